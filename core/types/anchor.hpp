@@ -1,0 +1,59 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/ids.hpp"
+#include "core/base/time.hpp"
+#include "core/types/estimate.hpp"
+
+namespace anchord {
+
+/// A place on earth with its own origin and outline.
+struct Site {
+  SiteId id{};
+  std::string name;
+  std::optional<Wgs84> origin{};     ///< of the ENU frame; absent: the first fixed position of its first mission
+  std::string outline_geojson;       ///< polygon, or empty
+  std::string crs_frame;             ///< datum of the base, e.g. "ETRS89"; empty = unknown
+  std::optional<double> crs_epoch{};
+  std::optional<double> base_sigma_m{};  ///< of the base station's own coordinates
+  std::string base_source;           ///< known_point, survey_in, network or empty
+  UtcTime created{};
+  std::uint64_t version{1};          ///< for ETag
+};
+
+/// Identity and facility-management data of one anchor; positions live in calibrations.
+struct Anchor {
+  AnchorId id{};
+  NetworkId network_id{};
+  std::optional<SiteId> site{};
+  std::string name, building, floor, space, asset_tag, ifc_guid;
+  std::vector<std::pair<std::string, std::string>> external_ids;  ///< system, id
+  bool retired{false};
+  UtcTime created{};
+  std::uint64_t version{1};
+};
+
+/// Result of one batch solve over missions. Never changes once finished.
+struct Calibration {
+  CalibrationId id{};
+  std::vector<MissionId> missions;
+  TrackFrame frame{TrackFrame::wgs84};
+  std::optional<Wgs84> origin{};  ///< of the ENU numbers
+  std::string settings_json;      ///< the request as accepted
+  UtcTime created{};
+  std::vector<Estimate> anchors;
+};
+
+/// A published state of all anchors: what facility tools read.
+struct Revision {
+  std::uint64_t number{};
+  CalibrationId calibration{};
+  UtcTime published{};
+  std::string by;    ///< token id
+  std::string note;
+};
+
+}  // namespace anchord

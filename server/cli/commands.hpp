@@ -1,0 +1,13 @@
+#pragma once
+
+namespace CLI {
+class App;
+}
+
+/// Each subcommand lives in its own file and adds itself to the app; its callback sets the exit code.
+/// Exit codes: 0 done, 1 failed, 2 unusable input or arguments.
+namespace anchord::cli {
+
+void add_version_command(CLI::App& app, int& exit_code);
+
+}  // namespace anchord::cli

@@ -1,0 +1,16 @@
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "server/cli/commands.hpp"
+
+namespace anchord::cli {
+
+void add_version_command(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("version", "Print the version");
+  command->callback([&exit_code] {
+    std::printf("anchord %s\n", ANCHORD_VERSION);
+    exit_code = 0;
+  });
+}
+
+}  // namespace anchord::cli

@@ -1,0 +1,17 @@
+#include <CLI/CLI.hpp>
+
+#include "server/cli/commands.hpp"
+
+int main(int argc, char** argv) {
+  CLI::App app{"anchord: finds where a building's UWB anchors are on the globe", "anchord"};
+  app.require_subcommand(1);
+  int exit_code = 0;
+  anchord::cli::add_version_command(app, exit_code);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const int code = app.exit(error);
+    return code == 0 ? 0 : 2;
+  }
+  return exit_code;
+}
