@@ -1,0 +1,78 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "api/http/router.hpp"
+#include "api/live/ws_handler.hpp"
+
+namespace anchord {
+class AccessStore;
+class AnchorStore;
+class Clock;
+class JobStore;
+class MeasurementStore;
+class MissionStore;
+}  // namespace anchord
+
+namespace anchord::api {
+
+class AccessService;
+class Hub;
+
+struct BuildInfo {
+  std::string version, git, build, compiler;
+  std::int64_t schema{0};  ///< of the database
+};
+
+/// State of storage as the world may know it.
+struct StorageStatus {
+  bool writable{true};
+  std::string reason;  ///< why not, in words
+  std::uint64_t db_bytes{0}, disk_free_bytes{0}, queue_depth{0};
+  std::string synchronous{"full"};
+};
+
+/// Everything above the sockets: routes, services and live topics over the ports. Built by the composition root
+/// with the stores, run by the server. Thread-safe once start() returned.
+class Application {
+ public:
+  struct Deps {
+    MeasurementStore& measurements;
+    MissionStore& missions;
+    AnchorStore& anchors;
+    JobStore& jobs;
+    AccessStore& access_store;
+    const Clock& clock;
+    BuildInfo build{};
+    AccessService* access{nullptr};  ///< tokens, sessions, tickets; null: those routes do not exist (tests)
+    /// Runs a task on the pool; absent: on the calling thread.
+    std::function<void(std::function<void()>)> post{};
+    std::function<StorageStatus()> storage_status{};
+    std::function<std::string()> metrics_text{};  ///< Prometheus text of the server, appended to ours
+    std::function<void(std::string_view request_id, std::string_view what)> log_fault{};
+    bool auth_off{false};
+  };
+
+  explicit Application(Deps deps);
+  ~Application();
+  Application(const Application&) = delete;
+  Application& operator=(const Application&) = delete;
+
+  Router& router();
+  WsHandlerFactory ws_factory();
+  Hub& hub();
+  /// Marks jobs of the last run as interrupted, starts heartbeats and the job thread.
+  void start();
+  /// Says bye to WebSocket clients, parks jobs, joins. Idempotent.
+  void stop();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace anchord::api
