@@ -1,0 +1,24 @@
+# build_preset PRESET [ninja targets...]: configure and build, with progress.
+build_preset() {
+  local preset=$1 ; shift
+  local -a settings=()
+  [[ -d $private_boost_dir/usr ]] && settings+=("-DCMAKE_PREFIX_PATH=$PWD/$private_boost_dir/usr")
+  say "configuring $preset"
+  cmake --preset "$preset" "${settings[@]}" || die "cmake --preset $preset failed: its own message stands above"
+  say "building $preset with $(jobs_count) jobs"
+  NINJA_STATUS='[%f/%t %es] ' ninja -C "build/$preset" -j "$(jobs_count)" "$@" ||
+    die "the build failed: its own message stands above"
+}
+
+cmd_build() {
+  install_packages
+  ensure_node
+  build_preset release "$@"
+  say "built $build_dir/anchord"
+}
+
+cmd_clean() {
+  # The database of ./dev run and private tools go too: everything the project makes lies in build/ and node_modules.
+  rm -rf build web/node_modules tests/node_modules
+  say "removed build/, web/node_modules, tests/node_modules"
+}

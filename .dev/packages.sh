@@ -1,0 +1,63 @@
+# Installs what .ci/packages lists and this machine lacks. Silent and offline when nothing is missing.
+
+# Names of the wanted groups: `package_names` alone gives the ungrouped ones, `package_names lint` those and @lint.
+package_names() {
+  awk -v groups=" $* " '
+    { sub(/#.*/, "") }
+    NF == 0 { next }
+    NF == 1 { print $1; next }
+    index(groups, " " substr($2, 2) " ") { print $1 }' .ci/packages
+}
+
+is_installed() { [[ $(dpkg-query -W -f='${db:Status-Status}' "$1" 2>/dev/null) == installed ]]; }
+
+# apt-get as root, without questions.
+apt() {
+  local -a root=()
+  if ((EUID != 0)); then
+    command -v sudo >/dev/null || die "not root and no sudo: run as root: apt-get install -y --no-install-recommends $missing_text"
+    root=(sudo)
+  fi
+  "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -q "$@"
+}
+
+# libboost1.81-dev declares a conflict with every other libboost*-dev. Where such a one is installed it stays (other
+# software of the machine may want it): ours is unpacked below build/ and found there, headers are all we use.
+private_boost_dir=build/boost-1.81
+other_boost() {
+  dpkg-query -W -f='${Package} ${db:Status-Status}\n' 'libboost1.*-dev' 2>/dev/null |
+    awk '$2 == "installed" && $1 ~ /^libboost1\.[0-9]+-dev$/ && $1 != "libboost1.81-dev" {print $1; exit}'
+}
+unpack_private_boost() {
+  [[ -e $private_boost_dir/usr/include/boost/version.hpp ]] && return
+  say "$1 is installed and conflicts with libboost1.81-dev: unpacking the latter into $private_boost_dir"
+  rm -rf "$private_boost_dir" && mkdir -p "$private_boost_dir/deb"
+  (cd "$private_boost_dir/deb" && apt-get -q download libboost1.81-dev) ||
+    die "cannot download Debian package libboost1.81-dev: are the sources and the network in order? (apt-get update)"
+  dpkg -x "$private_boost_dir"/deb/*.deb "$private_boost_dir"
+}
+
+# install_packages [GROUP...]
+install_packages() {
+  command -v dpkg-query >/dev/null && command -v apt-get >/dev/null ||
+    die "this needs Debian 12: no apt-get here. Install the packages of .ci/packages by other means and call cmake --preset release"
+  local -a missing=() ; local name boost_conflict missing_text
+  boost_conflict=$(other_boost)
+  while read -r name; do
+    [[ $name == libboost1.81-dev && -n $boost_conflict ]] && continue
+    is_installed "$name" || missing+=("$name")
+  done < <(package_names "$@")
+  if ((${#missing[@]})); then
+    missing_text="${missing[*]}"
+    say "installing ${#missing[@]} Debian packages: $missing_text"
+    apt update || say "apt-get update failed: going on with the package lists at hand"
+    for name in "${missing[@]}"; do
+      apt-cache show "$name" >/dev/null 2>&1 ||
+        die "Debian package '$name' is not available from the sources of this machine (needed: Debian 12 bookworm, main)"
+    done
+    # --no-remove: nothing of the user's goes away for our sake.
+    apt install -y --no-install-recommends --no-remove "${missing[@]}" ||
+      die "apt-get could not install: $missing_text (its own message stands above)"
+  fi
+  if [[ -n $boost_conflict ]]; then unpack_private_boost "$boost_conflict"; fi
+}
