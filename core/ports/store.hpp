@@ -21,8 +21,21 @@ namespace anchord {
 /// What became of one row: the same identity with other content is a conflict, and the stored row stays.
 enum class RowOutcome : std::uint8_t { accepted, duplicate, conflict, unknown_mission };
 
-/// Measurements. append_* return after the commit is on the disk (fsynced); one call is one transaction, and
-/// concurrent calls share one commit. Errors: storage_full, storage_unavailable, queue_full.
+/// A radio heard in a mission, kept up to date by the appends.
+struct DeviceSeen {
+  enum class Kind : std::uint8_t { tag, anchor };
+  NetworkId network_id{};
+  Kind kind{Kind::anchor};
+  MissionId mission{};
+  UtcTime first_seen{}, last_seen{};  ///< measured times
+  std::uint64_t n_ranges{};
+};
+
+/// Measurements. append_* return after the commit is on the disk (fsynced); concurrent calls share one commit.
+/// Outcomes stand in the order of the rows. With `atomic`, one row that is a conflict or of an unknown mission stores
+/// none of the call (the outcomes tell which; rows that would have been stored say `accepted`, so look for a bad one).
+/// The same identity and content (arrival time aside) is a duplicate. Callable from any thread; blocks.
+/// Errors of every port: storage_full, storage_unavailable, queue_full; not_found and conflict as named.
 class MeasurementStore {
  public:
   virtual ~MeasurementStore() = default;
@@ -42,13 +55,21 @@ class MeasurementStore {
   template <class Row>
   struct Page {
     std::vector<Row> rows;
-    std::string next;  ///< empty at the end
+    std::vector<std::int64_t> ids;  ///< row ids, parallel to rows: the {id} of /ranges/{id}
+    std::string next;               ///< empty at the end
   };
   virtual Result<Page<Range>> ranges(const Filter& filter) = 0;
   virtual Result<Page<Fix>> fixes(const Filter& filter) = 0;
+  virtual Result<Range> range(std::int64_t id) = 0;  ///< with CIR and truth
   virtual Result<std::uint64_t> count_ranges(const MissionId& mission) = 0;
+  virtual Result<std::uint64_t> count_fixes(const MissionId& mission) = 0;
+  /// All radios of one mission, or of all (one row per mission and device), newest first.
+  virtual Result<std::vector<DeviceSeen>> devices(const std::optional<MissionId>& mission) = 0;
 };
 
+/// Flights, newest first in lists (`after`: the last id of the page before). insert answers storage_full already when
+/// little space is left, so that a flight that runs can finish. remove takes the measurements along; conflict when a
+/// calibration was made from it.
 class MissionStore {
  public:
   virtual ~MissionStore() = default;
@@ -59,7 +80,18 @@ class MissionStore {
   virtual Result<void> remove(const MissionId& id) = 0;
 };
 
-/// Sites, anchors and their published positions. Updates name the version they change: conflict when it moved on.
+/// Position of one anchor in a published revision.
+struct PublishedPosition {
+  std::uint64_t since_revision{};  ///< the revision that set it; later ones carried it on
+  CalibrationId calibration{};
+  UtcTime published{};
+  TrackFrame frame{TrackFrame::wgs84};
+  std::optional<Wgs84> origin{};
+  Estimate estimate{};
+};
+
+/// Sites, anchors and their published positions. Updates name the version they change: conflict when it moved on;
+/// the stored version becomes expected_version + 1. Lists are in id order, calibrations and revisions newest first.
 class AnchorStore {
  public:
   virtual ~AnchorStore() = default;
@@ -79,9 +111,17 @@ class AnchorStore {
   virtual Result<Calibration> calibration(const CalibrationId& id) = 0;
   virtual Result<std::vector<Calibration>> calibrations(std::size_t limit,
                                                         const std::optional<CalibrationId>& after) = 0;
-  virtual Result<Revision> publish(const CalibrationId& id, std::string_view by, std::string_view note,
-                                   UtcTime now) = 0;
+  virtual Result<void> remove(const CalibrationId& id) = 0;  ///< conflict when a revision uses it
+  /// A new revision: the named anchors (each with a position in the calibration, else invalid_argument) take their
+  /// position from it, all others keep that of the revision before. Which verdicts may be published is not decided here.
+  virtual Result<Revision> publish(const CalibrationId& id, const std::vector<NetworkId>& anchors,
+                                   std::string_view by, std::string_view note, UtcTime now) = 0;
+  /// before: 0 for the newest page.
   virtual Result<std::vector<Revision>> revisions(std::size_t limit, std::uint64_t before) = 0;
+  /// All positions of a revision, of the newest when absent (empty when nothing was ever published).
+  virtual Result<std::vector<PublishedPosition>> published(std::optional<std::uint64_t> revision) = 0;
+  /// Every position ever published of one anchor, newest first.
+  virtual Result<std::vector<PublishedPosition>> history(NetworkId network_id) = 0;
 };
 
 /// Access tokens: only the hash of the secret is stored.
@@ -99,11 +139,13 @@ class TokenStore {
   virtual ~TokenStore() = default;
   virtual Result<void> insert(const Token& token) = 0;
   virtual Result<Token> token(const TokenId& id) = 0;
+  virtual Result<Token> token_by_secret(std::string_view secret_sha256_hex) = 0;
   virtual Result<std::vector<Token>> tokens() = 0;
+  virtual Result<void> touch(const TokenId& id, UtcTime now) = 0;  ///< last used; call it at most once a minute
   virtual Result<void> revoke(const TokenId& id, UtcTime now) = 0;
 };
 
-/// Long work, visible and cancellable; survives a restart as `interrupted`.
+/// Long work, visible and cancellable. At start the server calls fail_unfinished, for nothing runs then.
 enum class JobState : std::uint8_t { queued, running, succeeded, failed, canceled };
 struct Job {
   JobId id{};
@@ -121,7 +163,9 @@ class JobStore {
   virtual Result<void> insert(const Job& job) = 0;
   virtual Result<void> update(const Job& job) = 0;
   virtual Result<Job> job(const JobId& id) = 0;
-  virtual Result<std::vector<Job>> jobs(std::size_t limit, const std::optional<JobId>& after) = 0;
+  virtual Result<std::vector<Job>> jobs(std::size_t limit, const std::optional<JobId>& after) = 0;  ///< newest first
+  /// Queued and running jobs become failed with this problem; says how many.
+  virtual Result<std::size_t> fail_unfinished(UtcTime now, std::string_view problem_json) = 0;
 };
 
 /// Answers kept for Idempotency-Key (24 h), and the append-only audit log with its hash chain.
@@ -139,9 +183,13 @@ class AccessStore {
  public:
   virtual ~AccessStore() = default;
   virtual Result<std::optional<StoredAnswer>> answer(std::string_view principal, std::string_view key) = 0;
+  /// Conflict when the principal has an answer under this key already.
   virtual Result<void> keep_answer(const StoredAnswer& answer) = 0;
+  virtual Result<std::size_t> drop_answers_before(UtcTime time) = 0;
   virtual Result<void> append_audit(const AuditEntry& entry) = 0;
-  virtual Result<std::vector<AuditEntry>> audit(std::size_t limit) = 0;
+  virtual Result<std::vector<AuditEntry>> audit(std::size_t limit) = 0;  ///< newest first
+  /// conflict, naming the entry, when the hash chain is broken.
+  virtual Result<void> verify_audit() = 0;
 };
 
 }  // namespace anchord

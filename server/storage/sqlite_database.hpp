@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "core/base/result.hpp"
+#include "core/ports/store.hpp"
+
+namespace anchord {
+
+/// What a commit waits for; docs/durability.md says what survives which accident.
+enum class Synchronous : std::uint8_t { normal, full, extra };
+
+struct StorageOptions {
+  std::filesystem::path data_dir;               ///< made with mode 0700 when absent
+  Synchronous synchronous{Synchronous::full};   ///< the one that keeps acknowledged rows over a power cut
+  std::size_t readers{3};                       ///< read-only connections
+  std::size_t max_queued_rows{200'000};         ///< beyond it an append answers queue_full
+  std::size_t max_queued_calls{1'000};
+  std::uint64_t checkpoint_wal_bytes{16u << 20};  ///< the writer moves the WAL into the database beyond this
+  std::uint64_t warn_free_bytes{std::uint64_t{2} << 30};
+  std::uint64_t refuse_free_bytes{500u << 20};  ///< below: no new missions
+  std::uint64_t reserve_bytes{64u << 20};       ///< file given up to let a running flight finish; 0: none
+  std::optional<std::uint32_t> max_pages{};     ///< limit of the file in pages of 8 KiB (quota)
+  bool full_check{false};                       ///< integrity_check instead of quick_check at start
+};
+
+enum class StorageLevel : std::uint8_t {
+  ok,
+  disk_low,     ///< below warn_free_bytes
+  disk_scarce,  ///< below refuse_free_bytes, or living on the reserve: no new missions
+  full,         ///< the last write found no space
+  unavailable,  ///< the last write failed; reopening is tried
+};
+std::string to_string(StorageLevel level);
+std::string to_string(Synchronous synchronous);
+
+struct StorageHealth {
+  StorageLevel level{StorageLevel::ok};
+  std::string reason;  ///< in words; empty when ok
+  bool writable() const { return level < StorageLevel::full; }
+  std::size_t queued_calls{}, queued_rows{};
+  std::uint64_t db_bytes{}, wal_bytes{}, disk_free_bytes{};
+  std::uint64_t commits{}, rows_written{};
+  double last_commit_s{};
+  int schema_version{};
+  Synchronous synchronous{Synchronous::full};
+};
+
+struct BackupReport {
+  std::filesystem::path file;
+  std::uint64_t bytes{};
+  std::string sha256_hex;  ///< also written beside it as <file>.sha256
+};
+
+/// An open data folder. Everything may be called from any thread; the destructor finishes queued writes,
+/// checkpoints and closes.
+class Database {
+ public:
+  virtual ~Database() = default;
+  virtual MeasurementStore& measurements() = 0;
+  virtual MissionStore& missions() = 0;
+  virtual AnchorStore& anchors() = 0;
+  virtual TokenStore& tokens() = 0;
+  virtual JobStore& jobs() = 0;
+  virtual AccessStore& access() = 0;
+  virtual StorageHealth health() = 0;
+  /// Online copy while writes go on: fsynced, integrity-checked, with its SHA-256. The file must not exist.
+  virtual Result<BackupReport> backup(const std::filesystem::path& file) = 0;
+};
+
+/// Opens (first time: makes) DIR/anchord.db, migrates it, checks it. Messages are for the operator's terminal.
+/// Errors: conflict (another process has the folder), unsupported (made by a newer anchord, or not by anchord; the
+/// file is untouched), storage_unavailable (damaged, or missing where one was: with the commands that recover),
+/// storage_full.
+Result<std::unique_ptr<Database>> open_database(const StorageOptions& options);
+
+/// Short word of the backend's version for /version: the newest migration this program knows.
+int newest_schema_version();
+
+}  // namespace anchord
