@@ -1,0 +1,3 @@
+import { render } from 'preact';
+
+render(<main>anchord</main>, document.getElementById('app')!);
