@@ -1,0 +1,170 @@
+#include "core/nlos/features.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace anchord::nlos {
+namespace {
+
+constexpr std::array<std::string_view, k_feature_count> k_names{
+    "range_m", "range_db", "rx_dbm", "fp_dbm", "rx_minus_fp_db", "noise_excess_db", "fp_snr_db", "total_snr_db", "preamble_db",
+    "fp_shape12_db", "fp_shape32_db", "rx_free_space_db", "fp_free_space_db", "fp_index", "max_noise_db", "kurtosis",
+    "mean_excess_delay_ns", "rms_delay_spread_ns", "early_energy", "peak_delay_ns", "height_difference_m", "heading_deg",
+    "log_range_spread", "log_fp_spread", "log_rx_minus_fp_spread"};
+
+// 5 % quantile of 20 log10(s / sqrt N) of the register in three public sets; of CIR noise taps it lies 10 dB higher.
+constexpr double k_noise_floor_db = 7.4;
+constexpr double k_cir_noise_floor_db = 17.4;
+
+std::optional<double> positive(std::optional<double> value) {
+  return value && *value > 0 && std::isfinite(*value) ? value : std::nullopt;
+}
+
+double db20(double ratio) { return 20 * std::log10(ratio); }
+
+std::optional<double> difference(std::optional<double> a, std::optional<double> b) {
+  if (!a || !b) return std::nullopt;
+  return *a - *b;
+}
+
+void set_levels(const DiagnosticSample& s, FeatureVector& out, std::optional<double>& rx, std::optional<double>& fp) {
+  const auto n = positive(s.preamble_count);
+  const auto c = positive(s.cir_power);
+  const bool amplitudes = s.fp_amp1 && s.fp_amp2 && s.fp_amp3;
+  rx = c && n ? received_dbm(*c, *n, s.prf) : s.rx_dbm;
+  fp = amplitudes && n ? first_path_dbm(*s.fp_amp1, *s.fp_amp2, *s.fp_amp3, *n, s.prf) : s.fp_dbm;
+  std::optional<double> d = difference(rx, fp);
+  if (c && amplitudes) d = power_difference_db(*c, *s.fp_amp1, *s.fp_amp2, *s.fp_amp3);
+  if (s.cir && n) {   // computed from the CIR where no register said it
+    const double n2 = *n * *n;
+    if (!rx && s.cir->energy > 0) rx = 10 * std::log10(s.cir->energy / n2) - power_constant_db(s.prf);
+    if (!fp && s.cir->first_path_energy > 0) fp = 10 * std::log10(s.cir->first_path_energy / n2) - power_constant_db(s.prf);
+    if (!d) d = difference(rx, fp);
+  }
+  out.set(Feature::rx_dbm, rx);
+  out.set(Feature::fp_dbm, fp);
+  out.set(Feature::rx_minus_fp_db, d);
+}
+
+void set_noise(const DiagnosticSample& s, std::optional<double> rx, FeatureVector& out) {
+  const auto n = positive(s.preamble_count);
+  auto noise = positive(s.std_noise);
+  double floor_db = k_noise_floor_db;
+  if (!noise && s.cir) {
+    noise = positive(s.cir->noise_rms);
+    floor_db = k_cir_noise_floor_db;
+  }
+  if (!noise) return;
+  if (n) out.set(Feature::noise_excess_db, db20(*noise / std::sqrt(*n)) - floor_db);
+  if (s.fp_amp1 && s.fp_amp2 && s.fp_amp3) {
+    const double top = std::max({*s.fp_amp1, *s.fp_amp2, *s.fp_amp3});
+    if (top > 0) out.set(Feature::fp_snr_db, db20(top / *noise));
+  }
+  if (rx && n) out.set(Feature::total_snr_db, *rx + power_constant_db(s.prf) + db20(*n) - db20(*noise));
+  else if (const auto c = positive(s.cir_power)) out.set(Feature::total_snr_db, 10 * std::log10(*c * 131072.0) - db20(*noise));
+  if (const auto top = positive(s.max_noise)) out.set(Feature::max_noise_db, db20(*top / *noise));
+}
+
+double quantile(std::vector<double>& sorted, double q) {
+  const double at = q * static_cast<double>(sorted.size() - 1);
+  const auto low = static_cast<std::size_t>(at);
+  const auto high = std::min(low + 1, sorted.size() - 1);
+  return sorted[low] + (at - static_cast<double>(low)) * (sorted[high] - sorted[low]);
+}
+
+double sample_sd(std::span<const double> values) {
+  double mean = 0;
+  for (const double v : values) mean += v;
+  mean /= static_cast<double>(values.size());
+  double sum = 0;
+  for (const double v : values) sum += (v - mean) * (v - mean);
+  return std::sqrt(sum / static_cast<double>(values.size() - 1));
+}
+
+}  // namespace
+
+std::string_view feature_name(Feature feature) { return k_names.at(static_cast<std::size_t>(feature)); }
+
+std::optional<Feature> feature_of(std::string_view name) {
+  const auto* found = std::find(k_names.begin(), k_names.end(), name);
+  if (found == k_names.end()) return std::nullopt;
+  return static_cast<Feature>(found - k_names.begin());
+}
+
+void FeatureVector::set(Feature feature, std::optional<double> value) {
+  if (!value || !std::isfinite(*value)) return;
+  values[static_cast<std::size_t>(feature)] = *value;
+  present.set(static_cast<std::size_t>(feature));
+}
+
+std::optional<double> FeatureVector::get(Feature feature) const {
+  const auto at = static_cast<std::size_t>(feature);
+  if (!present.test(at)) return std::nullopt;
+  return values[at];
+}
+
+FeatureVector compute_features(const DiagnosticSample& s) {
+  FeatureVector out;
+  std::optional<double> rx, fp;
+  set_levels(s, out, rx, fp);
+  set_noise(s, rx, out);
+  const auto range = positive(s.range_m);
+  if (range) {
+    out.set(Feature::range_m, *range);
+    out.set(Feature::range_db, db20(*range));
+    if (rx) out.set(Feature::rx_free_space_db, *rx + db20(*range));
+    if (fp) out.set(Feature::fp_free_space_db, *fp + db20(*range));
+  }
+  if (const auto n = positive(s.preamble_count)) out.set(Feature::preamble_db, db20(*n));
+  const auto f1 = positive(s.fp_amp1), f2 = positive(s.fp_amp2), f3 = positive(s.fp_amp3);
+  if (f1 && f2) out.set(Feature::fp_shape12_db, db20(*f1 / *f2));
+  if (f3 && f2) out.set(Feature::fp_shape32_db, db20(*f3 / *f2));
+  out.set(Feature::fp_index, s.fp_index ? s.fp_index : s.cir ? std::optional{s.cir->first_path_idx} : std::nullopt);
+  out.set(Feature::height_difference_m, s.height_difference_m);
+  out.set(Feature::heading_deg, s.heading_deg);
+  out.set(Feature::kurtosis, s.kurtosis);
+  if (s.cir) {
+    out.set(Feature::kurtosis, s.cir->kurtosis);
+    out.set(Feature::mean_excess_delay_ns, s.cir->mean_excess_delay_ns);
+    out.set(Feature::rms_delay_spread_ns, s.cir->rms_delay_spread_ns);
+    out.set(Feature::early_energy, s.cir->early_energy);
+    out.set(Feature::peak_delay_ns, s.cir->peak_delay_ns);
+  }
+  return out;
+}
+
+void compute_features(std::span<const DiagnosticSample> samples, std::span<FeatureVector> out) {
+  for (std::size_t i = 0; i < samples.size(); ++i) out[i] = compute_features(samples[i]);
+}
+
+FeatureVector aggregate_at_rest(std::span<const FeatureVector> repeats) {
+  FeatureVector out;
+  if (repeats.empty()) return out;
+  std::vector<double> column(repeats.size());
+  for (std::size_t f = 0; f < k_feature_count; ++f) {
+    if (!std::all_of(repeats.begin(), repeats.end(), [f](const auto& r) { return r.present.test(f); })) continue;
+    for (std::size_t i = 0; i < repeats.size(); ++i) column[i] = repeats[i].values[f];
+    const auto feature = static_cast<Feature>(f);
+    if (repeats.size() >= 3 && feature == Feature::range_m)
+      out.set(Feature::log_range_spread, std::log(0.005 + sample_sd(column)));
+    std::sort(column.begin(), column.end());
+    out.set(feature, quantile(column, 0.5));
+    if (repeats.size() < 3 || (feature != Feature::fp_dbm && feature != Feature::rx_minus_fp_db)) continue;
+    const double spread = (quantile(column, 0.9) - quantile(column, 0.1)) / 2.56;
+    out.set(feature == Feature::fp_dbm ? Feature::log_fp_spread : Feature::log_rx_minus_fp_spread, std::log(0.01 + spread));
+  }
+  return out;
+}
+
+void RangeSpread::add(double range_m) {
+  if (!(range_m > 0) || !std::isfinite(range_m)) return;
+  if (ranges_m_.size() == capacity_) ranges_m_.erase(ranges_m_.begin());
+  ranges_m_.push_back(range_m);
+}
+
+std::optional<double> RangeSpread::sd_m() const {
+  if (ranges_m_.size() < 3) return std::nullopt;
+  return sample_sd(ranges_m_);
+}
+
+}  // namespace anchord::nlos

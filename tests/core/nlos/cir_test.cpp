@@ -1,0 +1,100 @@
+#include "core/nlos/cir.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+namespace anchord::nlos {
+namespace {
+
+// One nanosecond a tap, no noise taps, a window of 100 taps from the first path on: delays come out in taps.
+CirOptions plain_window(std::size_t taps) {
+  CirOptions o;
+  o.tap_ns = 1;
+  o.noise_begin = 0;
+  o.noise_end = 0;
+  o.window_before = 0;
+  o.window_after = taps - 1;
+  return o;
+}
+
+}  // namespace
+
+// w equal taps in a window of n: |h| is Bernoulli with p = w / n, so kurtosis = (1 - 3 p (1 - p)) / (p (1 - p));
+// delays are those of a discrete uniform variable: (w - 1) / 2 and sqrt((w^2 - 1) / 12).
+TEST(CirShape, OfARectangleMatchesTheClosedForm) {
+  std::vector<float> h(200, 0.0F);
+  for (std::size_t k = 50; k < 50 + 21; ++k) h[k] = 700.0F;
+  const auto shape = cir_shape(h, 50.0, plain_window(100));
+  ASSERT_TRUE(shape);
+  const double p = 0.21;
+  EXPECT_NEAR(shape->kurtosis, (1 - 3 * p * (1 - p)) / (p * (1 - p)), 1e-9);
+  EXPECT_NEAR(shape->mean_excess_delay_ns, 10, 1e-12);
+  EXPECT_NEAR(shape->rms_delay_spread_ns, std::sqrt((21.0 * 21.0 - 1) / 12), 1e-9);
+  EXPECT_NEAR(shape->early_energy, 13.0 / 21.0, 1e-12);
+  EXPECT_NEAR(shape->energy, 21 * 700.0 * 700.0, 1e-6);
+}
+
+// Powers P1 at 0 and P2 at T: mean T P2 / (P1 + P2), spread T sqrt(P1 P2) / (P1 + P2).
+TEST(CirShape, OfTwoDeltasMatchesTheClosedForm) {
+  std::vector<float> h(200, 0.0F);
+  h[60] = 300.0F;
+  h[100] = 600.0F;
+  const auto shape = cir_shape(h, 60.0, plain_window(100));
+  ASSERT_TRUE(shape);
+  EXPECT_NEAR(shape->mean_excess_delay_ns, 40 * 4.0 / 5.0, 1e-12);
+  EXPECT_NEAR(shape->rms_delay_spread_ns, 40 * 2.0 / 5.0, 1e-9);
+  EXPECT_NEAR(shape->peak_delay_ns, 40, 1e-12);
+  EXPECT_NEAR(shape->early_energy, 0.2, 1e-12);
+}
+
+// Power r^k: a geometric variable, mean r / (1 - r), variance r / (1 - r)^2; 300 taps leave 1e-13 of it out.
+TEST(CirShape, OfAnExponentialDecayMatchesTheClosedForm) {
+  const double r = 0.9;
+  std::vector<float> h(400, 0.0F);
+  for (std::size_t k = 0; k < 300; ++k) h[50 + k] = static_cast<float>(1e4 * std::pow(r, 0.5 * static_cast<double>(k)));
+  const auto shape = cir_shape(h, 50.0, plain_window(300));
+  ASSERT_TRUE(shape);
+  EXPECT_NEAR(shape->mean_excess_delay_ns, r / (1 - r), 1e-5);          // floats carry seven digits
+  EXPECT_NEAR(shape->rms_delay_spread_ns, std::sqrt(r) / (1 - r), 1e-5);
+}
+
+TEST(CirShape, IsTheSameForComplexTapsAndTheirMagnitude) {
+  std::vector<std::int16_t> re_im;
+  std::vector<float> magnitude;
+  for (int k = 0; k < 1016; ++k) {
+    const auto re = static_cast<std::int16_t>((k * 37) % 61 - 30 + (k >= 746 && k < 760 ? 3000 : 0));
+    const auto im = static_cast<std::int16_t>((k * 53) % 59 - 29);
+    re_im.insert(re_im.end(), {re, im});
+    magnitude.push_back(std::hypot(static_cast<float>(re), static_cast<float>(im)));
+  }
+  const auto a = cir_shape(re_im, 746.3);
+  const auto b = cir_shape(magnitude, 746.3);
+  ASSERT_TRUE(a && b);
+  EXPECT_NEAR(a->kurtosis, b->kurtosis, 1e-4);
+  EXPECT_NEAR(a->rms_delay_spread_ns, b->rms_delay_spread_ns, 1e-4);
+}
+
+// A ramp from noise of rms 10 (threshold 64): taps 0, 100 at 745, 746 cross 64 at 745.64.
+TEST(CirShape, FindsTheFirstPathByTheInterpolatedCrossing) {
+  std::vector<float> h(1016, 10.0F);
+  h[745] = 0.0F;
+  for (std::size_t k = 746; k < 752; ++k) h[k] = 100.0F;
+  h[700] = 500.0F;   // one lonely tap is no path
+  const auto shape = cir_shape(h, std::nullopt);
+  ASSERT_TRUE(shape);
+  EXPECT_NEAR(shape->first_path_idx, 745.64, 1e-6);
+  EXPECT_NEAR(shape->noise_rms, 10, 1e-6);
+}
+
+TEST(CirShape, HasNoValueWithoutSignalOrWithAnImpossibleFirstPath) {
+  EXPECT_FALSE(cir_shape(std::vector<float>(1016, 5.0F), std::nullopt));
+  EXPECT_FALSE(cir_shape(std::vector<float>(1016, 0.0F), 746.0));
+  EXPECT_FALSE(cir_shape(std::vector<float>{}, 0.0));
+  EXPECT_FALSE(cir_shape(std::vector<float>(1016, 5.0F), 2000.0));
+  EXPECT_FALSE(cir_shape(std::vector<float>(1016, 5.0F), -3.0));
+  EXPECT_FALSE(cir_shape(std::vector<float>(1016, 5.0F), std::nan("")));
+}
+
+}  // namespace anchord::nlos
