@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -29,6 +30,16 @@ struct Principal {
     }
     return false;
   }
+};
+
+/// A body that did not arrive whole: 408 time-out, 413 excess, 400 lost peer or broken framing.
+class BodyError : public std::runtime_error {
+ public:
+  BodyError(int status, const std::string& what) : std::runtime_error(what), status_(status) {}
+  int status() const { return status_; }
+
+ private:
+  int status_;
 };
 
 /// Pulls a request body that is too large to hold. The server reads the socket inside read().

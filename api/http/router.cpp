@@ -228,6 +228,9 @@ Response Router::dispatch(const Route& route, Request& request) const {
     } else {
       response = guarded(request);
     }
+  } catch (const BodyError& lost) {
+    response = problem(lost.status(), lost.status() == 413 ? "too-large" : "malformed", lost.what());
+    response.header("Connection", "close");
   } catch (const std::bad_alloc&) {
     response = problem(503, "overloaded", "out of memory");
     if (state_->fault) state_->fault(request.request_id, "out of memory");
