@@ -1,0 +1,58 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string_view>
+#include <vector>
+
+#include "core/base/ids.hpp"
+#include "core/types/position.hpp"
+
+namespace anchord::sim {
+
+/// What a panel is made of. The excess delay of a crossing is (sqrt(permittivity) - 1) * thickness / cos(incidence),
+/// the extra optical path of a dielectric slab; its loss is `loss_db` at right angles, divided by the same cosine.
+/// Values for 4 to 6.5 GHz in the middle of ITU-R P.2040-3 table 3 (permittivity) and of published UWB wall tests.
+struct Material {
+  std::string_view name;
+  double relative_permittivity{};
+  double loss_db{};
+};
+inline constexpr Material k_glass{"glass", 6.3, 2.0};
+inline constexpr Material k_brick{"brick", 3.9, 7.0};
+inline constexpr Material k_concrete{"concrete", 5.2, 14.0};
+inline constexpr Material k_plasterboard{"plasterboard", 2.7, 1.5};
+
+/// A flat rectangular piece of wall, window or ceiling; ENU metres.
+struct Panel {
+  Eigen::Vector3d corner_m{0, 0, 0};
+  Eigen::Vector3d side_a_m{0, 0, 0}, side_b_m{0, 0, 0};  ///< at right angles to each other
+  double thickness_m{};
+  Material material{};
+};
+
+struct WorldAnchor {
+  NetworkId id{};
+  Eigen::Vector3d enu_m{0, 0, 0};
+};
+
+/// What stands on the site, in ENU metres of `origin`.
+struct World {
+  Wgs84 origin{};
+  double length_m{30}, width_m{20}, height_m{8};  ///< of the building: x 0..length, y 0..width, z 0..height
+  std::vector<Panel> panels;
+  std::vector<WorldAnchor> anchors;
+};
+
+/// The demonstration building: 30 x 20 x 8 m with glass fronts between brick piers, a concrete stair core, plasterboard
+/// partitions and a concrete roof; six anchors inside, at 2.4 to 6.6 m.
+World demonstration_world();
+
+/// What lies on the straight line between two points.
+struct Obstruction {
+  double excess_m{};  ///< extra path, so that ranges come out long by this much
+  double loss_db{};
+  int panels{};
+};
+Obstruction obstruction_between(const World& world, const Eigen::Vector3d& a_m, const Eigen::Vector3d& b_m);
+
+}  // namespace anchord::sim
