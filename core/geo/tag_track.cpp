@@ -1,0 +1,127 @@
+#include "core/geo/tag_track.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace anchord {
+namespace {
+
+double default_sigma_m(FixClass fix) {
+  // RTK promises 20 mm (dissertation 3.2.3, 7.2.3); the others are the usual orders of magnitude of their class.
+  switch (fix) {
+    case FixClass::rtk_fixed: return 0.02;
+    case FixClass::rtk_float: return 0.4;
+    case FixClass::dgps: return 1.0;
+    case FixClass::single: return 3.0;
+    case FixClass::none: return 100.0;
+  }
+  return 100.0;
+}
+
+double gap_limit_s(std::span<const TrackPose> poses) {
+  // Some sources pause between bursts (0.3 s every few samples): a limit from the median would refuse most of those
+  // tracks, one from the largest interval would bridge real gaps.
+  std::vector<double> interval_s;
+  for (std::size_t i = 1; i < poses.size(); ++i) interval_s.push_back(poses[i].t_s - poses[i - 1].t_s);
+  if (interval_s.empty()) return 0.5;
+  const auto at = interval_s.begin() + static_cast<std::ptrdiff_t>(interval_s.size() * 9 / 10);
+  std::nth_element(interval_s.begin(), at, interval_s.end());
+  return std::clamp(3.0 * *at, 0.1, 0.5);
+}
+
+}  // namespace
+
+std::string_view to_string(TrackRefusal why) {
+  switch (why) {
+    case TrackRefusal::none: return "none";
+    case TrackRefusal::outside: return "outside_track";
+    case TrackRefusal::gap: return "track_gap";
+    case TrackRefusal::fix_class: return "fix_not_good_enough";
+  }
+  return "none";
+}
+
+TrackPose pose_of(const Fix& fix, const std::optional<EnuFrame>& frame, UtcTime epoch) {
+  TrackPose pose;
+  pose.t_s = seconds_between(epoch, fix.time);
+  pose.position_m = fix.frame == TrackFrame::wgs84 && frame ? frame->enu_from_wgs84(fix.position).m : fix.local_m;
+  if (fix.enu_from_body) pose.attitude = fix.enu_from_body->normalized();
+  const double sigma_m = default_sigma_m(fix.fix);
+  pose.covariance_m2 = fix.covariance_m2.value_or(Eigen::Matrix3d::Identity() * sigma_m * sigma_m);
+  pose.fix = fix.fix;
+  return pose;
+}
+
+TagPoint interpolate(const TrackPose& before, const TrackPose& after, double t_s,
+                     const Eigen::Vector3d& lever_arm_body_m) {
+  const double interval_s = after.t_s - before.t_s;
+  const double share = interval_s > 0 ? (t_s - before.t_s) / interval_s : 0.0;
+  TagPoint point;
+  point.covariance_m2 = (1.0 - share) * before.covariance_m2 + share * after.covariance_m2;
+  Eigen::Vector3d arm_before(0, 0, lever_arm_body_m.z());
+  Eigen::Vector3d arm_after = arm_before;
+  Eigen::Vector3d arm = arm_before;
+  if (before.attitude && after.attitude) {
+    const Eigen::Quaterniond now = before.attitude->slerp(share, *after.attitude);
+    point.body_up = now * Eigen::Vector3d::UnitZ();
+    arm = now * lever_arm_body_m;
+    arm_before = *before.attitude * lever_arm_body_m;
+    arm_after = *after.attitude * lever_arm_body_m;
+  }
+  point.position_m = (1.0 - share) * before.position_m + share * after.position_m + arm;
+  if (interval_s > 0) {
+    point.velocity_mps = (after.position_m + arm_after - before.position_m - arm_before) / interval_s;
+  }
+  return point;
+}
+
+TagTrack::TagTrack(std::span<const Fix> fixes, const std::optional<EnuFrame>& frame, UtcTime epoch,
+                   const TrackOptions& options)
+    : min_fix_(options.min_fix) {
+  poses_.reserve(fixes.size());
+  for (const Fix& fix : fixes) {
+    TrackPose pose = pose_of(fix, frame, epoch);
+    if (!std::isfinite(pose.t_s) || !pose.position_m.allFinite() || !pose.covariance_m2.allFinite()) continue;
+    poses_.push_back(std::move(pose));
+  }
+  std::ranges::stable_sort(poses_, [](const TrackPose& a, const TrackPose& b) {
+    return a.t_s != b.t_s ? a.t_s < b.t_s : a.fix > b.fix;  // the better of two at one instant comes first and stays
+  });
+  const auto twins = std::ranges::unique(poses_, {}, &TrackPose::t_s);
+  poses_.erase(twins.begin(), twins.end());
+  has_attitude_ = !poses_.empty() && std::ranges::all_of(poses_, [](const TrackPose& p) {
+    return p.attitude.has_value();
+  });
+  max_gap_s_ = options.max_gap_s.value_or(gap_limit_s(poses_));
+}
+
+TagPoint TagTrack::at(double t_s, const Eigen::Vector3d& lever_arm_body_m) const {
+  TagPoint point;
+  const auto after = std::ranges::upper_bound(poses_, t_s, {}, &TrackPose::t_s);
+  if (after == poses_.begin()) {
+    point.refused = TrackRefusal::outside;
+    return point;
+  }
+  const auto before = std::prev(after);
+  if (after == poses_.end()) {
+    point.refused = TrackRefusal::outside;
+    // The last epoch itself is not an extrapolation.
+    if (before->t_s < t_s) return point;
+    if (before->fix < min_fix_) {
+      point.refused = TrackRefusal::fix_class;
+      return point;
+    }
+    return interpolate(*before, *before, t_s, lever_arm_body_m);
+  }
+  if (after->t_s - before->t_s > max_gap_s_) {
+    point.refused = TrackRefusal::gap;
+    return point;
+  }
+  if (before->fix < min_fix_ || after->fix < min_fix_) {
+    point.refused = TrackRefusal::fix_class;
+    return point;
+  }
+  return interpolate(*before, *after, t_s, lever_arm_body_m);
+}
+
+}  // namespace anchord

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "core/base/time.hpp"
+#include "core/geo/enu.hpp"
+#include "core/types/fix.hpp"
+
+namespace anchord {
+
+/// One epoch of the track in the frame of the answer.
+struct TrackPose {
+  double t_s{};  ///< since the epoch of the track
+  Eigen::Vector3d position_m{0, 0, 0};
+  std::optional<Eigen::Quaterniond> attitude{};  ///< frame <- body
+  Eigen::Matrix3d covariance_m2{Eigen::Matrix3d::Zero()};
+  FixClass fix{FixClass::none};
+};
+
+/// Why the track says nothing about an instant.
+enum class TrackRefusal : std::uint8_t { none, outside, gap, fix_class };
+/// The word under which a refused range is counted: "outside_track", "track_gap", "fix_not_good_enough".
+std::string_view to_string(TrackRefusal why);
+
+/// A tag antenna at one instant.
+struct TagPoint {
+  TrackRefusal refused{TrackRefusal::none};
+  Eigen::Vector3d position_m{0, 0, 0};  ///< of the antenna
+  Eigen::Vector3d velocity_mps{0, 0, 0};
+  Eigen::Vector3d body_up{0, 0, 1};     ///< unit vector, for the vertical antenna offset
+  Eigen::Matrix3d covariance_m2{Eigen::Matrix3d::Zero()};
+};
+
+struct TrackOptions {
+  FixClass min_fix{FixClass::rtk_fixed};
+  std::optional<double> max_gap_s{};  ///< absent: 3 x the 90th percentile interval, within [0.1, 0.5] s
+};
+
+/// Where a tag antenna was at any instant between two epochs of the track.
+///
+/// Position linear between the neighbours, attitude by slerp, lever arm added (body: forward, left, up). Never
+/// extrapolates, never bridges a gap, and both neighbours must be of the asked class. Covariance is the mean of the
+/// neighbours' weighted by nearness: their errors are nearly the same error, so interpolation does not average it.
+/// Without attitude the body is taken as level, and only the upward part of the lever arm is applied.
+/// Const calls from any thread.
+class TagTrack {
+ public:
+  /// fixes  any order; all of one TrackFrame; `frame` is needed for wgs84 and ignored for local
+  /// epoch  the instant of t_s = 0
+  TagTrack(std::span<const Fix> fixes, const std::optional<EnuFrame>& frame, UtcTime epoch,
+           const TrackOptions& options = {});
+
+  TagPoint at(double t_s, const Eigen::Vector3d& lever_arm_body_m = Eigen::Vector3d::Zero()) const;
+  std::span<const TrackPose> poses() const { return poses_; }
+  bool has_attitude() const { return has_attitude_; }
+  double max_gap_s() const { return max_gap_s_; }
+
+ private:
+  std::vector<TrackPose> poses_;  ///< ascending in time, no two at one instant
+  FixClass min_fix_;
+  double max_gap_s_{};
+  bool has_attitude_{false};
+};
+
+/// Pose of one fix; covariance by fix class where the source gave none (fixed: 400 mm^2 per axis, mission row 2).
+TrackPose pose_of(const Fix& fix, const std::optional<EnuFrame>& frame, UtcTime epoch);
+/// Between two poses, no questions asked; t_s within them.
+TagPoint interpolate(const TrackPose& before, const TrackPose& after, double t_s,
+                     const Eigen::Vector3d& lever_arm_body_m);
+
+}  // namespace anchord

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+namespace anchord {
+
+/// Order of the shared unknowns in every vector and matrix: b (m), c (m per e-fold), tau (s), l_z (m).
+inline constexpr int k_shared_bias = 0;
+inline constexpr int k_shared_curve = 1;
+inline constexpr int k_shared_lag = 2;
+inline constexpr int k_shared_lever = 3;
+
+/// What one flight says about the shared unknowns, flight-to-flight wander already allowed for.
+struct ProfileFactor {
+  std::string flight;
+  Eigen::Matrix4d information{Eigen::Matrix4d::Zero()};
+  Eigen::Vector4d information_mean{Eigen::Vector4d::Zero()};  ///< information * mean
+};
+
+/// Calibration of one kit (tag + receiver + aircraft), carried from flight to flight without truth.
+struct KitProfile {
+  std::string kit;
+  std::vector<ProfileFactor> factors;
+};
+
+}  // namespace anchord

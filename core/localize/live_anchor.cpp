@@ -1,0 +1,207 @@
+#include "core/localize/live_anchor.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "core/localize/error_ellipse.hpp"
+#include "core/localize/geometry.hpp"
+#include "core/localize/linear.hpp"
+#include "core/localize/solver.hpp"
+#include "core/planning/gdop.hpp"
+
+namespace anchord {
+namespace {
+
+// Errors of a moving radio stay alike for seconds; measured on real flights (see FlightOptions::correlation_s).
+constexpr double k_correlation_s = 10.0;
+constexpr double k_floor_sigma_m = 0.04;
+
+SolverOptions solver_options(const LiveOptions& live, double bias_m) {
+  SolverOptions options;
+  options.loss = Loss::cauchy;
+  options.loss_sigmas = 2.0;
+  options.estimate_bias = true;
+  options.bias_prior_m = bias_m;
+  options.bias_prior_sigma_m = live.bias_prior_sigma_m;
+  options.max_iterations = 30;
+  return options;
+}
+
+std::vector<Observation> every_nth(const std::vector<Observation>& rows, std::size_t most) {
+  if (rows.size() <= most) return rows;
+  std::vector<Observation> few;
+  const double step = static_cast<double>(rows.size()) / static_cast<double>(most);
+  for (std::size_t i = 0; i < most; ++i) few.push_back(rows[static_cast<std::size_t>(static_cast<double>(i) * step)]);
+  return few;
+}
+
+/// The best of many starts, by cost.
+std::optional<AnchorFit> best_fit(const std::vector<Observation>& rows, const std::vector<Eigen::Vector3d>& starts,
+                                  const SolverOptions& options) {
+  std::optional<AnchorFit> best;
+  for (const auto& start : starts) {
+    auto fit = solve_anchor_gauss_newton(rows, start, options);
+    if (fit && (!best || fit.value().cost < best->cost)) best = std::move(fit.value());
+  }
+  return best;
+}
+
+double rms(const std::vector<double>& residuals) {
+  // The middle two thirds: what the typical range does, not what the worst one did.
+  std::vector<double> size;
+  for (const double r : residuals) size.push_back(r * r);
+  const auto keep = static_cast<std::ptrdiff_t>(std::max<std::size_t>(size.size() * 2 / 3, 1));
+  std::ranges::nth_element(size, size.begin() + keep - 1);
+  double sum = 0;
+  for (std::ptrdiff_t i = 0; i < keep; ++i) sum += size[static_cast<std::size_t>(i)];
+  return std::sqrt(sum / static_cast<double>(keep));
+}
+
+double scale_of(const std::vector<double>& residuals) {
+  std::vector<double> size;
+  for (const double r : residuals) size.push_back(std::abs(r));
+  const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
+  std::ranges::nth_element(size, middle);
+  return std::max(1.4826 * *middle, 0.02);
+}
+
+}  // namespace
+
+bool LiveAnchor::add(const Observation& row, UtcTime time, const LiveOptions& options) {
+  ++used_;
+  estimate_.n_used = used_;
+  if (!newest_ || time > *newest_) newest_ = time;
+  if (!first_ || time < *first_) first_ = time;
+  if (skipped_++ % stride_ == 0) rows_.push_back(row);
+  if (rows_.size() > options.max_rows) thin(options.max_rows);
+  estimate_.time = *newest_;
+  if (solved_ && seconds_between(*solved_, *newest_) < options.update_interval_s) return false;
+  return solve(options);
+}
+
+void LiveAnchor::thin(std::size_t max_rows) {
+  std::vector<Observation> half;
+  for (std::size_t i = 0; i < rows_.size(); i += 2) half.push_back(rows_[i]);
+  rows_ = std::move(half);
+  stride_ *= 2;
+  rows_at_search_ = std::min(rows_at_search_, max_rows / 2);
+}
+
+std::optional<double> LiveAnchor::residual_m(const Observation& row) const {
+  if (!position_m_) return std::nullopt;
+  return row.distance_m - (row.tag_m - *position_m_).norm() - bias_m_;
+}
+
+bool LiveAnchor::solve(const LiveOptions& options) {
+  if (!newest_ || used_ == used_at_solve_) return false;
+  used_at_solve_ = used_;
+  solved_ = newest_;
+  search(options);
+  describe(options);
+  return true;
+}
+
+void LiveAnchor::search(const LiveOptions& options) {
+  if (rows_.size() < 5) return;
+  const SolverOptions settings = solver_options(options, 0.0);
+  std::vector<Eigen::Vector3d> starts;
+  if (position_m_) starts.push_back(*position_m_);
+  // While the geometry still grows the warm start may sit on the wrong side: look afresh at every doubling.
+  if (!position_m_ || rows_.size() >= 2 * rows_at_search_) {
+    rows_at_search_ = rows_.size();
+    const auto few = every_nth(rows_, 80);
+    if (auto best = best_fit(few, start_candidates(few), settings)) starts.push_back(best->position_m);
+  }
+  const auto rows = every_nth(rows_, 600);
+  if (auto best = best_fit(rows, starts, settings)) {
+    position_m_ = best->position_m;
+    bias_m_ = best->bias_m;
+  }
+}
+
+void LiveAnchor::describe(const LiveOptions& options) {
+  const GeometryReport geometry = assess_geometry(rows_);
+  estimate_.mirror.reset();
+  estimate_.best.reset();
+  estimate_.reason = geometry.reason;
+  estimate_.verdict = Verdict::too_few;
+  if (geometry.kind == GeometryKind::too_few || rows_.size() < 5) {
+    if (estimate_.reason.empty()) estimate_.reason = "too few: " + std::to_string(rows_.size()) + " ranges, need 5";
+    return;
+  }
+  estimate_.verdict = Verdict::diverged;
+  estimate_.reason = "no solution: the search left the finite numbers";
+  if (!position_m_) return;
+  const SolverOptions settings = solver_options(options, 0.0);
+  const auto rows = every_nth(rows_, 600);
+  const auto fit = solve_anchor_gauss_newton(rows, *position_m_, settings);
+  if (!fit) {
+    estimate_.verdict = fit.error().code == Errc::weak_geometry ? Verdict::weak_geometry : Verdict::diverged;
+    estimate_.reason = fit.error().message;
+    return;
+  }
+  const AnchorFit& best = fit.value();
+  position_m_ = best.position_m;
+  bias_m_ = best.bias_m;
+  estimate_.bias_m = best.bias_m + options.bias_m;
+  estimate_.bias_sigma_m = best.bias_sigma_m;
+  // The same tempering as the batch solve: two correlation times are one independent look.
+  const double scale_m = scale_of(best.residuals_m);
+  const double duration_s = std::max(seconds_between(*first_, *newest_), 1.0);
+  const double looks = std::max(duration_s / (2.0 * k_correlation_s), 1.0);
+  const double inflate = std::max(static_cast<double>(rows.size()) / looks, 1.0) *
+                         std::max(scale_m * scale_m / (options.range_sigma_m * options.range_sigma_m), 0.1);
+  const auto hypothesis = [&](const AnchorFit& f) {
+    Hypothesis h;
+    h.position.m = f.position_m;
+    h.covariance_m2 = f.covariance_m2 * inflate + Eigen::Matrix3d::Identity() * k_floor_sigma_m * k_floor_sigma_m;
+    h.rms_residual_m = rms(f.residuals_m);
+    return h;
+  };
+  estimate_.best = hypothesis(best);
+  estimate_.verdict = Verdict::ok;
+  estimate_.reason.clear();
+  const auto twin = solve_anchor_gauss_newton(rows, geometry.shape.mirrored(best.position_m), settings);
+  if (twin && (twin.value().position_m - best.position_m).norm() > 0.4) {
+    // Tempered likelihood ratio of the two places.
+    const double worse = std::max(twin.value().cost - best.cost, 0.0) / inflate;
+    const double odds = std::exp(-std::min(worse, 700.0));
+    if (odds > 0.01) {
+      estimate_.mirror = hypothesis(twin.value());
+      estimate_.mirror->probability = odds / (1.0 + odds);
+      estimate_.best->probability = 1.0 / (1.0 + odds);
+      estimate_.verdict = Verdict::ambiguous;
+      estimate_.reason = geometry.reason.empty() ? "mirror: two places fit alike" : geometry.reason;
+    }
+  }
+  const ErrorEllipse ellipse = error_ellipse(estimate_.best->covariance_m2);
+  estimate_.h95_m = ellipse.h95_m;
+  estimate_.v95_m = ellipse.v95_m;
+  if (geometry.kind == GeometryKind::collinear || ellipse.h95_m > 0.2 * geometry.median_range_m) {
+    char text[120];
+    std::snprintf(text, sizeof text, "weak geometry: 95 %% radius %.2f m at a median range of %.2f m", ellipse.h95_m,
+                  geometry.median_range_m);
+    estimate_.verdict = Verdict::weak_geometry;
+    estimate_.reason = geometry.kind == GeometryKind::collinear ? geometry.reason : text;
+  }
+  std::vector<Eigen::Vector3d> places;
+  for (const auto& row : rows) places.push_back(row.tag_m);
+  estimate_.gdop.reset();
+  estimate_.gdop_trace.reset();
+  if (const auto gdop = planning::gdop(best.position_m, places)) {
+    estimate_.gdop = gdop.value().root;
+    estimate_.gdop_trace = gdop.value().trace;
+  }
+}
+
+Estimate LiveAnchor::estimate(const std::optional<EnuFrame>& frame) const {
+  Estimate answer = estimate_;
+  if (frame) {
+    if (answer.best) answer.best->wgs84 = frame->wgs84_from_enu(answer.best->position);
+    if (answer.mirror) answer.mirror->wgs84 = frame->wgs84_from_enu(answer.mirror->position);
+  }
+  return answer;
+}
+
+}  // namespace anchord

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/types/estimate.hpp"
+#include "core/types/fix.hpp"
+#include "core/types/mission.hpp"
+#include "core/types/range.hpp"
+
+namespace anchord {
+
+/// What became of one live range.
+struct RangeResult {
+  Range range;                          ///< as received, without its CIR
+  std::string refused;                  ///< reason word; empty when used
+  std::optional<double> residual_m{};   ///< against the anchor's current estimate
+  std::optional<double> sigma_m{};
+  std::optional<Eigen::Vector3d> tag_enu_m{};
+  bool used() const { return refused.empty(); }
+};
+
+/// Where the drone is.
+struct LivePose {
+  UtcTime time{};
+  Fix fix;
+  Eigen::Vector3d enu_m{0, 0, 0};      ///< of the track point; local x, y, z in a local frame
+  std::optional<double> speed_mps{};
+};
+
+struct LiveOptions {
+  FixClass min_fix{FixClass::rtk_fixed};
+  double max_gap_s{0.5};           ///< between the two fixes round a range
+  double max_wait_s{2.0};          ///< a range whose next fix has not come by then is refused
+  double update_interval_s{0.5};   ///< per anchor, of measurement time: 2 Hz
+  std::size_t max_rows{1500};      ///< per anchor; beyond it every second row goes, old and new alike
+  std::size_t max_waiting{5000};   ///< ranges waiting for a fix; the oldest leaves first
+  double range_sigma_m{0.15};      ///< of an uncorrected range
+  double bias_prior_sigma_m{0.3};
+  double lag_s{0.0};               ///< of a kit profile
+  double bias_m{0.0};
+  std::optional<Wgs84> origin{};   ///< absent: the first good fix
+};
+
+/// One flight as it happens: joins ranges to the track and keeps every anchor's estimate warm.
+///
+/// Driven by measurement time only, so that a replay repeats it at any speed. Memory is bounded by LiveOptions.
+/// Not thread-safe: one strand per mission owns it.
+class LiveFlight {
+ public:
+  explicit LiveFlight(Mission mission, LiveOptions options = {});
+  ~LiveFlight();
+  LiveFlight(LiveFlight&&) noexcept;
+  LiveFlight& operator=(LiveFlight&&) noexcept;
+
+  void add(const Fix& fix);
+  void add(const Range& range);
+  /// Ends the stream: waiting ranges are decided, every anchor is solved once more.
+  void finish();
+
+  /// Decided since the last call, in order of decision.
+  std::vector<RangeResult> take_ranges();
+  /// Anchors solved since the last call, the newest answer of each.
+  std::vector<Estimate> take_estimates();
+  /// Newest answer of every anchor heard.
+  std::vector<Estimate> estimates() const;
+  std::optional<LivePose> pose() const;
+  std::optional<Wgs84> origin() const;  ///< of the ENU numbers; none in a local frame or before the first good fix
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace anchord
