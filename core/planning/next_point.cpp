@@ -201,8 +201,8 @@ std::string refused_words(const std::vector<CandidateValue>& candidates) {
 }
 
 std::string words(const Decision& decision, const NextPointOptions& options, bool ridge) {
-  const std::string total = " of " + std::to_string(decision.candidates.size()) + " candidates; ";
-  if (!decision.chosen) return "nowhere to go: none" + total + refused_words(decision.candidates);
+  const std::string total = "; " + std::to_string(decision.candidates.size()) + " candidates, ";
+  if (!decision.chosen) return "nowhere to go" + total + refused_words(decision.candidates);
   const auto& best = decision.candidates[*decision.chosen];
   std::array<char, 256> text{};
   if (ridge) {
