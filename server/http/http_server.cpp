@@ -1,0 +1,168 @@
+#include "server/http/http_server.hpp"
+
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/v6_only.hpp>
+#include <charconv>
+#include <thread>
+
+#include "server/http/sessions.hpp"
+
+namespace anchord::server {
+namespace {
+
+constexpr std::string_view k_full =
+    "HTTP/1.1 503 Service Unavailable\r\nRetry-After: 5\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
+
+Result<tcp::endpoint> parse_endpoint(std::string_view text) {
+  const auto bad = [&] {
+    return make_error(Errc::invalid_argument, "'" + std::string(text.substr(0, 80)) +
+                                                  "' is not an address like 127.0.0.1:8420 or [::1]:8420");
+  };
+  const auto colon = text.rfind(':');
+  if (colon == std::string_view::npos) return bad();
+  std::string_view host = text.substr(0, colon);
+  const std::string_view digits = text.substr(colon + 1);
+  if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
+  if (host == "localhost") host = "127.0.0.1";
+  std::uint16_t port = 0;
+  const auto [end, status] = std::from_chars(digits.data(), digits.data() + digits.size(), port);
+  if (digits.empty() || status != std::errc{} || end != digits.data() + digits.size()) return bad();
+  error_code error;
+  const auto address = asio::ip::make_address(std::string(host), error);
+  if (error) return bad();
+  return tcp::endpoint(address, port);
+}
+
+bool out_of_descriptors(const error_code& error) {
+  return error == asio::error::no_descriptors || error.value() == ENFILE ||
+         error == asio::error::no_buffer_space || error == asio::error::no_memory;
+}
+
+}  // namespace
+
+struct HttpServer::State {
+  std::shared_ptr<SessionContext> context;
+  asio::io_context io;
+  asio::executor_work_guard<asio::io_context::executor_type> work{io.get_executor()};
+  std::vector<std::shared_ptr<tcp::acceptor>> acceptors;
+  std::vector<std::thread> threads;
+  std::size_t io_threads{1};
+  bool stopped{false};
+
+  static asio::awaitable<void> accept_all(std::shared_ptr<tcp::acceptor> acceptor,
+                                          std::shared_ptr<SessionContext> context, asio::io_context& io) {
+    asio::steady_timer pause(acceptor->get_executor());
+    while (!context->stopping) {
+      tcp::socket socket(asio::make_strand(io));
+      const auto [error] = co_await acceptor->async_accept(socket, k_wait);
+      if (error == asio::error::operation_aborted || !acceptor->is_open()) co_return;
+      if (error) {
+        // Without a pause a full descriptor table would make this loop spin on the connection it cannot take.
+        pause.expires_after(std::chrono::milliseconds(out_of_descriptors(error) ? 200 : 10));
+        co_await pause.async_wait(k_wait);
+        continue;
+      }
+      error_code ignored;
+      if (context->connections.load() >= context->limits.max_connections) {
+        socket.non_blocking(true, ignored);
+        socket.write_some(asio::buffer(k_full.data(), k_full.size()), ignored);
+        socket.shutdown(tcp::socket::shutdown_both, ignored);
+        continue;
+      }
+      socket.set_option(tcp::no_delay(true), ignored);
+      ++context->connections;
+      ConnectionSlot slot(nullptr, [context](void*) { --context->connections; });
+      start_http_session(std::move(socket), context, std::move(slot));
+    }
+  }
+};
+
+HttpServer::HttpServer(HttpServerOptions options, Gateway& gateway, WorkerPool& pool, WorkerPool& stream_pool)
+    : state_(std::make_unique<State>()) {
+  state_->context = std::make_shared<SessionContext>(gateway, pool, stream_pool);
+  state_->context->limits = options.limits;
+  state_->context->ws_limits = options.ws_limits;
+  state_->context->hosts = std::move(options.hosts);
+  state_->context->log_fault = std::move(options.log_fault);
+  state_->io_threads = options.io_threads;
+}
+
+HttpServer::~HttpServer() { stop(std::chrono::milliseconds(0)); }
+
+Result<std::uint16_t> HttpServer::listen(std::string_view text) {
+  BOOST_OUTCOME_TRY(const auto endpoint, parse_endpoint(text));
+  auto acceptor = std::make_shared<tcp::acceptor>(state_->io);
+  error_code error;
+  acceptor->open(endpoint.protocol(), error);
+  if (!error) acceptor->set_option(tcp::acceptor::reuse_address(true), error);
+  if (!error && endpoint.address().is_v6()) acceptor->set_option(asio::ip::v6_only(true), error);
+  if (!error) acceptor->bind(endpoint, error);
+  if (!error) acceptor->listen(1024, error);
+  if (error) {
+    const auto code = error == asio::error::address_in_use ? Errc::conflict : Errc::unsupported;
+    return make_error(code, "cannot listen on " + std::string(text) + ": " + error.message());
+  }
+  state_->acceptors.push_back(acceptor);
+  return acceptor->local_endpoint().port();
+}
+
+void HttpServer::start() {
+  auto& s = *state_;
+  for (const auto& acceptor : s.acceptors) {
+    asio::co_spawn(s.io, State::accept_all(acceptor, s.context, s.io),
+                   [context = s.context](const std::exception_ptr& fault) {
+                     if (fault && context->log_fault) context->log_fault("a listener ended by an exception");
+                   });
+  }
+  for (std::size_t i = 0; i < s.io_threads; ++i) {
+    s.threads.emplace_back([&s] { s.io.run(); });
+    pthread_setname_np(s.threads.back().native_handle(), "anchord-io");
+  }
+}
+
+void HttpServer::stop(std::chrono::milliseconds grace) {
+  auto& s = *state_;
+  if (s.stopped) return;
+  s.stopped = true;
+  s.context->stopping = true;
+  const auto each = [&s](auto act) {
+    std::vector<std::shared_ptr<Connection>> alive;
+    {
+      const std::lock_guard lock(s.context->mutex);
+      for (const auto& [key, weak] : s.context->alive) {
+        if (auto connection = weak.lock()) alive.push_back(std::move(connection));
+      }
+    }
+    for (const auto& connection : alive) act(*connection);
+  };
+  asio::post(s.io, [&s] {
+    error_code ignored;
+    for (const auto& acceptor : s.acceptors) acceptor->close(ignored);
+  });
+  const auto wait_until_none = [&s](std::chrono::steady_clock::time_point deadline) {
+    while (s.context->connections.load() > 0 && std::chrono::steady_clock::now() < deadline) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+  };
+  if (!s.threads.empty()) {
+    each([](Connection& connection) { connection.stop(); });
+    wait_until_none(std::chrono::steady_clock::now() + grace);
+    each([](Connection& connection) { connection.abort(); });
+    wait_until_none(std::chrono::steady_clock::now() + std::chrono::milliseconds(500));
+  }
+  s.work.reset();
+  s.io.stop();
+  for (auto& thread : s.threads) thread.join();
+  s.threads.clear();
+}
+
+std::size_t HttpServer::connections() const { return state_->context->connections; }
+std::size_t HttpServer::websockets() const { return state_->context->websockets; }
+
+Result<bool> is_loopback(std::string_view endpoint) {
+  BOOST_OUTCOME_TRY(const auto parsed, parse_endpoint(endpoint));
+  return parsed.address().is_loopback();
+}
+
+}  // namespace anchord::server

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace anchord::server {
+
+/// Threads that run handlers. Bounded: a full queue is an answer (503), not a wait. Thread-safe.
+class WorkerPool {
+ public:
+  WorkerPool(std::string name, std::size_t threads, std::size_t queue_limit);
+  /// stop().
+  ~WorkerPool();
+  WorkerPool(const WorkerPool&) = delete;
+  WorkerPool& operator=(const WorkerPool&) = delete;
+
+  /// False when the queue is full or the pool stops; the task is then not run. Tasks must not throw.
+  [[nodiscard]] bool try_submit(std::function<void()> task);
+  /// Refuses new tasks, runs those in the queue, joins. Idempotent; not from a task.
+  void stop();
+  std::size_t queued() const;
+
+ private:
+  void run();
+  const std::size_t queue_limit_;
+  mutable std::mutex mutex_;
+  std::condition_variable work_;
+  std::deque<std::function<void()>> queue_;
+  bool stopping_{false};
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace anchord::server
