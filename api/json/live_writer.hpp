@@ -1,0 +1,37 @@
+#pragma once
+
+#include <string>
+
+#include "core/localize/live_flight.hpp"
+#include "core/types/estimate.hpp"
+#include "core/types/mission.hpp"
+
+namespace anchord::api {
+
+/// Objects of the live topics, written by std::to_chars: 100 ranges a second to 50 browsers leave no time for a DOM.
+/// Keys are those of tests/data/wire/topic.*.json; metres have 4 decimals, degrees 9.
+std::string live_pose_json(const MissionId& mission, TrackFrame frame, const LivePose& pose);
+std::string live_rtk_json(const MissionId& mission, const Fix& fix);
+std::string live_range_json(const MissionId& mission, const RangeResult& result);
+std::string live_fix_json(const MissionId& mission, const Fix& fix);
+std::string live_estimate_json(const MissionId& mission, const Estimate& estimate);
+
+/// found (no position yet), estimating, ambiguous or converged.
+std::string_view live_status(const Estimate& estimate);
+std::string_view verdict_word(Verdict verdict);
+
+struct MissionLiveState {
+  std::uint64_t n_ranges{}, n_fixes{};
+  std::size_t anchors_found{}, anchors_converged{};
+  double range_rate_hz{};
+  std::optional<Wgs84> origin{};
+  UtcTime time{};                      ///< of the newest measurement; creation before the first
+  std::optional<UtcTime> started{};    ///< first measurement
+};
+std::string mission_state_json(const Mission& mission, const MissionLiveState& state);
+std::string_view mission_state_word(MissionState state);
+
+/// JSON string with quotes and escapes; bytes that are not UTF-8 become '?'.
+std::string json_text(std::string_view text);
+
+}  // namespace anchord::api

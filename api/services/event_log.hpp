@@ -1,0 +1,41 @@
+#pragma once
+
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/ids.hpp"
+#include "core/base/time.hpp"
+
+namespace anchord::api {
+
+class Hub;
+
+/// Something an operator should know, as text and as a stable code.
+struct LiveEvent {
+  Uuid id{};
+  UtcTime time{};
+  std::string level, code, text;  ///< level: info, warning, critical
+  std::optional<MissionId> mission{};
+};
+std::string event_json(const LiveEvent& event);
+
+/// The last 10 000 events, also published on topic `events`. Thread-safe.
+class EventLog {
+ public:
+  static constexpr std::size_t k_kept = 10'000;
+  EventLog(Hub& hub, const Clock& clock) : hub_(hub), clock_(clock) {}
+  void add(std::string level, std::string code, std::string text, std::optional<MissionId> mission = {});
+  /// Newest first.
+  std::vector<LiveEvent> newest(std::size_t limit, const std::optional<MissionId>& mission, std::optional<UtcTime> since) const;
+
+ private:
+  Hub& hub_;
+  const Clock& clock_;
+  mutable std::mutex mutex_;
+  std::deque<LiveEvent> events_;
+};
+
+}  // namespace anchord::api

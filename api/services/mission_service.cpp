@@ -1,0 +1,450 @@
+#include "api/services/mission_service.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <variant>
+
+#include "api/json/live_writer.hpp"
+#include "api/live/hub.hpp"
+#include "api/services/event_log.hpp"
+#include "core/localize/live_flight.hpp"
+#include "core/ports/store.hpp"
+
+namespace anchord::api {
+namespace {
+
+using Row = std::variant<Range, Fix>;
+
+constexpr std::int64_t k_pose_interval_us = 100'000;  // 10 Hz of measurement time
+constexpr std::int64_t k_rtk_interval_us = 200'000;
+
+UtcTime time_of(const Row& row) {
+  return std::visit([](const auto& r) { return r.time; }, row);
+}
+
+struct Radio {
+  bool tag{false};
+  UtcTime last_seen{};      ///< measured
+  UtcTime last_arrival{};   ///< wall clock: a replayed flight is live too
+  double interval_s{0};     ///< smoothed
+};
+
+}  // namespace
+
+struct MissionService::Flight {
+  explicit Flight(const Mission& m) : id(m.id), frame(m.frame), mission(m), live(m) {}
+  const MissionId id;
+  const TrackFrame frame;
+  std::mutex queue_mutex;
+  Mission mission;  ///< under queue_mutex
+  std::deque<Row> queue;
+  bool scheduled{false};
+  std::uint64_t dropped{0};
+  UtcTime last_arrival{};
+
+  std::mutex work_mutex;  ///< the strand: everything below
+  LiveFlight live;
+  std::map<NetworkId, std::string> statuses;
+  MissionLiveState state;
+  std::int64_t last_pose_us{0}, last_rtk_us{0};
+  std::deque<std::int64_t> range_times_us;
+  std::atomic<bool> dirty{true};
+};
+
+struct MissionService::State : std::enable_shared_from_this<MissionService::State> {
+  explicit State(Deps d) : deps(std::move(d)) {}
+  Deps deps;
+  std::mutex mutex;
+  std::map<MissionId, Mission> cache;
+  std::map<MissionId, std::shared_ptr<Flight>> flights;
+  std::mutex radios_mutex;
+  std::map<NetworkId, Radio> radios;
+  std::atomic<std::size_t> queued{0};
+  std::atomic<bool> stopped{false};
+  std::mutex running_mutex;
+  std::condition_variable idle;
+  int running{0};
+  std::int64_t ticks{0};
+
+  std::shared_ptr<Flight> find(const MissionId& id) {
+    const std::scoped_lock lock(mutex);
+    const auto it = flights.find(id);
+    return it == flights.end() ? nullptr : it->second;
+  }
+
+  template <class R>
+  void accept(std::vector<R> rows);
+  void schedule(const std::shared_ptr<Flight>& flight);
+  void work(Flight& flight);
+  void step(Flight& flight, const Row& row, bool quiet);
+  void announce(Flight& flight, bool quiet);
+  void publish_pose(Flight& flight);
+  void rebuild(Flight& flight);
+  void heard(NetworkId id, bool tag, UtcTime time);
+  void publish_devices();
+};
+
+MissionService::MissionService(Deps deps) : state_(std::make_shared<State>(std::move(deps))) {}
+MissionService::~MissionService() { stop(); }
+
+Result<Mission> MissionService::mission(const MissionId& id) {
+  {
+    const std::scoped_lock lock(state_->mutex);
+    const auto it = state_->cache.find(id);
+    if (it != state_->cache.end()) return it->second;
+  }
+  BOOST_OUTCOME_TRY(auto mission, state_->deps.missions.mission(id));
+  const std::scoped_lock lock(state_->mutex);
+  if (state_->cache.size() > 1000) state_->cache.clear();
+  state_->cache[id] = mission;
+  return mission;
+}
+
+Result<void> MissionService::create(const Mission& mission) {
+  BOOST_OUTCOME_TRY(state_->deps.missions.insert(mission));
+  prepare(mission.id);
+  state_->deps.events.add("info", "mission.started", mission.name + " started", mission.id);
+  if (const auto flight = state_->find(mission.id)) {
+    const std::scoped_lock lock(flight->work_mutex);
+    state_->deps.hub.publish(Topic::mission_state, mission_state_json(mission, flight->state), mission.created.us(), to_string(mission.id));
+  }
+  return boost::outcome_v2::success();
+}
+
+Result<Mission> MissionService::finish(const MissionId& id) {
+  BOOST_OUTCOME_TRY(auto current, state_->deps.missions.mission(id));
+  if (current.state == MissionState::finished) return make_error(Errc::conflict, current.name + " is finished already");
+  current.state = MissionState::finished;
+  current.finished = state_->deps.clock.now();
+  BOOST_OUTCOME_TRY(state_->deps.missions.update(current));
+  {
+    const std::scoped_lock lock(state_->mutex);
+    state_->cache[id] = current;
+  }
+  if (const auto flight = state_->find(id)) {
+    {
+      const std::scoped_lock lock(flight->queue_mutex);
+      flight->mission = current;
+    }
+    flight->dirty = true;
+  }
+  state_->deps.events.add("info", "mission.finished", current.name + " finished", id);
+  return current;
+}
+
+Result<void> MissionService::remove(const MissionId& id) {
+  BOOST_OUTCOME_TRY(state_->deps.missions.remove(id));
+  const std::scoped_lock lock(state_->mutex);
+  state_->cache.erase(id);
+  state_->flights.erase(id);
+  for (const Topic topic : {Topic::mission_state, Topic::drone_pose, Topic::rtk_status}) state_->deps.hub.forget(topic, to_string(id));
+  return boost::outcome_v2::success();
+}
+
+void MissionService::prepare(const MissionId& id) {
+  if (state_->find(id)) return;
+  const auto record = mission(id);
+  if (!record) return;
+  auto flight = std::make_shared<Flight>(record.value());
+  // Locked before it can be found: whoever comes second waits until the stored rows are in.
+  const std::scoped_lock work(flight->work_mutex);
+  {
+    const std::scoped_lock lock(state_->mutex);
+    if (!state_->flights.emplace(id, flight).second) return;
+  }
+  flight->state.time = record.value().created;
+  state_->rebuild(*flight);
+}
+
+void MissionService::State::rebuild(Flight& flight) {
+  const MissionId id = flight.id;
+  const auto n = deps.measurements.count_ranges(id);
+  const auto n_fixes = deps.measurements.count_fixes(id);
+  if (!n || !n_fixes || n.value() + n_fixes.value() == 0) return;
+  // Two sorted streams merged by time, a page of each in memory.
+  MeasurementStore::Filter range_filter, fix_filter;
+  range_filter.mission = fix_filter.mission = id;
+  range_filter.limit = fix_filter.limit = 5000;
+  std::deque<Range> ranges;
+  std::deque<Fix> fixes;
+  bool more_ranges = true, more_fixes = true;
+  while (true) {
+    if (ranges.empty() && more_ranges) {
+      auto page = deps.measurements.ranges(range_filter);
+      if (!page) return;
+      for (auto& row : page.value().rows) ranges.push_back(std::move(row));
+      range_filter.after = page.value().next;
+      more_ranges = !range_filter.after.empty();
+    }
+    if (fixes.empty() && more_fixes) {
+      auto page = deps.measurements.fixes(fix_filter);
+      if (!page) return;
+      for (auto& row : page.value().rows) fixes.push_back(std::move(row));
+      fix_filter.after = page.value().next;
+      more_fixes = !fix_filter.after.empty();
+    }
+    if (ranges.empty() && fixes.empty()) break;
+    if (fixes.empty() || (!ranges.empty() && ranges.front().time < fixes.front().time)) {
+      step(flight, Row(std::move(ranges.front())), true);
+      ranges.pop_front();
+    } else {
+      step(flight, Row(std::move(fixes.front())), true);
+      fixes.pop_front();
+    }
+  }
+  announce(flight, true);
+  publish_pose(flight);
+}
+
+template <class R>
+void MissionService::State::accept(std::vector<R> rows) {
+  const UtcTime now = deps.clock.now();
+  std::shared_ptr<Flight> flight;
+  for (auto& row : rows) {
+    if (!flight || flight->id != row.mission) flight = find(row.mission);
+    if (!flight) continue;
+    const std::scoped_lock lock(flight->queue_mutex);
+    flight->last_arrival = now;
+    if (flight->queue.size() >= k_max_queued_rows) {
+      flight->queue.pop_front();
+      ++flight->dropped;
+      --queued;
+    }
+    flight->queue.emplace_back(std::move(row));
+    ++queued;
+  }
+  std::vector<std::shared_ptr<Flight>> all;
+  {
+    const std::scoped_lock lock(mutex);
+    for (auto& [id, f] : flights) all.push_back(f);
+  }
+  for (auto& f : all) schedule(f);
+}
+
+void MissionService::accepted(std::vector<Range> ranges) { state_->accept(std::move(ranges)); }
+void MissionService::accepted(std::vector<Fix> fixes) { state_->accept(std::move(fixes)); }
+
+void MissionService::State::schedule(const std::shared_ptr<Flight>& flight) {
+  {
+    const std::scoped_lock lock(flight->queue_mutex);
+    if (flight->scheduled || flight->queue.empty() || stopped) return;
+    flight->scheduled = true;
+  }
+  {
+    const std::scoped_lock lock(running_mutex);
+    ++running;
+  }
+  auto task = [self = shared_from_this(), flight] {
+    if (!self->stopped) self->work(*flight);
+    bool again = false;
+    {
+      const std::scoped_lock lock(flight->queue_mutex);
+      flight->scheduled = false;
+      again = !flight->queue.empty();
+    }
+    {
+      const std::scoped_lock lock(self->running_mutex);
+      --self->running;
+    }
+    self->idle.notify_all();
+    if (again) self->schedule(flight);
+  };
+  if (deps.post) deps.post(std::move(task));
+  else task();
+}
+
+void MissionService::State::work(Flight& flight) {
+  // One slice: other missions and requests share the pool.
+  std::deque<Row> rows;
+  std::uint64_t dropped = 0;
+  {
+    const std::scoped_lock lock(flight.queue_mutex);
+    const std::size_t n = std::min<std::size_t>(flight.queue.size(), 500);
+    for (std::size_t i = 0; i < n; ++i) {
+      rows.push_back(std::move(flight.queue.front()));
+      flight.queue.pop_front();
+    }
+    dropped = std::exchange(flight.dropped, 0);
+  }
+  queued -= rows.size();
+  if (dropped > 0) {
+    deps.events.add("warning", "live.behind", std::to_string(dropped) + " measurements left the live path; they are stored", flight.id);
+  }
+  const std::scoped_lock lock(flight.work_mutex);
+  std::size_t since_announced = 0;
+  for (const auto& row : rows) {
+    step(flight, row, false);
+    if (++since_announced == 100) {
+      announce(flight, false);
+      since_announced = 0;
+    }
+  }
+  announce(flight, false);
+  publish_pose(flight);
+  flight.dirty = true;
+}
+
+void MissionService::State::step(Flight& flight, const Row& row, bool quiet) {
+  auto& state = flight.state;
+  const UtcTime time = time_of(row);
+  if (!state.started || time < *state.started) state.started = time;
+  if (!(time < state.time) || state.n_ranges + state.n_fixes == 0) state.time = time;
+  if (const auto* range = std::get_if<Range>(&row)) {
+    ++state.n_ranges;
+    if (!quiet) {
+      heard(range->tag, range->kind == RangeKind::tag_anchor, time);
+      heard(range->anchor, false, time);
+    }
+    flight.range_times_us.push_back(time.us());
+    if (flight.range_times_us.size() > 100) flight.range_times_us.pop_front();
+    const double span_s = static_cast<double>(flight.range_times_us.back() - flight.range_times_us.front()) * 1e-6;
+    state.range_rate_hz = span_s > 0 ? static_cast<double>(flight.range_times_us.size() - 1) / span_s : 0;
+    flight.live.add(*range);
+    return;
+  }
+  const auto& fix = std::get<Fix>(row);
+  ++state.n_fixes;
+  flight.live.add(fix);
+  if (quiet) return;
+  const std::int64_t now_us = fix.time.us();
+  if (now_us - flight.last_pose_us >= k_pose_interval_us || now_us < flight.last_pose_us) {
+    flight.last_pose_us = now_us;
+    publish_pose(flight);
+  }
+  if (now_us - flight.last_rtk_us >= k_rtk_interval_us || now_us < flight.last_rtk_us) {
+    flight.last_rtk_us = now_us;
+    deps.hub.publish(Topic::rtk_status, live_rtk_json(flight.id, fix), now_us, to_string(flight.id));
+    deps.hub.collect(Topic::fixes, live_fix_json(flight.id, fix), now_us);
+  }
+}
+
+void MissionService::State::publish_pose(Flight& flight) {
+  const auto pose = flight.live.pose();
+  if (!pose) return;
+  deps.hub.publish(Topic::drone_pose, live_pose_json(flight.id, flight.frame, *pose), pose->time.us(), to_string(flight.id));
+}
+
+void MissionService::State::announce(Flight& flight, bool quiet) {
+  const MissionId id = flight.id;
+  for (const auto& result : flight.live.take_ranges()) {
+    if (!quiet) deps.hub.collect(Topic::ranges, live_range_json(id, result), result.range.time.us(), result.range.anchor);
+  }
+  for (const auto& estimate : flight.live.take_estimates()) {
+    const std::string status(live_status(estimate));
+    auto& known = flight.statuses[estimate.anchor];
+    if (known.empty()) {
+      // From its first range on an anchor has an identity that facility data can hang on.
+      const auto anchor = deps.anchors.find_or_create(estimate.anchor, deps.clock.now());
+      if (!quiet && anchor) deps.events.add("info", "anchor.found", "anchor " + to_string(estimate.anchor) + " found", id);
+    }
+    if (status != known && !quiet && (status == "converged" || status == "ambiguous")) {
+      deps.events.add(status == "converged" ? "info" : "warning", "anchor." + status,
+                      "anchor " + to_string(estimate.anchor) + (status == "converged" ? " converged" : " is ambiguous: " + estimate.reason), id);
+    }
+    known = status;
+    deps.hub.publish(Topic::anchors_estimates, live_estimate_json(id, estimate), estimate.time.us(), to_string(id) + to_string(estimate.anchor), estimate.anchor);
+  }
+  flight.state.origin = flight.live.origin();
+  flight.state.anchors_found = flight.statuses.size();
+  flight.state.anchors_converged = static_cast<std::size_t>(
+      std::count_if(flight.statuses.begin(), flight.statuses.end(), [](const auto& entry) { return entry.second == "converged"; }));
+}
+
+void MissionService::State::heard(NetworkId id, bool tag, UtcTime time) {
+  const std::scoped_lock lock(radios_mutex);
+  auto& radio = radios[id];
+  const double step_s = seconds_between(radio.last_seen, time);
+  if (radio.last_seen.ns != 0 && step_s > 0 && step_s < 10) radio.interval_s = radio.interval_s == 0 ? step_s : 0.9 * radio.interval_s + 0.1 * step_s;
+  radio.tag = tag;
+  radio.last_seen = time;
+  radio.last_arrival = deps.clock.now();
+}
+
+void MissionService::State::publish_devices() {
+  const UtcTime now = deps.clock.now();
+  std::string json = "[";
+  {
+    const std::scoped_lock lock(radios_mutex);
+    if (radios.empty()) return;
+    for (const auto& [id, radio] : radios) {
+      const double silent_s = seconds_between(radio.last_arrival, now);
+      const char* state = silent_s < 2 ? "live" : silent_s < 5 ? "late" : "lost";
+      char rate[32];
+      std::snprintf(rate, sizeof rate, "%.1f", radio.interval_s > 0 && silent_s < 5 ? 1 / radio.interval_s : 0.0);
+      json += (json.size() > 1 ? "," : "") + std::string(R"({"network_id":")") + to_string(id) + R"(","kind":")" + (radio.tag ? "tag" : "anchor") +
+              R"(","state":")" + state + R"(","last_seen_us":)" + std::to_string(radio.last_seen.us()) + R"(,"rate_hz":)" + rate + '}';
+    }
+  }
+  deps.hub.publish(Topic::devices, json + ']', now.us());
+}
+
+std::vector<MissionService::LiveView> MissionService::live(const std::optional<MissionId>& id) {
+  std::vector<std::shared_ptr<Flight>> wanted;
+  if (id) {
+    prepare(*id);
+    if (auto flight = state_->find(*id)) wanted.push_back(std::move(flight));
+  } else {
+    // After a restart nothing is followed yet: bring back the newest flights that still record.
+    if (const auto newest = state_->deps.missions.missions(5, std::nullopt)) {
+      for (const auto& mission : newest.value()) {
+        if (mission.state == MissionState::recording) prepare(mission.id);
+      }
+    }
+    const std::scoped_lock lock(state_->mutex);
+    for (const auto& [mission, flight] : state_->flights) wanted.push_back(flight);
+  }
+  std::vector<LiveView> out;
+  for (const auto& flight : wanted) {
+    Mission mission;
+    {
+      const std::scoped_lock lock(flight->queue_mutex);
+      mission = flight->mission;
+    }
+    const std::scoped_lock lock(flight->work_mutex);
+    out.push_back({std::move(mission), flight->live.origin(), flight->live.estimates()});
+  }
+  return out;
+}
+
+void MissionService::tick() {
+  std::vector<std::shared_ptr<Flight>> all;
+  {
+    const std::scoped_lock lock(state_->mutex);
+    for (const auto& [id, flight] : state_->flights) all.push_back(flight);
+  }
+  for (const auto& flight : all) {
+    if (!flight->dirty) continue;
+    const std::unique_lock lock(flight->work_mutex, std::try_to_lock);
+    if (!lock) continue;  // at work: the next tick tells
+    flight->dirty = false;
+    Mission mission;
+    {
+      const std::scoped_lock queue(flight->queue_mutex);
+      mission = flight->mission;
+    }
+    state_->deps.hub.publish(Topic::mission_state, mission_state_json(mission, flight->state), flight->state.time.us(), to_string(mission.id));
+  }
+  if (++state_->ticks % 2 == 0) state_->publish_devices();
+}
+
+std::size_t MissionService::queued() const { return state_->queued; }
+
+bool MissionService::recording() const {
+  const UtcTime now = state_->deps.clock.now();
+  const std::scoped_lock lock(state_->mutex);
+  return std::any_of(state_->flights.begin(), state_->flights.end(), [&](const auto& entry) {
+    const std::scoped_lock queue(entry.second->queue_mutex);
+    return entry.second->mission.state == MissionState::recording && seconds_between(entry.second->last_arrival, now) < 5;
+  });
+}
+
+void MissionService::stop() {
+  state_->stopped = true;
+  std::unique_lock lock(state_->running_mutex);
+  // Tasks the pool never ran (it was stopped first) must not hold the shutdown up for ever.
+  state_->idle.wait_for(lock, std::chrono::seconds(5), [&] { return state_->running == 0; });
+}
+
+}  // namespace anchord::api

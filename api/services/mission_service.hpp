@@ -1,0 +1,86 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/ids.hpp"
+#include "core/base/result.hpp"
+#include "core/base/time.hpp"
+#include "core/types/estimate.hpp"
+#include "core/types/fix.hpp"
+#include "core/types/mission.hpp"
+#include "core/types/range.hpp"
+
+namespace anchord {
+class AnchorStore;
+class MeasurementStore;
+class MissionStore;
+}  // namespace anchord
+
+namespace anchord::api {
+
+class EventLog;
+class Hub;
+
+/// Flights: their records and, for each, the one LiveFlight that follows the accepted measurements and feeds the hub.
+///
+/// Thread-safe. Rows are queued per mission and worked off in order by one task at a time (a strand), so that ingest
+/// never waits for a solve. A queue holds at most 100 000 rows; then the oldest leave the live path, which is an event
+/// (the store has them).
+class MissionService {
+ public:
+  static constexpr std::size_t k_max_queued_rows = 100'000;
+  struct Deps {
+    MissionStore& missions;
+    MeasurementStore& measurements;
+    AnchorStore& anchors;
+    Hub& hub;
+    EventLog& events;
+    const Clock& clock;
+    std::function<void(std::function<void()>)> post;  ///< runs a task on the pool; may run it inline
+  };
+  explicit MissionService(Deps deps);
+  ~MissionService();
+
+  Result<Mission> mission(const MissionId& id);  ///< cached
+  Result<void> create(const Mission& mission);
+  /// conflict when it is finished already.
+  Result<Mission> finish(const MissionId& id);
+  Result<void> remove(const MissionId& id);
+
+  /// Before rows of this mission are stored: brings its live flight up to what the store holds already, so that a
+  /// restart in flight goes on where it was. Cheap once done.
+  void prepare(const MissionId& id);
+  /// Rows of one kind that were committed, in order of arrival.
+  void accepted(std::vector<Range> ranges);
+  void accepted(std::vector<Fix> fixes);
+
+  struct LiveView {
+    Mission mission;
+    std::optional<Wgs84> origin;
+    std::vector<Estimate> estimates;
+  };
+  /// Running estimates of one mission, or of every recording one.
+  std::vector<LiveView> live(const std::optional<MissionId>& id);
+
+  /// Each 500 ms: mission.state of what moved, devices once a second.
+  void tick();
+  /// Rows that wait to be worked off, over all missions.
+  std::size_t queued() const;
+  bool recording() const;  ///< a mission got measurements in the last 5 s
+  /// Refuses new work and waits until no task is running.
+  void stop();
+
+ private:
+  struct Flight;
+  struct State;
+  std::shared_ptr<State> state_;
+};
+
+}  // namespace anchord::api
