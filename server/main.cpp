@@ -7,6 +7,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   int exit_code = 0;
   anchord::cli::add_plan_command(app, exit_code);
+  anchord::cli::add_simulate_command(app, exit_code);
   anchord::cli::add_version_command(app, exit_code);
   try {
     app.parse(argc, argv);

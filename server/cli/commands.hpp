@@ -9,6 +9,7 @@ class App;
 namespace anchord::cli {
 
 void add_plan_command(CLI::App& app, int& exit_code);
+void add_simulate_command(CLI::App& app, int& exit_code);
 void add_version_command(CLI::App& app, int& exit_code);
 
 }  // namespace anchord::cli
