@@ -1,0 +1,76 @@
+/// Anchors as the Anchors view shows them, whether they come from the stream, from a published revision or from a fresh calibration.
+import { cov6, ellipse, estimate, mirror, num, obj, str, STATUS, vec3, VERDICT, type EstimateMsg, type Mirror } from '../live/messages';
+import { ellipse_from_covariance } from '../map/enu';
+import { request } from './client';
+
+export interface AnchorRow extends EstimateMsg {
+  readonly name: string;
+  readonly absolute_h95_m: number | null;
+  readonly absolute_v95_m: number | null;
+  readonly calibrated_at: string | null;
+  readonly revision: number | null;
+  readonly crs: string;
+}
+
+export const row_of_estimate = (e: EstimateMsg): AnchorRow => ({ ...e, name: '', absolute_h95_m: null, absolute_v95_m: null, calibrated_at: null, revision: null, crs: '' });
+
+const point = (v: unknown): { lon: number | null; lat: number | null; h_m: number | null } => {
+  const c = vec3(obj(v)?.coordinates ?? v);
+  return { lon: c?.[0] ?? null, lat: c?.[1] ?? null, h_m: c?.[2] ?? null };
+};
+function mirror_of(v: unknown): Mirror | null {
+  const o = obj(v);
+  return o && (o.coordinates === undefined && o.geometry === undefined ? mirror(o) : { ...point(o.geometry ?? o.coordinates), enu_m: vec3(o.enu_m), probability: num(o.probability) });
+}
+function crs_words(v: unknown): string {
+  const o = obj(v), base = obj(o?.base);
+  if (!o) return '';
+  const sigma = num(base?.sigma_m);
+  return [str(o.frame) || str(o.id), num(o.epoch) ? `epoch ${num(o.epoch)}` : '', str(base?.source) ? `base ${str(base?.source).replaceAll('_', ' ')}${sigma === null ? '' : ` σ ${Math.round(sigma * 1000)} mm`}` : ''].filter(Boolean).join(', ');
+}
+
+/// `properties` of a GeoJSON feature or one anchor of a calibration; `geometry` beside it.
+export function row_of(p: Record<string, unknown>, geometry: unknown): AnchorRow | null {
+  const network_id = str(p.network_id);
+  if (!network_id) return null;
+  const accuracy = obj(p.accuracy), relative = obj(accuracy?.relative) ?? accuracy, absolute = obj(accuracy?.absolute), quality = obj(p.quality);
+  const cov = cov6(relative?.cov_enu_m2), provenance = obj(p.provenance);
+  const verdict = str(quality?.verdict) || str(p.verdict);
+  const known = (VERDICT as readonly string[]).includes(verdict);
+  const status = str(p.status);
+  const base = estimate({
+    anchor: network_id, mission: Array.isArray(provenance?.missions) ? str(provenance.missions[0]) : '', verdict: known ? verdict : 'ok',
+    status: (STATUS as readonly string[]).includes(status) ? status : verdict === 'ambiguous' ? 'ambiguous' : verdict === 'ok' ? 'converged' : geometry ? 'estimating' : 'found',
+    reason: str(quality?.reason) || str(p.reason), ...point(geometry), enu_m: p.enu_m ?? p.local_m, cov_enu_m2: relative?.cov_enu_m2, h95_m: relative?.h95_m, v95_m: relative?.v95_m,
+    gdop: quality?.gdop, gdop_trace: quality?.gdop_trace, n_ranges: quality?.n_ranges, n_refused: quality?.n_refused, rms_residual_m: quality?.rms_residual_m, probability: p.probability,
+  });
+  if (!base) return null;
+  const twin = mirror_of(p.mirror);
+  return {
+    ...base, ellipse95: ellipse(relative?.ellipse95) ?? (cov && ellipse_from_covariance(cov)), mirror: twin, probability: base.probability ?? (twin?.probability == null ? null : 1 - twin.probability),
+    name: str(p.name), absolute_h95_m: num(absolute?.h95_m), absolute_v95_m: num(absolute?.v95_m), calibrated_at: str(p.calibrated_at) || null, revision: num(p.revision), crs: crs_words(p.crs),
+  };
+}
+export function rows_of_collection(answer: unknown): { rows: AnchorRow[]; revision: number | null } {
+  const o = obj(answer);
+  const features = Array.isArray(o?.features) ? o.features : [];
+  const rows = features.map((f) => { const x = obj(f); return x ? row_of(obj(x.properties) ?? {}, x.geometry) : null; }).filter((r): r is AnchorRow => r !== null);
+  return { rows, revision: num(o?.revision) ?? rows.reduce<number | null>((r, x) => (x.revision === null ? r : Math.max(r ?? 0, x.revision)), null) };
+}
+export const published = async (): Promise<{ rows: AnchorRow[]; revision: number | null }> => rows_of_collection(await request('GET', '/anchors?limit=1000'));
+
+export interface Calibration { readonly id: string; readonly rows: readonly AnchorRow[] }
+export function calibration_of(answer: unknown): Calibration | null {
+  const o = obj(answer);
+  if (!o || !str(o.id) || !Array.isArray(o.anchors)) return null;
+  return { id: str(o.id), rows: o.anchors.map((a) => { const x = obj(a); return x ? row_of(x, x.geometry) : null; }).filter((r): r is AnchorRow => r !== null) };
+}
+export async function calibrate(mission: string, key: string): Promise<Calibration> {
+  const answer = await request('POST', '/calibrations', { missions: [mission] }, { Prefer: 'wait=120', 'Idempotency-Key': key });
+  const done = calibration_of(answer);
+  if (!done) throw new Error('The calibration is still running; look again in a minute.');
+  return done;
+}
+export async function publish(calibration: string, note: string, key: string): Promise<number | null> {
+  return num(obj(await request('POST', `/calibrations/${encodeURIComponent(calibration)}/publish`, note ? { note } : {}, { 'Idempotency-Key': key }))?.revision);
+}

@@ -1,0 +1,284 @@
+import { num, obj, str } from './messages';
+import type { LinkState, LiveSink, LiveSource } from './source';
+
+/// The part of WebSocket that is used, so that tests can play the server.
+export interface Socket {
+  onopen: (() => void) | null;
+  onmessage: ((event: { data: unknown }) => void) | null;
+  onclose: ((event: { code: number }) => void) | null;
+  send(text: string): void;
+  close(): void;
+}
+export interface Environment {
+  open(): Socket;
+  now_ms(): number;         ///< steady
+  wall_us(): number;        ///< this machine's clock
+  random(): number;         ///< 0..1
+  after(ms: number, call: () => void): () => void;  ///< returns its cancel
+}
+
+interface Topic { sub: number | null; seq: number | null; waiting: boolean; resubscribed_ms: number }
+
+const LATE_MS = 2000, LOST_MS = 5000, CHECK_MS = 250;   // dashboard.md section 4: LATE > 2 s, LOST > 5 s
+const FIRST_RETRY_MS = 500, LAST_RETRY_MS = 10_000;
+const TIME_EVERY_MS = 10_000;
+
+/// Client of subprotocol anchord.v1: subscribes, follows seq and prev, resumes by epoch and seq, reconnects for ever. No DOM.
+export class LiveClient implements LiveSource {
+  readonly counters = { duplicates: 0, holes: 0, unreadable: 0, unknown_ops: 0 };
+  private sink: LiveSink | null = null;
+  private socket: Socket | null = null;
+  private epoch: string | null = null;
+  private readonly topics = new Map<string, Topic>();
+  private readonly by_sub = new Map<number, string>();
+  private readonly by_id = new Map<number, string>();
+  private next_id = 1;
+  private heard_ms = -Infinity;
+  private state: LinkState = 'connecting';
+  private greeted = false;
+  private attempt = 0;
+  private retry_at_ms: number | null = null;
+  private cancel_retry: (() => void) | null = null;
+  private cancel_check: (() => void) | null = null;
+  private readonly offsets: { at_ms: number; offset_us: number; spread_us: number }[] = [];
+  private asked_time_ms = -Infinity;
+  private minimum_retry_ms = 0;
+  private resume: { recovered: number; resynchronised: boolean; open: Set<string> } | null = null;
+
+  constructor(topics: readonly string[], private readonly env: Environment, private readonly params: Record<string, object> = {}) {
+    for (const t of topics) this.topics.set(t, { sub: null, seq: null, waiting: false, resubscribed_ms: -Infinity });
+  }
+
+  start(sink: LiveSink): void {
+    this.sink = sink;
+    this.check();
+    this.connect();
+  }
+  stop(): void {
+    this.cancel_check?.();
+    this.cancel_retry?.();
+    this.drop_socket();
+    this.sink = null;
+  }
+  retryNow(): void {
+    if (!this.sink) return;
+    this.cancel_retry?.();
+    this.drop_socket();
+    this.connect();
+  }
+  now_us(): number {
+    return this.env.wall_us() + this.offset_us();
+  }
+  silence_ms(): number {
+    return Math.max(0, this.env.now_ms() - this.heard_ms);
+  }
+  retry_in_ms(): number | null {
+    return this.retry_at_ms === null ? null : Math.max(0, this.retry_at_ms - this.env.now_ms());
+  }
+  /// Clock of the server minus ours: the sample with the tightest bound among the recent ones.
+  offset_us(): number {
+    let best: { offset_us: number; spread_us: number } | null = null;
+    for (const s of this.offsets) if (!best || s.spread_us < best.spread_us) best = s;
+    return best?.offset_us ?? 0;
+  }
+
+  private connect(): void {
+    this.retry_at_ms = null;
+    this.greeted = false;
+    const socket = this.env.open();
+    this.socket = socket;
+    socket.onmessage = (event) => { if (this.socket === socket) this.receive(event.data); };
+    socket.onclose = (event) => { if (this.socket === socket) this.closed(event.code); };
+  }
+  private drop_socket(): void {
+    const socket = this.socket;
+    this.socket = null;
+    if (!socket) return;
+    socket.onmessage = socket.onclose = socket.onopen = null;
+    try { socket.close(); } catch { /* already closing */ }
+  }
+  private closed(code: number): void {
+    this.socket = null;
+    if (!this.greeted || code === 4001 || code === 4003) this.sink?.refused();
+    this.retry_later();
+  }
+  private retry_later(): void {
+    const ceiling = Math.min(LAST_RETRY_MS, FIRST_RETRY_MS * 2 ** this.attempt++);
+    const wait = Math.max(this.minimum_retry_ms, FIRST_RETRY_MS + this.env.random() * (ceiling - FIRST_RETRY_MS));
+    this.minimum_retry_ms = 0;
+    this.retry_at_ms = this.env.now_ms() + wait;
+    this.cancel_retry?.();
+    this.cancel_retry = this.env.after(wait, () => this.connect());
+  }
+
+  private check(): void {
+    this.cancel_check = this.env.after(CHECK_MS, () => this.check());
+    const silence = this.env.now_ms() - this.heard_ms;
+    if (silence === Infinity) return;
+    this.set_link(silence > LOST_MS ? 'lost' : silence > LATE_MS ? 'late' : 'live');
+    if (silence > LOST_MS && this.socket && this.greeted) {  // an open socket that says nothing is a dead one
+      this.drop_socket();
+      this.retry_later();
+    }
+    if (this.socket && this.greeted && this.env.now_ms() - this.asked_time_ms > TIME_EVERY_MS) this.ask_time();
+  }
+  private set_link(state: LinkState): void {
+    if (state === this.state) return;
+    this.state = state;
+    this.sink?.link(state);
+  }
+  private ask_time(): void {
+    this.asked_time_ms = this.env.now_ms();
+    this.send({ op: 'time', id: this.next_id++, c_us: this.env.wall_us() });
+  }
+  private send(message: object): void {
+    this.socket?.send(JSON.stringify(message));
+  }
+
+  private receive(text: unknown): void {
+    let message: Record<string, unknown> | null = null;
+    try {
+      message = typeof text === 'string' ? obj(JSON.parse(text)) : null;
+    } catch { /* counted below */ }
+    if (!message) {
+      this.counters.unreadable++;
+      return;
+    }
+    this.heard_ms = this.env.now_ms();
+    switch (message.op) {
+      case 'hello': return this.hello(message);
+      case 'ack': return this.ack(message);
+      case 'snap': case 'data': return this.content(message);
+      case 'gap': return this.gap(message);
+      case 'hb': return this.heartbeat(message);
+      case 'time': return this.time(message);
+      case 'err': return this.error(message);
+      case 'bye': this.minimum_retry_ms = Math.min(LAST_RETRY_MS, num(message.retry_ms) ?? 0); return;
+      default: this.counters.unknown_ops++;
+    }
+  }
+
+  private hello(m: Record<string, unknown>): void {
+    this.greeted = true;
+    this.attempt = 0;
+    const again = this.epoch !== null;
+    const restarted = again && this.epoch !== str(m.epoch);
+    this.epoch = str(m.epoch);
+    if (restarted) {
+      for (const t of this.topics.values()) t.seq = null;
+      this.sink?.restarted();
+    }
+    const offered = Array.isArray(m.topics) ? new Set(m.topics) : null;
+    this.by_sub.clear();
+    this.by_id.clear();
+    const wanted = [...this.topics.keys()].filter((t) => !offered || offered.has(t));
+    this.resume = again ? { recovered: 0, resynchronised: restarted, open: new Set(wanted) } : null;
+    for (const name of wanted) this.subscribe(name);
+    this.set_link('live');
+    this.ask_time();
+  }
+  private subscribe(name: string): void {
+    const topic = this.topics.get(name);
+    if (!topic) return;
+    const id = this.next_id++;
+    this.by_id.set(id, name);
+    topic.sub = null;
+    topic.waiting = true;
+    const since = topic.seq !== null && this.epoch ? { since: { epoch: this.epoch, seq: topic.seq } } : {};
+    this.send({ op: 'sub', id, topic: name, params: this.params[name] ?? {}, ...since });
+  }
+  private ack(m: Record<string, unknown>): void {
+    const [id, sub] = [num(m.id), num(m.sub)];
+    const name = id === null ? undefined : this.by_id.get(id);
+    const topic = name === undefined ? undefined : this.topics.get(name);
+    if (!topic || !name || sub === null || id === null) return;
+    this.by_id.delete(id);
+    this.by_sub.set(sub, name);
+    topic.sub = sub;
+    topic.waiting = false;
+    if (m.recovered !== true) {
+      if (topic.seq !== null && this.resume) this.resume.resynchronised = true;
+      topic.seq = null;  // the snapshot, or the first message, says where we stand
+    }
+    this.resume?.open.delete(name);
+    // What is replayed follows its ack; the heartbeat after the last ack ends the count.
+  }
+  private content(m: Record<string, unknown>): void {
+    const sub = num(m.sub);
+    const name = sub === null ? undefined : this.by_sub.get(sub);
+    const topic = name === undefined ? undefined : this.topics.get(name);
+    const seq = num(m.seq);
+    if (!topic || !name || topic.sub !== sub || seq === null) return;
+    const t_us = num(m.t_us) ?? this.now_us();
+    if (m.op === 'snap') {
+      topic.seq = seq;
+      this.sink?.snap(name, m.data, t_us);
+      return;
+    }
+    if (topic.seq !== null && seq <= topic.seq) {
+      this.counters.duplicates++;
+      return;
+    }
+    const prev = num(m.prev);
+    if (topic.seq !== null && prev !== null && prev > topic.seq) {
+      this.hole(name, topic);
+      return;
+    }
+    topic.seq = seq;
+    if (this.resume) this.resume.recovered++;
+    this.sink?.data(name, m.data, t_us);
+  }
+  /// A jump that nobody announced: ask again from where we stand. Once in two seconds, else a broken server would be asked for ever.
+  private hole(name: string, topic: Topic): void {
+    this.counters.holes++;
+    if (this.env.now_ms() - topic.resubscribed_ms < 2000) {
+      topic.seq = null;
+      return;
+    }
+    topic.resubscribed_ms = this.env.now_ms();
+    if (topic.sub !== null) {
+      this.by_sub.delete(topic.sub);
+      this.send({ op: 'unsub', id: this.next_id++, sub: topic.sub });
+    }
+    this.subscribe(name);
+  }
+  private gap(m: Record<string, unknown>): void {
+    const sub = num(m.sub);
+    const name = sub === null ? undefined : this.by_sub.get(sub);
+    const topic = name === undefined ? undefined : this.topics.get(name);
+    if (!topic || !name) return;
+    topic.seq = Math.max(topic.seq ?? 0, num(m.to_seq) ?? 0);
+    this.sink?.gap(name, num(m.dropped) ?? 0);
+  }
+  private heartbeat(m: Record<string, unknown>): void {
+    const t_us = num(m.t_us);
+    // One way only: the offset is off by the (unknown) delay, so any round trip below a second beats it.
+    if (t_us !== null) this.clock_sample(t_us - this.env.wall_us(), 1_000_000);
+    if (this.resume && this.resume.open.size === 0) {
+      const { recovered, resynchronised } = this.resume;
+      this.resume = null;
+      this.sink?.resumed(recovered, resynchronised);
+    }
+  }
+  private time(m: Record<string, unknown>): void {
+    const [c_us, t_us] = [num(m.c_us), num(m.t_us)];
+    if (c_us === null || t_us === null) return;
+    const now = this.env.wall_us();
+    this.clock_sample(t_us - (c_us + now) / 2, now - c_us);
+  }
+  private clock_sample(offset_us: number, spread_us: number): void {
+    const at_ms = this.env.now_ms();
+    while (this.offsets.length && at_ms - this.offsets[0]!.at_ms > 60_000) this.offsets.shift();
+    if (this.offsets.length >= 64) this.offsets.shift();
+    this.offsets.push({ at_ms, offset_us, spread_us });
+  }
+  private error(m: Record<string, unknown>): void {
+    const id = num(m.id);
+    const name = id === null ? undefined : this.by_id.get(id);
+    if (id === null || name === undefined) return;
+    this.by_id.delete(id);
+    this.resume?.open.delete(name);  // refused for this role: the others go on
+    const topic = this.topics.get(name);
+    if (topic) topic.waiting = false;
+  }
+}

@@ -1,0 +1,29 @@
+/// Where live data comes from. The views know this interface only, so that a recording can feed them as well as a socket.
+
+export type LinkState = 'connecting' | 'live' | 'late' | 'lost';
+
+export interface LiveSink {
+  /// A snapshot replaces all that is known of the topic.
+  snap(topic: string, data: unknown, t_us: number): void;
+  data(topic: string, data: unknown, t_us: number): void;
+  /// Messages of a lossy topic are gone and the sender said so.
+  gap(topic: string, dropped: number): void;
+  /// Another life of the server: everything known is replaced by the snapshots that follow.
+  restarted(): void;
+  /// After an interruption all topics are up to date again: by replay of so many messages, or by snapshots.
+  resumed(recovered: number, resynchronised: boolean): void;
+  link(state: LinkState): void;
+  /// A conversation ended before it began, or the server refused it: the session may have run out.
+  refused(): void;
+}
+
+export interface LiveSource {
+  start(sink: LiveSink): void;
+  stop(): void;
+  retryNow(): void;
+  /// Microseconds since 1970 by the source's clock.
+  now_us(): number;
+  /// Milliseconds of silence, and until the next attempt (null while connected).
+  silence_ms(): number;
+  retry_in_ms(): number | null;
+}

@@ -1,0 +1,114 @@
+/// The signals of the page, and the sink that fills them. Scenes are mutable; `tick` says, at most four times a second, that text may look again.
+import { computed, signal } from '@preact/signals';
+import * as m from '../live/messages';
+import type { LinkState, LiveSink, LiveSource } from '../live/source';
+import { Scene } from './scene';
+
+export const TOPICS = ['mission.state', 'drone.pose', 'rtk.status', 'ranges', 'anchors.estimates', 'devices', 'system', 'events', 'alarms', 'revisions', 'jobs'] as const;
+
+export const link = signal<LinkState>('connecting');
+export const tick = signal(0);
+export const scenes = new Map<string, Scene>();
+export const mission_list = signal<readonly m.MissionMsg[]>([]);
+export const chosen_mission = signal<string | null>(null);   ///< by the user; null follows the newest recording
+export const chosen_anchor = signal<string | null>(null);
+export const server_alarms = signal<readonly m.AlarmMsg[]>([]);
+export const devices = signal<readonly m.DeviceMsg[]>([]);
+export const system = signal<{ value: m.SystemMsg; at_ms: number } | null>(null);
+export const events = signal<readonly m.EventMsg[]>([]);
+export const revision = signal<number | null>(null);
+export const toast = signal<{ text: string; id: number } | null>(null);
+export const synced = signal(false);  ///< first snapshots are in: before that, empty means "not loaded yet"
+
+export const now_ms = (): number => performance.now();
+let source: LiveSource | null = null;
+export const live_source = (): LiveSource | null => source;
+export const server_now_us = (): number => source?.now_us() ?? Date.now() * 1000;
+
+/// Newest recording first, then the newest of the others.
+export const ordered_missions = computed(() =>
+  [...mission_list.value].sort((a, b) => Number(b.state === 'recording') - Number(a.state === 'recording') || (b.started_us ?? b.t_us) - (a.started_us ?? a.t_us)));
+export const mission_id = computed(() => {
+  const chosen = chosen_mission.value;
+  return chosen && mission_list.value.some((x) => x.mission === chosen) ? chosen : (ordered_missions.value[0]?.mission ?? null);
+});
+export function scene_of(id: string): Scene {
+  let scene = scenes.get(id);
+  if (!scene) scenes.set(id, (scene = new Scene(id)));
+  return scene;
+}
+export const current_scene = (): Scene | null => (mission_id.value ? scene_of(mission_id.value) : null);
+export const current_mission = computed(() => mission_list.value.find((x) => x.mission === mission_id.value) ?? null);
+
+let toasts = 0;
+let toast_timer: ReturnType<typeof setTimeout> | undefined;
+/// Result of the user's own action, or of a reconnect: five seconds, polite.
+export function say(text: string): void {
+  toast.value = { text, id: ++toasts };
+  clearTimeout(toast_timer);
+  toast_timer = setTimeout(() => (toast.value = null), 5000);
+}
+
+let dirty = false;
+let flush_timer: ReturnType<typeof setTimeout> | null = null;
+function touch(): void {
+  dirty = true;
+  flush_timer ??= setTimeout(flush, 250);
+}
+function flush(): void {
+  flush_timer = null;
+  if (dirty) tick.value++;
+  dirty = false;
+}
+/// Ages move while nothing arrives, so the text looks at least once a second.
+setInterval(() => tick.value++, 1000);
+
+function upsert(list: readonly m.MissionMsg[], news: readonly m.MissionMsg[]): m.MissionMsg[] {
+  const by_id = new Map(list.map((x) => [x.mission, x]));
+  for (const x of news) by_id.set(x.mission, x);
+  return [...by_id.values()];
+}
+
+type Handler = (data: unknown, whole: boolean) => void;
+const handlers: Record<string, Handler> = {
+  'mission.state': (data, whole) => {
+    const news = m.all(data, m.mission);
+    mission_list.value = whole ? news : upsert(mission_list.value, news);
+    for (const x of news) scene_of(x.mission).add_state(x, now_ms());
+    synced.value = true;
+  },
+  'drone.pose': (data) => { for (const p of m.all(data, m.pose)) scene_of(p.mission).add_pose(p, now_ms()); },
+  'rtk.status': (data) => { for (const r of m.all(data, m.rtk)) scene_of(r.mission).add_rtk(r, now_ms()); },
+  ranges: (data) => { for (const r of m.all(data, m.range)) scene_of(r.mission).add_range(r, now_ms()); },
+  'anchors.estimates': (data, whole) => {
+    if (whole) for (const s of scenes.values()) s.anchors.clear();
+    for (const e of m.all(data, m.estimate)) scene_of(e.mission).add_estimate(e, now_ms());
+  },
+  devices: (data) => (devices.value = m.all(data, m.device)),
+  system: (data) => { for (const s of m.all(data, m.system)) system.value = { value: s, at_ms: now_ms() }; },
+  events: (data, whole) => (events.value = [...(whole ? [] : events.value), ...m.all(data, m.event)].slice(-50)),
+  alarms: (data) => (server_alarms.value = m.all(data, m.alarm)),
+  revisions: (data) => { for (const r of m.all(data, m.revision)) revision.value = Math.max(revision.value ?? 0, r.revision); },
+  jobs: () => undefined,
+};
+
+export function connect(live: LiveSource, refused: () => void): void {
+  source = live;
+  const sink: LiveSink = {
+    snap: (topic, data) => { if (data != null) handlers[topic]?.(data, true); touch(); },
+    data: (topic, data) => { handlers[topic]?.(data, false); touch(); },
+    gap: () => touch(),
+    restarted: () => {
+      scenes.clear();
+      mission_list.value = [];
+      server_alarms.value = [];
+      devices.value = [];
+      events.value = [];
+      touch();
+    },
+    resumed: (recovered, resynchronised) => say(resynchronised ? 'Resynchronised: all values are current' : `Connected again, recovered ${recovered} messages`),
+    link: (state) => { link.value = state; touch(); },
+    refused,
+  };
+  live.start(sink);
+}

@@ -1,0 +1,80 @@
+import type { AnchorRow } from '../api/anchors';
+import { age, accuracy, bearing, date, fixed, latlon, metres, percent, plain } from '../ui/format';
+import { CopyBox } from '../ui/copy_box';
+import { Mark, Q, StatusChip } from '../ui/marks';
+import { GATES, why_not_done, VERDICT_WORDS } from '../ui/words';
+import { Convergence } from './convergence';
+import { Covariance, Loupe } from './loupe';
+import { current_scene, now_ms } from '../state/store';
+
+export function AnchorDetail({ row: r, live }: { row: AnchorRow; live: boolean }) {
+  const why = why_not_done(r), heard = live ? current_scene()?.anchors.get(r.anchor) : undefined;
+  const geo = r.lat !== null && r.lon !== null;
+  return (
+    <div data-testid="anchor-detail">
+      <section class="sec-p">
+        <div class="hd big"><h2>{r.anchor}</h2>{r.name && <span class="meta">{r.name}</span>}<StatusChip status={r.status} /><span class="grow" />{heard && <span class="meta">updated {age(now_ms() - heard.at_ms)} ago</span>}</div>
+        {why && <div class={`callout ${r.status === 'ambiguous' ? 'caution' : r.status === 'moved' ? 'bad' : 'info'}`} data-testid="why"><b>{why.title}</b><p>{why.text}</p></div>}
+        <dl class="kv pos">
+          {geo && <div><dt>Latitude</dt><dd data-testid="latitude"><Q v={latlon(r.lat)} u="°" /></dd></div>}
+          {geo && <div><dt>Longitude</dt><dd data-testid="longitude"><Q v={latlon(r.lon)} u="°" /></dd></div>}
+          {geo && <div><dt>Ellipsoidal h</dt><dd><Q v={metres(r.h_m)} u="m" /></dd></div>}
+          {r.enu_m && (live || !geo) && <div><dt>{geo ? 'E, N, U' : 'x, y, z'}</dt><dd><Q v={r.enu_m.map((x) => metres(x)).join(', ')} u="m" /></dd></div>}
+        </dl>
+        <dl class="kv s">
+          <div><dt>Relative to the base, 95 %</dt><dd>{accuracy(r.h95_m)}</dd></div>
+          <div><dt>Vertical, 95 %</dt><dd>{accuracy(r.v95_m)}</dd></div>
+          <div><dt>Absolute, 95 %</dt><dd>{r.absolute_h95_m === null ? <span class="mut">base not stated</span> : accuracy(r.absolute_h95_m)}</dd></div>
+          {r.calibrated_at && <div><dt>Calibrated</dt><dd>{date(r.calibrated_at)}</dd></div>}
+          {r.crs && <div><dt>Frame</dt><dd>{r.crs}</dd></div>}
+        </dl>
+        {geo && <CopyBox label="Copy latitude, longitude, height" text={`${plain(r.lat, 9)}, ${plain(r.lon, 9)}, ${plain(r.h_m, 3)}`} />}
+        {r.mirror && <Twin r={r} />}
+      </section>
+      <div class="two">
+        <Gates r={r} />
+        <section class="sec-p">
+          {r.ellipse95 && <><h3>95 % ellipse <span class="mut">{fixed(r.ellipse95.major_m, 3)} × {fixed(r.ellipse95.minor_m, 3)} m @ {bearing(r.ellipse95.azimuth_deg)}°</span></h3><Loupe e={r} size={170} /></>}
+          {r.cov_enu_m2 && <Covariance c={r.cov_enu_m2} />}
+        </section>
+      </div>
+      {live && <section class="sec-p"><Convergence anchor={r.anchor} /></section>}
+    </div>
+  );
+}
+
+function Twin({ r }: { r: AnchorRow }) {
+  const m = r.mirror!;
+  return (
+    <p class="why" data-testid="mirror">
+      <Mark shape="half" tone="caution" /> The other place that fits{m.probability === null ? '' : `, ${percent(m.probability)} %`}: <span class="n">{m.lat !== null ? `${latlon(m.lat)}°, ${latlon(m.lon)}°` : (m.enu_m?.map((x) => metres(x)).join(', ') ?? '–')}</span>. Odds {percent(r.probability)} to {percent(m.probability)}.
+    </p>
+  );
+}
+
+/// The server's verdict decides; these name value and limit of what it looks at.
+function Gates({ r }: { r: AnchorRow }) {
+  type Gate = [string, string, string, boolean | null];
+  const max = (v: number | null, limit: number): boolean | null => (v === null ? null : v <= limit);
+  const list: Gate[] = [
+    ['Verdict', VERDICT_WORDS[r.verdict], '', r.verdict === 'ok'],
+    ['95 % horizontal', `${fixed(r.h95_m, 2)} m`, `≤ ${fixed(GATES.h95_m, 2)}`, max(r.h95_m, GATES.h95_m)],
+    ['95 % vertical', `${fixed(r.v95_m, 2)} m`, `≤ ${fixed(GATES.v95_m, 2)}`, max(r.v95_m, GATES.v95_m)],
+    ['GDOP', fixed(r.gdop, 2), `≤ ${fixed(GATES.gdop, 1)}`, max(r.gdop, GATES.gdop)],
+    ['Ranges used', String(r.n_ranges), `≥ ${GATES.n_ranges}`, r.n_ranges >= GATES.n_ranges],
+    ['Residual RMS', `${fixed(r.rms_residual_m === null ? null : r.rms_residual_m * 1000, 0)} mm`, `≤ ${GATES.rms_residual_m * 1000}`, max(r.rms_residual_m, GATES.rms_residual_m)],
+    ['Mirror odds', r.mirror ? `${percent(r.mirror.probability)} %` : 'no twin', `≤ ${GATES.mirror * 100}`, r.mirror ? (r.mirror.probability ?? 1) <= GATES.mirror : true],
+  ];
+  const passed = list.filter((g) => g[3] === true).length;
+  return (
+    <section class="sec-p">
+      <table class="gates" data-testid="gates">
+        <caption>Quality <span class="mut">{passed} of {list.length} pass</span></caption>
+        <thead class="sr"><tr><th scope="col">Pass</th><th scope="col">What</th><th scope="col">Value</th><th scope="col">Limit</th></tr></thead>
+        <tbody>{list.map(([name, value, limit, ok]) => (
+          <tr key={name}><td><Mark shape={ok === null ? 'off' : ok ? 'ok' : 'bad'} tone={ok === null ? 'off' : ok ? 'ok' : 'bad'} /><span class="sr">{ok === null ? 'not known' : ok ? 'passes' : 'fails'}</span></td><th scope="row">{name}</th><td class={`num ${ok === false ? 'bad' : ''}`}>{value}</td><td class="num mut">{limit}</td></tr>
+        ))}</tbody>
+      </table>
+    </section>
+  );
+}
