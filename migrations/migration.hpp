@@ -1,0 +1,17 @@
+#pragma once
+
+#include <span>
+#include <string_view>
+
+namespace anchord {
+
+/// One step of the schema, embedded in the binary from migrations/<database>/NNNN_name.sql.
+struct Migration {
+  int number;
+  std::string_view name;
+  std::string_view sql;
+};
+
+std::span<const Migration> sqlite_migrations();
+
+}  // namespace anchord

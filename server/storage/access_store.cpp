@@ -1,0 +1,141 @@
+#include <span>
+
+#include "server/storage/migrate.hpp"
+#include "server/storage/stores.hpp"
+
+namespace anchord::sql {
+namespace {
+
+constexpr const char* k_answer =
+    "SELECT idempotency_key, principal, request_sha256_hex, body, status, created_t_ns FROM stored_answer "
+    "WHERE principal = ?1 AND idempotency_key = ?2";
+constexpr const char* k_keep =
+    "INSERT INTO stored_answer (principal, idempotency_key, request_sha256_hex, status, body, created_t_ns) "
+    "VALUES (?1, ?2, ?3, ?4, ?5, ?6) ON CONFLICT DO NOTHING RETURNING status";
+constexpr const char* k_drop = "DELETE FROM stored_answer WHERE created_t_ns < ?1 RETURNING status";
+constexpr const char* k_newest_entry = "SELECT number, chain_sha256_hex FROM audit ORDER BY number DESC LIMIT 1";
+constexpr const char* k_append =
+    "INSERT INTO audit (number, t_ns, who, what, from_where, result, chain_sha256_hex) "
+    "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
+constexpr const char* k_entries =
+    "SELECT t_ns, who, what, from_where, result FROM audit ORDER BY number DESC LIMIT ?1";
+constexpr const char* k_chain =
+    "SELECT number, t_ns, who, what, from_where, result, chain_sha256_hex FROM audit ORDER BY number";
+
+AuditEntry read_entry(Query& query) {
+  AuditEntry entry;
+  entry.time = query.time();
+  entry.who = query.text();
+  entry.what = query.text();
+  entry.from = query.text();
+  entry.result = query.text();
+  return entry;
+}
+
+/// Lengths before the texts, so that no two different entries give the same bytes.
+std::string link(const std::string& before, std::int64_t number, const AuditEntry& entry) {
+  std::string bytes = before + "|" + std::to_string(number) + "|" + std::to_string(entry.time.ns);
+  for (const std::string* part : {&entry.who, &entry.what, &entry.from, &entry.result}) {
+    bytes += "|" + std::to_string(part->size()) + ":" + *part;
+  }
+  return sha256_hex(bytes);
+}
+
+class SqlAccessStore final : public AccessStore {
+ public:
+  explicit SqlAccessStore(Gate& gate) : gate_(gate) {}
+
+  Result<std::optional<StoredAnswer>> answer(std::string_view principal, std::string_view key) override {
+    using Found = std::optional<StoredAnswer>;
+    return read_value<Found>(gate_, [&](Connection& c) -> Result<Found> {
+      Query query(c, k_answer);
+      query << principal << key;
+      if (!query.step()) return Found{};
+      StoredAnswer found;
+      found.key = query.text();
+      found.principal = query.text();
+      found.request_sha256_hex = query.text();
+      const auto body = query.blob();
+      for (const std::byte byte : body) found.body += static_cast<char>(byte);
+      found.status = query.as<int>();
+      found.created = query.time();
+      return Found{std::move(found)};
+    });
+  }
+  Result<void> keep_answer(const StoredAnswer& answer) override {
+    return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+      Query query(c, k_keep);
+      query << answer.principal << answer.key << answer.request_sha256_hex << answer.status
+            << std::as_bytes(std::span{answer.body}) << answer.created;
+      if (query.returned()) return std::nullopt;
+      return make_error(Errc::conflict, "an answer is kept under this key already");
+    });
+  }
+  Result<std::size_t> drop_answers_before(UtcTime time) override {
+    return write_value<std::size_t>(gate_, 1, [&](Connection& c) -> Result<std::size_t> {
+      Query query(c, k_drop);
+      query << time;
+      std::size_t n = 0;
+      while (query.step()) ++n;
+      return n;
+    });
+  }
+  Result<void> append_audit(const AuditEntry& entry) override {
+    return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+      std::int64_t number = 0;
+      std::string before;
+      {
+        Query newest(c, k_newest_entry);
+        if (newest.step()) {
+          number = newest.integer();
+          before = newest.text();
+        }
+      }
+      ++number;
+      const std::string chain = link(before, number, entry);
+      Query query(c, k_append);
+      query << number << entry.time << entry.who << entry.what << entry.from << entry.result << chain;
+      query.run();
+      return std::nullopt;
+    });
+  }
+  Result<std::vector<AuditEntry>> audit(std::size_t limit) override {
+    return read_value<std::vector<AuditEntry>>(gate_, [&](Connection& c) -> Result<std::vector<AuditEntry>> {
+      Query query(c, k_entries);
+      query << row_limit(limit);
+      std::vector<AuditEntry> found;
+      while (query.step()) found.push_back(read_entry(query));
+      return found;
+    });
+  }
+  Result<void> verify_audit() override {
+    if (auto error = gate_.read([](Connection& c) -> std::optional<Error> {
+          Query query(c, k_chain);
+          std::string before;
+          std::int64_t expected = 1;
+          while (query.step()) {
+            const std::int64_t number = query.integer();
+            const AuditEntry entry = read_entry(query);
+            const std::string chain = query.text();
+            if (number != expected || chain != link(before, number, entry)) {
+              return make_error(Errc::conflict, "the audit log was changed at entry " + std::to_string(expected));
+            }
+            before = chain;
+            ++expected;
+          }
+          return std::nullopt;
+        })) {
+      return *std::move(error);
+    }
+    return boost::outcome_v2::success();
+  }
+
+ private:
+  Gate& gate_;
+};
+
+}  // namespace
+
+std::unique_ptr<AccessStore> make_access_store(Gate& gate) { return std::make_unique<SqlAccessStore>(gate); }
+
+}  // namespace anchord::sql

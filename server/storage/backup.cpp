@@ -1,0 +1,94 @@
+#include "server/storage/backup.hpp"
+
+#include <openssl/evp.h>
+#include <sqlite3.h>
+
+#include <array>
+#include <chrono>
+#include <fstream>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "server/storage/data_folder.hpp"
+
+namespace anchord::sql {
+namespace {
+
+// With the source read through its own snapshot, the copy never starts again however much is written meanwhile; the
+// steps are small so that a copy on a slow card does not hold the file system for long at a time.
+constexpr int k_pages_a_step = 512;
+
+Result<void> copy_pages(SqliteConnection& source, const std::filesystem::path& file) {
+  sqlite3* raw = nullptr;
+  const int opened = sqlite3_open_v2(file.c_str(), &raw, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, nullptr);
+  const std::unique_ptr<sqlite3, int (*)(sqlite3*)> target(raw, sqlite3_close);
+  if (opened != SQLITE_OK) return make_error(Errc::storage_unavailable, "backup: cannot make " + file.string());
+  sqlite3_backup* const backup = sqlite3_backup_init(target.get(), "main", source.handle(), "main");
+  if (backup == nullptr) return make_error(Errc::storage_unavailable, "backup: " + std::string(sqlite3_errmsg(raw)));
+  int code = SQLITE_OK;
+  int waits = 0;
+  while (code == SQLITE_OK || ((code == SQLITE_BUSY || code == SQLITE_LOCKED) && ++waits < 100)) {
+    if (code != SQLITE_OK) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    code = sqlite3_backup_step(backup, k_pages_a_step);
+  }
+  sqlite3_backup_finish(backup);
+  if (code == SQLITE_DONE) return boost::outcome_v2::success();
+  const bool full = (code & 0xff) == SQLITE_FULL;
+  return make_error(full ? Errc::storage_full : Errc::storage_unavailable,
+                    "backup to " + file.string() + ": " + sqlite3_errstr(code));
+}
+
+Result<std::string> sha256_of_file(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  const std::unique_ptr<EVP_MD_CTX, void (*)(EVP_MD_CTX*)> digest(EVP_MD_CTX_new(), EVP_MD_CTX_free);
+  EVP_DigestInit_ex(digest.get(), EVP_sha256(), nullptr);
+  std::vector<char> chunk(1 << 16);
+  while (in) {
+    in.read(chunk.data(), static_cast<std::streamsize>(chunk.size()));
+    EVP_DigestUpdate(digest.get(), chunk.data(), static_cast<std::size_t>(in.gcount()));
+  }
+  if (!in.eof()) return make_error(Errc::storage_unavailable, "backup: cannot read back " + file.string());
+  std::array<unsigned char, EVP_MAX_MD_SIZE> bytes{};
+  unsigned int size = 0;
+  EVP_DigestFinal_ex(digest.get(), bytes.data(), &size);
+  std::string hex;
+  for (unsigned int i = 0; i < size; ++i) {
+    constexpr std::string_view k_digits = "0123456789abcdef";
+    hex += k_digits[bytes[i] >> 4];
+    hex += k_digits[bytes[i] & 15];
+  }
+  return hex;
+}
+
+}  // namespace
+
+Result<BackupReport> back_up(SqliteConnection& source, const std::filesystem::path& file) {
+  std::error_code error;
+  if (std::filesystem::exists(file, error)) return make_error(Errc::conflict, "backup: " + file.string() + " exists");
+  // Under another name until it is known to be good, so that a half copy never looks like a backup.
+  const std::filesystem::path part = file.string() + ".part";
+  std::filesystem::remove(part, error);
+  BOOST_OUTCOME_TRY(copy_pages(source, part));
+  std::string found;
+  {
+    SqliteConnection copy(part, SqliteConnection::Mode::read_only, Synchronous::full, std::nullopt);
+    found = copy.check(true);
+  }
+  std::filesystem::remove(part.string() + "-wal", error);
+  std::filesystem::remove(part.string() + "-shm", error);
+  if (found != "ok") return make_error(Errc::storage_unavailable, "backup: the copy is damaged: " + found);
+  BOOST_OUTCOME_TRY(sync_path(part));
+  BackupReport report;
+  BOOST_OUTCOME_TRY(report.sha256_hex, sha256_of_file(part));
+  std::filesystem::rename(part, file, error);
+  if (error) return make_error(Errc::storage_unavailable, "backup: " + error.message());
+  std::ofstream(file.string() + ".sha256") << report.sha256_hex << "  " << file.filename().string() << '\n';
+  BOOST_OUTCOME_TRY(sync_path(file.string() + ".sha256"));
+  BOOST_OUTCOME_TRY(sync_path(std::filesystem::absolute(file).parent_path()));
+  report.file = file;
+  report.bytes = std::filesystem::file_size(file, error);
+  return report;
+}
+
+}  // namespace anchord::sql

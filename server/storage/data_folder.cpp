@@ -1,0 +1,136 @@
+#include "server/storage/data_folder.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <string_view>
+#include <system_error>
+
+namespace anchord::sql {
+namespace {
+
+constexpr const char* k_lock = "anchord.lock";
+constexpr const char* k_marker = "anchord.folder";
+constexpr const char* k_reserve = "reserve.bin";
+constexpr mode_t k_private_file = 0600;
+constexpr mode_t k_private_folder = 0700;
+
+Error system_error(const std::string& what, int code) {
+  const bool full = code == ENOSPC || code == EDQUOT;
+  return make_error(full ? Errc::storage_full : Errc::storage_unavailable, what + ": " + std::strerror(code));
+}
+
+int open_file(const std::filesystem::path& path, int flags) {
+  return ::open(path.c_str(), flags | O_CLOEXEC, k_private_file);
+}
+
+std::string pid_in(int fd) {
+  std::array<char, 32> text{};
+  const ssize_t n = ::pread(fd, text.data(), text.size(), 0);
+  return n > 0 ? " (process " + std::string(text.data(), static_cast<std::size_t>(n)) + ")" : "";
+}
+
+Result<void> write_small(const std::filesystem::path& path, std::string_view text) {
+  const int fd = open_file(path, O_WRONLY | O_CREAT | O_TRUNC);
+  if (fd < 0) return system_error(path.string(), errno);
+  const bool ok = ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size()) && ::fsync(fd) == 0;
+  const int code = errno;
+  ::close(fd);
+  if (!ok) return system_error(path.string(), code);
+  return sync_path(path.parent_path());
+}
+
+std::string shell_quoted(const std::filesystem::path& path) { return "'" + path.string() + "'"; }
+
+}  // namespace
+
+Result<std::unique_ptr<DataFolder>> DataFolder::open(const std::filesystem::path& dir, std::uint64_t reserve_bytes) {
+  ::umask(S_IRWXG | S_IRWXO);
+  std::error_code error;
+  const bool fresh = std::filesystem::create_directories(dir, error);
+  if (error) return system_error("data folder " + dir.string(), error.value());
+  if (fresh) ::chmod(dir.c_str(), k_private_folder);
+  const auto path = dir / k_lock;
+  const int fd = open_file(path, O_RDWR | O_CREAT);
+  if (fd < 0) return system_error("data folder " + dir.string() + ": " + k_lock, errno);
+  if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
+    const std::string holder = pid_in(fd);
+    ::close(fd);
+    return make_error(Errc::conflict, "data folder " + dir.string() + " is in use by another anchord" + holder);
+  }
+  const std::string pid = std::to_string(::getpid());
+  if (::ftruncate(fd, 0) != 0 || ::pwrite(fd, pid.data(), pid.size(), 0) < 0) {
+    // Only the message for a second process gets poorer: the lock itself is held.
+    errno = 0;
+  }
+  return std::unique_ptr<DataFolder>(new DataFolder(dir, fd, reserve_bytes));
+}
+
+DataFolder::DataFolder(std::filesystem::path dir, int lock_fd, std::uint64_t reserve_bytes)
+    : dir_(std::move(dir)), lock_fd_(lock_fd), reserve_bytes_(reserve_bytes) {}
+
+DataFolder::~DataFolder() { ::close(lock_fd_); }
+
+bool DataFolder::had_database() const {
+  std::error_code ignored;
+  return std::filesystem::exists(dir_ / k_marker, ignored);
+}
+
+Result<void> DataFolder::note_database() {
+  if (had_database()) return boost::outcome_v2::success();
+  return write_small(dir_ / k_marker, "anchord data folder: a database was made here; do not delete this file\n");
+}
+
+std::uint64_t DataFolder::free_bytes() const {
+  struct statvfs info {};
+  if (::statvfs(dir_.c_str(), &info) != 0) return 0;
+  return static_cast<std::uint64_t>(info.f_bavail) * info.f_frsize;
+}
+
+bool DataFolder::has_reserve() const {
+  std::error_code ignored;
+  return reserve_bytes_ == 0 || std::filesystem::exists(dir_ / k_reserve, ignored);
+}
+
+void DataFolder::fill_reserve(std::uint64_t keep_free_bytes) {
+  if (has_reserve() || free_bytes() < keep_free_bytes + reserve_bytes_) return;
+  const auto path = dir_ / k_reserve;
+  const int fd = open_file(path, O_WRONLY | O_CREAT);
+  if (fd < 0) return;
+  const bool ok = ::posix_fallocate(fd, 0, static_cast<off_t>(reserve_bytes_)) == 0;
+  ::close(fd);
+  if (!ok) ::unlink(path.c_str());
+}
+
+bool DataFolder::give_up_reserve() { return ::unlink((dir_ / k_reserve).c_str()) == 0; }
+
+std::string DataFolder::recovery_commands() const {
+  const std::string db = shell_quoted(database());
+  const std::string saved = shell_quoted(dir_.string() + ".damaged");
+  return "Nothing was changed. Stop every anchord, then keep a copy of all files, and either save what can be read or go "
+         "back to the newest copy:\n"
+         "  cp -a " + shell_quoted(dir_) + " " + saved + "\n"
+         "  sqlite3 " + db + " .recover | sqlite3 " + shell_quoted(dir_ / "recovered.db") + " && mv " +
+         shell_quoted(dir_ / "recovered.db") + " " + db + " && rm -f " + shell_quoted(wal()) + " " + shell_quoted(dir_ / "anchord.db-shm") +
+         "\n"
+         "  cp \"$(ls -t " + shell_quoted(backups()) + "/*.db | head -1)\" " + db + " && rm -f " + shell_quoted(wal()) + " " +
+         shell_quoted(dir_ / "anchord.db-shm");
+}
+
+Result<void> sync_path(const std::filesystem::path& path) {
+  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0) return system_error(path.string(), errno);
+  const bool ok = ::fsync(fd) == 0;
+  const int code = errno;
+  ::close(fd);
+  if (!ok) return system_error(path.string(), code);
+  return boost::outcome_v2::success();
+}
+
+}  // namespace anchord::sql

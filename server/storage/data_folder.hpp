@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "core/base/result.hpp"
+
+namespace anchord::sql {
+
+/// The folder with the database: its lock, its reserve of disk space, and what stands in it.
+class DataFolder {
+ public:
+  /// Makes the folder (0700) when absent and takes its lock; from here on the umask is 077.
+  /// Errors: conflict when another process has it; storage_unavailable.
+  static Result<std::unique_ptr<DataFolder>> open(const std::filesystem::path& dir, std::uint64_t reserve_bytes);
+  ~DataFolder();
+  DataFolder(const DataFolder&) = delete;
+  DataFolder& operator=(const DataFolder&) = delete;
+
+  const std::filesystem::path& dir() const { return dir_; }
+  std::filesystem::path database() const { return dir_ / "anchord.db"; }
+  std::filesystem::path wal() const { return dir_ / "anchord.db-wal"; }
+  std::filesystem::path backups() const { return dir_ / "backups"; }
+
+  /// A database was made here once; from then on an empty or missing one is damage, never a fresh start.
+  bool had_database() const;
+  Result<void> note_database();
+
+  std::uint64_t free_bytes() const;
+  /// Makes the reserve file when there is space for it beyond `keep_free_bytes`.
+  void fill_reserve(std::uint64_t keep_free_bytes);
+  bool has_reserve() const;
+  /// Deletes the reserve; false when there was none.
+  bool give_up_reserve();
+
+  /// What the operator can type, for this folder.
+  std::string recovery_commands() const;
+
+ private:
+  DataFolder(std::filesystem::path dir, int lock_fd, std::uint64_t reserve_bytes);
+  const std::filesystem::path dir_;
+  const int lock_fd_;
+  const std::uint64_t reserve_bytes_;
+};
+
+/// fsync of a file or of a folder (for the names in it).
+Result<void> sync_path(const std::filesystem::path& path);
+
+}  // namespace anchord::sql

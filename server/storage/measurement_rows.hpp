@@ -1,0 +1,70 @@
+#pragma once
+
+#include "core/types/fix.hpp"
+#include "core/types/range.hpp"
+#include "server/storage/sql.hpp"
+
+/// Ranges and fixes as rows: texts, binding, reading, and what "the same content" means.
+namespace anchord::sql {
+
+/// What a table of measurements is made of, so that appends and pages are written once for both.
+template <class Row>
+struct Table;
+
+template <>
+struct Table<Range> {
+  static constexpr std::string_view name = "uwb_range";
+  static constexpr std::string_view id = "range_id";
+  static constexpr std::string_view columns =
+      "range_id, mission_key, kind, t_ns, received_t_ns, tag, antenna, anchor, seq, distance_m, rss_dbm, fp_dbm, "
+      "rx_dbm, std_noise, heading_deg, truth_distance_m, truth_los";
+  static constexpr std::string_view insert =
+      "INSERT INTO uwb_range (mission_key, kind, t_ns, received_t_ns, tag, antenna, anchor, seq, distance_m, rss_dbm, "
+      "fp_dbm, rx_dbm, std_noise, heading_deg, truth_distance_m, truth_los) "
+      "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16) "
+      "ON CONFLICT DO NOTHING RETURNING range_id";
+  static constexpr std::string_view same_identity =
+      "mission_key = ?1 AND t_ns = ?2 AND tag = ?3 AND anchor = ?4 AND antenna = ?5 AND ifnull(seq, -1) = ?6";
+  static void bind(Query& query, std::int64_t mission_key, const Range& row);
+  static void bind_identity(Query& query, std::int64_t mission_key, const Range& row);
+  /// All columns after id and mission_key; the mission is the caller's to fill in.
+  static Range read(Query& query);
+  /// Empty, or why the row cannot be stored.
+  static std::string refusal(const Range& row);
+};
+
+template <>
+struct Table<Fix> {
+  static constexpr std::string_view name = "fix";
+  static constexpr std::string_view id = "fix_id";
+  static constexpr std::string_view columns =
+      "fix_id, mission_key, t_ns, received_t_ns, seq, frame, lat_deg, lon_deg, height_m, x_m, y_m, z_m, fix_class, "
+      "cov_ee_m2, cov_en_m2, cov_eu_m2, cov_nn_m2, cov_nu_m2, cov_uu_m2, "
+      "enu_from_body_x, enu_from_body_y, enu_from_body_z, enu_from_body_w, correction_age_s, satellites";
+  static constexpr std::string_view insert =
+      "INSERT INTO fix (mission_key, t_ns, received_t_ns, seq, frame, lat_deg, lon_deg, height_m, x_m, y_m, z_m, "
+      "fix_class, cov_ee_m2, cov_en_m2, cov_eu_m2, cov_nn_m2, cov_nu_m2, cov_uu_m2, "
+      "enu_from_body_x, enu_from_body_y, enu_from_body_z, enu_from_body_w, correction_age_s, satellites) "
+      "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20, ?21, ?22, "
+      "?23, ?24) ON CONFLICT DO NOTHING RETURNING fix_id";
+  static constexpr std::string_view same_identity = "mission_key = ?1 AND t_ns = ?2 AND ifnull(seq, -1) = ?3";
+  static void bind(Query& query, std::int64_t mission_key, const Fix& row);
+  static void bind_identity(Query& query, std::int64_t mission_key, const Fix& row);
+  static Fix read(Query& query);
+  static std::string refusal(const Fix& row);
+};
+
+void insert_cir(Connection& connection, std::int64_t range_id, const Cir& cir);
+std::optional<Cir> read_cir(Connection& connection, std::int64_t range_id);
+
+/// Equal in everything but the arrival time, which differs when a client sends again.
+bool same_content(const Range& a, const Range& b);
+bool same_content(const Fix& a, const Fix& b);
+
+/// Upper triangle of a symmetric matrix: ee, en, eu, nn, nu, uu.
+void bind_covariance(Query& query, const Eigen::Matrix3d& m);
+Eigen::Matrix3d read_covariance(Query& query);
+void bind_wgs84(Query& query, const std::optional<Wgs84>& position);
+std::optional<Wgs84> read_wgs84(Query& query);
+
+}  // namespace anchord::sql

@@ -1,0 +1,309 @@
+#include <charconv>
+#include <map>
+#include <tuple>
+
+#include "server/storage/measurement_rows.hpp"
+#include "server/storage/stores.hpp"
+
+namespace anchord::sql {
+namespace {
+
+constexpr const char* k_mission_id = "SELECT id FROM mission WHERE mission_key = ?1";
+constexpr const char* k_note_device =
+    "INSERT INTO device_seen (mission_key, network_id, kind, first_t_ns, last_t_ns, n_ranges) "
+    "VALUES (?1, ?2, ?3, ?4, ?5, ?6) "
+    "ON CONFLICT (mission_key, network_id, kind) DO UPDATE SET "
+    "first_t_ns = CASE WHEN excluded.first_t_ns < device_seen.first_t_ns THEN excluded.first_t_ns "
+    "ELSE device_seen.first_t_ns END, "
+    "last_t_ns = CASE WHEN excluded.last_t_ns > device_seen.last_t_ns THEN excluded.last_t_ns "
+    "ELSE device_seen.last_t_ns END, "
+    "n_ranges = device_seen.n_ranges + excluded.n_ranges";
+constexpr const char* k_devices_of_mission =
+    "SELECT d.network_id, d.kind, m.id, d.first_t_ns, d.last_t_ns, d.n_ranges "
+    "FROM device_seen d JOIN mission m ON m.mission_key = d.mission_key "
+    "WHERE m.id = ?1 ORDER BY d.last_t_ns DESC, d.network_id";
+constexpr const char* k_devices =
+    "SELECT d.network_id, d.kind, m.id, d.first_t_ns, d.last_t_ns, d.n_ranges "
+    "FROM device_seen d JOIN mission m ON m.mission_key = d.mission_key ORDER BY d.last_t_ns DESC, d.network_id";
+constexpr const char* k_count_ranges = "SELECT count(*) FROM uwb_range WHERE mission_key = ?1";
+constexpr const char* k_count_fixes = "SELECT count(*) FROM fix WHERE mission_key = ?1";
+
+class Keys {
+ public:
+  explicit Keys(Connection& connection) : connection_(connection) {}
+  std::optional<std::int64_t> of(const MissionId& id) {
+    if (last_ && last_->first == id) return last_->second;
+    auto it = known_.find(id);
+    if (it == known_.end()) it = known_.emplace(id, mission_key(connection_, id)).first;
+    last_ = *it;
+    return it->second;
+  }
+
+ private:
+  Connection& connection_;
+  std::map<MissionId, std::optional<std::int64_t>> known_;
+  std::optional<std::pair<MissionId, std::optional<std::int64_t>>> last_;
+};
+
+/// Sums of one append, so that each device costs one statement a call and not one a row.
+class Devices {
+ public:
+  void note(std::int64_t key, const Range& row) {
+    add({key, row.anchor.value, DeviceSeen::Kind::anchor}, row.time);
+    add({key, row.tag.value, row.kind == RangeKind::tag_anchor ? DeviceSeen::Kind::tag : DeviceSeen::Kind::anchor},
+        row.time);
+  }
+  void note(std::int64_t, const Fix&) {}
+  void store(Connection& connection) const {
+    for (const auto& [device, seen] : seen_) {
+      const auto& [key, network_id, kind] = device;
+      Query query(connection, k_note_device);
+      query << key << NetworkId{network_id} << static_cast<int>(kind) << seen.first << seen.last << seen.n;
+      query.run();
+    }
+  }
+
+ private:
+  struct Seen {
+    UtcTime first{}, last{};
+    std::int64_t n{0};
+  };
+  using Device = std::tuple<std::int64_t, std::uint32_t, DeviceSeen::Kind>;
+  void add(const Device& device, UtcTime time) {
+    auto [it, fresh] = seen_.try_emplace(device, Seen{time, time, 0});
+    it->second.first = std::min(it->second.first, time);
+    it->second.last = std::max(it->second.last, time);
+    ++it->second.n;
+  }
+  std::map<Device, Seen> seen_;
+};
+
+void store_cir(Connection& connection, std::int64_t id, const Range& row) {
+  if (row.cir) insert_cir(connection, id, *row.cir);
+}
+void store_cir(Connection&, std::int64_t, const Fix&) {}
+void load_cir(Connection& connection, std::int64_t id, Range& row) { row.cir = read_cir(connection, id); }
+void load_cir(Connection&, std::int64_t, Fix&) {}
+
+template <class Row>
+RowOutcome judge_stored(Connection& connection, std::int64_t key, const Row& row) {
+  static const std::string text = "SELECT " + std::string(Table<Row>::columns) + " FROM " +
+                                  std::string(Table<Row>::name) + " WHERE " + std::string(Table<Row>::same_identity);
+  Query query(connection, text);
+  Table<Row>::bind_identity(query, key, row);
+  if (!query.step()) throw SqlError(Failure::internal, "a row that was refused as present is not there");
+  const std::int64_t id = query.integer();
+  query.skip();
+  Row stored = Table<Row>::read(query);
+  load_cir(connection, id, stored);
+  return same_content(stored, row) ? RowOutcome::duplicate : RowOutcome::conflict;
+}
+
+template <class Row>
+void append_rows(Connection& connection, const std::vector<Row>& rows, std::vector<RowOutcome>& outcomes) {
+  outcomes.assign(rows.size(), RowOutcome::accepted);
+  Keys keys(connection);
+  Devices devices;
+  Query insert(connection, Table<Row>::insert);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const auto key = keys.of(rows[i].mission);
+    if (!key) {
+      outcomes[i] = RowOutcome::unknown_mission;
+      continue;
+    }
+    insert.again();
+    Table<Row>::bind(insert, *key, rows[i]);
+    const auto id = insert.returned();
+    if (!id) {
+      outcomes[i] = judge_stored(connection, *key, rows[i]);
+      continue;
+    }
+    store_cir(connection, *id, rows[i]);
+    devices.note(*key, rows[i]);
+  }
+  devices.store(connection);
+}
+
+template <class Row>
+Result<std::vector<RowOutcome>> append(Gate& gate, const std::vector<Row>& rows, bool atomic) {
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const std::string refusal = Table<Row>::refusal(rows[i]);
+    if (!refusal.empty()) return make_error(Errc::invalid_argument, "row " + std::to_string(i) + ": " + refusal);
+  }
+  std::vector<RowOutcome> outcomes;
+  if (rows.empty()) return outcomes;
+  bool refused = false;
+  const auto error = gate.write(rows.size(), [&](Connection& connection) -> std::optional<Error> {
+    append_rows(connection, rows, outcomes);
+    refused = atomic && std::ranges::any_of(outcomes, [](RowOutcome outcome) {
+                return outcome == RowOutcome::conflict || outcome == RowOutcome::unknown_mission;
+              });
+    if (refused) return make_error(Errc::conflict, "a row of an atomic call cannot be stored");
+    return std::nullopt;
+  });
+  if (error && !(refused && error->code == Errc::conflict)) return *error;
+  return outcomes;
+}
+
+struct Cursor {
+  std::int64_t t_ns{}, id{};
+};
+
+Result<std::optional<Cursor>> parse_cursor(const std::string& text) {
+  if (text.empty()) return std::optional<Cursor>{};
+  Cursor cursor;
+  const char* const end = text.data() + text.size();
+  const auto time = std::from_chars(text.data(), end, cursor.t_ns);
+  if (time.ec == std::errc{} && time.ptr != end && *time.ptr == '.') {
+    const auto id = std::from_chars(time.ptr + 1, end, cursor.id);
+    if (id.ec == std::errc{} && id.ptr == end) return std::optional(cursor);
+  }
+  return make_error(Errc::invalid_argument, "not a cursor of ours: \"" + text + "\"");
+}
+
+/// Text of one page: the parameters appear in the order in which bind_page binds them.
+template <class Row>
+std::string page_text(const MeasurementStore::Filter& filter, bool after) {
+  int n = 0;
+  std::string where;
+  const auto term = [&](const std::string& text) {
+    where += (where.empty() ? " WHERE " : " AND ") + text + "?" + std::to_string(++n);
+  };
+  if (filter.mission) term("mission_key = ");
+  if (filter.since) term("t_ns >= ");
+  if (filter.until) term("t_ns < ");
+  if constexpr (std::is_same_v<Row, Range>) {
+    if (filter.anchor) term("anchor = ");
+    if (filter.tag) term("tag = ");
+  }
+  const std::string id(Table<Row>::id);
+  if (after) {
+    // The first comparison is implied by the second, but an index can follow only the first.
+    const std::string beyond = filter.descending ? "<" : ">";
+    term("t_ns " + beyond + "= ");
+    const std::string same = "?" + std::to_string(n);
+    where += " AND (t_ns " + beyond + " " + same + " OR (t_ns = " + same + " AND " + id + " " + beyond + " ?" +
+             std::to_string(++n) + "))";
+  }
+  const std::string direction = filter.descending ? " DESC" : "";
+  return "SELECT " + std::string(Table<Row>::columns) + " FROM " + std::string(Table<Row>::name) + where +
+         " ORDER BY t_ns" + direction + ", " + id + direction + " LIMIT ?" + std::to_string(++n);
+}
+
+MissionId mission_id(Connection& connection, std::int64_t key) {
+  Query query(connection, k_mission_id);
+  query << key;
+  if (!query.step()) throw SqlError(Failure::damaged, "a measurement without its mission");
+  return query.id<MissionId>();
+}
+
+template <class Row>
+Result<MeasurementStore::Page<Row>> read_page(Connection& connection, const MeasurementStore::Filter& filter) {
+  BOOST_OUTCOME_TRY(const auto cursor, parse_cursor(filter.after));
+  MeasurementStore::Page<Row> page;
+  std::optional<std::int64_t> key;
+  if (filter.mission) {
+    key = mission_key(connection, *filter.mission);
+    if (!key) return page;
+  }
+  Query query(connection, page_text<Row>(filter, cursor.has_value()));
+  if (key) query << *key;
+  if (filter.since) query << *filter.since;
+  if (filter.until) query << *filter.until;
+  if constexpr (std::is_same_v<Row, Range>) {
+    if (filter.anchor) query << *filter.anchor;
+    if (filter.tag) query << *filter.tag;
+  }
+  if (cursor) query << cursor->t_ns << cursor->id;
+  // One more than asked tells whether there is a next page.
+  query << row_limit(filter.limit) + 1;
+  std::map<std::int64_t, MissionId> missions;
+  while (query.step()) {
+    if (page.rows.size() == filter.limit) {
+      if (filter.limit > 0) page.next = std::to_string(page.rows.back().time.ns) + "." + std::to_string(page.ids.back());
+      break;
+    }
+    page.ids.push_back(query.integer());
+    const std::int64_t row_key = query.integer();
+    auto it = missions.find(row_key);
+    if (it == missions.end()) it = missions.emplace(row_key, mission_id(connection, row_key)).first;
+    page.rows.push_back(Table<Row>::read(query));
+    page.rows.back().mission = it->second;
+    if (filter.with_cir) load_cir(connection, page.ids.back(), page.rows.back());
+  }
+  return page;
+}
+
+class SqlMeasurementStore final : public MeasurementStore {
+ public:
+  explicit SqlMeasurementStore(Gate& gate) : gate_(gate) {}
+
+  Result<std::vector<RowOutcome>> append_ranges(std::vector<Range> rows, bool atomic) override {
+    return append(gate_, rows, atomic);
+  }
+  Result<std::vector<RowOutcome>> append_fixes(std::vector<Fix> rows, bool atomic) override {
+    return append(gate_, rows, atomic);
+  }
+  Result<Page<Range>> ranges(const Filter& filter) override {
+    return read_value<Page<Range>>(gate_, [&](Connection& c) { return read_page<Range>(c, filter); });
+  }
+  Result<Page<Fix>> fixes(const Filter& filter) override {
+    return read_value<Page<Fix>>(gate_, [&](Connection& c) { return read_page<Fix>(c, filter); });
+  }
+  Result<Range> range(std::int64_t id) override {
+    return read_value<Range>(gate_, [&](Connection& c) -> Result<Range> {
+      static const std::string text =
+          "SELECT " + std::string(Table<Range>::columns) + " FROM uwb_range WHERE range_id = ?1";
+      Query query(c, text);
+      query << id;
+      if (!query.step()) return make_error(Errc::not_found, "no range " + std::to_string(id));
+      query.skip();
+      const std::int64_t key = query.integer();
+      Range row = Table<Range>::read(query);
+      row.mission = mission_id(c, key);
+      row.cir = read_cir(c, id);
+      return row;
+    });
+  }
+  Result<std::uint64_t> count_ranges(const MissionId& mission) override { return count(mission, k_count_ranges); }
+  Result<std::uint64_t> count_fixes(const MissionId& mission) override { return count(mission, k_count_fixes); }
+
+  Result<std::vector<DeviceSeen>> devices(const std::optional<MissionId>& mission) override {
+    return read_value<std::vector<DeviceSeen>>(gate_, [&](Connection& c) -> Result<std::vector<DeviceSeen>> {
+      Query query(c, mission ? k_devices_of_mission : k_devices);
+      if (mission) query << *mission;
+      std::vector<DeviceSeen> found;
+      while (query.step()) {
+        DeviceSeen device;
+        device.network_id = query.network_id();
+        device.kind = query.as<DeviceSeen::Kind>();
+        device.mission = query.id<MissionId>();
+        device.first_seen = query.time();
+        device.last_seen = query.time();
+        device.n_ranges = query.as<std::uint64_t>();
+        found.push_back(device);
+      }
+      return found;
+    });
+  }
+
+ private:
+  Result<std::uint64_t> count(const MissionId& mission, const char* text) {
+    return read_value<std::uint64_t>(gate_, [&](Connection& c) -> Result<std::uint64_t> {
+      const auto key = mission_key(c, mission);
+      if (!key) return std::uint64_t{0};
+      Query query(c, text);
+      query << *key;
+      return query.step() ? query.as<std::uint64_t>() : 0;
+    });
+  }
+  Gate& gate_;
+};
+
+}  // namespace
+
+std::unique_ptr<MeasurementStore> make_measurement_store(Gate& gate) {
+  return std::make_unique<SqlMeasurementStore>(gate);
+}
+
+}  // namespace anchord::sql

@@ -1,0 +1,94 @@
+#include "server/storage/migrate.hpp"
+
+#include <openssl/evp.h>
+
+#include <array>
+#include <system_error>
+
+#include "core/base/check.hpp"
+
+namespace anchord::sql {
+namespace {
+
+constexpr const char* k_applied = "SELECT number, name, sha256_hex FROM schema_migration ORDER BY number";
+constexpr const char* k_record =
+    "INSERT INTO schema_migration (number, name, sha256_hex, applied_t_ns) VALUES (?1, ?2, ?3, ?4)";
+
+std::string quoted(std::string text) {
+  for (std::size_t at = text.find('\''); at != std::string::npos; at = text.find('\'', at + 2)) text.insert(at, 1, '\'');
+  return "'" + text + "'";
+}
+
+void copy_before(SqliteConnection& connection, const std::filesystem::path& dir, std::int64_t version) {
+  std::error_code ignored;
+  std::filesystem::create_directories(dir, ignored);
+  const auto file = dir / ("before-migration-" + std::to_string(version + 1) + ".db");
+  // Left by a start that was killed: it may be half a copy.
+  std::filesystem::remove(file, ignored);
+  connection.execute("VACUUM INTO " + quoted(file.string()));
+}
+
+Result<void> verify_applied(SqliteConnection& connection, std::span<const Migration> migrations) {
+  Query query(connection, k_applied);
+  while (query.step()) {
+    const auto number = query.integer();
+    const auto name = query.text();
+    const auto digest = query.text();
+    if (number < 1 || static_cast<std::size_t>(number) > migrations.size()) continue;
+    if (digest != sha256_hex(migrations[static_cast<std::size_t>(number - 1)].sql)) {
+      return make_error(Errc::unsupported, "migration " + std::to_string(number) + " (" + name +
+                                               ") was another one when this database was made: it had SHA-256 " + digest);
+    }
+  }
+  return boost::outcome_v2::success();
+}
+
+void apply(SqliteConnection& connection, const Migration& migration, UtcTime now) {
+  connection.execute("BEGIN IMMEDIATE");
+  try {
+    connection.execute(std::string(migration.sql));
+    {
+      Query query(connection, k_record);
+      query << migration.number << migration.name << sha256_hex(migration.sql) << now;
+      query.run();
+    }
+    connection.execute("PRAGMA user_version=" + std::to_string(migration.number));
+    connection.execute("COMMIT");
+  } catch (const SqlError& error) {
+    if (connection.in_transaction()) connection.execute("ROLLBACK");
+    throw SqlError(error.failure(), "migration " + std::to_string(migration.number) + ": " + error.what());
+  }
+}
+
+}  // namespace
+
+std::string sha256_hex(std::string_view bytes) {
+  std::array<unsigned char, 32> digest{};
+  unsigned int size = 0;
+  ANCHORD_CHECK(EVP_Digest(bytes.data(), bytes.size(), digest.data(), &size, EVP_sha256(), nullptr) == 1, "SHA-256");
+  constexpr std::string_view k_digits = "0123456789abcdef";
+  std::string hex;
+  for (const unsigned char byte : digest) {
+    hex += k_digits[byte >> 4];
+    hex += k_digits[byte & 15];
+  }
+  return hex;
+}
+
+Result<void> migrate(SqliteConnection& connection, std::span<const Migration> migrations,
+                     const std::filesystem::path& backup_dir, UtcTime now) {
+  const std::int64_t version = connection.pragma("user_version");
+  const auto newest = static_cast<std::int64_t>(migrations.size());
+  ANCHORD_CHECK(version <= newest, "a newer database came to migrate: " << version);
+  if (version > 0) {
+    BOOST_OUTCOME_TRY(verify_applied(connection, migrations));
+  }
+  if (version == newest) return boost::outcome_v2::success();
+  if (version > 0) copy_before(connection, backup_dir, version);
+  for (const Migration& migration : migrations.subspan(static_cast<std::size_t>(version))) {
+    apply(connection, migration, now);
+  }
+  return boost::outcome_v2::success();
+}
+
+}  // namespace anchord::sql

@@ -1,0 +1,173 @@
+#include <algorithm>
+#include <limits>
+
+#include "server/storage/stores.hpp"
+
+namespace anchord::sql {
+namespace {
+
+constexpr const char* k_key = "SELECT mission_key FROM mission WHERE id = ?1";
+constexpr const char* k_insert =
+    "INSERT INTO mission (id, site_id, name, kit, radio, frame, track_point, state, created_t_ns, finished_t_ns) "
+    "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10) RETURNING mission_key";
+constexpr const char* k_update =
+    "UPDATE mission SET site_id = ?2, name = ?3, kit = ?4, radio = ?5, frame = ?6, track_point = ?7, state = ?8, "
+    "created_t_ns = ?9, finished_t_ns = ?10 WHERE id = ?1 RETURNING mission_key";
+constexpr const char* k_columns =
+    "SELECT mission_key, id, site_id, name, kit, radio, frame, track_point, state, created_t_ns, finished_t_ns "
+    "FROM mission ";
+constexpr const char* k_insert_tag =
+    "INSERT INTO mission_tag (mission_key, ordinal, tag, antenna, lever_arm_forward_m, lever_arm_left_m, "
+    "lever_arm_up_m) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
+constexpr const char* k_tags =
+    "SELECT tag, antenna, lever_arm_forward_m, lever_arm_left_m, lever_arm_up_m FROM mission_tag "
+    "WHERE mission_key = ?1 ORDER BY ordinal";
+constexpr const char* k_drop_tags = "DELETE FROM mission_tag WHERE mission_key = ?1";
+constexpr const char* k_calibrations =
+    "SELECT count(*) FROM calibration_mission cm JOIN mission m ON m.mission_key = cm.mission_key WHERE m.id = ?1";
+constexpr const char* k_remove = "DELETE FROM mission WHERE id = ?1 RETURNING mission_key";
+constexpr const char* k_site = "SELECT 1 FROM site WHERE id = ?1";
+
+Error no_mission(const MissionId& id) { return make_error(Errc::not_found, "no mission " + to_string(id)); }
+
+std::optional<Error> check_site(Connection& connection, const Mission& mission) {
+  if (!mission.site) return std::nullopt;
+  Query query(connection, k_site);
+  query << *mission.site;
+  if (query.step()) return std::nullopt;
+  return make_error(Errc::not_found, "no site " + to_string(*mission.site));
+}
+
+void store_tags(Connection& connection, std::int64_t key, const Mission& mission) {
+  Query query(connection, k_insert_tag);
+  std::int64_t ordinal = 0;
+  for (const TagAntenna& tag : mission.tags) {
+    query.again();
+    const auto& arm = tag.lever_arm_body_m;
+    query << key << ordinal++ << tag.tag << tag.antenna << arm.x() << arm.y() << arm.z();
+    query.run();
+  }
+}
+
+void bind(Query& query, const Mission& m) {
+  query << m.id << m.site << m.name << m.kit << m.radio << static_cast<int>(m.frame) << static_cast<int>(m.point)
+        << static_cast<int>(m.state) << m.created << m.finished;
+}
+
+Mission read(Connection& connection, Query& query) {
+  Mission m;
+  const std::int64_t key = query.integer();
+  m.id = query.id<MissionId>();
+  m.site = query.maybe([&] { return query.id<SiteId>(); });
+  m.name = query.text();
+  m.kit = query.text();
+  m.radio = query.text();
+  m.frame = query.as<TrackFrame>();
+  m.point = query.as<TrackPoint>();
+  m.state = query.as<MissionState>();
+  m.created = query.time();
+  m.finished = query.maybe_time();
+  Query tags(connection, k_tags);
+  tags << key;
+  while (tags.step()) {
+    TagAntenna tag;
+    tag.tag = tags.network_id();
+    tag.antenna = tags.as<std::uint8_t>();
+    for (int axis = 0; axis < 3; ++axis) tag.lever_arm_body_m[axis] = tags.real();
+    m.tags.push_back(tag);
+  }
+  return m;
+}
+
+class SqlMissionStore final : public MissionStore {
+ public:
+  SqlMissionStore(Gate& gate, AdmitMission admit) : gate_(gate), admit_(std::move(admit)) {}
+
+  Result<void> insert(const Mission& mission) override {
+    if (auto refusal = admit_()) return *std::move(refusal);
+    return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+      if (mission_key(c, mission.id)) return make_error(Errc::conflict, "mission " + to_string(mission.id) + " exists");
+      if (auto error = check_site(c, mission)) return error;
+      Query query(c, k_insert);
+      bind(query, mission);
+      store_tags(c, query.returned().value(), mission);
+      return std::nullopt;
+    });
+  }
+
+  Result<void> update(const Mission& mission) override {
+    return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+      if (auto error = check_site(c, mission)) return error;
+      Query query(c, k_update);
+      bind(query, mission);
+      const auto key = query.returned();
+      if (!key) return no_mission(mission.id);
+      Query drop(c, k_drop_tags);
+      drop << *key;
+      drop.run();
+      store_tags(c, *key, mission);
+      return std::nullopt;
+    });
+  }
+
+  Result<Mission> mission(const MissionId& id) override {
+    return read_value<Mission>(gate_, [&](Connection& c) -> Result<Mission> {
+      static const std::string text = std::string(k_columns) + "WHERE id = ?1";
+      Query query(c, text);
+      query << id;
+      if (!query.step()) return no_mission(id);
+      return read(c, query);
+    });
+  }
+
+  Result<std::vector<Mission>> missions(std::size_t limit, const std::optional<MissionId>& after) override {
+    return read_value<std::vector<Mission>>(gate_, [&](Connection& c) -> Result<std::vector<Mission>> {
+      static const std::string first = std::string(k_columns) + "ORDER BY id DESC LIMIT ?1";
+      static const std::string next = std::string(k_columns) + "WHERE id < ?1 ORDER BY id DESC LIMIT ?2";
+      Query query(c, after ? next : first);
+      if (after) query << *after;
+      query << row_limit(limit);
+      std::vector<Mission> found;
+      while (query.step()) found.push_back(read(c, query));
+      return found;
+    });
+  }
+
+  Result<void> remove(const MissionId& id) override {
+    return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+      Query used(c, k_calibrations);
+      used << id;
+      used.step();
+      const std::int64_t n = used.integer();
+      if (n > 0) {
+        return make_error(Errc::conflict, "mission " + to_string(id) + " is used by " + std::to_string(n) +
+                                              (n == 1 ? " calibration" : " calibrations"));
+      }
+      Query query(c, k_remove);
+      query << id;
+      return query.returned() ? std::nullopt : std::optional(no_mission(id));
+    });
+  }
+
+ private:
+  Gate& gate_;
+  AdmitMission admit_;
+};
+
+}  // namespace
+
+std::unique_ptr<MissionStore> make_mission_store(Gate& gate, AdmitMission admit) {
+  return std::make_unique<SqlMissionStore>(gate, std::move(admit));
+}
+
+std::optional<std::int64_t> mission_key(Connection& connection, const MissionId& id) {
+  Query query(connection, k_key);
+  query << id;
+  return query.step() ? std::optional(query.integer()) : std::nullopt;
+}
+
+std::int64_t row_limit(std::size_t limit) {
+  return static_cast<std::int64_t>(std::min<std::size_t>(limit, std::numeric_limits<std::int32_t>::max()));
+}
+
+}  // namespace anchord::sql

@@ -1,0 +1,203 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "core/base/ids.hpp"
+#include "core/base/result.hpp"
+#include "core/base/time.hpp"
+
+/// The seam between the stores and the database: stores are written once against it, each database implements it once.
+/// SQL texts use ?1, ?2 ... in order, ON CONFLICT and RETURNING, and nothing that only one database knows.
+namespace anchord::sql {
+
+enum class Failure : std::uint8_t {
+  full,         ///< no space
+  unavailable,  ///< I/O error, read-only, busy past the limit
+  damaged,      ///< the file is not what it should be
+  constraint,   ///< a rule of the schema; the caller's data, not the database
+  internal,     ///< our SQL is wrong
+};
+
+/// Thrown inside server/storage only; the write queue and the reader pool turn it into an Error.
+class SqlError : public std::runtime_error {
+ public:
+  SqlError(Failure failure, const std::string& text) : std::runtime_error(text), failure_(failure) {}
+  Failure failure() const { return failure_; }
+
+ private:
+  Failure failure_;
+};
+
+Error to_error(const SqlError& error);
+
+/// A prepared statement. Parameters count from 1, columns from 0. A bound blob must live until reset.
+class Statement {
+ public:
+  virtual ~Statement() = default;
+  virtual void bind_null(int index) = 0;
+  virtual void bind_integer(int index, std::int64_t value) = 0;
+  virtual void bind_real(int index, double value) = 0;
+  virtual void bind_text(int index, std::string_view value) = 0;
+  virtual void bind_blob(int index, std::span<const std::byte> value) = 0;
+  virtual bool step() = 0;  ///< true: a row
+  virtual void reset() noexcept = 0;
+  virtual bool is_null(int column) = 0;
+  virtual std::int64_t integer(int column) = 0;
+  virtual double real(int column) = 0;
+  virtual std::string text(int column) = 0;
+  virtual std::span<const std::byte> blob(int column) = 0;  ///< until the next step or reset
+};
+
+/// One connection, used by one thread at a time.
+class Connection {
+ public:
+  virtual ~Connection() = default;
+  /// Prepared once per text and kept.
+  virtual Statement& prepared(std::string_view sql) = 0;
+  virtual void execute(const std::string& sql) = 0;
+};
+
+/// A statement in use: bind with <<, step, take columns in order; resets itself.
+class Query {
+ public:
+  Query(Connection& connection, std::string_view sql) : statement_(connection.prepared(sql)) {}
+  ~Query() { statement_.reset(); }
+  Query(const Query&) = delete;
+  Query& operator=(const Query&) = delete;
+
+  /// Ready for the next set of parameters; every one must be bound again.
+  void again() {
+    statement_.reset();
+    parameter_ = 1;
+  }
+  bool step() {
+    column_ = 0;
+    return statement_.step();
+  }
+  void run() {
+    while (step()) {
+    }
+  }
+
+  /// The integer of a RETURNING; nothing when no row was touched. Runs to the end, where foreign keys are judged.
+  std::optional<std::int64_t> returned() {
+    if (!step()) return std::nullopt;
+    const std::int64_t value = integer();
+    run();
+    return value;
+  }
+
+  Query& operator<<(std::nullopt_t) { return statement_.bind_null(parameter_++), *this; }
+  Query& operator<<(std::int64_t v) { return statement_.bind_integer(parameter_++, v), *this; }
+  Query& operator<<(int v) { return *this << std::int64_t{v}; }
+  Query& operator<<(bool v) { return *this << std::int64_t{v}; }
+  Query& operator<<(std::uint8_t v) { return *this << std::int64_t{v}; }
+  Query& operator<<(std::uint64_t v) { return *this << static_cast<std::int64_t>(v); }
+  Query& operator<<(double v) { return statement_.bind_real(parameter_++, v), *this; }
+  Query& operator<<(std::string_view v) { return statement_.bind_text(parameter_++, v), *this; }
+  Query& operator<<(const std::string& v) { return *this << std::string_view{v}; }
+  Query& operator<<(const char* v) { return *this << std::string_view{v}; }
+  Query& operator<<(std::span<const std::byte> v) { return statement_.bind_blob(parameter_++, v), *this; }
+  Query& operator<<(UtcTime v) { return *this << v.ns; }
+  Query& operator<<(NetworkId v) { return *this << std::int64_t{v.value}; }
+  template <class Tag>
+  Query& operator<<(const Id<Tag>& v) {
+    return *this << std::as_bytes(std::span{v.uuid.bytes});
+  }
+  template <class T>
+  Query& operator<<(const std::optional<T>& v) {
+    return v ? *this << *v : *this << std::nullopt;
+  }
+
+  std::int64_t integer() { return statement_.integer(column_++); }
+  template <class T>
+  T as() {
+    return static_cast<T>(integer());
+  }
+  double real();  ///< NaN for NULL, which is how the database keeps a NaN
+  std::string text() { return statement_.text(column_++); }
+  std::span<const std::byte> blob() { return statement_.blob(column_++); }
+  UtcTime time() { return {integer()}; }
+  NetworkId network_id() { return {static_cast<std::uint32_t>(integer())}; }
+  template <class AnyId>
+  AnyId id() {
+    return AnyId{uuid()};
+  }
+  bool null() { return statement_.is_null(column_); }
+  void skip(int columns = 1) { column_ += columns; }
+  /// The next column, or nothing when NULL: q.maybe([&] { return q.real(); }).
+  template <class F>
+  auto maybe(F&& take) -> std::optional<decltype(take())> {
+    if (null()) {
+      skip();
+      return std::nullopt;
+    }
+    return std::forward<F>(take)();
+  }
+  std::optional<double> maybe_real() {
+    return maybe([&] { return real(); });
+  }
+  std::optional<UtcTime> maybe_time() {
+    return maybe([&] { return time(); });
+  }
+
+ private:
+  Uuid uuid();
+
+  Statement& statement_;
+  int parameter_{1};
+  int column_{0};
+};
+
+/// Something to do on a connection inside a transaction; an Error undoes it. May run again from the start, so it sets
+/// its results only by overwriting.
+using Work = std::function<std::optional<Error>(Connection&)>;
+
+/// Where a store sends its work. Callable from any thread; both calls block until done.
+class Gate {
+ public:
+  virtual ~Gate() = default;
+  /// Returns after the commit. `rows` is the weight in the bounded queue.
+  virtual std::optional<Error> write(std::size_t rows, const Work& work) = 0;
+  /// One consistent snapshot.
+  virtual std::optional<Error> read(const Work& work) = 0;
+};
+
+/// Runs `work` (Connection& -> Result<T>) through the gate.
+template <class T, class F>
+Result<T> write_value(Gate& gate, std::size_t rows, F work) {
+  std::optional<T> value;
+  auto error = gate.write(rows, [&](Connection& c) -> std::optional<Error> {
+    Result<T> result = work(c);
+    if (!result) return result.error();
+    value = std::move(result).value();
+    return std::nullopt;
+  });
+  if (error) return *std::move(error);
+  return *std::move(value);
+}
+
+template <class T, class F>
+Result<T> read_value(Gate& gate, F work) {
+  std::optional<T> value;
+  auto error = gate.read([&](Connection& c) -> std::optional<Error> {
+    Result<T> result = work(c);
+    if (!result) return result.error();
+    value = std::move(result).value();
+    return std::nullopt;
+  });
+  if (error) return *std::move(error);
+  return *std::move(value);
+}
+
+/// For work without a value.
+Result<void> write_void(Gate& gate, const Work& work, std::size_t rows = 1);
+
+}  // namespace anchord::sql

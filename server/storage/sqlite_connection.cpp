@@ -1,0 +1,226 @@
+#include "server/storage/sqlite_connection.hpp"
+
+#include <SQLiteCpp/Database.h>
+#include <SQLiteCpp/Exception.h>
+#include <SQLiteCpp/Statement.h>
+#include <sqlite3.h>
+
+#include <cerrno>
+#include <cstring>
+#include <unordered_map>
+
+namespace anchord::sql {
+namespace {
+
+constexpr int k_busy_timeout_ms = 5000;
+
+// A quota or a limit on the file size is, for whoever has to help, the same as a full disk.
+bool means_no_space(int system_errno) {
+  return system_errno == ENOSPC || system_errno == EDQUOT || system_errno == EFBIG;
+}
+
+Failure classify(int code, int system_errno) {
+  switch (code & 0xff) {
+    case SQLITE_FULL:
+      return Failure::full;
+    case SQLITE_IOERR:
+      return means_no_space(system_errno) ? Failure::full : Failure::unavailable;
+    case SQLITE_CANTOPEN:
+      return means_no_space(system_errno) ? Failure::full : Failure::unavailable;
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+    case SQLITE_READONLY:
+    case SQLITE_PERM:
+    case SQLITE_PROTOCOL:
+      return Failure::unavailable;
+    case SQLITE_CORRUPT:
+    case SQLITE_NOTADB:
+      return Failure::damaged;
+    case SQLITE_CONSTRAINT:
+      return Failure::constraint;
+    default:
+      return Failure::internal;
+  }
+}
+
+SqlError to_sql_error(const SQLite::Exception& error, sqlite3* db) {
+  const int code = error.getExtendedErrorCode() > 0 ? error.getExtendedErrorCode() : error.getErrorCode();
+  const int system_errno = db != nullptr ? sqlite3_system_errno(db) : 0;
+  std::string text = std::string("database: ") + error.what();
+  const Failure failure = classify(code, system_errno);
+  if (failure == Failure::unavailable || failure == Failure::full) {
+    text += " (code " + std::to_string(code);
+    if ((code & 0xff) == SQLITE_IOERR && system_errno != 0) text += std::string(", ") + std::strerror(system_errno);
+    text += ")";
+  }
+  return {failure, text};
+}
+
+class SqliteStatement final : public Statement {
+ public:
+  SqliteStatement(SQLite::Database& db, const std::string& sql) : db_(db.getHandle()), statement_(db, sql) {}
+  void bind_null(int index) override {
+    guard([&] { statement_.bind(index); });
+  }
+  void bind_integer(int index, std::int64_t value) override {
+    guard([&] { statement_.bind(index, value); });
+  }
+  void bind_real(int index, double value) override {
+    guard([&] { statement_.bind(index, value); });
+  }
+  void bind_text(int index, std::string_view value) override {
+    guard([&] { statement_.bind(index, std::string(value)); });
+  }
+  void bind_blob(int index, std::span<const std::byte> value) override {
+    // A null pointer would bind NULL; an empty blob is a value.
+    guard([&] {
+      statement_.bindNoCopy(index, value.empty() ? static_cast<const void*>("") : value.data(),
+                            static_cast<int>(value.size()));
+    });
+  }
+  bool step() override {
+    bool row = false;
+    guard([&] { row = statement_.executeStep(); });
+    return row;
+  }
+  void reset() noexcept override { statement_.tryReset(); }
+  bool is_null(int column) override { return statement_.isColumnNull(column); }
+  std::int64_t integer(int column) override { return statement_.getColumn(column).getInt64(); }
+  double real(int column) override { return statement_.getColumn(column).getDouble(); }
+  std::string text(int column) override { return statement_.getColumn(column).getString(); }
+  std::span<const std::byte> blob(int column) override {
+    const auto value = statement_.getColumn(column);
+    return {static_cast<const std::byte*>(value.getBlob()), static_cast<std::size_t>(value.getBytes())};
+  }
+
+ private:
+  template <class F>
+  void guard(F&& f) {
+    try {
+      f();
+    } catch (const SQLite::Exception& error) {
+      throw to_sql_error(error, db_);
+    }
+  }
+  sqlite3* db_;
+  SQLite::Statement statement_;
+};
+
+int open_flags(SqliteConnection::Mode mode) {
+  switch (mode) {
+    case SqliteConnection::Mode::read_only:
+      return SQLite::OPEN_READONLY | SQLite::OPEN_NOMUTEX;
+    case SqliteConnection::Mode::read_write:
+      return SQLite::OPEN_READWRITE | SQLite::OPEN_NOMUTEX;
+    case SqliteConnection::Mode::create:
+      return SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE | SQLite::OPEN_NOMUTEX;
+  }
+  return SQLite::OPEN_READONLY | SQLite::OPEN_NOMUTEX;
+}
+
+}  // namespace
+
+struct SqliteConnection::State {
+  State(const std::filesystem::path& file, int flags) : db(file.string(), flags, k_busy_timeout_ms) {}
+  SQLite::Database db;
+  std::unordered_map<std::string, std::unique_ptr<SqliteStatement>> statements;
+  int wal_pages{0};
+};
+
+SqliteConnection::SqliteConnection(const std::filesystem::path& file, Mode mode, Synchronous synchronous,
+                                   std::optional<std::uint32_t> max_pages) {
+  try {
+    state_ = std::make_unique<State>(file, open_flags(mode));
+  } catch (const SQLite::Exception& error) {
+    throw SqlError(classify(error.getExtendedErrorCode() > 0 ? error.getExtendedErrorCode() : error.getErrorCode(), 0),
+                   "database: " + file.string() + ": " + error.what());
+  }
+  sqlite3_extended_result_codes(handle(), 1);
+  sqlite3_db_config(handle(), SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  sqlite3_db_config(handle(), SQLITE_DBCONFIG_DQS_DML, 0, nullptr);
+  sqlite3_db_config(handle(), SQLITE_DBCONFIG_DQS_DDL, 0, nullptr);
+  execute("PRAGMA trusted_schema=OFF");
+  execute("PRAGMA cell_size_check=ON");
+  // A stray pointer or an I/O error on mapped pages is damage or a signal; read() gives an error.
+  execute("PRAGMA mmap_size=0");
+  execute("PRAGMA foreign_keys=ON");
+  if (mode == Mode::read_only) {
+    execute("PRAGMA query_only=ON");
+    return;
+  }
+  if (mode == Mode::create) execute("PRAGMA page_size=8192");
+  execute("PRAGMA journal_mode=WAL");
+  execute("PRAGMA synchronous=" + to_string(synchronous));
+  // Checkpoints are run by the writer's thread alone: SQLite up to 3.51.2 has a rare race between two that do.
+  execute("PRAGMA wal_autocheckpoint=0");
+  execute("PRAGMA journal_size_limit=67108864");
+  execute("PRAGMA cache_size=-16384");
+  if (max_pages) execute("PRAGMA max_page_count=" + std::to_string(*max_pages));
+  sqlite3_wal_hook(
+      handle(),
+      [](void* pages, sqlite3*, const char*, int count) {
+        *static_cast<int*>(pages) = count;
+        return SQLITE_OK;
+      },
+      &state_->wal_pages);
+}
+
+SqliteConnection::~SqliteConnection() {
+  state_->statements.clear();  // before the database they belong to
+}
+
+Statement& SqliteConnection::prepared(std::string_view sql) {
+  std::string text(sql);
+  auto it = state_->statements.find(text);
+  if (it == state_->statements.end()) {
+    try {
+      auto statement = std::make_unique<SqliteStatement>(state_->db, text);
+      it = state_->statements.emplace(std::move(text), std::move(statement)).first;
+    } catch (const SQLite::Exception& error) {
+      throw to_sql_error(error, handle());
+    }
+  }
+  return *it->second;
+}
+
+void SqliteConnection::execute(const std::string& sql) {
+  try {
+    state_->db.exec(sql);
+  } catch (const SQLite::Exception& error) {
+    throw to_sql_error(error, handle());
+  }
+}
+
+std::int64_t SqliteConnection::pragma(const std::string& name) {
+  Query query(*this, "PRAGMA " + name);
+  return query.step() ? query.integer() : 0;
+}
+
+bool SqliteConnection::read_only_file() { return sqlite3_db_readonly(handle(), "main") != 0; }
+
+bool SqliteConnection::in_transaction() { return sqlite3_get_autocommit(handle()) == 0; }
+
+int SqliteConnection::wal_pages() const { return state_->wal_pages; }
+
+void SqliteConnection::checkpoint_passive() {
+  int log = 0;
+  int done = 0;
+  const int code = sqlite3_wal_checkpoint_v2(handle(), nullptr, SQLITE_CHECKPOINT_PASSIVE, &log, &done);
+  // Busy: a reader still needs the old pages; the next time will do.
+  if (code != SQLITE_OK && (code & 0xff) != SQLITE_BUSY) {
+    throw SqlError(classify(code, sqlite3_system_errno(handle())),
+                   std::string("database: checkpoint: ") + sqlite3_errmsg(handle()));
+  }
+  if (done >= log) state_->wal_pages = 0;
+}
+
+std::string SqliteConnection::check(bool full) {
+  std::string found;
+  Query query(*this, full ? "PRAGMA integrity_check(10)" : "PRAGMA quick_check(10)");
+  while (query.step()) found += (found.empty() ? "" : "; ") + query.text();
+  return found;
+}
+
+sqlite3* SqliteConnection::handle() { return state_->db.getHandle(); }
+
+}  // namespace anchord::sql

@@ -1,0 +1,243 @@
+#include "server/storage/sqlite_database.hpp"
+
+#include <atomic>
+#include <fstream>
+#include <thread>
+
+#include "migrations/migration.hpp"
+#include "server/storage/backup.hpp"
+#include "server/storage/data_folder.hpp"
+#include "server/storage/migrate.hpp"
+#include "server/storage/reader_pool.hpp"
+#include "server/storage/sqlite_connection.hpp"
+#include "server/storage/stores.hpp"
+#include "server/storage/write_queue.hpp"
+
+namespace anchord {
+namespace {
+
+using sql::Connection;
+using sql::DataFolder;
+using sql::SqlError;
+using sql::SqliteConnection;
+using Mode = SqliteConnection::Mode;
+
+// Beyond this size a check at start takes longer than a start may; it then runs beside the first requests.
+constexpr std::uint64_t k_check_at_start_bytes = 256u << 20;
+
+std::uint64_t size_of(const std::filesystem::path& file) {
+  std::error_code error;
+  const auto bytes = std::filesystem::file_size(file, error);
+  return error ? 0 : bytes;
+}
+
+std::string mebibytes(std::uint64_t bytes) { return std::to_string(bytes >> 20) + " MiB"; }
+
+class SqliteDatabase final : public Database, private sql::Gate {
+ public:
+  SqliteDatabase(StorageOptions options, std::unique_ptr<DataFolder> folder, std::unique_ptr<SqliteConnection> writer,
+                 bool check_in_background)
+      : options_(std::move(options)),
+        folder_(std::move(folder)),
+        writer_(std::move(writer), [this] { return open_connection(Mode::read_write); },
+                [this] { return folder_->give_up_reserve(); },
+                {options_.max_queued_rows, options_.max_queued_calls, options_.checkpoint_wal_bytes}),
+        readers_([this] { return open_connection(Mode::read_only); }, options_.readers),
+        measurements_(sql::make_measurement_store(*this)),
+        missions_(sql::make_mission_store(*this, [this] { return admit_mission(); })),
+        anchors_(sql::make_anchor_store(*this)),
+        tokens_(sql::make_token_store(*this)),
+        jobs_(sql::make_job_store(*this)),
+        access_(sql::make_access_store(*this)) {
+    if (check_in_background) checker_ = std::thread([this] { check_in_background_thread(); });
+  }
+  ~SqliteDatabase() override {
+    if (checker_.joinable()) checker_.join();
+  }
+
+  MeasurementStore& measurements() override { return *measurements_; }
+  MissionStore& missions() override { return *missions_; }
+  AnchorStore& anchors() override { return *anchors_; }
+  TokenStore& tokens() override { return *tokens_; }
+  JobStore& jobs() override { return *jobs_; }
+  AccessStore& access() override { return *access_; }
+
+  StorageHealth health() override {
+    const auto status = writer_.status();
+    StorageHealth health;
+    health.queued_calls = status.queued_calls;
+    health.queued_rows = status.queued_rows;
+    health.commits = status.commits;
+    health.rows_written = status.rows;
+    health.last_commit_s = status.last_commit_s;
+    health.db_bytes = size_of(folder_->database());
+    health.wal_bytes = size_of(folder_->wal());
+    health.disk_free_bytes = folder_->free_bytes();
+    health.schema_version = newest_schema_version();
+    health.synchronous = options_.synchronous;
+    folder_->fill_reserve(options_.warn_free_bytes);
+    judge(health, status);
+    return health;
+  }
+
+  Result<BackupReport> backup(const std::filesystem::path& file) override {
+    try {
+      const auto source = open_connection(Mode::read_only);
+      return sql::back_up(*source, file);
+    } catch (const SqlError& error) {
+      return sql::to_error(error);
+    }
+  }
+
+ private:
+  std::optional<Error> write(std::size_t rows, const sql::Work& work) override { return writer_.write(rows, work); }
+  std::optional<Error> read(const sql::Work& work) override { return readers_.read(work); }
+
+  std::unique_ptr<SqliteConnection> open_connection(Mode mode) const {
+    return std::make_unique<SqliteConnection>(folder_->database(), mode, options_.synchronous, options_.max_pages);
+  }
+
+  std::optional<Error> admit_mission() const {
+    const std::uint64_t free = folder_->free_bytes();
+    if (free >= options_.refuse_free_bytes) return std::nullopt;
+    return make_error(Errc::storage_full, "no new missions: " + mebibytes(free) + " free, " +
+                                              mebibytes(options_.refuse_free_bytes) + " needed; a running one goes on");
+  }
+
+  void judge(StorageHealth& health, const sql::WriteQueue::Status& status) const {
+    const std::uint64_t free = health.disk_free_bytes;
+    if (status.trouble) {
+      health.level = status.trouble->failure() == sql::Failure::full ? StorageLevel::full : StorageLevel::unavailable;
+      health.reason = status.trouble->what();
+    } else if (damage_found_) {
+      health.level = StorageLevel::unavailable;
+      health.reason = "the check of the database found damage; see the log of the start";
+    } else if (free < options_.refuse_free_bytes) {
+      health.level = StorageLevel::disk_scarce;
+      health.reason = mebibytes(free) + " free on the disk: no new missions";
+    } else if (free < options_.warn_free_bytes) {
+      health.level = StorageLevel::disk_low;
+      health.reason = mebibytes(free) + " free on the disk";
+    }
+  }
+
+  void check_in_background_thread() {
+    try {
+      damage_found_ = open_connection(Mode::read_only)->check(options_.full_check) != "ok";
+    } catch (const SqlError&) {
+      damage_found_ = true;
+    }
+  }
+
+  const StorageOptions options_;
+  std::atomic<bool> damage_found_{false};
+  // In this order: readers close first, so that the writer is the last connection and empties the WAL; then the lock.
+  const std::unique_ptr<DataFolder> folder_;
+  sql::WriteQueue writer_;
+  sql::ReaderPool readers_;
+  std::unique_ptr<MeasurementStore> measurements_;
+  std::unique_ptr<MissionStore> missions_;
+  std::unique_ptr<AnchorStore> anchors_;
+  std::unique_ptr<TokenStore> tokens_;
+  std::unique_ptr<JobStore> jobs_;
+  std::unique_ptr<AccessStore> access_;
+  std::thread checker_;
+};
+
+Error damaged(const DataFolder& folder, const std::string& what) {
+  return make_error(Errc::storage_unavailable,
+                    "database " + folder.database().string() + ": " + what + "\n" + folder.recovery_commands());
+}
+
+/// Looks without touching: is it ours, and not newer than we are?
+std::optional<Error> judge_file(const DataFolder& folder) {
+  std::ifstream in(folder.database(), std::ios::binary);
+  std::string magic(16, '\0');
+  if (!in.read(magic.data(), 16) || magic != std::string("SQLite format 3\0", 16)) {
+    return damaged(folder, "this is not a database any more");
+  }
+  SqliteConnection look(folder.database(), Mode::read_only, Synchronous::full, std::nullopt);
+  const auto application = look.pragma("application_id");
+  const auto version = look.pragma("user_version");
+  if (version == 0 && application == 0 && look.pragma("schema_version") == 0) return std::nullopt;  // a first start was cut
+  if (application != sql::k_application_id) {
+    return make_error(Errc::unsupported, "database " + folder.database().string() + " was not made by anchord");
+  }
+  if (version > newest_schema_version()) {
+    return make_error(Errc::unsupported, "database " + folder.database().string() + " has version " +
+                                             std::to_string(version) + "; this anchord knows up to " +
+                                             std::to_string(newest_schema_version()) +
+                                             ". Use the newer anchord, or a copy from " + folder.backups().string());
+  }
+  return std::nullopt;
+}
+
+Result<std::unique_ptr<SqliteConnection>> open_writer(const StorageOptions& options, DataFolder& folder, bool check) {
+  const std::uint64_t bytes = size_of(folder.database());
+  if (bytes == 0 && (folder.had_database() || size_of(folder.wal()) > 0)) {
+    return damaged(folder, std::filesystem::exists(folder.database()) ? "the file is empty" : "the file is missing");
+  }
+  if (bytes > 0) {
+    if (auto refusal = judge_file(folder)) return *std::move(refusal);
+  }
+  auto writer = std::make_unique<SqliteConnection>(folder.database(), bytes == 0 ? Mode::create : Mode::read_write,
+                                                   options.synchronous, options.max_pages);
+  if (writer->read_only_file()) {
+    return make_error(Errc::storage_unavailable, "database " + folder.database().string() + " is read-only");
+  }
+  if (check && bytes > 0) {
+    const std::string found = writer->check(options.full_check);
+    if (found != "ok") return damaged(folder, "damaged: " + found);
+  }
+  BOOST_OUTCOME_TRY(sql::migrate(*writer, sqlite_migrations(), folder.backups(), SystemClock{}.now()));
+  BOOST_OUTCOME_TRY(folder.note_database());
+  return writer;
+}
+
+}  // namespace
+
+std::string to_string(StorageLevel level) {
+  switch (level) {
+    case StorageLevel::ok:
+      return "ok";
+    case StorageLevel::disk_low:
+      return "disk_low";
+    case StorageLevel::disk_scarce:
+      return "disk_scarce";
+    case StorageLevel::full:
+      return "full";
+    case StorageLevel::unavailable:
+      return "unavailable";
+  }
+  return "unavailable";
+}
+
+std::string to_string(Synchronous synchronous) {
+  switch (synchronous) {
+    case Synchronous::normal:
+      return "normal";
+    case Synchronous::full:
+      return "full";
+    case Synchronous::extra:
+      return "extra";
+  }
+  return "full";
+}
+
+int newest_schema_version() { return static_cast<int>(sqlite_migrations().size()); }
+
+Result<std::unique_ptr<Database>> open_database(const StorageOptions& options) {
+  BOOST_OUTCOME_TRY(auto folder, DataFolder::open(options.data_dir, options.reserve_bytes));
+  try {
+    const bool check = size_of(folder->database()) <= k_check_at_start_bytes;
+    BOOST_OUTCOME_TRY(auto writer, open_writer(options, *folder, check));
+    folder->fill_reserve(options.refuse_free_bytes);
+    return std::unique_ptr<Database>(
+        std::make_unique<SqliteDatabase>(options, std::move(folder), std::move(writer), !check));
+  } catch (const SqlError& error) {
+    if (error.failure() == sql::Failure::damaged) return damaged(*folder, error.what());
+    return sql::to_error(error);
+  }
+}
+
+}  // namespace anchord

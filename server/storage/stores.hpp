@@ -1,0 +1,28 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "core/ports/store.hpp"
+#include "server/storage/sql.hpp"
+
+/// The ports, written once for every database behind a Gate.
+namespace anchord::sql {
+
+/// Empty, or why a new mission cannot be taken now (space).
+using AdmitMission = std::function<std::optional<Error>()>;
+
+std::unique_ptr<MeasurementStore> make_measurement_store(Gate& gate);
+std::unique_ptr<MissionStore> make_mission_store(Gate& gate, AdmitMission admit);
+std::unique_ptr<AnchorStore> make_anchor_store(Gate& gate);
+std::unique_ptr<TokenStore> make_token_store(Gate& gate);
+std::unique_ptr<JobStore> make_job_store(Gate& gate);
+std::unique_ptr<AccessStore> make_access_store(Gate& gate);
+
+/// The short form of a mission's id; nothing when there is no such mission.
+std::optional<std::int64_t> mission_key(Connection& connection, const MissionId& id);
+
+/// SQL's LIMIT of a page size that comes from outside.
+std::int64_t row_limit(std::size_t limit);
+
+}  // namespace anchord::sql

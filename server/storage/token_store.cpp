@@ -1,0 +1,92 @@
+#include "server/storage/stores.hpp"
+
+namespace anchord::sql {
+namespace {
+
+constexpr const char* k_insert =
+    "INSERT INTO token (id, name, secret_sha256_hex, created_t_ns, expires_t_ns, revoked_t_ns, last_used_t_ns) "
+    "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
+constexpr const char* k_insert_role = "INSERT INTO token_role (token_id, ordinal, role) VALUES (?1, ?2, ?3)";
+constexpr const char* k_columns =
+    "SELECT id, name, secret_sha256_hex, created_t_ns, expires_t_ns, revoked_t_ns, last_used_t_ns FROM token ";
+constexpr const char* k_roles = "SELECT role FROM token_role WHERE token_id = ?1 ORDER BY ordinal";
+// A second revocation keeps the time of the first.
+constexpr const char* k_revoke =
+    "UPDATE token SET revoked_t_ns = coalesce(revoked_t_ns, ?2) WHERE id = ?1 RETURNING revoked_t_ns";
+constexpr const char* k_touch = "UPDATE token SET last_used_t_ns = ?2 WHERE id = ?1 RETURNING last_used_t_ns";
+
+Token read(Connection& c, Query& query) {
+  Token token;
+  token.id = query.id<TokenId>();
+  token.name = query.text();
+  token.secret_sha256_hex = query.text();
+  token.created = query.time();
+  token.expires = query.maybe_time();
+  token.revoked = query.maybe_time();
+  token.last_used = query.maybe_time();
+  Query roles(c, k_roles);
+  roles << token.id;
+  while (roles.step()) token.roles.push_back(roles.text());
+  return token;
+}
+
+class SqlTokenStore final : public TokenStore {
+ public:
+  explicit SqlTokenStore(Gate& gate) : gate_(gate) {}
+
+  Result<void> insert(const Token& token) override {
+    return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+      Query query(c, k_insert);
+      query << token.id << token.name << token.secret_sha256_hex << token.created << token.expires << token.revoked
+            << token.last_used;
+      query.run();
+      std::int64_t ordinal = 0;
+      for (const std::string& role : token.roles) {
+        Query insert_role(c, k_insert_role);
+        insert_role << token.id << ordinal++ << role;
+        insert_role.run();
+      }
+      return std::nullopt;
+    });
+  }
+  Result<Token> token(const TokenId& id) override { return find("WHERE id = ?1", id); }
+  Result<Token> token_by_secret(std::string_view secret_sha256_hex) override {
+    return find("WHERE secret_sha256_hex = ?1", secret_sha256_hex);
+  }
+  Result<std::vector<Token>> tokens() override {
+    return read_value<std::vector<Token>>(gate_, [&](Connection& c) -> Result<std::vector<Token>> {
+      Query query(c, std::string(k_columns) + "ORDER BY id");
+      std::vector<Token> found;
+      while (query.step()) found.push_back(read(c, query));
+      return found;
+    });
+  }
+  Result<void> revoke(const TokenId& id, UtcTime now) override { return stamp(k_revoke, id, now); }
+  Result<void> touch(const TokenId& id, UtcTime now) override { return stamp(k_touch, id, now); }
+
+ private:
+  template <class Key>
+  Result<Token> find(const char* where, const Key& key) {
+    return read_value<Token>(gate_, [&](Connection& c) -> Result<Token> {
+      Query query(c, std::string(k_columns) + where);
+      query << key;
+      if (!query.step()) return make_error(Errc::not_found, "no such token");
+      return read(c, query);
+    });
+  }
+  Result<void> stamp(const char* text, const TokenId& id, UtcTime now) {
+    return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+      Query query(c, text);
+      query << id << now;
+      if (query.returned()) return std::nullopt;
+      return make_error(Errc::not_found, "no token " + to_string(id));
+    });
+  }
+  Gate& gate_;
+};
+
+}  // namespace
+
+std::unique_ptr<TokenStore> make_token_store(Gate& gate) { return std::make_unique<SqlTokenStore>(gate); }
+
+}  // namespace anchord::sql

@@ -1,0 +1,200 @@
+#include "server/storage/write_queue.hpp"
+
+#include <utility>
+
+namespace anchord::sql {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+constexpr auto k_idle = std::chrono::milliseconds(500);
+constexpr auto k_reopen_every = std::chrono::milliseconds(500);
+// One commit holds at most so much: a caller with one row should not wait for a flood before it.
+constexpr std::size_t k_group_rows = 20'000;
+constexpr std::size_t k_group_calls = 256;
+constexpr std::uint64_t k_page_bytes = 8192;
+
+}  // namespace
+
+WriteQueue::WriteQueue(std::unique_ptr<SqliteConnection> connection, Open open, std::function<bool()> give_up_reserve,
+                       Limits limits)
+    : open_(std::move(open)),
+      give_up_reserve_(std::move(give_up_reserve)),
+      limits_(limits),
+      connection_(std::move(connection)),
+      thread_([this] { run(); }) {}
+
+WriteQueue::~WriteQueue() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  wake_writer_.notify_one();
+  thread_.join();
+}
+
+std::optional<Error> WriteQueue::write(std::size_t rows, const Work& work) {
+  Task task{rows, &work, std::nullopt, false};
+  std::unique_lock lock(mutex_);
+  if (stopping_) return make_error(Errc::storage_unavailable, "the database is closing");
+  const bool too_many_rows = queued_rows_ > 0 && queued_rows_ + rows > limits_.max_rows;
+  if (too_many_rows || queue_.size() >= limits_.max_calls) {
+    return make_error(Errc::queue_full, "the write queue is full: " + std::to_string(queued_rows_) + " rows in " +
+                                            std::to_string(queue_.size()) + " calls wait");
+  }
+  queue_.push_back(&task);
+  queued_rows_ += rows;
+  wake_writer_.notify_one();
+  wake_callers_.wait(lock, [&] { return task.done; });
+  return std::move(task.error);
+}
+
+WriteQueue::Status WriteQueue::status() const {
+  const std::lock_guard lock(mutex_);
+  Status status = status_;
+  status.queued_calls = queue_.size();
+  status.queued_rows = queued_rows_;
+  return status;
+}
+
+void WriteQueue::run() {
+  for (;;) {
+    Group group = take();
+    if (group.empty()) {
+      checkpoint_if(true);
+      // A database that fell away is tried again also when nobody writes, so that readiness comes back by itself.
+      if (connection_ == nullptr) ensure_connection();
+      const std::lock_guard lock(mutex_);
+      if (stopping_ && queue_.empty()) break;
+      continue;
+    }
+    commit(group);
+    {
+      const std::lock_guard lock(mutex_);
+      for (Task* task : group) task->done = true;
+    }
+    wake_callers_.notify_all();
+    checkpoint_if(false);
+  }
+  connection_.reset();
+}
+
+WriteQueue::Group WriteQueue::take() {
+  std::unique_lock lock(mutex_);
+  wake_writer_.wait_for(lock, k_idle, [&] { return stopping_ || !queue_.empty(); });
+  Group group;
+  std::size_t rows = 0;
+  while (!queue_.empty() && group.size() < k_group_calls && (group.empty() || rows + queue_.front()->rows <= k_group_rows)) {
+    rows += queue_.front()->rows;
+    group.push_back(queue_.front());
+    queue_.pop_front();
+  }
+  queued_rows_ -= rows;
+  return group;
+}
+
+void WriteQueue::commit(Group& group) {
+  try {
+    attempt(group);
+    return;
+  } catch (const SqlError& error) {
+    const bool retry = error.failure() == Failure::full && (give_up_reserve_() || group.size() > 1);
+    if (!retry) return fail(group, error);
+  }
+  // Space was found, or perhaps a large call is in the way of small ones: each for itself.
+  for (Task* task : group) {
+    Group one{task};
+    try {
+      attempt(one);
+    } catch (const SqlError& error) {
+      fail(one, error);
+    }
+  }
+}
+
+void WriteQueue::attempt(Group& group) {
+  const auto start = SteadyClock::now();
+  if (!ensure_connection()) throw SqlError(Failure::unavailable, status().trouble ? status().trouble->what() : "closed");
+  std::size_t rows = 0;
+  try {
+    connection_->execute("BEGIN IMMEDIATE");
+    for (Task* task : group) {
+      run_task(*task);
+      if (!task->error) rows += task->rows;
+    }
+    connection_->execute("COMMIT");
+  } catch (const SqlError& error) {
+    // After a failed write or fsync the pages in memory are not to be believed: close, and let a new connection recover.
+    if (!rolled_back_whole() || error.failure() != Failure::full) connection_.reset();
+    throw;
+  }
+  const std::lock_guard lock(mutex_);
+  ++status_.commits;
+  status_.rows += rows;
+  status_.last_commit_s = std::chrono::duration<double>(SteadyClock::now() - start).count();
+  status_.trouble.reset();
+}
+
+void WriteQueue::run_task(Task& task) {
+  task.error.reset();
+  connection_->execute("SAVEPOINT call");
+  try {
+    task.error = (*task.work)(*connection_);
+  } catch (const SqlError& error) {
+    if (error.failure() != Failure::constraint && error.failure() != Failure::internal) throw;
+    task.error = to_error(error);
+  } catch (const std::exception& error) {
+    task.error = make_error(Errc::internal, std::string("storage: ") + error.what());
+  }
+  if (task.error) connection_->execute("ROLLBACK TO call");
+  connection_->execute("RELEASE call");
+}
+
+bool WriteQueue::rolled_back_whole() noexcept {
+  try {
+    if (connection_->in_transaction()) connection_->execute("ROLLBACK");
+    return true;
+  } catch (const std::exception&) {
+    return false;
+  }
+}
+
+void WriteQueue::fail(Group& group, const SqlError& error) {
+  for (Task* task : group) task->error = to_error(error);
+  const std::lock_guard lock(mutex_);
+  status_.trouble = error;
+}
+
+bool WriteQueue::ensure_connection() {
+  if (connection_ != nullptr) return true;
+  const auto now = SteadyClock::now();
+  if (now < next_reopen_) return false;
+  next_reopen_ = now + k_reopen_every;
+  try {
+    auto connection = open_();
+    // A connection opened while the disk was read-only stays so for ever.
+    if (connection->read_only_file()) throw SqlError(Failure::unavailable, "database: the file is read-only");
+    connection_ = std::move(connection);
+    const std::lock_guard lock(mutex_);
+    status_.trouble.reset();
+    return true;
+  } catch (const SqlError& error) {
+    const std::lock_guard lock(mutex_);
+    status_.trouble = error;
+    return false;
+  }
+}
+
+void WriteQueue::checkpoint_if(bool due) {
+  if (connection_ == nullptr || connection_->wal_pages() == 0) return;
+  if (!due && static_cast<std::uint64_t>(connection_->wal_pages()) * k_page_bytes < limits_.checkpoint_wal_bytes) return;
+  try {
+    connection_->checkpoint_passive();
+  } catch (const SqlError& error) {
+    // No acknowledged row is at risk: all are in the WAL. A full disk heals by itself, anything else by reopening.
+    if (error.failure() != Failure::full) connection_.reset();
+    const std::lock_guard lock(mutex_);
+    status_.trouble = error;
+  }
+}
+
+}  // namespace anchord::sql

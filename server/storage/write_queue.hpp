@@ -1,0 +1,82 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "server/storage/sql.hpp"
+#include "server/storage/sqlite_connection.hpp"
+#include "server/storage/sqlite_database.hpp"
+
+namespace anchord::sql {
+
+/// The one writer: a thread with the only read-write connection. What waits when a commit ends goes into the next one
+/// together (group commit), each call inside a savepoint of its own. Callers wake after the commit, never before.
+class WriteQueue {
+ public:
+  struct Limits {
+    std::size_t max_rows, max_calls;
+    std::uint64_t checkpoint_wal_bytes;
+  };
+  struct Status {
+    std::size_t queued_calls{}, queued_rows{};
+    std::uint64_t commits{}, rows{};
+    double last_commit_s{};
+    std::optional<SqlError> trouble;  ///< of the last write; nothing after one that went well
+  };
+  using Open = std::function<std::unique_ptr<SqliteConnection>()>;
+
+  /// `open` makes a new connection after a failure; `give_up_reserve` frees disk space once and says whether it did.
+  WriteQueue(std::unique_ptr<SqliteConnection> connection, Open open, std::function<bool()> give_up_reserve,
+             Limits limits);
+  /// Finishes what is queued, checkpoints, closes.
+  ~WriteQueue();
+
+  std::optional<Error> write(std::size_t rows, const Work& work);
+  Status status() const;
+
+ private:
+  struct Task {
+    std::size_t rows{};
+    const Work* work{};
+    std::optional<Error> error;
+    bool done{false};
+  };
+  using Group = std::vector<Task*>;
+
+  void run();
+  Group take();
+  void commit(Group& group);
+  void attempt(Group& group);
+  void run_task(Task& task);
+  bool rolled_back_whole() noexcept;
+  void fail(Group& group, const SqlError& error);
+  bool ensure_connection();
+  void checkpoint_if(bool due);
+
+  const Open open_;
+  const std::function<bool()> give_up_reserve_;
+  const Limits limits_;
+
+  // Of the writer's thread only.
+  std::unique_ptr<SqliteConnection> connection_;
+  std::chrono::steady_clock::time_point next_reopen_{};
+
+  mutable std::mutex mutex_;
+  std::condition_variable wake_writer_, wake_callers_;
+  std::deque<Task*> queue_;
+  std::size_t queued_rows_{0};
+  bool stopping_{false};
+  Status status_;
+
+  std::thread thread_;
+};
+
+}  // namespace anchord::sql

@@ -1,0 +1,295 @@
+#include <algorithm>
+#include <atomic>
+#include <functional>
+#include <limits>
+#include <thread>
+
+#include "tests/server/storage/backends.hpp"
+
+namespace anchord {
+namespace {
+
+using testing::Each;
+using testing::ElementsAre;
+using enum RowOutcome;
+class MeasurementStoreContract : public StoreContract {
+ protected:
+  std::vector<RowOutcome> append(std::vector<Range> rows, bool atomic = false) {
+    auto result = db_->measurements().append_ranges(std::move(rows), atomic);
+    EXPECT_TRUE(result) << result.error().message;
+    return result ? result.value() : std::vector<RowOutcome>{};
+  }
+  std::vector<Range> all(const MissionId& mission) {
+    MeasurementStore::Filter filter;
+    filter.mission = mission;
+    filter.limit = 100'000;
+    filter.with_cir = true;
+    return db_->measurements().ranges(filter).value().rows;
+  }
+};
+
+TEST_P(MeasurementStoreContract, GivesBackEveryFieldOfARange) {
+  const auto mission = stored_mission();
+  Range full = range_at(mission.id, 7);
+  full.kind = RangeKind::anchor_anchor;
+  full.received = UtcTime{full.time.ns + 5'000};
+  full.antenna = 3;
+  full.seq = 9'007'199'254'740'993;  // does not fit a double
+  full.rss_dbm = -84.3;
+  full.fp_dbm = -86.1;
+  full.rx_dbm = -82.7;
+  full.std_noise = 52;
+  full.heading_deg = 120.5;
+  full.truth = RangeTruth{7.35, true};
+  full.cir = Cir{{1, -2, 32767, -32768}, 1001.6, 744.2, 1001};
+  Range bare = range_at(mission.id, 8);
+  bare.seq.reset();
+  ASSERT_THAT(append({full, bare}), ElementsAre(accepted, accepted));
+  const auto rows = all(mission.id);
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].mission, mission.id);
+  EXPECT_EQ(rows[0].kind, RangeKind::anchor_anchor);
+  EXPECT_EQ(rows[0].time, full.time);
+  EXPECT_EQ(rows[0].received, full.received);
+  EXPECT_EQ(rows[0].tag, full.tag);
+  EXPECT_EQ(rows[0].antenna, 3);
+  EXPECT_EQ(rows[0].anchor, full.anchor);
+  EXPECT_EQ(rows[0].seq, full.seq);
+  EXPECT_EQ(rows[0].distance_m, full.distance_m);
+  EXPECT_EQ(rows[0].rss_dbm, -84.3);
+  EXPECT_EQ(rows[0].fp_dbm, -86.1);
+  EXPECT_EQ(rows[0].rx_dbm, -82.7);
+  EXPECT_EQ(rows[0].std_noise, 52);
+  EXPECT_EQ(rows[0].heading_deg, 120.5);
+  ASSERT_TRUE(rows[0].truth);
+  EXPECT_EQ(rows[0].truth->distance_m, 7.35);
+  EXPECT_EQ(rows[0].truth->los, true);
+  ASSERT_TRUE(rows[0].cir);
+  EXPECT_THAT(rows[0].cir->re_im, ElementsAre(1, -2, 32767, -32768));
+  EXPECT_EQ(rows[0].cir->first_path_idx, 744.2);
+  EXPECT_EQ(rows[0].cir->preamble_count, 1001);
+  EXPECT_FALSE(rows[1].seq || rows[1].received || rows[1].rss_dbm || rows[1].truth || rows[1].cir);
+}
+
+TEST_P(MeasurementStoreContract, GivesBackEveryFieldOfAFix) {
+  const auto mission = stored_mission();
+  Fix globe = fix_at(mission.id, 0);
+  globe.received = UtcTime{globe.time.ns + 1};
+  globe.seq = 12;
+  globe.covariance_m2 = (Eigen::Matrix3d() << 1e-4, 2e-5, 3e-6, 2e-5, 4e-4, 5e-6, 3e-6, 5e-6, 6e-4).finished();
+  globe.enu_from_body = Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5);
+  globe.correction_age_s = 0.8;
+  globe.satellites = 21;
+  Fix local = fix_at(mission.id, 1);
+  local.frame = TrackFrame::local;
+  local.local_m = {1.25, -2.5, 3.75};
+  ASSERT_TRUE(db_->measurements().append_fixes({globe, local}, false));
+  MeasurementStore::Filter filter;
+  filter.mission = mission.id;
+  const auto rows = db_->measurements().fixes(filter).value().rows;
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].position.lat_deg, 51.0231234567891);
+  EXPECT_EQ(rows[0].position.lon_deg, 3.7131234567891);
+  EXPECT_EQ(rows[0].position.height_m, 58.412);
+  EXPECT_EQ(rows[0].received, globe.received);
+  EXPECT_EQ(rows[0].seq, 12u);
+  EXPECT_EQ(rows[0].fix, FixClass::rtk_fixed);
+  EXPECT_EQ(*rows[0].covariance_m2, *globe.covariance_m2);
+  EXPECT_EQ(rows[0].enu_from_body->coeffs(), globe.enu_from_body->coeffs());
+  EXPECT_EQ(rows[0].correction_age_s, 0.8);
+  EXPECT_EQ(rows[0].satellites, 21);
+  EXPECT_EQ(rows[1].frame, TrackFrame::local);
+  EXPECT_EQ(rows[1].local_m, local.local_m);
+  EXPECT_FALSE(rows[1].covariance_m2 || rows[1].enu_from_body || rows[1].satellites);
+}
+
+TEST_P(MeasurementStoreContract, CountsTheSameRowAgainAsDuplicateWhateverItsArrivalTime) {
+  const auto mission = stored_mission();
+  Range row = range_at(mission.id, 1);
+  row.cir = Cir{{1, 2}, 1001.6, std::nullopt, std::nullopt};
+  append({row});
+  row.received = k_noon;
+  EXPECT_THAT(append({row, row}), ElementsAre(duplicate, duplicate));
+  EXPECT_EQ(db_->measurements().count_ranges(mission.id).value(), 1u);
+}
+
+TEST_P(MeasurementStoreContract, KeepsTheStoredRowWhenTheSameIdentityComesWithOtherContent) {
+  const auto mission = stored_mission();
+  Range row = range_at(mission.id, 1);
+  append({row});
+  Range other = row;
+  other.distance_m += 1;
+  Range other_cir = row;
+  other_cir.cir = Cir{{1, 2}, 1001.6, std::nullopt, std::nullopt};
+  EXPECT_THAT(append({other, other_cir}), ElementsAre(conflict, conflict));
+  EXPECT_EQ(all(mission.id).at(0).distance_m, row.distance_m);
+}
+
+TEST_P(MeasurementStoreContract, TellsRowsApartByEveryPartOfTheIdentity) {
+  const auto mission = stored_mission();
+  const auto second_mission = stored_mission("second");
+  const Range row = range_at(mission.id, 1);
+  std::vector<Range> rows(7, row);
+  rows[1].mission = second_mission.id;
+  rows[2].tag = NetworkId{1};
+  rows[3].antenna = 1;
+  rows[4].anchor = NetworkId{2};
+  rows[5].time.ns += 1;
+  rows[6].seq.reset();
+  EXPECT_THAT(append(rows), Each(accepted));
+  EXPECT_THAT(append(rows), Each(duplicate));
+}
+
+TEST_P(MeasurementStoreContract, NamesRowsOfUnknownMissionsAndStoresTheOthers) {
+  const auto mission = stored_mission();
+  const MissionId stranger{make_uuid_v7(k_noon)};
+  EXPECT_THAT(append({range_at(mission.id, 1), range_at(stranger, 2), range_at(mission.id, 3)}),
+              ElementsAre(accepted, unknown_mission, accepted));
+  EXPECT_EQ(db_->measurements().count_ranges(mission.id).value(), 2u);
+}
+
+TEST_P(MeasurementStoreContract, StoresNothingOfAnAtomicCallWithOneBadRow) {
+  const auto mission = stored_mission();
+  append({range_at(mission.id, 1)});
+  Range bad = range_at(mission.id, 1);
+  bad.distance_m = 99;
+  EXPECT_THAT(append({range_at(mission.id, 2), bad}, true), ElementsAre(accepted, conflict));
+  EXPECT_EQ(db_->measurements().count_ranges(mission.id).value(), 1u);
+  EXPECT_THAT(append({range_at(mission.id, 1), range_at(mission.id, 2)}, true), ElementsAre(duplicate, accepted));
+  EXPECT_EQ(db_->measurements().count_ranges(mission.id).value(), 2u);
+}
+
+TEST_P(MeasurementStoreContract, TakesAnEmptyCall) { EXPECT_TRUE(append({}).empty()); }
+
+TEST_P(MeasurementStoreContract, RefusesWhatIsNotANumber) {
+  const auto mission = stored_mission();
+  Range bad = range_at(mission.id, 1);
+  bad.distance_m = std::numeric_limits<double>::quiet_NaN();
+  const auto result = db_->measurements().append_ranges({range_at(mission.id, 0), bad}, false);
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, Errc::invalid_argument);
+  EXPECT_EQ(db_->measurements().count_ranges(mission.id).value(), 0u);
+}
+
+TEST_P(MeasurementStoreContract, PagesThroughAllRowsOnceInBothDirections) {
+  const auto mission = stored_mission();
+  std::vector<Range> rows;
+  for (int i = 0; i < 23; ++i) {
+    rows.push_back(range_at(mission.id, i));
+    rows.back().time = UtcTime{k_noon.ns + (i / 5) * 1'000'000};  // five of the same instant
+  }
+  std::ranges::reverse(rows);  // arrival out of order
+  append(rows);
+  for (const bool descending : {false, true}) {
+    for (const bool of_mission : {false, true}) {
+      MeasurementStore::Filter filter;
+      if (of_mission) filter.mission = mission.id;
+      filter.limit = 4;
+      filter.descending = descending;
+      std::vector<std::int64_t> ids;
+      std::vector<std::int64_t> times;
+      do {
+        const auto page = db_->measurements().ranges(filter).value();
+        ASSERT_LE(page.rows.size(), 4u);
+        for (const Range& row : page.rows) times.push_back(row.time.ns);
+        ids.insert(ids.end(), page.ids.begin(), page.ids.end());
+        filter.after = page.next;
+      } while (!filter.after.empty());
+      EXPECT_EQ(ids.size(), 23u);
+      EXPECT_TRUE(descending ? std::ranges::is_sorted(times, std::greater{}) : std::ranges::is_sorted(times));
+      std::ranges::sort(ids);
+      EXPECT_EQ(std::ranges::adjacent_find(ids), ids.end());
+    }
+  }
+}
+
+TEST_P(MeasurementStoreContract, FiltersByAnchorTagAndHalfOpenTime) {
+  const auto mission = stored_mission();
+  std::vector<Range> rows;
+  for (int i = 0; i < 12; ++i) rows.push_back(range_at(mission.id, i));
+  rows[5].tag = NetworkId{77};
+  append(rows);
+  MeasurementStore::Filter filter;
+  filter.mission = mission.id;
+  filter.anchor = NetworkId{0x101};
+  EXPECT_EQ(db_->measurements().ranges(filter).value().rows.size(), 3u);  // 1, 5, 9
+  filter.tag = NetworkId{77};
+  EXPECT_EQ(db_->measurements().ranges(filter).value().rows.size(), 1u);
+  filter.anchor.reset();
+  filter.tag.reset();
+  filter.since = rows[2].time;
+  filter.until = rows[4].time;
+  EXPECT_EQ(db_->measurements().ranges(filter).value().rows.size(), 2u);  // 2, 3
+}
+
+TEST_P(MeasurementStoreContract, RefusesACursorThatIsNotItsOwn) {
+  for (const char* cursor : {"x", "1", "1.", "1.2x", "99999999999999999999.1"}) {
+    MeasurementStore::Filter filter;
+    filter.after = cursor;
+    const auto page = db_->measurements().ranges(filter);
+    ASSERT_FALSE(page) << cursor;
+    EXPECT_EQ(page.error().code, Errc::invalid_argument);
+  }
+}
+
+TEST_P(MeasurementStoreContract, FindsOneRangeByTheIdOfItsPage) {
+  const auto mission = stored_mission();
+  Range row = range_at(mission.id, 3);
+  row.cir = Cir{{5, 6}, 1001.6, std::nullopt, std::nullopt};
+  append({row});
+  const auto page = db_->measurements().ranges({}).value();
+  ASSERT_EQ(page.ids.size(), 1u);
+  EXPECT_FALSE(page.rows[0].cir) << "lists leave impulse responses out unless asked";
+  const auto found = db_->measurements().range(page.ids[0]).value();
+  EXPECT_EQ(found.mission, mission.id);
+  EXPECT_TRUE(found.cir);
+  EXPECT_EQ(db_->measurements().range(page.ids[0] + 1).error().code, Errc::not_found);
+}
+
+TEST_P(MeasurementStoreContract, KnowsEveryRadioItHeard) {
+  const auto mission = stored_mission();
+  append({range_at(mission.id, 0), range_at(mission.id, 4), range_at(mission.id, 1)});
+  append({range_at(mission.id, 0)});  // a duplicate is not another range
+  const auto devices = db_->measurements().devices(mission.id).value();
+  ASSERT_EQ(devices.size(), 3u);
+  for (const DeviceSeen& device : devices) {
+    const bool is_tag = device.kind == DeviceSeen::Kind::tag;
+    EXPECT_EQ(device.network_id, is_tag ? NetworkId{0x6e01} : device.network_id);
+    const std::uint64_t expected = is_tag ? 3 : device.network_id == NetworkId{0x100} ? 2 : 1;
+    EXPECT_EQ(device.n_ranges, expected);
+  }
+  EXPECT_EQ(devices[0].last_seen, range_at(mission.id, 4).time);
+  EXPECT_EQ(db_->measurements().devices(std::nullopt).value().size(), 3u);
+}
+
+TEST_P(MeasurementStoreContract, KeepsEverythingOverAReopening) {
+  const auto mission = stored_mission();
+  append({range_at(mission.id, 0), range_at(mission.id, 1)});
+  reopen();
+  EXPECT_EQ(all(mission.id).size(), 2u);
+  EXPECT_THAT(append({range_at(mission.id, 0)}), ElementsAre(duplicate));
+}
+
+TEST_P(MeasurementStoreContract, TakesEveryRowOnceFromManyThreadsAtOnce) {
+  const auto mission = stored_mission();
+  std::atomic<int> n_accepted{0};
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 4; ++t) {
+    threads.emplace_back([&] {
+      for (int batch = 0; batch < 20; ++batch) {
+        std::vector<Range> rows;
+        for (int i = 0; i < 10; ++i) rows.push_back(range_at(mission.id, batch * 10 + i));
+        const auto outcomes = append(std::move(rows), batch % 2 == 0);
+        n_accepted += static_cast<int>(std::ranges::count(outcomes, accepted));
+      }
+    });
+  }
+  for (auto& thread : threads) thread.join();
+  EXPECT_EQ(n_accepted, 200);
+  EXPECT_EQ(db_->measurements().count_ranges(mission.id).value(), 200u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Backends, MeasurementStoreContract, backends(), backend_name);
+
+}  // namespace
+}  // namespace anchord
