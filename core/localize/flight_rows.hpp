@@ -1,0 +1,43 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/geo/tag_track.hpp"
+#include "core/localize/flight_options.hpp"
+#include "core/types/flight_data.hpp"
+
+namespace anchord {
+
+/// One usable range, not yet joined to the track: where on it depends on the lag being sought.
+struct JointRow {
+  double t_s{};
+  double distance_m{};
+  Eigen::Vector3d lever_arm_body_m{0, 0, 0};
+};
+
+/// All ranges of one anchor, ascending in time.
+struct AnchorRows {
+  NetworkId id{};
+  std::string name;
+  std::vector<JointRow> rows;
+  std::map<std::string, std::size_t> refused;
+};
+
+/// A flight ready to be solved.
+struct FlightRows {
+  UtcTime epoch{};
+  std::optional<EnuFrame> frame;  ///< absent: local metres
+  TagTrack track;
+  std::vector<AnchorRows> anchors;
+  std::vector<std::string> notes;
+  double track_span_s{};
+};
+
+/// Judges every row: finite, within bounds, not a repeat, of a declared tag. Refused ones are counted by reason.
+/// errors  too_few_observations: no usable fix or no range at all
+Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& options);
+
+}  // namespace anchord

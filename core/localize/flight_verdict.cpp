@@ -1,0 +1,205 @@
+#include "core/localize/flight_verdict.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include "core/localize/error_ellipse.hpp"
+#include "core/localize/geometry.hpp"
+#include "core/localize/residual.hpp"
+#include "core/localize/solver.hpp"
+#include "core/planning/gdop.hpp"
+
+namespace anchord {
+namespace {
+
+constexpr std::size_t k_min_used = 10;      // below, no scale can be told from the residuals
+constexpr double k_sigma_ratio = 0.08;      // sH/D above: undetermined (seen 0.083 and up; 0.078 passes)
+constexpr double k_sigma_ratio_marginal = 0.05;
+constexpr double k_twin_distance_m = 0.4;
+constexpr double k_twin_cost = 3.0;         // tempered; likelihood ratio 20
+
+struct Twin {
+  AnchorFit fit;
+  double worse{};  ///< tempered cost above the solution's
+  double horizontal_m{};
+};
+
+std::string text(const char* format, double a, double b, double c) {
+  char buffer[240];
+  std::snprintf(buffer, sizeof buffer, format, a, b, c);
+  return buffer;
+}
+
+/// Other places that fit about as well, best first.
+std::vector<Twin> twins_of(const FlightRows& flight, const JointFit& fit, std::size_t index, const TrackShape& shape,
+                           const FlightOptions& options) {
+  const AnchorBlock& block = fit.normal.anchors[index];
+  const Eigen::Vector3d solution = fit.state.anchors[index].position_m;
+  const auto rows = observations_of(flight, flight.anchors[index], fit.state.shared, 400, block.scale_m);
+  SolverOptions settings;
+  settings.dims = options.dims;
+  settings.estimate_bias = true;
+  // Bias prior in the scale of the thinned, untempered cost below.
+  const double unit = static_cast<double>(block.n_in_track) / (static_cast<double>(rows.size()) * block.kappa);
+  settings.bias_prior_sigma_m = options.delay_prior_m * std::sqrt(unit);
+  const auto polish = [&](const Eigen::Vector3d& start) -> std::optional<AnchorFit> {
+    settings.loss = Loss::cauchy;
+    settings.loss_sigmas = 2.0;
+    const auto rough = solve_anchor_gauss_newton(rows, start, settings);
+    if (!rough) return std::nullopt;
+    settings.loss = options.loss;
+    settings.loss_sigmas = default_bend(options.loss) * (options.loss == Loss::tukey ? options.mad_factor : 1.0);
+    auto fine = solve_anchor_gauss_newton(rows, rough.value().position_m, settings);
+    if (!fine) return std::nullopt;
+    return std::move(fine.value());
+  };
+  const auto here = polish(solution);
+  std::vector<Twin> twins;
+  if (!here) return twins;
+  std::vector<Eigen::Vector3d> starts{shape.mirrored(solution)};
+  const Eigen::Vector3d axis = shape.axes.col(2);
+  for (int k = 1; k < 8; ++k) {
+    const Eigen::AngleAxisd turn(k * std::numbers::pi / 4.0, axis);
+    starts.push_back(shape.centroid_m + turn * (solution - shape.centroid_m));
+  }
+  for (const auto& start : starts) {
+    auto there = polish(start);
+    if (!there) continue;
+    const double worse = (there->cost - here->cost) * unit;
+    const auto close = [&](const Eigen::Vector3d& p) { return (there->position_m - p).norm() < k_twin_distance_m; };
+    if (worse > k_twin_cost || close(solution) || close(here->position_m)) continue;
+    if (std::ranges::any_of(twins, [&](const Twin& t) { return close(t.fit.position_m); })) continue;
+    const double horizontal_m = (there->position_m - here->position_m).head<2>().norm();
+    twins.push_back({std::move(*there), worse, horizontal_m});
+  }
+  std::ranges::sort(twins, {}, &Twin::worse);
+  return twins;
+}
+
+Hypothesis hypothesis(const FlightRows& flight, const Eigen::Vector3d& position, const Eigen::Matrix3d& covariance,
+                      double rms_m) {
+  Hypothesis h;
+  h.position.m = position;
+  if (flight.frame) h.wgs84 = flight.frame->wgs84_from_enu(h.position);
+  h.covariance_m2 = covariance;
+  h.rms_residual_m = rms_m;
+  return h;
+}
+
+void fill_gdop(Estimate& estimate, const std::vector<Observation>& rows, const Eigen::Vector3d& anchor, Dims dims) {
+  std::vector<Eigen::Vector3d> places;
+  std::vector<Eigen::Vector2d> flat;
+  for (const auto& o : rows) {
+    places.push_back(o.tag_m);
+    flat.emplace_back(o.tag_m.head<2>());
+  }
+  const auto gdop = dims == Dims::two ? planning::gdop(Eigen::Vector2d(anchor.head<2>()), flat) : planning::gdop(anchor, places);
+  if (!gdop) return;
+  estimate.gdop = gdop.value().root;
+  estimate.gdop_trace = gdop.value().trace;
+}
+
+/// Twins, probabilities and the part of the position that stands.
+void judge_twins(const FlightRows& flight, AnchorSolution& solution, const std::vector<Twin>& twins,
+                 const GeometryReport& geometry) {
+  Estimate& estimate = solution.estimate;
+  const Twin* twin = twins.empty() ? nullptr : &twins.front();
+  if (!twin && geometry.kind != GeometryKind::coplanar) return;
+  if (twin) {
+    estimate.mirror = hypothesis(flight, twin->fit.position_m, estimate.best->covariance_m2, estimate.best->rms_residual_m);
+    const double odds = std::exp(-std::clamp(twin->worse, -50.0, 50.0));
+    estimate.mirror->probability = odds / (1.0 + odds);
+    estimate.best->probability = 1.0 / (1.0 + odds);
+  }
+  estimate.verdict = Verdict::ambiguous;
+  const bool sideways = twin && std::ranges::any_of(twins, [](const Twin& t) { return t.horizontal_m > k_twin_distance_m; });
+  solution.determined = sideways ? Determined::none : Determined::horizontal;
+  if (!twin) {
+    estimate.reason = geometry.reason + "; the side of it the anchor is on is not determined, its height is uncertain";
+    return;
+  }
+  const double apart_m = (twin->fit.position_m - estimate.best->position.m).norm();
+  estimate.reason = text("mirror: a second place %.2f m away fits as well (tempered cost %+.2f, %.2f m apart horizontally)",
+                         apart_m, twin->worse, twin->horizontal_m);
+  if (!geometry.reason.empty()) estimate.reason += "; " + geometry.reason;
+  // Until someone says which, the claimed height must hold both.
+  estimate.v95_m = std::max(estimate.v95_m, std::abs(twin->fit.position_m.z() - estimate.best->position.m.z()) + estimate.v95_m);
+}
+
+}  // namespace
+
+AnchorSolution judge_anchor(const FlightRows& flight, const JointFit& fit, std::size_t index, const FlightOptions& options) {
+  const AnchorRows& rows = flight.anchors[index];
+  const AnchorBlock& block = fit.normal.anchors[index];
+  const JointState::Anchor& anchor = fit.state.anchors[index];
+  AnchorSolution solution;
+  Estimate& estimate = solution.estimate;
+  estimate.anchor = rows.id;
+  solution.name = rows.name;
+  estimate.refused = rows.refused;
+  for (const auto& [why, count] : block.refused) estimate.refused[why] += count;
+  estimate.n_used = block.n_used;
+  estimate.time = UtcTime{flight.epoch.ns + std::llround(block.last_t_s * 1e9)};
+  const auto observations = observations_of(flight, rows, fit.state.shared, 2000, 1.0);
+  const GeometryReport geometry = assess_geometry(observations, options.dims);
+  solution.geometry = {geometry.shape.sd_m, geometry.median_range_m, geometry.line_ratio, geometry.plane_ratio, 0};
+  if (!anchor.active || geometry.kind == GeometryKind::too_few || block.n_used < k_min_used) {
+    estimate.verdict = Verdict::too_few;
+    estimate.reason = !geometry.reason.empty() ? geometry.reason
+                                               : "too few: " + std::to_string(block.n_used) + " usable ranges, need " +
+                                                     std::to_string(k_min_used);
+    if (!anchor.active) {
+      for (const JointRow& row : rows.rows) {
+        const auto why = flight.track.at(row.t_s + fit.state.shared[k_shared_lag], row.lever_arm_body_m).refused;
+        if (why != TrackRefusal::none) ++estimate.refused[std::string(to_string(why))];
+      }
+    }
+    return solution;
+  }
+  const Eigen::Matrix4d& joint = fit.anchor_covariance[index];
+  solution.fit_covariance_m2 = joint.topLeftCorner<3, 3>();
+  if (options.dims == Dims::two) {
+    solution.fit_covariance_m2.row(2).setZero();
+    solution.fit_covariance_m2.col(2).setZero();
+  }
+  solution.delay_m = anchor.delay_m;
+  solution.delay_sigma_m = std::sqrt(joint(3, 3));
+  solution.residual_scale_m = block.scale_m;
+  const Eigen::Matrix3d covariance =
+      solution.fit_covariance_m2 + Eigen::Matrix3d::Identity() * options.floor_sigma_m * options.floor_sigma_m;
+  if (!anchor.position_m.allFinite() || !covariance.allFinite() || block.scale_m > 2.0 ||
+      (anchor.position_m - geometry.shape.centroid_m).norm() > 3.0 * options.max_range_m) {
+    estimate.verdict = Verdict::diverged;
+    estimate.reason = text("no consistent answer: typical residual %.2f m at a median range of %.2f m over %.0f ranges",
+                           block.scale_m, geometry.median_range_m, static_cast<double>(block.n_in_track));
+    return solution;
+  }
+  estimate.best = hypothesis(flight, anchor.position_m, covariance, block.rms_m);
+  const ErrorEllipse ellipse = error_ellipse(covariance);
+  estimate.h95_m = ellipse.h95_m;
+  estimate.v95_m = ellipse.v95_m;
+  fill_gdop(estimate, observations, anchor.position_m, options.dims);
+  estimate.verdict = Verdict::ok;
+  solution.determined = Determined::position;
+  const double horizontal_sigma_m = ellipse.major_m / std::sqrt(5.991464547107979);
+  solution.geometry.sigma_ratio = horizontal_sigma_m / geometry.median_range_m;
+  judge_twins(flight, solution, twins_of(flight, fit, index, geometry.shape, options), geometry);
+  if (geometry.kind == GeometryKind::collinear || solution.geometry.sigma_ratio > k_sigma_ratio) {
+    estimate.verdict = Verdict::weak_geometry;
+    solution.determined = Determined::none;
+    estimate.reason = geometry.kind == GeometryKind::collinear
+                          ? geometry.reason
+                          : text("weak geometry: horizontal sigma %.2f m at a median range of %.2f m (ratio %.3f)",
+                                 horizontal_sigma_m, geometry.median_range_m, solution.geometry.sigma_ratio);
+  } else if (estimate.verdict == Verdict::ok &&
+             (geometry.line_ratio < GeometryLimits{}.line_marginal || solution.geometry.sigma_ratio > k_sigma_ratio_marginal)) {
+    estimate.reason = text("near the limit of geometry: line ratio %.3f, horizontal sigma over range %.3f (limits 0.07 and %.2f)",
+                           geometry.line_ratio, solution.geometry.sigma_ratio, k_sigma_ratio);
+  }
+  return solution;
+}
+
+}  // namespace anchord

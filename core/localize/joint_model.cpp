@@ -1,0 +1,172 @@
+#include "core/localize/joint_model.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "core/localize/residual.hpp"
+
+namespace anchord {
+namespace {
+
+constexpr double k_hinge_m = 5.0;
+
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+/// Robust weight of a residual against its scale.
+double row_weight(double residual_over_scale, const FlightOptions& options) {
+  const double bend = default_bend(options.loss) * (options.loss == Loss::tukey ? options.mad_factor : 1.0);
+  return loss_value(options.loss, bend, residual_over_scale).weight;
+}
+
+/// Time the rows cover, pauses of more than 2 s left out.
+double duration_s(const std::vector<double>& times_s) {
+  double sum_s = 0;
+  for (std::size_t i = 1; i < times_s.size(); ++i) {
+    const double step_s = times_s[i] - times_s[i - 1];
+    if (step_s <= 2.0) sum_s += step_s;
+  }
+  return std::max(sum_s, 1.0);
+}
+
+void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointState::Anchor& anchor,
+                  const Eigen::Vector4d& shared, const FlightOptions& options, double scale_floor_m,
+                  double common_scale_m, AnchorBlock& block, JointNormal& normal) {
+  std::vector<JointLine> lines;
+  std::vector<double> sizes, times_s, position_variances;
+  lines.reserve(rows.rows.size());
+  for (const JointRow& row : rows.rows) {
+    JointLine line = linearise(flight.track, row, shared, anchor);
+    if (line.refused != TrackRefusal::none) {
+      ++block.refused[std::string(to_string(line.refused))];
+      continue;
+    }
+    sizes.push_back(std::abs(line.residual_m));
+    times_s.push_back(row.t_s);
+    position_variances.push_back(line.position_variance_m2);
+    block.last_t_s = std::max(block.last_t_s, row.t_s);
+    lines.push_back(std::move(line));
+  }
+  block.n_in_track = lines.size();
+  if (lines.empty()) return;
+  // The MAD holds the usual position error already; only what a row has beyond that makes it count less.
+  const double usual_variance_m2 = median(position_variances);
+  block.scale_m = std::max({1.4826 * median(sizes), options.min_scale_m, scale_floor_m});
+  const double scale2 = block.scale_m * block.scale_m;
+  double sum_square = 0;
+  std::vector<double> weights;
+  weights.reserve(lines.size());
+  for (const JointLine& line : lines) {
+    const double widening = (scale2 + std::max(line.position_variance_m2 - usual_variance_m2, 0.0)) / scale2;
+    double weight = row_weight(line.residual_m / (block.scale_m * std::sqrt(widening)), options) / widening;
+    if (options.weights == Weights::as_printed) weight *= std::sqrt(widening) * block.scale_m / common_scale_m;
+    weights.push_back(weight);
+    block.sum_weight += weight;
+    sum_square += weight * line.residual_m * line.residual_m;
+    if (weight > 0) {
+      ++block.n_used;
+    } else {
+      ++block.n_rejected;
+    }
+  }
+  if (block.n_rejected > 0) block.refused["outlier"] = block.n_rejected;
+  if (block.sum_weight > 0) block.rms_m = std::sqrt(sum_square / block.sum_weight);
+  block.kappa = std::max(1.0, 2.0 * options.correlation_s * block.sum_weight / duration_s(times_s));
+  const double unit = 1.0 / (block.kappa * scale2);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (weights[i] <= 0) continue;
+    const double weight = weights[i] * unit;
+    const JointLine& line = lines[i];
+    block.own.noalias() += weight * line.by_anchor * line.by_anchor.transpose();
+    block.shared.noalias() += weight * line.by_anchor * line.by_shared.transpose();
+    block.gradient += weight * line.residual_m * line.by_anchor;
+    normal.shared.noalias() += weight * line.by_shared * line.by_shared.transpose();
+    normal.shared_gradient += weight * line.residual_m * line.by_shared;
+  }
+}
+
+}  // namespace
+
+double range_curve(double distance_m) { return std::log(std::max(distance_m, k_hinge_m) / k_hinge_m); }
+
+JointLine linearise(const TagTrack& track, const JointRow& row, const Eigen::Vector4d& shared,
+                    const JointState::Anchor& anchor) {
+  JointLine line;
+  const TagPoint point = track.at(row.t_s + shared[k_shared_lag], row.lever_arm_body_m);
+  line.refused = point.refused;
+  if (point.refused != TrackRefusal::none) return line;
+  const Eigen::Vector3d antenna = point.position_m + shared[k_shared_lever] * point.body_up;
+  const Eigen::Vector3d difference = antenna - anchor.position_m;
+  const double distance_m = std::max(difference.norm(), 1e-6);
+  const Eigen::Vector3d u = difference / distance_m;
+  const double curve = range_curve(distance_m);
+  const double slope = distance_m > k_hinge_m ? 1.0 + shared[k_shared_curve] / distance_m : 1.0;
+  line.residual_m = row.distance_m - (distance_m + shared[k_shared_bias] + anchor.delay_m + shared[k_shared_curve] * curve);
+  line.by_anchor << -slope * u, 1.0;
+  line.by_shared[k_shared_bias] = 1.0;
+  line.by_shared[k_shared_curve] = curve;
+  line.by_shared[k_shared_lag] = slope * u.dot(point.velocity_mps);
+  line.by_shared[k_shared_lever] = slope * u.dot(point.body_up);
+  line.position_variance_m2 = std::max(u.dot(point.covariance_m2 * u), 0.0);
+  return line;
+}
+
+JointNormal build_normal(const FlightRows& flight, const JointState& state, const FlightOptions& options,
+                         double scale_floor_m) {
+  JointNormal normal;
+  normal.anchors.resize(flight.anchors.size());
+  // Sigma of a mitigated line-of-sight range, only to give eq 7.11's weights the unit of an inverse variance.
+  const double common_scale_m = std::sqrt(k_variance_los_m2);
+  for (std::size_t i = 0; i < flight.anchors.size(); ++i) {
+    AnchorBlock& block = normal.anchors[i];
+    const auto& anchor = state.anchors[i];
+    if (!anchor.active) continue;
+    build_anchor(flight, flight.anchors[i], anchor, state.shared, options, scale_floor_m, common_scale_m, block, normal);
+    const double delay_information = 1.0 / (options.delay_prior_m * options.delay_prior_m);
+    block.own(3, 3) += delay_information;
+    block.gradient[3] -= delay_information * anchor.delay_m;
+    if (options.dims == Dims::two) {
+      block.own.row(2).setZero();
+      block.own.col(2).setZero();
+      block.own(2, 2) = 1.0;
+      block.shared.row(2).setZero();
+      block.gradient[2] = 0;
+    }
+    // 1e-6 of the largest: a direction no range sees stays where it is instead of flying off.
+    Eigen::Matrix4d damped = block.own;
+    damped.topLeftCorner<3, 3>().diagonal().array() += 1e-6 * block.own.topLeftCorner<3, 3>().diagonal().maxCoeff() + 1e-12;
+    block.own_inverse = damped.ldlt().solve(Eigen::Matrix4d::Identity());
+  }
+  normal.reduced = normal.shared;
+  normal.reduced_gradient = normal.shared_gradient;
+  for (const AnchorBlock& block : normal.anchors) {
+    normal.reduced.noalias() -= block.shared.transpose() * block.own_inverse * block.shared;
+    normal.reduced_gradient.noalias() -= block.shared.transpose() * block.own_inverse * block.gradient;
+  }
+  return normal;
+}
+
+std::vector<Observation> observations_of(const FlightRows& flight, const AnchorRows& anchor,
+                                         const Eigen::Vector4d& shared, std::size_t most, double sigma_m) {
+  std::vector<Observation> all;
+  for (const JointRow& row : anchor.rows) {
+    const TagPoint point = flight.track.at(row.t_s + shared[k_shared_lag], row.lever_arm_body_m);
+    if (point.refused != TrackRefusal::none) continue;
+    Observation o;
+    o.tag_m = point.position_m + shared[k_shared_lever] * point.body_up;
+    o.distance_m = row.distance_m - shared[k_shared_bias];
+    o.distance_m -= shared[k_shared_curve] * range_curve(o.distance_m);
+    o.sigma_m = sigma_m;
+    all.push_back(o);
+  }
+  if (all.size() <= most) return all;
+  std::vector<Observation> few;
+  for (std::size_t i = 0; i < most; ++i) few.push_back(all[i * all.size() / most]);
+  return few;
+}
+
+}  // namespace anchord

@@ -1,0 +1,87 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "core/localize/flight_options.hpp"
+#include "core/localize/flight_rows.hpp"
+#include "core/localize/observation.hpp"
+
+namespace anchord {
+
+/// Gaussian knowledge of the shared unknowns (order: kit_profile.hpp).
+struct SharedPrior {
+  Eigen::Vector4d mean{Eigen::Vector4d::Zero()};
+  Eigen::Matrix4d information{Eigen::Matrix4d::Identity()};
+};
+
+/// Point in the space of all unknowns.
+struct JointState {
+  Eigen::Vector4d shared{Eigen::Vector4d::Zero()};
+  struct Anchor {
+    Eigen::Vector3d position_m{0, 0, 0};
+    double delay_m{0};
+    bool active{true};  ///< false: too few usable ranges, takes no part
+  };
+  std::vector<Anchor> anchors;
+};
+
+/// g(rho) of the model: no curve within 5 m, where it could not be told from the bias.
+double range_curve(double distance_m);
+
+/// One row linearised: residual and derivative of the prediction by (x, y, z, d) and by the shared unknowns.
+struct JointLine {
+  TrackRefusal refused{TrackRefusal::none};
+  double residual_m{};
+  Eigen::Vector4d by_anchor{Eigen::Vector4d::Zero()};
+  Eigen::Vector4d by_shared{Eigen::Vector4d::Zero()};
+  double position_variance_m2{};  ///< of the track along the line of sight
+};
+JointLine linearise(const TagTrack& track, const JointRow& row, const Eigen::Vector4d& shared,
+                    const JointState::Anchor& anchor);
+
+/// Normal equations of one round in the shape they have: an arrow. Robust weights and tempering are inside.
+struct AnchorBlock {
+  Eigen::Matrix4d own{Eigen::Matrix4d::Zero()};     ///< (x, d) against itself, prior on d included
+  Eigen::Matrix4d shared{Eigen::Matrix4d::Zero()};  ///< (x, d) against the shared
+  Eigen::Vector4d gradient{Eigen::Vector4d::Zero()};
+  Eigen::Matrix4d own_inverse{Eigen::Matrix4d::Zero()};
+  double scale_m{};        ///< 1.4826 MAD, never below the floor
+  double kappa{1};         ///< tempering
+  double sum_weight{};
+  double rms_m{};          ///< weighted
+  std::size_t n_used{}, n_in_track{}, n_rejected{};
+  std::map<std::string, std::size_t> refused;  ///< by the track, and as outliers
+  double last_t_s{};
+};
+struct JointNormal {
+  std::vector<AnchorBlock> anchors;
+  Eigen::Matrix4d shared{Eigen::Matrix4d::Zero()};         ///< of the likelihood alone, before elimination
+  Eigen::Vector4d shared_gradient{Eigen::Vector4d::Zero()};
+  Eigen::Matrix4d reduced{Eigen::Matrix4d::Zero()};        ///< Schur complement over x and d, without the prior
+  Eigen::Vector4d reduced_gradient{Eigen::Vector4d::Zero()};
+};
+JointNormal build_normal(const FlightRows& flight, const JointState& state, const FlightOptions& options,
+                         double scale_floor_m);
+
+/// Answer of the iteration.
+struct JointFit {
+  JointState state;
+  JointNormal normal;               ///< at the state
+  Eigen::Matrix4d shared_covariance{Eigen::Matrix4d::Zero()};
+  std::vector<Eigen::Matrix4d> anchor_covariance;  ///< (x, d) of each anchor, everything else marginalised
+  int rounds{};
+  bool converged{false};
+};
+/// Iterated reweighted Gauss-Newton from a start. errors: canceled
+Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, const SharedPrior& prior,
+                             const FlightOptions& options);
+
+/// Start of every anchor by itself: closed form, reflections and a ring, each polished robustly, the best kept.
+JointState joint_start(const FlightRows& flight, const SharedPrior& prior, const FlightOptions& options);
+
+/// Rows of one anchor at given shared values, thinned to at most `most`, with the range curve and bias taken off.
+std::vector<Observation> observations_of(const FlightRows& flight, const AnchorRows& anchor,
+                                         const Eigen::Vector4d& shared, std::size_t most, double sigma_m);
+
+}  // namespace anchord

@@ -1,0 +1,108 @@
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/localize/joint_model.hpp"
+#include "core/localize/linear.hpp"
+#include "core/localize/solver.hpp"
+
+namespace anchord {
+namespace {
+
+constexpr int k_max_rounds = 60;
+constexpr std::size_t k_min_rows = 5;  // one more than x, y, z and a shared bias ask for
+
+double clipped(double value, double limit) { return std::clamp(value, -limit, limit); }
+
+/// Best of many starts for one anchor; Cauchy of 0.3 m and a bias of its own, so that a kit's bias does not push the
+/// anchor into the wrong basin before the joint solve can see it.
+std::optional<Eigen::Vector3d> start_of(const FlightRows& flight, const AnchorRows& anchor, const SharedPrior& prior,
+                                        const FlightOptions& options, std::optional<double> height_m) {
+  auto rows = observations_of(flight, anchor, prior.mean, 200, 0.3);
+  if (rows.size() < k_min_rows) return std::nullopt;
+  SolverOptions settings;
+  settings.dims = options.dims;
+  settings.loss = Loss::cauchy;
+  settings.loss_sigmas = 1.0;
+  settings.estimate_bias = !options.fixed_bias_m;
+  settings.bias_prior_sigma_m = 0.5;
+  std::optional<AnchorFit> best;
+  for (Eigen::Vector3d start : start_candidates(rows, options.dims)) {
+    if (height_m) start.z() = *height_m;
+    auto fit = solve_anchor_gauss_newton(rows, start, settings);
+    if (fit && (!best || fit.value().cost < best->cost)) best = std::move(fit.value());
+  }
+  if (best) return best->position_m;
+  // No start converged (a line, for example): the joint solve is heavily damped there and may begin anywhere near.
+  const auto linear = start_candidates(rows, options.dims);
+  Eigen::Vector3d start = linear.front();
+  if (height_m) start.z() = *height_m;
+  return start;
+}
+
+}  // namespace
+
+JointState joint_start(const FlightRows& flight, const SharedPrior& prior, const FlightOptions& options) {
+  JointState state;
+  state.shared = prior.mean;
+  std::optional<double> height_m;
+  if (options.dims == Dims::two) {
+    double sum_m = 0;
+    for (const auto& pose : flight.track.poses()) sum_m += pose.position_m.z();
+    height_m = options.anchor_height_m.value_or(sum_m / static_cast<double>(flight.track.poses().size()));
+  }
+  for (const AnchorRows& rows : flight.anchors) {
+    JointState::Anchor anchor;
+    const auto start = start_of(flight, rows, prior, options, height_m);
+    anchor.active = start.has_value();
+    if (start) anchor.position_m = *start;
+    state.anchors.push_back(anchor);
+  }
+  return state;
+}
+
+Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, const SharedPrior& prior,
+                             const FlightOptions& options) {
+  JointFit fit;
+  fit.state = start;
+  for (fit.rounds = 0; fit.rounds < k_max_rounds && !fit.converged; ++fit.rounds) {
+    if (options.canceled && options.canceled()) return make_error(Errc::canceled, "canceled");
+    // Wide at first: the scale of residuals far from the answer says nothing about the noise.
+    const double floor_m = fit.rounds == 0 ? 0.5 : fit.rounds == 1 ? 0.25 : 0.0;
+    const JointNormal normal = build_normal(flight, fit.state, options, floor_m);
+    const Eigen::Matrix4d system = normal.reduced + prior.information;
+    const Eigen::Vector4d right = normal.reduced_gradient + prior.information * (prior.mean - fit.state.shared);
+    Eigen::Vector4d step = system.ldlt().solve(right);
+    if (!step.allFinite()) step.setZero();
+    step[k_shared_bias] = clipped(step[k_shared_bias], 0.5);
+    step[k_shared_curve] = clipped(step[k_shared_curve], 0.05);
+    step[k_shared_lag] = clipped(step[k_shared_lag], 0.1);
+    step[k_shared_lever] = clipped(step[k_shared_lever], 0.1);
+    double largest = step.cwiseAbs().maxCoeff();
+    for (std::size_t i = 0; i < fit.state.anchors.size(); ++i) {
+      auto& anchor = fit.state.anchors[i];
+      if (!anchor.active) continue;
+      const AnchorBlock& block = normal.anchors[i];
+      Eigen::Vector4d own = block.own_inverse * (block.gradient - block.shared * step);
+      const double length = own.head<3>().norm();
+      if (!own.allFinite()) continue;
+      if (length > 1.0) own *= 1.0 / length;
+      anchor.position_m += own.head<3>();
+      anchor.delay_m += own[3];
+      largest = std::max(largest, own.cwiseAbs().maxCoeff());
+    }
+    fit.state.shared += step;
+    // 0.1 mm: re-estimated scales make the last digits wander.
+    fit.converged = fit.rounds >= 3 && largest < 1e-5 * (fit.rounds > 25 ? 10.0 : 1.0);
+  }
+  fit.normal = build_normal(flight, fit.state, options, 0.0);
+  fit.shared_covariance = (fit.normal.reduced + prior.information).inverse();
+  for (const AnchorBlock& block : fit.normal.anchors) {
+    const Eigen::Matrix4d lever = block.own_inverse * block.shared;
+    fit.anchor_covariance.push_back(block.own_inverse + lever * fit.shared_covariance * lever.transpose());
+  }
+  return fit;
+}
+
+}  // namespace anchord

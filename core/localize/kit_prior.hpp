@@ -1,0 +1,29 @@
+#pragma once
+
+#include <span>
+
+#include "core/localize/flight_options.hpp"
+#include "core/localize/joint_model.hpp"
+#include "core/localize/kit_profile.hpp"
+
+namespace anchord {
+
+/// What a flight says about the shared unknowns: Schur complement over positions and delays minus its prior, with
+/// flight-to-flight wander allowed for.
+ProfileFactor profile_factor(const JointFit& fit, const SharedPrior& prior, const std::string& flight);
+
+/// Prior of a kit nobody has flown: FlightOptions' sigmas about zero.
+SharedPrior wide_prior(const FlightOptions& options);
+
+/// Is the kit's bias calibrated away, or does it have one? In a small volume the antenna pattern alone imitates a
+/// common bias of 0.1 m, while true uncalibrated kits stand out: z decides, on all flights including the one solved.
+struct BiasGate {
+  double bias_m{}, sigma_m{}, z{};
+  bool calibrated{};
+};
+BiasGate bias_gate(std::span<const ProfileFactor> all, const FlightOptions& options);
+
+/// Prior for the next flight: factors of the others, widened by the wander.
+SharedPrior profile_prior(std::span<const ProfileFactor> others, bool calibrated, const FlightOptions& options);
+
+}  // namespace anchord
