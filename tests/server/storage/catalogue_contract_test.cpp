@@ -1,0 +1,330 @@
+#include <cmath>
+#include <limits>
+
+#include "tests/server/storage/backends.hpp"
+
+namespace anchord {
+namespace {
+
+using testing::ElementsAre;
+
+class MissionStoreContract : public StoreContract {};
+
+TEST_P(MissionStoreContract, GivesBackEveryField) {
+  Site site;
+  site.id = SiteId{make_uuid_v7(k_noon)};
+  ASSERT_TRUE(db_->anchors().insert(site));
+  Mission m;
+  m.id = MissionId{make_uuid_v7(k_noon)};
+  m.site = site.id;
+  m.name = "Halle \xC3\xA4, \"A'; DROP TABLE mission";
+  m.kit = "kit";
+  m.radio = "dw1000";
+  m.frame = TrackFrame::local;
+  m.point = TrackPoint::body;
+  m.state = MissionState::finished;
+  m.created = k_noon;
+  m.finished = UtcTime{k_noon.ns + 1};
+  m.tags = {{NetworkId{0x6e01}, 0, {0.1, -0.2, -0.3}}, {NetworkId{0xffffffff}, 255, {0, 0, 0}}};
+  ASSERT_TRUE(db_->missions().insert(m));
+  const auto found = db_->missions().mission(m.id).value();
+  EXPECT_EQ(found.site, m.site);
+  EXPECT_EQ(found.name, m.name);
+  EXPECT_EQ(found.kit, "kit");
+  EXPECT_EQ(found.radio, "dw1000");
+  EXPECT_EQ(found.frame, TrackFrame::local);
+  EXPECT_EQ(found.point, TrackPoint::body);
+  EXPECT_EQ(found.state, MissionState::finished);
+  EXPECT_EQ(found.created, k_noon);
+  EXPECT_EQ(found.finished, m.finished);
+  ASSERT_EQ(found.tags.size(), 2u);
+  EXPECT_EQ(found.tags[0].lever_arm_body_m, Eigen::Vector3d(0.1, -0.2, -0.3));
+  EXPECT_EQ(found.tags[1].tag, NetworkId{0xffffffff});
+  EXPECT_EQ(found.tags[1].antenna, 255);
+}
+
+TEST_P(MissionStoreContract, UpdatesAllOfAMissionAndNamesAnUnknownOne) {
+  Mission m = stored_mission();
+  m.name = "other";
+  m.tags = {{NetworkId{9}, 1, {1, 2, 3}}};
+  m.state = MissionState::finished;
+  ASSERT_TRUE(db_->missions().update(m));
+  const auto found = db_->missions().mission(m.id).value();
+  EXPECT_EQ(found.name, "other");
+  EXPECT_EQ(found.tags.size(), 1u);
+  m.id = MissionId{make_uuid_v7(k_noon)};
+  EXPECT_EQ(db_->missions().update(m).error().code, Errc::not_found);
+  EXPECT_EQ(db_->missions().mission(m.id).error().code, Errc::not_found);
+  EXPECT_EQ(db_->missions().remove(m.id).error().code, Errc::not_found);
+}
+
+TEST_P(MissionStoreContract, RefusesTheSameIdTwiceAndASiteThatIsNotThere) {
+  Mission m = stored_mission();
+  EXPECT_EQ(db_->missions().insert(m).error().code, Errc::conflict);
+  m.id = MissionId{make_uuid_v7(k_noon)};
+  m.site = SiteId{make_uuid_v7(k_noon)};
+  EXPECT_EQ(db_->missions().insert(m).error().code, Errc::not_found);
+}
+
+TEST_P(MissionStoreContract, ListsNewestFirstPageByPage) {
+  std::vector<MissionId> ids;
+  for (int i = 0; i < 5; ++i) {
+    Mission m;
+    m.id = MissionId{make_uuid_v7(UtcTime{k_noon.ns + i * 1'000'000'000LL})};
+    ASSERT_TRUE(db_->missions().insert(m));
+    ids.push_back(m.id);
+  }
+  const auto first = db_->missions().missions(2, std::nullopt).value();
+  ASSERT_EQ(first.size(), 2u);
+  EXPECT_EQ(first[0].id, ids[4]);
+  const auto next = db_->missions().missions(10, first[1].id).value();
+  ASSERT_EQ(next.size(), 3u);
+  EXPECT_EQ(next[2].id, ids[0]);
+}
+
+TEST_P(MissionStoreContract, TakesMeasurementsAlongWhenRemovedUnlessACalibrationUsesIt) {
+  const auto used = stored_mission();
+  const auto unused = stored_mission();
+  for (const auto& m : {used, unused}) {
+    Range row = range_at(m.id, 1);
+    row.cir = Cir{};
+    ASSERT_TRUE(db_->measurements().append_ranges({row}, false));
+    ASSERT_TRUE(db_->measurements().append_fixes({fix_at(m.id, 1)}, false));
+  }
+  stored_calibration(used, {1});
+  EXPECT_EQ(db_->missions().remove(used.id).error().code, Errc::conflict);
+  ASSERT_TRUE(db_->missions().remove(unused.id));
+  const auto left = db_->measurements().ranges({}).value();
+  ASSERT_EQ(left.rows.size(), 1u);
+  EXPECT_EQ(left.rows[0].mission, used.id);
+  EXPECT_EQ(db_->measurements().devices(std::nullopt).value().size(), 2u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Backends, MissionStoreContract, backends(), backend_name);
+
+class AnchorStoreContract : public StoreContract {};
+
+TEST_P(AnchorStoreContract, ChangesASiteOnlyFromTheVersionNamed) {
+  Site site;
+  site.id = SiteId{make_uuid_v7(k_noon)};
+  site.name = "Ghent";
+  site.origin = Wgs84{51.02, 3.71, 58.4};
+  site.outline_geojson = "{}";
+  site.crs_frame = "ETRS89";
+  site.crs_epoch = 2026.34;
+  site.base_sigma_m = 0.008;
+  site.base_source = "known_point";
+  site.created = k_noon;
+  ASSERT_TRUE(db_->anchors().insert(site));
+  EXPECT_EQ(db_->anchors().insert(site).error().code, Errc::conflict);
+  site.name = "West";
+  ASSERT_TRUE(db_->anchors().update(site, 1));
+  EXPECT_EQ(db_->anchors().update(site, 1).error().code, Errc::conflict);
+  const auto found = db_->anchors().site(site.id).value();
+  EXPECT_EQ(found.version, 2u);
+  EXPECT_EQ(found.name, "West");
+  EXPECT_EQ(found.origin->lat_deg, 51.02);
+  EXPECT_EQ(found.crs_epoch, 2026.34);
+  EXPECT_EQ(found.base_sigma_m, 0.008);
+  EXPECT_EQ(db_->anchors().sites(10, std::nullopt).value().size(), 1u);
+  Mission m;
+  m.id = MissionId{make_uuid_v7(k_noon)};
+  m.site = site.id;
+  ASSERT_TRUE(db_->missions().insert(m));
+  EXPECT_EQ(db_->anchors().remove(site.id).error().code, Errc::conflict);
+  ASSERT_TRUE(db_->missions().remove(m.id));
+  ASSERT_TRUE(db_->anchors().remove(site.id));
+  EXPECT_EQ(db_->anchors().site(site.id).error().code, Errc::not_found);
+  EXPECT_EQ(db_->anchors().update(site, 2).error().code, Errc::not_found);
+}
+
+TEST_P(AnchorStoreContract, MakesAnAnchorOnceAndKeepsItsFacilityData) {
+  const auto made = db_->anchors().find_or_create(NetworkId{0x6a2f}, k_noon).value();
+  EXPECT_EQ(db_->anchors().find_or_create(NetworkId{0x6a2f}, UtcTime{0}).value().id, made.id);
+  Anchor changed = made;
+  changed.name = "north-west";
+  changed.floor = "0";
+  changed.asset_tag = "UWB-000412";
+  changed.ifc_guid = "2O2Fr$t4X7Zf8NOew3FLOH";
+  changed.external_ids = {{"maximo", "LOC-88231"}, {"sap", "7"}};
+  changed.retired = true;
+  ASSERT_TRUE(db_->anchors().update(changed, 1));
+  EXPECT_EQ(db_->anchors().update(changed, 1).error().code, Errc::conflict);
+  const auto found = db_->anchors().anchor(NetworkId{0x6a2f}).value();
+  EXPECT_EQ(found.version, 2u);
+  EXPECT_EQ(found.name, "north-west");
+  EXPECT_EQ(found.external_ids, changed.external_ids);
+  EXPECT_TRUE(found.retired);
+  EXPECT_EQ(db_->anchors().anchor(made.id).value().asset_tag, "UWB-000412");
+  EXPECT_EQ(db_->anchors().anchor(NetworkId{1}).error().code, Errc::not_found);
+  EXPECT_EQ(db_->anchors().anchors(10, std::nullopt).value().size(), 1u);
+  EXPECT_EQ(db_->anchors().anchors(10, made.id).value().size(), 0u);
+}
+
+TEST_P(AnchorStoreContract, GivesBackACalibrationAsItWas) {
+  const auto mission = stored_mission();
+  Calibration c;
+  c.id = CalibrationId{make_uuid_v7(k_noon)};
+  c.missions = {mission.id};
+  c.origin = Wgs84{51, 3, 58};
+  c.settings_json = R"({"dims":3})";
+  c.created = k_noon;
+  Estimate e;
+  e.anchor = NetworkId{0x6a2f};
+  e.time = k_noon;
+  e.verdict = Verdict::ambiguous;
+  e.reason = "two places fit";
+  e.best = Hypothesis{{{1, 2, 3}}, Wgs84{51.1, 3.1, 60}, Eigen::Vector3d(1e-4, 2e-4, 3e-4).asDiagonal(), 0.047, 0.6};
+  e.mirror = Hypothesis{{{1, 2, -3}}, std::nullopt, Eigen::Matrix3d::Identity(), 0.05, 0.4};
+  e.h95_m = 0.05;
+  e.v95_m = std::numeric_limits<double>::infinity();
+  e.gdop = 2.31;
+  e.n_used = 412;
+  e.refused = {{"gap", 3}, {"zero_distance", 1}};
+  e.bias_m = 0.23;
+  Estimate lost;
+  lost.anchor = NetworkId{2};
+  lost.h95_m = std::numeric_limits<double>::quiet_NaN();
+  c.anchors = {e, lost};
+  ASSERT_TRUE(db_->anchors().insert(c));
+  EXPECT_EQ(db_->anchors().insert(c).error().code, Errc::conflict);
+  const auto found = db_->anchors().calibration(c.id).value();
+  EXPECT_EQ(found.missions, c.missions);
+  EXPECT_EQ(found.origin->height_m, 58);
+  EXPECT_EQ(found.settings_json, c.settings_json);
+  ASSERT_EQ(found.anchors.size(), 2u);
+  const auto& f = found.anchors[0];
+  EXPECT_EQ(f.verdict, Verdict::ambiguous);
+  EXPECT_EQ(f.reason, e.reason);
+  EXPECT_EQ(f.best->position.m, e.best->position.m);
+  EXPECT_EQ(f.best->wgs84->lat_deg, 51.1);
+  EXPECT_EQ(f.best->covariance_m2, e.best->covariance_m2);
+  EXPECT_EQ(f.mirror->probability, 0.4);
+  EXPECT_FALSE(f.mirror->wgs84);
+  EXPECT_TRUE(std::isinf(f.v95_m));
+  EXPECT_EQ(f.refused, e.refused);
+  EXPECT_EQ(f.bias_m, 0.23);
+  EXPECT_FALSE(f.lag_s);
+  EXPECT_FALSE(found.anchors[1].best);
+  EXPECT_TRUE(std::isnan(found.anchors[1].h95_m));
+  EXPECT_EQ(db_->anchors().calibrations(10, std::nullopt).value().size(), 1u);
+  ASSERT_TRUE(db_->anchors().remove(c.id));
+  EXPECT_EQ(db_->anchors().calibration(c.id).error().code, Errc::not_found);
+}
+
+TEST_P(AnchorStoreContract, RefusesACalibrationOfAMissionThatIsNotThereAndLeavesNothing) {
+  Calibration c;
+  c.id = CalibrationId{make_uuid_v7(k_noon)};
+  c.missions = {MissionId{make_uuid_v7(k_noon)}};
+  EXPECT_EQ(db_->anchors().insert(c).error().code, Errc::not_found);
+  EXPECT_EQ(db_->anchors().calibration(c.id).error().code, Errc::not_found);
+}
+
+TEST_P(AnchorStoreContract, CarriesPositionsOnThatANewRevisionDoesNotSet) {
+  const auto mission = stored_mission();
+  EXPECT_TRUE(db_->anchors().published(std::nullopt).value().empty());
+  const auto first = stored_calibration(mission, {1, 2});
+  const auto second = stored_calibration(mission, {2, 3});
+  const auto r1 = db_->anchors().publish(first.id, {NetworkId{1}, NetworkId{2}}, "token", "first", k_noon).value();
+  EXPECT_EQ(r1.number, 1u);
+  ASSERT_TRUE(db_->anchors().publish(second.id, {NetworkId{2}}, "token", "", k_noon));
+  const auto now = db_->anchors().published(std::nullopt).value();
+  ASSERT_EQ(now.size(), 2u);
+  EXPECT_EQ(now[0].estimate.anchor, NetworkId{1});
+  EXPECT_EQ(now[0].since_revision, 1u);
+  EXPECT_EQ(now[0].calibration, first.id);
+  EXPECT_EQ(now[1].since_revision, 2u);
+  EXPECT_EQ(now[1].calibration, second.id);
+  EXPECT_EQ(db_->anchors().published(1).value()[1].calibration, first.id);
+  EXPECT_EQ(db_->anchors().published(3).error().code, Errc::not_found);
+  const auto history = db_->anchors().history(NetworkId{2}).value();
+  ASSERT_EQ(history.size(), 2u);
+  EXPECT_EQ(history[0].since_revision, 2u);
+  const auto revisions = db_->anchors().revisions(10, 0).value();
+  ASSERT_EQ(revisions.size(), 2u);
+  EXPECT_EQ(revisions[0].number, 2u);
+  EXPECT_EQ(revisions[1].note, "first");
+  EXPECT_EQ(db_->anchors().revisions(10, 2).value().size(), 1u);
+  EXPECT_EQ(db_->anchors().remove(first.id).error().code, Errc::conflict);
+}
+
+TEST_P(AnchorStoreContract, PublishesNothingWhenOneAnchorHasNoPosition) {
+  const auto c = stored_calibration(stored_mission(), {1});
+  const auto result = db_->anchors().publish(c.id, {NetworkId{1}, NetworkId{2}}, "", "", k_noon);
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, Errc::invalid_argument);
+  EXPECT_TRUE(db_->anchors().revisions(10, 0).value().empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(Backends, AnchorStoreContract, backends(), backend_name);
+
+class AccessContract : public StoreContract {};
+
+TEST_P(AccessContract, FindsATokenBySecretAndKeepsTheFirstRevocation) {
+  Token token{TokenId{make_uuid_v7(k_noon)}, "gate", std::string(64, 'a'), {"gateway", "viewer"}, k_noon, {}, {}, {}};
+  ASSERT_TRUE(db_->tokens().insert(token));
+  EXPECT_EQ(db_->tokens().insert(token).error().code, Errc::conflict);
+  ASSERT_TRUE(db_->tokens().touch(token.id, UtcTime{5}));
+  ASSERT_TRUE(db_->tokens().revoke(token.id, UtcTime{7}));
+  ASSERT_TRUE(db_->tokens().revoke(token.id, UtcTime{9}));
+  const auto found = db_->tokens().token_by_secret(std::string(64, 'a')).value();
+  EXPECT_EQ(found.id, token.id);
+  EXPECT_THAT(found.roles, ElementsAre("gateway", "viewer"));
+  EXPECT_EQ(found.last_used, UtcTime{5});
+  EXPECT_EQ(found.revoked, UtcTime{7});
+  EXPECT_FALSE(found.expires);
+  EXPECT_EQ(db_->tokens().token_by_secret("b").error().code, Errc::not_found);
+  EXPECT_EQ(db_->tokens().revoke(TokenId{}, k_noon).error().code, Errc::not_found);
+  EXPECT_EQ(db_->tokens().tokens().value().size(), 1u);
+}
+
+TEST_P(AccessContract, FailsJobsThatARestartCutOff) {
+  Job running;
+  running.id = JobId{make_uuid_v7(k_noon)};
+  running.kind = "calibration";
+  running.state = JobState::running;
+  running.fraction = 0.42;
+  Job done = running;
+  done.id = JobId{make_uuid_v7(k_noon)};
+  done.state = JobState::succeeded;
+  ASSERT_TRUE(db_->jobs().insert(running));
+  ASSERT_TRUE(db_->jobs().insert(done));
+  EXPECT_EQ(db_->jobs().fail_unfinished(k_noon, "{}").value(), 1u);
+  const auto found = db_->jobs().job(running.id).value();
+  EXPECT_EQ(found.state, JobState::failed);
+  EXPECT_EQ(found.fraction, 0.42);
+  EXPECT_EQ(found.finished, k_noon);
+  EXPECT_EQ(db_->jobs().job(done.id).value().state, JobState::succeeded);
+  done.detail = "x";
+  ASSERT_TRUE(db_->jobs().update(done));
+  EXPECT_EQ(db_->jobs().jobs(10, std::nullopt).value().size(), 2u);
+  EXPECT_EQ(db_->jobs().job(JobId{}).error().code, Errc::not_found);
+}
+
+TEST_P(AccessContract, KeepsOneAnswerForAPrincipalAndKey) {
+  const StoredAnswer answer{"key", "me", "hash", std::string("a\0b", 3), 201, k_noon};
+  ASSERT_TRUE(db_->access().keep_answer(answer));
+  EXPECT_EQ(db_->access().keep_answer(answer).error().code, Errc::conflict);
+  const auto found = db_->access().answer("me", "key").value();
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->body, answer.body);
+  EXPECT_EQ(found->status, 201);
+  EXPECT_FALSE(db_->access().answer("you", "key").value());
+  EXPECT_EQ(db_->access().drop_answers_before(k_noon).value(), 0u);
+  EXPECT_EQ(db_->access().drop_answers_before(UtcTime{k_noon.ns + 1}).value(), 1u);
+}
+
+TEST_P(AccessContract, ChainsTheAuditLog) {
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(db_->access().append_audit({UtcTime{i}, "me", "publish", "127.0.0.1", std::to_string(i)}));
+  }
+  const auto entries = db_->access().audit(2).value();
+  ASSERT_EQ(entries.size(), 2u);
+  EXPECT_EQ(entries[0].result, "2");
+  EXPECT_TRUE(db_->access().verify_audit());
+}
+
+INSTANTIATE_TEST_SUITE_P(Backends, AccessContract, backends(), backend_name);
+
+}  // namespace
+}  // namespace anchord
