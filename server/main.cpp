@@ -6,7 +6,9 @@ int main(int argc, char** argv) {
   CLI::App app{"anchord: finds where a building's UWB anchors are on the globe", "anchord"};
   app.require_subcommand(1);
   int exit_code = 0;
+  anchord::cli::add_config_command(app, exit_code);
   anchord::cli::add_plan_command(app, exit_code);
+  anchord::cli::add_serve_command(app, exit_code);
   anchord::cli::add_simulate_command(app, exit_code);
   anchord::cli::add_version_command(app, exit_code);
   try {

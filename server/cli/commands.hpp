@@ -8,7 +8,9 @@ class App;
 /// Exit codes: 0 done, 1 failed, 2 unusable input or arguments.
 namespace anchord::cli {
 
+void add_config_command(CLI::App& app, int& exit_code);
 void add_plan_command(CLI::App& app, int& exit_code);
+void add_serve_command(CLI::App& app, int& exit_code);
 void add_simulate_command(CLI::App& app, int& exit_code);
 void add_version_command(CLI::App& app, int& exit_code);
 

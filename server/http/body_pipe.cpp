@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "api/http/problem.hpp"
-
 namespace anchord::server {
 
 std::size_t BodyPipe::read(std::span<char> buffer) {
@@ -15,7 +13,7 @@ std::size_t BodyPipe::read(std::span<char> buffer) {
     filled_.wait(lock, [this] { return at_ < bytes_.size() || ended_ || failed_status_ != 0; });
     if (at_ == bytes_.size()) {
       if (failed_status_ != 0) {
-        api::throw_problem(failed_status_, failed_status_ == 413 ? "too-large" : "malformed", failed_);
+        throw api::BodyError(failed_status_, failed_);
       }
       return 0;
     }

@@ -134,7 +134,9 @@ std::string response_head(const api::Response& response, std::string_view reques
   head.reserve(1024);
   head.append("HTTP/1.1 ").append(std::to_string(response.status)).append(" ");
   head.append(reason_phrase(response.status)).append("\r\n");
-  for (const auto& [name, text] : response.headers) add(head, name, text);
+  for (const auto& [name, text] : response.headers) {
+    if (!iequals(name, "connection")) add(head, name, text);  // ours to say
+  }
   add(head, "Date", http_date());
   if (!request_id.empty() && !has(response, "x-request-id")) add(head, "X-Request-Id", request_id);
   if (!has(response, "content-security-policy"))

@@ -1,0 +1,240 @@
+#include "server/app/app.hpp"
+
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "api/http/problem.hpp"
+#include "server/app/front_door.hpp"
+#include "server/app/metrics.hpp"
+#include "server/http/http_server.hpp"
+#include "server/http/request_judge.hpp"
+#include "server/http/text.hpp"
+#include "server/runtime/logging.hpp"
+#include "server/runtime/worker_pool.hpp"
+
+namespace anchord::server {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The rules about who may reach the server from where (one place, so that no other path can listen).
+Result<void> check_listeners(const Config& config) {
+  const bool auth_off = config.text("auth") == "off";
+  const auto endpoints = config.list("listen");
+  if (endpoints.empty()) return make_error(Errc::invalid_argument, "listen: no address");
+  for (const auto& endpoint : endpoints) {
+    BOOST_OUTCOME_TRY(const bool loopback, is_loopback(endpoint));
+    if (loopback) continue;
+    if (auth_off) {
+      return make_error(Errc::invalid_argument, "--auth=off is for loopback addresses only; " + endpoint +
+                                                    " could be reached by others");
+    }
+    if (!config.flag("insecure")) {
+      return make_error(Errc::invalid_argument,
+                        endpoint +
+                            " can be reached by others and there is no TLS yet; put a "
+                            "TLS proxy before a loopback address, or say --insecure");
+    }
+  }
+  return boost::outcome_v2::success();
+}
+
+HostPolicy host_policy(const Config& config) {
+  HostPolicy policy{{"localhost", "127.0.0.1", "[::1]"}, {}};
+  for (const auto& endpoint : config.list("listen")) policy.hosts.push_back(host_name(endpoint));
+  for (const auto& host : config.list("allowed_hosts")) policy.hosts.push_back(lower(host));
+  for (const auto& origin : config.list("allowed_origins")) policy.origins.push_back(lower(origin));
+  return policy;
+}
+
+/// As many descriptors as the system lets us have: connections, database and models need them.
+std::size_t raise_descriptor_limit() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return 1024;
+  limit.rlim_cur = limit.rlim_max == RLIM_INFINITY ? 65'536 : std::min<rlim_t>(limit.rlim_max, 65'536);
+  setrlimit(RLIMIT_NOFILE, &limit);
+  getrlimit(RLIMIT_NOFILE, &limit);
+  return static_cast<std::size_t>(limit.rlim_cur);
+}
+
+/// Writes a file only its owner may read, whole or not at all.
+Result<void> write_private(const fs::path& file, const std::string& text) {
+  const fs::path part = file.string() + ".part";
+  const int fd = ::open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+  const bool written = fd >= 0 &&
+                       ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
+                       ::fsync(fd) == 0;
+  if (fd >= 0) ::close(fd);
+  std::error_code error;
+  if (written) fs::rename(part, file, error);
+  if (!written || error) return make_error(Errc::storage_unavailable, "cannot write " + file.string());
+  return boost::outcome_v2::success();
+}
+
+}  // namespace
+
+struct App::State {
+  Config config;
+  SystemClock clock;
+  std::unique_ptr<TokenStore> tokens;
+  std::unique_ptr<AccessStore> access_store;
+  std::unique_ptr<Metrics> metrics;
+  std::unique_ptr<api::AccessService> access;
+  std::unique_ptr<WorkerPool> pool, stream_pool;
+  std::unique_ptr<api::Router> router;
+  std::unique_ptr<FrontDoor> door;
+  std::unique_ptr<HttpServer> http;
+  std::vector<std::string> urls;
+  fs::path data_dir;
+  bool stopped{false};
+
+  Result<void> first_token();
+  Result<void> listen();
+};
+
+namespace {
+
+/// Until the database is composed in: no tokens, no log.
+class NoTokens final : public TokenStore {
+ public:
+  Result<void> insert(const Token&) override { return boost::outcome_v2::success(); }
+  Result<Token> token(const TokenId&) override { return make_error(Errc::not_found, "no token"); }
+  Result<Token> token_by_secret(std::string_view) override { return make_error(Errc::not_found, "no token"); }
+  Result<std::vector<Token>> tokens() override { return std::vector<Token>{}; }
+  Result<void> revoke(const TokenId&, UtcTime) override { return make_error(Errc::not_found, "no token"); }
+  Result<void> touch(const TokenId&, UtcTime) override { return boost::outcome_v2::success(); }
+};
+class NoLog final : public AccessStore {
+ public:
+  Result<std::optional<StoredAnswer>> answer(std::string_view, std::string_view) override {
+    return std::optional<StoredAnswer>{};
+  }
+  Result<void> keep_answer(const StoredAnswer&) override { return boost::outcome_v2::success(); }
+  Result<std::size_t> drop_answers_before(UtcTime) override { return std::size_t{0}; }
+  Result<void> append_audit(const AuditEntry&) override { return boost::outcome_v2::success(); }
+  Result<std::vector<AuditEntry>> audit(std::size_t) override { return std::vector<AuditEntry>{}; }
+  Result<void> verify_audit() override { return boost::outcome_v2::success(); }
+};
+
+void add_probes(api::Router& router) {
+  for (const char* path : {"/healthz", "/readyz"}) {
+    router.add({api::Method::get, path, api::Access::open(), [](const api::Request&) {
+                  api::Response response;
+                  response.header("Content-Type", "application/json");
+                  response.body = R"({"status":"ok"})";
+                  return response;
+                }});
+  }
+}
+
+}  // namespace
+
+Result<void> App::State::first_token() {
+  if (config.text("auth") == "off" || access->has_tokens()) return boost::outcome_v2::success();
+  const api::Principal first_run{"first-run", "first run", {}};
+  BOOST_OUTCOME_TRY(const auto made,
+                    access->create_token("first run", {"admin"}, std::nullopt, first_run, "local"));
+  const fs::path file = data_dir / k_admin_token_file;
+  BOOST_OUTCOME_TRYV(write_private(file, made.text + "\n"));
+  log(LogLevel::info, "made the first admin token", {{"file", file.string()}});
+  // Only to a person: a redirected stderr is a log.
+  if (isatty(STDERR_FILENO) == 1) {
+    std::fprintf(stderr, "\nFirst start. The admin token, shown once (also in %s):\n\n  %s\n\n", file.c_str(),
+                 made.text.c_str());
+  }
+  return boost::outcome_v2::success();
+}
+
+Result<void> App::State::listen() {
+  HttpServerOptions options;
+  options.limits = http_limits(config);
+  options.ws_limits = ws_limits(config);
+  options.hosts = host_policy(config);
+  options.io_threads = config.count("http.io_threads");
+  options.log_fault = [](std::string_view what) { log(LogLevel::error, "fault", {{"what", what}}); };
+  const std::size_t descriptors = raise_descriptor_limit();
+  options.limits.max_connections =
+      std::min(options.limits.max_connections, descriptors - std::min<std::size_t>(descriptors / 2, 128));
+  http = std::make_unique<HttpServer>(options, *door, *pool, *stream_pool);
+  for (const auto& endpoint : config.list("listen")) {
+    BOOST_OUTCOME_TRY(const auto port, http->listen(endpoint));
+    urls.push_back("http://" + endpoint.substr(0, endpoint.rfind(':')) + ":" + std::to_string(port));
+  }
+  metrics->gauge("anchord_http_connections", "Sockets open",
+                 [this] { return static_cast<double>(http->connections()); });
+  metrics->gauge("anchord_ws_clients", "WebSocket clients",
+                 [this] { return static_cast<double>(http->websockets()); });
+  metrics->gauge("anchord_worker_queue", "Requests that wait for a handler",
+                 [this] { return static_cast<double>(pool->queued()); });
+  http->start();
+  BOOST_OUTCOME_TRYV(write_private(data_dir / k_address_file, urls.front() + "\n"));
+  for (const auto& url : urls) log(LogLevel::info, "listening", {{"url", url}});
+  return boost::outcome_v2::success();
+}
+
+App::App(std::unique_ptr<State> state) : state_(std::move(state)) {}
+App::~App() { stop(); }
+const std::vector<std::string>& App::urls() const { return state_->urls; }
+
+Result<std::unique_ptr<App>> App::start(const Config& config) {
+  BOOST_OUTCOME_TRYV(check_listeners(config));
+  auto state = std::make_unique<State>();
+  auto& s = *state;
+  s.config = config;
+  s.data_dir = config.text("data_dir");
+  std::error_code error;
+  fs::create_directories(s.data_dir, error);
+  if (error) return make_error(Errc::storage_unavailable, s.data_dir.string() + ": " + error.message());
+  s.tokens = std::make_unique<NoTokens>();
+  s.access_store = std::make_unique<NoLog>();
+  s.metrics = std::make_unique<Metrics>(ANCHORD_VERSION);
+  api::AccessOptions access_options;
+  access_options.auth_off = config.text("auth") == "off";
+  s.access = std::make_unique<api::AccessService>(*s.tokens, *s.access_store, s.clock, access_options);
+  BOOST_OUTCOME_TRYV(s.access->load());
+  BOOST_OUTCOME_TRYV(s.first_token());
+  s.pool =
+      std::make_unique<WorkerPool>("anchord-work", config.count("http.workers"), config.count("http.queue"));
+  s.stream_pool = std::make_unique<WorkerPool>("anchord-upload", config.count("http.upload_workers"), 64);
+  s.router = std::make_unique<api::Router>();
+  add_probes(*s.router);
+  FrontDoorOptions door;
+  door.hosts = host_policy(config);
+  door.rate_per_s = static_cast<double>(config.count("rate.per_s"));
+  door.rate_burst = static_cast<double>(config.count("rate.burst"));
+  s.door = std::make_unique<FrontDoor>(*s.router, api::WsHandlerFactory{}, *s.access, *s.metrics, door);
+  auto app = std::unique_ptr<App>(new App(std::move(state)));
+  BOOST_OUTCOME_TRYV(app->state_->listen());
+  return app;
+}
+
+void App::stop() {
+  auto& s = *state_;
+  if (s.stopped) return;
+  s.stopped = true;
+  auto last = std::chrono::steady_clock::now();
+  const auto step = [&last](std::string_view name) {
+    const auto now = std::chrono::steady_clock::now();
+    log(LogLevel::info, "stop step",
+        {{"step", name},
+         {"ms", std::to_string(std::chrono::duration_cast<std::chrono::milliseconds>(now - last).count())}});
+    last = now;
+  };
+  if (s.door) s.door->close();
+  if (s.http) s.http->stop(std::chrono::seconds(5));
+  step("connections");
+  if (s.pool) s.pool->stop();
+  if (s.stream_pool) s.stream_pool->stop();
+  step("workers");
+  std::error_code ignored;
+  if (!s.urls.empty()) fs::remove(s.data_dir / k_address_file, ignored);
+}
+
+}  // namespace anchord::server

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "server/config/config.hpp"
+
+namespace anchord::server {
+
+/// The composition root: builds everything in the order it depends on each other, stops it in the reverse
+/// order.
+class App {
+ public:
+  /// Checks the addresses, opens and migrates the database, makes the first admin token, listens. Messages of
+  /// errors are for the operator's terminal. Errors: invalid_argument (settings), conflict (address or folder
+  /// in use), those of the database.
+  static Result<std::unique_ptr<App>> start(const Config& config);
+  ~App();
+  App(const App&) = delete;
+  App& operator=(const App&) = delete;
+
+  /// Where it listens, "http://127.0.0.1:8420".
+  const std::vector<std::string>& urls() const;
+  /// Refuses new work, says goodbye to WebSockets, finishes what runs, flushes and closes the database. Logs
+  /// how long each step took. Idempotent; within 10 s.
+  void stop();
+
+ private:
+  struct State;
+  explicit App(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+/// Files of the data folder that other commands look for.
+inline constexpr std::string_view k_admin_token_file = "admin.token";
+inline constexpr std::string_view k_address_file = "address";
+
+}  // namespace anchord::server

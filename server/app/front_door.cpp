@@ -1,0 +1,230 @@
+#include "server/app/front_door.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "api/http/problem.hpp"
+#include "server/app/base64.hpp"
+#include "server/app/live_peer.hpp"
+#include "server/http/request_judge.hpp"
+#include "server/http/static_files.hpp"
+#include "server/http/text.hpp"
+#include "server/runtime/logging.hpp"
+
+namespace anchord::server {
+namespace {
+
+constexpr std::string_view k_live_path = "/api/v1/ws";
+constexpr std::string_view k_subprotocol = "anchord.v1";
+
+bool unsafe(api::Method method) {
+  return method != api::Method::get && method != api::Method::head && method != api::Method::options;
+}
+
+/// What a plain HTML form can send without asking anybody.
+bool form_type(std::string_view content_type) {
+  return content_type.empty() || content_type.starts_with("application/x-www-form-urlencoded") ||
+         content_type.starts_with("multipart/form-data") || content_type.starts_with("text/plain");
+}
+
+bool has_body(const api::Request& request) {
+  return !request.header("transfer-encoding").empty() ||
+         (!request.header("content-length").empty() && request.header("content-length") != "0");
+}
+
+Admission refused(api::Response response, std::string route = {}) {
+  Admission admission;
+  admission.refusal = std::move(response);
+  admission.route = std::move(route);
+  return admission;
+}
+
+/// Token of "Bearer x", or of the password of "Basic x".
+std::string credential(std::string_view authorization) {
+  const auto space = authorization.find(' ');
+  if (space == std::string_view::npos) return {};
+  const auto scheme = authorization.substr(0, space);
+  const auto rest = trim(authorization.substr(space + 1));
+  if (iequals(scheme, "bearer")) return std::string(rest);
+  if (!iequals(scheme, "basic")) return {};
+  const auto decoded = base64_decoded(rest);
+  if (!decoded) return {};
+  const auto colon = decoded->find(':');
+  return colon == std::string::npos ? std::string{} : decoded->substr(colon + 1);
+}
+
+bool ingest(std::string_view pattern) { return pattern == "/api/v1/ranges" || pattern == "/api/v1/fixes"; }
+
+}  // namespace
+
+FrontDoor::FrontDoor(const api::Router& router, api::WsHandlerFactory live, api::AccessService& access,
+                     Metrics& metrics, FrontDoorOptions options)
+    : router_(router),
+      live_(std::move(live)),
+      access_(access),
+      metrics_(metrics),
+      options_(std::move(options)),
+      rate_(options_.rate_per_s, options_.rate_burst),
+      logins_(options_.login_per_s, options_.login_burst) {}
+
+std::optional<api::Response> FrontDoor::identify(api::Request& request, bool websocket) {
+  for (const auto& [key, value] : request.query) {
+    // A long-lived secret in an address ends in logs, histories and Referer headers.
+    if (key == "token" || key == "access_token" || value.starts_with("anc_")) {
+      return problem(400, "malformed", "a token in the address is refused; send it as Authorization: Bearer");
+    }
+  }
+  if (access_.options().auth_off) {
+    request.principal = api::local_principal();
+  } else if (const auto authorization = request.header("authorization"); !authorization.empty()) {
+    const auto who = access_.verify(credential(authorization));
+    if (!who) return problem(401, "unauthorized", "the token is not known, expired or revoked");
+    request.principal = *who;
+    return std::nullopt;  // no browser adds this header by itself
+  } else if (const auto ticket = request.query_value("ticket"); ticket && websocket) {
+    const auto who = access_.take_ticket(*ticket);
+    if (!who) return problem(401, "unauthorized", "the ticket is used up, expired or unknown");
+    request.principal = *who;
+    return std::nullopt;
+  } else if (const auto cookie = api::cookie_value(request.header("cookie"), api::k_session_cookie);
+             !cookie.empty()) {
+    const auto who = access_.session(cookie);
+    if (!who) return std::nullopt;  // an old cookie is nobody, not an error: the login page must still load
+    request.principal = *who;
+    if (unsafe(request.method) && request.header("x-anchord") != "1") {
+      return problem(403, "forbidden", "changes by a browser session need the header X-Anchord: 1");
+    }
+  } else {
+    return std::nullopt;
+  }
+  if (unsafe(request.method) && has_body(request) && form_type(request.header("content-type"))) {
+    return problem(415, "media-type", "send application/json, application/x-ndjson or text/csv");
+  }
+  return std::nullopt;
+}
+
+std::optional<api::Response> FrontDoor::limit(const api::Request& request) {
+  if (access_.options().auth_off) return std::nullopt;
+  const auto now = RateLimit::Clock::now();
+  std::optional<int> wait_s;
+  if (request.method == api::Method::post && request.path == "/api/v1/session") {
+    wait_s = logins_.take(request.remote, now);
+  } else {
+    const std::string& id = request.principal.token_id;
+    wait_s = rate_.take(id.empty() ? "address " + request.remote : id, now);
+  }
+  if (!wait_s) return std::nullopt;
+  auto response = problem(429, "rate-limited", "too many requests");
+  response.header("Retry-After", std::to_string(*wait_s));
+  return response;
+}
+
+Admission FrontDoor::live(api::Request& request, bool websocket) {
+  const std::string route(k_live_path);
+  if (!websocket) {
+    auto response = problem(426, "malformed", "this address speaks WebSocket, subprotocol anchord.v1");
+    response.header("Upgrade", "websocket");
+    return refused(std::move(response), route);
+  }
+  using enum api::Role;
+  if (request.principal.roles.empty()) {
+    auto response = problem(401, "unauthorized", "send a token, a session cookie or ?ticket=");
+    response.header("WWW-Authenticate", "Bearer realm=\"anchord\"");
+    return refused(std::move(response), route);
+  }
+  if (!api::Access::any_of({viewer, integrator, engineer, op}).permits(request.principal)) {
+    return refused(problem(403, "forbidden", "live data needs the role viewer"), route);
+  }
+  Admission admission;
+  admission.route = route;
+  if (const auto offered = request.header("sec-websocket-protocol"); !offered.empty()) {
+    const auto words = split(offered, ',');
+    if (!std::ranges::any_of(words, [](std::string_view word) { return trim(word) == k_subprotocol; })) {
+      return refused(problem(400, "malformed", "the only subprotocol is anchord.v1"), route);
+    }
+    admission.subprotocol = k_subprotocol;
+  }
+  admission.websocket = [this, who = request.principal] { return make_live_peer(live_(who)); };
+  return admission;
+}
+
+Admission FrontDoor::admit(api::Request& request, std::string_view host, bool websocket) {
+  if (closed_) {
+    auto response = problem(503, "overloaded", "the server stops");
+    response.header("Retry-After", "5");
+    return refused(std::move(response));
+  }
+  if ((websocket || unsafe(request.method)) &&
+      !origin_allowed(request.header("origin"), host, options_.hosts)) {
+    return refused(problem(403, "forbidden", "pages of this origin are not allowed; see allowed_origins"));
+  }
+  auto no = identify(request, websocket);
+  if (no) {
+    if (no->status == 401) no->header("WWW-Authenticate", "Bearer realm=\"anchord\"");
+    return refused(std::move(*no));
+  }
+  auto found = router_.resolve(request.method, request.path);
+  const bool probe = request.path == "/healthz" || request.path == "/readyz";
+  const bool file = found.kind == api::Resolution::Kind::not_found && !request.path.starts_with("/api");
+  if (!probe && !file) {
+    if (auto wait = limit(request)) return refused(std::move(*wait));
+  }
+  if (request.path == k_live_path) return live(request, websocket);
+  if (found.kind == api::Resolution::Kind::not_found && !unsafe(request.method)) {
+    if (auto response = static_file(request)) {
+      if (request.method == api::Method::options)
+        *response = api::Response{204, {{"Allow", "GET, HEAD, OPTIONS"}}, {}, {}};
+      return refused(std::move(*response), "static");
+    }
+  }
+  if (found.kind != api::Resolution::Kind::matched) return refused(router_.refuse(found, request));
+
+  const api::Route& route = *found.route;
+  request.params = std::move(found.params);
+  Admission admission;
+  admission.route = route.pattern;
+  if (!route.access.permits(request.principal)) {
+    admission.refusal =
+        router_.dispatch(route, request);  // 401 or 403 in its words; the handler is not reached
+    return admission;
+  }
+  admission.body_limit = route.body_limit;
+  admission.streams_body = route.streams_body;
+  admission.quick = request.path == "/healthz";  // says that the event loop turns, so it is answered by it
+  admission.run = [this, &route](api::Request& r) { return run(route, r); };
+  return admission;
+}
+
+api::Response FrontDoor::run(const api::Route& route, api::Request& request) {
+  auto response = router_.dispatch(route, request);
+  // Every change goes to the audit log; measurements are their own record, logins and tokens write richer
+  // entries.
+  if (unsafe(route.method) && !ingest(route.pattern) && !route.pattern.starts_with("/api/v1/tokens") &&
+      !route.pattern.starts_with("/api/v1/session") && !route.pattern.starts_with("/api/v1/ws-tickets")) {
+    access_.audit(request.principal.token_id,
+                  std::string(api::to_string(request.method)) + " " + request.path, request.remote,
+                  std::to_string(response.status));
+  }
+  return response;
+}
+
+api::Response FrontDoor::problem(int status, std::string_view type, std::string detail) {
+  return api::problem(status, type, std::move(detail));
+}
+
+void FrontDoor::answered(const api::Request& request, std::string_view route, int status, double seconds,
+                         std::size_t bytes_out) {
+  metrics_.answered(route, api::to_string(request.method), status, seconds);
+  const LogLevel level = status >= 500 ? LogLevel::warning : LogLevel::debug;
+  log(level, "request",
+      {{"request_id", request.request_id},
+       {"method", api::to_string(request.method)},
+       {"path", request.path},
+       {"status", std::to_string(status)},
+       {"ms", std::to_string(seconds * 1000)},
+       {"bytes", std::to_string(bytes_out)},
+       {"from", request.remote},
+       {"token", request.principal.token_id}});
+}
+
+}  // namespace anchord::server

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "api/http/router.hpp"
+#include "api/live/ws_handler.hpp"
+#include "api/services/access.hpp"
+#include "server/app/metrics.hpp"
+#include "server/app/rate_limit.hpp"
+#include "server/http/gateway.hpp"
+#include "server/http/limits.hpp"
+
+namespace anchord::server {
+
+struct FrontDoorOptions {
+  HostPolicy hosts{};
+  double rate_per_s{50}, rate_burst{200};
+  double login_per_s{5.0 / 60}, login_burst{5};  ///< per address
+};
+
+/// Between the transport and the application: who asks, from which page, how often, and which route answers.
+/// Denies by default: what no route and no file claims is refused. Called on io threads; never blocks.
+class FrontDoor final : public Gateway {
+ public:
+  FrontDoor(const api::Router& router, api::WsHandlerFactory live, api::AccessService& access,
+            Metrics& metrics, FrontDoorOptions options);
+
+  Admission admit(api::Request& request, std::string_view host, bool websocket) override;
+  api::Response problem(int status, std::string_view type, std::string detail) override;
+  void answered(const api::Request& request, std::string_view route, int status, double seconds,
+                std::size_t bytes_out) override;
+  /// From now on everything new gets 503.
+  void close() { closed_ = true; }
+
+ private:
+  std::optional<api::Response> identify(api::Request& request, bool websocket);
+  std::optional<api::Response> limit(const api::Request& request);
+  Admission live(api::Request& request, bool websocket);
+  api::Response run(const api::Route& route, api::Request& request);
+
+  const api::Router& router_;
+  api::WsHandlerFactory live_;
+  api::AccessService& access_;
+  Metrics& metrics_;
+  FrontDoorOptions options_;
+  RateLimit rate_, logins_;
+  std::atomic<bool> closed_{false};
+};
+
+}  // namespace anchord::server

@@ -1,0 +1,47 @@
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "server/cli/commands.hpp"
+#include "server/cli/config_flags.hpp"
+
+namespace anchord::cli {
+namespace {
+
+Result<server::Config> loaded(const ConfigFlags& flags) {
+  auto config = flags.load();
+  if (!config) {
+    std::fprintf(stderr, "%s\n", config.error().message.c_str());
+    return config;
+  }
+  for (const auto& warning : config.value().warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
+  return config;
+}
+
+}  // namespace
+
+void add_config_command(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("config", "Check or show the settings");
+  command->require_subcommand(1);
+  auto* check = command->add_subcommand("check", "Say what is wrong with file, environment and flags");
+  const auto check_flags = add_config_flags(*check);
+  check->callback([&exit_code, check_flags] {
+    const auto config = loaded(*check_flags);
+    exit_code = config ? 0 : 2;
+    if (config) std::puts("configuration is good");
+  });
+  auto* show = command->add_subcommand("show", "Print every setting, its value and where that comes from");
+  const auto show_flags = add_config_flags(*show);
+  show->callback([&exit_code, show_flags] {
+    const auto config = loaded(*show_flags);
+    exit_code = config ? 0 : 2;
+    if (!config) return;
+    for (const auto& option : server::options()) {
+      const auto& value = config.value().values.find(option.key)->second;
+      std::printf("%-22s %-24s %-12s %s\n", std::string(option.key).c_str(),
+                  ("\"" + value.text + "\"").c_str(), std::string(server::to_string(value.origin)).c_str(),
+                  std::string(option.help).c_str());
+    }
+  });
+}
+
+}  // namespace anchord::cli

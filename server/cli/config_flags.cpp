@@ -1,0 +1,30 @@
+#include "server/cli/config_flags.hpp"
+
+#include <CLI/CLI.hpp>
+
+namespace anchord::cli {
+
+Result<server::Config> ConfigFlags::load() const {
+  std::optional<std::filesystem::path> path;
+  if (!file.empty()) path = file;
+  return server::load_config(given, path, server::process_environment());
+}
+
+std::shared_ptr<ConfigFlags> add_config_flags(CLI::App& command) {
+  auto flags = std::make_shared<ConfigFlags>();
+  command.add_option("--config", flags->file, "TOML file with settings");
+  for (const auto& option : server::options()) {
+    const std::string key(option.key);
+    const std::string help = std::string(option.help) + " [" + std::string(option.default_value) + "]";
+    if (option.kind == server::OptionKind::flag) {
+      command.add_flag_callback(
+          option.flag(), [flags, key] { flags->given[key] = "true"; }, help);
+    } else {
+      command.add_option_function<std::string>(
+          option.flag(), [flags, key](const std::string& text) { flags->given[key] = text; }, help);
+    }
+  }
+  return flags;
+}
+
+}  // namespace anchord::cli

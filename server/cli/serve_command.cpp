@@ -1,0 +1,56 @@
+#include <signal.h>
+#include <sys/stat.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "server/app/app.hpp"
+#include "server/cli/commands.hpp"
+#include "server/cli/config_flags.hpp"
+#include "server/runtime/logging.hpp"
+
+namespace anchord::cli {
+namespace {
+
+int serve(const server::Config& config) {
+  // Blocked before any thread starts, so that all inherit it and only sigwait below hears them.
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  signal(SIGPIPE, SIG_IGN);
+  umask(077);  // the database holds tokens and positions
+
+  server::start_logging(config.text("log_level"));
+  for (const auto& warning : config.warnings) server::log(server::LogLevel::warning, warning);
+  auto app = server::App::start(config);
+  if (!app) {
+    std::fprintf(stderr, "anchord: %s\n", app.error().message.c_str());
+    return app.error().code == Errc::invalid_argument ? 2 : 1;
+  }
+  int received = 0;
+  sigwait(&signals, &received);
+  server::log(server::LogLevel::info, "stopping", {{"signal", received == SIGINT ? "SIGINT" : "SIGTERM"}});
+  app.value()->stop();
+  server::log(server::LogLevel::info, "stopped");
+  return 0;
+}
+
+}  // namespace
+
+void add_serve_command(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("serve", "Run the server");
+  const auto flags = add_config_flags(*command);
+  command->callback([&exit_code, flags] {
+    const auto config = flags->load();
+    if (!config) {
+      std::fprintf(stderr, "anchord: %s\n", config.error().message.c_str());
+      exit_code = 2;
+      return;
+    }
+    exit_code = serve(config.value());
+  });
+}
+
+}  // namespace anchord::cli

@@ -1,0 +1,210 @@
+#include "server/config/config.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "core/base/check.hpp"
+#include "server/config/toml_file.hpp"
+#include "server/http/text.hpp"
+
+extern char** environ;
+
+namespace anchord::server {
+namespace {
+
+using enum OptionKind;
+
+constexpr std::array k_options = {
+    Option{"listen", "127.0.0.1:8420",
+           "addresses to listen on, separated by commas; port 0: the system chooses", list},
+    Option{"data_dir", "anchord-data", "folder of the database; made when absent"},
+    Option{"auth", "on", "off: everybody may do everything; only on loopback, for demonstrations", choice,
+           "on|off"},
+    Option{"insecure", "false", "allow other addresses than loopback although there is no TLS", flag},
+    Option{"allowed_hosts", "", "host names and addresses clients may use, besides loopback", list},
+    Option{"allowed_origins", "", "pages of other origins that may call, like https://portal.example", list},
+    Option{"log_level", "info", "least level that is logged", choice, "debug|info|warning|error"},
+    Option{"storage.synchronous", "full", "what a commit waits for; full survives a power cut", choice,
+           "normal|full|extra"},
+    Option{"http.io_threads", "1", "threads of the sockets", count},
+    Option{"http.workers", "4", "threads that run handlers", count},
+    Option{"http.queue", "256", "requests that may wait for a handler; beyond: 503", count},
+    Option{"http.upload_workers", "8", "threads for uploads that stream", count},
+    Option{"http.max_connections", "4096", "sockets at once; beyond: 503 and close", count},
+    Option{"http.keep_alive_s", "75", "idle time of a connection between requests", seconds},
+    Option{"http.head_s", "10", "time a request head may take", seconds},
+    Option{"http.body_window_s", "20", "how long a body may stay below 1 KiB/s", seconds},
+    Option{"http.write_stall_s", "30", "time without progress of a write", seconds},
+    Option{"ws.max_connections", "64", "WebSocket clients at once; beyond: close 4029", count},
+    Option{"ws.message_bytes", "65536", "largest message a client may send", count},
+    Option{"ws.ping_s", "15", "period of protocol pings", seconds},
+    Option{"ws.idle_s", "45", "silence after which a peer is dead", seconds},
+    Option{"rate.per_s", "50", "requests a second of one token; beyond: 429", count},
+    Option{"rate.burst", "200", "requests a token may send at once", count},
+};
+
+const Option* find(std::string_view key) {
+  const auto* at = std::ranges::find(k_options, key, &Option::key);
+  return at == k_options.end() ? nullptr : at;
+}
+
+std::string spelled(std::string_view key, char separator) {
+  std::string out(key);
+  std::ranges::replace(out, '.', separator);
+  std::ranges::replace(out, '_', separator);
+  return out;
+}
+
+std::optional<double> number(std::string_view text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (text.empty() || error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value))
+    return {};
+  return value;
+}
+
+/// Why the text does not suit the option; empty when it does.
+std::string wrong(const Option& option, const std::string& value) {
+  switch (option.kind) {
+    case text:
+    case list:
+      return {};
+    case flag:
+      return value == "true" || value == "false" ? "" : "must be true or false";
+    case count: {
+      const auto n = number(value);
+      return n && *n >= 1 && *n <= 1e9 && *n == std::floor(*n) ? "" : "must be a whole number from 1";
+    }
+    case seconds: {
+      const auto n = number(value);
+      return n && *n > 0 && *n <= 86'400 ? "" : "must be a number of seconds above 0, at most 86400";
+    }
+    case choice: {
+      const auto words = split(option.choices, '|');
+      if (std::ranges::find(words, value) != words.end()) return {};
+      return "must be one of " + std::string(option.choices);
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string Option::flag() const { return "--" + spelled(key, '-'); }
+
+std::string Option::env() const {
+  std::string out = "ANCHORD_" + spelled(key, '_');
+  std::ranges::transform(out, out.begin(),
+                         [](char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 32) : c; });
+  return out;
+}
+
+std::span<const Option> options() { return k_options; }
+
+std::string_view to_string(Origin origin) {
+  switch (origin) {
+    case Origin::standard:
+      return "default";
+    case Origin::file:
+      return "file";
+    case Origin::environment:
+      return "environment";
+    case Origin::flag:
+      return "flag";
+  }
+  return "default";
+}
+
+const std::string& Config::text(std::string_view key) const {
+  const auto at = values.find(key);
+  ANCHORD_CHECK(at != values.end(), "no setting " << key);
+  return at->second.text;
+}
+bool Config::flag(std::string_view key) const { return text(key) == "true"; }
+std::size_t Config::count(std::string_view key) const {
+  return static_cast<std::size_t>(number(text(key)).value_or(0));
+}
+std::chrono::milliseconds Config::seconds(std::string_view key) const {
+  return std::chrono::milliseconds(std::llround(number(text(key)).value_or(0) * 1000));
+}
+std::vector<std::string> Config::list(std::string_view key) const {
+  std::vector<std::string> out;
+  for (const auto item : split(text(key), ',')) {
+    if (!trim(item).empty()) out.emplace_back(trim(item));
+  }
+  return out;
+}
+
+Result<Config> load_config(const std::map<std::string, std::string>& flags,
+                           const std::optional<std::filesystem::path>& file,
+                           const std::vector<std::string>& environment) {
+  Config config;
+  std::string faults;
+  const auto put = [&](std::string_view key, std::string value, Origin origin, const std::string& called) {
+    const Option* option = find(key);
+    if (option == nullptr) {
+      faults += called + ": there is no such setting\n";
+    } else if (const auto why = wrong(*option, value); !why.empty()) {
+      faults += called + " = '" + value + "': " + why + "\n";
+    } else {
+      config.values[std::string(key)] = {std::move(value), origin};
+    }
+  };
+  for (const auto& option : k_options) {
+    config.values[std::string(option.key)] = {std::string(option.default_value), Origin::standard};
+  }
+  if (file) {
+    BOOST_OUTCOME_TRY(const auto entries, read_toml(*file));
+    for (const auto& [key, value] : entries) put(key, value, Origin::file, file->string() + ": " + key);
+  }
+  for (const auto& line : environment) {
+    if (!line.starts_with("ANCHORD_")) continue;
+    const auto equals = std::min(line.find('='), line.size());
+    const std::string name = line.substr(0, equals);
+    const auto* at =
+        std::ranges::find_if(k_options, [&](const Option& option) { return option.env() == name; });
+    if (at == k_options.end()) {
+      config.warnings.push_back("environment variable " + name + " is no setting of the server");
+    } else {
+      put(at->key, line.substr(std::min(equals + 1, line.size())), Origin::environment, name);
+    }
+  }
+  for (const auto& [key, value] : flags) {
+    const Option* option = find(key);
+    put(key, value, Origin::flag, option != nullptr ? option->flag() : key);
+  }
+  if (!faults.empty()) {
+    faults.pop_back();
+    return make_error(Errc::invalid_argument, std::move(faults));
+  }
+  return config;
+}
+
+HttpLimits http_limits(const Config& config) {
+  HttpLimits limits;
+  limits.max_connections = config.count("http.max_connections");
+  limits.keep_alive = config.seconds("http.keep_alive_s");
+  limits.head_time = config.seconds("http.head_s");
+  limits.body_window = config.seconds("http.body_window_s");
+  limits.write_stall = config.seconds("http.write_stall_s");
+  return limits;
+}
+
+WsLimits ws_limits(const Config& config) {
+  WsLimits limits;
+  limits.max_connections = config.count("ws.max_connections");
+  limits.message_bytes = config.count("ws.message_bytes");
+  limits.ping = config.seconds("ws.ping_s");
+  limits.idle = config.seconds("ws.idle_s");
+  return limits;
+}
+
+std::vector<std::string> process_environment() {
+  std::vector<std::string> lines;
+  for (char** at = environ; at != nullptr && *at != nullptr; ++at) lines.emplace_back(*at);
+  return lines;
+}
+
+}  // namespace anchord::server
