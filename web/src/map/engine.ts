@@ -6,7 +6,7 @@ import Projection from 'ol/proj/Projection.js';
 import View from 'ol/View.js';
 import { magnification } from './enu';
 import { read_palette, type Palette } from './palette';
-import { draw_fast, draw_slow, to_px, type Camera, type Content } from './picture';
+import { draw_fast, draw_slow, draw_top, to_px, type Camera, type Content } from './picture';
 
 export type Mode = 'fit' | 'follow' | 'free';
 export interface MapView {
@@ -27,7 +27,7 @@ export interface MapHooks {
 const ENU = new Projection({ code: 'anchord:enu', units: 'm', extent: [-2e5, -2e5, 2e5, 2e5] });
 const reduced = matchMedia('(prefers-reduced-motion: reduce)');
 
-export function open_map(target: HTMLElement, overlay: HTMLCanvasElement, hooks: MapHooks): MapView {
+export function open_map(target: HTMLElement, overlay: HTMLCanvasElement, top: HTMLCanvasElement, hooks: MapHooks): MapView {
   let palette: Palette = read_palette();
   let mode: Mode = 'fit';
   let magnified = 1;
@@ -57,6 +57,8 @@ export function open_map(target: HTMLElement, overlay: HTMLCanvasElement, hooks:
       const cam = camera(), c = sized(slow, cam), content = hooks.content();
       magnified = magnification(content.anchors.flatMap((a) => (a.ellipse95 && a.status !== 'ambiguous' ? [a.ellipse95.major_m] : [])), cam.px_per_m);
       if (c) draw_slow(c, palette, cam, content, magnified);
+      const t = sized(top, cam);
+      if (t) draw_top(t, palette, cam, content);
       hooks.camera_changed(cam.px_per_m, magnified);
       dirty = true;
       return slow;

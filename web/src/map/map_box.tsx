@@ -12,7 +12,7 @@ export const current_map: { view: MapView | null } = { view: null };
 interface Props { content: () => Content; onSelect: (anchor: string) => void; label: string; follow: boolean; version: unknown }
 
 export function MapBox({ content, onSelect, label, follow, version }: Props) {
-  const target = useRef<HTMLDivElement>(null), overlay = useRef<HTMLCanvasElement>(null), map = useRef<MapView | null>(null);
+  const target = useRef<HTMLDivElement>(null), overlay = useRef<HTMLCanvasElement>(null), top = useRef<HTMLCanvasElement>(null), map = useRef<MapView | null>(null);
   const latest = useRef({ content, onSelect });
   latest.current = { content, onSelect };
   const [mode, set_mode] = useState<Mode>('fit');
@@ -22,8 +22,8 @@ export function MapBox({ content, onSelect, label, follow, version }: Props) {
   useEffect(() => {
     let gone = false;
     import('./engine').then(({ open_map }) => {
-      if (gone || !target.current || !overlay.current) return;
-      map.current = open_map(target.current, overlay.current, {
+      if (gone || !target.current || !overlay.current || !top.current) return;
+      map.current = open_map(target.current, overlay.current, top.current, {
         content: () => latest.current.content(),
         selected: (id) => latest.current.onSelect(id),
         mode_changed: set_mode,
@@ -46,7 +46,8 @@ export function MapBox({ content, onSelect, label, follow, version }: Props) {
   return (
     <div class="mapbox" data-testid="map">
       <div class="mapcanvas" ref={target} tabindex={0} role="application" aria-label={label} />
-      <canvas class="overlay" ref={overlay} aria-hidden="true" />
+      <canvas class="overlay" ref={overlay} aria-hidden="true" data-testid="range-lines" />
+      <canvas class="overlay" ref={top} aria-hidden="true" data-testid="anchor-ellipses" />
       {failed && <p class="mapfail">The map could not be loaded; everything is in the tables. Reload to try again.</p>}
       <div class="mapui">
         <div class="mgrp">

@@ -1,4 +1,4 @@
-/// What is drawn, given a camera: the slow picture (grid, anchors, ellipses) and the fast one (trail, ranges, drone).
+/// What is drawn, given a camera, from below: the slow picture (grid, ellipses), the fast one (trail, ranges, drone), the top (symbols, labels).
 import type { EstimateMsg, FixClass, Vec3 } from '../live/messages';
 import { interpolated, range_class, type Scene } from '../state/scene';
 import { accuracy, age, percent } from '../ui/format';
@@ -20,26 +20,34 @@ export interface Content {
 const RANGE_STALE_MS = 2000, POSE_STALE_MS = 1000, TRAIL_US = 120_000_000;
 const symbol_r = (p: Palette): number => p.rem * 0.47;
 
+/// Grid and ellipses, below everything that moves.
 export function draw_slow(c: Ctx, p: Palette, cam: Camera, content: Content, magnified: number): void {
   c.fillStyle = p.map;
   c.fillRect(0, 0, cam.w, cam.h);
   grid(c, p, cam);
   const r = symbol_r(p);
-  const placed = content.anchors.filter((a) => a.enu_m);
-  const taken: Box[] = [];
-  for (const a of placed) {
-    const [x, y] = to_px(cam, a.enu_m!), colour = status_colour(p, a.status);
-    taken.push({ x: x - r - 2, y: y - r - 2, w: 2 * r + 4, h: 2 * r + 4 });
+  for (const a of content.anchors) {
+    if (!a.enu_m) continue;
+    const [x, y] = to_px(cam, a.enu_m), colour = status_colour(p, a.status);
     const scale = cam.px_per_m * magnified;
     if (a.mirror?.enu_m) {
       const [mx, my] = to_px(cam, a.mirror.enu_m);
       mirror_link(c, p, x, y, mx, my);
-      if (a.ellipse95) ellipse_at(c, p, mirrored(a, scale), mx, my, scale, colour, true);
+      if (a.ellipse95) ellipse_at(c, p, mirrored(a), mx, my, scale, colour, true);
       c.save(); c.strokeStyle = colour; c.lineWidth = 1.6; c.setLineDash([3, 3]); c.beginPath(); c.arc(mx, my, r * 0.8, 0, Math.PI * 2); c.stroke(); c.restore();
-      taken.push({ x: mx - r, y: my - r, w: 2 * r, h: 2 * r });
     }
     // An ellipse smaller than its symbol would only blur it.
     if (a.ellipse95 && a.ellipse95.major_m * scale > r) ellipse_at(c, p, a.ellipse95, x, y, scale, colour, false);
+  }
+}
+/// Symbols and labels, above the ranges: a line must never strike out a name.
+export function draw_top(c: Ctx, p: Palette, cam: Camera, content: Content): void {
+  c.clearRect(0, 0, cam.w, cam.h);
+  const r = symbol_r(p), placed = content.anchors.filter((a) => a.enu_m), taken: Box[] = [];
+  const block = (m: Vec3): void => { const [x, y] = to_px(cam, m); taken.push({ x: x - r - 2, y: y - r - 2, w: 2 * r + 4, h: 2 * r + 4 }); };
+  for (const a of placed) {
+    block(a.enu_m!);
+    if (a.mirror?.enu_m) block(a.mirror.enu_m);
   }
   for (const a of placed) anchor_symbol(c, p, a.status, ...to_px(cam, a.enu_m!), r);
   const first = placed.filter((a) => a.anchor === content.selected), rest = placed.filter((a) => a.anchor !== content.selected);
@@ -52,7 +60,7 @@ export function draw_slow(c: Ctx, p: Palette, cam: Camera, content: Content, mag
   }
 }
 /// The twin's ellipse is the same one, reflected in the line between the two.
-function mirrored(a: EstimateMsg, _scale: number): NonNullable<EstimateMsg['ellipse95']> {
+function mirrored(a: EstimateMsg): NonNullable<EstimateMsg['ellipse95']> {
   const [e, n] = [a.mirror!.enu_m![0] - a.enu_m![0], a.mirror!.enu_m![1] - a.enu_m![1]];
   const axis_deg = Math.atan2(e, n) * 180 / Math.PI + 90;
   return { ...a.ellipse95!, azimuth_deg: 2 * axis_deg - a.ellipse95!.azimuth_deg };

@@ -19,7 +19,7 @@ export function Convergence({ anchor }: { anchor: string }) {
     let gone = false;
     void import('./plot').then(({ make_convergence }) => {
       if (gone || !box.current) return;
-      plot.current = make_convergence(box.current, { ink: css('--ink'), text: css('--ink-3'), line: css('--line'), ok: css('--ok'), font: css('--font'), width: Number(css('--lw-data')) || 2, rem: parseFloat(getComputedStyle(document.documentElement).fontSize) }, DONE_SIGMA_M);
+      plot.current = make_convergence(box.current, { ink: css('--ink'), ground: css('--panel'), text: css('--ink-3'), line: css('--line'), ok: css('--ok'), font: css('--font'), width: Number(css('--lw-data')) || 2, rem: parseFloat(getComputedStyle(document.documentElement).fontSize) }, DONE_SIGMA_M);
       draw();
     });
     const resize = new ResizeObserver(() => { if (box.current && plot.current) plot.current.setSize({ width: box.current.clientWidth, height: box.current.clientHeight }); });

@@ -1,9 +1,15 @@
 import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
 
-interface Look { ink: string; text: string; line: string; ok: string; font: string; width: number; rem: number }
+interface Look { ink: string; ground: string; text: string; line: string; ok: string; font: string; width: number; rem: number }
 
 const words = (m: number): string => (m >= 1 ? `${m} m` : m >= 0.01 ? `${Math.round(m * 100)} cm` : `${Math.round(m * 1000)} mm`);
+
+const decades = (min: number, max: number): number[] => {
+  const out: number[] = [];
+  for (let e = Math.ceil(Math.log10(min) - 1e-9); e <= Math.log10(max) + 1e-9; e++) out.push(10 ** e);
+  return out;
+};
 
 export function make_convergence(box: HTMLElement, look: Look, limit_m: number): uPlot {
   const font = `${look.rem * 0.75}px ${look.font}`;
@@ -13,7 +19,7 @@ export function make_convergence(box: HTMLElement, look: Look, limit_m: number):
     scales: { x: { time: false }, y: { distr: 3, log: 10, range: (_u, min, max) => [10 ** Math.floor(Math.log10(Math.min(min || 1, limit_m * 0.6))), 10 ** Math.ceil(Math.log10(Math.max(max || 1, 1)))] } },
     axes: [
       { stroke: look.text, font, size: look.rem * 1.4, gap: 2, grid: { show: false }, ticks: { show: false }, values: (_u, v) => v.map((x) => `${x} s`) },
-      { stroke: look.text, font, size: look.rem * 3, gap: 4, grid: { stroke: look.line, width: 1 }, ticks: { show: false }, values: (_u, v) => v.map((x) => (x && Math.abs(Math.log10(x) % 1) < 1e-9 ? words(x) : '')) },
+      { stroke: look.text, font, size: look.rem * 3, gap: 4, splits: (_u, _i, min, max) => decades(min, max), grid: { stroke: look.line, width: 1 }, ticks: { show: false }, values: (_u, v) => v.map(words) },
     ],
     series: [{}, { stroke: look.ink, width: look.width, points: { show: false }, spanGaps: false }],
     hooks: {
@@ -23,6 +29,8 @@ export function make_convergence(box: HTMLElement, look: Look, limit_m: number):
         c.strokeStyle = c.fillStyle = look.ok; c.lineWidth = 1.5 * px; c.setLineDash([6 * px, 3 * px]);
         c.beginPath(); c.moveTo(u.bbox.left, y); c.lineTo(u.bbox.left + u.bbox.width, y); c.stroke();
         c.font = `500 ${look.rem * 0.75 * px}px ${look.font}`; c.textAlign = 'right'; c.textBaseline = 'bottom';
+        c.setLineDash([]); c.strokeStyle = look.ground; c.lineWidth = 4 * px; c.lineJoin = 'round';
+        c.strokeText(`done below ${words(limit_m)}`, u.bbox.left + u.bbox.width, y - 2 * px);
         c.fillText(`done below ${words(limit_m)}`, u.bbox.left + u.bbox.width, y - 2 * px);
         c.restore();
       }],

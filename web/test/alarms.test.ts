@@ -1,0 +1,77 @@
+import { describe, expect, it } from 'vitest';
+import { AlarmLimiter, Conditions, merged, type Alarm, type Situation } from '../src/ui/alarm_rules';
+
+const calm: Situation = { now_ms: 0, link: 'live', silence_ms: 0, recording: true, fix: 'fixed', correction_age_s: 1, range_silence_ms: 0 };
+const ids = (list: readonly Alarm[]): string[] => list.map((a) => a.id);
+
+describe('Conditions', () => {
+  it('say nothing while all is well', () => expect(new Conditions().standing(calm)).toEqual([]));
+  it('raise rtk.lost after 2 s below FLOAT and rtk.float after 5 s of FLOAT', () => {
+    const c = new Conditions();
+    expect(ids(c.standing({ ...calm, fix: 'single' }))).toEqual([]);
+    expect(ids(c.standing({ ...calm, fix: 'single', now_ms: 2000 }))).toEqual(['rtk.lost']);
+    expect(ids(c.standing({ ...calm, fix: 'float', now_ms: 3000 }))).toEqual([]);
+    expect(ids(c.standing({ ...calm, fix: 'float', now_ms: 8000 }))).toEqual(['rtk.float']);
+    expect(ids(c.standing({ ...calm, now_ms: 8100 }))).toEqual([]);
+  });
+  it('raise uwb.none after 5 s without a range, but not before the first one', () => {
+    const c = new Conditions();
+    expect(ids(c.standing({ ...calm, range_silence_ms: Infinity }))).toEqual([]);
+    expect(ids(c.standing({ ...calm, range_silence_ms: 5001 }))).toEqual(['uwb.none']);
+  });
+  it('raise link.lost only while a flight is recorded, and keep the rest as last heard', () => {
+    const c = new Conditions();
+    c.standing({ ...calm, fix: 'none' });
+    c.standing({ ...calm, fix: 'none', now_ms: 2500 });
+    const lost = c.standing({ ...calm, fix: 'none', link: 'lost', silence_ms: 6000, now_ms: 9000 });
+    expect(ids(lost)).toEqual(['link.lost', 'rtk.lost']);
+    expect(lost[0]!.since_ms).toBe(3000);
+    expect(lost[1]!.title).toContain('when last heard');
+    expect(new Conditions().standing({ ...calm, link: 'lost', recording: false })).toEqual([]);
+  });
+  it('are listed once per id with the word of the server, critical first', () => {
+    const own = new Conditions();
+    own.standing({ ...calm, fix: 'none' });
+    const list = merged(own.standing({ ...calm, fix: 'none', now_ms: 3000 }), [
+      { id: 'disk.low', priority: 'warning', since_us: 0, text: 'Disk is low', acknowledged: false }, { id: 'rtk.lost', priority: 'critical', since_us: 1_000_000, text: 'RTK lost at the server', acknowledged: true },
+    ], 3_000_000, 3000);
+    expect(list.map((a) => [a.id, a.title, a.acknowledged])).toEqual([['rtk.lost', 'RTK lost at the server', true], ['disk.low', 'Disk is low', false]]);
+    expect(list[0]!.since_ms).toBe(1000);
+  });
+});
+
+describe('AlarmLimiter', () => {
+  const alarm = (id: string, priority: Alarm['priority'], acknowledged = false): Alarm => ({ id, priority, title: id, advice: '', since_ms: 0, acknowledged });
+  const [critical, warning] = [alarm('link.lost', 'critical'), alarm('rtk.float', 'warning')];
+  it('repeats a critical alarm every 10 s and a warning never while it stands', () => {
+    const l = new AlarmLimiter();
+    expect(l.due([critical], 0)).toBe(critical);
+    expect(l.due([critical], 9999)).toBeNull();
+    expect(l.due([critical], 10_000)).toBe(critical);
+    const w = new AlarmLimiter();
+    expect(w.due([warning], 0)).toBe(warning);
+    expect(w.due([warning], 60_000)).toBeNull();
+  });
+  it('keeps a flickering warning to once in 30 s', () => {
+    const l = new AlarmLimiter();
+    expect(l.due([warning], 0)).toBe(warning);
+    l.due([], 1000);
+    expect(l.due([warning], 2000)).toBeNull();
+    l.due([], 29_000);
+    expect(l.due([warning], 30_000)).toBe(warning);
+  });
+  it('sounds one at a time, the most urgent', () => expect(new AlarmLimiter().due([warning, critical], 0)).toBe(critical));
+  it('is quiet for advisories and for what was acknowledged', () => {
+    expect(new AlarmLimiter().due([alarm('ws.slow', 'advisory'), alarm('x', 'critical', true)], 0)).toBeNull();
+  });
+  it('is quiet while muted, and until the next critical when asked so', () => {
+    const l = new AlarmLimiter();
+    l.mute(120_000);
+    expect(l.due([critical], 0)).toBeNull();
+    expect(l.due([critical], 120_000)).toBe(critical);
+    const u = new AlarmLimiter();
+    u.mute_until_critical();
+    expect(u.due([warning], 0)).toBeNull();
+    expect(u.due([warning, critical], 1000)).toBe(critical);
+  });
+});

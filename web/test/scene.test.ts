@@ -1,0 +1,42 @@
+import { describe, expect, it } from 'vitest';
+import { pose, range, type RangeMsg } from '../src/live/messages';
+import { interpolated, range_class, rate_hz, Scene } from '../src/state/scene';
+
+const at = (t_s: number, e: number, extra: object = {}) => pose({ mission: 'm', t_us: t_s * 1e6, enu_m: [e, 0, 5], fix: 'fixed', heading_deg: 350, ...extra })!;
+const heard = (t_s: number, d: number): RangeMsg => range({ t_us: t_s * 1e6, mission: 'm', anchor: '0x1', distance_m: d, used: true })!;
+
+describe('Scene', () => {
+  it('does not fill the trail while the drone stands still', () => {
+    const s = new Scene('m');
+    for (let i = 0; i < 100; i++) s.add_pose(at(i * 0.01, 0.0001 * i), i);
+    expect(s.trail.length).toBe(1);
+  });
+  it('starts the trail anew when a looped replay jumps back', () => {
+    const s = new Scene('m');
+    s.add_pose(at(0, 0), 0); s.add_pose(at(100, 50), 100); s.add_pose(at(0, 0), 200);
+    expect(s.trail).toHaveLength(1);
+  });
+  it('keeps 20 s of ranges and knows their rate', () => {
+    const s = new Scene('m');
+    for (let i = 0; i <= 300; i++) s.add_range(heard(i / 10, 3), i);
+    const row = s.ranges.get('0x1')!;
+    expect(row.recent[0]!.t_us).toBe(10e6);
+    expect(rate_hz(row)).toBeCloseTo(10, 6);
+  });
+  it('does not let an older range replace a newer one', () => {
+    const s = new Scene('m');
+    s.add_range(heard(2, 5), 0); s.add_range(heard(1, 9), 1);
+    expect(s.ranges.get('0x1')!.last.distance_m).toBe(5);
+  });
+  it('moves the drone evenly between two poses and through north the short way', () => {
+    const s = new Scene('m');
+    s.add_pose(at(0, 0), 0); s.add_pose(at(0.1, 1, { heading_deg: 10 }), 100);
+    const half = interpolated(s, 150)!;
+    expect(half.body[0]).toBeCloseTo(0.5, 9);
+    expect(half.heading_deg).toBeCloseTo(360, 9);
+    expect(interpolated(s, 5000)!.body[0]).toBe(1);
+  });
+  it('calls a range unclear without a model or between 0.4 and 0.6', () => {
+    expect([null, 0.4, 0.5, 0.6, 0.61, 0.39].map(range_class)).toEqual(['unclear', 'unclear', 'unclear', 'unclear', 'los', 'nlos']);
+  });
+});
