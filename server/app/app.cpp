@@ -10,7 +10,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "api/http/problem.hpp"
+#include "api/http/router.hpp"
+#include "api/routes/access_routes.hpp"
 #include "server/app/front_door.hpp"
 #include "server/app/metrics.hpp"
 #include "server/http/http_server.hpp"
@@ -18,6 +19,7 @@
 #include "server/http/text.hpp"
 #include "server/runtime/logging.hpp"
 #include "server/runtime/worker_pool.hpp"
+#include "server/storage/sqlite_database.hpp"
 
 namespace anchord::server {
 namespace {
@@ -83,8 +85,7 @@ Result<void> write_private(const fs::path& file, const std::string& text) {
 struct App::State {
   Config config;
   SystemClock clock;
-  std::unique_ptr<TokenStore> tokens;
-  std::unique_ptr<AccessStore> access_store;
+  std::unique_ptr<Database> database;
   std::unique_ptr<Metrics> metrics;
   std::unique_ptr<api::AccessService> access;
   std::unique_ptr<WorkerPool> pool, stream_pool;
@@ -101,28 +102,7 @@ struct App::State {
 
 namespace {
 
-/// Until the database is composed in: no tokens, no log.
-class NoTokens final : public TokenStore {
- public:
-  Result<void> insert(const Token&) override { return boost::outcome_v2::success(); }
-  Result<Token> token(const TokenId&) override { return make_error(Errc::not_found, "no token"); }
-  Result<Token> token_by_secret(std::string_view) override { return make_error(Errc::not_found, "no token"); }
-  Result<std::vector<Token>> tokens() override { return std::vector<Token>{}; }
-  Result<void> revoke(const TokenId&, UtcTime) override { return make_error(Errc::not_found, "no token"); }
-  Result<void> touch(const TokenId&, UtcTime) override { return boost::outcome_v2::success(); }
-};
-class NoLog final : public AccessStore {
- public:
-  Result<std::optional<StoredAnswer>> answer(std::string_view, std::string_view) override {
-    return std::optional<StoredAnswer>{};
-  }
-  Result<void> keep_answer(const StoredAnswer&) override { return boost::outcome_v2::success(); }
-  Result<std::size_t> drop_answers_before(UtcTime) override { return std::size_t{0}; }
-  Result<void> append_audit(const AuditEntry&) override { return boost::outcome_v2::success(); }
-  Result<std::vector<AuditEntry>> audit(std::size_t) override { return std::vector<AuditEntry>{}; }
-  Result<void> verify_audit() override { return boost::outcome_v2::success(); }
-};
-
+/// What the server answers while no application is composed in.
 void add_probes(api::Router& router) {
   for (const char* path : {"/healthz", "/readyz"}) {
     router.add({api::Method::get, path, api::Access::open(), [](const api::Request&) {
@@ -132,6 +112,16 @@ void add_probes(api::Router& router) {
                   return response;
                 }});
   }
+}
+
+Result<std::unique_ptr<Database>> open_store(const Config& config) {
+  StorageOptions options;
+  options.data_dir = config.text("data_dir");
+  const std::string& word = config.text("storage.synchronous");
+  options.synchronous = word == "normal"  ? Synchronous::normal
+                        : word == "extra" ? Synchronous::extra
+                                          : Synchronous::full;
+  return open_database(options);
 }
 
 }  // namespace
@@ -189,15 +179,12 @@ Result<std::unique_ptr<App>> App::start(const Config& config) {
   auto& s = *state;
   s.config = config;
   s.data_dir = config.text("data_dir");
-  std::error_code error;
-  fs::create_directories(s.data_dir, error);
-  if (error) return make_error(Errc::storage_unavailable, s.data_dir.string() + ": " + error.message());
-  s.tokens = std::make_unique<NoTokens>();
-  s.access_store = std::make_unique<NoLog>();
+  BOOST_OUTCOME_TRY(s.database, open_store(config));
   s.metrics = std::make_unique<Metrics>(ANCHORD_VERSION);
   api::AccessOptions access_options;
   access_options.auth_off = config.text("auth") == "off";
-  s.access = std::make_unique<api::AccessService>(*s.tokens, *s.access_store, s.clock, access_options);
+  s.access = std::make_unique<api::AccessService>(s.database->tokens(), s.database->access(), s.clock,
+                                                  access_options);
   BOOST_OUTCOME_TRYV(s.access->load());
   BOOST_OUTCOME_TRYV(s.first_token());
   s.pool =
@@ -205,6 +192,7 @@ Result<std::unique_ptr<App>> App::start(const Config& config) {
   s.stream_pool = std::make_unique<WorkerPool>("anchord-upload", config.count("http.upload_workers"), 64);
   s.router = std::make_unique<api::Router>();
   add_probes(*s.router);
+  api::add_access_routes(*s.router, *s.access);
   FrontDoorOptions door;
   door.hosts = host_policy(config);
   door.rate_per_s = static_cast<double>(config.count("rate.per_s"));
@@ -233,6 +221,11 @@ void App::stop() {
   if (s.pool) s.pool->stop();
   if (s.stream_pool) s.stream_pool->stop();
   step("workers");
+  s.http.reset();
+  s.door.reset();
+  s.access.reset();
+  s.database.reset();  // finishes queued writes, checkpoints, closes
+  step("database");
   std::error_code ignored;
   if (!s.urls.empty()) fs::remove(s.data_dir / k_address_file, ignored);
 }
