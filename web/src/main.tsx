@@ -1,7 +1,8 @@
+import { effect } from '@preact/signals';
 import { render } from 'preact';
 import { browser_environment } from './live/browser';
 import { LiveClient } from './live/client';
-import { refresh_me } from './state/session';
+import { me, refresh_me } from './state/session';
 import { connect, TOPICS } from './state/store';
 import { App } from './ui/app';
 import { on_key } from './ui/keyboard';
@@ -14,5 +15,10 @@ import './style/views.css';
 const client = new LiveClient(TOPICS, browser_environment());
 render(<App />, document.getElementById('app')!);
 addEventListener('keydown', on_key);
-void refresh_me();
-connect(client, () => void refresh_me());
+/// Signed out, the stream rests until somebody signs in; the last picture stays.
+let started = false;
+void refresh_me().then(() => effect(() => {
+  if (me.value === null) return client.pause();
+  if (!started) connect(client, () => void refresh_me());
+  started = true;
+}));

@@ -66,6 +66,12 @@ export class LiveClient implements LiveSource {
     this.drop_socket();
     this.connect();
   }
+  /// No attempts until retryNow(): the server will not talk to us, and asking again only fills its log.
+  pause(): void {
+    this.cancel_retry?.();
+    this.retry_at_ms = null;
+    this.drop_socket();
+  }
   now_us(): number {
     return this.env.wall_us() + this.offset_us();
   }

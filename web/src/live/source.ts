@@ -21,6 +21,7 @@ export interface LiveSource {
   start(sink: LiveSink): void;
   stop(): void;
   retryNow(): void;
+  pause(): void;
   /// Microseconds since 1970 by the source's clock.
   now_us(): number;
   /// Milliseconds of silence, and until the next attempt (null while connected).

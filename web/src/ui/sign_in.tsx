@@ -2,7 +2,7 @@ import { signal } from '@preact/signals';
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { ApiError } from '../api/client';
 import { me, sign_in, sign_out } from '../state/session';
-import { live_source } from '../state/store';
+import { live_source, synced } from '../state/store';
 import { Icon } from './marks';
 
 const shown = signal(false);
@@ -42,7 +42,7 @@ export function SignIn() {
         </>
       ) : (
         <form onSubmit={(e) => void submit(e)}>
-          <p>What you see is the last picture. Paste a token to go on; <code>anchord token create</code> makes one.</p>
+          <p>{synced.value ? 'What you see is the last picture. ' : ''}Paste a token to go on; <code>anchord token create</code> makes one.</p>
           <label class="lab" for="token">Token</label>
           <input id="token" ref={input} type="password" autocomplete="current-password" spellcheck={false} placeholder="anc_…" data-testid="token" aria-describedby="token-problem" />
           <p id="token-problem" class="bad" role="status">{problem}</p>

@@ -35,7 +35,7 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
   const list = alarms.value, worst = list[0]?.priority;
   return {
     link: {
-      ...link_look, word: link.value === 'connecting' ? 'CONNECTING' : link.value.toUpperCase(), extra: link.value === 'lost' ? clock(silence / 1000, true) : '',
+      ...link_look, word: me.value === null ? 'SIGNED OUT' : link.value === 'connecting' ? 'CONNECTING' : link.value.toUpperCase(), extra: link.value === 'lost' ? clock(silence / 1000, true) : '',
       card: <><p>{{ connecting: 'Waiting for the first answer of anchord.', live: 'Heartbeats arrive every second.', late: 'No heartbeat for more than 2 s.', lost: 'No heartbeat for more than 5 s. Values are the last known; the page tries again by itself.' }[link.value]}</p>{sys && <p>{fixed(sys.ws_clients, 0)} screens connected, {fixed(sys.queue_depth, 0)} rows waiting to be stored.</p>}</>,
     },
     rtk: {
@@ -43,7 +43,7 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
       card: r ? <><p>{r.fix === 'fixed' ? (old ? 'Fixed, but its corrections are more than 5 s old.' : 'Centimetre positions.') : r.fix === 'float' ? 'Decimetre positions: ranges count less until FIX returns.' : 'No RTK: ranges are recorded, their positions are too poor to use.'}</p><p>{fixed(r.satellites, 0)} satellites, corrections {fixed(r.correction_age_s, 1)} s old, σ E, N, U {r.sigma_m ? r.sigma_m.map((x) => millimetres(x)).join(', ') : '–'} mm (1σ).</p></> : <p>No position has been received for this flight.</p>,
     },
     uwb: {
-      ...(rows.length === 0 || uwb_stale ? look('off') : heard === 0 ? look('bad') : heard < all_seen ? look('ok') : look('ok')), stale: uwb_stale, word: `${uwb_stale ? all_seen : heard}/${all_seen}`, extra: uwb_stale ? aged(now - (scene?.range_at_ms ?? 0)) : '',
+      ...(rows.length === 0 || uwb_stale ? look('off') : heard === 0 ? look('bad') : look('ok')), stale: uwb_stale, word: !all_seen ? 'none' : `${uwb_stale ? all_seen : heard}/${all_seen}`, extra: uwb_stale ? aged(now - (scene?.range_at_ms ?? 0)) : '',
       card: <p>{rows.length ? `${heard} of ${all_seen} anchors heard in the last 2 s, ${fixed(mission?.range_rate_hz, 0)} ranges a second.` : 'No range has been received for this flight.'}{devices.value.some((d) => d.kind === 'tag') && ` Tags: ${devices.value.filter((d) => d.kind === 'tag').map((d) => `${d.network_id} ${d.state}`).join(', ')}.`}</p>,
     },
     drone: {
@@ -51,7 +51,7 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
       card: <p>{pose ? 'Height above the origin of this flight, and speed over ground. Battery and mode come with the aircraft link, which this flight does not have.' : 'No position of the aircraft has been received.'}</p>,
     },
     rec: {
-      ...(running ? (sys && !sys.recording ? look('caution') : look('ok')) : look('off')), stale: lost && running, word: running ? clock(flown_s) : mission ? 'off' : 'off', extra: lost && running ? 'not known' : running || !mission ? '' : mission.state,
+      ...(running ? (sys && !sys.recording ? look('caution') : look('ok')) : look('off')), stale: lost && running, word: running ? clock(flown_s) : 'off', extra: lost && running ? 'not known' : running || !mission ? '' : mission.state,
       card: <><p>{running ? `${mission.name}: ${mission.n_ranges} ranges and ${mission.n_fixes} fixes stored.` : 'No flight is being recorded.'}</p>{sys && <p>Database {bytes(sys.db_bytes)}, {bytes(sys.disk_free_bytes)} free; a stored row survives {sys.synchronous === 'full' ? 'power loss' : 'a crash of the program'}.</p>}</>,
     },
     alarms: {

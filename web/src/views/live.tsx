@@ -2,6 +2,7 @@
 import { useEffect } from 'preact/hooks';
 import { MapBox } from '../map/map_box';
 import type { Content } from '../map/picture';
+import { me } from '../state/session';
 import { chosen_anchor, chosen_mission, current_mission, current_scene, link, mission_id, now_ms, ordered_missions, server_now_us, synced, tick } from '../state/store';
 import { bearing, clock, fixed, grouped, millimetres } from '../ui/format';
 import { Chip, Q } from '../ui/marks';
@@ -40,7 +41,7 @@ export function Live() {
 }
 
 function Waiting() {
-  return <div class="empty"><p role="status">{link.value === 'lost' || link.value === 'late' ? 'Waiting for anchord to answer.' : 'Loading the flights of this server.'}</p></div>;
+  return <div class="empty"><p role="status">{me.value === null ? 'Sign in to see the flights of this server.' : link.value === 'lost' || link.value === 'late' ? 'Waiting for anchord to answer.' : 'Loading the flights of this server.'}</p></div>;
 }
 
 function Progress() {
