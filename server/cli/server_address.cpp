@@ -1,0 +1,30 @@
+#include "server/cli/server_address.hpp"
+
+#include <cstdlib>
+#include <fstream>
+
+#include "server/app/app.hpp"
+
+namespace anchord::cli {
+namespace {
+
+std::string first_line(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  std::string line;
+  std::getline(in, line);
+  return line;
+}
+
+}  // namespace
+
+std::optional<std::string> running_server(const std::filesystem::path& data_dir) {
+  auto line = first_line(data_dir / server::k_address_file);
+  return line.empty() ? std::nullopt : std::optional(std::move(line));
+}
+
+std::string own_token(const std::filesystem::path& data_dir) {
+  if (const char* given = std::getenv("ANCHORD_TOKEN")) return given;
+  return first_line(data_dir / server::k_admin_token_file);
+}
+
+}  // namespace anchord::cli

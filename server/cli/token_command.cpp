@@ -1,0 +1,155 @@
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "api/services/access.hpp"
+#include "server/cli/commands.hpp"
+#include "server/cli/server_address.hpp"
+#include "server/http/http_client.hpp"
+#include "server/runtime/logging.hpp"
+#include "server/storage/sqlite_database.hpp"
+
+namespace anchord::cli {
+namespace {
+
+struct Options {
+  std::string data_dir{"anchord-data"}, url, name, expires, id;
+  std::vector<std::string> roles;
+};
+
+/// "365d", "12h", or a UTC time. Errors: invalid_argument.
+Result<std::optional<UtcTime>> expiry(const std::string& text, UtcTime now) {
+  if (text.empty()) return std::optional<UtcTime>{};
+  const char unit = text.back();
+  if (unit == 'd' || unit == 'h') {
+    char* end = nullptr;
+    const long n = std::strtol(text.c_str(), &end, 10);
+    if (n < 1 || n > 100'000 || end != text.c_str() + text.size() - 1) {
+      return make_error(Errc::invalid_argument,
+                        "--expires " + text + ": like 365d, 12h or 2027-01-31T00:00:00Z");
+    }
+    return std::optional(UtcTime{now.ns + n * (unit == 'd' ? 86'400LL : 3'600LL) * 1'000'000'000LL});
+  }
+  BOOST_OUTCOME_TRY(const auto time, parse_rfc3339(text));
+  return std::optional(time);
+}
+
+int fail(const std::string& message, int code = 1) {
+  std::fprintf(stderr, "anchord: %s\n", message.c_str());
+  return code;
+}
+
+/// A running server owns the folder: ask it. Else open the folder ourselves.
+int through_server(const Options& options, const std::string& url, std::string_view method,
+                   const std::string& target, const std::string& body) {
+  auto client = server::HttpClient::to(url);
+  if (!client) return fail(client.error().message, 2);
+  const std::string token = own_token(options.data_dir);
+  if (!token.empty()) client.value().set_header("Authorization", "Bearer " + token);
+  const auto answer = client.value().call(method, target, body);
+  if (!answer) return fail(answer.error().message);
+  if (answer.value().status >= 400) return fail(answer.value().body);
+  if (!answer.value().body.empty()) std::printf("%s\n", answer.value().body.c_str());
+  return 0;
+}
+
+std::optional<std::string> server_of(const Options& options) {
+  if (!options.url.empty()) return options.url;
+  const auto url = running_server(options.data_dir);
+  if (!url) return std::nullopt;
+  // The address may be left over from a crash.
+  auto client = server::HttpClient::to(*url, std::chrono::seconds(2));
+  if (!client || !client.value().call("GET", "/healthz")) return std::nullopt;
+  return url;
+}
+
+template <class Act>
+int with_folder(const Options& options, Act act) {
+  StorageOptions storage;
+  storage.data_dir = options.data_dir;
+  auto database = open_database(storage);
+  if (!database) return fail(database.error().message);
+  const SystemClock clock;
+  api::AccessService access(database.value()->tokens(), database.value()->access(), clock);
+  if (const auto loaded = access.load(); !loaded) return fail(loaded.error().message);
+  return act(access);
+}
+
+int create(const Options& options) {
+  const auto expires = expiry(options.expires, SystemClock().now());
+  if (!expires) return fail(expires.error().message, 2);
+  if (const auto url = server_of(options)) {
+    std::string roles;
+    for (const auto& role : options.roles)
+      roles += (roles.empty() ? "\"" : ",\"") + server::json_escaped(role) + "\"";
+    std::string body = R"({"name":")" + server::json_escaped(options.name) + R"(","roles":[)" + roles + "]";
+    if (expires.value()) body += R"(,"expires_at":")" + to_rfc3339(*expires.value()) + "\"";
+    return through_server(options, *url, "POST", "/api/v1/tokens", body + "}");
+  }
+  return with_folder(options, [&](api::AccessService& access) {
+    const api::Principal who{"command line", "command line", {}};
+    const auto made = access.create_token(options.name, options.roles, expires.value(), who, "local");
+    if (!made) return fail(made.error().message, 2);
+    std::fprintf(stderr, "token %s, shown once:\n", to_string(made.value().token.id).c_str());
+    std::printf("%s\n", made.value().text.c_str());
+    return 0;
+  });
+}
+
+int list(const Options& options) {
+  if (const auto url = server_of(options)) return through_server(options, *url, "GET", "/api/v1/tokens", {});
+  return with_folder(options, [](api::AccessService& access) {
+    for (const auto& token : access.tokens()) {
+      std::string roles;
+      for (const auto& role : token.roles) roles += (roles.empty() ? "" : ",") + role;
+      const std::string state = token.revoked   ? "revoked " + to_rfc3339(*token.revoked)
+                                : token.expires ? "expires " + to_rfc3339(*token.expires)
+                                                : "no expiry";
+      std::printf("%s  %-20s  %s  %s\n", to_string(token.id).c_str(), token.name.c_str(), roles.c_str(),
+                  state.c_str());
+    }
+    return 0;
+  });
+}
+
+int revoke(const Options& options) {
+  const auto id = parse_uuid(options.id);
+  if (!id) return fail(id.error().message, 2);
+  if (const auto url = server_of(options)) {
+    return through_server(options, *url, "DELETE", "/api/v1/tokens/" + options.id, {});
+  }
+  return with_folder(options, [&](api::AccessService& access) {
+    const api::Principal who{"command line", "command line", {}};
+    const auto done = access.revoke_token(TokenId{id.value()}, who, "local");
+    return done ? 0 : fail(done.error().message);
+  });
+}
+
+}  // namespace
+
+void add_token_command(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("token", "Make, list and revoke access tokens");
+  command->require_subcommand(1);
+  const auto options = std::make_shared<Options>();
+  const auto common = [&](CLI::App* sub) {
+    sub->add_option("--data-dir", options->data_dir, "folder of the database [anchord-data]")
+        ->envname("ANCHORD_DATA_DIR");
+    sub->add_option("--url", options->url, "address of a running server (token in ANCHORD_TOKEN)");
+  };
+  auto* make = command->add_subcommand("create", "Make a token and print it, once");
+  common(make);
+  make->add_option("--name", options->name, "who or what it is for")->required();
+  make->add_option("--role", options->roles,
+                   "viewer, integrator, gateway, engineer, operator, admin; may be repeated")
+      ->required();
+  make->add_option("--expires", options->expires, "like 365d, 12h or 2027-01-31T00:00:00Z [never]");
+  make->callback([&exit_code, options] { exit_code = create(*options); });
+  auto* show = command->add_subcommand("list", "List tokens (never their secrets)");
+  common(show);
+  show->callback([&exit_code, options] { exit_code = list(*options); });
+  auto* end = command->add_subcommand("revoke", "Revoke a token at once");
+  common(end);
+  end->add_option("id", options->id, "id of the token")->required();
+  end->callback([&exit_code, options] { exit_code = revoke(*options); });
+}
+
+}  // namespace anchord::cli
