@@ -54,7 +54,6 @@ class Application {
     std::function<StorageStatus()> storage_status{};
     std::function<std::string()> metrics_text{};  ///< Prometheus text of the server, appended to ours
     std::function<void(std::string_view request_id, std::string_view what)> log_fault{};
-    bool auth_off{false};
   };
 
   explicit Application(Deps deps);

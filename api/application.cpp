@@ -1,0 +1,128 @@
+#include "api/application.hpp"
+
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include "api/json/live_writer.hpp"
+#include "api/live/conversation.hpp"
+#include "api/live/hub.hpp"
+#include "api/routes/access_routes.hpp"
+#include "api/routes/routes.hpp"
+#include "core/ports/store.hpp"
+
+namespace anchord::api {
+
+struct Application::State {
+  explicit State(Deps d)
+      : deps(std::move(d)),
+        router(&deps.access_store, &deps.clock),
+        hub(deps.clock, "anchord " + deps.build.version),
+        events(hub, deps.clock),
+        missions({deps.missions, deps.measurements, deps.anchors, hub, events, deps.clock, deps.post}),
+        ingest(deps.measurements, missions),
+        calibrations({deps.measurements, deps.missions, deps.anchors, deps.jobs, hub, deps.clock}),
+        services{deps, hub, events, missions, ingest, calibrations} {
+    router.on_fault(deps.log_fault);
+    add_mission_routes(router, services);
+    add_measurement_routes(router, services);
+    add_site_routes(router, services);
+    add_anchor_routes(router, services);
+    add_calibration_routes(router, services);
+    if (deps.access != nullptr) add_access_routes(router, *deps.access);
+    add_system_routes(router, services);
+  }
+
+  void beat();
+  void second();
+
+  Deps deps;
+  Router router;
+  Hub hub;
+  EventLog events;
+  MissionService missions;
+  IngestService ingest;
+  CalibrationService calibrations;
+  Services services;
+  std::mutex mutex;
+  std::condition_variable stop_told;
+  bool stopping{false}, started{false};
+  std::thread heart;
+  std::optional<UtcTime> unwritable_since;
+};
+
+void Services::audit(const Request& request, std::string what, std::string result) const {
+  // Kept even when the store is in trouble is impossible; an answer that could not be audited is a 5xx.
+  value_or_problem(deps.access_store.append_audit({deps.clock.now(), request.principal.token_id, std::move(what), request.remote, std::move(result)}));
+}
+
+/// 50 ms: what was collected goes out, mission states each half second, the rest each second.
+void Application::State::beat() {
+  std::unique_lock lock(mutex);
+  for (std::uint64_t n = 1; !stopping; ++n) {
+    stop_told.wait_for(lock, std::chrono::milliseconds(50), [&] { return stopping; });
+    if (stopping) return;
+    lock.unlock();
+    hub.tick();
+    if (n % 10 == 0) missions.tick();
+    if (n % 20 == 0) second();
+    if (n % 72'000 == 0) {
+      // Hourly: answers to Idempotency-Key are promised for a day.
+      (void)deps.access_store.drop_answers_before({deps.clock.now().ns - 24LL * 3600 * 1'000'000'000}).has_value();
+    }
+    lock.lock();
+  }
+}
+
+void Application::State::second() {
+  const UtcTime now = deps.clock.now();
+  const StorageStatus storage = services.storage();
+  std::string json = R"({"t_us":)" + std::to_string(now.us()) + R"(,"recording":)" + (missions.recording() ? "true" : "false");
+  json += R"(,"queue_depth":)" + std::to_string(storage.queue_depth + missions.queued()) + R"(,"db_bytes":)" + std::to_string(storage.db_bytes);
+  json += R"(,"disk_free_bytes":)" + std::to_string(storage.disk_free_bytes) + R"(,"ws_clients":)" + std::to_string(hub.clients());
+  json += R"(,"synchronous":)" + json_text(storage.synchronous) + '}';
+  hub.publish(Topic::system, std::move(json), now.us());
+
+  if (!storage.writable && !unwritable_since) {
+    unwritable_since = now;
+    events.add("critical", "storage.unwritable", storage.reason);
+  } else if (storage.writable && unwritable_since) {
+    unwritable_since.reset();
+    events.add("info", "storage.writable", "measurements are stored again");
+  }
+  std::string alarms = "[";
+  if (unwritable_since) {
+    alarms += R"({"id":"storage.unwritable","priority":"critical","since_us":)" + std::to_string(unwritable_since->us()) + R"(,"text":)" + json_text(storage.reason) + R"(,"acknowledged":false})";
+  }
+  hub.publish(Topic::alarms, alarms + ']', now.us());
+}
+
+Application::Application(Deps deps) : state_(std::make_unique<State>(std::move(deps))) {}
+Application::~Application() { stop(); }
+
+Router& Application::router() { return state_->router; }
+Hub& Application::hub() { return state_->hub; }
+
+WsHandlerFactory Application::ws_factory() {
+  return [this](const Principal& who) { return std::make_unique<Conversation>(state_->hub, who); };
+}
+
+void Application::start() {
+  if (std::exchange(state_->started, true)) return;
+  state_->calibrations.start();
+  state_->heart = std::thread([this] { state_->beat(); });
+}
+
+void Application::stop() {
+  {
+    const std::scoped_lock lock(state_->mutex);
+    if (std::exchange(state_->stopping, true)) return;
+  }
+  state_->stop_told.notify_all();
+  if (state_->heart.joinable()) state_->heart.join();
+  state_->hub.shut_down();
+  state_->calibrations.stop();
+  state_->missions.stop();
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,192 @@
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "api/json/live_writer.hpp"
+#include "api/json/wire_resources.hpp"
+#include "core/localize/error_ellipse.hpp"
+
+namespace anchord::api {
+
+using Ordered = nlohmann::ordered_json;
+
+namespace {
+
+double rounded(double value, double steps) { return std::round(value * steps) / steps; }
+double metres(double value) { return rounded(value, 1e4); }
+
+Ordered vector_json(const Eigen::Vector3d& v) { return {metres(v.x()), metres(v.y()), metres(v.z())}; }
+
+/// RFC 7946: longitude, latitude, ellipsoidal height; 9 decimals are a tenth of a millimetre.
+Ordered coordinates(const Wgs84& at) { return {rounded(at.lon_deg, 1e9), rounded(at.lat_deg, 1e9), metres(at.height_m)}; }
+
+Ordered point(const std::optional<Wgs84>& at) {
+  if (!at) return nullptr;
+  return {{"type", "Point"}, {"coordinates", coordinates(*at)}};
+}
+
+template <class T>
+Ordered or_null(const std::optional<T>& value) {
+  if (!value) return nullptr;
+  return *value;
+}
+
+Ordered text_or_null(const std::string& text) {
+  if (text.empty()) return nullptr;
+  return text;
+}
+
+std::size_t n_refused(const Estimate& estimate) {
+  std::size_t sum = 0;
+  for (const auto& [reason, n] : estimate.refused) sum += n;
+  return sum;
+}
+
+Ordered accuracy(const Estimate& estimate, const std::optional<Site>& site) {
+  if (!estimate.best || !estimate.best->covariance_m2.allFinite()) return nullptr;
+  const auto& c = estimate.best->covariance_m2;
+  const ErrorEllipse ellipse = error_ellipse(c);
+  const auto sigma = [&](int i) { return metres(std::sqrt(std::max(0.0, c(i, i)))); };
+  Ordered relative{{"sigma_e_m", sigma(0)}, {"sigma_n_m", sigma(1)}, {"sigma_u_m", sigma(2)},
+                   {"cov_enu_m2", {c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)}},
+                   {"ellipse95", {{"major_m", metres(ellipse.major_m)}, {"minor_m", metres(ellipse.minor_m)}, {"azimuth_deg", rounded(ellipse.azimuth_deg, 10)}}},
+                   {"h95_m", metres(estimate.h95_m)}, {"v95_m", metres(estimate.v95_m)}};
+  Ordered absolute = nullptr;
+  if (site && site->base_sigma_m) {
+    // The base's own coordinates err alike for all anchors: 95 % of it in the plane is 2.4477 sigma, upwards 1.96.
+    const double s = *site->base_sigma_m;
+    absolute = {{"h95_m", metres(std::hypot(estimate.h95_m, 2.4477 * s))}, {"v95_m", metres(std::hypot(estimate.v95_m, 1.96 * s))}};
+  }
+  return {{"relative", std::move(relative)}, {"absolute", std::move(absolute)}};
+}
+
+Ordered quality(const Estimate& estimate) {
+  return {{"verdict", verdict_word(estimate.verdict)}, {"reason", estimate.reason}, {"gdop", or_null(estimate.gdop)}, {"gdop_trace", or_null(estimate.gdop_trace)},
+          {"n_ranges", estimate.n_used}, {"n_refused", n_refused(estimate)}, {"refused", estimate.refused},
+          {"rms_residual_m", estimate.best ? Ordered(metres(estimate.best->rms_residual_m)) : Ordered(nullptr)},
+          {"bias_m", or_null(estimate.bias_m)}, {"bias_sigma_m", or_null(estimate.bias_sigma_m)}, {"lag_s", or_null(estimate.lag_s)}, {"lag_sigma_s", or_null(estimate.lag_sigma_s)}};
+}
+
+Ordered mirror(const Estimate& estimate) {
+  if (!estimate.mirror) return nullptr;
+  return {{"coordinates", estimate.mirror->wgs84 ? coordinates(*estimate.mirror->wgs84) : Ordered(nullptr)}, {"enu_m", vector_json(estimate.mirror->position.m)},
+          {"probability", rounded(estimate.mirror->probability, 1e3)}};
+}
+
+/// Frame of the base as far as the site says; null is "unknown", never a guess.
+Ordered crs(const AnchorFeature& feature) {
+  if (feature.frame != TrackFrame::wgs84) return nullptr;
+  const Site site = feature.site.value_or(Site{});
+  return {{"id", "EPSG:4979"}, {"frame", text_or_null(site.crs_frame)}, {"epoch", or_null(site.crs_epoch)},
+          {"base", {{"source", text_or_null(site.base_source)}, {"sigma_m", or_null(site.base_sigma_m)}}}};
+}
+
+std::string number(double value, int decimals) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.*f", decimals, value);
+  return text;
+}
+
+}  // namespace
+
+Ordered estimate_result_json(const Estimate& estimate, TrackFrame frame, const std::optional<Site>& site) {
+  Ordered out{{"network_id", to_string(estimate.anchor)}, {"verdict", verdict_word(estimate.verdict)}, {"reason", estimate.reason}};
+  out["geometry"] = point(estimate.best ? estimate.best->wgs84 : std::nullopt);
+  out["enu_m"] = estimate.best ? vector_json(estimate.best->position.m) : Ordered(nullptr);
+  out["local_m"] = estimate.best && frame == TrackFrame::local ? vector_json(estimate.best->position.m) : Ordered(nullptr);
+  out["accuracy"] = accuracy(estimate, site);
+  out["quality"] = quality(estimate);
+  out["mirror"] = mirror(estimate);
+  return out;
+}
+
+Ordered anchor_feature_json(const AnchorFeature& feature) {
+  const Anchor& anchor = feature.anchor;
+  const auto& estimate = feature.estimate;
+  const bool placed = estimate && estimate->best;
+  Ordered external = Ordered::array(), missions = Ordered::array();
+  for (const auto& [system, id] : anchor.external_ids) external.push_back({{"system", system}, {"id", id}});
+  for (const auto& id : feature.missions) missions.push_back(to_string(id));
+  Ordered p{{"network_id", to_string(anchor.network_id)}, {"name", anchor.name}, {"status", feature.status}, {"revision", or_null(feature.revision)}};
+  p["calibrated_at"] = feature.calibrated ? Ordered(to_rfc3339(*feature.calibrated)) : Ordered(nullptr);
+  p["site"] = anchor.site ? Ordered(to_string(*anchor.site)) : Ordered(nullptr);
+  p["building"] = anchor.building;
+  p["floor"] = anchor.floor;
+  p["space"] = anchor.space;
+  p["asset_tag"] = anchor.asset_tag;
+  p["ifc_guid"] = anchor.ifc_guid;
+  p["external_ids"] = std::move(external);
+  p["retired"] = anchor.retired;
+  p["crs"] = crs(feature);
+  p["height_orthometric_m"] = nullptr;  // no geoid model is installed; never guessed
+  p["geoid"] = nullptr;
+  p["enu_m"] = placed ? vector_json(estimate->best->position.m) : Ordered(nullptr);
+  p["local_m"] = placed && feature.frame == TrackFrame::local ? vector_json(estimate->best->position.m) : Ordered(nullptr);
+  p["accuracy"] = estimate ? accuracy(*estimate, feature.site) : Ordered(nullptr);
+  p["quality"] = estimate ? quality(*estimate) : Ordered(nullptr);
+  p["provenance"] = {{"calibration", feature.calibration ? Ordered(to_string(*feature.calibration)) : Ordered(nullptr)}, {"missions", std::move(missions)}};
+  p["mirror"] = estimate ? mirror(*estimate) : Ordered(nullptr);
+  const std::string self = "/api/v1/anchors/" + to_string(anchor.network_id);
+  p["links"] = Ordered::array({{{"rel", "history"}, {"href", self + "/history"}}});
+  if (anchor.site) p["links"].push_back({{"rel", "site"}, {"href", "/api/v1/sites/" + to_string(*anchor.site)}});
+  return {{"type", "Feature"}, {"id", to_string(anchor.id)}, {"geometry", point(placed ? estimate->best->wgs84 : std::nullopt)}, {"properties", std::move(p)}};
+}
+
+Ordered flat_feature_json(const AnchorFeature& feature) {
+  Ordered full = anchor_feature_json(feature);
+  Ordered flat;
+  for (const char* key : {"network_id", "name", "status", "revision", "calibrated_at", "site", "building", "floor", "space", "asset_tag", "ifc_guid"}) flat[key] = full["properties"][key];
+  const auto& estimate = feature.estimate;
+  flat["verdict"] = estimate ? Ordered(verdict_word(estimate->verdict)) : Ordered(nullptr);
+  flat["h95_m"] = estimate && estimate->best ? Ordered(metres(estimate->h95_m)) : Ordered(nullptr);
+  flat["v95_m"] = estimate && estimate->best ? Ordered(metres(estimate->v95_m)) : Ordered(nullptr);
+  flat["frame"] = full["properties"]["crs"].is_object() ? full["properties"]["crs"]["frame"] : Ordered(nullptr);
+  full["properties"] = std::move(flat);
+  return full;
+}
+
+std::string csv_text(std::string_view text) {
+  std::string out;
+  // Spreadsheets run cells that begin like a formula (reliability.md section 5).
+  if (!text.empty() && std::string_view("=+-@\t\r").find(text.front()) != std::string_view::npos) out += '\'';
+  out += text;
+  if (out.find_first_of(",\"\r\n") == std::string::npos) return out;
+  std::string quoted = "\"";
+  for (const char c : out) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + '"';
+}
+
+std::string anchors_csv_header() {
+  return "id,network_id,name,status,revision,calibrated_at,site,building,floor,space,asset_tag,ifc_guid,lon,lat,h_m,local_x_m,local_y_m,local_z_m,"
+         "sigma_e_m,sigma_n_m,sigma_u_m,ellipse95_major_m,ellipse95_minor_m,ellipse95_azimuth_deg,h95_m,v95_m,verdict,frame,epoch";
+}
+
+std::string anchor_csv_row(const AnchorFeature& feature) {
+  const Anchor& a = feature.anchor;
+  std::string row = to_string(a.id) + ',' + to_string(a.network_id);
+  const auto add = [&row](std::string_view cell) { row += ','; row += cell; };
+  add(csv_text(a.name));
+  add(feature.status);
+  add(feature.revision ? std::to_string(*feature.revision) : "");
+  add(feature.calibrated ? to_rfc3339(*feature.calibrated) : "");
+  add(a.site ? to_string(*a.site) : "");
+  for (const auto* text : {&a.building, &a.floor, &a.space, &a.asset_tag, &a.ifc_guid}) add(csv_text(*text));
+  const auto& estimate = feature.estimate;
+  const bool placed = estimate && estimate->best;
+  const auto& at = placed ? estimate->best->wgs84 : std::optional<Wgs84>{};
+  add(at ? number(at->lon_deg, 9) : "");
+  add(at ? number(at->lat_deg, 9) : "");
+  add(at ? number(at->height_m, 4) : "");
+  for (int i = 0; i < 3; ++i) add(placed && feature.frame == TrackFrame::local ? number(estimate->best->position.m[i], 4) : "");
+  for (int i = 0; i < 3; ++i) add(placed ? number(std::sqrt(std::max(0.0, estimate->best->covariance_m2(i, i))), 4) : "");
+  const ErrorEllipse ellipse = placed ? error_ellipse(estimate->best->covariance_m2) : ErrorEllipse{};
+  for (const double value : {ellipse.major_m, ellipse.minor_m}) add(placed ? number(value, 4) : "");
+  add(placed ? number(ellipse.azimuth_deg, 1) : "");
+  add(placed ? number(estimate->h95_m, 4) : "");
+  add(placed ? number(estimate->v95_m, 4) : "");
+  add(estimate ? verdict_word(estimate->verdict) : "");
+  add(feature.site ? csv_text(feature.site->crs_frame) : "");
+  add(feature.site && feature.site->crs_epoch ? number(*feature.site->crs_epoch, 2) : "");
+  return row;
+}
+
+}  // namespace anchord::api

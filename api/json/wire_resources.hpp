@@ -1,0 +1,52 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+
+#include "api/http/problem.hpp"
+#include "core/ports/store.hpp"
+
+namespace anchord::api {
+
+nlohmann::ordered_json mission_json(const Mission& mission, std::optional<std::uint64_t> n_ranges, std::optional<std::uint64_t> n_fixes);
+/// Body of POST /missions. What is wrong goes to `errors`.
+Mission read_mission(const nlohmann::json& body, std::vector<FieldError>& errors);
+
+nlohmann::ordered_json site_json(const Site& site);
+/// Applies a merge-patch (or, for a new site, a whole body) to `site`.
+void patch_site(const nlohmann::json& body, bool whole, Site& site, std::vector<FieldError>& errors);
+/// Applies the FM fields of a merge-patch to `anchor`.
+void patch_anchor(const nlohmann::json& body, Anchor& anchor, std::vector<FieldError>& errors);
+
+/// What an anchor feature (api.md section 4) is made of.
+struct AnchorFeature {
+  Anchor anchor;
+  std::string status;                       ///< accepted, or the live status
+  std::optional<std::uint64_t> revision{};
+  std::optional<UtcTime> calibrated{};
+  std::optional<CalibrationId> calibration{};
+  std::vector<MissionId> missions;
+  TrackFrame frame{TrackFrame::wgs84};
+  std::optional<Estimate> estimate{};
+  std::optional<Site> site{};
+};
+nlohmann::ordered_json anchor_feature_json(const AnchorFeature& feature);
+/// No nested objects, for GIS readers.
+nlohmann::ordered_json flat_feature_json(const AnchorFeature& feature);
+/// Header and row of anchors.csv, without line end; safe to open in a spreadsheet.
+std::string anchors_csv_header();
+std::string anchor_csv_row(const AnchorFeature& feature);
+
+/// position, accuracy, quality and mirror of one estimate, as in calibrations.
+nlohmann::ordered_json estimate_result_json(const Estimate& estimate, TrackFrame frame, const std::optional<Site>& site = {});
+nlohmann::ordered_json calibration_json(const Calibration& calibration, bool with_anchors);
+nlohmann::ordered_json revision_json(const Revision& revision);
+nlohmann::ordered_json published_json(const PublishedPosition& position);
+nlohmann::ordered_json job_json(const Job& job);
+std::string_view job_state_word(JobState state);
+
+/// One CSV cell: quoted where needed; a text that begins like a formula gets a leading apostrophe.
+std::string csv_text(std::string_view text);
+
+}  // namespace anchord::api

@@ -1,0 +1,278 @@
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "api/json/live_writer.hpp"
+#include "api/json/reader.hpp"
+#include "api/json/wire_resources.hpp"
+#include "api/routes/routes.hpp"
+#include "api/routes/support.hpp"
+#include "core/ports/store.hpp"
+
+namespace anchord::api {
+
+using Ordered = nlohmann::ordered_json;
+
+namespace {
+
+/// Sites and calibrations that features refer to, each read once.
+class Lookup {
+ public:
+  explicit Lookup(AnchorStore& store) : store_(store) {}
+  std::optional<Site> site(const std::optional<SiteId>& id) {
+    if (!id) return std::nullopt;
+    auto [it, fresh] = sites_.try_emplace(*id);
+    if (fresh) {
+      if (auto found = store_.site(*id)) it->second = std::move(found).value();
+    }
+    return it->second;
+  }
+  const std::vector<MissionId>& missions(const CalibrationId& id) {
+    auto [it, fresh] = missions_.try_emplace(id);
+    if (fresh) {
+      if (auto found = store_.calibration(id)) it->second = found.value().missions;
+    }
+    return it->second;
+  }
+
+ private:
+  AnchorStore& store_;
+  std::map<SiteId, std::optional<Site>> sites_;
+  std::map<CalibrationId, std::vector<MissionId>> missions_;
+};
+
+AnchorFeature published_feature(Lookup& lookup, Anchor anchor, const PublishedPosition& position, std::uint64_t revision) {
+  AnchorFeature feature;
+  feature.site = lookup.site(anchor.site);
+  feature.anchor = std::move(anchor);
+  feature.status = feature.anchor.retired ? "retired" : "accepted";
+  feature.revision = revision;
+  feature.calibrated = position.published;
+  feature.calibration = position.calibration;
+  feature.missions = lookup.missions(position.calibration);
+  feature.frame = position.frame;
+  feature.estimate = position.estimate;
+  return feature;
+}
+
+std::uint64_t newest_revision(Services& s) {
+  const auto newest = value_or_problem(s.deps.anchors.revisions(1, 0));
+  return newest.empty() ? 0 : newest.front().number;
+}
+
+/// All features of the published revision (newest when absent), in order of network id.
+std::vector<AnchorFeature> published(Services& s, std::optional<std::uint64_t> revision, std::uint64_t& number) {
+  number = revision ? *revision : newest_revision(s);
+  if (number == 0) return {};
+  Lookup lookup(s.deps.anchors);
+  std::vector<AnchorFeature> out;
+  for (const auto& position : value_or_problem(s.deps.anchors.published(number))) {
+    auto anchor = value_or_problem(s.deps.anchors.find_or_create(position.estimate.anchor, s.deps.clock.now()));
+    out.push_back(published_feature(lookup, std::move(anchor), position, number));
+  }
+  std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.anchor.network_id < b.anchor.network_id; });
+  return out;
+}
+
+/// Running estimates; of an anchor that several missions hear the newest.
+std::vector<AnchorFeature> live(Services& s, const std::optional<MissionId>& mission) {
+  if (mission) value_or_problem(s.missions.mission(*mission));
+  Lookup lookup(s.deps.anchors);
+  std::map<NetworkId, AnchorFeature> newest;
+  for (const auto& view : s.missions.live(mission)) {
+    for (const auto& estimate : view.estimates) {
+      auto& feature = newest[estimate.anchor];
+      if (feature.estimate && estimate.time < feature.estimate->time) continue;
+      feature.estimate = estimate;
+      feature.frame = view.mission.frame;
+      feature.missions = {view.mission.id};
+      feature.calibrated = estimate.time;
+      feature.status = live_status(estimate);
+    }
+  }
+  std::vector<AnchorFeature> out;
+  for (auto& [id, feature] : newest) {
+    feature.anchor = value_or_problem(s.deps.anchors.find_or_create(id, s.deps.clock.now()));
+    feature.site = lookup.site(feature.anchor.site);
+    out.push_back(std::move(feature));
+  }
+  return out;
+}
+
+struct Box {
+  double west, south, east, north;
+};
+std::optional<Box> query_box(const Request& request) {
+  const auto text = request.query_value("bbox");
+  if (!text) return std::nullopt;
+  nlohmann::json numbers;
+  if (parse_json('[' + *text + ']', numbers) || numbers.size() != 4 || !std::all_of(numbers.begin(), numbers.end(), [](const auto& n) { return n.is_number(); })) {
+    throw_problem(422, "validation", "bbox is west,south,east,north in degrees", {{"/bbox", "bad_value", "must be four numbers"}});
+  }
+  return Box{numbers[0], numbers[1], numbers[2], numbers[3]};
+}
+
+std::vector<AnchorFeature> wanted(Services& s, const Request& request, std::uint64_t& number) {
+  const auto view = request.query_value("view").value_or("published");
+  std::optional<std::uint64_t> revision;
+  if (const auto text = request.query_value("revision")) {
+    nlohmann::json value;
+    if (parse_json(*text, value) || !value.is_number_unsigned()) throw_problem(422, "validation", "revision is a number", {{"/revision", "wrong_type", "must be a number"}});
+    revision = value.get<std::uint64_t>();
+    if (*revision == 0 || *revision > newest_revision(s)) throw_problem(404, "not-found", "there is no revision " + *text);
+  }
+  if (view != "published" && view != "live") throw_problem(422, "validation", "view is published or live", {{"/view", "unknown_value", "must be published or live"}});
+  auto all = view == "live" ? live(s, query_mission(request)) : published(s, revision, number);
+  const auto box = query_box(request);
+  const auto site = request.query_value("site");
+  std::erase_if(all, [&](const AnchorFeature& feature) {
+    if (site && (!feature.anchor.site || to_string(*feature.anchor.site) != *site)) return true;
+    if (!box) return false;
+    if (!feature.estimate || !feature.estimate->best || !feature.estimate->best->wgs84) return true;
+    const auto& at = *feature.estimate->best->wgs84;
+    return at.lon_deg < box->west || at.lon_deg > box->east || at.lat_deg < box->south || at.lat_deg > box->north;
+  });
+  return all;
+}
+
+Response as_csv(const std::vector<AnchorFeature>& features) {
+  Response response;
+  response.header("Content-Type", "text/csv; charset=utf-8");
+  response.body = anchors_csv_header() + "\r\n";
+  for (const auto& feature : features) response.body += anchor_csv_row(feature) + "\r\n";
+  return response;
+}
+
+Response list(Services& s, const Request& request) {
+  check_query(request, {"view", "revision", "mission", "site", "bbox", "limit", "cursor", "format"});
+  const auto page = page_query(request);
+  std::uint64_t number = 0;
+  auto all = wanted(s, request, number);
+  if (!page.cursor.empty()) {
+    const auto after = parse_network_id(page.cursor);
+    if (!after) throw_problem(422, "validation", "cursor is not one of ours", {{"/cursor", "bad_cursor", "is not one of ours"}});
+    std::erase_if(all, [&](const auto& feature) { return feature.anchor.network_id <= after.value(); });
+  }
+  const std::string format = negotiate(request, {"geojson", "json", "csv", "ndjson"});
+  std::string next;
+  if (all.size() > page.limit) {
+    all.resize(page.limit);
+    next = to_string(all.back().anchor.network_id);
+  }
+  if (format == "csv") return as_csv(all);
+  if (format == "ndjson") {
+    Response response;
+    response.header("Content-Type", "application/x-ndjson");
+    for (const auto& feature : all) response.body += anchor_feature_json(feature).dump() + '\n';
+    return response;
+  }
+  Ordered features = Ordered::array();
+  for (const auto& feature : all) features.push_back(anchor_feature_json(feature));
+  Ordered body{{"type", "FeatureCollection"}, {"features", std::move(features)}, {"revision", number == 0 ? Ordered(nullptr) : Ordered(number)}, {"next_cursor", next.empty() ? Ordered(nullptr) : Ordered(next)}};
+  Response response = json_response(200, body, "application/geo+json");
+  if (!next.empty()) response.header("Link", next_link(request, next));
+  return response;
+}
+
+/// By UUID or by network id ("0x6a2f").
+Anchor path_anchor(Services& s, const Request& request) {
+  const auto& text = request.params.at("id");
+  if (const auto id = parse_uuid(text)) return value_or_problem(s.deps.anchors.anchor(AnchorId{id.value()}));
+  const auto network_id = parse_network_id(text);
+  if (!network_id) throw_problem(404, "not-found", "there is no anchor " + text.substr(0, 60));
+  return value_or_problem(s.deps.anchors.anchor(network_id.value()));
+}
+
+AnchorFeature feature_of(Services& s, const Anchor& anchor) {
+  Lookup lookup(s.deps.anchors);
+  std::uint64_t number = 0;
+  for (auto& feature : published(s, std::nullopt, number)) {
+    if (feature.anchor.network_id == anchor.network_id) return feature;
+  }
+  AnchorFeature feature;
+  feature.anchor = anchor;
+  feature.site = lookup.site(anchor.site);
+  feature.status = anchor.retired ? "retired" : "found";
+  return feature;
+}
+
+std::string etag(const AnchorFeature& feature) {
+  return "\"a-" + std::to_string(feature.anchor.version) + '-' + std::to_string(feature.revision.value_or(0)) + '"';
+}
+
+Response answer(const AnchorFeature& feature) {
+  Response response = json_response(200, anchor_feature_json(feature), "application/geo+json");
+  response.header("ETag", etag(feature));
+  return response;
+}
+
+Response patch(Services& s, const Request& request) {
+  Anchor anchor = path_anchor(s, request);
+  require_match(request, etag(feature_of(s, anchor)));
+  std::vector<FieldError> errors;
+  patch_anchor(json_body(request), anchor, errors);
+  if (anchor.site && !s.deps.anchors.site(*anchor.site)) errors.push_back({"/site", "unknown_site", "there is no such site"});
+  refuse_if_any(errors);
+  value_or_problem(s.deps.anchors.update(anchor, anchor.version));
+  s.audit(request, "anchor.change " + to_string(anchor.network_id));
+  return answer(feature_of(s, value_or_problem(s.deps.anchors.anchor(anchor.id))));
+}
+
+Response estimates(Services& s, const Request& request) {
+  check_query(request, {"mission"});
+  const Anchor anchor = path_anchor(s, request);
+  Ordered items = Ordered::array();
+  for (const auto& view : s.missions.live(query_mission(request))) {
+    for (const auto& estimate : view.estimates) {
+      if (estimate.anchor == anchor.network_id) items.push_back(Ordered::parse(live_estimate_json(view.mission.id, estimate)));
+    }
+  }
+  return list_response(request, std::move(items), "");
+}
+
+Response history(Services& s, const Request& request) {
+  check_query(request, {});
+  const Anchor anchor = path_anchor(s, request);
+  Ordered items = Ordered::array();
+  for (const auto& position : value_or_problem(s.deps.anchors.history(anchor.network_id))) items.push_back(published_json(position));
+  return list_response(request, std::move(items), "");
+}
+
+Response export_geojson(Services& s, const Request& request) {
+  check_query(request, {"flat", "revision", "site", "bbox"});
+  const bool flat = query_flag(request, "flat");
+  std::uint64_t number = 0;
+  Ordered features = Ordered::array();
+  for (const auto& feature : wanted(s, request, number)) features.push_back(flat ? flat_feature_json(feature) : anchor_feature_json(feature));
+  Ordered body{{"type", "FeatureCollection"}, {"features", std::move(features)}};
+  if (!flat) body["revision"] = number == 0 ? Ordered(nullptr) : Ordered(number);
+  Response response = json_response(200, body, "application/geo+json");
+  response.header("Content-Disposition", "attachment; filename=\"anchors.geojson\"");
+  return response;
+}
+
+Response export_csv(Services& s, const Request& request) {
+  check_query(request, {"revision", "site", "bbox"});
+  std::uint64_t number = 0;
+  Response response = as_csv(wanted(s, request, number));
+  response.header("Content-Disposition", "attachment; filename=\"anchors.csv\"");
+  return response;
+}
+
+}  // namespace
+
+void add_anchor_routes(Router& router, Services& s) {
+  const auto on = [&s](auto function) { return [&s, function](const Request& request) { return function(s, request); }; };
+  router.add({Method::get, "/api/v1/anchors", readers(), on(list)});
+  router.add({Method::get, "/api/v1/anchors/{id}", readers(), [&s](const Request& request) {
+                check_query(request, {});
+                return answer(feature_of(s, path_anchor(s, request)));
+              }});
+  router.add({Method::patch, "/api/v1/anchors/{id}", Access::any_of({Role::integrator}), on(patch), 1 << 20, false, true});
+  router.add({Method::get, "/api/v1/anchors/{id}/estimates", readers(), on(estimates)});
+  router.add({Method::get, "/api/v1/anchors/{id}/history", readers(), on(history)});
+  router.add({Method::get, "/api/v1/exports/anchors.geojson", readers(), on(export_geojson)});
+  router.add({Method::get, "/api/v1/exports/anchors.csv", readers(), on(export_csv)});
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,32 @@
+#pragma once
+
+#include "api/application.hpp"
+#include "api/services/calibration_service.hpp"
+#include "api/services/event_log.hpp"
+#include "api/services/ingest.hpp"
+#include "api/services/mission_service.hpp"
+
+namespace anchord::api {
+
+/// What the routes work with; lives as long as the Application.
+struct Services {
+  Application::Deps& deps;
+  Hub& hub;
+  EventLog& events;
+  MissionService& missions;
+  IngestService& ingest;
+  CalibrationService& calibrations;
+
+  StorageStatus storage() const { return deps.storage_status ? deps.storage_status() : StorageStatus{}; }
+  /// One line in the audit log: who did what from where.
+  void audit(const Request& request, std::string what, std::string result = "ok") const;
+};
+
+void add_mission_routes(Router& router, Services& services);
+void add_measurement_routes(Router& router, Services& services);
+void add_site_routes(Router& router, Services& services);
+void add_anchor_routes(Router& router, Services& services);
+void add_calibration_routes(Router& router, Services& services);
+void add_system_routes(Router& router, Services& services);
+
+}  // namespace anchord::api

@@ -1,0 +1,84 @@
+#include "core/localize/fuse.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "core/base/check.hpp"
+#include "core/localize/error_ellipse.hpp"
+
+namespace anchord {
+namespace {
+
+/// 99.9 % point of chi-square, Wilson-Hilferty; within 1 % for 3 and more degrees of freedom.
+double chi2_999(double dof) {
+  const double a = 2.0 / (9.0 * dof);
+  const double root = 1 - a + 3.0902 * std::sqrt(a);
+  return dof * root * root * root;
+}
+
+}  // namespace
+
+Estimate fuse_estimates(std::span<const Estimate> estimates) {
+  ANCHORD_CHECK(!estimates.empty(), "nothing to fuse");
+  if (estimates.size() == 1) return estimates.front();
+  Estimate out;
+  const Estimate* chosen = &estimates.front();
+  double smallest = std::numeric_limits<double>::infinity();
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d weighted = Eigen::Vector3d::Zero();
+  std::size_t n_ok = 0;
+  for (const auto& estimate : estimates) {
+    if (estimate.best && estimate.h95_m < smallest) {
+      smallest = estimate.h95_m;
+      chosen = &estimate;
+    }
+    if (estimate.verdict != Verdict::ok || !estimate.best) continue;
+    const Eigen::Matrix3d inverse = estimate.best->covariance_m2.inverse();
+    if (!inverse.allFinite()) continue;
+    information += inverse;
+    weighted += inverse * estimate.best->position.m;
+    ++n_ok;
+  }
+  out = *chosen;
+  out.n_used = 0;
+  out.refused.clear();
+  for (const auto& estimate : estimates) {
+    out.n_used += estimate.n_used;
+    for (const auto& [reason, n] : estimate.refused) out.refused[reason] += n;
+    out.time = std::max(out.time, estimate.time);
+  }
+  if (n_ok == 0) return out;
+  const Eigen::Matrix3d covariance = information.inverse();
+  const Eigen::Vector3d mean = covariance * weighted;
+  double chi2 = 0, rms2 = 0;
+  for (const auto& estimate : estimates) {
+    if (estimate.verdict != Verdict::ok || !estimate.best) continue;
+    const Eigen::Vector3d off = estimate.best->position.m - mean;
+    chi2 += off.dot(estimate.best->covariance_m2.inverse() * off);
+    rms2 += estimate.best->rms_residual_m * estimate.best->rms_residual_m;
+  }
+  const double dof = 3.0 * static_cast<double>(n_ok - 1);
+  Hypothesis best;
+  best.position.m = mean;
+  best.covariance_m2 = covariance * (dof > 0 ? std::max(1.0, chi2 / dof) : 1.0);
+  best.rms_residual_m = std::sqrt(rms2 / static_cast<double>(n_ok));
+  out.best = best;
+  out.mirror.reset();
+  out.verdict = Verdict::ok;
+  out.reason.clear();
+  if (dof > 0 && chi2 > chi2_999(dof)) {
+    char text[128];
+    std::snprintf(text, sizeof text, "%zu flights contradict each other: chi2 %.1f with %.0f degrees of freedom, limit %.1f", n_ok, chi2, dof, chi2_999(dof));
+    out.verdict = Verdict::diverged;
+    out.reason = text;
+  }
+  const ErrorEllipse ellipse = error_ellipse(best.covariance_m2);
+  out.h95_m = ellipse.h95_m;
+  out.v95_m = ellipse.v95_m;
+  return out;
+}
+
+}  // namespace anchord
