@@ -154,6 +154,20 @@ describe('LiveClient', () => {
     world.advance(1000);
     expect(world.sockets).toHaveLength(2);
   });
+  it('gives up an attempt that nobody answers, and tries again', () => {
+    world.advance(10_300);
+    expect(client.retry_in_ms()).not.toBeNull();
+    world.advance(600);
+    expect(world.sockets).toHaveLength(2);
+  });
+  it('rests when told so, until somebody asks it to go on', () => {
+    hello();
+    client.pause();
+    world.advance(60_000);
+    expect(world.sockets).toHaveLength(1);
+    client.retryNow();
+    expect(world.sockets).toHaveLength(2);
+  });
   it('backs off from half a second to ten and never stops', () => {
     hello();
     const waits: number[] = [];

@@ -22,6 +22,7 @@ interface Topic { sub: number | null; seq: number | null; waiting: boolean; resu
 const LATE_MS = 2000, LOST_MS = 5000, CHECK_MS = 250;   // dashboard.md section 4: LATE > 2 s, LOST > 5 s
 const FIRST_RETRY_MS = 500, LAST_RETRY_MS = 10_000;
 const TIME_EVERY_MS = 10_000;
+const GREETING_MS = 10_000;  // a connection attempt into a dead network would hang for minutes
 
 /// Client of subprotocol anchord.v1: subscribes, follows seq and prev, resumes by epoch and seq, reconnects for ever. No DOM.
 export class LiveClient implements LiveSource {
@@ -33,6 +34,7 @@ export class LiveClient implements LiveSource {
   private readonly by_sub = new Map<number, string>();
   private readonly by_id = new Map<number, string>();
   private next_id = 1;
+  private opened_ms = 0;
   private heard_ms = -Infinity;
   private state: LinkState = 'connecting';
   private greeted = false;
@@ -91,6 +93,7 @@ export class LiveClient implements LiveSource {
   private connect(): void {
     this.retry_at_ms = null;
     this.greeted = false;
+    this.opened_ms = this.env.now_ms();
     const socket = this.env.open();
     this.socket = socket;
     socket.onmessage = (event) => { if (this.socket === socket) this.receive(event.data); };
@@ -120,6 +123,10 @@ export class LiveClient implements LiveSource {
   private check(): void {
     this.cancel_check = this.env.after(CHECK_MS, () => this.check());
     const silence = this.env.now_ms() - this.heard_ms;
+    if (this.socket && !this.greeted && this.env.now_ms() - this.opened_ms > GREETING_MS) {
+      this.drop_socket();
+      this.retry_later();
+    }
     if (silence === Infinity) return;
     this.set_link(silence > LOST_MS ? 'lost' : silence > LATE_MS ? 'late' : 'live');
     if (silence > LOST_MS && this.socket && this.greeted) {  // an open socket that says nothing is a dead one

@@ -11,7 +11,7 @@ export const may_publish = computed(() => may('engineer', 'operator', 'op'));
 
 function me_of(answer: unknown): Me | null {
   const o = obj(answer);
-  return o && { name: str(o.name), roles: Array.isArray(o.roles) ? o.roles.filter((r): r is string => typeof r === 'string') : [], auth: str(o.auth) };
+  return o && { name: str(o.name), roles: Array.isArray(o.roles) ? o.roles.filter((r): r is string => typeof r === 'string') : [], auth: str(o.auth) || (str(o.token_id) === 'local' ? 'off' : 'on') };
 }
 /// Asks who we are; signed out on 401. Other trouble leaves what is known: a lost link is not a lost session.
 export async function refresh_me(): Promise<void> {
