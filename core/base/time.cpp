@@ -45,6 +45,8 @@ Result<UtcTime> parse_rfc3339(std::string_view text) {
   if (y < 0 || mo < 0 || d < 0 || h < 0 || h > 23 || mi < 0 || mi > 59 || s < 0 || s > 59) return bad();
   const year_month_day date{year{y}, month{static_cast<unsigned>(mo)}, day{static_cast<unsigned>(d)}};
   if (!date.ok()) return bad();
+  // 64 bits of nanoseconds hold 1677-09-21 to 2262-04-11; whole years, so that no fraction runs over either.
+  if (y < 1678 || y > 2261) return bad();
   std::int64_t fraction_ns = 0;
   if (text.size() > 20) {
     const std::size_t n = text.size() - 21;

@@ -1,0 +1,35 @@
+// Lines of a bulk upload: every line is judged, none may crash, what is accepted keeps the stated limits.
+#include <cmath>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string_view>
+
+#include "api/json/reader.hpp"
+#include "api/json/wire_rows.hpp"
+#include "tests/fuzz/check.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace anchord;
+  std::string_view rest(reinterpret_cast<const char*>(data), size);
+  while (!rest.empty()) {
+    const std::size_t end = rest.find('\n');
+    const std::string_view line = rest.substr(0, end);
+    rest = end == std::string_view::npos ? std::string_view() : rest.substr(end + 1);
+    nlohmann::json row;
+    if (api::parse_json(line, row)) continue;
+    std::vector<api::FieldError> errors;
+    const auto range = api::read_range(row, std::nullopt, errors);
+    if (errors.empty()) {
+      fuzz::require(range.range.distance_m >= 0.05 && range.range.distance_m <= 150, "a range is 0.05 to 150 m");
+      (void)api::range_json(range.range, 1).dump();
+    }
+    errors.clear();
+    const Fix fix = api::read_fix(row, std::nullopt, errors);
+    if (errors.empty()) {
+      fuzz::require(std::isfinite(fix.position.lat_deg) && std::abs(fix.position.lat_deg) <= 90, "latitude in bounds");
+      (void)api::fix_json(fix, std::nullopt).dump();
+    }
+  }
+  (void)api::from_base64(std::string_view(reinterpret_cast<const char*>(data), size));
+  return 0;
+}
