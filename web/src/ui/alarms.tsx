@@ -79,11 +79,11 @@ export function AlarmBar() {
     </div>
   );
   return (
-    <div class="alarmbar on" data-testid="alarm-bar">
+    <section class="alarmbar on" aria-label="Alarms" data-testid="alarm-bar">
       {row(first, first.priority === 'critical' && !first.acknowledged ? 'first' : 'second')}
       {second && row(second, 'second')}
       {/* Spoken once per alarm, without the running clock; only critical interrupts. */}
       <p class="sr" role={first.priority === 'critical' ? 'alert' : 'status'}>{first.title}. {first.advice}</p>
-    </div>
+    </section>
   );
 }

@@ -14,7 +14,7 @@ const PLACE_ENU: Column[] = [0, 1, 2].map((i) => ({ key: 'enu'[i]!, head: `${'EN
 const PLACE_GEO: Column[] = [
   { key: 'lat', head: 'Latitude, °', cell: (r) => latlon(r.lat), sort: (r) => n(r.lat) },
   { key: 'lon', head: 'Longitude, °', cell: (r) => latlon(r.lon), sort: (r) => n(r.lon) },
-  { key: 'h', head: 'Ellipsoidal h, m', cell: (r) => metres(r.h_m), sort: (r) => n(r.h_m) },
+  { key: 'h', head: 'h ellips., m', cell: (r) => metres(r.h_m), sort: (r) => n(r.h_m) },
 ];
 const QUALITY: Column[] = [
   { key: 'sh', head: 'σ h, m', cell: (r) => fixed(sigma_h(r.cov_enu_m2), 3), sort: (r) => n(sigma_h(r.cov_enu_m2)) },

@@ -6,7 +6,7 @@ export function FirstRun() {
   useEffect(() => { document.title = 'First flight - anchord'; }, []);
   const url = new URL('.', document.baseURI.split('#')[0]).toString().replace(/\/$/, '');
   return (
-    <div class="first" data-testid="first-run">
+    <div class="firstrun" data-testid="first-run">
       <div>
         <h1>Fly a simulated flight first</h1>
         <p class="lead">This server holds no flight yet. A simulated one needs no hardware and no internet: it comes in through the same door as a real one, so what you see is what you will fly.</p>

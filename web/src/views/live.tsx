@@ -26,6 +26,7 @@ export function Live() {
   const selected = chosen_anchor.value ?? sorted[0]?.anchor ?? null;
   return (
     <div class="live" data-testid="live">
+      <h1 class="sr">Live flight</h1>
       <section class="left" aria-label="Map and flight readings">
         <MapBox content={() => ({ ...content(), selected })} onSelect={(a) => (chosen_anchor.value = a)} label="Live map: drone, ranges and anchors. All of it is also in the tables." follow version={`${tick.value}${selected}`} />
         <Legend />
@@ -41,7 +42,7 @@ export function Live() {
 }
 
 function Waiting() {
-  return <div class="empty"><p role="status">{me.value === null ? 'Sign in to see the flights of this server.' : link.value === 'lost' || link.value === 'late' ? 'Waiting for anchord to answer.' : 'Loading the flights of this server.'}</p></div>;
+  return <div class="empty"><h1 class="sr">Live flight</h1><p role="status">{me.value === null ? 'Sign in to see the flights of this server.' : link.value === 'lost' || link.value === 'late' ? 'Waiting for anchord to answer.' : 'Loading the flights of this server.'}</p></div>;
 }
 
 function Progress() {
