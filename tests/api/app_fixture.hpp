@@ -1,0 +1,104 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "api/application.hpp"
+#include "api/http/router.hpp"
+#include "api/live/hub.hpp"
+#include "server/storage/sqlite_database.hpp"
+
+namespace anchord::test {
+
+using Json = nlohmann::json;
+
+/// The application over a real SQLite database in a temporary folder, without sockets.
+class AppFixture : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    char path[] = "/tmp/anchord_api_XXXXXX";
+    ASSERT_NE(mkdtemp(path), nullptr);
+    dir_ = path;
+    open();
+  }
+  void TearDown() override {
+    app_.reset();
+    database_.reset();
+    std::filesystem::remove_all(dir_);
+  }
+  void open() {
+    StorageOptions options;
+    options.data_dir = dir_ / "data";
+    options.reserve_bytes = 0;
+    auto opened = open_database(options);
+    ASSERT_TRUE(opened.has_value()) << opened.error().message;
+    database_ = std::move(opened).value();
+    app_ = std::make_unique<api::Application>(api::Application::Deps{database_->measurements(), database_->missions(), database_->anchors(), database_->jobs(), database_->access(), clock_, {"0.1.0", "test", "", "", 1}});
+    app_->start();
+  }
+  void restart() {
+    app_.reset();
+    database_.reset();
+    open();
+  }
+
+  struct Call {
+    std::string type{"application/json"};
+    std::map<std::string, std::string> query{}, headers{};
+    std::vector<api::Role> roles{api::Role::admin};
+  };
+  api::Response call(api::Method method, const std::string& path, const std::string& body, const Call& options) {
+    api::Request request;
+    request.method = method;
+    request.path = path;
+    request.query = options.query;
+    request.headers = options.headers;
+    if (!body.empty() && !options.type.empty()) request.headers["content-type"] = options.type;
+    request.body = body;
+    request.principal = {"tester", "tester", options.roles};
+    request.request_id = "test-1";
+    request.remote = "127.0.0.1";
+    return app_->router().handle(request);
+  }
+  api::Response get(const std::string& path, std::map<std::string, std::string> query = {}) {
+    Call options;
+    options.query = std::move(query);
+    return call(api::Method::get, path, "", options);
+  }
+  api::Response post(const std::string& path, const std::string& body, const std::string& type = "application/json", std::map<std::string, std::string> query = {}) {
+    Call options;
+    options.type = type;
+    options.query = std::move(query);
+    return call(api::Method::post, path, body, options);
+  }
+  static Json json(const api::Response& response) { return Json::parse(response.body); }
+  static std::string header(const api::Response& response, const std::string& name) {
+    for (const auto& [key, value] : response.headers) {
+      if (key == name) return value;
+    }
+    return {};
+  }
+  static std::string text(const api::Response& response) {
+    if (!response.body_stream) return response.body;
+    std::string all, part;
+    while (!(part = response.body_stream()).empty()) all += part;
+    return all;
+  }
+  /// A mission; the id.
+  std::string mission(const std::string& frame = "wgs84") {
+    const auto response = post("/api/v1/missions", R"({"name":"test flight","frame":")" + frame + R"(","track_point":"tag_antenna"})");
+    EXPECT_EQ(response.status, 201) << response.body;
+    return json(response).value("id", "");
+  }
+
+  SystemClock clock_;
+  std::filesystem::path dir_;
+  std::unique_ptr<Database> database_;
+  std::unique_ptr<api::Application> app_;
+};
+
+}  // namespace anchord::test
