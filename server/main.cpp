@@ -8,8 +8,10 @@ int main(int argc, char** argv) {
   int exit_code = 0;
   anchord::cli::add_config_command(app, exit_code);
   anchord::cli::add_healthcheck_command(app, exit_code);
+  anchord::cli::add_import_command(app, exit_code);
   anchord::cli::add_plan_command(app, exit_code);
   anchord::cli::add_serve_command(app, exit_code);
+  anchord::cli::add_replay_command(app, exit_code);
   anchord::cli::add_simulate_command(app, exit_code);
   anchord::cli::add_token_command(app, exit_code);
   anchord::cli::add_version_command(app, exit_code);

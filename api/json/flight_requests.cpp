@@ -1,0 +1,103 @@
+#include "api/json/flight_requests.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "api/json/wire_rows.hpp"
+
+namespace anchord::api {
+namespace {
+
+using Json = nlohmann::json;
+using Ordered = nlohmann::ordered_json;
+
+std::string_view point_word(TrackPoint point) {
+  switch (point) {
+    case TrackPoint::gnss_antenna:
+      return "gnss_antenna";
+    case TrackPoint::body:
+      return "body";
+    case TrackPoint::tag_antenna:
+      return "tag_antenna";
+  }
+  return "gnss_antenna";
+}
+
+Json parsed(std::string_view body) { return Json::parse(body, nullptr, false); }
+
+std::string text_of(const Json& object, const char* key) {
+  if (!object.is_object()) return {};
+  const auto it = object.find(key);
+  return it != object.end() && it->is_string() ? it->get<std::string>() : std::string{};
+}
+
+// Nothing of a recording is thrown away for bytes that are not UTF-8.
+std::string dumped(const Ordered& json) { return json.dump(-1, ' ', false, Ordered::error_handler_t::replace); }
+
+}  // namespace
+
+std::string mission_request_json(const Mission& mission) {
+  Ordered out{{"name", mission.name}};
+  if (!mission.kit.empty()) out["kit"] = mission.kit;
+  if (!mission.radio.empty()) out["radio"] = mission.radio;
+  out["frame"] = mission.frame == TrackFrame::wgs84 ? "wgs84" : "local";
+  out["track_point"] = point_word(mission.point);
+  out["tags"] = Ordered::array();
+  for (const TagAntenna& tag : mission.tags) {
+    const auto& arm = tag.lever_arm_body_m;
+    out["tags"].push_back(
+        {{"tag", to_string(tag.tag)}, {"antenna", tag.antenna}, {"lever_arm_body_m", {arm.x(), arm.y(), arm.z()}}});
+  }
+  return dumped(out);
+}
+
+void append_ndjson(std::string& body, const Range& row) {
+  body += dumped(range_json(row, std::nullopt));
+  body += '\n';
+}
+
+void append_ndjson(std::string& body, const Fix& row) {
+  body += dumped(fix_json(row, std::nullopt));
+  body += '\n';
+}
+
+Result<IngestAnswer> parse_ingest_answer(std::string_view body) {
+  const Json json = parsed(body);
+  const auto count = [&](const char* key) -> std::optional<std::uint64_t> {
+    if (!json.is_object()) return std::nullopt;
+    const auto it = json.find(key);
+    if (it == json.end() || !it->is_number_unsigned()) return std::nullopt;
+    return it->get<std::uint64_t>();
+  };
+  const auto accepted = count("accepted");
+  const auto duplicates = count("duplicates");
+  const auto rejected = count("rejected");
+  if (!accepted || !duplicates || !rejected) {
+    return make_error(Errc::bad_frame, "not the answer of an ingest: " + std::string(body.substr(0, 200)));
+  }
+  IngestAnswer answer{*accepted, *duplicates, *rejected, {}};
+  const auto errors = json.find("errors");
+  if (errors != json.end() && errors->is_array() && !errors->empty()) {
+    const Json& first = errors->front();
+    answer.first_error = text_of(first, "code") + ": " + text_of(first, "detail");
+  }
+  return answer;
+}
+
+Result<std::string> parse_created_id(std::string_view body) {
+  std::string id = text_of(parsed(body), "id");
+  if (id.empty()) return make_error(Errc::bad_frame, "an answer without an id: " + std::string(body.substr(0, 200)));
+  return id;
+}
+
+std::string problem_text(std::string_view body) {
+  const Json json = parsed(body);
+  std::string text = text_of(json, "detail");
+  if (text.empty()) text = text_of(json, "title");
+  if (json.is_object() && json.contains("errors") && json["errors"].is_array() && !json["errors"].empty()) {
+    const Json& first = json["errors"].front();
+    text += " (" + text_of(first, "pointer") + ": " + text_of(first, "detail") + ")";
+  }
+  return text.empty() ? std::string(body.substr(0, 200)) : text;
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,115 @@
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "api/imports/flight_folder.hpp"
+#include "server/cli/commands.hpp"
+#include "server/cli/flight_upload.hpp"
+#include "server/cli/progress.hpp"
+#include "server/storage/sqlite_database.hpp"
+
+namespace anchord::cli {
+namespace {
+
+struct Options {
+  std::string folder, url, data_dir, token_file, name;
+};
+
+std::string name_of(const Options& options, const FlightData& flight) {
+  if (!options.name.empty()) return options.name;
+  if (!flight.mission.name.empty()) return flight.mission.name;
+  return std::filesystem::weakly_canonical(options.folder).filename().string();
+}
+
+Result<std::string> import_by_rest(const Options& options, FlightData flight) {
+  BOOST_OUTCOME_TRY(const auto token, read_token_file(options.token_file));
+  BOOST_OUTCOME_TRY(const auto client, RestClient::make(options.url, token, interrupted));
+  const std::string name = name_of(options, flight);
+  FlightUpload upload(*client, std::move(flight));
+  BOOST_OUTCOME_TRY(upload.create_mission(name));
+  {
+    Progress progress("import");
+    while (!upload.done()) {
+      BOOST_OUTCOME_TRY(upload.send_next_batch());
+      progress.show(upload.fraction());
+    }
+  }
+  BOOST_OUTCOME_TRY(upload.finish_mission());
+  std::fprintf(stderr, "%s: %s\n", name.c_str(), upload.summary().c_str());
+  return upload.mission_id();
+}
+
+template <class Row, class Append>
+Result<void> append_all(std::vector<Row>& rows, const MissionId& mission, std::size_t& refused, Append append) {
+  for (std::size_t at = 0; at < rows.size();) {
+    std::vector<Row> batch;
+    for (; at < rows.size() && batch.size() < FlightUpload::k_batch_rows; ++at) {
+      rows[at].mission = mission;
+      batch.push_back(std::move(rows[at]));
+    }
+    BOOST_OUTCOME_TRY(const auto outcomes, append(std::move(batch)));
+    for (const RowOutcome outcome : outcomes) refused += outcome == RowOutcome::accepted ? 0 : 1;
+  }
+  return boost::outcome_v2::success();
+}
+
+Result<std::string> import_into_folder(const Options& options, FlightData flight) {
+  StorageOptions storage;
+  storage.data_dir = options.data_dir;
+  BOOST_OUTCOME_TRY(const auto db, open_database(storage));
+  Mission mission = flight.mission;
+  const UtcTime now = SystemClock{}.now();
+  mission.id = MissionId{make_uuid_v7(now)};
+  mission.name = name_of(options, flight);
+  mission.state = MissionState::finished;
+  mission.created = now;
+  mission.finished = now;
+  BOOST_OUTCOME_TRY(db->missions().insert(mission));
+  // Not from a wire: a value that cannot be stored (NaN) is left out and counted, as the server would answer.
+  std::size_t refused = std::erase_if(flight.ranges, [](const Range& r) { return !(r.distance_m > 0); });
+  const std::size_t n = flight.fixes.size() + flight.ranges.size();
+  auto& store = db->measurements();
+  BOOST_OUTCOME_TRY(append_all(flight.fixes, mission.id, refused,
+                               [&](std::vector<Fix> rows) { return store.append_fixes(std::move(rows), false); }));
+  BOOST_OUTCOME_TRY(append_all(flight.ranges, mission.id, refused,
+                               [&](std::vector<Range> rows) { return store.append_ranges(std::move(rows), false); }));
+  std::fprintf(stderr, "%s: %zu rows stored, %zu refused\n", mission.name.c_str(), n, refused);
+  return to_string(mission.id);
+}
+
+int import_flight(const Options& options) {
+  auto flight = read_flight_folder(options.folder);
+  if (!flight) {
+    std::fprintf(stderr, "anchord import: %s\n", flight.error().message.c_str());
+    return 2;
+  }
+  prepare_rows(flight.value());
+  const auto id = options.data_dir.empty() ? import_by_rest(options, std::move(flight).value())
+                                           : import_into_folder(options, std::move(flight).value());
+  if (!id) {
+    std::fprintf(stderr, "anchord import: %s\n", id.error().message.c_str());
+    return 1;
+  }
+  std::printf("%s\n", id.value().c_str());
+  return 0;
+}
+
+}  // namespace
+
+void add_import_command(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("import", "Bring measurements in from files");
+  command->require_subcommand(1);
+  auto* flight = command->add_subcommand("flight", "One flight folder as a finished mission; prints the mission's id");
+  auto options = std::make_shared<Options>();
+  options->url = "http://127.0.0.1:8420";
+  flight->add_option("folder", options->folder, "Flight folder: flight.json, track.csv[.gz], ranges.csv[.gz]")->required();
+  auto* url = flight->add_option("--url", options->url, "Running server")->capture_default_str();
+  flight->add_option("--data-dir", options->data_dir, "Straight into the data folder of a server that is not running")
+      ->excludes(url);
+  flight->add_option("--token-file", options->token_file, "File with an access token (gateway and operator)");
+  flight->add_option("--name", options->name, "Name of the mission; else that of the folder");
+  flight->callback([options, &exit_code] { exit_code = import_flight(*options); });
+}
+
+}  // namespace anchord::cli

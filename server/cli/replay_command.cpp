@@ -1,0 +1,130 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "api/imports/flight_folder.hpp"
+#include "server/cli/commands.hpp"
+#include "server/cli/flight_upload.hpp"
+#include "server/cli/progress.hpp"
+
+namespace anchord::cli {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+constexpr auto k_tick = std::chrono::milliseconds(100);
+
+struct Options {
+  std::string source, url{"http://127.0.0.1:8420"}, speed{"1"}, token_file, name;
+  bool loop{false};
+};
+
+/// Infinity for "max"; nothing for what is no speed.
+std::optional<double> parse_speed(const std::string& text) {
+  if (text == "max") return std::numeric_limits<double>::infinity();
+  char* end = nullptr;
+  const double speed = std::strtod(text.c_str(), &end);
+  if (end == text.c_str() || *end != '\0' || !(speed > 0) || !std::isfinite(speed)) return std::nullopt;
+  return speed;
+}
+
+/// Stamps the flight so that it ends when the playback ends. Differences between times stay what they were, so that
+/// speeds and gaps are real, and no row is ever stamped later than it is sent.
+void stamp_to_now(FlightUpload& upload, double speed, UtcTime now) {
+  const double length_s = seconds_between(upload.first(), upload.last());
+  const auto playing_ns = static_cast<std::int64_t>(length_s / speed * 1e9);
+  upload.shift(now.ns + playing_ns - upload.last().ns);
+}
+
+Result<void> play(FlightUpload& upload, double speed) {
+  Progress progress("replay");
+  if (std::isinf(speed)) {
+    while (!upload.done()) {
+      BOOST_OUTCOME_TRY(upload.send_next_batch());
+      progress.show(upload.fraction());
+    }
+    return boost::outcome_v2::success();
+  }
+  const UtcTime first = upload.first();
+  const auto start = SteadyClock::now();
+  auto next = start;
+  while (!upload.done()) {
+    if (interrupted()) return make_error(Errc::canceled, "stopped");
+    std::this_thread::sleep_until(next);
+    const double elapsed_s = std::chrono::duration<double>(SteadyClock::now() - start).count();
+    BOOST_OUTCOME_TRY(upload.send_before(UtcTime{first.ns + static_cast<std::int64_t>(elapsed_s * speed * 1e9)}));
+    progress.show(upload.fraction());
+    next = std::max(next + k_tick, SteadyClock::now());
+  }
+  return boost::outcome_v2::success();
+}
+
+Result<void> play_once(const Options& options, RestClient& client, const FlightData& flight, double speed) {
+  FlightUpload upload(client, flight);
+  stamp_to_now(upload, speed, SystemClock{}.now());
+  BOOST_OUTCOME_TRY(upload.create_mission(options.name.empty() ? flight.mission.name : options.name));
+  std::fprintf(stderr, "replay: mission %s\n", upload.mission_id().c_str());
+  const auto played = play(upload, speed);
+  std::fprintf(stderr, "replay: %s\n", upload.summary().c_str());
+  if (!played) return played;
+  return upload.finish_mission();
+}
+
+int replay(const Options& options) {
+  const auto speed = parse_speed(options.speed);
+  if (!speed) {
+    std::fprintf(stderr, "anchord replay: --speed is a number above 0, or max: %s\n", options.speed.c_str());
+    return 2;
+  }
+  auto flight = read_flight_folder(options.source);
+  if (!flight) {
+    std::fprintf(stderr, "anchord replay: %s\n", flight.error().message.c_str());
+    return 2;
+  }
+  if (flight.value().fixes.empty() && flight.value().ranges.empty()) {
+    std::fprintf(stderr, "anchord replay: %s: nothing was measured\n", options.source.c_str());
+    return 2;
+  }
+  if (flight.value().mission.name.empty()) {
+    flight.value().mission.name = std::filesystem::weakly_canonical(options.source).filename().string();
+  }
+  prepare_rows(flight.value());
+  Result<void> result = boost::outcome_v2::success();
+  const auto token = read_token_file(options.token_file);
+  if (!token) {
+    std::fprintf(stderr, "anchord replay: %s\n", token.error().message.c_str());
+    return 2;
+  }
+  auto client = RestClient::make(options.url, token.value(), interrupted);
+  if (!client) {
+    std::fprintf(stderr, "anchord replay: %s\n", client.error().message.c_str());
+    return 2;
+  }
+  do {
+    result = play_once(options, *client.value(), flight.value(), *speed);
+  } while (result && options.loop && !interrupted());
+  if (result) return 0;
+  std::fprintf(stderr, "anchord replay: %s\n", result.error().message.c_str());
+  return result.error().code == Errc::canceled ? 0 : 1;
+}
+
+}  // namespace
+
+void add_replay_command(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("replay", "Play a flight through a running server as if it were live");
+  auto options = std::make_shared<Options>();
+  command->add_option("flight", options->source, "Flight folder")->required();
+  command->add_option("--url", options->url, "Running server")->capture_default_str();
+  command->add_option("--speed", options->speed, "Times real time, or max")->capture_default_str();
+  command->add_option("--token-file", options->token_file, "File with an access token (gateway and operator)");
+  command->add_option("--name", options->name, "Name of the mission; else that of the flight");
+  command->add_flag("--loop", options->loop, "Again and again, each time a new mission");
+  command->callback([options, &exit_code] { exit_code = replay(*options); });
+}
+
+}  // namespace anchord::cli
