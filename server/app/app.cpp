@@ -10,8 +10,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "api/application.hpp"
 #include "api/http/router.hpp"
-#include "api/routes/access_routes.hpp"
 #include "server/app/front_door.hpp"
 #include "server/app/metrics.hpp"
 #include "server/http/http_server.hpp"
@@ -88,8 +88,8 @@ struct App::State {
   std::unique_ptr<Database> database;
   std::unique_ptr<Metrics> metrics;
   std::unique_ptr<api::AccessService> access;
-  std::unique_ptr<WorkerPool> pool, stream_pool;
-  std::unique_ptr<api::Router> router;
+  std::unique_ptr<WorkerPool> pool, stream_pool, live_pool;
+  std::unique_ptr<api::Application> application;
   std::unique_ptr<FrontDoor> door;
   std::unique_ptr<HttpServer> http;
   std::vector<std::string> urls;
@@ -102,16 +102,11 @@ struct App::State {
 
 namespace {
 
-/// What the server answers while no application is composed in.
-void add_probes(api::Router& router) {
-  for (const char* path : {"/healthz", "/readyz"}) {
-    router.add({api::Method::get, path, api::Access::open(), [](const api::Request&) {
-                  api::Response response;
-                  response.header("Content-Type", "application/json");
-                  response.body = R"({"status":"ok"})";
-                  return response;
-                }});
-  }
+/// What the application may know of its storage.
+api::StorageStatus storage_status(Database& database) {
+  const StorageHealth health = database.health();
+  return {health.writable(), health.reason,          health.db_bytes + health.wal_bytes,
+          health.disk_free_bytes, health.queued_rows, to_string(health.synchronous)};
 }
 
 Result<std::unique_ptr<Database>> open_store(const Config& config) {
@@ -190,15 +185,27 @@ Result<std::unique_ptr<App>> App::start(const Config& config) {
   s.pool =
       std::make_unique<WorkerPool>("anchord-work", config.count("http.workers"), config.count("http.queue"));
   s.stream_pool = std::make_unique<WorkerPool>("anchord-upload", config.count("http.upload_workers"), 64);
-  s.router = std::make_unique<api::Router>();
-  add_probes(*s.router);
-  api::add_access_routes(*s.router, *s.access);
+  // Live solves have their own thread: a burst of measurements must not delay requests.
+  s.live_pool = std::make_unique<WorkerPool>("anchord-live", 1, 10'000);
+  s.application = std::make_unique<api::Application>(api::Application::Deps{
+      s.database->measurements(), s.database->missions(), s.database->anchors(), s.database->jobs(),
+      s.database->access(), s.clock, {ANCHORD_VERSION, "", "", __VERSION__, newest_schema_version()},
+      s.access.get(),
+      [pool = s.live_pool.get()](std::function<void()> task) {
+        if (!pool->try_submit(task)) task();
+      },
+      [database = s.database.get()] { return storage_status(*database); },
+      [metrics = s.metrics.get()] { return metrics->text(); },
+      [](std::string_view request_id, std::string_view what) {
+        log(LogLevel::error, "fault", {{"request_id", std::string(request_id)}, {"what", std::string(what)}});
+      }});
   FrontDoorOptions door;
   door.hosts = host_policy(config);
   door.rate_per_s = static_cast<double>(config.count("rate.per_s"));
   door.rate_burst = static_cast<double>(config.count("rate.burst"));
-  s.door = std::make_unique<FrontDoor>(*s.router, api::WsHandlerFactory{}, *s.access, *s.metrics, door);
+  s.door = std::make_unique<FrontDoor>(s.application->router(), s.application->ws_factory(), *s.access, *s.metrics, door);
   auto app = std::unique_ptr<App>(new App(std::move(state)));
+  app->state_->application->start();
   BOOST_OUTCOME_TRYV(app->state_->listen());
   return app;
 }
@@ -216,13 +223,17 @@ void App::stop() {
     last = now;
   };
   if (s.door) s.door->close();
+  if (s.application) s.application->stop();  // clients are told, the job is parked, live work is done
+  step("application");
   if (s.http) s.http->stop(std::chrono::seconds(5));
   step("connections");
   if (s.pool) s.pool->stop();
   if (s.stream_pool) s.stream_pool->stop();
+  if (s.live_pool) s.live_pool->stop();
   step("workers");
   s.http.reset();
   s.door.reset();
+  s.application.reset();
   s.access.reset();
   s.database.reset();  // finishes queued writes, checkpoints, closes
   step("database");
