@@ -1,0 +1,52 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string_view>
+
+#include "drivers/gnss/epoch.hpp"
+#include "drivers/gnss/erb.hpp"
+#include "drivers/gnss/framer.hpp"
+#include "drivers/gnss/gpsd.hpp"
+#include "drivers/gnss/llh.hpp"
+#include "drivers/gnss/nmea.hpp"
+#include "drivers/gnss/ubx.hpp"
+
+namespace anchord::gnss {
+
+struct DecoderOptions {
+  std::optional<Protocol> only{};  ///< absent: every format the stream holds
+  nmea::GstOrder gst_order{nmea::GstOrder::larger_for_both};
+  std::optional<UtcTime> reference{};  ///< some instant of the stream, for NMEA that never says the date
+};
+
+/// Bytes of a receiver in, epochs out, whatever it speaks and however the bytes are cut. No clock, no port, bounded
+/// memory, never throws on any input. Not thread-safe.
+class Decoder {
+ public:
+  explicit Decoder(const DecoderOptions& options = {});
+
+  void feed(std::string_view bytes, Epochs& out);
+  /// The stream has ended: publishes what was being collected.
+  void finish(Epochs& out);
+
+  const Skips& skips() const { return skips_; }
+  /// Good frames of a format so far.
+  std::uint64_t frames(Protocol protocol) const { return frames_[static_cast<std::size_t>(protocol)]; }
+
+ private:
+  void take(const Frame& frame, Epochs& out);
+  template <class Parsed, class Assembler>
+  void take_binary(const Parsed& parsed, Assembler& assembler, const Frame& frame, const char* reason, Epochs& out);
+
+  Skips skips_;
+  Framer framer_;
+  std::array<std::uint64_t, 5> frames_{};
+  nmea::Assembler nmea_;
+  ubx::Assembler ubx_;
+  erb::Assembler erb_;
+  llh::Decoder llh_;
+  gpsd::Assembler gpsd_;
+};
+
+}  // namespace anchord::gnss

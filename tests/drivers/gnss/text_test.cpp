@@ -1,0 +1,159 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "samples.hpp"
+
+namespace anchord::gnss {
+namespace {
+
+using namespace test;
+
+const std::string k_llh_header =
+    "%  UTC                   latitude(deg) longitude(deg)  height(m)   Q  ns   sdn(m)   sde(m)   sdu(m)  sdne(m)  "
+    "sdeu(m)  sdun(m) age(s)  ratio\n";
+const std::string k_llh_float =
+    "2024/06/15 23:59:51.000   51.022827740    3.710564222    62.7980   5  14   2.1000   1.4000   4.0000  -0.0001   "
+    "0.0001   0.0005   0.00    0.0\n";
+const std::string k_llh_fixed =
+    "2024/06/16 00:00:13.600   51.022874322    3.710416541    61.0000   1  13   0.0140   0.0090   0.0210   0.0000  "
+    "-0.0000  -0.0000   1.10   12.5\n";
+
+TEST(Llh, DecodesTheExamples) {
+  const auto epochs = decode(k_llh_header + k_llh_float + k_llh_fixed);
+  ASSERT_EQ(epochs.size(), 2U);
+  EXPECT_EQ(epochs[0].fix, FixClass::single);  // 5 is float in NMEA and single here
+  const auto& e = epochs[1];
+  EXPECT_EQ(e.fix, FixClass::rtk_fixed);
+  EXPECT_EQ(to_rfc3339(e.time.value()), "2024-06-16T00:00:13.600000Z");
+  EXPECT_EQ(e.lat_deg, 51.022874322);
+  EXPECT_EQ(e.lon_deg, 3.710416541);
+  EXPECT_EQ(e.height_ellipsoid_m, 61.0);
+  EXPECT_FALSE(e.height_msl_m);
+  EXPECT_EQ(e.satellites, 13);
+  EXPECT_EQ(e.sigma_n_m, 0.014);  // order north, east, up
+  EXPECT_EQ(e.sigma_e_m, 0.009);
+  EXPECT_EQ(e.sigma_u_m, 0.021);
+  EXPECT_EQ(e.age_s, 1.1);
+}
+
+TEST(Llh, ReadsCovariancesAsSignedRoots) {
+  const auto e =
+      decode("2024/06/16 00:00:13.600 51.0 3.7 61.0 2 13 0.3 0.2 0.5 -0.1 0.15 0.2 1.1 12.5\n").at(0);
+  EXPECT_NEAR(e.covariance_enu_m2.value()(0, 1), -0.01, 1e-12);
+  EXPECT_NEAR(e.covariance_enu_m2.value()(0, 2), 0.0225, 1e-12);
+  EXPECT_NEAR(e.covariance_enu_m2.value()(1, 2), 0.04, 1e-12);
+}
+
+TEST(Llh, TakesTheTimeSystemAndHeightFromTheHeader) {
+  std::string header = k_llh_header;
+  header.replace(3, 4, "GPST");
+  // 18 leap seconds in 2024, 13 in 2005.
+  EXPECT_EQ(to_rfc3339(decode(header + k_llh_fixed).at(0).time.value()), "2024-06-15T23:59:55.600000Z");
+  std::string old = k_llh_fixed;
+  old.replace(0, 4, "2005");
+  EXPECT_EQ(to_rfc3339(decode(header + old).at(0).time.value()), "2005-06-16T00:00:00.600000Z");
+  const auto e = decode("% (lat/lon/height=WGS84/geodetic,Q=1:fix)\n" + k_llh_fixed).at(0);
+  EXPECT_FALSE(e.height_ellipsoid_m);
+  EXPECT_EQ(e.height_msl_m, 61.0);
+}
+
+TEST(Llh, ReadsDegreesMinutesSecondsAndOtherSeparators) {
+  const auto e = decode("2024/06/16 00:00:13.600,-0,30,36.00000,3,45,18.00000,61.0,1,13,0.01,0.01,0.02,0,0,0,1.1,12.5\n").at(0);
+  EXPECT_NEAR(e.lat_deg.value(), -0.51, 1e-12);
+  EXPECT_NEAR(e.lon_deg.value(), 3.755, 1e-12);
+  EXPECT_EQ(e.height_ellipsoid_m, 61.0);
+}
+
+TEST(Llh, RefusesLinesItCannotTrust) {
+  for (const char* line : {"2024/06/16 00:00:13.600 51.0 3.7 61.0 1 13 0.01 0.01\n",                         // short
+                           "2024/06/16 00:00:13.600 51.0 3.7 61.0 8 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n",     // Q 8
+                           "2024/06/16 00:00:13.600 51.0 3.7x 61.0 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n",
+                           "2024/06/31 00:00:13.600 51.0 3.7 61.0 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n",
+                           "4/06/16 00:00:13.600 51.0 3.7 61.0 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n",        // joined late
+                           "2024/06/16 00:00:13.600 95.0 3.7 61.0 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n"}) {
+    Skips skips;
+    EXPECT_TRUE(decode(line, {}, &skips).empty()) << line;
+    EXPECT_EQ(skips["llh: line not readable"], 1U) << line;
+  }
+}
+
+TEST(Llh, SaysThatEcefColumnsHoldNoGeodeticPosition) {
+  Skips skips;
+  EXPECT_TRUE(decode("%  UTC  x-ecef(m) y-ecef(m) z-ecef(m) Q ns sdx(m) sdy(m) sdz(m) sdxy sdyz sdzx age(s) ratio\n"
+                     "2024/06/16 00:00:13.600 4000000.0 300000.0 4900000.0 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n",
+                     {}, &skips)
+                  .empty());
+  EXPECT_EQ(skips["llh: ECEF or baseline form"], 1U);
+}
+
+TEST(Llh, DoesNotUseALineWhoseEndIsMissing) {
+  Skips skips;
+  EXPECT_TRUE(decode(k_llh_fixed.substr(0, k_llh_fixed.size() - 3), {}, &skips).empty());
+  EXPECT_EQ(skips["llh: cut off at the end"], 1U);
+}
+
+// Recorded with gpsd 3.22; the TPV is the format's description's.
+const std::string k_tpv =
+    R"({"class":"TPV","device":"udp://127.0.0.1:29471","status":4,"mode":3,"time":"2024-06-15T23:59:54.000Z","ept":0.005,"lat":51.022879722,"lon":3.710443322,"altHAE":63.5760,"altMSL":18.6140,"alt":18.6140,"track":277.8400,"speed":3.925,"climb":0.210,"geoidSep":44.962,"eph":4.275})"
+    "\r\n";
+
+TEST(Gpsd, DecodesAFloatingEpochWithItsSigmas) {
+  const auto epochs = decode(
+      R"({"class":"VERSION","release":"3.22","rev":"3.22","proto_major":3,"proto_minor":14})"
+      "\r\n"
+      R"({"class":"SKY","hdop":0.9,"uSat":14})"
+      "\r\n"
+      R"({"class":"TPV","device":"x","mode":1})"
+      "\r\n"
+      R"({"class":"GST","device":"x"})"
+      "\r\n" +
+      k_tpv + R"({"class":"GST","time":"2024-06-15T23:59:54.000Z","rms":0.4,"lat":0.17,"lon":0.31,"alt":0.55})" "\r\n");
+  ASSERT_EQ(epochs.size(), 1U);
+  const auto& e = epochs[0];
+  EXPECT_EQ(e.fix, FixClass::rtk_float);  // status 4; NMEA's 4 would be fixed
+  EXPECT_EQ(e.lat_deg, 51.022879722);
+  EXPECT_EQ(e.height_ellipsoid_m, 63.576);
+  EXPECT_EQ(e.height_msl_m, 18.614);
+  EXPECT_EQ(e.sigma_e_m, 0.31);
+  EXPECT_EQ(e.sigma_n_m, 0.31);
+  EXPECT_EQ(e.sigma_u_m, 0.55);
+  EXPECT_EQ(e.satellites, 14);
+  EXPECT_EQ(e.hdop, 0.9);
+}
+
+TEST(Gpsd, MergesSeveralReportsOfOneTimeAndIgnoresEph) {
+  const auto epochs = decode(
+      R"({"class":"TPV","mode":2,"time":"2024-06-15T23:59:54.000Z","lat":51.02,"lon":3.71})" "\n" + k_tpv +
+      R"({"class":"TPV","mode":3,"status":3,"time":"2024-06-15T23:59:54.200Z","lat":51.02,"lon":3.71,"altHAE":63.5,"eph":4.275})" "\n");
+  ASSERT_EQ(epochs.size(), 2U);
+  EXPECT_EQ(epochs[0].height_ellipsoid_m, 63.576);
+  EXPECT_EQ(epochs[1].fix, FixClass::rtk_fixed);
+  EXPECT_FALSE(epochs[1].sigma_e_m);
+}
+
+TEST(Gpsd, DropsPositionsWithoutTimeAndOldHeights) {
+  const auto epochs = decode(
+      R"({"class":"TPV","mode":3,"lat":51.02,"lon":3.71,"altHAE":63.5})" "\n"
+      R"({"class":"TPV","mode":3,"time":"2024-06-15T23:59:54.200Z","lat":51.02,"lon":3.71,"alt":63.5})" "\n");
+  ASSERT_EQ(epochs.size(), 1U);
+  EXPECT_FALSE(epochs[0].height_ellipsoid_m);  // "alt" was either height, by version
+}
+
+TEST(Gpsd, CountsWhatIsNoReport) {
+  Skips skips;
+  EXPECT_TRUE(decode("{\"class\":\n{\"x\":1}\n{]\n" + std::string(1000, '{') + "\n", {}, &skips).empty());
+  EXPECT_EQ(skips["gpsd: line not readable"], 4U);
+}
+
+TEST(Detection, TakesEveryFormatOfOneStream) {
+  const auto epochs = decode(k_gga + k_pvt + k_hp + erb_epoch() + k_llh_fixed + k_tpv);
+  ASSERT_EQ(epochs.size(), 5U);
+  EXPECT_EQ(decode(k_rmc + k_gga + k_pvt + k_hp, {Protocol::ubx, {}, {}}).size(), 1U);
+}
+
+TEST(Detection, FindsSentencesBehindALoggersTimeStamp) {
+  EXPECT_EQ(decode("2024-06-13 09:00:00.123 " + k_rmc + "2024-06-13 09:00:00.124 " + k_gga).size(), 1U);
+}
+
+}  // namespace
+}  // namespace anchord::gnss
