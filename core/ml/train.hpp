@@ -90,6 +90,8 @@ struct MixtureTask {
   double kappa{0};
 };
 Result<BiasMixture> fit_mixture(const MixtureTask& task);
+/// Its first step alone: the curve b0 both classes share, from the LOS rows. errors: too_few_observations below 8 of them
+Result<BiasMixture::Shared> fit_shared_bias(const MixtureTask& task);
 
 double weighted_median(std::vector<std::pair<double, double>> value_and_weight);
 

@@ -59,7 +59,9 @@ std::vector<double> minimise(const std::function<double(const std::vector<double
   return simplex.front().second;
 }
 
-Result<BiasMixture::Shared> fit_shared(const MixtureTask& task) {
+}  // namespace
+
+Result<BiasMixture::Shared> fit_shared_bias(const MixtureTask& task) {
   std::vector<std::size_t> los_rows;
   std::vector<std::pair<double, double>> los_bias;
   for (std::size_t i = 0; i < task.bias_m.size(); ++i)
@@ -91,11 +93,9 @@ Result<BiasMixture::Shared> fit_shared(const MixtureTask& task) {
   return shared;
 }
 
-}  // namespace
-
 Result<BiasMixture> fit_mixture(const MixtureTask& task) {
   BiasMixture m;
-  BOOST_OUTCOME_TRY(m.shared, fit_shared(task));
+  BOOST_OUTCOME_TRY(m.shared, fit_shared_bias(task));
   const std::size_t n = task.bias_m.size();
   double total = 0;
   for (const double w : task.w) total += w;

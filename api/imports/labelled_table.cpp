@@ -1,0 +1,408 @@
+#include "api/imports/labelled_table.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <unordered_map>
+
+#include "api/imports/gzip_lines.hpp"
+
+namespace anchord::api {
+namespace {
+
+using Names = std::vector<std::string_view>;
+
+// Field -> column names it goes by in the public sets, first match wins.
+const Names k_range{"range_m", "distance_m", "measured_range_m", "range", "distance"};
+const Names k_truth{"true_range_m", "true_range_2d_m", "true_distance_m", "rtk_range_m", "truth_m"};
+const Names k_label{"nlos", "is_nlos", "los", "is_los", "label", "cls", "class"};
+const Names k_rx{"rx_dbm", "rss_dbm", "rx_power_dbm", "rss"};
+const Names k_fp{"fp_dbm", "first_path_dbm", "first_path_power", "fp_power_dbm"};
+const Names k_f1{"fp_amp1", "firstPathAmp1"}, k_f2{"fp_amp2", "firstPathAmp2"}, k_f3{"fp_amp3", "firstPathAmp3"};
+const Names k_cir_power{"cir_pwr", "cir_power", "maxGrowthCIR"};
+const Names k_count{"rxpacc", "rxPreamCount", "preamble_count"};
+const Names k_std_noise{"std_noise", "stdNoise"}, k_max_noise{"max_noise", "maxNoise"};
+const Names k_fp_index{"fp_index", "firstPath", "fp_idx"};
+const Names k_height{"height_diff_m", "height_difference_m"};
+const Names k_heading{"heading_deg"};
+const Names k_group{"group", "env", "environment", "place", "room", "campaign", "session", "setup", "tag_pos", "anchor_height_m"};
+const Names k_placement{"setup_id", "placement", "setup"};
+const Names k_time{"t_s", "unix_s", "t_us", "time_s"};
+const Names k_joins{"setup", "idx", "seq"};
+// Registers that trees like as they are. Positions, identities and times are never features: they name the place.
+const Names k_registers{"fp_amp1", "fp_amp2", "fp_amp3", "cir_pwr", "std_noise", "max_noise", "rxpacc", "fp_raw", "cir_kurtosis",
+                        "grp1", "grp2", "grp3", "grp4", "grp5", "grp6", "grp7", "grp8"};
+
+constexpr std::size_t k_none = static_cast<std::size_t>(-1);
+constexpr std::size_t k_time_blocks = 10;
+constexpr double k_nan = std::numeric_limits<double>::quiet_NaN();
+
+void split(std::string_view line, std::vector<std::string_view>& cells) {
+  cells.clear();
+  while (true) {
+    const auto comma = line.find(',');
+    auto cell = line.substr(0, comma);
+    if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"') cell = cell.substr(1, cell.size() - 2);
+    while (!cell.empty() && cell.front() == ' ') cell.remove_prefix(1);
+    while (!cell.empty() && cell.back() == ' ') cell.remove_suffix(1);
+    cells.push_back(cell);
+    if (comma == std::string_view::npos) return;
+    line.remove_prefix(comma + 1);
+  }
+}
+
+double number(std::string_view cell) {
+  double value = k_nan;
+  const auto [end, status] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
+  return status == std::errc{} && end == cell.data() + cell.size() && std::isfinite(value) ? value : k_nan;
+}
+
+std::optional<double> finite(double value) { return std::isnan(value) ? std::nullopt : std::optional{value}; }
+
+struct Header {
+  std::vector<std::string> names;
+  std::size_t of(std::string_view name) const {
+    const auto at = std::find(names.begin(), names.end(), name);
+    return at == names.end() ? k_none : static_cast<std::size_t>(at - names.begin());
+  }
+  std::size_t first(const Names& candidates) const {
+    for (const auto name : candidates)
+      if (const auto at = of(name); at != k_none) return at;
+    return k_none;
+  }
+};
+
+class Ids {
+ public:
+  std::uint32_t of(const std::string& name) {
+    const auto [at, fresh] = ids_.try_emplace(name, static_cast<std::uint32_t>(names_.size()));
+    if (fresh) names_.push_back(name);
+    return at->second;
+  }
+  std::vector<std::string> names() const { return names_; }
+
+ private:
+  std::unordered_map<std::string, std::uint32_t> ids_;
+  std::vector<std::string> names_;
+};
+
+std::string joined(const std::vector<std::string_view>& cells, std::span<const std::size_t> columns) {
+  std::string out;
+  for (const auto c : columns) out.append(out.empty() ? "" : "/").append(cells[c]);
+  return out;
+}
+
+using CirShapes = std::unordered_map<std::string, nlos::CirShape>;
+
+struct CirTable {
+  std::vector<std::string> join_names;
+  CirShapes shapes;
+};
+
+Result<CirTable> read_cir(const std::filesystem::path& path) {
+  BOOST_OUTCOME_TRY(auto lines, GzipLines::open(path));
+  CirTable out;
+  std::vector<std::size_t> joins;
+  std::vector<std::pair<std::size_t, std::size_t>> taps;
+  std::vector<std::string_view> cells;
+  std::vector<float> magnitude;
+  std::size_t width = 0;
+  for (std::string_view line;;) {
+    BOOST_OUTCOME_TRY(const bool more, lines.next(line));
+    if (!more) break;
+    split(line, cells);
+    if (width == 0) {
+      width = cells.size();
+      for (std::size_t c = 0; c < width; ++c) {
+        if (std::find(k_joins.begin(), k_joins.end(), cells[c]) != k_joins.end()) joins.push_back(c), out.join_names.emplace_back(cells[c]);
+        else if (cells[c].size() > 1 && cells[c][0] == 'm' && !std::isnan(number(cells[c].substr(1))))
+          taps.emplace_back(static_cast<std::size_t>(number(cells[c].substr(1))), c);
+      }
+      std::sort(taps.begin(), taps.end());
+      if (joins.empty() || taps.size() < 32) return make_error(Errc::invalid_argument, path.string() + ": a CIR table needs a join column (setup, idx, seq) and taps m0, m1, ...");
+      continue;
+    }
+    if (cells.size() != width)
+      return make_error(Errc::bad_frame, path.string() + ":" + std::to_string(lines.line_number()) + ": " + std::to_string(cells.size()) + " cells, the header has " + std::to_string(width));
+    magnitude.clear();
+    for (const auto& [tap, column] : taps) magnitude.push_back(static_cast<float>(number(cells[column])));
+    if (std::any_of(magnitude.begin(), magnitude.end(), [](float v) { return std::isnan(v); })) continue;
+    if (const auto shape = nlos::cir_shape(magnitude, std::nullopt)) out.shapes.emplace(joined(cells, joins), *shape);
+  }
+  return out;
+}
+
+class Reader {
+ public:
+  Reader(const TableOptions& options, bool several_files) : options_{options}, several_files_{several_files} {}
+
+  Result<void> read(const std::filesystem::path& path, const CirTable* cir) {
+    BOOST_OUTCOME_TRY(auto lines, GzipLines::open(path));
+    file_ = path.string();
+    std::string_view line;
+    BOOST_OUTCOME_TRY(const bool any, lines.next(line));
+    if (!any) return make_error(Errc::bad_frame, file_ + ": empty file, a header line is needed");
+    std::vector<std::string_view> cells;
+    split(line, cells);
+    BOOST_OUTCOME_TRY(take_header(cells));
+    std::vector<std::size_t> joins;
+    if (cir) {
+      for (const auto& name : cir->join_names) {
+        joins.push_back(header_.of(name));
+        if (joins.back() == k_none) return make_error(Errc::not_found, file_ + ": the CIR table is joined by column " + name + ", which is not there");
+      }
+    }
+    while (true) {
+      BOOST_OUTCOME_TRY(const bool more, lines.next(line));
+      if (!more) break;
+      if (line.empty()) continue;
+      split(line, cells);
+      if (cells.size() != header_.names.size())
+        return make_error(Errc::bad_frame, file_ + ":" + std::to_string(lines.line_number()) + ": " + std::to_string(cells.size()) + " cells, the header has " + std::to_string(header_.names.size()));
+      ++out_.rows_read;
+      const nlos::CirShape* shape = nullptr;
+      if (cir) {
+        const auto found = cir->shapes.find(joined(cells, joins));
+        if (found != cir->shapes.end()) shape = &found->second;
+      }
+      if (cir && shape == nullptr) drop("no CIR in the CIR table", lines.line_number());
+      else take_row(cells, lines.line_number(), shape);
+    }
+    return boost::outcome_v2::success();
+  }
+
+  Result<LabelledTable> finish() {
+    if (out_.rows() == 0) return make_error(Errc::too_few_observations, file_ + ": no usable row among " + std::to_string(out_.rows_read));
+    BOOST_OUTCOME_TRY(map_labels());
+    if (out_.grouping == Grouping::time_block) {
+      for (std::size_t i = 0; i < out_.rows(); ++i) out_.group[i] = static_cast<std::uint32_t>(i * k_time_blocks / out_.rows());
+      for (std::size_t b = 0; b < k_time_blocks; ++b) out_.group_names.push_back("block " + std::to_string(b));
+    } else {
+      out_.group_names = groups_.names();
+    }
+    return std::move(out_);
+  }
+
+ private:
+  Result<std::size_t> column(const std::string& name) const {
+    const auto at = header_.of(name);
+    if (at == k_none) {
+      std::string known;
+      for (const auto& n : header_.names) known += (known.empty() ? "" : ", ") + n;
+      return make_error(Errc::not_found, file_ + ": no column " + name + "; the columns are " + known);
+    }
+    return at;
+  }
+
+  Result<void> take_header(const std::vector<std::string_view>& cells) {
+    Header fresh;
+    for (const auto cell : cells) fresh.names.emplace_back(cell);
+    if (!header_.names.empty()) {
+      if (fresh.names != header_.names) return make_error(Errc::invalid_argument, file_ + ": its columns differ from those of the first file");
+      return boost::outcome_v2::success();
+    }
+    header_ = std::move(fresh);
+    range_ = header_.first(k_range);
+    if (range_ == k_none) return make_error(Errc::not_found, file_ + ": no column of measured ranges (range_m, distance_m)");
+    label_ = header_.first(k_label);
+    if (!options_.label.empty()) {
+      BOOST_OUTCOME_TRY(label_, column(options_.label));
+    }
+    truth_ = header_.first(k_truth);
+    if (!options_.truth.empty()) {
+      BOOST_OUTCOME_TRY(truth_, column(options_.truth));
+    }
+    if (label_ != k_none) out_.label_column = header_.names[label_];
+    if (truth_ != k_none) out_.truth_column = header_.names[truth_];
+    BOOST_OUTCOME_TRY(choose_groups());
+    BOOST_OUTCOME_TRY(choose_placements());
+    out_.raw_names = header_.names;
+    return boost::outcome_v2::success();
+  }
+
+  Result<void> choose_groups() {
+    for (const auto& name : options_.group_by) {
+      BOOST_OUTCOME_TRY(const auto at, column(name));
+      group_columns_.push_back(at);
+    }
+    if (group_columns_.empty() && header_.first(k_group) != k_none) group_columns_.push_back(header_.first(k_group));
+    out_.grouping = !group_columns_.empty() ? Grouping::column : several_files_ ? Grouping::file : header_.first(k_time) != k_none ? Grouping::time_block : Grouping::row;
+    for (const auto c : group_columns_) out_.group_by += (out_.group_by.empty() ? "" : ",") + header_.names[c];
+    if (out_.grouping == Grouping::file) out_.group_by = "file";
+    if (out_.grouping == Grouping::time_block) out_.group_by = "time block";
+    return boost::outcome_v2::success();
+  }
+
+  Result<void> choose_placements() {
+    for (const auto& name : options_.placement) {
+      BOOST_OUTCOME_TRY(const auto at, column(name));
+      placement_columns_.push_back(at);
+    }
+    const auto add = [&](std::size_t at) {
+      if (at != k_none) placement_columns_.push_back(at);
+    };
+    if (placement_columns_.empty()) add(header_.first(k_placement));
+    if (placement_columns_.empty() && header_.of("tag_pos") != k_none && header_.of("anchor_id") != k_none)
+      add(header_.of("tag_pos")), add(header_.of("anchor_id"));
+    // A true range that repeats names its placement, together with the place and the class.
+    if (placement_columns_.empty() && truth_ != k_none) {
+      placement_columns_ = group_columns_;
+      add(truth_);
+      add(label_);
+    }
+    for (const auto c : placement_columns_) out_.placement_by += (out_.placement_by.empty() ? "" : ",") + header_.names[c];
+    return boost::outcome_v2::success();
+  }
+
+  void drop(const std::string& reason, std::size_t line) {
+    auto& entry = out_.dropped[reason];
+    if (entry.first++ == 0) entry.second = file_ + ":" + std::to_string(line);
+  }
+
+  void take_row(const std::vector<std::string_view>& cells, std::size_t line, const nlos::CirShape* shape) {
+    values_.clear();
+    for (const auto cell : cells) values_.push_back(number(cell));
+    const auto value = [&](const Names& names) {
+      const auto at = header_.first(names);
+      return at == k_none ? std::nullopt : finite(values_[at]);
+    };
+    const double range = values_[range_];
+    if (!(range > 0)) return drop(std::isnan(range) ? header_.names[range_] + " missing" : header_.names[range_] + " not above zero", line);
+    if (range > 1e4) return drop(header_.names[range_] + " beyond 10 km", line);
+    std::optional<double> truth;
+    if (truth_ != k_none) {
+      truth = finite(values_[truth_]);
+      if (!truth) return drop(header_.names[truth_] + " missing", line);
+      if (!(*truth > 0) || *truth > 1e4) return drop(header_.names[truth_] + " impossible", line);
+    }
+    if (label_ != k_none && cells[label_].empty()) return drop(header_.names[label_] + " missing", line);
+
+    nlos::DiagnosticSample s;
+    s.range_m = range;
+    s.rx_dbm = value(k_rx), s.fp_dbm = value(k_fp);
+    s.fp_amp1 = value(k_f1), s.fp_amp2 = value(k_f2), s.fp_amp3 = value(k_f3);
+    s.cir_power = value(k_cir_power), s.preamble_count = value(k_count);
+    s.std_noise = value(k_std_noise), s.max_noise = value(k_max_noise);
+    s.fp_index = value(k_fp_index);
+    s.height_difference_m = value(k_height), s.heading_deg = value(k_heading);
+    if (shape) s.cir = *shape;
+    out_.features.push_back(nlos::compute_features(s));
+    out_.raw.insert(out_.raw.end(), values_.begin(), values_.end());
+    out_.range_m.push_back(range);
+    out_.true_range_m.push_back(truth);
+    out_.los.emplace_back();
+    labels_.emplace_back(label_ == k_none ? std::string{} : std::string{cells[label_]});
+    std::string group = out_.grouping == Grouping::file ? file_ : joined(cells, group_columns_);
+    if (out_.grouping == Grouping::row && !placement_columns_.empty()) group = joined(cells, placement_columns_);
+    else if (out_.grouping == Grouping::row) group = std::to_string(out_.rows());
+    out_.group.push_back(out_.grouping == Grouping::time_block ? 0 : groups_.of(group));
+    out_.placement.push_back(placement_columns_.empty() ? static_cast<std::uint32_t>(out_.rows())
+                                                        : placements_.of((several_files_ ? file_ + "/" : "") + group + "/" + joined(cells, placement_columns_)));
+  }
+
+  Result<void> map_labels() {
+    if (label_ == k_none) return boost::outcome_v2::success();
+    std::string los_value = options_.los_value;
+    const auto& name = header_.names[label_];
+    if (los_value.empty() && (name == "nlos" || name == "is_nlos")) los_value = "0";
+    if (los_value.empty() && (name == "los" || name == "is_los")) los_value = "1";
+    if (los_value.empty()) los_value = std::find(labels_.begin(), labels_.end(), "LOS") != labels_.end() ? "LOS" : *std::min_element(labels_.begin(), labels_.end());
+    std::size_t los = 0;
+    for (std::size_t i = 0; i < labels_.size(); ++i) {
+      const double a = number(labels_[i]), b = number(los_value);
+      out_.los[i] = !std::isnan(a) && !std::isnan(b) ? a == b : labels_[i] == los_value;
+      los += *out_.los[i] ? 1 : 0;
+    }
+    if (los == 0 && !options_.los_value.empty()) return make_error(Errc::invalid_argument, file_ + ": no row of column " + name + " is \"" + los_value + "\"");
+    return boost::outcome_v2::success();
+  }
+
+  const TableOptions& options_;
+  bool several_files_;
+  std::string file_;
+  Header header_{};
+  std::size_t range_{k_none}, label_{k_none}, truth_{k_none};
+  std::vector<std::size_t> group_columns_, placement_columns_;
+  std::vector<double> values_;
+  std::vector<std::string> labels_;
+  Ids groups_, placements_;
+  LabelledTable out_;
+};
+
+}  // namespace
+
+Result<LabelledTable> read_labelled_tables(std::span<const std::filesystem::path> paths, const TableOptions& options) {
+  if (paths.empty()) return make_error(Errc::invalid_argument, "no data file given");
+  std::optional<CirTable> cir;
+  if (options.cir) {
+    BOOST_OUTCOME_TRY(cir, read_cir(*options.cir));
+  }
+  Reader reader{options, paths.size() > 1};
+  for (const auto& path : paths) {
+    BOOST_OUTCOME_TRY(reader.read(path, cir ? &*cir : nullptr));
+  }
+  return reader.finish();
+}
+
+Result<ml::Dataset> dataset_from(const LabelledTable& table, const SetRequest& request, std::vector<std::size_t>& rows,
+                                 std::map<std::string, std::size_t>& dropped) {
+  if (request.need_label && !table.labelled()) return make_error(Errc::not_found, "no label column (nlos, los, label, cls): name it with --label");
+  if (request.need_truth && !table.has_truth()) return make_error(Errc::not_found, "no column of true ranges (true_range_m): name it with --truth");
+  struct Source {
+    std::optional<nlos::Feature> feature;
+    std::size_t column{};
+  };
+  std::vector<Source> sources;
+  for (const auto& name : request.features) {
+    const auto feature = nlos::feature_of(name);
+    const auto column = std::find(table.raw_names.begin(), table.raw_names.end(), name);
+    if (!feature && column == table.raw_names.end()) return make_error(Errc::not_found, "no feature or column named " + name);
+    sources.push_back({feature, static_cast<std::size_t>(column - table.raw_names.begin())});
+  }
+  ml::Dataset out;
+  out.features = request.features;
+  out.group_names = table.group_names;
+  rows.clear();
+  std::vector<double> values(sources.size());
+  for (std::size_t i = 0; i < table.rows(); ++i) {
+    bool whole = true;
+    for (std::size_t f = 0; f < sources.size() && whole; ++f) {
+      const auto value = sources[f].feature ? table.features[i].get(*sources[f].feature) : finite(table.raw[i * table.raw_names.size() + sources[f].column]);
+      whole = value.has_value();
+      if (!whole) ++dropped["no " + request.features[f]];
+      else values[f] = *value;
+    }
+    if (!whole) continue;
+    out.x.insert(out.x.end(), values.begin(), values.end());
+    if (table.labelled()) out.los.push_back(table.los[i].value_or(false) ? 1 : 0);
+    if (table.has_truth()) out.bias_m.push_back(table.range_m[i] - *table.true_range_m[i]);
+    out.weight.push_back(1);
+    out.group.push_back(table.group[i]);
+    out.placement.push_back(table.placement[i]);
+    rows.push_back(i);
+  }
+  if (rows.empty()) return make_error(Errc::too_few_observations, "no row has all of the features asked for");
+  return out;
+}
+
+std::vector<std::string> available_features(const LabelledTable& table, bool with_registers) {
+  std::vector<std::string> out;
+  const auto most = static_cast<std::size_t>(0.99 * static_cast<double>(table.rows()));
+  for (std::size_t f = 0; f < nlos::k_feature_count; ++f) {
+    std::size_t present = 0;
+    for (const auto& row : table.features) present += row.present.test(f) ? 1 : 0;
+    if (present >= most && present > 0) out.emplace_back(nlos::feature_name(static_cast<nlos::Feature>(f)));
+  }
+  if (!with_registers) return out;
+  for (const auto name : k_registers) {
+    const auto at = std::find(table.raw_names.begin(), table.raw_names.end(), name);
+    if (at == table.raw_names.end()) continue;
+    const auto column = static_cast<std::size_t>(at - table.raw_names.begin());
+    std::size_t present = 0;
+    for (std::size_t i = 0; i < table.rows(); ++i) present += std::isnan(table.raw[i * table.raw_names.size() + column]) ? 0 : 1;
+    if (present >= most) out.emplace_back(name);
+  }
+  return out;
+}
+
+}  // namespace anchord::api

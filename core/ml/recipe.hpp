@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "core/ml/dataset.hpp"
+#include "core/ml/train.hpp"
+
+/// One way to fit: a method, its features and its settings; and how it does on places it has not seen.
+namespace anchord::ml {
+
+enum class Method : std::uint8_t {
+  none,            ///< no correction
+  constant,        ///< median bias
+  logistic, random_forest, svm, boosted,
+  average,         ///< mean of the logits of logistic, RBF SVM and forest
+  univariate,      ///< polynomial of one feature
+  multivariate,    ///< polynomial of several, with interactions
+  least_absolute,  ///< robust linear fit
+};
+
+std::string_view method_name(Method method);
+std::optional<Method> method_of(std::string_view name);
+
+struct Recipe {
+  Method method{Method::average};
+  std::vector<std::string> features{};
+  double clip{3};                  ///< sd, for features outside the training range; 0 off
+  double c{3};                     ///< logistic
+  SvmOptions svm{};                ///< c counts placements, and is spread over their rows
+  TreeOptions forest{};
+  BoostOptions boosted{};
+  int degree{2};                   ///< polynomials
+  double ridge{1e-3};
+  std::size_t per_placement{5};    ///< rows of one placement used for training: repeats are near copies
+
+  std::string describe() const;    ///< "svm(c=3, gamma=0.03) on 7 features"
+};
+
+/// Answers whether to go on.
+using Progress = std::function<bool(const std::string& stage, double share_done)>;
+
+/// Uncalibrated classifier on the recipe's features. errors: not_found, too_few_observations (one class only)
+Result<Classifier> fit_classifier(const Dataset& data, const Recipe& recipe);
+/// errors: not_found, too_few_observations
+Result<Regressor> fit_regressor(const Dataset& data, const Recipe& recipe);
+
+/// Weight 1 / rows of the same placement for each row, so that every placement counts alike.
+std::vector<double> placement_weights(const Dataset& data);
+
+/// What models that never saw a row's place say about it.
+struct OutOfFold {
+  std::vector<double> logit{};       ///< classification, uncalibrated
+  std::vector<double> p_los{};       ///< calibrated by one Platt line over all folds, clipped
+  Platt platt{};
+  std::vector<double> bias_m{};      ///< regression
+  double loss{};                     ///< log loss or MAE, every placement alike: what selection minimises
+  double loss_sd{};                  ///< over the folds
+  double worst_harm_m{};             ///< regression: largest rise of a place's MAE over the uncorrected one
+};
+/// fold  of each row, from grouped_folds
+Result<OutOfFold> cross_validate(const Dataset& data, const Recipe& recipe, const std::vector<std::size_t>& fold, bool classification);
+
+/// Largest rise, metres, of any group's mean absolute error by a correction; groups of fewer than 20 rows are left to noise.
+double worst_harm_m(const Dataset& data, std::span<const double> correction_m);
+
+}  // namespace anchord::ml
