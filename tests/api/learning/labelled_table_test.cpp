@@ -1,0 +1,132 @@
+#include "api/imports/labelled_table.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include <fstream>
+
+#include "api/imports/gzip_lines.hpp"
+
+namespace anchord::api {
+namespace {
+
+class LabelledTableTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    dir_ = std::filesystem::temp_directory_path() / ("anchord_table_" + std::to_string(getpid()) + "_" + testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::create_directories(dir_);
+  }
+  void TearDown() override { std::filesystem::remove_all(dir_); }
+
+  std::filesystem::path plain(const std::string& name, const std::string& text) {
+    std::ofstream{dir_ / name, std::ios::binary} << text;
+    return dir_ / name;
+  }
+  std::filesystem::path gzip(const std::string& name, const std::string& text) {
+    const gzFile f = gzopen((dir_ / name).c_str(), "wb");
+    gzwrite(f, text.data(), static_cast<unsigned>(text.size()));
+    gzclose(f);
+    return dir_ / name;
+  }
+  static Result<LabelledTable> read(std::vector<std::filesystem::path> paths, TableOptions options = {}) { return read_labelled_tables(paths, options); }
+
+  std::filesystem::path dir_;
+};
+
+const std::string k_rooms =
+    "env,nlos,setup_id,range_m,true_range_m,rx_dbm,fp_dbm\n"
+    "hw,0,a,5.1,5.0,-80,-82\n"
+    "hw,1,b,6.9,6.0,-85,-95\n"
+    "til,0,c,3.0,3.0,-75,-77\n";
+
+}  // namespace
+
+TEST_F(LabelledTableTest, ReadsGzipAndPlainAlikeAndMapsColumnsByName) {
+  const auto a = read({gzip("r.csv.gz", k_rooms)}), b = read({plain("r.csv", k_rooms)});
+  ASSERT_TRUE(a && b);
+  EXPECT_EQ(a.value().range_m, b.value().range_m);
+  EXPECT_EQ(a.value().group, b.value().group);
+  const auto& t = a.value();
+  EXPECT_EQ(t.rows(), 3U);
+  EXPECT_EQ(t.los[0], true);
+  EXPECT_EQ(t.los[1], false);
+  EXPECT_EQ(t.truth_column, "true_range_m");
+  EXPECT_EQ(t.group_by, "env");
+  EXPECT_EQ(t.group, (std::vector<std::uint32_t>{0, 0, 1}));
+  EXPECT_NEAR(*t.features[1].get(nlos::Feature::rx_minus_fp_db), 10, 1e-12);
+}
+
+TEST_F(LabelledTableTest, DropsMissingAndImpossibleValuesAndSaysWhere) {
+  const auto t = read({plain("r.csv", "nlos,range_m,rx_dbm,fp_dbm\n0,0,-80,-82\n0,,-80,-82\n1,5,-inf,-82\n,4,-80,-81\n0,nan,-80,-81\n1,7,-80,-82\n")});
+  ASSERT_TRUE(t);
+  EXPECT_EQ(t.value().rows(), 2U);
+  EXPECT_EQ(t.value().dropped.at("range_m not above zero").first, 1U);
+  EXPECT_EQ(t.value().dropped.at("range_m missing").first, 2U);
+  EXPECT_NE(t.value().dropped.at("nlos missing").second.find("r.csv:5"), std::string::npos);
+  std::vector<std::size_t> rows;
+  std::map<std::string, std::size_t> dropped;
+  const auto d = dataset_from(t.value(), {{"range_m", "rx_dbm"}, true, false}, rows, dropped);
+  ASSERT_TRUE(d);
+  EXPECT_EQ(rows, std::vector<std::size_t>{1});
+  EXPECT_EQ(dropped.at("no rx_dbm"), 1U);
+}
+
+TEST_F(LabelledTableTest, NamesTheLineOfABrokenRowAndTheColumnThatLacks) {
+  const auto torn = read({plain("r.csv", "nlos,range_m\n0,1\n0,1,2\n")});
+  ASSERT_FALSE(torn);
+  EXPECT_NE(torn.error().message.find("r.csv:3"), std::string::npos);
+  TableOptions options;
+  options.label = "wall";
+  const auto lacking = read({plain("r.csv", k_rooms)}, options);
+  ASSERT_FALSE(lacking);
+  EXPECT_NE(lacking.error().message.find("no column wall"), std::string::npos);
+  EXPECT_NE(lacking.error().message.find("setup_id"), std::string::npos);
+  EXPECT_FALSE(read({plain("e.csv", "")}));
+  EXPECT_FALSE(read({plain("h.csv", "nlos,range_m\n")}));
+  EXPECT_FALSE(read({plain("n.csv", "a,b\n1,2\n")}));
+  EXPECT_FALSE(read({dir_ / "absent.csv"}));
+  EXPECT_FALSE(read({dir_}));
+}
+
+TEST_F(LabelledTableTest, RefusesATruncatedGzipInsteadOfTrainingOnHalfOfIt) {
+  std::string text = "nlos,range_m\n";
+  for (int i = 0; i < 5000; ++i) text += std::to_string(i % 2) + "," + std::to_string(1 + (i * 7919) % 1000) + "\n";
+  const auto whole = gzip("r.csv.gz", text);
+  std::filesystem::resize_file(whole, std::filesystem::file_size(whole) / 2);
+  EXPECT_FALSE(read({whole}));
+}
+
+TEST_F(LabelledTableTest, TakesTheLowestClassNumberForLosUnlessToldOtherwise) {
+  const auto path = plain("r.csv", "cls,range_m\n2,1\n1,1\n3,1\n");
+  EXPECT_EQ(read({path}).value().los, (std::vector<std::optional<bool>>{false, true, false}));
+  TableOptions options;
+  options.los_value = "3";
+  EXPECT_EQ(read({path}, options).value().los, (std::vector<std::optional<bool>>{false, false, true}));
+}
+
+TEST_F(LabelledTableTest, SplitsByFileWhereSeveralAreGivenAndNoColumnNamesAPlace) {
+  const auto a = plain("a.csv", "range_m,rtk_range_m\n1,1\n2,2\n"), b = plain("b.csv", "range_m,rtk_range_m\n3,3\n");
+  const auto t = read({a, b});
+  ASSERT_TRUE(t);
+  EXPECT_EQ(t.value().grouping, Grouping::file);
+  EXPECT_EQ(t.value().group, (std::vector<std::uint32_t>{0, 0, 1}));
+  EXPECT_EQ(read({a}).value().grouping, Grouping::row);
+}
+
+// Magnitudes are joined by setup and idx; the shape is that of core/nlos/cir.
+TEST_F(LabelledTableTest, JoinsCirsAndDropsRowsWithoutOne) {
+  std::string cir = "setup,idx";
+  for (int k = 0; k < 800; ++k) cir += ",m" + std::to_string(k);
+  cir += "\n4,1";
+  for (int k = 0; k < 800; ++k) cir += k >= 700 && k < 710 ? ",900" : ",10";
+  TableOptions options;
+  options.cir = plain("cir.csv", cir + "\n");
+  const auto t = read({plain("r.csv", "setup,idx,nlos,range_m\n4,0,0,5\n4,1,0,5\n")}, options);
+  ASSERT_TRUE(t);
+  EXPECT_EQ(t.value().rows(), 1U);
+  EXPECT_NEAR(*t.value().features[0].get(nlos::Feature::early_energy), 8 / 10.0, 0.11);   // the window begins 5 taps before the first path
+  EXPECT_EQ(t.value().dropped.at("no CIR in the CIR table").first, 1U);
+}
+
+}  // namespace anchord::api
