@@ -1,0 +1,185 @@
+// ./dev bench: one table. Every figure of ours stands beside a peer or a limit taken in the same run.
+//   node tests/bench/bench.mjs [solve] [ingest] [get] [fanout]
+import { execFileSync } from 'node:child_process';
+import { createServer } from 'node:http';
+import { existsSync, mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { LiveClient } from '../e2e/live.mjs';
+import { eventually, run, startServer } from '../e2e/server.mjs';
+import { cpuSeconds, hammer, percentile, request } from './load.mjs';
+
+const wanted = process.argv.slice(2);
+const on = (name) => wanted.length === 0 || wanted.includes(name);
+const rows = [];
+const row = (work, figure, beside = '') => {
+  rows.push([work, figure, beside]);
+  console.error(`    ${work}: ${figure}${beside ? `   (${beside})` : ''}`);
+};
+const say = (text) => console.error(`==> ${text}`);
+
+function solve() {
+  const bench = join(process.env.ANCHORD_BENCH_DIR ?? '', 'solve_bench');
+  if (!existsSync(bench)) return row('solve', 'not built', bench);
+  const out = JSON.parse(execFileSync(bench, ['--benchmark_format=json', '--benchmark_min_time=0.2'], { stdio: ['ignore', 'pipe', 'ignore'] }));
+  const time = Object.fromEntries(out.benchmarks.map((b) => [b.name, b]));
+  for (const n of [10, 100, 1000, 10000]) {
+    row(`solve one anchor, ${n} ranges, cold`, `${time[`solve_gauss_newton/${n}`].cpu_time.toFixed(1)} us CPU`, `Ceres ${time[`solve_ceres/${n}`].cpu_time.toFixed(0)} us`);
+  }
+  row('solve a flight of 3 700 ranges, 6 anchors', `${time.solve_whole_flight.cpu_time.toFixed(0)} ms CPU`);
+  row('live path, per second of flight', `${(time.live_whole_flight.cpu_s_per_flight_s * 1e3).toFixed(1)} ms CPU`, 'limit 1000 ms');
+}
+
+const mission = (name) => ({ name, kit: 'bench', frame: 'wgs84', track_point: 'gnss_antenna', tags: [{ tag: '0x6e01', antenna: 0, lever_arm_body_m: [0, 0, 0] }] });
+
+async function newMission(server, name) {
+  const answer = await server.fetch('/api/v1/missions', { json: mission(name) });
+  const text = await answer.text();
+  if (answer.status !== 201) throw new Error(`POST missions: ${answer.status} ${text}`);
+  return JSON.parse(text).id;
+}
+
+let sequence = 0;
+function ndjson(count, mission, cir) {
+  let body = '';
+  for (let i = 0; i < count; i++) {
+    const seq = sequence++;
+    body += `{"t_us":${1777889472000000 + seq * 100},"tag":"0x6e01","anchor":"0x6a2${seq % 6}","distance_m":${(5 + (seq % 1000) / 100).toFixed(3)},"rss_dbm":-84.3,"fp_dbm":-86.1,"rx_dbm":-82.7,"seq":${seq},"mission":"${mission}"${cir}}\n`;
+  }
+  return body;
+}
+
+async function ingest(server) {
+  const id = await newMission(server, 'bench ingest');
+  const samples = Buffer.alloc(1016 * 4);
+  for (let i = 0; i < samples.length; i++) samples[i] = (i * 37) & 0xff;
+  const cir = `,"cir":{"n":1016,"dt_ps":1001.6,"first_path_idx":744.2,"rxpacc":1001,"b64":"${samples.toString('base64')}"}`;
+  for (const [name, extra, perBody, bodies] of [['without CIR', '', 10_000, 6], ['with CIR', cir, 1000, 6]]) {
+    const texts = Array.from({ length: bodies }, () => ndjson(perBody, id, extra));
+    const cpu = cpuSeconds(server.pid), start = performance.now();
+    for (const body of texts) {
+      const answer = await server.fetch('/api/v1/ranges', { method: 'POST', headers: { 'content-type': 'application/x-ndjson' }, body });
+      const result = await answer.json();
+      if (result.accepted !== perBody) throw new Error(`ingest: ${answer.status} ${JSON.stringify(result).slice(0, 500)}`);
+    }
+    const seconds = (performance.now() - start) / 1000, total = perBody * bodies;
+    row(`ingest over HTTP ${name}`, `${Math.round(total / seconds)} rows/s, ${((cpuSeconds(server.pid) - cpu) / total * 1e6).toFixed(1)} us CPU a row`,
+      name === 'without CIR' ? `SQLite alone ${sqliteAlone(total)} rows/s` : 'aim 2 000 rows/s');
+  }
+  const one = [];
+  for (let i = 0; i < 200; i++) {
+    const body = ndjson(1, id, '');
+    const start = performance.now();
+    const answer = await server.fetch('/api/v1/ranges', { method: 'POST', headers: { 'content-type': 'application/x-ndjson' }, body });
+    await answer.arrayBuffer();
+    one.push(performance.now() - start);
+  }
+  row('POST of one range, acknowledged after fsync', `p50 ${percentile(one, 0.5).toFixed(2)} ms, p99 ${percentile(one, 0.99).toFixed(2)} ms`);
+}
+
+/** The same rows by the sqlite3 program into a table with one key, WAL, FULL, 1 000 rows a transaction: the limit. */
+function sqliteAlone(count) {
+  const folder = mkdtempSync(join(tmpdir(), 'anchord-bench-'));
+  try {
+    let sql = 'PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; CREATE TABLE r(id INTEGER PRIMARY KEY, t INTEGER, tag INTEGER, anchor INTEGER, seq INTEGER, d REAL, rss REAL, fp REAL, rx REAL, UNIQUE(t, tag, anchor, seq)) STRICT;\n';
+    for (let i = 0; i < count; i++) {
+      if (i % 1000 === 0) sql += 'BEGIN;\n';
+      sql += `INSERT INTO r(t,tag,anchor,seq,d,rss,fp,rx) VALUES(${1777889472000000 + i * 100},28161,${27168 + (i % 6)},${i},7.5,-84.3,-86.1,-82.7);\n`;
+      if (i % 1000 === 999) sql += 'COMMIT;\n';
+    }
+    const start = performance.now();
+    execFileSync('sqlite3', [join(folder, 'x.db')], { input: sql, stdio: ['pipe', 'ignore', 'inherit'] });
+    return Math.round(count / ((performance.now() - start) / 1000));
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
+}
+
+async function get(server) {
+  const flight = join(server.dataDir, 'flight');
+  await run(['simulate', 'flight', '--seed', '7', '--duration', '60', '--out', flight]);
+  const { code, stderr } = await run(['import', 'flight', flight, '--url', server.url]);
+  if (code !== 0) throw new Error(`import: ${stderr}`);
+  const id = (await (await server.fetch('/api/v1/missions')).json()).items?.find((m) => m.name.startsWith('simulated'))?.id;
+  const solved = await server.fetch('/api/v1/calibrations', { json: { missions: [id] }, headers: { prefer: 'wait=60' } });
+  const calibration = await solved.json();
+  const published = await server.fetch(`/api/v1/calibrations/${calibration.id}/publish`, { json: {} });
+  if (!published.ok) throw new Error(`publish: ${published.status} ${await published.text()}`);
+  const body = await (await server.fetch('/api/v1/anchors/0x6a21')).text();
+  const cpu = cpuSeconds(server.pid);
+  const ours = await hammer(server.port, request('GET', '/api/v1/anchors/0x6a21', { port: server.port }));
+  const perRequest = ((cpuSeconds(server.pid) - cpu) / ours.count) * 1e6;
+  const peer = createServer((_, response) => response.writeHead(200, { 'content-type': 'application/geo+json', 'content-length': Buffer.byteLength(body) }).end(body));
+  await new Promise((done) => peer.listen(0, '127.0.0.1', done));
+  const plain = await hammer(peer.address().port, request('GET', '/', { port: 1 }));
+  peer.close();
+  row('GET of one anchor, 4 connections', `${Math.round(ours.perSecond)} a second, p99 ${ours.p99Ms.toFixed(2)} ms, ${perRequest.toFixed(0)} us CPU`, `the same bytes from a bare Node server in the generator's process ${Math.round(plain.perSecond)}`);
+}
+
+async function fanout(server) {
+  const id = await newMission(server, 'bench fan-out');
+  const clients = [], late = [];
+  let gaps = 0;
+  for (let i = 0; i < 50; i++) {
+    const client = await LiveClient.open(server);
+    client.socket.on('message', (data) => {
+      const now = (performance.timeOrigin + performance.now()) * 1000;
+      const message = JSON.parse(String(data));
+      if (message.op === 'gap') gaps++;
+      if (message.op === 'data') for (const range of [message.data].flat()) if (range.mission === id) late.push((now - range.t_us) / 1000);
+    });
+    client.send({ op: 'sub', id: 1, topic: 'ranges' });
+    await client.next('ack', (m) => m.op === 'ack');
+    clients.push(client);
+  }
+  // 100 ranges a second, each stamped when it is sent; a fix every 50 ms, since a range waits for the fix after it.
+  const seconds = 5, cpu = cpuSeconds(server.pid), start = performance.now();
+  const nowUs = () => Math.round((performance.timeOrigin + performance.now()) * 1000);
+  let sent = 0, seq = 0;
+  const post = (path, json) => server.fetch(path, { json }).then((r) => r.arrayBuffer());
+  const pending = [];
+  await new Promise((done) => {
+    const timer = setInterval(() => {
+      const due = Math.floor(((performance.now() - start) / 1000) * 100);
+      const batch = [];
+      while (sent < due && sent < seconds * 100) batch.push({ t_us: nowUs(), tag: '0x6e01', anchor: `0x6a2${sent % 6}`, distance_m: 7 + (sent % 10) / 10, seq: sent++, mission: id });
+      if (batch.length) pending.push(post('/api/v1/ranges', batch));
+      if (++seq % 5 === 0) pending.push(post('/api/v1/fixes', { t_us: nowUs(), mission: id, lon: 3.7131, lat: 51.0231, h_m: 60, fix: 'fixed', sigma_m: [0.01, 0.01, 0.02], q: [0, 0, 0, 1], seq }));
+      if (sent >= seconds * 100) {
+        clearInterval(timer);
+        done();
+      }
+    }, 10);
+  });
+  await Promise.all(pending);
+  await post('/api/v1/fixes', { t_us: nowUs(), mission: id, lon: 3.7131, lat: 51.0231, h_m: 60, fix: 'fixed', sigma_m: [0.01, 0.01, 0.02], q: [0, 0, 0, 1], seq: seq + 1 });
+  const want = sent * clients.length;
+  await eventually('every delivery', () => late.length >= want * 0.99, 5000).catch(() => {});
+  const share = (cpuSeconds(server.pid) - cpu) / ((performance.now() - start) / 1000);
+  row('fan-out of 100 ranges/s to 50 clients', `p50 ${percentile(late, 0.5)?.toFixed(1)} ms, p99 ${percentile(late, 0.99)?.toFixed(1)} ms, ${late.length} of ${want} delivered, ${gaps} gaps, ${(share * 100).toFixed(0)} % of a core`,
+    'from the stamp in the row to the parsed message, fsync and the wait for the next fix (50 ms) included');
+  for (const client of clients) client.terminate();
+}
+
+if (on('solve')) {
+  say('solving');
+  solve();
+}
+if (['ingest', 'get', 'fanout'].some(on)) {
+  const server = await startServer();
+  try {
+    for (const [name, task] of [['ingest', ingest], ['get', get], ['fanout', fanout]]) {
+      if (!on(name)) continue;
+      say(name);
+      await task(server).catch((error) => {
+        row(name, `FAILED: ${error.message.split('\n')[0]}`);
+        process.exitCode = 1;
+      });
+    }
+  } finally {
+    await server.dispose();
+  }
+}
+const width = [0, 1].map((column) => Math.max(...rows.map((r) => r[column].length)));
+console.log(rows.map(([work, figure, beside]) => `${work.padEnd(width[0])}  ${figure.padEnd(width[1])}  ${beside}`).join('\n'));
+process.exit();
