@@ -19,6 +19,17 @@ bool means_no_space(int system_errno) {
   return system_errno == ENOSPC || system_errno == EDQUOT || system_errno == EFBIG;
 }
 
+// sqlite3_system_errno is often 0 by the time it can be asked; the files remember their own last one.
+int last_system_errno(sqlite3* db) {
+  int found = sqlite3_system_errno(db);
+  for (const int which : {SQLITE_FCNTL_JOURNAL_POINTER, SQLITE_FCNTL_FILE_POINTER}) {
+    sqlite3_file* file = nullptr;
+    if (found != 0 || sqlite3_file_control(db, "main", which, static_cast<void*>(&file)) != SQLITE_OK) continue;
+    if (file != nullptr && file->pMethods != nullptr) file->pMethods->xFileControl(file, SQLITE_FCNTL_LAST_ERRNO, &found);
+  }
+  return found;
+}
+
 Failure classify(int code, int system_errno) {
   switch (code & 0xff) {
     case SQLITE_FULL:
@@ -45,7 +56,7 @@ Failure classify(int code, int system_errno) {
 
 SqlError to_sql_error(const SQLite::Exception& error, sqlite3* db) {
   const int code = error.getExtendedErrorCode() > 0 ? error.getExtendedErrorCode() : error.getErrorCode();
-  const int system_errno = db != nullptr ? sqlite3_system_errno(db) : 0;
+  const int system_errno = db != nullptr ? last_system_errno(db) : 0;
   std::string text = std::string("database: ") + error.what();
   const Failure failure = classify(code, system_errno);
   if (failure == Failure::unavailable || failure == Failure::full) {
@@ -110,6 +121,7 @@ int open_flags(SqliteConnection::Mode mode) {
   switch (mode) {
     case SqliteConnection::Mode::read_only:
       return SQLite::OPEN_READONLY | SQLite::OPEN_NOMUTEX;
+    case SqliteConnection::Mode::inspect:
     case SqliteConnection::Mode::read_write:
       return SQLite::OPEN_READWRITE | SQLite::OPEN_NOMUTEX;
     case SqliteConnection::Mode::create:
@@ -144,7 +156,7 @@ SqliteConnection::SqliteConnection(const std::filesystem::path& file, Mode mode,
   // A stray pointer or an I/O error on mapped pages is damage or a signal; read() gives an error.
   execute("PRAGMA mmap_size=0");
   execute("PRAGMA foreign_keys=ON");
-  if (mode == Mode::read_only) {
+  if (mode == Mode::read_only || mode == Mode::inspect) {
     execute("PRAGMA query_only=ON");
     return;
   }
@@ -208,7 +220,7 @@ void SqliteConnection::checkpoint_passive() {
   const int code = sqlite3_wal_checkpoint_v2(handle(), nullptr, SQLITE_CHECKPOINT_PASSIVE, &log, &done);
   // Busy: a reader still needs the old pages; the next time will do.
   if (code != SQLITE_OK && (code & 0xff) != SQLITE_BUSY) {
-    throw SqlError(classify(code, sqlite3_system_errno(handle())),
+    throw SqlError(classify(code, last_system_errno(handle())),
                    std::string("database: checkpoint: ") + sqlite3_errmsg(handle()));
   }
   if (done >= log) state_->wal_pages = 0;

@@ -15,7 +15,12 @@ namespace anchord::sql {
 /// One SQLite connection with the settings of docs/durability.md.
 class SqliteConnection final : public Connection {
  public:
-  enum class Mode : std::uint8_t { read_only, read_write, create };
+  enum class Mode : std::uint8_t {
+    read_only,
+    inspect,  ///< only reads, but may finish what a killed process left half done (a hot journal)
+    read_write,
+    create,
+  };
   SqliteConnection(const std::filesystem::path& file, Mode mode, Synchronous synchronous,
                    std::optional<std::uint32_t> max_pages);
   ~SqliteConnection() override;

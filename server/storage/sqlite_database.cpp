@@ -149,17 +149,19 @@ Error damaged(const DataFolder& folder, const std::string& what) {
                     "database " + folder.database().string() + ": " + what + "\n" + folder.recovery_commands());
 }
 
-/// Looks without touching: is it ours, and not newer than we are?
-std::optional<Error> judge_file(const DataFolder& folder) {
+/// Looks without touching: is it ours, and not newer than we are? True when nothing was ever stored in it.
+Result<bool> judge_file(const DataFolder& folder) {
   std::ifstream in(folder.database(), std::ios::binary);
   std::string magic(16, '\0');
   if (!in.read(magic.data(), 16) || magic != std::string("SQLite format 3\0", 16)) {
     return damaged(folder, "this is not a database any more");
   }
-  SqliteConnection look(folder.database(), Mode::read_only, Synchronous::full, std::nullopt);
+  // Only the very first start, before the WAL, has a journal; when it was killed, the journal must be undone to read.
+  const bool cut = std::filesystem::exists(folder.database().string() + "-journal");
+  SqliteConnection look(folder.database(), cut ? Mode::inspect : Mode::read_only, Synchronous::full, std::nullopt);
   const auto application = look.pragma("application_id");
   const auto version = look.pragma("user_version");
-  if (version == 0 && application == 0 && look.pragma("schema_version") == 0) return std::nullopt;  // a first start was cut
+  if (version == 0 && application == 0 && look.pragma("schema_version") == 0) return true;
   if (application != sql::k_application_id) {
     return make_error(Errc::unsupported, "database " + folder.database().string() + " was not made by anchord");
   }
@@ -169,7 +171,7 @@ std::optional<Error> judge_file(const DataFolder& folder) {
                                              std::to_string(newest_schema_version()) +
                                              ". Use the newer anchord, or a copy from " + folder.backups().string());
   }
-  return std::nullopt;
+  return false;
 }
 
 Result<std::unique_ptr<SqliteConnection>> open_writer(const StorageOptions& options, DataFolder& folder, bool check) {
@@ -177,15 +179,17 @@ Result<std::unique_ptr<SqliteConnection>> open_writer(const StorageOptions& opti
   if (bytes == 0 && (folder.had_database() || size_of(folder.wal()) > 0)) {
     return damaged(folder, std::filesystem::exists(folder.database()) ? "the file is empty" : "the file is missing");
   }
-  if (bytes > 0) {
-    if (auto refusal = judge_file(folder)) return *std::move(refusal);
+  bool fresh = bytes == 0;
+  if (!fresh) {
+    BOOST_OUTCOME_TRY(fresh, judge_file(folder));
   }
-  auto writer = std::make_unique<SqliteConnection>(folder.database(), bytes == 0 ? Mode::create : Mode::read_write,
+  if (fresh && folder.had_database()) return damaged(folder, "nothing is stored in it any more");
+  auto writer = std::make_unique<SqliteConnection>(folder.database(), fresh ? Mode::create : Mode::read_write,
                                                    options.synchronous, options.max_pages);
   if (writer->read_only_file()) {
     return make_error(Errc::storage_unavailable, "database " + folder.database().string() + " is read-only");
   }
-  if (check && bytes > 0) {
+  if (check && !fresh) {
     const std::string found = writer->check(options.full_check);
     if (found != "ok") return damaged(folder, "damaged: " + found);
   }

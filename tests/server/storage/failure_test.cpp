@@ -1,0 +1,338 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sqlite3.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <atomic>
+#include <fstream>
+#include <iterator>
+#include <random>
+#include <sstream>
+#include <thread>
+
+#include "tests/server/storage/child.hpp"
+#include "tests/server/storage/store_contract.hpp"
+
+namespace anchord {
+namespace {
+
+using testing::HasSubstr;
+
+struct Raw {
+  explicit Raw(const std::filesystem::path& file) { sqlite3_open(file.c_str(), &db); }
+  ~Raw() { sqlite3_close(db); }
+  Raw(const Raw&) = delete;
+  Raw& operator=(const Raw&) = delete;
+  void run(const char* sql) { ASSERT_EQ(sqlite3_exec(db, sql, nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(db); }
+  sqlite3* db{nullptr};
+};
+
+std::string bytes_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+class StorageFailure : public testing::Test {
+ protected:
+  StorageFailure() {
+    options_.data_dir = dir_.path() / "data";
+    options_.reserve_bytes = 0;
+  }
+  std::filesystem::path file() const { return options_.data_dir / "anchord.db"; }
+  std::unique_ptr<Database> open() {
+    auto db = open_database(options_);
+    EXPECT_TRUE(db) << db.error().message;
+    return db ? std::move(db).value() : nullptr;
+  }
+  Error open_error() {
+    auto db = open_database(options_);
+    EXPECT_FALSE(db);
+    return db ? Error{} : db.error();
+  }
+  static Mission mission_in(Database& db) {
+    Mission m;
+    m.id = MissionId{make_uuid_v7(k_noon)};
+    EXPECT_TRUE(db.missions().insert(m));
+    return m;
+  }
+  static std::vector<Range> batch(const MissionId& mission, int from, int n) {
+    std::vector<Range> rows;
+    for (int i = 0; i < n; ++i) rows.push_back(range_at(mission, from + i));
+    return rows;
+  }
+  /// A folder with one mission of `n` ranges, closed again.
+  MissionId filled(int n) {
+    auto db = open();
+    const auto m = mission_in(*db);
+    EXPECT_TRUE(db->measurements().append_ranges(batch(m.id, 0, n), false));
+    return m.id;
+  }
+  ScratchDir dir_;
+  StorageOptions options_;
+};
+
+TEST_F(StorageFailure, RefusesASecondInstanceAndNamesTheFirst) {
+  const auto first = open();
+  const Error error = open_error();
+  EXPECT_EQ(error.code, Errc::conflict);
+  EXPECT_THAT(error.message, HasSubstr(std::to_string(::getpid())));
+}
+
+TEST_F(StorageFailure, KeepsItsFilesFromOtherUsers) {
+  filled(1);
+  struct stat info {};
+  ASSERT_EQ(::stat(options_.data_dir.c_str(), &info), 0);
+  EXPECT_EQ(info.st_mode & 0777, 0700u);
+  ASSERT_EQ(::stat(file().c_str(), &info), 0);
+  EXPECT_EQ(info.st_mode & 0077, 0u);
+}
+
+TEST_F(StorageFailure, AnswersStorageFullAtTheQuotaAndKeepsWhatItAcknowledged) {
+  options_.max_pages = 120;
+  MissionId mission;
+  int acknowledged = 0;
+  {
+    const auto db = open();
+    mission = mission_in(*db).id;
+    Result<std::vector<RowOutcome>> result = std::vector<RowOutcome>{};
+    while (acknowledged < 100'000 && (result = db->measurements().append_ranges(batch(mission, acknowledged, 500), false))) {
+      acknowledged += 500;
+    }
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().code, Errc::storage_full) << result.error().message;
+    EXPECT_EQ(db->health().level, StorageLevel::full);
+    EXPECT_FALSE(db->health().writable());
+    EXPECT_EQ(db->measurements().count_ranges(mission).value(), static_cast<std::uint64_t>(acknowledged));
+  }
+  options_.max_pages.reset();
+  const auto db = open();
+  EXPECT_EQ(db->measurements().count_ranges(mission).value(), static_cast<std::uint64_t>(acknowledged));
+  EXPECT_TRUE(db->measurements().append_ranges(batch(mission, acknowledged, 500), false));
+  EXPECT_EQ(db->health().level, StorageLevel::ok);
+}
+
+TEST_F(StorageFailure, AnswersStorageFullWhenTheFileMayNotGrow) {
+  const MissionId mission = filled(10);
+  Child child([&](int) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{2u << 20, 2u << 20};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    auto db = open_database(options_);
+    if (!db) return 2;
+    for (int i = 10; i < 200'000; i += 1000) {
+      const auto result = db.value()->measurements().append_ranges(batch(mission, i, 1000), false);
+      if (result) continue;
+      const bool reads = db.value()->measurements().count_ranges(mission).has_value();
+      return result.error().code == Errc::storage_full && reads ? 0 : 3;
+    }
+    return 4;
+  });
+  EXPECT_EQ(child.wait(), 0);
+  const auto db = open();
+  EXPECT_GE(db->measurements().count_ranges(mission).value(), 10u);
+}
+
+TEST_F(StorageFailure, GivesUpItsReserveBeforeItAnswersFull) {
+  options_.reserve_bytes = 1u << 20;
+  options_.max_pages = 120;
+  const auto db = open();
+  const auto reserve = options_.data_dir / "reserve.bin";
+  EXPECT_EQ(std::filesystem::file_size(reserve), options_.reserve_bytes);
+  const auto mission = mission_in(*db);
+  for (int i = 0; i < 100'000 && db->measurements().append_ranges(batch(mission.id, i, 500), false); i += 500) {
+    EXPECT_TRUE(std::filesystem::exists(reserve));
+  }
+  EXPECT_FALSE(std::filesystem::exists(reserve));
+}
+
+TEST_F(StorageFailure, TakesNoNewMissionWhenSpaceIsScarceButRowsOfARunningOne) {
+  const MissionId mission = filled(1);
+  options_.refuse_free_bytes = std::uint64_t{1} << 60;
+  options_.warn_free_bytes = std::uint64_t{1} << 60;
+  const auto db = open();
+  EXPECT_EQ(db->health().level, StorageLevel::disk_scarce);
+  EXPECT_TRUE(db->health().writable());
+  Mission m;
+  m.id = MissionId{make_uuid_v7(k_noon)};
+  EXPECT_EQ(db->missions().insert(m).error().code, Errc::storage_full);
+  EXPECT_TRUE(db->measurements().append_ranges(batch(mission, 1, 1), false));
+}
+
+TEST_F(StorageFailure, WarnsWhenSpaceGetsLow) {
+  options_.warn_free_bytes = std::uint64_t{1} << 60;
+  EXPECT_EQ(open()->health().level, StorageLevel::disk_low);
+}
+
+TEST_F(StorageFailure, RefusesAReadOnlyFileAsUnavailable) {
+  filled(1);
+  const auto user = ::geteuid() == 0 ? uid_t{65534} : ::geteuid();
+  ::chmod(dir_.path().c_str(), 0755);
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(dir_.path())) {
+    ASSERT_EQ(::chown(entry.path().c_str(), user, static_cast<gid_t>(-1)), 0);
+  }
+  ::chmod(file().c_str(), 0444);
+  const std::string before = bytes_of(file());
+  Child child([&](int) {
+    if (::geteuid() == 0 && ::setuid(user) != 0) return 2;  // root may write everywhere
+    const auto db = open_database(options_);
+    return !db && db.error().code == Errc::storage_unavailable ? 0 : 3;
+  });
+  EXPECT_EQ(child.wait(), 0);
+  EXPECT_EQ(bytes_of(file()), before);
+}
+
+TEST_F(StorageFailure, RefusesADamagedPageWithTheCommandsThatRecover) {
+  filled(5000);
+  {
+    std::fstream io(file(), std::ios::binary | std::ios::in | std::ios::out);
+    // Pages in the middle of the tree of measurements, far from the header.
+    io.seekp(static_cast<std::streamoff>(std::filesystem::file_size(file()) / 2 / 8192 * 8192));
+    io << std::string(8192, '\x5a');
+  }
+  const std::string before = bytes_of(file());
+  const Error error = open_error();
+  EXPECT_EQ(error.code, Errc::storage_unavailable);
+  EXPECT_THAT(error.message, HasSubstr("cp -a"));
+  EXPECT_THAT(error.message, HasSubstr(".recover"));
+  EXPECT_THAT(error.message, HasSubstr("backups"));
+  EXPECT_EQ(bytes_of(file()), before);
+}
+
+TEST_F(StorageFailure, NeverStartsAfreshWhereADatabaseWas) {
+  filled(10);
+  std::filesystem::resize_file(file(), 0);
+  EXPECT_EQ(open_error().code, Errc::storage_unavailable);
+  EXPECT_EQ(std::filesystem::file_size(file()), 0u);
+  std::filesystem::remove(file());
+  EXPECT_THAT(open_error().message, HasSubstr("missing"));
+  EXPECT_FALSE(std::filesystem::exists(file()));
+}
+
+TEST_F(StorageFailure, RefusesAFileThatIsNoDatabase) {
+  filled(10);
+  std::ofstream(file(), std::ios::binary) << std::string(100'000, 'x');
+  EXPECT_EQ(open_error().code, Errc::storage_unavailable);
+}
+
+TEST_F(StorageFailure, RefusesANewerVersionAndLeavesItAlone) {
+  filled(10);
+  Raw(file()).run("PRAGMA user_version = 9999");
+  const std::string before = bytes_of(file());
+  const Error error = open_error();
+  EXPECT_EQ(error.code, Errc::unsupported);
+  EXPECT_THAT(error.message, HasSubstr("9999"));
+  EXPECT_EQ(bytes_of(file()), before);
+}
+
+TEST_F(StorageFailure, RefusesADatabaseOfAnotherProgram) {
+  std::filesystem::create_directories(options_.data_dir);
+  Raw(file()).run("CREATE TABLE t (x)");
+  const std::string before = bytes_of(file());
+  EXPECT_EQ(open_error().code, Errc::unsupported);
+  EXPECT_EQ(bytes_of(file()), before);
+}
+
+TEST_F(StorageFailure, AnswersUnavailableWhileAnotherProcessHoldsTheLockAndRecovers) {
+  const auto db = open();
+  const auto mission = mission_in(*db);
+  Raw other(file());
+  other.run("BEGIN IMMEDIATE");
+  const auto refused = db->measurements().append_ranges(batch(mission.id, 0, 1), false);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, Errc::storage_unavailable);
+  EXPECT_EQ(db->health().level, StorageLevel::unavailable);
+  EXPECT_TRUE(db->missions().mission(mission.id)) << "reads go on";
+  other.run("ROLLBACK");
+  Result<std::vector<RowOutcome>> taken = std::vector<RowOutcome>{};
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+  do {
+    taken = db->measurements().append_ranges(batch(mission.id, 0, 1), false);
+  } while (!taken && std::chrono::steady_clock::now() < deadline);
+  EXPECT_TRUE(taken);
+  EXPECT_EQ(db->health().level, StorageLevel::ok);
+}
+
+TEST_F(StorageFailure, AnswersQueueFullBeyondTheBoundAndLosesNothingOfTheRest) {
+  options_.max_queued_rows = 100;
+  const auto db = open();
+  const auto mission = mission_in(*db);
+  Raw other(file());
+  other.run("BEGIN IMMEDIATE");
+  std::atomic<int> taken{0};
+  std::atomic<int> refused{0};
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 6; ++t) {
+    threads.emplace_back([&, t] {
+      const auto result = db->measurements().append_ranges(batch(mission.id, t * 40, 40), false);
+      if (result) ++taken;
+      if (!result && result.error().code == Errc::queue_full) ++refused;
+    });
+  }
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(4);
+  while (refused == 0 && std::chrono::steady_clock::now() < deadline) std::this_thread::yield();
+  other.run("ROLLBACK");
+  for (auto& thread : threads) thread.join();
+  EXPECT_GE(refused, 1);
+  EXPECT_EQ(taken + refused, 6);
+  EXPECT_EQ(db->measurements().count_ranges(mission.id).value(), static_cast<std::uint64_t>(taken * 40));
+}
+
+TEST_F(StorageFailure, KeepsEveryAcknowledgedBatchWhenKilledAtRandomMoments) {
+  const MissionId mission = filled(0);
+  std::mt19937 random(7);
+  int acknowledged = 0;
+  for (int round = 0; round < 15; ++round) {
+    Child child([&](int out) {
+      auto db = open_database(options_);
+      if (!db) return 1;
+      for (int i = acknowledged;; ++i) {
+        if (!db.value()->measurements().append_ranges(batch(mission, i * 20, 20), false)) return 2;
+        if (::write(out, "x", 1) != 1) return 3;
+      }
+    });
+    const int wanted = static_cast<int>(random() % 60);
+    for (int i = 0; i < wanted && child.read_byte(); ++i) ++acknowledged;
+    child.kill_now();
+    while (child.read_byte()) ++acknowledged;  // written before the end: acknowledged as well
+    const auto db = open();
+    ASSERT_NE(db, nullptr);
+    const auto stored = db->measurements().count_ranges(mission).value();
+    ASSERT_GE(stored, static_cast<std::uint64_t>(acknowledged) * 20);
+    ASSERT_EQ(stored % 20, 0u) << "half a batch";
+    acknowledged = static_cast<int>(stored / 20);
+  }
+  EXPECT_GT(acknowledged, 0);
+}
+
+TEST_F(StorageFailure, BacksUpUnderLoadACopyThatPassesItsChecks) {
+  const auto db = open();
+  const auto mission = mission_in(*db);
+  ASSERT_TRUE(db->measurements().append_ranges(batch(mission.id, 0, 3000), false));
+  std::atomic<bool> stop{false};
+  std::thread writer([&] {
+    for (int i = 3000; !stop; i += 10) EXPECT_TRUE(db->measurements().append_ranges(batch(mission.id, i, 10), false));
+  });
+  const auto copy = dir_.path() / "copy.db";
+  const auto report = db->backup(copy);
+  stop = true;
+  writer.join();
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_EQ(report.value().bytes, std::filesystem::file_size(copy));
+  std::string line;
+  std::getline(std::ifstream(copy.string() + ".sha256") >> std::ws, line);
+  EXPECT_EQ(line, report.value().sha256_hex + "  copy.db");
+  EXPECT_EQ(db->backup(copy).error().code, Errc::conflict);
+
+  StorageOptions restored = options_;
+  restored.data_dir = dir_.path() / "restored";
+  std::filesystem::create_directories(restored.data_dir);
+  std::filesystem::copy_file(copy, restored.data_dir / "anchord.db");
+  const auto again = open_database(restored);
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_GE(again.value()->measurements().count_ranges(mission.id).value(), 3000u);
+}
+
+}  // namespace
+}  // namespace anchord

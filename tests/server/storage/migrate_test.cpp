@@ -1,0 +1,204 @@
+#include "server/storage/migrate.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <random>
+#include <sstream>
+#include <thread>
+
+#include "tests/server/storage/child.hpp"
+#include "tests/server/storage/store_contract.hpp"
+
+namespace anchord::sql {
+namespace {
+
+using Mode = SqliteConnection::Mode;
+
+SqliteConnection connect(const std::filesystem::path& file, Mode mode = Mode::create) {
+  return {file, mode, Synchronous::full, std::nullopt};
+}
+
+class Migrate : public testing::Test {
+ protected:
+  std::filesystem::path file() const { return dir_.path() / "m.db"; }
+  Result<void> run(SqliteConnection& c, std::span<const Migration> migrations) {
+    return migrate(c, migrations, dir_.path() / "backups", k_noon);
+  }
+  static std::int64_t count(SqliteConnection& c, const char* text) {
+    Query query(c, text);
+    return query.step() ? query.integer() : -1;
+  }
+  ScratchDir dir_;
+};
+
+// A landed migration is never edited. When this fails, the file was: take the edit back and write a new one.
+TEST_F(Migrate, FindsEveryLandedMigrationAsItWas) {
+  std::string digests;
+  for (const Migration& m : sqlite_migrations()) digests += std::to_string(m.number) + " " + sha256_hex(m.sql) + "\n";
+  EXPECT_EQ(digests, "1 5b9e60fa88e5313cd602de900b5ef1fd26ec48251481d3a023274024847ee06c\n");
+}
+
+TEST_F(Migrate, KnowsTheDigestOfAPublishedVector) {
+  // FIPS 180-2, appendix B.1
+  EXPECT_EQ(sha256_hex("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+}
+
+// The first one stands for whatever a version 1 was; the second takes long enough to be caught in the middle.
+const std::vector<Migration>& two_steps() {
+  static const std::string slow = [] {
+    const std::string numbers =
+        "WITH RECURSIVE n (value) AS (SELECT 1 UNION ALL SELECT value + 1 FROM n LIMIT 60000) SELECT value FROM n";
+    return "CREATE TABLE b (x INTEGER) STRICT; INSERT INTO b " + numbers + "; DROP TABLE a; ";
+  }();
+  static const std::vector<Migration> steps = {
+      {1, "first",
+       "CREATE TABLE schema_migration (number INTEGER PRIMARY KEY, name TEXT NOT NULL, sha256_hex TEXT NOT NULL, "
+       "applied_t_ns INTEGER NOT NULL) STRICT; CREATE TABLE a (x INTEGER) STRICT; INSERT INTO a VALUES (42);"},
+      {2, "second", slow}};
+  return steps;
+}
+
+TEST_F(Migrate, MakesACopyBeforeItTouchesADatabaseThatHasSomething) {
+  auto c = connect(file());
+  ASSERT_TRUE(run(c, std::span(two_steps()).first(1)));
+  EXPECT_FALSE(std::filesystem::exists(dir_.path() / "backups"));
+  ASSERT_TRUE(run(c, two_steps()));
+  EXPECT_EQ(c.pragma("user_version"), 2);
+  auto copy = connect(dir_.path() / "backups" / "before-migration-2.db", Mode::read_only);
+  EXPECT_EQ(copy.pragma("user_version"), 1);
+  EXPECT_EQ(count(copy, "SELECT x FROM a"), 42);
+}
+
+TEST_F(Migrate, RefusesADatabaseWhoseStepsWereOthers) {
+  auto c = connect(file());
+  ASSERT_TRUE(run(c, std::span(two_steps()).first(1)));
+  std::vector<Migration> edited = two_steps();
+  edited[0].sql = "CREATE TABLE other (x INTEGER) STRICT;";
+  const auto result = run(c, edited);
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, Errc::unsupported);
+  EXPECT_EQ(c.pragma("user_version"), 1);
+}
+
+TEST_F(Migrate, LeavesTheOldVersionWhenAStepFails) {
+  auto c = connect(file());
+  ASSERT_TRUE(run(c, std::span(two_steps()).first(1)));
+  std::vector<Migration> broken = two_steps();
+  broken[1].sql = "CREATE TABLE b (x INTEGER) STRICT; INSERT INTO nowhere VALUES (1);";
+  EXPECT_THROW(static_cast<void>(run(c, broken)), SqlError);
+  EXPECT_EQ(c.pragma("user_version"), 1);
+  EXPECT_EQ(count(c, "SELECT count(*) FROM sqlite_schema WHERE name = 'b'"), 0);
+}
+
+TEST_F(Migrate, IsAtTheOldOrTheNewVersionAfterAKillAtAnyInstant) {
+  std::mt19937 random(3);
+  int old_version = 0;
+  for (int round = 0; round < 20; ++round) {
+    std::filesystem::remove_all(dir_.path() / "backups");
+    for (const char* end : {"", "-wal", "-shm"}) std::filesystem::remove(file().string() + end);
+    {
+      auto c = connect(file());
+      ASSERT_TRUE(run(c, std::span(two_steps()).first(1)));
+    }
+    Child child([&](int out) {
+      auto c = connect(file(), Mode::read_write);
+      if (::write(out, "x", 1) != 1) return 1;
+      return run(c, two_steps()) ? 0 : 1;
+    });
+    child.read_byte();
+    std::this_thread::sleep_for(std::chrono::microseconds(random() % 40'000));  // the random instant itself
+    child.kill_now();
+    auto c = connect(file(), Mode::read_write);
+    EXPECT_EQ(c.check(true), "ok");
+    const auto version = c.pragma("user_version");
+    ASSERT_TRUE(version == 1 || version == 2) << version;
+    old_version += version == 1 ? 1 : 0;
+    EXPECT_EQ(count(c, "SELECT count(*) FROM schema_migration"), version);
+    EXPECT_EQ(count(c, "SELECT count(*) FROM sqlite_schema WHERE name = 'a'"), version == 1 ? 1 : 0);
+    EXPECT_EQ(count(c, "SELECT count(*) FROM sqlite_schema WHERE name = 'b'"), version == 1 ? 0 : 1);
+    ASSERT_TRUE(run(c, two_steps())) << "the next start finishes it";
+    EXPECT_EQ(count(c, "SELECT count(*) FROM b"), 60000);
+  }
+  EXPECT_GT(old_version, 0) << "no kill came in time: make the step slower";
+}
+
+TEST_F(Migrate, StartsAgainAfterAKillDuringTheVeryFirstStart) {
+  std::mt19937 random(5);
+  for (int round = 0; round < 20; ++round) {
+    StorageOptions options;
+    options.data_dir = dir_.path() / ("first" + std::to_string(round));
+    options.reserve_bytes = 0;
+    {
+      Child child([&](int out) {
+        if (::write(out, "x", 1) != 1) return 1;
+        return open_database(options) ? 0 : 1;
+      });
+      child.read_byte();
+      std::this_thread::sleep_for(std::chrono::microseconds(random() % 60'000));
+    }
+    const auto db = open_database(options);
+    ASSERT_TRUE(db) << db.error().message;
+    EXPECT_TRUE(db.value()->missions().missions(1, std::nullopt));
+  }
+}
+
+TEST_F(Migrate, OpensAStoredDatabaseOfEveryEarlierVersion) {
+  for (int version = 1; version <= newest_schema_version(); ++version) {
+    std::ifstream in(std::filesystem::path(ANCHORD_TEST_DATA) / "storage" / ("version_" + std::to_string(version) + ".sql"));
+    std::stringstream text;
+    text << in.rdbuf();
+    ASSERT_FALSE(text.str().empty()) << "store a database of version " << version << " (see migrations/README.md)";
+    StorageOptions options;
+    options.data_dir = dir_.path() / ("v" + std::to_string(version));
+    options.reserve_bytes = 0;
+    std::filesystem::create_directories(options.data_dir);
+    connect(options.data_dir / "anchord.db").execute(text.str());
+    const auto db = open_database(options);
+    ASSERT_TRUE(db) << db.error().message;
+    const auto missions = db.value()->missions().missions(10, std::nullopt).value();
+    ASSERT_EQ(missions.size(), 1u);
+    EXPECT_EQ(missions[0].name, "stored flight");
+    EXPECT_EQ(db.value()->measurements().count_ranges(missions[0].id).value(), 3u);
+    MeasurementStore::Filter filter;
+    filter.with_cir = true;
+    EXPECT_TRUE(db.value()->measurements().ranges(filter).value().rows[0].cir);
+    EXPECT_EQ(db.value()->measurements().fixes({}).value().rows.size(), 2u);
+    EXPECT_EQ(db.value()->anchors().published(std::nullopt).value().size(), 1u);
+    EXPECT_TRUE(db.value()->access().verify_audit());
+  }
+}
+
+// Writes the stored database of the newest version: run with ANCHORD_WRITE_STORED=DIR, then dump it as
+// migrations/README.md says.
+TEST_F(Migrate, WritesAStoredDatabaseWhenAsked) {
+  const char* dir = std::getenv("ANCHORD_WRITE_STORED");
+  if (dir == nullptr) return;
+  StorageOptions options;
+  options.data_dir = dir;
+  options.reserve_bytes = 0;
+  const auto db = open_database(options).value();
+  Mission m;
+  m.id = MissionId{make_uuid_v7(k_noon)};
+  m.name = "stored flight";
+  m.tags = {{NetworkId{0x6e01}, 0, {0.1, 0, -0.12}}};
+  ASSERT_TRUE(db->missions().insert(m));
+  std::vector<Range> ranges = {range_at(m.id, 0), range_at(m.id, 1), range_at(m.id, 2)};
+  ranges[0].cir = Cir{{1, -1, 2, -2}, 1001.6, 1.5, 1001};
+  ASSERT_TRUE(db->measurements().append_ranges(ranges, true));
+  ASSERT_TRUE(db->measurements().append_fixes({fix_at(m.id, 0), fix_at(m.id, 1)}, true));
+  ASSERT_TRUE(db->anchors().find_or_create(NetworkId{0x100}, k_noon));
+  Calibration c;
+  c.id = CalibrationId{make_uuid_v7(k_noon)};
+  c.missions = {m.id};
+  c.anchors.emplace_back();
+  c.anchors[0].anchor = NetworkId{0x100};
+  c.anchors[0].best = Hypothesis{};
+  ASSERT_TRUE(db->anchors().insert(c));
+  ASSERT_TRUE(db->anchors().publish(c.id, {NetworkId{0x100}}, "token", "note", k_noon));
+  ASSERT_TRUE(db->access().append_audit({k_noon, "token", "publish", "127.0.0.1", "ok"}));
+}
+
+}  // namespace
+}  // namespace anchord::sql
