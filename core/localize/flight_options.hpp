@@ -28,6 +28,8 @@ struct FlightOptions {
   double bias_prior_m{1.0};          ///< 0 to 0.7 m seen for whole kits
   double calibrated_bias_prior_m{0.025};  ///< once the gate says the kit is calibrated
   double bias_gate_z{3.0};           ///< below: calibrated
+  double bias_known_sigma_m{0.1};    ///< a flight (with profile) that knows its bias worse than this cannot tell
+  double unknown_bias_prior_m{0.3};  ///< then: between calibrated (0) and not (0.7), and the regions show it
   double delay_prior_m{0.04};        ///< unit to unit; a free one is fatal in small volumes
   double curve_prior_m{0.03};        ///< leading edge moves with received power
   double lag_prior_s{0.2};           ///< stamping delay

@@ -67,7 +67,7 @@ FlightSolution describe(const Work& work, const FlightData& flight, const Flight
   solution.shared.lag_s = valued(k_shared_lag);
   solution.shared.lever_up_m = valued(k_shared_lever);
   solution.shared.bias_z = work.gate.z;
-  solution.shared.bias_determined = options.fixed_bias_m || !work.gate.calibrated || work.gate.sigma_m <= 0.1;
+  solution.shared.bias_determined = options.fixed_bias_m || work.gate.known;
   if (!solution.shared.bias_determined) {
     solution.notes.push_back(sentence(
         "bias not determined by this flight, profile missing: %.3f m with sigma %.3f m (z %.1f)", work.gate.bias_m,
@@ -130,12 +130,12 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
       auto with_own = factors;
       with_own.push_back(all[i].factor);
       all[i].gate = bias_gate(with_own, options);
-      // The gate snaps to "calibrated" only what evidence supports: a flight that cannot tell keeps the wide prior,
-      // and its regions show it.
-      const bool calibrated = all[i].gate.calibrated && all[i].gate.sigma_m <= 0.1;
-      priors.push_back(profile_prior(factors, calibrated, options));
+      priors.push_back(profile_prior(factors, all[i].gate, options));
     }
     for (std::size_t i = 0; i < all.size(); ++i) {
+      // A flight alone whose gate changed nothing is solved already.
+      const bool same = priors[i].mean == all[i].prior.mean && priors[i].information == all[i].prior.information;
+      if (same) continue;
       BOOST_OUTCOME_TRY(solve_with(all[i], priors[i], options));
     }
   }

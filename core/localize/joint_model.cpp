@@ -34,7 +34,7 @@ double duration_s(const std::vector<double>& times_s) {
 }
 
 void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointState::Anchor& anchor,
-                  const Eigen::Vector4d& shared, const FlightOptions& options, double scale_floor_m,
+                  const Eigen::Vector4d& shared, const FlightOptions& options, double scale_floor_m, double kept_scale_m,
                   double common_scale_m, AnchorBlock& block, JointNormal& normal) {
   std::vector<JointLine> lines;
   std::vector<double> sizes, times_s, position_variances;
@@ -55,7 +55,7 @@ void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointS
   if (lines.empty()) return;
   // The MAD holds the usual position error already; only what a row has beyond that makes it count less.
   const double usual_variance_m2 = median(position_variances);
-  block.scale_m = std::max({1.4826 * median(sizes), options.min_scale_m, scale_floor_m});
+  block.scale_m = kept_scale_m > 0 ? kept_scale_m : std::max({1.4826 * median(sizes), options.min_scale_m, scale_floor_m});
   const double scale2 = block.scale_m * block.scale_m;
   double sum_square = 0;
   std::vector<double> weights;
@@ -116,7 +116,7 @@ JointLine linearise(const TagTrack& track, const JointRow& row, const Eigen::Vec
 }
 
 JointNormal build_normal(const FlightRows& flight, const JointState& state, const FlightOptions& options,
-                         double scale_floor_m) {
+                         double scale_floor_m, const JointNormal* scales_from) {
   JointNormal normal;
   normal.anchors.resize(flight.anchors.size());
   // Sigma of a mitigated line-of-sight range, only to give eq 7.11's weights the unit of an inverse variance.
@@ -125,7 +125,8 @@ JointNormal build_normal(const FlightRows& flight, const JointState& state, cons
     AnchorBlock& block = normal.anchors[i];
     const auto& anchor = state.anchors[i];
     if (!anchor.active) continue;
-    build_anchor(flight, flight.anchors[i], anchor, state.shared, options, scale_floor_m, common_scale_m, block, normal);
+    build_anchor(flight, flight.anchors[i], anchor, state.shared, options, scale_floor_m,
+                 scales_from ? scales_from->anchors[i].scale_m : 0.0, common_scale_m, block, normal);
     const double delay_information = 1.0 / (options.delay_prior_m * options.delay_prior_m);
     block.own(3, 3) += delay_information;
     block.gradient[3] -= delay_information * anchor.delay_m;

@@ -61,8 +61,9 @@ struct JointNormal {
   Eigen::Matrix4d reduced{Eigen::Matrix4d::Zero()};        ///< Schur complement over x and d, without the prior
   Eigen::Vector4d reduced_gradient{Eigen::Vector4d::Zero()};
 };
+/// scales_from  residual scales to keep instead of measuring them anew
 JointNormal build_normal(const FlightRows& flight, const JointState& state, const FlightOptions& options,
-                         double scale_floor_m);
+                         double scale_floor_m, const JointNormal* scales_from = nullptr);
 
 /// Answer of the iteration.
 struct JointFit {

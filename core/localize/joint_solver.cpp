@@ -11,6 +11,7 @@ namespace anchord {
 namespace {
 
 constexpr int k_max_rounds = 60;
+constexpr int k_scale_rounds = 20;
 constexpr std::size_t k_min_rows = 5;  // one more than x, y, z and a shared bias ask for
 
 double clipped(double value, double limit) { return std::clamp(value, -limit, limit); }
@@ -66,11 +67,18 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
                              const FlightOptions& options) {
   JointFit fit;
   fit.state = start;
+  struct Pace {
+    Eigen::Vector3d last_m{0, 0, 0};
+    double share{1.0};
+  };
+  std::vector<Pace> paces(start.anchors.size());
   for (fit.rounds = 0; fit.rounds < k_max_rounds && !fit.converged; ++fit.rounds) {
     if (options.canceled && options.canceled()) return make_error(Errc::canceled, "canceled");
     // Wide at first: the scale of residuals far from the answer says nothing about the noise.
     const double floor_m = fit.rounds == 0 ? 0.5 : fit.rounds == 1 ? 0.25 : 0.0;
-    const JointNormal normal = build_normal(flight, fit.state, options, floor_m);
+    // Scales measured anew in every round would keep the last millimetres wandering.
+    fit.normal = build_normal(flight, fit.state, options, floor_m, fit.rounds > k_scale_rounds ? &fit.normal : nullptr);
+    const JointNormal& normal = fit.normal;
     const Eigen::Matrix4d system = normal.reduced + prior.information;
     const Eigen::Vector4d right = normal.reduced_gradient + prior.information * (prior.mean - fit.state.shared);
     Eigen::Vector4d step = system.ldlt().solve(right);
@@ -88,15 +96,22 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
       const double length = own.head<3>().norm();
       if (!own.allFinite()) continue;
       if (length > 1.0) own *= 1.0 / length;
+      // Height near the plane of the track: the full step overshoots to the other side and back, for ever.
+      Pace& pace = paces[i];
+      pace.share = own.head<3>().dot(pace.last_m) < 0 ? 0.5 * pace.share : std::min(1.0, 1.5 * pace.share);
+      pace.last_m = own.head<3>();
+      own *= pace.share;
       anchor.position_m += own.head<3>();
       anchor.delay_m += own[3];
       largest = std::max(largest, own.cwiseAbs().maxCoeff());
     }
     fit.state.shared += step;
-    // 0.1 mm: re-estimated scales make the last digits wander.
-    fit.converged = fit.rounds >= 3 && largest < 1e-5 * (fit.rounds > 25 ? 10.0 : 1.0);
+    // 0.1 mm; what still moves after many rounds is a direction nothing measures, and its covariance says so.
+    const double enough = fit.rounds < 25 ? 1e-4 : 1e-3;
+    fit.converged = fit.rounds >= 3 && largest < enough;
   }
-  fit.normal = build_normal(flight, fit.state, options, 0.0);
+  const JointNormal scales = std::move(fit.normal);
+  fit.normal = build_normal(flight, fit.state, options, 0.0, &scales);
   fit.shared_covariance = (fit.normal.reduced + prior.information).inverse();
   for (const AnchorBlock& block : fit.normal.anchors) {
     const Eigen::Matrix4d lever = block.own_inverse * block.shared;

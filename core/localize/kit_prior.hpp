@@ -19,11 +19,14 @@ SharedPrior wide_prior(const FlightOptions& options);
 /// common bias of 0.1 m, while true uncalibrated kits stand out: z decides, on all flights including the one solved.
 struct BiasGate {
   double bias_m{}, sigma_m{}, z{};
-  bool calibrated{};
+  bool calibrated{};  ///< z below the gate
+  bool known{};       ///< not calibrated, or known well enough to say that it is
+  double prior_sigma_m{1.0};  ///< of the bias about zero, as the gate decided
 };
 BiasGate bias_gate(std::span<const ProfileFactor> all, const FlightOptions& options);
 
-/// Prior for the next flight: factors of the others, widened by the wander.
-SharedPrior profile_prior(std::span<const ProfileFactor> others, bool calibrated, const FlightOptions& options);
+/// Prior for the next flight: what the gate decided about the bias and the factors of the others, widened by the
+/// wander where there are any.
+SharedPrior profile_prior(std::span<const ProfileFactor> others, const BiasGate& gate, const FlightOptions& options);
 
 }  // namespace anchord

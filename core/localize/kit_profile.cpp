@@ -64,18 +64,26 @@ BiasGate bias_gate(std::span<const ProfileFactor> all, const FlightOptions& opti
   gate.sigma_m = std::sqrt(covariance(k_shared_bias, k_shared_bias));
   gate.z = std::abs(gate.bias_m) / gate.sigma_m;
   gate.calibrated = gate.z < options.bias_gate_z;
+  gate.known = !gate.calibrated || gate.sigma_m <= options.bias_known_sigma_m;
+  gate.prior_sigma_m = !gate.calibrated ? options.bias_prior_m
+                       : gate.known     ? options.calibrated_bias_prior_m
+                                        : options.unknown_bias_prior_m;
   return gate;
 }
 
-SharedPrior profile_prior(std::span<const ProfileFactor> others, bool calibrated, const FlightOptions& options) {
+SharedPrior profile_prior(std::span<const ProfileFactor> others, const BiasGate& gate, const FlightOptions& options) {
   if (options.fixed_bias_m) return wide_prior(options);
   Sum sum;
-  sum.information = base_information(options, calibrated ? options.calibrated_bias_prior_m : options.bias_prior_m);
+  sum.information = base_information(options, gate.prior_sigma_m);
   for (const auto& factor : others) {
     sum.information += factor.information;
     sum.information_mean += factor.information_mean;
   }
   SharedPrior prior;
+  if (others.empty()) {
+    prior.information = sum.information;
+    return prior;
+  }
   const Eigen::Matrix4d covariance = sum.information.inverse();
   prior.mean = covariance * sum.information_mean;
   prior.information = (covariance + wander()).inverse();
