@@ -128,11 +128,17 @@ export function open_map(target: HTMLElement, overlay: HTMLCanvasElement, top: H
     else view.animate({ center: [d[0], d[1]], duration: 240 });
   };
 
-  let dirty = true, drawn = -1, last_ms = 0;
+  const aim = (): void => {
+    if (mode === 'fit') fit(false);
+    if (mode === 'follow') follow();
+  };
+
+  let dirty = true, drawn = -1, last_ms = 0, aimed_ms = 0;
   const frame = (t: number): void => {
     if (closed) return;
     requestAnimationFrame(frame);
     const content = hooks.content(), scene = content.scene;
+    if (t - aimed_ms > 300) { aimed_ms = t; aim(); }
     const moving = !!scene?.pose && t - scene.pose.at_ms < 1500;
     // While nothing moves, once in a quarter of a second is enough for ages and fading.
     if (!dirty && !moving && scene?.version === drawn && t - last_ms < 250) return;
@@ -147,11 +153,7 @@ export function open_map(target: HTMLElement, overlay: HTMLCanvasElement, top: H
   resized.observe(target);
 
   return {
-    changed: () => {
-      if (mode === 'fit') fit(false);
-      if (mode === 'follow') follow();
-      layer.changed();
-    },
+    changed: () => { aim(); layer.changed(); },
     theme_changed: () => { palette = read_palette(); dirty = true; layer.changed(); },
     mode: (next) => {
       set_mode(next);

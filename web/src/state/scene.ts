@@ -24,6 +24,7 @@ export class Scene {
   readonly ranges = new Map<string, RangeRow>();
   range_at_ms = -Infinity;
   version = 0;  ///< grows with every change: what was drawn of it is still right while it stands
+  estimates_version = 0;  ///< grows with estimates only: the slow picture of the map need not be drawn for a pose
   fix_since_us: number | null = null;
 
   constructor(readonly id: string) {}
@@ -73,6 +74,7 @@ export class Scene {
     if (!last || e.t_us > last.t_us) h.push({ t_us: e.t_us, sigma_h_m: sigma_h(e.cov_enu_m2), gdop: e.gdop });
     if (h.length > HISTORY_POINTS) h.splice(0, HISTORY_POINTS / 6);
     this.version++;
+    this.estimates_version++;
   }
   forget_track(): void {
     this.trail = [];

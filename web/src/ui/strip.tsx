@@ -68,7 +68,7 @@ export function Strip() {
   const open = open_card.value;
   return (
     <header class="strip">
-      <a class="brand" href="#/live">
+      <a class="brand" href="#/live" aria-label="anchord">
         <svg viewBox="0 0 24 24" class="logo" aria-hidden="true"><path d="M12 11.5V21M7 21h10" /><circle cx="12" cy="8.6" r="2.5" /><path d="M6 14.5a8.6 8.6 0 0 1 0-11.8M18 14.5a8.6 8.6 0 0 0 0-11.8" /></svg><span>anchord</span>
       </a>
       <div class="site"><b title={mission?.name ?? ''}>{mission?.name || 'No flight'}</b><span>{mission ? { recording: 'recording', finished: 'finished', planned: 'planned' }[mission.state] : 'nothing recorded yet'}</span></div>

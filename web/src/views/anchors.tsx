@@ -54,7 +54,7 @@ export function Anchors({ anchor }: { anchor: string | null }) {
   const search = useRef<HTMLInputElement>(null);
   const ready = all.filter((r) => r.verdict === 'ok').length;
   const query = live ? `?view=live${mission ? `&mission=${encodeURIComponent(mission.mission)}` : ''}&` : '?';
-  const version = useMemo(() => ({}), [tick.value, source.value, filter.value, selected?.anchor, loaded.value]);
+  const version = useMemo(() => ({}), [live && scene?.estimates_version, source.value, filter.value, selected?.anchor, loaded.value]);
   return (
     <div class="anchors" data-testid="anchors">
       <div class="toolbar">

@@ -7,6 +7,7 @@ import { chosen_anchor, chosen_mission, current_mission, current_scene, link, mi
 import { bearing, clock, fixed, grouped, millimetres } from '../ui/format';
 import { Chip, Q } from '../ui/marks';
 import { AnchorCard } from './anchor_card';
+import { Events } from './events';
 import { FirstRun } from './first_run';
 import { RangeList } from './range_list';
 
@@ -28,7 +29,7 @@ export function Live() {
     <div class="live" data-testid="live">
       <h1 class="sr">Live flight</h1>
       <section class="left" aria-label="Map and flight readings">
-        <MapBox content={() => ({ ...content(), selected })} onSelect={(a) => (chosen_anchor.value = a)} label="Live map: drone, ranges and anchors. All of it is also in the tables." follow version={`${tick.value}${selected}`} />
+        <MapBox content={() => ({ ...content(), selected })} onSelect={(a) => (chosen_anchor.value = a)} label="Live map: drone, ranges and anchors. All of it is also in the tables." follow version={`${mission.mission} ${scene?.estimates_version} ${selected}`} />
         <Legend />
         <Band />
       </section>
@@ -36,6 +37,7 @@ export function Live() {
         <Progress />
         <RangeList selected={selected} />
         {selected && <AnchorCard anchor={selected} />}
+        <Events />
       </aside>
     </div>
   );
