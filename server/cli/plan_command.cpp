@@ -5,7 +5,9 @@
 #include <iterator>
 #include <memory>
 
+#include "api/exports/flight_plan_output.hpp"
 #include "api/exports/plan_output.hpp"
+#include "api/imports/outline_geojson.hpp"
 #include "api/imports/plan_input.hpp"
 #include "server/cli/commands.hpp"
 
@@ -52,6 +54,57 @@ int plan_next(const std::string& path, bool json) {
   return decision.value().chosen ? 0 : 1;
 }
 
+struct Flight {
+  std::string outline, format{"json"}, criterion{"a_optimal"};
+  double building_height_m{0};
+  planning::FlightPlanOptions options;
+};
+
+int plan_flight(const Flight& flight) {
+  const auto text = read_all(flight.outline);
+  if (!text) return 2;
+  std::vector<api::FieldError> errors;
+  auto request = api::read_outline(*text, errors);
+  if (!request) {
+    print_errors(flight.outline, errors);
+    return 2;
+  }
+  if (flight.building_height_m > 0) request->input.building_height_m = flight.building_height_m;
+  auto options = flight.options;
+  if (flight.criterion == "d_optimal") options.criterion = planning::Criterion::d_optimal;
+  const auto plan = planning::plan_flight(request->input, options);
+  if (!plan) {
+    std::fprintf(stderr, "anchord plan: %s: %s\n", flight.outline.c_str(), plan.error().message.c_str());
+    return plan.error().code == Errc::invalid_argument ? 2 : 1;
+  }
+  std::string out;
+  if (flight.format == "plan") out = api::flight_plan_qgc(plan.value(), request->origin, request->input.outline, options);
+  else if (flight.format == "geojson") out = api::flight_plan_geojson(plan.value(), request->origin);
+  else out = api::flight_plan_json(plan.value(), request->origin);
+  std::fputs(out.c_str(), stdout);
+  return 0;
+}
+
+void add_flight(CLI::App& plan, int& exit_code) {
+  auto flight = std::make_shared<Flight>();
+  auto& o = flight->options;
+  auto* command = plan.add_subcommand("flight", "Waypoints of a whole flight from a building's outline alone");
+  command->add_option("OUTLINE", flight->outline, "GeoJSON (docs/formats.md, Outline), - for standard input")->required();
+  command->add_option("--format", flight->format, "json, plan (QGroundControl) or geojson")
+      ->check(CLI::IsMember({"json", "plan", "geojson"}));
+  command->add_option("--criterion", flight->criterion, "a_optimal: mean error; d_optimal: error volume")
+      ->check(CLI::IsMember({"a_optimal", "d_optimal"}));
+  command->add_option("--height", flight->building_height_m, "of the building in m; default: height_m of the outline, else 6");
+  command->add_option("--keep-out", o.keep_out_m, "distance from the outline in m")->capture_default_str();
+  command->add_option("--heights", o.heights_m, "to measure at, m above ground, with commas")->delimiter(',');
+  command->add_option("--max-points", o.max_points, "at most so many measuring points")->capture_default_str();
+  command->add_option("--min-gain", o.min_gain, "stop when a point brings less than this share")->capture_default_str();
+  command->add_option("--max-range", o.max_range_m, "no ranges beyond, m")->capture_default_str();
+  command->add_option("--speed", o.speed_mps, "m/s")->capture_default_str();
+  command->add_option("--dwell", o.dwell_s, "s at each measuring point")->capture_default_str();
+  command->callback([flight, &exit_code] { exit_code = plan_flight(*flight); });
+}
+
 }  // namespace
 
 void add_plan_command(CLI::App& app, int& exit_code) {
@@ -67,6 +120,7 @@ void add_plan_command(CLI::App& app, int& exit_code) {
   command->add_option("INPUT", next->input, "JSON file, - for standard input")->required();
   command->add_flag("--json", next->json, "Print JSON instead of a table");
   command->callback([next, &exit_code] { exit_code = plan_next(next->input, next->json); });
+  add_flight(*plan, exit_code);
 }
 
 }  // namespace anchord::cli

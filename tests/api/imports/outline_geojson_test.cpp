@@ -1,0 +1,77 @@
+#include "api/imports/outline_geojson.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+#include "api/exports/flight_plan_output.hpp"
+
+namespace anchord::api {
+namespace {
+
+std::string example() {
+  std::ifstream file(ANCHORD_TEST_DATA "/../../docs/examples/outline.geojson");
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::vector<std::string> pointers(std::string_view json) {
+  std::vector<FieldError> errors;
+  EXPECT_FALSE(read_outline(json, errors));
+  std::vector<std::string> out;
+  for (const auto& e : errors) out.push_back(e.pointer + " " + e.code);
+  return out;
+}
+
+// 0.00043 deg of longitude at 51.0228 N are 30.18 m, 0.00018 deg of latitude 20.03 m (WGS84 radii of curvature).
+TEST(Outline, ReadsTheExampleInMetres) {
+  std::vector<FieldError> errors;
+  const auto request = read_outline(example(), errors);
+  ASSERT_TRUE(request);
+  ASSERT_EQ(request->input.outline.size(), 4U);
+  EXPECT_NEAR((request->input.outline[1] - request->input.outline[0]).norm(), 30.18, 0.02);
+  EXPECT_NEAR((request->input.outline[2] - request->input.outline[1]).norm(), 20.03, 0.02);
+  EXPECT_EQ(request->input.building_height_m, 7.5);
+  EXPECT_EQ(request->input.no_fly.size(), 1U);
+}
+
+TEST(Outline, NamesWhatIsWrongByPointer) {
+  EXPECT_THAT(pointers("{"), testing::SizeIs(1));
+  EXPECT_THAT(pointers(R"({"type":"Point","coordinates":[1,2]})"), testing::ElementsAre("/type unknown_value"));
+  EXPECT_THAT(pointers(R"({"type":"Polygon","coordinates":[[[3,51],[3.1,51],[3.1,"x"]]]})"),
+              testing::ElementsAre("/coordinates/0/2 wrong_type"));
+  EXPECT_THAT(pointers(R"({"type":"Polygon","coordinates":[[[51,300],[3.1,51],[3.1,52]]]})"),
+              testing::ElementsAre("/coordinates/0/0 out_of_range"));
+  EXPECT_THAT(pointers(R"({"type":"FeatureCollection","features":[]})"), testing::ElementsAre(" required"));
+}
+
+TEST(FlightPlanOutput, WritesAPlanThatQGroundControlReads) {
+  std::vector<FieldError> errors;
+  const auto request = read_outline(example(), errors);
+  ASSERT_TRUE(request);
+  const planning::FlightPlanOptions options;
+  const auto plan = planning::plan_flight(request->input, options).value();
+  const auto qgc = nlohmann::json::parse(flight_plan_qgc(plan, request->origin, request->input.outline, options));
+  EXPECT_EQ(qgc["fileType"], "Plan");
+  const auto& items = qgc["mission"]["items"];
+  ASSERT_EQ(items.size(), plan.waypoints.size() + 2);
+  EXPECT_EQ(items.front()["command"], 22);
+  EXPECT_EQ(items.back()["command"], 20);
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    EXPECT_EQ(items[i]["doJumpId"], i + 1);
+    EXPECT_EQ(items[i]["params"].size(), 7U);
+  }
+  EXPECT_NEAR(items[1]["params"][4].get<double>(), 51.0228, 0.001);  // latitude first here
+  EXPECT_NEAR(items[1]["params"][5].get<double>(), 3.7102, 0.001);
+  EXPECT_EQ(qgc["geoFence"]["polygons"][0]["inclusion"], false);
+
+  const auto json = nlohmann::json::parse(flight_plan_json(plan, request->origin));
+  EXPECT_EQ(json["waypoints"].size(), plan.waypoints.size());
+  const auto geojson = nlohmann::json::parse(flight_plan_geojson(plan, request->origin));
+  EXPECT_EQ(geojson["features"].size(), plan.waypoints.size() + 1);
+}
+
+}  // namespace
+}  // namespace anchord::api

@@ -1,0 +1,123 @@
+#include "core/planning/flight_plan.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <numbers>
+
+#include "core/planning/design.hpp"
+
+namespace anchord::planning {
+namespace {
+
+using Eigen::Vector3d;
+
+const Polygon k_hall{{0, 0}, {30, 0}, {30, 20}, {0, 20}};
+const Polygon k_ell{{0, 0}, {40, 0}, {40, 15}, {15, 15}, {15, 40}, {0, 40}};
+
+TEST(Ring, KeepsItsDistanceRoundEveryCorner) {
+  for (const auto& outline : {k_hall, k_ell, Polygon(k_ell.rbegin(), k_ell.rend())}) {
+    const auto ring = ring_around(outline, 4, 2);
+    ASSERT_GT(ring.size(), 40U);
+    for (const auto& p : ring) {
+      EXPECT_FALSE(contains(outline, p));
+      EXPECT_NEAR(distance_to_edge_m(outline, p), 4, 1e-9);
+    }
+  }
+}
+
+void expect_legal(const FlightPlan& plan, const Polygon& outline, double keep_out_m) {
+  for (std::size_t i = 0; i < plan.waypoints.size(); ++i) {
+    const auto &a = plan.waypoints[i].point_m, &b = plan.waypoints[(i + 1) % plan.waypoints.size()].point_m;
+    EXPECT_GE(distance_to_edge_m(outline, a.head<2>()), keep_out_m - 1e-6);
+    for (double t = 0; t <= 1; t += 0.02) {  // the way too, but for the arc of a corner
+      const Eigen::Vector2d p = ((1 - t) * a + t * b).head<2>();
+      EXPECT_FALSE(contains(outline, p)) << "leg " << i;
+      EXPECT_GE(distance_to_edge_m(outline, p), keep_out_m - 0.21) << "leg " << i;
+    }
+  }
+}
+
+TEST(FlightPlan, FliesRoundAHallAtItsKeepOutDistance) {
+  const auto plan = plan_flight({k_hall, 6, {}, {}}, {}).value();
+  EXPECT_GE(plan.n_measure, 8U);
+  EXPECT_LE(plan.n_measure, 60U);
+  expect_legal(plan, k_hall, 4);
+  double lowest = 1e9, highest = 0;
+  for (const auto& w : plan.waypoints) {
+    lowest = std::min(lowest, w.point_m.z());
+    highest = std::max(highest, w.point_m.z());
+  }
+  EXPECT_GT(highest - lowest, 5);  // a flat flight cannot tell heights
+  EXPECT_LT(plan.rms_m, 0.2);
+}
+
+TEST(FlightPlan, GoesRoundTheNotchOfAnL) { expect_legal(plan_flight({k_ell, 9, {}, {}}, {}).value(), k_ell, 4); }
+
+// A lawn-mower ring of as many points at one height, evenly spread, is what people fly by hand.
+TEST(FlightPlan, PredictsLessErrorThanAnEvenRingOfAsManyPoints) {
+  FlightPlanOptions options;
+  const auto plan = plan_flight({k_hall, 6, {}, {}}, options).value();
+  Design ring(plan.assumed_anchors_m, options);
+  const auto points = ring_around(k_hall, 4, 1);
+  for (std::size_t i = 0; i < plan.n_measure; ++i) {
+    const auto& p = points[i * points.size() / plan.n_measure];
+    ring.add({p.x(), p.y(), 3});
+  }
+  EXPECT_LT(plan.rms_m, 0.8 * std::sqrt(ring.mean_variance_m2()));
+}
+
+TEST(FlightPlan, StopsByGainAndSaysSo) {
+  FlightPlanOptions eager, thrifty;
+  eager.min_gain = 0.005;
+  thrifty.min_gain = 0.10;
+  const auto many = plan_flight({k_hall, 6, {}, {}}, eager).value();
+  const auto few = plan_flight({k_hall, 6, {}, {}}, thrifty).value();
+  EXPECT_LT(few.n_measure, many.n_measure);
+  EXPECT_LT(many.rms_m, few.rms_m);
+  EXPECT_THAT(few.reason, testing::HasSubstr("% only"));
+}
+
+TEST(FlightPlan, StaysInsideTheFenceAndOutOfNoFly) {
+  FlightPlanInput input{k_hall, 6, {{{10, -30}, {20, -30}, {20, -6.5}, {10, -6.5}}}, {{-8, -40}, {60, -40}, {60, 60}, {-8, 60}}};
+  const auto plan = plan_flight(input, {}).value();
+  for (const auto& w : plan.waypoints) {
+    EXPECT_TRUE(contains(input.fence, w.point_m.head<2>()));
+    EXPECT_GE(distance_to_edge_m(input.no_fly[0], w.point_m.head<2>()), 3.8 - 1e-6);
+  }
+}
+
+TEST(FlightPlan, NamesWhatMakesItImpossible) {
+  EXPECT_EQ(plan_flight({{{0, 0}, {1, 0}}, 6, {}, {}}, {}).error().code, Errc::invalid_argument);
+  EXPECT_EQ(plan_flight({{{0, 0}, {10, 0}, {20, 0}}, 6, {}, {}}, {}).error().code, Errc::invalid_argument);
+  EXPECT_EQ(plan_flight({k_hall, 6, {}, {{5, 5}, {10, 5}, {10, 10}}}, {}).error().code, Errc::not_found);
+  FlightPlanOptions options;
+  options.keep_out_m = -1;
+  EXPECT_EQ(plan_flight({k_hall, 6, {}, {}}, options).error().code, Errc::invalid_argument);
+}
+
+TEST(FlightPlan, IsTheSameEveryTime) {
+  const auto a = plan_flight({k_ell, 9, {}, {}}, {}).value(), b = plan_flight({k_ell, 9, {}, {}}, {}).value();
+  ASSERT_EQ(a.waypoints.size(), b.waypoints.size());
+  for (std::size_t i = 0; i < a.waypoints.size(); ++i) EXPECT_EQ(a.waypoints[i].point_m, b.waypoints[i].point_m);
+}
+
+TEST(Design, AddingAndRemovingAPointLeavesNoTrace) {
+  const std::vector<Vector3d> anchors{{5, 5, 2}, {20, 10, 2}};
+  FlightPlanOptions options;
+  for (const auto criterion : {Criterion::a_optimal, Criterion::d_optimal}) {
+    options.criterion = criterion;
+    Design design(anchors, options);
+    for (const auto& p : {Vector3d(-4, 0, 2), Vector3d(35, 0, 10), Vector3d(10, 25, 5), Vector3d(0, 25, 8)}) design.add(p);
+    const double before = design.value(), expected = design.value_with({15, -5, 4});
+    design.add({15, -5, 4});
+    EXPECT_NEAR(design.value(), expected, 1e-9 * std::abs(expected));
+    design.remove({15, -5, 4});
+    EXPECT_NEAR(design.value() / before, 1, 1e-6);
+  }
+}
+
+}  // namespace
+}  // namespace anchord::planning
