@@ -11,12 +11,14 @@ int main(int argc, char** argv) {
   anchord::cli::add_import_command(app, exit_code);
   anchord::cli::add_decode_command(app, exit_code);
   anchord::cli::add_plan_command(app, exit_code);
+  anchord::cli::add_profile_command(app, exit_code);
   anchord::cli::add_serve_command(app, exit_code);
   anchord::cli::add_replay_command(app, exit_code);
   anchord::cli::add_simulate_command(app, exit_code);
   anchord::cli::add_token_command(app, exit_code);
   anchord::cli::add_evaluate_command(app, exit_code);
   anchord::cli::add_train_command(app, exit_code);
+  anchord::cli::add_solve_command(app, exit_code);
   anchord::cli::add_version_command(app, exit_code);
   try {
     app.parse(argc, argv);

@@ -29,4 +29,7 @@ BiasGate bias_gate(std::span<const ProfileFactor> all, const FlightOptions& opti
 /// wander where there are any.
 SharedPrior profile_prior(std::span<const ProfileFactor> others, const BiasGate& gate, const FlightOptions& options);
 
+/// One sigma of each shared unknown.
+Eigen::Vector4d prior_sigmas(const SharedPrior& prior);
+
 }  // namespace anchord

@@ -90,4 +90,8 @@ SharedPrior profile_prior(std::span<const ProfileFactor> others, const BiasGate&
   return prior;
 }
 
+Eigen::Vector4d prior_sigmas(const SharedPrior& prior) {
+  return prior.information.inverse().diagonal().cwiseSqrt();
+}
+
 }  // namespace anchord

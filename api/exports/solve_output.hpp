@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "core/localize/flight_solver.hpp"
+
+namespace anchord {
+
+enum class SolveFormat : std::uint8_t { table, json, geojson, csv };
+
+/// A solved flight with what it was told.
+struct SolvedFlight {
+  const FlightData* data{};
+  const FlightSolution* solution{};
+};
+
+/// Text of `anchord solve`, newline at the end. Schema in docs/formats.md; longitudes and latitudes with 9 decimals
+/// (0.1 mm), metres with 4. In a local frame GeoJSON features have no geometry.
+std::string solve_output(std::span<const SolvedFlight> flights, SolveFormat format);
+
+/// Words of the interfaces.
+std::string_view word(Verdict verdict);
+std::string_view word(Determined determined);
+
+}  // namespace anchord
