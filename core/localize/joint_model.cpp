@@ -55,6 +55,7 @@ void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointS
   if (lines.empty()) return;
   // The MAD holds the usual position error already; only what a row has beyond that makes it count less.
   const double usual_variance_m2 = median(position_variances);
+  block.usual_position_variance_m2 = usual_variance_m2;
   block.scale_m = kept_scale_m > 0 ? kept_scale_m : std::max({1.4826 * median(sizes), options.min_scale_m, scale_floor_m});
   const double scale2 = block.scale_m * block.scale_m;
   double sum_square = 0;

@@ -50,6 +50,7 @@ struct AnchorBlock {
   double kappa{1};         ///< tempering
   double sum_weight{};
   double rms_m{};          ///< weighted
+  double usual_position_variance_m2{};  ///< median over the rows, along the line of sight
   std::size_t n_used{}, n_in_track{}, n_rejected{};
   std::map<std::string, std::size_t> refused;  ///< by the track, and as outliers
   double last_t_s{};
@@ -77,6 +78,11 @@ struct JointFit {
 /// Iterated reweighted Gauss-Newton from a start. errors: canceled
 Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, const SharedPrior& prior,
                              const FlightOptions& options);
+
+/// The same minimum by Ceres, positions and delays eliminated first (Schur), Levenberg-Marquardt or dogleg.
+/// errors: canceled, no_convergence
+Result<JointState> polish_joint_ceres(const FlightRows& flight, JointState state, const SharedPrior& prior,
+                                      const FlightOptions& options);
 
 /// Start of every anchor by itself: closed form, reflections and a ring, each polished robustly, the best kept.
 JointState joint_start(const FlightRows& flight, const SharedPrior& prior, const FlightOptions& options);

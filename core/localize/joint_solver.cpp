@@ -67,12 +67,15 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
                              const FlightOptions& options) {
   JointFit fit;
   fit.state = start;
+  // The Gauss-Newton rounds bring every method near; Ceres then does the rest where it is asked for.
+  const bool by_ceres = options.method != Method::gauss_newton;
+  const int most_rounds = by_ceres ? 5 : k_max_rounds;
   struct Pace {
     Eigen::Vector3d last_m{0, 0, 0};
     double share{1.0};
   };
   std::vector<Pace> paces(start.anchors.size());
-  for (fit.rounds = 0; fit.rounds < k_max_rounds && !fit.converged; ++fit.rounds) {
+  for (fit.rounds = 0; fit.rounds < most_rounds && !fit.converged; ++fit.rounds) {
     if (options.canceled && options.canceled()) return make_error(Errc::canceled, "canceled");
     // Wide at first: the scale of residuals far from the answer says nothing about the noise.
     const double floor_m = fit.rounds == 0 ? 0.5 : fit.rounds == 1 ? 0.25 : 0.0;
@@ -110,8 +113,14 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
     const double enough = fit.rounds < 25 ? 1e-4 : 1e-3;
     fit.converged = fit.rounds >= 3 && largest < enough;
   }
-  const JointNormal scales = std::move(fit.normal);
-  fit.normal = build_normal(flight, fit.state, options, 0.0, &scales);
+  if (by_ceres) {
+    BOOST_OUTCOME_TRY(fit.state, polish_joint_ceres(flight, std::move(fit.state), prior, options));
+    fit.converged = true;
+    fit.normal = build_normal(flight, fit.state, options, 0.0);
+  } else {
+    const JointNormal scales = std::move(fit.normal);
+    fit.normal = build_normal(flight, fit.state, options, 0.0, &scales);
+  }
   fit.shared_covariance = (fit.normal.reduced + prior.information).inverse();
   for (const AnchorBlock& block : fit.normal.anchors) {
     const Eigen::Matrix4d lever = block.own_inverse * block.shared;
