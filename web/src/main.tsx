@@ -2,6 +2,7 @@ import { effect } from '@preact/signals';
 import { render } from 'preact';
 import { browser_environment } from './live/browser';
 import { LiveClient } from './live/client';
+import { follow_archive, load_missions } from './state/archive';
 import { me, refresh_me } from './state/session';
 import { connect, TOPICS } from './state/store';
 import { App } from './ui/app';
@@ -19,6 +20,9 @@ addEventListener('keydown', on_key);
 let started = false;
 void refresh_me().then(() => effect(() => {
   if (me.value === null) return client.pause();
-  if (!started) connect(client, () => void refresh_me());
+  if (!started) {
+    connect(client, () => void refresh_me(), () => void load_missions());
+    follow_archive();
+  }
   started = true;
 }));

@@ -53,3 +53,10 @@ describe('REST answers', () => {
     expect(problem_of('<html>', 0).title).toBe('No answer from anchord');
   });
 });
+
+describe('missions of REST', () => {
+  it('become what the stream would have said of them', async () => {
+    const { mission_of_rest } = await import('../src/state/archive');
+    expect(mission_of_rest(wire('rest.mission'))).toMatchObject({ mission: '0197a3b0-5d10-7b1e-9c55-0a1b2c3d4e5f', name: 'Demonstration flight', state: 'recording', frame: 'wgs84', n_ranges: 4120, started_us: Date.UTC(2026, 4, 4, 10, 9, 12, 345) * 1000 });
+  });
+});

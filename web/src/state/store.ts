@@ -71,11 +71,11 @@ function upsert(list: readonly m.MissionMsg[], news: readonly m.MissionMsg[]): m
 
 type Handler = (data: unknown, whole: boolean) => void;
 const handlers: Record<string, Handler> = {
-  'mission.state': (data, whole) => {
+  'mission.state': (data) => {
     const news = m.all(data, m.mission);
-    mission_list.value = whole ? news : upsert(mission_list.value, news);
+    mission_list.value = upsert(mission_list.value, news);
     for (const x of news) scene_of(x.mission).add_state(x, now_ms());
-    synced.value = true;
+    if (news.length) synced.value = true;
   },
   'drone.pose': (data) => { for (const p of m.all(data, m.pose)) scene_of(p.mission).add_pose(p, now_ms()); },
   'rtk.status': (data) => { for (const r of m.all(data, m.rtk)) scene_of(r.mission).add_rtk(r, now_ms()); },
@@ -92,7 +92,8 @@ const handlers: Record<string, Handler> = {
   jobs: () => undefined,
 };
 
-export function connect(live: LiveSource, refused: () => void): void {
+/// `fresh`: the stream begins, or another life of the server does, and what it does not tell must be asked for.
+export function connect(live: LiveSource, refused: () => void, fresh: () => void): void {
   source = live;
   const sink: LiveSink = {
     snap: (topic, data) => { if (data != null) handlers[topic]?.(data, true); touch(); },
@@ -104,6 +105,7 @@ export function connect(live: LiveSource, refused: () => void): void {
       server_alarms.value = [];
       devices.value = [];
       events.value = [];
+      fresh();
       touch();
     },
     resumed: (recovered, resynchronised) => say(resynchronised ? 'Resynchronised: all values are current' : `Connected again, recovered ${recovered} messages`),
@@ -111,4 +113,5 @@ export function connect(live: LiveSource, refused: () => void): void {
     refused,
   };
   live.start(sink);
+  fresh();
 }

@@ -19,7 +19,9 @@ const KEYS: Record<string, () => void> = {
   a: () => { const first = alarms.value.find((x) => !x.acknowledged); if (first) acknowledge(first.id); },
   '/': () => {
     if (!location.hash.startsWith('#/anchors')) location.hash = '#/anchors';
-    setTimeout(() => document.getElementById('filter')?.focus());
+    const field = document.getElementById('filter');
+    if (field) field.focus();
+    else setTimeout(() => document.getElementById('filter')?.focus(), 50);
   },
 };
 /// Single letters never fire in fields, with modifiers, or when switched off; Escape always closes what is open.

@@ -5,7 +5,7 @@ import { current_scene, tick } from '../state/store';
 import { fixed } from '../ui/format';
 import { css, ground } from '../ui/theme';
 
-/// Converged below 5 cm (1 sigma, horizontal): what the design names on the chart.
+/// The goal the design draws: 5 cm, 1 sigma, horizontal. Whether an anchor converged is the server's word.
 export const DONE_SIGMA_M = 0.05;
 
 export function Convergence({ anchor }: { anchor: string }) {
@@ -34,7 +34,7 @@ export function Convergence({ anchor }: { anchor: string }) {
   return (
     <figure class="conv" data-testid="convergence">
       <figcaption>σ horizontal, 1σ <b>{last === null ? 'not known yet' : last < 1 ? `${fixed(last * 100, 1)} cm` : `${fixed(last, 1)} m`}</b></figcaption>
-      <div ref={box} class="plot" role="img" aria-label={`Horizontal sigma over ${history.length} estimates, now ${last === null ? 'not known' : `${fixed(last, 3)} m`}; done below ${DONE_SIGMA_M} m`} />
+      <div ref={box} class="plot" role="img" aria-label={`Horizontal sigma over ${history.length} estimates, now ${last === null ? 'not known' : `${fixed(last, 3)} m`}; goal ${DONE_SIGMA_M} m`} />
     </figure>
   );
 }

@@ -30,8 +30,8 @@ export function make_convergence(box: HTMLElement, look: Look, limit_m: number):
         c.beginPath(); c.moveTo(u.bbox.left, y); c.lineTo(u.bbox.left + u.bbox.width, y); c.stroke();
         c.font = `500 ${look.rem * 0.75 * px}px ${look.font}`; c.textAlign = 'right'; c.textBaseline = 'bottom';
         c.setLineDash([]); c.strokeStyle = look.ground; c.lineWidth = 4 * px; c.lineJoin = 'round';
-        c.strokeText(`done below ${words(limit_m)}`, u.bbox.left + u.bbox.width, y - 2 * px);
-        c.fillText(`done below ${words(limit_m)}`, u.bbox.left + u.bbox.width, y - 2 * px);
+        c.strokeText(`goal ${words(limit_m)}`, u.bbox.left + u.bbox.width, y - 2 * px);
+        c.fillText(`goal ${words(limit_m)}`, u.bbox.left + u.bbox.width, y - 2 * px);
         c.restore();
       }],
     },
