@@ -205,6 +205,7 @@ void App::State::compose() {
 
 App::App(std::unique_ptr<State> state) : state_(std::move(state)) {}
 App::~App() { stop(); }
+const api::Router& App::router() const { return state_->application->router(); }
 const std::vector<std::string>& App::urls() const { return state_->urls; }
 
 Result<std::unique_ptr<App>> App::start(const Config& config) {

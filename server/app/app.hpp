@@ -7,6 +7,10 @@
 #include "core/base/result.hpp"
 #include "server/config/config.hpp"
 
+namespace anchord::api {
+class Router;
+}
+
 namespace anchord::server {
 
 /// The composition root: builds everything in the order it depends on each other, stops it in the reverse
@@ -21,6 +25,8 @@ class App {
   App(const App&) = delete;
   App& operator=(const App&) = delete;
 
+  /// Every route with its access decision.
+  const api::Router& router() const;
   /// Where it listens, "http://127.0.0.1:8420".
   const std::vector<std::string>& urls() const;
   /// Refuses new work, says goodbye to WebSockets, finishes what runs, flushes and closes the database. Logs

@@ -119,11 +119,6 @@ std::optional<api::Response> FrontDoor::limit(const api::Request& request) {
 
 Admission FrontDoor::live(api::Request& request, bool websocket) {
   const std::string route(k_live_path);
-  if (!websocket) {
-    auto response = problem(426, "malformed", "this address speaks WebSocket, subprotocol anchord.v1");
-    response.header("Upgrade", "websocket");
-    return refused(std::move(response), route);
-  }
   using enum api::Role;
   if (request.principal.roles.empty()) {
     auto response = problem(401, "unauthorized", "send a token, a session cookie or ?ticket=");
@@ -132,6 +127,11 @@ Admission FrontDoor::live(api::Request& request, bool websocket) {
   }
   if (!api::Access::any_of({viewer, integrator, engineer, op}).permits(request.principal)) {
     return refused(problem(403, "forbidden", "live data needs the role viewer"), route);
+  }
+  if (!websocket) {
+    auto response = problem(426, "malformed", "this address speaks WebSocket, subprotocol anchord.v1");
+    response.header("Upgrade", "websocket");
+    return refused(std::move(response), route);
   }
   Admission admission;
   admission.route = route;

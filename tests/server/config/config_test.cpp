@@ -1,0 +1,69 @@
+#include "server/config/config.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+
+namespace anchord::server {
+namespace {
+
+class ConfigFile {
+ public:
+  explicit ConfigFile(const std::string& text)
+      : path_(std::filesystem::temp_directory_path() /
+              ("anchord_config_" + std::to_string(getpid()) + ".toml")) {
+    std::ofstream(path_) << text;
+  }
+  ~ConfigFile() { std::filesystem::remove(path_); }
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+TEST(Config, TakesFlagsOverEnvironmentOverFileOverDefaults) {
+  const ConfigFile file(
+      "listen = [\"127.0.0.1:1\", \"[::1]:1\"]\nlog_level = \"debug\"\n[http]\nworkers = 2\nhead_s = 0.5\n");
+  const auto config = load_config({{"http.workers", "9"}}, file.path(),
+                                  {"ANCHORD_HTTP_WORKERS=5", "ANCHORD_LOG_LEVEL=error"});
+  ASSERT_TRUE(config) << config.error().message;
+  EXPECT_EQ(config.value().count("http.workers"), 9u);
+  EXPECT_EQ(config.value().text("log_level"), "error");
+  EXPECT_EQ(config.value().list("listen"), (std::vector<std::string>{"127.0.0.1:1", "[::1]:1"}));
+  EXPECT_EQ(config.value().seconds("http.head_s"), std::chrono::milliseconds(500));
+  EXPECT_EQ(config.value().text("auth"), "on");
+  EXPECT_EQ(config.value().values.find("http.workers")->second.origin, Origin::flag);
+  EXPECT_EQ(config.value().values.find("log_level")->second.origin, Origin::environment);
+  EXPECT_EQ(config.value().values.find("listen")->second.origin, Origin::file);
+  EXPECT_EQ(config.value().values.find("auth")->second.origin, Origin::standard);
+}
+
+TEST(Config, TellsEveryFaultAtOnce) {
+  const ConfigFile file("auht = \"off\"\n[http]\nworkers = \"many\"\n");
+  const auto config = load_config({{"auth", "maybe"}}, file.path(), {"ANCHORD_HTTP_HEAD_S=-1"});
+  ASSERT_FALSE(config);
+  for (const char* part : {"auht", "http.workers", "--auth", "ANCHORD_HTTP_HEAD_S"}) {
+    EXPECT_NE(config.error().message.find(part), std::string::npos) << part;
+  }
+}
+
+TEST(Config, NamesLineAndColumnOfBrokenToml) {
+  const ConfigFile file("listen = \n");
+  const auto config = load_config({}, file.path(), {});
+  ASSERT_FALSE(config);
+  EXPECT_NE(config.error().message.find(":1:"), std::string::npos) << config.error().message;
+}
+
+TEST(Config, WarnsOfVariablesItDoesNotKnow) {
+  const auto config = load_config({}, std::nullopt, {"ANCHORD_BINARY=/x", "PATH=/bin"});
+  ASSERT_TRUE(config);
+  EXPECT_EQ(config.value().warnings.size(), 1u);
+}
+
+TEST(Config, EveryDefaultIsValid) { EXPECT_TRUE(load_config({}, std::nullopt, {})); }
+
+TEST(Config, SaysThatTheFileIsMissing) { EXPECT_FALSE(load_config({}, "/nowhere/anchord.toml", {})); }
+
+}  // namespace
+}  // namespace anchord::server
