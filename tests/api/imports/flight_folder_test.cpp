@@ -1,0 +1,204 @@
+#include "api/imports/flight_folder.hpp"
+
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "api/json/kit_profile_json.hpp"
+
+namespace anchord {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* k_globe = R"({"kit": "k", "track": {"frame": "wgs84", "point": "gnss_antenna",
+  "heading_column": "yaw", "heading_enu_ccw_from_east_deg": {"add": 30}},
+  "tags": [{"tag_id": "tag", "lever_arm_body_m": [0.2, 0, 0]}]})";
+constexpr const char* k_local = R"({"kit": "k", "track": {"frame": "local", "point": "body", "in": "ranges",
+  "attitude": "quaternion_xyzw"}, "tags": [{"tag_id": "200", "antenna": "1", "lever_arm_body_m": [0, 0, 0]}]})";
+
+class FlightFolder : public ::testing::Test {
+ protected:
+  fs::path folder_ = fs::path(::testing::TempDir()) / ::testing::UnitTest::GetInstance()->current_test_info()->name();
+  void SetUp() override {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  void write(const char* name, const std::string& text) { std::ofstream(folder_ / name, std::ios::binary) << text; }
+  void globe() {
+    write("flight.json", k_globe);
+    write("track.csv", "t_s,lat_deg,lon_deg,alt_m,fix,sd_h_m,sd_v_m,yaw\n0.0,50.1,4.2,80,2,0.01,0.02,60\n0.5,50.2,4.3,81,0,2.4,3,61\n");
+    write("ranges.csv", "t_s,anchor_id,range_m,rx_dbm,fp_dbm\n0.1,3,6.14,-79.5,-81\n0.2,0x6a2f,0,-79,-80\n");
+  }
+  std::string error() {
+    const auto flight = read_flight_folder(folder_);
+    return flight ? "no error" : flight.error().message;
+  }
+  void expect_error(const std::string& part) { EXPECT_NE(error().find(part), std::string::npos) << error(); }
+};
+
+TEST_F(FlightFolder, ReadsATrackOnTheGlobe) {
+  globe();
+  const auto read = read_flight_folder(folder_);
+  ASSERT_TRUE(read) << read.error().message;
+  const FlightData& flight = read.value();
+  EXPECT_EQ(flight.mission.kit, "k");
+  EXPECT_EQ(flight.mission.frame, TrackFrame::wgs84);
+  EXPECT_NEAR(flight.mission.tags.at(0).lever_arm_body_m.x(), 0.2, 1e-12);
+  ASSERT_EQ(flight.fixes.size(), 2U);
+  EXPECT_EQ(flight.fixes[0].fix, FixClass::rtk_fixed);
+  EXPECT_EQ(flight.fixes[1].fix, FixClass::single);
+  EXPECT_NEAR(flight.fixes[0].covariance_m2->operator()(2, 2), 4e-4, 1e-12);
+  // 60 + 30 degrees counter-clockwise from east: forward points north.
+  EXPECT_LT((*flight.fixes[0].enu_from_body * Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitY()).norm(), 1e-12);
+  ASSERT_EQ(flight.ranges.size(), 2U);
+  EXPECT_EQ(flight.ranges[0].time.us(), 100'000);
+  EXPECT_EQ(flight.ranges[1].anchor.value, 0x6a2fU);
+  EXPECT_EQ(flight.ranges[1].distance_m, 0.0);  // the failure value passes; the solver refuses and counts it
+  EXPECT_EQ(flight.anchor_names.at(NetworkId{3}), "3");
+  EXPECT_EQ(flight.ranges[0].tag, flight.mission.tags[0].tag);
+}
+
+TEST_F(FlightFolder, ReadsPosesOutOfTheRanges) {
+  write("flight.json", k_local);
+  write("ranges.csv", "t_s,anchor_id,range_m,x_m,y_m,z_m,qx,qy,qz,qw\n1,7,2.5,0.1,0.2,0.3,0,0,0,1\n");
+  const auto read = read_flight_folder(folder_);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read.value().fixes.at(0).local_m, Eigen::Vector3d(0.1, 0.2, 0.3));
+  EXPECT_EQ(read.value().ranges.at(0).antenna, 1);
+  EXPECT_EQ(read.value().fixes.at(0).fix, FixClass::rtk_fixed);  // motion capture
+}
+
+TEST_F(FlightFolder, ReadsGzipAndWindowsLineEnds) {
+  globe();
+  fs::remove(folder_ / "ranges.csv");
+  const std::string text = "\xEF\xBB\xBFt_s,anchor_id,range_m\r\n0.1,3,6.14\r\n\r\n";
+  gzFile gz = gzopen((folder_ / "ranges.csv.gz").c_str(), "wb");
+  gzwrite(gz, text.data(), static_cast<unsigned>(text.size()));
+  gzclose(gz);
+  const auto read = read_flight_folder(folder_);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read.value().ranges.size(), 1U);
+}
+
+TEST_F(FlightFolder, NamesFileAndLineOfABadNumber) {
+  globe();
+  write("ranges.csv", "t_s,anchor_id,range_m\n0.1,3,6.14\n0.2,3,six\n");
+  expect_error("ranges.csv:3: range_m: 'six' is not a number");
+}
+
+TEST_F(FlightFolder, NamesFileAndLineOfAShortRow) {
+  globe();
+  write("ranges.csv", "t_s,anchor_id,range_m\n0.1,3\n");
+  expect_error("ranges.csv:2: 2 fields, the header has 3");
+}
+
+TEST_F(FlightFolder, NamesAMissingColumn) {
+  globe();
+  write("ranges.csv", "t_s,anchor,range_m\n0.1,3,4\n");
+  expect_error("column 'anchor_id' is missing");
+}
+
+TEST_F(FlightFolder, NamesAnUnknownKey) {
+  globe();
+  write("flight.json", R"({"kit": "k", "leverarm": 1, "track": {"frame": "local", "point": "body"}})");
+  expect_error("unknown key 'leverarm'");
+}
+
+TEST_F(FlightFolder, RefusesBrokenJsonDeepJsonAndMissingFiles) {
+  globe();
+  write("flight.json", "{\"kit\": ");
+  expect_error("flight.json");
+  write("flight.json", std::string(5000, '[') + std::string(5000, ']'));
+  expect_error("flight.json");
+  fs::remove(folder_ / "flight.json");
+  expect_error("flight.json: cannot be opened");
+  globe();
+  fs::remove(folder_ / "track.csv");
+  expect_error("neither track.csv nor track.csv.gz");
+}
+
+TEST_F(FlightFolder, RefusesATruncatedGzip) {
+  globe();
+  fs::remove(folder_ / "ranges.csv");
+  std::string text = "t_s,anchor_id,range_m\n";
+  for (int i = 0; i < 5000; ++i) text += std::to_string(i * 0.01) + ",3," + std::to_string(5 + std::sin(i)) + "\n";
+  gzFile gz = gzopen((folder_ / "ranges.csv.gz").c_str(), "wb");
+  gzwrite(gz, text.data(), static_cast<unsigned>(text.size()));
+  gzclose(gz);
+  fs::resize_file(folder_ / "ranges.csv.gz", fs::file_size(folder_ / "ranges.csv.gz") / 2);
+  EXPECT_NE(error(), "no error");
+}
+
+TEST_F(FlightFolder, ListsColumnsItDoesNotKnow) {
+  globe();
+  write("ranges.csv", "t_s,anchor_id,range_m,moon_phase\n0.1,3,6.14,0.5\n");
+  const auto read = read_flight_folder(folder_);
+  ASSERT_TRUE(read);
+  ASSERT_EQ(read.value().notes.size(), 1U);
+  EXPECT_NE(read.value().notes[0].find("moon_phase"), std::string::npos);
+}
+
+TEST_F(FlightFolder, NeverOpensTruth) {
+  globe();
+  write("anchors_truth.csv", "this is not even a table\n\"");
+  EXPECT_TRUE(read_flight_folder(folder_));
+}
+
+TEST_F(FlightFolder, AsksWhichTagWhenSeveralAreDeclared) {
+  globe();
+  write("flight.json", R"({"track": {"frame": "wgs84", "point": "body"}, "tags": [{"tag_id": "1"}, {"tag_id": "2"}]})");
+  expect_error("no column tag_id");
+}
+
+TEST_F(FlightFolder, WritesWhatItReads) {
+  globe();
+  const FlightData first = read_flight_folder(folder_).value();
+  ASSERT_TRUE(write_flight_folder(first, folder_ / "copy"));
+  const auto second = read_flight_folder(folder_ / "copy");
+  ASSERT_TRUE(second) << second.error().message;
+  ASSERT_EQ(second.value().fixes.size(), first.fixes.size());
+  ASSERT_EQ(second.value().ranges.size(), first.ranges.size());
+  for (std::size_t i = 0; i < first.fixes.size(); ++i) {
+    EXPECT_EQ(second.value().fixes[i].time, first.fixes[i].time);
+    EXPECT_EQ(second.value().fixes[i].fix, first.fixes[i].fix);
+    EXPECT_NEAR(second.value().fixes[i].position.lat_deg, first.fixes[i].position.lat_deg, 1e-10);
+    EXPECT_LT(second.value().fixes[i].enu_from_body->angularDistance(*first.fixes[i].enu_from_body), 1e-6);
+  }
+  for (std::size_t i = 0; i < first.ranges.size(); ++i) {
+    EXPECT_EQ(second.value().ranges[i].time, first.ranges[i].time);
+    EXPECT_EQ(second.value().ranges[i].anchor, first.ranges[i].anchor);
+    EXPECT_NEAR(second.value().ranges[i].distance_m, first.ranges[i].distance_m, 1e-4);
+  }
+  EXPECT_EQ(second.value().anchor_names, first.anchor_names);
+}
+
+TEST(KitProfileJson, ComesBackAsItWent) {
+  KitProfile profile;
+  profile.kit = "hexacopter 2";
+  ProfileFactor factor;
+  factor.flight = "tuesday";
+  factor.information = Eigen::Vector4d(400, 30, 900, 12).asDiagonal();
+  factor.information(0, 1) = factor.information(1, 0) = -7.25;
+  factor.information_mean = {80, 1.5, -160, 0.125};
+  profile.factors.push_back(factor);
+  const auto back = parse_kit_profile(kit_profile_json(profile));
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_EQ(back.value().kit, profile.kit);
+  EXPECT_EQ(back.value().factors.at(0).information, factor.information);
+  EXPECT_EQ(back.value().factors.at(0).information_mean, factor.information_mean);
+}
+
+TEST(KitProfileJson, NamesWhatIsWrong) {
+  EXPECT_FALSE(parse_kit_profile("nonsense"));
+  EXPECT_FALSE(parse_kit_profile(R"({"schema": "anchord.kit_profile/2", "kit": "k", "factors": []})"));
+  const auto typo = parse_kit_profile(R"({"schema": "anchord.kit_profile/1", "kit": "k", "factor": []})");
+  EXPECT_NE(typo.error().message.find("unknown key 'factor'"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace anchord
