@@ -1,0 +1,106 @@
+// The learning commands as a user runs them: the real binary, files on disk, exit codes and streams.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+namespace anchord {
+namespace {
+
+struct Ran {
+  int code;
+  std::string out, err;
+};
+
+class LearningCli : public testing::Test {
+ protected:
+  void SetUp() override {
+    dir_ = std::filesystem::temp_directory_path() / ("anchord_cli_" + std::to_string(getpid()) + "_" + testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::create_directories(dir_);
+    // Forty-eight placements in six rooms; walls weaken the first path and delay it by 0.3 to 0.8 m.
+    std::ofstream rooms{dir_ / "rooms.csv"};
+    rooms << "env,nlos,setup_id,range_m,true_range_m,rx_dbm,fp_dbm,note\n";
+    for (int p = 0; p < 48; ++p) {
+      const bool nlos = p % 2 == 1;
+      for (int k = 0; k < 4; ++k) {
+        const double truth = 2 + (p * 7 % 17) * 0.5, wobble = 0.01 * ((p * 31 + k * 17) % 7 - 3);
+        const double rx = -74 - 20 * std::log10(truth) - (nlos ? 4 : 0) + 20 * wobble;
+        rooms << "room" << p / 8 << ',' << nlos << ",s" << p << ',' << truth + 0.1 + wobble + (nlos ? 0.3 + 0.1 * (p % 6) : 0) << ',' << truth << ',' << rx << ','
+              << rx - (nlos ? 7 : 2) - 10 * wobble << ",x\n";
+      }
+    }
+  }
+  void TearDown() override { std::filesystem::remove_all(dir_); }
+
+  static std::string slurp(const std::filesystem::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  Ran run(const std::string& arguments) const {
+    const std::string command = "cd " + dir_.string() + " && " ANCHORD_BINARY " " + arguments + " >out.txt 2>err.txt";
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, slurp(dir_ / "out.txt"), slurp(dir_ / "err.txt")};
+  }
+
+  std::filesystem::path dir_;
+};
+
+}  // namespace
+
+TEST_F(LearningCli, TrainsAndEvaluatesWithJsonAloneOnStandardOutput) {
+  const auto train = run("train --data rooms.csv --task nlos_id --label nlos --group-by env --method auto --out m.json --json");
+  ASSERT_EQ(train.code, 0) << train.err;
+  const auto report = nlohmann::json::parse(train.out);
+  EXPECT_EQ(report.at("places"), 6);
+  EXPECT_EQ(report.at("placements"), 48);
+  const auto evaluate = run("evaluate --model m.json --data rooms.csv --json");
+  ASSERT_EQ(evaluate.code, 0) << evaluate.err;
+  const auto e = nlohmann::json::parse(evaluate.out);
+  for (const char* key : {"accuracy", "balanced_accuracy", "fpr", "fnr", "brier", "confusion"}) EXPECT_TRUE(e.contains(key)) << key;
+  EXPECT_GT(e.at("accuracy"), 0.95);
+  EXPECT_EQ(e.at("n"), 192);
+}
+
+TEST_F(LearningCli, BiasIsReportedRawAndCorrectedPerClassAndOverAll) {
+  ASSERT_EQ(run("train --data rooms.csv --task bias --truth true_range_m --group-by env --out m.json").code, 0);
+  const auto e = nlohmann::json::parse(run("evaluate --model m.json --data rooms.csv --json").out);
+  EXPECT_LT(e.at("mae_m"), e.at("mae_raw_m"));
+  for (const char* which : {"all", "los", "nlos"})
+    for (const char* key : {"mae_raw_m", "mae_m", "mse_raw_m2", "mse_m2"}) EXPECT_TRUE(e.at("bias").at(which).contains(key)) << which << ' ' << key;
+}
+
+TEST_F(LearningCli, TheSameSeedWritesTheSameBytes) {
+  ASSERT_EQ(run("train --data rooms.csv --task bias --out a.json --seed 5").code, 0);
+  ASSERT_EQ(run("train --data rooms.csv --task bias --out b.json --seed 5").code, 0);
+  EXPECT_FALSE(slurp(dir_ / "a.json").empty());
+  EXPECT_EQ(slurp(dir_ / "a.json"), slurp(dir_ / "b.json"));
+}
+
+TEST_F(LearningCli, UnusableInputExitsWithTwoNamesItAndLeavesNoModel) {
+  std::ofstream{dir_ / "torn.csv"} << "nlos,range_m\n0,1\n1\n";
+  const auto torn = run("train --data torn.csv --out m.json --json");
+  EXPECT_EQ(torn.code, 2);
+  EXPECT_TRUE(torn.out.empty());
+  EXPECT_NE(torn.err.find("torn.csv:3"), std::string::npos) << torn.err;
+  const auto column = run("train --data rooms.csv --label wall --out m.json");
+  EXPECT_EQ(column.code, 2);
+  EXPECT_NE(column.err.find("no column wall"), std::string::npos) << column.err;
+  EXPECT_EQ(run("train --data absent.csv --out m.json").code, 2);
+  EXPECT_EQ(run("train --data rooms.csv --task colour --out m.json").code, 2);
+  EXPECT_EQ(run("train --data rooms.csv --method magic --out m.json").code, 2);
+  EXPECT_EQ(run("train --data rooms.csv --features nothing --out m.json").code, 2);
+  EXPECT_FALSE(std::filesystem::exists(dir_ / "m.json"));
+  std::ofstream{dir_ / "bad.json"} << "{\"format\":\"anchord-model-1\"}";
+  const auto model = run("evaluate --model bad.json --data rooms.csv");
+  EXPECT_EQ(model.code, 2);
+  EXPECT_NE(model.err.find("/manifest"), std::string::npos) << model.err;
+}
+
+}  // namespace anchord
