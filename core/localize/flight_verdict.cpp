@@ -118,7 +118,13 @@ void judge_twins(const FlightRows& flight, AnchorSolution& solution, const std::
   const bool sideways = twin && std::ranges::any_of(twins, [](const Twin& t) { return t.horizontal_m > k_twin_distance_m; });
   solution.determined = sideways ? Determined::none : Determined::horizontal;
   if (!twin) {
+    // No second minimum of its own, but a plane cannot tell the sides: what its reflection says is as good.
+    const Eigen::Vector3d reflected = geometry.shape.mirrored(estimate.best->position.m);
     estimate.reason = geometry.reason + "; the side of it the anchor is on is not determined, its height is uncertain";
+    if ((reflected - estimate.best->position.m).norm() < 0.1) return;
+    estimate.mirror = hypothesis(flight, reflected, estimate.best->covariance_m2, estimate.best->rms_residual_m);
+    estimate.mirror->probability = estimate.best->probability = 0.5;
+    estimate.v95_m += std::abs(reflected.z() - estimate.best->position.m.z());
     return;
   }
   const double apart_m = (twin->fit.position_m - estimate.best->position.m).norm();
