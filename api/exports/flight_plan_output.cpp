@@ -12,10 +12,10 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 /// 1e-9 deg is 0.1 mm; more digits only make files unreadable.
-double rounded(double value, double unit) { return std::round(value / unit) * unit; }
+double rounded(double value, double per_unit) { return std::round(value * per_unit) / per_unit; }
 double heading_deg(const planning::Waypoint& w) {
   const double deg = w.heading_rad * 180 / std::numbers::pi;
-  return rounded(deg < 0 ? deg + 360 : deg, 0.1);
+  return rounded(deg < 0 ? deg + 360 : deg, 10);
 }
 
 struct Place {
@@ -24,7 +24,7 @@ struct Place {
 /// The ground is taken flat at the origin's height: over a building's size the tangent plane is off by micrometres.
 Place place_of(const EnuFrame& frame, const Eigen::Vector2d& p) {
   const auto at = frame.wgs84_from_enu(Enu{{p.x(), p.y(), 0}});
-  return {rounded(at.lon_deg, 1e-9), rounded(at.lat_deg, 1e-9)};
+  return {rounded(at.lon_deg, 1e9), rounded(at.lat_deg, 1e9)};
 }
 
 Json predicted_json(const planning::FlightPlan& plan) {

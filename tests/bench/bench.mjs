@@ -30,6 +30,14 @@ function solve() {
   row('live path, per second of flight', `${(time.live_whole_flight.cpu_s_per_flight_s * 1e3).toFixed(1)} ms CPU`, 'limit 1000 ms');
 }
 
+function planner() {
+  const bench = join(process.env.ANCHORD_BENCH_DIR ?? '', 'planner_bench');
+  if (!existsSync(bench)) return row('planner', 'not built', bench);
+  const out = JSON.parse(execFileSync(bench, ['--benchmark_format=json', '--benchmark_min_time=0.2'], { stdio: ['ignore', 'pipe', 'ignore'] }));
+  const ns = Object.fromEntries(out.benchmarks.map((b) => [b.name, b.per_candidate * 1e9]));
+  row('planner, 41^3 candidates, 1 000 past points, per candidate', `${ns.batch_kernel.toFixed(1)} ns CPU`, `rebuild and invert ${(ns.rebuild_and_invert / 1e3).toFixed(1)} us`);
+}
+
 const mission = (name) => ({ name, kit: 'bench', frame: 'wgs84', track_point: 'gnss_antenna', tags: [{ tag: '0x6e01', antenna: 0, lever_arm_body_m: [0, 0, 0] }] });
 
 async function newMission(server, name) {
@@ -161,6 +169,10 @@ async function fanout(server) {
   for (const client of clients) client.terminate();
 }
 
+if (on('planner')) {
+  say('planner');
+  planner();
+}
 if (on('solve')) {
   say('solving');
   solve();
