@@ -120,6 +120,7 @@ test('a simulated flight converges on screen, and what is published is what the 
     await id('progress').waitFor({ timeout: 20_000 });
     await eventually('ranges arrive', async () => (await id('range-list').locator('tbody tr').count()) >= 3, 20_000);
     await eventually('the fix is shown', async () => (await text(id('status-rtk'))).match(/FIX|FLOAT/), 10_000);
+    await eventually('height and speed are read', async () => /Height[−\d.]+.*Speed[\d.]+/.test(await text(id('rtk-card'))), 10_000);
     await picture(page, 'live-converging');
     await eventually('three anchors converge', async () => {
       const done = /(\d+) of (\d+)/.exec(await text(id('progress').locator('dd')));

@@ -116,7 +116,7 @@ export function open_map(target: HTMLElement, overlay: HTMLCanvasElement, top: H
     const m = Math.max(box[2] - box[0], box[3] - box[1]) * (always ? 0 : 0.06);
     fitted = [box[0] - m, box[1] - m, box[2] + m, box[3] + m];
     const [w, h] = size as [number, number];
-    view.fit(fitted as number[], { padding: [h * 0.09 + 16, w * 0.07 + 48, h * 0.09 + 40, w * 0.07 + 60], maxZoom: 40, minResolution: 0.008 });
+    view.fit(fitted as number[], { padding: [h * 0.06 + 14, w * 0.07 + 48, h * 0.06 + 40, w * 0.07 + 60], maxZoom: 40, minResolution: 0.008 });
   };
   const follow = (): void => {
     const d = hooks.content().scene?.pose?.value.enu_m;

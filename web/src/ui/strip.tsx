@@ -23,8 +23,8 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
   const rtk = scene?.rtk ?? null, rtk_age = rtk ? now - rtk.at_ms : Infinity, rtk_stale = !!rtk && (lost || rtk_age > 2000 || !running);
   const r = rtk?.value, old = (r?.correction_age_s ?? 0) > 5;
   const rtk_look = !r || r.fix === 'none' ? look('off') : r.fix === 'single' ? look('bad') : r.fix === 'dgps' ? look('info') : r.fix === 'float' || old ? look('caution') : look('ok');
-  const rows = scene ? [...scene.ranges.values()] : [], heard = rows.filter((x) => now - x.at_ms < 2000).length, uwb_stale = rows.length > 0 && (lost || !running);
-  const all_seen = Math.max(rows.length, mission?.anchors_found ?? 0);
+  const rows = scene ? [...scene.ranges.values()] : [], heard = rows.filter((x) => now - x.at_ms < 2000).length;
+  const all_seen = Math.max(rows.length, mission?.anchors_found ?? 0, scene?.anchors.size ?? 0), uwb_stale = all_seen > 0 && (lost || !running);
   const pose = scene?.pose ?? null, pose_stale = !!pose && (lost || now - pose.at_ms > 1000 || !running);
   const up = pose?.value.enu_m?.[2] ?? null;
   const rec_s = mission?.started_us != null ? ((running ? server_now_us() : mission.t_us) - mission.started_us) / 1e6 : null;
@@ -43,7 +43,7 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
       card: r ? <><p>{r.fix === 'fixed' ? (old ? 'Fixed, but its corrections are more than 5 s old.' : 'Centimetre positions.') : r.fix === 'float' ? 'Decimetre positions: ranges count less until FIX returns.' : 'No RTK: ranges are recorded, their positions are too poor to use.'}</p><p>{fixed(r.satellites, 0)} satellites, corrections {fixed(r.correction_age_s, 1)} s old, σ E, N, U {r.sigma_m ? r.sigma_m.map((x) => millimetres(x)).join(', ') : '–'} mm (1σ).</p></> : <p>No position has been received for this flight.</p>,
     },
     uwb: {
-      ...(rows.length === 0 || uwb_stale ? look('off') : heard === 0 ? look('bad') : look('ok')), stale: uwb_stale, word: !all_seen ? 'none' : `${uwb_stale ? all_seen : heard}/${all_seen}`, extra: uwb_stale ? aged(now - (scene?.range_at_ms ?? 0)) : '',
+      ...(rows.length === 0 || uwb_stale ? look('off') : heard === 0 ? look('bad') : look('ok')), stale: uwb_stale, word: !all_seen ? 'none' : `${uwb_stale ? all_seen : heard}/${all_seen}`, extra: uwb_stale ? (rows.length ? aged(now - (scene?.range_at_ms ?? 0)) : 'ended') : '',
       card: <p>{rows.length ? `${heard} of ${all_seen} anchors heard in the last 2 s, ${fixed(mission?.range_rate_hz, 0)} ranges a second.` : 'No range has been received for this flight.'}{devices.value.some((d) => d.kind === 'tag') && ` Tags: ${devices.value.filter((d) => d.kind === 'tag').map((d) => `${d.network_id} ${d.state}`).join(', ')}.`}</p>,
     },
     drone: {

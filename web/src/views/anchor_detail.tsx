@@ -5,9 +5,10 @@ import { Mark, Q, StatusChip } from '../ui/marks';
 import { GATES, why_not_done, VERDICT_WORDS } from '../ui/words';
 import { Convergence } from './convergence';
 import { Covariance, Loupe } from './loupe';
-import { current_scene, now_ms } from '../state/store';
+import { current_scene, now_ms, tick } from '../state/store';
 
 export function AnchorDetail({ row: r, live }: { row: AnchorRow; live: boolean }) {
+  tick.value;
   const why = why_not_done(r), heard = live ? current_scene()?.anchors.get(r.anchor) : undefined;
   const geo = r.lat !== null && r.lon !== null;
   return (

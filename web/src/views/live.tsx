@@ -48,6 +48,7 @@ function Waiting() {
 }
 
 function Progress() {
+  tick.value;
   const m = current_mission.value!, scene = current_scene(), list = ordered_missions.value;
   const running = m.state === 'recording', lost = link.value === 'lost';
   const total = Math.max(m.anchors_found, scene?.anchors.size ?? 0);
@@ -79,6 +80,7 @@ function Progress() {
 const Pips = ({ done, total }: { done: number; total: number }) => total > 0 && total <= 16 ? <span class="pips" aria-hidden="true">{Array.from({ length: total }, (_, i) => <i key={i} class={i < done ? 'd' : ''} />)}</span> : null;
 
 function Band() {
+  tick.value;
   const scene = current_scene(), p = scene?.pose?.value, r = scene?.rtk?.value, now = now_ms(), running = current_mission.value?.state === 'recording';
   const lost = link.value === 'lost';
   const pose_cls = scene?.pose && running && (lost || now - scene.pose.at_ms > 1000) ? 'v stale' : running ? 'v' : 'v ended';
