@@ -1,6 +1,6 @@
-# Checks that need no build of the product beyond its compile commands.
+# Only looks. Layout, bug patterns, headers that stand alone, the two contracts.
 
-own_sources() { git ls-files -- '*.cpp' '*.hpp' | grep -v '^build/' || true; }
+own_sources() { git ls-files --cached --others --exclude-standard -- '*.cpp' '*.hpp'; }
 
 cmd_fmt() {
   install_packages lint
@@ -8,11 +8,42 @@ cmd_fmt() {
   say "formatted"
 }
 
+# clang-tidy remembers what was clean: a file is looked at again when it, any own header or the rules changed.
+tidy() {
+  local seen=build/lint failed=0 rules file
+  mkdir -p "$seen"
+  rules=$(own_sources | grep '\.hpp$' | tr '\n' '\0' | xargs -0 cat .clang-tidy | sha256sum | cut -c1-16)
+  while read -r file; do
+    local mark="$seen/$(sha256sum <"$file" | cut -c1-16)-$rules"
+    [[ -e $mark ]] || printf '%s\0%s\0' "$file" "$mark"
+  done < <(own_sources | grep '\.cpp$' | grep -v '^tests/') >"$seen/todo"
+  xargs -0 -r -n 2 -P "$(jobs_count)" bash -c '
+    echo "    $1" >&2
+    timeout 300 clang-tidy-16 -p build/release --quiet --extra-arg=-Wno-unknown-warning-option "$1" 2>/dev/null && touch "$2"' tidy <"$seen/todo" || failed=1
+  return $failed
+}
+
+# cmd_lint [layout|bugs|headers|contracts ...]: all four without arguments.
 cmd_lint() {
   install_packages lint
-  local failed=0
-  say "clang-format"
-  own_sources | tr '\n' '\0' | xargs -0 -r clang-format --dry-run --Werror || { failed=1; }
-  ((failed == 0)) || die "lint found something: see above (./dev fmt repairs layout)"
+  ensure_node
+  local -a parts=("$@") ; local part ; local wrong=()
+  ((${#parts[@]})) || parts=(layout contracts headers bugs)
+  for part in "${parts[@]}"; do
+    say "lint: $part"
+    case $part in
+      layout) own_sources | tr '\n' '\0' | xargs -0 -r clang-format --dry-run --Werror || wrong+=(layout) ;;
+      contracts)
+        [[ -d tests/node_modules ]] || (cd tests && npm ci --loglevel=error)
+        node tests/node_modules/@redocly/cli/bin/cli.js lint --config tests/lint/redocly.yaml api/openapi.yaml || wrong+=(openapi)
+        node tests/lint/asyncapi.mjs api/asyncapi.yaml || wrong+=(asyncapi) ;;
+      headers) build_preset dev all_verify_interface_header_sets || wrong+=(headers) ;;
+      bugs)
+        cmake --preset release >/dev/null
+        tidy || wrong+=(bugs) ;;
+      *) die "lint knows layout, contracts, headers, bugs; not '$part'" ;;
+    esac
+  done
+  ((${#wrong[@]} == 0)) || die "lint found something in: ${wrong[*]} (./dev fmt repairs layout)"
   say "lint is clean"
 }

@@ -10,7 +10,7 @@ const methods = ['get', 'put', 'post', 'delete', 'options', 'head', 'patch', 'tr
 const escape = (part) => part.replaceAll('~', '~0').replaceAll('/', '~1');
 
 export class Contract {
-  constructor(document = parse(readFileSync(join(root, 'api/openapi.yaml'), 'utf8'))) {
+  constructor(document = parse(readFileSync(process.env.ANCHORD_OPENAPI ?? join(root, 'api/openapi.yaml'), 'utf8'))) {
     this.document = document;
     this.ajv = new Ajv2020({ strict: false, allErrors: true, logger: false, validateFormats: true });
     addFormats(this.ajv);

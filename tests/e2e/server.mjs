@@ -19,6 +19,13 @@ export async function eventually(what, probe, deadlineMs = 10_000, stepMs = 20) 
   }
 }
 
+// A test file that is ended from outside takes its servers with it.
+const running = new Set();
+process.on('exit', () => {
+  for (const child of running) child.kill('SIGKILL');
+});
+for (const signal of ['SIGINT', 'SIGTERM', 'SIGHUP']) process.on(signal, () => process.exit(1));
+
 /**
  * One server with its data folder.
  *
@@ -53,6 +60,8 @@ export class Server {
     const args = ['serve', '--listen', listen, `--auth=${this.auth}`, '--data-dir', this.dataDir, ...this.args];
     this.child = spawn(binary, args, { stdio: ['ignore', 'pipe', 'pipe'], env: { ...process.env, ...this.env } });
     const child = this.child;
+    running.add(child);
+    child.once('exit', () => running.delete(child));
     let output = '';
     const collect = (chunk) => {
       output += chunk;

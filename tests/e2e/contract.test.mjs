@@ -1,0 +1,105 @@
+// Every operation of api/openapi.yaml is called at least once, and every answer is one that the document promises:
+// status, content type, required headers, body. Wrong requests too, since clients meet those answers most.
+import assert from 'node:assert/strict';
+import { after, before, test } from 'node:test';
+import { Contract, checked } from './contract.mjs';
+import { ndjson, simulatedFlight } from './flight.mjs';
+import { startServer } from './server.mjs';
+
+const contract = new Contract();
+let server, call, flight;
+const ids = {};
+const lines = (rows) => ({ headers: { 'content-type': 'application/x-ndjson' }, body: ndjson(rows) });
+const unknown = '0197a3b0-5d10-7b1e-9c55-0a1b2c3d4e5f';
+
+before(async () => {
+  server = await startServer({ auth: 'on' });
+  call = checked(server, contract);
+  flight = await simulatedFlight({ duration: 90 });
+});
+after(() => server?.dispose());
+
+test('a site, a mission, its measurements', async () => {
+  ids.site = (await call('POST', '/api/v1/sites', { expect: 201, json: { name: 'Contract site' } })).json.id;
+  ids.mission = (await call('POST', '/api/v1/missions', { expect: 201, json: flight.mission })).json.id;
+  ids.spare = (await call('POST', '/api/v1/missions', { expect: 201, json: { ...flight.mission, name: 'spare' } })).json.id;
+  await call('POST', `/api/v1/fixes?mission=${ids.mission}`, { expect: 200, ...lines(flight.fixes) });
+  await call('POST', `/api/v1/ranges?mission=${ids.mission}`, { expect: 200, ...lines(flight.ranges) });
+  const cir = { t_us: flight.ranges[9].t_us + 1, tag: '0x6e01', anchor: '0x6a21', distance_m: 9, mission: ids.spare, cir: { n: 2, dt_ps: 1001.6, first_path_idx: 0.5, rxpacc: 1001, b64: 'AAEAAv//AAA=' } };
+  await call('POST', '/api/v1/ranges', { expect: 200, json: [cir] });
+  await call('POST', `/api/v1/missions/${ids.mission}/actions`, { expect: 200, json: { action: 'finish' } });
+});
+
+test('a calibration, published', async () => {
+  const solved = await call('POST', '/api/v1/calibrations', { json: { missions: [ids.mission] }, headers: { prefer: 'wait=120' } });
+  assert.ok(solved.status < 300, solved.text);
+  ids.calibration = solved.json.id;
+  const job = await call('POST', '/api/v1/calibrations', { json: { missions: [ids.mission] } });
+  assert.ok([200, 201, 202].includes(job.status));
+  await call('POST', `/api/v1/calibrations/${ids.calibration}/publish`, { json: {} });
+});
+
+test('everything that can be read', async () => {
+  ids.job = (await call('GET', '/api/v1/jobs', { expect: 200 })).json.items[0]?.id;
+  ids.range = (await call('GET', `/api/v1/ranges?mission=${ids.spare}`, { expect: 200 })).json.items[0].id;
+  ids.anchor = '0x6a21';
+  const given = { '/sites/': ids.site, '/missions/': ids.mission, '/ranges/': ids.range, '/anchors/': ids.anchor, '/calibrations/': ids.calibration, '/jobs/': ids.job };
+  const wrong = [];  // all at once, as a person wants them
+  for (const { method, template } of contract.operations.filter((o) => o.method === 'get')) {
+    if (template === '/api/v1/ws') continue;  // its own test below
+    const resource = Object.keys(given).find((part) => template.includes(part));
+    const path = template.replace(/\{[^}]+\}/, resource ? given[resource] : 'validation');
+    try {
+      const answer = await call(method.toUpperCase(), path);
+      if (answer.status >= 400) wrong.push(`${template}: ${answer.status} ${answer.text.slice(0, 300)}`);
+      if (template.includes('{id}') && template.startsWith('/api/')) {
+        await call('GET', template.replace(/\{[^}]+\}/, template.includes('/ranges/') ? '999999999' : unknown), { expect: 404 });
+      }
+    } catch (error) {
+      wrong.push(error.message);
+    }
+  }
+  assert.equal(wrong.join('\n\n'), '');
+  await call('GET', '/api/v1/anchors?view=live', { expect: 200 });
+  await call('GET', '/api/v1/missions?limit=0', { expect: 422 });
+});
+
+test('changes with preconditions, tokens, sessions, tickets', async () => {
+  const patch = { headers: { 'content-type': 'application/merge-patch+json' }, body: '{"name":"Hall A"}' };
+  for (const path of ['/api/v1/anchors/0x6a21', `/api/v1/sites/${ids.site}`]) {
+    await call('PATCH', path, { expect: 428, ...patch });
+    await call('PATCH', path, { expect: 412, ...patch, headers: { ...patch.headers, 'if-match': '"other"' } });
+    const etag = (await call('GET', path, { expect: 200 })).headers.get('etag');
+    await call('PATCH', path, { expect: 200, ...patch, headers: { ...patch.headers, 'if-match': etag } });
+  }
+  const made = (await call('POST', '/api/v1/tokens', { expect: 201, json: { name: 'viewer', roles: ['viewer'] } })).json;
+  await call('DELETE', `/api/v1/tokens/${made.id}`);
+  await call('POST', '/api/v1/ws-tickets', {});
+  await call('POST', '/api/v1/session', { json: { token: server.token }, token: '' });
+  await call('DELETE', '/api/v1/session', {});
+});
+
+test('wrong requests get the problems that are promised', async () => {
+  await call('GET', '/api/v1/missions', { expect: 401, token: '' });
+  await call('POST', '/api/v1/missions', { expect: 422, json: { name: 'x', no_such_field: 1 } });
+  await call('POST', '/api/v1/missions', { expect: 400, headers: { 'content-type': 'application/json' }, body: '{"name":' });
+  await call('POST', '/api/v1/missions', { expect: 415, headers: { 'content-type': 'text/plain' }, body: 'hello' });
+  await call('POST', '/api/v1/ranges', { expect: 415, headers: { 'content-type': 'image/png' }, body: 'x' });
+  await call('POST', '/api/v1/calibrations', { json: { missions: [unknown] } });
+});
+
+test('what can be deleted', async () => {
+  const etag = (path) => call('GET', path, { expect: 200 }).then((answer) => answer.headers.get('etag'));
+  for (const path of [`/api/v1/missions/${ids.spare}`, `/api/v1/sites/${ids.site}`]) {
+    const answer = await call('DELETE', path, { headers: { 'if-match': (await etag(path)) ?? '*' } });
+    assert.ok(answer.status < 300, `${path}: ${answer.status} ${answer.text}`);
+  }
+  await call('DELETE', `/api/v1/jobs/${ids.job}`);
+  await call('DELETE', `/api/v1/calibrations/${ids.calibration}`);
+});
+
+test('no operation of the contract was left out', () => {
+  const left = contract.uncalled().filter((name) => name !== 'GET /api/v1/ws');  // live.test.mjs
+  assert.deepEqual(left, []);
+  assert.ok(contract.operations.length > 30, `only ${contract.operations.length} operations in the contract`);
+});
