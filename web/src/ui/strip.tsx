@@ -76,7 +76,7 @@ export function Strip() {
         const r = readings[k];
         return (
           <div class="tilebox" key={k}>
-            <button class={`tile ${k}${r.stale ? ' stale' : ''}`} data-tone={r.tone} data-testid={`status-${k}`} aria-expanded={open === k} onClick={() => (open_card.value = open === k ? null : k)}>
+            <button class={`tile ${k}${r.stale ? ' stale' : ''}${r.extra === 'ended' ? ' over' : ''}`} data-tone={r.tone} data-testid={`status-${k}`} aria-expanded={open === k} onClick={() => (open_card.value = open === k ? null : k)}>
               <span class="tl">{LABELS[k]}</span>
               <span class="tv"><Mark shape={r.shape} /><b>{r.word}</b>{r.extra && <i>{r.extra}</i>}</span>
             </button>
