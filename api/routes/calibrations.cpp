@@ -78,6 +78,10 @@ Response list(Services& s, const Request& request) {
 Response create(Services& s, const Request& request) {
   std::vector<FieldError> errors;
   auto wanted = read_calibration_request(json_body(request), errors);
+  for (std::size_t i = 0; i < wanted.learn_from.size(); ++i) {
+    const auto mission = s.missions.mission(wanted.learn_from[i]);
+    if (!mission && mission.error().code == Errc::not_found) errors.push_back({"/learn_from/" + std::to_string(i), "unknown_mission", "there is no such mission"});
+  }
   for (std::size_t i = 0; i < wanted.missions.size(); ++i) {
     const auto mission = s.missions.mission(wanted.missions[i]);
     if (!mission && mission.error().code == Errc::not_found) errors.push_back({"/missions/" + std::to_string(i), "unknown_mission", "there is no such mission"});
@@ -160,6 +164,7 @@ Response publish(Services& s, const Request& request) {
   // Audited before it happens: a publication that nobody can be asked about must not exist.
   s.audit(request, "calibration.publish " + to_string(calibration.id) + (reason.empty() ? "" : " reason: " + reason));
   const auto revision = value_or_problem(s.deps.anchors.publish(calibration.id, anchors, request.principal.token_id, note, s.deps.clock.now()));
+  for (const auto& id : anchors) value_or_problem(s.deps.anchors.find_or_create(id, s.deps.clock.now()));
   s.hub.publish(Topic::revisions, Ordered{{"revision", revision.number}, {"t_us", revision.published.us()}, {"calibration", to_string(calibration.id)}}.dump(), revision.published.us());
   s.events.add("info", "revision.published", "revision " + std::to_string(revision.number) + " with " + std::to_string(anchors.size()) + " anchors published");
   Ordered answer = revision_json(revision);

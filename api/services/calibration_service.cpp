@@ -22,23 +22,23 @@ using Json = nlohmann::json;
 CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldError>& errors) {
   CalibrationRequest out;
   Fields fields(body, "", errors);
-  if (const Json* missions = fields.child("missions")) {
-    if (!missions->is_array() || missions->empty() || missions->size() > 100) {
-      fields.error("missions", "wrong_type", "must be an array of 1 to 100 mission ids");
-    } else {
-      std::set<std::string> seen;
-      for (std::size_t i = 0; i < missions->size(); ++i) {
-        const auto& item = (*missions)[i];
-        const auto id = parse_uuid(item.is_string() ? item.get_ref<const std::string&>() : "");
-        const std::string at = "/missions/" + std::to_string(i);
-        if (!id) errors.push_back({at, "bad_id", id.error().message});
-        else if (!seen.insert(to_string(id.value())).second) errors.push_back({at, "duplicate", "the mission stands twice"});
-        else out.missions.push_back(MissionId{id.value()});
-      }
+  std::set<std::string> seen;
+  const auto read_ids = [&](const char* key, std::vector<MissionId>& ids) {
+    const Json* list = fields.child(key);
+    if (list == nullptr) return;
+    if (!list->is_array() || list->empty() || list->size() > 100) return fields.error(key, "wrong_type", "must be an array of 1 to 100 mission ids");
+    for (std::size_t i = 0; i < list->size(); ++i) {
+      const auto& item = (*list)[i];
+      const auto id = parse_uuid(item.is_string() ? item.get_ref<const std::string&>() : "");
+      const std::string at = std::string("/") + key + '/' + std::to_string(i);
+      if (!id) errors.push_back({at, "bad_id", id.error().message});
+      else if (!seen.insert(to_string(id.value())).second) errors.push_back({at, "duplicate", "the mission stands twice"});
+      else ids.push_back(MissionId{id.value()});
     }
-  } else {
-    fields.error("missions", "required", "missions is missing");
-  }
+  };
+  if (!fields.has("missions")) fields.error("missions", "required", "missions is missing");
+  read_ids("missions", out.missions);
+  read_ids("learn_from", out.learn_from);
   auto& options = out.options;
   if (const auto dims = fields.integer("dims", 2, 3)) options.dims = *dims == 2 ? Dims::two : Dims::three;
   if (const auto solver = fields.word("solver", {"gauss_newton", "levenberg_marquardt", "dogleg"})) options.method = static_cast<anchord::Method>(*solver);
@@ -238,11 +238,13 @@ void CalibrationService::State::run(const Task& task) {
 Result<Calibration> CalibrationService::State::solve(const Task& task, Job& job) {
   const auto canceled_now = [&] { return is_canceled(task.id); };
   std::vector<FlightData> flights;
-  for (const auto& id : task.request.missions) {
+  std::vector<MissionId> all = task.request.missions;
+  all.insert(all.end(), task.request.learn_from.begin(), task.request.learn_from.end());
+  for (const auto& id : all) {
     BOOST_OUTCOME_TRY(auto mission, deps.missions.mission(id));
     BOOST_OUTCOME_TRY(auto flight, load_flight(deps.measurements, mission, canceled_now));
     flights.push_back(std::move(flight));
-    progress(job, 0.3 * static_cast<double>(flights.size()) / static_cast<double>(task.request.missions.size()), "load", flights.back().mission.name);
+    progress(job, 0.3 * static_cast<double>(flights.size()) / static_cast<double>(all.size()), "load", flights.back().mission.name);
   }
   FlightOptions options = task.request.options;
   options.canceled = canceled_now;
@@ -266,7 +268,8 @@ Result<Calibration> CalibrationService::State::solve(const Task& task, Job& job)
   out.origin = out.frame == TrackFrame::wgs84 ? options.origin : std::nullopt;
 
   std::map<NetworkId, std::vector<Estimate>> by_anchor;
-  for (const auto& solution : solutions) {
+  for (std::size_t i = 0; i < task.request.missions.size(); ++i) {
+    const auto& solution = solutions[i];
     for (const auto& anchor : solution.anchors) by_anchor[anchor.estimate.anchor].push_back(anchor.estimate);
   }
   for (const auto& [id, estimates] : by_anchor) {

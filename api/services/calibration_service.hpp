@@ -21,6 +21,7 @@ class Hub;
 /// A batch solve as asked for.
 struct CalibrationRequest {
   std::vector<MissionId> missions;
+  std::vector<MissionId> learn_from;  ///< other flights of the same kit: they tell its bias and lag, not positions
   FlightOptions options;
   std::string settings_json;  ///< as accepted
 };

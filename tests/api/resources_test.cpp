@@ -1,0 +1,154 @@
+// Missions, sites, anchors, calibrations: conventions of api.md section 5 over a real database.
+#include "app_fixture.hpp"
+#include "core/types/anchor.hpp"
+
+namespace anchord::test {
+namespace {
+
+using api::Method;
+
+class Resources : public AppFixture {
+ protected:
+  Call with(const std::string& name, const std::string& value) {
+    Call options;
+    options.headers[name] = value;
+    return options;
+  }
+  /// A stored calibration with one believed and one ambiguous anchor.
+  std::string calibration() {
+    Calibration c;
+    c.id.uuid = make_uuid_v7(clock_.now());
+    c.missions = {MissionId{parse_uuid(mission()).value()}};
+    c.origin = Wgs84{51.023, 3.713, 55};
+    c.settings_json = "{}";
+    c.created = clock_.now();
+    for (const auto& [id, verdict] : {std::pair{0x6a2fu, Verdict::ok}, std::pair{0x6a3cu, Verdict::ambiguous}}) {
+      Estimate e;
+      e.anchor = {id};
+      e.time = clock_.now();
+      e.verdict = verdict;
+      e.reason = verdict == Verdict::ok ? "" : "the mirrored place fits as well";
+      Hypothesis best;
+      best.wgs84 = Wgs84{51.0231, 3.7131, 58.4};
+      best.covariance_m2 = Eigen::Vector3d(4e-4, 4e-4, 1e-3).asDiagonal();
+      e.best = best;
+      e.h95_m = 0.05;
+      e.v95_m = 0.06;
+      e.n_used = 100;
+      c.anchors.push_back(e);
+    }
+    EXPECT_TRUE(database_->anchors().insert(c).has_value());
+    return to_string(c.id);
+  }
+};
+
+TEST_F(Resources, ReportEveryWrongFieldOfAMissionAtOnce) {
+  const auto response = post("/api/v1/missions", R"({"nam":"x","frame":"gps","track_point":"body"})");
+  EXPECT_EQ(response.status, 422);
+  EXPECT_EQ(json(response)["errors"].size(), 3u) << response.body;
+  EXPECT_EQ(json(response)["type"], "/problems/validation");
+  EXPECT_EQ(json(response)["instance"], "/api/v1/missions");
+}
+
+TEST_F(Resources, FinishAMissionOnce) {
+  const auto id = mission();
+  EXPECT_EQ(json(post("/api/v1/missions/" + id + "/actions", R"({"action":"finish"})"))["state"], "finished");
+  EXPECT_EQ(post("/api/v1/missions/" + id + "/actions", R"({"action":"finish"})").status, 422);
+  EXPECT_EQ(post("/api/v1/missions/" + id + "/actions", R"({"action":"explode"})").status, 422);
+  EXPECT_EQ(json(get("/api/v1/missions/" + id + "/events"))["items"].size(), 2u);
+}
+
+TEST_F(Resources, PageByCursorWithoutLosingOrRepeatingRows) {
+  std::set<std::string> made, seen;
+  for (int i = 0; i < 7; ++i) made.insert(mission());
+  std::string cursor;
+  do {
+    auto query = std::map<std::string, std::string>{{"limit", "3"}};
+    if (!cursor.empty()) query["cursor"] = cursor;
+    const auto response = get("/api/v1/missions", query);
+    const auto body = json(response);
+    for (const auto& item : body["items"]) EXPECT_TRUE(seen.insert(item["id"].get<std::string>()).second);
+    cursor = body["next_cursor"].is_null() ? "" : body["next_cursor"].get<std::string>();
+    EXPECT_EQ(header(response, "Link").empty(), cursor.empty());
+  } while (!cursor.empty());
+  EXPECT_EQ(seen, made);
+}
+
+TEST_F(Resources, RefuseUnknownQueryParametersAndLimits) {
+  EXPECT_EQ(get("/api/v1/missions", {{"limt", "3"}}).status, 422);
+  EXPECT_EQ(get("/api/v1/missions", {{"limit", "0"}}).status, 422);
+  EXPECT_EQ(get("/api/v1/missions", {{"limit", "5000"}}).status, 422);
+  EXPECT_EQ(get("/api/v1/missions", {{"cursor", "zzz"}}).status, 422);
+}
+
+TEST_F(Resources, ChangeASiteOnlyWithTheEtagThatWasRead) {
+  const auto made = post("/api/v1/sites", R"({"name":"Ghent","origin":{"lon":3.7,"lat":51.0,"h_m":55}})");
+  ASSERT_EQ(made.status, 201) << made.body;
+  const std::string path = "/api/v1/sites/" + json(made)["id"].get<std::string>();
+  EXPECT_EQ(call(Method::patch, path, R"({"name":"A"})", {}).status, 428);
+  const auto stale = call(Method::patch, path, R"({"name":"A"})", with("if-match", "\"s-77\""));
+  EXPECT_EQ(stale.status, 412);
+  EXPECT_EQ(header(stale, "ETag"), header(made, "ETag"));
+  const auto changed = call(Method::patch, path, R"({"name":"A"})", with("if-match", header(made, "ETag")));
+  EXPECT_EQ(changed.status, 200) << changed.body;
+  EXPECT_EQ(json(changed)["origin"]["lon"], 3.7);
+  EXPECT_EQ(call(Method::get, path, "", with("if-none-match", header(changed, "ETag"))).status, 304);
+  EXPECT_EQ(call(Method::get, path, "", with("if-none-match", header(made, "ETag"))).status, 200);
+}
+
+TEST_F(Resources, PublishOnlyWhatIsBelievedUnlessAReasonIsGiven) {
+  const auto id = calibration();
+  EXPECT_TRUE(json(get("/api/v1/anchors"))["features"].empty());
+  EXPECT_TRUE(json(get("/api/v1/anchors"))["revision"].is_null());
+  EXPECT_EQ(post("/api/v1/calibrations/" + id + "/publish", R"({"anchors":["0x6a3c"]})").status, 422);
+  const auto published = post("/api/v1/calibrations/" + id + "/publish", R"({"note":"first"})");
+  ASSERT_EQ(published.status, 201) << published.body;
+  EXPECT_EQ(json(published)["anchors"], Json::array({"0x6a2f"}));
+  EXPECT_EQ(json(published)["left_out"][0]["network_id"], "0x6a3c");
+  const auto anchors = json(get("/api/v1/anchors"));
+  ASSERT_EQ(anchors["features"].size(), 1u);
+  EXPECT_EQ(anchors["features"][0]["geometry"]["coordinates"][0], 3.7131) << "longitude first, RFC 7946";
+  EXPECT_EQ(anchors["features"][0]["geometry"]["coordinates"][1], 51.0231);
+  EXPECT_EQ(post("/api/v1/calibrations/" + id + "/publish", R"({"anchors":["0x6a3c"],"reason":"checked by tape"})").status, 201);
+  EXPECT_EQ(json(get("/api/v1/anchors"))["features"].size(), 2u);
+  EXPECT_EQ(json(get("/api/v1/anchors", {{"revision", "1"}}))["features"].size(), 1u);
+  EXPECT_EQ(get("/api/v1/anchors", {{"revision", "9"}}).status, 404);
+  EXPECT_EQ(json(get("/api/v1/anchors/0x6a2f/history"))["items"].size(), 1u);
+  const auto audit = json(get("/api/v1/audit"));
+  EXPECT_NE(audit.dump().find("checked by tape"), std::string::npos);
+}
+
+TEST_F(Resources, PatchFacilityDataAndExportItSafely) {
+  const auto id = calibration();
+  post("/api/v1/calibrations/" + id + "/publish", "");
+  const auto read = get("/api/v1/anchors/0x6a2f");
+  const auto patched = call(Method::patch, "/api/v1/anchors/0x6a2f", R"({"name":"=1+1","building":"B\"1\""})", with("if-match", header(read, "ETag")));
+  ASSERT_EQ(patched.status, 200) << patched.body;
+  const auto csv = get("/api/v1/exports/anchors.csv").body;
+  EXPECT_NE(csv.find(",'=1+1,"), std::string::npos) << csv;
+  EXPECT_NE(csv.find(R"("B""1""")"), std::string::npos) << csv;
+  EXPECT_EQ(call(Method::patch, "/api/v1/anchors/0x6a2f", R"({"h_m":3})", with("if-match", header(patched, "ETag"))).status, 422);
+  EXPECT_EQ(get("/api/v1/anchors/0x9999").status, 404);
+  const auto flat = json(get("/api/v1/exports/anchors.geojson", {{"flat", "true"}}));
+  for (const auto& [key, value] : flat["features"][0]["properties"].items()) EXPECT_FALSE(value.is_structured()) << key;
+}
+
+TEST_F(Resources, AnswerUnknownPathsAndMethods) {
+  EXPECT_EQ(get("/api/v1/nothing").status, 404);
+  const auto wrong = call(Method::put, "/api/v1/missions", "", {});
+  EXPECT_EQ(wrong.status, 405);
+  EXPECT_EQ(header(wrong, "Allow"), "GET, HEAD, POST, OPTIONS");
+  EXPECT_EQ(call(Method::options, "/api/v1/missions", "", {}).status, 204);
+  EXPECT_EQ(get("/api/v1/missions/not-a-uuid").status, 404);
+}
+
+TEST_F(Resources, FailACalibrationOfAnEmptyMissionWithItsReason) {
+  const auto id = mission();
+  const auto response = call(Method::post, "/api/v1/calibrations", Json{{"missions", {id}}}.dump(), with("prefer", "wait=20"));
+  EXPECT_EQ(response.status, 422) << response.body;
+  EXPECT_EQ(json(get("/api/v1/jobs"))["items"][0]["state"], "failed");
+  EXPECT_EQ(post("/api/v1/calibrations", R"({"missions":[],"models":{}})").status, 422);
+}
+
+}  // namespace
+}  // namespace anchord::test
