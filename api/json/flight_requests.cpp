@@ -1,5 +1,6 @@
 #include "api/json/flight_requests.hpp"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "api/json/wire_rows.hpp"
@@ -33,7 +34,61 @@ std::string text_of(const Json& object, const char* key) {
 // Nothing of a recording is thrown away for bytes that are not UTF-8.
 std::string dumped(const Ordered& json) { return json.dump(-1, ' ', false, Ordered::error_handler_t::replace); }
 
+template <class Row, class Read>
+Result<std::vector<Row>> parse_rows(std::string_view ndjson, Read read) {
+  std::vector<Row> rows;
+  while (!ndjson.empty()) {
+    const std::size_t end = std::min(ndjson.find('\n'), ndjson.size());
+    Json row = parsed(ndjson.substr(0, end));
+    ndjson.remove_prefix(std::min(end + 1, ndjson.size()));
+    std::vector<FieldError> errors;
+    if (row.is_object()) row.erase("id");
+    rows.push_back(read(row, errors));
+    if (!errors.empty()) {
+      return make_error(Errc::bad_frame, "stored row " + std::to_string(rows.size()) + ": " + errors.front().detail);
+    }
+  }
+  return rows;
+}
+
+TagAntenna parse_tag(const Json& json) {
+  TagAntenna tag;
+  tag.tag = parse_network_id(json.at("tag").get<std::string>()).value();
+  tag.antenna = json.value("antenna", std::uint8_t{0});
+  const auto arm = json.at("lever_arm_body_m").get<std::vector<double>>();
+  tag.lever_arm_body_m = {arm.at(0), arm.at(1), arm.at(2)};
+  return tag;
+}
+
 }  // namespace
+
+Result<Mission> parse_mission(std::string_view body) {
+  const Json json = parsed(body);
+  Mission mission;
+  try {
+    mission.name = json.at("name").get<std::string>();
+    mission.kit = text_of(json, "kit");
+    mission.radio = text_of(json, "radio");
+    mission.frame = json.at("frame") == "local" ? TrackFrame::local : TrackFrame::wgs84;
+    const std::string point = json.at("track_point").get<std::string>();
+    for (const TrackPoint candidate : {TrackPoint::gnss_antenna, TrackPoint::body, TrackPoint::tag_antenna}) {
+      if (point == point_word(candidate)) mission.point = candidate;
+    }
+    for (const Json& tag : json.at("tags")) mission.tags.push_back(parse_tag(tag));
+  } catch (const std::exception& error) {
+    return make_error(Errc::bad_frame, std::string("not a mission: ") + error.what());
+  }
+  return mission;
+}
+
+Result<std::vector<Fix>> parse_fixes(std::string_view ndjson) {
+  return parse_rows<Fix>(ndjson, [](const Json& row, auto& errors) { return read_fix(row, std::nullopt, errors); });
+}
+
+Result<std::vector<Range>> parse_ranges(std::string_view ndjson) {
+  return parse_rows<Range>(ndjson,
+                           [](const Json& row, auto& errors) { return read_range(row, std::nullopt, errors).range; });
+}
 
 std::string mission_request_json(const Mission& mission) {
   Ordered out{{"name", mission.name}};

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/base/result.hpp"
 #include "core/types/fix.hpp"
@@ -25,6 +26,11 @@ struct IngestAnswer {
 Result<IngestAnswer> parse_ingest_answer(std::string_view body);
 /// "id" of a created resource.
 Result<std::string> parse_created_id(std::string_view body);
+/// A mission, its fixes or its ranges as the server gives them (rows as NDJSON), for a replay.
+/// errors  bad_frame, with the line
+Result<Mission> parse_mission(std::string_view body);
+Result<std::vector<Fix>> parse_fixes(std::string_view ndjson);
+Result<std::vector<Range>> parse_ranges(std::string_view ndjson);
 /// "detail" and the first of "errors" of a problem answer; the body's beginning when it is none.
 std::string problem_text(std::string_view body);
 

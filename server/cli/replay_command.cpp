@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "api/imports/flight_folder.hpp"
+#include "api/json/flight_requests.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/flight_upload.hpp"
 #include "server/cli/progress.hpp"
@@ -75,13 +76,36 @@ Result<void> play_once(const Options& options, RestClient& client, const FlightD
   return upload.finish_mission();
 }
 
+/// A flight the server has, as it gives it; impulse responses stay where they are.
+Result<FlightData> fetch_flight(RestClient& client, const std::string& id) {
+  FlightData flight;
+  BOOST_OUTCOME_TRY(const auto mission, client.get("/api/v1/missions/" + id));
+  BOOST_OUTCOME_TRY(flight.mission, api::parse_mission(mission));
+  BOOST_OUTCOME_TRY(const auto fixes, client.get("/api/v1/fixes?format=ndjson&mission=" + id));
+  BOOST_OUTCOME_TRY(flight.fixes, api::parse_fixes(fixes));
+  BOOST_OUTCOME_TRY(const auto ranges, client.get("/api/v1/ranges?format=ndjson&mission=" + id));
+  BOOST_OUTCOME_TRY(flight.ranges, api::parse_ranges(ranges));
+  return flight;
+}
+
 int replay(const Options& options) {
   const auto speed = parse_speed(options.speed);
   if (!speed) {
     std::fprintf(stderr, "anchord replay: --speed is a number above 0, or max: %s\n", options.speed.c_str());
     return 2;
   }
-  auto flight = read_flight_folder(options.source);
+  const auto token = read_token_file(options.token_file);
+  if (!token) {
+    std::fprintf(stderr, "anchord replay: %s\n", token.error().message.c_str());
+    return 2;
+  }
+  auto client = RestClient::make(options.url, token.value(), interrupted);
+  if (!client) {
+    std::fprintf(stderr, "anchord replay: %s\n", client.error().message.c_str());
+    return 2;
+  }
+  auto flight = parse_uuid(options.source) ? fetch_flight(*client.value(), options.source)
+                                           : read_flight_folder(options.source);
   if (!flight) {
     std::fprintf(stderr, "anchord replay: %s\n", flight.error().message.c_str());
     return 2;
@@ -95,16 +119,6 @@ int replay(const Options& options) {
   }
   prepare_rows(flight.value());
   Result<void> result = boost::outcome_v2::success();
-  const auto token = read_token_file(options.token_file);
-  if (!token) {
-    std::fprintf(stderr, "anchord replay: %s\n", token.error().message.c_str());
-    return 2;
-  }
-  auto client = RestClient::make(options.url, token.value(), interrupted);
-  if (!client) {
-    std::fprintf(stderr, "anchord replay: %s\n", client.error().message.c_str());
-    return 2;
-  }
   do {
     result = play_once(options, *client.value(), flight.value(), *speed);
   } while (result && options.loop && !interrupted());
@@ -118,7 +132,7 @@ int replay(const Options& options) {
 void add_replay_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("replay", "Play a flight through a running server as if it were live");
   auto options = std::make_shared<Options>();
-  command->add_option("flight", options->source, "Flight folder")->required();
+  command->add_option("flight", options->source, "Flight folder, or the id of a mission of that server")->required();
   command->add_option("--url", options->url, "Running server")->capture_default_str();
   command->add_option("--speed", options->speed, "Times real time, or max")->capture_default_str();
   command->add_option("--token-file", options->token_file, "File with an access token (gateway and operator)");

@@ -65,6 +65,12 @@ test('a replay is a fresh mission that happens now', async () => {
     const fixes = (await json(server, `/api/v1/fixes?mission=${items[0].id}&limit=1000`)).items;
     const newest = Math.max(...fixes.map((fix) => fix.t_us)) / 1000;
     assert.ok(newest >= begin && newest <= Date.now(), `${newest} is not between ${begin} and now`);
+
+    const again = await run(['replay', items[0].id, '--url', server.url, '--speed', 'max', '--name', 'stored']);
+    assert.equal(again.code, 0, again.stderr);
+    const third = (await json(server, '/api/v1/missions')).items[0];
+    assert.deepEqual([third.name, third.n_ranges, third.n_fixes], ['stored', items[0].n_ranges, items[0].n_fixes]);
+    assert.deepEqual(third.tags, items[0].tags);
   } finally {
     await server.dispose();
   }
