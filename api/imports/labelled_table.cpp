@@ -198,8 +198,7 @@ class Reader {
     Header fresh;
     for (const auto cell : cells) fresh.names.emplace_back(cell);
     if (!header_.names.empty()) {
-      if (fresh.names != header_.names) return make_error(Errc::invalid_argument, file_ + ": its columns differ from those of the first file");
-      return boost::outcome_v2::success();
+      return follow_header(std::move(fresh));
     }
     header_ = std::move(fresh);
     range_ = header_.first(k_range);
@@ -217,7 +216,28 @@ class Reader {
     BOOST_OUTCOME_TRY(choose_groups());
     BOOST_OUTCOME_TRY(choose_placements());
     out_.raw_names = header_.names;
+    find_raw_columns();
     return boost::outcome_v2::success();
+  }
+
+  // A later file may have its columns in another order, lack some that are no one's role, and have others.
+  Result<void> follow_header(Header fresh) {
+    const Header before = std::move(header_);
+    header_ = std::move(fresh);
+    std::vector<std::size_t*> roles{&range_, &label_, &truth_};
+    for (auto& c : group_columns_) roles.push_back(&c);
+    for (auto& c : placement_columns_) roles.push_back(&c);
+    for (auto* role : roles) {
+      if (*role == k_none) continue;
+      BOOST_OUTCOME_TRY(*role, column(before.names[*role]));
+    }
+    find_raw_columns();
+    return boost::outcome_v2::success();
+  }
+
+  void find_raw_columns() {
+    raw_columns_.clear();
+    for (const auto& name : out_.raw_names) raw_columns_.push_back(header_.of(name));
   }
 
   Result<void> choose_groups() {
@@ -287,7 +307,7 @@ class Reader {
     s.height_difference_m = value(k_height), s.heading_deg = value(k_heading);
     if (shape) s.cir = *shape;
     out_.features.push_back(nlos::compute_features(s));
-    out_.raw.insert(out_.raw.end(), values_.begin(), values_.end());
+    for (const auto c : raw_columns_) out_.raw.push_back(c == k_none ? k_nan : values_[c]);
     out_.range_m.push_back(range);
     out_.true_range_m.push_back(truth);
     out_.los.emplace_back();
@@ -322,7 +342,7 @@ class Reader {
   std::string file_;
   Header header_{};
   std::size_t range_{k_none}, label_{k_none}, truth_{k_none};
-  std::vector<std::size_t> group_columns_, placement_columns_;
+  std::vector<std::size_t> group_columns_, placement_columns_, raw_columns_;
   std::vector<double> values_;
   std::vector<std::string> labels_;
   Ids groups_, placements_;

@@ -114,6 +114,18 @@ TEST_F(LabelledTableTest, SplitsByFileWhereSeveralAreGivenAndNoColumnNamesAPlace
   EXPECT_EQ(read({a}).value().grouping, Grouping::row);
 }
 
+TEST_F(LabelledTableTest, FollowsALaterFilesOwnOrderOfColumns) {
+  const auto a = plain("a.csv", "range_m,rtk_range_m\n1,1.5\n"), b = plain("b.csv", "bearing_rad,rtk_range_m,range_m\n0.1,3.5,3\n");
+  const auto t = read({a, b});
+  ASSERT_TRUE(t) << t.error().message;
+  EXPECT_EQ(t.value().range_m, (std::vector<double>{1, 3}));
+  EXPECT_EQ(t.value().true_range_m[1], 3.5);
+  EXPECT_EQ(t.value().raw, (std::vector<double>{1, 1.5, 3, 3.5}));
+  const auto lacking = read({a, plain("c.csv", "range_m\n1\n")});
+  ASSERT_FALSE(lacking);
+  EXPECT_NE(lacking.error().message.find("c.csv: no column rtk_range_m"), std::string::npos);
+}
+
 // Magnitudes are joined by setup and idx; the shape is that of core/nlos/cir.
 TEST_F(LabelledTableTest, JoinsCirsAndDropsRowsWithoutOne) {
   std::string cir = "setup,idx";
