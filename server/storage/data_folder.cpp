@@ -112,12 +112,15 @@ bool DataFolder::give_up_reserve() { return ::unlink((dir_ / k_reserve).c_str())
 
 std::string DataFolder::recovery_commands() const {
   const std::string db = shell_quoted(database());
+  const std::string recovered = shell_quoted(dir_ / "recovered.db");
   const std::string saved = shell_quoted(dir_.string() + ".damaged");
   return "Nothing was changed. Stop every anchord, then keep a copy of all files, and either save what can be read or go "
          "back to the newest copy:\n"
          "  cp -a " + shell_quoted(dir_) + " " + saved + "\n"
-         "  sqlite3 " + db + " .recover | sqlite3 " + shell_quoted(dir_ / "recovered.db") + " && mv " +
-         shell_quoted(dir_ / "recovered.db") + " " + db + " && rm -f " + shell_quoted(wal()) + " " + shell_quoted(dir_ / "anchord.db-shm") +
+         // Not .recover: that of Debian 12's sqlite3 answers "SQL logic error" to every database.
+         "  (echo 'PRAGMA application_id=1095648072;'; echo \"PRAGMA user_version=$(sqlite3 " + db +
+         " 'PRAGMA user_version');\"; sqlite3 " + db + " .dump | sed 's/^ROLLBACK.*/COMMIT;/') | sqlite3 " + recovered +
+         "; mv " + recovered + " " + db + " && rm -f " + shell_quoted(wal()) + " " + shell_quoted(dir_ / "anchord.db-shm") +
          "\n"
          "  cp \"$(ls -t " + shell_quoted(backups()) + "/*.db | head -1)\" " + db + " && rm -f " + shell_quoted(wal()) + " " +
          shell_quoted(dir_ / "anchord.db-shm");

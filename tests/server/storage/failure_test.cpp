@@ -195,7 +195,7 @@ TEST_F(StorageFailure, RefusesADamagedPageWithTheCommandsThatRecover) {
   const Error error = open_error();
   EXPECT_EQ(error.code, Errc::storage_unavailable);
   EXPECT_THAT(error.message, HasSubstr("cp -a"));
-  EXPECT_THAT(error.message, HasSubstr(".recover"));
+  EXPECT_THAT(error.message, HasSubstr(".dump"));
   EXPECT_THAT(error.message, HasSubstr("backups"));
   EXPECT_EQ(bytes_of(file()), before);
 }
