@@ -54,7 +54,10 @@ json principal_json(const Principal& who) {
   json roles = json::array();
   for (const Role role : who.roles) roles.push_back(to_string(role));
   const bool login_is_off = who.token_id == local_principal().token_id;
-  return {{"token_id", who.token_id}, {"name", who.name}, {"roles", roles}, {"auth", login_is_off ? "off" : "on"}};
+  return {{"token_id", who.token_id},
+          {"name", who.name},
+          {"roles", roles},
+          {"auth", login_is_off ? "off" : "on"}};
 }
 
 Response answer(int status, const json& body) {

@@ -74,6 +74,18 @@ TEST(Tokens, AreRefusedOnceRevokedAndInAddresses) {
   EXPECT_NE(audit.find("token revoke"), std::string::npos);
 }
 
+TEST(Tokens, AreNeverKeptForIdempotency) {
+  AppFixture server;
+  ASSERT_TRUE(server.app) << server.error.message;
+  auto headers = server.bearer(server.admin);
+  headers["Idempotency-Key"] = "again";
+  const std::string body = R"({"name":"x","roles":["viewer"]})";
+  const auto one = server.call("POST", "/api/v1/tokens", body, headers);
+  const auto two = server.call("POST", "/api/v1/tokens", body, headers);
+  EXPECT_EQ(two.status, 201);
+  EXPECT_NE(one.body, two.body) << "a repeated answer would mean that the secret was stored";
+}
+
 TEST(Tokens, FirstAdminTokenIsInAFileOnlyItsOwnerMayRead) {
   AppFixture server;
   ASSERT_TRUE(server.app) << server.error.message;
