@@ -60,7 +60,7 @@ std::string write_model_artifact(const ml::Model& model) {
   if (model.classifier) out["classifier"] = json_of(*model.classifier);
   if (model.regressor) {
     const auto& r = *model.regressor;
-    out["regressor"] = {{"scaler", json_of(r.scaler)}, {"scorer", json_of(r.scorer)}, {"min_m", r.min_m}, {"max_m", r.max_m}, {"sigma_m", r.sigma_m}};
+    out["regressor"] = {{"scaler", json_of(r.scaler)}, {"scorer", json_of(r.scorer)}, {"min_m", r.min_m}, {"max_m", r.max_m}, {"fallback_m", r.fallback_m}, {"sigma_m", r.sigma_m}};
   }
   if (model.mixture) out["mixture"] = json_of(*model.mixture);
   return out.dump() + "\n";

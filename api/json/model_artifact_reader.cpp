@@ -185,6 +185,7 @@ ml::Regressor regressor_of(Walk& w, const Json& j, std::size_t features) {
   out.scorer = scorer_of(w, j, at, out.scaler.mean.size());
   out.min_m = w.number(j, at, "min_m", -k_huge, k_huge);
   out.max_m = w.number(j, at, "max_m", out.min_m, k_huge);
+  out.fallback_m = w.number(j, at, "fallback_m", -k_huge, k_huge);
   out.sigma_m = w.number(j, at, "sigma_m", 1e-6, 1e6);
   return out;
 }

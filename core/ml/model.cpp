@@ -105,8 +105,12 @@ double Classifier::p_los(std::span<const double> features) const {
 double Regressor::bias_m(std::span<const double> features) const {
   ANCHORD_CHECK(scaler.mean.size() <= k_max_features && features.size() >= scaler.mean.size(), features.size() << " features given");
   std::array<double, k_max_features> z;
+  // A curve says nothing beyond the rows it was fitted to: 4 sd off, its answer counts half.
+  double beyond_sd = 0;
+  for (std::size_t i = 0; i < scaler.mean.size(); ++i) beyond_sd = std::max(beyond_sd, std::abs(features[i] - scaler.mean[i]) / scaler.sd[i] - 3.0);
   scaler.apply(features, z);
-  return std::clamp(score(scorer, {z.data(), scaler.mean.size()}), min_m, max_m);
+  const double answer = std::clamp(score(scorer, {z.data(), scaler.mean.size()}), min_m, max_m);
+  return fallback_m + (answer - fallback_m) / (1 + beyond_sd * beyond_sd);
 }
 
 std::string_view task_name(Task task) { return k_task_names.at(static_cast<std::size_t>(task)); }

@@ -92,6 +92,7 @@ struct Regressor {
   Scaler scaler{};
   Scorer scorer{};
   double min_m{-1e9}, max_m{1e9};   ///< answers are clipped to what was seen in training
+  double fallback_m{0};             ///< median of the training biases: far from the training rows the answer shrinks to it
   double sigma_m{1};
 
   double bias_m(std::span<const double> features) const;

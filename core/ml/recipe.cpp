@@ -110,6 +110,11 @@ Result<Regressor> fit_regressor(const Dataset& data, const Recipe& recipe) {
   BOOST_OUTCOME_TRY(const auto p, prepare(data, recipe, false));
   Regressor out;
   out.scaler = p.scaler;
+  if (recipe.method != Method::none) {
+    std::vector<std::pair<double, double>> biases;
+    for (std::size_t i = 0; i < p.y.size(); ++i) biases.emplace_back(p.y[i], p.data.weight[i]);
+    out.fallback_m = weighted_median(std::move(biases));
+  }
   switch (recipe.method) {
     case Method::none: out.scorer = Linear{}; break;
     case Method::constant: {

@@ -69,6 +69,18 @@ TEST(Learn, OneClassBiasFindsTheConstant) {
   EXPECT_LT(e.all->corrected.mae_m, 0.03);
 }
 
+// A slope fitted between 8 and 12 m must not be believed at 100 m: there the median of the training biases answers.
+TEST(Regressor, ShrinksToTheMedianFarFromTheRowsItWasFittedTo) {
+  Regressor r;
+  r.scaler = {{10}, {1}, 2.5};
+  r.scorer = Linear{{0.1}, 0.2};
+  r.fallback_m = 0.2;
+  const std::vector<double> near{11}, four_sd{14}, far{110};
+  EXPECT_NEAR(r.bias_m(near), 0.3, 1e-12);
+  EXPECT_NEAR(r.bias_m(four_sd), 0.2 + 0.25 / 2, 1e-12);
+  EXPECT_NEAR(r.bias_m(far), 0.2, 1e-3);
+}
+
 TEST(Learn, RefusesASinglePlaceAndASingleClass) {
   auto one_place = world(1, false);
   std::fill(one_place.group.begin(), one_place.group.end(), 0U);
