@@ -13,16 +13,18 @@ namespace anchord::sim {
 namespace {
 
 constexpr std::array k_heights_m{3.5, 9.0, 14.0};
-constexpr double k_climb_share = 0.03;  ///< of the path, before each orbit but the first
+constexpr double k_climb_share = 0.03;                  ///< of the path, before each orbit but the first
 const Eigen::Vector3d k_lever_arm_m{0.12, 0.0, -0.28};  ///< GNSS antenna on the mast, tag under the belly
 constexpr NetworkId k_tag{0x6e01};
 
-/// Point of a rectangle with rounded corners, at a share of its length, counter-clockwise from the middle of the south side.
+/// Point of a rectangle with rounded corners, at a share of its length, counter-clockwise from the middle of
+/// the south side.
 Eigen::Vector2d ring_m(const World& world, double clearance_m, double share) {
   const double l = world.length_m, w = world.width_m, arc = std::numbers::pi / 2 * clearance_m;
   const double perimeter_m = 2 * (l + w) + 4 * arc;
   double at_m = std::fmod(share, 1.0) * perimeter_m + l / 2;
-  const std::array<std::pair<Eigen::Vector2d, Eigen::Vector2d>, 4> sides{{{{0, 0}, {1, 0}}, {{l, 0}, {0, 1}}, {{l, w}, {-1, 0}}, {{0, w}, {0, -1}}}};
+  const std::array<std::pair<Eigen::Vector2d, Eigen::Vector2d>, 4> sides{
+      {{{0, 0}, {1, 0}}, {{l, 0}, {0, 1}}, {{l, w}, {-1, 0}}, {{0, w}, {0, -1}}}};
   const std::array lengths_m{l, w, l, w};
   for (std::size_t side = 0;; side = (side + 1) % 4) {
     const Eigen::Vector2d along = sides[side].second, outward(along.y(), -along.x());
@@ -45,14 +47,17 @@ Eigen::Quaterniond attitude(const World& world, const SimulationOptions& options
   const double time_s = share * options.duration_s;
   const double yaw = std::atan2(ahead.y(), ahead.x()) + 0.2 * std::sin(0.31 * time_s);
   const double pitch = 0.03 * std::sin(0.83 * time_s), roll = 0.03 * std::cos(0.57 * time_s);
-  return Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
+  return Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
+         Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
          Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX());
 }
 
-/// Error of the receiver: a slow part (multipath, base) and a fast one, together as large as the sigma it states.
+/// Error of the receiver: a slow part (multipath, base) and a fast one, together as large as the sigma it
+/// states.
 class ReceiverError {
  public:
-  ReceiverError(double step_s, Random& random) : keep_(std::exp(-step_s / 15.0)), random_(random), slow_(random.normal3()) {}
+  ReceiverError(double step_s, Random& random)
+      : keep_(std::exp(-step_s / 15.0)), random_(random), slow_(random.normal3()) {}
   Eigen::Vector3d next(const Eigen::Vector3d& sigma_m) {
     slow_ = keep_ * slow_ + std::sqrt(1 - keep_ * keep_) * random_.normal3();
     return sigma_m.cwiseProduct(0.7 * slow_ + std::sqrt(1 - 0.49) * random_.normal3());
@@ -73,7 +78,8 @@ std::vector<Fix> simulate_fixes(const World& world, const SimulationOptions& opt
   for (std::int64_t i = 0; i <= count; ++i) {
     const double time_s = static_cast<double>(i) * step_s, share = std::min(time_s / options.duration_s, 1.0);
     const bool is_float = share >= float_from && share < float_to;
-    const Eigen::Vector3d sigma_m = is_float ? Eigen::Vector3d(0.25, 0.25, 0.45) : Eigen::Vector3d(0.010, 0.010, 0.018);
+    const Eigen::Vector3d sigma_m =
+        is_float ? Eigen::Vector3d(0.25, 0.25, 0.45) : Eigen::Vector3d(0.010, 0.010, 0.018);
     Fix fix;
     fix.time = UtcTime{options.start.ns + static_cast<std::int64_t>(std::llround(time_s * 1e6)) * 1000};
     fix.seq = static_cast<std::uint64_t>(i);
@@ -90,7 +96,8 @@ std::vector<Fix> simulate_fixes(const World& world, const SimulationOptions& opt
 
 std::vector<Range> simulate_ranges(const World& world, const SimulationOptions& options, Random& random) {
   std::vector<double> bias_m;
-  for (std::size_t i = 0; i < world.anchors.size(); ++i) bias_m.push_back(options.radio.anchor_bias_sigma_m * random.normal());
+  for (std::size_t i = 0; i < world.anchors.size(); ++i)
+    bias_m.push_back(options.radio.anchor_bias_sigma_m * random.normal());
   std::vector<Range> ranges;
   const auto count = static_cast<std::int64_t>(options.duration_s * options.range_rate_hz);
   for (std::int64_t i = 0; i < count; ++i) {
@@ -98,15 +105,18 @@ std::vector<Range> simulate_ranges(const World& world, const SimulationOptions& 
     const double share = std::min(time_s / options.duration_s, 1.0);
     const std::size_t index = static_cast<std::size_t>(i) % world.anchors.size();
     const WorldAnchor& anchor = world.anchors[index];
-    const Eigen::Vector3d tag_m = orbit_m(world, options, share) + attitude(world, options, share) * k_lever_arm_m;
+    const Eigen::Vector3d tag_m =
+        orbit_m(world, options, share) + attitude(world, options, share) * k_lever_arm_m;
     const auto exchange = simulate_exchange(world, options.radio, tag_m, anchor, bias_m[index], random);
     if (!exchange) continue;
     Range range;
-    range.time = UtcTime{options.start.ns + static_cast<std::int64_t>(std::llround((time_s + options.lag_s) * 1e6)) * 1000};
+    range.time = UtcTime{options.start.ns +
+                         static_cast<std::int64_t>(std::llround((time_s + options.lag_s) * 1e6)) * 1000};
     range.tag = k_tag;
     range.anchor = anchor.id;
     range.seq = static_cast<std::uint64_t>(i);
-    range.distance_m = std::round(exchange->distance_m * 1000.0) / 1000.0;  // the device answers whole millimetres
+    range.distance_m =
+        std::round(exchange->distance_m * 1000.0) / 1000.0;  // the device answers whole millimetres
     range.rss_dbm = std::round(exchange->rss_dbm * 100.0) / 100.0;
     range.truth = RangeTruth{exchange->truth_m, exchange->line_of_sight};
     ranges.push_back(std::move(range));
@@ -122,7 +132,8 @@ Eigen::Vector3d orbit_m(const World& world, const SimulationOptions& options, do
   for (std::size_t level = 0; level < k_heights_m.size(); ++level) {
     const bool last = level + 1 == k_heights_m.size();
     if (left < orbit_share || last) {
-      const Eigen::Vector2d at_m = ring_m(world, options.clearance_m, std::clamp(left / orbit_share, 0.0, 1.0));
+      const Eigen::Vector2d at_m =
+          ring_m(world, options.clearance_m, std::clamp(left / orbit_share, 0.0, 1.0));
       return {at_m.x(), at_m.y(), k_heights_m[level]};
     }
     left -= orbit_share;
@@ -137,11 +148,17 @@ Eigen::Vector3d orbit_m(const World& world, const SimulationOptions& options, do
 }
 
 Result<SimulatedFlight> simulate_flight(const World& world, const SimulationOptions& options) {
-  const auto positive = [](double value, double limit) { return value > 0 && value <= limit; };  // false for NaN
-  if (!positive(options.duration_s, 14'400)) return make_error(Errc::invalid_argument, "duration must be in 0..14400 s");
-  if (!positive(options.range_rate_hz, 10'000)) return make_error(Errc::invalid_argument, "range rate must be in 0..10000 Hz");
-  if (!positive(options.fix_rate_hz, 1'000)) return make_error(Errc::invalid_argument, "fix rate must be in 0..1000 Hz");
-  if (!positive(options.clearance_m, 1'000)) return make_error(Errc::invalid_argument, "clearance must be in 0..1000 m");
+  const auto positive = [](double value, double limit) {
+    return value > 0 && value <= limit;
+  };  // false for NaN
+  if (!positive(options.duration_s, 14'400))
+    return make_error(Errc::invalid_argument, "duration must be in 0..14400 s");
+  if (!positive(options.range_rate_hz, 10'000))
+    return make_error(Errc::invalid_argument, "range rate must be in 0..10000 Hz");
+  if (!positive(options.fix_rate_hz, 1'000))
+    return make_error(Errc::invalid_argument, "fix rate must be in 0..1000 Hz");
+  if (!positive(options.clearance_m, 1'000))
+    return make_error(Errc::invalid_argument, "clearance must be in 0..1000 m");
   if (world.anchors.empty()) return make_error(Errc::invalid_argument, "the world has no anchors");
   SimulatedFlight flight;
   Mission& mission = flight.data.mission;

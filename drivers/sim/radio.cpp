@@ -9,11 +9,13 @@ namespace anchord::sim {
 double friis_dbm(double transmit_dbm, double carrier_hz, double distance_m) {
   constexpr double k_light_mps = 299'792'458.0;
   const double wavelength_m = k_light_mps / carrier_hz;
-  return transmit_dbm + 20.0 * std::log10(wavelength_m / (4.0 * std::numbers::pi * std::max(distance_m, 0.01)));
+  return transmit_dbm +
+         20.0 * std::log10(wavelength_m / (4.0 * std::numbers::pi * std::max(distance_m, 0.01)));
 }
 
-std::optional<Exchange> simulate_exchange(const World& world, const RadioOptions& options, const Eigen::Vector3d& tag_m,
-                                          const WorldAnchor& anchor, double anchor_bias_m, Random& random) {
+std::optional<Exchange> simulate_exchange(const World& world, const RadioOptions& options,
+                                          const Eigen::Vector3d& tag_m, const WorldAnchor& anchor,
+                                          double anchor_bias_m, Random& random) {
   const double truth_m = (tag_m - anchor.enu_m).norm();
   const Obstruction wall = obstruction_between(world, tag_m, anchor.enu_m);
   // Every draw happens on every call, so that a lost exchange does not shift the numbers of all later ones.
@@ -29,7 +31,8 @@ std::optional<Exchange> simulate_exchange(const World& world, const RadioOptions
   const double excess_m = std::max(0.0, wall.excess_m + spread_m) + tail_m;
   const double measured_m = truth_m + options.shared_bias_m + anchor_bias_m + noise_m + excess_m;
   constexpr double k_line_of_sight_m = 0.06;
-  return Exchange{zero ? 0.0 : std::max(0.0, measured_m), rss_dbm, truth_m, wall.excess_m < k_line_of_sight_m};
+  return Exchange{zero ? 0.0 : std::max(0.0, measured_m), rss_dbm, truth_m,
+                  wall.excess_m < k_line_of_sight_m};
 }
 
 }  // namespace anchord::sim

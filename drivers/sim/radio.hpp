@@ -9,15 +9,15 @@ namespace anchord::sim {
 
 /// The radio of the simulated kit.
 struct RadioOptions {
-  double transmit_dbm = -14.3;       ///< UWB limit of -41.3 dBm/MHz over 500 MHz
-  double carrier_hz = 3.9936e9;      ///< DW1000 channel 2
-  double range_sigma_m = 0.035;      ///< line-of-sight noise of one exchange
-  double shared_bias_m = 0.08;       ///< antenna delay of the kit, in every range
-  double anchor_bias_sigma_m = 0.02; ///< spread of it between anchors
+  double transmit_dbm = -14.3;        ///< UWB limit of -41.3 dBm/MHz over 500 MHz
+  double carrier_hz = 3.9936e9;       ///< DW1000 channel 2
+  double range_sigma_m = 0.035;       ///< line-of-sight noise of one exchange
+  double shared_bias_m = 0.08;        ///< antenna delay of the kit, in every range
+  double anchor_bias_sigma_m = 0.02;  ///< spread of it between anchors
   double rss_sigma_db = 1.2;
-  double sensitivity_dbm = -102;     ///< half of the exchanges are lost at this level
-  double loss_chance = 0.02;         ///< lost for no reason to be seen
-  double zero_chance = 0.004;        ///< answered with 0 mm, the device's failure value
+  double sensitivity_dbm = -102;  ///< half of the exchanges are lost at this level
+  double loss_chance = 0.02;      ///< lost for no reason to be seen
+  double zero_chance = 0.004;     ///< answered with 0 mm, the device's failure value
 };
 
 /// Friis, eq 2.5, isotropic antennas: received level at a distance in free space.
@@ -31,9 +31,10 @@ struct Exchange {
   bool line_of_sight{};  ///< nothing but glass and plasterboard in between
 };
 
-/// Ranges of one anchor with fixed bias. Walls make ranges long and weak, with a spread that grows with the excess;
-/// reflections add a one-sided tail. Nothing: the exchange was lost.
-std::optional<Exchange> simulate_exchange(const World& world, const RadioOptions& options, const Eigen::Vector3d& tag_m,
-                                          const WorldAnchor& anchor, double anchor_bias_m, Random& random);
+/// Ranges of one anchor with fixed bias. Walls make ranges long and weak, with a spread that grows with the
+/// excess; reflections add a one-sided tail. Nothing: the exchange was lost.
+std::optional<Exchange> simulate_exchange(const World& world, const RadioOptions& options,
+                                          const Eigen::Vector3d& tag_m, const WorldAnchor& anchor,
+                                          double anchor_bias_m, Random& random);
 
 }  // namespace anchord::sim

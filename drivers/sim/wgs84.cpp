@@ -15,7 +15,8 @@ constexpr double k_rad = std::numbers::pi / 180.0;
 Eigen::Vector3d ecef_m(const Wgs84& at) {
   const double lat = at.lat_deg * k_rad, lon = at.lon_deg * k_rad;
   const double n = k_a_m / std::sqrt(1.0 - k_e2 * std::sin(lat) * std::sin(lat));
-  return {(n + at.height_m) * std::cos(lat) * std::cos(lon), (n + at.height_m) * std::cos(lat) * std::sin(lon),
+  return {(n + at.height_m) * std::cos(lat) * std::cos(lon),
+          (n + at.height_m) * std::cos(lat) * std::sin(lon),
           (n * (1.0 - k_e2) + at.height_m) * std::sin(lat)};
 }
 
@@ -24,7 +25,8 @@ Eigen::Vector3d ecef_m(const Wgs84& at) {
 Wgs84 wgs84_from_enu(const Wgs84& origin, const Eigen::Vector3d& enu_m) {
   const double lat0 = origin.lat_deg * k_rad, lon0 = origin.lon_deg * k_rad;
   const Eigen::Vector3d east(-std::sin(lon0), std::cos(lon0), 0);
-  const Eigen::Vector3d north(-std::sin(lat0) * std::cos(lon0), -std::sin(lat0) * std::sin(lon0), std::cos(lat0));
+  const Eigen::Vector3d north(-std::sin(lat0) * std::cos(lon0), -std::sin(lat0) * std::sin(lon0),
+                              std::cos(lat0));
   const Eigen::Vector3d up(std::cos(lat0) * std::cos(lon0), std::cos(lat0) * std::sin(lon0), std::sin(lat0));
   const Eigen::Vector3d p = ecef_m(origin) + enu_m.x() * east + enu_m.y() * north + enu_m.z() * up;
   const double rho_m = std::hypot(p.x(), p.y());

@@ -9,7 +9,8 @@ namespace anchord::sim {
 namespace {
 
 /// Absolute cosine between the line and the panel's normal where they cross; nothing when they do not.
-std::optional<double> crossing(const Panel& panel, const Eigen::Vector3d& from_m, const Eigen::Vector3d& step_m) {
+std::optional<double> crossing(const Panel& panel, const Eigen::Vector3d& from_m,
+                               const Eigen::Vector3d& step_m) {
   const Eigen::Vector3d normal = panel.side_a_m.cross(panel.side_b_m).normalized();
   const double along = normal.dot(step_m);
   if (std::abs(along) < 1e-12) return std::nullopt;
@@ -22,7 +23,8 @@ std::optional<double> crossing(const Panel& panel, const Eigen::Vector3d& from_m
   return std::abs(along) / step_m.norm();
 }
 
-Panel upright(double x0, double y0, double x1, double y1, double height_m, double thickness_m, const Material& material) {
+Panel upright(double x0, double y0, double x1, double y1, double height_m, double thickness_m,
+              const Material& material) {
   return {{x0, y0, 0}, {x1 - x0, y1 - y0, 0}, {0, 0, height_m}, thickness_m, material};
 }
 
@@ -35,9 +37,11 @@ void add_front(World& world, double x0, double y0, double x1, double y1) {
     const Eigen::Vector2d start = Eigen::Vector2d(x0, y0) + at_m * direction;
     const Eigen::Vector2d middle = Eigen::Vector2d(x0, y0) + glass_end_m * direction;
     const Eigen::Vector2d end = Eigen::Vector2d(x0, y0) + pier_end_m * direction;
-    world.panels.push_back(upright(start.x(), start.y(), middle.x(), middle.y(), world.height_m, 0.012, k_glass));
+    world.panels.push_back(
+        upright(start.x(), start.y(), middle.x(), middle.y(), world.height_m, 0.012, k_glass));
     if (pier_end_m > glass_end_m) {
-      world.panels.push_back(upright(middle.x(), middle.y(), end.x(), end.y(), world.height_m, 0.22, k_brick));
+      world.panels.push_back(
+          upright(middle.x(), middle.y(), end.x(), end.y(), world.height_m, 0.22, k_brick));
     }
   }
 }
@@ -60,8 +64,8 @@ World demonstration_world() {
   world.panels.push_back(upright(13, 12, 13, 8, h, 0.2, k_concrete));
   world.panels.push_back(upright(10, 0, 10, 8, h, 0.1, k_plasterboard));
   world.panels.push_back(upright(20, 12, 20, 20, h, 0.1, k_plasterboard));
-  world.anchors = {{{0x6a21}, {2.1, 1.8, 2.4}},   {{0x6a22}, {27.6, 2.3, 6.1}},  {{0x6a23}, {28.2, 17.9, 2.7}},
-                   {{0x6a24}, {3.3, 18.4, 6.6}},  {{0x6a25}, {14.2, 3.1, 3.0}},  {{0x6a26}, {16.8, 16.7, 5.2}}};
+  world.anchors = {{{0x6a21}, {2.1, 1.8, 2.4}},  {{0x6a22}, {27.6, 2.3, 6.1}}, {{0x6a23}, {28.2, 17.9, 2.7}},
+                   {{0x6a24}, {3.3, 18.4, 6.6}}, {{0x6a25}, {14.2, 3.1, 3.0}}, {{0x6a26}, {16.8, 16.7, 5.2}}};
   return world;
 }
 

@@ -9,9 +9,10 @@
 
 namespace anchord::sim {
 
-/// What a panel is made of. The excess delay of a crossing is (sqrt(permittivity) - 1) * thickness / cos(incidence),
-/// the extra optical path of a dielectric slab; its loss is `loss_db` at right angles, divided by the same cosine.
-/// Values for 4 to 6.5 GHz in the middle of ITU-R P.2040-3 table 3 (permittivity) and of published UWB wall tests.
+/// What a panel is made of. The excess delay of a crossing is (sqrt(permittivity) - 1) * thickness /
+/// cos(incidence), the extra optical path of a dielectric slab; its loss is `loss_db` at right angles,
+/// divided by the same cosine. Values for 4 to 6.5 GHz in the middle of ITU-R P.2040-3 table 3 (permittivity)
+/// and of published UWB wall tests.
 struct Material {
   std::string_view name;
   double relative_permittivity{};
@@ -43,8 +44,8 @@ struct World {
   std::vector<WorldAnchor> anchors;
 };
 
-/// The demonstration building: 30 x 20 x 8 m with glass fronts between brick piers, a concrete stair core, plasterboard
-/// partitions and a concrete roof; six anchors inside, at 2.4 to 6.6 m.
+/// The demonstration building: 30 x 20 x 8 m with glass fronts between brick piers, a concrete stair core,
+/// plasterboard partitions and a concrete roof; six anchors inside, at 2.4 to 6.6 m.
 World demonstration_world();
 
 /// What lies on the straight line between two points.

@@ -18,8 +18,8 @@ bool write_truth(const sim::SimulatedFlight& flight, const std::filesystem::path
   for (const auto& [id, at] : flight.truth_wgs84) {
     const Eigen::Vector3d& enu_m = flight.truth_enu_m.at(id);
     char line[200];
-    std::snprintf(line, sizeof line, "%s,%.10f,%.10f,%.4f,%.4f,%.4f,%.4f\n", to_string(id).c_str(), at.lat_deg,
-                  at.lon_deg, at.height_m, enu_m.x(), enu_m.y(), enu_m.z());
+    std::snprintf(line, sizeof line, "%s,%.10f,%.10f,%.4f,%.4f,%.4f,%.4f\n", to_string(id).c_str(),
+                  at.lat_deg, at.lon_deg, at.height_m, enu_m.x(), enu_m.y(), enu_m.z());
     file << line;
   }
   file.close();
@@ -41,8 +41,9 @@ int simulate(const sim::SimulationOptions& options, const std::filesystem::path&
     return 1;
   }
   std::fprintf(stderr, "%s: %zu ranges of %zu anchors, %zu fixes, %.0f s, seed %llu\n", folder.c_str(),
-               flight.value().data.ranges.size(), flight.value().truth_wgs84.size(), flight.value().data.fixes.size(),
-               options.duration_s, static_cast<unsigned long long>(options.seed));
+               flight.value().data.ranges.size(), flight.value().truth_wgs84.size(),
+               flight.value().data.fixes.size(), options.duration_s,
+               static_cast<unsigned long long>(options.seed));
   return 0;
 }
 
@@ -51,13 +52,15 @@ int simulate(const sim::SimulationOptions& options, const std::filesystem::path&
 void add_simulate_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("simulate", "Make measurements without a drone");
   command->require_subcommand(1);
-  auto* flight = command->add_subcommand("flight", "One seeded flight round the demonstration building, as a flight folder");
+  auto* flight = command->add_subcommand(
+      "flight", "One seeded flight round the demonstration building, as a flight folder");
   auto options = std::make_shared<sim::SimulationOptions>();
   auto folder = std::make_shared<std::string>();
   flight->add_option("--seed", options->seed, "Same seed, same flight")->capture_default_str();
   flight->add_option("--out", *folder, "Folder to write; made when absent")->required();
   flight->add_option("--duration", options->duration_s, "Seconds of flight")->capture_default_str();
-  flight->add_option("--rate", options->range_rate_hz, "Ranges tried a second, over all anchors")->capture_default_str();
+  flight->add_option("--rate", options->range_rate_hz, "Ranges tried a second, over all anchors")
+      ->capture_default_str();
   flight->add_option("--fix-rate", options->fix_rate_hz, "RTK epochs a second")->capture_default_str();
   flight->callback([options, folder, &exit_code] { exit_code = simulate(*options, *folder); });
 }

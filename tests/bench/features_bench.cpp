@@ -20,7 +20,8 @@ std::vector<std::int16_t> records() {
   for (std::size_t r = 0; r < k_records; ++r)
     for (std::size_t k = 0; k < k_taps; ++k) {
       const double echo = k >= 746 && k < 860 ? 6000.0 / static_cast<double>(k - 744) : 0;
-      for (int part = 0; part < 2; ++part) out.push_back(static_cast<std::int16_t>((random.uniform() - 0.5) * (140 + echo)));
+      for (int part = 0; part < 2; ++part)
+        out.push_back(static_cast<std::int16_t>((random.uniform() - 0.5) * (140 + echo)));
     }
   return out;
 }

@@ -1,5 +1,5 @@
-// Time per candidate of the planner: a grid of 41^3 candidates after 1000 measured points. CPU time, one thread;
-// `rebuild_and_invert` is what eq 8.2-8.5 say word for word, on a sample of the grid.
+// Time per candidate of the planner: a grid of 41^3 candidates after 1000 measured points. CPU time, one
+// thread; `rebuild_and_invert` is what eq 8.2-8.5 say word for word, on a sample of the grid.
 #include <benchmark/benchmark.h>
 
 #include <Eigen/LU>

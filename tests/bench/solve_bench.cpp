@@ -1,5 +1,5 @@
-// Time of one anchor's solve over the number of ranges, Ceres beside the Eigen Gauss-Newton of the live path, and of a
-// whole simulated flight. CPU time; one thread.
+// Time of one anchor's solve over the number of ranges, Ceres beside the Eigen Gauss-Newton of the live path,
+// and of a whole simulated flight. CPU time; one thread.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -36,7 +36,8 @@ void solve_ceres(benchmark::State& state) {
 }
 void solve_gauss_newton(benchmark::State& state) {
   const auto rows = ring(state.range(0));
-  for (auto _ : state) benchmark::DoNotOptimize(solve_anchor_gauss_newton(rows, {0, 0, 0}).value().position_m);
+  for (auto _ : state)
+    benchmark::DoNotOptimize(solve_anchor_gauss_newton(rows, {0, 0, 0}).value().position_m);
 }
 BENCHMARK(solve_ceres)->RangeMultiplier(10)->Range(10, 10'000)->Unit(benchmark::kMicrosecond);
 BENCHMARK(solve_gauss_newton)->RangeMultiplier(10)->Range(10, 10'000)->Unit(benchmark::kMicrosecond);
@@ -55,13 +56,14 @@ void live_whole_flight(benchmark::State& state) {
     LiveFlight live(flight.data.mission);
     std::size_t fix = 0;
     for (const Range& range : flight.data.ranges) {
-      while (fix < flight.data.fixes.size() && flight.data.fixes[fix].time <= range.time) live.add(flight.data.fixes[fix++]);
+      while (fix < flight.data.fixes.size() && flight.data.fixes[fix].time <= range.time)
+        live.add(flight.data.fixes[fix++]);
       live.add(range);
       benchmark::DoNotOptimize(live.take_estimates().size() + live.take_ranges().size());
     }
   }
-  state.counters["cpu_s_per_flight_s"] = benchmark::Counter(
-      210.0, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+  state.counters["cpu_s_per_flight_s"] =
+      benchmark::Counter(210.0, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 BENCHMARK(live_whole_flight)->Unit(benchmark::kMillisecond);
 

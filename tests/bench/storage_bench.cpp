@@ -55,8 +55,20 @@ void append(benchmark::State& state, Synchronous synchronous, bool with_cir) {
 void append_full(benchmark::State& state) { append(state, Synchronous::full, false); }
 void append_normal(benchmark::State& state) { append(state, Synchronous::normal, false); }
 void append_with_cir(benchmark::State& state) { append(state, Synchronous::full, true); }
-BENCHMARK(append_full)->Arg(1)->Arg(50)->Arg(1000)->Arg(10000)->MeasureProcessCPUTime()->UseRealTime()->Unit(benchmark::kMillisecond);
-BENCHMARK(append_normal)->Arg(1)->Arg(1000)->MeasureProcessCPUTime()->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(append_full)
+    ->Arg(1)
+    ->Arg(50)
+    ->Arg(1000)
+    ->Arg(10000)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK(append_normal)
+    ->Arg(1)
+    ->Arg(1000)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
 BENCHMARK(append_with_cir)->Arg(1000)->MeasureProcessCPUTime()->UseRealTime()->Unit(benchmark::kMillisecond);
 
 void append_duplicates(benchmark::State& state) {
@@ -72,7 +84,8 @@ void read_mission(benchmark::State& state) {
   Bench bench(Synchronous::normal);
   constexpr std::int64_t k_rows = 100'000;
   for (int i = 0; i < 10; ++i) {
-    if (!bench.db->measurements().append_ranges(bench.rows(k_rows / 10, false), false)) throw std::runtime_error("append");
+    if (!bench.db->measurements().append_ranges(bench.rows(k_rows / 10, false), false))
+      throw std::runtime_error("append");
   }
   for (auto _ : state) {
     MeasurementStore::Filter filter;

@@ -20,13 +20,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     std::vector<api::FieldError> errors;
     const auto range = api::read_range(row, std::nullopt, errors);
     if (errors.empty()) {
-      fuzz::require(range.range.distance_m >= 0.05 && range.range.distance_m <= 150, "a range is 0.05 to 150 m");
+      fuzz::require(range.range.distance_m >= 0.05 && range.range.distance_m <= 150,
+                    "a range is 0.05 to 150 m");
       (void)api::range_json(range.range, 1).dump();
     }
     errors.clear();
     const Fix fix = api::read_fix(row, std::nullopt, errors);
     if (errors.empty()) {
-      fuzz::require(std::isfinite(fix.position.lat_deg) && std::abs(fix.position.lat_deg) <= 90, "latitude in bounds");
+      fuzz::require(std::isfinite(fix.position.lat_deg) && std::abs(fix.position.lat_deg) <= 90,
+                    "latitude in bounds");
       (void)api::fix_json(fix, std::nullopt).dump();
     }
   }

@@ -34,7 +34,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   std::array<char, 64> out{};  // small: many steps
   while (!parser.done()) {
     const auto step = parser.decode(rest, out);
-    fuzz::require(step.consumed <= rest.size() && step.produced <= out.size(), "a step stays inside its buffers");
+    fuzz::require(step.consumed <= rest.size() && step.produced <= out.size(),
+                  "a step stays inside its buffers");
     if (step.refusal || step.done || (step.consumed == 0 && step.produced == 0)) break;
     rest.remove_prefix(step.consumed);
     if (step.needs_input && rest.empty()) break;

@@ -69,7 +69,8 @@ TEST(SimulatedFlight, StatesASigmaThatItsFixesKeep) {
   int n = 0, floats = 0;
   for (const Fix& fix : flight.data.fixes) {
     Eigen::Vector3d at_m;
-    site.Forward(fix.position.lat_deg, fix.position.lon_deg, fix.position.height_m, at_m.x(), at_m.y(), at_m.z());
+    site.Forward(fix.position.lat_deg, fix.position.lon_deg, fix.position.height_m, at_m.x(), at_m.y(),
+                 at_m.z());
     const double share = std::min(seconds_between(options.start, fix.time) / options.duration_s, 1.0);
     const Eigen::Vector3d error_m = at_m - orbit_m(world, options, share);
     sum += error_m.dot(fix.covariance_m2->inverse() * error_m) / 3;
@@ -98,7 +99,8 @@ TEST(SimulatedFlight, HasEveryAnchorAndEveryKindOfTrouble) {
 }
 
 TEST(SimulatedFlight, RefusesNonsense) {
-  for (const double bad : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+  for (const double bad :
+       {0.0, -1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     SimulationOptions options;
     options.duration_s = bad;
     EXPECT_FALSE(simulate_flight(demonstration_world(), options)) << bad;

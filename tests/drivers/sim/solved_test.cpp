@@ -36,9 +36,9 @@ Judged judge(std::uint64_t seed) {
     // 7.815: 95 % point of chi-square with three degrees of freedom.
     judged.inside += error_m.dot(estimate.best->covariance_m2.inverse() * error_m) < 7.815;
     judged.worst_m = std::max(judged.worst_m, error_m.norm());
-    std::printf("seed %d %s error %.3f m (h %.3f) claims h95 %.3f v95 %.3f verdict %d\n", static_cast<int>(seed),
-                to_string(estimate.anchor).c_str(), error_m.norm(), error_m.head<2>().norm(), estimate.h95_m,
-                estimate.v95_m, static_cast<int>(estimate.verdict));
+    std::printf("seed %d %s error %.3f m (h %.3f) claims h95 %.3f v95 %.3f verdict %d\n",
+                static_cast<int>(seed), to_string(estimate.anchor).c_str(), error_m.norm(),
+                error_m.head<2>().norm(), estimate.h95_m, estimate.v95_m, static_cast<int>(estimate.verdict));
   }
   return judged;
 }
@@ -48,7 +48,8 @@ TEST(DemonstrationFlight, FindsEveryAnchorInsideItsClaimedRegion) {
   EXPECT_EQ(judged.anchors, 6);
   EXPECT_EQ(judged.ok, 6);
   EXPECT_EQ(judged.inside, 6);
-  EXPECT_LT(judged.worst_m, 0.6);  // height of the anchor close under the roof, whose upper ranges are all late
+  EXPECT_LT(judged.worst_m,
+            0.6);  // height of the anchor close under the roof, whose upper ranges are all late
 }
 
 TEST(SimulatedFlight, ClaimsRegionsThatHoldTheTruthOverManySeeds) {

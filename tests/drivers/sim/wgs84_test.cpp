@@ -8,9 +8,11 @@ namespace anchord::sim {
 namespace {
 
 TEST(SimulatedGlobe, AgreesWithGeographicLibToAMicrometre) {
-  for (const Wgs84 origin : {Wgs84{51.0231, 3.7131, 55.5}, Wgs84{-33.9, 151.2, 0}, Wgs84{0, -179.9999, 8000}, Wgs84{89.9, 12, 10}}) {
+  for (const Wgs84 origin : {Wgs84{51.0231, 3.7131, 55.5}, Wgs84{-33.9, 151.2, 0}, Wgs84{0, -179.9999, 8000},
+                             Wgs84{89.9, 12, 10}}) {
     const GeographicLib::LocalCartesian reference(origin.lat_deg, origin.lon_deg, origin.height_m);
-    for (const Eigen::Vector3d& enu_m : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(30, 20, 8), Eigen::Vector3d(-9000, 4000, 120)}) {
+    for (const Eigen::Vector3d& enu_m :
+         {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(30, 20, 8), Eigen::Vector3d(-9000, 4000, 120)}) {
       const Wgs84 at = wgs84_from_enu(origin, enu_m);
       Eigen::Vector3d back_m;
       reference.Forward(at.lat_deg, at.lon_deg, at.height_m, back_m.x(), back_m.y(), back_m.z());
