@@ -44,7 +44,7 @@ class LearningCli : public testing::Test {
     return {std::istreambuf_iterator<char>(file), {}};
   }
   Ran run(const std::string& arguments) const {
-    const std::string command = "cd " + dir_.string() + " && " ANCHORD_BINARY " " + arguments + " >out.txt 2>err.txt";
+    const std::string command = "cd '" + dir_.string() + "' && '" ANCHORD_BINARY "' " + arguments + " >out.txt 2>err.txt";
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, slurp(dir_ / "out.txt"), slurp(dir_ / "err.txt")};
   }
