@@ -53,7 +53,8 @@ struct Application::State {
 
 void Services::audit(const Request& request, std::string what, std::string result) const {
   // Kept even when the store is in trouble is impossible; an answer that could not be audited is a 5xx.
-  value_or_problem(deps.access_store.append_audit({deps.clock.now(), request.principal.token_id, std::move(what), request.remote, std::move(result)}));
+  value_or_problem(deps.access_store.append_audit(
+      {deps.clock.now(), request.principal.token_id, std::move(what), request.remote, std::move(result)}));
 }
 
 /// 50 ms: what was collected goes out, mission states each half second, the rest each second.
@@ -68,7 +69,8 @@ void Application::State::beat() {
     if (n % 20 == 0) second();
     if (n % 72'000 == 0) {
       // Hourly: answers to Idempotency-Key are promised for a day.
-      (void)deps.access_store.drop_answers_before({deps.clock.now().ns - 24LL * 3600 * 1'000'000'000}).has_value();
+      (void)deps.access_store.drop_answers_before({deps.clock.now().ns - 24LL * 3600 * 1'000'000'000})
+          .has_value();
     }
     lock.lock();
   }
@@ -77,9 +79,12 @@ void Application::State::beat() {
 void Application::State::second() {
   const UtcTime now = deps.clock.now();
   const StorageStatus storage = services.storage();
-  std::string json = R"({"t_us":)" + std::to_string(now.us()) + R"(,"recording":)" + (missions.recording() ? "true" : "false");
-  json += R"(,"queue_depth":)" + std::to_string(storage.queue_depth + missions.queued()) + R"(,"db_bytes":)" + std::to_string(storage.db_bytes);
-  json += R"(,"disk_free_bytes":)" + std::to_string(storage.disk_free_bytes) + R"(,"ws_clients":)" + std::to_string(hub.clients());
+  std::string json = R"({"t_us":)" + std::to_string(now.us()) + R"(,"recording":)" +
+                     (missions.recording() ? "true" : "false");
+  json += R"(,"queue_depth":)" + std::to_string(storage.queue_depth + missions.queued()) + R"(,"db_bytes":)" +
+          std::to_string(storage.db_bytes);
+  json += R"(,"disk_free_bytes":)" + std::to_string(storage.disk_free_bytes) + R"(,"ws_clients":)" +
+          std::to_string(hub.clients());
   json += R"(,"synchronous":)" + json_text(storage.synchronous) + '}';
   hub.publish(Topic::system, std::move(json), now.us());
 
@@ -92,7 +97,9 @@ void Application::State::second() {
   }
   std::string alarms = "[";
   if (unwritable_since) {
-    alarms += R"({"id":"storage.unwritable","priority":"critical","since_us":)" + std::to_string(unwritable_since->us()) + R"(,"text":)" + json_text(storage.reason) + R"(,"acknowledged":false})";
+    alarms += R"({"id":"storage.unwritable","priority":"critical","since_us":)" +
+              std::to_string(unwritable_since->us()) + R"(,"text":)" + json_text(storage.reason) +
+              R"(,"acknowledged":false})";
   }
   hub.publish(Topic::alarms, alarms + ']', now.us());
 }

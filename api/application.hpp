@@ -36,8 +36,8 @@ struct StorageStatus {
   std::string synchronous{"full"};
 };
 
-/// Everything above the sockets: routes, services and live topics over the ports. Built by the composition root
-/// with the stores, run by the server. Thread-safe once start() returned.
+/// Everything above the sockets: routes, services and live topics over the ports. Built by the composition
+/// root with the stores, run by the server. Thread-safe once start() returned.
 class Application {
  public:
   struct Deps {

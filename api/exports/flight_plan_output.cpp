@@ -21,14 +21,16 @@ double heading_deg(const planning::Waypoint& w) {
 struct Place {
   double lon_deg, lat_deg;
 };
-/// The ground is taken flat at the origin's height: over a building's size the tangent plane is off by micrometres.
+/// The ground is taken flat at the origin's height: over a building's size the tangent plane is off by
+/// micrometres.
 Place place_of(const EnuFrame& frame, const Eigen::Vector2d& p) {
   const auto at = frame.wgs84_from_enu(Enu{{p.x(), p.y(), 0}});
   return {rounded(at.lon_deg, 1e9), rounded(at.lat_deg, 1e9)};
 }
 
 Json predicted_json(const planning::FlightPlan& plan) {
-  return {{"n_anchors_assumed", plan.assumed_anchors_m.size()}, {"rms_m", plan.rms_m}, {"worst_m", plan.worst_m}};
+  return {
+      {"n_anchors_assumed", plan.assumed_anchors_m.size()}, {"rms_m", plan.rms_m}, {"worst_m", plan.worst_m}};
 }
 
 }  // namespace
@@ -85,8 +87,8 @@ std::string flight_plan_geojson(const planning::FlightPlan& plan, const Wgs84& o
   return out.dump(2) + "\n";
 }
 
-std::string flight_plan_qgc(const planning::FlightPlan& plan, const Wgs84& origin, const planning::Polygon& outline,
-                            const planning::FlightPlanOptions& options) {
+std::string flight_plan_qgc(const planning::FlightPlan& plan, const Wgs84& origin,
+                            const planning::Polygon& outline, const planning::FlightPlanOptions& options) {
   // MAV_CMD and MAV_FRAME numbers of the MAVLink common set.
   constexpr int k_waypoint = 16, k_return = 20, k_takeoff = 22, k_relative_altitude = 3, k_mission_frame = 2;
   const EnuFrame frame(origin);
@@ -109,12 +111,14 @@ std::string flight_plan_qgc(const planning::FlightPlan& plan, const Wgs84& origi
     const auto& first = plan.waypoints.front();
     const auto at = place_of(frame, first.point_m.head<2>());
     home = {at.lat_deg, at.lon_deg, 0};
-    put(k_takeoff, k_relative_altitude, {0, 0, 0, nullptr, at.lat_deg, at.lon_deg, first.point_m.z()}, first.point_m.z());
+    put(k_takeoff, k_relative_altitude, {0, 0, 0, nullptr, at.lat_deg, at.lon_deg, first.point_m.z()},
+        first.point_m.z());
   }
   for (const auto& w : plan.waypoints) {
     const auto at = place_of(frame, w.point_m.head<2>());
     put(k_waypoint, k_relative_altitude,
-        {w.measure ? options.dwell_s : 0.0, 0, 0, heading_deg(w), at.lat_deg, at.lon_deg, w.point_m.z()}, w.point_m.z());
+        {w.measure ? options.dwell_s : 0.0, 0, 0, heading_deg(w), at.lat_deg, at.lon_deg, w.point_m.z()},
+        w.point_m.z());
   }
   put(k_return, k_mission_frame, {0, 0, 0, 0, 0, 0, 0}, 0);
 
@@ -127,9 +131,10 @@ std::string flight_plan_qgc(const planning::FlightPlan& plan, const Wgs84& origi
   out["fileType"] = "Plan";
   out["groundStation"] = "QGroundControl";
   out["version"] = 1;
-  out["geoFence"] = {{"circles", Json::array()},
-                     {"polygons", Json::array({{{"inclusion", false}, {"polygon", corners}, {"version", 1}}})},
-                     {"version", 2}};
+  out["geoFence"] = {
+      {"circles", Json::array()},
+      {"polygons", Json::array({{{"inclusion", false}, {"polygon", corners}, {"version", 1}}})},
+      {"version", 2}};
   out["rallyPoints"] = {{"points", Json::array()}, {"version", 2}};
   out["mission"] = {{"version", 2},
                     {"firmwareType", 12},  // MAV_AUTOPILOT_PX4; every item here means the same to ArduPilot

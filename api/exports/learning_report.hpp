@@ -7,16 +7,18 @@
 #include "core/ml/evaluate.hpp"
 #include "core/ml/learn.hpp"
 
-/// What `anchord train` and `anchord evaluate` print: JSON for programs, a table for people. docs/learning.md lists the fields.
+/// What `anchord train` and `anchord evaluate` print: JSON for programs, a table for people. docs/learning.md
+/// lists the fields.
 namespace anchord::api {
 
 /// Rows read, used, and why the others were not.
 struct RowReport {
   std::vector<std::string> files{};
   std::size_t read{}, used{};
-  std::map<std::string, std::pair<std::size_t, std::string>> dropped{};   ///< reason -> how many, first place ("" where unknown)
+  std::map<std::string, std::pair<std::size_t, std::string>>
+      dropped{};  ///< reason -> how many, first place ("" where unknown)
   std::string label{}, truth{}, group_by{}, placement{};
-  std::string warning{};   ///< an optimistic split, for one
+  std::string warning{};  ///< an optimistic split, for one
 };
 
 std::string train_json(const ml::Learned& learned, const RowReport& rows, const std::string& out_path);

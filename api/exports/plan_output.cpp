@@ -20,9 +20,12 @@ Json point_json(const Eigen::Vector3d& p, int dims) {
 
 const char* value_name(Rule rule) {
   switch (rule) {
-    case Rule::dissertation: return "gdop_trace";
-    case Rule::a_optimal: return "position_variance_m2";
-    case Rule::d_optimal: return "log_det_covariance";
+    case Rule::dissertation:
+      return "gdop_trace";
+    case Rule::a_optimal:
+      return "position_variance_m2";
+    case Rule::d_optimal:
+      return "log_det_covariance";
   }
   return "";
 }
@@ -56,7 +59,8 @@ std::string decision_json(const planning::Decision& decision, const PlanRequest&
                       ? point_json(decision.candidates[*decision.chosen].point_m, request.options.dims)
                       : Json(nullptr);
   out["chosen"] = decision.chosen ? Json(*decision.chosen) : Json(nullptr);
-  out["value"] = decision.chosen ? finite_or_null(decision.candidates[*decision.chosen].value) : Json(nullptr);
+  out["value"] =
+      decision.chosen ? finite_or_null(decision.candidates[*decision.chosen].value) : Json(nullptr);
   out["value_before"] = finite_or_null(decision.value_before);
   out["reason"] = decision.reason;
   out["candidates"] = Json::array();
@@ -79,8 +83,10 @@ std::string decision_text(const planning::Decision& decision, const PlanRequest&
   for (std::size_t i = 0; i < decision.candidates.size(); ++i) {
     const auto& c = decision.candidates[i];
     std::array<char, 32> value{};
-    if (std::isfinite(c.value)) std::snprintf(value.data(), value.size(), "%.9g", c.value);
-    else std::snprintf(value.data(), value.size(), "singular");
+    if (std::isfinite(c.value))
+      std::snprintf(value.data(), value.size(), "%.9g", c.value);
+    else
+      std::snprintf(value.data(), value.size(), "singular");
     std::snprintf(line.data(), line.size(), "%s  %10.3f %10.3f %10.3f  %-22s %8.1f  %s\n",
                   decision.chosen == i ? "*" : " ", c.point_m.x(), c.point_m.y(), c.point_m.z(), value.data(),
                   c.flight_s, c.refused ? std::string(planning::to_string(*c.refused)).c_str() : "");

@@ -7,7 +7,8 @@
 
 namespace anchord::api {
 
-/// The decision with every candidate's value, as docs/formats.md ("Planner output") describes it; ends in a newline.
+/// The decision with every candidate's value, as docs/formats.md ("Planner output") describes it; ends in a
+/// newline.
 std::string decision_json(const planning::Decision& decision, const PlanRequest& request);
 /// The same as a table for people.
 std::string decision_text(const planning::Decision& decision, const PlanRequest& request);

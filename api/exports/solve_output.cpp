@@ -13,7 +13,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-
 /// A number with so many decimals, null where there is none.
 Json number(double value, int decimals) {
   if (!std::isfinite(value)) return nullptr;
@@ -54,14 +53,16 @@ Json anchor_json(const AnchorSolution& anchor, bool globe) {
     json["cov_enu_m2"] = {number(c(0, 0), 8), number(c(0, 1), 8), number(c(0, 2), 8),
                           number(c(1, 1), 8), number(c(1, 2), 8), number(c(2, 2), 8)};
     const ErrorEllipse ellipse = error_ellipse(c);
-    json["ellipse95"] = {{"major_m", number(ellipse.major_m, 4)}, {"minor_m", number(ellipse.minor_m, 4)},
+    json["ellipse95"] = {{"major_m", number(ellipse.major_m, 4)},
+                         {"minor_m", number(ellipse.minor_m, 4)},
                          {"azimuth_deg", number(ellipse.azimuth_deg, 1)}};
     json["h95_m"] = number(e.h95_m, 4);
     json["v95_m"] = number(e.v95_m, 4);
     json["rms_residual_m"] = number(e.best->rms_residual_m, 4);
     json["probability"] = number(e.best->probability, 4);
   } else {
-    for (const char* key : {"lon", "lat", "h_m", "enu_m", "cov_enu_m2", "ellipse95", "h95_m", "v95_m", "rms_residual_m", "probability"}) {
+    for (const char* key : {"lon", "lat", "h_m", "enu_m", "cov_enu_m2", "ellipse95", "h95_m", "v95_m",
+                            "rms_residual_m", "probability"}) {
       json[key] = nullptr;
     }
   }
@@ -87,8 +88,10 @@ Json anchor_json(const AnchorSolution& anchor, bool globe) {
   json["lag_s"] = number(e.lag_s, 4);
   json["lag_sigma_s"] = number(e.lag_sigma_s, 4);
   const auto& g = anchor.geometry;
-  json["geometry"] = {{"track_sd_m", vector_of(g.track_sd_m)}, {"median_range_m", number(g.median_range_m, 3)},
-                      {"line_ratio", number(g.line_ratio, 4)}, {"plane_ratio", number(g.plane_ratio, 4)},
+  json["geometry"] = {{"track_sd_m", vector_of(g.track_sd_m)},
+                      {"median_range_m", number(g.median_range_m, 3)},
+                      {"line_ratio", number(g.line_ratio, 4)},
+                      {"plane_ratio", number(g.plane_ratio, 4)},
                       {"sigma_ratio", number(g.sigma_ratio, 4)}};
   return json;
 }
@@ -103,7 +106,8 @@ Json flight_json(const SolvedFlight& flight) {
   json["frame"] = globe ? "wgs84" : "local";
   json["origin"] = nullptr;
   if (s.origin) {
-    json["origin"] = {{"lon", number(s.origin->lon_deg, 9)}, {"lat", number(s.origin->lat_deg, 9)},
+    json["origin"] = {{"lon", number(s.origin->lon_deg, 9)},
+                      {"lat", number(s.origin->lat_deg, 9)},
                       {"h_m", number(s.origin->height_m, 4)}};
   }
   json["shared"] = {{"bias_m", valued(s.shared.bias_m)},
@@ -134,9 +138,12 @@ std::string geojson(std::span<const SolvedFlight> flights) {
       const auto& best = anchor.estimate.best;
       if (best && best->wgs84) {
         geometry = {{"type", "Point"},
-                    {"coordinates", {number(best->wgs84->lon_deg, 9), number(best->wgs84->lat_deg, 9), number(best->wgs84->height_m, 4)}}};
+                    {"coordinates",
+                     {number(best->wgs84->lon_deg, 9), number(best->wgs84->lat_deg, 9),
+                      number(best->wgs84->height_m, 4)}}};
       }
-      all["features"].push_back({{"type", "Feature"}, {"geometry", std::move(geometry)}, {"properties", std::move(properties)}});
+      all["features"].push_back(
+          {{"type", "Feature"}, {"geometry", std::move(geometry)}, {"properties", std::move(properties)}});
     }
   }
   return all.dump(1) + "\n";
@@ -146,30 +153,42 @@ std::string geojson(std::span<const SolvedFlight> flights) {
 
 std::string_view word(Verdict verdict) {
   switch (verdict) {
-    case Verdict::ok: return "ok";
-    case Verdict::weak_geometry: return "weak_geometry";
-    case Verdict::ambiguous: return "ambiguous";
-    case Verdict::too_few: return "too_few";
-    case Verdict::diverged: return "diverged";
+    case Verdict::ok:
+      return "ok";
+    case Verdict::weak_geometry:
+      return "weak_geometry";
+    case Verdict::ambiguous:
+      return "ambiguous";
+    case Verdict::too_few:
+      return "too_few";
+    case Verdict::diverged:
+      return "diverged";
   }
   return "diverged";
 }
 
 std::string_view word(Determined determined) {
   switch (determined) {
-    case Determined::none: return "none";
-    case Determined::horizontal: return "horizontal";
-    case Determined::position: return "position";
+    case Determined::none:
+      return "none";
+    case Determined::horizontal:
+      return "horizontal";
+    case Determined::position:
+      return "position";
   }
   return "none";
 }
 
 std::string solve_output(std::span<const SolvedFlight> flights, SolveFormat format) {
   switch (format) {
-    case SolveFormat::table: return solve_table(flights);
-    case SolveFormat::csv: return solve_csv(flights);
-    case SolveFormat::geojson: return geojson(flights);
-    case SolveFormat::json: break;
+    case SolveFormat::table:
+      return solve_table(flights);
+    case SolveFormat::csv:
+      return solve_csv(flights);
+    case SolveFormat::geojson:
+      return geojson(flights);
+    case SolveFormat::json:
+      break;
   }
   Json all = {{"schema", "anchord.solve/1"}, {"flights", Json::array()}};
   for (const auto& flight : flights) all["flights"].push_back(flight_json(flight));

@@ -16,8 +16,8 @@ struct SolvedFlight {
   const FlightSolution* solution{};
 };
 
-/// Text of `anchord solve`, newline at the end. Schema in docs/formats.md; longitudes and latitudes with 9 decimals
-/// (0.1 mm), metres with 4. In a local frame GeoJSON features have no geometry.
+/// Text of `anchord solve`, newline at the end. Schema in docs/formats.md; longitudes and latitudes with 9
+/// decimals (0.1 mm), metres with 4. In a local frame GeoJSON features have no geometry.
 std::string solve_output(std::span<const SolvedFlight> flights, SolveFormat format);
 
 /// Words of the interfaces.

@@ -42,13 +42,17 @@ std::string solve_table(std::span<const SolvedFlight> flights) {
   for (const auto& flight : flights) {
     const FlightSolution& s = *flight.solution;
     const bool globe = flight.data->mission.frame == TrackFrame::wgs84;
-    append(out, "%s  kit %s  %zu ranges, %zu used\n", s.name.c_str(), flight.data->mission.kit.c_str(), s.n_ranges, s.n_used);
-    append(out, "bias %.3f m (sigma %.3f)%s, range curve %.3f m per e-fold (%.3f), lag %.3f s (%.3f), antenna up %.3f m (%.3f)\n",
+    append(out, "%s  kit %s  %zu ranges, %zu used\n", s.name.c_str(), flight.data->mission.kit.c_str(),
+           s.n_ranges, s.n_used);
+    append(out,
+           "bias %.3f m (sigma %.3f)%s, range curve %.3f m per e-fold (%.3f), lag %.3f s (%.3f), antenna up "
+           "%.3f m (%.3f)\n",
            s.shared.bias_m.value, s.shared.bias_m.sigma, s.shared.bias_determined ? "" : " NOT DETERMINED",
            s.shared.curve_m.value, s.shared.curve_m.sigma, s.shared.lag_s.value, s.shared.lag_s.sigma,
            s.shared.lever_up_m.value, s.shared.lever_up_m.sigma);
-    append(out, "%-10s %15s %15s %10s %8s %8s %-14s %7s %8s %8s\n", "anchor", globe ? "lat" : "x_m", globe ? "lon" : "y_m",
-           globe ? "height_m" : "z_m", "h95_m", "v95_m", "verdict", "gdop", "used", "refused");
+    append(out, "%-10s %15s %15s %10s %8s %8s %-14s %7s %8s %8s\n", "anchor", globe ? "lat" : "x_m",
+           globe ? "lon" : "y_m", globe ? "height_m" : "z_m", "h95_m", "v95_m", "verdict", "gdop", "used",
+           "refused");
     for (const auto& anchor : s.anchors) {
       const Estimate& e = anchor.estimate;
       append(out, "%-10s ", anchor.name.c_str());
@@ -58,7 +62,8 @@ std::string solve_table(std::span<const SolvedFlight> flights) {
       } else {
         append(out, "%15s %15s %10s %8s %8s", "-", "-", "-", "-", "-");
       }
-      append(out, " %-14s %7.2f %8zu %8zu\n", std::string(word(e.verdict)).c_str(), e.gdop.value_or(0.0), e.n_used, total(e.refused));
+      append(out, " %-14s %7.2f %8zu %8zu\n", std::string(word(e.verdict)).c_str(), e.gdop.value_or(0.0),
+             e.n_used, total(e.refused));
       if (e.mirror) {
         append(out, "%-10s ", "  or");
         append_place(out, *e.mirror, globe);
@@ -75,28 +80,32 @@ std::string solve_table(std::span<const SolvedFlight> flights) {
 
 std::string solve_csv(std::span<const SolvedFlight> flights) {
   std::string out =
-      "flight,anchor_id,network_id,verdict,determined,lon,lat,h_m,e_m,n_m,u_m,cov_ee_m2,cov_en_m2,cov_eu_m2,cov_nn_m2,"
-      "cov_nu_m2,cov_uu_m2,h95_m,v95_m,mirror_e_m,mirror_n_m,mirror_u_m,probability,n_ranges,n_refused,gdop,bias_m,lag_s,reason\n";
+      "flight,anchor_id,network_id,verdict,determined,lon,lat,h_m,e_m,n_m,u_m,cov_ee_m2,cov_en_m2,cov_eu_m2,"
+      "cov_nn_m2,"
+      "cov_nu_m2,cov_uu_m2,h95_m,v95_m,mirror_e_m,mirror_n_m,mirror_u_m,probability,n_ranges,n_refused,gdop,"
+      "bias_m,lag_s,reason\n";
   for (const auto& flight : flights) {
     for (const auto& anchor : flight.solution->anchors) {
       const Estimate& e = anchor.estimate;
       out += field(flight.solution->name) + "," + field(anchor.name) + "," + to_string(e.anchor) + ",";
       out += std::string(word(e.verdict)) + "," + std::string(word(anchor.determined)) + ",";
       if (e.best && e.best->wgs84) {
-        append(out, "%.9f,%.9f,%.4f,", e.best->wgs84->lon_deg, e.best->wgs84->lat_deg, e.best->wgs84->height_m);
+        append(out, "%.9f,%.9f,%.4f,", e.best->wgs84->lon_deg, e.best->wgs84->lat_deg,
+               e.best->wgs84->height_m);
       } else {
         out += ",,,";
       }
       if (e.best) {
         const auto& p = e.best->position.m;
         const auto& c = e.best->covariance_m2;
-        append(out, "%.4f,%.4f,%.4f,%.8f,%.8f,%.8f,%.8f,%.8f,%.8f,%.4f,%.4f,", p.x(), p.y(), p.z(), c(0, 0), c(0, 1), c(0, 2),
-               c(1, 1), c(1, 2), c(2, 2), e.h95_m, e.v95_m);
+        append(out, "%.4f,%.4f,%.4f,%.8f,%.8f,%.8f,%.8f,%.8f,%.8f,%.4f,%.4f,", p.x(), p.y(), p.z(), c(0, 0),
+               c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2), e.h95_m, e.v95_m);
       } else {
         out += ",,,,,,,,,,,";
       }
       if (e.mirror) {
-        append(out, "%.4f,%.4f,%.4f,", e.mirror->position.m.x(), e.mirror->position.m.y(), e.mirror->position.m.z());
+        append(out, "%.4f,%.4f,%.4f,", e.mirror->position.m.x(), e.mirror->position.m.y(),
+               e.mirror->position.m.z());
       } else {
         out += ",,,";
       }

@@ -15,7 +15,9 @@ constexpr std::int64_t k_keep_ns = 24LL * 3600 * 1'000'000'000;
 
 class Sha256 {
  public:
-  Sha256() : context_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) { EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr); }
+  Sha256() : context_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) {
+    EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr);
+  }
   void add(std::string_view bytes) { EVP_DigestUpdate(context_.get(), bytes.data(), bytes.size()); }
   std::string hex() {
     std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
@@ -88,7 +90,8 @@ Response Idempotency::run(Request& request, const std::function<Response(Request
   if (key.size() > 128) return problem(400, "malformed", "Idempotency-Key is longer than 128 characters");
   const std::string& who = request.principal.token_id;
   const Running running(mutex_, running_, who + '\n' + key);
-  if (!running.first()) return problem(409, "conflict", "a request with this Idempotency-Key is still running");
+  if (!running.first())
+    return problem(409, "conflict", "a request with this Idempotency-Key is still running");
 
   Sha256 hash;
   hash.add(to_string(request.method));
@@ -130,8 +133,7 @@ Response Idempotency::run(Request& request, const std::function<Response(Request
     response = handler(request);
   }
   if (response.status < 500 && !response.body_stream) {
-    auto saved = answers_.keep_answer(
-        {key, who, hash.hex(), response.body, response.status, clock_.now()});
+    auto saved = answers_.keep_answer({key, who, hash.hex(), response.body, response.status, clock_.now()});
     if (!saved) return problem_of(saved.error());
   }
   return response;

@@ -46,8 +46,8 @@ class BodyError : public std::runtime_error {
 class BodyReader {
  public:
   virtual ~BodyReader() = default;
-  /// Next bytes, at most buffer.size(); 0 at the end. Throws ProblemException (api/http/problem.hpp) when the peer is
-  /// gone, too slow, sends too much or breaks the framing.
+  /// Next bytes, at most buffer.size(); 0 at the end. Throws ProblemException (api/http/problem.hpp) when the
+  /// peer is gone, too slow, sends too much or breaks the framing.
   virtual std::size_t read(std::span<char> buffer) = 0;
 };
 

@@ -8,7 +8,8 @@ using Json = nlohmann::ordered_json;
 
 const std::vector<ProblemType>& problem_types() {
   static const std::vector<ProblemType> k_types{
-      {"validation", "Request body is not valid", "Fields are wrong; errors lists every one with its pointer."},
+      {"validation", "Request body is not valid",
+       "Fields are wrong; errors lists every one with its pointer."},
       {"malformed", "Request cannot be read", "The request is not well-formed JSON, CSV or HTTP."},
       {"unauthorized", "Authentication needed", "Send a token as Authorization: Bearer, or log in."},
       {"forbidden", "Not allowed", "The token is valid but lacks the role that is named."},
@@ -17,9 +18,11 @@ const std::vector<ProblemType>& problem_types() {
       {"not-acceptable", "Format not offered", "None of the formats asked for exists here."},
       {"conflict", "Conflict", "The request contradicts what is stored; the stored state stays."},
       {"gone", "Gone", "It existed and was removed."},
-      {"precondition-failed", "Precondition failed", "The resource changed since it was read; read it again."},
+      {"precondition-failed", "Precondition failed",
+       "The resource changed since it was read; read it again."},
       {"too-large", "Request too large", "The body exceeds the limit of this address."},
-      {"media-type", "Unsupported media type", "Content-Type is absent, not understood, or the body is compressed."},
+      {"media-type", "Unsupported media type",
+       "Content-Type is absent, not understood, or the body is compressed."},
       {"state", "Not in this state", "The present state does not permit this action."},
       {"precondition-required", "Precondition required", "Send If-Match with the ETag that was read."},
       {"rate-limited", "Too many requests", "Wait for Retry-After seconds."},
@@ -58,7 +61,8 @@ std::string problem_json(int status, std::string_view type, std::string_view det
   return body.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-Response problem(int status, std::string_view type, std::string detail, const std::vector<FieldError>& errors) {
+Response problem(int status, std::string_view type, std::string detail,
+                 const std::vector<FieldError>& errors) {
   Response response;
   response.status = status;
   response.header("Content-Type", "application/problem+json");
@@ -99,7 +103,8 @@ Response problem_of(const Error& error) {
   return problem(500, "internal", "");
 }
 
-void throw_problem(int status, std::string_view type, std::string detail, const std::vector<FieldError>& errors) {
+void throw_problem(int status, std::string_view type, std::string detail,
+                   const std::vector<FieldError>& errors) {
   throw ProblemException{problem(status, type, std::move(detail), errors)};
 }
 

@@ -17,7 +17,8 @@ struct FieldError {
 
 /// RFC 9457 answer. `type` is the last part of the path: "validation" gives "/problems/validation"; the title
 /// comes from the one catalogue (api.md section 5). Instance and request id are added by Router::dispatch.
-Response problem(int status, std::string_view type, std::string detail, const std::vector<FieldError>& errors = {});
+Response problem(int status, std::string_view type, std::string detail,
+                 const std::vector<FieldError>& errors = {});
 
 /// The one table from Errc to HTTP status. 503 carries Retry-After.
 Response problem_of(const Error& error);

@@ -44,7 +44,8 @@ bool etag_listed(std::string_view list, std::string_view etag) {
   while (!list.empty()) {
     auto comma = list.find(',');
     auto item = list.substr(0, comma);
-    while (!item.empty() && std::isspace(static_cast<unsigned char>(item.front())) != 0) item.remove_prefix(1);
+    while (!item.empty() && std::isspace(static_cast<unsigned char>(item.front())) != 0)
+      item.remove_prefix(1);
     while (!item.empty() && std::isspace(static_cast<unsigned char>(item.back())) != 0) item.remove_suffix(1);
     if (item == "*" || strong(item) == strong(etag)) return true;
     if (comma == std::string_view::npos) break;
@@ -100,32 +101,46 @@ void complete_problem(const Request& request, Response& response) {
     return out;
   };
   response.body.pop_back();
-  response.body += ",\"instance\":\"" + quote(request.path) + "\",\"request_id\":\"" + quote(request.request_id) + "\"}";
+  response.body +=
+      ",\"instance\":\"" + quote(request.path) + "\",\"request_id\":\"" + quote(request.request_id) + "\"}";
 }
 
 }  // namespace
 
 std::string_view to_string(Method method) {
   switch (method) {
-    case Method::get: return "GET";
-    case Method::head: return "HEAD";
-    case Method::post: return "POST";
-    case Method::put: return "PUT";
-    case Method::patch: return "PATCH";
-    case Method::del: return "DELETE";
-    case Method::options: return "OPTIONS";
+    case Method::get:
+      return "GET";
+    case Method::head:
+      return "HEAD";
+    case Method::post:
+      return "POST";
+    case Method::put:
+      return "PUT";
+    case Method::patch:
+      return "PATCH";
+    case Method::del:
+      return "DELETE";
+    case Method::options:
+      return "OPTIONS";
   }
   return "GET";
 }
 
 std::string_view to_string(Role role) {
   switch (role) {
-    case Role::viewer: return "viewer";
-    case Role::integrator: return "integrator";
-    case Role::gateway: return "gateway";
-    case Role::engineer: return "engineer";
-    case Role::op: return "operator";
-    case Role::admin: return "admin";
+    case Role::viewer:
+      return "viewer";
+    case Role::integrator:
+      return "integrator";
+    case Role::gateway:
+      return "gateway";
+    case Role::engineer:
+      return "engineer";
+    case Role::op:
+      return "operator";
+    case Role::admin:
+      return "admin";
   }
   return "viewer";
 }
@@ -146,7 +161,8 @@ struct Router::State {
 };
 
 Router::Router(AccessStore* answers, const Clock* clock) : state_(std::make_unique<State>()) {
-  if (answers != nullptr && clock != nullptr) state_->idempotency = std::make_unique<Idempotency>(*answers, *clock);
+  if (answers != nullptr && clock != nullptr)
+    state_->idempotency = std::make_unique<Idempotency>(*answers, *clock);
 }
 Router::~Router() = default;
 Router::Router(Router&&) noexcept = default;
@@ -154,7 +170,9 @@ Router& Router::operator=(Router&&) noexcept = default;
 
 void Router::add(Route route) { state_->routes.push_back(std::move(route)); }
 const std::vector<Route>& Router::routes() const { return state_->routes; }
-void Router::on_fault(std::function<void(std::string_view, std::string_view)> log) { state_->fault = std::move(log); }
+void Router::on_fault(std::function<void(std::string_view, std::string_view)> log) {
+  state_->fault = std::move(log);
+}
 
 Resolution Router::resolve(Method method, std::string_view path) const {
   Resolution best;
@@ -167,7 +185,8 @@ Resolution Router::resolve(Method method, std::string_view path) const {
     int literals = 0;
     if (!match(segments(route.pattern), parts, params, literals)) continue;
     const std::string name(to_string(route.method));
-    if (allow.find(name) == std::string::npos) allow += name + (route.method == Method::get ? ", HEAD, " : ", ");
+    if (allow.find(name) == std::string::npos)
+      allow += name + (route.method == Method::get ? ", HEAD, " : ", ");
     if (route.method == wanted && literals > best_literals) {
       best_literals = literals;
       best.kind = Resolution::Kind::matched;
@@ -218,12 +237,14 @@ Response Router::dispatch(const Route& route, Request& request) const {
         response = problem(401, "unauthorized", "send a token as Authorization: Bearer");
       } else {
         std::string needed;
-        for (const Role role : route.access.roles()) needed += (needed.empty() ? "" : " or ") + std::string(to_string(role));
+        for (const Role role : route.access.roles())
+          needed += (needed.empty() ? "" : " or ") + std::string(to_string(role));
         response = problem(403, "forbidden", "this needs the role " + (needed.empty() ? "admin" : needed));
       }
     } else if (route.needs_if_match && request.header("if-match").empty()) {
       response = problem(428, "precondition-required", "send If-Match with the ETag that was read");
-    } else if (route.method == Method::post && state_->idempotency && !request.header("idempotency-key").empty()) {
+    } else if (route.method == Method::post && state_->idempotency &&
+               !request.header("idempotency-key").empty()) {
       response = state_->idempotency->run(request, guarded);
     } else {
       response = guarded(request);
@@ -242,7 +263,8 @@ Response Router::dispatch(const Route& route, Request& request) const {
   complete_problem(request, response);
   if (!request.request_id.empty()) response.header("X-Request-Id", request.request_id);
   if (!has_header(response, "Cache-Control")) {
-    response.header("Cache-Control", response.status >= 400 || request.method != Method::get ? "no-store" : "no-cache");
+    response.header("Cache-Control",
+                    response.status >= 400 || request.method != Method::get ? "no-store" : "no-cache");
   }
   return response;
 }

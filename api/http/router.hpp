@@ -69,9 +69,9 @@ class Router {
   void add(Route route);
   Resolution resolve(Method method, std::string_view path) const;
 
-  /// Judges roles (401, 403), If-Match (428), Idempotency-Key (replay, 409, 422), calls the handler, turns what
-  /// it throws into a problem, answers If-None-Match with 304 and adds ETag, Cache-Control and X-Request-Id.
-  /// Request::params must hold those of the resolution.
+  /// Judges roles (401, 403), If-Match (428), Idempotency-Key (replay, 409, 422), calls the handler, turns
+  /// what it throws into a problem, answers If-None-Match with 304 and adds ETag, Cache-Control and
+  /// X-Request-Id. Request::params must hold those of the resolution.
   Response dispatch(const Route& route, Request& request) const;
 
   /// resolve + dispatch, with 404, 405 and OPTIONS.

@@ -32,7 +32,9 @@ gzFile handle(void* gz) { return static_cast<gzFile>(gz); }
 }  // namespace
 
 CsvTable::CsvTable(CsvTable&& other) noexcept
-    : file_(std::move(other.file_)), gz_(std::exchange(other.gz_, nullptr)), line_(other.line_),
+    : file_(std::move(other.file_)),
+      gz_(std::exchange(other.gz_, nullptr)),
+      line_(other.line_),
       header_(std::move(other.header_)) {}
 
 CsvTable::~CsvTable() {
@@ -46,11 +48,12 @@ Result<CsvTable> CsvTable::open(const std::filesystem::path& folder, const std::
   const bool has_plain = std::filesystem::exists(plain, ignored);
   const bool has_packed = std::filesystem::exists(packed, ignored);
   if (!has_plain && !has_packed) {
-    return make_error(Errc::not_found, folder.string() + ": neither " + stem + ".csv nor " + stem + ".csv.gz is there");
+    return make_error(Errc::not_found,
+                      folder.string() + ": neither " + stem + ".csv nor " + stem + ".csv.gz is there");
   }
   if (has_plain && has_packed) {
-    return make_error(Errc::invalid_argument,
-                      folder.string() + ": both " + stem + ".csv and " + stem + ".csv.gz are there; which is meant?");
+    return make_error(Errc::invalid_argument, folder.string() + ": both " + stem + ".csv and " + stem +
+                                                  ".csv.gz are there; which is meant?");
   }
   CsvTable table;
   table.file_ = (has_plain ? plain : packed).string();
@@ -82,7 +85,8 @@ Result<std::size_t> CsvTable::require(std::string_view name) const {
   if (const auto at = column(name)) return *at;
   std::string have;
   for (const auto& h : header_) have += (have.empty() ? "" : ", ") + h;
-  return make_error(Errc::invalid_argument, file_ + ":1: column '" + std::string(name) + "' is missing (have: " + have + ")");
+  return make_error(Errc::invalid_argument,
+                    file_ + ":1: column '" + std::string(name) + "' is missing (have: " + have + ")");
 }
 
 Result<bool> CsvTable::read_line() {
@@ -119,7 +123,8 @@ Result<bool> CsvTable::next() {
   if (!any) return false;
   split(line_text_, fields_);
   if (fields_.size() != header_.size()) {
-    return error(std::to_string(fields_.size()) + " fields, the header has " + std::to_string(header_.size()));
+    return error(std::to_string(fields_.size()) + " fields, the header has " +
+                 std::to_string(header_.size()));
   }
   return true;
 }

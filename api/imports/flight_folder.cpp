@@ -64,7 +64,8 @@ class PoseColumns {
       if (!std::isfinite(p[i])) return std::optional<Fix>{};
     }
     if (globe_) {
-      if (std::abs(p[0]) > 90 || std::abs(p[1]) > 180) return table.error("lat_deg or lon_deg outside the globe");
+      if (std::abs(p[0]) > 90 || std::abs(p[1]) > 180)
+        return table.error("lat_deg or lon_deg outside the globe");
       fix.position = {p[0], p[1], p[2]};
     } else {
       fix.local_m = {p[0], p[1], p[2]};
@@ -99,9 +100,14 @@ class PoseColumns {
  private:
   Result<FixClass> fix_class(const CsvTable& table) const {
     if (!fix_) return FixClass::rtk_fixed;  // motion capture has no such column
-    constexpr std::array<std::pair<std::string_view, FixClass>, 8> words{
-        {{"2", FixClass::rtk_fixed}, {"1", FixClass::rtk_float}, {"0", FixClass::single}, {"fixed", FixClass::rtk_fixed},
-         {"float", FixClass::rtk_float}, {"dgps", FixClass::dgps}, {"single", FixClass::single}, {"none", FixClass::none}}};
+    constexpr std::array<std::pair<std::string_view, FixClass>, 8> words{{{"2", FixClass::rtk_fixed},
+                                                                          {"1", FixClass::rtk_float},
+                                                                          {"0", FixClass::single},
+                                                                          {"fixed", FixClass::rtk_fixed},
+                                                                          {"float", FixClass::rtk_float},
+                                                                          {"dgps", FixClass::dgps},
+                                                                          {"single", FixClass::single},
+                                                                          {"none", FixClass::none}}};
     for (const auto& [word, fix] : words) {
       if (table.text(*fix_) == word) return fix;
     }
@@ -116,10 +122,12 @@ class PoseColumns {
   std::optional<std::size_t> heading_, fix_, sd_h_, sd_v_, age_, satellites_;
 };
 
-void note_unknown(const CsvTable& table, const std::string& file, std::initializer_list<std::string_view> known,
-                  const FlightDeclaration& flight, FlightData& data) {
-  constexpr std::array<std::string_view, 17> pose{"t_s", "lat_deg", "lon_deg", "alt_m", "x_m", "y_m", "z_m", "fix", "sd_h_m",
-                                                  "sd_v_m", "correction_age_s", "satellites", "qx", "qy", "qz", "qw", ""};
+void note_unknown(const CsvTable& table, const std::string& file,
+                  std::initializer_list<std::string_view> known, const FlightDeclaration& flight,
+                  FlightData& data) {
+  constexpr std::array<std::string_view, 17> pose{
+      "t_s",    "lat_deg",          "lon_deg",    "alt_m", "x_m", "y_m", "z_m", "fix", "sd_h_m",
+      "sd_v_m", "correction_age_s", "satellites", "qx",    "qy",  "qz",  "qw",  ""};
   std::string unused;
   for (const auto& name : table.header()) {
     bool is_known = name == flight.heading_column;
@@ -130,7 +138,8 @@ void note_unknown(const CsvTable& table, const std::string& file, std::initializ
   if (!unused.empty()) data.notes.push_back(file + ": columns not used: " + unused);
 }
 
-Result<void> read_track(const std::filesystem::path& folder, const FlightDeclaration& flight, FlightData& data) {
+Result<void> read_track(const std::filesystem::path& folder, const FlightDeclaration& flight,
+                        FlightData& data) {
   BOOST_OUTCOME_TRY(auto table, CsvTable::open(folder, "track"));
   BOOST_OUTCOME_TRY(const std::size_t t, table.require("t_s"));
   BOOST_OUTCOME_TRY(const auto pose, PoseColumns::of(table, flight));
@@ -150,11 +159,13 @@ Result<void> read_track(const std::filesystem::path& folder, const FlightDeclara
       ++not_finite;
     }
   }
-  if (not_finite > 0) data.notes.push_back("track: " + std::to_string(not_finite) + " rows without a finite pose left out");
+  if (not_finite > 0)
+    data.notes.push_back("track: " + std::to_string(not_finite) + " rows without a finite pose left out");
   return boost::outcome_v2::success();
 }
 
-Result<void> read_ranges(const std::filesystem::path& folder, const FlightDeclaration& flight, FlightData& data) {
+Result<void> read_ranges(const std::filesystem::path& folder, const FlightDeclaration& flight,
+                         FlightData& data) {
   BOOST_OUTCOME_TRY(auto table, CsvTable::open(folder, "ranges"));
   BOOST_OUTCOME_TRY(const std::size_t t, table.require("t_s"));
   BOOST_OUTCOME_TRY(const std::size_t anchor, table.require("anchor_id"));
@@ -169,11 +180,14 @@ Result<void> read_ranges(const std::filesystem::path& folder, const FlightDeclar
   if (flight.track_in_ranges) {
     BOOST_OUTCOME_TRY(pose, PoseColumns::of(table, flight));
   }
-  note_unknown(table, "ranges", {"anchor_id", "range_m", "tag_id", "antenna", "rx_dbm", "fp_dbm", "rss_dbm", "seq"}, flight, data);
+  note_unknown(table, "ranges",
+               {"anchor_id", "range_m", "tag_id", "antenna", "rx_dbm", "fp_dbm", "rss_dbm", "seq"}, flight,
+               data);
   const auto& tags = flight.mission.tags;
   if (!tag && tags.size() > 1) {
-    return make_error(Errc::invalid_argument, folder.string() + ": flight.json declares " + std::to_string(tags.size()) +
-                                                  " tag antennas, ranges has no column tag_id to tell them apart");
+    return make_error(Errc::invalid_argument,
+                      folder.string() + ": flight.json declares " + std::to_string(tags.size()) +
+                          " tag antennas, ranges has no column tag_id to tell them apart");
   }
   std::size_t pose_not_finite = 0;
   while (true) {

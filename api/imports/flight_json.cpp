@@ -78,7 +78,8 @@ void read_track(Reader r, FlightDeclaration& flight, const std::string& file, st
     r.fail("'point' is '" + point + "', expected gnss_antenna, body or tag_antenna");
   }
   const std::string in = r.text("in", false);
-  if (!in.empty() && in != "ranges" && in != "track") r.fail("'in' is '" + in + "', expected ranges or track");
+  if (!in.empty() && in != "ranges" && in != "track")
+    r.fail("'in' is '" + in + "', expected ranges or track");
   flight.track_in_ranges = in == "ranges";
   const std::string attitude = r.text("attitude", false);
   if (!attitude.empty() && attitude != "quaternion_xyzw" && attitude != "none") {
@@ -101,7 +102,8 @@ void read_tag(Reader r, Mission& mission) {
   antenna.tag = network_id_of(id);
   const std::string number = r.text("antenna", false);
   if (!number.empty()) {
-    const auto parsed = number.size() <= 3 ? parse_network_id(number) : Result<NetworkId>(make_error(Errc::bad_frame, ""));
+    const auto parsed =
+        number.size() <= 3 ? parse_network_id(number) : Result<NetworkId>(make_error(Errc::bad_frame, ""));
     if (!parsed || parsed.value().value > 255) {
       r.fail("'antenna' is '" + number + "', expected 0 to 255");
       return;
@@ -115,7 +117,8 @@ void read_tag(Reader r, Mission& mission) {
     }
     for (std::size_t i = 0; i < 3; ++i) {
       const Json& value = (*arm)[i];
-      if (!value.is_number() || !std::isfinite(value.get<double>()) || std::abs(value.get<double>()) > 100.0) {
+      if (!value.is_number() || !std::isfinite(value.get<double>()) ||
+          std::abs(value.get<double>()) > 100.0) {
         r.fail("'lever_arm_body_m' is not three numbers of metres");
         return;
       }
@@ -123,7 +126,8 @@ void read_tag(Reader r, Mission& mission) {
     }
   }
   for (const auto& other : mission.tags) {
-    if (other.tag == antenna.tag && other.antenna == antenna.antenna) r.fail("tag '" + id + "' stands there twice");
+    if (other.tag == antenna.tag && other.antenna == antenna.antenna)
+      r.fail("tag '" + id + "' stands there twice");
   }
   mission.tags.push_back(antenna);
 }
@@ -164,7 +168,8 @@ Result<FlightDeclaration> read_flight_json(const std::filesystem::path& file) {
   flight.mission.kit = r.text("kit", false);
   flight.mission.radio = r.text("radio", false);
   if (flight.mission.name.empty()) {
-    flight.mission.name = std::filesystem::absolute(file).lexically_normal().parent_path().filename().string();
+    flight.mission.name =
+        std::filesystem::absolute(file).lexically_normal().parent_path().filename().string();
   }
   if (const std::string epoch = r.text("epoch_utc", false); !epoch.empty()) {
     if (const auto time = parse_rfc3339(epoch)) {
@@ -181,7 +186,8 @@ Result<FlightDeclaration> read_flight_json(const std::filesystem::path& file) {
   if (const Json* tags = r.find("tags")) {
     if (!tags->is_array()) r.fail("'tags' is not a list");
     for (std::size_t i = 0; tags->is_array() && i < tags->size(); ++i) {
-      read_tag(Reader((*tags)[i], file.string() + ": tags[" + std::to_string(i) + "]", error), flight.mission);
+      read_tag(Reader((*tags)[i], file.string() + ": tags[" + std::to_string(i) + "]", error),
+               flight.mission);
     }
   }
   if (error) return *error;
@@ -200,9 +206,12 @@ Result<void> write_flight_json(const FlightDeclaration& flight, const std::files
   json["track"]["frame"] = mission.frame == TrackFrame::wgs84 ? "wgs84" : "local";
   const auto point = [&] {
     switch (mission.point) {
-      case TrackPoint::gnss_antenna: return "gnss_antenna";
-      case TrackPoint::body: return "body";
-      case TrackPoint::tag_antenna: return "tag_antenna";
+      case TrackPoint::gnss_antenna:
+        return "gnss_antenna";
+      case TrackPoint::body:
+        return "body";
+      case TrackPoint::tag_antenna:
+        return "tag_antenna";
     }
     return "body";
   };

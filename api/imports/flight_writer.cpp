@@ -18,11 +18,16 @@ void row(std::ofstream& out, const char* format, Args... args) {
 
 const char* word(FixClass fix) {
   switch (fix) {
-    case FixClass::none: return "none";
-    case FixClass::single: return "single";
-    case FixClass::dgps: return "dgps";
-    case FixClass::rtk_float: return "float";
-    case FixClass::rtk_fixed: return "fixed";
+    case FixClass::none:
+      return "none";
+    case FixClass::single:
+      return "single";
+    case FixClass::dgps:
+      return "dgps";
+    case FixClass::rtk_float:
+      return "float";
+    case FixClass::rtk_fixed:
+      return "fixed";
   }
   return "none";
 }
@@ -33,10 +38,12 @@ Result<void> closed(std::ofstream& out, const std::filesystem::path& file) {
   return boost::outcome_v2::success();
 }
 
-Result<void> write_track(const FlightData& flight, UtcTime epoch, bool attitude, const std::filesystem::path& file) {
+Result<void> write_track(const FlightData& flight, UtcTime epoch, bool attitude,
+                         const std::filesystem::path& file) {
   std::ofstream out(file, std::ios::binary);
   const bool globe = flight.mission.frame == TrackFrame::wgs84;
-  out << (globe ? "t_s,lat_deg,lon_deg,alt_m" : "t_s,x_m,y_m,z_m") << ",fix,sd_h_m,sd_v_m" << (attitude ? ",qx,qy,qz,qw" : "") << '\n';
+  out << (globe ? "t_s,lat_deg,lon_deg,alt_m" : "t_s,x_m,y_m,z_m") << ",fix,sd_h_m,sd_v_m"
+      << (attitude ? ",qx,qy,qz,qw" : "") << '\n';
   for (const Fix& fix : flight.fixes) {
     if (fix.frame != flight.mission.frame) {
       return make_error(Errc::invalid_argument, "a fix is not in the frame of its mission");
@@ -44,9 +51,11 @@ Result<void> write_track(const FlightData& flight, UtcTime epoch, bool attitude,
     const double t_s = seconds_between(epoch, fix.time);
     // 1e-10 degrees are 0.01 mm.
     if (globe) {
-      row(out, "%.6f,%.10f,%.10f,%.5f,%s", t_s, fix.position.lat_deg, fix.position.lon_deg, fix.position.height_m, word(fix.fix));
+      row(out, "%.6f,%.10f,%.10f,%.5f,%s", t_s, fix.position.lat_deg, fix.position.lon_deg,
+          fix.position.height_m, word(fix.fix));
     } else {
-      row(out, "%.6f,%.5f,%.5f,%.5f,%s", t_s, fix.local_m.x(), fix.local_m.y(), fix.local_m.z(), word(fix.fix));
+      row(out, "%.6f,%.5f,%.5f,%.5f,%s", t_s, fix.local_m.x(), fix.local_m.y(), fix.local_m.z(),
+          word(fix.fix));
     }
     if (fix.covariance_m2) {
       const auto& c = *fix.covariance_m2;
@@ -75,7 +84,8 @@ Result<void> write_ranges(const FlightData& flight, UtcTime epoch, const std::fi
     const auto name = flight.anchor_names.find(range.anchor);
     row(out, "%.6f,%s,%u,%s,%.4f", seconds_between(epoch, range.time), to_string(range.tag).c_str(),
         static_cast<unsigned>(range.antenna),
-        name != flight.anchor_names.end() ? name->second.c_str() : to_string(range.anchor).c_str(), range.distance_m);
+        name != flight.anchor_names.end() ? name->second.c_str() : to_string(range.anchor).c_str(),
+        range.distance_m);
     optional(range.rx_dbm);
     optional(range.fp_dbm);
     optional(range.rss_dbm);
@@ -97,7 +107,8 @@ Result<void> write_flight_folder(const FlightData& flight, const std::filesystem
   UtcTime epoch = flight.fixes.empty() ? flight.mission.created : flight.fixes.front().time;
   epoch.ns -= epoch.ns % 1000;  // the declaration carries microseconds
   declaration.epoch = epoch;
-  for (const Fix& fix : flight.fixes) declaration.quaternion = declaration.quaternion || fix.enu_from_body.has_value();
+  for (const Fix& fix : flight.fixes)
+    declaration.quaternion = declaration.quaternion || fix.enu_from_body.has_value();
   BOOST_OUTCOME_TRY(write_flight_json(declaration, folder / "flight.json"));
   BOOST_OUTCOME_TRY(write_track(flight, epoch, declaration.quaternion, folder / "track.csv"));
   return write_ranges(flight, epoch, folder / "ranges.csv");

@@ -14,14 +14,16 @@ struct GzipLines::File {
   ~File() { gzclose_r(handle); }
 };
 
-GzipLines::GzipLines(std::unique_ptr<File> file, std::string name) : file_{std::move(file)}, name_{std::move(name)} {}
+GzipLines::GzipLines(std::unique_ptr<File> file, std::string name)
+    : file_{std::move(file)}, name_{std::move(name)} {}
 GzipLines::GzipLines(GzipLines&&) noexcept = default;
 GzipLines& GzipLines::operator=(GzipLines&&) noexcept = default;
 GzipLines::~GzipLines() = default;
 
 Result<GzipLines> GzipLines::open(const std::filesystem::path& path) {
   std::error_code ignored;
-  if (!std::filesystem::is_regular_file(path, ignored)) return make_error(Errc::not_found, path.string() + ": no such file");
+  if (!std::filesystem::is_regular_file(path, ignored))
+    return make_error(Errc::not_found, path.string() + ": no such file");
   const gzFile handle = gzopen(path.c_str(), "rb");
   if (handle == nullptr) return make_error(Errc::not_found, path.string() + ": cannot be read");
   gzbuffer(handle, 1 << 17);
@@ -44,7 +46,8 @@ Result<bool> GzipLines::next(std::string_view& line) {
     }
     if (ended_) return false;
     if (buffer_.size() - at_ > k_max_line)
-      return make_error(Errc::bad_frame, name_ + ": line " + std::to_string(line_number_ + 1) + " is longer than 1 MiB");
+      return make_error(Errc::bad_frame,
+                        name_ + ": line " + std::to_string(line_number_ + 1) + " is longer than 1 MiB");
     buffer_.erase(0, at_);
     at_ = 0;
     searched = buffer_.size();
@@ -56,7 +59,8 @@ Result<bool> GzipLines::next(std::string_view& line) {
     int state = Z_OK;
     const char* what = gzerror(file_->handle, &state);
     if (got < 0 || (got == 0 && state != Z_OK && state != Z_STREAM_END))
-      return make_error(Errc::bad_frame, name_ + ": damaged after line " + std::to_string(line_number_) + ": " + what);
+      return make_error(Errc::bad_frame,
+                        name_ + ": damaged after line " + std::to_string(line_number_) + ": " + what);
     if (got == 0) ended_ = true;
   }
 }

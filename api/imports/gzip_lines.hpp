@@ -11,8 +11,8 @@
 
 namespace anchord::api {
 
-/// Lines of a text file, gzipped or plain (told by its content). A line longer than 1 MiB, a truncated or damaged gzip stream and
-/// more than 4 GiB of text are errors.
+/// Lines of a text file, gzipped or plain (told by its content). A line longer than 1 MiB, a truncated or
+/// damaged gzip stream and more than 4 GiB of text are errors.
 class GzipLines {
  public:
   static Result<GzipLines> open(const std::filesystem::path& path);
@@ -22,7 +22,7 @@ class GzipLines {
 
   /// The next line without its end; false at the end of the file. The view lives until the next call.
   Result<bool> next(std::string_view& line);
-  std::size_t line_number() const { return line_number_; }   ///< of the line last given, from 1
+  std::size_t line_number() const { return line_number_; }  ///< of the line last given, from 1
 
  private:
   struct File;

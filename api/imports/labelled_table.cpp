@@ -18,20 +18,24 @@ const Names k_truth{"true_range_m", "true_range_2d_m", "true_distance_m", "rtk_r
 const Names k_label{"nlos", "is_nlos", "los", "is_los", "label", "cls", "class"};
 const Names k_rx{"rx_dbm", "rss_dbm", "rx_power_dbm", "rss"};
 const Names k_fp{"fp_dbm", "first_path_dbm", "first_path_power", "fp_power_dbm"};
-const Names k_f1{"fp_amp1", "firstPathAmp1"}, k_f2{"fp_amp2", "firstPathAmp2"}, k_f3{"fp_amp3", "firstPathAmp3"};
+const Names k_f1{"fp_amp1", "firstPathAmp1"}, k_f2{"fp_amp2", "firstPathAmp2"},
+    k_f3{"fp_amp3", "firstPathAmp3"};
 const Names k_cir_power{"cir_pwr", "cir_power", "maxGrowthCIR"};
 const Names k_count{"rxpacc", "rxPreamCount", "preamble_count"};
 const Names k_std_noise{"std_noise", "stdNoise"}, k_max_noise{"max_noise", "maxNoise"};
 const Names k_fp_index{"fp_index", "firstPath", "fp_idx"};
 const Names k_height{"height_diff_m", "height_difference_m"};
 const Names k_heading{"heading_deg"};
-const Names k_group{"group", "env", "environment", "place", "room", "campaign", "session", "setup", "tag_pos", "anchor_height_m"};
+const Names k_group{"group",    "env",     "environment", "place",   "room",
+                    "campaign", "session", "setup",       "tag_pos", "anchor_height_m"};
 const Names k_placement{"setup_id", "placement", "setup"};
 const Names k_time{"t_s", "unix_s", "t_us", "time_s"};
 const Names k_joins{"setup", "idx", "seq"};
-// Registers that trees like as they are. Positions, identities and times are never features: they name the place.
-const Names k_registers{"fp_amp1", "fp_amp2", "fp_amp3", "cir_pwr", "std_noise", "max_noise", "rxpacc", "fp_raw", "cir_kurtosis",
-                        "grp1", "grp2", "grp3", "grp4", "grp5", "grp6", "grp7", "grp8"};
+// Registers that trees like as they are. Positions, identities and times are never features: they name the
+// place.
+const Names k_registers{"fp_amp1", "fp_amp2", "fp_amp3",      "cir_pwr", "std_noise", "max_noise",
+                        "rxpacc",  "fp_raw",  "cir_kurtosis", "grp1",    "grp2",      "grp3",
+                        "grp4",    "grp5",    "grp6",         "grp7",    "grp8"};
 
 constexpr std::size_t k_none = static_cast<std::size_t>(-1);
 constexpr std::size_t k_time_blocks = 10;
@@ -114,27 +118,35 @@ Result<CirTable> read_cir(const std::filesystem::path& path) {
     if (width == 0) {
       width = cells.size();
       for (std::size_t c = 0; c < width; ++c) {
-        if (std::find(k_joins.begin(), k_joins.end(), cells[c]) != k_joins.end()) joins.push_back(c), out.join_names.emplace_back(cells[c]);
+        if (std::find(k_joins.begin(), k_joins.end(), cells[c]) != k_joins.end())
+          joins.push_back(c), out.join_names.emplace_back(cells[c]);
         else if (cells[c].size() > 1 && cells[c][0] == 'm' && !std::isnan(number(cells[c].substr(1))))
           taps.emplace_back(static_cast<std::size_t>(number(cells[c].substr(1))), c);
       }
       std::sort(taps.begin(), taps.end());
-      if (joins.empty() || taps.size() < 32) return make_error(Errc::invalid_argument, path.string() + ": a CIR table needs a join column (setup, idx, seq) and taps m0, m1, ...");
+      if (joins.empty() || taps.size() < 32)
+        return make_error(
+            Errc::invalid_argument,
+            path.string() + ": a CIR table needs a join column (setup, idx, seq) and taps m0, m1, ...");
       continue;
     }
     if (cells.size() != width)
-      return make_error(Errc::bad_frame, path.string() + ":" + std::to_string(lines.line_number()) + ": " + std::to_string(cells.size()) + " cells, the header has " + std::to_string(width));
+      return make_error(Errc::bad_frame, path.string() + ":" + std::to_string(lines.line_number()) + ": " +
+                                             std::to_string(cells.size()) + " cells, the header has " +
+                                             std::to_string(width));
     magnitude.clear();
     for (const auto& [tap, column] : taps) magnitude.push_back(static_cast<float>(number(cells[column])));
     if (std::any_of(magnitude.begin(), magnitude.end(), [](float v) { return std::isnan(v); })) continue;
-    if (const auto shape = nlos::cir_shape(magnitude, std::nullopt)) out.shapes.emplace(joined(cells, joins), *shape);
+    if (const auto shape = nlos::cir_shape(magnitude, std::nullopt))
+      out.shapes.emplace(joined(cells, joins), *shape);
   }
   return out;
 }
 
 class Reader {
  public:
-  Reader(const TableOptions& options, bool several_files) : options_{options}, several_files_{several_files} {}
+  Reader(const TableOptions& options, bool several_files)
+      : options_{options}, several_files_{several_files} {}
 
   Result<void> read(const std::filesystem::path& path, const CirTable* cir) {
     BOOST_OUTCOME_TRY(auto lines, GzipLines::open(path));
@@ -149,7 +161,9 @@ class Reader {
     if (cir) {
       for (const auto& name : cir->join_names) {
         joins.push_back(header_.of(name));
-        if (joins.back() == k_none) return make_error(Errc::not_found, file_ + ": the CIR table is joined by column " + name + ", which is not there");
+        if (joins.back() == k_none)
+          return make_error(Errc::not_found,
+                            file_ + ": the CIR table is joined by column " + name + ", which is not there");
       }
     }
     while (true) {
@@ -158,25 +172,33 @@ class Reader {
       if (line.empty()) continue;
       split(line, cells);
       if (cells.size() != header_.names.size())
-        return make_error(Errc::bad_frame, file_ + ":" + std::to_string(lines.line_number()) + ": " + std::to_string(cells.size()) + " cells, the header has " + std::to_string(header_.names.size()));
+        return make_error(Errc::bad_frame, file_ + ":" + std::to_string(lines.line_number()) + ": " +
+                                               std::to_string(cells.size()) + " cells, the header has " +
+                                               std::to_string(header_.names.size()));
       ++out_.rows_read;
       const nlos::CirShape* shape = nullptr;
       if (cir) {
         const auto found = cir->shapes.find(joined(cells, joins));
         if (found != cir->shapes.end()) shape = &found->second;
       }
-      if (cir && shape == nullptr) drop("no CIR in the CIR table", lines.line_number());
-      else take_row(cells, lines.line_number(), shape);
+      if (cir && shape == nullptr)
+        drop("no CIR in the CIR table", lines.line_number());
+      else
+        take_row(cells, lines.line_number(), shape);
     }
     return boost::outcome_v2::success();
   }
 
   Result<LabelledTable> finish() {
-    if (out_.rows() == 0) return make_error(Errc::too_few_observations, file_ + ": no usable row among " + std::to_string(out_.rows_read));
+    if (out_.rows() == 0)
+      return make_error(Errc::too_few_observations,
+                        file_ + ": no usable row among " + std::to_string(out_.rows_read));
     BOOST_OUTCOME_TRY(map_labels());
     if (out_.grouping == Grouping::time_block) {
-      for (std::size_t i = 0; i < out_.rows(); ++i) out_.group[i] = static_cast<std::uint32_t>(i * k_time_blocks / out_.rows());
-      for (std::size_t b = 0; b < k_time_blocks; ++b) out_.group_names.push_back("block " + std::to_string(b));
+      for (std::size_t i = 0; i < out_.rows(); ++i)
+        out_.group[i] = static_cast<std::uint32_t>(i * k_time_blocks / out_.rows());
+      for (std::size_t b = 0; b < k_time_blocks; ++b)
+        out_.group_names.push_back("block " + std::to_string(b));
     } else {
       out_.group_names = groups_.names();
     }
@@ -202,7 +224,8 @@ class Reader {
     }
     header_ = std::move(fresh);
     range_ = header_.first(k_range);
-    if (range_ == k_none) return make_error(Errc::not_found, file_ + ": no column of measured ranges (range_m, distance_m)");
+    if (range_ == k_none)
+      return make_error(Errc::not_found, file_ + ": no column of measured ranges (range_m, distance_m)");
     label_ = header_.first(k_label);
     if (!options_.label.empty()) {
       BOOST_OUTCOME_TRY(label_, column(options_.label));
@@ -245,9 +268,14 @@ class Reader {
       BOOST_OUTCOME_TRY(const auto at, column(name));
       group_columns_.push_back(at);
     }
-    if (group_columns_.empty() && header_.first(k_group) != k_none) group_columns_.push_back(header_.first(k_group));
-    out_.grouping = !group_columns_.empty() ? Grouping::column : several_files_ ? Grouping::file : header_.first(k_time) != k_none ? Grouping::time_block : Grouping::row;
-    for (const auto c : group_columns_) out_.group_by += (out_.group_by.empty() ? "" : ",") + header_.names[c];
+    if (group_columns_.empty() && header_.first(k_group) != k_none)
+      group_columns_.push_back(header_.first(k_group));
+    out_.grouping = !group_columns_.empty()           ? Grouping::column
+                    : several_files_                  ? Grouping::file
+                    : header_.first(k_time) != k_none ? Grouping::time_block
+                                                      : Grouping::row;
+    for (const auto c : group_columns_)
+      out_.group_by += (out_.group_by.empty() ? "" : ",") + header_.names[c];
     if (out_.grouping == Grouping::file) out_.group_by = "file";
     if (out_.grouping == Grouping::time_block) out_.group_by = "time block";
     return boost::outcome_v2::success();
@@ -270,7 +298,8 @@ class Reader {
       add(truth_);
       add(label_);
     }
-    for (const auto c : placement_columns_) out_.placement_by += (out_.placement_by.empty() ? "" : ",") + header_.names[c];
+    for (const auto c : placement_columns_)
+      out_.placement_by += (out_.placement_by.empty() ? "" : ",") + header_.names[c];
     return boost::outcome_v2::success();
   }
 
@@ -287,7 +316,10 @@ class Reader {
       return at == k_none ? std::nullopt : finite(values_[at]);
     };
     const double range = values_[range_];
-    if (!(range > 0)) return drop(std::isnan(range) ? header_.names[range_] + " missing" : header_.names[range_] + " not above zero", line);
+    if (!(range > 0))
+      return drop(
+          std::isnan(range) ? header_.names[range_] + " missing" : header_.names[range_] + " not above zero",
+          line);
     if (range > 1e4) return drop(header_.names[range_] + " beyond 10 km", line);
     std::optional<double> truth;
     if (truth_ != k_none) {
@@ -313,11 +345,15 @@ class Reader {
     out_.los.emplace_back();
     labels_.emplace_back(label_ == k_none ? std::string{} : std::string{cells[label_]});
     std::string group = out_.grouping == Grouping::file ? file_ : joined(cells, group_columns_);
-    if (out_.grouping == Grouping::row && !placement_columns_.empty()) group = joined(cells, placement_columns_);
-    else if (out_.grouping == Grouping::row) group = std::to_string(out_.rows());
+    if (out_.grouping == Grouping::row && !placement_columns_.empty())
+      group = joined(cells, placement_columns_);
+    else if (out_.grouping == Grouping::row)
+      group = std::to_string(out_.rows());
     out_.group.push_back(out_.grouping == Grouping::time_block ? 0 : groups_.of(group));
-    out_.placement.push_back(placement_columns_.empty() ? static_cast<std::uint32_t>(out_.rows())
-                                                        : placements_.of((several_files_ ? file_ + "/" : "") + group + "/" + joined(cells, placement_columns_)));
+    out_.placement.push_back(placement_columns_.empty()
+                                 ? static_cast<std::uint32_t>(out_.rows())
+                                 : placements_.of((several_files_ ? file_ + "/" : "") + group + "/" +
+                                                  joined(cells, placement_columns_)));
   }
 
   Result<void> map_labels() {
@@ -326,14 +362,19 @@ class Reader {
     const auto& name = header_.names[label_];
     if (los_value.empty() && (name == "nlos" || name == "is_nlos")) los_value = "0";
     if (los_value.empty() && (name == "los" || name == "is_los")) los_value = "1";
-    if (los_value.empty()) los_value = std::find(labels_.begin(), labels_.end(), "LOS") != labels_.end() ? "LOS" : *std::min_element(labels_.begin(), labels_.end());
+    if (los_value.empty())
+      los_value = std::find(labels_.begin(), labels_.end(), "LOS") != labels_.end()
+                      ? "LOS"
+                      : *std::min_element(labels_.begin(), labels_.end());
     std::size_t los = 0;
     for (std::size_t i = 0; i < labels_.size(); ++i) {
       const double a = number(labels_[i]), b = number(los_value);
       out_.los[i] = !std::isnan(a) && !std::isnan(b) ? a == b : labels_[i] == los_value;
       los += *out_.los[i] ? 1 : 0;
     }
-    if (los == 0 && !options_.los_value.empty()) return make_error(Errc::invalid_argument, file_ + ": no row of column " + name + " is \"" + los_value + "\"");
+    if (los == 0 && !options_.los_value.empty())
+      return make_error(Errc::invalid_argument,
+                        file_ + ": no row of column " + name + " is \"" + los_value + "\"");
     return boost::outcome_v2::success();
   }
 
@@ -351,7 +392,8 @@ class Reader {
 
 }  // namespace
 
-Result<LabelledTable> read_labelled_tables(std::span<const std::filesystem::path> paths, const TableOptions& options) {
+Result<LabelledTable> read_labelled_tables(std::span<const std::filesystem::path> paths,
+                                           const TableOptions& options) {
   if (paths.empty()) return make_error(Errc::invalid_argument, "no data file given");
   std::optional<CirTable> cir;
   if (options.cir) {
@@ -364,10 +406,13 @@ Result<LabelledTable> read_labelled_tables(std::span<const std::filesystem::path
   return reader.finish();
 }
 
-Result<ml::Dataset> dataset_from(const LabelledTable& table, const SetRequest& request, std::vector<std::size_t>& rows,
+Result<ml::Dataset> dataset_from(const LabelledTable& table, const SetRequest& request,
+                                 std::vector<std::size_t>& rows,
                                  std::map<std::string, std::size_t>& dropped) {
-  if (request.need_label && !table.labelled()) return make_error(Errc::not_found, "no label column (nlos, los, label, cls): name it with --label");
-  if (request.need_truth && !table.has_truth()) return make_error(Errc::not_found, "no column of true ranges (true_range_m): name it with --truth");
+  if (request.need_label && !table.labelled())
+    return make_error(Errc::not_found, "no label column (nlos, los, label, cls): name it with --label");
+  if (request.need_truth && !table.has_truth())
+    return make_error(Errc::not_found, "no column of true ranges (true_range_m): name it with --truth");
   struct Source {
     std::optional<nlos::Feature> feature;
     std::size_t column{};
@@ -376,7 +421,8 @@ Result<ml::Dataset> dataset_from(const LabelledTable& table, const SetRequest& r
   for (const auto& name : request.features) {
     const auto feature = nlos::feature_of(name);
     const auto column = std::find(table.raw_names.begin(), table.raw_names.end(), name);
-    if (!feature && column == table.raw_names.end()) return make_error(Errc::not_found, "no feature or column named " + name);
+    if (!feature && column == table.raw_names.end())
+      return make_error(Errc::not_found, "no feature or column named " + name);
     sources.push_back({feature, static_cast<std::size_t>(column - table.raw_names.begin())});
   }
   ml::Dataset out;
@@ -387,10 +433,14 @@ Result<ml::Dataset> dataset_from(const LabelledTable& table, const SetRequest& r
   for (std::size_t i = 0; i < table.rows(); ++i) {
     bool whole = true;
     for (std::size_t f = 0; f < sources.size() && whole; ++f) {
-      const auto value = sources[f].feature ? table.features[i].get(*sources[f].feature) : finite(table.raw[i * table.raw_names.size() + sources[f].column]);
+      const auto value = sources[f].feature
+                             ? table.features[i].get(*sources[f].feature)
+                             : finite(table.raw[i * table.raw_names.size() + sources[f].column]);
       whole = value.has_value();
-      if (!whole) ++dropped["no " + request.features[f]];
-      else values[f] = *value;
+      if (!whole)
+        ++dropped["no " + request.features[f]];
+      else
+        values[f] = *value;
     }
     if (!whole) continue;
     out.x.insert(out.x.end(), values.begin(), values.end());
@@ -419,7 +469,8 @@ std::vector<std::string> available_features(const LabelledTable& table, bool wit
     if (at == table.raw_names.end()) continue;
     const auto column = static_cast<std::size_t>(at - table.raw_names.begin());
     std::size_t present = 0;
-    for (std::size_t i = 0; i < table.rows(); ++i) present += std::isnan(table.raw[i * table.raw_names.size() + column]) ? 0 : 1;
+    for (std::size_t i = 0; i < table.rows(); ++i)
+      present += std::isnan(table.raw[i * table.raw_names.size() + column]) ? 0 : 1;
     if (present >= most) out.emplace_back(name);
   }
   return out;

@@ -13,16 +13,18 @@
 #include "core/ml/dataset.hpp"
 #include "core/nlos/features.hpp"
 
-/// Labelled measurements as people publish them: CSV, one ranging a line, columns found by name (docs/learning.md lists the names).
+/// Labelled measurements as people publish them: CSV, one ranging a line, columns found by name
+/// (docs/learning.md lists the names).
 namespace anchord::api {
 
 struct TableOptions {
-  std::string label{};                       ///< column; empty: nlos, is_nlos, los, label, cls, class
-  std::string los_value{};                   ///< what means LOS there; empty: 0 for nlos, 1 for los, else the lowest class or "LOS"
-  std::string truth{};                       ///< column of the true range; empty: true_range_m and its kin
-  std::vector<std::string> group_by{};       ///< columns naming a place; empty: env, setup, tag_pos, ...
-  std::vector<std::string> placement{};      ///< columns naming one placement; empty: setup_id, ...
-  std::optional<std::filesystem::path> cir{};   ///< table of |taps| m0.. with join columns (setup, idx)
+  std::string label{};  ///< column; empty: nlos, is_nlos, los, label, cls, class
+  std::string
+      los_value{};  ///< what means LOS there; empty: 0 for nlos, 1 for los, else the lowest class or "LOS"
+  std::string truth{};                         ///< column of the true range; empty: true_range_m and its kin
+  std::vector<std::string> group_by{};         ///< columns naming a place; empty: env, setup, tag_pos, ...
+  std::vector<std::string> placement{};        ///< columns naming one placement; empty: setup_id, ...
+  std::optional<std::filesystem::path> cir{};  ///< table of |taps| m0.. with join columns (setup, idx)
 };
 
 /// How the rows were told apart for splits.
@@ -30,8 +32,8 @@ enum class Grouping { column, file, time_block, row };
 
 struct LabelledTable {
   std::vector<nlos::FeatureVector> features{};
-  std::vector<std::string> raw_names{};                    ///< numeric columns as they stand
-  std::vector<double> raw{};                               ///< rows x raw_names; NaN where the cell is no finite number
+  std::vector<std::string> raw_names{};  ///< numeric columns as they stand
+  std::vector<double> raw{};             ///< rows x raw_names; NaN where the cell is no finite number
   std::vector<std::optional<bool>> los{};
   std::vector<std::optional<double>> true_range_m{};
   std::vector<double> range_m{};
@@ -40,26 +42,31 @@ struct LabelledTable {
   std::string label_column{}, truth_column{}, group_by{}, placement_by{};
   Grouping grouping{Grouping::row};
   std::size_t rows_read{};
-  std::map<std::string, std::pair<std::size_t, std::string>> dropped{};   ///< reason -> how many, first "file:line"
+  std::map<std::string, std::pair<std::size_t, std::string>>
+      dropped{};  ///< reason -> how many, first "file:line"
 
   std::size_t rows() const { return range_m.size(); }
   bool labelled() const { return !label_column.empty(); }
   bool has_truth() const { return !truth_column.empty(); }
 };
 
-/// errors: not_found (file, column), bad_frame (a line with another number of cells: file and line named), invalid_argument
-Result<LabelledTable> read_labelled_tables(std::span<const std::filesystem::path> paths, const TableOptions& options);
+/// errors: not_found (file, column), bad_frame (a line with another number of cells: file and line named),
+/// invalid_argument
+Result<LabelledTable> read_labelled_tables(std::span<const std::filesystem::path> paths,
+                                           const TableOptions& options);
 
-/// A data set of the named features (computed ones by their name, others as columns of the file); rows that lack one, or a label or
-/// truth that is asked for, are left out and counted in `dropped`. `rows` receives the table's row of each of the set's.
+/// A data set of the named features (computed ones by their name, others as columns of the file); rows that
+/// lack one, or a label or truth that is asked for, are left out and counted in `dropped`. `rows` receives
+/// the table's row of each of the set's.
 struct SetRequest {
   std::vector<std::string> features{};
   bool need_label{}, need_truth{};
 };
-Result<ml::Dataset> dataset_from(const LabelledTable& table, const SetRequest& request, std::vector<std::size_t>& rows,
-                                 std::map<std::string, std::size_t>& dropped);
+Result<ml::Dataset> dataset_from(const LabelledTable& table, const SetRequest& request,
+                                 std::vector<std::size_t>& rows, std::map<std::string, std::size_t>& dropped);
 
-/// Names every row (but at most 1 %) has: computed features, then the register columns that are features in their own right.
+/// Names every row (but at most 1 %) has: computed features, then the register columns that are features in
+/// their own right.
 std::vector<std::string> available_features(const LabelledTable& table, bool with_registers);
 
 }  // namespace anchord::api

@@ -12,7 +12,8 @@ namespace {
 using Json = nlohmann::json;
 using LonLat = Eigen::Vector2d;
 
-/// Members that GeoJSON allows beside ours are left alone (RFC 7946 section 6.1), so unknown ones are no error here.
+/// Members that GeoJSON allows beside ours are left alone (RFC 7946 section 6.1), so unknown ones are no
+/// error here.
 class Reader {
  public:
   explicit Reader(std::vector<FieldError>& errors) : errors_(errors) {}
@@ -27,10 +28,12 @@ class Reader {
 
   void object(const Json& json, const std::string& at, const Json* properties) {
     if (!json.is_object()) return fail(at, "wrong_type", "must be a GeoJSON object");
-    const auto type = json.value("type", Json()).is_string() ? json["type"].get<std::string>() : std::string();
+    const auto type =
+        json.value("type", Json()).is_string() ? json["type"].get<std::string>() : std::string();
     if (type == "FeatureCollection") {
       const auto features = json.find("features");
-      if (features == json.end() || !features->is_array()) return fail(at + "/features", "required", "must be an array");
+      if (features == json.end() || !features->is_array())
+        return fail(at + "/features", "required", "must be an array");
       for (std::size_t i = 0; i < features->size(); ++i) {
         object((*features)[i], at + "/features/" + std::to_string(i), nullptr);
       }
@@ -56,7 +59,8 @@ class Reader {
       return fail(at + "/coordinates", "required", "must be an array of rings of [lon, lat]");
     }
     const Json& ring = (*rings)[0];  // holes (courtyards) are not flown into
-    if (ring.size() < 3 || ring.size() > 10'000) return fail(at + "/coordinates/0", "out_of_range", "needs 3 to 10000 corners");
+    if (ring.size() < 3 || ring.size() > 10'000)
+      return fail(at + "/coordinates/0", "out_of_range", "needs 3 to 10000 corners");
     for (std::size_t i = 0; i < ring.size(); ++i) {
       const auto& p = ring[i];
       const std::string here = at + "/coordinates/0/" + std::to_string(i);
@@ -65,12 +69,14 @@ class Reader {
       }
       const LonLat corner{p[0].get<double>(), p[1].get<double>()};
       if (!(std::abs(corner.x()) <= 180) || !(std::abs(corner.y()) <= 90)) {
-        return fail(here, "out_of_range", "longitude -180..180, latitude -90..90 (GeoJSON has longitude first)");
+        return fail(here, "out_of_range",
+                    "longitude -180..180, latitude -90..90 (GeoJSON has longitude first)");
       }
       if (area.corners.empty() || corner != area.corners.back()) area.corners.push_back(corner);
     }
     if (area.corners.size() > 1 && area.corners.front() == area.corners.back()) area.corners.pop_back();
-    if (area.corners.size() < 3) return fail(at + "/coordinates/0", "out_of_range", "needs 3 different corners");
+    if (area.corners.size() < 3)
+      return fail(at + "/coordinates/0", "out_of_range", "needs 3 different corners");
     areas.push_back(std::move(area));
   }
 
@@ -108,12 +114,14 @@ std::optional<OutlineRequest> read_outline(std::string_view text, std::vector<Fi
   for (const auto& area : reader.areas) {
     if (area.kind == "no_fly" || area.kind == "fence") continue;
     if (outline != nullptr) {
-      errors.push_back({area.at, "conflict", "a second building outline; mark other areas with kind no_fly or fence"});
+      errors.push_back(
+          {area.at, "conflict", "a second building outline; mark other areas with kind no_fly or fence"});
     } else {
       outline = &area;
     }
   }
-  if (outline == nullptr && errors.empty()) errors.push_back({"", "required", "no Polygon with the building's outline"});
+  if (outline == nullptr && errors.empty())
+    errors.push_back({"", "required", "no Polygon with the building's outline"});
   if (!errors.empty()) return std::nullopt;
 
   OutlineRequest out;

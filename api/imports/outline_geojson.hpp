@@ -16,7 +16,8 @@ struct OutlineRequest {
   planning::FlightPlanInput input;
 };
 
-/// Everything that is wrong is reported at once, each with its JSON pointer; then nothing is returned. Never throws.
+/// Everything that is wrong is reported at once, each with its JSON pointer; then nothing is returned. Never
+/// throws.
 std::optional<OutlineRequest> read_outline(std::string_view geojson, std::vector<FieldError>& errors);
 
 }  // namespace anchord::api

@@ -25,7 +25,9 @@ class Reader {
   std::optional<Eigen::Vector3d> point(const Json& value, const std::string& at) {
     const bool two = dims_ == 2 && value.is_array() && value.size() == 2;
     if (!two && !(value.is_array() && value.size() == 3)) {
-      errors_.push_back({at, "wrong_type", dims_ == 2 ? "must be [x, y] or [x, y, z] in metres" : "must be [x, y, z] in metres"});
+      errors_.push_back(
+          {at, "wrong_type",
+           dims_ == 2 ? "must be [x, y] or [x, y, z] in metres" : "must be [x, y, z] in metres"});
       return std::nullopt;
     }
     Eigen::Vector3d out{0, 0, 0};
@@ -129,11 +131,13 @@ void read_grid(Fields& outer, std::vector<FieldError>& errors, planning::GridOpt
 }
 
 void read_bounds(Fields& fields, Reader& reader, std::vector<FieldError>& errors, planning::Bounds& bounds) {
-  if (const Json* value = fields.child("fence_m")) bounds.fence = reader.polygon(*value, fields.pointer("fence_m"));
+  if (const Json* value = fields.child("fence_m"))
+    bounds.fence = reader.polygon(*value, fields.pointer("fence_m"));
   if (const Json* value = fields.child("no_fly_m")) {
     if (!value->is_array()) fields.error("no_fly_m", "wrong_type", "must be an array of polygons");
     for (std::size_t i = 0; value->is_array() && i < value->size(); ++i) {
-      bounds.no_fly.push_back(reader.polygon((*value)[i], fields.pointer("no_fly_m") + '/' + std::to_string(i)));
+      bounds.no_fly.push_back(
+          reader.polygon((*value)[i], fields.pointer("no_fly_m") + '/' + std::to_string(i)));
     }
   }
   if (const Json* value = fields.child("obstacles")) {
@@ -171,7 +175,8 @@ void read_covariance(Fields& fields, planning::PlannedAnchor& anchor) {
   m << (*c)[0], (*c)[1], (*c)[2], (*c)[1], (*c)[3], (*c)[4], (*c)[2], (*c)[4], (*c)[5];
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(m, Eigen::EigenvaluesOnly);
   if (!(eigen.eigenvalues()[0] > 0)) {
-    fields.error("covariance_m2", "out_of_range", "is no covariance (ee, en, eu, nn, nu, uu must be positive definite)");
+    fields.error("covariance_m2", "out_of_range",
+                 "is no covariance (ee, en, eu, nn, nu, uu must be positive definite)");
     return;
   }
   anchor.covariance_m2 = m;
@@ -184,20 +189,22 @@ void read_measured_at(Fields& fields, std::size_t n_visited, planning::PlannedAn
     std::iota(anchor.measured_at.begin(), anchor.measured_at.end(), std::size_t{0});
     return;
   }
-  if (!value->is_array()) return fields.error("measured_at", "wrong_type", "must be an array of indices of visited_m");
+  if (!value->is_array())
+    return fields.error("measured_at", "wrong_type", "must be an array of indices of visited_m");
   for (std::size_t i = 0; i < value->size(); ++i) {
     const auto& index = (*value)[i];
     if (!index.is_number_unsigned() || index.get<std::uint64_t>() >= n_visited) {
-      fields.error("measured_at", "out_of_range", "index " + std::to_string(i) + " names none of the " +
-                                                      std::to_string(n_visited) + " visited points");
+      fields.error("measured_at", "out_of_range",
+                   "index " + std::to_string(i) + " names none of the " + std::to_string(n_visited) +
+                       " visited points");
       return;
     }
     anchor.measured_at.push_back(index.get<std::size_t>());
   }
 }
 
-planning::PlannedAnchor read_anchor(const Json& value, const std::string& at, Reader& reader, std::size_t n_visited,
-                                    std::vector<FieldError>& errors) {
+planning::PlannedAnchor read_anchor(const Json& value, const std::string& at, Reader& reader,
+                                    std::size_t n_visited, std::vector<FieldError>& errors) {
   planning::PlannedAnchor anchor;
   Fields fields(value, at, errors);
   if (!fields.is_object()) return anchor;
@@ -205,7 +212,8 @@ planning::PlannedAnchor read_anchor(const Json& value, const std::string& at, Re
   const auto read_place = [&](Fields& place_fields, double probability) {
     const Json* position = place_fields.child("position_m");
     take(probability, place_fields.number("probability", 0, 1));
-    if (position == nullptr) return place_fields.error("position_m", "required", "where the anchor is thought to be");
+    if (position == nullptr)
+      return place_fields.error("position_m", "required", "where the anchor is thought to be");
     if (const auto p = reader.point(*position, place_fields.pointer("position_m"))) {
       anchor.places.push_back({*p, probability});
     }
@@ -218,7 +226,8 @@ planning::PlannedAnchor read_anchor(const Json& value, const std::string& at, Re
   }
   double total = 0;
   for (const auto& place : anchor.places) total += place.probability;
-  if (!anchor.places.empty() && !(total > 0)) fields.error("probability", "out_of_range", "all places have probability 0");
+  if (!anchor.places.empty() && !(total > 0))
+    fields.error("probability", "out_of_range", "all places have probability 0");
   read_measured_at(fields, n_visited, anchor);
   read_covariance(fields, anchor);
   take(anchor.weight, fields.number("weight", 1e-6, 1e6));
@@ -245,7 +254,8 @@ std::optional<PlanRequest> read_plan_input(std::string_view text, std::vector<Fi
                                     ? fields.child("visited_m")->size()
                                     : 0;
   out.input.unreachable = reader.points(fields, "unreachable_m");
-  if (const Json* current = fields.child("current_m")) out.input.current = reader.point(*current, "/current_m");
+  if (const Json* current = fields.child("current_m"))
+    out.input.current = reader.point(*current, "/current_m");
   if (n_visited == 0 && !fields.has("current_m")) {
     fields.error("visited_m", "required", "give visited points, or current_m");
   }
@@ -254,7 +264,8 @@ std::optional<PlanRequest> read_plan_input(std::string_view text, std::vector<Fi
   read_bounds(fields, reader, errors, out.input.bounds);
   const Json* anchors = fields.child("anchors");
   if (anchors == nullptr || !anchors->is_array() || anchors->empty() || anchors->size() > 1000) {
-    fields.error("anchors", anchors == nullptr ? "required" : "wrong_type", "must be an array of 1 to 1000 anchors");
+    fields.error("anchors", anchors == nullptr ? "required" : "wrong_type",
+                 "must be an array of 1 to 1000 anchors");
   } else {
     for (std::size_t i = 0; i < anchors->size(); ++i) {
       out.input.anchors.push_back(

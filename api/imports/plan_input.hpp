@@ -15,8 +15,8 @@ struct PlanRequest {
   planning::NextPointOptions options;
 };
 
-/// Reads it. Everything that is wrong is reported at once, each with its JSON pointer; then nothing is returned.
-/// Unknown fields are refused: a typo is how a setting gets lost. Never throws.
+/// Reads it. Everything that is wrong is reported at once, each with its JSON pointer; then nothing is
+/// returned. Unknown fields are refused: a typo is how a setting gets lost. Never throws.
 std::optional<PlanRequest> read_plan_input(std::string_view json, std::vector<FieldError>& errors);
 
 }  // namespace anchord::api

@@ -32,7 +32,9 @@ std::string text_of(const Json& object, const char* key) {
 }
 
 // Nothing of a recording is thrown away for bytes that are not UTF-8.
-std::string dumped(const Ordered& json) { return json.dump(-1, ' ', false, Ordered::error_handler_t::replace); }
+std::string dumped(const Ordered& json) {
+  return json.dump(-1, ' ', false, Ordered::error_handler_t::replace);
+}
 
 template <class Row, class Read>
 Result<std::vector<Row>> parse_rows(std::string_view ndjson, Read read) {
@@ -45,7 +47,8 @@ Result<std::vector<Row>> parse_rows(std::string_view ndjson, Read read) {
     if (row.is_object()) row.erase("id");
     rows.push_back(read(row, errors));
     if (!errors.empty()) {
-      return make_error(Errc::bad_frame, "stored row " + std::to_string(rows.size()) + ": " + errors.front().detail);
+      return make_error(Errc::bad_frame,
+                        "stored row " + std::to_string(rows.size()) + ": " + errors.front().detail);
     }
   }
   return rows;
@@ -82,12 +85,13 @@ Result<Mission> parse_mission(std::string_view body) {
 }
 
 Result<std::vector<Fix>> parse_fixes(std::string_view ndjson) {
-  return parse_rows<Fix>(ndjson, [](const Json& row, auto& errors) { return read_fix(row, std::nullopt, errors); });
+  return parse_rows<Fix>(ndjson,
+                         [](const Json& row, auto& errors) { return read_fix(row, std::nullopt, errors); });
 }
 
 Result<std::vector<Range>> parse_ranges(std::string_view ndjson) {
-  return parse_rows<Range>(ndjson,
-                           [](const Json& row, auto& errors) { return read_range(row, std::nullopt, errors).range; });
+  return parse_rows<Range>(
+      ndjson, [](const Json& row, auto& errors) { return read_range(row, std::nullopt, errors).range; });
 }
 
 std::string mission_request_json(const Mission& mission) {
@@ -99,8 +103,9 @@ std::string mission_request_json(const Mission& mission) {
   out["tags"] = Ordered::array();
   for (const TagAntenna& tag : mission.tags) {
     const auto& arm = tag.lever_arm_body_m;
-    out["tags"].push_back(
-        {{"tag", to_string(tag.tag)}, {"antenna", tag.antenna}, {"lever_arm_body_m", {arm.x(), arm.y(), arm.z()}}});
+    out["tags"].push_back({{"tag", to_string(tag.tag)},
+                           {"antenna", tag.antenna},
+                           {"lever_arm_body_m", {arm.x(), arm.y(), arm.z()}}});
   }
   return dumped(out);
 }
@@ -140,7 +145,8 @@ Result<IngestAnswer> parse_ingest_answer(std::string_view body) {
 
 Result<std::string> parse_created_id(std::string_view body) {
   std::string id = text_of(parsed(body), "id");
-  if (id.empty()) return make_error(Errc::bad_frame, "an answer without an id: " + std::string(body.substr(0, 200)));
+  if (id.empty())
+    return make_error(Errc::bad_frame, "an answer without an id: " + std::string(body.substr(0, 200)));
   return id;
 }
 

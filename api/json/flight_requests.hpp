@@ -10,7 +10,8 @@
 #include "core/types/mission.hpp"
 #include "core/types/range.hpp"
 
-/// The client's half of the wire: what `anchord import` and `anchord replay` send, and how they read the answers.
+/// The client's half of the wire: what `anchord import` and `anchord replay` send, and how they read the
+/// answers.
 namespace anchord::api {
 
 /// Body of POST /missions.

@@ -52,9 +52,17 @@ class Object {
     out_ += json;
     return *this;
   }
-  Object& optional(const std::optional<double>& value, int decimals) { return value ? number(*value, decimals) : raw("null"); }
+  Object& optional(const std::optional<double>& value, int decimals) {
+    return value ? number(*value, decimals) : raw("null");
+  }
   Object& vector(const Eigen::Vector3d& v, int decimals) {
-    raw("[").number(v.x(), decimals).raw(",").number(v.y(), decimals).raw(",").number(v.z(), decimals).raw("]");
+    raw("[")
+        .number(v.x(), decimals)
+        .raw(",")
+        .number(v.y(), decimals)
+        .raw(",")
+        .number(v.z(), decimals)
+        .raw("]");
     return *this;
   }
   std::string take() { return std::move(out_ += '}'); }
@@ -89,22 +97,32 @@ std::string json_text(std::string_view text) {
   const bool utf8 = is_utf8(text);
   for (const char c : text) {
     const auto byte = static_cast<unsigned char>(c);
-    if (c == '"' || c == '\\') out += '\\', out += c;
-    else if (c == '\n') out += "\\n";
-    else if (byte < 0x20) out += ' ';
-    else if (byte >= 0x80 && !utf8) out += '?';
-    else out += c;
+    if (c == '"' || c == '\\')
+      out += '\\', out += c;
+    else if (c == '\n')
+      out += "\\n";
+    else if (byte < 0x20)
+      out += ' ';
+    else if (byte >= 0x80 && !utf8)
+      out += '?';
+    else
+      out += c;
   }
   return out + '"';
 }
 
 std::string_view verdict_word(Verdict verdict) {
   switch (verdict) {
-    case Verdict::ok: return "ok";
-    case Verdict::weak_geometry: return "weak_geometry";
-    case Verdict::ambiguous: return "ambiguous";
-    case Verdict::too_few: return "too_few";
-    case Verdict::diverged: return "diverged";
+    case Verdict::ok:
+      return "ok";
+    case Verdict::weak_geometry:
+      return "weak_geometry";
+    case Verdict::ambiguous:
+      return "ambiguous";
+    case Verdict::too_few:
+      return "too_few";
+    case Verdict::diverged:
+      return "diverged";
   }
   return "diverged";
 }
@@ -118,9 +136,12 @@ std::string_view live_status(const Estimate& estimate) {
 
 std::string_view mission_state_word(MissionState state) {
   switch (state) {
-    case MissionState::planned: return "planned";
-    case MissionState::recording: return "recording";
-    case MissionState::finished: return "finished";
+    case MissionState::planned:
+      return "planned";
+    case MissionState::recording:
+      return "recording";
+    case MissionState::finished:
+      return "finished";
   }
   return "recording";
 }
@@ -132,21 +153,32 @@ std::string live_pose_json(const MissionId& mission, TrackFrame frame, const Liv
   out.key("enu_m").vector(pose.enu_m, 4);
   out.key("heading_deg").optional(heading_deg(pose.fix), 2).key("fix").text(fix_word(pose.fix.fix));
   out.key("sigma_m");
-  if (const auto sigma = sigma_m(pose.fix)) out.vector(*sigma, 4);
-  else out.raw("null");
+  if (const auto sigma = sigma_m(pose.fix))
+    out.vector(*sigma, 4);
+  else
+    out.raw("null");
   out.key("tag_enu_m").raw("null").key("speed_mps").optional(pose.speed_mps, 3);
   return out.take();
 }
 
 std::string live_rtk_json(const MissionId& mission, const Fix& fix) {
   Object out;
-  out.key("mission").text(to_string(mission)).key("t_us").integer(fix.time.us()).key("fix").text(fix_word(fix.fix));
+  out.key("mission")
+      .text(to_string(mission))
+      .key("t_us")
+      .integer(fix.time.us())
+      .key("fix")
+      .text(fix_word(fix.fix));
   out.key("satellites");
-  if (fix.satellites) out.integer(*fix.satellites);
-  else out.raw("null");
+  if (fix.satellites)
+    out.integer(*fix.satellites);
+  else
+    out.raw("null");
   out.key("correction_age_s").optional(fix.correction_age_s, 2).key("sigma_m");
-  if (const auto sigma = sigma_m(fix)) out.vector(*sigma, 4);
-  else out.raw("null");
+  if (const auto sigma = sigma_m(fix))
+    out.vector(*sigma, 4);
+  else
+    out.raw("null");
   return out.take();
 }
 
@@ -156,10 +188,17 @@ std::string live_range_json(const MissionId& mission, const RangeResult& result)
   out.key("t_us").integer(range.time.us()).key("mission").text(to_string(mission));
   out.key("tag").text(to_string(range.tag)).key("anchor").text(to_string(range.anchor));
   out.key("distance_m").number(range.distance_m, 4).key("corrected_m").number(range.distance_m, 4);
-  out.key("sigma_m").optional(result.sigma_m, 4).key("rss_dbm").optional(range.rss_dbm, 2).key("p_los").raw("null");
+  out.key("sigma_m")
+      .optional(result.sigma_m, 4)
+      .key("rss_dbm")
+      .optional(range.rss_dbm, 2)
+      .key("p_los")
+      .raw("null");
   out.key("used").raw(result.used() ? "true" : "false").key("refused");
-  if (result.used()) out.raw("null");
-  else out.text(result.refused);
+  if (result.used())
+    out.raw("null");
+  else
+    out.text(result.refused);
   return out.take();
 }
 
@@ -168,11 +207,15 @@ std::string live_fix_json(const MissionId& mission, const Fix& fix) {
   out.key("t_us").integer(fix.time.us()).key("mission").text(to_string(mission));
   place(out, fix.frame == TrackFrame::wgs84 ? std::optional(fix.position) : std::nullopt);
   out.key("local_m");
-  if (fix.frame == TrackFrame::local) out.vector(fix.local_m, 4);
-  else out.raw("null");
+  if (fix.frame == TrackFrame::local)
+    out.vector(fix.local_m, 4);
+  else
+    out.raw("null");
   out.key("fix").text(fix_word(fix.fix)).key("sigma_m");
-  if (const auto sigma = sigma_m(fix)) out.vector(*sigma, 4);
-  else out.raw("null");
+  if (const auto sigma = sigma_m(fix))
+    out.vector(*sigma, 4);
+  else
+    out.raw("null");
   return out.take();
 }
 
@@ -180,27 +223,69 @@ std::string live_estimate_json(const MissionId& mission, const Estimate& estimat
   Object out;
   std::size_t refused = 0;
   for (const auto& [reason, n] : estimate.refused) refused += n;
-  out.key("mission").text(to_string(mission)).key("anchor").text(to_string(estimate.anchor)).key("t_us").integer(estimate.time.us());
-  out.key("status").text(live_status(estimate)).key("verdict").text(verdict_word(estimate.verdict)).key("reason").text(estimate.reason);
+  out.key("mission")
+      .text(to_string(mission))
+      .key("anchor")
+      .text(to_string(estimate.anchor))
+      .key("t_us")
+      .integer(estimate.time.us());
+  out.key("status")
+      .text(live_status(estimate))
+      .key("verdict")
+      .text(verdict_word(estimate.verdict))
+      .key("reason")
+      .text(estimate.reason);
   out.key("enu_m");
-  if (estimate.best) out.vector(estimate.best->position.m, 4);
-  else out.raw("null");
+  if (estimate.best)
+    out.vector(estimate.best->position.m, 4);
+  else
+    out.raw("null");
   place(out, estimate.best ? estimate.best->wgs84 : std::nullopt);
   if (estimate.best && estimate.best->covariance_m2.allFinite()) {
     const auto& c = estimate.best->covariance_m2;
-    out.key("cov_enu_m2").raw("[").small(c(0, 0)).raw(",").small(c(0, 1)).raw(",").small(c(0, 2)).raw(",").small(c(1, 1)).raw(",").small(c(1, 2)).raw(",").small(c(2, 2)).raw("]");
+    out.key("cov_enu_m2")
+        .raw("[")
+        .small(c(0, 0))
+        .raw(",")
+        .small(c(0, 1))
+        .raw(",")
+        .small(c(0, 2))
+        .raw(",")
+        .small(c(1, 1))
+        .raw(",")
+        .small(c(1, 2))
+        .raw(",")
+        .small(c(2, 2))
+        .raw("]");
     const ErrorEllipse ellipse = error_ellipse(c);
     Object inner;
-    inner.key("major_m").number(ellipse.major_m, 4).key("minor_m").number(ellipse.minor_m, 4).key("azimuth_deg").number(ellipse.azimuth_deg, 1);
+    inner.key("major_m")
+        .number(ellipse.major_m, 4)
+        .key("minor_m")
+        .number(ellipse.minor_m, 4)
+        .key("azimuth_deg")
+        .number(ellipse.azimuth_deg, 1);
     out.key("ellipse95").raw(inner.take());
     out.key("h95_m").number(estimate.h95_m, 4).key("v95_m").number(estimate.v95_m, 4);
   } else {
-    out.key("cov_enu_m2").raw("null").key("ellipse95").raw("null").key("h95_m").raw("null").key("v95_m").raw("null");
+    out.key("cov_enu_m2")
+        .raw("null")
+        .key("ellipse95")
+        .raw("null")
+        .key("h95_m")
+        .raw("null")
+        .key("v95_m")
+        .raw("null");
   }
   out.key("gdop").optional(estimate.gdop, 3).key("gdop_trace").optional(estimate.gdop_trace, 3);
-  out.key("n_ranges").integer(static_cast<std::int64_t>(estimate.n_used)).key("n_refused").integer(static_cast<std::int64_t>(refused));
-  out.key("rms_residual_m").optional(estimate.best ? std::optional(estimate.best->rms_residual_m) : std::nullopt, 4);
-  out.key("probability").optional(estimate.best ? std::optional(estimate.best->probability) : std::nullopt, 3);
+  out.key("n_ranges")
+      .integer(static_cast<std::int64_t>(estimate.n_used))
+      .key("n_refused")
+      .integer(static_cast<std::int64_t>(refused));
+  out.key("rms_residual_m")
+      .optional(estimate.best ? std::optional(estimate.best->rms_residual_m) : std::nullopt, 4);
+  out.key("probability")
+      .optional(estimate.best ? std::optional(estimate.best->probability) : std::nullopt, 3);
   out.key("mirror");
   if (estimate.mirror) {
     Object twin;
@@ -216,10 +301,17 @@ std::string live_estimate_json(const MissionId& mission, const Estimate& estimat
 
 std::string mission_state_json(const Mission& mission, const MissionLiveState& state) {
   Object out;
-  out.key("mission").text(to_string(mission.id)).key("name").text(mission.name).key("state").text(mission_state_word(mission.state));
+  out.key("mission")
+      .text(to_string(mission.id))
+      .key("name")
+      .text(mission.name)
+      .key("state")
+      .text(mission_state_word(mission.state));
   out.key("t_us").integer(state.time.us()).key("started_us");
-  if (state.started) out.integer(state.started->us());
-  else out.raw("null");
+  if (state.started)
+    out.integer(state.started->us());
+  else
+    out.raw("null");
   out.key("frame").text(mission.frame == TrackFrame::wgs84 ? "wgs84" : "local").key("origin");
   if (state.origin) {
     Object origin;
@@ -228,8 +320,14 @@ std::string mission_state_json(const Mission& mission, const MissionLiveState& s
   } else {
     out.raw("null");
   }
-  out.key("n_ranges").integer(static_cast<std::int64_t>(state.n_ranges)).key("n_fixes").integer(static_cast<std::int64_t>(state.n_fixes));
-  out.key("anchors_found").integer(static_cast<std::int64_t>(state.anchors_found)).key("anchors_converged").integer(static_cast<std::int64_t>(state.anchors_converged));
+  out.key("n_ranges")
+      .integer(static_cast<std::int64_t>(state.n_ranges))
+      .key("n_fixes")
+      .integer(static_cast<std::int64_t>(state.n_fixes));
+  out.key("anchors_found")
+      .integer(static_cast<std::int64_t>(state.anchors_found))
+      .key("anchors_converged")
+      .integer(static_cast<std::int64_t>(state.anchors_converged));
   out.key("range_rate_hz").number(state.range_rate_hz, 1);
   return out.take();
 }

@@ -8,8 +8,8 @@
 
 namespace anchord::api {
 
-/// Objects of the live topics, written by std::to_chars: 100 ranges a second to 50 browsers leave no time for a DOM.
-/// Keys are those of tests/data/wire/topic.*.json; metres have 4 decimals, degrees 9.
+/// Objects of the live topics, written by std::to_chars: 100 ranges a second to 50 browsers leave no time for
+/// a DOM. Keys are those of tests/data/wire/topic.*.json; metres have 4 decimals, degrees 9.
 std::string live_pose_json(const MissionId& mission, TrackFrame frame, const LivePose& pose);
 std::string live_rtk_json(const MissionId& mission, const Fix& fix);
 std::string live_range_json(const MissionId& mission, const RangeResult& result);
@@ -25,8 +25,8 @@ struct MissionLiveState {
   std::size_t anchors_found{}, anchors_converged{};
   double range_rate_hz{};
   std::optional<Wgs84> origin{};
-  UtcTime time{};                      ///< of the newest measurement; creation before the first
-  std::optional<UtcTime> started{};    ///< first measurement
+  UtcTime time{};                    ///< of the newest measurement; creation before the first
+  std::optional<UtcTime> started{};  ///< first measurement
 };
 std::string mission_state_json(const Mission& mission, const MissionLiveState& state);
 std::string_view mission_state_word(MissionState state);

@@ -18,9 +18,12 @@ std::string short_json(const Json& value) {
 std::string escape_pointer(std::string_view key) {
   std::string out;
   for (const char c : key) {
-    if (c == '~') out += "~0";
-    else if (c == '/') out += "~1";
-    else out += c;
+    if (c == '~')
+      out += "~0";
+    else if (c == '/')
+      out += "~1";
+    else
+      out += c;
   }
   return out;
 }
@@ -36,7 +39,8 @@ class Builder final : public nlohmann::json_sax<Json> {
   bool number_integer(number_integer_t value) override { return put(Json(value)); }
   bool number_unsigned(number_unsigned_t value) override { return put(Json(value)); }
   bool number_float(number_float_t value, const string_t& text) override {
-    if (!std::isfinite(value)) return fail("non_finite", "'" + text.substr(0, 40) + "' is not a finite number");
+    if (!std::isfinite(value))
+      return fail("non_finite", "'" + text.substr(0, 40) + "' is not a finite number");
     return put(Json(value));
   }
   bool string(string_t& value) override { return put(Json(std::move(value))); }
@@ -46,11 +50,13 @@ class Builder final : public nlohmann::json_sax<Json> {
   bool end_object() override { return close(); }
   bool end_array() override { return close(); }
   bool key(string_t& name) override {
-    if (stack_.back()->contains(name)) return fail("duplicate_key", "key '" + name.substr(0, 60) + "' stands twice in one object", name);
+    if (stack_.back()->contains(name))
+      return fail("duplicate_key", "key '" + name.substr(0, 60) + "' stands twice in one object", name);
     keys_.back() = name;
     return true;
   }
-  bool parse_error(std::size_t position, const std::string&, const nlohmann::detail::exception& error) override {
+  bool parse_error(std::size_t position, const std::string&,
+                   const nlohmann::detail::exception& error) override {
     if (error.id == 406) return fail("non_finite", "a number does not fit a double");
     return fail("malformed", "not JSON at byte " + std::to_string(position));
   }
@@ -59,8 +65,10 @@ class Builder final : public nlohmann::json_sax<Json> {
   std::string path() const {
     std::string at;
     for (std::size_t i = 0; i < stack_.size(); ++i) {
-      if (stack_[i]->is_array()) at += '/' + std::to_string(stack_[i]->size());
-      else if (!keys_[i].empty()) at += '/' + escape_pointer(keys_[i]);
+      if (stack_[i]->is_array())
+        at += '/' + std::to_string(stack_[i]->size());
+      else if (!keys_[i].empty())
+        at += '/' + escape_pointer(keys_[i]);
     }
     return at;
   }
@@ -112,8 +120,10 @@ bool mentions_non_finite(std::string_view text) {
   bool in_string = false;
   for (std::size_t i = 0; i < text.size(); ++i) {
     if (in_string) {
-      if (text[i] == '\\') ++i;
-      else if (text[i] == '"') in_string = false;
+      if (text[i] == '\\')
+        ++i;
+      else if (text[i] == '"')
+        in_string = false;
       continue;
     }
     if (text[i] == '"') in_string = true;
@@ -135,10 +145,14 @@ bool is_utf8(std::string_view bytes) {
       ++i;
       continue;
     }
-    if (lead >= 0xc2 && lead <= 0xdf) extra = 1, point = lead & 0x1fu;
-    else if (lead >= 0xe0 && lead <= 0xef) extra = 2, point = lead & 0x0fu;
-    else if (lead >= 0xf0 && lead <= 0xf4) extra = 3, point = lead & 0x07u;
-    else return false;
+    if (lead >= 0xc2 && lead <= 0xdf)
+      extra = 1, point = lead & 0x1fu;
+    else if (lead >= 0xe0 && lead <= 0xef)
+      extra = 2, point = lead & 0x0fu;
+    else if (lead >= 0xf0 && lead <= 0xf4)
+      extra = 3, point = lead & 0x07u;
+    else
+      return false;
     if (bytes.size() - i <= extra) return false;
     for (std::size_t k = 1; k <= extra; ++k) {
       const auto next = static_cast<unsigned char>(bytes[i + k]);
@@ -159,7 +173,8 @@ std::optional<FieldError> parse_json(std::string_view text, Json& out) {
   Builder builder(out);
   if (Json::sax_parse(text.begin(), text.end(), &builder)) return std::nullopt;
   if (builder.failure && builder.failure->code == "malformed" && mentions_non_finite(text)) {
-    return FieldError{builder.failure->pointer, "non_finite", "NaN and Infinity are not numbers here; leave unknown values out"};
+    return FieldError{builder.failure->pointer, "non_finite",
+                      "NaN and Infinity are not numbers here; leave unknown values out"};
   }
   return builder.failure ? builder.failure : FieldError{"", "malformed", "not JSON"};
 }
@@ -213,7 +228,8 @@ std::optional<double> Fields::number(std::string_view key, double min, double ma
   return finite(*value, pointer(key), min, max);
 }
 
-std::optional<std::int64_t> Fields::integer(std::string_view key, std::int64_t min, std::int64_t max, bool required) {
+std::optional<std::int64_t> Fields::integer(std::string_view key, std::int64_t min, std::int64_t max,
+                                            bool required) {
   const Json* value = child(key);
   if (value == nullptr) {
     if (required) error(key, "required", std::string(key) + " is missing");
@@ -223,10 +239,12 @@ std::optional<std::int64_t> Fields::integer(std::string_view key, std::int64_t m
     errors_.push_back({pointer(key), "wrong_type", "must be an integer", short_json(*value)});
     return std::nullopt;
   }
-  const bool huge = value->is_number_unsigned() && value->get<std::uint64_t>() > static_cast<std::uint64_t>(INT64_MAX);
+  const bool huge =
+      value->is_number_unsigned() && value->get<std::uint64_t>() > static_cast<std::uint64_t>(INT64_MAX);
   const std::int64_t number = huge ? INT64_MAX : value->get<std::int64_t>();
   if (huge || number < min || number > max) {
-    errors_.push_back({pointer(key), "out_of_range", "must be " + std::to_string(min) + ".." + std::to_string(max), short_json(*value)});
+    errors_.push_back({pointer(key), "out_of_range",
+                       "must be " + std::to_string(min) + ".." + std::to_string(max), short_json(*value)});
     return std::nullopt;
   }
   return number;
@@ -244,7 +262,8 @@ std::optional<std::string> Fields::text(std::string_view key, std::size_t max_by
   }
   const auto& text = value->get_ref<const std::string&>();
   if (text.size() > max_bytes || (required && text.empty())) {
-    error(key, "out_of_range", text.empty() ? "must not be empty" : "must be at most " + std::to_string(max_bytes) + " bytes");
+    error(key, "out_of_range",
+          text.empty() ? "must not be empty" : "must be at most " + std::to_string(max_bytes) + " bytes");
     return std::nullopt;
   }
   for (const char c : text) {
@@ -266,14 +285,16 @@ std::optional<bool> Fields::boolean(std::string_view key) {
   return value->get<bool>();
 }
 
-std::optional<std::vector<double>> Fields::numbers(std::string_view key, std::size_t n, double min, double max, bool required) {
+std::optional<std::vector<double>> Fields::numbers(std::string_view key, std::size_t n, double min,
+                                                   double max, bool required) {
   const Json* value = child(key);
   if (value == nullptr) {
     if (required) error(key, "required", std::string(key) + " is missing");
     return std::nullopt;
   }
   if (!value->is_array() || value->size() != n) {
-    errors_.push_back({pointer(key), "wrong_type", "must be an array of " + std::to_string(n) + " numbers", short_json(*value)});
+    errors_.push_back({pointer(key), "wrong_type", "must be an array of " + std::to_string(n) + " numbers",
+                       short_json(*value)});
     return std::nullopt;
   }
   std::vector<double> out;
@@ -285,7 +306,8 @@ std::optional<std::vector<double>> Fields::numbers(std::string_view key, std::si
   return out;
 }
 
-std::optional<std::size_t> Fields::word(std::string_view key, const std::vector<std::string_view>& words, bool required) {
+std::optional<std::size_t> Fields::word(std::string_view key, const std::vector<std::string_view>& words,
+                                        bool required) {
   const Json* value = child(key);
   if (value == nullptr) {
     if (required) error(key, "required", std::string(key) + " is missing");
@@ -308,7 +330,8 @@ void Fields::finish() {
   if (object_ == nullptr) return;
   for (const auto& [key, value] : object_->items()) {
     if (known_.find(key) == known_.end()) {
-      errors_.push_back({pointer(key), "unknown_field", "there is no field '" + key.substr(0, 60) + "' here"});
+      errors_.push_back(
+          {pointer(key), "unknown_field", "there is no field '" + key.substr(0, 60) + "' here"});
     }
   }
 }
@@ -322,7 +345,8 @@ Json json_body(const Request& request, bool may_be_empty) {
     throw_problem(415, "media-type", "send Content-Type: application/json");
   }
   const auto encoding = request.header("content-encoding");
-  if (!encoding.empty() && encoding != "identity") throw_problem(415, "media-type", "compressed bodies are not accepted");
+  if (!encoding.empty() && encoding != "identity")
+    throw_problem(415, "media-type", "compressed bodies are not accepted");
   Json body;
   if (auto error = parse_json(request.body, body)) {
     const bool syntax = error->code == "malformed" || error->code == "bad_utf8";
@@ -333,7 +357,9 @@ Json json_body(const Request& request, bool may_be_empty) {
 
 void refuse_if_any(const std::vector<FieldError>& errors) {
   if (errors.empty()) return;
-  throw_problem(422, "validation", std::to_string(errors.size()) + (errors.size() == 1 ? " field is wrong" : " fields are wrong"), errors);
+  throw_problem(
+      422, "validation",
+      std::to_string(errors.size()) + (errors.size() == 1 ? " field is wrong" : " fields are wrong"), errors);
 }
 
 }  // namespace anchord::api

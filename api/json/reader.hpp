@@ -19,13 +19,14 @@ inline constexpr int k_max_json_depth = 32;
 /// True for well-formed UTF-8 (no surrogates, no overlong forms).
 bool is_utf8(std::string_view bytes);
 
-/// Parses one JSON document. Refused, each with its own code and never half-read: broken syntax (`malformed`),
-/// broken UTF-8 (`bad_utf8`), nesting beyond 32 (`too_deep`), a key twice in one object (`duplicate_key`), numbers
-/// that are no finite double, NaN and Infinity (`non_finite`). Never throws.
+/// Parses one JSON document. Refused, each with its own code and never half-read: broken syntax
+/// (`malformed`), broken UTF-8 (`bad_utf8`), nesting beyond 32 (`too_deep`), a key twice in one object
+/// (`duplicate_key`), numbers that are no finite double, NaN and Infinity (`non_finite`). Never throws.
 std::optional<FieldError> parse_json(std::string_view text, nlohmann::json& out);
 
-/// Reads the fields of one object and collects everything that is wrong with them, each with its JSON pointer.
-/// Every getter marks its key as known; finish() reports the rest as unknown_field. null counts as absent.
+/// Reads the fields of one object and collects everything that is wrong with them, each with its JSON
+/// pointer. Every getter marks its key as known; finish() reports the rest as unknown_field. null counts as
+/// absent.
 class Fields {
  public:
   Fields(const nlohmann::json& value, std::string base, std::vector<FieldError>& errors);
@@ -38,7 +39,8 @@ class Fields {
   std::string pointer(std::string_view key) const;
 
   std::optional<double> number(std::string_view key, double min, double max, bool required = false);
-  std::optional<std::int64_t> integer(std::string_view key, std::int64_t min, std::int64_t max, bool required = false);
+  std::optional<std::int64_t> integer(std::string_view key, std::int64_t min, std::int64_t max,
+                                      bool required = false);
   std::optional<std::string> text(std::string_view key, std::size_t max_bytes, bool required = false);
   std::optional<bool> boolean(std::string_view key);
   /// An array of exactly n finite numbers.

@@ -17,7 +17,9 @@ double metres(double value) { return rounded(value, 1e4); }
 Ordered vector_json(const Eigen::Vector3d& v) { return {metres(v.x()), metres(v.y()), metres(v.z())}; }
 
 /// RFC 7946: longitude, latitude, ellipsoidal height; 9 decimals are a tenth of a millimetre.
-Ordered coordinates(const Wgs84& at) { return {rounded(at.lon_deg, 1e9), rounded(at.lat_deg, 1e9), metres(at.height_m)}; }
+Ordered coordinates(const Wgs84& at) {
+  return {rounded(at.lon_deg, 1e9), rounded(at.lat_deg, 1e9), metres(at.height_m)};
+}
 
 Ordered point(const std::optional<Wgs84>& at) {
   if (!at) return nullptr;
@@ -46,29 +48,47 @@ Ordered accuracy(const Estimate& estimate, const std::optional<Site>& site) {
   const auto& c = estimate.best->covariance_m2;
   const ErrorEllipse ellipse = error_ellipse(c);
   const auto sigma = [&](int i) { return metres(std::sqrt(std::max(0.0, c(i, i)))); };
-  Ordered relative{{"sigma_e_m", sigma(0)}, {"sigma_n_m", sigma(1)}, {"sigma_u_m", sigma(2)},
+  Ordered relative{{"sigma_e_m", sigma(0)},
+                   {"sigma_n_m", sigma(1)},
+                   {"sigma_u_m", sigma(2)},
                    {"cov_enu_m2", {c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)}},
-                   {"ellipse95", {{"major_m", metres(ellipse.major_m)}, {"minor_m", metres(ellipse.minor_m)}, {"azimuth_deg", rounded(ellipse.azimuth_deg, 10)}}},
-                   {"h95_m", metres(estimate.h95_m)}, {"v95_m", metres(estimate.v95_m)}};
+                   {"ellipse95",
+                    {{"major_m", metres(ellipse.major_m)},
+                     {"minor_m", metres(ellipse.minor_m)},
+                     {"azimuth_deg", rounded(ellipse.azimuth_deg, 10)}}},
+                   {"h95_m", metres(estimate.h95_m)},
+                   {"v95_m", metres(estimate.v95_m)}};
   Ordered absolute = nullptr;
   if (site && site->base_sigma_m) {
-    // The base's own coordinates err alike for all anchors: 95 % of it in the plane is 2.4477 sigma, upwards 1.96.
+    // The base's own coordinates err alike for all anchors: 95 % of it in the plane is 2.4477 sigma,
+    // upwards 1.96.
     const double s = *site->base_sigma_m;
-    absolute = {{"h95_m", metres(std::hypot(estimate.h95_m, 2.4477 * s))}, {"v95_m", metres(std::hypot(estimate.v95_m, 1.96 * s))}};
+    absolute = {{"h95_m", metres(std::hypot(estimate.h95_m, 2.4477 * s))},
+                {"v95_m", metres(std::hypot(estimate.v95_m, 1.96 * s))}};
   }
   return {{"relative", std::move(relative)}, {"absolute", std::move(absolute)}};
 }
 
 Ordered quality(const Estimate& estimate) {
-  return {{"verdict", verdict_word(estimate.verdict)}, {"reason", estimate.reason}, {"gdop", or_null(estimate.gdop)}, {"gdop_trace", or_null(estimate.gdop_trace)},
-          {"n_ranges", estimate.n_used}, {"n_refused", n_refused(estimate)}, {"refused", estimate.refused},
-          {"rms_residual_m", estimate.best ? Ordered(metres(estimate.best->rms_residual_m)) : Ordered(nullptr)},
-          {"bias_m", or_null(estimate.bias_m)}, {"bias_sigma_m", or_null(estimate.bias_sigma_m)}, {"lag_s", or_null(estimate.lag_s)}, {"lag_sigma_s", or_null(estimate.lag_sigma_s)}};
+  return {
+      {"verdict", verdict_word(estimate.verdict)},
+      {"reason", estimate.reason},
+      {"gdop", or_null(estimate.gdop)},
+      {"gdop_trace", or_null(estimate.gdop_trace)},
+      {"n_ranges", estimate.n_used},
+      {"n_refused", n_refused(estimate)},
+      {"refused", estimate.refused},
+      {"rms_residual_m", estimate.best ? Ordered(metres(estimate.best->rms_residual_m)) : Ordered(nullptr)},
+      {"bias_m", or_null(estimate.bias_m)},
+      {"bias_sigma_m", or_null(estimate.bias_sigma_m)},
+      {"lag_s", or_null(estimate.lag_s)},
+      {"lag_sigma_s", or_null(estimate.lag_sigma_s)}};
 }
 
 Ordered mirror(const Estimate& estimate) {
   if (!estimate.mirror) return nullptr;
-  return {{"coordinates", estimate.mirror->wgs84 ? coordinates(*estimate.mirror->wgs84) : Ordered(nullptr)}, {"enu_m", vector_json(estimate.mirror->position.m)},
+  return {{"coordinates", estimate.mirror->wgs84 ? coordinates(*estimate.mirror->wgs84) : Ordered(nullptr)},
+          {"enu_m", vector_json(estimate.mirror->position.m)},
           {"probability", rounded(estimate.mirror->probability, 1e3)}};
 }
 
@@ -76,7 +96,9 @@ Ordered mirror(const Estimate& estimate) {
 Ordered crs(const AnchorFeature& feature) {
   if (feature.frame != TrackFrame::wgs84) return nullptr;
   const Site site = feature.site.value_or(Site{});
-  return {{"id", "EPSG:4979"}, {"frame", text_or_null(site.crs_frame)}, {"epoch", or_null(site.crs_epoch)},
+  return {{"id", "EPSG:4979"},
+          {"frame", text_or_null(site.crs_frame)},
+          {"epoch", or_null(site.crs_epoch)},
           {"base", {{"source", text_or_null(site.base_source)}, {"sigma_m", or_null(site.base_sigma_m)}}}};
 }
 
@@ -89,10 +111,13 @@ std::string number(double value, int decimals) {
 }  // namespace
 
 Ordered estimate_result_json(const Estimate& estimate, TrackFrame frame, const std::optional<Site>& site) {
-  Ordered out{{"network_id", to_string(estimate.anchor)}, {"verdict", verdict_word(estimate.verdict)}, {"reason", estimate.reason}};
+  Ordered out{{"network_id", to_string(estimate.anchor)},
+              {"verdict", verdict_word(estimate.verdict)},
+              {"reason", estimate.reason}};
   out["geometry"] = point(estimate.best ? estimate.best->wgs84 : std::nullopt);
   out["enu_m"] = estimate.best ? vector_json(estimate.best->position.m) : Ordered(nullptr);
-  out["local_m"] = estimate.best && frame == TrackFrame::local ? vector_json(estimate.best->position.m) : Ordered(nullptr);
+  out["local_m"] =
+      estimate.best && frame == TrackFrame::local ? vector_json(estimate.best->position.m) : Ordered(nullptr);
   out["accuracy"] = accuracy(estimate, site);
   out["quality"] = quality(estimate);
   out["mirror"] = mirror(estimate);
@@ -106,7 +131,10 @@ Ordered anchor_feature_json(const AnchorFeature& feature) {
   Ordered external = Ordered::array(), missions = Ordered::array();
   for (const auto& [system, id] : anchor.external_ids) external.push_back({{"system", system}, {"id", id}});
   for (const auto& id : feature.missions) missions.push_back(to_string(id));
-  Ordered p{{"network_id", to_string(anchor.network_id)}, {"name", anchor.name}, {"status", feature.status}, {"revision", or_null(feature.revision)}};
+  Ordered p{{"network_id", to_string(anchor.network_id)},
+            {"name", anchor.name},
+            {"status", feature.status},
+            {"revision", or_null(feature.revision)}};
   p["calibrated_at"] = feature.calibrated ? Ordered(to_rfc3339(*feature.calibrated)) : Ordered(nullptr);
   p["site"] = anchor.site ? Ordered(to_string(*anchor.site)) : Ordered(nullptr);
   p["building"] = anchor.building;
@@ -120,26 +148,36 @@ Ordered anchor_feature_json(const AnchorFeature& feature) {
   p["height_orthometric_m"] = nullptr;  // no geoid model is installed; never guessed
   p["geoid"] = nullptr;
   p["enu_m"] = placed ? vector_json(estimate->best->position.m) : Ordered(nullptr);
-  p["local_m"] = placed && feature.frame == TrackFrame::local ? vector_json(estimate->best->position.m) : Ordered(nullptr);
+  p["local_m"] = placed && feature.frame == TrackFrame::local ? vector_json(estimate->best->position.m)
+                                                              : Ordered(nullptr);
   p["accuracy"] = estimate ? accuracy(*estimate, feature.site) : Ordered(nullptr);
   p["quality"] = estimate ? quality(*estimate) : Ordered(nullptr);
-  p["provenance"] = {{"calibration", feature.calibration ? Ordered(to_string(*feature.calibration)) : Ordered(nullptr)}, {"missions", std::move(missions)}};
+  p["provenance"] = {
+      {"calibration", feature.calibration ? Ordered(to_string(*feature.calibration)) : Ordered(nullptr)},
+      {"missions", std::move(missions)}};
   p["mirror"] = estimate ? mirror(*estimate) : Ordered(nullptr);
   const std::string self = "/api/v1/anchors/" + to_string(anchor.network_id);
   p["links"] = Ordered::array({{{"rel", "history"}, {"href", self + "/history"}}});
-  if (anchor.site) p["links"].push_back({{"rel", "site"}, {"href", "/api/v1/sites/" + to_string(*anchor.site)}});
-  return {{"type", "Feature"}, {"id", to_string(anchor.id)}, {"geometry", point(placed ? estimate->best->wgs84 : std::nullopt)}, {"properties", std::move(p)}};
+  if (anchor.site)
+    p["links"].push_back({{"rel", "site"}, {"href", "/api/v1/sites/" + to_string(*anchor.site)}});
+  return {{"type", "Feature"},
+          {"id", to_string(anchor.id)},
+          {"geometry", point(placed ? estimate->best->wgs84 : std::nullopt)},
+          {"properties", std::move(p)}};
 }
 
 Ordered flat_feature_json(const AnchorFeature& feature) {
   Ordered full = anchor_feature_json(feature);
   Ordered flat;
-  for (const char* key : {"network_id", "name", "status", "revision", "calibrated_at", "site", "building", "floor", "space", "asset_tag", "ifc_guid"}) flat[key] = full["properties"][key];
+  for (const char* key : {"network_id", "name", "status", "revision", "calibrated_at", "site", "building",
+                          "floor", "space", "asset_tag", "ifc_guid"})
+    flat[key] = full["properties"][key];
   const auto& estimate = feature.estimate;
   flat["verdict"] = estimate ? Ordered(verdict_word(estimate->verdict)) : Ordered(nullptr);
   flat["h95_m"] = estimate && estimate->best ? Ordered(metres(estimate->h95_m)) : Ordered(nullptr);
   flat["v95_m"] = estimate && estimate->best ? Ordered(metres(estimate->v95_m)) : Ordered(nullptr);
-  flat["frame"] = full["properties"]["crs"].is_object() ? full["properties"]["crs"]["frame"] : Ordered(nullptr);
+  flat["frame"] =
+      full["properties"]["crs"].is_object() ? full["properties"]["crs"]["frame"] : Ordered(nullptr);
   full["properties"] = std::move(flat);
   return full;
 }
@@ -156,14 +194,19 @@ std::string csv_text(std::string_view text) {
 }
 
 std::string anchors_csv_header() {
-  return "id,network_id,name,status,revision,calibrated_at,site,building,floor,space,asset_tag,ifc_guid,lon,lat,h_m,local_x_m,local_y_m,local_z_m,"
-         "sigma_e_m,sigma_n_m,sigma_u_m,ellipse95_major_m,ellipse95_minor_m,ellipse95_azimuth_deg,h95_m,v95_m,verdict,frame,epoch";
+  return "id,network_id,name,status,revision,calibrated_at,site,building,floor,space,asset_tag,ifc_guid,lon,"
+         "lat,h_m,local_x_m,local_y_m,local_z_m,"
+         "sigma_e_m,sigma_n_m,sigma_u_m,ellipse95_major_m,ellipse95_minor_m,ellipse95_azimuth_deg,h95_m,v95_"
+         "m,verdict,frame,epoch";
 }
 
 std::string anchor_csv_row(const AnchorFeature& feature) {
   const Anchor& a = feature.anchor;
   std::string row = to_string(a.id) + ',' + to_string(a.network_id);
-  const auto add = [&row](std::string_view cell) { row += ','; row += cell; };
+  const auto add = [&row](std::string_view cell) {
+    row += ',';
+    row += cell;
+  };
   add(csv_text(a.name));
   add(feature.status);
   add(feature.revision ? std::to_string(*feature.revision) : "");
@@ -176,8 +219,10 @@ std::string anchor_csv_row(const AnchorFeature& feature) {
   add(at ? number(at->lon_deg, 9) : "");
   add(at ? number(at->lat_deg, 9) : "");
   add(at ? number(at->height_m, 4) : "");
-  for (int i = 0; i < 3; ++i) add(placed && feature.frame == TrackFrame::local ? number(estimate->best->position.m[i], 4) : "");
-  for (int i = 0; i < 3; ++i) add(placed ? number(std::sqrt(std::max(0.0, estimate->best->covariance_m2(i, i))), 4) : "");
+  for (int i = 0; i < 3; ++i)
+    add(placed && feature.frame == TrackFrame::local ? number(estimate->best->position.m[i], 4) : "");
+  for (int i = 0; i < 3; ++i)
+    add(placed ? number(std::sqrt(std::max(0.0, estimate->best->covariance_m2(i, i))), 4) : "");
   const ErrorEllipse ellipse = placed ? error_ellipse(estimate->best->covariance_m2) : ErrorEllipse{};
   for (const double value : {ellipse.major_m, ellipse.minor_m}) add(placed ? number(value, 4) : "");
   add(placed ? number(ellipse.azimuth_deg, 1) : "");

@@ -28,18 +28,23 @@ constexpr std::size_t k_max_text = 200;
 
 /// In a merge-patch null clears, absent keeps.
 void patch_text(Fields& fields, const Json& body, const char* key, std::string& target) {
-  if (auto text = fields.text(key, k_max_text)) target = *text;
-  else if (body.is_object() && body.contains(key) && body[key].is_null()) target.clear();
+  if (auto text = fields.text(key, k_max_text))
+    target = *text;
+  else if (body.is_object() && body.contains(key) && body[key].is_null())
+    target.clear();
 }
 
 }  // namespace
 
-Ordered mission_json(const Mission& mission, std::optional<std::uint64_t> n_ranges, std::optional<std::uint64_t> n_fixes) {
+Ordered mission_json(const Mission& mission, std::optional<std::uint64_t> n_ranges,
+                     std::optional<std::uint64_t> n_fixes) {
   static constexpr std::array k_points{"gnss_antenna", "body", "tag_antenna"};
   Ordered tags = Ordered::array();
   for (const auto& tag : mission.tags) {
     const auto& arm = tag.lever_arm_body_m;
-    tags.push_back({{"tag", to_string(tag.tag)}, {"antenna", tag.antenna}, {"lever_arm_body_m", {arm.x(), arm.y(), arm.z()}}});
+    tags.push_back({{"tag", to_string(tag.tag)},
+                    {"antenna", tag.antenna},
+                    {"lever_arm_body_m", {arm.x(), arm.y(), arm.z()}}});
   }
   Ordered out{{"id", to_string(mission.id)}, {"name", mission.name}};
   out["site"] = mission.site ? Ordered(to_string(*mission.site)) : Ordered(nullptr);
@@ -64,12 +69,16 @@ Mission read_mission(const Json& body, std::vector<FieldError>& errors) {
   if (const auto text = fields.text("radio", k_max_text)) mission.radio = *text;
   if (const auto text = fields.text("site", 36)) {
     const auto id = parse_uuid(*text);
-    if (id) mission.site = SiteId{id.value()};
-    else fields.error("site", "bad_id", id.error().message);
+    if (id)
+      mission.site = SiteId{id.value()};
+    else
+      fields.error("site", "bad_id", id.error().message);
   }
-  if (const auto frame = fields.word("frame", {"wgs84", "local"}, true)) mission.frame = static_cast<TrackFrame>(*frame);
+  if (const auto frame = fields.word("frame", {"wgs84", "local"}, true))
+    mission.frame = static_cast<TrackFrame>(*frame);
   // Required: an arm applied to the wrong point is a silent error of decimetres.
-  if (const auto point = fields.word("track_point", {"gnss_antenna", "body", "tag_antenna"}, true)) mission.point = static_cast<TrackPoint>(*point);
+  if (const auto point = fields.word("track_point", {"gnss_antenna", "body", "tag_antenna"}, true))
+    mission.point = static_cast<TrackPoint>(*point);
   if (const Json* tags = fields.child("tags")) {
     if (!tags->is_array() || tags->size() > 64) {
       fields.error("tags", "wrong_type", "must be an array of at most 64 tag antennas");
@@ -79,14 +88,18 @@ Mission read_mission(const Json& body, std::vector<FieldError>& errors) {
         TagAntenna tag;
         if (const auto text = inner.text("tag", 20, true)) {
           const auto id = parse_network_id(*text);
-          if (id) tag.tag = id.value();
-          else inner.error("tag", "bad_id", id.error().message);
+          if (id)
+            tag.tag = id.value();
+          else
+            inner.error("tag", "bad_id", id.error().message);
         }
         if (const auto n = inner.integer("antenna", 0, 255)) tag.antenna = static_cast<std::uint8_t>(*n);
-        if (const auto arm = inner.numbers("lever_arm_body_m", 3, -100, 100, true)) tag.lever_arm_body_m = {(*arm)[0], (*arm)[1], (*arm)[2]};
+        if (const auto arm = inner.numbers("lever_arm_body_m", 3, -100, 100, true))
+          tag.lever_arm_body_m = {(*arm)[0], (*arm)[1], (*arm)[2]};
         inner.finish();
         for (const auto& other : mission.tags) {
-          if (other.tag == tag.tag && other.antenna == tag.antenna) inner.error("tag", "duplicate", "this antenna of the tag stands twice");
+          if (other.tag == tag.tag && other.antenna == tag.antenna)
+            inner.error("tag", "duplicate", "this antenna of the tag stands twice");
         }
         mission.tags.push_back(tag);
       }
@@ -98,9 +111,13 @@ Mission read_mission(const Json& body, std::vector<FieldError>& errors) {
 
 Ordered site_json(const Site& site) {
   Ordered out{{"id", to_string(site.id)}, {"name", site.name}, {"origin", wgs84_json(site.origin)}};
-  out["outline"] = site.outline_geojson.empty() ? Ordered(nullptr) : Ordered::parse(site.outline_geojson, nullptr, false);
-  out["crs"] = {{"frame", site.crs_frame.empty() ? Ordered(nullptr) : Ordered(site.crs_frame)}, {"epoch", or_null(site.crs_epoch)},
-                {"base", {{"source", site.base_source.empty() ? Ordered(nullptr) : Ordered(site.base_source)}, {"sigma_m", or_null(site.base_sigma_m)}}}};
+  out["outline"] =
+      site.outline_geojson.empty() ? Ordered(nullptr) : Ordered::parse(site.outline_geojson, nullptr, false);
+  out["crs"] = {{"frame", site.crs_frame.empty() ? Ordered(nullptr) : Ordered(site.crs_frame)},
+                {"epoch", or_null(site.crs_epoch)},
+                {"base",
+                 {{"source", site.base_source.empty() ? Ordered(nullptr) : Ordered(site.base_source)},
+                  {"sigma_m", or_null(site.base_sigma_m)}}}};
   out["created_at"] = to_rfc3339(site.created);
   return out;
 }
@@ -112,16 +129,20 @@ void patch_site(const Json& body, bool whole, Site& site, std::vector<FieldError
   if (const auto text = fields.text("name", k_max_text, whole)) site.name = *text;
   if (const Json* origin = fields.child("origin")) {
     Fields inner(*origin, "/origin", errors);
-    const auto lon = inner.number("lon", -180, 180, true), lat = inner.number("lat", -90, 90, true), height = inner.number("h_m", -500, 9000, true);
+    const auto lon = inner.number("lon", -180, 180, true), lat = inner.number("lat", -90, 90, true),
+               height = inner.number("h_m", -500, 9000, true);
     inner.finish();
     if (lon && lat && height) site.origin = Wgs84{*lat, *lon, *height};
   } else if (cleared("origin")) {
     site.origin.reset();
   }
   if (const Json* outline = fields.child("outline")) {
-    const bool polygon = outline->is_object() && outline->value("type", Json()) == "Polygon" && outline->contains("coordinates") && (*outline)["coordinates"].is_array();
-    if (!polygon || outline->dump().size() > 100'000) fields.error("outline", "wrong_type", "must be a GeoJSON Polygon below 100 kB");
-    else site.outline_geojson = outline->dump();
+    const bool polygon = outline->is_object() && outline->value("type", Json()) == "Polygon" &&
+                         outline->contains("coordinates") && (*outline)["coordinates"].is_array();
+    if (!polygon || outline->dump().size() > 100'000)
+      fields.error("outline", "wrong_type", "must be a GeoJSON Polygon below 100 kB");
+    else
+      site.outline_geojson = outline->dump();
   } else if (cleared("outline")) {
     site.outline_geojson.clear();
   }
@@ -153,8 +174,10 @@ void patch_anchor(const Json& body, Anchor& anchor, std::vector<FieldError>& err
   if (const auto retired = fields.boolean("retired")) anchor.retired = *retired;
   if (const auto text = fields.text("site", 36)) {
     const auto id = parse_uuid(*text);
-    if (id) anchor.site = SiteId{id.value()};
-    else fields.error("site", "bad_id", id.error().message);
+    if (id)
+      anchor.site = SiteId{id.value()};
+    else
+      fields.error("site", "bad_id", id.error().message);
   } else if (body.contains("site") && body["site"].is_null()) {
     anchor.site.reset();
   }
@@ -179,35 +202,50 @@ void patch_anchor(const Json& body, Anchor& anchor, std::vector<FieldError>& err
 Ordered calibration_json(const Calibration& calibration, bool with_anchors) {
   Ordered missions = Ordered::array();
   for (const auto& id : calibration.missions) missions.push_back(to_string(id));
-  Ordered out{{"id", to_string(calibration.id)}, {"created_at", to_rfc3339(calibration.created)}, {"missions", std::move(missions)},
-              {"frame", calibration.frame == TrackFrame::wgs84 ? "wgs84" : "local"}, {"origin", wgs84_json(calibration.origin)}};
+  Ordered out{{"id", to_string(calibration.id)},
+              {"created_at", to_rfc3339(calibration.created)},
+              {"missions", std::move(missions)},
+              {"frame", calibration.frame == TrackFrame::wgs84 ? "wgs84" : "local"},
+              {"origin", wgs84_json(calibration.origin)}};
   auto settings = Ordered::parse(calibration.settings_json, nullptr, false);
   out["settings"] = settings.is_discarded() ? Ordered::object() : std::move(settings);
   if (!with_anchors) return out;
   Ordered anchors = Ordered::array();
-  for (const auto& estimate : calibration.anchors) anchors.push_back(estimate_result_json(estimate, calibration.frame));
+  for (const auto& estimate : calibration.anchors)
+    anchors.push_back(estimate_result_json(estimate, calibration.frame));
   out["anchors"] = std::move(anchors);
   return out;
 }
 
 Ordered revision_json(const Revision& revision) {
-  return {{"revision", revision.number}, {"t_us", revision.published.us()}, {"published_at", to_rfc3339(revision.published)},
-          {"calibration", to_string(revision.calibration)}, {"by", revision.by}, {"note", revision.note}};
+  return {{"revision", revision.number},
+          {"t_us", revision.published.us()},
+          {"published_at", to_rfc3339(revision.published)},
+          {"calibration", to_string(revision.calibration)},
+          {"by", revision.by},
+          {"note", revision.note}};
 }
 
 Ordered published_json(const PublishedPosition& position) {
-  Ordered out{{"revision", position.since_revision}, {"published_at", to_rfc3339(position.published)}, {"calibration", to_string(position.calibration)}};
+  Ordered out{{"revision", position.since_revision},
+              {"published_at", to_rfc3339(position.published)},
+              {"calibration", to_string(position.calibration)}};
   out.update(estimate_result_json(position.estimate, position.frame));
   return out;
 }
 
 std::string_view job_state_word(JobState state) {
   switch (state) {
-    case JobState::queued: return "queued";
-    case JobState::running: return "running";
-    case JobState::succeeded: return "succeeded";
-    case JobState::failed: return "failed";
-    case JobState::canceled: return "canceled";
+    case JobState::queued:
+      return "queued";
+    case JobState::running:
+      return "running";
+    case JobState::succeeded:
+      return "succeeded";
+    case JobState::failed:
+      return "failed";
+    case JobState::canceled:
+      return "canceled";
   }
   return "failed";
 }
@@ -219,14 +257,17 @@ Ordered job_json(const Job& job) {
   const std::string self = "/api/v1/jobs/" + to_string(job.id);
   Ordered links = Ordered::array();
   if (!job.result_href.empty()) links.push_back({{"rel", "result"}, {"href", job.result_href}});
-  if (job.state == JobState::queued || job.state == JobState::running) links.push_back({{"rel", "cancel"}, {"href", self}, {"method", "DELETE"}});
+  if (job.state == JobState::queued || job.state == JobState::running)
+    links.push_back({{"rel", "cancel"}, {"href", self}, {"method", "DELETE"}});
   Ordered out{{"id", to_string(job.id)}, {"kind", job.kind}, {"state", job_state_word(job.state)}};
-  out["progress"] = {{"fraction", job.fraction}, {"stage", job.stage}, {"stage_index", stage}, {"stage_count", k_stages.size()}, {"detail", job.detail}, {"eta_s", nullptr}};
+  out["progress"] = {{"fraction", job.fraction},       {"stage", job.stage},   {"stage_index", stage},
+                     {"stage_count", k_stages.size()}, {"detail", job.detail}, {"eta_s", nullptr}};
   out["created_at"] = to_rfc3339(job.created);
   out["started_at"] = job.started ? Ordered(to_rfc3339(*job.started)) : Ordered(nullptr);
   out["finished_at"] = job.finished ? Ordered(to_rfc3339(*job.finished)) : Ordered(nullptr);
   out["links"] = std::move(links);
-  out["problem"] = job.problem_json.empty() ? Ordered(nullptr) : Ordered::parse(job.problem_json, nullptr, false);
+  out["problem"] =
+      job.problem_json.empty() ? Ordered(nullptr) : Ordered::parse(job.problem_json, nullptr, false);
   return out;
 }
 

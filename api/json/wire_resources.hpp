@@ -9,7 +9,8 @@
 
 namespace anchord::api {
 
-nlohmann::ordered_json mission_json(const Mission& mission, std::optional<std::uint64_t> n_ranges, std::optional<std::uint64_t> n_fixes);
+nlohmann::ordered_json mission_json(const Mission& mission, std::optional<std::uint64_t> n_ranges,
+                                    std::optional<std::uint64_t> n_fixes);
 /// Body of POST /missions. What is wrong goes to `errors`.
 Mission read_mission(const nlohmann::json& body, std::vector<FieldError>& errors);
 
@@ -22,7 +23,7 @@ void patch_anchor(const nlohmann::json& body, Anchor& anchor, std::vector<FieldE
 /// What an anchor feature (api.md section 4) is made of.
 struct AnchorFeature {
   Anchor anchor;
-  std::string status;                       ///< accepted, or the live status
+  std::string status;  ///< accepted, or the live status
   std::optional<std::uint64_t> revision{};
   std::optional<UtcTime> calibrated{};
   std::optional<CalibrationId> calibration{};
@@ -39,7 +40,8 @@ std::string anchors_csv_header();
 std::string anchor_csv_row(const AnchorFeature& feature);
 
 /// position, accuracy, quality and mirror of one estimate, as in calibrations.
-nlohmann::ordered_json estimate_result_json(const Estimate& estimate, TrackFrame frame, const std::optional<Site>& site = {});
+nlohmann::ordered_json estimate_result_json(const Estimate& estimate, TrackFrame frame,
+                                            const std::optional<Site>& site = {});
 nlohmann::ordered_json calibration_json(const Calibration& calibration, bool with_anchors);
 nlohmann::ordered_json revision_json(const Revision& revision);
 nlohmann::ordered_json published_json(const PublishedPosition& position);

@@ -27,13 +27,17 @@ void read_common(Fields& fields, const std::optional<MissionId>& given, MissionI
   if (fields.has("mission")) {
     if (const auto text = fields.text("mission", 36, true)) {
       const auto id = parse_uuid(*text);
-      if (id) mission.uuid = id.value();
-      else fields.error("mission", "unknown_mission", "'" + *text + "' is not the id of a mission");
+      if (id)
+        mission.uuid = id.value();
+      else
+        fields.error("mission", "unknown_mission", "'" + *text + "' is not the id of a mission");
     }
   } else {
     fields.child("mission");
-    if (given) mission = *given;
-    else fields.error("mission", "required", "name the mission in the row or as ?mission=");
+    if (given)
+      mission = *given;
+    else
+      fields.error("mission", "required", "name the mission in the row or as ?mission=");
   }
 }
 
@@ -59,7 +63,8 @@ std::optional<Cir> read_cir(const Json& value, const std::string& at, std::vecto
     if (!bytes) {
       fields.error("b64", "bad_base64", "is not base64");
     } else if (n && bytes->size() != static_cast<std::size_t>(*n) * 4) {
-      fields.error("b64", "wrong_length", "holds " + std::to_string(bytes->size()) + " bytes, n says " + std::to_string(*n * 4));
+      fields.error("b64", "wrong_length",
+                   "holds " + std::to_string(bytes->size()) + " bytes, n says " + std::to_string(*n * 4));
     } else {
       cir.re_im.resize(bytes->size() / 2);
       for (std::size_t i = 0; i < cir.re_im.size(); ++i) {
@@ -91,7 +96,8 @@ void read_position(Fields& fields, Fix& fix) {
   const auto lat = fields.number("lat", -90, 90, true);
   const auto height = fields.number("h_m", -500, 9000, true);
   if (lon && lat && *lon == 0 && *lat == 0) {
-    fields.error("lat", "null_island", "longitude and latitude are both 0: what a receiver without a fix sends");
+    fields.error("lat", "null_island",
+                 "longitude and latitude are both 0: what a receiver without a fix sends");
   }
   if (lon && lat && height) fix.position = {*lat, *lon, *height};
 }
@@ -104,10 +110,15 @@ void read_uncertainty(Fields& fields, Fix& fix) {
     const auto& v = *cov;
     c << v[0], v[1], v[2], v[1], v[3], v[4], v[2], v[4], v[5];
     // Sylvester: all leading minors positive.
-    if (c(0, 0) > 0 && c(0, 0) * c(1, 1) - c(0, 1) * c(0, 1) > 0 && c.determinant() > 0) fix.covariance_m2 = c;
-    else fields.error("cov_enu_m2", "not_positive", "is not a positive definite matrix [ee, en, eu, nn, nu, uu]");
+    if (c(0, 0) > 0 && c(0, 0) * c(1, 1) - c(0, 1) * c(0, 1) > 0 && c.determinant() > 0)
+      fix.covariance_m2 = c;
+    else
+      fields.error("cov_enu_m2", "not_positive",
+                   "is not a positive definite matrix [ee, en, eu, nn, nu, uu]");
   } else if (sigma) {
-    fix.covariance_m2 = Eigen::Vector3d((*sigma)[0] * (*sigma)[0], (*sigma)[1] * (*sigma)[1], (*sigma)[2] * (*sigma)[2]).asDiagonal();
+    fix.covariance_m2 =
+        Eigen::Vector3d((*sigma)[0] * (*sigma)[0], (*sigma)[1] * (*sigma)[1], (*sigma)[2] * (*sigma)[2])
+            .asDiagonal();
   }
 }
 
@@ -116,8 +127,10 @@ void read_attitude(Fields& fields, Fix& fix) {
   const auto heading = fields.number("heading_deg", -360, 360);
   if (q) {
     const Eigen::Quaterniond rotation((*q)[3], (*q)[0], (*q)[1], (*q)[2]);
-    if (std::abs(rotation.norm() - 1) > 0.01) fields.error("q", "not_unit", "is not a unit quaternion [qx, qy, qz, qw]");
-    else fix.enu_from_body = rotation.normalized();
+    if (std::abs(rotation.norm() - 1) > 0.01)
+      fields.error("q", "not_unit", "is not a unit quaternion [qx, qy, qz, qw]");
+    else
+      fix.enu_from_body = rotation.normalized();
   } else if (heading) {
     // Clockwise from north; the body's x axis points forward, ENU angles count counter-clockwise from east.
     const double yaw_rad = (90.0 - *heading) * k_pi / 180.0;
@@ -133,13 +146,15 @@ void put_if(Ordered& out, const char* key, const auto& value) {
 
 std::string_view fix_word(FixClass fix) { return k_fix_words[static_cast<std::size_t>(fix)]; }
 
-RangeRow read_range(const Json& row, const std::optional<MissionId>& mission, std::vector<FieldError>& errors) {
+RangeRow read_range(const Json& row, const std::optional<MissionId>& mission,
+                    std::vector<FieldError>& errors) {
   RangeRow out;
   Range& range = out.range;
   Fields fields(row, "", errors);
   if (!fields.is_object()) return out;
   read_common(fields, mission, range.mission, range.time, range.received, range.seq);
-  if (const auto kind = fields.word("kind", {"tag_anchor", "anchor_anchor"})) range.kind = static_cast<RangeKind>(*kind);
+  if (const auto kind = fields.word("kind", {"tag_anchor", "anchor_anchor"}))
+    range.kind = static_cast<RangeKind>(*kind);
   if (const auto id = read_network_id(fields, "tag")) range.tag = *id;
   if (const auto id = read_network_id(fields, "anchor")) range.anchor = *id;
   if (const auto n = fields.integer("antenna", 0, 255)) range.antenna = static_cast<std::uint8_t>(*n);
@@ -276,7 +291,8 @@ std::string base64(std::string_view bytes) {
   for (std::size_t i = 0; i < bytes.size(); i += 3) {
     const std::size_t n = std::min<std::size_t>(3, bytes.size() - i);
     std::uint32_t block = 0;
-    for (std::size_t k = 0; k < 3; ++k) block = (block << 8) | (k < n ? static_cast<unsigned char>(bytes[i + k]) : 0u);
+    for (std::size_t k = 0; k < 3; ++k)
+      block = (block << 8) | (k < n ? static_cast<unsigned char>(bytes[i + k]) : 0u);
     for (std::size_t k = 0; k < 4; ++k) out += k <= n ? k_alphabet[(block >> (18 - 6 * k)) & 63] : '=';
   }
   return out;
@@ -286,7 +302,8 @@ std::optional<std::string> from_base64(std::string_view text) {
   static const auto k_value = [] {
     std::array<std::int8_t, 256> table{};
     table.fill(-1);
-    for (int i = 0; i < 64; ++i) table[static_cast<unsigned char>(k_alphabet[i])] = static_cast<std::int8_t>(i);
+    for (int i = 0; i < 64; ++i)
+      table[static_cast<unsigned char>(k_alphabet[i])] = static_cast<std::int8_t>(i);
     return table;
   }();
   if (text.size() % 4 != 0) return std::nullopt;

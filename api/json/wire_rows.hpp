@@ -20,14 +20,16 @@ struct RangeRow {
   std::optional<Fix> pose{};
 };
 
-/// Reads one range (api.md section 4). Everything wrong is appended to `errors`; the value is usable only when
-/// nothing was appended. `mission`: of the query, used where the row names none. Limits: distance 0.05..150 m, 0 is
-/// `zero_distance` (the failure value of Pozyx radios).
-RangeRow read_range(const nlohmann::json& row, const std::optional<MissionId>& mission, std::vector<FieldError>& errors);
+/// Reads one range (api.md section 4). Everything wrong is appended to `errors`; the value is usable only
+/// when nothing was appended. `mission`: of the query, used where the row names none. Limits: distance
+/// 0.05..150 m, 0 is `zero_distance` (the failure value of Pozyx radios).
+RangeRow read_range(const nlohmann::json& row, const std::optional<MissionId>& mission,
+                    std::vector<FieldError>& errors);
 
 /// Reads one fix. Position either lon, lat, h_m or local_m; |lat| <= 90, |lon| <= 180, height -500..9000 m,
 /// longitude and latitude both 0 refused (`null_island`: what a receiver without a fix sends).
-Fix read_fix(const nlohmann::json& row, const std::optional<MissionId>& mission, std::vector<FieldError>& errors);
+Fix read_fix(const nlohmann::json& row, const std::optional<MissionId>& mission,
+             std::vector<FieldError>& errors);
 
 nlohmann::ordered_json range_json(const Range& range, std::optional<std::int64_t> id);
 nlohmann::ordered_json fix_json(const Fix& fix, std::optional<std::int64_t> id);

@@ -21,7 +21,8 @@ std::int64_t steady_us() {
 
 }  // namespace
 
-Conversation::Conversation(Hub& hub, Principal principal) : hub_(hub), principal_(std::move(principal)), outbox_(hub.counters()) {}
+Conversation::Conversation(Hub& hub, Principal principal)
+    : hub_(hub), principal_(std::move(principal)), outbox_(hub.counters()) {}
 
 Conversation::~Conversation() { on_close(); }
 
@@ -30,11 +31,15 @@ void Conversation::on_open(std::function<void()> wake) {
   Json topic_names = Json::array(), roles = Json::array();
   for (const auto& topic : topics()) topic_names.push_back(topic.name);
   for (const Role role : principal_.roles) roles.push_back(to_string(role));
-  nlohmann::ordered_json hello{{"op", "hello"}, {"server", hub_.server_name()}, {"epoch", hub_.epoch()}, {"t_us", hub_.clock().now().us()},
-                               {"hb_ms", 1000}, {"topics", topic_names}, {"roles", roles}};
+  nlohmann::ordered_json hello{{"op", "hello"},         {"server", hub_.server_name()},
+                               {"epoch", hub_.epoch()}, {"t_us", hub_.clock().now().us()},
+                               {"hb_ms", 1000},         {"topics", topic_names},
+                               {"roles", roles}};
   say(hello.dump());
-  if (hub_.join(*this)) joined_ = true;
-  else close(4029, "too_many");
+  if (hub_.join(*this))
+    joined_ = true;
+  else
+    close(4029, "too_many");
 }
 
 void Conversation::on_close() {
@@ -45,7 +50,8 @@ void Conversation::on_close() {
 void Conversation::on_text(std::string_view text) {
   Json message;
   if (text.size() > 64 * 1024) return close(4009, "protocol");
-  if (parse_json(text, message) || !message.is_object() || !message.contains("op") || !message["op"].is_string()) {
+  if (parse_json(text, message) || !message.is_object() || !message.contains("op") ||
+      !message["op"].is_string()) {
     refuse(message, 400, "malformed", "send JSON objects with an op");
     return close(4009, "protocol");
   }
@@ -53,7 +59,10 @@ void Conversation::on_text(std::string_view text) {
   if (op == "sub") return subscribe(message);
   if (op == "unsub") return unsubscribe(message);
   if (op == "time") {
-    nlohmann::ordered_json answer{{"op", "time"}, {"id", message.value("id", Json())}, {"c_us", message.value("c_us", Json())}, {"t_us", hub_.clock().now().us()}};
+    nlohmann::ordered_json answer{{"op", "time"},
+                                  {"id", message.value("id", Json())},
+                                  {"c_us", message.value("c_us", Json())},
+                                  {"t_us", hub_.clock().now().us()}};
     return say(answer.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   }
   refuse(message, 422, "validation", "op is sub, unsub or time");
@@ -68,14 +77,19 @@ void Conversation::subscribe(const Json& message) {
   Subscription subscription;
   if (const Json* params = fields.child("params")) {
     Fields inner(*params, "/params", errors);
-    if (const auto hz = inner.number("max_hz", 0.01, 1000)) subscription.min_interval_us = static_cast<std::int64_t>(1e6 / *hz);
+    if (const auto hz = inner.number("max_hz", 0.01, 1000))
+      subscription.min_interval_us = static_cast<std::int64_t>(1e6 / *hz);
     if (const Json* anchors = inner.child("anchors")) {
-      if (!anchors->is_array() || anchors->size() > 1000) inner.error("anchors", "wrong_type", "must be an array of at most 1000 network ids");
-      else for (const auto& item : *anchors) {
-        const auto anchor = parse_network_id(item.is_string() ? item.get_ref<const std::string&>() : "");
-        if (anchor) subscription.anchors.insert(anchor.value());
-        else inner.error("anchors", "bad_id", anchor.error().message);
-      }
+      if (!anchors->is_array() || anchors->size() > 1000)
+        inner.error("anchors", "wrong_type", "must be an array of at most 1000 network ids");
+      else
+        for (const auto& item : *anchors) {
+          const auto anchor = parse_network_id(item.is_string() ? item.get_ref<const std::string&>() : "");
+          if (anchor)
+            subscription.anchors.insert(anchor.value());
+          else
+            inner.error("anchors", "bad_id", anchor.error().message);
+        }
     }
     inner.word("encoding", {"json"});
     inner.finish();
@@ -89,7 +103,8 @@ void Conversation::subscribe(const Json& message) {
     if (epoch && seq) since = {*epoch, static_cast<std::uint64_t>(*seq)};
   }
   fields.finish();
-  if (!errors.empty()) return refuse(message, 422, "validation", errors.front().pointer + ": " + errors.front().detail);
+  if (!errors.empty())
+    return refuse(message, 422, "validation", errors.front().pointer + ": " + errors.front().detail);
   const TopicInfo* topic = find_topic(*name);
   if (topic == nullptr) return refuse(message, 404, "not-found", "there is no topic " + *name);
   if (subscriptions_.size() >= k_max_subscriptions) {
@@ -98,18 +113,23 @@ void Conversation::subscribe(const Json& message) {
   }
   subscription.topic = topic->topic;
   subscription.id = default_sub(topic->topic);
-  // The usual number lets all clients share the bytes of a frame; a second subscription of the topic gets its own.
+  // The usual number lets all clients share the bytes of a frame; a second subscription of the topic gets its
+  // own.
   if (subscriptions_.count(subscription.id) > 0) subscription.id = next_sub_++;
   subscriptions_[subscription.id] = topic->topic;
 
   {
-    // Before the hub knows of it, so that nothing published meanwhile is lost; where it begins is known after.
+    // Before the hub knows of it, so that nothing published meanwhile is lost; where it begins is known
+    // after.
     const std::scoped_lock lock(mutex_);
     outbox_.add(subscription);
   }
   const Resumed start = hub_.subscribe(*this, topic->topic, since);
-  nlohmann::ordered_json ack{{"op", "ack"}, {"id", id ? Json(*id) : Json()}, {"sub", subscription.id},
-                             {"from_seq", start.recovered ? since->second + 1 : start.last_seq + 1}, {"recovered", start.recovered}};
+  nlohmann::ordered_json ack{{"op", "ack"},
+                             {"id", id ? Json(*id) : Json()},
+                             {"sub", subscription.id},
+                             {"from_seq", start.recovered ? since->second + 1 : start.last_seq + 1},
+                             {"recovered", start.recovered}};
   std::string frames = ack.dump();
   {
     const std::scoped_lock lock(mutex_);
@@ -118,9 +138,12 @@ void Conversation::subscribe(const Json& message) {
     if (!start.recovered) {
       std::vector<LiveElement> wanted;
       for (const auto& element : start.snapshot) {
-        if (subscription.anchors.empty() || !element.anchor || subscription.anchors.count(*element.anchor) > 0) wanted.push_back(element);
+        if (subscription.anchors.empty() || !element.anchor ||
+            subscription.anchors.count(*element.anchor) > 0)
+          wanted.push_back(element);
       }
-      room = outbox_.control(snap_frame(subscription.id, start.last_seq, start.t_us, wanted, topic->keyed)) && room;
+      room = outbox_.control(snap_frame(subscription.id, start.last_seq, start.t_us, wanted, topic->keyed)) &&
+             room;
     }
     if (!room) close_ = {4008, "slow_consumer"};
   }
@@ -134,7 +157,8 @@ void Conversation::unsubscribe(const Json& message) {
   const auto id = fields.integer("id", 0, INT64_MAX);
   const auto sub = fields.integer("sub", 0, INT64_MAX, true);
   fields.finish();
-  if (!errors.empty()) return refuse(message, 422, "validation", errors.front().pointer + ": " + errors.front().detail);
+  if (!errors.empty())
+    return refuse(message, 422, "validation", errors.front().pointer + ": " + errors.front().detail);
   const auto it = subscriptions_.find(static_cast<std::uint64_t>(*sub));
   if (it == subscriptions_.end()) return refuse(message, 404, "not-found", "there is no such subscription");
   hub_.unsubscribe(*this, it->second);
@@ -148,7 +172,9 @@ void Conversation::unsubscribe(const Json& message) {
 }
 
 void Conversation::refuse(const Json& message, int status, std::string_view type, std::string_view detail) {
-  const Json id = message.is_object() && message.contains("id") && message["id"].is_number_integer() ? message["id"] : Json();
+  const Json id = message.is_object() && message.contains("id") && message["id"].is_number_integer()
+                      ? message["id"]
+                      : Json();
   say(R"({"op":"err","id":)" + id.dump() + R"(,"problem":)" + problem_json(status, type, detail) + '}');
 }
 
@@ -179,8 +205,10 @@ void Conversation::on_message(Topic topic, const std::shared_ptr<const LiveMessa
     room = outbox_.put(message, topic);
     due = outbox_.due(steady_us());
   }
-  if (!room) close(4008, "slow_consumer");
-  else if (due && wake_) wake_();
+  if (!room)
+    close(4008, "slow_consumer");
+  else if (due && wake_)
+    wake_();
 }
 
 void Conversation::on_tick(UtcTime now, bool heartbeat) {

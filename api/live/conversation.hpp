@@ -10,8 +10,8 @@
 
 namespace anchord::api {
 
-/// The `anchord.v1` protocol of one client (api.md section 9): hello, sub, unsub, time in; ack, snap, data, gap, hb,
-/// err, bye out.
+/// The `anchord.v1` protocol of one client (api.md section 9): hello, sub, unsub, time in; ack, snap, data,
+/// gap, hb, err, bye out.
 class Conversation final : public WsHandler, private HubListener {
  public:
   static constexpr std::size_t k_max_subscriptions = 32;

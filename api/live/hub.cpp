@@ -40,9 +40,12 @@ std::size_t LiveMessage::bytes() const {
 }
 
 Hub::Hub(const Clock& clock, std::string server_name)
-    : clock_(clock), server_name_(std::move(server_name)), epoch_(to_string(make_uuid_v7(clock.now())).substr(0, 23)) {}
+    : clock_(clock),
+      server_name_(std::move(server_name)),
+      epoch_(to_string(make_uuid_v7(clock.now())).substr(0, 23)) {}
 
-void Hub::publish(Topic topic, std::string json, std::int64_t t_us, std::string key, std::optional<NetworkId> anchor) {
+void Hub::publish(Topic topic, std::string json, std::int64_t t_us, std::string key,
+                  std::optional<NetworkId> anchor) {
   LiveElement element{std::move(key), anchor, std::make_shared<const std::string>(std::move(json))};
   const std::scoped_lock lock(mutex_);
   send(topic, {std::move(element)}, t_us);
@@ -70,7 +73,8 @@ void Hub::send(Topic topic, std::vector<LiveElement> elements, std::int64_t t_us
   message->t_us = t_us;
   message->elements = std::move(elements);
   if (!channel.listeners.empty()) {
-    message->frame = data_frame(default_sub(topic), message->seq, message->seq - 1, t_us, message->elements, about.cls == TopicClass::stream, 0);
+    message->frame = data_frame(default_sub(topic), message->seq, message->seq - 1, t_us, message->elements,
+                                about.cls == TopicClass::stream, 0);
   }
   ++counters_.published;
   if (about.cls == TopicClass::state) {
@@ -82,7 +86,8 @@ void Hub::send(Topic topic, std::vector<LiveElement> elements, std::int64_t t_us
     channel.history_bytes += message->bytes();
     trim(about, channel, now_us);
   }
-  for (auto it = channel.listeners.begin(); it != channel.listeners.end(); it = channel.listeners.upper_bound(*it)) {
+  for (auto it = channel.listeners.begin(); it != channel.listeners.end();
+       it = channel.listeners.upper_bound(*it)) {
     (*it)->on_message(topic, message);
   }
 }
@@ -90,7 +95,8 @@ void Hub::send(Topic topic, std::vector<LiveElement> elements, std::int64_t t_us
 void Hub::trim(const TopicInfo& topic, Channel& channel, std::int64_t now_us) {
   const auto too_much = [&] {
     if (topic.cls == TopicClass::event) return channel.history.size() > k_event_history;
-    return now_us - channel.history_at_us.front() > k_stream_history_us || channel.history_bytes > k_stream_history_bytes;
+    return now_us - channel.history_at_us.front() > k_stream_history_us ||
+           channel.history_bytes > k_stream_history_bytes;
   };
   while (!channel.history.empty() && too_much()) {
     channel.history_bytes -= channel.history.front()->bytes();
@@ -112,7 +118,8 @@ void Hub::leave(HubListener& listener) {
   for (auto& channel : channels_) channel.listeners.erase(&listener);
 }
 
-Resumed Hub::subscribe(HubListener& listener, Topic topic, const std::optional<std::pair<std::string, std::uint64_t>>& since) {
+Resumed Hub::subscribe(HubListener& listener, Topic topic,
+                       const std::optional<std::pair<std::string, std::uint64_t>>& since) {
   const std::scoped_lock lock(mutex_);
   auto& channel = channels_[static_cast<std::size_t>(topic)];
   channel.listeners.insert(&listener);
@@ -158,7 +165,8 @@ void Hub::tick() {
   const UtcTime now = clock_.now();
   for (const auto& topic : topics()) {
     auto& channel = channels_[static_cast<std::size_t>(topic.topic)];
-    if (!channel.collected.empty()) send(topic.topic, std::exchange(channel.collected, {}), channel.collected_t_us);
+    if (!channel.collected.empty())
+      send(topic.topic, std::exchange(channel.collected, {}), channel.collected_t_us);
     if (topic.cls == TopicClass::stream) trim(topic, channel, now.us());
   }
   // A clock that was set back must not silence the heartbeat.

@@ -26,7 +26,18 @@ enum class TopicClass : std::uint8_t {
 };
 
 enum class Topic : std::uint8_t {
-  alarms, anchors_estimates, devices, drone_pose, events, fixes, jobs, mission_state, ranges, revisions, rtk_status, system,
+  alarms,
+  anchors_estimates,
+  devices,
+  drone_pose,
+  events,
+  fixes,
+  jobs,
+  mission_state,
+  ranges,
+  revisions,
+  rtk_status,
+  system,
 };
 inline constexpr std::size_t k_topic_count = 12;
 
@@ -42,8 +53,8 @@ const TopicInfo* find_topic(std::string_view name);
 
 /// One JSON object on its way to many clients; encoded once, shared by reference.
 struct LiveElement {
-  std::string key;                     ///< of a state topic
-  std::optional<NetworkId> anchor{};   ///< for params.anchors
+  std::string key;                    ///< of a state topic
+  std::optional<NetworkId> anchor{};  ///< for params.anchors
   std::shared_ptr<const std::string> json;
 };
 
@@ -76,14 +87,14 @@ struct HubCounters {
 /// What a new subscription starts from.
 struct Resumed {
   bool recovered{false};
-  std::uint64_t last_seq{};                                   ///< newest seq of the topic at this instant
-  std::vector<std::shared_ptr<const LiveMessage>> missed;     ///< after `since`, when recovered
-  std::vector<LiveElement> snapshot;                          ///< otherwise
+  std::uint64_t last_seq{};                                ///< newest seq of the topic at this instant
+  std::vector<std::shared_ptr<const LiveMessage>> missed;  ///< after `since`, when recovered
+  std::vector<LiveElement> snapshot;                       ///< otherwise
   std::int64_t t_us{};
 };
 
-/// The event bus: topics with sequence numbers, history and snapshots. No producer ever waits for a client; every
-/// client has its own bounded outbox. Thread-safe; locks in the order hub, then outbox.
+/// The event bus: topics with sequence numbers, history and snapshots. No producer ever waits for a client;
+/// every client has its own bounded outbox. Thread-safe; locks in the order hub, then outbox.
 class Hub {
  public:
   static constexpr std::size_t k_event_history = 10'000;
@@ -98,7 +109,8 @@ class Hub {
   const Clock& clock() const { return clock_; }
 
   /// Sends one object now. `json` is a complete JSON value.
-  void publish(Topic topic, std::string json, std::int64_t t_us, std::string key = {}, std::optional<NetworkId> anchor = {});
+  void publish(Topic topic, std::string json, std::int64_t t_us, std::string key = {},
+               std::optional<NetworkId> anchor = {});
   /// Collects an element of a stream; tick() sends them together, at most 20 frames a second.
   void collect(Topic topic, std::string json, std::int64_t t_us, std::optional<NetworkId> anchor = {});
   /// Forgets a key of a state topic (a removed mission).
@@ -107,7 +119,8 @@ class Hub {
   /// False when there are too many connections.
   bool join(HubListener& listener);
   void leave(HubListener& listener);
-  Resumed subscribe(HubListener& listener, Topic topic, const std::optional<std::pair<std::string, std::uint64_t>>& since);
+  Resumed subscribe(HubListener& listener, Topic topic,
+                    const std::optional<std::pair<std::string, std::uint64_t>>& since);
   void unsubscribe(HubListener& listener, Topic topic);
 
   /// Every 50 ms: sends what was collected; wakes clients with due frames; a heartbeat each second.

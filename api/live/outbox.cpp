@@ -25,12 +25,15 @@ void Outbox::remove(std::uint64_t sub) {
   queues_.erase(it);
 }
 
-void Outbox::start(std::uint64_t sub, std::uint64_t last_seq, const std::vector<std::shared_ptr<const LiveMessage>>& missed) {
+void Outbox::start(std::uint64_t sub, std::uint64_t last_seq,
+                   const std::vector<std::shared_ptr<const LiveMessage>>& missed) {
   auto& queue = queues_[sub];
   queue.subscription.last_seq = last_seq;
   for (const auto& message : missed) {
     const auto& elements = message->elements;
-    if (std::any_of(elements.begin(), elements.end(), [&](const auto& e) { return wants(queue.subscription, e); })) queue.replay.push_back(message);
+    if (std::any_of(elements.begin(), elements.end(),
+                    [&](const auto& e) { return wants(queue.subscription, e); }))
+      queue.replay.push_back(message);
   }
 }
 
@@ -57,7 +60,8 @@ bool Outbox::put(const std::shared_ptr<const LiveMessage>& message, Topic topic)
   for (auto& [id, queue] : queues_) {
     if (queue.subscription.topic != topic) continue;
     const auto& elements = message->elements;
-    const bool any = std::any_of(elements.begin(), elements.end(), [&](const auto& e) { return wants(queue.subscription, e); });
+    const bool any = std::any_of(elements.begin(), elements.end(),
+                                 [&](const auto& e) { return wants(queue.subscription, e); });
     if (!any) continue;
     if (cls == TopicClass::state) {
       queue.only = queue.newest.empty() ? message : nullptr;
@@ -109,14 +113,16 @@ void Outbox::drop_oldest_stream() {
 }
 
 bool Outbox::ready(const Queue& queue, std::int64_t now_us) const {
-  if (queue.newest.empty() && queue.messages.empty() && queue.replay.empty() && queue.gap_dropped == 0) return false;
+  if (queue.newest.empty() && queue.messages.empty() && queue.replay.empty() && queue.gap_dropped == 0)
+    return false;
   const std::int64_t since = now_us - queue.sent_us;
   return since >= queue.subscription.min_interval_us || since < 0;
 }
 
 bool Outbox::due(std::int64_t now_us) const {
   if (!control_.empty() || !heartbeat_.empty()) return true;
-  return std::any_of(queues_.begin(), queues_.end(), [&](const auto& entry) { return ready(entry.second, now_us); });
+  return std::any_of(queues_.begin(), queues_.end(),
+                     [&](const auto& entry) { return ready(entry.second, now_us); });
 }
 
 std::shared_ptr<const std::string> Outbox::next_control() {
@@ -138,7 +144,8 @@ std::shared_ptr<const std::string> Outbox::next(std::int64_t now_us) {
       if (cls == TopicClass::state) return take_state(queue);
       if (!queue.replay.empty()) return take_messages(queue, queue.replay, true);
       if (queue.gap_dropped > 0) {
-        auto frame = std::make_shared<const std::string>(gap_frame(id, queue.gap_from, queue.gap_to, queue.gap_dropped));
+        auto frame = std::make_shared<const std::string>(
+            gap_frame(id, queue.gap_from, queue.gap_to, queue.gap_dropped));
         queue.subscription.last_seq = queue.gap_to;
         queue.gap_dropped = 0;
         queue.sent_us = INT64_MIN / 2;
@@ -161,7 +168,8 @@ std::shared_ptr<const std::string> Outbox::take_state(Queue& queue) {
     elements.push_back(std::move(pending.element));
   }
   std::shared_ptr<const std::string> frame;
-  if (queue.only && queue.only->frame && queue.conflated == 0 && subscription.id == default_sub(subscription.topic) && subscription.last_seq + 1 == seq) {
+  if (queue.only && queue.only->frame && queue.conflated == 0 &&
+      subscription.id == default_sub(subscription.topic) && subscription.last_seq + 1 == seq) {
     frame = queue.only->frame;
   } else {
     frame = data_frame(subscription.id, seq, subscription.last_seq, t_us, elements, false, queue.conflated);
@@ -173,7 +181,9 @@ std::shared_ptr<const std::string> Outbox::take_state(Queue& queue) {
   return frame;
 }
 
-std::shared_ptr<const std::string> Outbox::take_messages(Queue& queue, std::deque<std::shared_ptr<const LiveMessage>>& from, bool merge) {
+std::shared_ptr<const std::string> Outbox::take_messages(Queue& queue,
+                                                         std::deque<std::shared_ptr<const LiveMessage>>& from,
+                                                         bool merge) {
   const bool counted = &from == &queue.messages;
   auto& subscription = queue.subscription;
   const bool filtered = !subscription.anchors.empty();
@@ -195,7 +205,8 @@ std::shared_ptr<const std::string> Outbox::take_messages(Queue& queue, std::dequ
     }
   }
   std::shared_ptr<const std::string> frame;
-  if (taken == 1 && !filtered && last->frame && subscription.id == default_sub(subscription.topic) && subscription.last_seq + 1 == last->seq) {
+  if (taken == 1 && !filtered && last->frame && subscription.id == default_sub(subscription.topic) &&
+      subscription.last_seq + 1 == last->seq) {
     frame = last->frame;
   } else {
     frame = data_frame(subscription.id, last->seq, subscription.last_seq, last->t_us, elements, merge, 0);
@@ -205,7 +216,8 @@ std::shared_ptr<const std::string> Outbox::take_messages(Queue& queue, std::dequ
 }
 
 double Outbox::fill() const {
-  return std::max(static_cast<double>(bytes_) / static_cast<double>(k_max_bytes), static_cast<double>(count_) / static_cast<double>(k_max_messages));
+  return std::max(static_cast<double>(bytes_) / static_cast<double>(k_max_bytes),
+                  static_cast<double>(count_) / static_cast<double>(k_max_messages));
 }
 
 }  // namespace anchord::api

@@ -13,7 +13,8 @@
 namespace anchord::api {
 
 /// One WebSocket conversation, free of transport. All calls come from the session's strand; the wake function
-/// handed to on_open may be called from any thread (and after the session ended: the session makes it harmless).
+/// handed to on_open may be called from any thread (and after the session ended: the session makes it
+/// harmless).
 class WsHandler {
  public:
   virtual ~WsHandler() = default;

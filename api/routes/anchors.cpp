@@ -41,7 +41,8 @@ class Lookup {
   std::map<CalibrationId, std::vector<MissionId>> missions_;
 };
 
-AnchorFeature published_feature(Lookup& lookup, Anchor anchor, const PublishedPosition& position, std::uint64_t revision) {
+AnchorFeature published_feature(Lookup& lookup, Anchor anchor, const PublishedPosition& position,
+                                std::uint64_t revision) {
   AnchorFeature feature;
   feature.site = lookup.site(anchor.site);
   feature.anchor = std::move(anchor);
@@ -61,16 +62,19 @@ std::uint64_t newest_revision(Services& s) {
 }
 
 /// All features of the published revision (newest when absent), in order of network id.
-std::vector<AnchorFeature> published(Services& s, std::optional<std::uint64_t> revision, std::uint64_t& number) {
+std::vector<AnchorFeature> published(Services& s, std::optional<std::uint64_t> revision,
+                                     std::uint64_t& number) {
   number = revision ? *revision : newest_revision(s);
   if (number == 0) return {};
   Lookup lookup(s.deps.anchors);
   std::vector<AnchorFeature> out;
   for (const auto& position : value_or_problem(s.deps.anchors.published(number))) {
-    auto anchor = value_or_problem(s.deps.anchors.find_or_create(position.estimate.anchor, s.deps.clock.now()));
+    auto anchor =
+        value_or_problem(s.deps.anchors.find_or_create(position.estimate.anchor, s.deps.clock.now()));
     out.push_back(published_feature(lookup, std::move(anchor), position, number));
   }
-  std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.anchor.network_id < b.anchor.network_id; });
+  std::sort(out.begin(), out.end(),
+            [](const auto& a, const auto& b) { return a.anchor.network_id < b.anchor.network_id; });
   return out;
 }
 
@@ -106,8 +110,10 @@ std::optional<Box> query_box(const Request& request) {
   const auto text = request.query_value("bbox");
   if (!text) return std::nullopt;
   nlohmann::json numbers;
-  if (parse_json('[' + *text + ']', numbers) || numbers.size() != 4 || !std::all_of(numbers.begin(), numbers.end(), [](const auto& n) { return n.is_number(); })) {
-    throw_problem(422, "validation", "bbox is west,south,east,north in degrees", {{"/bbox", "bad_value", "must be four numbers"}});
+  if (parse_json('[' + *text + ']', numbers) || numbers.size() != 4 ||
+      !std::all_of(numbers.begin(), numbers.end(), [](const auto& n) { return n.is_number(); })) {
+    throw_problem(422, "validation", "bbox is west,south,east,north in degrees",
+                  {{"/bbox", "bad_value", "must be four numbers"}});
   }
   return Box{numbers[0], numbers[1], numbers[2], numbers[3]};
 }
@@ -117,11 +123,16 @@ std::vector<AnchorFeature> wanted(Services& s, const Request& request, std::uint
   std::optional<std::uint64_t> revision;
   if (const auto text = request.query_value("revision")) {
     nlohmann::json value;
-    if (parse_json(*text, value) || !value.is_number_unsigned()) throw_problem(422, "validation", "revision is a number", {{"/revision", "wrong_type", "must be a number"}});
+    if (parse_json(*text, value) || !value.is_number_unsigned())
+      throw_problem(422, "validation", "revision is a number",
+                    {{"/revision", "wrong_type", "must be a number"}});
     revision = value.get<std::uint64_t>();
-    if (*revision == 0 || *revision > newest_revision(s)) throw_problem(404, "not-found", "there is no revision " + *text);
+    if (*revision == 0 || *revision > newest_revision(s))
+      throw_problem(404, "not-found", "there is no revision " + *text);
   }
-  if (view != "published" && view != "live") throw_problem(422, "validation", "view is published or live", {{"/view", "unknown_value", "must be published or live"}});
+  if (view != "published" && view != "live")
+    throw_problem(422, "validation", "view is published or live",
+                  {{"/view", "unknown_value", "must be published or live"}});
   auto all = view == "live" ? live(s, query_mission(request)) : published(s, revision, number);
   const auto box = query_box(request);
   const auto site = request.query_value("site");
@@ -130,7 +141,8 @@ std::vector<AnchorFeature> wanted(Services& s, const Request& request, std::uint
     if (!box) return false;
     if (!feature.estimate || !feature.estimate->best || !feature.estimate->best->wgs84) return true;
     const auto& at = *feature.estimate->best->wgs84;
-    return at.lon_deg < box->west || at.lon_deg > box->east || at.lat_deg < box->south || at.lat_deg > box->north;
+    return at.lon_deg < box->west || at.lon_deg > box->east || at.lat_deg < box->south ||
+           at.lat_deg > box->north;
   });
   return all;
 }
@@ -150,7 +162,9 @@ Response list(Services& s, const Request& request) {
   auto all = wanted(s, request, number);
   if (!page.cursor.empty()) {
     const auto after = parse_network_id(page.cursor);
-    if (!after) throw_problem(422, "validation", "cursor is not one of ours", {{"/cursor", "bad_cursor", "is not one of ours"}});
+    if (!after)
+      throw_problem(422, "validation", "cursor is not one of ours",
+                    {{"/cursor", "bad_cursor", "is not one of ours"}});
     std::erase_if(all, [&](const auto& feature) { return feature.anchor.network_id <= after.value(); });
   }
   const std::string format = negotiate(request, {"geojson", "json", "csv", "ndjson"});
@@ -168,7 +182,10 @@ Response list(Services& s, const Request& request) {
   }
   Ordered features = Ordered::array();
   for (const auto& feature : all) features.push_back(anchor_feature_json(feature));
-  Ordered body{{"type", "FeatureCollection"}, {"features", std::move(features)}, {"revision", number == 0 ? Ordered(nullptr) : Ordered(number)}, {"next_cursor", next.empty() ? Ordered(nullptr) : Ordered(next)}};
+  Ordered body{{"type", "FeatureCollection"},
+               {"features", std::move(features)},
+               {"revision", number == 0 ? Ordered(nullptr) : Ordered(number)},
+               {"next_cursor", next.empty() ? Ordered(nullptr) : Ordered(next)}};
   Response response = json_response(200, body, "application/geo+json");
   if (!next.empty()) response.header("Link", next_link(request, next));
   return response;
@@ -197,7 +214,8 @@ AnchorFeature feature_of(Services& s, const Anchor& anchor) {
 }
 
 std::string etag(const AnchorFeature& feature) {
-  return "\"a-" + std::to_string(feature.anchor.version) + '-' + std::to_string(feature.revision.value_or(0)) + '"';
+  return "\"a-" + std::to_string(feature.anchor.version) + '-' +
+         std::to_string(feature.revision.value_or(0)) + '"';
 }
 
 Response answer(const AnchorFeature& feature) {
@@ -211,7 +229,8 @@ Response patch(Services& s, const Request& request) {
   require_match(request, etag(feature_of(s, anchor)));
   std::vector<FieldError> errors;
   patch_anchor(json_body(request), anchor, errors);
-  if (anchor.site && !s.deps.anchors.site(*anchor.site)) errors.push_back({"/site", "unknown_site", "there is no such site"});
+  if (anchor.site && !s.deps.anchors.site(*anchor.site))
+    errors.push_back({"/site", "unknown_site", "there is no such site"});
   refuse_if_any(errors);
   value_or_problem(s.deps.anchors.update(anchor, anchor.version));
   s.audit(request, "anchor.change " + to_string(anchor.network_id));
@@ -224,7 +243,8 @@ Response estimates(Services& s, const Request& request) {
   Ordered items = Ordered::array();
   for (const auto& view : s.missions.live(query_mission(request))) {
     for (const auto& estimate : view.estimates) {
-      if (estimate.anchor == anchor.network_id) items.push_back(Ordered::parse(live_estimate_json(view.mission.id, estimate)));
+      if (estimate.anchor == anchor.network_id)
+        items.push_back(Ordered::parse(live_estimate_json(view.mission.id, estimate)));
     }
   }
   return list_response(request, std::move(items), "");
@@ -234,7 +254,8 @@ Response history(Services& s, const Request& request) {
   check_query(request, {});
   const Anchor anchor = path_anchor(s, request);
   Ordered items = Ordered::array();
-  for (const auto& position : value_or_problem(s.deps.anchors.history(anchor.network_id))) items.push_back(published_json(position));
+  for (const auto& position : value_or_problem(s.deps.anchors.history(anchor.network_id)))
+    items.push_back(published_json(position));
   return list_response(request, std::move(items), "");
 }
 
@@ -243,7 +264,8 @@ Response export_geojson(Services& s, const Request& request) {
   const bool flat = query_flag(request, "flat");
   std::uint64_t number = 0;
   Ordered features = Ordered::array();
-  for (const auto& feature : wanted(s, request, number)) features.push_back(flat ? flat_feature_json(feature) : anchor_feature_json(feature));
+  for (const auto& feature : wanted(s, request, number))
+    features.push_back(flat ? flat_feature_json(feature) : anchor_feature_json(feature));
   Ordered body{{"type", "FeatureCollection"}, {"features", std::move(features)}};
   if (!flat) body["revision"] = number == 0 ? Ordered(nullptr) : Ordered(number);
   Response response = json_response(200, body, "application/geo+json");
@@ -262,13 +284,16 @@ Response export_csv(Services& s, const Request& request) {
 }  // namespace
 
 void add_anchor_routes(Router& router, Services& s) {
-  const auto on = [&s](auto function) { return [&s, function](const Request& request) { return function(s, request); }; };
+  const auto on = [&s](auto function) {
+    return [&s, function](const Request& request) { return function(s, request); };
+  };
   router.add({Method::get, "/api/v1/anchors", readers(), on(list)});
   router.add({Method::get, "/api/v1/anchors/{id}", readers(), [&s](const Request& request) {
                 check_query(request, {});
                 return answer(feature_of(s, path_anchor(s, request)));
               }});
-  router.add({Method::patch, "/api/v1/anchors/{id}", Access::any_of({Role::integrator}), on(patch), 1 << 20, false, true});
+  router.add({Method::patch, "/api/v1/anchors/{id}", Access::any_of({Role::integrator}), on(patch), 1 << 20,
+              false, true});
   router.add({Method::get, "/api/v1/anchors/{id}/estimates", readers(), on(estimates)});
   router.add({Method::get, "/api/v1/anchors/{id}/history", readers(), on(history)});
   router.add({Method::get, "/api/v1/exports/anchors.geojson", readers(), on(export_geojson)});

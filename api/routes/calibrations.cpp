@@ -15,8 +15,8 @@ using Ordered = nlohmann::ordered_json;
 
 namespace {
 
-/// Requests that hold a thread of the pool while they wait for a job. Beyond this the answer is 202 at once, so that
-/// patient clients cannot starve all others.
+/// Requests that hold a thread of the pool while they wait for a job. Beyond this the answer is 202 at once,
+/// so that patient clients cannot starve all others.
 constexpr int k_max_waiting = 2;
 std::atomic<int>& waiting() {
   static std::atomic<int> count{0};
@@ -60,7 +60,8 @@ Response job_answer(int status, const Job& job) {
 Response list(Services& s, const Request& request) {
   check_query(request, {"limit", "cursor", "fields"});
   const auto page = page_query(request);
-  auto rows = value_or_problem(s.deps.anchors.calibrations(page.limit + 1, cursor_id<CalibrationId>(page.cursor)));
+  auto rows =
+      value_or_problem(s.deps.anchors.calibrations(page.limit + 1, cursor_id<CalibrationId>(page.cursor)));
   const bool more = rows.size() > page.limit;
   if (more) rows.pop_back();
   Ordered items = Ordered::array();
@@ -80,11 +81,13 @@ Response create(Services& s, const Request& request) {
   auto wanted = read_calibration_request(json_body(request), errors);
   for (std::size_t i = 0; i < wanted.learn_from.size(); ++i) {
     const auto mission = s.missions.mission(wanted.learn_from[i]);
-    if (!mission && mission.error().code == Errc::not_found) errors.push_back({"/learn_from/" + std::to_string(i), "unknown_mission", "there is no such mission"});
+    if (!mission && mission.error().code == Errc::not_found)
+      errors.push_back({"/learn_from/" + std::to_string(i), "unknown_mission", "there is no such mission"});
   }
   for (std::size_t i = 0; i < wanted.missions.size(); ++i) {
     const auto mission = s.missions.mission(wanted.missions[i]);
-    if (!mission && mission.error().code == Errc::not_found) errors.push_back({"/missions/" + std::to_string(i), "unknown_mission", "there is no such mission"});
+    if (!mission && mission.error().code == Errc::not_found)
+      errors.push_back({"/missions/" + std::to_string(i), "unknown_mission", "there is no such mission"});
   }
   refuse_if_any(errors);
   Job job = value_or_problem(s.calibrations.submit(std::move(wanted)));
@@ -105,23 +108,29 @@ Response create(Services& s, const Request& request) {
     // The job's own problem is the answer: who waits wants to know why, not that there was a job.
     const auto inner = nlohmann::json::parse(job.problem_json, nullptr, false);
     const int status = inner.is_object() ? inner.value("status", 500) : 500;
-    std::string type = inner.is_object() ? inner.value("type", std::string("/problems/internal")) : "/problems/internal";
-    Response response = problem(status, type.substr(type.rfind('/') + 1), inner.is_object() ? inner.value("detail", std::string()) : "");
+    std::string type =
+        inner.is_object() ? inner.value("type", std::string("/problems/internal")) : "/problems/internal";
+    Response response = problem(status, type.substr(type.rfind('/') + 1),
+                                inner.is_object() ? inner.value("detail", std::string()) : "");
     response.header("Location", "/api/v1/jobs/" + to_string(job.id));
     return response;
   }
   return job_answer(202, job);
 }
 
-/// Which anchors a publication takes. Without a list: those whose verdict is ok. A list may name others only with a
-/// reason, which goes to the audit log (reliability.md section 4).
-std::vector<NetworkId> chosen(const Calibration& calibration, const nlohmann::json* list, const std::string& reason, std::vector<FieldError>& errors) {
+/// Which anchors a publication takes. Without a list: those whose verdict is ok. A list may name others only
+/// with a reason, which goes to the audit log (reliability.md section 4).
+std::vector<NetworkId> chosen(const Calibration& calibration, const nlohmann::json* list,
+                              const std::string& reason, std::vector<FieldError>& errors) {
   std::vector<NetworkId> out;
   if (list == nullptr) {
     for (const auto& estimate : calibration.anchors) {
       if (estimate.verdict == Verdict::ok && estimate.best) out.push_back(estimate.anchor);
     }
-    if (out.empty()) throw_problem(422, "state", "no anchor of this calibration has the verdict ok; name anchors and give a reason to publish them all the same");
+    if (out.empty())
+      throw_problem(422, "state",
+                    "no anchor of this calibration has the verdict ok; name anchors and give a reason to "
+                    "publish them all the same");
     return out;
   }
   if (!list->is_array() || list->empty() || list->size() > 10'000) {
@@ -141,9 +150,13 @@ std::vector<NetworkId> chosen(const Calibration& calibration, const nlohmann::js
     for (const auto& estimate : calibration.anchors) {
       if (estimate.anchor == id.value()) found = &estimate;
     }
-    if (found == nullptr || !found->best) errors.push_back({at, "no_position", "the calibration has no position of " + to_string(id.value())});
-    else if (found->verdict != Verdict::ok && reason.empty()) refused += (refused.empty() ? "" : "; ") + to_string(id.value()) + " is " + std::string(verdict_word(found->verdict)) + ": " + found->reason;
-    else out.push_back(id.value());
+    if (found == nullptr || !found->best)
+      errors.push_back({at, "no_position", "the calibration has no position of " + to_string(id.value())});
+    else if (found->verdict != Verdict::ok && reason.empty())
+      refused += (refused.empty() ? "" : "; ") + to_string(id.value()) + " is " +
+                 std::string(verdict_word(found->verdict)) + ": " + found->reason;
+    else
+      out.push_back(id.value());
   }
   refuse_if_any(errors);
   if (!refused.empty()) throw_problem(422, "state", refused + " (give a reason to publish all the same)");
@@ -162,17 +175,28 @@ Response publish(Services& s, const Request& request) {
   refuse_if_any(errors);
   const auto anchors = chosen(calibration, list, reason, errors);
   // Audited before it happens: a publication that nobody can be asked about must not exist.
-  s.audit(request, "calibration.publish " + to_string(calibration.id) + (reason.empty() ? "" : " reason: " + reason));
-  const auto revision = value_or_problem(s.deps.anchors.publish(calibration.id, anchors, request.principal.token_id, note, s.deps.clock.now()));
+  s.audit(request,
+          "calibration.publish " + to_string(calibration.id) + (reason.empty() ? "" : " reason: " + reason));
+  const auto revision = value_or_problem(
+      s.deps.anchors.publish(calibration.id, anchors, request.principal.token_id, note, s.deps.clock.now()));
   for (const auto& id : anchors) value_or_problem(s.deps.anchors.find_or_create(id, s.deps.clock.now()));
-  s.hub.publish(Topic::revisions, Ordered{{"revision", revision.number}, {"t_us", revision.published.us()}, {"calibration", to_string(calibration.id)}}.dump(), revision.published.us());
-  s.events.add("info", "revision.published", "revision " + std::to_string(revision.number) + " with " + std::to_string(anchors.size()) + " anchors published");
+  s.hub.publish(Topic::revisions,
+                Ordered{{"revision", revision.number},
+                        {"t_us", revision.published.us()},
+                        {"calibration", to_string(calibration.id)}}
+                    .dump(),
+                revision.published.us());
+  s.events.add("info", "revision.published",
+               "revision " + std::to_string(revision.number) + " with " + std::to_string(anchors.size()) +
+                   " anchors published");
   Ordered answer = revision_json(revision);
   Ordered taken = Ordered::array(), left = Ordered::array();
   for (const auto& id : anchors) taken.push_back(to_string(id));
   for (const auto& estimate : calibration.anchors) {
     if (std::find(anchors.begin(), anchors.end(), estimate.anchor) == anchors.end()) {
-      left.push_back({{"network_id", to_string(estimate.anchor)}, {"verdict", verdict_word(estimate.verdict)}, {"reason", estimate.reason}});
+      left.push_back({{"network_id", to_string(estimate.anchor)},
+                      {"verdict", verdict_word(estimate.verdict)},
+                      {"reason", estimate.reason}});
     }
   }
   answer["anchors"] = std::move(taken);
@@ -188,7 +212,9 @@ Response revisions(Services& s, const Request& request) {
   std::uint64_t before = 0;
   if (!page.cursor.empty()) {
     nlohmann::json value;
-    if (parse_json(page.cursor, value) || !value.is_number_unsigned()) throw_problem(422, "validation", "cursor is not one of ours", {{"/cursor", "bad_cursor", "is not one of ours"}});
+    if (parse_json(page.cursor, value) || !value.is_number_unsigned())
+      throw_problem(422, "validation", "cursor is not one of ours",
+                    {{"/cursor", "bad_cursor", "is not one of ours"}});
     before = value.get<std::uint64_t>();
   }
   auto rows = value_or_problem(s.deps.anchors.revisions(page.limit + 1, before));
@@ -213,13 +239,17 @@ Response jobs(Services& s, const Request& request) {
 }  // namespace
 
 void add_calibration_routes(Router& router, Services& s) {
-  const auto on = [&s](auto function) { return [&s, function](const Request& request) { return function(s, request); }; };
+  const auto on = [&s](auto function) {
+    return [&s, function](const Request& request) { return function(s, request); };
+  };
   const auto engineer = Access::any_of({Role::engineer});
   router.add({Method::get, "/api/v1/calibrations", readers(), on(list)});
   router.add({Method::post, "/api/v1/calibrations", engineer, on(create)});
   router.add({Method::get, "/api/v1/calibrations/{id}", readers(), [&s](const Request& request) {
                 check_query(request, {});
-                return json_response(200, whole(s, value_or_problem(s.deps.anchors.calibration(path_id<CalibrationId>(request)))));
+                return json_response(
+                    200,
+                    whole(s, value_or_problem(s.deps.anchors.calibration(path_id<CalibrationId>(request)))));
               }});
   router.add({Method::del, "/api/v1/calibrations/{id}", engineer, [&s](const Request& request) {
                 const auto id = path_id<CalibrationId>(request);
@@ -229,7 +259,8 @@ void add_calibration_routes(Router& router, Services& s) {
                 response.status = 204;
                 return response;
               }});
-  router.add({Method::post, "/api/v1/calibrations/{id}/publish", Access::any_of({Role::engineer, Role::op}), on(publish)});
+  router.add({Method::post, "/api/v1/calibrations/{id}/publish", Access::any_of({Role::engineer, Role::op}),
+              on(publish)});
   router.add({Method::get, "/api/v1/revisions", readers(), on(revisions)});
   router.add({Method::get, "/api/v1/jobs", readers(), on(jobs)});
   router.add({Method::get, "/api/v1/jobs/{id}", readers(), [&s](const Request& request) {
@@ -240,7 +271,8 @@ void add_calibration_routes(Router& router, Services& s) {
   router.add({Method::del, "/api/v1/jobs/{id}", engineer, [&s](const Request& request) {
                 const auto id = path_id<JobId>(request);
                 const auto canceled = s.calibrations.cancel(id);
-                if (!canceled && canceled.error().code == Errc::conflict) throw_problem(422, "state", canceled.error().message);
+                if (!canceled && canceled.error().code == Errc::conflict)
+                  throw_problem(422, "state", canceled.error().message);
                 const Job job = value_or_problem(canceled);
                 s.audit(request, "job.cancel " + to_string(id));
                 return json_response(job.state == JobState::canceled ? 200 : 202, job_json(job));

@@ -26,7 +26,9 @@ MeasurementStore::Filter filter_of(const Request& request) {
   filter.since = query_time(request, "since");
   filter.until = query_time(request, "until");
   const auto sort = request.query_value("sort").value_or("t_us");
-  if (sort != "t_us" && sort != "-t_us") throw_problem(422, "validation", "sort is t_us or -t_us", {{"/sort", "unknown_value", "must be t_us or -t_us"}});
+  if (sort != "t_us" && sort != "-t_us")
+    throw_problem(422, "validation", "sort is t_us or -t_us",
+                  {{"/sort", "unknown_value", "must be t_us or -t_us"}});
   filter.descending = sort == "-t_us";
   return filter;
 }
@@ -36,28 +38,42 @@ std::string csv_number(const auto& value) {
   return nlohmann::json(*value).dump();
 }
 
-constexpr const char* k_range_header = "id,t_us,mission,kind,tag,antenna,anchor,seq,distance_m,rss_dbm,fp_dbm,rx_dbm,std_noise,heading_deg,truth_distance_m,truth_los\r\n";
+constexpr const char* k_range_header =
+    "id,t_us,mission,kind,tag,antenna,anchor,seq,distance_m,rss_dbm,fp_dbm,rx_dbm,std_noise,heading_deg,"
+    "truth_distance_m,truth_los\r\n";
 std::string range_csv(const Range& r, std::int64_t id) {
   const RangeTruth truth = r.truth.value_or(RangeTruth{});
-  return std::to_string(id) + ',' + std::to_string(r.time.us()) + ',' + to_string(r.mission) + ',' + (r.kind == RangeKind::tag_anchor ? "tag_anchor" : "anchor_anchor") + ',' + to_string(r.tag) +
-         ',' + std::to_string(r.antenna) + ',' + to_string(r.anchor) + ',' + csv_number(r.seq) + ',' + nlohmann::json(r.distance_m).dump() + ',' + csv_number(r.rss_dbm) + ',' + csv_number(r.fp_dbm) +
-         ',' + csv_number(r.rx_dbm) + ',' + csv_number(r.std_noise) + ',' + csv_number(r.heading_deg) + ',' + csv_number(truth.distance_m) + ',' + csv_number(truth.los) + "\r\n";
+  return std::to_string(id) + ',' + std::to_string(r.time.us()) + ',' + to_string(r.mission) + ',' +
+         (r.kind == RangeKind::tag_anchor ? "tag_anchor" : "anchor_anchor") + ',' + to_string(r.tag) + ',' +
+         std::to_string(r.antenna) + ',' + to_string(r.anchor) + ',' + csv_number(r.seq) + ',' +
+         nlohmann::json(r.distance_m).dump() + ',' + csv_number(r.rss_dbm) + ',' + csv_number(r.fp_dbm) +
+         ',' + csv_number(r.rx_dbm) + ',' + csv_number(r.std_noise) + ',' + csv_number(r.heading_deg) + ',' +
+         csv_number(truth.distance_m) + ',' + csv_number(truth.los) + "\r\n";
 }
 
-constexpr const char* k_fix_header = "id,t_us,mission,seq,lon,lat,h_m,x_m,y_m,z_m,fix,sigma_e_m,sigma_n_m,sigma_u_m,correction_age_s,satellites\r\n";
+constexpr const char* k_fix_header =
+    "id,t_us,mission,seq,lon,lat,h_m,x_m,y_m,z_m,fix,sigma_e_m,sigma_n_m,sigma_u_m,correction_age_s,"
+    "satellites\r\n";
 std::string fix_csv(const Fix& f, std::int64_t id) {
   const bool globe = f.frame == TrackFrame::wgs84;
   const auto number = [](double v) { return nlohmann::json(v).dump(); };
-  std::string row = std::to_string(id) + ',' + std::to_string(f.time.us()) + ',' + to_string(f.mission) + ',' + csv_number(f.seq);
-  row += ',' + (globe ? number(f.position.lon_deg) + ',' + number(f.position.lat_deg) + ',' + number(f.position.height_m) + ",,," : ",,," + number(f.local_m.x()) + ',' + number(f.local_m.y()) + ',' + number(f.local_m.z()));
+  std::string row = std::to_string(id) + ',' + std::to_string(f.time.us()) + ',' + to_string(f.mission) +
+                    ',' + csv_number(f.seq);
+  row += ',' +
+         (globe ? number(f.position.lon_deg) + ',' + number(f.position.lat_deg) + ',' +
+                      number(f.position.height_m) + ",,,"
+                : ",,," + number(f.local_m.x()) + ',' + number(f.local_m.y()) + ',' + number(f.local_m.z()));
   row += ',' + std::string(fix_word(f.fix));
-  for (int i = 0; i < 3; ++i) row += ',' + (f.covariance_m2 ? number(std::sqrt(std::max(0.0, (*f.covariance_m2)(i, i)))) : std::string());
+  for (int i = 0; i < 3; ++i)
+    row +=
+        ',' + (f.covariance_m2 ? number(std::sqrt(std::max(0.0, (*f.covariance_m2)(i, i)))) : std::string());
   return row + ',' + csv_number(f.correction_age_s) + ',' + csv_number(f.satellites) + "\r\n";
 }
 
 /// Streams every page that matches (or `limit` rows where asked for); memory is one page.
 template <class Fetch, class Write>
-Response stream(const Request& request, MeasurementStore::Filter filter, std::string type, std::string header, Fetch fetch, Write write) {
+Response stream(const Request& request, MeasurementStore::Filter filter, std::string type, std::string header,
+                Fetch fetch, Write write) {
   struct Progress {
     MeasurementStore::Filter filter;
     std::string header;
@@ -65,7 +81,8 @@ Response stream(const Request& request, MeasurementStore::Filter filter, std::st
     bool done{false};
   };
   const bool limited = request.query_value("limit").has_value();
-  auto state = std::make_shared<Progress>(Progress{std::move(filter), std::move(header), limited ? filter.limit : SIZE_MAX});
+  auto state = std::make_shared<Progress>(
+      Progress{std::move(filter), std::move(header), limited ? filter.limit : SIZE_MAX});
   Response response;
   response.header("Content-Type", std::move(type));
   response.body_stream = [state, fetch, write]() -> std::string {
@@ -75,7 +92,8 @@ Response stream(const Request& request, MeasurementStore::Filter filter, std::st
     const auto page = fetch(state->filter);
     // The status is sent already; an early end is all that can still be told.
     if (!page) throw BodyError(503, page.error().message);
-    for (std::size_t i = 0; i < page.value().rows.size(); ++i) out += write(page.value().rows[i], page.value().ids[i]);
+    for (std::size_t i = 0; i < page.value().rows.size(); ++i)
+      out += write(page.value().rows[i], page.value().ids[i]);
     state->left -= page.value().rows.size();
     state->filter.after = page.value().next;
     state->done = page.value().next.empty() || state->left == 0;
@@ -89,7 +107,9 @@ Response rows(const Request& request, Fetch fetch, Json json, Csv csv, const cha
   auto filter = filter_of(request);
   const std::string format = negotiate(request, {"json", "ndjson", "csv"});
   if (format == "csv") return stream(request, filter, "text/csv; charset=utf-8", header, fetch, csv);
-  if (format == "ndjson") return stream(request, filter, "application/x-ndjson", "", fetch, [json](const auto& row, std::int64_t id) { return json(row, id).dump() + '\n'; });
+  if (format == "ndjson")
+    return stream(request, filter, "application/x-ndjson", "", fetch,
+                  [json](const auto& row, std::int64_t id) { return json(row, id).dump() + '\n'; });
   const auto page = value_or_problem(fetch(filter));
   Ordered items = Ordered::array();
   for (std::size_t i = 0; i < page.rows.size(); ++i) items.push_back(json(page.rows[i], page.ids[i]));
@@ -97,25 +117,32 @@ Response rows(const Request& request, Fetch fetch, Json json, Csv csv, const cha
 }
 
 Response list_ranges(Services& s, const Request& request) {
-  check_query(request, {"limit", "cursor", "fields", "format", "mission", "anchor", "tag", "since", "until", "sort", "cir"});
+  check_query(request, {"limit", "cursor", "fields", "format", "mission", "anchor", "tag", "since", "until",
+                        "sort", "cir"});
   const bool with_cir = query_flag(request, "cir");
-  return rows(request, [&store = s.deps.measurements, with_cir](MeasurementStore::Filter filter) {
-      filter.with_cir = with_cir;
-      return store.ranges(filter);
-    }, [](const Range& row, std::int64_t id) { return range_json(row, id); }, range_csv, k_range_header);
+  return rows(
+      request,
+      [&store = s.deps.measurements, with_cir](MeasurementStore::Filter filter) {
+        filter.with_cir = with_cir;
+        return store.ranges(filter);
+      },
+      [](const Range& row, std::int64_t id) { return range_json(row, id); }, range_csv, k_range_header);
 }
 
 Response list_fixes(Services& s, const Request& request) {
   check_query(request, {"limit", "cursor", "fields", "format", "mission", "since", "until", "sort"});
-  return rows(request, [&store = s.deps.measurements](const MeasurementStore::Filter& filter) { return store.fixes(filter); },
-              [](const Fix& row, std::int64_t id) { return fix_json(row, id); }, fix_csv, k_fix_header);
+  return rows(
+      request,
+      [&store = s.deps.measurements](const MeasurementStore::Filter& filter) { return store.fixes(filter); },
+      [](const Fix& row, std::int64_t id) { return fix_json(row, id); }, fix_csv, k_fix_header);
 }
 
 Range one_range(Services& s, const Request& request) {
   const auto& text = request.params.at("id");
   std::int64_t id = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id);
-  if (error != std::errc{} || end != text.data() + text.size()) throw_problem(404, "not-found", "there is no such range");
+  if (error != std::errc{} || end != text.data() + text.size())
+    throw_problem(404, "not-found", "there is no such range");
   return value_or_problem(s.deps.measurements.range(id));
 }
 
@@ -134,8 +161,12 @@ Response devices(Services& s, const Request& request) {
   check_query(request, {"mission", "fields"});
   Ordered items = Ordered::array();
   for (const auto& device : value_or_problem(s.deps.measurements.devices(query_mission(request)))) {
-    items.push_back({{"network_id", to_string(device.network_id)}, {"kind", device.kind == DeviceSeen::Kind::tag ? "tag" : "anchor"}, {"mission", to_string(device.mission)},
-                     {"first_seen_us", device.first_seen.us()}, {"last_seen_us", device.last_seen.us()}, {"n_ranges", device.n_ranges}});
+    items.push_back({{"network_id", to_string(device.network_id)},
+                     {"kind", device.kind == DeviceSeen::Kind::tag ? "tag" : "anchor"},
+                     {"mission", to_string(device.mission)},
+                     {"first_seen_us", device.first_seen.us()},
+                     {"last_seen_us", device.last_seen.us()},
+                     {"n_ranges", device.n_ranges}});
   }
   return list_response(request, std::move(items), "");
 }
@@ -143,9 +174,12 @@ Response devices(Services& s, const Request& request) {
 }  // namespace
 
 void add_measurement_routes(Router& router, Services& s) {
-  const auto on = [&s](auto function) { return [&s, function](const Request& request) { return function(s, request); }; };
+  const auto on = [&s](auto function) {
+    return [&s, function](const Request& request) { return function(s, request); };
+  };
   const auto ingest = [&router](const char* path, Handler handler) {
-    router.add({Method::post, path, Access::any_of({Role::gateway}), std::move(handler), IngestService::k_max_body_bytes, true});
+    router.add({Method::post, path, Access::any_of({Role::gateway}), std::move(handler),
+                IngestService::k_max_body_bytes, true});
   };
   ingest("/api/v1/ranges", [&s](const Request& request) { return s.ingest.ranges(request); });
   ingest("/api/v1/fixes", [&s](const Request& request) { return s.ingest.fixes(request); });

@@ -14,7 +14,8 @@ using Ordered = nlohmann::ordered_json;
 namespace {
 
 Ordered with_counts(Services& s, const Mission& mission) {
-  return mission_json(mission, value_or_problem(s.deps.measurements.count_ranges(mission.id)), value_or_problem(s.deps.measurements.count_fixes(mission.id)));
+  return mission_json(mission, value_or_problem(s.deps.measurements.count_ranges(mission.id)),
+                      value_or_problem(s.deps.measurements.count_fixes(mission.id)));
 }
 
 Response list(Services& s, const Request& request) {
@@ -31,7 +32,8 @@ Response list(Services& s, const Request& request) {
 Response create(Services& s, const Request& request) {
   std::vector<FieldError> errors;
   Mission mission = read_mission(json_body(request), errors);
-  if (mission.site && !s.deps.anchors.site(*mission.site)) errors.push_back({"/site", "unknown_site", "there is no such site"});
+  if (mission.site && !s.deps.anchors.site(*mission.site))
+    errors.push_back({"/site", "unknown_site", "there is no such site"});
   refuse_if_any(errors);
   mission.created = s.deps.clock.now();
   mission.id.uuid = make_uuid_v7(mission.created);
@@ -52,7 +54,8 @@ Response act(Services& s, const Request& request) {
   fields.finish();
   refuse_if_any(errors);
   const auto finished = s.missions.finish(id);
-  if (!finished && finished.error().code == Errc::conflict) throw_problem(422, "state", finished.error().message);
+  if (!finished && finished.error().code == Errc::conflict)
+    throw_problem(422, "state", finished.error().message);
   auto mission = value_or_problem(finished);
   s.audit(request, "mission.finish " + to_string(id));
   return json_response(200, with_counts(s, mission));
@@ -66,7 +69,8 @@ Response events(Services& s, const Request& request) {
     value_or_problem(s.missions.mission(*mission));
   }
   Ordered items = Ordered::array();
-  for (const auto& event : s.events.newest(page_query(request).limit, mission, query_time(request, "since"))) items.push_back(Ordered::parse(event_json(event)));
+  for (const auto& event : s.events.newest(page_query(request).limit, mission, query_time(request, "since")))
+    items.push_back(Ordered::parse(event_json(event)));
   return list_response(request, std::move(items), "");
 }
 
@@ -85,15 +89,22 @@ Response track(Services& s, const Request& request) {
   const auto rows = value_or_problem(s.deps.measurements.fixes(filter));
   Ordered line = Ordered::array(), local = Ordered::array(), t_us = Ordered::array(), fix = Ordered::array();
   for (const auto& row : rows.rows) {
-    if (row.frame == TrackFrame::wgs84) line.push_back({row.position.lon_deg, row.position.lat_deg, row.position.height_m});
-    else local.push_back({row.local_m.x(), row.local_m.y(), row.local_m.z()});
+    if (row.frame == TrackFrame::wgs84)
+      line.push_back({row.position.lon_deg, row.position.lat_deg, row.position.height_m});
+    else
+      local.push_back({row.local_m.x(), row.local_m.y(), row.local_m.z()});
     t_us.push_back(row.time.us());
     fix.push_back(fix_word(row.fix));
   }
   const bool globe = mission.frame == TrackFrame::wgs84;
   Ordered body{{"type", "Feature"}, {"id", to_string(id)}};
-  body["geometry"] = globe && line.size() > 1 ? Ordered{{"type", "LineString"}, {"coordinates", std::move(line)}} : Ordered(nullptr);
-  body["properties"] = {{"mission", to_string(id)}, {"t_us", std::move(t_us)}, {"fix", std::move(fix)}, {"local_m", globe ? Ordered(nullptr) : std::move(local)}};
+  body["geometry"] = globe && line.size() > 1
+                         ? Ordered{{"type", "LineString"}, {"coordinates", std::move(line)}}
+                         : Ordered(nullptr);
+  body["properties"] = {{"mission", to_string(id)},
+                        {"t_us", std::move(t_us)},
+                        {"fix", std::move(fix)},
+                        {"local_m", globe ? Ordered(nullptr) : std::move(local)}};
   body["next_cursor"] = rows.next.empty() ? Ordered(nullptr) : Ordered(rows.next);
   Response response = json_response(200, body, "application/geo+json");
   if (!rows.next.empty()) response.header("Link", next_link(request, rows.next));
@@ -103,12 +114,15 @@ Response track(Services& s, const Request& request) {
 }  // namespace
 
 void add_mission_routes(Router& router, Services& s) {
-  const auto on = [&s](auto function) { return [&s, function](const Request& request) { return function(s, request); }; };
+  const auto on = [&s](auto function) {
+    return [&s, function](const Request& request) { return function(s, request); };
+  };
   router.add({Method::get, "/api/v1/missions", readers(), on(list)});
   router.add({Method::post, "/api/v1/missions", Access::any_of({Role::op}), on(create)});
   router.add({Method::get, "/api/v1/missions/{id}", readers(), [&s](const Request& request) {
                 check_query(request, {});
-                return json_response(200, with_counts(s, value_or_problem(s.missions.mission(path_id<MissionId>(request)))));
+                return json_response(
+                    200, with_counts(s, value_or_problem(s.missions.mission(path_id<MissionId>(request)))));
               }});
   router.add({Method::del, "/api/v1/missions/{id}", Access::any_of({Role::op}), [&s](const Request& request) {
                 const auto id = path_id<MissionId>(request);

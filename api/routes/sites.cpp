@@ -70,7 +70,9 @@ Response remove(Services& s, const Request& request) {
 }  // namespace
 
 void add_site_routes(Router& router, Services& s) {
-  const auto on = [&s](auto function) { return [&s, function](const Request& request) { return function(s, request); }; };
+  const auto on = [&s](auto function) {
+    return [&s, function](const Request& request) { return function(s, request); };
+  };
   const auto admin = Access::any_of({Role::admin});
   router.add({Method::get, "/api/v1/sites", readers(), on(list)});
   router.add({Method::post, "/api/v1/sites", admin, on(create)});

@@ -15,15 +15,19 @@ std::string percent_encoded(std::string_view text) {
   std::string out;
   for (const char c : text) {
     const auto byte = static_cast<unsigned char>(c);
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.' || c == '~';
-    if (plain) out += c;
-    else out += '%', out += k_hex[byte >> 4], out += k_hex[byte & 15];
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                       c == '-' || c == '_' || c == '.' || c == '~';
+    if (plain)
+      out += c;
+    else
+      out += '%', out += k_hex[byte >> 4], out += k_hex[byte & 15];
   }
   return out;
 }
 
 [[noreturn]] void bad_query(const char* name, std::string detail) {
-  throw_problem(422, "validation", std::string(name) + " " + detail, {{std::string("/") + name, "bad_value", detail}});
+  throw_problem(422, "validation", std::string(name) + " " + detail,
+                {{std::string("/") + name, "bad_value", detail}});
 }
 
 }  // namespace
@@ -41,7 +45,8 @@ Response json_response(int status, const Ordered& body, std::string_view content
 void check_query(const Request& request, std::initializer_list<std::string_view> allowed) {
   std::vector<FieldError> errors;
   for (const auto& [key, value] : request.query) {
-    if (std::find(allowed.begin(), allowed.end(), key) == allowed.end()) errors.push_back({"/" + key.substr(0, 60), "unknown_field", "no such query parameter"});
+    if (std::find(allowed.begin(), allowed.end(), key) == allowed.end())
+      errors.push_back({"/" + key.substr(0, 60), "unknown_field", "no such query parameter"});
   }
   if (!errors.empty()) throw_problem(422, "validation", "unknown query parameter", errors);
 }
@@ -51,7 +56,9 @@ PageQuery page_query(const Request& request, std::size_t max_limit) {
   page.cursor = request.query_value("cursor").value_or("");
   if (const auto text = request.query_value("limit")) {
     const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), page.limit);
-    if (error != std::errc{} || end != text->data() + text->size() || page.limit < 1 || page.limit > max_limit) bad_query("limit", "must be 1.." + std::to_string(max_limit));
+    if (error != std::errc{} || end != text->data() + text->size() || page.limit < 1 ||
+        page.limit > max_limit)
+      bad_query("limit", "must be 1.." + std::to_string(max_limit));
   }
   return page;
 }
@@ -95,7 +102,8 @@ std::optional<UtcTime> query_time(const Request& request, const char* name) {
   if (!text) return std::nullopt;
   std::int64_t us = 0;
   const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), us);
-  if (error == std::errc{} && end == text->data() + text->size() && us >= 0 && us <= 4'102'444'800'000'000) return UtcTime::from_us(us);
+  if (error == std::errc{} && end == text->data() + text->size() && us >= 0 && us <= 4'102'444'800'000'000)
+    return UtcTime::from_us(us);
   const auto time = parse_rfc3339(*text);
   if (!time) bad_query(name, "must be RFC 3339 with Z, or microseconds");
   return time.value();
@@ -127,13 +135,16 @@ bool query_flag(const Request& request, const char* name) {
 void require_match(const Request& request, const std::string& etag) {
   const auto wanted = request.header("if-match");
   if (wanted == "*" || wanted.find(etag) != std::string_view::npos) return;
-  Response response = problem(412, "precondition-failed", "it changed since it was read; its ETag is now " + etag);
+  Response response =
+      problem(412, "precondition-failed", "it changed since it was read; its ETag is now " + etag);
   response.header("ETag", etag);
   throw ProblemException{std::move(response)};
 }
 
 std::string negotiate(const Request& request, std::initializer_list<std::string_view> offers) {
-  const auto offered = [&](std::string_view word) { return std::find(offers.begin(), offers.end(), word) != offers.end(); };
+  const auto offered = [&](std::string_view word) {
+    return std::find(offers.begin(), offers.end(), word) != offers.end();
+  };
   if (const auto format = request.query_value("format")) {
     if (!offered(*format)) throw_problem(406, "not-acceptable", "this address has no format " + *format);
     return *format;
@@ -141,11 +152,17 @@ std::string negotiate(const Request& request, std::initializer_list<std::string_
   const std::string accept(request.header("accept"));
   if (accept.empty() || accept.find("*/*") != std::string::npos) return std::string(*offers.begin());
   static constexpr std::pair<std::string_view, std::string_view> k_types[]{
-      {"application/geo+json", "geojson"}, {"application/x-ndjson", "ndjson"}, {"text/csv", "csv"}, {"application/json", "json"}, {"application/octet-stream", "binary"}};
+      {"application/geo+json", "geojson"},
+      {"application/x-ndjson", "ndjson"},
+      {"text/csv", "csv"},
+      {"application/json", "json"},
+      {"application/octet-stream", "binary"}};
   for (const auto& [type, word] : k_types) {
     if (accept.find(type) != std::string::npos && offered(word)) return std::string(word);
   }
-  if (accept.find("application/json") != std::string::npos || accept.find("application/*") != std::string::npos) return std::string(*offers.begin());
+  if (accept.find("application/json") != std::string::npos ||
+      accept.find("application/*") != std::string::npos)
+    return std::string(*offers.begin());
   throw_problem(406, "not-acceptable", "none of the formats in Accept exists here");
 }
 

@@ -15,10 +15,12 @@
 
 namespace anchord::api {
 
-/// Everybody who may read (V of api.md section 6; integrator, engineer and operator include it, gateway does not).
+/// Everybody who may read (V of api.md section 6; integrator, engineer and operator include it, gateway does
+/// not).
 Access readers();
 
-Response json_response(int status, const nlohmann::ordered_json& body, std::string_view content_type = "application/json");
+Response json_response(int status, const nlohmann::ordered_json& body,
+                       std::string_view content_type = "application/json");
 /// 422 for a query parameter that the route does not have: a typo is how a filter gets lost.
 void check_query(const Request& request, std::initializer_list<std::string_view> allowed);
 
@@ -41,7 +43,9 @@ template <class I>
 std::optional<I> cursor_id(const std::string& cursor) {
   if (cursor.empty()) return std::nullopt;
   const auto id = parse_uuid(cursor);
-  if (!id) throw_problem(422, "validation", "cursor is not one of ours", {{"/cursor", "bad_cursor", "is not one of ours"}});
+  if (!id)
+    throw_problem(422, "validation", "cursor is not one of ours",
+                  {{"/cursor", "bad_cursor", "is not one of ours"}});
   return I{id.value()};
 }
 /// RFC 3339 or integer microseconds.
@@ -52,8 +56,8 @@ bool query_flag(const Request& request, const char* name);
 
 /// 412, with the present ETag, unless If-Match names it.
 void require_match(const Request& request, const std::string& etag);
-/// "json", "geojson", "csv", "ndjson": of ?format= or else Accept; the first offer where neither decides. 406 when
-/// nothing fits.
+/// "json", "geojson", "csv", "ndjson": of ?format= or else Accept; the first offer where neither decides. 406
+/// when nothing fits.
 std::string negotiate(const Request& request, std::initializer_list<std::string_view> offers);
 /// Seconds of `Prefer: wait=n`, 0 without, at most 600.
 int prefer_wait_s(const Request& request);

@@ -14,19 +14,35 @@ namespace {
 
 Response ready(Services& s, const Request&) {
   const StorageStatus storage = s.storage();
-  Ordered body{{"status", storage.writable ? "ready" : "degraded"}, {"checks", {{"db", storage.writable ? "ok" : storage.reason}, {"disk", storage.writable ? "ok" : storage.reason}, {"migrations", "ok"}}}};
+  Ordered body{{"status", storage.writable ? "ready" : "degraded"},
+               {"checks",
+                {{"db", storage.writable ? "ok" : storage.reason},
+                 {"disk", storage.writable ? "ok" : storage.reason},
+                 {"migrations", "ok"}}}};
   return json_response(storage.writable ? 200 : 503, body);
 }
 
 Response version(Services& s, const Request&) {
   const auto& build = s.deps.build;
-  return json_response(200, {{"version", build.version}, {"git", build.git}, {"schema", build.schema}, {"api", "v1"}, {"build", build.build}, {"compiler", build.compiler}});
+  return json_response(200, {{"version", build.version},
+                             {"git", build.git},
+                             {"schema", build.schema},
+                             {"api", "v1"},
+                             {"build", build.build},
+                             {"compiler", build.compiler}});
 }
 
 Response system(Services& s, const Request&) {
   const StorageStatus storage = s.storage();
-  return json_response(200, {{"t_us", s.deps.clock.now().us()}, {"recording", s.missions.recording()}, {"queue_depth", storage.queue_depth + s.missions.queued()}, {"db_bytes", storage.db_bytes},
-                             {"disk_free_bytes", storage.disk_free_bytes}, {"ws_clients", s.hub.clients()}, {"synchronous", storage.synchronous}, {"writable", storage.writable}, {"reason", storage.reason}});
+  return json_response(200, {{"t_us", s.deps.clock.now().us()},
+                             {"recording", s.missions.recording()},
+                             {"queue_depth", storage.queue_depth + s.missions.queued()},
+                             {"db_bytes", storage.db_bytes},
+                             {"disk_free_bytes", storage.disk_free_bytes},
+                             {"ws_clients", s.hub.clients()},
+                             {"synchronous", storage.synchronous},
+                             {"writable", storage.writable},
+                             {"reason", storage.reason}});
 }
 
 Response metrics(Services& s, const Request&) {
@@ -34,7 +50,8 @@ Response metrics(Services& s, const Request&) {
   auto& live = s.hub.counters();
   const StorageStatus storage = s.storage();
   std::string text;
-  const auto add = [&text](const std::string& name, const char* type, std::uint64_t value, const std::string& labels = {}) {
+  const auto add = [&text](const std::string& name, const char* type, std::uint64_t value,
+                           const std::string& labels = {}) {
     if (text.find("# TYPE " + name + ' ') == std::string::npos) text += "# TYPE " + name + ' ' + type + '\n';
     text += name + labels + ' ' + std::to_string(value) + '\n';
   };
@@ -66,14 +83,21 @@ Response audit_log(Services& s, const Request& request) {
   check_query(request, {"limit"});
   Ordered items = Ordered::array();
   for (const auto& entry : value_or_problem(s.deps.access_store.audit(page_query(request).limit))) {
-    items.push_back({{"at", to_rfc3339(entry.time)}, {"who", entry.who}, {"what", entry.what}, {"from", entry.from}, {"result", entry.result}});
+    items.push_back({{"at", to_rfc3339(entry.time)},
+                     {"who", entry.who},
+                     {"what", entry.what},
+                     {"from", entry.from},
+                     {"result", entry.result}});
   }
   return list_response(request, std::move(items), "");
 }
 
 Response explain(const Request& request) {
   for (const auto& known : problem_types()) {
-    if (known.type == request.params.at("type")) return json_response(200, {{"type", "/problems/" + std::string(known.type)}, {"title", known.title}, {"explanation", known.explanation}});
+    if (known.type == request.params.at("type"))
+      return json_response(200, {{"type", "/problems/" + std::string(known.type)},
+                                 {"title", known.title},
+                                 {"explanation", known.explanation}});
   }
   throw_problem(404, "not-found", "there is no such problem type");
 }
@@ -81,18 +105,25 @@ Response explain(const Request& request) {
 }  // namespace
 
 void add_system_routes(Router& router, Services& s) {
-  const auto on = [&s](auto function) { return [&s, function](const Request& request) { return function(s, request); }; };
-  router.add({Method::get, "/healthz", Access::open(), [](const Request&) { return json_response(200, {{"status", "ok"}}); }});
+  const auto on = [&s](auto function) {
+    return [&s, function](const Request& request) { return function(s, request); };
+  };
+  router.add({Method::get, "/healthz", Access::open(), [](const Request&) {
+                return json_response(200, {{"status", "ok"}});
+              }});
   router.add({Method::get, "/readyz", Access::open(), on(ready)});
   router.add({Method::get, "/version", Access::open(), on(version)});
   router.add({Method::get, "/metrics", readers(), on(metrics)});
   router.add({Method::get, "/problems/{type}", Access::open(), explain});
   router.add({Method::get, "/api/v1/system", readers(), on(system)});
   router.add({Method::get, "/api/v1/audit", Access::any_of({Role::admin}), on(audit_log)});
-  router.add({Method::get, "/api/v1/openapi.json", Access::open(), [](const Request&) { return document(openapi_json()); }});
-  router.add({Method::get, "/api/v1/asyncapi.json", Access::open(), [](const Request&) { return document(asyncapi_json()); }});
+  router.add({Method::get, "/api/v1/openapi.json", Access::open(),
+              [](const Request&) { return document(openapi_json()); }});
+  router.add({Method::get, "/api/v1/asyncapi.json", Access::open(),
+              [](const Request&) { return document(asyncapi_json()); }});
   router.add({Method::get, "/api/v1/ws", readers(), [](const Request&) -> Response {
-                Response response = problem(426, "method", "this is a WebSocket of subprotocol anchord.v1: ask for an upgrade");
+                Response response = problem(
+                    426, "method", "this is a WebSocket of subprotocol anchord.v1: ask for an upgrade");
                 response.header("Upgrade", "websocket");
                 return response;
               }});

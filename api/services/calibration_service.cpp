@@ -26,14 +26,18 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
   const auto read_ids = [&](const char* key, std::vector<MissionId>& ids) {
     const Json* list = fields.child(key);
     if (list == nullptr) return;
-    if (!list->is_array() || list->empty() || list->size() > 100) return fields.error(key, "wrong_type", "must be an array of 1 to 100 mission ids");
+    if (!list->is_array() || list->empty() || list->size() > 100)
+      return fields.error(key, "wrong_type", "must be an array of 1 to 100 mission ids");
     for (std::size_t i = 0; i < list->size(); ++i) {
       const auto& item = (*list)[i];
       const auto id = parse_uuid(item.is_string() ? item.get_ref<const std::string&>() : "");
       const std::string at = std::string("/") + key + '/' + std::to_string(i);
-      if (!id) errors.push_back({at, "bad_id", id.error().message});
-      else if (!seen.insert(to_string(id.value())).second) errors.push_back({at, "duplicate", "the mission stands twice"});
-      else ids.push_back(MissionId{id.value()});
+      if (!id)
+        errors.push_back({at, "bad_id", id.error().message});
+      else if (!seen.insert(to_string(id.value())).second)
+        errors.push_back({at, "duplicate", "the mission stands twice"});
+      else
+        ids.push_back(MissionId{id.value()});
     }
   };
   if (!fields.has("missions")) fields.error("missions", "required", "missions is missing");
@@ -41,20 +45,27 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
   read_ids("learn_from", out.learn_from);
   auto& options = out.options;
   if (const auto dims = fields.integer("dims", 2, 3)) options.dims = *dims == 2 ? Dims::two : Dims::three;
-  if (const auto solver = fields.word("solver", {"gauss_newton", "levenberg_marquardt", "dogleg"})) options.method = static_cast<anchord::Method>(*solver);
-  if (const auto weights = fields.word("weights", {"inverse_variance", "dissertation"})) options.weights = static_cast<Weights>(*weights);
+  if (const auto solver = fields.word("solver", {"gauss_newton", "levenberg_marquardt", "dogleg"}))
+    options.method = static_cast<anchord::Method>(*solver);
+  if (const auto weights = fields.word("weights", {"inverse_variance", "dissertation"}))
+    options.weights = static_cast<Weights>(*weights);
   if (const Json* loss = fields.child("loss")) {
     Fields inner(*loss, "/loss", errors);
-    if (const auto type = inner.word("type", {"none", "huber", "cauchy", "tukey"}, true)) options.loss = static_cast<Loss>(*type);
-    // The robust scale comes from the residuals themselves; `scale` stretches it, 1.5 being the neutral value of api.md.
+    if (const auto type = inner.word("type", {"none", "huber", "cauchy", "tukey"}, true))
+      options.loss = static_cast<Loss>(*type);
+    // The robust scale comes from the residuals themselves; `scale` stretches it, 1.5 being the neutral value
+    // of api.md.
     if (const auto scale = inner.number("scale", 0.1, 10)) options.mad_factor *= *scale / 1.5;
     inner.finish();
   }
   if (const auto height = fields.number("anchor_height_m", -1000, 9000)) options.anchor_height_m = *height;
   if (const auto gap = fields.number("max_gap_s", 0.01, 10)) options.max_gap_s = *gap;
-  if (const auto fix = fields.word("min_fix", {"none", "single", "dgps", "float", "fixed"})) options.min_fix = static_cast<FixClass>(*fix);
-  for (const char* later : {"frame", "use_anchor_anchor", "models", "sigma_m", "initial", "compare_uncorrected"}) {
-    if (fields.child(later) != nullptr) fields.error(later, "unsupported", std::string(later) + " cannot be set in this version");
+  if (const auto fix = fields.word("min_fix", {"none", "single", "dgps", "float", "fixed"}))
+    options.min_fix = static_cast<FixClass>(*fix);
+  for (const char* later :
+       {"frame", "use_anchor_anchor", "models", "sigma_m", "initial", "compare_uncorrected"}) {
+    if (fields.child(later) != nullptr)
+      fields.error(later, "unsupported", std::string(later) + " cannot be set in this version");
   }
   fields.finish();
   out.settings_json = body.is_object() ? [&] {
@@ -65,7 +76,8 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
   return out;
 }
 
-Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission, const std::function<bool()>& canceled) {
+Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission,
+                               const std::function<bool()>& canceled) {
   FlightData flight;
   flight.mission = mission;
   MeasurementStore::Filter filter;
@@ -125,7 +137,8 @@ CalibrationService::CalibrationService(Deps deps) : state_(std::make_shared<Stat
 CalibrationService::~CalibrationService() { stop(); }
 
 void CalibrationService::start() {
-  const auto problem = problem_json(503, "internal", "interrupted: the server was restarted while the job ran; send it again");
+  const auto problem =
+      problem_json(503, "internal", "interrupted: the server was restarted while the job ran; send it again");
   (void)state_->deps.jobs.fail_unfinished(state_->deps.clock.now(), problem).has_value();
   state_->thread = std::thread([state = state_] { state->loop(); });
 }
@@ -152,7 +165,8 @@ Result<Job> CalibrationService::submit(CalibrationRequest request) {
   {
     const std::scoped_lock lock(state_->mutex);
     if (state_->stopping) return make_error(Errc::queue_full, "the server is stopping");
-    if (state_->queue.size() >= k_max_queued) return make_error(Errc::queue_full, "16 jobs are waiting already");
+    if (state_->queue.size() >= k_max_queued)
+      return make_error(Errc::queue_full, "16 jobs are waiting already");
   }
   BOOST_OUTCOME_TRY(state_->deps.jobs.insert(job));
   state_->deps.hub.publish(Topic::jobs, job_json(job).dump(), job.created.us(), to_string(job.id));
@@ -172,13 +186,15 @@ Result<Job> CalibrationService::wait(const JobId& id, std::chrono::milliseconds 
     const bool ended = job.state != JobState::queued && job.state != JobState::running;
     if (ended || state_->stopping || std::chrono::steady_clock::now() >= deadline) return job;
     // The change may be told between the read and the wait: look again after a while in any case.
-    state_->changed.wait_until(lock, std::min(deadline, std::chrono::steady_clock::now() + std::chrono::milliseconds(100)));
+    state_->changed.wait_until(
+        lock, std::min(deadline, std::chrono::steady_clock::now() + std::chrono::milliseconds(100)));
   }
 }
 
 Result<Job> CalibrationService::cancel(const JobId& id) {
   BOOST_OUTCOME_TRY(auto job, state_->deps.jobs.job(id));
-  if (job.state != JobState::queued && job.state != JobState::running) return make_error(Errc::conflict, "the job has ended");
+  if (job.state != JobState::queued && job.state != JobState::running)
+    return make_error(Errc::conflict, "the job has ended");
   {
     const std::scoped_lock lock(state_->mutex);
     state_->canceled.insert(id);
@@ -244,16 +260,20 @@ Result<Calibration> CalibrationService::State::solve(const Task& task, Job& job)
     BOOST_OUTCOME_TRY(auto mission, deps.missions.mission(id));
     BOOST_OUTCOME_TRY(auto flight, load_flight(deps.measurements, mission, canceled_now));
     flights.push_back(std::move(flight));
-    progress(job, 0.3 * static_cast<double>(flights.size()) / static_cast<double>(all.size()), "load", flights.back().mission.name);
+    progress(job, 0.3 * static_cast<double>(flights.size()) / static_cast<double>(all.size()), "load",
+             flights.back().mission.name);
   }
   FlightOptions options = task.request.options;
   options.canceled = canceled_now;
   Calibration out;
   out.frame = flights.front().mission.frame;
   for (const auto& flight : flights) {
-    if (flight.mission.frame != out.frame) return make_error(Errc::invalid_argument, "missions on the globe and in a local frame cannot be solved together");
+    if (flight.mission.frame != out.frame)
+      return make_error(Errc::invalid_argument,
+                        "missions on the globe and in a local frame cannot be solved together");
     if (out.frame != TrackFrame::wgs84 || options.origin) continue;
-    for (const auto& fix : flight.fixes) {  // one frame for all flights, so that their answers can be compared
+    for (const auto& fix :
+         flight.fixes) {  // one frame for all flights, so that their answers can be compared
       if (fix.fix >= options.min_fix && fix.frame == TrackFrame::wgs84) {
         options.origin = fix.position;
         break;

@@ -21,20 +21,22 @@ class Hub;
 /// A batch solve as asked for.
 struct CalibrationRequest {
   std::vector<MissionId> missions;
-  std::vector<MissionId> learn_from;  ///< other flights of the same kit: they tell its bias and lag, not positions
+  std::vector<MissionId>
+      learn_from;  ///< other flights of the same kit: they tell its bias and lag, not positions
   FlightOptions options;
   std::string settings_json;  ///< as accepted
 };
 
-/// Reads the body of POST /calibrations; what is wrong is appended to `errors`. Settings this build does not have
-/// (models, frame, use_anchor_anchor, ...) are refused as `unsupported`, never ignored.
+/// Reads the body of POST /calibrations; what is wrong is appended to `errors`. Settings this build does not
+/// have (models, frame, use_anchor_anchor, ...) are refused as `unsupported`, never ignored.
 CalibrationRequest read_calibration_request(const nlohmann::json& body, std::vector<FieldError>& errors);
 
 /// All rows of a mission as the solver takes them.
-Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission, const std::function<bool()>& canceled);
+Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission,
+                               const std::function<bool()>& canceled);
 
-/// Batch solves as jobs: one at a time on one background thread, at most 16 waiting; state in the JobStore, progress
-/// on topic `jobs`. Thread-safe.
+/// Batch solves as jobs: one at a time on one background thread, at most 16 waiting; state in the JobStore,
+/// progress on topic `jobs`. Thread-safe.
 class CalibrationService {
  public:
   static constexpr std::size_t k_max_queued = 16;

@@ -6,8 +6,9 @@
 namespace anchord::api {
 
 std::string event_json(const LiveEvent& event) {
-  return R"({"id":")" + to_string(event.id) + R"(","t_us":)" + std::to_string(event.time.us()) + R"(,"level":)" + json_text(event.level) +
-         R"(,"code":)" + json_text(event.code) + R"(,"text":)" + json_text(event.text) + R"(,"mission":)" +
+  return R"({"id":")" + to_string(event.id) + R"(","t_us":)" + std::to_string(event.time.us()) +
+         R"(,"level":)" + json_text(event.level) + R"(,"code":)" + json_text(event.code) + R"(,"text":)" +
+         json_text(event.text) + R"(,"mission":)" +
          (event.mission ? json_text(to_string(*event.mission)) : "null") + '}';
 }
 
@@ -23,7 +24,8 @@ void EventLog::add(std::string level, std::string code, std::string text, std::o
   hub_.publish(Topic::events, std::move(json), now.us());
 }
 
-std::vector<LiveEvent> EventLog::newest(std::size_t limit, const std::optional<MissionId>& mission, std::optional<UtcTime> since) const {
+std::vector<LiveEvent> EventLog::newest(std::size_t limit, const std::optional<MissionId>& mission,
+                                        std::optional<UtcTime> since) const {
   const std::scoped_lock lock(mutex_);
   std::vector<LiveEvent> out;
   for (auto it = events_.rbegin(); it != events_.rend() && out.size() < limit; ++it) {

@@ -29,7 +29,8 @@ class EventLog {
   EventLog(Hub& hub, const Clock& clock) : hub_(hub), clock_(clock) {}
   void add(std::string level, std::string code, std::string text, std::optional<MissionId> mission = {});
   /// Newest first.
-  std::vector<LiveEvent> newest(std::size_t limit, const std::optional<MissionId>& mission, std::optional<UtcTime> since) const;
+  std::vector<LiveEvent> newest(std::size_t limit, const std::optional<MissionId>& mission,
+                                std::optional<UtcTime> since) const;
 
  private:
   Hub& hub_;

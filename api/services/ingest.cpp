@@ -20,7 +20,6 @@ namespace {
 
 constexpr std::size_t k_batch_rows = 1000, k_max_errors = 100;
 
-
 std::optional<bool> flag(const Request& request, const char* name) {
   const auto value = request.query_value(name);
   if (!value) return false;
@@ -72,13 +71,21 @@ class IngestRun {
     type = type.substr(0, type.find(';'));
     while (!type.empty() && type.back() == ' ') type.pop_back();
     const auto encoding = request_.header("content-encoding");
-    if (!encoding.empty() && encoding != "identity") throw_problem(415, "media-type", "compressed bodies are not accepted");
+    if (!encoding.empty() && encoding != "identity")
+      throw_problem(415, "media-type", "compressed bodies are not accepted");
     StringReader whole(request_.body);
-    LineReader lines(request_.body_stream != nullptr ? *request_.body_stream : static_cast<BodyReader&>(whole), IngestService::k_max_body_bytes);
-    if (type == "application/x-ndjson" || type == "application/ndjson" || type == "application/jsonl") ndjson(lines);
-    else if (type == "text/csv") csv(lines);
-    else if (type == "application/json") json(lines);
-    else throw_problem(415, "media-type", "send Content-Type application/json, application/x-ndjson or text/csv");
+    LineReader lines(
+        request_.body_stream != nullptr ? *request_.body_stream : static_cast<BodyReader&>(whole),
+        IngestService::k_max_body_bytes);
+    if (type == "application/x-ndjson" || type == "application/ndjson" || type == "application/jsonl")
+      ndjson(lines);
+    else if (type == "text/csv")
+      csv(lines);
+    else if (type == "application/json")
+      json(lines);
+    else
+      throw_problem(415, "media-type",
+                    "send Content-Type application/json, application/x-ndjson or text/csv");
     flush();
     return answer();
   }
@@ -90,24 +97,30 @@ class IngestRun {
     if (!atomic) errors.push_back({"/atomic", "wrong_type", "must be true or false"});
     if (!dry_run) errors.push_back({"/dry_run", "wrong_type", "must be true or false"});
     for (const auto& [key, value] : request_.query) {
-      if (key != "atomic" && key != "dry_run" && key != "mission") errors.push_back({"/" + key.substr(0, 60), "unknown_field", "no such query parameter"});
+      if (key != "atomic" && key != "dry_run" && key != "mission")
+        errors.push_back({"/" + key.substr(0, 60), "unknown_field", "no such query parameter"});
     }
     if (const auto text = request_.query_value("mission")) {
       const auto id = parse_uuid(*text);
-      if (id) mission_ = MissionId{id.value()};
-      else errors.push_back({"/mission", "bad_id", id.error().message});
+      if (id)
+        mission_ = MissionId{id.value()};
+      else
+        errors.push_back({"/mission", "bad_id", id.error().message});
     }
     refuse_if_any(errors);
     atomic_ = *atomic;
     dry_run_ = *dry_run;
-    if (mission_ && !known(*mission_)) throw_problem(404, "not-found", "there is no mission " + to_string(*mission_));
+    if (mission_ && !known(*mission_))
+      throw_problem(404, "not-found", "there is no mission " + to_string(*mission_));
   }
 
   void ndjson(LineReader& lines) {
     std::string line;
     for (std::uint64_t n = 1; lines.next(line); ++n) {
-      if (lines.too_long()) reject(n, {{"", "too_long", "the line is longer than 1 MiB"}});
-      else if (line.find_first_not_of(" \t") != std::string::npos) take_text(n, line);
+      if (lines.too_long())
+        reject(n, {{"", "too_long", "the line is longer than 1 MiB"}});
+      else if (line.find_first_not_of(" \t") != std::string::npos)
+        take_text(n, line);
     }
   }
 
@@ -121,10 +134,14 @@ class IngestRun {
       if (line.empty()) continue;
       Json value;
       std::vector<FieldError> wrong;
-      if (lines.too_long()) wrong.push_back({"", "too_long", "the line is longer than 1 MiB"});
-      else rows.row(line, value, wrong);
-      if (wrong.empty()) take(n, value);
-      else reject(n, wrong);
+      if (lines.too_long())
+        wrong.push_back({"", "too_long", "the line is longer than 1 MiB"});
+      else
+        rows.row(line, value, wrong);
+      if (wrong.empty())
+        take(n, value);
+      else
+        reject(n, wrong);
     }
   }
 
@@ -148,7 +165,8 @@ class IngestRun {
     for (std::size_t i = 0; i < elements->size(); ++i) {
       Json value;
       const auto error = parse_json((*elements)[i], value);
-      if (error && error->code == "malformed") throw_problem(400, "malformed", "element " + std::to_string(i + 1) + " is not JSON", {*error});
+      if (error && error->code == "malformed")
+        throw_problem(400, "malformed", "element " + std::to_string(i + 1) + " is not JSON", {*error});
     }
     for (std::size_t i = 0; i < elements->size(); ++i) take_text(i + 1, (*elements)[i]);
   }
@@ -156,7 +174,8 @@ class IngestRun {
   void take_text(std::uint64_t line, std::string_view text) {
     Json value;
     if (const auto error = parse_json(text, value)) {
-      if (single_ && (error->code == "malformed" || error->code == "bad_utf8")) throw_problem(400, "malformed", error->detail, {*error});
+      if (single_ && (error->code == "malformed" || error->code == "bad_utf8"))
+        throw_problem(400, "malformed", error->detail, {*error});
       reject(line, {*error});
       return;
     }
@@ -185,7 +204,8 @@ class IngestRun {
     const auto it = seen_.find(id);
     if (it != seen_.end()) return it->second ? &*it->second : nullptr;
     auto mission = service_.missions_.mission(id);
-    if (!mission && mission.error().code != Errc::not_found) throw ProblemException{problem_of(mission.error())};
+    if (!mission && mission.error().code != Errc::not_found)
+      throw ProblemException{problem_of(mission.error())};
     std::optional<Mission> found;
     if (mission) found = std::move(mission).value();
     const auto& kept = seen_.emplace(id, std::move(found)).first->second;
@@ -199,7 +219,9 @@ class IngestRun {
       errors.push_back({"/mission", "unknown_mission", "there is no mission " + to_string(id)});
     } else if (fix != nullptr && fix->frame != mission->frame) {
       errors.push_back({mission->frame == TrackFrame::wgs84 ? "/local_m" : "/lon", "wrong_frame",
-                        mission->frame == TrackFrame::wgs84 ? "the mission is on the globe: send lon, lat, h_m" : "the mission has a local frame: send local_m"});
+                        mission->frame == TrackFrame::wgs84
+                            ? "the mission is on the globe: send lon, lat, h_m"
+                            : "the mission has a local frame: send local_m"});
     }
   }
 
@@ -231,13 +253,17 @@ class IngestRun {
     std::vector<Row> live;
     live.reserve(rows_.size());
     for (const auto& row : rows_) {
-      if constexpr (std::is_same_v<Row, Range>) live.push_back(without_cir(row));
-      else live.push_back(row);
+      if constexpr (std::is_same_v<Row, Range>)
+        live.push_back(without_cir(row));
+      else
+        live.push_back(row);
     }
     auto stored = append(service_.store_, std::move(rows_), atomic_);
     rows_.clear();
     if (!stored) {
-      std::string before = accepted_ + duplicates_ == 0 ? "" : "; " + std::to_string(accepted_ + duplicates_) + " rows before are stored, send all again";
+      std::string before = accepted_ + duplicates_ == 0 ? ""
+                                                        : "; " + std::to_string(accepted_ + duplicates_) +
+                                                              " rows before are stored, send all again";
       throw ProblemException{problem_of(make_error(stored.error().code, stored.error().message + before))};
     }
     settle(stored.value(), std::move(live));
@@ -247,7 +273,8 @@ class IngestRun {
   void settle(const std::vector<RowOutcome>& outcomes, std::vector<Row> live) {
     std::vector<Row> fresh;
     bool sunk = false;
-    for (const auto outcome : outcomes) sunk = sunk || outcome == RowOutcome::conflict || outcome == RowOutcome::unknown_mission;
+    for (const auto outcome : outcomes)
+      sunk = sunk || outcome == RowOutcome::conflict || outcome == RowOutcome::unknown_mission;
     sunk = sunk && atomic_;
     for (std::size_t i = 0; i < outcomes.size(); ++i) {
       switch (outcomes[i]) {
@@ -263,7 +290,8 @@ class IngestRun {
           break;
         case RowOutcome::conflict:
           conflict_ = true;
-          reject(lines_[i], {{"", "conflict", "the same identity is stored with other content; the stored row stays"}});
+          reject(lines_[i],
+                 {{"", "conflict", "the same identity is stored with other content; the stored row stays"}});
           break;
         case RowOutcome::unknown_mission:
           reject(lines_[i], {{"/mission", "unknown_mission", "the mission was removed"}});
@@ -294,13 +322,16 @@ class IngestRun {
       }
       const bool only_conflict = conflict_ && errors_.front().second.code == "conflict";
       return problem(only_conflict ? 409 : 422, only_conflict ? "conflict" : "validation",
-                     single_ ? std::to_string(errors.size()) + (errors.size() == 1 ? " field is wrong" : " fields are wrong")
-                             : std::to_string(rejected_) + " rows are wrong; nothing was stored", errors);
+                     single_ ? std::to_string(errors.size()) +
+                                   (errors.size() == 1 ? " field is wrong" : " fields are wrong")
+                             : std::to_string(rejected_) + " rows are wrong; nothing was stored",
+                     errors);
     }
     Ordered body{{"accepted", accepted_}, {"duplicates", duplicates_}, {"rejected", rejected_}};
     Ordered list = Ordered::array();
     for (const auto& [line, error] : errors_) {
-      list.push_back({{"line", line}, {"code", error.code}, {"pointer", error.pointer}, {"detail", error.detail}});
+      list.push_back(
+          {{"line", line}, {"code", error.code}, {"pointer", error.pointer}, {"detail", error.detail}});
     }
     body["errors"] = std::move(list);
     body["errors_truncated"] = truncated_;

@@ -26,9 +26,9 @@ UtcTime time_of(const Row& row) {
 
 struct Radio {
   bool tag{false};
-  UtcTime last_seen{};      ///< measured
-  UtcTime last_arrival{};   ///< wall clock: a replayed flight is live too
-  double interval_s{0};     ///< smoothed
+  UtcTime last_seen{};     ///< measured
+  UtcTime last_arrival{};  ///< wall clock: a replayed flight is live too
+  double interval_s{0};    ///< smoothed
 };
 
 }  // namespace
@@ -108,14 +108,16 @@ Result<void> MissionService::create(const Mission& mission) {
   state_->deps.events.add("info", "mission.started", mission.name + " started", mission.id);
   if (const auto flight = state_->find(mission.id)) {
     const std::scoped_lock lock(flight->work_mutex);
-    state_->deps.hub.publish(Topic::mission_state, mission_state_json(mission, flight->state), mission.created.us(), to_string(mission.id));
+    state_->deps.hub.publish(Topic::mission_state, mission_state_json(mission, flight->state),
+                             mission.created.us(), to_string(mission.id));
   }
   return boost::outcome_v2::success();
 }
 
 Result<Mission> MissionService::finish(const MissionId& id) {
   BOOST_OUTCOME_TRY(auto current, state_->deps.missions.mission(id));
-  if (current.state == MissionState::finished) return make_error(Errc::conflict, current.name + " is finished already");
+  if (current.state == MissionState::finished)
+    return make_error(Errc::conflict, current.name + " is finished already");
   current.state = MissionState::finished;
   current.finished = state_->deps.clock.now();
   BOOST_OUTCOME_TRY(state_->deps.missions.update(current));
@@ -139,7 +141,8 @@ Result<void> MissionService::remove(const MissionId& id) {
   const std::scoped_lock lock(state_->mutex);
   state_->cache.erase(id);
   state_->flights.erase(id);
-  for (const Topic topic : {Topic::mission_state, Topic::drone_pose, Topic::rtk_status}) state_->deps.hub.forget(topic, to_string(id));
+  for (const Topic topic : {Topic::mission_state, Topic::drone_pose, Topic::rtk_status})
+    state_->deps.hub.forget(topic, to_string(id));
   return boost::outcome_v2::success();
 }
 
@@ -251,8 +254,10 @@ void MissionService::State::schedule(const std::shared_ptr<Flight>& flight) {
     self->idle.notify_all();
     if (again) self->schedule(flight);
   };
-  if (deps.post) deps.post(std::move(task));
-  else task();
+  if (deps.post)
+    deps.post(std::move(task));
+  else
+    task();
 }
 
 void MissionService::State::work(Flight& flight) {
@@ -270,7 +275,8 @@ void MissionService::State::work(Flight& flight) {
   }
   queued -= rows.size();
   if (dropped > 0) {
-    deps.events.add("warning", "live.behind", std::to_string(dropped) + " measurements left the live path; they are stored", flight.id);
+    deps.events.add("warning", "live.behind",
+                    std::to_string(dropped) + " measurements left the live path; they are stored", flight.id);
   }
   const std::scoped_lock lock(flight.work_mutex);
   std::size_t since_announced = 0;
@@ -299,7 +305,8 @@ void MissionService::State::step(Flight& flight, const Row& row, bool quiet) {
     }
     flight.range_times_us.push_back(time.us());
     if (flight.range_times_us.size() > 100) flight.range_times_us.pop_front();
-    const double span_s = static_cast<double>(flight.range_times_us.back() - flight.range_times_us.front()) * 1e-6;
+    const double span_s =
+        static_cast<double>(flight.range_times_us.back() - flight.range_times_us.front()) * 1e-6;
     state.range_rate_hz = span_s > 0 ? static_cast<double>(flight.range_times_us.size() - 1) / span_s : 0;
     flight.live.add(*range);
     return;
@@ -323,13 +330,16 @@ void MissionService::State::step(Flight& flight, const Row& row, bool quiet) {
 void MissionService::State::publish_pose(Flight& flight) {
   const auto pose = flight.live.pose();
   if (!pose) return;
-  deps.hub.publish(Topic::drone_pose, live_pose_json(flight.id, flight.frame, *pose), pose->time.us(), to_string(flight.id));
+  deps.hub.publish(Topic::drone_pose, live_pose_json(flight.id, flight.frame, *pose), pose->time.us(),
+                   to_string(flight.id));
 }
 
 void MissionService::State::announce(Flight& flight, bool quiet) {
   const MissionId id = flight.id;
   for (const auto& result : flight.live.take_ranges()) {
-    if (!quiet) deps.hub.collect(Topic::ranges, live_range_json(id, result), result.range.time.us(), result.range.anchor);
+    if (!quiet)
+      deps.hub.collect(Topic::ranges, live_range_json(id, result), result.range.time.us(),
+                       result.range.anchor);
   }
   for (const auto& estimate : flight.live.take_estimates()) {
     const std::string status(live_status(estimate));
@@ -337,26 +347,32 @@ void MissionService::State::announce(Flight& flight, bool quiet) {
     if (known.empty()) {
       // From its first range on an anchor has an identity that facility data can hang on.
       const auto anchor = deps.anchors.find_or_create(estimate.anchor, deps.clock.now());
-      if (!quiet && anchor) deps.events.add("info", "anchor.found", "anchor " + to_string(estimate.anchor) + " found", id);
+      if (!quiet && anchor)
+        deps.events.add("info", "anchor.found", "anchor " + to_string(estimate.anchor) + " found", id);
     }
     if (status != known && !quiet && (status == "converged" || status == "ambiguous")) {
       deps.events.add(status == "converged" ? "info" : "warning", "anchor." + status,
-                      "anchor " + to_string(estimate.anchor) + (status == "converged" ? " converged" : " is ambiguous: " + estimate.reason), id);
+                      "anchor " + to_string(estimate.anchor) +
+                          (status == "converged" ? " converged" : " is ambiguous: " + estimate.reason),
+                      id);
     }
     known = status;
-    deps.hub.publish(Topic::anchors_estimates, live_estimate_json(id, estimate), estimate.time.us(), to_string(id) + to_string(estimate.anchor), estimate.anchor);
+    deps.hub.publish(Topic::anchors_estimates, live_estimate_json(id, estimate), estimate.time.us(),
+                     to_string(id) + to_string(estimate.anchor), estimate.anchor);
   }
   flight.state.origin = flight.live.origin();
   flight.state.anchors_found = flight.statuses.size();
-  flight.state.anchors_converged = static_cast<std::size_t>(
-      std::count_if(flight.statuses.begin(), flight.statuses.end(), [](const auto& entry) { return entry.second == "converged"; }));
+  flight.state.anchors_converged =
+      static_cast<std::size_t>(std::count_if(flight.statuses.begin(), flight.statuses.end(),
+                                             [](const auto& entry) { return entry.second == "converged"; }));
 }
 
 void MissionService::State::heard(NetworkId id, bool tag, UtcTime time) {
   const std::scoped_lock lock(radios_mutex);
   auto& radio = radios[id];
   const double step_s = seconds_between(radio.last_seen, time);
-  if (radio.last_seen.ns != 0 && step_s > 0 && step_s < 10) radio.interval_s = radio.interval_s == 0 ? step_s : 0.9 * radio.interval_s + 0.1 * step_s;
+  if (radio.last_seen.ns != 0 && step_s > 0 && step_s < 10)
+    radio.interval_s = radio.interval_s == 0 ? step_s : 0.9 * radio.interval_s + 0.1 * step_s;
   radio.tag = tag;
   radio.last_seen = time;
   radio.last_arrival = deps.clock.now();
@@ -372,9 +388,11 @@ void MissionService::State::publish_devices() {
       const double silent_s = seconds_between(radio.last_arrival, now);
       const char* state = silent_s < 2 ? "live" : silent_s < 5 ? "late" : "lost";
       char rate[32];
-      std::snprintf(rate, sizeof rate, "%.1f", radio.interval_s > 0 && silent_s < 5 ? 1 / radio.interval_s : 0.0);
-      json += (json.size() > 1 ? "," : "") + std::string(R"({"network_id":")") + to_string(id) + R"(","kind":")" + (radio.tag ? "tag" : "anchor") +
-              R"(","state":")" + state + R"(","last_seen_us":)" + std::to_string(radio.last_seen.us()) + R"(,"rate_hz":)" + rate + '}';
+      std::snprintf(rate, sizeof rate, "%.1f",
+                    radio.interval_s > 0 && silent_s < 5 ? 1 / radio.interval_s : 0.0);
+      json += (json.size() > 1 ? "," : "") + std::string(R"({"network_id":")") + to_string(id) +
+              R"(","kind":")" + (radio.tag ? "tag" : "anchor") + R"(","state":")" + state +
+              R"(","last_seen_us":)" + std::to_string(radio.last_seen.us()) + R"(,"rate_hz":)" + rate + '}';
     }
   }
   deps.hub.publish(Topic::devices, json + ']', now.us());
@@ -424,7 +442,8 @@ void MissionService::tick() {
       const std::scoped_lock queue(flight->queue_mutex);
       mission = flight->mission;
     }
-    state_->deps.hub.publish(Topic::mission_state, mission_state_json(mission, flight->state), flight->state.time.us(), to_string(mission.id));
+    state_->deps.hub.publish(Topic::mission_state, mission_state_json(mission, flight->state),
+                             flight->state.time.us(), to_string(mission.id));
   }
   if (++state_->ticks % 2 == 0) state_->publish_devices();
 }
@@ -436,7 +455,8 @@ bool MissionService::recording() const {
   const std::scoped_lock lock(state_->mutex);
   return std::any_of(state_->flights.begin(), state_->flights.end(), [&](const auto& entry) {
     const std::scoped_lock queue(entry.second->queue_mutex);
-    return entry.second->mission.state == MissionState::recording && seconds_between(entry.second->last_arrival, now) < 5;
+    return entry.second->mission.state == MissionState::recording &&
+           seconds_between(entry.second->last_arrival, now) < 5;
   });
 }
 

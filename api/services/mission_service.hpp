@@ -28,11 +28,12 @@ namespace anchord::api {
 class EventLog;
 class Hub;
 
-/// Flights: their records and, for each, the one LiveFlight that follows the accepted measurements and feeds the hub.
+/// Flights: their records and, for each, the one LiveFlight that follows the accepted measurements and feeds
+/// the hub.
 ///
-/// Thread-safe. Rows are queued per mission and worked off in order by one task at a time (a strand), so that ingest
-/// never waits for a solve. A queue holds at most 100 000 rows; then the oldest leave the live path, which is an event
-/// (the store has them).
+/// Thread-safe. Rows are queued per mission and worked off in order by one task at a time (a strand), so that
+/// ingest never waits for a solve. A queue holds at most 100 000 rows; then the oldest leave the live path,
+/// which is an event (the store has them).
 class MissionService {
  public:
   static constexpr std::size_t k_max_queued_rows = 100'000;
@@ -54,8 +55,8 @@ class MissionService {
   Result<Mission> finish(const MissionId& id);
   Result<void> remove(const MissionId& id);
 
-  /// Before rows of this mission are stored: brings its live flight up to what the store holds already, so that a
-  /// restart in flight goes on where it was. Cheap once done.
+  /// Before rows of this mission are stored: brings its live flight up to what the store holds already, so
+  /// that a restart in flight goes on where it was. Cheap once done.
   void prepare(const MissionId& id);
   /// Rows of one kind that were committed, in order of arrival.
   void accepted(std::vector<Range> ranges);

@@ -27,9 +27,12 @@ bool LineReader::next(std::string& line) {
     any = true;
     const char* begin = buffer_.data() + at_;
     const void* found = std::memchr(begin, '\n', end_ - at_);
-    const std::size_t n = found != nullptr ? static_cast<std::size_t>(static_cast<const char*>(found) - begin) : end_ - at_;
-    if (line.size() + n > k_max_row_bytes) too_long_ = true;
-    else if (!too_long_) line.append(begin, n);
+    const std::size_t n =
+        found != nullptr ? static_cast<std::size_t>(static_cast<const char*>(found) - begin) : end_ - at_;
+    if (line.size() + n > k_max_row_bytes)
+      too_long_ = true;
+    else if (!too_long_)
+      line.append(begin, n);
     at_ += n + (found != nullptr ? 1 : 0);
     if (found != nullptr) break;
   }
@@ -50,14 +53,22 @@ std::optional<std::vector<std::string_view>> split_json_array(std::string_view t
   for (std::size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
     if (in_string) {
-      if (c == '\\') ++i;
-      else if (c == '"') in_string = false;
+      if (c == '\\')
+        ++i;
+      else if (c == '"')
+        in_string = false;
       continue;
     }
     switch (c) {
-      case '"': in_string = true; break;
-      case '[': case '{': ++depth; break;
-      case ']': case '}':
+      case '"':
+        in_string = true;
+        break;
+      case '[':
+      case '{':
+        ++depth;
+        break;
+      case ']':
+      case '}':
         if (--depth < 0) return std::nullopt;
         break;
       case ',':
@@ -66,14 +77,17 @@ std::optional<std::vector<std::string_view>> split_json_array(std::string_view t
           begin = i + 1;
         }
         break;
-      default: break;
+      default:
+        break;
     }
   }
   if (in_string || depth != 0) return std::nullopt;
   const auto last = text.substr(begin);
   const bool blank = std::all_of(last.begin(), last.end(), space);
-  if (!blank) out.push_back(last);
-  else if (!out.empty()) return std::nullopt;
+  if (!blank)
+    out.push_back(last);
+  else if (!out.empty())
+    return std::nullopt;
   return out;
 }
 
@@ -84,16 +98,20 @@ const std::map<std::string, std::string, std::less<>>& columns(RowKind kind) {
       {"t_us", "/t_us"}, {"received_us", "/received_us"}, {"seq", "/seq"}, {"mission", "/mission"}};
   static const auto k_range = [] {
     auto map = k_common;
-    for (const char* name : {"kind", "tag", "antenna", "anchor", "distance_m", "rss_dbm", "fp_dbm", "rx_dbm", "std_noise", "heading_deg"}) {
+    for (const char* name : {"kind", "tag", "antenna", "anchor", "distance_m", "rss_dbm", "fp_dbm", "rx_dbm",
+                             "std_noise", "heading_deg"}) {
       map.emplace(name, std::string("/") + name);
     }
-    for (const char* name : {"n", "dt_ps", "first_path_idx", "rxpacc", "b64"}) map.emplace(std::string("cir_") + name, std::string("/cir/") + name);
-    for (const char* name : {"distance_m", "los", "campaign"}) map.emplace(std::string("truth_") + name, std::string("/truth/") + name);
+    for (const char* name : {"n", "dt_ps", "first_path_idx", "rxpacc", "b64"})
+      map.emplace(std::string("cir_") + name, std::string("/cir/") + name);
+    for (const char* name : {"distance_m", "los", "campaign"})
+      map.emplace(std::string("truth_") + name, std::string("/truth/") + name);
     return map;
   }();
   static const auto k_fix = [] {
     auto map = k_common;
-    for (const char* name : {"lon", "lat", "h_m", "fix", "heading_deg", "correction_age_s", "satellites"}) map.emplace(name, std::string("/") + name);
+    for (const char* name : {"lon", "lat", "h_m", "fix", "heading_deg", "correction_age_s", "satellites"})
+      map.emplace(name, std::string("/") + name);
     const auto array = [&map](std::string to, std::vector<const char*> names) {
       for (std::size_t i = 0; i < names.size(); ++i) map.emplace(names[i], to + "/" + std::to_string(i));
     };
@@ -113,9 +131,12 @@ std::optional<std::vector<std::string>> cells(std::string_view line) {
   for (std::size_t i = 0; i < line.size(); ++i) {
     const char c = line[i];
     if (quoted) {
-      if (c != '"') out.back() += c;
-      else if (i + 1 < line.size() && line[i + 1] == '"') out.back() += '"', ++i;
-      else quoted = false;
+      if (c != '"')
+        out.back() += c;
+      else if (i + 1 < line.size() && line[i + 1] == '"')
+        out.back() += '"', ++i;
+      else
+        quoted = false;
     } else if (c == '"') {
       if (!out.back().empty()) return std::nullopt;
       quoted = true;
@@ -134,8 +155,8 @@ std::optional<std::vector<std::string>> cells(std::string_view line) {
 }
 
 bool is_text(std::string_view pointer) {
-  return pointer == "/mission" || pointer == "/tag" || pointer == "/anchor" || pointer == "/fix" || pointer == "/kind" ||
-         pointer == "/cir/b64" || pointer == "/truth/campaign";
+  return pointer == "/mission" || pointer == "/tag" || pointer == "/anchor" || pointer == "/fix" ||
+         pointer == "/kind" || pointer == "/cir/b64" || pointer == "/truth/campaign";
 }
 
 }  // namespace
@@ -150,7 +171,8 @@ CsvRows::CsvRows(RowKind kind, std::string_view header, std::vector<FieldError>&
   for (const auto& name : *names) {
     const auto it = columns(kind).find(name);
     if (it == columns(kind).end()) {
-      errors.push_back({"/" + name.substr(0, 60), "unknown_field", "there is no column '" + name.substr(0, 60) + "' here"});
+      errors.push_back({"/" + name.substr(0, 60), "unknown_field",
+                        "there is no column '" + name.substr(0, 60) + "' here"});
     } else if (std::find(pointers_.begin(), pointers_.end(), it->second) != pointers_.end()) {
       errors.push_back({"/" + name, "duplicate_key", "column '" + name + "' stands twice"});
     } else {
@@ -167,7 +189,10 @@ void CsvRows::row(std::string_view line, nlohmann::json& out, std::vector<FieldE
   }
   const auto values = cells(line);
   if (!values || values->size() != pointers_.size()) {
-    errors.push_back({"", "malformed", values ? "has " + std::to_string(values->size()) + " cells, the header " + std::to_string(pointers_.size()) : "a quote is left open"});
+    errors.push_back({"", "malformed",
+                      values ? "has " + std::to_string(values->size()) + " cells, the header " +
+                                   std::to_string(pointers_.size())
+                             : "a quote is left open"});
     return;
   }
   for (std::size_t i = 0; i < pointers_.size(); ++i) {

@@ -33,14 +33,16 @@ class LineReader {
   bool too_long_{false};
 };
 
-/// Cuts the elements out of a JSON array without parsing them. Null when the text is not one well-bracketed array.
+/// Cuts the elements out of a JSON array without parsing them. Null when the text is not one well-bracketed
+/// array.
 std::optional<std::vector<std::string_view>> split_json_array(std::string_view text);
 
 enum class RowKind : std::uint8_t { range, fix };
 
 /// Turns CSV rows (RFC 4180 quoting, one record a line, header first) into the JSON objects of the same rows.
-/// Columns carry the names of the JSON fields; arrays and objects are flat: sigma_e_m sigma_n_m sigma_u_m, x_m y_m z_m,
-/// qx qy qz qw, truth_distance_m, truth_los, cir_n cir_b64 and so on. An empty cell is an absent field.
+/// Columns carry the names of the JSON fields; arrays and objects are flat: sigma_e_m sigma_n_m sigma_u_m,
+/// x_m y_m z_m, qx qy qz qw, truth_distance_m, truth_los, cir_n cir_b64 and so on. An empty cell is an absent
+/// field.
 class CsvRows {
  public:
   /// errors: what is wrong with the header (unknown or repeated columns).

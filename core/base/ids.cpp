@@ -73,10 +73,12 @@ Result<NetworkId> parse_network_id(std::string_view text) {
   const bool hex = text.size() > 2 && text[0] == '0' && (text[1] == 'x' || text[1] == 'X');
   const std::string_view digits = hex ? text.substr(2) : text;
   NetworkId id;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), id.value, hex ? 16 : 10);
+  const auto [end, error] =
+      std::from_chars(digits.data(), digits.data() + digits.size(), id.value, hex ? 16 : 10);
   if (digits.empty() || error != std::errc{} || end != digits.data() + digits.size()) {
-    return make_error(Errc::invalid_argument, "'" + std::string(text.substr(0, 40)) +
-                                                  "' is not a network id like 0x6a2f or 27183 (32 bits at most)");
+    return make_error(Errc::invalid_argument,
+                      "'" + std::string(text.substr(0, 40)) +
+                          "' is not a network id like 0x6a2f or 27183 (32 bits at most)");
   }
   return id;
 }

@@ -25,8 +25,8 @@ std::string to_rfc3339(UtcTime t) {
 Result<UtcTime> parse_rfc3339(std::string_view text) {
   using namespace std::chrono;
   const auto bad = [&] {
-    return make_error(Errc::invalid_argument,
-                      "'" + std::string(text.substr(0, 40)) + "' is not a UTC time like 2026-05-04T10:11:12.345678Z");
+    return make_error(Errc::invalid_argument, "'" + std::string(text.substr(0, 40)) +
+                                                  "' is not a UTC time like 2026-05-04T10:11:12.345678Z");
   };
   const auto digits = [&](std::size_t at, std::size_t n) -> int {
     int value = 0;

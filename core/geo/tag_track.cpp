@@ -7,20 +7,26 @@ namespace anchord {
 namespace {
 
 double default_sigma_m(FixClass fix) {
-  // RTK promises 20 mm (dissertation 3.2.3, 7.2.3); the others are the usual orders of magnitude of their class.
+  // RTK promises 20 mm (dissertation 3.2.3, 7.2.3); the others are the usual orders of magnitude of their
+  // class.
   switch (fix) {
-    case FixClass::rtk_fixed: return 0.02;
-    case FixClass::rtk_float: return 0.4;
-    case FixClass::dgps: return 1.0;
-    case FixClass::single: return 3.0;
-    case FixClass::none: return 100.0;
+    case FixClass::rtk_fixed:
+      return 0.02;
+    case FixClass::rtk_float:
+      return 0.4;
+    case FixClass::dgps:
+      return 1.0;
+    case FixClass::single:
+      return 3.0;
+    case FixClass::none:
+      return 100.0;
   }
   return 100.0;
 }
 
 double gap_limit_s(std::span<const TrackPose> poses) {
-  // Some sources pause between bursts (0.3 s every few samples): a limit from the median would refuse most of those
-  // tracks, one from the largest interval would bridge real gaps.
+  // Some sources pause between bursts (0.3 s every few samples): a limit from the median would refuse most of
+  // those tracks, one from the largest interval would bridge real gaps.
   std::vector<double> interval_s;
   for (std::size_t i = 1; i < poses.size(); ++i) interval_s.push_back(poses[i].t_s - poses[i - 1].t_s);
   if (interval_s.empty()) return 0.5;
@@ -33,10 +39,14 @@ double gap_limit_s(std::span<const TrackPose> poses) {
 
 std::string_view to_string(TrackRefusal why) {
   switch (why) {
-    case TrackRefusal::none: return "none";
-    case TrackRefusal::outside: return "outside_track";
-    case TrackRefusal::gap: return "track_gap";
-    case TrackRefusal::fix_class: return "fix_not_good_enough";
+    case TrackRefusal::none:
+      return "none";
+    case TrackRefusal::outside:
+      return "outside_track";
+    case TrackRefusal::gap:
+      return "track_gap";
+    case TrackRefusal::fix_class:
+      return "fix_not_good_enough";
   }
   return "none";
 }
@@ -44,7 +54,8 @@ std::string_view to_string(TrackRefusal why) {
 TrackPose pose_of(const Fix& fix, const std::optional<EnuFrame>& frame, UtcTime epoch) {
   TrackPose pose;
   pose.t_s = seconds_between(epoch, fix.time);
-  pose.position_m = fix.frame == TrackFrame::wgs84 && frame ? frame->enu_from_wgs84(fix.position).m : fix.local_m;
+  pose.position_m =
+      fix.frame == TrackFrame::wgs84 && frame ? frame->enu_from_wgs84(fix.position).m : fix.local_m;
   if (fix.enu_from_body) pose.attitude = fix.enu_from_body->normalized();
   const double sigma_m = default_sigma_m(fix.fix);
   pose.covariance_m2 = fix.covariance_m2.value_or(Eigen::Matrix3d::Identity() * sigma_m * sigma_m);
@@ -85,13 +96,13 @@ TagTrack::TagTrack(std::span<const Fix> fixes, const std::optional<EnuFrame>& fr
     poses_.push_back(std::move(pose));
   }
   std::ranges::stable_sort(poses_, [](const TrackPose& a, const TrackPose& b) {
-    return a.t_s != b.t_s ? a.t_s < b.t_s : a.fix > b.fix;  // the better of two at one instant comes first and stays
+    return a.t_s != b.t_s ? a.t_s < b.t_s
+                          : a.fix > b.fix;  // the better of two at one instant comes first and stays
   });
   const auto twins = std::ranges::unique(poses_, {}, &TrackPose::t_s);
   poses_.erase(twins.begin(), twins.end());
-  has_attitude_ = !poses_.empty() && std::ranges::all_of(poses_, [](const TrackPose& p) {
-    return p.attitude.has_value();
-  });
+  has_attitude_ = !poses_.empty() &&
+                  std::ranges::all_of(poses_, [](const TrackPose& p) { return p.attitude.has_value(); });
   max_gap_s_ = options.max_gap_s.value_or(gap_limit_s(poses_));
 }
 

@@ -33,7 +33,7 @@ struct TagPoint {
   TrackRefusal refused{TrackRefusal::none};
   Eigen::Vector3d position_m{0, 0, 0};  ///< of the antenna
   Eigen::Vector3d velocity_mps{0, 0, 0};
-  Eigen::Vector3d body_up{0, 0, 1};     ///< unit vector, for the vertical antenna offset
+  Eigen::Vector3d body_up{0, 0, 1};  ///< unit vector, for the vertical antenna offset
   Eigen::Matrix3d covariance_m2{Eigen::Matrix3d::Zero()};
 };
 
@@ -44,11 +44,11 @@ struct TrackOptions {
 
 /// Where a tag antenna was at any instant between two epochs of the track.
 ///
-/// Position linear between the neighbours, attitude by slerp, lever arm added (body: forward, left, up). Never
-/// extrapolates, never bridges a gap, and both neighbours must be of the asked class. Covariance is the mean of the
-/// neighbours' weighted by nearness: their errors are nearly the same error, so interpolation does not average it.
-/// Without attitude the body is taken as level, and only the upward part of the lever arm is applied.
-/// Const calls from any thread.
+/// Position linear between the neighbours, attitude by slerp, lever arm added (body: forward, left, up).
+/// Never extrapolates, never bridges a gap, and both neighbours must be of the asked class. Covariance is the
+/// mean of the neighbours' weighted by nearness: their errors are nearly the same error, so interpolation
+/// does not average it. Without attitude the body is taken as level, and only the upward part of the lever
+/// arm is applied. Const calls from any thread.
 class TagTrack {
  public:
   /// fixes  any order; all of one TrackFrame; `frame` is needed for wgs84 and ignored for local
@@ -68,7 +68,8 @@ class TagTrack {
   bool has_attitude_{false};
 };
 
-/// Pose of one fix; covariance by fix class where the source gave none (fixed: 400 mm^2 per axis, mission row 2).
+/// Pose of one fix; covariance by fix class where the source gave none (fixed: 400 mm^2 per axis, mission row
+/// 2).
 TrackPose pose_of(const Fix& fix, const std::optional<EnuFrame>& frame, UtcTime epoch);
 /// Between two poses, no questions asked; t_s within them.
 TagPoint interpolate(const TrackPose& before, const TrackPose& after, double t_s,

@@ -13,21 +13,25 @@ double in_plane(double distance_m, double rise_m) {
 
 }  // namespace
 
-Eigen::Vector3d first_guess(const Eigen::Vector3d& tag_m, double distance_m, double bearing_rad, double height_m) {
+Eigen::Vector3d first_guess(const Eigen::Vector3d& tag_m, double distance_m, double bearing_rad,
+                            double height_m) {
   const double d = in_plane(distance_m, height_m - tag_m.z());
   return {tag_m.x() + d * std::sin(bearing_rad), tag_m.y() + d * std::cos(bearing_rad), height_m};
 }
 
-Result<Eigen::Vector3d> second_guess(const Eigen::Vector3d& tag1_m, double distance1_m, const Eigen::Vector3d& tag2_m,
-                                     double distance2_m, double height_m, const Eigen::Vector3d& guess_m,
-                                     double slack_m) {
+Result<Eigen::Vector3d> second_guess(const Eigen::Vector3d& tag1_m, double distance1_m,
+                                     const Eigen::Vector3d& tag2_m, double distance2_m, double height_m,
+                                     const Eigen::Vector3d& guess_m, double slack_m) {
   const Eigen::Vector2d a = tag1_m.head<2>(), between = tag2_m.head<2>() - a;
   const double apart = between.norm();
-  if (!(apart > 1e-3)) return make_error(Errc::weak_geometry, "both ranges are from the same place in the plane");
-  const double r1 = in_plane(distance1_m, height_m - tag1_m.z()), r2 = in_plane(distance2_m, height_m - tag2_m.z());
+  if (!(apart > 1e-3))
+    return make_error(Errc::weak_geometry, "both ranges are from the same place in the plane");
+  const double r1 = in_plane(distance1_m, height_m - tag1_m.z()),
+               r2 = in_plane(distance2_m, height_m - tag2_m.z());
   const double miss = std::max(apart - r1 - r2, std::abs(r1 - r2) - apart);
   if (!(miss <= slack_m)) {
-    return make_error(Errc::no_convergence, "the two ranges miss each other by " + std::to_string(miss) + " m");
+    return make_error(Errc::no_convergence,
+                      "the two ranges miss each other by " + std::to_string(miss) + " m");
   }
   const double along = (apart * apart + r1 * r1 - r2 * r2) / (2 * apart);
   const double across = in_plane(r1, along);

@@ -11,24 +11,26 @@
 
 namespace anchord {
 
-/// Settings of solve_flight. Defaults hold for every kit and place; their reasons were measured on real flights
-/// (core/localize/README.md).
+/// Settings of solve_flight. Defaults hold for every kit and place; their reasons were measured on real
+/// flights (core/localize/README.md).
 struct FlightOptions {
   Dims dims{Dims::three};
   Method method{Method::gauss_newton};
   Weights weights{Weights::inverse_variance};
   Loss loss{Loss::tukey};
-  std::optional<double> anchor_height_m{};  ///< dims two: height of all anchors; absent: mean height of the track
+  std::optional<double>
+      anchor_height_m{};  ///< dims two: height of all anchors; absent: mean height of the track
 
   FixClass min_fix{FixClass::rtk_fixed};  ///< both neighbours of a range must be at least this
   std::optional<double> max_gap_s{};      ///< absent: 3 x the 90th percentile track interval, in [0.1, 0.5] s
   double min_range_m{0.05};               ///< reliability limit; 0 is the radios' failure value
   double max_range_m{150.0};
 
-  double bias_prior_m{1.0};          ///< 0 to 0.7 m seen for whole kits
+  double bias_prior_m{1.0};               ///< 0 to 0.7 m seen for whole kits
   double calibrated_bias_prior_m{0.025};  ///< once the gate says the kit is calibrated
-  double bias_gate_z{3.0};           ///< below: calibrated
-  double bias_known_sigma_m{0.1};    ///< a flight (with profile) that knows its bias worse than this cannot tell
+  double bias_gate_z{3.0};                ///< below: calibrated
+  double bias_known_sigma_m{
+      0.1};  ///< a flight (with profile) that knows its bias worse than this cannot tell
   double unknown_bias_prior_m{0.3};  ///< then: between calibrated (0) and not (0.7), and the regions show it
   double delay_prior_m{0.04};        ///< unit to unit; a free one is fatal in small volumes
   double curve_prior_m{0.03};        ///< leading edge moves with received power
@@ -36,12 +38,12 @@ struct FlightOptions {
   double lever_prior_m{0.1};         ///< body z only: x, y are confounded with the lag
   std::optional<double> fixed_bias_m{};  ///< no estimate: this bias is given
 
-  double mad_factor{0.7};            ///< Tukey cut-off = 4.685 x this x scale; below 1 is what late clusters need
+  double mad_factor{0.7};  ///< Tukey cut-off = 4.685 x this x scale; below 1 is what late clusters need
   double min_scale_m{0.02};
-  double correlation_s{10.0};        ///< errors stay alike this long; tempers the likelihood
-  double floor_sigma_m{0.04};        ///< per axis: frame, lever arm; no residual shows it
+  double correlation_s{10.0};  ///< errors stay alike this long; tempers the likelihood
+  double floor_sigma_m{0.04};  ///< per axis: frame, lever arm; no residual shows it
 
-  std::optional<Wgs84> origin{};     ///< of the ENU answers; absent: the first fix good enough
+  std::optional<Wgs84> origin{};  ///< of the ENU answers; absent: the first fix good enough
   std::optional<KitProfile> profile{};
   std::function<bool()> canceled{};  ///< asked between rounds
   Result<void> check() const;

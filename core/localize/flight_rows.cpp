@@ -12,7 +12,8 @@ namespace {
 std::string refusal(const Range& range, const FlightOptions& options) {
   if (!std::isfinite(range.distance_m)) return "not_finite";
   if (range.distance_m == 0.0) return "zero_range";  // the device's failure value
-  if (range.distance_m < options.min_range_m || range.distance_m > options.max_range_m) return "out_of_bounds";
+  if (range.distance_m < options.min_range_m || range.distance_m > options.max_range_m)
+    return "out_of_bounds";
   return {};
 }
 
@@ -30,7 +31,8 @@ const Fix* origin_fix(const std::vector<Fix>& fixes, FixClass min_fix) {
   for (const Fix& fix : fixes) {
     if (fix.frame != TrackFrame::wgs84) continue;
     const bool good = fix.fix >= min_fix;
-    if (!best || (good && best->fix < min_fix) || ((good || best->fix < min_fix) && fix.time < best->time)) best = &fix;
+    if (!best || (good && best->fix < min_fix) || ((good || best->fix < min_fix) && fix.time < best->time))
+      best = &fix;
   }
   return best;
 }
@@ -39,8 +41,9 @@ bool usable(const Fix& fix, TrackFrame frame) {
   if (fix.frame != frame || fix.fix == FixClass::none) return false;
   if (frame == TrackFrame::local) return fix.local_m.allFinite() && fix.local_m.norm() < 1e6;
   const Wgs84& p = fix.position;
-  return std::isfinite(p.lat_deg) && std::isfinite(p.lon_deg) && std::isfinite(p.height_m) && std::abs(p.lat_deg) <= 90 &&
-         std::abs(p.lon_deg) <= 180 && p.height_m >= -500 && p.height_m <= 9000 && !(p.lat_deg == 0 && p.lon_deg == 0);
+  return std::isfinite(p.lat_deg) && std::isfinite(p.lon_deg) && std::isfinite(p.height_m) &&
+         std::abs(p.lat_deg) <= 90 && std::abs(p.lon_deg) <= 180 && p.height_m >= -500 &&
+         p.height_m <= 9000 && !(p.lat_deg == 0 && p.lon_deg == 0);
 }
 
 }  // namespace
@@ -48,26 +51,32 @@ bool usable(const Fix& fix, TrackFrame frame) {
 Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& options) {
   const TrackFrame kind = flight.mission.frame;
   std::vector<Fix> fixes;
-  std::ranges::copy_if(flight.fixes, std::back_inserter(fixes), [&](const Fix& f) { return usable(f, kind); });
+  std::ranges::copy_if(flight.fixes, std::back_inserter(fixes),
+                       [&](const Fix& f) { return usable(f, kind); });
   if (fixes.empty()) return make_error(Errc::too_few_observations, "no usable position in the track");
   if (flight.ranges.empty()) return make_error(Errc::too_few_observations, "no ranges");
   std::optional<EnuFrame> frame;
-  if (kind == TrackFrame::wgs84) frame.emplace(options.origin.value_or(origin_fix(fixes, options.min_fix)->position));
+  if (kind == TrackFrame::wgs84)
+    frame.emplace(options.origin.value_or(origin_fix(fixes, options.min_fix)->position));
   if (frame) {
     // 20 km: swapped coordinates and wild fixes are not part of any flight round a building.
     std::erase_if(fixes, [&](const Fix& f) { return frame->enu_from_wgs84(f.position).m.norm() > 20'000; });
-    if (fixes.empty()) return make_error(Errc::too_few_observations, "no position within 20 km of the origin");
+    if (fixes.empty())
+      return make_error(Errc::too_few_observations, "no position within 20 km of the origin");
   }
   const UtcTime epoch = std::ranges::min_element(fixes, {}, &Fix::time)->time;
-  FlightRows rows{epoch, frame, TagTrack(fixes, frame, epoch, {options.min_fix, options.max_gap_s}), {}, {}, 0};
+  FlightRows rows{epoch, frame, TagTrack(fixes, frame, epoch, {options.min_fix, options.max_gap_s}),
+                  {},    {},    0};
   rows.track_span_s = rows.track.poses().back().t_s - rows.track.poses().front().t_s;
   bool arm_across = false;
-  for (const auto& tag : flight.mission.tags) arm_across = arm_across || tag.lever_arm_body_m.head<2>().norm() > 0.01;
+  for (const auto& tag : flight.mission.tags)
+    arm_across = arm_across || tag.lever_arm_body_m.head<2>().norm() > 0.01;
   if (arm_across && !rows.track.has_attitude()) {
     rows.notes.emplace_back("the track has no attitude: only the upward part of the lever arms is applied");
   }
   if (fixes.size() != flight.fixes.size()) {
-    rows.notes.push_back(std::to_string(flight.fixes.size() - fixes.size()) + " positions not usable were left out");
+    rows.notes.push_back(std::to_string(flight.fixes.size() - fixes.size()) +
+                         " positions not usable were left out");
   }
   std::map<NetworkId, AnchorRows> anchors;
   std::set<std::tuple<std::int64_t, NetworkId, std::uint8_t, NetworkId, std::optional<std::uint64_t>>> seen;
@@ -77,7 +86,8 @@ Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& op
     std::string why = refusal(range, options);
     const auto arm = lever_arm(flight.mission, range);
     if (why.empty() && !arm) why = "unknown_tag";
-    if (why.empty() && !seen.insert({range.time.ns, range.tag, range.antenna, range.anchor, range.seq}).second) {
+    if (why.empty() &&
+        !seen.insert({range.time.ns, range.tag, range.antenna, range.anchor, range.seq}).second) {
       why = "duplicate";
     }
     if (why.empty()) {

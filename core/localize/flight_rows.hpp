@@ -36,8 +36,8 @@ struct FlightRows {
   double track_span_s{};
 };
 
-/// Judges every row: finite, within bounds, not a repeat, of a declared tag. Refused ones are counted by reason.
-/// errors  too_few_observations: no usable fix or no range at all
+/// Judges every row: finite, within bounds, not a repeat, of a declared tag. Refused ones are counted by
+/// reason. errors  too_few_observations: no usable fix or no range at all
 Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& options);
 
 }  // namespace anchord

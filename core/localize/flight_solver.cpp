@@ -31,15 +31,18 @@ Result<void> solve_with(Work& work, const SharedPrior& prior, const FlightOption
 
 bool same_kit(const Work& a, const Work& b) { return !a.kit.empty() && a.kit == b.kit; }
 
-/// Factors of the other flights of the kit: those solved now, and the stored profile's except this very flight's.
-std::vector<ProfileFactor> others_of(const std::vector<Work>& all, std::size_t index, const FlightOptions& options) {
+/// Factors of the other flights of the kit: those solved now, and the stored profile's except this very
+/// flight's.
+std::vector<ProfileFactor> others_of(const std::vector<Work>& all, std::size_t index,
+                                     const FlightOptions& options) {
   std::vector<ProfileFactor> factors;
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (i != index && same_kit(all[i], all[index])) factors.push_back(all[i].factor);
   }
   if (options.profile && (options.profile->kit.empty() || options.profile->kit == all[index].kit)) {
     for (const auto& factor : options.profile->factors) {
-      const bool solved_now = std::ranges::any_of(all, [&](const Work& w) { return same_kit(w, all[index]) && w.name == factor.flight; });
+      const bool solved_now = std::ranges::any_of(
+          all, [&](const Work& w) { return same_kit(w, all[index]) && w.name == factor.flight; });
       if (!solved_now && factor.flight != all[index].name) factors.push_back(factor);
     }
   }
@@ -69,17 +72,19 @@ FlightSolution describe(const Work& work, const FlightData& flight, const Flight
   solution.shared.bias_z = work.gate.z;
   solution.shared.bias_determined = options.fixed_bias_m || work.gate.known;
   if (!solution.shared.bias_determined) {
-    solution.notes.push_back(sentence(
-        "bias not determined by this flight, profile missing: %.3f m with sigma %.3f m (z %.1f)", work.gate.bias_m,
-        work.gate.sigma_m, work.gate.z));
+    solution.notes.push_back(
+        sentence("bias not determined by this flight, profile missing: %.3f m with sigma %.3f m (z %.1f)",
+                 work.gate.bias_m, work.gate.sigma_m, work.gate.z));
   }
   if (!work.fit.converged) {
-    solution.notes.push_back("the joint solve did not settle within " + std::to_string(work.fit.rounds) + " rounds");
+    solution.notes.push_back("the joint solve did not settle within " + std::to_string(work.fit.rounds) +
+                             " rounds");
   }
   for (std::size_t i = 0; i < work.rows.anchors.size(); ++i) {
     AnchorSolution anchor = judge_anchor(work.rows, work.fit, i, options);
     anchor.estimate.bias_m = solution.shared.bias_m.value + anchor.delay_m.value_or(0.0);
-    anchor.estimate.bias_sigma_m = std::hypot(solution.shared.bias_m.sigma, anchor.delay_sigma_m.value_or(options.delay_prior_m));
+    anchor.estimate.bias_sigma_m =
+        std::hypot(solution.shared.bias_m.sigma, anchor.delay_sigma_m.value_or(options.delay_prior_m));
     anchor.estimate.lag_s = solution.shared.lag_s.value;
     anchor.estimate.lag_sigma_s = solution.shared.lag_s.sigma;
     for (const auto& [why, count] : anchor.estimate.refused) solution.refused[why] += count;
@@ -96,12 +101,15 @@ FlightSolution describe(const Work& work, const FlightData& flight, const Flight
 Result<void> FlightOptions::check() const {
   const auto positive = [](double v) { return std::isfinite(v) && v > 0; };
   const bool good = positive(bias_prior_m) && positive(calibrated_bias_prior_m) && positive(delay_prior_m) &&
-                    positive(curve_prior_m) && positive(lag_prior_s) && positive(lever_prior_m) && positive(mad_factor) &&
-                    positive(min_scale_m) && correlation_s >= 0 && floor_sigma_m >= 0 && min_range_m >= 0 &&
-                    max_range_m > min_range_m && (!max_gap_s || positive(*max_gap_s)) &&
-                    (!anchor_height_m || std::isfinite(*anchor_height_m)) && (!fixed_bias_m || std::isfinite(*fixed_bias_m));
+                    positive(curve_prior_m) && positive(lag_prior_s) && positive(lever_prior_m) &&
+                    positive(mad_factor) && positive(min_scale_m) && correlation_s >= 0 &&
+                    floor_sigma_m >= 0 && min_range_m >= 0 && max_range_m > min_range_m &&
+                    (!max_gap_s || positive(*max_gap_s)) &&
+                    (!anchor_height_m || std::isfinite(*anchor_height_m)) &&
+                    (!fixed_bias_m || std::isfinite(*fixed_bias_m));
   if (good) return boost::outcome_v2::success();
-  return make_error(Errc::invalid_argument, "flight options: sigmas, limits and factors must be positive and finite");
+  return make_error(Errc::invalid_argument,
+                    "flight options: sigmas, limits and factors must be positive and finite");
 }
 
 Result<FlightSolution> solve_flight(const FlightData& flight, const FlightOptions& options) {
@@ -110,8 +118,8 @@ Result<FlightSolution> solve_flight(const FlightData& flight, const FlightOption
   return std::move(solutions.front());
 }
 
-Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* const> flights, const FlightOptions& options,
-                                                  KitProfile* profile) {
+Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* const> flights,
+                                                  const FlightOptions& options, KitProfile* profile) {
   BOOST_OUTCOME_TRY(options.check());
   std::vector<Work> all;
   for (const FlightData* flight : flights) {
@@ -134,7 +142,8 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
     }
     for (std::size_t i = 0; i < all.size(); ++i) {
       // A flight alone whose gate changed nothing is solved already.
-      const bool same = priors[i].mean == all[i].prior.mean && priors[i].information == all[i].prior.information;
+      const bool same =
+          priors[i].mean == all[i].prior.mean && priors[i].information == all[i].prior.information;
       if (same) continue;
       BOOST_OUTCOME_TRY(solve_with(all[i], priors[i], options));
     }

@@ -23,8 +23,8 @@ struct Valued {
 /// What the whole kit shares: bias, range curve, lag, vertical antenna offset (see KitProfile).
 struct SharedSolution {
   Valued bias_m;
-  Valued curve_m;   ///< per e-fold of distance beyond 5 m
-  Valued lag_s;     ///< the range stamped t belongs to the track at t + lag
+  Valued curve_m;  ///< per e-fold of distance beyond 5 m
+  Valued lag_s;    ///< the range stamped t belongs to the track at t + lag
   Valued lever_up_m;
   bool bias_determined{true};  ///< false: neither this flight nor a profile says what the bias is
   double bias_z{};             ///< |b| / sd(b) the calibrated-or-not gate saw
@@ -50,7 +50,7 @@ struct AnchorSolution {
   Eigen::Matrix3d fit_covariance_m2{Eigen::Matrix3d::Zero()};  ///< before the floor was added
   std::optional<double> delay_m;                               ///< d_a: this unit against the kit
   std::optional<double> delay_sigma_m;
-  double residual_scale_m{};                                   ///< robust, 1.4826 MAD
+  double residual_scale_m{};  ///< robust, 1.4826 MAD
 };
 
 /// One flight solved. Positions are ENU of `origin`, or the track's own local metres where that is absent.
@@ -59,17 +59,18 @@ struct FlightSolution {
   std::string name;
   std::optional<Wgs84> origin;
   SharedSolution shared;
-  std::vector<AnchorSolution> anchors;          ///< in order of network id
-  std::map<std::string, std::size_t> refused;   ///< over all anchors, reason -> count
+  std::vector<AnchorSolution> anchors;         ///< in order of network id
+  std::map<std::string, std::size_t> refused;  ///< over all anchors, reason -> count
   std::size_t n_ranges{}, n_used{}, n_fixes{};
-  std::vector<std::string> notes;               ///< for people: what limits this solution
+  std::vector<std::string> notes;  ///< for people: what limits this solution
 };
 
-/// Joint robust solution of every anchor heard in one flight, with the bias, lag and antenna offset they share.
+/// Joint robust solution of every anchor heard in one flight, with the bias, lag and antenna offset they
+/// share.
 ///
 /// Model of range r stamped t:  r = |p(t+lag) + R (l + l_z e_z) - x_a| + b + d_a + c g(rho) + e,
-/// g(rho) = ln(max(rho, 5 m) / 5 m). Tukey biweight with a scale from the residuals, priors on everything but x_a,
-/// likelihood tempered because errors stay correlated for seconds. See core/localize/README.md.
+/// g(rho) = ln(max(rho, 5 m) / 5 m). Tukey biweight with a scale from the residuals, priors on everything but
+/// x_a, likelihood tempered because errors stay correlated for seconds. See core/localize/README.md.
 ///
 /// flight   any order of rows; bad rows are refused with a reason and counted, never an error
 /// errors   invalid_argument (options), too_few_observations (no track or no ranges at all), canceled
@@ -77,8 +78,8 @@ struct FlightSolution {
 Result<FlightSolution> solve_flight(const FlightData& flight, const FlightOptions& options = {});
 
 /// Several flights of one kit: each takes what the others say about bias, curve, lag and offset as its prior.
-/// Flights whose Mission::kit differs do not learn from each other. Answers in input order; `profile` gets the
-/// profile of all flights when they are of one kit.
+/// Flights whose Mission::kit differs do not learn from each other. Answers in input order; `profile` gets
+/// the profile of all flights when they are of one kit.
 Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* const> flights,
                                                   const FlightOptions& options = {},
                                                   KitProfile* profile = nullptr);

@@ -15,11 +15,11 @@
 namespace anchord {
 namespace {
 
-constexpr std::size_t k_min_used = 10;      // below, no scale can be told from the residuals
-constexpr double k_sigma_ratio = 0.08;      // sH/D above: undetermined (seen 0.083 and up; 0.078 passes)
+constexpr std::size_t k_min_used = 10;  // below, no scale can be told from the residuals
+constexpr double k_sigma_ratio = 0.08;  // sH/D above: undetermined (seen 0.083 and up; 0.078 passes)
 constexpr double k_sigma_ratio_marginal = 0.05;
 constexpr double k_twin_distance_m = 0.4;
-constexpr double k_twin_cost = 3.0;         // tempered; likelihood ratio 20
+constexpr double k_twin_cost = 3.0;  // tempered; likelihood ratio 20
 
 struct Twin {
   AnchorFit fit;
@@ -34,8 +34,8 @@ std::string text(const char* format, double a, double b, double c) {
 }
 
 /// Other places that fit about as well, best first.
-std::vector<Twin> twins_of(const FlightRows& flight, const JointFit& fit, std::size_t index, const TrackShape& shape,
-                           const FlightOptions& options) {
+std::vector<Twin> twins_of(const FlightRows& flight, const JointFit& fit, std::size_t index,
+                           const TrackShape& shape, const FlightOptions& options) {
   const AnchorBlock& block = fit.normal.anchors[index];
   const Eigen::Vector3d solution = fit.state.anchors[index].position_m;
   const auto rows = observations_of(flight, flight.anchors[index], fit.state.shared, 400, block.scale_m);
@@ -43,7 +43,8 @@ std::vector<Twin> twins_of(const FlightRows& flight, const JointFit& fit, std::s
   settings.dims = options.dims;
   settings.estimate_bias = true;
   // Bias prior in the scale of the thinned, untempered cost below.
-  const double unit = static_cast<double>(block.n_in_track) / (static_cast<double>(rows.size()) * block.kappa);
+  const double unit =
+      static_cast<double>(block.n_in_track) / (static_cast<double>(rows.size()) * block.kappa);
   settings.bias_prior_sigma_m = options.delay_prior_m * std::sqrt(unit);
   const auto polish = [&](const Eigen::Vector3d& start) -> std::optional<AnchorFit> {
     settings.loss = Loss::cauchy;
@@ -51,7 +52,8 @@ std::vector<Twin> twins_of(const FlightRows& flight, const JointFit& fit, std::s
     const auto rough = solve_anchor_gauss_newton(rows, start, settings);
     if (!rough) return std::nullopt;
     settings.loss = options.loss;
-    settings.loss_sigmas = default_bend(options.loss) * (options.loss == Loss::tukey ? options.mad_factor : 1.0);
+    settings.loss_sigmas =
+        default_bend(options.loss) * (options.loss == Loss::tukey ? options.mad_factor : 1.0);
     auto fine = solve_anchor_gauss_newton(rows, rough.value().position_m, settings);
     if (!fine) return std::nullopt;
     return std::move(fine.value());
@@ -69,7 +71,9 @@ std::vector<Twin> twins_of(const FlightRows& flight, const JointFit& fit, std::s
     auto there = polish(start);
     if (!there) continue;
     const double worse = (there->cost - here->cost) * unit;
-    const auto close = [&](const Eigen::Vector3d& p) { return (there->position_m - p).norm() < k_twin_distance_m; };
+    const auto close = [&](const Eigen::Vector3d& p) {
+      return (there->position_m - p).norm() < k_twin_distance_m;
+    };
     if (worse > k_twin_cost || close(solution) || close(here->position_m)) continue;
     if (std::ranges::any_of(twins, [&](const Twin& t) { return close(t.fit.position_m); })) continue;
     const double horizontal_m = (there->position_m - here->position_m).head<2>().norm();
@@ -79,8 +83,8 @@ std::vector<Twin> twins_of(const FlightRows& flight, const JointFit& fit, std::s
   return twins;
 }
 
-Hypothesis hypothesis(const FlightRows& flight, const Eigen::Vector3d& position, const Eigen::Matrix3d& covariance,
-                      double rms_m) {
+Hypothesis hypothesis(const FlightRows& flight, const Eigen::Vector3d& position,
+                      const Eigen::Matrix3d& covariance, double rms_m) {
   Hypothesis h;
   h.position.m = position;
   if (flight.frame) h.wgs84 = flight.frame->wgs84_from_enu(h.position);
@@ -89,14 +93,16 @@ Hypothesis hypothesis(const FlightRows& flight, const Eigen::Vector3d& position,
   return h;
 }
 
-void fill_gdop(Estimate& estimate, const std::vector<Observation>& rows, const Eigen::Vector3d& anchor, Dims dims) {
+void fill_gdop(Estimate& estimate, const std::vector<Observation>& rows, const Eigen::Vector3d& anchor,
+               Dims dims) {
   std::vector<Eigen::Vector3d> places;
   std::vector<Eigen::Vector2d> flat;
   for (const auto& o : rows) {
     places.push_back(o.tag_m);
     flat.emplace_back(o.tag_m.head<2>());
   }
-  const auto gdop = dims == Dims::two ? planning::gdop(Eigen::Vector2d(anchor.head<2>()), flat) : planning::gdop(anchor, places);
+  const auto gdop = dims == Dims::two ? planning::gdop(Eigen::Vector2d(anchor.head<2>()), flat)
+                                      : planning::gdop(anchor, places);
   if (!gdop) return;
   estimate.gdop = gdop.value().root;
   estimate.gdop_trace = gdop.value().trace;
@@ -109,35 +115,42 @@ void judge_twins(const FlightRows& flight, AnchorSolution& solution, const std::
   const Twin* twin = twins.empty() ? nullptr : &twins.front();
   if (!twin && geometry.kind != GeometryKind::coplanar) return;
   if (twin) {
-    estimate.mirror = hypothesis(flight, twin->fit.position_m, estimate.best->covariance_m2, estimate.best->rms_residual_m);
+    estimate.mirror =
+        hypothesis(flight, twin->fit.position_m, estimate.best->covariance_m2, estimate.best->rms_residual_m);
     const double odds = std::exp(-std::clamp(twin->worse, -50.0, 50.0));
     estimate.mirror->probability = odds / (1.0 + odds);
     estimate.best->probability = 1.0 / (1.0 + odds);
   }
   estimate.verdict = Verdict::ambiguous;
-  const bool sideways = twin && std::ranges::any_of(twins, [](const Twin& t) { return t.horizontal_m > k_twin_distance_m; });
+  const bool sideways =
+      twin && std::ranges::any_of(twins, [](const Twin& t) { return t.horizontal_m > k_twin_distance_m; });
   solution.determined = sideways ? Determined::none : Determined::horizontal;
   if (!twin) {
     // No second minimum of its own, but a plane cannot tell the sides: what its reflection says is as good.
     const Eigen::Vector3d reflected = geometry.shape.mirrored(estimate.best->position.m);
-    estimate.reason = geometry.reason + "; the side of it the anchor is on is not determined, its height is uncertain";
+    estimate.reason =
+        geometry.reason + "; the side of it the anchor is on is not determined, its height is uncertain";
     if ((reflected - estimate.best->position.m).norm() < 0.1) return;
-    estimate.mirror = hypothesis(flight, reflected, estimate.best->covariance_m2, estimate.best->rms_residual_m);
+    estimate.mirror =
+        hypothesis(flight, reflected, estimate.best->covariance_m2, estimate.best->rms_residual_m);
     estimate.mirror->probability = estimate.best->probability = 0.5;
     estimate.v95_m += std::abs(reflected.z() - estimate.best->position.m.z());
     return;
   }
   const double apart_m = (twin->fit.position_m - estimate.best->position.m).norm();
-  estimate.reason = text("mirror: a second place %.2f m away fits as well (tempered cost %+.2f, %.2f m apart horizontally)",
-                         apart_m, twin->worse, twin->horizontal_m);
+  estimate.reason =
+      text("mirror: a second place %.2f m away fits as well (tempered cost %+.2f, %.2f m apart horizontally)",
+           apart_m, twin->worse, twin->horizontal_m);
   if (!geometry.reason.empty()) estimate.reason += "; " + geometry.reason;
   // Until someone says which, the claimed height must hold both.
-  estimate.v95_m = std::max(estimate.v95_m, std::abs(twin->fit.position_m.z() - estimate.best->position.m.z()) + estimate.v95_m);
+  estimate.v95_m = std::max(
+      estimate.v95_m, std::abs(twin->fit.position_m.z() - estimate.best->position.m.z()) + estimate.v95_m);
 }
 
 }  // namespace
 
-AnchorSolution judge_anchor(const FlightRows& flight, const JointFit& fit, std::size_t index, const FlightOptions& options) {
+AnchorSolution judge_anchor(const FlightRows& flight, const JointFit& fit, std::size_t index,
+                            const FlightOptions& options) {
   const AnchorRows& rows = flight.anchors[index];
   const AnchorBlock& block = fit.normal.anchors[index];
   const JointState::Anchor& anchor = fit.state.anchors[index];
@@ -151,15 +164,17 @@ AnchorSolution judge_anchor(const FlightRows& flight, const JointFit& fit, std::
   estimate.time = UtcTime{flight.epoch.ns + std::llround(block.last_t_s * 1e9)};
   const auto observations = observations_of(flight, rows, fit.state.shared, 2000, 1.0);
   const GeometryReport geometry = assess_geometry(observations, options.dims);
-  solution.geometry = {geometry.shape.sd_m, geometry.median_range_m, geometry.line_ratio, geometry.plane_ratio, 0};
+  solution.geometry = {geometry.shape.sd_m, geometry.median_range_m, geometry.line_ratio,
+                       geometry.plane_ratio, 0};
   if (!anchor.active || geometry.kind == GeometryKind::too_few || block.n_used < k_min_used) {
     estimate.verdict = Verdict::too_few;
     estimate.reason = !geometry.reason.empty() ? geometry.reason
-                                               : "too few: " + std::to_string(block.n_used) + " usable ranges, need " +
-                                                     std::to_string(k_min_used);
+                                               : "too few: " + std::to_string(block.n_used) +
+                                                     " usable ranges, need " + std::to_string(k_min_used);
     if (!anchor.active) {
       for (const JointRow& row : rows.rows) {
-        const auto why = flight.track.at(row.t_s + fit.state.shared[k_shared_lag], row.lever_arm_body_m).refused;
+        const auto why =
+            flight.track.at(row.t_s + fit.state.shared[k_shared_lag], row.lever_arm_body_m).refused;
         if (why != TrackRefusal::none) ++estimate.refused[std::string(to_string(why))];
       }
     }
@@ -174,13 +189,15 @@ AnchorSolution judge_anchor(const FlightRows& flight, const JointFit& fit, std::
   solution.delay_m = anchor.delay_m;
   solution.delay_sigma_m = std::sqrt(joint(3, 3));
   solution.residual_scale_m = block.scale_m;
-  const Eigen::Matrix3d covariance =
-      solution.fit_covariance_m2 + Eigen::Matrix3d::Identity() * options.floor_sigma_m * options.floor_sigma_m;
+  const Eigen::Matrix3d covariance = solution.fit_covariance_m2 + Eigen::Matrix3d::Identity() *
+                                                                      options.floor_sigma_m *
+                                                                      options.floor_sigma_m;
   if (!anchor.position_m.allFinite() || !covariance.allFinite() || block.scale_m > 2.0 ||
       (anchor.position_m - geometry.shape.centroid_m).norm() > 3.0 * options.max_range_m) {
     estimate.verdict = Verdict::diverged;
-    estimate.reason = text("no consistent answer: typical residual %.2f m at a median range of %.2f m over %.0f ranges",
-                           block.scale_m, geometry.median_range_m, static_cast<double>(block.n_in_track));
+    estimate.reason =
+        text("no consistent answer: typical residual %.2f m at a median range of %.2f m over %.0f ranges",
+             block.scale_m, geometry.median_range_m, static_cast<double>(block.n_in_track));
     return solution;
   }
   estimate.best = hypothesis(flight, anchor.position_m, covariance, block.rms_m);
@@ -196,14 +213,17 @@ AnchorSolution judge_anchor(const FlightRows& flight, const JointFit& fit, std::
   if (geometry.kind == GeometryKind::collinear || solution.geometry.sigma_ratio > k_sigma_ratio) {
     estimate.verdict = Verdict::weak_geometry;
     solution.determined = Determined::none;
-    estimate.reason = geometry.kind == GeometryKind::collinear
-                          ? geometry.reason
-                          : text("weak geometry: horizontal sigma %.2f m at a median range of %.2f m (ratio %.3f)",
-                                 horizontal_sigma_m, geometry.median_range_m, solution.geometry.sigma_ratio);
-  } else if (estimate.verdict == Verdict::ok &&
-             (geometry.line_ratio < GeometryLimits{}.line_marginal || solution.geometry.sigma_ratio > k_sigma_ratio_marginal)) {
-    estimate.reason = text("near the limit of geometry: line ratio %.3f, horizontal sigma over range %.3f (limits 0.07 and %.2f)",
-                           geometry.line_ratio, solution.geometry.sigma_ratio, k_sigma_ratio);
+    estimate.reason =
+        geometry.kind == GeometryKind::collinear
+            ? geometry.reason
+            : text("weak geometry: horizontal sigma %.2f m at a median range of %.2f m (ratio %.3f)",
+                   horizontal_sigma_m, geometry.median_range_m, solution.geometry.sigma_ratio);
+  } else if (estimate.verdict == Verdict::ok && (geometry.line_ratio < GeometryLimits{}.line_marginal ||
+                                                 solution.geometry.sigma_ratio > k_sigma_ratio_marginal)) {
+    estimate.reason = text(
+        "near the limit of geometry: line ratio %.3f, horizontal sigma over range %.3f (limits 0.07 and "
+        "%.2f)",
+        geometry.line_ratio, solution.geometry.sigma_ratio, k_sigma_ratio);
   }
   return solution;
 }

@@ -71,7 +71,9 @@ Estimate fuse_estimates(std::span<const Estimate> estimates) {
   out.reason.clear();
   if (dof > 0 && chi2 > chi2_999(dof)) {
     char text[128];
-    std::snprintf(text, sizeof text, "%zu flights contradict each other: chi2 %.1f with %.0f degrees of freedom, limit %.1f", n_ok, chi2, dof, chi2_999(dof));
+    std::snprintf(text, sizeof text,
+                  "%zu flights contradict each other: chi2 %.1f with %.0f degrees of freedom, limit %.1f",
+                  n_ok, chi2, dof, chi2_999(dof));
     out.verdict = Verdict::diverged;
     out.reason = text;
   }

@@ -13,9 +13,10 @@ struct Normal {
   double cost{};
 };
 
-/// Iteratively reweighted normal equations, eq 7.26 with the robust weight on W. Held unknowns get a unit diagonal.
-Normal build(std::span<const Observation> observations, const std::vector<RowScale>& scales, const Unknowns& at,
-             const SolverOptions& options, double bend) {
+/// Iteratively reweighted normal equations, eq 7.26 with the robust weight on W. Held unknowns get a unit
+/// diagonal.
+Normal build(std::span<const Observation> observations, const std::vector<RowScale>& scales,
+             const Unknowns& at, const SolverOptions& options, double bend) {
   Normal n;
   Eigen::Vector4d u;
   for (std::size_t i = 0; i < observations.size(); ++i) {
@@ -48,8 +49,8 @@ Normal build(std::span<const Observation> observations, const std::vector<RowSca
 
 }  // namespace
 
-Result<AnchorFit> solve_anchor_gauss_newton(std::span<const Observation> observations, const Eigen::Vector3d& start,
-                                            const SolverOptions& options) {
+Result<AnchorFit> solve_anchor_gauss_newton(std::span<const Observation> observations,
+                                            const Eigen::Vector3d& start, const SolverOptions& options) {
   BOOST_OUTCOME_TRY(check_problem(observations, start, options));
   const double bend = options.loss_sigmas > 0 ? options.loss_sigmas : default_bend(options.loss);
   Unknowns at;

@@ -38,7 +38,8 @@ TrackShape track_shape(std::span<const Observation> observations) {
   return shape;
 }
 
-GeometryReport assess_geometry(std::span<const Observation> observations, Dims dims, const GeometryLimits& limits) {
+GeometryReport assess_geometry(std::span<const Observation> observations, Dims dims,
+                               const GeometryLimits& limits) {
   GeometryReport report;
   const std::size_t needed = dims == Dims::two ? 3 : 4;
   std::vector<Observation> distinct;  // repeats of one place are one place
@@ -55,7 +56,8 @@ GeometryReport assess_geometry(std::span<const Observation> observations, Dims d
     return report;
   }
   std::vector<Observation> rows(observations.begin(), observations.end());
-  std::erase_if(rows, [](const Observation& o) { return !o.tag_m.allFinite() || !std::isfinite(o.distance_m); });
+  std::erase_if(rows,
+                [](const Observation& o) { return !o.tag_m.allFinite() || !std::isfinite(o.distance_m); });
   if (dims == Dims::two) {
     for (auto& o : rows) o.tag_m.z() = 0;
   }

@@ -22,12 +22,12 @@ TrackShape track_shape(std::span<const Observation> observations);
 
 enum class GeometryKind : std::uint8_t { too_few, collinear, coplanar, good };
 
-/// Limits on the shape of the track seen from the anchor, D = median range. Each lies between real flights that
-/// failed and passed: line 0.05 failed, 0.075 passed; planes 0.002 to 0.015 had a twin, 0.055 had none.
+/// Limits on the shape of the track seen from the anchor, D = median range. Each lies between real flights
+/// that failed and passed: line 0.05 failed, 0.075 passed; planes 0.002 to 0.015 had a twin, 0.055 had none.
 struct GeometryLimits {
-  double line{0.07};        ///< L2/D below: a line
+  double line{0.07};  ///< L2/D below: a line
   double line_marginal{0.10};
-  double plane{0.02};       ///< L1/D below: a plane
+  double plane{0.02};  ///< L1/D below: a plane
 };
 
 struct GeometryReport {
@@ -39,8 +39,9 @@ struct GeometryReport {
   std::string reason;    ///< with the numbers; empty when good
 };
 
-/// May these ranges determine an anchor at all? Asked before any solver, which would answer a number regardless.
-/// In 2D the height is not asked for: coplanar is good then, and a line leaves the mirrored twin across it.
+/// May these ranges determine an anchor at all? Asked before any solver, which would answer a number
+/// regardless. In 2D the height is not asked for: coplanar is good then, and a line leaves the mirrored twin
+/// across it.
 GeometryReport assess_geometry(std::span<const Observation> observations, Dims dims = Dims::three,
                                const GeometryLimits& limits = {});
 

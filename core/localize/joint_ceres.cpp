@@ -14,12 +14,12 @@ namespace {
 
 using Four = std::array<double, 4>;
 
-/// All ranges of one anchor and the prior on its delay. Scales and tempering stay as they were at the start of the
-/// round, so that Ceres sees one smooth problem.
+/// All ranges of one anchor and the prior on its delay. Scales and tempering stay as they were at the start
+/// of the round, so that Ceres sees one smooth problem.
 class AnchorRanges final : public ceres::CostFunction {
  public:
-  AnchorRanges(const FlightRows& flight, const AnchorRows& rows, const AnchorBlock& block, const FlightOptions& options,
-               std::vector<double> sigma_m)
+  AnchorRanges(const FlightRows& flight, const AnchorRows& rows, const AnchorBlock& block,
+               const FlightOptions& options, std::vector<double> sigma_m)
       : flight_(flight), rows_(rows), options_(options), kappa_(block.kappa), sigma_m_(std::move(sigma_m)) {
     mutable_parameter_block_sizes()->push_back(4);
     mutable_parameter_block_sizes()->push_back(4);
@@ -32,14 +32,17 @@ class AnchorRanges final : public ceres::CostFunction {
     const JointState::Anchor anchor{own.head<3>(), own[3], true};
     double* by_own = jacobians ? jacobians[0] : nullptr;
     double* by_shared = jacobians ? jacobians[1] : nullptr;
-    const double bend = default_bend(options_.loss) * (options_.loss == Loss::tukey ? options_.mad_factor : 1.0);
+    const double bend =
+        default_bend(options_.loss) * (options_.loss == Loss::tukey ? options_.mad_factor : 1.0);
     const std::size_t n = rows_.rows.size();
     for (std::size_t i = 0; i < n; ++i) {
       const JointLine line = linearise(flight_.track, rows_.rows[i], shared, anchor);
       double slope = 0;
       residuals[i] = 0;
       if (line.refused == TrackRefusal::none) {
-        const double factor = options_.weights == Weights::as_printed ? std::sqrt(sigma_m_[i] / std::sqrt(k_variance_los_m2)) : 1.0;
+        const double factor = options_.weights == Weights::as_printed
+                                  ? std::sqrt(sigma_m_[i] / std::sqrt(k_variance_los_m2))
+                                  : 1.0;
         const double e = line.residual_m / sigma_m_[i];
         const LossValue value = loss_value(options_.loss, bend, e);
         const double size = std::sqrt(value.rho);
@@ -71,7 +74,8 @@ class SharedTerm final : public ceres::SizedCostFunction<4, 4> {
     root_ = Eigen::Matrix4d(prior.information.llt().matrixL()).transpose();
   }
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    Eigen::Map<Eigen::Vector4d>{residuals} = root_ * (Eigen::Map<const Eigen::Vector4d>(parameters[0]) - mean_);
+    Eigen::Map<Eigen::Vector4d>{residuals} =
+        root_ * (Eigen::Map<const Eigen::Vector4d>(parameters[0]) - mean_);
     if (jacobians && jacobians[0]) {
       Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>{jacobians[0]} = root_;
     }
@@ -84,8 +88,8 @@ class SharedTerm final : public ceres::SizedCostFunction<4, 4> {
 };
 
 /// Sigma of every row: the anchor's residual scale, widened by what its position is worse than usual.
-std::vector<double> sigmas(const FlightRows& flight, const AnchorRows& rows, const JointState& state, std::size_t index,
-                           const AnchorBlock& block) {
+std::vector<double> sigmas(const FlightRows& flight, const AnchorRows& rows, const JointState& state,
+                           std::size_t index, const AnchorBlock& block) {
   std::vector<double> sigma_m;
   for (const JointRow& row : rows.rows) {
     const JointLine line = linearise(flight.track, row, state.shared, state.anchors[index]);
@@ -115,15 +119,17 @@ Result<JointState> polish_joint_ceres(const FlightRows& flight, JointState state
       own[i] = {anchor.position_m.x(), anchor.position_m.y(), anchor.position_m.z(), anchor.delay_m};
       problem.AddParameterBlock(own[i].data(), 4);
       if (options.dims == Dims::two) problem.SetManifold(own[i].data(), new ceres::SubsetManifold(4, {2}));
-      problem.AddResidualBlock(new AnchorRanges(flight, flight.anchors[i], normal.anchors[i], options,
-                                                sigmas(flight, flight.anchors[i], state, i, normal.anchors[i])),
-                               nullptr, own[i].data(), shared.data());
+      problem.AddResidualBlock(
+          new AnchorRanges(flight, flight.anchors[i], normal.anchors[i], options,
+                           sigmas(flight, flight.anchors[i], state, i, normal.anchors[i])),
+          nullptr, own[i].data(), shared.data());
       ordering->AddElementToGroup(own[i].data(), 0);
     }
     ceres::Solver::Options ceres_options;
     ceres_options.linear_solver_type = ceres::DENSE_SCHUR;
     ceres_options.linear_solver_ordering = ordering;
-    ceres_options.trust_region_strategy_type = options.method == Method::dogleg ? ceres::DOGLEG : ceres::LEVENBERG_MARQUARDT;
+    ceres_options.trust_region_strategy_type =
+        options.method == Method::dogleg ? ceres::DOGLEG : ceres::LEVENBERG_MARQUARDT;
     ceres_options.max_num_iterations = 50;
     ceres_options.function_tolerance = 1e-14;
     ceres_options.logging_type = ceres::SILENT;

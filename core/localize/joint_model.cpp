@@ -34,8 +34,8 @@ double duration_s(const std::vector<double>& times_s) {
 }
 
 void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointState::Anchor& anchor,
-                  const Eigen::Vector4d& shared, const FlightOptions& options, double scale_floor_m, double kept_scale_m,
-                  double common_scale_m, AnchorBlock& block, JointNormal& normal) {
+                  const Eigen::Vector4d& shared, const FlightOptions& options, double scale_floor_m,
+                  double kept_scale_m, double common_scale_m, AnchorBlock& block, JointNormal& normal) {
   std::vector<JointLine> lines;
   std::vector<double> sizes, times_s, position_variances;
   lines.reserve(rows.rows.size());
@@ -56,7 +56,8 @@ void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointS
   // The MAD holds the usual position error already; only what a row has beyond that makes it count less.
   const double usual_variance_m2 = median(position_variances);
   block.usual_position_variance_m2 = usual_variance_m2;
-  block.scale_m = kept_scale_m > 0 ? kept_scale_m : std::max({1.4826 * median(sizes), options.min_scale_m, scale_floor_m});
+  block.scale_m = kept_scale_m > 0 ? kept_scale_m
+                                   : std::max({1.4826 * median(sizes), options.min_scale_m, scale_floor_m});
   const double scale2 = block.scale_m * block.scale_m;
   double sum_square = 0;
   std::vector<double> weights;
@@ -64,7 +65,8 @@ void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointS
   for (const JointLine& line : lines) {
     const double widening = (scale2 + std::max(line.position_variance_m2 - usual_variance_m2, 0.0)) / scale2;
     double weight = row_weight(line.residual_m / (block.scale_m * std::sqrt(widening)), options) / widening;
-    if (options.weights == Weights::as_printed) weight *= std::sqrt(widening) * block.scale_m / common_scale_m;
+    if (options.weights == Weights::as_printed)
+      weight *= std::sqrt(widening) * block.scale_m / common_scale_m;
     weights.push_back(weight);
     block.sum_weight += weight;
     sum_square += weight * line.residual_m * line.residual_m;
@@ -106,7 +108,8 @@ JointLine linearise(const TagTrack& track, const JointRow& row, const Eigen::Vec
   const Eigen::Vector3d u = difference / distance_m;
   const double curve = range_curve(distance_m);
   const double slope = distance_m > k_hinge_m ? 1.0 + shared[k_shared_curve] / distance_m : 1.0;
-  line.residual_m = row.distance_m - (distance_m + shared[k_shared_bias] + anchor.delay_m + shared[k_shared_curve] * curve);
+  line.residual_m =
+      row.distance_m - (distance_m + shared[k_shared_bias] + anchor.delay_m + shared[k_shared_curve] * curve);
   line.by_anchor << -slope * u, 1.0;
   line.by_shared[k_shared_bias] = 1.0;
   line.by_shared[k_shared_curve] = curve;
@@ -140,7 +143,8 @@ JointNormal build_normal(const FlightRows& flight, const JointState& state, cons
     }
     // 1e-6 of the largest: a direction no range sees stays where it is instead of flying off.
     Eigen::Matrix4d damped = block.own;
-    damped.topLeftCorner<3, 3>().diagonal().array() += 1e-6 * block.own.topLeftCorner<3, 3>().diagonal().maxCoeff() + 1e-12;
+    damped.topLeftCorner<3, 3>().diagonal().array() +=
+        1e-6 * block.own.topLeftCorner<3, 3>().diagonal().maxCoeff() + 1e-12;
     block.own_inverse = damped.ldlt().solve(Eigen::Matrix4d::Identity());
   }
   normal.reduced = normal.shared;

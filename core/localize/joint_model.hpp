@@ -46,10 +46,10 @@ struct AnchorBlock {
   Eigen::Matrix4d shared{Eigen::Matrix4d::Zero()};  ///< (x, d) against the shared
   Eigen::Vector4d gradient{Eigen::Vector4d::Zero()};
   Eigen::Matrix4d own_inverse{Eigen::Matrix4d::Zero()};
-  double scale_m{};        ///< 1.4826 MAD, never below the floor
-  double kappa{1};         ///< tempering
+  double scale_m{};  ///< 1.4826 MAD, never below the floor
+  double kappa{1};   ///< tempering
   double sum_weight{};
-  double rms_m{};          ///< weighted
+  double rms_m{};                       ///< weighted
   double usual_position_variance_m2{};  ///< median over the rows, along the line of sight
   std::size_t n_used{}, n_in_track{}, n_rejected{};
   std::map<std::string, std::size_t> refused;  ///< by the track, and as outliers
@@ -57,9 +57,9 @@ struct AnchorBlock {
 };
 struct JointNormal {
   std::vector<AnchorBlock> anchors;
-  Eigen::Matrix4d shared{Eigen::Matrix4d::Zero()};         ///< of the likelihood alone, before elimination
+  Eigen::Matrix4d shared{Eigen::Matrix4d::Zero()};  ///< of the likelihood alone, before elimination
   Eigen::Vector4d shared_gradient{Eigen::Vector4d::Zero()};
-  Eigen::Matrix4d reduced{Eigen::Matrix4d::Zero()};        ///< Schur complement over x and d, without the prior
+  Eigen::Matrix4d reduced{Eigen::Matrix4d::Zero()};  ///< Schur complement over x and d, without the prior
   Eigen::Vector4d reduced_gradient{Eigen::Vector4d::Zero()};
 };
 /// scales_from  residual scales to keep instead of measuring them anew
@@ -69,7 +69,7 @@ JointNormal build_normal(const FlightRows& flight, const JointState& state, cons
 /// Answer of the iteration.
 struct JointFit {
   JointState state;
-  JointNormal normal;               ///< at the state
+  JointNormal normal;  ///< at the state
   Eigen::Matrix4d shared_covariance{Eigen::Matrix4d::Zero()};
   std::vector<Eigen::Matrix4d> anchor_covariance;  ///< (x, d) of each anchor, everything else marginalised
   int rounds{};
@@ -84,10 +84,12 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
 Result<JointState> polish_joint_ceres(const FlightRows& flight, JointState state, const SharedPrior& prior,
                                       const FlightOptions& options);
 
-/// Start of every anchor by itself: closed form, reflections and a ring, each polished robustly, the best kept.
+/// Start of every anchor by itself: closed form, reflections and a ring, each polished robustly, the best
+/// kept.
 JointState joint_start(const FlightRows& flight, const SharedPrior& prior, const FlightOptions& options);
 
-/// Rows of one anchor at given shared values, thinned to at most `most`, with the range curve and bias taken off.
+/// Rows of one anchor at given shared values, thinned to at most `most`, with the range curve and bias taken
+/// off.
 std::vector<Observation> observations_of(const FlightRows& flight, const AnchorRows& anchor,
                                          const Eigen::Vector4d& shared, std::size_t most, double sigma_m);
 

@@ -16,10 +16,11 @@ constexpr std::size_t k_min_rows = 5;  // one more than x, y, z and a shared bia
 
 double clipped(double value, double limit) { return std::clamp(value, -limit, limit); }
 
-/// Best of many starts for one anchor; Cauchy of 0.3 m and a bias of its own, so that a kit's bias does not push the
-/// anchor into the wrong basin before the joint solve can see it.
-std::optional<Eigen::Vector3d> start_of(const FlightRows& flight, const AnchorRows& anchor, const SharedPrior& prior,
-                                        const FlightOptions& options, std::optional<double> height_m) {
+/// Best of many starts for one anchor; Cauchy of 0.3 m and a bias of its own, so that a kit's bias does not
+/// push the anchor into the wrong basin before the joint solve can see it.
+std::optional<Eigen::Vector3d> start_of(const FlightRows& flight, const AnchorRows& anchor,
+                                        const SharedPrior& prior, const FlightOptions& options,
+                                        std::optional<double> height_m) {
   auto rows = observations_of(flight, anchor, prior.mean, 200, 0.3);
   if (rows.size() < k_min_rows) return std::nullopt;
   SolverOptions settings;
@@ -35,7 +36,8 @@ std::optional<Eigen::Vector3d> start_of(const FlightRows& flight, const AnchorRo
     if (fit && (!best || fit.value().cost < best->cost)) best = std::move(fit.value());
   }
   if (best) return best->position_m;
-  // No start converged (a line, for example): the joint solve is heavily damped there and may begin anywhere near.
+  // No start converged (a line, for example): the joint solve is heavily damped there and may begin anywhere
+  // near.
   const auto linear = start_candidates(rows, options.dims);
   Eigen::Vector3d start = linear.front();
   if (height_m) start.z() = *height_m;
@@ -80,10 +82,12 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
     // Wide at first: the scale of residuals far from the answer says nothing about the noise.
     const double floor_m = fit.rounds == 0 ? 0.5 : fit.rounds == 1 ? 0.25 : 0.0;
     // Scales measured anew in every round would keep the last millimetres wandering.
-    fit.normal = build_normal(flight, fit.state, options, floor_m, fit.rounds > k_scale_rounds ? &fit.normal : nullptr);
+    fit.normal = build_normal(flight, fit.state, options, floor_m,
+                              fit.rounds > k_scale_rounds ? &fit.normal : nullptr);
     const JointNormal& normal = fit.normal;
     const Eigen::Matrix4d system = normal.reduced + prior.information;
-    const Eigen::Vector4d right = normal.reduced_gradient + prior.information * (prior.mean - fit.state.shared);
+    const Eigen::Vector4d right =
+        normal.reduced_gradient + prior.information * (prior.mean - fit.state.shared);
     Eigen::Vector4d step = system.ldlt().solve(right);
     if (!step.allFinite()) step.setZero();
     step[k_shared_bias] = clipped(step[k_shared_bias], 0.5);

@@ -8,26 +8,28 @@
 
 namespace anchord {
 
-/// What a flight says about the shared unknowns: Schur complement over positions and delays minus its prior, with
-/// flight-to-flight wander allowed for.
+/// What a flight says about the shared unknowns: Schur complement over positions and delays minus its prior,
+/// with flight-to-flight wander allowed for.
 ProfileFactor profile_factor(const JointFit& fit, const SharedPrior& prior, const std::string& flight);
 
 /// Prior of a kit nobody has flown: FlightOptions' sigmas about zero.
 SharedPrior wide_prior(const FlightOptions& options);
 
-/// Is the kit's bias calibrated away, or does it have one? In a small volume the antenna pattern alone imitates a
-/// common bias of 0.1 m, while true uncalibrated kits stand out: z decides, on all flights including the one solved.
+/// Is the kit's bias calibrated away, or does it have one? In a small volume the antenna pattern alone
+/// imitates a common bias of 0.1 m, while true uncalibrated kits stand out: z decides, on all flights
+/// including the one solved.
 struct BiasGate {
   double bias_m{}, sigma_m{}, z{};
-  bool calibrated{};  ///< z below the gate
-  bool known{};       ///< not calibrated, or known well enough to say that it is
+  bool calibrated{};          ///< z below the gate
+  bool known{};               ///< not calibrated, or known well enough to say that it is
   double prior_sigma_m{1.0};  ///< of the bias about zero, as the gate decided
 };
 BiasGate bias_gate(std::span<const ProfileFactor> all, const FlightOptions& options);
 
-/// Prior for the next flight: what the gate decided about the bias and the factors of the others, widened by the
-/// wander where there are any.
-SharedPrior profile_prior(std::span<const ProfileFactor> others, const BiasGate& gate, const FlightOptions& options);
+/// Prior for the next flight: what the gate decided about the bias and the factors of the others, widened by
+/// the wander where there are any.
+SharedPrior profile_prior(std::span<const ProfileFactor> others, const BiasGate& gate,
+                          const FlightOptions& options);
 
 /// One sigma of each shared unknown.
 Eigen::Vector4d prior_sigmas(const SharedPrior& prior);

@@ -71,7 +71,8 @@ BiasGate bias_gate(std::span<const ProfileFactor> all, const FlightOptions& opti
   return gate;
 }
 
-SharedPrior profile_prior(std::span<const ProfileFactor> others, const BiasGate& gate, const FlightOptions& options) {
+SharedPrior profile_prior(std::span<const ProfileFactor> others, const BiasGate& gate,
+                          const FlightOptions& options) {
   if (options.fixed_bias_m) return wide_prior(options);
   Sum sum;
   sum.information = base_information(options, gate.prior_sigma_m);

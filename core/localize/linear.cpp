@@ -14,11 +14,13 @@ namespace {
 bool finite(const Observation& o) { return o.tag_m.allFinite() && std::isfinite(o.distance_m); }
 
 /// Both (or the one) solutions of the centred linear system in principal axes.
-void centred_solutions(std::span<const Observation> observations, Dims dims, std::vector<Eigen::Vector3d>& out) {
+void centred_solutions(std::span<const Observation> observations, Dims dims,
+                       std::vector<Eigen::Vector3d>& out) {
   if (observations.size() < 3) return;
   const TrackShape shape = track_shape(observations);
   const double n = static_cast<double>(observations.size());
-  Eigen::Vector3d rhs = Eigen::Vector3d::Zero();  // sum of local * (|local|^2 - r^2), eq 7.2-7.3 about the mean
+  Eigen::Vector3d rhs =
+      Eigen::Vector3d::Zero();  // sum of local * (|local|^2 - r^2), eq 7.2-7.3 about the mean
   double mean_q = 0;
   for (const auto& o : observations) {
     const Eigen::Vector3d local = shape.axes.transpose() * (o.tag_m - shape.centroid_m);
@@ -42,8 +44,8 @@ void centred_solutions(std::span<const Observation> observations, Dims dims, std
   }
   const auto global = [&](const Eigen::Vector3d& local) { return shape.centroid_m + shape.axes * local; };
   out.push_back(global(local_anchor));
-  // mean(r^2 - |p|^2) = |x|^2: what the solved axes leave is the size of the flat one, not its sign. For a track
-  // that is flat only nearly, the same size is a better guess than the ill-conditioned axis itself.
+  // mean(r^2 - |p|^2) = |x|^2: what the solved axes leave is the size of the flat one, not its sign. For a
+  // track that is flat only nearly, the same size is a better guess than the ill-conditioned axis itself.
   const int weak_axis = flat_axis >= 0 ? flat_axis : 0;
   if (flat_axis < 0) inside_m2 -= local_anchor[0] * local_anchor[0];
   const double size_m = std::sqrt(std::max(-mean_q - inside_m2, 0.0));
@@ -98,7 +100,8 @@ std::vector<Eigen::Vector3d> start_candidates(std::span<const Observation> obser
   centred_solutions(rows, dims, starts);
   // The nearest third: late ranges from far away pull the linear system most.
   std::ranges::sort(rows, {}, &Observation::distance_m);
-  const std::size_t near = std::max<std::size_t>(rows.size() * 35 / 100, std::min<std::size_t>(rows.size(), 8));
+  const std::size_t near =
+      std::max<std::size_t>(rows.size() * 35 / 100, std::min<std::size_t>(rows.size(), 8));
   centred_solutions(std::span(rows).first(near), dims, starts);
   const TrackShape shape = track_shape(rows);
   const std::size_t solved = starts.size();

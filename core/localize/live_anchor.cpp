@@ -13,7 +13,8 @@
 namespace anchord {
 namespace {
 
-// Errors of a moving radio stay alike for seconds; measured on real flights (see FlightOptions::correlation_s).
+// Errors of a moving radio stay alike for seconds; measured on real flights (see
+// FlightOptions::correlation_s).
 constexpr double k_correlation_s = 10.0;
 constexpr double k_floor_sigma_m = 0.04;
 
@@ -32,13 +33,14 @@ std::vector<Observation> every_nth(const std::vector<Observation>& rows, std::si
   if (rows.size() <= most) return rows;
   std::vector<Observation> few;
   const double step = static_cast<double>(rows.size()) / static_cast<double>(most);
-  for (std::size_t i = 0; i < most; ++i) few.push_back(rows[static_cast<std::size_t>(static_cast<double>(i) * step)]);
+  for (std::size_t i = 0; i < most; ++i)
+    few.push_back(rows[static_cast<std::size_t>(static_cast<double>(i) * step)]);
   return few;
 }
 
 /// The best of many starts, by cost.
-std::optional<AnchorFit> best_fit(const std::vector<Observation>& rows, const std::vector<Eigen::Vector3d>& starts,
-                                  const SolverOptions& options) {
+std::optional<AnchorFit> best_fit(const std::vector<Observation>& rows,
+                                  const std::vector<Eigen::Vector3d>& starts, const SolverOptions& options) {
   std::optional<AnchorFit> best;
   for (const auto& start : starts) {
     auto fit = solve_anchor_gauss_newton(rows, start, options);
@@ -127,7 +129,8 @@ void LiveAnchor::describe(const LiveOptions& options) {
   estimate_.reason = geometry.reason;
   estimate_.verdict = Verdict::too_few;
   if (geometry.kind == GeometryKind::too_few || rows_.size() < 5) {
-    if (estimate_.reason.empty()) estimate_.reason = "too few: " + std::to_string(rows_.size()) + " ranges, need 5";
+    if (estimate_.reason.empty())
+      estimate_.reason = "too few: " + std::to_string(rows_.size()) + " ranges, need 5";
     return;
   }
   estimate_.verdict = Verdict::diverged;
@@ -155,7 +158,8 @@ void LiveAnchor::describe(const LiveOptions& options) {
   const auto hypothesis = [&](const AnchorFit& f) {
     Hypothesis h;
     h.position.m = f.position_m;
-    h.covariance_m2 = f.covariance_m2 * inflate + Eigen::Matrix3d::Identity() * k_floor_sigma_m * k_floor_sigma_m;
+    h.covariance_m2 =
+        f.covariance_m2 * inflate + Eigen::Matrix3d::Identity() * k_floor_sigma_m * k_floor_sigma_m;
     h.rms_residual_m = rms(f.residuals_m);
     return h;
   };
@@ -180,8 +184,8 @@ void LiveAnchor::describe(const LiveOptions& options) {
   estimate_.v95_m = ellipse.v95_m;
   if (geometry.kind == GeometryKind::collinear || ellipse.h95_m > 0.2 * geometry.median_range_m) {
     char text[120];
-    std::snprintf(text, sizeof text, "weak geometry: 95 %% radius %.2f m at a median range of %.2f m", ellipse.h95_m,
-                  geometry.median_range_m);
+    std::snprintf(text, sizeof text, "weak geometry: 95 %% radius %.2f m at a median range of %.2f m",
+                  ellipse.h95_m, geometry.median_range_m);
     estimate_.verdict = Verdict::weak_geometry;
     estimate_.reason = geometry.kind == GeometryKind::collinear ? geometry.reason : text;
   }

@@ -11,7 +11,8 @@
 
 namespace anchord {
 
-/// One anchor of a live flight: its rows, thinned to a bound, and its warm estimate. Used by LiveFlight alone.
+/// One anchor of a live flight: its rows, thinned to a bound, and its warm estimate. Used by LiveFlight
+/// alone.
 class LiveAnchor {
  public:
   explicit LiveAnchor(NetworkId id) { estimate_.anchor = id; }

@@ -46,13 +46,15 @@ struct LiveFlight::State {
     result.range = range;
     result.range.cir.reset();
     result.refused = std::move(why);
-    if (range.kind == RangeKind::tag_anchor) anchors.try_emplace(range.anchor, range.anchor).first->second.refuse(result.refused);
+    if (range.kind == RangeKind::tag_anchor)
+      anchors.try_emplace(range.anchor, range.anchor).first->second.refuse(result.refused);
     keep(std::move(result));
   }
 
   void keep(RangeResult result) {
     // Whoever does not collect loses the oldest, not the memory.
-    if (results.size() >= options.max_waiting) results.erase(results.begin(), results.begin() + static_cast<std::ptrdiff_t>(results.size() / 2));
+    if (results.size() >= options.max_waiting)
+      results.erase(results.begin(), results.begin() + static_cast<std::ptrdiff_t>(results.size() / 2));
     results.push_back(std::move(result));
   }
 
@@ -171,8 +173,7 @@ void LiveFlight::add(const Range& range) {
     s.waiting.pop_front();
   }
   // Time moves on with the ranges too: without fixes a range does not wait for ever.
-  while (!s.waiting.empty() &&
-         seconds_between(s.waiting.front().time, range.time) > s.options.max_wait_s) {
+  while (!s.waiting.empty() && seconds_between(s.waiting.front().time, range.time) > s.options.max_wait_s) {
     s.refuse(s.waiting.front(), "no_fix_in_time");
     s.waiting.pop_front();
   }

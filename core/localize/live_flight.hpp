@@ -16,9 +16,9 @@ namespace anchord {
 
 /// What became of one live range.
 struct RangeResult {
-  Range range;                          ///< as received, without its CIR
-  std::string refused;                  ///< reason word; empty when used
-  std::optional<double> residual_m{};   ///< against the anchor's current estimate
+  Range range;                         ///< as received, without its CIR
+  std::string refused;                 ///< reason word; empty when used
+  std::optional<double> residual_m{};  ///< against the anchor's current estimate
   std::optional<double> sigma_m{};
   std::optional<Eigen::Vector3d> tag_enu_m{};
   bool used() const { return refused.empty(); }
@@ -28,28 +28,28 @@ struct RangeResult {
 struct LivePose {
   UtcTime time{};
   Fix fix;
-  Eigen::Vector3d enu_m{0, 0, 0};      ///< of the track point; local x, y, z in a local frame
+  Eigen::Vector3d enu_m{0, 0, 0};  ///< of the track point; local x, y, z in a local frame
   std::optional<double> speed_mps{};
 };
 
 struct LiveOptions {
   FixClass min_fix{FixClass::rtk_fixed};
-  double max_gap_s{0.5};           ///< between the two fixes round a range
-  double max_wait_s{2.0};          ///< a range whose next fix has not come by then is refused
-  double update_interval_s{0.5};   ///< per anchor, of measurement time: 2 Hz
-  std::size_t max_rows{1500};      ///< per anchor; beyond it every second row goes, old and new alike
-  std::size_t max_waiting{5000};   ///< ranges waiting for a fix; the oldest leaves first
-  double range_sigma_m{0.15};      ///< of an uncorrected range
+  double max_gap_s{0.5};          ///< between the two fixes round a range
+  double max_wait_s{2.0};         ///< a range whose next fix has not come by then is refused
+  double update_interval_s{0.5};  ///< per anchor, of measurement time: 2 Hz
+  std::size_t max_rows{1500};     ///< per anchor; beyond it every second row goes, old and new alike
+  std::size_t max_waiting{5000};  ///< ranges waiting for a fix; the oldest leaves first
+  double range_sigma_m{0.15};     ///< of an uncorrected range
   double bias_prior_sigma_m{0.3};
-  double lag_s{0.0};               ///< of a kit profile
+  double lag_s{0.0};  ///< of a kit profile
   double bias_m{0.0};
-  std::optional<Wgs84> origin{};   ///< absent: the first good fix
+  std::optional<Wgs84> origin{};  ///< absent: the first good fix
 };
 
 /// One flight as it happens: joins ranges to the track and keeps every anchor's estimate warm.
 ///
-/// Driven by measurement time only, so that a replay repeats it at any speed. Memory is bounded by LiveOptions.
-/// Not thread-safe: one strand per mission owns it.
+/// Driven by measurement time only, so that a replay repeats it at any speed. Memory is bounded by
+/// LiveOptions. Not thread-safe: one strand per mission owns it.
 class LiveFlight {
  public:
   explicit LiveFlight(Mission mission, LiveOptions options = {});
@@ -69,7 +69,8 @@ class LiveFlight {
   /// Newest answer of every anchor heard.
   std::vector<Estimate> estimates() const;
   std::optional<LivePose> pose() const;
-  std::optional<Wgs84> origin() const;  ///< of the ENU numbers; none in a local frame or before the first good fix
+  std::optional<Wgs84> origin()
+      const;  ///< of the ENU numbers; none in a local frame or before the first good fix
 
  private:
   struct State;

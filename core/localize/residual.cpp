@@ -9,10 +9,14 @@ namespace anchord {
 
 double default_bend(Loss loss) {
   switch (loss) {
-    case Loss::none: return 1.0;
-    case Loss::huber: return 1.345;
-    case Loss::cauchy: return 2.385;
-    case Loss::tukey: return 4.685;
+    case Loss::none:
+      return 1.0;
+    case Loss::huber:
+      return 1.345;
+    case Loss::cauchy:
+      return 2.385;
+    case Loss::tukey:
+      return 4.685;
   }
   return 1.0;
 }
@@ -21,11 +25,13 @@ LossValue loss_value(Loss loss, double bend, double e) {
   const double s = e * e;
   const double k2 = bend * bend;
   switch (loss) {
-    case Loss::none: return {s, 1.0};
+    case Loss::none:
+      return {s, 1.0};
     case Loss::huber:
       if (std::abs(e) <= bend) return {s, 1.0};
       return {2.0 * bend * std::abs(e) - k2, bend / std::abs(e)};
-    case Loss::cauchy: return {k2 * std::log1p(s / k2), 1.0 / (1.0 + s / k2)};
+    case Loss::cauchy:
+      return {k2 * std::log1p(s / k2), 1.0 / (1.0 + s / k2)};
     case Loss::tukey: {
       if (s >= k2) return {k2 / 3.0, 0.0};
       const double inside = 1.0 - s / k2;
@@ -40,13 +46,15 @@ double residual_m(const Observation& o, const Unknowns& at, Eigen::Vector4d* der
   const double distance_m = difference.norm();
   if (derivative) {
     // On the tag itself there is no direction; any unit vector is a subgradient, up is as good as another.
-    const Eigen::Vector3d u = distance_m > 1e-9 ? Eigen::Vector3d(difference / distance_m) : Eigen::Vector3d(0, 0, 1);
+    const Eigen::Vector3d u =
+        distance_m > 1e-9 ? Eigen::Vector3d(difference / distance_m) : Eigen::Vector3d(0, 0, 1);
     *derivative << u, 1.0;
   }
   return o.distance_m - distance_m - at[3];
 }
 
-std::vector<RowScale> row_scales(std::span<const Observation> observations, const Unknowns& at, Weights weights) {
+std::vector<RowScale> row_scales(std::span<const Observation> observations, const Unknowns& at,
+                                 Weights weights) {
   std::vector<RowScale> scales;
   scales.reserve(observations.size());
   Eigen::Vector4d derivative;
@@ -59,8 +67,8 @@ std::vector<RowScale> row_scales(std::span<const Observation> observations, cons
   return scales;
 }
 
-double robust_residual(const Observation& o, const RowScale& scale, const Unknowns& at, Loss loss, double bend,
-                       Eigen::Vector4d* derivative) {
+double robust_residual(const Observation& o, const RowScale& scale, const Unknowns& at, Loss loss,
+                       double bend, Eigen::Vector4d* derivative) {
   const double e = residual_m(o, at, derivative) / scale.sigma_m;
   const LossValue value = loss_value(loss, bend, e);
   const double size = std::sqrt(value.rho);
@@ -78,7 +86,8 @@ std::vector<int> free_unknowns(const SolverOptions& options) {
 }
 
 Result<void> SolverOptions::check() const {
-  if (!(loss_sigmas >= 0) || max_iterations < 1 || !std::isfinite(bias_prior_m) || !(bias_prior_sigma_m > 0)) {
+  if (!(loss_sigmas >= 0) || max_iterations < 1 || !std::isfinite(bias_prior_m) ||
+      !(bias_prior_sigma_m > 0)) {
     return make_error(Errc::invalid_argument,
                       "solver options: loss_sigmas >= 0, max_iterations >= 1, bias_prior_sigma_m > 0");
   }
@@ -97,11 +106,11 @@ Result<void> check_problem(std::span<const Observation> observations, const Eige
   if (!start.allFinite()) return make_error(Errc::invalid_argument, "the start is not finite");
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const auto& o = observations[i];
-    if (!o.tag_m.allFinite() || !std::isfinite(o.distance_m) || !std::isfinite(o.sigma_m) || !(o.sigma_m > 0) ||
-        !o.tag_covariance_m2.allFinite()) {
-      return make_error(Errc::invalid_argument, "observation " + std::to_string(i) + " is not usable: distance " +
-                                                    std::to_string(o.distance_m) + " m, sigma " +
-                                                    std::to_string(o.sigma_m) + " m");
+    if (!o.tag_m.allFinite() || !std::isfinite(o.distance_m) || !std::isfinite(o.sigma_m) ||
+        !(o.sigma_m > 0) || !o.tag_covariance_m2.allFinite()) {
+      return make_error(Errc::invalid_argument,
+                        "observation " + std::to_string(i) + " is not usable: distance " +
+                            std::to_string(o.distance_m) + " m, sigma " + std::to_string(o.sigma_m) + " m");
     }
   }
   return boost::outcome_v2::success();
@@ -118,7 +127,8 @@ Result<AnchorFit> finish_fit(std::span<const Observation> observations, const Un
   fit.position_m = at.head<3>();
   fit.bias_m = at[3];
   Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();  // sum of W omega u u^T
-  Eigen::Matrix4d noise = Eigen::Matrix4d::Zero();   // the same with W^2 s^2: what the noise does to the gradient
+  Eigen::Matrix4d noise =
+      Eigen::Matrix4d::Zero();  // the same with W^2 s^2: what the noise does to the gradient
   Eigen::Vector4d u;
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const double e_m = residual_m(observations[i], at, &u);
@@ -150,9 +160,10 @@ Result<AnchorFit> finish_fit(std::span<const Observation> observations, const Un
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(a);
   // 1e-10: what planning/gdop calls singular; below, the covariance would be rounding noise.
   if (!(eigen.eigenvalues().minCoeff() > 1e-10 * eigen.eigenvalues().maxCoeff())) {
-    return make_error(Errc::weak_geometry, "some direction is not measured at all: eigenvalues of the normal matrix " +
-                                               std::to_string(eigen.eigenvalues().minCoeff()) + " to " +
-                                               std::to_string(eigen.eigenvalues().maxCoeff()));
+    return make_error(Errc::weak_geometry,
+                      "some direction is not measured at all: eigenvalues of the normal matrix " +
+                          std::to_string(eigen.eigenvalues().minCoeff()) + " to " +
+                          std::to_string(eigen.eigenvalues().maxCoeff()));
   }
   const Eigen::MatrixXd inverse = a.inverse();
   const Eigen::MatrixXd covariance =

@@ -27,14 +27,16 @@ struct RowScale {
   double sigma_m{};
   double factor{};
 };
-std::vector<RowScale> row_scales(std::span<const Observation> observations, const Unknowns& at, Weights weights);
+std::vector<RowScale> row_scales(std::span<const Observation> observations, const Unknowns& at,
+                                 Weights weights);
 
 /// Residual i in metres and its derivative by the unknowns (of the prediction: d(|a - q| + b)).
 double residual_m(const Observation& o, const Unknowns& at, Eigen::Vector4d* derivative);
 
-/// Whitened robust residual m_i sqrt(rho(e/s)) with sign of e, and its derivative: squares sum to twice the cost.
-double robust_residual(const Observation& o, const RowScale& scale, const Unknowns& at, Loss loss, double bend,
-                       Eigen::Vector4d* derivative);
+/// Whitened robust residual m_i sqrt(rho(e/s)) with sign of e, and its derivative: squares sum to twice the
+/// cost.
+double robust_residual(const Observation& o, const RowScale& scale, const Unknowns& at, Loss loss,
+                       double bend, Eigen::Vector4d* derivative);
 
 /// Checks shared by both solvers.
 Result<void> check_problem(std::span<const Observation> observations, const Eigen::Vector3d& start,

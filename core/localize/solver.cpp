@@ -10,8 +10,8 @@ namespace {
 /// All ranges of one anchor in one block: one virtual call per iteration instead of one per range.
 class AllRanges final : public ceres::CostFunction {
  public:
-  AllRanges(std::span<const Observation> observations, std::vector<RowScale> scales, const SolverOptions& options,
-            double bend)
+  AllRanges(std::span<const Observation> observations, std::vector<RowScale> scales,
+            const SolverOptions& options, double bend)
       : observations_(observations), scales_(std::move(scales)), options_(options), bend_(bend) {
     mutable_parameter_block_sizes()->push_back(4);
     set_num_residuals(static_cast<int>(observations.size()) + (options.estimate_bias ? 1 : 0));
@@ -22,7 +22,8 @@ class AllRanges final : public ceres::CostFunction {
     double* jacobian = jacobians ? jacobians[0] : nullptr;
     Eigen::Vector4d row;
     for (std::size_t i = 0; i < observations_.size(); ++i) {
-      residuals[i] = robust_residual(observations_[i], scales_[i], at, options_.loss, bend_, jacobian ? &row : nullptr);
+      residuals[i] =
+          robust_residual(observations_[i], scales_[i], at, options_.loss, bend_, jacobian ? &row : nullptr);
       if (jacobian) Eigen::Map<Eigen::Vector4d>(jacobian + 4 * i) = row;
     }
     if (options_.estimate_bias) {
@@ -52,8 +53,11 @@ ceres::Solver::Options ceres_options(const SolverOptions& options) {
   ceres.num_threads = 1;
   ceres.logging_type = ceres::SILENT;
   switch (options.method) {
-    case Method::levenberg_marquardt: break;
-    case Method::dogleg: ceres.trust_region_strategy_type = ceres::DOGLEG; break;
+    case Method::levenberg_marquardt:
+      break;
+    case Method::dogleg:
+      ceres.trust_region_strategy_type = ceres::DOGLEG;
+      break;
     case Method::gauss_newton:
       // A trust region without a border: eq 7.27's step, taken unless it raises the cost.
       ceres.initial_trust_region_radius = 1e16;
@@ -75,14 +79,16 @@ Result<AnchorFit> solve_anchor(std::span<const Observation> observations, const 
   if (options.dims == Dims::two) held.push_back(2);
   if (!options.estimate_bias) held.push_back(3);
   int iterations = 0;
-  // The line of sight, and with it the projected variance, follows the anchor: solve, weigh again, until it stays.
+  // The line of sight, and with it the projected variance, follows the anchor: solve, weigh again, until it
+  // stays.
   for (int round = 0; round < 20; ++round) {
     const Unknowns before = at;
     ceres::Problem problem;
     problem.AddParameterBlock(at.data(), 4);
     if (!held.empty()) problem.SetManifold(at.data(), new ceres::SubsetManifold(4, held));
-    problem.AddResidualBlock(new AllRanges(observations, row_scales(observations, at, options.weights), options, bend),
-                             nullptr, at.data());
+    problem.AddResidualBlock(
+        new AllRanges(observations, row_scales(observations, at, options.weights), options, bend), nullptr,
+        at.data());
     ceres::Solver::Summary summary;
     ceres::Solve(ceres_options(options), &problem, &summary);
     iterations += static_cast<int>(summary.iterations.size());

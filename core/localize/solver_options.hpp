@@ -4,7 +4,8 @@
 
 namespace anchord {
 
-/// How the minimum is searched (dissertation section 7.2.4). All end at the same place on a well-posed problem.
+/// How the minimum is searched (dissertation section 7.2.4). All end at the same place on a well-posed
+/// problem.
 enum class Method : std::uint8_t { gauss_newton, levenberg_marquardt, dogleg };
 
 /// What one range counts.
@@ -17,7 +18,7 @@ enum class Weights : std::uint8_t {
 enum class Loss : std::uint8_t { none, huber, cauchy, tukey };
 
 enum class Dims : std::uint8_t {
-  two,    ///< height held at the start's
+  two,  ///< height held at the start's
   three,
 };
 

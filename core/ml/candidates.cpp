@@ -8,16 +8,22 @@ namespace {
 
 using Names = std::vector<std::string>;
 
-// Feature sets that carried over to unseen places in public data; a set counts where the data have at least its first three.
-const Names k_base{"range_m", "rx_dbm", "rx_minus_fp_db", "noise_excess_db", "fp_snr_db", "total_snr_db", "preamble_db"};
-const Names k_shape{"range_m", "rx_dbm", "rx_minus_fp_db", "noise_excess_db", "fp_snr_db", "total_snr_db", "preamble_db", "fp_shape12_db", "fp_shape32_db"};
+// Feature sets that carried over to unseen places in public data; a set counts where the data have at least
+// its first three.
+const Names k_base{"range_m",   "rx_dbm",       "rx_minus_fp_db", "noise_excess_db",
+                   "fp_snr_db", "total_snr_db", "preamble_db"};
+const Names k_shape{"range_m",      "rx_dbm",      "rx_minus_fp_db", "noise_excess_db", "fp_snr_db",
+                    "total_snr_db", "preamble_db", "fp_shape12_db",  "fp_shape32_db"};
 const Names k_levels{"range_m", "rx_dbm", "fp_dbm"};
 const Names k_first_path{"fp_free_space_db", "rx_minus_fp_db", "range_m"};
 const Names k_first_path_range{"fp_free_space_db", "rx_minus_fp_db"};
 const Names k_early{"fp_free_space_db", "early_energy", "noise_excess_db"};
-const Names k_thesis{"range_m", "rx_dbm", "fp_dbm", "mean_excess_delay_ns", "rms_delay_spread_ns", "kurtosis"};
+const Names k_thesis{"range_m", "rx_dbm", "fp_dbm", "mean_excess_delay_ns", "rms_delay_spread_ns",
+                     "kurtosis"};
 
-bool has(const Dataset& data, const std::string& name) { return std::find(data.features.begin(), data.features.end(), name) != data.features.end(); }
+bool has(const Dataset& data, const std::string& name) {
+  return std::find(data.features.begin(), data.features.end(), name) != data.features.end();
+}
 
 bool has_all(const Dataset& data, const Names& names) {
   return std::all_of(names.begin(), names.end(), [&](const auto& n) { return has(data, n); });
@@ -33,7 +39,7 @@ Recipe boosted(const LearnOptions& options, std::size_t rows) {
   Recipe r;
   r.method = Method::boosted;
   r.per_placement = options.per_placement;
-  r.clip = 0;   // trees do not extrapolate
+  r.clip = 0;  // trees do not extrapolate
   r.boosted.rounds = rows > 5000 ? 600 : 150;
   r.boosted.depth = rows > 5000 ? 6 : 3;
   r.boosted.learning_rate = 0.05;
@@ -54,12 +60,19 @@ std::vector<Recipe> classifier_candidates(const Dataset& data, const LearnOption
   if (few) plain.c = 0.3, plain.svm.c = 1, plain.forest.leaf_share = 0.08;
 
   std::vector<Names> sets;
-  if (!options.features.empty()) sets = {options.features};
-  else if (few) sets = {k_early, k_first_path_range, k_first_path, k_levels, k_thesis};
-  else if (has_all(data, k_base)) sets = {k_base, k_shape};
-  else sets = {k_levels, k_first_path, k_early};
-  if (options.features.empty() && std::none_of(sets.begin(), sets.end(), [&](const auto& s) { return has_all(data, s); })) {
-    sets = {Names(data.features.begin(), data.features.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(data.columns(), k_max_features)))};
+  if (!options.features.empty())
+    sets = {options.features};
+  else if (few)
+    sets = {k_early, k_first_path_range, k_first_path, k_levels, k_thesis};
+  else if (has_all(data, k_base))
+    sets = {k_base, k_shape};
+  else
+    sets = {k_levels, k_first_path, k_early};
+  if (options.features.empty() &&
+      std::none_of(sets.begin(), sets.end(), [&](const auto& s) { return has_all(data, s); })) {
+    sets = {Names(data.features.begin(),
+                  data.features.begin() +
+                      static_cast<std::ptrdiff_t>(std::min<std::size_t>(data.columns(), k_max_features)))};
   }
 
   // The average first: each single family fails on some set, so it must be beaten clearly, not tied.
@@ -81,10 +94,15 @@ std::vector<Recipe> classifier_candidates(const Dataset& data, const LearnOption
       }
       // The declared grid: C, SVM C x gamma, leaf.
       for (const double c : few ? std::vector<double>{0.1, 0.3, 1} : std::vector<double>{1, 3, 10, 30}) {
-        for (const double gamma : method == Method::svm || method == Method::average ? std::vector<double>{0.01, 0.03, 0.1} : std::vector<double>{0.03}) {
-          for (const double leaf : method == Method::random_forest || method == Method::average ? std::vector<double>{0.02, 0.03, 0.05, 0.08} : std::vector<double>{0.03}) {
+        for (const double gamma : method == Method::svm || method == Method::average
+                                      ? std::vector<double>{0.01, 0.03, 0.1}
+                                      : std::vector<double>{0.03}) {
+          for (const double leaf : method == Method::random_forest || method == Method::average
+                                       ? std::vector<double>{0.02, 0.03, 0.05, 0.08}
+                                       : std::vector<double>{0.03}) {
             r.c = c, r.svm.c = std::min(c, 10.0), r.svm.gamma = gamma, r.forest.leaf_share = leaf;
-            if (method == Method::random_forest && c != (few ? 0.1 : 1.0)) continue;   // C is nothing to a forest
+            if (method == Method::random_forest && c != (few ? 0.1 : 1.0))
+              continue;  // C is nothing to a forest
             add(out, data, r, set);
           }
         }
@@ -94,7 +112,9 @@ std::vector<Recipe> classifier_candidates(const Dataset& data, const LearnOption
   if ((many && !options.method) || options.method == Method::boosted) {
     auto r = boosted(options, placements);
     const auto& everything = options.features.empty() ? data.features : options.features;
-    add(out, data, r, Names(everything.begin(), everything.begin() + static_cast<std::ptrdiff_t>(std::min(everything.size(), k_max_features))));
+    add(out, data, r,
+        Names(everything.begin(),
+              everything.begin() + static_cast<std::ptrdiff_t>(std::min(everything.size(), k_max_features))));
     if (many && !options.method) {
       Recipe forest = plain;
       forest.method = Method::random_forest;
@@ -125,7 +145,7 @@ std::vector<Recipe> regressor_candidates(const Dataset& data, const LearnOptions
 
   r.method = Method::none;
   r.features = {levels.front()};
-  out.push_back(r);   // always: the row every correction is measured against
+  out.push_back(r);  // always: the row every correction is measured against
   r.method = Method::constant;
   if (wanted(r.method)) out.push_back(r);
   r.method = Method::univariate;
@@ -152,7 +172,8 @@ std::vector<Recipe> regressor_candidates(const Dataset& data, const LearnOptions
   r.method = Method::random_forest;
   r.clip = 0;
   r.forest.features_per_split = std::max<std::size_t>(1, (levels.size() + 1) / 2);
-  for (const double leaf : options.grid ? std::vector<double>{0.01, 0.02, 0.04, 0.08} : std::vector<double>{0.02}) {
+  for (const double leaf :
+       options.grid ? std::vector<double>{0.01, 0.02, 0.04, 0.08} : std::vector<double>{0.02}) {
     r.forest.leaf_share = leaf;
     if (wanted(r.method)) out.push_back(r);
   }

@@ -78,7 +78,9 @@ std::string Dataset::digest() const {
   return sha.hex();
 }
 
-std::vector<std::size_t> range_outliers(std::span<const double> range_m, std::span<const std::uint32_t> placement, double mads, double floor_m) {
+std::vector<std::size_t> range_outliers(std::span<const double> range_m,
+                                        std::span<const std::uint32_t> placement, double mads,
+                                        double floor_m) {
   std::vector<std::size_t> out;
   for (const auto& [id, rows] : rows_by(placement)) {
     if (rows.size() < 5) continue;
@@ -134,17 +136,20 @@ Dataset thin_placements(const Dataset& data, std::size_t per_placement) {
   return out;
 }
 
-std::vector<std::size_t> grouped_folds(std::span<const std::uint32_t> group, std::size_t k, std::uint64_t seed) {
+std::vector<std::size_t> grouped_folds(std::span<const std::uint32_t> group, std::size_t k,
+                                       std::uint64_t seed) {
   const auto by_group = rows_by(group);
   std::vector<std::uint32_t> order;
   for (const auto& [id, rows] : by_group) order.push_back(id);
   Random random{seed};
   random.shuffle(order);
-  std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return by_group.at(a).size() > by_group.at(b).size(); });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](auto a, auto b) { return by_group.at(a).size() > by_group.at(b).size(); });
   const std::size_t folds = std::max<std::size_t>(1, std::min(k, order.size()));
   std::vector<std::size_t> filled(folds, 0), fold(group.size(), 0);
   for (const std::uint32_t id : order) {
-    const auto lightest = static_cast<std::size_t>(std::min_element(filled.begin(), filled.end()) - filled.begin());
+    const auto lightest =
+        static_cast<std::size_t>(std::min_element(filled.begin(), filled.end()) - filled.begin());
     filled[lightest] += by_group.at(id).size();
     for (const std::size_t i : by_group.at(id)) fold[i] = lightest;
   }
@@ -158,6 +163,8 @@ std::vector<std::size_t> rows_of_fold(std::span<const std::size_t> fold, std::si
   return rows;
 }
 
-std::size_t count_distinct(std::span<const std::uint32_t> ids) { return std::set<std::uint32_t>(ids.begin(), ids.end()).size(); }
+std::size_t count_distinct(std::span<const std::uint32_t> ids) {
+  return std::set<std::uint32_t>(ids.begin(), ids.end()).size();
+}
 
 }  // namespace anchord::ml

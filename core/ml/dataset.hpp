@@ -12,13 +12,13 @@
 namespace anchord::ml {
 
 struct Dataset {
-  std::vector<std::string> features{};      ///< names, in column order
-  std::vector<double> x{};                  ///< rows() x features.size(), row after row
-  std::vector<std::uint8_t> los{};          ///< 1 LOS, 0 NLOS; empty when unlabelled
-  std::vector<double> bias_m{};             ///< measured - true range (eq 6.3); empty without truth
-  std::vector<double> weight{};             ///< > 0
-  std::vector<std::uint32_t> group{};       ///< place, room, campaign: never divided by a split
-  std::vector<std::uint32_t> placement{};   ///< repeats of one placement are near copies of each other
+  std::vector<std::string> features{};     ///< names, in column order
+  std::vector<double> x{};                 ///< rows() x features.size(), row after row
+  std::vector<std::uint8_t> los{};         ///< 1 LOS, 0 NLOS; empty when unlabelled
+  std::vector<double> bias_m{};            ///< measured - true range (eq 6.3); empty without truth
+  std::vector<double> weight{};            ///< > 0
+  std::vector<std::uint32_t> group{};      ///< place, room, campaign: never divided by a split
+  std::vector<std::uint32_t> placement{};  ///< repeats of one placement are near copies of each other
   std::vector<std::string> group_names{};
 
   std::size_t rows() const { return weight.size(); }
@@ -33,22 +33,28 @@ struct Dataset {
   Result<Dataset> with_features(std::span<const std::string> names) const;
   /// Rows of one class.
   Dataset of_class(bool is_los) const;
-  /// SHA-256 over names, values, labels, truths and groups: the same data give the same digest on every machine.
+  /// SHA-256 over names, values, labels, truths and groups: the same data give the same digest on every
+  /// machine.
   std::string digest() const;
 };
 
-/// Repeats whose range lies more than `mads` (1.4826 MAD) and `floor_m` off their placement's median; needs 5 repeats to judge.
-std::vector<std::size_t> range_outliers(std::span<const double> range_m, std::span<const std::uint32_t> placement, double mads = 8,
+/// Repeats whose range lies more than `mads` (1.4826 MAD) and `floor_m` off their placement's median; needs 5
+/// repeats to judge.
+std::vector<std::size_t> range_outliers(std::span<const double> range_m,
+                                        std::span<const std::uint32_t> placement, double mads = 8,
                                         double floor_m = 0.5);
 
 /// One row per placement: the median of each feature and of the bias (6.2.1); class by majority; weight 1.
 Dataset aggregate_placements(const Dataset& data);
 
-/// At most `per_placement` rows of each placement, evenly spread over it, each weighing 1 / their number: every placement counts alike.
+/// At most `per_placement` rows of each placement, evenly spread over it, each weighing 1 / their number:
+/// every placement counts alike.
 Dataset thin_placements(const Dataset& data, std::size_t per_placement);
 
-/// Fold 0..k-1 of each row: whole groups, shuffled by the seed, largest first into the lightest fold. Fewer groups than k: one fold each.
-std::vector<std::size_t> grouped_folds(std::span<const std::uint32_t> group, std::size_t k, std::uint64_t seed);
+/// Fold 0..k-1 of each row: whole groups, shuffled by the seed, largest first into the lightest fold. Fewer
+/// groups than k: one fold each.
+std::vector<std::size_t> grouped_folds(std::span<const std::uint32_t> group, std::size_t k,
+                                       std::uint64_t seed);
 
 /// Rows in (true) or outside (false) a fold.
 std::vector<std::size_t> rows_of_fold(std::span<const std::size_t> fold, std::size_t which, bool inside);

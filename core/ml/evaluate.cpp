@@ -6,7 +6,8 @@
 namespace anchord::ml {
 namespace {
 
-BiasEvaluation bias_of(const std::vector<double>& raw, const std::vector<double>& left, const std::vector<std::size_t>& rows) {
+BiasEvaluation bias_of(const std::vector<double>& raw, const std::vector<double>& left,
+                       const std::vector<std::size_t>& rows) {
   std::vector<double> a, b;
   for (const auto i : rows) a.push_back(raw[i]), b.push_back(left[i]);
   return {error_stats(a), error_stats(b)};
@@ -22,7 +23,8 @@ std::vector<std::size_t> rows_where(const Dataset& data, std::uint8_t is_los) {
 }  // namespace
 
 Evaluation evaluate(const Model& model, const Dataset& given) {
-  const bool one_class = given.labelled() && (model.info.task == Task::los_bias || model.info.task == Task::nlos_bias);
+  const bool one_class =
+      given.labelled() && (model.info.task == Task::los_bias || model.info.task == Task::nlos_bias);
   const Dataset data = one_class ? given.of_class(model.info.task == Task::los_bias) : given;
   Evaluation out;
   out.rows = data.rows();
@@ -59,9 +61,12 @@ Evaluation evaluate(const Model& model, const Dataset& given) {
   }
   std::map<std::uint32_t, std::vector<std::size_t>> places;
   for (std::size_t i = 0; i < data.rows(); ++i) places[data.group[i]].push_back(i);
-  if (places.size() > 1000) return out;   // no places, only rows
+  if (places.size() > 1000) return out;  // no places, only rows
   for (const auto& [group, rows] : places) {
-    PlaceEvaluation place{group < data.group_names.size() ? data.group_names[group] : std::to_string(group), rows.size(), {}, {}};
+    PlaceEvaluation place{group < data.group_names.size() ? data.group_names[group] : std::to_string(group),
+                          rows.size(),
+                          {},
+                          {}};
     if (classes) {
       Confusion c;
       for (const auto i : rows) c.count(data.los[i] != 0, p_los[i] >= model.classifier->threshold);

@@ -30,12 +30,14 @@ double loss_of(const std::vector<BaggedTree>& trees, const TrainingRows& rows) {
 
 }  // namespace
 
-Result<std::vector<Importance>> permutation_importance(const Dataset& all, const Recipe& recipe, bool classification, int repeats) {
+Result<std::vector<Importance>> permutation_importance(const Dataset& all, const Recipe& recipe,
+                                                       bool classification, int repeats) {
   BOOST_OUTCOME_TRY(const auto chosen, all.with_features(recipe.features));
   const Dataset data = thin_placements(chosen, recipe.per_placement);
   std::vector<double> y(data.los.begin(), data.los.end());
   if (!classification) y = data.bias_m;
-  if (y.size() != data.rows() || y.empty()) return make_error(Errc::invalid_argument, "the data have no answers to learn");
+  if (y.size() != data.rows() || y.empty())
+    return make_error(Errc::invalid_argument, "the data have no answers to learn");
   std::vector<double> x = data.x;
   const TrainingRows rows{x, data.columns(), y, data.weight};
   std::vector<BaggedTree> trees;
@@ -72,8 +74,10 @@ Result<std::vector<Importance>> permutation_importance(const Dataset& all, const
   return out;
 }
 
-Result<std::vector<ForwardStep>> forward_filter(const Dataset& data, Recipe recipe, const std::vector<std::string>& order,
-                                                const std::vector<std::size_t>& fold, bool classification, double least_gain) {
+Result<std::vector<ForwardStep>> forward_filter(const Dataset& data, Recipe recipe,
+                                                const std::vector<std::string>& order,
+                                                const std::vector<std::size_t>& fold, bool classification,
+                                                double least_gain) {
   recipe.features.clear();
   std::vector<ForwardStep> out;
   double best = 1e300;
@@ -82,8 +86,10 @@ Result<std::vector<ForwardStep>> forward_filter(const Dataset& data, Recipe reci
     BOOST_OUTCOME_TRY(const auto result, cross_validate(data, recipe, fold, classification));
     const bool kept = result.loss < best - least_gain;
     out.push_back({name, result.loss, kept});
-    if (kept) best = result.loss;
-    else recipe.features.pop_back();
+    if (kept)
+      best = result.loss;
+    else
+      recipe.features.pop_back();
   }
   return out;
 }

@@ -10,7 +10,8 @@
 namespace anchord::ml {
 namespace {
 
-// Log losses closer than this are noise on a few hundred placements: then the order of the candidates decides.
+// Log losses closer than this are noise on a few hundred placements: then the order of the candidates
+// decides.
 constexpr double k_tie_log_loss = 0.01;
 // Metres of mean error that one metre of harm done to the worst place is worth.
 constexpr double k_harm_price = 0.5;
@@ -32,21 +33,33 @@ bool cancelled(const LearnOptions& options, const std::string& stage, std::size_
   return options.progress && !options.progress(stage, static_cast<double>(done) / static_cast<double>(of));
 }
 
-Result<Picked> pick_classifier(const Dataset& data, const LearnOptions& options, const std::vector<std::size_t>& fold, std::vector<CandidateRow>& table) {
+Result<Picked> pick_classifier(const Dataset& data, const LearnOptions& options,
+                               const std::vector<std::size_t>& fold, std::vector<CandidateRow>& table) {
   const auto candidates = classifier_candidates(data, options);
   if (candidates.empty()) return make_error(Errc::not_found, "no candidate's features are in the data");
   std::vector<OutOfFold> results;
   std::size_t best = 0;
   for (std::size_t c = 0; c < candidates.size(); ++c) {
-    if (cancelled(options, candidates[c].describe(), c, candidates.size())) return make_error(Errc::canceled, "cancelled");
+    if (cancelled(options, candidates[c].describe(), c, candidates.size()))
+      return make_error(Errc::canceled, "cancelled");
     BOOST_OUTCOME_TRY(auto result, cross_validate(data, candidates[c], fold, true));
-    table.push_back({candidates[c].describe(), result.loss, result.loss_sd, confusion_at(result.p_los, data.los, 0.5), brier(result.p_los, data.los), {}, 0, false});
+    table.push_back({candidates[c].describe(),
+                     result.loss,
+                     result.loss_sd,
+                     confusion_at(result.p_los, data.los, 0.5),
+                     brier(result.p_los, data.los),
+                     {},
+                     0,
+                     false});
     if (!results.empty() && result.loss < results[best].loss - k_tie_log_loss) best = c;
     results.push_back(std::move(result));
   }
   table[best].picked = true;
-  std::string why = candidates.size() == 1 ? "the only candidate: " : "lowest grouped log loss, ties within 0.01 to the earlier in the table: ";
-  why += candidates[best].describe() + " " + fixed(results[best].loss, 3) + " over " + std::to_string(candidates.size()) + " candidates";
+  std::string why = candidates.size() == 1
+                        ? "the only candidate: "
+                        : "lowest grouped log loss, ties within 0.01 to the earlier in the table: ";
+  why += candidates[best].describe() + " " + fixed(results[best].loss, 3) + " over " +
+         std::to_string(candidates.size()) + " candidates";
   return Picked{candidates[best], std::move(results[best]), why};
 }
 
@@ -60,20 +73,27 @@ double threshold_for(std::span<const double> p_los, std::span<const std::uint8_t
 
 }  // namespace
 
-Result<Learned> learn_class(const Dataset& data, const LearnOptions& options, const std::vector<std::size_t>& fold) {
+Result<Learned> learn_class(const Dataset& data, const LearnOptions& options,
+                            const std::vector<std::size_t>& fold) {
   Learned out;
   BOOST_OUTCOME_TRY(auto picked, pick_classifier(data, options, fold, out.table));
   BOOST_OUTCOME_TRY(auto classifier, fit_classifier(data, picked.recipe));
   classifier.slope = picked.out_of_fold.platt.slope;
   classifier.offset = picked.out_of_fold.platt.offset;
-  if (options.max_fpr) classifier.threshold = threshold_for(picked.out_of_fold.p_los, data.los, *options.max_fpr);
+  if (options.max_fpr)
+    classifier.threshold = threshold_for(picked.out_of_fold.p_los, data.los, *options.max_fpr);
   out.p_los = std::move(picked.out_of_fold.p_los);
   const auto c = confusion_at(out.p_los, data.los, classifier.threshold);
   out.model.info.features = picked.recipe.features;
   out.model.info.method = picked.recipe.describe();
   out.model.info.why = picked.why;
-  out.model.info.metrics = {{"accuracy", c.accuracy()}, {"balanced_accuracy", c.balanced_accuracy()}, {"fpr", c.fpr()}, {"fnr", c.fnr()},
-                            {"log_loss", picked.out_of_fold.loss}, {"log_loss_sd", picked.out_of_fold.loss_sd}, {"brier", brier(out.p_los, data.los)}};
+  out.model.info.metrics = {{"accuracy", c.accuracy()},
+                            {"balanced_accuracy", c.balanced_accuracy()},
+                            {"fpr", c.fpr()},
+                            {"fnr", c.fnr()},
+                            {"log_loss", picked.out_of_fold.loss},
+                            {"log_loss_sd", picked.out_of_fold.loss_sd},
+                            {"brier", brier(out.p_los, data.los)}};
   out.model.classifier = std::move(classifier);
   return out;
 }
@@ -89,7 +109,8 @@ std::vector<double> minus(std::span<const double> a, std::span<const double> b, 
 // Robust spread of what the correction leaves: quantile of 68 % of the magnitudes, never below 5 mm.
 double spread_m(std::span<const double> residual_m, std::span<const double> weight) {
   std::vector<std::pair<double, double>> squares;
-  for (std::size_t i = 0; i < residual_m.size(); ++i) squares.emplace_back(std::abs(residual_m[i]), weight[i]);
+  for (std::size_t i = 0; i < residual_m.size(); ++i)
+    squares.emplace_back(std::abs(residual_m[i]), weight[i]);
   std::sort(squares.begin(), squares.end());
   double total = 0, below = 0;
   for (const auto& [value, w] : squares) total += w;
@@ -110,19 +131,30 @@ double gaussian_nll(std::span<const double> residual_m, std::span<const double> 
   return sum / total;
 }
 
-Result<Learned> learn_regression(const Dataset& data, const LearnOptions& options, const std::vector<std::size_t>& fold) {
+Result<Learned> learn_regression(const Dataset& data, const LearnOptions& options,
+                                 const std::vector<std::size_t>& fold) {
   Learned out;
   const auto candidates = regressor_candidates(data, options);
   std::vector<OutOfFold> results;
   std::size_t best = options.method && candidates.size() > 1 ? 1 : 0;
   std::size_t constant = 0;
-  const auto cost = [](const OutOfFold& r) { return r.loss + k_harm_price * std::max(0.0, r.worst_harm_m - k_harmless_m); };
+  const auto cost = [](const OutOfFold& r) {
+    return r.loss + k_harm_price * std::max(0.0, r.worst_harm_m - k_harmless_m);
+  };
   for (std::size_t c = 0; c < candidates.size(); ++c) {
-    if (cancelled(options, candidates[c].describe(), c, candidates.size())) return make_error(Errc::canceled, "cancelled");
+    if (cancelled(options, candidates[c].describe(), c, candidates.size()))
+      return make_error(Errc::canceled, "cancelled");
     BOOST_OUTCOME_TRY(auto result, cross_validate(data, candidates[c], fold, false));
     const auto left = minus(data.bias_m, result.bias_m, 1);
     const bool none = candidates[c].method == Method::none;
-    out.table.push_back({none ? "none (no correction)" : candidates[c].describe(), result.loss, result.loss_sd, {}, 0, error_stats(left), result.worst_harm_m, false});
+    out.table.push_back({none ? "none (no correction)" : candidates[c].describe(),
+                         result.loss,
+                         result.loss_sd,
+                         {},
+                         0,
+                         error_stats(left),
+                         result.worst_harm_m,
+                         false});
     results.push_back(std::move(result));
     if (candidates[c].method == Method::constant) constant = c;
     if (c > best && cost(results[c]) < cost(results[best]) * 0.99 - 1e-4) best = c;
@@ -139,9 +171,17 @@ Result<Learned> learn_regression(const Dataset& data, const LearnOptions& option
   const auto raw = error_stats(data.bias_m), corrected = error_stats(left);
   out.model.info.features = candidates[best].features;
   out.model.info.method = candidates[best].describe();
-  out.model.info.why = "lowest grouped MAE plus 0.5 of the worst place's harm beyond 2 cm, ties within 1 % to the earlier in the table, over " + std::to_string(candidates.size()) + " candidates";
-  out.model.info.metrics = {{"mae_raw_m", raw.mae_m}, {"mae_m", corrected.mae_m}, {"mse_raw_m2", raw.mse_m2}, {"mse_m2", corrected.mse_m2},
-                            {"worst_place_harm_m", results[best].worst_harm_m}, {"nll", out.nll}, {"nll_constants", out.nll_constants}};
+  out.model.info.why =
+      "lowest grouped MAE plus 0.5 of the worst place's harm beyond 2 cm, ties within 1 % to the earlier in "
+      "the table, over " +
+      std::to_string(candidates.size()) + " candidates";
+  out.model.info.metrics = {{"mae_raw_m", raw.mae_m},
+                            {"mae_m", corrected.mae_m},
+                            {"mse_raw_m2", raw.mse_m2},
+                            {"mse_m2", corrected.mse_m2},
+                            {"worst_place_harm_m", results[best].worst_harm_m},
+                            {"nll", out.nll},
+                            {"nll_constants", out.nll_constants}};
   out.model.regressor = std::move(regressor);
   return out;
 }
@@ -149,11 +189,16 @@ Result<Learned> learn_regression(const Dataset& data, const LearnOptions& option
 }  // namespace
 
 Result<Learned> learn(const Dataset& data, const LearnOptions& options) {
-  if (count_distinct(data.group) < 2) return make_error(Errc::too_few_observations, "all rows are of one place: nothing can be held out; name other columns with --group-by");
+  if (count_distinct(data.group) < 2)
+    return make_error(
+        Errc::too_few_observations,
+        "all rows are of one place: nothing can be held out; name other columns with --group-by");
   const auto fold = grouped_folds(data.group, options.folds, options.seed);
   const bool classes = options.task == Task::nlos_id || (options.task == Task::bias && data.labelled());
-  if (options.task != Task::nlos_id && !data.has_truth()) return make_error(Errc::not_found, "a bias needs true ranges");
-  if (options.task == Task::nlos_id && !data.labelled()) return make_error(Errc::not_found, "identification needs labels");
+  if (options.task != Task::nlos_id && !data.has_truth())
+    return make_error(Errc::not_found, "a bias needs true ranges");
+  if (options.task == Task::nlos_id && !data.labelled())
+    return make_error(Errc::not_found, "identification needs labels");
   const bool mixture = options.task == Task::bias && classes && !options.method;
   auto learned = options.task == Task::nlos_id ? learn_class(data, options, fold)
                  : mixture                     ? learn_bias_mixture(data, options, fold)

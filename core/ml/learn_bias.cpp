@@ -8,7 +8,7 @@
 namespace anchord::ml {
 namespace {
 
-constexpr double k_harm_price = 0.5;      // metres of mean error that a metre of harm to the worst place is worth
+constexpr double k_harm_price = 0.5;  // metres of mean error that a metre of harm to the worst place is worth
 constexpr double k_harmless_m = 0.02;
 
 struct Shape {
@@ -26,7 +26,8 @@ std::vector<std::size_t> indices_of(const Dataset& data, const std::vector<std::
 }
 
 // Rows thinned as in training, with their out-of-fold probabilities.
-Result<BiasMixture> fit_on(const Dataset& data, const std::vector<double>& p_los, const std::vector<std::size_t>& rows, const Shape& shape, bool features) {
+Result<BiasMixture> fit_on(const Dataset& data, const std::vector<double>& p_los,
+                           const std::vector<std::size_t>& rows, const Shape& shape, bool features) {
   Dataset part = data.subset(rows);
   // The probability rides along as a column through the thinning.
   part.features.emplace_back("p_los");
@@ -40,7 +41,9 @@ Result<BiasMixture> fit_on(const Dataset& data, const std::vector<double>& p_los
   part = thin_placements(part, 5);
   std::vector<double> p;
   for (std::size_t i = 0; i < part.rows(); ++i) p.push_back(part.row(i).back());
-  MixtureTask task{part.x, part.columns(), part.bias_m, part.weight, p, part.los, indices_of(data, shape.shared), {}, shape.kappa};
+  MixtureTask task{
+      part.x, part.columns(), part.bias_m, part.weight, p, part.los, indices_of(data, shape.shared),
+      {},     shape.kappa};
   if (features) task.tail_features = indices_of(data, {"rx_free_space_db", "rx_minus_fp_db"});
   return fit_mixture(task);
 }
@@ -53,7 +56,9 @@ Result<double> los_loss(const Dataset& data, const std::vector<std::size_t>& fol
   for (std::size_t k = 0; k < folds; ++k) {
     Dataset train = data.subset(rows_of_fold(fold, k, false));
     train = thin_placements(train, 5);
-    MixtureTask task{train.x, train.columns(), train.bias_m, train.weight, {}, train.los, indices_of(data, shape.shared), {}, shape.kappa};
+    MixtureTask task{
+        train.x, train.columns(), train.bias_m, train.weight, {}, train.los, indices_of(data, shape.shared),
+        {},      shape.kappa};
     BOOST_OUTCOME_TRY(const auto shared, fit_shared_bias(task));
     BiasMixture m;
     m.shared = shared;
@@ -84,13 +89,15 @@ CandidateRow bias_row(const Dataset& data, std::string name, const std::vector<d
 }
 
 // The comparison of the literature: medians of the two classes, weighted by the probability.
-std::vector<double> weighted_class_medians(const Dataset& data, const std::vector<double>& p_los, const std::vector<std::size_t>& fold) {
+std::vector<double> weighted_class_medians(const Dataset& data, const std::vector<double>& p_los,
+                                           const std::vector<std::size_t>& fold) {
   std::vector<double> out(data.rows());
   const auto weight = placement_weights(data);
   const std::size_t folds = *std::max_element(fold.begin(), fold.end()) + 1;
   for (std::size_t k = 0; k < folds; ++k) {
     std::vector<std::pair<double, double>> los, nlos;
-    for (const auto i : rows_of_fold(fold, k, false)) (data.los[i] ? los : nlos).emplace_back(data.bias_m[i], weight[i]);
+    for (const auto i : rows_of_fold(fold, k, false))
+      (data.los[i] ? los : nlos).emplace_back(data.bias_m[i], weight[i]);
     const double a = weighted_median(std::move(los)), b = weighted_median(std::move(nlos));
     for (const auto i : rows_of_fold(fold, k, true)) out[i] = p_los[i] * a + (1 - p_los[i]) * b;
   }
@@ -99,16 +106,20 @@ std::vector<double> weighted_class_medians(const Dataset& data, const std::vecto
 
 }  // namespace
 
-Result<Learned> learn_bias_mixture(const Dataset& data, const LearnOptions& options, const std::vector<std::size_t>& fold) {
+Result<Learned> learn_bias_mixture(const Dataset& data, const LearnOptions& options,
+                                   const std::vector<std::size_t>& fold) {
   LearnOptions identify = options;
   identify.task = Task::nlos_id;
   BOOST_OUTCOME_TRY(auto out, learn_class(data, identify, fold));
-  const auto cancelled = [&](const char* stage, double share) { return options.progress && !options.progress(stage, share); };
+  const auto cancelled = [&](const char* stage, double share) {
+    return options.progress && !options.progress(stage, share);
+  };
 
   // Shared curve by held-out LOS rows; a constant unless a curve is clearly better.
   Shape best_shape;
   BOOST_OUTCOME_TRY(double best_loss, los_loss(data, fold, best_shape));
-  for (const auto& names : {std::vector<std::string>{"range_m", "range_db"}, std::vector<std::string>{"range_m", "fp_dbm", "noise_excess_db"}}) {
+  for (const auto& names : {std::vector<std::string>{"range_m", "range_db"},
+                            std::vector<std::string>{"range_m", "fp_dbm", "noise_excess_db"}}) {
     if (indices_of(data, names).size() != names.size()) continue;
     for (const double kappa : {0.5, 1.0}) {
       if (cancelled("shared bias", 0.2)) return make_error(Errc::canceled, "cancelled");
@@ -128,7 +139,8 @@ Result<Learned> learn_bias_mixture(const Dataset& data, const LearnOptions& opti
   std::array<std::vector<double>, 2> quantile;
   for (auto& q : quantile) q.resize(data.rows());
   for (std::size_t k = 0; k < folds; ++k) {
-    if (cancelled("bias mixture", 0.3 + 0.6 * static_cast<double>(k) / static_cast<double>(folds))) return make_error(Errc::canceled, "cancelled");
+    if (cancelled("bias mixture", 0.3 + 0.6 * static_cast<double>(k) / static_cast<double>(folds)))
+      return make_error(Errc::canceled, "cancelled");
     const auto outside = rows_of_fold(fold, k, false);
     BOOST_OUTCOME_TRY(const auto mixture, fit_on(data, out.p_los, outside, best_shape, true));
     BOOST_OUTCOME_TRY(const auto constants, fit_on(data, base_rate, outside, {}, false));
@@ -136,20 +148,24 @@ Result<Learned> learn_bias_mixture(const Dataset& data, const LearnOptions& opti
       const auto density = density_of(mixture, out.p_los[i], data.row(i));
       for (std::size_t q = 0; q < 2; ++q) quantile[q][i] = density.quantile(k_quantiles[q]);
       out.nll -= weight[i] * density.log_density(data.bias_m[i]) / total;
-      out.nll_constants -= weight[i] * density_of(constants, base_rate[i], data.row(i)).log_density(data.bias_m[i]) / total;
+      out.nll_constants -=
+          weight[i] * density_of(constants, base_rate[i], data.row(i)).log_density(data.bias_m[i]) / total;
     }
   }
 
-  // How much of it to apply: least mean error, harm to the worst place beyond 2 cm priced in; nothing at all is among the choices.
-  std::vector<CandidateRow> table{bias_row(data, "none (no correction)", std::vector<double>(data.rows(), 0.0)),
-                                  bias_row(data, "class medians weighted by P(LOS)", weighted_class_medians(data, out.p_los, fold))};
+  // How much of it to apply: least mean error, harm to the worst place beyond 2 cm priced in; nothing at all
+  // is among the choices.
+  std::vector<CandidateRow> table{
+      bias_row(data, "none (no correction)", std::vector<double>(data.rows(), 0.0)),
+      bias_row(data, "class medians weighted by P(LOS)", weighted_class_medians(data, out.p_los, fold))};
   double best_cost = 1e9, best_q = 0.5, best_gain = 0;
   std::size_t best_row = 0;
   for (std::size_t q = 0; q < 2; ++q) {
     for (const double gain : k_gains) {
       std::vector<double> correction;
       for (const double v : quantile[q]) correction.push_back(gain * v);
-      auto row = bias_row(data, "mixture, quantile " + fixed(k_quantiles[q]) + ", gain " + fixed(gain), correction);
+      auto row =
+          bias_row(data, "mixture, quantile " + fixed(k_quantiles[q]) + ", gain " + fixed(gain), correction);
       const double cost = row.error.mae_m + k_harm_price * std::max(0.0, row.worst_harm_m - k_harmless_m);
       if (gain > 0) table.push_back(row);
       if (cost < best_cost - 1e-4) {
@@ -167,7 +183,9 @@ Result<Learned> learn_bias_mixture(const Dataset& data, const LearnOptions& opti
   std::vector<std::string> wanted = best_shape.shared;
   wanted.insert(wanted.end(), {"rx_free_space_db", "rx_minus_fp_db"});
   for (const auto& name : wanted)
-    if (!indices_of(data, {name}).empty() && std::find(features.begin(), features.end(), name) == features.end()) features.push_back(name);
+    if (!indices_of(data, {name}).empty() &&
+        std::find(features.begin(), features.end(), name) == features.end())
+      features.push_back(name);
   BOOST_OUTCOME_TRY(const auto narrowed, data.with_features(features));
   BOOST_OUTCOME_TRY(auto mixture, fit_on(narrowed, out.p_los, all, best_shape, true));
   mixture.quantile = best_q;
@@ -175,11 +193,20 @@ Result<Learned> learn_bias_mixture(const Dataset& data, const LearnOptions& opti
 
   auto& info = out.model.info;
   info.features = features;
-  info.why += "; bias: mixture, shared curve " + (best_shape.shared.empty() ? std::string{"constant"} : "of " + best_shape.shared.front() + " and others, kappa " + fixed(best_shape.kappa)) +
-              "; quantile " + fixed(best_q) + " and gain " + fixed(best_gain) + " had the least held-out error with harm beyond 2 cm priced in";
+  info.why += "; bias: mixture, shared curve " +
+              (best_shape.shared.empty()
+                   ? std::string{"constant"}
+                   : "of " + best_shape.shared.front() + " and others, kappa " + fixed(best_shape.kappa)) +
+              "; quantile " + fixed(best_q) + " and gain " + fixed(best_gain) +
+              " had the least held-out error with harm beyond 2 cm priced in";
   const auto raw = table.front().error, corrected = table[best_row].error;
-  info.metrics.insert(info.metrics.end(), {{"mae_raw_m", raw.mae_m}, {"mae_m", corrected.mae_m}, {"mse_raw_m2", raw.mse_m2}, {"mse_m2", corrected.mse_m2},
-                                           {"worst_place_harm_m", table[best_row].worst_harm_m}, {"nll", out.nll}, {"nll_constants", out.nll_constants}});
+  info.metrics.insert(info.metrics.end(), {{"mae_raw_m", raw.mae_m},
+                                           {"mae_m", corrected.mae_m},
+                                           {"mse_raw_m2", raw.mse_m2},
+                                           {"mse_m2", corrected.mse_m2},
+                                           {"worst_place_harm_m", table[best_row].worst_harm_m},
+                                           {"nll", out.nll},
+                                           {"nll_constants", out.nll_constants}});
   out.model.mixture = std::move(mixture);
   for (auto& row : out.table) row.picked = false;
   out.table = std::move(table);

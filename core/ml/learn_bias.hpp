@@ -5,10 +5,12 @@
 namespace anchord::ml {
 
 /// Identification alone: candidates, pick, refit, calibration.
-Result<Learned> learn_class(const Dataset& data, const LearnOptions& options, const std::vector<std::size_t>& fold);
+Result<Learned> learn_class(const Dataset& data, const LearnOptions& options,
+                            const std::vector<std::size_t>& fold);
 
-/// Classifier and bias mixture together: the mixture is fitted on out-of-fold probabilities, and how much of its correction is applied
-/// (quantile and gain) is what helped on held-out places without harming one.
-Result<Learned> learn_bias_mixture(const Dataset& data, const LearnOptions& options, const std::vector<std::size_t>& fold);
+/// Classifier and bias mixture together: the mixture is fitted on out-of-fold probabilities, and how much of
+/// its correction is applied (quantile and gain) is what helped on held-out places without harming one.
+Result<Learned> learn_bias_mixture(const Dataset& data, const LearnOptions& options,
+                                   const std::vector<std::size_t>& fold);
 
 }  // namespace anchord::ml

@@ -26,7 +26,8 @@ Confusion confusion_at(std::span<const double> p_los, std::span<const std::uint8
   return c;
 }
 
-double brier(std::span<const double> p_los, std::span<const std::uint8_t> los, std::span<const double> weight) {
+double brier(std::span<const double> p_los, std::span<const std::uint8_t> los,
+             std::span<const double> weight) {
   double sum = 0, total = 0;
   for (std::size_t i = 0; i < p_los.size(); ++i) {
     const double w = weight.empty() ? 1 : weight[i];
@@ -37,7 +38,8 @@ double brier(std::span<const double> p_los, std::span<const std::uint8_t> los, s
   return ratio(sum, total);
 }
 
-double log_loss(std::span<const double> p_los, std::span<const std::uint8_t> los, std::span<const double> weight) {
+double log_loss(std::span<const double> p_los, std::span<const std::uint8_t> los,
+                std::span<const double> weight) {
   double sum = 0, total = 0;
   for (std::size_t i = 0; i < p_los.size(); ++i) {
     const double w = weight.empty() ? 1 : weight[i];
@@ -66,7 +68,8 @@ std::vector<RocPoint> roc(std::span<const double> p_los, std::span<const std::ui
 
 double area_under(std::span<const RocPoint> curve) {
   double area = 0;
-  for (std::size_t i = 1; i < curve.size(); ++i) area += 0.5 * (curve[i].fpr - curve[i - 1].fpr) * (curve[i].tpr + curve[i - 1].tpr);
+  for (std::size_t i = 1; i < curve.size(); ++i)
+    area += 0.5 * (curve[i].fpr - curve[i - 1].fpr) * (curve[i].tpr + curve[i - 1].tpr);
   return area;
 }
 
@@ -83,7 +86,9 @@ ErrorStats error_stats(std::span<const double> error_m) {
   return stats;
 }
 
-double improvement(double uncorrected, double corrected) { return uncorrected > 0 ? (uncorrected - corrected) / uncorrected : 0; }
+double improvement(double uncorrected, double corrected) {
+  return uncorrected > 0 ? (uncorrected - corrected) / uncorrected : 0;
+}
 
 std::vector<CdfPoint> cdf_of_magnitude(std::span<const double> value_m, std::size_t points) {
   std::vector<double> sorted;

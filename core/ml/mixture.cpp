@@ -7,7 +7,7 @@
 namespace anchord::ml {
 namespace {
 
-constexpr double k_uniform = 0.01;          // share of ranges nothing explains
+constexpr double k_uniform = 0.01;  // share of ranges nothing explains
 constexpr double k_uniform_width_m = 10.0;
 
 double normal_cdf(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
@@ -47,8 +47,9 @@ double BiasMixture::shared_m(std::span<const double> features) const {
 
 double BiasMixture::tau_m(std::span<const double> features) const {
   double log_value = log_tau;
-  for (const auto& term : tail) log_value += term.weight * std::clamp((features[term.feature] - term.mean) / term.sd, -2.0, 2.0);
-  return std::exp(std::clamp(log_value, -6.0, 3.0));   // 2.5 mm .. 20 m
+  for (const auto& term : tail)
+    log_value += term.weight * std::clamp((features[term.feature] - term.mean) / term.sd, -2.0, 2.0);
+  return std::exp(std::clamp(log_value, -6.0, 3.0));  // 2.5 mm .. 20 m
 }
 
 double BiasDensity::log_density(double bias_m) const {
@@ -56,14 +57,17 @@ double BiasDensity::log_density(double bias_m) const {
   const double z = (e - m0_m) / s0_m;
   const double los = std::exp(-0.5 * z * z) / (s0_m * std::sqrt(2 * std::numbers::pi));
   const double nlos = std::exp(emg_log_density(e, m1_m, s1_m, tau_m));
-  const double uniform = std::abs(e) <= 0.5 * k_uniform_width_m ? 1 / k_uniform_width_m : 1e-3 / k_uniform_width_m;
+  const double uniform =
+      std::abs(e) <= 0.5 * k_uniform_width_m ? 1 / k_uniform_width_m : 1e-3 / k_uniform_width_m;
   return std::log((1 - k_uniform) * (p_los * los + (1 - p_los) * nlos) + k_uniform * uniform);
 }
 
 double BiasDensity::cdf(double bias_m) const {
   const double e = bias_m - shared_m;
   const double uniform = std::clamp(0.5 + e / k_uniform_width_m, 0.0, 1.0);
-  return (1 - k_uniform) * (p_los * normal_cdf((e - m0_m) / s0_m) + (1 - p_los) * emg_cdf(e, m1_m, s1_m, tau_m)) + k_uniform * uniform;
+  return (1 - k_uniform) *
+             (p_los * normal_cdf((e - m0_m) / s0_m) + (1 - p_los) * emg_cdf(e, m1_m, s1_m, tau_m)) +
+         k_uniform * uniform;
 }
 
 double BiasDensity::quantile(double q) const {
@@ -80,7 +84,8 @@ double BiasDensity::mean_m() const { return shared_m + p_los * m0_m + (1 - p_los
 double BiasDensity::sigma_m() const {
   const double los = m0_m, nlos = m1_m + tau_m;
   const double mean = p_los * los + (1 - p_los) * nlos;
-  const double second = p_los * (s0_m * s0_m + los * los) + (1 - p_los) * (s1_m * s1_m + tau_m * tau_m + nlos * nlos);
+  const double second =
+      p_los * (s0_m * s0_m + los * los) + (1 - p_los) * (s1_m * s1_m + tau_m * tau_m + nlos * nlos);
   return std::sqrt(std::max(1e-6, second - mean * mean));
 }
 

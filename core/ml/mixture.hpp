@@ -10,16 +10,16 @@ namespace anchord::ml {
 /// Density of the range bias of a link of which only P(LOS) is known.
 ///
 /// e = bias - b0(x);  f(e) = .99 [p N(e; m0, s0) + (1 - p) EMG(e; m1, s1, tau)] + .01 / 10 m
-/// with p = P(LOS), EMG a Gaussian plus an exponential delay of mean tau (a blocked path arrives late, never early), and
-/// ln tau = a0 + a1 z(X) + a2 z(D) over the free-space level X and the first-path difference D, each z clipped to +-2.
-/// b0 is the bias both classes share (antenna delay, level): k + kappa (g(x) - k).
-/// The correction is a quantile of the whole, not the mean: a doubtful range is moved little.
+/// with p = P(LOS), EMG a Gaussian plus an exponential delay of mean tau (a blocked path arrives late, never
+/// early), and ln tau = a0 + a1 z(X) + a2 z(D) over the free-space level X and the first-path difference D,
+/// each z clipped to +-2. b0 is the bias both classes share (antenna delay, level): k + kappa (g(x) - k). The
+/// correction is a quantile of the whole, not the mean: a doubtful range is moved little.
 struct BiasMixture {
   struct Shared {
-    double centre_m{};                          ///< k
-    double kappa{};                             ///< 0: the constant alone
-    std::vector<std::size_t> features{};        ///< indices into the model's features
-    std::vector<double> mean{}, sd{}, low{}, high{}, weight{};   ///< g: clip to low..high, standardise, weigh
+    double centre_m{};                                          ///< k
+    double kappa{};                                             ///< 0: the constant alone
+    std::vector<std::size_t> features{};                        ///< indices into the model's features
+    std::vector<double> mean{}, sd{}, low{}, high{}, weight{};  ///< g: clip to low..high, standardise, weigh
     double offset_m{};
   };
   struct TailTerm {
@@ -28,10 +28,10 @@ struct BiasMixture {
   };
   Shared shared{};
   double m0_m{}, s0_m{0.1}, m1_m{}, s1_m{0.1};
-  double log_tau{};                 ///< a0, tau in metres
-  std::vector<TailTerm> tail{};     ///< a1, a2
-  double quantile{0.5};             ///< which quantile corrects
-  double gain{1};                   ///< share of the correction that is applied
+  double log_tau{};              ///< a0, tau in metres
+  std::vector<TailTerm> tail{};  ///< a1, a2
+  double quantile{0.5};          ///< which quantile corrects
+  double gain{1};                ///< share of the correction that is applied
 
   double shared_m(std::span<const double> features) const;
   double tau_m(std::span<const double> features) const;
@@ -43,9 +43,9 @@ struct BiasDensity {
 
   double log_density(double bias_m) const;
   double cdf(double bias_m) const;
-  double quantile(double q) const;     ///< bisection to 0.1 mm
-  double mean_m() const;               ///< without the uniform part
-  double sigma_m() const;              ///< sd without the uniform part
+  double quantile(double q) const;  ///< bisection to 0.1 mm
+  double mean_m() const;            ///< without the uniform part
+  double sigma_m() const;           ///< sd without the uniform part
 };
 
 BiasDensity density_of(const BiasMixture& mixture, double p_los, std::span<const double> features);

@@ -18,7 +18,9 @@ double dot(const double* a, const double* b, std::size_t n) {
   return sum;
 }
 
-double raw(const Linear& m, std::span<const double> x) { return m.offset + dot(m.weights.data(), x.data(), m.weights.size()); }
+double raw(const Linear& m, std::span<const double> x) {
+  return m.offset + dot(m.weights.data(), x.data(), m.weights.size());
+}
 
 double raw(const Polynomial& m, std::span<const double> x) {
   double sum = 0;
@@ -34,7 +36,8 @@ double raw(const Trees& m, std::span<const double> x) {
   double sum = 0;
   const auto* nodes = m.nodes.data();
   for (std::uint32_t at : m.roots) {
-    while (nodes[at].feature >= 0) at = nodes[at].left + (x[static_cast<std::size_t>(nodes[at].feature)] < nodes[at].value ? 0U : 1U);
+    while (nodes[at].feature >= 0)
+      at = nodes[at].left + (x[static_cast<std::size_t>(nodes[at].feature)] < nodes[at].value ? 0U : 1U);
     sum += nodes[at].value;
   }
   return m.base + m.scale * sum;
@@ -52,9 +55,15 @@ double raw(const Svm& m, std::span<const double> x) {
     const double* s = m.support.data() + i * m.dims;
     double k = 0;
     switch (m.kernel) {
-      case Kernel::linear: k = dot(s, x.data(), m.dims); break;
-      case Kernel::polynomial: k = power(m.gamma * dot(s, x.data(), m.dims) + m.coef0, m.degree); break;
-      case Kernel::sigmoid: k = std::tanh(m.gamma * dot(s, x.data(), m.dims) + m.coef0); break;
+      case Kernel::linear:
+        k = dot(s, x.data(), m.dims);
+        break;
+      case Kernel::polynomial:
+        k = power(m.gamma * dot(s, x.data(), m.dims) + m.coef0, m.degree);
+        break;
+      case Kernel::sigmoid:
+        k = std::tanh(m.gamma * dot(s, x.data(), m.dims) + m.coef0);
+        break;
       case Kernel::rbf: {
         double d2 = 0;
         for (std::size_t j = 0; j < m.dims; ++j) d2 += (s[j] - x[j]) * (s[j] - x[j]);
@@ -83,14 +92,15 @@ double score(const Scorer& scorer, std::span<const double> x) {
 }
 
 double Classifier::mean_logit(std::span<const double> features) const {
-  ANCHORD_CHECK(scaler.mean.size() <= k_max_features && features.size() >= scaler.mean.size(), features.size() << " features given");
+  ANCHORD_CHECK(scaler.mean.size() <= k_max_features && features.size() >= scaler.mean.size(),
+                features.size() << " features given");
   std::array<double, k_max_features> z;
   scaler.apply(features, z);
   double sum = 0;
   for (const auto& member : members) {
     double s = score(member.scorer, {z.data(), scaler.mean.size()});
     if (member.share) {
-      s = std::clamp(s, 0.01, 0.99);   // a forest of one opinion is not certainty
+      s = std::clamp(s, 0.01, 0.99);  // a forest of one opinion is not certainty
       s = std::log(s / (1 - s));
     }
     sum += member.slope * s + member.offset;
@@ -103,11 +113,13 @@ double Classifier::p_los(std::span<const double> features) const {
 }
 
 double Regressor::bias_m(std::span<const double> features) const {
-  ANCHORD_CHECK(scaler.mean.size() <= k_max_features && features.size() >= scaler.mean.size(), features.size() << " features given");
+  ANCHORD_CHECK(scaler.mean.size() <= k_max_features && features.size() >= scaler.mean.size(),
+                features.size() << " features given");
   std::array<double, k_max_features> z;
   // A curve says nothing beyond the rows it was fitted to: 4 sd off, its answer counts half.
   double beyond_sd = 0;
-  for (std::size_t i = 0; i < scaler.mean.size(); ++i) beyond_sd = std::max(beyond_sd, std::abs(features[i] - scaler.mean[i]) / scaler.sd[i] - 3.0);
+  for (std::size_t i = 0; i < scaler.mean.size(); ++i)
+    beyond_sd = std::max(beyond_sd, std::abs(features[i] - scaler.mean[i]) / scaler.sd[i] - 3.0);
   scaler.apply(features, z);
   const double answer = std::clamp(score(scorer, {z.data(), scaler.mean.size()}), min_m, max_m);
   return fallback_m + (answer - fallback_m) / (1 + beyond_sd * beyond_sd);

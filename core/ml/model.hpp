@@ -11,7 +11,8 @@
 
 #include "core/ml/mixture.hpp"
 
-/// Fitted models as plain values, and their prediction: flat, free of allocation, equal on every machine that computes IEEE doubles.
+/// Fitted models as plain values, and their prediction: flat, free of allocation, equal on every machine that
+/// computes IEEE doubles.
 namespace anchord::ml {
 
 /// No model may look at more; keeps prediction on the stack.
@@ -29,7 +30,8 @@ struct Linear {
   double offset{};
 };
 
-/// Sum of coefficient times product of features; a term names each feature as often as its power, and none for the constant.
+/// Sum of coefficient times product of features; a term names each feature as often as its power, and none
+/// for the constant.
 struct Polynomial {
   struct Term {
     std::vector<std::uint16_t> features{};
@@ -38,12 +40,13 @@ struct Polynomial {
   std::vector<Term> terms{};
 };
 
-/// Trees in one array: left child `left`, right child `left + 1`; x < threshold goes left. Sum of leaf values times scale, plus base.
+/// Trees in one array: left child `left`, right child `left + 1`; x < threshold goes left. Sum of leaf values
+/// times scale, plus base.
 struct Trees {
   struct Node {
-    std::int32_t feature{-1};   ///< -1: leaf
-    std::uint32_t left{};       ///< > own index, so that every walk ends
-    double value{};             ///< threshold, or the leaf's value
+    std::int32_t feature{-1};  ///< -1: leaf
+    std::uint32_t left{};      ///< > own index, so that every walk ends
+    double value{};            ///< threshold, or the leaf's value
   };
   std::vector<Node> nodes{};
   std::vector<std::uint32_t> roots{};
@@ -59,8 +62,8 @@ struct Svm {
   double gamma{}, coef0{};
   int degree{3};
   std::size_t dims{};
-  std::vector<double> support{};   ///< n x dims
-  std::vector<double> alpha{};     ///< n
+  std::vector<double> support{};  ///< n x dims
+  std::vector<double> alpha{};    ///< n
   double rho{};
 };
 
@@ -69,19 +72,19 @@ using Scorer = std::variant<Linear, Polynomial, Trees, Svm>;
 /// Raw score at standardised features.
 double score(const Scorer& scorer, std::span<const double> x);
 
-/// P(LOS) = clip(sigmoid(a * mean over members of logit + b)); a member's logit is slope * s + offset, where s is its score, or the
-/// log odds of its score when that is a share (forest).
+/// P(LOS) = clip(sigmoid(a * mean over members of logit + b)); a member's logit is slope * s + offset, where
+/// s is its score, or the log odds of its score when that is a share (forest).
 struct Classifier {
   struct Member {
     Scorer scorer{};
-    bool share{};   ///< score is a probability
+    bool share{};  ///< score is a probability
     double slope{1}, offset{0};
   };
   Scaler scaler{};
   std::vector<Member> members{};
-  double slope{1}, offset{0};          ///< calibration of the mean logit (Platt), fitted on out-of-fold predictions
-  double p_min{0.01}, p_max{0.99};     ///< no model knows more than that about an unseen place
-  double threshold{0.5};               ///< p >= threshold is called LOS
+  double slope{1}, offset{0};  ///< calibration of the mean logit (Platt), fitted on out-of-fold predictions
+  double p_min{0.01}, p_max{0.99};  ///< no model knows more than that about an unseen place
+  double threshold{0.5};            ///< p >= threshold is called LOS
 
   double mean_logit(std::span<const double> features) const;
   double p_los(std::span<const double> features) const;
@@ -91,8 +94,9 @@ struct Classifier {
 struct Regressor {
   Scaler scaler{};
   Scorer scorer{};
-  double min_m{-1e9}, max_m{1e9};   ///< answers are clipped to what was seen in training
-  double fallback_m{0};             ///< median of the training biases: far from the training rows the answer shrinks to it
+  double min_m{-1e9}, max_m{1e9};  ///< answers are clipped to what was seen in training
+  double fallback_m{
+      0};  ///< median of the training biases: far from the training rows the answer shrinks to it
   double sigma_m{1};
 
   double bias_m(std::span<const double> features) const;
@@ -107,37 +111,39 @@ std::optional<Task> task_of(std::string_view name);
 struct ModelInfo {
   Task task{Task::nlos_id};
   std::string method{};
-  std::string feature_set{};              ///< version of the named features
-  std::vector<std::string> features{};    ///< needed, in this order
+  std::string feature_set{};            ///< version of the named features
+  std::vector<std::string> features{};  ///< needed, in this order
   std::string data_digest{};
   std::size_t rows{}, placements{}, groups{};
   std::string group_by{};
   std::size_t folds{};
   std::uint64_t seed{};
   std::string code_version{};
-  std::string why{};                      ///< how the method was picked
-  std::vector<std::pair<std::string, double>> metrics{};   ///< of the cross-validation, in the order of the table
+  std::string why{};  ///< how the method was picked
+  std::vector<std::pair<std::string, double>>
+      metrics{};  ///< of the cross-validation, in the order of the table
 };
 
 struct Model {
   ModelInfo info{};
   std::optional<Classifier> classifier{};
-  std::optional<Regressor> regressor{};     ///< los_bias, nlos_bias, or bias without classes
-  std::optional<BiasMixture> mixture{};     ///< bias with classes: needs the classifier
+  std::optional<Regressor> regressor{};  ///< los_bias, nlos_bias, or bias without classes
+  std::optional<BiasMixture> mixture{};  ///< bias with classes: needs the classifier
 };
 
 struct Prediction {
   std::optional<bool> los{};
   std::optional<double> p_los{};
-  std::optional<double> bias_m{};    ///< subtract from the measured range
-  std::optional<double> sigma_m{};   ///< of the corrected range
+  std::optional<double> bias_m{};   ///< subtract from the measured range
+  std::optional<double> sigma_m{};  ///< of the corrected range
 };
 
 /// features  model.info.features.size() values in that order, finite
 /// threads   pure
 Prediction predict(const Model& model, std::span<const double> features);
 
-/// ln of the density of the range's bias under the model: what a robust estimator weighs. No value for a pure classifier.
+/// ln of the density of the range's bias under the model: what a robust estimator weighs. No value for a pure
+/// classifier.
 std::optional<double> log_density(const Model& model, std::span<const double> features, double bias_m);
 
 }  // namespace anchord::ml

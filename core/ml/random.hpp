@@ -6,7 +6,8 @@
 
 namespace anchord::ml {
 
-/// SplitMix64: the same draws from the same seed with every compiler and library, which std's distributions do not promise.
+/// SplitMix64: the same draws from the same seed with every compiler and library, which std's distributions
+/// do not promise.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : state_{seed} {}

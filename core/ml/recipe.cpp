@@ -9,7 +9,9 @@
 namespace anchord::ml {
 namespace {
 
-constexpr std::array<std::string_view, 10> k_names{"none", "constant", "logistic", "random_forest", "svm", "boosted", "average", "univariate", "multivariate", "least_absolute"};
+constexpr std::array<std::string_view, 10> k_names{
+    "none",    "constant", "logistic",   "random_forest", "svm",
+    "boosted", "average",  "univariate", "multivariate",  "least_absolute"};
 
 struct Prepared {
   Dataset data;
@@ -27,11 +29,17 @@ Result<Prepared> prepare(const Dataset& all, const Recipe& recipe, bool classifi
   if (p.data.rows() == 0) return make_error(Errc::too_few_observations, "no rows to train on");
   p.scaler = fit_scaler(p.data.x, p.data.columns(), p.data.weight, recipe.clip);
   p.z.resize(p.data.x.size());
-  for (std::size_t i = 0; i < p.data.rows(); ++i) p.scaler.apply(p.data.row(i), std::span{p.z}.subspan(i * p.data.columns(), p.data.columns()));
-  if (classification) p.y.assign(p.data.los.begin(), p.data.los.end());
-  else p.y = p.data.bias_m;
-  if (p.y.empty()) return make_error(Errc::invalid_argument, classification ? "the data have no labels" : "the data have no true ranges");
-  if (classification && (std::all_of(p.y.begin(), p.y.end(), [](double v) { return v > 0.5; }) || std::all_of(p.y.begin(), p.y.end(), [](double v) { return v < 0.5; })))
+  for (std::size_t i = 0; i < p.data.rows(); ++i)
+    p.scaler.apply(p.data.row(i), std::span{p.z}.subspan(i * p.data.columns(), p.data.columns()));
+  if (classification)
+    p.y.assign(p.data.los.begin(), p.data.los.end());
+  else
+    p.y = p.data.bias_m;
+  if (p.y.empty())
+    return make_error(Errc::invalid_argument,
+                      classification ? "the data have no labels" : "the data have no true ranges");
+  if (classification && (std::all_of(p.y.begin(), p.y.end(), [](double v) { return v > 0.5; }) ||
+                         std::all_of(p.y.begin(), p.y.end(), [](double v) { return v < 0.5; })))
     return make_error(Errc::too_few_observations, "a classifier needs both LOS and NLOS rows");
   return p;
 }
@@ -76,15 +84,29 @@ std::string Recipe::describe() const {
   const std::string forest_text = "leaf=" + number(100 * forest.leaf_share) + "%";
   switch (method) {
     case Method::none:
-    case Method::constant: return out;
-    case Method::logistic: out += "(c=" + number(c) + ")"; break;
-    case Method::svm: out += "(" + svm_text + ")"; break;
-    case Method::random_forest: out += "(" + forest_text + ")"; break;
-    case Method::boosted: out += "(rounds=" + number(boosted.rounds) + ", depth=" + number(boosted.depth) + ")"; break;
-    case Method::average: out += "(c=" + number(c) + ", svm " + svm_text + ", " + forest_text + ")"; break;
+    case Method::constant:
+      return out;
+    case Method::logistic:
+      out += "(c=" + number(c) + ")";
+      break;
+    case Method::svm:
+      out += "(" + svm_text + ")";
+      break;
+    case Method::random_forest:
+      out += "(" + forest_text + ")";
+      break;
+    case Method::boosted:
+      out += "(rounds=" + number(boosted.rounds) + ", depth=" + number(boosted.depth) + ")";
+      break;
+    case Method::average:
+      out += "(c=" + number(c) + ", svm " + svm_text + ", " + forest_text + ")";
+      break;
     case Method::univariate:
-    case Method::multivariate: out += "(degree=" + number(degree) + ")"; break;
-    case Method::least_absolute: break;
+    case Method::multivariate:
+      out += "(degree=" + number(degree) + ")";
+      break;
+    case Method::least_absolute:
+      break;
   }
   if (features.size() == 1) return out + " of " + features.front();
   return out + " on " + std::to_string(features.size()) + " features";
@@ -100,9 +122,11 @@ Result<Classifier> fit_classifier(const Dataset& data, const Recipe& recipe) {
     BOOST_OUTCOME_TRY(auto member, svm_member(p, recipe.svm));
     out.members.push_back(std::move(member));
   }
-  if (all || recipe.method == Method::random_forest) out.members.push_back({fit_forest(p.rows(), recipe.forest), true});
+  if (all || recipe.method == Method::random_forest)
+    out.members.push_back({fit_forest(p.rows(), recipe.forest), true});
   if (recipe.method == Method::boosted) out.members.push_back({fit_boosted(p.rows(), recipe.boosted)});
-  if (out.members.empty()) return make_error(Errc::invalid_argument, std::string{method_name(recipe.method)} + " does not classify");
+  if (out.members.empty())
+    return make_error(Errc::invalid_argument, std::string{method_name(recipe.method)} + " does not classify");
   return out;
 }
 
@@ -116,14 +140,18 @@ Result<Regressor> fit_regressor(const Dataset& data, const Recipe& recipe) {
     out.fallback_m = weighted_median(std::move(biases));
   }
   switch (recipe.method) {
-    case Method::none: out.scorer = Linear{}; break;
+    case Method::none:
+      out.scorer = Linear{};
+      break;
     case Method::constant: {
       std::vector<std::pair<double, double>> values;
       for (std::size_t i = 0; i < p.y.size(); ++i) values.emplace_back(p.y[i], p.data.weight[i]);
       out.scorer = Linear{{}, weighted_median(std::move(values))};
       break;
     }
-    case Method::random_forest: out.scorer = fit_forest(p.rows(), recipe.forest); break;
+    case Method::random_forest:
+      out.scorer = fit_forest(p.rows(), recipe.forest);
+      break;
     case Method::boosted: {
       auto options = recipe.boosted;
       options.classification = false;
@@ -134,11 +162,21 @@ Result<Regressor> fit_regressor(const Dataset& data, const Recipe& recipe) {
       BOOST_OUTCOME_TRY(out.scorer, fit_svm(p.rows(), per_row(recipe.svm, p.data), false));
       break;
     }
-    case Method::univariate: out.scorer = fit_polynomial(p.rows(), polynomial_terms(p.data.columns(), recipe.degree, false), recipe.ridge); break;
-    case Method::multivariate: out.scorer = fit_polynomial(p.rows(), polynomial_terms(p.data.columns(), recipe.degree, true), recipe.ridge); break;
-    case Method::least_absolute: out.scorer = fit_least_absolute(p.rows(), 0.003); break;
+    case Method::univariate:
+      out.scorer =
+          fit_polynomial(p.rows(), polynomial_terms(p.data.columns(), recipe.degree, false), recipe.ridge);
+      break;
+    case Method::multivariate:
+      out.scorer =
+          fit_polynomial(p.rows(), polynomial_terms(p.data.columns(), recipe.degree, true), recipe.ridge);
+      break;
+    case Method::least_absolute:
+      out.scorer = fit_least_absolute(p.rows(), 0.003);
+      break;
     case Method::logistic:
-    case Method::average: return make_error(Errc::invalid_argument, std::string{method_name(recipe.method)} + " does not regress");
+    case Method::average:
+      return make_error(Errc::invalid_argument,
+                        std::string{method_name(recipe.method)} + " does not regress");
   }
   if (recipe.method != Method::none && recipe.method != Method::constant) {
     out.min_m = *std::min_element(p.y.begin(), p.y.end());
@@ -156,7 +194,7 @@ std::vector<double> placement_weights(const Dataset& data) {
 }
 
 double worst_harm_m(const Dataset& data, std::span<const double> correction_m) {
-  std::map<std::uint32_t, std::array<double, 3>> sums;   // rows, raw, corrected
+  std::map<std::uint32_t, std::array<double, 3>> sums;  // rows, raw, corrected
   for (std::size_t i = 0; i < data.rows(); ++i) {
     auto& s = sums[data.group[i]];
     s[0] += 1, s[1] += std::abs(data.bias_m[i]), s[2] += std::abs(data.bias_m[i] - correction_m[i]);
@@ -167,7 +205,8 @@ double worst_harm_m(const Dataset& data, std::span<const double> correction_m) {
   return worst;
 }
 
-Result<OutOfFold> cross_validate(const Dataset& data, const Recipe& recipe, const std::vector<std::size_t>& fold, bool classification) {
+Result<OutOfFold> cross_validate(const Dataset& data, const Recipe& recipe,
+                                 const std::vector<std::size_t>& fold, bool classification) {
   BOOST_OUTCOME_TRY(const auto chosen, data.with_features(recipe.features));
   OutOfFold out;
   auto& answers = classification ? out.logit : out.bias_m;

@@ -16,9 +16,12 @@
 namespace anchord::ml {
 
 enum class Method : std::uint8_t {
-  none,            ///< no correction
-  constant,        ///< median bias
-  logistic, random_forest, svm, boosted,
+  none,      ///< no correction
+  constant,  ///< median bias
+  logistic,
+  random_forest,
+  svm,
+  boosted,
   average,         ///< mean of the logits of logistic, RBF SVM and forest
   univariate,      ///< polynomial of one feature
   multivariate,    ///< polynomial of several, with interactions
@@ -31,16 +34,16 @@ std::optional<Method> method_of(std::string_view name);
 struct Recipe {
   Method method{Method::average};
   std::vector<std::string> features{};
-  double clip{3};                  ///< sd, for features outside the training range; 0 off
-  double c{3};                     ///< logistic
-  SvmOptions svm{};                ///< c counts placements, and is spread over their rows
+  double clip{3};    ///< sd, for features outside the training range; 0 off
+  double c{3};       ///< logistic
+  SvmOptions svm{};  ///< c counts placements, and is spread over their rows
   TreeOptions forest{};
   BoostOptions boosted{};
-  int degree{2};                   ///< polynomials
+  int degree{2};  ///< polynomials
   double ridge{1e-3};
-  std::size_t per_placement{5};    ///< rows of one placement used for training: repeats are near copies
+  std::size_t per_placement{5};  ///< rows of one placement used for training: repeats are near copies
 
-  std::string describe() const;    ///< "svm(c=3, gamma=0.03) on 7 features"
+  std::string describe() const;  ///< "svm(c=3, gamma=0.03) on 7 features"
 };
 
 /// Answers whether to go on.
@@ -56,18 +59,20 @@ std::vector<double> placement_weights(const Dataset& data);
 
 /// What models that never saw a row's place say about it.
 struct OutOfFold {
-  std::vector<double> logit{};       ///< classification, uncalibrated
-  std::vector<double> p_los{};       ///< calibrated by one Platt line over all folds, clipped
+  std::vector<double> logit{};  ///< classification, uncalibrated
+  std::vector<double> p_los{};  ///< calibrated by one Platt line over all folds, clipped
   Platt platt{};
-  std::vector<double> bias_m{};      ///< regression
-  double loss{};                     ///< log loss or MAE, every placement alike: what selection minimises
-  double loss_sd{};                  ///< over the folds
-  double worst_harm_m{};             ///< regression: largest rise of a place's MAE over the uncorrected one
+  std::vector<double> bias_m{};  ///< regression
+  double loss{};                 ///< log loss or MAE, every placement alike: what selection minimises
+  double loss_sd{};              ///< over the folds
+  double worst_harm_m{};         ///< regression: largest rise of a place's MAE over the uncorrected one
 };
 /// fold  of each row, from grouped_folds
-Result<OutOfFold> cross_validate(const Dataset& data, const Recipe& recipe, const std::vector<std::size_t>& fold, bool classification);
+Result<OutOfFold> cross_validate(const Dataset& data, const Recipe& recipe,
+                                 const std::vector<std::size_t>& fold, bool classification);
 
-/// Largest rise, metres, of any group's mean absolute error by a correction; groups of fewer than 20 rows are left to noise.
+/// Largest rise, metres, of any group's mean absolute error by a correction; groups of fewer than 20 rows are
+/// left to noise.
 double worst_harm_m(const Dataset& data, std::span<const double> correction_m);
 
 }  // namespace anchord::ml

@@ -7,7 +7,8 @@
 #include "core/base/result.hpp"
 #include "core/ml/model.hpp"
 
-/// Fits of the single methods. All take standardised features row after row, and are deterministic: same input, same bytes.
+/// Fits of the single methods. All take standardised features row after row, and are deterministic: same
+/// input, same bytes.
 namespace anchord::ml {
 
 /// n rows of d features; y a class (1 LOS, 0 NLOS) or metres; w > 0.
@@ -23,7 +24,8 @@ struct TrainingRows {
 /// Weighted mean and sd of each column; a constant column gets sd 1.
 Scaler fit_scaler(std::span<const double> x, std::size_t d, std::span<const double> w, double clip);
 
-/// L2 logistic regression by iteratively reweighted least squares: minimises sum w loss + |weights|^2 / (2 C).
+/// L2 logistic regression by iteratively reweighted least squares: minimises sum w loss + |weights|^2 / (2
+/// C).
 Linear fit_logistic(const TrainingRows& rows, double c);
 
 struct Platt {
@@ -32,12 +34,14 @@ struct Platt {
 /// Logistic of one variable: calibrates a score into log odds; slope never negative.
 Platt fit_platt(std::span<const double> score, std::span<const double> y, std::span<const double> w);
 
-/// Terms of a polynomial: every product of at most `degree` features; without interactions only powers of one feature.
+/// Terms of a polynomial: every product of at most `degree` features; without interactions only powers of one
+/// feature.
 std::vector<Polynomial::Term> polynomial_terms(std::size_t d, int degree, bool interactions);
 /// Coefficients by ridge least squares (`ridge` times the sum of weights; the constant is free).
 Polynomial fit_polynomial(const TrainingRows& rows, std::vector<Polynomial::Term> terms, double ridge);
 
-/// Linear fit of the least absolute deviation with an L1 penalty, by iteratively reweighted least squares (100 rounds).
+/// Linear fit of the least absolute deviation with an L1 penalty, by iteratively reweighted least squares
+/// (100 rounds).
 Linear fit_least_absolute(const TrainingRows& rows, double l1_penalty);
 
 struct TreeOptions {
@@ -47,18 +51,20 @@ struct TreeOptions {
   std::size_t features_per_split = 0;  ///< 0: sqrt of the number of features
   std::uint64_t seed = 1;
 };
-/// Random forest: bagged trees on up to 255 quantile bins a feature, variance criterion (Gini for classes). `out_of_bag`, where given, gets
-/// for each row the mean of the trees that did not see it (NaN where all saw it).
-Trees fit_forest(const TrainingRows& rows, const TreeOptions& options, std::vector<double>* out_of_bag = nullptr);
+/// Random forest: bagged trees on up to 255 quantile bins a feature, variance criterion (Gini for classes).
+/// `out_of_bag`, where given, gets for each row the mean of the trees that did not see it (NaN where all saw
+/// it).
+Trees fit_forest(const TrainingRows& rows, const TreeOptions& options,
+                 std::vector<double>* out_of_bag = nullptr);
 
 struct BoostOptions {
   int rounds = 400;
   int depth = 6;
   double learning_rate = 0.05;
-  double lambda = 2;                ///< L2 on leaf values
-  double min_child_weight = 1;      ///< sum of second derivatives in a leaf
-  double column_share = 0.5;        ///< of the features, drawn per tree
-  bool classification = true;       ///< log loss; else squared error
+  double lambda = 2;            ///< L2 on leaf values
+  double min_child_weight = 1;  ///< sum of second derivatives in a leaf
+  double column_share = 0.5;    ///< of the features, drawn per tree
+  bool classification = true;   ///< log loss; else squared error
   std::uint64_t seed = 1;
 };
 /// Gradient boosted trees, second order, on the same bins. Classification scores are log odds.
@@ -70,14 +76,15 @@ struct SvmOptions {
   double gamma = 0.03;
   double coef0 = 0;
   int degree = 3;
-  double epsilon_m = 0.01;   ///< tube of the regression
+  double epsilon_m = 0.01;  ///< tube of the regression
 };
-/// C-SVC or epsilon-SVR by libsvm; instance weights are not used (keep rows per placement equal instead). A score above 0 is LOS.
+/// C-SVC or epsilon-SVR by libsvm; instance weights are not used (keep rows per placement equal instead). A
+/// score above 0 is LOS.
 Result<Svm> fit_svm(const TrainingRows& rows, const SvmOptions& options, bool classification);
 
-/// Maximum likelihood of the bias mixture's shared curve and components. errors: too_few_observations below 8 rows of a class
-/// x      raw features, n rows of d
-/// p_los  out-of-fold and calibrated: in-sample probabilities make the mixture overconfident
+/// Maximum likelihood of the bias mixture's shared curve and components. errors: too_few_observations below 8
+/// rows of a class x      raw features, n rows of d p_los  out-of-fold and calibrated: in-sample
+/// probabilities make the mixture overconfident
 struct MixtureTask {
   std::span<const double> x{};
   std::size_t d{};
@@ -85,12 +92,13 @@ struct MixtureTask {
   std::span<const double> w{};
   std::span<const double> p_los{};
   std::span<const std::uint8_t> los{};
-  std::vector<std::size_t> shared_features{};   ///< arguments of b0; empty: constant
-  std::vector<std::size_t> tail_features{};     ///< X and D
+  std::vector<std::size_t> shared_features{};  ///< arguments of b0; empty: constant
+  std::vector<std::size_t> tail_features{};    ///< X and D
   double kappa{0};
 };
 Result<BiasMixture> fit_mixture(const MixtureTask& task);
-/// Its first step alone: the curve b0 both classes share, from the LOS rows. errors: too_few_observations below 8 of them
+/// Its first step alone: the curve b0 both classes share, from the LOS rows. errors: too_few_observations
+/// below 8 of them
 Result<BiasMixture::Shared> fit_shared_bias(const MixtureTask& task);
 
 double weighted_median(std::vector<std::pair<double, double>> value_and_weight);

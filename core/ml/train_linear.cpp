@@ -37,16 +37,20 @@ double logistic_loss(const Eigen::VectorXd& z, const Eigen::VectorXd& y, const E
 }
 
 // Newton with halved steps on the penalised loss; the last column is the free constant.
-Eigen::VectorXd irls(const Eigen::MatrixXd& x, const Eigen::VectorXd& y, const Eigen::VectorXd& w, double penalty) {
+Eigen::VectorXd irls(const Eigen::MatrixXd& x, const Eigen::VectorXd& y, const Eigen::VectorXd& w,
+                     double penalty) {
   const Eigen::Index d = x.cols();
   Eigen::VectorXd beta = Eigen::VectorXd::Zero(d), ridge = Eigen::VectorXd::Constant(d, penalty);
   ridge[d - 1] = 1e-9;
-  const auto loss = [&](const Eigen::VectorXd& b) { return logistic_loss(x * b, y, w) + 0.5 * b.cwiseAbs2().dot(ridge); };
+  const auto loss = [&](const Eigen::VectorXd& b) {
+    return logistic_loss(x * b, y, w) + 0.5 * b.cwiseAbs2().dot(ridge);
+  };
   double best = loss(beta);
   for (int round = 0; round < 100; ++round) {
     const Eigen::VectorXd p = (1 + (-(x * beta)).array().exp()).inverse();
     const Eigen::VectorXd curvature = (w.array() * p.array() * (1 - p.array())).max(1e-12);
-    const Eigen::VectorXd gradient = x.transpose() * (w.array() * (p - y).array()).matrix() + ridge.cwiseProduct(beta);
+    const Eigen::VectorXd gradient =
+        x.transpose() * (w.array() * (p - y).array()).matrix() + ridge.cwiseProduct(beta);
     Eigen::MatrixXd hessian = x.transpose() * curvature.asDiagonal() * x;
     hessian.diagonal() += ridge;
     const Eigen::VectorXd step = hessian.ldlt().solve(gradient);
@@ -89,7 +93,8 @@ Scaler fit_scaler(std::span<const double> x, std::size_t d, std::span<const doub
   }
   for (auto& m : scaler.mean) m /= std::max(total, 1e-300);
   for (std::size_t i = 0; i < w.size(); ++i)
-    for (std::size_t j = 0; j < d; ++j) scaler.sd[j] += w[i] * (x[i * d + j] - scaler.mean[j]) * (x[i * d + j] - scaler.mean[j]);
+    for (std::size_t j = 0; j < d; ++j)
+      scaler.sd[j] += w[i] * (x[i * d + j] - scaler.mean[j]) * (x[i * d + j] - scaler.mean[j]);
   for (std::size_t j = 0; j < d; ++j) {
     scaler.sd[j] = std::sqrt(scaler.sd[j] / std::max(total, 1e-300));
     if (!(scaler.sd[j] > 1e-9 * (1 + std::abs(scaler.mean[j])))) scaler.sd[j] = 1;
@@ -97,7 +102,9 @@ Scaler fit_scaler(std::span<const double> x, std::size_t d, std::span<const doub
   return scaler;
 }
 
-Linear fit_logistic(const TrainingRows& rows, double c) { return to_linear(irls(with_ones(rows), map(rows.y), map(rows.w), 1 / c)); }
+Linear fit_logistic(const TrainingRows& rows, double c) {
+  return to_linear(irls(with_ones(rows), map(rows.y), map(rows.w), 1 / c));
+}
 
 Platt fit_platt(std::span<const double> score, std::span<const double> y, std::span<const double> w) {
   const auto n = index(score.size());
@@ -116,7 +123,9 @@ std::vector<Polynomial::Term> polynomial_terms(std::size_t d, int degree, bool i
   std::vector<Polynomial::Term> terms{{}};
   if (!interactions) {
     for (std::size_t f = 0; f < d; ++f)
-      for (int power = 1; power <= degree; ++power) terms.push_back({std::vector<std::uint16_t>(static_cast<std::size_t>(power), static_cast<std::uint16_t>(f)), 0});
+      for (int power = 1; power <= degree; ++power)
+        terms.push_back(
+            {std::vector<std::uint16_t>(static_cast<std::size_t>(power), static_cast<std::uint16_t>(f)), 0});
     return terms;
   }
   // Each term grows by features not before its last one, so that every product comes once.
@@ -147,8 +156,10 @@ Polynomial fit_polynomial(const TrainingRows& rows, std::vector<Polynomial::Term
   Eigen::MatrixXd normal = phi.transpose() * w.asDiagonal() * phi;
   const double penalty = ridge * w.sum();
   for (Eigen::Index t = 0; t < m; ++t)
-    normal(t, t) += terms[static_cast<std::size_t>(t)].features.empty() ? 1e-12 * w.sum() : std::max(penalty, 1e-10 * w.sum());
-  const Eigen::VectorXd coefficients = normal.ldlt().solve(phi.transpose() * (w.array() * map(rows.y).array()).matrix());
+    normal(t, t) += terms[static_cast<std::size_t>(t)].features.empty() ? 1e-12 * w.sum()
+                                                                        : std::max(penalty, 1e-10 * w.sum());
+  const Eigen::VectorXd coefficients =
+      normal.ldlt().solve(phi.transpose() * (w.array() * map(rows.y).array()).matrix());
   for (Eigen::Index t = 0; t < m; ++t) terms[static_cast<std::size_t>(t)].coefficient = coefficients[t];
   return {std::move(terms)};
 }
@@ -167,7 +178,8 @@ Linear fit_least_absolute(const TrainingRows& rows, double l1_penalty) {
     // |r| = r^2 / |r|; the floor of 1 mm keeps the weights finite.
     const Eigen::VectorXd weight = w.array() / residual.array().abs().max(1e-3);
     Eigen::MatrixXd normal = x.transpose() * weight.asDiagonal() * x;
-    for (Eigen::Index j = 0; j + 1 < d; ++j) normal(j, j) += l1_penalty * w.sum() / std::max(std::abs(beta[j]), 1e-3);
+    for (Eigen::Index j = 0; j + 1 < d; ++j)
+      normal(j, j) += l1_penalty * w.sum() / std::max(std::abs(beta[j]), 1e-3);
     normal(d - 1, d - 1) += 1e-9;
     const Eigen::VectorXd next = normal.ldlt().solve(x.transpose() * weight.cwiseProduct(y));
     const double moved = (next - beta).cwiseAbs().maxCoeff();

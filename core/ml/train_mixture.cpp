@@ -13,8 +13,10 @@ double quantile(std::vector<double> values, double q) {
   return values[static_cast<std::size_t>(std::lround(q * static_cast<double>(values.size() - 1)))];
 }
 
-// Nelder-Mead with the standard coefficients: the likelihood is smooth, has 5 to 7 parameters, and no derivative code to get wrong.
-std::vector<double> minimise(const std::function<double(const std::vector<double>&)>& f, std::vector<double> start, double step, int evaluations) {
+// Nelder-Mead with the standard coefficients: the likelihood is smooth, has 5 to 7 parameters, and no
+// derivative code to get wrong.
+std::vector<double> minimise(const std::function<double(const std::vector<double>&)>& f,
+                             std::vector<double> start, double step, int evaluations) {
   const std::size_t d = start.size();
   std::vector<std::pair<double, std::vector<double>>> simplex{{f(start), start}};
   for (std::size_t i = 0; i < d; ++i) {
@@ -48,7 +50,8 @@ std::vector<double> minimise(const std::function<double(const std::vector<double
         simplex.back() = contracted;
       } else {
         for (std::size_t k = 1; k <= d; ++k) {
-          for (std::size_t i = 0; i < d; ++i) simplex[k].second[i] = 0.5 * (simplex[k].second[i] + simplex[0].second[i]);
+          for (std::size_t i = 0; i < d; ++i)
+            simplex[k].second[i] = 0.5 * (simplex[k].second[i] + simplex[0].second[i]);
           simplex[k].first = f(simplex[k].second);
           ++used;
         }
@@ -66,7 +69,9 @@ Result<BiasMixture::Shared> fit_shared_bias(const MixtureTask& task) {
   std::vector<std::pair<double, double>> los_bias;
   for (std::size_t i = 0; i < task.bias_m.size(); ++i)
     if (task.los[i]) los_rows.push_back(i), los_bias.emplace_back(task.bias_m[i], task.w[i]);
-  if (los_rows.size() < 8) return make_error(Errc::too_few_observations, "the shared bias needs 8 LOS rows, got " + std::to_string(los_rows.size()));
+  if (los_rows.size() < 8)
+    return make_error(Errc::too_few_observations,
+                      "the shared bias needs 8 LOS rows, got " + std::to_string(los_rows.size()));
   BiasMixture::Shared shared;
   shared.centre_m = weighted_median(std::move(los_bias));
   if (task.kappa == 0 || task.shared_features.empty()) return shared;
@@ -79,7 +84,8 @@ Result<BiasMixture::Shared> fit_shared_bias(const MixtureTask& task) {
     for (const auto i : los_rows) column.push_back(task.x[i * task.d + shared.features[j]]);
     shared.low.push_back(quantile(column, 0.01));
     shared.high.push_back(quantile(column, 0.99));
-    for (std::size_t r = 0; r < los_rows.size(); ++r) x[r * k + j] = std::clamp(column[r], shared.low[j], shared.high[j]);
+    for (std::size_t r = 0; r < los_rows.size(); ++r)
+      x[r * k + j] = std::clamp(column[r], shared.low[j], shared.high[j]);
   }
   for (const auto i : los_rows) y.push_back(task.bias_m[i]), w.push_back(task.w[i]);
   const Scaler scaler = fit_scaler(x, k, w, 0);
@@ -110,22 +116,33 @@ Result<BiasMixture> fit_mixture(const MixtureTask& task) {
   for (std::size_t i = 0; i < n; ++i) {
     shared[i] = m.shared_m(task.x.subspan(i * task.d, task.d));
     const double e = task.bias_m[i] - shared[i];
-    if (task.los[i]) los_spread.emplace_back(std::abs(e), task.w[i]);
-    else nlos_excess.emplace_back(std::max(e, 0.02), task.w[i]);
+    if (task.los[i])
+      los_spread.emplace_back(std::abs(e), task.w[i]);
+    else
+      nlos_excess.emplace_back(std::max(e, 0.02), task.w[i]);
   }
-  if (nlos_excess.size() < 8) return make_error(Errc::too_few_observations, "the mixture needs 8 NLOS rows, got " + std::to_string(nlos_excess.size()));
+  if (nlos_excess.size() < 8)
+    return make_error(Errc::too_few_observations,
+                      "the mixture needs 8 NLOS rows, got " + std::to_string(nlos_excess.size()));
   const double s0 = std::max(0.01, 1.4826 * weighted_median(los_spread));
   const double tau = std::max(0.03, weighted_median(nlos_excess) / 0.69);
 
   const auto unpack = [&m](const std::vector<double>& p) {
-    m.m0_m = p[0], m.s0_m = std::exp(std::clamp(p[1], -5.0, 1.0)), m.m1_m = p[2], m.s1_m = std::exp(std::clamp(p[3], -5.0, 1.0)), m.log_tau = p[4];
+    m.m0_m = p[0], m.s0_m = std::exp(std::clamp(p[1], -5.0, 1.0)), m.m1_m = p[2],
+    m.s1_m = std::exp(std::clamp(p[3], -5.0, 1.0)), m.log_tau = p[4];
     for (std::size_t t = 0; t < m.tail.size(); ++t) m.tail[t].weight = std::clamp(p[5 + t], -1.5, 1.5);
   };
   const auto loss = [&](const std::vector<double>& p) {
     unpack(p);
     double sum = 0;
     for (std::size_t i = 0; i < n; ++i) {
-      const BiasDensity density{task.p_los[i], shared[i], m.m0_m, m.s0_m, m.m1_m, m.s1_m, m.tau_m(task.x.subspan(i * task.d, task.d))};
+      const BiasDensity density{task.p_los[i],
+                                shared[i],
+                                m.m0_m,
+                                m.s0_m,
+                                m.m1_m,
+                                m.s1_m,
+                                m.tau_m(task.x.subspan(i * task.d, task.d))};
       sum -= task.w[i] * density.log_density(task.bias_m[i]);
     }
     double penalty = 0;
@@ -136,7 +153,7 @@ Result<BiasMixture> fit_mixture(const MixtureTask& task) {
   std::vector<double> start{0, std::log(s0), 0, std::log(s0), std::log(tau)};
   start.resize(5 + m.tail.size(), 0.0);
   auto best = minimise(loss, start, 0.3, 400);
-  best = minimise(loss, best, 0.1, 400);   // a fresh simplex: the first may have collapsed early
+  best = minimise(loss, best, 0.1, 400);  // a fresh simplex: the first may have collapsed early
   unpack(best);
   return m;
 }

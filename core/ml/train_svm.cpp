@@ -15,10 +15,14 @@ struct FreeModel {
 
 int libsvm_kernel(Kernel kernel) {
   switch (kernel) {
-    case Kernel::linear: return LINEAR;
-    case Kernel::polynomial: return POLY;
-    case Kernel::sigmoid: return SIGMOID;
-    case Kernel::rbf: return RBF;
+    case Kernel::linear:
+      return LINEAR;
+    case Kernel::polynomial:
+      return POLY;
+    case Kernel::sigmoid:
+      return SIGMOID;
+    case Kernel::rbf:
+      return RBF;
   }
   return RBF;
 }
@@ -50,9 +54,11 @@ Result<Svm> fit_svm(const TrainingRows& rows, const SvmOptions& options, bool cl
   parameter.C = options.c;
   parameter.p = options.epsilon_m;
   parameter.shrinking = 1;
-  if (const char* why = svm_check_parameter(&problem, &parameter)) return make_error(Errc::invalid_argument, std::string{"SVM: "} + why);
+  if (const char* why = svm_check_parameter(&problem, &parameter))
+    return make_error(Errc::invalid_argument, std::string{"SVM: "} + why);
   const std::unique_ptr<svm_model, FreeModel> fitted{svm_train(&problem, &parameter)};
-  if (!fitted || (classification && fitted->nr_class != 2)) return make_error(Errc::too_few_observations, "an SVM needs rows of both classes");
+  if (!fitted || (classification && fitted->nr_class != 2))
+    return make_error(Errc::too_few_observations, "an SVM needs rows of both classes");
 
   Svm out{options.kernel, options.gamma, options.coef0, options.degree, d, {}, {}, fitted->rho[0]};
   for (int i = 0; i < fitted->l; ++i) {

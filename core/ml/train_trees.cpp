@@ -15,7 +15,7 @@ constexpr std::size_t k_max_bins = 255;
 struct Binned {
   std::size_t n{}, d{};
   std::vector<std::uint8_t> bin;
-  std::vector<std::vector<double>> edges;   // per feature, upper edge of each bin but the last
+  std::vector<std::vector<double>> edges;  // per feature, upper edge of each bin but the last
 
   explicit Binned(const TrainingRows& rows) : n{rows.n()}, d{rows.d}, bin(rows.n() * rows.d), edges(rows.d) {
     std::vector<double> values(n), distinct;
@@ -40,7 +40,8 @@ struct Binned {
         }
       }
       for (std::size_t i = 0; i < n; ++i)
-        bin[f * n + i] = static_cast<std::uint8_t>(std::upper_bound(edges[f].begin(), edges[f].end(), values[i]) - edges[f].begin());
+        bin[f * n + i] = static_cast<std::uint8_t>(
+            std::upper_bound(edges[f].begin(), edges[f].end(), values[i]) - edges[f].begin());
     }
   }
 };
@@ -52,17 +53,19 @@ struct Cell {
 struct GrowOptions {
   int max_depth{};
   double lambda{}, min_h{}, min_rows{};
-  std::size_t features_per_split{};   // 0: all allowed
+  std::size_t features_per_split{};  // 0: all allowed
 };
 
-// Grows one tree on sums of g (target) and h (weight): leaf value G / (H + lambda), gain the drop of the squared loss.
+// Grows one tree on sums of g (target) and h (weight): leaf value G / (H + lambda), gain the drop of the
+// squared loss.
 class Grower {
  public:
   Grower(const Binned& data, const GrowOptions& options) : data_{data}, options_{options} {}
 
   // rows: indices, reordered in place; times: how often each row counts (bootstrap).
-  void grow(Trees& out, std::vector<std::uint32_t>& rows, std::span<const double> g, std::span<const double> h,
-            std::span<const double> times, std::vector<std::size_t> allowed, double leaf_scale, Random& random) {
+  void grow(Trees& out, std::vector<std::uint32_t>& rows, std::span<const double> g,
+            std::span<const double> h, std::span<const double> times, std::vector<std::size_t> allowed,
+            double leaf_scale, Random& random) {
     g_ = g, h_ = h, times_ = times, allowed_ = std::move(allowed), leaf_scale_ = leaf_scale;
     out.roots.push_back(static_cast<std::uint32_t>(out.nodes.size()));
     out.nodes.emplace_back();
@@ -76,34 +79,41 @@ class Grower {
     bool found{false};
   };
 
-  void split(Trees& out, std::size_t node, std::vector<std::uint32_t>& rows, std::size_t begin, std::size_t end, int depth, Random& random) {
+  void split(Trees& out, std::size_t node, std::vector<std::uint32_t>& rows, std::size_t begin,
+             std::size_t end, int depth, Random& random) {
     Cell total;
     for (std::size_t i = begin; i < end; ++i) {
       const auto r = rows[i];
       total.g += times_[r] * g_[r], total.h += times_[r] * h_[r], total.rows += times_[r];
     }
-    const Best best = depth < options_.max_depth && total.rows >= 2 * options_.min_rows ? find(rows, begin, end, total, random) : Best{};
+    const Best best = depth < options_.max_depth && total.rows >= 2 * options_.min_rows
+                          ? find(rows, begin, end, total, random)
+                          : Best{};
     if (!best.found) {
       out.nodes[node].value = leaf_scale_ * total.g / (total.h + options_.lambda);
       return;
     }
     const std::uint8_t* bins = data_.bin.data() + best.feature * data_.n;
-    const auto middle = std::stable_partition(rows.begin() + static_cast<std::ptrdiff_t>(begin), rows.begin() + static_cast<std::ptrdiff_t>(end),
+    const auto middle = std::stable_partition(rows.begin() + static_cast<std::ptrdiff_t>(begin),
+                                              rows.begin() + static_cast<std::ptrdiff_t>(end),
                                               [&](auto r) { return bins[r] <= best.bin; });
     const auto at = static_cast<std::size_t>(middle - rows.begin());
     const std::size_t left = out.nodes.size();
     out.nodes.resize(left + 2);
-    out.nodes[node] = {static_cast<std::int32_t>(best.feature), static_cast<std::uint32_t>(left), data_.edges[best.feature][best.bin]};
+    out.nodes[node] = {static_cast<std::int32_t>(best.feature), static_cast<std::uint32_t>(left),
+                       data_.edges[best.feature][best.bin]};
     split(out, left, rows, begin, at, depth + 1, random);
     split(out, left + 1, rows, at, end, depth + 1, random);
   }
 
-  Best find(const std::vector<std::uint32_t>& rows, std::size_t begin, std::size_t end, const Cell& total, Random& random) {
+  Best find(const std::vector<std::uint32_t>& rows, std::size_t begin, std::size_t end, const Cell& total,
+            Random& random) {
     Best best;
     std::size_t tried = allowed_.size();
     if (options_.features_per_split > 0 && options_.features_per_split < tried) {
       tried = options_.features_per_split;
-      for (std::size_t i = 0; i < tried; ++i) std::swap(allowed_[i], allowed_[i + random.below(allowed_.size() - i)]);
+      for (std::size_t i = 0; i < tried; ++i)
+        std::swap(allowed_[i], allowed_[i + random.below(allowed_.size() - i)]);
     }
     const double whole = total.g * total.g / (total.h + options_.lambda);
     for (std::size_t a = 0; a < tried; ++a) {
@@ -124,7 +134,8 @@ class Grower {
         const double right_h = total.h - left.h, right_g = total.g - left.g;
         if (left.rows < options_.min_rows || total.rows - left.rows < options_.min_rows) continue;
         if (left.h < options_.min_h || right_h < options_.min_h) continue;
-        const double gain = left.g * left.g / (left.h + options_.lambda) + right_g * right_g / (right_h + options_.lambda) - whole;
+        const double gain = left.g * left.g / (left.h + options_.lambda) +
+                            right_g * right_g / (right_h + options_.lambda) - whole;
         if (gain > best.gain) best = {gain, f, b, true};
       }
     }
@@ -147,7 +158,8 @@ std::vector<std::size_t> first_n(std::size_t n) {
 
 double tree_value(const Trees& model, std::uint32_t at, std::span<const double> x) {
   while (model.nodes[at].feature >= 0)
-    at = model.nodes[at].left + (x[static_cast<std::size_t>(model.nodes[at].feature)] < model.nodes[at].value ? 0U : 1U);
+    at = model.nodes[at].left +
+         (x[static_cast<std::size_t>(model.nodes[at].feature)] < model.nodes[at].value ? 0U : 1U);
   return model.nodes[at].value;
 }
 
@@ -157,8 +169,11 @@ Trees fit_forest(const TrainingRows& rows, const TreeOptions& options, std::vect
   const Binned data{rows};
   const std::size_t n = rows.n();
   std::size_t per_split = options.features_per_split;
-  if (per_split == 0) per_split = std::max<std::size_t>(1, static_cast<std::size_t>(std::sqrt(static_cast<double>(rows.d)) + 0.5));
-  GrowOptions grow{options.max_depth, 0, 1e-12, std::max(1.0, options.leaf_share * static_cast<double>(n)), per_split};
+  if (per_split == 0)
+    per_split =
+        std::max<std::size_t>(1, static_cast<std::size_t>(std::sqrt(static_cast<double>(rows.d)) + 0.5));
+  GrowOptions grow{options.max_depth, 0, 1e-12, std::max(1.0, options.leaf_share * static_cast<double>(n)),
+                   per_split};
   Grower grower{data, grow};
   std::vector<double> g(n), h(rows.w.begin(), rows.w.end()), times(n), sum(n, 0), count(n, 0);
   for (std::size_t i = 0; i < n; ++i) g[i] = rows.w[i] * rows.y[i];
@@ -178,7 +193,8 @@ Trees fit_forest(const TrainingRows& rows, const TreeOptions& options, std::vect
   }
   if (out_of_bag) {
     out_of_bag->resize(n);
-    for (std::size_t i = 0; i < n; ++i) (*out_of_bag)[i] = count[i] > 0 ? sum[i] / count[i] : std::numeric_limits<double>::quiet_NaN();
+    for (std::size_t i = 0; i < n; ++i)
+      (*out_of_bag)[i] = count[i] > 0 ? sum[i] / count[i] : std::numeric_limits<double>::quiet_NaN();
   }
   return model;
 }
@@ -196,7 +212,8 @@ Trees fit_boosted(const TrainingRows& rows, const BoostOptions& options) {
   std::vector<double> f(n, model.base), g(n), h(n);
   const std::vector<double> once(n, 1.0);
   Random random{options.seed};
-  const auto columns = std::max<std::size_t>(1, static_cast<std::size_t>(std::lround(options.column_share * static_cast<double>(rows.d))));
+  const auto columns = std::max<std::size_t>(
+      1, static_cast<std::size_t>(std::lround(options.column_share * static_cast<double>(rows.d))));
   std::vector<std::uint32_t> order(n);
   for (int round = 0; round < options.rounds; ++round) {
     for (std::size_t i = 0; i < n; ++i) {

@@ -37,7 +37,8 @@ double mean_power(const Taps& taps, std::size_t begin, std::size_t end) {
 
 // First tap above the threshold whose successor does not fall back under it, with the crossing interpolated.
 template <class Taps>
-std::optional<double> find_first_path(const Taps& taps, std::size_t n, std::size_t from, double threshold_power) {
+std::optional<double> find_first_path(const Taps& taps, std::size_t n, std::size_t from,
+                                      double threshold_power) {
   for (std::size_t k = from; k + 1 < n; ++k) {
     if (taps.power(k) < threshold_power || taps.power(k + 1) < threshold_power) continue;
     const double level = std::sqrt(threshold_power);
@@ -50,12 +51,14 @@ std::optional<double> find_first_path(const Taps& taps, std::size_t n, std::size
 }
 
 template <class Taps>
-std::optional<CirShape> shape_of(const Taps& taps, std::size_t n, std::optional<double> first_path_idx, const CirOptions& o) {
+std::optional<CirShape> shape_of(const Taps& taps, std::size_t n, std::optional<double> first_path_idx,
+                                 const CirOptions& o) {
   const bool has_noise = n > o.noise_end && o.noise_end > o.noise_begin;
   const double noise_power = has_noise ? mean_power(taps, o.noise_begin, o.noise_end) : 0.0;
   if (!first_path_idx) {
     if (!has_noise) return std::nullopt;
-    first_path_idx = find_first_path(taps, n, o.noise_end, o.detect_rms * o.detect_rms * std::max(noise_power, 1e-9));
+    first_path_idx =
+        find_first_path(taps, n, o.noise_end, o.detect_rms * o.detect_rms * std::max(noise_power, 1e-9));
     if (!first_path_idx) return std::nullopt;
   }
   const double fp = *first_path_idx;
@@ -64,8 +67,9 @@ std::optional<CirShape> shape_of(const Taps& taps, std::size_t n, std::optional<
   const std::size_t begin = fp_tap - std::min(fp_tap, o.window_before);
   const std::size_t end = std::min(n, fp_tap + o.window_after + 1);
 
-  double sum_q = 0, sum_qt = 0, sum_qtt = 0, early = 0;        // q: power above the noise, t: taps from the first path
-  double m1 = 0, m2 = 0, m3 = 0, m4 = 0;                       // raw moments of |h|
+  double sum_q = 0, sum_qt = 0, sum_qtt = 0,
+         early = 0;                       // q: power above the noise, t: taps from the first path
+  double m1 = 0, m2 = 0, m3 = 0, m4 = 0;  // raw moments of |h|
   double peak = -1, peak_tap = 0, all = 0;
   const double keep_power = o.keep_rms * o.keep_rms * noise_power;
   for (std::size_t k = begin; k < end; ++k) {
@@ -110,11 +114,13 @@ std::optional<CirShape> shape_of(const Taps& taps, std::size_t n, std::optional<
 
 }  // namespace
 
-std::optional<CirShape> cir_shape(std::span<const std::int16_t> re_im, std::optional<double> first_path_idx, const CirOptions& options) {
+std::optional<CirShape> cir_shape(std::span<const std::int16_t> re_im, std::optional<double> first_path_idx,
+                                  const CirOptions& options) {
   return shape_of(Complex{re_im.data()}, re_im.size() / 2, first_path_idx, options);
 }
 
-std::optional<CirShape> cir_shape(std::span<const float> magnitude, std::optional<double> first_path_idx, const CirOptions& options) {
+std::optional<CirShape> cir_shape(std::span<const float> magnitude, std::optional<double> first_path_idx,
+                                  const CirOptions& options) {
   return shape_of(Magnitude{magnitude.data()}, magnitude.size(), first_path_idx, options);
 }
 

@@ -6,13 +6,34 @@
 namespace anchord::nlos {
 namespace {
 
-constexpr std::array<std::string_view, k_feature_count> k_names{
-    "range_m", "range_db", "rx_dbm", "fp_dbm", "rx_minus_fp_db", "noise_excess_db", "fp_snr_db", "total_snr_db", "preamble_db",
-    "fp_shape12_db", "fp_shape32_db", "rx_free_space_db", "fp_free_space_db", "fp_index", "max_noise_db", "kurtosis",
-    "mean_excess_delay_ns", "rms_delay_spread_ns", "early_energy", "peak_delay_ns", "height_difference_m", "heading_deg",
-    "log_range_spread", "log_fp_spread", "log_rx_minus_fp_spread"};
+constexpr std::array<std::string_view, k_feature_count> k_names{"range_m",
+                                                                "range_db",
+                                                                "rx_dbm",
+                                                                "fp_dbm",
+                                                                "rx_minus_fp_db",
+                                                                "noise_excess_db",
+                                                                "fp_snr_db",
+                                                                "total_snr_db",
+                                                                "preamble_db",
+                                                                "fp_shape12_db",
+                                                                "fp_shape32_db",
+                                                                "rx_free_space_db",
+                                                                "fp_free_space_db",
+                                                                "fp_index",
+                                                                "max_noise_db",
+                                                                "kurtosis",
+                                                                "mean_excess_delay_ns",
+                                                                "rms_delay_spread_ns",
+                                                                "early_energy",
+                                                                "peak_delay_ns",
+                                                                "height_difference_m",
+                                                                "heading_deg",
+                                                                "log_range_spread",
+                                                                "log_fp_spread",
+                                                                "log_rx_minus_fp_spread"};
 
-// 5 % quantile of 20 log10(s / sqrt N) of the register in three public sets; of CIR noise taps it lies 10 dB higher.
+// 5 % quantile of 20 log10(s / sqrt N) of the register in three public sets; of CIR noise taps it lies 10 dB
+// higher.
 constexpr double k_noise_floor_db = 7.4;
 constexpr double k_cir_noise_floor_db = 17.4;
 
@@ -27,7 +48,8 @@ std::optional<double> difference(std::optional<double> a, std::optional<double> 
   return *a - *b;
 }
 
-void set_levels(const DiagnosticSample& s, FeatureVector& out, std::optional<double>& rx, std::optional<double>& fp) {
+void set_levels(const DiagnosticSample& s, FeatureVector& out, std::optional<double>& rx,
+                std::optional<double>& fp) {
   const auto n = positive(s.preamble_count);
   const auto c = positive(s.cir_power);
   const bool amplitudes = s.fp_amp1 && s.fp_amp2 && s.fp_amp3;
@@ -35,10 +57,11 @@ void set_levels(const DiagnosticSample& s, FeatureVector& out, std::optional<dou
   fp = amplitudes && n ? first_path_dbm(*s.fp_amp1, *s.fp_amp2, *s.fp_amp3, *n, s.prf) : s.fp_dbm;
   std::optional<double> d = difference(rx, fp);
   if (c && amplitudes) d = power_difference_db(*c, *s.fp_amp1, *s.fp_amp2, *s.fp_amp3);
-  if (s.cir && n) {   // computed from the CIR where no register said it
+  if (s.cir && n) {  // computed from the CIR where no register said it
     const double n2 = *n * *n;
     if (!rx && s.cir->energy > 0) rx = 10 * std::log10(s.cir->energy / n2) - power_constant_db(s.prf);
-    if (!fp && s.cir->first_path_energy > 0) fp = 10 * std::log10(s.cir->first_path_energy / n2) - power_constant_db(s.prf);
+    if (!fp && s.cir->first_path_energy > 0)
+      fp = 10 * std::log10(s.cir->first_path_energy / n2) - power_constant_db(s.prf);
     if (!d) d = difference(rx, fp);
   }
   out.set(Feature::rx_dbm, rx);
@@ -60,8 +83,10 @@ void set_noise(const DiagnosticSample& s, std::optional<double> rx, FeatureVecto
     const double top = std::max({*s.fp_amp1, *s.fp_amp2, *s.fp_amp3});
     if (top > 0) out.set(Feature::fp_snr_db, db20(top / *noise));
   }
-  if (rx && n) out.set(Feature::total_snr_db, *rx + power_constant_db(s.prf) + db20(*n) - db20(*noise));
-  else if (const auto c = positive(s.cir_power)) out.set(Feature::total_snr_db, 10 * std::log10(*c * 131072.0) - db20(*noise));
+  if (rx && n)
+    out.set(Feature::total_snr_db, *rx + power_constant_db(s.prf) + db20(*n) - db20(*noise));
+  else if (const auto c = positive(s.cir_power))
+    out.set(Feature::total_snr_db, 10 * std::log10(*c * 131072.0) - db20(*noise));
   if (const auto top = positive(s.max_noise)) out.set(Feature::max_noise_db, db20(*top / *noise));
 }
 
@@ -119,7 +144,9 @@ FeatureVector compute_features(const DiagnosticSample& s) {
   const auto f1 = positive(s.fp_amp1), f2 = positive(s.fp_amp2), f3 = positive(s.fp_amp3);
   if (f1 && f2) out.set(Feature::fp_shape12_db, db20(*f1 / *f2));
   if (f3 && f2) out.set(Feature::fp_shape32_db, db20(*f3 / *f2));
-  out.set(Feature::fp_index, s.fp_index ? s.fp_index : s.cir ? std::optional{s.cir->first_path_idx} : std::nullopt);
+  out.set(Feature::fp_index, s.fp_index ? s.fp_index
+                             : s.cir    ? std::optional{s.cir->first_path_idx}
+                                        : std::nullopt);
   out.set(Feature::height_difference_m, s.height_difference_m);
   out.set(Feature::heading_deg, s.heading_deg);
   out.set(Feature::kurtosis, s.kurtosis);
@@ -142,7 +169,8 @@ FeatureVector aggregate_at_rest(std::span<const FeatureVector> repeats) {
   if (repeats.empty()) return out;
   std::vector<double> column(repeats.size());
   for (std::size_t f = 0; f < k_feature_count; ++f) {
-    if (!std::all_of(repeats.begin(), repeats.end(), [f](const auto& r) { return r.present.test(f); })) continue;
+    if (!std::all_of(repeats.begin(), repeats.end(), [f](const auto& r) { return r.present.test(f); }))
+      continue;
     for (std::size_t i = 0; i < repeats.size(); ++i) column[i] = repeats[i].values[f];
     const auto feature = static_cast<Feature>(f);
     if (repeats.size() >= 3 && feature == Feature::range_m)
@@ -151,7 +179,8 @@ FeatureVector aggregate_at_rest(std::span<const FeatureVector> repeats) {
     out.set(feature, quantile(column, 0.5));
     if (repeats.size() < 3 || (feature != Feature::fp_dbm && feature != Feature::rx_minus_fp_db)) continue;
     const double spread = (quantile(column, 0.9) - quantile(column, 0.1)) / 2.56;
-    out.set(feature == Feature::fp_dbm ? Feature::log_fp_spread : Feature::log_rx_minus_fp_spread, std::log(0.01 + spread));
+    out.set(feature == Feature::fp_dbm ? Feature::log_fp_spread : Feature::log_rx_minus_fp_spread,
+            std::log(0.01 + spread));
   }
   return out;
 }

@@ -11,38 +11,40 @@
 #include "core/nlos/cir.hpp"
 #include "core/nlos/power.hpp"
 
-/// The one named, ordered, versioned feature set, from whatever a device, a recording or a public data set gives.
+/// The one named, ordered, versioned feature set, from whatever a device, a recording or a public data set
+/// gives.
 namespace anchord::nlos {
 
-/// Raised when a formula changes, so that a model is never fed numbers that mean something else. New names at the end do not raise it.
+/// Raised when a formula changes, so that a model is never fed numbers that mean something else. New names at
+/// the end do not raise it.
 inline constexpr std::string_view k_feature_set_version = "anchord-features-1";
 
 enum class Feature : std::size_t {
-  range_m,                   ///< R as measured
-  range_db,                  ///< 20 log10 R
-  rx_dbm,                    ///< P_RX, eq 5.7
-  fp_dbm,                    ///< P_FP, eq 5.6
-  rx_minus_fp_db,            ///< D = P_RX - P_FP
-  noise_excess_db,           ///< E = 20 log10(s / sqrt N) - 7.4: a level meter that goes on where P_RX saturates
-  fp_snr_db,                 ///< S = 20 log10(max F / s)
-  total_snr_db,              ///< T = 10 log10(C 2^17) - 20 log10 s
-  preamble_db,               ///< L = 20 log10 N
-  fp_shape12_db,             ///< 20 log10(F1 / F2)
-  fp_shape32_db,             ///< 20 log10(F3 / F2)
-  rx_free_space_db,          ///< X = P_RX + 20 log10 R
-  fp_free_space_db,          ///< P_FP + 20 log10 R
-  fp_index,                  ///< first-path tap
-  max_noise_db,              ///< 20 log10(max noise / s)
-  kurtosis,                  ///< eq 5.3
-  mean_excess_delay_ns,      ///< eq 5.4
-  rms_delay_spread_ns,       ///< eq 5.5
-  early_energy,              ///< share of the energy in the first 13 taps of the window
-  peak_delay_ns,             ///< strongest tap after the first path
+  range_m,               ///< R as measured
+  range_db,              ///< 20 log10 R
+  rx_dbm,                ///< P_RX, eq 5.7
+  fp_dbm,                ///< P_FP, eq 5.6
+  rx_minus_fp_db,        ///< D = P_RX - P_FP
+  noise_excess_db,       ///< E = 20 log10(s / sqrt N) - 7.4: a level meter that goes on where P_RX saturates
+  fp_snr_db,             ///< S = 20 log10(max F / s)
+  total_snr_db,          ///< T = 10 log10(C 2^17) - 20 log10 s
+  preamble_db,           ///< L = 20 log10 N
+  fp_shape12_db,         ///< 20 log10(F1 / F2)
+  fp_shape32_db,         ///< 20 log10(F3 / F2)
+  rx_free_space_db,      ///< X = P_RX + 20 log10 R
+  fp_free_space_db,      ///< P_FP + 20 log10 R
+  fp_index,              ///< first-path tap
+  max_noise_db,          ///< 20 log10(max noise / s)
+  kurtosis,              ///< eq 5.3
+  mean_excess_delay_ns,  ///< eq 5.4
+  rms_delay_spread_ns,   ///< eq 5.5
+  early_energy,          ///< share of the energy in the first 13 taps of the window
+  peak_delay_ns,         ///< strongest tap after the first path
   height_difference_m,
   heading_deg,
-  log_range_spread,          ///< ln(0.005 + sd R) over a window at rest
-  log_fp_spread,             ///< ln(0.01 + (q90 - q10) / 2.56) of P_FP
-  log_rx_minus_fp_spread,    ///< same of D
+  log_range_spread,        ///< ln(0.005 + sd R) over a window at rest
+  log_fp_spread,           ///< ln(0.01 + (q90 - q10) / 2.56) of P_FP
+  log_rx_minus_fp_spread,  ///< same of D
   count
 };
 
@@ -56,12 +58,12 @@ struct DiagnosticSample {
   std::optional<double> range_m{};
   std::optional<double> rx_dbm{}, fp_dbm{};
   std::optional<double> fp_amp1{}, fp_amp2{}, fp_amp3{};
-  std::optional<double> cir_power{};        ///< CIR_PWR register, C
-  std::optional<double> preamble_count{};   ///< RXPACC, N
+  std::optional<double> cir_power{};       ///< CIR_PWR register, C
+  std::optional<double> preamble_count{};  ///< RXPACC, N
   std::optional<double> std_noise{}, max_noise{};
   std::optional<double> fp_index{};
   std::optional<double> height_difference_m{}, heading_deg{};
-  std::optional<double> kurtosis{};         ///< where the source computed it; a CIR's own shape wins
+  std::optional<double> kurtosis{};  ///< where the source computed it; a CIR's own shape wins
   std::optional<CirShape> cir{};
   Prf prf{Prf::mhz64};
 };
@@ -75,23 +77,25 @@ struct FeatureVector {
   std::optional<double> get(Feature feature) const;
 };
 
-/// Everything the sample allows; non-finite and impossible inputs (range <= 0, no noise) leave their features out. No allocation.
+/// Everything the sample allows; non-finite and impossible inputs (range <= 0, no noise) leave their features
+/// out. No allocation.
 FeatureVector compute_features(const DiagnosticSample& sample);
 
 /// Batch form: out[i] from samples[i]; out.size() must be at least samples.size().
 void compute_features(std::span<const DiagnosticSample> samples, std::span<FeatureVector> out);
 
-/// Median of each feature over repeats at one placement (features lacking in any repeat are lacking), and with at least 3 repeats
-/// the three spreads.
+/// Median of each feature over repeats at one placement (features lacking in any repeat are lacking), and
+/// with at least 3 repeats the three spreads.
 FeatureVector aggregate_at_rest(std::span<const FeatureVector> repeats);
 
-/// Sliding window over the ranges of one link at rest: sd of the last `capacity`. Zero ranges are faults and are not taken (5.2).
+/// Sliding window over the ranges of one link at rest: sd of the last `capacity`. Zero ranges are faults and
+/// are not taken (5.2).
 class RangeSpread {
  public:
   explicit RangeSpread(std::size_t capacity = 10) : capacity_{capacity} {}
   void add(double range_m);
   void clear() { ranges_m_.clear(); }
-  std::optional<double> sd_m() const;   ///< sample sd, from 3 ranges on
+  std::optional<double> sd_m() const;  ///< sample sd, from 3 ranges on
 
  private:
   std::size_t capacity_;

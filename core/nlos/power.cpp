@@ -12,11 +12,16 @@ double power_constant_db(Prf prf) { return prf == Prf::mhz16 ? 113.77 : 121.74; 
 double corrected_preamble_count(double rxpacc, double rxpacc_nosat, Sfd sfd) {
   if (rxpacc != rxpacc_nosat) return rxpacc;
   switch (sfd) {
-    case Sfd::standard_8: return rxpacc - 5;
-    case Sfd::standard_64: return rxpacc - 64;
-    case Sfd::decawave_8: return rxpacc - 10;
-    case Sfd::decawave_16: return rxpacc - 18;
-    case Sfd::decawave_64: return rxpacc - 82;
+    case Sfd::standard_8:
+      return rxpacc - 5;
+    case Sfd::standard_64:
+      return rxpacc - 64;
+    case Sfd::decawave_8:
+      return rxpacc - 10;
+    case Sfd::decawave_16:
+      return rxpacc - 18;
+    case Sfd::decawave_64:
+      return rxpacc - 82;
   }
   return rxpacc;
 }

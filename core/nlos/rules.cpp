@@ -20,7 +20,9 @@ double quantile(std::vector<double> values, double q) {
 Result<RssLine> fit_rss_line(std::span<const RssSample> los_samples, const RssFitOptions& options) {
   std::map<long, std::vector<RssSample>> bins;
   for (const auto& sample : los_samples) {
-    if (!std::isfinite(sample.distance_m) || !std::isfinite(sample.rss_dbm) || sample.distance_m <= 0 || sample.distance_m > 1e4) continue;
+    if (!std::isfinite(sample.distance_m) || !std::isfinite(sample.rss_dbm) || sample.distance_m <= 0 ||
+        sample.distance_m > 1e4)
+      continue;
     bins[std::lround(sample.distance_m / options.bin_m)].push_back(sample);
   }
   double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
@@ -41,19 +43,26 @@ Result<RssLine> fit_rss_line(std::span<const RssSample> los_samples, const RssFi
     sxy += x * y;
   }
   const double det = n * sxx - sx * sx;
-  if (n < 2 || !(det > 0)) return make_error(Errc::too_few_observations, "RSS line needs two distances with enough LOS samples each, got " + std::to_string(static_cast<int>(n)));
+  if (n < 2 || !(det > 0))
+    return make_error(Errc::too_few_observations,
+                      "RSS line needs two distances with enough LOS samples each, got " +
+                          std::to_string(static_cast<int>(n)));
   const double slope = (n * sxy - sx * sy) / det;
   return RssLine{(sy - slope * sx) / n, slope};
 }
 
-Result<ThresholdRule> fit_threshold_for_nlos_share(std::span<const double> nlos_values, bool los_above, double share) {
-  if (nlos_values.empty()) return make_error(Errc::too_few_observations, "a threshold needs NLOS values, got none");
-  return ThresholdRule{quantile({nlos_values.begin(), nlos_values.end()}, los_above ? share : 1 - share), los_above};
+Result<ThresholdRule> fit_threshold_for_nlos_share(std::span<const double> nlos_values, bool los_above,
+                                                   double share) {
+  if (nlos_values.empty())
+    return make_error(Errc::too_few_observations, "a threshold needs NLOS values, got none");
+  return ThresholdRule{quantile({nlos_values.begin(), nlos_values.end()}, los_above ? share : 1 - share),
+                       los_above};
 }
 
 Result<ThresholdRule> fit_threshold(std::span<const double> los_values, std::span<const double> nlos_values) {
-  if (los_values.empty() || nlos_values.empty()) return make_error(Errc::too_few_observations, "a threshold needs values of both classes");
-  std::vector<std::pair<double, bool>> all;   // value, is LOS
+  if (los_values.empty() || nlos_values.empty())
+    return make_error(Errc::too_few_observations, "a threshold needs values of both classes");
+  std::vector<std::pair<double, bool>> all;  // value, is LOS
   for (const double v : los_values) all.emplace_back(v, true);
   for (const double v : nlos_values) all.emplace_back(v, false);
   std::sort(all.begin(), all.end());

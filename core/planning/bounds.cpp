@@ -20,8 +20,8 @@ int side_of(const Vector2d& a, const Vector2d& b, const Vector2d& p) {
 }
 
 bool in_box(const Vector2d& a, const Vector2d& b, const Vector2d& p) {
-  return p.x() >= std::min(a.x(), b.x()) && p.x() <= std::max(a.x(), b.x()) && p.y() >= std::min(a.y(), b.y()) &&
-         p.y() <= std::max(a.y(), b.y());
+  return p.x() >= std::min(a.x(), b.x()) && p.x() <= std::max(a.x(), b.x()) &&
+         p.y() >= std::min(a.y(), b.y()) && p.y() <= std::max(a.y(), b.y());
 }
 
 template <class Visit>
@@ -31,12 +31,13 @@ void for_each_edge(const Polygon& polygon, Visit&& visit) {
 
 bool crosses_edge(const Polygon& polygon, const Vector2d& from, const Vector2d& to) {
   bool out = false;
-  for_each_edge(polygon, [&](const Vector2d& a, const Vector2d& b) { out = out || segments_cross(from, to, a, b); });
+  for_each_edge(polygon,
+                [&](const Vector2d& a, const Vector2d& b) { out = out || segments_cross(from, to, a, b); });
   return out;
 }
 
-/// A polygon may be concave: both ends inside do not make the way between them inside. Cuts the way where it meets
-/// edges and asks for the middle of every piece.
+/// A polygon may be concave: both ends inside do not make the way between them inside. Cuts the way where it
+/// meets edges and asks for the middle of every piece.
 bool way_stays_inside(const Polygon& polygon, const Vector2d& from, const Vector2d& to) {
   std::vector<double> cuts{0, 1};
   const Vector2d way = to - from;
@@ -44,7 +45,8 @@ bool way_stays_inside(const Polygon& polygon, const Vector2d& from, const Vector
     const double parallel = cross(way, b - a);
     if (parallel != 0) cuts.push_back(std::clamp(cross(a - from, b - a) / parallel, 0.0, 1.0));
     for (const auto& corner : {a, b}) {  // for edges along the way
-      if (way.squaredNorm() > 0) cuts.push_back(std::clamp((corner - from).dot(way) / way.squaredNorm(), 0.0, 1.0));
+      if (way.squaredNorm() > 0)
+        cuts.push_back(std::clamp((corner - from).dot(way) / way.squaredNorm(), 0.0, 1.0));
     }
   });
   std::sort(cuts.begin(), cuts.end());
@@ -66,16 +68,26 @@ bool comes_too_near(double start_m, double end_m, double way_m, double keep_out_
 
 std::string_view to_string(Refusal refusal) {
   switch (refusal) {
-    case Refusal::visited: return "visited";
-    case Refusal::unreachable: return "unreachable";
-    case Refusal::outside_fence: return "outside_fence";
-    case Refusal::no_fly: return "no_fly";
-    case Refusal::near_wall: return "near_wall";
-    case Refusal::too_low: return "too_low";
-    case Refusal::too_high: return "too_high";
-    case Refusal::path_blocked: return "path_blocked";
-    case Refusal::over_range: return "over_range";
-    case Refusal::on_anchor: return "on_anchor";
+    case Refusal::visited:
+      return "visited";
+    case Refusal::unreachable:
+      return "unreachable";
+    case Refusal::outside_fence:
+      return "outside_fence";
+    case Refusal::no_fly:
+      return "no_fly";
+    case Refusal::near_wall:
+      return "near_wall";
+    case Refusal::too_low:
+      return "too_low";
+    case Refusal::too_high:
+      return "too_high";
+    case Refusal::path_blocked:
+      return "path_blocked";
+    case Refusal::over_range:
+      return "over_range";
+    case Refusal::on_anchor:
+      return "on_anchor";
   }
   return "unknown";
 }
@@ -95,10 +107,11 @@ bool contains(const Polygon& polygon, const Vector2d& point) {
 }
 
 bool segments_cross(const Vector2d& a, const Vector2d& b, const Vector2d& c, const Vector2d& d) {
-  const int a_side = side_of(c, d, a), b_side = side_of(c, d, b), c_side = side_of(a, b, c), d_side = side_of(a, b, d);
+  const int a_side = side_of(c, d, a), b_side = side_of(c, d, b), c_side = side_of(a, b, c),
+            d_side = side_of(a, b, d);
   if (a_side * b_side < 0 && c_side * d_side < 0) return true;
-  return (a_side == 0 && in_box(c, d, a)) || (b_side == 0 && in_box(c, d, b)) || (c_side == 0 && in_box(a, b, c)) ||
-         (d_side == 0 && in_box(a, b, d));
+  return (a_side == 0 && in_box(c, d, a)) || (b_side == 0 && in_box(c, d, b)) ||
+         (c_side == 0 && in_box(a, b, c)) || (d_side == 0 && in_box(a, b, d));
 }
 
 double distance_to_segment_m(const Vector2d& point, const Vector2d& a, const Vector2d& b) {
@@ -108,10 +121,11 @@ double distance_to_segment_m(const Vector2d& point, const Vector2d& a, const Vec
   return (point - (a + t * ab)).norm();
 }
 
-double distance_between_segments_m(const Vector2d& a, const Vector2d& b, const Vector2d& c, const Vector2d& d) {
+double distance_between_segments_m(const Vector2d& a, const Vector2d& b, const Vector2d& c,
+                                   const Vector2d& d) {
   if (segments_cross(a, b, c, d)) return 0;
-  return std::min({distance_to_segment_m(a, c, d), distance_to_segment_m(b, c, d), distance_to_segment_m(c, a, b),
-                   distance_to_segment_m(d, a, b)});
+  return std::min({distance_to_segment_m(a, c, d), distance_to_segment_m(b, c, d),
+                   distance_to_segment_m(c, a, b), distance_to_segment_m(d, a, b)});
 }
 
 double distance_to_edge_m(const Polygon& polygon, const Vector2d& point) {
@@ -127,7 +141,8 @@ std::optional<Refusal> refuse_point(const Bounds& bounds, const Eigen::Vector3d&
   const Vector2d p = point_m.head<2>();
   if (!bounds.fence.empty() && !contains(bounds.fence, p)) return Refusal::outside_fence;
   for (const auto& area : bounds.no_fly) {
-    if (contains(area, p) || distance_to_edge_m(area, p) < bounds.keep_out_m - k_slack_m) return Refusal::no_fly;
+    if (contains(area, p) || distance_to_edge_m(area, p) < bounds.keep_out_m - k_slack_m)
+      return Refusal::no_fly;
   }
   for (const auto& wall : bounds.walls) {
     const double m = distance_to_segment_m(p, wall.a_m, wall.b_m);
@@ -138,26 +153,29 @@ std::optional<Refusal> refuse_point(const Bounds& bounds, const Eigen::Vector3d&
   return std::nullopt;
 }
 
-std::optional<Refusal> refuse_path(const Bounds& bounds, const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m) {
+std::optional<Refusal> refuse_path(const Bounds& bounds, const Eigen::Vector3d& from_m,
+                                   const Eigen::Vector3d& to_m) {
   const Vector2d from = from_m.head<2>(), to = to_m.head<2>();
   if (!bounds.fence.empty() && contains(bounds.fence, from) && !way_stays_inside(bounds.fence, from, to)) {
     return Refusal::path_blocked;
   }
   for (const auto& area : bounds.no_fly) {
-    if (!contains(area, from) && (contains(area, to) || crosses_edge(area, from, to))) return Refusal::path_blocked;
+    if (!contains(area, from) && (contains(area, to) || crosses_edge(area, from, to)))
+      return Refusal::path_blocked;
     double way = std::numeric_limits<double>::infinity();
     for_each_edge(area, [&](const Vector2d& a, const Vector2d& b) {
       way = std::min(way, distance_between_segments_m(from, to, a, b));
     });
-    if (comes_too_near(distance_to_edge_m(area, from), distance_to_edge_m(area, to), way, bounds.keep_out_m)) {
+    if (comes_too_near(distance_to_edge_m(area, from), distance_to_edge_m(area, to), way,
+                       bounds.keep_out_m)) {
       return Refusal::path_blocked;
     }
   }
   for (const auto& wall : bounds.walls) {
     if (segments_cross(from, to, wall.a_m, wall.b_m)) return Refusal::path_blocked;
     const double way = distance_between_segments_m(from, to, wall.a_m, wall.b_m);
-    if (comes_too_near(distance_to_segment_m(from, wall.a_m, wall.b_m), distance_to_segment_m(to, wall.a_m, wall.b_m),
-                       way, wall.keep_out_m)) {
+    if (comes_too_near(distance_to_segment_m(from, wall.a_m, wall.b_m),
+                       distance_to_segment_m(to, wall.a_m, wall.b_m), way, wall.keep_out_m)) {
       return Refusal::path_blocked;
     }
   }

@@ -29,15 +29,15 @@ struct Bounds {
 /// Why a candidate may not be flown to.
 enum class Refusal : unsigned char {
   visited,
-  unreachable,     ///< tried before and not reached, or no connection there
+  unreachable,  ///< tried before and not reached, or no connection there
   outside_fence,
   no_fly,
   near_wall,
   too_low,
   too_high,
-  path_blocked,    ///< the point is fine, the straight way to it is not
-  over_range,      ///< too far from every anchor
-  on_anchor,       ///< no direction from there
+  path_blocked,  ///< the point is fine, the straight way to it is not
+  over_range,    ///< too far from every anchor
+  on_anchor,     ///< no direction from there
 };
 std::string_view to_string(Refusal refusal);
 
@@ -46,19 +46,22 @@ bool contains(const Polygon& polygon, const Eigen::Vector2d& point_m);
 /// Touching counts as crossing; collinear overlap too.
 bool segments_cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c,
                     const Eigen::Vector2d& d);
-double distance_to_segment_m(const Eigen::Vector2d& point, const Eigen::Vector2d& a, const Eigen::Vector2d& b);
+double distance_to_segment_m(const Eigen::Vector2d& point, const Eigen::Vector2d& a,
+                             const Eigen::Vector2d& b);
 /// 0 where they cross.
-double distance_between_segments_m(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c,
-                                   const Eigen::Vector2d& d);
+double distance_between_segments_m(const Eigen::Vector2d& a, const Eigen::Vector2d& b,
+                                   const Eigen::Vector2d& c, const Eigen::Vector2d& d);
 /// To the nearest edge, from either side.
 double distance_to_edge_m(const Polygon& polygon, const Eigen::Vector2d& point_m);
 
 /// First rule the point breaks; nothing when it may be flown to. Not finite: outside_fence.
 std::optional<Refusal> refuse_point(const Bounds& bounds, const Eigen::Vector3d& point_m);
 
-/// First rule the straight way breaks. Where the way starts is not judged (the aircraft is there already), only
-/// what it crosses or comes too near to; leaving a keep-out zone outwards is allowed, going deeper is not.
-std::optional<Refusal> refuse_path(const Bounds& bounds, const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m);
+/// First rule the straight way breaks. Where the way starts is not judged (the aircraft is there already),
+/// only what it crosses or comes too near to; leaving a keep-out zone outwards is allowed, going deeper is
+/// not.
+std::optional<Refusal> refuse_path(const Bounds& bounds, const Eigen::Vector3d& from_m,
+                                   const Eigen::Vector3d& to_m);
 
 /// Probability that the straight line is not line of sight, of independent walls: 1 - prod (1 - p).
 double p_nlos_through(const Bounds& bounds, const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m);

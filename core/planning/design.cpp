@@ -48,7 +48,8 @@ double Design::value_with(const Eigen::Vector3d& point) const {
   for (std::size_t i = 0; i < anchors_.size(); ++i) {
     const Eigen::Vector4d h = row(i, point), ph = covariances_[i] * h;
     if (options_.criterion == Criterion::a_optimal) {  // the trace alone needs no matrix
-      out += covariances_[i].topLeftCorner<3, 3>().trace() - ph.head<3>().squaredNorm() / (variance_m2_ + h.dot(ph));
+      out += covariances_[i].topLeftCorner<3, 3>().trace() -
+             ph.head<3>().squaredNorm() / (variance_m2_ + h.dot(ph));
     } else {
       out += value_of(covariances_[i] - ph * ph.transpose() / (variance_m2_ + h.dot(ph)));
     }
@@ -64,7 +65,8 @@ double Design::mean_variance_m2() const {
 
 std::vector<double> Design::sigmas_m() const {
   std::vector<double> out;
-  for (const auto& covariance : covariances_) out.push_back(std::sqrt(covariance.topLeftCorner<3, 3>().trace()));
+  for (const auto& covariance : covariances_)
+    out.push_back(std::sqrt(covariance.topLeftCorner<3, 3>().trace()));
   return out;
 }
 

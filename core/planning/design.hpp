@@ -8,7 +8,8 @@
 
 namespace anchord::planning {
 
-/// Expected covariance of position and bias of many assumed anchors, under a set of measuring points that changes.
+/// Expected covariance of position and bias of many assumed anchors, under a set of measuring points that
+/// changes.
 class Design {
  public:
   Design(std::span<const Eigen::Vector3d> anchors, const FlightPlanOptions& options);

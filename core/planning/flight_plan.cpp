@@ -32,7 +32,9 @@ std::vector<Vector3d> assumed_anchors(const FlightPlanInput& input, const Flight
   // A large hall gets a wider grid, not more anchors.
   for (double spacing = options.anchor_spacing_m;; spacing *= 1.3) {
     out.clear();
-    const auto count = [&](double length) { return std::max(1, static_cast<int>(std::round(length / spacing))); };
+    const auto count = [&](double length) {
+      return std::max(1, static_cast<int>(std::round(length / spacing)));
+    };
     const int nx = count(high.x() - low.x()), ny = count(high.y() - low.y());
     for (int iy = 0; iy < ny; ++iy) {
       for (int ix = 0; ix < nx; ++ix) {
@@ -45,15 +47,18 @@ std::vector<Vector3d> assumed_anchors(const FlightPlanInput& input, const Flight
   }
 }
 
-std::vector<Candidate> candidates(const FlightPlanInput& input, const FlightPlanOptions& options, const Bounds& bounds) {
+std::vector<Candidate> candidates(const FlightPlanInput& input, const FlightPlanOptions& options,
+                                  const Bounds& bounds) {
   std::vector<double> heights = options.heights_m;
-  if (heights.empty()) heights = {2.0, std::max(3.0, input.building_height_m * 0.6), input.building_height_m + 4.0};
+  if (heights.empty())
+    heights = {2.0, std::max(3.0, input.building_height_m * 0.6), input.building_height_m + 4.0};
   std::vector<Candidate> out;
   for (const double extra : options.ring_m) {
     const auto ring = ring_around(input.outline, options.keep_out_m + extra, options.spacing_m);
     for (std::size_t i = 0; i < ring.size(); ++i) {
       for (const double z : heights) {
-        const Candidate c{{ring[i].x(), ring[i].y(), z}, static_cast<double>(i) / static_cast<double>(ring.size())};
+        const Candidate c{{ring[i].x(), ring[i].y(), z},
+                          static_cast<double>(i) / static_cast<double>(ring.size())};
         if (!refuse_point(bounds, c.point_m)) out.push_back(c);
       }
     }
@@ -73,8 +78,8 @@ std::pair<std::size_t, double> best_of(const Design& design, const std::vector<C
   return best;
 }
 
-std::vector<std::size_t> choose(Design& design, const std::vector<Candidate>& all, const FlightPlanOptions& options,
-                                std::string& reason) {
+std::vector<std::size_t> choose(Design& design, const std::vector<Candidate>& all,
+                                const FlightPlanOptions& options, std::string& reason) {
   std::vector<bool> chosen(all.size(), false);
   std::vector<std::size_t> out;
   const auto most = std::min(static_cast<std::size_t>(options.max_points), all.size());
@@ -88,7 +93,8 @@ std::vector<std::size_t> choose(Design& design, const std::vector<Candidate>& al
     if (static_cast<int>(out.size()) >= options.min_points && gain < options.min_gain) {
       design.remove(all[next].point_m);
       std::array<char, 128> text{};
-      std::snprintf(text.data(), text.size(), "one more point would lower the predicted variance by %.1f %% only", 100 * gain);
+      std::snprintf(text.data(), text.size(),
+                    "one more point would lower the predicted variance by %.1f %% only", 100 * gain);
       reason = text.data();
       break;
     }
@@ -115,10 +121,10 @@ std::vector<std::size_t> choose(Design& design, const std::vector<Candidate>& al
   return out;
 }
 
-/// Points between two that no straight way joins: along the inner ring, each as far as can be seen, the shorter way
-/// round. Empty when there is none.
-std::vector<Vector3d> way_round(const std::vector<Candidate>& ring, const Bounds& bounds, const Vector3d& from,
-                                const Vector3d& to) {
+/// Points between two that no straight way joins: along the inner ring, each as far as can be seen, the
+/// shorter way round. Empty when there is none.
+std::vector<Vector3d> way_round(const std::vector<Candidate>& ring, const Bounds& bounds,
+                                const Vector3d& from, const Vector3d& to) {
   const double height = std::max(from.z(), to.z());
   const int n = static_cast<int>(ring.size());
   std::vector<Vector3d> best;
@@ -135,7 +141,8 @@ std::vector<Vector3d> way_round(const std::vector<Candidate>& ring, const Bounds
       int here = start;
       for (int walked = 0; walked < n && length < best_m && refuse_path(bounds, way.back(), to);) {
         int step = 0;
-        for (int k = 1; k <= n - walked && !refuse_path(bounds, way.back(), at(here + direction * k)); ++k) step = k;
+        for (int k = 1; k <= n - walked && !refuse_path(bounds, way.back(), at(here + direction * k)); ++k)
+          step = k;
         if (step == 0) break;
         here += direction * step;
         walked += step;
@@ -155,7 +162,8 @@ std::vector<Vector3d> way_round(const std::vector<Candidate>& ring, const Bounds
 Result<void> order(FlightPlan& plan, std::vector<Candidate> chosen, const FlightPlanInput& input,
                    const FlightPlanOptions& options, const Bounds& bounds) {
   std::sort(chosen.begin(), chosen.end(), [](const Candidate& a, const Candidate& b) {
-    return std::tuple(a.along, a.point_m.z(), a.point_m.x()) < std::tuple(b.along, b.point_m.z(), b.point_m.x());
+    return std::tuple(a.along, a.point_m.z(), a.point_m.x()) <
+           std::tuple(b.along, b.point_m.z(), b.point_m.x());
   });
   Vector2d middle{0, 0};
   for (const auto& corner : input.outline) middle += corner / static_cast<double>(input.outline.size());
@@ -174,12 +182,14 @@ Result<void> order(FlightPlan& plan, std::vector<Candidate> chosen, const Flight
     if (!refuse_path(bounds, from, to)) continue;
     const auto way = way_round(ring, bounds, from, to);
     if (way.empty()) {
-      return make_error(Errc::not_found, "no legal way joins two points of the flight: widen the fence or the keep-out");
+      return make_error(Errc::not_found,
+                        "no legal way joins two points of the flight: widen the fence or the keep-out");
     }
     for (const auto& p : way) put(p, false);
   }
   for (std::size_t i = 0; i < plan.waypoints.size(); ++i) {
-    plan.length_m += (plan.waypoints[(i + 1) % plan.waypoints.size()].point_m - plan.waypoints[i].point_m).norm();
+    plan.length_m +=
+        (plan.waypoints[(i + 1) % plan.waypoints.size()].point_m - plan.waypoints[i].point_m).norm();
   }
   plan.n_measure = chosen.size();
   plan.duration_s = plan.length_m / options.speed_mps + static_cast<double>(chosen.size()) * options.dwell_s;
@@ -201,9 +211,11 @@ Result<void> FlightPlanOptions::check() const {
   if (!(spacing_m >= 0.5) || !(anchor_spacing_m >= 0.5)) return bad("spacings must be at least 0.5 m");
   if (!(floor_m >= 2) || max_anchors < 1) return bad("floor_m must be at least 2 and max_anchors at least 1");
   if (!(max_range_m > 0)) return bad("max_range_m must be positive");
-  if (min_points < 4 || max_points < min_points || max_points > 500) return bad("need 4 <= min_points <= max_points <= 500");
+  if (min_points < 4 || max_points < min_points || max_points > 500)
+    return bad("need 4 <= min_points <= max_points <= 500");
   if (!(min_gain >= 0 && min_gain < 1)) return bad("min_gain must be 0 to 1");
-  if (ranges_per_point < 1 || !(range_sigma_m > 0) || !(point_sigma_m >= 0) || !(prior_sigma_m > 0) || !(bias_sigma_m > 0)) {
+  if (ranges_per_point < 1 || !(range_sigma_m > 0) || !(point_sigma_m >= 0) || !(prior_sigma_m > 0) ||
+      !(bias_sigma_m > 0)) {
     return bad("ranges_per_point and sigmas must be positive");
   }
   if (!(speed_mps > 0) || !(dwell_s >= 0)) return bad("speed_mps must be positive and dwell_s not negative");
@@ -212,7 +224,8 @@ Result<void> FlightPlanOptions::check() const {
 
 Result<FlightPlan> plan_flight(const FlightPlanInput& input, const FlightPlanOptions& options) {
   BOOST_OUTCOME_TRY(options.check());
-  if (input.outline.size() < 3) return make_error(Errc::invalid_argument, "an outline needs at least three corners");
+  if (input.outline.size() < 3)
+    return make_error(Errc::invalid_argument, "an outline needs at least three corners");
   for (const auto& corner : input.outline) {
     if (!corner.allFinite() || corner.norm() > 2000) {
       return make_error(Errc::invalid_argument, "a corner of the outline is more than 2 km from its middle");
@@ -223,21 +236,25 @@ Result<FlightPlan> plan_flight(const FlightPlanInput& input, const FlightPlanOpt
     const auto &a = input.outline[i], &b = input.outline[(i + 1) % input.outline.size()];
     twice_area_m2 += a.x() * b.y() - a.y() * b.x();
   }
-  if (std::abs(twice_area_m2) < 2) return make_error(Errc::invalid_argument, "the outline encloses less than 1 m^2");
+  if (std::abs(twice_area_m2) < 2)
+    return make_error(Errc::invalid_argument, "the outline encloses less than 1 m^2");
   Bounds bounds;
   bounds.fence = input.fence;
   bounds.no_fly = input.no_fly;
   bounds.no_fly.push_back(input.outline);
-  // A straight way between two points of the ring round a corner's arc cuts the arc: allow 20 cm of the keep-out.
+  // A straight way between two points of the ring round a corner's arc cuts the arc: allow 20 cm of the
+  // keep-out.
   bounds.keep_out_m = std::max(0.0, options.keep_out_m - 0.2);
 
   FlightPlan plan;
   plan.assumed_anchors_m = assumed_anchors(input, options);
-  if (plan.assumed_anchors_m.empty()) return make_error(Errc::invalid_argument, "the outline encloses no area");
+  if (plan.assumed_anchors_m.empty())
+    return make_error(Errc::invalid_argument, "the outline encloses no area");
   const auto all = candidates(input, options, bounds);
   plan.n_candidates = all.size();
   if (static_cast<int>(all.size()) < options.min_points) {
-    return make_error(Errc::not_found, "only " + std::to_string(all.size()) + " points to fly to are left by fence, no-fly and keep-out, need " +
+    return make_error(Errc::not_found, "only " + std::to_string(all.size()) +
+                                           " points to fly to are left by fence, no-fly and keep-out, need " +
                                            std::to_string(options.min_points));
   }
   Design design(plan.assumed_anchors_m, options);

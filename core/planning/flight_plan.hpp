@@ -17,31 +17,32 @@ enum class Criterion : std::uint8_t {
 };
 
 struct FlightPlanInput {
-  Polygon outline;              ///< of the building, ENU metres
+  Polygon outline;  ///< of the building, ENU metres
   double building_height_m = 6;
   std::vector<Polygon> no_fly;
-  Polygon fence;                ///< empty: none
+  Polygon fence;  ///< empty: none
 };
 
 struct FlightPlanOptions {
-  double keep_out_m = 4;              ///< from the outline and from no-fly areas
+  double keep_out_m = 4;                ///< from the outline and from no-fly areas
   std::vector<double> ring_m = {0, 6};  ///< rings of candidates, beyond keep_out_m
-  std::vector<double> heights_m;      ///< above ground; empty: 2 m, mid-height and 4 m above the roof
-  double spacing_m = 3;               ///< of candidates along a ring
-  double anchor_spacing_m = 5;        ///< of the anchors assumed inside, at most `max_anchors` of them
+  std::vector<double> heights_m;        ///< above ground; empty: 2 m, mid-height and 4 m above the roof
+  double spacing_m = 3;                 ///< of candidates along a ring
+  double anchor_spacing_m = 5;          ///< of the anchors assumed inside, at most `max_anchors` of them
   int max_anchors = 80;
-  double floor_m = 3;                 ///< assumed anchors hang 2.5 m above each floor
+  double floor_m = 3;  ///< assumed anchors hang 2.5 m above each floor
   double max_range_m = 60;
   Criterion criterion = Criterion::a_optimal;
-  int min_points = 8;                 ///< a flight with fewer cannot tell bias, height and mirror apart
+  int min_points = 8;  ///< a flight with fewer cannot tell bias, height and mirror apart
   int max_points = 60;
   /// Stops adding once a point lowers the mean predicted variance by less than this share.
   double min_gain = 0.02;
-  int ranges_per_point = 20;          ///< n samples of the dwell
-  double range_sigma_m = 0.15;        ///< through a facade: between 0.05 (line of sight) and 0.23 (NLOS)
-  double point_sigma_m = 0.05;        ///< common to all ranges of one point: RTK and multipath do not average out there
+  int ranges_per_point = 20;    ///< n samples of the dwell
+  double range_sigma_m = 0.15;  ///< through a facade: between 0.05 (line of sight) and 0.23 (NLOS)
+  double point_sigma_m =
+      0.05;  ///< common to all ranges of one point: RTK and multipath do not average out there
   double prior_sigma_m = 30;
-  double bias_sigma_m = 0.3;          ///< constant excess per anchor, estimated too
+  double bias_sigma_m = 0.3;  ///< constant excess per anchor, estimated too
   double speed_mps = 2;
   double dwell_s = 4;
 
@@ -56,21 +57,22 @@ struct Waypoint {
 };
 
 struct FlightPlan {
-  std::vector<Waypoint> waypoints;   ///< in flying order, closed: the first follows the last
+  std::vector<Waypoint> waypoints;  ///< in flying order, closed: the first follows the last
   std::size_t n_measure{};
   std::size_t n_candidates{};
   std::vector<Eigen::Vector3d> assumed_anchors_m;
   std::vector<double> predicted_sigma_m;  ///< per assumed anchor: root of the summed variance of its position
   double rms_m{}, worst_m{};
   double length_m{}, duration_s{};
-  std::string reason;                ///< why it stopped adding points
+  std::string reason;  ///< why it stopped adding points
 };
 
-/// Waypoints of a whole flight from the outline of the building alone, so that none is set by hand (chapter 9):
-/// greedy choice among candidates on rings round the outline, then exchange of single points until none helps, then
-/// an order round the building with transit points where the straight way would cut a corner.
+/// Waypoints of a whole flight from the outline of the building alone, so that none is set by hand (chapter
+/// 9): greedy choice among candidates on rings round the outline, then exchange of single points until none
+/// helps, then an order round the building with transit points where the straight way would cut a corner.
 ///
-/// errors   invalid_argument (outline of fewer than three corners or without area, options), not_found (nowhere to
+/// errors   invalid_argument (outline of fewer than three corners or without area, options), not_found
+/// (nowhere to
 ///          fly: fence and no-fly leave no candidate; or two points no legal way joins)
 /// threads  pure; deterministic
 Result<FlightPlan> plan_flight(const FlightPlanInput& input, const FlightPlanOptions& options);

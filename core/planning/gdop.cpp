@@ -8,8 +8,8 @@ namespace anchord::planning {
 namespace {
 
 Error too_few(std::size_t count, int dim) {
-  return make_error(Errc::too_few_observations, "too few points for GDOP: " + std::to_string(count) + ", need " +
-                                                    std::to_string(dim));
+  return make_error(Errc::too_few_observations,
+                    "too few points for GDOP: " + std::to_string(count) + ", need " + std::to_string(dim));
 }
 
 template <int Dim>

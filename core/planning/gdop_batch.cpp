@@ -79,7 +79,11 @@ Forms forms_of(const Geometry<Dim>& base) {
   Eigen::Matrix3d n = Eigen::Matrix3d::Zero(), d = Eigen::Matrix3d::Zero();
   n.template topLeftCorner<Dim, Dim>() = update.numerator;
   d.template topLeftCorner<Dim, Dim>() = update.denominator;
-  return {coefficients(n), coefficients(d), base.anchor()[0], base.anchor()[1], Dim == 3 ? base.anchor()[Dim - 1] : 0.0,
+  return {coefficients(n),
+          coefficients(d),
+          base.anchor()[0],
+          base.anchor()[1],
+          Dim == 3 ? base.anchor()[Dim - 1] : 0.0,
           update.limit};
 }
 

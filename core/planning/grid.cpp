@@ -5,8 +5,10 @@
 namespace anchord::planning {
 
 Result<Grid> grid_around(const Eigen::Vector3d& centre_m, const GridOptions& options) {
-  constexpr int k_max_points = 1'000'000;  // a decision beyond that no longer fits between two points of a flight
-  if (!centre_m.allFinite()) return make_error(Errc::invalid_argument, "the centre of the grid is not finite");
+  constexpr int k_max_points =
+      1'000'000;  // a decision beyond that no longer fits between two points of a flight
+  if (!centre_m.allFinite())
+    return make_error(Errc::invalid_argument, "the centre of the grid is not finite");
   if (!(options.step_m > 0) || !(options.step_up_m > 0)) {
     return make_error(Errc::invalid_argument, "grid steps must be positive");
   }
@@ -15,14 +17,16 @@ Result<Grid> grid_around(const Eigen::Vector3d& centre_m, const GridOptions& opt
   }
   const int across = 2 * options.reach + 1, upward = 2 * options.reach_up + 1;
   if (across * across > k_max_points / upward) {
-    return make_error(Errc::invalid_argument, "a grid of " + std::to_string(across) + " x " + std::to_string(across) +
-                                                  " x " + std::to_string(upward) + " points is too large");
+    return make_error(Errc::invalid_argument, "a grid of " + std::to_string(across) + " x " +
+                                                  std::to_string(across) + " x " + std::to_string(upward) +
+                                                  " points is too large");
   }
   Grid grid;
   for (int iy = -options.reach; iy <= options.reach; ++iy) {
     for (int ix = -options.reach; ix <= options.reach; ++ix) {
       for (int iz = -options.reach_up; iz <= options.reach_up; ++iz) {
-        grid.push_back(centre_m + Eigen::Vector3d(ix * options.step_m, iy * options.step_m, iz * options.step_up_m));
+        grid.push_back(centre_m +
+                       Eigen::Vector3d(ix * options.step_m, iy * options.step_m, iz * options.step_up_m));
       }
     }
   }

@@ -10,10 +10,10 @@ namespace anchord::planning {
 
 /// The grid round the aircraft from which its next point is taken (8.4.3).
 struct GridOptions {
-  double step_m = 0.5;     ///< the dissertation flew 0.48
+  double step_m = 0.5;  ///< the dissertation flew 0.48
   double step_up_m = 0.5;
-  int reach = 1;           ///< cells each way in the plane; 1 = the eight neighbours of Fig 8.7
-  int reach_up = 0;        ///< cells up and down; 0 = stay at this height
+  int reach = 1;     ///< cells each way in the plane; 1 = the eight neighbours of Fig 8.7
+  int reach_up = 0;  ///< cells up and down; 0 = stay at this height
 };
 
 /// Structure of arrays, as the batch kernel reads it.
@@ -26,9 +26,10 @@ struct Grid {
   }
 };
 
-/// (2 reach + 1)^2 (2 reach_up + 1) points, the middle one included; order: y slowest, then x, then z, each rising.
-/// Among equal values the first wins, which is what makes the path of Fig 8.8 turn to negative y.
-/// errors: invalid_argument (steps not positive, negative reach, more than a million points, centre not finite)
+/// (2 reach + 1)^2 (2 reach_up + 1) points, the middle one included; order: y slowest, then x, then z, each
+/// rising. Among equal values the first wins, which is what makes the path of Fig 8.8 turn to negative y.
+/// errors: invalid_argument (steps not positive, negative reach, more than a million points, centre not
+/// finite)
 Result<Grid> grid_around(const Eigen::Vector3d& centre_m, const GridOptions& options);
 
 }  // namespace anchord::planning

@@ -23,7 +23,8 @@ struct Column {
   std::vector<double> with;
 };
 
-bool out_of_range(const NextPointOptions& options, const Eigen::Vector3d& point, const Eigen::Vector3d& place) {
+bool out_of_range(const NextPointOptions& options, const Eigen::Vector3d& point,
+                  const Eigen::Vector3d& place) {
   return options.max_range_m && (point - place).norm() > *options.max_range_m;
 }
 
@@ -49,10 +50,11 @@ Column traces(const NextPointInput& input, const PlannedAnchor& anchor, const Pl
   return out;
 }
 
-/// As `traces`, with a millionth of a measurement added in every direction: ranks candidates while all of them
-/// leave the geometry singular (the second point of a flight in 3D).
+/// As `traces`, with a millionth of a measurement added in every direction: ranks candidates while all of
+/// them leave the geometry singular (the second point of a flight in 3D).
 template <int Dim>
-Column ridge_traces(const NextPointInput& input, const PlannedAnchor& anchor, const Place& place, const Grid& grid) {
+Column ridge_traces(const NextPointInput& input, const PlannedAnchor& anchor, const Place& place,
+                    const Grid& grid) {
   const Point<Dim> at = place.position_m.head<Dim>();
   Geometry<Dim> base(at);
   for (const auto i : anchor.measured_at) base.add(input.visited[i].head<Dim>());
@@ -91,8 +93,8 @@ Column informations(const NextPointInput& input, const PlannedAnchor& anchor, co
 }
 
 /// Expectation over the places an anchor may be at.
-Column anchor_column(const NextPointInput& input, const PlannedAnchor& anchor, const NextPointOptions& options,
-                     const Grid& grid, bool ridge) {
+Column anchor_column(const NextPointInput& input, const PlannedAnchor& anchor,
+                     const NextPointOptions& options, const Grid& grid, bool ridge) {
   Column out{0, std::vector<double>(grid.size(), 0.0)};
   double total = 0;
   for (const auto& place : anchor.places) total += place.probability;
@@ -101,9 +103,11 @@ Column anchor_column(const NextPointInput& input, const PlannedAnchor& anchor, c
     if (options.rule != Rule::dissertation) {
       one = informations(input, anchor, place, options, grid);
     } else if (options.dims == 2) {
-      one = ridge ? ridge_traces<2>(input, anchor, place, grid) : traces<2>(input, anchor, place, options, grid);
+      one = ridge ? ridge_traces<2>(input, anchor, place, grid)
+                  : traces<2>(input, anchor, place, options, grid);
     } else {
-      one = ridge ? ridge_traces<3>(input, anchor, place, grid) : traces<3>(input, anchor, place, options, grid);
+      one = ridge ? ridge_traces<3>(input, anchor, place, grid)
+                  : traces<3>(input, anchor, place, options, grid);
     }
     const double share = place.probability / total;
     if (share == 0) continue;
@@ -113,12 +117,13 @@ Column anchor_column(const NextPointInput& input, const PlannedAnchor& anchor, c
   return out;
 }
 
-/// Position sigma an anchor has now, per axis, in units of its target; between 1e-3 and 1e3 so that no anchor is
-/// forgotten and none shouts the others down.
+/// Position sigma an anchor has now, per axis, in units of its target; between 1e-3 and 1e3 so that no anchor
+/// is forgotten and none shouts the others down.
 double deficit(const PlannedAnchor& anchor, const NextPointOptions& options, double before) {
   double variance_m2 = before / options.dims;
   if (options.rule == Rule::dissertation) {
-    variance_m2 *= options.los_sigma_m * options.los_sigma_m + options.position_sigma_m * options.position_sigma_m;
+    variance_m2 *=
+        options.los_sigma_m * options.los_sigma_m + options.position_sigma_m * options.position_sigma_m;
   }
   if (options.rule == Rule::d_optimal) variance_m2 = std::exp(before / options.dims);
   return std::clamp(std::sqrt(variance_m2) / anchor.target_m, 1e-3, 1e3);
@@ -172,18 +177,22 @@ Result<void> check_input(const NextPointInput& input) {
     double total = 0;
     for (const auto& place : anchor.places) {
       if (!place.position_m.allFinite() || !(place.probability >= 0)) {
-        return make_error(Errc::invalid_argument, "anchor " + anchor.name + ": place not finite or probability negative");
+        return make_error(Errc::invalid_argument,
+                          "anchor " + anchor.name + ": place not finite or probability negative");
       }
       total += place.probability;
     }
-    if (!(total > 0)) return make_error(Errc::invalid_argument, "anchor " + anchor.name + " has no possible place");
+    if (!(total > 0))
+      return make_error(Errc::invalid_argument, "anchor " + anchor.name + " has no possible place");
     if (!(anchor.weight > 0) || !(anchor.target_m > 0)) {
-      return make_error(Errc::invalid_argument, "anchor " + anchor.name + ": weight and target must be positive");
+      return make_error(Errc::invalid_argument,
+                        "anchor " + anchor.name + ": weight and target must be positive");
     }
     for (const auto i : anchor.measured_at) {
       if (i >= input.visited.size()) {
-        return make_error(Errc::invalid_argument, "anchor " + anchor.name + " was measured at visited point " +
-                                                      std::to_string(i) + " of " + std::to_string(input.visited.size()));
+        return make_error(Errc::invalid_argument, "anchor " + anchor.name +
+                                                      " was measured at visited point " + std::to_string(i) +
+                                                      " of " + std::to_string(input.visited.size()));
       }
     }
   }
@@ -196,7 +205,8 @@ std::string refused_words(const std::vector<CandidateValue>& candidates) {
     if (c.refused) ++counts[to_string(*c.refused)];
   }
   std::string out;
-  for (const auto& [why, n] : counts) out += (out.empty() ? "" : ", ") + std::to_string(n) + " " + std::string(why);
+  for (const auto& [why, n] : counts)
+    out += (out.empty() ? "" : ", ") + std::to_string(n) + " " + std::string(why);
   return out.empty() ? "none refused" : "refused: " + out;
 }
 
@@ -206,20 +216,22 @@ std::string words(const Decision& decision, const NextPointOptions& options, boo
   const auto& best = decision.candidates[*decision.chosen];
   std::array<char, 256> text{};
   if (ridge) {
-    std::snprintf(text.data(), text.size(), "geometry stays singular with any one point; best spread of directions");
+    std::snprintf(text.data(), text.size(),
+                  "geometry stays singular with any one point; best spread of directions");
   } else if (options.rule == Rule::dissertation) {
-    std::snprintf(text.data(), text.size(), "lowest GDOP: trace %.4g (root %.4g), before: %s", best.value,
-                  std::sqrt(best.value),
-                  std::isfinite(decision.value_before) ? std::to_string(decision.value_before).c_str() : "singular");
+    std::snprintf(
+        text.data(), text.size(), "lowest GDOP: trace %.4g (root %.4g), before: %s", best.value,
+        std::sqrt(best.value),
+        std::isfinite(decision.value_before) ? std::to_string(decision.value_before).c_str() : "singular");
   } else if (options.rule == Rule::a_optimal) {
     std::snprintf(text.data(), text.size(), "lowest expected error: %.3f m rms, before: %.3f m",
                   std::sqrt(best.value), std::sqrt(decision.value_before));
   } else {
-    std::snprintf(text.data(), text.size(), "smallest error ellipsoid: log det %.3f, before: %.3f", best.value,
-                  decision.value_before);
+    std::snprintf(text.data(), text.size(), "smallest error ellipsoid: log det %.3f, before: %.3f",
+                  best.value, decision.value_before);
   }
-  return text.data() + (options.flight_time_cost ? std::string(", best gain per second") : std::string()) + total +
-         refused_words(decision.candidates);
+  return text.data() + (options.flight_time_cost ? std::string(", best gain per second") : std::string()) +
+         total + refused_words(decision.candidates);
 }
 
 }  // namespace
@@ -229,7 +241,8 @@ Result<void> NextPointOptions::check() const {
   if (dims != 2 && dims != 3) return bad("dims must be 2 or 3");
   if (!(visited_share >= 0 && visited_share <= 1)) return bad("visited_share must be 0 to 1");
   if (max_range_m && !(*max_range_m > 0)) return bad("max_range_m must be positive");
-  if (!(los_sigma_m > 0) || !(nlos_sigma_m > 0) || !(position_sigma_m >= 0)) return bad("sigmas must be positive");
+  if (!(los_sigma_m > 0) || !(nlos_sigma_m > 0) || !(position_sigma_m >= 0))
+    return bad("sigmas must be positive");
   if (!(prior_sigma_m > 0) || !(bias_sigma_m > 0)) return bad("prior sigmas must be positive");
   if (!(speed_mps > 0) || !(dwell_s >= 0)) return bad("speed_mps must be positive and dwell_s not negative");
   return boost::outcome_v2::success();
@@ -238,8 +251,8 @@ Result<void> NextPointOptions::check() const {
 Result<Decision> next_point(const NextPointInput& input, const NextPointOptions& options) {
   BOOST_OUTCOME_TRY(options.check());
   BOOST_OUTCOME_TRY(check_input(input));
-  const Eigen::Vector3d current = input.current.value_or(input.visited.empty() ? Eigen::Vector3d::Zero().eval()
-                                                                               : input.visited.back());
+  const Eigen::Vector3d current =
+      input.current.value_or(input.visited.empty() ? Eigen::Vector3d::Zero().eval() : input.visited.back());
   BOOST_OUTCOME_TRY(const auto grid, grid_around(current, options.grid));
 
   std::vector<Column> columns;
@@ -274,7 +287,8 @@ Result<Decision> next_point(const NextPointInput& input, const NextPointOptions&
   const bool ridge = !any_finite && options.rule == Rule::dissertation;
   if (ridge) {
     std::vector<Column> spread;
-    for (const auto& anchor : input.anchors) spread.push_back(anchor_column(input, anchor, options, grid, true));
+    for (const auto& anchor : input.anchors)
+      spread.push_back(anchor_column(input, anchor, options, grid, true));
     for (std::size_t i = 0; i < grid.size(); ++i) {
       std::vector<double> values;
       for (const auto& column : spread) values.push_back(column.with[i]);
@@ -297,18 +311,24 @@ Result<Decision> next_point(const NextPointInput& input, const NextPointOptions&
 
 std::string_view to_string(Rule rule) {
   switch (rule) {
-    case Rule::dissertation: return "dissertation";
-    case Rule::a_optimal: return "a_optimal";
-    case Rule::d_optimal: return "d_optimal";
+    case Rule::dissertation:
+      return "dissertation";
+    case Rule::a_optimal:
+      return "a_optimal";
+    case Rule::d_optimal:
+      return "d_optimal";
   }
   return "unknown";
 }
 
 std::string_view to_string(Combine how) {
   switch (how) {
-    case Combine::worst: return "worst";
-    case Combine::mean: return "mean";
-    case Combine::weighted: return "weighted";
+    case Combine::worst:
+      return "worst";
+    case Combine::mean:
+      return "mean";
+    case Combine::weighted:
+      return "weighted";
   }
   return "unknown";
 }

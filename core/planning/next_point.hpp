@@ -23,7 +23,7 @@ enum class Rule : std::uint8_t {
 
 /// How several anchors make one value.
 enum class Combine : std::uint8_t {
-  worst,     ///< the anchor that is worst off decides
+  worst,  ///< the anchor that is worst off decides
   mean,
   weighted,  ///< mean, weighted by how far each is from its target accuracy
 };
@@ -36,15 +36,17 @@ struct Place {
 
 struct PlannedAnchor {
   std::string name;
-  std::vector<Place> places;                       ///< one, or the mirror candidates too
-  std::vector<std::size_t> measured_at;            ///< indices of `visited` where it was ranged
-  std::optional<Eigen::Matrix3d> covariance_m2{};  ///< of the estimator; then `measured_at` is not counted again
+  std::vector<Place> places;             ///< one, or the mirror candidates too
+  std::vector<std::size_t> measured_at;  ///< indices of `visited` where it was ranged
+  std::optional<Eigen::Matrix3d>
+      covariance_m2{};  ///< of the estimator; then `measured_at` is not counted again
   double weight{1};
   double target_m{0.05};  ///< wanted position sigma, for Combine::weighted
 };
 
 struct NextPointInput {
-  std::vector<Eigen::Vector3d> visited;      ///< in order; the last is where the aircraft is unless `current` says so
+  std::vector<Eigen::Vector3d>
+      visited;  ///< in order; the last is where the aircraft is unless `current` says so
   std::optional<Eigen::Vector3d> current{};
   std::vector<Eigen::Vector3d> unreachable;  ///< tried and given up (8.3.9, 8.3.10)
   std::vector<PlannedAnchor> anchors;
@@ -61,13 +63,13 @@ struct NextPointOptions {
   double visited_share = 0.5;
 
   // For a_optimal and d_optimal. Variances of the dissertation (7.2), as standard deviations.
-  double los_sigma_m = 0.049;        ///< sqrt(2401 mm^2)
-  double nlos_sigma_m = 0.2336;      ///< sqrt(54550 mm^2)
-  double position_sigma_m = 0.02;    ///< RTK, sqrt(400 mm^2)
-  double prior_sigma_m = 100;        ///< of an anchor nobody has measured: weak, only keeps the matrix regular
-  bool bias_column = false;          ///< a constant excess on every range of the anchor is estimated too
+  double los_sigma_m = 0.049;      ///< sqrt(2401 mm^2)
+  double nlos_sigma_m = 0.2336;    ///< sqrt(54550 mm^2)
+  double position_sigma_m = 0.02;  ///< RTK, sqrt(400 mm^2)
+  double prior_sigma_m = 100;      ///< of an anchor nobody has measured: weak, only keeps the matrix regular
+  bool bias_column = false;        ///< a constant excess on every range of the anchor is estimated too
   double bias_sigma_m = 0.3;
-  bool flight_time_cost = false;     ///< gain per second instead of gain
+  bool flight_time_cost = false;  ///< gain per second instead of gain
   double speed_mps = 2.0;
   double dwell_s = 2.0;
 
@@ -77,10 +79,10 @@ struct NextPointOptions {
 
 struct CandidateValue {
   Eigen::Vector3d point_m{0, 0, 0};
-  double value{};                    ///< of the rule, combined; +infinity where singular
-  double score{};                    ///< what was minimised: value, or minus the gain per second
+  double value{};  ///< of the rule, combined; +infinity where singular
+  double score{};  ///< what was minimised: value, or minus the gain per second
   std::vector<double> per_anchor;
-  double p_nlos{};                   ///< expected, mean over anchors
+  double p_nlos{};  ///< expected, mean over anchors
   double flight_s{};
   std::optional<Refusal> refused{};  ///< value is still shown, but the point cannot be chosen
 };
@@ -93,8 +95,8 @@ struct Decision {
   std::vector<CandidateValue> candidates;
 };
 
-/// Best next point by the rule (8.4.3). Visited, unreachable and forbidden points keep their value but cannot win;
-/// equal values (1e-9 relative) go to the first in the order of the grid.
+/// Best next point by the rule (8.4.3). Visited, unreachable and forbidden points keep their value but cannot
+/// win; equal values (1e-9 relative) go to the first in the order of the grid.
 ///
 /// errors   invalid_argument (no anchor, no position, indices or numbers that make no sense)
 /// threads  pure

@@ -26,8 +26,8 @@ Vector2d outward(const Vector2d& a, const Vector2d& b) {  // of a counter-clockw
 
 }  // namespace
 
-/// Every edge moved outwards, and an arc round every corner that points outwards; what then lies too near to another
-/// part of the outline (the inside of an L) is left out. No polygon clipping needed.
+/// Every edge moved outwards, and an arc round every corner that points outwards; what then lies too near to
+/// another part of the outline (the inside of an L) is left out. No polygon clipping needed.
 std::vector<Vector2d> ring_around(const Polygon& polygon, double distance_m, double spacing_m) {
   Polygon corners = polygon;
   if (signed_area(corners) < 0) std::reverse(corners.begin(), corners.end());
@@ -41,7 +41,8 @@ std::vector<Vector2d> ring_around(const Polygon& polygon, double distance_m, dou
     if ((b - a).norm() < 1e-9 || (c - b).norm() < 1e-9) continue;
     const Vector2d normal = outward(a, b);
     const int steps = std::max(1, static_cast<int>(std::ceil((b - a).norm() / spacing_m)));
-    for (int k = 0; k <= steps; ++k) keep(a + (b - a) * (static_cast<double>(k) / steps) + distance_m * normal);
+    for (int k = 0; k <= steps; ++k)
+      keep(a + (b - a) * (static_cast<double>(k) / steps) + distance_m * normal);
     const Vector2d next = outward(b, c);
     const double turn = std::atan2(normal.x() * next.y() - normal.y() * next.x(), normal.dot(next));
     const int arc = turn > 0 ? static_cast<int>(turn * distance_m / spacing_m) : 0;

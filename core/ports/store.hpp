@@ -31,11 +31,12 @@ struct DeviceSeen {
   std::uint64_t n_ranges{};
 };
 
-/// Measurements. append_* return after the commit is on the disk (fsynced); concurrent calls share one commit.
-/// Outcomes stand in the order of the rows. With `atomic`, one row that is a conflict or of an unknown mission stores
-/// none of the call (the outcomes tell which; rows that would have been stored say `accepted`, so look for a bad one).
-/// The same identity and content (arrival time aside) is a duplicate. Callable from any thread; blocks.
-/// Errors of every port: storage_full, storage_unavailable, queue_full; not_found and conflict as named.
+/// Measurements. append_* return after the commit is on the disk (fsynced); concurrent calls share one
+/// commit. Outcomes stand in the order of the rows. With `atomic`, one row that is a conflict or of an
+/// unknown mission stores none of the call (the outcomes tell which; rows that would have been stored say
+/// `accepted`, so look for a bad one). The same identity and content (arrival time aside) is a duplicate.
+/// Callable from any thread; blocks. Errors of every port: storage_full, storage_unavailable, queue_full;
+/// not_found and conflict as named.
 class MeasurementStore {
  public:
   virtual ~MeasurementStore() = default;
@@ -67,9 +68,9 @@ class MeasurementStore {
   virtual Result<std::vector<DeviceSeen>> devices(const std::optional<MissionId>& mission) = 0;
 };
 
-/// Flights, newest first in lists (`after`: the last id of the page before). insert answers storage_full already when
-/// little space is left, so that a flight that runs can finish. remove takes the measurements along; conflict when a
-/// calibration was made from it.
+/// Flights, newest first in lists (`after`: the last id of the page before). insert answers storage_full
+/// already when little space is left, so that a flight that runs can finish. remove takes the measurements
+/// along; conflict when a calibration was made from it.
 class MissionStore {
  public:
   virtual ~MissionStore() = default;
@@ -90,8 +91,9 @@ struct PublishedPosition {
   Estimate estimate{};
 };
 
-/// Sites, anchors and their published positions. Updates name the version they change: conflict when it moved on;
-/// the stored version becomes expected_version + 1. Lists are in id order, calibrations and revisions newest first.
+/// Sites, anchors and their published positions. Updates name the version they change: conflict when it moved
+/// on; the stored version becomes expected_version + 1. Lists are in id order, calibrations and revisions
+/// newest first.
 class AnchorStore {
  public:
   virtual ~AnchorStore() = default;
@@ -112,8 +114,9 @@ class AnchorStore {
   virtual Result<std::vector<Calibration>> calibrations(std::size_t limit,
                                                         const std::optional<CalibrationId>& after) = 0;
   virtual Result<void> remove(const CalibrationId& id) = 0;  ///< conflict when a revision uses it
-  /// A new revision: the named anchors (each with a position in the calibration, else invalid_argument) take their
-  /// position from it, all others keep that of the revision before. Which verdicts may be published is not decided here.
+  /// A new revision: the named anchors (each with a position in the calibration, else invalid_argument) take
+  /// their position from it, all others keep that of the revision before. Which verdicts may be published is
+  /// not decided here.
   virtual Result<Revision> publish(const CalibrationId& id, const std::vector<NetworkId>& anchors,
                                    std::string_view by, std::string_view note, UtcTime now) = 0;
   /// before: 0 for the newest page.
@@ -141,7 +144,8 @@ class TokenStore {
   virtual Result<Token> token(const TokenId& id) = 0;
   virtual Result<Token> token_by_secret(std::string_view secret_sha256_hex) = 0;
   virtual Result<std::vector<Token>> tokens() = 0;
-  virtual Result<void> touch(const TokenId& id, UtcTime now) = 0;  ///< last used; call it at most once a minute
+  virtual Result<void> touch(const TokenId& id,
+                             UtcTime now) = 0;  ///< last used; call it at most once a minute
   virtual Result<void> revoke(const TokenId& id, UtcTime now) = 0;
 };
 
@@ -163,7 +167,8 @@ class JobStore {
   virtual Result<void> insert(const Job& job) = 0;
   virtual Result<void> update(const Job& job) = 0;
   virtual Result<Job> job(const JobId& id) = 0;
-  virtual Result<std::vector<Job>> jobs(std::size_t limit, const std::optional<JobId>& after) = 0;  ///< newest first
+  virtual Result<std::vector<Job>> jobs(std::size_t limit,
+                                        const std::optional<JobId>& after) = 0;  ///< newest first
   /// Queued and running jobs become failed with this problem; says how many.
   virtual Result<std::size_t> fail_unfinished(UtcTime now, std::string_view problem_json) = 0;
 };

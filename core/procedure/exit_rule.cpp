@@ -28,14 +28,16 @@ std::optional<std::string> goal(const ExitRule& rule, const Progress& now) {
 std::optional<Exit> exit_of(const ExitRule& rule, const Progress& now) {
   const auto reached = goal(rule, now);
   if (now.battery && *now.battery <= rule.min_battery) {
-    return Exit{reached.has_value(), text("battery at %.0f %%, return at %.0f %%", 100 * *now.battery, 100 * rule.min_battery)};
+    return Exit{reached.has_value(),
+                text("battery at %.0f %%, return at %.0f %%", 100 * *now.battery, 100 * rule.min_battery)};
   }
   if (reached) return Exit{true, *reached};
   if (rule.max_s && now.elapsed_s >= *rule.max_s) {
     return Exit{false, text("time over: %.0f s of %.0f s", now.elapsed_s, *rule.max_s)};
   }
   if (now.iterations >= rule.max_iterations) {
-    return Exit{false, text("%.0f of %.0f points measured without reaching the goal", now.iterations, rule.max_iterations)};
+    return Exit{false, text("%.0f of %.0f points measured without reaching the goal", now.iterations,
+                            rule.max_iterations)};
   }
   return std::nullopt;
 }

@@ -10,7 +10,8 @@ namespace anchord::procedure {
 Result<HeightGuess> height_from_search(std::span<const HeightSample> samples) {
   constexpr double k_best_sigma_m = 0.2;  // Fig 8.5b
   if (samples.size() < 5) {
-    return make_error(Errc::too_few_observations, std::to_string(samples.size()) + " samples of a height search, need 5");
+    return make_error(Errc::too_few_observations,
+                      std::to_string(samples.size()) + " samples of a height search, need 5");
   }
   double low = samples[0].height_m, high = low;
   for (const auto& s : samples) {
@@ -40,7 +41,8 @@ Result<HeightGuess> height_from_search(std::span<const HeightSample> samples) {
     const Eigen::Matrix3d cov = (m.transpose() * m).inverse() * rms * rms;
     const Eigen::Vector3d slope{0, -1 / (2 * c[2]), c[1] / (2 * c[2] * c[2])};
     const double sigma = half * std::sqrt(std::max(0.0, slope.dot(cov * slope)));
-    return HeightGuess{middle + half * peak, std::clamp(sigma, k_best_sigma_m, std::max(half, k_best_sigma_m)), false};
+    return HeightGuess{middle + half * peak,
+                       std::clamp(sigma, k_best_sigma_m, std::max(half, k_best_sigma_m)), false};
   }
   const auto best = std::max_element(samples.begin(), samples.end(),
                                      [](const auto& a, const auto& b) { return a.rss_dbm < b.rss_dbm; });

@@ -16,9 +16,10 @@ struct HeightGuess {
   bool at_edge{};    ///< the best RSS lay at an end of the search: the anchor may be beyond it
 };
 
-/// Height of the anchor from RSS over height (8.3.6): RSS is highest at the anchor's own height. A parabola through
-/// all samples; where it has no peak inside the search, the best sample and a sigma of half the search.
-/// errors  too_few_observations (fewer than 5), weak_geometry (less than 0.5 m of height), invalid_argument
+/// Height of the anchor from RSS over height (8.3.6): RSS is highest at the anchor's own height. A parabola
+/// through all samples; where it has no peak inside the search, the best sample and a sigma of half the
+/// search. errors  too_few_observations (fewer than 5), weak_geometry (less than 0.5 m of height),
+/// invalid_argument
 Result<HeightGuess> height_from_search(std::span<const HeightSample> samples);
 
 }  // namespace anchord::procedure

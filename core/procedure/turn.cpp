@@ -12,7 +12,8 @@ namespace {
 
 constexpr double k_turn = 2 * std::numbers::pi, k_degree = std::numbers::pi / 180;
 constexpr std::array k_lobes_rad{120 * k_degree, 250 * k_degree};  // Fig 8.4a
-constexpr double k_lobe_width_rad = 35 * k_degree;  // chosen: the lobes of the figure fall to half in about 40 degrees
+constexpr double k_lobe_width_rad =
+    35 * k_degree;  // chosen: the lobes of the figure fall to half in about 40 degrees
 constexpr int k_steps = 720;
 
 double wrap(double angle) { return angle - k_turn * std::floor(angle / k_turn); }
@@ -51,8 +52,9 @@ Result<Bearing> bearing_from_turn(std::span<const TurnSample> samples) {
   double gap = headings.front() + k_turn - headings.back();
   for (std::size_t i = 1; i < headings.size(); ++i) gap = std::max(gap, headings[i] - headings[i - 1]);
   if (gap > std::numbers::pi / 2) {
-    return make_error(Errc::weak_geometry,
-                      "the turn leaves " + std::to_string(static_cast<int>(gap / k_degree)) + " degrees unseen");
+    return make_error(
+        Errc::weak_geometry,
+        "the turn leaves " + std::to_string(static_cast<int>(gap / k_degree)) + " degrees unseen");
   }
   double power = 0;
   for (const auto& s : samples) power += (s.rss_dbm - mean_dbm) * (s.rss_dbm - mean_dbm);
@@ -64,7 +66,8 @@ Result<Bearing> bearing_from_turn(std::span<const TurnSample> samples) {
   for (int k = 0; k < k_steps; ++k) {
     const double bearing = k_turn * k / k_steps;
     double mean = 0, dot = 0, norm = 0;
-    for (const auto& s : samples) mean += turn_profile(s.heading_rad - bearing) / static_cast<double>(samples.size());
+    for (const auto& s : samples)
+      mean += turn_profile(s.heading_rad - bearing) / static_cast<double>(samples.size());
     for (const auto& s : samples) {
       const double t = turn_profile(s.heading_rad - bearing) - mean;
       dot += t * (s.rss_dbm - mean_dbm);

@@ -14,14 +14,14 @@ namespace anchord {
 struct Site {
   SiteId id{};
   std::string name;
-  std::optional<Wgs84> origin{};     ///< of the ENU frame; absent: the first fixed position of its first mission
-  std::string outline_geojson;       ///< polygon, or empty
-  std::string crs_frame;             ///< datum of the base, e.g. "ETRS89"; empty = unknown
+  std::optional<Wgs84> origin{};  ///< of the ENU frame; absent: the first fixed position of its first mission
+  std::string outline_geojson;    ///< polygon, or empty
+  std::string crs_frame;          ///< datum of the base, e.g. "ETRS89"; empty = unknown
   std::optional<double> crs_epoch{};
   std::optional<double> base_sigma_m{};  ///< of the base station's own coordinates
-  std::string base_source;           ///< known_point, survey_in, network or empty
+  std::string base_source;               ///< known_point, survey_in, network or empty
   UtcTime created{};
-  std::uint64_t version{1};          ///< for ETag
+  std::uint64_t version{1};  ///< for ETag
 };
 
 /// Identity and facility-management data of one anchor; positions live in calibrations.
@@ -52,7 +52,7 @@ struct Revision {
   std::uint64_t number{};
   CalibrationId calibration{};
   UtcTime published{};
-  std::string by;    ///< token id
+  std::string by;  ///< token id
   std::string note;
 };
 

@@ -18,8 +18,8 @@ enum class Verdict : std::uint8_t { ok, weak_geometry, ambiguous, too_few, diver
 
 /// One place an anchor may be.
 struct Hypothesis {
-  Enu position{};                                       ///< ENU of the site origin, or local metres
-  std::optional<Wgs84> wgs84{};                         ///< absent in a local frame
+  Enu position{};                                          ///< ENU of the site origin, or local metres
+  std::optional<Wgs84> wgs84{};                            ///< absent in a local frame
   Eigen::Matrix3d covariance_m2{Eigen::Matrix3d::Zero()};  ///< ENU or local axes
   double rms_residual_m{};
   double probability{1.0};

@@ -21,8 +21,8 @@ struct Fix {
   std::optional<UtcTime> received{};   ///< arrival, where it differs
   std::optional<std::uint64_t> seq{};  ///< of the source; part of the identity
   TrackFrame frame{TrackFrame::wgs84};
-  Wgs84 position{};                     ///< valid when frame == wgs84
-  Eigen::Vector3d local_m{0, 0, 0};     ///< valid when frame == local
+  Wgs84 position{};                  ///< valid when frame == wgs84
+  Eigen::Vector3d local_m{0, 0, 0};  ///< valid when frame == local
   FixClass fix{FixClass::none};
   /// ENU (or local x, y, z) covariance, m^2; absent when the source gave none.
   std::optional<Eigen::Matrix3d> covariance_m2{};

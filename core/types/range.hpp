@@ -25,14 +25,15 @@ struct RangeTruth {
   std::optional<bool> los{};
 };
 
-/// One exchange as received: immutable, never corrected in place. Identity: (mission, tag, antenna, anchor, time, seq).
+/// One exchange as received: immutable, never corrected in place. Identity: (mission, tag, antenna, anchor,
+/// time, seq).
 struct Range {
   MissionId mission{};
   RangeKind kind{RangeKind::tag_anchor};
   UtcTime time{};
   std::optional<UtcTime> received{};
-  NetworkId tag{};           ///< the other anchor when kind == anchor_anchor
-  std::uint8_t antenna{0};   ///< which antenna of the tag
+  NetworkId tag{};          ///< the other anchor when kind == anchor_anchor
+  std::uint8_t antenna{0};  ///< which antenna of the tag
   NetworkId anchor{};
   std::optional<std::uint64_t> seq{};
   double distance_m{};

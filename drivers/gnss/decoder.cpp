@@ -15,7 +15,8 @@ void Decoder::finish(Epochs& out) {
   ubx_.finish(out);
   erb_.finish(out);
   gpsd_.finish(out);
-  if (!out.empty() && out.back().time && out.back().protocol != Protocol::nmea) nmea_.set_reference(*out.back().time);
+  if (!out.empty() && out.back().time && out.back().protocol != Protocol::nmea)
+    nmea_.set_reference(*out.back().time);
   nmea_.finish(out);
 }
 
@@ -48,7 +49,8 @@ void Decoder::take(const Frame& frame, Epochs& out) {
       auto epoch = llh_.line(frame.bytes);
       if (!epoch) {
         const bool form = epoch.error().code == Errc::unsupported;
-        return skips_.count(form ? "llh: ECEF or baseline form" : "llh: line not readable", frame.offset, frame.bytes);
+        return skips_.count(form ? "llh: ECEF or baseline form" : "llh: line not readable", frame.offset,
+                            frame.bytes);
       }
       if (epoch.value()) out.push_back(*epoch.value());
       return;

@@ -20,8 +20,8 @@ struct DecoderOptions {
   std::optional<UtcTime> reference{};  ///< some instant of the stream, for NMEA that never says the date
 };
 
-/// Bytes of a receiver in, epochs out, whatever it speaks and however the bytes are cut. No clock, no port, bounded
-/// memory, never throws on any input. Not thread-safe.
+/// Bytes of a receiver in, epochs out, whatever it speaks and however the bytes are cut. No clock, no port,
+/// bounded memory, never throws on any input. Not thread-safe.
 class Decoder {
  public:
   explicit Decoder(const DecoderOptions& options = {});
@@ -37,7 +37,8 @@ class Decoder {
  private:
   void take(const Frame& frame, Epochs& out);
   template <class Parsed, class Assembler>
-  void take_binary(const Parsed& parsed, Assembler& assembler, const Frame& frame, const char* reason, Epochs& out);
+  void take_binary(const Parsed& parsed, Assembler& assembler, const Frame& frame, const char* reason,
+                   Epochs& out);
 
   Skips skips_;
   Framer framer_;

@@ -4,11 +4,16 @@ namespace anchord::gnss {
 
 std::string_view to_string(Protocol protocol) {
   switch (protocol) {
-    case Protocol::nmea: return "nmea";
-    case Protocol::ubx: return "ubx";
-    case Protocol::erb: return "erb";
-    case Protocol::llh: return "llh";
-    case Protocol::gpsd: return "gpsd";
+    case Protocol::nmea:
+      return "nmea";
+    case Protocol::ubx:
+      return "ubx";
+    case Protocol::erb:
+      return "erb";
+    case Protocol::llh:
+      return "llh";
+    case Protocol::gpsd:
+      return "gpsd";
   }
   return "unknown";
 }

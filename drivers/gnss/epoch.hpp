@@ -21,13 +21,14 @@ std::string_view to_string(Protocol protocol);
 /// With fix none there is no position, even where the receiver still prints an old one.
 struct Epoch {
   Protocol protocol{Protocol::nmea};
-  std::optional<UtcTime> time{};                   ///< of measurement, leap seconds taken out
-  std::optional<std::int64_t> time_of_day_ns{};    ///< UTC; for NMEA streams that never say the date
+  std::optional<UtcTime> time{};                 ///< of measurement, leap seconds taken out
+  std::optional<std::int64_t> time_of_day_ns{};  ///< UTC; for NMEA streams that never say the date
   std::optional<double> lat_deg{}, lon_deg{};
-  std::optional<double> height_ellipsoid_m{}, height_msl_m{};  ///< msl: of the receiver's own geoid, never mix makes
+  std::optional<double> height_ellipsoid_m{},
+      height_msl_m{};  ///< msl: of the receiver's own geoid, never mix makes
   FixClass fix{FixClass::none};
   std::optional<int> satellites{};
-  std::optional<double> age_s{};                   ///< of the corrections
+  std::optional<double> age_s{};                                ///< of the corrections
   std::optional<double> sigma_e_m{}, sigma_n_m{}, sigma_u_m{};  ///< 1 sigma
   std::optional<double> hdop{};
   std::optional<Eigen::Matrix3d> covariance_enu_m2{};  ///< full, where the format has it
@@ -37,7 +38,8 @@ struct Epoch {
 /// As the rest of the system stores it. Nothing without time, position and ellipsoidal height.
 std::optional<Fix> to_fix(const Epoch& epoch, const MissionId& mission);
 
-/// What was not used, by reason. Reasons come from a fixed set in the decoders, so this cannot grow without bound.
+/// What was not used, by reason. Reasons come from a fixed set in the decoders, so this cannot grow without
+/// bound.
 class Skips {
  public:
   struct Entry {

@@ -31,7 +31,8 @@ Result<Message> parse_position(std::string_view p) {
   out.acc_3d_m = std::hypot(read_le<std::uint32_t>(p, 36), read_le<std::uint32_t>(p, 40)) * 1e-3;
   // Comparisons are false for NaN, so it ends here too.
   if (!(std::abs(out.lat_deg) <= 90) || !(std::abs(out.lon_deg) <= 180)) return bad("POS", "off the globe");
-  if (!(std::abs(out.height_m) < 1e5) || !(std::abs(out.msl_m) < 1e5)) return bad("POS", "height not believable");
+  if (!(std::abs(out.height_m) < 1e5) || !(std::abs(out.msl_m) < 1e5))
+    return bad("POS", "height not believable");
   return Message(out);
 }
 
@@ -85,7 +86,8 @@ Result<Message> parse(std::string_view frame) {
   const auto payload = frame.substr(k_header, frame.size() - k_overhead);
   for (const auto& kind : k_kinds) {
     if (read_le<std::uint8_t>(frame, 2) != kind.id) continue;
-    if (payload.size() < kind.min_payload) return bad(kind.name, std::to_string(payload.size()) + " bytes are too few");
+    if (payload.size() < kind.min_payload)
+      return bad(kind.name, std::to_string(payload.size()) + " bytes are too few");
     return kind.parse(payload);
   }
   return Message(Other{});
@@ -121,7 +123,8 @@ void Assembler::publish(Epochs& out) {
   Epoch epoch;
   epoch.protocol = Protocol::erb;
   if (group.tow_ms < k_week_ms && group.status->gps_week > 0) {
-    epoch.time = utc_from_gps_week(group.status->gps_week, static_cast<std::int64_t>(group.tow_ms) * 1'000'000);
+    epoch.time =
+        utc_from_gps_week(group.status->gps_week, static_cast<std::int64_t>(group.tow_ms) * 1'000'000);
   }
   epoch.satellites = group.status->satellites;
   if (group.rtk) epoch.satellites = group.rtk->satellites;
@@ -137,8 +140,10 @@ void Assembler::publish(Epochs& out) {
       epoch.age_s = group.rtk->age_s;
       epoch.baseline_ned_m = group.rtk->baseline_ned_m;
     }
-    // 0 means unknown. The 3D value for every axis: more than any of them, but nothing finer is in the format.
-    if (group.position->acc_3d_m > 0) epoch.sigma_e_m = epoch.sigma_n_m = epoch.sigma_u_m = group.position->acc_3d_m;
+    // 0 means unknown. The 3D value for every axis: more than any of them, but nothing finer is in the
+    // format.
+    if (group.position->acc_3d_m > 0)
+      epoch.sigma_e_m = epoch.sigma_n_m = epoch.sigma_u_m = group.position->acc_3d_m;
   }
   out.push_back(std::move(epoch));
 }

@@ -13,7 +13,8 @@ namespace anchord::gnss::erb {
 struct Position {
   std::uint32_t tow_ms{};
   double lat_deg{}, lon_deg{}, height_m{}, msl_m{};
-  double acc_3d_m{};  ///< sqrt(acc_h^2 + acc_v^2): the two are of ECEF axes, only together they mean something
+  double
+      acc_3d_m{};  ///< sqrt(acc_h^2 + acc_v^2): the two are of ECEF axes, only together they mean something
 };
 struct Status {
   std::uint32_t tow_ms{};
@@ -38,11 +39,12 @@ struct Rtk {
 struct Other {};
 using Message = std::variant<Other, Position, Status, Dops, Velocity, Rtk>;
 
-/// A whole frame whose checksum is right. STAT is told apart by its length, not by the version. errors: bad_frame.
+/// A whole frame whose checksum is right. STAT is told apart by its length, not by the version. errors:
+/// bad_frame.
 Result<Message> parse(std::string_view frame);
 
-/// Collects by time of week, since POS comes before the STAT that qualifies it. Published on RTK, the last message
-/// of an epoch, or when the next one begins. Time is GPS time; leap seconds are taken out here.
+/// Collects by time of week, since POS comes before the STAT that qualifies it. Published on RTK, the last
+/// message of an epoch, or when the next one begins. Time is GPS time; leap seconds are taken out here.
 class Assembler {
  public:
   void add(const Message& message, Epochs& out);

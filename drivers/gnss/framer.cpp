@@ -77,7 +77,8 @@ Framer::Step Framer::step(std::string_view rest, bool final) const {
   if (looks_for(Protocol::nmea) && c == '$') return nmea(rest, final);
   if (line_start_) {
     if (looks_for(Protocol::gpsd) && c == '{') return line(rest, final, Protocol::gpsd, k_max_gpsd);
-    if (looks_for(Protocol::llh) && (digit(c) || c == '%')) return line(rest, final, Protocol::llh, k_max_llh);
+    if (looks_for(Protocol::llh) && (digit(c) || c == '%'))
+      return line(rest, final, Protocol::llh, k_max_llh);
     if (c == '#') {
       const auto end = rest.find('\n');
       if (end != std::string_view::npos) return {Step::Kind::skip, end + 1, {}, "comment line"};
@@ -106,7 +107,9 @@ Framer::Step Framer::ubx(std::string_view rest, bool final) const {
 
 Framer::Step Framer::erb(std::string_view rest, bool final) const {
   const Step not_erb{Step::Kind::skip, 1, {}, nullptr};  // plain text may hold "ER"
-  const auto wait = [&]() -> Step { return final ? Step{Step::Kind::skip, 1, {}, "erb: cut off at the end"} : Step{}; };
+  const auto wait = [&]() -> Step {
+    return final ? Step{Step::Kind::skip, 1, {}, "erb: cut off at the end"} : Step{};
+  };
   if (rest.size() < 2) return final ? not_erb : Step{};
   if (rest[1] != 'R') return not_erb;
   if (rest.size() < 3) return final ? not_erb : Step{};
@@ -144,7 +147,8 @@ Framer::Step Framer::line(std::string_view rest, bool final, Protocol protocol, 
   std::size_t i = 0;
   for (; i < rest.size() && rest[i] != '\n'; ++i) {
     if (i >= limit) return {Step::Kind::skip, 1, {}, too_long};
-    const bool text = printable(rest[i]) || rest[i] == '\t' || rest[i] == '\r' || (gpsd && byte(rest, i) >= 0x80);
+    const bool text =
+        printable(rest[i]) || rest[i] == '\t' || rest[i] == '\r' || (gpsd && byte(rest, i) >= 0x80);
     // A logger's own time (or noise) in front of a sentence: the line is the sentence's, not ours.
     if (!text || (!gpsd && (rest[i] == '$' || rest[i] == '{'))) {
       return {Step::Kind::skip, 1, {}, "byte outside any frame"};

@@ -18,14 +18,14 @@ struct Frame {
 };
 
 /// Longest frames believed. A longer one is taken for noise and the search goes on at its second byte.
-inline constexpr std::size_t k_max_nmea = 256, k_max_ubx_payload = 8192, k_max_erb_payload = 645, k_max_llh = 1024,
-                             k_max_gpsd = 16'384;
+inline constexpr std::size_t k_max_nmea = 256, k_max_ubx_payload = 8192, k_max_erb_payload = 645,
+                             k_max_llh = 1024, k_max_gpsd = 16'384;
 
 /// Cuts a byte stream into frames; all formats share one buffer and the earliest complete valid frame wins.
 ///
-/// A frame that turns out wrong costs its first byte only: what follows inside it is searched again, so noise that
-/// looks like a header swallows nothing. Memory: at most one longest frame and the chunk being fed.
-/// Text lines without a checksum (LLH) count only when their end was seen.
+/// A frame that turns out wrong costs its first byte only: what follows inside it is searched again, so noise
+/// that looks like a header swallows nothing. Memory: at most one longest frame and the chunk being fed. Text
+/// lines without a checksum (LLH) count only when their end was seen.
 class Framer {
  public:
   using Sink = std::function<void(const Frame&)>;

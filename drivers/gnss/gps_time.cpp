@@ -29,7 +29,8 @@ std::optional<std::int64_t> days_from_civil(int year, int month, int day) {
   const int y = month <= 2 ? year - 1 : year;
   const int era = y / 400, of_era = y - era * 400;
   const int of_year = (153 * (month + (month > 2 ? -3 : 9)) + 2) / 5 + day - 1;
-  return static_cast<std::int64_t>(era) * 146'097 + of_era * 365 + of_era / 4 - of_era / 100 + of_year - 719'468;
+  return static_cast<std::int64_t>(era) * 146'097 + of_era * 365 + of_era / 4 - of_era / 100 + of_year -
+         719'468;
 }
 
 std::optional<std::int64_t> time_of_day_ns(int hour, int minute, int second, std::int64_t fraction_ns) {

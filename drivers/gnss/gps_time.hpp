@@ -20,8 +20,8 @@ std::optional<std::int64_t> time_of_day_ns(int hour, int minute, int second, std
 /// Table of IERS Bulletin C; 18 s since 2017-01-01, none announced since.
 int gps_minus_utc_s(std::int64_t gps_ns);
 
-/// GPS week and nanoseconds of week to UTC. A week below 1024 is a ten-bit week: no RTK receiver of ours ran before
-/// the rollover of 2019-04-07 (week 2048), so it is counted from there.
+/// GPS week and nanoseconds of week to UTC. A week below 1024 is a ten-bit week: no RTK receiver of ours ran
+/// before the rollover of 2019-04-07 (week 2048), so it is counted from there.
 UtcTime utc_from_gps_week(int week, std::int64_t ns_of_week);
 UtcTime utc_from_gps(std::int64_t gps_ns);
 

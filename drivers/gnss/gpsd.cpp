@@ -36,12 +36,17 @@ std::optional<UtcTime> time_of(const Json& object) {
 FixClass fix_of(int mode, std::optional<int> status) {
   if (mode < 2) return FixClass::none;
   switch (status.value_or(1)) {
-    case 2: return FixClass::dgps;
-    case 3: return FixClass::rtk_fixed;
-    case 4: return FixClass::rtk_float;
+    case 2:
+      return FixClass::dgps;
+    case 3:
+      return FixClass::rtk_fixed;
+    case 4:
+      return FixClass::rtk_float;
     case 5:
-    case 8: return FixClass::none;  // dead reckoning, simulated
-    default: return FixClass::single;
+    case 8:
+      return FixClass::none;  // dead reckoning, simulated
+    default:
+      return FixClass::single;
   }
 }
 
@@ -116,7 +121,8 @@ Result<void> Assembler::line(std::string_view text, Epochs& out) {
       report.height_ellipsoid_m = number(json, "altHAE");  // never "alt": it was either height, by version
       report.height_msl_m = number(json, "altMSL");
       report.age_s = number(json, "dgpsAge");
-      if (!report.lat_deg || !report.lon_deg || std::abs(*report.lat_deg) > 90 || std::abs(*report.lon_deg) > 180) {
+      if (!report.lat_deg || !report.lon_deg || std::abs(*report.lat_deg) > 90 ||
+          std::abs(*report.lon_deg) > 180) {
         return bad("TPV without a position on the globe");
       }
     }

@@ -8,12 +8,13 @@
 
 namespace anchord::gnss::gpsd {
 
-/// Reports of a gpsd (protocol 3), one JSON object per line. Several TPV of one time are merged; published with the
-/// GST of that time or when the next time begins. eph and its sisters are not used: with NMEA receivers they are
-/// HDOP times a constant, metres where RTK has centimetres. Not thread-safe.
+/// Reports of a gpsd (protocol 3), one JSON object per line. Several TPV of one time are merged; published
+/// with the GST of that time or when the next time begins. eph and its sisters are not used: with NMEA
+/// receivers they are HDOP times a constant, metres where RTK has centimetres. Not thread-safe.
 class Assembler {
  public:
-  /// errors: bad_frame (not JSON, not an object, value out of its domain). Unknown classes and fields are fine.
+  /// errors: bad_frame (not JSON, not an object, value out of its domain). Unknown classes and fields are
+  /// fine.
   Result<void> line(std::string_view text, Epochs& out);
   void finish(Epochs& out) { publish(out); }
 

@@ -14,15 +14,22 @@ Error bad(std::string what) { return make_error(Errc::bad_frame, std::move(what)
 /// Q of RTKLIB, not of NMEA: 4 is DGPS here.
 std::optional<FixClass> fix_of(int q) {
   switch (q) {
-    case 1: return FixClass::rtk_fixed;
-    case 2: return FixClass::rtk_float;
+    case 1:
+      return FixClass::rtk_fixed;
+    case 2:
+      return FixClass::rtk_float;
     case 3:
-    case 4: return FixClass::dgps;
-    case 5: return FixClass::single;
-    case 6: return FixClass::rtk_float;  // PPP: decimetres while it converges, no integers
+    case 4:
+      return FixClass::dgps;
+    case 5:
+      return FixClass::single;
+    case 6:
+      return FixClass::rtk_float;  // PPP: decimetres while it converges, no integers
     case 0:
-    case 7: return FixClass::none;
-    default: return std::nullopt;
+    case 7:
+      return FixClass::none;
+    default:
+      return std::nullopt;
   }
 }
 
@@ -56,7 +63,8 @@ std::optional<Eigen::Matrix3d> covariance_enu(const std::vector<double>& v, std:
 }
 
 /// Degrees, minutes, seconds in three columns; the sign is that of the degrees, "-0" included.
-std::optional<double> from_dms(std::string_view degrees_text, double degrees, double minutes, double seconds) {
+std::optional<double> from_dms(std::string_view degrees_text, double degrees, double minutes,
+                               double seconds) {
   if (minutes < 0 || minutes >= 60 || seconds < 0 || seconds > 60) return std::nullopt;
   const double size = std::abs(degrees) + minutes / 60 + seconds / 3600;
   return degrees_text.front() == '-' ? -size : size;
@@ -73,9 +81,12 @@ void Decoder::header(std::string_view text) {
   other_form_ = has("x-ecef") || has("e-baseline") || has("x/y/z");
   const auto words = split(text.substr(1), " \t", true);
   if (words.empty()) return;
-  if (words[0] == "GPST") system_ = TimeSystem::gpst;
-  else if (words[0] == "JST") system_ = TimeSystem::jst;
-  else if (words[0] == "UTC") system_ = TimeSystem::utc;
+  if (words[0] == "GPST")
+    system_ = TimeSystem::gpst;
+  else if (words[0] == "JST")
+    system_ = TimeSystem::jst;
+  else if (words[0] == "UTC")
+    system_ = TimeSystem::utc;
 }
 
 Result<std::optional<Epoch>> Decoder::line(std::string_view text) {
@@ -94,7 +105,8 @@ Result<std::optional<Epoch>> Decoder::line(std::string_view text) {
   std::vector<double> v;
   for (std::size_t i = first; i < words.size(); ++i) {
     const auto value = to_number(words[i]);
-    if (!value) return bad("column " + std::to_string(i + 1) + " '" + std::string(words[i]) + "' is no number");
+    if (!value)
+      return bad("column " + std::to_string(i + 1) + " '" + std::string(words[i]) + "' is no number");
     v.push_back(*value);
   }
 
@@ -111,10 +123,14 @@ Result<std::optional<Epoch>> Decoder::line(std::string_view text) {
       out.time = utc_from_gps_week(*week, seconds->whole * k_second_ns + seconds->fraction_ns);
     }
   }
-  if (ns && gps_time) out.time = utc_from_gps(*ns);
-  else if (ns && system_ == TimeSystem::jst) out.time = UtcTime{*ns - 9 * 3600 * k_second_ns};
-  else if (ns) out.time = UtcTime{*ns};
-  if (!out.time) return bad("time '" + std::string(words[0]) + " " + std::string(words[1]) + "' does not exist");
+  if (ns && gps_time)
+    out.time = utc_from_gps(*ns);
+  else if (ns && system_ == TimeSystem::jst)
+    out.time = UtcTime{*ns - 9 * 3600 * k_second_ns};
+  else if (ns)
+    out.time = UtcTime{*ns};
+  if (!out.time)
+    return bad("time '" + std::string(words[0]) + " " + std::string(words[1]) + "' does not exist");
 
   // Decimal degrees, or degrees minutes seconds twice: four columns more.
   const bool dms = v.size() == 17 || v.size() == 26;
@@ -124,7 +140,8 @@ Result<std::optional<Epoch>> Decoder::line(std::string_view text) {
     lat = from_dms(words[first], v[0], v[1], v[2]);
     lon = from_dms(words[first + 3], v[3], v[4], v[5]);
   }
-  if (!lat || !lon || std::abs(*lat) > 90 || std::abs(*lon) > 180) return bad("latitude or longitude off the globe");
+  if (!lat || !lon || std::abs(*lat) > 90 || std::abs(*lon) > 180)
+    return bad("latitude or longitude off the globe");
   if (std::abs(v[at]) > 1e5) return bad("height not believable");
   const auto q = to_integer(words[first + at + 1]), satellites = to_integer(words[first + at + 2]);
   const auto fix = q ? fix_of(*q) : std::nullopt;
@@ -141,7 +158,8 @@ Result<std::optional<Epoch>> Decoder::line(std::string_view text) {
   if (v[at + 4] > 0) out.sigma_e_m = v[at + 4];
   if (v[at + 5] > 0) out.sigma_u_m = v[at + 5];
   out.covariance_enu_m2 = covariance_enu(v, at + 3);
-  // RTKLIB prints 0.00 both without corrections and for an age of nothing; only with corrections it is an age.
+  // RTKLIB prints 0.00 both without corrections and for an age of nothing; only with corrections it is an
+  // age.
   if (*fix != FixClass::single && v[at + 9] >= 0) out.age_s = v[at + 9];
   return std::optional(out);
 }

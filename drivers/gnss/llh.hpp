@@ -8,12 +8,13 @@
 
 namespace anchord::gnss::llh {
 
-/// RTKLIB solution text, line by line. Header lines may come at any time or never; until one says otherwise time is
-/// UTC (as Reach streams it) and height ellipsoidal. Not thread-safe.
+/// RTKLIB solution text, line by line. Header lines may come at any time or never; until one says otherwise
+/// time is UTC (as Reach streams it) and height ellipsoidal. Not thread-safe.
 class Decoder {
  public:
   /// One line without its end. An epoch, nothing for headers and blank lines, or an error: bad_frame (too few
-  /// columns, not a number, out of its domain), unsupported (ECEF and baseline forms: no geodetic position in them).
+  /// columns, not a number, out of its domain), unsupported (ECEF and baseline forms: no geodetic position in
+  /// them).
   Result<std::optional<Epoch>> line(std::string_view text);
 
  private:

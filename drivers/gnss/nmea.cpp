@@ -70,7 +70,8 @@ class FieldReader {
   template <class T>
   Result<Message> done(T message) const {
     if (bad_) {
-      return make_error(Errc::bad_frame, "field " + std::to_string(*bad_) + " '" + std::string(text(*bad_)) + "'");
+      return make_error(Errc::bad_frame,
+                        "field " + std::to_string(*bad_) + " '" + std::string(text(*bad_)) + "'");
     }
     return Message(std::move(message));
   }
@@ -159,22 +160,32 @@ constexpr std::array k_kinds{Kind{"GGA", parse_gga}, Kind{"RMC", parse_rmc}, Kin
 FixClass fix_of_quality(int quality) {
   switch (quality) {
     case 1:
-    case 3: return FixClass::single;  // 3: PPS, the precise single solution
-    case 2: return FixClass::dgps;
-    case 4: return FixClass::rtk_fixed;
-    case 5: return FixClass::rtk_float;
-    default: return FixClass::none;  // 6 dead reckoning, 7 manual, 8 simulator, 9 unknown: no measured position
+    case 3:
+      return FixClass::single;  // 3: PPS, the precise single solution
+    case 2:
+      return FixClass::dgps;
+    case 4:
+      return FixClass::rtk_fixed;
+    case 5:
+      return FixClass::rtk_float;
+    default:
+      return FixClass::none;  // 6 dead reckoning, 7 manual, 8 simulator, 9 unknown: no measured position
   }
 }
 
 FixClass fix_of_mode(char mode) {
   switch (mode) {
     case 0:
-    case 'A': return FixClass::single;
-    case 'D': return FixClass::dgps;
-    case 'R': return FixClass::rtk_fixed;
-    case 'F': return FixClass::rtk_float;
-    default: return FixClass::none;
+    case 'A':
+      return FixClass::single;
+    case 'D':
+      return FixClass::dgps;
+    case 'R':
+      return FixClass::rtk_fixed;
+    case 'F':
+      return FixClass::rtk_float;
+    default:
+      return FixClass::none;
   }
 }
 

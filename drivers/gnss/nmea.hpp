@@ -44,7 +44,8 @@ Result<Message> parse(std::string_view sentence);
 
 /// How GST's two horizontal sigmas are read.
 enum class GstOrder : std::uint8_t {
-  /// The larger of the two for both axes: the open Reach encoder prints east where north belongs, others do not,
+  /// The larger of the two for both axes: the open Reach encoder prints east where north belongs, others do
+  /// not,
   /// and nothing in the stream tells which.
   larger_for_both,
   standard,  ///< latitude, longitude: where the maker is known to be right
@@ -52,8 +53,8 @@ enum class GstOrder : std::uint8_t {
 
 /// Joins the sentences of one time into an epoch, which is published when the next time begins.
 ///
-/// The date comes from RMC or ZDA (or set_reference) and runs on over midnight; epochs before the first date wait, at
-/// most 600 of them. Sigmas of the last GST serve for 2 s while the quality stays. Not thread-safe.
+/// The date comes from RMC or ZDA (or set_reference) and runs on over midnight; epochs before the first date
+/// wait, at most 600 of them. Sigmas of the last GST serve for 2 s while the quality stays. Not thread-safe.
 class Assembler {
  public:
   explicit Assembler(GstOrder order = GstOrder::larger_for_both) : order_(order) {}

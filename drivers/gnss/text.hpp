@@ -50,7 +50,8 @@ inline std::optional<Seconds> to_seconds(std::string_view text) {
   return out;
 }
 
-inline std::vector<std::string_view> split(std::string_view text, std::string_view separators, bool join_runs) {
+inline std::vector<std::string_view> split(std::string_view text, std::string_view separators,
+                                           bool join_runs) {
   std::vector<std::string_view> out;
   std::size_t from = 0;
   while (from <= text.size()) {

@@ -12,7 +12,8 @@ namespace {
 constexpr std::size_t k_header = 6, k_overhead = 8;
 
 Error too_short(const char* name, std::size_t size) {
-  return make_error(Errc::bad_frame, std::string(name) + " of " + std::to_string(size) + " bytes is too short");
+  return make_error(Errc::bad_frame,
+                    std::string(name) + " of " + std::to_string(size) + " bytes is too short");
 }
 
 bool on_earth(double lat_deg, double lon_deg) { return std::abs(lat_deg) <= 90 && std::abs(lon_deg) <= 180; }
@@ -36,7 +37,8 @@ Result<Message> parse_pvt(std::string_view p) {
   out.itow_ms = read_le<std::uint32_t>(p, 0);
   const auto valid = read_le<std::uint8_t>(p, 11);
   if ((valid & 3U) == 3U) {
-    const auto days = days_from_civil(read_le<std::uint16_t>(p, 4), read_le<std::uint8_t>(p, 6), read_le<std::uint8_t>(p, 7));
+    const auto days = days_from_civil(read_le<std::uint16_t>(p, 4), read_le<std::uint8_t>(p, 6),
+                                      read_le<std::uint8_t>(p, 7));
     // nano is signed: the true time is the whole second plus it, and may lie in the second before.
     const auto tod = time_of_day_ns(read_le<std::uint8_t>(p, 8), read_le<std::uint8_t>(p, 9),
                                     read_le<std::uint8_t>(p, 10), read_le<std::int32_t>(p, 16));
@@ -55,7 +57,8 @@ Result<Message> parse_pvt(std::string_view p) {
   out.msl_m = read_le<std::int32_t>(p, 36) * 1e-3;
   out.h_acc_m = read_le<std::uint32_t>(p, 40) * 1e-3;
   out.v_acc_m = read_le<std::uint32_t>(p, 44) * 1e-3;
-  if (!on_earth(out.lat_deg, out.lon_deg)) return make_error(Errc::bad_frame, "NAV-PVT with a position off the globe");
+  if (!on_earth(out.lat_deg, out.lon_deg))
+    return make_error(Errc::bad_frame, "NAV-PVT with a position off the globe");
   return Message(out);
 }
 
@@ -86,8 +89,8 @@ Result<Message> parse_covariance(std::string_view p) {
   for (std::size_t i = 0; i < c.size(); ++i) c[i] = static_cast<double>(read_le<float>(p, 16 + 4 * i));
   Eigen::Matrix3d enu;
   enu << c[3], c[1], -c[4], c[1], c[0], -c[2], -c[4], -c[2], c[5];
-  const bool definite = enu.allFinite() && enu(0, 0) > 0 && enu(0, 0) * enu(1, 1) - enu(0, 1) * enu(1, 0) > 0 &&
-                        enu(2, 2) > 0;
+  const bool definite =
+      enu.allFinite() && enu(0, 0) > 0 && enu(0, 0) * enu(1, 1) - enu(0, 1) * enu(1, 0) > 0 && enu(2, 2) > 0;
   if (!definite) return make_error(Errc::bad_frame, "NAV-COV is no covariance");
   out.position_enu_m2 = enu;
   return Message(out);
@@ -125,9 +128,9 @@ struct Kind {
   std::uint8_t message_class, id;
   Result<Message> (*parse)(std::string_view);
 };
-constexpr std::array k_kinds{Kind{0x01, 0x07, parse_pvt}, Kind{0x01, 0x14, parse_hp},
+constexpr std::array k_kinds{Kind{0x01, 0x07, parse_pvt},        Kind{0x01, 0x14, parse_hp},
                              Kind{0x01, 0x36, parse_covariance}, Kind{0x01, 0x3c, parse_relative},
-                             Kind{0x01, 0x04, parse_dop}, Kind{0x01, 0x61, parse_end}};
+                             Kind{0x01, 0x04, parse_dop},        Kind{0x01, 0x61, parse_end}};
 
 }  // namespace
 
@@ -165,7 +168,8 @@ void Assembler::add(const Message& message, Epochs& out) {
       },
       message);
   // Where the receiver marks the end of its epochs, everything of them is waited for.
-  if (!has_end_ && group_ && group_->pvt && group_->hp && (!has_covariance_ || group_->covariance)) publish(out);
+  if (!has_end_ && group_ && group_->pvt && group_->hp && (!has_covariance_ || group_->covariance))
+    publish(out);
 }
 
 void Assembler::publish(Epochs& out) {

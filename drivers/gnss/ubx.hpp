@@ -53,8 +53,8 @@ using Message = std::variant<Other, Pvt, HpPosition, Covariance, RelativePositio
 /// domain). Pure.
 Result<Message> parse(std::string_view frame);
 
-/// Joins the messages of one iTOW; published when the next one begins, on NAV-EOE, or as soon as PVT and HPPOSLLH
-/// (and NAV-COV, where the stream has it) are in. Without a PVT there is no fix type and no epoch.
+/// Joins the messages of one iTOW; published when the next one begins, on NAV-EOE, or as soon as PVT and
+/// HPPOSLLH (and NAV-COV, where the stream has it) are in. Without a PVT there is no fix type and no epoch.
 class Assembler {
  public:
   void add(const Message& message, Epochs& out);

@@ -25,13 +25,15 @@ constexpr std::array k_position{Column{"lat_deg", &gnss::Epoch::lat_deg, 9},
                                 Column{"lon_deg", &gnss::Epoch::lon_deg, 9},
                                 Column{"height_ellipsoid_m", &gnss::Epoch::height_ellipsoid_m, 4},
                                 Column{"height_msl_m", &gnss::Epoch::height_msl_m, 4}};
-constexpr std::array k_quality{Column{"age_s", &gnss::Epoch::age_s, 2}, Column{"sigma_e_m", &gnss::Epoch::sigma_e_m, 4},
-                               Column{"sigma_n_m", &gnss::Epoch::sigma_n_m, 4},
-                               Column{"sigma_u_m", &gnss::Epoch::sigma_u_m, 4}, Column{"hdop", &gnss::Epoch::hdop, 2}};
+constexpr std::array k_quality{
+    Column{"age_s", &gnss::Epoch::age_s, 2}, Column{"sigma_e_m", &gnss::Epoch::sigma_e_m, 4},
+    Column{"sigma_n_m", &gnss::Epoch::sigma_n_m, 4}, Column{"sigma_u_m", &gnss::Epoch::sigma_u_m, 4},
+    Column{"hdop", &gnss::Epoch::hdop, 2}};
 
 std::string fixed(double value, int decimals) {
   std::array<char, 64> text{};
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed, decimals);
+  const auto end =
+      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed, decimals);
   return {text.data(), end.ptr};
 }
 
@@ -49,9 +51,12 @@ std::string line_of(const gnss::Epoch& epoch, bool json) {
   const auto put = [&](const char* name, const std::string& text, bool quoted) {
     if (!std::exchange(first, false)) out += ',';
     if (json) out += '"' + std::string(name) + "\":";
-    if (json && text.empty()) out += "null";
-    else if (json && quoted) out += '"' + text + '"';
-    else out += text;
+    if (json && text.empty())
+      out += "null";
+    else if (json && quoted)
+      out += '"' + text + '"';
+    else
+      out += text;
   };
   const auto numbers = [&](const auto& columns) {
     for (const auto& column : columns) {
@@ -86,12 +91,13 @@ void report(const gnss::Decoder& decoder, std::size_t epochs, std::size_t datele
   }
   std::fputs(" frames\n", stderr);
   if (dateless > 0) {
-    std::fprintf(stderr, "%zu epochs without a date: no RMC or ZDA in the stream; give one with --date\n", dateless);
+    std::fprintf(stderr, "%zu epochs without a date: no RMC or ZDA in the stream; give one with --date\n",
+                 dateless);
   }
   for (const auto& [reason, entry] : decoder.skips().entries()) {
     std::fprintf(stderr, "skipped: %s: %llu, first at byte %llu: %s\n", reason.c_str(),
-                 static_cast<unsigned long long>(entry.count), static_cast<unsigned long long>(entry.first_offset),
-                 entry.example.c_str());
+                 static_cast<unsigned long long>(entry.count),
+                 static_cast<unsigned long long>(entry.first_offset), entry.example.c_str());
   }
 }
 
@@ -110,7 +116,8 @@ int run(const Decode& options) {
   if (!options.date.empty()) {
     const auto noon = parse_rfc3339(options.date + "T12:00:00Z");
     if (!noon) {
-      std::fprintf(stderr, "anchord decode: --date %s: %s\n", options.date.c_str(), noon.error().message.c_str());
+      std::fprintf(stderr, "anchord decode: --date %s: %s\n", options.date.c_str(),
+                   noon.error().message.c_str());
       return 2;
     }
     decoder_options.reference = noon.value();
@@ -153,13 +160,16 @@ int run(const Decode& options) {
 
 void add_decode_command(CLI::App& app, int& exit_code) {
   auto options = std::make_shared<Decode>();
-  auto* command = app.add_subcommand("decode", "Print every epoch of a GNSS log; what was skipped goes to stderr");
+  auto* command =
+      app.add_subcommand("decode", "Print every epoch of a GNSS log; what was skipped goes to stderr");
   command->add_option("FILE", options->file, "log, - for standard input")->required();
   command->add_option("--format", options->format, "auto takes every format the stream holds")
       ->check(CLI::IsMember({"auto", "nmea", "ubx", "erb", "llh", "gpsd"}));
-  command->add_option("--gst", options->gst,
-                      "NMEA GST sigmas: the larger of latitude and longitude for both (some receivers swap them), or "
-                      "the standard order")
+  command
+      ->add_option(
+          "--gst", options->gst,
+          "NMEA GST sigmas: the larger of latitude and longitude for both (some receivers swap them), or "
+          "the standard order")
       ->check(CLI::IsMember({"larger", "standard"}));
   command->add_option("--date", options->date, "YYYY-MM-DD of an NMEA log that has no RMC or ZDA");
   auto* csv = command->add_flag("--csv", options->csv, "CSV with a header line (default)");

@@ -29,22 +29,25 @@ int evaluate(const EvaluateArguments& a) {
   const auto table = read_data(a.data);
   if (!table) return refuse("evaluate", table.error().message);
   auto report = row_report(a.data, table.value());
-  report.warning.clear();   // nothing is split here
+  report.warning.clear();  // nothing is split here
   const auto task = model.value().info.task;
-  const api::SetRequest request{model.value().info.features, task == ml::Task::nlos_id, task != ml::Task::nlos_id};
+  const api::SetRequest request{model.value().info.features, task == ml::Task::nlos_id,
+                                task != ml::Task::nlos_id};
   std::vector<std::size_t> rows;
   std::map<std::string, std::size_t> dropped;
   const auto data = api::dataset_from(table.value(), request, rows, dropped);
   if (!data) {
     std::string why = data.error().message;
-    for (const auto& [reason, count] : dropped) why += "; " + reason + " in " + std::to_string(count) + " rows";
+    for (const auto& [reason, count] : dropped)
+      why += "; " + reason + " in " + std::to_string(count) + " rows";
     return refuse("evaluate", a.data.files.front() + ": " + why);
   }
   add_dropped(report, dropped);
   const auto evaluation = ml::evaluate(model.value(), data.value());
   if (evaluation.rows == 0) return refuse("evaluate", a.data.files.front() + ": no row of the model's class");
   report.used = evaluation.rows;
-  const auto out = a.json ? api::evaluation_json(evaluation, model.value(), report) : api::evaluation_text(evaluation, model.value(), report);
+  const auto out = a.json ? api::evaluation_json(evaluation, model.value(), report)
+                          : api::evaluation_text(evaluation, model.value(), report);
   std::fputs(out.c_str(), stdout);
   return 0;
 }
@@ -56,7 +59,10 @@ void add_evaluate_command(CLI::App& app, int& exit_code) {
   auto a = std::make_shared<EvaluateArguments>();
   add_data_options(*command, a->data);
   command->add_option("--model", a->model, "Model artifact of `anchord train`")->required();
-  command->add_option("--threshold", a->threshold, "P(LOS) from which a ranging is called LOS (default: the model's)")->check(CLI::Range(0.0, 1.0));
+  command
+      ->add_option("--threshold", a->threshold,
+                   "P(LOS) from which a ranging is called LOS (default: the model's)")
+      ->check(CLI::Range(0.0, 1.0));
   command->add_flag("--json", a->json, "One JSON document on standard output");
   command->callback([a, &exit_code] { exit_code = evaluate(*a); });
 }

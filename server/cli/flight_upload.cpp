@@ -18,8 +18,8 @@ void sort_and_number(std::vector<Row>& rows) {
 
 template <class Row>
 std::size_t end_before(const std::vector<Row>& rows, std::size_t from, UtcTime until) {
-  const auto it = std::ranges::lower_bound(rows.begin() + static_cast<std::ptrdiff_t>(from), rows.end(), until, {},
-                                           &Row::time);
+  const auto it = std::ranges::lower_bound(rows.begin() + static_cast<std::ptrdiff_t>(from), rows.end(),
+                                           until, {}, &Row::time);
   return static_cast<std::size_t>(it - rows.begin());
 }
 
@@ -30,7 +30,8 @@ void prepare_rows(FlightData& flight) {
   sort_and_number(flight.ranges);
 }
 
-FlightUpload::FlightUpload(RestClient& client, FlightData flight) : client_(client), flight_(std::move(flight)) {}
+FlightUpload::FlightUpload(RestClient& client, FlightData flight)
+    : client_(client), flight_(std::move(flight)) {}
 
 Result<void> FlightUpload::create_mission(const std::string& name) {
   flight_.mission.name = name;
@@ -65,7 +66,8 @@ Result<void> FlightUpload::send_before(UtcTime until) {
   const std::size_t end_fix = end_before(flight_.fixes, next_fix_, until);
   const std::size_t end_range = end_before(flight_.ranges, next_range_, until);
   // Fixes first: a range waits on the server for the fix after it.
-  BOOST_OUTCOME_TRY(post_rows("/api/v1/fixes", std::span(flight_.fixes).subspan(next_fix_, end_fix - next_fix_)));
+  BOOST_OUTCOME_TRY(
+      post_rows("/api/v1/fixes", std::span(flight_.fixes).subspan(next_fix_, end_fix - next_fix_)));
   next_fix_ = end_fix;
   BOOST_OUTCOME_TRY(
       post_rows("/api/v1/ranges", std::span(flight_.ranges).subspan(next_range_, end_range - next_range_)));
@@ -118,8 +120,8 @@ double FlightUpload::fraction() const {
 }
 
 std::string FlightUpload::summary() const {
-  std::string text = std::to_string(accepted_) + " rows accepted, " + std::to_string(duplicates_) + " duplicates, " +
-                     std::to_string(rejected_) + " rejected";
+  std::string text = std::to_string(accepted_) + " rows accepted, " + std::to_string(duplicates_) +
+                     " duplicates, " + std::to_string(rejected_) + " rejected";
   if (!first_error_.empty()) text += " (first: " + first_error_ + ")";
   return text;
 }

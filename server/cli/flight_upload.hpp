@@ -10,8 +10,8 @@
 
 namespace anchord::cli {
 
-/// Sorts fixes and ranges by time and numbers those that have no sequence number, so that rows of one microsecond
-/// stay apart and a batch that is sent again is recognised.
+/// Sorts fixes and ranges by time and numbers those that have no sequence number, so that rows of one
+/// microsecond stay apart and a batch that is sent again is recognised.
 void prepare_rows(FlightData& flight);
 
 /// Sends one flight: a fresh mission, then its rows in order of time.

@@ -41,7 +41,8 @@ Result<std::string> import_by_rest(const Options& options, FlightData flight) {
 }
 
 template <class Row, class Append>
-Result<void> append_all(std::vector<Row>& rows, const MissionId& mission, std::size_t& refused, Append append) {
+Result<void> append_all(std::vector<Row>& rows, const MissionId& mission, std::size_t& refused,
+                        Append append) {
   for (std::size_t at = 0; at < rows.size();) {
     std::vector<Row> batch;
     for (; at < rows.size() && batch.size() < FlightUpload::k_batch_rows; ++at) {
@@ -70,10 +71,12 @@ Result<std::string> import_into_folder(const Options& options, FlightData flight
   std::size_t refused = std::erase_if(flight.ranges, [](const Range& r) { return !(r.distance_m > 0); });
   const std::size_t n = flight.fixes.size() + flight.ranges.size();
   auto& store = db->measurements();
-  BOOST_OUTCOME_TRY(append_all(flight.fixes, mission.id, refused,
-                               [&](std::vector<Fix> rows) { return store.append_fixes(std::move(rows), false); }));
-  BOOST_OUTCOME_TRY(append_all(flight.ranges, mission.id, refused,
-                               [&](std::vector<Range> rows) { return store.append_ranges(std::move(rows), false); }));
+  BOOST_OUTCOME_TRY(append_all(flight.fixes, mission.id, refused, [&](std::vector<Fix> rows) {
+    return store.append_fixes(std::move(rows), false);
+  }));
+  BOOST_OUTCOME_TRY(append_all(flight.ranges, mission.id, refused, [&](std::vector<Range> rows) {
+    return store.append_ranges(std::move(rows), false);
+  }));
   std::fprintf(stderr, "%s: %zu rows stored, %zu refused\n", mission.name.c_str(), n, refused);
   return to_string(mission.id);
 }
@@ -100,12 +103,16 @@ int import_flight(const Options& options) {
 void add_import_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("import", "Bring measurements in from files");
   command->require_subcommand(1);
-  auto* flight = command->add_subcommand("flight", "One flight folder as a finished mission; prints the mission's id");
+  auto* flight =
+      command->add_subcommand("flight", "One flight folder as a finished mission; prints the mission's id");
   auto options = std::make_shared<Options>();
   options->url = "http://127.0.0.1:8420";
-  flight->add_option("folder", options->folder, "Flight folder: flight.json, track.csv[.gz], ranges.csv[.gz]")->required();
+  flight->add_option("folder", options->folder, "Flight folder: flight.json, track.csv[.gz], ranges.csv[.gz]")
+      ->required();
   auto* url = flight->add_option("--url", options->url, "Running server")->capture_default_str();
-  flight->add_option("--data-dir", options->data_dir, "Straight into the data folder of a server that is not running")
+  flight
+      ->add_option("--data-dir", options->data_dir,
+                   "Straight into the data folder of a server that is not running")
       ->excludes(url);
   flight->add_option("--token-file", options->token_file, "File with an access token (gateway and operator)");
   flight->add_option("--name", options->name, "Name of the mission; else that of the folder");

@@ -28,10 +28,12 @@ std::optional<std::string> read_all(const std::string& path) {
 }
 
 void print_errors(const std::string& path, const std::vector<api::FieldError>& errors) {
-  std::fprintf(stderr, "anchord plan: %s: %zu error%s\n", path.c_str(), errors.size(), errors.size() == 1 ? "" : "s");
+  std::fprintf(stderr, "anchord plan: %s: %zu error%s\n", path.c_str(), errors.size(),
+               errors.size() == 1 ? "" : "s");
   for (const auto& e : errors) {
-    std::fprintf(stderr, "  %s: %s: %s%s%s\n", e.pointer.empty() ? "(document)" : e.pointer.c_str(), e.code.c_str(),
-                 e.detail.c_str(), e.value_json.empty() ? "" : ", not ", e.value_json.c_str());
+    std::fprintf(stderr, "  %s: %s: %s%s%s\n", e.pointer.empty() ? "(document)" : e.pointer.c_str(),
+                 e.code.c_str(), e.detail.c_str(), e.value_json.empty() ? "" : ", not ",
+                 e.value_json.c_str());
   }
 }
 
@@ -49,7 +51,8 @@ int plan_next(const std::string& path, bool json) {
     std::fprintf(stderr, "anchord plan: %s: %s\n", path.c_str(), decision.error().message.c_str());
     return 2;
   }
-  const auto out = json ? api::decision_json(decision.value(), *request) : api::decision_text(decision.value(), *request);
+  const auto out =
+      json ? api::decision_json(decision.value(), *request) : api::decision_text(decision.value(), *request);
   std::fputs(out.c_str(), stdout);
   return decision.value().chosen ? 0 : 1;
 }
@@ -78,9 +81,12 @@ int plan_flight(const Flight& flight) {
     return plan.error().code == Errc::invalid_argument ? 2 : 1;
   }
   std::string out;
-  if (flight.format == "plan") out = api::flight_plan_qgc(plan.value(), request->origin, request->input.outline, options);
-  else if (flight.format == "geojson") out = api::flight_plan_geojson(plan.value(), request->origin);
-  else out = api::flight_plan_json(plan.value(), request->origin);
+  if (flight.format == "plan")
+    out = api::flight_plan_qgc(plan.value(), request->origin, request->input.outline, options);
+  else if (flight.format == "geojson")
+    out = api::flight_plan_geojson(plan.value(), request->origin);
+  else
+    out = api::flight_plan_json(plan.value(), request->origin);
   std::fputs(out.c_str(), stdout);
   return 0;
 }
@@ -88,17 +94,22 @@ int plan_flight(const Flight& flight) {
 void add_flight(CLI::App& plan, int& exit_code) {
   auto flight = std::make_shared<Flight>();
   auto& o = flight->options;
-  auto* command = plan.add_subcommand("flight", "Waypoints of a whole flight from a building's outline alone");
-  command->add_option("OUTLINE", flight->outline, "GeoJSON (docs/formats.md, Outline), - for standard input")->required();
+  auto* command =
+      plan.add_subcommand("flight", "Waypoints of a whole flight from a building's outline alone");
+  command->add_option("OUTLINE", flight->outline, "GeoJSON (docs/formats.md, Outline), - for standard input")
+      ->required();
   command->add_option("--format", flight->format, "json, plan (QGroundControl) or geojson")
       ->check(CLI::IsMember({"json", "plan", "geojson"}));
   command->add_option("--criterion", flight->criterion, "a_optimal: mean error; d_optimal: error volume")
       ->check(CLI::IsMember({"a_optimal", "d_optimal"}));
-  command->add_option("--height", flight->building_height_m, "of the building in m; default: height_m of the outline, else 6");
+  command->add_option("--height", flight->building_height_m,
+                      "of the building in m; default: height_m of the outline, else 6");
   command->add_option("--keep-out", o.keep_out_m, "distance from the outline in m")->capture_default_str();
   command->add_option("--heights", o.heights_m, "to measure at, m above ground, with commas")->delimiter(',');
-  command->add_option("--max-points", o.max_points, "at most so many measuring points")->capture_default_str();
-  command->add_option("--min-gain", o.min_gain, "stop when a point brings less than this share")->capture_default_str();
+  command->add_option("--max-points", o.max_points, "at most so many measuring points")
+      ->capture_default_str();
+  command->add_option("--min-gain", o.min_gain, "stop when a point brings less than this share")
+      ->capture_default_str();
   command->add_option("--max-range", o.max_range_m, "no ranges beyond, m")->capture_default_str();
   command->add_option("--speed", o.speed_mps, "m/s")->capture_default_str();
   command->add_option("--dwell", o.dwell_s, "s at each measuring point")->capture_default_str();
@@ -116,7 +127,8 @@ void add_plan_command(CLI::App& app, int& exit_code) {
     bool json{false};
   };
   auto next = std::make_shared<Next>();
-  auto* command = plan->add_subcommand("next", "Best next point of a flight (docs/formats.md, Planner input)");
+  auto* command =
+      plan->add_subcommand("next", "Best next point of a flight (docs/formats.md, Planner input)");
   command->add_option("INPUT", next->input, "JSON file, - for standard input")->required();
   command->add_flag("--json", next->json, "Print JSON instead of a table");
   command->callback([next, &exit_code] { exit_code = plan_next(next->input, next->json); });

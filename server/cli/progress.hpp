@@ -4,7 +4,8 @@
 
 namespace anchord::cli {
 
-/// Progress of a long command on stderr: one line that is written over on a terminal, else a line every ten seconds.
+/// Progress of a long command on stderr: one line that is written over on a terminal, else a line every ten
+/// seconds.
 class Progress {
  public:
   explicit Progress(std::string what);

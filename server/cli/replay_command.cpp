@@ -34,8 +34,8 @@ std::optional<double> parse_speed(const std::string& text) {
   return speed;
 }
 
-/// Stamps the flight so that it ends when the playback ends. Differences between times stay what they were, so that
-/// speeds and gaps are real, and no row is ever stamped later than it is sent.
+/// Stamps the flight so that it ends when the playback ends. Differences between times stay what they were,
+/// so that speeds and gaps are real, and no row is ever stamped later than it is sent.
 void stamp_to_now(FlightUpload& upload, double speed, UtcTime now) {
   const double length_s = seconds_between(upload.first(), upload.last());
   const auto playing_ns = static_cast<std::int64_t>(length_s / speed * 1e9);
@@ -58,7 +58,8 @@ Result<void> play(FlightUpload& upload, double speed) {
     if (interrupted()) return make_error(Errc::canceled, "stopped");
     std::this_thread::sleep_until(next);
     const double elapsed_s = std::chrono::duration<double>(SteadyClock::now() - start).count();
-    BOOST_OUTCOME_TRY(upload.send_before(UtcTime{first.ns + static_cast<std::int64_t>(elapsed_s * speed * 1e9)}));
+    BOOST_OUTCOME_TRY(
+        upload.send_before(UtcTime{first.ns + static_cast<std::int64_t>(elapsed_s * speed * 1e9)}));
     progress.show(upload.fraction());
     next = std::max(next + k_tick, SteadyClock::now());
   }
@@ -132,10 +133,12 @@ int replay(const Options& options) {
 void add_replay_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("replay", "Play a flight through a running server as if it were live");
   auto options = std::make_shared<Options>();
-  command->add_option("flight", options->source, "Flight folder, or the id of a mission of that server")->required();
+  command->add_option("flight", options->source, "Flight folder, or the id of a mission of that server")
+      ->required();
   command->add_option("--url", options->url, "Running server")->capture_default_str();
   command->add_option("--speed", options->speed, "Times real time, or max")->capture_default_str();
-  command->add_option("--token-file", options->token_file, "File with an access token (gateway and operator)");
+  command->add_option("--token-file", options->token_file,
+                      "File with an access token (gateway and operator)");
   command->add_option("--name", options->name, "Name of the mission; else that of the flight");
   command->add_flag("--loop", options->loop, "Again and again, each time a new mission");
   command->callback([options, &exit_code] { exit_code = replay(*options); });

@@ -19,7 +19,9 @@ constexpr auto k_first_pause = std::chrono::milliseconds(100);
 constexpr auto k_longest_pause = std::chrono::milliseconds(5000);
 constexpr auto k_look_every = std::chrono::milliseconds(50);
 
-bool worth_another_try(int status) { return status == 408 || status == 429 || (status >= 500 && status != 507); }
+bool worth_another_try(int status) {
+  return status == 408 || status == 429 || (status >= 500 && status != 507);
+}
 
 Errc errc_of(int status) {
   if (status == 404) return Errc::not_found;
@@ -47,7 +49,8 @@ struct RestClient::State {
     return true;
   }
 
-  Result<std::string> until_answered(const std::string& what, const std::function<httplib::Result()>& send) const {
+  Result<std::string> until_answered(const std::string& what,
+                                     const std::function<httplib::Result()>& send) const {
     const auto give_up = SteadyClock::now() + k_give_up_after;
     auto length = k_first_pause;
     for (;;) {
@@ -60,7 +63,8 @@ struct RestClient::State {
       }
       const std::string why = answer ? std::to_string(answer->status) + " " + api::problem_text(answer->body)
                                      : httplib::to_string(answer.error());
-      if (SteadyClock::now() + length > give_up) return make_error(Errc::link_lost, name + " " + what + ": " + why);
+      if (SteadyClock::now() + length > give_up)
+        return make_error(Errc::link_lost, name + " " + what + ": " + why);
       if (!pause(length)) return make_error(Errc::canceled, "stopped while " + name + " was away: " + why);
       length = std::min(length * 2, k_longest_pause);
     }
@@ -92,11 +96,12 @@ RestClient::RestClient(std::unique_ptr<State> state) : state_(std::move(state)) 
 RestClient::~RestClient() = default;
 
 Result<std::string> RestClient::get(const std::string& path) {
-  return state_->until_answered("GET " + path, [&] { return state_->client.Get((state_->prefix + path).c_str()); });
+  return state_->until_answered("GET " + path,
+                                [&] { return state_->client.Get((state_->prefix + path).c_str()); });
 }
 
-Result<std::string> RestClient::post(const std::string& path, const std::string& content_type, const std::string& body,
-                                     const std::string& idempotency_key) {
+Result<std::string> RestClient::post(const std::string& path, const std::string& content_type,
+                                     const std::string& body, const std::string& idempotency_key) {
   httplib::Headers headers;
   if (!idempotency_key.empty()) headers.emplace("Idempotency-Key", idempotency_key);
   return state_->until_answered("POST " + path, [&] {

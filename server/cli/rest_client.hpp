@@ -8,9 +8,9 @@
 
 namespace anchord::cli {
 
-/// Requests to a running anchord. Sends again with growing pauses while the server is away, busy or full of work;
-/// gives up after a minute. Everything it sends may arrive twice, which is why rows have identities and creations an
-/// Idempotency-Key. One thread.
+/// Requests to a running anchord. Sends again with growing pauses while the server is away, busy or full of
+/// work; gives up after a minute. Everything it sends may arrive twice, which is why rows have identities and
+/// creations an Idempotency-Key. One thread.
 class RestClient {
  public:
   /// `url`: http://host:port, with or without a path before /api. `cancelled` ends waiting early.
@@ -19,8 +19,8 @@ class RestClient {
                                                   std::function<bool()> cancelled);
   ~RestClient();
 
-  /// Body of the 2xx. errors: link_lost (gave up), canceled, invalid_argument and others (the server's 4xx, with its
-  /// words).
+  /// Body of the 2xx. errors: link_lost (gave up), canceled, invalid_argument and others (the server's 4xx,
+  /// with its words).
   Result<std::string> get(const std::string& path);
   Result<std::string> post(const std::string& path, const std::string& content_type, const std::string& body,
                            const std::string& idempotency_key = {});

@@ -19,7 +19,8 @@ constexpr int k_unusable = 2;
 /// What the command line of solve and profile holds.
 struct Arguments {
   std::vector<std::string> folders;
-  std::string format{"table"}, solver{"gauss_newton"}, weights{"inverse_variance"}, loss{"tukey"}, min_fix{"fixed"};
+  std::string format{"table"}, solver{"gauss_newton"}, weights{"inverse_variance"}, loss{"tukey"},
+      min_fix{"fixed"};
   int dims{3};
   std::optional<double> bias_m, height_m;
   std::string profile, out;
@@ -46,7 +47,10 @@ Result<FlightOptions> options_of(const Arguments& a) {
                    : a.solver == "dogleg"            ? Method::dogleg
                                                      : Method::gauss_newton;
   options.weights = a.weights == "as_printed" ? Weights::as_printed : Weights::inverse_variance;
-  options.loss = a.loss == "none" ? Loss::none : a.loss == "huber" ? Loss::huber : a.loss == "cauchy" ? Loss::cauchy : Loss::tukey;
+  options.loss = a.loss == "none"     ? Loss::none
+                 : a.loss == "huber"  ? Loss::huber
+                 : a.loss == "cauchy" ? Loss::cauchy
+                                      : Loss::tukey;
   options.min_fix = a.min_fix == "float"    ? FixClass::rtk_float
                     : a.min_fix == "dgps"   ? FixClass::dgps
                     : a.min_fix == "single" ? FixClass::single
@@ -82,11 +86,13 @@ int solve(const Arguments& a) {
   if (!options) return complain(options.error());
   const auto flights = read_all(a.folders);
   if (!flights) return complain(flights.error());
-  std::fprintf(stderr, "solving %zu flight%s\n", flights.value().size(), flights.value().size() == 1 ? "" : "s");
+  std::fprintf(stderr, "solving %zu flight%s\n", flights.value().size(),
+               flights.value().size() == 1 ? "" : "s");
   const auto solutions = solve_flights(pointers(flights.value()), options.value());
   if (!solutions) return complain(solutions.error());
   std::vector<SolvedFlight> solved;
-  for (std::size_t i = 0; i < flights.value().size(); ++i) solved.push_back({&flights.value()[i], &solutions.value()[i]});
+  for (std::size_t i = 0; i < flights.value().size(); ++i)
+    solved.push_back({&flights.value()[i], &solutions.value()[i]});
   const SolveFormat format = a.format == "json"      ? SolveFormat::json
                              : a.format == "geojson" ? SolveFormat::geojson
                              : a.format == "csv"     ? SolveFormat::csv
@@ -103,7 +109,8 @@ int fit_profile(const Arguments& a) {
   if (!flights) return complain(flights.error());
   for (const auto& flight : flights.value()) {
     if (flight.mission.kit.empty() || flight.mission.kit != flights.value().front().mission.kit) {
-      return complain(make_error(Errc::invalid_argument, "flights of one kit are needed: '" + flight.mission.kit + "' and '" +
+      return complain(make_error(Errc::invalid_argument, "flights of one kit are needed: '" +
+                                                             flight.mission.kit + "' and '" +
                                                              flights.value().front().mission.kit + "'"));
     }
   }
@@ -117,7 +124,8 @@ int fit_profile(const Arguments& a) {
     std::fprintf(stderr, "anchord: %s: cannot be written\n", a.out.c_str());
     return 1;
   }
-  std::fprintf(stderr, "profile of kit %s from %zu flights in %s\n", profile.kit.c_str(), profile.factors.size(), a.out.c_str());
+  std::fprintf(stderr, "profile of kit %s from %zu flights in %s\n", profile.kit.c_str(),
+               profile.factors.size(), a.out.c_str());
   return 0;
 }
 
@@ -132,23 +140,32 @@ int show_profile(const std::string& file) {
   for (const auto& factor : profile.value().factors) std::printf("  %s\n", factor.flight.c_str());
   std::printf("bias %.3f m (sigma %.3f), %s (z %.1f, limit %.1f)\n", gate.bias_m, gate.sigma_m,
               gate.calibrated ? "taken as calibrated" : "not calibrated", gate.z, options.bias_gate_z);
-  std::printf("prior of the next flight: bias %.3f m (%.3f), range curve %.3f m per e-fold (%.3f), lag %.3f s (%.3f), antenna up "
-              "%.3f m (%.3f)\n",
-              prior.mean[0], sigma[0], prior.mean[1], sigma[1], prior.mean[2], sigma[2], prior.mean[3], sigma[3]);
+  std::printf(
+      "prior of the next flight: bias %.3f m (%.3f), range curve %.3f m per e-fold (%.3f), lag %.3f s "
+      "(%.3f), antenna up "
+      "%.3f m (%.3f)\n",
+      prior.mean[0], sigma[0], prior.mean[1], sigma[1], prior.mean[2], sigma[2], prior.mean[3], sigma[3]);
   return 0;
 }
 
 void add_options(CLI::App& command, Arguments& a) {
-  command.add_option("flights", a.folders, "Flight folders (docs/formats.md); flights of one kit learn from each other")->required();
+  command
+      .add_option("flights", a.folders,
+                  "Flight folders (docs/formats.md); flights of one kit learn from each other")
+      ->required();
   command.add_option("--solver", a.solver, "gauss_newton, levenberg_marquardt or dogleg")
       ->check(CLI::IsMember({"gauss_newton", "levenberg_marquardt", "dogleg"}));
-  command.add_option("--weights", a.weights, "inverse_variance, or as_printed (eq 7.11)")->check(CLI::IsMember({"inverse_variance", "as_printed"}));
-  command.add_option("--loss", a.loss, "tukey, cauchy, huber or none")->check(CLI::IsMember({"none", "huber", "cauchy", "tukey"}));
+  command.add_option("--weights", a.weights, "inverse_variance, or as_printed (eq 7.11)")
+      ->check(CLI::IsMember({"inverse_variance", "as_printed"}));
+  command.add_option("--loss", a.loss, "tukey, cauchy, huber or none")
+      ->check(CLI::IsMember({"none", "huber", "cauchy", "tukey"}));
   command.add_option("--dims", a.dims, "3, or 2 with the height held")->check(CLI::IsMember({2, 3}));
-  command.add_option("--height", a.height_m, "Height of all anchors for --dims 2; default: mean height of the track");
+  command.add_option("--height", a.height_m,
+                     "Height of all anchors for --dims 2; default: mean height of the track");
   command.add_option("--min-fix", a.min_fix, "Least fix class of the track: fixed, float, dgps or single")
       ->check(CLI::IsMember({"fixed", "float", "dgps", "single"}));
-  command.add_option("--bias", a.bias_m, "Range bias of the kit in metres, taken as known instead of estimated");
+  command.add_option("--bias", a.bias_m,
+                     "Range bias of the kit in metres, taken as known instead of estimated");
   command.add_option("--profile", a.profile, "Kit profile of earlier flights (anchord profile fit)");
 }
 
@@ -167,7 +184,8 @@ void add_profile_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("profile", "Calibration of a kit, carried from flight to flight");
   command->require_subcommand(1);
   auto arguments = std::make_shared<Arguments>();
-  auto* fit = command->add_subcommand("fit", "Learn bias, range curve, lag and antenna offset from flights of one kit");
+  auto* fit = command->add_subcommand(
+      "fit", "Learn bias, range curve, lag and antenna offset from flights of one kit");
   add_options(*fit, *arguments);
   fit->add_option("--out", arguments->out, "File to write")->required();
   fit->callback([arguments, &exit_code] { exit_code = fit_profile(*arguments); });

@@ -37,7 +37,8 @@ bool write_whole(const std::string& path, const std::string& text) {
 }
 
 // Faults leave before training (6.2.1): ranges far off their placement's median.
-void drop_outliers(ml::Dataset& data, const std::vector<std::size_t>& rows, const api::LabelledTable& table, api::RowReport& report) {
+void drop_outliers(ml::Dataset& data, const std::vector<std::size_t>& rows, const api::LabelledTable& table,
+                   api::RowReport& report) {
   std::vector<double> range;
   for (const auto i : rows) range.push_back(table.range_m[i]);
   const auto faults = ml::range_outliers(range, data.placement);
@@ -62,9 +63,13 @@ int train(const TrainArguments& a) {
   if (!table) return refuse("train", table.error().message);
   auto report = row_report(a.data, table.value());
 
-  api::SetRequest request{a.features, *task == ml::Task::nlos_id || *task == ml::Task::los_bias || *task == ml::Task::nlos_bias, *task != ml::Task::nlos_id};
-  if (*task != ml::Task::nlos_id && *task != ml::Task::bias && !table.value().labelled()) request.need_label = false;
-  if (request.features.empty()) request.features = api::available_features(table.value(), *task == ml::Task::nlos_id);
+  api::SetRequest request{
+      a.features, *task == ml::Task::nlos_id || *task == ml::Task::los_bias || *task == ml::Task::nlos_bias,
+      *task != ml::Task::nlos_id};
+  if (*task != ml::Task::nlos_id && *task != ml::Task::bias && !table.value().labelled())
+    request.need_label = false;
+  if (request.features.empty())
+    request.features = api::available_features(table.value(), *task == ml::Task::nlos_id);
   std::vector<std::size_t> rows;
   std::map<std::string, std::size_t> dropped;
   auto data = api::dataset_from(table.value(), request, rows, dropped);
@@ -73,7 +78,9 @@ int train(const TrainArguments& a) {
   drop_outliers(data.value(), rows, table.value(), report);
   if (data.value().labelled() && (*task == ml::Task::los_bias || *task == ml::Task::nlos_bias)) {
     data = data.value().of_class(*task == ml::Task::los_bias);
-    if (data.value().rows() == 0) return refuse("train", a.data.files.front() + ": no row of the class in column " + table.value().label_column);
+    if (data.value().rows() == 0)
+      return refuse("train",
+                    a.data.files.front() + ": no row of the class in column " + table.value().label_column);
   }
   report.used = data.value().rows();
 
@@ -89,7 +96,8 @@ int train(const TrainArguments& a) {
     std::fprintf(stderr, "anchord train: cannot write %s\n", a.out.c_str());
     return 1;
   }
-  const auto text = a.json ? api::train_json(learned.value(), report, a.out) : api::train_text(learned.value(), report, a.out);
+  const auto text = a.json ? api::train_json(learned.value(), report, a.out)
+                           : api::train_text(learned.value(), report, a.out);
   std::fputs(text.c_str(), stdout);
   return 0;
 }
@@ -97,16 +105,31 @@ int train(const TrainArguments& a) {
 }  // namespace
 
 void add_train_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand("train", "Fit a model of line of sight or range bias to a table of labelled rangings");
+  auto* command = app.add_subcommand(
+      "train", "Fit a model of line of sight or range bias to a table of labelled rangings");
   auto a = std::make_shared<TrainArguments>();
   add_data_options(*command, a->data);
   command->add_option("--task", a->task, "nlos_id, los_bias, nlos_bias or bias")->capture_default_str();
-  command->add_option("--method", a->method, "auto, or one of logistic, random_forest, svm, boosted, average, constant, polynomial, multivariate, least_absolute")->capture_default_str();
-  command->add_option("--features", a->features, "Features by name (default: chosen with the method)")->delimiter(',');
-  command->add_option("--folds", a->folds, "Folds of whole places")->check(CLI::Range(2, 1000))->capture_default_str();
+  command
+      ->add_option("--method", a->method,
+                   "auto, or one of logistic, random_forest, svm, boosted, average, constant, polynomial, "
+                   "multivariate, least_absolute")
+      ->capture_default_str();
+  command->add_option("--features", a->features, "Features by name (default: chosen with the method)")
+      ->delimiter(',');
+  command->add_option("--folds", a->folds, "Folds of whole places")
+      ->check(CLI::Range(2, 1000))
+      ->capture_default_str();
   command->add_option("--seed", a->seed, "Seed of folds and trees")->capture_default_str();
-  command->add_option("--per-placement", a->per_placement, "Rows of one placement used for training; repeats are near copies")->check(CLI::Range(1, 100000))->capture_default_str();
-  command->add_option("--max-fpr", a->max_fpr, "Choose the threshold so that at most this share of held-out NLOS is called LOS")->check(CLI::Range(0.0, 1.0));
+  command
+      ->add_option("--per-placement", a->per_placement,
+                   "Rows of one placement used for training; repeats are near copies")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  command
+      ->add_option("--max-fpr", a->max_fpr,
+                   "Choose the threshold so that at most this share of held-out NLOS is called LOS")
+      ->check(CLI::Range(0.0, 1.0));
   command->add_flag("--grid", a->grid, "Search the declared grid of settings as well");
   command->add_option("--out", a->out, "Model artifact to write")->required();
   command->add_flag("--json", a->json, "One JSON document on standard output");

@@ -91,8 +91,8 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
     websocket::stream_base::timeout timeout{};
     timeout.handshake_timeout = limits.close_time;  // Beast uses it for the closing handshake too
     timeout.idle_timeout = limits.idle;
-    // Without this Beast ends the session after idle_timeout whatever the peer sends. Its pings come at half of it;
-    // ours have a shorter period.
+    // Without this Beast ends the session after idle_timeout whatever the peer sends. Its pings come at half
+    // of it; ours have a shorter period.
     timeout.keep_alive_pings = true;
     ws_.set_option(timeout);
     ws_.read_message_max(limits.message_bytes);

@@ -13,7 +13,8 @@ constexpr const char* k_keep =
     "INSERT INTO stored_answer (principal, idempotency_key, request_sha256_hex, status, body, created_t_ns) "
     "VALUES (?1, ?2, ?3, ?4, ?5, ?6) ON CONFLICT DO NOTHING RETURNING status";
 constexpr const char* k_drop = "DELETE FROM stored_answer WHERE created_t_ns < ?1 RETURNING status";
-constexpr const char* k_newest_entry = "SELECT number, chain_sha256_hex FROM audit ORDER BY number DESC LIMIT 1";
+constexpr const char* k_newest_entry =
+    "SELECT number, chain_sha256_hex FROM audit ORDER BY number DESC LIMIT 1";
 constexpr const char* k_append =
     "INSERT INTO audit (number, t_ns, who, what, from_where, result, chain_sha256_hex) "
     "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
@@ -118,7 +119,8 @@ class SqlAccessStore final : public AccessStore {
             const AuditEntry entry = read_entry(query);
             const std::string chain = query.text();
             if (number != expected || chain != link(before, number, entry)) {
-              return make_error(Errc::conflict, "the audit log was changed at entry " + std::to_string(expected));
+              return make_error(Errc::conflict,
+                                "the audit log was changed at entry " + std::to_string(expected));
             }
             before = chain;
             ++expected;

@@ -6,29 +6,36 @@ namespace anchord::sql {
 namespace {
 
 constexpr const char* k_site_insert =
-    "INSERT INTO site (id, name, origin_lat_deg, origin_lon_deg, origin_height_m, outline_geojson, crs_frame, "
+    "INSERT INTO site (id, name, origin_lat_deg, origin_lon_deg, origin_height_m, outline_geojson, "
+    "crs_frame, "
     "crs_epoch_year, base_sigma_m, base_source, created_t_ns, version) "
     "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12) ON CONFLICT DO NOTHING RETURNING version";
 constexpr const char* k_site_update =
-    "UPDATE site SET name = ?2, origin_lat_deg = ?3, origin_lon_deg = ?4, origin_height_m = ?5, outline_geojson = ?6, "
-    "crs_frame = ?7, crs_epoch_year = ?8, base_sigma_m = ?9, base_source = ?10, created_t_ns = ?11, version = ?12 "
+    "UPDATE site SET name = ?2, origin_lat_deg = ?3, origin_lon_deg = ?4, origin_height_m = ?5, "
+    "outline_geojson = ?6, "
+    "crs_frame = ?7, crs_epoch_year = ?8, base_sigma_m = ?9, base_source = ?10, created_t_ns = ?11, version "
+    "= ?12 "
     "WHERE id = ?1 AND version = ?13 RETURNING version";
 constexpr const char* k_site_columns =
-    "SELECT id, name, origin_lat_deg, origin_lon_deg, origin_height_m, outline_geojson, crs_frame, crs_epoch_year, "
+    "SELECT id, name, origin_lat_deg, origin_lon_deg, origin_height_m, outline_geojson, crs_frame, "
+    "crs_epoch_year, "
     "base_sigma_m, base_source, created_t_ns, version FROM site ";
 constexpr const char* k_site_users =
-    "SELECT (SELECT count(*) FROM mission WHERE site_id = ?1) + (SELECT count(*) FROM anchor WHERE site_id = ?1)";
+    "SELECT (SELECT count(*) FROM mission WHERE site_id = ?1) + (SELECT count(*) FROM anchor WHERE site_id = "
+    "?1)";
 constexpr const char* k_site_remove = "DELETE FROM site WHERE id = ?1 RETURNING version";
 
 constexpr const char* k_anchor_insert =
-    "INSERT INTO anchor (id, network_id, site_id, name, building, floor, space, asset_tag, ifc_guid, retired, "
+    "INSERT INTO anchor (id, network_id, site_id, name, building, floor, space, asset_tag, ifc_guid, "
+    "retired, "
     "created_t_ns, version) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)";
 constexpr const char* k_anchor_update =
     "UPDATE anchor SET network_id = ?2, site_id = ?3, name = ?4, building = ?5, floor = ?6, space = ?7, "
     "asset_tag = ?8, ifc_guid = ?9, retired = ?10, created_t_ns = ?11, version = ?12 "
     "WHERE id = ?1 AND version = ?13 RETURNING version";
 constexpr const char* k_anchor_columns =
-    "SELECT id, network_id, site_id, name, building, floor, space, asset_tag, ifc_guid, retired, created_t_ns, version "
+    "SELECT id, network_id, site_id, name, building, floor, space, asset_tag, ifc_guid, retired, "
+    "created_t_ns, version "
     "FROM anchor ";
 constexpr const char* k_external_ids =
     "SELECT system, external_id FROM anchor_external_id WHERE anchor_id = ?1 ORDER BY ordinal";
@@ -44,7 +51,8 @@ Error absent(const char* what, const AnyId& id) {
 void bind(Query& query, const Site& s, std::uint64_t version) {
   query << s.id << s.name;
   bind_wgs84(query, s.origin);
-  query << s.outline_geojson << s.crs_frame << s.crs_epoch << s.base_sigma_m << s.base_source << s.created << version;
+  query << s.outline_geojson << s.crs_frame << s.crs_epoch << s.base_sigma_m << s.base_source << s.created
+        << version;
 }
 
 Site read_site(Query& query) {
@@ -63,8 +71,8 @@ Site read_site(Query& query) {
 }
 
 void bind(Query& query, const Anchor& a, std::uint64_t version) {
-  query << a.id << a.network_id << a.site << a.name << a.building << a.floor << a.space << a.asset_tag << a.ifc_guid
-        << a.retired << a.created << version;
+  query << a.id << a.network_id << a.site << a.name << a.building << a.floor << a.space << a.asset_tag
+        << a.ifc_guid << a.retired << a.created << version;
 }
 
 void store_external_ids(Connection& c, const Anchor& anchor) {
@@ -121,8 +129,8 @@ std::optional<Site> find_site(Connection& c, const SiteId& id) {
 }
 
 Error moved_on(const char* what, std::uint64_t expected, std::uint64_t stored) {
-  return make_error(Errc::conflict, std::string(what) + " is at version " + std::to_string(stored) + ", not " +
-                                        std::to_string(expected));
+  return make_error(Errc::conflict, std::string(what) + " is at version " + std::to_string(stored) +
+                                        ", not " + std::to_string(expected));
 }
 
 class SqlAnchorStore final : public AnchorStore {
@@ -181,7 +189,8 @@ class SqlAnchorStore final : public AnchorStore {
     auto found = anchor(network_id);
     if (found || found.error().code != Errc::not_found) return found;
     return write_value<Anchor>(gate_, 1, [&](Connection& c) -> Result<Anchor> {
-      if (auto other = find_anchor(c, k_by_network_id, network_id)) return *std::move(other);  // made meanwhile
+      if (auto other = find_anchor(c, k_by_network_id, network_id))
+        return *std::move(other);  // made meanwhile
       Anchor fresh;
       fresh.id = AnchorId{make_uuid_v7(now)};
       fresh.network_id = network_id;
@@ -200,7 +209,8 @@ class SqlAnchorStore final : public AnchorStore {
       query << expected_version;
       if (!query.returned()) {
         const auto stored = find_anchor(c, k_by_id, anchor.id);
-        return stored ? moved_on("the anchor", expected_version, stored->version) : absent("anchor", anchor.id);
+        return stored ? moved_on("the anchor", expected_version, stored->version)
+                      : absent("anchor", anchor.id);
       }
       store_external_ids(c, anchor);
       return std::nullopt;
@@ -245,8 +255,8 @@ class SqlAnchorStore final : public AnchorStore {
   Result<void> remove(const CalibrationId& id) override {
     return write_void(gate_, [&](Connection& c) { return remove_calibration(c, id); });
   }
-  Result<Revision> publish(const CalibrationId& id, const std::vector<NetworkId>& anchors, std::string_view by,
-                           std::string_view note, UtcTime now) override {
+  Result<Revision> publish(const CalibrationId& id, const std::vector<NetworkId>& anchors,
+                           std::string_view by, std::string_view note, UtcTime now) override {
     return write_value<Revision>(
         gate_, 1, [&](Connection& c) { return publish_revision(c, id, anchors, by, note, now); });
   }

@@ -15,17 +15,20 @@
 namespace anchord::sql {
 namespace {
 
-// With the source read through its own snapshot, the copy never starts again however much is written meanwhile; the
-// steps are small so that a copy on a slow card does not hold the file system for long at a time.
+// With the source read through its own snapshot, the copy never starts again however much is written
+// meanwhile; the steps are small so that a copy on a slow card does not hold the file system for long at a
+// time.
 constexpr int k_pages_a_step = 512;
 
 Result<void> copy_pages(SqliteConnection& source, const std::filesystem::path& file) {
   sqlite3* raw = nullptr;
   const int opened = sqlite3_open_v2(file.c_str(), &raw, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, nullptr);
   const std::unique_ptr<sqlite3, int (*)(sqlite3*)> target(raw, sqlite3_close);
-  if (opened != SQLITE_OK) return make_error(Errc::storage_unavailable, "backup: cannot make " + file.string());
+  if (opened != SQLITE_OK)
+    return make_error(Errc::storage_unavailable, "backup: cannot make " + file.string());
   sqlite3_backup* const backup = sqlite3_backup_init(target.get(), "main", source.handle(), "main");
-  if (backup == nullptr) return make_error(Errc::storage_unavailable, "backup: " + std::string(sqlite3_errmsg(raw)));
+  if (backup == nullptr)
+    return make_error(Errc::storage_unavailable, "backup: " + std::string(sqlite3_errmsg(raw)));
   int code = SQLITE_OK;
   int waits = 0;
   while (code == SQLITE_OK || ((code == SQLITE_BUSY || code == SQLITE_LOCKED) && ++waits < 100)) {
@@ -65,7 +68,8 @@ Result<std::string> sha256_of_file(const std::filesystem::path& file) {
 
 Result<BackupReport> back_up(SqliteConnection& source, const std::filesystem::path& file) {
   std::error_code error;
-  if (std::filesystem::exists(file, error)) return make_error(Errc::conflict, "backup: " + file.string() + " exists");
+  if (std::filesystem::exists(file, error))
+    return make_error(Errc::conflict, "backup: " + file.string() + " exists");
   // Under another name until it is known to be good, so that a half copy never looks like a backup.
   const std::filesystem::path part = file.string() + ".part";
   std::filesystem::remove(part, error);

@@ -9,12 +9,14 @@ namespace anchord::sql {
 namespace {
 
 constexpr const char* k_insert =
-    "INSERT INTO calibration (id, frame, origin_lat_deg, origin_lon_deg, origin_height_m, settings_json, created_t_ns) "
+    "INSERT INTO calibration (id, frame, origin_lat_deg, origin_lon_deg, origin_height_m, settings_json, "
+    "created_t_ns) "
     "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7) ON CONFLICT DO NOTHING RETURNING calibration_key";
 constexpr const char* k_insert_mission =
     "INSERT INTO calibration_mission (calibration_key, ordinal, mission_key) VALUES (?1, ?2, ?3)";
 constexpr const char* k_columns =
-    "SELECT calibration_key, id, frame, origin_lat_deg, origin_lon_deg, origin_height_m, settings_json, created_t_ns "
+    "SELECT calibration_key, id, frame, origin_lat_deg, origin_lon_deg, origin_height_m, settings_json, "
+    "created_t_ns "
     "FROM calibration ";
 constexpr const char* k_missions =
     "SELECT m.id FROM calibration_mission cm JOIN mission m ON m.mission_key = cm.mission_key "
@@ -25,7 +27,8 @@ constexpr const char* k_remove = "DELETE FROM calibration WHERE calibration_key 
 
 constexpr const char* k_newest = "SELECT coalesce(max(number), 0) FROM revision";
 constexpr const char* k_insert_revision =
-    "INSERT INTO revision (number, calibration_key, published_t_ns, published_by, note) VALUES (?1, ?2, ?3, ?4, ?5)";
+    "INSERT INTO revision (number, calibration_key, published_t_ns, published_by, note) VALUES (?1, ?2, ?3, "
+    "?4, ?5)";
 constexpr const char* k_carry_on =
     "INSERT INTO revision_position (number, network_id, since_number) "
     "SELECT ?1, network_id, since_number FROM revision_position WHERE number = ?2";
@@ -38,11 +41,15 @@ constexpr const char* k_revisions =
     "WHERE ?1 = 0 OR r.number < ?1 ORDER BY r.number DESC LIMIT ?2";
 constexpr const char* k_revision_exists = "SELECT count(*) FROM revision WHERE number = ?1";
 constexpr const char* k_position_columns =
-    "SELECT p.network_id, p.since_number, c.calibration_key, c.id, r.published_t_ns, c.frame, c.origin_lat_deg, "
-    "c.origin_lon_deg, c.origin_height_m FROM revision_position p JOIN revision r ON r.number = p.since_number "
+    "SELECT p.network_id, p.since_number, c.calibration_key, c.id, r.published_t_ns, c.frame, "
+    "c.origin_lat_deg, "
+    "c.origin_lon_deg, c.origin_height_m FROM revision_position p JOIN revision r ON r.number = "
+    "p.since_number "
     "JOIN calibration c ON c.calibration_key = r.calibration_key ";
 
-Error absent(const CalibrationId& id) { return make_error(Errc::not_found, "no calibration " + to_string(id)); }
+Error absent(const CalibrationId& id) {
+  return make_error(Errc::not_found, "no calibration " + to_string(id));
+}
 
 std::optional<std::int64_t> key_of(Connection& c, const CalibrationId& id) {
   Query query(c, k_key);
@@ -132,7 +139,8 @@ Result<Calibration> find_calibration(Connection& c, const CalibrationId& id) {
 
 Result<std::vector<Calibration>> list_calibrations(Connection& c, std::int64_t limit,
                                                    const std::optional<CalibrationId>& after) {
-  Query query(c, std::string(k_columns) + (after ? "WHERE id < ?1 ORDER BY id DESC LIMIT ?2" : "ORDER BY id DESC LIMIT ?1"));
+  Query query(c, std::string(k_columns) +
+                     (after ? "WHERE id < ?1 ORDER BY id DESC LIMIT ?2" : "ORDER BY id DESC LIMIT ?1"));
   if (after) query << *after;
   query << limit;
   std::vector<Calibration> found;
@@ -154,8 +162,9 @@ std::optional<Error> remove_calibration(Connection& c, const CalibrationId& id) 
   return std::nullopt;
 }
 
-Result<Revision> publish_revision(Connection& c, const CalibrationId& id, const std::vector<NetworkId>& anchors,
-                                  std::string_view by, std::string_view note, UtcTime now) {
+Result<Revision> publish_revision(Connection& c, const CalibrationId& id,
+                                  const std::vector<NetworkId>& anchors, std::string_view by,
+                                  std::string_view note, UtcTime now) {
   const auto key = key_of(c, id);
   if (!key) return absent(id);
   const std::uint64_t before = newest_revision(c);
@@ -169,7 +178,8 @@ Result<Revision> publish_revision(Connection& c, const CalibrationId& id, const 
   for (const NetworkId anchor : anchors) {
     const auto estimate = read_estimate(c, *key, anchor);
     if (!estimate || !estimate->best) {
-      return make_error(Errc::invalid_argument, "anchor " + to_string(anchor) + " has no position in this calibration");
+      return make_error(Errc::invalid_argument,
+                        "anchor " + to_string(anchor) + " has no position in this calibration");
     }
     Query set(c, k_set_position);
     set << revision.number << anchor;
@@ -194,7 +204,8 @@ Result<std::vector<Revision>> list_revisions(Connection& c, std::int64_t limit, 
   return found;
 }
 
-Result<std::vector<PublishedPosition>> positions_of_revision(Connection& c, std::optional<std::uint64_t> revision) {
+Result<std::vector<PublishedPosition>> positions_of_revision(Connection& c,
+                                                             std::optional<std::uint64_t> revision) {
   const std::uint64_t number = revision ? *revision : newest_revision(c);
   if (revision) {
     Query exists(c, k_revision_exists);

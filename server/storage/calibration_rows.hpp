@@ -16,15 +16,17 @@ Result<std::vector<Calibration>> list_calibrations(Connection& connection, std::
                                                    const std::optional<CalibrationId>& after);
 std::optional<Error> remove_calibration(Connection& connection, const CalibrationId& id);
 Result<Revision> publish_revision(Connection& connection, const CalibrationId& id,
-                                  const std::vector<NetworkId>& anchors, std::string_view by, std::string_view note,
-                                  UtcTime now);
-Result<std::vector<Revision>> list_revisions(Connection& connection, std::int64_t limit, std::uint64_t before);
+                                  const std::vector<NetworkId>& anchors, std::string_view by,
+                                  std::string_view note, UtcTime now);
+Result<std::vector<Revision>> list_revisions(Connection& connection, std::int64_t limit,
+                                             std::uint64_t before);
 Result<std::vector<PublishedPosition>> positions_of_revision(Connection& connection,
                                                              std::optional<std::uint64_t> revision);
 Result<std::vector<PublishedPosition>> positions_of_anchor(Connection& connection, NetworkId network_id);
 
 /// All estimates of one calibration, in the order in which it has them.
-void store_estimates(Connection& connection, std::int64_t calibration_key, const std::vector<Estimate>& estimates);
+void store_estimates(Connection& connection, std::int64_t calibration_key,
+                     const std::vector<Estimate>& estimates);
 std::vector<Estimate> read_estimates(Connection& connection, std::int64_t calibration_key);
 std::optional<Estimate> read_estimate(Connection& connection, std::int64_t calibration_key, NetworkId anchor);
 

@@ -39,7 +39,8 @@ std::string pid_in(int fd) {
 Result<void> write_small(const std::filesystem::path& path, std::string_view text) {
   const int fd = open_file(path, O_WRONLY | O_CREAT | O_TRUNC);
   if (fd < 0) return system_error(path.string(), errno);
-  const bool ok = ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size()) && ::fsync(fd) == 0;
+  const bool ok =
+      ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size()) && ::fsync(fd) == 0;
   const int code = errno;
   ::close(fd);
   if (!ok) return system_error(path.string(), code);
@@ -50,7 +51,8 @@ std::string shell_quoted(const std::filesystem::path& path) { return "'" + path.
 
 }  // namespace
 
-Result<std::unique_ptr<DataFolder>> DataFolder::open(const std::filesystem::path& dir, std::uint64_t reserve_bytes) {
+Result<std::unique_ptr<DataFolder>> DataFolder::open(const std::filesystem::path& dir,
+                                                     std::uint64_t reserve_bytes) {
   ::umask(S_IRWXG | S_IRWXO);
   std::error_code error;
   const bool fresh = std::filesystem::create_directories(dir, error);
@@ -62,7 +64,8 @@ Result<std::unique_ptr<DataFolder>> DataFolder::open(const std::filesystem::path
   if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
     const std::string holder = pid_in(fd);
     ::close(fd);
-    return make_error(Errc::conflict, "data folder " + dir.string() + " is in use by another anchord" + holder);
+    return make_error(Errc::conflict,
+                      "data folder " + dir.string() + " is in use by another anchord" + holder);
   }
   const std::string pid = std::to_string(::getpid());
   if (::ftruncate(fd, 0) != 0 || ::pwrite(fd, pid.data(), pid.size(), 0) < 0) {
@@ -84,7 +87,8 @@ bool DataFolder::had_database() const {
 
 Result<void> DataFolder::note_database() {
   if (had_database()) return boost::outcome_v2::success();
-  return write_small(dir_ / k_marker, "anchord data folder: a database was made here; do not delete this file\n");
+  return write_small(dir_ / k_marker,
+                     "anchord data folder: a database was made here; do not delete this file\n");
 }
 
 std::uint64_t DataFolder::free_bytes() const {
@@ -114,15 +118,20 @@ std::string DataFolder::recovery_commands() const {
   const std::string db = shell_quoted(database());
   const std::string recovered = shell_quoted(dir_ / "recovered.db");
   const std::string saved = shell_quoted(dir_.string() + ".damaged");
-  return "Nothing was changed. Stop every anchord, then keep a copy of all files, and either save what can be read or go "
+  return "Nothing was changed. Stop every anchord, then keep a copy of all files, and either save what can "
+         "be read or go "
          "back to the newest copy:\n"
-         "  cp -a " + shell_quoted(dir_) + " " + saved + "\n"
-         // Not .recover: that of Debian 12's sqlite3 answers "SQL logic error" to every database.
-         "  (echo 'PRAGMA application_id=1095648072;'; echo \"PRAGMA user_version=$(sqlite3 " + db +
-         " 'PRAGMA user_version');\"; sqlite3 " + db + " .dump | sed 's/^ROLLBACK.*/COMMIT;/') | sqlite3 " + recovered +
-         "; mv " + recovered + " " + db + " && rm -f " + shell_quoted(wal()) + " " + shell_quoted(dir_ / "anchord.db-shm") +
+         "  cp -a " +
+         shell_quoted(dir_) + " " + saved +
          "\n"
-         "  cp \"$(ls -t " + shell_quoted(backups()) + "/*.db | head -1)\" " + db + " && rm -f " + shell_quoted(wal()) + " " +
+         // Not .recover: that of Debian 12's sqlite3 answers "SQL logic error" to every database.
+         "  (echo 'PRAGMA application_id=1095648072;'; echo \"PRAGMA user_version=$(sqlite3 " +
+         db + " 'PRAGMA user_version');\"; sqlite3 " + db +
+         " .dump | sed 's/^ROLLBACK.*/COMMIT;/') | sqlite3 " + recovered + "; mv " + recovered + " " + db +
+         " && rm -f " + shell_quoted(wal()) + " " + shell_quoted(dir_ / "anchord.db-shm") +
+         "\n"
+         "  cp \"$(ls -t " +
+         shell_quoted(backups()) + "/*.db | head -1)\" " + db + " && rm -f " + shell_quoted(wal()) + " " +
          shell_quoted(dir_ / "anchord.db-shm");
 }
 

@@ -14,7 +14,8 @@ class DataFolder {
  public:
   /// Makes the folder (0700) when absent and takes its lock; from here on the umask is 077.
   /// Errors: conflict when another process has it; storage_unavailable.
-  static Result<std::unique_ptr<DataFolder>> open(const std::filesystem::path& dir, std::uint64_t reserve_bytes);
+  static Result<std::unique_ptr<DataFolder>> open(const std::filesystem::path& dir,
+                                                  std::uint64_t reserve_bytes);
   ~DataFolder();
   DataFolder(const DataFolder&) = delete;
   DataFolder& operator=(const DataFolder&) = delete;

@@ -5,25 +5,31 @@ namespace anchord::sql {
 namespace {
 
 constexpr const char* k_insert =
-    "INSERT INTO estimate (calibration_key, network_id, ordinal, t_ns, verdict, reason, h95_m, v95_m, gdop, gdop_trace, "
+    "INSERT INTO estimate (calibration_key, network_id, ordinal, t_ns, verdict, reason, h95_m, v95_m, gdop, "
+    "gdop_trace, "
     "n_used, bias_m, bias_sigma_m, lag_s, lag_sigma_s) "
     "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15)";
 constexpr const char* k_insert_hypothesis =
-    "INSERT INTO hypothesis (calibration_key, network_id, is_mirror, e_m, n_m, u_m, lat_deg, lon_deg, height_m, "
+    "INSERT INTO hypothesis (calibration_key, network_id, is_mirror, e_m, n_m, u_m, lat_deg, lon_deg, "
+    "height_m, "
     "cov_ee_m2, cov_en_m2, cov_eu_m2, cov_nn_m2, cov_nu_m2, cov_uu_m2, rms_residual_m, probability) "
     "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17)";
 constexpr const char* k_insert_refused =
     "INSERT INTO estimate_refused (calibration_key, network_id, reason, n_ranges) VALUES (?1, ?2, ?3, ?4)";
 constexpr const char* k_columns =
-    "SELECT network_id, t_ns, verdict, reason, h95_m, v95_m, gdop, gdop_trace, n_used, bias_m, bias_sigma_m, lag_s, "
+    "SELECT network_id, t_ns, verdict, reason, h95_m, v95_m, gdop, gdop_trace, n_used, bias_m, bias_sigma_m, "
+    "lag_s, "
     "lag_sigma_s FROM estimate WHERE calibration_key = ?1 ";
 constexpr const char* k_hypotheses =
-    "SELECT is_mirror, e_m, n_m, u_m, lat_deg, lon_deg, height_m, cov_ee_m2, cov_en_m2, cov_eu_m2, cov_nn_m2, "
-    "cov_nu_m2, cov_uu_m2, rms_residual_m, probability FROM hypothesis WHERE calibration_key = ?1 AND network_id = ?2";
+    "SELECT is_mirror, e_m, n_m, u_m, lat_deg, lon_deg, height_m, cov_ee_m2, cov_en_m2, cov_eu_m2, "
+    "cov_nn_m2, "
+    "cov_nu_m2, cov_uu_m2, rms_residual_m, probability FROM hypothesis WHERE calibration_key = ?1 AND "
+    "network_id = ?2";
 constexpr const char* k_refused =
     "SELECT reason, n_ranges FROM estimate_refused WHERE calibration_key = ?1 AND network_id = ?2";
 
-void store_hypothesis(Connection& c, std::int64_t key, NetworkId anchor, bool is_mirror, const Hypothesis& h) {
+void store_hypothesis(Connection& c, std::int64_t key, NetworkId anchor, bool is_mirror,
+                      const Hypothesis& h) {
   Query query(c, k_insert_hypothesis);
   query << key << anchor << is_mirror << h.position.m.x() << h.position.m.y() << h.position.m.z();
   bind_wgs84(query, h.wgs84);
@@ -74,13 +80,14 @@ Estimate read(Connection& c, std::int64_t key, Query& query) {
 
 }  // namespace
 
-void store_estimates(Connection& connection, std::int64_t calibration_key, const std::vector<Estimate>& estimates) {
+void store_estimates(Connection& connection, std::int64_t calibration_key,
+                     const std::vector<Estimate>& estimates) {
   std::int64_t ordinal = 0;
   for (const Estimate& e : estimates) {
     Query query(connection, k_insert);
-    query << calibration_key << e.anchor << ordinal++ << e.time << static_cast<int>(e.verdict) << e.reason << e.h95_m
-          << e.v95_m << e.gdop << e.gdop_trace << std::uint64_t{e.n_used} << e.bias_m << e.bias_sigma_m << e.lag_s
-          << e.lag_sigma_s;
+    query << calibration_key << e.anchor << ordinal++ << e.time << static_cast<int>(e.verdict) << e.reason
+          << e.h95_m << e.v95_m << e.gdop << e.gdop_trace << std::uint64_t{e.n_used} << e.bias_m
+          << e.bias_sigma_m << e.lag_s << e.lag_sigma_s;
     query.run();
     if (e.best) store_hypothesis(connection, calibration_key, e.anchor, false, *e.best);
     if (e.mirror) store_hypothesis(connection, calibration_key, e.anchor, true, *e.mirror);
@@ -100,7 +107,8 @@ std::vector<Estimate> read_estimates(Connection& connection, std::int64_t calibr
   return found;
 }
 
-std::optional<Estimate> read_estimate(Connection& connection, std::int64_t calibration_key, NetworkId anchor) {
+std::optional<Estimate> read_estimate(Connection& connection, std::int64_t calibration_key,
+                                      NetworkId anchor) {
   Query query(connection, std::string(k_columns) + "AND network_id = ?2");
   query << calibration_key << anchor;
   if (!query.step()) return std::nullopt;

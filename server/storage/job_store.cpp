@@ -4,7 +4,8 @@ namespace anchord::sql {
 namespace {
 
 constexpr const char* k_insert =
-    "INSERT INTO job (id, kind, state, fraction, stage, detail, result_href, problem_json, request_json, created_t_ns, "
+    "INSERT INTO job (id, kind, state, fraction, stage, detail, result_href, problem_json, request_json, "
+    "created_t_ns, "
     "started_t_ns, finished_t_ns) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)";
 constexpr const char* k_update =
     "UPDATE job SET kind = ?2, state = ?3, fraction = ?4, stage = ?5, detail = ?6, result_href = ?7, "

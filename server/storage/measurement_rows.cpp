@@ -18,7 +18,9 @@ std::int64_t seq_or_none(const std::optional<std::uint64_t>& seq) {
   return seq ? static_cast<std::int64_t>(*seq) : -1;
 }
 
-std::optional<double> truth_distance_m(const Range& row) { return row.truth ? row.truth->distance_m : std::nullopt; }
+std::optional<double> truth_distance_m(const Range& row) {
+  return row.truth ? row.truth->distance_m : std::nullopt;
+}
 std::optional<bool> truth_los(const Range& row) { return row.truth ? row.truth->los : std::nullopt; }
 
 bool same_cir(const std::optional<Cir>& a, const std::optional<Cir>& b) {
@@ -158,7 +160,8 @@ std::optional<Cir> read_cir(Connection& connection, std::int64_t range_id) {
   cir.preamble_count = query.maybe_real();
   const auto bytes = query.blob();
   cir.re_im.resize(bytes.size() / sizeof(std::int16_t));
-  if (!cir.re_im.empty()) std::memcpy(cir.re_im.data(), bytes.data(), cir.re_im.size() * sizeof(std::int16_t));
+  if (!cir.re_im.empty())
+    std::memcpy(cir.re_im.data(), bytes.data(), cir.re_im.size() * sizeof(std::int16_t));
   return cir;
 }
 

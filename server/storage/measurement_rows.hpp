@@ -16,10 +16,12 @@ struct Table<Range> {
   static constexpr std::string_view name = "uwb_range";
   static constexpr std::string_view id = "range_id";
   static constexpr std::string_view columns =
-      "range_id, mission_key, kind, t_ns, received_t_ns, tag, antenna, anchor, seq, distance_m, rss_dbm, fp_dbm, "
+      "range_id, mission_key, kind, t_ns, received_t_ns, tag, antenna, anchor, seq, distance_m, rss_dbm, "
+      "fp_dbm, "
       "rx_dbm, std_noise, heading_deg, truth_distance_m, truth_los";
   static constexpr std::string_view insert =
-      "INSERT INTO uwb_range (mission_key, kind, t_ns, received_t_ns, tag, antenna, anchor, seq, distance_m, rss_dbm, "
+      "INSERT INTO uwb_range (mission_key, kind, t_ns, received_t_ns, tag, antenna, anchor, seq, distance_m, "
+      "rss_dbm, "
       "fp_dbm, rx_dbm, std_noise, heading_deg, truth_distance_m, truth_los) "
       "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16) "
       "ON CONFLICT DO NOTHING RETURNING range_id";
@@ -38,14 +40,17 @@ struct Table<Fix> {
   static constexpr std::string_view name = "fix";
   static constexpr std::string_view id = "fix_id";
   static constexpr std::string_view columns =
-      "fix_id, mission_key, t_ns, received_t_ns, seq, frame, lat_deg, lon_deg, height_m, x_m, y_m, z_m, fix_class, "
+      "fix_id, mission_key, t_ns, received_t_ns, seq, frame, lat_deg, lon_deg, height_m, x_m, y_m, z_m, "
+      "fix_class, "
       "cov_ee_m2, cov_en_m2, cov_eu_m2, cov_nn_m2, cov_nu_m2, cov_uu_m2, "
       "enu_from_body_x, enu_from_body_y, enu_from_body_z, enu_from_body_w, correction_age_s, satellites";
   static constexpr std::string_view insert =
-      "INSERT INTO fix (mission_key, t_ns, received_t_ns, seq, frame, lat_deg, lon_deg, height_m, x_m, y_m, z_m, "
+      "INSERT INTO fix (mission_key, t_ns, received_t_ns, seq, frame, lat_deg, lon_deg, height_m, x_m, y_m, "
+      "z_m, "
       "fix_class, cov_ee_m2, cov_en_m2, cov_eu_m2, cov_nn_m2, cov_nu_m2, cov_uu_m2, "
       "enu_from_body_x, enu_from_body_y, enu_from_body_z, enu_from_body_w, correction_age_s, satellites) "
-      "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20, ?21, ?22, "
+      "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20, "
+      "?21, ?22, "
       "?23, ?24) ON CONFLICT DO NOTHING RETURNING fix_id";
   static constexpr std::string_view same_identity = "mission_key = ?1 AND t_ns = ?2 AND ifnull(seq, -1) = ?3";
   static void bind(Query& query, std::int64_t mission_key, const Fix& row);

@@ -24,7 +24,8 @@ constexpr const char* k_devices_of_mission =
     "WHERE m.id = ?1 ORDER BY d.last_t_ns DESC, d.network_id";
 constexpr const char* k_devices =
     "SELECT d.network_id, d.kind, m.id, d.first_t_ns, d.last_t_ns, d.n_ranges "
-    "FROM device_seen d JOIN mission m ON m.mission_key = d.mission_key ORDER BY d.last_t_ns DESC, d.network_id";
+    "FROM device_seen d JOIN mission m ON m.mission_key = d.mission_key ORDER BY d.last_t_ns DESC, "
+    "d.network_id";
 constexpr const char* k_count_ranges = "SELECT count(*) FROM uwb_range WHERE mission_key = ?1";
 constexpr const char* k_count_fixes = "SELECT count(*) FROM fix WHERE mission_key = ?1";
 
@@ -50,7 +51,8 @@ class Devices {
  public:
   void note(std::int64_t key, const Range& row) {
     add({key, row.anchor.value, DeviceSeen::Kind::anchor}, row.time);
-    add({key, row.tag.value, row.kind == RangeKind::tag_anchor ? DeviceSeen::Kind::tag : DeviceSeen::Kind::anchor},
+    add({key, row.tag.value,
+         row.kind == RangeKind::tag_anchor ? DeviceSeen::Kind::tag : DeviceSeen::Kind::anchor},
         row.time);
   }
   void note(std::int64_t, const Fix&) {}
@@ -88,7 +90,8 @@ void load_cir(Connection&, std::int64_t, Fix&) {}
 template <class Row>
 RowOutcome judge_stored(Connection& connection, std::int64_t key, const Row& row) {
   static const std::string text = "SELECT " + std::string(Table<Row>::columns) + " FROM " +
-                                  std::string(Table<Row>::name) + " WHERE " + std::string(Table<Row>::same_identity);
+                                  std::string(Table<Row>::name) + " WHERE " +
+                                  std::string(Table<Row>::same_identity);
   Query query(connection, text);
   Table<Row>::bind_identity(query, key, row);
   if (!query.step()) throw SqlError(Failure::internal, "a row that was refused as present is not there");
@@ -128,7 +131,8 @@ template <class Row>
 Result<std::vector<RowOutcome>> append(Gate& gate, const std::vector<Row>& rows, bool atomic) {
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const std::string refusal = Table<Row>::refusal(rows[i]);
-    if (!refusal.empty()) return make_error(Errc::invalid_argument, "row " + std::to_string(i) + ": " + refusal);
+    if (!refusal.empty())
+      return make_error(Errc::invalid_argument, "row " + std::to_string(i) + ": " + refusal);
   }
   std::vector<RowOutcome> outcomes;
   if (rows.empty()) return outcomes;
@@ -182,8 +186,8 @@ std::string page_text(const MeasurementStore::Filter& filter, bool after) {
     const std::string beyond = filter.descending ? "<" : ">";
     term("t_ns " + beyond + "= ");
     const std::string same = "?" + std::to_string(n);
-    where += " AND (t_ns " + beyond + " " + same + " OR (t_ns = " + same + " AND " + id + " " + beyond + " ?" +
-             std::to_string(++n) + "))";
+    where += " AND (t_ns " + beyond + " " + same + " OR (t_ns = " + same + " AND " + id + " " + beyond +
+             " ?" + std::to_string(++n) + "))";
   }
   const std::string direction = filter.descending ? " DESC" : "";
   return "SELECT " + std::string(Table<Row>::columns) + " FROM " + std::string(Table<Row>::name) + where +
@@ -198,7 +202,8 @@ MissionId mission_id(Connection& connection, std::int64_t key) {
 }
 
 template <class Row>
-Result<MeasurementStore::Page<Row>> read_page(Connection& connection, const MeasurementStore::Filter& filter) {
+Result<MeasurementStore::Page<Row>> read_page(Connection& connection,
+                                              const MeasurementStore::Filter& filter) {
   BOOST_OUTCOME_TRY(const auto cursor, parse_cursor(filter.after));
   MeasurementStore::Page<Row> page;
   std::optional<std::int64_t> key;
@@ -220,7 +225,8 @@ Result<MeasurementStore::Page<Row>> read_page(Connection& connection, const Meas
   std::map<std::int64_t, MissionId> missions;
   while (query.step()) {
     if (page.rows.size() == filter.limit) {
-      if (filter.limit > 0) page.next = std::to_string(page.rows.back().time.ns) + "." + std::to_string(page.ids.back());
+      if (filter.limit > 0)
+        page.next = std::to_string(page.rows.back().time.ns) + "." + std::to_string(page.ids.back());
       break;
     }
     page.ids.push_back(query.integer());
@@ -265,8 +271,12 @@ class SqlMeasurementStore final : public MeasurementStore {
       return row;
     });
   }
-  Result<std::uint64_t> count_ranges(const MissionId& mission) override { return count(mission, k_count_ranges); }
-  Result<std::uint64_t> count_fixes(const MissionId& mission) override { return count(mission, k_count_fixes); }
+  Result<std::uint64_t> count_ranges(const MissionId& mission) override {
+    return count(mission, k_count_ranges);
+  }
+  Result<std::uint64_t> count_fixes(const MissionId& mission) override {
+    return count(mission, k_count_fixes);
+  }
 
   Result<std::vector<DeviceSeen>> devices(const std::optional<MissionId>& mission) override {
     return read_value<std::vector<DeviceSeen>>(gate_, [&](Connection& c) -> Result<std::vector<DeviceSeen>> {

@@ -15,7 +15,8 @@ constexpr const char* k_record =
     "INSERT INTO schema_migration (number, name, sha256_hex, applied_t_ns) VALUES (?1, ?2, ?3, ?4)";
 
 std::string quoted(std::string text) {
-  for (std::size_t at = text.find('\''); at != std::string::npos; at = text.find('\'', at + 2)) text.insert(at, 1, '\'');
+  for (std::size_t at = text.find('\''); at != std::string::npos; at = text.find('\'', at + 2))
+    text.insert(at, 1, '\'');
   return "'" + text + "'";
 }
 
@@ -36,8 +37,9 @@ Result<void> verify_applied(SqliteConnection& connection, std::span<const Migrat
     const auto digest = query.text();
     if (number < 1 || static_cast<std::size_t>(number) > migrations.size()) continue;
     if (digest != sha256_hex(migrations[static_cast<std::size_t>(number - 1)].sql)) {
-      return make_error(Errc::unsupported, "migration " + std::to_string(number) + " (" + name +
-                                               ") was another one when this database was made: it had SHA-256 " + digest);
+      return make_error(Errc::unsupported,
+                        "migration " + std::to_string(number) + " (" + name +
+                            ") was another one when this database was made: it had SHA-256 " + digest);
     }
   }
   return boost::outcome_v2::success();
@@ -65,7 +67,8 @@ void apply(SqliteConnection& connection, const Migration& migration, UtcTime now
 std::string sha256_hex(std::string_view bytes) {
   std::array<unsigned char, 32> digest{};
   unsigned int size = 0;
-  ANCHORD_CHECK(EVP_Digest(bytes.data(), bytes.size(), digest.data(), &size, EVP_sha256(), nullptr) == 1, "SHA-256");
+  ANCHORD_CHECK(EVP_Digest(bytes.data(), bytes.size(), digest.data(), &size, EVP_sha256(), nullptr) == 1,
+                "SHA-256");
   constexpr std::string_view k_digits = "0123456789abcdef";
   std::string hex;
   for (const unsigned char byte : digest) {

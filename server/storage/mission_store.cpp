@@ -8,13 +8,16 @@ namespace {
 
 constexpr const char* k_key = "SELECT mission_key FROM mission WHERE id = ?1";
 constexpr const char* k_insert =
-    "INSERT INTO mission (id, site_id, name, kit, radio, frame, track_point, state, created_t_ns, finished_t_ns) "
+    "INSERT INTO mission (id, site_id, name, kit, radio, frame, track_point, state, created_t_ns, "
+    "finished_t_ns) "
     "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10) RETURNING mission_key";
 constexpr const char* k_update =
-    "UPDATE mission SET site_id = ?2, name = ?3, kit = ?4, radio = ?5, frame = ?6, track_point = ?7, state = ?8, "
+    "UPDATE mission SET site_id = ?2, name = ?3, kit = ?4, radio = ?5, frame = ?6, track_point = ?7, state = "
+    "?8, "
     "created_t_ns = ?9, finished_t_ns = ?10 WHERE id = ?1 RETURNING mission_key";
 constexpr const char* k_columns =
-    "SELECT mission_key, id, site_id, name, kit, radio, frame, track_point, state, created_t_ns, finished_t_ns "
+    "SELECT mission_key, id, site_id, name, kit, radio, frame, track_point, state, created_t_ns, "
+    "finished_t_ns "
     "FROM mission ";
 constexpr const char* k_insert_tag =
     "INSERT INTO mission_tag (mission_key, ordinal, tag, antenna, lever_arm_forward_m, lever_arm_left_m, "
@@ -24,7 +27,8 @@ constexpr const char* k_tags =
     "WHERE mission_key = ?1 ORDER BY ordinal";
 constexpr const char* k_drop_tags = "DELETE FROM mission_tag WHERE mission_key = ?1";
 constexpr const char* k_calibrations =
-    "SELECT count(*) FROM calibration_mission cm JOIN mission m ON m.mission_key = cm.mission_key WHERE m.id = ?1";
+    "SELECT count(*) FROM calibration_mission cm JOIN mission m ON m.mission_key = cm.mission_key WHERE m.id "
+    "= ?1";
 constexpr const char* k_remove = "DELETE FROM mission WHERE id = ?1 RETURNING mission_key";
 constexpr const char* k_site = "SELECT 1 FROM site WHERE id = ?1";
 
@@ -50,8 +54,8 @@ void store_tags(Connection& connection, std::int64_t key, const Mission& mission
 }
 
 void bind(Query& query, const Mission& m) {
-  query << m.id << m.site << m.name << m.kit << m.radio << static_cast<int>(m.frame) << static_cast<int>(m.point)
-        << static_cast<int>(m.state) << m.created << m.finished;
+  query << m.id << m.site << m.name << m.kit << m.radio << static_cast<int>(m.frame)
+        << static_cast<int>(m.point) << static_cast<int>(m.state) << m.created << m.finished;
 }
 
 Mission read(Connection& connection, Query& query) {
@@ -86,7 +90,8 @@ class SqlMissionStore final : public MissionStore {
   Result<void> insert(const Mission& mission) override {
     if (auto refusal = admit_()) return *std::move(refusal);
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      if (mission_key(c, mission.id)) return make_error(Errc::conflict, "mission " + to_string(mission.id) + " exists");
+      if (mission_key(c, mission.id))
+        return make_error(Errc::conflict, "mission " + to_string(mission.id) + " exists");
       if (auto error = check_site(c, mission)) return error;
       Query query(c, k_insert);
       bind(query, mission);

@@ -13,8 +13,9 @@
 #include "core/base/result.hpp"
 #include "core/base/time.hpp"
 
-/// The seam between the stores and the database: stores are written once against it, each database implements it once.
-/// SQL texts use ?1, ?2 ... in order, ON CONFLICT and RETURNING, and nothing that only one database knows.
+/// The seam between the stores and the database: stores are written once against it, each database implements
+/// it once. SQL texts use ?1, ?2 ... in order, ON CONFLICT and RETURNING, and nothing that only one database
+/// knows.
 namespace anchord::sql {
 
 enum class Failure : std::uint8_t {
@@ -86,7 +87,8 @@ class Query {
     }
   }
 
-  /// The integer of a RETURNING; nothing when no row was touched. Runs to the end, where foreign keys are judged.
+  /// The integer of a RETURNING; nothing when no row was touched. Runs to the end, where foreign keys are
+  /// judged.
   std::optional<std::int64_t> returned() {
     if (!step()) return std::nullopt;
     const std::int64_t value = integer();
@@ -156,8 +158,8 @@ class Query {
   int column_{0};
 };
 
-/// Something to do on a connection inside a transaction; an Error undoes it. May run again from the start, so it sets
-/// its results only by overwriting.
+/// Something to do on a connection inside a transaction; an Error undoes it. May run again from the start, so
+/// it sets its results only by overwriting.
 using Work = std::function<std::optional<Error>(Connection&)>;
 
 /// Where a store sends its work. Callable from any thread; both calls block until done.

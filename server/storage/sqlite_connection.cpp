@@ -24,8 +24,10 @@ int last_system_errno(sqlite3* db) {
   int found = sqlite3_system_errno(db);
   for (const int which : {SQLITE_FCNTL_JOURNAL_POINTER, SQLITE_FCNTL_FILE_POINTER}) {
     sqlite3_file* file = nullptr;
-    if (found != 0 || sqlite3_file_control(db, "main", which, static_cast<void*>(&file)) != SQLITE_OK) continue;
-    if (file != nullptr && file->pMethods != nullptr) file->pMethods->xFileControl(file, SQLITE_FCNTL_LAST_ERRNO, &found);
+    if (found != 0 || sqlite3_file_control(db, "main", which, static_cast<void*>(&file)) != SQLITE_OK)
+      continue;
+    if (file != nullptr && file->pMethods != nullptr)
+      file->pMethods->xFileControl(file, SQLITE_FCNTL_LAST_ERRNO, &found);
   }
   return found;
 }
@@ -61,7 +63,8 @@ SqlError to_sql_error(const SQLite::Exception& error, sqlite3* db) {
   const Failure failure = classify(code, system_errno);
   if (failure == Failure::unavailable || failure == Failure::full) {
     text += " (code " + std::to_string(code);
-    if ((code & 0xff) == SQLITE_IOERR && system_errno != 0) text += std::string(", ") + std::strerror(system_errno);
+    if ((code & 0xff) == SQLITE_IOERR && system_errno != 0)
+      text += std::string(", ") + std::strerror(system_errno);
     text += ")";
   }
   return {failure, text};
@@ -144,8 +147,9 @@ SqliteConnection::SqliteConnection(const std::filesystem::path& file, Mode mode,
   try {
     state_ = std::make_unique<State>(file, open_flags(mode));
   } catch (const SQLite::Exception& error) {
-    throw SqlError(classify(error.getExtendedErrorCode() > 0 ? error.getExtendedErrorCode() : error.getErrorCode(), 0),
-                   "database: " + file.string() + ": " + error.what());
+    throw SqlError(
+        classify(error.getExtendedErrorCode() > 0 ? error.getExtendedErrorCode() : error.getErrorCode(), 0),
+        "database: " + file.string() + ": " + error.what());
   }
   sqlite3_extended_result_codes(handle(), 1);
   sqlite3_db_config(handle(), SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
@@ -163,7 +167,8 @@ SqliteConnection::SqliteConnection(const std::filesystem::path& file, Mode mode,
   if (mode == Mode::create) execute("PRAGMA page_size=8192");
   execute("PRAGMA journal_mode=WAL");
   execute("PRAGMA synchronous=" + to_string(synchronous));
-  // Checkpoints are run by the writer's thread alone: SQLite up to 3.51.2 has a rare race between two that do.
+  // Checkpoints are run by the writer's thread alone: SQLite up to 3.51.2 has a rare race between two that
+  // do.
   execute("PRAGMA wal_autocheckpoint=0");
   execute("PRAGMA journal_size_limit=67108864");
   execute("PRAGMA cache_size=-16384");

@@ -31,9 +31,9 @@ class SqliteConnection final : public Connection {
   std::int64_t pragma(const std::string& name);  ///< the integer it answers
   bool read_only_file();                         ///< opened for writing, but the file did not allow it
   bool in_transaction();
-  int wal_pages() const;        ///< pages in the WAL after the last commit
-  void checkpoint_passive();    ///< sets wal_pages to 0 when all of it reached the database
-  std::string check(bool full); ///< "ok", or what is damaged
+  int wal_pages() const;         ///< pages in the WAL after the last commit
+  void checkpoint_passive();     ///< sets wal_pages to 0 when all of it reached the database
+  std::string check(bool full);  ///< "ok", or what is damaged
   sqlite3* handle();
 
  private:

@@ -35,13 +35,14 @@ std::string mebibytes(std::uint64_t bytes) { return std::to_string(bytes >> 20) 
 
 class SqliteDatabase final : public Database, private sql::Gate {
  public:
-  SqliteDatabase(StorageOptions options, std::unique_ptr<DataFolder> folder, std::unique_ptr<SqliteConnection> writer,
-                 bool check_in_background)
+  SqliteDatabase(StorageOptions options, std::unique_ptr<DataFolder> folder,
+                 std::unique_ptr<SqliteConnection> writer, bool check_in_background)
       : options_(std::move(options)),
         folder_(std::move(folder)),
-        writer_(std::move(writer), [this] { return open_connection(Mode::read_write); },
-                [this] { return folder_->give_up_reserve(); },
-                {options_.max_queued_rows, options_.max_queued_calls, options_.checkpoint_wal_bytes}),
+        writer_(
+            std::move(writer), [this] { return open_connection(Mode::read_write); },
+            [this] { return folder_->give_up_reserve(); },
+            {options_.max_queued_rows, options_.max_queued_calls, options_.checkpoint_wal_bytes}),
         readers_([this] { return open_connection(Mode::read_only); }, options_.readers),
         measurements_(sql::make_measurement_store(*this)),
         missions_(sql::make_mission_store(*this, [this] { return admit_mission(); })),
@@ -90,24 +91,29 @@ class SqliteDatabase final : public Database, private sql::Gate {
   }
 
  private:
-  std::optional<Error> write(std::size_t rows, const sql::Work& work) override { return writer_.write(rows, work); }
+  std::optional<Error> write(std::size_t rows, const sql::Work& work) override {
+    return writer_.write(rows, work);
+  }
   std::optional<Error> read(const sql::Work& work) override { return readers_.read(work); }
 
   std::unique_ptr<SqliteConnection> open_connection(Mode mode) const {
-    return std::make_unique<SqliteConnection>(folder_->database(), mode, options_.synchronous, options_.max_pages);
+    return std::make_unique<SqliteConnection>(folder_->database(), mode, options_.synchronous,
+                                              options_.max_pages);
   }
 
   std::optional<Error> admit_mission() const {
     const std::uint64_t free = folder_->free_bytes();
     if (free >= options_.refuse_free_bytes) return std::nullopt;
     return make_error(Errc::storage_full, "no new missions: " + mebibytes(free) + " free, " +
-                                              mebibytes(options_.refuse_free_bytes) + " needed; a running one goes on");
+                                              mebibytes(options_.refuse_free_bytes) +
+                                              " needed; a running one goes on");
   }
 
   void judge(StorageHealth& health, const sql::WriteQueue::Status& status) const {
     const std::uint64_t free = health.disk_free_bytes;
     if (status.trouble) {
-      health.level = status.trouble->failure() == sql::Failure::full ? StorageLevel::full : StorageLevel::unavailable;
+      health.level =
+          status.trouble->failure() == sql::Failure::full ? StorageLevel::full : StorageLevel::unavailable;
       health.reason = status.trouble->what();
     } else if (damage_found_) {
       health.level = StorageLevel::unavailable;
@@ -131,7 +137,8 @@ class SqliteDatabase final : public Database, private sql::Gate {
 
   const StorageOptions options_;
   std::atomic<bool> damage_found_{false};
-  // In this order: readers close first, so that the writer is the last connection and empties the WAL; then the lock.
+  // In this order: readers close first, so that the writer is the last connection and empties the WAL; then
+  // the lock.
   const std::unique_ptr<DataFolder> folder_;
   sql::WriteQueue writer_;
   sql::ReaderPool readers_;
@@ -145,8 +152,8 @@ class SqliteDatabase final : public Database, private sql::Gate {
 };
 
 Error damaged(const DataFolder& folder, const std::string& what) {
-  return make_error(Errc::storage_unavailable,
-                    "database " + folder.database().string() + ": " + what + "\n" + folder.recovery_commands());
+  return make_error(Errc::storage_unavailable, "database " + folder.database().string() + ": " + what + "\n" +
+                                                   folder.recovery_commands());
 }
 
 /// Looks without touching: is it ours, and not newer than we are? True when nothing was ever stored in it.
@@ -156,28 +163,33 @@ Result<bool> judge_file(const DataFolder& folder) {
   if (!in.read(magic.data(), 16) || magic != std::string("SQLite format 3\0", 16)) {
     return damaged(folder, "this is not a database any more");
   }
-  // Only the very first start, before the WAL, has a journal; when it was killed, the journal must be undone to read.
+  // Only the very first start, before the WAL, has a journal; when it was killed, the journal must be undone
+  // to read.
   const bool cut = std::filesystem::exists(folder.database().string() + "-journal");
-  SqliteConnection look(folder.database(), cut ? Mode::inspect : Mode::read_only, Synchronous::full, std::nullopt);
+  SqliteConnection look(folder.database(), cut ? Mode::inspect : Mode::read_only, Synchronous::full,
+                        std::nullopt);
   const auto application = look.pragma("application_id");
   const auto version = look.pragma("user_version");
   if (version == 0 && application == 0 && look.pragma("schema_version") == 0) return true;
   if (application != sql::k_application_id) {
-    return make_error(Errc::unsupported, "database " + folder.database().string() + " was not made by anchord");
+    return make_error(Errc::unsupported,
+                      "database " + folder.database().string() + " was not made by anchord");
   }
   if (version > newest_schema_version()) {
-    return make_error(Errc::unsupported, "database " + folder.database().string() + " has version " +
-                                             std::to_string(version) + "; this anchord knows up to " +
-                                             std::to_string(newest_schema_version()) +
-                                             ". Use the newer anchord, or a copy from " + folder.backups().string());
+    return make_error(Errc::unsupported,
+                      "database " + folder.database().string() + " has version " + std::to_string(version) +
+                          "; this anchord knows up to " + std::to_string(newest_schema_version()) +
+                          ". Use the newer anchord, or a copy from " + folder.backups().string());
   }
   return false;
 }
 
-Result<std::unique_ptr<SqliteConnection>> open_writer(const StorageOptions& options, DataFolder& folder, bool check) {
+Result<std::unique_ptr<SqliteConnection>> open_writer(const StorageOptions& options, DataFolder& folder,
+                                                      bool check) {
   const std::uint64_t bytes = size_of(folder.database());
   if (bytes == 0 && (folder.had_database() || size_of(folder.wal()) > 0)) {
-    return damaged(folder, std::filesystem::exists(folder.database()) ? "the file is empty" : "the file is missing");
+    return damaged(folder,
+                   std::filesystem::exists(folder.database()) ? "the file is empty" : "the file is missing");
   }
   bool fresh = bytes == 0;
   if (!fresh) {

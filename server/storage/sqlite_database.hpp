@@ -16,10 +16,10 @@ namespace anchord {
 enum class Synchronous : std::uint8_t { normal, full, extra };
 
 struct StorageOptions {
-  std::filesystem::path data_dir;               ///< made with mode 0700 when absent
-  Synchronous synchronous{Synchronous::full};   ///< the one that keeps acknowledged rows over a power cut
-  std::size_t readers{3};                       ///< read-only connections
-  std::size_t max_queued_rows{200'000};         ///< beyond it an append answers queue_full
+  std::filesystem::path data_dir;              ///< made with mode 0700 when absent
+  Synchronous synchronous{Synchronous::full};  ///< the one that keeps acknowledged rows over a power cut
+  std::size_t readers{3};                      ///< read-only connections
+  std::size_t max_queued_rows{200'000};        ///< beyond it an append answers queue_full
   std::size_t max_queued_calls{1'000};
   std::uint64_t checkpoint_wal_bytes{16u << 20};  ///< the writer moves the WAL into the database beyond this
   std::uint64_t warn_free_bytes{std::uint64_t{2} << 30};
@@ -73,10 +73,10 @@ class Database {
   virtual Result<BackupReport> backup(const std::filesystem::path& file) = 0;
 };
 
-/// Opens (first time: makes) DIR/anchord.db, migrates it, checks it. Messages are for the operator's terminal.
-/// Errors: conflict (another process has the folder), unsupported (made by a newer anchord, or not by anchord; the
-/// file is untouched), storage_unavailable (damaged, or missing where one was: with the commands that recover),
-/// storage_full.
+/// Opens (first time: makes) DIR/anchord.db, migrates it, checks it. Messages are for the operator's
+/// terminal. Errors: conflict (another process has the folder), unsupported (made by a newer anchord, or not
+/// by anchord; the file is untouched), storage_unavailable (damaged, or missing where one was: with the
+/// commands that recover), storage_full.
 Result<std::unique_ptr<Database>> open_database(const StorageOptions& options);
 
 /// Short word of the backend's version for /version: the newest migration this program knows.

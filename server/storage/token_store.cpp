@@ -4,11 +4,13 @@ namespace anchord::sql {
 namespace {
 
 constexpr const char* k_insert =
-    "INSERT INTO token (id, name, secret_sha256_hex, created_t_ns, expires_t_ns, revoked_t_ns, last_used_t_ns) "
+    "INSERT INTO token (id, name, secret_sha256_hex, created_t_ns, expires_t_ns, revoked_t_ns, "
+    "last_used_t_ns) "
     "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
 constexpr const char* k_insert_role = "INSERT INTO token_role (token_id, ordinal, role) VALUES (?1, ?2, ?3)";
 constexpr const char* k_columns =
-    "SELECT id, name, secret_sha256_hex, created_t_ns, expires_t_ns, revoked_t_ns, last_used_t_ns FROM token ";
+    "SELECT id, name, secret_sha256_hex, created_t_ns, expires_t_ns, revoked_t_ns, last_used_t_ns FROM "
+    "token ";
 constexpr const char* k_roles = "SELECT role FROM token_role WHERE token_id = ?1 ORDER BY ordinal";
 // A second revocation keeps the time of the first.
 constexpr const char* k_revoke =
@@ -37,8 +39,8 @@ class SqlTokenStore final : public TokenStore {
   Result<void> insert(const Token& token) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       Query query(c, k_insert);
-      query << token.id << token.name << token.secret_sha256_hex << token.created << token.expires << token.revoked
-            << token.last_used;
+      query << token.id << token.name << token.secret_sha256_hex << token.created << token.expires
+            << token.revoked << token.last_used;
       query.run();
       std::int64_t ordinal = 0;
       for (const std::string& role : token.roles) {

@@ -15,8 +15,8 @@ constexpr std::uint64_t k_page_bytes = 8192;
 
 }  // namespace
 
-WriteQueue::WriteQueue(std::unique_ptr<SqliteConnection> connection, Open open, std::function<bool()> give_up_reserve,
-                       Limits limits)
+WriteQueue::WriteQueue(std::unique_ptr<SqliteConnection> connection, Open open,
+                       std::function<bool()> give_up_reserve, Limits limits)
     : open_(std::move(open)),
       give_up_reserve_(std::move(give_up_reserve)),
       limits_(limits),
@@ -38,8 +38,8 @@ std::optional<Error> WriteQueue::write(std::size_t rows, const Work& work) {
   if (stopping_) return make_error(Errc::storage_unavailable, "the database is closing");
   const bool too_many_rows = queued_rows_ > 0 && queued_rows_ + rows > limits_.max_rows;
   if (too_many_rows || queue_.size() >= limits_.max_calls) {
-    return make_error(Errc::queue_full, "the write queue is full: " + std::to_string(queued_rows_) + " rows in " +
-                                            std::to_string(queue_.size()) + " calls wait");
+    return make_error(Errc::queue_full, "the write queue is full: " + std::to_string(queued_rows_) +
+                                            " rows in " + std::to_string(queue_.size()) + " calls wait");
   }
   queue_.push_back(&task);
   queued_rows_ += rows;
@@ -61,7 +61,8 @@ void WriteQueue::run() {
     Group group = take();
     if (group.empty()) {
       checkpoint_if(true);
-      // A database that fell away is tried again also when nobody writes, so that readiness comes back by itself.
+      // A database that fell away is tried again also when nobody writes, so that readiness comes back by
+      // itself.
       if (connection_ == nullptr) ensure_connection();
       const std::lock_guard lock(mutex_);
       if (stopping_ && queue_.empty()) break;
@@ -83,7 +84,8 @@ WriteQueue::Group WriteQueue::take() {
   wake_writer_.wait_for(lock, k_idle, [&] { return stopping_ || !queue_.empty(); });
   Group group;
   std::size_t rows = 0;
-  while (!queue_.empty() && group.size() < k_group_calls && (group.empty() || rows + queue_.front()->rows <= k_group_rows)) {
+  while (!queue_.empty() && group.size() < k_group_calls &&
+         (group.empty() || rows + queue_.front()->rows <= k_group_rows)) {
     rows += queue_.front()->rows;
     group.push_back(queue_.front());
     queue_.pop_front();
@@ -113,7 +115,8 @@ void WriteQueue::commit(Group& group) {
 
 void WriteQueue::attempt(Group& group) {
   const auto start = SteadyClock::now();
-  if (!ensure_connection()) throw SqlError(Failure::unavailable, status().trouble ? status().trouble->what() : "closed");
+  if (!ensure_connection())
+    throw SqlError(Failure::unavailable, status().trouble ? status().trouble->what() : "closed");
   std::size_t rows = 0;
   try {
     connection_->execute("BEGIN IMMEDIATE");
@@ -123,7 +126,8 @@ void WriteQueue::attempt(Group& group) {
     }
     connection_->execute("COMMIT");
   } catch (const SqlError& error) {
-    // After a failed write or fsync the pages in memory are not to be believed: close, and let a new connection recover.
+    // After a failed write or fsync the pages in memory are not to be believed: close, and let a new
+    // connection recover.
     if (!rolled_back_whole() || error.failure() != Failure::full) connection_.reset();
     throw;
   }
@@ -186,11 +190,14 @@ bool WriteQueue::ensure_connection() {
 
 void WriteQueue::checkpoint_if(bool due) {
   if (connection_ == nullptr || connection_->wal_pages() == 0) return;
-  if (!due && static_cast<std::uint64_t>(connection_->wal_pages()) * k_page_bytes < limits_.checkpoint_wal_bytes) return;
+  if (!due &&
+      static_cast<std::uint64_t>(connection_->wal_pages()) * k_page_bytes < limits_.checkpoint_wal_bytes)
+    return;
   try {
     connection_->checkpoint_passive();
   } catch (const SqlError& error) {
-    // No acknowledged row is at risk: all are in the WAL. A full disk heals by itself, anything else by reopening.
+    // No acknowledged row is at risk: all are in the WAL. A full disk heals by itself, anything else by
+    // reopening.
     if (error.failure() != Failure::full) connection_.reset();
     const std::lock_guard lock(mutex_);
     status_.trouble = error;

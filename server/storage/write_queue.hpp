@@ -17,8 +17,9 @@
 
 namespace anchord::sql {
 
-/// The one writer: a thread with the only read-write connection. What waits when a commit ends goes into the next one
-/// together (group commit), each call inside a savepoint of its own. Callers wake after the commit, never before.
+/// The one writer: a thread with the only read-write connection. What waits when a commit ends goes into the
+/// next one together (group commit), each call inside a savepoint of its own. Callers wake after the commit,
+/// never before.
 class WriteQueue {
  public:
   struct Limits {
@@ -33,7 +34,8 @@ class WriteQueue {
   };
   using Open = std::function<std::unique_ptr<SqliteConnection>()>;
 
-  /// `open` makes a new connection after a failure; `give_up_reserve` frees disk space once and says whether it did.
+  /// `open` makes a new connection after a failure; `give_up_reserve` frees disk space once and says whether
+  /// it did.
   WriteQueue(std::unique_ptr<SqliteConnection> connection, Open open, std::function<bool()> give_up_reserve,
              Limits limits);
   /// Finishes what is queued, checkpoints, closes.

@@ -37,7 +37,13 @@ class AppFixture : public ::testing::Test {
     auto opened = open_database(options);
     ASSERT_TRUE(opened.has_value()) << opened.error().message;
     database_ = std::move(opened).value();
-    app_ = std::make_unique<api::Application>(api::Application::Deps{database_->measurements(), database_->missions(), database_->anchors(), database_->jobs(), database_->access(), clock_, {"0.1.0", "test", "", "", 1}});
+    app_ = std::make_unique<api::Application>(api::Application::Deps{database_->measurements(),
+                                                                     database_->missions(),
+                                                                     database_->anchors(),
+                                                                     database_->jobs(),
+                                                                     database_->access(),
+                                                                     clock_,
+                                                                     {"0.1.0", "test", "", "", 1}});
     app_->start();
   }
   void restart() {
@@ -51,7 +57,8 @@ class AppFixture : public ::testing::Test {
     std::map<std::string, std::string> query{}, headers{};
     std::vector<api::Role> roles{api::Role::admin};
   };
-  api::Response call(api::Method method, const std::string& path, const std::string& body, const Call& options) {
+  api::Response call(api::Method method, const std::string& path, const std::string& body,
+                     const Call& options) {
     api::Request request;
     request.method = method;
     request.path = path;
@@ -69,7 +76,9 @@ class AppFixture : public ::testing::Test {
     options.query = std::move(query);
     return call(api::Method::get, path, "", options);
   }
-  api::Response post(const std::string& path, const std::string& body, const std::string& type = "application/json", std::map<std::string, std::string> query = {}) {
+  api::Response post(const std::string& path, const std::string& body,
+                     const std::string& type = "application/json",
+                     std::map<std::string, std::string> query = {}) {
     Call options;
     options.type = type;
     options.query = std::move(query);
@@ -90,7 +99,8 @@ class AppFixture : public ::testing::Test {
   }
   /// A mission; the id.
   std::string mission(const std::string& frame = "wgs84") {
-    const auto response = post("/api/v1/missions", R"({"name":"test flight","frame":")" + frame + R"(","track_point":"tag_antenna"})");
+    const auto response = post("/api/v1/missions", R"({"name":"test flight","frame":")" + frame +
+                                                       R"(","track_point":"tag_antenna"})");
     EXPECT_EQ(response.status, 201) << response.body;
     return json(response).value("id", "");
   }

@@ -1,4 +1,5 @@
-// The contract and the code say the same: every documented operation has a route and every route is documented.
+// The contract and the code say the same: every documented operation has a route and every route is
+// documented.
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -27,12 +28,22 @@ class Contract : public AppFixture {};
 
 TEST_F(Contract, EveryOperationHasARouteAndEveryRouteAnOperation) {
   api::AccessService access(database_->tokens(), database_->access(), clock_);
-  api::Application app({database_->measurements(), database_->missions(), database_->anchors(), database_->jobs(), database_->access(), clock_, {}, &access});
+  api::Application app({database_->measurements(),
+                        database_->missions(),
+                        database_->anchors(),
+                        database_->jobs(),
+                        database_->access(),
+                        clock_,
+                        {},
+                        &access});
   std::set<std::string> served;
-  for (const auto& route : app.router().routes()) served.insert(std::string(to_string(route.method)) + ' ' + route.pattern);
+  for (const auto& route : app.router().routes())
+    served.insert(std::string(to_string(route.method)) + ' ' + route.pattern);
   const auto promised = documented();
-  for (const auto& one : promised) EXPECT_TRUE(served.count(one) > 0) << one << " is documented and not served";
-  for (const auto& one : served) EXPECT_TRUE(promised.count(one) > 0) << one << " is served and not documented";
+  for (const auto& one : promised)
+    EXPECT_TRUE(served.count(one) > 0) << one << " is documented and not served";
+  for (const auto& one : served)
+    EXPECT_TRUE(promised.count(one) > 0) << one << " is served and not documented";
 }
 
 TEST_F(Contract, EveryOperationHasAnIdAndAProblemAnswer) {
@@ -41,8 +52,11 @@ TEST_F(Contract, EveryOperationHasAnIdAndAProblemAnswer) {
   for (const auto& [path, operations] : document["paths"].items()) {
     for (const auto& [method, operation] : operations.items()) {
       EXPECT_TRUE(operation.contains("operationId")) << method << ' ' << path;
-      EXPECT_TRUE(ids.insert(operation.value("operationId", "")).second) << "twice: " << operation["operationId"];
-      const bool problem = std::any_of(operation["responses"].items().begin(), operation["responses"].items().end(), [](const auto& item) { return item.key() >= "400"; });
+      EXPECT_TRUE(ids.insert(operation.value("operationId", "")).second)
+          << "twice: " << operation["operationId"];
+      const bool problem =
+          std::any_of(operation["responses"].items().begin(), operation["responses"].items().end(),
+                      [](const auto& item) { return item.key() >= "400"; });
       EXPECT_TRUE(problem) << method << ' ' << path;
     }
   }
@@ -61,7 +75,8 @@ TEST_F(Contract, RequestExamplesOfTheDashboardAreAccepted) {
   Json calibration = read("rest.calibration.request.json");
   calibration["missions"] = {json(made)["id"]};
   EXPECT_EQ(post("/api/v1/calibrations", calibration.dump()).status, 202);
-  for (const auto& [key, value] : version_keys.items()) EXPECT_TRUE(json(get("/version")).contains(key)) << key;
+  for (const auto& [key, value] : version_keys.items())
+    EXPECT_TRUE(json(get("/version")).contains(key)) << key;
 }
 
 }  // namespace

@@ -50,7 +50,8 @@ TEST_F(HubRules, KeepsOnlyTheNewestStatePerKeyForASlowClient) {
   auto client = connect();
   client->on_text(R"({"op":"sub","id":1,"topic":"anchors.estimates"})");
   read(*client);
-  for (int i = 0; i < 1000; ++i) hub_.publish(Topic::anchors_estimates, R"({"n":)" + std::to_string(i) + "}", i, i % 2 == 0 ? "a" : "b");
+  for (int i = 0; i < 1000; ++i)
+    hub_.publish(Topic::anchors_estimates, R"({"n":)" + std::to_string(i) + "}", i, i % 2 == 0 ? "a" : "b");
   const auto data = of(read(*client), "data");
   ASSERT_EQ(data.size(), 1u);
   EXPECT_EQ(data[0]["data"].size(), 2u);
@@ -82,7 +83,8 @@ TEST_F(HubRules, ClosesAClientThatCannotKeepUpWithEventsAndLetsItResume) {
   ASSERT_TRUE(client->close_request().has_value());
   EXPECT_EQ(client->close_request()->first, 4008);
   auto again = connect();
-  again->on_text(R"({"op":"sub","id":1,"topic":"events","since":{"epoch":")" + hub_.epoch() + R"(","seq":0}})");
+  again->on_text(R"({"op":"sub","id":1,"topic":"events","since":{"epoch":")" + hub_.epoch() +
+                 R"(","seq":0}})");
   const auto frames = read(*again);
   EXPECT_EQ(of(frames, "ack")[0]["recovered"], true);
   int n = 0;

@@ -13,15 +13,20 @@ class Ingest : public AppFixture {
     id_ = mission();
   }
   std::string row(int i, const std::string& more = "") const {
-    return R"({"t_us":)" + std::to_string(1'777'889'472'000'000 + i * 1000) + R"(,"mission":")" + id_ + R"(","tag":"0x6e01","anchor":"0x6a2f","distance_m":7.5)" + more + "}";
+    return R"({"t_us":)" + std::to_string(1'777'889'472'000'000 + i * 1000) + R"(,"mission":")" + id_ +
+           R"(","tag":"0x6e01","anchor":"0x6a2f","distance_m":7.5)" + more + "}";
   }
   std::string fix(int i, const std::string& place = R"("lon":3.7131,"lat":51.0231,"h_m":61.4)") const {
-    return R"({"t_us":)" + std::to_string(1'777'889'472'000'000 + i * 1000) + R"(,"mission":")" + id_ + R"(",)" + place + R"(,"fix":"fixed","sigma_m":[0.01,0.01,0.02]})";
+    return R"({"t_us":)" + std::to_string(1'777'889'472'000'000 + i * 1000) + R"(,"mission":")" + id_ +
+           R"(",)" + place + R"(,"fix":"fixed","sigma_m":[0.01,0.01,0.02]})";
   }
-  std::uint64_t stored() { return database_->measurements().count_ranges(MissionId{parse_uuid(id_).value()}).value(); }
+  std::uint64_t stored() {
+    return database_->measurements().count_ranges(MissionId{parse_uuid(id_).value()}).value();
+  }
   /// A good row, the bad one, a good row; the code of the bad one.
   std::string code_of(const std::string& bad, const std::string& pointer = "?") {
-    const auto response = post("/api/v1/ranges", row(1) + "\n" + bad + "\n" + row(2) + "\n", "application/x-ndjson");
+    const auto response =
+        post("/api/v1/ranges", row(1) + "\n" + bad + "\n" + row(2) + "\n", "application/x-ndjson");
     EXPECT_EQ(response.status, 200) << response.body;
     const auto body = json(response);
     EXPECT_EQ(body["accepted"].get<int>() + body["duplicates"].get<int>(), 2) << response.body;
@@ -46,30 +51,51 @@ TEST_F(Ingest, TakesOneJsonObject) {
   EXPECT_EQ(response.status, 200) << response.body;
   EXPECT_EQ(json(response)["accepted"], 1);
 }
-TEST_F(Ingest, TakesAJsonArray) { EXPECT_EQ(json(post("/api/v1/ranges", "[" + row(1) + "," + row(2) + "]"))["accepted"], 2); }
-TEST_F(Ingest, TakesNdjsonWithBlankAndCrlfLines) { EXPECT_EQ(json(post("/api/v1/ranges", row(1) + "\r\n\r\n" + row(2), "application/x-ndjson"))["accepted"], 2); }
+TEST_F(Ingest, TakesAJsonArray) {
+  EXPECT_EQ(json(post("/api/v1/ranges", "[" + row(1) + "," + row(2) + "]"))["accepted"], 2);
+}
+TEST_F(Ingest, TakesNdjsonWithBlankAndCrlfLines) {
+  EXPECT_EQ(json(post("/api/v1/ranges", row(1) + "\r\n\r\n" + row(2), "application/x-ndjson"))["accepted"],
+            2);
+}
 TEST_F(Ingest, TakesCsvOfRangesAndFixes) {
-  const auto ranges = post("/api/v1/ranges", "t_us,tag,anchor,distance_m,rss_dbm\n1777889472000000,0x6e01,0x6a2f,7.5,-80\n1777889472001000,28161,27183,7.6,\n", "text/csv; charset=utf-8", {{"mission", id_}});
+  const auto ranges = post("/api/v1/ranges",
+                           "t_us,tag,anchor,distance_m,rss_dbm\n1777889472000000,0x6e01,0x6a2f,7.5,-"
+                           "80\n1777889472001000,28161,27183,7.6,\n",
+                           "text/csv; charset=utf-8", {{"mission", id_}});
   EXPECT_EQ(json(ranges)["accepted"], 2) << ranges.body;
-  const auto fixes = post("/api/v1/fixes", "t_us,lon,lat,h_m,fix,sigma_e_m,sigma_n_m,sigma_u_m\n1777889472000000,3.7,51.0,61.4,fixed,0.01,0.01,0.02\n", "text/csv", {{"mission", id_}});
+  const auto fixes = post("/api/v1/fixes",
+                          "t_us,lon,lat,h_m,fix,sigma_e_m,sigma_n_m,sigma_u_m\n1777889472000000,3.7,51.0,61."
+                          "4,fixed,0.01,0.01,0.02\n",
+                          "text/csv", {{"mission", id_}});
   EXPECT_EQ(json(fixes)["accepted"], 1) << fixes.body;
 }
-TEST_F(Ingest, RefusesAnUnknownCsvColumn) { EXPECT_EQ(post("/api/v1/ranges", "t_us,tag,anchor,distance\n", "text/csv", {{"mission", id_}}).status, 422); }
+TEST_F(Ingest, RefusesAnUnknownCsvColumn) {
+  EXPECT_EQ(post("/api/v1/ranges", "t_us,tag,anchor,distance\n", "text/csv", {{"mission", id_}}).status, 422);
+}
 TEST_F(Ingest, RefusesNanInCsv) {
-  const auto response = post("/api/v1/ranges", "t_us,tag,anchor,distance_m\n1777889472000000,0x6e01,0x6a2f,NaN\n", "text/csv", {{"mission", id_}});
+  const auto response =
+      post("/api/v1/ranges", "t_us,tag,anchor,distance_m\n1777889472000000,0x6e01,0x6a2f,NaN\n", "text/csv",
+           {{"mission", id_}});
   EXPECT_EQ(json(response)["errors"][0]["code"], "non_finite") << response.body;
 }
 TEST_F(Ingest, RefusesNan) { EXPECT_EQ(code_of(with("7.5", "NaN")), "non_finite"); }
 TEST_F(Ingest, RefusesInfinity) { EXPECT_EQ(code_of(with("7.5", "Infinity")), "non_finite"); }
 TEST_F(Ingest, RefusesAHugeNumber) { EXPECT_EQ(code_of(with("7.5", "1e999")), "non_finite"); }
-TEST_F(Ingest, RefusesZeroDistanceByName) { EXPECT_EQ(code_of(with("7.5", "0"), "/distance_m"), "zero_distance"); }
+TEST_F(Ingest, RefusesZeroDistanceByName) {
+  EXPECT_EQ(code_of(with("7.5", "0"), "/distance_m"), "zero_distance");
+}
 TEST_F(Ingest, RefusesDistancesNoRadioMeasures) {
   EXPECT_EQ(code_of(with("7.5", "150.01"), "/distance_m"), "out_of_range");
   EXPECT_EQ(code_of(with("7.5", "0.049"), "/distance_m"), "out_of_range");
   EXPECT_EQ(code_of(with("7.5", "-3"), "/distance_m"), "out_of_range");
 }
-TEST_F(Ingest, RefusesAnUnknownField) { EXPECT_EQ(code_of(row(9, R"(,"distanze_m":7)"), "/distanze_m"), "unknown_field"); }
-TEST_F(Ingest, RefusesARepeatedKey) { EXPECT_EQ(code_of(row(9, R"(,"tag":"0x1")"), "/tag"), "duplicate_key"); }
+TEST_F(Ingest, RefusesAnUnknownField) {
+  EXPECT_EQ(code_of(row(9, R"(,"distanze_m":7)"), "/distanze_m"), "unknown_field");
+}
+TEST_F(Ingest, RefusesARepeatedKey) {
+  EXPECT_EQ(code_of(row(9, R"(,"tag":"0x1")"), "/tag"), "duplicate_key");
+}
 TEST_F(Ingest, RefusesBrokenUtf8) { EXPECT_EQ(code_of(row(9, ",\"heading_deg\":\"\xc3\x28\"")), "bad_utf8"); }
 TEST_F(Ingest, RefusesDeepJson) {
   std::string deep;
@@ -77,13 +103,22 @@ TEST_F(Ingest, RefusesDeepJson) {
   EXPECT_EQ(code_of(row(9, R"(,"truth":)" + deep)), "too_deep");
 }
 TEST_F(Ingest, RefusesATruncatedLine) { EXPECT_EQ(code_of(row(9).substr(0, 40)), "malformed"); }
-TEST_F(Ingest, RefusesAnUnknownMission) { EXPECT_EQ(code_of(with(id_, "0197a3b0-5d10-7b1e-9c55-0a1b2c3d4e5f"), "/mission"), "unknown_mission"); }
-TEST_F(Ingest, RefusesAMissingField) { EXPECT_EQ(code_of(with(R"(,"distance_m":7.5)", ""), "/distance_m"), "required"); }
-TEST_F(Ingest, RefusesABadNetworkId) { EXPECT_EQ(code_of(with("0x6a2f", "anchor one"), "/anchor"), "bad_id"); }
-TEST_F(Ingest, RefusesALineThatIsTooLong) { EXPECT_EQ(code_of("{\"x\":\"" + std::string(2 << 20, 'a') + "\"}"), "too_long"); }
+TEST_F(Ingest, RefusesAnUnknownMission) {
+  EXPECT_EQ(code_of(with(id_, "0197a3b0-5d10-7b1e-9c55-0a1b2c3d4e5f"), "/mission"), "unknown_mission");
+}
+TEST_F(Ingest, RefusesAMissingField) {
+  EXPECT_EQ(code_of(with(R"(,"distance_m":7.5)", ""), "/distance_m"), "required");
+}
+TEST_F(Ingest, RefusesABadNetworkId) {
+  EXPECT_EQ(code_of(with("0x6a2f", "anchor one"), "/anchor"), "bad_id");
+}
+TEST_F(Ingest, RefusesALineThatIsTooLong) {
+  EXPECT_EQ(code_of("{\"x\":\"" + std::string(2 << 20, 'a') + "\"}"), "too_long");
+}
 
 TEST_F(Ingest, AnswersASingleBadObjectWithEveryFieldAtOnce) {
-  const auto response = post("/api/v1/ranges", R"({"t_us":-1,"tag":"x","anchor":"0x1","distance_m":0,"mission":")" + id_ + R"("})");
+  const auto response = post(
+      "/api/v1/ranges", R"({"t_us":-1,"tag":"x","anchor":"0x1","distance_m":0,"mission":")" + id_ + R"("})");
   EXPECT_EQ(response.status, 422);
   EXPECT_EQ(header(response, "Content-Type"), "application/problem+json");
   EXPECT_EQ(json(response)["errors"].size(), 3u) << response.body;
@@ -105,16 +140,24 @@ TEST_F(Ingest, CountsDuplicatesAndKeepsTheStoredRowOnConflict) {
   EXPECT_EQ(json(lines)["errors"][0]["code"], "conflict") << lines.body;
   EXPECT_EQ(json(get("/api/v1/ranges"))["items"][0]["distance_m"], 7.5);
 }
-TEST_F(Ingest, TakesRowsOutOfOrder) { EXPECT_EQ(json(post("/api/v1/ranges", row(5) + "\n" + row(1) + "\n" + row(3), "application/x-ndjson"))["accepted"], 3); }
+TEST_F(Ingest, TakesRowsOutOfOrder) {
+  EXPECT_EQ(json(post("/api/v1/ranges", row(5) + "\n" + row(1) + "\n" + row(3),
+                      "application/x-ndjson"))["accepted"],
+            3);
+}
 TEST_F(Ingest, StoresNothingWhenAtomicAndOneRowIsBad) {
-  const auto response = post("/api/v1/ranges", row(1) + "\n" + with("7.5", "0"), "application/x-ndjson", {{"atomic", "true"}});
+  const auto response =
+      post("/api/v1/ranges", row(1) + "\n" + with("7.5", "0"), "application/x-ndjson", {{"atomic", "true"}});
   EXPECT_EQ(response.status, 422) << response.body;
   EXPECT_EQ(stored(), 0u);
-  EXPECT_EQ(post("/api/v1/ranges", row(1) + "\n" + row(2), "application/x-ndjson", {{"atomic", "true"}}).status, 200);
+  EXPECT_EQ(
+      post("/api/v1/ranges", row(1) + "\n" + row(2), "application/x-ndjson", {{"atomic", "true"}}).status,
+      200);
   EXPECT_EQ(stored(), 2u);
 }
 TEST_F(Ingest, StoresNothingOnADryRun) {
-  const auto response = post("/api/v1/ranges", row(1) + "\n" + with("7.5", "0"), "application/x-ndjson", {{"dry_run", "true"}});
+  const auto response =
+      post("/api/v1/ranges", row(1) + "\n" + with("7.5", "0"), "application/x-ndjson", {{"dry_run", "true"}});
   EXPECT_EQ(json(response)["accepted"], 1);
   EXPECT_EQ(json(response)["rejected"], 1);
   EXPECT_EQ(stored(), 0u);
@@ -140,9 +183,17 @@ TEST_F(Ingest, RefusesABodyBeyond32MiB) {
   while (body.size() <= (33u << 20)) body += line;
   EXPECT_EQ(post("/api/v1/ranges", body, "application/x-ndjson").status, 413);
 }
-TEST_F(Ingest, RefusesAnUnknownMissionInTheQuery) { EXPECT_EQ(post("/api/v1/ranges", row(1), "application/json", {{"mission", "0197a3b0-5d10-7b1e-9c55-0a1b2c3d4e5f"}}).status, 404); }
+TEST_F(Ingest, RefusesAnUnknownMissionInTheQuery) {
+  EXPECT_EQ(post("/api/v1/ranges", row(1), "application/json",
+                 {{"mission", "0197a3b0-5d10-7b1e-9c55-0a1b2c3d4e5f"}})
+                .status,
+            404);
+}
 TEST_F(Ingest, RefusesFixesThatAreNowhere) {
-  const auto code = [&](const std::string& place) { return json(post("/api/v1/fixes", fix(1, place), "application/x-ndjson"))["errors"][0]["code"].get<std::string>(); };
+  const auto code = [&](const std::string& place) {
+    return json(post("/api/v1/fixes", fix(1, place), "application/x-ndjson"))["errors"][0]["code"]
+        .get<std::string>();
+  };
   EXPECT_EQ(code(R"("lon":0,"lat":0,"h_m":5)"), "null_island");
   EXPECT_EQ(code(R"("lon":3.7,"lat":90.5,"h_m":5)"), "out_of_range");
   EXPECT_EQ(code(R"("lon":181,"lat":51,"h_m":5)"), "out_of_range");
@@ -160,7 +211,9 @@ TEST_F(Ingest, KeepsTheImpulseResponseBitForBit) {
   const auto id = json(get("/api/v1/ranges"))["items"][0]["id"].get<int>();
   const auto response = get("/api/v1/ranges/" + std::to_string(id) + "/cir", {{"format", "binary"}});
   EXPECT_EQ(response.body, std::string("\x00\x01\x00\x02\xff\xff\x00\x80", 8));
-  EXPECT_EQ(json(post("/api/v1/ranges", row(2, R"(,"cir":{"n":3,"b64":"AAEAAv//AIA="})"), "application/x-ndjson"))["errors"][0]["code"], "wrong_length");
+  EXPECT_EQ(json(post("/api/v1/ranges", row(2, R"(,"cir":{"n":3,"b64":"AAEAAv//AIA="})"),
+                      "application/x-ndjson"))["errors"][0]["code"],
+            "wrong_length");
 }
 TEST_F(Ingest, IsForGatewaysAndNotForViewers) {
   Call viewer;

@@ -22,7 +22,8 @@ class Resources : public AppFixture {
     c.origin = Wgs84{51.023, 3.713, 55};
     c.settings_json = "{}";
     c.created = clock_.now();
-    for (const auto& [id, verdict] : {std::pair{0x6a2fu, Verdict::ok}, std::pair{0x6a3cu, Verdict::ambiguous}}) {
+    for (const auto& [id, verdict] :
+         {std::pair{0x6a2fu, Verdict::ok}, std::pair{0x6a3cu, Verdict::ambiguous}}) {
       Estimate e;
       e.anchor = {id};
       e.time = clock_.now();
@@ -109,7 +110,10 @@ TEST_F(Resources, PublishOnlyWhatIsBelievedUnlessAReasonIsGiven) {
   ASSERT_EQ(anchors["features"].size(), 1u);
   EXPECT_EQ(anchors["features"][0]["geometry"]["coordinates"][0], 3.7131) << "longitude first, RFC 7946";
   EXPECT_EQ(anchors["features"][0]["geometry"]["coordinates"][1], 51.0231);
-  EXPECT_EQ(post("/api/v1/calibrations/" + id + "/publish", R"({"anchors":["0x6a3c"],"reason":"checked by tape"})").status, 201);
+  EXPECT_EQ(
+      post("/api/v1/calibrations/" + id + "/publish", R"({"anchors":["0x6a3c"],"reason":"checked by tape"})")
+          .status,
+      201);
   EXPECT_EQ(json(get("/api/v1/anchors"))["features"].size(), 2u);
   EXPECT_EQ(json(get("/api/v1/anchors", {{"revision", "1"}}))["features"].size(), 1u);
   EXPECT_EQ(get("/api/v1/anchors", {{"revision", "9"}}).status, 404);
@@ -122,15 +126,20 @@ TEST_F(Resources, PatchFacilityDataAndExportItSafely) {
   const auto id = calibration();
   post("/api/v1/calibrations/" + id + "/publish", "");
   const auto read = get("/api/v1/anchors/0x6a2f");
-  const auto patched = call(Method::patch, "/api/v1/anchors/0x6a2f", R"({"name":"=1+1","building":"B\"1\""})", with("if-match", header(read, "ETag")));
+  const auto patched = call(Method::patch, "/api/v1/anchors/0x6a2f", R"({"name":"=1+1","building":"B\"1\""})",
+                            with("if-match", header(read, "ETag")));
   ASSERT_EQ(patched.status, 200) << patched.body;
   const auto csv = get("/api/v1/exports/anchors.csv").body;
   EXPECT_NE(csv.find(",'=1+1,"), std::string::npos) << csv;
   EXPECT_NE(csv.find(R"("B""1""")"), std::string::npos) << csv;
-  EXPECT_EQ(call(Method::patch, "/api/v1/anchors/0x6a2f", R"({"h_m":3})", with("if-match", header(patched, "ETag"))).status, 422);
+  EXPECT_EQ(
+      call(Method::patch, "/api/v1/anchors/0x6a2f", R"({"h_m":3})", with("if-match", header(patched, "ETag")))
+          .status,
+      422);
   EXPECT_EQ(get("/api/v1/anchors/0x9999").status, 404);
   const auto flat = json(get("/api/v1/exports/anchors.geojson", {{"flat", "true"}}));
-  for (const auto& [key, value] : flat["features"][0]["properties"].items()) EXPECT_FALSE(value.is_structured()) << key;
+  for (const auto& [key, value] : flat["features"][0]["properties"].items())
+    EXPECT_FALSE(value.is_structured()) << key;
 }
 
 TEST_F(Resources, AnswerUnknownPathsAndMethods) {
@@ -144,7 +153,8 @@ TEST_F(Resources, AnswerUnknownPathsAndMethods) {
 
 TEST_F(Resources, FailACalibrationOfAnEmptyMissionWithItsReason) {
   const auto id = mission();
-  const auto response = call(Method::post, "/api/v1/calibrations", Json{{"missions", {id}}}.dump(), with("prefer", "wait=20"));
+  const auto response =
+      call(Method::post, "/api/v1/calibrations", Json{{"missions", {id}}}.dump(), with("prefer", "wait=20"));
   EXPECT_EQ(response.status, 422) << response.body;
   EXPECT_EQ(json(get("/api/v1/jobs"))["items"][0]["state"], "failed");
   EXPECT_EQ(post("/api/v1/calibrations", R"({"missions":[],"models":{}})").status, 422);

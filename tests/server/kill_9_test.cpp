@@ -89,8 +89,8 @@ class Server {
     ::dup2(log, 1);
     ::dup2(log, 2);
     const std::string dir = data_.string();
-    ::execl(ANCHORD_BINARY, ANCHORD_BINARY, "serve", "--listen", "127.0.0.1:0", "--auth", "off", "--data-dir", dir.c_str(),
-            "--rate-per-s", "100000", "--rate-burst", "100000", static_cast<char*>(nullptr));
+    ::execl(ANCHORD_BINARY, ANCHORD_BINARY, "serve", "--listen", "127.0.0.1:0", "--auth", "off", "--data-dir",
+            dir.c_str(), "--rate-per-s", "100000", "--rate-burst", "100000", static_cast<char*>(nullptr));
     ::_exit(127);
   }
   const std::filesystem::path data_, log_;
@@ -131,9 +131,9 @@ class Client {
     std::string body;
     for (int i = 0; i < k_batch_rows; ++i) {
       const int seq = acknowledged_ * k_batch_rows + i;
-      body += R"({"t_us":)" + std::to_string(1'777'889'472'000'000 + seq * 1000LL) + R"(,"mission":")" + mission_ +
-              R"(","tag":")" + std::to_string(tag()) + R"(","anchor":"0x6a2f","distance_m":7.5,"seq":)" +
-              std::to_string(seq) + "}\n";
+      body += R"({"t_us":)" + std::to_string(1'777'889'472'000'000 + seq * 1000LL) + R"(,"mission":")" +
+              mission_ + R"(","tag":")" + std::to_string(tag()) +
+              R"(","anchor":"0x6a2f","distance_m":7.5,"seq":)" + std::to_string(seq) + "}\n";
     }
     const auto answer = client.Post("/api/v1/ranges", body, "application/x-ndjson");
     if (!answer) return false;
@@ -157,7 +157,8 @@ class Client {
 
 std::string mission_on(const Server& server) {
   httplib::Client client(server.url());
-  const auto answer = client.Post("/api/v1/missions", R"({"name":"kill","frame":"wgs84","track_point":"gnss_antenna","tags":[]})",
+  const auto answer = client.Post("/api/v1/missions",
+                                  R"({"name":"kill","frame":"wgs84","track_point":"gnss_antenna","tags":[]})",
                                   "application/json");
   if (!answer || answer->status != 201) return {};
   const auto at = answer->body.find(R"("id":")");
@@ -205,7 +206,8 @@ TEST(Kill9, LosesNoAcknowledgedRowAndStoresNoneTwice) {
     EXPECT_EQ(client->wrong_answer(), "");
     const int rows = client->acknowledged_batches() * k_batch_rows;
     acknowledged += rows;
-    const auto seqs = column(db, "SELECT seq FROM uwb_range WHERE tag = " + std::to_string(client->tag()) + " ORDER BY seq");
+    const auto seqs = column(
+        db, "SELECT seq FROM uwb_range WHERE tag = " + std::to_string(client->tag()) + " ORDER BY seq");
     // Every acknowledged number, each once; perhaps the batch whose answer was lost, whole.
     ASSERT_GE(seqs.size(), static_cast<std::size_t>(rows));
     ASSERT_LE(seqs.size(), static_cast<std::size_t>(rows + k_batch_rows));
@@ -215,8 +217,8 @@ TEST(Kill9, LosesNoAcknowledgedRowAndStoresNoneTwice) {
   sqlite3_close(db);
   EXPECT_GT(acknowledged, k_kills * k_batch_rows) << "hardly anything was written: the test proves nothing";
   std::ranges::sort(restarts_s);
-  std::printf("%d kills, %d rows acknowledged, restart to ready: median %.3f s, worst %.3f s\n", kills, acknowledged,
-              restarts_s[restarts_s.size() / 2], restarts_s.back());
+  std::printf("%d kills, %d rows acknowledged, restart to ready: median %.3f s, worst %.3f s\n", kills,
+              acknowledged, restarts_s[restarts_s.size() / 2], restarts_s.back());
   EXPECT_LT(restarts_s[restarts_s.size() / 2], 1.0);
   // Nine in ten: the machine of a test runs other tests beside this one.
   EXPECT_LT(restarts_s[restarts_s.size() * 9 / 10], 1.0);

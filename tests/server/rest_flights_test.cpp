@@ -1,7 +1,8 @@
 // Real flights, imported through REST into the running server, solved there, and compared with truth.
-// The bar is the column "plain least squares" of the data sets' README: what a competent person gets in an afternoon.
-#include <gtest/gtest.h>
+// The bar is the column "plain least squares" of the data sets' README: what a competent person gets in an
+// afternoon.
 #include <fcntl.h>
+#include <gtest/gtest.h>
 #include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
@@ -36,7 +37,8 @@ class Server {
     char path[] = "/tmp/anchord_flights_XXXXXX";
     dir_ = mkdtemp(path);
     const std::string data = (dir_ / "data").string();
-    std::vector<std::string> words{ANCHORD_BINARY, "serve", "--listen", "127.0.0.1:0", "--auth", "off", "--data-dir", data};
+    std::vector<std::string> words{ANCHORD_BINARY, "serve", "--listen",   "127.0.0.1:0",
+                                   "--auth",       "off",   "--data-dir", data};
     std::vector<char*> argv;
     for (auto& word : words) argv.push_back(word.data());
     argv.push_back(nullptr);
@@ -69,7 +71,8 @@ class Server {
   std::string url_;
 };
 
-Json call(server::HttpClient& client, const std::string& method, const std::string& target, const std::string& body, const std::string& type, int expected) {
+Json call(server::HttpClient& client, const std::string& method, const std::string& target,
+          const std::string& body, const std::string& type, int expected) {
   const auto answer = client.call(method, target, body, type);
   if (!answer) {
     ADD_FAILURE() << target << ": " << answer.error().message;
@@ -80,7 +83,8 @@ Json call(server::HttpClient& client, const std::string& method, const std::stri
 }
 
 template <class Row, class Write>
-std::pair<int, int> upload(server::HttpClient& client, const std::string& target, const std::vector<Row>& rows, Write write) {
+std::pair<int, int> upload(server::HttpClient& client, const std::string& target,
+                           const std::vector<Row>& rows, Write write) {
   int accepted = 0, rejected = 0;
   std::string body;
   const auto send = [&] {
@@ -110,25 +114,37 @@ std::string import_over_rest(server::HttpClient& client, const fs::path& folder)
   Json tags = Json::array();
   for (const auto& tag : flight.mission.tags) {
     const auto& arm = tag.lever_arm_body_m;
-    tags.push_back({{"tag", to_string(tag.tag)}, {"antenna", tag.antenna}, {"lever_arm_body_m", {arm.x(), arm.y(), arm.z()}}});
+    tags.push_back({{"tag", to_string(tag.tag)},
+                    {"antenna", tag.antenna},
+                    {"lever_arm_body_m", {arm.x(), arm.y(), arm.z()}}});
   }
   const Json mission = call(client, "POST", "/api/v1/missions",
-                            Json{{"name", folder.filename().string()}, {"kit", flight.mission.kit}, {"frame", flight.mission.frame == TrackFrame::wgs84 ? "wgs84" : "local"},
-                                 {"track_point", k_points[static_cast<std::size_t>(flight.mission.point)]}, {"tags", tags}}.dump(),
+                            Json{{"name", folder.filename().string()},
+                                 {"kit", flight.mission.kit},
+                                 {"frame", flight.mission.frame == TrackFrame::wgs84 ? "wgs84" : "local"},
+                                 {"track_point", k_points[static_cast<std::size_t>(flight.mission.point)]},
+                                 {"tags", tags}}
+                                .dump(),
                             "application/json", 201);
   const std::string id = mission.value("id", "");
   const auto without_mission = [](auto row) {
     row.erase("mission");  // given in the query
     return row;
   };
-  const auto fixes = upload(client, "/api/v1/fixes?mission=" + id, flight.fixes, [&](const Fix& fix) { return without_mission(api::fix_json(fix, std::nullopt)); });
-  const auto ranges = upload(client, "/api/v1/ranges?mission=" + id, flight.ranges, [&](const Range& range) { return without_mission(api::range_json(range, std::nullopt)); });
-  std::printf("%s: %d fixes (%d refused), %d ranges (%d refused)\n", folder.filename().c_str(), fixes.first, fixes.second, ranges.first, ranges.second);
+  const auto fixes = upload(client, "/api/v1/fixes?mission=" + id, flight.fixes, [&](const Fix& fix) {
+    return without_mission(api::fix_json(fix, std::nullopt));
+  });
+  const auto ranges = upload(client, "/api/v1/ranges?mission=" + id, flight.ranges, [&](const Range& range) {
+    return without_mission(api::range_json(range, std::nullopt));
+  });
+  std::printf("%s: %d fixes (%d refused), %d ranges (%d refused)\n", folder.filename().c_str(), fixes.first,
+              fixes.second, ranges.first, ranges.second);
   return id;
 }
 
 /// The calibration of one mission as answered; `others`: flights of the same kit to learn bias and lag from.
-Json solve_over_rest(server::HttpClient& client, const std::string& mission, const std::vector<std::string>& others = {}) {
+Json solve_over_rest(server::HttpClient& client, const std::string& mission,
+                     const std::vector<std::string>& others = {}) {
   Json request{{"missions", {mission}}};
   if (!others.empty()) request["learn_from"] = others;
   return call(client, "POST", "/api/v1/calibrations", request.dump(), "application/json", 201);
@@ -143,8 +159,10 @@ std::vector<std::map<std::string, std::string>> read_csv(const fs::path& path) {
     std::istringstream cells(line);
     std::map<std::string, std::string> row;
     for (std::size_t i = 0; std::getline(cells, cell, ','); ++i) {
-      if (first) header.push_back(cell);
-      else row[header.at(i)] = cell;
+      if (first)
+        header.push_back(cell);
+      else
+        row[header.at(i)] = cell;
     }
     if (!row.empty()) rows.push_back(row);
   }
@@ -172,10 +190,12 @@ struct Errors {
 };
 
 /// One line of the table; the error that counts for the set goes to `errors`.
-void judge(const std::string& flight, const std::string& id, const Json* anchor, const Eigen::Vector3d& truth_enu, bool horizontal_only, Errors& errors) {
+void judge(const std::string& flight, const std::string& id, const Json* anchor,
+           const Eigen::Vector3d& truth_enu, bool horizontal_only, Errors& errors) {
   const auto at = position(anchor);
   if (!at) {
-    std::printf("%-16s %-4s %8s %8s %18s %7s %s\n", flight.c_str(), id.c_str(), "-", "-", "-", "-", anchor == nullptr ? "not heard" : (*anchor)["verdict"].get<std::string>().c_str());
+    std::printf("%-16s %-4s %8s %8s %18s %7s %s\n", flight.c_str(), id.c_str(), "-", "-", "-", "-",
+                anchor == nullptr ? "not heard" : (*anchor)["verdict"].get<std::string>().c_str());
     return;
   }
   const Eigen::Vector3d error = *at - truth_enu;
@@ -183,13 +203,16 @@ void judge(const std::string& flight, const std::string& id, const Json* anchor,
   const auto& c = (*anchor)["accuracy"]["relative"]["cov_enu_m2"];
   Eigen::Matrix2d cov;
   cov << c[0].get<double>(), c[1].get<double>(), c[1].get<double>(), c[3].get<double>();
-  const bool inside = error.head<2>().dot(cov.inverse() * error.head<2>()) <= 5.991;  // 95 % of chi2 with 2 degrees of freedom
-  const double h95 = (*anchor)["accuracy"]["relative"]["h95_m"], v95 = (*anchor)["accuracy"]["relative"]["v95_m"];
+  const bool inside = error.head<2>().dot(cov.inverse() * error.head<2>()) <=
+                      5.991;  // 95 % of chi2 with 2 degrees of freedom
+  const double h95 = (*anchor)["accuracy"]["relative"]["h95_m"],
+               v95 = (*anchor)["accuracy"]["relative"]["v95_m"];
   char region[32];
   std::snprintf(region, sizeof region, "h %.2f v %.2f", h95, v95);
   char third[16] = "-";
   if (!horizontal_only) std::snprintf(third, sizeof third, "%.3f", d);
-  std::printf("%-16s %-4s %8.3f %8s %18s %7s %s\n", flight.c_str(), id.c_str(), h, third, region, inside ? "inside" : "OUTSIDE", (*anchor)["verdict"].get<std::string>().c_str());
+  std::printf("%-16s %-4s %8.3f %8s %18s %7s %s\n", flight.c_str(), id.c_str(), h, third, region,
+              inside ? "inside" : "OUTSIDE", (*anchor)["verdict"].get<std::string>().c_str());
   const double counted = horizontal_only ? h : d;
   errors.sum += counted;
   errors.largest = std::max(errors.largest, counted);
@@ -197,12 +220,16 @@ void judge(const std::string& flight, const std::string& id, const Json* anchor,
   errors.inside += inside ? 1 : 0;
 }
 
-void header() { std::printf("%-16s %-4s %8s %8s %18s %7s %s\n", "flight", "anc", "horiz m", "3D m", "claimed 95 % m", "", "verdict"); }
+void header() {
+  std::printf("%-16s %-4s %8s %8s %18s %7s %s\n", "flight", "anc", "horiz m", "3D m", "claimed 95 % m", "",
+              "verdict");
+}
 
 class RestFlights : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!fs::exists(shared())) GTEST_SKIP() << "SKIPPED: no real data at " << shared() << "; this proof did not run";
+    if (!fs::exists(shared()))
+      GTEST_SKIP() << "SKIPPED: no real data at " << shared() << "; this proof did not run";
     server_ = std::make_unique<Server>();
     ASSERT_FALSE(server_->url().empty()) << "the server did not come up";
     auto client = server::HttpClient::to(server_->url(), std::chrono::seconds(240));
@@ -218,12 +245,14 @@ class RestFlights : public ::testing::Test {
     std::sort(out.begin(), out.end());
     return out;
   }
-  Errors local_set(const fs::path& folder, const std::string& mission, const std::vector<std::string>& others = {}) {
+  Errors local_set(const fs::path& folder, const std::string& mission,
+                   const std::vector<std::string>& others = {}) {
     Errors errors;
     const Json calibration = solve_over_rest(*client_, mission, others);
     header();
     for (const auto& row : read_csv(folder / "anchors_truth.csv")) {
-      judge(folder.filename(), row.at("anchor_id"), anchor_of(calibration, row.at("anchor_id")), {std::stod(row.at("x_m")), std::stod(row.at("y_m")), std::stod(row.at("z_m"))}, false, errors);
+      judge(folder.filename(), row.at("anchor_id"), anchor_of(calibration, row.at("anchor_id")),
+            {std::stod(row.at("x_m")), std::stod(row.at("y_m")), std::stod(row.at("z_m"))}, false, errors);
     }
     last_ = calibration;
     return errors;
@@ -238,15 +267,19 @@ TEST_F(RestFlights, OutdoorRtkReachesPlainLeastSquaresHorizontally) {
   for (const auto& folder : flights("outdoor-rtk")) {
     const Json calibration = solve_over_rest(*client_, import_over_rest(*client_, folder));
     ASSERT_TRUE(calibration.contains("origin") && calibration["origin"].is_object());
-    const EnuFrame frame({calibration["origin"]["lat"], calibration["origin"]["lon"], calibration["origin"]["h_m"]});
+    const EnuFrame frame(
+        {calibration["origin"]["lat"], calibration["origin"]["lon"], calibration["origin"]["h_m"]});
     header();
     for (const auto& row : read_csv(folder / "anchors_truth.csv")) {
       // The truth has no ellipsoidal height: horizontal only.
-      const Enu truth = frame.enu_from_wgs84({std::stod(row.at("lat_deg")), std::stod(row.at("lon_deg")), calibration["origin"]["h_m"]});
-      judge(folder.filename(), row.at("anchor_id"), anchor_of(calibration, row.at("anchor_id")), truth.m, true, errors);
+      const Enu truth = frame.enu_from_wgs84(
+          {std::stod(row.at("lat_deg")), std::stod(row.at("lon_deg")), calibration["origin"]["h_m"]});
+      judge(folder.filename(), row.at("anchor_id"), anchor_of(calibration, row.at("anchor_id")), truth.m,
+            true, errors);
     }
   }
-  std::printf("outdoor-rtk: %d anchors, mean %.3f m, max %.3f m, %d inside; plain 0.107\n", errors.n, errors.mean(), errors.largest, errors.inside);
+  std::printf("outdoor-rtk: %d anchors, mean %.3f m, max %.3f m, %d inside; plain 0.107\n", errors.n,
+              errors.mean(), errors.largest, errors.inside);
   EXPECT_EQ(errors.n, 16);
   EXPECT_LE(errors.mean(), 0.107);
 }
@@ -265,24 +298,32 @@ TEST_F(RestFlights, InrolMocapReachesPlainLeastSquaresIn3d) {
     all.inside += errors.inside;
     all.largest = std::max(all.largest, errors.largest);
   }
-  std::printf("inrol-mocap: %d anchors, mean %.3f m, max %.3f m, %d inside; plain 0.145\n", all.n, all.mean(), all.largest, all.inside);
+  std::printf("inrol-mocap: %d anchors, mean %.3f m, max %.3f m, %d inside; plain 0.145\n", all.n, all.mean(),
+              all.largest, all.inside);
   EXPECT_EQ(all.n, 24);
   EXPECT_LE(all.mean(), 0.145);
 }
 
 TEST_F(RestFlights, RcvDroneReachesPlainLeastSquaresAndFlagsTheLineFlight) {
-  const Errors one = local_set(shared() / "rcv-drone" / "seq1", import_over_rest(*client_, shared() / "rcv-drone" / "seq1"));
-  const Errors three = local_set(shared() / "rcv-drone" / "seq3", import_over_rest(*client_, shared() / "rcv-drone" / "seq3"));
-  const Errors line = local_set(shared() / "rcv-drone" / "seq5", import_over_rest(*client_, shared() / "rcv-drone" / "seq5"));
-  std::printf("rcv-drone: seq1 %.3f m (plain 0.449), seq3 %.3f m (plain 0.242), seq5 %.3f m (must be flagged)\n", one.mean(), three.mean(), line.mean());
+  const Errors one =
+      local_set(shared() / "rcv-drone" / "seq1", import_over_rest(*client_, shared() / "rcv-drone" / "seq1"));
+  const Errors three =
+      local_set(shared() / "rcv-drone" / "seq3", import_over_rest(*client_, shared() / "rcv-drone" / "seq3"));
+  const Errors line =
+      local_set(shared() / "rcv-drone" / "seq5", import_over_rest(*client_, shared() / "rcv-drone" / "seq5"));
+  std::printf(
+      "rcv-drone: seq1 %.3f m (plain 0.449), seq3 %.3f m (plain 0.242), seq5 %.3f m (must be flagged)\n",
+      one.mean(), three.mean(), line.mean());
   EXPECT_LE(one.mean(), 0.449);
   EXPECT_LE(three.mean(), 0.242);
-  for (const auto& anchor : last_["anchors"]) EXPECT_NE(anchor["verdict"], "ok") << "a line flight determines no anchor: " << anchor["network_id"];
+  for (const auto& anchor : last_["anchors"])
+    EXPECT_NE(anchor["verdict"], "ok") << "a line flight determines no anchor: " << anchor["network_id"];
 }
 
 TEST_F(RestFlights, ViralDroneReachesPlainLeastSquaresBetweenAnchors) {
   // anchor_to_anchor_uwb.csv of the set: 100-101, 100-102, 101-102, metres, measured by the radios.
-  const std::map<std::string, std::array<double, 3>> k_measured{{"eee", {41.749, 27.176, 22.15}}, {"nya", {14.727, 13.088, 15.077}}, {"sbs", {31.381, 24.696, 26.038}}};
+  const std::map<std::string, std::array<double, 3>> k_measured{
+      {"eee", {41.749, 27.176, 22.15}}, {"nya", {14.727, 13.088, 15.077}}, {"sbs", {31.381, 24.696, 26.038}}};
   const auto authors = read_csv(shared() / "viral-drone" / "anchors_authors_estimate.csv");
   Errors between, against;
   for (const auto& folder : flights("viral-drone")) {
@@ -292,7 +333,8 @@ TEST_F(RestFlights, ViralDroneReachesPlainLeastSquaresBetweenAnchors) {
     for (std::size_t i = 0; i < 3; ++i) at[i] = position(anchor_of(calibration, std::to_string(100 + i)));
     constexpr std::pair<int, int> k_pairs[]{{0, 1}, {0, 2}, {1, 2}};
     for (std::size_t k = 0; k < 3; ++k) {
-      const auto &a = at[static_cast<std::size_t>(k_pairs[k].first)], &b = at[static_cast<std::size_t>(k_pairs[k].second)];
+      const auto &a = at[static_cast<std::size_t>(k_pairs[k].first)],
+                 &b = at[static_cast<std::size_t>(k_pairs[k].second)];
       if (!a || !b) continue;
       between.sum += std::abs((*a - *b).norm() - k_measured.at(place)[k]);
       ++between.n;
@@ -301,10 +343,12 @@ TEST_F(RestFlights, ViralDroneReachesPlainLeastSquaresBetweenAnchors) {
     header();
     for (const auto& row : authors) {
       if (row.at("place") != place) continue;
-      judge(name, row.at("anchor_id"), anchor_of(calibration, row.at("anchor_id")), {std::stod(row.at("x_m")), std::stod(row.at("y_m")), std::stod(row.at("z_m"))}, false, against);
+      judge(name, row.at("anchor_id"), anchor_of(calibration, row.at("anchor_id")),
+            {std::stod(row.at("x_m")), std::stod(row.at("y_m")), std::stod(row.at("z_m"))}, false, against);
     }
   }
-  std::printf("viral-drone: between anchors %.3f m (plain 2.05), against the authors %.3f m (plain 1.97)\n", between.mean(), against.mean());
+  std::printf("viral-drone: between anchors %.3f m (plain 2.05), against the authors %.3f m (plain 1.97)\n",
+              between.mean(), against.mean());
   EXPECT_EQ(between.n, 27);
   EXPECT_LE(between.mean(), 2.05);
   EXPECT_LE(against.mean(), 1.97);

@@ -22,16 +22,21 @@ constexpr const char* k_local = R"({"kit": "k", "track": {"frame": "local", "poi
 
 class FlightFolder : public ::testing::Test {
  protected:
-  fs::path folder_ = fs::path(::testing::TempDir()) / ::testing::UnitTest::GetInstance()->current_test_info()->name();
+  fs::path folder_ =
+      fs::path(::testing::TempDir()) / ::testing::UnitTest::GetInstance()->current_test_info()->name();
   void SetUp() override {
     fs::remove_all(folder_);
     fs::create_directories(folder_);
   }
   void TearDown() override { fs::remove_all(folder_); }
-  void write(const char* name, const std::string& text) { std::ofstream(folder_ / name, std::ios::binary) << text; }
+  void write(const char* name, const std::string& text) {
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+  }
   void globe() {
     write("flight.json", k_globe);
-    write("track.csv", "t_s,lat_deg,lon_deg,alt_m,fix,sd_h_m,sd_v_m,yaw\n0.0,50.1,4.2,80,2,0.01,0.02,60\n0.5,50.2,4.3,81,0,2.4,3,61\n");
+    write("track.csv",
+          "t_s,lat_deg,lon_deg,alt_m,fix,sd_h_m,sd_v_m,yaw\n0.0,50.1,4.2,80,2,0.01,0.02,60\n0.5,50.2,4.3,81,"
+          "0,2.4,3,61\n");
     write("ranges.csv", "t_s,anchor_id,range_m,rx_dbm,fp_dbm\n0.1,3,6.14,-79.5,-81\n0.2,0x6a2f,0,-79,-80\n");
   }
   std::string error() {
@@ -54,7 +59,8 @@ TEST_F(FlightFolder, ReadsATrackOnTheGlobe) {
   EXPECT_EQ(flight.fixes[1].fix, FixClass::single);
   EXPECT_NEAR(flight.fixes[0].covariance_m2->operator()(2, 2), 4e-4, 1e-12);
   // 60 + 30 degrees counter-clockwise from east: forward points north.
-  EXPECT_LT((*flight.fixes[0].enu_from_body * Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitY()).norm(), 1e-12);
+  EXPECT_LT((*flight.fixes[0].enu_from_body * Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitY()).norm(),
+            1e-12);
   ASSERT_EQ(flight.ranges.size(), 2U);
   EXPECT_EQ(flight.ranges[0].time.us(), 100'000);
   EXPECT_EQ(flight.ranges[1].anchor.value, 0x6a2fU);
@@ -126,7 +132,8 @@ TEST_F(FlightFolder, RefusesATruncatedGzip) {
   globe();
   fs::remove(folder_ / "ranges.csv");
   std::string text = "t_s,anchor_id,range_m\n";
-  for (int i = 0; i < 5000; ++i) text += std::to_string(i * 0.01) + ",3," + std::to_string(5 + std::sin(i)) + "\n";
+  for (int i = 0; i < 5000; ++i)
+    text += std::to_string(i * 0.01) + ",3," + std::to_string(5 + std::sin(i)) + "\n";
   gzFile gz = gzopen((folder_ / "ranges.csv.gz").c_str(), "wb");
   gzwrite(gz, text.data(), static_cast<unsigned>(text.size()));
   gzclose(gz);
@@ -151,7 +158,8 @@ TEST_F(FlightFolder, NeverOpensTruth) {
 
 TEST_F(FlightFolder, AsksWhichTagWhenSeveralAreDeclared) {
   globe();
-  write("flight.json", R"({"track": {"frame": "wgs84", "point": "body"}, "tags": [{"tag_id": "1"}, {"tag_id": "2"}]})");
+  write("flight.json",
+        R"({"track": {"frame": "wgs84", "point": "body"}, "tags": [{"tag_id": "1"}, {"tag_id": "2"}]})");
   expect_error("no column tag_id");
 }
 

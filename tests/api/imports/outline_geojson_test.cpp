@@ -25,7 +25,8 @@ std::vector<std::string> pointers(std::string_view json) {
   return out;
 }
 
-// 0.00043 deg of longitude at 51.0228 N are 30.18 m, 0.00018 deg of latitude 20.03 m (WGS84 radii of curvature).
+// 0.00043 deg of longitude at 51.0228 N are 30.18 m, 0.00018 deg of latitude 20.03 m (WGS84 radii of
+// curvature).
 TEST(Outline, ReadsTheExampleInMetres) {
   std::vector<FieldError> errors;
   const auto request = read_outline(example(), errors);
@@ -39,7 +40,8 @@ TEST(Outline, ReadsTheExampleInMetres) {
 
 TEST(Outline, NamesWhatIsWrongByPointer) {
   EXPECT_THAT(pointers("{"), testing::SizeIs(1));
-  EXPECT_THAT(pointers(R"({"type":"Point","coordinates":[1,2]})"), testing::ElementsAre("/type unknown_value"));
+  EXPECT_THAT(pointers(R"({"type":"Point","coordinates":[1,2]})"),
+              testing::ElementsAre("/type unknown_value"));
   EXPECT_THAT(pointers(R"({"type":"Polygon","coordinates":[[[3,51],[3.1,51],[3.1,"x"]]]})"),
               testing::ElementsAre("/coordinates/0/2 wrong_type"));
   EXPECT_THAT(pointers(R"({"type":"Polygon","coordinates":[[[51,300],[3.1,51],[3.1,52]]]})"),
@@ -53,7 +55,8 @@ TEST(FlightPlanOutput, WritesAPlanThatQGroundControlReads) {
   ASSERT_TRUE(request);
   const planning::FlightPlanOptions options;
   const auto plan = planning::plan_flight(request->input, options).value();
-  const auto qgc = nlohmann::json::parse(flight_plan_qgc(plan, request->origin, request->input.outline, options));
+  const auto qgc =
+      nlohmann::json::parse(flight_plan_qgc(plan, request->origin, request->input.outline, options));
   EXPECT_EQ(qgc["fileType"], "Plan");
   const auto& items = qgc["mission"]["items"];
   ASSERT_EQ(items.size(), plan.waypoints.size() + 2);

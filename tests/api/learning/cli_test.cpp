@@ -22,7 +22,9 @@ struct Ran {
 class LearningCli : public testing::Test {
  protected:
   void SetUp() override {
-    dir_ = std::filesystem::temp_directory_path() / ("anchord_cli_" + std::to_string(getpid()) + "_" + testing::UnitTest::GetInstance()->current_test_info()->name());
+    dir_ = std::filesystem::temp_directory_path() /
+           ("anchord_cli_" + std::to_string(getpid()) + "_" +
+            testing::UnitTest::GetInstance()->current_test_info()->name());
     std::filesystem::create_directories(dir_);
     // Forty-eight placements in six rooms; walls weaken the first path and delay it by 0.3 to 0.8 m.
     std::ofstream rooms{dir_ / "rooms.csv"};
@@ -32,7 +34,8 @@ class LearningCli : public testing::Test {
       for (int k = 0; k < 4; ++k) {
         const double truth = 2 + (p * 7 % 17) * 0.5, wobble = 0.01 * ((p * 31 + k * 17) % 7 - 3);
         const double rx = -74 - 20 * std::log10(truth) - (nlos ? 4 : 0) + 20 * wobble;
-        rooms << "room" << p / 8 << ',' << nlos << ",s" << p << ',' << truth + 0.1 + wobble + (nlos ? 0.3 + 0.1 * (p % 6) : 0) << ',' << truth << ',' << rx << ','
+        rooms << "room" << p / 8 << ',' << nlos << ",s" << p << ','
+              << truth + 0.1 + wobble + (nlos ? 0.3 + 0.1 * (p % 6) : 0) << ',' << truth << ',' << rx << ','
               << rx - (nlos ? 7 : 2) - 10 * wobble << ",x\n";
       }
     }
@@ -44,7 +47,8 @@ class LearningCli : public testing::Test {
     return {std::istreambuf_iterator<char>(file), {}};
   }
   Ran run(const std::string& arguments) const {
-    const std::string command = "cd '" + dir_.string() + "' && '" ANCHORD_BINARY "' " + arguments + " >out.txt 2>err.txt";
+    const std::string command =
+        "cd '" + dir_.string() + "' && '" ANCHORD_BINARY "' " + arguments + " >out.txt 2>err.txt";
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, slurp(dir_ / "out.txt"), slurp(dir_ / "err.txt")};
   }
@@ -55,7 +59,8 @@ class LearningCli : public testing::Test {
 }  // namespace
 
 TEST_F(LearningCli, TrainsAndEvaluatesWithJsonAloneOnStandardOutput) {
-  const auto train = run("train --data rooms.csv --task nlos_id --label nlos --group-by env --method auto --out m.json --json");
+  const auto train = run(
+      "train --data rooms.csv --task nlos_id --label nlos --group-by env --method auto --out m.json --json");
   ASSERT_EQ(train.code, 0) << train.err;
   const auto report = nlohmann::json::parse(train.out);
   EXPECT_EQ(report.at("places"), 6);
@@ -63,17 +68,20 @@ TEST_F(LearningCli, TrainsAndEvaluatesWithJsonAloneOnStandardOutput) {
   const auto evaluate = run("evaluate --model m.json --data rooms.csv --json");
   ASSERT_EQ(evaluate.code, 0) << evaluate.err;
   const auto e = nlohmann::json::parse(evaluate.out);
-  for (const char* key : {"accuracy", "balanced_accuracy", "fpr", "fnr", "brier", "confusion"}) EXPECT_TRUE(e.contains(key)) << key;
+  for (const char* key : {"accuracy", "balanced_accuracy", "fpr", "fnr", "brier", "confusion"})
+    EXPECT_TRUE(e.contains(key)) << key;
   EXPECT_GT(e.at("accuracy"), 0.95);
   EXPECT_EQ(e.at("n"), 192);
 }
 
 TEST_F(LearningCli, BiasIsReportedRawAndCorrectedPerClassAndOverAll) {
-  ASSERT_EQ(run("train --data rooms.csv --task bias --truth true_range_m --group-by env --out m.json").code, 0);
+  ASSERT_EQ(run("train --data rooms.csv --task bias --truth true_range_m --group-by env --out m.json").code,
+            0);
   const auto e = nlohmann::json::parse(run("evaluate --model m.json --data rooms.csv --json").out);
   EXPECT_LT(e.at("mae_m"), e.at("mae_raw_m"));
   for (const char* which : {"all", "los", "nlos"})
-    for (const char* key : {"mae_raw_m", "mae_m", "mse_raw_m2", "mse_m2"}) EXPECT_TRUE(e.at("bias").at(which).contains(key)) << which << ' ' << key;
+    for (const char* key : {"mae_raw_m", "mae_m", "mse_raw_m2", "mse_m2"})
+      EXPECT_TRUE(e.at("bias").at(which).contains(key)) << which << ' ' << key;
 }
 
 TEST_F(LearningCli, TheSameSeedWritesTheSameBytes) {

@@ -14,7 +14,9 @@ namespace {
 class LabelledTableTest : public testing::Test {
  protected:
   void SetUp() override {
-    dir_ = std::filesystem::temp_directory_path() / ("anchord_table_" + std::to_string(getpid()) + "_" + testing::UnitTest::GetInstance()->current_test_info()->name());
+    dir_ = std::filesystem::temp_directory_path() /
+           ("anchord_table_" + std::to_string(getpid()) + "_" +
+            testing::UnitTest::GetInstance()->current_test_info()->name());
     std::filesystem::create_directories(dir_);
   }
   void TearDown() override { std::filesystem::remove_all(dir_); }
@@ -29,7 +31,9 @@ class LabelledTableTest : public testing::Test {
     gzclose(f);
     return dir_ / name;
   }
-  static Result<LabelledTable> read(std::vector<std::filesystem::path> paths, TableOptions options = {}) { return read_labelled_tables(paths, options); }
+  static Result<LabelledTable> read(std::vector<std::filesystem::path> paths, TableOptions options = {}) {
+    return read_labelled_tables(paths, options);
+  }
 
   std::filesystem::path dir_;
 };
@@ -58,7 +62,9 @@ TEST_F(LabelledTableTest, ReadsGzipAndPlainAlikeAndMapsColumnsByName) {
 }
 
 TEST_F(LabelledTableTest, DropsMissingAndImpossibleValuesAndSaysWhere) {
-  const auto t = read({plain("r.csv", "nlos,range_m,rx_dbm,fp_dbm\n0,0,-80,-82\n0,,-80,-82\n1,5,-inf,-82\n,4,-80,-81\n0,nan,-80,-81\n1,7,-80,-82\n")});
+  const auto t = read({plain("r.csv",
+                             "nlos,range_m,rx_dbm,fp_dbm\n0,0,-80,-82\n0,,-80,-82\n1,5,-inf,-82\n,4,-80,-"
+                             "81\n0,nan,-80,-81\n1,7,-80,-82\n")});
   ASSERT_TRUE(t);
   EXPECT_EQ(t.value().rows(), 2U);
   EXPECT_EQ(t.value().dropped.at("range_m not above zero").first, 1U);
@@ -91,7 +97,8 @@ TEST_F(LabelledTableTest, NamesTheLineOfABrokenRowAndTheColumnThatLacks) {
 
 TEST_F(LabelledTableTest, RefusesATruncatedGzipInsteadOfTrainingOnHalfOfIt) {
   std::string text = "nlos,range_m\n";
-  for (int i = 0; i < 5000; ++i) text += std::to_string(i % 2) + "," + std::to_string(1 + (i * 7919) % 1000) + "\n";
+  for (int i = 0; i < 5000; ++i)
+    text += std::to_string(i % 2) + "," + std::to_string(1 + (i * 7919) % 1000) + "\n";
   const auto whole = gzip("r.csv.gz", text);
   std::filesystem::resize_file(whole, std::filesystem::file_size(whole) / 2);
   EXPECT_FALSE(read({whole}));
@@ -106,7 +113,8 @@ TEST_F(LabelledTableTest, TakesTheLowestClassNumberForLosUnlessToldOtherwise) {
 }
 
 TEST_F(LabelledTableTest, SplitsByFileWhereSeveralAreGivenAndNoColumnNamesAPlace) {
-  const auto a = plain("a.csv", "range_m,rtk_range_m\n1,1\n2,2\n"), b = plain("b.csv", "range_m,rtk_range_m\n3,3\n");
+  const auto a = plain("a.csv", "range_m,rtk_range_m\n1,1\n2,2\n"),
+             b = plain("b.csv", "range_m,rtk_range_m\n3,3\n");
   const auto t = read({a, b});
   ASSERT_TRUE(t);
   EXPECT_EQ(t.value().grouping, Grouping::file);
@@ -115,7 +123,8 @@ TEST_F(LabelledTableTest, SplitsByFileWhereSeveralAreGivenAndNoColumnNamesAPlace
 }
 
 TEST_F(LabelledTableTest, FollowsALaterFilesOwnOrderOfColumns) {
-  const auto a = plain("a.csv", "range_m,rtk_range_m\n1,1.5\n"), b = plain("b.csv", "bearing_rad,rtk_range_m,range_m\n0.1,3.5,3\n");
+  const auto a = plain("a.csv", "range_m,rtk_range_m\n1,1.5\n"),
+             b = plain("b.csv", "bearing_rad,rtk_range_m,range_m\n0.1,3.5,3\n");
   const auto t = read({a, b});
   ASSERT_TRUE(t) << t.error().message;
   EXPECT_EQ(t.value().range_m, (std::vector<double>{1, 3}));
@@ -137,7 +146,8 @@ TEST_F(LabelledTableTest, JoinsCirsAndDropsRowsWithoutOne) {
   const auto t = read({plain("r.csv", "setup,idx,nlos,range_m\n4,0,0,5\n4,1,0,5\n")}, options);
   ASSERT_TRUE(t);
   EXPECT_EQ(t.value().rows(), 1U);
-  EXPECT_NEAR(*t.value().features[0].get(nlos::Feature::early_energy), 8 / 10.0, 0.11);   // the window begins 5 taps before the first path
+  EXPECT_NEAR(*t.value().features[0].get(nlos::Feature::early_energy), 8 / 10.0,
+              0.11);  // the window begins 5 taps before the first path
   EXPECT_EQ(t.value().dropped.at("no CIR in the CIR table").first, 1U);
 }
 

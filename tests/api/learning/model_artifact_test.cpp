@@ -59,13 +59,15 @@ TEST_P(EveryMethod, PredictsTheSameAfterWritingAndReadingAndWritesTheSameBytes) 
   const auto again = read_model_artifact(text);
   ASSERT_TRUE(again) << again.error().message;
   EXPECT_EQ(write_model_artifact(again.value()), text);
-  EXPECT_EQ(write_model_artifact(model_of(GetParam())), text);   // same seed, same data: same bytes
+  EXPECT_EQ(write_model_artifact(model_of(GetParam())), text);  // same seed, same data: same bytes
   const auto data = ring();
-  for (std::size_t i = 0; i < data.rows(); ++i) EXPECT_EQ(ml::predict(model, data.row(i)).p_los, ml::predict(again.value(), data.row(i)).p_los);
+  for (std::size_t i = 0; i < data.rows(); ++i)
+    EXPECT_EQ(ml::predict(model, data.row(i)).p_los, ml::predict(again.value(), data.row(i)).p_los);
 }
 
 INSTANTIATE_TEST_SUITE_P(ModelArtifact, EveryMethod,
-                         testing::Values(ml::Method::logistic, ml::Method::random_forest, ml::Method::svm, ml::Method::boosted, ml::Method::average));
+                         testing::Values(ml::Method::logistic, ml::Method::random_forest, ml::Method::svm,
+                                         ml::Method::boosted, ml::Method::average));
 
 TEST(ModelArtifact, RefusesWhatIsWrongAndNamesThePlace) {
   const auto good = write_model_artifact(model_of(ml::Method::logistic));
@@ -76,12 +78,16 @@ TEST(ModelArtifact, RefusesWhatIsWrongAndNamesThePlace) {
   EXPECT_NE(message(""), "");
   EXPECT_NE(message("[]"), "");
   EXPECT_NE(message("{}"), "");
-  EXPECT_EQ(read_model_artifact(replaced(good, "anchord-model-1", "anchord-model-9")).error().code, Errc::unsupported);
-  EXPECT_EQ(read_model_artifact(replaced(good, "anchord-features-1", "anchord-features-0")).error().code, Errc::unsupported);
-  EXPECT_NE(message(replaced(good, "\"threshold\":0.5", "\"threshold\":1.5")).find("/classifier/threshold"), std::string::npos);
+  EXPECT_EQ(read_model_artifact(replaced(good, "anchord-model-1", "anchord-model-9")).error().code,
+            Errc::unsupported);
+  EXPECT_EQ(read_model_artifact(replaced(good, "anchord-features-1", "anchord-features-0")).error().code,
+            Errc::unsupported);
+  EXPECT_NE(message(replaced(good, "\"threshold\":0.5", "\"threshold\":1.5")).find("/classifier/threshold"),
+            std::string::npos);
   EXPECT_NE(message(replaced(good, "\"threshold\":0.5", "\"threshold\":1e999")), "");
   EXPECT_NE(message(replaced(good, "\"slope\":", "\"slope\":null,\"x\":")).find("slope"), std::string::npos);
-  EXPECT_NE(message(replaced(good, "\"sd\":[", "\"sd\":[0,")).find("/classifier/scaler/sd"), std::string::npos);
+  EXPECT_NE(message(replaced(good, "\"sd\":[", "\"sd\":[0,")).find("/classifier/scaler/sd"),
+            std::string::npos);
   EXPECT_NE(message(replaced(good, "\"seed\":0", "\"seed\":-1")).find("/manifest/seed"), std::string::npos);
 }
 
@@ -102,16 +108,19 @@ TEST(ModelArtifact, RefusesTreesThatWouldNotEndOrReachOutside) {
   }
   const auto at = good.find("\"feature\":[");
   const auto end = good.find("}}]", at);
-  const auto chain = good.substr(0, at) + "\"feature\":" + feature + "],\"left\":" + left + "],\"value\":" + value + "]" + good.substr(end);
+  const auto chain = good.substr(0, at) + "\"feature\":" + feature + "],\"left\":" + left +
+                     "],\"value\":" + value + "]" + good.substr(end);
   EXPECT_FALSE(read_model_artifact(chain));
 }
 
 TEST(ModelArtifact, RefusesEveryTruncationQuickly) {
   const auto good = write_model_artifact(model_of(ml::Method::logistic));
   const auto start = std::chrono::steady_clock::now();
-  for (std::size_t n = 0; n + 2 < good.size(); ++n) EXPECT_FALSE(read_model_artifact(std::string_view{good}.substr(0, n))) << n;
+  for (std::size_t n = 0; n + 2 < good.size(); ++n)
+    EXPECT_FALSE(read_model_artifact(std::string_view{good}.substr(0, n))) << n;
   EXPECT_FALSE(read_model_artifact(std::string(1000000, '[')));
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));   // milliseconds; room for a loaded machine and sanitizers
+  EXPECT_LT(std::chrono::steady_clock::now() - start,
+            std::chrono::seconds(20));  // milliseconds; room for a loaded machine and sanitizers
 }
 
 TEST(ModelArtifact, KeepsTheBiasMixture) {

@@ -10,13 +10,14 @@ TEST(Uuid, Version7SortsByTimeAndSurvivesTheRoundTrip) {
   const Uuid b = make_uuid_v7(UtcTime::from_us(1777889472346678));
   EXPECT_LT(a, b);
   const std::string text = to_string(a);
-  EXPECT_EQ(text[14], '7');  // RFC 9562 section 5.7: version nibble
+  EXPECT_EQ(text[14], '7');                        // RFC 9562 section 5.7: version nibble
   EXPECT_EQ(text.substr(0, 13), "019df278-6f59");  // 1777889472345 ms in hexadecimal
   EXPECT_EQ(parse_uuid(text).value(), a);
 }
 
 TEST(Uuid, RefusesAnythingButTheCanonicalForm) {
-  for (const char* text : {"", "0197a3c2", "0197a3c25d107b1e9c550a1b2c3d4e5f", "0197a3c2-5d10-7b1e-9c55-0a1b2c3d4e5g"}) {
+  for (const char* text :
+       {"", "0197a3c2", "0197a3c25d107b1e9c550a1b2c3d4e5f", "0197a3c2-5d10-7b1e-9c55-0a1b2c3d4e5g"}) {
     EXPECT_FALSE(parse_uuid(text)) << text;
   }
 }
@@ -24,7 +25,8 @@ TEST(Uuid, RefusesAnythingButTheCanonicalForm) {
 TEST(NetworkId, ReadsHexAndDecimalAndWritesFourHexDigits) {
   EXPECT_EQ(to_string(parse_network_id("0x6A2F").value()), "0x6a2f");
   EXPECT_EQ(to_string(parse_network_id("101").value()), "0x0065");
-  for (const char* text : {"", "0x", "6a2f", "-1", "0x1ffffffff", "1 "}) EXPECT_FALSE(parse_network_id(text)) << text;
+  for (const char* text : {"", "0x", "6a2f", "-1", "0x1ffffffff", "1 "})
+    EXPECT_FALSE(parse_network_id(text)) << text;
 }
 
 }  // namespace

@@ -43,7 +43,8 @@ TEST(EnuFrame, GoesThereAndBackWithinAMicrometre) {
 }
 
 TEST(EnuFrame, TurnsACovarianceWithTheMeridians) {
-  // 90 degrees of longitude further along the equator, east there is the direction from this place's up inwards.
+  // 90 degrees of longitude further along the equator, east there is the direction from this place's up
+  // inwards.
   const EnuFrame here({0, 0, 0});
   const EnuFrame there({0, 90, 0});
   const Eigen::Matrix3d up_only = Eigen::Vector3d(0, 0, 4).asDiagonal();

@@ -8,20 +8,23 @@
 namespace anchord {
 namespace {
 
-Fix fix_at(double t_s, Eigen::Vector3d at, FixClass quality = FixClass::rtk_fixed, std::optional<double> yaw_deg = std::nullopt) {
+Fix fix_at(double t_s, Eigen::Vector3d at, FixClass quality = FixClass::rtk_fixed,
+           std::optional<double> yaw_deg = std::nullopt) {
   Fix fix;
   fix.time = UtcTime::from_seconds(t_s);
   fix.frame = TrackFrame::local;
   fix.local_m = at;
   fix.fix = quality;
   if (yaw_deg) {
-    fix.enu_from_body = Eigen::Quaterniond(Eigen::AngleAxisd(*yaw_deg * std::numbers::pi / 180, Eigen::Vector3d::UnitZ()));
+    fix.enu_from_body =
+        Eigen::Quaterniond(Eigen::AngleAxisd(*yaw_deg * std::numbers::pi / 180, Eigen::Vector3d::UnitZ()));
   }
   return fix;
 }
 
 TEST(TagTrack, InterpolatesPositionByTimeAndAttitudeOnTheSphere) {
-  const std::vector<Fix> fixes{fix_at(0, {0, 0, 0}, FixClass::rtk_fixed, 0), fix_at(0.2, {2, 0, 1}, FixClass::rtk_fixed, 90)};
+  const std::vector<Fix> fixes{fix_at(0, {0, 0, 0}, FixClass::rtk_fixed, 0),
+                               fix_at(0.2, {2, 0, 1}, FixClass::rtk_fixed, 90)};
   const TagTrack track(fixes, std::nullopt, UtcTime{}, {.max_gap_s = 1.0});
   const TagPoint point = track.at(0.1, {1, 0, 0});
   ASSERT_EQ(point.refused, TrackRefusal::none);
@@ -45,15 +48,16 @@ TEST(TagTrack, RefusesAGapLongerThanTheLimit) {
 }
 
 TEST(TagTrack, RefusesWhenEitherNeighbourIsNotFixed) {
-  const std::vector<Fix> fixes{fix_at(0, {0, 0, 0}), fix_at(0.1, {1, 0, 0}, FixClass::rtk_float), fix_at(0.2, {2, 0, 0})};
+  const std::vector<Fix> fixes{fix_at(0, {0, 0, 0}), fix_at(0.1, {1, 0, 0}, FixClass::rtk_float),
+                               fix_at(0.2, {2, 0, 0})};
   const TagTrack track(fixes, std::nullopt, UtcTime{});
   EXPECT_EQ(track.at(0.05).refused, TrackRefusal::fix_class);
   EXPECT_EQ(track.at(0.15).refused, TrackRefusal::fix_class);
 }
 
 TEST(TagTrack, TakesRowsInAnyOrderAndTheBetterOfTwoAtOneInstant) {
-  const std::vector<Fix> fixes{fix_at(0.2, {2, 0, 0}), fix_at(0.1, {9, 9, 9}, FixClass::rtk_float), fix_at(0, {0, 0, 0}),
-                               fix_at(0.1, {1, 0, 0})};
+  const std::vector<Fix> fixes{fix_at(0.2, {2, 0, 0}), fix_at(0.1, {9, 9, 9}, FixClass::rtk_float),
+                               fix_at(0, {0, 0, 0}), fix_at(0.1, {1, 0, 0})};
   const TagTrack track(fixes, std::nullopt, UtcTime{});
   ASSERT_EQ(track.poses().size(), 3U);
   EXPECT_NEAR(track.at(0.15).position_m.x(), 1.5, 1e-12);
@@ -64,7 +68,8 @@ TEST(TagTrack, KeepsTheNeighboursCovarianceBetweenThem) {
   fixes[0].covariance_m2 = Eigen::Matrix3d::Identity() * 1.0;
   fixes[1].covariance_m2 = Eigen::Matrix3d::Identity() * 3.0;
   const TagTrack track(fixes, std::nullopt, UtcTime{});
-  EXPECT_NEAR(track.at(0.05).covariance_m2(1, 1), 2.0, 1e-9);  // not 1.0: neighbouring errors are the same error
+  EXPECT_NEAR(track.at(0.05).covariance_m2(1, 1), 2.0,
+              1e-9);  // not 1.0: neighbouring errors are the same error
 }
 
 TEST(TagTrack, AssumesTheDissertationsRtkVarianceWhereTheSourceGivesNone) {
@@ -74,7 +79,8 @@ TEST(TagTrack, AssumesTheDissertationsRtkVarianceWhereTheSourceGivesNone) {
 }
 
 TEST(TagTrack, LeavesOutPosesThatAreNotFinite) {
-  const std::vector<Fix> fixes{fix_at(0, {0, 0, 0}), fix_at(0.1, {std::nan(""), 0, 0}), fix_at(0.2, {2, 0, 0})};
+  const std::vector<Fix> fixes{fix_at(0, {0, 0, 0}), fix_at(0.1, {std::nan(""), 0, 0}),
+                               fix_at(0.2, {2, 0, 0})};
   const TagTrack track(fixes, std::nullopt, UtcTime{}, {.max_gap_s = 0.5});
   EXPECT_NEAR(track.at(0.1).position_m.x(), 1.0, 1e-12);
 }

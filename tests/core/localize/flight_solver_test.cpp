@@ -184,7 +184,10 @@ TEST(FlightSolver, EveryMethodEndsAtTheSamePlace) {
     const auto other = solve_flight(flight, {.method = method});
     ASSERT_TRUE(other);
     for (std::size_t i = 0; i < 4; ++i) {
-      EXPECT_LT((other.value().anchors[i].estimate.best->position.m - reference.value().anchors[i].estimate.best->position.m).norm(), 1e-3);
+      EXPECT_LT((other.value().anchors[i].estimate.best->position.m -
+                 reference.value().anchors[i].estimate.best->position.m)
+                    .norm(),
+                1e-3);
     }
   }
 }
@@ -213,7 +216,8 @@ TEST(FlightSolver, AnotherFlightOfTheKitTellsTheBiasTheFirstCannot) {
 }
 
 TEST(FlightSolver, StopsWhenCanceled) {
-  EXPECT_EQ(solve_flight(make_flight(MadeFlight{}), {.canceled = [] { return true; }}).error().code, Errc::canceled);
+  EXPECT_EQ(solve_flight(make_flight(MadeFlight{}), {.canceled = [] { return true; }}).error().code,
+            Errc::canceled);
 }
 
 TEST(FlightSolver, HoldsTheHeightInTwoDimensions) {

@@ -20,7 +20,8 @@ FlightData make_flight(const MadeFlight& m) {
     Fix fix;
     fix.time = UtcTime::from_seconds(t_s);
     fix.frame = m.frame;
-    const Eigen::Vector3d at = path(m, t_s) + 0.005 * Eigen::Vector3d(noise(random), noise(random), noise(random));
+    const Eigen::Vector3d at =
+        path(m, t_s) + 0.005 * Eigen::Vector3d(noise(random), noise(random), noise(random));
     if (m.frame == TrackFrame::local) {
       fix.local_m = at;
     } else {

@@ -32,14 +32,16 @@ TEST(LinearPosition, FindsTheAnchorOfAHandMadeTriangle) {
 
 TEST(LinearPosition, IsExactForExactRangesInThreeDimensions) {
   const Eigen::Vector3d anchor(7, -3, 2);
-  const std::vector<Observation> rows{at(0, 0, 0, anchor), at(10, 0, 1, anchor), at(0, 10, 2, anchor), at(5, 5, 9, anchor)};
+  const std::vector<Observation> rows{at(0, 0, 0, anchor), at(10, 0, 1, anchor), at(0, 10, 2, anchor),
+                                      at(5, 5, 9, anchor)};
   EXPECT_LT((linear_position(rows).value() - anchor).norm(), 1e-10);
 }
 
 TEST(LinearPosition, KeepsItsDigitsFarFromTheOrigin) {
   const Eigen::Vector3d far(4e5, 5.6e6, 100);  // projected coordinates, as people hand them in
   const Eigen::Vector3d anchor = far + Eigen::Vector3d(7, -3, 2);
-  std::vector<Observation> rows{at(0, 0, 0, anchor), at(10, 0, 1, anchor), at(0, 10, 2, anchor), at(5, 5, 9, anchor)};
+  std::vector<Observation> rows{at(0, 0, 0, anchor), at(10, 0, 1, anchor), at(0, 10, 2, anchor),
+                                at(5, 5, 9, anchor)};
   for (auto& o : rows) {
     o.tag_m += far;
     o.distance_m = (o.tag_m - anchor).norm();
@@ -55,7 +57,8 @@ TEST(LinearPosition, SaysTooFewBelowFourRanges) {
 
 TEST(LinearPosition, SaysWeakGeometryForOnePlane) {
   const Eigen::Vector3d anchor(1, 2, 3);
-  const std::vector<Observation> rows{at(0, 0, 0, anchor), at(1, 0, 0, anchor), at(0, 1, 0, anchor), at(4, 5, 0, anchor)};
+  const std::vector<Observation> rows{at(0, 0, 0, anchor), at(1, 0, 0, anchor), at(0, 1, 0, anchor),
+                                      at(4, 5, 0, anchor)};
   EXPECT_EQ(linear_position(rows).error().code, Errc::weak_geometry);
 }
 

@@ -38,7 +38,8 @@ TEST(LiveFlight, ConvergesToTheBatchAnswer) {
   for (std::size_t i = 0; i < 4; ++i) {
     ASSERT_TRUE(estimates[i].best) << estimates[i].reason;
     EXPECT_EQ(estimates[i].verdict, Verdict::ok) << estimates[i].reason;
-    EXPECT_LT((estimates[i].best->position.m - batch.value().anchors[i].estimate.best->position.m).norm(), 0.05);
+    EXPECT_LT((estimates[i].best->position.m - batch.value().anchors[i].estimate.best->position.m).norm(),
+              0.05);
   }
 }
 
@@ -61,7 +62,8 @@ TEST(LiveFlight, TakesRowsOutOfOrder) {
   const MadeFlight made;
   auto flight = make_flight(made);
   // Neighbours swapped all along, and every range a little late.
-  for (std::size_t i = 0; i + 1 < flight.fixes.size(); i += 3) std::swap(flight.fixes[i], flight.fixes[i + 1]);
+  for (std::size_t i = 0; i + 1 < flight.fixes.size(); i += 3)
+    std::swap(flight.fixes[i], flight.fixes[i + 1]);
   auto ranges = flight.ranges;
   std::ranges::stable_sort(ranges, {}, &Range::time);
   for (std::size_t i = 0; i + 1 < ranges.size(); i += 2) std::swap(ranges[i], ranges[i + 1]);
@@ -69,7 +71,8 @@ TEST(LiveFlight, TakesRowsOutOfOrder) {
   std::size_t next = 0;
   for (const Fix& fix : flight.fixes) {
     live.add(fix);
-    while (next < ranges.size() && ranges[next].time.seconds() < fix.time.seconds() - 0.5) live.add(ranges[next++]);
+    while (next < ranges.size() && ranges[next].time.seconds() < fix.time.seconds() - 0.5)
+      live.add(ranges[next++]);
   }
   live.finish();
   const auto estimates = live.estimates();

@@ -1,5 +1,5 @@
-// Flights measured by others (../shared/data, never part of this project). Everything here is judged against the
-// figures of that folder's README; nothing is tuned to a file, a place or a device id.
+// Flights measured by others (../shared/data, never part of this project). Everything here is judged against
+// the figures of that folder's README; nothing is tuned to a file, a place or a device id.
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -37,10 +37,12 @@ std::map<NetworkId, Truth> read_truth(const fs::path& folder, const std::optiona
   while (t.next().value()) {
     Truth one;
     if (origin) {
-      const Wgs84 at{t.number(t.column("lat_deg").value()).value(), t.number(t.column("lon_deg").value()).value(), origin->height_m};
+      const Wgs84 at{t.number(t.column("lat_deg").value()).value(),
+                     t.number(t.column("lon_deg").value()).value(), origin->height_m};
       one = {EnuFrame(*origin).enu_from_wgs84(at).m, true};
     } else {
-      one.at_m = {t.number(t.column("x_m").value()).value(), t.number(t.column("y_m").value()).value(), t.number(t.column("z_m").value()).value()};
+      one.at_m = {t.number(t.column("x_m").value()).value(), t.number(t.column("y_m").value()).value(),
+                  t.number(t.column("z_m").value()).value()};
     }
     truth[network_id_of(t.text(id))] = one;
   }
@@ -62,8 +64,10 @@ bool inside(const Eigen::Vector3d& off, const Eigen::Matrix3d& covariance, bool 
 
 class RealFlights : public ::testing::Test {
  protected:
-  /// Solves all flights of a set, each with what the others say about the kit (or alone), and prints the table.
-  std::map<std::string, Tally> solve_set(const std::string& set, bool alone, const FlightOptions& options = {}) {
+  /// Solves all flights of a set, each with what the others say about the kit (or alone), and prints the
+  /// table.
+  std::map<std::string, Tally> solve_set(const std::string& set, bool alone,
+                                         const FlightOptions& options = {}) {
     std::map<std::string, Tally> tallies;
     std::vector<FlightData> flights;
     std::vector<fs::path> folders;
@@ -86,26 +90,30 @@ class RealFlights : public ::testing::Test {
       solutions = solve_flights(pointers, options).value();
     }
     tallies["all"].seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    std::printf("%-14s %-6s %8s %8s %8s %8s %-6s %-14s %s\n", "flight", "anchor", "err_h_m", "err_3d_m", "h95_m", "v95_m", "inside",
-                "verdict", alone ? "(alone)" : "(with the kit's other flights)");
+    std::printf("%-14s %-6s %8s %8s %8s %8s %-6s %-14s %s\n", "flight", "anchor", "err_h_m", "err_3d_m",
+                "h95_m", "v95_m", "inside", "verdict", alone ? "(alone)" : "(with the kit's other flights)");
     for (std::size_t i = 0; i < solutions.size(); ++i) {
-      for (const auto& anchor : solutions[i].anchors) add(tallies, solutions[i], anchor, read_truth(folders[i], solutions[i].origin));
+      for (const auto& anchor : solutions[i].anchors)
+        add(tallies, solutions[i], anchor, read_truth(folders[i], solutions[i].origin));
     }
     for (const auto& [name, tally] : tallies) {
-      if (tally.n > 0) std::printf("%-14s mean %.3f max %.3f m, inside %d of %d\n", name.c_str(), tally.mean_m(), tally.max_m, tally.inside, tally.n);
+      if (tally.n > 0)
+        std::printf("%-14s mean %.3f max %.3f m, inside %d of %d\n", name.c_str(), tally.mean_m(),
+                    tally.max_m, tally.inside, tally.n);
     }
     std::printf("%.2f s for %zu flights\n\n", tallies["all"].seconds, solutions.size());
     solutions_ = std::move(solutions);
     return tallies;
   }
 
-  static void add(std::map<std::string, Tally>& tallies, const FlightSolution& s, const AnchorSolution& anchor,
-                  const std::map<NetworkId, Truth>& truth) {
+  static void add(std::map<std::string, Tally>& tallies, const FlightSolution& s,
+                  const AnchorSolution& anchor, const std::map<NetworkId, Truth>& truth) {
     const Estimate& e = anchor.estimate;
     const auto known = truth.find(e.anchor);
     const std::string verdict(word(e.verdict));
     if (!e.best || known == truth.end()) {
-      std::printf("%-14s %-6s %8s %8s %8.3f %8.3f %-6s %-14s\n", s.name.c_str(), anchor.name.c_str(), "-", "-", e.h95_m, e.v95_m, "-", verdict.c_str());
+      std::printf("%-14s %-6s %8s %8s %8.3f %8.3f %-6s %-14s\n", s.name.c_str(), anchor.name.c_str(), "-",
+                  "-", e.h95_m, e.v95_m, "-", verdict.c_str());
       return;
     }
     const Eigen::Vector3d off = e.best->position.m - known->second.at_m;
@@ -113,7 +121,8 @@ class RealFlights : public ::testing::Test {
     const bool in = inside(off, e.best->covariance_m2, flat);
     const double h_m = off.head<2>().norm();
     std::printf("%-14s %-6s %8.3f %8s %8.3f %8.3f %-6s %-14s\n", s.name.c_str(), anchor.name.c_str(), h_m,
-                flat ? "-" : std::to_string(off.norm()).substr(0, 5).c_str(), e.h95_m, e.v95_m, in ? "yes" : "NO", verdict.c_str());
+                flat ? "-" : std::to_string(off.norm()).substr(0, 5).c_str(), e.h95_m, e.v95_m,
+                in ? "yes" : "NO", verdict.c_str());
     for (const std::string& name : {s.name, std::string("all")}) {
       Tally& tally = tallies[name];
       if (anchor.determined == Determined::none) {
@@ -137,7 +146,8 @@ class RealFlights : public ::testing::Test {
   std::vector<FlightSolution> solutions_;
 };
 
-// Bars: column "plain least squares" for a flight alone, "plain, done well" or better with the kit's other flights.
+// Bars: column "plain least squares" for a flight alone, "plain, done well" or better with the kit's other
+// flights.
 
 TEST_F(RealFlights, OutdoorRtkAlone) {
   const auto t = solve_set("outdoor-rtk", true);
@@ -189,16 +199,19 @@ TEST_F(RealFlights, RcvDroneWithProfile) {
 TEST_F(RealFlights, ViralDroneAnchorsAgreeBetweenFlights) {
   solve_set("viral-drone", false);
   ASSERT_EQ(solutions_.size(), 9U);
-  // Each flight has its own frame, and no survey exists: distances between the anchors are what can be compared.
+  // Each flight has its own frame, and no survey exists: distances between the anchors are what can be
+  // compared.
   std::map<std::string, std::vector<Eigen::Vector3d>> sides;
   for (const auto& s : solutions_) {
     ASSERT_EQ(s.anchors.size(), 3U);
     const auto at = [&](std::size_t k) { return s.anchors[k].estimate.best.value().position.m; };
-    sides[s.name.substr(0, 3)].push_back({(at(0) - at(1)).norm(), (at(0) - at(2)).norm(), (at(1) - at(2)).norm()});
+    sides[s.name.substr(0, 3)].push_back(
+        {(at(0) - at(1)).norm(), (at(0) - at(2)).norm(), (at(1) - at(2)).norm()});
     for (const auto& anchor : s.anchors) EXPECT_NE(anchor.determined, Determined::none) << s.name;
   }
   // Radio distances between the anchors (README; 101-102 and 100-102 as corrected there).
-  const std::map<std::string, Eigen::Vector3d> measured{{"eee", {41.749, 27.176, 22.150}}, {"nya", {14.727, 13.088, 15.077}}};
+  const std::map<std::string, Eigen::Vector3d> measured{{"eee", {41.749, 27.176, 22.150}},
+                                                        {"nya", {14.727, 13.088, 15.077}}};
   double off_sum_m = 0;
   double spread_sum_m = 0;
   int n = 0;
@@ -215,7 +228,8 @@ TEST_F(RealFlights, ViralDroneAnchorsAgreeBetweenFlights) {
       n += 3;
     }
   }
-  std::printf("viral-drone: mean distance off the radios' own %.3f m, mean spread over flights %.3f m\n", off_sum_m / n, spread_sum_m / n_spread);
+  std::printf("viral-drone: mean distance off the radios' own %.3f m, mean spread over flights %.3f m\n",
+              off_sum_m / n, spread_sum_m / n_spread);
   EXPECT_LE(off_sum_m / n, 2.05);
   EXPECT_LE(spread_sum_m / n_spread, 1.48);
 }

@@ -33,7 +33,8 @@ TEST(AnchorSolver, AgreesWithIndependentGaussNewtonOnAThousandCases) {
   std::uniform_real_distribution<double> side(-1, 1);
   for (int i = 0; i < 1000; ++i) {
     const Eigen::Vector3d anchor(15 * side(random), 15 * side(random), 8 * side(random));
-    auto rows = testing::ranges_from_box(random, anchor, 12 + static_cast<std::size_t>(i % 40), {20, 20, 10}, 0.05);
+    auto rows =
+        testing::ranges_from_box(random, anchor, 12 + static_cast<std::size_t>(i % 40), {20, 20, 10}, 0.05);
     for (auto& o : rows) o.tag_covariance_m2 = Eigen::Vector3d(400e-6, 400e-6, 900e-6).asDiagonal();
     SolverOptions options;
     options.method = k_methods[static_cast<std::size_t>(i) % 3];
@@ -65,8 +66,10 @@ TEST(AnchorSolver, JacobianMatchesFiniteDifferences) {
         Unknowns down = at;
         up[k] += 1e-6;
         down[k] -= 1e-6;
-        const double numeric = (robust_residual(rows[i], scales[i], up, loss, default_bend(loss), nullptr) -
-                                robust_residual(rows[i], scales[i], down, loss, default_bend(loss), nullptr)) / 2e-6;
+        const double numeric =
+            (robust_residual(rows[i], scales[i], up, loss, default_bend(loss), nullptr) -
+             robust_residual(rows[i], scales[i], down, loss, default_bend(loss), nullptr)) /
+            2e-6;
         EXPECT_NEAR(analytic[k], numeric, 1e-5) << "row " << i << " unknown " << k;
       }
     }
@@ -95,7 +98,9 @@ TEST(JointModel, JacobianMatchesFiniteDifferences) {
     Eigen::Vector4d down = shared;
     up[k] += h;
     down[k] -= h;
-    const double numeric = -(linearise(track, row, up, anchor).residual_m - linearise(track, row, down, anchor).residual_m) / (2 * h);
+    const double numeric =
+        -(linearise(track, row, up, anchor).residual_m - linearise(track, row, down, anchor).residual_m) /
+        (2 * h);
     EXPECT_NEAR(line.by_shared[k], numeric, 1e-5) << "shared " << k;
   }
   for (int k = 0; k < 4; ++k) {
@@ -113,7 +118,8 @@ TEST(JointModel, JacobianMatchesFiniteDifferences) {
 }
 
 TEST(AnchorSolver, EllipsoidHoldsTruthIn95PercentOfRuns) {
-  // Dissertation 7.2.3: LOS 2401 mm^2, NLOS 54550 mm^2, RTK 400 mm^2 per axis. 7.815: chi-square 95 %, three degrees.
+  // Dissertation 7.2.3: LOS 2401 mm^2, NLOS 54550 mm^2, RTK 400 mm^2 per axis. 7.815: chi-square 95 %, three
+  // degrees.
   std::mt19937_64 random(77);
   std::normal_distribution<double> noise(0, 1);
   std::uniform_real_distribution<double> side(-1, 1);
@@ -125,7 +131,8 @@ TEST(AnchorSolver, EllipsoidHoldsTruthIn95PercentOfRuns) {
     for (int i = 0; i < 40; ++i) {
       Observation o;
       const Eigen::Vector3d truth(20 * side(random), 20 * side(random), 10 * side(random));
-      o.tag_m = truth + std::sqrt(k_variance_rtk_m2) * Eigen::Vector3d(noise(random), noise(random), noise(random));
+      o.tag_m =
+          truth + std::sqrt(k_variance_rtk_m2) * Eigen::Vector3d(noise(random), noise(random), noise(random));
       o.tag_covariance_m2 = Eigen::Matrix3d::Identity() * k_variance_rtk_m2;
       o.sigma_m = std::sqrt(i % 3 == 0 ? k_variance_nlos_m2 : k_variance_los_m2);
       o.distance_m = (truth - anchor).norm() + o.sigma_m * noise(random);
@@ -141,10 +148,12 @@ TEST(AnchorSolver, EllipsoidHoldsTruthIn95PercentOfRuns) {
 }
 
 TEST(AnchorSolver, WeighsLineOfSightMoreLikeFigure72) {
-  // Section 7.2.3 and Fig 7.2: four good ranges and one obstructed, 0.5 m long; weights pull the answer to the good ones.
+  // Section 7.2.3 and Fig 7.2: four good ranges and one obstructed, 0.5 m long; weights pull the answer to
+  // the good ones.
   std::vector<Observation> rows;
   const Eigen::Vector3d anchor(0, 0, 0);
-  for (const auto& p : {Eigen::Vector3d(5, 0, 0), Eigen::Vector3d(-4, 3, 0), Eigen::Vector3d(-1, -6, 0), Eigen::Vector3d(3, 5, 0), Eigen::Vector3d(0, 7, 0)}) {
+  for (const auto& p : {Eigen::Vector3d(5, 0, 0), Eigen::Vector3d(-4, 3, 0), Eigen::Vector3d(-1, -6, 0),
+                        Eigen::Vector3d(3, 5, 0), Eigen::Vector3d(0, 7, 0)}) {
     Observation o;
     o.tag_m = p;
     o.distance_m = (p - anchor).norm();
@@ -185,7 +194,8 @@ TEST(AnchorSolver, RecoversAnchorUnderThirtyPercentNlosOutliers) {
   }
   SolverOptions options;
   options.loss = Loss::tukey;
-  const auto start = solve_anchor(rows, linear_position(rows).value(), {.loss = Loss::cauchy}).value().position_m;
+  const auto start =
+      solve_anchor(rows, linear_position(rows).value(), {.loss = Loss::cauchy}).value().position_m;
   EXPECT_LT((solve_anchor(rows, start, options).value().position_m - anchor).norm(), 0.05);
 }
 

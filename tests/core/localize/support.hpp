@@ -8,9 +8,11 @@
 
 namespace anchord::testing {
 
-/// Ranges from n places spread through a box about the anchor's neighbourhood, with Gaussian noise of sigma_m.
-inline std::vector<Observation> ranges_from_box(std::mt19937_64& random, const Eigen::Vector3d& anchor, std::size_t n,
-                                                const Eigen::Vector3d& half_box_m, double sigma_m) {
+/// Ranges from n places spread through a box about the anchor's neighbourhood, with Gaussian noise of
+/// sigma_m.
+inline std::vector<Observation> ranges_from_box(std::mt19937_64& random, const Eigen::Vector3d& anchor,
+                                                std::size_t n, const Eigen::Vector3d& half_box_m,
+                                                double sigma_m) {
   std::uniform_real_distribution<double> side(-1, 1);
   std::normal_distribution<double> noise(0, 1);
   std::vector<Observation> rows;

@@ -24,7 +24,7 @@ Dataset small() {
 
 }  // namespace
 
-TEST(Sha256, MatchesThePublishedVectors) {   // FIPS 180-4 examples
+TEST(Sha256, MatchesThePublishedVectors) {  // FIPS 180-4 examples
   Sha256 abc;
   abc.add("abc");
   EXPECT_EQ(abc.hex(), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");

@@ -47,7 +47,8 @@ TEST(ForwardFilter, KeepsWhatHelpsAndLeavesNoiseOut) {
   const auto data = world();
   Recipe logistic;
   logistic.method = Method::logistic;
-  const auto steps = forward_filter(data, logistic, {"strong", "noise", "weak"}, grouped_folds(data.group, 6, 1), true, 0.01);
+  const auto steps = forward_filter(data, logistic, {"strong", "noise", "weak"},
+                                    grouped_folds(data.group, 6, 1), true, 0.01);
   ASSERT_TRUE(steps);
   EXPECT_TRUE(steps.value()[0].kept);
   EXPECT_FALSE(steps.value()[1].kept);

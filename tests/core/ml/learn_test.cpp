@@ -20,7 +20,8 @@ Dataset world(std::uint64_t seed, bool with_truth) {
     const double range = 2 + 8 * r.uniform(), loss = los ? 1 + 2 * r.uniform() : 3 + 6 * r.uniform();
     const double excess = los ? 0 : -0.5 * std::log(1 - r.uniform());
     for (int k = 0; k < 8; ++k) {
-      const double rx = -75 - 20 * std::log10(range) - (los ? 0 : 4) + r.uniform(), noise = 0.04 * (r.uniform() - 0.5);
+      const double rx = -75 - 20 * std::log10(range) - (los ? 0 : 4) + r.uniform(),
+                   noise = 0.04 * (r.uniform() - 0.5);
       d.x.insert(d.x.end(), {range, rx, rx - loss, loss, rx + 20 * std::log10(range)});
       d.los.push_back(los);
       if (with_truth) d.bias_m.push_back(0.15 + excess + noise);
@@ -53,8 +54,7 @@ TEST(Learn, BiasTableStartsWithNoCorrectionAndThePickIsNotWorse) {
   ASSERT_TRUE(learned) << learned.error().message;
   const auto& table = learned.value().table;
   EXPECT_EQ(table.front().name, "none (no correction)");
-  for (const auto& row : table)
-    EXPECT_TRUE(!row.picked || row.error.mae_m <= table.front().error.mae_m);
+  for (const auto& row : table) EXPECT_TRUE(!row.picked || row.error.mae_m <= table.front().error.mae_m);
   EXPECT_LT(learned.value().nll, learned.value().nll_constants);
 }
 
@@ -64,12 +64,14 @@ TEST(Learn, OneClassBiasFindsTheConstant) {
   const auto learned = learn(world(1, true).of_class(true), options);
   ASSERT_TRUE(learned);
   const auto all = world(3, true).of_class(true);
-  const auto e = evaluate(learned.value().model, all.with_features(learned.value().model.info.features).value());
+  const auto e =
+      evaluate(learned.value().model, all.with_features(learned.value().model.info.features).value());
   EXPECT_NEAR(e.all->raw.mae_m, 0.15, 0.01);
   EXPECT_LT(e.all->corrected.mae_m, 0.03);
 }
 
-// A slope fitted between 8 and 12 m must not be believed at 100 m: there the median of the training biases answers.
+// A slope fitted between 8 and 12 m must not be believed at 100 m: there the median of the training biases
+// answers.
 TEST(Regressor, ShrinksToTheMedianFarFromTheRowsItWasFittedTo) {
   Regressor r;
   r.scaler = {{10}, {1}, 2.5};
@@ -100,7 +102,8 @@ TEST(Learn, ThresholdKeepsTheAskedFalsePositiveRateOnHeldOutPlaces) {
   const auto data = world(4, false);
   const auto learned = learn(data, options);
   ASSERT_TRUE(learned);
-  EXPECT_LE(confusion_at(learned.value().p_los, data.los, learned.value().model.classifier->threshold).fpr(), 0.05);
+  EXPECT_LE(confusion_at(learned.value().p_los, data.los, learned.value().model.classifier->threshold).fpr(),
+            0.05);
 }
 
 }  // namespace anchord::ml

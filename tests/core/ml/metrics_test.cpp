@@ -28,12 +28,13 @@ TEST(Confusion, OfOneClassCountsOnlyThatClass) {
   EXPECT_DOUBLE_EQ(c.fpr(), 0);
 }
 
-// Table 6.2's counts of the dissertation's logistic regression would do as well; here the textbook case with ties.
+// Table 6.2's counts of the dissertation's logistic regression would do as well; here the textbook case with
+// ties.
 TEST(Roc, AreaIsTheChanceThatALosLinkScoresHigher) {
   const std::vector<double> p{.9, .5, .5, .1};
   const std::vector<std::uint8_t> los{1, 1, 0, 0};
   const auto curve = roc(p, los);
-  EXPECT_DOUBLE_EQ(area_under(curve), 0.875);   // pairs: 1 + 1 + 1 + .5 of 4
+  EXPECT_DOUBLE_EQ(area_under(curve), 0.875);  // pairs: 1 + 1 + 1 + .5 of 4
   EXPECT_DOUBLE_EQ(curve.back().fpr, 1);
   EXPECT_DOUBLE_EQ(curve.back().tpr, 1);
 }

@@ -9,7 +9,8 @@
 
 namespace anchord::ml {
 
-// erfcx(1) = 0.427583576155807..., erfcx(10) = 0.0561409927438226 (Abramowitz and Stegun 7.1; asymptotic series).
+// erfcx(1) = 0.427583576155807..., erfcx(10) = 0.0561409927438226 (Abramowitz and Stegun 7.1; asymptotic
+// series).
 TEST(Erfcx, MatchesPublishedValuesOnBothBranches) {
   EXPECT_NEAR(erfcx(0), 1, 1e-15);
   EXPECT_NEAR(erfcx(1), 0.427583576155807, 1e-12);

@@ -15,7 +15,7 @@ struct Sample {
   TrainingRows rows() const { return {x, d, y, w}; }
 };
 
-double gauss(Random& r) {   // sum of twelve uniforms: mean 0, sd 1
+double gauss(Random& r) {  // sum of twelve uniforms: mean 0, sd 1
   double s = -6;
   for (int i = 0; i < 12; ++i) s += r.uniform();
   return s;
@@ -48,7 +48,8 @@ Sample ring(std::size_t n, std::uint64_t seed) {
 
 double hit_rate(const Scorer& scorer, const Sample& s, double threshold) {
   double right = 0;
-  for (std::size_t i = 0; i < s.y.size(); ++i) right += (score(scorer, s.rows().row(i)) > threshold) == (s.y[i] > 0.5) ? 1 : 0;
+  for (std::size_t i = 0; i < s.y.size(); ++i)
+    right += (score(scorer, s.rows().row(i)) > threshold) == (s.y[i] > 0.5) ? 1 : 0;
   return right / static_cast<double>(s.y.size());
 }
 
@@ -57,12 +58,13 @@ double hit_rate(const Scorer& scorer, const Sample& s, double threshold) {
 TEST(Logistic, RecoversTheWorldsOwnWeights) {
   const auto s = logistic_world(20000, 3);
   const auto m = fit_logistic(s.rows(), 1e3);
-  EXPECT_NEAR(m.weights[0], 2, 0.1);   // standard error about 0.03
+  EXPECT_NEAR(m.weights[0], 2, 0.1);  // standard error about 0.03
   EXPECT_NEAR(m.weights[1], -1, 0.1);
   EXPECT_NEAR(m.offset, 0.5, 0.1);
 }
 
-// One feature +-1, half a class each side: with the penalty w^2 / (2C) the optimum solves 2n sigmoid(-w) = w / C; n = 2 pairs, C = 1: w = 1.2024.
+// One feature +-1, half a class each side: with the penalty w^2 / (2C) the optimum solves 2n sigmoid(-w) = w
+// / C; n = 2 pairs, C = 1: w = 1.2024.
 TEST(Logistic, StaysFiniteOnSeparableClasses) {
   const Sample s{{1, 1, -1, -1}, {1, 1, 0, 0}, {1, 1, 1, 1}, 1};
   const double w = fit_logistic(s.rows(), 1).weights[0];
@@ -86,7 +88,7 @@ TEST(Polynomial, RecoversACubicAndAnInteraction) {
     s.w.push_back(1);
   }
   const auto m = fit_polynomial(s.rows(), polynomial_terms(2, 3, true), 0);
-  EXPECT_EQ(m.terms.size(), 10U);   // (2 + 3 choose 3)
+  EXPECT_EQ(m.terms.size(), 10U);  // (2 + 3 choose 3)
   const std::vector<double> at{1.5, -2.0};
   EXPECT_NEAR(score(m, at), 0.3 - 0.2 * 3.375 - 2.1, 1e-6);
   EXPECT_EQ(polynomial_terms(1, 4, false).size(), 5U);
@@ -138,7 +140,8 @@ TEST(Boosted, LearnsARingAndAWave) {
   o.column_share = 1;
   EXPECT_GT(hit_rate(fit_boosted(train.rows(), o), fresh, 0), 0.95);
   Sample wave{{}, {}, {}, 1};
-  for (int i = 0; i < 500; ++i) wave.x.push_back(i * 0.01), wave.y.push_back(std::sin(i * 0.01)), wave.w.push_back(1);
+  for (int i = 0; i < 500; ++i)
+    wave.x.push_back(i * 0.01), wave.y.push_back(std::sin(i * 0.01)), wave.w.push_back(1);
   o.classification = false;
   const std::vector<double> at{1.5};
   EXPECT_NEAR(score(fit_boosted(wave.rows(), o), at), std::sin(1.5), 0.02);
@@ -150,7 +153,8 @@ TEST(Svm, LearnsARingWithRbfAndALineWithTheLinearKernel) {
   ASSERT_TRUE(rbf);
   EXPECT_GT(hit_rate(rbf.value(), fresh, 0), 0.94);
   Sample line{{}, {}, {}, 1};
-  for (int i = 0; i < 50; ++i) line.x.push_back(0.1 * i), line.y.push_back(0.3 * 0.1 * i), line.w.push_back(1);
+  for (int i = 0; i < 50; ++i)
+    line.x.push_back(0.1 * i), line.y.push_back(0.3 * 0.1 * i), line.w.push_back(1);
   const auto svr = fit_svm(line.rows(), {Kernel::linear, 10, 0.5, 0, 3, 0.01}, false);
   const std::vector<double> at{2.5};
   EXPECT_NEAR(score(svr.value(), at), 0.75, 0.02);

@@ -21,8 +21,8 @@ CirOptions plain_window(std::size_t taps) {
 
 }  // namespace
 
-// w equal taps in a window of n: |h| is Bernoulli with p = w / n, so kurtosis = (1 - 3 p (1 - p)) / (p (1 - p));
-// delays are those of a discrete uniform variable: (w - 1) / 2 and sqrt((w^2 - 1) / 12).
+// w equal taps in a window of n: |h| is Bernoulli with p = w / n, so kurtosis = (1 - 3 p (1 - p)) / (p (1 -
+// p)); delays are those of a discrete uniform variable: (w - 1) / 2 and sqrt((w^2 - 1) / 12).
 TEST(CirShape, OfARectangleMatchesTheClosedForm) {
   std::vector<float> h(200, 0.0F);
   for (std::size_t k = 50; k < 50 + 21; ++k) h[k] = 700.0F;
@@ -53,10 +53,11 @@ TEST(CirShape, OfTwoDeltasMatchesTheClosedForm) {
 TEST(CirShape, OfAnExponentialDecayMatchesTheClosedForm) {
   const double r = 0.9;
   std::vector<float> h(400, 0.0F);
-  for (std::size_t k = 0; k < 300; ++k) h[50 + k] = static_cast<float>(1e4 * std::pow(r, 0.5 * static_cast<double>(k)));
+  for (std::size_t k = 0; k < 300; ++k)
+    h[50 + k] = static_cast<float>(1e4 * std::pow(r, 0.5 * static_cast<double>(k)));
   const auto shape = cir_shape(h, 50.0, plain_window(300));
   ASSERT_TRUE(shape);
-  EXPECT_NEAR(shape->mean_excess_delay_ns, r / (1 - r), 1e-5);          // floats carry seven digits
+  EXPECT_NEAR(shape->mean_excess_delay_ns, r / (1 - r), 1e-5);  // floats carry seven digits
   EXPECT_NEAR(shape->rms_delay_spread_ns, std::sqrt(r) / (1 - r), 1e-5);
 }
 
@@ -81,7 +82,7 @@ TEST(CirShape, FindsTheFirstPathByTheInterpolatedCrossing) {
   std::vector<float> h(1016, 10.0F);
   h[745] = 0.0F;
   for (std::size_t k = 746; k < 752; ++k) h[k] = 100.0F;
-  h[700] = 500.0F;   // one lonely tap is no path
+  h[700] = 500.0F;  // one lonely tap is no path
   const auto shape = cir_shape(h, std::nullopt);
   ASSERT_TRUE(shape);
   EXPECT_NEAR(shape->first_path_idx, 745.64, 1e-6);

@@ -16,12 +16,12 @@ TEST(Features, OfAMeasuredRowMatchHandNumbers) {
   s.preamble_count = 101;
   s.std_noise = 36;
   const auto f = compute_features(s);
-  EXPECT_NEAR(*f.get(Feature::fp_dbm), -93.968, 1e-3);                 // the set's own column
+  EXPECT_NEAR(*f.get(Feature::fp_dbm), -93.968, 1e-3);  // the set's own column
   EXPECT_NEAR(*f.get(Feature::rx_minus_fp_db), 13.832, 1e-3);
-  EXPECT_NEAR(*f.get(Feature::noise_excess_db), 3.683, 1e-3);          // 20 log10(36 / 10.0499) - 7.4
-  EXPECT_NEAR(*f.get(Feature::fp_snr_db), 33.261, 1e-3);               // 20 log10(1657 / 36)
+  EXPECT_NEAR(*f.get(Feature::noise_excess_db), 3.683, 1e-3);  // 20 log10(36 / 10.0499) - 7.4
+  EXPECT_NEAR(*f.get(Feature::fp_snr_db), 33.261, 1e-3);       // 20 log10(1657 / 36)
   EXPECT_NEAR(*f.get(Feature::rx_free_space_db), -62.025, 1e-3);
-  EXPECT_NEAR(*f.get(Feature::total_snr_db), 50.564, 1e-3);            // -80.136 + 121.74 + 40.086 - 31.126
+  EXPECT_NEAR(*f.get(Feature::total_snr_db), 50.564, 1e-3);  // -80.136 + 121.74 + 40.086 - 31.126
   EXPECT_FALSE(f.get(Feature::kurtosis));
   EXPECT_FALSE(f.get(Feature::log_range_spread));
 }
@@ -68,7 +68,7 @@ TEST(RangeSpread, SlidesAndDropsZeroRanges) {
   EXPECT_FALSE(window.sd_m());
   window.add(3);
   EXPECT_NEAR(*window.sd_m(), 1, 1e-12);
-  window.add(4);   // 2, 3, 4
+  window.add(4);  // 2, 3, 4
   EXPECT_NEAR(*window.sd_m(), 1, 1e-12);
 }
 

@@ -54,7 +54,9 @@ TEST(FlightPlan, FliesRoundAHallAtItsKeepOutDistance) {
   EXPECT_LT(plan.rms_m, 0.2);
 }
 
-TEST(FlightPlan, GoesRoundTheNotchOfAnL) { expect_legal(plan_flight({k_ell, 9, {}, {}}, {}).value(), k_ell, 4); }
+TEST(FlightPlan, GoesRoundTheNotchOfAnL) {
+  expect_legal(plan_flight({k_ell, 9, {}, {}}, {}).value(), k_ell, 4);
+}
 
 // A lawn-mower ring of as many points at one height, evenly spread, is what people fly by hand.
 TEST(FlightPlan, PredictsLessErrorThanAnEvenRingOfAsManyPoints) {
@@ -81,7 +83,10 @@ TEST(FlightPlan, StopsByGainAndSaysSo) {
 }
 
 TEST(FlightPlan, StaysInsideTheFenceAndOutOfNoFly) {
-  FlightPlanInput input{k_hall, 6, {{{10, -30}, {20, -30}, {20, -6.5}, {10, -6.5}}}, {{-8, -40}, {60, -40}, {60, 60}, {-8, 60}}};
+  FlightPlanInput input{k_hall,
+                        6,
+                        {{{10, -30}, {20, -30}, {20, -6.5}, {10, -6.5}}},
+                        {{-8, -40}, {60, -40}, {60, 60}, {-8, 60}}};
   const auto plan = plan_flight(input, {}).value();
   for (const auto& w : plan.waypoints) {
     EXPECT_TRUE(contains(input.fence, w.point_m.head<2>()));
@@ -101,7 +106,8 @@ TEST(FlightPlan, NamesWhatMakesItImpossible) {
 TEST(FlightPlan, IsTheSameEveryTime) {
   const auto a = plan_flight({k_ell, 9, {}, {}}, {}).value(), b = plan_flight({k_ell, 9, {}, {}}, {}).value();
   ASSERT_EQ(a.waypoints.size(), b.waypoints.size());
-  for (std::size_t i = 0; i < a.waypoints.size(); ++i) EXPECT_EQ(a.waypoints[i].point_m, b.waypoints[i].point_m);
+  for (std::size_t i = 0; i < a.waypoints.size(); ++i)
+    EXPECT_EQ(a.waypoints[i].point_m, b.waypoints[i].point_m);
 }
 
 TEST(Design, AddingAndRemovingAPointLeavesNoTrace) {
@@ -110,7 +116,8 @@ TEST(Design, AddingAndRemovingAPointLeavesNoTrace) {
   for (const auto criterion : {Criterion::a_optimal, Criterion::d_optimal}) {
     options.criterion = criterion;
     Design design(anchors, options);
-    for (const auto& p : {Vector3d(-4, 0, 2), Vector3d(35, 0, 10), Vector3d(10, 25, 5), Vector3d(0, 25, 8)}) design.add(p);
+    for (const auto& p : {Vector3d(-4, 0, 2), Vector3d(35, 0, 10), Vector3d(10, 25, 5), Vector3d(0, 25, 8)})
+      design.add(p);
     const double before = design.value(), expected = design.value_with({15, -5, 4});
     design.add({15, -5, 4});
     EXPECT_NEAR(design.value(), expected, 1e-9 * std::abs(expected));

@@ -156,7 +156,8 @@ TEST(GdopBatch, AgreesWithOneByOneForEveryLengthAndMarksSingularOnesInfinite) {
     for (std::size_t i = 0; i < size; ++i) {
       const auto one = base.with({x[i], y[i], z[i]});
       if (one) {
-        EXPECT_NEAR(trace[i] / one.value().trace, 1.0, 1e-10);  // the base of two points is singular: some digits go
+        EXPECT_NEAR(trace[i] / one.value().trace, 1.0,
+                    1e-10);  // the base of two points is singular: some digits go
       } else {
         EXPECT_TRUE(std::isinf(trace[i])) << i;
       }

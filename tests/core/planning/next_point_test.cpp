@@ -173,7 +173,8 @@ TEST(NextPoint, PrefersANearerPointWhenFlightTimeCounts) {
   options.dwell_s = 0.5;
   const auto near = next_point(input, options).value();
   const Vector3d from = input.visited.back();
-  EXPECT_LT((near.candidates[*near.chosen].point_m - from).norm(), (far.candidates[*far.chosen].point_m - from).norm());
+  EXPECT_LT((near.candidates[*near.chosen].point_m - from).norm(),
+            (far.candidates[*far.chosen].point_m - from).norm());
 }
 
 // Behind a wall a range is worth (0.2336^2 + 0.02^2) / (0.049^2 + 0.02^2) = 19.6 times less.

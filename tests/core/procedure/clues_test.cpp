@@ -39,7 +39,8 @@ std::vector<TurnSample> turn(double bearing_deg, double step_deg, double noise_d
   return out;
 }
 
-// 8.3.5: "able to identify the angle of the signal with an accuracy of about 20 degrees"; step as in chapter 4.
+// 8.3.5: "able to identify the angle of the signal with an accuracy of about 20 degrees"; step as in
+// chapter 4.
 TEST(Turn, FindsTheBearingWithinTwentyDegreesInTwoDecibelsOfNoise) {
   int good = 0;
   for (unsigned i = 0; i < 200; ++i) {
@@ -75,7 +76,8 @@ TEST(HeightSearch, FindsTheAnchorsHeightWithinTwentyCentimetres) {
   int good = 0;
   for (int i = 0; i < 200; ++i) {
     std::vector<HeightSample> samples;
-    for (double h = 1.5; h <= 2.5; h += 0.05) samples.push_back({h, -80 - 12 * (h - 2.1) * (h - 2.1) + noise(random)});
+    for (double h = 1.5; h <= 2.5; h += 0.05)
+      samples.push_back({h, -80 - 12 * (h - 2.1) * (h - 2.1) + noise(random)});
     const auto guess = height_from_search(samples).value();
     EXPECT_GE(guess.sigma_m, 0.2);
     good += std::abs(guess.height_m - 2.1) <= 0.2;

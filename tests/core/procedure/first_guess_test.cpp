@@ -13,7 +13,8 @@ using Eigen::Vector3d;
 TEST(FirstGuess, GoesTheDistanceAlongTheBearing) {
   const auto p = first_guess({3, 0, 1}, 4.2, 270 * std::numbers::pi / 180, 1);
   EXPECT_TRUE(p.isApprox(Vector3d(-1.2, 0, 1), 1e-12));
-  EXPECT_NEAR(first_guess({0, 0, 4}, 5, 0, 1).y(), 4, 1e-12);  // 3-4-5: the height difference is not in the plane
+  EXPECT_NEAR(first_guess({0, 0, 4}, 5, 0, 1).y(), 4,
+              1e-12);  // 3-4-5: the height difference is not in the plane
   EXPECT_TRUE(first_guess({0, 0, 9}, 5, 0, 1).isApprox(Vector3d(0, 0, 1)));
 }
 

@@ -60,8 +60,10 @@ TEST(Ubx, TreatsAFixThatIsNotOkAsNone) {
 }
 
 TEST(Ubx, TellsFixClassesApartByCarrierAndCorrections) {
-  for (const auto& [flags, fix] : {std::pair{0x01, FixClass::single}, {0x03, FixClass::dgps},
-                                   {0x43, FixClass::rtk_float}, {0x83, FixClass::rtk_fixed}}) {
+  for (const auto& [flags, fix] : {std::pair{0x01, FixClass::single},
+                                   {0x03, FixClass::dgps},
+                                   {0x43, FixClass::rtk_float},
+                                   {0x83, FixClass::rtk_fixed}}) {
     auto frame = k_pvt.substr(0, k_pvt.size() - 2);
     frame[27] = static_cast<char>(flags);
     EXPECT_EQ(decode(with_fletcher(frame)).at(0).fix, fix);
@@ -124,7 +126,8 @@ TEST(Ubx, ReadsRelativePositionInBothVersions) {
 
 TEST(Ubx, RefusesShortPayloadsAndImpossibleDates) {
   Skips skips;
-  EXPECT_TRUE(decode(with_fletcher(ubx(0x01, 0x07, 40)) + with_fletcher(ubx(0x01, 0x14, 8)), {}, &skips).empty());
+  EXPECT_TRUE(
+      decode(with_fletcher(ubx(0x01, 0x07, 40)) + with_fletcher(ubx(0x01, 0x14, 8)), {}, &skips).empty());
   EXPECT_EQ(skips["ubx: payload not readable"], 2U);
   auto frame = k_pvt.substr(0, k_pvt.size() - 2);
   frame[12] = 13;  // month
@@ -160,7 +163,8 @@ TEST(Erb, DecodesAnEpoch) {
 }
 
 TEST(Erb, QualifiesAPositionByTheStatusOfItsOwnTime) {
-  // A second epoch 200 ms later without valid fix: its position must not be published with the first one's status.
+  // A second epoch 200 ms later without valid fix: its position must not be published with the first one's
+  // status.
   auto pos = k_erb_pos.substr(0, k_erb_pos.size() - 2), stat = k_erb_stat.substr(0, k_erb_stat.size() - 2);
   put(pos, 5, 378017800 + 200, 4);
   put(stat, 5, 378017800 + 200, 4);
@@ -189,11 +193,13 @@ TEST(ErbFraming, PlainTextThatHoldsItsLettersIsNoFrame) {
 
 TEST(GpsTime, KnowsLeapSecondsAndTenBitWeeks) {
   // 2024-06-15 23:59:50 UTC is week 2319, 8 s.
-  EXPECT_EQ(to_rfc3339(decode("2319 8.000 51.0 3.7 62.8 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n").at(0).time.value()),
-            "2024-06-15T23:59:50.000000Z");
+  EXPECT_EQ(
+      to_rfc3339(decode("2319 8.000 51.0 3.7 62.8 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n").at(0).time.value()),
+      "2024-06-15T23:59:50.000000Z");
   // The same week as a ten-bit number: 2319 - 2048.
-  EXPECT_EQ(to_rfc3339(decode("271 8.000 51.0 3.7 62.8 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n").at(0).time.value()),
-            "2024-06-15T23:59:50.000000Z");
+  EXPECT_EQ(
+      to_rfc3339(decode("271 8.000 51.0 3.7 62.8 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n").at(0).time.value()),
+      "2024-06-15T23:59:50.000000Z");
 }
 
 }  // namespace

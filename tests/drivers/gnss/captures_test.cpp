@@ -72,7 +72,8 @@ void expect_gga(const Epoch& e, std::map<std::string, std::string> row, const st
   }
   if (!row["hhmmss"].empty()) {
     const auto clock = to_rfc3339(e.time.value()).substr(11, 8);
-    EXPECT_EQ(clock.substr(0, 2) + clock.substr(3, 2) + clock.substr(6, 2), row["hhmmss"].substr(0, 6)) << what;
+    EXPECT_EQ(clock.substr(0, 2) + clock.substr(3, 2) + clock.substr(6, 2), row["hhmmss"].substr(0, 6))
+        << what;
   }
 }
 
@@ -108,7 +109,8 @@ TEST_F(Captures, MixedNmeaAndUbxWithABadChecksum) {
   EXPECT_EQ(epochs[0].satellites, 7);
   EXPECT_EQ(to_rfc3339(epochs[0].time.value()), "2022-01-18T08:02:46.999824Z");  // :47 minus 175377 ns
   const auto rows = table("dev2_mixed_nmea_ubx_badck.bin.gga.expected.csv");
-  for (std::size_t i = 0; i < rows.size(); ++i) expect_gga(epochs[1 + i], rows[i], "row " + std::to_string(i));
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    expect_gga(epochs[1 + i], rows[i], "row " + std::to_string(i));
   EXPECT_EQ(to_rfc3339(epochs[2].time.value()), "2022-01-18T08:02:48.000000Z");  // the date is UBX's
 }
 
@@ -141,7 +143,10 @@ TEST_F(Captures, GeonetLlhInGpsTime) {
 }
 
 constexpr FixClass fix_of_stat(int stat) {
-  return stat == 1 ? FixClass::rtk_fixed : stat == 2 ? FixClass::rtk_float : stat == 5 ? FixClass::single : FixClass::none;
+  return stat == 1   ? FixClass::rtk_fixed
+         : stat == 2 ? FixClass::rtk_float
+         : stat == 5 ? FixClass::single
+                     : FixClass::none;
 }
 
 /// RFC 3339 of "2025/03/04 09:15:01.200".
@@ -172,8 +177,10 @@ TEST_F(Captures, EmlidErbAgreesWithWhatWentIntoTheEncoder) {
     expect_near(e.lat_deg, row["lat_deg"], 1e-9, "lat");
     expect_near(e.lon_deg, row["lon_deg"], 1e-9, "lon");
     expect_near(e.height_ellipsoid_m, row["h_ell_m"], 1e-4, "height");
-    EXPECT_NEAR(e.baseline_ned_m.value().x(), std::stod(row["base_n_mm"]) / 1000, 1.5e-3);  // the encoder cuts off
-    EXPECT_NEAR(e.baseline_ned_m.value().y(), std::stod(row["base_e_mm"]) / 1000, 1.5e-3);  // the encoder cuts off
+    EXPECT_NEAR(e.baseline_ned_m.value().x(), std::stod(row["base_n_mm"]) / 1000,
+                1.5e-3);  // the encoder cuts off
+    EXPECT_NEAR(e.baseline_ned_m.value().y(), std::stod(row["base_e_mm"]) / 1000,
+                1.5e-3);  // the encoder cuts off
     if (std::stod(row["age_s"]) > 0) expect_near(e.age_s, row["age_s"], 1e-9, "age");
   }
 }
@@ -226,7 +233,8 @@ TEST_F(Captures, DecodeTheSameHoweverTheBytesAreCut) {
     for (const std::size_t piece : {1U, 7U, 1000U}) {
       Decoder decoder;
       Epochs pieces;
-      for (std::size_t i = 0; i < bytes.size(); i += piece) decoder.feed(std::string_view(bytes).substr(i, piece), pieces);
+      for (std::size_t i = 0; i < bytes.size(); i += piece)
+        decoder.feed(std::string_view(bytes).substr(i, piece), pieces);
       decoder.finish(pieces);
       ASSERT_EQ(pieces.size(), whole.size()) << name;
       for (std::size_t i = 0; i < whole.size(); ++i) {
@@ -240,8 +248,9 @@ TEST_F(Captures, DecodeTheSameHoweverTheBytesAreCut) {
 /// Every position a prefix gives must be one the whole capture gives.
 TEST_F(Captures, EveryPrefixGivesOnlyPositionsOfTheWhole) {
   using Position = std::tuple<double, double, double>;
-  for (const char* name : {"dev1_zed_x20p_nav.ubx", "dev2_mixed_nmea_ubx_badck.bin", "dev3_skytraq_dgps.nmea",
-                           "dev4_geonet_rtk.llh", "dev5_emlid_demo.erb", "dev5_emlid_demo.nmea", "dev5_emlid_demo.llh"}) {
+  for (const char* name :
+       {"dev1_zed_x20p_nav.ubx", "dev2_mixed_nmea_ubx_badck.bin", "dev3_skytraq_dgps.nmea",
+        "dev4_geonet_rtk.llh", "dev5_emlid_demo.erb", "dev5_emlid_demo.nmea", "dev5_emlid_demo.llh"}) {
     const auto bytes = capture(name).substr(0, 6000);  // quadratic
     std::set<Position> known;
     const auto position = [](const Epoch& e) {

@@ -64,12 +64,13 @@ TEST(Nmea, EmptyFieldsAreAbsentNotZero) {
 }
 
 std::string gga(const char* time, const char* quality = "4") {
-  return sentence(std::string("GNGGA,") + time + ",5101.0,N,00342.0,E," + quality + ",14,0.9,22.5,M,45.0,M,0.8,");
+  return sentence(std::string("GNGGA,") + time + ",5101.0,N,00342.0,E," + quality +
+                  ",14,0.9,22.5,M,45.0,M,0.8,");
 }
 
 TEST(Nmea, RunsTheDateOnOverMidnightWhileOnlyGgaComes) {
-  const auto epochs = decode(sentence("GNRMC,235959.80,A,5101.0,N,00342.0,E,0,0,311223,,,D") + gga("235959.80") +
-                             gga("000000.00") + gga("000000.20"));
+  const auto epochs = decode(sentence("GNRMC,235959.80,A,5101.0,N,00342.0,E,0,0,311223,,,D") +
+                             gga("235959.80") + gga("000000.00") + gga("000000.20"));
   ASSERT_EQ(epochs.size(), 3U);
   EXPECT_EQ(to_rfc3339(*epochs[0].time), "2023-12-31T23:59:59.800000Z");
   EXPECT_EQ(to_rfc3339(*epochs[1].time), "2024-01-01T00:00:00.000000Z");
@@ -77,8 +78,8 @@ TEST(Nmea, RunsTheDateOnOverMidnightWhileOnlyGgaComes) {
 }
 
 TEST(Nmea, GivesEpochsBeforeTheFirstDateTheirDateAfterwards) {
-  const auto epochs = decode(gga("235959.80") + gga("000000.00") + sentence("GNZDA,000000.20,01,01,2024,00,00") +
-                             gga("000000.20"));
+  const auto epochs = decode(gga("235959.80") + gga("000000.00") +
+                             sentence("GNZDA,000000.20,01,01,2024,00,00") + gga("000000.20"));
   ASSERT_EQ(epochs.size(), 3U);
   EXPECT_EQ(to_rfc3339(*epochs[0].time), "2023-12-31T23:59:59.800000Z");
   EXPECT_EQ(to_rfc3339(*epochs[2].time), "2024-01-01T00:00:00.200000Z");
@@ -132,14 +133,15 @@ INSTANTIATE_TEST_SUITE_P(All, NmeaQuality,
                                          Quality{"9", FixClass::none}, Quality{"", FixClass::none}));
 
 TEST(Nmea, RefusesWhatIsOutOfItsDomainThoughTheChecksumIsRight) {
-  for (const char* text : {"GNGGA,250000.00,5101.0,N,00342.0,E,4,14,0.9,22.5,M,45.0,M,0.8,",   // hour 25
-                           "GNGGA,120000.00,5160.0,N,00342.0,E,4,14,0.9,22.5,M,45.0,M,0.8,",   // 60 minutes
-                           "GNGGA,120000.00,9101.0,N,00342.0,E,4,14,0.9,22.5,M,45.0,M,0.8,",   // beyond the pole
-                           "GNGGA,120000.00,5101.0,X,00342.0,E,4,14,0.9,22.5,M,45.0,M,0.8,",   // no such side
-                           "GNGGA,120000.00,5101.0,N,00342.0,E,4,14,0.9,nan,M,45.0,M,0.8,",    // not a number
-                           "GNGGA,120000.00,5101.0,N",                                         // cut short
-                           "GNRMC,120000.00,A,5101.0,N,00342.0,E,0,0,310224,,,D",              // 31 February
-                           "GNGST,120000.00,,,,,-0.01,0.01,0.02"}) {
+  for (const char* text :
+       {"GNGGA,250000.00,5101.0,N,00342.0,E,4,14,0.9,22.5,M,45.0,M,0.8,",  // hour 25
+        "GNGGA,120000.00,5160.0,N,00342.0,E,4,14,0.9,22.5,M,45.0,M,0.8,",  // 60 minutes
+        "GNGGA,120000.00,9101.0,N,00342.0,E,4,14,0.9,22.5,M,45.0,M,0.8,",  // beyond the pole
+        "GNGGA,120000.00,5101.0,X,00342.0,E,4,14,0.9,22.5,M,45.0,M,0.8,",  // no such side
+        "GNGGA,120000.00,5101.0,N,00342.0,E,4,14,0.9,nan,M,45.0,M,0.8,",   // not a number
+        "GNGGA,120000.00,5101.0,N",                                        // cut short
+        "GNRMC,120000.00,A,5101.0,N,00342.0,E,0,0,310224,,,D",             // 31 February
+        "GNGST,120000.00,,,,,-0.01,0.01,0.02"}) {
     Skips skips;
     EXPECT_TRUE(decode(sentence(text), {}, &skips).empty()) << text;
     EXPECT_EQ(skips["nmea: field not readable"], 1U) << text;

@@ -6,7 +6,8 @@
 
 #include "samples.hpp"
 
-// Noise on the wire: nothing crashes, no frame with a wrong checksum is taken, and the next good one is found.
+// Noise on the wire: nothing crashes, no frame with a wrong checksum is taken, and the next good one is
+// found.
 
 namespace anchord::gnss {
 namespace {
@@ -31,26 +32,29 @@ std::string ubx_at(std::uint32_t itow_ms) {
 
 std::string gga_at(int second) {
   char text[128];
-  std::snprintf(text, sizeof text, "GNGGA,0900%02d.00,5101.3687380,N,00342.6274020,E,4,14,0.9,22.500,M,45.012,M,0.8,0000",
+  std::snprintf(text, sizeof text,
+                "GNGGA,0900%02d.00,5101.3687380,N,00342.6274020,E,4,14,0.9,22.500,M,45.012,M,0.8,0000",
                 second);
   return sentence(text);
 }
 
 std::string llh_at(int second) {
   char text[200];
-  std::snprintf(text, sizeof text,
-                "2024/06/16 00:00:%02d.600   51.022874322    3.710416541    61.0000   1  13   0.0140   0.0090   0.0210 "
-                "  0.0000  -0.0000  -0.0000   1.10   12.5\n",
-                second);
+  std::snprintf(
+      text, sizeof text,
+      "2024/06/16 00:00:%02d.600   51.022874322    3.710416541    61.0000   1  13   0.0140   0.0090   0.0210 "
+      "  0.0000  -0.0000  -0.0000   1.10   12.5\n",
+      second);
   return text;
 }
 
 std::string tpv_at(int second) {
   char text[200];
-  std::snprintf(text, sizeof text,
-                R"({"class":"TPV","mode":3,"status":3,"time":"2024-06-15T23:59:%02d.000Z","lat":51.02,"lon":3.71,"altHAE":63.5})"
-                "\r\n",
-                second);
+  std::snprintf(
+      text, sizeof text,
+      R"({"class":"TPV","mode":3,"status":3,"time":"2024-06-15T23:59:%02d.000Z","lat":51.02,"lon":3.71,"altHAE":63.5})"
+      "\r\n",
+      second);
   return text;
 }
 
@@ -84,7 +88,8 @@ std::vector<std::string> frames_of(std::string_view bytes, bool checksummed) {
   Framer framer(std::nullopt, skips);
   std::vector<std::string> out;
   const auto keep = [&](const Frame& frame) {
-    // A stray digit alone on a line is a (refused) line of LLH: only formats with a checksum are judged by it.
+    // A stray digit alone on a line is a (refused) line of LLH: only formats with a checksum are judged by
+    // it.
     const bool line = frame.protocol == Protocol::llh || frame.protocol == Protocol::gpsd;
     if (!checksummed || !line) out.emplace_back(frame.bytes);
   };
@@ -111,9 +116,15 @@ void expect_believable(const Epoch& e, const std::string& what) {
 std::string corrupted(std::string bytes, std::mt19937_64& random) {
   const std::size_t at = random() % bytes.size();
   switch (random() % 3) {
-    case 0: bytes[at] = static_cast<char>(bytes[at] ^ static_cast<char>(1 + random() % 255)); break;
-    case 1: bytes.erase(at, 1); break;
-    default: bytes.insert(at, 1, static_cast<char>(random() % 256)); break;
+    case 0:
+      bytes[at] = static_cast<char>(bytes[at] ^ static_cast<char>(1 + random() % 255));
+      break;
+    case 1:
+      bytes.erase(at, 1);
+      break;
+    default:
+      bytes.insert(at, 1, static_cast<char>(random() % 256));
+      break;
   }
   return bytes;
 }
@@ -132,12 +143,14 @@ TEST_P(Robustness, TenThousandCorruptionsGiveNoFalseFrameAndTheNextGoodOneIsFoun
   for (int i = 0; i < 10'000; ++i) {
     const auto bytes = corrupted(stream_.frames, random);
     if (stream_.checksummed) {
-      for (const auto& frame : frames_of(bytes, stream_.checksummed)) EXPECT_EQ(known.count(frame), 1U) << stream_.name << " case " << i;
+      for (const auto& frame : frames_of(bytes, stream_.checksummed))
+        EXPECT_EQ(known.count(frame), 1U) << stream_.name << " case " << i;
     }
     const auto epochs = decode(bytes + stream_.last);
     ASSERT_FALSE(epochs.empty());
     for (const auto& e : epochs) expect_believable(e, stream_.name);
-    EXPECT_EQ(epochs.back().time_of_day_ns, last_epochs.back().time_of_day_ns) << stream_.name << " case " << i;
+    EXPECT_EQ(epochs.back().time_of_day_ns, last_epochs.back().time_of_day_ns)
+        << stream_.name << " case " << i;
     EXPECT_EQ(epochs.back().lat_deg, last_epochs.back().lat_deg) << stream_.name << " case " << i;
   }
 }
@@ -149,7 +162,8 @@ TEST_P(Robustness, EveryPrefixIsHarmlessAndGivesOnlyFramesOfTheWhole) {
   for (std::size_t n = 0; n < bytes.size(); ++n) {
     const auto prefix = std::string_view(bytes).substr(0, n);
     if (std::string_view(stream_.name) != "gpsd") {  // a cut JSON line reaches the parser, which refuses it
-      for (const auto& frame : frames_of(prefix, stream_.checksummed)) EXPECT_EQ(known.count(frame), 1U) << stream_.name << " at " << n;
+      for (const auto& frame : frames_of(prefix, stream_.checksummed))
+        EXPECT_EQ(known.count(frame), 1U) << stream_.name << " at " << n;
     }
     for (const auto& e : decode(prefix)) expect_believable(e, stream_.name);
   }
@@ -161,7 +175,8 @@ TEST_P(Robustness, GarbageBetweenFramesCostsNone) {
   for (int i = 0; i < 200; ++i) {
     std::string noise(random() % 300, '\0');
     for (auto& c : noise) c = static_cast<char>(random());
-    EXPECT_EQ(decode(stream_.frames + noise + "\n" + stream_.last).size(), expected) << stream_.name << " case " << i;
+    EXPECT_EQ(decode(stream_.frames + noise + "\n" + stream_.last).size(), expected)
+        << stream_.name << " case " << i;
   }
 }
 
@@ -177,9 +192,8 @@ TEST_P(Robustness, PureNoiseGivesNothingBelievableAndStaysSmall) {
   EXPECT_LT(decoder.skips().entries().size(), 30U);
 }
 
-INSTANTIATE_TEST_SUITE_P(Formats, Robustness, testing::Range<std::size_t>(0, 5), [](const auto& param) {
-  return std::string(streams()[param.param].name);
-});
+INSTANTIATE_TEST_SUITE_P(Formats, Robustness, testing::Range<std::size_t>(0, 5),
+                         [](const auto& param) { return std::string(streams()[param.param].name); });
 
 }  // namespace
 }  // namespace anchord::gnss

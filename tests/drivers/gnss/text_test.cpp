@@ -9,13 +9,16 @@ namespace {
 using namespace test;
 
 const std::string k_llh_header =
-    "%  UTC                   latitude(deg) longitude(deg)  height(m)   Q  ns   sdn(m)   sde(m)   sdu(m)  sdne(m)  "
+    "%  UTC                   latitude(deg) longitude(deg)  height(m)   Q  ns   sdn(m)   sde(m)   sdu(m)  "
+    "sdne(m)  "
     "sdeu(m)  sdun(m) age(s)  ratio\n";
 const std::string k_llh_float =
-    "2024/06/15 23:59:51.000   51.022827740    3.710564222    62.7980   5  14   2.1000   1.4000   4.0000  -0.0001   "
+    "2024/06/15 23:59:51.000   51.022827740    3.710564222    62.7980   5  14   2.1000   1.4000   4.0000  "
+    "-0.0001   "
     "0.0001   0.0005   0.00    0.0\n";
 const std::string k_llh_fixed =
-    "2024/06/16 00:00:13.600   51.022874322    3.710416541    61.0000   1  13   0.0140   0.0090   0.0210   0.0000  "
+    "2024/06/16 00:00:13.600   51.022874322    3.710416541    61.0000   1  13   0.0140   0.0090   0.0210   "
+    "0.0000  "
     "-0.0000  -0.0000   1.10   12.5\n";
 
 TEST(Llh, DecodesTheExamples) {
@@ -58,19 +61,22 @@ TEST(Llh, TakesTheTimeSystemAndHeightFromTheHeader) {
 }
 
 TEST(Llh, ReadsDegreesMinutesSecondsAndOtherSeparators) {
-  const auto e = decode("2024/06/16 00:00:13.600,-0,30,36.00000,3,45,18.00000,61.0,1,13,0.01,0.01,0.02,0,0,0,1.1,12.5\n").at(0);
+  const auto e =
+      decode("2024/06/16 00:00:13.600,-0,30,36.00000,3,45,18.00000,61.0,1,13,0.01,0.01,0.02,0,0,0,1.1,12.5\n")
+          .at(0);
   EXPECT_NEAR(e.lat_deg.value(), -0.51, 1e-12);
   EXPECT_NEAR(e.lon_deg.value(), 3.755, 1e-12);
   EXPECT_EQ(e.height_ellipsoid_m, 61.0);
 }
 
 TEST(Llh, RefusesLinesItCannotTrust) {
-  for (const char* line : {"2024/06/16 00:00:13.600 51.0 3.7 61.0 1 13 0.01 0.01\n",                         // short
-                           "2024/06/16 00:00:13.600 51.0 3.7 61.0 8 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n",     // Q 8
-                           "2024/06/16 00:00:13.600 51.0 3.7x 61.0 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n",
-                           "2024/06/31 00:00:13.600 51.0 3.7 61.0 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n",
-                           "4/06/16 00:00:13.600 51.0 3.7 61.0 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n",        // joined late
-                           "2024/06/16 00:00:13.600 95.0 3.7 61.0 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n"}) {
+  for (const char* line :
+       {"2024/06/16 00:00:13.600 51.0 3.7 61.0 1 13 0.01 0.01\n",                      // short
+        "2024/06/16 00:00:13.600 51.0 3.7 61.0 8 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n",  // Q 8
+        "2024/06/16 00:00:13.600 51.0 3.7x 61.0 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n",
+        "2024/06/31 00:00:13.600 51.0 3.7 61.0 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n",
+        "4/06/16 00:00:13.600 51.0 3.7 61.0 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n",  // joined late
+        "2024/06/16 00:00:13.600 95.0 3.7 61.0 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n"}) {
     Skips skips;
     EXPECT_TRUE(decode(line, {}, &skips).empty()) << line;
     EXPECT_EQ(skips["llh: line not readable"], 1U) << line;
@@ -79,10 +85,11 @@ TEST(Llh, RefusesLinesItCannotTrust) {
 
 TEST(Llh, SaysThatEcefColumnsHoldNoGeodeticPosition) {
   Skips skips;
-  EXPECT_TRUE(decode("%  UTC  x-ecef(m) y-ecef(m) z-ecef(m) Q ns sdx(m) sdy(m) sdz(m) sdxy sdyz sdzx age(s) ratio\n"
-                     "2024/06/16 00:00:13.600 4000000.0 300000.0 4900000.0 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n",
-                     {}, &skips)
-                  .empty());
+  EXPECT_TRUE(
+      decode("%  UTC  x-ecef(m) y-ecef(m) z-ecef(m) Q ns sdx(m) sdy(m) sdz(m) sdxy sdyz sdzx age(s) ratio\n"
+             "2024/06/16 00:00:13.600 4000000.0 300000.0 4900000.0 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n",
+             {}, &skips)
+          .empty());
   EXPECT_EQ(skips["llh: ECEF or baseline form"], 1U);
 }
 
@@ -98,16 +105,18 @@ const std::string k_tpv =
     "\r\n";
 
 TEST(Gpsd, DecodesAFloatingEpochWithItsSigmas) {
-  const auto epochs = decode(
-      R"({"class":"VERSION","release":"3.22","rev":"3.22","proto_major":3,"proto_minor":14})"
-      "\r\n"
-      R"({"class":"SKY","hdop":0.9,"uSat":14})"
-      "\r\n"
-      R"({"class":"TPV","device":"x","mode":1})"
-      "\r\n"
-      R"({"class":"GST","device":"x"})"
-      "\r\n" +
-      k_tpv + R"({"class":"GST","time":"2024-06-15T23:59:54.000Z","rms":0.4,"lat":0.17,"lon":0.31,"alt":0.55})" "\r\n");
+  const auto epochs =
+      decode(R"({"class":"VERSION","release":"3.22","rev":"3.22","proto_major":3,"proto_minor":14})"
+             "\r\n"
+             R"({"class":"SKY","hdop":0.9,"uSat":14})"
+             "\r\n"
+             R"({"class":"TPV","device":"x","mode":1})"
+             "\r\n"
+             R"({"class":"GST","device":"x"})"
+             "\r\n" +
+             k_tpv +
+             R"({"class":"GST","time":"2024-06-15T23:59:54.000Z","rms":0.4,"lat":0.17,"lon":0.31,"alt":0.55})"
+             "\r\n");
   ASSERT_EQ(epochs.size(), 1U);
   const auto& e = epochs[0];
   EXPECT_EQ(e.fix, FixClass::rtk_float);  // status 4; NMEA's 4 would be fixed
@@ -123,8 +132,11 @@ TEST(Gpsd, DecodesAFloatingEpochWithItsSigmas) {
 
 TEST(Gpsd, MergesSeveralReportsOfOneTimeAndIgnoresEph) {
   const auto epochs = decode(
-      R"({"class":"TPV","mode":2,"time":"2024-06-15T23:59:54.000Z","lat":51.02,"lon":3.71})" "\n" + k_tpv +
-      R"({"class":"TPV","mode":3,"status":3,"time":"2024-06-15T23:59:54.200Z","lat":51.02,"lon":3.71,"altHAE":63.5,"eph":4.275})" "\n");
+      R"({"class":"TPV","mode":2,"time":"2024-06-15T23:59:54.000Z","lat":51.02,"lon":3.71})"
+      "\n" +
+      k_tpv +
+      R"({"class":"TPV","mode":3,"status":3,"time":"2024-06-15T23:59:54.200Z","lat":51.02,"lon":3.71,"altHAE":63.5,"eph":4.275})"
+      "\n");
   ASSERT_EQ(epochs.size(), 2U);
   EXPECT_EQ(epochs[0].height_ellipsoid_m, 63.576);
   EXPECT_EQ(epochs[1].fix, FixClass::rtk_fixed);
@@ -132,9 +144,11 @@ TEST(Gpsd, MergesSeveralReportsOfOneTimeAndIgnoresEph) {
 }
 
 TEST(Gpsd, DropsPositionsWithoutTimeAndOldHeights) {
-  const auto epochs = decode(
-      R"({"class":"TPV","mode":3,"lat":51.02,"lon":3.71,"altHAE":63.5})" "\n"
-      R"({"class":"TPV","mode":3,"time":"2024-06-15T23:59:54.200Z","lat":51.02,"lon":3.71,"alt":63.5})" "\n");
+  const auto epochs =
+      decode(R"({"class":"TPV","mode":3,"lat":51.02,"lon":3.71,"altHAE":63.5})"
+             "\n"
+             R"({"class":"TPV","mode":3,"time":"2024-06-15T23:59:54.200Z","lat":51.02,"lon":3.71,"alt":63.5})"
+             "\n");
   ASSERT_EQ(epochs.size(), 1U);
   EXPECT_FALSE(epochs[0].height_ellipsoid_m);  // "alt" was either height, by version
 }

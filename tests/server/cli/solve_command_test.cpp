@@ -24,7 +24,8 @@ Answer run(const std::string& arguments) {
   FILE* pipe = popen((std::string("'") + ANCHORD_BINARY + "' " + arguments + " 2>/dev/null").c_str(), "r");
   if (!pipe) return {-1, ""};
   std::array<char, 4096> chunk{};
-  for (std::size_t n = 0; (n = std::fread(chunk.data(), 1, chunk.size(), pipe)) > 0;) answer.out.append(chunk.data(), n);
+  for (std::size_t n = 0; (n = std::fread(chunk.data(), 1, chunk.size(), pipe)) > 0;)
+    answer.out.append(chunk.data(), n);
   const int status = pclose(pipe);
   answer.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   return answer;
@@ -33,7 +34,9 @@ Answer run(const std::string& arguments) {
 class SolveCommand : public ::testing::Test {
  protected:
   // A space in the path, on purpose; one folder per test, since tests run side by side.
-  fs::path folder_ = fs::path(::testing::TempDir()) / ("anchord solve " + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
+  fs::path folder_ =
+      fs::path(::testing::TempDir()) /
+      ("anchord solve " + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
   std::string quoted() const { return "'" + folder_.string() + "'"; }
   void SetUp() override {
     fs::remove_all(folder_);

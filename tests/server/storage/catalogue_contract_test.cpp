@@ -174,7 +174,8 @@ TEST_P(AnchorStoreContract, GivesBackACalibrationAsItWas) {
   e.time = k_noon;
   e.verdict = Verdict::ambiguous;
   e.reason = "two places fit";
-  e.best = Hypothesis{{{1, 2, 3}}, Wgs84{51.1, 3.1, 60}, Eigen::Vector3d(1e-4, 2e-4, 3e-4).asDiagonal(), 0.047, 0.6};
+  e.best = Hypothesis{
+      {{1, 2, 3}}, Wgs84{51.1, 3.1, 60}, Eigen::Vector3d(1e-4, 2e-4, 3e-4).asDiagonal(), 0.047, 0.6};
   e.mirror = Hypothesis{{{1, 2, -3}}, std::nullopt, Eigen::Matrix3d::Identity(), 0.05, 0.4};
   e.h95_m = 0.05;
   e.v95_m = std::numeric_limits<double>::infinity();
@@ -225,7 +226,8 @@ TEST_P(AnchorStoreContract, CarriesPositionsOnThatANewRevisionDoesNotSet) {
   EXPECT_TRUE(db_->anchors().published(std::nullopt).value().empty());
   const auto first = stored_calibration(mission, {1, 2});
   const auto second = stored_calibration(mission, {2, 3});
-  const auto r1 = db_->anchors().publish(first.id, {NetworkId{1}, NetworkId{2}}, "token", "first", k_noon).value();
+  const auto r1 =
+      db_->anchors().publish(first.id, {NetworkId{1}, NetworkId{2}}, "token", "first", k_noon).value();
   EXPECT_EQ(r1.number, 1u);
   ASSERT_TRUE(db_->anchors().publish(second.id, {NetworkId{2}}, "token", "", k_noon));
   const auto now = db_->anchors().published(std::nullopt).value();
@@ -261,7 +263,8 @@ INSTANTIATE_TEST_SUITE_P(Backends, AnchorStoreContract, backends(), backend_name
 class AccessContract : public StoreContract {};
 
 TEST_P(AccessContract, FindsATokenBySecretAndKeepsTheFirstRevocation) {
-  Token token{TokenId{make_uuid_v7(k_noon)}, "gate", std::string(64, 'a'), {"gateway", "viewer"}, k_noon, {}, {}, {}};
+  Token token{
+      TokenId{make_uuid_v7(k_noon)}, "gate", std::string(64, 'a'), {"gateway", "viewer"}, k_noon, {}, {}, {}};
   ASSERT_TRUE(db_->tokens().insert(token));
   EXPECT_EQ(db_->tokens().insert(token).error().code, Errc::conflict);
   ASSERT_TRUE(db_->tokens().touch(token.id, UtcTime{5}));

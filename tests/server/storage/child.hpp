@@ -7,7 +7,8 @@
 #include <functional>
 #include <string>
 
-/// A process of our own that can be killed. The body's answer is its exit code; what it writes to `out` can be read.
+/// A process of our own that can be killed. The body's answer is its exit code; what it writes to `out` can
+/// be read.
 class Child {
  public:
   explicit Child(const std::function<int(int out)>& body) {

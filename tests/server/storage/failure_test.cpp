@@ -25,7 +25,9 @@ struct Raw {
   ~Raw() { sqlite3_close(db); }
   Raw(const Raw&) = delete;
   Raw& operator=(const Raw&) = delete;
-  void run(const char* sql) { ASSERT_EQ(sqlite3_exec(db, sql, nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(db); }
+  void run(const char* sql) {
+    ASSERT_EQ(sqlite3_exec(db, sql, nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(db);
+  }
   sqlite3* db{nullptr};
 };
 
@@ -97,7 +99,8 @@ TEST_F(StorageFailure, AnswersStorageFullAtTheQuotaAndKeepsWhatItAcknowledged) {
     const auto db = open();
     mission = mission_in(*db).id;
     Result<std::vector<RowOutcome>> result = std::vector<RowOutcome>{};
-    while (acknowledged < 100'000 && (result = db->measurements().append_ranges(batch(mission, acknowledged, 500), false))) {
+    while (acknowledged < 100'000 &&
+           (result = db->measurements().append_ranges(batch(mission, acknowledged, 500), false))) {
       acknowledged += 500;
     }
     ASSERT_FALSE(result);
@@ -141,7 +144,8 @@ TEST_F(StorageFailure, GivesUpItsReserveBeforeItAnswersFull) {
   const auto reserve = options_.data_dir / "reserve.bin";
   EXPECT_EQ(std::filesystem::file_size(reserve), options_.reserve_bytes);
   const auto mission = mission_in(*db);
-  for (int i = 0; i < 100'000 && db->measurements().append_ranges(batch(mission.id, i, 500), false); i += 500) {
+  for (int i = 0; i < 100'000 && db->measurements().append_ranges(batch(mission.id, i, 500), false);
+       i += 500) {
     EXPECT_TRUE(std::filesystem::exists(reserve));
   }
   EXPECT_FALSE(std::filesystem::exists(reserve));
@@ -312,7 +316,8 @@ TEST_F(StorageFailure, BacksUpUnderLoadACopyThatPassesItsChecks) {
   ASSERT_TRUE(db->measurements().append_ranges(batch(mission.id, 0, 3000), false));
   std::atomic<bool> stop{false};
   std::thread writer([&] {
-    for (int i = 3000; !stop; i += 10) EXPECT_TRUE(db->measurements().append_ranges(batch(mission.id, i, 10), false));
+    for (int i = 3000; !stop; i += 10)
+      EXPECT_TRUE(db->measurements().append_ranges(batch(mission.id, i, 10), false));
   });
   const auto copy = dir_.path() / "copy.db";
   const auto report = db->backup(copy);

@@ -76,7 +76,8 @@ TEST_P(MeasurementStoreContract, GivesBackEveryFieldOfAFix) {
   Fix globe = fix_at(mission.id, 0);
   globe.received = UtcTime{globe.time.ns + 1};
   globe.seq = 12;
-  globe.covariance_m2 = (Eigen::Matrix3d() << 1e-4, 2e-5, 3e-6, 2e-5, 4e-4, 5e-6, 3e-6, 5e-6, 6e-4).finished();
+  globe.covariance_m2 =
+      (Eigen::Matrix3d() << 1e-4, 2e-5, 3e-6, 2e-5, 4e-4, 5e-6, 3e-6, 5e-6, 6e-4).finished();
   globe.enu_from_body = Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5);
   globe.correction_age_s = 0.8;
   globe.satellites = 21;
@@ -155,7 +156,8 @@ TEST_P(MeasurementStoreContract, StoresNothingOfAnAtomicCallWithOneBadRow) {
   bad.distance_m = 99;
   EXPECT_THAT(append({range_at(mission.id, 2), bad}, true), ElementsAre(accepted, conflict));
   EXPECT_EQ(db_->measurements().count_ranges(mission.id).value(), 1u);
-  EXPECT_THAT(append({range_at(mission.id, 1), range_at(mission.id, 2)}, true), ElementsAre(duplicate, accepted));
+  EXPECT_THAT(append({range_at(mission.id, 1), range_at(mission.id, 2)}, true),
+              ElementsAre(duplicate, accepted));
   EXPECT_EQ(db_->measurements().count_ranges(mission.id).value(), 2u);
 }
 

@@ -36,7 +36,8 @@ class Migrate : public testing::Test {
 // A landed migration is never edited. When this fails, the file was: take the edit back and write a new one.
 TEST_F(Migrate, FindsEveryLandedMigrationAsItWas) {
   std::string digests;
-  for (const Migration& m : sqlite_migrations()) digests += std::to_string(m.number) + " " + sha256_hex(m.sql) + "\n";
+  for (const Migration& m : sqlite_migrations())
+    digests += std::to_string(m.number) + " " + sha256_hex(m.sql) + "\n";
   EXPECT_EQ(digests, "1 5b9e60fa88e5313cd602de900b5ef1fd26ec48251481d3a023274024847ee06c\n");
 }
 
@@ -49,14 +50,16 @@ TEST_F(Migrate, KnowsTheDigestOfAPublishedVector) {
 const std::vector<Migration>& two_steps() {
   static const std::string slow = [] {
     const std::string numbers =
-        "WITH RECURSIVE n (value) AS (SELECT 1 UNION ALL SELECT value + 1 FROM n LIMIT 60000) SELECT value FROM n";
+        "WITH RECURSIVE n (value) AS (SELECT 1 UNION ALL SELECT value + 1 FROM n LIMIT 60000) SELECT value "
+        "FROM n";
     return "CREATE TABLE b (x INTEGER) STRICT; INSERT INTO b " + numbers + "; DROP TABLE a; ";
   }();
-  static const std::vector<Migration> steps = {
-      {1, "first",
-       "CREATE TABLE schema_migration (number INTEGER PRIMARY KEY, name TEXT NOT NULL, sha256_hex TEXT NOT NULL, "
-       "applied_t_ns INTEGER NOT NULL) STRICT; CREATE TABLE a (x INTEGER) STRICT; INSERT INTO a VALUES (42);"},
-      {2, "second", slow}};
+  static const std::vector<Migration> steps = {{1, "first",
+                                                "CREATE TABLE schema_migration (number INTEGER PRIMARY KEY, "
+                                                "name TEXT NOT NULL, sha256_hex TEXT NOT NULL, "
+                                                "applied_t_ns INTEGER NOT NULL) STRICT; CREATE TABLE a (x "
+                                                "INTEGER) STRICT; INSERT INTO a VALUES (42);"},
+                                               {2, "second", slow}};
   return steps;
 }
 
@@ -146,10 +149,12 @@ TEST_F(Migrate, StartsAgainAfterAKillDuringTheVeryFirstStart) {
 
 TEST_F(Migrate, OpensAStoredDatabaseOfEveryEarlierVersion) {
   for (int version = 1; version <= newest_schema_version(); ++version) {
-    std::ifstream in(std::filesystem::path(ANCHORD_TEST_DATA) / "storage" / ("version_" + std::to_string(version) + ".sql"));
+    std::ifstream in(std::filesystem::path(ANCHORD_TEST_DATA) / "storage" /
+                     ("version_" + std::to_string(version) + ".sql"));
     std::stringstream text;
     text << in.rdbuf();
-    ASSERT_FALSE(text.str().empty()) << "store a database of version " << version << " (see migrations/README.md)";
+    ASSERT_FALSE(text.str().empty()) << "store a database of version " << version
+                                     << " (see migrations/README.md)";
     StorageOptions options;
     options.data_dir = dir_.path() / ("v" + std::to_string(version));
     options.reserve_bytes = 0;
