@@ -5,6 +5,13 @@
 #include "api/live/frames.hpp"
 
 namespace anchord::api {
+namespace {
+
+constexpr std::uint16_t k_bye_code = 4010;
+constexpr std::string_view k_bye_reason = "shutting_down";
+
+}  // namespace
+
 
 const std::array<TopicInfo, k_topic_count>& topics() {
   static constexpr std::array<TopicInfo, k_topic_count> k_topics{{
@@ -109,6 +116,7 @@ bool Hub::join(HubListener& listener) {
   const std::scoped_lock lock(mutex_);
   if (connections_.size() >= k_max_connections) return false;
   connections_.insert(&listener);
+  if (closed_) listener.on_bye(k_bye_code, k_bye_reason);  // came between shut_down() and the closing door
   return true;
 }
 
@@ -179,7 +187,7 @@ void Hub::tick() {
 void Hub::shut_down() {
   const std::scoped_lock lock(mutex_);
   closed_ = true;
-  for (auto* listener : connections_) listener->on_bye(4010, "shutting_down");
+  for (auto* listener : connections_) listener->on_bye(k_bye_code, k_bye_reason);
 }
 
 std::size_t Hub::clients() const {

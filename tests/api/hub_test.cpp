@@ -163,5 +163,12 @@ TEST_F(HubRules, TellsTheTimeAndSaysGoodbye) {
   EXPECT_EQ(client->close_request()->first, 4010);
 }
 
+TEST_F(HubRules, SaysGoodbyeToWhomComesWhileItShutsDown) {
+  hub_.shut_down();
+  auto client = connect();
+  ASSERT_TRUE(client->close_request());
+  EXPECT_EQ(client->close_request()->first, 4010);
+}
+
 }  // namespace
 }  // namespace anchord::test
