@@ -21,14 +21,16 @@ struct Application::State {
         events(hub, deps.clock),
         missions({deps.missions, deps.measurements, deps.anchors, hub, events, deps.clock, deps.post}),
         ingest(deps.measurements, missions),
-        calibrations({deps.measurements, deps.missions, deps.anchors, deps.jobs, hub, deps.clock}),
-        services{deps, hub, events, missions, ingest, calibrations} {
+        jobs(deps.jobs, hub, deps.clock),
+        calibrations({deps.measurements, deps.missions, deps.anchors, jobs, deps.clock}),
+        services{deps, hub, events, missions, ingest, jobs, calibrations} {
     router.on_fault(deps.log_fault);
     add_mission_routes(router, services);
     add_measurement_routes(router, services);
     add_site_routes(router, services);
     add_anchor_routes(router, services);
     add_calibration_routes(router, services);
+    add_job_routes(router, services);
     if (deps.access != nullptr) add_access_routes(router, *deps.access);
     add_system_routes(router, services);
   }
@@ -42,6 +44,7 @@ struct Application::State {
   EventLog events;
   MissionService missions;
   IngestService ingest;
+  JobService jobs;
   CalibrationService calibrations;
   Services services;
   std::mutex mutex;
@@ -116,7 +119,7 @@ WsHandlerFactory Application::ws_factory() {
 
 void Application::start() {
   if (std::exchange(state_->started, true)) return;
-  state_->calibrations.start();
+  state_->jobs.start();
   state_->heart = std::thread([this] { state_->beat(); });
 }
 
@@ -128,7 +131,7 @@ void Application::stop() {
   state_->stop_told.notify_all();
   if (state_->heart.joinable()) state_->heart.join();
   state_->hub.shut_down();
-  state_->calibrations.stop();
+  state_->jobs.stop();
   state_->missions.stop();
 }
 

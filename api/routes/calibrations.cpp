@@ -1,10 +1,10 @@
-#include <atomic>
 #include <nlohmann/json.hpp>
 
 #include "api/json/live_writer.hpp"
 #include "api/json/reader.hpp"
 #include "api/json/wire_resources.hpp"
 #include "api/live/hub.hpp"
+#include "api/routes/job_answer.hpp"
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
 #include "core/ports/store.hpp"
@@ -14,26 +14,6 @@ namespace anchord::api {
 using Ordered = nlohmann::ordered_json;
 
 namespace {
-
-/// Requests that hold a thread of the pool while they wait for a job. Beyond this the answer is 202 at once,
-/// so that patient clients cannot starve all others.
-constexpr int k_max_waiting = 2;
-std::atomic<int>& waiting() {
-  static std::atomic<int> count{0};
-  return count;
-}
-
-class WaitSlot {
- public:
-  WaitSlot() : taken_(++waiting() <= k_max_waiting) {}
-  ~WaitSlot() { --waiting(); }
-  WaitSlot(const WaitSlot&) = delete;
-  WaitSlot& operator=(const WaitSlot&) = delete;
-  bool taken() const { return taken_; }
-
- private:
-  bool taken_;
-};
 
 /// Revisions that a calibration went into.
 Ordered published_in(Services& s, const CalibrationId& id) {
@@ -48,13 +28,6 @@ Ordered whole(Services& s, const Calibration& calibration) {
   Ordered body = calibration_json(calibration, true);
   body["published"] = published_in(s, calibration.id);
   return body;
-}
-
-Response job_answer(int status, const Job& job) {
-  Response response = json_response(status, job_json(job));
-  response.header("Location", "/api/v1/jobs/" + to_string(job.id));
-  if (status == 202) response.header("Retry-After", "1");
-  return response;
 }
 
 Response list(Services& s, const Request& request) {
@@ -92,30 +65,12 @@ Response create(Services& s, const Request& request) {
   refuse_if_any(errors);
   Job job = value_or_problem(s.calibrations.submit(std::move(wanted)));
   s.audit(request, "calibration.start " + to_string(job.id));
-  const int wait_s = prefer_wait_s(request);
-  if (wait_s > 0) {
-    const WaitSlot slot;
-    if (slot.taken()) job = value_or_problem(s.calibrations.wait(job.id, std::chrono::seconds(wait_s)));
-  }
-  if (job.state == JobState::succeeded) {
-    const auto calibration = value_or_problem(s.deps.anchors.calibration(CalibrationId{job.id.uuid}));
+  return job_outcome(s, request, std::move(job), [&](const Job& done) {
+    const auto calibration = value_or_problem(s.deps.anchors.calibration(CalibrationId{done.id.uuid}));
     Response response = json_response(201, whole(s, calibration));
     response.header("Location", "/api/v1/calibrations/" + to_string(calibration.id));
-    response.header("Preference-Applied", "wait=" + std::to_string(wait_s));
     return response;
-  }
-  if (job.state == JobState::failed) {
-    // The job's own problem is the answer: who waits wants to know why, not that there was a job.
-    const auto inner = nlohmann::json::parse(job.problem_json, nullptr, false);
-    const int status = inner.is_object() ? inner.value("status", 500) : 500;
-    std::string type =
-        inner.is_object() ? inner.value("type", std::string("/problems/internal")) : "/problems/internal";
-    Response response = problem(status, type.substr(type.rfind('/') + 1),
-                                inner.is_object() ? inner.value("detail", std::string()) : "");
-    response.header("Location", "/api/v1/jobs/" + to_string(job.id));
-    return response;
-  }
-  return job_answer(202, job);
+  });
 }
 
 /// Which anchors a publication takes. Without a list: those whose verdict is ok. A list may name others only
@@ -225,17 +180,6 @@ Response revisions(Services& s, const Request& request) {
   return list_response(request, std::move(items), more ? std::to_string(rows.back().number) : "");
 }
 
-Response jobs(Services& s, const Request& request) {
-  check_query(request, {"limit", "cursor", "fields"});
-  const auto page = page_query(request);
-  auto rows = value_or_problem(s.deps.jobs.jobs(page.limit + 1, cursor_id<JobId>(page.cursor)));
-  const bool more = rows.size() > page.limit;
-  if (more) rows.pop_back();
-  Ordered items = Ordered::array();
-  for (const auto& job : rows) items.push_back(job_json(job));
-  return list_response(request, std::move(items), more ? to_string(rows.back().id) : "");
-}
-
 }  // namespace
 
 void add_calibration_routes(Router& router, Services& s) {
@@ -262,21 +206,6 @@ void add_calibration_routes(Router& router, Services& s) {
   router.add({Method::post, "/api/v1/calibrations/{id}/publish", Access::any_of({Role::engineer, Role::op}),
               on(publish)});
   router.add({Method::get, "/api/v1/revisions", readers(), on(revisions)});
-  router.add({Method::get, "/api/v1/jobs", readers(), on(jobs)});
-  router.add({Method::get, "/api/v1/jobs/{id}", readers(), [&s](const Request& request) {
-                check_query(request, {});
-                const Job job = value_or_problem(s.deps.jobs.job(path_id<JobId>(request)));
-                return json_response(200, job_json(job));
-              }});
-  router.add({Method::del, "/api/v1/jobs/{id}", engineer, [&s](const Request& request) {
-                const auto id = path_id<JobId>(request);
-                const auto canceled = s.calibrations.cancel(id);
-                if (!canceled && canceled.error().code == Errc::conflict)
-                  throw_problem(422, "state", canceled.error().message);
-                const Job job = value_or_problem(canceled);
-                s.audit(request, "job.cancel " + to_string(id));
-                return json_response(job.state == JobState::canceled ? 200 : 202, job_json(job));
-              }});
 }
 
 }  // namespace anchord::api

@@ -4,6 +4,7 @@
 #include "api/services/calibration_service.hpp"
 #include "api/services/event_log.hpp"
 #include "api/services/ingest.hpp"
+#include "api/services/job_service.hpp"
 #include "api/services/mission_service.hpp"
 
 namespace anchord::api {
@@ -15,6 +16,7 @@ struct Services {
   EventLog& events;
   MissionService& missions;
   IngestService& ingest;
+  JobService& jobs;
   CalibrationService& calibrations;
 
   StorageStatus storage() const { return deps.storage_status ? deps.storage_status() : StorageStatus{}; }
@@ -27,6 +29,7 @@ void add_measurement_routes(Router& router, Services& services);
 void add_site_routes(Router& router, Services& services);
 void add_anchor_routes(Router& router, Services& services);
 void add_calibration_routes(Router& router, Services& services);
+void add_job_routes(Router& router, Services& services);
 void add_system_routes(Router& router, Services& services);
 
 }  // namespace anchord::api

@@ -1,8 +1,6 @@
 #pragma once
 
-#include <chrono>
 #include <functional>
-#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
@@ -16,7 +14,8 @@
 
 namespace anchord::api {
 
-class Hub;
+class JobContext;
+class JobService;
 
 /// A batch solve as asked for.
 struct CalibrationRequest {
@@ -35,36 +34,24 @@ CalibrationRequest read_calibration_request(const nlohmann::json& body, std::vec
 Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission,
                                const std::function<bool()>& canceled);
 
-/// Batch solves as jobs: one at a time on one background thread, at most 16 waiting; state in the JobStore,
-/// progress on topic `jobs`. Thread-safe.
+/// Batch solves as jobs of kind `calibration`. Thread-safe.
 class CalibrationService {
  public:
-  static constexpr std::size_t k_max_queued = 16;
   struct Deps {
     MeasurementStore& measurements;
     MissionStore& missions;
     AnchorStore& anchors;
-    JobStore& jobs;
-    Hub& hub;
+    JobService& jobs;
     const Clock& clock;
   };
-  explicit CalibrationService(Deps deps);
-  ~CalibrationService();
-
-  /// Jobs of the last run become failed: interrupted. Starts the thread.
-  void start();
-  void stop();
+  explicit CalibrationService(Deps deps) : deps_(deps) {}
 
   /// queue_full when too many wait; not_found for a mission that is not there.
   Result<Job> submit(CalibrationRequest request);
-  /// Waits for the end of a job; the job as it is after that time otherwise.
-  Result<Job> wait(const JobId& id, std::chrono::milliseconds longest);
-  /// conflict when it has ended.
-  Result<Job> cancel(const JobId& id);
 
  private:
-  struct State;
-  std::shared_ptr<State> state_;
+  Result<Calibration> solve(const CalibrationRequest& request, JobContext& job);
+  Deps deps_;
 };
 
 }  // namespace anchord::api

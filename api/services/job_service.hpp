@@ -1,0 +1,62 @@
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "core/base/result.hpp"
+#include "core/ports/store.hpp"
+
+namespace anchord::api {
+
+class Hub;
+
+/// What a job tells about itself while it runs. Called from the job's thread.
+class JobContext {
+ public:
+  virtual ~JobContext() = default;
+  virtual const Job& job() const = 0;
+  /// Written to the store and to topic `jobs`.
+  virtual void progress(double fraction, std::string stage, std::string detail) = 0;
+  /// Somebody canceled it, or the server stops: end soon with Errc::canceled.
+  virtual bool canceled() const = 0;
+};
+
+struct JobEnd {
+  std::string result_href{}, detail{};
+};
+
+/// Long work in a bounded, visible queue: one thread for each kind, so that a calibration never waits for a
+/// training run, at most 16 waiting of each. States live in the JobStore, progress goes to topic `jobs`.
+/// Thread-safe.
+class JobService {
+ public:
+  static constexpr std::size_t k_max_queued = 16;
+  using Work = std::function<Result<JobEnd>(JobContext&)>;
+
+  JobService(JobStore& jobs, Hub& hub, const Clock& clock);
+  ~JobService();
+  JobService(const JobService&) = delete;
+  JobService& operator=(const JobService&) = delete;
+
+  /// Jobs of the last run become failed: interrupted. From here on jobs run.
+  void start();
+  /// Asks what runs to end, and waits for it; what waits is marked interrupted by the next start.
+  void stop();
+
+  /// A job of a new id. queue_full when too many of its kind wait.
+  Result<Job> submit(std::string kind, std::string request_json, Work work);
+  /// The same job again under its own id, from the beginning. conflict while it waits, runs or has succeeded.
+  Result<Job> restart(const JobId& id, Work work);
+  /// Waits for the end of a job; the job as it is after that time otherwise.
+  Result<Job> wait(const JobId& id, std::chrono::milliseconds longest);
+  /// conflict when it has ended.
+  Result<Job> cancel(const JobId& id);
+
+ private:
+  struct State;
+  std::shared_ptr<State> state_;
+};
+
+}  // namespace anchord::api
