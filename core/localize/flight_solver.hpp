@@ -51,6 +51,8 @@ struct AnchorSolution {
   std::optional<double> delay_m;                               ///< d_a: this unit against the kit
   std::optional<double> delay_sigma_m;
   double residual_scale_m{};  ///< robust, 1.4826 MAD
+  std::vector<RangeResidual>
+      residuals;  ///< of every range the track could place, by time; weight 0: rejected
 };
 
 /// One flight solved. Positions are ENU of `origin`, or the track's own local metres where that is absent.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -15,6 +16,29 @@ namespace anchord {
 
 /// May this position be believed? Only `ok` may ever be accepted without a person.
 enum class Verdict : std::uint8_t { ok, weak_geometry, ambiguous, too_few, diverged };
+
+/// One acceptance test of an estimate: named, with its number and its limit.
+struct Gate {
+  std::string name;               ///< redundancy, geometry, side, chi_square, halves, flights, bias, prior
+  std::optional<double> value{};  ///< absent: could not be measured, and `why` says what was missing
+  double limit{};
+  bool passed{false};
+  std::string why;  ///< in words, with the numbers
+};
+
+/// What one range said in the end.
+struct RangeResidual {
+  UtcTime time{};
+  NetworkId tag{};
+  std::uint8_t antenna{0};
+  Eigen::Vector3d tag_m{0, 0, 0};  ///< antenna, ENU or local, lag applied
+  double distance_m{};             ///< as received
+  double corrected_m{};            ///< less the bias, curve, unit delay and what a model took off
+  double residual_m{};             ///< corrected - geometric
+  double standardised{};           ///< residual over its sigma and redundancy
+  double weight{};                 ///< 0..1; 0: rejected
+  std::optional<double> p_los{};   ///< after the fit, where a model gave one before
+};
 
 /// One place an anchor may be.
 struct Hypothesis {
@@ -43,6 +67,15 @@ struct Estimate {
   std::optional<double> bias_sigma_m{};
   std::optional<double> lag_s{};
   std::optional<double> lag_sigma_s{};
+  std::vector<Gate> gates{};  ///< in the order they were asked; empty in flight, where nothing is accepted
+
+  /// May be accepted without a person: verdict ok and every gate passed. Nothing else ever is.
+  bool acceptable() const;
 };
+
+inline bool Estimate::acceptable() const {
+  return verdict == Verdict::ok && best && !gates.empty() &&
+         std::all_of(gates.begin(), gates.end(), [](const Gate& gate) { return gate.passed; });
+}
 
 }  // namespace anchord
