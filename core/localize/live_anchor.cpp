@@ -17,6 +17,7 @@ namespace {
 // FlightOptions::correlation_s).
 constexpr double k_correlation_s = 10.0;
 constexpr double k_floor_sigma_m = 0.04;
+constexpr double k_weak_share = 0.2;  ///< of the median range: a 95 % bound wider than this places nothing
 
 SolverOptions solver_options(const LiveOptions& live, double bias_m) {
   SolverOptions options;
@@ -25,7 +26,7 @@ SolverOptions solver_options(const LiveOptions& live, double bias_m) {
   options.estimate_bias = true;
   options.bias_prior_m = bias_m;
   options.bias_prior_sigma_m = live.bias_prior_sigma_m;
-  options.max_iterations = 30;
+  options.max_iterations = 100;  // a track near a plane leaves a long curved valley to walk down
   return options;
 }
 
@@ -129,19 +130,21 @@ void LiveAnchor::describe(const LiveOptions& options) {
   estimate_.reason = geometry.reason;
   estimate_.verdict = Verdict::too_few;
   if (geometry.kind == GeometryKind::too_few || rows_.size() < 5) {
-    if (estimate_.reason.empty())
+    if (geometry.kind != GeometryKind::too_few)
       estimate_.reason = "too few: " + std::to_string(rows_.size()) + " ranges, need 5";
     return;
   }
-  estimate_.verdict = Verdict::diverged;
-  estimate_.reason = "no solution: the search left the finite numbers";
+  // A search that settles nowhere on a track that pins nothing down is the track's fault, not the ranges'.
+  const bool weak = geometry.kind != GeometryKind::good;
+  estimate_.verdict = weak ? Verdict::weak_geometry : Verdict::diverged;
+  if (!weak) estimate_.reason = "no position explains these ranges together";
   if (!position_m_) return;
   const SolverOptions settings = solver_options(options, 0.0);
   const auto rows = every_nth(rows_, 600);
   const auto fit = solve_anchor_gauss_newton(rows, *position_m_, settings);
   if (!fit) {
-    estimate_.verdict = fit.error().code == Errc::weak_geometry ? Verdict::weak_geometry : Verdict::diverged;
-    estimate_.reason = fit.error().message;
+    if (fit.error().code == Errc::weak_geometry) estimate_.verdict = Verdict::weak_geometry;
+    if (estimate_.reason.empty()) estimate_.reason = fit.error().message;
     return;
   }
   const AnchorFit& best = fit.value();
@@ -182,10 +185,14 @@ void LiveAnchor::describe(const LiveOptions& options) {
   const ErrorEllipse ellipse = error_ellipse(estimate_.best->covariance_m2);
   estimate_.h95_m = ellipse.h95_m;
   estimate_.v95_m = ellipse.v95_m;
-  if (geometry.kind == GeometryKind::collinear || ellipse.h95_m > 0.2 * geometry.median_range_m) {
-    char text[120];
-    std::snprintf(text, sizeof text, "weak geometry: 95 %% radius %.2f m at a median range of %.2f m",
-                  ellipse.h95_m, geometry.median_range_m);
+  const double limit_m = k_weak_share * geometry.median_range_m;
+  if (geometry.kind == GeometryKind::collinear || std::max(ellipse.h95_m, ellipse.v95_m) > limit_m) {
+    char text[160];
+    std::snprintf(
+        text, sizeof text,
+        "weak geometry: 95 %% within %.2f m horizontally and %.2f m vertically at a median range of "
+        "%.2f m",
+        ellipse.h95_m, ellipse.v95_m, geometry.median_range_m);
     estimate_.verdict = Verdict::weak_geometry;
     estimate_.reason = geometry.kind == GeometryKind::collinear ? geometry.reason : text;
   }

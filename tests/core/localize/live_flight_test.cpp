@@ -135,6 +135,30 @@ TEST(LiveFlight, UpdatesEachAnchorAtMostTwiceASecondOfMeasurementTime) {
   EXPECT_GT(updates, 4U * 100U);
 }
 
+TEST(LiveFlight, BlamesALevelFlightsGeometryAndNotItsRanges) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    MadeFlight made;
+    made.height_swing_m = 0;
+    made.duration_s = 40;
+    made.noise_m = 0.1;
+    made.seed = seed;
+    const auto flight = make_flight(made);
+    LiveFlight live(flight.mission);
+    auto ranges = flight.ranges;
+    std::ranges::stable_sort(ranges, {}, &Range::time);
+    std::size_t next = 0;
+    for (const Fix& fix : flight.fixes) {
+      while (next < ranges.size() && ranges[next].time < fix.time) live.add(ranges[next++]);
+      live.add(fix);
+      for (const Estimate& estimate : live.take_estimates()) {
+        const auto where = to_string(estimate.anchor) + " at " + std::to_string(fix.time.seconds()) + " s: ";
+        EXPECT_NE(estimate.verdict, Verdict::ok) << where << "v95 " << estimate.v95_m << " m";
+        EXPECT_NE(estimate.verdict, Verdict::diverged) << where << estimate.reason;
+      }
+    }
+  }
+}
+
 TEST(LiveFlight, PlacesAnRtkFlightOnTheGlobe) {
   MadeFlight made;
   made.frame = TrackFrame::wgs84;
