@@ -6,7 +6,7 @@
 #include <set>
 
 #include "core/ml/random.hpp"
-#include "core/ml/sha256.hpp"
+#include "core/base/sha256.hpp"
 
 namespace anchord::ml {
 namespace {

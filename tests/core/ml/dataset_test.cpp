@@ -5,7 +5,7 @@
 #include <map>
 #include <set>
 
-#include "core/ml/sha256.hpp"
+#include "core/base/sha256.hpp"
 
 namespace anchord::ml {
 namespace {

@@ -6,15 +6,17 @@
 #include <string>
 #include <string_view>
 
-namespace anchord::ml {
+namespace anchord {
 
-/// SHA-256 (FIPS 180-4), for content digests of data sets. Not for secrets: no constant time is promised.
+/// SHA-256 (FIPS 180-4), for content digests of data sets and signatures of
+/// MAVLink frames. No constant time is promised.
 class Sha256 {
  public:
   void add(std::string_view bytes);
   void add(double value);  ///< IEEE 754 bits, little endian; -0 counts as 0
   void add(std::uint64_t value);
-  std::string hex();  ///< 64 digits; call once
+  std::array<std::uint8_t, 32> digest();  ///< call once
+  std::string hex();                      ///< the digest as 64 digits; call once
 
  private:
   void block(const unsigned char* bytes);
@@ -25,4 +27,4 @@ class Sha256 {
   std::uint64_t length_{0};
 };
 
-}  // namespace anchord::ml
+}  // namespace anchord

@@ -1,8 +1,8 @@
-#include "core/ml/sha256.hpp"
+#include "core/base/sha256.hpp"
 
 #include <bit>
 
-namespace anchord::ml {
+namespace anchord {
 namespace {
 
 constexpr std::array<std::uint32_t, 64> k_round{
@@ -57,7 +57,7 @@ void Sha256::add(std::uint64_t value) {
 
 void Sha256::add(double value) { add(std::bit_cast<std::uint64_t>(value + 0.0)); }
 
-std::string Sha256::hex() {
+std::array<std::uint8_t, 32> Sha256::digest() {
   const std::uint64_t bits = length_ * 8;
   add(std::string_view{"\x80", 1});
   while (filled_ != 56) add(std::string_view{"\0", 1});
@@ -65,10 +65,19 @@ std::string Sha256::hex() {
     const char byte = static_cast<char>(static_cast<unsigned char>(bits >> shift));
     add(std::string_view{&byte, 1});
   }
-  std::string out;
-  for (const std::uint32_t word : state_)
-    for (int shift = 28; shift >= 0; shift -= 4) out += "0123456789abcdef"[(word >> shift) & 15U];
+  std::array<std::uint8_t, 32> out{};
+  for (std::size_t i = 0; i < out.size(); ++i)
+    out[i] = static_cast<std::uint8_t>(state_[i / 4] >> (24 - 8 * (i % 4)));
   return out;
 }
 
-}  // namespace anchord::ml
+std::string Sha256::hex() {
+  std::string out;
+  for (const std::uint8_t byte : digest()) {
+    out += "0123456789abcdef"[byte >> 4U];
+    out += "0123456789abcdef"[byte & 15U];
+  }
+  return out;
+}
+
+}  // namespace anchord
