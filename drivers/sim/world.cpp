@@ -23,9 +23,38 @@ std::optional<double> crossing(const Panel& panel, const Eigen::Vector3d& from_m
   return std::abs(along) / step_m.norm();
 }
 
+/// Absolute cosine between the line and the vertical where they cross; nothing when they do not.
+std::optional<double> crossing(const Slab& slab, const Eigen::Vector3d& from_m,
+                               const Eigen::Vector3d& step_m) {
+  if (std::abs(step_m.z()) < 1e-12) return std::nullopt;
+  const double share = (slab.height_m - from_m.z()) / step_m.z();
+  if (share <= 0 || share >= 1) return std::nullopt;
+  const Eigen::Vector2d at_m = (from_m + share * step_m).head<2>();
+  bool inside = false;  // even-odd rule
+  for (std::size_t i = 0, j = slab.outline_m.size() - 1; i < slab.outline_m.size(); j = i++) {
+    const Eigen::Vector2d &a = slab.outline_m[i], &b = slab.outline_m[j];
+    if ((a.y() > at_m.y()) != (b.y() > at_m.y()) &&
+        at_m.x() < (b.x() - a.x()) * (at_m.y() - a.y()) / (b.y() - a.y()) + a.x())
+      inside = !inside;
+  }
+  if (!inside) return std::nullopt;
+  return std::abs(step_m.z()) / step_m.norm();
+}
+
+void add_crossing(Obstruction& sum, double cosine, double excess_m, double loss_db) {
+  const double slant = 1.0 / std::max(cosine, 0.2);  // a grazing ray leaves through the panel's edge
+  sum.excess_m += excess_m * slant;
+  sum.loss_db += loss_db * slant;
+  ++sum.panels;
+}
+
+double slab_excess_m(const Material& material, double thickness_m) {
+  return (std::sqrt(material.relative_permittivity) - 1.0) * thickness_m;
+}
+
 Panel upright(double x0, double y0, double x1, double y1, double height_m, double thickness_m,
               const Material& material) {
-  return {{x0, y0, 0}, {x1 - x0, y1 - y0, 0}, {0, 0, height_m}, thickness_m, material};
+  return upright_wall({x0, y0}, {x1, y1}, 0, height_m, thickness_m, material);
 }
 
 /// One front: 3.5 m of glass, then a brick pier of 1.5 m, and so on to the corner.
@@ -56,7 +85,7 @@ World demonstration_world() {
   add_front(world, l, 0, l, w);
   add_front(world, l, w, 0, w);
   add_front(world, 0, w, 0, 0);
-  world.panels.push_back({{0, 0, h}, {l, 0, 0}, {0, w, 0}, 0.25, k_concrete});
+  world.panels.push_back({{0, 0, h}, {l, 0, 0}, {0, w, 0}, 0.25, k_concrete, {}});
   // Stair core in the middle, partitions at thirds.
   world.panels.push_back(upright(13, 8, 17, 8, h, 0.2, k_concrete));
   world.panels.push_back(upright(17, 8, 17, 12, h, 0.2, k_concrete));
@@ -69,16 +98,28 @@ World demonstration_world() {
   return world;
 }
 
+Panel upright_wall(const Eigen::Vector2d& from_m, const Eigen::Vector2d& to_m, double bottom_m, double top_m,
+                   double thickness_m, const Material& material) {
+  return {{from_m.x(), from_m.y(), bottom_m},
+          {to_m.x() - from_m.x(), to_m.y() - from_m.y(), 0},
+          {0, 0, top_m - bottom_m},
+          thickness_m,
+          material,
+          {}};
+}
+
 Obstruction obstruction_between(const World& world, const Eigen::Vector3d& a_m, const Eigen::Vector3d& b_m) {
   Obstruction sum;
   const Eigen::Vector3d step_m = b_m - a_m;
   for (const Panel& panel : world.panels) {
-    const auto cosine = crossing(panel, a_m, step_m);
-    if (!cosine) continue;
-    const double slant = 1.0 / std::max(*cosine, 0.2);  // a grazing ray leaves through the panel's edge
-    sum.excess_m += (std::sqrt(panel.material.relative_permittivity) - 1.0) * panel.thickness_m * slant;
-    sum.loss_db += panel.material.loss_db * slant;
-    ++sum.panels;
+    if (const auto cosine = crossing(panel, a_m, step_m)) {
+      add_crossing(sum, *cosine, panel.excess_m.value_or(slab_excess_m(panel.material, panel.thickness_m)),
+                   panel.material.loss_db);
+    }
+  }
+  for (const Slab& slab : world.slabs) {
+    if (const auto cosine = crossing(slab, a_m, step_m))
+      add_crossing(sum, *cosine, slab_excess_m(slab.material, slab.thickness_m), slab.material.loss_db);
   }
   return sum;
 }

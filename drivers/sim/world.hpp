@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -29,6 +30,15 @@ struct Panel {
   Eigen::Vector3d side_a_m{0, 0, 0}, side_b_m{0, 0, 0};  ///< at right angles to each other
   double thickness_m{};
   Material material{};
+  std::optional<double> excess_m{};  ///< extra path at right angles; absent: from thickness and material
+};
+
+/// A floor or roof: a polygon (x, y) at one height, any number of corners, either way round.
+struct Slab {
+  std::vector<Eigen::Vector2d> outline_m;
+  double height_m{};
+  double thickness_m{};
+  Material material{};
 };
 
 struct WorldAnchor {
@@ -41,8 +51,13 @@ struct World {
   Wgs84 origin{};
   double length_m{30}, width_m{20}, height_m{8};  ///< of the building: x 0..length, y 0..width, z 0..height
   std::vector<Panel> panels;
+  std::vector<Slab> slabs;
   std::vector<WorldAnchor> anchors;
 };
+
+/// An upright wall between two points seen from above.
+Panel upright_wall(const Eigen::Vector2d& from_m, const Eigen::Vector2d& to_m, double bottom_m, double top_m,
+                   double thickness_m, const Material& material);
 
 /// The demonstration building: 30 x 20 x 8 m with glass fronts between brick piers, a concrete stair core,
 /// plasterboard partitions and a concrete roof; six anchors inside, at 2.4 to 6.6 m.
