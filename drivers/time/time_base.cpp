@@ -1,0 +1,64 @@
+#include "drivers/time/time_base.hpp"
+
+#include <cmath>
+#include <cstdio>
+
+namespace anchord::timing {
+
+void TimeBase::arrived(const link::Arrival& at) {
+  system_ns_ = at.utc.ns - at.steady_ns;
+  newest_ns_ = at.steady_ns;
+  if (!pinned_ns_) pinned_ns_ = system_ns_;
+}
+
+void TimeBase::receiver_said(int receiver, UtcTime measured, const link::Arrival& at, double latency_s) {
+  arrived(at);
+  if (!receiver_id_) receiver_id_ = receiver;
+  if (receiver_id_ != receiver) return;
+  latency_s_ = latency_s;
+  receiver_.add(measured.ns, at.steady_ns);
+}
+
+void TimeBase::receiver_gone(int receiver) {
+  // What it taught us stays true for minutes; another receiver may take over and starts its own fit.
+  if (receiver_id_ == receiver && !receiver_.settled()) {
+    receiver_id_.reset();
+    receiver_ = ClockModel{};
+  }
+}
+
+TimeSource TimeBase::source() const {
+  return receiver_.settled() ? TimeSource::receiver : TimeSource::system_clock;
+}
+
+UtcStamp TimeBase::utc_of(std::int64_t steady_ns) const {
+  if (source() == TimeSource::receiver) {
+    if (const auto stamp = receiver_.device_of(steady_ns)) {
+      return {UtcTime{stamp->ns + static_cast<std::int64_t>(latency_s_ * 1e9)},
+              std::hypot(stamp->sigma_ns * 1e-9, k_latency_sigma_s)};
+    }
+  }
+  return {UtcTime{pinned_ns_.value_or(0) + steady_ns}, 0.5};
+}
+
+std::optional<double> TimeBase::system_offset_s() const {
+  if (source() != TimeSource::receiver) return std::nullopt;
+  return static_cast<double>(system_ns_ + newest_ns_ - utc_of(newest_ns_).time.ns) * 1e-9;
+}
+
+std::optional<std::string> TimeBase::skew() const {
+  char text[160];
+  if (const auto offset = system_offset_s()) {
+    const double allowed = k_skew_limit_s + 3 * k_latency_sigma_s;
+    if (std::abs(*offset) <= allowed) return std::nullopt;
+    std::snprintf(text, sizeof text, "the system clock is %.3f s %s of the receiver's UTC", std::abs(*offset),
+                  *offset > 0 ? "ahead" : "behind");
+    return text;
+  }
+  const double stepped = static_cast<double>(system_ns_ - pinned_ns_.value_or(system_ns_)) * 1e-9;
+  if (std::abs(stepped) <= k_skew_limit_s) return std::nullopt;
+  std::snprintf(text, sizeof text, "the system clock was moved by %+.3f s since the start", stepped);
+  return text;
+}
+
+}  // namespace anchord::timing
