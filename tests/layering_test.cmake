@@ -14,7 +14,7 @@ set(everywhere "Eigen/|boost/outcome/")
 
 set(core_own "^core/")
 set(core_header "^(${everywhere})")
-set(core_source "^(ceres/|libsvm/|glog/|opencv2/|GeographicLib/|sys/random\\.h$)")
+set(core_source "^(ceres/|libsvm/|glog/|opencv2/|GeographicLib/|proj\\.h$|sys/random\\.h$)")
 
 set(drivers_own "^(drivers/|${base_types_ports})")
 set(drivers_header "^(${everywhere}|boost/asio)")

@@ -1,0 +1,124 @@
+#include "core/geo/projection.hpp"
+
+#include <proj.h>
+
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <mutex>
+#include <utility>
+
+namespace anchord {
+
+struct Projection::Pipeline {
+  Pipeline() : context(proj_context_create()) {
+    proj_context_set_enable_network(context, 0);
+    // PROJ prints what it cannot do; we say it in our own words.
+    proj_log_level(context, PJ_LOG_NONE);
+  }
+  ~Pipeline() {
+    if (operation != nullptr) proj_destroy(operation);
+    proj_context_destroy(context);
+  }
+  Pipeline(const Pipeline&) = delete;
+  Pipeline& operator=(const Pipeline&) = delete;
+  PJ_CONTEXT* context;
+  PJ* operation{nullptr};
+  std::mutex mutex;  // a PJ belongs to one thread at a time
+};
+
+namespace {
+
+struct Datum {
+  std::string_view word;
+  int epsg;
+};
+/// Geographic 3D systems of the EPSG registry; words without capitals, blanks and hyphens.
+constexpr std::array k_datums{Datum{"wgs84", 4979},     Datum{"etrs89", 4937},      Datum{"etrf2000", 7931},
+                              Datum{"itrf2008", 7911},  Datum{"itrf2014", 7912},    Datum{"itrf2020", 9989},
+                              Datum{"igs14", 9018},     Datum{"nad83(2011)", 6319}, Datum{"gda94", 4939},
+                              Datum{"gda2020", 7843},   Datum{"jgd2011", 6667},     Datum{"nzgd2000", 4959},
+                              Datum{"sirgas2000", 4988}};
+
+struct Owned {
+  PJ* pj;
+  ~Owned() {
+    if (pj != nullptr) proj_destroy(pj);
+  }
+};
+
+std::string code(int epsg) { return "EPSG:" + std::to_string(epsg); }
+
+}  // namespace
+
+std::optional<int> geographic_epsg(std::string_view datum) {
+  std::string word;
+  for (const char c : datum.substr(0, datum.find(" ("))) {
+    if (c != ' ' && c != '-' && c != '_')
+      word += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  }
+  for (const auto& known : k_datums) {
+    if (word == known.word) return known.epsg;
+  }
+  return std::nullopt;
+}
+
+Projection::Projection(int epsg, std::string name, std::unique_ptr<Pipeline> pipeline)
+    : epsg_(epsg), name_(std::move(name)), pipeline_(std::move(pipeline)) {}
+Projection::Projection(Projection&&) noexcept = default;
+Projection& Projection::operator=(Projection&&) noexcept = default;
+Projection::~Projection() = default;
+
+Result<Projection> Projection::open(int epsg, int geographic_epsg) {
+  auto pipeline = std::make_unique<Pipeline>();
+  PJ_CONTEXT* context = pipeline->context;
+  const Owned target{proj_create(context, code(epsg).c_str())};
+  const Owned source{proj_create(context, code(geographic_epsg).c_str())};
+  if (target.pj == nullptr) return make_error(Errc::not_found, "PROJ knows no " + code(epsg));
+  if (source.pj == nullptr) return make_error(Errc::not_found, "PROJ knows no " + code(geographic_epsg));
+  const char* given = proj_get_name(target.pj);
+  std::string name = given != nullptr ? given : code(epsg);
+  if (proj_get_type(target.pj) != PJ_TYPE_PROJECTED_CRS)
+    return make_error(Errc::invalid_argument, code(epsg) + " (" + name + ") is not a projected system");
+  const Owned conversion{proj_crs_get_coordoperation(context, target.pj)};
+  const char* method = nullptr;
+  if (conversion.pj != nullptr)
+    proj_coordoperation_get_method_info(context, conversion.pj, &method, nullptr, nullptr);
+  // PROJ computes this method without its rotation of 29.3", which is 745 m in EPSG:31300.
+  if (method != nullptr && std::string_view(method).find("2SP Belgium") != std::string_view::npos)
+    return make_error(Errc::unsupported, name + " is not computed rightly by PROJ; take EPSG:31370");
+  const char* const options[] = {"ALLOW_BALLPARK=NO", nullptr};
+  const Owned found{proj_create_crs_to_crs_from_pj(context, source.pj, target.pj, nullptr, options)};
+  if (found.pj == nullptr)
+    return make_error(Errc::unsupported,
+                      "no way from " + code(geographic_epsg) + " to " + name + " with the grids installed");
+  // Longitude and easting first, in whatever order the register has the axes.
+  pipeline->operation = proj_normalize_for_visualization(context, found.pj);
+  if (pipeline->operation == nullptr) return make_error(Errc::unsupported, name + ": axes not understood");
+  return Projection(epsg, std::move(name), std::move(pipeline));
+}
+
+Result<Eigen::Vector2d> Projection::easting_northing_m(const Wgs84& at) const {
+  const std::scoped_lock lock(pipeline_->mutex);
+  const PJ_COORD out =
+      proj_trans(pipeline_->operation, PJ_FWD, proj_coord(at.lon_deg, at.lat_deg, at.height_m, HUGE_VAL));
+  if (!std::isfinite(out.xy.x) || !std::isfinite(out.xy.y)) {
+    proj_errno_reset(pipeline_->operation);
+    return make_error(Errc::invalid_argument, "the place lies outside " + name_);
+  }
+  return Eigen::Vector2d(out.xy.x, out.xy.y);
+}
+
+Result<Wgs84> Projection::geographic(const Eigen::Vector2d& easting_northing_m, double height_m) const {
+  const std::scoped_lock lock(pipeline_->mutex);
+  const PJ_COORD out =
+      proj_trans(pipeline_->operation, PJ_INV,
+                 proj_coord(easting_northing_m.x(), easting_northing_m.y(), height_m, HUGE_VAL));
+  if (!std::isfinite(out.xy.x) || !std::isfinite(out.xy.y)) {
+    proj_errno_reset(pipeline_->operation);
+    return make_error(Errc::invalid_argument, "the place lies outside " + name_);
+  }
+  return Wgs84{out.xy.y, out.xy.x, height_m};
+}
+
+}  // namespace anchord

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "core/base/result.hpp"
+#include "core/types/position.hpp"
+
+namespace anchord {
+
+/// EPSG code of the geographic 3D system a base station's datum is: "ETRS89" -> 4937. Capitals, blanks,
+/// hyphens and an epoch in brackets do not matter. Nothing for a datum this table does not name, and for none
+/// at all.
+std::optional<int> geographic_epsg(std::string_view datum);
+
+/// Map coordinates of an EPSG code, by PROJ with what is installed (never the network, never a "ballpark"
+/// that leaves out a datum shift). Safe to use from any thread.
+class Projection {
+ public:
+  /// epsg             projected system, e.g. 25831 (ETRS89 / UTM 31N)
+  /// geographic_epsg  system of the latitudes and longitudes put in, e.g. 4937
+  /// errors           not_found (no such code), invalid_argument (not a projected system), unsupported (no
+  /// way
+  ///                  from the one datum to the other with what is installed)
+  static Result<Projection> open(int epsg, int geographic_epsg);
+  Projection(Projection&&) noexcept;
+  Projection& operator=(Projection&&) noexcept;
+  ~Projection();
+
+  int epsg() const { return epsg_; }
+  const std::string& name() const { return name_; }
+  /// Easting and northing, whatever order the system's own axes have. errors: invalid_argument outside the
+  /// projection. accuracy: PROJ's, below 1 mm within a zone, plus that of the datum shift where there is one.
+  Result<Eigen::Vector2d> easting_northing_m(const Wgs84& at) const;
+  /// The way back; height is handed through.
+  Result<Wgs84> geographic(const Eigen::Vector2d& easting_northing_m, double height_m) const;
+
+ private:
+  struct Pipeline;
+  Projection(int epsg, std::string name, std::unique_ptr<Pipeline> pipeline);
+  int epsg_{};
+  std::string name_;
+  std::unique_ptr<Pipeline> pipeline_;
+};
+
+}  // namespace anchord

@@ -1,0 +1,109 @@
+#include "core/geo/projection.hpp"
+
+#include <gtest/gtest.h>
+
+#include <GeographicLib/UTMUPS.hpp>
+#include <filesystem>
+#include <fstream>
+
+#include "core/geo/geoid.hpp"
+
+namespace anchord {
+namespace {
+
+constexpr double degrees(double d, double m, double s) { return d + m / 60 + s / 3600; }
+
+TEST(Projection, GivesTheBritishNationalGridExampleOfEpsg) {
+  // IOGP Guidance Note 7-2, section 3.5.3.1 (Transverse Mercator): OSGB 36 50 30'N 0 30'E ->
+  // E 577274.99, N 69740.50.
+  const auto grid = Projection::open(27700, 4277);
+  ASSERT_TRUE(grid.has_value()) << grid.error().message;
+  const auto at = grid.value().easting_northing_m({50.5, 0.5, 0});
+  ASSERT_TRUE(at.has_value());
+  EXPECT_NEAR(at.value().x(), 577274.99, 0.01);
+  EXPECT_NEAR(at.value().y(), 69740.50, 0.01);
+}
+
+TEST(Projection, GivesTheJamaicanLambertExampleOfEpsg) {
+  // IOGP Guidance Note 7-2, Lambert Conic Conformal (1SP): JAD69 17 55'55.80"N 76 56'37.26"W ->
+  // E 255966.58, N 142493.51.
+  const auto lambert = Projection::open(24200, 4242);
+  ASSERT_TRUE(lambert.has_value()) << lambert.error().message;
+  const auto at = lambert.value().easting_northing_m({degrees(17, 55, 55.80), -degrees(76, 56, 37.26), 0});
+  ASSERT_TRUE(at.has_value());
+  EXPECT_NEAR(at.value().x(), 255966.58, 0.01);
+  EXPECT_NEAR(at.value().y(), 142493.51, 0.01);
+}
+
+TEST(Projection, AgreesWithAnotherLibraryInUtmAndComesBack) {
+  const auto utm = Projection::open(32631, 4979);
+  ASSERT_TRUE(utm.has_value()) << utm.error().message;
+  EXPECT_EQ(utm.value().name(), "WGS 84 / UTM zone 31N");
+  const Wgs84 place{51.023123457, 3.713123457, 58.4};
+  const auto at = utm.value().easting_northing_m(place);
+  ASSERT_TRUE(at.has_value());
+  int zone = 0;
+  bool north = false;
+  double easting = 0, northing = 0;
+  GeographicLib::UTMUPS::Forward(place.lat_deg, place.lon_deg, zone, north, easting, northing);
+  EXPECT_EQ(zone, 31);
+  EXPECT_NEAR(at.value().x(), easting, 1e-6);
+  EXPECT_NEAR(at.value().y(), northing, 1e-6);
+  const auto back = utm.value().geographic(at.value(), 58.4);
+  ASSERT_TRUE(back.has_value());
+  EXPECT_NEAR(back.value().lat_deg, place.lat_deg, 1e-11);
+  EXPECT_NEAR(back.value().lon_deg, place.lon_deg, 1e-11);
+}
+
+TEST(Projection, RefusesWhatIsNoMap) {
+  EXPECT_EQ(Projection::open(999999, 4937).error().code, Errc::not_found);
+  EXPECT_EQ(Projection::open(4326, 4937).error().code, Errc::invalid_argument);
+  EXPECT_EQ(Projection::open(31300, 4313).error().code, Errc::unsupported);  // PROJ is 745 m off there
+  const auto utm = Projection::open(25831, 4937);
+  ASSERT_TRUE(utm.has_value());
+  EXPECT_FALSE(utm.value().easting_northing_m({91, 0, 0}).has_value());
+}
+
+TEST(Projection, KnowsDatumsByTheirWordsAndNothingByGuess) {
+  EXPECT_EQ(geographic_epsg("ETRS89"), 4937);
+  EXPECT_EQ(geographic_epsg("WGS 84"), 4979);
+  EXPECT_EQ(geographic_epsg("ITRF2014 (2026.3)"), 7912);
+  EXPECT_FALSE(geographic_epsg("").has_value());
+  EXPECT_FALSE(geographic_epsg("our own").has_value());
+}
+
+/// A geoid of one height in GeographicLib's PGM format: raw = (height - offset) / scale.
+void write_geoid(const std::filesystem::path& file, double height_m) {
+  std::ofstream out(file, std::ios::binary);
+  out << "P5\n# Geoid file in PGM format for the GeographicLib::Geoid class\n# Description test\n"
+         "# Offset -108\n# Scale 0.003\n# Origin 90N 0E\n# AREA_OR_POINT Point\n8 5\n65535\n";
+  const auto raw = static_cast<unsigned>(std::lround((height_m + 108) / 0.003));
+  for (int i = 0; i < 40; ++i) out << static_cast<char>(raw >> 8U) << static_cast<char>(raw & 0xffU);
+}
+
+TEST(Geoid, SaysThatThereIsNoneAndWhatWouldInstallOne) {
+  const auto none = Geoid::open("/nonexistent");
+  ASSERT_FALSE(none.has_value());
+  EXPECT_EQ(none.error().code, Errc::not_found);
+  EXPECT_NE(none.error().message.find("geographiclib-get-geoids"), std::string::npos);
+}
+
+TEST(Geoid, ReadsTheHeightOfAnInstalledFile) {
+  char folder[] = "/tmp/anchord_geoid_XXXXXX";
+  ASSERT_NE(mkdtemp(folder), nullptr);
+  const std::filesystem::path dir(folder);
+  write_geoid(dir / "egm96-15.pgm", 43.5);
+  const auto geoid = Geoid::open(dir.string());
+  ASSERT_TRUE(geoid.has_value()) << geoid.error().message;
+  EXPECT_EQ(geoid.value().name(), "EGM96");
+  const auto height = geoid.value().undulation_m({51, 3.7, 58.4});
+  ASSERT_TRUE(height.has_value());
+  EXPECT_NEAR(height.value(), 43.5, 1e-9);
+  EXPECT_FALSE(geoid.value().undulation_m({91, 0, 0}).has_value());
+  std::ofstream(dir / "egm2008-1.pgm") << "P5\nbroken";
+  EXPECT_EQ(Geoid::open(dir.string()).error().code, Errc::bad_frame);
+  std::filesystem::remove_all(dir);
+}
+
+}  // namespace
+}  // namespace anchord
