@@ -35,6 +35,18 @@ void add(std::vector<Recipe>& out, const Dataset& data, Recipe recipe, const Nam
   out.push_back(std::move(recipe));
 }
 
+bool wanted(const LearnOptions& options, Method method) {
+  return std::find(options.methods.begin(), options.methods.end(), method) != options.methods.end();
+}
+
+// The declared values of each setting: the caller's grid, the default one, or the defaults alone.
+std::map<std::string, std::vector<double>> axes(const LearnOptions& options, Method method,
+                                                bool classification) {
+  if (const auto found = options.grid.find(method); found != options.grid.end()) return found->second;
+  if (options.search) return default_grid(method, classification);
+  return {};
+}
+
 Recipe boosted(const LearnOptions& options, std::size_t rows) {
   Recipe r;
   r.method = Method::boosted;
@@ -77,10 +89,11 @@ std::vector<Recipe> classifier_candidates(const Dataset& data, const LearnOption
 
   // The average first: each single family fails on some set, so it must be beaten clearly, not tied.
   std::vector<Method> methods{Method::average, Method::logistic, Method::random_forest};
-  if (options.method) methods = {*options.method};
+  const bool chosen = !options.methods.empty();
+  if (chosen) methods = options.methods;
   // Many rows without placements: the small models are for the table, trees on everything win.
   const bool many = placements > 5000;
-  if (many && !options.method) methods = {Method::logistic};
+  if (many && !chosen) methods = {Method::logistic};
 
   std::vector<Recipe> out;
   for (const auto& set : sets) {
@@ -88,34 +101,16 @@ std::vector<Recipe> classifier_candidates(const Dataset& data, const LearnOption
       if (method == Method::boosted) continue;
       Recipe r = plain;
       r.method = method;
-      if (!options.grid) {
-        add(out, data, r, set);
-        continue;
-      }
-      // The declared grid: C, SVM C x gamma, leaf.
-      for (const double c : few ? std::vector<double>{0.1, 0.3, 1} : std::vector<double>{1, 3, 10, 30}) {
-        for (const double gamma : method == Method::svm || method == Method::average
-                                      ? std::vector<double>{0.01, 0.03, 0.1}
-                                      : std::vector<double>{0.03}) {
-          for (const double leaf : method == Method::random_forest || method == Method::average
-                                       ? std::vector<double>{0.02, 0.03, 0.05, 0.08}
-                                       : std::vector<double>{0.03}) {
-            r.c = c, r.svm.c = std::min(c, 10.0), r.svm.gamma = gamma, r.forest.leaf_share = leaf;
-            if (method == Method::random_forest && c != (few ? 0.1 : 1.0))
-              continue;  // C is nothing to a forest
-            add(out, data, r, set);
-          }
-        }
-      }
+      for (const auto& point : expand(r, axes(options, method, true))) add(out, data, point, set);
     }
   }
-  if ((many && !options.method) || options.method == Method::boosted) {
-    auto r = boosted(options, placements);
+  if ((many && !chosen) || wanted(options, Method::boosted)) {
     const auto& everything = options.features.empty() ? data.features : options.features;
-    add(out, data, r,
-        Names(everything.begin(),
-              everything.begin() + static_cast<std::ptrdiff_t>(std::min(everything.size(), k_max_features))));
-    if (many && !options.method) {
+    const Names first(everything.begin(), everything.begin() + static_cast<std::ptrdiff_t>(std::min(
+                                                                   everything.size(), k_max_features)));
+    for (const auto& r : expand(boosted(options, placements), axes(options, Method::boosted, true)))
+      add(out, data, r, first);
+    if (many && !chosen) {
       Recipe forest = plain;
       forest.method = Method::random_forest;
       forest.clip = 0;
@@ -141,46 +136,47 @@ std::vector<Recipe> regressor_candidates(const Dataset& data, const LearnOptions
   r.clip = 2.5;
   r.forest.seed = options.seed;
   r.forest.leaf_share = 0.04;
-  const auto wanted = [&](Method m) { return !options.method || *options.method == m; };
+  const auto tried = [&](Method m) { return options.methods.empty() || wanted(options, m); };
+  const auto add_all = [&](const Recipe& base) {
+    for (const auto& point : expand(base, axes(options, base.method, false))) out.push_back(point);
+  };
 
   r.method = Method::none;
   r.features = {levels.front()};
   out.push_back(r);  // always: the row every correction is measured against
   r.method = Method::constant;
-  if (wanted(r.method)) out.push_back(r);
+  if (tried(r.method)) out.push_back(r);
   r.method = Method::univariate;
-  for (const auto& name : levels)
-    for (int degree = 1; wanted(r.method) && degree <= 4; ++degree) {
-      if (name == "height_difference_m" && options.features.empty()) continue;
-      r.degree = degree;
-      r.features = {name};
-      out.push_back(r);
-    }
+  for (const auto& name : levels) {
+    if (!tried(r.method) || (name == "height_difference_m" && options.features.empty())) continue;
+    r.features = {name};
+    auto degrees = axes(options, r.method, false);
+    if (degrees.empty()) degrees = {{"degree", {1, 2, 3, 4}}};
+    for (const auto& point : expand(r, degrees)) out.push_back(point);
+  }
   r.features = levels;
   r.method = Method::least_absolute;
-  if (wanted(r.method)) out.push_back(r);
+  if (tried(r.method)) out.push_back(r);
   r.method = Method::multivariate;
-  for (int degree = 1; wanted(r.method) && levels.size() > 1 && degree <= 3; ++degree) {
-    r.degree = degree;
-    out.push_back(r);
+  if (tried(r.method) && levels.size() > 1) {
+    auto degrees = axes(options, r.method, false);
+    if (degrees.empty()) degrees = {{"degree", {1, 2, 3}}};
+    for (const auto& point : expand(r, degrees)) out.push_back(point);
   }
   r.method = Method::svm;
   r.svm.c = 1;
   r.svm.gamma = 0.1;
   r.svm.epsilon_m = 0.01;
-  if (wanted(r.method)) out.push_back(r);
+  if (tried(r.method)) add_all(r);
   r.method = Method::random_forest;
   r.clip = 0;
   r.forest.features_per_split = std::max<std::size_t>(1, (levels.size() + 1) / 2);
-  for (const double leaf :
-       options.grid ? std::vector<double>{0.01, 0.02, 0.04, 0.08} : std::vector<double>{0.02}) {
-    r.forest.leaf_share = leaf;
-    if (wanted(r.method)) out.push_back(r);
-  }
-  if (options.method == Method::boosted) {
+  r.forest.leaf_share = 0.02;
+  if (tried(r.method)) add_all(r);
+  if (wanted(options, Method::boosted)) {
     auto b = boosted(options, count_distinct(data.placement));
     b.features = levels;
-    out.push_back(b);
+    add_all(b);
   }
   return out;
 }

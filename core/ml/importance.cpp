@@ -31,45 +31,47 @@ double loss_of(const std::vector<BaggedTree>& trees, const TrainingRows& rows) {
 }  // namespace
 
 Result<std::vector<Importance>> permutation_importance(const Dataset& all, const Recipe& recipe,
-                                                       bool classification, int repeats) {
+                                                       bool classification, int repeats,
+                                                       const Execution& run) {
   BOOST_OUTCOME_TRY(const auto chosen, all.with_features(recipe.features));
   const Dataset data = thin_placements(chosen, recipe.per_placement);
   std::vector<double> y(data.los.begin(), data.los.end());
   if (!classification) y = data.bias_m;
   if (y.size() != data.rows() || y.empty())
     return make_error(Errc::invalid_argument, "the data have no answers to learn");
-  std::vector<double> x = data.x;
-  const TrainingRows rows{x, data.columns(), y, data.weight};
-  std::vector<BaggedTree> trees;
-  auto options = recipe.forest;
-  options.trees = 1;
-  for (int t = 0; t < recipe.forest.trees; ++t) {
+  const TrainingRows rows{data.x, data.columns(), y, data.weight};
+  std::vector<BaggedTree> trees(static_cast<std::size_t>(std::max(recipe.forest.trees, 0)));
+  BOOST_OUTCOME_TRY(parallel_for(trees.size(), run, [&](std::size_t t) -> Result<void> {
+    auto options = recipe.forest;
+    options.trees = 1;
     options.seed = recipe.forest.seed + 7919 * static_cast<std::uint64_t>(t + 1);
     std::vector<double> out_of_bag;
     auto tree = fit_forest(rows, options, &out_of_bag);
     std::vector<std::size_t> unseen;
     for (std::size_t i = 0; i < out_of_bag.size(); ++i)
       if (!std::isnan(out_of_bag[i])) unseen.push_back(i);
-    trees.push_back({std::move(tree), std::move(unseen)});
-  }
+    trees[t] = {std::move(tree), std::move(unseen)};
+    return boost::outcome_v2::success();
+  }));
   const double whole = std::max(loss_of(trees, rows), 1e-12);
-  Random random{recipe.forest.seed};
-  std::vector<Importance> out;
-  for (std::size_t f = 0; f < data.columns(); ++f) {
+  std::vector<Importance> out(data.columns());
+  BOOST_OUTCOME_TRY(parallel_for(data.columns(), run, [&](std::size_t f) -> Result<void> {
+    Random random{recipe.forest.seed + 104729 * (f + 1)};
+    std::vector<double> x = data.x, column(data.rows());
+    const TrainingRows shuffled{x, data.columns(), y, data.weight};
     double sum = 0, squares = 0;
-    for (int r = 0; r < repeats; ++r) {
-      std::vector<double> column;
-      for (std::size_t i = 0; i < data.rows(); ++i) column.push_back(data.x[i * data.columns() + f]);
+    for (int r = 0; r < repeats && !run.cancelled(); ++r) {
+      for (std::size_t i = 0; i < data.rows(); ++i) column[i] = data.x[i * data.columns() + f];
       random.shuffle(column);
       for (std::size_t i = 0; i < data.rows(); ++i) x[i * data.columns() + f] = column[i];
-      const double rise = (loss_of(trees, rows) - whole) / whole;
+      const double rise = (loss_of(trees, shuffled) - whole) / whole;
       sum += rise;
       squares += rise * rise;
     }
-    for (std::size_t i = 0; i < data.rows(); ++i) x[i * data.columns() + f] = data.x[i * data.columns() + f];
     const double mean = sum / repeats;
-    out.push_back({data.features[f], mean, std::sqrt(std::max(0.0, squares / repeats - mean * mean))});
-  }
+    out[f] = {data.features[f], mean, std::sqrt(std::max(0.0, squares / repeats - mean * mean))};
+    return boost::outcome_v2::success();
+  }));
   std::stable_sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.mean > b.mean; });
   return out;
 }
@@ -77,13 +79,13 @@ Result<std::vector<Importance>> permutation_importance(const Dataset& all, const
 Result<std::vector<ForwardStep>> forward_filter(const Dataset& data, Recipe recipe,
                                                 const std::vector<std::string>& order,
                                                 const std::vector<std::size_t>& fold, bool classification,
-                                                double least_gain) {
+                                                double least_gain, const Execution& run) {
   recipe.features.clear();
   std::vector<ForwardStep> out;
   double best = 1e300;
   for (const auto& name : order) {
     recipe.features.push_back(name);
-    BOOST_OUTCOME_TRY(const auto result, cross_validate(data, recipe, fold, classification));
+    BOOST_OUTCOME_TRY(const auto result, cross_validate(data, recipe, fold, classification, run));
     const bool kept = result.loss < best - least_gain;
     out.push_back({name, result.loss, kept});
     if (kept)

@@ -17,7 +17,8 @@ struct Importance {
 /// Out-of-bag permutation importance of a random forest, most important first. Whole columns are shuffled by
 /// the seed, `repeats` times. errors: those of fit_classifier
 Result<std::vector<Importance>> permutation_importance(const Dataset& data, const Recipe& recipe,
-                                                       bool classification, int repeats = 5);
+                                                       bool classification, int repeats = 5,
+                                                       const Execution& run = {});
 
 /// One step of the forward filter.
 struct ForwardStep {
@@ -31,6 +32,6 @@ struct ForwardStep {
 Result<std::vector<ForwardStep>> forward_filter(const Dataset& data, Recipe recipe,
                                                 const std::vector<std::string>& order,
                                                 const std::vector<std::size_t>& fold, bool classification,
-                                                double least_gain = 0.002);
+                                                double least_gain = 0.002, const Execution& run = {});
 
 }  // namespace anchord::ml

@@ -29,28 +29,55 @@ struct Picked {
   std::string why;
 };
 
-bool cancelled(const LearnOptions& options, const std::string& stage, std::size_t done, std::size_t of) {
-  return options.progress && !options.progress(stage, static_cast<double>(done) / static_cast<double>(of));
+void tell(const LearnOptions& options, const std::string& detail, std::size_t done, std::size_t of) {
+  if (options.progress) options.progress(static_cast<double>(done) / static_cast<double>(of), detail);
+}
+
+CandidateRow row_of(const Recipe& recipe, const OutOfFold& result) {
+  CandidateRow row;
+  row.name = recipe.method == Method::none ? "none (no correction)" : recipe.describe();
+  row.loss = result.loss, row.loss_sd = result.loss_sd;
+  row.method = recipe.method;
+  row.settings = settings_of(recipe);
+  row.features = recipe.features;
+  return row;
+}
+
+// What each fold says of one candidate.
+void add_folds(const Dataset& data, const std::vector<std::size_t>& fold, std::size_t candidate,
+               const OutOfFold& result, std::vector<FoldRow>& out) {
+  const std::size_t first = out.size();
+  for (std::size_t k = 0; k < result.fold_loss.size(); ++k)
+    out.push_back({candidate, k, 0, 0, result.fold_loss[k], {}, 0, 0});
+  for (std::size_t i = 0; i < data.rows(); ++i) {
+    auto& row = out[first + fold[i]];
+    row.test_rows += 1;
+    if (!result.p_los.empty()) row.confusion.count(data.los[i] != 0, result.p_los[i] >= 0.5);
+    if (result.bias_m.empty()) continue;
+    row.mae_raw_m += std::abs(data.bias_m[i]);
+    row.mae_m += std::abs(data.bias_m[i] - result.bias_m[i]);
+  }
+  for (std::size_t k = first; k < out.size(); ++k) {
+    const auto n = static_cast<double>(std::max<std::size_t>(out[k].test_rows, 1));
+    out[k].train_rows = data.rows() - out[k].test_rows;
+    out[k].mae_raw_m /= n, out[k].mae_m /= n;
+  }
 }
 
 Result<Picked> pick_classifier(const Dataset& data, const LearnOptions& options,
-                               const std::vector<std::size_t>& fold, std::vector<CandidateRow>& table) {
+                               const std::vector<std::size_t>& fold, std::vector<CandidateRow>& table,
+                               std::vector<FoldRow>& folds) {
   const auto candidates = classifier_candidates(data, options);
   if (candidates.empty()) return make_error(Errc::not_found, "no candidate's features are in the data");
   std::vector<OutOfFold> results;
   std::size_t best = 0;
   for (std::size_t c = 0; c < candidates.size(); ++c) {
-    if (cancelled(options, candidates[c].describe(), c, candidates.size()))
-      return make_error(Errc::canceled, "cancelled");
-    BOOST_OUTCOME_TRY(auto result, cross_validate(data, candidates[c], fold, true));
-    table.push_back({candidates[c].describe(),
-                     result.loss,
-                     result.loss_sd,
-                     confusion_at(result.p_los, data.los, 0.5),
-                     brier(result.p_los, data.los),
-                     {},
-                     0,
-                     false});
+    tell(options, candidates[c].describe(), c, candidates.size());
+    BOOST_OUTCOME_TRY(auto result, cross_validate(data, candidates[c], fold, true, options.run));
+    table.push_back(row_of(candidates[c], result));
+    table.back().confusion = confusion_at(result.p_los, data.los, 0.5);
+    table.back().brier = brier(result.p_los, data.los);
+    add_folds(data, fold, c, result, folds);
     if (!results.empty() && result.loss < results[best].loss - k_tie_log_loss) best = c;
     results.push_back(std::move(result));
   }
@@ -76,13 +103,14 @@ double threshold_for(std::span<const double> p_los, std::span<const std::uint8_t
 Result<Learned> learn_class(const Dataset& data, const LearnOptions& options,
                             const std::vector<std::size_t>& fold) {
   Learned out;
-  BOOST_OUTCOME_TRY(auto picked, pick_classifier(data, options, fold, out.table));
-  BOOST_OUTCOME_TRY(auto classifier, fit_classifier(data, picked.recipe));
+  BOOST_OUTCOME_TRY(auto picked, pick_classifier(data, options, fold, out.table, out.folds));
+  BOOST_OUTCOME_TRY(auto classifier, fit_classifier(data, picked.recipe, options.run));
   classifier.slope = picked.out_of_fold.platt.slope;
   classifier.offset = picked.out_of_fold.platt.offset;
   if (options.max_fpr)
     classifier.threshold = threshold_for(picked.out_of_fold.p_los, data.los, *options.max_fpr);
   out.p_los = std::move(picked.out_of_fold.p_los);
+  out.picked = picked.recipe;
   const auto c = confusion_at(out.p_los, data.los, classifier.threshold);
   out.model.info.features = picked.recipe.features;
   out.model.info.method = picked.recipe.describe();
@@ -136,31 +164,24 @@ Result<Learned> learn_regression(const Dataset& data, const LearnOptions& option
   Learned out;
   const auto candidates = regressor_candidates(data, options);
   std::vector<OutOfFold> results;
-  std::size_t best = options.method && candidates.size() > 1 ? 1 : 0;
+  std::size_t best = !options.methods.empty() && candidates.size() > 1 ? 1 : 0;
   std::size_t constant = 0;
   const auto cost = [](const OutOfFold& r) {
     return r.loss + k_harm_price * std::max(0.0, r.worst_harm_m - k_harmless_m);
   };
   for (std::size_t c = 0; c < candidates.size(); ++c) {
-    if (cancelled(options, candidates[c].describe(), c, candidates.size()))
-      return make_error(Errc::canceled, "cancelled");
-    BOOST_OUTCOME_TRY(auto result, cross_validate(data, candidates[c], fold, false));
-    const auto left = minus(data.bias_m, result.bias_m, 1);
-    const bool none = candidates[c].method == Method::none;
-    out.table.push_back({none ? "none (no correction)" : candidates[c].describe(),
-                         result.loss,
-                         result.loss_sd,
-                         {},
-                         0,
-                         error_stats(left),
-                         result.worst_harm_m,
-                         false});
+    tell(options, candidates[c].describe(), c, candidates.size());
+    BOOST_OUTCOME_TRY(auto result, cross_validate(data, candidates[c], fold, false, options.run));
+    out.table.push_back(row_of(candidates[c], result));
+    out.table.back().error = error_stats(minus(data.bias_m, result.bias_m, 1));
+    out.table.back().worst_harm_m = result.worst_harm_m;
+    add_folds(data, fold, c, result, out.folds);
     results.push_back(std::move(result));
     if (candidates[c].method == Method::constant) constant = c;
     if (c > best && cost(results[c]) < cost(results[best]) * 0.99 - 1e-4) best = c;
   }
   out.table[best].picked = true;
-  BOOST_OUTCOME_TRY(auto regressor, fit_regressor(data, candidates[best]));
+  BOOST_OUTCOME_TRY(auto regressor, fit_regressor(data, candidates[best], options.run));
   const auto weight = placement_weights(data);
   const auto left = minus(data.bias_m, results[best].bias_m, 1);
   regressor.sigma_m = spread_m(left, weight);
@@ -168,6 +189,7 @@ Result<Learned> learn_regression(const Dataset& data, const LearnOptions& option
   const auto left_constant = minus(data.bias_m, results[constant].bias_m, 1);
   out.nll_constants = gaussian_nll(left_constant, weight, spread_m(left_constant, weight));
   out.correction_m = std::move(results[best].bias_m);
+  out.picked = candidates[best];
   const auto raw = error_stats(data.bias_m), corrected = error_stats(left);
   out.model.info.features = candidates[best].features;
   out.model.info.method = candidates[best].describe();
@@ -199,11 +221,12 @@ Result<Learned> learn(const Dataset& data, const LearnOptions& options) {
     return make_error(Errc::not_found, "a bias needs true ranges");
   if (options.task == Task::nlos_id && !data.labelled())
     return make_error(Errc::not_found, "identification needs labels");
-  const bool mixture = options.task == Task::bias && classes && !options.method;
+  const bool mixture = options.task == Task::bias && classes && options.methods.empty();
   auto learned = options.task == Task::nlos_id ? learn_class(data, options, fold)
                  : mixture                     ? learn_bias_mixture(data, options, fold)
                                                : learn_regression(data, options, fold);
   if (!learned) return learned.error();
+  learned.value().fold = fold;
   auto& info = learned.value().model.info;
   info.task = options.task;
   info.data_digest = data.digest();

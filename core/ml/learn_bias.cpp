@@ -112,7 +112,8 @@ Result<Learned> learn_bias_mixture(const Dataset& data, const LearnOptions& opti
   identify.task = Task::nlos_id;
   BOOST_OUTCOME_TRY(auto out, learn_class(data, identify, fold));
   const auto cancelled = [&](const char* stage, double share) {
-    return options.progress && !options.progress(stage, share);
+    if (options.progress) options.progress(share, stage);
+    return options.run.cancelled();
   };
 
   // Shared curve by held-out LOS rows; a constant unless a curve is clearly better.
@@ -208,8 +209,9 @@ Result<Learned> learn_bias_mixture(const Dataset& data, const LearnOptions& opti
                                            {"nll", out.nll},
                                            {"nll_constants", out.nll_constants}});
   out.model.mixture = std::move(mixture);
-  for (auto& row : out.table) row.picked = false;
+  out.class_table = std::move(out.table);
   out.table = std::move(table);
+  out.folds.clear();
   return out;
 }
 

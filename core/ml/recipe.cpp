@@ -51,8 +51,8 @@ SvmOptions per_row(SvmOptions options, const Dataset& data) {
   return options;
 }
 
-Result<Classifier::Member> svm_member(const Prepared& p, const SvmOptions& options) {
-  BOOST_OUTCOME_TRY(auto svm, fit_svm(p.rows(), per_row(options, p.data), true));
+Result<Classifier::Member> svm_member(const Prepared& p, const SvmOptions& options, const Execution& run) {
+  BOOST_OUTCOME_TRY(auto svm, fit_svm(p.rows(), per_row(options, p.data), true, run));
   std::vector<double> margin;
   for (std::size_t i = 0; i < p.data.rows(); ++i) margin.push_back(score(svm, p.rows().row(i)));
   const Platt platt = fit_platt(margin, p.y, p.data.weight);
@@ -79,58 +79,53 @@ std::optional<Method> method_of(std::string_view name) {
 }
 
 std::string Recipe::describe() const {
-  std::string out{method_name(method)};
-  const std::string svm_text = "c=" + number(svm.c) + ", gamma=" + number(svm.gamma);
-  const std::string forest_text = "leaf=" + number(100 * forest.leaf_share) + "%";
-  switch (method) {
-    case Method::none:
-    case Method::constant:
-      return out;
-    case Method::logistic:
-      out += "(c=" + number(c) + ")";
-      break;
-    case Method::svm:
-      out += "(" + svm_text + ")";
-      break;
-    case Method::random_forest:
-      out += "(" + forest_text + ")";
-      break;
-    case Method::boosted:
-      out += "(rounds=" + number(boosted.rounds) + ", depth=" + number(boosted.depth) + ")";
-      break;
-    case Method::average:
-      out += "(c=" + number(c) + ", svm " + svm_text + ", " + forest_text + ")";
-      break;
-    case Method::univariate:
-    case Method::multivariate:
-      out += "(degree=" + number(degree) + ")";
-      break;
-    case Method::least_absolute:
-      break;
+  constexpr std::array<std::string_view, 4> k_kernels{"linear", "polynomial", "sigmoid", "rbf"};
+  std::string settings;
+  const auto add = [&](std::string_view name, const std::string& value) {
+    settings += (settings.empty() ? "" : ", ") + std::string{name} + "=" + value;
+  };
+  for (const auto& [name, value] : settings_of(*this)) {
+    // Settings that say nothing here: of other kernels, or left at "no limit".
+    if (method == Method::svm && name == "gamma" && svm.kernel == Kernel::linear) continue;
+    if (method == Method::svm && name == "degree" && svm.kernel != Kernel::polynomial) continue;
+    if (method == Method::svm && name == "coef0" &&
+        (svm.kernel == Kernel::linear || svm.kernel == Kernel::rbf || value == 0))
+      continue;
+    if (name == "epsilon_m" || name == "ridge" || name == "max_depth") continue;
+    if (name == "features_per_split" && value == 0) continue;
+    if (name == "interactions" && interactions) continue;
+    if (name == "kernel")
+      add(name, std::string{k_kernels.at(static_cast<std::size_t>(svm.kernel))});
+    else
+      add(name, number(value));
   }
+  std::string out{method_name(method)};
+  if (!settings.empty()) out += "(" + settings + ")";
+  if (method == Method::none || method == Method::constant) return out;
   if (features.size() == 1) return out + " of " + features.front();
   return out + " on " + std::to_string(features.size()) + " features";
 }
 
-Result<Classifier> fit_classifier(const Dataset& data, const Recipe& recipe) {
+Result<Classifier> fit_classifier(const Dataset& data, const Recipe& recipe, const Execution& run) {
   BOOST_OUTCOME_TRY(const auto p, prepare(data, recipe, true));
   Classifier out;
   out.scaler = p.scaler;
   const bool all = recipe.method == Method::average;
   if (all || recipe.method == Method::logistic) out.members.push_back({fit_logistic(p.rows(), recipe.c)});
   if (all || recipe.method == Method::svm) {
-    BOOST_OUTCOME_TRY(auto member, svm_member(p, recipe.svm));
+    BOOST_OUTCOME_TRY(auto member, svm_member(p, recipe.svm, run));
     out.members.push_back(std::move(member));
   }
   if (all || recipe.method == Method::random_forest)
-    out.members.push_back({fit_forest(p.rows(), recipe.forest), true});
-  if (recipe.method == Method::boosted) out.members.push_back({fit_boosted(p.rows(), recipe.boosted)});
+    out.members.push_back({fit_forest(p.rows(), recipe.forest, nullptr, run), true});
+  if (recipe.method == Method::boosted) out.members.push_back({fit_boosted(p.rows(), recipe.boosted, run)});
+  if (run.cancelled()) return make_error(Errc::canceled, "cancelled");
   if (out.members.empty())
     return make_error(Errc::invalid_argument, std::string{method_name(recipe.method)} + " does not classify");
   return out;
 }
 
-Result<Regressor> fit_regressor(const Dataset& data, const Recipe& recipe) {
+Result<Regressor> fit_regressor(const Dataset& data, const Recipe& recipe, const Execution& run) {
   BOOST_OUTCOME_TRY(const auto p, prepare(data, recipe, false));
   Regressor out;
   out.scaler = p.scaler;
@@ -150,16 +145,16 @@ Result<Regressor> fit_regressor(const Dataset& data, const Recipe& recipe) {
       break;
     }
     case Method::random_forest:
-      out.scorer = fit_forest(p.rows(), recipe.forest);
+      out.scorer = fit_forest(p.rows(), recipe.forest, nullptr, run);
       break;
     case Method::boosted: {
       auto options = recipe.boosted;
       options.classification = false;
-      out.scorer = fit_boosted(p.rows(), options);
+      out.scorer = fit_boosted(p.rows(), options, run);
       break;
     }
     case Method::svm: {
-      BOOST_OUTCOME_TRY(out.scorer, fit_svm(p.rows(), per_row(recipe.svm, p.data), false));
+      BOOST_OUTCOME_TRY(out.scorer, fit_svm(p.rows(), per_row(recipe.svm, p.data), false, run));
       break;
     }
     case Method::univariate:
@@ -167,8 +162,8 @@ Result<Regressor> fit_regressor(const Dataset& data, const Recipe& recipe) {
           fit_polynomial(p.rows(), polynomial_terms(p.data.columns(), recipe.degree, false), recipe.ridge);
       break;
     case Method::multivariate:
-      out.scorer =
-          fit_polynomial(p.rows(), polynomial_terms(p.data.columns(), recipe.degree, true), recipe.ridge);
+      out.scorer = fit_polynomial(
+          p.rows(), polynomial_terms(p.data.columns(), recipe.degree, recipe.interactions), recipe.ridge);
       break;
     case Method::least_absolute:
       out.scorer = fit_least_absolute(p.rows(), 0.003);
@@ -178,6 +173,7 @@ Result<Regressor> fit_regressor(const Dataset& data, const Recipe& recipe) {
       return make_error(Errc::invalid_argument,
                         std::string{method_name(recipe.method)} + " does not regress");
   }
+  if (run.cancelled()) return make_error(Errc::canceled, "cancelled");
   if (recipe.method != Method::none && recipe.method != Method::constant) {
     out.min_m = *std::min_element(p.y.begin(), p.y.end());
     out.max_m = *std::max_element(p.y.begin(), p.y.end());
@@ -206,23 +202,26 @@ double worst_harm_m(const Dataset& data, std::span<const double> correction_m) {
 }
 
 Result<OutOfFold> cross_validate(const Dataset& data, const Recipe& recipe,
-                                 const std::vector<std::size_t>& fold, bool classification) {
+                                 const std::vector<std::size_t>& fold, bool classification,
+                                 const Execution& run) {
   BOOST_OUTCOME_TRY(const auto chosen, data.with_features(recipe.features));
   OutOfFold out;
   auto& answers = classification ? out.logit : out.bias_m;
   answers.resize(data.rows());
   const std::size_t folds = fold.empty() ? 0 : *std::max_element(fold.begin(), fold.end()) + 1;
-  for (std::size_t k = 0; k < folds; ++k) {
+  const Execution inner{1, run.stop};
+  BOOST_OUTCOME_TRY(parallel_for(folds, run, [&](std::size_t k) -> Result<void> {
     const auto inside = rows_of_fold(fold, k, true), outside = rows_of_fold(fold, k, false);
     const Dataset train = chosen.subset(outside);
     if (classification) {
-      BOOST_OUTCOME_TRY(const auto model, fit_classifier(train, recipe));
+      BOOST_OUTCOME_TRY(const auto model, fit_classifier(train, recipe, inner));
       for (const auto i : inside) answers[i] = model.mean_logit(chosen.row(i));
     } else {
-      BOOST_OUTCOME_TRY(const auto model, fit_regressor(train, recipe));
+      BOOST_OUTCOME_TRY(const auto model, fit_regressor(train, recipe, inner));
       for (const auto i : inside) answers[i] = model.bias_m(chosen.row(i));
     }
-  }
+    return boost::outcome_v2::success();
+  }));
   const auto weight = placement_weights(data);
   std::vector<double> loss(data.rows());
   if (classification) {
@@ -244,6 +243,7 @@ Result<OutOfFold> cross_validate(const Dataset& data, const Recipe& recipe,
       if (fold[i] == k) s += weight[i] * loss[i], w += weight[i];
     sum += s, total += w;
     sum_folds += s / w, sum_squares += s / w * s / w;
+    out.fold_loss.push_back(s / w);
   }
   const auto n = static_cast<double>(folds);
   out.loss = sum / total;

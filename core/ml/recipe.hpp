@@ -2,7 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -10,6 +10,7 @@
 
 #include "core/base/result.hpp"
 #include "core/ml/dataset.hpp"
+#include "core/ml/parallel.hpp"
 #include "core/ml/train.hpp"
 
 /// One way to fit: a method, its features and its settings; and how it does on places it has not seen.
@@ -39,20 +40,27 @@ struct Recipe {
   SvmOptions svm{};  ///< c counts placements, and is spread over their rows
   TreeOptions forest{};
   BoostOptions boosted{};
-  int degree{2};  ///< polynomials
+  int degree{2};            ///< polynomials
+  bool interactions{true};  ///< multivariate: products of different features too
   double ridge{1e-3};
   std::size_t per_placement{5};  ///< rows of one placement used for training: repeats are near copies
 
   std::string describe() const;  ///< "svm(c=3, gamma=0.03) on 7 features"
 };
 
-/// Answers whether to go on.
-using Progress = std::function<bool(const std::string& stage, double share_done)>;
+/// Sets one of the method's settings by its name (grid_settings); false where the method has none of that
+/// name.
+bool apply_setting(Recipe& recipe, std::string_view name, double value);
+/// The method's settings as they are, in the order of `grid_settings`.
+std::vector<std::pair<std::string, double>> settings_of(const Recipe& recipe);
+/// Every combination of the values of the axes.
+std::vector<Recipe> expand(const Recipe& recipe, const std::map<std::string, std::vector<double>>& axes);
 
-/// Uncalibrated classifier on the recipe's features. errors: not_found, too_few_observations (one class only)
-Result<Classifier> fit_classifier(const Dataset& data, const Recipe& recipe);
+/// Uncalibrated classifier on the recipe's features. errors: not_found, too_few_observations (one class
+/// only), canceled
+Result<Classifier> fit_classifier(const Dataset& data, const Recipe& recipe, const Execution& run = {});
 /// errors: not_found, too_few_observations
-Result<Regressor> fit_regressor(const Dataset& data, const Recipe& recipe);
+Result<Regressor> fit_regressor(const Dataset& data, const Recipe& recipe, const Execution& run = {});
 
 /// Weight 1 / rows of the same placement for each row, so that every placement counts alike.
 std::vector<double> placement_weights(const Dataset& data);
@@ -65,11 +73,13 @@ struct OutOfFold {
   std::vector<double> bias_m{};  ///< regression
   double loss{};                 ///< log loss or MAE, every placement alike: what selection minimises
   double loss_sd{};              ///< over the folds
-  double worst_harm_m{};         ///< regression: largest rise of a place's MAE over the uncorrected one
+  std::vector<double> fold_loss{};
+  double worst_harm_m{};  ///< regression: largest rise of a place's MAE over the uncorrected one
 };
 /// fold  of each row, from grouped_folds
 Result<OutOfFold> cross_validate(const Dataset& data, const Recipe& recipe,
-                                 const std::vector<std::size_t>& fold, bool classification);
+                                 const std::vector<std::size_t>& fold, bool classification,
+                                 const Execution& run = {});
 
 /// Largest rise, metres, of any group's mean absolute error by a correction; groups of fewer than 20 rows are
 /// left to noise.

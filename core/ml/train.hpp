@@ -6,9 +6,11 @@
 
 #include "core/base/result.hpp"
 #include "core/ml/model.hpp"
+#include "core/ml/parallel.hpp"
 
 /// Fits of the single methods. All take standardised features row after row, and are deterministic: same
-/// input, same bytes.
+/// input, same bytes. Those that may take long look at `run` between trees, rounds and solver steps; a fit
+/// that was stopped returns what it has, and the caller throws it away.
 namespace anchord::ml {
 
 /// n rows of d features; y a class (1 LOS, 0 NLOS) or metres; w > 0.
@@ -55,7 +57,7 @@ struct TreeOptions {
 /// `out_of_bag`, where given, gets for each row the mean of the trees that did not see it (NaN where all saw
 /// it).
 Trees fit_forest(const TrainingRows& rows, const TreeOptions& options,
-                 std::vector<double>* out_of_bag = nullptr);
+                 std::vector<double>* out_of_bag = nullptr, const Execution& run = {});
 
 struct BoostOptions {
   int rounds = 400;
@@ -68,7 +70,7 @@ struct BoostOptions {
   std::uint64_t seed = 1;
 };
 /// Gradient boosted trees, second order, on the same bins. Classification scores are log odds.
-Trees fit_boosted(const TrainingRows& rows, const BoostOptions& options);
+Trees fit_boosted(const TrainingRows& rows, const BoostOptions& options, const Execution& run = {});
 
 struct SvmOptions {
   Kernel kernel = Kernel::rbf;
@@ -80,7 +82,8 @@ struct SvmOptions {
 };
 /// C-SVC or epsilon-SVR by libsvm; instance weights are not used (keep rows per placement equal instead). A
 /// score above 0 is LOS.
-Result<Svm> fit_svm(const TrainingRows& rows, const SvmOptions& options, bool classification);
+Result<Svm> fit_svm(const TrainingRows& rows, const SvmOptions& options, bool classification,
+                    const Execution& run = {});
 
 /// Maximum likelihood of the bias mixture's shared curve and components. errors: too_few_observations below 8
 /// rows of a class x      raw features, n rows of d p_los  out-of-fold and calibrated: in-sample

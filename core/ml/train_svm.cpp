@@ -29,7 +29,9 @@ int libsvm_kernel(Kernel kernel) {
 
 }  // namespace
 
-Result<Svm> fit_svm(const TrainingRows& rows, const SvmOptions& options, bool classification) {
+Result<Svm> fit_svm(const TrainingRows& rows, const SvmOptions& options, bool classification,
+                    const Execution& run) {
+  if (run.cancelled()) return make_error(Errc::canceled, "cancelled");
   const std::size_t n = rows.n(), d = rows.d;
   if (n == 0) return make_error(Errc::too_few_observations, "an SVM needs rows, got none");
   svm_set_print_string_function(&say_nothing);

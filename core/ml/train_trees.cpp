@@ -165,7 +165,8 @@ double tree_value(const Trees& model, std::uint32_t at, std::span<const double> 
 
 }  // namespace
 
-Trees fit_forest(const TrainingRows& rows, const TreeOptions& options, std::vector<double>* out_of_bag) {
+Trees fit_forest(const TrainingRows& rows, const TreeOptions& options, std::vector<double>* out_of_bag,
+                 const Execution& run) {
   const Binned data{rows};
   const std::size_t n = rows.n();
   std::size_t per_split = options.features_per_split;
@@ -180,7 +181,7 @@ Trees fit_forest(const TrainingRows& rows, const TreeOptions& options, std::vect
   Trees model;
   model.scale = 1.0 / options.trees;
   Random random{options.seed};
-  for (int t = 0; t < options.trees; ++t) {
+  for (int t = 0; t < options.trees && !run.cancelled(); ++t) {
     std::fill(times.begin(), times.end(), 0.0);
     for (std::size_t i = 0; i < n; ++i) times[random.below(n)] += 1;
     std::vector<std::uint32_t> used;
@@ -199,7 +200,7 @@ Trees fit_forest(const TrainingRows& rows, const TreeOptions& options, std::vect
   return model;
 }
 
-Trees fit_boosted(const TrainingRows& rows, const BoostOptions& options) {
+Trees fit_boosted(const TrainingRows& rows, const BoostOptions& options, const Execution& run) {
   const Binned data{rows};
   const std::size_t n = rows.n();
   Grower grower{data, {options.depth, options.lambda, options.min_child_weight, 1, 0}};
@@ -215,7 +216,7 @@ Trees fit_boosted(const TrainingRows& rows, const BoostOptions& options) {
   const auto columns = std::max<std::size_t>(
       1, static_cast<std::size_t>(std::lround(options.column_share * static_cast<double>(rows.d))));
   std::vector<std::uint32_t> order(n);
-  for (int round = 0; round < options.rounds; ++round) {
+  for (int round = 0; round < options.rounds && !run.cancelled(); ++round) {
     for (std::size_t i = 0; i < n; ++i) {
       const double p = options.classification ? 1 / (1 + std::exp(-f[i])) : 0;
       g[i] = rows.w[i] * (options.classification ? rows.y[i] - p : rows.y[i] - f[i]);

@@ -84,7 +84,10 @@ int train(const TrainArguments& a) {
   }
   report.used = data.value().rows();
 
-  ml::LearnOptions options{*task, method, a.features, a.folds, a.seed, a.per_placement, a.grid, {}, {}};
+  ml::LearnOptions options;
+  options.task = *task, options.features = a.features, options.folds = a.folds, options.seed = a.seed;
+  options.per_placement = a.per_placement, options.search = a.grid, options.run.threads = 0;
+  if (method) options.methods = {*method};
   if (a.max_fpr >= 0) options.max_fpr = a.max_fpr;
   auto learned = ml::learn(data.value(), options);
   if (!learned) return refuse("train", a.data.files.front() + ": " + learned.error().message);

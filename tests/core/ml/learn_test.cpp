@@ -2,36 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "core/ml/evaluate.hpp"
-#include "core/ml/random.hpp"
+#include "tests/core/ml/learning_world.hpp"
 
 namespace anchord::ml {
 namespace {
 
-// Sixty placements in six places; NLOS links read weaker first paths and arrive late.
-Dataset world(std::uint64_t seed, bool with_truth) {
-  Dataset d;
-  d.features = {"range_m", "rx_dbm", "fp_dbm", "rx_minus_fp_db", "rx_free_space_db"};
-  Random r{seed};
-  for (std::uint32_t placement = 0; placement < 60; ++placement) {
-    const bool los = placement % 2 == 0;
-    const double range = 2 + 8 * r.uniform(), loss = los ? 1 + 2 * r.uniform() : 3 + 6 * r.uniform();
-    const double excess = los ? 0 : -0.5 * std::log(1 - r.uniform());
-    for (int k = 0; k < 8; ++k) {
-      const double rx = -75 - 20 * std::log10(range) - (los ? 0 : 4) + r.uniform(),
-                   noise = 0.04 * (r.uniform() - 0.5);
-      d.x.insert(d.x.end(), {range, rx, rx - loss, loss, rx + 20 * std::log10(range)});
-      d.los.push_back(los);
-      if (with_truth) d.bias_m.push_back(0.15 + excess + noise);
-      d.weight.push_back(1);
-      d.placement.push_back(placement);
-      d.group.push_back(placement / 10);
-    }
-  }
-  return d;
-}
+Dataset world(std::uint64_t seed, bool with_truth) { return learning_world(seed, with_truth); }
 
 }  // namespace
 
@@ -91,9 +68,13 @@ TEST(Learn, RefusesASinglePlaceAndASingleClass) {
 }
 
 TEST(Learn, StopsWhenTold) {
+  std::stop_source stop;
   LearnOptions options;
-  options.progress = [](const std::string&, double) { return false; };
-  EXPECT_EQ(learn(world(1, false), options).error().code, Errc::canceled);
+  options.run.stop = stop.get_token();
+  options.progress = [&](double, const std::string&) { stop.request_stop(); };
+  const auto learned = learn(world(1, false), options);
+  ASSERT_FALSE(learned);
+  EXPECT_EQ(learned.error().code, Errc::canceled);
 }
 
 TEST(Learn, ThresholdKeepsTheAskedFalsePositiveRateOnHeldOutPlaces) {

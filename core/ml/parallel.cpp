@@ -1,0 +1,56 @@
+#include "core/ml/parallel.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+namespace anchord::ml {
+namespace {
+
+struct Outcome {
+  std::mutex mutex;
+  std::size_t failed_at{static_cast<std::size_t>(-1)};
+  std::optional<Error> error;
+  std::exception_ptr thrown;
+
+  void fail(std::size_t at, std::optional<Error> why, std::exception_ptr what) {
+    const std::lock_guard lock{mutex};
+    if (at >= failed_at) return;
+    failed_at = at, error = std::move(why), thrown = std::move(what);
+  }
+};
+
+}  // namespace
+
+Result<void> parallel_for(std::size_t n, const Execution& how,
+                          const std::function<Result<void>(std::size_t)>& work) {
+  std::atomic<std::size_t> next{0};
+  std::atomic<bool> failed{false};
+  Outcome outcome;
+  const auto run = [&] {
+    for (std::size_t i; !failed && !how.cancelled() && (i = next++) < n;) {
+      try {
+        if (auto done = work(i); !done) outcome.fail(i, done.error(), nullptr), failed = true;
+      } catch (...) {  // out of memory in a worker is the caller's to handle
+        outcome.fail(i, std::nullopt, std::current_exception()), failed = true;
+      }
+    }
+  };
+  std::size_t threads = how.threads == 0 ? std::thread::hardware_concurrency() : how.threads;
+  threads = std::clamp<std::size_t>(threads, 1, std::max<std::size_t>(n, 1));
+  {
+    std::vector<std::jthread> helpers;
+    for (std::size_t t = 1; t < threads; ++t) helpers.emplace_back(run);
+    run();
+  }
+  if (how.cancelled()) return make_error(Errc::canceled, "cancelled");
+  if (outcome.thrown) std::rethrow_exception(outcome.thrown);
+  if (outcome.error) return *outcome.error;
+  return boost::outcome_v2::success();
+}
+
+}  // namespace anchord::ml

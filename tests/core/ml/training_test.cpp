@@ -1,0 +1,137 @@
+#include "core/ml/training.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <thread>
+
+#include "tests/core/ml/learning_world.hpp"
+
+namespace anchord::ml {
+namespace {
+
+using std::chrono::steady_clock;
+
+bool same_numbers(const TrainingOutcome& a, const TrainingOutcome& b) {
+  if (a.predictions.size() != b.predictions.size() || a.importance.size() != b.importance.size())
+    return false;
+  for (std::size_t i = 0; i < a.predictions.size(); ++i)
+    if (a.predictions[i].p_los != b.predictions[i].p_los ||
+        a.predictions[i].correction_m != b.predictions[i].correction_m)
+      return false;
+  for (std::size_t i = 0; i < a.importance.size(); ++i)
+    if (a.importance[i].feature != b.importance[i].feature || a.importance[i].mean != b.importance[i].mean)
+      return false;
+  return a.model.info.method == b.model.info.method && a.model.info.metrics == b.model.info.metrics;
+}
+
+}  // namespace
+
+TEST(Training, ReportsGridFoldsImportanceAndPredictionsOfTheSameRun) {
+  const auto data = learning_world(1, false);
+  TrainingSpec spec;
+  spec.methods = {Method::logistic, Method::random_forest};
+  spec.grid = {{Method::logistic, {{"c", {0.1, 1, 10}}}},
+               {Method::random_forest, {{"leaf_share", {0.02, 0.1}}}}};
+  spec.folds = 3;
+  spec.held_out = {"room 5"};
+  spec.selection = true;
+  const auto run = train(data, spec);
+  ASSERT_TRUE(run) << run.error().message;
+  const auto& o = run.value();
+  EXPECT_EQ(o.candidates.size() % 5, 0U);  // 3 points of logistic and 2 of the forest for each feature set
+  EXPECT_EQ(o.folds.size(), 3 * o.candidates.size());
+  EXPECT_EQ(o.fold_places.size(), 3U);
+  EXPECT_EQ(o.importance.size(), data.columns());
+  EXPECT_EQ(o.predictions.size(), data.rows());
+  EXPECT_EQ(o.split.train_rows, 400U);
+  EXPECT_EQ(o.split.test_rows, 80U);
+  EXPECT_EQ(o.split.test_place_names, std::vector<std::string>{"room 5"});
+  EXPECT_FALSE(o.split.leak);
+  ASSERT_TRUE(o.test);
+  EXPECT_GT(o.test->confusion->accuracy(), 0.85);
+  ASSERT_TRUE(o.threshold);
+  EXPECT_LE(o.threshold->fpr_low, o.threshold->fpr);
+  EXPECT_GE(o.threshold->fpr_high, o.threshold->fpr);
+  EXPECT_FALSE(o.selection.empty());
+  EXPECT_TRUE(o.selection.front().kept);
+}
+
+TEST(Training, LeakReportFindsAPlacementInTwoPlacesAndCopiedRows) {
+  auto data = learning_world(1, false);
+  data.placement[100] = data.placement[0];  // rows 0 and 100 are of different places
+  for (std::size_t c = 0; c < data.columns(); ++c) data.x[200 * data.columns() + c] = data.x[c];
+  data.los[200] = data.los[0];
+  const auto report = split_report(data, {0, 1, 2}, {200});
+  EXPECT_EQ(report.shared_placements, 1U);
+  EXPECT_EQ(report.duplicate_rows, 1U);
+  EXPECT_TRUE(report.leak);
+}
+
+TEST(Training, OneSeedGivesTheSameNumbersOnAnyNumberOfThreads) {
+  const auto data = learning_world(3, true);
+  for (const Task task : {Task::nlos_id, Task::bias}) {
+    TrainingSpec spec;
+    spec.task = task;
+    spec.threads = 1;
+    const auto one = train(data, spec);
+    spec.threads = 4;
+    const auto four = train(data, spec);
+    ASSERT_TRUE(one && four);
+    EXPECT_TRUE(same_numbers(one.value(), four.value())) << task_name(task);
+  }
+}
+
+TEST(Training, StopsSoonAfterItIsAskedTo) {
+  const auto data = learning_world(1, true, 4000);  // 32 000 rows: minutes of work
+  TrainingSpec spec;
+  spec.methods = {Method::boosted, Method::svm, Method::random_forest};
+  spec.search = true;
+  spec.per_placement = 8;
+  for (const Method method : spec.methods) {
+    auto one = spec;
+    one.methods = {method};
+    std::stop_source stop;
+    std::atomic<bool> searching{false};
+    steady_clock::time_point asked;
+    std::jthread asker{[&] {
+      searching.wait(false);
+      asked = steady_clock::now();
+      stop.request_stop();
+    }};
+    const auto run = train(data, one, stop.get_token(), [&](const TrainingProgress& p) {
+      if (p.stage == "search" && !searching.exchange(true)) searching.notify_all();
+    });
+    const auto ended = steady_clock::now();
+    asker.join();
+    ASSERT_FALSE(run);
+    EXPECT_EQ(run.error().code, Errc::canceled);
+    EXPECT_LT(std::chrono::duration<double>(ended - asked).count(), 5.0)  // 0.5 s on a quiet machine
+        << method_name(method);
+  }
+}
+
+TEST(Training, ProgressNeverFallsAndEndsAtOne) {
+  double last = 0;
+  std::string stage;
+  const auto run = train(learning_world(1, true), {}, {}, [&](const TrainingProgress& p) {
+    EXPECT_GE(p.fraction, last);
+    last = p.fraction, stage = p.stage;
+  });
+  ASSERT_TRUE(run) << run.error().message;
+  EXPECT_DOUBLE_EQ(last, 1.0);
+  EXPECT_EQ(stage, "test");
+}
+
+TEST(Training, NamesEveryFaultOfASpec) {
+  TrainingSpec spec;
+  spec.folds = 1;
+  spec.grid = {{Method::logistic, {{"gamma", {1}}}}};
+  const auto checked = spec.check();
+  ASSERT_FALSE(checked);
+  EXPECT_NE(checked.error().message.find("folds"), std::string::npos);
+  EXPECT_NE(checked.error().message.find("logistic has no setting gamma"), std::string::npos);
+}
+
+}  // namespace anchord::ml
