@@ -15,12 +15,17 @@ namespace anchord::sim {
 
 /// What goes wrong with one device between two instants of the scenario.
 enum class FaultKind : std::uint8_t {
-  unplug,     ///< the port vanishes and comes back
-  garbage,    ///< bytes of noise between and inside the frames
-  silence,    ///< the device hears and says nothing
-  fix_loss,   ///< rover: no position
-  fix_float,  ///< rover: ambiguities lost, float position
-  stale,      ///< tag: every range succeeds and shows the previous measurement or 167772160 mm
+  unplug,       ///< the port vanishes and comes back
+  garbage,      ///< bytes of noise between and inside the frames
+  silence,      ///< the device hears and says nothing
+  fix_loss,     ///< rover: no position
+  fix_float,    ///< rover: ambiguities lost, float position
+  late,         ///< tag: every answer comes 150 ms late, beyond the patience of the maker's client
+  stale,        ///< tag: ranging says success and the range info stays the one before, or 167772160 mm
+  zero,         ///< tag: ranging says success with 0 mm
+  no_event,     ///< tag: ranging never ends
+  refuse,       ///< tag: functions are refused, with short answers
+  remote_deaf,  ///< tag: devices answer ranging, not remote questions
 };
 struct Fault {
   std::string device;  ///< name of a tag or rover of the scenario
