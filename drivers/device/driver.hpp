@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -63,6 +64,8 @@ class DriverOutput {
   virtual std::optional<RoverStatus> rover_position() const = 0;
   /// UTC of steady instants.
   virtual timing::TimeBase& time() = 0;
+  /// Which device of the recording this is: the name under which a receiver speaks to the time base.
+  virtual std::uint16_t slot() const = 0;
 };
 
 /// What one kind of device's protocol does with its bytes. Pure: no port, no clock, no threads; the same
@@ -80,6 +83,10 @@ class Driver {
   /// Answers through DriverOutput::answer, now or later; a command that cannot be done is answered too.
   virtual void command(const Command& command, const Arrival& now) = 0;
 };
+
+/// The drivers there are. options_json: as in Settings. errors: invalid_argument, naming the option.
+Result<std::unique_ptr<Driver>> make_driver(std::string_view kind, std::string_view options_json,
+                                            DriverOutput& output);
 
 /// A device as the operator set it up. `options_json` is the object of its kind (gnss: format, latency_ms;
 /// ntrip: mount, user, ...). Secrets are never in here: they come by file (`password_file`).

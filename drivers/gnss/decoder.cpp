@@ -20,6 +20,13 @@ void Decoder::finish(Epochs& out) {
   nmea_.finish(out);
 }
 
+void Decoder::quiet(Epochs& out) {
+  ubx_.finish(out);
+  erb_.finish(out);
+  gpsd_.finish(out);
+  nmea_.quiet(out);
+}
+
 template <class Parsed, class Assembler>
 void Decoder::take_binary(const Parsed& parsed, Assembler& assembler, const Frame& frame, const char* reason,
                           Epochs& out) {

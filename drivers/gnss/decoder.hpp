@@ -30,6 +30,13 @@ class Decoder {
   /// The stream has ended: publishes what was being collected.
   void finish(Epochs& out);
 
+  /// The wire has been quiet for longer than receivers pause inside an epoch: publishes what is complete
+  /// enough now instead of when the next epoch begins. What follows of the same time makes no second epoch of
+  /// its own unless it repeats a position; callers drop those by their time.
+  void quiet(Epochs& out);
+  /// Some instant of the stream, for NMEA that never says the date.
+  void set_reference(UtcTime time) { nmea_.set_reference(time); }
+
   const Skips& skips() const { return skips_; }
   /// Good frames of a format so far.
   std::uint64_t frames(Protocol protocol) const { return frames_[static_cast<std::size_t>(protocol)]; }

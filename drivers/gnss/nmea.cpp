@@ -311,6 +311,10 @@ void Assembler::flush(Epochs& out) {
 
 void Assembler::set_reference(UtcTime time) { reference_ = time; }
 
+void Assembler::quiet(Epochs& out) {
+  if (group_.gga || (group_.rmc && group_.rmc->valid)) publish(out);
+}
+
 void Assembler::finish(Epochs& out) {
   publish(out);
   flush(out);

@@ -61,6 +61,8 @@ class Assembler {
   /// One frame; false when it says the same epoch again (some receivers repeat the last GGA after a loss).
   bool add(const Message& message, Epochs& out);
   void finish(Epochs& out);
+  /// Publishes what is being collected when it holds a position; epochs without a date go on waiting.
+  void quiet(Epochs& out);
   /// A time known from elsewhere, e.g. from UBX on the same wire.
   void set_reference(UtcTime time);
 

@@ -1,0 +1,140 @@
+#include "drivers/device/pipeline.hpp"
+
+#include "drivers/device/settings.hpp"
+
+namespace anchord::device {
+
+class Pipeline::Device final : public DriverOutput {
+ public:
+  Device(Pipeline& owner, std::uint16_t slot, Settings settings, std::string json)
+      : owner_(owner), slot_(slot), settings_(std::move(settings)), json_(std::move(json)) {}
+
+  Result<void> make() {
+    BOOST_OUTCOME_TRY(driver_, make_driver(settings_.kind, settings_.options_json, *this));
+    return boost::outcome_v2::success();
+  }
+  Driver& driver() { return *driver_; }
+  const Driver& driver() const { return *driver_; }
+  const Settings& settings() const { return settings_; }
+  const std::string& json() const { return json_; }
+
+  void ensure_open(const Arrival& at) {
+    if (open_) return;
+    open_ = true;
+    driver_->opened(at);
+  }
+  void close(const Arrival& at) {
+    if (std::exchange(open_, false)) driver_->closed(at);
+  }
+  bool is_open() const { return open_; }
+
+  void send(std::string_view bytes) override { owner_.sink_.send(slot_, bytes); }
+  void emit(Fix fix) override {
+    fix.mission = owner_.mission_;
+    owner_.sink_.fix(slot_, fix);
+  }
+  void emit(Range range) override {
+    range.mission = owner_.mission_;
+    owner_.sink_.range(slot_, range);
+  }
+  void rover(const RoverStatus& status) override {
+    if (status.position) owner_.rover_ = status;
+    owner_.sink_.rover(slot_, status);
+  }
+  void identified(const Identity& identity) override { owner_.sink_.identified(slot_, identity); }
+  void heard() override { owner_.sink_.heard(slot_); }
+  void dropped(std::string_view reason, std::uint64_t n) override { owner_.sink_.dropped(slot_, reason, n); }
+  void answer(std::uint64_t id, Result<std::string> json) override { owner_.sink_.answer(slot_, id, json); }
+  void corrections(std::string_view bytes) override { owner_.correct(bytes); }
+  std::optional<RoverStatus> rover_position() const override { return owner_.rover_; }
+  timing::TimeBase& time() override { return owner_.time_; }
+  std::uint16_t slot() const override { return slot_; }
+
+ private:
+  Pipeline& owner_;
+  std::uint16_t slot_;
+  Settings settings_;
+  std::string json_;
+  std::unique_ptr<Driver> driver_;
+  bool open_{false};
+};
+
+Pipeline::Pipeline(PipelineSink& sink) : sink_(sink) {}
+Pipeline::~Pipeline() = default;
+
+Result<void> Pipeline::add(std::uint16_t slot, std::string_view json) {
+  const auto known = devices_.find(slot);
+  // Each part of a recording tells again what is there.
+  if (known != devices_.end() && known->second->json() == json) return boost::outcome_v2::success();
+  BOOST_OUTCOME_TRY(auto settings, parse_settings(json));
+  auto device = std::make_unique<Device>(*this, slot, std::move(settings), std::string(json));
+  BOOST_OUTCOME_TRY(device->make());
+  devices_[slot] = std::move(device);
+  return boost::outcome_v2::success();
+}
+
+void Pipeline::correct(std::string_view bytes) {
+  for (const auto& [slot, device] : devices_) {
+    if (device->settings().kind == "gnss" && device->is_open()) sink_.send(slot, bytes);
+  }
+}
+
+std::optional<std::int64_t> Pipeline::deadline_ns(std::uint16_t slot) const {
+  const auto found = devices_.find(slot);
+  return found == devices_.end() || !found->second->is_open() ? std::nullopt
+                                                              : found->second->driver().deadline_ns();
+}
+
+Result<void> Pipeline::take(const record::Event& event) {
+  using record::EventKind;
+  time_.arrived(event.at);
+  if (event.kind == EventKind::added) return add(event.slot, event.payload);
+  if (event.kind == EventKind::mission) {
+    if (event.payload.empty()) {
+      mission_ = {};
+      return boost::outcome_v2::success();
+    }
+    BOOST_OUTCOME_TRY(const auto id, parse_uuid(event.payload));
+    mission_ = MissionId{id};
+    return boost::outcome_v2::success();
+  }
+  const auto found = devices_.find(event.slot);
+  if (found == devices_.end()) {
+    return make_error(Errc::not_found, "no device in slot " + std::to_string(event.slot));
+  }
+  auto& device = *found->second;
+  switch (event.kind) {
+    case EventKind::opened:
+      device.close(event.at);  // a listening link's next peer
+      device.ensure_open(event.at);
+      break;
+    case EventKind::bytes:
+      device.ensure_open(event.at);
+      device.driver().bytes(event.payload, event.at);
+      break;
+    case EventKind::tick:
+      device.ensure_open(event.at);
+      device.driver().tick(event.at);
+      break;
+    case EventKind::closed:
+      device.close(event.at);
+      time_.receiver_gone(event.slot);
+      break;
+    case EventKind::command: {
+      BOOST_OUTCOME_TRY(const auto command, parse_command(event.payload));
+      device.driver().command(command, event.at);
+      break;
+    }
+    case EventKind::removed:
+      device.close(event.at);
+      time_.receiver_gone(event.slot);
+      devices_.erase(found);
+      break;
+    case EventKind::added:
+    case EventKind::mission:
+      break;
+  }
+  return boost::outcome_v2::success();
+}
+
+}  // namespace anchord::device

@@ -1,0 +1,62 @@
+#include "drivers/device/settings.hpp"
+
+#include <nlohmann/json.hpp>
+
+namespace anchord::device {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string text_of(const Json& object, const char* key) {
+  const auto it = object.find(key);
+  return it != object.end() && it->is_string() ? it->get<std::string>() : std::string();
+}
+
+Json object_of(const std::string& text) {
+  auto json = Json::parse(text.empty() ? "{}" : text, nullptr, false);
+  return json.is_object() ? json : Json::object();
+}
+
+std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+
+Result<Json> parsed(std::string_view text) {
+  if (text.size() > 65'536) return make_error(Errc::bad_frame, "longer than 64 KiB");
+  auto json = Json::parse(text.begin(), text.end(), nullptr, false);
+  if (!json.is_object()) return make_error(Errc::bad_frame, "not a JSON object");
+  return json;
+}
+
+}  // namespace
+
+std::string to_json(const Settings& s) {
+  return dump({{"id", s.id},
+               {"kind", s.kind},
+               {"name", s.name},
+               {"address", s.address},
+               {"options", object_of(s.options_json)}});
+}
+
+Result<Settings> parse_settings(std::string_view text) {
+  BOOST_OUTCOME_TRY(const auto json, parsed(text));
+  Settings out{text_of(json, "id"), text_of(json, "kind"), text_of(json, "name"), text_of(json, "address"),
+               "{}"};
+  if (const auto it = json.find("options"); it != json.end() && it->is_object()) out.options_json = dump(*it);
+  return out;
+}
+
+std::string to_json(const Command& c) {
+  return dump({{"id", c.id}, {"name", c.name}, {"arguments", object_of(c.arguments_json)}});
+}
+
+Result<Command> parse_command(std::string_view text) {
+  BOOST_OUTCOME_TRY(const auto json, parsed(text));
+  Command out;
+  if (const auto it = json.find("id"); it != json.end() && it->is_number_unsigned())
+    out.id = it->get<std::uint64_t>();
+  out.name = text_of(json, "name");
+  if (const auto it = json.find("arguments"); it != json.end() && it->is_object())
+    out.arguments_json = dump(*it);
+  return out;
+}
+
+}  // namespace anchord::device

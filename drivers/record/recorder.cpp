@@ -1,0 +1,244 @@
+#include "drivers/record/recorder.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <condition_variable>
+#include <cstdio>
+#include <cstring>
+#include <map>
+#include <mutex>
+#include <thread>
+
+namespace anchord::record {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr std::int64_t k_retry_ns = 10'000'000'000;
+
+/// "20261121T064100Z": sorts by time, safe in any file system.
+std::string stem_of(UtcTime now) {
+  std::string out;
+  for (const char c : to_rfc3339(now).substr(0, 19)) {
+    if (c != '-' && c != ':') out += c;
+  }
+  return out + "Z";
+}
+
+std::string part_name(const std::string& stem, int part) {
+  char text[32];
+  std::snprintf(text, sizeof text, "-%04d.anrec", part);
+  return stem + text;
+}
+
+bool write_all(int fd, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const auto n = ::write(fd, bytes.data(), bytes.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) return false;
+    bytes.remove_prefix(static_cast<std::size_t>(n));
+  }
+  return true;
+}
+
+}  // namespace
+
+struct Recorder::State {
+  fs::path folder;
+  std::string stem;
+  RecorderOptions options;
+
+  // Of the calling thread.
+  int part{0};
+  std::uint64_t in_part{0};
+  std::int64_t retry_at_ns{0};
+  std::map<std::uint16_t, std::string> devices;  ///< "added" payloads, for the next part
+  std::string mission, scratch;
+
+  mutable std::mutex mutex;  ///< the three below, shared with the syncing thread
+  std::condition_variable wake;
+  int fd{-1};
+  fs::path file;
+  std::string failure;
+  bool stopping{false};
+
+  std::atomic<std::uint64_t> written{0}, lost{0};
+  std::thread syncer;
+
+  Result<void> next_part(const link::Arrival& at);
+  void remember(const Event& event);
+  bool write(std::string_view bytes);
+  void fail(std::int64_t now_ns, int error);
+  void sync_loop();
+};
+
+Result<void> Recorder::State::next_part(const link::Arrival& at) {
+  int opened = -1;
+  fs::path path;
+  do {
+    path = folder / part_name(stem, ++part);
+    opened = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0600);
+  } while (opened < 0 && errno == EEXIST && part < 9999);
+  if (opened < 0) {
+    return make_error(errno == ENOSPC ? Errc::storage_full : Errc::storage_unavailable,
+                      path.string() + ": " + std::strerror(errno));
+  }
+  {
+    const std::lock_guard lock(mutex);
+    if (fd >= 0) ::close(fd);
+    fd = opened;
+    file = path;
+    failure.clear();
+  }
+  std::string head(k_magic);
+  for (const auto& [slot, settings] : devices) append_record(head, {EventKind::added, slot, at, settings});
+  if (!mission.empty()) append_record(head, {EventKind::mission, 0, at, mission});
+  in_part = 0;
+  if (!write(head)) return make_error(Errc::storage_full, path.string() + ": " + std::strerror(errno));
+  return boost::outcome_v2::success();
+}
+
+bool Recorder::State::write(std::string_view bytes) {
+  if (!write_all(fd, bytes)) return false;
+  in_part += bytes.size();
+  written += bytes.size();
+  return true;
+}
+
+void Recorder::State::remember(const Event& event) {
+  switch (event.kind) {
+    case EventKind::added:
+      devices[event.slot] = std::string(event.payload);
+      break;
+    case EventKind::removed:
+      devices.erase(event.slot);
+      break;
+    case EventKind::mission:
+      mission = std::string(event.payload);
+      break;
+    case EventKind::opened:
+    case EventKind::bytes:
+    case EventKind::tick:
+    case EventKind::closed:
+    case EventKind::command:
+      break;
+  }
+}
+
+void Recorder::State::fail(std::int64_t now_ns, int error) {
+  retry_at_ns = now_ns + k_retry_ns;
+  const std::lock_guard lock(mutex);
+  failure = file.string() + ": " + std::strerror(error);
+}
+
+void Recorder::State::sync_loop() {
+  std::uint64_t synced = 0;
+  std::unique_lock lock(mutex);
+  while (!stopping) {
+    wake.wait_for(lock, std::chrono::milliseconds(options.sync_every_ms), [this] { return stopping; });
+    const auto now = written.load();
+    if (fd < 0 || now == synced) continue;
+    const int copy = ::dup(fd);  // the writer may turn to the next part meanwhile
+    lock.unlock();
+    if (copy >= 0) {
+      (void)::fdatasync(copy);
+      ::close(copy);
+    }
+    synced = now;
+    lock.lock();
+  }
+}
+
+Recorder::Recorder(std::unique_ptr<State> state) : state_(std::move(state)) {
+  state_->syncer = std::thread([state_now = state_.get()] { state_now->sync_loop(); });
+}
+
+Recorder::~Recorder() {
+  {
+    const std::lock_guard lock(state_->mutex);
+    state_->stopping = true;
+  }
+  state_->wake.notify_all();
+  state_->syncer.join();
+  if (state_->fd >= 0) {
+    (void)::fdatasync(state_->fd);
+    ::close(state_->fd);
+  }
+}
+
+Result<std::unique_ptr<Recorder>> Recorder::open(const fs::path& folder, UtcTime now,
+                                                 const RecorderOptions& options) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (!error) fs::permissions(folder, fs::perms::owner_all, error);
+  if (error) return make_error(Errc::storage_unavailable, folder.string() + ": " + error.message());
+  auto state = std::make_unique<State>();
+  state->folder = folder;
+  state->stem = stem_of(now);
+  state->options = options;
+  BOOST_OUTCOME_TRY(state->next_part({now, 0}));
+  return std::unique_ptr<Recorder>(new Recorder(std::move(state)));
+}
+
+void Recorder::take(const Event& event) {
+  auto& s = *state_;
+  s.remember(event);
+  const bool broken = s.retry_at_ns != 0;
+  if (broken && event.at.steady_ns < s.retry_at_ns) {
+    ++s.lost;
+    return;
+  }
+  // After a failure the old part may end in half a record: what comes goes to a new one.
+  if (broken || s.in_part >= s.options.rotate_bytes) {
+    if (const auto next = s.next_part(event.at); !next) {
+      ++s.lost;
+      return s.fail(event.at.steady_ns, errno);
+    }
+    s.retry_at_ns = 0;
+    const bool told = event.kind == EventKind::added || event.kind == EventKind::mission;
+    if (told) return;  // the head of the new part says it
+  }
+  s.scratch.clear();
+  append_record(s.scratch, event);
+  if (!s.write(s.scratch)) {
+    ++s.lost;
+    s.fail(event.at.steady_ns, errno);
+  }
+}
+
+std::string Recorder::failed() const {
+  const std::lock_guard lock(state_->mutex);
+  return state_->failure;
+}
+std::uint64_t Recorder::bytes_written() const { return state_->written; }
+std::uint64_t Recorder::events_lost() const { return state_->lost; }
+fs::path Recorder::file() const {
+  const std::lock_guard lock(state_->mutex);
+  return state_->file;
+}
+
+Result<std::vector<fs::path>> parts_of(const fs::path& file) {
+  const auto name = file.filename().string();
+  const auto dash = name.rfind('-');
+  if (!name.ends_with(".anrec") || dash == std::string::npos) {
+    return make_error(Errc::invalid_argument, file.string() + ": recordings are called <start>-NNNN.anrec");
+  }
+  const auto stem = name.substr(0, dash);
+  std::vector<fs::path> out{file};
+  std::error_code error;
+  const auto folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    const auto other = it->path().filename().string();
+    if (other > name && other.ends_with(".anrec") && other.substr(0, other.rfind('-')) == stem) {
+      out.push_back(it->path());
+    }
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+}  // namespace anchord::record

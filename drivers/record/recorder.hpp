@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "drivers/record/event.hpp"
+
+namespace anchord::record {
+
+struct RecorderOptions {
+  std::uint64_t rotate_bytes = 256u << 20;
+  std::int64_t sync_every_ms =
+      1'000;  ///< fdatasync, on a thread of its own: the power may go, a process may not
+};
+
+/// Appends every event to a file before anybody parses it. Each record goes to the kernel in one write, so a
+/// killed process loses nothing that was handed over and a power cut at most the last second; a torn tail is
+/// cut by the reader. Files are `<UTC of the start>-NNNN.anrec`, a new one at rotate_bytes; each begins with
+/// the devices there are, so that any part replays alone.
+///
+/// A full disk stops the recording, not the flight: take() then counts, and tries again after ten seconds of
+/// event time. One thread calls; failed() and counters from any.
+class Recorder {
+ public:
+  static Result<std::unique_ptr<Recorder>> open(const std::filesystem::path& folder, UtcTime now,
+                                                const RecorderOptions& options = {});
+  ~Recorder();
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  void take(const Event& event);
+  /// Why nothing is being recorded; empty while it is.
+  std::string failed() const;
+  std::uint64_t bytes_written() const;
+  std::uint64_t events_lost() const;
+  std::filesystem::path file() const;  ///< being written
+
+ private:
+  struct State;
+  explicit Recorder(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+/// The parts of one recording in order: the file itself and those after it of the same start in its folder.
+Result<std::vector<std::filesystem::path>> parts_of(const std::filesystem::path& file);
+
+}  // namespace anchord::record

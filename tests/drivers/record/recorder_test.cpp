@@ -1,0 +1,145 @@
+#include "drivers/record/recorder.hpp"
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <iterator>
+
+namespace anchord::record {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Folder {
+  Folder() { fs::remove_all(path); }
+  ~Folder() { fs::remove_all(path); }
+  fs::path path{fs::temp_directory_path() / ("anchord_rec_" + std::to_string(::getpid()) + "_" +
+                                             testing::UnitTest::GetInstance()->current_test_info()->name())};
+};
+
+std::string slurp(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::vector<std::string> payloads(const fs::path& first) {
+  std::vector<std::string> out;
+  const auto parts = parts_of(first).value();
+  for (const auto& part : parts) {
+    const auto text = slurp(part);
+    EventReader reader(text);
+    EXPECT_TRUE(reader.begin()) << part;
+    while (const auto event = reader.next()) {
+      if (event->kind == EventKind::bytes) out.emplace_back(event->payload);
+    }
+  }
+  return out;
+}
+
+const UtcTime k_start{1'795'243'500'000'000'000};
+
+TEST(Recorder, WritesForTheOwnerAloneAndNeverOverWhatIsThere) {
+  const Folder folder;
+  fs::path first;
+  {
+    const auto recorder = Recorder::open(folder.path, k_start).value();
+    first = recorder->file();
+    EXPECT_EQ(fs::status(first).permissions(), fs::perms::owner_read | fs::perms::owner_write);
+  }
+  const auto second = Recorder::open(folder.path, k_start).value();
+  EXPECT_NE(second->file(), first);
+}
+
+TEST(Recorder, TurnsToANewPartThatTellsTheDevicesAgain) {
+  const Folder folder;
+  RecorderOptions options;
+  options.rotate_bytes = 1000;
+  std::vector<std::string> expected;
+  fs::path first;
+  {
+    const auto recorder = Recorder::open(folder.path, k_start, options).value();
+    first = recorder->file();
+    recorder->take({EventKind::added, 3, {}, R"({"id":"a"})"});
+    recorder->take({EventKind::mission, 0, {}, "0190f1f2-0000-7000-8000-000000000001"});
+    for (int i = 0; i < 100; ++i) {
+      expected.push_back("chunk " + std::to_string(i));
+      recorder->take({EventKind::bytes, 3, {UtcTime{i}, i}, expected.back()});
+    }
+  }
+  EXPECT_EQ(payloads(first), expected);
+  const auto parts = parts_of(first).value();
+  ASSERT_GT(parts.size(), 3U);
+  const auto text = slurp(parts[2]);
+  EventReader reader(text);
+  ASSERT_TRUE(reader.begin());
+  const auto device = reader.next();
+  ASSERT_TRUE(device);
+  EXPECT_EQ(device->kind, EventKind::added);
+  EXPECT_EQ(device->slot, 3);
+  EXPECT_EQ(reader.next()->kind, EventKind::mission);
+}
+
+TEST(Recorder, AKilledProcessLosesNothingItHandedOver) {
+  const Folder folder;
+  for (int round = 0; round < 5; ++round) {
+    int pipe_ends[2];
+    ASSERT_EQ(::pipe(pipe_ends), 0);
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      auto recorder = Recorder::open(folder.path / std::to_string(round), k_start);
+      if (!recorder) ::_exit(2);
+      for (std::uint32_t i = 0;; ++i) {
+        recorder.value()->take({EventKind::bytes, 1, {}, std::string(50 + i % 500, 'x')});
+        if (::write(pipe_ends[1], &i, sizeof i) != sizeof i) ::_exit(3);
+      }
+    }
+    ::close(pipe_ends[1]);
+    std::uint32_t told = 0;
+    while (told < 1000U + 777U * static_cast<unsigned>(round)) {
+      ASSERT_EQ(::read(pipe_ends[0], &told, sizeof told), static_cast<ssize_t>(sizeof told));
+    }
+    ::kill(child, SIGKILL);
+    while (::read(pipe_ends[0], &told, sizeof told) == static_cast<ssize_t>(sizeof told)) {
+    }
+    ::close(pipe_ends[0]);
+    ASSERT_EQ(::waitpid(child, nullptr, 0), child);
+    const auto file = fs::directory_iterator(folder.path / std::to_string(round))->path();
+    EXPECT_GE(payloads(file).size(), told + 1U);
+  }
+}
+
+TEST(Recorder, AFullDiskIsToldAndTriedAgain) {
+  const Folder folder;
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    // The limit on file sizes stands for the full disk.
+    ::signal(SIGXFSZ, SIG_IGN);
+    const auto recorder = Recorder::open(folder.path, k_start).value();
+    rlimit limit{2000, RLIM_INFINITY};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    for (int i = 0; i < 100; ++i) recorder->take({EventKind::bytes, 1, {{}, i}, std::string(100, 'x')});
+    const bool told = !recorder->failed().empty() && recorder->events_lost() > 80;
+    limit.rlim_cur = RLIM_INFINITY;
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    const auto lost = recorder->events_lost();
+    recorder->take({EventKind::bytes, 1, {{}, 11'000'000'000}, "again"});
+    const bool back = recorder->failed().empty() && recorder->events_lost() == lost;
+    ::_exit(told && back ? 0 : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  std::vector<fs::path> files(fs::directory_iterator(folder.path), {});
+  ASSERT_EQ(files.size(), 2U);
+  const auto all = payloads(std::min(files[0], files[1]));
+  EXPECT_EQ(all.back(), "again");
+}
+
+}  // namespace
+}  // namespace anchord::record
