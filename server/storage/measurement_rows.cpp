@@ -154,6 +154,10 @@ std::optional<Cir> read_cir(Connection& connection, std::int64_t range_id) {
   Query query(connection, k_select_cir);
   query << range_id;
   if (!query.step()) return std::nullopt;
+  return read_cir_columns(query);
+}
+
+Cir read_cir_columns(Query& query) {
   Cir cir;
   cir.dt_ps = query.real();
   cir.first_path_idx = query.maybe_real();

@@ -61,6 +61,8 @@ struct Table<Fix> {
 
 void insert_cir(Connection& connection, std::int64_t range_id, const Cir& cir);
 std::optional<Cir> read_cir(Connection& connection, std::int64_t range_id);
+/// dt_ps, first_path_idx, preamble_count, re_im.
+Cir read_cir_columns(Query& query);
 
 /// Equal in everything but the arrival time, which differs when a client sends again.
 bool same_content(const Range& a, const Range& b);

@@ -49,7 +49,11 @@ class SqliteDatabase final : public Database, private sql::Gate {
         anchors_(sql::make_anchor_store(*this)),
         tokens_(sql::make_token_store(*this)),
         jobs_(sql::make_job_store(*this)),
-        access_(sql::make_access_store(*this)) {
+        access_(sql::make_access_store(*this)),
+        campaigns_(sql::make_campaign_store(*this)),
+        datasets_(sql::make_dataset_store(*this)),
+        training_runs_(sql::make_training_run_store(*this)),
+        models_(sql::make_model_store(*this)) {
     if (check_in_background) checker_ = std::thread([this] { check_in_background_thread(); });
   }
   ~SqliteDatabase() override {
@@ -62,6 +66,10 @@ class SqliteDatabase final : public Database, private sql::Gate {
   TokenStore& tokens() override { return *tokens_; }
   JobStore& jobs() override { return *jobs_; }
   AccessStore& access() override { return *access_; }
+  CampaignStore& campaigns() override { return *campaigns_; }
+  DatasetStore& datasets() override { return *datasets_; }
+  TrainingRunStore& training_runs() override { return *training_runs_; }
+  ModelStore& models() override { return *models_; }
 
   StorageHealth health() override {
     const auto status = writer_.status();
@@ -148,6 +156,10 @@ class SqliteDatabase final : public Database, private sql::Gate {
   std::unique_ptr<TokenStore> tokens_;
   std::unique_ptr<JobStore> jobs_;
   std::unique_ptr<AccessStore> access_;
+  std::unique_ptr<CampaignStore> campaigns_;
+  std::unique_ptr<DatasetStore> datasets_;
+  std::unique_ptr<TrainingRunStore> training_runs_;
+  std::unique_ptr<ModelStore> models_;
   std::thread checker_;
 };
 

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "core/base/result.hpp"
+#include "core/ports/learning_store.hpp"
 #include "core/ports/store.hpp"
 
 namespace anchord {
@@ -68,6 +69,10 @@ class Database {
   virtual TokenStore& tokens() = 0;
   virtual JobStore& jobs() = 0;
   virtual AccessStore& access() = 0;
+  virtual CampaignStore& campaigns() = 0;
+  virtual DatasetStore& datasets() = 0;
+  virtual TrainingRunStore& training_runs() = 0;
+  virtual ModelStore& models() = 0;
   virtual StorageHealth health() = 0;
   /// Online copy while writes go on: fsynced, integrity-checked, with its SHA-256. The file must not exist.
   virtual Result<BackupReport> backup(const std::filesystem::path& file) = 0;

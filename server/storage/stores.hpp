@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 
+#include "core/ports/learning_store.hpp"
 #include "core/ports/store.hpp"
 #include "server/storage/sql.hpp"
 
@@ -18,6 +19,10 @@ std::unique_ptr<AnchorStore> make_anchor_store(Gate& gate);
 std::unique_ptr<TokenStore> make_token_store(Gate& gate);
 std::unique_ptr<JobStore> make_job_store(Gate& gate);
 std::unique_ptr<AccessStore> make_access_store(Gate& gate);
+std::unique_ptr<CampaignStore> make_campaign_store(Gate& gate);
+std::unique_ptr<DatasetStore> make_dataset_store(Gate& gate);
+std::unique_ptr<TrainingRunStore> make_training_run_store(Gate& gate);
+std::unique_ptr<ModelStore> make_model_store(Gate& gate);
 
 /// The short form of a mission's id; nothing when there is no such mission.
 std::optional<std::int64_t> mission_key(Connection& connection, const MissionId& id);
