@@ -60,6 +60,8 @@ class DriverOutput {
   virtual void answer(std::uint64_t command_id, Result<std::string> json) = 0;
   /// Corrections for rovers (RTCM), from an NTRIP client.
   virtual void corrections(std::string_view bytes) = 0;
+  /// This connection is of no use (refused, not our device): close it and wait this long at least.
+  virtual void hang_up(std::string_view why, std::int64_t wait_ns) = 0;
   /// The newest position of a rover, for casters that want to know where we are; absent without a fix.
   virtual std::optional<RoverStatus> rover_position() const = 0;
   /// UTC of steady instants.

@@ -46,6 +46,9 @@ class Pipeline::Device final : public DriverOutput {
   void dropped(std::string_view reason, std::uint64_t n) override { owner_.sink_.dropped(slot_, reason, n); }
   void answer(std::uint64_t id, Result<std::string> json) override { owner_.sink_.answer(slot_, id, json); }
   void corrections(std::string_view bytes) override { owner_.correct(bytes); }
+  void hang_up(std::string_view why, std::int64_t wait_ns) override {
+    owner_.sink_.hang_up(slot_, why, wait_ns);
+  }
   std::optional<RoverStatus> rover_position() const override { return owner_.rover_; }
   timing::TimeBase& time() override { return owner_.time_; }
   std::uint16_t slot() const override { return slot_; }

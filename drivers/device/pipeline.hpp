@@ -28,6 +28,7 @@ class PipelineSink {
   virtual void heard(std::uint16_t slot) = 0;
   virtual void dropped(std::uint16_t slot, std::string_view reason, std::uint64_t n) = 0;
   virtual void answer(std::uint16_t slot, std::uint64_t command_id, const Result<std::string>& json) = 0;
+  virtual void hang_up(std::uint16_t slot, std::string_view why, std::int64_t wait_ns) = 0;
 };
 
 /// All drivers of one server (or of one recording) behind one entrance. Every input is an event, and nothing

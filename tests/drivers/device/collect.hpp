@@ -39,7 +39,13 @@ struct Collect final : PipelineSink {
   void answer(std::uint16_t, std::uint64_t id, const Result<std::string>& json) override {
     answers[id] = json ? json.value() : "error: " + json.error().message;
   }
+  void hang_up(std::uint16_t, std::string_view why, std::int64_t wait_ns) override {
+    hung_up = std::string(why);
+    hang_up_wait_ns = wait_ns;
+  }
 
+  std::string hung_up;
+  std::int64_t hang_up_wait_ns{0};
   std::map<std::uint16_t, std::string> sent;
   std::vector<Fix> fixes;
   std::vector<Range> ranges;

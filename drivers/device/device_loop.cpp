@@ -1,0 +1,486 @@
+#include "drivers/device/device_loop.hpp"
+
+#include <algorithm>
+#include <array>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <chrono>
+#include <deque>
+#include <exception>
+#include <random>
+
+#include "drivers/device/pipeline.hpp"
+#include "drivers/device/settings.hpp"
+#include "drivers/link/serial_port.hpp"
+#include "drivers/record/recorder.hpp"
+
+namespace anchord::device {
+namespace {
+
+namespace asio = boost::asio;
+using record::EventKind;
+
+asio::steady_timer::time_point time_point(std::int64_t steady_ns) {
+  return asio::steady_timer::time_point(std::chrono::nanoseconds(steady_ns));
+}
+
+/// Rows per second over five whole seconds.
+class Rate {
+ public:
+  void count(std::int64_t now_ns) {
+    turn(now_ns);
+    ++slots_[0];
+  }
+  double value(std::int64_t now_ns) const {
+    Rate copy = *this;
+    copy.turn(now_ns);
+    std::uint64_t sum = 0;
+    for (std::size_t i = 1; i < slots_.size(); ++i) sum += copy.slots_[i];
+    return static_cast<double>(sum) / static_cast<double>(slots_.size() - 1);
+  }
+
+ private:
+  void turn(std::int64_t now_ns) {
+    for (const auto second = now_ns / 1'000'000'000; second_ < second; ++second_) {
+      if (second - second_ > 10) second_ = second - 10;
+      std::rotate(slots_.rbegin(), slots_.rbegin() + 1, slots_.rend());
+      slots_[0] = 0;
+    }
+  }
+  std::array<std::uint64_t, 6> slots_{};
+  std::int64_t second_{0};
+};
+
+/// A device is one entry; the slot is its number in the recording.
+struct Entry {
+  Entry(asio::io_context& io, Settings s, link::Address a)
+      : settings(std::move(s)), address(std::move(a)), timer(io) {}
+  Settings settings;
+  link::Address address;
+  asio::steady_timer timer;
+  std::unique_ptr<link::ByteLink> link;
+  Supervision supervision;
+  bool listens{false}, present{true}, fed{false};
+  std::optional<std::int64_t> armed_ns{};
+  std::uint64_t generation{0};  ///< of the link, so that a late report of an old one is known
+  std::uint64_t device_number{0};
+  DeviceState told;  ///< counters, identity, rover
+  Rate rate;
+  std::int64_t hang_up_wait_ns{0};
+  std::string hang_up;
+};
+
+}  // namespace
+
+class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_from_this<DeviceLoop::Impl> {
+ public:
+  Impl(asio::io_context& io, record::Recorder* recorder, DeviceListener& listener, const LoopOptions& options)
+      : io_(io),
+        recorder_(recorder),
+        listener_(listener),
+        options_(options),
+        poll_(io),
+        random_(options.seed),
+        pipeline_(*this) {}
+
+  void start() { poll(); }
+  void stop() {
+    stopped_ = true;
+    poll_.cancel();
+    for (auto& [slot, entry] : entries_) {
+      entry.timer.cancel();
+      entry.link.reset();
+    }
+  }
+
+  // --- the operator's side ---------------------------------------------------------------------------------
+  Result<void> add(const Settings& settings) {
+    BOOST_OUTCOME_TRY(const auto address, link::parse_address(settings.address));
+    for (const auto& [slot, entry] : entries_) {
+      if (entry.settings.id == settings.id) return make_error(Errc::conflict, "the device is there already");
+      if (entry.address == address && (address.kind == link::Kind::serial || address.port != 0)) {
+        return make_error(Errc::conflict, "address: " + settings.address + " is that of device \"" +
+                                              entry.settings.name + "\"");
+      }
+    }
+    const auto slot = next_slot_;
+    const auto json = to_json(settings);
+    BOOST_OUTCOME_TRY(take({EventKind::added, slot, link::arrival_now(), json}));
+    ++next_slot_;
+    auto& entry = entries_.try_emplace(slot, io_, settings, address).first->second;
+    entry.listens = address.kind == link::Kind::tcp_listen;
+    entry.supervision.since_ns = now();
+    happen(slot, {Happened::appeared, now()});
+    return boost::outcome_v2::success();
+  }
+
+  Result<void> remove(const std::string& id) {
+    const auto slot = slot_of(id);
+    if (!slot) return make_error(Errc::not_found, "there is no such device");
+    entries_.erase(*slot);
+    (void)take({EventKind::removed, *slot, link::arrival_now(), {}});
+    listener_.changed(id);
+    return boost::outcome_v2::success();
+  }
+
+  Result<void> command(const std::string& id, const Command& command) {
+    const auto slot = slot_of(id);
+    if (!slot) return make_error(Errc::not_found, "there is no such device");
+    const auto& entry = entries_.at(*slot);
+    if (entry.supervision.phase == Phase::lost || entry.supervision.phase == Phase::found) {
+      return make_error(Errc::link_lost, "the device is not connected: " + entry.supervision.reason);
+    }
+    const auto json = to_json(command);
+    feed({EventKind::command, *slot, link::arrival_now(), json});
+    return boost::outcome_v2::success();
+  }
+
+  void record_into(const std::optional<MissionId>& mission) {
+    const auto text = mission ? to_string(*mission) : std::string();
+    (void)take({EventKind::mission, 0, link::arrival_now(), text});
+  }
+
+  std::vector<DeviceState> devices() const {
+    std::vector<DeviceState> out;
+    for (const auto& [slot, entry] : entries_) out.push_back(state_of(entry));
+    return out;
+  }
+  std::optional<DeviceState> device(const std::string& id) const {
+    const auto slot = slot_of(id);
+    return slot ? std::optional(state_of(entries_.at(*slot))) : std::nullopt;
+  }
+  ClockState clock() const {
+    const auto& time = const_cast<Pipeline&>(pipeline_).time();
+    ClockState out;
+    out.from_receiver = time.source() == timing::TimeSource::receiver;
+    out.system_offset_s = time.system_offset_s();
+    out.sigma_s = time.utc_of(now()).sigma_s;
+    out.skew = time.skew().value_or("");
+    return out;
+  }
+  std::uint16_t port(const std::string& id) const {
+    const auto slot = slot_of(id);
+    const auto* link = slot ? entries_.at(*slot).link.get() : nullptr;
+    return link != nullptr ? link->port() : std::uint16_t{0};
+  }
+
+  // --- what the pipeline says ------------------------------------------------------------------------------
+  void send(std::uint16_t slot, std::string_view bytes) override {
+    const auto found = entries_.find(slot);
+    if (found == entries_.end() || !found->second.link) return;
+    if (const auto done = found->second.link->write(bytes); !done) {
+      count(slot, done.error().code == Errc::queue_full ? "write_refused" : "write_without_link", 1);
+    }
+  }
+  void fix(std::uint16_t slot, const Fix& fix) override {
+    const auto found = entries_.find(slot);
+    if (found == entries_.end()) return;
+    ++found->second.told.fixes;
+    found->second.rate.count(now());
+    if (fix.mission == MissionId{}) return;
+    listener_.fix(found->second.settings.id, fix);
+  }
+  void range(std::uint16_t slot, const Range& range) override {
+    const auto found = entries_.find(slot);
+    if (found == entries_.end()) return;
+    ++found->second.told.ranges;
+    found->second.rate.count(now());
+    if (range.mission == MissionId{}) return;
+    listener_.range(found->second.settings.id, range);
+  }
+  void rover(std::uint16_t slot, const RoverStatus& status) override {
+    if (const auto found = entries_.find(slot); found != entries_.end()) found->second.told.rover = status;
+  }
+  void identified(std::uint16_t slot, const Identity& identity) override {
+    const auto found = entries_.find(slot);
+    if (found == entries_.end() || found->second.told.identity == identity) return;
+    found->second.told.identity = identity;
+    find_conflicts();
+    listener_.changed(found->second.settings.id);
+  }
+  void heard(std::uint16_t slot) override {
+    const auto found = entries_.find(slot);
+    if (found == entries_.end()) return;
+    ++found->second.told.frames;
+    found->second.told.last_heard = now_.utc;
+    happen(slot, {Happened::heard, now()});
+  }
+  void dropped(std::uint16_t slot, std::string_view reason, std::uint64_t n) override {
+    count(slot, reason, n);
+  }
+  void answer(std::uint16_t slot, std::uint64_t id, const Result<std::string>& json) override {
+    if (const auto found = entries_.find(slot); found != entries_.end()) {
+      listener_.answer(found->second.settings.id, id, json);
+    }
+  }
+  void hang_up(std::uint16_t slot, std::string_view why, std::int64_t wait_ns) override {
+    // Not from inside the driver's own call: feed() does it afterwards.
+    if (const auto found = entries_.find(slot); found != entries_.end()) {
+      found->second.hang_up = why;
+      found->second.hang_up_wait_ns = wait_ns;
+    }
+  }
+
+ private:
+  std::int64_t now() const { return link::arrival_now().steady_ns; }
+  double uniform() { return static_cast<double>(random_() >> 11) * 0x1p-53; }
+
+  std::optional<std::uint16_t> slot_of(const std::string& id) const {
+    for (const auto& [slot, entry] : entries_) {
+      if (entry.settings.id == id) return slot;
+    }
+    return std::nullopt;
+  }
+
+  DeviceState state_of(const Entry& entry) const {
+    auto out = entry.told;
+    out.settings = entry.settings;
+    out.phase = entry.supervision.phase;
+    out.reason = entry.supervision.reason;
+    const auto at = now();
+    out.in_phase_s = static_cast<double>(at - entry.supervision.since_ns) * 1e-9;
+    out.rows_per_s = entry.rate.value(at);
+    if (entry.link) {
+      out.bytes_in += entry.link->counters().bytes_in;
+      out.bytes_out += entry.link->counters().bytes_out;
+    }
+    return out;
+  }
+
+  void count(std::uint16_t slot, std::string_view reason, std::uint64_t n) {
+    const auto found = entries_.find(slot);
+    if (found == entries_.end()) return;
+    auto& dropped = found->second.told.dropped;
+    // Reasons come from the drivers' fixed sets; the bound is for a driver that forgets that.
+    if (dropped.size() >= 64 && dropped.count(std::string(reason)) == 0) reason = "other";
+    dropped[std::string(reason)] += n;
+  }
+
+  Result<void> take(const record::Event& event) {
+    now_ = event.at;
+    if (recorder_ != nullptr) recorder_->take(event);
+    return pipeline_.take(event);
+  }
+
+  /// The third door of exceptions: what a driver throws ends its link, not the flight.
+  void feed(const record::Event& event) {
+    const auto slot = event.slot;
+    std::string fault;
+    try {
+      if (const auto done = take(event); !done) count(slot, "refused_event", 1);
+    } catch (const std::exception& error) {
+      fault = std::string("fault in the driver: ") + error.what();
+    }
+    const auto found = entries_.find(slot);
+    if (found == entries_.end()) return;
+    if (!fault.empty()) {
+      count(slot, "driver_fault", 1);
+      found->second.hang_up = fault;
+    }
+    if (!found->second.hang_up.empty()) {
+      const auto why = std::exchange(found->second.hang_up, {});
+      end_link(slot, why, std::exchange(found->second.hang_up_wait_ns, 0));
+      return;
+    }
+    arm(slot);
+  }
+
+  /// The link is gone or given up: the driver hears of it once, then the supervisor.
+  void end_link(std::uint16_t slot, const std::string& why, std::int64_t not_before_ns = 0) {
+    drop_link(slot);
+    happen(slot, {Happened::closed, now(), uniform(), why, not_before_ns});
+  }
+
+  void drop_link(std::uint16_t slot) {
+    auto& entry = entries_.at(slot);
+    ++entry.generation;
+    if (entry.link) {
+      entry.told.bytes_in += entry.link->counters().bytes_in;
+      entry.told.bytes_out += entry.link->counters().bytes_out;
+      entry.link.reset();
+    }
+    entry.device_number = 0;
+    if (std::exchange(entry.fed, false)) {
+      ++entry.told.lost;
+      try {
+        (void)take({EventKind::closed, slot, link::arrival_now(), {}});
+      } catch (const std::exception&) {
+        count(slot, "driver_fault", 1);
+      }
+    }
+  }
+
+  void happen(std::uint16_t slot, const Occurrence& occurrence) {
+    const auto found = entries_.find(slot);
+    if (found == entries_.end()) return;
+    auto& entry = found->second;
+    const auto before = entry.supervision.phase;
+    const auto old_reason = entry.supervision.reason;
+    const auto step = advance(entry.supervision, occurrence, supervisor_of(entry));
+    entry.supervision = step.next;
+    if (step.wanted == Wanted::close) drop_link(slot);
+    if (step.wanted == Wanted::open) open(slot);
+    if (entry.supervision.phase != before ||
+        (before == Phase::lost && entry.supervision.reason != old_reason)) {
+      listener_.changed(entry.settings.id);
+    }
+    arm(slot);
+  }
+
+  /// A caster or a peer that comes to us need not speak for a while.
+  SupervisorOptions supervisor_of(const Entry& entry) const {
+    auto out = options_.supervisor;
+    if (entry.settings.kind == "ntrip") {
+      out.first_wait_ns = 1'000'000'000;
+      out.longest_wait_ns = 30'000'000'000;
+      out.silent_after_ns = 10'000'000'000;
+      out.reopen_after_ns = 30'000'000'000;
+    }
+    // Closing a listening socket drops nobody but the peer that may yet speak.
+    if (entry.listens) out.reopen_after_ns = 3600 * std::int64_t{1'000'000'000};
+    return out;
+  }
+
+  void open(std::uint16_t slot) {
+    auto& entry = entries_.at(slot);
+    if (entry.address.kind == link::Kind::serial) {
+      const auto number = link::device_number(entry.address.path);
+      entry.present = static_cast<bool>(number);
+      entry.device_number = number ? number.value() : 0;
+      for (const auto& [other_slot, other] : entries_) {
+        if (other_slot == slot || !number || other.device_number != number.value()) continue;
+        entry.device_number = 0;
+        entry.told.conflict =
+            "the same port as device \"" + other.settings.name + "\" (" + other.settings.id + ")";
+        count(slot, "port_conflict", 1);
+        happen(slot, {Happened::closed, now(), uniform(), entry.address.path + ": " + entry.told.conflict});
+        return;
+      }
+    }
+    entry.link = link::make_link(io_, entry.address);
+    const auto generation = ++entry.generation;
+    const auto current = [weak = weak_from_this(), slot, generation]() -> std::shared_ptr<Impl> {
+      auto self = weak.lock();
+      if (!self || self->stopped_) return nullptr;
+      const auto found = self->entries_.find(slot);
+      return found != self->entries_.end() && found->second.generation == generation ? self : nullptr;
+    };
+    entry.link->open({[current, slot] {
+                        if (const auto self = current()) self->opened(slot);
+                      },
+                      [current, slot](std::string_view bytes, const link::Arrival& at) {
+                        if (const auto self = current()) self->feed({EventKind::bytes, slot, at, bytes});
+                      },
+                      [current, slot](const Error& why) {
+                        if (const auto self = current()) self->end_link(slot, why.message);
+                      }});
+  }
+
+  void opened(std::uint16_t slot) {
+    auto& entry = entries_.at(slot);
+    ++entry.told.opened;
+    entry.fed = true;
+    entry.told.conflict.clear();
+    find_conflicts();
+    happen(slot, {Happened::opened, now()});
+    feed({EventKind::opened, slot, link::arrival_now(), {}});
+  }
+
+  /// One timer for the supervisor's and the driver's wishes.
+  void arm(std::uint16_t slot) {
+    auto& entry = entries_.at(slot);
+    auto due = deadline_ns(entry.supervision, supervisor_of(entry));
+    // A port that is not plugged in is not tried; the poll sees it come.
+    if (entry.supervision.phase == Phase::lost && !entry.present) due.reset();
+    if (const auto wish = pipeline_.deadline_ns(slot); wish && (!due || *wish < *due)) due = wish;
+    if (!due) {
+      entry.timer.cancel();
+      entry.armed_ns.reset();
+      return;
+    }
+    if (entry.armed_ns == *due) return;
+    entry.armed_ns = *due;
+    entry.timer.expires_at(time_point(*due));
+    entry.timer.async_wait([weak = weak_from_this(), slot](const boost::system::error_code& error) {
+      const auto self = weak.lock();
+      if (error || !self || self->stopped_) return;
+      const auto found = self->entries_.find(slot);
+      if (found == self->entries_.end()) return;
+      found->second.armed_ns.reset();
+      self->rang(slot);
+    });
+  }
+
+  void rang(std::uint16_t slot) {
+    const auto at = link::arrival_now();
+    if (const auto wish = pipeline_.deadline_ns(slot); wish && *wish <= at.steady_ns) {
+      feed({EventKind::tick, slot, at, {}});
+    }
+    happen(slot, {Happened::tick, at.steady_ns, uniform()});
+  }
+
+  void poll() {
+    poll_.expires_after(std::chrono::milliseconds(options_.presence_poll_ms));
+    poll_.async_wait([weak = weak_from_this()](const boost::system::error_code& error) {
+      const auto self = weak.lock();
+      if (error || !self || self->stopped_) return;
+      self->look();
+      self->poll();
+    });
+  }
+
+  void look() {
+    std::vector<std::uint16_t> came;
+    for (auto& [slot, entry] : entries_) {
+      if (entry.address.kind != link::Kind::serial || entry.supervision.phase != Phase::lost) continue;
+      const bool there = static_cast<bool>(link::device_number(entry.address.path));
+      if (there && !entry.present) came.push_back(slot);
+      entry.present = there;
+    }
+    for (const auto slot : came) happen(slot, {Happened::appeared, now(), uniform()});
+  }
+
+  void find_conflicts() {
+    for (auto& [slot, entry] : entries_) {
+      if (!entry.told.identity.network_id) continue;
+      entry.told.conflict.clear();
+      for (const auto& [other_slot, other] : entries_) {
+        if (other_slot == slot || other.told.identity.network_id != entry.told.identity.network_id) continue;
+        entry.told.conflict = to_string(*entry.told.identity.network_id) + " is also device \"" +
+                              other.settings.name + "\" (" + other.settings.id + ")";
+      }
+    }
+  }
+
+  asio::io_context& io_;
+  record::Recorder* recorder_;
+  DeviceListener& listener_;
+  LoopOptions options_;
+  asio::steady_timer poll_;
+  std::mt19937_64 random_;
+  Pipeline pipeline_;
+  std::map<std::uint16_t, Entry> entries_;
+  link::Arrival now_{};
+  std::uint16_t next_slot_{1};
+  bool stopped_{false};
+};
+
+DeviceLoop::DeviceLoop(asio::io_context& io, record::Recorder* recorder, DeviceListener& listener,
+                       const LoopOptions& options)
+    : impl_(std::make_shared<Impl>(io, recorder, listener, options)) {
+  impl_->start();
+}
+DeviceLoop::~DeviceLoop() { impl_->stop(); }
+
+Result<void> DeviceLoop::add(const Settings& settings) { return impl_->add(settings); }
+Result<void> DeviceLoop::remove(const std::string& id) { return impl_->remove(id); }
+Result<void> DeviceLoop::command(const std::string& id, const Command& command) {
+  return impl_->command(id, command);
+}
+void DeviceLoop::record_into(const std::optional<MissionId>& mission) { impl_->record_into(mission); }
+std::vector<DeviceState> DeviceLoop::devices() const { return impl_->devices(); }
+std::optional<DeviceState> DeviceLoop::device(const std::string& id) const { return impl_->device(id); }
+ClockState DeviceLoop::clock() const { return impl_->clock(); }
+std::uint16_t DeviceLoop::port(const std::string& id) const { return impl_->port(id); }
+
+}  // namespace anchord::device

@@ -1,0 +1,92 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/ids.hpp"
+#include "core/base/result.hpp"
+#include "drivers/device/driver.hpp"
+#include "drivers/device/supervisor.hpp"
+
+namespace boost::asio {
+class io_context;
+}
+namespace anchord::record {
+class Recorder;
+}
+
+namespace anchord::device {
+
+/// Everything known of one device at one moment.
+struct DeviceState {
+  Settings settings;
+  Phase phase{Phase::lost};
+  std::string reason;    ///< why it is not talking
+  std::string conflict;  ///< two devices on one port, or one identity on two devices; empty: none
+  double in_phase_s{0};
+  std::optional<UtcTime> last_heard{};
+  Identity identity;
+  std::optional<RoverStatus> rover{};
+  std::uint64_t bytes_in{0}, bytes_out{0}, frames{0}, fixes{0}, ranges{0}, opened{0}, lost{0};
+  std::map<std::string, std::uint64_t> dropped;  ///< by reason
+  double rows_per_s{0};                          ///< over the last five seconds
+};
+
+/// How the server's clocks stand.
+struct ClockState {
+  bool from_receiver{false};
+  std::optional<double> system_offset_s{};
+  double sigma_s{0};
+  std::string skew;  ///< empty: none
+};
+
+/// Who hears of rows and changes. Called on the io thread; must not block.
+class DeviceListener {
+ public:
+  virtual ~DeviceListener() = default;
+  virtual void fix(const std::string& device, const Fix& fix) = 0;
+  virtual void range(const std::string& device, const Range& range) = 0;
+  virtual void changed(const std::string& device) = 0;  ///< phase, identity or conflict
+  virtual void answer(const std::string& device, std::uint64_t command, const Result<std::string>& json) = 0;
+};
+
+struct LoopOptions {
+  SupervisorOptions supervisor{};
+  std::int64_t presence_poll_ms = 500;  ///< of serial ports that are gone: by-id names come with the plug
+  std::uint64_t seed = 1;               ///< of the jitter
+};
+
+/// The devices of one server on one io_context: links, supervisors and timers round a Pipeline. All that
+/// reaches the pipeline is recorded first. Everything here belongs to the thread that runs the io_context.
+class DeviceLoop {
+ public:
+  /// recorder: may be null (nothing is recorded). It and the listener outlive the loop.
+  DeviceLoop(boost::asio::io_context& io, record::Recorder* recorder, DeviceListener& listener,
+             const LoopOptions& options = {});
+  ~DeviceLoop();
+  DeviceLoop(const DeviceLoop&) = delete;
+  DeviceLoop& operator=(const DeviceLoop&) = delete;
+
+  /// errors: invalid_argument (address, kind, options), conflict (id or address in use already)
+  Result<void> add(const Settings& settings);
+  Result<void> remove(const std::string& id);                           ///< not_found
+  Result<void> command(const std::string& id, const Command& command);  ///< not_found, link_lost
+  void record_into(const std::optional<MissionId>& mission);
+
+  std::vector<DeviceState> devices() const;
+  std::optional<DeviceState> device(const std::string& id) const;
+  ClockState clock() const;
+  /// Of a listening link.
+  std::uint16_t port(const std::string& id) const;
+
+ private:
+  class Impl;
+  std::shared_ptr<Impl> impl_;
+};
+
+}  // namespace anchord::device
