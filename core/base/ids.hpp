@@ -43,6 +43,7 @@ using CampaignId = Id<struct CampaignTag>;
 using DatasetId = Id<struct DatasetTag>;
 using TrainingRunId = Id<struct TrainingRunTag>;
 using ModelId = Id<struct ModelTag>;
+using FrameId = Id<struct FrameTag>;
 using JobId = Id<struct JobTag>;
 using TokenId = Id<struct TokenTag>;
 

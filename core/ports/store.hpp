@@ -89,6 +89,7 @@ struct PublishedPosition {
   TrackFrame frame{TrackFrame::wgs84};
   std::optional<Wgs84> origin{};
   Estimate estimate{};
+  std::optional<Override> overridden{};  ///< published in spite of a gate
 };
 
 /// Sites, anchors and their published positions. Updates name the version they change: conflict when it moved
@@ -113,12 +114,15 @@ class AnchorStore {
   virtual Result<Calibration> calibration(const CalibrationId& id) = 0;
   virtual Result<std::vector<Calibration>> calibrations(std::size_t limit,
                                                         const std::optional<CalibrationId>& after) = 0;
+  /// What insert was given as evidence_json; empty when there was none.
+  virtual Result<std::string> evidence(const CalibrationId& id) = 0;
   virtual Result<void> remove(const CalibrationId& id) = 0;  ///< conflict when a revision uses it
   /// A new revision: the named anchors (each with a position in the calibration, else invalid_argument) take
   /// their position from it, all others keep that of the revision before. Which verdicts may be published is
-  /// not decided here.
+  /// not decided here; `overrides` (of named anchors) are kept with the revision.
   virtual Result<Revision> publish(const CalibrationId& id, const std::vector<NetworkId>& anchors,
-                                   std::string_view by, std::string_view note, UtcTime now) = 0;
+                                   std::string_view by, std::string_view note, UtcTime now,
+                                   const std::vector<Override>& overrides = {}) = 0;
   /// before: 0 for the newest page.
   virtual Result<std::vector<Revision>> revisions(std::size_t limit, std::uint64_t before) = 0;
   /// All positions of a revision, of the newest when absent (empty when nothing was ever published).

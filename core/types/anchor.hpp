@@ -20,6 +20,7 @@ struct Site {
   std::optional<double> crs_epoch{};
   std::optional<double> base_sigma_m{};  ///< of the base station's own coordinates
   std::string base_source;               ///< known_point, survey_in, network or empty
+  std::optional<int> projected_epsg{};   ///< map system of `projected`, e.g. 25831
   UtcTime created{};
   std::uint64_t version{1};  ///< for ETag
 };
@@ -45,6 +46,17 @@ struct Calibration {
   std::string settings_json;      ///< the request as accepted
   UtcTime created{};
   std::vector<Estimate> anchors;
+  std::string provenance_json{"{}"};  ///< profile, models, base, and what each flight said
+  /// Residuals and the course of the estimate, for the report. Large: read back by AnchorStore::evidence
+  /// alone.
+  std::string evidence_json;
+};
+
+/// A person published an anchor although a gate failed.
+struct Override {
+  NetworkId anchor{};
+  std::string reason;  ///< never empty
+  std::string by;      ///< token id
 };
 
 /// A published state of all anchors: what facility tools read.

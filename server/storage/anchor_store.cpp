@@ -8,21 +8,21 @@ namespace {
 constexpr const char* k_site_insert =
     "INSERT INTO site (id, name, origin_lat_deg, origin_lon_deg, origin_height_m, outline_geojson, "
     "crs_frame, "
-    "crs_epoch_year, base_sigma_m, base_source, created_t_ns, version) "
-    "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12) ON CONFLICT DO NOTHING RETURNING version";
+    "crs_epoch_year, base_sigma_m, base_source, projected_epsg, created_t_ns, version) "
+    "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13) ON CONFLICT DO NOTHING RETURNING "
+    "version";
 constexpr const char* k_site_update =
     "UPDATE site SET name = ?2, origin_lat_deg = ?3, origin_lon_deg = ?4, origin_height_m = ?5, "
     "outline_geojson = ?6, "
-    "crs_frame = ?7, crs_epoch_year = ?8, base_sigma_m = ?9, base_source = ?10, created_t_ns = ?11, version "
-    "= ?12 "
-    "WHERE id = ?1 AND version = ?13 RETURNING version";
+    "crs_frame = ?7, crs_epoch_year = ?8, base_sigma_m = ?9, base_source = ?10, projected_epsg = ?11, "
+    "created_t_ns = ?12, version = ?13 WHERE id = ?1 AND version = ?14 RETURNING version";
 constexpr const char* k_site_columns =
     "SELECT id, name, origin_lat_deg, origin_lon_deg, origin_height_m, outline_geojson, crs_frame, "
     "crs_epoch_year, "
-    "base_sigma_m, base_source, created_t_ns, version FROM site ";
+    "base_sigma_m, base_source, projected_epsg, created_t_ns, version FROM site ";
 constexpr const char* k_site_users =
     "SELECT (SELECT count(*) FROM mission WHERE site_id = ?1) + (SELECT count(*) FROM anchor WHERE site_id = "
-    "?1)";
+    "?1) + (SELECT count(*) FROM local_frame WHERE site_id = ?1)";
 constexpr const char* k_site_remove = "DELETE FROM site WHERE id = ?1 RETURNING version";
 
 constexpr const char* k_anchor_insert =
@@ -51,8 +51,12 @@ Error absent(const char* what, const AnyId& id) {
 void bind(Query& query, const Site& s, std::uint64_t version) {
   query << s.id << s.name;
   bind_wgs84(query, s.origin);
-  query << s.outline_geojson << s.crs_frame << s.crs_epoch << s.base_sigma_m << s.base_source << s.created
-        << version;
+  query << s.outline_geojson << s.crs_frame << s.crs_epoch << s.base_sigma_m << s.base_source;
+  if (s.projected_epsg)
+    query << *s.projected_epsg;
+  else
+    query << std::nullopt;
+  query << s.created << version;
 }
 
 Site read_site(Query& query) {
@@ -65,6 +69,7 @@ Site read_site(Query& query) {
   s.crs_epoch = query.maybe_real();
   s.base_sigma_m = query.maybe_real();
   s.base_source = query.text();
+  s.projected_epsg = query.maybe([&] { return query.as<int>(); });
   s.created = query.time();
   s.version = query.as<std::uint64_t>();
   return s;
@@ -252,13 +257,17 @@ class SqlAnchorStore final : public AnchorStore {
     return read_value<std::vector<Calibration>>(
         gate_, [&](Connection& c) { return list_calibrations(c, row_limit(limit), after); });
   }
+  Result<std::string> evidence(const CalibrationId& id) override {
+    return read_value<std::string>(gate_, [&](Connection& c) { return find_evidence(c, id); });
+  }
   Result<void> remove(const CalibrationId& id) override {
     return write_void(gate_, [&](Connection& c) { return remove_calibration(c, id); });
   }
   Result<Revision> publish(const CalibrationId& id, const std::vector<NetworkId>& anchors,
-                           std::string_view by, std::string_view note, UtcTime now) override {
+                           std::string_view by, std::string_view note, UtcTime now,
+                           const std::vector<Override>& overrides) override {
     return write_value<Revision>(
-        gate_, 1, [&](Connection& c) { return publish_revision(c, id, anchors, by, note, now); });
+        gate_, 1, [&](Connection& c) { return publish_revision(c, id, anchors, by, note, now, overrides); });
   }
   Result<std::vector<Revision>> revisions(std::size_t limit, std::uint64_t before) override {
     return read_value<std::vector<Revision>>(

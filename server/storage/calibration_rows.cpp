@@ -10,14 +10,18 @@ namespace {
 
 constexpr const char* k_insert =
     "INSERT INTO calibration (id, frame, origin_lat_deg, origin_lon_deg, origin_height_m, settings_json, "
-    "created_t_ns) "
-    "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7) ON CONFLICT DO NOTHING RETURNING calibration_key";
+    "created_t_ns, provenance_json) "
+    "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8) ON CONFLICT DO NOTHING RETURNING calibration_key";
 constexpr const char* k_insert_mission =
     "INSERT INTO calibration_mission (calibration_key, ordinal, mission_key) VALUES (?1, ?2, ?3)";
 constexpr const char* k_columns =
     "SELECT calibration_key, id, frame, origin_lat_deg, origin_lon_deg, origin_height_m, settings_json, "
-    "created_t_ns "
-    "FROM calibration ";
+    "created_t_ns, provenance_json FROM calibration ";
+constexpr const char* k_insert_evidence =
+    "INSERT INTO calibration_evidence (calibration_key, evidence_json) VALUES (?1, ?2)";
+constexpr const char* k_evidence =
+    "SELECT evidence_json FROM calibration_evidence e JOIN calibration c ON c.calibration_key = "
+    "e.calibration_key WHERE c.id = ?1";
 constexpr const char* k_missions =
     "SELECT m.id FROM calibration_mission cm JOIN mission m ON m.mission_key = cm.mission_key "
     "WHERE cm.calibration_key = ?1 ORDER BY cm.ordinal";
@@ -35,6 +39,10 @@ constexpr const char* k_carry_on =
 constexpr const char* k_set_position =
     "INSERT INTO revision_position (number, network_id, since_number) VALUES (?1, ?2, ?1) "
     "ON CONFLICT (number, network_id) DO UPDATE SET since_number = excluded.since_number";
+constexpr const char* k_insert_override =
+    "INSERT INTO revision_override (number, network_id, reason, overridden_by) VALUES (?1, ?2, ?3, ?4)";
+constexpr const char* k_override =
+    "SELECT reason, overridden_by FROM revision_override WHERE number = ?1 AND network_id = ?2";
 constexpr const char* k_revisions =
     "SELECT r.number, c.id, r.published_t_ns, r.published_by, r.note FROM revision r "
     "JOIN calibration c ON c.calibration_key = r.calibration_key "
@@ -70,6 +78,7 @@ Calibration read(Connection& c, Query& query) {
   found.origin = read_wgs84(query);
   found.settings_json = query.text();
   found.created = query.time();
+  found.provenance_json = query.text();
   Query missions(c, k_missions);
   missions << key;
   while (missions.step()) found.missions.push_back(missions.id<MissionId>());
@@ -91,6 +100,12 @@ std::vector<PublishedPosition> read_positions(Connection& c, Query& query) {
     auto estimate = read_estimate(c, key, anchor);
     if (!estimate) throw SqlError(Failure::damaged, "a published position without its estimate");
     position.estimate = *std::move(estimate);
+    Query overridden(c, k_override);
+    overridden << position.since_revision << anchor;
+    if (overridden.step()) {
+      std::string reason = overridden.text();
+      position.overridden = Override{anchor, std::move(reason), overridden.text()};
+    }
     found.push_back(std::move(position));
   }
   return found;
@@ -114,7 +129,7 @@ std::optional<Error> insert_calibration(Connection& c, const Calibration& calibr
     Query query(c, k_insert);
     query << calibration.id << static_cast<int>(calibration.frame);
     bind_wgs84(query, calibration.origin);
-    query << calibration.settings_json << calibration.created;
+    query << calibration.settings_json << calibration.created << calibration.provenance_json;
     key = query.returned();
   }
   if (!key) return make_error(Errc::conflict, "calibration " + to_string(calibration.id) + " exists");
@@ -127,6 +142,11 @@ std::optional<Error> insert_calibration(Connection& c, const Calibration& calibr
     query.run();
   }
   store_estimates(c, *key, calibration.anchors);
+  if (!calibration.evidence_json.empty()) {
+    Query query(c, k_insert_evidence);
+    query << *key << calibration.evidence_json;
+    query.run();
+  }
   return std::nullopt;
 }
 
@@ -148,6 +168,13 @@ Result<std::vector<Calibration>> list_calibrations(Connection& c, std::int64_t l
   return found;
 }
 
+Result<std::string> find_evidence(Connection& c, const CalibrationId& id) {
+  if (!key_of(c, id)) return absent(id);
+  Query query(c, k_evidence);
+  query << id;
+  return query.step() ? query.text() : std::string{};
+}
+
 std::optional<Error> remove_calibration(Connection& c, const CalibrationId& id) {
   const auto key = key_of(c, id);
   if (!key) return absent(id);
@@ -164,7 +191,8 @@ std::optional<Error> remove_calibration(Connection& c, const CalibrationId& id) 
 
 Result<Revision> publish_revision(Connection& c, const CalibrationId& id,
                                   const std::vector<NetworkId>& anchors, std::string_view by,
-                                  std::string_view note, UtcTime now) {
+                                  std::string_view note, UtcTime now,
+                                  const std::vector<Override>& overrides) {
   const auto key = key_of(c, id);
   if (!key) return absent(id);
   const std::uint64_t before = newest_revision(c);
@@ -184,6 +212,14 @@ Result<Revision> publish_revision(Connection& c, const CalibrationId& id,
     Query set(c, k_set_position);
     set << revision.number << anchor;
     set.run();
+  }
+  for (const Override& one : overrides) {
+    if (std::ranges::find(anchors, one.anchor) == anchors.end())
+      return make_error(Errc::invalid_argument,
+                        "override of anchor " + to_string(one.anchor) + ", which is not published");
+    Query insert_override(c, k_insert_override);
+    insert_override << revision.number << one.anchor << one.reason << one.by;
+    insert_override.run();
   }
   return revision;
 }

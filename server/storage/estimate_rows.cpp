@@ -28,6 +28,13 @@ constexpr const char* k_hypotheses =
 constexpr const char* k_refused =
     "SELECT reason, n_ranges FROM estimate_refused WHERE calibration_key = ?1 AND network_id = ?2";
 
+constexpr const char* k_insert_gate =
+    "INSERT INTO estimate_gate (calibration_key, network_id, ordinal, name, value, limit_value, passed, why) "
+    "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)";
+constexpr const char* k_gates =
+    "SELECT name, value, limit_value, passed, why FROM estimate_gate WHERE calibration_key = ?1 AND "
+    "network_id = ?2 ORDER BY ordinal";
+
 void store_hypothesis(Connection& c, std::int64_t key, NetworkId anchor, bool is_mirror,
                       const Hypothesis& h) {
   Query query(c, k_insert_hypothesis);
@@ -56,6 +63,17 @@ void read_parts(Connection& c, std::int64_t key, Estimate& e) {
   while (refused.step()) {
     std::string reason = refused.text();
     e.refused[std::move(reason)] = refused.as<std::size_t>();
+  }
+  Query gates(c, k_gates);
+  gates << key << e.anchor;
+  while (gates.step()) {
+    anchord::Gate gate;
+    gate.name = gates.text();
+    gate.value = gates.maybe_real();
+    gate.limit = gates.real();
+    gate.passed = gates.integer() != 0;
+    gate.why = gates.text();
+    e.gates.push_back(std::move(gate));
   }
 }
 
@@ -95,6 +113,13 @@ void store_estimates(Connection& connection, std::int64_t calibration_key,
       Query refused(connection, k_insert_refused);
       refused << calibration_key << e.anchor << reason << std::uint64_t{n};
       refused.run();
+    }
+    std::int64_t place = 0;
+    for (const anchord::Gate& gate : e.gates) {
+      Query insert(connection, k_insert_gate);
+      insert << calibration_key << e.anchor << place++ << gate.name << gate.value << gate.limit << gate.passed
+             << gate.why;
+      insert.run();
     }
   }
 }

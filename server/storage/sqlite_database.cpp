@@ -47,6 +47,8 @@ class SqliteDatabase final : public Database, private sql::Gate {
         measurements_(sql::make_measurement_store(*this)),
         missions_(sql::make_mission_store(*this, [this] { return admit_mission(); })),
         anchors_(sql::make_anchor_store(*this)),
+        kits_(sql::make_kit_store(*this)),
+        frames_(sql::make_frame_store(*this)),
         tokens_(sql::make_token_store(*this)),
         jobs_(sql::make_job_store(*this)),
         access_(sql::make_access_store(*this)),
@@ -63,6 +65,8 @@ class SqliteDatabase final : public Database, private sql::Gate {
   MeasurementStore& measurements() override { return *measurements_; }
   MissionStore& missions() override { return *missions_; }
   AnchorStore& anchors() override { return *anchors_; }
+  KitStore& kits() override { return *kits_; }
+  FrameStore& frames() override { return *frames_; }
   TokenStore& tokens() override { return *tokens_; }
   JobStore& jobs() override { return *jobs_; }
   AccessStore& access() override { return *access_; }
@@ -153,6 +157,8 @@ class SqliteDatabase final : public Database, private sql::Gate {
   std::unique_ptr<MeasurementStore> measurements_;
   std::unique_ptr<MissionStore> missions_;
   std::unique_ptr<AnchorStore> anchors_;
+  std::unique_ptr<KitStore> kits_;
+  std::unique_ptr<FrameStore> frames_;
   std::unique_ptr<TokenStore> tokens_;
   std::unique_ptr<JobStore> jobs_;
   std::unique_ptr<AccessStore> access_;

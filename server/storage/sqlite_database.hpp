@@ -9,6 +9,7 @@
 
 #include "core/base/result.hpp"
 #include "core/ports/learning_store.hpp"
+#include "core/ports/site_store.hpp"
 #include "core/ports/store.hpp"
 
 namespace anchord {
@@ -66,6 +67,8 @@ class Database {
   virtual MeasurementStore& measurements() = 0;
   virtual MissionStore& missions() = 0;
   virtual AnchorStore& anchors() = 0;
+  virtual KitStore& kits() = 0;
+  virtual FrameStore& frames() = 0;
   virtual TokenStore& tokens() = 0;
   virtual JobStore& jobs() = 0;
   virtual AccessStore& access() = 0;

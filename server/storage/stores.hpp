@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "core/ports/learning_store.hpp"
+#include "core/ports/site_store.hpp"
 #include "core/ports/store.hpp"
 #include "server/storage/sql.hpp"
 
@@ -16,6 +17,8 @@ using AdmitMission = std::function<std::optional<Error>()>;
 std::unique_ptr<MeasurementStore> make_measurement_store(Gate& gate);
 std::unique_ptr<MissionStore> make_mission_store(Gate& gate, AdmitMission admit);
 std::unique_ptr<AnchorStore> make_anchor_store(Gate& gate);
+std::unique_ptr<KitStore> make_kit_store(Gate& gate);
+std::unique_ptr<FrameStore> make_frame_store(Gate& gate);
 std::unique_ptr<TokenStore> make_token_store(Gate& gate);
 std::unique_ptr<JobStore> make_job_store(Gate& gate);
 std::unique_ptr<AccessStore> make_access_store(Gate& gate);

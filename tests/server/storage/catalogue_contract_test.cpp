@@ -258,6 +258,95 @@ TEST_P(AnchorStoreContract, PublishesNothingWhenOneAnchorHasNoPosition) {
   EXPECT_TRUE(db_->anchors().revisions(10, 0).value().empty());
 }
 
+TEST_P(AnchorStoreContract, KeepsGatesEvidenceAndWhoOverrodeWhat) {
+  const auto mission = stored_mission();
+  Calibration c;
+  c.id = CalibrationId{make_uuid_v7(k_noon)};
+  c.missions = {mission.id};
+  c.provenance_json = R"({"profile":null})";
+  c.evidence_json = R"({"residuals":[1,2]})";
+  for (const std::uint32_t id : {1u, 2u}) {
+    Estimate e;
+    e.anchor = NetworkId{id};
+    e.best = Hypothesis{};
+    e.gates = {{"chi_square", 31.2, 16.3, id == 1, "31.2 over 16.3"},
+               {"halves", std::nullopt, 16.3, false, "one half has no ranges"}};
+    c.anchors.push_back(e);
+  }
+  ASSERT_TRUE(db_->anchors().insert(c));
+  const auto read = db_->anchors().calibration(c.id).value();
+  EXPECT_EQ(read.provenance_json, c.provenance_json);
+  EXPECT_TRUE(read.evidence_json.empty()) << "read on its own";
+  EXPECT_EQ(db_->anchors().evidence(c.id).value(), c.evidence_json);
+  ASSERT_EQ(read.anchors[1].gates.size(), 2u);
+  EXPECT_EQ(read.anchors[1].gates[0].name, "chi_square");
+  EXPECT_EQ(read.anchors[1].gates[0].value, 31.2);
+  EXPECT_FALSE(read.anchors[1].gates[0].passed);
+  EXPECT_TRUE(read.anchors[0].gates[0].passed);
+  EXPECT_FALSE(read.anchors[1].gates[1].value.has_value());
+
+  const std::vector<NetworkId> both{NetworkId{1}, NetworkId{2}};
+  EXPECT_EQ(db_->anchors().publish(c.id, both, "t", "", k_noon, {{NetworkId{3}, "no", "t"}}).error().code,
+            Errc::invalid_argument);
+  ASSERT_TRUE(db_->anchors().publish(c.id, both, "t", "", k_noon, {{NetworkId{2}, "taped", "token-7"}}));
+  const auto published = db_->anchors().published(std::nullopt).value();
+  EXPECT_FALSE(published[0].overridden.has_value());
+  ASSERT_TRUE(published[1].overridden.has_value());
+  EXPECT_EQ(published[1].overridden->reason, "taped");
+  EXPECT_EQ(published[1].overridden->by, "token-7");
+  const auto later = stored_calibration(mission, {9});
+  ASSERT_TRUE(db_->anchors().publish(later.id, {NetworkId{9}}, "t", "", k_noon));
+  EXPECT_TRUE(db_->anchors().published(std::nullopt).value()[1].overridden.has_value()) << "carried on";
+}
+
+TEST_P(AnchorStoreContract, KeepsEveryProfileOfAKitAndRefusesALostUpdate) {
+  EXPECT_FALSE(db_->kits().profile("kit-1").value().has_value());
+  StoredProfile p{"kit-1", 0, k_noon, "token", "put", R"({"a":1})"};
+  EXPECT_EQ(db_->kits().put(p, 0).value().version, 1u);
+  EXPECT_EQ(db_->kits().put(p, 0).error().code, Errc::conflict);
+  p.profile_json = R"({"a":2})";
+  p.source = "calibration x";
+  EXPECT_EQ(db_->kits().put(p, 1).value().version, 2u);
+  reopen();
+  EXPECT_EQ(db_->kits().profile("kit-1").value()->profile_json, R"({"a":2})");
+  const auto history = db_->kits().history("kit-1", 10).value();
+  ASSERT_EQ(history.size(), 2u);
+  EXPECT_EQ(history[1].source, "put");
+  p.kit = "kit-0";
+  ASSERT_TRUE(db_->kits().put(p, 0));
+  const auto newest = db_->kits().newest().value();
+  ASSERT_EQ(newest.size(), 2u);
+  EXPECT_EQ(newest[0].kit, "kit-0");
+  EXPECT_EQ(newest[1].version, 2u);
+}
+
+TEST_P(AnchorStoreContract, KeepsFramesByNameAndVersion) {
+  Site site;
+  site.id = SiteId{make_uuid_v7(k_noon)};
+  site.projected_epsg = 25831;
+  ASSERT_TRUE(db_->anchors().insert(site));
+  EXPECT_EQ(db_->anchors().site(site.id).value().projected_epsg, 25831);
+  LocalFrame frame{FrameId{make_uuid_v7(k_noon)}, "hall-a", site.id, R"({"pairs":[]})", k_noon, 1};
+  ASSERT_TRUE(db_->frames().insert(frame));
+  LocalFrame other = frame;
+  other.id = FrameId{make_uuid_v7(k_noon)};
+  EXPECT_EQ(db_->frames().insert(other).error().code, Errc::conflict);
+  other.name = "hall-b";
+  other.site.reset();
+  ASSERT_TRUE(db_->frames().insert(other));
+  other.name = "hall-a";
+  EXPECT_EQ(db_->frames().update(other, 1).error().code, Errc::conflict);
+  frame.definition_json = R"({"pairs":[1]})";
+  ASSERT_TRUE(db_->frames().update(frame, 1));
+  EXPECT_EQ(db_->frames().update(frame, 1).error().code, Errc::conflict);
+  EXPECT_EQ(db_->frames().frame("hall-a").value().version, 2u);
+  EXPECT_EQ(db_->frames().frames_of(site.id).value().size(), 1u);
+  EXPECT_EQ(db_->frames().frames(1, std::nullopt).value().size(), 1u);
+  EXPECT_EQ(db_->anchors().remove(site.id).error().code, Errc::conflict) << "a frame stands on it";
+  ASSERT_TRUE(db_->frames().remove(frame.id));
+  EXPECT_EQ(db_->frames().frame(frame.id).error().code, Errc::not_found);
+}
+
 INSTANTIATE_TEST_SUITE_P(Backends, AnchorStoreContract, backends(), backend_name);
 
 class AccessContract : public StoreContract {};

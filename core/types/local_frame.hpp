@@ -1,0 +1,31 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "core/base/ids.hpp"
+#include "core/base/time.hpp"
+
+namespace anchord {
+
+/// The frame of a positioning system (Pozyx) in one building, tied to the globe by pairs.
+struct LocalFrame {
+  FrameId id{};
+  std::string name;
+  std::optional<SiteId> site{};
+  std::string definition_json{"{}"};  ///< pairs and their fit; api/json/frame_json reads and writes it
+  UtcTime created{};
+  std::uint64_t version{1};  ///< for ETag
+};
+
+/// One state of a kit's calibration; api/json/kit_profile_json reads the text.
+struct StoredProfile {
+  std::string kit;
+  std::uint64_t version{};  ///< from 1; for ETag
+  UtcTime time{};
+  std::string by;      ///< token id, or empty for the server itself
+  std::string source;  ///< "put", or "calibration <id>"
+  std::string profile_json;
+};
+
+}  // namespace anchord

@@ -1,0 +1,114 @@
+#include "server/storage/stores.hpp"
+
+namespace anchord::sql {
+namespace {
+
+constexpr const char* k_insert =
+    "INSERT INTO local_frame (id, name, site_id, definition_json, created_t_ns, version) "
+    "VALUES (?1, ?2, ?3, ?4, ?5, ?6) ON CONFLICT DO NOTHING RETURNING version";
+constexpr const char* k_update =
+    "UPDATE local_frame SET name = ?2, site_id = ?3, definition_json = ?4, created_t_ns = ?5, version = ?6 "
+    "WHERE id = ?1 AND version = ?7 RETURNING version";
+constexpr const char* k_columns =
+    "SELECT id, name, site_id, definition_json, created_t_ns, version FROM local_frame ";
+constexpr const char* k_remove = "DELETE FROM local_frame WHERE id = ?1 RETURNING version";
+constexpr const char* k_site = "SELECT count(*) FROM site WHERE id = ?1";
+
+void bind(Query& query, const LocalFrame& f, std::uint64_t version) {
+  query << f.id << f.name << f.site << f.definition_json << f.created << version;
+}
+
+std::optional<Error> missing_site(Connection& c, const LocalFrame& frame) {
+  if (!frame.site) return std::nullopt;
+  Query query(c, k_site);
+  query << *frame.site;
+  if (query.step() && query.integer() > 0) return std::nullopt;
+  return make_error(Errc::not_found, "no site " + to_string(*frame.site));
+}
+
+std::vector<LocalFrame> all(Query& query) {
+  std::vector<LocalFrame> found;
+  while (query.step()) {
+    LocalFrame f;
+    f.id = query.id<FrameId>();
+    f.name = query.text();
+    f.site = query.maybe([&] { return query.id<SiteId>(); });
+    f.definition_json = query.text();
+    f.created = query.time();
+    f.version = query.as<std::uint64_t>();
+    found.push_back(std::move(f));
+  }
+  return found;
+}
+
+class SqlFrameStore final : public FrameStore {
+ public:
+  explicit SqlFrameStore(Gate& gate) : gate_(gate) {}
+
+  Result<void> insert(const LocalFrame& frame) override {
+    return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+      if (auto error = missing_site(c, frame)) return error;
+      Query query(c, k_insert);
+      bind(query, frame, frame.version);
+      if (query.returned()) return std::nullopt;
+      return make_error(Errc::conflict, "a frame named '" + frame.name + "' exists");
+    });
+  }
+  Result<void> update(const LocalFrame& frame, std::uint64_t expected_version) override {
+    return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+      if (auto error = missing_site(c, frame)) return error;
+      Query named(c, std::string(k_columns) + "WHERE name = ?1 AND id <> ?2");
+      named << frame.name << frame.id;
+      if (named.step()) return make_error(Errc::conflict, "a frame named '" + frame.name + "' exists");
+      Query query(c, k_update);
+      bind(query, frame, expected_version + 1);
+      query << expected_version;
+      if (query.returned()) return std::nullopt;
+      return make_error(Errc::conflict, "the frame was changed in between");
+    });
+  }
+  Result<LocalFrame> frame(const FrameId& id) override { return find("WHERE id = ?1", id); }
+  Result<LocalFrame> frame(const std::string& name) override { return find("WHERE name = ?1", name); }
+  Result<std::vector<LocalFrame>> frames(std::size_t limit, const std::optional<FrameId>& after) override {
+    return read_value<std::vector<LocalFrame>>(gate_, [&](Connection& c) -> Result<std::vector<LocalFrame>> {
+      Query query(c, std::string(k_columns) + "WHERE id > ?1 ORDER BY id LIMIT ?2");
+      const FrameId start = after.value_or(FrameId{});
+      query << start << row_limit(limit);
+      return all(query);
+    });
+  }
+  Result<std::vector<LocalFrame>> frames_of(const SiteId& site) override {
+    return read_value<std::vector<LocalFrame>>(gate_, [&](Connection& c) -> Result<std::vector<LocalFrame>> {
+      Query query(c, std::string(k_columns) + "WHERE site_id = ?1 ORDER BY id");
+      query << site;
+      return all(query);
+    });
+  }
+  Result<void> remove(const FrameId& id) override {
+    return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+      Query query(c, k_remove);
+      query << id;
+      if (query.returned()) return std::nullopt;
+      return make_error(Errc::not_found, "no frame " + to_string(id));
+    });
+  }
+
+ private:
+  template <class Key>
+  Result<LocalFrame> find(const char* where, const Key& key) {
+    return read_value<LocalFrame>(gate_, [&](Connection& c) -> Result<LocalFrame> {
+      Query query(c, std::string(k_columns) + where);
+      query << key;
+      auto found = all(query);
+      if (found.empty()) return make_error(Errc::not_found, "no such frame");
+      return std::move(found.front());
+    });
+  }
+  Gate& gate_;
+};
+
+}  // namespace
+
+std::unique_ptr<FrameStore> make_frame_store(Gate& gate) { return std::make_unique<SqlFrameStore>(gate); }
+
+}  // namespace anchord::sql
