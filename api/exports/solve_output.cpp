@@ -93,6 +93,15 @@ Json anchor_json(const AnchorSolution& anchor, bool globe) {
                       {"line_ratio", number(g.line_ratio, 4)},
                       {"plane_ratio", number(g.plane_ratio, 4)},
                       {"sigma_ratio", number(g.sigma_ratio, 4)}};
+  json["acceptable"] = e.acceptable();
+  json["gates"] = Json::array();
+  for (const Gate& gate : e.gates) {
+    json["gates"].push_back({{"name", gate.name},
+                             {"value", number(gate.value, 4)},
+                             {"limit", number(gate.limit, 4)},
+                             {"passed", gate.passed},
+                             {"why", gate.why}});
+  }
   return json;
 }
 

@@ -70,6 +70,12 @@ std::string solve_table(std::span<const SolvedFlight> flights) {
         append(out, " %17s probability %.2f\n", "", e.mirror->probability);
       }
       if (!e.reason.empty()) out += "           " + e.reason + "\n";
+      for (const Gate& gate : e.gates) {
+        if (gate.passed) continue;
+        out += "           gate " + gate.name + " not passed: ";
+        if (gate.value) append(out, "%.3g, limit %.3g: ", *gate.value, gate.limit);
+        out += gate.why + "\n";
+      }
     }
     for (const auto& [why, count] : s.refused) append(out, "refused %-22s %zu\n", why.c_str(), count);
     for (const auto& note : s.notes) out += "note: " + note + "\n";

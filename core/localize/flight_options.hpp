@@ -32,15 +32,15 @@ struct FlightOptions {
   double bias_known_sigma_m{
       0.1};  ///< a flight (with profile) that knows its bias worse than this cannot tell
   double unknown_bias_prior_m{0.3};  ///< then: between calibrated (0) and not (0.7), and the regions show it
-  double delay_prior_m{0.04};        ///< unit to unit; a free one is fatal in small volumes
+  double delay_prior_m{0.06};        ///< unit to unit; a free one is fatal in small volumes
   double curve_prior_m{0.03};        ///< leading edge moves with received power
   double lag_prior_s{0.2};           ///< stamping delay
   double lever_prior_m{0.1};         ///< body z only: x, y are confounded with the lag
   std::optional<double> fixed_bias_m{};  ///< no estimate: this bias is given
 
-  double mad_factor{0.7};  ///< Tukey cut-off = 4.685 x this x scale; below 1 is what late clusters need
+  double mad_factor{0.6};  ///< Tukey cut-off = 4.685 x this x scale; below 1 is what late clusters need
   double min_scale_m{0.02};
-  double correlation_s{10.0};  ///< errors stay alike this long; tempers the likelihood
+  double correlation_s{7.0};   ///< errors stay alike this long (0.6 to 29 s seen); tempers the likelihood
   double floor_sigma_m{0.04};  ///< per axis: frame, lever arm; no residual shows it
 
   std::optional<Wgs84> origin{};  ///< of the ENU answers; absent: the first fix good enough

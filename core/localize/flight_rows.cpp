@@ -91,7 +91,8 @@ Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& op
       why = "duplicate";
     }
     if (why.empty()) {
-      anchor.rows.push_back({seconds_between(epoch, range.time), range.distance_m, *arm});
+      anchor.rows.push_back(
+          {seconds_between(epoch, range.time), range.distance_m, *arm, range.tag, range.antenna});
     } else {
       ++anchor.refused[why];
     }

@@ -16,6 +16,8 @@ struct JointRow {
   double t_s{};
   double distance_m{};
   Eigen::Vector3d lever_arm_body_m{0, 0, 0};
+  NetworkId tag{};
+  std::uint8_t antenna{0};
 };
 
 /// All ranges of one anchor, ascending in time.

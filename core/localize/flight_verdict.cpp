@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "core/localize/error_ellipse.hpp"
+#include "core/localize/gates.hpp"
 #include "core/localize/geometry.hpp"
 #include "core/localize/residual.hpp"
 #include "core/localize/solver.hpp"
@@ -149,8 +150,10 @@ void judge_twins(const FlightRows& flight, AnchorSolution& solution, const std::
 
 }  // namespace
 
-AnchorSolution judge_anchor(const FlightRows& flight, const JointFit& fit, std::size_t index,
-                            const FlightOptions& options) {
+namespace {
+
+AnchorSolution verdict_of(const FlightRows& flight, const JointFit& fit, std::size_t index,
+                          const FlightOptions& options) {
   const AnchorRows& rows = flight.anchors[index];
   const AnchorBlock& block = fit.normal.anchors[index];
   const JointState::Anchor& anchor = fit.state.anchors[index];
@@ -225,6 +228,16 @@ AnchorSolution judge_anchor(const FlightRows& flight, const JointFit& fit, std::
         "%.2f)",
         geometry.line_ratio, solution.geometry.sigma_ratio, k_sigma_ratio);
   }
+  return solution;
+}
+
+}  // namespace
+
+AnchorSolution judge_anchor(const FlightRows& flight, const JointFit& fit, std::size_t index,
+                            const FlightOptions& options) {
+  AnchorSolution solution = verdict_of(flight, fit, index, options);
+  if (fit.state.anchors[index].active) solution.residuals = residuals_of(flight, fit, index, options);
+  solution.estimate.gates = gates_of(flight, fit, index, solution, options);
   return solution;
 }
 

@@ -3,20 +3,29 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 #include "core/base/check.hpp"
 #include "core/localize/error_ellipse.hpp"
+#include "core/localize/gates.hpp"
 
 namespace anchord {
 namespace {
 
-/// 99.9 % point of chi-square, Wilson-Hilferty; within 1 % for 3 and more degrees of freedom.
-double chi2_999(double dof) {
-  const double a = 2.0 / (9.0 * dof);
-  const double root = 1 - a + 3.0902 * std::sqrt(a);
-  return dof * root * root * root;
+/// Of each gate the answer that is hardest to pass: one that failed, else the first flight's.
+std::vector<Gate> worst_gates(std::span<const Estimate* const> estimates) {
+  std::vector<Gate> worst;
+  for (const Estimate* estimate : estimates) {
+    for (const Gate& gate : estimate->gates) {
+      const auto known = std::ranges::find(worst, gate.name, &Gate::name);
+      if (known == worst.end()) {
+        worst.push_back(gate);
+      } else if (known->passed && !gate.passed) {
+        *known = gate;
+      }
+    }
+  }
+  return worst;
 }
 
 }  // namespace
@@ -60,6 +69,11 @@ Estimate fuse_estimates(std::span<const Estimate> estimates) {
     chi2 += off.dot(estimate.best->covariance_m2.inverse() * off);
     rms2 += estimate.best->rms_residual_m * estimate.best->rms_residual_m;
   }
+  std::vector<const Estimate*> counted;
+  for (const auto& estimate : estimates) {
+    if (estimate.verdict == Verdict::ok && estimate.best) counted.push_back(&estimate);
+  }
+  out.gates = worst_gates(counted);
   const double dof = 3.0 * static_cast<double>(n_ok - 1);
   Hypothesis best;
   best.position.m = mean;
@@ -69,13 +83,13 @@ Estimate fuse_estimates(std::span<const Estimate> estimates) {
   out.mirror.reset();
   out.verdict = Verdict::ok;
   out.reason.clear();
-  if (dof > 0 && chi2 > chi2_999(dof)) {
-    char text[128];
-    std::snprintf(text, sizeof text,
-                  "%zu flights contradict each other: chi2 %.1f with %.0f degrees of freedom, limit %.1f",
-                  n_ok, chi2, dof, chi2_999(dof));
-    out.verdict = Verdict::diverged;
-    out.reason = text;
+  if (dof > 0) {
+    const Gate agreement = flights_gate(chi2, n_ok);
+    if (!agreement.passed) {
+      out.verdict = Verdict::diverged;
+      out.reason = "flights contradict each other: " + agreement.why;
+    }
+    out.gates.push_back(agreement);
   }
   const ErrorEllipse ellipse = error_ellipse(best.covariance_m2);
   out.h95_m = ellipse.h95_m;

@@ -70,12 +70,12 @@ Result<AnchorFit> solve_anchor_gauss_newton(std::span<const Observation> observa
       const Unknowns next = at + step;
       Normal there = build(observations, scales, next, options, bend);
       if (there.cost <= here.cost * (1.0 + 1e-14) + 1e-300) {
-        settled = step.norm() < 1e-10;
+        settled = step.norm() < options.step_tolerance_m;
         at = next;
         here = there;
         damping = damping < 1e-6 ? 0.0 : damping * 0.1;
       } else {
-        settled = step.norm() < 1e-10;
+        settled = step.norm() < options.step_tolerance_m;
         damping = damping == 0.0 ? 1e-4 : damping * 10.0;
       }
     }

@@ -17,12 +17,6 @@ double median(std::vector<double>& values) {
   return *middle;
 }
 
-/// Robust weight of a residual against its scale.
-double row_weight(double residual_over_scale, const FlightOptions& options) {
-  const double bend = default_bend(options.loss) * (options.loss == Loss::tukey ? options.mad_factor : 1.0);
-  return loss_value(options.loss, bend, residual_over_scale).weight;
-}
-
 /// Time the rows cover, pauses of more than 2 s left out.
 double duration_s(const std::vector<double>& times_s) {
   double sum_s = 0;
@@ -64,7 +58,8 @@ void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointS
   weights.reserve(lines.size());
   for (const JointLine& line : lines) {
     const double widening = (scale2 + std::max(line.position_variance_m2 - usual_variance_m2, 0.0)) / scale2;
-    double weight = row_weight(line.residual_m / (block.scale_m * std::sqrt(widening)), options) / widening;
+    double weight =
+        robust_weight(line.residual_m / (block.scale_m * std::sqrt(widening)), options) / widening;
     if (options.weights == Weights::as_printed)
       weight *= std::sqrt(widening) * block.scale_m / common_scale_m;
     weights.push_back(weight);
@@ -94,6 +89,11 @@ void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointS
 
 }  // namespace
 
+double robust_weight(double residual_over_scale, const FlightOptions& options) {
+  const double bend = default_bend(options.loss) * (options.loss == Loss::tukey ? options.mad_factor : 1.0);
+  return loss_value(options.loss, bend, residual_over_scale).weight;
+}
+
 double range_curve(double distance_m) { return std::log(std::max(distance_m, k_hinge_m) / k_hinge_m); }
 
 JointLine linearise(const TagTrack& track, const JointRow& row, const Eigen::Vector4d& shared,
@@ -103,6 +103,7 @@ JointLine linearise(const TagTrack& track, const JointRow& row, const Eigen::Vec
   line.refused = point.refused;
   if (point.refused != TrackRefusal::none) return line;
   const Eigen::Vector3d antenna = point.position_m + shared[k_shared_lever] * point.body_up;
+  line.antenna_m = antenna;
   const Eigen::Vector3d difference = antenna - anchor.position_m;
   const double distance_m = std::max(difference.norm(), 1e-6);
   const Eigen::Vector3d u = difference / distance_m;

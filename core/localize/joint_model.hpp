@@ -33,12 +33,16 @@ double range_curve(double distance_m);
 struct JointLine {
   TrackRefusal refused{TrackRefusal::none};
   double residual_m{};
+  Eigen::Vector3d antenna_m{0, 0, 0};  ///< where the tag antenna was
   Eigen::Vector4d by_anchor{Eigen::Vector4d::Zero()};
   Eigen::Vector4d by_shared{Eigen::Vector4d::Zero()};
   double position_variance_m2{};  ///< of the track along the line of sight
 };
 JointLine linearise(const TagTrack& track, const JointRow& row, const Eigen::Vector4d& shared,
                     const JointState::Anchor& anchor);
+
+/// Robust weight, 0..1, of a residual against its scale, by the loss of the options.
+double robust_weight(double residual_over_scale, const FlightOptions& options);
 
 /// Normal equations of one round in the shape they have: an arrow. Robust weights and tempering are inside.
 struct AnchorBlock {

@@ -22,7 +22,8 @@ struct SolverOptions {
   bool estimate_bias{false};  ///< one constant added to all ranges of the anchor
   double bias_prior_m{0};
   double bias_prior_sigma_m{0.5};
-  int max_iterations{100};  ///< per round of weights; a run that wants more is not converging
+  double step_tolerance_m{1e-10};  ///< a step below it ends the search (Gauss-Newton)
+  int max_iterations{100};         ///< per round of weights; a run that wants more is not converging
   Result<void> check() const;
 };
 

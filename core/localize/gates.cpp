@@ -1,0 +1,211 @@
+#include "core/localize/gates.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "core/localize/geometry.hpp"
+#include "core/localize/residual.hpp"
+#include "core/localize/solver.hpp"
+
+namespace anchord {
+namespace {
+
+template <class... Numbers>
+std::string text(const char* format, Numbers... numbers) {
+  char buffer[240];
+  std::snprintf(buffer, sizeof buffer, format, numbers...);
+  return buffer;
+}
+
+Gate at_least(std::string name, double value, double limit, std::string why) {
+  return {std::move(name), value, limit, value >= limit, std::move(why)};
+}
+Gate at_most(std::string name, double value, double limit, std::string why) {
+  return {std::move(name), value, limit, value <= limit, std::move(why)};
+}
+
+/// Quantile of the standard normal, Abramowitz and Stegun 26.2.23: error below 4.5e-4.
+double normal_quantile(double probability) {
+  const double tail = std::min(probability, 1.0 - probability);
+  const double t = std::sqrt(-2.0 * std::log(std::max(tail, 1e-300)));
+  const double z =
+      t - (2.515517 + t * (0.802853 + t * 0.010328)) / (1.0 + t * (1.432788 + t * (0.189269 + t * 0.001308)));
+  return probability < 0.5 ? -z : z;
+}
+
+/// Means of the residuals in windows of two correlation times.
+Gate chi_square(const AnchorSolution& solution, const FlightOptions& options, const GateLimits& limits) {
+  const double window_s = std::max(2.0 * options.correlation_s, 1.0);
+  double chi2 = 0;
+  int windows = 0;
+  double sum = 0, weight = 0;
+  const RangeResidual* first = nullptr;
+  const auto close = [&] {
+    if (weight > 0) {
+      const double mean_m = sum / weight;
+      chi2 += mean_m * mean_m / (solution.residual_scale_m * solution.residual_scale_m);
+      ++windows;
+    }
+    sum = weight = 0;
+  };
+  for (const auto& row : solution.residuals) {
+    if (first && seconds_between(first->time, row.time) > window_s) {
+      close();
+      first = nullptr;
+    }
+    if (!first) first = &row;
+    sum += row.weight * row.residual_m;
+    weight += row.weight;
+  }
+  close();
+  const double dof = std::max(windows - 3, 1);
+  return at_most(
+      "chi_square", chi2, chi2_quantile(limits.probability, dof),
+      text("residual means over %.0f s against a scale of %.3f m: chi2 %.1f, %.0f degrees of freedom",
+           window_s, solution.residual_scale_m, chi2, dof));
+}
+
+struct Half {
+  Eigen::Vector3d position_m;
+  Eigen::Matrix3d covariance_m2;
+};
+
+/// The anchor from some of its rows, everything shared held; covariance tempered like the whole.
+std::optional<Half> solve_half(std::vector<Observation> rows, const Eigen::Vector3d& start,
+                               const AnchorBlock& block, std::size_t of_rows, const FlightOptions& options) {
+  if (rows.size() < 10) return std::nullopt;
+  const double stands_for =
+      static_cast<double>(block.n_in_track) / (static_cast<double>(of_rows) * block.kappa);
+  SolverOptions settings;
+  settings.dims = options.dims;
+  settings.estimate_bias = true;
+  settings.bias_prior_sigma_m = options.delay_prior_m * std::sqrt(stands_for);
+  // Cauchy: a half in which the anchor stood elsewhere must not lose all its rows to the other's place.
+  settings.loss = Loss::cauchy;
+  settings.loss_sigmas = 2.0;
+  settings.step_tolerance_m = 1e-4;
+  const auto fit = solve_anchor_gauss_newton(rows, start, settings);
+  if (!fit) return std::nullopt;
+  return Half{fit.value().position_m, fit.value().covariance_m2 / stands_for};
+}
+
+Gate halves(const FlightRows& flight, const JointFit& fit, std::size_t index, const FlightOptions& options,
+            const GateLimits& limits) {
+  const AnchorBlock& block = fit.normal.anchors[index];
+  const auto rows =
+      observations_of(flight, flight.anchors[index], fit.state.shared, 800, std::max(block.scale_m, 1e-3));
+  const auto middle = rows.begin() + static_cast<std::ptrdiff_t>(rows.size() / 2);
+  const Eigen::Vector3d& at = fit.state.anchors[index].position_m;
+  const auto early = solve_half({rows.begin(), middle}, at, block, rows.size(), options);
+  const auto late = solve_half({middle, rows.end()}, at, block, rows.size(), options);
+  const double limit = chi2_quantile(limits.probability, options.dims == Dims::two ? 2 : 3);
+  if (!early || !late) {
+    return {"halves", std::nullopt, limit, false,
+            std::string(early ? "the second" : "the first") + " half of the flight alone gives no answer"};
+  }
+  const Eigen::Vector3d apart = late->position_m - early->position_m;
+  Eigen::Matrix3d both = early->covariance_m2 + late->covariance_m2;
+  both.diagonal().array() += 2.0 * options.floor_sigma_m * options.floor_sigma_m + 1e-12;
+  const double chi2 = apart.dot(both.ldlt().solve(apart));
+  return at_most("halves", chi2, limit,
+                 text("the two halves of the flight put it %.2f m apart (%.2f m horizontally): chi2 %.1f",
+                      apart.norm(), apart.head<2>().norm(), chi2));
+}
+
+}  // namespace
+
+double chi2_quantile(double probability, double dof) {
+  const double a = 2.0 / (9.0 * dof);
+  const double root = 1.0 - a + normal_quantile(probability) * std::sqrt(a);
+  return dof * root * root * root;
+}
+
+std::vector<Gate> gates_of(const FlightRows& flight, const JointFit& fit, std::size_t index,
+                           const AnchorSolution& solution, const FlightOptions& options,
+                           const GateLimits& limits) {
+  const Estimate& estimate = solution.estimate;
+  const AnchorBlock& block = fit.normal.anchors[index];
+  const double unknowns = options.dims == Dims::two ? 3 : 4;
+  const double used = static_cast<double>(block.n_used);
+  std::vector<Gate> gates;
+  gates.push_back(at_least("redundancy", used - unknowns, limits.redundancy,
+                           text("%.0f ranges used for %.0f unknowns", used, unknowns)));
+  if (!estimate.best) return gates;
+  const double share = static_cast<double>(block.n_rejected) / static_cast<double>(block.n_in_track);
+  gates.push_back(at_most("rejected", share, limits.rejected_share,
+                          text("%.1f %% of %zu ranges rejected", 100 * share, block.n_in_track)));
+  const GeometryLimits geometry;
+  gates.push_back(at_least("geometry", solution.geometry.line_ratio, geometry.line,
+                           "width of the track across its main direction over the median range"));
+  gates.push_back(at_most("precision", solution.geometry.sigma_ratio, 0.08,
+                          "largest horizontal sigma over the median range"));
+  const bool plane = options.dims == Dims::three && solution.determined == Determined::horizontal;
+  const double side = plane && !estimate.mirror ? 0.5 : estimate.best->probability;
+  gates.push_back(at_least(
+      "side", side, limits.side_probability,
+      estimate.mirror ? "probability of this side; the twin is given as mirror" : "no twin fits as well"));
+  if (plane && !estimate.mirror) gates.back().why = "the track is a plane: height not determined";
+  gates.push_back(at_most("residual_scale", solution.residual_scale_m, limits.residual_scale_m,
+                          "1.4826 x median absolute residual, metres"));
+  gates.push_back(chi_square(solution, options, limits));
+  gates.push_back(halves(flight, fit, index, options, limits));
+  const double bias_sigma_m = std::sqrt(std::max(fit.shared_covariance(k_shared_bias, k_shared_bias), 0.0));
+  gates.push_back(at_most(
+      "bias", bias_sigma_m, 2.0 * options.bias_known_sigma_m,
+      text("range bias of the kit %.3f m with sigma %.3f m", fit.state.shared[k_shared_bias], bias_sigma_m)));
+  if (!fit.converged)
+    gates.push_back(
+        {"settled", static_cast<double>(fit.rounds), 60, false, "the joint solve did not settle"});
+  return gates;
+}
+
+Gate moved_gate(const Estimate& now, const Estimate& before, const GateLimits& limits) {
+  const double limit = chi2_quantile(limits.probability, 3);
+  if (!now.best || !before.best)
+    return {"flights", std::nullopt, limit, false, "one of them has no position"};
+  const Eigen::Vector3d apart = now.best->position.m - before.best->position.m;
+  const Eigen::Matrix3d both = now.best->covariance_m2 + before.best->covariance_m2;
+  const double chi2 = apart.dot(both.ldlt().solve(apart));
+  if (!std::isfinite(chi2)) return {"flights", std::nullopt, limit, false, "a covariance is singular"};
+  return at_most(
+      "flights", chi2, limit,
+      text("%.3f m from the earlier answer (%.3f m horizontally): chi2 %.1f%s", apart.norm(),
+           apart.head<2>().norm(), chi2, chi2 > limit ? ", it moved or one of them is wrong" : ""));
+}
+
+Gate flights_gate(double chi2, std::size_t n_flights, const GateLimits& limits) {
+  const double dof = 3.0 * static_cast<double>(n_flights - 1);
+  return at_most("flights", chi2, chi2_quantile(limits.probability, dof),
+                 text("%zu flights about their common answer: chi2 %.1f with %.0f degrees of freedom",
+                      n_flights, chi2, dof));
+}
+
+std::vector<RangeResidual> residuals_of(const FlightRows& flight, const JointFit& fit, std::size_t index,
+                                        const FlightOptions& options) {
+  const AnchorBlock& block = fit.normal.anchors[index];
+  const JointState::Anchor& anchor = fit.state.anchors[index];
+  std::vector<RangeResidual> all;
+  for (const JointRow& row : flight.anchors[index].rows) {
+    const JointLine line = linearise(flight.track, row, fit.state.shared, anchor);
+    if (line.refused != TrackRefusal::none) continue;
+    const double extra_m2 = std::max(line.position_variance_m2 - block.usual_position_variance_m2, 0.0);
+    const double sigma2 = block.scale_m * block.scale_m + extra_m2;
+    const double leverage = line.by_anchor.dot(block.own_inverse * line.by_anchor) / (block.kappa * sigma2);
+    RangeResidual one;
+    one.time = UtcTime{flight.epoch.ns + std::llround(row.t_s * 1e9)};
+    one.tag = row.tag;
+    one.antenna = row.antenna;
+    one.tag_m = line.antenna_m;
+    one.distance_m = row.distance_m;
+    one.residual_m = line.residual_m;
+    one.corrected_m = line.residual_m + (line.antenna_m - anchor.position_m).norm();
+    one.weight = robust_weight(line.residual_m / std::sqrt(sigma2), options);
+    one.standardised = line.residual_m / std::sqrt(sigma2 * std::max(1.0 - leverage, 0.05));
+    all.push_back(one);
+  }
+  return all;
+}
+
+}  // namespace anchord

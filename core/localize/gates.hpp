@@ -1,0 +1,48 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/localize/flight_solver.hpp"
+#include "core/localize/joint_model.hpp"
+
+namespace anchord {
+
+/// Limits of the acceptance gates.
+struct GateLimits {
+  double redundancy{30};          ///< ranges beyond the unknowns; fewer cannot show that one of them is wrong
+  double rejected_share{0.5};     ///< beyond: the rejected are the majority, and may be the right ones
+  double side_probability{0.99};  ///< of the chosen side against its twin
+  double residual_scale_m{0.6};   ///< radios that work stay below 0.25 m
+  double probability{0.999};      ///< of the chi-square tests: one good anchor in a thousand is held back
+};
+
+/// Every gate one flight can ask of one anchor, in a fixed order: redundancy, rejected, geometry, precision,
+/// side, residual_scale, chi_square, halves, bias, settled.
+///
+/// chi_square  means of the residuals over two correlation times, each against the residual scale: white
+///             noise averages out there, an error of the model does not
+/// halves      the anchor from the first and from the second half of the flight, by their distance in the
+///             metric of both covariances: an anchor that moved, a clock that slipped, a base that jumped
+/// solution    estimate, geometry and residuals filled
+std::vector<Gate> gates_of(const FlightRows& flight, const JointFit& fit, std::size_t index,
+                           const AnchorSolution& solution, const FlightOptions& options,
+                           const GateLimits& limits = {});
+
+/// Did the anchor move between two answers in one frame? Passed when their difference is within what both
+/// covariances allow (three degrees of freedom). Either without a position: not passed, no value.
+Gate moved_gate(const Estimate& now, const Estimate& before, const GateLimits& limits = {});
+
+/// The agreement of several flights about their common answer: chi2 with 3 (n - 1) degrees of freedom.
+Gate flights_gate(double chi2, std::size_t n_flights, const GateLimits& limits = {});
+
+/// Quantile of chi-square, Wilson-Hilferty; within 2 % for 3 and more degrees of freedom.
+double chi2_quantile(double probability, double dof);
+
+/// What every placed range of one anchor says at the solution, by time. The standardised residual is e over
+/// its sigma times sqrt(1 - leverage): beyond about 3.3 the default loss gives it no weight (Baarda's data
+/// snooping at 99.9 %, repeated in every round of the fit).
+std::vector<RangeResidual> residuals_of(const FlightRows& flight, const JointFit& fit, std::size_t index,
+                                        const FlightOptions& options);
+
+}  // namespace anchord

@@ -1,0 +1,139 @@
+#include "core/localize/gates.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "core/localize/fuse.hpp"
+#include "tests/core/localize/flight_support.hpp"
+
+namespace anchord {
+namespace {
+
+using testing::MadeFlight;
+using testing::make_flight;
+
+const Gate& gate(const Estimate& estimate, std::string_view name) {
+  const auto at = std::ranges::find(estimate.gates, name, &Gate::name);
+  EXPECT_NE(at, estimate.gates.end()) << name;
+  return at != estimate.gates.end() ? *at : estimate.gates.front();
+}
+
+TEST(Gates, LetAnOrdinaryFlightPass) {
+  const auto s = solve_flight(make_flight(MadeFlight{}));
+  ASSERT_TRUE(s);
+  for (const auto& anchor : s.value().anchors) {
+    for (const Gate& g : anchor.estimate.gates) EXPECT_TRUE(g.passed) << g.name << ": " << g.why;
+    EXPECT_TRUE(anchor.estimate.acceptable());
+    for (const char* name : {"redundancy", "rejected", "geometry", "precision", "side", "residual_scale",
+                             "chi_square", "halves", "bias"})
+      EXPECT_TRUE(gate(anchor.estimate, name).value) << name;
+  }
+}
+
+TEST(Gates, HoldBackAnAnchorThatMovedInTheMiddleOfTheFlight) {
+  MadeFlight before;
+  MadeFlight after = before;
+  after.anchors[0] += Eigen::Vector3d(0.6, -0.5, 0);
+  FlightData flight = make_flight(before);
+  const FlightData moved = make_flight(after);
+  for (std::size_t i = 0; i < flight.ranges.size(); ++i) {
+    if (seconds_between(UtcTime{}, flight.ranges[i].time) > 60) flight.ranges[i] = moved.ranges[i];
+  }
+  const auto s = solve_flight(flight);
+  ASSERT_TRUE(s);
+  const Estimate& e = s.value().anchors[0].estimate;
+  EXPECT_FALSE(gate(e, "halves").passed) << gate(e, "halves").why;
+  EXPECT_FALSE(e.acceptable());
+  EXPECT_TRUE(s.value().anchors[2].estimate.acceptable());
+}
+
+TEST(Gates, HoldBackAFlightAtOneHeight) {
+  MadeFlight made;
+  made.height_swing_m = 0;
+  const auto s = solve_flight(make_flight(made));
+  ASSERT_TRUE(s);
+  for (const auto& anchor : s.value().anchors) {
+    EXPECT_FALSE(gate(anchor.estimate, "side").passed);
+    EXPECT_FALSE(anchor.estimate.acceptable());
+  }
+}
+
+TEST(Gates, HoldBackALineFlight) {
+  MadeFlight made;
+  made.height_swing_m = 0.05;
+  made.width_m = 0.1;
+  const auto s = solve_flight(make_flight(made));
+  ASSERT_TRUE(s);
+  for (const auto& anchor : s.value().anchors) EXPECT_FALSE(gate(anchor.estimate, "geometry").passed);
+}
+
+TEST(Gates, HoldBackTooFewRanges) {
+  auto flight = make_flight(MadeFlight{});
+  std::size_t seen = 0;
+  std::erase_if(flight.ranges, [&](const Range& r) { return r.anchor.value == 0x6003 && seen++ % 40 != 0; });
+  const auto s = solve_flight(flight);
+  ASSERT_TRUE(s);
+  EXPECT_FALSE(gate(s.value().anchors[3].estimate, "redundancy").passed);
+}
+
+TEST(Gates, AreNeverPassedByAnEstimateWithoutAny) {
+  Estimate estimate;
+  estimate.verdict = Verdict::ok;
+  estimate.best.emplace();
+  EXPECT_FALSE(estimate.acceptable());
+  estimate.gates.push_back({"redundancy", 40.0, 30.0, true, ""});
+  EXPECT_TRUE(estimate.acceptable());
+  estimate.gates.push_back({"halves", std::nullopt, 16.3, false, "no answer"});
+  EXPECT_FALSE(estimate.acceptable());
+}
+
+TEST(Gates, TellAMovedAnchorFromOneThatStayed) {
+  MadeFlight first, second;
+  second.seed = 2;
+  second.anchors[1] += Eigen::Vector3d(0.5, 0.5, 0);
+  const auto a = solve_flight(make_flight(first));
+  const auto b = solve_flight(make_flight(second));
+  ASSERT_TRUE(a);
+  ASSERT_TRUE(b);
+  const auto at = [](const auto& s, std::size_t i) { return s.value().anchors[i].estimate; };
+  EXPECT_TRUE(moved_gate(at(b, 0), at(a, 0)).passed);
+  EXPECT_FALSE(moved_gate(at(b, 1), at(a, 1)).passed);
+  EXPECT_FALSE(moved_gate(Estimate{}, at(a, 1)).passed);
+  const Estimate stayed[] = {at(a, 0), at(b, 0)}, moved[] = {at(a, 1), at(b, 1)};
+  EXPECT_TRUE(fuse_estimates(stayed).acceptable());
+  EXPECT_FALSE(fuse_estimates(moved).acceptable());
+  EXPECT_FALSE(gate(fuse_estimates(moved), "flights").passed);
+}
+
+TEST(Gates, UseTheTabulatedQuantilesOfChiSquare) {
+  // Tables: 16.27 (3, 99.9 %), 7.815 (3, 95 %), 29.59 (10, 99.9 %).
+  EXPECT_NEAR(chi2_quantile(0.999, 3), 16.27, 0.02 * 16.27);
+  EXPECT_NEAR(chi2_quantile(0.95, 3), 7.815, 0.02 * 7.815);
+  EXPECT_NEAR(chi2_quantile(0.999, 10), 29.59, 0.02 * 29.59);
+}
+
+TEST(Residuals, ListEveryPlacedRangeAndMarkTheRejected) {
+  MadeFlight made;
+  made.nlos_share = 0.1;
+  const auto s = solve_flight(make_flight(made));
+  ASSERT_TRUE(s);
+  for (const auto& anchor : s.value().anchors) {
+    const auto rejected =
+        std::ranges::count_if(anchor.residuals, [](const RangeResidual& r) { return r.weight == 0; });
+    EXPECT_EQ(static_cast<std::size_t>(rejected), anchor.estimate.refused.at("outlier"));
+    EXPECT_EQ(anchor.residuals.size() - static_cast<std::size_t>(rejected), anchor.estimate.n_used);
+    for (const auto& r : anchor.residuals) {
+      // Baarda: beyond 3.3 sigmas rejected, far inside kept.
+      if (std::abs(r.standardised) > 3.8) {
+        EXPECT_EQ(r.weight, 0.0);
+      }
+      if (std::abs(r.standardised) < 2.0) {
+        EXPECT_GT(r.weight, 0.0);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace anchord
