@@ -78,6 +78,8 @@ bool LiveAnchor::add(const Observation& row, UtcTime time, const LiveOptions& op
   if (!first_ || time < *first_) first_ = time;
   if (skipped_++ % stride_ == 0) rows_.push_back(row);
   if (rows_.size() > options.max_rows) thin(options.max_rows);
+  recent_.push_back({row, time});
+  if (recent_.size() > options.max_rows) recent_.pop_front();
   estimate_.time = *newest_;
   if (solved_ && seconds_between(*solved_, *newest_) < options.update_interval_s) return false;
   return solve(options);
@@ -91,15 +93,19 @@ void LiveAnchor::thin(std::size_t max_rows) {
   rows_at_search_ = std::min(rows_at_search_, max_rows / 2);
 }
 
-std::optional<double> LiveAnchor::residual_m(const Observation& row) const {
+std::optional<double> LiveAnchor::residual_m(const Observation& row, const LiveOptions& options) const {
   if (!position_m_) return std::nullopt;
-  return row.distance_m - (row.tag_m - *position_m_).norm() - bias_m_;
+  return row.distance_m - correction_m(row.distance_m, options) - (row.tag_m - *position_m_).norm();
 }
 
 bool LiveAnchor::solve(const LiveOptions& options) {
   if (!newest_ || used_ == used_at_solve_) return false;
   used_at_solve_ = used_;
   solved_ = newest_;
+  if (joint_) {
+    refine();
+    return true;
+  }
   search(options);
   describe(options);
   return true;
@@ -107,7 +113,7 @@ bool LiveAnchor::solve(const LiveOptions& options) {
 
 void LiveAnchor::search(const LiveOptions& options) {
   if (rows_.size() < 5) return;
-  const SolverOptions settings = solver_options(options, 0.0);
+  const SolverOptions settings = solver_options(options, options.bias_m);
   std::vector<Eigen::Vector3d> starts;
   if (position_m_) starts.push_back(*position_m_);
   // While the geometry still grows the warm start may sit on the wrong side: look afresh at every doubling.
@@ -139,7 +145,7 @@ void LiveAnchor::describe(const LiveOptions& options) {
   estimate_.verdict = weak ? Verdict::weak_geometry : Verdict::diverged;
   if (!weak) estimate_.reason = "no position explains these ranges together";
   if (!position_m_) return;
-  const SolverOptions settings = solver_options(options, 0.0);
+  const SolverOptions settings = solver_options(options, options.bias_m);
   const auto rows = every_nth(rows_, 600);
   const auto fit = solve_anchor_gauss_newton(rows, *position_m_, settings);
   if (!fit) {
@@ -150,7 +156,7 @@ void LiveAnchor::describe(const LiveOptions& options) {
   const AnchorFit& best = fit.value();
   position_m_ = best.position_m;
   bias_m_ = best.bias_m;
-  estimate_.bias_m = best.bias_m + options.bias_m;
+  estimate_.bias_m = best.bias_m;
   estimate_.bias_sigma_m = best.bias_sigma_m;
   // The same tempering as the batch solve: two correlation times are one independent look.
   const double scale_m = scale_of(best.residuals_m);

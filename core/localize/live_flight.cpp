@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <limits>
+#include <map>
 #include <set>
 #include <tuple>
 #include <utility>
 
 #include "core/geo/tag_track.hpp"
+#include "core/localize/flight_solver.hpp"
 #include "core/localize/live_anchor.hpp"
 
 namespace anchord {
@@ -18,7 +21,12 @@ struct LiveFlight::State {
   std::optional<UtcTime> epoch;
   std::optional<EnuFrame> frame;
   std::deque<TrackPose> track;  ///< ascending; only as long as ranges may still ask for it
-  std::deque<Range> waiting;    ///< ranges the track has not passed yet
+  struct Waiting {
+    Range range;
+    std::string told;  ///< why it counts as refused for now; empty while nobody was told
+  };
+  std::multimap<std::int64_t, Waiting> waiting;  ///< by time: ranges the track does not cover yet
+  std::int64_t newest_range_ns{0}, told_until_ns{std::numeric_limits<std::int64_t>::min()};
   std::map<NetworkId, LiveAnchor> anchors;
   std::vector<RangeResult> results;
   std::set<NetworkId> changed;
@@ -53,37 +61,79 @@ struct LiveFlight::State {
 
   void keep(RangeResult result) {
     // Whoever does not collect loses the oldest, not the memory.
-    if (results.size() >= options.max_waiting)
+    if (results.size() >= std::min<std::size_t>(options.max_waiting, 5000))
       results.erase(results.begin(), results.begin() + static_cast<std::ptrdiff_t>(results.size() / 2));
     results.push_back(std::move(result));
   }
 
-  /// Joins one range to the track; false while the fix after it has not come.
-  bool decide(const Range& range) {
+  enum class Fate : std::uint8_t { decided, waits, outside, gap };
+
+  /// Joins one range to the track as it is now; what is not decided may be, once more fixes have come.
+  Fate decide(const Range& range) {
     const double t_s = seconds(range.time) + options.lag_s;
-    if (track.empty() || t_s < track.front().t_s) {
-      refuse(range, "outside_track");
-      return true;
-    }
+    if (track.empty()) return Fate::waits;
+    if (t_s < track.front().t_s) return Fate::outside;
     const auto after = std::ranges::lower_bound(track, t_s, {}, &TrackPose::t_s);
-    if (after == track.end()) return false;
+    if (after == track.end()) return Fate::waits;
     const auto before = after == track.begin() ? after : std::prev(after);
-    if (after->t_s - before->t_s > options.max_gap_s) {
-      refuse(range, "track_gap");
-    } else if (before->fix < options.min_fix || after->fix < options.min_fix) {
+    if (after->t_s - before->t_s > options.max_gap_s) return Fate::gap;
+    if (before->fix < options.min_fix || after->fix < options.min_fix) {
       refuse(range, "fix_not_good_enough");
     } else if (const auto arm = lever_arm(range); !arm) {
       refuse(range, "unknown_tag");
     } else {
       use(range, interpolate(*before, *after, t_s, *arm));
     }
-    return true;
+    return Fate::decided;
+  }
+
+  void tell(Waiting& entry, const char* why) {
+    if (!entry.told.empty()) return;
+    entry.told = why;
+    refuse(entry.range, why);
+  }
+
+  /// True when the range is done with; else it stays parked.
+  bool settle(Waiting& entry) {
+    if (!epoch) return false;
+    const std::string told = entry.told;
+    const Fate fate = decide(entry.range);
+    if (fate == Fate::outside) tell(entry, "outside_track");
+    if (fate == Fate::gap) tell(entry, "track_gap");
+    if (fate == Fate::decided && !told.empty()) anchors.at(entry.range.anchor).forgive(told);
+    return fate == Fate::decided;
+  }
+
+  /// The track changed between these instants: whatever waits there is looked at again.
+  void settle_between(double from_s, double to_s) {
+    const auto ns = [&](double t_s) { return epoch->ns + static_cast<std::int64_t>(t_s * 1e9); };
+    auto it = waiting.lower_bound(ns(from_s - options.lag_s) - 1);
+    const auto end = waiting.upper_bound(ns(to_s - options.lag_s) + 1);
+    while (it != end) it = settle(it->second) ? waiting.erase(it) : std::next(it);
+  }
+
+  void park(Waiting entry) {
+    const std::int64_t ns = entry.range.time.ns;
+    const auto late_ns = static_cast<std::int64_t>(options.max_wait_s * 1e9);
+    newest_range_ns = std::max(newest_range_ns, ns);
+    if (ns < told_until_ns) tell(entry, "no_fix_in_time");
+    waiting.emplace(ns, std::move(entry));
+    // Time moves on with the ranges too: without fixes nobody is left to wonder.
+    if (newest_range_ns - late_ns > told_until_ns) {
+      auto it = waiting.lower_bound(told_until_ns);
+      told_until_ns = newest_range_ns - late_ns;
+      for (; it != waiting.end() && it->first < told_until_ns; ++it) tell(it->second, "no_fix_in_time");
+    }
+    while (waiting.size() > options.max_waiting) {
+      tell(waiting.begin()->second, "waited_too_long");
+      waiting.erase(waiting.begin());
+    }
   }
 
   void use(const Range& range, const TagPoint& point) {
     Observation row;
     row.tag_m = point.position_m;
-    row.distance_m = range.distance_m - options.bias_m;
+    row.distance_m = range.distance_m;
     row.sigma_m = options.range_sigma_m;
     row.tag_covariance_m2 = point.covariance_m2;
     auto& anchor = anchors.try_emplace(range.anchor, range.anchor).first->second;
@@ -93,28 +143,9 @@ struct LiveFlight::State {
     result.range.cir.reset();
     result.sigma_m = std::sqrt(row.sigma_m * row.sigma_m + point.covariance_m2.trace() / 3.0);
     result.tag_enu_m = point.position_m;
-    result.residual_m = anchor.residual_m(row);
+    result.corrected_m = range.distance_m - anchor.correction_m(range.distance_m, options);
+    result.residual_m = anchor.residual_m(row, options);
     keep(std::move(result));
-  }
-
-  void decide_waiting(bool last_call) {
-    const double newest_s = track.empty() ? 0.0 : track.back().t_s;
-    std::deque<Range> still;
-    for (auto& range : waiting) {
-      if (epoch && decide(range)) continue;
-      if (last_call) {
-        refuse(range, "outside_track");
-      } else {
-        still.push_back(std::move(range));
-      }
-    }
-    waiting = std::move(still);
-    while (waiting.size() > options.max_waiting) {
-      refuse(waiting.front(), "waited_too_long");
-      waiting.pop_front();
-    }
-    // Late rows may still come for a while; older track than that is of no use.
-    while (track.size() > 2 && track[1].t_s < newest_s - 10.0) track.pop_front();
   }
 };
 
@@ -145,8 +176,12 @@ void LiveFlight::add(const Fix& fix) {
     }
     s.pose = std::move(live);
   }
-  s.track.insert(place, std::move(pose));
-  s.decide_waiting(false);
+  const double t_s = pose.t_s;
+  const auto at = s.track.insert(place, std::move(pose));
+  const double from_s = at == s.track.begin() ? t_s : std::prev(at)->t_s;
+  const double to_s = std::next(at) == s.track.end() ? t_s : std::next(at)->t_s;
+  s.settle_between(from_s, to_s);
+  if (s.track.size() > s.options.max_track) s.track.pop_front();
 }
 
 void LiveFlight::add(const Range& range) {
@@ -166,21 +201,25 @@ void LiveFlight::add(const Range& range) {
     return;
   }
   while (s.seen.size() > 4 * s.options.max_waiting) s.seen.erase(s.seen.begin());
-  if (s.epoch && s.decide(range)) return;
-  s.waiting.push_back(range);
-  if (s.waiting.size() > s.options.max_waiting) {
-    s.refuse(s.waiting.front(), "waited_too_long");
-    s.waiting.pop_front();
-  }
-  // Time moves on with the ranges too: without fixes a range does not wait for ever.
-  while (!s.waiting.empty() && seconds_between(s.waiting.front().time, range.time) > s.options.max_wait_s) {
-    s.refuse(s.waiting.front(), "no_fix_in_time");
-    s.waiting.pop_front();
+  State::Waiting entry{range, {}};
+  entry.range.cir.reset();
+  if (!s.settle(entry)) s.park(std::move(entry));
+}
+
+void LiveFlight::adopt(const FlightSolution& solution, UtcTime cut) {
+  State& s = *state_;
+  s.options.bias_m = solution.shared.bias_m.value;
+  s.options.lag_s = solution.shared.lag_s.value;
+  for (const auto& anchor : solution.anchors) {
+    const NetworkId id = anchor.estimate.anchor;
+    auto& live = s.anchors.try_emplace(id, id).first->second;
+    if (live.adopt(anchor, solution.shared, cut)) s.changed.insert(id);
   }
 }
 
 void LiveFlight::finish() {
-  state_->decide_waiting(true);
+  for (auto& [ns, entry] : state_->waiting) state_->tell(entry, "outside_track");
+  state_->waiting.clear();
   for (auto& [id, anchor] : state_->anchors) {
     if (anchor.solve(state_->options)) state_->changed.insert(id);
   }

@@ -14,12 +14,15 @@
 
 namespace anchord {
 
+struct FlightSolution;
+
 /// What became of one live range.
 struct RangeResult {
   Range range;                         ///< as received, without its CIR
   std::string refused;                 ///< reason word; empty when used
   std::optional<double> residual_m{};  ///< against the anchor's current estimate
   std::optional<double> sigma_m{};
+  std::optional<double> corrected_m{};  ///< less the bias, curve and unit delay known by then
   std::optional<Eigen::Vector3d> tag_enu_m{};
   bool used() const { return refused.empty(); }
 };
@@ -34,22 +37,26 @@ struct LivePose {
 
 struct LiveOptions {
   FixClass min_fix{FixClass::rtk_fixed};
-  double max_gap_s{0.5};          ///< between the two fixes round a range
-  double max_wait_s{2.0};         ///< a range whose next fix has not come by then is refused
-  double update_interval_s{0.5};  ///< per anchor, of measurement time: 2 Hz
-  std::size_t max_rows{1500};     ///< per anchor; beyond it every second row goes, old and new alike
-  std::size_t max_waiting{5000};  ///< ranges waiting for a fix; the oldest leaves first
-  double range_sigma_m{0.15};     ///< of an uncorrected range
+  double max_gap_s{0.5};            ///< between the two fixes round a range
+  double max_wait_s{2.0};           ///< a range whose next fix has not come by then is told as refused
+  double update_interval_s{0.5};    ///< per anchor, of measurement time: 2 Hz
+  std::size_t max_rows{1500};       ///< per anchor; beyond it every second row goes, old and new alike
+  std::size_t max_waiting{20'000};  ///< ranges waiting for a fix; the oldest leaves first
+  std::size_t max_track{72'000};    ///< poses kept: an hour at 20 Hz; the oldest leaves first
+  double range_sigma_m{0.15};       ///< of an uncorrected range
   double bias_prior_sigma_m{0.3};
-  double lag_s{0.0};  ///< of a kit profile
+  double lag_s{0.0};  ///< of the kit; adopt() replaces both
   double bias_m{0.0};
   std::optional<Wgs84> origin{};  ///< absent: the first good fix
 };
 
 /// One flight as it happens: joins ranges to the track and keeps every anchor's estimate warm.
 ///
-/// Driven by measurement time only, so that a replay repeats it at any speed. Memory is bounded by
-/// LiveOptions. Not thread-safe: one strand per mission owns it.
+/// Ranges and fixes may come in any order, all of one kind before the other too (an upload of two files does
+/// that): a range whose time the track does not cover yet is told as refused once it is late, but stays
+/// parked, and is used when the fixes come after all. Driven by measurement time only, so that a replay
+/// repeats it at any speed. Memory is bounded by LiveOptions. Not thread-safe: one strand per mission owns
+/// it.
 class LiveFlight {
  public:
   explicit LiveFlight(Mission mission, LiveOptions options = {});
@@ -59,6 +66,9 @@ class LiveFlight {
 
   void add(const Fix& fix);
   void add(const Range& range);
+  /// A joint solution of this flight's rows up to `cut`: its bias and lag hold from now on, and its positions
+  /// are what later ranges refine. Solved in the frame of origin().
+  void adopt(const FlightSolution& solution, UtcTime cut);
   /// Ends the stream: waiting ranges are decided, every anchor is solved once more.
   void finish();
 

@@ -176,5 +176,98 @@ TEST(LiveFlight, PlacesAnRtkFlightOnTheGlobe) {
   }
 }
 
+/// Truth within this of every estimate once all rows are in.
+void expect_placed(const LiveFlight& live, const MadeFlight& made, double within_m) {
+  const auto estimates = live.estimates();
+  ASSERT_EQ(estimates.size(), made.anchors.size());
+  for (std::size_t i = 0; i < estimates.size(); ++i) {
+    ASSERT_TRUE(estimates[i].best) << estimates[i].reason;
+    EXPECT_LT((estimates[i].best->position.m - made.anchors[i]).norm(), within_m);
+    EXPECT_GT(estimates[i].n_used, 100U);
+    EXPECT_FALSE(estimates[i].refused.contains("no_fix_in_time"));
+    EXPECT_FALSE(estimates[i].refused.contains("outside_track"));
+  }
+}
+
+TEST(LiveFlight, UsesRangesThatComeAfterAllFixesOfTheFlight) {
+  MadeFlight made;
+  made.duration_s = 60;
+  const auto flight = make_flight(made);
+  LiveFlight live(flight.mission);
+  for (const Fix& fix : flight.fixes) live.add(fix);
+  for (const Range& range : flight.ranges) live.add(range);
+  expect_placed(live, made, 0.2);
+}
+
+TEST(LiveFlight, UsesRangesThatCameBeforeAllFixesOfTheFlight) {
+  MadeFlight made;
+  made.duration_s = 60;
+  const auto flight = make_flight(made);
+  LiveFlight live(flight.mission);
+  auto ranges = flight.ranges;
+  std::ranges::stable_sort(ranges, {}, &Range::time);
+  for (const Range& range : ranges) live.add(range);
+  // Whoever watches is told at once that no track is there, and what became of it later.
+  std::size_t told = 0;
+  for (const auto& result : live.take_ranges()) told += result.refused == "no_fix_in_time" ? 1 : 0;
+  EXPECT_GT(told, 0U);
+  for (const Fix& fix : flight.fixes) live.add(fix);
+  expect_placed(live, made, 0.2);
+}
+
+TEST(LiveFlight, UsesRangesAndFixesSentInChunksOfTurningOrder) {
+  MadeFlight made;
+  made.duration_s = 60;
+  const auto flight = make_flight(made);
+  LiveFlight live(flight.mission);
+  // Eight chunks of each kind, fixes from the last to the first: the track grows at its front.
+  for (std::size_t chunk = 8; chunk-- > 0;) {
+    const std::size_t n = flight.fixes.size(), m = flight.ranges.size();
+    for (std::size_t i = chunk * m / 8; i < (chunk + 1) * m / 8; ++i) live.add(flight.ranges[i]);
+    for (std::size_t i = chunk * n / 8; i < (chunk + 1) * n / 8; ++i) live.add(flight.fixes[i]);
+  }
+  live.finish();
+  expect_placed(live, made, 0.2);
+}
+
+TEST(LiveFlight, GoesOnFromAJointSolution) {
+  MadeFlight made;
+  made.bias_m = 0.4;
+  auto flight = make_flight(made);
+  std::ranges::stable_sort(flight.ranges, {}, &Range::time);
+  FlightData half = flight;
+  const UtcTime cut = flight.ranges[flight.ranges.size() / 2].time;
+  std::erase_if(half.ranges, [&](const Range& range) { return range.time > cut; });
+  const auto joint = solve_flight(half);
+  ASSERT_TRUE(joint);
+  LiveFlight live(flight.mission);
+  for (const Fix& fix : flight.fixes) live.add(fix);
+  for (const Range& range : half.ranges) live.add(range);
+  live.adopt(joint.value(), cut);
+  const auto adopted = live.estimates();
+  for (std::size_t i = 0; i < adopted.size(); ++i) {
+    ASSERT_TRUE(adopted[i].best);
+    EXPECT_LT((adopted[i].best->position.m - joint.value().anchors[i].estimate.best->position.m).norm(),
+              1e-6);
+    // The kit's bias with the delay of this unit.
+    EXPECT_NEAR(adopted[i].bias_m.value(), made.bias_m, 0.03);
+  }
+  live.take_ranges();
+  for (const Range& range : flight.ranges) {
+    if (range.time > cut) live.add(range);
+  }
+  double sum_m = 0;
+  const auto results = live.take_ranges();
+  ASSERT_GT(results.size(), 100U);
+  for (const auto& result : results) sum_m += result.residual_m.value();
+  EXPECT_LT(std::abs(sum_m / static_cast<double>(results.size())), 0.03) << "the bias is taken off";
+  live.finish();
+  const auto refined = live.estimates();
+  for (std::size_t i = 0; i < refined.size(); ++i) {
+    EXPECT_LT(refined[i].h95_m, adopted[i].h95_m) << "later ranges add something";
+    EXPECT_LT((refined[i].best->position.m - made.anchors[i]).norm(), 0.15);
+  }
+}
+
 }  // namespace
 }  // namespace anchord
