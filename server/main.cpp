@@ -16,6 +16,10 @@ int main(int argc, char** argv) {
   anchord::cli::add_replay_command(app, exit_code);
   anchord::cli::add_simulate_command(app, exit_code);
   anchord::cli::add_token_command(app, exit_code);
+  anchord::cli::add_rules_command(app, exit_code);
+  anchord::cli::add_models_command(app, exit_code);
+  anchord::cli::add_campaign_command(app, exit_code);
+  anchord::cli::add_dataset_command(app, exit_code);
   anchord::cli::add_evaluate_command(app, exit_code);
   anchord::cli::add_train_command(app, exit_code);
   anchord::cli::add_solve_command(app, exit_code);

@@ -5,7 +5,7 @@
 
 #include "api/imports/labelled_table.hpp"
 #include "core/ml/evaluate.hpp"
-#include "core/ml/learn.hpp"
+#include "core/ml/training.hpp"
 
 /// What `anchord train` and `anchord evaluate` print: JSON for programs, a table for people. docs/learning.md
 /// lists the fields.
@@ -21,8 +21,10 @@ struct RowReport {
   std::string warning{};  ///< an optimistic split, for one
 };
 
-std::string train_json(const ml::Learned& learned, const RowReport& rows, const std::string& out_path);
-std::string train_text(const ml::Learned& learned, const RowReport& rows, const std::string& out_path);
+std::string train_json(const ml::TrainingOutcome& outcome, const RowReport& rows,
+                       const std::string& out_path);
+std::string train_text(const ml::TrainingOutcome& outcome, const RowReport& rows,
+                       const std::string& out_path);
 std::string evaluation_json(const ml::Evaluation& evaluation, const ml::Model& model, const RowReport& rows);
 std::string evaluation_text(const ml::Evaluation& evaluation, const ml::Model& model, const RowReport& rows);
 

@@ -5,27 +5,14 @@
 #include <cmath>
 #include <unordered_map>
 
+#include "api/imports/column_names.hpp"
 #include "api/imports/gzip_lines.hpp"
 
 namespace anchord::api {
 namespace {
 
-using Names = std::vector<std::string_view>;
+using namespace columns;
 
-// Field -> column names it goes by in the public sets, first match wins.
-const Names k_range{"range_m", "distance_m", "measured_range_m", "range", "distance"};
-const Names k_truth{"true_range_m", "true_range_2d_m", "true_distance_m", "rtk_range_m", "truth_m"};
-const Names k_label{"nlos", "is_nlos", "los", "is_los", "label", "cls", "class"};
-const Names k_rx{"rx_dbm", "rss_dbm", "rx_power_dbm", "rss"};
-const Names k_fp{"fp_dbm", "first_path_dbm", "first_path_power", "fp_power_dbm"};
-const Names k_f1{"fp_amp1", "firstPathAmp1"}, k_f2{"fp_amp2", "firstPathAmp2"},
-    k_f3{"fp_amp3", "firstPathAmp3"};
-const Names k_cir_power{"cir_pwr", "cir_power", "maxGrowthCIR"};
-const Names k_count{"rxpacc", "rxPreamCount", "preamble_count"};
-const Names k_std_noise{"std_noise", "stdNoise"}, k_max_noise{"max_noise", "maxNoise"};
-const Names k_fp_index{"fp_index", "firstPath", "fp_idx"};
-const Names k_height{"height_diff_m", "height_difference_m"};
-const Names k_heading{"heading_deg"};
 const Names k_group{"group",    "env",     "environment", "place",   "room",
                     "campaign", "session", "setup",       "tag_pos", "anchor_height_m"};
 const Names k_placement{"setup_id", "placement", "setup"};

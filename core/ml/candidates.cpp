@@ -61,6 +61,25 @@ Recipe boosted(const LearnOptions& options, std::size_t rows) {
   return r;
 }
 
+Recipe many_row_forest(const LearnOptions& options) {
+  Recipe r;
+  r.method = Method::random_forest;
+  r.per_placement = options.per_placement;
+  r.clip = 0;
+  r.forest.seed = options.seed;
+  r.forest.leaf_share = 0.0003;
+  r.forest.trees = 60;
+  return r;
+}
+
+Recipe tree_average(const LearnOptions& options, std::size_t rows) {
+  Recipe r = boosted(options, rows);
+  r.method = Method::tree_average;
+  r.forest = many_row_forest(options).forest;
+  if (rows <= 5000) r.forest.leaf_share = 0.02;
+  return r;
+}
+
 }  // namespace
 
 std::vector<Recipe> classifier_candidates(const Dataset& data, const LearnOptions& options) {
@@ -93,12 +112,12 @@ std::vector<Recipe> classifier_candidates(const Dataset& data, const LearnOption
   if (chosen) methods = options.methods;
   // Many rows without placements: the small models are for the table, trees on everything win.
   const bool many = placements > 5000;
-  if (many && !chosen) methods = {Method::logistic};
+  if (many && !chosen) methods.clear();
 
   std::vector<Recipe> out;
   for (const auto& set : sets) {
     for (const auto method : methods) {
-      if (method == Method::boosted) continue;
+      if (method == Method::boosted || method == Method::tree_average) continue;
       Recipe r = plain;
       r.method = method;
       for (const auto& point : expand(r, axes(options, method, true))) add(out, data, point, set);
@@ -108,16 +127,23 @@ std::vector<Recipe> classifier_candidates(const Dataset& data, const LearnOption
     const auto& everything = options.features.empty() ? data.features : options.features;
     const Names first(everything.begin(), everything.begin() + static_cast<std::ptrdiff_t>(std::min(
                                                                    everything.size(), k_max_features)));
+    // The average first: its votes are the steadier, and it must be beaten clearly.
+    if (many && !chosen) add(out, data, tree_average(options, placements), first);
     for (const auto& r : expand(boosted(options, placements), axes(options, Method::boosted, true)))
       add(out, data, r, first);
     if (many && !chosen) {
-      Recipe forest = plain;
-      forest.method = Method::random_forest;
-      forest.clip = 0;
-      forest.forest.leaf_share = 0.0003;
-      forest.forest.trees = 60;
-      add(out, data, forest, out.back().features);
+      add(out, data, many_row_forest(options), first);
+      Recipe logistic = plain;
+      logistic.method = Method::logistic;
+      add(out, data, logistic, first);
     }
+  }
+  if (wanted(options, Method::tree_average)) {
+    const auto& everything = options.features.empty() ? data.features : options.features;
+    for (const auto& r : expand(tree_average(options, placements), axes(options, Method::tree_average, true)))
+      add(out, data, r,
+          Names(everything.begin(), everything.begin() + static_cast<std::ptrdiff_t>(
+                                                             std::min(everything.size(), k_max_features))));
   }
   return out;
 }

@@ -5,8 +5,8 @@
 #include <map>
 #include <set>
 
-#include "core/ml/random.hpp"
 #include "core/base/sha256.hpp"
+#include "core/ml/random.hpp"
 
 namespace anchord::ml {
 namespace {
@@ -16,6 +16,12 @@ double median(std::vector<double> values) {
   std::nth_element(values.begin(), middle, values.end());
   if (values.size() % 2 == 1) return *middle;
   return 0.5 * (*middle + *std::max_element(values.begin(), middle));
+}
+
+double mean_of(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double v : values) sum += v;
+  return sum / static_cast<double>(values.size());
 }
 
 std::map<std::uint32_t, std::vector<std::size_t>> rows_by(std::span<const std::uint32_t> id) {
@@ -96,7 +102,8 @@ std::vector<std::size_t> range_outliers(std::span<const double> range_m,
   return out;
 }
 
-Dataset aggregate_placements(const Dataset& data) {
+Dataset aggregate_placements(const Dataset& data, bool mean) {
+  const auto middle = [mean](const std::vector<double>& v) { return mean ? mean_of(v) : median(v); };
   std::vector<std::size_t> firsts;
   const auto placements = rows_by(data.placement);
   for (const auto& [id, rows] : placements) firsts.push_back(rows.front());
@@ -106,19 +113,24 @@ Dataset aggregate_placements(const Dataset& data) {
     std::vector<double> values(rows.size());
     for (std::size_t c = 0; c < data.columns(); ++c) {
       for (std::size_t r = 0; r < rows.size(); ++r) values[r] = data.x[rows[r] * data.columns() + c];
-      out.x[at * data.columns() + c] = median(values);
+      out.x[at * data.columns() + c] = middle(values);
     }
     std::size_t los = 0;
     for (std::size_t r = 0; r < rows.size(); ++r) {
       if (data.has_truth()) values[r] = data.bias_m[rows[r]];
       if (data.labelled()) los += data.los[rows[r]];
     }
-    if (data.has_truth()) out.bias_m[at] = median(values);
+    if (data.has_truth()) out.bias_m[at] = middle(values);
     if (data.labelled()) out.los[at] = 2 * los > rows.size() ? 1 : 0;
     out.weight[at] = 1;
     ++at;
   }
   return out;
+}
+
+std::string place_name(const Dataset& data, std::uint32_t group) {
+  return group < data.group_names.size() && !data.group_names[group].empty() ? data.group_names[group]
+                                                                             : std::to_string(group);
 }
 
 Dataset thin_placements(const Dataset& data, std::size_t per_placement) {

@@ -44,8 +44,12 @@ std::vector<std::size_t> range_outliers(std::span<const double> range_m,
                                         std::span<const std::uint32_t> placement, double mads = 8,
                                         double floor_m = 0.5);
 
-/// One row per placement: the median of each feature and of the bias (6.2.1); class by majority; weight 1.
-Dataset aggregate_placements(const Dataset& data);
+/// One row per placement: the median (or the mean, as 6.2.1 does) of each feature and of the bias; class by
+/// majority; weight 1.
+Dataset aggregate_placements(const Dataset& data, bool mean = false);
+
+/// Name of a place, or its number where it has none.
+std::string place_name(const Dataset& data, std::uint32_t group);
 
 /// At most `per_placement` rows of each placement, evenly spread over it, each weighing 1 / their number:
 /// every placement counts alike.

@@ -63,10 +63,7 @@ Evaluation evaluate(const Model& model, const Dataset& given) {
   for (std::size_t i = 0; i < data.rows(); ++i) places[data.group[i]].push_back(i);
   if (places.size() > 1000) return out;  // no places, only rows
   for (const auto& [group, rows] : places) {
-    PlaceEvaluation place{group < data.group_names.size() ? data.group_names[group] : std::to_string(group),
-                          rows.size(),
-                          {},
-                          {}};
+    PlaceEvaluation place{place_name(data, group), rows.size(), {}, {}};
     if (classes) {
       Confusion c;
       for (const auto i : rows) c.count(data.los[i] != 0, p_los[i] >= model.classifier->threshold);

@@ -47,11 +47,11 @@ constexpr std::array k_settings{
             [](const Recipe& r) { return r.svm.epsilon_m; },
             [](Recipe& r, double v) { r.svm.epsilon_m = v; }},
     Setting{"trees",
-            {Method::random_forest, Method::average, Method::random_forest},
+            {Method::random_forest, Method::average, Method::tree_average},
             [](const Recipe& r) { return static_cast<double>(r.forest.trees); },
             [](Recipe& r, double v) { r.forest.trees = whole(v); }},
     Setting{"leaf_share",
-            {Method::random_forest, Method::average, Method::random_forest},
+            {Method::random_forest, Method::average, Method::tree_average},
             [](const Recipe& r) { return r.forest.leaf_share; },
             [](Recipe& r, double v) { r.forest.leaf_share = v; }},
     Setting{"max_depth",
@@ -65,15 +65,15 @@ constexpr std::array k_settings{
               r.forest.features_per_split = static_cast<std::size_t>(std::max(0, whole(v)));
             }},
     Setting{"rounds",
-            {Method::boosted, Method::boosted, Method::boosted},
+            {Method::boosted, Method::tree_average, Method::boosted},
             [](const Recipe& r) { return static_cast<double>(r.boosted.rounds); },
             [](Recipe& r, double v) { r.boosted.rounds = whole(v); }},
     Setting{"depth",
-            {Method::boosted, Method::boosted, Method::boosted},
+            {Method::boosted, Method::tree_average, Method::boosted},
             [](const Recipe& r) { return static_cast<double>(r.boosted.depth); },
             [](Recipe& r, double v) { r.boosted.depth = whole(v); }},
     Setting{"learning_rate",
-            {Method::boosted, Method::boosted, Method::boosted},
+            {Method::boosted, Method::tree_average, Method::boosted},
             [](const Recipe& r) { return r.boosted.learning_rate; },
             [](Recipe& r, double v) { r.boosted.learning_rate = v; }},
     Setting{"degree",
@@ -129,6 +129,7 @@ std::map<std::string, std::vector<double>> default_grid(Method method, bool clas
     case Method::random_forest:
       return {{"trees", {60, 120}}, {"leaf_share", {0.01, 0.02, 0.04, 0.08}}, {"features_per_split", {0, 2}}};
     case Method::boosted:
+    case Method::tree_average:
       return {{"rounds", {100, 300}}, {"depth", {2, 4, 6}}};
     case Method::average:
       return {{"c", {1, 3, 10}}, {"gamma", {0.01, 0.03, 0.1}}, {"leaf_share", {0.03, 0.08}}};

@@ -10,10 +10,13 @@ namespace {
 
 constexpr double k_harm_price = 0.5;  // metres of mean error that a metre of harm to the worst place is worth
 constexpr double k_harmless_m = 0.02;
+constexpr std::array<double, 5> k_quantiles{0.2, 0.3, 0.4, 0.5, 0.6};
+constexpr std::array<double, 5> k_gains{0, 0.25, 0.5, 0.75, 1};
 
 struct Shape {
-  std::vector<std::string> shared;
+  std::vector<std::string> shared{};
   double kappa{};
+  std::vector<std::string> tail{};  // what the mean NLOS delay depends on
 };
 
 std::vector<std::size_t> indices_of(const Dataset& data, const std::vector<std::string>& names) {
@@ -27,7 +30,7 @@ std::vector<std::size_t> indices_of(const Dataset& data, const std::vector<std::
 
 // Rows thinned as in training, with their out-of-fold probabilities.
 Result<BiasMixture> fit_on(const Dataset& data, const std::vector<double>& p_los,
-                           const std::vector<std::size_t>& rows, const Shape& shape, bool features) {
+                           const std::vector<std::size_t>& rows, const Shape& shape) {
   Dataset part = data.subset(rows);
   // The probability rides along as a column through the thinning.
   part.features.emplace_back("p_los");
@@ -41,11 +44,70 @@ Result<BiasMixture> fit_on(const Dataset& data, const std::vector<double>& p_los
   part = thin_placements(part, 5);
   std::vector<double> p;
   for (std::size_t i = 0; i < part.rows(); ++i) p.push_back(part.row(i).back());
-  MixtureTask task{
-      part.x, part.columns(), part.bias_m, part.weight, p, part.los, indices_of(data, shape.shared),
-      {},     shape.kappa};
-  if (features) task.tail_features = indices_of(data, {"rx_free_space_db", "rx_minus_fp_db"});
+  MixtureTask task{part.x,
+                   part.columns(),
+                   part.bias_m,
+                   part.weight,
+                   p,
+                   part.los,
+                   indices_of(data, shape.shared),
+                   indices_of(data, shape.tail),
+                   shape.kappa};
   return fit_mixture(task);
+}
+
+// Each row's density by a mixture fitted to the other folds.
+Result<std::vector<BiasDensity>> out_of_fold(const Dataset& data, const std::vector<double>& p_los,
+                                             const std::vector<std::size_t>& fold, const Shape& shape,
+                                             const Execution& run) {
+  const std::size_t folds = *std::max_element(fold.begin(), fold.end()) + 1;
+  std::vector<BiasDensity> out(data.rows());
+  BOOST_OUTCOME_TRY(parallel_for(folds, run, [&](std::size_t k) -> Result<void> {
+    BOOST_OUTCOME_TRY(const auto mixture, fit_on(data, p_los, rows_of_fold(fold, k, false), shape));
+    for (const auto i : rows_of_fold(fold, k, true)) out[i] = density_of(mixture, p_los[i], data.row(i));
+    return boost::outcome_v2::success();
+  }));
+  return out;
+}
+
+double mean_nll(const Dataset& data, const std::vector<BiasDensity>& densities,
+                const std::vector<double>& weight) {
+  double sum = 0, total = 0;
+  for (std::size_t i = 0; i < data.rows(); ++i) {
+    sum -= weight[i] * densities[i].log_density(data.bias_m[i]);
+    total += weight[i];
+  }
+  return sum / total;
+}
+
+// What the mean NLOS delay may depend on. Excess goes with what the wall took from the level, and with how
+// much wall there is along the way; which of them carries over is a matter of the building and the radio.
+const std::vector<std::vector<std::string>> k_tails{{"rx_free_space_db", "rx_minus_fp_db"},
+                                                    {"rx_dbm", "range_m"},
+                                                    {"range_m", "rx_minus_fp_db"},
+                                                    {"rx_dbm", "rx_minus_fp_db"},
+                                                    {"fp_dbm", "range_m"}};
+
+// Densities with the tail of the least held-out negative log-likelihood; the earlier one within 0.01.
+Result<std::vector<BiasDensity>> best_densities(const Dataset& data, const std::vector<double>& p_los,
+                                                const std::vector<std::size_t>& fold, Shape& shape,
+                                                const LearnOptions& options) {
+  const auto weight = placement_weights(data);
+  std::vector<BiasDensity> best;
+  double best_nll = 0;
+  for (std::size_t t = 0; t < k_tails.size(); ++t) {
+    if (options.progress)
+      options.progress(0.4 + 0.6 * static_cast<double>(t) / static_cast<double>(k_tails.size()),
+                       "bias mixture");
+    Shape one = shape;
+    one.tail = k_tails[t];
+    if (indices_of(data, one.tail).size() != one.tail.size() && t > 0) continue;
+    BOOST_OUTCOME_TRY(auto densities, out_of_fold(data, p_los, fold, one, options.run));
+    const double nll = mean_nll(data, densities, weight);
+    if (!best.empty() && nll > best_nll - 0.01) continue;
+    best = std::move(densities), best_nll = nll, shape.tail = one.tail;
+  }
+  return best;
 }
 
 // Grouped error of the shared curve alone, on LOS rows.
@@ -124,35 +186,24 @@ Result<Learned> learn_bias_mixture(const Dataset& data, const LearnOptions& opti
     if (indices_of(data, names).size() != names.size()) continue;
     for (const double kappa : {0.5, 1.0}) {
       if (cancelled("shared bias", 0.2)) return make_error(Errc::canceled, "cancelled");
-      BOOST_OUTCOME_TRY(const double loss, los_loss(data, fold, {names, kappa}));
-      if (loss < best_loss * 0.98) best_loss = loss, best_shape = {names, kappa};
+      BOOST_OUTCOME_TRY(const double loss, los_loss(data, fold, {names, kappa, {}}));
+      if (loss < best_loss * 0.98) best_loss = loss, best_shape = {names, kappa, {}};
     }
   }
 
   // Every row's density from folds without it; the likelihood beside that of constants.
-  const std::size_t folds = *std::max_element(fold.begin(), fold.end()) + 1;
   const auto weight = placement_weights(data);
   double los_share = 0, total = 0;
   for (std::size_t i = 0; i < data.rows(); ++i) los_share += weight[i] * data.los[i], total += weight[i];
   const std::vector<double> base_rate(data.rows(), los_share / total);
-  constexpr std::array<double, 2> k_quantiles{0.4, 0.5};
-  constexpr std::array<double, 5> k_gains{0, 0.25, 0.5, 0.75, 1};
-  std::array<std::vector<double>, 2> quantile;
-  for (auto& q : quantile) q.resize(data.rows());
-  for (std::size_t k = 0; k < folds; ++k) {
-    if (cancelled("bias mixture", 0.3 + 0.6 * static_cast<double>(k) / static_cast<double>(folds)))
-      return make_error(Errc::canceled, "cancelled");
-    const auto outside = rows_of_fold(fold, k, false);
-    BOOST_OUTCOME_TRY(const auto mixture, fit_on(data, out.p_los, outside, best_shape, true));
-    BOOST_OUTCOME_TRY(const auto constants, fit_on(data, base_rate, outside, {}, false));
-    for (const auto i : rows_of_fold(fold, k, true)) {
-      const auto density = density_of(mixture, out.p_los[i], data.row(i));
-      for (std::size_t q = 0; q < 2; ++q) quantile[q][i] = density.quantile(k_quantiles[q]);
-      out.nll -= weight[i] * density.log_density(data.bias_m[i]) / total;
-      out.nll_constants -=
-          weight[i] * density_of(constants, base_rate[i], data.row(i)).log_density(data.bias_m[i]) / total;
-    }
-  }
+  if (cancelled("constants", 0.3)) return make_error(Errc::canceled, "cancelled");
+  BOOST_OUTCOME_TRY(const auto constants, out_of_fold(data, base_rate, fold, {}, options.run));
+  out.nll_constants = mean_nll(data, constants, weight);
+  BOOST_OUTCOME_TRY(const auto densities, best_densities(data, out.p_los, fold, best_shape, options));
+  out.nll = mean_nll(data, densities, weight);
+  std::array<std::vector<double>, k_quantiles.size()> quantile;
+  for (std::size_t q = 0; q < k_quantiles.size(); ++q)
+    for (const auto& density : densities) quantile[q].push_back(density.quantile(k_quantiles[q]));
 
   // How much of it to apply: least mean error, harm to the worst place beyond 2 cm priced in; nothing at all
   // is among the choices.
@@ -161,7 +212,7 @@ Result<Learned> learn_bias_mixture(const Dataset& data, const LearnOptions& opti
       bias_row(data, "class medians weighted by P(LOS)", weighted_class_medians(data, out.p_los, fold))};
   double best_cost = 1e9, best_q = 0.5, best_gain = 0;
   std::size_t best_row = 0;
-  for (std::size_t q = 0; q < 2; ++q) {
+  for (std::size_t q = 0; q < k_quantiles.size(); ++q) {
     for (const double gain : k_gains) {
       std::vector<double> correction;
       for (const double v : quantile[q]) correction.push_back(gain * v);
@@ -182,13 +233,13 @@ Result<Learned> learn_bias_mixture(const Dataset& data, const LearnOptions& opti
   // The deployed model sees the classifier's own feature columns, so the mixture's names join them.
   std::vector<std::string> features = out.model.info.features;
   std::vector<std::string> wanted = best_shape.shared;
-  wanted.insert(wanted.end(), {"rx_free_space_db", "rx_minus_fp_db"});
+  wanted.insert(wanted.end(), best_shape.tail.begin(), best_shape.tail.end());
   for (const auto& name : wanted)
     if (!indices_of(data, {name}).empty() &&
         std::find(features.begin(), features.end(), name) == features.end())
       features.push_back(name);
   BOOST_OUTCOME_TRY(const auto narrowed, data.with_features(features));
-  BOOST_OUTCOME_TRY(auto mixture, fit_on(narrowed, out.p_los, all, best_shape, true));
+  BOOST_OUTCOME_TRY(auto mixture, fit_on(narrowed, out.p_los, all, best_shape));
   mixture.quantile = best_q;
   mixture.gain = best_gain;
 

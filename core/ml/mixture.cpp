@@ -45,6 +45,10 @@ double BiasMixture::shared_m(std::span<const double> features) const {
   return shared.centre_m + shared.kappa * (g - shared.centre_m);
 }
 
+double BiasMixture::correction_m(const BiasDensity& density) const {
+  return gain * density.quantile(quantile);
+}
+
 double BiasMixture::tau_m(std::span<const double> features) const {
   double log_value = log_tau;
   for (const auto& term : tail)

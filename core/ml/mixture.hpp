@@ -7,6 +7,8 @@
 
 namespace anchord::ml {
 
+struct BiasDensity;
+
 /// Density of the range bias of a link of which only P(LOS) is known.
 ///
 /// e = bias - b0(x);  f(e) = .99 [p N(e; m0, s0) + (1 - p) EMG(e; m1, s1, tau)] + .01 / 10 m
@@ -32,6 +34,9 @@ struct BiasMixture {
   std::vector<TailTerm> tail{};  ///< a1, a2
   double quantile{0.5};          ///< which quantile corrects
   double gain{1};                ///< share of the correction that is applied
+
+  /// What to subtract from the measured range: gain times the quantile.
+  double correction_m(const BiasDensity& density) const;
 
   double shared_m(std::span<const double> features) const;
   double tau_m(std::span<const double> features) const;

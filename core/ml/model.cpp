@@ -141,7 +141,7 @@ Prediction predict(const Model& model, std::span<const double> features) {
   }
   if (model.mixture && out.p_los) {
     const auto density = density_of(*model.mixture, *out.p_los, features);
-    out.bias_m = model.mixture->gain * density.quantile(model.mixture->quantile);
+    out.bias_m = model.mixture->correction_m(density);
     out.sigma_m = density.sigma_m();
   } else if (model.regressor) {
     out.bias_m = model.regressor->bias_m(features);

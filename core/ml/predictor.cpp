@@ -113,7 +113,7 @@ RangeVerdict Predictor::judge(const nlos::FeatureVector& features, Correction ho
         out.bias_m =
             is_los ? density.shared_m + density.m0_m : density.shared_m + density.m1_m + density.tau_m;
       } else {
-        out.bias_m = m->mixture->gain * density.quantile(m->mixture->quantile);
+        out.bias_m = m->mixture->correction_m(density);
       }
       out.sigma_m = density.sigma_m();
     } else if (m->regressor) {

@@ -9,9 +9,9 @@
 namespace anchord::ml {
 namespace {
 
-constexpr std::array<std::string_view, 10> k_names{
-    "none",    "constant", "logistic",   "random_forest", "svm",
-    "boosted", "average",  "univariate", "multivariate",  "least_absolute"};
+constexpr std::array<std::string_view, 11> k_names{
+    "none",    "constant",   "logistic",     "random_forest",  "svm",         "boosted",
+    "average", "univariate", "multivariate", "least_absolute", "tree_average"};
 
 struct Prepared {
   Dataset data;
@@ -116,9 +116,10 @@ Result<Classifier> fit_classifier(const Dataset& data, const Recipe& recipe, con
     BOOST_OUTCOME_TRY(auto member, svm_member(p, recipe.svm, run));
     out.members.push_back(std::move(member));
   }
-  if (all || recipe.method == Method::random_forest)
+  if (all || recipe.method == Method::random_forest || recipe.method == Method::tree_average)
     out.members.push_back({fit_forest(p.rows(), recipe.forest, nullptr, run), true});
-  if (recipe.method == Method::boosted) out.members.push_back({fit_boosted(p.rows(), recipe.boosted, run)});
+  if (recipe.method == Method::boosted || recipe.method == Method::tree_average)
+    out.members.push_back({fit_boosted(p.rows(), recipe.boosted, run)});
   if (run.cancelled()) return make_error(Errc::canceled, "cancelled");
   if (out.members.empty())
     return make_error(Errc::invalid_argument, std::string{method_name(recipe.method)} + " does not classify");
@@ -170,6 +171,7 @@ Result<Regressor> fit_regressor(const Dataset& data, const Recipe& recipe, const
       break;
     case Method::logistic:
     case Method::average:
+    case Method::tree_average:
       return make_error(Errc::invalid_argument,
                         std::string{method_name(recipe.method)} + " does not regress");
   }

@@ -27,6 +27,7 @@ enum class Method : std::uint8_t {
   univariate,      ///< polynomial of one feature
   multivariate,    ///< polynomial of several, with interactions
   least_absolute,  ///< robust linear fit
+  tree_average,    ///< mean of the logits of boosted trees and forest: for many rows
 };
 
 std::string_view method_name(Method method);

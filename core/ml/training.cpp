@@ -41,39 +41,6 @@ class Reporter {
   double before_{0}, whole_{0}, most_{0};
 };
 
-std::string name_of(const Dataset& data, std::uint32_t group) {
-  return group < data.group_names.size() ? data.group_names[group] : std::to_string(group);
-}
-
-struct Split {
-  std::vector<std::size_t> train, test;
-};
-
-Result<Split> split_rows(const Dataset& data, const TrainingSpec& spec) {
-  std::set<std::uint32_t> held;
-  for (const auto& name : spec.held_out) {
-    bool found = false;
-    for (const auto id : data.group)
-      if (name_of(data, id) == name) held.insert(id), found = true;
-    if (!found) return make_error(Errc::not_found, "no place named " + name + " to hold out");
-  }
-  if (spec.held_out.empty() && spec.held_out_share > 0) {
-    const std::set<std::uint32_t> all(data.group.begin(), data.group.end());
-    std::vector<std::uint32_t> order(all.begin(), all.end());
-    Random random{spec.seed ^ 0x5EED5EEDULL};  // another draw than the folds'
-    random.shuffle(order);
-    const auto n =
-        static_cast<std::size_t>(std::ceil(spec.held_out_share * static_cast<double>(order.size()) - 1e-9));
-    held.insert(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(std::min(n, order.size())));
-  }
-  Split out;
-  for (std::size_t i = 0; i < data.rows(); ++i)
-    (held.contains(data.group[i]) ? out.test : out.train).push_back(i);
-  if (out.train.empty())
-    return make_error(Errc::too_few_observations, "every place is held out: nothing is left to train on");
-  return out;
-}
-
 std::vector<std::vector<std::string>> places_of_folds(const Dataset& data,
                                                       const std::vector<std::size_t>& fold) {
   std::vector<std::set<std::uint32_t>> ids;
@@ -86,12 +53,13 @@ std::vector<std::vector<std::string>> places_of_folds(const Dataset& data,
     out.emplace_back();
     // Rows as places would name every row: enough is enough.
     for (const auto id : places)
-      if (out.back().size() < 1000) out.back().push_back(name_of(data, id));
+      if (out.back().size() < 1000) out.back().push_back(place_name(data, id));
   }
   return out;
 }
 
-std::vector<RowPrediction> predictions_of(const Dataset& data, const Split& split, const Learned& learned) {
+std::vector<RowPrediction> predictions_of(const Dataset& data, const PlaceSplit& split,
+                                          const Learned& learned) {
   std::vector<RowPrediction> out;
   for (std::size_t k = 0; k < split.train.size(); ++k) {
     RowPrediction p{split.train[k], false, {}, {}, {}, {}};
@@ -104,7 +72,7 @@ std::vector<RowPrediction> predictions_of(const Dataset& data, const Split& spli
   return out;
 }
 
-void add_test(const Dataset& data, const Split& split, TrainingOutcome& out) {
+void add_test(const Dataset& data, const PlaceSplit& split, TrainingOutcome& out) {
   const auto narrowed = data.subset(split.test).with_features(out.model.info.features);
   if (!narrowed) return;  // the model's features come from these data
   out.test = evaluate(out.model, narrowed.value());
@@ -153,6 +121,32 @@ Recipe ranking_forest(const Dataset& data, const TrainingSpec& spec) {
 
 }  // namespace
 
+Result<PlaceSplit> split_places(const Dataset& data, const std::vector<std::string>& held_out,
+                                double held_out_share, std::uint64_t seed) {
+  const std::set<std::uint32_t> all(data.group.begin(), data.group.end());
+  std::set<std::uint32_t> held;
+  for (const auto& name : held_out) {
+    const std::size_t before = held.size();
+    for (const auto id : all)
+      if (place_name(data, id) == name) held.insert(id);
+    if (held.size() == before) return make_error(Errc::not_found, "no place named " + name + " to hold out");
+  }
+  if (held_out.empty() && held_out_share > 0) {
+    std::vector<std::uint32_t> order(all.begin(), all.end());
+    Random random{seed ^ 0x5EED5EEDULL};  // another draw than the folds'
+    random.shuffle(order);
+    const auto n =
+        static_cast<std::size_t>(std::ceil(held_out_share * static_cast<double>(order.size()) - 1e-9));
+    held.insert(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(std::min(n, order.size())));
+  }
+  PlaceSplit out;
+  for (std::size_t i = 0; i < data.rows(); ++i)
+    (held.contains(data.group[i]) ? out.test : out.train).push_back(i);
+  if (out.train.empty())
+    return make_error(Errc::too_few_observations, "every place is held out: nothing is left to train on");
+  return out;
+}
+
 Result<void> TrainingSpec::check() const {
   std::string faults;
   const auto fault = [&faults](const std::string& text) { faults += (faults.empty() ? "" : "; ") + text; };
@@ -192,7 +186,7 @@ Result<TrainingOutcome> train(const Dataset& data, const TrainingSpec& spec, std
   const Execution run{spec.threads, stop};
 
   reporter.enter("split");
-  BOOST_OUTCOME_TRY(const auto split, split_rows(data, spec));
+  BOOST_OUTCOME_TRY(const auto split, split_places(data, spec.held_out, spec.held_out_share, spec.seed));
   TrainingOutcome out;
   out.split = split_report(data, split.train, split.test);
   const Dataset train_set = data.subset(split.train);

@@ -91,6 +91,14 @@ struct TrainingOutcome {
   SplitReport split{};
 };
 
+/// Rows to train on and rows held out: whole places, by name or a share of them drawn by the seed.
+struct PlaceSplit {
+  std::vector<std::size_t> train{}, test{};
+};
+/// errors  not_found (a place), too_few_observations (nothing left to train on)
+Result<PlaceSplit> split_places(const Dataset& data, const std::vector<std::string>& held_out,
+                                double held_out_share, std::uint64_t seed);
+
 SplitReport split_report(const Dataset& data, const std::vector<std::size_t>& train,
                          const std::vector<std::size_t>& test);
 

@@ -61,8 +61,7 @@ SplitReport split_report(const Dataset& data, const std::vector<std::size_t>& tr
   count_side(data, test, out.test_rows, out.test_placements, out.test_places);
   std::set<std::uint32_t> places;
   for (const auto i : test) places.insert(data.group[i]);
-  for (const auto id : places)
-    out.test_place_names.push_back(id < data.group_names.size() ? data.group_names[id] : std::to_string(id));
+  for (const auto id : places) out.test_place_names.push_back(place_name(data, id));
   out.shared_placements = shared_placements(data);
   out.duplicate_rows = duplicate_rows(data);
   out.leak = out.shared_placements > 0 || out.duplicate_rows > 0;

@@ -1,11 +1,14 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <memory>
 #include <set>
 
+#include "api/imports/dataset_csv.hpp"
 #include "api/json/model_artifact.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"
@@ -15,13 +18,15 @@ namespace {
 
 struct TrainArguments {
   DataOptions data;
-  std::string task{"nlos_id"}, method{"auto"}, out{};
-  std::vector<std::string> features;
+  std::string task{"nlos_id"}, out{};
+  std::vector<std::string> methods{"auto"}, features;
   std::size_t folds{10};
   std::uint64_t seed{1};
   std::size_t per_placement{5};
-  double max_fpr{-1};
-  bool grid{false}, json{false};
+  double max_fpr{-1}, held_out_share{0};
+  std::vector<std::string> tries, held_out;
+  std::size_t threads{0};
+  bool grid{false}, importance{false}, selection{false}, json{false};
 };
 
 // Written beside and renamed, so that a run that dies leaves no half model.
@@ -51,45 +56,115 @@ void drop_outliers(ml::Dataset& data, const std::vector<std::size_t>& rows, cons
   data = data.subset(kept);
 }
 
+// "svm.c=1,10,100" into the grid.
+Result<void> read_try(const std::string& text, ml::Grid& grid) {
+  const auto dot = text.find('.'), equals = text.find('=');
+  const auto method = ml::method_of(text.substr(0, dot));
+  if (dot == std::string::npos || equals == std::string::npos || equals < dot || !method)
+    return make_error(Errc::invalid_argument, "--try is method.setting=value,value, not " + text);
+  auto& values = grid[*method][text.substr(dot + 1, equals - dot - 1)];
+  for (std::size_t at = equals + 1; at <= text.size();) {
+    const auto end = std::min(text.find(',', at), text.size());
+    char* stopped = nullptr;
+    const std::string one = text.substr(at, end - at);
+    values.push_back(std::strtod(one.c_str(), &stopped));
+    if (one.empty() || *stopped != 0)
+      return make_error(Errc::invalid_argument, "--try: no number in \"" + one + "\" of " + text);
+    at = end + 1;
+  }
+  return boost::outcome_v2::success();
+}
+
+struct Gathered {
+  ml::Dataset data;
+  api::RowReport report;
+  std::vector<std::string> held_out;  // a frozen data set's own test places
+};
+
+// A data set of `anchord dataset build` is taken as it is: nothing is computed or dropped again.
+Result<std::optional<Gathered>> gather_frozen(const TrainArguments& a) {
+  if (a.data.files.size() != 1) return std::optional<Gathered>{};
+  std::ifstream file(a.data.files.front(), std::ios::binary);
+  std::string text(64, '\0');
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (!file || !api::is_dataset_csv(text)) return std::optional<Gathered>{};
+  text.append(std::istreambuf_iterator<char>(file), {});
+  BOOST_OUTCOME_TRY(auto set, api::read_dataset_csv(text));
+  Gathered out;
+  out.report.files = a.data.files;
+  out.report.read = set.data.rows();
+  out.report.label = set.data.labelled() ? "los" : "";
+  out.report.truth = set.data.has_truth() ? "bias_m" : "";
+  out.report.group_by = "place", out.report.placement = "placement_id";
+  out.data = std::move(set.data);
+  out.held_out = std::move(set.test_places);
+  return std::optional{std::move(out)};
+}
+
+Result<Gathered> gather_table(const TrainArguments& a, ml::Task task) {
+  BOOST_OUTCOME_TRY(const auto table, read_data(a.data));
+  Gathered out;
+  out.report = row_report(a.data, table);
+  api::SetRequest request{
+      a.features, task == ml::Task::nlos_id || task == ml::Task::los_bias || task == ml::Task::nlos_bias,
+      task != ml::Task::nlos_id};
+  if (task != ml::Task::nlos_id && task != ml::Task::bias && !table.labelled()) request.need_label = false;
+  if (request.features.empty()) request.features = api::available_features(table, task == ml::Task::nlos_id);
+  std::vector<std::size_t> rows;
+  std::map<std::string, std::size_t> dropped;
+  auto data = api::dataset_from(table, request, rows, dropped);
+  if (!data) return make_error(data.error().code, a.data.files.front() + ": " + data.error().message);
+  add_dropped(out.report, dropped);
+  out.data = std::move(data).value();
+  drop_outliers(out.data, rows, table, out.report);
+  return out;
+}
+
+Result<Gathered> gather(const TrainArguments& a, ml::Task task) {
+  BOOST_OUTCOME_TRY(auto frozen, gather_frozen(a));
+  Gathered out;
+  if (frozen) {
+    out = std::move(*frozen);
+  } else {
+    BOOST_OUTCOME_TRY(out, gather_table(a, task));
+  }
+  if (out.data.labelled() && (task == ml::Task::los_bias || task == ml::Task::nlos_bias)) {
+    out.data = out.data.of_class(task == ml::Task::los_bias);
+    if (out.data.rows() == 0)
+      return make_error(Errc::too_few_observations,
+                        a.data.files.front() + ": no row of the class in column " + out.report.label);
+  }
+  out.report.used = out.data.rows();
+  return out;
+}
+
 int train(const TrainArguments& a) {
   const auto task = ml::task_of(a.task);
   if (!task) return refuse("train", "--task is nlos_id, los_bias, nlos_bias or bias, not " + a.task);
-  std::optional<ml::Method> method;
-  if (a.method != "auto") {
-    method = ml::method_of(a.method);
-    if (!method) return refuse("train", "unknown --method " + a.method);
+  std::vector<ml::Method> methods;
+  for (const auto& name : a.methods) {
+    if (name == "auto") continue;
+    const auto method = ml::method_of(name);
+    if (!method) return refuse("train", "unknown --method " + name);
+    methods.push_back(*method);
   }
-  const auto table = read_data(a.data);
-  if (!table) return refuse("train", table.error().message);
-  auto report = row_report(a.data, table.value());
+  const auto gathered = gather(a, *task);
+  if (!gathered) return refuse("train", gathered.error().message);
+  const auto& [data, report, frozen_test] = gathered.value();
 
-  api::SetRequest request{
-      a.features, *task == ml::Task::nlos_id || *task == ml::Task::los_bias || *task == ml::Task::nlos_bias,
-      *task != ml::Task::nlos_id};
-  if (*task != ml::Task::nlos_id && *task != ml::Task::bias && !table.value().labelled())
-    request.need_label = false;
-  if (request.features.empty())
-    request.features = api::available_features(table.value(), *task == ml::Task::nlos_id);
-  std::vector<std::size_t> rows;
-  std::map<std::string, std::size_t> dropped;
-  auto data = api::dataset_from(table.value(), request, rows, dropped);
-  if (!data) return refuse("train", a.data.files.front() + ": " + data.error().message);
-  add_dropped(report, dropped);
-  drop_outliers(data.value(), rows, table.value(), report);
-  if (data.value().labelled() && (*task == ml::Task::los_bias || *task == ml::Task::nlos_bias)) {
-    data = data.value().of_class(*task == ml::Task::los_bias);
-    if (data.value().rows() == 0)
-      return refuse("train",
-                    a.data.files.front() + ": no row of the class in column " + table.value().label_column);
+  ml::TrainingSpec spec;
+  spec.task = *task, spec.features = a.features, spec.folds = a.folds, spec.seed = a.seed;
+  spec.methods = methods;
+  spec.per_placement = a.per_placement, spec.search = a.grid, spec.threads = a.threads;
+  spec.held_out = a.held_out.empty() ? frozen_test : a.held_out;
+  spec.held_out_share = a.held_out_share;
+  spec.importance = a.importance, spec.selection = a.selection;
+  if (a.max_fpr >= 0) spec.max_fpr = a.max_fpr;
+  for (const auto& one : a.tries) {
+    const auto read = read_try(one, spec.grid);
+    if (!read) return refuse("train", read.error().message);
   }
-  report.used = data.value().rows();
-
-  ml::LearnOptions options;
-  options.task = *task, options.features = a.features, options.folds = a.folds, options.seed = a.seed;
-  options.per_placement = a.per_placement, options.search = a.grid, options.run.threads = 0;
-  if (method) options.methods = {*method};
-  if (a.max_fpr >= 0) options.max_fpr = a.max_fpr;
-  auto learned = ml::learn(data.value(), options);
+  auto learned = ml::train(data, spec);
   if (!learned) return refuse("train", a.data.files.front() + ": " + learned.error().message);
   auto& info = learned.value().model.info;
   info.feature_set = nlos::k_feature_set_version;
@@ -114,9 +189,11 @@ void add_train_command(CLI::App& app, int& exit_code) {
   add_data_options(*command, a->data);
   command->add_option("--task", a->task, "nlos_id, los_bias, nlos_bias or bias")->capture_default_str();
   command
-      ->add_option("--method", a->method,
-                   "auto, or one of logistic, random_forest, svm, boosted, average, constant, polynomial, "
-                   "multivariate, least_absolute")
+      ->add_option(
+          "--method", a->methods,
+          "auto, or several of logistic, random_forest, svm, boosted, average, tree_average, constant, "
+          "polynomial, multivariate, least_absolute: the best of them on held-out places")
+      ->delimiter(',')
       ->capture_default_str();
   command->add_option("--features", a->features, "Features by name (default: chosen with the method)")
       ->delimiter(',');
@@ -134,6 +211,17 @@ void add_train_command(CLI::App& app, int& exit_code) {
                    "Choose the threshold so that at most this share of held-out NLOS is called LOS")
       ->check(CLI::Range(0.0, 1.0));
   command->add_flag("--grid", a->grid, "Search the declared grid of settings as well");
+  command->add_option("--try", a->tries,
+                      "Values of one setting to search, as svm.c=1,10,100; repeat for more settings");
+  command->add_option("--hold-out", a->held_out, "Places no part of training sees: the final test")
+      ->delimiter(',');
+  command->add_option("--hold-out-share", a->held_out_share, "Or this share of the places, drawn by the seed")
+      ->check(CLI::Range(0.0, 0.9));
+  command->add_flag("--importance", a->importance, "Rank the features by out-of-bag permutation");
+  command->add_flag("--selection", a->selection, "Forward filter of the features in the order of importance");
+  command
+      ->add_option("--threads", a->threads, "Threads (default: all cores); the model does not depend on it")
+      ->check(CLI::Range(0, 1024));
   command->add_option("--out", a->out, "Model artifact to write")->required();
   command->add_flag("--json", a->json, "One JSON document on standard output");
   command->callback([a, &exit_code] { exit_code = train(*a); });

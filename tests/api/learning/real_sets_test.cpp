@@ -51,6 +51,7 @@ TEST_P(RealSet, HoldsItsFigureOnPlacesItHasNotSeen) {
   ml::LearnOptions how;
   how.task = c.task;
   how.folds = c.folds;
+  how.run.threads = 0;
   const auto learned = ml::learn(data.value(), how);
   ASSERT_TRUE(learned) << learned.error().message;
   const auto& l = learned.value();
@@ -86,8 +87,8 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"graz-rooms", "graz-rooms/rooms.csv.gz", {"room_to"}, 10, nlos_id, 0.860, 0.216, 0.855, 0.23},
         Case{"ghent-iiot", "ghent-iiot/iiot19.csv.gz", {"tag_pos"}, 10, nlos_id, 0.890, 0.071, 0.87, 0.08},
         Case{"warsaw-cir", "warsaw-cir/rangings.csv.gz", {"setup"}, 23, nlos_id, 0.885, 0.074, 0.88, 0.09},
-        Case{"ewine-features", "ewine-features/features.csv.gz", {}, 3, nlos_id, 0.913, 0.098, 0.905, 0.115},
-        Case{"bielefeld-mp", "bielefeld-mp/features.csv.gz", {}, 3, nlos_id, 0.930, 0.065, 0.915, 0.08},
+        Case{"ewine-features", "ewine-features/features.csv.gz", {}, 3, nlos_id, 0.913, 0.098, 0.913, 0.105},
+        Case{"bielefeld-mp", "bielefeld-mp/features.csv.gz", {}, 3, nlos_id, 0.930, 0.065, 0.922, 0.07},
         // The README's raw MAE of graz and ghent is of another sampling of rows; its plain figures are scaled
         // to ours.
         Case{"graz-rooms bias",
@@ -115,7 +116,7 @@ INSTANTIATE_TEST_SUITE_P(
              bias,
              0.65 * 0.216 / 0.510,
              0,
-             0.9,
+             0.5,
              0},
         Case{"outdoor-static LOS",
              "outdoor-static/static.csv.gz",

@@ -1,0 +1,106 @@
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <fstream>
+#include <memory>
+
+#include "api/imports/campaign.hpp"
+#include "api/imports/dataset_csv.hpp"
+#include "api/imports/gzip_lines.hpp"
+#include "server/cli/commands.hpp"
+#include "server/cli/learning_data.hpp"
+
+namespace anchord::cli {
+namespace {
+
+struct CampaignArguments {
+  std::string file, out, environment, material, site, format{"detect"}, label;
+  double distance_m{-1}, heading_deg{0}, height_m{0}, thickness_m{0};
+  bool has_heading{false}, has_height{false}, has_thickness{false}, keep_outliers{false};
+};
+
+Result<std::string> whole_text(const std::string& path) {
+  BOOST_OUTCOME_TRY(auto lines, api::GzipLines::open(path));
+  std::string out;
+  for (std::string_view line;;) {
+    BOOST_OUTCOME_TRY(const bool more, lines.next(line));
+    if (!more) return out;
+    out.append(line).push_back('\n');
+  }
+}
+
+api::CampaignOptions options_of(const CampaignArguments& a) {
+  api::CampaignOptions o;
+  o.format = a.format == "csv"      ? api::CampaignFormat::csv
+             : a.format == "ndjson" ? api::CampaignFormat::ndjson
+             : a.format == "txt"    ? api::CampaignFormat::txt
+                                    : api::CampaignFormat::detect;
+  o.filter = !a.keep_outliers;
+  o.defaults.name = a.site, o.defaults.environment = a.environment, o.defaults.material = a.material;
+  if (a.distance_m > 0) o.defaults.distance_m = a.distance_m;
+  if (a.has_heading) o.defaults.heading_deg = a.heading_deg;
+  if (a.has_height) o.defaults.height_m = a.height_m;
+  if (a.has_thickness) o.defaults.thickness_m = a.thickness_m;
+  if (!a.label.empty()) o.defaults.los = a.label == "LOS";
+  return o;
+}
+
+void print_report(const api::CampaignReport& r, std::FILE* to) {
+  std::fprintf(to, "%zu measurements, %zu kept, %zu sites\n", r.lines, r.kept, r.sites.size());
+  for (const auto& [reason, count] : r.dropped)
+    std::fprintf(to, "  dropped %zu: %s\n", count, reason.c_str());
+  for (const auto& e : r.errors) std::fprintf(to, "  line %zu: %s\n", e.line, e.detail.c_str());
+  for (const auto& s : r.sites)
+    std::fprintf(to, "  %-24s %6zu kept, %zu zero, %zu outliers, median %.3f m, sd %.3f m\n", s.name.c_str(),
+                 s.kept, s.zero, s.outliers, s.median_m, s.sd_m);
+}
+
+int import(const CampaignArguments& a) {
+  const auto text = whole_text(a.file);
+  if (!text) return refuse("campaign", text.error().message);
+  const auto read = api::import_campaign(text.value(), options_of(a));
+  if (!read) return refuse("campaign", a.file + ": " + read.error().message);
+  if (a.out.empty()) {
+    std::fputs(api::campaign_csv(read.value().campaign).c_str(), stdout);
+    print_report(read.value().report, stderr);
+    return 0;
+  }
+  std::ofstream file(a.out, std::ios::binary);
+  file << api::campaign_csv(read.value().campaign);
+  if (!file.flush()) {
+    std::fprintf(stderr, "anchord campaign: cannot write %s\n", a.out.c_str());
+    return 1;
+  }
+  print_report(read.value().report, stdout);
+  return 0;
+}
+
+}  // namespace
+
+void add_campaign_command(CLI::App& app, int& exit_code) {
+  auto* campaign = app.add_subcommand("campaign", "Measurement campaigns: ranges with ground truth");
+  campaign->require_subcommand(1);
+  auto a = std::make_shared<CampaignArguments>();
+  auto* command = campaign->add_subcommand(
+      "import",
+      "Read CSV, NDJSON or a .txt of one measurement a line, drop faults, write one CSV to train on");
+  command->add_option("file", a->file, "File, plain or gzipped")->required();
+  command->add_option("--out", a->out, "CSV to write (default: standard output)");
+  command->add_option("--format", a->format, "detect, csv, ndjson or txt")
+      ->check(CLI::IsMember({"detect", "csv", "ndjson", "txt"}));
+  command->add_option("--site", a->site, "Name of the site, for files that name none");
+  command->add_option("--environment", a->environment, "Hall, office: what no split may divide");
+  command->add_option("--material", a->material, "Of the obstacle");
+  command->add_option("--distance-m", a->distance_m, "True distance")->check(CLI::PositiveNumber);
+  auto* heading = command->add_option("--heading-deg", a->heading_deg, "Heading of the tag");
+  auto* height = command->add_option("--height-m", a->height_m, "Height difference of the antennas");
+  auto* thickness = command->add_option("--thickness-m", a->thickness_m, "Of the obstacle");
+  command->add_option("--label", a->label, "LOS or NLOS")->check(CLI::IsMember({"LOS", "NLOS"}));
+  command->add_flag("--keep-outliers", a->keep_outliers, "Drop zero ranges only");
+  command->callback([a, heading, height, thickness, &exit_code] {
+    a->has_heading = heading->count() > 0, a->has_height = height->count() > 0;
+    a->has_thickness = thickness->count() > 0;
+    exit_code = import(*a);
+  });
+}
+
+}  // namespace anchord::cli

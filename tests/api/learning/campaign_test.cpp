@@ -1,0 +1,102 @@
+#include "api/imports/campaign.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace anchord::api {
+
+TEST(Campaign, ReadsPlainTextOfOneMeasurementALine) {
+  const auto read = import_campaign(
+      "# true_distance_m = 4.5\n# los = 1\n# environment: hall A\n"
+      "1526300000123 4512 -79.25\n"
+      "timestamp: 1526300000223 ms, distance: 4498 mm, RSS: -80 dBm\n"
+      "1526300000323,0,-95\n");
+  ASSERT_TRUE(read) << read.error().message;
+  const auto& c = read.value().campaign;
+  ASSERT_EQ(c.measurements.size(), 2U);
+  EXPECT_NEAR(c.measurements[0].range_m, 4.512, 1e-12);
+  EXPECT_NEAR(*c.measurements[1].rx_dbm, -80, 1e-12);
+  EXPECT_NEAR(*c.measurements[0].t_s, 1526300000.123, 1e-6);
+  ASSERT_EQ(c.sites.size(), 1U);
+  EXPECT_EQ(c.sites[0].environment, "hall A");
+  EXPECT_NEAR(*c.sites[0].distance_m, 4.5, 1e-12);
+  EXPECT_EQ(c.sites[0].los, true);
+  EXPECT_EQ(read.value().report.dropped.at("zero range"), 1U);
+}
+
+TEST(Campaign, ReadsCsvAndNdjsonToTheSameCampaign) {
+  const auto csv = import_campaign(
+      "site,environment,material,distance_m,heading_deg,height_m,thickness_m,los,range_m,rx_dbm\n"
+      "s1,lab,,3,22.5,0.5,,1,3.05,-79\n"
+      "s2,lab,brick,3,0,0,0.12,0,3.61,-86\n");
+  const auto ndjson = import_campaign(
+      R"({"site":"s1","environment":"lab","distance_m":3,"heading_deg":22.5,"height_m":0.5,"los":true,"range_m":3.05,"rx_dbm":-79})"
+      "\n"
+      R"({"site":"s2","environment":"lab","material":"brick","distance_m":3,"heading_deg":0,"height_m":0,"thickness_m":0.12,"los":"NLOS","range_m":3.61,"rx_dbm":-86})"
+      "\n");
+  ASSERT_TRUE(csv) << csv.error().message;
+  ASSERT_TRUE(ndjson) << ndjson.error().message;
+  EXPECT_EQ(csv.value().report.format, CampaignFormat::csv);
+  EXPECT_EQ(ndjson.value().report.format, CampaignFormat::ndjson);
+  EXPECT_EQ(csv.value().campaign.sites, ndjson.value().campaign.sites);
+  EXPECT_EQ(campaign_csv(csv.value().campaign), campaign_csv(ndjson.value().campaign));
+  EXPECT_EQ(csv.value().campaign.sites[1].los, false);
+}
+
+TEST(Campaign, BadLinesNeverSinkGoodOnesAndAreNamed) {
+  const auto read =
+      import_campaign("range_m,true_range_m,los\n2.0,1.9,1\nabc,1.9,1\n2.0,1.9\n2.1,1.9,maybe\n2.2,1.9,1\n");
+  ASSERT_TRUE(read);
+  const auto& r = read.value().report;
+  EXPECT_EQ(r.lines, 5U);
+  EXPECT_EQ(r.kept, 2U);
+  EXPECT_EQ(r.dropped.at("unreadable line"), 3U);
+  ASSERT_EQ(r.errors.size(), 3U);
+  EXPECT_EQ(r.errors[0].line, 3U);
+  EXPECT_EQ(r.errors[1].line, 4U);
+  EXPECT_EQ(r.errors[2].line, 5U);
+}
+
+// Twenty ranges within 2 cm of 5 m, and one of 9 m: the median stays, the outlier goes and is reported.
+TEST(Campaign, DropsOutliersOfASiteByItsMedianAndSaysSo) {
+  std::string text = "site,range_m,true_range_m,los\n";
+  for (int i = 0; i < 20; ++i) text += "a," + std::to_string(5 + 0.001 * i) + ",5,1\n";
+  text += "a,9.0,5,1\nb,9.0,9,1\n";
+  const auto read = import_campaign(text);
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read.value().report.kept, 21U);
+  EXPECT_EQ(read.value().report.sites[0].outliers, 1U);
+  EXPECT_NEAR(read.value().report.sites[0].median_m, 5.0095, 1e-9);
+  CampaignOptions keep_all;
+  keep_all.filter = false;
+  EXPECT_EQ(import_campaign(text, keep_all).value().report.kept, 22U);
+}
+
+TEST(Campaign, WrittenAndReadAgainIsTheSameTable) {
+  std::string text = "site,environment,range_m,true_range_m,los,rx_dbm,fp_dbm\n";
+  for (int i = 0; i < 12; ++i)
+    text += "s" + std::to_string(i / 3) + ",room " + std::to_string(i / 6) + "," +
+            std::to_string(3 + 0.1 / (i + 1)) + ",3," + std::to_string(i % 2) + ",-80.125,-82.5\n";
+  const auto first = import_campaign(text);
+  ASSERT_TRUE(first);
+  const auto again = import_campaign(campaign_csv(first.value().campaign));
+  ASSERT_TRUE(again);
+  EXPECT_EQ(campaign_csv(first.value().campaign), campaign_csv(again.value().campaign));
+  const auto table = table_of(first.value().campaign);
+  EXPECT_EQ(table.rows(), 12U);
+  EXPECT_EQ(table.group_names.size(), 2U);
+  EXPECT_NEAR(*table.features[0].get(nlos::Feature::rx_minus_fp_db), 2.375, 1e-12);
+}
+
+TEST(Campaign, HostileTextEndsInAnErrorNotInACrash) {
+  EXPECT_EQ(import_campaign("").error().code, Errc::bad_frame);
+  EXPECT_EQ(import_campaign("\n\n# only = comments\n").error().code, Errc::bad_frame);
+  for (const char* text : {"range_m\nnan\ninf\n-1\n1e999\n", "{\"range_m\":[[[[1]]]]}\n{\n",
+                           "\xff\xfe 1 2 3\n", "# =\n# :\n1"}) {
+    const auto read = import_campaign(text);
+    EXPECT_TRUE(!read || read.value().report.kept <= 1U);
+  }
+}
+
+}  // namespace anchord::api
