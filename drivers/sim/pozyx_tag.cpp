@@ -202,9 +202,9 @@ void PozyxTag::answer_remote(PozyxDevice& other, Bytes message, double now_s) {
   Bytes answer;
   std::uint8_t events = event::func;
   switch (message[0]) {
-    case remote::read:  // 00 address count
-      if (message.size() >= 4)
-        answer = other.read(message[2], std::min<std::size_t>(message[3], k_tx_buffer));
+    case remote::read:  // address, count
+      if (message.size() >= 3)
+        answer = other.read(message[1], std::min<std::size_t>(message[2], k_tx_buffer));
       events |= event::rx_data;
       break;
     case remote::write:  // address, data
