@@ -2,6 +2,7 @@
 
 #include "drivers/device/driver.hpp"
 #include "drivers/gnss/rover.hpp"
+#include "drivers/pozyx/unit.hpp"
 
 // The one place that knows which kinds of devices there are, and the names of their options.
 
@@ -48,6 +49,7 @@ Result<std::unique_ptr<Driver>> make_driver(std::string_view kind, std::string_v
   const auto options = Json::parse(options_json.begin(), options_json.end(), nullptr, false);
   if (!options.is_object()) return bad("options", "must be a JSON object");
   if (kind == "gnss") return make_rover(options, output);
+  if (kind == "pozyx") return pozyx::make_unit(options_json, output);
   return make_error(Errc::invalid_argument, "kind: no driver for \"" + std::string(kind) + "\"");
 }
 
