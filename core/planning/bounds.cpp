@@ -37,7 +37,7 @@ bool crosses_edge(const Polygon& polygon, const Vector2d& from, const Vector2d& 
 }
 
 /// A polygon may be concave: both ends inside do not make the way between them inside. Cuts the way where it
-/// meets edges and asks for the middle of every piece.
+/// meets edges and asks for the middle of every piece. A way that begins outside may come in, once.
 bool way_stays_inside(const Polygon& polygon, const Vector2d& from, const Vector2d& to) {
   std::vector<double> cuts{0, 1};
   const Vector2d way = to - from;
@@ -50,9 +50,12 @@ bool way_stays_inside(const Polygon& polygon, const Vector2d& from, const Vector
     }
   });
   std::sort(cuts.begin(), cuts.end());
+  bool came_in = contains(polygon, from);
   for (std::size_t i = 1; i < cuts.size(); ++i) {
     if (cuts[i] - cuts[i - 1] < 1e-12) continue;
-    if (!contains(polygon, from + 0.5 * (cuts[i] + cuts[i - 1]) * way)) return false;
+    const bool inside = contains(polygon, from + 0.5 * (cuts[i] + cuts[i - 1]) * way);
+    if (came_in && !inside) return false;
+    came_in = came_in || inside;
   }
   return contains(polygon, to);
 }
@@ -156,7 +159,7 @@ std::optional<Refusal> refuse_point(const Bounds& bounds, const Eigen::Vector3d&
 std::optional<Refusal> refuse_path(const Bounds& bounds, const Eigen::Vector3d& from_m,
                                    const Eigen::Vector3d& to_m) {
   const Vector2d from = from_m.head<2>(), to = to_m.head<2>();
-  if (!bounds.fence.empty() && contains(bounds.fence, from) && !way_stays_inside(bounds.fence, from, to)) {
+  if (!bounds.fence.empty() && !way_stays_inside(bounds.fence, from, to)) {
     return Refusal::path_blocked;
   }
   for (const auto& area : bounds.no_fly) {

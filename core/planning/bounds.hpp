@@ -59,7 +59,7 @@ std::optional<Refusal> refuse_point(const Bounds& bounds, const Eigen::Vector3d&
 
 /// First rule the straight way breaks. Where the way starts is not judged (the aircraft is there already),
 /// only what it crosses or comes too near to; leaving a keep-out zone outwards is allowed, going deeper is
-/// not.
+/// not; from outside the fence it may come in, once.
 std::optional<Refusal> refuse_path(const Bounds& bounds, const Eigen::Vector3d& from_m,
                                    const Eigen::Vector3d& to_m);
 

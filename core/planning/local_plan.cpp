@@ -1,0 +1,233 @@
+#include "core/planning/local_plan.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include "core/geo/enu.hpp"
+#include "core/planning/design.hpp"
+
+namespace anchord::planning {
+namespace {
+
+std::string with_numbers(const char* format, double a, double b = 0) {
+  std::array<char, 160> out{};
+  std::snprintf(out.data(), out.size(), format, a, b);
+  return out.data();
+}
+
+FlightPlanOptions flight_options(const Plan& plan) {
+  FlightPlanOptions o;
+  o.keep_out_m = plan.settings.keep_out_m;
+  o.speed_mps = plan.settings.speed_mps;
+  o.dwell_s = plan.settings.dwell_s;
+  o.ranges_per_point = plan.settings.samples;
+  if (plan.settings.rule == "d_optimal") o.criterion = Criterion::d_optimal;
+  return o;
+}
+
+/// 2 m, mid-height and 4 m above the roof, as far as the band allows.
+std::vector<double> heights_of(const Plan& plan) {
+  const auto& s = plan.settings;
+  std::vector<double> out;
+  for (const double wanted : {2.0, plan.building_height_m / 2, plan.building_height_m + 4}) {
+    const double height = std::clamp(wanted, s.min_height_m, s.max_height_m);
+    if (std::none_of(out.begin(), out.end(), [&](double h) { return std::abs(h - height) < 0.5; })) {
+      out.push_back(height);
+    }
+  }
+  return out;
+}
+
+std::vector<Eigen::Vector3d> anchors_inside(const LocalPlan& plan, const FlightPlanOptions& options,
+                                            double height_m) {
+  std::vector<Eigen::Vector3d> out;
+  if (plan.outline.size() < 3) return out;
+  Eigen::Vector2d low = plan.outline[0], high = plan.outline[0];
+  for (const auto& c : plan.outline) low = low.cwiseMin(c), high = high.cwiseMax(c);
+  for (double up = std::min(2.5, height_m / 2); up < height_m; up += options.floor_m) {
+    for (double x = low.x() + 1; x < high.x(); x += options.anchor_spacing_m) {
+      for (double y = low.y() + 1; y < high.y(); y += options.anchor_spacing_m) {
+        if (contains(plan.outline, {x, y})) out.emplace_back(x, y, up);
+      }
+    }
+  }
+  while (out.size() > static_cast<std::size_t>(options.max_anchors)) {
+    std::vector<Eigen::Vector3d> half;
+    for (std::size_t i = 0; i < out.size(); i += 2) half.push_back(out[i]);
+    out = std::move(half);
+  }
+  return out;
+}
+
+void predict(const Plan& plan, const LocalPlan& local, PlanCheck& check) {
+  const auto options = flight_options(plan);
+  check.assumed_anchors_m = anchors_inside(local, options, plan.building_height_m);
+  if (check.assumed_anchors_m.empty() || check.n_measure == 0) {
+    check.assumed_anchors_m.clear();
+    return;
+  }
+  Design design(check.assumed_anchors_m, options);
+  for (std::size_t i = 0; i < local.waypoints_m.size(); ++i) {
+    if (plan.waypoints[i].measure) design.add(local.waypoints_m[i]);
+  }
+  check.predicted_sigma_m = design.sigmas_m();
+  check.rms_m = std::sqrt(design.mean_variance_m2());
+  check.worst_m = *std::max_element(check.predicted_sigma_m.begin(), check.predicted_sigma_m.end());
+}
+
+std::string point_text(Refusal refusal, const Plan& plan, std::size_t i) {
+  const auto& s = plan.settings;
+  const std::string who = "waypoint " + std::to_string(i + 1) + " ";
+  if (refusal == Refusal::too_low) {
+    return who + with_numbers("is %.1f m high, the band begins at %.1f m", plan.waypoints[i].height_m,
+                              s.min_height_m);
+  }
+  if (refusal == Refusal::too_high) {
+    return who + with_numbers("is %.1f m high, the band ends at %.1f m", plan.waypoints[i].height_m,
+                              s.max_height_m);
+  }
+  if (refusal == Refusal::outside_fence) return who + "lies outside the fence";
+  return who + with_numbers("is nearer than %.1f m to the building or a no-fly area", s.keep_out_m);
+}
+
+}  // namespace
+
+bool PlanCheck::flyable() const {
+  return std::none_of(issues.begin(), issues.end(),
+                      [](const PlanIssue& i) { return i.severity == Severity::error; });
+}
+
+Result<Wgs84> plan_origin(const Plan& plan) {
+  if (plan.origin) return *plan.origin;
+  GeoPolygon points = plan.outline;
+  if (points.empty()) {
+    for (const auto& w : plan.waypoints) points.push_back(w.at);
+  }
+  if (points.empty()) {
+    return make_error(Errc::invalid_argument,
+                      "the plan has no origin, no outline and no waypoint: nowhere to fly");
+  }
+  Wgs84 middle{};
+  for (const auto& p : points) {
+    middle.lon_deg += p.lon_deg / static_cast<double>(points.size());
+    middle.lat_deg += p.lat_deg / static_cast<double>(points.size());
+  }
+  return middle;
+}
+
+Result<LocalPlan> local_plan(const Plan& plan) {
+  BOOST_OUTCOME_TRY(const auto origin, plan_origin(plan));
+  LocalPlan out;
+  out.origin = origin;
+  const EnuFrame frame(origin);
+  const auto metres = [&](const LonLat& p) -> Eigen::Vector2d {
+    return frame.enu_from_wgs84({p.lat_deg, p.lon_deg, origin.height_m}).m.head<2>();
+  };
+  const auto area = [&](const GeoPolygon& polygon) {
+    Polygon local;
+    for (const auto& corner : polygon) local.push_back(metres(corner));
+    return local;
+  };
+  out.outline = area(plan.outline);
+  out.fence = area(plan.fence);
+  for (const auto& polygon : plan.no_fly) out.no_fly.push_back(area(polygon));
+  for (const auto& w : plan.waypoints) {
+    const auto at = metres(w.at);
+    out.waypoints_m.emplace_back(at.x(), at.y(), w.height_m);
+  }
+  return out;
+}
+
+Bounds flight_bounds(const LocalPlan& plan, const PlanSettings& settings) {
+  Bounds bounds;
+  bounds.fence = plan.fence;
+  bounds.no_fly = plan.no_fly;
+  if (plan.outline.size() >= 3) bounds.no_fly.push_back(plan.outline);
+  // Straight ways between points of a ring cut its arcs: plan_flight() allows 20 cm, and 1 cm is rounding.
+  bounds.keep_out_m = std::max(0.0, settings.keep_out_m - 0.21);
+  bounds.min_height_m = settings.min_height_m;
+  bounds.max_height_m = settings.max_height_m;
+  return bounds;
+}
+
+Result<PlanCheck> check_plan(const Plan& plan) {
+  BOOST_OUTCOME_TRY(const auto local, local_plan(plan));
+  const Bounds bounds = flight_bounds(local, plan.settings);
+  PlanCheck check;
+  const auto report = [&](Severity severity, std::string code, std::string pointer, std::string text) {
+    check.issues.push_back({severity, std::move(code), std::move(pointer), std::move(text)});
+  };
+  if (plan.waypoints.empty()) report(Severity::error, "no_waypoints", "/waypoints", "there is no waypoint");
+  if (local.fence.empty()) {
+    report(Severity::warning, "no_fence", "/fence",
+           "no fence is drawn: only the height band and the no-fly areas bound the flight");
+  }
+  if (local.outline.empty()) {
+    report(Severity::warning, "no_outline", "/outline",
+           "no outline is drawn: nothing keeps the aircraft off the building");
+  }
+  for (std::size_t i = 0; i < local.waypoints_m.size(); ++i) {
+    const std::string pointer = "/waypoints/" + std::to_string(i);
+    const auto& point = local.waypoints_m[i];
+    if (const auto refusal = refuse_point(bounds, point)) {
+      report(Severity::error, std::string(to_string(*refusal)), pointer, point_text(*refusal, plan, i));
+    }
+    if (plan.waypoints[i].measure) {
+      ++check.n_measure;
+      check.duration_s += plan.waypoints[i].dwell_s.value_or(plan.settings.dwell_s);
+    }
+    if (i == 0) continue;
+    const auto& before = local.waypoints_m[i - 1];
+    check.length_m += (point - before).norm();
+    if (!refuse_point(bounds, before) && !refuse_point(bounds, point) && refuse_path(bounds, before, point)) {
+      report(Severity::error, "path_blocked", pointer,
+             "the straight way from waypoint " + std::to_string(i) + " to " + std::to_string(i + 1) +
+                 " crosses the building, a no-fly area or the fence");
+    }
+  }
+  check.duration_s += check.length_m / plan.settings.speed_mps;
+  const auto& limit = plan.settings.max_flight_s;
+  if (limit && check.duration_s > *limit) {
+    report(Severity::error, "too_long", "/settings/max_flight_s",
+           with_numbers("the flight takes %.0f s, the limit is %.0f s", check.duration_s, *limit));
+  }
+  if (check.n_measure > 0 && check.n_measure < 4) {
+    report(Severity::warning, "few_points", "/waypoints",
+           with_numbers("%.0f measuring points: four that are not in one plane are the least for a position",
+                        static_cast<double>(check.n_measure)));
+  }
+  predict(plan, local, check);
+  return check;
+}
+
+Result<Plan> generate_waypoints(const Plan& plan) {
+  if (plan.outline.size() < 3) {
+    return make_error(Errc::invalid_argument,
+                      "waypoints are made from the building's outline, and the plan has none");
+  }
+  BOOST_OUTCOME_TRY(const auto local, local_plan(plan));
+  FlightPlanInput input{local.outline, plan.building_height_m, local.no_fly, local.fence};
+  auto options = flight_options(plan);
+  options.heights_m = heights_of(plan);
+  BOOST_OUTCOME_TRY(const auto flight, plan_flight(input, options));
+  Plan out = plan;
+  out.waypoints.clear();
+  const EnuFrame frame(local.origin);
+  for (const auto& w : flight.waypoints) {
+    const auto at = frame.wgs84_from_enu(Enu{{w.point_m.x(), w.point_m.y(), 0}});
+    PlanWaypoint waypoint;
+    waypoint.at = {at.lon_deg, at.lat_deg};
+    waypoint.height_m = w.point_m.z();
+    waypoint.heading_deg = std::fmod(w.heading_rad * 180 / std::numbers::pi + 360, 360);
+    waypoint.measure = w.measure;
+    waypoint.turn = w.measure && plan.settings.turn;
+    waypoint.height_search = w.measure && plan.settings.height_search;
+    out.waypoints.push_back(waypoint);
+  }
+  return out;
+}
+
+}  // namespace anchord::planning

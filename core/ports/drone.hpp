@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/types/position.hpp"
+
+namespace anchord {
+
+/// What became of a command to the aircraft.
+enum class CommandState : std::uint8_t {
+  sent,
+  accepted,     ///< acknowledged, or seen to be done
+  refused,      ///< by the autopilot, with its reason
+  unconfirmed,  ///< neither within 2 s: an alarm; never repeated by itself after that
+};
+
+struct CommandReport {
+  std::uint64_t number{};
+  std::string what;  ///< take_off, go_to, hold, return_home, land
+  CommandState state{};
+  std::string text;
+};
+
+/// How the aircraft is, as its autopilot tells. Ages in seconds.
+struct DroneStatus {
+  bool connected{false};  ///< heard within the last 3 s
+  double silent_s{};
+  std::string autopilot;  ///< "ArduPilot", "PX4" or empty
+  std::string mode;       ///< word of the autopilot's mode
+  bool armed{false}, in_air{false}, failsafe{false};
+  bool taken_over{
+      false};  ///< somebody else changed the mode: no target is sent until the operator starts anew
+  std::optional<Wgs84> position{};     ///< height_m above the ellipsoid where known, else above sea level
+  std::optional<double> relative_m{};  ///< above home
+  std::optional<double> heading_deg{}, speed_mps{}, battery{};
+  std::optional<Wgs84> home{};
+  int gps_fix{};     ///< MAVLink's number: 5 RTK float, 6 RTK fixed
+  std::string text;  ///< newest warning of the autopilot
+};
+
+/// What the procedure may ask of an aircraft. Calls return at once with the number of the command; its fate
+/// comes through reports(). Heights above home.
+class Drone {
+ public:
+  virtual ~Drone() = default;
+  virtual std::uint64_t take_off(double height_m) = 0;
+  virtual std::uint64_t go_to(double lat_deg, double lon_deg, double height_m,
+                              std::optional<double> heading_deg) = 0;
+  virtual std::uint64_t hold() = 0;
+  virtual std::uint64_t return_home() = 0;
+  virtual std::uint64_t land() = 0;
+  virtual DroneStatus status() const = 0;
+  virtual std::vector<CommandReport> take_reports() = 0;
+};
+
+}  // namespace anchord

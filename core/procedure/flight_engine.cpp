@@ -1,0 +1,427 @@
+#include "core/procedure/flight_engine.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/planning/local_plan.hpp"
+#include "core/planning/route.hpp"
+#include "core/procedure/why_not_done.hpp"
+
+namespace anchord::procedure {
+namespace {
+
+constexpr double k_listen_s = 1.0;   ///< least stay in a search, so that every anchor had its turn
+constexpr double k_connect_s = 1.0;  ///< least look at the connections of a point
+constexpr double k_settle_s = 0.5;   ///< at rest this long counts as arrived
+constexpr int k_heard = 3;           ///< ranges that make an anchor heard
+constexpr double k_degree = std::numbers::pi / 180;
+
+double apart(double a, double b) { return std::abs(std::remainder(a - b, 2 * std::numbers::pi)); }
+
+bool in_flight(Step step) { return step != Step::ready && step != Step::done; }
+
+}  // namespace
+
+Result<FlightSetup> flight_setup(const Plan& plan, const Eigen::Vector3d& home_m) {
+  BOOST_OUTCOME_TRY(const auto local, planning::local_plan(plan));
+  const PlanSettings& s = plan.settings;
+  FlightSetup out;
+  out.origin = local.origin;
+  out.expected = plan.expected_anchors;
+  out.samples = s.samples;
+  const auto& corners = local.outline.empty() ? local.fence : local.outline;
+  for (const auto& corner : corners) {
+    out.middle_m.head<2>() += corner / static_cast<double>(corners.size());
+  }
+  out.middle_m.z() = plan.building_height_m / 2;
+  for (std::size_t i = 0; i < plan.waypoints.size(); ++i) {
+    const auto& w = plan.waypoints[i];
+    const Eigen::Vector2d look = (out.middle_m - local.waypoints_m[i]).head<2>();
+    out.settings.waypoints.push_back(
+        {local.waypoints_m[i], w.heading_deg ? *w.heading_deg * k_degree : std::atan2(look.x(), look.y()),
+         w.measure, w.turn, w.height_search, w.dwell_s.value_or(s.dwell_s)});
+  }
+  out.settings.k = s.k;
+  out.settings.ranging_s = s.dwell_s + 2;
+  out.settings.min_height_m = s.min_height_m;
+  out.settings.max_height_m = s.max_height_m;
+  out.settings.take_off_m = std::clamp(4.0, s.min_height_m, s.max_height_m);
+  BOOST_OUTCOME_TRY(out.settings.check());
+  out.limits.bounds = planning::flight_bounds(local, s);
+  out.limits.home_m = home_m;
+  out.limits.speed_mps = s.speed_mps;
+  out.limits.min_battery = s.min_battery;
+  out.exit.min_iterations = s.min_iterations;
+  out.exit.max_iterations = s.max_iterations;
+  out.exit.target_sigma_m = s.target_sigma_m;
+  out.exit.gdop_root = s.target_gdop;
+  out.exit.max_s = s.max_flight_s;
+  out.exit.min_battery = s.min_battery;
+  auto& p = out.planner;
+  p.rule = s.rule == "dissertation" ? planning::Rule::dissertation
+           : s.rule == "d_optimal"  ? planning::Rule::d_optimal
+                                    : planning::Rule::a_optimal;
+  p.combine = s.combine == "worst"  ? planning::Combine::worst
+              : s.combine == "mean" ? planning::Combine::mean
+                                    : planning::Combine::weighted;
+  p.grid = {s.grid_step_m, s.grid_step_up_m, s.grid_reach, s.grid_reach_up};
+  p.bias_column = p.rule != planning::Rule::dissertation;
+  p.flight_time_cost = p.rule != planning::Rule::dissertation;
+  p.speed_mps = s.speed_mps;
+  p.dwell_s = s.dwell_s;
+  return out;
+}
+
+FlightEngine::FlightEngine(FlightSetup setup) : setup_(std::move(setup)) {}
+
+FlightEngine::FlightEngine(FlightSetup setup, const State& stored, double now_s) : setup_(std::move(setup)) {
+  state_ = stored;
+  started_s_ = now_s;
+  apply(now_s, resume_after_restart(stored, now_s));
+}
+
+std::optional<Eigen::Vector3d> FlightEngine::position_m() const {
+  return fix_m_ ? fix_m_ : vehicle_.position_m;
+}
+double FlightEngine::elapsed_s() const { return started_s_ ? state_.since_s - *started_s_ : 0; }
+
+std::vector<Command> FlightEngine::take_orders() { return std::exchange(orders_, {}); }
+std::vector<Happening> FlightEngine::take_happenings() { return std::exchange(happenings_, {}); }
+
+void FlightEngine::tell(double now_s, std::string level, std::string code, std::string text) {
+  happenings_.push_back({now_s, std::move(level), std::move(code), std::move(text)});
+}
+
+void FlightEngine::fix(double now_s, const Eigen::Vector3d& enu_m, FixClass fix) {
+  fix_ = fix;
+  if (fix >= FixClass::rtk_float) good_fix_s_ = now_s;
+  if (fix == FixClass::none) return;
+  fix_m_ = enu_m;
+  fix_s_ = now_s;
+}
+
+void FlightEngine::range(double now_s, NetworkId anchor, bool used) {
+  if (!used || !in_flight(state_.step)) return;
+  if (note_range(state_, anchor))
+    tell(now_s, "info", "anchor.found", "anchor " + to_string(anchor) + " heard first");
+}
+
+void FlightEngine::vehicle(double now_s, const VehicleView& view) {
+  vehicle_ = view;
+  vehicle_s_ = now_s;
+}
+
+bool FlightEngine::command(double now_s, Event event, const std::string& who) {
+  if (event == Event::start) started_s_ = now_s;
+  return feed(now_s, event, who.empty() ? std::string{} : "by " + who);
+}
+
+bool FlightEngine::feed(double now_s, Event event, std::string text, std::optional<Eigen::Vector3d> point,
+                        std::optional<double> heading) {
+  const auto step = advance(setup_.settings, state_, {event, now_s, point, heading, std::move(text)});
+  if (step.transition == nullptr) return false;
+  apply(now_s, step);
+  return true;
+}
+
+void FlightEngine::apply(double now_s, const Advance& step) {
+  const bool measured = step.state.visited.size() > state_.visited.size();
+  state_ = step.state;
+  if (measured) {
+    for (const auto& a : state_.anchors) {
+      if (a.samples_here > 0) measured_at_[a.id].push_back(state_.visited.back());
+    }
+  }
+  legs_.clear();
+  settled_s_.reset();
+  pending_.reset();
+  tell(now_s, "info", "procedure." + std::string(to_string(state_.step)), state_.reason);
+  for (const auto& c : step.commands) execute(now_s, c);
+}
+
+void FlightEngine::execute(double now_s, const Command& c) {
+  switch (c.kind) {
+    case Command::Kind::take_off:
+      if (const auto refused = refuse_command(setup_.limits, position_m(), c)) {
+        tell(now_s, "critical", "cmd.refused", refused->text);
+        pending_ = Event::land;
+        pending_text_ = refused->text;
+      } else {
+        order(c);
+      }
+      return;
+    case Command::Kind::go_to:
+      return fly(now_s, c.point_m, c.heading_rad, false);
+    case Command::Kind::return_home: {
+      Eigen::Vector3d above = setup_.limits.home_m;
+      above.z() = std::max({above.z(), setup_.settings.take_off_m, setup_.settings.min_height_m});
+      return fly(now_s, above, std::nullopt, true);
+    }
+    case Command::Kind::hold:
+    case Command::Kind::land:
+      return order(c);
+    case Command::Kind::measure:
+    case Command::Kind::decide:
+      return;  // the engine's own work, seen by the step
+  }
+}
+
+/// Lays out the legs. The way home without a legal route, or without a position, is the autopilot's own
+/// return.
+void FlightEngine::fly(double now_s, const Eigen::Vector3d& to_m, std::optional<double> heading, bool home) {
+  const auto from = position_m();
+  const bool lost = alarm_ && (alarm_->id == "rtk.lost" || alarm_->id == "drone.link");
+  const auto way =
+      from && !(home && lost) ? planning::route(setup_.limits.bounds, *from, to_m) : std::nullopt;
+  if (!way && home) return order({Command::Kind::return_home, {0, 0, 0}, std::nullopt});
+  if (!way) {
+    tell(now_s, "warning", "point.unreachable", "no legal way to the target");
+    pending_ = Event::unreachable;
+    pending_text_ = "no legal way";
+    return;
+  }
+  legs_.assign(way->begin(), way->end());
+  if (!home) state_.heading_rad = heading ? heading : state_.heading_rad;
+  next_leg(now_s);
+}
+
+void FlightEngine::next_leg(double now_s) {
+  settled_s_.reset();
+  const Command c{Command::Kind::go_to, legs_.front(),
+                  state_.step == Step::return_home ? std::nullopt : state_.heading_rad};
+  if (const auto refused = refuse_command(setup_.limits, position_m(), c)) {
+    tell(now_s, "warning", "point.unreachable", refused->text);
+    legs_.clear();
+    pending_ = Event::unreachable;
+    pending_text_ = refused->text;
+    return;
+  }
+  order(c);
+}
+
+void FlightEngine::look_out(double now_s) {
+  Situation now;
+  now.position_m = position_m();
+  const auto age = [&](const std::optional<double>& t) {
+    return t ? now_s - *t : now_s - started_s_.value_or(now_s);
+  };
+  now.position_age_s = fix_m_ ? age(fix_s_) : age(vehicle_s_);
+  now.autopilot_m = vehicle_.position_m;
+  now.fix = fix_;
+  now.since_good_fix_s = age(good_fix_s_);
+  now.autopilot_silent_s = age(vehicle_s_);
+  now.battery = vehicle_.battery;
+  now.flying = in_flight(state_.step) && (vehicle_.in_air || state_.step != Step::take_off);
+  const auto alarm = watch(setup_.limits, now);
+  if (alarm && (!alarm_ || alarm_->id != alarm->id || alarm_->reaction < alarm->reaction)) {
+    tell(now_s, "critical", alarm->id, alarm->text);
+    alarm_ = alarm;
+    const auto step = state_.step;
+    if (alarm->reaction == Reaction::land && step != Step::landing) {
+      feed(now_s, Event::land, alarm->text);
+    } else if (alarm->reaction == Reaction::return_home && step != Step::landing &&
+               step != Step::return_home) {
+      feed(now_s, Event::return_home, alarm->text);
+    } else if (alarm->reaction == Reaction::hold && step != Step::landing && step != Step::hold &&
+               step != Step::return_home) {
+      feed(now_s, Event::hold, alarm->text);
+    }
+    return;
+  }
+  if (!alarm && alarm_) tell(now_s, "info", alarm_->id + ".cleared", "no longer");
+  alarm_ = alarm;
+}
+
+void FlightEngine::look_for_arrival(double now_s) {
+  if (legs_.empty()) return;
+  const auto at = position_m();
+  if (!at) return;
+  const bool last = legs_.size() == 1;
+  const bool near = (*at - legs_.front()).norm() <= (last ? setup_.arrive_m : 2 * setup_.arrive_m);
+  const bool turned = !last || !state_.heading_rad || !vehicle_.heading_rad ||
+                      state_.step == Step::return_home ||
+                      apart(*state_.heading_rad, *vehicle_.heading_rad) <= setup_.arrive_rad;
+  const bool still = !last || vehicle_.speed_mps <= setup_.arrive_mps;
+  if (!near || !turned || !still) {
+    settled_s_.reset();
+    return;
+  }
+  if (!settled_s_) settled_s_ = now_s;
+  if (last && now_s - *settled_s_ < k_settle_s) return;
+  legs_.pop_front();
+  if (legs_.empty())
+    feed(now_s, Event::arrived);
+  else
+    next_leg(now_s);
+}
+
+void FlightEngine::work(double now_s, std::span<const Estimate> estimates) {
+  const double here_s = now_s - state_.since_s;
+  const auto heard = [&](int n) {
+    return std::any_of(state_.anchors.begin(), state_.anchors.end(),
+                       [n](const AnchorTask& a) { return !a.done && a.samples_here >= n; });
+  };
+  switch (state_.step) {
+    case Step::take_off: {
+      const auto at = vehicle_.position_m ? vehicle_.position_m : fix_m_;
+      if (vehicle_.in_air && at && at->z() >= 0.9 * setup_.settings.take_off_m) feed(now_s, Event::airborne);
+      return;
+    }
+    case Step::search_anchors: {
+      const auto& waypoint = setup_.settings.waypoints.at(state_.waypoint);
+      if (state_.steps == 0 && !waypoint.measure) {
+        feed(now_s, Event::done_here, "a point on the way only");
+      } else if (here_s >= k_listen_s && heard(k_heard)) {
+        feed(now_s, Event::heard);
+      } else if (here_s >= 2 * k_listen_s &&
+                 std::any_of(state_.anchors.begin(), state_.anchors.end(),
+                             [](const AnchorTask& a) { return a.samples_here >= k_heard; })) {
+        feed(now_s, Event::done_here, "only anchors that are done answer here");
+      }
+      return;
+    }
+    case Step::check_connections:
+      if (here_s >= k_connect_s && heard(1) && (fix_ >= FixClass::rtk_float)) feed(now_s, Event::connected);
+      return;
+    case Step::ranging: {
+      const double dwell_s = setup_.settings.waypoints.at(state_.waypoint).dwell_s;
+      const bool enough = std::all_of(state_.anchors.begin(), state_.anchors.end(), [&](const AnchorTask& a) {
+        return a.done || a.samples_here == 0 || a.samples_here >= setup_.samples;
+      });
+      if (here_s >= dwell_s && enough && heard(1)) feed(now_s, Event::sampled);
+      return;
+    }
+    case Step::find_next_point:
+      decide(now_s, estimates);
+      return;
+    case Step::return_home:
+    case Step::landing:
+      if (vehicle_s_ && !vehicle_.in_air && !vehicle_.armed) feed(now_s, Event::landed);
+      return;
+    case Step::ready:
+    case Step::go_to_waypoint:
+    case Step::move_around:
+    case Step::step_to_waypoint:
+    case Step::turn:
+    case Step::height_search:
+    case Step::go_to_point:
+    case Step::go_back:
+    case Step::hold:
+    case Step::done:
+      return;
+  }
+}
+
+void FlightEngine::judge_anchors(double now_s, std::span<const Estimate> estimates) {
+  for (auto& task : state_.anchors) {
+    if (task.done) continue;
+    const auto it = std::find_if(estimates.begin(), estimates.end(),
+                                 [&](const Estimate& e) { return e.anchor == task.id; });
+    const auto estimate = it == estimates.end() ? std::nullopt : std::optional(*it);
+    Progress progress;
+    progress.iterations = task.iterations;
+    progress.battery = vehicle_.battery;
+    progress.elapsed_s = now_s - started_s_.value_or(now_s);
+    if (estimate && estimate->verdict == Verdict::ok) {
+      progress.sigma_m = position_sigma_m(*estimate);
+      progress.gdop_root = estimate->gdop;
+    }
+    if (const auto exit = exit_of(setup_.exit, progress)) {
+      task.done = true;
+      task.why = exit->reason;
+      tell(now_s, exit->reached ? "info" : "warning", "anchor.done",
+           to_string(task.id) + ": " + exit->reason);
+    } else {
+      task.why = why_not_done(estimate, measured_at_[task.id], setup_.exit);
+    }
+  }
+}
+
+void FlightEngine::decide(double now_s, std::span<const Estimate> estimates) {
+  judge_anchors(now_s, estimates);
+  const auto finish = [&](Event event, std::string why) {
+    if (decision_) decision_->outcome = std::string(to_string(event)) + ": " + why;
+    feed(now_s, event, std::move(why));
+  };
+  const auto is_done = [&](NetworkId id) {
+    return std::any_of(state_.anchors.begin(), state_.anchors.end(),
+                       [&](const AnchorTask& a) { return a.id == id && a.done; });
+  };
+  if (!setup_.expected.empty() && std::all_of(setup_.expected.begin(), setup_.expected.end(), is_done)) {
+    state_.waypoint = setup_.settings.waypoints.size() - 1;
+    return finish(Event::done_here, "every expected anchor is done");
+  }
+  planning::NextPointInput input;
+  input.visited = state_.visited;
+  input.current = state_.target_m;
+  input.unreachable = state_.unreachable;
+  input.bounds = setup_.limits.bounds;
+  for (const auto& task : state_.anchors) {
+    if (task.done) continue;
+    planning::PlannedAnchor anchor;
+    anchor.name = to_string(task.id);
+    anchor.weight = weight_of(task);
+    if (setup_.exit.target_sigma_m) anchor.target_m = *setup_.exit.target_sigma_m;
+    const auto it = std::find_if(estimates.begin(), estimates.end(),
+                                 [&](const Estimate& e) { return e.anchor == task.id && e.best; });
+    if (it == estimates.end()) {
+      anchor.places = {{setup_.middle_m, 1}};
+      const auto& seen = measured_at_[task.id];
+      for (std::size_t i = 0; i < input.visited.size(); ++i) {
+        if (std::find(seen.begin(), seen.end(), input.visited[i]) != seen.end())
+          anchor.measured_at.push_back(i);
+      }
+    } else {
+      anchor.places = {{it->best->position.m, it->best->probability}};
+      if (it->mirror)
+        anchor.places.push_back({it->mirror->position.m, std::max(1e-3, it->mirror->probability)});
+      anchor.covariance_m2 = it->best->covariance_m2;
+    }
+    input.anchors.push_back(std::move(anchor));
+  }
+  if (input.anchors.empty()) return finish(Event::done_here, "every anchor heard so far is done");
+  auto decided = planning::next_point(input, setup_.planner);
+  if (!decided) return finish(Event::no_point, decided.error().message);
+  const double before = decided.value().value_before;
+  if (decision_ && decision_->predicted && std::isfinite(before)) decision_->reached = before;
+  DecisionRecord record;
+  record.time_s = now_s;
+  record.decision = std::move(decided).value();
+  const auto chosen = record.decision.chosen;
+  if (chosen) record.predicted = record.decision.candidates[*chosen].value;
+  decision_ = std::move(record);
+  if (!chosen) return finish(Event::no_point, decision_->decision.reason);
+  if (state_.points > setup_.settings.points_per_waypoint) {
+    return finish(Event::done_here, std::to_string(state_.points) + " points measured at this waypoint");
+  }
+  const auto& best = decision_->decision.candidates[*chosen];
+  // Logarithms have no shares: for d_optimal a step of the log volume counts as the share.
+  const double gain = setup_.planner.rule == planning::Rule::d_optimal ? before - best.value
+                      : std::isfinite(before)                          ? (before - best.value) / before
+                                                                       : 1;
+  if (gain < setup_.min_gain) {
+    return finish(Event::done_here,
+                  "the best point would bring " + std::to_string(std::lround(100 * gain)) + " %");
+  }
+  const Eigen::Vector2d look = (setup_.middle_m - best.point_m).head<2>();
+  decision_->outcome = "point: " + decision_->decision.reason;
+  feed(now_s, Event::point, decision_->decision.reason, best.point_m, std::atan2(look.x(), look.y()));
+}
+
+void FlightEngine::tick(double now_s, std::span<const Estimate> estimates) {
+  if (!in_flight(state_.step)) return;
+  look_out(now_s);
+  if (pending_) {
+    const auto event = *std::exchange(pending_, std::nullopt);
+    if (feed(now_s, event, std::exchange(pending_text_, {}))) return;
+  }
+  look_for_arrival(now_s);
+  work(now_s, estimates);
+  if (state_.deadline_s > 0 && now_s >= state_.deadline_s) {
+    if (state_.step == Step::ranging || state_.step == Step::search_anchors) judge_anchors(now_s, estimates);
+    feed(now_s, Event::timeout);
+  }
+}
+
+}  // namespace anchord::procedure

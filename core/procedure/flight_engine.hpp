@@ -1,0 +1,127 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <deque>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/planning/next_point.hpp"
+#include "core/procedure/exit_rule.hpp"
+#include "core/procedure/machine.hpp"
+#include "core/procedure/safety.hpp"
+#include "core/types/estimate.hpp"
+#include "core/types/fix.hpp"
+#include "core/types/plan.hpp"
+
+namespace anchord::procedure {
+
+/// Everything a flight is flown by. Metres of the plan's origin.
+struct FlightSetup {
+  Settings settings;
+  SafetyLimits limits;
+  ExitRule exit;
+  planning::NextPointOptions planner;
+  Wgs84 origin{};
+  Eigen::Vector3d middle_m{
+      0, 0, 0};  ///< of the building: where an anchor is thought to be before anything is known
+  std::vector<NetworkId> expected;  ///< when every one of them is done, the flight is over
+  int samples = 20;                 ///< ranges wanted of each anchor at a point
+  double min_gain = 0.1;            ///< share of the value; a point that brings less is not flown to
+  double arrive_m = 0.5, arrive_rad = 0.25, arrive_mps = 0.4;
+};
+
+/// errors  invalid_argument: no waypoint, plan nowhere, settings
+Result<FlightSetup> flight_setup(const Plan& plan, const Eigen::Vector3d& home_m);
+
+/// What the autopilot says of itself.
+struct VehicleView {
+  std::optional<Eigen::Vector3d> position_m{};
+  std::optional<double> heading_rad{};
+  double speed_mps{};
+  bool armed{false}, in_air{false};
+  std::optional<double> battery{};
+};
+
+/// One decision and what became of it.
+struct DecisionRecord {
+  double time_s{};
+  planning::Decision decision;
+  std::optional<double> predicted{};  ///< value of the chosen point
+  std::optional<double> reached{};    ///< value when the next decision was made
+  std::string outcome;                ///< point, no_point or done_here, with its reason
+};
+
+struct Happening {
+  double time_s{};
+  std::string level;  ///< info, warning, critical
+  std::string code;
+  std::string text;
+};
+
+/// Runs one flight: machine, guard, watch, planner and route together. Driven by calls alone: no clock, no
+/// thread, no aircraft. Not thread-safe.
+///
+/// Every command passes refuse_command() twice: when it is laid out and again, from where the aircraft then
+/// is, when it leaves.
+class FlightEngine {
+ public:
+  explicit FlightEngine(FlightSetup setup);
+  /// Goes on from a stored state: the first order is to hold.
+  FlightEngine(FlightSetup setup, const State& stored, double now_s);
+
+  void fix(double now_s, const Eigen::Vector3d& enu_m, FixClass fix);
+  void range(double now_s, NetworkId anchor, bool used);
+  void vehicle(double now_s, const VehicleView& view);
+  /// What the operator wants: start, hold, resume, skip, return_home, land. False: means nothing in this
+  /// step.
+  bool command(double now_s, Event event, const std::string& who);
+  /// At least twice a second. The estimates are looked at when a decision is due.
+  void tick(double now_s, std::span<const Estimate> estimates);
+
+  std::vector<Command> take_orders();
+  std::vector<Happening> take_happenings();
+
+  const State& state() const { return state_; }
+  const FlightSetup& setup() const { return setup_; }
+  const std::optional<Alarm>& alarm() const { return alarm_; }
+  const std::optional<DecisionRecord>& decision() const { return decision_; }
+  std::optional<Eigen::Vector3d> position_m() const;
+  double elapsed_s() const;
+  const std::map<NetworkId, std::vector<Eigen::Vector3d>>& measured_at() const { return measured_at_; }
+
+ private:
+  void apply(double now_s, const Advance& step);
+  bool feed(double now_s, Event event, std::string text = {}, std::optional<Eigen::Vector3d> point = {},
+            std::optional<double> heading = {});
+  void execute(double now_s, const Command& command);
+  void fly(double now_s, const Eigen::Vector3d& to_m, std::optional<double> heading, bool home);
+  void next_leg(double now_s);
+  void order(const Command& command) { orders_.push_back(command); }
+  void tell(double now_s, std::string level, std::string code, std::string text);
+  void look_out(double now_s);
+  void look_for_arrival(double now_s);
+  void work(double now_s, std::span<const Estimate> estimates);
+  void judge_anchors(double now_s, std::span<const Estimate> estimates);
+  void decide(double now_s, std::span<const Estimate> estimates);
+
+  FlightSetup setup_;
+  State state_;
+  VehicleView vehicle_;
+  std::optional<double> vehicle_s_, fix_s_, good_fix_s_, started_s_;
+  std::optional<Eigen::Vector3d> fix_m_;
+  FixClass fix_{FixClass::none};
+  std::deque<Eigen::Vector3d> legs_;  ///< still to be flown to, the present one first
+  std::optional<Event> pending_;      ///< an order was refused: fed at the next tick
+  std::string pending_text_;
+  std::optional<double> settled_s_;
+  std::optional<Alarm> alarm_;
+  std::optional<DecisionRecord> decision_;
+  std::map<NetworkId, std::vector<Eigen::Vector3d>> measured_at_;
+  std::vector<Command> orders_;
+  std::vector<Happening> happenings_;
+};
+
+}  // namespace anchord::procedure

@@ -1,0 +1,178 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/ids.hpp"
+#include "core/base/result.hpp"
+
+namespace anchord::procedure {
+
+/// Steps of a calibration flight, Fig 8.3; the words are those of docs/procedure.md.
+enum class Step : std::uint8_t {
+  ready,
+  take_off,
+  go_to_waypoint,
+  search_anchors,
+  move_around,
+  step_to_waypoint,  ///< 1/k of the way to the next one, eq 8.6
+  turn,
+  height_search,
+  ranging,
+  find_next_point,
+  go_to_point,
+  check_connections,
+  go_back,
+  hold,
+  return_home,
+  landing,
+  done,
+};
+inline constexpr std::size_t k_step_count = 17;
+std::string_view to_string(Step step);
+std::optional<Step> step_of(std::string_view word);
+
+/// What can happen. Times come in as `timeout`: the machine has no clock, it says when it wants to be woken.
+enum class Event : std::uint8_t {
+  start,
+  airborne,
+  arrived,      ///< at the target of the last go_to, heading included
+  heard,        ///< at least one unfinished anchor answers
+  sampled,      ///< enough ranges of every anchor that answers
+  point,        ///< the planner chose one
+  no_point,     ///< the planner found none
+  done_here,    ///< nothing more to gain at this waypoint, or every anchor is done
+  unreachable,  ///< refused by the guard, or not approached
+  connected,    ///< anchors, rover and autopilot answer at this point
+  disconnected,
+  landed,
+  timeout,
+  hold,
+  resume,
+  skip,
+  return_home,
+  land,
+};
+inline constexpr std::size_t k_event_count = 18;
+std::string_view to_string(Event event);
+std::optional<Event> event_of(std::string_view word);
+
+/// What a transition asks of the state, so that one event can lead to several places.
+enum class Guard : std::uint8_t {
+  always,
+  wants_turn,        ///< an anchor is heard whose bearing is not known, and turns are allowed here
+  wants_height,      ///< no turn wanted, and a height not known
+  legs_left,         ///< of the turn or the height search
+  moves_left,        ///< of the three directions
+  waypoint_left,     ///< there is another waypoint
+  tries_left,        ///< the command may be given once more
+  anything_sampled,  ///< at least one range came at this point
+  was_returning,     ///< hold interrupted the way home
+  had_point,         ///< hold interrupted the work at one of the planner's points
+};
+std::string_view to_string(Guard guard);
+
+struct Transition {
+  Step from{};
+  Event event{};
+  Guard guard{};
+  Step to{};
+  std::string_view reason;  ///< for the operator
+};
+/// All transitions; of those that fit, the first wins. docs/procedure.md has the same table, where "any in
+/// flight" stands for every step but ready, landing and done.
+std::span<const Transition> transitions();
+
+/// What the aircraft or the planner shall do.
+struct Command {
+  enum class Kind : std::uint8_t { take_off, go_to, hold, return_home, land, measure, decide };
+  Kind kind{};
+  Eigen::Vector3d point_m{0, 0, 0};     ///< of go_to; ENU of the plan; take_off: the height is in z
+  std::optional<double> heading_rad{};  ///< clockwise from north
+  bool operator==(const Command&) const = default;
+};
+std::string_view to_string(Command::Kind kind);
+
+struct Waypoint {
+  Eigen::Vector3d point_m{0, 0, 0};
+  std::optional<double> heading_rad{};
+  bool measure{true}, turn{true}, height_search{true};
+  double dwell_s{4};
+};
+
+struct Settings {
+  std::vector<Waypoint> waypoints;
+  int k = 3;                     ///< eq 8.6
+  int tries = 3;                 ///< of a command, the first included
+  int points_per_waypoint = 1;   ///< the planner's points before the next waypoint is due
+  double move_m = 2;             ///< of the move around
+  double search_height_m = 1.5;  ///< up and down from where the search began
+  double take_off_m = 4;
+  double min_height_m = 1.5, max_height_m = 30;
+  // Longest stay in each step, s.
+  double go_to_s = 90, search_s = 5, turn_leg_s = 15, height_leg_s = 20, ranging_s = 20, decide_s = 5;
+  double connections_s = 5, hold_s = 600, take_off_s = 60, landing_s = 120, return_s = 240;
+  Result<void> check() const;
+};
+
+/// One anchor's own sub-procedure; all run at once and share the aircraft.
+struct AnchorTask {
+  NetworkId id{};
+  bool has_bearing{false}, has_height{false};
+  int iterations{};  ///< points where it was ranged
+  int waiting{};     ///< points since it was ranged last: the planner serves who waits longest first
+  int samples_here{};
+  bool done{false};
+  std::string why;  ///< why it is done, or why not yet
+  bool operator==(const AnchorTask&) const = default;
+};
+
+/// All there is to know; plain values, so that a server that was killed goes on from the stored ones.
+struct State {
+  Step step{Step::ready};
+  Step interrupted{Step::ready};  ///< what hold interrupted
+  std::size_t waypoint{};
+  int tries{}, moves{}, steps{}, legs{}, points{};
+  double since_s{};     ///< entered the step
+  double deadline_s{};  ///< when `timeout` is due; 0: never
+  Eigen::Vector3d target_m{0, 0, 0}, former_m{0, 0, 0}, centre_m{0, 0, 0};
+  std::optional<double> heading_rad{};
+  std::vector<Eigen::Vector3d> visited, unreachable;
+  std::vector<AnchorTask> anchors;
+  std::string reason;  ///< of the last transition
+  std::uint64_t n_transitions{};
+};
+
+/// An event with what comes along.
+struct Input {
+  Event event{};
+  double now_s{};                            ///< of the flight's own clock, never falling
+  std::optional<Eigen::Vector3d> point_m{};  ///< of `point`
+  std::optional<double> heading_rad{};       ///< of `point`
+  std::string text;                          ///< the cause, shown with the reason
+};
+
+struct Advance {
+  State state;
+  std::vector<Command> commands;
+  const Transition* transition{};  ///< null: the event means nothing in this step, nothing changed
+};
+
+/// One step of Fig 8.3. Pure: no clock, no aircraft, no randomness.
+Advance advance(const Settings& settings, const State& state, const Input& input);
+
+/// A range of this anchor came. Enters it into the tasks; says whether it was unknown.
+bool note_range(State& state, NetworkId anchor);
+/// What each anchor should count in the planner: 0 when done, else growing with the points it waited.
+double weight_of(const AnchorTask& task);
+
+/// The state of a server that was killed: the aircraft is told to hold before anything else, and goes on when
+/// the operator says so.
+Advance resume_after_restart(const State& stored, double now_s);
+
+}  // namespace anchord::procedure

@@ -1,0 +1,143 @@
+#include "core/procedure/safety.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+namespace anchord::procedure {
+namespace {
+
+std::string text(const char* format, double a, double b = 0) {
+  std::array<char, 160> out{};
+  std::snprintf(out.data(), out.size(), format, a, b);
+  return out.data();
+}
+
+/// The same volume, wider by the tolerance: what a breach is beyond.
+planning::Bounds widened(const SafetyLimits& limits) {
+  planning::Bounds wide = limits.bounds;
+  wide.keep_out_m = std::max(0.0, wide.keep_out_m - limits.tolerance_m);
+  wide.min_height_m.reset();  // below the band is where one takes off and lands
+  if (wide.max_height_m) *wide.max_height_m += limits.tolerance_m;
+  for (auto& wall : wide.walls) wall.keep_out_m = std::max(0.0, wall.keep_out_m - limits.tolerance_m);
+  return wide;
+}
+
+std::optional<Alarm> breach(const SafetyLimits& limits, const Eigen::Vector3d& at_m) {
+  const auto refusal = planning::refuse_point(widened(limits), at_m);
+  if (!refusal) return std::nullopt;
+  if (*refusal == planning::Refusal::outside_fence) {
+    const double out_m = planning::distance_to_edge_m(limits.bounds.fence, at_m.head<2>());
+    if (out_m <= limits.tolerance_m && at_m.allFinite()) return std::nullopt;
+    return Alarm{Reaction::hold, "fence.breach", text("%.1f m outside the fence", out_m)};
+  }
+  if (*refusal == planning::Refusal::too_high) {
+    return Alarm{
+        Reaction::hold, "fence.breach",
+        text("%.1f m high, the band ends at %.1f m", at_m.z(), limits.bounds.max_height_m.value_or(0))};
+  }
+  return Alarm{Reaction::hold, "fence.breach",
+               text("nearer than %.1f m to the building or a no-fly area", limits.bounds.keep_out_m)};
+}
+
+}  // namespace
+
+std::string_view to_string(Reaction reaction) {
+  switch (reaction) {
+    case Reaction::hold:
+      return "hold";
+    case Reaction::return_home:
+      return "return_home";
+    case Reaction::land:
+      return "land";
+  }
+  return "";
+}
+
+std::optional<Refused> refuse_command(const SafetyLimits& limits,
+                                      const std::optional<Eigen::Vector3d>& aircraft_m,
+                                      const Command& command) {
+  const auto& bounds = limits.bounds;
+  if (command.kind == Command::Kind::take_off) {
+    const double height = command.point_m.z();
+    if (!(height > 0) || (bounds.max_height_m && height > *bounds.max_height_m)) {
+      return Refused{"take_off_height", text("take-off to %.1f m is outside the height band", height)};
+    }
+    // Straight up from where it stands, which must be inside the fence and off every area.
+    if (aircraft_m) {
+      Eigen::Vector3d above = *aircraft_m;
+      above.z() = std::max(height, bounds.min_height_m.value_or(height));
+      if (const auto refusal = planning::refuse_point(bounds, above)) {
+        return Refused{std::string(planning::to_string(*refusal)),
+                       "the place of the take-off is not allowed"};
+      }
+    }
+    return std::nullopt;
+  }
+  if (command.kind != Command::Kind::go_to) return std::nullopt;
+  if (!command.point_m.allFinite() || (command.heading_rad && !std::isfinite(*command.heading_rad))) {
+    return Refused{"not_finite", "the target is not a number"};
+  }
+  if (!aircraft_m || !aircraft_m->allFinite())
+    return Refused{"position_unknown", "it is not known where the aircraft is"};
+  const double jump_m = (command.point_m - *aircraft_m).norm();
+  if (jump_m > limits.max_jump_m) {
+    return Refused{"jump",
+                   text("the target is %.0f m away, at most %.0f m are allowed", jump_m, limits.max_jump_m)};
+  }
+  if (const auto refusal = planning::refuse_point(bounds, command.point_m)) {
+    return Refused{std::string(planning::to_string(*refusal)), "the target is not allowed"};
+  }
+  if (const auto refusal = planning::refuse_path(bounds, *aircraft_m, command.point_m)) {
+    return Refused{std::string(planning::to_string(*refusal)),
+                   "the straight way to the target is not allowed"};
+  }
+  return std::nullopt;
+}
+
+double return_margin(const SafetyLimits& limits, const Eigen::Vector3d& position_m) {
+  const double way_m = (position_m - limits.home_m).norm() + std::max(0.0, position_m.z());
+  return limits.min_battery + way_m / limits.speed_mps * limits.battery_per_s;
+}
+
+std::optional<Alarm> watch(const SafetyLimits& limits, const Situation& now) {
+  if (!now.flying) return std::nullopt;
+  if (now.battery && *now.battery <= limits.critical_battery) {
+    return Alarm{Reaction::land, "drone.battery",
+                 text("battery at %.0f %%: landing here", 100 * *now.battery)};
+  }
+  if (now.battery && now.position_m && *now.battery <= return_margin(limits, *now.position_m)) {
+    return Alarm{Reaction::return_home, "drone.battery",
+                 text("battery at %.0f %%, needed to return %.0f %%", 100 * *now.battery,
+                      100 * return_margin(limits, *now.position_m))};
+  }
+  if (now.position_m && now.position_age_s <= limits.position_age_s) {
+    if (auto alarm = breach(limits, *now.position_m)) return alarm;
+  }
+  if (now.autopilot_silent_s > limits.link_return_s) {
+    return Alarm{Reaction::return_home, "drone.link",
+                 text("autopilot silent for %.0f s", now.autopilot_silent_s)};
+  }
+  if (now.autopilot_silent_s > limits.link_hold_s) {
+    return Alarm{Reaction::hold, "drone.link", text("autopilot silent for %.0f s", now.autopilot_silent_s)};
+  }
+  if (!now.position_m || now.position_age_s > limits.position_age_s) {
+    if (now.position_age_s > limits.rtk_return_s) {
+      return Alarm{Reaction::return_home, "rtk.lost", text("no position for %.0f s", now.position_age_s)};
+    }
+    return Alarm{Reaction::hold, "rtk.lost", text("no position for %.1f s", now.position_age_s)};
+  }
+  if (now.wants_rtk && now.since_good_fix_s > limits.rtk_return_s) {
+    return Alarm{Reaction::return_home, "rtk.lost", text("no RTK for %.0f s", now.since_good_fix_s)};
+  }
+  if (now.wants_rtk && now.since_good_fix_s > limits.rtk_hold_s) {
+    return Alarm{Reaction::hold, "rtk.lost", text("no RTK for %.1f s", now.since_good_fix_s)};
+  }
+  if (now.autopilot_m && (*now.autopilot_m - *now.position_m).norm() > limits.disagree_m) {
+    return Alarm{Reaction::hold, "position.disagree",
+                 text("autopilot and rover disagree by %.1f m", (*now.autopilot_m - *now.position_m).norm())};
+  }
+  return std::nullopt;
+}
+
+}  // namespace anchord::procedure

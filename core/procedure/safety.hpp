@@ -1,0 +1,71 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "core/planning/bounds.hpp"
+#include "core/procedure/machine.hpp"
+#include "core/types/fix.hpp"
+
+namespace anchord::procedure {
+
+/// What the aircraft may do, and when it must stop. Metres of the plan's origin.
+struct SafetyLimits {
+  planning::Bounds bounds;  ///< fence, no-fly areas (the outline is one), height band, keep-out
+  Eigen::Vector3d home_m{0, 0, 0};
+  double max_jump_m = 200;   ///< no target further than this from where the aircraft is
+  double tolerance_m = 1.0;  ///< wind and control: a breach is beyond it
+  double speed_mps = 2;
+  double battery_per_s = 1.0 / 1200;           ///< share used in flight: 20 minutes a battery
+  double min_battery = 0.3;                    ///< must be left above home
+  double critical_battery = 0.12;              ///< lands where it is
+  double position_age_s = 2;                   ///< older: it is not known where the aircraft is
+  double rtk_hold_s = 2, rtk_return_s = 10;    ///< without at least float
+  double link_hold_s = 3, link_return_s = 15;  ///< autopilot silent
+  double disagree_m = 3;                       ///< autopilot's position against the rover's
+};
+
+struct Refused {
+  std::string code;  ///< stable word
+  std::string text;  ///< with the numbers
+};
+
+/// First rule that a command breaks, seen from where the aircraft is; nothing when it may leave. Hold, return
+/// and land are never refused. The straight way is judged as well as its end.
+std::optional<Refused> refuse_command(const SafetyLimits& limits,
+                                      const std::optional<Eigen::Vector3d>& aircraft_m,
+                                      const Command& command);
+
+/// How things stand now. Ages in seconds.
+struct Situation {
+  std::optional<Eigen::Vector3d> position_m{};  ///< the rover's, else the autopilot's
+  double position_age_s{};
+  std::optional<Eigen::Vector3d> autopilot_m{};
+  FixClass fix{FixClass::none};
+  double since_good_fix_s{};  ///< without float or fixed
+  double autopilot_silent_s{};
+  std::optional<double> battery{};  ///< share, 0..1
+  bool flying{false};
+  bool wants_rtk{true};
+};
+
+enum class Reaction : std::uint8_t { hold, return_home, land };
+std::string_view to_string(Reaction reaction);
+struct Alarm {
+  Reaction reaction{};
+  std::string id;    ///< alarm of dashboard.md
+  std::string text;  ///< with the numbers
+};
+
+/// The gravest thing that is wrong, or nothing. Order: battery critical, battery return margin, fence and
+/// height breach, autopilot silent, position unknown, RTK lost, positions that disagree. docs/procedure.md
+/// has the table.
+std::optional<Alarm> watch(const SafetyLimits& limits, const Situation& now);
+
+/// Share of the battery that must be left to reach home with the reserve.
+double return_margin(const SafetyLimits& limits, const Eigen::Vector3d& position_m);
+
+}  // namespace anchord::procedure

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/ids.hpp"
+#include "core/base/time.hpp"
+#include "core/types/position.hpp"
+
+namespace anchord {
+
+using PlanId = Id<struct PlanTag>;
+
+struct LonLat {
+  double lon_deg{}, lat_deg{};
+  bool operator==(const LonLat&) const = default;
+};
+/// Corners in order, not closed; empty: there is none.
+using GeoPolygon = std::vector<LonLat>;
+
+struct PlanWaypoint {
+  LonLat at;
+  double height_m{};                    ///< above the ground of the plan's origin
+  std::optional<double> heading_deg{};  ///< clockwise from north; absent: towards the building
+  std::optional<double> dwell_s{};      ///< absent: the plan's
+  bool measure{true};                   ///< false: only on the way
+  bool turn{false};                     ///< 360 degree turn here, for anchors without a bearing
+  bool height_search{false};
+};
+
+/// Grid, rules and limits of a flight; the defaults fly without a look at them.
+struct PlanSettings {
+  double keep_out_m = 4;  ///< from the outline and from no-fly areas
+  double min_height_m = 1.5, max_height_m = 30;
+  double speed_mps = 2;
+  double dwell_s = 4;
+  int samples = 20;                        ///< ranges wanted of each anchor at a point
+  int k = 3;                               ///< steps towards the next waypoint where nothing is heard, eq 8.6
+  bool turn = true, height_search = true;  ///< for anchors heard first, where the waypoint allows it
+  double grid_step_m = 3, grid_step_up_m = 2;
+  int grid_reach = 2, grid_reach_up = 1;
+  std::string rule = "a_optimal";  ///< words of planning::Rule and Combine
+  std::string combine = "weighted";
+  int min_iterations = 4, max_iterations = 40;  ///< 8.4.4, per anchor
+  double target_sigma_m = 0.05;
+  std::optional<double> target_gdop{};  ///< conventional: the root
+  std::optional<double> max_flight_s{};
+  double min_battery = 0.3;  ///< share at which the aircraft goes home
+};
+
+/// What the operator wants flown: outline, areas, waypoints, settings. `version` is its revision.
+struct Plan {
+  PlanId id{};
+  std::string name;
+  std::optional<SiteId> site{};
+  std::optional<Wgs84> origin{};  ///< ground; absent: the middle of the outline or of the waypoints, height 0
+  GeoPolygon outline;             ///< of the building
+  double building_height_m = 6;
+  std::vector<GeoPolygon> no_fly;
+  GeoPolygon fence;
+  PlanSettings settings{};
+  std::vector<NetworkId> expected_anchors;
+  std::vector<PlanWaypoint> waypoints;
+  UtcTime created{}, changed{};
+  std::uint64_t version{1};
+};
+
+}  // namespace anchord
