@@ -1,0 +1,78 @@
+#include "drivers/drone/dialect.hpp"
+
+#include <array>
+#include <utility>
+
+namespace anchord::drone {
+namespace {
+
+constexpr std::uint32_t px4(std::uint32_t main, std::uint32_t sub) { return main << 16U | sub << 24U; }
+
+// ArduCopter mode.h; PX4 px4_custom_mode.h. Hold is BRAKE for ArduPilot (stops at once) and AUTO/LOITER for
+// PX4.
+constexpr Dialect k_ardupilot{Autopilot::ardupilot, "ArduPilot", 4, 17, 6, 9, false, false};
+constexpr Dialect k_px4{Autopilot::px4, "PX4", px4(4, 3), px4(4, 3), px4(4, 5), px4(4, 6), true, true};
+constexpr Dialect k_unknown{Autopilot::unknown, "", 0, 0, 0, 0, false, false};
+
+constexpr std::array<std::pair<std::uint32_t, std::string_view>, 12> k_ardupilot_modes{{{0, "STABILIZE"},
+                                                                                        {2, "ALT_HOLD"},
+                                                                                        {3, "AUTO"},
+                                                                                        {4, "GUIDED"},
+                                                                                        {5, "LOITER"},
+                                                                                        {6, "RTL"},
+                                                                                        {9, "LAND"},
+                                                                                        {16, "POSHOLD"},
+                                                                                        {17, "BRAKE"},
+                                                                                        {20, "GUIDED_NOGPS"},
+                                                                                        {21, "SMART_RTL"},
+                                                                                        {27, "AUTO_RTL"}}};
+constexpr std::array<std::pair<std::uint32_t, std::string_view>, 10> k_px4_modes{{{px4(1, 0), "MANUAL"},
+                                                                                  {px4(2, 0), "ALTCTL"},
+                                                                                  {px4(3, 0), "POSCTL"},
+                                                                                  {px4(4, 2), "TAKEOFF"},
+                                                                                  {px4(4, 3), "HOLD"},
+                                                                                  {px4(4, 4), "MISSION"},
+                                                                                  {px4(4, 5), "RTL"},
+                                                                                  {px4(4, 6), "LAND"},
+                                                                                  {px4(6, 0), "OFFBOARD"},
+                                                                                  {px4(7, 0), "STABILIZED"}}};
+
+}  // namespace
+
+const Dialect& dialect_of(Autopilot autopilot) {
+  switch (autopilot) {
+    case Autopilot::ardupilot:
+      return k_ardupilot;
+    case Autopilot::px4:
+      return k_px4;
+    case Autopilot::unknown:
+      break;
+  }
+  return k_unknown;
+}
+
+Autopilot autopilot_of(std::int64_t heartbeat_autopilot) {
+  if (heartbeat_autopilot == 3) return Autopilot::ardupilot;
+  if (heartbeat_autopilot == 12) return Autopilot::px4;
+  return Autopilot::unknown;
+}
+
+ModeParams mode_params(Autopilot autopilot, std::uint32_t custom_mode) {
+  if (autopilot != Autopilot::px4) return {static_cast<double>(custom_mode), 0};
+  return {static_cast<double>(custom_mode >> 16U & 0xFFU), static_cast<double>(custom_mode >> 24U)};
+}
+
+std::string_view mode_word(Autopilot autopilot, std::uint32_t custom_mode) {
+  if (autopilot == Autopilot::px4) {
+    for (const auto& [mode, word] : k_px4_modes) {
+      if (mode == custom_mode) return word;
+    }
+  } else {
+    for (const auto& [mode, word] : k_ardupilot_modes) {
+      if (mode == custom_mode) return word;
+    }
+  }
+  return "other";
+}
+
+}  // namespace anchord::drone

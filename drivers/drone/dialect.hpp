@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+namespace anchord::drone {
+
+enum class Autopilot : std::uint8_t { unknown, ardupilot, px4 };
+
+/// Everything in which ArduPilot Copter and PX4 differ, in one place.
+struct Dialect {
+  Autopilot autopilot{};
+  std::string_view name;
+  /// custom_mode of HEARTBEAT for the modes that we command.
+  std::uint32_t guided{}, hold{}, return_home{}, land{};
+  bool take_off_above_sea{};  ///< param7 of TAKEOFF: above mean sea level (PX4) or above home (ArduPilot)
+  bool targets_by_command{};  ///< go-to by DO_REPOSITION (PX4 in hold) or by position targets (ArduPilot)
+};
+const Dialect& dialect_of(Autopilot autopilot);
+/// By the autopilot number of HEARTBEAT: 3 ArduPilot, 12 PX4.
+Autopilot autopilot_of(std::int64_t heartbeat_autopilot);
+
+/// Parameters 2 and 3 of DO_SET_MODE.
+struct ModeParams {
+  double main{}, sub{};
+};
+ModeParams mode_params(Autopilot autopilot, std::uint32_t custom_mode);
+std::string_view mode_word(Autopilot autopilot, std::uint32_t custom_mode);
+
+}  // namespace anchord::drone

@@ -1,0 +1,127 @@
+// Mission and fence lists of a Session: MISSION_COUNT, MISSION_REQUEST_INT, MISSION_ITEM_INT, MISSION_ACK.
+#include "drivers/drone/session.hpp"
+
+namespace anchord::drone {
+namespace {
+
+using mavlink::Message;
+
+constexpr double k_wait_s = 1.5;
+constexpr int k_tries = 5;
+constexpr std::size_t k_max_items = 1000;
+
+std::string list_word(ItemList list) { return list == ItemList::fence ? "fence" : "mission"; }
+
+}  // namespace
+
+std::uint64_t Session::upload(ItemList list, std::vector<MissionItem> items) {
+  const std::uint64_t number = ++number_;
+  if (transfer_ || items.size() > k_max_items) {
+    report(number, "upload", CommandState::refused,
+           transfer_ ? "another transfer runs" : "more than 1000 items");
+    return number;
+  }
+  report(number, "upload", CommandState::sent, list_word(list));
+  transfer_ = Transfer{number, true, list, std::move(items), 0, 0, now_s_ - k_wait_s, 0};
+  transfer_->count = transfer_->items.size();
+  drive_transfer();
+  return number;
+}
+
+std::uint64_t Session::download(ItemList list) {
+  const std::uint64_t number = ++number_;
+  if (transfer_) {
+    report(number, "download", CommandState::refused, "another transfer runs");
+    return number;
+  }
+  report(number, "download", CommandState::sent, list_word(list));
+  transfer_ = Transfer{number, false, list, {}, 0, 0, now_s_ - k_wait_s, 0};
+  drive_transfer();
+  return number;
+}
+
+void Session::end_transfer(CommandState state, std::string text) {
+  report(transfer_->number, transfer_->up ? "upload" : "download", state, std::move(text));
+  transfer_.reset();
+}
+
+void Session::send_item(std::size_t index) {
+  const auto& item = transfer_->items[index];
+  Message m = addressed("MISSION_ITEM_INT");
+  m.set("seq", static_cast<std::int64_t>(index)).set("command", item.command).set("frame", item.frame);
+  m.set_real("param1", item.p1)
+      .set_real("param2", item.p2)
+      .set_real("param3", item.p3)
+      .set_real("param4", item.p4);
+  m.set("x", item.x).set("y", item.y).set_real("z", item.z);
+  m.set("autocontinue", 1).set("mission_type", static_cast<std::int64_t>(transfer_->list));
+  send(m);
+}
+
+/// Repeats what was not answered within 1.5 s, five times.
+void Session::drive_transfer() {
+  if (!transfer_ || now_s_ - transfer_->last_s < k_wait_s) return;
+  auto& t = *transfer_;
+  if (t.tries++ >= k_tries) return end_transfer(CommandState::unconfirmed, "the autopilot does not answer");
+  t.last_s = now_s_;
+  const auto list = static_cast<std::int64_t>(t.list);
+  if (t.up) {
+    send(addressed("MISSION_COUNT")
+             .set("count", static_cast<std::int64_t>(t.count))
+             .set("mission_type", list));
+  } else if (t.count == 0) {
+    send(addressed("MISSION_REQUEST_LIST").set("mission_type", list));
+  } else {
+    send(addressed("MISSION_REQUEST_INT")
+             .set("seq", static_cast<std::int64_t>(t.next))
+             .set("mission_type", list));
+  }
+}
+
+void Session::on_transfer(const Message& m) {
+  if (!transfer_) return;
+  auto& t = *transfer_;
+  const auto answered = [&] {
+    t.tries = 0;
+    t.last_s = now_s_;
+  };
+  if (t.up && (m.is("MISSION_REQUEST_INT") || m.is("MISSION_REQUEST"))) {
+    const auto seq = m.integer("seq");
+    if (seq >= 0 && static_cast<std::size_t>(seq) < t.items.size()) {
+      answered();
+      send_item(static_cast<std::size_t>(seq));
+    }
+  } else if (t.up && m.is("MISSION_ACK")) {
+    const auto type = m.integer("type");
+    end_transfer(type == 0 ? CommandState::accepted : CommandState::refused,
+                 type == 0 ? std::to_string(t.count) + " items" : "MISSION_ACK type " + std::to_string(type));
+  } else if (!t.up && m.is("MISSION_COUNT") && t.count == 0) {
+    answered();
+    t.count = static_cast<std::size_t>(m.integer("count"));
+    if (t.count > k_max_items) return end_transfer(CommandState::refused, "more than 1000 items");
+    if (t.count == 0) {
+      items_.clear();
+      return end_transfer(CommandState::accepted, "0 items");
+    }
+    send(addressed("MISSION_REQUEST_INT")
+             .set("seq", 0)
+             .set("mission_type", static_cast<std::int64_t>(t.list)));
+  } else if (!t.up && m.is("MISSION_ITEM_INT") && m.integer("seq") == static_cast<std::int64_t>(t.next)) {
+    answered();
+    t.items.push_back({static_cast<int>(m.integer("command")), static_cast<int>(m.integer("frame")),
+                       m.real("param1"), m.real("param2"), m.real("param3"), m.real("param4"),
+                       static_cast<std::int32_t>(m.integer("x")), static_cast<std::int32_t>(m.integer("y")),
+                       m.real("z")});
+    if (++t.next < t.count) {
+      send(addressed("MISSION_REQUEST_INT")
+               .set("seq", static_cast<std::int64_t>(t.next))
+               .set("mission_type", static_cast<std::int64_t>(t.list)));
+      return;
+    }
+    send(addressed("MISSION_ACK").set("mission_type", static_cast<std::int64_t>(t.list)));
+    items_ = t.items;
+    end_transfer(CommandState::accepted, std::to_string(t.count) + " items");
+  }
+}
+
+}  // namespace anchord::drone

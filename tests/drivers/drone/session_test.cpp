@@ -1,0 +1,261 @@
+// The session against the simulated autopilot, byte by byte and faster than real time. What the autopilot
+// does is what was seen on ArduCopter 4.7-dev and is written of PX4.
+#include "drivers/drone/session.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "drivers/sim/autopilot.hpp"
+
+namespace anchord::drone {
+namespace {
+
+constexpr std::int64_t k_unix_us = 1'777'888'800'000'000;
+
+class Pair {
+ public:
+  explicit Pair(sim::AutopilotOptions a = {}, SessionOptions s = {}) : autopilot(std::move(a)), session(s) {}
+
+  void run(double seconds) {
+    const double end = now + seconds;
+    while (now < end) {
+      now += 0.05;
+      const auto unix_us = k_unix_us + static_cast<std::int64_t>(now * 1e6);
+      autopilot.advance(now);
+      session.feed(now, unix_us, autopilot.take_bytes());
+      session.tick(now, unix_us);
+      const auto out = session.take_bytes();
+      if (!link_down) autopilot.feed(out);
+      for (auto& r : session.take_reports()) reports.push_back(std::move(r));
+    }
+  }
+  template <class Done>
+  bool run_until(Done done, double seconds) {
+    for (const double end = now + seconds; now < end;) {
+      run(0.2);
+      if (done()) return true;
+    }
+    return false;
+  }
+  CommandState last(std::uint64_t number) const {
+    CommandState out{};
+    for (const auto& r : reports) {
+      if (r.number == number) out = r.state;
+    }
+    return out;
+  }
+  std::string words(std::uint64_t number) const {
+    std::string out;
+    for (const auto& r : reports) {
+      if (r.number == number) out = r.text;
+    }
+    return out;
+  }
+  bool fly() {
+    run(3);
+    const auto number = session.take_off(4);
+    return run_until([&] { return last(number) == CommandState::accepted; }, 60) &&
+           run_until([&] { return session.status().relative_m.value_or(0) > 3.8; }, 20);
+  }
+  std::uint64_t go(double east_m, double north_m, double up_m, std::optional<double> heading_deg) {
+    // 51.0231 degrees north: 69 960 m a degree of longitude on a sphere of 6371 km.
+    return session.go_to(51.0231 + north_m / 111'195,
+                         3.7131 + east_m / (111'195 * std::cos(51.0231 * M_PI / 180)), up_m, heading_deg);
+  }
+
+  sim::AutopilotSim autopilot;
+  Session session;
+  std::vector<CommandReport> reports;
+  double now{0};
+  bool link_down{false};
+};
+
+class EachAutopilot : public ::testing::TestWithParam<Autopilot> {
+ protected:
+  sim::AutopilotOptions options() const {
+    sim::AutopilotOptions o;
+    o.dialect = GetParam();
+    o.ready_s = 5;
+    return o;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Dialects, EachAutopilot, ::testing::Values(Autopilot::ardupilot, Autopilot::px4),
+                         [](const auto& given) { return std::string(dialect_of(given.param).name); });
+
+TEST_P(EachAutopilot, TakesOffFliesToATargetWithItsHeadingHoldsAndLands) {
+  Pair pair(options());
+  ASSERT_TRUE(pair.fly());
+  const auto go = pair.go(10, -5, 6, 90);
+  EXPECT_TRUE(pair.run_until([&] { return pair.last(go) == CommandState::accepted; }, 2.1)) << pair.words(go);
+  pair.run(15);
+  EXPECT_NEAR(pair.autopilot.vehicle().position_m().x(), 10, 0.3);
+  EXPECT_NEAR(pair.autopilot.vehicle().position_m().y(), -5, 0.3);
+  EXPECT_NEAR(pair.autopilot.vehicle().position_m().z(), 6, 0.3);
+  EXPECT_NEAR(*pair.session.status().heading_deg, 90, 2);
+  const auto hold = pair.session.hold();
+  pair.run(2.1);
+  EXPECT_EQ(pair.last(hold), CommandState::accepted);
+  const auto again = pair.go(0, 0, 6, std::nullopt);
+  pair.run(2.1);
+  EXPECT_EQ(pair.last(again), CommandState::accepted) << "after a hold it goes on: " << pair.words(again);
+  const auto land = pair.session.land();
+  EXPECT_TRUE(pair.run_until([&] { return !pair.session.status().armed; }, 30));
+  EXPECT_EQ(pair.last(land), CommandState::accepted);
+}
+
+TEST_P(EachAutopilot, ReturnsHome) {
+  Pair pair(options());
+  ASSERT_TRUE(pair.fly());
+  (void)pair.go(8, 8, 5, std::nullopt);
+  pair.run(10);
+  const auto number = pair.session.return_home();
+  EXPECT_TRUE(pair.run_until([&] { return !pair.session.status().armed; }, 60));
+  EXPECT_EQ(pair.last(number), CommandState::accepted);
+  EXPECT_NEAR(pair.autopilot.vehicle().position_m().head<2>().norm(), 0, 0.6);
+}
+
+TEST_P(EachAutopilot, ACommandWithoutAnAnswerIsReportedWithinTwoSeconds) {
+  Pair pair(options());
+  ASSERT_TRUE(pair.fly());
+  pair.link_down = true;
+  const double begun = pair.now;
+  const auto number = pair.session.hold();
+  ASSERT_TRUE(pair.run_until([&] { return pair.last(number) == CommandState::unconfirmed; }, 5));
+  EXPECT_LE(pair.now - begun, 2.3);
+  const auto go = pair.go(5, 5, 5, std::nullopt);
+  ASSERT_TRUE(pair.run_until([&] { return pair.last(go) == CommandState::unconfirmed; }, 5));
+}
+
+TEST_P(EachAutopilot, FliesOnALossyLink) {
+  auto lossy = options();
+  lossy.loss = 0.2;
+  lossy.duplicate = 0.1;
+  Pair pair(lossy);
+  ASSERT_TRUE(pair.fly());
+  (void)pair.go(6, 0, 5, 180);
+  pair.run(12);
+  EXPECT_NEAR(pair.autopilot.vehicle().position_m().x(), 6, 0.3);
+  EXPECT_GT(pair.session.counters().lost, 10u);
+}
+
+TEST_P(EachAutopilot, UploadsAndDownloadsMissionAndFence) {
+  Pair pair(options());
+  pair.run(3);
+  std::vector<MissionItem> items;
+  for (int i = 0; i < 7; ++i)
+    items.push_back({i == 0 ? 22 : 16, 6, 4, 0, 0, 90, 510231000 + i, 37131000 - i, 5.0 + i});
+  for (const auto list : {ItemList::mission, ItemList::fence}) {
+    const auto up = pair.session.upload(list, items);
+    ASSERT_TRUE(pair.run_until([&] { return pair.last(up) == CommandState::accepted; }, 10))
+        << pair.words(up);
+    const auto down = pair.session.download(list);
+    ASSERT_TRUE(pair.run_until([&] { return pair.last(down) == CommandState::accepted; }, 10))
+        << pair.words(down);
+    EXPECT_EQ(pair.session.downloaded(), items);
+    items.pop_back();
+  }
+}
+
+TEST(DroneSession, ArmingIsTriedUntilThePreArmChecksPass) {
+  sim::AutopilotOptions slow;
+  slow.ready_s = 25;
+  Pair pair(slow);
+  pair.run(3);
+  const auto number = pair.session.take_off(4);
+  pair.run(10);
+  EXPECT_EQ(pair.last(number), CommandState::sent);
+  EXPECT_EQ(pair.session.status().text, "Arm: Need Position Estimate");
+  EXPECT_TRUE(pair.run_until([&] { return pair.last(number) == CommandState::accepted; }, 40));
+}
+
+TEST(DroneSession, ATakeOffThatNeverComesIsReportedWithTheReason) {
+  sim::AutopilotOptions never;
+  never.ready_s = 1e9;
+  Pair pair(never);
+  pair.run(3);
+  const auto number = pair.session.take_off(4);
+  EXPECT_TRUE(pair.run_until([&] { return pair.last(number) == CommandState::unconfirmed; }, 65));
+  EXPECT_NE(pair.words(number).find("Need Position Estimate"), std::string::npos);
+}
+
+TEST(DroneSession, WhenThePilotTakesOverNoTargetIsSentAnyMore) {
+  sim::AutopilotOptions o;
+  o.ready_s = 5;
+  Pair pair(o);
+  ASSERT_TRUE(pair.fly());
+  (void)pair.go(20, 0, 5, std::nullopt);
+  pair.run(5);
+  pair.autopilot.pilot_takes_over(5);  // LOITER
+  pair.run(2);
+  EXPECT_TRUE(pair.session.status().taken_over);
+  const auto where = pair.autopilot.vehicle().position_m();
+  pair.run(5);
+  EXPECT_LT((pair.autopilot.vehicle().position_m() - where).norm(), 1.0) << "the mode is not switched back";
+  EXPECT_EQ(pair.autopilot.custom_mode(), 5u);
+  const auto refused = pair.go(5, 5, 5, std::nullopt);
+  pair.run(0.1);
+  EXPECT_EQ(pair.last(refused), CommandState::refused);
+}
+
+TEST(DroneSession, RefusesTargetsThatAreNoPlace) {
+  sim::AutopilotOptions o;
+  o.ready_s = 5;
+  Pair pair(o);
+  ASSERT_TRUE(pair.fly());
+  for (const auto& [lat, lon, up] :
+       {std::tuple{std::nan(""), 3.7, 5.0}, {0.0, 0.0, 5.0}, {51.0231, 3.72, 5.0}, {91.0, 3.7, 5.0}}) {
+    const auto number = pair.session.go_to(lat, lon, up, std::nullopt);
+    pair.run(0.1);
+    EXPECT_EQ(pair.last(number), CommandState::refused);
+  }
+}
+
+TEST(DroneSession, TellsWhenTheVehicleFallsSilent) {
+  Pair pair;
+  EXPECT_FALSE(pair.session.status().connected);
+  pair.run(2);
+  EXPECT_TRUE(pair.session.status().connected);
+  EXPECT_EQ(pair.session.status().autopilot, "ArduPilot");
+  pair.autopilot.set_silent(true);
+  pair.run(4.5);
+  EXPECT_FALSE(pair.session.status().connected);
+  EXPECT_GT(pair.session.status().silent_s, 3);
+}
+
+TEST(DroneSession, WithoutTheStationsHeartbeatTheSimulatedAutopilotReturns) {
+  sim::AutopilotOptions o;
+  o.ready_s = 5;
+  Pair pair(o);
+  ASSERT_TRUE(pair.fly());
+  (void)pair.go(10, 0, 5, std::nullopt);
+  pair.run(8);
+  pair.link_down = true;
+  pair.run(8);
+  EXPECT_TRUE(pair.autopilot.failsafe());
+  EXPECT_EQ(pair.session.status().mode, "RTL");
+}
+
+TEST(DroneSession, SignedLinksRefuseUnsignedStations) {
+  mavlink::Secret secret{};
+  secret.fill(7);
+  sim::AutopilotOptions o;
+  o.ready_s = 5;
+  o.secret = secret;
+  SessionOptions with;
+  with.secret = secret;
+  Pair good(o, with);
+  EXPECT_TRUE(good.fly());
+  Pair bad(o);
+  bad.run(10);
+  const auto number = bad.session.take_off(4);
+  bad.run(10);
+  EXPECT_FALSE(bad.autopilot.vehicle().armed());
+  EXPECT_EQ(bad.last(number), CommandState::sent);
+}
+
+}  // namespace
+
+void PrintTo(CommandState state, std::ostream* out) { *out << static_cast<int>(state); }
+
+}  // namespace anchord::drone
