@@ -7,6 +7,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   int exit_code = 0;
   anchord::cli::add_config_command(app, exit_code);
+  anchord::cli::add_frame_command(app, exit_code);
   anchord::cli::add_healthcheck_command(app, exit_code);
   anchord::cli::add_import_command(app, exit_code);
   anchord::cli::add_decode_command(app, exit_code);

@@ -9,6 +9,7 @@ class App;
 namespace anchord::cli {
 
 void add_config_command(CLI::App& app, int& exit_code);
+void add_frame_command(CLI::App& app, int& exit_code);
 void add_healthcheck_command(CLI::App& app, int& exit_code);
 void add_import_command(CLI::App& app, int& exit_code);
 void add_decode_command(CLI::App& app, int& exit_code);
