@@ -9,6 +9,8 @@
 #include "api/live/hub.hpp"
 #include "api/routes/access_routes.hpp"
 #include "api/routes/routes.hpp"
+#include "api/services/geo_service.hpp"
+#include "api/services/kit_profiles.hpp"
 #include "core/ports/store.hpp"
 
 namespace anchord::api {
@@ -22,19 +24,27 @@ struct Application::State {
         missions({deps.missions, deps.measurements, deps.anchors, hub, events, deps.clock, deps.post}),
         ingest(deps.measurements, missions),
         jobs(deps.jobs, hub, deps.clock),
-        calibrations({deps.measurements, deps.missions, deps.anchors, jobs, deps.clock}),
-        services{deps, hub, events, missions, ingest, jobs, calibrations} {
+        geo(deps.geoid_dir),
+        calibrations({deps.measurements, deps.missions, deps.anchors, jobs, deps.clock, profiles_of(deps)}),
+        services{deps, hub, events, missions, ingest, jobs, calibrations, geo, profiles.get(), deps.frames} {
     router.on_fault(deps.log_fault);
     add_mission_routes(router, services);
     add_measurement_routes(router, services);
     add_site_routes(router, services);
     add_anchor_routes(router, services);
     add_calibration_routes(router, services);
+    add_comparison_routes(router, services);
+    if (services.profiles != nullptr) add_kit_routes(router, services);
+    if (services.frames != nullptr) add_frame_routes(router, services);
     add_job_routes(router, services);
     if (deps.access != nullptr) add_access_routes(router, *deps.access);
     add_system_routes(router, services);
   }
 
+  KitProfiles* profiles_of(const Deps& from) {
+    if (from.kits != nullptr) profiles = std::make_unique<KitProfiles>(*from.kits, from.missions, from.clock);
+    return profiles.get();
+  }
   void beat();
   void second();
 
@@ -45,6 +55,8 @@ struct Application::State {
   MissionService missions;
   IngestService ingest;
   JobService jobs;
+  GeoService geo;
+  std::unique_ptr<KitProfiles> profiles;
   CalibrationService calibrations;
   Services services;
   std::mutex mutex;

@@ -12,6 +12,8 @@
 namespace anchord {
 class AccessStore;
 class AnchorStore;
+class FrameStore;
+class KitStore;
 class Clock;
 class JobStore;
 class MeasurementStore;
@@ -52,6 +54,9 @@ class Application {
     /// Runs a task on the pool; absent: on the calling thread.
     std::function<void(std::function<void()>)> post{};
     std::function<StorageStatus()> storage_status{};
+    KitStore* kits{nullptr};                      ///< null: no kit profiles (tests)
+    FrameStore* frames{nullptr};                  ///< null: no local frames (tests)
+    std::string geoid_dir{};                      ///< empty: where GeographicLib looks
     std::function<std::string()> metrics_text{};  ///< Prometheus text of the server, appended to ours
     std::function<void(std::string_view request_id, std::string_view what)> log_fault{};
   };

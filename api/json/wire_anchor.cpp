@@ -69,7 +69,9 @@ Ordered accuracy(const Estimate& estimate, const std::optional<Site>& site) {
   return {{"relative", std::move(relative)}, {"absolute", std::move(absolute)}};
 }
 
-Ordered quality(const Estimate& estimate) {
+Ordered quality(const Estimate& estimate, const std::optional<Override>& overridden) {
+  Ordered gates = Ordered::array();
+  for (const auto& gate : estimate.gates) gates.push_back(gate_json(gate));
   return {
       {"verdict", verdict_word(estimate.verdict)},
       {"reason", estimate.reason},
@@ -82,7 +84,11 @@ Ordered quality(const Estimate& estimate) {
       {"bias_m", or_null(estimate.bias_m)},
       {"bias_sigma_m", or_null(estimate.bias_sigma_m)},
       {"lag_s", or_null(estimate.lag_s)},
-      {"lag_sigma_s", or_null(estimate.lag_sigma_s)}};
+      {"lag_sigma_s", or_null(estimate.lag_sigma_s)},
+      {"acceptable", estimate.acceptable()},
+      {"gates", std::move(gates)},
+      {"override",
+       overridden ? Ordered{{"reason", overridden->reason}, {"by", overridden->by}} : Ordered(nullptr)}};
 }
 
 Ordered mirror(const Estimate& estimate) {
@@ -110,7 +116,17 @@ std::string number(double value, int decimals) {
 
 }  // namespace
 
-Ordered estimate_result_json(const Estimate& estimate, TrackFrame frame, const std::optional<Site>& site) {
+Ordered gate_json(const Gate& gate) {
+  const auto finite = [](double v) { return std::isfinite(v) ? Ordered(v) : Ordered(nullptr); };
+  return {{"name", gate.name},
+          {"value", gate.value ? finite(*gate.value) : Ordered(nullptr)},
+          {"limit", finite(gate.limit)},
+          {"passed", gate.passed},
+          {"why", gate.why}};
+}
+
+Ordered estimate_result_json(const Estimate& estimate, TrackFrame frame, const std::optional<Site>& site,
+                             const std::optional<Override>& overridden) {
   Ordered out{{"network_id", to_string(estimate.anchor)},
               {"verdict", verdict_word(estimate.verdict)},
               {"reason", estimate.reason}};
@@ -119,7 +135,7 @@ Ordered estimate_result_json(const Estimate& estimate, TrackFrame frame, const s
   out["local_m"] =
       estimate.best && frame == TrackFrame::local ? vector_json(estimate.best->position.m) : Ordered(nullptr);
   out["accuracy"] = accuracy(estimate, site);
-  out["quality"] = quality(estimate);
+  out["quality"] = quality(estimate, overridden);
   out["mirror"] = mirror(estimate);
   return out;
 }
@@ -145,13 +161,22 @@ Ordered anchor_feature_json(const AnchorFeature& feature) {
   p["external_ids"] = std::move(external);
   p["retired"] = anchor.retired;
   p["crs"] = crs(feature);
-  p["height_orthometric_m"] = nullptr;  // no geoid model is installed; never guessed
-  p["geoid"] = nullptr;
+  const bool orthometric = feature.height_orthometric_m.has_value();
+  p["height_orthometric_m"] = orthometric ? Ordered(metres(*feature.height_orthometric_m)) : Ordered(nullptr);
+  p["geoid"] = orthometric ? Ordered(feature.geoid) : Ordered(nullptr);
+  p["geoid_reason"] = orthometric || feature.geoid.empty() ? Ordered(nullptr) : Ordered(feature.geoid);
+  p["projected"] = nullptr;
+  if (feature.projected)
+    p["projected"] = {{"epsg", feature.projected->epsg},
+                      {"e_m", rounded(feature.projected->e_m, 1e3)},
+                      {"n_m", rounded(feature.projected->n_m, 1e3)}};
+  p["projected_reason"] = text_or_null(feature.projected_reason);
   p["enu_m"] = placed ? vector_json(estimate->best->position.m) : Ordered(nullptr);
   p["local_m"] = placed && feature.frame == TrackFrame::local ? vector_json(estimate->best->position.m)
+                 : feature.local_m                            ? vector_json(*feature.local_m)
                                                               : Ordered(nullptr);
   p["accuracy"] = estimate ? accuracy(*estimate, feature.site) : Ordered(nullptr);
-  p["quality"] = estimate ? quality(*estimate) : Ordered(nullptr);
+  p["quality"] = estimate ? quality(*estimate, feature.overridden) : Ordered(nullptr);
   p["provenance"] = {
       {"calibration", feature.calibration ? Ordered(to_string(*feature.calibration)) : Ordered(nullptr)},
       {"missions", std::move(missions)}};
@@ -176,6 +201,11 @@ Ordered flat_feature_json(const AnchorFeature& feature) {
   flat["verdict"] = estimate ? Ordered(verdict_word(estimate->verdict)) : Ordered(nullptr);
   flat["h95_m"] = estimate && estimate->best ? Ordered(metres(estimate->h95_m)) : Ordered(nullptr);
   flat["v95_m"] = estimate && estimate->best ? Ordered(metres(estimate->v95_m)) : Ordered(nullptr);
+  flat["acceptable"] = estimate ? Ordered(estimate->acceptable()) : Ordered(nullptr);
+  flat["override_reason"] = feature.overridden ? Ordered(feature.overridden->reason) : Ordered(nullptr);
+  flat["e_m"] = feature.projected ? Ordered(rounded(feature.projected->e_m, 1e3)) : Ordered(nullptr);
+  flat["n_m"] = feature.projected ? Ordered(rounded(feature.projected->n_m, 1e3)) : Ordered(nullptr);
+  flat["epsg"] = feature.projected ? Ordered(feature.projected->epsg) : Ordered(nullptr);
   flat["frame"] =
       full["properties"]["crs"].is_object() ? full["properties"]["crs"]["frame"] : Ordered(nullptr);
   full["properties"] = std::move(flat);
@@ -197,7 +227,7 @@ std::string anchors_csv_header() {
   return "id,network_id,name,status,revision,calibrated_at,site,building,floor,space,asset_tag,ifc_guid,lon,"
          "lat,h_m,local_x_m,local_y_m,local_z_m,"
          "sigma_e_m,sigma_n_m,sigma_u_m,ellipse95_major_m,ellipse95_minor_m,ellipse95_azimuth_deg,h95_m,v95_"
-         "m,verdict,frame,epoch";
+         "m,verdict,frame,epoch,epsg,e_m,n_m,height_orthometric_m,geoid,gates_failed,override_reason";
 }
 
 std::string anchor_csv_row(const AnchorFeature& feature) {
@@ -220,7 +250,9 @@ std::string anchor_csv_row(const AnchorFeature& feature) {
   add(at ? number(at->lat_deg, 9) : "");
   add(at ? number(at->height_m, 4) : "");
   for (int i = 0; i < 3; ++i)
-    add(placed && feature.frame == TrackFrame::local ? number(estimate->best->position.m[i], 4) : "");
+    add(placed && feature.frame == TrackFrame::local ? number(estimate->best->position.m[i], 4)
+        : feature.local_m                            ? number((*feature.local_m)[i], 4)
+                                                     : "");
   for (int i = 0; i < 3; ++i)
     add(placed ? number(std::sqrt(std::max(0.0, estimate->best->covariance_m2(i, i))), 4) : "");
   const ErrorEllipse ellipse = placed ? error_ellipse(estimate->best->covariance_m2) : ErrorEllipse{};
@@ -231,6 +263,17 @@ std::string anchor_csv_row(const AnchorFeature& feature) {
   add(estimate ? verdict_word(estimate->verdict) : "");
   add(feature.site ? csv_text(feature.site->crs_frame) : "");
   add(feature.site && feature.site->crs_epoch ? number(*feature.site->crs_epoch, 2) : "");
+  add(feature.projected ? std::to_string(feature.projected->epsg) : "");
+  add(feature.projected ? number(feature.projected->e_m, 3) : "");
+  add(feature.projected ? number(feature.projected->n_m, 3) : "");
+  add(feature.height_orthometric_m ? number(*feature.height_orthometric_m, 3) : "");
+  add(feature.height_orthometric_m ? csv_text(feature.geoid) : "");
+  std::string failed;
+  for (const auto& gate : estimate ? estimate->gates : std::vector<Gate>{}) {
+    if (!gate.passed) failed += (failed.empty() ? "" : " ") + gate.name;
+  }
+  add(csv_text(failed));
+  add(feature.overridden ? csv_text(feature.overridden->reason) : "");
   return row;
 }
 

@@ -118,6 +118,7 @@ Ordered site_json(const Site& site) {
                 {"base",
                  {{"source", site.base_source.empty() ? Ordered(nullptr) : Ordered(site.base_source)},
                   {"sigma_m", or_null(site.base_sigma_m)}}}};
+  out["projected_epsg"] = or_null(site.projected_epsg);
   out["created_at"] = to_rfc3339(site.created);
   return out;
 }
@@ -159,6 +160,10 @@ void patch_site(const Json& body, bool whole, Site& site, std::vector<FieldError
     }
     inner.finish();
   }
+  if (const auto epsg = fields.integer("projected_epsg", 1024, 999'999))
+    site.projected_epsg = static_cast<int>(*epsg);
+  else if (cleared("projected_epsg"))
+    site.projected_epsg.reset();
   fields.finish();
 }
 
@@ -209,6 +214,8 @@ Ordered calibration_json(const Calibration& calibration, bool with_anchors) {
               {"origin", wgs84_json(calibration.origin)}};
   auto settings = Ordered::parse(calibration.settings_json, nullptr, false);
   out["settings"] = settings.is_discarded() ? Ordered::object() : std::move(settings);
+  auto provenance = Ordered::parse(calibration.provenance_json, nullptr, false);
+  out["provenance"] = provenance.is_object() ? std::move(provenance) : Ordered::object();
   if (!with_anchors) return out;
   Ordered anchors = Ordered::array();
   for (const auto& estimate : calibration.anchors)
@@ -230,7 +237,7 @@ Ordered published_json(const PublishedPosition& position) {
   Ordered out{{"revision", position.since_revision},
               {"published_at", to_rfc3339(position.published)},
               {"calibration", to_string(position.calibration)}};
-  out.update(estimate_result_json(position.estimate, position.frame));
+  out.update(estimate_result_json(position.estimate, position.frame, std::nullopt, position.overridden));
   return out;
 }
 

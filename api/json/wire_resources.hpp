@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
@@ -31,6 +32,16 @@ struct AnchorFeature {
   TrackFrame frame{TrackFrame::wgs84};
   std::optional<Estimate> estimate{};
   std::optional<Site> site{};
+  std::optional<Override> overridden{};
+  std::optional<Eigen::Vector3d> local_m{};  ///< in the positioning system's frame, where one is fitted
+  struct Projected {
+    int epsg{};
+    double e_m{}, n_m{};
+  };
+  std::optional<Projected> projected{};
+  std::string projected_reason;  ///< why there is none
+  std::optional<double> height_orthometric_m{};
+  std::string geoid;  ///< its name, or why there is none
 };
 nlohmann::ordered_json anchor_feature_json(const AnchorFeature& feature);
 /// No nested objects, for GIS readers.
@@ -39,9 +50,12 @@ nlohmann::ordered_json flat_feature_json(const AnchorFeature& feature);
 std::string anchors_csv_header();
 std::string anchor_csv_row(const AnchorFeature& feature);
 
+/// Value, limit and words of one gate.
+nlohmann::ordered_json gate_json(const Gate& gate);
 /// position, accuracy, quality and mirror of one estimate, as in calibrations.
 nlohmann::ordered_json estimate_result_json(const Estimate& estimate, TrackFrame frame,
-                                            const std::optional<Site>& site = {});
+                                            const std::optional<Site>& site = {},
+                                            const std::optional<Override>& overridden = {});
 nlohmann::ordered_json calibration_json(const Calibration& calibration, bool with_anchors);
 nlohmann::ordered_json revision_json(const Revision& revision);
 nlohmann::ordered_json published_json(const PublishedPosition& position);

@@ -2,11 +2,16 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "api/exports/kml.hpp"
+#include "api/json/frame_json.hpp"
 #include "api/json/live_writer.hpp"
 #include "api/json/reader.hpp"
 #include "api/json/wire_resources.hpp"
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
+#include "api/services/geo_service.hpp"
+#include "core/geo/enu.hpp"
+#include "core/ports/site_store.hpp"
 #include "core/ports/store.hpp"
 
 namespace anchord::api {
@@ -18,7 +23,7 @@ namespace {
 /// Sites and calibrations that features refer to, each read once.
 class Lookup {
  public:
-  explicit Lookup(AnchorStore& store) : store_(store) {}
+  explicit Lookup(Services& services) : services_(services), store_(services.deps.anchors) {}
   std::optional<Site> site(const std::optional<SiteId>& id) {
     if (!id) return std::nullopt;
     auto [it, fresh] = sites_.try_emplace(*id);
@@ -35,7 +40,40 @@ class Lookup {
     return it->second;
   }
 
+  /// What the position is called elsewhere: the positioning system's frame, the map, sea level.
+  void name_elsewhere(AnchorFeature& feature) {
+    if (!feature.estimate || !feature.estimate->best || !feature.estimate->best->wgs84) return;
+    const Wgs84& at = *feature.estimate->best->wgs84;
+    const auto map = services_.geo.projected(feature.site, at);
+    if (map)
+      feature.projected = {map.value().epsg, map.value().easting_northing_m.x(),
+                           map.value().easting_northing_m.y()};
+    else
+      feature.projected_reason = map.error().message;
+    const auto height = services_.geo.orthometric(at);
+    if (height) feature.height_orthometric_m = height.value().height_m;
+    feature.geoid = height ? height.value().geoid : height.error().message;
+    if (const auto* frame = local_frame(feature.anchor.site))
+      feature.local_m = frame->fit.transform.local_from(EnuFrame(frame->origin).enu_from_wgs84(at).m);
+  }
+
  private:
+  /// The first fitted frame of the site.
+  const FrameDefinition* local_frame(const std::optional<SiteId>& site) {
+    if (!site || services_.frames == nullptr) return nullptr;
+    auto [it, fresh] = frames_.try_emplace(*site);
+    if (fresh) {
+      if (const auto found = services_.frames->frames_of(*site)) {
+        for (const auto& frame : found.value()) {
+          if (!it->second) it->second = frame_definition(frame);
+        }
+      }
+    }
+    return it->second ? &*it->second : nullptr;
+  }
+
+  Services& services_;
+  std::map<SiteId, std::optional<FrameDefinition>> frames_;
   AnchorStore& store_;
   std::map<SiteId, std::optional<Site>> sites_;
   std::map<CalibrationId, std::vector<MissionId>> missions_;
@@ -53,6 +91,8 @@ AnchorFeature published_feature(Lookup& lookup, Anchor anchor, const PublishedPo
   feature.missions = lookup.missions(position.calibration);
   feature.frame = position.frame;
   feature.estimate = position.estimate;
+  feature.overridden = position.overridden;
+  lookup.name_elsewhere(feature);
   return feature;
 }
 
@@ -66,7 +106,7 @@ std::vector<AnchorFeature> published(Services& s, std::optional<std::uint64_t> r
                                      std::uint64_t& number) {
   number = revision ? *revision : newest_revision(s);
   if (number == 0) return {};
-  Lookup lookup(s.deps.anchors);
+  Lookup lookup(s);
   std::vector<AnchorFeature> out;
   for (const auto& position : value_or_problem(s.deps.anchors.published(number))) {
     auto anchor =
@@ -81,7 +121,7 @@ std::vector<AnchorFeature> published(Services& s, std::optional<std::uint64_t> r
 /// Running estimates; of an anchor that several missions hear the newest.
 std::vector<AnchorFeature> live(Services& s, const std::optional<MissionId>& mission) {
   if (mission) value_or_problem(s.missions.mission(*mission));
-  Lookup lookup(s.deps.anchors);
+  Lookup lookup(s);
   std::map<NetworkId, AnchorFeature> newest;
   for (const auto& view : s.missions.live(mission)) {
     for (const auto& estimate : view.estimates) {
@@ -201,7 +241,7 @@ Anchor path_anchor(Services& s, const Request& request) {
 }
 
 AnchorFeature feature_of(Services& s, const Anchor& anchor) {
-  Lookup lookup(s.deps.anchors);
+  Lookup lookup(s);
   std::uint64_t number = 0;
   for (auto& feature : published(s, std::nullopt, number)) {
     if (feature.anchor.network_id == anchor.network_id) return feature;
@@ -281,6 +321,16 @@ Response export_csv(Services& s, const Request& request) {
   return response;
 }
 
+Response export_kml(Services& s, const Request& request) {
+  check_query(request, {"revision", "site", "bbox"});
+  std::uint64_t number = 0;
+  Response response;
+  response.body = anchors_kml(wanted(s, request, number));
+  response.header("Content-Type", "application/vnd.google-earth.kml+xml");
+  response.header("Content-Disposition", "attachment; filename=\"anchors.kml\"");
+  return response;
+}
+
 }  // namespace
 
 void add_anchor_routes(Router& router, Services& s) {
@@ -298,6 +348,7 @@ void add_anchor_routes(Router& router, Services& s) {
   router.add({Method::get, "/api/v1/anchors/{id}/history", readers(), on(history)});
   router.add({Method::get, "/api/v1/exports/anchors.geojson", readers(), on(export_geojson)});
   router.add({Method::get, "/api/v1/exports/anchors.csv", readers(), on(export_csv)});
+  router.add({Method::get, "/api/v1/exports/anchors.kml", readers(), on(export_kml)});
 }
 
 }  // namespace anchord::api

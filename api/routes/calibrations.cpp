@@ -7,6 +7,8 @@
 #include "api/routes/job_answer.hpp"
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
+#include "api/services/calibration_report.hpp"
+#include "api/services/position_diff.hpp"
 #include "core/ports/store.hpp"
 
 namespace anchord::api {
@@ -24,8 +26,12 @@ Ordered published_in(Services& s, const CalibrationId& id) {
   return out;
 }
 
+void ask_whether_moved(Services& s, Calibration& calibration);
+
 Ordered whole(Services& s, const Calibration& calibration) {
-  Ordered body = calibration_json(calibration, true);
+  Calibration today = calibration;
+  ask_whether_moved(s, today);
+  Ordered body = calibration_json(today, true);
   body["published"] = published_in(s, calibration.id);
   return body;
 }
@@ -73,67 +79,171 @@ Response create(Services& s, const Request& request) {
   });
 }
 
-/// Which anchors a publication takes. Without a list: those whose verdict is ok. A list may name others only
-/// with a reason, which goes to the audit log (reliability.md section 4).
-std::vector<NetworkId> chosen(const Calibration& calibration, const nlohmann::json* list,
-                              const std::string& reason, std::vector<FieldError>& errors) {
-  std::vector<NetworkId> out;
-  if (list == nullptr) {
-    for (const auto& estimate : calibration.anchors) {
-      if (estimate.verdict == Verdict::ok && estimate.best) out.push_back(estimate.anchor);
+/// What holds an anchor back: every gate that failed, a verdict that is not ok, or no gates at all.
+std::vector<Gate> failures(const Estimate& estimate) {
+  std::vector<Gate> out;
+  if (estimate.verdict != Verdict::ok)
+    out.push_back({"verdict", std::nullopt, 0, false,
+                   std::string(verdict_word(estimate.verdict)) + ": " + estimate.reason});
+  for (const auto& gate : estimate.gates) {
+    if (!gate.passed) out.push_back(gate);
+  }
+  if (estimate.gates.empty())
+    out.push_back({"gates", std::nullopt, 0, false, "this calibration was made without acceptance gates"});
+  return out;
+}
+
+/// The answer to a publication of anchors that may not be accepted without a person: all of it, as gates.
+[[noreturn]] void throw_gates(const std::map<NetworkId, std::vector<Gate>>& refused) {
+  std::vector<FieldError> errors;
+  Ordered gates = Ordered::array();
+  for (const auto& [id, list] : refused) {
+    for (const auto& gate : list) {
+      errors.push_back({"/anchors", "gate", to_string(id) + " " + gate.name + ": " + gate.why});
+      Ordered one = gate_json(gate);
+      Ordered item{{"network_id", to_string(id)}};
+      item.update(one);
+      gates.push_back(std::move(item));
     }
-    if (out.empty())
-      throw_problem(422, "state",
-                    "no anchor of this calibration has the verdict ok; name anchors and give a reason to "
-                    "publish them all the same");
-    return out;
   }
-  if (!list->is_array() || list->empty() || list->size() > 10'000) {
-    errors.push_back({"/anchors", "wrong_type", "must be an array of network ids"});
-    return out;
-  }
-  std::string refused;
-  for (std::size_t i = 0; i < list->size(); ++i) {
-    const auto& item = (*list)[i];
-    const std::string at = "/anchors/" + std::to_string(i);
+  Response response = problem(409, "conflict",
+                              std::to_string(refused.size()) +
+                                  " anchors fail a gate; publish them by an override with a reason, each",
+                              errors);
+  auto body = Ordered::parse(response.body);
+  body["gates"] = std::move(gates);
+  response.body = body.dump();
+  throw ProblemException{std::move(response)};
+}
+
+struct PublishRequest {
+  std::string note;
+  std::optional<std::vector<NetworkId>> anchors;  ///< absent: every acceptable one
+  std::map<NetworkId, std::string> overrides;     ///< reason
+};
+
+PublishRequest read_publish(const nlohmann::json& body) {
+  std::vector<FieldError> errors;
+  Fields fields(body, "", errors);
+  PublishRequest out;
+  out.note = fields.text("note", 500).value_or("");
+  const auto reason = fields.text("reason", 500).value_or("");
+  const auto id_at = [&](const nlohmann::json& item, const std::string& at) -> std::optional<NetworkId> {
     const auto id = parse_network_id(item.is_string() ? item.get_ref<const std::string&>() : "");
-    if (!id) {
-      errors.push_back({at, "bad_id", id.error().message});
-      continue;
-    }
-    const Estimate* found = nullptr;
-    for (const auto& estimate : calibration.anchors) {
-      if (estimate.anchor == id.value()) found = &estimate;
-    }
-    if (found == nullptr || !found->best)
-      errors.push_back({at, "no_position", "the calibration has no position of " + to_string(id.value())});
-    else if (found->verdict != Verdict::ok && reason.empty())
-      refused += (refused.empty() ? "" : "; ") + to_string(id.value()) + " is " +
-                 std::string(verdict_word(found->verdict)) + ": " + found->reason;
+    if (id) return id.value();
+    errors.push_back({at, "bad_id", id.error().message});
+    return std::nullopt;
+  };
+  if (const auto* list = fields.child("anchors")) {
+    out.anchors.emplace();
+    if (!list->is_array() || list->empty() || list->size() > 10'000)
+      errors.push_back({"/anchors", "wrong_type", "must be an array of network ids"});
     else
-      out.push_back(id.value());
+      for (std::size_t i = 0; i < list->size(); ++i) {
+        const auto id = id_at((*list)[i], "/anchors/" + std::to_string(i));
+        if (!id) continue;
+        out.anchors->push_back(*id);
+        if (!reason.empty()) out.overrides[*id] = reason;  // one reason for all that are named
+      }
+  }
+  if (const auto* list = fields.child("overrides")) {
+    if (!list->is_array() || list->size() > 10'000)
+      errors.push_back({"/overrides", "wrong_type", "must be an array of {network_id, reason}"});
+    else
+      for (std::size_t i = 0; i < list->size(); ++i) {
+        const std::string at = "/overrides/" + std::to_string(i);
+        Fields inner((*list)[i], at, errors);
+        const auto text = inner.text("network_id", 20, true);
+        const auto why = inner.text("reason", 500, true);
+        inner.finish();
+        if (!text || !why) continue;
+        if (why->empty()) errors.push_back({at + "/reason", "required", "an override needs a reason"});
+        if (const auto id = id_at(*text, at + "/network_id")) out.overrides[*id] = *why;
+      }
+  }
+  fields.finish();
+  refuse_if_any(errors);
+  return out;
+}
+
+/// The calibration as it stands today: gate "moved" is asked against what is published now.
+void ask_whether_moved(Services& s, Calibration& calibration) {
+  const auto before = placed(value_or_problem(s.deps.anchors.published(std::nullopt)));
+  const auto now = placed(calibration);
+  for (const auto& change : changes(now, before)) {
+    if (!change.gate) continue;
+    for (auto& estimate : calibration.anchors) {
+      if (estimate.anchor != change.anchor) continue;
+      std::erase_if(estimate.gates, [](const Gate& g) { return g.name == "moved"; });
+      estimate.gates.push_back(*change.gate);
+    }
+  }
+}
+
+/// Which anchors a publication takes and which of them only by a person's word.
+std::vector<NetworkId> chosen(const Calibration& calibration, const PublishRequest& wanted,
+                              std::vector<Override>& overrides, const std::string& by) {
+  std::vector<NetworkId> out;
+  std::map<NetworkId, std::vector<Gate>> refused;
+  std::vector<FieldError> errors;
+  std::map<NetworkId, const Estimate*> known;
+  for (const auto& estimate : calibration.anchors) {
+    if (estimate.best) known[estimate.anchor] = &estimate;
+  }
+  const auto take = [&](const Estimate& estimate, bool asked_for) {
+    if (estimate.acceptable()) return out.push_back(estimate.anchor);
+    const auto reason = wanted.overrides.find(estimate.anchor);
+    if (reason != wanted.overrides.end() && !reason->second.empty()) {
+      overrides.push_back({estimate.anchor, reason->second, by});
+      return out.push_back(estimate.anchor);
+    }
+    if (asked_for) refused[estimate.anchor] = failures(estimate);
+  };
+  for (const auto& [id, reason] : wanted.overrides) {
+    if (known.count(id) == 0)
+      errors.push_back({"/overrides", "no_position", "the calibration has no position of " + to_string(id)});
+  }
+  if (wanted.anchors) {
+    for (std::size_t i = 0; i < wanted.anchors->size(); ++i) {
+      const NetworkId id = (*wanted.anchors)[i];
+      if (known.count(id) > 0)
+        take(*known[id], true);
+      else
+        errors.push_back({"/anchors/" + std::to_string(i), "no_position",
+                          "the calibration has no position of " + to_string(id)});
+    }
+  } else {
+    for (const auto& [id, estimate] : known) take(*estimate, false);
   }
   refuse_if_any(errors);
-  if (!refused.empty()) throw_problem(422, "state", refused + " (give a reason to publish all the same)");
+  if (!refused.empty()) throw_gates(refused);
+  if (out.empty()) {
+    for (const auto& [id, estimate] : known) refused[id] = failures(*estimate);
+    if (!refused.empty()) throw_gates(refused);
+    throw_problem(409, "conflict", "no anchor of this calibration has a position");
+  }
   return out;
 }
 
 Response publish(Services& s, const Request& request) {
-  const auto calibration = value_or_problem(s.deps.anchors.calibration(path_id<CalibrationId>(request)));
-  const auto body = json_body(request, true);
-  std::vector<FieldError> errors;
-  Fields fields(body, "", errors);
-  const auto note = fields.text("note", 500).value_or("");
-  const auto reason = fields.text("reason", 500).value_or("");
-  const auto* list = fields.child("anchors");
-  fields.finish();
-  refuse_if_any(errors);
-  const auto anchors = chosen(calibration, list, reason, errors);
+  auto calibration = value_or_problem(s.deps.anchors.calibration(path_id<CalibrationId>(request)));
+  const auto wanted = read_publish(json_body(request, true));
+  ask_whether_moved(s, calibration);
+  std::vector<Override> overrides;
+  const auto anchors = chosen(calibration, wanted, overrides, request.principal.token_id);
   // Audited before it happens: a publication that nobody can be asked about must not exist.
-  s.audit(request,
-          "calibration.publish " + to_string(calibration.id) + (reason.empty() ? "" : " reason: " + reason));
-  const auto revision = value_or_problem(
-      s.deps.anchors.publish(calibration.id, anchors, request.principal.token_id, note, s.deps.clock.now()));
+  s.audit(request, "calibration.publish " + to_string(calibration.id));
+  for (const auto& one : overrides) {
+    std::string words;
+    for (const auto& estimate : calibration.anchors) {
+      if (estimate.anchor != one.anchor) continue;
+      for (const auto& gate : failures(estimate)) words += ' ' + gate.name + " (" + gate.why + ")";
+    }
+    s.audit(request, "calibration.override " + to_string(calibration.id) + ' ' + to_string(one.anchor) +
+                         " reason: " + one.reason + "; failed:" + words);
+  }
+  const auto revision = value_or_problem(s.deps.anchors.publish(
+      calibration.id, anchors, request.principal.token_id, wanted.note, s.deps.clock.now(), overrides));
   for (const auto& id : anchors) value_or_problem(s.deps.anchors.find_or_create(id, s.deps.clock.now()));
   s.hub.publish(Topic::revisions,
                 Ordered{{"revision", revision.number},
@@ -141,23 +251,47 @@ Response publish(Services& s, const Request& request) {
                         {"calibration", to_string(calibration.id)}}
                     .dump(),
                 revision.published.us());
-  s.events.add("info", "revision.published",
+  s.events.add(overrides.empty() ? "info" : "warning", "revision.published",
                "revision " + std::to_string(revision.number) + " with " + std::to_string(anchors.size()) +
-                   " anchors published");
+                   " anchors published" +
+                   (overrides.empty() ? "" : ", " + std::to_string(overrides.size()) + " by override"));
   Ordered answer = revision_json(revision);
-  Ordered taken = Ordered::array(), left = Ordered::array();
+  Ordered taken = Ordered::array(), left = Ordered::array(), overridden = Ordered::array();
   for (const auto& id : anchors) taken.push_back(to_string(id));
+  for (const auto& one : overrides)
+    overridden.push_back({{"network_id", to_string(one.anchor)}, {"reason", one.reason}});
   for (const auto& estimate : calibration.anchors) {
-    if (std::find(anchors.begin(), anchors.end(), estimate.anchor) == anchors.end()) {
-      left.push_back({{"network_id", to_string(estimate.anchor)},
-                      {"verdict", verdict_word(estimate.verdict)},
-                      {"reason", estimate.reason}});
-    }
+    if (std::find(anchors.begin(), anchors.end(), estimate.anchor) != anchors.end()) continue;
+    Ordered gates = Ordered::array();
+    for (const auto& gate : failures(estimate)) gates.push_back(gate_json(gate));
+    left.push_back({{"network_id", to_string(estimate.anchor)},
+                    {"verdict", verdict_word(estimate.verdict)},
+                    {"reason", estimate.reason},
+                    {"gates", std::move(gates)}});
   }
   answer["anchors"] = std::move(taken);
+  answer["overrides"] = std::move(overridden);
   answer["left_out"] = std::move(left);
   Response response = json_response(201, answer);
   response.header("Location", "/api/v1/anchors?revision=" + std::to_string(revision.number));
+  return response;
+}
+
+/// One printable page, complete in itself.
+Response report(Services& s, const Request& request) {
+  check_query(request, {});
+  auto calibration = value_or_problem(s.deps.anchors.calibration(path_id<CalibrationId>(request)));
+  const auto page = value_or_problem(
+      calibration_report(s.deps.anchors, s.deps.missions, calibration, "anchord " + s.deps.build.version));
+  Response response;
+  response.header("Content-Type", "text/html; charset=utf-8");
+  // No script may run in it and nothing is fetched; its own style is all it has.
+  response.header("Content-Security-Policy",
+                  "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'; "
+                  "frame-ancestors 'none'");
+  response.header("Content-Disposition",
+                  "inline; filename=\"calibration-" + to_string(calibration.id).substr(0, 8) + ".html\"");
+  response.body = report_html(page);
   return response;
 }
 
@@ -203,6 +337,7 @@ void add_calibration_routes(Router& router, Services& s) {
                 response.status = 204;
                 return response;
               }});
+  router.add({Method::get, "/api/v1/calibrations/{id}/report", readers(), on(report)});
   router.add({Method::post, "/api/v1/calibrations/{id}/publish", Access::any_of({Role::engineer, Role::op}),
               on(publish)});
   router.add({Method::get, "/api/v1/revisions", readers(), on(revisions)});

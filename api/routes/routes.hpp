@@ -9,6 +9,9 @@
 
 namespace anchord::api {
 
+class GeoService;
+class KitProfiles;
+
 /// What the routes work with; lives as long as the Application.
 struct Services {
   Application::Deps& deps;
@@ -18,6 +21,9 @@ struct Services {
   IngestService& ingest;
   JobService& jobs;
   CalibrationService& calibrations;
+  GeoService& geo;
+  KitProfiles* profiles{nullptr};  ///< null: their routes do not exist
+  FrameStore* frames{nullptr};     ///< null: their routes do not exist
 
   StorageStatus storage() const { return deps.storage_status ? deps.storage_status() : StorageStatus{}; }
   /// One line in the audit log: who did what from where.
@@ -28,6 +34,9 @@ void add_mission_routes(Router& router, Services& services);
 void add_measurement_routes(Router& router, Services& services);
 void add_site_routes(Router& router, Services& services);
 void add_anchor_routes(Router& router, Services& services);
+void add_comparison_routes(Router& router, Services& services);
+void add_frame_routes(Router& router, Services& services);
+void add_kit_routes(Router& router, Services& services);
 void add_calibration_routes(Router& router, Services& services);
 void add_job_routes(Router& router, Services& services);
 void add_system_routes(Router& router, Services& services);

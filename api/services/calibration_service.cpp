@@ -1,11 +1,14 @@
 #include "api/services/calibration_service.hpp"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "api/exports/evidence.hpp"
 #include "api/json/reader.hpp"
 #include "api/json/wire_resources.hpp"
 #include "api/services/job_service.hpp"
+#include "api/services/kit_profiles.hpp"
 #include "core/geo/enu.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "core/localize/fuse.hpp"
@@ -57,6 +60,8 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
   if (const auto gap = fields.number("max_gap_s", 0.01, 10)) options.max_gap_s = *gap;
   if (const auto fix = fields.word("min_fix", {"none", "single", "dgps", "float", "fixed"}))
     options.min_fix = static_cast<FixClass>(*fix);
+  if (const auto profile = fields.word("profile", {"kit", "none"})) out.use_profile = *profile == 0;
+  if (const auto steps = fields.integer("iterations", 0, 50)) out.iterations = static_cast<int>(*steps);
   for (const char* later :
        {"frame", "use_anchor_anchor", "models", "sigma_m", "initial", "compare_uncorrected"}) {
     if (fields.child(later) != nullptr)
@@ -93,60 +98,184 @@ Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission,
   return flight;
 }
 
-Result<Job> CalibrationService::submit(CalibrationRequest request) {
-  for (const auto& id : request.missions) {
-    BOOST_OUTCOME_TRYV(deps_.missions.mission(id));
-  }
-  const std::string settings = request.settings_json;
-  return deps_.jobs.submit("calibration", settings,
-                           [this, wanted = std::move(request)](JobContext& job) -> Result<JobEnd> {
-                             BOOST_OUTCOME_TRY(const auto made, solve(wanted, job));
-                             BOOST_OUTCOME_TRYV(deps_.anchors.insert(made));
-                             return JobEnd{"/api/v1/calibrations/" + to_string(made.id),
-                                           std::to_string(made.anchors.size()) + " anchors"};
-                           });
-}
-
-Result<Calibration> CalibrationService::solve(const CalibrationRequest& request, JobContext& job) {
-  const auto canceled_now = [&] { return job.canceled(); };
+/// Flights by the place they have in the request; those to learn from stand behind.
+struct CalibrationService::Solved {
+  Calibration calibration;
   std::vector<FlightData> flights;
-  std::vector<MissionId> all = request.missions;
-  all.insert(all.end(), request.learn_from.begin(), request.learn_from.end());
-  for (const auto& id : all) {
-    BOOST_OUTCOME_TRY(auto mission, deps_.missions.mission(id));
-    BOOST_OUTCOME_TRY(auto flight, load_flight(deps_.measurements, mission, canceled_now));
-    flights.push_back(std::move(flight));
-    job.progress(0.3 * static_cast<double>(flights.size()) / static_cast<double>(all.size()), "load",
-                 flights.back().mission.name);
+  std::vector<std::optional<FlightSolution>> solutions;
+  std::vector<KitProfile> learned;
+  Json profiles = Json::array();
+  Evidence evidence;
+
+  std::vector<std::size_t> of_kit(const std::string& kit) const {
+    std::vector<std::size_t> out;
+    for (std::size_t i = 0; i < flights.size(); ++i) {
+      if (flights[i].mission.kit == kit) out.push_back(i);
+    }
+    return out;
   }
-  FlightOptions options = request.options;
-  options.canceled = canceled_now;
-  Calibration out;
+  std::vector<Mission> missions() const {
+    std::vector<Mission> out;
+    for (const auto& flight : flights) out.push_back(flight.mission);
+    return out;
+  }
+};
+
+namespace {
+
+/// One frame for all flights, so that their answers can be compared.
+Result<void> choose_frame(const std::vector<FlightData>& flights, FlightOptions& options, Calibration& out) {
   out.frame = flights.front().mission.frame;
   for (const auto& flight : flights) {
     if (flight.mission.frame != out.frame)
       return make_error(Errc::invalid_argument,
                         "missions on the globe and in a local frame cannot be solved together");
     if (out.frame != TrackFrame::wgs84 || options.origin) continue;
-    for (const auto& fix :
-         flight.fixes) {  // one frame for all flights, so that their answers can be compared
+    for (const auto& fix : flight.fixes) {
       if (fix.fix >= options.min_fix && fix.frame == TrackFrame::wgs84) {
         options.origin = fix.position;
         break;
       }
     }
   }
-  job.progress(0.3, "solve", std::to_string(flights.size()) + " flights");
-  std::vector<const FlightData*> pointers;
-  for (const auto& flight : flights) pointers.push_back(&flight);
-  BOOST_OUTCOME_TRY(auto solutions, solve_flights(pointers, options));
-  if (canceled_now()) return make_error(Errc::canceled, "canceled");
   out.origin = out.frame == TrackFrame::wgs84 ? options.origin : std::nullopt;
+  return boost::outcome_v2::success();
+}
+
+/// A flight solved with other than the house's settings says other things about its kit.
+bool teaches(const FlightOptions& options) {
+  const FlightOptions usual;
+  return options.loss == usual.loss && options.weights == usual.weights && options.dims == usual.dims &&
+         options.min_fix == usual.min_fix && options.mad_factor == usual.mad_factor && !options.fixed_bias_m;
+}
+
+bool believed(const FlightSolution& solution) {
+  return std::ranges::any_of(solution.anchors,
+                             [](const AnchorSolution& a) { return a.estimate.verdict == Verdict::ok; });
+}
+
+Json site_base(const Site& site) {
+  const auto text = [](const std::string& t) { return t.empty() ? Json(nullptr) : Json(t); };
+  return {{"site", to_string(site.id)},
+          {"frame", text(site.crs_frame)},
+          {"epoch", site.crs_epoch ? Json(*site.crs_epoch) : Json(nullptr)},
+          {"source", text(site.base_source)},
+          {"sigma_m", site.base_sigma_m ? Json(*site.base_sigma_m) : Json(nullptr)}};
+}
+
+Json flight_provenance(const FlightData& flight, const FlightSolution& s) {
+  const auto valued = [](const Valued& v) { return Json{{"value", v.value}, {"sigma", v.sigma}}; };
+  return {{"mission", to_string(flight.mission.id)},
+          {"name", flight.mission.name},
+          {"kit", flight.mission.kit},
+          {"bias_m", valued(s.shared.bias_m)},
+          {"curve_m_per_efold", valued(s.shared.curve_m)},
+          {"lag_s", valued(s.shared.lag_s)},
+          {"lever_up_m", valued(s.shared.lever_up_m)},
+          {"bias_determined", s.shared.bias_determined},
+          {"n_fixes", s.n_fixes},
+          {"n_ranges", s.n_ranges},
+          {"n_used", s.n_used},
+          {"refused", s.refused},
+          {"notes", s.notes}};
+}
+
+}  // namespace
+
+Result<Job> CalibrationService::submit(CalibrationRequest request) {
+  for (const auto& id : request.missions) {
+    BOOST_OUTCOME_TRYV(deps_.missions.mission(id));
+  }
+  const std::string settings = request.settings_json;
+  return deps_.jobs.submit(
+      "calibration", settings, [this, wanted = std::move(request)](JobContext& job) -> Result<JobEnd> {
+        BOOST_OUTCOME_TRY(const auto solved, solve(wanted, job));
+        const Calibration& made = solved.calibration;
+        BOOST_OUTCOME_TRYV(deps_.anchors.insert(made));
+        const std::string id = to_string(made.id);
+        for (const auto& profile : solved.learned) {
+          BOOST_OUTCOME_TRYV(deps_.profiles->learn(profile, solved.missions(), "calibration " + id));
+        }
+        return JobEnd{"/api/v1/calibrations/" + id, std::to_string(made.anchors.size()) + " anchors"};
+      });
+}
+
+/// All flights of one kit together, with what the kit's stored profile says about them.
+Result<void> CalibrationService::solve_kit(const CalibrationRequest& request, const FlightOptions& options,
+                                           Solved& solved, const std::string& kit) {
+  FlightOptions of_kit = options;
+  std::uint64_t version = 0;
+  const bool stored = deps_.profiles != nullptr && request.use_profile && !kit.empty();
+  if (stored && !of_kit.fixed_bias_m) {
+    BOOST_OUTCOME_TRY(auto profile, deps_.profiles->for_flights(kit, solved.missions()));
+    if (profile) {
+      of_kit.profile = std::move(profile->profile);
+      version = profile->version;
+    }
+  }
+  const auto members = solved.of_kit(kit);
+  std::vector<FlightData> named;
+  for (const std::size_t i : members) {
+    named.push_back(solved.flights[i]);
+    // Factors of a profile are told apart by this name.
+    named.back().mission.name = KitProfiles::flight_key(solved.flights[i].mission);
+  }
+  std::vector<const FlightData*> pointers;
+  for (const auto& flight : named) pointers.push_back(&flight);
+  KitProfile learned;
+  BOOST_OUTCOME_TRY(auto answers, solve_flights(pointers, of_kit, &learned));
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    if (!believed(answers[k]))
+      std::erase_if(learned.factors,
+                    [&](const ProfileFactor& f) { return f.flight == named[k].mission.name; });
+    solved.solutions[members[k]] = std::move(answers[k]);
+  }
+  if (!kit.empty()) {
+    solved.profiles.push_back({{"kit", kit},
+                               {"version", version > 0 ? Json(version) : Json(nullptr)},
+                               {"n_flights", of_kit.profile ? of_kit.profile->factors.size() : 0}});
+    if (stored && teaches(options)) solved.learned.push_back(std::move(learned));
+  }
+  if (request.iterations > 0 && !members.empty() && members.front() < request.missions.size() &&
+      solved.evidence.course.empty()) {
+    BOOST_OUTCOME_TRY(solved.evidence.course, course_of(named.front(), of_kit, request.iterations));
+  }
+  return boost::outcome_v2::success();
+}
+
+Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRequest& request,
+                                                             JobContext& job) {
+  const auto canceled_now = [&] { return job.canceled(); };
+  Solved solved;
+  std::vector<MissionId> all = request.missions;
+  all.insert(all.end(), request.learn_from.begin(), request.learn_from.end());
+  for (const auto& id : all) {
+    BOOST_OUTCOME_TRY(auto mission, deps_.missions.mission(id));
+    BOOST_OUTCOME_TRY(auto flight, load_flight(deps_.measurements, mission, canceled_now));
+    solved.flights.push_back(std::move(flight));
+    job.progress(0.3 * static_cast<double>(solved.flights.size()) / static_cast<double>(all.size()), "load",
+                 solved.flights.back().mission.name);
+  }
+  FlightOptions options = request.options;
+  options.canceled = canceled_now;
+  Calibration& out = solved.calibration;
+  BOOST_OUTCOME_TRYV(choose_frame(solved.flights, options, out));
+  job.progress(0.3, "solve", std::to_string(solved.flights.size()) + " flights");
+  solved.solutions.resize(solved.flights.size());
+  std::set<std::string> kits;
+  for (const auto& flight : solved.flights) kits.insert(flight.mission.kit);
+  for (const auto& kit : kits) {
+    BOOST_OUTCOME_TRYV(solve_kit(request, options, solved, kit));
+  }
+  if (canceled_now()) return make_error(Errc::canceled, "canceled");
 
   std::map<NetworkId, std::vector<Estimate>> by_anchor;
+  Json flights = Json::array();
   for (std::size_t i = 0; i < request.missions.size(); ++i) {
-    const auto& solution = solutions[i];
+    const auto& solution = *solved.solutions[i];
     for (const auto& anchor : solution.anchors) by_anchor[anchor.estimate.anchor].push_back(anchor.estimate);
+    solved.evidence.flights.push_back(evidence_of(solved.flights[i], solution, out.origin));
+    flights.push_back(flight_provenance(solved.flights[i], solution));
   }
   for (const auto& [id, estimates] : by_anchor) {
     Estimate estimate = fuse_estimates(estimates);
@@ -157,12 +286,22 @@ Result<Calibration> CalibrationService::solve(const CalibrationRequest& request,
     }
     out.anchors.push_back(std::move(estimate));
   }
+  Json base = nullptr;
+  if (const auto& site = solved.flights.front().mission.site) {
+    if (const auto found = deps_.anchors.site(*site)) base = site_base(found.value());
+  }
+  out.provenance_json = Json{
+      {"profiles", std::move(solved.profiles)},
+      {"base", std::move(base)},
+      {"flights",
+       std::move(flights)}}.dump();
+  out.evidence_json = evidence_json(solved.evidence);
   out.created = deps_.clock.now();
   out.id.uuid = job.job().id.uuid;  // the job and what it makes share their number
   out.missions = request.missions;
   out.settings_json = request.settings_json;
   job.progress(0.95, "store", "");
-  return out;
+  return solved;
 }
 
 }  // namespace anchord::api

@@ -15,6 +15,7 @@
 namespace anchord::api {
 
 class JobContext;
+class KitProfiles;
 class JobService;
 
 /// A batch solve as asked for.
@@ -24,6 +25,8 @@ struct CalibrationRequest {
       learn_from;  ///< other flights of the same kit: they tell its bias and lag, not positions
   FlightOptions options;
   std::string settings_json;  ///< as accepted
+  bool use_profile{true};     ///< the kit's stored profile tells the prior, and learns from these flights
+  int iterations{0};          ///< growing parts of each flight solved too, for the report's curves
 };
 
 /// Reads the body of POST /calibrations; what is wrong is appended to `errors`. Settings this build does not
@@ -43,6 +46,7 @@ class CalibrationService {
     AnchorStore& anchors;
     JobService& jobs;
     const Clock& clock;
+    KitProfiles* profiles{nullptr};  ///< null: flights learn from each other alone
   };
   explicit CalibrationService(Deps deps) : deps_(deps) {}
 
@@ -50,7 +54,11 @@ class CalibrationService {
   Result<Job> submit(CalibrationRequest request);
 
  private:
-  Result<Calibration> solve(const CalibrationRequest& request, JobContext& job);
+  /// A calibration and what the profiles of its kits should learn from it.
+  struct Solved;
+  Result<Solved> solve(const CalibrationRequest& request, JobContext& job);
+  Result<void> solve_kit(const CalibrationRequest& request, const FlightOptions& options, Solved& solved,
+                         const std::string& kit);
   Deps deps_;
 };
 

@@ -185,6 +185,8 @@ void App::State::compose() {
   deps.build = {ANCHORD_VERSION, ANCHORD_GIT, ANCHORD_BUILD_TYPE, __VERSION__,
                 database->health().schema_version};
   deps.access = access.get();
+  deps.kits = &database->kits();
+  deps.frames = &database->frames();
   deps.post = [this](std::function<void()> task) {
     if (!live_pool->try_submit(task)) task();  // a full queue slows the sender, loses nothing
   };

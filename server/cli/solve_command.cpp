@@ -10,6 +10,7 @@
 #include "core/localize/flight_solver.hpp"
 #include "core/localize/kit_prior.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/solve_report.hpp"
 
 namespace anchord::cli {
 namespace {
@@ -24,6 +25,7 @@ struct Arguments {
   int dims{3};
   std::optional<double> bias_m, height_m;
   std::string profile, out;
+  SolveReportOptions report;
 };
 
 int complain(const Error& error) {
@@ -99,6 +101,16 @@ int solve(const Arguments& a) {
                                                      : SolveFormat::table;
   const std::string text = solve_output(solved, format);
   std::fwrite(text.data(), 1, text.size(), stdout);
+  for (std::size_t i = 0; i < solved.size() && !a.report.file.empty(); ++i) {
+    SolveReportOptions one = a.report;
+    if (solved.size() > 1)
+      one.file.replace_filename(one.file.stem().string() + "-" + std::to_string(i + 1) +
+                                one.file.extension().string());
+    std::fprintf(stderr, "writing %s\n", one.file.c_str());
+    if (const auto written = write_solve_report(*solved[i].data, *solved[i].solution, options.value(), one);
+        !written)
+      return complain(written.error());
+  }
   return std::fflush(stdout) == 0 ? 0 : 1;
 }
 
@@ -177,6 +189,14 @@ void add_solve_command(CLI::App& app, int& exit_code) {
   add_options(*command, *arguments);
   command->add_option("--format", arguments->format, "table, json, geojson or csv, on standard output")
       ->check(CLI::IsMember({"table", "json", "geojson", "csv"}));
+  command->add_option("--report", arguments->report.file,
+                      "Also write a printable page to this HTML file; of several flights FILE-1.html, ...");
+  command->add_option("--truth", arguments->report.truth,
+                      "For the page: anchors_truth.csv with the surveyed positions to compare with");
+  command
+      ->add_option("--iterations", arguments->report.iterations,
+                   "For the page: growing parts of the flight to solve, for the error curves; 0 for none")
+      ->check(CLI::Range(0, 50));
   command->callback([arguments, &exit_code] { exit_code = solve(*arguments); });
 }
 

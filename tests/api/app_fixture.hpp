@@ -37,13 +37,12 @@ class AppFixture : public ::testing::Test {
     auto opened = open_database(options);
     ASSERT_TRUE(opened.has_value()) << opened.error().message;
     database_ = std::move(opened).value();
-    app_ = std::make_unique<api::Application>(api::Application::Deps{database_->measurements(),
-                                                                     database_->missions(),
-                                                                     database_->anchors(),
-                                                                     database_->jobs(),
-                                                                     database_->access(),
-                                                                     clock_,
-                                                                     {"0.1.0", "test", "", "", 1}});
+    api::Application::Deps deps{database_->measurements(),   database_->missions(), database_->anchors(),
+                                database_->jobs(),           database_->access(),   clock_,
+                                {"0.1.0", "test", "", "", 1}};
+    deps.kits = &database_->kits();
+    deps.frames = &database_->frames();
+    app_ = std::make_unique<api::Application>(std::move(deps));
     app_->start();
   }
   void restart() {

@@ -28,14 +28,17 @@ class Contract : public AppFixture {};
 
 TEST_F(Contract, EveryOperationHasARouteAndEveryRouteAnOperation) {
   api::AccessService access(database_->tokens(), database_->access(), clock_);
-  api::Application app({database_->measurements(),
-                        database_->missions(),
-                        database_->anchors(),
-                        database_->jobs(),
-                        database_->access(),
-                        clock_,
-                        {},
-                        &access});
+  api::Application::Deps deps{database_->measurements(),
+                              database_->missions(),
+                              database_->anchors(),
+                              database_->jobs(),
+                              database_->access(),
+                              clock_,
+                              {},
+                              &access};
+  deps.kits = &database_->kits();
+  deps.frames = &database_->frames();
+  api::Application app(std::move(deps));
   std::set<std::string> served;
   for (const auto& route : app.router().routes())
     served.insert(std::string(to_string(route.method)) + ' ' + route.pattern);

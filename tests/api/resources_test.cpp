@@ -36,6 +36,7 @@ class Resources : public AppFixture {
       e.h95_m = 0.05;
       e.v95_m = 0.06;
       e.n_used = 100;
+      e.gates = {{"redundancy", 96.0, 30.0, true, ""}};
       c.anchors.push_back(e);
     }
     EXPECT_TRUE(database_->anchors().insert(c).has_value());
@@ -101,7 +102,7 @@ TEST_F(Resources, PublishOnlyWhatIsBelievedUnlessAReasonIsGiven) {
   const auto id = calibration();
   EXPECT_TRUE(json(get("/api/v1/anchors"))["features"].empty());
   EXPECT_TRUE(json(get("/api/v1/anchors"))["revision"].is_null());
-  EXPECT_EQ(post("/api/v1/calibrations/" + id + "/publish", R"({"anchors":["0x6a3c"]})").status, 422);
+  EXPECT_EQ(post("/api/v1/calibrations/" + id + "/publish", R"({"anchors":["0x6a3c"]})").status, 409);
   const auto published = post("/api/v1/calibrations/" + id + "/publish", R"({"note":"first"})");
   ASSERT_EQ(published.status, 201) << published.body;
   EXPECT_EQ(json(published)["anchors"], Json::array({"0x6a2f"}));

@@ -37,13 +37,26 @@ test('a calibration, published', async () => {
   const job = await call('POST', '/api/v1/calibrations', { json: { missions: [ids.mission] } });
   assert.ok([200, 201, 202].includes(job.status));
   await call('POST', `/api/v1/calibrations/${ids.calibration}/publish`, { json: {} });
+  // Its kit learned from it; a first profile of another one is put.
+  const profile = (await call('GET', `/api/v1/devices/${flight.mission.kit}/profile`, { expect: 200 }));
+  await call('PUT', `/api/v1/devices/${flight.mission.kit}/profile`, { expect: 428, json: profile.json.profile });
+  await call('PUT', `/api/v1/devices/${flight.mission.kit}/profile`, { expect: 200, json: profile.json.profile, headers: { 'if-match': profile.headers.get('etag') } });
+});
+
+test('a local frame, fitted to the published anchors', async () => {
+  ids.frame = (await call('POST', '/api/v1/frames', { expect: 201, json: { name: 'hall-a' } })).json.id;
+  const { json } = await call('GET', '/api/v1/anchors', { expect: 200 });
+  const pairs = json.features.map(({ properties }) => ({ anchor: properties.network_id, local_m: properties.enu_m }));
+  const fit = await call('POST', `/api/v1/frames/${ids.frame}/fit`, { expect: 200, json: { pairs, parameters: 4 } });
+  assert.ok(fit.json.fit.rms_m < 0.001, `ENU numbers are a local frame of their own: ${fit.json.fit.rms_m}`);
+  await call('POST', '/api/v1/transform', { expect: 200, json: { from: 'local', to: 'geo', frame: 'hall-a', points: [pairs[0].local_m] } });
 });
 
 test('everything that can be read', async () => {
   ids.job = (await call('GET', '/api/v1/jobs', { expect: 200 })).json.items[0]?.id;
   ids.range = (await call('GET', `/api/v1/ranges?mission=${ids.spare}`, { expect: 200 })).json.items[0].id;
   ids.anchor = '0x6a21';
-  const given = { '/sites/': ids.site, '/missions/': ids.mission, '/ranges/': ids.range, '/anchors/': ids.anchor, '/calibrations/': ids.calibration, '/jobs/': ids.job };
+  const given = { '/sites/': ids.site, '/missions/': ids.mission, '/ranges/': ids.range, '/anchors/': ids.anchor, '/calibrations/': ids.calibration, '/jobs/': ids.job, '/devices/': flight.mission.kit, '/frames/': ids.frame, '/revisions/': '1' };
   const wrong = [];  // all at once, as a person wants them
   for (const { method, template } of contract.operations.filter((o) => o.method === 'get')) {
     if (template === '/api/v1/ws') continue;  // its own test below
@@ -66,7 +79,7 @@ test('everything that can be read', async () => {
 
 test('changes with preconditions, tokens, sessions, tickets', async () => {
   const patch = { headers: { 'content-type': 'application/merge-patch+json' }, body: '{"name":"Hall A"}' };
-  for (const path of ['/api/v1/anchors/0x6a21', `/api/v1/sites/${ids.site}`]) {
+  for (const path of ['/api/v1/anchors/0x6a21', `/api/v1/sites/${ids.site}`, `/api/v1/frames/${ids.frame}`]) {
     await call('PATCH', path, { expect: 428, ...patch });
     await call('PATCH', path, { expect: 412, ...patch, headers: { ...patch.headers, 'if-match': '"other"' } });
     const etag = (await call('GET', path, { expect: 200 })).headers.get('etag');
@@ -90,7 +103,7 @@ test('wrong requests get the problems that are promised', async () => {
 
 test('what can be deleted', async () => {
   const etag = (path) => call('GET', path, { expect: 200 }).then((answer) => answer.headers.get('etag'));
-  for (const path of [`/api/v1/missions/${ids.spare}`, `/api/v1/sites/${ids.site}`]) {
+  for (const path of [`/api/v1/missions/${ids.spare}`, `/api/v1/frames/${ids.frame}`, `/api/v1/sites/${ids.site}`]) {
     const answer = await call('DELETE', path, { headers: { 'if-match': (await etag(path)) ?? '*' } });
     assert.ok(answer.status < 300, `${path}: ${answer.status} ${answer.text}`);
   }

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "core/geo/geoid.hpp"
+#include "core/geo/projection.hpp"
+#include "core/types/anchor.hpp"
+
+namespace anchord::api {
+
+/// What a position is called in other systems, or why it is not: map coordinates of the site's EPSG code, and
+/// the height over the geoid. Opens each projection once and the geoid file at the first question.
+/// Thread-safe.
+class GeoService {
+ public:
+  /// geoid_folder: empty for where GeographicLib looks.
+  explicit GeoService(std::string geoid_folder = {}) : geoid_folder_(std::move(geoid_folder)) {}
+
+  struct Projected {
+    int epsg{};
+    Eigen::Vector2d easting_northing_m{0, 0};
+  };
+  /// Errors say what is missing: no EPSG code, a base whose datum is not stated (a shift of up to a metre
+  /// would be guessed), a place outside the map.
+  Result<Projected> projected(const std::optional<Site>& site, const Wgs84& at);
+  Result<const Projection*> projection(int epsg, const std::string& datum);
+
+  struct Orthometric {
+    double height_m{};
+    std::string geoid;
+  };
+  Result<Orthometric> orthometric(const Wgs84& at);
+
+ private:
+  std::string geoid_folder_;
+  std::mutex mutex_;
+  std::map<std::pair<int, int>, Result<Projection>> projections_;
+  std::optional<Result<Geoid>> geoid_;
+};
+
+}  // namespace anchord::api
