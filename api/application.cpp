@@ -21,7 +21,8 @@ struct Application::State {
         router(&deps.access_store, &deps.clock),
         hub(deps.clock, "anchord " + deps.build.version),
         events(hub, deps.clock),
-        missions({deps.missions, deps.measurements, deps.anchors, hub, events, deps.clock, deps.post}),
+        missions(
+            {deps.missions, deps.measurements, deps.anchors, hub, events, deps.clock, deps.post, deps.goal}),
         ingest(deps.measurements, missions),
         jobs(deps.jobs, hub, deps.clock),
         geo(deps.geoid_dir),

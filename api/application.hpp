@@ -8,6 +8,7 @@
 
 #include "api/http/router.hpp"
 #include "api/live/ws_handler.hpp"
+#include "core/localize/accuracy_goal.hpp"
 
 namespace anchord {
 class AccessStore;
@@ -53,6 +54,7 @@ class Application {
     AccessService* access{nullptr};  ///< tokens, sessions, tickets; null: those routes do not exist (tests)
     /// Runs a task on the pool; absent: on the calling thread.
     std::function<void(std::function<void()>)> post{};
+    AccuracyGoal goal{};  ///< how well a live anchor must be known to count as converged
     std::function<StorageStatus()> storage_status{};
     KitStore* kits{nullptr};                      ///< null: no kit profiles (tests)
     FrameStore* frames{nullptr};                  ///< null: no local frames (tests)

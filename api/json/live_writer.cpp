@@ -5,6 +5,7 @@
 
 #include "api/json/reader.hpp"
 #include "api/json/wire_rows.hpp"
+#include "core/localize/accuracy_goal.hpp"
 #include "core/localize/error_ellipse.hpp"
 
 namespace anchord::api {
@@ -129,7 +130,7 @@ std::string_view verdict_word(Verdict verdict) {
 
 std::string_view live_status(const Estimate& estimate) {
   if (!estimate.best) return "found";
-  if (estimate.verdict == Verdict::ok) return "converged";
+  if (reached_goal(estimate)) return "converged";
   if (estimate.verdict == Verdict::ambiguous) return "ambiguous";
   return "estimating";
 }
@@ -187,13 +188,20 @@ std::string live_range_json(const MissionId& mission, const RangeResult& result)
   Object out;
   out.key("t_us").integer(range.time.us()).key("mission").text(to_string(mission));
   out.key("tag").text(to_string(range.tag)).key("anchor").text(to_string(range.anchor));
-  out.key("distance_m").number(range.distance_m, 4).key("corrected_m").number(range.distance_m, 4);
+  out.key("distance_m").number(range.distance_m, 4);
+  out.key("corrected_m").number(result.corrected_m.value_or(range.distance_m), 4);
   out.key("sigma_m")
       .optional(result.sigma_m, 4)
       .key("rss_dbm")
       .optional(range.rss_dbm, 2)
       .key("p_los")
       .raw("null");
+  out.key("tag_enu_m");
+  if (result.tag_enu_m)
+    out.vector(*result.tag_enu_m, 4);
+  else
+    out.raw("null");
+  out.key("residual_m").optional(result.residual_m, 4);
   out.key("used").raw(result.used() ? "true" : "false").key("refused");
   if (result.used())
     out.raw("null");
@@ -296,6 +304,15 @@ std::string live_estimate_json(const MissionId& mission, const Estimate& estimat
   } else {
     out.raw("null");
   }
+  std::string gates = "[";
+  for (const Gate& gate : estimate.gates) {
+    Object inner;
+    inner.key("name").text(gate.name).key("value").optional(gate.value, 4);
+    inner.key("limit").number(gate.limit, 4).key("passed").raw(gate.passed ? "true" : "false");
+    inner.key("why").text(gate.why);
+    gates += (gates.size() > 1 ? "," : "") + inner.take();
+  }
+  out.key("gates").raw(gates + "]");
   return out.take();
 }
 

@@ -16,7 +16,7 @@ std::string live_range_json(const MissionId& mission, const RangeResult& result)
 std::string live_fix_json(const MissionId& mission, const Fix& fix);
 std::string live_estimate_json(const MissionId& mission, const Estimate& estimate);
 
-/// found (no position yet), estimating, ambiguous or converged.
+/// found (no position yet), estimating, ambiguous or converged: verdict ok, and within the accuracy goal.
 std::string_view live_status(const Estimate& estimate);
 std::string_view verdict_word(Verdict verdict);
 

@@ -9,6 +9,9 @@
 #include "api/json/live_writer.hpp"
 #include "api/live/hub.hpp"
 #include "api/services/event_log.hpp"
+#include "api/services/joint_worker.hpp"
+#include "core/localize/flight_history.hpp"
+#include "core/localize/flight_solver.hpp"
 #include "core/localize/live_flight.hpp"
 #include "core/ports/store.hpp"
 
@@ -23,6 +26,22 @@ constexpr std::int64_t k_rtk_interval_us = 200'000;
 UtcTime time_of(const Row& row) {
   return std::visit([](const auto& r) { return r.time; }, row);
 }
+
+/// Enough to know a row again that came both from the store and from the queue.
+std::size_t identity(const Row& row) {
+  const auto mix = [](std::size_t seed, std::uint64_t value) {
+    return seed ^ (std::hash<std::uint64_t>{}(value) + 0x9e3779b97f4a7c15ULL + (seed << 6) + (seed >> 2));
+  };
+  std::size_t hash = mix(row.index(), static_cast<std::uint64_t>(time_of(row).ns));
+  if (const auto* range = std::get_if<Range>(&row)) {
+    hash = mix(mix(hash, range->tag.value), range->anchor.value);
+    return mix(mix(hash, range->antenna), range->seq.value_or(0));
+  }
+  return mix(hash, std::get<Fix>(row).seq.value_or(0));
+}
+
+constexpr std::size_t k_min_joint_ranges = 100;  // below, the own search of each anchor is as good
+constexpr auto k_joint_pause = std::chrono::seconds(2);
 
 struct Radio {
   bool tag{false};
@@ -51,6 +70,21 @@ struct MissionService::Flight {
   std::int64_t last_pose_us{0}, last_rtk_us{0};
   std::deque<std::int64_t> range_times_us;
   std::atomic<bool> dirty{true};
+
+  FlightHistory history;
+  std::size_t ranges_since_joint{0};
+  std::chrono::steady_clock::time_point joint_not_before{};
+  bool joint_running{false};
+
+  std::atomic<bool> rebuilding{false};  ///< rows wait in the queue until what was stored is in
+  struct Rebuild {
+    MeasurementStore::Filter range_filter{}, fix_filter{};
+    std::deque<Range> ranges;
+    std::deque<Fix> fixes;
+    bool more_ranges{true}, more_fixes{true};
+  };
+  std::unique_ptr<Rebuild> rebuild;
+  std::vector<std::size_t> rebuilt;  ///< identities, sorted at the end, until the queue was worked off once
 };
 
 struct MissionService::State : std::enable_shared_from_this<MissionService::State> {
@@ -67,6 +101,7 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   std::condition_variable idle;
   int running{0};
   std::int64_t ticks{0};
+  JointWorker joint;
 
   std::shared_ptr<Flight> find(const MissionId& id) {
     const std::scoped_lock lock(mutex);
@@ -81,7 +116,13 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   void step(Flight& flight, const Row& row, bool quiet);
   void announce(Flight& flight, bool quiet);
   void publish_pose(Flight& flight);
-  void rebuild(Flight& flight);
+  void begin_rebuild(const std::shared_ptr<Flight>& flight);
+  void continue_rebuild(const std::shared_ptr<Flight>& flight);
+  bool rebuild_slice(Flight& flight);
+  void post(std::function<void()> task);
+  void start_joint(const std::shared_ptr<Flight>& flight);
+  void finish_joint(Flight& flight, const FlightSolution* solution, UtcTime cut,
+                    std::chrono::steady_clock::duration took);
   void heard(NetworkId id, bool tag, UtcTime time);
   void publish_devices();
 };
@@ -151,54 +192,117 @@ void MissionService::prepare(const MissionId& id) {
   const auto record = mission(id);
   if (!record) return;
   auto flight = std::make_shared<Flight>(record.value());
-  // Locked before it can be found: whoever comes second waits until the stored rows are in.
-  const std::scoped_lock work(flight->work_mutex);
+  flight->state.time = record.value().created;
+  // Told before it can be found: rows that come meanwhile wait in the queue.
+  flight->rebuilding = true;
   {
     const std::scoped_lock lock(state_->mutex);
     if (!state_->flights.emplace(id, flight).second) return;
   }
-  flight->state.time = record.value().created;
-  state_->rebuild(*flight);
+  state_->begin_rebuild(flight);
 }
 
-void MissionService::State::rebuild(Flight& flight) {
-  const MissionId id = flight.id;
-  const auto n = deps.measurements.count_ranges(id);
-  const auto n_fixes = deps.measurements.count_fixes(id);
-  if (!n || !n_fixes || n.value() + n_fixes.value() == 0) return;
-  // Two sorted streams merged by time, a page of each in memory.
-  MeasurementStore::Filter range_filter, fix_filter;
-  range_filter.mission = fix_filter.mission = id;
-  range_filter.limit = fix_filter.limit = 5000;
-  std::deque<Range> ranges;
-  std::deque<Fix> fixes;
-  bool more_ranges = true, more_fixes = true;
-  while (true) {
-    if (ranges.empty() && more_ranges) {
-      auto page = deps.measurements.ranges(range_filter);
-      if (!page) return;
-      for (auto& row : page.value().rows) ranges.push_back(std::move(row));
-      range_filter.after = page.value().next;
-      more_ranges = !range_filter.after.empty();
-    }
-    if (fixes.empty() && more_fixes) {
-      auto page = deps.measurements.fixes(fix_filter);
-      if (!page) return;
-      for (auto& row : page.value().rows) fixes.push_back(std::move(row));
-      fix_filter.after = page.value().next;
-      more_fixes = !fix_filter.after.empty();
-    }
-    if (ranges.empty() && fixes.empty()) break;
-    if (fixes.empty() || (!ranges.empty() && ranges.front().time < fixes.front().time)) {
-      step(flight, Row(std::move(ranges.front())), true);
-      ranges.pop_front();
-    } else {
-      step(flight, Row(std::move(fixes.front())), true);
-      fixes.pop_front();
-    }
+void MissionService::State::begin_rebuild(const std::shared_ptr<Flight>& flight) {
+  const auto n = deps.measurements.count_ranges(flight->id);
+  const auto n_fixes = deps.measurements.count_fixes(flight->id);
+  if (!n || !n_fixes || n.value() + n_fixes.value() == 0) {
+    flight->rebuilding = false;
+    return schedule(flight);
   }
+  {
+    const std::scoped_lock lock(flight->work_mutex);
+    flight->rebuild = std::make_unique<Flight::Rebuild>();
+    auto& r = *flight->rebuild;
+    r.range_filter.mission = r.fix_filter.mission = flight->id;
+    r.range_filter.limit = r.fix_filter.limit = 2000;
+    flight->live.hold(true);
+  }
+  continue_rebuild(flight);
+}
+
+void MissionService::State::continue_rebuild(const std::shared_ptr<Flight>& flight) {
+  post([self = shared_from_this(), flight] {
+    if (self->stopped) return;
+    if (self->rebuild_slice(*flight)) return self->continue_rebuild(flight);
+    flight->rebuilding = false;
+    self->schedule(flight);
+  });
+}
+
+/// Two sorted streams merged by time, a page of each in memory; one page of either a call. False at the end.
+bool MissionService::State::rebuild_slice(Flight& flight) {
+  const std::scoped_lock lock(flight.work_mutex);
+  auto& r = *flight.rebuild;
+  bool failed = false;
+  const auto refill = [&](auto& rows, auto& filter, bool& more, auto read) {
+    if (!rows.empty() || !more) return;
+    auto page = read(filter);
+    failed = failed || !page;
+    if (!page) return;
+    for (auto& row : page.value().rows) rows.push_back(std::move(row));
+    filter.after = page.value().next;
+    more = !filter.after.empty();
+  };
+  refill(r.ranges, r.range_filter, r.more_ranges, [&](auto& f) { return deps.measurements.ranges(f); });
+  refill(r.fixes, r.fix_filter, r.more_fixes, [&](auto& f) { return deps.measurements.fixes(f); });
+  const auto take = [&](auto& rows) {
+    Row row(std::move(rows.front()));
+    rows.pop_front();
+    flight.rebuilt.push_back(identity(row));
+    step(flight, row, true);
+  };
+  while (!failed && !(r.ranges.empty() && r.fixes.empty())) {
+    // A stream that has run dry in the middle waits for its next page.
+    if ((r.ranges.empty() && r.more_ranges) || (r.fixes.empty() && r.more_fixes)) return true;
+    if (r.fixes.empty() || (!r.ranges.empty() && r.ranges.front().time < r.fixes.front().time))
+      take(r.ranges);
+    else
+      take(r.fixes);
+  }
+  flight.rebuild.reset();
+  std::ranges::sort(flight.rebuilt);
+  flight.live.hold(false);
   announce(flight, true);
   publish_pose(flight);
+  flight.dirty = true;
+  return false;
+}
+
+void MissionService::State::start_joint(const std::shared_ptr<Flight>& flight) {
+  if (stopped || flight->rebuilding || !joint.idle()) return;
+  Mission mission;
+  {
+    const std::scoped_lock lock(flight->queue_mutex);
+    mission = flight->mission;
+  }
+  const std::unique_lock lock(flight->work_mutex, std::try_to_lock);
+  if (!lock || flight->joint_running || flight->ranges_since_joint == 0) return;
+  const auto now = std::chrono::steady_clock::now();
+  if (flight->history.n_ranges() < k_min_joint_ranges || now < flight->joint_not_before) return;
+  JointWorker::Task task;
+  task.flight = flight->history.data(mission);
+  task.options.origin = flight->live.origin();
+  if (flight->frame == TrackFrame::wgs84 && !task.options.origin) return;
+  task.done = [self = this, flight, cut = flight->history.newest(), now](const FlightSolution* solution) {
+    self->finish_joint(*flight, solution, cut, std::chrono::steady_clock::now() - now);
+  };
+  // Set before the worker can be done.
+  flight->joint_running = true;
+  flight->ranges_since_joint = 0;
+  if (!joint.try_start(std::move(task))) flight->joint_running = false, flight->ranges_since_joint = 1;
+}
+
+void MissionService::State::finish_joint(Flight& flight, const FlightSolution* solution, UtcTime cut,
+                                         std::chrono::steady_clock::duration took) {
+  const std::scoped_lock lock(flight.work_mutex);
+  flight.joint_running = false;
+  // Three times as long a pause as the solution took: a quarter of one core at most, however long the flight.
+  flight.joint_not_before = std::chrono::steady_clock::now() +
+                            std::max<std::chrono::steady_clock::duration>(k_joint_pause, 3 * took);
+  if (solution == nullptr || stopped) return;
+  flight.live.adopt(*solution, cut);
+  announce(flight, false);
+  flight.dirty = true;
 }
 
 template <class R>
@@ -232,14 +336,10 @@ void MissionService::accepted(std::vector<Fix> fixes) { state_->accept(std::move
 void MissionService::State::schedule(const std::shared_ptr<Flight>& flight) {
   {
     const std::scoped_lock lock(flight->queue_mutex);
-    if (flight->scheduled || flight->queue.empty() || stopped) return;
+    if (flight->scheduled || flight->queue.empty() || stopped || flight->rebuilding) return;
     flight->scheduled = true;
   }
-  {
-    const std::scoped_lock lock(running_mutex);
-    ++running;
-  }
-  auto task = [self = shared_from_this(), flight] {
+  post([self = shared_from_this(), flight] {
     if (!self->stopped) self->work(*flight);
     bool again = false;
     {
@@ -247,17 +347,28 @@ void MissionService::State::schedule(const std::shared_ptr<Flight>& flight) {
       flight->scheduled = false;
       again = !flight->queue.empty();
     }
+    if (again) self->schedule(flight);
+  });
+}
+
+/// On the pool, counted, so that stop() can wait for it.
+void MissionService::State::post(std::function<void()> task) {
+  {
+    const std::scoped_lock lock(running_mutex);
+    ++running;
+  }
+  auto counted = [self = shared_from_this(), task = std::move(task)] {
+    task();
     {
       const std::scoped_lock lock(self->running_mutex);
       --self->running;
     }
     self->idle.notify_all();
-    if (again) self->schedule(flight);
   };
   if (deps.post)
-    deps.post(std::move(task));
+    deps.post(std::move(counted));
   else
-    task();
+    counted();
 }
 
 void MissionService::State::work(Flight& flight) {
@@ -281,6 +392,7 @@ void MissionService::State::work(Flight& flight) {
   const std::scoped_lock lock(flight.work_mutex);
   std::size_t since_announced = 0;
   for (const auto& row : rows) {
+    if (!flight.rebuilt.empty() && std::ranges::binary_search(flight.rebuilt, identity(row))) continue;
     step(flight, row, false);
     if (++since_announced == 100) {
       announce(flight, false);
@@ -290,6 +402,8 @@ void MissionService::State::work(Flight& flight) {
   announce(flight, false);
   publish_pose(flight);
   flight.dirty = true;
+  const std::scoped_lock queue(flight.queue_mutex);
+  if (flight.queue.empty()) flight.rebuilt = {};
 }
 
 void MissionService::State::step(Flight& flight, const Row& row, bool quiet) {
@@ -308,11 +422,14 @@ void MissionService::State::step(Flight& flight, const Row& row, bool quiet) {
     const double span_s =
         static_cast<double>(flight.range_times_us.back() - flight.range_times_us.front()) * 1e-6;
     state.range_rate_hz = span_s > 0 ? static_cast<double>(flight.range_times_us.size() - 1) / span_s : 0;
+    flight.history.add(*range);
+    ++flight.ranges_since_joint;
     flight.live.add(*range);
     return;
   }
   const auto& fix = std::get<Fix>(row);
   ++state.n_fixes;
+  flight.history.add(fix);
   flight.live.add(fix);
   if (quiet) return;
   const std::int64_t now_us = fix.time.us();
@@ -341,7 +458,8 @@ void MissionService::State::announce(Flight& flight, bool quiet) {
       deps.hub.collect(Topic::ranges, live_range_json(id, result), result.range.time.us(),
                        result.range.anchor);
   }
-  for (const auto& estimate : flight.live.take_estimates()) {
+  for (auto& estimate : flight.live.take_estimates()) {
+    judge_goal(estimate, deps.goal);
     const std::string status(live_status(estimate));
     auto& known = flight.statuses[estimate.anchor];
     if (known.empty()) {
@@ -422,6 +540,7 @@ std::vector<MissionService::LiveView> MissionService::live(const std::optional<M
     }
     const std::scoped_lock lock(flight->work_mutex);
     out.push_back({std::move(mission), flight->live.origin(), flight->live.estimates()});
+    for (auto& estimate : out.back().estimates) judge_goal(estimate, state_->deps.goal);
   }
   return out;
 }
@@ -433,6 +552,7 @@ void MissionService::tick() {
     for (const auto& [id, flight] : state_->flights) all.push_back(flight);
   }
   for (const auto& flight : all) {
+    state_->start_joint(flight);
     if (!flight->dirty) continue;
     const std::unique_lock lock(flight->work_mutex, std::try_to_lock);
     if (!lock) continue;  // at work: the next tick tells
@@ -462,6 +582,7 @@ bool MissionService::recording() const {
 
 void MissionService::stop() {
   state_->stopped = true;
+  state_->joint.stop();
   std::unique_lock lock(state_->running_mutex);
   // Tasks the pool never ran (it was stopped first) must not hold the shutdown up for ever.
   state_->idle.wait_for(lock, std::chrono::seconds(5), [&] { return state_->running == 0; });

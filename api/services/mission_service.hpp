@@ -12,6 +12,7 @@
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
 #include "core/base/time.hpp"
+#include "core/localize/accuracy_goal.hpp"
 #include "core/types/estimate.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/mission.hpp"
@@ -45,6 +46,7 @@ class MissionService {
     EventLog& events;
     const Clock& clock;
     std::function<void(std::function<void()>)> post;  ///< runs a task on the pool; may run it inline
+    AccuracyGoal goal{};                              ///< an anchor within it is converged
   };
   explicit MissionService(Deps deps);
   ~MissionService();
@@ -55,8 +57,8 @@ class MissionService {
   Result<Mission> finish(const MissionId& id);
   Result<void> remove(const MissionId& id);
 
-  /// Before rows of this mission are stored: brings its live flight up to what the store holds already, so
-  /// that a restart in flight goes on where it was. Cheap once done.
+  /// Before rows of this mission are stored: makes its live flight, and has what the store holds already read
+  /// in by tasks of the pool, so that a restart in flight goes on where it was and no request waits for it.
   void prepare(const MissionId& id);
   /// Rows of one kind that were committed, in order of arrival.
   void accepted(std::vector<Range> ranges);
@@ -70,7 +72,8 @@ class MissionService {
   /// Running estimates of one mission, or of every recording one.
   std::vector<LiveView> live(const std::optional<MissionId>& id);
 
-  /// Each 500 ms: mission.state of what moved, devices once a second.
+  /// Each 500 ms: mission.state of what moved, devices once a second; a joint solution is begun where enough
+  /// ranges came since the last (at most a quarter of one core).
   void tick();
   /// Rows that wait to be worked off, over all missions.
   std::size_t queued() const;

@@ -71,7 +71,7 @@ double scale_of(const std::vector<double>& residuals) {
 
 }  // namespace
 
-bool LiveAnchor::add(const Observation& row, UtcTime time, const LiveOptions& options) {
+bool LiveAnchor::add(const Observation& row, UtcTime time, const LiveOptions& options, bool held) {
   ++used_;
   estimate_.n_used = used_;
   if (!newest_ || time > *newest_) newest_ = time;
@@ -81,6 +81,7 @@ bool LiveAnchor::add(const Observation& row, UtcTime time, const LiveOptions& op
   recent_.push_back({row, time});
   if (recent_.size() > options.max_rows) recent_.pop_front();
   estimate_.time = *newest_;
+  if (held) return false;
   if (solved_ && seconds_between(*solved_, *newest_) < options.update_interval_s) return false;
   return solve(options);
 }

@@ -26,7 +26,7 @@ class LiveAnchor {
   /// A refusal taken back: the fixes came after all.
   void forgive(const std::string& why);
   /// True when the estimate was solved anew: at most every update_interval_s of measurement time.
-  bool add(const Observation& row, UtcTime time, const LiveOptions& options);
+  bool add(const Observation& row, UtcTime time, const LiveOptions& options, bool held = false);
   /// Solves with all rows; false when there is nothing new.
   bool solve(const LiveOptions& options);
   /// Takes over a joint solution of the rows up to `cut`; false when it has no position for this anchor, and

@@ -30,6 +30,7 @@ struct LiveFlight::State {
   std::map<NetworkId, LiveAnchor> anchors;
   std::vector<RangeResult> results;
   std::set<NetworkId> changed;
+  bool held{false};
   std::optional<LivePose> pose;
   using Identity = std::tuple<std::int64_t, NetworkId, std::uint8_t, NetworkId>;
   std::set<Identity> seen;  ///< of the last seconds, against repeats
@@ -137,7 +138,7 @@ struct LiveFlight::State {
     row.sigma_m = options.range_sigma_m;
     row.tag_covariance_m2 = point.covariance_m2;
     auto& anchor = anchors.try_emplace(range.anchor, range.anchor).first->second;
-    if (anchor.add(row, range.time, options)) changed.insert(range.anchor);
+    if (anchor.add(row, range.time, options, held)) changed.insert(range.anchor);
     RangeResult result;
     result.range = range;
     result.range.cir.reset();
@@ -214,6 +215,15 @@ void LiveFlight::adopt(const FlightSolution& solution, UtcTime cut) {
     const NetworkId id = anchor.estimate.anchor;
     auto& live = s.anchors.try_emplace(id, id).first->second;
     if (live.adopt(anchor, solution.shared, cut)) s.changed.insert(id);
+  }
+}
+
+void LiveFlight::hold(bool held) {
+  State& s = *state_;
+  s.held = held;
+  if (held) return;
+  for (auto& [id, anchor] : s.anchors) {
+    if (anchor.solve(s.options)) s.changed.insert(id);
   }
 }
 

@@ -69,6 +69,9 @@ class LiveFlight {
   /// A joint solution of this flight's rows up to `cut`: its bias and lag hold from now on, and its positions
   /// are what later ranges refine. Solved in the frame of origin().
   void adopt(const FlightSolution& solution, UtcTime cut);
+  /// While held, ranges are joined but nothing is solved: for reading in what was stored. Letting go solves
+  /// every anchor once.
+  void hold(bool held);
   /// Ends the stream: waiting ranges are decided, every anchor is solved once more.
   void finish();
 

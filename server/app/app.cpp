@@ -187,6 +187,7 @@ void App::State::compose() {
   deps.access = access.get();
   deps.kits = &database->kits();
   deps.frames = &database->frames();
+  deps.goal = {config.metres("goal.h95_m"), config.metres("goal.v95_m")};
   deps.post = [this](std::function<void()> task) {
     if (!live_pool->try_submit(task)) task();  // a full queue slows the sender, loses nothing
   };

@@ -41,6 +41,9 @@ constexpr std::array k_options = {
     Option{"ws.message_bytes", "65536", "largest message a client may send", count},
     Option{"ws.ping_s", "15", "period of protocol pings", seconds},
     Option{"ws.idle_s", "45", "silence after which a peer is dead", seconds},
+    Option{"goal.h95_m", "0.2", "a live anchor is converged when its horizontal 95 % radius is within this",
+           metres},
+    Option{"goal.v95_m", "0.4", "and its vertical 95 % bound within this", metres},
     Option{"rate.per_s", "50", "requests a second of one token; beyond: 429", count},
     Option{"rate.burst", "200", "requests a token may send at once", count},
 };
@@ -80,6 +83,10 @@ std::string wrong(const Option& option, const std::string& value) {
     case seconds: {
       const auto n = number(value);
       return n && *n > 0 && *n <= 86'400 ? "" : "must be a number of seconds above 0, at most 86400";
+    }
+    case metres: {
+      const auto n = number(value);
+      return n && *n > 0 && *n <= 1000 ? "" : "must be a length in metres above 0, at most 1000";
     }
     case choice: {
       const auto words = split(option.choices, '|');
@@ -129,6 +136,7 @@ std::size_t Config::count(std::string_view key) const {
 std::chrono::milliseconds Config::seconds(std::string_view key) const {
   return std::chrono::milliseconds(std::llround(number(text(key)).value_or(0) * 1000));
 }
+double Config::metres(std::string_view key) const { return number(text(key)).value_or(0); }
 std::vector<std::string> Config::list(std::string_view key) const {
   std::vector<std::string> out;
   for (const auto item : split(text(key), ',')) {

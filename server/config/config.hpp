@@ -16,7 +16,7 @@
 
 namespace anchord::server {
 
-enum class OptionKind : std::uint8_t { text, flag, count, seconds, list, choice };
+enum class OptionKind : std::uint8_t { text, flag, count, seconds, metres, list, choice };
 
 /// One setting. The table of all of them is the only place that knows names, defaults and meaning.
 struct Option {
@@ -46,6 +46,7 @@ struct Config {
   bool flag(std::string_view key) const;
   std::size_t count(std::string_view key) const;
   std::chrono::milliseconds seconds(std::string_view key) const;
+  double metres(std::string_view key) const;
   std::vector<std::string> list(std::string_view key) const;
 };
 

@@ -30,7 +30,8 @@ class AppFixture : public ::testing::Test {
     database_.reset();
     std::filesystem::remove_all(dir_);
   }
-  void open() {
+  /// post: runs what the application puts on its pool; absent: at once, on the calling thread.
+  void open(std::function<void(std::function<void()>)> post = {}, AccuracyGoal goal = {}) {
     StorageOptions options;
     options.data_dir = dir_ / "data";
     options.reserve_bytes = 0;
@@ -42,6 +43,8 @@ class AppFixture : public ::testing::Test {
                                 {"0.1.0", "test", "", "", 1}};
     deps.kits = &database_->kits();
     deps.frames = &database_->frames();
+    deps.post = std::move(post);
+    deps.goal = goal;
     app_ = std::make_unique<api::Application>(std::move(deps));
     app_->start();
   }

@@ -159,6 +159,18 @@ TEST(LiveFlight, BlamesALevelFlightsGeometryAndNotItsRanges) {
   }
 }
 
+TEST(LiveFlight, SolvesNothingWhileHeldAndEveryAnchorOnceAfterwards) {
+  const MadeFlight made;
+  const auto flight = make_flight(made);
+  LiveFlight live(flight.mission);
+  live.hold(true);
+  play(live, flight);
+  EXPECT_TRUE(live.take_estimates().empty());
+  live.hold(false);
+  EXPECT_EQ(live.take_estimates().size(), made.anchors.size());
+  for (const auto& estimate : live.estimates()) EXPECT_EQ(estimate.verdict, Verdict::ok) << estimate.reason;
+}
+
 TEST(LiveFlight, PlacesAnRtkFlightOnTheGlobe) {
   MadeFlight made;
   made.frame = TrackFrame::wgs84;

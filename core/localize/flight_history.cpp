@@ -1,0 +1,45 @@
+#include "core/localize/flight_history.hpp"
+
+#include <algorithm>
+
+namespace anchord {
+namespace {
+
+template <class Row>
+void halve(std::vector<Row>& rows) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < rows.size(); i += 2) rows[kept++] = std::move(rows[i]);
+  rows.resize(kept);
+}
+
+}  // namespace
+
+void FlightHistory::add(const Range& range) {
+  if (ranges_seen_++ % range_stride_ != 0) return;
+  newest_ = ranges_.empty() ? range.time : std::max(newest_, range.time);
+  ranges_.push_back(range);
+  ranges_.back().cir.reset();
+  if (ranges_.size() < k_max_ranges) return;
+  halve(ranges_);
+  range_stride_ *= 2;
+}
+
+void FlightHistory::add(const Fix& fix) {
+  if (fixes_seen_++ % fix_stride_ != 0) return;
+  fixes_.push_back(fix);
+  if (fixes_.size() < k_max_fixes) return;
+  halve(fixes_);
+  fix_stride_ *= 2;
+}
+
+FlightData FlightHistory::data(const Mission& mission) const {
+  FlightData flight;
+  flight.mission = mission;
+  flight.fixes = fixes_;
+  flight.ranges = ranges_;
+  return flight;
+}
+
+void FlightHistory::clear() { *this = FlightHistory{}; }
+
+}  // namespace anchord

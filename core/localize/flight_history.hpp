@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "core/types/flight_data.hpp"
+
+namespace anchord {
+
+/// The rows of a flight in the air, for a joint solution now and then. Bounded: when full, every second row
+/// goes, old and new alike, and from then on only every second (fourth, ...) comes in. Not thread-safe.
+class FlightHistory {
+ public:
+  static constexpr std::size_t k_max_ranges = 24'000, k_max_fixes = 48'000;
+
+  void add(const Range& range);
+  void add(const Fix& fix);
+  /// A copy for a solver on another thread.
+  FlightData data(const Mission& mission) const;
+  std::size_t n_ranges() const { return ranges_.size(); }
+  UtcTime newest() const { return newest_; }  ///< of the ranges
+  void clear();
+
+ private:
+  std::vector<Range> ranges_;
+  std::vector<Fix> fixes_;
+  std::size_t range_stride_{1}, fix_stride_{1}, ranges_seen_{0}, fixes_seen_{0};
+  UtcTime newest_{};
+};
+
+}  // namespace anchord

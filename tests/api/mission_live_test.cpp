@@ -1,0 +1,163 @@
+// A flight in the air: what restarts, joint solutions and the accuracy goal do to its running estimates.
+#include <algorithm>
+#include <deque>
+#include <future>
+
+#include "api/json/wire_rows.hpp"
+#include "api/services/joint_worker.hpp"
+#include "app_fixture.hpp"
+#include "core/localize/flight_solver.hpp"
+#include "tests/core/localize/flight_support.hpp"
+
+namespace anchord::test {
+namespace {
+
+using testing::MadeFlight;
+using testing::make_flight;
+
+constexpr std::int64_t k_start_us = 1'777'889'472'000'000;
+
+/// Rows in the order a stream brings them.
+FlightData streamed(const MadeFlight& made) {
+  auto flight = make_flight(made);
+  std::ranges::stable_sort(flight.ranges, {}, &Range::time);
+  return flight;
+}
+
+class MissionLive : public AppFixture {
+ protected:
+  /// Rows of the made flight between two of its seconds, as NDJSON.
+  template <class Rows, class Write>
+  static std::string ndjson(const Rows& rows, double from_s, double to_s, Write write) {
+    std::string out;
+    std::int64_t seq = 0;
+    for (const auto& row : rows) {
+      const double t_s = row.time.seconds();
+      ++seq;
+      if (t_s < from_s || t_s >= to_s) continue;
+      Json json = write(row);
+      json["t_us"] = k_start_us + row.time.us();
+      json["seq"] = seq;
+      out += json.dump() + '\n';
+    }
+    return out;
+  }
+  void deliver(const std::string& mission, const FlightData& flight, double from_s, double to_s) {
+    const auto fixes = ndjson(flight.fixes, from_s, to_s, [](const Fix& fix) {
+      return Json{{"local_m", {fix.local_m.x(), fix.local_m.y(), fix.local_m.z()}}, {"fix", "fixed"}};
+    });
+    const auto ranges = ndjson(flight.ranges, from_s, to_s, [](const Range& range) {
+      return Json{{"tag", to_string(range.tag)},
+                  {"anchor", to_string(range.anchor)},
+                  {"distance_m", range.distance_m}};
+    });
+    for (const auto& [path, body] : {std::pair{"/api/v1/fixes", fixes}, {"/api/v1/ranges", ranges}}) {
+      const auto answer = post(path, body, "application/x-ndjson", {{"mission", mission}});
+      ASSERT_EQ(answer.status, 200) << answer.body;
+      ASSERT_EQ(json(answer)["rejected"], 0) << answer.body;
+    }
+  }
+  std::map<std::string, Json> live(const std::string& mission) {
+    std::map<std::string, Json> out;
+    const auto answer = get("/api/v1/anchors", {{"view", "live"}, {"mission", mission}});
+    EXPECT_EQ(answer.status, 200) << answer.body;
+    const Json body = json(answer);
+    for (const auto& feature : body["features"])
+      out[feature["properties"]["network_id"].get<std::string>()] = feature["properties"];
+    return out;
+  }
+};
+
+TEST_F(MissionLive, GoesOnAfterARestartWhereItWas) {
+  const MadeFlight made;
+  const auto flight = streamed(made);
+  const auto id = mission("local");
+  deliver(id, flight, 0, 80);
+  const auto before = live(id);
+  ASSERT_EQ(before.size(), 4U);
+  restart();
+  deliver(id, flight, 80, 120.5);
+  const auto after = live(id);
+  ASSERT_EQ(after.size(), 4U);
+  for (const auto& [anchor, properties] : after) {
+    const int n_before = before.at(anchor)["quality"]["n_ranges"], n = properties["quality"]["n_ranges"];
+    EXPECT_GT(n, n_before) << anchor;
+    EXPECT_LE(n, static_cast<int>(flight.ranges.size() / 4 + 2)) << "a row counted twice";
+    const auto at = properties["local_m"].get<std::vector<double>>();
+    const auto& truth = made.anchors.at(std::stoul(anchor, nullptr, 16) - 0x6000);
+    EXPECT_LT((Eigen::Vector3d(at.at(0), at.at(1), at.at(2)) - truth).norm(), 0.3) << properties.dump();
+  }
+}
+
+/// Rows reach the live flight while it is still reading what was stored: none is lost, none counted twice.
+TEST_F(MissionLive, TakesRowsThatComeWhileItReadsWhatWasStored) {
+  const auto flight = streamed(MadeFlight{});
+  const auto id = mission("local");
+  deliver(id, flight, 0, 80);
+  std::deque<std::function<void()>> later;
+  app_.reset();
+  database_.reset();
+  open([&](auto task) { later.push_back(std::move(task)); });
+  deliver(id, flight, 80, 120.5);
+  EXPECT_FALSE(later.empty()) << "no request did the reading itself";
+  for (; !later.empty(); later.pop_front()) later.front()();
+  std::size_t n = 0;
+  for (const auto& [anchor, properties] : live(id)) n += properties["quality"]["n_ranges"].get<std::size_t>();
+  EXPECT_LE(n, flight.ranges.size());
+  EXPECT_GT(n, flight.ranges.size() * 95 / 100) << "but for those at the ends of the track";
+  app_->stop();
+}
+
+TEST_F(MissionLive, CallsAnAnchorConvergedOnlyWithinTheGoal) {
+  const auto flight = streamed(MadeFlight{});
+  for (const auto& [goal, status] : {std::pair{AccuracyGoal{.h95_m = 2, .v95_m = 2}, "converged"},
+                                     {{.h95_m = 1e-4, .v95_m = 2}, "estimating"}}) {
+    app_.reset();
+    database_.reset();
+    open({}, goal);
+    const auto id = mission("local");
+    deliver(id, flight, 0, 120.5);
+    const auto anchors = live(id);
+    EXPECT_EQ(anchors.size(), 4U);
+    for (const auto& [anchor, properties] : anchors) {
+      // A joint solution in between may have doubts of its own; then no goal is reached.
+      const bool believed = properties["quality"]["verdict"] == "ok";
+      EXPECT_EQ(properties["status"], believed ? status : "estimating") << properties.dump();
+    }
+  }
+}
+
+FlightData solvable() { return make_flight(MadeFlight{}); }
+
+TEST(JointWorker, SolvesOneTaskAtATimeAndRefusesTheRest) {
+  api::JointWorker worker;
+  std::promise<void> entered, let_go;
+  std::promise<bool> solved;
+  ASSERT_TRUE(worker.try_start({solvable(), {}, [&](const FlightSolution* solution) {
+                                  entered.set_value();
+                                  let_go.get_future().wait();
+                                  solved.set_value(solution != nullptr && solution->anchors.size() == 4);
+                                }}));
+  entered.get_future().wait();
+  EXPECT_FALSE(worker.idle());
+  EXPECT_FALSE(worker.try_start({solvable(), {}, [](const FlightSolution*) {}}));
+  let_go.set_value();
+  EXPECT_TRUE(solved.get_future().get());
+}
+
+TEST(JointWorker, TellsThatAFlightHasNoSolution) {
+  api::JointWorker worker;
+  std::promise<bool> none;
+  ASSERT_TRUE(worker.try_start(
+      {FlightData{}, {}, [&](const FlightSolution* solution) { none.set_value(solution == nullptr); }}));
+  EXPECT_TRUE(none.get_future().get());
+}
+
+TEST(JointWorker, TakesNothingOnceStopped) {
+  api::JointWorker worker;
+  worker.stop();
+  EXPECT_FALSE(worker.try_start({solvable(), {}, [](const FlightSolution*) {}}));
+}
+
+}  // namespace
+}  // namespace anchord::test

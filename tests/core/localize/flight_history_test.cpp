@@ -1,0 +1,79 @@
+#include "core/localize/flight_history.hpp"
+
+#include <gtest/gtest.h>
+
+#include "core/localize/accuracy_goal.hpp"
+
+namespace anchord {
+namespace {
+
+TEST(FlightHistory, StaysWithinItsBoundAndKeepsOldAndNewAlike) {
+  FlightHistory history;
+  const int n = 100'000;
+  for (int i = 0; i < n; ++i) {
+    Range range;
+    range.time = UtcTime::from_seconds(i);
+    history.add(range);
+    Fix fix;
+    fix.time = UtcTime::from_seconds(i);
+    history.add(fix);
+  }
+  const auto kept = history.data(Mission{});
+  EXPECT_LT(kept.ranges.size(), FlightHistory::k_max_ranges);
+  EXPECT_LT(kept.fixes.size(), FlightHistory::k_max_fixes);
+  EXPECT_EQ(kept.ranges.front().time, UtcTime::from_seconds(0));
+  const double gap_s = kept.ranges[1].time.seconds() - kept.ranges[0].time.seconds();
+  for (std::size_t i = 1; i < kept.ranges.size(); ++i)
+    EXPECT_NEAR(seconds_between(kept.ranges[i - 1].time, kept.ranges[i].time), gap_s, 1e-6);
+  EXPECT_LE(n - kept.ranges.back().time.seconds(), 2 * gap_s);
+  EXPECT_EQ(history.newest(), kept.ranges.back().time);
+}
+
+TEST(FlightHistory, KeepsNoImpulseResponses) {
+  FlightHistory history;
+  Range range;
+  range.cir.emplace();
+  history.add(range);
+  EXPECT_FALSE(history.data(Mission{}).ranges[0].cir);
+}
+
+Estimate known_within(double h95_m, double v95_m) {
+  Estimate estimate;
+  estimate.verdict = Verdict::ok;
+  estimate.best = Hypothesis{};
+  estimate.h95_m = h95_m;
+  estimate.v95_m = v95_m;
+  return estimate;
+}
+
+TEST(AccuracyGoal, IsReachedOnlyWhenBothBoundsAreWithinIt) {
+  for (const auto& [h95_m, v95_m, reached] :
+       {std::tuple{0.2, 0.4, true}, {0.201, 0.1, false}, {0.1, 0.401, false}, {0.05, 0.05, true}}) {
+    auto estimate = known_within(h95_m, v95_m);
+    judge_goal(estimate, {.h95_m = 0.2, .v95_m = 0.4});
+    EXPECT_EQ(reached_goal(estimate), reached) << h95_m << ' ' << v95_m;
+  }
+}
+
+TEST(AccuracyGoal, IsJudgedAnewNotTwice) {
+  auto estimate = known_within(0.3, 0.3);
+  judge_goal(estimate, {.h95_m = 0.2, .v95_m = 0.4});
+  EXPECT_FALSE(reached_goal(estimate));
+  judge_goal(estimate, {.h95_m = 0.5, .v95_m = 0.5});
+  EXPECT_EQ(estimate.gates.size(), 2U);
+  EXPECT_TRUE(reached_goal(estimate));
+}
+
+TEST(AccuracyGoal, IsNotReachedWithoutAPositionOrWithAnotherVerdict) {
+  Estimate nowhere;
+  judge_goal(nowhere, {});
+  EXPECT_FALSE(reached_goal(nowhere));
+  auto ambiguous = known_within(0.01, 0.01);
+  ambiguous.verdict = Verdict::ambiguous;
+  judge_goal(ambiguous, {});
+  EXPECT_FALSE(reached_goal(ambiguous));
+  EXPECT_FALSE(reached_goal(known_within(0.01, 0.01))) << "never judged";
+}
+
+}  // namespace
+}  // namespace anchord
