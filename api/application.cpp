@@ -38,6 +38,7 @@ struct Application::State {
     if (services.profiles != nullptr) add_kit_routes(router, services);
     if (services.frames != nullptr) add_frame_routes(router, services);
     add_job_routes(router, services);
+    if (deps.plans != nullptr) add_plan_routes(router, services);
     if (deps.access != nullptr) add_access_routes(router, *deps.access);
     add_system_routes(router, services);
   }

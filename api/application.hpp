@@ -19,6 +19,7 @@ class Clock;
 class JobStore;
 class MeasurementStore;
 class MissionStore;
+class PlanStore;
 }  // namespace anchord
 
 namespace anchord::api {
@@ -51,6 +52,7 @@ class Application {
     AccessStore& access_store;
     const Clock& clock;
     BuildInfo build{};
+    PlanStore* plans{nullptr};       ///< null: plans and flights do not exist (tests)
     AccessService* access{nullptr};  ///< tokens, sessions, tickets; null: those routes do not exist (tests)
     /// Runs a task on the pool; absent: on the calling thread.
     std::function<void(std::function<void()>)> post{};

@@ -184,6 +184,7 @@ void App::State::compose() {
                               .clock = clock};
   deps.build = {ANCHORD_VERSION, ANCHORD_GIT, ANCHORD_BUILD_TYPE, __VERSION__,
                 database->health().schema_version};
+  deps.plans = &database->plans();
   deps.access = access.get();
   deps.kits = &database->kits();
   deps.frames = &database->frames();

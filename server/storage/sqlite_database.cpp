@@ -55,7 +55,8 @@ class SqliteDatabase final : public Database, private sql::Gate {
         campaigns_(sql::make_campaign_store(*this)),
         datasets_(sql::make_dataset_store(*this)),
         training_runs_(sql::make_training_run_store(*this)),
-        models_(sql::make_model_store(*this)) {
+        models_(sql::make_model_store(*this)),
+        plans_(sql::make_plan_store(*this)) {
     if (check_in_background) checker_ = std::thread([this] { check_in_background_thread(); });
   }
   ~SqliteDatabase() override {
@@ -74,6 +75,7 @@ class SqliteDatabase final : public Database, private sql::Gate {
   DatasetStore& datasets() override { return *datasets_; }
   TrainingRunStore& training_runs() override { return *training_runs_; }
   ModelStore& models() override { return *models_; }
+  PlanStore& plans() override { return *plans_; }
 
   StorageHealth health() override {
     const auto status = writer_.status();
@@ -166,6 +168,7 @@ class SqliteDatabase final : public Database, private sql::Gate {
   std::unique_ptr<DatasetStore> datasets_;
   std::unique_ptr<TrainingRunStore> training_runs_;
   std::unique_ptr<ModelStore> models_;
+  std::unique_ptr<PlanStore> plans_;
   std::thread checker_;
 };
 

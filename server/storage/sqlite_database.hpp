@@ -9,6 +9,7 @@
 
 #include "core/base/result.hpp"
 #include "core/ports/learning_store.hpp"
+#include "core/ports/plan_store.hpp"
 #include "core/ports/site_store.hpp"
 #include "core/ports/store.hpp"
 
@@ -76,6 +77,7 @@ class Database {
   virtual DatasetStore& datasets() = 0;
   virtual TrainingRunStore& training_runs() = 0;
   virtual ModelStore& models() = 0;
+  virtual PlanStore& plans() = 0;
   virtual StorageHealth health() = 0;
   /// Online copy while writes go on: fsynced, integrity-checked, with its SHA-256. The file must not exist.
   virtual Result<BackupReport> backup(const std::filesystem::path& file) = 0;

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "core/ports/learning_store.hpp"
+#include "core/ports/plan_store.hpp"
 #include "core/ports/site_store.hpp"
 #include "core/ports/store.hpp"
 #include "server/storage/sql.hpp"
@@ -26,6 +27,7 @@ std::unique_ptr<CampaignStore> make_campaign_store(Gate& gate);
 std::unique_ptr<DatasetStore> make_dataset_store(Gate& gate);
 std::unique_ptr<TrainingRunStore> make_training_run_store(Gate& gate);
 std::unique_ptr<ModelStore> make_model_store(Gate& gate);
+std::unique_ptr<PlanStore> make_plan_store(Gate& gate);
 
 /// The short form of a mission's id; nothing when there is no such mission.
 std::optional<std::int64_t> mission_key(Connection& connection, const MissionId& id);

@@ -35,6 +35,7 @@ TEST_F(Contract, EveryOperationHasARouteAndEveryRouteAnOperation) {
                               database_->access(),
                               clock_,
                               {},
+                              &database_->plans(),
                               &access};
   deps.kits = &database_->kits();
   deps.frames = &database_->frames();

@@ -52,11 +52,30 @@ test('a local frame, fitted to the published anchors', async () => {
   await call('POST', '/api/v1/transform', { expect: 200, json: { from: 'local', to: 'geo', frame: 'hall-a', points: [pairs[0].local_m] } });
 });
 
+test('plans: made, generated, imported, checked, changed, exported', async () => {
+  const outline = { type: 'Polygon', coordinates: [[[3.7131, 51.0231], [3.71353, 51.0231], [3.71353, 51.02328], [3.7131, 51.02328], [3.7131, 51.0231]]] };
+  const made = await call('POST', '/api/v1/plans/generate', { expect: 200, json: { name: 'Hall A', outline, building_height_m: 8 } });
+  ids.plan = (await call('POST', '/api/v1/plans', { expect: 201, json: made.json.plan })).json.id;
+  const path = `/api/v1/plans/${ids.plan}`;
+  await call('POST', `${path}/validate`, { expect: 200 });
+  await call('GET', `${path}/export?format=geojson`, { expect: 200 });
+  const file = await call('GET', `${path}/export`, { expect: 200 });
+  await call('POST', '/api/v1/plans/import?dry_run=true', { expect: 200, json: file.json });
+  ids.sparePlan = (await call('POST', '/api/v1/plans/import?name=Again', { expect: 201, json: file.json })).json.id;
+  const etag = (answer) => answer.headers.get('etag');
+  const got = await call('GET', path, { expect: 200 });
+  const put = await call('PUT', path, { expect: 200, json: got.json, headers: { 'if-match': etag(got) } });
+  await call('PATCH', path, { expect: 412, json: { name: 'Hall B' }, headers: { 'if-match': etag(got) } });
+  await call('PATCH', path, { expect: 200, json: { name: 'Hall B' }, headers: { 'if-match': etag(put) } });
+  await call('PATCH', path, { expect: 428, json: { name: 'Hall C' } });
+  await call('DELETE', `/api/v1/plans/${ids.sparePlan}`, { expect: 204, headers: { 'if-match': '"p-1"' } });
+});
+
 test('everything that can be read', async () => {
   ids.job = (await call('GET', '/api/v1/jobs', { expect: 200 })).json.items[0]?.id;
   ids.range = (await call('GET', `/api/v1/ranges?mission=${ids.spare}`, { expect: 200 })).json.items[0].id;
   ids.anchor = '0x6a21';
-  const given = { '/sites/': ids.site, '/missions/': ids.mission, '/ranges/': ids.range, '/anchors/': ids.anchor, '/calibrations/': ids.calibration, '/jobs/': ids.job, '/devices/': flight.mission.kit, '/frames/': ids.frame, '/revisions/': '1' };
+  const given = { '/sites/': ids.site, '/missions/': ids.mission, '/ranges/': ids.range, '/anchors/': ids.anchor, '/calibrations/': ids.calibration, '/jobs/': ids.job, '/plans/': ids.plan, '/devices/': flight.mission.kit, '/frames/': ids.frame, '/revisions/': '1' };
   const wrong = [];  // all at once, as a person wants them
   for (const { method, template } of contract.operations.filter((o) => o.method === 'get')) {
     if (template === '/api/v1/ws') continue;  // its own test below

@@ -1,0 +1,179 @@
+#include <cmath>
+
+#include <set>
+
+#include "app_fixture.hpp"
+
+namespace anchord::test {
+namespace {
+
+/// A 30 x 20 m hall: at 51 degrees a degree of longitude has 70.2 km, one of latitude 111.2 km.
+Json hall() {
+  return Json::parse(R"({"name":"Hall A","building_height_m":8,
+    "outline":{"type":"Polygon","coordinates":[[[3.7131,51.0231],[3.7135275,51.0231],[3.7135275,51.0232799],[3.7131,51.0232799],[3.7131,51.0231]]]},
+    "settings":{"keep_out_m":4,"max_height_m":20},
+    "waypoints":[{"lon":3.71300,"lat":51.02305,"height_above_ground_m":4,"turn":true,"dwell_s":6},
+                 {"lon":3.71362,"lat":51.02305,"height_above_ground_m":9,"heading_deg":90},
+                 {"lon":3.71362,"lat":51.02334,"height_above_ground_m":4},
+                 {"lon":3.71300,"lat":51.02334,"height_above_ground_m":12,"measure":false}]})");
+}
+
+class Plans : public AppFixture {
+ protected:
+  Json make(const Json& body) {
+    const auto made = post("/api/v1/plans", body.dump());
+    EXPECT_EQ(made.status, 201) << made.body;
+    return json(made);
+  }
+  api::Response with_match(api::Method method, const std::string& path, const std::string& body,
+                           const std::string& etag) {
+    Call options;
+    options.headers["if-match"] = etag;
+    return call(method, path, body, options);
+  }
+};
+
+TEST_F(Plans, AreStoredAndComeBackAsTheyWere) {
+  const Json made = make(hall());
+  EXPECT_EQ(made["revision"], 1);
+  const auto path = "/api/v1/plans/" + made["id"].get<std::string>();
+  restart();
+  const auto got = get(path);
+  EXPECT_EQ(got.status, 200);
+  EXPECT_EQ(json(got), made);
+  EXPECT_EQ(made["waypoints"][0]["turn"], true);
+  EXPECT_EQ(made["settings"]["keep_out_m"], 4);
+  EXPECT_EQ(made["settings"]["k"], 3) << "what was not said has its default";
+  EXPECT_EQ(json(get("/api/v1/plans"))["items"].size(), 1u);
+}
+
+TEST_F(Plans, WhatWasGotCanBePutBack) {
+  Json plan = make(hall());
+  const auto path = "/api/v1/plans/" + plan["id"].get<std::string>();
+  plan["name"] = "Hall B";
+  const auto put = with_match(api::Method::put, path, plan.dump(), "\"p-1\"");
+  ASSERT_EQ(put.status, 200) << put.body;
+  EXPECT_EQ(json(put)["revision"], 2);
+  EXPECT_EQ(header(put, "ETag"), "\"p-2\"");
+  EXPECT_EQ(json(get(path))["name"], "Hall B");
+}
+
+TEST_F(Plans, AChangeOfAnOldRevisionIsRefused) {
+  const Json plan = make(hall());
+  const auto path = "/api/v1/plans/" + plan["id"].get<std::string>();
+  EXPECT_EQ(with_match(api::Method::patch, path, R"({"settings":{"k":5}})", "\"p-1\"").status, 200);
+  EXPECT_EQ(with_match(api::Method::patch, path, R"({"settings":{"k":6}})", "\"p-1\"").status, 412);
+  EXPECT_EQ(json(get(path))["settings"]["k"], 5);
+  EXPECT_EQ(json(get(path))["settings"]["keep_out_m"], 4) << "a merge-patch leaves the rest";
+  EXPECT_EQ(with_match(api::Method::del, path, "", "\"p-1\"").status, 412);
+  EXPECT_EQ(with_match(api::Method::del, path, "", "\"p-2\"").status, 204);
+  EXPECT_EQ(get(path).status, 404);
+}
+
+TEST_F(Plans, EverythingWrongIsNamedAtOnce) {
+  Json plan = hall();
+  plan["waypoints"][1]["height_above_ground_m"] = -4;
+  plan["settings"]["speed"] = 3;
+  plan["outline"]["type"] = "Point";
+  const auto answer = post("/api/v1/plans", plan.dump());
+  ASSERT_EQ(answer.status, 422);
+  std::set<std::string> pointers;
+  const Json problem = json(answer);
+  for (const auto& e : problem["errors"]) pointers.insert(e["pointer"]);
+  EXPECT_TRUE(pointers.count("/waypoints/1/height_above_ground_m")) << answer.body;
+  EXPECT_TRUE(pointers.count("/settings/speed")) << answer.body;
+  EXPECT_TRUE(pointers.count("/outline")) << answer.body;
+}
+
+TEST_F(Plans, ValidateTellsWhatIsWrongAndWhatTheFlightWouldBring) {
+  Json plan = hall();
+  plan["waypoints"][1]["lon"] = 3.7133;  // above the building's south wall, 5.6 m south of it: still legal
+  plan["waypoints"][2] = {
+      {"lon", 3.7133}, {"lat", 51.0232}, {"height_above_ground_m", 4}};  // inside the hall
+  plan["waypoints"][3]["height_above_ground_m"] = 25;
+  const auto made = make(plan);
+  const auto check = json(post("/api/v1/plans/" + made["id"].get<std::string>() + "/validate", ""));
+  EXPECT_EQ(check["flyable"], false);
+  std::map<std::string, std::string> issues;
+  for (const auto& issue : check["issues"]) issues[issue["pointer"].get<std::string>()] = issue["code"];
+  EXPECT_EQ(issues["/waypoints/2"], "no_fly");
+  EXPECT_EQ(issues["/waypoints/3"], "too_high");
+  EXPECT_EQ(issues.count("/waypoints/0"), 0u);
+  EXPECT_EQ(check["n_measure"], 3);
+  EXPECT_GT(check["predicted"]["worst_m"], 0);
+}
+
+TEST_F(Plans, GenerateFliesRoundTheOutlineWithoutAnyWaypointSet) {
+  Json plan = hall();
+  plan.erase("waypoints");
+  const auto answer = post("/api/v1/plans/generate", plan.dump());
+  ASSERT_EQ(answer.status, 200) << answer.body;
+  const Json out = json(answer);
+  EXPECT_EQ(out["check"]["flyable"], true) << out["check"]["issues"].dump();
+  EXPECT_GE(out["plan"]["waypoints"].size(), 8u);
+  EXPECT_LT(out["check"]["predicted"]["rms_m"], 0.3);
+  const auto made = post("/api/v1/plans", out["plan"].dump());
+  EXPECT_EQ(made.status, 201) << "what was generated can be stored: " << made.body;
+  plan.erase("outline");
+  EXPECT_EQ(post("/api/v1/plans/generate", plan.dump()).status, 422);
+}
+
+TEST_F(Plans, ExportedForQGroundControlAndImportedAgainTheyFlyTheSame) {
+  Json plan = hall();
+  plan["fence"] = Json::parse(
+      R"({"type":"Polygon","coordinates":[[[3.712,51.022],[3.715,51.022],[3.715,51.0242],[3.712,51.0242]]]})");
+  const Json made = make(plan);
+  const auto file = get("/api/v1/plans/" + made["id"].get<std::string>() + "/export");
+  ASSERT_EQ(file.status, 200);
+  const Json qgc = json(file);
+  EXPECT_EQ(qgc["fileType"], "Plan");
+  EXPECT_EQ(qgc["mission"]["items"][0]["command"], 22);
+  const auto imported = post("/api/v1/plans/import", file.body, "application/json", {{"name", "Again"}});
+  ASSERT_EQ(imported.status, 201) << imported.body;
+  const Json again = json(imported);
+  EXPECT_EQ(again["name"], "Again");
+  ASSERT_EQ(again["waypoints"].size(), made["waypoints"].size());
+  for (std::size_t i = 0; i < made["waypoints"].size(); ++i) {
+    for (const char* key : {"lon", "lat", "height_above_ground_m", "measure", "turn"}) {
+      EXPECT_EQ(again["waypoints"][i][key], made["waypoints"][i][key]) << i << key;
+    }
+  }
+  EXPECT_EQ(again["fence"], made["fence"]);
+  // QGroundControl has no building: its outline comes back as an area not to fly in.
+  EXPECT_EQ(again["no_fly"][0], made["outline"]);
+}
+
+TEST_F(Plans, ReadAPlanAsQGroundControlWritesIt) {
+  // Items of the .plan example in QGroundControl's developer guide (file_formats/plan.md), shortened.
+  const char* file =
+      R"({"fileType":"Plan","geoFence":{"circles":[{"circle":{"center":[47.397,8.5456],"radius":100},
+    "inclusion":true,"version":1}],"polygons":[{"inclusion":false,"polygon":[[47.3977,8.5456],[47.3977,8.5459],[47.3979,8.5459]],
+    "version":1}],"version":2},"groundStation":"QGroundControl","mission":{"cruiseSpeed":15,"firmwareType":12,"hoverSpeed":5,
+    "items":[{"AMSLAltAboveTerrain":null,"Altitude":50,"AltitudeMode":1,"autoContinue":true,"command":22,"doJumpId":1,"frame":3,
+    "params":[15,0,0,null,47.3985099,8.5451002,50],"type":"SimpleItem"},
+    {"autoContinue":true,"command":16,"doJumpId":2,"frame":3,"params":[2,0,0,-90,47.3985099,8.5451002,20],"type":"SimpleItem"},
+    {"TransectStyleComplexItem":{},"complexItemType":"survey","type":"ComplexItem","version":4},
+    {"autoContinue":true,"command":20,"doJumpId":4,"frame":2,"params":[0,0,0,0,0,0,0],"type":"SimpleItem"}],
+    "plannedHomePosition":[47.3977419,8.545594,487.989],"vehicleType":2,"version":2},
+    "rallyPoints":{"points":[],"version":2},"version":1})";
+  const auto answer = post("/api/v1/plans/import", file, "application/json", {{"dry_run", "true"}});
+  ASSERT_EQ(answer.status, 200) << answer.body;
+  const Json out = json(answer);
+  ASSERT_EQ(out["plan"]["waypoints"].size(), 1u);
+  EXPECT_EQ(out["plan"]["waypoints"][0]["heading_deg"], 270);
+  EXPECT_EQ(out["plan"]["settings"]["speed_mps"], 5);
+  EXPECT_EQ(out["plan"]["fence"]["coordinates"][0].size(), 25u);
+  EXPECT_EQ(out["plan"]["no_fly"].size(), 1u);
+  EXPECT_EQ(out["notes"].size(), 1u) << "the survey was left out and said so";
+  EXPECT_EQ(json(get("/api/v1/plans"))["items"].size(), 0u) << "a dry run stores nothing";
+}
+
+TEST_F(Plans, OnlyAnOperatorMayChangeThem) {
+  Call viewer;
+  viewer.roles = {api::Role::viewer};
+  EXPECT_EQ(call(api::Method::post, "/api/v1/plans", hall().dump(), viewer).status, 403);
+  EXPECT_EQ(call(api::Method::get, "/api/v1/plans", "", viewer).status, 200);
+}
+
+}  // namespace
+}  // namespace anchord::test
