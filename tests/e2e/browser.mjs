@@ -1,5 +1,6 @@
 // Chromium for browser tests. Debian's own, found by path; the flags keep it from calling home.
-import { existsSync, mkdtempSync, rmSync } from 'node:fs';
+import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { chromium } from 'playwright-core';
@@ -25,3 +26,30 @@ export async function openBrowser(options = {}) {
     },
   };
 }
+
+/** A page of `server` that notes its console errors and every host it asks: {page, seen, id(testid)}. */
+export async function openPage(browser, server, { hash = '#/live', theme = 'light', width = 1440, height = 900 } = {}) {
+  const page = await browser.context.newPage();
+  await page.setViewportSize({ width, height });
+  const seen = { errors: [], hosts: new Set() };
+  page.on('console', (m) => m.type() === 'error' && seen.errors.push(m.text()));
+  page.on('pageerror', (e) => seen.errors.push(String(e)));
+  page.on('request', (r) => seen.hosts.add(new URL(r.url()).host));
+  page.on('websocket', (w) => seen.hosts.add(new URL(w.url()).host));
+  await page.goto(`${server.url}/?theme=${theme}${hash}`);
+  return { page, seen, id: (name) => page.getByTestId(name) };
+}
+
+const shots = process.env.ANCHORD_SHOTS;  // a folder: keep pictures of what was tested
+export const picture = async (page, name) => { if (shots) await page.screenshot({ path: join(shots, `${name}.png`) }); };
+
+const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
+/** What axe finds wrong on the page as it is. */
+export async function violations(page) {
+  await page.evaluate(axe);
+  const found = await page.evaluate(() => globalThis.axe.run(document, { resultTypes: ['violations'] }));
+  return found.violations.map((v) => `${v.id}: ${v.nodes.map((n) => n.target.join(' ')).join(', ')}`);
+}
+
+/** Text of the first match; empty while there is none. */
+export const text = (locator) => locator.first().textContent({ timeout: 5000 }).then((t) => t ?? '', () => '');

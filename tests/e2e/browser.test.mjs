@@ -1,19 +1,16 @@
 // The dashboard as people use it: Debian's Chromium, the real binary, the simulated flight through the real REST door.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
-import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
-import { createRequire } from 'node:module';
+import { mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { gzipSync } from 'node:zlib';
-import { chromiumPath, haveChromium, openBrowser } from './browser.mjs';
+import { chromiumPath, haveChromium, openBrowser, openPage, picture, text, violations } from './browser.mjs';
 import { binary, eventually, run, startServer } from './server.mjs';
 
-const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 const folder = mkdtempSync(join(tmpdir(), 'anchord e2e '));
 const flight = join(folder, 'flight');
-const shots = process.env.ANCHORD_SHOTS;  // a folder: keep pictures of what was tested
 let browser, flown;
 
 before(async () => {
@@ -29,21 +26,6 @@ after(async () => {
   rmSync(folder, { recursive: true, force: true });
 });
 
-/** A page that notes its console errors and every host it asks. */
-async function openPage(server, { hash = '#/live', theme = 'light', width = 1440, height = 900 } = {}) {
-  const page = await browser.context.newPage();
-  await page.setViewportSize({ width, height });
-  const seen = { errors: [], hosts: new Set(), bytes: [] };
-  page.on('console', (m) => m.type() === 'error' && seen.errors.push(m.text()));
-  page.on('pageerror', (e) => seen.errors.push(String(e)));
-  page.on('request', (r) => seen.hosts.add(new URL(r.url()).host));
-  page.on('websocket', (w) => seen.hosts.add(new URL(w.url()).host));
-  await page.goto(`${server.url}/?theme=${theme}${hash}`);
-  return { page, seen, id: (name) => page.getByTestId(name) };
-}
-const picture = async (page, name) => { if (shots) await page.screenshot({ path: join(shots, `${name}.png`) }); };
-const text = (locator) => locator.first().textContent({ timeout: 5000 }).then((t) => t ?? '', () => '');
-
 /** Plays the flight into the server; `ended` resolves with its exit code. */
 function replay(server, speed) {
   const child = spawn(binary, ['replay', flight, '--url', server.url, '--speed', String(speed)], { stdio: ['ignore', 'ignore', 'pipe'] });
@@ -52,16 +34,10 @@ function replay(server, speed) {
   const ended = new Promise((done) => child.once('exit', (code) => done({ code, stderr })));
   return { ended, stop: () => child.kill('SIGTERM') };
 }
-async function violations(page) {
-  await page.evaluate(axe);
-  const found = await page.evaluate(() => globalThis.axe.run(document, { resultTypes: ['violations'] }));
-  return found.violations.map((v) => `${v.id}: ${v.nodes.map((n) => n.target.join(' ')).join(', ')}`);
-}
-
 test('a cold start offline shows what to do first, asks no other host and logs no error', async () => {
   const server = await startServer({ auth: 'off' });
   try {
-    const { page, seen, id } = await openPage(server);
+    const { page, seen, id } = await openPage(browser, server);
     await id('first-run').waitFor();
     await eventually('the link is live', async () => (await text(id('status-link'))).includes('LIVE'));
     assert.deepEqual([...seen.hosts], [new URL(server.url).host]);
@@ -94,7 +70,7 @@ test('the script and the styles stay within their budgets', async () => {
 test('signed out: the sheet asks for a token, refuses a wrong one, and the right one opens the page', async () => {
   const server = await startServer({ auth: 'on' });
   try {
-    const { page, id } = await openPage(server);
+    const { page, id } = await openPage(browser, server);
     await id('sign-in').waitFor();
     await id('token').fill('anc_000000_not-a-token');
     await id('sign-in-submit').click();
@@ -113,7 +89,7 @@ test('signed out: the sheet asks for a token, refuses a wrong one, and the right
 });
 
 test('a simulated flight converges on screen, and what is published is what the calibration found', async () => {
-  const { page, seen, id } = await openPage(flown);
+  const { page, seen, id } = await openPage(browser, flown);
   await eventually('the link is live', async () => (await text(id('status-link'))).includes('LIVE'));
   const playing = replay(flown, 6);
   try {
@@ -169,7 +145,7 @@ test('a simulated flight converges on screen, and what is published is what the 
 });
 
 test('everything is reached by the keyboard, and letters stay letters in a field', async () => {
-  const { page, id } = await openPage(flown);
+  const { page, id } = await openPage(browser, flown);
   await id('live').waitFor();
   await page.keyboard.press('3');
   await id('anchors').waitFor();
@@ -197,7 +173,7 @@ test('a server that goes silent is late, then lost with an alarm while a flight 
   const server = await startServer({ auth: 'off' });
   const playing = replay(server, 1);
   try {
-    const { page, id } = await openPage(server);
+    const { page, id } = await openPage(browser, server);
     await eventually('ranges arrive', async () => (await id('range-list').locator('tbody tr').count()) >= 1, 20_000);
     process.kill(server.pid, 'SIGSTOP');
     try {
@@ -234,7 +210,7 @@ test('a server that goes silent is late, then lost with an alarm while a flight 
 
 test('a tablet upright, a wide screen and text of 200 % lose nothing', async () => {
   for (const [width, height, zoom] of [[768, 1024, 1], [2560, 1440, 1], [1280, 1024, 2]]) {
-    const { page, id } = await openPage(flown, { width: width / zoom, height: height / zoom });
+    const { page, id } = await openPage(browser, flown, { width: width / zoom, height: height / zoom });
     await id('live').waitFor();
     for (const name of ['status-link', 'status-alarms', 'theme', 'nav-anchors']) {
       const box = await id(name).boundingBox();

@@ -1,5 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import { pose, range, type RangeMsg } from '../src/live/messages';
+import { trail_of } from '../src/state/archive';
 import { interpolated, range_class, rate_hz, Scene } from '../src/state/scene';
 
 const at = (t_s: number, e: number, extra: object = {}) => pose({ mission: 'm', t_us: t_s * 1e6, enu_m: [e, 0, 5], fix: 'fixed', heading_deg: 350, ...extra })!;
@@ -38,5 +39,21 @@ describe('Scene', () => {
   });
   it('calls a range unclear without a model or between 0.4 and 0.6', () => {
     expect([null, 0.4, 0.5, 0.6, 0.61, 0.39].map(range_class)).toEqual(['unclear', 'unclear', 'unclear', 'unclear', 'los', 'nlos']);
+  });
+});
+
+describe('the trail after a reload', () => {
+  const feature = { geometry: { coordinates: [[3.7131, 51.0231, 10], [3.71310143, 51.0231, 10]] }, properties: { t_us: [1e6, 2e6], fix: ['fixed', 'float'], local_m: null } };
+  it('is in metres about the origin of the flight', () => {
+    const [first, second] = trail_of(feature, { lon: 3.7131, lat: 51.0231, h_m: 10 });
+    expect([first!.e, first!.n, first!.fix]).toEqual([0, 0, 'fixed']);
+    expect(second!.e).toBeCloseTo(0.1003, 3);   // 1.43e-6 deg of longitude at 51 deg north, N cos(lat) = 4 020 km
+  });
+  it('is empty on the globe without an origin', () => expect(trail_of(feature, null)).toEqual([]));
+  it('comes before what the stream has told', () => {
+    const scene = new Scene('m');
+    scene.trail = [{ t_us: 3e6, e: 5, n: 5, fix: 'fixed' }];
+    scene.add_earlier_trail(trail_of(feature, { lon: 3.7131, lat: 51.0231, h_m: 10 }));
+    expect(scene.trail.map((p) => p.t_us)).toEqual([1e6, 2e6, 3e6]);
   });
 });

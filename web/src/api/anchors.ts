@@ -1,9 +1,14 @@
 /// Anchors as the Anchors view shows them, whether they come from the stream, from a published revision or from a fresh calibration.
 import { cov6, ellipse, estimate, mirror, num, obj, str, STATUS, vec3, VERDICT, type EstimateMsg, type Mirror } from '../live/messages';
 import { ellipse_from_covariance } from '../map/enu';
-import { request } from './client';
+import { api_url, request } from './client';
 
+/// One acceptance test of the server: its number against its limit.
+export interface Gate { readonly name: string; readonly value: number | null; readonly limit: number | null; readonly passed: boolean; readonly why: string }
 export interface AnchorRow extends EstimateMsg {
+  readonly gates: readonly Gate[];       ///< empty where none were run: a running estimate
+  readonly acceptable: boolean | null;   ///< verdict ok and every gate passed; null where none were run
+  readonly override: string;             ///< why a person published it although a gate failed
   readonly name: string;
   readonly absolute_h95_m: number | null;
   readonly absolute_v95_m: number | null;
@@ -12,8 +17,9 @@ export interface AnchorRow extends EstimateMsg {
   readonly crs: string;
 }
 
-export const row_of_estimate = (e: EstimateMsg): AnchorRow => ({ ...e, name: '', absolute_h95_m: null, absolute_v95_m: null, calibrated_at: null, revision: null, crs: '' });
+export const row_of_estimate = (e: EstimateMsg): AnchorRow => ({ ...e, name: '', absolute_h95_m: null, absolute_v95_m: null, calibrated_at: null, revision: null, crs: '', gates: [], acceptable: null, override: '' });
 
+const gates_of = (v: unknown): Gate[] => (Array.isArray(v) ? v.map(obj).filter((o) => o !== null && str(o.name) !== '').map((o) => ({ name: str(o!.name), value: num(o!.value), limit: num(o!.limit), passed: o!.passed === true, why: str(o!.why) })) : []);
 const point = (v: unknown): { lon: number | null; lat: number | null; h_m: number | null } => {
   const c = vec3(obj(v)?.coordinates ?? v);
   return { lon: c?.[0] ?? null, lat: c?.[1] ?? null, h_m: c?.[2] ?? null };
@@ -49,6 +55,7 @@ export function row_of(p: Record<string, unknown>, geometry: unknown): AnchorRow
   return {
     ...base, ellipse95: ellipse(relative?.ellipse95) ?? (cov && ellipse_from_covariance(cov)), mirror: twin, probability: base.probability ?? (twin?.probability == null ? null : 1 - twin.probability),
     name: str(p.name), absolute_h95_m: num(absolute?.h95_m), absolute_v95_m: num(absolute?.v95_m), calibrated_at: str(p.calibrated_at) || null, revision: num(p.revision), crs: crs_words(p.crs),
+    gates: gates_of(quality?.gates), acceptable: typeof quality?.acceptable === 'boolean' ? quality.acceptable : null, override: str(obj(quality?.override)?.reason),
   };
 }
 export function rows_of_collection(answer: unknown): { rows: AnchorRow[]; revision: number | null } {
@@ -71,6 +78,18 @@ export async function calibrate(mission: string, key: string): Promise<Calibrati
   if (!done) throw new Error('The calibration is still running; look again in a minute.');
   return done;
 }
-export async function publish(calibration: string, note: string, key: string): Promise<number | null> {
-  return num(obj(await request('POST', `/calibrations/${encodeURIComponent(calibration)}/publish`, note ? { note } : {}, { 'Idempotency-Key': key }))?.revision);
+/// An anchor that fails a gate goes out only with the reason a person gives for it.
+export interface Override { readonly network_id: string; readonly reason: string }
+export async function publish(calibration: string, note: string, overrides: readonly Override[], key: string): Promise<number | null> {
+  const body = { ...(note ? { note } : {}), ...(overrides.length ? { overrides } : {}) };
+  return num(obj(await request('POST', `/calibrations/${encodeURIComponent(calibration)}/publish`, body, { 'Idempotency-Key': key }))?.revision);
 }
+
+/// Against what is published: where each anchor was, in metres, and whether it moved beyond what both covariances allow.
+export interface Moved { readonly change: string; readonly horizontal_m: number | null; readonly vertical_m: number | null }
+export async function moved_since_published(calibration: string): Promise<Map<string, Moved>> {
+  const items = obj(await request('GET', `/calibrations/${encodeURIComponent(calibration)}/diff`))?.items, out = new Map<string, Moved>();
+  for (const o of (Array.isArray(items) ? items : []).map(obj)) if (o && str(o.network_id)) out.set(str(o.network_id), { change: str(o.change), horizontal_m: num(o.horizontal_m), vertical_m: num(o.vertical_m) });
+  return out;
+}
+export const report_url = (calibration: string): string => api_url(`/calibrations/${encodeURIComponent(calibration)}/report`);

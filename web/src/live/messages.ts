@@ -44,6 +44,7 @@ export const str = (v: unknown): string => (typeof v === 'string' ? v : '');
 const count = (v: unknown): number => num(v) ?? 0;
 const word = <T extends string>(v: unknown, words: readonly T[], otherwise: T): T => (words.includes(v as T) ? (v as T) : otherwise);
 
+export const fix_class = (v: unknown): FixClass => word(v, FIX, 'none');
 export function vec3(v: unknown): Vec3 | null {
   if (!Array.isArray(v) || v.length !== 3) return null;
   const [a, b, c] = v.map(num);
@@ -66,13 +67,13 @@ export function pose(v: unknown): Pose | null {
   const o = obj(v);
   const t_us = num(o?.t_us);
   if (!o || t_us == null) return null;
-  return { mission: str(o.mission), t_us, ...place(o), enu_m: vec3(o.enu_m), tag_enu_m: vec3(o.tag_enu_m), heading_deg: num(o.heading_deg), fix: word(o.fix, FIX, 'none'), sigma_m: vec3(o.sigma_m), speed_mps: num(o.speed_mps) };
+  return { mission: str(o.mission), t_us, ...place(o), enu_m: vec3(o.enu_m), tag_enu_m: vec3(o.tag_enu_m), heading_deg: num(o.heading_deg), fix: fix_class(o.fix), sigma_m: vec3(o.sigma_m), speed_mps: num(o.speed_mps) };
 }
 export function rtk(v: unknown): Rtk | null {
   const o = obj(v);
   const t_us = num(o?.t_us);
   if (!o || t_us == null) return null;
-  return { mission: str(o.mission), t_us, fix: word(o.fix, FIX, 'none'), satellites: num(o.satellites), correction_age_s: num(o.correction_age_s), sigma_m: vec3(o.sigma_m) };
+  return { mission: str(o.mission), t_us, fix: fix_class(o.fix), satellites: num(o.satellites), correction_age_s: num(o.correction_age_s), sigma_m: vec3(o.sigma_m) };
 }
 export function range(v: unknown): RangeMsg | null {
   const o = obj(v);

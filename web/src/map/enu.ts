@@ -24,6 +24,17 @@ export function enu_from_geodetic(p: Geodetic, origin: Geodetic): Vec3 {
   ];
 }
 
+/// The point e, n metres from `origin` on its tangent plane, at the height of the origin. Newton on the exact forward formula: below a micrometre within a site.
+export function geodetic_from_enu(e: number, n: number, origin: Geodetic): Geodetic {
+  let lon = origin.lon, lat = origin.lat;
+  for (let i = 0; i < 4; i++) {
+    const [de, dn] = enu_from_geodetic({ lon, lat, h_m: origin.h_m }, origin);
+    lat += (n - dn) / A_M / RAD;
+    lon += (e - de) / (A_M * Math.cos(lat * RAD)) / RAD;
+  }
+  return { lon, lat, h_m: origin.h_m };
+}
+
 const CHI2_2_95 = 5.991464547107979;  // chi-square with 2 degrees of freedom at 0.95 = -2 ln 0.05
 
 /// 95 % ellipse of the horizontal part of a covariance [ee, en, eu, nn, nu, uu] in m^2; azimuth of the major axis clockwise from north, 0..180. Null where

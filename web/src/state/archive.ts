@@ -2,8 +2,10 @@
 import { effect } from '@preact/signals';
 import { rows_of_collection } from '../api/anchors';
 import { request } from '../api/client';
-import { mission, num, obj, str, type MissionMsg } from '../live/messages';
-import { link, mission_id, mission_list, now_ms, scene_of, synced, tick } from './store';
+import { fix_class, mission, num, obj, str, vec3, type MissionMsg } from '../live/messages';
+import { enu_from_geodetic } from '../map/enu';
+import type { TrailPoint } from './scene';
+import { current_mission, link, mission_id, mission_list, now_ms, scene_of, synced, tick } from './store';
 
 const micros = (rfc3339: unknown): number | null => {
   const ms = Date.parse(str(rfc3339));
@@ -32,6 +34,22 @@ async function load_estimates(id: string): Promise<void> {
     tick.value++;
   } catch { /* no estimates: the view says so */ }
 }
+/// The way flown before this page was opened: a reload in the field must not wipe the map. What the stream has told meanwhile stays.
+async function load_track(m: MissionMsg): Promise<void> {
+  try {
+    const feature = obj(await request('GET', `/missions/${encodeURIComponent(m.mission)}/track?limit=10000&since=${TRACK_SINCE(m)}`));
+    const scene = scene_of(m.mission), news = trail_of(feature, m.origin).filter((p) => !scene.trail[0] || p.t_us < scene.trail[0].t_us);
+    scene.add_earlier_trail(news);
+    tick.value++;
+  } catch { /* the trail begins where the page was opened */ }
+}
+const TRACK_SINCE = (m: MissionMsg): string => new Date(Math.max(0, m.t_us / 1000 - 480_000)).toISOString();   ///< eight minutes: one page even at 20 Hz
+/// GeoJSON of a track as points about the origin of the flight; none where a track on the globe has no origin yet.
+export function trail_of(feature: Record<string, unknown> | null, origin: MissionMsg['origin']): TrailPoint[] {
+  const p = obj(feature?.properties), times = Array.isArray(p?.t_us) ? p.t_us : [], fixes = Array.isArray(p?.fix) ? p.fix : [], globe = obj(feature?.geometry)?.coordinates;
+  const places = Array.isArray(p?.local_m) ? p.local_m.map(vec3) : Array.isArray(globe) && origin ? globe.map((c) => { const v = vec3(c); return v && enu_from_geodetic({ lon: v[0], lat: v[1], h_m: v[2] }, origin); }) : [];
+  return places.flatMap((at, i) => { const t_us = num(times[i]); return at && t_us !== null ? [{ t_us, e: at[0], n: at[1], fix: fix_class(fixes[i]) }] : []; });
+}
 export function follow_archive(): void {
   let asked: string | null = null;
   effect(() => {
@@ -40,5 +58,12 @@ export function follow_archive(): void {
     asked = id;
     if (scene_of(id).anchors.size === 0) void load_estimates(id);
   });
-  effect(() => { if (link.value === 'lost') asked = null; });
+  let tracked: string | null = null;
+  effect(() => {
+    const m = current_mission.value;   // its origin may come later than its name
+    if (!m || link.value !== 'live' || tracked === m.mission || (m.frame === 'wgs84' && !m.origin)) return;
+    tracked = m.mission;
+    void load_track(m);
+  });
+  effect(() => { if (link.value === 'lost') asked = tracked = null; });
 }

@@ -9,6 +9,7 @@ export interface RangeRow { last: RangeMsg; at_ms: number; readonly recent: { t_
 export interface HistoryPoint { readonly t_us: number; readonly sigma_h_m: number | null; readonly gdop: number | null }
 
 const TRAIL_POINTS = 6000;
+const TRAIL_STEP_M = 0.1;          // below a pixel at any scale a flight is watched at; standing still must not fill the trail
 const RECENT_US = 20_000_000;      // the 20 s sparkline
 const HISTORY_POINTS = 1200;
 
@@ -41,8 +42,7 @@ export class Scene {
     this.pose = { value: p, at_ms };
     if (p.enu_m) {
       const last = this.trail[this.trail.length - 1];
-      // 0.1 m apart is below a pixel at any scale a flight is watched at; standing still must not fill the trail.
-      if (!last || last.fix !== p.fix || Math.hypot(p.enu_m[0] - last.e, p.enu_m[1] - last.n) > 0.1 || p.t_us - last.t_us > 2_000_000) {
+      if (!last || last.fix !== p.fix || Math.hypot(p.enu_m[0] - last.e, p.enu_m[1] - last.n) > TRAIL_STEP_M || p.t_us - last.t_us > 2_000_000) {
         this.trail.push({ t_us: p.t_us, e: p.enu_m[0], n: p.enu_m[1], fix: p.fix });
         if (this.trail.length > TRAIL_POINTS) this.trail.splice(0, TRAIL_POINTS / 6);
       }
@@ -75,6 +75,16 @@ export class Scene {
     if (h.length > HISTORY_POINTS) h.splice(0, HISTORY_POINTS / 6);
     this.version++;
     this.estimates_version++;
+  }
+  /// Older than all that is there, oldest first; thinned as a live trail is.
+  add_earlier_trail(points: readonly TrailPoint[]): void {
+    const kept: TrailPoint[] = [];
+    for (const p of points) {
+      const last = kept[kept.length - 1];
+      if (!last || last.fix !== p.fix || Math.hypot(p.e - last.e, p.n - last.n) > TRAIL_STEP_M || p.t_us - last.t_us > 2_000_000) kept.push(p);
+    }
+    this.trail = [...kept, ...this.trail].slice(-TRAIL_POINTS);
+    this.version++;
   }
   forget_track(): void {
     this.trail = [];

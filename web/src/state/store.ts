@@ -17,6 +17,7 @@ export const devices = signal<readonly m.DeviceMsg[]>([]);
 export const system = signal<{ value: m.SystemMsg; at_ms: number } | null>(null);
 export const events = signal<readonly m.EventMsg[]>([]);
 export const revision = signal<number | null>(null);
+export const jobs_version = signal(0);  ///< grows with every news of a job; what a job is about is asked over REST
 export const toast = signal<{ text: string; id: number } | null>(null);
 export const synced = signal(false);  ///< first snapshots are in: before that, empty means "not loaded yet"
 
@@ -89,7 +90,7 @@ const handlers: Record<string, Handler> = {
   events: (data, whole) => (events.value = [...(whole ? [] : events.value), ...m.all(data, m.event)].slice(-50)),
   alarms: (data) => (server_alarms.value = m.all(data, m.alarm)),
   revisions: (data) => { for (const r of m.all(data, m.revision)) revision.value = Math.max(revision.value ?? 0, r.revision); },
-  jobs: () => undefined,
+  jobs: () => { jobs_version.value++; },
 };
 
 /// `fresh`: the stream begins, or another life of the server does, and what it does not tell must be asked for.

@@ -1,4 +1,6 @@
 import { signal } from '@preact/signals';
+import type { ComponentType } from 'preact';
+import { useEffect, useState } from 'preact/hooks';
 import { toast } from '../state/store';
 import { Anchors } from '../views/anchors';
 import { Live } from '../views/live';
@@ -8,23 +10,46 @@ import { Icon, Mark } from './marks';
 import { SignIn } from './sign_in';
 import { Strip } from './strip';
 
-/// `#/live`, `#/anchors`, `#/anchors/0x6a2f`.
+/// `#/live`, `#/plan/<id>`, `#/anchors`, `#/anchors/0x6a2f`, `#/measurements`, `#/models`, `#/models/runs/<id>`, `#/system`.
 export const route = signal(location.hash);
 addEventListener('hashchange', () => (route.value = location.hash));
 
-function Rail({ view }: { view: 'live' | 'anchors' }) {
-  const item = (id: 'live' | 'anchors', name: string) => <a class={view === id ? 'ri on' : 'ri'} href={`#/${id}`} aria-current={view === id ? 'page' : undefined} data-testid={`nav-${id}`}><Icon name={id} /><span>{name}</span></a>;
-  return <nav class="rail" aria-label="Views">{item('live', 'Live')}{item('anchors', 'Anchors')}<span class="grow" /><button class="ri" onClick={() => (help_open.value = !help_open.value)} aria-expanded={help_open.value}><Icon name="help" /><span>Keys</span></button></nav>;
+const VIEWS = [['live', 'Live'], ['plan', 'Plan'], ['anchors', 'Anchors'], ['measurements', 'Measure'], ['models', 'Models'], ['system', 'System']] as const;
+type View = (typeof VIEWS)[number][0];
+
+function Rail({ view }: { view: View }) {
+  const item = (id: View, name: string) => <a key={id} class={view === id ? 'ri on' : 'ri'} href={`#/${id}`} aria-current={view === id ? 'page' : undefined} data-testid={`nav-${id}`}><Icon name={id} /><span>{name}</span></a>;
+  return <nav class="rail" aria-label="Views">{VIEWS.map(([id, name]) => item(id, name))}<span class="grow" /><button class="ri" onClick={() => (help_open.value = !help_open.value)} aria-expanded={help_open.value}><Icon name="help" /><span>Keys</span></button></nav>;
 }
 
+/// A view that is not for the field comes in a chunk of its own: the operator's first load stays small.
+function Later<P extends object>({ load, props }: { load: () => Promise<ComponentType<P>>; props: P }) {
+  const [View, set_view] = useState<ComponentType<P> | null>(null), [failed, set_failed] = useState(false);
+  useEffect(() => { load().then((v) => set_view(() => v), () => set_failed(true)); }, []);
+  if (failed) return <div class="empty"><p role="status">This view could not be loaded from anchord. It needs the link to the server once.</p></div>;
+  return View ? <View {...props} /> : <div class="empty"><p role="status">Loading.</p></div>;
+}
+const load_models = () => import('../views/models/models').then((m) => m.Models);
+const load_plan = () => import('../views/plan/plan').then((m) => m.Plan);
+const load_system = () => import('../views/system/system').then((m) => m.System);
+const load_measurements = () => import('../views/measurements/measurements').then((m) => m.Measurements);
+
 export function App() {
-  const [, view, arg] = route.value.replace(/^#\/?/, '/').split('/');
+  const [, name, ...args] = route.value.replace(/^#\/?/, '/').split('/'), arg = args[args.length - 1];
+  const view: View = VIEWS.find(([id]) => id === name)?.[0] ?? 'live', named = arg ? decodeURIComponent(arg) : null;
   return (
     <div class="app">
       <Strip />
       <AlarmBar />
-      <Rail view={view === 'anchors' ? 'anchors' : 'live'} />
-      <main class="main">{view === 'anchors' ? <Anchors anchor={arg ? decodeURIComponent(arg) : null} /> : <Live />}</main>
+      <Rail view={view} />
+      <main class="main">
+        {view === 'live' && <Live />}
+        {view === 'plan' && <Later load={load_plan} props={{ id: named }} />}
+        {view === 'anchors' && <Anchors anchor={named} />}
+        {view === 'measurements' && <Later load={load_measurements} props={{}} />}
+        {view === 'system' && <Later load={load_system} props={{}} />}
+        {view === 'models' && <Later load={load_models} props={{ run: args[0] === 'runs' ? named : null }} />}
+      </main>
       <SignIn />
       <Help />
       <div class="toasts" role="status">{toast.value && <div class="toast" key={toast.value.id} data-testid="toast"><Mark shape="ok" />{toast.value.text}</div>}</div>

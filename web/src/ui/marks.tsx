@@ -6,6 +6,10 @@ import type { RangeClass } from '../state/scene';
 const ICONS = {
   live: <><circle cx="10" cy="10" r="4.4" /><path d="M10 2.8v14.4M2.8 10h14.4" /></>,
   anchors: <><path d="M10 9.6V17.2M6.2 17.2h7.6" /><circle cx="10" cy="7.5" r="1.9" /><path d="M5.5 11.7a6 6 0 0 1 0-8.4M14.5 11.7a6 6 0 0 0 0-8.4" /></>,
+  plan: <><circle cx="4.6" cy="15.4" r="1.9" /><circle cx="15.4" cy="4.6" r="1.9" /><path d="M6.6 15.4h6a2.7 2.7 0 0 0 0-5.4H7.4a2.7 2.7 0 0 1 0-5.4h6" /></>,
+  measurements: <path d="M2.6 12.2c1.4 0 1.6-6.6 3-6.6s1.8 10 3.2 10 1.8-12.4 3.2-12.4 1.6 9 3 9h2.4" />,
+  models: <path d="M3.4 3.2v13.4h13.4M5.6 13.8c5.4 0 4.2-8.4 10.6-9.2" />,
+  system: <path d="M3.2 6h6.2M13 6h3.8M3.2 14h2.6M9.4 14h7.4M11.2 3.9v4.2M7.6 11.9v4.2" />,
   auto: <><circle cx="10" cy="10" r="6.8" /><path d="M10 3.2a6.8 6.8 0 0 1 0 13.6z" fill="currentColor" /></>,
   light: <><circle cx="10" cy="10" r="3.4" /><path d="M10 2.4v1.8M10 15.8v1.8M2.4 10h1.8M15.8 10h1.8M4.6 4.6l1.3 1.3M14.1 14.1l1.3 1.3M4.6 15.4l1.3-1.3M14.1 5.9l1.3-1.3" /></>,
   dark: <path d="M15.8 12.1A6.6 6.6 0 0 1 7.9 4.2a6.6 6.6 0 1 0 7.9 7.9z" />,

@@ -22,5 +22,12 @@ export const REFUSED_WORDS: Record<string, string> = {
 };
 export const refused_words = (reason: string): string => REFUSED_WORDS[reason] ?? reason.replaceAll('_', ' ');
 
+/// Acceptance gates of the server, by name; what is not here is shown by its own name.
+const GATE_WORDS: Record<string, string> = {
+  redundancy: 'Ranges beyond need', rejected: 'Share of ranges rejected', geometry: 'Width of the track', precision: 'Precision', side: 'This side, not its twin', residual_scale: 'Residuals',
+  chi_square: 'Residuals over time', halves: 'Two halves agree', flights: 'Flights agree', bias: 'Range bias known', settled: 'Solve settled',
+};
+export const gate_words = (name: string): string => GATE_WORDS[name] ?? name.replaceAll('_', ' ').replace(/^./, (c) => c.toUpperCase());
+
 /// Limits a position is held against. The server's verdict decides; these are what the page draws and names beside the values.
 export const GATES = { h95_m: 0.1, v95_m: 0.2, gdop: 2.5, n_ranges: 60, rms_residual_m: 0.15, mirror: 0.01 } as const;

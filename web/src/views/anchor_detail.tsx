@@ -2,7 +2,7 @@ import type { AnchorRow } from '../api/anchors';
 import { age, accuracy, bearing, date, fixed, latlon, metres, percent, plain } from '../ui/format';
 import { CopyBox } from '../ui/copy_box';
 import { Mark, Q, StatusChip } from '../ui/marks';
-import { GATES, why_not_done, VERDICT_WORDS } from '../ui/words';
+import { GATES, gate_words, why_not_done, VERDICT_WORDS } from '../ui/words';
 import { Convergence } from './convergence';
 import { Covariance, Loupe } from './loupe';
 import { current_scene, now_ms, tick } from '../state/store';
@@ -53,29 +53,34 @@ function Twin({ r }: { r: AnchorRow }) {
   );
 }
 
-/// The server's verdict decides; these name value and limit of what it looks at.
+/// The gates of the server where it ran them; on a running estimate, what the page can hold against a limit itself. The verdict is always the server's.
 function Gates({ r }: { r: AnchorRow }) {
-  type Gate = [string, string, string, boolean | null];
-  const max = (v: number | null, limit: number): boolean | null => (v === null ? null : v <= limit);
-  const list: Gate[] = [
-    ['Verdict', VERDICT_WORDS[r.verdict], '', r.verdict === 'ok'],
-    ['95 % horizontal', `${fixed(r.h95_m, 2)} m`, `≤ ${fixed(GATES.h95_m, 2)}`, max(r.h95_m, GATES.h95_m)],
-    ['95 % vertical', `${fixed(r.v95_m, 2)} m`, `≤ ${fixed(GATES.v95_m, 2)}`, max(r.v95_m, GATES.v95_m)],
-    ['GDOP', fixed(r.gdop, 2), `≤ ${fixed(GATES.gdop, 1)}`, max(r.gdop, GATES.gdop)],
-    ['Ranges used', String(r.n_ranges), `≥ ${GATES.n_ranges}`, r.n_ranges >= GATES.n_ranges],
-    ['Residual RMS', `${fixed(r.rms_residual_m === null ? null : r.rms_residual_m * 1000, 0)} mm`, `≤ ${GATES.rms_residual_m * 1000}`, max(r.rms_residual_m, GATES.rms_residual_m)],
-    ['Mirror odds', r.mirror ? `${percent(r.mirror.probability)} %` : 'no twin', `≤ ${GATES.mirror * 100}`, r.mirror ? (r.mirror.probability ?? 1) <= GATES.mirror : true],
-  ];
-  const passed = list.filter((g) => g[3] === true).length;
+  const list = r.gates.length ? run_gates(r) : running_gates(r), passed = list.filter((g) => g.ok === true).length;
   return (
     <section class="sec-p">
       <table class="gates" data-testid="gates">
-        <caption>Quality <span class="mut">{passed} of {list.length} pass</span></caption>
+        <caption>{r.gates.length ? 'Acceptance gates' : 'Quality'} <span class="mut">{passed} of {list.length} pass</span></caption>
         <thead class="sr"><tr><th scope="col">Pass</th><th scope="col">What</th><th scope="col">Value</th><th scope="col">Limit</th></tr></thead>
-        <tbody>{list.map(([name, value, limit, ok]) => (
-          <tr key={name}><td><Mark shape={ok === null ? 'off' : ok ? 'ok' : 'bad'} tone={ok === null ? 'off' : ok ? 'ok' : 'bad'} /><span class="sr">{ok === null ? 'not known' : ok ? 'passes' : 'fails'}</span></td><th scope="row">{name}</th><td class={`num ${ok === false ? 'bad' : ''}`}>{value}</td><td class="num mut">{limit}</td></tr>
+        <tbody>{list.map(({ name, value, limit, ok, why }) => (
+          <tr key={name} title={why}><td><Mark shape={ok === null ? 'off' : ok ? 'ok' : 'bad'} tone={ok === null ? 'off' : ok ? 'ok' : 'bad'} /><span class="sr">{ok === null ? 'not known' : ok ? 'passes' : 'fails'}</span></td><th scope="row">{name}{ok === false && why && <span class="mut block">{why}</span>}</th><td class={`num ${ok === false ? 'bad' : ''}`}>{value}</td><td class="num mut">{limit}</td></tr>
         ))}</tbody>
       </table>
+      {r.override && <p class="why" data-testid="override"><Mark shape="caution" tone="caution" /> Published by a person although a gate failed: {r.override}</p>}
     </section>
   );
+}
+interface Line { readonly name: string; readonly value: string; readonly limit: string; readonly ok: boolean | null; readonly why: string }
+const brief = (v: number | null): string => (v === null ? '–' : fixed(v, Math.abs(v) < 10 ? 2 : 0));
+const run_gates = (r: AnchorRow): Line[] => r.gates.map((g) => ({ name: gate_words(g.name), value: brief(g.value), limit: brief(g.limit), ok: g.passed, why: g.why }));
+function running_gates(r: AnchorRow): Line[] {
+  const at_most = (name: string, v: number | null, limit: number, value: string, shown: string): Line => ({ name, value, limit: `≤ ${shown}`, ok: v === null ? null : v <= limit, why: '' });
+  return [
+    { name: 'Verdict', value: VERDICT_WORDS[r.verdict], limit: '', ok: r.verdict === 'ok', why: '' },
+    at_most('95 % horizontal', r.h95_m, GATES.h95_m, `${fixed(r.h95_m, 2)} m`, fixed(GATES.h95_m, 2)),
+    at_most('95 % vertical', r.v95_m, GATES.v95_m, `${fixed(r.v95_m, 2)} m`, fixed(GATES.v95_m, 2)),
+    at_most('GDOP', r.gdop, GATES.gdop, fixed(r.gdop, 2), fixed(GATES.gdop, 1)),
+    { name: 'Ranges used', value: String(r.n_ranges), limit: `≥ ${GATES.n_ranges}`, ok: r.n_ranges >= GATES.n_ranges, why: '' },
+    at_most('Residual RMS', r.rms_residual_m, GATES.rms_residual_m, `${fixed(r.rms_residual_m === null ? null : r.rms_residual_m * 1000, 0)} mm`, String(GATES.rms_residual_m * 1000)),
+    at_most('Mirror odds', r.mirror ? (r.mirror.probability ?? 1) : 0, GATES.mirror, r.mirror ? `${percent(r.mirror.probability)} %` : 'no twin', String(GATES.mirror * 100)),
+  ];
 }

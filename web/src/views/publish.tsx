@@ -1,34 +1,39 @@
 /// Review and publish: a fresh calibration of the whole flight, the result of every anchor against the live estimate, then one revision for facility tools.
 import { signal } from '@preact/signals';
 import { useEffect, useRef, useState } from 'preact/hooks';
-import { ApiError, idempotency_key } from '../api/client';
-import { calibrate, publish, type AnchorRow, type Calibration } from '../api/anchors';
+import { idempotency_key, said } from '../api/client';
+import { calibrate, moved_since_published, publish, report_url, type AnchorRow, type Calibration, type Moved } from '../api/anchors';
 import type { MissionMsg } from '../live/messages';
 import { current_scene, revision, say } from '../state/store';
 import { accuracy, fixed } from '../ui/format';
 import { Icon, Mark, StatusChip } from '../ui/marks';
-import { VERDICT_WORDS } from '../ui/words';
+import { gate_words, VERDICT_WORDS } from '../ui/words';
 
 export const publish_open = signal(false);
 
 export function Publish({ mission }: { mission: MissionMsg }) {
-  const [draft, set_draft] = useState<Calibration | null>(null), [problem, set_problem] = useState(''), [busy, set_busy] = useState<'' | 'calibrating' | 'publishing'>('calibrating');
+  const [draft, set_draft] = useState<Calibration | null>(null), [moved, set_moved] = useState<ReadonlyMap<string, Moved>>(new Map()), [reasons, set_reasons] = useState<Readonly<Record<string, string>>>({}), [problem, set_problem] = useState(''), [busy, set_busy] = useState<'' | 'calibrating' | 'publishing'>('calibrating');
   const keys = useRef({ calibrate: idempotency_key(), publish: idempotency_key() }), note = useRef<HTMLInputElement>(null), box = useRef<HTMLElement>(null);
   const guarded = async (what: 'calibrating' | 'publishing', work: () => Promise<void>): Promise<void> => {
     set_busy(what);
     set_problem('');
-    try { await work(); } catch (e) { set_problem(e instanceof ApiError ? `${e.message}${e.problem.request_id ? ` (request ${e.problem.request_id})` : ''}` : e instanceof Error ? e.message : String(e)); }
+    try { await work(); } catch (e) { set_problem(said(e)); }
     set_busy('');
   };
-  const solve = (): void => void guarded('calibrating', async () => set_draft(await calibrate(mission.mission, keys.current.calibrate)));
+  const solve = (): void => void guarded('calibrating', async () => {
+    const made = await calibrate(mission.mission, keys.current.calibrate);
+    set_draft(made);
+    set_moved(await moved_since_published(made.id).catch(() => new Map()));
+  });
   useEffect(() => { box.current?.focus(); solve(); }, []);
+  const good = draft?.rows.filter(passes) ?? [], overrides = Object.entries(reasons).filter(([, reason]) => reason.trim() !== '').map(([network_id, reason]) => ({ network_id, reason: reason.trim() }));
+  const going = good.length + overrides.length;
   const send = (): void => void guarded('publishing', async () => {
-    const n = await publish(draft!.id, note.current?.value.trim() ?? '', keys.current.publish);
+    const n = await publish(draft!.id, note.current?.value.trim() ?? '', overrides, keys.current.publish);
     if (n !== null) revision.value = Math.max(revision.value ?? 0, n);
     say(`Published${n === null ? '' : ` as revision ${n}`}`);
     publish_open.value = false;
   });
-  const good = draft?.rows.filter((r) => r.verdict === 'ok') ?? [];
   return (
     <section class="drawer" role="dialog" aria-modal="false" aria-labelledby="publish-title" tabIndex={-1} ref={box} data-testid="publish">
       <div class="hd big"><h2 id="publish-title">Review and publish</h2><span class="grow" /><button class="btn quiet" aria-label="Close" onClick={() => (publish_open.value = false)}><Icon name="close" /></button></div>
@@ -40,28 +45,38 @@ export function Publish({ mission }: { mission: MissionMsg }) {
           <div class="scroll" tabIndex={0} aria-label="Result of the calibration">
             <table class="tbl" data-testid="draft">
               <caption class="sr">Result of the calibration for each anchor</caption>
-              <thead><tr><th scope="col">Anchor</th><th scope="col">Result</th><th scope="col" class="num">95 % h</th><th scope="col" class="num">95 % v</th><th scope="col" class="num">From live, m</th><th scope="col">Published</th></tr></thead>
-              <tbody>{draft.rows.map((r) => <DraftRow key={r.anchor} r={r} />)}</tbody>
+              <thead><tr><th scope="col">Anchor</th><th scope="col">Result</th><th scope="col" class="num">95 % h</th><th scope="col" class="num">95 % v</th><th scope="col" class="num">From live, m</th><th scope="col" class="num">From published, m</th><th scope="col">Published</th></tr></thead>
+              <tbody>{draft.rows.map((r) => <DraftRow key={r.anchor} r={r} moved={moved.get(r.anchor)} reason={reasons[r.anchor]} set_reason={(reason) => set_reasons({ ...reasons, [r.anchor]: reason })} />)}</tbody>
             </table>
           </div>
           <label class="lab" for="note">Note</label>
           <input id="note" ref={note} placeholder="What this revision is about" maxLength={200} />
-          <div class="actions"><button class="btn" onClick={() => (publish_open.value = false)}>Not now</button><button class="btn primary" data-testid="publish-now" disabled={busy !== '' || good.length === 0} onClick={send}>{busy === 'publishing' ? 'Publishing' : `Publish ${good.length} of ${draft.rows.length} anchors`}</button></div>
+          <div class="actions"><a class="btn" href={report_url(draft.id)} target="_blank" rel="noreferrer" data-testid="report">Report to print</a><span class="grow" /><button class="btn" onClick={() => (publish_open.value = false)}>Not now</button><button class="btn primary" data-testid="publish-now" disabled={busy !== '' || going === 0} onClick={send}>{busy === 'publishing' ? 'Publishing' : `Publish ${going} of ${draft.rows.length} anchors`}</button></div>
         </>
       )}
     </section>
   );
 }
 
-function DraftRow({ r }: { r: AnchorRow }) {
-  const live = current_scene()?.anchors.get(r.anchor)?.value;
+/// What may go out without a person: the server says so; a server without gates is taken at its verdict.
+const passes = (r: AnchorRow): boolean => r.acceptable ?? r.verdict === 'ok';
+/// Two places that fit cannot be talked into one; anything else a person may answer for.
+const may_override = (r: AnchorRow): boolean => !passes(r) && r.verdict !== 'ambiguous' && r.enu_m !== null;
+
+function DraftRow({ r, moved, reason, set_reason }: { r: AnchorRow; moved: Moved | undefined; reason: string | undefined; set_reason: (reason: string) => void }) {
+  const live = current_scene()?.anchors.get(r.anchor)?.value, failed = r.gates.filter((g) => !g.passed);
   const shift = live?.enu_m && r.enu_m ? Math.hypot(r.enu_m[0] - live.enu_m[0], r.enu_m[1] - live.enu_m[1], r.enu_m[2] - live.enu_m[2]) : null;
+  const from = moved?.horizontal_m == null ? null : Math.hypot(moved.horizontal_m, moved.vertical_m ?? 0);
   return (
     <tr>
       <th scope="row">{r.anchor}</th>
       <td><StatusChip status={r.status} /><span class="mut block wrap">{r.verdict === 'ok' ? '' : r.reason || VERDICT_WORDS[r.verdict]}</span></td>
       <td class="num">{accuracy(r.h95_m)}</td><td class="num">{accuracy(r.v95_m)}</td><td class="num">{fixed(shift, 3)}</td>
-      <td>{r.verdict === 'ok' ? <><Mark shape="ok" tone="ok" /> yes</> : <><Mark shape="off" tone="off" /> no, {VERDICT_WORDS[r.verdict]}</>}</td>
+      <td class="num">{from === null ? <span class="mut">new</span> : fixed(from, 3)}{moved?.change === 'moved' && <span class="bad block"><Mark shape="bad" tone="bad" /> moved</span>}</td>
+      <td class="wrap">
+        {passes(r) ? <><Mark shape="ok" tone="ok" /> yes</> : <><Mark shape="off" tone="off" /> no{failed.length ? `: ${failed.map((g) => `${gate_words(g.name).toLowerCase()} ${g.why ? `(${g.why})` : ''}`).join(', ')}` : `, ${VERDICT_WORDS[r.verdict]}`}</>}
+        {may_override(r) && (reason === undefined ? <button class="btn small" onClick={() => set_reason('')}>Publish it all the same</button> : <input class="reason" aria-label={`Reason to publish ${r.anchor}`} placeholder="why, for the record" maxLength={500} value={reason} onInput={(e) => set_reason(e.currentTarget.value)} />)}
+      </td>
     </tr>
   );
 }

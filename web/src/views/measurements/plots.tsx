@@ -1,0 +1,75 @@
+/// The plots of many measurements at once. LOS is a filled dot, NLOS a triangle, without a label a ring: colour never speaks alone.
+import { useState } from 'preact/hooks';
+import type { Sample } from '../../api/measurements';
+import { fixed, grouped } from '../../ui/format';
+import { Axes, Drawing, scale, ticks } from '../chart';
+import { feature_words } from '../models/words';
+import { histogram } from './choice';
+
+const POINTS_MAX = 1500;   ///< drawn; thinned evenly above it, and said
+const span = (v: readonly number[], pad: number): [number, number] => {
+  const lo = Math.min(...v), hi = Math.max(...v), room = (hi - lo || 1) * pad;
+  return [lo - room, hi + room];
+};
+
+interface Cloud { readonly samples: readonly Sample[]; readonly x: (s: Sample) => number | null; readonly y: (s: Sample) => number | null; readonly xw: (v: number) => string; readonly yw: (v: number) => string; readonly label: string; readonly selected: number | null; readonly select: (id: number) => void }
+function Scatter({ samples, x, y, xw, yw, label, selected, select }: Cloud) {
+  const known = samples.flatMap((s) => { const a = x(s), b = y(s); return a === null || b === null ? [] : [{ s, a, b }]; });
+  const step = Math.max(1, Math.ceil(known.length / POINTS_MAX)), drawn = known.filter(({ s }, i) => i % step === 0 || s.id === selected);
+  if (!drawn.length) return <p class="why">Nothing to draw: these measurements lack one of the two quantities.</p>;
+  const [x0, x1] = span(drawn.map((p) => p.a), 0.03), [y0, y1] = span(drawn.map((p) => p.b), 0.06);
+  const shape = (los: boolean | null, px: number, py: number, r: number): string =>
+    (los === false ? `M${px} ${py - r}l${r} ${1.7 * r}h${-2 * r}z` : `M${px - r} ${py}a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0z`);
+  return <>
+    <Drawing cls="scatter" label={`${label}, ${drawn.length} measurements`} draw={(w, h) => {
+      const f = { w, h, left: 56, right: 10, top: 8, bottom: 24 }, sx = scale([x0, x1], [f.left, w - f.right]), sy = scale([y0, y1], [h - f.bottom, f.top]);
+      return <>
+        <Axes f={f} x={sx} y={sy} xs={ticks(x0, x1)} ys={ticks(y0, y1, 4)} xw={xw} yw={yw} />
+        {drawn.map(({ s, a, b }) => <path key={s.id} class={`pt ${s.los === null ? 'none' : s.los ? 'los' : 'nlos'}${s.id === selected ? ' sel' : ''}`} d={shape(s.los, sx(a), sy(b), s.id === selected ? 7 : 3)} onClick={() => select(s.id)} />)}
+      </>;
+    }} />
+    {step > 1 && <p class="sub">every {step === 2 ? 'second' : `${step}th`} of {grouped(known.length)} is drawn</p>}
+  </>;
+}
+
+const metre_words = (v: number): string => `${fixed(v, 0)} m`;
+export function LevelPanel({ samples, selected, select }: { samples: readonly Sample[]; selected: number | null; select: (id: number) => void }) {
+  return (
+    <section class="cell-p" data-testid="plot-level">
+      <h2>Level over distance</h2>
+      <p class="sub">received level against measured distance</p>
+      <Scatter samples={samples} x={(s) => s.distance_m} y={(s) => s.rx_dbm} xw={metre_words} yw={(v) => `${fixed(v, 0)} dBm`} label="Received level against distance" selected={selected} select={select} />
+    </section>
+  );
+}
+export function TruthPanel({ samples, selected, select }: { samples: readonly Sample[]; selected: number | null; select: (id: number) => void }) {
+  if (!samples.some((s) => s.truth_m !== null)) return null;
+  return (
+    <section class="cell-p" data-testid="plot-bias">
+      <h2>Bias over distance</h2>
+      <p class="sub">measured less true distance, where the truth is known</p>
+      <Scatter samples={samples} x={(s) => s.truth_m} y={(s) => (s.truth_m === null ? null : s.distance_m - s.truth_m)} xw={metre_words} yw={(v) => `${fixed(v * 1000, 0)} mm`} label="Bias against true distance" selected={selected} select={select} />
+    </section>
+  );
+}
+
+export function HistogramPanel({ samples }: { samples: readonly Sample[] }) {
+  const names = [...new Set(samples.flatMap((s) => Object.keys(s.features)))], [wanted, set_wanted] = useState('');
+  const name = names.includes(wanted) ? wanted : names.includes('rx_minus_fp_db') ? 'rx_minus_fp_db' : (names[0] ?? ''), bars = name ? histogram(samples, name) : null;
+  return (
+    <section class="cell-p" data-testid="plot-histogram">
+      <div class="hd"><h2>Feature</h2>{names.length > 0 && <select class="input" value={name} aria-label="Feature of the histogram" onChange={(e) => set_wanted(e.currentTarget.value)}>{names.map((n) => <option key={n} value={n}>{feature_words(n)}</option>)}</select>}</div>
+      {!bars && <p class="why">{names.length ? 'Every measurement shown has the same value.' : 'The radio gave no diagnostics with these measurements.'}</p>}
+      {bars && <Drawing cls="scatter" label={`Histogram of ${feature_words(name)} by label`} draw={(w, h) => {
+        const totals = bars.los.map((v, i) => v + bars.nlos[i]! + bars.unlabelled[i]!), top = Math.max(...totals), edges = bars.edges;
+        const f = { w, h, left: 44, right: 10, top: 8, bottom: 24 }, x = scale([edges[0]!, edges[edges.length - 1]!], [f.left, w - f.right]), y = scale([0, top], [h - f.bottom, f.top]);
+        const part = (cls: string, counts: readonly number[], under: (i: number) => number) => counts.map((n, i) => n > 0 && <rect key={`${cls}${i}`} class={`hb ${cls}`} x={x(edges[i]!) + 0.5} width={Math.max(1, x(edges[i + 1]!) - x(edges[i]!) - 1)} y={y(under(i) + n)} height={y(under(i)) - y(under(i) + n)} />);
+        return <>
+          <Axes f={f} x={x} y={y} xs={ticks(edges[0]!, edges[edges.length - 1]!)} ys={ticks(0, top, 3)} xw={(v) => fixed(v, Math.abs(edges[edges.length - 1]! - edges[0]!) < 4 ? 1 : 0)} yw={(v) => grouped(v)} />
+          {part('los', bars.los, () => 0)}{part('nlos', bars.nlos, (i) => bars.los[i]!)}{part('none', bars.unlabelled, (i) => bars.los[i]! + bars.nlos[i]!)}
+        </>;
+      }} />}
+      {bars && <p class="legend"><span><i class="sw los" />LOS</span><span><i class="sw nlos" />NLOS</span><span><i class="sw none" />no label</span></p>}
+    </section>
+  );
+}

@@ -1,0 +1,119 @@
+/// Plan: outline, areas and waypoints, drawn or typed; generated from the outline; judged while it is edited; saved by revision.
+import { useEffect, useRef, useState } from 'preact/hooks';
+import './plan.css';
+import { ApiError, said } from '../../api/client';
+import { check as fetch_check, EMPTY, export_url, generate, import_file, plans as fetch_plans, read, remove, save, type Check, type Plan as PlanDoc } from '../../api/plans';
+import type { Geodetic } from '../../map/enu';
+import { may } from '../../state/session';
+import { current_mission, say } from '../../state/store';
+import { clock, fixed, grouped } from '../../ui/format';
+import { Chip, Icon } from '../../ui/marks';
+import { begun, changed, origin_of, redone, undone, type History, type Picked, type Shape } from './draft';
+import { PlanMap } from './plan_map';
+import { Corners, SettingFields, Waypoints } from './points';
+
+export function Plan({ id }: { id: string | null }) {
+  const [all, set_all] = useState<readonly PlanDoc[] | null>(null), [history, set_history] = useState<History>(begun(EMPTY)), [saved, set_saved] = useState<PlanDoc>(EMPTY), [drawing, set_drawing] = useState<Shape>('outline'), [picked, pick] = useState<Picked | null>(null);
+  const [check, set_check] = useState<Check | null>(null), [problem, set_problem] = useState(''), [theirs, set_theirs] = useState<PlanDoc | null>(null), [notes, set_notes] = useState<readonly string[]>([]), [busy, set_busy] = useState(''), [origin, set_origin] = useState<Geodetic | null>(null);
+  const file = useRef<HTMLInputElement>(null), plan = history.now, dirty = plan !== saved, engineer = may('engineer', 'operator');
+  // Metres are about one origin for as long as a plan is open: a map that moves while it is drawn on cannot be used.
+  const open = (p: PlanDoc): void => { set_origin(origin_of(p, current_mission.peek()?.origin ?? null)); set_history(begun(p)); set_saved(p); pick(null); set_check(null); set_theirs(null); set_notes([]); };
+  const guarded = async (what: string, work: () => Promise<void>): Promise<void> => { set_busy(what); set_problem(''); try { await work(); } catch (e) { set_problem(said(e)); } set_busy(''); };
+  useEffect(() => {
+    document.title = 'Plan - anchord';
+    fetch_plans().then((list) => { set_all(list); const wanted = list.find((p) => p.id === id) ?? list[0]; open(wanted ?? EMPTY); }, (e: unknown) => set_problem(said(e)));
+  }, [id]);
+  useEffect(() => { if (saved.id && !dirty) fetch_check(saved.id).then(set_check, () => undefined); }, [saved]);
+  const change = (p: PlanDoc): void => { set_history(changed(history, p)); set_check(null); };
+  const keep = (): void => void guarded('save', async () => {
+    try {
+      const kept = await save(plan);
+      set_history(begun(kept));
+      set_saved(kept);
+      set_theirs(null);
+      set_all([kept, ...(all ?? []).filter((p) => p.id !== kept.id)]);
+      say(`Saved, revision ${kept.revision}`);
+    } catch (e) {
+      // Somebody else saved meanwhile: both versions are shown, nothing is overwritten in silence.
+      if (e instanceof ApiError && e.problem.status === 412 && plan.id) set_theirs(await read(plan.id));
+      else throw e;
+    }
+  });
+  const propose = (): void => void guarded('generate', async () => { const made = await generate(plan); set_history(changed(history, made.plan)); set_check(made.check); say(`${made.plan.waypoints.length} waypoints proposed`); });
+  const bring = (f: File): void => void guarded('import', async () => { const made = await import_file(f.name.replace(/\.\w+$/, ''), await f.text()); set_history(changed(history, { ...made.plan, id: plan.id, revision: plan.revision, name: plan.name || made.plan.name })); set_notes(made.notes); set_origin(origin_of(made.plan, origin)); });
+  const no_flies = plan.no_fly.map((_, i): [Shape, string] => [`no_fly/${i}`, `No-fly ${i + 1}`]);
+  const areas: readonly (readonly [Shape, string])[] = [['outline', 'Outline'], ['fence', 'Fence'], ...no_flies, [`no_fly/${plan.no_fly.length}`, 'New no-fly'], ['waypoints', 'Waypoints']];
+  return (
+    <div class="plan" data-testid="plan">
+      <div class="toolbar">
+        <h1>Plan</h1>
+        {all && all.length > 0 && <select aria-label="Plan" data-testid="plan-choice" value={plan.id ?? ''} disabled={dirty} onChange={(e) => { const p = all.find((x) => x.id === e.currentTarget.value); if (p) open(p); }}>{!plan.id && <option value="">new plan</option>}{all.map((p) => <option key={p.id} value={p.id!}>{p.name}</option>)}</select>}
+        <input class="planname" aria-label="Name of the plan" placeholder="Name" value={plan.name} data-testid="plan-name" onChange={(e) => change({ ...plan, name: e.currentTarget.value })} />
+        <span class="mut">{plan.id ? `revision ${plan.revision}${dirty ? ', changed' : ''}` : 'not saved'}</span>
+        <span class="grow" />
+        <button class="btn" disabled={!history.before.length} onClick={() => { set_history(undone(history)); set_check(null); }}>Undo</button><button class="btn" disabled={!history.after.length} onClick={() => { set_history(redone(history)); set_check(null); }}>Redo</button>
+        {engineer && <button class="btn" onClick={() => open(EMPTY)} disabled={dirty}>New</button>}
+        <button class="btn" onClick={() => file.current?.click()}>Import</button><input ref={file} type="file" accept=".plan,.json,.geojson" class="sr" tabIndex={-1} aria-label="Plan file" onChange={(e) => { const f = e.currentTarget.files?.[0]; if (f) bring(f); e.currentTarget.value = ''; }} />
+        {plan.id && !dirty && <><a class="btn" href={export_url(plan.id, 'plan')} download={`${plan.name}.plan`}><Icon name="download" />.plan</a><a class="btn" href={export_url(plan.id, 'geojson')} download={`${plan.name}.geojson`}><Icon name="download" />GeoJSON</a></>}
+        {engineer && <button class="btn" data-testid="generate" disabled={plan.outline.length < 3 || busy !== ''} onClick={propose}>{busy === 'generate' ? 'Planning' : 'Generate'}</button>}
+        {engineer && <button class="btn primary" data-testid="save" disabled={!dirty || busy !== ''} onClick={keep}>Save</button>}
+      </div>
+      {problem && <div class="problem" role="status"><b>That did not work.</b> {problem}</div>}
+      {theirs && <Conflict mine={plan} theirs={theirs} keep_mine={() => { set_history(changed(history, { ...plan, revision: theirs.revision })); set_theirs(null); }} take_theirs={() => open(theirs)} />}
+      <div class="planbody">
+        <div class="planleft">
+          <div class="drawbar seg" role="group" aria-label="What a tap adds">{areas.map(([shape, words]) => <button key={words} class={drawing === shape ? 'on' : ''} aria-pressed={drawing === shape} data-testid={`draw-${words.toLowerCase().replace(' ', '-')}`} onClick={() => set_drawing(shape)}>{words}</button>)}</div>
+          {origin ? <PlanMap plan={plan} origin={origin} drawing={drawing} picked={picked} pick={pick} change={change} /> : <Where set={set_origin} />}
+        </div>
+        <div class="planside" tabIndex={0} role="region" aria-label="Plan in numbers">
+          <CheckPanel check={check} dirty={dirty} plan={plan} />
+          {notes.length > 0 && <div class="callout"><b>Imported.</b><ul>{notes.map((n) => <li key={n}>{n}</li>)}</ul></div>}
+          <section class="sec-p"><div class="hd"><h2>Waypoints</h2><span class="meta">{plan.waypoints.length}</span></div><Waypoints plan={plan} picked={picked} pick={pick} change={change} /></section>
+          <section class="sec-p"><h2>Areas</h2>
+            {plan.outline.length === 0 && <p class="why">The outline of the building comes first: tap its corners, or import a GeoJSON.</p>}
+            <Corners plan={plan} shape="outline" name="Outline" picked={picked} pick={pick} change={change} /><Corners plan={plan} shape="fence" name="Fence" picked={picked} pick={pick} change={change} />
+            {plan.no_fly.map((_, i) => <Corners key={i} plan={plan} shape={`no_fly/${i}`} name={`No-fly ${i + 1}`} picked={picked} pick={pick} change={change} />)}
+          </section>
+          <section class="sec-p"><h2>Settings</h2><SettingFields plan={plan} change={change} /></section>
+          {engineer && plan.id && !dirty && <section class="sec-p"><button class="btn" onClick={() => void guarded('remove', async () => { await remove(plan); set_all((all ?? []).filter((p) => p.id !== plan.id)); open(EMPTY); say('Plan removed'); })}>Remove this plan</button></section>}
+        </div>
+      </div>
+    </div>
+  );
+}
+
+function CheckPanel({ check, dirty, plan }: { check: Check | null; dirty: boolean; plan: PlanDoc }) {
+  return (
+    <section class="sec-p" data-testid="check">
+      <div class="hd"><h2>Check</h2>{check && <Chip shape={check.flyable ? 'ok' : 'bad'} tone={check.flyable ? 'ok' : 'bad'} word={check.flyable ? 'CAN BE FLOWN' : 'CANNOT BE FLOWN'} />}</div>
+      {!check && <p class="why">{plan.outline.length < 3 && !plan.waypoints.length ? 'Nothing is drawn yet.' : dirty ? 'Save to have it checked.' : 'Checking.'}</p>}
+      {check && <dl class="kv">
+        <div><dt>Flight</dt><dd>{clock(check.duration_s, true)}</dd></div><div><dt>Way</dt><dd>{grouped(check.length_m)} m</dd></div><div><dt>Measuring points</dt><dd>{grouped(check.n_measure)}</dd></div>
+        <div><dt>Error expected</dt><dd>{check.rms_m === null ? '–' : `${fixed(check.rms_m * 100, 1)} cm`}</dd></div><div><dt>Worst anchor</dt><dd>{check.worst_m === null ? '–' : `${fixed(check.worst_m * 100, 1)} cm`}</dd></div>
+      </dl>}
+      {check && <ul class="issues">{check.issues.map((i, k) => <li key={k}><Chip shape={i.severity === 'error' ? 'bad' : 'caution'} tone={i.severity === 'error' ? 'bad' : 'caution'} word={i.severity.toUpperCase()} /> {i.text}</li>)}</ul>}
+    </section>
+  );
+}
+
+/// Both versions side by side in numbers; the person decides.
+function Conflict({ mine, theirs, keep_mine, take_theirs }: { mine: PlanDoc; theirs: PlanDoc; keep_mine: () => void; take_theirs: () => void }) {
+  const row = (name: string, f: (p: PlanDoc) => string | number) => <tr class={f(mine) === f(theirs) ? '' : 'sel'}><th scope="row">{name}</th><td>{f(mine)}</td><td>{f(theirs)}</td></tr>;
+  return (
+    <div class="callout caution" role="alertdialog" aria-label="The plan was changed by somebody else" data-testid="conflict">
+      <b>Somebody else saved this plan meanwhile (revision {theirs.revision}).</b>
+      <table class="tbl"><thead><tr><td /><th scope="col">Mine</th><th scope="col">Theirs</th></tr></thead><tbody>{row('Name', (p) => p.name)}{row('Waypoints', (p) => p.waypoints.length)}{row('Corners of the outline', (p) => p.outline.length)}{row('No-fly areas', (p) => p.no_fly.length)}{row('Building height, m', (p) => p.building_height_m)}</tbody></table>
+      <span class="actions"><button class="btn" onClick={take_theirs}>Take theirs</button><button class="btn" onClick={keep_mine}>Keep mine, then save</button></span>
+    </div>
+  );
+}
+
+/// Without a flight and without a drawing nobody knows where on the globe to draw.
+function Where({ set }: { set: (o: Geodetic) => void }) {
+  const [text, set_text] = useState(''), parts = text.split(/[,;\s]+/).map(Number), good = parts.length === 2 && parts.every(Number.isFinite) && Math.abs(parts[0]!) <= 90 && Math.abs(parts[1]!) <= 180;
+  return (
+    <div class="empty"><p>Where is the building? Type the latitude and longitude of its middle, or import an outline.</p>
+      <form class="addform" onSubmit={(e) => { e.preventDefault(); if (good) set({ lat: parts[0]!, lon: parts[1]!, h_m: 0 }); }}><input aria-label="Latitude, longitude" data-testid="where" placeholder="51.0232, 3.7133" value={text} onInput={(e) => set_text(e.currentTarget.value)} /><button class="btn primary" disabled={!good}>Draw here</button></form>
+    </div>
+  );
+}
