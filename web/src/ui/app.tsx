@@ -10,11 +10,11 @@ import { Icon, Mark } from './marks';
 import { SignIn } from './sign_in';
 import { Strip } from './strip';
 
-/// `#/live`, `#/plan/<id>`, `#/anchors`, `#/anchors/0x6a2f`, `#/measurements`, `#/models`, `#/models/runs/<id>`, `#/system`.
+/// `#/live`, `#/plan/<id>`, `#/anchors`, `#/anchors/0x6a2f`, `#/measurements`, `#/models`, `#/models/runs/<id>`, `#/replay/<mission>?t=12.5`, `#/system`.
 export const route = signal(location.hash);
 addEventListener('hashchange', () => (route.value = location.hash));
 
-const VIEWS = [['live', 'Live'], ['plan', 'Plan'], ['anchors', 'Anchors'], ['measurements', 'Measure'], ['models', 'Models'], ['system', 'System']] as const;
+const VIEWS = [['live', 'Live'], ['plan', 'Plan'], ['anchors', 'Anchors'], ['measurements', 'Measure'], ['models', 'Models'], ['replay', 'Replay'], ['system', 'System']] as const;
 type View = (typeof VIEWS)[number][0];
 
 function Rail({ view }: { view: View }) {
@@ -31,6 +31,7 @@ function Later<P extends object>({ load, props }: { load: () => Promise<Componen
 }
 const load_models = () => import('../views/models/models').then((m) => m.Models);
 const load_plan = () => import('../views/plan/plan').then((m) => m.Plan);
+const load_replay = () => import('../views/replay/replay').then((m) => m.Replay);
 const load_system = () => import('../views/system/system').then((m) => m.System);
 const load_measurements = () => import('../views/measurements/measurements').then((m) => m.Measurements);
 
@@ -47,6 +48,7 @@ export function App() {
         {view === 'plan' && <Later load={load_plan} props={{ id: named }} />}
         {view === 'anchors' && <Anchors anchor={named} />}
         {view === 'measurements' && <Later load={load_measurements} props={{}} />}
+        {view === 'replay' && <Later load={load_replay} props={{ id: named }} />}
         {view === 'system' && <Later load={load_system} props={{}} />}
         {view === 'models' && <Later load={load_models} props={{ run: args[0] === 'runs' ? named : null }} />}
       </main>

@@ -1,7 +1,7 @@
 /// The selected anchor beside the map: state, why it is not done, its curve, its ellipse at true scale, its covariance.
 import type { EstimateMsg } from '../live/messages';
 import { sigma_h, sigma_v } from '../map/enu';
-import { current_mission, current_scene, link, now_ms, tick } from '../state/store';
+import { watched_mission, watched_scene, now_ms, tick, watched_lost } from '../state/store';
 import { accuracy, age, fixed, metres, percent } from '../ui/format';
 import { Chip, Q, StatusChip } from '../ui/marks';
 import { why_not_done } from '../ui/words';
@@ -10,9 +10,9 @@ import { Covariance, Loupe } from './loupe';
 
 export function AnchorCard({ anchor }: { anchor: string }) {
   tick.value;
-  const scene = current_scene(), heard = scene?.anchors.get(anchor);
+  const scene = watched_scene(), heard = scene?.anchors.get(anchor);
   if (!heard) return <section class="sec-p"><div class="hd"><h2>{anchor}</h2><Chip shape="off" tone="off" word="UNSEEN" /></div><p class="why">Ranges arrive, an estimate has not been made yet.</p></section>;
-  const e = heard.value, old_ms = now_ms() - heard.at_ms, stale = current_mission.value?.state === 'recording' && (link.value === 'lost' || old_ms > 10_000);
+  const e = heard.value, old_ms = now_ms() - heard.at_ms, stale = watched_mission.value?.state === 'recording' && (watched_lost() || old_ms > 10_000);
   const why = why_not_done(e);
   return (
     <section class="sec-p" data-testid="anchor-card">

@@ -1,7 +1,7 @@
 /// Horizontal sigma of one anchor over the flight, log scale, with the limit drawn in. uPlot comes with this chunk.
 import { useEffect, useRef } from 'preact/hooks';
 import type uPlot from 'uplot';
-import { current_scene, tick } from '../state/store';
+import { watched_scene, tick } from '../state/store';
 import { fixed } from '../ui/format';
 import { css, ground } from '../ui/theme';
 
@@ -11,7 +11,7 @@ export const DONE_SIGMA_M = 0.05;
 export function Convergence({ anchor }: { anchor: string }) {
   const box = useRef<HTMLDivElement>(null), plot = useRef<uPlot | null>(null);
   tick.value;
-  const history = current_scene()?.history.get(anchor) ?? [];
+  const history = watched_scene()?.history.get(anchor) ?? [];
   const theme = ground.value;
   const last = [...history].reverse().find((h) => h.sigma_h_m !== null)?.sigma_h_m ?? null;
 
@@ -27,7 +27,7 @@ export function Convergence({ anchor }: { anchor: string }) {
     return () => { gone = true; resize.disconnect(); plot.current?.destroy(); plot.current = null; };
   }, [anchor, theme]);
   const draw = (): void => {
-    const h = current_scene()?.history.get(anchor) ?? [], t0 = h[0]?.t_us ?? 0;
+    const h = watched_scene()?.history.get(anchor) ?? [], t0 = h[0]?.t_us ?? 0;
     plot.current?.setData([h.map((x) => (x.t_us - t0) / 1e6), h.map((x) => x.sigma_h_m)]);
   };
   useEffect(draw, [tick.value]);

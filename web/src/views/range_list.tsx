@@ -1,4 +1,4 @@
-import { chosen_anchor, current_mission, current_scene, link, now_ms, tick } from '../state/store';
+import { chosen_anchor, watched_mission, watched_scene, now_ms, tick, watched_lost } from '../state/store';
 import { range_class, rate_hz, type RangeRow } from '../state/scene';
 import { age, fixed, range_m } from '../ui/format';
 import { CLASS_LOOK, Mark, Q } from '../ui/marks';
@@ -9,7 +9,7 @@ const STALE_MS = 2000;
 /// One row per anchor, in the order of their ids: a list that re-sorts under the finger cannot be tapped.
 export function RangeList({ selected }: { selected: string | null }) {
   tick.value;
-  const scene = current_scene(), now = now_ms(), lost = link.value === 'lost', running = current_mission.value?.state === 'recording';
+  const scene = watched_scene(), now = now_ms(), lost = watched_lost(), running = watched_mission.value?.state === 'recording';
   const rows = scene ? [...scene.ranges.entries()].sort(([a], [b]) => (a < b ? -1 : 1)) : [];
   const heard = rows.filter(([, r]) => now - r.at_ms < STALE_MS).length;
   const total_hz = rows.reduce((s, [, r]) => s + (now - r.at_ms < STALE_MS ? (rate_hz(r) ?? 0) : 0), 0);

@@ -1,0 +1,53 @@
+import { describe, expect, it } from 'vitest';
+import type { MissionMsg, RangeMsg } from '../src/live/messages';
+import { after, Player, poses_of, type Recording } from '../src/state/recording';
+
+const mission: MissionMsg = { mission: 'm', name: 'flight', state: 'finished', t_us: 0, started_us: 0, frame: 'local', origin: null, n_ranges: 0, n_fixes: 0, anchors_found: 0, anchors_converged: 0, range_rate_hz: null };
+const fix = (t_s: number, e: number) => ({ t_us: t_s * 1e6, local_m: [e, 0, 5], fix: 'fixed' });
+const range = (t_s: number): RangeMsg => ({ t_us: t_s * 1e6, mission: 'm', tag: '0x1', anchor: '0x2', distance_m: t_s, corrected_m: t_s, sigma_m: null, rss_dbm: null, p_los: null, used: true, refused: null });
+const seconds = Array.from({ length: 600 }, (_, i) => i);
+const recording: Recording = { mission, from_us: 0, to_us: 599e6, poses: poses_of(seconds.map((t) => fix(t, t)), 'm', null), ranges: seconds.map(range), marks: [], cut: false };
+
+describe('the player of a recording', () => {
+  it('shows what was known at a moment and nothing later', () => {
+    const p = new Player(recording);
+    p.to(10.4e6, 1000);
+    expect(p.scene.pose!.value.t_us).toBe(10e6);
+    expect(p.scene.ranges.get('0x2')!.last.distance_m).toBe(10);
+  });
+  it('goes back: what came later is gone', () => {
+    const p = new Player(recording);
+    p.to(300e6, 1000);
+    p.to(200e6, 2000);
+    expect(p.scene.pose!.value.t_us).toBe(200e6);
+    expect(p.scene.trail.every((q) => q.t_us <= 200e6)).toBe(true);
+  });
+  it('a far jump shows the two minutes before it and no line across the hole', () => {
+    const p = new Player(recording);
+    p.to(500e6, 1000);
+    expect(p.scene.trail[0]!.t_us).toBeGreaterThanOrEqual(380e6);
+    expect(p.scene.trail[p.scene.trail.length - 1]!.t_us).toBe(500e6);
+  });
+  it('keeps what is fresh fresh while it stands, and what was old old', () => {
+    const p = new Player(recording);
+    p.to(10.5e6, 1000);
+    p.to(10.5e6, 9000);
+    expect(9000 - p.scene.pose!.at_ms).toBeCloseTo(500, 6);
+  });
+  it('does not leave the flight', () => {
+    const p = new Player(recording);
+    p.to(9e12, 0);
+    expect(p.t_us).toBe(599e6);
+    p.to(-5, 0);
+    expect(p.t_us).toBe(0);
+  });
+});
+
+describe('a fix of the recording', () => {
+  it('gives the bearing of the body x-axis from its quaternion', () => {
+    const half = Math.SQRT1_2;   // a quarter turn about up takes x from east to north
+    expect(poses_of([{ ...fix(0, 0), q: [0, 0, half, half] }], 'm', null)[0]!.heading_deg).toBeCloseTo(0, 9);
+    expect(poses_of([{ ...fix(0, 0), q: [0, 0, 0, 1] }], 'm', null)[0]!.heading_deg).toBeCloseTo(90, 9);
+  });
+  it('finds the first row above a time', () => expect([after([{ t_us: 1 }, { t_us: 3 }], 0), after([{ t_us: 1 }, { t_us: 3 }], 1), after([{ t_us: 1 }, { t_us: 3 }], 9)]).toEqual([0, 1, 2]));
+});
