@@ -12,7 +12,6 @@ constexpr std::string_view k_bye_reason = "shutting_down";
 
 }  // namespace
 
-
 const std::array<TopicInfo, k_topic_count>& topics() {
   static constexpr std::array<TopicInfo, k_topic_count> k_topics{{
       {Topic::alarms, "alarms", TopicClass::state, false},
