@@ -2,15 +2,20 @@
 
 #include <condition_variable>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "api/json/live_writer.hpp"
+#include "api/json/wire_devices.hpp"
 #include "api/live/conversation.hpp"
 #include "api/live/hub.hpp"
 #include "api/routes/access_routes.hpp"
 #include "api/routes/routes.hpp"
+#include "api/services/alarm_board.hpp"
+#include "api/services/device_ingest.hpp"
 #include "api/services/geo_service.hpp"
 #include "api/services/kit_profiles.hpp"
+#include "core/ports/devices.hpp"
 #include "core/ports/store.hpp"
 
 namespace anchord::api {
@@ -21,9 +26,10 @@ struct Application::State {
         router(&deps.access_store, &deps.clock),
         hub(deps.clock, "anchord " + deps.build.version),
         events(hub, deps.clock),
-        missions(
-            {deps.missions, deps.measurements, deps.anchors, hub, events, deps.clock, deps.post, deps.goal}),
+        missions({deps.missions, deps.measurements, deps.anchors, hub, events, deps.clock, deps.post,
+                  deps.goal, [this] { return device_rows(); }}),
         ingest(deps.measurements, missions),
+        device_ingest(deps.measurements, missions),
         jobs(deps.jobs, hub, deps.clock),
         geo(deps.geoid_dir),
         calibrations({deps.measurements, deps.missions, deps.anchors, jobs, deps.clock, profiles_of(deps)}),
@@ -37,6 +43,7 @@ struct Application::State {
     add_comparison_routes(router, services);
     if (services.profiles != nullptr) add_kit_routes(router, services);
     if (services.frames != nullptr) add_frame_routes(router, services);
+    add_device_routes(router, services);
     add_job_routes(router, services);
     if (deps.plans != nullptr) add_plan_routes(router, services);
     if (deps.access != nullptr) add_access_routes(router, *deps.access);
@@ -48,6 +55,7 @@ struct Application::State {
     return profiles.get();
   }
   void beat();
+  std::string device_rows();
   void second();
 
   Deps deps;
@@ -56,6 +64,7 @@ struct Application::State {
   EventLog events;
   MissionService missions;
   IngestService ingest;
+  DeviceIngest device_ingest;
   JobService jobs;
   GeoService geo;
   std::unique_ptr<KitProfiles> profiles;
@@ -65,13 +74,23 @@ struct Application::State {
   std::condition_variable stop_told;
   bool stopping{false}, started{false};
   std::thread heart;
-  std::optional<UtcTime> unwritable_since;
+  AlarmBoard alarms{events};
 };
 
 void Services::audit(const Request& request, std::string what, std::string result) const {
   // Kept even when the store is in trouble is impossible; an answer that could not be audited is a 5xx.
   value_or_problem(deps.access_store.append_audit(
       {deps.clock.now(), request.principal.token_id, std::move(what), request.remote, std::move(result)}));
+}
+
+/// Rows of topic `devices` for what is set up here.
+std::string Application::State::device_rows() {
+  std::string out;
+  if (deps.devices == nullptr) return out;
+  for (const auto& device : deps.devices->devices()) {
+    out += (out.empty() ? "" : ",") + device_row_json(device).dump();
+  }
+  return out;
 }
 
 /// 50 ms: what was collected goes out, mission states each half second, the rest each second.
@@ -105,20 +124,16 @@ void Application::State::second() {
   json += R"(,"synchronous":)" + json_text(storage.synchronous) + '}';
   hub.publish(Topic::system, std::move(json), now.us());
 
-  if (!storage.writable && !unwritable_since) {
-    unwritable_since = now;
-    events.add("critical", "storage.unwritable", storage.reason);
-  } else if (storage.writable && unwritable_since) {
-    unwritable_since.reset();
-    events.add("info", "storage.writable", "measurements are stored again");
+  alarms.set({"storage.unwritable", "critical", "measurements are stored again"},
+             storage.writable ? std::string() : storage.reason, now);
+  if (deps.devices != nullptr) {
+    alarms.set({"clock.skew", "warning", "the system clock is right again"}, deps.devices->clock().skew, now);
+    const auto unrecorded = deps.devices->recorder_failure();
+    alarms.set({"recording.failed", "critical", "raw bytes are recorded again"},
+               unrecorded.empty() ? unrecorded : "raw bytes of the devices are not recorded: " + unrecorded,
+               now);
   }
-  std::string alarms = "[";
-  if (unwritable_since) {
-    alarms += R"({"id":"storage.unwritable","priority":"critical","since_us":)" +
-              std::to_string(unwritable_since->us()) + R"(,"text":)" + json_text(storage.reason) +
-              R"(,"acknowledged":false})";
-  }
-  hub.publish(Topic::alarms, alarms + ']', now.us());
+  hub.publish(Topic::alarms, alarms.json(), now.us());
 }
 
 Application::Application(Deps deps) : state_(std::make_unique<State>(std::move(deps))) {}
@@ -126,6 +141,7 @@ Application::~Application() { stop(); }
 
 Router& Application::router() { return state_->router; }
 Hub& Application::hub() { return state_->hub; }
+DeviceRows& Application::device_rows() { return state_->device_ingest; }
 
 WsHandlerFactory Application::ws_factory() {
   return [this](const Principal& who) { return std::make_unique<Conversation>(state_->hub, who); };

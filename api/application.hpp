@@ -16,6 +16,8 @@ class AnchorStore;
 class FrameStore;
 class KitStore;
 class Clock;
+class DeviceControl;
+class DeviceRows;
 class JobStore;
 class MeasurementStore;
 class MissionStore;
@@ -60,6 +62,7 @@ class Application {
     std::function<StorageStatus()> storage_status{};
     KitStore* kits{nullptr};                      ///< null: no kit profiles (tests)
     FrameStore* frames{nullptr};                  ///< null: no local frames (tests)
+    DeviceControl* devices{nullptr};              ///< of this server; null: it has none
     std::string geoid_dir{};                      ///< empty: where GeographicLib looks
     std::function<std::string()> metrics_text{};  ///< Prometheus text of the server, appended to ours
     std::function<void(std::string_view request_id, std::string_view what)> log_fault{};
@@ -73,6 +76,8 @@ class Application {
   Router& router();
   WsHandlerFactory ws_factory();
   Hub& hub();
+  /// Where rows of this server's own devices go.
+  DeviceRows& device_rows();
   /// Marks jobs of the last run as interrupted, starts heartbeats and the job thread.
   void start();
   /// Says bye to WebSocket clients, parks jobs, joins. Idempotent.

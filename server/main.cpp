@@ -11,6 +11,7 @@ int main(int argc, char** argv) {
   anchord::cli::add_healthcheck_command(app, exit_code);
   anchord::cli::add_import_command(app, exit_code);
   anchord::cli::add_decode_command(app, exit_code);
+  anchord::cli::add_devices_command(app, exit_code);
   anchord::cli::add_plan_command(app, exit_code);
   anchord::cli::add_profile_command(app, exit_code);
   anchord::cli::add_serve_command(app, exit_code);

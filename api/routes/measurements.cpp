@@ -157,20 +157,6 @@ Response range_cir(Services& s, const Request& request) {
   return response;
 }
 
-Response devices(Services& s, const Request& request) {
-  check_query(request, {"mission", "fields"});
-  Ordered items = Ordered::array();
-  for (const auto& device : value_or_problem(s.deps.measurements.devices(query_mission(request)))) {
-    items.push_back({{"network_id", to_string(device.network_id)},
-                     {"kind", device.kind == DeviceSeen::Kind::tag ? "tag" : "anchor"},
-                     {"mission", to_string(device.mission)},
-                     {"first_seen_us", device.first_seen.us()},
-                     {"last_seen_us", device.last_seen.us()},
-                     {"n_ranges", device.n_ranges}});
-  }
-  return list_response(request, std::move(items), "");
-}
-
 }  // namespace
 
 void add_measurement_routes(Router& router, Services& s) {
@@ -194,7 +180,6 @@ void add_measurement_routes(Router& router, Services& s) {
               }});
   router.add({Method::get, "/api/v1/ranges/{id}/cir", readers(), on(range_cir)});
   router.add({Method::get, "/api/v1/fixes", readers(), on(list_fixes)});
-  router.add({Method::get, "/api/v1/devices", readers(), on(devices)});
 }
 
 }  // namespace anchord::api

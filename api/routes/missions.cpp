@@ -5,6 +5,7 @@
 #include "api/json/wire_rows.hpp"
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
+#include "core/ports/devices.hpp"
 #include "core/ports/store.hpp"
 
 namespace anchord::api {
@@ -37,7 +38,11 @@ Response create(Services& s, const Request& request) {
   refuse_if_any(errors);
   mission.created = s.deps.clock.now();
   mission.id.uuid = make_uuid_v7(mission.created);
+  const bool with_devices = !request.query_value("devices") || query_flag(request, "devices");
   value_or_problem(s.missions.create(mission));
+  // A local frame has no place for a rover's positions.
+  if (s.deps.devices != nullptr && with_devices && mission.frame == TrackFrame::wgs84)
+    s.deps.devices->record_into(mission.id);
   s.audit(request, "mission.create " + to_string(mission.id));
   Response response = json_response(201, mission_json(mission, 0, 0));
   response.header("Location", "/api/v1/missions/" + to_string(mission.id));
@@ -57,6 +62,7 @@ Response act(Services& s, const Request& request) {
   if (!finished && finished.error().code == Errc::conflict)
     throw_problem(422, "state", finished.error().message);
   auto mission = value_or_problem(finished);
+  if (s.deps.devices != nullptr && s.deps.devices->recording_into() == id) s.deps.devices->record_into({});
   s.audit(request, "mission.finish " + to_string(id));
   return json_response(200, with_counts(s, mission));
 }

@@ -38,6 +38,7 @@ void add_comparison_routes(Router& router, Services& services);
 void add_frame_routes(Router& router, Services& services);
 void add_kit_routes(Router& router, Services& services);
 void add_calibration_routes(Router& router, Services& services);
+void add_device_routes(Router& router, Services& services);
 void add_job_routes(Router& router, Services& services);
 void add_plan_routes(Router& router, Services& services);
 void add_system_routes(Router& router, Services& services);

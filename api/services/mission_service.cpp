@@ -498,10 +498,11 @@ void MissionService::State::heard(NetworkId id, bool tag, UtcTime time) {
 
 void MissionService::State::publish_devices() {
   const UtcTime now = deps.clock.now();
+  const std::string more = deps.device_rows ? deps.device_rows() : std::string();
   std::string json = "[";
   {
     const std::scoped_lock lock(radios_mutex);
-    if (radios.empty()) return;
+    if (radios.empty() && more.empty()) return;
     for (const auto& [id, radio] : radios) {
       const double silent_s = seconds_between(radio.last_arrival, now);
       const char* state = silent_s < 2 ? "live" : silent_s < 5 ? "late" : "lost";
@@ -513,6 +514,7 @@ void MissionService::State::publish_devices() {
               R"(","last_seen_us":)" + std::to_string(radio.last_seen.us()) + R"(,"rate_hz":)" + rate + '}';
     }
   }
+  if (!more.empty()) json += (json.size() > 1 ? "," : "") + more;
   deps.hub.publish(Topic::devices, json + ']', now.us());
 }
 

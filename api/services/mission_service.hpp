@@ -47,6 +47,7 @@ class MissionService {
     const Clock& clock;
     std::function<void(std::function<void()>)> post;  ///< runs a task on the pool; may run it inline
     AccuracyGoal goal{};                              ///< an anchor within it is converged
+    std::function<std::string()> device_rows{};       ///< more rows of topic `devices`, comma between them
   };
   explicit MissionService(Deps deps);
   ~MissionService();

@@ -140,6 +140,19 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     (void)take({EventKind::mission, 0, link::arrival_now(), text});
   }
 
+  void record_to(record::Recorder* recorder) {
+    recorder_ = recorder;
+    if (recorder_ == nullptr) return;
+    const auto at = link::arrival_now();
+    for (const auto& [slot, entry] : entries_) {
+      const auto json = to_json(entry.settings);
+      recorder_->take({EventKind::added, slot, at, json});
+    }
+    if (pipeline_.mission() == MissionId{}) return;
+    const auto mission = to_string(pipeline_.mission());
+    recorder_->take({EventKind::mission, 0, at, mission});
+  }
+
   std::vector<DeviceState> devices() const {
     std::vector<DeviceState> out;
     for (const auto& [slot, entry] : entries_) out.push_back(state_of(entry));
@@ -478,6 +491,7 @@ Result<void> DeviceLoop::command(const std::string& id, const Command& command) 
   return impl_->command(id, command);
 }
 void DeviceLoop::record_into(const std::optional<MissionId>& mission) { impl_->record_into(mission); }
+void DeviceLoop::record_to(record::Recorder* recorder) { impl_->record_to(recorder); }
 std::vector<DeviceState> DeviceLoop::devices() const { return impl_->devices(); }
 std::optional<DeviceState> DeviceLoop::device(const std::string& id) const { return impl_->device(id); }
 ClockState DeviceLoop::clock() const { return impl_->clock(); }

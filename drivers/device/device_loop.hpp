@@ -78,6 +78,9 @@ class DeviceLoop {
   Result<void> command(const std::string& id, const Command& command);  ///< not_found, link_lost
   void record_into(const std::optional<MissionId>& mission);
 
+  /// Another recorder, or none; it hears of the devices there are.
+  void record_to(record::Recorder* recorder);
+
   std::vector<DeviceState> devices() const;
   std::optional<DeviceState> device(const std::string& id) const;
   ClockState clock() const;

@@ -84,11 +84,9 @@ class Driver {
   virtual void closed(const Arrival& now) { (void)now; }
   /// Answers through DriverOutput::answer, now or later; a command that cannot be done is answered too.
   virtual void command(const Command& command, const Arrival& now) = 0;
+  /// Whether corrections of an NTRIP client are to be sent to it.
+  virtual bool takes_corrections() const { return false; }
 };
-
-/// The drivers there are. options_json: as in Settings. errors: invalid_argument, naming the option.
-Result<std::unique_ptr<Driver>> make_driver(std::string_view kind, std::string_view options_json,
-                                            DriverOutput& output);
 
 /// A device as the operator set it up. `options_json` is the object of its kind (gnss: format, latency_ms;
 /// ntrip: mount, user, ...). Secrets are never in here: they come by file (`password_file`).
@@ -99,5 +97,8 @@ struct Settings {
   std::string address;
   std::string options_json{"{}"};
 };
+
+/// The drivers there are. errors: invalid_argument, naming the option.
+Result<std::unique_ptr<Driver>> make_driver(const Settings& settings, DriverOutput& output);
 
 }  // namespace anchord::device

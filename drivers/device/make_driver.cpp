@@ -1,7 +1,10 @@
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "drivers/device/driver.hpp"
 #include "drivers/gnss/rover.hpp"
+#include "drivers/link/address.hpp"
+#include "drivers/ntrip/client.hpp"
 #include "drivers/pozyx/unit.hpp"
 
 // The one place that knows which kinds of devices there are, and the names of their options.
@@ -35,22 +38,62 @@ Result<std::unique_ptr<Driver>> make_rover(const Json& options, DriverOutput& ou
     } else if (key == "gpsd_device") {
       if (!value.is_string() || value.get_ref<const std::string&>().size() > 200) return bad(key, "a path");
       rover.gpsd_device = value.get<std::string>();
+    } else if (key == "corrections") {
+      if (value != "own" && value != "ntrip") return bad(key, "own or ntrip");
+      rover.takes_corrections = value == "ntrip";
     } else {
-      return bad(key, "a gnss device has format, gst_order, latency_ms, gpsd_device");
+      return bad(key, "a gnss device has format, gst_order, latency_ms, gpsd_device, corrections");
     }
   }
   return std::unique_ptr<Driver>(std::make_unique<gnss::Rover>(std::move(rover), output));
 }
 
+/// A word of a request line or header: printable, without blanks, so that it ends neither.
+bool plain(const Json& value, std::size_t most) {
+  if (!value.is_string() || value.get_ref<const std::string&>().size() > most) return false;
+  const auto& text = value.get_ref<const std::string&>();
+  return std::all_of(text.begin(), text.end(), [](char c) { return c > ' ' && c < 0x7f; });
+}
+
+Result<std::unique_ptr<Driver>> make_caster_client(const Json& options, std::string_view address,
+                                                   DriverOutput& output) {
+  ntrip::ClientOptions client;
+  for (const auto& [key, value] : options.items()) {
+    if (key == "mount") {
+      if (!plain(value, 200) || value == "") return bad(key, "the name of a mount point");
+      client.mount = value.get<std::string>();
+    } else if (key == "user") {
+      if (!value.is_string() || value.get_ref<const std::string&>().size() > 200) return bad(key, "a name");
+      client.user = value.get<std::string>();
+    } else if (key == "password_file") {
+      if (!value.is_string() || value.get_ref<const std::string&>().size() > 1000) return bad(key, "a path");
+      client.password_file = value.get<std::string>();
+    } else if (key == "version") {
+      if (value != 1 && value != 2) return bad(key, "1 or 2");
+      client.version = value.get<int>();
+    } else if (key == "send_gga") {
+      if (!value.is_boolean()) return bad(key, "true or false");
+      client.send_gga = value.get<bool>();
+    } else {
+      return bad(key, "an ntrip device has mount, user, password_file, version, send_gga");
+    }
+  }
+  if (client.mount.empty()) return bad("mount", "the caster's mount point is needed");
+  if (const auto where = link::parse_address(address); where && where.value().kind == link::Kind::tcp)
+    client.host = where.value().host + ":" + std::to_string(where.value().port);
+  return std::unique_ptr<Driver>(std::make_unique<ntrip::Client>(std::move(client), output));
+}
+
 }  // namespace
 
-Result<std::unique_ptr<Driver>> make_driver(std::string_view kind, std::string_view options_json,
-                                            DriverOutput& output) {
+Result<std::unique_ptr<Driver>> make_driver(const Settings& settings, DriverOutput& output) {
+  const auto& [id, kind, name, address, options_json] = settings;
   const auto options = Json::parse(options_json.begin(), options_json.end(), nullptr, false);
   if (!options.is_object()) return bad("options", "must be a JSON object");
   if (kind == "gnss") return make_rover(options, output);
+  if (kind == "ntrip") return make_caster_client(options, address, output);
   if (kind == "pozyx") return pozyx::make_unit(options_json, output);
-  return make_error(Errc::invalid_argument, "kind: no driver for \"" + std::string(kind) + "\"");
+  return make_error(Errc::invalid_argument, "kind: no driver for \"" + kind + "\"");
 }
 
 }  // namespace anchord::device

@@ -10,7 +10,7 @@ class Pipeline::Device final : public DriverOutput {
       : owner_(owner), slot_(slot), settings_(std::move(settings)), json_(std::move(json)) {}
 
   Result<void> make() {
-    BOOST_OUTCOME_TRY(driver_, make_driver(settings_.kind, settings_.options_json, *this));
+    BOOST_OUTCOME_TRY(driver_, make_driver(settings_, *this));
     return boost::outcome_v2::success();
   }
   Driver& driver() { return *driver_; }
@@ -78,7 +78,7 @@ Result<void> Pipeline::add(std::uint16_t slot, std::string_view json) {
 
 void Pipeline::correct(std::string_view bytes) {
   for (const auto& [slot, device] : devices_) {
-    if (device->settings().kind == "gnss" && device->is_open()) sink_.send(slot, bytes);
+    if (device->is_open() && device->driver().takes_corrections()) sink_.send(slot, bytes);
   }
 }
 

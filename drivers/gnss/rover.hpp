@@ -16,7 +16,8 @@ struct RoverOptions {
   /// Between the instant of measurement and the first byte of it, at least: computing and link. Of the clock
   /// model; makers state 20 to 100 ms.
   double latency_s{0.05};
-  std::string gpsd_device;  ///< which of a gpsd's receivers; empty: all it has
+  std::string gpsd_device;       ///< which of a gpsd's receivers; empty: all it has
+  bool takes_corrections{true};  ///< of an NTRIP client here; false: it has its own way to a base
 };
 
 /// One RTK rover, whatever it speaks. Where a wire carries several formats, the one that says most is used
@@ -33,6 +34,10 @@ class Rover final : public device::Driver {
   std::optional<std::int64_t> deadline_ns() const override { return quiet_at_ns_; }
   void closed(const device::Arrival& now) override;
   void command(const device::Command& command, const device::Arrival& now) override;
+  /// A gpsd takes commands on its socket, and would read corrections as such.
+  bool takes_corrections() const override {
+    return options_.takes_corrections && options_.format != Protocol::gpsd && !watching_;
+  }
 
  private:
   void greet_gpsd(std::string_view bytes);

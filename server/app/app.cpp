@@ -17,6 +17,7 @@
 #include "server/http/http_server.hpp"
 #include "server/http/request_judge.hpp"
 #include "server/http/text.hpp"
+#include "server/runtime/device_manager.hpp"
 #include "server/runtime/logging.hpp"
 #include "server/runtime/worker_pool.hpp"
 #include "server/storage/sqlite_database.hpp"
@@ -89,6 +90,7 @@ struct App::State {
   std::unique_ptr<Metrics> metrics;
   std::unique_ptr<api::AccessService> access;
   std::unique_ptr<WorkerPool> pool, stream_pool, live_pool;
+  std::unique_ptr<DeviceManager> devices;
   std::unique_ptr<api::Application> application;
   std::unique_ptr<FrontDoor> door;
   std::unique_ptr<HttpServer> http;
@@ -97,6 +99,8 @@ struct App::State {
   bool stopped{false};
 
   Result<void> first_token();
+  Result<void> open_devices();
+  void resume_recording();
   void compose();
   Result<void> listen();
 };
@@ -170,6 +174,25 @@ Result<void> App::State::listen() {
   return boost::outcome_v2::success();
 }
 
+Result<void> App::State::open_devices() {
+  DeviceManagerOptions options;
+  options.data_dir = data_dir;
+  options.from_config = config.list("devices");
+  options.log = [](const std::string& text) { log(LogLevel::info, "device", {{"what", text}}); };
+  BOOST_OUTCOME_TRY(devices, DeviceManager::open(std::move(options)));
+  return boost::outcome_v2::success();
+}
+
+/// A flight that was running when the server stopped goes on; what is older than a day was forgotten.
+void App::State::resume_recording() {
+  const auto newest = database->missions().missions(1, std::nullopt);
+  if (!newest || newest.value().empty()) return;
+  const auto& mission = newest.value().front();
+  const bool running = mission.state == MissionState::recording && mission.frame == TrackFrame::wgs84 &&
+                       seconds_between(mission.created, clock.now()) < 86'400;
+  if (running) devices->record_into(mission.id);
+}
+
 void App::State::compose() {
   pool =
       std::make_unique<WorkerPool>("anchord-work", config.count("http.workers"), config.count("http.queue"));
@@ -189,16 +212,19 @@ void App::State::compose() {
   deps.kits = &database->kits();
   deps.frames = &database->frames();
   deps.goal = {config.metres("goal.h95_m"), config.metres("goal.v95_m")};
+  deps.devices = devices.get();
   deps.post = [this](std::function<void()> task) {
     if (!live_pool->try_submit(task)) task();  // a full queue slows the sender, loses nothing
   };
   deps.storage_status = [this] { return status_of(*database); };
-  deps.metrics_text = [this] { return metrics->text(); };
+  deps.metrics_text = [this] { return metrics->text() + devices->metrics(); };
   deps.log_fault = [](std::string_view request_id, std::string_view what) {
     log(LogLevel::error, "fault in a handler", {{"request_id", request_id}, {"what", what}});
   };
   application = std::make_unique<api::Application>(std::move(deps));
   application->start();
+  resume_recording();
+  devices->start(application->device_rows());
   FrontDoorOptions options;
   options.hosts = host_policy(config);
   options.rate_per_s = static_cast<double>(config.count("rate.per_s"));
@@ -226,6 +252,7 @@ Result<std::unique_ptr<App>> App::start(const Config& config) {
                                                   access_options);
   BOOST_OUTCOME_TRYV(s.access->load());
   BOOST_OUTCOME_TRYV(s.first_token());
+  BOOST_OUTCOME_TRYV(s.open_devices());
   s.compose();
   auto app = std::unique_ptr<App>(new App(std::move(state)));
   BOOST_OUTCOME_TRYV(app->state_->listen());
@@ -248,6 +275,8 @@ void App::stop() {
   if (s.application) s.application->hub().shut_down();  // WebSockets: bye and 4010
   if (s.http) s.http->stop(std::chrono::seconds(4));
   step("connections");
+  if (s.devices) s.devices->stop();  // what waits goes to the database while it is open
+  step("devices");
   if (s.application) s.application->stop();  // first, so that nobody waits in a handler for a job
   step("application");
   for (auto* workers : {s.pool.get(), s.stream_pool.get(), s.live_pool.get()}) {
@@ -257,6 +286,7 @@ void App::stop() {
   s.http.reset();
   s.door.reset();
   s.application.reset();
+  s.devices.reset();
   s.access.reset();
   s.database.reset();  // finishes queued writes, checkpoints, closes
   step("database");

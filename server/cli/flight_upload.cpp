@@ -36,7 +36,7 @@ FlightUpload::FlightUpload(RestClient& client, FlightData flight)
 Result<void> FlightUpload::create_mission(const std::string& name) {
   flight_.mission.name = name;
   const std::string key = to_string(make_uuid_v7(SystemClock{}.now()));
-  BOOST_OUTCOME_TRY(const auto body, client_.post("/api/v1/missions", "application/json",
+  BOOST_OUTCOME_TRY(const auto body, client_.post("/api/v1/missions?devices=false", "application/json",
                                                   api::mission_request_json(flight_.mission), key));
   BOOST_OUTCOME_TRY(mission_id_, api::parse_created_id(body));
   BOOST_OUTCOME_TRY(const auto uuid, parse_uuid(mission_id_));

@@ -1,0 +1,118 @@
+#include "api/json/wire_devices.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "api/json/reader.hpp"
+#include "api/json/wire_rows.hpp"
+
+namespace anchord::api {
+
+using Json = nlohmann::json;
+using Ordered = nlohmann::ordered_json;
+
+namespace {
+
+const std::vector<std::string_view> k_kinds{"gnss", "pozyx", "ntrip"};
+
+template <class T>
+Ordered maybe(const std::optional<T>& value) {
+  return value ? Ordered(*value) : Ordered(nullptr);
+}
+Ordered text_or_null(const std::string& text) { return text.empty() ? Ordered(nullptr) : Ordered(text); }
+Ordered network_id(const DeviceReport& d) {
+  return d.network_id ? Ordered(to_string(*d.network_id)) : Ordered(nullptr);
+}
+
+}  // namespace
+
+Ordered device_json(const DeviceReport& d) {
+  Ordered out{{"id", to_string(d.config.id)},
+              {"kind", d.config.kind},
+              {"name", d.config.name},
+              {"address", d.config.address},
+              {"options", Ordered::parse(d.config.options_json, nullptr, false)},
+              {"enabled", d.config.enabled},
+              {"state", d.state},
+              {"reason", text_or_null(d.reason)},
+              {"conflict", text_or_null(d.conflict)},
+              {"in_state_s", d.in_state_s},
+              {"last_seen_us", d.last_heard ? Ordered(d.last_heard->us()) : Ordered(nullptr)},
+              {"network_id", network_id(d)},
+              {"model", text_or_null(d.model)},
+              {"firmware", text_or_null(d.firmware)},
+              {"serial", text_or_null(d.serial)},
+              {"rate_hz", d.rows_per_s},
+              {"counters",
+               {{"bytes_in", d.bytes_in},
+                {"bytes_out", d.bytes_out},
+                {"frames", d.frames},
+                {"fixes", d.fixes},
+                {"ranges", d.ranges},
+                {"opened", d.opened},
+                {"lost", d.lost}}}};
+  Ordered dropped = Ordered::object();
+  for (const auto& [reason, n] : d.dropped) dropped[reason] = n;
+  out["dropped"] = std::move(dropped);
+  if (d.rover) {
+    out["rover"] = {{"t_us", d.rover->time.us()},
+                    {"fix", fix_word(d.rover->fix)},
+                    {"satellites", maybe(d.rover->satellites)},
+                    {"age_s", maybe(d.rover->age_s)},
+                    {"sigma_h_m", maybe(d.rover->sigma_h_m)},
+                    {"sigma_v_m", maybe(d.rover->sigma_v_m)}};
+  }
+  return out;
+}
+
+Ordered device_row_json(const DeviceReport& d) {
+  return {{"network_id", network_id(d)},
+          {"kind", d.config.kind},
+          {"state", d.state == "talking"                    ? "live"
+                    : d.state == "lost" || d.state == "off" ? "lost"
+                                                            : "late"},
+          {"last_seen_us", d.last_heard ? Ordered(d.last_heard->us()) : Ordered(nullptr)},
+          {"rate_hz", d.rows_per_s},
+          {"id", to_string(d.config.id)},
+          {"name", d.config.name},
+          {"phase", d.state},
+          {"reason", text_or_null(d.reason)},
+          {"conflict", text_or_null(d.conflict)}};
+}
+
+Ordered discovered_json(const DiscoveredDevice& f) {
+  return {{"address", f.address},
+          {"kind", text_or_null(f.kind)},
+          {"evidence", f.evidence},
+          {"configured", f.configured}};
+}
+
+Ordered clock_json(const DeviceClock& c) {
+  return {{"source", c.from_receiver ? "receiver" : "system_clock"},
+          {"system_offset_s", maybe(c.system_offset_s)},
+          {"sigma_s", c.sigma_s},
+          {"skew", text_or_null(c.skew)}};
+}
+
+void patch_device(const Json& body, bool whole, DeviceConfig& device, std::vector<FieldError>& errors) {
+  Fields fields(body, "", errors);
+  if (!fields.is_object()) return;
+  if (const auto kind = fields.word("kind", k_kinds, whole)) device.kind = k_kinds[*kind];
+  if (const auto name = fields.text("name", 200)) device.name = *name;
+  if (const auto address = fields.text("address", 500, whole)) device.address = *address;
+  if (const auto enabled = fields.boolean("enabled")) device.enabled = *enabled;
+  if (const Json* options = fields.child("options")) {
+    if (!options->is_object() || options->dump().size() > 10'000) {
+      fields.error("options", "wrong_type", "must be an object below 10 kB");
+    } else {
+      auto merged = Json::parse(device.options_json, nullptr, false);
+      merged.merge_patch(*options);
+      device.options_json = merged.dump();
+    }
+  } else if (body.contains("options")) {
+    device.options_json = "{}";
+  }
+  fields.finish();
+  if (device.name.empty()) device.name = device.kind;
+}
+
+}  // namespace anchord::api

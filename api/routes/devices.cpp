@@ -1,0 +1,163 @@
+#include <nlohmann/json.hpp>
+
+#include "api/json/reader.hpp"
+#include "api/json/wire_devices.hpp"
+#include "api/routes/job_answer.hpp"
+#include "api/routes/routes.hpp"
+#include "api/routes/support.hpp"
+#include "core/ports/devices.hpp"
+#include "core/ports/store.hpp"
+
+namespace anchord::api {
+
+using Ordered = nlohmann::ordered_json;
+
+namespace {
+
+std::string etag(const DeviceReport& device) { return "\"d-" + std::to_string(device.config.version) + '"'; }
+
+DeviceControl& control(Services& s) {
+  if (s.deps.devices == nullptr) throw_problem(503, "unavailable", "this server has no devices of its own");
+  return *s.deps.devices;
+}
+
+Response answer(int status, const DeviceReport& device) {
+  Response response = json_response(status, device_json(device));
+  response.header("ETag", etag(device));
+  return response;
+}
+
+/// Settings no driver or link takes are the client's 422 and not our fault.
+template <class T>
+T accepted(Result<T> result) {
+  if (!result && result.error().code == Errc::invalid_argument) {
+    const auto& text = result.error().message;
+    const bool options = text.starts_with("kind: ") || text.find(": ") < 40;
+    throw_problem(422, "validation", text, {{options ? "/options" : "/address", "refused", text}});
+  }
+  return value_or_problem(std::move(result));
+}
+
+/// What is set up here, then the radios that were heard in missions.
+Response list(Services& s, const Request& request) {
+  check_query(request, {"mission", "fields"});
+  const auto mission = query_mission(request);
+  Ordered items = Ordered::array();
+  if (!mission && s.deps.devices != nullptr) {
+    for (const auto& device : s.deps.devices->devices()) items.push_back(device_json(device));
+  }
+  for (const auto& radio : value_or_problem(s.deps.measurements.devices(mission))) {
+    items.push_back({{"network_id", to_string(radio.network_id)},
+                     {"kind", radio.kind == DeviceSeen::Kind::tag ? "tag" : "anchor"},
+                     {"mission", to_string(radio.mission)},
+                     {"first_seen_us", radio.first_seen.us()},
+                     {"last_seen_us", radio.last_seen.us()},
+                     {"n_ranges", radio.n_ranges}});
+  }
+  return list_response(request, std::move(items), "");
+}
+
+Response create(Services& s, const Request& request) {
+  std::vector<FieldError> errors;
+  DeviceConfig config;
+  patch_device(json_body(request), true, config, errors);
+  refuse_if_any(errors);
+  const auto device = accepted(control(s).add(std::move(config)));
+  s.audit(request, "device.create " + to_string(device.config.id) + " " + device.config.address);
+  Response response = answer(201, device);
+  response.header("Location", "/api/v1/devices/" + to_string(device.config.id));
+  return response;
+}
+
+Response patch(Services& s, const Request& request) {
+  const auto before = value_or_problem(control(s).device(path_uuid(request)));
+  require_match(request, etag(before));
+  std::vector<FieldError> errors;
+  auto config = before.config;
+  patch_device(json_body(request), false, config, errors);
+  refuse_if_any(errors);
+  const auto device = accepted(control(s).change(std::move(config), before.config.version));
+  s.audit(request, "device.change " + to_string(device.config.id));
+  return answer(200, device);
+}
+
+Response remove(Services& s, const Request& request) {
+  const auto device = value_or_problem(control(s).device(path_uuid(request)));
+  require_match(request, etag(device));
+  value_or_problem(control(s).remove(device.config.id));
+  s.audit(request, "device.delete " + to_string(device.config.id));
+  Response response;
+  response.status = 204;
+  return response;
+}
+
+Response act(Services& s, const Request& request) {
+  const auto device = value_or_problem(control(s).device(path_uuid(request)));
+  std::vector<FieldError> errors;
+  const auto body = json_body(request);
+  Fields fields(body, "", errors);
+  const auto action = fields.text("action", 40, true);
+  const auto* arguments = fields.child("arguments");
+  if (arguments != nullptr && !arguments->is_object())
+    fields.error("arguments", "wrong_type", "must be an object");
+  fields.finish();
+  refuse_if_any(errors);
+  const auto result =
+      control(s).act(device.config.id, *action, arguments == nullptr ? "{}" : arguments->dump());
+  s.audit(request, "device.action " + to_string(device.config.id) + " " + *action, result ? "ok" : "failed");
+  if (!result && (result.error().code == Errc::unsupported || result.error().code == Errc::link_lost)) {
+    throw_problem(422, "state", result.error().message);
+  }
+  auto json = Ordered::parse(accepted(result), nullptr, false);
+  return json_response(
+      200, {{"action", *action}, {"result", json.is_discarded() ? Ordered(nullptr) : std::move(json)}});
+}
+
+/// What the last discovery found.
+Response found_answer(DeviceControl& devices) {
+  Ordered items = Ordered::array();
+  for (const auto& device : devices.discovered()) items.push_back(discovered_json(device));
+  return json_response(200, {{"items", std::move(items)}});
+}
+
+Response discover(Services& s, const Request& request) {
+  std::vector<FieldError> errors;
+  const auto body = json_body(request, true);
+  Fields fields(body, "", errors);
+  fields.finish();
+  refuse_if_any(errors);
+  auto& devices = control(s);
+  auto job =
+      value_or_problem(s.jobs.submit("discovery", "{}", [&devices](JobContext& context) -> Result<JobEnd> {
+        context.progress(0, "listening", "every port that is not in use");
+        const auto n = devices.discover().size();
+        return JobEnd{"/api/v1/discovery", std::to_string(n) + " ports"};
+      }));
+  s.audit(request, "device.discovery");
+  return job_outcome(s, request, std::move(job), [&devices](const Job&) { return found_answer(devices); });
+}
+
+}  // namespace
+
+void add_device_routes(Router& router, Services& s) {
+  const auto on = [&s](auto function) {
+    return [&s, function](const Request& request) { return function(s, request); };
+  };
+  const auto operators = Access::any_of({Role::op});
+  router.add({Method::get, "/api/v1/devices", readers(), on(list)});
+  router.add({Method::post, "/api/v1/devices", operators, on(create)});
+  router.add({Method::get, "/api/v1/devices/{id}", readers(), [&s](const Request& request) {
+                check_query(request, {});
+                return answer(200, value_or_problem(control(s).device(path_uuid(request))));
+              }});
+  router.add({Method::patch, "/api/v1/devices/{id}", operators, on(patch), 1 << 20, false, true});
+  router.add({Method::del, "/api/v1/devices/{id}", operators, on(remove), 1 << 20, false, true});
+  router.add({Method::post, "/api/v1/devices/{id}/actions", operators, on(act)});
+  router.add({Method::post, "/api/v1/discovery", operators, on(discover)});
+  router.add({Method::get, "/api/v1/discovery", readers(), [&s](const Request& request) {
+                check_query(request, {});
+                return found_answer(control(s));
+              }});
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,98 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/ids.hpp"
+#include "core/base/result.hpp"
+#include "core/types/fix.hpp"
+#include "core/types/range.hpp"
+
+namespace anchord {
+
+/// A device as the operator set it up.
+struct DeviceConfig {
+  Uuid id{};
+  std::string kind;  ///< gnss, pozyx, ntrip
+  std::string name;
+  std::string address;  ///< serial:..., tcp://..., tcp-listen://..., udp://...
+  std::string options_json{"{}"};
+  bool enabled{true};
+  std::uint64_t version{1};  ///< for ETag
+};
+
+/// ... and how it stands.
+struct DeviceReport {
+  DeviceConfig config;
+  std::string state{"off"};  ///< off, lost, found, open, talking, silent
+  std::string reason;        ///< why it is not talking, one line
+  std::string conflict;      ///< two devices on one port, or one identity on two
+  double in_state_s{};
+  std::optional<UtcTime> last_heard{};
+  std::string model, firmware, serial;
+  std::optional<NetworkId> network_id{};
+  std::uint64_t bytes_in{}, bytes_out{}, frames{}, fixes{}, ranges{}, opened{}, lost{};
+  double rows_per_s{};
+  std::map<std::string, std::uint64_t> dropped;  ///< by reason
+  struct Rover {
+    UtcTime time{};
+    FixClass fix{FixClass::none};
+    std::optional<int> satellites{};
+    std::optional<double> age_s{}, sigma_h_m{}, sigma_v_m{};
+  };
+  std::optional<Rover> rover{};
+};
+
+/// Whose clock the stamps come from.
+struct DeviceClock {
+  bool from_receiver{};
+  std::optional<double> system_offset_s{};  ///< system clock minus UTC of the receiver
+  double sigma_s{};
+  std::string skew;  ///< one line when the system clock is wrong; empty: none
+};
+
+/// Something that could be a device.
+struct DiscoveredDevice {
+  std::string address;
+  std::string kind;      ///< empty: nothing known spoke
+  std::string evidence;  ///< what was heard, or why it could not be opened
+  bool configured{};     ///< is one of ours already
+};
+
+/// What the devices of this server may be asked. Thread-safe; blocks for at most a few seconds. errors:
+/// not_found, conflict (version moved on; address in use), invalid_argument (names the field), link_lost,
+/// unsupported, storage_unavailable.
+class DeviceControl {
+ public:
+  virtual ~DeviceControl() = default;
+  virtual std::vector<DeviceReport> devices() = 0;
+  virtual Result<DeviceReport> device(const Uuid& id) = 0;
+  virtual Result<DeviceReport> add(DeviceConfig config) = 0;  ///< gives it its id
+  virtual Result<DeviceReport> change(DeviceConfig config, std::uint64_t expected_version) = 0;
+  virtual Result<void> remove(const Uuid& id) = 0;
+  /// Answer of the device, a JSON value.
+  virtual Result<std::string> act(const Uuid& id, std::string_view action,
+                                  std::string_view arguments_json) = 0;
+  /// Looks and listens at every port; takes some seconds.
+  virtual std::vector<DiscoveredDevice> discover() = 0;
+  virtual std::vector<DiscoveredDevice> discovered() = 0;  ///< by the last discover()
+  virtual DeviceClock clock() = 0;
+  /// Rows of devices belong to this mission from now on; absent: to none, and only the raw recording has
+  /// them.
+  virtual void record_into(const std::optional<MissionId>& mission) = 0;
+  virtual std::optional<MissionId> recording_into() = 0;
+  /// Why raw bytes are not being recorded; empty while they are, or while there is no device.
+  virtual std::string recorder_failure() = 0;
+};
+
+/// Who takes the rows of devices: stores them and hands them to the live flight. Blocks on the database.
+class DeviceRows {
+ public:
+  virtual ~DeviceRows() = default;
+  virtual Result<void> take(std::vector<Fix> fixes, std::vector<Range> ranges) = 0;
+};
+
+}  // namespace anchord

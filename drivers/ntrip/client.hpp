@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "drivers/device/driver.hpp"
+#include "drivers/ntrip/rtcm.hpp"
+
+namespace anchord::ntrip {
+
+struct ClientOptions {
+  std::string mount;
+  std::string user, password_file;  ///< the password itself is in no setting and in no recording
+  int version = 2;                  ///< 1 for old casters that do not understand HTTP/1.1
+  bool send_gga = true;             ///< network mounts send nothing before they know where we are
+  std::string host;                 ///< for the request's Host line
+};
+
+/// Corrections from an NTRIP caster, handed on to the rovers as they come. Undoes chunks, refuses what is not
+/// a stream (source table, refusals) with its reason, and tells the caster our rover's position every ten
+/// seconds. See device::Driver.
+class Client final : public device::Driver {
+ public:
+  Client(ClientOptions options, device::DriverOutput& output);
+
+  void opened(const device::Arrival& now) override;
+  void bytes(std::string_view bytes, const device::Arrival& at) override;
+  void tick(const device::Arrival& now) override;
+  std::optional<std::int64_t> deadline_ns() const override { return deadline_ns_; }
+  void closed(const device::Arrival& now) override;
+  void command(const device::Command& command, const device::Arrival& now) override;
+
+ private:
+  enum class State : std::uint8_t { closed, status, headers, maybe_headers, table, stream, refused };
+  void head(const device::Arrival& at);
+  bool status_line(const std::string& line);
+  void header_line(const std::string& line);
+  void begin_stream(const device::Arrival& at);
+  void table_line(const std::string& line);
+  void table_end();
+  void stream(std::string_view bytes);
+  void unchunk(std::string_view bytes);
+  void refuse(const std::string& why, std::int64_t wait_s);
+  void tell_position(const device::Arrival& now);
+
+  ClientOptions options_;
+  device::DriverOutput& out_;
+  State state_{State::closed};
+  std::string held_;  ///< of the answer's head or of a chunk's; bounded
+  bool chunked_{false}, is_table_{false};
+  std::size_t chunk_left_{0};
+  std::string mounts_;  ///< of a source table
+  RtcmCounter frames_;
+  std::uint64_t skipped_{0};
+  std::optional<std::int64_t> deadline_ns_{};
+};
+
+/// A GGA sentence of a rover's position with its CR LF.
+std::string gga_of(const device::RoverStatus& rover);
+std::string base64(std::string_view bytes);
+
+}  // namespace anchord::ntrip

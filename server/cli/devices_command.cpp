@@ -1,0 +1,236 @@
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "server/cli/commands.hpp"
+#include "server/cli/server_address.hpp"
+#include "server/http/http_client.hpp"
+
+namespace anchord::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct Options {
+  std::string data_dir{"anchord-data"}, url, device, kind, address, name, action;
+  std::vector<std::string> settings;
+  bool json{false};
+};
+
+int fail(const std::string& message, int code = 1) {
+  std::fprintf(stderr, "anchord devices: %s\n", message.c_str());
+  return code;
+}
+
+/// The running server, asked with the token of its own folder.
+class Server {
+ public:
+  static Result<Server> of(const Options& options) {
+    const auto url = options.url.empty() ? running_server(options.data_dir) : std::optional(options.url);
+    if (!url) {
+      return make_error(Errc::not_found,
+                        "no server runs in " + options.data_dir + ": start anchord serve, or say --url");
+    }
+    // A discovery listens for seconds, an action may wait for its device.
+    BOOST_OUTCOME_TRY(auto client, server::HttpClient::to(*url, std::chrono::seconds(30)));
+    if (const auto token = own_token(options.data_dir); !token.empty()) {
+      client.set_header("Authorization", "Bearer " + token);
+    }
+    return Server(std::move(client));
+  }
+
+  Result<Json> call(std::string_view method, const std::string& target, const std::string& body = {}) {
+    BOOST_OUTCOME_TRY(const auto answer, client_.call(method, target, body));
+    auto json = Json::parse(answer.body, nullptr, false);
+    if (answer.status >= 400) {
+      const auto detail = json.is_object() ? json.value("detail", answer.body) : answer.body;
+      return make_error(answer.status == 404 ? Errc::not_found : Errc::invalid_argument, detail);
+    }
+    if (json.is_discarded()) json = nullptr;
+    return json;
+  }
+  void header(const std::string& name, const std::string& value) { client_.set_header(name, value); }
+
+ private:
+  explicit Server(server::HttpClient client) : client_(std::move(client)) {}
+  server::HttpClient client_;
+};
+
+std::string text(const Json& object, const char* key) {
+  const auto it = object.find(key);
+  return it != object.end() && it->is_string() ? it->get<std::string>() : std::string();
+}
+
+Result<Json> configured(Server& server) {
+  BOOST_OUTCOME_TRY(const auto all, server.call("GET", "/api/v1/devices"));
+  Json out = Json::array();
+  for (const auto& item : all.value("items", Json::array())) {
+    if (item.contains("address")) out.push_back(item);
+  }
+  return out;
+}
+
+/// By id, the beginning of it, or name. errors: not_found, conflict (several).
+Result<Json> find(Server& server, const std::string& word) {
+  BOOST_OUTCOME_TRY(const auto all, configured(server));
+  std::vector<Json> hits;
+  for (const auto& device : all) {
+    if (text(device, "id").starts_with(word) || text(device, "name") == word) hits.push_back(device);
+  }
+  if (hits.empty()) return make_error(Errc::not_found, "there is no device \"" + word + "\"");
+  if (hits.size() > 1) return make_error(Errc::conflict, "\"" + word + "\" is several devices: use the id");
+  return hits.front();
+}
+
+void print_device(const Json& d) {
+  std::string state = text(d, "state");
+  const auto dropped = d.value("dropped", Json::object());
+  std::uint64_t n = 0;
+  for (const auto& [reason, count] : dropped.items()) n += count.get<std::uint64_t>();
+  std::printf("%s  %-6s %-16s %-8s %6.1f/s  %s\n", text(d, "id").c_str(), text(d, "kind").c_str(),
+              text(d, "name").c_str(), state.c_str(), d.value("rate_hz", 0.0), text(d, "address").c_str());
+  for (const char* key : {"reason", "conflict"}) {
+    if (!text(d, key).empty()) std::printf("    %s\n", text(d, key).c_str());
+  }
+  if (n > 0) std::printf("    not used: %s\n", dropped.dump().c_str());
+}
+
+int show(const Options& options, const Result<Json>& list, void (*print)(const Json&)) {
+  if (!list) return fail(list.error().message);
+  if (options.json) {
+    std::printf("%s\n", list.value().dump(1).c_str());
+    return 0;
+  }
+  for (const auto& item : list.value()) print(item);
+  if (list.value().empty()) std::printf("none\n");
+  return 0;
+}
+
+int list(const Options& options, Server& server) { return show(options, configured(server), print_device); }
+
+int discover(const Options& options, Server& server) {
+  server.header("Prefer", "wait=20");
+  auto found = server.call("POST", "/api/v1/discovery", "{}");
+  if (!found) return fail(found.error().message);
+  if (!found.value().contains("items")) return fail("the discovery takes longer than 20 s: ask again");
+  return show(options, found.value()["items"], [](const Json& d) {
+    const auto kind = text(d, "kind");
+    std::printf("%-6s %s\n    %s\n", kind.empty() ? "?" : kind.c_str(), text(d, "address").c_str(),
+                text(d, "evidence").c_str());
+  });
+}
+
+int add(const Options& options, Server& server) {
+  const Json body{{"kind", options.kind},
+                  {"address", options.address},
+                  {"name", options.name.empty() ? options.kind : options.name}};
+  const auto made = server.call("POST", "/api/v1/devices", body.dump());
+  if (!made) return fail(made.error().message);
+  std::printf("%s\n", text(made.value(), "id").c_str());
+  return 0;
+}
+
+/// "name=rover", "enabled=false", "address=...", everything else is an option of the kind.
+Result<Json> patch_of(const std::vector<std::string>& settings) {
+  Json out = Json::object();
+  for (const auto& setting : settings) {
+    const auto equals = setting.find('=');
+    if (equals == std::string::npos)
+      return make_error(Errc::invalid_argument, "\"" + setting + "\" is not key=value");
+    const auto key = setting.substr(0, equals), raw = setting.substr(equals + 1);
+    auto value = Json::parse(raw, nullptr, false);
+    if (value.is_discarded()) value = raw;
+    if (key == "name" || key == "address" || key == "kind") {
+      out[key] = raw;
+    } else if (key == "enabled") {
+      out[key] = value;
+    } else {
+      out["options"][key] = value;
+    }
+  }
+  return out;
+}
+
+int settings(const Options& options, Server& server) {
+  const auto device = find(server, options.device);
+  if (!device) return fail(device.error().message);
+  if (options.settings.empty()) {
+    std::printf("%s\n", device.value().dump(1).c_str());
+    return 0;
+  }
+  const auto patch = patch_of(options.settings);
+  if (!patch) return fail(patch.error().message, 2);
+  server.header("If-Match", "*");
+  const auto changed =
+      server.call("PATCH", "/api/v1/devices/" + text(device.value(), "id"), patch.value().dump());
+  if (!changed) return fail(changed.error().message);
+  print_device(changed.value());
+  return 0;
+}
+
+int remove(const Options& options, Server& server) {
+  const auto device = find(server, options.device);
+  if (!device) return fail(device.error().message);
+  server.header("If-Match", "*");
+  const auto done = server.call("DELETE", "/api/v1/devices/" + text(device.value(), "id"));
+  return done ? 0 : fail(done.error().message);
+}
+
+int act(const Options& options, Server& server) {
+  const auto device = find(server, options.device);
+  if (!device) return fail(device.error().message);
+  const auto done = server.call("POST", "/api/v1/devices/" + text(device.value(), "id") + "/actions",
+                                Json{{"action", options.action}}.dump());
+  if (!done) return fail(done.error().message);
+  std::printf("%s\n", done.value().value("result", Json()).dump(1).c_str());
+  return 0;
+}
+
+}  // namespace
+
+void add_devices_command(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("devices", "Tags, rovers and correction services of a running server");
+  auto options = std::make_shared<Options>();
+  command->add_option("--data-dir", options->data_dir, "Folder of the server")->capture_default_str();
+  command->add_option("--url", options->url, "Another server");
+  command->add_flag("--json", options->json, "As the server gives it");
+  command->require_subcommand(0, 1);
+  const auto run = [options, &exit_code](int (*what)(const Options&, Server&)) {
+    auto server = Server::of(*options);
+    exit_code = server ? what(*options, server.value()) : fail(server.error().message);
+  };
+  command->add_subcommand("list", "What is set up, and how it stands")->callback([run] { run(list); });
+  command->add_subcommand("discover", "Listen at every port that is not in use")->callback([run] {
+    run(discover);
+  });
+  auto* made = command->add_subcommand("add", "Set a device up");
+  made->add_option("kind", options->kind, "gnss, pozyx or ntrip")->required();
+  made->add_option("address", options->address, "serial:/dev/serial/by-id/..., tcp://host:port, ...")
+      ->required();
+  made->add_option("--name", options->name, "For people");
+  made->callback([run] { run(add); });
+  auto* set =
+      command->add_subcommand("settings", "Show a device, or change it: name=..., enabled=false, format=ubx");
+  set->add_option("device", options->device, "Id, the beginning of it, or name")->required();
+  set->add_option("changes", options->settings, "key=value");
+  set->callback([run] { run(settings); });
+  auto* gone = command->add_subcommand("remove", "Forget a device");
+  gone->add_option("device", options->device, "Id, the beginning of it, or name")->required();
+  gone->callback([run] { run(remove); });
+  auto* identify = command->add_subcommand("identify", "Let a device show itself, e.g. by its light");
+  identify->add_option("device", options->device, "Id, the beginning of it, or name")->required();
+  identify->callback([run, options] {
+    options->action = "identify";
+    run(act);
+  });
+  auto* action = command->add_subcommand("action", "Anything else a device can be asked");
+  action->add_option("device", options->device, "Id, the beginning of it, or name")->required();
+  action->add_option("action", options->action, "reboot, ...")->required();
+  action->callback([run] { run(act); });
+  command->callback([run, command] {
+    if (command->get_subcommands().empty()) run(list);
+  });
+}
+
+}  // namespace anchord::cli

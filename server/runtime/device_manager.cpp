@@ -1,0 +1,517 @@
+#include "server/runtime/device_manager.hpp"
+
+#include <algorithm>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
+#include <condition_variable>
+#include <deque>
+#include <future>
+#include <mutex>
+#include <random>
+#include <thread>
+
+#include "drivers/device/device_loop.hpp"
+#include "drivers/device/discover.hpp"
+#include "drivers/link/address.hpp"
+#include "drivers/record/recorder.hpp"
+#include "server/runtime/device_file.hpp"
+
+namespace anchord::server {
+namespace {
+
+constexpr auto k_batch_time = std::chrono::milliseconds(100);
+constexpr std::size_t k_batch_rows = 200;
+constexpr auto k_answer_time = std::chrono::seconds(10);
+
+device::Settings settings_of(const DeviceConfig& c) {
+  return {to_string(c.id), c.kind, c.name, c.address, c.options_json};
+}
+
+DeviceReport report_of(const DeviceConfig& config, const device::DeviceState& s) {
+  DeviceReport out;
+  out.config = config;
+  out.state = std::string(to_string(s.phase));
+  out.reason = s.reason;
+  out.conflict = s.conflict;
+  out.in_state_s = s.in_phase_s;
+  out.last_heard = s.last_heard;
+  out.model = s.identity.model;
+  out.firmware = s.identity.firmware;
+  out.serial = s.identity.serial;
+  out.network_id = s.identity.network_id;
+  out.bytes_in = s.bytes_in;
+  out.bytes_out = s.bytes_out;
+  out.frames = s.frames;
+  out.fixes = s.fixes;
+  out.ranges = s.ranges;
+  out.opened = s.opened;
+  out.lost = s.lost;
+  out.rows_per_s = s.rows_per_s;
+  out.dropped = s.dropped;
+  if (s.rover) {
+    out.rover = DeviceReport::Rover{s.rover->time,  s.rover->fix,       s.rover->satellites,
+                                    s.rover->age_s, s.rover->sigma_h_m, s.rover->sigma_v_m};
+  }
+  return out;
+}
+
+/// Rows on their way to the database, oldest first; the oldest leave when nobody takes them.
+class RowQueue {
+ public:
+  template <class Row>
+  void push(Row row) {
+    const std::scoped_lock lock(mutex_);
+    auto& rows = of(row);
+    rows.push_back(std::move(row));
+    if (fixes_.size() + ranges_.size() > DeviceManager::k_max_waiting_rows) {
+      rows.pop_front();
+      ++dropped_;
+    }
+    if (fixes_.size() + ranges_.size() >= k_batch_rows) told_.notify_one();
+  }
+  /// Waits for a batch's time or size; false when stopping and empty.
+  bool take(std::vector<Fix>& fixes, std::vector<Range>& ranges) {
+    std::unique_lock lock(mutex_);
+    told_.wait_for(lock, k_batch_time,
+                   [this] { return stopping_ || fixes_.size() + ranges_.size() >= k_batch_rows; });
+    fixes.assign(std::make_move_iterator(fixes_.begin()), std::make_move_iterator(fixes_.end()));
+    ranges.assign(std::make_move_iterator(ranges_.begin()), std::make_move_iterator(ranges_.end()));
+    fixes_.clear();
+    ranges_.clear();
+    return !stopping_ || !fixes.empty() || !ranges.empty();
+  }
+  void stop() {
+    const std::scoped_lock lock(mutex_);
+    stopping_ = true;
+    told_.notify_all();
+  }
+  bool stopping() const {
+    const std::scoped_lock lock(mutex_);
+    return stopping_;
+  }
+  void lost(std::size_t n) {
+    const std::scoped_lock lock(mutex_);
+    dropped_ += n;
+  }
+  std::uint64_t dropped() const {
+    const std::scoped_lock lock(mutex_);
+    return dropped_;
+  }
+
+ private:
+  std::deque<Fix>& of(const Fix&) { return fixes_; }
+  std::deque<Range>& of(const Range&) { return ranges_; }
+  mutable std::mutex mutex_;
+  std::condition_variable told_;
+  std::deque<Fix> fixes_;
+  std::deque<Range> ranges_;
+  std::uint64_t dropped_{0};
+  bool stopping_{false};
+};
+
+}  // namespace
+
+class DeviceManager::Impl final : public device::DeviceListener {
+ public:
+  explicit Impl(DeviceManagerOptions options) : options_(std::move(options)), work_(io_.get_executor()) {
+    device::LoopOptions loop;
+    loop.seed = std::random_device{}();
+    loop_ = std::make_unique<device::DeviceLoop>(io_, nullptr, *this, loop);
+    io_thread_ = std::thread([this] { io_.run(); });
+  }
+  ~Impl() override { stop(); }
+
+  Result<void> load() {
+    BOOST_OUTCOME_TRY(auto devices, read_devices(file()));
+    for (const auto& text : options_.from_config) {
+      const auto equals = text.find('=');
+      if (equals == std::string::npos) {
+        return make_error(Errc::invalid_argument, "devices: \"" + text + "\" is not kind=address");
+      }
+      DeviceConfig config;
+      config.kind = text.substr(0, equals);
+      config.address = text.substr(equals + 1);
+      config.name = config.kind;
+      BOOST_OUTCOME_TRYV(link::parse_address(config.address));
+      const bool known = std::any_of(devices.begin(), devices.end(),
+                                     [&](const auto& d) { return d.address == config.address; });
+      if (known) continue;
+      config.id = make_uuid_v7(SystemClock{}.now());
+      devices.push_back(std::move(config));
+    }
+    const std::scoped_lock lock(mutex_);
+    configs_ = std::move(devices);
+    return boost::outcome_v2::success();
+  }
+
+  void start(DeviceRows& rows) {
+    rows_ = &rows;
+    writer_ = std::thread([this] { write_rows(); });
+    std::vector<DeviceConfig> configs;
+    {
+      const std::scoped_lock lock(mutex_);
+      configs = configs_;
+    }
+    for (const auto& config : configs) {
+      if (!config.enabled) continue;
+      if (const auto begun = on_io([&] { return begin(config); }); !begun)
+        note(config.name + ": " + begun.error().message);
+    }
+  }
+
+  void stop() {
+    {
+      // Held until the thread is gone: whoever asks meanwhile waits, and then finds no loop.
+      const std::scoped_lock lock(post_mutex_);
+      if (std::exchange(stopped_, true)) return;
+      // The last task: what was posted before it runs before it, and nothing comes after.
+      boost::asio::post(io_, [this] {
+        loop_.reset();
+        recorder_.reset();
+        io_.stop();
+      });
+      io_thread_.join();
+    }
+    queue_.stop();
+    if (writer_.joinable()) writer_.join();
+    const std::scoped_lock lock(answers_mutex_);
+    for (auto& [id, promise] : answers_) promise.set_value(make_error(Errc::canceled, "the server stops"));
+    answers_.clear();
+  }
+
+  /// Runs a function on the io thread and gives back what it says.
+  template <class F>
+  auto on_io(F function) -> decltype(function()) {
+    std::packaged_task<decltype(function())()> task(std::move(function));
+    auto result = task.get_future();
+    bool alone = false;
+    {
+      const std::scoped_lock lock(post_mutex_);
+      alone = stopped_;
+      if (!alone) boost::asio::post(io_, [&task] { task(); });
+    }
+    if (alone) task();  // the io thread is gone, and with it the loop
+    return result.get();
+  }
+
+  // --- io thread -------------------------------------------------------------------------------------------
+  void fix(const std::string&, const Fix& row) override { queue_.push(row); }
+  void range(const std::string&, const Range& row) override { queue_.push(row); }
+  void changed(const std::string& id) override {
+    const auto state = loop_ ? loop_->device(id) : std::nullopt;
+    if (!state) return;
+    note("device \"" + state->settings.name + "\" is " + std::string(to_string(state->phase)) +
+         (state->reason.empty() ? "" : ": " + state->reason));
+  }
+  void answer(const std::string&, std::uint64_t command, const Result<std::string>& json) override {
+    const std::scoped_lock lock(answers_mutex_);
+    const auto found = answers_.find(command);
+    if (found == answers_.end()) return;  // nobody waits any more
+    found->second.set_value(json);
+    answers_.erase(found);
+  }
+
+  Result<void> begin(const DeviceConfig& config) {
+    if (!loop_) return make_error(Errc::canceled, "the server stops");
+    if (!recorder_) open_recorder();
+    return loop_->add(settings_of(config));
+  }
+
+  /// Made with the first device: a server without devices leaves no empty recordings.
+  void open_recorder() {
+    auto made = record::Recorder::open(options_.data_dir / "recordings", SystemClock{}.now());
+    if (made) {
+      recorder_ = std::move(made).value();
+      loop_->record_to(recorder_.get());
+    } else {
+      const std::scoped_lock lock(mutex_);
+      recorder_failure_ = made.error().message;
+      note("raw bytes are not recorded: " + recorder_failure_);
+    }
+  }
+
+  // --- writer thread ---------------------------------------------------------------------------------------
+  void write_rows() {
+    std::vector<Fix> fixes;
+    std::vector<Range> ranges;
+    while (queue_.take(fixes, ranges)) {
+      if (fixes.empty() && ranges.empty()) continue;
+      for (int attempt = 1;; ++attempt) {
+        const auto done = rows_->take(fixes, ranges);
+        if (done) break;
+        if (attempt == 1) note("rows of devices are not stored: " + done.error().message);
+        // A full disk may be helped, and a locked database comes back; meanwhile the queue holds what comes.
+        if (queue_.stopping() || attempt >= 30) {
+          queue_.lost(fixes.size() + ranges.size());
+          break;
+        }
+        std::this_thread::sleep_for(std::chrono::seconds(1));
+      }
+    }
+  }
+
+  void note(const std::string& text) const {
+    if (options_.log) options_.log(text);
+  }
+  std::filesystem::path file() const { return options_.data_dir / "devices.json"; }
+
+  DeviceManagerOptions options_;
+  boost::asio::io_context io_{1};
+  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work_;
+  std::unique_ptr<record::Recorder> recorder_;
+  std::unique_ptr<device::DeviceLoop> loop_;
+  std::thread io_thread_, writer_;
+  RowQueue queue_;
+  DeviceRows* rows_{nullptr};
+
+  std::mutex mutex_;  ///< the next four
+  std::vector<DiscoveredDevice> discovered_;
+  std::vector<DeviceConfig> configs_;
+  std::optional<MissionId> mission_;
+  std::string recorder_failure_;
+
+  std::mutex answers_mutex_;
+  std::map<std::uint64_t, std::promise<Result<std::string>>> answers_;
+  std::uint64_t next_command_{1};
+  std::mutex post_mutex_;
+  bool stopped_{false};
+};
+
+DeviceManager::DeviceManager(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+DeviceManager::~DeviceManager() = default;
+
+Result<std::unique_ptr<DeviceManager>> DeviceManager::open(DeviceManagerOptions options) {
+  auto impl = std::make_unique<Impl>(std::move(options));
+  BOOST_OUTCOME_TRYV(impl->load());
+  return std::unique_ptr<DeviceManager>(new DeviceManager(std::move(impl)));
+}
+
+void DeviceManager::start(DeviceRows& rows) { impl_->start(rows); }
+void DeviceManager::stop() { impl_->stop(); }
+
+std::vector<DeviceReport> DeviceManager::devices() {
+  std::vector<DeviceConfig> configs;
+  {
+    const std::scoped_lock lock(impl_->mutex_);
+    configs = impl_->configs_;
+  }
+  if (configs.empty()) return {};
+  const auto states = impl_->on_io(
+      [&] { return impl_->loop_ ? impl_->loop_->devices() : std::vector<device::DeviceState>{}; });
+  std::vector<DeviceReport> out;
+  for (const auto& config : configs) {
+    const auto id = to_string(config.id);
+    const auto state =
+        std::find_if(states.begin(), states.end(), [&](const auto& s) { return s.settings.id == id; });
+    if (state != states.end()) {
+      out.push_back(report_of(config, *state));
+    } else {
+      DeviceReport off;
+      off.config = config;
+      off.reason = config.enabled ? "its settings are not usable" : "switched off";
+      out.push_back(std::move(off));
+    }
+  }
+  return out;
+}
+
+Result<DeviceReport> DeviceManager::device(const Uuid& id) {
+  for (auto& report : devices()) {
+    if (report.config.id == id) return std::move(report);
+  }
+  return make_error(Errc::not_found, "there is no device " + to_string(id));
+}
+
+Result<DeviceReport> DeviceManager::add(DeviceConfig config) {
+  config.id = make_uuid_v7(SystemClock{}.now());
+  config.version = 1;
+  if (config.enabled) {
+    const auto begun = impl_->on_io([&] { return impl_->begin(config); });
+    if (!begun) return begun.error();
+  }
+  std::vector<DeviceConfig> all;
+  {
+    const std::scoped_lock lock(impl_->mutex_);
+    impl_->configs_.push_back(config);
+    all = impl_->configs_;
+  }
+  BOOST_OUTCOME_TRYV(write_devices(impl_->file(), all));
+  return device(config.id);
+}
+
+Result<DeviceReport> DeviceManager::change(DeviceConfig config, std::uint64_t expected_version) {
+  std::vector<DeviceConfig> all;
+  DeviceConfig before;
+  {
+    const std::scoped_lock lock(impl_->mutex_);
+    const auto found = std::find_if(impl_->configs_.begin(), impl_->configs_.end(),
+                                    [&](const auto& c) { return c.id == config.id; });
+    if (found == impl_->configs_.end())
+      return make_error(Errc::not_found, "there is no device " + to_string(config.id));
+    if (found->version != expected_version)
+      return make_error(Errc::conflict, "the device was changed meanwhile");
+    before = *found;
+    config.version = expected_version + 1;
+    *found = config;
+    all = impl_->configs_;
+  }
+  const bool same_link = before.kind == config.kind && before.address == config.address &&
+                         before.options_json == config.options_json && before.name == config.name &&
+                         before.enabled == config.enabled;
+  if (!same_link) {
+    const auto changed = impl_->on_io([&]() -> Result<void> {
+      if (!impl_->loop_) return make_error(Errc::canceled, "the server stops");
+      (void)impl_->loop_->remove(to_string(config.id));
+      if (!config.enabled) return boost::outcome_v2::success();
+      auto begun = impl_->begin(config);
+      if (!begun && before.enabled) (void)impl_->begin(before);
+      return begun;
+    });
+    if (!changed) {
+      const std::scoped_lock lock(impl_->mutex_);
+      for (auto& c : impl_->configs_) {
+        if (c.id == before.id) c = before;
+      }
+      return changed.error();
+    }
+  }
+  BOOST_OUTCOME_TRYV(write_devices(impl_->file(), all));
+  return device(config.id);
+}
+
+Result<void> DeviceManager::remove(const Uuid& id) {
+  std::vector<DeviceConfig> all;
+  {
+    const std::scoped_lock lock(impl_->mutex_);
+    if (std::erase_if(impl_->configs_, [&](const auto& c) { return c.id == id; }) == 0) {
+      return make_error(Errc::not_found, "there is no device " + to_string(id));
+    }
+    all = impl_->configs_;
+  }
+  impl_->on_io([&] {
+    if (impl_->loop_) (void)impl_->loop_->remove(to_string(id));
+    return 0;
+  });
+  return write_devices(impl_->file(), all);
+}
+
+Result<std::string> DeviceManager::act(const Uuid& id, std::string_view action,
+                                       std::string_view arguments_json) {
+  std::future<Result<std::string>> answer;
+  std::uint64_t number = 0;
+  {
+    const std::scoped_lock lock(impl_->answers_mutex_);
+    number = impl_->next_command_++;
+    answer = impl_->answers_[number].get_future();
+  }
+  const auto forget = [&] {
+    const std::scoped_lock lock(impl_->answers_mutex_);
+    impl_->answers_.erase(number);
+  };
+  const auto begun = impl_->on_io([&]() -> Result<void> {
+    if (!impl_->loop_) return make_error(Errc::canceled, "the server stops");
+    return impl_->loop_->command(to_string(id), {number, std::string(action), std::string(arguments_json)});
+  });
+  if (!begun) {
+    forget();
+    return begun.error();
+  }
+  if (answer.wait_for(k_answer_time) != std::future_status::ready) {
+    forget();
+    return make_error(Errc::link_lost, "the device did not answer within 10 s");
+  }
+  return answer.get();
+}
+
+std::vector<DiscoveredDevice> DeviceManager::discover() {
+  std::vector<std::string> ours;
+  {
+    const std::scoped_lock lock(impl_->mutex_);
+    for (const auto& c : impl_->configs_) ours.push_back(c.address);
+  }
+  std::vector<DiscoveredDevice> out;
+  for (auto& found : device::discover(ours)) {
+    out.push_back(
+        {std::move(found.address), std::move(found.kind), std::move(found.evidence), found.configured});
+  }
+  const std::scoped_lock lock(impl_->mutex_);
+  impl_->discovered_ = out;
+  return out;
+}
+
+std::vector<DiscoveredDevice> DeviceManager::discovered() {
+  const std::scoped_lock lock(impl_->mutex_);
+  return impl_->discovered_;
+}
+
+DeviceClock DeviceManager::clock() {
+  const auto state =
+      impl_->on_io([&] { return impl_->loop_ ? impl_->loop_->clock() : device::ClockState{}; });
+  return {state.from_receiver, state.system_offset_s, state.sigma_s, state.skew};
+}
+
+void DeviceManager::record_into(const std::optional<MissionId>& mission) {
+  {
+    const std::scoped_lock lock(impl_->mutex_);
+    impl_->mission_ = mission;
+  }
+  impl_->on_io([&] {
+    if (impl_->loop_) impl_->loop_->record_into(mission);
+    return 0;
+  });
+}
+
+std::optional<MissionId> DeviceManager::recording_into() {
+  const std::scoped_lock lock(impl_->mutex_);
+  return impl_->mission_;
+}
+
+std::string DeviceManager::recorder_failure() {
+  {
+    const std::scoped_lock lock(impl_->mutex_);
+    if (!impl_->recorder_failure_.empty()) return impl_->recorder_failure_;
+  }
+  return impl_->on_io([&] { return impl_->recorder_ ? impl_->recorder_->failed() : std::string(); });
+}
+
+std::string DeviceManager::metrics() {
+  const auto all = devices();
+  if (all.empty()) return {};
+  std::string out;
+  const auto label = [](const DeviceReport& d) {
+    return "{device=\"" + to_string(d.config.id) + "\",kind=\"" + d.config.kind + "\"";
+  };
+  const auto family = [&](const char* name, const char* type, const char* help, auto value) {
+    out += std::string("# HELP ") + name + " " + help + "\n# TYPE " + name + " " + type + "\n";
+    for (const auto& d : all) out += name + label(d) + "} " + std::to_string(value(d)) + "\n";
+  };
+  family("anchord_device_talking", "gauge", "1 while good frames come",
+         [](const DeviceReport& d) { return d.state == "talking" ? 1 : 0; });
+  family("anchord_device_received_bytes_total", "counter", "Bytes received",
+         [](const auto& d) { return d.bytes_in; });
+  family("anchord_device_sent_bytes_total", "counter", "Bytes sent",
+         [](const auto& d) { return d.bytes_out; });
+  family("anchord_device_frames_total", "counter", "Reads that held a good frame",
+         [](const auto& d) { return d.frames; });
+  family("anchord_device_fixes_total", "counter", "Positions decoded", [](const auto& d) { return d.fixes; });
+  family("anchord_device_ranges_total", "counter", "Ranges decoded", [](const auto& d) { return d.ranges; });
+  family("anchord_device_lost_total", "counter", "Links that were lost",
+         [](const auto& d) { return d.lost; });
+  out +=
+      "# HELP anchord_device_dropped_total What was not used, by reason\n# TYPE anchord_device_dropped_total "
+      "counter\n";
+  for (const auto& d : all) {
+    for (const auto& [reason, n] : d.dropped) {
+      out += "anchord_device_dropped_total" + label(d) + ",reason=\"" + reason + "\"} " + std::to_string(n) +
+             "\n";
+    }
+  }
+  out +=
+      "# HELP anchord_device_rows_lost_total Rows that the database did not take in time\n"
+      "# TYPE anchord_device_rows_lost_total counter\nanchord_device_rows_lost_total " +
+      std::to_string(impl_->queue_.dropped()) + "\n";
+  return out;
+}
+
+}  // namespace anchord::server

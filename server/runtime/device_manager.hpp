@@ -1,0 +1,59 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/ports/devices.hpp"
+
+namespace anchord::server {
+
+struct DeviceManagerOptions {
+  std::filesystem::path data_dir;        ///< devices.json and recordings/ are in it
+  std::vector<std::string> from_config;  ///< "kind=address"; added when no device has the address
+  std::function<void(const std::string& text)> log{};
+};
+
+/// The devices of this server: settings in `devices.json`, supervisors and drivers on one thread of their
+/// own, raw recordings, and rows handed on in batches (100 ms or 200 rows) by a second thread.
+///
+/// At most 100 000 rows wait for the database; then the oldest leave, counted (the recording has the bytes).
+class DeviceManager final : public DeviceControl {
+ public:
+  static constexpr std::size_t k_max_waiting_rows = 100'000;
+
+  /// errors: storage_unavailable, bad_frame (devices.json cannot be read: it is left as it is),
+  /// invalid_argument (from_config)
+  static Result<std::unique_ptr<DeviceManager>> open(DeviceManagerOptions options);
+  ~DeviceManager() override;
+
+  /// Rows go here from now on; devices are started. Once.
+  void start(DeviceRows& rows);
+  /// Closes every link, hands on what waits. Idempotent.
+  void stop();
+
+  std::vector<DeviceReport> devices() override;
+  Result<DeviceReport> device(const Uuid& id) override;
+  Result<DeviceReport> add(DeviceConfig config) override;
+  Result<DeviceReport> change(DeviceConfig config, std::uint64_t expected_version) override;
+  Result<void> remove(const Uuid& id) override;
+  Result<std::string> act(const Uuid& id, std::string_view action, std::string_view arguments_json) override;
+  std::vector<DiscoveredDevice> discover() override;
+  std::vector<DiscoveredDevice> discovered() override;
+  DeviceClock clock() override;
+  void record_into(const std::optional<MissionId>& mission) override;
+  std::optional<MissionId> recording_into() override;
+  std::string recorder_failure() override;
+
+  /// Prometheus text of all devices.
+  std::string metrics();
+
+ private:
+  class Impl;
+  explicit DeviceManager(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace anchord::server

@@ -1,0 +1,172 @@
+#include "drivers/ntrip/client.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <utility>
+
+#include "drivers/device/settings.hpp"
+#include "tests/drivers/device/collect.hpp"
+
+namespace anchord::ntrip {
+namespace {
+
+using device::test::Collect;
+using record::EventKind;
+
+/// Message 1005 of the RTCM 10403 standard's own example: 25 bytes.
+const std::string k_1005(
+    "\xd3\x00\x13\x3e\xd7\xd3\x02\x02\x98\x0e\xde\xef\x34\xb4\xbd\x62\xac\x09\x41\x98\x6f\x33\x36\x0b\x98",
+    25);
+
+/// A rover in slot 1 and a caster in slot 2, behind the server's own entrance.
+struct Link {
+  explicit Link(const std::string& options = R"({"mount":"BASE","user":"me","version":1})") : pipeline(sink) {
+    take(EventKind::added, 1,
+         device::to_json(device::Settings{"r", "gnss", "", "tcp://192.0.2.1:9001", "{}"}));
+    take(EventKind::added, 2,
+         device::to_json(device::Settings{"c", "ntrip", "", "tcp://caster.example:2101", options}));
+    take(EventKind::opened, 1);
+  }
+  void take(EventKind kind, std::uint16_t slot, std::string_view payload = {}) {
+    const link::Arrival at{UtcTime{1'718'269'200'000'000'000 + now_ns}, now_ns};
+    const auto done = pipeline.take({kind, slot, at, payload});
+    EXPECT_TRUE(done) << done.error().message;
+  }
+  std::string to_rover() { return std::exchange(sink.sent[1], {}); }
+  std::string to_caster() { return std::exchange(sink.sent[2], {}); }
+  Collect sink;
+  device::Pipeline pipeline;
+  std::int64_t now_ns{1'000'000'000};
+};
+
+TEST(Crc24q, OfTheStandardsExampleIsItsOwn) {
+  EXPECT_EQ(crc24q(std::string_view(k_1005).substr(0, 22)), 0x360b98u);
+  RtcmCounter counter;
+  EXPECT_EQ(counter.feed(k_1005 + "\xd3\xd3junk" + k_1005), 2);
+  EXPECT_EQ(counter.newest_message(), 1005);
+  EXPECT_EQ(counter.skipped(), 6u);
+}
+
+TEST(Base64, AsInRfc4648) {
+  EXPECT_EQ(base64("foob"), "Zm9vYg==");
+  EXPECT_EQ(base64("fooba"), "Zm9vYmE=");
+  EXPECT_EQ(base64("foobar"), "Zm9vYmFy");
+}
+
+TEST(NtripClient, AsksAsEachVersionAsks) {
+  Link one;
+  one.take(EventKind::opened, 2);
+  EXPECT_EQ(one.to_caster(),
+            "GET /BASE HTTP/1.0\r\nUser-Agent: NTRIP anchord/1\r\nAuthorization: Basic bWU6\r\n\r\n");
+  const auto file = std::filesystem::temp_directory_path() / ("ntrip_password_" + std::to_string(getpid()));
+  std::ofstream(file) << "secret\n";
+  Link two(R"({"mount":"BASE","user":"me","password_file":")" + file.string() + R"("})");
+  two.take(EventKind::opened, 2);
+  EXPECT_EQ(two.to_caster(),
+            "GET /BASE HTTP/1.1\r\nHost: caster.example:2101\r\nNtrip-Version: Ntrip/2.0\r\n"
+            "User-Agent: NTRIP anchord/1\r\nAuthorization: Basic bWU6c2VjcmV0\r\nConnection: close\r\n\r\n");
+  std::filesystem::remove(file);
+}
+
+TEST(NtripClient, HandsTheStreamOnWhereverTheAnswerIsCut) {
+  const std::string stream = k_1005 + k_1005;
+  for (const std::string& head : {std::string("ICY 200 OK\r\n"), std::string("ICY 200 OK\r\n\r\n"),
+                                  std::string("ICY 200 OK\r\nServer: x\r\n\r\n"),
+                                  std::string("HTTP/1.1 200 OK\r\nContent-Type: gnss/data\r\n\r\n")}) {
+    const std::string all = head + stream;
+    for (std::size_t cut = 1; cut < all.size(); ++cut) {
+      Link link;
+      link.take(EventKind::opened, 2);
+      link.take(EventKind::bytes, 2, std::string_view(all).substr(0, cut));
+      link.take(EventKind::bytes, 2, std::string_view(all).substr(cut));
+      ASSERT_EQ(link.to_rover(), stream) << head << " cut at " << cut;
+    }
+  }
+}
+
+TEST(NtripClient, UndoesChunksThatCutFrames) {
+  const std::string all = "HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n7\r\n" + k_1005.substr(0, 7) +
+                          "\r\n12;x=y\r\n" + k_1005.substr(7) + "\r\n0\r\n\r\n";
+  for (std::size_t cut = 1; cut < all.size(); ++cut) {
+    Link link;
+    link.take(EventKind::opened, 2);
+    link.take(EventKind::bytes, 2, std::string_view(all).substr(0, cut));
+    link.take(EventKind::bytes, 2, std::string_view(all).substr(cut));
+    ASSERT_EQ(link.to_rover(), k_1005) << "cut at " << cut;
+    ASSERT_EQ(link.sink.hung_up, "the caster ended the stream");
+  }
+}
+
+TEST(NtripClient, SaysWhyThereIsNoStream) {
+  const auto why = [](const std::string& answer) {
+    Link link;
+    link.take(EventKind::opened, 2);
+    link.take(EventKind::bytes, 2, answer);
+    EXPECT_EQ(link.to_rover(), "");
+    return link.sink.hung_up;
+  };
+  EXPECT_EQ(why("HTTP/1.0 401 Unauthorized\r\n"), "the caster refuses user or password");
+  EXPECT_EQ(why("HTTP/1.1 404 Not Found\r\n"), "the caster has no mount \"BASE\"");
+  EXPECT_EQ(why("HTTP/1.1 503 Busy\r\n"), "the caster answers \"HTTP/1.1 503 Busy\"");
+  EXPECT_EQ(why("SOURCETABLE 200 OK\r\nServer: x\r\n\r\nCAS;a;b\r\nSTR;NEAR;Gent;RTCM "
+                "3.2;\r\nSTR;FAR;x;\r\nENDSOURCETABLE\r\n"),
+            "the caster has no mount \"BASE\"; it has NEAR, FAR");
+  EXPECT_EQ(why(std::string(20'000, 'x')), "the caster's answer is no NTRIP");
+  Link silent;
+  silent.take(EventKind::opened, 2);
+  silent.now_ns += 11'000'000'000;
+  silent.take(EventKind::tick, 2);
+  EXPECT_EQ(silent.sink.hung_up, "no answer of the caster within 10 s");
+}
+
+TEST(NtripClient, TellsTheRoversPositionAtOnceAndEachTenSeconds) {
+  Link link;
+  // Section 3 of the NMEA description, with its date.
+  link.take(EventKind::bytes, 1,
+            "$GNRMC,090000.20,A,5101.3687380,N,00342.6274020,E,0.70,109.44,130624,,,D*47\r\n"
+            "$GNGGA,090000.20,5101.3687380,N,00342.6274020,E,4,14,0.9,22.500,M,45.012,M,0.8,0000*65\r\n");
+  link.now_ns += 100'000'000;
+  link.take(EventKind::tick, 1);
+  link.take(EventKind::opened, 2);
+  (void)link.to_caster();
+  link.take(EventKind::bytes, 2, "ICY 200 OK\r\n\r\n");
+  const std::string told = link.to_caster();
+  EXPECT_TRUE(told.starts_with("$GPGGA,090000.00,5101.3687,N,00342.6274,E,4,14,0.9,22.500,M,45.012,M,,*"))
+      << told;
+  link.now_ns += 10'000'000'000;
+  ASSERT_LE(link.pipeline.deadline_ns(2).value_or(INT64_MAX), link.now_ns);
+  link.take(EventKind::tick, 2);
+  EXPECT_EQ(link.to_caster(), told);
+}
+
+TEST(NtripClient, LeavesARoverAloneThatHasItsOwnCorrections) {
+  Collect sink;
+  device::Pipeline pipeline(sink);
+  const auto take = [&](EventKind kind, std::uint16_t slot, std::string_view payload) {
+    EXPECT_TRUE(pipeline.take({kind, slot, {}, payload}));
+  };
+  take(EventKind::added, 1,
+       device::to_json(device::Settings{"r", "gnss", "", "tcp://192.0.2.1:1", R"({"corrections":"own"})"}));
+  take(EventKind::added, 2,
+       device::to_json(device::Settings{"c", "ntrip", "", "tcp://a:1", R"({"mount":"M"})"}));
+  take(EventKind::opened, 1, {});
+  take(EventKind::opened, 2, {});
+  take(EventKind::bytes, 2, "ICY 200 OK\r\n\r\n" + k_1005);
+  EXPECT_EQ(sink.sent[1], "");
+}
+
+TEST(NtripClient, RefusesSettingsThatWouldBreakTheRequest) {
+  Collect sink;
+  device::Pipeline pipeline(sink);
+  for (const char* options : {R"({})", R"({"mount":"a b"})", R"({"mount":"a\r\nX: y"})",
+                              R"({"mount":"M","version":3})", R"({"mount":"M","password":"x"})"}) {
+    EXPECT_FALSE(pipeline.take(
+        {EventKind::added, 1, {}, device::to_json(device::Settings{"c", "ntrip", "", "tcp://a:1", options})}))
+        << options;
+  }
+}
+
+}  // namespace
+}  // namespace anchord::ntrip

@@ -1,0 +1,180 @@
+// The server with a receiver of its own: set up over REST, heard over TCP, stored, seen, taken out.
+#include <arpa/inet.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "core/base/time.hpp"
+#include "tests/server/app/app_fixture.hpp"
+
+namespace anchord::test {
+namespace {
+
+using Json = nlohmann::json;
+
+std::string sentence(const std::string& body) {
+  unsigned sum = 0;
+  for (const char c : body) sum ^= static_cast<unsigned char>(c);
+  char end[8];
+  std::snprintf(end, sizeof end, "*%02X\r\n", sum);
+  return "$" + body + end;
+}
+
+/// A receiver as a TCP server: an epoch of RTK fixed position each 50 ms, of now.
+class Receiver {
+ public:
+  Receiver() : socket_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_in at{};
+    at.sin_family = AF_INET;
+    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    EXPECT_EQ(::bind(socket_, reinterpret_cast<sockaddr*>(&at), sizeof at), 0);
+    EXPECT_EQ(::listen(socket_, 4), 0);
+    socklen_t size = sizeof at;
+    ::getsockname(socket_, reinterpret_cast<sockaddr*>(&at), &size);
+    address_ = "tcp://127.0.0.1:" + std::to_string(ntohs(at.sin_port));
+    thread_ = std::thread([this] { serve(); });
+  }
+  ~Receiver() {
+    stop_ = true;
+    thread_.join();
+    ::close(socket_);
+  }
+  const std::string& address() const { return address_; }
+
+ private:
+  static std::string epoch() {
+    const std::string now = to_rfc3339(UtcTime{SystemClock{}.now().ns / 10'000'000 * 10'000'000});
+    const std::string time =
+        now.substr(11, 2) + now.substr(14, 2) + now.substr(17, 2) + "." + now.substr(20, 2);
+    const std::string date = now.substr(8, 2) + now.substr(5, 2) + now.substr(2, 2);
+    return sentence("GNRMC," + time + ",A,5101.3687380,N,00342.6274020,E,0.70,109.44," + date + ",,,D") +
+           sentence("GNGGA," + time + ",5101.3687380,N,00342.6274020,E,4,14,0.9,22.500,M,45.012,M,0.8,0000") +
+           sentence("GNGST," + time + ",0.4,,,,0.012,0.012,0.021");
+  }
+  void serve() {
+    int peer = -1;
+    while (!stop_) {
+      pollfd waiting{peer < 0 ? socket_ : -1, POLLIN, 0};
+      ::poll(&waiting, 1, 50);
+      if (peer < 0 && (waiting.revents & POLLIN)) peer = ::accept4(socket_, nullptr, nullptr, SOCK_CLOEXEC);
+      const std::string text = epoch();
+      if (peer >= 0 && ::send(peer, text.data(), text.size(), MSG_NOSIGNAL) < 0) {
+        ::close(peer);
+        peer = -1;
+      }
+    }
+    if (peer >= 0) ::close(peer);
+  }
+  int socket_;
+  std::string address_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+struct Rover : AppFixture {
+  Rover() : AppFixture(Settings{{"auth", "off"}, {"rate.burst", "100000"}}) {}
+  Json ask(std::string_view method, const std::string& target, const Json& body = nullptr,
+           const std::map<std::string, std::string>& headers = {}) {
+    last = call(method, target, body.is_null() ? std::string() : body.dump(), headers);
+    return Json::parse(last.body, nullptr, false);
+  }
+  /// Asks until it is so; the last answer when 20 s pass first.
+  Json until(const std::string& target, const std::function<bool(const Json&)>& so) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    for (;;) {
+      Json json = ask("GET", target);
+      if (so(json) || std::chrono::steady_clock::now() > end) return json;
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+  }
+  server::ClientResponse last;
+};
+
+TEST(DevicesOverHttp, ARoverSetUpOverRestIsHeardAndItsPositionsAreOfTheMissionThatRecords) {
+  Receiver receiver;
+  Rover server;
+  ASSERT_TRUE(server.app) << server.error.message;
+  const auto made = server.ask("POST", "/api/v1/devices",
+                               {{"kind", "gnss"}, {"name", "rover"}, {"address", receiver.address()}});
+  ASSERT_EQ(server.last.status, 201) << server.last.body;
+  const std::string path = server.last.headers.at("location"), etag = server.last.headers.at("etag");
+  const auto talking = server.until(path, [](const Json& d) { return d.value("state", "") == "talking"; });
+  EXPECT_EQ(talking.value("state", ""), "talking") << talking;
+  const auto mission = server.ask("POST", "/api/v1/missions",
+                                  {{"name", "flight"}, {"frame", "wgs84"}, {"track_point", "tag_antenna"}});
+  ASSERT_EQ(server.last.status, 201) << server.last.body;
+  const std::string id = mission.value("id", "");
+  const auto fixes =
+      server.until("/api/v1/fixes?mission=" + id, [](const Json& page) { return page["items"].size() >= 5; });
+  ASSERT_GE(fixes["items"].size(), 5u) << fixes;
+  const Json& fix = fixes["items"][0];
+  EXPECT_EQ(fix.value("fix", ""), "fixed");
+  EXPECT_NEAR(fix.value("lat", 0.0), 51.0228123, 1e-9);  // section 7 of the NMEA sheet
+  EXPECT_NEAR(fix.value("h_m", 0.0), 67.512, 1e-6);
+  const auto told = server.ask("GET", path);
+  EXPECT_EQ(told["rover"].value("fix", ""), "fixed");
+  EXPECT_EQ(told["rover"].value("satellites", 0), 14);
+  EXPECT_NE(server.call("GET", "/metrics").body.find("anchord_device_talking"), std::string::npos);
+
+  // Switched off it keeps its settings; an old ETag is refused.
+  const auto off = server.ask("PATCH", path, {{"enabled", false}}, {{"If-Match", etag}});
+  EXPECT_EQ(server.last.status, 200) << server.last.body;
+  EXPECT_EQ(off.value("state", ""), "off");
+  server.ask("PATCH", path, {{"enabled", true}}, {{"If-Match", etag}});
+  EXPECT_EQ(server.last.status, 412);
+  server.ask("DELETE", path, nullptr, {{"If-Match", "*"}});
+  EXPECT_EQ(server.last.status, 204);
+  server.ask("GET", path);
+  EXPECT_EQ(server.last.status, 404);
+}
+
+TEST(DevicesOverHttp, RefusesWhatNoDriverTakesAndTheSameAddressTwice) {
+  Rover server;
+  ASSERT_TRUE(server.app) << server.error.message;
+  for (const Json& body :
+       {Json{{"kind", "gnss"}, {"address", "teapot:1"}}, Json{{"kind", "gnss"}},
+        Json{{"kind", "toaster"}, {"address", "tcp://127.0.0.1:1"}},
+        Json{{"kind", "gnss"}, {"address", "tcp://127.0.0.1:1"}, {"colour", "red"}},
+        Json{{"kind", "gnss"}, {"address", "tcp://127.0.0.1:1"}, {"options", {{"format", "x"}}}},
+        Json{{"kind", "pozyx"}, {"address", "tcp://127.0.0.1:1"}, {"options", {{"cir", "x"}}}}}) {
+    server.ask("POST", "/api/v1/devices", body);
+    EXPECT_EQ(server.last.status, 422) << body << server.last.body;
+  }
+  const Json good{{"kind", "gnss"}, {"address", "serial:/dev/serial/by-id/nothing"}};
+  const auto made = server.ask("POST", "/api/v1/devices", good);
+  ASSERT_EQ(server.last.status, 201) << server.last.body;
+  EXPECT_EQ(made.value("state", ""), "lost");
+  server.ask("POST", "/api/v1/devices", good);
+  EXPECT_EQ(server.last.status, 409) << server.last.body;
+  server.ask("POST", "/api/v1/devices/" + made.value("id", "") + "/actions", {{"action", "identify"}});
+  EXPECT_EQ(server.last.status, 422) << "it is not connected";
+}
+
+TEST(DevicesOverHttp, AServerStartedAgainKnowsItsDevices) {
+  Receiver receiver;
+  Rover server;
+  ASSERT_TRUE(server.app) << server.error.message;
+  server.ask("POST", "/api/v1/devices", {{"kind", "gnss"}, {"name", "r"}, {"address", receiver.address()}});
+  ASSERT_EQ(server.last.status, 201);
+  server.app.reset();
+  const auto config = server::load_config(
+      Settings{{"listen", "127.0.0.1:0"}, {"auth", "off"}, {"data_dir", (server.folder / "data").string()}},
+      std::nullopt, {});
+  server.app = std::move(server::App::start(config.value())).value();
+  server.url = server.app->urls().front();
+  const auto list = server.until("/api/v1/devices", [](const Json& page) {
+    return !page["items"].empty() && page["items"][0].value("state", "") == "talking";
+  });
+  ASSERT_EQ(list["items"].size(), 1u);
+  EXPECT_EQ(list["items"][0].value("state", ""), "talking") << list;
+  EXPECT_TRUE(std::filesystem::exists(server.folder / "data" / "recordings"));
+}
+
+}  // namespace
+}  // namespace anchord::test
