@@ -7,6 +7,7 @@
 #include "api/imports/flight_folder.hpp"
 #include "drivers/sim/flight.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/simulate_devices.hpp"
 
 namespace anchord::cli {
 namespace {
@@ -50,8 +51,24 @@ int simulate(const sim::SimulationOptions& options, const std::filesystem::path&
 }  // namespace
 
 void add_simulate_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand("simulate", "Make measurements without a drone");
-  command->require_subcommand(1);
+  auto* command = app.add_subcommand(
+      "simulate", "Serve simulated devices on ptys and TCP ports, or make a flight without a drone");
+  command->require_subcommand(0, 1);
+  auto devices = std::make_shared<SimulateDevices>();
+  command->add_option("SCENARIO", devices->scenario,
+                      "Scenario file (docs/formats.md), or demonstration: a tag on a pty, a rover on TCP");
+  command->add_flag("--json", devices->json, "One JSON object a device and a line, again after each plug");
+  command->add_option("--seed", devices->seed, "In place of the scenario's");
+  command->add_option("--duration", devices->duration_s, "Ends after so many seconds; else with Ctrl-C");
+  command->add_option("--links", devices->links, "Folder for links to the ptys, which stay over a replug");
+  command->add_flag(
+      "--live", devices->live,
+      "Fly by lines on standard input: go_to E N U [HEADING_DEG], speed MPS, plug NAME, unplug NAME");
+  command->callback([devices, command, &exit_code] {
+    if (!command->get_subcommands().empty()) return;
+    if (devices->scenario.empty()) throw CLI::RequiredError("SCENARIO");
+    exit_code = simulate_devices(*devices);
+  });
   auto* flight = command->add_subcommand(
       "flight", "One seeded flight round the demonstration building, as a flight folder");
   auto options = std::make_shared<sim::SimulationOptions>();

@@ -1,0 +1,192 @@
+// Simulated devices on real ptys and sockets, and the server's own device loop at the other end.
+#include "drivers/sim/rig.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <boost/asio/io_context.hpp>
+#include <chrono>
+#include <filesystem>
+#include <map>
+#include <random>
+#include <thread>
+
+#include "drivers/device/device_loop.hpp"
+#include "drivers/sim/rover_formats.hpp"
+
+namespace anchord::sim {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::size_t entries_of(const char* folder) {
+  std::size_t n = 0;
+  for ([[maybe_unused]] const auto& entry : fs::directory_iterator(folder)) ++n;
+  return n;
+}
+
+struct Rows final : device::DeviceListener {
+  void fix(const std::string& id, const Fix& row) override { fixes[id].push_back(row); }
+  void range(const std::string& id, const Range& row) override { ranges[id].push_back(row); }
+  void changed(const std::string&) override {}
+  void answer(const std::string&, std::uint64_t, const Result<std::string>&) override {}
+  std::map<std::string, std::vector<Fix>> fixes;
+  std::map<std::string, std::vector<Range>> ranges;
+};
+
+/// A scenario being served by this thread, together with a device loop that has each of its devices.
+class Bench {
+ public:
+  explicit Bench(Scenario scenario) {
+    std::string pattern = (fs::temp_directory_path() / "anchord_rig_XXXXXX").string();
+    folder_ = mkdtemp(pattern.data());
+    RigOptions options;
+    options.links_folder = folder_.string();
+    auto opened = Rig::open(std::make_shared<const Scenario>(std::move(scenario)), options);
+    EXPECT_TRUE(opened) << opened.error().message;
+    rig = std::move(opened).value();
+    device::LoopOptions loop_options;
+    loop_options.presence_poll_ms = 10;
+    loop_options.supervisor.first_wait_ns = 10'000'000;
+    loop_options.supervisor.longest_wait_ns = 50'000'000;
+    loop = std::make_unique<device::DeviceLoop>(io, nullptr, rows, loop_options);
+    loop->record_into(MissionId{Uuid{{1}}});
+    for (const auto& device : rig->devices()) {
+      const auto added = loop->add({device.name, device.kind, device.name, device.address,
+                                    device.kind == "pozyx" ? R"({"cir":"none"})" : "{}"});
+      EXPECT_TRUE(added) << added.error().message;
+    }
+  }
+  ~Bench() {
+    loop.reset();
+    rig.reset();
+    fs::remove_all(folder_);
+  }
+  /// Turns both sides until it is so; false when that takes more than 60 s.
+  bool until(const std::function<bool()>& so) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (!so()) {
+      if (std::chrono::steady_clock::now() > end) return false;
+      io.restart();
+      io.poll();
+      rig->step(1);
+    }
+    return true;
+  }
+  boost::asio::io_context io{1};
+  Rows rows;
+  std::unique_ptr<Rig> rig;
+  std::unique_ptr<device::DeviceLoop> loop;
+
+ private:
+  fs::path folder_;
+};
+
+TEST(Rig, ServesATagAndARoverOfEachFormatToTheRealDrivers) {
+  Scenario scenario = demonstration_scenario();
+  scenario.rovers.clear();
+  for (const RoverFormat format :
+       {RoverFormat::nmea, RoverFormat::ubx, RoverFormat::erb, RoverFormat::llh, RoverFormat::gpsd}) {
+    for (const RoverPort port : {RoverPort::pty, RoverPort::tcp}) {
+      if (format == RoverFormat::gpsd && port == RoverPort::pty) continue;  // a gpsd is a socket
+      RoverSetup& rover = scenario.rovers.emplace_back();
+      rover.format = format;
+      rover.port = port;
+      rover.rate_hz = 20;
+      rover.name = std::string(to_string(format)) + (port == RoverPort::pty ? "_pty" : "_tcp");
+    }
+  }
+  Bench bench(scenario);
+  const bool all = bench.until([&] {
+    for (const auto& rover : scenario.rovers) {
+      if (bench.rows.fixes[rover.name].size() < 5) return false;
+    }
+    return bench.rows.ranges["tag"].size() >= 20;
+  });
+  for (const auto& device : bench.loop->devices())
+    EXPECT_EQ(device.phase, device::Phase::talking) << device.settings.name << ": " << device.reason;
+  EXPECT_TRUE(all);
+  for (const auto& [name, fixes] : bench.rows.fixes) EXPECT_EQ(fixes.back().fix, FixClass::rtk_fixed) << name;
+}
+
+TEST(Rig, RefusesAScenarioThatCannotRunAndAPortThatIsTaken) {
+  Scenario scenario = demonstration_scenario();
+  auto first = Rig::open(std::make_shared<const Scenario>(scenario), {});
+  ASSERT_TRUE(first);
+  scenario.rovers[0].tcp_port = first.value()->devices().at(1).tcp_port;
+  EXPECT_EQ(Rig::open(std::make_shared<const Scenario>(scenario), {}).error().code, Errc::conflict);
+  scenario.path.clear();
+  EXPECT_EQ(Rig::open(std::make_shared<const Scenario>(scenario), {}).error().code, Errc::invalid_argument);
+}
+
+TEST(Rig, DevicesPulledTwoHundredTimesComeBackAndNothingLeaks) {
+  Scenario scenario = demonstration_scenario();
+  scenario.tags.clear();
+  scenario.rovers.clear();
+  for (int i = 0; i < 8; ++i) {
+    TagSetup& tag = scenario.tags.emplace_back();
+    tag.name = "tag" + std::to_string(i);
+    tag.id = NetworkId{0x6e01u + static_cast<unsigned>(i)};
+    RoverSetup& rover = scenario.rovers.emplace_back();
+    rover.name = "rover" + std::to_string(i);
+    rover.port = i % 2 ? RoverPort::pty : RoverPort::tcp;
+    rover.format = i % 4 < 2 ? RoverFormat::nmea : RoverFormat::ubx;
+    rover.rate_hz = 50;
+    rover.delay_s = 0;
+  }
+  Bench bench(scenario);
+  std::map<std::string, int> pulls;
+  const auto rows_of = [&](const std::string& name) {
+    return bench.rows.fixes[name].size() + bench.rows.ranges[name].size();
+  };
+  const auto everybody_speaks = [&] {
+    std::map<std::string, std::size_t> before;
+    for (const auto& device : bench.rig->devices()) before[device.name] = rows_of(device.name);
+    return bench.until([&] {
+      for (const auto& [name, n] : before) {
+        if (rows_of(name) < n + 3) return false;
+      }
+      return true;
+    });
+  };
+  ASSERT_TRUE(everybody_speaks());
+  const auto descriptors = entries_of("/proc/self/fd"), threads = entries_of("/proc/self/task");
+  std::mt19937 random(7);
+  const auto pause = [&](int most_ms) {
+    const auto until =
+        bench.rig->now_s() + 1e-3 * static_cast<double>(random() % static_cast<unsigned>(most_ms));
+    ASSERT_TRUE(bench.until([&] { return bench.rig->now_s() >= until; }));
+  };
+  int pulled = 0;
+  for (int round = 0; round < 13; ++round) {  // 13 x 16 pulls
+    for (const auto& device : bench.rig->devices()) {
+      pause(8);
+      ASSERT_TRUE(bench.rig->plug(device.name, false));
+      ++pulls[device.name];
+      ++pulled;
+    }
+    for (const auto& device : bench.rig->devices()) {
+      pause(8);
+      ASSERT_TRUE(bench.rig->plug(device.name, true));
+    }
+    ASSERT_TRUE(everybody_speaks()) << "round " << round;
+  }
+  EXPECT_GE(pulled, 200);
+  EXPECT_EQ(entries_of("/proc/self/fd"), descriptors);
+  EXPECT_EQ(entries_of("/proc/self/task"), threads);
+  for (const auto& device : bench.loop->devices()) {
+    const std::string& name = device.settings.name;
+    EXPECT_EQ(device.dropped.count("driver_fault"), 0u) << name;
+    EXPECT_EQ(device.conflict, "") << name;
+    // Epochs are missing around the pulls only: as many gaps as pulls at most.
+    int gaps = 0;
+    const auto& fixes = bench.rows.fixes[name];
+    for (std::size_t i = 1; i < fixes.size(); ++i)
+      gaps += seconds_between(fixes[i - 1].time, fixes[i].time) > 0.03;
+    EXPECT_LE(gaps, pulls[name]) << name;
+    for (const Range& range : bench.rows.ranges[name]) EXPECT_LT(range.distance_m, 100) << name;
+  }
+}
+
+}  // namespace
+}  // namespace anchord::sim
