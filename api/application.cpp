@@ -10,6 +10,7 @@
 #include "api/live/conversation.hpp"
 #include "api/live/hub.hpp"
 #include "api/routes/access_routes.hpp"
+#include "api/routes/learning.hpp"
 #include "api/routes/routes.hpp"
 #include "api/services/alarm_board.hpp"
 #include "api/services/device_ingest.hpp"
@@ -26,8 +27,9 @@ struct Application::State {
         router(&deps.access_store, &deps.clock),
         hub(deps.clock, "anchord " + deps.build.version),
         events(hub, deps.clock),
+        models(deps.learning != nullptr ? std::make_unique<ModelRegistry>(deps.learning->models) : nullptr),
         missions({deps.missions, deps.measurements, deps.anchors, hub, events, deps.clock, deps.post,
-                  deps.goal, [this] { return device_rows(); }}),
+                  deps.goal, [this] { return device_rows(); }, judge(), needs_cir()}),
         ingest(deps.measurements, missions),
         device_ingest(deps.measurements, missions),
         jobs(deps.jobs, hub, deps.clock),
@@ -46,6 +48,13 @@ struct Application::State {
     add_device_routes(router, services);
     add_job_routes(router, services);
     if (deps.plans != nullptr) add_plan_routes(router, services);
+    if (deps.learning != nullptr) {
+      learning = std::make_unique<Learning>(*this);
+      add_campaign_routes(router, learning->services);
+      add_dataset_routes(router, learning->services);
+      add_training_run_routes(router, learning->services);
+      add_model_routes(router, learning->services);
+    }
     if (deps.access != nullptr) add_access_routes(router, *deps.access);
     add_system_routes(router, services);
   }
@@ -54,6 +63,17 @@ struct Application::State {
     if (from.kits != nullptr) profiles = std::make_unique<KitProfiles>(*from.kits, from.missions, from.clock);
     return profiles.get();
   }
+
+  /// What the promoted models say of a range as it comes. Nothing while none is promoted.
+  std::function<std::optional<RangeModel>(const Range&)> judge() const {
+    if (!models) return {};
+    return [registry = models.get()](const Range& range) { return judge_range(*registry->active(), range); };
+  }
+  std::function<bool()> needs_cir() const {
+    if (!models) return {};
+    return [registry = models.get()] { return registry->active()->needs_cir; };
+  }
+
   void beat();
   std::string device_rows();
   void second();
@@ -62,6 +82,7 @@ struct Application::State {
   Router router;
   Hub hub;
   EventLog events;
+  std::unique_ptr<ModelRegistry> models;
   MissionService missions;
   IngestService ingest;
   DeviceIngest device_ingest;
@@ -70,6 +91,15 @@ struct Application::State {
   std::unique_ptr<KitProfiles> profiles;
   CalibrationService calibrations;
   Services services;
+  struct Learning {
+    explicit Learning(State& s)
+        : training({s.deps.learning->datasets, s.deps.learning->runs, s.jobs, s.events, s.deps.clock,
+                    s.deps.run_work ? s.deps.run_work : RunWork(work_inline), s.deps.build.version}),
+          services{s.services, *s.deps.learning, training, *s.models} {}
+    TrainingService training;
+    LearningServices services;
+  };
+  std::unique_ptr<Learning> learning;
   std::mutex mutex;
   std::condition_variable stop_told;
   bool stopping{false}, started{false};
@@ -149,6 +179,10 @@ WsHandlerFactory Application::ws_factory() {
 
 void Application::start() {
   if (std::exchange(state_->started, true)) return;
+  if (state_->models) {
+    const auto loaded = state_->models->reload();
+    if (!loaded && state_->deps.log_fault) state_->deps.log_fault("", loaded.error().message);
+  }
   state_->jobs.start();
   state_->heart = std::thread([this] { state_->beat(); });
 }

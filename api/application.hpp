@@ -7,21 +7,27 @@
 #include <vector>
 
 #include "api/http/router.hpp"
+#include "api/learning/worker_port.hpp"
 #include "api/live/ws_handler.hpp"
 #include "core/localize/accuracy_goal.hpp"
 
 namespace anchord {
 class AccessStore;
 class AnchorStore;
-class FrameStore;
-class KitStore;
+class CampaignStore;
 class Clock;
+class DatasetStore;
 class DeviceControl;
 class DeviceRows;
+class FrameStore;
 class JobStore;
+class KitStore;
+class LabelStore;
 class MeasurementStore;
 class MissionStore;
 class PlanStore;
+class ModelStore;
+class TrainingRunStore;
 }  // namespace anchord
 
 namespace anchord::api {
@@ -32,6 +38,15 @@ class Hub;
 struct BuildInfo {
   std::string version, git, build, compiler;
   std::int64_t schema{0};  ///< of the database
+};
+
+/// The ports of learning, together.
+struct LearningStores {
+  CampaignStore& campaigns;
+  LabelStore& labels;
+  DatasetStore& datasets;
+  TrainingRunStore& runs;
+  ModelStore& models;
 };
 
 /// State of storage as the world may know it.
@@ -66,6 +81,8 @@ class Application {
     std::string geoid_dir{};                      ///< empty: where GeographicLib looks
     std::function<std::string()> metrics_text{};  ///< Prometheus text of the server, appended to ours
     std::function<void(std::string_view request_id, std::string_view what)> log_fault{};
+    LearningStores* learning{nullptr};  ///< null: the routes of learning do not exist (tests)
+    RunWork run_work{};                 ///< runs heavy work; absent: on the job's own thread
   };
 
   explicit Application(Deps deps);

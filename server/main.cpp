@@ -26,6 +26,7 @@ int main(int argc, char** argv) {
   anchord::cli::add_train_command(app, exit_code);
   anchord::cli::add_solve_command(app, exit_code);
   anchord::cli::add_version_command(app, exit_code);
+  anchord::cli::add_worker_command(app, exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

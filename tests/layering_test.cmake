@@ -31,7 +31,7 @@ set(server/storage_source "^(sqlite3\\.h$|SQLiteCpp/|soci/|openssl/|sys/|unistd\
 
 set(server_own "^(server/|api/|drivers/|core/|migrations/|web/assets\\.hpp$)")
 set(server_header "^(${everywhere}|boost/)")
-set(server_source "^(CLI/|httplib\\.h$|spdlog/|fmt/|prometheus/|openssl/|toml\\+\\+/|toml\\.hpp$|nlohmann/json|simdjson\\.h$|zlib\\.h$|sys/|netdb\\.h$|netinet/|arpa/|unistd\\.h$|fcntl\\.h$|signal\\.h$|poll\\.h$|pthread\\.h$|termios\\.h$)")
+set(server_source "^(CLI/|linux/(filter|seccomp)\\.h$|spawn\\.h$|httplib\\.h$|spdlog/|fmt/|prometheus/|openssl/|toml\\+\\+/|toml\\.hpp$|nlohmann/json|simdjson\\.h$|zlib\\.h$|sys/|netdb\\.h$|netinet/|arpa/|unistd\\.h$|fcntl\\.h$|signal\\.h$|poll\\.h$|pthread\\.h$|termios\\.h$)")
 
 set(migrations_own "^(migrations/|core/base/)")
 set(migrations_header "^$")

@@ -195,7 +195,7 @@ std::string live_range_json(const MissionId& mission, const RangeResult& result)
       .key("rss_dbm")
       .optional(range.rss_dbm, 2)
       .key("p_los")
-      .raw("null");
+      .optional(result.model ? result.model->p_los : std::nullopt, 3);
   out.key("tag_enu_m");
   if (result.tag_enu_m)
     out.vector(*result.tag_enu_m, 4);

@@ -1,8 +1,10 @@
 #include <nlohmann/json.hpp>
 
 #include "api/json/reader.hpp"
+#include "api/json/wire_learning.hpp"
 #include "api/json/wire_resources.hpp"
 #include "api/json/wire_rows.hpp"
+#include "api/learning/range_features.hpp"
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
 #include "core/ports/store.hpp"
@@ -118,15 +120,21 @@ Response rows(const Request& request, Fetch fetch, Json json, Csv csv, const cha
 
 Response list_ranges(Services& s, const Request& request) {
   check_query(request, {"limit", "cursor", "fields", "format", "mission", "anchor", "tag", "since", "until",
-                        "sort", "cir"});
-  const bool with_cir = query_flag(request, "cir");
+                        "sort", "cir", "features"});
+  const bool with_cir = query_flag(request, "cir"), with_features = query_flag(request, "features");
   return rows(
       request,
-      [&store = s.deps.measurements, with_cir](MeasurementStore::Filter filter) {
-        filter.with_cir = with_cir;
+      [&store = s.deps.measurements, with_cir, with_features](MeasurementStore::Filter filter) {
+        filter.with_cir = with_cir || with_features;
         return store.ranges(filter);
       },
-      [](const Range& row, std::int64_t id) { return range_json(row, id); }, range_csv, k_range_header);
+      [with_cir, with_features](const Range& row, std::int64_t id) {
+        Ordered json = range_json(row, id);
+        if (with_features) json["features"] = features_json(features_of(row));
+        if (!with_cir) json.erase("cir");
+        return json;
+      },
+      range_csv, k_range_header);
 }
 
 Response list_fixes(Services& s, const Request& request) {
@@ -176,7 +184,9 @@ void add_measurement_routes(Router& router, Services& s) {
                 const auto& text = request.params.at("id");
                 const Range range = one_range(s, request);
                 std::from_chars(text.data(), text.data() + text.size(), id);
-                return json_response(200, range_json(range, id));
+                Ordered json = range_json(range, id);
+                json["features"] = features_json(features_of(range));
+                return json_response(200, json);
               }});
   router.add({Method::get, "/api/v1/ranges/{id}/cir", readers(), on(range_cir)});
   router.add({Method::get, "/api/v1/fixes", readers(), on(list_fixes)});

@@ -36,7 +36,9 @@ Result<void> DeviceIngest::take(std::vector<Fix> fixes, std::vector<Range> range
   }
   if (!ranges.empty()) {
     auto live = ranges;
-    for (auto& range : live) range.cir.reset();  // a live row needs no impulse response, and it is 4 kB
+    // A live row needs no impulse response, and it is 4 kB; only some models look at it.
+    if (!missions_.wants_cir())
+      for (auto& range : live) range.cir.reset();
     BOOST_OUTCOME_TRY(const auto outcomes, store_.append_ranges(std::move(ranges), false));
     if (auto fresh = stored(std::move(live), outcomes); !fresh.empty()) missions_.accepted(std::move(fresh));
   }

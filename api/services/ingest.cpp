@@ -250,11 +250,12 @@ class IngestRun {
       if (prepared_.insert(row.mission).second) service_.missions_.prepare(row.mission);
     }
     if (!poses_.empty()) store_poses();
+    const bool with_cir = service_.missions_.wants_cir();
     std::vector<Row> live;
     live.reserve(rows_.size());
     for (const auto& row : rows_) {
       if constexpr (std::is_same_v<Row, Range>)
-        live.push_back(without_cir(row));
+        live.push_back(with_cir ? row : without_cir(row));
       else
         live.push_back(row);
     }

@@ -89,16 +89,25 @@ class JobService::State::Context final : public JobContext {
   Context(State& state, Job& job) : state_(state), job_(job) {}
   const Job& job() const override { return job_; }
   void progress(double fraction, std::string stage, std::string detail) override {
+    const bool new_stage = job_.stage != stage;
     job_.fraction = fraction;
     job_.stage = std::move(stage);
     job_.detail = std::move(detail);
-    state_.save(job_);
+    // Every write is an fsync that flights share: the store gets what is worth keeping, the hub all of it.
+    const auto now = std::chrono::steady_clock::now();
+    if (new_stage || now - saved_ >= std::chrono::seconds(1)) {
+      saved_ = now;
+      state_.save(job_);
+    } else {
+      state_.tell(job_);
+    }
   }
   bool canceled() const override { return state_.is_canceled(job_.id); }
 
  private:
   State& state_;
   Job& job_;
+  std::chrono::steady_clock::time_point saved_{};
 };
 
 JobService::JobService(JobStore& jobs, Hub& hub, const Clock& clock)
@@ -127,10 +136,11 @@ void JobService::stop() {
   }
 }
 
-Result<Job> JobService::submit(std::string kind, std::string request_json, Work work) {
+Result<Job> JobService::submit(std::string kind, std::string request_json, Work work,
+                               std::optional<JobId> id) {
   Job job;
   job.created = state_->clock.now();
-  job.id.uuid = make_uuid_v7(job.created);
+  job.id = id.value_or(JobId{make_uuid_v7(job.created)});
   job.kind = std::move(kind);
   job.stage = "queued";
   job.request_json = std::move(request_json);

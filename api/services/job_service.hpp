@@ -45,8 +45,8 @@ class JobService {
   /// Asks what runs to end, and waits for it; what waits is marked interrupted by the next start.
   void stop();
 
-  /// A job of a new id. queue_full when too many of its kind wait.
-  Result<Job> submit(std::string kind, std::string request_json, Work work);
+  /// A job of a new id, or of the one given. queue_full when too many of its kind wait.
+  Result<Job> submit(std::string kind, std::string request_json, Work work, std::optional<JobId> id = {});
   /// The same job again under its own id, from the beginning. conflict while it waits, runs or has succeeded.
   Result<Job> restart(const JobId& id, Work work);
   /// Waits for the end of a job; the job as it is after that time otherwise.

@@ -18,8 +18,15 @@
 namespace anchord::api {
 namespace {
 
-using Row = std::variant<Range, Fix>;
+/// A range, and what the models that were promoted when it came say of it.
+struct JudgedRange {
+  Range range;
+  std::optional<RangeModel> model;
+  UtcTime time{};
+};
+using Row = std::variant<JudgedRange, Fix>;
 
+constexpr double k_least_range_m = 0.05;              // what radios report for a failure lies below it
 constexpr std::int64_t k_pose_interval_us = 100'000;  // 10 Hz of measurement time
 constexpr std::int64_t k_rtk_interval_us = 200'000;
 
@@ -28,12 +35,21 @@ UtcTime time_of(const Row& row) {
 }
 
 /// Enough to know a row again that came both from the store and from the queue.
+/// As a solution of the whole flight takes it.
+Range corrected(const JudgedRange& judged) {
+  Range out = judged.range;
+  const double bias_m = judged.model ? judged.model->bias_m.value_or(0) : 0;
+  if (out.distance_m - bias_m > k_least_range_m) out.distance_m -= bias_m;
+  return out;
+}
+
 std::size_t identity(const Row& row) {
   const auto mix = [](std::size_t seed, std::uint64_t value) {
     return seed ^ (std::hash<std::uint64_t>{}(value) + 0x9e3779b97f4a7c15ULL + (seed << 6) + (seed >> 2));
   };
   std::size_t hash = mix(row.index(), static_cast<std::uint64_t>(time_of(row).ns));
-  if (const auto* range = std::get_if<Range>(&row)) {
+  if (const auto* judged = std::get_if<JudgedRange>(&row)) {
+    const Range* range = &judged->range;
     hash = mix(mix(hash, range->tag.value), range->anchor.value);
     return mix(mix(hash, range->antenna), range->seq.value_or(0));
   }
@@ -111,6 +127,8 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
 
   template <class R>
   void accept(std::vector<R> rows);
+  Row row_of(Range range) const;
+  static Row row_of(Fix fix) { return fix; }
   void schedule(const std::shared_ptr<Flight>& flight);
   void work(Flight& flight);
   void step(Flight& flight, const Row& row, bool quiet);
@@ -215,6 +233,7 @@ void MissionService::State::begin_rebuild(const std::shared_ptr<Flight>& flight)
     auto& r = *flight->rebuild;
     r.range_filter.mission = r.fix_filter.mission = flight->id;
     r.range_filter.limit = r.fix_filter.limit = 2000;
+    r.range_filter.with_cir = deps.judge_needs_cir && deps.judge_needs_cir();
     flight->live.hold(true);
   }
   continue_rebuild(flight);
@@ -246,7 +265,7 @@ bool MissionService::State::rebuild_slice(Flight& flight) {
   refill(r.ranges, r.range_filter, r.more_ranges, [&](auto& f) { return deps.measurements.ranges(f); });
   refill(r.fixes, r.fix_filter, r.more_fixes, [&](auto& f) { return deps.measurements.fixes(f); });
   const auto take = [&](auto& rows) {
-    Row row(std::move(rows.front()));
+    const Row row = row_of(std::move(rows.front()));
     rows.pop_front();
     flight.rebuilt.push_back(identity(row));
     step(flight, row, true);
@@ -305,6 +324,14 @@ void MissionService::State::finish_joint(Flight& flight, const FlightSolution* s
   flight.dirty = true;
 }
 
+Row MissionService::State::row_of(Range range) const {
+  JudgedRange row{std::move(range), {}, {}};
+  row.time = row.range.time;
+  if (deps.judge) row.model = deps.judge(row.range);
+  row.range.cir.reset();  // a queued row needs none, and it is 4 kB
+  return row;
+}
+
 template <class R>
 void MissionService::State::accept(std::vector<R> rows) {
   const UtcTime now = deps.clock.now();
@@ -312,6 +339,7 @@ void MissionService::State::accept(std::vector<R> rows) {
   for (auto& row : rows) {
     if (!flight || flight->id != row.mission) flight = find(row.mission);
     if (!flight) continue;
+    Row judged = row_of(std::move(row));
     const std::scoped_lock lock(flight->queue_mutex);
     flight->last_arrival = now;
     if (flight->queue.size() >= k_max_queued_rows) {
@@ -319,7 +347,7 @@ void MissionService::State::accept(std::vector<R> rows) {
       ++flight->dropped;
       --queued;
     }
-    flight->queue.emplace_back(std::move(row));
+    flight->queue.push_back(std::move(judged));
     ++queued;
   }
   std::vector<std::shared_ptr<Flight>> all;
@@ -328,6 +356,22 @@ void MissionService::State::accept(std::vector<R> rows) {
     for (auto& [id, f] : flights) all.push_back(f);
   }
   for (auto& f : all) schedule(f);
+}
+
+bool MissionService::wants_cir() const {
+  return state_->deps.judge_needs_cir && state_->deps.judge_needs_cir();
+}
+
+void MissionService::note_in_flights(const std::string& code, const std::string& text) {
+  std::vector<MissionId> recording;
+  {
+    const std::scoped_lock lock(state_->mutex);
+    for (const auto& [id, flight] : state_->flights) {
+      const std::scoped_lock queue(flight->queue_mutex);
+      if (flight->mission.state == MissionState::recording) recording.push_back(id);
+    }
+  }
+  for (const auto& id : recording) state_->deps.events.add("info", code, text, id);
 }
 
 void MissionService::accepted(std::vector<Range> ranges) { state_->accept(std::move(ranges)); }
@@ -411,7 +455,8 @@ void MissionService::State::step(Flight& flight, const Row& row, bool quiet) {
   const UtcTime time = time_of(row);
   if (!state.started || time < *state.started) state.started = time;
   if (!(time < state.time) || state.n_ranges + state.n_fixes == 0) state.time = time;
-  if (const auto* range = std::get_if<Range>(&row)) {
+  if (const auto* judged = std::get_if<JudgedRange>(&row)) {
+    const Range* range = &judged->range;
     ++state.n_ranges;
     if (!quiet) {
       heard(range->tag, range->kind == RangeKind::tag_anchor, time);
@@ -422,9 +467,9 @@ void MissionService::State::step(Flight& flight, const Row& row, bool quiet) {
     const double span_s =
         static_cast<double>(flight.range_times_us.back() - flight.range_times_us.front()) * 1e-6;
     state.range_rate_hz = span_s > 0 ? static_cast<double>(flight.range_times_us.size() - 1) / span_s : 0;
-    flight.history.add(*range);
+    flight.history.add(corrected(*judged));
     ++flight.ranges_since_joint;
-    flight.live.add(*range);
+    flight.live.add(*range, judged->model);
     return;
   }
   const auto& fix = std::get<Fix>(row);

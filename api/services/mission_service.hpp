@@ -17,6 +17,7 @@
 #include "core/types/fix.hpp"
 #include "core/types/mission.hpp"
 #include "core/types/range.hpp"
+#include "core/types/range_model.hpp"
 
 namespace anchord {
 class AnchorStore;
@@ -48,6 +49,9 @@ class MissionService {
     std::function<void(std::function<void()>)> post;  ///< runs a task on the pool; may run it inline
     AccuracyGoal goal{};                              ///< an anchor within it is converged
     std::function<std::string()> device_rows{};       ///< more rows of topic `devices`, comma between them
+    /// What the promoted models say of a range; absent: ranges are used raw.
+    std::function<std::optional<RangeModel>(const Range&)> judge{};
+    std::function<bool()> judge_needs_cir{};
   };
   explicit MissionService(Deps deps);
   ~MissionService();
@@ -61,6 +65,10 @@ class MissionService {
   /// Before rows of this mission are stored: makes its live flight, and has what the store holds already read
   /// in by tasks of the pool, so that a restart in flight goes on where it was and no request waits for it.
   void prepare(const MissionId& id);
+  /// The promoted models want impulse responses: rows are accepted with them, and lose them once judged.
+  bool wants_cir() const;
+  /// An event in the record of every flight that records now.
+  void note_in_flights(const std::string& code, const std::string& text);
   /// Rows of one kind that were committed, in order of arrival.
   void accepted(std::vector<Range> ranges);
   void accepted(std::vector<Fix> fixes);

@@ -14,6 +14,12 @@
 #include "core/localize/live_anchor.hpp"
 
 namespace anchord {
+namespace {
+
+/// No model is believed beyond the noise of the radio itself: 2 cm at best.
+constexpr double k_least_sigma_m = 0.02;
+
+}  // namespace
 
 struct LiveFlight::State {
   Mission mission;
@@ -23,11 +29,13 @@ struct LiveFlight::State {
   std::deque<TrackPose> track;  ///< ascending; only as long as ranges may still ask for it
   struct Waiting {
     Range range;
+    std::optional<RangeModel> model;
     std::string told;  ///< why it counts as refused for now; empty while nobody was told
   };
   std::multimap<std::int64_t, Waiting> waiting;  ///< by time: ranges the track does not cover yet
   std::int64_t newest_range_ns{0}, told_until_ns{std::numeric_limits<std::int64_t>::min()};
   std::map<NetworkId, LiveAnchor> anchors;
+  std::map<NetworkId, LiveAnchor> uncorrected;  ///< those with corrected ranges, as they were without
   std::vector<RangeResult> results;
   std::set<NetworkId> changed;
   bool held{false};
@@ -70,7 +78,8 @@ struct LiveFlight::State {
   enum class Fate : std::uint8_t { decided, waits, outside, gap };
 
   /// Joins one range to the track as it is now; what is not decided may be, once more fixes have come.
-  Fate decide(const Range& range) {
+  Fate decide(const Waiting& entry) {
+    const Range& range = entry.range;
     const double t_s = seconds(range.time) + options.lag_s;
     if (track.empty()) return Fate::waits;
     if (t_s < track.front().t_s) return Fate::outside;
@@ -83,7 +92,7 @@ struct LiveFlight::State {
     } else if (const auto arm = lever_arm(range); !arm) {
       refuse(range, "unknown_tag");
     } else {
-      use(range, interpolate(*before, *after, t_s, *arm));
+      use(entry, interpolate(*before, *after, t_s, *arm));
     }
     return Fate::decided;
   }
@@ -98,7 +107,7 @@ struct LiveFlight::State {
   bool settle(Waiting& entry) {
     if (!epoch) return false;
     const std::string told = entry.told;
-    const Fate fate = decide(entry.range);
+    const Fate fate = decide(entry);
     if (fate == Fate::outside) tell(entry, "outside_track");
     if (fate == Fate::gap) tell(entry, "track_gap");
     if (fate == Fate::decided && !told.empty()) anchors.at(entry.range.anchor).forgive(told);
@@ -131,20 +140,32 @@ struct LiveFlight::State {
     }
   }
 
-  void use(const Range& range, const TagPoint& point) {
+  void use(const Waiting& entry, const TagPoint& point) {
+    const Range& range = entry.range;
+    const auto& model = entry.model;
     Observation row;
     row.tag_m = point.position_m;
     row.distance_m = range.distance_m;
     row.sigma_m = options.range_sigma_m;
     row.tag_covariance_m2 = point.covariance_m2;
     auto& anchor = anchors.try_emplace(range.anchor, range.anchor).first->second;
+    if (model && model->bias_m) {
+      // The same flight without the models, from its first corrected range on: what they change can be seen.
+      auto& raw = uncorrected.try_emplace(range.anchor, anchor).first->second;
+      raw.add(row, range.time, options, held);
+      row.distance_m -= *model->bias_m;
+      if (model->sigma_m) row.sigma_m = std::max(*model->sigma_m, k_least_sigma_m);
+    } else if (const auto raw = uncorrected.find(range.anchor); raw != uncorrected.end()) {
+      raw->second.add(row, range.time, options, held);
+    }
     if (anchor.add(row, range.time, options, held)) changed.insert(range.anchor);
     RangeResult result;
     result.range = range;
+    result.model = model;
     result.range.cir.reset();
     result.sigma_m = std::sqrt(row.sigma_m * row.sigma_m + point.covariance_m2.trace() / 3.0);
     result.tag_enu_m = point.position_m;
-    result.corrected_m = range.distance_m - anchor.correction_m(range.distance_m, options);
+    result.corrected_m = row.distance_m - anchor.correction_m(row.distance_m, options);
     result.residual_m = anchor.residual_m(row, options);
     keep(std::move(result));
   }
@@ -185,7 +206,7 @@ void LiveFlight::add(const Fix& fix) {
   if (s.track.size() > s.options.max_track) s.track.pop_front();
 }
 
-void LiveFlight::add(const Range& range) {
+void LiveFlight::add(const Range& range, const std::optional<RangeModel>& model) {
   State& s = *state_;
   if (range.kind != RangeKind::tag_anchor) return;
   if (!std::isfinite(range.distance_m) || range.distance_m < 0.05) {
@@ -202,7 +223,7 @@ void LiveFlight::add(const Range& range) {
     return;
   }
   while (s.seen.size() > 4 * s.options.max_waiting) s.seen.erase(s.seen.begin());
-  State::Waiting entry{range, {}};
+  State::Waiting entry{range, model, {}};
   entry.range.cir.reset();
   if (!s.settle(entry)) s.park(std::move(entry));
 }
@@ -225,6 +246,7 @@ void LiveFlight::hold(bool held) {
   for (auto& [id, anchor] : s.anchors) {
     if (anchor.solve(s.options)) s.changed.insert(id);
   }
+  for (auto& [id, anchor] : s.uncorrected) (void)anchor.solve(s.options);
 }
 
 void LiveFlight::finish() {
@@ -233,6 +255,7 @@ void LiveFlight::finish() {
   for (auto& [id, anchor] : state_->anchors) {
     if (anchor.solve(state_->options)) state_->changed.insert(id);
   }
+  for (auto& [id, anchor] : state_->uncorrected) (void)anchor.solve(state_->options);
 }
 
 std::vector<RangeResult> LiveFlight::take_ranges() { return std::exchange(state_->results, {}); }
@@ -249,6 +272,15 @@ std::vector<Estimate> LiveFlight::estimates() const {
   std::vector<Estimate> all;
   for (const auto& [id, anchor] : state_->anchors) all.push_back(anchor.estimate(state_->frame));
   return all;
+}
+
+std::optional<double> LiveFlight::uncorrected_shift_m(NetworkId anchor) const {
+  const auto raw = state_->uncorrected.find(anchor);
+  if (raw == state_->uncorrected.end()) return std::nullopt;
+  const auto with = state_->anchors.at(anchor).estimate(state_->frame),
+             without = raw->second.estimate(state_->frame);
+  if (!with.best || !without.best) return std::nullopt;
+  return (with.best->position.m - without.best->position.m).norm();
 }
 
 std::optional<LivePose> LiveFlight::pose() const { return state_->pose; }

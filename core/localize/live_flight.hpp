@@ -11,6 +11,7 @@
 #include "core/types/fix.hpp"
 #include "core/types/mission.hpp"
 #include "core/types/range.hpp"
+#include "core/types/range_model.hpp"
 
 namespace anchord {
 
@@ -19,10 +20,12 @@ struct FlightSolution;
 /// What became of one live range.
 struct RangeResult {
   Range range;                         ///< as received, without its CIR
+  std::optional<RangeModel> model{};   ///< what the promoted models said of it
   std::string refused;                 ///< reason word; empty when used
   std::optional<double> residual_m{};  ///< against the anchor's current estimate
   std::optional<double> sigma_m{};
-  std::optional<double> corrected_m{};  ///< less the bias, curve and unit delay known by then
+  std::optional<double>
+      corrected_m{};  ///< less what the model told, and the bias, curve and delay known by then
   std::optional<Eigen::Vector3d> tag_enu_m{};
   bool used() const { return refused.empty(); }
 };
@@ -65,7 +68,8 @@ class LiveFlight {
   LiveFlight& operator=(LiveFlight&&) noexcept;
 
   void add(const Fix& fix);
-  void add(const Range& range);
+  /// `model`: its correction is taken off and its sigma used, before anything is solved.
+  void add(const Range& range, const std::optional<RangeModel>& model = {});
   /// A joint solution of this flight's rows up to `cut`: its bias and lag hold from now on, and its positions
   /// are what later ranges refine. Solved in the frame of origin().
   void adopt(const FlightSolution& solution, UtcTime cut);
@@ -81,6 +85,9 @@ class LiveFlight {
   std::vector<Estimate> take_estimates();
   /// Newest answer of every anchor heard.
   std::vector<Estimate> estimates() const;
+  /// How far an anchor stands from where the same ranges put it without the models. Nothing where no range of
+  /// it was corrected.
+  std::optional<double> uncorrected_shift_m(NetworkId anchor) const;
   std::optional<LivePose> pose() const;
   std::optional<Wgs84> origin()
       const;  ///< of the ENU numbers; none in a local frame or before the first good fix

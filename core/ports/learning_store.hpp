@@ -67,6 +67,19 @@ class CampaignStore {
   virtual Result<StoredSample> sample(const CampaignId& campaign, std::int64_t id) = 0;  ///< with its CIR
 };
 
+/// Ground truth of ranges of a flight, told afterwards.
+class LabelStore {
+ public:
+  virtual ~LabelStore() = default;
+  struct Filter {
+    MissionId mission{};
+    std::optional<NetworkId> anchor{}, tag{};
+    std::optional<UtcTime> since{}, until{};  ///< until: not included
+  };
+  /// Overwrites what is given of the truth; how many ranges it was. not_found: no such mission.
+  virtual Result<std::uint64_t> label(const Filter& filter, const RangeTruth& truth) = 0;
+};
+
 /// A frozen query: its rows never change, and its digest proves it.
 struct DatasetRecord {
   DatasetId id{};

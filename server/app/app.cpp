@@ -20,6 +20,7 @@
 #include "server/runtime/device_manager.hpp"
 #include "server/runtime/logging.hpp"
 #include "server/runtime/worker_pool.hpp"
+#include "server/runtime/worker_process.hpp"
 #include "server/storage/sqlite_database.hpp"
 
 namespace anchord::server {
@@ -91,6 +92,7 @@ struct App::State {
   std::unique_ptr<api::AccessService> access;
   std::unique_ptr<WorkerPool> pool, stream_pool, live_pool;
   std::unique_ptr<DeviceManager> devices;
+  std::unique_ptr<api::LearningStores> learning;
   std::unique_ptr<api::Application> application;
   std::unique_ptr<FrontDoor> door;
   std::unique_ptr<HttpServer> http;
@@ -213,6 +215,11 @@ void App::State::compose() {
   deps.frames = &database->frames();
   deps.goal = {config.metres("goal.h95_m"), config.metres("goal.v95_m")};
   deps.devices = devices.get();
+  learning = std::make_unique<api::LearningStores>(
+      api::LearningStores{database->campaigns(), database->labels(), database->datasets(),
+                          database->training_runs(), database->models()});
+  deps.learning = learning.get();
+  deps.run_work = work_in_process();
   deps.post = [this](std::function<void()> task) {
     if (!live_pool->try_submit(task)) task();  // a full queue slows the sender, loses nothing
   };

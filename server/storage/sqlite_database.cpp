@@ -53,6 +53,7 @@ class SqliteDatabase final : public Database, private sql::Gate {
         jobs_(sql::make_job_store(*this)),
         access_(sql::make_access_store(*this)),
         campaigns_(sql::make_campaign_store(*this)),
+        labels_(sql::make_label_store(*this)),
         datasets_(sql::make_dataset_store(*this)),
         training_runs_(sql::make_training_run_store(*this)),
         models_(sql::make_model_store(*this)),
@@ -72,6 +73,7 @@ class SqliteDatabase final : public Database, private sql::Gate {
   JobStore& jobs() override { return *jobs_; }
   AccessStore& access() override { return *access_; }
   CampaignStore& campaigns() override { return *campaigns_; }
+  LabelStore& labels() override { return *labels_; }
   DatasetStore& datasets() override { return *datasets_; }
   TrainingRunStore& training_runs() override { return *training_runs_; }
   ModelStore& models() override { return *models_; }
@@ -165,6 +167,7 @@ class SqliteDatabase final : public Database, private sql::Gate {
   std::unique_ptr<JobStore> jobs_;
   std::unique_ptr<AccessStore> access_;
   std::unique_ptr<CampaignStore> campaigns_;
+  std::unique_ptr<LabelStore> labels_;
   std::unique_ptr<DatasetStore> datasets_;
   std::unique_ptr<TrainingRunStore> training_runs_;
   std::unique_ptr<ModelStore> models_;

@@ -74,6 +74,7 @@ class Database {
   virtual JobStore& jobs() = 0;
   virtual AccessStore& access() = 0;
   virtual CampaignStore& campaigns() = 0;
+  virtual LabelStore& labels() = 0;
   virtual DatasetStore& datasets() = 0;
   virtual TrainingRunStore& training_runs() = 0;
   virtual ModelStore& models() = 0;

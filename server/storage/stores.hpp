@@ -24,6 +24,7 @@ std::unique_ptr<TokenStore> make_token_store(Gate& gate);
 std::unique_ptr<JobStore> make_job_store(Gate& gate);
 std::unique_ptr<AccessStore> make_access_store(Gate& gate);
 std::unique_ptr<CampaignStore> make_campaign_store(Gate& gate);
+std::unique_ptr<LabelStore> make_label_store(Gate& gate);
 std::unique_ptr<DatasetStore> make_dataset_store(Gate& gate);
 std::unique_ptr<TrainingRunStore> make_training_run_store(Gate& gate);
 std::unique_ptr<ModelStore> make_model_store(Gate& gate);

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "api/application.hpp"
@@ -38,6 +39,8 @@ class AppFixture : public ::testing::Test {
     auto opened = open_database(options);
     ASSERT_TRUE(opened.has_value()) << opened.error().message;
     database_ = std::move(opened).value();
+    learning_.emplace(api::LearningStores{database_->campaigns(), database_->labels(), database_->datasets(),
+                                          database_->training_runs(), database_->models()});
     api::Application::Deps deps{database_->measurements(),   database_->missions(), database_->anchors(),
                                 database_->jobs(),           database_->access(),   clock_,
                                 {"0.1.0", "test", "", "", 1}};
@@ -46,6 +49,7 @@ class AppFixture : public ::testing::Test {
     deps.frames = &database_->frames();
     deps.post = std::move(post);
     deps.goal = goal;
+    deps.learning = &*learning_;
     app_ = std::make_unique<api::Application>(std::move(deps));
     app_->start();
   }
@@ -111,6 +115,7 @@ class AppFixture : public ::testing::Test {
   SystemClock clock_;
   std::filesystem::path dir_;
   std::unique_ptr<Database> database_;
+  std::optional<api::LearningStores> learning_;
   std::unique_ptr<api::Application> app_;
 };
 

@@ -39,6 +39,7 @@ TEST_F(Contract, EveryOperationHasARouteAndEveryRouteAnOperation) {
                               &access};
   deps.kits = &database_->kits();
   deps.frames = &database_->frames();
+  deps.learning = &*learning_;
   api::Application app(std::move(deps));
   std::set<std::string> served;
   for (const auto& route : app.router().routes())

@@ -1,12 +1,12 @@
 // ./dev bench: one table. Every figure of ours stands beside a peer or a limit taken in the same run.
-//   node tests/bench/bench.mjs [solve] [ingest] [get] [fanout]
+//   node tests/bench/bench.mjs [solve] [ingest] [get] [fanout] [training]
 import { execFileSync } from 'node:child_process';
 import { createServer } from 'node:http';
-import { existsSync, mkdtempSync, rmSync } from 'node:fs';
+import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { LiveClient } from '../e2e/live.mjs';
-import { eventually, run, startServer } from '../e2e/server.mjs';
+import { eventually, root, run, startServer } from '../e2e/server.mjs';
 import { cpuSeconds, hammer, percentile, request } from './load.mjs';
 
 const wanted = process.argv.slice(2);
@@ -124,11 +124,12 @@ async function get(server) {
   row('GET of one anchor, 4 connections', `${Math.round(ours.perSecond)} a second, p99 ${ours.p99Ms.toFixed(2)} ms, ${perRequest.toFixed(0)} us CPU`, `the same bytes from a bare Node server in the generator's process ${Math.round(plain.perSecond)}`);
 }
 
-async function fanout(server) {
-  const id = await newMission(server, 'bench fan-out');
+/** 100 ranges a second, 5 s long, to `count` clients: how late each delivery came, in ms. */
+async function liveLatency(server, name, count) {
+  const id = await newMission(server, name);
   const clients = [], late = [];
   let gaps = 0;
-  for (let i = 0; i < 50; i++) {
+  for (let i = 0; i < count; i++) {
     const client = await LiveClient.open(server);
     client.socket.on('message', (data) => {
       const now = (performance.timeOrigin + performance.now()) * 1000;
@@ -164,9 +165,39 @@ async function fanout(server) {
   const want = sent * clients.length;
   await eventually('every delivery', () => late.length >= want * 0.99, 5000).catch(() => {});
   const share = (cpuSeconds(server.pid) - cpu) / ((performance.now() - start) / 1000);
-  row('fan-out of 100 ranges/s to 50 clients', `p50 ${percentile(late, 0.5)?.toFixed(1)} ms, p99 ${percentile(late, 0.99)?.toFixed(1)} ms, ${late.length} of ${want} delivered, ${gaps} gaps, ${(share * 100).toFixed(0)} % of a core`,
-    'from the stamp in the row to the parsed message, fsync and the wait for the next fix (50 ms) included');
   for (const client of clients) client.terminate();
+  return { late, want, gaps, share, p50: percentile(late, 0.5) ?? NaN, p99: percentile(late, 0.99) ?? NaN };
+}
+
+async function fanout(server) {
+  const { late, want, gaps, share, p50, p99 } = await liveLatency(server, 'bench fan-out', 50);
+  row('fan-out of 100 ranges/s to 50 clients', `p50 ${p50.toFixed(1)} ms, p99 ${p99.toFixed(1)} ms, ${late.length} of ${want} delivered, ${gaps} gaps, ${(share * 100).toFixed(0)} % of a core`,
+    'from the stamp in the row to the parsed message, fsync and the wait for the next fix (50 ms) included');
+}
+
+/** Live ranges with and without a grid search that keeps every core busy. */
+async function training(server) {
+  const send = async (path, init, status) => {
+    const answer = await server.fetch(path, init);
+    const text = await answer.text();
+    if (answer.status !== status) throw new Error(`${path}: ${answer.status} ${text.slice(0, 300)}`);
+    return JSON.parse(text);
+  };
+  await send('/api/v1/campaigns', { json: { name: 'bench' } }, 201);
+  const csv = readFileSync(join(root, 'docs/examples/campaign.csv'));
+  await send('/api/v1/campaigns/bench/samples', { method: 'POST', headers: { 'content-type': 'text/csv' }, body: csv }, 200);
+  await send('/api/v1/datasets', { json: { name: 'bench', campaigns: ['bench'], aggregation: 'none' } }, 201);
+  const quiet = await liveLatency(server, 'bench without training', 4);
+  const values = (n, from, step) => Array.from({ length: n }, (_, i) => Number((from * step ** i).toPrecision(6)));
+  const job = await send('/api/v1/training-runs', { json: { task: 'nlos_id', dataset: 'bench', methods: ['svm'], importance: false,
+    grid: { svm: { c: values(90, 0.1, 1.1), gamma: values(90, 0.001, 1.1) } } } }, 202);
+  const now = () => send(`/api/v1/jobs/${job.id}`, {}, 200);
+  await eventually('the search runs', async () => (await now()).progress.stage === 'search', 30_000);
+  const busy = await liveLatency(server, 'bench with training', 4);
+  const still = (await now()).state;
+  await server.fetch(`/api/v1/jobs/${job.id}`, { method: 'DELETE' });
+  row('live range, 100/s to 4 clients, beside a grid search', `p50 ${busy.p50.toFixed(1)} ms, p99 ${busy.p99.toFixed(1)} ms (search ${still})`,
+    `without it p50 ${quiet.p50.toFixed(1)} ms, p99 ${quiet.p99.toFixed(1)} ms`);
 }
 
 if (on('planner')) {
@@ -177,10 +208,10 @@ if (on('solve')) {
   say('solving');
   solve();
 }
-if (['ingest', 'get', 'fanout'].some(on)) {
+if (['ingest', 'get', 'fanout', 'training'].some(on)) {
   const server = await startServer();
   try {
-    for (const [name, task] of [['ingest', ingest], ['get', get], ['fanout', fanout]]) {
+    for (const [name, task] of [['ingest', ingest], ['get', get], ['fanout', fanout], ['training', training]]) {
       if (!on(name)) continue;
       say(name);
       await task(server).catch((error) => {

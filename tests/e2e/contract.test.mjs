@@ -1,10 +1,12 @@
 // Every operation of api/openapi.yaml is called at least once, and every answer is one that the document promises:
 // status, content type, required headers, body. Wrong requests too, since clients meet those answers most.
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { Contract, checked } from './contract.mjs';
 import { ndjson, simulatedFlight } from './flight.mjs';
-import { startServer } from './server.mjs';
+import { root, startServer } from './server.mjs';
 
 const contract = new Contract();
 let server, call, flight;
@@ -71,11 +73,45 @@ test('plans: made, generated, imported, checked, changed, exported', async () =>
   await call('DELETE', `/api/v1/plans/${ids.sparePlan}`, { expect: 204, headers: { 'if-match': '"p-1"' } });
 });
 
+test('a campaign, a data set, a training run, a model', async () => {
+  const merge = { 'content-type': 'application/merge-patch+json' };
+  const made = await call('POST', '/api/v1/campaigns', { expect: 201, json: { name: 'contract' } });
+  ids.campaign = made.json.id;
+  await call('PATCH', `/api/v1/campaigns/${ids.campaign}`, { expect: 428, headers: merge, body: '{"note":"x"}' });
+  await call('PATCH', `/api/v1/campaigns/${ids.campaign}`, { expect: 200, headers: { ...merge, 'if-match': made.headers.get('etag') }, body: '{"note":"x"}' });
+  const csv = { headers: { 'content-type': 'text/csv' }, body: readFileSync(join(root, 'docs/examples/campaign.csv'), 'utf8') };
+  await call('POST', `/api/v1/campaigns/${ids.campaign}/samples`, { expect: 200, ...csv });
+  await call('GET', `/api/v1/campaigns/${ids.campaign}/samples?features=true&los=true`, { expect: 200 });
+  await call('PATCH', `/api/v1/ranges?mission=${ids.spare}`, { expect: 200, json: { los: true, distance_m: 8.9 } });
+  ids.dataset = (await call('POST', '/api/v1/datasets', { expect: 201, json: { name: 'contract', campaigns: ['contract'], split: { test: ['room 6'] } } })).json.id;
+  const rows = (await call('GET', `/api/v1/datasets/${ids.dataset}/rows?format=csv`, { expect: 200 })).text;
+  await call('GET', `/api/v1/datasets/${ids.dataset}/rows?format=ndjson`, { expect: 200 });
+  const copy = (await call('POST', '/api/v1/datasets?name=copy', { expect: 201, headers: csv.headers, body: rows })).json;
+  await call('DELETE', `/api/v1/datasets/${copy.id}`, { expect: 204 });
+  const train = (task, methods) => call('POST', '/api/v1/training-runs', { expect: 201, headers: { prefer: 'wait=120' }, json: { task, dataset: 'contract', methods, cv: { folds: 3, seed: 1 } } });
+  const bias = (await train('los_bias', ['constant'])).json;
+  const run = (await train('nlos_id', ['logistic'])).json;
+  ids.run = run.id;
+  ids.model = run.model.split('/').at(-1);
+  await call('POST', '/api/v1/training-runs', { expect: 422, json: { task: 'nlos_id', dataset: 'nowhere', methods: ['magic'] } });
+  await call('POST', `/api/v1/training-runs/${ids.run}/restart`, { expect: 422 });
+  await call('DELETE', `/api/v1/training-runs/${bias.id}`, { expect: 204 });
+  await call('DELETE', bias.model, { expect: 204 });
+  await call('POST', `/api/v1/models/${ids.model}/promote`, { expect: 200, json: { reason: 'contract' } });
+  await call('PATCH', '/api/v1/models/active', { expect: 200, json: { correction: 'hard' } });
+  await call('POST', '/api/v1/models/active/predict', { expect: 200, json: { sample: { distance_m: 5, rx_dbm: -80, fp_dbm: -83, std_noise: 45 } } });
+  await call('POST', `/api/v1/models/${ids.model}/predict`, { expect: 200, json: { samples: [{ distance_m: 5 }] } });
+  const artifact = (await call('GET', `/api/v1/models/${ids.model}/artifact`, { expect: 200 })).json;
+  await call('POST', '/api/v1/models', { expect: 201, json: artifact });
+  await call('POST', '/api/v1/models', { expect: 422, headers: { 'content-type': 'application/json' }, body: '{"format":"pickle"}' });
+});
+
 test('everything that can be read', async () => {
   ids.job = (await call('GET', '/api/v1/jobs', { expect: 200 })).json.items[0]?.id;
   ids.range = (await call('GET', `/api/v1/ranges?mission=${ids.spare}`, { expect: 200 })).json.items[0].id;
   ids.anchor = '0x6a21';
-  const given = { '/sites/': ids.site, '/missions/': ids.mission, '/ranges/': ids.range, '/anchors/': ids.anchor, '/calibrations/': ids.calibration, '/jobs/': ids.job, '/plans/': ids.plan, '/devices/': flight.mission.kit, '/frames/': ids.frame, '/revisions/': '1' };
+  const given = { '/sites/': ids.site, '/missions/': ids.mission, '/ranges/': ids.range, '/anchors/': ids.anchor, '/calibrations/': ids.calibration, '/jobs/': ids.job, '/plans/': ids.plan, '/devices/': flight.mission.kit, '/frames/': ids.frame, '/revisions/': '1',
+    '/campaigns/': ids.campaign, '/datasets/': ids.dataset, '/training-runs/': ids.run, '/models/': ids.model };
   const wrong = [];  // all at once, as a person wants them
   for (const { method, template } of contract.operations.filter((o) => o.method === 'get')) {
     if (template === '/api/v1/ws') continue;  // its own test below
@@ -127,6 +163,8 @@ test('what can be deleted', async () => {
     assert.ok(answer.status < 300, `${path}: ${answer.status} ${answer.text}`);
   }
   await call('DELETE', `/api/v1/jobs/${ids.job}`);
+  await call('POST', '/api/v1/models/rollback', { expect: 200, json: { task: 'nlos_id' } });
+  await call('DELETE', `/api/v1/campaigns/${ids.campaign}`, { expect: 204 });
   await call('DELETE', `/api/v1/calibrations/${ids.calibration}`);
 });
 

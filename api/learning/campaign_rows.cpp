@@ -1,0 +1,112 @@
+#include "api/learning/campaign_rows.hpp"
+
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "api/http/problem.hpp"
+#include "api/imports/campaign.hpp"
+#include "api/routes/support.hpp"
+
+namespace anchord::api {
+namespace {
+
+using Ordered = nlohmann::ordered_json;
+
+std::optional<double> query_number(const Request& request, const char* name, double low, double high) {
+  const auto text = request.query_value(name);
+  if (!text) return std::nullopt;
+  double value = 0;
+  const auto [end, status] = std::from_chars(text->data(), text->data() + text->size(), value);
+  if (status != std::errc{} || end != text->data() + text->size() || !(value >= low && value <= high))
+    throw_problem(422, "validation", std::string(name) + " must be a number",
+                  {{std::string("/") + name, "bad_value",
+                    "must be " + std::to_string(low) + ".." + std::to_string(high)}});
+  return value;
+}
+
+CampaignFormat format_of(const Request& request) {
+  std::string_view type = request.header("content-type");
+  type = type.substr(0, type.find(';'));
+  if (type == "text/csv") return CampaignFormat::csv;
+  if (type == "application/x-ndjson" || type == "application/ndjson" || type == "application/jsonl")
+    return CampaignFormat::ndjson;
+  if (type == "text/plain") return CampaignFormat::txt;
+  throw_problem(415, "media-type", "send Content-Type text/csv, application/x-ndjson or text/plain");
+}
+
+/// Settings are told apart by their names; where the source gives none, by what is true of them.
+std::string name_of(const CampaignSite& site) {
+  if (!site.name.empty()) return site.name;
+  const auto part = [](const std::optional<double>& value) {
+    return value ? nlohmann::json(*value).dump() : std::string("-");
+  };
+  return site.environment + "/" + part(site.distance_m) + "/" + part(site.heading_deg) + "/" +
+         part(site.height_m) + "/" + site.material + "/" + part(site.thickness_m) + "/" +
+         (site.los ? (*site.los ? "los" : "nlos") : "-");
+}
+
+Ordered report_json(const CampaignReport& report) {
+  Ordered dropped = Ordered::array(), errors = Ordered::array(), settings = Ordered::array();
+  for (const auto& [reason, n] : report.dropped) dropped.push_back({{"reason", reason}, {"count", n}});
+  for (const auto& error : report.errors) errors.push_back({{"line", error.line}, {"detail", error.detail}});
+  for (const auto& site : report.sites)
+    settings.push_back({{"setting", site.name},
+                        {"kept", site.kept},
+                        {"zero", site.zero},
+                        {"outliers", site.outliers},
+                        {"median_m", site.median_m},
+                        {"sd_m", site.sd_m}});
+  return {{"read", report.lines},
+          {"kept", report.kept},
+          {"dropped", std::move(dropped)},
+          {"errors", std::move(errors)},
+          {"settings", std::move(settings)}};
+}
+
+}  // namespace
+
+CampaignRows read_campaign_rows(const Request& request) {
+  CampaignOptions options;
+  options.format = format_of(request);
+  auto& d = options.defaults;
+  d.name = request.query_value("setting").value_or("");
+  d.environment = request.query_value("environment").value_or("");
+  d.material = request.query_value("material").value_or("");
+  d.distance_m = query_number(request, "distance_m", 0.01, 10'000);
+  d.heading_deg = query_number(request, "heading_deg", -720, 720);
+  d.height_m = query_number(request, "height_difference_m", -1000, 1000);
+  d.thickness_m = query_number(request, "thickness_m", 0, 100);
+  if (request.query_value("los")) d.los = query_flag(request, "los");
+  const auto read = import_campaign(request.body, options);
+  if (!read)
+    throw_problem(422, "validation", read.error().message, {{"", "unreadable", read.error().message}});
+  const auto& campaign = read.value().campaign;
+  CampaignRows out;
+  out.report_json = report_json(read.value().report).dump(-1, ' ', false, Ordered::error_handler_t::replace);
+  for (const auto& m : campaign.measurements) {
+    const auto& site = campaign.sites[m.site];
+    CampaignRow row;
+    auto& t = row.truth;
+    t.setting = name_of(site);
+    t.environment = site.environment;
+    t.distance_m = site.distance_m, t.los = site.los;
+    t.heading_deg = site.heading_deg, t.height_difference_m = site.height_m;
+    t.material = site.material, t.thickness_m = site.thickness_m, t.truth_sigma_m = site.truth_sd_m;
+    auto& x = row.sample;
+    if (m.t_s && *m.t_s > 0 && *m.t_s < 4e9) {
+      // Several rangings may share one stamp; the line tells them apart, and the same file again is the same.
+      x.time = UtcTime::from_seconds(*m.t_s);
+      x.seq = m.line;
+    }
+    x.range_m = m.range_m;
+    x.rx_dbm = m.rx_dbm, x.fp_dbm = m.fp_dbm;
+    x.fp_amp1 = m.fp_amp1, x.fp_amp2 = m.fp_amp2, x.fp_amp3 = m.fp_amp3;
+    x.cir_power = m.cir_power, x.preamble_count = m.preamble_count;
+    x.std_noise = m.std_noise, x.max_noise = m.max_noise, x.fp_index = m.fp_index;
+    out.rows.push_back(std::move(row));
+  }
+  return out;
+}
+
+}  // namespace anchord::api

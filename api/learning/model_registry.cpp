@@ -1,0 +1,136 @@
+#include "api/learning/model_registry.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "api/json/model_artifact.hpp"
+#include "api/learning/range_features.hpp"
+
+namespace anchord::api {
+namespace {
+
+using nlos::Feature;
+
+/// Features only an impulse response gives.
+constexpr std::array k_of_cir{Feature::kurtosis, Feature::mean_excess_delay_ns, Feature::rms_delay_spread_ns,
+                              Feature::early_energy, Feature::peak_delay_ns};
+
+Result<std::shared_ptr<const ml::Model>> read_model(ModelStore& store, const ModelId& id) {
+  BOOST_OUTCOME_TRY(const auto text, store.artifact(id));
+  BOOST_OUTCOME_TRY(auto model, read_model_artifact(text));
+  return std::make_shared<const ml::Model>(std::move(model));
+}
+
+std::shared_ptr<const ml::Model>* slot(ml::ModelSet& set, const std::string& task) {
+  if (task == "nlos_id") return &set.nlos_id;
+  if (task == "los_bias") return &set.los_bias;
+  if (task == "nlos_bias") return &set.nlos_bias;
+  if (task == "bias") return &set.bias;
+  return nullptr;
+}
+
+void put_lacking(const ml::Model* model, const nlos::FeatureVector& features, std::string& out) {
+  if (model == nullptr) return;
+  for (const auto& name : model->info.features) {
+    const auto feature = nlos::feature_of(name);
+    if (feature && features.get(*feature)) continue;
+    if (out.find(name) == std::string::npos) out += (out.empty() ? "" : ", ") + name;
+  }
+}
+
+}  // namespace
+
+std::string_view correction_word(ml::Correction how) {
+  switch (how) {
+    case ml::Correction::weighted:
+      return "weighted";
+    case ml::Correction::hard:
+      return "hard";
+    case ml::Correction::none:
+      return "none";
+  }
+  return "weighted";
+}
+
+std::optional<ml::Correction> correction_of(std::string_view word) {
+  if (word == "weighted") return ml::Correction::weighted;
+  if (word == "hard") return ml::Correction::hard;
+  if (word == "none") return ml::Correction::none;
+  return std::nullopt;
+}
+
+Result<ModelRegistry::Active> load_models(ModelStore& store, const std::map<std::string, ModelId>& models,
+                                          ml::Correction how) {
+  ModelRegistry::Active out;
+  out.correction = how;
+  ml::ModelSet set;
+  for (const auto& [task, id] : models) {
+    auto* place = slot(set, task);
+    if (place == nullptr) return make_error(Errc::invalid_argument, "there is no task " + task);
+    BOOST_OUTCOME_TRY(*place, read_model(store, id));
+    out.models[task] = id;
+    for (const auto& name : (*place)->info.features) {
+      const auto feature = nlos::feature_of(name);
+      out.needs_cir |= feature && std::find(k_of_cir.begin(), k_of_cir.end(), *feature) != k_of_cir.end();
+    }
+  }
+  BOOST_OUTCOME_TRY(out.predictor, ml::Predictor::make(std::move(set)));
+  return out;
+}
+
+ModelRegistry::ModelRegistry(ModelStore& store) : store_(store), active_(std::make_shared<const Active>()) {}
+
+std::shared_ptr<const ModelRegistry::Active> ModelRegistry::active() const {
+  const std::scoped_lock lock(mutex_);
+  return active_;
+}
+
+Result<void> ModelRegistry::reload() {
+  BOOST_OUTCOME_TRY(const auto promotions, store_.active());
+  std::map<std::string, ModelId> wanted;
+  ml::Correction how = ml::Correction::weighted;
+  for (const auto& one : promotions) {
+    if (one.task == k_correction_task)
+      how = correction_of(one.reason).value_or(how);
+    else if (one.model)
+      wanted[one.task] = *one.model;
+  }
+  auto loaded = load_models(store_, wanted, how);
+  Active next;
+  if (loaded) {
+    next = std::move(loaded).value();
+  } else {
+    // A stored model of an older program: fly without it, and say so, rather than not at all.
+    next.correction = how;
+    next.fault = loaded.error().message;
+  }
+  const std::scoped_lock lock(mutex_);
+  active_ = std::make_shared<const Active>(std::move(next));
+  return boost::outcome_v2::success();
+}
+
+RangeJudgement ModelRegistry::judge(const Active& active, const nlos::FeatureVector& features) {
+  RangeJudgement out;
+  if (active.predictor.empty()) {
+    out.note = active.fault.empty() ? "no model is promoted" : active.fault;
+    return out;
+  }
+  out.verdict = active.predictor.judge(features, active.correction);
+  if (!out.verdict.p_los && !out.verdict.bias_m) {
+    std::string lacking;
+    const auto& set = active.predictor.models();
+    for (const auto& model : {set.nlos_id, set.los_bias, set.nlos_bias, set.bias})
+      put_lacking(model.get(), features, lacking);
+    out.note = lacking.empty() ? "the promoted models give no class" : "the range lacks " + lacking;
+  }
+  return out;
+}
+
+std::optional<RangeModel> judge_range(const ModelRegistry::Active& active, const Range& range) {
+  if (active.predictor.empty() || range.kind != RangeKind::tag_anchor) return std::nullopt;
+  const auto verdict = active.predictor.judge(features_of(range), active.correction);
+  if (!verdict.p_los && !verdict.bias_m) return std::nullopt;
+  return RangeModel{verdict.los, verdict.p_los, verdict.bias_m, verdict.sigma_m, verdict.outside_training};
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/ml/predictor.hpp"
+#include "core/ports/learning_store.hpp"
+#include "core/types/range.hpp"
+#include "core/types/range_model.hpp"
+
+namespace anchord::api {
+
+/// What the promoted models say about one range, or why they say nothing.
+struct RangeJudgement {
+  ml::RangeVerdict verdict{};
+  std::string note;  ///< empty when classified: "no model is promoted", "lacks std_noise ..."
+};
+
+/// Which models are active, ready for use. Thread-safe: a promotion takes effect at the next range judged.
+class ModelRegistry {
+ public:
+  explicit ModelRegistry(ModelStore& store);
+
+  struct Active {
+    ml::Predictor predictor{};
+    std::map<std::string, ModelId> models{};  ///< by task
+    ml::Correction correction{ml::Correction::weighted};
+    bool needs_cir{false};
+    std::string fault{};  ///< why a promoted model is not in use
+  };
+  /// Never null.
+  std::shared_ptr<const Active> active() const;
+  /// After a promotion, and at the start. A model that cannot be used leaves its task without one, and
+  /// `fault` says so.
+  Result<void> reload();
+
+  static RangeJudgement judge(const Active& active, const nlos::FeatureVector& features);
+
+ private:
+  ModelStore& store_;
+  mutable std::mutex mutex_;
+  std::shared_ptr<const Active> active_;
+};
+
+/// In the form a flight keeps with the range. Nothing where the models say nothing.
+std::optional<RangeModel> judge_range(const ModelRegistry::Active& active, const Range& range);
+
+std::string_view correction_word(ml::Correction how);
+std::optional<ml::Correction> correction_of(std::string_view word);
+/// Promotions of this "task" say which correction is in use, in their reason.
+inline constexpr std::string_view k_correction_task = "correction";
+
+/// Active in place of the given ones where `overrides` names another; an absent id is no model. For a
+/// calibration with models of its choice.
+Result<ModelRegistry::Active> load_models(ModelStore& store, const std::map<std::string, ModelId>& models,
+                                          ml::Correction how);
+
+}  // namespace anchord::api

@@ -1,0 +1,41 @@
+#include "api/learning/range_features.hpp"
+
+namespace anchord::api {
+namespace {
+
+void take_cir(const std::optional<Cir>& cir, nlos::DiagnosticSample& s) {
+  if (!cir) return;
+  nlos::CirOptions options;
+  if (cir->dt_ps > 0) options.tap_ns = cir->dt_ps * 1e-3;
+  s.cir = nlos::cir_shape(std::span<const std::int16_t>(cir->re_im), cir->first_path_idx, options);
+  if (!s.preamble_count) s.preamble_count = cir->preamble_count;
+  if (!s.fp_index) s.fp_index = cir->first_path_idx;
+}
+
+}  // namespace
+
+nlos::FeatureVector features_of(const Range& range) {
+  nlos::DiagnosticSample s;
+  s.range_m = range.distance_m;
+  s.rx_dbm = range.rx_dbm ? range.rx_dbm : range.rss_dbm;
+  s.fp_dbm = range.fp_dbm;
+  s.std_noise = range.std_noise;
+  s.heading_deg = range.heading_deg;
+  take_cir(range.cir, s);
+  return nlos::compute_features(s);
+}
+
+nlos::FeatureVector features_of(const CampaignSample& x, const GroundTruth& truth) {
+  nlos::DiagnosticSample s;
+  s.range_m = x.range_m;
+  s.rx_dbm = x.rx_dbm, s.fp_dbm = x.fp_dbm;
+  s.fp_amp1 = x.fp_amp1, s.fp_amp2 = x.fp_amp2, s.fp_amp3 = x.fp_amp3;
+  s.cir_power = x.cir_power, s.preamble_count = x.preamble_count;
+  s.std_noise = x.std_noise, s.max_noise = x.max_noise;
+  s.fp_index = x.fp_index;
+  s.heading_deg = truth.heading_deg, s.height_difference_m = truth.height_difference_m;
+  take_cir(x.cir, s);
+  return nlos::compute_features(s);
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,96 @@
+#include "api/learning/training_service.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "api/json/model_artifact.hpp"
+#include "api/services/event_log.hpp"
+#include "api/services/job_service.hpp"
+#include "core/base/sha256.hpp"
+
+namespace anchord::api {
+namespace {
+
+using Json = nlohmann::json;
+
+}  // namespace
+
+std::string manifest_of(const std::string& artifact) {
+  const auto json = Json::parse(artifact, nullptr, false);
+  return json.is_object() && json.contains("manifest") ? json["manifest"].dump() : "{}";
+}
+
+Result<std::string> TrainingService::work(const TrainingRun& run, JobContext& job) {
+  BOOST_OUTCOME_TRY(const auto csv, deps_.datasets.csv(run.dataset));
+  const std::string message = Json{
+      {"kind", "training"},
+      {"csv", csv},
+      {"request", Json::parse(run.request_json)},
+      {"code_version",
+       deps_.code_version}}.dump();
+  BOOST_OUTCOME_TRY(
+      const auto answer,
+      deps_.run_work(
+          message, [&job](const WorkProgress& p) { job.progress(0.98 * p.fraction, p.stage, p.detail); },
+          [&job] { return job.canceled(); }));
+  if (job.canceled()) return make_error(Errc::canceled, "canceled");
+  job.progress(0.98, "store", "");
+  const auto json = Json::parse(answer, nullptr, false);
+  if (!json.is_object() || !json.contains("artifact") || !json.contains("parts"))
+    return make_error(Errc::internal, "the worker's answer cannot be read");
+  const auto artifact = json["artifact"].get<std::string>();
+  // What a worker made is read like what a stranger sends: the server never trusts bytes it will fly with.
+  BOOST_OUTCOME_TRY(const auto model, read_model_artifact(artifact));
+  StoredModel stored;
+  stored.created = deps_.clock.now();
+  stored.id.uuid = make_uuid_v7(stored.created);
+  stored.task = ml::task_name(model.info.task);
+  stored.method = model.info.method;
+  stored.run = run.id;
+  stored.created_by = run.created_by;
+  stored.manifest_json = manifest_of(artifact);
+  Sha256 sum;
+  sum.add(artifact);
+  stored.sha256_hex = sum.hex();
+  std::map<std::string, std::string> parts;
+  for (const auto& [name, text] : json["parts"].items()) parts[name] = text.get<std::string>();
+  BOOST_OUTCOME_TRYV(
+      deps_.runs.finish(run.id, json["summary"].get_ref<const std::string&>(), parts, stored, artifact));
+  deps_.events.add("info", "model.trained",
+                   stored.method + " for " + stored.task + " is trained: model " + to_string(stored.id));
+  return stored.method;
+}
+
+std::function<Result<std::string>(JobContext&)> TrainingService::work_of(const TrainingRun& run) {
+  return [this, run](JobContext& job) { return work(run, job); };
+}
+
+Result<Job> TrainingService::submit(const DatasetId& dataset, std::string task, std::string request_json,
+                                    std::string by) {
+  TrainingRun run;
+  run.created = deps_.clock.now();
+  run.id.uuid = make_uuid_v7(run.created);
+  run.dataset = dataset;
+  run.task = std::move(task);
+  run.request_json = std::move(request_json);
+  run.created_by = std::move(by);
+  BOOST_OUTCOME_TRYV(deps_.runs.insert(run));
+  auto job = deps_.jobs.submit(
+      "training", run.request_json,
+      [work = work_of(run), id = run.id](JobContext& context) -> Result<JobEnd> {
+        BOOST_OUTCOME_TRY(auto detail, work(context));
+        return JobEnd{"/api/v1/training-runs/" + to_string(id), std::move(detail)};
+      },
+      JobId{run.id.uuid});
+  if (!job) (void)deps_.runs.remove(run.id).has_value();
+  return job;
+}
+
+Result<Job> TrainingService::restart(const TrainingRunId& id) {
+  BOOST_OUTCOME_TRY(const auto run, deps_.runs.run(id));
+  return deps_.jobs.restart(JobId{id.uuid}, [work = work_of(run), id](JobContext& context) -> Result<JobEnd> {
+    BOOST_OUTCOME_TRY(auto detail, work(context));
+    return JobEnd{"/api/v1/training-runs/" + to_string(id), std::move(detail)};
+  });
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,73 @@
+#include <nlohmann/json.hpp>
+
+#include "api/exports/training_parts.hpp"
+#include "api/json/model_artifact.hpp"
+#include "api/json/reader.hpp"
+#include "api/learning/training_request.hpp"
+#include "api/learning/worker_port.hpp"
+
+namespace anchord::api {
+namespace {
+
+using Json = nlohmann::json;
+
+Result<std::string> train_work(const Json& message, const std::stop_token& stop,
+                               const WorkProgressSink& progress) {
+  std::vector<FieldError> errors;
+  const auto request = read_training_request(message.at("request"), errors);
+  if (!errors.empty())
+    return make_error(Errc::invalid_argument, errors.front().pointer + ": " + errors.front().detail);
+  const auto& csv = message.at("csv").get_ref<const std::string&>();
+  BOOST_OUTCOME_TRY(const auto table, DatasetTable::parse(csv));
+  auto spec = request.spec;
+  LearningWish wish{
+      spec.features, spec.task != ml::Task::bias, spec.task != ml::Task::nlos_id, {}, request.group_by};
+  if (spec.task == ml::Task::los_bias) wish.only_los = true;
+  if (spec.task == ml::Task::nlos_bias) wish.only_los = false;
+  if (spec.task == ml::Task::bias) {
+    // Classes help where every row has one; without any, the bias of all is learned as one.
+    wish.need_label = std::any_of(table.rows.begin(), table.rows.end(),
+                                  [](const DatasetRow& row) { return row.los.has_value(); });
+  }
+  BOOST_OUTCOME_TRY(const auto rows, learning_rows(table, wish));
+  spec.held_out = rows.held_out;
+  BOOST_OUTCOME_TRY(auto outcome, ml::train(rows.data, spec, stop, [&](const ml::TrainingProgress& p) {
+                      if (progress) progress({p.stage, p.stage_index, p.stage_count, p.fraction, p.detail});
+                    }));
+  auto& info = outcome.model.info;
+  info.feature_set = nlos::k_feature_set_version;
+  info.group_by = place_word(request.group_by);
+  info.code_version = message.value("code_version", std::string());
+  info.data_digest = dataset_digest(csv);
+  auto parts = training_parts(outcome, table, rows);
+  nlohmann::ordered_json out{{"artifact", write_model_artifact(outcome.model)}};
+  out["summary"] = std::move(parts.at("summary"));
+  parts.erase("summary");
+  out["parts"] = std::move(parts);
+  return out.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+}  // namespace
+
+Result<std::string> do_work(std::string_view message, const std::stop_token& stop,
+                            const WorkProgressSink& progress) {
+  const auto json = Json::parse(message, nullptr, false);
+  if (!json.is_object()) return make_error(Errc::bad_frame, "the message is not a JSON object");
+  try {
+    if (json.value("kind", std::string()) == "training") return train_work(json, stop, progress);
+  } catch (const Json::exception& fault) {
+    return make_error(Errc::bad_frame, fault.what());
+  }
+  return make_error(Errc::bad_frame, "no work of this kind");
+}
+
+Result<std::string> work_inline(const std::string& message, const WorkProgressSink& progress,
+                                const std::function<bool()>& canceled) {
+  std::stop_source stop;
+  return do_work(message, stop.get_token(), [&](const WorkProgress& p) {
+    if (canceled()) stop.request_stop();
+    progress(p);
+  });
+}
+
+}  // namespace anchord::api

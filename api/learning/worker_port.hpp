@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <stop_token>
+#include <string>
+#include <string_view>
+
+#include "core/base/result.hpp"
+
+/// Heavy work, apart from the service: a message of text in, a message of text out. The server runs it in a
+/// process of its own (server/runtime/worker_process); a test may run it on its own thread.
+namespace anchord::api {
+
+struct WorkProgress {
+  std::string stage{};
+  std::size_t stage_index{}, stage_count{};
+  double fraction{};
+  std::string detail{};
+};
+using WorkProgressSink = std::function<void(const WorkProgress&)>;
+
+/// Does what the message asks for. errors: those of the work; canceled; internal (the process died)
+/// canceled  asked a few times a second at least
+using RunWork = std::function<Result<std::string>(
+    const std::string& message, const WorkProgressSink& progress, const std::function<bool()>& canceled)>;
+
+/// The work itself, by the message's "kind". Pure: no store, no socket. errors: bad_frame (the message)
+Result<std::string> do_work(std::string_view message, const std::stop_token& stop,
+                            const WorkProgressSink& progress);
+
+/// do_work on the calling thread.
+Result<std::string> work_inline(const std::string& message, const WorkProgressSink& progress,
+                                const std::function<bool()>& canceled);
+
+}  // namespace anchord::api

@@ -1,0 +1,159 @@
+#include <charconv>
+#include <nlohmann/json.hpp>
+
+#include "api/json/reader.hpp"
+#include "api/json/wire_learning.hpp"
+#include "api/learning/freeze.hpp"
+#include "api/routes/learning.hpp"
+#include "api/routes/support.hpp"
+
+namespace anchord::api {
+
+using Ordered = nlohmann::ordered_json;
+
+DatasetRecord find_dataset(LearningStores& stores, const std::string& text) {
+  if (const auto id = parse_uuid(text))
+    return value_or_problem(stores.datasets.dataset(DatasetId{id.value()}));
+  return value_or_problem(stores.datasets.dataset(text));
+}
+
+namespace {
+
+constexpr std::uint64_t k_max_csv_bytes = 32ULL << 20;
+
+DatasetRecord named(LearningServices& l, const Request& request) {
+  return find_dataset(l.stores, request.params.at("id"));
+}
+
+Response list(LearningServices& l, const Request& request) {
+  check_query(request, {"limit", "cursor", "fields"});
+  const auto page = page_query(request);
+  auto rows = value_or_problem(l.stores.datasets.datasets(page.limit + 1, cursor_id<DatasetId>(page.cursor)));
+  const bool more = rows.size() > page.limit;
+  if (more) rows.pop_back();
+  Ordered items = Ordered::array();
+  for (const auto& one : rows) items.push_back(dataset_json(one, false));
+  return list_response(request, std::move(items), more ? to_string(rows.back().id) : "");
+}
+
+/// The rows come with the request: what GET .../rows gave elsewhere.
+FrozenDataset read_csv(const Request& request) {
+  auto table = DatasetTable::parse(request.body);
+  if (!table)
+    throw_problem(422, "validation", table.error().message, {{"", "bad_csv", table.error().message}});
+  FrozenDataset out;
+  out.table = std::move(table).value();
+  for (const auto& row : out.table.rows) ++(row.test ? out.n_test : out.n_train);
+  out.report_json = split_report_json(out.table, Place::environment, {});
+  return out;
+}
+
+Response create(LearningServices& l, const Request& request) {
+  DatasetRecord record;
+  FrozenDataset frozen;
+  std::string_view type = request.header("content-type");
+  type = type.substr(0, type.find(';'));
+  if (type == "text/csv") {
+    check_query(request, {"name"});
+    record.name = request.query_value("name").value_or("");
+    if (record.name.empty() || record.name.size() > 200)
+      throw_problem(422, "validation", "name is missing", {{"/name", "required", "say ?name="}});
+    record.query_json = R"({"imported":true})";
+    frozen = read_csv(request);
+  } else {
+    check_query(request, {});
+    std::vector<FieldError> errors;
+    const auto query =
+        read_dataset_query(json_body(request), l.stores.campaigns, l.services.deps.missions, errors);
+    refuse_if_any(errors);
+    record.name = query.name;
+    record.query_json = query.json;
+    auto made = freeze(query, l.stores.campaigns, l.services.deps.measurements, l.services.deps.missions);
+    if (!made && (made.error().code == Errc::too_few_observations || made.error().code == Errc::not_found ||
+                  made.error().code == Errc::invalid_argument))
+      throw_problem(422, "validation", made.error().message, {{"", "no_rows", made.error().message}});
+    frozen = value_or_problem(std::move(made));
+  }
+  const std::string csv = frozen.table.csv();
+  record.digest = dataset_digest(csv);
+  record.report_json = std::move(frozen.report_json);
+  record.n_train = frozen.n_train;
+  record.n_test = frozen.n_test;
+  record.created = l.services.deps.clock.now();
+  record.id.uuid = make_uuid_v7(record.created);
+  record.created_by = request.principal.name;
+  value_or_problem(l.stores.datasets.insert(record, csv));
+  l.services.audit(request, "dataset.create " + to_string(record.id) + " " + record.digest);
+  Response response = json_response(201, dataset_json(record, true));
+  response.header("Location", "/api/v1/datasets/" + to_string(record.id));
+  return response;
+}
+
+Ordered row_json(const DatasetRow& row, std::size_t index) {
+  return {{"row", index},
+          {"campaign", row.campaign},
+          {"environment", row.environment},
+          {"setting", row.setting},
+          {"split", row.test ? "test" : "train"},
+          {"los", row.los ? Ordered(*row.los) : Ordered(nullptr)},
+          {"true_range_m", row.true_range_m ? Ordered(*row.true_range_m) : Ordered(nullptr)},
+          {"repeats", row.repeats},
+          {"features", features_json(row.features)}};
+}
+
+Response rows(LearningServices& l, const Request& request) {
+  check_query(request, {"limit", "cursor", "fields", "format"});
+  const auto record = named(l, request);
+  auto csv = value_or_problem(l.stores.datasets.csv(record.id));
+  const std::string format = negotiate(request, {"json", "csv", "ndjson"});
+  Response response;
+  if (format == "csv") {
+    response.header("Content-Type", "text/csv; charset=utf-8");
+    response.header("ETag", "\"" + record.digest + "\"");
+    response.body = std::move(csv);
+    return response;
+  }
+  const auto table = value_or_problem(DatasetTable::parse(csv));
+  if (format == "ndjson") {
+    response.header("Content-Type", "application/x-ndjson");
+    for (std::size_t i = 0; i < table.rows.size(); ++i)
+      response.body += row_json(table.rows[i], i).dump() + '\n';
+    return response;
+  }
+  const auto page = page_query(request, 10'000);
+  std::size_t from = 0;
+  std::from_chars(page.cursor.data(), page.cursor.data() + page.cursor.size(), from);
+  Ordered items = Ordered::array();
+  std::size_t i = from;
+  for (; i < table.rows.size() && i - from < page.limit; ++i) items.push_back(row_json(table.rows[i], i));
+  return list_response(request, std::move(items), i < table.rows.size() ? std::to_string(i) : "");
+}
+
+}  // namespace
+
+void add_dataset_routes(Router& router, LearningServices& l) {
+  const auto on = [&l](auto function) {
+    return [&l, function](const Request& request) { return function(l, request); };
+  };
+  const auto engineer = Access::any_of({Role::engineer});
+  router.add({Method::get, "/api/v1/datasets", readers(), on(list)});
+  router.add({Method::post, "/api/v1/datasets", engineer, on(create), k_max_csv_bytes});
+  router.add({Method::get, "/api/v1/datasets/{id}", readers(), [&l](const Request& request) {
+                check_query(request, {});
+                const auto record = named(l, request);
+                Response response = json_response(200, dataset_json(record, true));
+                response.header("ETag", "\"" + record.digest + "\"");
+                return response;
+              }});
+  router.add({Method::del, "/api/v1/datasets/{id}", engineer, [&l](const Request& request) {
+                const auto record = named(l, request);
+                value_or_problem(l.stores.datasets.remove(record.id));
+                l.services.audit(request, "dataset.delete " + to_string(record.id) + " " + record.digest);
+                Response response;
+                response.status = 204;
+                return response;
+              }});
+  router.add({Method::get, "/api/v1/datasets/{id}/rows", readers(), on(rows)});
+}
+
+}  // namespace anchord::api

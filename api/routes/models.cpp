@@ -1,0 +1,290 @@
+#include <nlohmann/json.hpp>
+
+#include "api/json/model_artifact.hpp"
+#include "api/json/reader.hpp"
+#include "api/json/wire_learning.hpp"
+#include "api/learning/model_gate.hpp"
+#include "api/routes/learning.hpp"
+#include "api/routes/support.hpp"
+#include "core/base/sha256.hpp"
+
+namespace anchord::api {
+
+using Ordered = nlohmann::ordered_json;
+using Json = nlohmann::json;
+
+namespace {
+
+constexpr std::size_t k_most_samples = 10'000;
+
+bool is_active(LearningServices& l, const StoredModel& model) {
+  const auto active = l.models.active();
+  const auto at = active->models.find(model.task);
+  return at != active->models.end() && at->second == model.id;
+}
+
+Response list(LearningServices& l, const Request& request) {
+  check_query(request, {"limit", "cursor", "fields", "task"});
+  const auto page = page_query(request);
+  const auto task = request.query_value("task");
+  auto rows = value_or_problem(l.stores.models.models(page.limit + 1, cursor_id<ModelId>(page.cursor)));
+  const bool more = rows.size() > page.limit;
+  if (more) rows.pop_back();
+  Ordered items = Ordered::array();
+  for (const auto& model : rows)
+    if (!task || model.task == *task) items.push_back(model_json(model, is_active(l, model)));
+  return list_response(request, std::move(items), more ? to_string(rows.back().id) : "");
+}
+
+/// An artifact from elsewhere. Everything about it is checked before it is kept.
+Response upload(LearningServices& l, const Request& request) {
+  check_query(request, {});
+  auto read = read_model_artifact(request.body);
+  if (!read)
+    throw_problem(422, "validation", read.error().message, {{"", "bad_model", read.error().message}});
+  const auto& model = read.value();
+  // What is kept is what we understood, not what was sent.
+  const std::string artifact = write_model_artifact(model);
+  StoredModel stored;
+  stored.task = ml::task_name(model.info.task);
+  stored.method = model.info.method;
+  stored.manifest_json = manifest_of(artifact);
+  Sha256 sum;
+  sum.add(std::string_view(artifact));
+  stored.sha256_hex = sum.hex();
+  stored.created = l.services.deps.clock.now();
+  stored.id.uuid = make_uuid_v7(stored.created);
+  stored.created_by = request.principal.name;
+  value_or_problem(l.stores.models.insert(stored, artifact));
+  l.services.audit(request, "model.upload " + to_string(stored.id) + " " + stored.sha256_hex);
+  Response response = json_response(201, model_json(stored, false));
+  response.header("Location", "/api/v1/models/" + to_string(stored.id));
+  return response;
+}
+
+Response artifact(LearningServices& l, const Request& request) {
+  check_query(request, {});
+  const auto model = value_or_problem(l.stores.models.model(path_id<ModelId>(request)));
+  Response response;
+  response.header("Content-Type", "application/json");
+  response.header("ETag", "\"" + model.sha256_hex + "\"");
+  response.header("Content-Disposition",
+                  "attachment; filename=\"" + model.task + "-" + model.sha256_hex.substr(0, 12) + ".json\"");
+  response.body = value_or_problem(l.stores.models.artifact(model.id));
+  return response;
+}
+
+Ordered active_json(LearningServices& l) {
+  const auto active = l.models.active();
+  Ordered models = Ordered::object();
+  for (const char* task : {"nlos_id", "los_bias", "nlos_bias", "bias"}) {
+    const auto at = active->models.find(task);
+    models[task] = at == active->models.end()
+                       ? Ordered(nullptr)
+                       : model_json(value_or_problem(l.stores.models.model(at->second)), true);
+  }
+  const bool raw = active->predictor.empty();
+  return {{"models", std::move(models)},
+          {"correction", correction_word(active->correction)},
+          {"raw", raw},
+          {"note", !active->fault.empty() ? Ordered(active->fault)
+                   : raw                  ? Ordered("no model is promoted: ranges are used as they come")
+                                          : Ordered(nullptr)}};
+}
+
+Response patch_active(LearningServices& l, const Request& request) {
+  check_query(request, {});
+  std::vector<FieldError> errors;
+  const auto body = json_body(request);
+  Fields fields(body, "", errors);
+  const auto word = fields.word("correction", {"weighted", "hard", "none"}, true);
+  fields.finish();
+  refuse_if_any(errors);
+  const auto how = static_cast<ml::Correction>(*word);
+  l.services.audit(request, "models.correction " + std::string(correction_word(how)));
+  value_or_problem(
+      l.stores.models.promote({0, std::string(k_correction_task), std::nullopt, request.principal.name,
+                               std::string(correction_word(how)), l.services.deps.clock.now(), false}));
+  value_or_problem(l.models.reload());
+  l.services.events.add("info", "model.correction",
+                        "ranges are now corrected " + std::string(correction_word(how)));
+  return json_response(200, active_json(l));
+}
+
+std::optional<ml::Model> active_model(LearningServices& l, const std::string& task) {
+  const auto active = l.models.active();
+  const auto at = active->models.find(task);
+  if (at == active->models.end()) return std::nullopt;
+  auto model = read_model_artifact(value_or_problem(l.stores.models.artifact(at->second)));
+  if (!model) return std::nullopt;
+  return std::move(model).value();
+}
+
+GateReport judge(LearningServices& l, const StoredModel& stored) {
+  const auto model =
+      value_or_problem(read_model_artifact(value_or_problem(l.stores.models.artifact(stored.id))));
+  const auto current = active_model(l, stored.task);
+  std::optional<DatasetTable> table;
+  if (stored.run) {
+    const auto run = value_or_problem(l.stores.runs.run(*stored.run));
+    auto parsed = DatasetTable::parse(value_or_problem(l.stores.datasets.csv(run.dataset)));
+    if (parsed) table = std::move(parsed).value();
+  }
+  return gate_of(model, current ? &*current : nullptr, table ? &*table : nullptr);
+}
+
+void announce(LearningServices& l, const Promotion& done, const std::string& text) {
+  value_or_problem(l.models.reload());
+  const std::string code = done.rollback ? "model.rolled_back" : "model.promoted";
+  l.services.events.add("info", code, text);
+  l.services.missions.note_in_flights(code, text);
+}
+
+Response promote(LearningServices& l, const Request& request) {
+  check_query(request, {});
+  const auto stored = value_or_problem(l.stores.models.model(path_id<ModelId>(request)));
+  std::vector<FieldError> errors;
+  const auto body = json_body(request, true);
+  Fields fields(body, "", errors);
+  const auto reason = fields.text("reason", 500).value_or("");
+  fields.finish();
+  refuse_if_any(errors);
+  if (is_active(l, stored)) throw_problem(422, "state", "the model is active already");
+  const auto gate = judge(l, stored);
+  if (!gate.passed && reason.empty())
+    throw_problem(422, "state", gate.why + " (give a reason to promote all the same)");
+  // Audited before it happens, as publications are.
+  l.services.audit(request, "model.promote " + to_string(stored.id) +
+                                (gate.passed ? "" : " against the gate: " + gate.why) +
+                                (reason.empty() ? "" : " reason: " + reason));
+  const auto done = value_or_problem(l.stores.models.promote(
+      {0, stored.task, stored.id, request.principal.name, reason, l.services.deps.clock.now(), false}));
+  announce(l, done, stored.method + " " + to_string(stored.id) + " is now the model of " + stored.task);
+  Ordered answer = promotion_json(done);
+  answer["gate"] = gate_json(gate);
+  return json_response(200, answer);
+}
+
+Response gate_of_model(LearningServices& l, const Request& request) {
+  check_query(request, {});
+  return json_response(
+      200, gate_json(judge(l, value_or_problem(l.stores.models.model(path_id<ModelId>(request))))));
+}
+
+/// What was active before the newest promotion that still stands.
+std::optional<ModelId> before_the_newest(const std::vector<Promotion>& newest_first) {
+  std::vector<ModelId> stack;
+  for (auto it = newest_first.rbegin(); it != newest_first.rend(); ++it) {
+    if (it->rollback) {
+      if (!stack.empty()) stack.pop_back();
+    } else if (it->model) {
+      stack.push_back(*it->model);
+    }
+  }
+  if (stack.empty()) throw_problem(422, "state", "no model of this task is active");
+  stack.pop_back();
+  if (stack.empty()) return std::nullopt;
+  return stack.back();
+}
+
+Response roll_back(LearningServices& l, const Request& request) {
+  check_query(request, {});
+  std::vector<FieldError> errors;
+  const auto body = json_body(request);
+  Fields fields(body, "", errors);
+  const auto task = fields.word("task", {"nlos_id", "los_bias", "nlos_bias", "bias"}, true);
+  const auto reason = fields.text("reason", 500).value_or("");
+  fields.finish();
+  refuse_if_any(errors);
+  const std::string name(ml::task_name(static_cast<ml::Task>(*task)));
+  const auto back = before_the_newest(value_or_problem(l.stores.models.promotions(name, 100'000)));
+  l.services.audit(request, "model.rollback " + name + (reason.empty() ? "" : " reason: " + reason));
+  const auto done = value_or_problem(l.stores.models.promote(
+      {0, name, back, request.principal.name, reason, l.services.deps.clock.now(), true}));
+  announce(l, done,
+           back ? "rolled back: " + to_string(*back) + " is the model of " + name + " again"
+                : "rolled back: " + name + " has no model now");
+  return json_response(200, promotion_json(done));
+}
+
+Response promotions(LearningServices& l, const Request& request) {
+  check_query(request, {"limit", "fields", "task"});
+  const auto page = page_query(request);
+  Ordered items = Ordered::array();
+  for (const auto& one :
+       value_or_problem(l.stores.models.promotions(request.query_value("task").value_or(""), page.limit)))
+    items.push_back(promotion_json(one));
+  return list_response(request, std::move(items), "");
+}
+
+Response predict(LearningServices& l, const Request& request) {
+  check_query(request, {});
+  const auto body = json_body(request);
+  std::vector<FieldError> errors;
+  Fields fields(body, "", errors);
+  const Json* one = fields.child("sample");
+  const Json* many = fields.child("samples");
+  const auto how_word = fields.word("correction", {"weighted", "hard", "none"});
+  fields.finish();
+  if ((one == nullptr) == (many == nullptr))
+    errors.push_back({"/samples", "required", "send either sample or samples"});
+  else if (many != nullptr && (!many->is_array() || many->empty() || many->size() > k_most_samples))
+    errors.push_back({"/samples", "wrong_type", "must be an array of 1 to 10000 samples"});
+  refuse_if_any(errors);
+  std::vector<nlos::FeatureVector> features;
+  if (one != nullptr) features.push_back(read_features(*one, "/sample", errors));
+  for (std::size_t i = 0; many != nullptr && i < many->size() && errors.size() < 100; ++i)
+    features.push_back(read_features((*many)[i], "/samples/" + std::to_string(i), errors));
+  refuse_if_any(errors);
+
+  std::shared_ptr<const ModelRegistry::Active> models = l.models.active();
+  if (request.params.at("id") != "active") {
+    const auto stored = value_or_problem(l.stores.models.model(path_id<ModelId>(request)));
+    models = std::make_shared<const ModelRegistry::Active>(
+        value_or_problem(load_models(l.stores.models, {{stored.task, stored.id}}, ml::Correction::weighted)));
+  }
+  auto chosen = *models;
+  if (how_word) chosen.correction = static_cast<ml::Correction>(*how_word);
+  Ordered items = Ordered::array();
+  for (const auto& one_sample : features)
+    items.push_back(judgement_json(ModelRegistry::judge(chosen, one_sample)));
+  if (one != nullptr) return json_response(200, items.front());
+  return json_response(200, {{"items", std::move(items)}});
+}
+
+}  // namespace
+
+void add_model_routes(Router& router, LearningServices& l) {
+  const auto on = [&l](auto function) {
+    return [&l, function](const Request& request) { return function(l, request); };
+  };
+  const auto engineer = Access::any_of({Role::engineer});
+  router.add({Method::get, "/api/v1/models", readers(), on(list)});
+  router.add({Method::post, "/api/v1/models", engineer, on(upload), k_max_artifact_bytes});
+  router.add({Method::get, "/api/v1/models/active", readers(), [&l](const Request& request) {
+                check_query(request, {});
+                return json_response(200, active_json(l));
+              }});
+  router.add({Method::patch, "/api/v1/models/active", engineer, on(patch_active)});
+  router.add({Method::get, "/api/v1/models/promotions", readers(), on(promotions)});
+  router.add({Method::post, "/api/v1/models/rollback", engineer, on(roll_back)});
+  router.add({Method::get, "/api/v1/models/{id}", readers(), [&l](const Request& request) {
+                check_query(request, {});
+                const auto model = value_or_problem(l.stores.models.model(path_id<ModelId>(request)));
+                return json_response(200, model_json(model, is_active(l, model)));
+              }});
+  router.add({Method::del, "/api/v1/models/{id}", engineer, [&l](const Request& request) {
+                const auto id = path_id<ModelId>(request);
+                value_or_problem(l.stores.models.remove(id));
+                l.services.audit(request, "model.delete " + to_string(id));
+                Response response;
+                response.status = 204;
+                return response;
+              }});
+  router.add({Method::get, "/api/v1/models/{id}/artifact", readers(), on(artifact)});
+  router.add({Method::get, "/api/v1/models/{id}/gate", readers(), on(gate_of_model)});
+  router.add({Method::post, "/api/v1/models/{id}/promote", engineer, on(promote)});
+  router.add({Method::post, "/api/v1/models/{id}/predict", readers(), on(predict)});
+}
+
+}  // namespace anchord::api

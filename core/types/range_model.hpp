@@ -1,0 +1,16 @@
+#pragma once
+
+#include <optional>
+
+namespace anchord {
+
+/// What the promoted models say of a range: made from the measurement when it is used, never stored with it.
+struct RangeModel {
+  std::optional<bool> los{};
+  std::optional<double> p_los{};
+  std::optional<double> bias_m{};   ///< subtract it from the distance
+  std::optional<double> sigma_m{};  ///< of what is left
+  bool outside_training{false};
+};
+
+}  // namespace anchord

@@ -1,0 +1,121 @@
+#include <linux/filter.h>
+#include <linux/seccomp.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstddef>
+#include <cstdio>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <thread>
+#include <vector>
+
+#include "server/runtime/frames.hpp"
+#include "server/runtime/worker_process.hpp"
+
+namespace anchord::server {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr int k_socket = STDIN_FILENO;
+
+void limit(__rlimit_resource what, rlim_t most) {
+  rlimit now{};
+  getrlimit(what, &now);
+  now.rlim_cur = now.rlim_max = std::min(most, now.rlim_max);
+  setrlimit(what, &now);
+}
+
+/// New sockets and programs are refused from here on: a model file that breaks the trainer gets no further.
+void close_the_doors() {
+  prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
+  const auto refuse = [](unsigned number) {
+    return std::array{sock_filter BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, number, 0, 1),
+                      sock_filter BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | EPERM)};
+  };
+  std::vector<sock_filter> program{
+      sock_filter BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr))};
+  for (const unsigned number : {unsigned{SYS_socket}, unsigned{SYS_connect}, unsigned{SYS_bind},
+                                unsigned{SYS_execve}, unsigned{SYS_execveat}, unsigned{SYS_ptrace}}) {
+    for (const auto& step : refuse(number)) program.push_back(step);
+  }
+  program.push_back(sock_filter BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW));
+  sock_fprog filter{static_cast<unsigned short>(program.size()), program.data()};
+  // A kernel without the feature runs the work all the same: it is a second fence, not the first.
+  prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &filter, 0, 0);
+}
+
+void settle_in(pid_t server) {
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != server) _exit(1);  // it died before the line above
+  prctl(PR_SET_NAME, "anchord-worker");
+  setpriority(PRIO_PROCESS, 0, 10);
+  limit(RLIMIT_CORE, 0);
+  limit(RLIMIT_FSIZE, 0);
+  limit(RLIMIT_NOFILE, 64);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // their shadow counts as data
+  limit(RLIMIT_DATA, rlim_t{4} << 30);
+#endif
+  limit(RLIMIT_CPU, 24 * 3600);
+  close_the_doors();
+}
+
+}  // namespace
+
+int worker_main() {
+  const pid_t server = getppid();
+  settle_in(server);
+  std::string message;
+  if (read_frame(k_socket, message, -1) != FrameRead::frame) {
+    std::fputs("anchord worker: is started by the server, not by hand\n", stderr);
+    return 2;
+  }
+  std::stop_source stop;
+  std::mutex writing;
+  const auto send = [&writing](const Json& json) {
+    const std::scoped_lock lock(writing);
+    if (!write_frame(k_socket, json.dump(-1, ' ', false, Json::error_handler_t::replace))) _exit(1);
+  };
+  // Hears the server while the work goes on: a word to stop, or its end.
+  std::thread listener([&stop] {
+    std::string text;
+    while (true) {
+      const auto read = read_frame(k_socket, text, -1);
+      if (read == FrameRead::closed) _exit(1);
+      if (read == FrameRead::frame) stop.request_stop();
+    }
+  });
+  listener.detach();
+  Result<std::string> result = make_error(Errc::internal, "");
+  try {  // the door of jobs, in this process
+    result = api::do_work(message, stop.get_token(), [&send](const api::WorkProgress& p) {
+      send({{"op", "progress"},
+            {"stage", p.stage},
+            {"stage_index", p.stage_index},
+            {"stage_count", p.stage_count},
+            {"fraction", p.fraction},
+            {"detail", p.detail}});
+    });
+  } catch (const std::bad_alloc&) {
+    result = make_error(Errc::internal, "the work needs more memory than the 4 GiB it is allowed");
+  } catch (const std::exception& fault) {
+    result = make_error(Errc::internal, fault.what());
+  }
+  if (result)
+    send({{"op", "done"}, {"result", result.value()}});
+  else
+    send({{"op", "failed"},
+          {"code", static_cast<int>(result.error().code)},
+          {"message", result.error().message}});
+  std::fflush(stderr);
+  _exit(0);  // the listener still waits: nothing else is left to clean
+}
+
+}  // namespace anchord::server

@@ -1,0 +1,164 @@
+#include "server/runtime/worker_process.hpp"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "server/runtime/frames.hpp"
+
+extern char** environ;
+
+namespace anchord::server {
+namespace {
+
+using Json = nlohmann::json;
+using Steady = std::chrono::steady_clock;
+
+constexpr auto k_grace = std::chrono::milliseconds(500);
+
+class Socket {
+ public:
+  explicit Socket(int fd) : fd_(fd) {}
+  ~Socket() { close(); }
+  Socket(const Socket&) = delete;
+  Socket& operator=(const Socket&) = delete;
+  int fd() const { return fd_; }
+  void close() {
+    if (fd_ >= 0) ::close(fd_);
+    fd_ = -1;
+  }
+
+ private:
+  int fd_;
+};
+
+/// A child that is always collected: killed where it still runs when this goes.
+class Child {
+ public:
+  explicit Child(pid_t pid) : pid_(pid) {}
+  ~Child() {
+    if (pid_ <= 0) return;
+    kill();
+    (void)end();
+  }
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
+  void kill() const { ::kill(pid_, SIGKILL); }
+  /// Waits for its end; the words for it.
+  std::string end() {
+    int status = 0;
+    while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
+    }
+    pid_ = 0;
+    if (WIFSIGNALED(status))
+      return "was ended by signal " + std::to_string(WTERMSIG(status)) + " (" + strsignal(WTERMSIG(status)) +
+             ")";
+    return "ended with code " + std::to_string(WEXITSTATUS(status)) + " without an answer";
+  }
+
+ private:
+  pid_t pid_;
+};
+
+Result<pid_t> spawn(const std::filesystem::path& program, int socket) {
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, socket, STDIN_FILENO);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_addclosefrom_np(&actions, STDERR_FILENO + 1);
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  // The server blocks its signals in every thread; its child must hear its own.
+  sigset_t none, all;
+  sigemptyset(&none);
+  sigfillset(&all);
+  posix_spawnattr_setsigmask(&attributes, &none);
+  posix_spawnattr_setsigdefault(&attributes, &all);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+  // Settings of the server may be secrets, and are none of the worker's business.
+  std::vector<char*> environment;
+  for (char** one = environ; *one != nullptr; ++one)
+    if (std::strncmp(*one, "ANCHORD_", 8) != 0) environment.push_back(*one);
+  environment.push_back(nullptr);
+  std::string name = "anchord", word = "worker";
+  char* arguments[] = {name.data(), word.data(), nullptr};
+  pid_t pid = 0;
+  const int failed = posix_spawn(&pid, program.c_str(), &actions, &attributes, arguments, environment.data());
+  posix_spawn_file_actions_destroy(&actions);
+  posix_spawnattr_destroy(&attributes);
+  if (failed != 0)
+    return make_error(Errc::internal, std::string("cannot start a worker: ") + std::strerror(failed));
+  return pid;
+}
+
+void tell(const api::WorkProgressSink& progress, const Json& j) {
+  if (!progress) return;
+  progress({j.value("stage", std::string()), j.value("stage_index", std::size_t{}),
+            j.value("stage_count", std::size_t{}), j.value("fraction", 0.0),
+            j.value("detail", std::string())});
+}
+
+Result<std::string> run(const std::filesystem::path& program, const std::string& message,
+                        const api::WorkProgressSink& progress, const std::function<bool()>& canceled) {
+  int ends[2];
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
+    return make_error(Errc::internal, std::string("cannot start a worker: ") + std::strerror(errno));
+  Socket ours(ends[0]), theirs(ends[1]);
+  BOOST_OUTCOME_TRY(const auto pid, spawn(program, theirs.fd()));
+  Child child(pid);
+  theirs.close();
+  if (!write_frame(ours.fd(), message))
+    return make_error(Errc::link_lost, "the worker " + child.end() + " before it began");
+  std::optional<Steady::time_point> asked_to_stop;
+  std::string text;
+  while (true) {
+    if (!asked_to_stop && canceled()) {
+      asked_to_stop = Steady::now();
+      (void)write_frame(ours.fd(), R"({"op":"cancel"})");
+    }
+    if (asked_to_stop && Steady::now() - *asked_to_stop > k_grace) {
+      child.kill();
+      return make_error(Errc::canceled, "canceled");
+    }
+    switch (read_frame(ours.fd(), text, 50)) {
+      case FrameRead::nothing:
+        continue;
+      case FrameRead::closed:
+        if (asked_to_stop) return make_error(Errc::canceled, "canceled");
+        return make_error(Errc::link_lost, "the worker " + child.end());
+      case FrameRead::frame:
+        break;
+    }
+    auto json = Json::parse(text, nullptr, false);
+    const std::string op = json.is_object() ? json.value("op", std::string()) : "";
+    if (op == "progress") {
+      tell(progress, json);
+    } else if (op == "done") {
+      return json["result"].get<std::string>();
+    } else if (op == "failed") {
+      return make_error(static_cast<Errc>(json.value("code", static_cast<int>(Errc::internal))),
+                        json.value("message", std::string()));
+    } else {
+      return make_error(Errc::internal, "the worker's message cannot be read");
+    }
+  }
+}
+
+}  // namespace
+
+api::RunWork work_in_process(std::filesystem::path program) {
+  return [program = std::move(program)](const std::string& message, const api::WorkProgressSink& progress,
+                                        const std::function<bool()>& canceled) {
+    return run(program, message, progress, canceled);
+  };
+}
+
+}  // namespace anchord::server

@@ -1,0 +1,154 @@
+// Campaign, data set, training run, promotion and live use through the routes, over a real database.
+#include "tests/api/app_fixture.hpp"
+
+namespace anchord::test {
+namespace {
+
+/// Six rooms of ten settings: a wall takes 6 dB of the first path and adds half a metre.
+std::string campaign_csv() {
+  std::string csv = "environment,setting,true_distance_m,los,range_m,rx_dbm,fp_dbm\n";
+  std::uint64_t state = 1;
+  const auto noise = [&state] {  // uniform -1..1; any generator will do
+    state = state * 6364136223846793005ULL + 1442695040888963407ULL;
+    return static_cast<double>(state >> 11) * 0x1.0p-52 - 1.0;
+  };
+  for (int room = 0; room < 6; ++room) {
+    for (int k = 0; k < 10; ++k) {
+      const bool los = k % 2 == 0;
+      const double distance = 2.0 + k + 0.1 * room;
+      for (int repeat = 0; repeat < 3; ++repeat) {
+        const double rx = -75 - distance + noise();
+        const double fp = rx - (los ? 2.0 : 8.0) + 1.5 * noise();
+        const double range = distance + (los ? 0.05 : 0.55) + 0.03 * noise();
+        csv += "room " + std::to_string(room) + ",s" + std::to_string(room * 10 + k) + "," +
+               std::to_string(distance) + "," + (los ? "1" : "0") + "," + std::to_string(range) + "," +
+               std::to_string(rx) + "," + std::to_string(fp) + "\n";
+      }
+    }
+  }
+  return csv + "room 0,s0,2.0,1,0,-80,-82\n";  // the radio's failure value
+}
+
+class LearningService : public AppFixture {
+ protected:
+  void SetUp() override {
+    AppFixture::SetUp();
+    ASSERT_EQ(post("/api/v1/campaigns", R"({"name":"hall"})").status, 201);
+    imported_ = post("/api/v1/campaigns/hall/samples", campaign_csv(), "text/csv");
+    const auto made = post("/api/v1/datasets", R"({"name":"set","campaigns":["hall"],"aggregation":"none",
+      "split":{"by":"environment","test":["room 5"]}})");
+    ASSERT_EQ(made.status, 201) << made.body;
+    dataset_ = json(made);
+  }
+  Json train(const std::string& task, const std::string& method) {
+    Call options;
+    options.headers["prefer"] = "wait=120";
+    const auto run = call(api::Method::post, "/api/v1/training-runs",
+                          R"({"task":")" + task + R"(","dataset":"set","methods":[")" + method +
+                              R"("],"cv":{"folds":4,"seed":3},"importance":false})",
+                          options);
+    EXPECT_EQ(run.status, 201) << run.body;
+    return json(run);
+  }
+  api::Response promote(const Json& run, const std::string& body = "") {
+    return post(run.value("model", "") + "/promote", body);
+  }
+  api::Response imported_;
+  Json dataset_;
+};
+
+TEST_F(LearningService, ReportsWhatAnImportDropped) {
+  ASSERT_EQ(imported_.status, 200) << imported_.body;
+  EXPECT_EQ(json(imported_)["accepted"], 180);
+  EXPECT_EQ(json(imported_)["dropped"][0], (Json{{"reason", "zero range"}, {"count", 1}}));
+  EXPECT_EQ(post("/api/v1/campaigns/hall/samples", "x", "application/pdf").status, 415);
+  EXPECT_EQ(post("/api/v1/campaigns/nowhere/samples", "x", "text/csv").status, 404);
+  EXPECT_EQ(post("/api/v1/campaigns", R"({"name":"hall"})").status, 409);
+}
+
+TEST_F(LearningService, FreezesRowsWhoseCsvGivesTheSameDigest) {
+  EXPECT_EQ(dataset_["train"], 150);
+  EXPECT_EQ(dataset_["test"], 30);
+  EXPECT_EQ(dataset_["leak"], false);
+  const auto csv = get("/api/v1/datasets/set/rows", {{"format", "csv"}}).body;
+  const auto again = post("/api/v1/datasets", csv, "text/csv", {{"name", "copy"}});
+  ASSERT_EQ(again.status, 201) << again.body;
+  EXPECT_EQ(json(again)["digest"], dataset_["digest"]);
+  // One number changed is another data set.
+  auto other = csv;
+  other[other.find(",train,1,") + 7] = '0';
+  EXPECT_NE(json(post("/api/v1/datasets", other, "text/csv", {{"name", "other"}}))["digest"],
+            dataset_["digest"]);
+  EXPECT_EQ(post("/api/v1/datasets", "a,b\n1,2\n", "text/csv", {{"name", "bad"}}).status, 422);
+}
+
+TEST_F(LearningService, CallsAPlaceOnBothSidesALeak) {
+  auto csv = get("/api/v1/datasets/set/rows", {{"format", "csv"}}).body;
+  csv.replace(csv.find(",train,"), 7, ",test,");
+  const auto made = json(post("/api/v1/datasets", csv, "text/csv", {{"name", "leaky"}}));
+  EXPECT_EQ(made["leak"], true);
+  EXPECT_EQ(made["report"]["shared"]["environments"][0], "room 0");
+}
+
+TEST_F(LearningService, TrainsTheSameBytesTwiceAndMeasuresOnTheRoomItNeverSaw) {
+  const auto a = train("nlos_id", "logistic"), b = train("nlos_id", "logistic");
+  EXPECT_EQ(get(a.value("model", "") + "/artifact").body, get(b.value("model", "") + "/artifact").body);
+  // 6 dB apart with 1.5 dB of noise: a line separates them.
+  EXPECT_GT(a["test"]["accuracy"], 0.95);
+  EXPECT_EQ(a["test"]["n"], 30);
+  const auto base = "/api/v1/training-runs/" + a.value("id", "");
+  for (const char* part : {"folds", "grid", "importance", "selection", "confusion", "roc", "cdf"})
+    EXPECT_EQ(get(base + "/" + part).status, 200) << part;
+  EXPECT_EQ(json(get(base + "/predictions", {{"split", "test"}}))["items"].size(), 30u);
+}
+
+TEST_F(LearningService, PromotesOnlyACorrectionThatHelpsUnlessAReasonIsGiven) {
+  EXPECT_EQ(json(get("/api/v1/models/active"))["raw"], true);
+  const auto none = train("los_bias", "none");
+  const auto refused = promote(none);
+  EXPECT_EQ(refused.status, 422) << refused.body;
+  EXPECT_EQ(promote(none, R"({"reason":"as an example"})").status, 200);
+  const auto helps = train("los_bias", "constant");
+  const auto done = promote(helps);
+  EXPECT_EQ(done.status, 200) << done.body;
+  EXPECT_EQ(json(done)["gate"]["passed"], true);
+  EXPECT_EQ(promote(helps).status, 422);  // it is active already
+  const auto back = post("/api/v1/models/rollback", R"({"task":"los_bias"})");
+  ASSERT_EQ(back.status, 200);
+  EXPECT_EQ("/api/v1/models/" + json(back).value("model", ""), none["model"]);
+  EXPECT_TRUE(json(post("/api/v1/models/rollback", R"({"task":"los_bias"})"))["model"].is_null());
+  EXPECT_EQ(post("/api/v1/models/rollback", R"({"task":"los_bias"})").status, 422);
+  EXPECT_EQ(json(get("/api/v1/models/promotions"))["items"].size(), 4u);
+}
+
+TEST_F(LearningService, PredictsAndSaysWhatASampleLacks) {
+  const auto sample = R"({"sample":{"distance_m":6,"rx_dbm":-81,"fp_dbm":-83}})";
+  EXPECT_EQ(json(post("/api/v1/models/active/predict", sample))["note"], "no model is promoted");
+  const auto run = train("nlos_id", "logistic");
+  ASSERT_EQ(promote(run).status, 200);
+  const auto judged = json(post("/api/v1/models/active/predict", sample));
+  EXPECT_EQ(judged["los"], true);
+  EXPECT_GT(judged["p_los"], 0.5);
+  const auto batch =
+      json(post(run.value("model", "") + "/predict",
+                R"({"samples":[{"distance_m":6,"rx_dbm":-81,"fp_dbm":-89},{"distance_m":6}]})"));
+  EXPECT_EQ(batch["items"][0]["los"], false);
+  EXPECT_TRUE(batch["items"][1]["p_los"].is_null());
+  EXPECT_NE(batch["items"][1].value("note", "").find("fp_dbm"), std::string::npos) << batch;
+  EXPECT_EQ(post("/api/v1/models/active/predict", R"({"sample":{"fp_dmb":1}})").status, 422);
+}
+
+TEST_F(LearningService, KeepsRolesApart) {
+  Call viewer;
+  viewer.roles = {api::Role::viewer};
+  EXPECT_EQ(call(api::Method::get, "/api/v1/models", "", viewer).status, 200);
+  EXPECT_EQ(call(api::Method::post, "/api/v1/training-runs", "{}", viewer).status, 403);
+  Call gateway;
+  gateway.roles = {api::Role::gateway};
+  EXPECT_EQ(call(api::Method::post, "/api/v1/campaigns", R"({"name":"from the field"})", gateway).status,
+            201);
+  EXPECT_EQ(call(api::Method::post, "/api/v1/datasets", "{}", gateway).status, 403);
+}
+
+}  // namespace
+}  // namespace anchord::test

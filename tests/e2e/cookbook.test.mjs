@@ -1,0 +1,38 @@
+// The cookbook's commands, taken from the page and run by a shell against the real binary.
+import assert from 'node:assert/strict';
+import { spawn } from 'node:child_process';
+import { cpSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { test } from 'node:test';
+import { root, startServer } from './server.mjs';
+
+/** The ```sh blocks of a page, in order. */
+function commandsOf(page) {
+  return [...page.matchAll(/^```sh\n([\s\S]*?)^```$/gm)].map((match) => match[1]);
+}
+
+function shell(script, { cwd, env }) {
+  return new Promise((done, fail) => {
+    const child = spawn('bash', ['-euo', 'pipefail', '-x', '-c', script], { cwd, env, stdio: ['ignore', 'pipe', 'pipe'] });
+    let output = '';
+    for (const stream of [child.stdout, child.stderr]) stream.setEncoding('utf8').on('data', (chunk) => (output += chunk));
+    child.once('error', fail);
+    child.once('close', (code) => done({ code, output }));
+  });
+}
+
+test('every command of the cookbook does what the page says', async () => {
+  const commands = commandsOf(readFileSync(join(root, 'docs/cookbook.md'), 'utf8'));
+  assert.ok(commands.length >= 12, `${commands.length} blocks`);
+  const server = await startServer({ auth: 'on' });
+  const cwd = mkdtempSync(join(tmpdir(), 'anchord cookbook '));
+  try {
+    cpSync(join(root, 'docs/examples'), join(cwd, 'docs/examples'), { recursive: true });
+    const { code, output } = await shell(commands.join('\n'), { cwd, env: { ...process.env, U: server.url, T: server.token } });
+    assert.equal(code, 0, output.slice(-4000));
+  } finally {
+    await server.dispose();
+    rmSync(cwd, { recursive: true, force: true });
+  }
+});
