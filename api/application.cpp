@@ -34,7 +34,8 @@ struct Application::State {
         device_ingest(deps.measurements, missions),
         jobs(deps.jobs, hub, deps.clock),
         geo(deps.geoid_dir),
-        calibrations({deps.measurements, deps.missions, deps.anchors, jobs, deps.clock, profiles_of(deps)}),
+        calibrations({deps.measurements, deps.missions, deps.anchors, jobs, deps.clock, profiles_of(deps),
+                      models.get(), deps.learning != nullptr ? &deps.learning->models : nullptr}),
         services{deps, hub, events, missions, ingest, jobs, calibrations, geo, profiles.get(), deps.frames} {
     router.on_fault(deps.log_fault);
     add_mission_routes(router, services);

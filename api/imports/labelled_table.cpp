@@ -28,10 +28,10 @@ constexpr std::size_t k_none = static_cast<std::size_t>(-1);
 constexpr std::size_t k_time_blocks = 10;
 constexpr double k_nan = std::numeric_limits<double>::quiet_NaN();
 
-void split(std::string_view line, std::vector<std::string_view>& cells) {
+void split(std::string_view line, std::vector<std::string_view>& cells, char separator = ',') {
   cells.clear();
   while (true) {
-    const auto comma = line.find(',');
+    const auto comma = line.find(separator);
     auto cell = line.substr(0, comma);
     if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"') cell = cell.substr(1, cell.size() - 2);
     while (!cell.empty() && cell.front() == ' ') cell.remove_prefix(1);
@@ -50,6 +50,33 @@ double number(std::string_view cell) {
 
 std::optional<double> finite(double value) { return std::isnan(value) ? std::nullopt : std::optional{value}; }
 
+/// Comma, semicolon or tab: the one the header has most of.
+char separator_of(std::string_view header) {
+  char best = ',';
+  for (const char c : {';', '\t'})
+    if (std::count(header.begin(), header.end(), c) > std::count(header.begin(), header.end(), best))
+      best = c;
+  return best;
+}
+
+/// "FP Power [dBm]" and "fp_power_dbm" are one name.
+std::string plain_name(std::string_view name) {
+  std::string out;
+  for (const char c : name) {
+    if (c >= 'A' && c <= 'Z')
+      out += static_cast<char>(c - 'A' + 'a');
+    else if ((c >= 'a' && c <= 'z') || (c >= '0' && c <= '9'))
+      out += c;
+  }
+  return out;
+}
+
+/// Metres of one unit of a column, by the end of its name.
+double metres_per_unit(std::string_view name) {
+  const auto plain = plain_name(name);
+  return plain.ends_with("mm") ? 1e-3 : plain.ends_with("cm") ? 1e-2 : 1.0;
+}
+
 struct Header {
   std::vector<std::string> names;
   std::size_t of(std::string_view name) const {
@@ -59,6 +86,11 @@ struct Header {
   std::size_t first(const Names& candidates) const {
     for (const auto name : candidates)
       if (const auto at = of(name); at != k_none) return at;
+    for (const auto name : candidates) {
+      const auto wanted = plain_name(name);
+      for (std::size_t i = 0; i < names.size(); ++i)
+        if (plain_name(names[i]) == wanted) return i;
+    }
     return k_none;
   }
 };
@@ -141,8 +173,10 @@ class Reader {
     std::string_view line;
     BOOST_OUTCOME_TRY(const bool any, lines.next(line));
     if (!any) return make_error(Errc::bad_frame, file_ + ": empty file, a header line is needed");
+    if (line.starts_with("\xEF\xBB\xBF")) line.remove_prefix(3);
+    const char separator = separator_of(line);
     std::vector<std::string_view> cells;
-    split(line, cells);
+    split(line, cells, separator);
     BOOST_OUTCOME_TRY(take_header(cells));
     std::vector<std::size_t> joins;
     if (cir) {
@@ -157,7 +191,7 @@ class Reader {
       BOOST_OUTCOME_TRY(const bool more, lines.next(line));
       if (!more) break;
       if (line.empty()) continue;
-      split(line, cells);
+      split(line, cells, separator);
       if (cells.size() != header_.names.size())
         return make_error(Errc::bad_frame, file_ + ":" + std::to_string(lines.line_number()) + ": " +
                                                std::to_string(cells.size()) + " cells, the header has " +
@@ -195,12 +229,18 @@ class Reader {
  private:
   Result<std::size_t> column(const std::string& name) const {
     const auto at = header_.of(name);
-    if (at == k_none) {
-      std::string known;
-      for (const auto& n : header_.names) known += (known.empty() ? "" : ", ") + n;
-      return make_error(Errc::not_found, file_ + ": no column " + name + "; the columns are " + known);
-    }
+    if (at == k_none)
+      return make_error(Errc::not_found, file_ + ": no column " + name + "; the columns are " + columns());
     return at;
+  }
+
+  std::string columns() const {
+    std::string known;
+    for (const auto& n : header_.names) {
+      if (known.size() > 600) return known + ", ...";
+      known += (known.empty() ? "" : ", ") + n;
+    }
+    return known;
   }
 
   Result<void> take_header(const std::vector<std::string_view>& cells) {
@@ -211,8 +251,15 @@ class Reader {
     }
     header_ = std::move(fresh);
     range_ = header_.first(k_range);
-    if (range_ == k_none)
-      return make_error(Errc::not_found, file_ + ": no column of measured ranges (range_m, distance_m)");
+    if (!options_.range.empty()) {
+      BOOST_OUTCOME_TRY(range_, column(options_.range));
+    }
+    if (range_ == k_none && (truth_given() || no_levels()))
+      return make_error(Errc::not_found,
+                        file_ +
+                            ": no column of measured ranges (range_m, distance_m): name it with --range; "
+                            "the columns are " +
+                            columns());
     label_ = header_.first(k_label);
     if (!options_.label.empty()) {
       BOOST_OUTCOME_TRY(label_, column(options_.label));
@@ -248,6 +295,9 @@ class Reader {
   void find_raw_columns() {
     raw_columns_.clear();
     for (const auto& name : out_.raw_names) raw_columns_.push_back(header_.of(name));
+    for (const auto* names : {&k_rx, &k_fp, &k_f1, &k_f2, &k_f3, &k_cir_power, &k_count, &k_std_noise,
+                              &k_max_noise, &k_fp_index, &k_height, &k_heading})
+      level_columns_[names] = header_.first(*names);
   }
 
   Result<void> choose_groups() {
@@ -290,6 +340,30 @@ class Reader {
     return boost::outcome_v2::success();
   }
 
+  /// The column says by its name what 0 and 1 mean, and nobody said otherwise.
+  bool named_after_class() const {
+    const auto name = plain_name(header_.names[label_]);
+    return options_.los_value.empty() &&
+           (name == "nlos" || name == "isnlos" || name == "los" || name == "islos");
+  }
+  /// 1 for yes, 0 for no, and the classes by their names.
+  static std::optional<char> class_word(std::string_view cell) {
+    const auto word = plain_name(cell);
+    const double value = number(cell);
+    if (value == 0 || word == "false" || word == "no") return '0';
+    if (value == 1 || word == "true" || word == "yes") return '1';
+    if (word == "los") return 'L';
+    if (word == "nlos") return 'N';
+    return std::nullopt;
+  }
+
+  bool truth_given() const { return !options_.truth.empty() || header_.first(k_truth) != k_none; }
+  bool no_levels() const {
+    for (const auto* names : {&k_rx, &k_fp, &k_f1, &k_cir_power, &k_std_noise})
+      if (header_.first(*names) != k_none) return false;
+    return true;
+  }
+
   void drop(const std::string& reason, std::size_t line) {
     auto& entry = out_.dropped[reason];
     if (entry.first++ == 0) entry.second = file_ + ":" + std::to_string(line);
@@ -299,25 +373,28 @@ class Reader {
     values_.clear();
     for (const auto cell : cells) values_.push_back(number(cell));
     const auto value = [&](const Names& names) {
-      const auto at = header_.first(names);
+      const auto at = level_columns_.at(&names);
       return at == k_none ? std::nullopt : finite(values_[at]);
     };
-    const double range = values_[range_];
-    if (!(range > 0))
+    // A set without ranges can still tell classes by levels.
+    const double range = range_ == k_none ? 0 : values_[range_] * metres_per_unit(header_.names[range_]);
+    if (range_ != k_none && !(range > 0))
       return drop(
           std::isnan(range) ? header_.names[range_] + " missing" : header_.names[range_] + " not above zero",
           line);
     if (range > 1e4) return drop(header_.names[range_] + " beyond 10 km", line);
     std::optional<double> truth;
     if (truth_ != k_none) {
-      truth = finite(values_[truth_]);
+      truth = finite(values_[truth_] * metres_per_unit(header_.names[truth_]));
       if (!truth) return drop(header_.names[truth_] + " missing", line);
       if (!(*truth > 0) || *truth > 1e4) return drop(header_.names[truth_] + " impossible", line);
     }
     if (label_ != k_none && cells[label_].empty()) return drop(header_.names[label_] + " missing", line);
+    if (label_ != k_none && named_after_class() && !class_word(cells[label_]))
+      return drop(header_.names[label_] + " is neither 0 nor 1, LOS nor NLOS", line);
 
     nlos::DiagnosticSample s;
-    s.range_m = range;
+    if (range_ != k_none) s.range_m = range;
     s.rx_dbm = value(k_rx), s.fp_dbm = value(k_fp);
     s.fp_amp1 = value(k_f1), s.fp_amp2 = value(k_f2), s.fp_amp3 = value(k_f3);
     s.cir_power = value(k_cir_power), s.preamble_count = value(k_count);
@@ -347,12 +424,18 @@ class Reader {
     if (label_ == k_none) return boost::outcome_v2::success();
     std::string los_value = options_.los_value;
     const auto& name = header_.names[label_];
-    if (los_value.empty() && (name == "nlos" || name == "is_nlos")) los_value = "0";
-    if (los_value.empty() && (name == "los" || name == "is_los")) los_value = "1";
-    if (los_value.empty())
-      los_value = std::find(labels_.begin(), labels_.end(), "LOS") != labels_.end()
-                      ? "LOS"
-                      : *std::min_element(labels_.begin(), labels_.end());
+    if (named_after_class()) {
+      const bool nlos = plain_name(name).ends_with("nlos");
+      for (std::size_t i = 0; i < labels_.size(); ++i) {
+        const char word = class_word(labels_[i]).value_or('N');
+        out_.los[i] = word == 'L' || word == (nlos ? '0' : '1');
+      }
+      return boost::outcome_v2::success();
+    }
+    for (const char* word : {"LOS", "los", "Los"})
+      if (los_value.empty() && std::find(labels_.begin(), labels_.end(), word) != labels_.end())
+        los_value = word;
+    if (los_value.empty()) los_value = *std::min_element(labels_.begin(), labels_.end());
     std::size_t los = 0;
     for (std::size_t i = 0; i < labels_.size(); ++i) {
       const double a = number(labels_[i]), b = number(los_value);
@@ -371,6 +454,7 @@ class Reader {
   Header header_{};
   std::size_t range_{k_none}, label_{k_none}, truth_{k_none};
   std::vector<std::size_t> group_columns_, placement_columns_, raw_columns_;
+  std::map<const Names*, std::size_t> level_columns_;  ///< what features are computed from
   std::vector<double> values_;
   std::vector<std::string> labels_;
   Ids groups_, placements_;

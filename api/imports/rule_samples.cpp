@@ -36,7 +36,8 @@ std::vector<nlos::RuleSample> rule_samples(const LabelledTable& table) {
     const auto& f = table.features[i];
     nlos::RuleSample s;
     s.los = table.los[i].value_or(false);
-    s.distance_m = table.true_range_m[i] ? table.true_range_m[i] : std::optional{table.range_m[i]};
+    s.distance_m = table.true_range_m[i];
+    if (!s.distance_m && table.range_m[i] > 0) s.distance_m = table.range_m[i];
     s.rss_dbm = f.get(Feature::rx_dbm);
     s.kurtosis = f.get(Feature::kurtosis);
     s.mean_excess_delay_ns = f.get(Feature::mean_excess_delay_ns);

@@ -4,6 +4,7 @@
 #include "api/json/reader.hpp"
 #include "api/json/wire_learning.hpp"
 #include "api/learning/freeze.hpp"
+#include "api/learning/rule_rows.hpp"
 #include "api/routes/learning.hpp"
 #include "api/routes/support.hpp"
 
@@ -129,6 +130,32 @@ Response rows(LearningServices& l, const Request& request) {
   return list_response(request, std::move(items), i < table.rows.size() ? std::to_string(i) : "");
 }
 
+/// Tables 5.2 and 5.3 for this data set.
+Response rules(LearningServices& l, const Request& request) {
+  check_query(request, {"group_by", "seed"});
+  const auto record = named(l, request);
+  std::uint64_t seed = 1;
+  if (const auto text = request.query_value("seed")) {
+    const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), seed);
+    if (error != std::errc{} || end != text->data() + text->size())
+      throw_problem(422, "validation", "seed must be a whole number",
+                    {{"/seed", "bad_value", "must be a whole number"}});
+  }
+  const auto group_by = place_of(request.query_value("group_by").value_or("environment"));
+  if (!group_by)
+    throw_problem(422, "validation", "group_by is not known",
+                  {{"/group_by", "unknown_value", "must be environment, campaign or setting"}});
+  const auto table =
+      value_or_problem(DatasetTable::parse(value_or_problem(l.stores.datasets.csv(record.id))));
+  auto report = value_or_problem(rules_of(table, record.name, *group_by, seed));
+  const auto all = Ordered::parse(rules_json({report}));
+  Ordered json = all.at("data_sets").at(0);
+  json.erase("data_set");
+  json["dataset"] = to_string(record.id);
+  json["positive"] = "los";
+  return json_response(200, json);
+}
+
 }  // namespace
 
 void add_dataset_routes(Router& router, LearningServices& l) {
@@ -154,6 +181,7 @@ void add_dataset_routes(Router& router, LearningServices& l) {
                 return response;
               }});
   router.add({Method::get, "/api/v1/datasets/{id}/rows", readers(), on(rows)});
+  router.add({Method::get, "/api/v1/datasets/{id}/rules", readers(), on(rules)});
 }
 
 }  // namespace anchord::api

@@ -62,8 +62,9 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
     options.min_fix = static_cast<FixClass>(*fix);
   if (const auto profile = fields.word("profile", {"kit", "none"})) out.use_profile = *profile == 0;
   if (const auto steps = fields.integer("iterations", 0, 50)) out.iterations = static_cast<int>(*steps);
-  for (const char* later :
-       {"frame", "use_anchor_anchor", "models", "sigma_m", "initial", "compare_uncorrected"}) {
+  if (const Json* models = fields.child("models")) out.models = read_flight_models(*models, errors);
+  out.compare_uncorrected = fields.boolean("compare_uncorrected").value_or(true);
+  for (const char* later : {"frame", "use_anchor_anchor", "sigma_m", "initial"}) {
     if (fields.child(later) != nullptr)
       fields.error(later, "unsupported", std::string(later) + " cannot be set in this version");
   }
@@ -77,7 +78,7 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
 }
 
 Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission,
-                               const std::function<bool()>& canceled) {
+                               const std::function<bool()>& canceled, bool with_cir) {
   FlightData flight;
   flight.mission = mission;
   MeasurementStore::Filter filter;
@@ -89,6 +90,8 @@ Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission,
     for (auto& row : page.rows) flight.fixes.push_back(std::move(row));
     filter.after = page.next;
   } while (!filter.after.empty());
+  filter.with_cir = with_cir;
+  if (with_cir) filter.limit = 1000;  // 4 kB each
   do {
     if (canceled()) return make_error(Errc::canceled, "canceled");
     BOOST_OUTCOME_TRY(auto page, store.ranges(filter));
@@ -106,6 +109,7 @@ struct CalibrationService::Solved {
   std::vector<KitProfile> learned;
   Json profiles = Json::array();
   Evidence evidence;
+  std::vector<FlightModelsReport> models;  ///< what they did to each flight
 
   std::vector<std::size_t> of_kit(const std::string& kit) const {
     std::vector<std::size_t> out;
@@ -180,16 +184,35 @@ Json flight_provenance(const FlightData& flight, const FlightSolution& s) {
           {"notes", s.notes}};
 }
 
+/// Where an anchor would stand without the models, and how far they moved it.
+Json without_models(const Estimate& raw, const Calibration& made) {
+  const auto at = std::ranges::find(made.anchors, raw.anchor, &Estimate::anchor);
+  Json out{{"network_id", to_string(raw.anchor)}, {"enu_m", nullptr}, {"moved_m", nullptr}};
+  if (!raw.best) return out;
+  const auto& p = raw.best->position.m;
+  out["enu_m"] = {p.x(), p.y(), p.z()};
+  if (at != made.anchors.end() && at->best) out["moved_m"] = (at->best->position.m - p).norm();
+  return out;
+}
+
 }  // namespace
 
 Result<Job> CalibrationService::submit(CalibrationRequest request) {
   for (const auto& id : request.missions) {
     BOOST_OUTCOME_TRYV(deps_.missions.mission(id));
   }
+  ModelRegistry::Active models;
+  if (deps_.models != nullptr && deps_.model_store != nullptr) {
+    // Chosen now: a promotion while the job waits changes nothing of what was asked for.
+    auto chosen = models_for(request.models, *deps_.models, *deps_.model_store);
+    if (!chosen) return make_error(Errc::invalid_argument, "models: " + chosen.error().message);
+    models = std::move(chosen).value();
+  }
   const std::string settings = request.settings_json;
   return deps_.jobs.submit(
-      "calibration", settings, [this, wanted = std::move(request)](JobContext& job) -> Result<JobEnd> {
-        BOOST_OUTCOME_TRY(const auto solved, solve(wanted, job));
+      "calibration", settings,
+      [this, wanted = std::move(request), models = std::move(models)](JobContext& job) -> Result<JobEnd> {
+        BOOST_OUTCOME_TRY(const auto solved, solve(wanted, models, job));
         const Calibration& made = solved.calibration;
         BOOST_OUTCOME_TRYV(deps_.anchors.insert(made));
         const std::string id = to_string(made.id);
@@ -243,7 +266,19 @@ Result<void> CalibrationService::solve_kit(const CalibrationRequest& request, co
   return boost::outcome_v2::success();
 }
 
+Result<void> CalibrationService::solve_kits(const CalibrationRequest& request, const FlightOptions& options,
+                                            Solved& solved) {
+  solved.solutions.resize(solved.flights.size());
+  std::set<std::string> kits;
+  for (const auto& flight : solved.flights) kits.insert(flight.mission.kit);
+  for (const auto& kit : kits) {
+    BOOST_OUTCOME_TRYV(solve_kit(request, options, solved, kit));
+  }
+  return boost::outcome_v2::success();
+}
+
 Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRequest& request,
+                                                             const ModelRegistry::Active& models,
                                                              JobContext& job) {
   const auto canceled_now = [&] { return job.canceled(); };
   Solved solved;
@@ -251,7 +286,7 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
   all.insert(all.end(), request.learn_from.begin(), request.learn_from.end());
   for (const auto& id : all) {
     BOOST_OUTCOME_TRY(auto mission, deps_.missions.mission(id));
-    BOOST_OUTCOME_TRY(auto flight, load_flight(deps_.measurements, mission, canceled_now));
+    BOOST_OUTCOME_TRY(auto flight, load_flight(deps_.measurements, mission, canceled_now, models.needs_cir));
     solved.flights.push_back(std::move(flight));
     job.progress(0.3 * static_cast<double>(solved.flights.size()) / static_cast<double>(all.size()), "load",
                  solved.flights.back().mission.name);
@@ -261,21 +296,43 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
   Calibration& out = solved.calibration;
   BOOST_OUTCOME_TRYV(choose_frame(solved.flights, options, out));
   job.progress(0.3, "solve", std::to_string(solved.flights.size()) + " flights");
-  solved.solutions.resize(solved.flights.size());
-  std::set<std::string> kits;
-  for (const auto& flight : solved.flights) kits.insert(flight.mission.kit);
-  for (const auto& kit : kits) {
-    BOOST_OUTCOME_TRYV(solve_kit(request, options, solved, kit));
+  Solved raw;  // the same without the models
+  CalibrationRequest wanted = request;
+  if (!models.predictor.empty()) {
+    raw.flights = solved.flights;
+    std::size_t n_corrected = 0;
+    for (auto& flight : solved.flights) {
+      solved.models.push_back(correct_flight(models, flight));
+      n_corrected += solved.models.back().n_corrected;
+    }
+    // A kit's profile tells the bias of raw ranges: of corrected ones it would take it off twice, and what
+    // these teach is no bias of the kit.
+    if (n_corrected > 0) wanted.use_profile = false;
+    if (n_corrected == 0 || !request.compare_uncorrected) raw.flights.clear();
+  }
+  for (auto* flights : {&solved.flights, &raw.flights})
+    for (auto& flight : *flights)
+      for (auto& range : flight.ranges) range.cir.reset();
+  BOOST_OUTCOME_TRYV(solve_kits(wanted, options, solved));
+  if (!raw.flights.empty()) {
+    job.progress(0.7, "solve", "without the models");
+    wanted = request;
+    wanted.iterations = 0;
+    BOOST_OUTCOME_TRYV(solve_kits(wanted, options, raw));
+    solved.learned = std::move(raw.learned);
   }
   if (canceled_now()) return make_error(Errc::canceled, "canceled");
 
-  std::map<NetworkId, std::vector<Estimate>> by_anchor;
+  std::map<NetworkId, std::vector<Estimate>> by_anchor, by_anchor_raw;
   Json flights = Json::array();
   for (std::size_t i = 0; i < request.missions.size(); ++i) {
     const auto& solution = *solved.solutions[i];
     for (const auto& anchor : solution.anchors) by_anchor[anchor.estimate.anchor].push_back(anchor.estimate);
     solved.evidence.flights.push_back(evidence_of(solved.flights[i], solution, out.origin));
     flights.push_back(flight_provenance(solved.flights[i], solution));
+    if (raw.flights.empty()) continue;
+    for (const auto& anchor : raw.solutions[i]->anchors)
+      by_anchor_raw[anchor.estimate.anchor].push_back(anchor.estimate);
   }
   for (const auto& [id, estimates] : by_anchor) {
     Estimate estimate = fuse_estimates(estimates);
@@ -286,6 +343,9 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
     }
     out.anchors.push_back(std::move(estimate));
   }
+  Json uncorrected = raw.flights.empty() ? Json(nullptr) : Json::array();
+  for (const auto& [id, estimates] : by_anchor_raw)
+    uncorrected.push_back(without_models(fuse_estimates(estimates), out));
   Json base = nullptr;
   if (const auto& site = solved.flights.front().mission.site) {
     if (const auto found = deps_.anchors.site(*site)) base = site_base(found.value());
@@ -293,6 +353,8 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
   out.provenance_json = Json{
       {"profiles", std::move(solved.profiles)},
       {"base", std::move(base)},
+      {"models", models.predictor.empty() ? Json(nullptr) : Json(flight_models_json(models, solved.models))},
+      {"uncorrected", std::move(uncorrected)},
       {"flights",
        std::move(flights)}}.dump();
   out.evidence_json = evidence_json(solved.evidence);

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "api/http/problem.hpp"
+#include "api/learning/flight_models.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
 #include "core/localize/flight_options.hpp"
@@ -27,15 +28,17 @@ struct CalibrationRequest {
   std::string settings_json;  ///< as accepted
   bool use_profile{true};     ///< the kit's stored profile tells the prior, and learns from these flights
   int iterations{0};          ///< growing parts of each flight solved too, for the report's curves
+  FlightModelsWish models{};  ///< what corrects the ranges before anything is solved
+  bool compare_uncorrected{true};  ///< the positions without the models are kept beside
 };
 
 /// Reads the body of POST /calibrations; what is wrong is appended to `errors`. Settings this build does not
-/// have (models, frame, use_anchor_anchor, ...) are refused as `unsupported`, never ignored.
+/// have (frame, use_anchor_anchor, ...) are refused as `unsupported`, never ignored.
 CalibrationRequest read_calibration_request(const nlohmann::json& body, std::vector<FieldError>& errors);
 
-/// All rows of a mission as the solver takes them.
+/// All rows of a mission as the solver takes them; impulse responses only where asked for.
 Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission,
-                               const std::function<bool()>& canceled);
+                               const std::function<bool()>& canceled, bool with_cir = false);
 
 /// Batch solves as jobs of kind `calibration`. Thread-safe.
 class CalibrationService {
@@ -46,7 +49,9 @@ class CalibrationService {
     AnchorStore& anchors;
     JobService& jobs;
     const Clock& clock;
-    KitProfiles* profiles{nullptr};  ///< null: flights learn from each other alone
+    KitProfiles* profiles{nullptr};        ///< null: flights learn from each other alone
+    const ModelRegistry* models{nullptr};  ///< null, or no store: ranges are used raw
+    ModelStore* model_store{nullptr};
   };
   explicit CalibrationService(Deps deps) : deps_(deps) {}
 
@@ -56,7 +61,9 @@ class CalibrationService {
  private:
   /// A calibration and what the profiles of its kits should learn from it.
   struct Solved;
-  Result<Solved> solve(const CalibrationRequest& request, JobContext& job);
+  Result<Solved> solve(const CalibrationRequest& request, const ModelRegistry::Active& models,
+                       JobContext& job);
+  Result<void> solve_kits(const CalibrationRequest& request, const FlightOptions& options, Solved& solved);
   Result<void> solve_kit(const CalibrationRequest& request, const FlightOptions& options, Solved& solved,
                          const std::string& kit);
   Deps deps_;

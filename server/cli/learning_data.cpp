@@ -13,6 +13,7 @@ void add_data_options(CLI::App& command, DataOptions& o) {
   command.add_option("--cir", o.cir, "CSV of CIR magnitudes m0, m1, ... joined by setup, idx or seq");
   command.add_option("--label", o.table.label, "Column of the class (default: nlos, los, label, cls)");
   command.add_option("--los-value", o.table.los_value, "Value of that column that means LOS");
+  command.add_option("--range", o.table.range, "Column of the measured range (default: range_m and its kin)");
   command.add_option("--truth", o.table.truth,
                      "Column of the true range (default: true_range_m and its kin)");
   command.add_option("--group-by", o.table.group_by, "Columns naming a place, which no split divides")

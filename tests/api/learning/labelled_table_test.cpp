@@ -61,6 +61,39 @@ TEST_F(LabelledTableTest, ReadsGzipAndPlainAlikeAndMapsColumnsByName) {
   EXPECT_NEAR(*t.features[1].get(nlos::Feature::rx_minus_fp_db), 10, 1e-12);
 }
 
+TEST_F(LabelledTableTest, ReadsWhatASpreadsheetMakesOfIt) {
+  // Byte-order mark, semicolons, CRLF, names with capitals and units, millimetres.
+  const auto t = read({plain("r.csv",
+                             "\xEF\xBB\xBF"
+                             "Room;NLOS;Range_mm;Ground Truth;RX dBm\r\n"
+                             "hall;0;5100;5.0;-80\r\noffice;1;6900;6.0;-85\r\n")});
+  ASSERT_TRUE(t) << t.error().message;
+  EXPECT_EQ(t.value().range_m, (std::vector<double>{5.1, 6.9}));
+  EXPECT_EQ(t.value().true_range_m[1], 6.0);
+  EXPECT_EQ(t.value().group_by, "Room");
+  EXPECT_EQ(t.value().los[0], true);
+  EXPECT_EQ(t.value().features[0].get(nlos::Feature::rx_dbm), -80);
+}
+
+TEST_F(LabelledTableTest, NeverTakesAnUnknownWordForNlos) {
+  const auto t = read({plain("r.csv", "nlos,range_m\n0,5\n1,6\nmaybe,7\nLOS,8\n")});
+  ASSERT_TRUE(t) << t.error().message;
+  EXPECT_EQ(t.value().rows(), 3U);
+  EXPECT_EQ(t.value().los[2], true);
+  EXPECT_NE(t.value().dropped.at("nlos is neither 0 nor 1, LOS nor NLOS").second.find("r.csv:4"),
+            std::string::npos);
+}
+
+TEST_F(LabelledTableTest, NamesTheColumnsOfAFileWithoutRangesAndTakesOneByName) {
+  const auto path = plain("r.csv", "env,dist_to_anchor,nlos\na,5,0\n");
+  const auto none = read({path});
+  ASSERT_FALSE(none);
+  EXPECT_NE(none.error().message.find("env, dist_to_anchor, nlos"), std::string::npos);
+  TableOptions options;
+  options.range = "dist_to_anchor";
+  EXPECT_TRUE(read({path}, options));
+}
+
 TEST_F(LabelledTableTest, DropsMissingAndImpossibleValuesAndSaysWhere) {
   const auto t = read({plain("r.csv",
                              "nlos,range_m,rx_dbm,fp_dbm\n0,0,-80,-82\n0,,-80,-82\n1,5,-inf,-82\n,4,-80,-"

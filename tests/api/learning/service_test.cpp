@@ -1,4 +1,5 @@
 // Campaign, data set, training run, promotion and live use through the routes, over a real database.
+#include "drivers/sim/flight.hpp"
 #include "tests/api/app_fixture.hpp"
 
 namespace anchord::test {
@@ -136,6 +137,65 @@ TEST_F(LearningService, PredictsAndSaysWhatASampleLacks) {
   EXPECT_TRUE(batch["items"][1]["p_los"].is_null());
   EXPECT_NE(batch["items"][1].value("note", "").find("fp_dbm"), std::string::npos) << batch;
   EXPECT_EQ(post("/api/v1/models/active/predict", R"({"sample":{"fp_dmb":1}})").status, 422);
+}
+
+TEST_F(LearningService, TellsWhatThePlainRulesAreWorth) {
+  const auto answer = get("/api/v1/datasets/set/rules");
+  ASSERT_EQ(answer.status, 200) << answer.body;
+  const auto rules = json(answer);
+  EXPECT_EQ(rules["los_rows"], 90);
+  // 2 dB and 8 dB between total and first path: the printed threshold of 6 dB separates them.
+  EXPECT_GT(rules["printed"]["first_path"]["los_rate"], 0.95);
+  EXPECT_GT(rules["fitted"]["first_path"]["nlos_rate"], 0.9);
+  EXPECT_FALSE(rules["fitted"].contains("kurtosis"));  // no impulse responses here
+  EXPECT_EQ(get("/api/v1/datasets/set/rules", {{"group_by", "moon"}}).status, 422);
+}
+
+TEST_F(LearningService, DerivesAnOldFlightAgainWithTheModelsAskedFor) {
+  sim::SimulationOptions simulated;
+  simulated.seed = 5;
+  simulated.range_rate_hz = 8;
+  auto flight = sim::simulate_flight(sim::demonstration_world(), simulated).value();
+  Mission mission = flight.data.mission;
+  mission.id.uuid = make_uuid_v7(clock_.now());
+  mission.created = clock_.now();
+  ASSERT_TRUE(database_->missions().insert(mission).has_value());
+  for (auto& range : flight.data.ranges) range.mission = mission.id;
+  for (auto& fix : flight.data.fixes) fix.mission = mission.id;
+  ASSERT_TRUE(database_->measurements().append_fixes(flight.data.fixes, true).has_value());
+  ASSERT_TRUE(database_->measurements().append_ranges(flight.data.ranges, true).has_value());
+  const auto solve = [&](const std::string& more) {
+    Call options;
+    options.headers["prefer"] = "wait=120";
+    return call(api::Method::post, "/api/v1/calibrations",
+                R"({"missions":[")" + to_string(mission.id) + "\"]" + more + "}", options);
+  };
+  const auto before = json(solve(""));
+  EXPECT_TRUE(before["provenance"]["models"].is_null()) << before["provenance"];
+
+  Call options;
+  options.headers["prefer"] = "wait=120";
+  const auto run = json(call(api::Method::post, "/api/v1/training-runs",
+                             R"({"task":"bias","dataset":"set","methods":["constant"],"features":["range_m"],
+                             "cv":{"folds":4,"seed":3},"importance":false})",
+                             options));
+  ASSERT_EQ(promote(run, R"({"reason":"made-up numbers"})").status, 200) << run;
+  const auto with = json(solve(""));
+  const auto& told = with["provenance"]["models"];
+  ASSERT_TRUE(told.is_object()) << with["provenance"];
+  EXPECT_EQ("/api/v1/models/" + told.value("bias", ""), run["model"]);
+  EXPECT_GT(told["flights"][0]["n_corrected"], 100);
+  // The same flight without the model is kept beside, as it was solved before.
+  ASSERT_EQ(with["provenance"]["uncorrected"].size(), before["anchors"].size());
+  const auto without = json(solve(R"(,"models":{"bias":"none"})"));
+  EXPECT_TRUE(without["provenance"]["models"].is_null());
+  EXPECT_EQ(without["anchors"].size(), before["anchors"].size());
+  EXPECT_EQ(solve(R"(,"models":{"bias":"0197b0ff-0000-7000-8000-000000000000"})").status, 422);
+  EXPECT_EQ(solve(R"(,"models":{"bias":"newest"})").status, 422);
+  // Ranges that were recorded keep what they were.
+  EXPECT_EQ(json(get("/api/v1/ranges",
+                     {{"mission", to_string(mission.id)}, {"limit", "1"}}))["items"][0]["distance_m"],
+            flight.data.ranges.front().distance_m);
 }
 
 TEST_F(LearningService, KeepsRolesApart) {
