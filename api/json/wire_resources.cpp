@@ -259,8 +259,8 @@ std::string_view job_state_word(JobState state) {
 
 Ordered job_json(const Job& job) {
   static const std::vector<std::string> k_solving{"queued", "load", "solve", "store"};
-  static const std::vector<std::string> k_training{"queued",     "load", "split", "search", "importance",
-                                                   "selection", "test", "store"};
+  static const std::vector<std::string> k_training{"queued",     "load",      "split", "search",
+                                                   "importance", "selection", "test",  "store"};
   const auto& k_stages = job.kind == "training" ? k_training : k_solving;
   std::size_t stage = 0;
   while (stage + 1 < k_stages.size() && k_stages[stage] != job.stage) ++stage;

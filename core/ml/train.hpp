@@ -79,6 +79,9 @@ struct SvmOptions {
   double coef0 = 0;
   int degree = 3;
   double epsilon_m = 0.01;  ///< tube of the regression
+  /// Fitted to this many rows at most, drawn evenly: time grows with their square, and a fit must end within
+  /// half a second or so of being told to stop.
+  std::size_t max_rows = 4000;
 };
 /// C-SVC or epsilon-SVR by libsvm; instance weights are not used (keep rows per placement equal instead). A
 /// score above 0 is LOS.

@@ -1,5 +1,6 @@
 #include <libsvm/svm.h>
 
+#include <algorithm>
 #include <memory>
 
 #include "core/ml/train.hpp"
@@ -32,17 +33,18 @@ int libsvm_kernel(Kernel kernel) {
 Result<Svm> fit_svm(const TrainingRows& rows, const SvmOptions& options, bool classification,
                     const Execution& run) {
   if (run.cancelled()) return make_error(Errc::canceled, "cancelled");
-  const std::size_t n = rows.n(), d = rows.d;
+  const std::size_t d = rows.d, n = std::min(rows.n(), std::max<std::size_t>(options.max_rows, 1));
   if (n == 0) return make_error(Errc::too_few_observations, "an SVM needs rows, got none");
   svm_set_print_string_function(&say_nothing);
   std::vector<svm_node> nodes(n * (d + 1));
   std::vector<svm_node*> starts(n);
   std::vector<double> y(n);
   for (std::size_t i = 0; i < n; ++i) {
+    const std::size_t row = (2 * i + 1) * rows.n() / (2 * n);  // evenly; itself where all are taken
     starts[i] = nodes.data() + i * (d + 1);
-    for (std::size_t j = 0; j < d; ++j) starts[i][j] = {static_cast<int>(j) + 1, rows.x[i * d + j]};
+    for (std::size_t j = 0; j < d; ++j) starts[i][j] = {static_cast<int>(j) + 1, rows.x[row * d + j]};
     starts[i][d] = {-1, 0};
-    y[i] = classification ? (rows.y[i] > 0.5 ? 1.0 : -1.0) : rows.y[i];
+    y[i] = classification ? (rows.y[row] > 0.5 ? 1.0 : -1.0) : rows.y[row];
   }
   svm_problem problem{static_cast<int>(n), y.data(), starts.data()};
   svm_parameter parameter{};
