@@ -10,9 +10,11 @@
 
 #include "api/imports/flight_folder.hpp"
 #include "api/json/flight_requests.hpp"
+#include "drivers/device/replay.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/flight_upload.hpp"
 #include "server/cli/progress.hpp"
+#include "server/cli/replay_recording.hpp"
 
 namespace anchord::cli {
 namespace {
@@ -21,8 +23,8 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr auto k_tick = std::chrono::milliseconds(100);
 
 struct Options {
-  std::string source, url{"http://127.0.0.1:8420"}, speed{"1"}, token_file, name;
-  bool loop{false};
+  std::string source, url{"http://127.0.0.1:8420"}, speed{"1"}, token_file, name, out;
+  bool loop{false}, url_given{false};
 };
 
 /// Infinity for "max"; nothing for what is no speed.
@@ -90,6 +92,9 @@ Result<FlightData> fetch_flight(RestClient& client, const std::string& id) {
 }
 
 int replay(const Options& options) {
+  const bool recording = device::is_recording(options.source);
+  if (recording && !options.url_given)
+    return replay_recording(options.source, options.out.empty() ? "-" : options.out, nullptr);
   const auto speed = parse_speed(options.speed);
   if (!speed) {
     std::fprintf(stderr, "anchord replay: --speed is a number above 0, or max: %s\n", options.speed.c_str());
@@ -105,6 +110,7 @@ int replay(const Options& options) {
     std::fprintf(stderr, "anchord replay: %s\n", client.error().message.c_str());
     return 2;
   }
+  if (recording) return replay_recording(options.source, {}, client.value().get());
   auto flight = parse_uuid(options.source) ? fetch_flight(*client.value(), options.source)
                                            : read_flight_folder(options.source);
   if (!flight) {
@@ -131,17 +137,27 @@ int replay(const Options& options) {
 }  // namespace
 
 void add_replay_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand("replay", "Play a flight through a running server as if it were live");
+  auto* command = app.add_subcommand("replay",
+                                     "Play a flight through a running server as if it were live, or derive "
+                                     "the rows of a raw recording again");
   auto options = std::make_shared<Options>();
-  command->add_option("flight", options->source, "Flight folder, or the id of a mission of that server")
+  command
+      ->add_option("flight", options->source,
+                   "Flight folder, id of a mission of that server, or raw recording (*.anrec)")
       ->required();
-  command->add_option("--url", options->url, "Running server")->capture_default_str();
+  auto* url = command->add_option("--url", options->url, "Running server; of a recording: where its rows go")
+                  ->capture_default_str();
+  command->add_option("--out", options->out,
+                      "Of a recording: folder for fixes.ndjson and ranges.ndjson; else standard output");
   command->add_option("--speed", options->speed, "Times real time, or max")->capture_default_str();
   command->add_option("--token-file", options->token_file,
                       "File with an access token (gateway and operator)");
   command->add_option("--name", options->name, "Name of the mission; else that of the flight");
   command->add_flag("--loop", options->loop, "Again and again, each time a new mission");
-  command->callback([options, &exit_code] { exit_code = replay(*options); });
+  command->callback([options, url, &exit_code] {
+    options->url_given = url->count() > 0;
+    exit_code = replay(*options);
+  });
 }
 
 }  // namespace anchord::cli

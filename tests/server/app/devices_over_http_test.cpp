@@ -4,13 +4,17 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "api/json/wire_rows.hpp"
 #include "core/base/time.hpp"
+#include "drivers/device/replay.hpp"
+#include "drivers/sim/rig.hpp"
 #include "tests/server/app/app_fixture.hpp"
 
 namespace anchord::test {
@@ -174,6 +178,80 @@ TEST(DevicesOverHttp, AServerStartedAgainKnowsItsDevices) {
   ASSERT_EQ(list["items"].size(), 1u);
   EXPECT_EQ(list["items"][0].value("state", ""), "talking") << list;
   EXPECT_TRUE(std::filesystem::exists(server.folder / "data" / "recordings"));
+}
+
+/// Lines without their leading row id, sorted: the database orders by time, the recording by arrival.
+std::vector<std::string> sorted_lines(const std::string& text) {
+  std::vector<std::string> out;
+  for (std::size_t at = 0; at < text.size();) {
+    const auto end = text.find('\n', at);
+    std::string line = text.substr(at, end - at);
+    if (line.starts_with("{\"id\":")) line = "{" + line.substr(line.find(',') + 1);
+    out.push_back(std::move(line));
+    at = end + 1;
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+// A simulated tag and a simulated rover through links, supervisors, drivers, recorder, queue and database;
+// then the recording alone through the drivers again.
+TEST(DevicesOverHttp, ARecordingGivesTheRowsThatWereStoredByteForByte) {
+  Rover server;
+  ASSERT_TRUE(server.app) << server.error.message;
+  sim::RigOptions options;
+  options.links_folder = server.folder.string();
+  auto rig = sim::Rig::open(std::make_shared<const sim::Scenario>(sim::demonstration_scenario()), options);
+  ASSERT_TRUE(rig) << rig.error().message;
+  std::atomic<bool> stop{false};
+  std::thread flying([&] {
+    while (!stop) rig.value()->step(20);
+  });
+  for (const auto& device : rig.value()->devices()) {
+    server.ask("POST", "/api/v1/devices",
+               {{"kind", device.kind}, {"name", device.name}, {"address", device.address}});
+    EXPECT_EQ(server.last.status, 201) << server.last.body;
+  }
+  const auto mission = server.ask("POST", "/api/v1/missions",
+                                  {{"name", "flight"}, {"frame", "wgs84"}, {"track_point", "gnss_antenna"}});
+  const std::string id = mission.value("id", ""), of_mission = "?format=ndjson&mission=" + id;
+  const auto ranges = server.until("/api/v1/ranges?limit=30&mission=" + id,
+                                   [](const Json& page) { return page["items"].size() >= 30; });
+  EXPECT_GE(ranges["items"].size(), 30u);
+  server.ask("POST", "/api/v1/missions/" + id + "/actions", {{"action", "finish"}});
+  EXPECT_EQ(server.last.status, 200) << server.last.body;
+  server.app.reset();
+  stop = true;
+  flying.join();
+
+  std::string fixes_again, ranges_again;
+  std::filesystem::path first;
+  for (const auto& entry : std::filesystem::directory_iterator(server.folder / "data" / "recordings"))
+    if (first.empty() || entry.path() < first) first = entry.path();
+  const MissionId wanted{parse_uuid(id).value()};
+  const device::ReplayRows rows{[&](const Fix& row) -> Result<void> {
+                                  if (row.mission == wanted)
+                                    fixes_again += api::fix_json(row, std::nullopt).dump() + '\n';
+                                  return boost::outcome_v2::success();
+                                },
+                                [&](const Range& row) -> Result<void> {
+                                  if (row.mission == wanted)
+                                    ranges_again += api::range_json(row, std::nullopt).dump() + '\n';
+                                  return boost::outcome_v2::success();
+                                }};
+  const auto replayed = device::replay(first, rows);
+  ASSERT_TRUE(replayed) << replayed.error().message;
+  EXPECT_EQ(replayed.value().unreadable_bytes, 0u);
+
+  const auto config = server::load_config(
+      Settings{{"listen", "127.0.0.1:0"}, {"auth", "off"}, {"data_dir", (server.folder / "data").string()}},
+      std::nullopt, {});
+  server.app = std::move(server::App::start(config.value())).value();
+  server.url = server.app->urls().front();
+  EXPECT_EQ(sorted_lines(server.call("GET", "/api/v1/fixes" + of_mission).body), sorted_lines(fixes_again));
+  const auto stored = sorted_lines(server.call("GET", "/api/v1/ranges" + of_mission + "&cir=true").body);
+  EXPECT_GE(stored.size(), 30u);
+  EXPECT_EQ(stored, sorted_lines(ranges_again));
 }
 
 }  // namespace
