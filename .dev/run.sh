@@ -1,4 +1,4 @@
-# cmd_run: build, serve on loopback without login, fly the simulated demonstration flight in a loop.
+# cmd_run: build, serve on loopback without login, fly the simulated demonstration through the real drivers, again and again.
 run_address=127.0.0.1:8420
 run_pids=()
 
@@ -19,25 +19,80 @@ http_status() {
   [[ $line =~ ^HTTP/1\.1\ ([0-9]{3}) ]] && echo "${BASH_REMATCH[1]}"
 } 2>/dev/null
 
+# Status code of POST PATH with a JSON body; the answer's body is left in $reply.
+http_post() {
+  local line length=0
+  reply=
+  exec 9<>"/dev/tcp/${run_address%:*}/${run_address#*:}" || return 1
+  printf 'POST %s HTTP/1.1\r\nHost: %s\r\nContent-Type: application/json\r\nContent-Length: %d\r\nConnection: close\r\n\r\n%s' \
+    "$1" "$run_address" "${#2}" "$2" >&9
+  IFS= read -r -t 5 line <&9 || line=
+  local status=${line:9:3}
+  while IFS= read -r -t 5 line <&9 && [[ $line != $'\r' ]]; do
+    [[ ${line,,} =~ ^content-length:\ *([0-9]+) ]] && length=${BASH_REMATCH[1]}
+  done
+  ((length == 0)) || IFS= read -r -t 5 -N "$length" reply <&9 || true
+  exec 9>&- 9<&-
+  echo "$status"
+} 2>/dev/null
+
+# Simulated devices on their ports; $devices is what the server is told of them. Fails when they do not come up.
+start_devices() {
+  local told=build/run-devices.jsonl tries=0
+  devices=
+  : >"$told"
+  "$1" simulate demonstration --json --seed "$2" >"$told" &
+  simulator=$!
+  run_pids+=("$simulator")
+  until (($(wc -l <"$told") >= 2)); do
+    kill -0 "$simulator" 2>/dev/null || return 1
+    ((++tries <= 50)) || return 1
+    sleep 0.2
+  done
+  devices=$(sed -n 's/.*"kind":"\([a-z]*\)".*"address":"\([^"]*\)".*/\1=\2/p' "$told" | paste -sd,)
+  [[ $devices == *pozyx=* && $devices == *gnss=* ]]
+}
+
+# A flight of four minutes through the drivers, again and again.
+fly_devices() {
+  local mission
+  while true; do
+    [[ $(http_post /api/v1/missions "{\"name\":\"demonstration\",\"kit\":\"simulated\",\"frame\":\"wgs84\",\"track_point\":\"gnss_antenna\",\"tags\":[{\"tag\":\"0x6e01\",\"antenna\":0,\"lever_arm_body_m\":[0.12,0,-0.28]}]}"; echo "$reply" >build/run-mission.json) == 201 ]] || return 1
+    mission=$(sed -n 's/.*"id":"\([0-9a-f-]*\)".*/\1/p' build/run-mission.json)
+    for _ in {1..240}; do sleep 1; done
+    http_post "/api/v1/missions/$mission/actions" '{"action":"finish"}' >/dev/null
+  done
+}
+
 cmd_run() {
   cmd_build anchord
   local server=$build_dir/anchord data=build/run-data flight=build/run-flight seed=${ANCHORD_DEMO_SEED:-7} tries=0
+  local devices= simulator= reply= server_pid
   [[ -z $(http_status /healthz) ]] || die "something already answers on $run_address: stop it first"
   trap stop_children EXIT
   trap 'stop_children; exit 130' INT
   trap 'stop_children; exit 143' TERM
   mkdir -p "$data"
-  "$server" serve --listen "$run_address" --auth=off --data-dir "$data" &
-  run_pids+=($!)
+  if [[ ${ANCHORD_DEMO:-devices} != upload ]] && ! start_devices "$server" "$seed"; then
+    say "the simulated devices did not come up: the flight is uploaded instead"
+    devices=
+  fi
+  "$server" serve --listen "$run_address" --auth=off --data-dir "$data" ${devices:+--devices "$devices"} &
+  server_pid=$!
+  run_pids+=("$server_pid")
   until [[ $(http_status /readyz) == 200 ]]; do
-    kill -0 "${run_pids[0]}" 2>/dev/null || die "the server ended at once: its own message stands above"
+    kill -0 "$server_pid" 2>/dev/null || die "the server ended at once: its own message stands above"
     ((++tries <= 150)) || die "the server is not ready after 30 s: see /readyz on http://$run_address"
     sleep 0.2
   done
   say "anchord is at http://$run_address/  (Ctrl-C ends it; data in $data)"
-  rm -rf "$flight"
-  "$server" simulate flight --seed "$seed" --out "$flight"
-  "$server" replay "$flight" --url "http://$run_address" --speed 1 --loop &
+  if [[ -n $devices ]]; then
+    fly_devices &
+  else
+    rm -rf "$flight"
+    "$server" simulate flight --seed "$seed" --out "$flight"
+    "$server" replay "$flight" --url "http://$run_address" --speed 1 --loop &
+  fi
   run_pids+=($!)
-  wait "${run_pids[0]}"
+  wait "$server_pid"
 }

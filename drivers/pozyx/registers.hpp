@@ -26,7 +26,7 @@ inline constexpr std::uint8_t reset = 0xb0, led_ctrl = 0xb1, tx_data = 0xb2, tx_
                               flash_details = 0xbb, devices_get_ids = 0xc0, devices_discover = 0xc1,
                               devices_calibrate = 0xc2, devices_clear = 0xc3, device_add = 0xc4,
                               device_get_info = 0xc5, device_get_coords = 0xc6, device_get_range_info = 0xc7,
-                              cir_data = 0xc8;
+                              cir_data = 0xc8, positioning_with_data = 0xcc;
 }  // namespace fn
 
 /// Bits of INT_STATUS (register 05). Reading it clears it.

@@ -94,6 +94,9 @@ Bytes PozyxTag::call(const Command& command, double now_s) {
     answer.accepted = command.data.size() == 2 && command.data[0] + command.data[1] <= 100;
     if (answer.accepted)
       answer.result.assign(rx_.begin() + command.data[0], rx_.begin() + command.data[0] + command.data[1]);
+    rx_unread_ = false;
+  } else if (command.address == fn::positioning_with_data) {
+    answer = position_with_data(command.data);
   } else if (auto plain = self_.call(command.address, command.data)) {
     answer = std::move(*plain);
   } else {
@@ -183,6 +186,24 @@ bool PozyxTag::position(double now_s) {
   return true;
 }
 
+/// Newer firmware: what DO_POSITIONING found, by flags. Bit 0 the position and its status, bit 15 the number
+/// of ranges used (none are told); sensors are not simulated here.
+PozyxDevice::Answer PozyxTag::position_with_data(ByteView parameters) {
+  PozyxDevice::Answer answer;
+  const unsigned flags = parameters.size() == 2 ? u16_at(parameters, 0) : 0u;
+  answer.accepted = setup_.firmware > 0x11 && (flags & 0x7ffe) == 0 && flags != 0;
+  if (!answer.accepted) {
+    self_.fail(0x0d);
+    return answer;
+  }
+  if (flags & 1) {
+    answer.result = self_.read(reg::pos_x, 12);
+    answer.result.push_back(1);  // a valid one
+  }
+  if (flags & 0x8000) answer.result.push_back(0);
+  return answer;
+}
+
 bool PozyxTag::send(ByteView parameters, double now_s) {
   if (parameters.size() != 3) return false;
   const std::uint16_t to = u16_at(parameters, 0);
@@ -261,7 +282,12 @@ void PozyxTag::remote_function(PozyxDevice& other, ByteView message, double now_
     ++exchanges_;
     const std::uint16_t to = u16_at(parameters, 0), from = other.id();
     const double took_s = air_s(other);
-    after(now_s + took_s, [this, to, from, took_s, push](double at_s) {
+    // The buffer holds one message: the result waits until the acknowledgement was read, though not for ever.
+    // Clients need some 10 ms for that, about as long as the fastest exchange lasts.
+    constexpr double k_patience_s = 0.1, k_look_s = 0.002;
+    rx_unread_ = true;
+    rx_full_until_s_ = now_s + took_s + k_patience_s;
+    const auto range = [this, to, from, took_s, push](double at_s) {
       PozyxDevice *a = device(from), *b = device(to);
       const auto measured = a && b ? exchange(*a, *b, at_s - 0.4 * took_s) : std::nullopt;
       if (!measured) return;  // the remote device has an error; nothing is pushed
@@ -269,11 +295,17 @@ void PozyxTag::remote_function(PozyxDevice& other, ByteView message, double now_
       Bytes distance;
       put_u32(distance, a->ranges()[to].distance_mm);
       push(pushed(from, distance), event::rx_data);
-    });
+    };
+    after(now_s + took_s, [this, range](double at_s) { when_read(at_s, k_look_s, range); });
   } else {
     answer[0] = 0;
   }
   push(pushed(other.id(), answer), event::func);
+}
+
+void PozyxTag::when_read(double at_s, double look_s, const std::function<void(double)>& done) {
+  if (!rx_unread_ || at_s >= rx_full_until_s_) return done(at_s);
+  after(at_s + look_s, [this, look_s, done](double later_s) { when_read(later_s, look_s, done); });
 }
 
 std::optional<Exchange> PozyxTag::exchange(PozyxDevice& from, PozyxDevice& to, double at_s) {

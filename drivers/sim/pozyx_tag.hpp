@@ -49,9 +49,12 @@ class PozyxTag {
   void range_local(std::uint16_t to, double now_s);
   bool discover(pozyx::ByteView parameters, double now_s);
   bool position(double now_s);
+  PozyxDevice::Answer position_with_data(pozyx::ByteView parameters);
   bool send(pozyx::ByteView parameters, double now_s);
   void answer_remote(PozyxDevice& device, pozyx::Bytes message, double now_s);
   void remote_function(PozyxDevice& device, pozyx::ByteView message, double now_s);
+  /// Once the host has read the receive buffer, or has had its time for it.
+  void when_read(double at_s, double look_s, const std::function<void(double)>& done);
   std::optional<Exchange> exchange(PozyxDevice& from, PozyxDevice& to, double at_s);
   void store_range(PozyxDevice& from, std::uint16_t to, const Exchange& exchange, double at_s);
   void after(double at_s, std::function<void(double)> done);
@@ -75,6 +78,8 @@ class PozyxTag {
   std::vector<Pending> pending_;
   pozyx::Bytes tx_ = pozyx::Bytes(100), rx_ = pozyx::Bytes(100);
   std::size_t tx_size_{0};
+  bool rx_unread_{false};
+  double rx_full_until_s_{0};
   double boot_s_{0};
   std::uint64_t exchanges_{0};
 };

@@ -109,7 +109,8 @@ int simulate_devices(const SimulateDevices& options) {
   auto scenario = sim::read_scenario(options.scenario);
   if (!scenario) return fail(scenario.error().message, 2);
   if (options.seed) scenario.value().seed = *options.seed;
-  Links links{options.links, options.links.empty()};
+  // Absolute, since an address is.
+  Links links{options.links.empty() ? fs::path() : fs::absolute(options.links), options.links.empty()};
   std::error_code error;
   if (links.own) {
     links.folder = fs::temp_directory_path() / ("anchord-simulate-" + std::to_string(::getpid()));

@@ -1,5 +1,5 @@
 // ./dev bench: one table. Every figure of ours stands beside a peer or a limit taken in the same run.
-//   node tests/bench/bench.mjs [solve] [ingest] [get] [fanout] [training]
+//   node tests/bench/bench.mjs [solve] [ingest] [get] [fanout] [training] [devices]
 import { execFileSync } from 'node:child_process';
 import { createServer } from 'node:http';
 import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
@@ -7,6 +7,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { LiveClient } from '../e2e/live.mjs';
 import { eventually, root, run, startServer } from '../e2e/server.mjs';
+import { devices } from './devices.mjs';
 import { cpuSeconds, hammer, percentile, request } from './load.mjs';
 
 const wanted = process.argv.slice(2);
@@ -208,10 +209,10 @@ if (on('solve')) {
   say('solving');
   solve();
 }
-if (['ingest', 'get', 'fanout', 'training'].some(on)) {
+if (['ingest', 'get', 'fanout', 'training', 'devices'].some(on)) {
   const server = await startServer();
   try {
-    for (const [name, task] of [['ingest', ingest], ['get', get], ['fanout', fanout], ['training', training]]) {
+    for (const [name, task] of [['ingest', ingest], ['get', get], ['fanout', fanout], ['training', training], ['devices', (s) => devices(s, row)]]) {
       if (!on(name)) continue;
       say(name);
       await task(server).catch((error) => {

@@ -166,6 +166,45 @@ TEST(SimulatedTag, RangesBetweenTwoOthers) {
   EXPECT_NEAR(u32_at(pushed, 1), 5657 + 80, 200);  // 4 m and 4 m at right angles
 }
 
+// The maker's Python client sleeps between its questions: the result of a fast remote exchange must not
+// overwrite the acknowledgement that it has not read yet.
+TEST(SimulatedTag, KeepsTheAcknowledgementUntilASlowHostHasReadIt) {
+  Scenario scenario = open_field();
+  scenario.tags[0].range_s = 0.005;
+  Host host(scenario);
+  host.ask("F,b2,00b50260,1");
+  host.ask("R,05,1");
+  EXPECT_EQ(host.ask("F,b3,016008,1"), "D,01");
+  EXPECT_EQ(host.poll(event::func, 0.5), event::func);
+  host.now_s += 0.05;
+  EXPECT_EQ(host.ask("R,82,3"), "D,016001");
+  host.now_s += 0.02;
+  EXPECT_EQ(host.ask("F,b4,0001,2"), "D,0101");
+  EXPECT_EQ(host.poll(event::rx_data, 0.1), event::rx_data);
+  EXPECT_EQ(host.ask("R,82,3"), "D,016004");
+  // Nobody reads: it comes all the same.
+  host.ask("F,b2,00b50260,1");
+  host.ask("F,b3,016008,1");
+  host.now_s += 0.3;
+  EXPECT_EQ(host.ask("R,05,1"), "D,18");
+}
+
+TEST(SimulatedTag, GivesItsPositionWithDataOnNewerFirmwareOnly) {
+  Scenario scenario = open_field();
+  scenario.world.anchors.push_back({{0x6004}, {0, -4, 1}});
+  Host host(scenario);
+  for (const char* id : {"0160", "0260", "0360", "0460"})
+    host.ask(std::string("F,c4,") + id + "01000000000000000000000000,1");
+  host.ask("R,05,1");
+  EXPECT_EQ(host.ask("F,b6,,1"), "D,01");
+  EXPECT_NE(host.poll(event::pos | event::err, 1) & event::pos, 0);
+  const std::string position = host.ask("R,30,12"), with_data = host.ask("F,cc,0100,73");
+  EXPECT_EQ(with_data, "D,01" + position.substr(2) + "01");  // three coordinates and a status
+  scenario.tags[0].firmware = 0x11;
+  Host old(scenario);
+  EXPECT_EQ(old.ask("F,cc,0100,73"), "D,00");
+}
+
 TEST(SimulatedTag, ForgetsTheGainWithNewSettingsAndHearsNobodyWithOthers) {
   Host host(open_field());
   host.ask("W,1f,30");
