@@ -29,8 +29,10 @@ Place place_of(const EnuFrame& frame, const Eigen::Vector2d& p) {
 }
 
 Json predicted_json(const planning::FlightPlan& plan) {
-  return {
-      {"n_anchors_assumed", plan.assumed_anchors_m.size()}, {"rms_m", plan.rms_m}, {"worst_m", plan.worst_m}};
+  return {{"n_anchors_assumed", plan.assumed_anchors_m.size()},
+          {"n_out_of_range", plan.n_out_of_range},
+          {"rms_m", plan.rms_m},
+          {"worst_m", plan.worst_m}};
 }
 
 }  // namespace

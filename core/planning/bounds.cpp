@@ -29,6 +29,12 @@ void for_each_edge(const Polygon& polygon, Visit&& visit) {
   for (std::size_t i = 0; i < polygon.size(); ++i) visit(polygon[i], polygon[(i + 1) % polygon.size()]);
 }
 
+/// No two points of the boxes round two segments are nearer than this.
+double box_gap_m(const Vector2d& a, const Vector2d& b, const Vector2d& c, const Vector2d& d) {
+  const Vector2d gap = (a.cwiseMin(b) - c.cwiseMax(d)).cwiseMax(c.cwiseMin(d) - a.cwiseMax(b));
+  return gap.cwiseMax(0.0).norm();
+}
+
 bool crosses_edge(const Polygon& polygon, const Vector2d& from, const Vector2d& to) {
   bool out = false;
   for_each_edge(polygon,
@@ -167,7 +173,9 @@ std::optional<Refusal> refuse_path(const Bounds& bounds, const Eigen::Vector3d& 
       return Refusal::path_blocked;
     double way = std::numeric_limits<double>::infinity();
     for_each_edge(area, [&](const Vector2d& a, const Vector2d& b) {
-      way = std::min(way, distance_between_segments_m(from, to, a, b));
+      // Beyond the keep-out the exact distance decides nothing.
+      if (box_gap_m(from, to, a, b) < bounds.keep_out_m)
+        way = std::min(way, distance_between_segments_m(from, to, a, b));
     });
     if (comes_too_near(distance_to_edge_m(area, from), distance_to_edge_m(area, to), way,
                        bounds.keep_out_m)) {

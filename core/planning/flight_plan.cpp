@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/planning/design.hpp"
+#include "core/planning/route.hpp"
 
 namespace anchord::planning {
 namespace {
@@ -17,33 +18,63 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double k_infinity = std::numeric_limits<double>::infinity();
+/// The ring lies so far beyond the keep-out that the chords round a corner, 3 m apart, stay outside it.
+constexpr double k_ring_margin_m = 0.35;
 
 struct Candidate {
   Vector3d point_m;
   double along{};  ///< place round the building, 0..1
 };
 
-std::vector<Vector3d> assumed_anchors(const FlightPlanInput& input, const FlightPlanOptions& options) {
+/// Whether enough of the flight could range it: four points at least.
+bool in_range(const Vector3d& anchor, const std::vector<Candidate>& all, double max_range_m) {
+  constexpr int k_needed = 4;
+  int seen = 0;
+  for (const auto& c : all) {
+    if ((c.point_m - anchor).norm() <= max_range_m && ++seen >= k_needed) return true;
+  }
+  return false;
+}
+
+/// A grid inside the outline. What nothing outside can range is counted and left out: it cannot be found
+/// whatever is flown, and would drown the others in the mean.
+std::vector<Vector3d> assumed_anchors(const FlightPlanInput& input, const FlightPlanOptions& options,
+                                      const std::vector<Candidate>& all, std::size_t& n_out_of_range) {
   Vector2d low{k_infinity, k_infinity}, high{-k_infinity, -k_infinity};
   for (const auto& corner : input.outline) low = low.cwiseMin(corner), high = high.cwiseMax(corner);
   std::vector<double> heights;
   for (double z = 2.5; z < std::max(input.building_height_m, 2.6); z += options.floor_m) heights.push_back(z);
+  const double reach_m = options.max_range_m - options.keep_out_m;
   std::vector<Vector3d> out;
   // A large hall gets a wider grid, not more anchors.
   for (double spacing = options.anchor_spacing_m;; spacing *= 1.3) {
     out.clear();
+    n_out_of_range = 0;
     const auto count = [&](double length) {
       return std::max(1, static_cast<int>(std::round(length / spacing)));
     };
     const int nx = count(high.x() - low.x()), ny = count(high.y() - low.y());
+    std::vector<Vector3d> near;
     for (int iy = 0; iy < ny; ++iy) {
       for (int ix = 0; ix < nx; ++ix) {
         const Vector2d p = low + Vector2d((ix + 0.5) / nx, (iy + 0.5) / ny).cwiseProduct(high - low);
         if (!contains(input.outline, p)) continue;
-        for (const double z : heights) out.push_back({p.x(), p.y(), z});
+        const bool far = distance_to_edge_m(input.outline, p) > reach_m;
+        if (far) n_out_of_range += heights.size();
+        for (const double z : heights) {
+          if (!far) near.push_back({p.x(), p.y(), z});
+        }
       }
     }
-    if (static_cast<int>(out.size()) <= options.max_anchors || nx * ny == 1) return out;
+    const bool too_many = static_cast<int>(near.size()) > options.max_anchors && nx * ny > 1;
+    if (too_many) continue;
+    for (const auto& anchor : near) {
+      if (in_range(anchor, all, options.max_range_m))
+        out.push_back(anchor);
+      else
+        ++n_out_of_range;
+    }
+    return out;
   }
 }
 
@@ -54,7 +85,8 @@ std::vector<Candidate> candidates(const FlightPlanInput& input, const FlightPlan
     heights = {2.0, std::max(3.0, input.building_height_m * 0.6), input.building_height_m + 4.0};
   std::vector<Candidate> out;
   for (const double extra : options.ring_m) {
-    const auto ring = ring_around(input.outline, options.keep_out_m + extra, options.spacing_m);
+    const auto ring =
+        ring_around(input.outline, options.keep_out_m + k_ring_margin_m + extra, options.spacing_m);
     for (std::size_t i = 0; i < ring.size(); ++i) {
       for (const double z : heights) {
         const Candidate c{{ring[i].x(), ring[i].y(), z},
@@ -168,7 +200,7 @@ Result<void> order(FlightPlan& plan, std::vector<Candidate> chosen, const Flight
   Vector2d middle{0, 0};
   for (const auto& corner : input.outline) middle += corner / static_cast<double>(input.outline.size());
   std::vector<Candidate> ring;
-  for (const auto& p : ring_around(input.outline, options.keep_out_m, options.spacing_m)) {
+  for (const auto& p : ring_around(input.outline, options.keep_out_m + k_ring_margin_m, options.spacing_m)) {
     const Candidate c{{p.x(), p.y(), bounds.min_height_m.value_or(0)}, 0};
     if (!refuse_point(bounds, c.point_m)) ring.push_back(c);
   }
@@ -180,10 +212,14 @@ Result<void> order(FlightPlan& plan, std::vector<Candidate> chosen, const Flight
     const Vector3d &from = chosen[i].point_m, &to = chosen[(i + 1) % chosen.size()].point_m;
     put(from, true);
     if (!refuse_path(bounds, from, to)) continue;
-    const auto way = way_round(ring, bounds, from, to);
+    auto way = way_round(ring, bounds, from, to);
     if (way.empty()) {
-      return make_error(Errc::not_found,
-                        "no legal way joins two points of the flight: widen the fence or the keep-out");
+      const auto any = route(bounds, from, to);
+      if (!any) {
+        return make_error(Errc::not_found,
+                          "no legal way joins two points of the flight: widen the fence or the keep-out");
+      }
+      way.assign(any->begin(), any->end() - 1);
     }
     for (const auto& p : way) put(p, false);
   }
@@ -194,6 +230,14 @@ Result<void> order(FlightPlan& plan, std::vector<Candidate> chosen, const Flight
   plan.n_measure = chosen.size();
   plan.duration_s = plan.length_m / options.speed_mps + static_cast<double>(chosen.size()) * options.dwell_s;
   return boost::outcome_v2::success();
+}
+
+/// Points of a pocket that nothing legal leads out of are given up; the larger part is flown.
+std::vector<Candidate> joined(const std::vector<Candidate>& chosen, const Bounds& bounds) {
+  std::vector<Candidate> with, without;
+  for (const auto& c : chosen)
+    (route(bounds, chosen.front().point_m, c.point_m) ? with : without).push_back(c);
+  return with.size() >= without.size() || without.empty() ? with : joined(without, bounds);
 }
 
 }  // namespace
@@ -242,14 +286,9 @@ Result<FlightPlan> plan_flight(const FlightPlanInput& input, const FlightPlanOpt
   bounds.fence = input.fence;
   bounds.no_fly = input.no_fly;
   bounds.no_fly.push_back(input.outline);
-  // A straight way between two points of the ring round a corner's arc cuts the arc: allow 20 cm of the
-  // keep-out.
-  bounds.keep_out_m = std::max(0.0, options.keep_out_m - 0.2);
+  bounds.keep_out_m = options.keep_out_m;
 
   FlightPlan plan;
-  plan.assumed_anchors_m = assumed_anchors(input, options);
-  if (plan.assumed_anchors_m.empty())
-    return make_error(Errc::invalid_argument, "the outline encloses no area");
   const auto all = candidates(input, options, bounds);
   plan.n_candidates = all.size();
   if (static_cast<int>(all.size()) < options.min_points) {
@@ -257,12 +296,31 @@ Result<FlightPlan> plan_flight(const FlightPlanInput& input, const FlightPlanOpt
                                            " points to fly to are left by fence, no-fly and keep-out, need " +
                                            std::to_string(options.min_points));
   }
+  plan.assumed_anchors_m = assumed_anchors(input, options, all, plan.n_out_of_range);
+  if (plan.assumed_anchors_m.empty() && plan.n_out_of_range == 0)
+    return make_error(Errc::invalid_argument, "the outline encloses no area");
+  if (plan.assumed_anchors_m.empty()) {
+    return make_error(Errc::not_found, "nothing inside the outline is within " +
+                                           std::to_string(std::lround(options.max_range_m)) +
+                                           " m of where the aircraft may fly");
+  }
   Design design(plan.assumed_anchors_m, options);
   std::vector<Candidate> chosen;
   for (const auto i : choose(design, all, options, plan.reason)) chosen.push_back(all[i]);
+  if (auto kept = joined(chosen, bounds); kept.size() < chosen.size()) {
+    for (const auto& c : chosen) design.remove(c.point_m);
+    for (const auto& c : kept) design.add(c.point_m);
+    plan.reason += "; " + std::to_string(chosen.size() - kept.size()) +
+                   " points that no legal way reaches were left out";
+    chosen = std::move(kept);
+  }
   plan.predicted_sigma_m = design.sigmas_m();
   plan.rms_m = std::sqrt(design.mean_variance_m2());
   plan.worst_m = *std::max_element(plan.predicted_sigma_m.begin(), plan.predicted_sigma_m.end());
+  if (plan.n_out_of_range > 0) {
+    plan.reason += "; " + std::to_string(plan.n_out_of_range) +
+                   " places inside are out of range from everywhere and not counted";
+  }
   BOOST_OUTCOME_TRY(order(plan, std::move(chosen), input, options, bounds));
   return plan;
 }

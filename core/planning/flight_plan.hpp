@@ -60,7 +60,8 @@ struct FlightPlan {
   std::vector<Waypoint> waypoints;  ///< in flying order, closed: the first follows the last
   std::size_t n_measure{};
   std::size_t n_candidates{};
-  std::vector<Eigen::Vector3d> assumed_anchors_m;
+  std::vector<Eigen::Vector3d> assumed_anchors_m;  ///< those that can be ranged from outside
+  std::size_t n_out_of_range{};                    ///< the others
   std::vector<double> predicted_sigma_m;  ///< per assumed anchor: root of the summed variance of its position
   double rms_m{}, worst_m{};
   double length_m{}, duration_s{};

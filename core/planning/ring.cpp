@@ -45,7 +45,10 @@ std::vector<Vector2d> ring_around(const Polygon& polygon, double distance_m, dou
       keep(a + (b - a) * (static_cast<double>(k) / steps) + distance_m * normal);
     const Vector2d next = outward(b, c);
     const double turn = std::atan2(normal.x() * next.y() - normal.y() * next.x(), normal.dot(next));
-    const int arc = turn > 0 ? static_cast<int>(turn * distance_m / spacing_m) : 0;
+    // However sharp the corner, no chord cuts deep into the arc.
+    constexpr double k_largest_step_rad = 0.6;
+    const int arc =
+        turn > 0 ? static_cast<int>(std::max(turn * distance_m / spacing_m, turn / k_largest_step_rad)) : 0;
     for (int k = 1; k <= arc; ++k) {
       const double angle = turn * k / (arc + 1), co = std::cos(angle), si = std::sin(angle);
       keep(b + distance_m * Vector2d(co * normal.x() - si * normal.y(), si * normal.x() + co * normal.y()));

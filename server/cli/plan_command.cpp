@@ -124,14 +124,18 @@ void add_plan_command(CLI::App& app, int& exit_code) {
 
   struct Next {
     std::string input;
+    std::string format{"json"};
     bool json{false};
   };
   auto next = std::make_shared<Next>();
   auto* command =
       plan->add_subcommand("next", "Best next point of a flight (docs/formats.md, Planner input)");
   command->add_option("INPUT", next->input, "JSON file, - for standard input")->required();
-  command->add_flag("--json", next->json, "Print JSON instead of a table");
-  command->callback([next, &exit_code] { exit_code = plan_next(next->input, next->json); });
+  auto* format = command->add_option("--format", next->format, "json, or a table for people")
+                     ->check(CLI::IsMember({"json", "table"}))
+                     ->capture_default_str();
+  command->add_flag("--json", next->json, "the same as --format json")->excludes(format);
+  command->callback([next, &exit_code] { exit_code = plan_next(next->input, next->format == "json"); });
   add_flight(*plan, exit_code);
 }
 

@@ -49,6 +49,40 @@ TEST(Outline, NamesWhatIsWrongByPointer) {
   EXPECT_THAT(pointers(R"({"type":"FeatureCollection","features":[]})"), testing::ElementsAre(" required"));
 }
 
+TEST(Outline, ReadsSeveralPartsAsTheirHull) {
+  std::vector<FieldError> errors;
+  const auto request = read_outline(
+      R"({"type":"MultiPolygon","coordinates":[[[[3,51],[3.0001,51],[3.0001,51.0001],[3,51.0001],[3,51]]],
+        [[[3.0002,51],[3.0003,51],[3.0003,51.0001],[3.0002,51.0001],[3.0002,51]]]]})",
+      errors);
+  ASSERT_TRUE(request);
+  EXPECT_EQ(request->input.outline.size(), 4U);
+}
+
+TEST(Outline, LiesOverTheDateLine) {
+  std::vector<FieldError> errors;
+  const auto request = read_outline(
+      R"({"type":"Polygon","coordinates":[[[179.9999,10],[-179.9999,10],[-179.9999,10.0002],[179.9999,10.0002]]]})",
+      errors);
+  ASSERT_TRUE(request);
+  // 0.0002 degrees of longitude at 10 N: 111.32 km * cos(10 deg) * 0.0002 = 21.93 m.
+  EXPECT_NEAR((request->input.outline[1] - request->input.outline[0]).norm(), 21.93, 0.02);
+}
+
+TEST(Outline, ThatCrossesItselfIsRefused) {
+  EXPECT_THAT(
+      pointers(R"({"type":"Polygon","coordinates":[[[3,51],[3.001,51.001],[3.001,51],[3,51.001],[3,51]]]})"),
+      testing::ElementsAre("/coordinates/0 self_crossing"));
+}
+
+TEST(Outline, PointsBesideTheBuildingArePassedOver) {
+  std::vector<FieldError> errors;
+  EXPECT_TRUE(read_outline(
+      R"({"type":"FeatureCollection","features":[{"type":"Feature","geometry":{"type":"Point","coordinates":[3,51]},"properties":{}},
+        {"type":"Feature","geometry":{"type":"Polygon","coordinates":[[[3,51],[3.001,51],[3.001,51.001],[3,51]]]},"properties":null}]})",
+      errors));
+}
+
 TEST(FlightPlanOutput, WritesAPlanThatQGroundControlReads) {
   std::vector<FieldError> errors;
   const auto request = read_outline(example(), errors);

@@ -35,7 +35,7 @@ void expect_legal(const FlightPlan& plan, const Polygon& outline, double keep_ou
     for (double t = 0; t <= 1; t += 0.02) {  // the way too, but for the arc of a corner
       const Eigen::Vector2d p = ((1 - t) * a + t * b).head<2>();
       EXPECT_FALSE(contains(outline, p)) << "leg " << i;
-      EXPECT_GE(distance_to_edge_m(outline, p), keep_out_m - 0.21) << "leg " << i;
+      EXPECT_GE(distance_to_edge_m(outline, p), keep_out_m - 1e-6) << "leg " << i;
     }
   }
 }
@@ -124,6 +124,32 @@ TEST(Design, AddingAndRemovingAPointLeavesNoTrace) {
     design.remove({15, -5, 4});
     EXPECT_NEAR(design.value() / before, 1, 1e-6);
   }
+}
+
+// Points of a star: pockets that a ring cannot be walked round, and corners sharper than a right angle.
+TEST(FlightPlan, FindsItsWayRoundAStar) {
+  Polygon star;
+  for (int i = 0; i < 16; ++i) {
+    const double angle = i * 3.14159265358979 / 8, radius = i % 2 == 1 ? 20 : 8;
+    star.emplace_back(radius * std::cos(angle), radius * std::sin(angle));
+  }
+  const FlightPlanOptions options;
+  const auto plan = plan_flight({star, 6, {}, {}}, options);
+  ASSERT_TRUE(plan) << plan.error().message;
+  expect_legal(plan.value(), star, options.keep_out_m);
+}
+
+// 800 x 500 m with 60 m of range: what lies deep inside cannot be ranged from outside; the rest is planned
+// for.
+TEST(FlightPlan, LeavesOutWhatIsOutOfRangeFromEverywhere) {
+  const Polygon huge{{0, 0}, {800, 0}, {800, 500}, {0, 500}};
+  FlightPlanOptions options;
+  const auto plan = plan_flight({huge, 6, {}, {}}, options);
+  ASSERT_TRUE(plan) << plan.error().message;
+  EXPECT_GT(plan.value().n_out_of_range, 0u);
+  EXPECT_GT(plan.value().assumed_anchors_m.size(), 0u);
+  EXPECT_GT(plan.value().n_measure, 20u);
+  EXPECT_NE(plan.value().reason.find("out of range"), std::string::npos);
 }
 
 }  // namespace
