@@ -42,7 +42,7 @@ struct DroneStatus {
 };
 
 /// What the procedure may ask of an aircraft. Calls return at once with the number of the command; its fate
-/// comes through reports(). Heights above home.
+/// comes through take_reports(). Heights above home. Before the aircraft was heard every command is refused.
 class Drone {
  public:
   virtual ~Drone() = default;
@@ -52,6 +52,8 @@ class Drone {
   virtual std::uint64_t hold() = 0;
   virtual std::uint64_t return_home() = 0;
   virtual std::uint64_t land() = 0;
+  /// The operator has looked and goes on after `taken_over`.
+  virtual void take_back() = 0;
   virtual DroneStatus status() const = 0;
   virtual std::vector<CommandReport> take_reports() = 0;
 };

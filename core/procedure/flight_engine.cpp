@@ -73,9 +73,10 @@ Result<FlightSetup> flight_setup(const Plan& plan, const Eigen::Vector3d& home_m
   return out;
 }
 
-FlightEngine::FlightEngine(FlightSetup setup) : setup_(std::move(setup)) {}
+FlightEngine::FlightEngine(FlightSetup setup) : setup_(std::move(setup)), clues_(setup_.middle_m.z()) {}
 
-FlightEngine::FlightEngine(FlightSetup setup, const State& stored, double now_s) : setup_(std::move(setup)) {
+FlightEngine::FlightEngine(FlightSetup setup, const State& stored, double now_s)
+    : FlightEngine(std::move(setup)) {
   state_ = stored;
   started_s_ = now_s;
   apply(now_s, resume_after_restart(stored, now_s));
@@ -101,8 +102,15 @@ void FlightEngine::fix(double now_s, const Eigen::Vector3d& enu_m, FixClass fix)
   fix_s_ = now_s;
 }
 
-void FlightEngine::range(double now_s, NetworkId anchor, bool used) {
-  if (!used || !in_flight(state_.step)) return;
+void FlightEngine::range(double now_s, NetworkId anchor, bool used, std::optional<double> rss_dbm,
+                         std::optional<double> distance_m) {
+  if (!in_flight(state_.step)) return;
+  const auto at = position_m();
+  if (distance_m && at) clues_.ranged(anchor, *at, *distance_m);
+  if (rss_dbm && state_.step == Step::turn && vehicle_.heading_rad)
+    clues_.turned(anchor, *vehicle_.heading_rad, *rss_dbm);
+  if (rss_dbm && state_.step == Step::height_search && at) clues_.climbed(anchor, at->z(), *rss_dbm);
+  if (!used) return;
   if (note_range(state_, anchor))
     tell(now_s, "info", "anchor.found", "anchor " + to_string(anchor) + " heard first");
 }
@@ -127,6 +135,12 @@ bool FlightEngine::feed(double now_s, Event event, std::string text, std::option
 
 void FlightEngine::apply(double now_s, const Advance& step) {
   const bool measured = step.state.visited.size() > state_.visited.size();
+  if (const auto from = state_.step, to = step.state.step; from != to) {
+    if (from == Step::turn) clues_.conclude_turn();
+    if (from == Step::height_search) clues_.conclude_height_search();
+    if (to == Step::turn) clues_.begin_turn();
+    if (to == Step::height_search) clues_.begin_height_search();
+  }
   state_ = step.state;
   if (measured) {
     for (const auto& a : state_.anchors) {
@@ -366,7 +380,7 @@ void FlightEngine::decide(double now_s, std::span<const Estimate> estimates) {
     const auto it = std::find_if(estimates.begin(), estimates.end(),
                                  [&](const Estimate& e) { return e.anchor == task.id && e.best; });
     if (it == estimates.end()) {
-      anchor.places = {{setup_.middle_m, 1}};
+      anchor.places = {{clues_.guess_m(task.id).value_or(setup_.middle_m), 1}};
       const auto& seen = measured_at_[task.id];
       for (std::size_t i = 0; i < input.visited.size(); ++i) {
         if (std::find(seen.begin(), seen.end(), input.visited[i]) != seen.end())

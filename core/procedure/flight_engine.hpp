@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/planning/next_point.hpp"
+#include "core/procedure/clue_book.hpp"
 #include "core/procedure/exit_rule.hpp"
 #include "core/procedure/machine.hpp"
 #include "core/procedure/safety.hpp"
@@ -73,7 +74,9 @@ class FlightEngine {
   FlightEngine(FlightSetup setup, const State& stored, double now_s);
 
   void fix(double now_s, const Eigen::Vector3d& enu_m, FixClass fix);
-  void range(double now_s, NetworkId anchor, bool used);
+  /// `rss_dbm` and `distance_m` where known: clues while the aircraft turns and climbs.
+  void range(double now_s, NetworkId anchor, bool used, std::optional<double> rss_dbm = {},
+             std::optional<double> distance_m = {});
   void vehicle(double now_s, const VehicleView& view);
   /// What the operator wants: start, hold, resume, skip, return_home, land. False: means nothing in this
   /// step.
@@ -88,8 +91,10 @@ class FlightEngine {
   const FlightSetup& setup() const { return setup_; }
   const std::optional<Alarm>& alarm() const { return alarm_; }
   const std::optional<DecisionRecord>& decision() const { return decision_; }
+  const std::map<NetworkId, Clues>& clues() const { return clues_.clues(); }
   std::optional<Eigen::Vector3d> position_m() const;
-  double elapsed_s() const;
+  double elapsed_s() const;  ///< from the start to the last transition
+  double flown_s(double now_s) const { return started_s_ ? now_s - *started_s_ : 0; }
   const std::map<NetworkId, std::vector<Eigen::Vector3d>>& measured_at() const { return measured_at_; }
 
  private:
@@ -109,6 +114,7 @@ class FlightEngine {
 
   FlightSetup setup_;
   State state_;
+  ClueBook clues_;
   VehicleView vehicle_;
   std::optional<double> vehicle_s_, fix_s_, good_fix_s_, started_s_;
   std::optional<Eigen::Vector3d> fix_m_;

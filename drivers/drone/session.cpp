@@ -118,7 +118,10 @@ void Session::on_heartbeat(const mavlink::Received& in) {
     // A change that we did not command, while we command: the pilot, or a failsafe.
     const bool ours =
         commanded_mode_ && (mode == *commanded_mode_ || (commanded_s_ && now_s_ - *commanded_s_ < 3));
-    if (commanded_mode_ && !ours && (target_ || take_off_)) {
+    // PX4 lands by itself at the end of its return.
+    const auto& dialect = dialect_of(autopilot_);
+    const bool return_ends = commanded_mode_ == dialect.return_home && mode == dialect.land;
+    if (commanded_mode_ && !ours && !return_ends && (target_ || take_off_ || status_.in_air)) {
       status_.taken_over = true;
       target_.reset();
       take_off_.reset();
@@ -151,8 +154,18 @@ void Session::command(std::uint64_t number, const std::string& what, int command
   pending_.push_back({number, what, std::move(m), command_number, now_s_, now_s_, 1});
 }
 
-std::uint64_t Session::mode(const std::string& what, std::uint32_t custom_mode) {
+/// A mode number means nothing before it is known whose it is.
+bool Session::deaf(std::uint64_t number, const std::string& what) {
+  if (heard_s_ && autopilot_ != Autopilot::unknown) return false;
+  report(number, what, CommandState::refused,
+         heard_s_ ? "neither ArduPilot nor PX4" : "the aircraft has not been heard");
+  return true;
+}
+
+std::uint64_t Session::mode(const std::string& what, std::uint32_t Dialect::*wanted) {
   const std::uint64_t number = ++number_;
+  if (deaf(number, what)) return number;
+  const std::uint32_t custom_mode = dialect_of(autopilot_).*wanted;
   target_.reset();
   take_off_.reset();
   commanded_mode_ = custom_mode;
@@ -163,12 +176,13 @@ std::uint64_t Session::mode(const std::string& what, std::uint32_t custom_mode) 
   return number;
 }
 
-std::uint64_t Session::hold() { return mode("hold", dialect_of(autopilot_).hold); }
-std::uint64_t Session::return_home() { return mode("return_home", dialect_of(autopilot_).return_home); }
-std::uint64_t Session::land() { return mode("land", dialect_of(autopilot_).land); }
+std::uint64_t Session::hold() { return mode("hold", &Dialect::hold); }
+std::uint64_t Session::return_home() { return mode("return_home", &Dialect::return_home); }
+std::uint64_t Session::land() { return mode("land", &Dialect::land); }
 
 std::uint64_t Session::take_off(double height_m) {
   const std::uint64_t number = ++number_;
+  if (deaf(number, "take_off")) return number;
   status_.taken_over = false;
   report(number, "take_off", CommandState::sent, "");
   if (!(height_m > 0 && height_m <= 120)) {

@@ -51,6 +51,7 @@ class Session final : public Drone {
   std::uint64_t hold() override;
   std::uint64_t return_home() override;
   std::uint64_t land() override;
+  void take_back() override { status_.taken_over = false; }
   DroneStatus status() const override;
   std::vector<CommandReport> take_reports() override;
 
@@ -98,7 +99,8 @@ class Session final : public Drone {
   void send(const mavlink::Message& message);
   void command(std::uint64_t number, const std::string& what, int command_number,
                std::initializer_list<double> params);
-  std::uint64_t mode(const std::string& what, std::uint32_t custom_mode);
+  std::uint64_t mode(const std::string& what, std::uint32_t Dialect::*custom_mode);
+  bool deaf(std::uint64_t number, const std::string& what);
   void report(std::uint64_t number, const std::string& what, CommandState state, std::string text);
   void drive_take_off();
   void drive_target();

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "core/base/ids.hpp"
+#include "core/procedure/height_search.hpp"
+#include "core/procedure/turn.hpp"
+
+namespace anchord::procedure {
+
+/// What a turn and a height search told of one anchor (8.3.5, 8.3.6) before its position is known.
+struct Clues {
+  std::vector<TurnSample> turn;
+  std::vector<HeightSample> heights;
+  std::optional<Bearing> bearing{};
+  std::optional<HeightGuess> height{};
+  std::optional<Eigen::Vector3d> guess_m{};  ///< eq 8.7 from the newest range; needs the bearing
+};
+
+/// Collects RSS while the aircraft turns and climbs and concludes when it has. Metres of the plan's origin.
+/// Bounded: at most 2 000 samples of a kind for each anchor. Not thread-safe.
+class ClueBook {
+ public:
+  /// `default_height_m`: of the first guess where no height search gave one.
+  explicit ClueBook(double default_height_m) : default_height_m_(default_height_m) {}
+
+  void turned(NetworkId anchor, double heading_rad, double rss_dbm);
+  void climbed(NetworkId anchor, double height_m, double rss_dbm);
+  /// Newest range of an anchor, and where the tag was.
+  void ranged(NetworkId anchor, const Eigen::Vector3d& tag_m, double distance_m);
+  void begin_turn();           ///< forgets the samples of the last one
+  void begin_height_search();  ///< likewise
+  /// Anchors whose samples say something get a bearing, or a height; the others keep what they had.
+  void conclude_turn();
+  void conclude_height_search();
+
+  const std::map<NetworkId, Clues>& clues() const { return clues_; }
+  std::optional<Eigen::Vector3d> guess_m(NetworkId anchor) const;
+
+ private:
+  struct Seen {
+    Eigen::Vector3d tag_m{0, 0, 0};
+    double distance_m{};
+  };
+  void guess(NetworkId anchor, Clues& clues);
+
+  double default_height_m_;
+  std::map<NetworkId, Clues> clues_;
+  std::map<NetworkId, Seen> newest_;
+};
+
+}  // namespace anchord::procedure

@@ -1,0 +1,276 @@
+// Every fault at every step of a flight: the reaction of docs/procedure.md, and no target outside the volume.
+#include "core/procedure/flight_engine.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <map>
+#include <numbers>
+
+namespace anchord::procedure {
+namespace {
+
+using Eigen::Vector3d;
+
+const Vector3d k_home{-20, -20, 0}, k_place{-10, -10, 4};
+constexpr NetworkId k_anchor{0x6a21};
+
+FlightSetup setup() {
+  FlightSetup s;
+  s.settings.waypoints = {{k_place, 0.5, true, true, true, 4}, {{-10, 10, 4}, 0.5, true, true, true, 4}};
+  s.limits.bounds.fence = {{-30, -30}, {60, -30}, {60, 50}, {-30, 50}};
+  s.limits.bounds.no_fly = {{{0, 0}, {30, 0}, {30, 20}, {0, 20}}};
+  s.limits.bounds.keep_out_m = 4;
+  s.limits.bounds.min_height_m = 1.5;
+  s.limits.bounds.max_height_m = 20;
+  s.limits.home_m = k_home;
+  s.middle_m = {15, 10, 3};
+  s.planner.grid = {3, 2, 1, 1};
+  return s;
+}
+
+struct Flown {
+  FlightEngine engine{setup()};
+  double now{100};
+  VehicleView view;
+
+  Flown() {
+    view.position_m = k_place;
+    view.heading_rad = 0.5;
+    view.armed = view.in_air = true;
+    view.battery = 0.9;
+    here();
+  }
+  void here() {
+    engine.fix(now, k_place, FixClass::rtk_fixed);
+    engine.vehicle(now, view);
+  }
+  void feed(std::initializer_list<Event> events) {
+    for (const auto e : events) ASSERT_TRUE(engine.command(now, e, "")) << to_string(e);
+  }
+  void hear() {
+    for (int i = 0; i < 5; ++i) engine.range(now, k_anchor, true, -80.0, 25.0);
+  }
+};
+
+/// How each step in flight is come to.
+const std::map<Step, std::function<void(Flown&)>>& ways() {
+  static const auto to_search = [](Flown& f) { f.feed({Event::start, Event::airborne, Event::arrived}); };
+  static const auto to_ranging = [](Flown& f) {
+    to_search(f);
+    f.hear();
+    f.feed({Event::heard, Event::timeout});  // the turn is given up
+  };
+  static const std::map<Step, std::function<void(Flown&)>> k_ways{
+      {Step::take_off, [](Flown& f) { f.feed({Event::start}); }},
+      {Step::go_to_waypoint,
+       [](Flown& f) {
+         f.feed({Event::start, Event::airborne});
+       }},
+      {Step::search_anchors, to_search},
+      {Step::move_around,
+       [](Flown& f) {
+         to_search(f);
+         f.feed({Event::timeout});
+       }},
+      {Step::step_to_waypoint,
+       [](Flown& f) {
+         to_search(f);
+         for (int i = 0; i < 3; ++i) f.feed({Event::timeout, Event::arrived});
+         f.feed({Event::timeout});
+       }},
+      {Step::turn,
+       [](Flown& f) {
+         to_search(f);
+         f.hear();
+         f.feed({Event::heard});
+       }},
+      {Step::height_search,
+       [](Flown& f) {
+         to_search(f);
+         f.hear();
+         f.feed({Event::heard});
+         while (f.engine.state().step == Step::turn) {
+           f.hear();
+           f.feed({Event::arrived});
+         }
+       }},
+      {Step::ranging, to_ranging},
+      {Step::find_next_point,
+       [](Flown& f) {
+         to_ranging(f);
+         f.feed({Event::sampled});
+       }},
+      {Step::go_to_point,
+       [](Flown& f) {
+         to_ranging(f);
+         f.feed({Event::sampled, Event::point});
+       }},
+      {Step::check_connections,
+       [](Flown& f) {
+         to_ranging(f);
+         f.feed({Event::sampled, Event::point, Event::arrived});
+       }},
+      {Step::go_back,
+       [](Flown& f) {
+         to_ranging(f);
+         f.feed({Event::sampled, Event::point, Event::unreachable});
+       }},
+      {Step::hold,
+       [](Flown& f) {
+         f.feed({Event::start, Event::airborne, Event::hold});
+       }},
+      {Step::return_home,
+       [](Flown& f) {
+         f.feed({Event::start, Event::airborne, Event::return_home});
+       }},
+      {Step::landing, [](Flown& f) {
+         f.feed({Event::start, Event::airborne, Event::land});
+       }}};
+  return k_ways;
+}
+
+struct Fault {
+  const char* name;
+  std::function<void(Flown&)> happens;
+  Step reaction;
+};
+const std::vector<Fault>& faults() {
+  static const auto silent_for = [](double seconds) {
+    return [seconds](Flown& f) {
+      f.now += seconds;
+      f.engine.fix(f.now, k_place, FixClass::rtk_fixed);
+    };
+  };
+  static const auto rtk_lost_for = [](double seconds) {
+    return [seconds](Flown& f) {
+      f.now += seconds;
+      f.engine.fix(f.now, k_place, FixClass::single);
+      f.engine.vehicle(f.now, f.view);
+    };
+  };
+  static const auto battery_at = [](double share) {
+    return [share](Flown& f) {
+      f.view.battery = share;
+      f.here();
+    };
+  };
+  static const std::vector<Fault> k_faults{
+      {"battery critical", battery_at(0.11), Step::landing},
+      {"battery below the way home", battery_at(0.30), Step::return_home},
+      {"autopilot silent for 4 s", silent_for(4), Step::hold},
+      {"autopilot silent for 16 s", silent_for(16), Step::return_home},
+      {"no RTK for 3 s", rtk_lost_for(3), Step::hold},
+      {"no RTK for 11 s", rtk_lost_for(11), Step::return_home},
+      {"no position for 3 s",
+       [](Flown& f) {
+         f.now += 3;
+         f.engine.vehicle(f.now, f.view);
+       },
+       Step::hold},
+      {"blown into the keep-out",
+       [](Flown& f) {
+         f.engine.fix(f.now, {-2, 10, 4}, FixClass::rtk_fixed);
+         f.view.position_m = Vector3d(-2, 10, 4);
+         f.engine.vehicle(f.now, f.view);
+       },
+       Step::hold},
+      {"positions disagree",
+       [](Flown& f) {
+         f.view.position_m = k_place + Vector3d(0, 4, 0);
+         f.engine.vehicle(f.now, f.view);
+       },
+       Step::hold}};
+  return k_faults;
+}
+
+/// The graver step is never left for a lesser one: land over return over hold.
+Step expected(Step at, Step reaction) {
+  if (at == Step::landing) return Step::landing;
+  if (at == Step::return_home && reaction == Step::hold) return Step::return_home;
+  return reaction;
+}
+
+TEST(FlightEngine, AnswersEveryFaultAtEveryStepAsDocumented) {
+  for (const auto& [step, way] : ways()) {
+    for (const auto& fault : faults()) {
+      Flown f;
+      way(f);
+      ASSERT_EQ(f.engine.state().step, step) << to_string(f.engine.state().step);
+      (void)f.engine.take_orders();
+      f.here();
+      fault.happens(f);
+      f.engine.tick(f.now, {});
+      EXPECT_EQ(to_string(f.engine.state().step), to_string(expected(step, fault.reaction)))
+          << fault.name << " in " << to_string(step);
+      ASSERT_TRUE(f.engine.alarm()) << fault.name;
+      for (const auto& order : f.engine.take_orders()) {
+        if (order.kind != Command::Kind::go_to) continue;
+        EXPECT_EQ(f.engine.state().step, Step::return_home) << fault.name << " in " << to_string(step);
+        EXPECT_FALSE(planning::refuse_point(setup().limits.bounds, order.point_m));
+      }
+    }
+  }
+}
+
+TEST(FlightEngine, SaysWhenAFaultIsOver) {
+  Flown f;
+  ways().at(Step::hold)(f);
+  f.now += 4;
+  f.engine.fix(f.now, k_place, FixClass::rtk_fixed);
+  f.engine.tick(f.now, {});
+  ASSERT_TRUE(f.engine.alarm());
+  f.here();
+  f.engine.tick(f.now, {});
+  EXPECT_FALSE(f.engine.alarm());
+  EXPECT_EQ(f.engine.state().step, Step::hold) << "what was stopped goes on when the operator says so";
+}
+
+TEST(FlightEngine, AnUnreachablePointIsRememberedAndGoneBackFrom) {
+  Flown f;
+  ways().at(Step::go_to_point)(f);
+  f.now += 91;
+  f.here();
+  f.engine.tick(f.now, {});
+  EXPECT_EQ(f.engine.state().step, Step::go_back);
+  EXPECT_EQ(f.engine.state().unreachable.size(), 1u);
+}
+
+TEST(FlightEngine, WhenEveryAnchorGoesSilentItListensAgain) {
+  Flown f;
+  ways().at(Step::ranging)(f);
+  f.now += 30;
+  f.here();
+  f.engine.tick(f.now, {});
+  EXPECT_EQ(f.engine.state().step, Step::search_anchors);
+}
+
+// Orientation of the lobes 120 and 250 degrees (Fig 8.4): an anchor to the east is found by a turn on the
+// spot.
+TEST(FlightEngine, ATurnGivesABearingAndAFirstGuess) {
+  Flown f;
+  ways().at(Step::turn)(f);
+  const double bearing = std::numbers::pi / 2;
+  while (f.engine.state().step == Step::turn) {
+    const double from = *f.view.heading_rad, to = *f.engine.state().heading_rad;
+    const double turn = std::remainder(to - from, 2 * std::numbers::pi);
+    for (int i = 0; i < 20; ++i) {
+      f.view.heading_rad = from + turn * i / 20;
+      f.here();
+      f.engine.range(f.now, k_anchor, true, -85 + 6 * turn_profile(*f.view.heading_rad - bearing), 25.0);
+    }
+    f.view.heading_rad = to;
+    f.here();
+    ASSERT_TRUE(f.engine.command(f.now, Event::arrived, ""));
+  }
+  const auto& clues = f.engine.clues().at(k_anchor);
+  ASSERT_TRUE(clues.bearing);
+  EXPECT_NEAR(std::remainder(clues.bearing->bearing_rad - bearing, 2 * std::numbers::pi), 0, 0.2);
+  ASSERT_TRUE(clues.guess_m);
+  EXPECT_NEAR(clues.guess_m->x(), k_place.x() + 25, 1.5) << "25 m to the east";
+  EXPECT_NEAR(clues.guess_m->y(), k_place.y(), 5);
+}
+
+}  // namespace
+}  // namespace anchord::procedure
