@@ -227,7 +227,8 @@ std::string live_fix_json(const MissionId& mission, const Fix& fix) {
   return out.take();
 }
 
-std::string live_estimate_json(const MissionId& mission, const Estimate& estimate) {
+std::string live_estimate_json(const MissionId& mission, const Estimate& estimate,
+                               std::optional<double> models_moved_m) {
   Object out;
   std::size_t refused = 0;
   for (const auto& [reason, n] : estimate.refused) refused += n;
@@ -292,6 +293,7 @@ std::string live_estimate_json(const MissionId& mission, const Estimate& estimat
       .integer(static_cast<std::int64_t>(refused));
   out.key("rms_residual_m")
       .optional(estimate.best ? std::optional(estimate.best->rms_residual_m) : std::nullopt, 4);
+  if (models_moved_m) out.key("models_moved_m").number(*models_moved_m, 4);
   out.key("probability")
       .optional(estimate.best ? std::optional(estimate.best->probability) : std::nullopt, 3);
   out.key("mirror");

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "core/localize/live_flight.hpp"
@@ -14,7 +15,10 @@ std::string live_pose_json(const MissionId& mission, TrackFrame frame, const Liv
 std::string live_rtk_json(const MissionId& mission, const Fix& fix);
 std::string live_range_json(const MissionId& mission, const RangeResult& result);
 std::string live_fix_json(const MissionId& mission, const Fix& fix);
-std::string live_estimate_json(const MissionId& mission, const Estimate& estimate);
+/// models_moved_m  how far the anchor stands from where the same ranges put it without the promoted models;
+/// absent: no range of it was corrected, and the key is not there
+std::string live_estimate_json(const MissionId& mission, const Estimate& estimate,
+                               std::optional<double> models_moved_m = {});
 
 /// found (no position yet), estimating, ambiguous or converged: verdict ok, and within the accuracy goal.
 std::string_view live_status(const Estimate& estimate);

@@ -520,8 +520,9 @@ void MissionService::State::announce(Flight& flight, bool quiet) {
                       id);
     }
     known = status;
-    deps.hub.publish(Topic::anchors_estimates, live_estimate_json(id, estimate), estimate.time.us(),
-                     to_string(id) + to_string(estimate.anchor), estimate.anchor);
+    deps.hub.publish(Topic::anchors_estimates,
+                     live_estimate_json(id, estimate, flight.live.uncorrected_shift_m(estimate.anchor)),
+                     estimate.time.us(), to_string(id) + to_string(estimate.anchor), estimate.anchor);
   }
   flight.state.origin = flight.live.origin();
   flight.state.anchors_found = flight.statuses.size();

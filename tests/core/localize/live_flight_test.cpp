@@ -43,6 +43,48 @@ TEST(LiveFlight, ConvergesToTheBatchAnswer) {
   }
 }
 
+TEST(LiveFlight, TakesAModelsCorrectionOffAndKeepsTheAnswerWithoutIt) {
+  const auto flight = make_flight(MadeFlight{});
+  auto ranges = flight.ranges;
+  std::ranges::stable_sort(ranges, {}, &Range::time);
+  const NetworkId anchor = ranges.front().anchor;
+  LiveFlight plain(flight.mission), judged(flight.mission);
+  std::size_t next = 0;
+  // Every range of one anchor is a twentieth too long, and told to be; beside it flies one that never was. (A
+  // constant would say little: the flight finds its own bias.)
+  const auto add = [&](const Range& range) {
+    plain.add(range);
+    Range longer = range;
+    if (range.anchor != anchor) return judged.add(longer);
+    RangeModel model;
+    model.p_los = 0.9;
+    model.bias_m = 0.05 * range.distance_m;
+    longer.distance_m += *model.bias_m;
+    judged.add(longer, model);
+  };
+  for (const Fix& fix : flight.fixes) {
+    while (next < ranges.size() && ranges[next].time < fix.time) add(ranges[next++]);
+    plain.add(fix), judged.add(fix);
+  }
+  plain.finish(), judged.finish();
+  const auto results = judged.take_ranges();
+  const auto told = std::ranges::find_if(
+      results, [&](const RangeResult& r) { return r.used() && r.range.anchor == anchor; });
+  ASSERT_NE(told, results.end());
+  EXPECT_EQ(told->model->p_los, 0.9);
+  // A twentieth of the true distance, give or take the bias the flight finds by itself.
+  EXPECT_NEAR(told->range.distance_m - *told->corrected_m, told->range.distance_m * 0.05 / 1.05, 0.25);
+  const auto with = judged.estimates(), without = plain.estimates();
+  for (std::size_t i = 0; i < with.size(); ++i) {
+    ASSERT_TRUE(with[i].best && without[i].best);
+    EXPECT_LT((with[i].best->position.m - without[i].best->position.m).norm(), 1e-6);
+    const auto moved = judged.uncorrected_shift_m(with[i].anchor);
+    EXPECT_EQ(moved.has_value(), with[i].anchor == anchor);
+  }
+  EXPECT_GT(*judged.uncorrected_shift_m(anchor), 0.05);
+  EXPECT_FALSE(plain.uncorrected_shift_m(anchor));
+}
+
 TEST(LiveFlight, DecidesARangeOnceTheFixAfterItHasCome) {
   const auto flight = make_flight(MadeFlight{});
   LiveFlight live(flight.mission);
