@@ -106,11 +106,27 @@ test('a campaign, a data set, a training run, a model', async () => {
   await call('POST', '/api/v1/models', { expect: 422, headers: { 'content-type': 'application/json' }, body: '{"format":"pickle"}' });
 });
 
+test('devices: set up, refused, changed, asked, looked for', async () => {
+  const device = { kind: 'gnss', name: 'rover', address: 'serial:/dev/serial/by-id/of-the-contract-test', options: { format: 'nmea' } };
+  const made = await call('POST', '/api/v1/devices', { expect: 201, json: device });
+  ids.device = made.json.id;
+  await call('POST', '/api/v1/devices', { expect: 409, json: device });
+  await call('POST', '/api/v1/devices', { expect: 422, json: { ...device, address: 'teapot:1' } });
+  const path = `/api/v1/devices/${ids.device}`, patch = { json: { name: 'rover of the contract test' } };
+  await call('PATCH', path, { expect: 428, ...patch });
+  await call('PATCH', path, { expect: 200, ...patch, headers: { 'if-match': made.headers.get('etag') } });
+  await call('PATCH', path, { expect: 412, ...patch, headers: { 'if-match': made.headers.get('etag') } });
+  await call('POST', `${path}/actions`, { expect: 422, json: { action: 'identify' } });  // it is not plugged in
+  await call('POST', '/api/v1/discovery', { expect: 200, json: {}, headers: { prefer: 'wait=30' } });
+  const spare = await call('POST', '/api/v1/devices', { expect: 201, json: { kind: 'ntrip', address: 'tcp://127.0.0.1:1', options: { mount: 'M' }, enabled: false } });
+  await call('DELETE', `/api/v1/devices/${spare.json.id}`, { expect: 204, headers: { 'if-match': spare.headers.get('etag') } });
+});
+
 test('everything that can be read', async () => {
   ids.job = (await call('GET', '/api/v1/jobs', { expect: 200 })).json.items[0]?.id;
   ids.range = (await call('GET', `/api/v1/ranges?mission=${ids.spare}`, { expect: 200 })).json.items[0].id;
   ids.anchor = '0x6a21';
-  const given = { '/sites/': ids.site, '/missions/': ids.mission, '/ranges/': ids.range, '/anchors/': ids.anchor, '/calibrations/': ids.calibration, '/jobs/': ids.job, '/plans/': ids.plan, '/devices/': flight.mission.kit, '/frames/': ids.frame, '/revisions/': '1',
+  const given = { '/sites/': ids.site, '/missions/': ids.mission, '/ranges/': ids.range, '/anchors/': ids.anchor, '/calibrations/': ids.calibration, '/jobs/': ids.job, '/plans/': ids.plan, '/profile': flight.mission.kit, '/devices/': ids.device, '/frames/': ids.frame, '/revisions/': '1',
     '/campaigns/': ids.campaign, '/datasets/': ids.dataset, '/training-runs/': ids.run, '/models/': ids.model };
   const wrong = [];  // all at once, as a person wants them
   for (const { method, template } of contract.operations.filter((o) => o.method === 'get')) {

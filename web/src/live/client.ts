@@ -30,6 +30,7 @@ export class LiveClient implements LiveSource {
   private sink: LiveSink | null = null;
   private socket: Socket | null = null;
   private epoch: string | null = null;
+  private offered: ReadonlySet<unknown> | null = null;
   private readonly topics = new Map<string, Topic>();
   private readonly by_sub = new Map<number, string>();
   private readonly by_id = new Map<number, string>();
@@ -181,7 +182,7 @@ export class LiveClient implements LiveSource {
       for (const t of this.topics.values()) t.seq = null;
       this.sink?.restarted();
     }
-    const offered = Array.isArray(m.topics) ? new Set(m.topics) : null;
+    const offered = this.offered = Array.isArray(m.topics) ? new Set(m.topics) : null;
     this.by_sub.clear();
     this.by_id.clear();
     const wanted = [...this.topics.keys()].filter((t) => !offered || offered.has(t));
@@ -190,6 +191,7 @@ export class LiveClient implements LiveSource {
     this.set_link('live');
     this.ask_time();
   }
+  offers(topic: string): boolean { return this.offered?.has(topic) ?? false; }
   private subscribe(name: string): void {
     const topic = this.topics.get(name);
     if (!topic) return;

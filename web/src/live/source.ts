@@ -22,6 +22,8 @@ export interface LiveSource {
   stop(): void;
   retryNow(): void;
   pause(): void;
+  /// Whether the other end speaks of a topic at all.
+  offers(topic: string): boolean;
   /// Microseconds since 1970 by the source's clock.
   now_us(): number;
   /// Milliseconds of silence, and until the next attempt (null while connected).

@@ -3,6 +3,7 @@ import type { EstimateMsg, FixClass, Vec3 } from '../live/messages';
 import { interpolated, range_class, type Scene } from '../state/scene';
 import { accuracy, age, percent } from '../ui/format';
 import { round_length } from './enu';
+import { draw_flight, type FlightPicture } from './flight_layer';
 import { range_colour, status_colour, trail_style, type Palette } from './palette';
 import { anchor_symbol, drone, ellipse_at, label, reticle, type Box, type Ctx } from './symbols';
 
@@ -15,6 +16,7 @@ export interface Content {
   readonly scene: Scene | null;
   readonly link_lost: boolean;
   readonly running: boolean;  ///< the flight is being recorded
+  readonly flight?: FlightPicture | null;  ///< what is to be flown, where something is
 }
 
 const RANGE_STALE_MS = 2000, POSE_STALE_MS = 1000, TRAIL_US = 120_000_000;
@@ -25,6 +27,7 @@ export function draw_slow(c: Ctx, p: Palette, cam: Camera, content: Content, mag
   c.fillStyle = p.map;
   c.fillRect(0, 0, cam.w, cam.h);
   grid(c, p, cam);
+  if (content.flight) draw_flight(c, p, cam, content.flight);
   const r = symbol_r(p);
   for (const a of content.anchors) {
     if (!a.enu_m) continue;

@@ -1,4 +1,5 @@
 /// What is known of one flight, as mutable data: the stream writes it, the map reads it every frame, the text four times a second. No DOM, no signals.
+import type { GridMsg, ProcedureMsg, ProfileMsg } from '../live/flight_messages';
 import type { EstimateMsg, FixClass, MissionMsg, Pose, RangeMsg, Rtk, Vec3 } from '../live/messages';
 import { sigma_h } from '../map/enu';
 
@@ -24,6 +25,10 @@ export class Scene {
   readonly history = new Map<string, HistoryPoint[]>();
   readonly ranges = new Map<string, RangeRow>();
   range_at_ms = -Infinity;
+  procedure: Heard<ProcedureMsg> | null = null;
+  grid: Heard<GridMsg> | null = null;
+  readonly turns = new Map<string, Heard<ProfileMsg>>();
+  readonly heights = new Map<string, Heard<ProfileMsg>>();
   version = 0;  ///< grows with every change: what was drawn of it is still right while it stands
   estimates_version = 0;  ///< grows with estimates only: the slow picture of the map need not be drawn for a pose
   fix_since_us: number | null = null;
@@ -73,6 +78,16 @@ export class Scene {
     if (last && e.t_us < last.t_us - 5_000_000) h.length = 0;
     if (!last || e.t_us > last.t_us) h.push({ t_us: e.t_us, sigma_h_m: sigma_h(e.cov_enu_m2), gdop: e.gdop });
     if (h.length > HISTORY_POINTS) h.splice(0, HISTORY_POINTS / 6);
+    this.version++;
+    this.estimates_version++;
+  }
+  add_procedure(p: ProcedureMsg, at_ms: number): void {
+    this.procedure = { value: p, at_ms };
+    this.version++;
+  }
+  /// A new decision is part of the slow picture.
+  add_grid(g: GridMsg, at_ms: number): void {
+    this.grid = { value: g, at_ms };
     this.version++;
     this.estimates_version++;
   }

@@ -1,10 +1,11 @@
 /// The signals of the page, and the sink that fills them. Scenes are mutable; `tick` says, at most four times a second, that text may look again.
 import { computed, signal } from '@preact/signals';
+import * as f from '../live/flight_messages';
 import * as m from '../live/messages';
 import type { LinkState, LiveSink, LiveSource } from '../live/source';
 import { Scene } from './scene';
 
-export const TOPICS = ['mission.state', 'drone.pose', 'rtk.status', 'ranges', 'anchors.estimates', 'devices', 'system', 'events', 'alarms', 'revisions', 'jobs'] as const;
+export const TOPICS = ['mission.state', 'drone.pose', 'rtk.status', 'ranges', 'anchors.estimates', 'devices', 'system', 'events', 'alarms', 'revisions', 'jobs', 'procedure', 'mission.grid', 'mission.turn', 'mission.height'] as const;
 
 export const link = signal<LinkState>('connecting');
 export const tick = signal(0);
@@ -96,6 +97,10 @@ const handlers: Record<string, Handler> = {
   events: (data, whole) => (events.value = [...(whole ? [] : events.value), ...m.all(data, m.event)].slice(-50)),
   alarms: (data) => (server_alarms.value = m.all(data, m.alarm)),
   revisions: (data) => { for (const r of m.all(data, m.revision)) revision.value = Math.max(revision.value ?? 0, r.revision); },
+  procedure: (data) => { for (const p of m.all(data, f.procedure)) scene_of(p.mission).add_procedure(p, now_ms()); },
+  'mission.grid': (data) => { for (const g of m.all(data, f.grid)) scene_of(g.mission).add_grid(g, now_ms()); },
+  'mission.turn': (data) => { for (const t of m.all(data, f.turn)) scene_of(t.mission).turns.set(t.anchor, { value: t, at_ms: now_ms() }); },
+  'mission.height': (data) => { for (const h of m.all(data, f.height)) scene_of(h.mission).heights.set(h.anchor, { value: h, at_ms: now_ms() }); },
   jobs: () => { jobs_version.value++; },
 };
 

@@ -8,7 +8,7 @@ export const keys_on = signal((() => { try { return localStorage.getItem(KEY) !=
 
 const KEYS: readonly [string, string][] = [
   ['1', 'Live'], ['2', 'Plan'], ['3', 'Anchors'], ['4', 'Measurements'], ['5', 'Models'], ['6', 'Replay'], ['7', 'System'], ['J K', 'next, previous measurement'], ['Space ← → , .', 'play, step, previous and next event in a replay'], ['[ ]', 'previous, next anchor'], ['C', 'follow the drone'], ['F', 'fit everything'], ['+ −', 'zoom the map'], ['arrows', 'move the map, when it has the focus'],
-  ['/', 'filter anchors'], ['T', 'next theme'], ['M', 'mute 2 minutes'], ['A', 'acknowledge the first alarm'], ['?', 'this list'], ['Esc', 'close'],
+  ['/', 'filter anchors'], ['H', 'hold the aircraft, in flight'], ['T', 'next theme'], ['M', 'mute 2 minutes'], ['A', 'acknowledge the first alarm'], ['?', 'this list'], ['Esc', 'close'],
 ];
 export function Help() {
   const box = useRef<HTMLElement>(null);

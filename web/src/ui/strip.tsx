@@ -30,7 +30,7 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
   const rec_s = mission?.started_us != null ? ((running ? server_now_us() : mission.t_us) - mission.started_us) / 1e6 : null;
   // A replayed flight carries old times, so its length is by measurement: newest row minus start.
   const flown_s = mission?.started_us != null && pose ? (pose.value.t_us - mission.started_us) / 1e6 : rec_s;
-  const sys = system.value?.value;
+  const sys = system.value?.value, craft = scene?.procedure?.value.drone ?? null;
   const aged = (ms: number): string => (running || lost ? `${age(ms)} old` : 'ended');
   const list = alarms.value, worst = list[0]?.priority;
   return {
@@ -46,7 +46,10 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
       ...(rows.length === 0 || uwb_stale ? look('off') : heard === 0 ? look('bad') : look('ok')), stale: uwb_stale, word: !all_seen ? 'none' : `${uwb_stale ? all_seen : heard}/${all_seen}`, extra: uwb_stale ? (rows.length ? aged(now - (scene?.range_at_ms ?? 0)) : 'ended') : '',
       card: <p>{rows.length ? `${heard} of ${all_seen} anchors heard in the last 2 s, ${fixed(mission?.range_rate_hz, 0)} ranges a second.` : 'No range has been received for this flight.'}{devices.value.some((d) => d.kind === 'tag') && ` Tags: ${devices.value.filter((d) => d.kind === 'tag').map((d) => `${d.network_id} ${d.state}`).join(', ')}.`}</p>,
     },
-    drone: {
+    drone: craft ? {
+      ...(lost ? look('off') : !craft.connected ? look('bad') : craft.failsafe || craft.taken_over ? look('caution') : look('ok')), stale: lost, word: craft.battery === null ? craft.mode || 'seen' : `${fixed(craft.battery * 100, 0)} %`, extra: lost ? 'not known' : !craft.connected ? 'silent' : craft.battery === null ? '' : craft.mode,
+      card: <><p>{craft.connected ? `${craft.autopilot || 'The autopilot'} in mode ${craft.mode}, ${craft.in_air ? 'in the air' : craft.armed ? 'armed on the ground' : 'on the ground'}${craft.above_home_m === null ? '' : `, ${fixed(craft.above_home_m, 1)} m above home`}.` : 'The aircraft has not been heard for 3 s. It follows its own failsafe; use the remote control.'}</p>{craft.text && <p>It says: {craft.text}</p>}</>,
+    } : {
       ...(pose && !pose_stale ? look('ok') : look('off')), stale: pose_stale, word: pose ? (up === null ? 'seen' : `${fixed(up, 1)} m`) : 'none', extra: pose_stale ? aged(now - pose.at_ms) : pose?.value.speed_mps == null ? '' : `${fixed(pose.value.speed_mps, 1)} m/s`,
       card: <p>{pose ? 'Height above the origin of this flight, and speed over ground. Battery and mode come with the aircraft link, which this flight does not have.' : 'No position of the aircraft has been received.'}</p>,
     },

@@ -9,16 +9,21 @@ import { Chip, Q } from '../ui/marks';
 import { AnchorCard } from './anchor_card';
 import { Events } from './events';
 import { FirstRun } from './first_run';
+import './flight/flight.css';
+import { FlightBar } from './flight/commands';
+import { flight_picture, follow_plan } from './flight/picture';
+import { Clues, NextPoint, Procedure } from './flight/procedure';
 import { RangeList } from './range_list';
 
 export function content(): Content {
   const scene = current_scene(), m = current_mission.peek();
-  return { anchors: scene ? [...scene.anchors.values()].map((a) => a.value) : [], selected: chosen_anchor.peek(), scene, link_lost: link.peek() === 'lost', running: m?.state === 'recording' };
+  return { anchors: scene ? [...scene.anchors.values()].map((a) => a.value) : [], selected: chosen_anchor.peek(), scene, link_lost: link.peek() === 'lost', running: m?.state === 'recording', flight: flight_picture() };
 }
 
 export function Live() {
   tick.value;
-  const mission = current_mission.value;
+  const mission = current_mission.value, step = current_scene()?.procedure?.value;
+  useEffect(follow_plan, [step?.plan, step?.plan_revision]);
   useEffect(() => { document.title = `${mission?.name ?? 'Live'} - anchord`; }, [mission?.name]);
   if (!mission) return synced.value ? <FirstRun /> : <Waiting />;
   const scene = current_scene();
@@ -29,11 +34,15 @@ export function Live() {
     <div class="live" data-testid="live">
       <h1 class="sr">Live flight</h1>
       <section class="left" aria-label="Map and flight readings">
-        <MapBox content={() => ({ ...content(), selected })} onSelect={(a) => (chosen_anchor.value = a)} label="Live map: drone, ranges and anchors. All of it is also in the tables." follow version={`${mission.mission} ${scene?.estimates_version} ${selected}`} />
+        <MapBox content={() => ({ ...content(), selected })} onSelect={(a) => (chosen_anchor.value = a)} label="Live map: drone, ranges and anchors. All of it is also in the tables." follow version={`${mission.mission} ${scene?.estimates_version} ${step?.step} ${step?.waypoint} ${selected}`} />
         <Legend />
         <Band />
+        <FlightBar />
       </section>
       <aside class="side" aria-label="Flight, ranges, selected anchor" tabIndex={0}>
+        <Procedure />
+        <NextPoint />
+        <Clues />
         <Progress />
         <RangeList selected={selected} />
         {selected && <AnchorCard anchor={selected} />}

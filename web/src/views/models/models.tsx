@@ -14,10 +14,11 @@ import { BiasPanel } from './bias';
 import { ConfusionPanel, ThresholdPanel } from './classification';
 import { GridPanel, ImportancePanel, SplitPanel } from './evidence';
 import { Promote } from './promote';
+import { Rules } from './rules';
 import { RunTable } from './run_table';
 import { method_words, TASK_WORDS } from './words';
 
-const task = signal<Task>('nlos_id');
+const task = signal<Task>('nlos_id'), rules_open = signal(false);
 
 interface Loaded { readonly task: Task; readonly runs: readonly Run[]; readonly models: readonly Model[] }
 
@@ -46,7 +47,8 @@ export function Models({ run: wanted }: { run: string | null }) {
   return (
     <div class="desk" data-testid="models">
       <div class="toolbar">
-        <div class="seg" role="group" aria-label="Task">{TASKS.map((t) => <button key={t} class={t === of ? 'on' : ''} aria-pressed={t === of} data-testid={`task-${t}`} onClick={() => { task.value = t; location.hash = '#/models'; }}>{TASK_WORDS[t]}</button>)}</div>
+        <div class="seg" role="group" aria-label="Task">{TASKS.map((t) => <button key={t} class={t === of && !rules_open.value ? 'on' : ''} aria-pressed={t === of && !rules_open.value} data-testid={`task-${t}`} onClick={() => { task.value = t; rules_open.value = false; location.hash = '#/models'; }}>{TASK_WORDS[t]}</button>)}<button class={rules_open.value ? 'on' : ''} aria-pressed={rules_open.value} data-testid="task-rules" onClick={() => (rules_open.value = true)}>Rules</button></div>
+        {rules_open.value ? <h1>Rules</h1> : <>
         <h1>{chosen ? method_words(chosen.method) : 'Models'}</h1>
         {chosen && <span class="mut">run {chosen.id.slice(0, 8)}, {chosen.dataset}{chosen.seconds === null ? '' : `, ${fixed(chosen.seconds, 0)} s`}, {chosen.created_by}</span>}
         {chosen && <StateChip run={chosen} active={active} />}
@@ -55,14 +57,18 @@ export function Models({ run: wanted }: { run: string | null }) {
         {engineer && chosen?.job && (chosen.state === 'running' || chosen.state === 'queued') && <button class="btn" data-testid="cancel" onClick={() => void cancel_job(chosen.job!).then(reload, (e: unknown) => set_problem(said(e)))}>Cancel</button>}
         {engineer && active && <button class="btn" data-testid="rollback" onClick={() => void undo()}>Roll back</button>}
         {engineer && <button class="btn primary" data-testid="promote" disabled={!chosen?.model || chosen.model === active?.id} onClick={() => set_dialog(true)}>Promote</button>}
+        </>}
       </div>
       {problem && <div class="problem" role="status"><b>That did not work.</b> {problem} <button class="btn small" onClick={reload}>Try again</button></div>}
       {curl && chosen && <div class="curl"><CopyBox label="Retrain by curl" text={`curl -fsS -H "Authorization: Bearer $T" -H "Content-Type: application/json" -H "Prefer: wait=600" -d '${JSON.stringify({ task: of, dataset: chosen.dataset })}' ${location.origin}/api/v1/training-runs`} /></div>}
       <div class="page" tabIndex={0} role="region" aria-label="Numbers of the selected run">
+        {rules_open.value && <Rules />}
+        {!rules_open.value && <>
         {!all && !problem && <p class="pad" role="status">Loading the training runs.</p>}
         {all?.task === of && runs.length === 0 && <Nothing />}
         {chosen && shown && <Numbers run={shown.run} numbers={shown.numbers} />}
         <section class="cell-p wide">{(runs.length > 0 || models.length > 0) && <RunTable task={of} runs={runs} models={models} selected={chosen?.id ?? null} />}</section>
+        </>}
       </div>
       {dialog && chosen?.model && <Promote model={chosen.model} name={method_words(chosen.method)} close={() => set_dialog(false)} done={() => { set_dialog(false); reload(); }} />}
     </div>

@@ -48,7 +48,7 @@ export function Plan({ id }: { id: string | null }) {
       <div class="toolbar">
         <h1>Plan</h1>
         {all && all.length > 0 && <select aria-label="Plan" data-testid="plan-choice" value={plan.id ?? ''} disabled={dirty} onChange={(e) => { const p = all.find((x) => x.id === e.currentTarget.value); if (p) open(p); }}>{!plan.id && <option value="">new plan</option>}{all.map((p) => <option key={p.id} value={p.id!}>{p.name}</option>)}</select>}
-        <input class="planname" aria-label="Name of the plan" placeholder="Name" value={plan.name} data-testid="plan-name" onChange={(e) => change({ ...plan, name: e.currentTarget.value })} />
+        <input class="planname" aria-label="Name of the plan" placeholder="Name" value={plan.name} data-testid="plan-name" maxLength={200} onInput={(e) => set_history({ ...history, now: { ...plan, name: e.currentTarget.value } })} />
         <span class="mut">{plan.id ? `revision ${plan.revision}${dirty ? ', changed' : ''}` : 'not saved'}</span>
         <span class="grow" />
         <button class="btn" disabled={!history.before.length} onClick={() => { set_history(undone(history)); set_check(null); }}>Undo</button><button class="btn" disabled={!history.after.length} onClick={() => { set_history(redone(history)); set_check(null); }}>Redo</button>

@@ -13,6 +13,7 @@ export function System() {
   useEffect(() => { document.title = 'System - anchord'; }, []);
   return (
     <div class="system" data-testid="system" tabIndex={0} role="region" aria-label="System">
+      <h1 class="sr">System</h1>
       <DevicesPanel />
       <HealthPanel />
       {may('admin') && <AccessPanel />}

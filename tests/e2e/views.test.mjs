@@ -1,0 +1,180 @@
+// The views of the desk: planning, measurements, models, system. Real binary, real rows, real training; numbers on screen against the API's.
+import assert from 'node:assert/strict';
+import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+import { openBrowser, openPage, picture, text, violations } from './browser.mjs';
+import { eventually, root, run, startServer } from './server.mjs';
+
+const folder = mkdtempSync(join(tmpdir(), 'anchord views '));
+let browser, server, training;
+
+const post = async (path, json, headers = {}) => {
+  const answer = await server.fetch(path, { json, headers });
+  assert.ok(answer.ok, `${path}: ${answer.status} ${await answer.clone().text()}`);
+  return answer.json();
+};
+const get = async (path) => (await server.fetch(path)).json();
+
+before(async () => {
+  server = await startServer({ auth: 'off' });
+  const flight = join(folder, 'flight');
+  assert.equal((await run(['simulate', 'flight', '--seed', '7', '--duration', '60', '--out', flight])).code, 0);
+  const replayed = await run(['replay', flight, '--url', server.url, '--speed', 'max']);
+  assert.equal(replayed.code, 0, replayed.stderr);
+  await post('/api/v1/campaigns', { name: 'halls' });
+  const csv = readFileSync(join(root, 'docs/examples/campaign.csv'), 'utf8');
+  const imported = await server.fetch('/api/v1/campaigns/halls/samples', { method: 'POST', headers: { 'content-type': 'text/csv' }, body: csv });
+  assert.equal(imported.status, 200, await imported.text());
+  await post('/api/v1/datasets', { name: 'set', campaigns: ['halls'], aggregation: 'none', split: { test: ['room 6'] } });
+  training = await post('/api/v1/training-runs', { task: 'nlos_id', dataset: 'set', methods: ['logistic', 'random_forest'], cv: { folds: 4, seed: 7 } }, { prefer: 'wait=200' });
+  browser = await openBrowser();
+});
+after(async () => {
+  await browser?.close();
+  await server?.dispose();
+  rmSync(folder, { recursive: true, force: true });
+});
+
+test('the confusion on screen is that of the API, and the slider tells what a threshold costs', async () => {
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/models' });
+  await id('confusion').waitFor();
+  const { test: held_out } = await get(`/api/v1/training-runs/${training.id}/confusion`);
+  const cells = await id('confusion').locator('tbody td b').allTextContents(), c = held_out.confusion;
+  assert.deepEqual(cells.map(Number), [c.tp, c.fn, c.fp, c.tn]);
+  assert.equal(parseFloat(await text(id('fpr'))), Number(((100 * c.fp) / (c.fp + c.tn)).toFixed(1)));
+  const { points } = await get(`/api/v1/training-runs/${training.id}/roc`);
+  await id('threshold-slider').fill('0.9');
+  const near = points.filter((p) => p.threshold >= 0.9).reduce((a, b) => (b.threshold < a.threshold ? b : a));
+  await eventually('the slider speaks', async () => parseFloat(await text(id('slider-fpr'))) === Number((100 * near.fpr).toFixed(1)));
+  assert.deepEqual(await violations(page), []);
+  await picture(page, 'models-light');
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});
+
+test('the plain rules stand beside the learned models, with the rates of the API', async () => {
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/models' });
+  await id('task-rules').click();
+  await id('rules').locator('tbody tr').first().waitFor();
+  const { fitted } = await get('/api/v1/datasets/set/rules');
+  const row = id('rules').getByRole('row', { name: /^RSS over distance/ });
+  const shown = await row.locator('td').allTextContents();
+  assert.equal(parseFloat(shown[2]), Number((100 * fitted.rss.los_rate).toFixed(1)));
+  assert.equal(parseFloat(shown[3]), Number((100 * fitted.rss.nlos_rate).toFixed(1)));
+  assert.deepEqual(await violations(page), []);
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});
+
+test('a model is promoted past the gate, takes effect, and is rolled back by one press', async () => {
+  const { page, id } = await openPage(browser, server, { hash: `#/models/runs/${training.id}` });
+  await id('promote').click();
+  const dialog = id('promote-dialog');
+  await dialog.getByText(/GATE (NOT )?PASSED/).waitFor();
+  assert.deepEqual(await violations(page), []);
+  const reason = dialog.getByRole('textbox');
+  if (await reason.count()) await reason.fill('first model of this building');
+  await dialog.getByRole('button', { name: /^Promote/ }).click();
+  await dialog.waitFor({ state: 'detached' });
+  await eventually('it is active', async () => (await get('/api/v1/models/active')).models?.nlos_id?.id === training.model.split('/').pop());
+  await page.getByText('ACTIVE').first().waitFor();
+  await id('rollback').click();
+  await eventually('none is active', async () => !(await get('/api/v1/models/active')).models?.nlos_id);
+  await page.close();
+});
+
+test('measurements are filtered, plotted and opened one by one', async () => {
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/measurements' });
+  await id('rows').locator('tbody tr').first().waitFor();
+  const whole = await text(id('counts'));
+  await id('who').selectOption({ index: 1 });
+  await eventually('fewer are shown', async () => (await text(id('counts'))) !== whole);
+  await id('who').selectOption('');
+  await id('source').selectOption({ label: 'halls' });
+  await id('plot-bias').waitFor();
+  await id('rows').locator('tbody tr').first().click();
+  await id('features').waitFor();
+  const first = await text(id('impulse').locator('h2'));
+  await page.keyboard.press('j');
+  await eventually('the next one is open', async () => (await text(id('impulse').locator('h2'))) !== first || (await id('rows').locator('tr.sel').count()) === 1);
+  assert.deepEqual(await violations(page), []);
+  await picture(page, 'measurements-light');
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});
+
+test('a person draws an outline, generates a flight, moves a point by keys, saves, and a second editor is told', async () => {
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/plan' });
+  const map = id('plan-map');
+  await map.waitFor();
+  const box = await map.boundingBox();
+  for (const [x, y] of [[0.35, 0.35], [0.65, 0.35], [0.65, 0.6], [0.35, 0.6]]) await page.mouse.click(box.x + x * box.width, box.y + y * box.height);
+  await id('plan-name').fill('Hall A');
+  await id('generate').click();
+  await id('waypoints').locator('tbody tr').nth(3).waitFor({ timeout: 20_000 });
+  await id('check').getByText('BE FLOWN').waitFor();
+  await id('save').click();
+  await id('plan').getByText('revision 1').waitFor();
+  await id('check').getByText('BE FLOWN').waitFor();
+  assert.deepEqual(await violations(page), []);
+  await picture(page, 'plan-light');
+  const { items: [stored] } = await get('/api/v1/plans');
+  assert.equal(stored.name, 'Hall A');
+  assert.ok(stored.waypoints.length >= 4);
+  assert.equal(stored.outline.coordinates[0].length, 5);
+  // A waypoint goes half a metre north by an arrow key.
+  await id('waypoints').getByRole('button', { name: '1', exact: true }).click();
+  await map.focus();
+  await page.keyboard.press('ArrowUp');
+  await id('save').click();
+  await id('plan').getByText('revision 2').waitFor();
+  const moved = await get(`/api/v1/plans/${stored.id}`);
+  assert.ok(Math.abs((moved.waypoints[0].lat - stored.waypoints[0].lat) * 111_000 - 0.5) < 0.02);
+  // Somebody else saves; this page must not overwrite it in silence.
+  const other = await server.fetch(`/api/v1/plans/${stored.id}`, { method: 'PATCH', headers: { 'if-match': '"p-2"' }, json: { name: 'Hall B' } });
+  assert.equal(other.status, 200);
+  await id('plan-name').fill('Hall C');
+  await id('save').click();
+  await id('conflict').waitFor();
+  await id('conflict').getByRole('button', { name: 'Take theirs' }).click();
+  await eventually('theirs is shown', async () => (await id('plan-name').inputValue()) === 'Hall B');
+  assert.deepEqual(seen.errors.filter((e) => !e.includes('412')), []);
+  await page.close();
+});
+
+test('system tells the state of the server, and a token is shown once', async () => {
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/system' });
+  await id('health').getByText('DB', { exact: true }).waitFor();
+  await id('heard').locator('tbody tr').first().waitFor();
+  await id('access').getByPlaceholder('who or what will use it').fill('museum app');
+  await id('create-token').click();
+  const secret = await id('secret').getByRole('textbox').inputValue();
+  assert.match(secret, /^anc_/);
+  assert.deepEqual(await violations(page), []);
+  await picture(page, 'system-light');
+  await page.reload();
+  await id('access').getByText('museum app').waitFor();
+  assert.equal(await id('secret').count(), 0);
+  assert.ok(!(await page.content()).includes(secret));
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});
+
+test('a stored flight is replayed: time moves, a jump shows that moment, and no command is offered', async () => {
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/replay' });
+  await eventually('the flight is read', async () => /\d/.test(await text(id('replay-time'))), 20_000);
+  await id('scrubber').fill('30000000');
+  await eventually('it is at 30 s', async () => (await text(id('replay-time'))).startsWith('00:00:30'));
+  assert.ok((await id('range-list').locator('tbody tr').count()) >= 3);
+  await id('speed').selectOption('4');
+  await id('play').click();
+  await eventually('time moves on', async () => Number((await text(id('replay-time'))).slice(6, 8)) >= 33);
+  await id('play').click();
+  assert.equal(await page.getByRole('button', { name: /hold|land|start/i }).count(), 0);
+  assert.deepEqual(await violations(page), []);
+  await picture(page, 'replay-light');
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});

@@ -1,0 +1,34 @@
+import { describe, expect, it } from 'vitest';
+import { grid, procedure, STEPS, turn } from '../src/live/flight_messages';
+import { ranks } from '../src/views/flight/picture';
+import { next_step, stage_of, STEP_WORDS, TRACK } from '../src/views/flight/words';
+
+describe('a message of the procedure', () => {
+  it('needs its mission only, the rest is unknown', () => {
+    expect(procedure({})).toBeNull();
+    expect(procedure({ mission: 'm' })).toMatchObject({ step: 'ready', status: 'ready', target: null, drone: null, control: null, commands: [] });
+  });
+  it('never takes an unknown word for a state', () => expect(procedure({ mission: 'm', step: 'loop', status: '<b>', commands: [{ state: 'maybe' }] })).toMatchObject({ step: 'ready', status: 'ready', commands: [{ state: 'sent' }] }));
+  it('drops the choice of a decision whose candidates did not all arrive whole', () => {
+    const c = { lon: 1, lat: 2, value: 3 };
+    expect(grid({ mission: 'm', candidates: [c, c], chosen: 1 })!.chosen).toBe(1);
+    expect(grid({ mission: 'm', candidates: [{ lat: 2 }, c], chosen: 1 })!.chosen).toBeNull();
+  });
+  it('keeps the samples of a turn that are pairs of numbers', () => expect(turn({ mission: 'm', anchor: '0x1', samples: [[1, -80], [2], 'x', [3, null]] })!.samples).toEqual([[1, -80]]));
+});
+
+describe('the track of the procedure', () => {
+  it('has eleven stages, and every step but hold has one', () => {
+    expect(TRACK).toHaveLength(11);
+    expect(STEPS.filter((s) => stage_of(s) < 0)).toEqual(['hold']);
+  });
+  it('has words for every step, and an end', () => {
+    for (const s of STEPS) expect(STEP_WORDS[s]).toMatch(/^\w/);
+    expect(next_step('done')).toBeNull();
+  });
+});
+
+describe('ranks of candidates', () => {
+  it('are 0 for the best, 5 for the worst, none where refused', () => expect(ranks([{ value: 1, refused: null }, { value: 7, refused: null }, { value: 4, refused: null }, { value: 2, refused: 'visited' }])).toEqual([0, 5, 3, null]));
+  it('are all best where all are equal', () => expect(ranks([{ value: 2, refused: null }, { value: 2, refused: null }])).toEqual([0, 0]));
+});
