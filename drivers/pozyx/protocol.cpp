@@ -79,7 +79,12 @@ std::string function_line(std::uint8_t address, ByteView parameters, std::size_t
   return "F," + hex_byte(address) + "," + hex(parameters) + "," + std::to_string(reply_bytes) + "\r";
 }
 
-std::string reply_line(ByteView data) { return "D," + hex(data) + "\r\n"; }
+std::string reply_line(ByteView data) {
+  // Capitals, as tags say it; hosts say small letters, and both sides take either.
+  std::string digits = hex(data);
+  for (char& c : digits) c = c >= 'a' ? static_cast<char>(c - 'a' + 'A') : c;
+  return "D," + digits + "\r\n";
+}
 
 Result<Bytes> parse_reply(std::string_view line, std::size_t expected_bytes) {
   if (!line.starts_with("D,")) return bad("not a data line", line);

@@ -51,8 +51,8 @@ std::optional<std::string> TimeBase::skew() const {
   if (const auto offset = system_offset_s()) {
     const double allowed = k_skew_limit_s + 3 * k_latency_sigma_s;
     if (std::abs(*offset) <= allowed) return std::nullopt;
-    std::snprintf(text, sizeof text, "the system clock is %.3f s %s of the receiver's UTC", std::abs(*offset),
-                  *offset > 0 ? "ahead" : "behind");
+    std::snprintf(text, sizeof text, "the system clock is %.3f s %s the receiver's UTC", std::abs(*offset),
+                  *offset > 0 ? "ahead of" : "behind");
     return text;
   }
   const double stepped = static_cast<double>(system_ns_ - pinned_ns_.value_or(system_ns_)) * 1e-9;
