@@ -68,7 +68,8 @@ TEST_F(LabelledTableTest, ReadsWhatASpreadsheetMakesOfIt) {
                              "Room;NLOS;Range_mm;Ground Truth;RX dBm\r\n"
                              "hall;0;5100;5.0;-80\r\noffice;1;6900;6.0;-85\r\n")});
   ASSERT_TRUE(t) << t.error().message;
-  EXPECT_EQ(t.value().range_m, (std::vector<double>{5.1, 6.9}));
+  EXPECT_NEAR(t.value().range_m.at(0), 5.1, 1e-12);
+  EXPECT_NEAR(t.value().range_m.at(1), 6.9, 1e-12);
   EXPECT_EQ(t.value().true_range_m[1], 6.0);
   EXPECT_EQ(t.value().group_by, "Room");
   EXPECT_EQ(t.value().los[0], true);
