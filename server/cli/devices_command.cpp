@@ -13,7 +13,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 struct Options {
-  std::string data_dir{"anchord-data"}, url, device, kind, address, name, action;
+  std::string data_dir{"anchord-data"}, url, device, kind, address, name, action, arguments;
   std::vector<std::string> settings;
   bool json{false};
 };
@@ -180,8 +180,13 @@ int remove(const Options& options, Server& server) {
 int act(const Options& options, Server& server) {
   const auto device = find(server, options.device);
   if (!device) return fail(device.error().message);
-  const auto done = server.call("POST", "/api/v1/devices/" + text(device.value(), "id") + "/actions",
-                                Json{{"action", options.action}}.dump());
+  Json body{{"action", options.action}};
+  if (!options.arguments.empty()) {
+    body["arguments"] = Json::parse(options.arguments, nullptr, false);
+    if (!body["arguments"].is_object()) return fail("--arguments is a JSON object", 2);
+  }
+  const auto done =
+      server.call("POST", "/api/v1/devices/" + text(device.value(), "id") + "/actions", body.dump());
   if (!done) return fail(done.error().message);
   std::printf("%s\n", done.value().value("result", Json()).dump(1).c_str());
   return 0;
@@ -226,7 +231,11 @@ void add_devices_command(CLI::App& app, int& exit_code) {
   });
   auto* action = command->add_subcommand("action", "Anything else a device can be asked");
   action->add_option("device", options->device, "Id, the beginning of it, or name")->required();
-  action->add_option("action", options->action, "reboot, ...")->required();
+  action->add_option("action", options->action, "get_uwb, set_uwb, push_positions, range_between, ...")
+      ->required();
+  action->add_option(
+      "--arguments", options->arguments,
+      R"(JSON object, e.g. {"positions":[{"network_id":"0x6a21","x_m":1,"y_m":2,"z_m":2.5}]})");
   action->callback([run] { run(act); });
   command->callback([run, command] {
     if (command->get_subcommands().empty()) run(list);

@@ -22,7 +22,8 @@ namespace {
 
 constexpr auto k_batch_time = std::chrono::milliseconds(100);
 constexpr std::size_t k_batch_rows = 200;
-constexpr auto k_answer_time = std::chrono::seconds(10);
+constexpr auto k_answer_time =
+    std::chrono::seconds(25);  ///< settings of six anchors by radio take half of it
 
 device::Settings settings_of(const DeviceConfig& c) {
   return {to_string(c.id), c.kind, c.name, c.address, c.options_json};
@@ -419,7 +420,7 @@ Result<std::string> DeviceManager::act(const Uuid& id, std::string_view action,
   }
   if (answer.wait_for(k_answer_time) != std::future_status::ready) {
     forget();
-    return make_error(Errc::link_lost, "the device did not answer within 10 s");
+    return make_error(Errc::link_lost, "the device did not answer within 25 s");
   }
   return answer.get();
 }
