@@ -19,7 +19,7 @@ set(core_source "^(ceres/|libsvm/|glog/|opencv2/|GeographicLib/|proj\\.h$|sys/ra
 set(drivers_own "^(drivers/|${base_types_ports})")
 set(drivers_header "^(${everywhere}|boost/asio)")
 # json: a device of ours speaks it on the wire (gpsd), and only its decoder knows.
-set(drivers_source "^(nlohmann/json\\.hpp$|sys/|netinet/|linux/|termios\\.h$|unistd\\.h$|fcntl\\.h$|grp\\.h$|poll\\.h$|pty\\.h$)")
+set(drivers_source "^(nlohmann/json\\.hpp$|sys/|arpa/|netinet/|linux/|termios\\.h$|unistd\\.h$|fcntl\\.h$|grp\\.h$|poll\\.h$|pty\\.h$|stdlib\\.h$|time\\.h$)")
 
 set(api_own "^(api/|core/)")
 set(api_header "^(${everywhere}|nlohmann/json_fwd\\.hpp$)")
