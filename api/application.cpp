@@ -12,10 +12,12 @@
 #include "api/routes/access_routes.hpp"
 #include "api/routes/learning.hpp"
 #include "api/routes/routes.hpp"
+#include "api/services/access.hpp"
 #include "api/services/alarm_board.hpp"
 #include "api/services/device_ingest.hpp"
 #include "api/services/geo_service.hpp"
 #include "api/services/kit_profiles.hpp"
+#include "core/ports/backups.hpp"
 #include "core/ports/devices.hpp"
 #include "core/ports/store.hpp"
 
@@ -27,6 +29,7 @@ struct Application::State {
         router(&deps.access_store, &deps.clock),
         hub(deps.clock, "anchord " + deps.build.version),
         events(hub, deps.clock),
+        alarms(events),
         models(deps.learning != nullptr ? std::make_unique<ModelRegistry>(deps.learning->models) : nullptr),
         missions({deps.missions, deps.measurements, deps.anchors, hub, events, deps.clock, deps.post,
                   deps.goal, [this] { return device_rows(); }, judge(), needs_cir()}),
@@ -36,7 +39,8 @@ struct Application::State {
         geo(deps.geoid_dir),
         calibrations({deps.measurements, deps.missions, deps.anchors, jobs, deps.clock, profiles_of(deps),
                       models.get(), deps.learning != nullptr ? &deps.learning->models : nullptr}),
-        services{deps, hub, events, missions, ingest, jobs, calibrations, geo, profiles.get(), deps.frames} {
+        services{deps, hub,          events, alarms,         missions,   ingest,
+                 jobs, calibrations, geo,    profiles.get(), deps.frames} {
     router.on_fault(deps.log_fault);
     add_mission_routes(router, services);
     add_measurement_routes(router, services);
@@ -57,6 +61,8 @@ struct Application::State {
       add_model_routes(router, learning->services);
     }
     if (deps.access != nullptr) add_access_routes(router, *deps.access);
+    add_alarm_routes(router, services);
+    if (deps.backups != nullptr) add_backup_routes(router, services);
     add_system_routes(router, services);
   }
 
@@ -83,6 +89,7 @@ struct Application::State {
   Router router;
   Hub hub;
   EventLog events;
+  AlarmBoard alarms;
   std::unique_ptr<ModelRegistry> models;
   MissionService missions;
   IngestService ingest;
@@ -105,7 +112,6 @@ struct Application::State {
   std::condition_variable stop_told;
   bool stopping{false}, started{false};
   std::thread heart;
-  AlarmBoard alarms{events};
 };
 
 void Services::audit(const Request& request, std::string what, std::string result) const {
@@ -145,6 +151,7 @@ void Application::State::beat() {
 
 void Application::State::second() {
   const UtcTime now = deps.clock.now();
+  if (deps.access != nullptr) deps.access->flush();
   const StorageStatus storage = services.storage();
   std::string json = R"({"t_us":)" + std::to_string(now.us()) + R"(,"recording":)" +
                      (missions.recording() ? "true" : "false");
@@ -155,16 +162,21 @@ void Application::State::second() {
   json += R"(,"synchronous":)" + json_text(storage.synchronous) + '}';
   hub.publish(Topic::system, std::move(json), now.us());
 
-  alarms.set({"storage.unwritable", "critical", "measurements are stored again"},
-             storage.writable ? std::string() : storage.reason, now);
+  ServerPulse pulse{storage.writable, storage.reason, storage.disk_free_bytes,
+                    storage.queue_depth + missions.queued()};
   if (deps.devices != nullptr) {
-    alarms.set({"clock.skew", "warning", "the system clock is right again"}, deps.devices->clock().skew, now);
-    const auto unrecorded = deps.devices->recorder_failure();
-    alarms.set({"recording.failed", "critical", "raw bytes are recorded again"},
-               unrecorded.empty() ? unrecorded : "raw bytes of the devices are not recorded: " + unrecorded,
-               now);
+    pulse.clock_skew = deps.devices->clock().skew;
+    pulse.unrecorded = deps.devices->recorder_failure();
   }
-  hub.publish(Topic::alarms, alarms.json(), now.us());
+  alarms.update(alarm_conditions(missions.pulses(), pulse), now);
+  // Daily and after every flight (reliability.md section 2).
+  if (deps.backups != nullptr && deps.backups->due(missions.finished())) {
+    if (const auto begun = services.begin_backup(); !begun)
+      events.add("warning", "backup.failed", begun.error().message);
+  }
+  std::string list = "[";
+  for (const auto& alarm : alarms.standing()) list += (list.size() > 1 ? "," : "") + alarm_json(alarm);
+  hub.publish(Topic::alarms, list + ']', now.us());
 }
 
 Application::Application(Deps deps) : state_(std::make_unique<State>(std::move(deps))) {}

@@ -13,6 +13,7 @@
 
 namespace anchord {
 class AccessStore;
+class Backups;
 class AnchorStore;
 class CampaignStore;
 class Clock;
@@ -73,7 +74,8 @@ class Application {
     AccessService* access{nullptr};  ///< tokens, sessions, tickets; null: those routes do not exist (tests)
     /// Runs a task on the pool; absent: on the calling thread.
     std::function<void(std::function<void()>)> post{};
-    AccuracyGoal goal{};  ///< how well a live anchor must be known to count as converged
+    Backups* backups{nullptr};  ///< null: their routes do not exist and none are made
+    AccuracyGoal goal{};        ///< how well a live anchor must be known to count as converged
     std::function<StorageStatus()> storage_status{};
     KitStore* kits{nullptr};                      ///< null: no kit profiles (tests)
     FrameStore* frames{nullptr};                  ///< null: no local frames (tests)

@@ -6,6 +6,7 @@ int main(int argc, char** argv) {
   CLI::App app{"anchord: finds where a building's UWB anchors are on the globe", "anchord"};
   app.require_subcommand(1);
   int exit_code = 0;
+  anchord::cli::add_backup_command(app, exit_code);
   anchord::cli::add_config_command(app, exit_code);
   anchord::cli::add_frame_command(app, exit_code);
   anchord::cli::add_healthcheck_command(app, exit_code);

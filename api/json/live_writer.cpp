@@ -158,7 +158,12 @@ std::string live_pose_json(const MissionId& mission, TrackFrame frame, const Liv
     out.vector(*sigma, 4);
   else
     out.raw("null");
-  out.key("tag_enu_m").raw("null").key("speed_mps").optional(pose.speed_mps, 3);
+  out.key("tag_enu_m");
+  if (pose.tag_enu_m)
+    out.vector(*pose.tag_enu_m, 4);
+  else
+    out.raw("null");
+  out.key("speed_mps").optional(pose.speed_mps, 3);
   return out.take();
 }
 

@@ -261,9 +261,10 @@ std::optional<std::string> Fields::text(std::string_view key, std::size_t max_by
     return std::nullopt;
   }
   const auto& text = value->get_ref<const std::string&>();
-  if (text.size() > max_bytes || (required && text.empty())) {
+  const bool blank = text.find_first_not_of(' ') == std::string::npos;
+  if (text.size() > max_bytes || (required && blank)) {
     error(key, "out_of_range",
-          text.empty() ? "must not be empty" : "must be at most " + std::to_string(max_bytes) + " bytes");
+          blank ? "must not be empty" : "must be at most " + std::to_string(max_bytes) + " bytes");
     return std::nullopt;
   }
   for (const char c : text) {
@@ -336,11 +337,17 @@ void Fields::finish() {
   }
 }
 
-Json json_body(const Request& request, bool may_be_empty) {
-  if (request.body.empty() && may_be_empty) return Json::object();
+std::string media_type(const Request& request) {
   std::string type(request.header("content-type"));
   type = type.substr(0, type.find(';'));
   while (!type.empty() && type.back() == ' ') type.pop_back();
+  for (char& c : type) c = static_cast<char>(c >= 'A' && c <= 'Z' ? c + 32 : c);
+  return type;
+}
+
+Json json_body(const Request& request, bool may_be_empty) {
+  if (request.body.empty() && may_be_empty) return Json::object();
+  const std::string type = media_type(request);
   if (type != "application/json" && type != "application/merge-patch+json") {
     throw_problem(415, "media-type", "send Content-Type: application/json");
   }

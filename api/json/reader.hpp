@@ -61,6 +61,9 @@ class Fields {
   std::set<std::string, std::less<>> known_;
 };
 
+/// Content-Type without its parameters, lower case: media types have no case (RFC 9110 section 8.3.1).
+std::string media_type(const Request& request);
+
 /// The parsed body of an ordinary JSON request. Throws ProblemException: 415 without application/json (or
 /// merge-patch), 400 where it cannot be read. An empty body reads as {} when `may_be_empty`.
 nlohmann::json json_body(const Request& request, bool may_be_empty = false);

@@ -157,6 +157,8 @@ RangeRow read_range(const Json& row, const std::optional<MissionId>& mission,
     range.kind = static_cast<RangeKind>(*kind);
   if (const auto id = read_network_id(fields, "tag")) range.tag = *id;
   if (const auto id = read_network_id(fields, "anchor")) range.anchor = *id;
+  if (range.anchor == range.tag && range.anchor.value != 0)
+    fields.error("anchor", "same_device", "a radio cannot measure the distance to itself");
   if (const auto n = fields.integer("antenna", 0, 255)) range.antenna = static_cast<std::uint8_t>(*n);
   const Json* distance = fields.child("distance_m");
   if (distance != nullptr && distance->is_number() && distance->get<double>() == 0) {

@@ -4,6 +4,7 @@
 
 #include "api/http/problem.hpp"
 #include "api/http/router.hpp"
+#include "api/routes/support.hpp"
 #include "api/services/access.hpp"
 
 namespace anchord::api {
@@ -112,7 +113,8 @@ Response create_token(AccessService& access, const Request& request) {
   return response.header("Location", "/api/v1/tokens/" + to_string(made.token.id));
 }
 
-Response list_tokens(AccessService& access) {
+Response list_tokens(AccessService& access, const Request& request) {
+  check_query(request, {});
   json items = json::array();
   for (const auto& token : access.tokens()) items.push_back(token_json(token));
   return answer(200, {{"items", items}, {"next_cursor", nullptr}});
@@ -151,7 +153,7 @@ Response logout(AccessService& access, const Request& request) {
 void add_access_routes(Router& router, AccessService& access) {
   using enum Method;
   const auto admin = Access::any_of({Role::admin});
-  router.add({get, "/api/v1/tokens", admin, [&access](const Request&) { return list_tokens(access); }});
+  router.add({get, "/api/v1/tokens", admin, [&access](const Request& r) { return list_tokens(access, r); }});
   router.add(
       {post, "/api/v1/tokens", admin, [&access](const Request& r) { return create_token(access, r); }});
   router.add(

@@ -9,6 +9,7 @@
 
 namespace anchord::api {
 
+class AlarmBoard;
 class GeoService;
 class KitProfiles;
 
@@ -17,6 +18,7 @@ struct Services {
   Application::Deps& deps;
   Hub& hub;
   EventLog& events;
+  AlarmBoard& alarms;
   MissionService& missions;
   IngestService& ingest;
   JobService& jobs;
@@ -26,6 +28,8 @@ struct Services {
   FrameStore* frames{nullptr};     ///< null: their routes do not exist
 
   StorageStatus storage() const { return deps.storage_status ? deps.storage_status() : StorageStatus{}; }
+  /// Begins a backup in a job. Errors: those of the job queue.
+  Result<Job> begin_backup() const;
   /// One line in the audit log: who did what from where.
   void audit(const Request& request, std::string what, std::string result = "ok") const;
 };
@@ -41,6 +45,8 @@ void add_calibration_routes(Router& router, Services& services);
 void add_device_routes(Router& router, Services& services);
 void add_job_routes(Router& router, Services& services);
 void add_plan_routes(Router& router, Services& services);
+void add_alarm_routes(Router& router, Services& services);
+void add_backup_routes(Router& router, Services& services);
 void add_system_routes(Router& router, Services& services);
 
 }  // namespace anchord::api

@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/contract.hpp"
+#include "api/exports/docs_page.hpp"
 #include "api/live/hub.hpp"
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
@@ -117,6 +118,13 @@ void add_system_routes(Router& router, Services& s) {
   router.add({Method::get, "/problems/{type}", Access::open(), explain});
   router.add({Method::get, "/api/v1/system", readers(), on(system)});
   router.add({Method::get, "/api/v1/audit", Access::any_of({Role::admin}), on(audit_log)});
+  router.add({Method::get, "/api/docs", Access::open(), [](const Request&) {
+                static const std::string page = docs_page(openapi_json());
+                Response response;
+                response.header("Content-Type", "text/html; charset=utf-8");
+                response.body = page;
+                return response;
+              }});
   router.add({Method::get, "/api/v1/openapi.json", Access::open(),
               [](const Request&) { return document(openapi_json()); }});
   router.add({Method::get, "/api/v1/asyncapi.json", Access::open(),

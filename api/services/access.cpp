@@ -6,6 +6,7 @@
 #include <map>
 #include <mutex>
 #include <shared_mutex>
+#include <utility>
 
 #include "api/http/idempotency.hpp"
 #include "api/services/secrets.hpp"
@@ -69,6 +70,8 @@ UtcTime after(UtcTime now, std::chrono::seconds time) {
 }  // namespace
 
 struct AccessService::State {
+  State(TokenStore& s, AccessStore& l, const Clock& c, AccessOptions o)
+      : store(s), log(l), clock(c), options(o) {}
   TokenStore& store;
   AccessStore& log;
   const Clock& clock;
@@ -80,6 +83,22 @@ struct AccessService::State {
       sessions;  ///< by SHA-256 of the cookie: a memory dump gives no login
   std::map<std::string, Ticket, std::less<>> tickets;  ///< by SHA-256 of the ticket
   std::uint64_t next_order{0};
+
+  mutable std::mutex notes_mutex;  ///< apart: verify() is shared, and notes what it saw
+  struct Refusal {
+    UtcTime first{};
+    std::string who, what, from;
+    std::uint64_t count{};
+  };
+  std::map<std::string, Refusal> refusals;
+  std::uint64_t unnamed_refusals{0};
+  mutable std::map<std::string, UtcTime> used;  ///< by the id's 32 digits, since the last flush of them
+  UtcTime used_flushed{};
+
+  void note_use(const std::string& key) const {
+    const std::scoped_lock lock(notes_mutex);
+    used[key] = clock.now();
+  }
 
   /// Null unless the secret is right and the token lives. The mutex is held.
   const Token* find(std::string_view text) const {
@@ -96,8 +115,8 @@ struct AccessService::State {
 
 AccessService::AccessService(TokenStore& tokens, AccessStore& audit, const Clock& clock,
                              AccessOptions options)
-    : state_(new State{tokens, audit, clock, options, {}, {}, {}, {}, 0}) {}
-AccessService::~AccessService() = default;
+    : state_(std::make_unique<State>(tokens, audit, clock, options)) {}
+AccessService::~AccessService() { flush(); }
 
 const AccessOptions& AccessService::options() const { return state_->options; }
 
@@ -167,14 +186,20 @@ Result<void> AccessService::revoke_token(const TokenId& id, const Principal& by,
 std::vector<Token> AccessService::tokens() const {
   const std::shared_lock lock(state_->mutex);
   std::vector<Token> all;
-  for (const auto& [key, token] : state_->tokens) all.push_back(token);
+  const std::scoped_lock notes(state_->notes_mutex);
+  for (const auto& [key, token] : state_->tokens) {
+    all.push_back(token);
+    if (const auto at = state_->used.find(key); at != state_->used.end()) all.back().last_used = at->second;
+  }
   return all;
 }
 
 std::optional<Principal> AccessService::verify(std::string_view token_text) const {
   const std::shared_lock lock(state_->mutex);
   const Token* token = state_->find(token_text);
-  return token == nullptr ? std::nullopt : std::optional(principal_of(*token));
+  if (token == nullptr) return std::nullopt;
+  state_->note_use(without_dashes(token->id.uuid));
+  return principal_of(*token);
 }
 
 Result<std::string> AccessService::open_session(std::string_view token_text, std::string_view from) {
@@ -219,6 +244,7 @@ std::optional<Principal> AccessService::session(std::string_view cookie) const {
   if (at == state_->sessions.end() || at->second.until <= now) return std::nullopt;
   const auto token = state_->tokens.find(at->second.token_id);
   if (token == state_->tokens.end() || !live(token->second, now)) return std::nullopt;
+  state_->note_use(token->first);
   return principal_of(token->second);
 }
 
@@ -241,6 +267,57 @@ std::optional<Principal> AccessService::take_ticket(std::string_view ticket) {
   state_->tickets.erase(at);
   if (found.until <= state_->clock.now()) return std::nullopt;
   return found.principal;
+}
+
+void AccessService::note_refusal(std::string_view who, std::string_view what, std::string_view from) {
+  constexpr std::size_t k_max_noted = 1000;
+  const std::string key = std::string(who) + '\n' + std::string(what) + '\n' + std::string(from);
+  const std::scoped_lock lock(state_->notes_mutex);
+  const auto at = state_->refusals.find(key);
+  if (at == state_->refusals.end() && state_->refusals.size() >= k_max_noted) {
+    ++state_->unnamed_refusals;
+    return;
+  }
+  auto& refusal = state_->refusals[key];
+  if (refusal.count++ == 0)
+    refusal = {state_->clock.now(), std::string(who), std::string(what), std::string(from), 1};
+}
+
+void AccessService::flush() {
+  constexpr std::int64_t k_minute_ns = 60'000'000'000;
+  std::map<std::string, State::Refusal> refusals;
+  std::map<std::string, UtcTime> used;
+  std::uint64_t unnamed = 0;
+  const UtcTime now = state_->clock.now();
+  {
+    const std::scoped_lock lock(state_->notes_mutex);
+    refusals.swap(state_->refusals);
+    unnamed = std::exchange(state_->unnamed_refusals, 0);
+    if (now.ns - state_->used_flushed.ns >= k_minute_ns) {
+      used.swap(state_->used);
+      state_->used_flushed = now;
+    }
+  }
+  const auto write = [&](const State::Refusal& refusal) {
+    const std::string result =
+        refusal.count == 1 ? "refused" : "refused " + std::to_string(refusal.count) + " times";
+    // A store in trouble tells it by its health; a refusal that is not logged was refused all the same.
+    return state_->log.append_audit({refusal.first, refusal.who, refusal.what, refusal.from, result})
+        .has_value();
+  };
+  for (const auto& [key, refusal] : refusals) (void)write(refusal);
+  if (unnamed > 0) (void)write({now, "others", "requests", "", unnamed});
+  for (const auto& [key, time] : used) {
+    std::optional<TokenId> id;
+    {
+      const std::unique_lock lock(state_->mutex);
+      const auto at = state_->tokens.find(key);
+      if (at == state_->tokens.end()) continue;
+      at->second.last_used = time;
+      id = at->second.id;
+    }
+    (void)state_->store.touch(*id, time).has_value();
+  }
 }
 
 void AccessService::audit(std::string_view who, std::string_view what, std::string_view from,

@@ -66,6 +66,13 @@ class AccessService {
   /// The principal the ticket was made for, once.
   std::optional<Principal> take_ticket(std::string_view ticket);
 
+  /// Notes a request that was refused for who sent it; flush() writes it. Never waits: for the io thread.
+  /// Equal ones are counted, beyond 1000 different ones between two flushes only their number is kept.
+  void note_refusal(std::string_view who, std::string_view what, std::string_view from);
+  /// Writes what was noted: refusals to the audit log, each token's time of last use to the store (at most
+  /// once a minute). May wait for the disk.
+  void flush();
+
   /// Appends to the audit log; a log that cannot be written is reported by the store's health, not here.
   void audit(std::string_view who, std::string_view what, std::string_view from, std::string_view result);
 

@@ -1,36 +1,43 @@
 #pragma once
 
-#include <map>
+#include <mutex>
 #include <string>
 #include <string_view>
+#include <vector>
 
-#include "core/base/time.hpp"
+#include "api/services/alarm_rules.hpp"
+#include "core/base/result.hpp"
 
 namespace anchord::api {
 
 class EventLog;
 
-/// The alarms that stand, by id: each is told once as an event when it comes and once when it goes, and is in
-/// the list of topic `alarms` in between. Not thread-safe.
+/// An alarm that stands.
+struct Alarm {
+  AlarmCondition condition;
+  UtcTime since{};
+  bool acknowledged{false};
+};
+std::string_view priority_word(AlarmPriority priority);
+/// As topic `alarms` and GET /alarms show it.
+std::string alarm_json(const Alarm& alarm);
+
+/// The alarms that stand: raised when their condition begins, gone when it ends, quiet but visible once
+/// acknowledged. Raising, clearing and acknowledging are events. Thread-safe.
 class AlarmBoard {
  public:
-  struct Alarm {
-    std::string_view id, priority;  ///< of topic `alarms`: critical, warning, advisory
-    std::string_view over;          ///< what the event says when it is over
-  };
   explicit AlarmBoard(EventLog& events) : events_(events) {}
-  /// why  what is wrong now, one line; empty: nothing is
-  void set(const Alarm& alarm, const std::string& why, UtcTime now);
-  /// JSON array, the data of topic `alarms`.
-  std::string json() const;
+  /// What holds now, about once a second.
+  void update(std::vector<AlarmCondition> holding, UtcTime now);
+  /// Errors: not_found when no such alarm stands. Acknowledging twice is no error.
+  Result<Alarm> acknowledge(std::string_view id, std::string_view by);
+  /// By priority, then time.
+  std::vector<Alarm> standing() const;
 
  private:
-  struct Standing {
-    std::string priority, text;
-    UtcTime since{};
-  };
   EventLog& events_;
-  std::map<std::string, Standing, std::less<>> standing_;
+  mutable std::mutex mutex_;
+  std::vector<Alarm> alarms_;
 };
 
 }  // namespace anchord::api

@@ -62,9 +62,19 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
     options.min_fix = static_cast<FixClass>(*fix);
   if (const auto profile = fields.word("profile", {"kit", "none"})) out.use_profile = *profile == 0;
   if (const auto steps = fields.integer("iterations", 0, 50)) out.iterations = static_cast<int>(*steps);
+  if (const Json* sigma = fields.child("sigma_m")) {
+    Fields inner(*sigma, "/sigma_m", errors);
+    if (const auto los = inner.number("los", 0.001, 1)) options.min_scale_m = *los;
+    if (const auto rtk = inner.number("rtk", 0, 1)) options.floor_sigma_m = *rtk;
+    inner.number("nlos", 0.001, 10);  // of ranges that a model calls NLOS; the loss weighs the others
+    inner.finish();
+  }
+  // Every anchor is searched for from some 17 places, those of bearing and height among them, so that the
+  // answer depends on none of them; the word is taken for those who send it.
+  fields.word("initial", {"search", "bearing_height"});
   if (const Json* models = fields.child("models")) out.models = read_flight_models(*models, errors);
   out.compare_uncorrected = fields.boolean("compare_uncorrected").value_or(true);
-  for (const char* later : {"frame", "use_anchor_anchor", "sigma_m", "initial"}) {
+  for (const char* later : {"frame", "use_anchor_anchor"}) {
     if (fields.child(later) != nullptr)
       fields.error(later, "unsupported", std::string(later) + " cannot be set in this version");
   }
@@ -134,6 +144,13 @@ Result<void> choose_frame(const std::vector<FlightData>& flights, FlightOptions&
     if (flight.mission.frame != out.frame)
       return make_error(Errc::invalid_argument,
                         "missions on the globe and in a local frame cannot be solved together");
+    // Local coordinates of two places share no origin: their numbers would mix without anybody noticing.
+    const Mission& first = flights.front().mission;
+    if (out.frame == TrackFrame::local && flight.mission.site && first.site &&
+        *flight.mission.site != *first.site)
+      return make_error(Errc::invalid_argument,
+                        first.name + " and " + flight.mission.name +
+                            " are in local frames of different sites and cannot be solved together");
     if (out.frame != TrackFrame::wgs84 || options.origin) continue;
     for (const auto& fix : flight.fixes) {
       if (fix.fix >= options.min_fix && fix.frame == TrackFrame::wgs84) {

@@ -67,9 +67,7 @@ class IngestRun {
 
   Response run() {
     read_query();
-    std::string type(request_.header("content-type"));
-    type = type.substr(0, type.find(';'));
-    while (!type.empty() && type.back() == ' ') type.pop_back();
+    const std::string type = media_type(request_);
     const auto encoding = request_.header("content-encoding");
     if (!encoding.empty() && encoding != "identity")
       throw_problem(415, "media-type", "compressed bodies are not accepted");

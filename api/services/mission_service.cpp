@@ -9,7 +9,10 @@
 #include "api/json/live_writer.hpp"
 #include "api/live/hub.hpp"
 #include "api/services/event_log.hpp"
+#include "api/services/flight_watch.hpp"
 #include "api/services/joint_worker.hpp"
+#include "api/services/live_row.hpp"
+#include "api/services/radio_watch.hpp"
 #include "core/localize/flight_history.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "core/localize/live_flight.hpp"
@@ -18,53 +21,12 @@
 namespace anchord::api {
 namespace {
 
-/// A range, and what the models that were promoted when it came say of it.
-struct JudgedRange {
-  Range range;
-  std::optional<RangeModel> model;
-  UtcTime time{};
-};
-using Row = std::variant<JudgedRange, Fix>;
-
-constexpr double k_least_range_m = 0.05;              // what radios report for a failure lies below it
+using Row = LiveRow;
 constexpr std::int64_t k_pose_interval_us = 100'000;  // 10 Hz of measurement time
 constexpr std::int64_t k_rtk_interval_us = 200'000;
 
-UtcTime time_of(const Row& row) {
-  return std::visit([](const auto& r) { return r.time; }, row);
-}
-
-/// Enough to know a row again that came both from the store and from the queue.
-/// As a solution of the whole flight takes it.
-Range corrected(const JudgedRange& judged) {
-  Range out = judged.range;
-  const double bias_m = judged.model ? judged.model->bias_m.value_or(0) : 0;
-  if (out.distance_m - bias_m > k_least_range_m) out.distance_m -= bias_m;
-  return out;
-}
-
-std::size_t identity(const Row& row) {
-  const auto mix = [](std::size_t seed, std::uint64_t value) {
-    return seed ^ (std::hash<std::uint64_t>{}(value) + 0x9e3779b97f4a7c15ULL + (seed << 6) + (seed >> 2));
-  };
-  std::size_t hash = mix(row.index(), static_cast<std::uint64_t>(time_of(row).ns));
-  if (const auto* judged = std::get_if<JudgedRange>(&row)) {
-    const Range* range = &judged->range;
-    hash = mix(mix(hash, range->tag.value), range->anchor.value);
-    return mix(mix(hash, range->antenna), range->seq.value_or(0));
-  }
-  return mix(hash, std::get<Fix>(row).seq.value_or(0));
-}
-
 constexpr std::size_t k_min_joint_ranges = 100;  // below, the own search of each anchor is as good
 constexpr auto k_joint_pause = std::chrono::seconds(2);
-
-struct Radio {
-  bool tag{false};
-  UtcTime last_seen{};     ///< measured
-  UtcTime last_arrival{};  ///< wall clock: a replayed flight is live too
-  double interval_s{0};    ///< smoothed
-};
 
 }  // namespace
 
@@ -78,7 +40,7 @@ struct MissionService::Flight {
   bool scheduled{false};
   std::uint64_t dropped{0};
   UtcTime last_arrival{};
-
+  std::optional<UtcTime> fix_arrival{}, range_arrival{};
   std::mutex work_mutex;  ///< the strand: everything below
   LiveFlight live;
   std::map<NetworkId, std::string> statuses;
@@ -86,12 +48,12 @@ struct MissionService::Flight {
   std::int64_t last_pose_us{0}, last_rtk_us{0};
   std::deque<std::int64_t> range_times_us;
   std::atomic<bool> dirty{true};
-
   FlightHistory history;
   std::size_t ranges_since_joint{0};
   std::chrono::steady_clock::time_point joint_not_before{};
   bool joint_running{false};
 
+  FlightWatch watch;
   std::atomic<bool> rebuilding{false};  ///< rows wait in the queue until what was stored is in
   struct Rebuild {
     MeasurementStore::Filter range_filter{}, fix_filter{};
@@ -109,16 +71,22 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   std::mutex mutex;
   std::map<MissionId, Mission> cache;
   std::map<MissionId, std::shared_ptr<Flight>> flights;
-  std::mutex radios_mutex;
-  std::map<NetworkId, Radio> radios;
+  RadioWatch radios;
   std::atomic<std::size_t> queued{0};
   std::atomic<bool> stopped{false};
+  std::atomic<std::uint64_t> finished{0};
   std::mutex running_mutex;
   std::condition_variable idle;
   int running{0};
   std::int64_t ticks{0};
   JointWorker joint;
 
+  std::vector<std::shared_ptr<Flight>> all() {
+    std::vector<std::shared_ptr<Flight>> out;
+    const std::scoped_lock lock(mutex);
+    for (const auto& [id, flight] : flights) out.push_back(flight);
+    return out;
+  }
   std::shared_ptr<Flight> find(const MissionId& id) {
     const std::scoped_lock lock(mutex);
     const auto it = flights.find(id);
@@ -141,7 +109,6 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   void start_joint(const std::shared_ptr<Flight>& flight);
   void finish_joint(Flight& flight, const FlightSolution* solution, UtcTime cut,
                     std::chrono::steady_clock::duration took);
-  void heard(NetworkId id, bool tag, UtcTime time);
   void publish_devices();
 };
 
@@ -180,6 +147,7 @@ Result<Mission> MissionService::finish(const MissionId& id) {
   current.state = MissionState::finished;
   current.finished = state_->deps.clock.now();
   BOOST_OUTCOME_TRY(state_->deps.missions.update(current));
+  ++state_->finished;
   {
     const std::scoped_lock lock(state_->mutex);
     state_->cache[id] = current;
@@ -221,9 +189,9 @@ void MissionService::prepare(const MissionId& id) {
 }
 
 void MissionService::State::begin_rebuild(const std::shared_ptr<Flight>& flight) {
-  const auto n = deps.measurements.count_ranges(flight->id);
-  const auto n_fixes = deps.measurements.count_fixes(flight->id);
-  if (!n || !n_fixes || n.value() + n_fixes.value() == 0) {
+  const auto n = deps.measurements.count_ranges(flight->id),
+             fixes = deps.measurements.count_fixes(flight->id);
+  if (!n || !fixes || n.value() + fixes.value() == 0) {
     flight->rebuilding = false;
     return schedule(flight);
   }
@@ -320,6 +288,7 @@ void MissionService::State::finish_joint(Flight& flight, const FlightSolution* s
                             std::max<std::chrono::steady_clock::duration>(k_joint_pause, 3 * took);
   if (solution == nullptr || stopped) return;
   flight.live.adopt(*solution, cut);
+  flight.watch.note_lag(solution->shared.lag_s.value, solution->shared.lag_s.sigma);
   announce(flight, false);
   flight.dirty = true;
 }
@@ -342,6 +311,7 @@ void MissionService::State::accept(std::vector<R> rows) {
     Row judged = row_of(std::move(row));
     const std::scoped_lock lock(flight->queue_mutex);
     flight->last_arrival = now;
+    (std::is_same_v<R, Fix> ? flight->fix_arrival : flight->range_arrival) = now;
     if (flight->queue.size() >= k_max_queued_rows) {
       flight->queue.pop_front();
       ++flight->dropped;
@@ -350,12 +320,7 @@ void MissionService::State::accept(std::vector<R> rows) {
     flight->queue.push_back(std::move(judged));
     ++queued;
   }
-  std::vector<std::shared_ptr<Flight>> all;
-  {
-    const std::scoped_lock lock(mutex);
-    for (auto& [id, f] : flights) all.push_back(f);
-  }
-  for (auto& f : all) schedule(f);
+  for (const auto& f : all()) schedule(f);
 }
 
 bool MissionService::wants_cir() const {
@@ -459,14 +424,16 @@ void MissionService::State::step(Flight& flight, const Row& row, bool quiet) {
     const Range* range = &judged->range;
     ++state.n_ranges;
     if (!quiet) {
-      heard(range->tag, range->kind == RangeKind::tag_anchor, time);
-      heard(range->anchor, false, time);
+      const UtcTime now = deps.clock.now();
+      radios.heard(range->tag, range->kind == RangeKind::tag_anchor, time, now);
+      radios.heard(range->anchor, false, time, now);
     }
     flight.range_times_us.push_back(time.us());
     if (flight.range_times_us.size() > 100) flight.range_times_us.pop_front();
     const double span_s =
         static_cast<double>(flight.range_times_us.back() - flight.range_times_us.front()) * 1e-6;
     state.range_rate_hz = span_s > 0 ? static_cast<double>(flight.range_times_us.size() - 1) / span_s : 0;
+    flight.watch.note_range(time);
     flight.history.add(corrected(*judged));
     ++flight.ranges_since_joint;
     flight.live.add(*range, judged->model);
@@ -474,6 +441,7 @@ void MissionService::State::step(Flight& flight, const Row& row, bool quiet) {
   }
   const auto& fix = std::get<Fix>(row);
   ++state.n_fixes;
+  flight.watch.note(fix);
   flight.history.add(fix);
   flight.live.add(fix);
   if (quiet) return;
@@ -531,37 +499,12 @@ void MissionService::State::announce(Flight& flight, bool quiet) {
                                              [](const auto& entry) { return entry.second == "converged"; }));
 }
 
-void MissionService::State::heard(NetworkId id, bool tag, UtcTime time) {
-  const std::scoped_lock lock(radios_mutex);
-  auto& radio = radios[id];
-  const double step_s = seconds_between(radio.last_seen, time);
-  if (radio.last_seen.ns != 0 && step_s > 0 && step_s < 10)
-    radio.interval_s = radio.interval_s == 0 ? step_s : 0.9 * radio.interval_s + 0.1 * step_s;
-  radio.tag = tag;
-  radio.last_seen = time;
-  radio.last_arrival = deps.clock.now();
-}
-
 void MissionService::State::publish_devices() {
   const UtcTime now = deps.clock.now();
-  const std::string more = deps.device_rows ? deps.device_rows() : std::string();
-  std::string json = "[";
-  {
-    const std::scoped_lock lock(radios_mutex);
-    if (radios.empty() && more.empty()) return;
-    for (const auto& [id, radio] : radios) {
-      const double silent_s = seconds_between(radio.last_arrival, now);
-      const char* state = silent_s < 2 ? "live" : silent_s < 5 ? "late" : "lost";
-      char rate[32];
-      std::snprintf(rate, sizeof rate, "%.1f",
-                    radio.interval_s > 0 && silent_s < 5 ? 1 / radio.interval_s : 0.0);
-      json += (json.size() > 1 ? "," : "") + std::string(R"({"network_id":")") + to_string(id) +
-              R"(","kind":")" + (radio.tag ? "tag" : "anchor") + R"(","state":")" + state +
-              R"(","last_seen_us":)" + std::to_string(radio.last_seen.us()) + R"(,"rate_hz":)" + rate + '}';
-    }
-  }
-  if (!more.empty()) json += (json.size() > 1 ? "," : "") + more;
-  deps.hub.publish(Topic::devices, json + ']', now.us());
+  std::string rows = radios.rows_json(now);
+  if (const std::string more = deps.device_rows ? deps.device_rows() : std::string(); !more.empty())
+    rows += (rows.empty() ? "" : ",") + more;
+  if (!rows.empty()) deps.hub.publish(Topic::devices, '[' + rows + ']', now.us());
 }
 
 std::vector<MissionService::LiveView> MissionService::live(const std::optional<MissionId>& id) {
@@ -594,12 +537,7 @@ std::vector<MissionService::LiveView> MissionService::live(const std::optional<M
 }
 
 void MissionService::tick() {
-  std::vector<std::shared_ptr<Flight>> all;
-  {
-    const std::scoped_lock lock(state_->mutex);
-    for (const auto& [id, flight] : state_->flights) all.push_back(flight);
-  }
-  for (const auto& flight : all) {
+  for (const auto& flight : state_->all()) {
     state_->start_joint(flight);
     if (!flight->dirty) continue;
     const std::unique_lock lock(flight->work_mutex, std::try_to_lock);
@@ -614,6 +552,29 @@ void MissionService::tick() {
                              flight->state.time.us(), to_string(mission.id));
   }
   if (++state_->ticks % 2 == 0) state_->publish_devices();
+}
+
+std::uint64_t MissionService::finished() const { return state_->finished; }
+
+std::vector<FlightPulse> MissionService::pulses() {
+  const UtcTime now = state_->deps.clock.now();
+  const auto steady = std::chrono::steady_clock::now();
+  std::vector<FlightPulse> out;
+  for (const auto& flight : state_->all()) {
+    if (flight->rebuilding) continue;
+    const std::unique_lock work(flight->work_mutex, std::try_to_lock);
+    if (!work) continue;  // at work: rows come, nothing is silent
+    const std::scoped_lock lock(flight->queue_mutex);
+    if (flight->mission.state != MissionState::recording) continue;
+    FlightPulse pulse = flight->watch.look(flight->state.time, steady);
+    pulse.mission = flight->id;
+    pulse.name = flight->mission.name;
+    pulse.now = now;
+    pulse.fix_arrival = flight->fix_arrival;
+    pulse.range_arrival = flight->range_arrival;
+    out.push_back(std::move(pulse));
+  }
+  return out;
 }
 
 std::size_t MissionService::queued() const { return state_->queued; }

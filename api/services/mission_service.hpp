@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "api/services/alarm_rules.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
 #include "core/base/time.hpp"
@@ -84,6 +85,10 @@ class MissionService {
   /// Each 500 ms: mission.state of what moved, devices once a second; a joint solution is begun where enough
   /// ranges came since the last (at most a quarter of one core).
   void tick();
+  /// Flights that were finished since the start.
+  std::uint64_t finished() const;
+  /// How each recording flight stands, for its alarms; to be called once a second (FlightWatch).
+  std::vector<FlightPulse> pulses();
   /// Rows that wait to be worked off, over all missions.
   std::size_t queued() const;
   bool recording() const;  ///< a mission got measurements in the last 5 s

@@ -58,6 +58,14 @@ struct LiveFlight::State {
     return std::nullopt;
   }
 
+  /// Where the first tag is; nothing where it hangs off the track point and the attitude is not known.
+  std::optional<Eigen::Vector3d> tag_at(const TrackPose& at) const {
+    const Eigen::Vector3d arm =
+        mission.tags.empty() ? Eigen::Vector3d::Zero() : mission.tags.front().lever_arm_body_m;
+    if (!at.attitude && arm.norm() > 1e-9) return std::nullopt;
+    return interpolate(at, at, at.t_s, arm).position_m;
+  }
+
   void refuse(const Range& range, std::string why) {
     RangeResult result;
     result.range = range;
@@ -192,7 +200,7 @@ void LiveFlight::add(const Fix& fix) {
   const auto place = std::ranges::lower_bound(s.track, pose.t_s, {}, &TrackPose::t_s);
   if (place != s.track.end() && place->t_s == pose.t_s) return;
   if (place == s.track.end()) {
-    LivePose live{fix.time, fix, pose.position_m, std::nullopt};
+    LivePose live{fix.time, fix, pose.position_m, std::nullopt, s.tag_at(pose)};
     if (!s.track.empty() && pose.t_s - s.track.back().t_s < 2.0) {
       live.speed_mps = (pose.position_m - s.track.back().position_m).norm() / (pose.t_s - s.track.back().t_s);
     }

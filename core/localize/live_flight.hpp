@@ -36,6 +36,8 @@ struct LivePose {
   Fix fix;
   Eigen::Vector3d enu_m{0, 0, 0};  ///< of the track point; local x, y, z in a local frame
   std::optional<double> speed_mps{};
+  std::optional<Eigen::Vector3d>
+      tag_enu_m{};  ///< of the mission's first tag; absent where nothing says how it hangs
 };
 
 struct LiveOptions {

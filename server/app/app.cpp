@@ -17,6 +17,7 @@
 #include "server/http/http_server.hpp"
 #include "server/http/request_judge.hpp"
 #include "server/http/text.hpp"
+#include "server/runtime/backup_keeper.hpp"
 #include "server/runtime/device_manager.hpp"
 #include "server/runtime/logging.hpp"
 #include "server/runtime/worker_pool.hpp"
@@ -88,6 +89,7 @@ struct App::State {
   Config config;
   SystemClock clock;
   std::unique_ptr<Database> database;
+  std::unique_ptr<BackupKeeper> backups;
   std::unique_ptr<Metrics> metrics;
   std::unique_ptr<api::AccessService> access;
   std::unique_ptr<WorkerPool> pool, stream_pool, live_pool;
@@ -213,6 +215,13 @@ void App::State::compose() {
   deps.access = access.get();
   deps.kits = &database->kits();
   deps.frames = &database->frames();
+  BackupKeeper::Options keep;
+  keep.dir = config.text("backup.dir").empty() ? data_dir / "backups" : fs::path(config.text("backup.dir"));
+  keep.keep = config.count("backup.keep");
+  keep.every_h = config.count("backup.every_h");
+  keep.scheduled = config.text("backup.schedule") == "on";
+  backups = std::make_unique<BackupKeeper>(*database, clock, std::move(keep));
+  deps.backups = backups.get();
   deps.goal = {config.metres("goal.h95_m"), config.metres("goal.v95_m")};
   deps.devices = devices.get();
   learning = std::make_unique<api::LearningStores>(

@@ -27,6 +27,13 @@ bool form_type(std::string_view content_type) {
          content_type.starts_with("multipart/form-data") || content_type.starts_with("text/plain");
 }
 
+/// From a loopback address, and not by way of a proxy that speaks for somebody else.
+bool from_this_machine(const api::Request& request) {
+  const bool loopback = request.remote.starts_with("127.") || request.remote == "::1";
+  return loopback && request.header("forwarded").empty() && request.header("x-forwarded-for").empty() &&
+         request.header("x-forwarded-host").empty() && request.header("via").empty();
+}
+
 bool has_body(const api::Request& request) {
   return !request.header("transfer-encoding").empty() ||
          (!request.header("content-length").empty() && request.header("content-length") != "0");
@@ -81,7 +88,10 @@ std::optional<api::Response> FrontDoor::identify(api::Request& request, bool web
     request.principal = api::local_principal();
   } else if (const auto authorization = request.header("authorization"); !authorization.empty()) {
     const auto who = access_.verify(credential(authorization));
-    if (!who) return problem(401, "unauthorized", "the token is not known, expired or revoked");
+    if (!who) {
+      access_.note_refusal("nobody", "a token that is not known, expired or revoked", request.remote);
+      return problem(401, "unauthorized", "the token is not known, expired or revoked");
+    }
     request.principal = *who;
     return std::nullopt;  // no browser adds this header by itself
   } else if (const auto ticket = request.query_value("ticket"); ticket && websocket) {
@@ -97,6 +107,10 @@ std::optional<api::Response> FrontDoor::identify(api::Request& request, bool web
     if (unsafe(request.method) && request.header("x-anchord") != "1") {
       return problem(403, "forbidden", "changes by a browser session need the header X-Anchord: 1");
     }
+  } else if (request.path == "/metrics" && from_this_machine(request)) {
+    // A scraper beside the server needs no token (api.md section 11); it is nobody anywhere else.
+    request.principal = {"loopback", "loopback", {api::Role::viewer}};
+    return std::nullopt;
   } else {
     return std::nullopt;
   }
@@ -126,11 +140,10 @@ Admission FrontDoor::live(api::Request& request, bool websocket) {
   const std::string route(k_live_path);
   using enum api::Role;
   if (request.principal.roles.empty()) {
-    auto response = problem(401, "unauthorized", "send a token, a session cookie or ?ticket=");
-    response.header("WWW-Authenticate", "Bearer realm=\"anchord\"");
-    return refused(std::move(response), route);
+    return refused(problem(401, "unauthorized", "send a token, a session cookie or ?ticket="), route);
   }
   if (!api::Access::any_of({viewer, integrator, engineer, op}).permits(request.principal)) {
+    access_.note_refusal(request.principal.token_id, "GET " + route, request.remote);
     return refused(problem(403, "forbidden", "live data needs the role viewer"), route);
   }
   if (!websocket) {
@@ -161,11 +174,7 @@ Admission FrontDoor::admit(api::Request& request, std::string_view host, bool we
       !origin_allowed(request.header("origin"), host, options_.hosts)) {
     return refused(problem(403, "forbidden", "pages of this origin are not allowed; see allowed_origins"));
   }
-  auto no = identify(request, websocket);
-  if (no) {
-    if (no->status == 401) no->header("WWW-Authenticate", "Bearer realm=\"anchord\"");
-    return refused(std::move(*no));
-  }
+  if (auto no = identify(request, websocket)) return refused(std::move(*no));
   auto found = router_.resolve(request.method, request.path);
   const bool probe = request.path == "/healthz" || request.path == "/readyz";
   const bool file = found.kind == api::Resolution::Kind::not_found && !request.path.starts_with("/api");
@@ -190,6 +199,10 @@ Admission FrontDoor::admit(api::Request& request, std::string_view host, bool we
   if (!route.access.permits(request.principal)) {
     admission.refusal =
         router_.dispatch(route, request);  // 401 or 403 in its words; the handler is not reached
+    if (admission.refusal->status == 403) {
+      access_.note_refusal(request.principal.token_id,
+                           std::string(api::to_string(request.method)) + ' ' + route.pattern, request.remote);
+    }
     return admission;
   }
   admission.body_limit = route.body_limit;

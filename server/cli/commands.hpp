@@ -8,6 +8,7 @@ class App;
 /// Exit codes: 0 done, 1 failed, 2 unusable input or arguments.
 namespace anchord::cli {
 
+void add_backup_command(CLI::App& app, int& exit_code);
 void add_config_command(CLI::App& app, int& exit_code);
 void add_frame_command(CLI::App& app, int& exit_code);
 void add_healthcheck_command(CLI::App& app, int& exit_code);

@@ -19,8 +19,14 @@ const web::WebAsset* find_asset(std::string_view path) {
   return at == assets.end() ? nullptr : &*at;
 }
 
-/// A view of the page, not a file: no dot in its last segment.
+/// A view of the page: no dot in its last segment (that would be a file), and nothing that a client of the
+/// other faces may have mistyped; such a client wants its 404 and not a page.
 bool is_view(std::string_view path) {
+  for (const std::string_view face :
+       {"/api", "/ogc", "/omlox", "/problems", "/metrics", "/healthz", "/readyz"}) {
+    if (path.starts_with(face)) return false;
+  }
+  if (path.find("//") != std::string_view::npos) return false;
   const auto slash = path.rfind('/');
   return path.find('.', slash == std::string_view::npos ? 0 : slash) == std::string_view::npos;
 }

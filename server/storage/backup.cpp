@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/storage/data_folder.hpp"
+#include "server/storage/migrate.hpp"
 
 namespace anchord::sql {
 namespace {
@@ -96,3 +97,74 @@ Result<BackupReport> back_up(SqliteConnection& source, const std::filesystem::pa
 }
 
 }  // namespace anchord::sql
+
+namespace anchord {
+namespace {
+
+namespace fs = std::filesystem;
+
+Result<void> check_backup(const fs::path& backup) {
+  std::error_code error;
+  if (!fs::is_regular_file(backup, error)) return make_error(Errc::not_found, "no file " + backup.string());
+  std::string expected;
+  if (std::ifstream list(backup.string() + ".sha256"); list >> expected) {
+    BOOST_OUTCOME_TRY(const auto found, sql::sha256_of_file(backup));
+    if (found != expected)
+      return make_error(Errc::unsupported,
+                        backup.string() + " is not what was backed up: its SHA-256 differs");
+  }
+  try {
+    sql::SqliteConnection copy(backup, sql::SqliteConnection::Mode::inspect, Synchronous::full, std::nullopt);
+    if (copy.pragma("application_id") != sql::k_application_id)
+      return make_error(Errc::unsupported, backup.string() + " is not an anchord database");
+    if (copy.pragma("user_version") > newest_schema_version())
+      return make_error(Errc::unsupported, backup.string() + " was made by a newer anchord");
+    if (const auto found = copy.check(true); found != "ok")
+      return make_error(Errc::unsupported, backup.string() + " is damaged: " + found);
+  } catch (const std::exception& fault) {
+    return make_error(Errc::unsupported, backup.string() + " is not a database: " + fault.what());
+  }
+  return boost::outcome_v2::success();
+}
+
+}  // namespace
+
+Result<std::optional<fs::path>> restore_backup(const fs::path& data_dir, const fs::path& backup) {
+  BOOST_OUTCOME_TRY(const auto folder, sql::DataFolder::open(data_dir, 0));
+  BOOST_OUTCOME_TRYV(check_backup(backup));
+  // Copied and synced beside the old one first: whenever the power goes, one whole database has the name or
+  // stands beside it under a name that says what it is.
+  const fs::path fresh = folder->database().string() + ".restored";
+  std::error_code error;
+  fs::remove(fresh, error);
+  {
+    // Not a file copy: what is put back may be a database that crashed, with rows in its WAL.
+    sql::SqliteConnection source(backup, sql::SqliteConnection::Mode::inspect, Synchronous::full,
+                                 std::nullopt);
+    BOOST_OUTCOME_TRYV(sql::copy_pages(source, fresh));
+  }
+  for (const char* part : {"-wal", "-shm", "-journal"}) fs::remove(fresh.string() + part, error);
+  fs::permissions(fresh, fs::perms::owner_read | fs::perms::owner_write, error);
+  BOOST_OUTCOME_TRYV(sql::sync_path(fresh));
+  std::optional<fs::path> old;
+  if (fs::exists(folder->database(), error)) {
+    fs::path place = folder->database().string() + ".before-restore";
+    for (int n = 2; fs::exists(place, error); ++n)
+      place = folder->database().string() + ".before-restore-" + std::to_string(n);
+    for (const char* part : {"", "-wal", "-shm"}) {  // the WAL belongs to its database, not to the new one
+      if (!fs::exists(folder->database().string() + part, error)) continue;
+      fs::rename(folder->database().string() + part, place.string() + part, error);
+      if (error)
+        return make_error(Errc::storage_unavailable, "cannot put the old database aside: " + error.message());
+    }
+    old = place;
+  }
+  fs::rename(fresh, folder->database(), error);
+  if (error)
+    return make_error(Errc::storage_unavailable, "cannot put the backup in place: " + error.message());
+  BOOST_OUTCOME_TRYV(folder->note_database());
+  BOOST_OUTCOME_TRYV(sql::sync_path(folder->dir()));
+  return old;
+}
+
+}  // namespace anchord

@@ -90,6 +90,14 @@ class Database {
 /// commands that recover), storage_full.
 Result<std::unique_ptr<Database>> open_database(const StorageOptions& options);
 
+/// Puts a backup in the place of a folder's database, which nobody may have open. The backup is checked
+/// first (its .sha256 where there is one, integrity_check), and what stood there is kept beside it.
+/// Returns where the old database is now; nothing when there was none.
+/// Errors: conflict (a server has the folder), not_found, unsupported (no anchord database, or damaged),
+/// storage_unavailable, storage_full; the folder is as before then.
+Result<std::optional<std::filesystem::path>> restore_backup(const std::filesystem::path& data_dir,
+                                                            const std::filesystem::path& backup);
+
 /// Short word of the backend's version for /version: the newest migration this program knows.
 int newest_schema_version();
 

@@ -7,6 +7,7 @@
 #include "api/contract.hpp"
 #include "api/services/access.hpp"
 #include "app_fixture.hpp"
+#include "core/ports/backups.hpp"
 
 namespace anchord::test {
 namespace {
@@ -26,6 +27,13 @@ std::set<std::string> documented() {
 
 class Contract : public AppFixture {};
 
+/// Only there so that its routes are.
+struct NoBackups final : Backups {
+  Result<Backup> make() override { return make_error(Errc::storage_unavailable, "none here"); }
+  std::vector<Backup> list() const override { return {}; }
+  bool due(std::uint64_t) override { return false; }
+};
+
 TEST_F(Contract, EveryOperationHasARouteAndEveryRouteAnOperation) {
   api::AccessService access(database_->tokens(), database_->access(), clock_);
   api::Application::Deps deps{database_->measurements(),
@@ -40,6 +48,8 @@ TEST_F(Contract, EveryOperationHasARouteAndEveryRouteAnOperation) {
   deps.kits = &database_->kits();
   deps.frames = &database_->frames();
   deps.learning = &*learning_;
+  NoBackups backups;
+  deps.backups = &backups;
   api::Application app(std::move(deps));
   std::set<std::string> served;
   for (const auto& route : app.router().routes())

@@ -112,6 +112,12 @@ TEST_F(Ingest, RefusesAMissingField) {
 TEST_F(Ingest, RefusesABadNetworkId) {
   EXPECT_EQ(code_of(with("0x6a2f", "anchor one"), "/anchor"), "bad_id");
 }
+TEST_F(Ingest, RefusesARadioThatMeasuresToItself) {
+  EXPECT_EQ(code_of(with("0x6a2f", "0x6e01"), "/anchor"), "same_device");
+}
+TEST_F(Ingest, ReadsMediaTypesWithoutRegardToCase) {
+  EXPECT_EQ(post("/api/v1/ranges", row(77), "Application/X-NDJSON; Charset=UTF-8").status, 200);
+}
 TEST_F(Ingest, RefusesALineThatIsTooLong) {
   EXPECT_EQ(code_of("{\"x\":\"" + std::string(2 << 20, 'a') + "\"}"), "too_long");
 }

@@ -52,6 +52,12 @@ TEST_F(Resources, ReportEveryWrongFieldOfAMissionAtOnce) {
   EXPECT_EQ(json(response)["instance"], "/api/v1/missions");
 }
 
+TEST_F(Resources, RefuseANameOfSpaces) {
+  const auto response = post("/api/v1/missions", R"({"name":"   ","frame":"wgs84","track_point":"body"})");
+  EXPECT_EQ(response.status, 422);
+  EXPECT_EQ(json(response)["errors"][0]["pointer"], "/name");
+}
+
 TEST_F(Resources, FinishAMissionOnce) {
   const auto id = mission();
   EXPECT_EQ(json(post("/api/v1/missions/" + id + "/actions", R"({"action":"finish"})"))["state"], "finished");
@@ -159,6 +165,37 @@ TEST_F(Resources, FailACalibrationOfAnEmptyMissionWithItsReason) {
   EXPECT_EQ(response.status, 422) << response.body;
   EXPECT_EQ(json(get("/api/v1/jobs"))["items"][0]["state"], "failed");
   EXPECT_EQ(post("/api/v1/calibrations", R"({"missions":[],"models":{}})").status, 422);
+}
+
+TEST_F(Resources, TakeTheNoiseOfACalibrationAndRefuseNonsense) {
+  const auto id = mission();
+  const auto asked = [&](const Json& sigma) {
+    return call(Method::post, "/api/v1/calibrations",
+                Json{{"missions", {id}}, {"sigma_m", sigma}, {"initial", "bearing_height"}}.dump(), {});
+  };
+  EXPECT_EQ(asked({{"los", 0.049}, {"nlos", 0.234}, {"rtk", 0.02}}).status, 202);
+  const auto wrong = asked({{"los", 0}, {"rkt", 0.02}});
+  EXPECT_EQ(wrong.status, 422);
+  EXPECT_EQ(json(wrong)["errors"].size(), 2u) << wrong.body;
+}
+
+TEST_F(Resources, RefuseToMixLocalFramesOfDifferentSites) {
+  Json missions = Json::array();
+  for (const char* name : {"hall A", "hall B"}) {
+    const auto site = post(
+        "/api/v1/sites", Json{{"name", name}, {"origin", {{"lon", 3.7}, {"lat", 51.0}, {"h_m", 5}}}}.dump());
+    ASSERT_EQ(site.status, 201) << site.body;
+    const auto made = post(
+        "/api/v1/missions",
+        Json{{"name", name}, {"frame", "local"}, {"track_point", "body"}, {"site", json(site)["id"]}}.dump());
+    ASSERT_EQ(made.status, 201) << made.body;
+    missions.push_back(json(made)["id"]);
+  }
+  const auto answer = call(Method::post, "/api/v1/calibrations", Json{{"missions", missions}}.dump(),
+                           with("prefer", "wait=20"));
+  EXPECT_EQ(answer.status, 422) << answer.body;
+  EXPECT_NE(answer.body.find("hall A and hall B are in local frames of different sites"), std::string::npos)
+      << answer.body;
 }
 
 }  // namespace

@@ -146,6 +146,8 @@ test('everything that can be read', async () => {
   assert.equal(wrong.join('\n\n'), '');
   await call('GET', '/api/v1/anchors?view=live', { expect: 200 });
   await call('GET', '/api/v1/missions?limit=0', { expect: 422 });
+  await call('GET', '/api/v1/alarms', { expect: 200 });
+  await call('POST', '/api/v1/alarms/rtk.lost/ack', { expect: 404, json: { note: 'seen' } });
 });
 
 test('changes with preconditions, tokens, sessions, tickets', async () => {
@@ -156,6 +158,8 @@ test('changes with preconditions, tokens, sessions, tickets', async () => {
     const etag = (await call('GET', path, { expect: 200 })).headers.get('etag');
     await call('PATCH', path, { expect: 200, ...patch, headers: { ...patch.headers, 'if-match': etag } });
   }
+  const backup = (await call('POST', '/api/v1/backups', { expect: 201, headers: { prefer: 'wait=60' } })).json;
+  assert.ok((await call('GET', '/api/v1/backups', { expect: 200 })).json.items.some((b) => b.name === backup.name));
   const made = (await call('POST', '/api/v1/tokens', { expect: 201, json: { name: 'viewer', roles: ['viewer'] } })).json;
   await call('DELETE', `/api/v1/tokens/${made.id}`);
   await call('POST', '/api/v1/ws-tickets', {});

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <optional>
+#include <variant>
+
+#include "core/types/fix.hpp"
+#include "core/types/range.hpp"
+#include "core/types/range_model.hpp"
+
+namespace anchord::api {
+
+/// A range, and what the models that were promoted when it came say of it.
+struct JudgedRange {
+  Range range;
+  std::optional<RangeModel> model;
+  UtcTime time{};
+};
+/// What waits for a live flight.
+using LiveRow = std::variant<JudgedRange, Fix>;
+
+UtcTime time_of(const LiveRow& row);
+/// Enough to know a row again that came both from the store and from the queue.
+std::size_t identity(const LiveRow& row);
+/// As a solution of the whole flight takes it: less the bias a model sees, unless nothing would be left.
+Range corrected(const JudgedRange& judged);
+
+}  // namespace anchord::api

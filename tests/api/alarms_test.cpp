@@ -1,0 +1,207 @@
+// Alarms of dashboard.md section 6: when they are raised, acknowledged and over.
+#include "api/services/alarm_board.hpp"
+#include "api/services/event_log.hpp"
+#include "api/services/flight_watch.hpp"
+#include "app_fixture.hpp"
+
+namespace anchord::test {
+namespace {
+
+using api::AlarmPriority;
+using api::FlightPulse;
+
+UtcTime at(double s) { return UtcTime::from_seconds(1e9 + s); }
+
+/// A flight in which everything is well at second 100.
+FlightPulse well() {
+  FlightPulse f;
+  f.name = "flight";
+  f.now = at(100);
+  f.newest_fix = f.newest_range = f.fix_arrival = f.range_arrival = at(100);
+  f.fix = FixClass::rtk_fixed;
+  f.as_it_happens = true;
+  return f;
+}
+/// "id" of every alarm, joined; "" when all is well.
+std::string raised(const FlightPulse& flight, const api::ServerPulse& store = {}) {
+  std::string out;
+  for (const auto& c : api::alarm_conditions({flight}, store)) out += (out.empty() ? "" : " ") + c.id;
+  return out;
+}
+
+TEST(AlarmRules, AreQuietWhenAllIsWell) { EXPECT_EQ(raised(well()), ""); }
+
+TEST(AlarmRules, CallRtkLostAfterTwoSecondsBelowFloat) {
+  auto f = well();
+  f.fix = FixClass::single;
+  f.below_float_since = at(98.5);
+  EXPECT_EQ(raised(f), "");
+  f.below_float_since = at(97.5);
+  EXPECT_EQ(raised(f), "rtk.lost");
+  EXPECT_EQ(api::alarm_conditions({f}, {})[0].priority, AlarmPriority::critical);
+}
+
+TEST(AlarmRules, CallRtkLostWhenTheRoverFallsSilentWhileRangesCome) {
+  auto f = well();
+  f.newest_fix = f.fix_arrival = at(97);
+  EXPECT_EQ(raised(f), "rtk.lost");
+  f.newest_fix = f.fix_arrival = at(98.5);
+  EXPECT_EQ(raised(f), "");
+}
+
+TEST(AlarmRules, CallRtkLostWhenCorrectionsAreOld) {
+  auto f = well();
+  f.correction_age_s = 10.5;
+  EXPECT_EQ(raised(f), "rtk.lost");
+}
+
+TEST(AlarmRules, CallFloatAfterFiveSecondsWhileRanging) {
+  auto f = well();
+  f.fix = FixClass::rtk_float;
+  f.float_since = at(96);
+  EXPECT_EQ(raised(f), "");
+  f.float_since = at(94);
+  EXPECT_EQ(raised(f), "rtk.float");
+}
+
+TEST(AlarmRules, CallForRangesAfterFiveSecondsWithout) {
+  auto f = well();
+  f.newest_range = f.range_arrival = at(94);
+  EXPECT_EQ(raised(f), "uwb.none");
+  f.newest_range.reset();
+  f.range_arrival.reset();
+  EXPECT_EQ(raised(f), "") << "a flight that never ranged misses nothing";
+}
+
+TEST(AlarmRules, CallClocksThatDifferBeyondDoubt) {
+  auto f = well();
+  f.lag_s = -0.3;
+  f.lag_sigma_s = 0.02;
+  EXPECT_EQ(raised(f), "clock.skew");
+  f.lag_sigma_s = 0.2;
+  EXPECT_EQ(raised(f), "") << "within what the flight can tell";
+}
+
+TEST(AlarmRules, SayNothingOfUploadsAndOfFlightsThatAreOver) {
+  auto f = well();
+  f.below_float_since = at(0);
+  f.as_it_happens = false;
+  EXPECT_EQ(raised(f), "");
+  f.as_it_happens = true;
+  f.now = at(140);
+  EXPECT_EQ(raised(f), "");
+}
+
+TEST(AlarmRules, CallDiskQueueAndStore) {
+  EXPECT_EQ(raised(well(), {.disk_free_bytes = 1ULL << 30}), "disk.low");
+  EXPECT_EQ(raised(well(), {.disk_free_bytes = 3ULL << 30}), "");
+  EXPECT_EQ(raised(well(), {.queued_rows = 50'000}), "queue.behind");
+  EXPECT_EQ(raised(well(), {.clock_skew = "3 s fast"}), "clock.skew");
+  EXPECT_EQ(raised(well(), {.unrecorded = "no space"}), "recording.failed");
+  EXPECT_EQ(raised(well(), {.writable = false, .reason = "the disk is full"}), "storage.unwritable");
+}
+
+TEST(AlarmRules, GiveEachIdOnceForSeveralFlights) {
+  auto f = well();
+  f.below_float_since = at(0);
+  EXPECT_EQ(api::alarm_conditions({f, f}, {}).size(), 1u);
+}
+
+/// Ten looks, one a second of ours, while the flight's time passes at this speed.
+bool happens(api::FlightWatch& watch, double speed, double from_s = 0) {
+  bool answer = false;
+  for (int i = 0; i < 10; ++i) {
+    const auto ours =
+        api::FlightWatch::Steady{} + std::chrono::milliseconds(static_cast<int>((from_s + i) * 1000));
+    answer = watch.look(at((from_s + i) * speed), ours).as_it_happens;
+  }
+  return answer;
+}
+
+TEST(FlightWatch, KnowsAFlightAsItHappensFromUploadsAndFastReplays) {
+  for (const auto& [speed, live] :
+       {std::pair{1.0, true}, {0.9, true}, {5.0, false}, {60.0, false}, {0.0, false}}) {
+    api::FlightWatch watch;
+    EXPECT_EQ(happens(watch, speed), live) << speed;
+  }
+}
+
+TEST(FlightWatch, StaysWithWhatItWasWhenTheFlightFallsSilent) {
+  api::FlightWatch watch;
+  ASSERT_TRUE(happens(watch, 1));
+  bool still = false;
+  for (int i = 10; i < 40; ++i)
+    still = watch.look(at(9), api::FlightWatch::Steady{} + std::chrono::seconds(i)).as_it_happens;
+  EXPECT_TRUE(still);
+}
+
+TEST(FlightWatch, RemembersSinceWhenTheFixIsPoor) {
+  api::FlightWatch watch;
+  const auto fix = [&](double t_s, FixClass cls) {
+    Fix f;
+    f.time = at(t_s);
+    f.fix = cls;
+    watch.note(f);
+  };
+  fix(1, FixClass::rtk_fixed);
+  fix(2, FixClass::single);
+  fix(4, FixClass::none);
+  fix(3, FixClass::rtk_fixed);  // late: told nothing new
+  EXPECT_EQ(watch.look(at(4), {}).below_float_since, at(2));
+  fix(5, FixClass::rtk_float);
+  EXPECT_FALSE(watch.look(at(5), {}).below_float_since);
+  EXPECT_EQ(watch.look(at(5), {}).float_since, at(5));
+}
+
+class Alarms : public AppFixture {
+ protected:
+  Alarms() : hub_(clock_, "anchord test"), events_(hub_, clock_), board_(events_) {}
+  std::string codes() const {
+    std::string out;
+    for (const auto& event : events_.newest(10, {}, {})) out = event.code + (out.empty() ? "" : " ") + out;
+    return out;
+  }
+  api::Hub hub_;
+  api::EventLog events_;
+  api::AlarmBoard board_;
+};
+
+TEST_F(Alarms, StandUntilTheirConditionEndsAndAreEventsOnce) {
+  const api::AlarmCondition low{"disk.low", AlarmPriority::warning, "little is free", {}};
+  const api::AlarmCondition lost{"rtk.lost", AlarmPriority::critical, "lost", {}};
+  board_.update({low}, at(1));
+  board_.update({low, lost}, at(2));
+  ASSERT_EQ(board_.standing().size(), 2u);
+  EXPECT_EQ(board_.standing()[0].condition.id, "rtk.lost") << "critical first";
+  EXPECT_EQ(board_.standing()[1].since, at(1));
+  board_.update({}, at(3));
+  EXPECT_TRUE(board_.standing().empty());
+  EXPECT_EQ(codes(), "alarm.raised alarm.raised alarm.cleared alarm.cleared");
+}
+
+TEST_F(Alarms, AreQuietOnceAcknowledgedUntilTheyGetWorse) {
+  api::AlarmCondition low{"disk.low", AlarmPriority::warning, "less than 2 GiB", {}};
+  board_.update({low}, at(1));
+  EXPECT_EQ(board_.acknowledge("disk.high", "me").error().code, Errc::not_found);
+  ASSERT_TRUE(board_.acknowledge("disk.low", "me"));
+  ASSERT_TRUE(board_.acknowledge("disk.low", "me"));
+  board_.update({low}, at(2));
+  EXPECT_TRUE(board_.standing()[0].acknowledged);
+  low.text = "less than 500 MiB";
+  board_.update({low}, at(3));
+  EXPECT_FALSE(board_.standing()[0].acknowledged);
+  EXPECT_EQ(codes(), "alarm.raised alarm.acknowledged");
+}
+
+TEST_F(Alarms, AreServedAndAcknowledgedByOperatorsOnly) {
+  EXPECT_TRUE(json(get("/api/v1/alarms"))["items"].empty());
+  EXPECT_EQ(post("/api/v1/alarms/rtk.lost/ack", "").status, 404);
+  EXPECT_EQ(post("/api/v1/alarms/rtk.lost/ack", R"({"nte":"x"})").status, 422);
+  Call viewer;
+  viewer.roles = {api::Role::viewer};
+  EXPECT_EQ(call(api::Method::post, "/api/v1/alarms/rtk.lost/ack", "", viewer).status, 403);
+  EXPECT_EQ(call(api::Method::get, "/api/v1/alarms", "", viewer).status, 200);
+}
+
+}  // namespace
+}  // namespace anchord::test

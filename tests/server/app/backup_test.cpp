@@ -1,0 +1,142 @@
+// Backups: made on schedule and on request, few kept, put back.
+#include <fstream>
+
+#include "core/ports/store.hpp"
+#include "server/runtime/backup_keeper.hpp"
+#include "server/storage/sqlite_database.hpp"
+#include "tests/server/app/app_fixture.hpp"
+#include "tests/server/storage/scratch_dir.hpp"
+
+namespace anchord::test {
+namespace {
+
+struct HandClock final : Clock {
+  UtcTime now() const override { return time; }
+  UtcTime time{1'777'889'472'000'000'000};
+  void pass_h(double hours) { time.ns += static_cast<std::int64_t>(hours * 3.6e12); }
+};
+
+class BackupFiles : public ::testing::Test {
+ protected:
+  void SetUp() override { open(); }
+  void open() {
+    StorageOptions options;
+    options.data_dir = data();
+    options.reserve_bytes = 0;
+    auto opened = open_database(options);
+    ASSERT_TRUE(opened) << opened.error().message;
+    database_ = std::move(opened).value();
+  }
+  std::filesystem::path data() const { return dir_.path() / "data"; }
+  std::filesystem::path copies() const { return dir_.path() / "copies"; }
+  server::BackupKeeper keeper(std::size_t keep = 7) {
+    return server::BackupKeeper(*database_, clock_, {copies(), keep, 24, true});
+  }
+  MissionId mission(const std::string& name) {
+    Mission mission;
+    mission.id.uuid = make_uuid_v7(clock_.now());
+    mission.name = name;
+    mission.created = clock_.now();
+    EXPECT_TRUE(database_->missions().insert(mission));
+    return mission.id;
+  }
+  ScratchDir dir_;
+  HandClock clock_;
+  std::unique_ptr<Database> database_;
+};
+
+TEST_F(BackupFiles, KeepsTheNewestAndNothingOfOthers) {
+  auto backups = keeper(2);
+  std::filesystem::create_directories(copies());
+  std::ofstream(copies() / "before-migration-2.db") << "not ours to delete";
+  for (int i = 0; i < 4; ++i) {
+    clock_.pass_h(1);
+    ASSERT_TRUE(backups.make());
+  }
+  const auto kept = backups.list();
+  ASSERT_EQ(kept.size(), 2u);
+  EXPECT_EQ(kept[0].made, clock_.time) << "newest first";
+  EXPECT_EQ(kept[0].sha256_hex.size(), 64u);
+  EXPECT_EQ(kept[0].bytes, std::filesystem::file_size(copies() / kept[0].name));
+  EXPECT_TRUE(std::filesystem::exists(copies() / "before-migration-2.db"));
+}
+
+TEST_F(BackupFiles, AreDueEachDayAndAfterEveryFlightButNotAllTheTime) {
+  auto backups = keeper();
+  EXPECT_FALSE(backups.due(0)) << "nothing to lose yet";
+  clock_.pass_h(24.1);
+  EXPECT_TRUE(backups.due(0));
+  EXPECT_FALSE(backups.due(0)) << "just begun";
+  ASSERT_TRUE(backups.make());
+  clock_.pass_h(23);
+  EXPECT_FALSE(backups.due(0));
+  clock_.pass_h(0.01);
+  EXPECT_TRUE(backups.due(1)) << "a flight ended";
+  clock_.pass_h(0.01);
+  EXPECT_FALSE(backups.due(2)) << "another, half a minute later";
+  clock_.pass_h(0.2);
+  EXPECT_TRUE(backups.due(2));
+  server::BackupKeeper off(*database_, clock_, {copies(), 7, 24, false});
+  clock_.pass_h(100);
+  EXPECT_FALSE(off.due(9));
+}
+
+TEST_F(BackupFiles, ArePutBackWithWhatStoodThereKept) {
+  const auto before = mission("in the backup");
+  const auto made = keeper().make();
+  ASSERT_TRUE(made) << made.error().message;
+  clock_.pass_h(1);
+  const auto after = mission("made later");
+  const auto copy = copies() / made.value().name;
+  EXPECT_EQ(restore_backup(data(), copy).error().code, Errc::conflict) << "the folder is in use";
+  database_.reset();
+  const auto old = restore_backup(data(), copy);
+  ASSERT_TRUE(old) << old.error().message;
+  open();
+  EXPECT_TRUE(database_->missions().mission(before));
+  EXPECT_EQ(database_->missions().mission(after).error().code, Errc::not_found);
+  // And back again: nothing was lost by it.
+  database_.reset();
+  ASSERT_TRUE(old.value());
+  ASSERT_TRUE(restore_backup(data(), *old.value()));
+  open();
+  EXPECT_TRUE(database_->missions().mission(after));
+}
+
+TEST_F(BackupFiles, AreRefusedWhenTheyAreNotWhatWasBackedUp) {
+  mission("kept");
+  const auto made = keeper().make();
+  ASSERT_TRUE(made);
+  database_.reset();
+  const auto copy = copies() / made.value().name;
+  const auto error_of = [&](const std::filesystem::path& file) {
+    return restore_backup(data(), file).error().code;
+  };
+  EXPECT_EQ(error_of(dir_.path() / "nowhere.db"), Errc::not_found);
+  std::ofstream(dir_.path() / "text.db") << std::string(100'000, 'x');
+  EXPECT_EQ(error_of(dir_.path() / "text.db"), Errc::unsupported);
+  {
+    std::fstream file(copy, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(9000);
+    file.put('?');
+  }
+  EXPECT_EQ(error_of(copy), Errc::unsupported) << "one byte differs";
+  open();
+  EXPECT_EQ(database_->missions().missions(10, std::nullopt).value().size(), 1u) << "untouched by all of it";
+}
+
+TEST(BackupOverHttp, IsMadeByAdminsOnlyAndListed) {
+  AppFixture server;
+  ASSERT_TRUE(server.app) << server.error.message;
+  const auto viewer = server.bearer(server.token(R"(["viewer","operator","engineer"])"));
+  EXPECT_EQ(server.call("POST", "/api/v1/backups", {}, viewer).status, 403);
+  auto admin = server.bearer(server.admin);
+  admin["Prefer"] = "wait=60";
+  const auto made = server.call("POST", "/api/v1/backups", {}, admin);
+  ASSERT_EQ(made.status, 201) << made.body;
+  const auto list = server.call("GET", "/api/v1/backups", {}, admin);
+  EXPECT_NE(list.body.find(made.body), std::string::npos) << list.body;
+}
+
+}  // namespace
+}  // namespace anchord::test
