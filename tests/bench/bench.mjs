@@ -1,5 +1,5 @@
 // ./dev bench: one table. Every figure of ours stands beside a peer or a limit taken in the same run.
-//   node tests/bench/bench.mjs [solve] [ingest] [get] [fanout] [training] [devices]
+//   node tests/bench/bench.mjs [solve] [ingest] [get] [fanout] [training] [grid] [devices]
 import { execFileSync } from 'node:child_process';
 import { createServer } from 'node:http';
 import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
@@ -8,6 +8,7 @@ import { join } from 'node:path';
 import { LiveClient } from '../e2e/live.mjs';
 import { eventually, root, run, startServer } from '../e2e/server.mjs';
 import { devices } from './devices.mjs';
+import { grid } from './grid.mjs';
 import { cpuSeconds, hammer, percentile, request } from './load.mjs';
 
 const wanted = process.argv.slice(2);
@@ -210,6 +211,10 @@ if (on('planner')) {
 if (on('solve')) {
   say('solving');
   solve();
+}
+if (on('grid')) {
+  say('grid');
+  grid(row);
 }
 if (['ingest', 'get', 'fanout', 'training', 'devices'].some(on)) {
   const server = await startServer();
