@@ -1,4 +1,5 @@
 # cmd_run: build, serve on loopback without login, fly the simulated demonstration through the real drivers, again and again.
+# ANCHORD_DEMO=drone: an aircraft that stands ready instead, to be planned for and flown from the dashboard.
 run_address=127.0.0.1:8420
 run_pids=()
 
@@ -73,11 +74,13 @@ cmd_run() {
   trap 'stop_children; exit 130' INT
   trap 'stop_children; exit 143' TERM
   mkdir -p "$data"
-  if [[ ${ANCHORD_DEMO:-devices} != upload ]] && ! start_devices "$server" "$seed"; then
+  local demo=${ANCHORD_DEMO:-devices}
+  if [[ $demo == devices ]] && ! start_devices "$server" "$seed"; then
     say "the simulated devices did not come up: the flight is uploaded instead"
     devices=
   fi
-  "$server" serve --listen "$run_address" --auth=off --data-dir "$data" ${devices:+--devices "$devices"} &
+  "$server" serve --listen "$run_address" --auth=off --data-dir "$data" ${devices:+--devices "$devices"} \
+    $([[ $demo != drone ]] || echo "--drone-address udp://:14550") &
   server_pid=$!
   run_pids+=("$server_pid")
   until [[ $(http_status /readyz) == 200 ]]; do
@@ -86,7 +89,9 @@ cmd_run() {
     sleep 0.2
   done
   say "anchord is at http://$run_address/  (Ctrl-C ends it; data in $data)"
-  if [[ -n $devices ]]; then
+  if [[ $demo == drone ]]; then
+    "$server" simulate drone --seed "$seed" --url "http://$run_address" &
+  elif [[ -n $devices ]]; then
     fly_devices &
   else
     rm -rf "$flight"

@@ -1,5 +1,6 @@
 #include "api/application.hpp"
 
+#include <algorithm>
 #include <condition_variable>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -15,6 +16,7 @@
 #include "api/services/access.hpp"
 #include "api/services/alarm_board.hpp"
 #include "api/services/device_ingest.hpp"
+#include "api/services/flight_service.hpp"
 #include "api/services/geo_service.hpp"
 #include "api/services/kit_profiles.hpp"
 #include "core/ports/backups.hpp"
@@ -52,7 +54,15 @@ struct Application::State {
     if (services.frames != nullptr) add_frame_routes(router, services);
     add_device_routes(router, services);
     add_job_routes(router, services);
-    if (deps.plans != nullptr) add_plan_routes(router, services);
+    if (deps.plans != nullptr) {
+      add_plan_routes(router, services);
+      flights = std::make_unique<FlightService>(
+          FlightService::Deps{missions, *deps.plans, hub, events, deps.clock, deps.drone,
+                              [this] { return services.storage(); }, deps.flight_clock});
+      missions.observe(flights.get());
+      services.flights = flights.get();
+      add_flight_routes(router, services);
+    }
     if (deps.learning != nullptr) {
       learning = std::make_unique<Learning>(*this);
       add_campaign_routes(router, learning->services);
@@ -97,6 +107,7 @@ struct Application::State {
   JobService jobs;
   GeoService geo;
   std::unique_ptr<KitProfiles> profiles;
+  std::unique_ptr<FlightService> flights;
   CalibrationService calibrations;
   Services services;
   struct Learning {
@@ -168,7 +179,16 @@ void Application::State::second() {
     pulse.clock_skew = deps.devices->clock().skew;
     pulse.unrecorded = deps.devices->recorder_failure();
   }
-  alarms.update(alarm_conditions(missions.pulses(), pulse), now);
+  auto holding = alarm_conditions(missions.pulses(), pulse);
+  if (flights) {
+    for (auto& [id, text] : flights->alarms()) {
+      const bool told =
+          std::any_of(holding.begin(), holding.end(), [&](const auto& c) { return c.id == id; });
+      if (!text.empty() && !told)
+        holding.push_back({std::string(id), AlarmPriority::critical, std::move(text), std::nullopt});
+    }
+  }
+  alarms.update(std::move(holding), now);
   // Daily and after every flight (reliability.md section 2).
   if (deps.backups != nullptr && deps.backups->due(missions.finished())) {
     if (const auto begun = services.begin_backup(); !begun)
@@ -196,8 +216,13 @@ void Application::start() {
     const auto loaded = state_->models->reload();
     if (!loaded && state_->deps.log_fault) state_->deps.log_fault("", loaded.error().message);
   }
+  if (state_->flights) state_->flights->start();
   state_->jobs.start();
   state_->heart = std::thread([this] { state_->beat(); });
+}
+
+void Application::fly() {
+  if (state_->flights) state_->flights->step();
 }
 
 void Application::stop() {
@@ -207,6 +232,7 @@ void Application::stop() {
   }
   state_->stop_told.notify_all();
   if (state_->heart.joinable()) state_->heart.join();
+  if (state_->flights) state_->flights->stop();
   state_->hub.shut_down();
   state_->jobs.stop();
   state_->missions.stop();

@@ -21,6 +21,7 @@ class DatasetStore;
 class DeviceControl;
 class DeviceRows;
 class FrameStore;
+class Drone;
 class JobStore;
 class KitStore;
 class LabelStore;
@@ -81,6 +82,8 @@ class Application {
     FrameStore* frames{nullptr};                  ///< null: no local frames (tests)
     DeviceControl* devices{nullptr};              ///< of this server; null: it has none
     std::string geoid_dir{};                      ///< empty: where GeographicLib looks
+    Drone* drone{nullptr};                        ///< null: flights are flown by hand
+    std::function<double()> flight_clock{};       ///< steady seconds; set: fly() is called by hand (tests)
     std::function<std::string()> metrics_text{};  ///< Prometheus text of the server, appended to ours
     std::function<void(std::string_view request_id, std::string_view what)> log_fault{};
     LearningStores* learning{nullptr};  ///< null: the routes of learning do not exist (tests)
@@ -99,6 +102,8 @@ class Application {
   DeviceRows& device_rows();
   /// Marks jobs of the last run as interrupted, starts heartbeats and the job thread.
   void start();
+  /// One round of the flight in the air; only where Deps::flight_clock is set (tests).
+  void fly();
   /// Says bye to WebSocket clients, parks jobs, joins. Idempotent.
   void stop();
 

@@ -17,6 +17,7 @@ const std::vector<ProblemType>& problem_types() {
       {"method", "Method not allowed", "The address exists; Allow lists what it answers to."},
       {"not-acceptable", "Format not offered", "None of the formats asked for exists here."},
       {"conflict", "Conflict", "The request contradicts what is stored; the stored state stays."},
+      {"no-control", "No control", "Another operator has the aircraft, or nobody; take control first."},
       {"gone", "Gone", "It existed and was removed."},
       {"precondition-failed", "Precondition failed",
        "The resource changed since it was read; read it again."},

@@ -26,6 +26,10 @@ const std::array<TopicInfo, k_topic_count>& topics() {
       {Topic::revisions, "revisions", TopicClass::event, true},
       {Topic::rtk_status, "rtk.status", TopicClass::state, true},
       {Topic::system, "system", TopicClass::state, false},
+      {Topic::mission_grid, "mission.grid", TopicClass::state, true},
+      {Topic::mission_height, "mission.height", TopicClass::state, true},
+      {Topic::mission_turn, "mission.turn", TopicClass::state, true},
+      {Topic::procedure, "procedure", TopicClass::state, true},
   }};
   return k_topics;
 }

@@ -38,8 +38,12 @@ enum class Topic : std::uint8_t {
   revisions,
   rtk_status,
   system,
+  mission_grid,
+  mission_height,
+  mission_turn,
+  procedure,
 };
-inline constexpr std::size_t k_topic_count = 12;
+inline constexpr std::size_t k_topic_count = 16;
 
 struct TopicInfo {
   Topic topic;

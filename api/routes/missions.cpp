@@ -55,7 +55,10 @@ Response act(Services& s, const Request& request) {
   std::vector<FieldError> errors;
   const auto body = json_body(request);
   Fields fields(body, "", errors);
-  fields.word("action", {"finish"}, true);
+  std::vector<std::string_view> actions{"finish"};
+  if (s.flights != nullptr) actions.insert(actions.end(), flight_actions().begin(), flight_actions().end());
+  const auto action = fields.word("action", actions, true);
+  if (action.value_or(0) > 0) return flight_action(s, request, std::string(actions[*action]), fields, errors);
   fields.finish();
   refuse_if_any(errors);
   const auto finished = s.missions.finish(id);

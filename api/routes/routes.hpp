@@ -13,6 +13,9 @@ class AlarmBoard;
 class GeoService;
 class KitProfiles;
 
+class Fields;
+class FlightService;
+
 /// What the routes work with; lives as long as the Application.
 struct Services {
   Application::Deps& deps;
@@ -24,8 +27,9 @@ struct Services {
   JobService& jobs;
   CalibrationService& calibrations;
   GeoService& geo;
-  KitProfiles* profiles{nullptr};  ///< null: their routes do not exist
-  FrameStore* frames{nullptr};     ///< null: their routes do not exist
+  KitProfiles* profiles{nullptr};   ///< null: their routes do not exist
+  FrameStore* frames{nullptr};      ///< null: their routes do not exist
+  FlightService* flights{nullptr};  ///< null: no plans, nothing is flown (tests)
 
   StorageStatus storage() const { return deps.storage_status ? deps.storage_status() : StorageStatus{}; }
   /// Begins a backup in a job. Errors: those of the job queue.
@@ -47,6 +51,11 @@ void add_job_routes(Router& router, Services& services);
 void add_plan_routes(Router& router, Services& services);
 void add_alarm_routes(Router& router, Services& services);
 void add_backup_routes(Router& router, Services& services);
+void add_flight_routes(Router& router, Services& services);
+/// start, hold, resume, skip, return, land, abort.
+const std::vector<std::string_view>& flight_actions();
+Response flight_action(Services& services, const Request& request, const std::string& action, Fields& fields,
+                       std::vector<FieldError>& errors);
 void add_system_routes(Router& router, Services& services);
 
 }  // namespace anchord::api

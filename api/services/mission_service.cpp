@@ -12,6 +12,7 @@
 #include "api/services/flight_watch.hpp"
 #include "api/services/joint_worker.hpp"
 #include "api/services/live_row.hpp"
+#include "api/services/mission_observer.hpp"
 #include "api/services/radio_watch.hpp"
 #include "core/localize/flight_history.hpp"
 #include "core/localize/flight_solver.hpp"
@@ -75,6 +76,7 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   std::atomic<std::size_t> queued{0};
   std::atomic<bool> stopped{false};
   std::atomic<std::uint64_t> finished{0};
+  std::atomic<MissionObserver*> observer{nullptr};
   std::mutex running_mutex;
   std::condition_variable idle;
   int running{0};
@@ -114,6 +116,8 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
 
 MissionService::MissionService(Deps deps) : state_(std::make_shared<State>(std::move(deps))) {}
 MissionService::~MissionService() { stop(); }
+
+void MissionService::observe(MissionObserver* observer) { state_->observer = observer; }
 
 Result<Mission> MissionService::mission(const MissionId& id) {
   {
@@ -445,6 +449,7 @@ void MissionService::State::step(Flight& flight, const Row& row, bool quiet) {
   flight.history.add(fix);
   flight.live.add(fix);
   if (quiet) return;
+  if (auto* told = observer.load()) told->on_fix(fix);
   const std::int64_t now_us = fix.time.us();
   if (now_us - flight.last_pose_us >= k_pose_interval_us || now_us < flight.last_pose_us) {
     flight.last_pose_us = now_us;
@@ -467,9 +472,9 @@ void MissionService::State::publish_pose(Flight& flight) {
 void MissionService::State::announce(Flight& flight, bool quiet) {
   const MissionId id = flight.id;
   for (const auto& result : flight.live.take_ranges()) {
-    if (!quiet)
-      deps.hub.collect(Topic::ranges, live_range_json(id, result), result.range.time.us(),
-                       result.range.anchor);
+    if (quiet) continue;
+    if (auto* told = observer.load()) told->on_range(id, result);
+    deps.hub.collect(Topic::ranges, live_range_json(id, result), result.range.time.us(), result.range.anchor);
   }
   for (auto& estimate : flight.live.take_estimates()) {
     judge_goal(estimate, deps.goal);

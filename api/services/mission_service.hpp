@@ -30,6 +30,7 @@ namespace anchord::api {
 
 class EventLog;
 class Hub;
+class MissionObserver;
 
 /// Flights: their records and, for each, the one LiveFlight that follows the accepted measurements and feeds
 /// the hub.
@@ -57,6 +58,8 @@ class MissionService {
   explicit MissionService(Deps deps);
   ~MissionService();
 
+  /// Before the first measurement; null ends it. The observer outlives the service or takes itself off.
+  void observe(MissionObserver* observer);
   Result<Mission> mission(const MissionId& id);  ///< cached
   Result<void> create(const Mission& mission);
   /// conflict when it is finished already.

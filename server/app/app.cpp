@@ -14,6 +14,7 @@
 #include "api/live/hub.hpp"
 #include "server/app/front_door.hpp"
 #include "server/app/metrics.hpp"
+#include "server/flight/drone_link.hpp"
 #include "server/http/http_server.hpp"
 #include "server/http/request_judge.hpp"
 #include "server/http/text.hpp"
@@ -95,6 +96,7 @@ struct App::State {
   std::unique_ptr<WorkerPool> pool, stream_pool, live_pool;
   std::unique_ptr<DeviceManager> devices;
   std::unique_ptr<api::LearningStores> learning;
+  std::unique_ptr<flight::DroneLink> drone;
   std::unique_ptr<api::Application> application;
   std::unique_ptr<FrontDoor> door;
   std::unique_ptr<HttpServer> http;
@@ -212,6 +214,7 @@ void App::State::compose() {
   deps.build = {ANCHORD_VERSION, ANCHORD_GIT, ANCHORD_BUILD_TYPE, __VERSION__,
                 database->health().schema_version};
   deps.plans = &database->plans();
+  deps.drone = drone.get();
   deps.access = access.get();
   deps.kits = &database->kits();
   deps.frames = &database->frames();
@@ -269,6 +272,13 @@ Result<std::unique_ptr<App>> App::start(const Config& config) {
   BOOST_OUTCOME_TRYV(s.access->load());
   BOOST_OUTCOME_TRYV(s.first_token());
   BOOST_OUTCOME_TRYV(s.open_devices());
+  if (const auto& address = s.config.text("drone.address"); !address.empty()) {
+    auto drone = flight::DroneLink::open(address, [](std::string_view what) {
+      log(LogLevel::warning, "drone", {{"what", what}});
+    });
+    if (!drone) return make_error(drone.error().code, "drone.address: " + drone.error().message);
+    s.drone = std::move(drone).value();
+  }
   s.compose();
   auto app = std::unique_ptr<App>(new App(std::move(state)));
   BOOST_OUTCOME_TRYV(app->state_->listen());
@@ -303,6 +313,7 @@ void App::stop() {
   s.door.reset();
   s.application.reset();
   s.devices.reset();
+  s.drone.reset();
   s.access.reset();
   s.database.reset();  // finishes queued writes, checkpoints, closes
   step("database");

@@ -8,6 +8,7 @@
 #include "drivers/sim/flight.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/simulate_devices.hpp"
+#include "server/cli/simulate_drone.hpp"
 
 namespace anchord::cli {
 namespace {
@@ -80,6 +81,7 @@ void add_simulate_command(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   flight->add_option("--fix-rate", options->fix_rate_hz, "RTK epochs a second")->capture_default_str();
   flight->callback([options, folder, &exit_code] { exit_code = simulate(*options, *folder); });
+  add_simulate_drone(*command, exit_code);
 }
 
 }  // namespace anchord::cli

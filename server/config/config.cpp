@@ -36,6 +36,9 @@ constexpr std::array k_options = {
     Option{"backup.every_h", "24", "hours between two scheduled backups", count},
     Option{"backup.keep", "7", "backups that are kept; the oldest goes first", count},
     Option{"backup.dir", "", "where backups are put, another disk if there is one [DATA_DIR/backups]"},
+    Option{"drone.address", "",
+           "where the autopilot speaks MAVLink, like udp://:14550, tcp://127.0.0.1:5760 or "
+           "serial:/dev/ttyACM0; empty: flown by hand"},
     Option{"http.io_threads", "1", "threads of the sockets", count},
     Option{"http.workers", "4", "threads that run handlers", count},
     Option{"http.queue", "256", "requests that may wait for a handler; beyond: 503", count},

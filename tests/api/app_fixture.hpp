@@ -50,9 +50,12 @@ class AppFixture : public ::testing::Test {
     deps.post = std::move(post);
     deps.goal = goal;
     deps.learning = &*learning_;
+    configure(deps);
     app_ = std::make_unique<api::Application>(std::move(deps));
     app_->start();
   }
+  /// What a fixture adds before the application is made.
+  virtual void configure(api::Application::Deps&) {}
   void restart() {
     app_.reset();
     database_.reset();

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/ids.hpp"
+#include "core/geo/enu.hpp"
+#include "core/ports/drone.hpp"
+#include "core/procedure/flight_engine.hpp"
+
+namespace anchord::api {
+
+/// A command of the operator or of the procedure, and what became of it.
+struct FlightCommand {
+  std::uint64_t number{};
+  std::string action;  ///< start, hold, resume, skip, return, land, abort, or go_to of the procedure
+  std::string state;   ///< sent, accepted, refused, unconfirmed
+  std::string text, by;
+  UtcTime at{};
+};
+nlohmann::ordered_json flight_command_json(const FlightCommand& command);
+
+/// What stands beside the machine's state in the message of topic `procedure`.
+struct ProcedureView {
+  MissionId mission{};
+  std::string plan;  ///< id, or empty
+  std::string name;  ///< of the plan
+  std::uint64_t plan_revision{};
+  std::string mode;    ///< auto, manual
+  std::string status;  ///< ready, running, hold, return, landing, done, aborted
+  std::int64_t t_us{};
+  double now_s{};
+  std::optional<DroneStatus> drone{};
+  std::optional<std::string> holder{};
+  std::int64_t holder_since_us{}, holder_until_us{};
+  std::vector<FlightCommand> commands;
+};
+nlohmann::ordered_json procedure_json(const ProcedureView& view, const procedure::FlightEngine& engine,
+                                      const EnuFrame& frame);
+/// Topic mission.grid: the last decision with every candidate.
+nlohmann::ordered_json grid_json(const MissionId& mission, std::int64_t t_us,
+                                 const procedure::FlightEngine& engine, const EnuFrame& frame);
+/// Topics mission.turn and mission.height of one anchor.
+nlohmann::ordered_json turn_json(const MissionId& mission, NetworkId anchor, std::int64_t t_us,
+                                 const procedure::Clues& clues, bool running);
+nlohmann::ordered_json height_json(const MissionId& mission, NetworkId anchor, std::int64_t t_us,
+                                   const procedure::Clues& clues, bool running);
+
+/// The machine's state as it is kept, and back. errors: a document of another shape gives nothing.
+nlohmann::ordered_json stored_state(const procedure::State& state);
+std::optional<procedure::State> state_of(const nlohmann::json& json);
+
+}  // namespace anchord::api

@@ -1,0 +1,181 @@
+#include <nlohmann/json.hpp>
+
+#include "api/json/reader.hpp"
+#include "api/routes/routes.hpp"
+#include "api/routes/support.hpp"
+#include "api/services/flight_service.hpp"
+#include "core/ports/plan_store.hpp"
+
+namespace anchord::api {
+
+using Ordered = nlohmann::ordered_json;
+
+namespace {
+
+const std::vector<std::string_view> k_control{"take", "renew", "release"};
+
+Ordered lease_json(const Lease& lease, bool with_key) {
+  Ordered out{{"held", true},
+              {"mission", to_string(lease.mission)},
+              {"holder", lease.name},
+              {"since_us", lease.since.us()},
+              {"expires_us", lease.until.us()}};
+  if (with_key) out["lease"] = lease.key;
+  return out;
+}
+
+/// Control that is missing is a 409 of its own, so that a screen can offer to take it.
+template <class T>
+T granted(Result<T> result) {
+  if (!result && result.error().code == Errc::conflict)
+    throw_problem(409, "no-control", result.error().message);
+  return value_or_problem(std::move(result));
+}
+
+Response control(Services& s, const Request& request) {
+  const auto mission = path_id<MissionId>(request);
+  std::vector<FieldError> errors;
+  const auto body = json_body(request);
+  Fields fields(body, "", errors);
+  const auto action = fields.word("action", k_control, true);
+  const auto key = fields.text("lease", 64, action.value_or(0) != 0);
+  const bool by_force = fields.boolean("force").value_or(false);
+  fields.finish();
+  refuse_if_any(errors);
+  const auto done = std::string("control.") + std::string(k_control[*action]) + ' ' + to_string(mission);
+  if (*action == 0) {
+    const auto lease = granted(s.flights->take_control(mission, request.principal, by_force));
+    s.audit(request, done + (by_force ? " by force" : ""));
+    return json_response(200, lease_json(lease, true));
+  }
+  value_or_problem(s.missions.mission(mission));
+  if (*action == 1)
+    return json_response(
+        200, lease_json(granted(s.flights->renew_control(mission, *key, request.principal)), true));
+  granted(s.flights->release_control(mission, *key, request.principal));
+  s.audit(request, done);
+  return json_response(200, Ordered{{"held", false}});
+}
+
+Response who_has_control(Services& s, const Request& request) {
+  check_query(request, {});
+  value_or_problem(s.missions.mission(path_id<MissionId>(request)));
+  const auto lease = s.flights->control();
+  return json_response(200, lease ? lease_json(*lease, false) : Ordered{{"held", false}});
+}
+
+Response checklist(Services& s, const Request& request) {
+  check_query(request, {"plan"});
+  const auto mission = path_id<MissionId>(request);
+  value_or_problem(s.missions.mission(mission));
+  std::optional<PlanId> plan;
+  if (const auto text = request.query_value("plan")) {
+    const auto id = parse_uuid(*text);
+    if (!id) throw_problem(422, "validation", "plan is no id", {{"/plan", "bad_id", id.error().message}});
+    plan = PlanId{id.value()};
+  }
+  return json_response(200, checklist_json(s.flights->checklist(mission, plan)));
+}
+
+Response override_item(Services& s, const Request& request) {
+  const auto mission = path_id<MissionId>(request);
+  const auto item = request.params.at("item");
+  std::vector<FieldError> errors;
+  const auto body = json_body(request);
+  Fields fields(body, "", errors);
+  const auto reason = fields.text("reason", 300, true);
+  fields.finish();
+  if (errors.empty() && reason->empty()) errors.push_back({"/reason", "out_of_range", "must not be empty"});
+  refuse_if_any(errors);
+  value_or_problem(s.flights->override_item(mission, item, *reason, request.principal));
+  s.audit(request, "checklist." + item + ' ' + to_string(mission) + ": " + *reason);
+  return json_response(200, checklist_json(s.flights->checklist(mission, std::nullopt)));
+}
+
+Response shown(Services& s, const Request& request, std::string (FlightService::*text)(const MissionId&)) {
+  check_query(request, {});
+  const auto mission = path_id<MissionId>(request);
+  value_or_problem(s.missions.mission(mission));
+  Response response;
+  response.body = (s.flights->*text)(mission);
+  if (response.body.empty())
+    throw_problem(404, "not-found", "this mission has not been flown since the server started");
+  response.header("Content-Type", "application/json");
+  return response;
+}
+
+Response profiles(Services& s, const Request& request,
+                  std::vector<std::string> (FlightService::*texts)(const MissionId&)) {
+  check_query(request, {});
+  const auto mission = path_id<MissionId>(request);
+  value_or_problem(s.missions.mission(mission));
+  Response response;
+  for (const auto& one : (s.flights->*texts)(mission))
+    response.body += (response.body.empty() ? "" : ",") + one;
+  response.body = "{\"items\":[" + response.body + "]}";
+  response.header("Content-Type", "application/json");
+  return response;
+}
+
+}  // namespace
+
+const std::vector<std::string_view>& flight_actions() {
+  static const std::vector<std::string_view> k_actions{"start",  "hold", "resume", "skip",
+                                                       "return", "land", "abort"};
+  return k_actions;
+}
+
+/// The part of POST /missions/{id}/actions that moves an aircraft. Whatever it answers is in the audit log.
+Response flight_action(Services& s, const Request& request, const std::string& action, Fields& fields,
+                       std::vector<FieldError>& errors) {
+  static const std::vector<std::string_view> k_modes{"auto", "manual"};
+  const auto mission = path_id<MissionId>(request);
+  FlightService::Order order;
+  order.action = action;
+  order.lease = fields.text("lease", 64).value_or("");
+  if (action == "start") {
+    if (const auto text = fields.text("plan", 36, true)) {
+      const auto id = parse_uuid(*text);
+      if (id)
+        order.plan = PlanId{id.value()};
+      else
+        fields.error("plan", "bad_id", id.error().message);
+    }
+    order.manual = fields.word("mode", k_modes).value_or(0) == 1;
+  }
+  fields.finish();
+  refuse_if_any(errors);
+  const std::string what = "mission." + action + ' ' + to_string(mission);
+  auto command = s.flights->act(mission, order, request.principal);
+  if (!command) {
+    s.audit(request, what, "refused: " + command.error().message);
+    if (command.error().code == Errc::invalid_argument) throw_problem(422, "state", command.error().message);
+  }
+  auto given = granted(std::move(command));
+  s.audit(request, what);
+  if (const int wait_s = prefer_wait_s(request); wait_s > 0)
+    given = s.flights->settled(std::move(given), std::min(wait_s, 3));
+  return json_response(202, flight_command_json(given));
+}
+
+void add_flight_routes(Router& router, Services& s) {
+  const auto on = [&s](auto function) {
+    return [&s, function](const Request& request) { return function(s, request); };
+  };
+  const auto op = Access::any_of({Role::op});
+  const std::string base = "/api/v1/missions/{id}/";
+  router.add({Method::get, base + "control", readers(), on(who_has_control)});
+  router.add({Method::post, base + "control", op, on(control)});
+  router.add({Method::get, base + "checklist", readers(), on(checklist)});
+  router.add({Method::post, base + "checklist/{item}", op, on(override_item)});
+  router.add({Method::get, base + "procedure", readers(),
+              [&s](const Request& request) { return shown(s, request, &FlightService::procedure_text); }});
+  router.add({Method::get, base + "grid", readers(),
+              [&s](const Request& request) { return shown(s, request, &FlightService::grid_text); }});
+  router.add({Method::get, base + "turns", readers(),
+              [&s](const Request& request) { return profiles(s, request, &FlightService::turn_texts); }});
+  router.add({Method::get, base + "height-searches", readers(),
+              [&s](const Request& request) { return profiles(s, request, &FlightService::height_texts); }});
+}
+
+}  // namespace anchord::api

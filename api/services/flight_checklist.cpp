@@ -1,0 +1,104 @@
+#include "api/services/flight_checklist.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+namespace anchord::api {
+namespace {
+
+constexpr std::array<std::pair<std::string_view, std::string_view>, 4> k_by_a_person{
+    {{"props", "Propellers and battery are fastened"},
+     {"airspace", "The airspace is clear and allowed"},
+     {"people", "Nobody stands below the way"},
+     {"pilot", "A pilot is ready with the remote control"}}};
+constexpr std::array<std::string_view, 8> k_by_itself{"drone", "battery", "rtk",  "corrections",
+                                                      "tag",   "plan",    "disk", "recording"};
+
+std::string words(const char* format, double value) {
+  std::array<char, 120> out{};
+  std::snprintf(out.data(), out.size(), format, value);
+  return out.data();
+}
+
+std::string age(const std::optional<double>& seconds) {
+  return seconds ? words("%.1f s old", *seconds) : "never";
+}
+
+ChecklistItem item(const char* id, const char* text, bool ok, bool overridable, std::string detail) {
+  return {id, text, std::move(detail), ok, overridable, {}, {}};
+}
+
+}  // namespace
+
+std::vector<ChecklistItem> make_checklist(const ChecklistFacts& f) {
+  std::vector<ChecklistItem> out;
+  if (f.drone) {
+    const auto& d = *f.drone;
+    out.push_back(
+        item("drone", "The aircraft answers", d.connected && !d.failsafe, false,
+             d.connected ? d.autopilot + ", " + d.mode + (d.failsafe ? ", failsafe" : "") : "not heard"));
+    // What the flight may use is what is above the reserve; 30 % of it stays as a margin.
+    const double need = f.min_battery + 1.3 * (f.plan != nullptr ? f.plan->duration_s : 0) / 1200;
+    out.push_back(item("battery", "The battery suffices for the plan and 30 % more",
+                       d.battery && *d.battery >= std::min(need, 0.95), true,
+                       d.battery
+                           ? words("%.0f %% left, ", 100 * *d.battery) + words("%.0f %% wanted", 100 * need)
+                           : "unknown"));
+  }
+  out.push_back(
+      item("rtk", "RTK is fixed for 10 s", f.fixed_for_s && *f.fixed_for_s >= 10 && *f.fix_age_s < 2, true,
+           f.fixed_for_s ? words("fixed for %.0f s", *f.fixed_for_s) : "no fix, " + age(f.fix_age_s)));
+  out.push_back(item("corrections", "Corrections are younger than 2 s",
+                     f.correction_age_s && *f.correction_age_s < 2, true, age(f.correction_age_s)));
+  out.push_back(item("tag", "The tag ranges or is heard", f.range_age_s && *f.range_age_s < 10, true,
+                     "newest range: " + age(f.range_age_s)));
+  std::string why = "no plan is chosen";
+  if (f.plan != nullptr) {
+    why = f.plan->flyable() ? "nothing wrong" : "";
+    for (const auto& i : f.plan->issues) {
+      if (i.severity == planning::Severity::error && why.size() < 300)
+        why += (why.empty() ? "" : "; ") + i.text;
+    }
+  }
+  out.push_back(item("plan", "The plan can be flown", f.plan != nullptr && f.plan->flyable(), false, why));
+  out.push_back(item("disk", "More than 1 GB of disk is free", f.writable && f.disk_free_bytes > 1e9, true,
+                     words("%.1f GB", f.disk_free_bytes / 1e9)));
+  const bool open = f.mission != nullptr && f.mission->state != MissionState::finished;
+  out.push_back(item("recording", "The mission records", open, false, open ? "" : "the mission is finished"));
+  for (const auto& [id, text] : k_by_a_person)
+    out.push_back({std::string(id), std::string(text), "a person must say so", std::nullopt, true, {}, {}});
+  return out;
+}
+
+bool is_checklist_item(std::string_view id) {
+  return std::any_of(k_by_a_person.begin(), k_by_a_person.end(),
+                     [&](const auto& one) { return one.first == id; }) ||
+         std::find(k_by_itself.begin(), k_by_itself.end(), id) != k_by_itself.end();
+}
+
+nlohmann::ordered_json checklist_json(const std::vector<ChecklistItem>& items) {
+  auto list = nlohmann::ordered_json::array();
+  bool ready = true;
+  for (const auto& i : items) {
+    ready = ready && i.green();
+    const bool person = !i.ok;
+    list.push_back(
+        {{"id", i.id},
+         {"text", i.text},
+         {"state", i.green() ? "ok"
+                   : person  ? "open"
+                             : "failed"},
+         {"manual", person},
+         {"overridable", i.overridable},
+         {"detail", i.detail},
+         {"overridden_by", i.overridden_by.empty() ? nlohmann::ordered_json(nullptr)
+                                                   : nlohmann::ordered_json(i.overridden_by)},
+         {"override_reason", i.override_reason.empty() ? nlohmann::ordered_json(nullptr)
+                                                       : nlohmann::ordered_json(i.override_reason)}});
+  }
+  return {{"ready", ready}, {"items", std::move(list)}};
+}
+
+}  // namespace anchord::api

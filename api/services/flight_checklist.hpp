@@ -1,0 +1,42 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/planning/local_plan.hpp"
+#include "core/ports/drone.hpp"
+#include "core/types/mission.hpp"
+
+namespace anchord::api {
+
+/// One item before take-off. `ok` absent: a person must say so.
+struct ChecklistItem {
+  std::string id, text, detail;
+  std::optional<bool> ok{};
+  bool overridable{false};
+  std::string overridden_by, override_reason;  ///< or who confirmed a manual item
+  bool green() const { return ok.value_or(false) || !overridden_by.empty(); }
+};
+
+/// What is known when the list is made.
+struct ChecklistFacts {
+  const Mission* mission{};
+  const planning::PlanCheck* plan{};    ///< absent: no plan chosen
+  std::optional<DroneStatus> drone{};   ///< absent: flown by hand
+  std::optional<double> fix_age_s{};    ///< newest fix of the mission
+  std::optional<double> fixed_for_s{};  ///< RTK fixed without a break
+  std::optional<double> correction_age_s{};
+  std::optional<double> range_age_s{};  ///< newest range
+  double disk_free_bytes{};
+  bool writable{true};
+  double min_battery{0.3};
+};
+
+/// Every item, in the order of the screen. Start is blocked until all are green.
+std::vector<ChecklistItem> make_checklist(const ChecklistFacts& facts);
+bool is_checklist_item(std::string_view id);
+nlohmann::ordered_json checklist_json(const std::vector<ChecklistItem>& items);
+
+}  // namespace anchord::api

@@ -1,0 +1,246 @@
+// What an operator asks of a flight: begin, command, check; what a restart brings back; what is shown.
+#include <nlohmann/json.hpp>
+
+#include "api/application.hpp"
+#include "api/live/hub.hpp"
+#include "api/services/event_log.hpp"
+#include "api/services/flight_state.hpp"
+#include "core/ports/plan_store.hpp"
+
+namespace anchord::api {
+
+using procedure::Command;
+using procedure::Event;
+
+namespace {
+
+std::optional<Event> event_of_action(const std::string& action) {
+  if (action == "hold") return Event::hold;
+  if (action == "resume") return Event::resume;
+  if (action == "skip") return Event::skip;
+  if (action == "return") return Event::return_home;
+  if (action == "land") return Event::land;
+  return std::nullopt;
+}
+
+Error forbidden(std::string why) { return make_error(Errc::invalid_argument, std::move(why)); }
+
+}  // namespace
+
+std::vector<ChecklistItem> FlightService::State::checklist(const Mission* record, const MissionId& mission,
+                                                           const Plan* plan, bool manual) {
+  ChecklistFacts facts;
+  facts.mission = record;
+  std::optional<planning::PlanCheck> check;
+  if (plan != nullptr) {
+    if (auto judged = planning::check_plan(*plan)) check = std::move(judged).value();
+    facts.min_battery = plan->settings.min_battery;
+  }
+  facts.plan = check ? &*check : nullptr;
+  if (!manual && deps.drone != nullptr) facts.drone = deps.drone->status();
+  const double now = now_s();
+  if (const auto it = heard.find(mission); it != heard.end()) {
+    const auto& h = it->second;
+    if (h.fix_s) facts.fix_age_s = now - *h.fix_s;
+    if (h.fixed_since_s) facts.fixed_for_s = now - *h.fixed_since_s;
+    if (h.range_s) facts.range_age_s = now - *h.range_s;
+    if (facts.fix_age_s && h.correction_age_s)
+      facts.correction_age_s = *facts.fix_age_s + *h.correction_age_s;
+  }
+  const StorageStatus storage = deps.storage ? deps.storage() : StorageStatus{};
+  facts.writable = storage.writable;
+  facts.disk_free_bytes = static_cast<double>(storage.disk_free_bytes);
+  auto items = make_checklist(facts);
+  if (const auto it = said.find(mission); it != said.end()) {
+    for (auto& i : items) {
+      const auto found = it->second.find(i.id);
+      if (found == it->second.end() || !i.overridable) continue;
+      i.overridden_by = found->second.who;
+      i.override_reason = found->second.reason;
+    }
+  }
+  return items;
+}
+
+Result<FlightCommand> FlightService::State::begin(const Mission& mission, const Plan& plan, bool manual,
+                                                  const Principal& who) {
+  manual = manual || deps.drone == nullptr;
+  if (flight && flight->flying()) return forbidden("a flight is in the air already");
+  if (mission.frame != TrackFrame::wgs84)
+    return forbidden("a mission in a local frame cannot be flown: an aircraft needs the globe");
+  std::string open;
+  for (const auto& i : checklist(&mission, mission.id, &plan, manual)) {
+    if (!i.green()) open += (open.empty() ? "" : ", ") + i.id;
+  }
+  if (!open.empty()) return forbidden("the checklist is not green: " + open);
+  const auto& h = heard[mission.id];
+  if (!h.fix || h.fix->frame != TrackFrame::wgs84) return forbidden("it is not known where the aircraft is");
+  BOOST_OUTCOME_TRY(Wgs84 origin, planning::plan_origin(plan));
+  // A plan without an origin has its ground where the aircraft stands.
+  if (!plan.origin) origin.height_m = h.fix->position.height_m;
+  Plan flown = plan;
+  flown.origin = origin;
+  const EnuFrame frame(origin);
+  const Eigen::Vector3d home = frame.enu_from_wgs84(h.fix->position).m;
+  BOOST_OUTCOME_TRY(auto setup, procedure::flight_setup(flown, home));
+  const double now = now_s();
+  flight.emplace(mission.id, flown, manual, frame, home, procedure::FlightEngine(std::move(setup)));
+  auto& f = *flight;
+  f.engine.fix(now, home, h.fix->fix);
+  if (manual) f.by_hand.position_m = home, f.former_s = now;
+  telemetry(f);
+  by_drone_number.clear();
+  unconfirmed.reset();
+  auto& command = note("start", who.name, "sent");
+  f.engine.command(now, Event::start, who.name);
+  send_orders(f, &command);
+  tell_happenings(f);
+  said.erase(mission.id);  // of the next flight every item is asked again
+  return command;
+}
+
+Result<FlightCommand> FlightService::State::obey(const MissionId& mission, const std::string& action,
+                                                 const Principal& who) {
+  if (!flight_of(mission) || !flight->flying()) return forbidden("this mission is not being flown");
+  auto& f = *flight;
+  if (action == "abort") {
+    auto& command = note(action, who.name, "sent");
+    if (f.manual) {
+      command.state = "accepted";
+    } else {
+      by_drone_number[deps.drone->hold()] = command.number;
+    }
+    f.aborted = true;
+    deps.events.add("warning", "procedure.aborted",
+                    "aborted by " + who.name + ": the aircraft is the pilot's", mission);
+    return command;
+  }
+  const auto event = event_of_action(action);
+  if (!event) return forbidden("there is no action " + action);
+  if (f.taken_over) {
+    if (*event != Event::resume && *event != Event::return_home && *event != Event::land &&
+        *event != Event::hold)
+      return forbidden("the pilot or a failsafe has taken over; resume, hold, return or land take it back");
+    f.taken_over = false;
+    deps.drone->take_back();
+  }
+  if (!f.engine.command(now_s(), *event, who.name)) {
+    return forbidden("nothing to " + action + " in step " +
+                     std::string(procedure::to_string(f.engine.state().step)));
+  }
+  auto& command = note(action, who.name, "sent");
+  send_orders(f, &command);
+  tell_happenings(f);
+  return command;
+}
+
+void FlightService::State::recover() {
+  const auto kept = deps.plans.procedures();
+  if (!kept) return;
+  for (const auto& [mission, text] : kept.value()) deps.missions.prepare(mission);
+  const std::scoped_lock lock(mutex);
+  for (const auto& [mission, text] : kept.value()) {
+    const auto j = nlohmann::json::parse(text, nullptr, false);
+    std::vector<FieldError> errors;
+    const bool whole = j.is_object() && j.contains("plan") && j.contains("state") && j.contains("origin") &&
+                       j.contains("home_m") && j["origin"].size() == 3 && j["home_m"].size() == 3;
+    const auto state = whole ? state_of(j["state"]) : std::nullopt;
+    Plan plan = whole ? read_plan(j["plan"], errors) : Plan{};
+    if (!state || !errors.empty()) {
+      deps.events.add("critical", "procedure.lost",
+                      "the flight before the restart cannot be read: the pilot has it", mission);
+      continue;
+    }
+    if (const auto id = parse_uuid(j.value("plan_id", ""))) plan.id = PlanId{id.value()};
+    plan.version = j.value("plan_revision", 1ULL);
+    const Wgs84 origin{j["origin"][0], j["origin"][1], j["origin"][2]};
+    plan.origin = origin;
+    const Eigen::Vector3d home(j["home_m"][0].get<double>(), j["home_m"][1].get<double>(),
+                               j["home_m"][2].get<double>());
+    auto setup = procedure::flight_setup(plan, home);
+    if (!setup) continue;
+    const bool manual = j.value("manual", false) || deps.drone == nullptr;
+    flight.emplace(mission, std::move(plan), manual, EnuFrame(origin), home,
+                   procedure::FlightEngine(std::move(setup).value(), *state, now_s()));
+    // Not heard yet: the hold leaves with the first heartbeat.
+    for (const auto& order : flight->engine.take_orders()) {
+      if (!manual) flight->owed = order.kind;
+    }
+    tell_happenings(*flight);
+    deps.events.add("critical", "procedure.restarted",
+                    "server restarted in flight: told to hold, waiting for the operator", mission);
+  }
+}
+
+nlohmann::ordered_json FlightService::State::procedure(const ActiveFlight& f) const {
+  ProcedureView v;
+  v.mission = f.mission;
+  v.plan = f.plan.id.uuid == Uuid{} ? "" : to_string(f.plan.id);
+  v.name = f.plan.name;
+  v.plan_revision = f.plan.version;
+  v.mode = f.manual ? "manual" : "auto";
+  v.status = f.status();
+  v.t_us = deps.clock.now().us();
+  v.now_s = now_s();
+  if (!f.manual) v.drone = deps.drone->status();
+  if (const auto held = lease.holder(deps.clock.now())) {
+    v.holder = held->name;
+    v.holder_since_us = held->since.us();
+    v.holder_until_us = held->until.us();
+  }
+  v.commands.assign(commands.begin(), commands.end());
+  return procedure_json(v, f.engine, f.frame);
+}
+
+void FlightService::State::publish_soon() {
+  if (flight) flight->shown_s = -10;
+}
+
+/// The stepper once a second and with every transition, decisions once, profiles while they grow.
+void FlightService::State::publish() {
+  if (!flight) return;
+  auto& f = *flight;
+  const double now = now_s();
+  const auto n = f.engine.state().n_transitions;
+  const std::int64_t t_us = deps.clock.now().us();
+  const auto key = to_string(f.mission);
+  const bool moved = n != f.shown;
+  if (moved || now - f.shown_s >= 1) {
+    deps.hub.publish(Topic::procedure, procedure(f).dump(), t_us, key);
+    f.shown_s = now;
+  }
+  const auto step = f.engine.state().step;
+  const bool turning = step == procedure::Step::turn, climbing = step == procedure::Step::height_search;
+  if (turning || climbing || moved) {
+    for (const auto& [anchor, clues] : f.engine.clues()) {
+      if (!clues.turn.empty() && (turning || moved))
+        deps.hub.publish(Topic::mission_turn, turn_json(f.mission, anchor, t_us, clues, turning).dump(), t_us,
+                         key + to_string(anchor), anchor);
+      if (!clues.heights.empty() && (climbing || moved))
+        deps.hub.publish(Topic::mission_height, height_json(f.mission, anchor, t_us, clues, climbing).dump(),
+                         t_us, key + to_string(anchor), anchor);
+    }
+  }
+  if (moved && f.engine.decision())
+    deps.hub.publish(Topic::mission_grid, grid_json(f.mission, t_us, f.engine, f.frame).dump(), t_us, key);
+  f.shown = n;
+}
+
+std::vector<std::pair<std::string_view, std::string>> FlightService::State::alarms() const {
+  const bool flying = flight && flight->flying();
+  std::vector<std::pair<std::string_view, std::string>> out;
+  for (const auto id : k_flight_alarms) {
+    const auto& alarm = flying ? flight->engine.alarm() : std::nullopt;
+    out.emplace_back(id, alarm && alarm->id == id ? alarm->text : "");
+  }
+  out.emplace_back("drone.taken_over",
+                   flying && flight->taken_over ? "the pilot or a failsafe has the aircraft" : "");
+  std::string silent;
+  for (const auto& c : commands) {
+    if (flying && unconfirmed && c.number == *unconfirmed) silent = c.action + " " + c.state + ": " + c.text;
+  }
+  out.emplace_back("cmd.unconfirmed", std::move(silent));
+  return out;
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,214 @@
+#include "api/services/flight_service.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "api/application.hpp"
+#include "api/live/hub.hpp"
+#include "api/services/event_log.hpp"
+#include "api/services/flight_state.hpp"
+#include "api/services/mission_service.hpp"
+#include "core/localize/live_flight.hpp"
+#include "core/ports/plan_store.hpp"
+
+namespace anchord::api {
+
+using procedure::Event;
+
+FlightService::FlightService(Deps deps) : state_(std::make_unique<State>(std::move(deps))) {}
+FlightService::~FlightService() { stop(); }
+
+void FlightService::start() {
+  state_->recover();
+  if (state_->deps.now_s || state_->thread.joinable()) return;
+  state_->thread = std::thread([this] {
+    std::unique_lock lock(state_->mutex);
+    while (!state_->stopping) {
+      lock.unlock();
+      step();
+      lock.lock();
+      state_->wake.wait_for(lock, std::chrono::milliseconds(100), [&] { return state_->stopping; });
+    }
+  });
+}
+
+void FlightService::stop() {
+  {
+    const std::scoped_lock lock(state_->mutex);
+    if (state_->stopping) return;
+    state_->stopping = true;
+    // Whoever stops the server in flight leaves an aircraft that stands, not one that goes on.
+    if (state_->flight && state_->flight->flying() && !state_->flight->manual &&
+        state_->deps.drone != nullptr)
+      state_->deps.drone->hold();
+  }
+  state_->wake.notify_all();
+  state_->changed.notify_all();
+  if (state_->thread.joinable()) state_->thread.join();
+}
+
+void FlightService::step() {
+  auto& s = *state_;
+  // The estimates belong to the mission's strand, whose observer asks for our lock: never ask for both.
+  std::optional<MissionId> mission;
+  bool deciding = false;
+  {
+    const std::scoped_lock lock(s.mutex);
+    if (s.flight) {
+      mission = s.flight->mission;
+      deciding = s.flight->engine.state().step == procedure::Step::find_next_point;
+    }
+  }
+  std::vector<MissionService::LiveView> live;
+  if (deciding) live = s.deps.missions.live(mission);
+  std::string keep;
+  bool keeps = false;
+  {
+    const std::scoped_lock lock(s.mutex);
+    s.round(live.empty() ? nullptr : &live.front());
+    if (s.flight) keeps = s.flight->to_keep(keep);
+    s.publish();
+  }
+  if (keeps && mission) (void)s.deps.plans.keep_procedure(*mission, keep, s.deps.clock.now()).has_value();
+  s.changed.notify_all();
+}
+
+void FlightService::on_fix(const Fix& fix) {
+  const std::scoped_lock lock(state_->mutex);
+  state_->hear(fix);
+}
+
+void FlightService::on_range(const MissionId& mission, const RangeResult& result) {
+  const std::scoped_lock lock(state_->mutex);
+  state_->hear(mission, result);
+}
+
+Result<Lease> FlightService::take_control(const MissionId& mission, const Principal& who, bool by_force) {
+  BOOST_OUTCOME_TRYV(state_->deps.missions.mission(mission));
+  const std::scoped_lock lock(state_->mutex);
+  const auto now = state_->deps.clock.now();
+  const auto before = state_->lease.holder(now);
+  auto lease = state_->lease.take(mission, who, now, by_force);
+  if (lease) {
+    state_->deps.events.add(before ? "warning" : "info", "control.taken",
+                            who.name + (before ? " took control from " + before->name : " has control"),
+                            mission);
+    state_->publish_soon();
+  }
+  return lease;
+}
+
+Result<Lease> FlightService::renew_control(const MissionId& mission, const std::string& key,
+                                           const Principal& who) {
+  const std::scoped_lock lock(state_->mutex);
+  return state_->lease.renew(mission, key, who, state_->deps.clock.now());
+}
+
+Result<void> FlightService::release_control(const MissionId& mission, const std::string& key,
+                                            const Principal& who) {
+  const std::scoped_lock lock(state_->mutex);
+  BOOST_OUTCOME_TRYV(state_->lease.release(mission, key, who, state_->deps.clock.now()));
+  state_->deps.events.add("info", "control.released", who.name + " gave control back", mission);
+  state_->publish_soon();
+  return boost::outcome_v2::success();
+}
+
+std::optional<Lease> FlightService::control() {
+  const std::scoped_lock lock(state_->mutex);
+  return state_->lease.holder(state_->deps.clock.now());
+}
+
+Result<FlightCommand> FlightService::act(const MissionId& mission, const Order& order, const Principal& who) {
+  BOOST_OUTCOME_TRY(const auto record, state_->deps.missions.mission(mission));
+  std::optional<Plan> plan;
+  if (order.action == "start") {
+    if (!order.plan) return make_error(Errc::invalid_argument, "start needs the plan that is to be flown");
+    BOOST_OUTCOME_TRY(const auto stored, state_->deps.plans.plan(*order.plan));
+    plan = plan_of(stored);
+  }
+  const std::scoped_lock lock(state_->mutex);
+  BOOST_OUTCOME_TRYV(state_->lease.renew(mission, order.lease, who, state_->deps.clock.now()));
+  if (plan) return state_->begin(record, *plan, order.manual, who);
+  return state_->obey(mission, order.action, who);
+}
+
+FlightCommand FlightService::settled(FlightCommand command, double wait_s) {
+  std::unique_lock lock(state_->mutex);
+  const auto latest = [&] {
+    if (const auto* found = state_->find(command.number)) command = *found;
+    return command.state != "sent" || state_->stopping;
+  };
+  state_->changed.wait_for(lock, std::chrono::duration<double>(wait_s), latest);
+  return command;
+}
+
+std::vector<ChecklistItem> FlightService::checklist(const MissionId& mission,
+                                                    const std::optional<PlanId>& plan_id) {
+  const auto record = state_->deps.missions.mission(mission);
+  std::optional<Plan> plan;
+  if (plan_id) {
+    if (const auto stored = state_->deps.plans.plan(*plan_id)) plan = plan_of(stored.value());
+  }
+  const std::scoped_lock lock(state_->mutex);
+  return state_->checklist(record ? &record.value() : nullptr, mission, plan ? &*plan : nullptr,
+                           state_->deps.drone == nullptr);
+}
+
+Result<void> FlightService::override_item(const MissionId& mission, const std::string& item,
+                                          const std::string& reason, const Principal& who) {
+  BOOST_OUTCOME_TRYV(state_->deps.missions.mission(mission));
+  if (!is_checklist_item(item)) return make_error(Errc::not_found, "the checklist has no item " + item);
+  const std::scoped_lock lock(state_->mutex);
+  for (const auto& one : state_->checklist(nullptr, mission, nullptr, state_->deps.drone == nullptr)) {
+    if (one.id == item && !one.overridable)
+      return make_error(Errc::invalid_argument, item + " cannot be overridden: " + one.text);
+  }
+  state_->said[mission][item] = {who.name, reason};
+  state_->deps.events.add("info", "checklist." + item, who.name + ": " + reason, mission);
+  return boost::outcome_v2::success();
+}
+
+std::string FlightService::procedure_text(const MissionId& mission) {
+  const std::scoped_lock lock(state_->mutex);
+  const auto* flight = state_->flight_of(mission);
+  return flight == nullptr ? std::string{} : state_->procedure(*flight).dump();
+}
+
+std::string FlightService::grid_text(const MissionId& mission) {
+  const std::scoped_lock lock(state_->mutex);
+  const auto* f = state_->flight_of(mission);
+  return f == nullptr ? std::string{}
+                      : grid_json(mission, state_->deps.clock.now().us(), f->engine, f->frame).dump();
+}
+
+std::vector<std::string> FlightService::turn_texts(const MissionId& mission) {
+  const std::scoped_lock lock(state_->mutex);
+  std::vector<std::string> out;
+  if (const auto* f = state_->flight_of(mission)) {
+    const bool running = f->engine.state().step == procedure::Step::turn;
+    for (const auto& [anchor, clues] : f->engine.clues()) {
+      if (!clues.turn.empty())
+        out.push_back(turn_json(mission, anchor, state_->deps.clock.now().us(), clues, running).dump());
+    }
+  }
+  return out;
+}
+
+std::vector<std::string> FlightService::height_texts(const MissionId& mission) {
+  const std::scoped_lock lock(state_->mutex);
+  std::vector<std::string> out;
+  if (const auto* f = state_->flight_of(mission)) {
+    const bool running = f->engine.state().step == procedure::Step::height_search;
+    for (const auto& [anchor, clues] : f->engine.clues()) {
+      if (!clues.heights.empty())
+        out.push_back(height_json(mission, anchor, state_->deps.clock.now().us(), clues, running).dump());
+    }
+  }
+  return out;
+}
+
+std::vector<std::pair<std::string_view, std::string>> FlightService::alarms() {
+  const std::scoped_lock lock(state_->mutex);
+  return state_->alarms();
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,102 @@
+#pragma once
+
+#include <array>
+#include <condition_variable>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <thread>
+
+#include "api/json/plan_json.hpp"
+#include "api/services/flight_service.hpp"
+#include "api/services/mission_service.hpp"
+#include "core/procedure/flight_engine.hpp"
+
+namespace anchord::api {
+
+/// Alarms of procedure::watch(); the alarm board tells of their coming and going.
+inline constexpr std::array<std::string_view, 5> k_flight_alarms{
+    "drone.battery", "fence.breach", "drone.link", "rtk.lost", "position.disagree"};
+
+/// One flight, in the air or just landed. Under the service's lock.
+struct ActiveFlight {
+  ActiveFlight(const MissionId& m, Plan p, bool by_pilot, EnuFrame f, Eigen::Vector3d home,
+               procedure::FlightEngine e)
+      : mission(m),
+        plan(std::move(p)),
+        manual(by_pilot),
+        frame(std::move(f)),
+        home_m(std::move(home)),
+        engine(std::move(e)) {}
+
+  bool flying() const;
+  std::string status() const;
+  /// The document to store, when the machine moved since the last call; empty text: forget it.
+  bool to_keep(std::string& text);
+
+  MissionId mission;
+  Plan plan;
+  bool manual{false};
+  EnuFrame frame;  ///< of the plan, its ground at height 0
+  Eigen::Vector3d home_m;
+  procedure::FlightEngine engine;
+  bool aborted{false}, taken_over{false};
+  std::uint64_t kept{~0ULL}, shown{~0ULL};
+  double shown_s{-10};
+  std::size_t shown_iteration{~std::size_t{0}};
+  std::optional<procedure::Command::Kind>
+      owed{};                                 ///< hold, return or land for an aircraft that was not heard
+  std::optional<Eigen::Vector3d> former_m{};  ///< manual: the last fix, for its speed
+  std::optional<double> former_s{};
+  procedure::VehicleView by_hand{};
+};
+
+struct FlightService::State {
+  explicit State(Deps d) : deps(std::move(d)) {}
+
+  struct Heard {
+    std::optional<double> fix_s{}, fixed_since_s{}, range_s{}, correction_age_s{};
+    std::optional<Fix> fix{};
+  };
+  struct Said {
+    std::string who, reason;
+  };
+
+  double now_s() const;
+  const ActiveFlight* flight_of(const MissionId& mission) const;
+  FlightCommand* find(std::uint64_t number);
+  void hear(const Fix& fix);
+  void hear(const MissionId& mission, const RangeResult& result);
+  Result<FlightCommand> begin(const Mission& mission, const Plan& plan, bool manual, const Principal& who);
+  Result<FlightCommand> obey(const MissionId& mission, const std::string& action, const Principal& who);
+  void recover();
+  void round(const MissionService::LiveView* live);
+  void telemetry(ActiveFlight& f);
+  void send_orders(ActiveFlight& f, FlightCommand* cause);
+  std::uint64_t send(ActiveFlight& f, const procedure::Command& order);
+  void read_reports();
+  void tell_happenings(ActiveFlight& f);
+  FlightCommand& note(std::string action, std::string by, std::string state);
+  void publish();
+  void publish_soon();
+  nlohmann::ordered_json procedure(const ActiveFlight& f) const;
+  std::vector<ChecklistItem> checklist(const Mission* record, const MissionId& mission, const Plan* plan,
+                                       bool manual);
+  std::vector<std::pair<std::string_view, std::string>> alarms() const;
+
+  Deps deps;
+  std::mutex mutex;
+  std::condition_variable wake, changed;
+  std::thread thread;
+  bool stopping{false};
+  ControlLease lease;
+  std::optional<ActiveFlight> flight;
+  std::map<MissionId, Heard> heard;                        ///< newest few missions only
+  std::map<MissionId, std::map<std::string, Said>> said;   ///< of the checklist
+  std::deque<FlightCommand> commands;                      ///< newest last, at most 30
+  std::map<std::uint64_t, std::uint64_t> by_drone_number;  ///< number of the aircraft's -> ours
+  std::optional<std::uint64_t> unconfirmed;                ///< of the newest command that got no answer
+  std::uint64_t number{0};
+};
+
+}  // namespace anchord::api

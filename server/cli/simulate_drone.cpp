@@ -1,0 +1,190 @@
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <boost/asio/io_context.hpp>
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include "api/json/flight_requests.hpp"
+#include "drivers/link/byte_link.hpp"
+#include "drivers/sim/autopilot.hpp"
+#include "server/cli/progress.hpp"
+#include "server/cli/rest_client.hpp"
+#include "server/cli/simulate_drone.hpp"
+#include "server/flight/closed_loop.hpp"
+#include "server/flight/sim_kit.hpp"
+
+namespace anchord::cli {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+struct Options {
+  std::string mavlink{"udp://127.0.0.1:14550"}, url{"http://127.0.0.1:8420"}, token_file, mission;
+  std::uint64_t seed{1};
+  double ready_s{5}, wind_mps{0}, battery_s{1200};
+  bool px4{false}, walls{false};
+};
+
+/// Anything that goes wrong with one delivery is told and the flight goes on: a tag does not stop either.
+template <class T>
+bool told(const Result<T>& result) {
+  if (!result) std::fprintf(stderr, "anchord simulate drone: %s\n", result.error().message.c_str());
+  return result.has_value();
+}
+
+class World {
+ public:
+  World(const Options& options, RestClient& client)
+      : options_(options),
+        client_(client),
+        world_(options.walls ? flight::walled_world() : sim::demonstration_world()),
+        autopilot_(autopilot_options(options, world_)),
+        kit_(world_, radio(), options.seed, SystemClock().now()),
+        start_(SteadyClock::now()) {}
+
+  Result<void> find_mission() {
+    if (!options_.mission.empty()) {
+      mission_ = options_.mission;
+      BOOST_OUTCOME_TRY(mission_id_.uuid, parse_uuid(mission_));
+      return boost::outcome_v2::success();
+    }
+    auto mission = kit_.mission();
+    mission.name = "Simulated drone";
+    BOOST_OUTCOME_TRY(const auto made, client_.post("/api/v1/missions", "application/json",
+                                                    api::mission_request_json(mission)));
+    BOOST_OUTCOME_TRY(mission_, api::parse_created_id(made));
+    BOOST_OUTCOME_TRY(mission_id_.uuid, parse_uuid(mission_));
+    std::fprintf(stderr, "anchord simulate drone: mission %s\n", mission_.c_str());
+    return boost::outcome_v2::success();
+  }
+
+  /// Flies on to the present; what was measured meanwhile goes to the server.
+  void round(link::ByteLink& bytes) {
+    const double now_s = std::chrono::duration<double>(SteadyClock::now() - start_).count();
+    while (kit_.now_s() + flight::SimKit::k_step_s <= now_s) {
+      const Eigen::Vector3d before = autopilot_.vehicle().position_m();
+      autopilot_.advance(kit_.now_s() + flight::SimKit::k_step_s);
+      auto measured = kit_.observe(before, autopilot_.vehicle());
+      const std::scoped_lock lock(mutex_);
+      for (auto& fix : measured.fixes) {
+        fix.mission = mission_id_;
+        api::append_ndjson(fixes_, fix);
+      }
+      for (auto& range : measured.ranges) {
+        range.mission = mission_id_;
+        api::append_ndjson(ranges_, range);
+      }
+    }
+    const auto out = autopilot_.take_bytes();
+    if (!out.empty()) (void)bytes.write({reinterpret_cast<const char*>(out.data()), out.size()}).has_value();
+  }
+  void hear(std::string_view in) {
+    autopilot_.feed({reinterpret_cast<const std::uint8_t*>(in.data()), in.size()});
+  }
+  /// On a thread of its own: a server that is away must not stop the aircraft.
+  void deliver() {
+    const std::string where = "?mission=" + mission_;
+    std::string ranges, fixes;
+    {
+      const std::scoped_lock lock(mutex_);
+      ranges.swap(ranges_);
+      fixes.swap(fixes_);
+    }
+    if (!ranges.empty()) (void)told(client_.post("/api/v1/ranges" + where, "application/x-ndjson", ranges));
+    if (!fixes.empty()) (void)told(client_.post("/api/v1/fixes" + where, "application/x-ndjson", fixes));
+  }
+
+ private:
+  static sim::AutopilotOptions autopilot_options(const Options& options, const sim::World& world) {
+    sim::AutopilotOptions out;
+    out.dialect = options.px4 ? drone::Autopilot::px4 : drone::Autopilot::ardupilot;
+    out.origin = world.origin;
+    out.home_m = {-9, -9, 0};
+    out.ready_s = options.ready_s;
+    out.seed = options.seed;
+    out.vehicle.wind_mps = {options.wind_mps, 0, 0};
+    out.vehicle.battery_s = options.battery_s;
+    out.start_unix_us = SystemClock().now().us();
+    return out;
+  }
+  static sim::RadioOptions radio() {
+    sim::RadioOptions out;
+    out.turn_lobe_db = 6;
+    out.height_lobe = true;
+    return out;
+  }
+
+  const Options& options_;
+  RestClient& client_;
+  sim::World world_;
+  sim::AutopilotSim autopilot_;
+  flight::SimKit kit_;
+  SteadyClock::time_point start_;
+  MissionId mission_id_{};
+  std::mutex mutex_;
+  std::string mission_, fixes_, ranges_;
+};
+
+int simulate_drone(const Options& options) {
+  const auto address = link::parse_address(options.mavlink);
+  if (!told(address)) return 2;
+  const auto token = read_token_file(options.token_file);
+  if (!told(token)) return 2;
+  auto client = RestClient::make(options.url, token.value(), interrupted);
+  if (!told(client)) return 2;
+  World world(options, *client.value());
+  if (!told(world.find_mission())) return 1;
+  boost::asio::io_context io;
+  const auto bytes = link::make_link(io, address.value());
+  bool lost = false;
+  link::LinkHandlers handlers;
+  handlers.on_bytes = [&](std::string_view in, const link::Arrival&) { world.hear(in); };
+  handlers.on_closed = [&](const Error& why) {
+    std::fprintf(stderr, "anchord simulate drone: %s\n", why.message.c_str());
+    lost = true;
+  };
+  bytes->open(std::move(handlers));
+  std::atomic<bool> over{false};
+  std::thread deliverer([&] {
+    while (!over && !interrupted()) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(200));
+      world.deliver();
+    }
+  });
+  auto next = SteadyClock::now();
+  while (!interrupted() && !lost) {
+    io.restart();
+    next += std::chrono::milliseconds(50);
+    io.run_until(next);
+    std::this_thread::sleep_until(next);
+    world.round(*bytes);
+  }
+  over = true;
+  deliverer.join();
+  return lost ? 1 : 0;
+}
+
+}  // namespace
+
+void add_simulate_drone(CLI::App& simulate, int& exit_code) {
+  auto o = std::make_shared<Options>();
+  auto* command = simulate.add_subcommand(
+      "drone", "An aircraft to fly: MAVLink on a socket, its tag and rover as measurements of a mission");
+  command->add_option("--mavlink", o->mavlink, "where the server listens (its drone.address)")
+      ->capture_default_str();
+  command->add_option("--url", o->url, "of the server")->capture_default_str();
+  command->add_option("--token-file", o->token_file, "file with an access token (gateway and operator)");
+  command->add_option("--mission", o->mission, "that gets the measurements; default: a new one");
+  command->add_option("--seed", o->seed, "Same seed, same noise")->capture_default_str();
+  command->add_option("--ready", o->ready_s, "seconds until the pre-arm checks pass")->capture_default_str();
+  command->add_option("--wind", o->wind_mps, "from the west, m/s")->capture_default_str();
+  command->add_option("--battery", o->battery_s, "seconds of flight on it")->capture_default_str();
+  command->add_flag("--px4", o->px4, "speaks as PX4; default ArduPilot");
+  command->add_flag("--walls", o->walls, "brick fronts instead of glass");
+  command->callback([o, &exit_code] { exit_code = simulate_drone(*o); });
+}
+
+}  // namespace anchord::cli

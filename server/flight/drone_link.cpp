@@ -1,0 +1,143 @@
+#include "server/flight/drone_link.hpp"
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <mutex>
+#include <thread>
+
+#include "drivers/drone/session.hpp"
+#include "drivers/link/byte_link.hpp"
+
+namespace anchord::flight {
+namespace {
+
+namespace asio = boost::asio;
+constexpr auto k_round = std::chrono::milliseconds(50);
+constexpr int k_rounds_to_reopen = 20;
+
+double seconds(const link::Arrival& at) { return static_cast<double>(at.steady_ns) * 1e-9; }
+
+}  // namespace
+
+struct DroneLink::Impl {
+  Impl(link::Address where, std::function<void(std::string_view)> tell)
+      : address(std::move(where)), log(std::move(tell)), timer(io) {}
+
+  void run() {
+    open();
+    round();
+    io.run();
+  }
+
+  void open() {
+    bytes = link::make_link(io, address);
+    link::LinkHandlers handlers;
+    handlers.on_bytes = [this](std::string_view in, const link::Arrival& at) {
+      const std::scoped_lock lock(mutex);
+      session.feed(seconds(at), at.utc.us(), {reinterpret_cast<const std::uint8_t*>(in.data()), in.size()});
+    };
+    handlers.on_closed = [this](const Error& why) {
+      if (log && why.message != last_trouble) log("aircraft: " + why.message);
+      last_trouble = why.message;
+      closed_for = 1;
+    };
+    bytes->open(std::move(handlers));
+  }
+
+  void round() {
+    if (closed_for > 0 && ++closed_for > k_rounds_to_reopen) {
+      closed_for = 0;
+      open();
+    }
+    const auto now = link::arrival_now();
+    std::vector<std::uint8_t> out;
+    {
+      const std::scoped_lock lock(mutex);
+      session.tick(seconds(now), now.utc.us());
+      out = session.take_bytes();
+    }
+    write(out);
+    timer.expires_after(k_round);
+    timer.async_wait([this](const boost::system::error_code& error) {
+      if (!error) round();
+    });
+  }
+
+  /// What cannot leave is lost, as on any radio; the session repeats it or says that it was not confirmed.
+  void write(const std::vector<std::uint8_t>& out) {
+    if (!out.empty() && closed_for == 0)
+      (void)bytes->write({reinterpret_cast<const char*>(out.data()), out.size()}).has_value();
+  }
+
+  template <class Call>
+  std::uint64_t command(Call call) {
+    std::vector<std::uint8_t> out;
+    std::uint64_t number = 0;
+    {
+      const std::scoped_lock lock(mutex);
+      number = call(session);
+      out = session.take_bytes();
+    }
+    asio::post(io, [this, out = std::move(out)] { write(out); });
+    return number;
+  }
+
+  link::Address address;
+  std::function<void(std::string_view)> log;
+  asio::io_context io;
+  asio::steady_timer timer;
+  std::unique_ptr<link::ByteLink> bytes;
+  int closed_for{0};  ///< rounds since the link was lost; 0: it is open or opening
+  std::string last_trouble;
+  mutable std::mutex mutex;
+  drone::Session session;
+  std::thread thread;
+};
+
+Result<std::unique_ptr<DroneLink>> DroneLink::open(const std::string& address,
+                                                   std::function<void(std::string_view)> log) {
+  BOOST_OUTCOME_TRY(auto where, link::parse_address(address));
+  auto impl = std::make_unique<Impl>(std::move(where), std::move(log));
+  auto* running = impl.get();
+  impl->thread = std::thread([running] { running->run(); });
+  return std::unique_ptr<DroneLink>(new DroneLink(std::move(impl)));
+}
+
+DroneLink::DroneLink(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+DroneLink::~DroneLink() {
+  // Posted after the last command's bytes, so that a farewell hold still leaves.
+  asio::post(impl_->io, [this] { impl_->io.stop(); });
+  impl_->thread.join();
+}
+
+std::uint64_t DroneLink::take_off(double height_m) {
+  return impl_->command([&](drone::Session& s) { return s.take_off(height_m); });
+}
+std::uint64_t DroneLink::go_to(double lat_deg, double lon_deg, double height_m,
+                               std::optional<double> heading_deg) {
+  return impl_->command([&](drone::Session& s) { return s.go_to(lat_deg, lon_deg, height_m, heading_deg); });
+}
+std::uint64_t DroneLink::hold() {
+  return impl_->command([](drone::Session& s) { return s.hold(); });
+}
+std::uint64_t DroneLink::return_home() {
+  return impl_->command([](drone::Session& s) { return s.return_home(); });
+}
+std::uint64_t DroneLink::land() {
+  return impl_->command([](drone::Session& s) { return s.land(); });
+}
+void DroneLink::take_back() {
+  const std::scoped_lock lock(impl_->mutex);
+  impl_->session.take_back();
+}
+DroneStatus DroneLink::status() const {
+  const std::scoped_lock lock(impl_->mutex);
+  return impl_->session.status();
+}
+std::vector<CommandReport> DroneLink::take_reports() {
+  const std::scoped_lock lock(impl_->mutex);
+  return impl_->session.take_reports();
+}
+
+}  // namespace anchord::flight

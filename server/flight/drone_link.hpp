@@ -1,0 +1,38 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "core/base/result.hpp"
+#include "core/ports/drone.hpp"
+
+namespace anchord::flight {
+
+/// The aircraft at an address (drivers/link/address.hpp): a MAVLink session behind a socket or a serial port
+/// on a thread of its own. A lost link is opened again each second. Thread-safe.
+class DroneLink final : public Drone {
+ public:
+  /// `log`: one line for the operator's log. errors  invalid_argument: the address
+  static Result<std::unique_ptr<DroneLink>> open(const std::string& address,
+                                                 std::function<void(std::string_view)> log);
+  ~DroneLink() override;
+
+  std::uint64_t take_off(double height_m) override;
+  std::uint64_t go_to(double lat_deg, double lon_deg, double height_m,
+                      std::optional<double> heading_deg) override;
+  std::uint64_t hold() override;
+  std::uint64_t return_home() override;
+  std::uint64_t land() override;
+  void take_back() override;
+  DroneStatus status() const override;
+  std::vector<CommandReport> take_reports() override;
+
+ private:
+  struct Impl;
+  explicit DroneLink(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace anchord::flight

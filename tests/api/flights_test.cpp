@@ -1,0 +1,305 @@
+// A flight over REST against the simulated autopilot, through the real session: plan, checklist, control,
+// start, hold, resume, land; strangers, a silent aircraft, a server killed in flight. Time is the test's,
+// nothing sleeps.
+#include <cmath>
+
+#include "app_fixture.hpp"
+#include "core/ports/drone.hpp"
+#include "drivers/drone/session.hpp"
+#include "drivers/sim/autopilot.hpp"
+#include "drivers/sim/wgs84.hpp"
+
+namespace anchord::test {
+namespace {
+
+constexpr std::int64_t k_unix_us = 1'777'888'800'000'000;
+const Eigen::Vector3d k_home_m{-9, -9, 0};
+
+/// Session and autopilot, joined without a wire.
+class LoopDrone final : public Drone {
+ public:
+  LoopDrone()
+      : autopilot([] {
+          sim::AutopilotOptions o;
+          o.ready_s = 0;
+          o.home_m = k_home_m;
+          return o;
+        }()) {}
+
+  void run_until(double seconds) {
+    while (now < seconds - 1e-9) {
+      now += 0.05;
+      const auto unix_us = k_unix_us + static_cast<std::int64_t>(now * 1e6);
+      autopilot.advance(now);
+      session.feed(now, unix_us, autopilot.take_bytes());
+      session.tick(now, unix_us);
+      const auto out = session.take_bytes();
+      if (!link_down) autopilot.feed(out);
+    }
+  }
+  std::uint64_t take_off(double m) override { return session.take_off(m); }
+  std::uint64_t go_to(double lat, double lon, double m, std::optional<double> heading) override {
+    targets.push_back({lat, lon, m});
+    return session.go_to(lat, lon, m, heading);
+  }
+  std::uint64_t hold() override { return ++holds, session.hold(); }
+  std::uint64_t return_home() override { return session.return_home(); }
+  std::uint64_t land() override { return session.land(); }
+  void take_back() override { session.take_back(); }
+  DroneStatus status() const override { return session.status(); }
+  std::vector<CommandReport> take_reports() override { return session.take_reports(); }
+
+  sim::AutopilotSim autopilot;
+  drone::Session session;
+  std::vector<Wgs84> targets;
+  double now{0};
+  int holds{0};
+  bool link_down{false};
+};
+
+class Flights : public AppFixture {
+ protected:
+  void SetUp() override {
+    drone_ = std::make_unique<LoopDrone>();
+    AppFixture::SetUp();
+  }
+  void TearDown() override {
+    AppFixture::TearDown();
+    drone_.reset();
+  }
+  void configure(api::Application::Deps& deps) override {
+    deps.drone = with_drone_ ? drone_.get() : nullptr;
+    deps.flight_clock = [this] { return drone_->now; };
+  }
+  std::string origin_text() const { return R"({"lon":3.7131,"lat":51.0231,"h_m":55.5})"; }
+  std::string make_plan() {
+    const auto made =
+        post("/api/v1/plans", R"({"name":"Hall","building_height_m":8,"origin":)" + origin_text() + R"(,
+      "outline":{"type":"Polygon","coordinates":[[[3.7131,51.0231],[3.7135275,51.0231],[3.7135275,51.0232799],[3.7131,51.0232799]]]},
+      "settings":{"keep_out_m":4,"max_height_m":20},
+      "waypoints":[{"lon":3.7130,"lat":51.02305,"height_above_ground_m":4},
+                   {"lon":3.71362,"lat":51.02305,"height_above_ground_m":9}]})");
+    EXPECT_EQ(made.status, 201) << made.body;
+    return json(made)["id"];
+  }
+  /// Flies on; ten fixes a second come in as from a rover on the aircraft.
+  void fly(double seconds) {
+    for (const double end = drone_->now + seconds; drone_->now < end - 1e-9;) {
+      drone_->run_until(drone_->now + 0.1);
+      const auto at = sim::wgs84_from_enu({51.0231, 3.7131, 55.5}, drone_->autopilot.vehicle().position_m());
+      char row[300];
+      std::snprintf(
+          row, sizeof row,
+          R"({"t_us":%lld,"lon":%.10f,"lat":%.10f,"h_m":%.4f,"fix":"fixed","sigma_m":[0.01,0.01,0.02],)"
+          R"("correction_age_s":0.8})"
+          "\n",
+          static_cast<long long>(k_unix_us + std::llround(drone_->now * 1e6)), at.lon_deg, at.lat_deg,
+          at.height_m);
+      const auto taken = post("/api/v1/fixes", row, "application/x-ndjson", {{"mission", mission_}});
+      ASSERT_EQ(taken.status, 200) << taken.body;
+      app_->fly();
+    }
+  }
+  template <class Done>
+  bool fly_until(Done done, double seconds) {
+    for (const double end = drone_->now + seconds; drone_->now < end;) {
+      fly(0.5);
+      if (done()) return true;
+    }
+    return false;
+  }
+  Json procedure() { return json(get(base() + "/procedure")); }
+  std::string base() const { return "/api/v1/missions/" + mission_; }
+  Json control(const std::string& body = R"({"action":"take"})") {
+    const auto answer = post(base() + "/control", body);
+    EXPECT_EQ(answer.status, 200) << answer.body;
+    return json(answer);
+  }
+  api::Response act(const std::string& action, const std::string& lease, const std::string& more = "") {
+    return post(base() + "/actions", R"({"action":")" + action + R"(","lease":")" + lease + '"' + more + '}');
+  }
+  void check_everything() {
+    for (const char* item : {"props", "airspace", "people", "pilot", "tag", "disk", "battery"}) {
+      const auto said = post(base() + "/checklist/" + item, R"({"reason":"looked at it"})");
+      ASSERT_EQ(said.status, 200) << said.body;
+    }
+  }
+  std::string command_state(std::uint64_t number) {
+    std::string state;
+    const Json now = procedure();
+    for (const auto& c : now["commands"]) {
+      if (c["number"] == number) state = c["state"];
+    }
+    return state;
+  }
+  /// In the air at the first waypoint's side; the lease.
+  std::string take_off() {
+    mission_ = mission();
+    const auto plan = make_plan();
+    fly(12);
+    check_everything();
+    const std::string lease = control()["lease"];
+    const auto started = act("start", lease, R"(,"plan":")" + plan + '"');
+    EXPECT_EQ(started.status, 202) << started.body;
+    start_ = json(started)["number"];
+    EXPECT_TRUE(fly_until([&] { return procedure()["step"] == "go_to_waypoint"; }, 60))
+        << procedure().dump(1);
+    return lease;
+  }
+
+  std::unique_ptr<LoopDrone> drone_;
+  bool with_drone_{true};
+  std::string mission_;
+  std::uint64_t start_{};
+};
+
+TEST_F(Flights, StartIsBlockedUntilTheChecklistIsGreen) {
+  mission_ = mission();
+  const auto plan = make_plan();
+  const std::string lease = control()["lease"];
+  const auto early = act("start", lease, R"(,"plan":")" + plan + '"');
+  EXPECT_EQ(early.status, 422);
+  EXPECT_NE(early.body.find("rtk"), std::string::npos) << early.body;
+  fly(12);
+  const auto list = [&] { return json(get(base() + "/checklist", {{"plan", plan}})); };
+  EXPECT_EQ(list()["ready"], false);
+  for (const auto& item : Json(list()["items"])) {
+    if (item["id"] == "rtk" || item["id"] == "drone" || item["id"] == "plan") {
+      EXPECT_EQ(item["state"], "ok") << item;
+    }
+    if (item["id"] == "props") {
+      EXPECT_EQ(item["state"], "open") << item;
+    }
+  }
+  check_everything();
+  EXPECT_EQ(list()["ready"], true) << list().dump(1);
+  EXPECT_EQ(post(base() + "/checklist/plan", R"({"reason":"never mind"})").status, 422) << "not overridable";
+  EXPECT_EQ(post(base() + "/checklist/weather", R"({"reason":"sunny"})").status, 404);
+  EXPECT_EQ(act("start", lease, R"(,"plan":")" + plan + '"').status, 202);
+}
+
+TEST_F(Flights, StartsHoldsResumesAndLands) {
+  const auto lease = take_off();
+  EXPECT_EQ(command_state(start_), "accepted");
+  EXPECT_EQ(procedure()["status"], "running");
+  fly(3);
+  const auto hold = act("hold", lease);
+  ASSERT_EQ(hold.status, 202) << hold.body;
+  fly(2.2);
+  EXPECT_EQ(command_state(json(hold)["number"]), "accepted");
+  EXPECT_EQ(procedure()["status"], "hold");
+  EXPECT_EQ(drone_->session.status().mode, "BRAKE");
+  ASSERT_EQ(act("resume", lease).status, 202);
+  EXPECT_TRUE(fly_until([&] { return procedure()["step"] == "search_anchors"; }, 60));
+  EXPECT_LT((drone_->autopilot.vehicle().position_m() - Eigen::Vector3d(-7, -5.6, 4)).norm(), 1.0);
+  ASSERT_EQ(act("land", lease).status, 202);
+  EXPECT_TRUE(fly_until([&] { return procedure()["status"] == "done"; }, 60));
+  EXPECT_FALSE(drone_->autopilot.vehicle().armed());
+  EXPECT_EQ(act("hold", lease).status, 422) << "nothing flies any more";
+}
+
+TEST_F(Flights, OnlyOneHasControl) {
+  const auto lease = take_off();
+  EXPECT_EQ(post(base() + "/control", R"({"action":"take"})").status, 409);
+  EXPECT_EQ(act("hold", "0197a3b0-5d10-7b1e-9c55-0a1b2c3d4e5f").status, 409);
+  EXPECT_EQ(act("hold", "").status, 409);
+  EXPECT_EQ(json(act("hold", "")).value("type", ""), "/problems/no-control");
+  Call viewer;
+  viewer.roles = {api::Role::viewer};
+  EXPECT_EQ(
+      call(api::Method::post, base() + "/actions", R"({"action":"hold","lease":")" + lease + "\"}", viewer)
+          .status,
+      403);
+  EXPECT_EQ(procedure()["status"], "running");
+  const std::string second = control(R"({"action":"take","force":true})")["lease"];
+  EXPECT_EQ(act("hold", lease).status, 409) << "the first one lost it";
+  EXPECT_EQ(act("hold", second).status, 202);
+  EXPECT_EQ(control(R"({"action":"release","lease":")" + second + "\"}")["held"], false);
+  EXPECT_EQ(json(get(base() + "/control"))["held"], false);
+  const auto audit = database_->access().audit(100);
+  ASSERT_TRUE(audit);
+  int refused = 0, done = 0;
+  for (const auto& entry : audit.value()) {
+    refused += entry.what.rfind("mission.hold", 0) == 0 && entry.result != "ok";
+    done += entry.what.rfind("mission.hold", 0) == 0 && entry.result == "ok";
+  }
+  EXPECT_EQ(done, 1);
+  EXPECT_EQ(refused, 4);
+}
+
+TEST_F(Flights, ACommandWithoutAnAnswerIsNotConfirmedWithinTwoSeconds) {
+  const auto lease = take_off();
+  drone_->link_down = true;
+  const auto hold = act("hold", lease);
+  fly(2.4);
+  EXPECT_EQ(command_state(json(hold)["number"]), "unconfirmed");
+}
+
+TEST_F(Flights, AKilledServerTellsTheAircraftToHoldBeforeAnythingElse) {
+  take_off();
+  fly(2);
+  const int holds = drone_->holds;
+  // Killed: no farewell; the stored state is all there is.
+  drone_->targets.clear();
+  const double at = drone_->now;
+  app_.reset();
+  database_.reset();
+  const int farewell = drone_->holds - holds;
+  EXPECT_EQ(farewell, 1) << "an orderly stop says hold as well";
+  open();
+  fly(0.5);
+  EXPECT_GT(drone_->holds, holds + farewell);
+  EXPECT_EQ(procedure()["status"], "hold");
+  EXPECT_NE(procedure()["reason"].get<std::string>().find("restarted"), std::string::npos);
+  fly(5);
+  EXPECT_TRUE(drone_->targets.empty()) << "nothing is flown to before the operator says so";
+  const std::string lease = control(R"({"action":"take","force":true})")["lease"];
+  ASSERT_EQ(act("resume", lease).status, 202);
+  fly(1);
+  EXPECT_FALSE(drone_->targets.empty());
+  EXPECT_GT(drone_->now, at);
+}
+
+TEST_F(Flights, WhenThePilotTakesOverNothingIsSentUntilTheOperatorTakesItBack) {
+  const auto lease = take_off();
+  fly(4);
+  drone_->autopilot.pilot_takes_over(5);  // LOITER
+  fly(3);
+  EXPECT_EQ(procedure()["status"], "hold");
+  EXPECT_EQ(drone_->autopilot.custom_mode(), 5u) << "the pilot's mode stays";
+  drone_->targets.clear();
+  fly(3);
+  EXPECT_TRUE(drone_->targets.empty());
+  ASSERT_EQ(act("resume", lease).status, 202);
+  fly(2);
+  EXPECT_FALSE(drone_->targets.empty());
+  EXPECT_EQ(drone_->session.status().mode, "GUIDED");
+}
+
+TEST_F(Flights, WithoutAnAircraftToCommandThePilotIsShownWhereToGo) {
+  with_drone_ = false;
+  app_.reset();
+  database_.reset();
+  open();
+  mission_ = mission();
+  const auto plan = make_plan();
+  fly(12);
+  check_everything();
+  const std::string lease = control()["lease"];
+  const auto started = act("start", lease, R"(,"plan":")" + plan + '"');
+  ASSERT_EQ(started.status, 202) << started.body;
+  EXPECT_EQ(json(started)["state"], "accepted");
+  // The pilot takes off by hand and flies to the point that is shown.
+  auto& vehicle = drone_->autopilot.vehicle();
+  vehicle.arm();
+  vehicle.take_off(4);
+  EXPECT_TRUE(fly_until([&] { return procedure()["step"] == "go_to_waypoint"; }, 60)) << procedure().dump(1);
+  const auto target = procedure()["target"]["enu_m"];
+  EXPECT_EQ(procedure()["mode"], "manual");
+  vehicle.go_to(Eigen::Vector3d(target[0].get<double>(), target[1].get<double>(), target[2].get<double>()),
+                std::nullopt);
+  EXPECT_TRUE(fly_until([&] { return procedure()["step"] == "search_anchors"; }, 60)) << procedure().dump(1);
+}
+
+}  // namespace
+}  // namespace anchord::test
