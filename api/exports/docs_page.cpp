@@ -1,5 +1,6 @@
 #include "api/exports/docs_page.hpp"
 
+#include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <vector>
@@ -121,7 +122,8 @@ std::string operation_of(const std::string& method, const std::string& path, con
   if (const auto body = operation.find("requestBody"); body != operation.end())
     out += "<p>Body: " + contents(body->value("content", Ordered::object())) + "</p>\n";
   out += "<ul>\n";
-  for (const auto& [status, answer] : operation.value("responses", Ordered::object()).items()) {
+  const Ordered responses = operation.value("responses", Ordered::object());  // items() refers to it
+  for (const auto& [status, answer] : responses.items()) {
     out += "<li><b>" + escaped(status) + "</b> ";
     if (const auto ref = answer.find("$ref"); ref != answer.end())
       out += escaped(last_part(ref->get<std::string>()));
