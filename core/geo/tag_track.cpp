@@ -75,6 +75,8 @@ TagPoint interpolate(const TrackPose& before, const TrackPose& after, double t_s
   if (before.attitude && after.attitude) {
     const Eigen::Quaterniond now = before.attitude->slerp(share, *after.attitude);
     point.body_up = now * Eigen::Vector3d::UnitZ();
+    point.body_forward = now * Eigen::Vector3d::UnitX();
+    point.body_left = now * Eigen::Vector3d::UnitY();
     arm = now * lever_arm_body_m;
     arm_before = *before.attitude * lever_arm_body_m;
     arm_after = *after.attitude * lever_arm_body_m;

@@ -33,7 +33,9 @@ struct TagPoint {
   TrackRefusal refused{TrackRefusal::none};
   Eigen::Vector3d position_m{0, 0, 0};  ///< of the antenna
   Eigen::Vector3d velocity_mps{0, 0, 0};
-  Eigen::Vector3d body_up{0, 0, 1};  ///< unit vector, for the vertical antenna offset
+  Eigen::Vector3d body_up{0, 0, 1};       ///< unit vector, for the vertical antenna offset
+  Eigen::Vector3d body_forward{0, 0, 0};  ///< unit vector; zero where attitude is unknown
+  Eigen::Vector3d body_left{0, 0, 0};
   Eigen::Matrix3d covariance_m2{Eigen::Matrix3d::Zero()};
 };
 

@@ -37,6 +37,12 @@ const Fix* origin_fix(const std::vector<Fix>& fixes, FixClass min_fix) {
   return best;
 }
 
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
 bool usable(const Fix& fix, TrackFrame frame) {
   if (fix.frame != frame || fix.fix == FixClass::none) return false;
   if (frame == TrackFrame::local) return fix.local_m.allFinite() && fix.local_m.norm() < 1e6;
@@ -65,8 +71,8 @@ Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& op
       return make_error(Errc::too_few_observations, "no position within 20 km of the origin");
   }
   const UtcTime epoch = std::ranges::min_element(fixes, {}, &Fix::time)->time;
-  FlightRows rows{epoch, frame, TagTrack(fixes, frame, epoch, {options.min_fix, options.max_gap_s}),
-                  {},    {},    0};
+  FlightRows rows{epoch, frame, TagTrack(fixes, frame, epoch, {options.min_fix, options.max_gap_s}), {}, {},
+                  {},    0};
   rows.track_span_s = rows.track.poses().back().t_s - rows.track.poses().front().t_s;
   bool arm_across = false;
   for (const auto& tag : flight.mission.tags)
@@ -80,8 +86,13 @@ Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& op
   }
   std::map<NetworkId, AnchorRows> anchors;
   std::set<std::tuple<std::int64_t, NetworkId, std::uint8_t, NetworkId, std::optional<std::uint64_t>>> seen;
+  std::map<std::pair<NetworkId, NetworkId>, std::vector<double>> between;
   for (const Range& range : flight.ranges) {
-    if (range.kind != RangeKind::tag_anchor) continue;
+    if (range.kind == RangeKind::anchor_anchor) {
+      if (refusal(range, options).empty() && range.tag != range.anchor)
+        between[std::minmax(range.tag, range.anchor)].push_back(range.distance_m);
+      continue;
+    }
     AnchorRows& anchor = anchors[range.anchor];
     std::string why = refusal(range, options);
     const auto arm = lever_arm(flight.mission, range);
@@ -103,6 +114,17 @@ Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& op
     anchor.name = name != flight.anchor_names.end() ? name->second : to_string(id);
     std::ranges::stable_sort(anchor.rows, {}, &JointRow::t_s);
     rows.anchors.push_back(std::move(anchor));
+  }
+  for (auto& [ids, distances_m] : between) {
+    const auto a = std::ranges::find(rows.anchors, ids.first, &AnchorRows::id);
+    const auto b = std::ranges::find(rows.anchors, ids.second, &AnchorRows::id);
+    if (a == rows.anchors.end() || b == rows.anchors.end()) continue;
+    PairRow pair{static_cast<std::size_t>(a - rows.anchors.begin()),
+                 static_cast<std::size_t>(b - rows.anchors.begin()), median(distances_m),
+                 options.pair_sigma_m, distances_m.size()};
+    for (double& d : distances_m) d = std::abs(d - pair.distance_m);
+    pair.sigma_m = std::max(pair.sigma_m, 1.4826 * median(distances_m));
+    rows.pairs.push_back(pair);
   }
   return rows;
 }

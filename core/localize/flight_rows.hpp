@@ -28,12 +28,21 @@ struct AnchorRows {
   std::map<std::string, std::size_t> refused;
 };
 
+/// Ranges between two anchors, repeats made one: what stands still says the same thing again and again.
+struct PairRow {
+  std::size_t a{}, b{};  ///< indices into FlightRows::anchors
+  double distance_m{};   ///< median
+  double sigma_m{};      ///< FlightOptions::pair_sigma_m, or the repeats' spread where that is wider
+  std::size_t n{};
+};
+
 /// A flight ready to be solved.
 struct FlightRows {
   UtcTime epoch{};
   std::optional<EnuFrame> frame;  ///< absent: local metres
   TagTrack track;
   std::vector<AnchorRows> anchors;
+  std::vector<PairRow> pairs;  ///< between anchors the tag heard too
   std::vector<std::string> notes;
   double track_span_s{};
 };

@@ -69,6 +69,14 @@ FlightSolution describe(const Work& work, const FlightData& flight, const Flight
   solution.shared.curve_m = valued(k_shared_curve);
   solution.shared.lag_s = valued(k_shared_lag);
   solution.shared.lever_up_m = valued(k_shared_lever);
+  if (options.lever_across_prior_m > 0) {
+    solution.shared.lever_forward_m = valued(k_shared_forward);
+    solution.shared.lever_left_m = valued(k_shared_left);
+  }
+  if (!work.rows.pairs.empty()) {
+    solution.notes.push_back(std::to_string(work.rows.pairs.size()) +
+                             " distances between anchors took part in the solve");
+  }
   solution.shared.bias_z = work.gate.z;
   solution.shared.bias_determined = options.fixed_bias_m || work.gate.known;
   if (!solution.shared.bias_determined) {

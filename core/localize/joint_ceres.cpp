@@ -22,13 +22,13 @@ class AnchorRanges final : public ceres::CostFunction {
                const FlightOptions& options, std::vector<double> sigma_m)
       : flight_(flight), rows_(rows), options_(options), kappa_(block.kappa), sigma_m_(std::move(sigma_m)) {
     mutable_parameter_block_sizes()->push_back(4);
-    mutable_parameter_block_sizes()->push_back(4);
+    mutable_parameter_block_sizes()->push_back(6);
     set_num_residuals(static_cast<int>(rows.rows.size()) + 1);
   }
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     const Eigen::Map<const Eigen::Vector4d> own(parameters[0]);
-    const Eigen::Map<const Eigen::Vector4d> shared(parameters[1]);
+    const Eigen::Map<const SharedVector> shared(parameters[1]);
     const JointState::Anchor anchor{own.head<3>(), own[3], true};
     double* by_own = jacobians ? jacobians[0] : nullptr;
     double* by_shared = jacobians ? jacobians[1] : nullptr;
@@ -51,11 +51,11 @@ class AnchorRanges final : public ceres::CostFunction {
         slope = scale * (size > 1e-12 ? value.weight * std::abs(e) / size : 1.0) / sigma_m_[i];
       }
       if (by_own) Eigen::Map<Eigen::Vector4d>(by_own + 4 * i) = -slope * line.by_anchor;
-      if (by_shared) Eigen::Map<Eigen::Vector4d>(by_shared + 4 * i) = -slope * line.by_shared;
+      if (by_shared) Eigen::Map<SharedVector>(by_shared + 6 * i) = -slope * line.by_shared;
     }
     residuals[n] = own[3] / options_.delay_prior_m;
     if (by_own) Eigen::Map<Eigen::Vector4d>(by_own + 4 * n) << 0, 0, 0, 1.0 / options_.delay_prior_m;
-    if (by_shared) Eigen::Map<Eigen::Vector4d>(by_shared + 4 * n).setZero();
+    if (by_shared) Eigen::Map<SharedVector>(by_shared + 6 * n).setZero();
     return true;
   }
 
@@ -68,23 +68,22 @@ class AnchorRanges final : public ceres::CostFunction {
 };
 
 /// The Gaussian prior on the shared unknowns: L^T (phi - mu) with information = L L^T.
-class SharedTerm final : public ceres::SizedCostFunction<4, 4> {
+class SharedTerm final : public ceres::SizedCostFunction<6, 6> {
  public:
   explicit SharedTerm(const SharedPrior& prior) : mean_(prior.mean) {
-    root_ = Eigen::Matrix4d(prior.information.llt().matrixL()).transpose();
+    root_ = SharedMatrix(prior.information.llt().matrixL()).transpose();
   }
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    Eigen::Map<Eigen::Vector4d>{residuals} =
-        root_ * (Eigen::Map<const Eigen::Vector4d>(parameters[0]) - mean_);
+    Eigen::Map<SharedVector>{residuals} = root_ * (Eigen::Map<const SharedVector>(parameters[0]) - mean_);
     if (jacobians && jacobians[0]) {
-      Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>{jacobians[0]} = root_;
+      Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>{jacobians[0]} = root_;
     }
     return true;
   }
 
  private:
-  Eigen::Vector4d mean_;
-  Eigen::Matrix4d root_;
+  SharedVector mean_;
+  SharedMatrix root_;
 };
 
 /// Sigma of every row: the anchor's residual scale, widened by what its position is worse than usual.
@@ -107,9 +106,11 @@ Result<JointState> polish_joint_ceres(const FlightRows& flight, JointState state
     if (options.canceled && options.canceled()) return make_error(Errc::canceled, "canceled");
     const JointNormal normal = build_normal(flight, state, options, 0.0);
     ceres::Problem problem;
-    Eigen::Vector4d shared = state.shared;
+    SharedVector shared = state.shared;
     std::vector<Four> own(state.anchors.size());
-    problem.AddParameterBlock(shared.data(), 4);
+    problem.AddParameterBlock(shared.data(), 6);
+    if (options.lever_across_prior_m <= 0)
+      problem.SetManifold(shared.data(), new ceres::SubsetManifold(6, {k_shared_forward, k_shared_left}));
     problem.AddResidualBlock(new SharedTerm(prior), nullptr, shared.data());
     auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
     ordering->AddElementToGroup(shared.data(), 1);

@@ -28,7 +28,7 @@ double duration_s(const std::vector<double>& times_s) {
 }
 
 void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointState::Anchor& anchor,
-                  const Eigen::Vector4d& shared, const FlightOptions& options, double scale_floor_m,
+                  const SharedVector& shared, const FlightOptions& options, double scale_floor_m,
                   double kept_scale_m, double common_scale_m, AnchorBlock& block, JointNormal& normal) {
   std::vector<JointLine> lines;
   std::vector<double> sizes, times_s, position_variances;
@@ -96,13 +96,15 @@ double robust_weight(double residual_over_scale, const FlightOptions& options) {
 
 double range_curve(double distance_m) { return std::log(std::max(distance_m, k_hinge_m) / k_hinge_m); }
 
-JointLine linearise(const TagTrack& track, const JointRow& row, const Eigen::Vector4d& shared,
+JointLine linearise(const TagTrack& track, const JointRow& row, const SharedVector& shared,
                     const JointState::Anchor& anchor) {
   JointLine line;
   const TagPoint point = track.at(row.t_s + shared[k_shared_lag], row.lever_arm_body_m);
   line.refused = point.refused;
   if (point.refused != TrackRefusal::none) return line;
-  const Eigen::Vector3d antenna = point.position_m + shared[k_shared_lever] * point.body_up;
+  const Eigen::Vector3d antenna = point.position_m + shared[k_shared_lever] * point.body_up +
+                                  shared[k_shared_forward] * point.body_forward +
+                                  shared[k_shared_left] * point.body_left;
   line.antenna_m = antenna;
   const Eigen::Vector3d difference = antenna - anchor.position_m;
   const double distance_m = std::max(difference.norm(), 1e-6);
@@ -116,6 +118,8 @@ JointLine linearise(const TagTrack& track, const JointRow& row, const Eigen::Vec
   line.by_shared[k_shared_curve] = curve;
   line.by_shared[k_shared_lag] = slope * u.dot(point.velocity_mps);
   line.by_shared[k_shared_lever] = slope * u.dot(point.body_up);
+  line.by_shared[k_shared_forward] = slope * u.dot(point.body_forward);
+  line.by_shared[k_shared_left] = slope * u.dot(point.body_left);
   line.position_variance_m2 = std::max(u.dot(point.covariance_m2 * u), 0.0);
   return line;
 }
@@ -158,13 +162,14 @@ JointNormal build_normal(const FlightRows& flight, const JointState& state, cons
 }
 
 std::vector<Observation> observations_of(const FlightRows& flight, const AnchorRows& anchor,
-                                         const Eigen::Vector4d& shared, std::size_t most, double sigma_m) {
+                                         const SharedVector& shared, std::size_t most, double sigma_m) {
   std::vector<Observation> all;
   for (const JointRow& row : anchor.rows) {
     const TagPoint point = flight.track.at(row.t_s + shared[k_shared_lag], row.lever_arm_body_m);
     if (point.refused != TrackRefusal::none) continue;
     Observation o;
-    o.tag_m = point.position_m + shared[k_shared_lever] * point.body_up;
+    o.tag_m = point.position_m + shared[k_shared_lever] * point.body_up +
+              shared[k_shared_forward] * point.body_forward + shared[k_shared_left] * point.body_left;
     o.distance_m = row.distance_m - shared[k_shared_bias];
     o.distance_m -= shared[k_shared_curve] * range_curve(o.distance_m);
     o.sigma_m = sigma_m;

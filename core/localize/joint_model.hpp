@@ -11,13 +11,13 @@ namespace anchord {
 
 /// Gaussian knowledge of the shared unknowns (order: kit_profile.hpp).
 struct SharedPrior {
-  Eigen::Vector4d mean{Eigen::Vector4d::Zero()};
-  Eigen::Matrix4d information{Eigen::Matrix4d::Identity()};
+  SharedVector mean{SharedVector::Zero()};
+  SharedMatrix information{SharedMatrix::Identity()};
 };
 
 /// Point in the space of all unknowns.
 struct JointState {
-  Eigen::Vector4d shared{Eigen::Vector4d::Zero()};
+  SharedVector shared{SharedVector::Zero()};
   struct Anchor {
     Eigen::Vector3d position_m{0, 0, 0};
     double delay_m{0};
@@ -35,10 +35,10 @@ struct JointLine {
   double residual_m{};
   Eigen::Vector3d antenna_m{0, 0, 0};  ///< where the tag antenna was
   Eigen::Vector4d by_anchor{Eigen::Vector4d::Zero()};
-  Eigen::Vector4d by_shared{Eigen::Vector4d::Zero()};
+  SharedVector by_shared{SharedVector::Zero()};
   double position_variance_m2{};  ///< of the track along the line of sight
 };
-JointLine linearise(const TagTrack& track, const JointRow& row, const Eigen::Vector4d& shared,
+JointLine linearise(const TagTrack& track, const JointRow& row, const SharedVector& shared,
                     const JointState::Anchor& anchor);
 
 /// Robust weight, 0..1, of a residual against its scale, by the loss of the options.
@@ -46,8 +46,8 @@ double robust_weight(double residual_over_scale, const FlightOptions& options);
 
 /// Normal equations of one round in the shape they have: an arrow. Robust weights and tempering are inside.
 struct AnchorBlock {
-  Eigen::Matrix4d own{Eigen::Matrix4d::Zero()};     ///< (x, d) against itself, prior on d included
-  Eigen::Matrix4d shared{Eigen::Matrix4d::Zero()};  ///< (x, d) against the shared
+  Eigen::Matrix4d own{Eigen::Matrix4d::Zero()};  ///< (x, d) against itself, prior on d included
+  Eigen::Matrix<double, 4, 6> shared{Eigen::Matrix<double, 4, 6>::Zero()};  ///< (x, d) against the shared
   Eigen::Vector4d gradient{Eigen::Vector4d::Zero()};
   Eigen::Matrix4d own_inverse{Eigen::Matrix4d::Zero()};
   double scale_m{};  ///< 1.4826 MAD, never below the floor
@@ -61,20 +61,29 @@ struct AnchorBlock {
 };
 struct JointNormal {
   std::vector<AnchorBlock> anchors;
-  Eigen::Matrix4d shared{Eigen::Matrix4d::Zero()};  ///< of the likelihood alone, before elimination
-  Eigen::Vector4d shared_gradient{Eigen::Vector4d::Zero()};
-  Eigen::Matrix4d reduced{Eigen::Matrix4d::Zero()};  ///< Schur complement over x and d, without the prior
-  Eigen::Vector4d reduced_gradient{Eigen::Vector4d::Zero()};
+  SharedMatrix shared{SharedMatrix::Zero()};  ///< of the likelihood alone, before elimination
+  SharedVector shared_gradient{SharedVector::Zero()};
+  SharedMatrix reduced{SharedMatrix::Zero()};  ///< Schur complement over x and d, without the prior
+  SharedVector reduced_gradient{SharedVector::Zero()};
 };
 /// scales_from  residual scales to keep instead of measuring them anew
 JointNormal build_normal(const FlightRows& flight, const JointState& state, const FlightOptions& options,
                          double scale_floor_m, const JointNormal* scales_from = nullptr);
 
+/// The whole normal equations, 4 rows for each anchor in order, then the shared: what ranges between anchors
+/// couple no longer has the shape of an arrow. Prior on the shared included.
+struct DenseNormal {
+  Eigen::MatrixXd matrix;
+  Eigen::VectorXd gradient;
+};
+DenseNormal dense_normal(const FlightRows& flight, const JointState& state, const JointNormal& normal,
+                         const SharedPrior& prior, const FlightOptions& options);
+
 /// Answer of the iteration.
 struct JointFit {
   JointState state;
   JointNormal normal;  ///< at the state
-  Eigen::Matrix4d shared_covariance{Eigen::Matrix4d::Zero()};
+  SharedMatrix shared_covariance{SharedMatrix::Zero()};
   std::vector<Eigen::Matrix4d> anchor_covariance;  ///< (x, d) of each anchor, everything else marginalised
   int rounds{};
   bool converged{false};
@@ -95,6 +104,6 @@ JointState joint_start(const FlightRows& flight, const SharedPrior& prior, const
 /// Rows of one anchor at given shared values, thinned to at most `most`, with the range curve and bias taken
 /// off.
 std::vector<Observation> observations_of(const FlightRows& flight, const AnchorRows& anchor,
-                                         const Eigen::Vector4d& shared, std::size_t most, double sigma_m);
+                                         const SharedVector& shared, std::size_t most, double sigma_m);
 
 }  // namespace anchord

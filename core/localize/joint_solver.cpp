@@ -70,7 +70,8 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
   JointFit fit;
   fit.state = start;
   // The Gauss-Newton rounds bring every method near; Ceres then does the rest where it is asked for.
-  const bool by_ceres = options.method != Method::gauss_newton;
+  // Ranges between anchors are solved here whatever the method: their network is small and dense.
+  const bool by_ceres = options.method != Method::gauss_newton && flight.pairs.empty();
   const int most_rounds = by_ceres ? 5 : k_max_rounds;
   struct Pace {
     Eigen::Vector3d last_m{0, 0, 0};
@@ -85,21 +86,31 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
     fit.normal = build_normal(flight, fit.state, options, floor_m,
                               fit.rounds > k_scale_rounds ? &fit.normal : nullptr);
     const JointNormal& normal = fit.normal;
-    const Eigen::Matrix4d system = normal.reduced + prior.information;
-    const Eigen::Vector4d right =
-        normal.reduced_gradient + prior.information * (prior.mean - fit.state.shared);
-    Eigen::Vector4d step = system.ldlt().solve(right);
+    const bool coupled = !flight.pairs.empty();
+    Eigen::VectorXd all_steps;
+    SharedVector step;
+    if (coupled) {
+      const DenseNormal dense = dense_normal(flight, fit.state, normal, prior, options);
+      all_steps = dense.matrix.ldlt().solve(dense.gradient);
+      step = all_steps.tail<6>();
+    } else {
+      const SharedMatrix system = normal.reduced + prior.information;
+      step =
+          system.ldlt().solve(normal.reduced_gradient + prior.information * (prior.mean - fit.state.shared));
+    }
     if (!step.allFinite()) step.setZero();
     step[k_shared_bias] = clipped(step[k_shared_bias], 0.5);
     step[k_shared_curve] = clipped(step[k_shared_curve], 0.05);
     step[k_shared_lag] = clipped(step[k_shared_lag], 0.1);
-    step[k_shared_lever] = clipped(step[k_shared_lever], 0.1);
+    for (const int arm : {k_shared_lever, k_shared_forward, k_shared_left})
+      step[arm] = clipped(step[arm], 0.1);
     double largest = step.cwiseAbs().maxCoeff();
     for (std::size_t i = 0; i < fit.state.anchors.size(); ++i) {
       auto& anchor = fit.state.anchors[i];
       if (!anchor.active) continue;
       const AnchorBlock& block = normal.anchors[i];
-      Eigen::Vector4d own = block.own_inverse * (block.gradient - block.shared * step);
+      Eigen::Vector4d own = coupled ? Eigen::Vector4d(all_steps.segment<4>(4 * static_cast<Eigen::Index>(i)))
+                                    : block.own_inverse * (block.gradient - block.shared * step);
       const double length = own.head<3>().norm();
       if (!own.allFinite()) continue;
       if (length > 1.0) own *= 1.0 / length;
@@ -125,9 +136,18 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
     const JointNormal scales = std::move(fit.normal);
     fit.normal = build_normal(flight, fit.state, options, 0.0, &scales);
   }
+  if (!flight.pairs.empty()) {
+    const DenseNormal dense = dense_normal(flight, fit.state, fit.normal, prior, options);
+    const Eigen::Index n = dense.matrix.rows() - 6;
+    const Eigen::MatrixXd covariance = dense.matrix.inverse();
+    fit.shared_covariance = covariance.bottomRightCorner<6, 6>();
+    fit.normal.reduced = fit.shared_covariance.inverse() - prior.information;
+    for (Eigen::Index i = 0; i < n; i += 4) fit.anchor_covariance.emplace_back(covariance.block<4, 4>(i, i));
+    return fit;
+  }
   fit.shared_covariance = (fit.normal.reduced + prior.information).inverse();
   for (const AnchorBlock& block : fit.normal.anchors) {
-    const Eigen::Matrix4d lever = block.own_inverse * block.shared;
+    const Eigen::Matrix<double, 4, 6> lever = block.own_inverse * block.shared;
     fit.anchor_covariance.push_back(block.own_inverse + lever * fit.shared_covariance * lever.transpose());
   }
   return fit;

@@ -32,6 +32,6 @@ SharedPrior profile_prior(std::span<const ProfileFactor> others, const BiasGate&
                           const FlightOptions& options);
 
 /// One sigma of each shared unknown.
-Eigen::Vector4d prior_sigmas(const SharedPrior& prior);
+SharedVector prior_sigmas(const SharedPrior& prior);
 
 }  // namespace anchord

@@ -19,6 +19,15 @@ Eigen::Matrix4d base_information(const FlightOptions& options, double bias_sigma
       .asDiagonal();
 }
 
+/// Nothing but what is held or known about the arm's forward and left part.
+SharedPrior across_prior(const FlightOptions& options) {
+  SharedPrior prior;
+  const double sigma_m = options.lever_across_prior_m > 0 ? options.lever_across_prior_m : 1e-6;
+  prior.information(k_shared_forward, k_shared_forward) = 1.0 / square(sigma_m);
+  prior.information(k_shared_left, k_shared_left) = 1.0 / square(sigma_m);
+  return prior;
+}
+
 struct Sum {
   Eigen::Matrix4d information{Eigen::Matrix4d::Zero()};
   Eigen::Vector4d information_mean{Eigen::Vector4d::Zero()};
@@ -27,9 +36,18 @@ struct Sum {
 }  // namespace
 
 ProfileFactor profile_factor(const JointFit& fit, const SharedPrior& prior, const std::string& flight) {
-  const Eigen::Matrix4d& s = fit.normal.reduced;
+  // The arm's forward and left part belong to this flight: marginalised with their prior, the rest without.
+  SharedMatrix own_prior = SharedMatrix::Zero();
+  own_prior.bottomRightCorner<2, 2>() = prior.information.bottomRightCorner<2, 2>();
   // At the optimum the gradient of likelihood and prior cancel: S phi_f = (S + P) phi - P mu.
-  const Eigen::Vector4d eta = (s + prior.information) * fit.state.shared - prior.information * prior.mean;
+  const SharedMatrix& likelihood = fit.normal.reduced;
+  const SharedVector eta_all = (likelihood + prior.information) * fit.state.shared -
+                               prior.information * prior.mean + own_prior * prior.mean;
+  const SharedMatrix m = likelihood + own_prior;
+  const Eigen::Matrix<double, 4, 2> gain_across =
+      m.topRightCorner<4, 2>() * m.bottomRightCorner<2, 2>().inverse();
+  const Eigen::Matrix4d s = m.topLeftCorner<4, 4>() - gain_across * m.bottomLeftCorner<2, 4>();
+  const Eigen::Vector4d eta = eta_all.head<4>() - gain_across * eta_all.tail<2>();
   const Eigen::Matrix4d wander_information = wander().inverse();
   const Eigen::Matrix4d gain = Eigen::Matrix4d::Identity() - s * (s + wander_information).inverse();
   ProfileFactor factor;
@@ -41,8 +59,8 @@ ProfileFactor profile_factor(const JointFit& fit, const SharedPrior& prior, cons
 }
 
 SharedPrior wide_prior(const FlightOptions& options) {
-  SharedPrior prior;
-  prior.information = base_information(options, options.bias_prior_m);
+  SharedPrior prior = across_prior(options);
+  prior.information.topLeftCorner<4, 4>() = base_information(options, options.bias_prior_m);
   if (options.fixed_bias_m) {
     prior.mean[k_shared_bias] = *options.fixed_bias_m;
     prior.information(k_shared_bias, k_shared_bias) = 1.0 / square(1e-4);
@@ -80,18 +98,18 @@ SharedPrior profile_prior(std::span<const ProfileFactor> others, const BiasGate&
     sum.information += factor.information;
     sum.information_mean += factor.information_mean;
   }
-  SharedPrior prior;
+  SharedPrior prior = across_prior(options);
   if (others.empty()) {
-    prior.information = sum.information;
+    prior.information.topLeftCorner<4, 4>() = sum.information;
     return prior;
   }
   const Eigen::Matrix4d covariance = sum.information.inverse();
-  prior.mean = covariance * sum.information_mean;
-  prior.information = (covariance + wander()).inverse();
+  prior.mean.head<4>() = covariance * sum.information_mean;
+  prior.information.topLeftCorner<4, 4>() = (covariance + wander()).inverse();
   return prior;
 }
 
-Eigen::Vector4d prior_sigmas(const SharedPrior& prior) {
+SharedVector prior_sigmas(const SharedPrior& prior) {
   return prior.information.inverse().diagonal().cwiseSqrt();
 }
 

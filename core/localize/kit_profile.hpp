@@ -11,6 +11,11 @@ inline constexpr int k_shared_bias = 0;
 inline constexpr int k_shared_curve = 1;
 inline constexpr int k_shared_lag = 2;
 inline constexpr int k_shared_lever = 3;
+/// Then, known to one flight alone and no part of a profile: the lever arm's forward and left part (m).
+inline constexpr int k_shared_forward = 4;
+inline constexpr int k_shared_left = 5;
+using SharedVector = Eigen::Matrix<double, 6, 1>;
+using SharedMatrix = Eigen::Matrix<double, 6, 6>;
 
 /// What one flight says about the shared unknowns, flight-to-flight wander already allowed for.
 struct ProfileFactor {

@@ -28,7 +28,8 @@ FlightData make_flight(const MadeFlight& m) {
       fix.position = frame.wgs84_from_enu({at});
     }
     fix.fix = FixClass::rtk_fixed;
-    fix.enu_from_body = Eigen::Quaterniond::Identity();
+    fix.enu_from_body =
+        Eigen::Quaterniond(Eigen::AngleAxisd(m.turn_rate_radps * t_s, Eigen::Vector3d::UnitZ()));
     flight.fixes.push_back(fix);
   }
   for (std::size_t a = 0; a < m.anchors.size(); ++a) {
@@ -39,9 +40,23 @@ FlightData make_flight(const MadeFlight& m) {
       range.time = UtcTime::from_seconds(t_s);
       range.tag = NetworkId{0x6e01};
       range.anchor = id;
-      const Eigen::Vector3d tag = path(m, t_s + m.lag_s) + Eigen::Vector3d(0, 0, m.lever_up_m);
+      const Eigen::AngleAxisd heading(m.turn_rate_radps * (t_s + m.lag_s), Eigen::Vector3d::UnitZ());
+      const Eigen::Vector3d tag =
+          path(m, t_s + m.lag_s) + heading * m.arm_error_m + Eigen::Vector3d(0, 0, m.lever_up_m);
       range.distance_m = (tag - m.anchors[a]).norm() + m.bias_m + m.noise_m * noise(random);
+      if (a < m.delays_m.size()) range.distance_m += m.delays_m[a];
       if (uniform(random) < m.nlos_share) range.distance_m += 0.3 + 1.7 * uniform(random);
+      flight.ranges.push_back(range);
+    }
+  }
+  for (std::size_t a = 0; m.pairs && a < m.anchors.size(); ++a) {
+    for (std::size_t b = 0; b < a; ++b) {
+      Range range;
+      range.kind = RangeKind::anchor_anchor;
+      range.time = UtcTime::from_seconds(1.0);
+      range.tag = NetworkId{static_cast<std::uint32_t>(0x6000 + b)};
+      range.anchor = NetworkId{static_cast<std::uint32_t>(0x6000 + a)};
+      range.distance_m = (m.anchors[a] - m.anchors[b]).norm() + 0.1 + 0.02 * noise(random);
       flight.ranges.push_back(range);
     }
   }

@@ -12,9 +12,13 @@ struct MadeFlight {
   std::vector<Eigen::Vector3d> anchors{{12, 2, 1.5}, {-10, 8, 6}, {3, -14, 2}, {-6, -9, 9}};
   double bias_m{0}, lag_s{0}, noise_m{0.05}, lever_up_m{0};
   double duration_s{120};
-  double height_swing_m{5};  ///< 0: one plane
-  double width_m{15};        ///< across; small: a line
-  double nlos_share{0};      ///< ranges with 0.3 to 2 m excess
+  double height_swing_m{5};              ///< 0: one plane
+  double width_m{15};                    ///< across; small: a line
+  double nlos_share{0};                  ///< ranges with 0.3 to 2 m excess
+  Eigen::Vector3d arm_error_m{0, 0, 0};  ///< the antenna against where it is declared, body frame
+  std::vector<double> delays_m;          ///< of each anchor; missing: none
+  double turn_rate_radps{0};             ///< of the heading, which otherwise stays east
+  bool pairs{false};                     ///< ranges between the anchors too, all 0.1 m long
   TrackFrame frame{TrackFrame::local};
   Wgs84 origin{50.8789, 4.7005, 80.0};
   std::uint64_t seed{1};

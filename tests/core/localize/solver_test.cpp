@@ -90,12 +90,12 @@ TEST(JointModel, JacobianMatchesFiniteDifferences) {
   const TagTrack track(fixes, std::nullopt, UtcTime{});
   const JointRow row{2.03, 9.0, {0.2, -0.4, 0.1}};
   JointState::Anchor anchor{{-6, 5, 2}, 0.02, true};
-  const Eigen::Vector4d shared(0.3, 0.05, 0.012, 0.04);
+  const SharedVector shared{{0.3, 0.05, 0.012, 0.04, 0.03, -0.05}};
   const JointLine line = linearise(track, row, shared, anchor);
   const double h = 1e-7;
-  for (int k = 0; k < 4; ++k) {
-    Eigen::Vector4d up = shared;
-    Eigen::Vector4d down = shared;
+  for (int k = 0; k < 6; ++k) {
+    SharedVector up = shared;
+    SharedVector down = shared;
     up[k] += h;
     down[k] -= h;
     const double numeric =
