@@ -2,10 +2,14 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <map>
 #include <optional>
+#include <vector>
 
+#include "core/base/ids.hpp"
 #include "core/base/result.hpp"
 #include "core/localize/kit_profile.hpp"
+#include "core/localize/side_clues.hpp"
 #include "core/localize/solver_options.hpp"
 #include "core/types/fix.hpp"
 
@@ -31,21 +35,27 @@ struct FlightOptions {
   double bias_gate_z{3.0};                ///< below: calibrated
   double bias_known_sigma_m{
       0.1};  ///< a flight (with profile) that knows its bias worse than this cannot tell
-  double unknown_bias_prior_m{0.3};  ///< then: between calibrated (0) and not (0.7), and the regions show it
-  double delay_prior_m{0.06};        ///< unit to unit; a free one is fatal in small volumes
-  double curve_prior_m{0.03};        ///< leading edge moves with received power
-  double lag_prior_s{0.2};           ///< stamping delay
-  double lever_prior_m{0.1};         ///< body z only: x, y are confounded with the lag
-  double lever_across_prior_m{0};    ///< body x and y; 0: held at the declared arm. Only where heading and
-                                     ///< course differ can it be told from the lag
-  double pair_sigma_m{0.1};          ///< of a range between two anchors, whatever its repeats say
-  double pair_bias_prior_m{0.3};     ///< common to all ranges between anchors
+  double unknown_bias_prior_m{0.28};  ///< then: between calibrated (0) and not (0.7), and the regions show it
+  double delay_prior_m{0.06};         ///< unit to unit; a free one is fatal in small volumes
+  double curve_prior_m{0.03};         ///< leading edge moves with received power
+  double lag_prior_s{0.2};            ///< stamping delay
+  double lever_prior_m{0.1};          ///< body z only: x, y are confounded with the lag
+  double lever_across_prior_m{0};     ///< body x and y; 0: held at the declared arm. Only where heading and
+                                      ///< course differ can it be told from the lag
+  double pair_sigma_m{0.1};           ///< of a range between two anchors, whatever its repeats say
+  double pair_bias_prior_m{0.3};      ///< common to all ranges between anchors
   std::optional<double> fixed_bias_m{};  ///< no estimate: this bias is given
 
   double mad_factor{0.6};  ///< Tukey cut-off = 4.685 x this x scale; below 1 is what late clusters need
   double min_scale_m{0.02};
-  double correlation_s{7.0};   ///< errors stay alike this long (0.6 to 29 s seen); tempers the likelihood
+  double correlation_s{7.5};   ///< errors stay alike this long (0.6 to 29 s seen); tempers the likelihood
   double floor_sigma_m{0.04};  ///< per axis: frame, lever arm; no residual shows it
+
+  std::map<NetworkId, AnchorClues> clues{};  ///< which side an anchor is on, beside its ranges
+  std::vector<Eigen::Vector2d>
+      outline_m{};              ///< of the building, in the frame of the answers: anchors are inside
+  double outline_sigma_m{1.0};  ///< of that; walls are thick and outlines drawn by hand
+  std::optional<double> level_sigma_db{};  ///< of RSS about the turn profile; absent: RSS is no clue
 
   std::optional<Wgs84> origin{};  ///< of the ENU answers; absent: the first fix good enough
   std::optional<KitProfile> profile{};

@@ -87,7 +87,8 @@ Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& op
   std::map<NetworkId, AnchorRows> anchors;
   std::set<std::tuple<std::int64_t, NetworkId, std::uint8_t, NetworkId, std::optional<std::uint64_t>>> seen;
   std::map<std::pair<NetworkId, NetworkId>, std::vector<double>> between;
-  for (const Range& range : flight.ranges) {
+  for (std::size_t i = 0; i < flight.ranges.size(); ++i) {
+    const Range& range = flight.ranges[i];
     if (range.kind == RangeKind::anchor_anchor) {
       if (refusal(range, options).empty() && range.tag != range.anchor)
         between[std::minmax(range.tag, range.anchor)].push_back(range.distance_m);
@@ -102,8 +103,9 @@ Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& op
       why = "duplicate";
     }
     if (why.empty()) {
-      anchor.rows.push_back(
-          {seconds_between(epoch, range.time), range.distance_m, *arm, range.tag, range.antenna});
+      anchor.rows.push_back({seconds_between(epoch, range.time), range.distance_m, *arm, range.tag,
+                             range.antenna, i < flight.beliefs.size() ? flight.beliefs[i] : std::nullopt,
+                             range.rss_dbm ? range.rss_dbm : range.rx_dbm});
     } else {
       ++anchor.refused[why];
     }

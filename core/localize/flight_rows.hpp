@@ -18,6 +18,8 @@ struct JointRow {
   Eigen::Vector3d lever_arm_body_m{0, 0, 0};
   NetworkId tag{};
   std::uint8_t antenna{0};
+  std::optional<RangeBelief> belief{};
+  std::optional<double> rss_dbm{};
 };
 
 /// All ranges of one anchor, ascending in time.

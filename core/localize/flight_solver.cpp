@@ -11,6 +11,10 @@
 namespace anchord {
 namespace {
 
+constexpr double k_arm_asked_m = 0.3;  // as wide as a wrong entry in a form
+constexpr double k_arm_z = 4.0;
+constexpr double k_arm_least_m = 0.1;
+
 /// One flight under way through the passes.
 struct Work {
   FlightRows rows;
@@ -55,6 +59,26 @@ std::string sentence(const char* format, double a, double b, double c) {
   return text;
 }
 
+/// What the ranges say about the forward and left part of the arm if it is not held: one Gauss-Newton step
+/// from the solution. An arm declared wrongly moves every anchor, and no residual looks large.
+std::optional<Gate> suspicious_arm(const Work& work, const FlightOptions& options) {
+  if (options.lever_across_prior_m > 0 || !work.rows.track.has_attitude()) return std::nullopt;
+  SharedMatrix prior = work.prior.information;
+  prior.bottomRightCorner<2, 2>() = Eigen::Matrix2d::Identity() / (k_arm_asked_m * k_arm_asked_m);
+  const SharedMatrix system = work.fit.normal.reduced + prior;
+  const SharedVector step = system.ldlt().solve(work.fit.normal.reduced_gradient +
+                                                prior * (work.prior.mean - work.fit.state.shared));
+  const Eigen::Matrix2d covariance = system.inverse().bottomRightCorner<2, 2>();
+  const Eigen::Vector2d arm_m = step.tail<2>();
+  const double z = std::sqrt(arm_m.dot(covariance.inverse() * arm_m));
+  if (!(z > k_arm_z) || arm_m.norm() < k_arm_least_m) return std::nullopt;
+  return Gate{
+      "lever_arm", z, k_arm_z, false,
+      sentence(
+          "the ranges speak against the declared lever arm: %+.2f m forward, %+.2f m left of it (%.1f sigma)",
+          arm_m.x(), arm_m.y(), z)};
+}
+
 FlightSolution describe(const Work& work, const FlightData& flight, const FlightOptions& options) {
   FlightSolution solution;
   solution.mission = flight.mission.id;
@@ -84,12 +108,15 @@ FlightSolution describe(const Work& work, const FlightData& flight, const Flight
         sentence("bias not determined by this flight, profile missing: %.3f m with sigma %.3f m (z %.1f)",
                  work.gate.bias_m, work.gate.sigma_m, work.gate.z));
   }
+  const auto arm = suspicious_arm(work, options);
+  if (arm) solution.notes.push_back(arm->why);
   if (!work.fit.converged) {
     solution.notes.push_back("the joint solve did not settle within " + std::to_string(work.fit.rounds) +
                              " rounds");
   }
   for (std::size_t i = 0; i < work.rows.anchors.size(); ++i) {
     AnchorSolution anchor = judge_anchor(work.rows, work.fit, i, options);
+    if (arm && anchor.estimate.best) anchor.estimate.gates.push_back(*arm);
     anchor.estimate.bias_m = solution.shared.bias_m.value + anchor.delay_m.value_or(0.0);
     anchor.estimate.bias_sigma_m =
         std::hypot(solution.shared.bias_m.sigma, anchor.delay_sigma_m.value_or(options.delay_prior_m));
@@ -155,6 +182,9 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
       if (same) continue;
       BOOST_OUTCOME_TRY(solve_with(all[i], priors[i], options));
     }
+  }
+  if (!options.fixed_bias_m) {
+    for (Work& work : all) add_doubt(work.fit, work.prior, work.gate);
   }
   if (profile) {
     profile->kit = all.empty() ? "" : all.front().kit;

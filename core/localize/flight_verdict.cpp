@@ -20,7 +20,33 @@ constexpr std::size_t k_min_used = 10;  // below, no scale can be told from the 
 constexpr double k_sigma_ratio = 0.08;  // sH/D above: undetermined (seen 0.083 and up; 0.078 passes)
 constexpr double k_sigma_ratio_marginal = 0.05;
 constexpr double k_twin_distance_m = 0.4;
-constexpr double k_twin_cost = 3.0;  // tempered; likelihood ratio 20
+constexpr double k_decided_odds = 1.0 / 99.0;  // beyond 99 % one place is the answer
+constexpr double k_twin_cost = 4.6;            // tempered: ln 99
+
+/// What the clues hold against a place; differences are log odds.
+class Clues {
+ public:
+  Clues(const FlightRows& flight, const JointFit& fit, std::size_t index, const FlightOptions& options)
+      : options_(options),
+        clues_(clues_of(flight.anchors[index].id, options)),
+        levels_(levels_of(flight, flight.anchors[index], fit.state.shared, options)) {
+    // As for ranges: so many levels in a correlation time say the same thing.
+    const AnchorBlock& block = fit.normal.anchors[index];
+    if (!levels_.empty())
+      alike_ = std::max(
+          1.0, block.kappa * static_cast<double>(levels_.size()) / static_cast<double>(block.n_in_track));
+  }
+  double cost(const Eigen::Vector3d& place_m) const {
+    const double told = clue_cost(clues_, options_.outline_m, options_.outline_sigma_m, place_m);
+    return told + (levels_.empty() ? 0.0 : level_cost(levels_, place_m, *options_.level_sigma_db) / alike_);
+  }
+
+ private:
+  const FlightOptions& options_;
+  AnchorClues clues_;
+  std::vector<LevelSample> levels_;
+  double alike_{1};
+};
 
 struct Twin {
   AnchorFit fit;
@@ -36,7 +62,7 @@ std::string text(const char* format, double a, double b, double c) {
 
 /// Other places that fit about as well, best first.
 std::vector<Twin> twins_of(const FlightRows& flight, const JointFit& fit, std::size_t index,
-                           const TrackShape& shape, const FlightOptions& options) {
+                           const TrackShape& shape, const Clues& clues, const FlightOptions& options) {
   const AnchorBlock& block = fit.normal.anchors[index];
   const Eigen::Vector3d solution = fit.state.anchors[index].position_m;
   const auto rows = observations_of(flight, flight.anchors[index], fit.state.shared, 400, block.scale_m);
@@ -71,7 +97,8 @@ std::vector<Twin> twins_of(const FlightRows& flight, const JointFit& fit, std::s
   for (const auto& start : starts) {
     auto there = polish(start);
     if (!there) continue;
-    const double worse = (there->cost - here->cost) * unit;
+    const double worse =
+        (there->cost - here->cost) * unit + clues.cost(there->position_m) - clues.cost(solution);
     const auto close = [&](const Eigen::Vector3d& p) {
       return (there->position_m - p).norm() < k_twin_distance_m;
     };
@@ -109,9 +136,26 @@ void fill_gdop(Estimate& estimate, const std::vector<Observation>& rows, const E
   estimate.gdop_trace = gdop.value().trace;
 }
 
+/// Covariance of an anchor's position were the shared bias known.
+Eigen::Matrix3d known_bias_covariance(const JointFit& fit, std::size_t index) {
+  const AnchorBlock& block = fit.normal.anchors[index];
+  const Eigen::Vector4d with_bias =
+      -block.own_inverse * (block.shared * fit.shared_covariance.col(k_shared_bias));
+  const Eigen::Matrix4d known =
+      fit.anchor_covariance[index] - with_bias * with_bias.transpose() /
+                                         std::max(fit.shared_covariance(k_shared_bias, k_shared_bias), 1e-12);
+  return known.topLeftCorner<3, 3>();
+}
+
+double horizontal_sigma_of(const Eigen::Matrix3d& covariance, const FlightOptions& options) {
+  const Eigen::Matrix3d with_floor =
+      covariance + Eigen::Matrix3d::Identity() * options.floor_sigma_m * options.floor_sigma_m;
+  return error_ellipse(with_floor).major_m / std::sqrt(5.991464547107979);
+}
+
 /// Twins, probabilities and the part of the position that stands.
 void judge_twins(const FlightRows& flight, AnchorSolution& solution, const std::vector<Twin>& twins,
-                 const GeometryReport& geometry) {
+                 const GeometryReport& geometry, const Clues& clues) {
   Estimate& estimate = solution.estimate;
   const Twin* twin = twins.empty() ? nullptr : &twins.front();
   if (!twin && geometry.kind != GeometryKind::coplanar) return;
@@ -131,10 +175,21 @@ void judge_twins(const FlightRows& flight, AnchorSolution& solution, const std::
     const Eigen::Vector3d reflected = geometry.shape.mirrored(estimate.best->position.m);
     estimate.reason =
         geometry.reason + "; the side of it the anchor is on is not determined, its height is uncertain";
-    if ((reflected - estimate.best->position.m).norm() < 0.1) return;
+    const double apart_m = (reflected - estimate.best->position.m).norm();
+    const double odds =
+        std::exp(-std::clamp(clues.cost(reflected) - clues.cost(estimate.best->position.m), -50.0, 50.0));
+    if (apart_m > k_twin_distance_m && odds < k_decided_odds) {
+      estimate.verdict = Verdict::ok;
+      estimate.reason.clear();
+      solution.determined = Determined::position;
+      estimate.best->probability = 1.0 / (1.0 + odds);
+      return;
+    }
+    if (apart_m < 0.1) return;
     estimate.mirror =
         hypothesis(flight, reflected, estimate.best->covariance_m2, estimate.best->rms_residual_m);
-    estimate.mirror->probability = estimate.best->probability = 0.5;
+    estimate.best->probability = 1.0 / (1.0 + odds);
+    estimate.mirror->probability = odds / (1.0 + odds);
     estimate.v95_m += std::abs(reflected.z() - estimate.best->position.m.z());
     return;
   }
@@ -212,15 +267,21 @@ AnchorSolution verdict_of(const FlightRows& flight, const JointFit& fit, std::si
   solution.determined = Determined::position;
   const double horizontal_sigma_m = ellipse.major_m / std::sqrt(5.991464547107979);
   solution.geometry.sigma_ratio = horizontal_sigma_m / geometry.median_range_m;
-  judge_twins(flight, solution, twins_of(flight, fit, index, geometry.shape, options), geometry);
-  if (geometry.kind == GeometryKind::collinear || solution.geometry.sigma_ratio > k_sigma_ratio) {
+  const Clues clues(flight, fit, index, options);
+  judge_twins(flight, solution, twins_of(flight, fit, index, geometry.shape, clues, options), geometry,
+              clues);
+  // A bias nobody knows makes the region wide and is told as what it is (gates bias and precision); geometry
+  // is to blame only for what would remain if it were known.
+  const double geometric_sigma_m = horizontal_sigma_of(known_bias_covariance(fit, index), options);
+  const double geometric_ratio = geometric_sigma_m / geometry.median_range_m;
+  if (geometry.kind == GeometryKind::collinear || geometric_ratio > k_sigma_ratio) {
     estimate.verdict = Verdict::weak_geometry;
     solution.determined = Determined::none;
     estimate.reason =
         geometry.kind == GeometryKind::collinear
             ? geometry.reason
             : text("weak geometry: horizontal sigma %.2f m at a median range of %.2f m (ratio %.3f)",
-                   horizontal_sigma_m, geometry.median_range_m, solution.geometry.sigma_ratio);
+                   geometric_sigma_m, geometry.median_range_m, geometric_ratio);
   } else if (estimate.verdict == Verdict::ok && (geometry.line_ratio < GeometryLimits{}.line_marginal ||
                                                  solution.geometry.sigma_ratio > k_sigma_ratio_marginal)) {
     estimate.reason = text(

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/localize/belief_likelihood.hpp"
 #include "core/localize/geometry.hpp"
 #include "core/localize/residual.hpp"
 #include "core/localize/solver.hpp"
@@ -202,6 +203,10 @@ std::vector<RangeResidual> residuals_of(const FlightRows& flight, const JointFit
     one.residual_m = line.residual_m;
     one.corrected_m = line.residual_m + (line.antenna_m - anchor.position_m).norm();
     one.weight = robust_weight(line.residual_m / std::sqrt(sigma2), options);
+    if (row.belief) {
+      one.p_los = belief_value(*row.belief, line.residual_m, line.position_variance_m2).p_los;
+      one.weight = *one.p_los;
+    }
     one.standardised = line.residual_m / std::sqrt(sigma2 * std::max(1.0 - leverage, 0.05));
     all.push_back(one);
   }

@@ -3,13 +3,19 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <optional>
+#include <utility>
 
+#include "core/localize/belief_likelihood.hpp"
 #include "core/localize/residual.hpp"
 
 namespace anchord {
 namespace {
 
 constexpr double k_hinge_m = 5.0;
+constexpr double k_least_slow_m = 0.05;   // no radio in the air was seen with less of it
+constexpr double k_believed_white = 0.9;  // the share is an estimate; too much of it claims too much
 
 double median(std::vector<double>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -27,11 +33,34 @@ double duration_s(const std::vector<double>& times_s) {
   return std::max(sum_s, 1.0);
 }
 
+/// How much of scale^2 is noise that the next range does not share. Differences of neighbours show it, each
+/// antenna by itself; without enough neighbours within half a second nothing is known, and nothing claimed.
+class Neighbours {
+ public:
+  void add(const JointRow& row, double residual_m) {
+    auto& last = last_[{row.tag, row.antenna}];
+    if (last && row.t_s - last->first <= 0.5) jumps_m_.push_back(std::abs(residual_m - last->second));
+    last = {row.t_s, residual_m};
+  }
+  double white_share(double scale2) {
+    if (jumps_m_.size() < 50) return 0.0;
+    const double jump_m = 1.4826 * median(jumps_m_);
+    return std::min(0.5 * jump_m * jump_m / scale2, 1.0);
+  }
+
+ private:
+  std::map<std::pair<NetworkId, std::uint8_t>, std::optional<std::pair<double, double>>> last_;
+  std::vector<double> jumps_m_;
+};
+
 void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointState::Anchor& anchor,
                   const SharedVector& shared, const FlightOptions& options, double scale_floor_m,
-                  double kept_scale_m, double common_scale_m, AnchorBlock& block, JointNormal& normal) {
+                  double kept_scale_m, double common_scale_m, bool claims, AnchorBlock& block,
+                  JointNormal& normal) {
   std::vector<JointLine> lines;
   std::vector<double> sizes, times_s, position_variances;
+  std::vector<const RangeBelief*> beliefs;
+  Neighbours neighbours;
   lines.reserve(rows.rows.size());
   for (const JointRow& row : rows.rows) {
     JointLine line = linearise(flight.track, row, shared, anchor);
@@ -39,7 +68,10 @@ void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointS
       ++block.refused[std::string(to_string(line.refused))];
       continue;
     }
-    sizes.push_back(std::abs(line.residual_m));
+    const double centred_m = line.residual_m - (row.belief ? expected_error_m(*row.belief) : 0.0);
+    sizes.push_back(std::abs(centred_m));
+    beliefs.push_back(row.belief ? &*row.belief : nullptr);
+    neighbours.add(row, centred_m);
     times_s.push_back(row.t_s);
     position_variances.push_back(line.position_variance_m2);
     block.last_t_s = std::max(block.last_t_s, row.t_s);
@@ -56,15 +88,27 @@ void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointS
   double sum_square = 0;
   std::vector<double> weights;
   weights.reserve(lines.size());
-  for (const JointLine& line : lines) {
-    const double widening = (scale2 + std::max(line.position_variance_m2 - usual_variance_m2, 0.0)) / scale2;
-    double weight =
-        robust_weight(line.residual_m / (block.scale_m * std::sqrt(widening)), options) / widening;
-    if (options.weights == Weights::as_printed)
-      weight *= std::sqrt(widening) * block.scale_m / common_scale_m;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    JointLine& line = lines[i];
+    double weight = 0, counted = 0, counted_m = line.residual_m;
+    if (beliefs[i]) {
+      // Where a model spoke, its likelihood takes the place of scale and loss; the pull is its exact slope.
+      const BeliefValue value = belief_value(*beliefs[i], line.residual_m, line.position_variance_m2);
+      weight = (claims ? value.information_per_m2 : value.curvature_per_m2) * scale2;
+      counted = value.p_los;
+      counted_m -= beliefs[i]->los_bias_m;
+      line.residual_m = weight > 0 ? value.score_per_m * scale2 / weight : 0.0;
+    } else {
+      const double widening =
+          (scale2 + std::max(line.position_variance_m2 - usual_variance_m2, 0.0)) / scale2;
+      weight = robust_weight(line.residual_m / (block.scale_m * std::sqrt(widening)), options) / widening;
+      if (options.weights == Weights::as_printed)
+        weight *= std::sqrt(widening) * block.scale_m / common_scale_m;
+      counted = weight;
+    }
     weights.push_back(weight);
-    block.sum_weight += weight;
-    sum_square += weight * line.residual_m * line.residual_m;
+    block.sum_weight += counted;
+    sum_square += counted * counted_m * counted_m;
     if (weight > 0) {
       ++block.n_used;
     } else {
@@ -73,7 +117,11 @@ void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointS
   }
   if (block.n_rejected > 0) block.refused["outlier"] = block.n_rejected;
   if (block.sum_weight > 0) block.rms_m = std::sqrt(sum_square / block.sum_weight);
-  block.kappa = std::max(1.0, 2.0 * options.correlation_s * block.sum_weight / duration_s(times_s));
+  const double alike = std::max(1.0, 2.0 * options.correlation_s * block.sum_weight / duration_s(times_s));
+  // The mean over a correlation time keeps what is shared and averages the rest.
+  block.white_share = neighbours.white_share(scale2);
+  const double slow_share = k_least_slow_m * k_least_slow_m / scale2;
+  block.kappa = 1.0 + (alike - 1.0) * std::clamp(slow_share, 1.0 - k_believed_white * block.white_share, 1.0);
   const double unit = 1.0 / (block.kappa * scale2);
   for (std::size_t i = 0; i < lines.size(); ++i) {
     if (weights[i] <= 0) continue;
@@ -92,6 +140,11 @@ void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointS
 double robust_weight(double residual_over_scale, const FlightOptions& options) {
   const double bend = default_bend(options.loss) * (options.loss == Loss::tukey ? options.mad_factor : 1.0);
   return loss_value(options.loss, bend, residual_over_scale).weight;
+}
+
+AnchorClues clues_of(NetworkId id, const FlightOptions& options) {
+  const auto known = options.clues.find(id);
+  return known == options.clues.end() ? AnchorClues{} : known->second;
 }
 
 double range_curve(double distance_m) { return std::log(std::max(distance_m, k_hinge_m) / k_hinge_m); }
@@ -125,7 +178,7 @@ JointLine linearise(const TagTrack& track, const JointRow& row, const SharedVect
 }
 
 JointNormal build_normal(const FlightRows& flight, const JointState& state, const FlightOptions& options,
-                         double scale_floor_m, const JointNormal* scales_from) {
+                         double scale_floor_m, const JointNormal* scales_from, bool claims) {
   JointNormal normal;
   normal.anchors.resize(flight.anchors.size());
   // Sigma of a mitigated line-of-sight range, only to give eq 7.11's weights the unit of an inverse variance.
@@ -135,10 +188,14 @@ JointNormal build_normal(const FlightRows& flight, const JointState& state, cons
     const auto& anchor = state.anchors[i];
     if (!anchor.active) continue;
     build_anchor(flight, flight.anchors[i], anchor, state.shared, options, scale_floor_m,
-                 scales_from ? scales_from->anchors[i].scale_m : 0.0, common_scale_m, block, normal);
+                 scales_from ? scales_from->anchors[i].scale_m : 0.0, common_scale_m, claims, block, normal);
     const double delay_information = 1.0 / (options.delay_prior_m * options.delay_prior_m);
     block.own(3, 3) += delay_information;
     block.gradient[3] -= delay_information * anchor.delay_m;
+    const ClueNormal clue = clue_normal(clues_of(flight.anchors[i].id, options), options.outline_m,
+                                        options.outline_sigma_m, anchor.position_m);
+    block.own.topLeftCorner<3, 3>() += clue.information;
+    block.gradient.head<3>() += clue.gradient;
     if (options.dims == Dims::two) {
       block.own.row(2).setZero();
       block.own.col(2).setZero();
@@ -173,10 +230,32 @@ std::vector<Observation> observations_of(const FlightRows& flight, const AnchorR
     o.distance_m = row.distance_m - shared[k_shared_bias];
     o.distance_m -= shared[k_shared_curve] * range_curve(o.distance_m);
     o.sigma_m = sigma_m;
+    if (row.belief) {
+      o.distance_m -= expected_error_m(*row.belief);
+      o.sigma_m = std::hypot(sigma_m, (1.0 - row.belief->p_los) * row.belief->nlos_tail_m);
+    }
     all.push_back(o);
   }
   if (all.size() <= most) return all;
   std::vector<Observation> few;
+  for (std::size_t i = 0; i < most; ++i) few.push_back(all[i * all.size() / most]);
+  return few;
+}
+
+std::vector<LevelSample> levels_of(const FlightRows& flight, const AnchorRows& anchor,
+                                   const SharedVector& shared, const FlightOptions& options) {
+  std::vector<LevelSample> all;
+  if (!options.level_sigma_db) return all;
+  for (const JointRow& row : anchor.rows) {
+    if (!row.rss_dbm) continue;
+    const TagPoint point = flight.track.at(row.t_s + shared[k_shared_lag], row.lever_arm_body_m);
+    if (point.refused != TrackRefusal::none || point.body_forward.head<2>().norm() < 0.1) continue;
+    all.push_back(
+        {point.position_m, std::atan2(point.body_forward.x(), point.body_forward.y()), *row.rss_dbm});
+  }
+  constexpr std::size_t most = 400;
+  if (all.size() <= most) return all;
+  std::vector<LevelSample> few;
   for (std::size_t i = 0; i < most; ++i) few.push_back(all[i * all.size() / most]);
   return few;
 }

@@ -26,6 +26,13 @@ struct JointState {
   std::vector<Anchor> anchors;
 };
 
+/// Clues of an anchor beside its ranges; none where none were given.
+AnchorClues clues_of(NetworkId id, const FlightOptions& options);
+
+/// Levels received from an anchor, thinned to at most 400; empty without attitude or options.level_sigma_db.
+std::vector<LevelSample> levels_of(const FlightRows& flight, const AnchorRows& anchor,
+                                   const SharedVector& shared, const FlightOptions& options);
+
 /// g(rho) of the model: no curve within 5 m, where it could not be told from the bias.
 double range_curve(double distance_m);
 
@@ -50,8 +57,9 @@ struct AnchorBlock {
   Eigen::Matrix<double, 4, 6> shared{Eigen::Matrix<double, 4, 6>::Zero()};  ///< (x, d) against the shared
   Eigen::Vector4d gradient{Eigen::Vector4d::Zero()};
   Eigen::Matrix4d own_inverse{Eigen::Matrix4d::Zero()};
-  double scale_m{};  ///< 1.4826 MAD, never below the floor
-  double kappa{1};   ///< tempering
+  double scale_m{};      ///< 1.4826 MAD, never below the floor
+  double white_share{};  ///< of the residual variance, what changes from one range to the next
+  double kappa{1};       ///< tempering
   double sum_weight{};
   double rms_m{};                       ///< weighted
   double usual_position_variance_m2{};  ///< median over the rows, along the line of sight
@@ -67,8 +75,9 @@ struct JointNormal {
   SharedVector reduced_gradient{SharedVector::Zero()};
 };
 /// scales_from  residual scales to keep instead of measuring them anew
+/// claims       rows with a belief count what may be claimed of them, not what makes the next step safe
 JointNormal build_normal(const FlightRows& flight, const JointState& state, const FlightOptions& options,
-                         double scale_floor_m, const JointNormal* scales_from = nullptr);
+                         double scale_floor_m, const JointNormal* scales_from = nullptr, bool claims = false);
 
 /// The whole normal equations, 4 rows for each anchor in order, then the shared: what ranges between anchors
 /// couple no longer has the shape of an arrow. Prior on the shared included.

@@ -16,6 +16,12 @@ constexpr std::size_t k_min_rows = 5;  // one more than x, y, z and a shared bia
 
 double clipped(double value, double limit) { return std::clamp(value, -limit, limit); }
 
+bool has_beliefs(const FlightRows& flight) {
+  return std::ranges::any_of(flight.anchors, [](const AnchorRows& anchor) {
+    return std::ranges::any_of(anchor.rows, [](const JointRow& row) { return row.belief.has_value(); });
+  });
+}
+
 /// Best of many starts for one anchor; Cauchy of 0.3 m and a bias of its own, so that a kit's bias does not
 /// push the anchor into the wrong basin before the joint solve can see it.
 std::optional<Eigen::Vector3d> start_of(const FlightRows& flight, const AnchorRows& anchor,
@@ -29,11 +35,21 @@ std::optional<Eigen::Vector3d> start_of(const FlightRows& flight, const AnchorRo
   settings.loss_sigmas = 1.0;
   settings.estimate_bias = !options.fixed_bias_m;
   settings.bias_prior_sigma_m = 0.5;
+  const AnchorClues clues = clues_of(anchor.id, options);
+  const auto levels = levels_of(flight, anchor, prior.mean, options);
+  const double span_s = std::max(anchor.rows.back().t_s - anchor.rows.front().t_s, 1.0);
+  const double alike =
+      std::max(2.0 * options.correlation_s * static_cast<double>(levels.size()) / span_s, 1.0);
   std::optional<AnchorFit> best;
   for (Eigen::Vector3d start : start_candidates(rows, options.dims)) {
     if (height_m) start.z() = *height_m;
     auto fit = solve_anchor_gauss_newton(rows, start, settings);
-    if (fit && (!best || fit.value().cost < best->cost)) best = std::move(fit.value());
+    if (!fit) continue;
+    // The twin fits as well: a clue, told in the same unit, is what decides where to begin.
+    const Eigen::Vector3d& place_m = fit.value().position_m;
+    fit.value().cost += clue_cost(clues, options.outline_m, options.outline_sigma_m, place_m);
+    if (!levels.empty()) fit.value().cost += level_cost(levels, place_m, *options.level_sigma_db) / alike;
+    if (!best || fit.value().cost < best->cost) best = std::move(fit.value());
   }
   if (best) return best->position_m;
   // No start converged (a line, for example): the joint solve is heavily damped there and may begin anywhere
@@ -70,8 +86,10 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
   JointFit fit;
   fit.state = start;
   // The Gauss-Newton rounds bring every method near; Ceres then does the rest where it is asked for.
-  // Ranges between anchors are solved here whatever the method: their network is small and dense.
-  const bool by_ceres = options.method != Method::gauss_newton && flight.pairs.empty();
+  // Ranges between anchors are solved here whatever the method: their network is small and dense. So are
+  // ranges a model spoke about, whose likelihood is no sum of squares.
+  const bool by_ceres = options.method != Method::gauss_newton && flight.pairs.empty() &&
+                        !has_beliefs(flight) && options.clues.empty() && options.outline_m.empty();
   const int most_rounds = by_ceres ? 5 : k_max_rounds;
   struct Pace {
     Eigen::Vector3d last_m{0, 0, 0};
@@ -131,10 +149,10 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
   if (by_ceres) {
     BOOST_OUTCOME_TRY(fit.state, polish_joint_ceres(flight, std::move(fit.state), prior, options));
     fit.converged = true;
-    fit.normal = build_normal(flight, fit.state, options, 0.0);
+    fit.normal = build_normal(flight, fit.state, options, 0.0, nullptr, true);
   } else {
     const JointNormal scales = std::move(fit.normal);
-    fit.normal = build_normal(flight, fit.state, options, 0.0, &scales);
+    fit.normal = build_normal(flight, fit.state, options, 0.0, &scales, true);
   }
   if (!flight.pairs.empty()) {
     const DenseNormal dense = dense_normal(flight, fit.state, fit.normal, prior, options);

@@ -23,8 +23,14 @@ struct BiasGate {
   bool calibrated{};          ///< z below the gate
   bool known{};               ///< not calibrated, or known well enough to say that it is
   double prior_sigma_m{1.0};  ///< of the bias about zero, as the gate decided
+  /// Mean square of what the bias would be if the kit were not calibrated after all, times the probability of
+  /// that: "calibrated" is a decision on evidence, and the regions must not know better than the evidence.
+  double doubt_m2{};
 };
 BiasGate bias_gate(std::span<const ProfileFactor> all, const FlightOptions& options);
+
+/// Widens the covariances of a fit by the doubt about its bias, along the way each position follows the bias.
+void add_doubt(JointFit& fit, const SharedPrior& prior, const BiasGate& gate);
 
 /// Prior for the next flight: what the gate decided about the bias and the factors of the others, widened by
 /// the wander where there are any.

@@ -28,6 +28,16 @@ SharedPrior across_prior(const FlightOptions& options) {
   return prior;
 }
 
+/// Two hypotheses, even odds before: the kit is calibrated, or its bias is anything of half a metre. The
+/// Bayes factor of what all factors say decides how much of the second remains.
+double doubt_m2(const BiasGate& gate, const FlightOptions& options) {
+  const double own2 = square(gate.sigma_m), seen2 = square(gate.bias_m);
+  const double calibrated2 = own2 + square(options.calibrated_bias_prior_m), other2 = own2 + square(0.5);
+  const double odds =
+      std::sqrt(calibrated2 / other2) * std::exp(0.5 * seen2 * (1 / calibrated2 - 1 / other2));
+  return odds / (1.0 + odds) * (seen2 + own2);
+}
+
 struct Sum {
   Eigen::Matrix4d information{Eigen::Matrix4d::Zero()};
   Eigen::Vector4d information_mean{Eigen::Vector4d::Zero()};
@@ -86,7 +96,20 @@ BiasGate bias_gate(std::span<const ProfileFactor> all, const FlightOptions& opti
   gate.prior_sigma_m = !gate.calibrated ? options.bias_prior_m
                        : gate.known     ? options.calibrated_bias_prior_m
                                         : options.unknown_bias_prior_m;
+  if (gate.calibrated && gate.known) gate.doubt_m2 = doubt_m2(gate, options);
   return gate;
+}
+
+void add_doubt(JointFit& fit, const SharedPrior& prior, const BiasGate& gate) {
+  if (!(gate.doubt_m2 > 0)) return;
+  // Were the mean of the prior moved, the shared unknowns would follow by `shared`, each anchor by `own`.
+  const SharedVector shared = fit.shared_covariance * prior.information.col(k_shared_bias);
+  for (std::size_t i = 0; i < fit.anchor_covariance.size(); ++i) {
+    const AnchorBlock& block = fit.normal.anchors[i];
+    const Eigen::Vector4d own = -block.own_inverse * (block.shared * shared);
+    if (own.allFinite()) fit.anchor_covariance[i] += gate.doubt_m2 * own * own.transpose();
+  }
+  fit.shared_covariance += gate.doubt_m2 * shared * shared.transpose();
 }
 
 SharedPrior profile_prior(std::span<const ProfileFactor> others, const BiasGate& gate,

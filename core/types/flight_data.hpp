@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,6 +9,7 @@
 #include "core/types/fix.hpp"
 #include "core/types/mission.hpp"
 #include "core/types/range.hpp"
+#include "core/types/range_belief.hpp"
 
 namespace anchord {
 
@@ -17,7 +19,9 @@ struct FlightData {
   std::vector<Fix> fixes;                         ///< any order
   std::vector<Range> ranges;                      ///< any order
   std::map<NetworkId, std::string> anchor_names;  ///< id text as the source wrote it
-  std::vector<std::string> notes;                 ///< what the reader saw and did not use, for people
+  /// What a model believes of each range: empty, or one for every range, in their order.
+  std::vector<std::optional<RangeBelief>> beliefs{};
+  std::vector<std::string> notes;  ///< what the reader saw and did not use, for people
 };
 
 }  // namespace anchord

@@ -1,0 +1,96 @@
+#include "core/localize/side_clues.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/planning/bounds.hpp"
+#include "core/procedure/turn.hpp"
+
+namespace anchord {
+namespace {
+
+constexpr std::size_t k_least_levels = 30;
+
+double wrapped(double angle_rad) { return std::remainder(angle_rad, 2.0 * std::numbers::pi); }
+
+double bearing_of(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  return std::atan2(to.x() - from.x(), to.y() - from.y());
+}
+
+/// Metres outside, and the unit vector that leads further out; 0 within.
+double outside_m(std::span<const Eigen::Vector2d> outline, const Eigen::Vector2d& at, Eigen::Vector2d* away) {
+  if (outline.size() < 3) return 0;
+  const planning::Polygon polygon(outline.begin(), outline.end());
+  if (planning::contains(polygon, at)) return 0;
+  double nearest_m = 1e300;
+  Eigen::Vector2d nearest = at;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Eigen::Vector2d a = polygon[i], edge = polygon[(i + 1) % polygon.size()] - a;
+    const double share = std::clamp((at - a).dot(edge) / std::max(edge.squaredNorm(), 1e-12), 0.0, 1.0);
+    const double distance_m = (at - a - share * edge).norm();
+    if (distance_m >= nearest_m) continue;
+    nearest_m = distance_m;
+    nearest = a + share * edge;
+  }
+  if (away) *away = nearest_m > 1e-9 ? Eigen::Vector2d((at - nearest) / nearest_m) : Eigen::Vector2d(0, 0);
+  return nearest_m;
+}
+
+}  // namespace
+
+double clue_cost(const AnchorClues& clues, std::span<const Eigen::Vector2d> outline_m, double outline_sigma_m,
+                 const Eigen::Vector3d& place_m) {
+  double squares = 0;
+  const auto add = [&](double misfit, double sigma) { squares += misfit * misfit / (sigma * sigma); };
+  if (const auto& b = clues.bearing)
+    add(wrapped(bearing_of(b->tag_m, place_m) - b->bearing_rad), b->sigma_rad);
+  if (const auto& h = clues.height) add(place_m.z() - h->up_m, h->sigma_m);
+  add(outside_m(outline_m, place_m.head<2>(), nullptr), outline_sigma_m);
+  return 0.5 * squares;
+}
+
+ClueNormal clue_normal(const AnchorClues& clues, std::span<const Eigen::Vector2d> outline_m,
+                       double outline_sigma_m, const Eigen::Vector3d& place_m) {
+  ClueNormal normal;
+  const auto add = [&](const Eigen::Vector3d& slope, double missing, double sigma) {
+    normal.information += slope * slope.transpose() / (sigma * sigma);
+    normal.gradient += slope * missing / (sigma * sigma);
+  };
+  if (const auto& b = clues.bearing) {
+    const Eigen::Vector2d way = (place_m - b->tag_m).head<2>();
+    const double far2 = std::max(way.squaredNorm(), 1.0);  // right above there is no bearing to speak of
+    add({way.y() / far2, -way.x() / far2, 0}, wrapped(b->bearing_rad - bearing_of(b->tag_m, place_m)),
+        b->sigma_rad);
+  }
+  if (const auto& h = clues.height) add(Eigen::Vector3d::UnitZ(), h->up_m - place_m.z(), h->sigma_m);
+  Eigen::Vector2d away(0, 0);
+  const double outside = outside_m(outline_m, place_m.head<2>(), &away);
+  if (outside > 0) add({away.x(), away.y(), 0}, -outside, outline_sigma_m);
+  return normal;
+}
+
+double level_cost(std::span<const LevelSample> samples, const Eigen::Vector3d& place_m, double sigma_db) {
+  if (samples.size() < k_least_levels) return 0;
+  Eigen::Vector2d together(0, 0);
+  for (const auto& s : samples) together += Eigen::Vector2d(std::sin(s.heading_rad), std::cos(s.heading_rad));
+  // Headings within about a quarter turn leave the mean vector longer than 0.9: the lobes were not swept.
+  if (together.norm() > 0.9 * static_cast<double>(samples.size())) return 0;
+  Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d right = Eigen::Vector2d::Zero();
+  double squares = 0;
+  for (const auto& s : samples) {
+    const double far_m = std::max((place_m - s.tag_m).norm(), 0.5);
+    const double level_db = s.rss_dbm + 20.0 * std::log10(far_m);
+    const Eigen::Vector2d row(1.0, procedure::turn_profile(s.heading_rad - bearing_of(s.tag_m, place_m)));
+    normal += row * row.transpose();
+    right += row * level_db;
+    squares += level_db * level_db;
+  }
+  Eigen::Vector2d fit = normal.ldlt().solve(right);
+  if (fit[1] < 0) fit = {right[0] / normal(0, 0), 0};  // lobes turned inside out are no lobes
+  return 0.5 * std::max(squares - 2.0 * fit.dot(right) + fit.dot(normal * fit), 0.0) / (sigma_db * sigma_db);
+}
+
+}  // namespace anchord
