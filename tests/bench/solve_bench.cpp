@@ -2,6 +2,8 @@
 // and of a whole simulated flight. CPU time; one thread.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <vector>
 
@@ -66,5 +68,59 @@ void live_whole_flight(benchmark::State& state) {
       benchmark::Counter(210.0, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 BENCHMARK(live_whole_flight)->Unit(benchmark::kMillisecond);
+
+/// 10 000 ranges to 50 anchors of a campus, in one solve with everything they share.
+void solve_fifty_anchors(benchmark::State& state) {
+  sim::Random random(23);
+  FlightData flight;
+  flight.mission.frame = TrackFrame::local;
+  std::vector<Eigen::Vector3d> anchors;
+  for (int a = 0; a < 50; ++a)
+    anchors.emplace_back(-36.0 + 8.0 * (a % 10), -24.0 + 12.0 * static_cast<double>(a / 10),
+                         2.0 + 6.0 * random.uniform());
+  for (int i = 0; i < 2000; ++i) {
+    const double turn = 0.01 * i;
+    Fix fix;
+    fix.frame = TrackFrame::local;
+    fix.fix = FixClass::rtk_fixed;
+    fix.time = UtcTime::from_seconds(0.1 * i);
+    fix.local_m = {45 * std::cos(turn), 30 * std::sin(1.3 * turn), 12 + 7 * std::sin(2.1 * turn)};
+    flight.fixes.push_back(fix);
+    for (int k = 0; k < 5; ++k) {
+      const auto a = static_cast<std::size_t>((5 * i + k) % 50);
+      Range range;
+      range.time = fix.time;
+      range.tag = NetworkId{0x6e01};
+      range.anchor = NetworkId{static_cast<std::uint32_t>(0x6000 + a)};
+      range.distance_m = (fix.local_m - anchors[a]).norm() + 0.05 * random.normal();
+      flight.ranges.push_back(range);
+    }
+  }
+  for (auto _ : state) benchmark::DoNotOptimize(solve_flight(flight).value().anchors.size());
+}
+BENCHMARK(solve_fifty_anchors)->Unit(benchmark::kMillisecond);
+
+/// Time of one range through the live path, most of which only join it and some of which solve its anchor.
+void live_update(benchmark::State& state) {
+  const auto flight = sim::simulate_flight(sim::demonstration_world(), {}).value();
+  std::vector<double> micros;
+  for (auto _ : state) {
+    LiveFlight live(flight.data.mission);
+    std::size_t fix = 0;
+    for (const Range& range : flight.data.ranges) {
+      while (fix < flight.data.fixes.size() && flight.data.fixes[fix].time <= range.time)
+        live.add(flight.data.fixes[fix++]);
+      const auto begin = std::chrono::steady_clock::now();
+      live.add(range);
+      benchmark::DoNotOptimize(live.take_estimates().size() + live.take_ranges().size());
+      micros.push_back(
+          std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count());
+    }
+  }
+  std::ranges::sort(micros);
+  state.counters["p50_us"] = micros[micros.size() / 2];
+  state.counters["p99_us"] = micros[micros.size() * 99 / 100];
+}
+BENCHMARK(live_update)->Unit(benchmark::kMillisecond);
 
 }  // namespace
