@@ -5,6 +5,7 @@
 #include <set>
 
 #include "api/exports/evidence.hpp"
+#include "api/json/clues_json.hpp"
 #include "api/json/reader.hpp"
 #include "api/json/wire_resources.hpp"
 #include "api/services/job_service.hpp"
@@ -72,6 +73,7 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
   // Every anchor is searched for from some 17 places, those of bearing and height among them, so that the
   // answer depends on none of them; the word is taken for those who send it.
   fields.word("initial", {"search", "bearing_height"});
+  if (const Json* clues = fields.child("clues")) read_clues(*clues, "/clues", options, errors);
   if (const Json* models = fields.child("models")) out.models = read_flight_models(*models, errors);
   out.compare_uncorrected = fields.boolean("compare_uncorrected").value_or(true);
   for (const char* later : {"frame", "use_anchor_anchor"}) {

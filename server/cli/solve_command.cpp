@@ -3,9 +3,11 @@
 #include <fstream>
 #include <iterator>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "api/exports/solve_output.hpp"
 #include "api/imports/flight_folder.hpp"
+#include "api/json/clues_json.hpp"
 #include "api/json/kit_profile_json.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "core/localize/kit_prior.hpp"
@@ -24,7 +26,7 @@ struct Arguments {
       min_fix{"fixed"};
   int dims{3};
   std::optional<double> bias_m, height_m;
-  std::string profile, out;
+  std::string profile, out, clues;
   SolveReportOptions report;
 };
 
@@ -40,6 +42,22 @@ Result<KitProfile> read_profile(const std::string& file) {
   auto profile = parse_kit_profile(text);
   if (!profile) return make_error(profile.error().code, file + ": " + profile.error().message);
   return profile;
+}
+
+Result<void> add_clues(const std::string& file, FlightOptions& options) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return make_error(Errc::not_found, file + ": cannot be opened");
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  nlohmann::json json;
+  std::vector<api::FieldError> errors;
+  if (auto fault = api::parse_json(text, json)) {
+    errors.push_back(*std::move(fault));
+  } else {
+    api::read_clues(json, "", options, errors);
+  }
+  if (errors.empty()) return boost::outcome_v2::success();
+  return make_error(Errc::invalid_argument,
+                    file + ": " + errors.front().pointer + ": " + errors.front().detail);
 }
 
 Result<FlightOptions> options_of(const Arguments& a) {
@@ -61,6 +79,9 @@ Result<FlightOptions> options_of(const Arguments& a) {
   options.anchor_height_m = a.height_m;
   if (!a.profile.empty()) {
     BOOST_OUTCOME_TRY(options.profile, read_profile(a.profile));
+  }
+  if (!a.clues.empty()) {
+    BOOST_OUTCOME_TRYV(add_clues(a.clues, options));
   }
   BOOST_OUTCOME_TRY(options.check());
   return options;
@@ -187,6 +208,9 @@ void add_solve_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("solve", "Find the anchors of recorded flights, without a server");
   auto arguments = std::make_shared<Arguments>();
   add_options(*command, *arguments);
+  command->add_option(
+      "--clues", arguments->clues,
+      "JSON: outline, bearings, heights, RSS that tell an anchor from its twin (docs/formats.md)");
   command->add_option("--format", arguments->format, "table, json, geojson or csv, on standard output")
       ->check(CLI::IsMember({"table", "json", "geojson", "csv"}));
   command->add_option("--report", arguments->report.file,
