@@ -307,12 +307,15 @@ Result<FlightPlan> plan_flight(const FlightPlanInput& input, const FlightPlanOpt
   Design design(plan.assumed_anchors_m, options);
   std::vector<Candidate> chosen;
   for (const auto i : choose(design, all, options, plan.reason)) chosen.push_back(all[i]);
-  if (auto kept = joined(chosen, bounds); kept.size() < chosen.size()) {
+  if (!order(plan, chosen, input, options, bounds)) {
+    auto kept = joined(chosen, bounds);
     for (const auto& c : chosen) design.remove(c.point_m);
     for (const auto& c : kept) design.add(c.point_m);
     plan.reason += "; " + std::to_string(chosen.size() - kept.size()) +
                    " points that no legal way reaches were left out";
-    chosen = std::move(kept);
+    plan.waypoints.clear();
+    plan.length_m = 0;
+    BOOST_OUTCOME_TRY(order(plan, std::move(kept), input, options, bounds));
   }
   plan.predicted_sigma_m = design.sigmas_m();
   plan.rms_m = std::sqrt(design.mean_variance_m2());
@@ -321,7 +324,6 @@ Result<FlightPlan> plan_flight(const FlightPlanInput& input, const FlightPlanOpt
     plan.reason += "; " + std::to_string(plan.n_out_of_range) +
                    " places inside are out of range from everywhere and not counted";
   }
-  BOOST_OUTCOME_TRY(order(plan, std::move(chosen), input, options, bounds));
   return plan;
 }
 

@@ -32,7 +32,10 @@ std::vector<Vector2d> ring_around(const Polygon& polygon, double distance_m, dou
   Polygon corners = polygon;
   if (signed_area(corners) < 0) std::reverse(corners.begin(), corners.end());
   std::vector<Vector2d> out;
+  // A finely drawn curve would give a point every few centimetres; chords of this length stay shallow.
+  const double least_m = std::min(0.3 * distance_m, 0.5 * spacing_m);
   const auto keep = [&](const Vector2d& p) {
+    if (!out.empty() && (p - out.back()).norm() < least_m) return;
     if (!contains(polygon, p) && distance_to_edge_m(polygon, p) >= distance_m - 1e-6) out.push_back(p);
   };
   const std::size_t n = corners.size();

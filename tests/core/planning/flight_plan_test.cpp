@@ -139,6 +139,19 @@ TEST(FlightPlan, FindsItsWayRoundAStar) {
   expect_legal(plan.value(), star, options.keep_out_m);
 }
 
+// Drawn from a survey: a corner every 26 cm is no reason for a ring of thousands.
+TEST(FlightPlan, FliesRoundAFinelyDrawnCurve) {
+  Polygon round;
+  for (int i = 0; i < 360; ++i)
+    round.emplace_back(15 * std::cos(i * 3.14159265358979 / 180), 15 * std::sin(i * 3.14159265358979 / 180));
+  const FlightPlanOptions options;
+  const auto plan = plan_flight({round, 6, {}, {}}, options);
+  ASSERT_TRUE(plan) << plan.error().message;
+  EXPECT_LT(plan.value().n_candidates, 1000u);
+  EXPECT_EQ(plan.value().reason.find("left out"), std::string::npos) << plan.value().reason;
+  expect_legal(plan.value(), round, options.keep_out_m);
+}
+
 // 800 x 500 m with 60 m of range: what lies deep inside cannot be ranged from outside; the rest is planned
 // for.
 TEST(FlightPlan, LeavesOutWhatIsOutOfRangeFromEverywhere) {
