@@ -1,4 +1,5 @@
 #include "api/exports/docs_page.hpp"
+#include "api/exports/report.hpp"
 
 #include <algorithm>
 #include <map>
@@ -10,32 +11,9 @@ namespace {
 
 using Ordered = nlohmann::ordered_json;
 
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
-
 std::string text_of(const Ordered& object, const char* key) {
   const auto at = object.find(key);
-  return at != object.end() && at->is_string() ? escaped(at->get<std::string>()) : std::string{};
+  return at != object.end() && at->is_string() ? html_text(at->get<std::string>()) : std::string{};
 }
 
 std::string last_part(std::string_view reference) {
@@ -46,7 +24,7 @@ std::string last_part(std::string_view reference) {
 std::string type_of(const Ordered& schema) {
   if (!schema.is_object()) return {};
   if (const auto ref = schema.find("$ref"); ref != schema.end()) {
-    const std::string name = escaped(last_part(ref->get<std::string>()));
+    const std::string name = html_text(last_part(ref->get<std::string>()));
     return "<a href=\"#schema-" + name + "\">" + name + "</a>";
   }
   for (const char* several : {"oneOf", "anyOf", "allOf"}) {
@@ -58,14 +36,15 @@ std::string type_of(const Ordered& schema) {
   }
   std::string out;
   if (const auto type = schema.find("type"); type != schema.end())
-    out = escaped(type->is_string() ? type->get<std::string>() : type->dump());
+    out = html_text(type->is_string() ? type->get<std::string>() : type->dump());
   if (const auto items = schema.find("items"); items != schema.end()) out += " of " + type_of(*items);
-  if (const auto words = schema.find("enum"); words != schema.end()) out += " " + escaped(words->dump());
-  if (const auto value = schema.find("const"); value != schema.end()) out += " " + escaped(value->dump());
+  if (const auto words = schema.find("enum"); words != schema.end()) out += " " + html_text(words->dump());
+  if (const auto value = schema.find("const"); value != schema.end()) out += " " + html_text(value->dump());
   for (const char* limit : {"format", "minimum", "maximum", "minItems", "maxItems", "maxLength", "default"}) {
     const auto at = schema.find(limit);
     if (at != schema.end())
-      out += std::string(", ") + limit + " " + escaped(at->is_string() ? at->get<std::string>() : at->dump());
+      out +=
+          std::string(", ") + limit + " " + html_text(at->is_string() ? at->get<std::string>() : at->dump());
   }
   return out;
 }
@@ -77,8 +56,8 @@ std::string fields_of(const Ordered& schema) {
   std::string out = "<table><tr><th>field</th><th>type</th><th>meaning</th></tr>\n";
   for (const auto& [name, field] : properties->items()) {
     const bool must = std::find(required.begin(), required.end(), name) != required.end();
-    out += "<tr><td><code>" + escaped(name) + "</code>" + (must ? " *" : "") + "</td><td>" + type_of(field) +
-           "</td><td>" + text_of(field, "description") + "</td></tr>\n";
+    out += "<tr><td><code>" + html_text(name) + "</code>" + (must ? " *" : "") + "</td><td>" +
+           type_of(field) + "</td><td>" + text_of(field, "description") + "</td></tr>\n";
   }
   return out + "</table>\n";
 }
@@ -87,7 +66,7 @@ std::string contents(const Ordered& content) {
   std::string out;
   for (const auto& [media, body] : content.items()) {
     const auto schema = body.find("schema");
-    out += "<code>" + escaped(media) + "</code> " + (schema != body.end() ? type_of(*schema) : "") + "<br>";
+    out += "<code>" + html_text(media) + "</code> " + (schema != body.end() ? type_of(*schema) : "") + "<br>";
     if (schema != body.end() && !schema->contains("$ref")) out += fields_of(*schema);
   }
   return out;
@@ -112,10 +91,10 @@ std::string operation_of(const std::string& method, const std::string& path, con
   std::string name = method;
   for (char& c : name) c = static_cast<char>(c >= 'a' && c <= 'z' ? c - 32 : c);
   std::string out = "<h3 id=\"" + text_of(operation, "operationId") + "\"><code>" + name + " " +
-                    escaped(path) + "</code></h3>\n<p>" + text_of(operation, "summary") + "</p>\n";
+                    html_text(path) + "</code></h3>\n<p>" + text_of(operation, "summary") + "</p>\n";
   if (const auto more = text_of(operation, "description"); !more.empty()) out += "<p>" + more + "</p>\n";
   if (const auto roles = operation.find("x-roles"); roles != operation.end())
-    out += "<p>Roles: " + escaped(roles->dump()) + "</p>\n";
+    out += "<p>Roles: " + html_text(roles->dump()) + "</p>\n";
   Ordered parameters = shared;
   for (const auto& one : operation.value("parameters", Ordered::array())) parameters.push_back(one);
   out += parameters_of(parameters, document);
@@ -124,9 +103,9 @@ std::string operation_of(const std::string& method, const std::string& path, con
   out += "<ul>\n";
   const Ordered responses = operation.value("responses", Ordered::object());  // items() refers to it
   for (const auto& [status, answer] : responses.items()) {
-    out += "<li><b>" + escaped(status) + "</b> ";
+    out += "<li><b>" + html_text(status) + "</b> ";
     if (const auto ref = answer.find("$ref"); ref != answer.end())
-      out += escaped(last_part(ref->get<std::string>()));
+      out += html_text(last_part(ref->get<std::string>()));
     else
       out += text_of(answer, "description") + " " + contents(answer.value("content", Ordered::object()));
     out += "</li>\n";
@@ -160,13 +139,13 @@ std::string docs_page(std::string_view openapi_json) {
       "href=\"/api/v1/asyncapi.json\">asyncapi.json</a> (live topics). Fields with * are "
       "required.</p>\n<ul>\n";
   for (const auto& tag : order)
-    out += "<li><a href=\"#tag-" + escaped(tag) + "\">" + escaped(tag) + "</a></li>\n";
+    out += "<li><a href=\"#tag-" + html_text(tag) + "\">" + html_text(tag) + "</a></li>\n";
   out += "<li><a href=\"#schemas\">schemas</a></li>\n</ul>\n";
   for (const auto& tag : order)
-    out += "<h2 id=\"tag-" + escaped(tag) + "\">" + escaped(tag) + "</h2>\n" + sections[tag];
+    out += "<h2 id=\"tag-" + html_text(tag) + "\">" + html_text(tag) + "</h2>\n" + sections[tag];
   out += "<h2 id=\"schemas\">schemas</h2>\n";
   for (const auto& [name, schema] : document.at("components").at("schemas").items()) {
-    out += "<h3 id=\"schema-" + escaped(name) + "\">" + escaped(name) + "</h3>\n<p>" +
+    out += "<h3 id=\"schema-" + html_text(name) + "\">" + html_text(name) + "</h3>\n<p>" +
            text_of(schema, "description") + " " + type_of(schema) + "</p>\n" + fields_of(schema);
   }
   return out + "</body></html>\n";

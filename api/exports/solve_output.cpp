@@ -1,4 +1,5 @@
 #include "api/exports/solve_output.hpp"
+#include "api/json/live_writer.hpp"
 
 #include <cmath>
 #include <cstdio>
@@ -160,21 +161,7 @@ std::string geojson(std::span<const SolvedFlight> flights) {
 
 }  // namespace
 
-std::string_view word(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::ok:
-      return "ok";
-    case Verdict::weak_geometry:
-      return "weak_geometry";
-    case Verdict::ambiguous:
-      return "ambiguous";
-    case Verdict::too_few:
-      return "too_few";
-    case Verdict::diverged:
-      return "diverged";
-  }
-  return "diverged";
-}
+std::string_view word(Verdict verdict) { return api::verdict_word(verdict); }
 
 std::string_view word(Determined determined) {
   switch (determined) {

@@ -62,7 +62,7 @@ export function FlightBar() {
           <HoldButton testid="cmd-return" disabled={off} note={note('return')} onConfirm={act('return')}>Return</HoldButton>
           <HoldButton testid="cmd-land" disabled={off} note={note('land')} onConfirm={act('land')}>Land</HoldButton>
         </>}
-        {operator && idle && <button class="btn primary" data-testid="open-checklist" disabled={lost} onClick={() => (checklist_open.value = true)}>Checklist and start</button>}
+        {operator && idle && <button class="btn primary" data-testid="open-checklist" disabled={lost || other !== null} onClick={() => (checklist_open.value = true)}>Checklist and start</button>}
       </div>
       {checklist_open.value && idle && <Checklist mission={mission.mission} start={async (plan, manual) => { await send(mission.mission, 'start', { plan, mode: manual ? 'manual' : 'auto' }); checklist_open.value = problem.value !== ''; }} />}
     </div>

@@ -1,10 +1,14 @@
 /// Where the flight stands in its procedure and why; where it goes next and what that is worth; the turn and the height search while they run.
+import '../desk.css';
 import type { GridMsg, ProcedureMsg, ProfileMsg } from '../../live/flight_messages';
 import { current_scene, link, now_ms, tick } from '../../state/store';
 import { bearing, fixed } from '../../ui/format';
 import { Chip, Mark, Q } from '../../ui/marks';
 import { Axes, Drawing, line, scale, ticks } from '../chart';
 import { flying, next_step, stage_of, STATUS_LOOK, STEP_WORDS, TRACK } from './words';
+
+/// A reason of the server as a sentence: its words for refusals carry underscores.
+const sentence = (reason: string): string => `${reason[0]!.toUpperCase()}${reason.slice(1).replaceAll('_', ' ')}${/[.!?]$/.test(reason) ? '' : '.'}`;
 
 export function Procedure() {
   tick.value;
@@ -20,7 +24,7 @@ export function Procedure() {
         <Mark shape="estimating" tone="ink" /><span class="cur">{STEP_WORDS[p.step]}{p.step === 'step_to_waypoint' && p.k > 0 && ` (${p.part} of ${p.k})`}</span><span class={`t cur ${stale ? 'stale' : ''}`}>{since === null ? '' : <Q v={fixed(since, 0)} u="s" />}</span>
         {next && flying(p) && <><Mark shape="off" tone="off" /><span>{STEP_WORDS[next]}</span><span class="t">{p.step_limit_s !== null && since !== null && p.step_limit_s > since ? `within ${fixed(p.step_limit_s - since, 0)} s` : ''}</span></>}
       </div>
-      {p.reason && <p class="why">{p.reason[0]!.toUpperCase() + p.reason.slice(1)}.</p>}
+      {p.reason && <p class="why">{sentence(p.reason)}</p>}
       {p.drone?.taken_over && <div class="callout caution"><b>The pilot has taken over by remote control.</b> No target is sent until the flight is started or resumed again.</div>}
       {p.mode === 'manual' && p.target && flying(p) && <div class="callout"><b>Fly by hand: {fixed(p.distance_m, 1)} m to go{p.target.height_m === null ? '' : `, to ${fixed(p.target.height_m, 1)} m above ground`}{p.target.heading_deg === null ? '' : `, nose ${bearing(p.target.heading_deg)}°`}.</b> The flight goes on by itself when RTK sees you there.</div>}
       <NotDone p={p} />
@@ -42,13 +46,13 @@ export function NextPoint() {
   const fly = chosen?.plan_m && p.target ? p.distance_m : null, measure = g.rule === 'dissertation' ? 'GDOP' : 'Error';
   return (
     <section class="sec-p" data-testid="next-point">
-      <div class="hd"><h2>Next point, P{g.iteration + 1}</h2>{chosen ? <Chip shape="ok" tone="ok" word={g.outcome ? g.outcome.toUpperCase() : 'CHOSEN'} /> : <Chip shape="off" tone="off" word="NONE" />}</div>
+      <div class="hd"><h2>Next point, P{g.iteration + 1}</h2>{chosen ? <Chip shape="ok" tone="ok" word="CHOSEN" /> : <Chip shape="off" tone="off" word="NONE" />}</div>
       <dl class="kv np2">
         <div><dt>Fly</dt><dd><Q v={fixed(fly, 1)} u="m" /></dd></div>
         <div><dt>{measure}</dt><dd>{value_words(g, g.value_before)} → {value_words(g, g.predicted ?? chosen?.value ?? null)}</dd></div>
         {g.reached !== null && <div><dt>Reached</dt><dd>{value_words(g, g.reached)}</dd></div>}
       </dl>
-      {g.reason && <p class="why">{g.reason[0]!.toUpperCase() + g.reason.slice(1)}.</p>}
+      {g.reason && <p class="why">{sentence(g.reason)}</p>}
       <Ramp g={g} />
       <details class="candidates"><summary>{g.candidates.length} candidates</summary>
         <table class="tbl"><caption class="sr">Candidates of the last decision, best first</caption><thead><tr><th scope="col">No.</th><th scope="col" class="num">{measure}</th><th scope="col" class="num">Height, m</th><th scope="col">Refused</th></tr></thead>
@@ -78,7 +82,7 @@ function TurnPolar({ t }: { t: ProfileMsg }) {
     <section class="sec-p" data-testid="turn-polar">
       <div class="hd"><h2>Turn, {t.anchor}</h2><span class="meta">{t.best === null ? 'no bearing yet' : `bearing ${bearing(t.best)}° ± ${fixed(t.sigma, 0)}°`}</span></div>
       <Drawing cls="scatter" label={`RSS over heading for ${t.anchor}, ${t.samples.length} samples${t.best === null ? '' : `; bearing ${fixed(t.best, 0)} degrees`}`} draw={(w, h) => {
-        const cx = w / 2, cy = h / 2, r = Math.min(w, h) / 2 - 18, at = (deg: number, v: number): [number, number] => { const d = (r * Math.max(0, v - lo)) / (hi - lo), a = (deg * Math.PI) / 180; return [cx + d * Math.sin(a), cy - d * Math.cos(a)]; };
+        const cx = w / 2, cy = h / 2, r = Math.max(0, Math.min(w, h) / 2 - 18), at = (deg: number, v: number): [number, number] => { const d = (r * Math.max(0, v - lo)) / (hi - lo), a = (deg * Math.PI) / 180; return [cx + d * Math.sin(a), cy - d * Math.cos(a)]; };
         const sorted = [...t.samples].sort((a, b) => a[0] - b[0]);
         return <>
           {[0.33, 0.66, 1].map((f) => <circle key={f} class="ringl" cx={cx} cy={cy} r={r * f} />)}
