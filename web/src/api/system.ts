@@ -45,7 +45,7 @@ export const act_on_device = (id: string, action: string): Promise<unknown> => r
 export const change_device = (id: string, change: object): Promise<unknown> => request('PATCH', `/devices/${id}`, change, { 'If-Match': '*', 'Content-Type': 'application/merge-patch+json' });
 export const forget_device = (id: string): Promise<unknown> => request('DELETE', `/devices/${id}`, undefined, { 'If-Match': '*' });
 
-export const tokens = (): Promise<Token[]> => items('/tokens?limit=200', (o) => ({ id: str(o.id), name: str(o.name), roles: words(o.roles), created_at: str(o.created_at), expires_at: str(o.expires_at) || null, revoked_at: str(o.revoked_at) || null, last_used_at: str(o.last_used_at) || null }));
+export const tokens = (): Promise<Token[]> => items('/tokens', (o) => ({ id: str(o.id), name: str(o.name), roles: words(o.roles), created_at: str(o.created_at), expires_at: str(o.expires_at) || null, revoked_at: str(o.revoked_at) || null, last_used_at: str(o.last_used_at) || null }));
 /// The secret is in this answer and nowhere else.
 export async function create_token(name: string, role: string): Promise<string> {
   return str(obj(await request('POST', '/tokens', { name, roles: [role] }, { 'Idempotency-Key': idempotency_key() }))?.token);
