@@ -1,6 +1,8 @@
 import { describe, expect, it } from 'vitest';
+import { estimate } from '../src/live/messages';
 import { ecef_from_geodetic, ellipse_from_covariance, enu_from_geodetic, magnification, round_length, sigma_h } from '../src/map/enu';
 import { accuracy, age, bearing, clock, fixed, grouped, latlon, plain } from '../src/ui/format';
+import { why_not_done } from '../src/ui/words';
 
 describe('ENU', () => {
   it('puts the equator at the semi-major axis and the pole at the semi-minor one', () => {
@@ -67,4 +69,10 @@ describe('format', () => {
     expect([6000, 240_000, 7.2e6, Infinity].map(age)).toEqual(['6 s', '4 min', '2 h', 'long']);
     expect([0.0004, 0.008, 0.07, 0.41, 1.44, 21.3, null].map(accuracy)).toEqual(['±1 mm', '±8 mm', '±7 cm', '±41 cm', '±1.4 m', '±21 m', '–']);
   });
+});
+
+describe('what to do about a twin', () => {
+  const twin = (e: number, u: number) => why_not_done(estimate({ anchor: '0x1', verdict: 'ambiguous', status: 'ambiguous', enu_m: [0, 0, 3], mirror: { enu_m: [e, 0, 3 + u], probability: 0.3 } })!)!.text;
+  it('is another height where the twin lies above', () => expect(twin(0.1, 7)).toMatch(/higher or lower/));
+  it('is to leave the line where it lies beside', () => expect(twin(6, 0)).toMatch(/across/));
 });

@@ -8,10 +8,12 @@ export const VERDICT_WORDS: Record<Verdict, string> = {
 export function why_not_done(e: EstimateMsg): { title: string; text: string } | null {
   if (e.verdict === 'ok' && (e.status === 'converged' || e.status === 'accepted')) return null;
   const text = e.reason ? `${e.reason[0]!.toUpperCase()}${e.reason.slice(1)}${/[.!?]$/.test(e.reason) ? '' : '.'}` : '';
+  // A twin above or below is told apart by height, one beside by leaving the line.
+  const level = e.mirror?.enu_m && e.enu_m && Math.hypot(e.mirror.enu_m[0] - e.enu_m[0], e.mirror.enu_m[1] - e.enu_m[1]) < 1;
   const advice: Record<Verdict, string> = {
     ok: 'More ranges from new directions will bring the ellipse below the limit.',
     weak_geometry: 'Fly where the anchor is seen from another side, and at another height.',
-    ambiguous: 'Leave the line flown so far: one stretch across it tells the two places apart.',
+    ambiguous: level ? 'Fly one stretch a few metres higher or lower: that tells the two heights apart.' : 'Leave the line flown so far: one stretch across it tells the two places apart.',
     too_few: 'Stay in reach of it for some more seconds.',
     diverged: 'Look for reflections, or for two devices with one id.',
   };
