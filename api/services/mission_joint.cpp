@@ -1,0 +1,51 @@
+#include "api/services/mission_service_state.hpp"
+#include "core/localize/flight_solver.hpp"
+
+namespace anchord::api {
+
+namespace {
+
+constexpr std::size_t k_min_joint_ranges = 100;  // below, the own search of each anchor is as good
+constexpr auto k_joint_pause = std::chrono::seconds(2);
+
+}  // namespace
+
+void MissionService::State::start_joint(const std::shared_ptr<Flight>& flight) {
+  if (stopped || flight->rebuilding || !joint.idle()) return;
+  Mission mission;
+  {
+    const std::scoped_lock lock(flight->queue_mutex);
+    mission = flight->mission;
+  }
+  const std::unique_lock lock(flight->work_mutex, std::try_to_lock);
+  if (!lock || flight->joint_running || flight->ranges_since_joint == 0) return;
+  const auto now = std::chrono::steady_clock::now();
+  if (flight->history.n_ranges() < k_min_joint_ranges || now < flight->joint_not_before) return;
+  JointWorker::Task task;
+  task.flight = flight->history.data(mission);
+  task.options.origin = flight->live.origin();
+  if (flight->frame == TrackFrame::wgs84 && !task.options.origin) return;
+  task.done = [self = this, flight, cut = flight->history.newest(), now](const FlightSolution* solution) {
+    self->finish_joint(*flight, solution, cut, std::chrono::steady_clock::now() - now);
+  };
+  // Set before the worker can be done.
+  flight->joint_running = true;
+  flight->ranges_since_joint = 0;
+  if (!joint.try_start(std::move(task))) flight->joint_running = false, flight->ranges_since_joint = 1;
+}
+
+void MissionService::State::finish_joint(Flight& flight, const FlightSolution* solution, UtcTime cut,
+                                         std::chrono::steady_clock::duration took) {
+  const std::scoped_lock lock(flight.work_mutex);
+  flight.joint_running = false;
+  // Three times as long a pause as the solution took: a quarter of one core at most, however long the flight.
+  flight.joint_not_before = std::chrono::steady_clock::now() +
+                            std::max<std::chrono::steady_clock::duration>(k_joint_pause, 3 * took);
+  if (solution == nullptr || stopped) return;
+  flight.live.adopt(*solution, cut);
+  flight.watch.note_lag(solution->shared.lag_s.value, solution->shared.lag_s.sigma);
+  announce(flight, false);
+  flight.dirty = true;
+}
+
+}  // namespace anchord::api

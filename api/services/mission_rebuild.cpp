@@ -1,0 +1,72 @@
+#include "api/services/mission_service_state.hpp"
+
+namespace anchord::api {
+
+void MissionService::State::begin_rebuild(const std::shared_ptr<Flight>& flight) {
+  const auto n = deps.measurements.count_ranges(flight->id),
+             fixes = deps.measurements.count_fixes(flight->id);
+  if (!n || !fixes || n.value() + fixes.value() == 0) {
+    flight->rebuilding = false;
+    return schedule(flight);
+  }
+  {
+    const std::scoped_lock lock(flight->work_mutex);
+    flight->rebuild = std::make_unique<Flight::Rebuild>();
+    auto& r = *flight->rebuild;
+    r.range_filter.mission = r.fix_filter.mission = flight->id;
+    r.range_filter.limit = r.fix_filter.limit = 2000;
+    r.range_filter.with_cir = deps.judge_needs_cir && deps.judge_needs_cir();
+    flight->live.hold(true);
+  }
+  continue_rebuild(flight);
+}
+
+void MissionService::State::continue_rebuild(const std::shared_ptr<Flight>& flight) {
+  post([self = shared_from_this(), flight] {
+    if (self->stopped) return;
+    if (self->rebuild_slice(*flight)) return self->continue_rebuild(flight);
+    flight->rebuilding = false;
+    self->schedule(flight);
+  });
+}
+
+/// Two sorted streams merged by time, a page of each in memory; one page of either a call. False at the end.
+bool MissionService::State::rebuild_slice(Flight& flight) {
+  const std::scoped_lock lock(flight.work_mutex);
+  auto& r = *flight.rebuild;
+  bool failed = false;
+  const auto refill = [&](auto& rows, auto& filter, bool& more, auto read) {
+    if (!rows.empty() || !more) return;
+    auto page = read(filter);
+    failed = failed || !page;
+    if (!page) return;
+    for (auto& row : page.value().rows) rows.push_back(std::move(row));
+    filter.after = page.value().next;
+    more = !filter.after.empty();
+  };
+  refill(r.ranges, r.range_filter, r.more_ranges, [&](auto& f) { return deps.measurements.ranges(f); });
+  refill(r.fixes, r.fix_filter, r.more_fixes, [&](auto& f) { return deps.measurements.fixes(f); });
+  const auto take = [&](auto& rows) {
+    const LiveRow row = row_of(std::move(rows.front()));
+    rows.pop_front();
+    flight.rebuilt.push_back(identity(row));
+    step(flight, row, true);
+  };
+  while (!failed && !(r.ranges.empty() && r.fixes.empty())) {
+    // A stream that has run dry in the middle waits for its next page.
+    if ((r.ranges.empty() && r.more_ranges) || (r.fixes.empty() && r.more_fixes)) return true;
+    if (r.fixes.empty() || (!r.ranges.empty() && r.ranges.front().time < r.fixes.front().time))
+      take(r.ranges);
+    else
+      take(r.fixes);
+  }
+  flight.rebuild.reset();
+  std::ranges::sort(flight.rebuilt);
+  flight.live.hold(false);
+  announce(flight, true);
+  publish_pose(flight);
+  flight.dirty = true;
+  return false;
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,109 @@
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <variant>
+
+#include "api/json/live_writer.hpp"
+#include "api/services/flight_watch.hpp"
+#include "api/services/joint_worker.hpp"
+#include "api/services/live_row.hpp"
+#include "api/services/mission_service.hpp"
+#include "api/services/radio_watch.hpp"
+#include "core/localize/flight_history.hpp"
+#include "core/localize/live_flight.hpp"
+#include "core/ports/store.hpp"
+
+namespace anchord::api {
+
+/// One followed flight. `queue_mutex` guards what requests touch, `work_mutex` is the strand of the rest.
+struct MissionService::Flight {
+  explicit Flight(const Mission& m) : id(m.id), frame(m.frame), mission(m), live(m) {}
+  const MissionId id;
+  const TrackFrame frame;
+  std::mutex queue_mutex;
+  Mission mission;  ///< under queue_mutex
+  std::deque<LiveRow> queue;
+  bool scheduled{false};
+  std::uint64_t dropped{0};
+  UtcTime last_arrival{};
+  std::optional<UtcTime> fix_arrival{}, range_arrival{};
+  std::mutex work_mutex;  ///< the strand: everything below
+  LiveFlight live;
+  std::map<NetworkId, std::string> statuses;
+  MissionLiveState state;
+  std::int64_t last_pose_us{0}, last_rtk_us{0};
+  std::deque<std::int64_t> range_times_us;
+  std::atomic<bool> dirty{true};
+  FlightHistory history;
+  std::size_t ranges_since_joint{0};
+  std::chrono::steady_clock::time_point joint_not_before{};
+  bool joint_running{false};
+
+  FlightWatch watch;
+  std::atomic<bool> rebuilding{false};  ///< rows wait in the queue until what was stored is in
+  struct Rebuild {
+    MeasurementStore::Filter range_filter{}, fix_filter{};
+    std::deque<Range> ranges;
+    std::deque<Fix> fixes;
+    bool more_ranges{true}, more_fixes{true};
+  };
+  std::unique_ptr<Rebuild> rebuild;
+  std::vector<std::size_t> rebuilt;  ///< identities, sorted at the end, until the queue was worked off once
+};
+
+/// What the service is inside; its parts are in mission_live.cpp (rows to estimates to the hub),
+/// mission_rebuild.cpp (what was stored, after a restart) and mission_joint.cpp (the joint solution in
+/// flight).
+struct MissionService::State : std::enable_shared_from_this<MissionService::State> {
+  explicit State(Deps d) : deps(std::move(d)) {}
+  Deps deps;
+  std::mutex mutex;
+  std::map<MissionId, Mission> cache;
+  std::map<MissionId, std::shared_ptr<Flight>> flights;
+  RadioWatch radios;
+  std::atomic<std::size_t> queued{0};
+  std::atomic<bool> stopped{false};
+  std::atomic<std::uint64_t> finished{0};
+  std::atomic<MissionObserver*> observer{nullptr};
+  std::mutex running_mutex;
+  std::condition_variable idle;
+  int running{0};
+  std::int64_t ticks{0};
+  JointWorker joint;
+
+  std::vector<std::shared_ptr<Flight>> all() {
+    std::vector<std::shared_ptr<Flight>> out;
+    const std::scoped_lock lock(mutex);
+    for (const auto& [id, flight] : flights) out.push_back(flight);
+    return out;
+  }
+  std::shared_ptr<Flight> find(const MissionId& id) {
+    const std::scoped_lock lock(mutex);
+    const auto it = flights.find(id);
+    return it == flights.end() ? nullptr : it->second;
+  }
+
+  template <class R>
+  void accept(std::vector<R> rows);  ///< of Range and of Fix
+  LiveRow row_of(Range range) const;
+  static LiveRow row_of(Fix fix) { return fix; }
+  void schedule(const std::shared_ptr<Flight>& flight);
+  void work(Flight& flight);
+  void step(Flight& flight, const LiveRow& row, bool quiet);
+  void announce(Flight& flight, bool quiet);
+  void publish_pose(Flight& flight);
+  void begin_rebuild(const std::shared_ptr<Flight>& flight);
+  void continue_rebuild(const std::shared_ptr<Flight>& flight);
+  bool rebuild_slice(Flight& flight);
+  void post(std::function<void()> task);
+  void start_joint(const std::shared_ptr<Flight>& flight);
+  void finish_joint(Flight& flight, const FlightSolution* solution, UtcTime cut,
+                    std::chrono::steady_clock::duration took);
+  void publish_devices();
+};
+
+}  // namespace anchord::api
