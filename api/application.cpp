@@ -8,6 +8,7 @@
 
 #include "api/json/live_writer.hpp"
 #include "api/json/wire_devices.hpp"
+#include "api/learning/promotion_events.hpp"
 #include "api/live/conversation.hpp"
 #include "api/live/hub.hpp"
 #include "api/routes/access_routes.hpp"
@@ -215,6 +216,11 @@ void Application::start() {
   if (state_->models) {
     const auto loaded = state_->models->reload();
     if (!loaded && state_->deps.log_fault) state_->deps.log_fault("", loaded.error().message);
+    const auto before = promotion_events(state_->deps.learning->models, state_->deps.missions);
+    if (before)
+      state_->events.restore(before.value());
+    else if (state_->deps.log_fault)
+      state_->deps.log_fault("", before.error().message);
   }
   if (state_->flights) state_->flights->start();
   state_->jobs.start();

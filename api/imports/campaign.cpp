@@ -7,8 +7,10 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
+#include "api/imports/cells.hpp"
 #include "api/imports/column_names.hpp"
 #include "api/json/reader.hpp"
+#include "api/json/wire_rows.hpp"
 #include "core/ml/dataset.hpp"
 
 namespace anchord::api {
@@ -20,18 +22,11 @@ constexpr double k_furthest_m = 10'000;
 
 // Names of the hand-measured truth; a column of measured ranges may be called distance_m only where another
 // column is the truth.
-const Names k_site_name{"site", "setup_id", "setup", "placement", "measurement_point"};
+const Names k_site_name{"site", "setting", "setup_id", "setup", "placement", "measurement_point"};
 const Names k_environment{"environment", "env", "place", "room"};
 const Names k_campaign_truth{"true_distance_m", "true_range_m", "truth_m", "laser_m"};
 const Names k_measured{"range_m", "measured_range_m", "range"};
 const Names k_measured_mm{"range_mm", "measured_range_mm"};
-
-std::optional<double> number(std::string_view text) {
-  double value{};
-  const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (status != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
-  return value;
-}
 
 std::string_view trimmed(std::string_view text) {
   while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
@@ -91,7 +86,7 @@ class Importer {
 
   void take_line(std::string_view line, std::size_t number_of_line) {
     if (line.front() == '#') {
-      take_comment(trimmed(line.substr(1)));
+      take_comment(trimmed(line.substr(1)), number_of_line);
       return;
     }
     switch (out_.report.format) {
@@ -106,19 +101,24 @@ class Importer {
   }
 
   // "# key = value" or "# key: value": ground truth of the lines that follow.
-  void take_comment(std::string_view text) {
+  void take_comment(std::string_view text, std::size_t number_of_line) {
     const auto at = text.find_first_of("=:");
     if (at == std::string_view::npos) return;
-    const Row row{{std::string{trimmed(text.substr(0, at))}, std::string{trimmed(text.substr(at + 1))}}};
+    std::string value{trimmed(text.substr(at + 1))};
+    if (const auto parsed = cell_number(value, true); parsed && value.find(',') != std::string::npos)
+      value[value.find(',')] = '.';
+    const Row row{{std::string{trimmed(text.substr(0, at))}, std::move(value)}};
     std::string fault;
     auto changed = site_of(row, defaults_, fault);
-    if (fault.empty()) defaults_ = std::move(changed);
+    if (!fault.empty()) return refuse(number_of_line, fault);
+    defaults_ = std::move(changed);
   }
 
   void take_csv(std::string_view line, std::size_t at) {
+    if (header_.empty()) separator_ = separator_of(line);
     std::vector<std::string_view> cells;
     for (std::string_view rest = line;;) {
-      const auto comma = rest.find(',');
+      const auto comma = rest.find(separator_);
       auto cell = trimmed(rest.substr(0, comma));
       if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"')
         cell = cell.substr(1, cell.size() - 2);
@@ -132,8 +132,7 @@ class Importer {
     }
     ++out_.report.lines;
     if (cells.size() != header_.size())
-      return refuse(
-          at, std::to_string(cells.size()) + " cells, the header has " + std::to_string(header_.size()));
+      return refuse(at, wrong_cell_count(cells.size(), header_.size(), separator_));
     Row row;
     for (std::size_t c = 0; c < cells.size(); ++c) row.emplace(header_[c], cells[c]);
     take_row(row, at);
@@ -145,9 +144,14 @@ class Importer {
     if (const auto fault = parse_json(line, object)) return refuse(at, fault->detail);
     if (!object.is_object()) return refuse(at, "not a JSON object");
     Row row;
+    std::optional<Cir> cir;
     for (const auto& [key, value] : object.items()) {
       if (value.is_null()) continue;
-      if (value.is_boolean())
+      if (key == "cir" && value.is_object()) {
+        std::vector<FieldError> errors;
+        cir = read_cir(value, "/cir", errors);
+        if (!errors.empty()) return refuse(at, errors.front().pointer + " " + errors.front().detail);
+      } else if (value.is_boolean())
         row.emplace(key, value.get<bool>() ? "1" : "0");
       else if (value.is_string())
         row.emplace(key, value.get<std::string>());
@@ -156,26 +160,36 @@ class Importer {
       else
         return refuse(at, key + " is neither a number nor text");
     }
-    take_row(row, at);
+    take_row(row, at, std::move(cir));
   }
 
-  // Milliseconds, millimetres, dBm: the first three numbers of the line, whatever stands between them.
+  // Milliseconds, millimetres, dBm: the first three numbers of the line, whatever stands between them. Where
+  // blanks, tabs or semicolons stand between numbers, a comma inside one is a decimal comma.
   void take_txt(std::string_view line, std::size_t at) {
     ++out_.report.lines;
+    const bool commas_alone = line.find_first_of(" \t;") == std::string_view::npos;
+    const auto commas = std::count(line.begin(), line.end(), ',');
+    if (commas_alone && commas > 2)
+      return refuse(at,
+                    std::to_string(commas + 1) +
+                        " numbers separated by commas alone: decimal commas need blanks or semicolons "
+                        "between the numbers, else give time in ms, distance in mm and level in dBm only");
+    const auto digit = [&](std::size_t i) { return i < line.size() && line[i] >= '0' && line[i] <= '9'; };
     std::array<double, 3> value{};
     std::size_t n = 0;
     for (std::size_t i = 0; i < line.size() && n < 3;) {
-      const char c = line[i];
-      const bool starts = (c >= '0' && c <= '9') ||
-                          (c == '-' && i + 1 < line.size() && line[i + 1] >= '0' && line[i + 1] <= '9');
-      if (!starts) {
+      if (!digit(i) && !(line[i] == '-' && digit(i + 1))) {
         ++i;
         continue;
       }
-      const auto [end, status] = std::from_chars(line.data() + i, line.data() + line.size(), value[n]);
-      if (status != std::errc{}) return refuse(at, "not a number in \"" + std::string{line} + "\"");
-      ++n;
-      i = static_cast<std::size_t>(end - line.data());
+      std::size_t end = i + 1;
+      while (digit(end) || (end < line.size() && line[end] == '.' && digit(end + 1)) ||
+             (!commas_alone && end < line.size() && line[end] == ',' && digit(end + 1)))
+        ++end;
+      const auto number = cell_number(line.substr(i, end - i), true);
+      if (!number) return refuse(at, "not a number in \"" + std::string{line} + "\"");
+      value[n++] = *number;
+      i = end;
     }
     if (n < 2) return refuse(at, "needs a time in ms and a distance in mm");
     CampaignMeasurement m;
@@ -185,7 +199,7 @@ class Importer {
     keep(defaults_, std::move(m), at);
   }
 
-  void take_row(const Row& row, std::size_t at) {
+  void take_row(const Row& row, std::size_t at, std::optional<Cir> cir = std::nullopt) {
     std::string fault;
     auto site = site_of(row, defaults_, fault);
     CampaignMeasurement m;
@@ -211,10 +225,13 @@ class Importer {
     m.std_noise = value(k_std_noise), m.max_noise = value(k_max_noise), m.fp_index = value(k_fp_index);
     if (!fault.empty()) return refuse(at, fault);
     m.range_m = *range;
+    m.cir = std::move(cir);
     keep(site, std::move(m), at);
   }
 
-  static CampaignSite site_of(const Row& row, CampaignSite site, std::string& fault) {
+  std::optional<double> number(std::string_view text) const { return cell_number(text, separator_ != ','); }
+
+  CampaignSite site_of(const Row& row, CampaignSite site, std::string& fault) const {
     const auto text = [&](const Names& names, std::string& out) {
       if (auto found = find(row, names)) out = std::move(*found);
     };
@@ -332,6 +349,7 @@ class Importer {
   const CampaignOptions& options_;
   CampaignSite defaults_;
   std::vector<std::string> header_;
+  char separator_{','};
   std::size_t last_{static_cast<std::size_t>(-1)};
   std::optional<Error> fatal_;
   CampaignImport out_;

@@ -57,7 +57,8 @@ Result<CampaignImport> import_campaign(std::string_view text, const CampaignOpti
 /// site; sites without a name of an environment are places of their own.
 LabelledTable table_of(const Campaign& campaign);
 
-/// CSV of everything kept, ground truth in every row: read again, it is the same campaign.
+/// CSV of everything kept but impulse responses, ground truth in every row: read again, it is the same
+/// campaign.
 std::string campaign_csv(const Campaign& campaign);
 
 }  // namespace anchord::api

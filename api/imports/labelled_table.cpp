@@ -1,10 +1,10 @@
 #include "api/imports/labelled_table.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <unordered_map>
 
+#include "api/imports/cells.hpp"
 #include "api/imports/column_names.hpp"
 #include "api/imports/gzip_lines.hpp"
 
@@ -15,15 +15,9 @@ using namespace columns;
 
 const Names k_group{"group",    "env",     "environment", "place",   "room",
                     "campaign", "session", "setup",       "tag_pos", "anchor_height_m"};
-const Names k_placement{"setup_id", "placement", "setup"};
+const Names k_placement{"setup_id", "placement", "setup", "setting", "measurement_point"};
 const Names k_time{"t_s", "unix_s", "t_us", "time_s"};
 const Names k_joins{"setup", "idx", "seq"};
-// Registers that trees like as they are. Positions, identities and times are never features: they name the
-// place.
-const Names k_registers{"fp_amp1", "fp_amp2", "fp_amp3",      "cir_pwr", "std_noise", "max_noise",
-                        "rxpacc",  "fp_raw",  "cir_kurtosis", "grp1",    "grp2",      "grp3",
-                        "grp4",    "grp5",    "grp6",         "grp7",    "grp8"};
-
 constexpr std::size_t k_none = static_cast<std::size_t>(-1);
 constexpr std::size_t k_time_blocks = 10;
 constexpr double k_nan = std::numeric_limits<double>::quiet_NaN();
@@ -42,22 +36,11 @@ void split(std::string_view line, std::vector<std::string_view>& cells, char sep
   }
 }
 
-double number(std::string_view cell) {
-  double value = k_nan;
-  const auto [end, status] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  return status == std::errc{} && end == cell.data() + cell.size() && std::isfinite(value) ? value : k_nan;
+double number(std::string_view cell, bool decimal_comma = false) {
+  return cell_number(cell, decimal_comma).value_or(k_nan);
 }
 
 std::optional<double> finite(double value) { return std::isnan(value) ? std::nullopt : std::optional{value}; }
-
-/// Comma, semicolon or tab: the one the header has most of.
-char separator_of(std::string_view header) {
-  char best = ',';
-  for (const char c : {';', '\t'})
-    if (std::count(header.begin(), header.end(), c) > std::count(header.begin(), header.end(), best))
-      best = c;
-  return best;
-}
 
 /// "FP Power [dBm]" and "fp_power_dbm" are one name.
 std::string plain_name(std::string_view name) {
@@ -175,6 +158,8 @@ class Reader {
     if (!any) return make_error(Errc::bad_frame, file_ + ": empty file, a header line is needed");
     if (line.starts_with("\xEF\xBB\xBF")) line.remove_prefix(3);
     const char separator = separator_of(line);
+    decimal_comma_ = separator != ',';
+    out_.file_names.push_back(file_);
     std::vector<std::string_view> cells;
     split(line, cells, separator);
     BOOST_OUTCOME_TRY(take_header(cells));
@@ -193,9 +178,9 @@ class Reader {
       if (line.empty()) continue;
       split(line, cells, separator);
       if (cells.size() != header_.names.size())
-        return make_error(Errc::bad_frame, file_ + ":" + std::to_string(lines.line_number()) + ": " +
-                                               std::to_string(cells.size()) + " cells, the header has " +
-                                               std::to_string(header_.names.size()));
+        return make_error(Errc::bad_frame,
+                          file_ + ":" + std::to_string(lines.line_number()) + ": " +
+                              wrong_cell_count(cells.size(), header_.names.size(), separator));
       ++out_.rows_read;
       const nlos::CirShape* shape = nullptr;
       if (cir) {
@@ -332,6 +317,7 @@ class Reader {
     // A true range that repeats names its placement, together with the place and the class.
     if (placement_columns_.empty() && truth_ != k_none) {
       placement_columns_ = group_columns_;
+      placed_by_truth_ = true;
       add(truth_);
       add(label_);
     }
@@ -369,9 +355,13 @@ class Reader {
     if (entry.first++ == 0) entry.second = file_ + ":" + std::to_string(line);
   }
 
+  static const char* lacks(std::string_view cell) {
+    return says_nothing(cell) ? " missing" : " is no number";
+  }
+
   void take_row(const std::vector<std::string_view>& cells, std::size_t line, const nlos::CirShape* shape) {
     values_.clear();
-    for (const auto cell : cells) values_.push_back(number(cell));
+    for (const auto cell : cells) values_.push_back(number(cell, decimal_comma_));
     const auto value = [&](const Names& names) {
       const auto at = level_columns_.at(&names);
       return at == k_none ? std::nullopt : finite(values_[at]);
@@ -379,14 +369,14 @@ class Reader {
     // A set without ranges can still tell classes by levels.
     const double range = range_ == k_none ? 0 : values_[range_] * metres_per_unit(header_.names[range_]);
     if (range_ != k_none && !(range > 0))
-      return drop(
-          std::isnan(range) ? header_.names[range_] + " missing" : header_.names[range_] + " not above zero",
-          line);
+      return drop(header_.names[range_] + (std::isnan(range) ? lacks(cells[range_]) : " not above zero"),
+                  line);
     if (range > 1e4) return drop(header_.names[range_] + " beyond 10 km", line);
+    // A class needs no true range: whoever asks for a bias leaves rows without one out.
     std::optional<double> truth;
-    if (truth_ != k_none) {
+    if (truth_ != k_none && !says_nothing(cells[truth_])) {
       truth = finite(values_[truth_] * metres_per_unit(header_.names[truth_]));
-      if (!truth) return drop(header_.names[truth_] + " missing", line);
+      if (!truth) return drop(header_.names[truth_] + " is no number", line);
       if (!(*truth > 0) || *truth > 1e4) return drop(header_.names[truth_] + " impossible", line);
     }
     if (label_ != k_none && cells[label_].empty()) return drop(header_.names[label_] + " missing", line);
@@ -414,10 +404,14 @@ class Reader {
     else if (out_.grouping == Grouping::row)
       group = std::to_string(out_.rows());
     out_.group.push_back(out_.grouping == Grouping::time_block ? 0 : groups_.of(group));
-    out_.placement.push_back(placement_columns_.empty()
-                                 ? static_cast<std::uint32_t>(out_.rows())
-                                 : placements_.of((several_files_ ? file_ + "/" : "") + group + "/" +
-                                                  joined(cells, placement_columns_)));
+    out_.line.push_back(static_cast<std::uint32_t>(line));
+    out_.file.push_back(static_cast<std::uint32_t>(out_.file_names.size() - 1));
+    // Placements told apart by their true range: without one, a row is a placement of its own.
+    const bool alone = placement_columns_.empty() || (placed_by_truth_ && !truth);
+    const std::string own = alone ? "line " + std::to_string(line) : joined(cells, placement_columns_);
+    out_.placement.push_back(
+        placements_.of((several_files_ ? file_ + "/" : "") + (alone ? own : group + "/" + own)));
+    if (out_.placement.back() == out_.placement_names.size()) out_.placement_names.push_back(own);
   }
 
   Result<void> map_labels() {
@@ -450,6 +444,7 @@ class Reader {
 
   const TableOptions& options_;
   bool several_files_;
+  bool decimal_comma_{false}, placed_by_truth_{false};
   std::string file_;
   Header header_{};
   std::size_t range_{k_none}, label_{k_none}, truth_{k_none};
@@ -475,76 +470,6 @@ Result<LabelledTable> read_labelled_tables(std::span<const std::filesystem::path
     BOOST_OUTCOME_TRY(reader.read(path, cir ? &*cir : nullptr));
   }
   return reader.finish();
-}
-
-Result<ml::Dataset> dataset_from(const LabelledTable& table, const SetRequest& request,
-                                 std::vector<std::size_t>& rows,
-                                 std::map<std::string, std::size_t>& dropped) {
-  if (request.need_label && !table.labelled())
-    return make_error(Errc::not_found, "no label column (nlos, los, label, cls): name it with --label");
-  if (request.need_truth && !table.has_truth())
-    return make_error(Errc::not_found, "no column of true ranges (true_range_m): name it with --truth");
-  struct Source {
-    std::optional<nlos::Feature> feature;
-    std::size_t column{};
-  };
-  std::vector<Source> sources;
-  for (const auto& name : request.features) {
-    const auto feature = nlos::feature_of(name);
-    const auto column = std::find(table.raw_names.begin(), table.raw_names.end(), name);
-    if (!feature && column == table.raw_names.end())
-      return make_error(Errc::not_found, "no feature or column named " + name);
-    sources.push_back({feature, static_cast<std::size_t>(column - table.raw_names.begin())});
-  }
-  ml::Dataset out;
-  out.features = request.features;
-  out.group_names = table.group_names;
-  rows.clear();
-  std::vector<double> values(sources.size());
-  for (std::size_t i = 0; i < table.rows(); ++i) {
-    bool whole = true;
-    for (std::size_t f = 0; f < sources.size() && whole; ++f) {
-      const auto value = sources[f].feature
-                             ? table.features[i].get(*sources[f].feature)
-                             : finite(table.raw[i * table.raw_names.size() + sources[f].column]);
-      whole = value.has_value();
-      if (!whole)
-        ++dropped["no " + request.features[f]];
-      else
-        values[f] = *value;
-    }
-    if (!whole) continue;
-    out.x.insert(out.x.end(), values.begin(), values.end());
-    if (table.labelled()) out.los.push_back(table.los[i].value_or(false) ? 1 : 0);
-    if (table.has_truth()) out.bias_m.push_back(table.range_m[i] - *table.true_range_m[i]);
-    out.weight.push_back(1);
-    out.group.push_back(table.group[i]);
-    out.placement.push_back(table.placement[i]);
-    rows.push_back(i);
-  }
-  if (rows.empty()) return make_error(Errc::too_few_observations, "no row has all of the features asked for");
-  return out;
-}
-
-std::vector<std::string> available_features(const LabelledTable& table, bool with_registers) {
-  std::vector<std::string> out;
-  const auto most = static_cast<std::size_t>(0.99 * static_cast<double>(table.rows()));
-  for (std::size_t f = 0; f < nlos::k_feature_count; ++f) {
-    std::size_t present = 0;
-    for (const auto& row : table.features) present += row.present.test(f) ? 1 : 0;
-    if (present >= most && present > 0) out.emplace_back(nlos::feature_name(static_cast<nlos::Feature>(f)));
-  }
-  if (!with_registers) return out;
-  for (const auto name : k_registers) {
-    const auto at = std::find(table.raw_names.begin(), table.raw_names.end(), name);
-    if (at == table.raw_names.end()) continue;
-    const auto column = static_cast<std::size_t>(at - table.raw_names.begin());
-    std::size_t present = 0;
-    for (std::size_t i = 0; i < table.rows(); ++i)
-      present += std::isnan(table.raw[i * table.raw_names.size() + column]) ? 0 : 1;
-    if (present >= most) out.emplace_back(name);
-  }
-  return out;
 }
 
 }  // namespace anchord::api

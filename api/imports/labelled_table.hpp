@@ -17,6 +17,8 @@
 /// (docs/learning.md lists the names).
 namespace anchord::api {
 
+struct DatasetTable;
+
 struct TableOptions {
   std::string label{};  ///< column; empty: nlos, is_nlos, los, label, cls, class
   std::string
@@ -27,6 +29,9 @@ struct TableOptions {
   std::vector<std::string> placement{};        ///< columns naming one placement; empty: setup_id, ...
   std::optional<std::filesystem::path> cir{};  ///< table of |taps| m0.. with join columns (setup, idx)
 };
+
+/// Reason -> how many rows were left out, and where the first of them stands ("rooms.csv:17").
+using Dropped = std::map<std::string, std::pair<std::size_t, std::string>>;
 
 /// How the rows were told apart for splits.
 enum class Grouping { column, file, time_block, row };
@@ -43,9 +48,12 @@ struct LabelledTable {
   std::string label_column{}, truth_column{}, group_by{}, placement_by{};
   Grouping grouping{Grouping::row};
   std::size_t rows_read{};
-  std::map<std::string, std::pair<std::size_t, std::string>>
-      dropped{};  ///< reason -> how many, first "file:line"
+  Dropped dropped{};
+  std::vector<std::uint32_t> file{}, line{};  ///< where each row stands; empty where the rows are of no file
+  std::vector<std::string> file_names{};
+  std::vector<std::string> placement_names{};  ///< within their place: two places may use a name twice
 
+  std::string where(std::size_t row) const;  ///< "file:line"
   std::size_t rows() const { return range_m.size(); }
   bool labelled() const { return !label_column.empty(); }
   bool has_truth() const { return !truth_column.empty(); }
@@ -57,14 +65,20 @@ Result<LabelledTable> read_labelled_tables(std::span<const std::filesystem::path
                                            const TableOptions& options);
 
 /// A data set of the named features (computed ones by their name, others as columns of the file); rows that
-/// lack one, or a label or truth that is asked for, are left out and counted in `dropped`. `rows` receives
-/// the table's row of each of the set's.
+/// lack one, or a label or truth that is asked for, are left out and counted in `dropped`, feature by
+/// feature. Without `need_truth` the set has a bias only where all of its rows have a true range. `rows`
+/// receives the table's row of each of the set's. errors: not_found (feature, label or truth column),
+/// too_few_observations (says what the rows lack)
 struct SetRequest {
   std::vector<std::string> features{};
   bool need_label{}, need_truth{};
 };
 Result<ml::Dataset> dataset_from(const LabelledTable& table, const SetRequest& request,
-                                 std::vector<std::size_t>& rows, std::map<std::string, std::size_t>& dropped);
+                                 std::vector<std::size_t>& rows, Dropped& dropped);
+
+/// Every row with all its features and registers, not yet frozen: its place is the environment, its placement
+/// the setting. campaign  empty: the name of its file
+DatasetTable dataset_rows(const LabelledTable& table, const std::string& campaign = {});
 
 /// Names every row (but at most 1 %) has: computed features, then the register columns that are features in
 /// their own right.

@@ -50,35 +50,6 @@ std::optional<NetworkId> read_network_id(Fields& fields, std::string_view key) {
   return std::nullopt;
 }
 
-std::optional<Cir> read_cir(const Json& value, const std::string& at, std::vector<FieldError>& errors) {
-  const std::size_t before = errors.size();
-  Fields fields(value, at, errors);
-  Cir cir;
-  const auto n = fields.integer("n", 1, 4096, true);
-  if (const auto dt = fields.number("dt_ps", 1, 1e6)) cir.dt_ps = *dt;
-  cir.first_path_idx = fields.number("first_path_idx", 0, 4096);
-  cir.preamble_count = fields.number("rxpacc", 0, 1e6);
-  if (const auto text = fields.text("b64", 32768, true)) {
-    const auto bytes = from_base64(*text);
-    if (!bytes) {
-      fields.error("b64", "bad_base64", "is not base64");
-    } else if (n && bytes->size() != static_cast<std::size_t>(*n) * 4) {
-      fields.error("b64", "wrong_length",
-                   "holds " + std::to_string(bytes->size()) + " bytes, n says " + std::to_string(*n * 4));
-    } else {
-      cir.re_im.resize(bytes->size() / 2);
-      for (std::size_t i = 0; i < cir.re_im.size(); ++i) {
-        const auto low = static_cast<unsigned char>((*bytes)[2 * i]);
-        const auto high = static_cast<unsigned char>((*bytes)[2 * i + 1]);
-        cir.re_im[i] = static_cast<std::int16_t>(static_cast<std::uint16_t>(low | (high << 8)));
-      }
-    }
-  }
-  fields.finish();
-  if (errors.size() != before) return std::nullopt;
-  return cir;
-}
-
 void read_position(Fields& fields, Fix& fix) {
   const bool local = fields.has("local_m");
   const auto local_m = fields.numbers("local_m", 3, -1e5, 1e5);
@@ -143,6 +114,35 @@ void put_if(Ordered& out, const char* key, const auto& value) {
 }
 
 }  // namespace
+
+std::optional<Cir> read_cir(const Json& value, const std::string& at, std::vector<FieldError>& errors) {
+  const std::size_t before = errors.size();
+  Fields fields(value, at, errors);
+  Cir cir;
+  const auto n = fields.integer("n", 1, 4096, true);
+  if (const auto dt = fields.number("dt_ps", 1, 1e6)) cir.dt_ps = *dt;
+  cir.first_path_idx = fields.number("first_path_idx", 0, 4096);
+  cir.preamble_count = fields.number("rxpacc", 0, 1e6);
+  if (const auto text = fields.text("b64", 32768, true)) {
+    const auto bytes = from_base64(*text);
+    if (!bytes) {
+      fields.error("b64", "bad_base64", "is not base64");
+    } else if (n && bytes->size() != static_cast<std::size_t>(*n) * 4) {
+      fields.error("b64", "wrong_length",
+                   "holds " + std::to_string(bytes->size()) + " bytes, n says " + std::to_string(*n * 4));
+    } else {
+      cir.re_im.resize(bytes->size() / 2);
+      for (std::size_t i = 0; i < cir.re_im.size(); ++i) {
+        const auto low = static_cast<unsigned char>((*bytes)[2 * i]);
+        const auto high = static_cast<unsigned char>((*bytes)[2 * i + 1]);
+        cir.re_im[i] = static_cast<std::int16_t>(static_cast<std::uint16_t>(low | (high << 8)));
+      }
+    }
+  }
+  fields.finish();
+  if (errors.size() != before) return std::nullopt;
+  return cir;
+}
 
 std::string_view fix_word(FixClass fix) { return k_fix_words[static_cast<std::size_t>(fix)]; }
 

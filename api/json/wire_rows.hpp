@@ -33,6 +33,9 @@ Fix read_fix(const nlohmann::json& row, const std::optional<MissionId>& mission,
 
 nlohmann::ordered_json range_json(const Range& range, std::optional<std::int64_t> id);
 nlohmann::ordered_json fix_json(const Fix& fix, std::optional<std::int64_t> id);
+/// {"n", "dt_ps", "first_path_idx", "rxpacc", "b64"}; what is wrong goes to `errors`, under `at`.
+std::optional<Cir> read_cir(const nlohmann::json& value, const std::string& at,
+                            std::vector<FieldError>& errors);
 nlohmann::ordered_json cir_json(const Cir& cir);
 /// int16 re, im, little endian.
 std::string cir_bytes(const Cir& cir);

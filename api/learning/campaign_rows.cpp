@@ -104,6 +104,7 @@ CampaignRows read_campaign_rows(const Request& request) {
     x.fp_amp1 = m.fp_amp1, x.fp_amp2 = m.fp_amp2, x.fp_amp3 = m.fp_amp3;
     x.cir_power = m.cir_power, x.preamble_count = m.preamble_count;
     x.std_noise = m.std_noise, x.max_noise = m.max_noise, x.fp_index = m.fp_index;
+    x.cir = m.cir;
     out.rows.push_back(std::move(row));
   }
   return out;

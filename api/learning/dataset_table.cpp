@@ -5,6 +5,7 @@
 #include <bitset>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "core/base/sha256.hpp"
@@ -20,6 +21,7 @@ constexpr std::array<std::string_view, 7> k_columns{"campaign", "environment",  
 constexpr std::string_view k_formula = "=+-@\t\r";
 /// Features that name the version in the first line, so that other formulas are never mixed in.
 constexpr std::string_view k_version_column = "feature_set";
+constexpr double k_nan = std::numeric_limits<double>::quiet_NaN();
 
 void put_number(std::string& out, double value) {
   std::array<char, 40> text{};
@@ -91,7 +93,43 @@ Error bad(std::size_t line, const std::string& what) {
   return make_error(Errc::bad_frame, "line " + std::to_string(line) + ": " + what);
 }
 
+/// What stands after the fixed columns, in any order.
+struct Column {
+  std::string name;
+  std::optional<Feature> feature{};
+  std::size_t slot{};  ///< of the registers, which keep their own order
+};
+
+Result<std::vector<Column>> columns_of(const std::vector<std::string>& header,
+                                       std::vector<std::string>& registers) {
+  std::vector<Column> out;
+  std::set<std::string> seen;
+  for (std::size_t c = k_columns.size() + 1; c < header.size(); ++c) {
+    if (!seen.insert(header[c]).second) return bad(1, "column " + header[c] + " stands twice");
+    out.push_back({header[c], nlos::feature_of(header[c]), 0});
+  }
+  for (const auto name : register_columns())
+    if (seen.erase(std::string(name)) > 0) registers.emplace_back(name);
+  for (auto& column : out) {
+    const auto at = std::find(registers.begin(), registers.end(), column.name);
+    if (!column.feature && at == registers.end())
+      return bad(1, "no feature is named " + column.name.substr(0, 60));
+    column.slot = static_cast<std::size_t>(at - registers.begin());
+  }
+  return out;
+}
+
 }  // namespace
+
+const std::vector<std::string_view>& register_columns() {
+  static const std::vector<std::string_view> k_registers{
+      "fp_amp1", "fp_amp2", "fp_amp3",      "cir_pwr", "std_noise", "max_noise",
+      "rxpacc",  "fp_raw",  "cir_kurtosis", "grp1",    "grp2",      "grp3",
+      "grp4",    "grp5",    "grp6",         "grp7",    "grp8"};
+  return k_registers;
+}
+
+bool is_dataset_csv(std::string_view text) { return text.starts_with("feature_set,campaign,environment,"); }
 
 std::string_view place_word(Place place) {
   switch (place) {
@@ -131,6 +169,13 @@ std::string DatasetTable::csv() const {
   for (const auto column : k_columns) out.append(",").append(column);
   for (std::size_t f = 0; f < k_feature_count; ++f)
     if (used.test(f)) out.append(",").append(nlos::feature_name(static_cast<Feature>(f)));
+  std::vector<std::size_t> kept;
+  for (std::size_t c = 0; c < registers.size(); ++c) {
+    if (std::all_of(rows.begin(), rows.end(), [c](const auto& row) { return std::isnan(row.registers[c]); }))
+      continue;
+    kept.push_back(c);
+    out.append(",").append(registers[c]);
+  }
   out += '\n';
   for (const auto& row : rows) {
     out += nlos::k_feature_set_version;
@@ -148,6 +193,10 @@ std::string DatasetTable::csv() const {
       out += ',';
       if (row.features.present.test(f)) put_number(out, row.features.values[f]);
     }
+    for (const auto c : kept) {
+      out += ',';
+      if (!std::isnan(row.registers[c])) put_number(out, row.registers[c]);
+    }
     out += '\n';
   }
   return out;
@@ -161,16 +210,9 @@ Result<DatasetTable> DatasetTable::parse(std::string_view text) {
     return bad(1,
                "the columns must begin with feature_set,campaign,environment,setting,split,los,"
                "true_range_m,repeats");
-  std::vector<Feature> features;
-  std::set<std::string> seen;
-  for (std::size_t c = k_columns.size() + 1; c < cells.size(); ++c) {
-    const auto feature = nlos::feature_of(cells[c]);
-    if (!feature) return bad(1, "no feature is named " + cells[c].substr(0, 60));
-    if (!seen.insert(cells[c]).second) return bad(1, "column " + cells[c] + " stands twice");
-    features.push_back(*feature);
-  }
-  const std::size_t width = cells.size();
   DatasetTable out;
+  BOOST_OUTCOME_TRY(const auto columns, columns_of(cells, out.registers));
+  const std::size_t width = cells.size();
   for (std::size_t line = 2; next_record(text, cells); ++line) {
     if (cells.size() == 1 && cells[0].empty()) continue;
     if (cells.size() != width)
@@ -198,14 +240,19 @@ Result<DatasetTable> DatasetTable::parse(std::string_view text) {
     if (!repeats || *repeats < 1 || *repeats > 1e9 || *repeats != std::floor(*repeats))
       return bad(line, "repeats must be a whole number from 1");
     row.repeats = static_cast<std::size_t>(*repeats);
-    for (std::size_t f = 0; f < features.size(); ++f) {
-      const auto& cell = cells[k_columns.size() + 1 + f];
+    row.registers.assign(out.registers.size(), k_nan);
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      const auto& cell = cells[k_columns.size() + 1 + c];
       if (cell.empty()) continue;
       const auto value = number(cell);
-      if (!value) return bad(line, std::string(nlos::feature_name(features[f])) + " must be a number");
-      row.features.set(features[f], *value);
+      if (!value) return bad(line, columns[c].name + " must be a number");
+      if (columns[c].feature)
+        row.features.set(*columns[c].feature, *value);
+      else
+        row.registers[columns[c].slot] = *value;
     }
-    if (!(row.range_m() > 0)) return bad(line, "range_m must be above 0");
+    if (row.features.get(Feature::range_m) && !(row.range_m() > 0))
+      return bad(line, "range_m must be above 0");
     out.rows.push_back(std::move(row));
   }
   if (out.rows.empty()) return bad(2, "there is no row");
@@ -218,23 +265,58 @@ std::string dataset_digest(std::string_view csv) {
   return sum.hex();
 }
 
+namespace {
+
+/// Where a feature of the data comes from: computed, or a register.
+struct Source {
+  std::string name;
+  std::optional<Feature> feature{};
+  std::size_t column{};
+  std::optional<double> of(const DatasetRow& row) const {
+    if (feature) return row.features.get(*feature);
+    return std::isnan(row.registers[column]) ? std::nullopt : std::optional{row.registers[column]};
+  }
+};
+
+Result<std::vector<Source>> sources_of(const DatasetTable& table, const std::vector<std::string>& names) {
+  std::vector<Source> out;
+  for (const auto& name : names) {
+    const auto feature = nlos::feature_of(name);
+    const auto column = std::find(table.registers.begin(), table.registers.end(), name);
+    if (!feature && column == table.registers.end())
+      return make_error(Errc::not_found, "the data set has no feature named " + name);
+    out.push_back({name, feature, static_cast<std::size_t>(column - table.registers.begin())});
+  }
+  for (std::size_t f = 0; names.empty() && f < k_feature_count; ++f) {
+    std::size_t present = 0;
+    for (const auto& row : table.rows) present += row.features.present.test(f) ? 1 : 0;
+    // A feature that one row in a hundred lacks is worth that row.
+    const auto feature = static_cast<Feature>(f);
+    if (present > 0 && 100 * present >= 99 * table.rows.size())
+      out.push_back({std::string(nlos::feature_name(feature)), feature, 0});
+  }
+  return out;
+}
+
+}  // namespace
+
+LearningWish wish_of(ml::Task task, const DatasetTable& table) {
+  LearningWish wish;
+  wish.need_label = task != ml::Task::bias;
+  wish.need_truth = task != ml::Task::nlos_id;
+  if (task == ml::Task::los_bias) wish.only_los = true;
+  if (task == ml::Task::nlos_bias) wish.only_los = false;
+  // Classes help where every row has one; without any, the bias of all is learned as one.
+  if (task == ml::Task::bias)
+    wish.need_label = std::any_of(table.rows.begin(), table.rows.end(),
+                                  [](const DatasetRow& row) { return row.los.has_value(); });
+  return wish;
+}
+
 Result<LearningRows> learning_rows(const DatasetTable& table, const LearningWish& wish) {
   LearningRows out;
-  std::vector<Feature> features;
-  for (const auto& name : wish.features) {
-    const auto feature = nlos::feature_of(name);
-    if (!feature) return make_error(Errc::not_found, "there is no feature named " + name);
-    features.push_back(*feature);
-  }
-  if (features.empty()) {
-    for (std::size_t f = 0; f < k_feature_count; ++f) {
-      std::size_t present = 0;
-      for (const auto& row : table.rows) present += row.features.present.test(f) ? 1 : 0;
-      // A feature that one row in a hundred lacks is worth that row.
-      if (present > 0 && 100 * present >= 99 * table.rows.size()) features.push_back(static_cast<Feature>(f));
-    }
-  }
-  for (const auto feature : features) out.data.features.emplace_back(nlos::feature_name(feature));
+  BOOST_OUTCOME_TRY(const auto sources, sources_of(table, wish.features));
+  for (const auto& source : sources) out.data.features.push_back(source.name);
   // A place with rows on both sides of the split is two places, so that training never sees a test row.
   std::map<std::string, std::pair<bool, bool>> sides;
   for (const auto& row : table.rows) {
@@ -258,13 +340,17 @@ Result<LearningRows> learning_rows(const DatasetTable& table, const LearningWish
       drop("no true distance");
       continue;
     }
-    const auto lacking =
-        std::find_if(features.begin(), features.end(), [&](Feature f) { return !row.features.get(f); });
-    if (lacking != features.end()) {
-      drop("no " + std::string(nlos::feature_name(*lacking)));
+    if (wish.need_truth && !row.features.get(Feature::range_m)) {
+      drop("no measured range");
       continue;
     }
-    for (const auto feature : features) out.data.x.push_back(*row.features.get(feature));
+    const auto lacking =
+        std::find_if(sources.begin(), sources.end(), [&](const Source& one) { return !one.of(row); });
+    if (lacking != sources.end()) {
+      drop("no " + lacking->name);
+      continue;
+    }
+    for (const auto& source : sources) out.data.x.push_back(*source.of(row));
     if (wish.need_label) out.data.los.push_back(*row.los ? 1 : 0);
     if (wish.need_truth) out.data.bias_m.push_back(row.range_m() - *row.true_range_m);
     out.data.weight.push_back(1);

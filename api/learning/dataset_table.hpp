@@ -9,6 +9,7 @@
 
 #include "core/base/result.hpp"
 #include "core/ml/dataset.hpp"
+#include "core/ml/model.hpp"
 #include "core/nlos/features.hpp"
 
 namespace anchord::api {
@@ -21,6 +22,7 @@ struct DatasetRow {
   std::optional<double> true_range_m{};
   std::size_t repeats{1};  ///< how many measurements it stands for
   nlos::FeatureVector features{};
+  std::vector<double> registers{};  ///< of DatasetTable::registers; NaN where it has none
 
   double range_m() const { return features.get(nlos::Feature::range_m).value_or(0); }
 };
@@ -34,16 +36,25 @@ std::string place_name(const DatasetRow& row, Place place);
 /// Rows of a frozen data set.
 struct DatasetTable {
   std::vector<DatasetRow> rows;
+  std::vector<std::string> registers{};  ///< of register_columns(), in that order
 
-  /// The canonical text: RFC 4180, features in the order of nlos::Feature and only those any row has,
-  /// shortest digits that give the same double back. Texts that begin like a formula get an apostrophe.
+  /// The canonical text: RFC 4180, features in the order of nlos::Feature and only those any row has, then
+  /// the registers, shortest digits that give the same double back. Texts that begin like a formula get an
+  /// apostrophe.
   std::string csv() const;
   /// errors: bad_frame (names the line), unsupported (another version of the features)
   static Result<DatasetTable> parse(std::string_view csv);
 };
 
-/// SHA-256 of the canonical text.
+/// Registers as their radio gave them, which some public sets hold: trees like them, and train on them where
+/// they are named. Live ranges do not have them.
+const std::vector<std::string_view>& register_columns();
+
+/// SHA-256 of the canonical text: what sha256sum says of the file.
 std::string dataset_digest(std::string_view csv);
+
+/// True where a text begins as the canonical one does.
+bool is_dataset_csv(std::string_view text);
 
 /// What was asked of a table, ready for training. Rows that lack a feature, label or truth are left out and
 /// counted in `dropped`; `source` gets the table's row of each row.
@@ -59,6 +70,8 @@ struct LearningWish {
   std::optional<bool> only_los{};
   Place group_by{Place::environment};
 };
+/// What a task needs of the rows.
+LearningWish wish_of(ml::Task task, const DatasetTable& table);
 /// errors: not_found (feature), too_few_observations (nothing left)
 Result<LearningRows> learning_rows(const DatasetTable& table, const LearningWish& wish);
 

@@ -1,5 +1,6 @@
 #include "api/learning/training_request.hpp"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "api/json/reader.hpp"
@@ -24,6 +25,14 @@ std::vector<std::string> read_words(Fields& fields, const char* key, std::size_t
     else
       errors.push_back({fields.pointer(key) + "/" + std::to_string(i), "wrong_type", "must be a word"});
   }
+  return out;
+}
+
+std::string methods_for(ml::Task task) {
+  std::string out = "auto";
+  for (int m = 0; m <= static_cast<int>(ml::Method::tree_average); ++m)
+    if (ml::suits(static_cast<ml::Method>(m), task))
+      out += ", " + std::string(ml::method_name(static_cast<ml::Method>(m)));
   return out;
 }
 
@@ -73,14 +82,23 @@ TrainingRequest read_training_request(const Json& body, std::vector<FieldError>&
   const auto methods = read_words(fields, "methods", 20, errors);
   for (std::size_t i = 0; i < methods.size(); ++i) {
     if (methods[i] == "auto" && methods.size() == 1) continue;
-    if (const auto method = ml::method_of(methods[i]))
+    const std::string at = "/methods/" + std::to_string(i);
+    const auto method = ml::method_of(methods[i]);
+    if (!method) {
+      errors.push_back({at, "unknown_value", "there is no such method; there are " + methods_for(spec.task)});
+    } else if (!ml::suits(*method, spec.task)) {
+      errors.push_back({at, "unsuitable",
+                        methods[i] + " cannot learn " + std::string(ml::task_name(spec.task)) +
+                            "; the methods that can are " + methods_for(spec.task)});
+    } else {
       spec.methods.push_back(*method);
-    else
-      errors.push_back({"/methods/" + std::to_string(i), "unknown_value", "there is no such method"});
+    }
   }
   spec.features = read_words(fields, "features", ml::k_max_features, errors);
   for (std::size_t i = 0; i < spec.features.size(); ++i) {
-    if (!nlos::feature_of(spec.features[i]))
+    const auto& registers = register_columns();
+    if (!nlos::feature_of(spec.features[i]) &&
+        std::find(registers.begin(), registers.end(), spec.features[i]) == registers.end())
       errors.push_back({"/features/" + std::to_string(i), "unknown_value", "there is no such feature"});
   }
   if (const Json* cv = fields.child("cv")) {

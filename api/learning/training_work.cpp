@@ -20,15 +20,8 @@ Result<std::string> train_work(const Json& message, const std::stop_token& stop,
   const auto& csv = message.at("csv").get_ref<const std::string&>();
   BOOST_OUTCOME_TRY(const auto table, DatasetTable::parse(csv));
   auto spec = request.spec;
-  LearningWish wish{
-      spec.features, spec.task != ml::Task::bias, spec.task != ml::Task::nlos_id, {}, request.group_by};
-  if (spec.task == ml::Task::los_bias) wish.only_los = true;
-  if (spec.task == ml::Task::nlos_bias) wish.only_los = false;
-  if (spec.task == ml::Task::bias) {
-    // Classes help where every row has one; without any, the bias of all is learned as one.
-    wish.need_label = std::any_of(table.rows.begin(), table.rows.end(),
-                                  [](const DatasetRow& row) { return row.los.has_value(); });
-  }
+  auto wish = wish_of(spec.task, table);
+  wish.features = spec.features, wish.group_by = request.group_by;
   BOOST_OUTCOME_TRY(const auto rows, learning_rows(table, wish));
   spec.held_out = rows.held_out;
   BOOST_OUTCOME_TRY(auto outcome, ml::train(rows.data, spec, stop, [&](const ml::TrainingProgress& p) {

@@ -117,6 +117,23 @@ Response samples(LearningServices& l, const Request& request) {
   return list_response(request, std::move(items), more ? std::to_string(rows.back().id) : "");
 }
 
+/// The impulse response a sample came with, as that of a range.
+Response sample_cir(LearningServices& l, const Request& request) {
+  check_query(request, {"format"});
+  const auto& text = request.params.at("sample");
+  std::int64_t id = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id);
+  if (error != std::errc{} || end != text.data() + text.size())
+    throw_problem(404, "not-found", "no sample " + text.substr(0, 40));
+  const auto row = value_or_problem(l.stores.campaigns.sample(named(l, request).id, id));
+  if (!row.sample.cir) throw_problem(404, "not-found", "this sample came without an impulse response");
+  if (negotiate(request, {"json", "binary"}) == "json") return json_response(200, cir_json(*row.sample.cir));
+  Response response;
+  response.header("Content-Type", "application/octet-stream");
+  response.body = cir_bytes(*row.sample.cir);
+  return response;
+}
+
 /// Ground truth of a flight's ranges, told afterwards: PATCH /ranges with a filter.
 Response label(LearningServices& l, const Request& request) {
   check_query(request, {"mission", "anchor", "tag", "since", "until"});
@@ -167,6 +184,7 @@ void add_campaign_routes(Router& router, LearningServices& l) {
        }});
   router.add({Method::patch, "/api/v1/ranges", Access::any_of({Role::engineer}), on(label)});
   router.add({Method::get, "/api/v1/campaigns/{id}/samples", readers(), on(samples)});
+  router.add({Method::get, "/api/v1/campaigns/{id}/samples/{sample}/cir", readers(), on(sample_cir)});
   router.add({Method::post, "/api/v1/campaigns/{id}/samples", writers, on(import), k_max_import_bytes});
 }
 

@@ -1,4 +1,5 @@
 #include <charconv>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "api/json/reader.hpp"
@@ -42,11 +43,7 @@ FrozenDataset read_csv(const Request& request) {
   auto table = DatasetTable::parse(request.body);
   if (!table)
     throw_problem(422, "validation", table.error().message, {{"", "bad_csv", table.error().message}});
-  FrozenDataset out;
-  out.table = std::move(table).value();
-  for (const auto& row : out.table.rows) ++(row.test ? out.n_test : out.n_train);
-  out.report_json = split_report_json(out.table, Place::environment, {});
-  return out;
+  return frozen_before(std::move(table).value());
 }
 
 Response create(LearningServices& l, const Request& request) {
@@ -90,7 +87,11 @@ Response create(LearningServices& l, const Request& request) {
   return response;
 }
 
-Ordered row_json(const DatasetRow& row, std::size_t index) {
+Ordered row_json(const DatasetTable& table, std::size_t index) {
+  const auto& row = table.rows[index];
+  Ordered registers = Ordered::object();
+  for (std::size_t c = 0; c < row.registers.size(); ++c)
+    if (!std::isnan(row.registers[c])) registers[table.registers[c]] = row.registers[c];
   return {{"row", index},
           {"campaign", row.campaign},
           {"environment", row.environment},
@@ -99,7 +100,8 @@ Ordered row_json(const DatasetRow& row, std::size_t index) {
           {"los", row.los ? Ordered(*row.los) : Ordered(nullptr)},
           {"true_range_m", row.true_range_m ? Ordered(*row.true_range_m) : Ordered(nullptr)},
           {"repeats", row.repeats},
-          {"features", features_json(row.features)}};
+          {"features", features_json(row.features)},
+          {"registers", std::move(registers)}};
 }
 
 Response rows(LearningServices& l, const Request& request) {
@@ -117,8 +119,7 @@ Response rows(LearningServices& l, const Request& request) {
   const auto table = value_or_problem(DatasetTable::parse(csv));
   if (format == "ndjson") {
     response.header("Content-Type", "application/x-ndjson");
-    for (std::size_t i = 0; i < table.rows.size(); ++i)
-      response.body += row_json(table.rows[i], i).dump() + '\n';
+    for (std::size_t i = 0; i < table.rows.size(); ++i) response.body += row_json(table, i).dump() + '\n';
     return response;
   }
   const auto page = page_query(request, 10'000);
@@ -126,7 +127,7 @@ Response rows(LearningServices& l, const Request& request) {
   std::from_chars(page.cursor.data(), page.cursor.data() + page.cursor.size(), from);
   Ordered items = Ordered::array();
   std::size_t i = from;
-  for (; i < table.rows.size() && i - from < page.limit; ++i) items.push_back(row_json(table.rows[i], i));
+  for (; i < table.rows.size() && i - from < page.limit; ++i) items.push_back(row_json(table, i));
   return list_response(request, std::move(items), i < table.rows.size() ? std::to_string(i) : "");
 }
 

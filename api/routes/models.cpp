@@ -4,6 +4,7 @@
 #include "api/json/reader.hpp"
 #include "api/json/wire_learning.hpp"
 #include "api/learning/model_gate.hpp"
+#include "api/learning/promotion_events.hpp"
 #include "api/routes/learning.hpp"
 #include "api/routes/support.hpp"
 #include "core/base/sha256.hpp"
@@ -92,6 +93,13 @@ Ordered active_json(LearningServices& l) {
                                           : Ordered(nullptr)}};
 }
 
+void announce(LearningServices& l, const Promotion& done, const std::string& method) {
+  value_or_problem(l.models.reload());
+  const auto words = promotion_words(done, method);
+  l.services.events.add("info", words.code, words.text);
+  if (done.task != k_correction_task) l.services.missions.note_in_flights(words.code, words.text);
+}
+
 Response patch_active(LearningServices& l, const Request& request) {
   check_query(request, {});
   std::vector<FieldError> errors;
@@ -102,12 +110,10 @@ Response patch_active(LearningServices& l, const Request& request) {
   refuse_if_any(errors);
   const auto how = static_cast<ml::Correction>(*word);
   l.services.audit(request, "models.correction " + std::string(correction_word(how)));
-  value_or_problem(
+  const auto done = value_or_problem(
       l.stores.models.promote({0, std::string(k_correction_task), std::nullopt, request.principal.name,
                                std::string(correction_word(how)), l.services.deps.clock.now(), false}));
-  value_or_problem(l.models.reload());
-  l.services.events.add("info", "model.correction",
-                        "ranges are now corrected " + std::string(correction_word(how)));
+  announce(l, done, "");
   return json_response(200, active_json(l));
 }
 
@@ -133,13 +139,6 @@ GateReport judge(LearningServices& l, const StoredModel& stored) {
   return gate_of(model, current ? &*current : nullptr, table ? &*table : nullptr);
 }
 
-void announce(LearningServices& l, const Promotion& done, const std::string& text) {
-  value_or_problem(l.models.reload());
-  const std::string code = done.rollback ? "model.rolled_back" : "model.promoted";
-  l.services.events.add("info", code, text);
-  l.services.missions.note_in_flights(code, text);
-}
-
 Response promote(LearningServices& l, const Request& request) {
   check_query(request, {});
   const auto stored = value_or_problem(l.stores.models.model(path_id<ModelId>(request)));
@@ -150,6 +149,10 @@ Response promote(LearningServices& l, const Request& request) {
   fields.finish();
   refuse_if_any(errors);
   if (is_active(l, stored)) throw_problem(422, "state", "the model is active already");
+  // One that live ranges cannot be judged by would ground the others with it.
+  if (const auto able = load_models(l.stores.models, {{stored.task, stored.id}}, ml::Correction::weighted);
+      !able)
+    throw_problem(422, "unsupported", able.error().message);
   const auto gate = judge(l, stored);
   if (!gate.passed && reason.empty())
     throw_problem(422, "state", gate.why + " (give a reason to promote all the same)");
@@ -159,7 +162,7 @@ Response promote(LearningServices& l, const Request& request) {
                                 (reason.empty() ? "" : " reason: " + reason));
   const auto done = value_or_problem(l.stores.models.promote(
       {0, stored.task, stored.id, request.principal.name, reason, l.services.deps.clock.now(), false}));
-  announce(l, done, stored.method + " " + to_string(stored.id) + " is now the model of " + stored.task);
+  announce(l, done, stored.method);
   Ordered answer = promotion_json(done);
   answer["gate"] = gate_json(gate);
   return json_response(200, answer);
@@ -201,9 +204,7 @@ Response roll_back(LearningServices& l, const Request& request) {
   l.services.audit(request, "model.rollback " + name + (reason.empty() ? "" : " reason: " + reason));
   const auto done = value_or_problem(l.stores.models.promote(
       {0, name, back, request.principal.name, reason, l.services.deps.clock.now(), true}));
-  announce(l, done,
-           back ? "rolled back: " + to_string(*back) + " is the model of " + name + " again"
-                : "rolled back: " + name + " has no model now");
+  announce(l, done, "");
   return json_response(200, promotion_json(done));
 }
 
@@ -240,8 +241,9 @@ Response predict(LearningServices& l, const Request& request) {
   std::shared_ptr<const ModelRegistry::Active> models = l.models.active();
   if (request.params.at("id") != "active") {
     const auto stored = value_or_problem(l.stores.models.model(path_id<ModelId>(request)));
-    models = std::make_shared<const ModelRegistry::Active>(
-        value_or_problem(load_models(l.stores.models, {{stored.task, stored.id}}, ml::Correction::weighted)));
+    auto loaded = load_models(l.stores.models, {{stored.task, stored.id}}, ml::Correction::weighted);
+    if (!loaded) throw_problem(422, "unsupported", loaded.error().message);
+    models = std::make_shared<const ModelRegistry::Active>(std::move(loaded).value());
   }
   auto chosen = *models;
   if (how_word) chosen.correction = static_cast<ml::Correction>(*how_word);

@@ -62,6 +62,10 @@ Response create(LearningServices& l, const Request& request) {
     else
       value_or_problem(std::move(found));
   }
+  if (dataset && errors.empty()) {
+    if (const auto fits = wanted.spec.check_size(dataset->n_train); !fits)
+      errors.push_back({"/grid", "too_much", fits.error().message});
+  }
   refuse_if_any(errors);
   auto request_body = body;
   request_body["dataset"] = to_string(dataset->id);

@@ -1,5 +1,7 @@
 #include "api/services/event_log.hpp"
 
+#include <algorithm>
+
 #include "api/json/live_writer.hpp"
 #include "api/live/hub.hpp"
 
@@ -22,6 +24,13 @@ void EventLog::add(std::string level, std::string code, std::string text, std::o
     if (events_.size() > k_kept) events_.pop_front();
   }
   hub_.publish(Topic::events, std::move(json), now.us());
+}
+
+void EventLog::restore(const std::vector<LiveEvent>& events) {
+  const std::scoped_lock lock(mutex_);
+  const std::size_t room = k_kept - std::min(k_kept, events_.size());
+  const auto first = events.end() - static_cast<std::ptrdiff_t>(std::min(room, events.size()));
+  events_.insert(events_.begin(), first, events.end());
 }
 
 std::vector<LiveEvent> EventLog::newest(std::size_t limit, const std::optional<MissionId>& mission,

@@ -28,6 +28,8 @@ class EventLog {
   static constexpr std::size_t k_kept = 10'000;
   EventLog(Hub& hub, const Clock& clock) : hub_(hub), clock_(clock) {}
   void add(std::string level, std::string code, std::string text, std::optional<MissionId> mission = {});
+  /// Puts events of before the start in front of all others, oldest first; nobody is told again.
+  void restore(const std::vector<LiveEvent>& events);
   /// Newest first.
   std::vector<LiveEvent> newest(std::size_t limit, const std::optional<MissionId>& mission,
                                 std::optional<UtcTime> since) const;

@@ -96,6 +96,26 @@ bool belongs(const Setting& setting, Method method) {
 
 }  // namespace
 
+bool suits(Method method, Task task) {
+  switch (method) {
+    case Method::logistic:
+    case Method::average:
+    case Method::tree_average:
+      return task == Task::nlos_id;
+    case Method::none:
+    case Method::constant:
+    case Method::univariate:
+    case Method::multivariate:
+    case Method::least_absolute:
+      return task != Task::nlos_id;
+    case Method::random_forest:
+    case Method::svm:
+    case Method::boosted:
+      return true;
+  }
+  return false;
+}
+
 std::vector<std::string> grid_settings(Method method) {
   std::vector<std::string> out;
   for (const auto& s : k_settings)
@@ -150,17 +170,18 @@ std::vector<Recipe> expand(const Recipe& recipe, const std::map<std::string, std
   for (const auto& [name, values] : axes) {
     std::vector<Recipe> wider;
     for (const auto& one : out) {
-      // A linear kernel has no gamma: one of its values stands for all.
-      const bool idle = name == "gamma" && one.method == Method::svm && axes.contains("kernel") &&
-                        one.svm.kernel == Kernel::linear;
       for (const double value : values) {
         wider.push_back(one);
         apply_setting(wider.back(), name, value);
-        if (idle) break;
       }
     }
     out = std::move(wider);
   }
+  // A linear kernel has no gamma: one of its values stands for all.
+  if (const auto gamma = axes.find("gamma"); gamma != axes.end() && recipe.method == Method::svm)
+    std::erase_if(out, [&](const Recipe& one) {
+      return one.svm.kernel == Kernel::linear && one.svm.gamma != gamma->second.front();
+    });
   return out;
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <map>
 
 #include "core/ml/learn_bias.hpp"
 
@@ -21,6 +22,19 @@ std::string fixed(double value, int digits) {
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), "%.*f", digits, value);
   return text.data();
+}
+
+// Settings of an SVM are compared on fewer rows where there are many of them; the pick is then validated and
+// fitted on all it may have.
+constexpr std::size_t k_few_svms = 8, k_search_rows = 2000;
+
+std::vector<Recipe> for_search(std::vector<Recipe> candidates) {
+  const auto svms = std::count_if(candidates.begin(), candidates.end(),
+                                  [](const Recipe& r) { return r.method == Method::svm; });
+  if (static_cast<std::size_t>(svms) <= k_few_svms) return candidates;
+  for (auto& r : candidates)
+    if (r.method == Method::svm) r.svm.max_rows = std::min(r.svm.max_rows, k_search_rows);
+  return candidates;
 }
 
 struct Picked {
@@ -69,11 +83,12 @@ Result<Picked> pick_classifier(const Dataset& data, const LearnOptions& options,
                                std::vector<FoldRow>& folds) {
   const auto candidates = classifier_candidates(data, options);
   if (candidates.empty()) return make_error(Errc::not_found, "no candidate's features are in the data");
+  const auto searched = for_search(candidates);
   std::vector<OutOfFold> results;
   std::size_t best = 0;
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     tell(options, candidates[c].describe(), c, candidates.size());
-    BOOST_OUTCOME_TRY(auto result, cross_validate(data, candidates[c], fold, true, options.run));
+    BOOST_OUTCOME_TRY(auto result, cross_validate(data, searched[c], fold, true, options.run));
     table.push_back(row_of(candidates[c], result));
     table.back().confusion = confusion_at(result.p_los, data.los, 0.5);
     table.back().brier = brier(result.p_los, data.los);
@@ -82,6 +97,9 @@ Result<Picked> pick_classifier(const Dataset& data, const LearnOptions& options,
     results.push_back(std::move(result));
   }
   table[best].picked = true;
+  if (searched[best].svm.max_rows != candidates[best].svm.max_rows) {
+    BOOST_OUTCOME_TRY(results[best], cross_validate(data, candidates[best], fold, true, options.run));
+  }
   std::string why = candidates.size() == 1
                         ? "the only candidate: "
                         : "lowest grouped log loss, ties within 0.01 to the earlier in the table: ";
@@ -163,6 +181,7 @@ Result<Learned> learn_regression(const Dataset& data, const LearnOptions& option
                                  const std::vector<std::size_t>& fold) {
   Learned out;
   const auto candidates = regressor_candidates(data, options);
+  const auto searched = for_search(candidates);
   std::vector<OutOfFold> results;
   std::size_t best = !options.methods.empty() && candidates.size() > 1 ? 1 : 0;
   std::size_t constant = 0;
@@ -171,7 +190,7 @@ Result<Learned> learn_regression(const Dataset& data, const LearnOptions& option
   };
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     tell(options, candidates[c].describe(), c, candidates.size());
-    BOOST_OUTCOME_TRY(auto result, cross_validate(data, candidates[c], fold, false, options.run));
+    BOOST_OUTCOME_TRY(auto result, cross_validate(data, searched[c], fold, false, options.run));
     out.table.push_back(row_of(candidates[c], result));
     out.table.back().error = error_stats(minus(data.bias_m, result.bias_m, 1));
     out.table.back().worst_harm_m = result.worst_harm_m;
@@ -181,6 +200,9 @@ Result<Learned> learn_regression(const Dataset& data, const LearnOptions& option
     if (c > best && cost(results[c]) < cost(results[best]) * 0.99 - 1e-4) best = c;
   }
   out.table[best].picked = true;
+  if (searched[best].svm.max_rows != candidates[best].svm.max_rows) {
+    BOOST_OUTCOME_TRY(results[best], cross_validate(data, candidates[best], fold, false, options.run));
+  }
   BOOST_OUTCOME_TRY(auto regressor, fit_regressor(data, candidates[best], options.run));
   const auto weight = placement_weights(data);
   const auto left = minus(data.bias_m, results[best].bias_m, 1);
@@ -208,6 +230,17 @@ Result<Learned> learn_regression(const Dataset& data, const LearnOptions& option
   return out;
 }
 
+// An SVM sees at most a few thousand rows; whoever reads the manifest should know.
+std::string svm_note(const Dataset& data, const Recipe& picked) {
+  if (picked.method != Method::svm && picked.method != Method::average) return {};
+  std::map<std::uint32_t, std::size_t> repeats;
+  std::size_t rows = 0;
+  for (const auto id : data.placement) rows += repeats[id]++ < picked.per_placement ? 1 : 0;
+  if (rows <= picked.svm.max_rows) return {};
+  return "; the SVM is fitted to " + std::to_string(picked.svm.max_rows) + " of " + std::to_string(rows) +
+         " rows, drawn evenly";
+}
+
 }  // namespace
 
 Result<Learned> learn(const Dataset& data, const LearnOptions& options) {
@@ -228,6 +261,7 @@ Result<Learned> learn(const Dataset& data, const LearnOptions& options) {
   if (!learned) return learned.error();
   learned.value().fold = fold;
   auto& info = learned.value().model.info;
+  info.why += svm_note(data, learned.value().picked);
   info.task = options.task;
   info.data_digest = data.digest();
   info.rows = data.rows();

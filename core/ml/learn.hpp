@@ -23,6 +23,9 @@ std::vector<std::string> grid_settings(Method method);
 /// The grid `search` means for a method.
 std::map<std::string, std::vector<double>> default_grid(Method method, bool classification);
 
+/// Whether a method can learn a task: classes, or a bias in metres.
+bool suits(Method method, Task task);
+
 struct LearnOptions {
   Task task{Task::nlos_id};
   std::vector<Method> methods{};        ///< empty: auto

@@ -1,7 +1,10 @@
 #include "core/ml/training.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
+#include <map>
 #include <set>
 
 #include "core/ml/random.hpp"
@@ -155,6 +158,14 @@ Result<void> TrainingSpec::check() const {
   if (!(held_out_share >= 0 && held_out_share < 1)) fault("held_out_share must be 0 to below 1");
   if (max_fpr && !(*max_fpr >= 0 && *max_fpr <= 1)) fault("max_fpr must be 0 to 1");
   if (features.size() > k_max_features) fault("at most 64 features");
+  std::string able;
+  for (int m = 0; m <= static_cast<int>(Method::tree_average); ++m)
+    if (suits(static_cast<Method>(m), task))
+      able += (able.empty() ? "" : ", ") + std::string{method_name(static_cast<Method>(m))};
+  for (const auto method : methods)
+    if (!suits(method, task))
+      fault(std::string{method_name(method)} + " cannot learn " + std::string{task_name(task)} +
+            "; the methods that can are " + able + ", or auto");
   std::size_t points = 0;
   for (const auto& [method, axes] : grid) {
     const auto known = grid_settings(method);
@@ -175,9 +186,34 @@ Result<void> TrainingSpec::check() const {
   return boost::outcome_v2::success();
 }
 
+Result<void> TrainingSpec::check_size(std::size_t rows) const {
+  double row_fits = 0, settings = 0;
+  std::vector<Method> tried = methods;
+  if (tried.empty()) tried.push_back(task == Task::nlos_id ? Method::average : Method::multivariate);
+  for (const auto method : tried) {
+    const auto own = grid.find(method);
+    double points = 1;
+    for (const auto& [name, values] : own != grid.end() ? own->second
+                                      : search          ? default_grid(method, task == Task::nlos_id)
+                                                        : std::map<std::string, std::vector<double>>{})
+      points *= static_cast<double>(std::max<std::size_t>(values.size(), 1));
+    const std::size_t fitted = method == Method::svm ? std::min(rows, SvmOptions{}.max_rows) : rows;
+    settings += points;
+    row_fits += points * static_cast<double>(folds) * static_cast<double>(fitted);
+  }
+  if (row_fits <= k_most_row_fits) return boost::outcome_v2::success();
+  std::array<char, 200> text{};
+  std::snprintf(text.data(), text.size(),
+                "%.0f settings x %zu folds on %zu rows are %.2g row fits, more than the %.0e that end within "
+                "hours: take a smaller grid, fewer folds, or a data set of means or medians",
+                settings, folds, rows, row_fits, k_most_row_fits);
+  return make_error(Errc::invalid_argument, text.data());
+}
+
 Result<TrainingOutcome> train(const Dataset& data, const TrainingSpec& spec, std::stop_token stop,
                               const ProgressSink& progress) {
   BOOST_OUTCOME_TRY(spec.check());
+  BOOST_OUTCOME_TRY(spec.check_size(data.rows()));
   std::vector<Stage> stages{{"split", 1}, {"search", 80}};
   if (spec.importance) stages.push_back({"importance", 8});
   if (spec.selection) stages.push_back({"selection", 20});

@@ -14,6 +14,9 @@
 /// cross-validation, pick, refit, threshold, importance, measurement on held-out places.
 namespace anchord::ml {
 
+/// Row fits (settings x folds x rows) of a run at most: some hours on two cores.
+inline constexpr double k_most_row_fits = 1e9;
+
 struct TrainingSpec {
   Task task{Task::nlos_id};
   std::vector<Method> methods{};        ///< empty: auto
@@ -32,6 +35,9 @@ struct TrainingSpec {
 
   /// errors: invalid_argument, with every fault in the message
   Result<void> check() const;
+  /// Whether the search can end within hours: settings x folds x rows, an SVM's rows at most those it is
+  /// fitted to. errors: invalid_argument, with the numbers
+  Result<void> check_size(std::size_t rows) const;
 };
 
 /// Where a run stands; called from the calling thread only, a few times a second at most.

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/base/time.hpp"
+#include "core/types/range.hpp"
 
 namespace anchord {
 
@@ -37,6 +38,7 @@ struct CampaignMeasurement {
   std::optional<double> rx_dbm{}, fp_dbm{};
   std::optional<double> fp_amp1{}, fp_amp2{}, fp_amp3{};
   std::optional<double> cir_power{}, preamble_count{}, std_noise{}, max_noise{}, fp_index{};
+  std::optional<Cir> cir{};  ///< of NDJSON lines only
 };
 
 struct Campaign {

@@ -4,8 +4,6 @@
 #include <memory>
 
 #include "api/imports/campaign.hpp"
-#include "api/imports/dataset_csv.hpp"
-#include "api/imports/gzip_lines.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"
 
@@ -17,16 +15,6 @@ struct CampaignArguments {
   double distance_m{-1}, heading_deg{0}, height_m{0}, thickness_m{0};
   bool has_heading{false}, has_height{false}, has_thickness{false}, keep_outliers{false};
 };
-
-Result<std::string> whole_text(const std::string& path) {
-  BOOST_OUTCOME_TRY(auto lines, api::GzipLines::open(path));
-  std::string out;
-  for (std::string_view line;;) {
-    BOOST_OUTCOME_TRY(const bool more, lines.next(line));
-    if (!more) return out;
-    out.append(line).push_back('\n');
-  }
-}
 
 api::CampaignOptions options_of(const CampaignArguments& a) {
   api::CampaignOptions o;

@@ -1,10 +1,9 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <fstream>
-#include <iterator>
+#include <map>
 #include <memory>
 
-#include "api/imports/dataset_csv.hpp"
+#include "api/learning/freeze_rows.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"
 
@@ -13,55 +12,53 @@ namespace {
 
 struct DatasetArguments {
   DataOptions data;
-  std::string out, file, aggregate{"mean"};
-  std::vector<std::string> features, held_out;
+  std::string out, file, digest, campaign, aggregate{"mean"};
+  std::vector<std::string> held_out;
+  bool keep_outliers{false};
   double held_out_share{0};
   std::uint64_t seed{1};
 };
 
-void print_set(const ml::FrozenDataset& set) {
-  const auto& s = set.split;
-  std::printf("digest %s\naggregation %s, %zu features\n", set.digest.c_str(),
-              std::string{ml::aggregation_name(set.aggregation)}.c_str(), set.data.columns());
-  std::printf("train %zu rows, %zu placements, %zu places\n", s.train_rows, s.train_placements,
-              s.train_places);
-  std::printf("test  %zu rows, %zu placements, %zu places", s.test_rows, s.test_placements, s.test_places);
-  for (const auto& name : s.test_place_names) std::printf(" %s", name.c_str());
-  std::printf("\nleak  %s: %zu placements in more than one place, %zu rows equal to rows of other places\n",
-              s.leak ? "YES" : "none", s.shared_placements, s.duplicate_rows);
+void print_set(const api::FrozenDataset& set, const std::string& digest) {
+  std::printf("digest %s\n%s", digest.c_str(), api::split_report_text(set).c_str());
 }
 
 int build(const DatasetArguments& a) {
   const auto table = read_data(a.data);
   if (!table) return refuse("dataset", table.error().message);
-  api::SetRequest request{a.features, false, false};
-  if (request.features.empty()) request.features = api::available_features(table.value(), true);
-  std::vector<std::size_t> rows;
+  api::FreezeOptions how;
+  how.aggregation = a.aggregate == "none"   ? api::Aggregation::none
+                    : a.aggregate == "mean" ? api::Aggregation::mean
+                                            : api::Aggregation::median;
+  how.filter_faults = !a.keep_outliers;
+  how.test = a.held_out, how.test_share = a.held_out_share, how.seed = a.seed;
   std::map<std::string, std::size_t> dropped;
-  const auto data = api::dataset_from(table.value(), request, rows, dropped);
-  if (!data) return refuse("dataset", data.error().message);
-  const auto set =
-      ml::freeze(data.value(), {*ml::aggregation_of(a.aggregate), a.held_out, a.held_out_share, a.seed});
-  if (!set) return refuse("dataset", set.error().message);
-  std::ofstream file(a.out, std::ios::binary);
-  file << api::write_dataset_csv(set.value());
-  if (!file.flush()) {
+  for (const auto& [reason, entry] : table.value().dropped)
+    dropped[reason + " (first " + entry.second + ")"] = entry.first;
+  const auto set = api::freeze_rows(api::dataset_rows(table.value(), a.campaign), how, std::move(dropped));
+  if (!set) return refuse("dataset", a.data.files.front() + ": " + set.error().message);
+  const auto csv = set.value().table.csv();
+  if (!write_whole(a.out, csv)) {
     std::fprintf(stderr, "anchord dataset: cannot write %s\n", a.out.c_str());
     return 1;
   }
-  for (const auto& [reason, count] : dropped) std::printf("dropped %zu: %s\n", count, reason.c_str());
-  print_set(set.value());
+  print_set(set.value(), api::dataset_digest(csv));
   return 0;
 }
 
 int check(const DatasetArguments& a) {
-  std::ifstream file(a.file, std::ios::binary);
-  if (!file) return refuse("dataset", a.file + ": cannot be read");
-  const std::string text(std::istreambuf_iterator<char>(file), {});
-  const auto set = api::read_dataset_csv(text);
-  if (!set) return refuse("dataset", a.file + ": " + set.error().message);
-  print_set(set.value());
-  return 0;
+  DataOptions data;
+  data.files = {a.file};
+  auto frozen = read_frozen(data);
+  if (!frozen) return refuse("dataset", frozen.error().message);
+  if (!frozen.value())
+    return refuse("dataset", a.file +
+                                 ": not a frozen data set; `anchord dataset build` and GET "
+                                 "/datasets/{id}/rows?format=csv make one");
+  const auto digest = frozen.value()->digest;
+  print_set(api::frozen_before(std::move(frozen.value()->table)), digest);
+  if (a.digest.empty() || a.digest == digest) return 0;
+  return refuse("dataset", a.file + ": its digest is not " + a.digest);
 }
 
 }  // namespace
@@ -73,7 +70,6 @@ void add_dataset_command(CLI::App& app, int& exit_code) {
   auto* built =
       dataset->add_subcommand("build", "Aggregate, split by whole places, look for leaks, take the digest");
   add_data_options(*built, a->data);
-  built->add_option("--features", a->features, "Features by name (default: all there are)")->delimiter(',');
   built->add_option("--aggregate", a->aggregate, "none, mean or median of each measurement point")
       ->check(CLI::IsMember({"none", "mean", "median"}))
       ->capture_default_str();
@@ -81,10 +77,14 @@ void add_dataset_command(CLI::App& app, int& exit_code) {
   built->add_option("--hold-out-share", a->held_out_share, "Or this share of the places, drawn by the seed")
       ->check(CLI::Range(0.0, 0.9));
   built->add_option("--seed", a->seed, "Seed of that draw")->capture_default_str();
-  built->add_option("--out", a->out, "CSV to write; `anchord train --data` reads it")->required();
+  built->add_option("--campaign", a->campaign, "Name of the campaign (default: that of the file)");
+  built->add_flag("--keep-outliers", a->keep_outliers, "Keep ranges far off the median of their placement");
+  built->add_option("--out", a->out, "CSV to write; `anchord train --data` and POST /datasets read it")
+      ->required();
   built->callback([a, &exit_code] { exit_code = build(*a); });
   auto* checked = dataset->add_subcommand("check", "Read a data set again: digest, split, leak report");
-  checked->add_option("file", a->file, "CSV of `anchord dataset build`")->required();
+  checked->add_option("file", a->file, "CSV of `anchord dataset build` or of the service")->required();
+  checked->add_option("--digest", a->digest, "Fail where the digest is another");
   checked->callback([a, &exit_code] { exit_code = check(*a); });
 }
 

@@ -18,6 +18,30 @@ struct EvaluateArguments {
   bool json{false};
 };
 
+struct Gathered {
+  ml::Dataset data;
+  api::RowReport report;
+};
+
+Result<Gathered> gather(const EvaluateArguments& a, const ml::ModelInfo& info) {
+  BOOST_OUTCOME_TRY(const auto frozen, read_frozen(a.data));
+  if (frozen) {
+    BOOST_OUTCOME_TRY(auto rows, rows_for(a.data, *frozen, info.task, info.features));
+    return Gathered{std::move(rows.data), std::move(rows.report)};
+  }
+  BOOST_OUTCOME_TRY(const auto table, read_data(a.data));
+  Gathered out{{}, row_report(a.data, table)};
+  out.report.warning.clear();  // nothing is split here
+  std::vector<std::size_t> rows;
+  api::Dropped dropped;
+  auto data = api::dataset_from(
+      table, {info.features, info.task == ml::Task::nlos_id, info.task != ml::Task::nlos_id}, rows, dropped);
+  if (!data) return make_error(data.error().code, a.data.files.front() + ": " + data.error().message);
+  add_dropped(out.report, dropped);
+  out.data = std::move(data).value();
+  return out;
+}
+
 int evaluate(const EvaluateArguments& a) {
   std::ifstream file(a.model, std::ios::binary);
   if (!file) return refuse("evaluate", a.model + ": cannot be read");
@@ -26,24 +50,10 @@ int evaluate(const EvaluateArguments& a) {
   if (!model) return refuse("evaluate", a.model + ": " + model.error().message);
   if (a.threshold >= 0 && model.value().classifier) model.value().classifier->threshold = a.threshold;
 
-  const auto table = read_data(a.data);
-  if (!table) return refuse("evaluate", table.error().message);
-  auto report = row_report(a.data, table.value());
-  report.warning.clear();  // nothing is split here
-  const auto task = model.value().info.task;
-  const api::SetRequest request{model.value().info.features, task == ml::Task::nlos_id,
-                                task != ml::Task::nlos_id};
-  std::vector<std::size_t> rows;
-  std::map<std::string, std::size_t> dropped;
-  const auto data = api::dataset_from(table.value(), request, rows, dropped);
-  if (!data) {
-    std::string why = data.error().message;
-    for (const auto& [reason, count] : dropped)
-      why += "; " + reason + " in " + std::to_string(count) + " rows";
-    return refuse("evaluate", a.data.files.front() + ": " + why);
-  }
-  add_dropped(report, dropped);
-  const auto evaluation = ml::evaluate(model.value(), data.value());
+  auto gathered = gather(a, model.value().info);
+  if (!gathered) return refuse("evaluate", gathered.error().message);
+  auto& [data, report] = gathered.value();
+  const auto evaluation = ml::evaluate(model.value(), data);
   if (evaluation.rows == 0) return refuse("evaluate", a.data.files.front() + ": no row of the model's class");
   report.used = evaluation.rows;
   const auto out = a.json ? api::evaluation_json(evaluation, model.value(), report)

@@ -2,6 +2,10 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "api/imports/gzip_lines.hpp"
 
 namespace anchord::cli {
 
@@ -44,8 +48,77 @@ api::RowReport row_report(const DataOptions& o, const api::LabelledTable& table)
   return report;
 }
 
-void add_dropped(api::RowReport& report, const std::map<std::string, std::size_t>& dropped) {
-  for (const auto& [reason, count] : dropped) report.dropped[reason].first += count;
+void add_dropped(api::RowReport& report, const api::Dropped& dropped) {
+  for (const auto& [reason, entry] : dropped) {
+    auto& all = report.dropped[reason];
+    if (all.first == 0) all.second = entry.second;
+    all.first += entry.first;
+  }
+}
+
+Result<std::string> whole_text(const std::string& path) {
+  BOOST_OUTCOME_TRY(auto lines, api::GzipLines::open(path));
+  std::string out;
+  for (std::string_view line;;) {
+    BOOST_OUTCOME_TRY(const bool more, lines.next(line));
+    if (!more) return out;
+    out.append(line).push_back('\n');
+  }
+}
+
+Result<std::optional<FrozenFile>> read_frozen(const DataOptions& o) {
+  if (o.files.size() != 1) return std::optional<FrozenFile>{};
+  const auto& path = o.files.front();
+  {
+    BOOST_OUTCOME_TRY(auto lines, api::GzipLines::open(path));
+    std::string_view first;
+    BOOST_OUTCOME_TRY(const bool any, lines.next(first));
+    if (!any || !api::is_dataset_csv(first)) return std::optional<FrozenFile>{};
+  }
+  BOOST_OUTCOME_TRY(const auto text, whole_text(path));
+  auto table = api::DatasetTable::parse(text);
+  if (!table) return make_error(table.error().code, path + ": " + table.error().message);
+  FrozenFile out{std::move(table).value(), {}};
+  out.digest = api::dataset_digest(out.table.csv());
+  return std::optional{std::move(out)};
+}
+
+Result<FrozenRows> rows_for(const DataOptions& o, const FrozenFile& file, ml::Task task,
+                            const std::vector<std::string>& features) {
+  auto wish = api::wish_of(task, file.table);
+  wish.features = features;
+  if (!o.table.group_by.empty()) {
+    const auto place = o.table.group_by.size() == 1 ? api::place_of(o.table.group_by.front()) : std::nullopt;
+    if (!place)
+      return make_error(Errc::invalid_argument,
+                        "--group-by of a frozen data set is environment, campaign or setting");
+    wish.group_by = *place;
+  }
+  auto rows = api::learning_rows(file.table, wish);
+  if (!rows) return make_error(rows.error().code, o.files.front() + ": " + rows.error().message);
+  FrozenRows out;
+  out.data = std::move(rows.value().data);
+  out.held_out = std::move(rows.value().held_out);
+  out.group_by = api::place_word(wish.group_by), out.digest = file.digest;
+  auto& report = out.report;
+  report.files = o.files;
+  report.read = file.table.rows.size(), report.used = out.data.rows();
+  for (const auto& [reason, n] : rows.value().dropped) report.dropped[reason].first = n;
+  report.label = out.data.labelled() ? "los" : "";
+  report.truth = out.data.has_truth() ? "true_range_m" : "";
+  report.group_by = out.group_by, report.placement = "setting";
+  return out;
+}
+
+bool write_whole(const std::string& path, const std::string& text) {
+  const std::string beside = path + ".part";
+  std::ofstream file(beside, std::ios::binary);
+  file << text;
+  file.close();
+  std::error_code failed;
+  if (file) std::filesystem::rename(beside, path, failed);
+  if (!file || failed) std::filesystem::remove(beside, failed);
+  return static_cast<bool>(file) && !failed;
 }
 
 int refuse(const char* command, const std::string& message) {

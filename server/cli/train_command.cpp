@@ -4,11 +4,9 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <memory>
 #include <set>
 
-#include "api/imports/dataset_csv.hpp"
 #include "api/json/model_artifact.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"
@@ -28,18 +26,6 @@ struct TrainArguments {
   std::size_t threads{0};
   bool grid{false}, importance{false}, selection{false}, json{false};
 };
-
-// Written beside and renamed, so that a run that dies leaves no half model.
-bool write_whole(const std::string& path, const std::string& text) {
-  const std::string beside = path + ".part";
-  std::ofstream file(beside, std::ios::binary);
-  file << text;
-  file.close();
-  std::error_code failed;
-  if (file) std::filesystem::rename(beside, path, failed);
-  if (!file || failed) std::filesystem::remove(beside, failed);
-  return static_cast<bool>(file) && !failed;
-}
 
 // Faults leave before training (6.2.1): ranges far off their placement's median.
 void drop_outliers(ml::Dataset& data, const std::vector<std::size_t>& rows, const api::LabelledTable& table,
@@ -79,27 +65,8 @@ struct Gathered {
   ml::Dataset data;
   api::RowReport report;
   std::vector<std::string> held_out;  // a frozen data set's own test places
+  std::string digest;                 // of a frozen data set
 };
-
-// A data set of `anchord dataset build` is taken as it is: nothing is computed or dropped again.
-Result<std::optional<Gathered>> gather_frozen(const TrainArguments& a) {
-  if (a.data.files.size() != 1) return std::optional<Gathered>{};
-  std::ifstream file(a.data.files.front(), std::ios::binary);
-  std::string text(64, '\0');
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (!file || !api::is_dataset_csv(text)) return std::optional<Gathered>{};
-  text.append(std::istreambuf_iterator<char>(file), {});
-  BOOST_OUTCOME_TRY(auto set, api::read_dataset_csv(text));
-  Gathered out;
-  out.report.files = a.data.files;
-  out.report.read = set.data.rows();
-  out.report.label = set.data.labelled() ? "los" : "";
-  out.report.truth = set.data.has_truth() ? "bias_m" : "";
-  out.report.group_by = "place", out.report.placement = "placement_id";
-  out.data = std::move(set.data);
-  out.held_out = std::move(set.test_places);
-  return std::optional{std::move(out)};
-}
 
 Result<Gathered> gather_table(const TrainArguments& a, ml::Task task) {
   BOOST_OUTCOME_TRY(const auto table, read_data(a.data));
@@ -111,7 +78,7 @@ Result<Gathered> gather_table(const TrainArguments& a, ml::Task task) {
   if (task != ml::Task::nlos_id && task != ml::Task::bias && !table.labelled()) request.need_label = false;
   if (request.features.empty()) request.features = api::available_features(table, task == ml::Task::nlos_id);
   std::vector<std::size_t> rows;
-  std::map<std::string, std::size_t> dropped;
+  api::Dropped dropped;
   auto data = api::dataset_from(table, request, rows, dropped);
   if (!data) return make_error(data.error().code, a.data.files.front() + ": " + data.error().message);
   add_dropped(out.report, dropped);
@@ -121,13 +88,12 @@ Result<Gathered> gather_table(const TrainArguments& a, ml::Task task) {
 }
 
 Result<Gathered> gather(const TrainArguments& a, ml::Task task) {
-  BOOST_OUTCOME_TRY(auto frozen, gather_frozen(a));
-  Gathered out;
+  BOOST_OUTCOME_TRY(const auto frozen, read_frozen(a.data));
   if (frozen) {
-    out = std::move(*frozen);
-  } else {
-    BOOST_OUTCOME_TRY(out, gather_table(a, task));
+    BOOST_OUTCOME_TRY(auto rows, rows_for(a.data, *frozen, task, a.features));
+    return Gathered{std::move(rows.data), std::move(rows.report), std::move(rows.held_out), rows.digest};
   }
+  BOOST_OUTCOME_TRY(auto out, gather_table(a, task));
   if (out.data.labelled() && (task == ml::Task::los_bias || task == ml::Task::nlos_bias)) {
     out.data = out.data.of_class(task == ml::Task::los_bias);
     if (out.data.rows() == 0)
@@ -148,9 +114,12 @@ int train(const TrainArguments& a) {
     if (!method) return refuse("train", "unknown --method " + name);
     methods.push_back(*method);
   }
+  ml::TrainingSpec asked;
+  asked.task = *task, asked.methods = methods;
+  if (const auto able = asked.check(); !able) return refuse("train", able.error().message);
   const auto gathered = gather(a, *task);
   if (!gathered) return refuse("train", gathered.error().message);
-  const auto& [data, report, frozen_test] = gathered.value();
+  const auto& [data, report, frozen_test, digest] = gathered.value();
 
   ml::TrainingSpec spec;
   spec.task = *task, spec.features = a.features, spec.folds = a.folds, spec.seed = a.seed;
@@ -170,6 +139,7 @@ int train(const TrainArguments& a) {
   info.feature_set = nlos::k_feature_set_version;
   info.group_by = report.group_by.empty() ? "row" : report.group_by;
   info.code_version = ANCHORD_VERSION;
+  if (!digest.empty()) info.data_digest = digest;
   if (!write_whole(a.out, api::write_model_artifact(learned.value().model))) {
     std::fprintf(stderr, "anchord train: cannot write %s\n", a.out.c_str());
     return 1;

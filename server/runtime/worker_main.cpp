@@ -67,6 +67,13 @@ void settle_in(pid_t server) {
   close_the_doors();
 }
 
+std::string allowed_memory() {
+  rlimit now{};
+  getrlimit(RLIMIT_DATA, &now);
+  return now.rlim_cur == RLIM_INFINITY ? "memory of the machine"
+                                       : std::to_string(now.rlim_cur >> 20) + " MiB of memory";
+}
+
 }  // namespace
 
 int worker_main() {
@@ -104,9 +111,14 @@ int worker_main() {
             {"detail", p.detail}});
     });
   } catch (const std::bad_alloc&) {
-    result = make_error(Errc::internal, "the work needs more memory than the 4 GiB it is allowed");
+    message.clear(), message.shrink_to_fit();  // room for the answer
+    result =
+        make_error(Errc::unsupported, "the training needs more memory than the " + allowed_memory() +
+                                          " a worker may take: use a data set of means or medians, fewer "
+                                          "rows, features or trees, and start the run again");
   } catch (const std::exception& fault) {
-    result = make_error(Errc::internal, fault.what());
+    result = make_error(Errc::link_lost, std::string("the worker failed: ") + fault.what() +
+                                             "; the run, its rows and settings are kept");
   }
   if (result)
     send({{"op", "done"}, {"result", result.value()}});

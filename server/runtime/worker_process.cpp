@@ -40,6 +40,22 @@ class Socket {
   int fd_;
 };
 
+/// What most often lies behind a worker's death, and what helps.
+std::string cause_of(int signal) {
+  switch (signal) {
+    case SIGKILL:
+      return "most often the machine had no memory left; free some, or train on fewer rows or a smaller "
+             "grid, "
+             "and start the run again";
+    case SIGXCPU:
+      return "it had used its 24 hours of processor time; train on fewer rows or a smaller grid";
+    default:
+      return "a fault of the trainer or too little memory; the run, its rows and settings are kept: try "
+             "fewer "
+             "rows or another method, and report it";
+  }
+}
+
 /// A child that is always collected: killed where it still runs when this goes.
 class Child {
  public:
@@ -60,7 +76,7 @@ class Child {
     pid_ = 0;
     if (WIFSIGNALED(status))
       return "was ended by signal " + std::to_string(WTERMSIG(status)) + " (" + strsignal(WTERMSIG(status)) +
-             ")";
+             "): " + cause_of(WTERMSIG(status));
     return "ended with code " + std::to_string(WEXITSTATUS(status)) + " without an answer";
   }
 

@@ -1,5 +1,5 @@
 // ./dev bench: one table. Every figure of ours stands beside a peer or a limit taken in the same run.
-//   node tests/bench/bench.mjs [solve] [bound] [ingest] [get] [fanout] [training] [grid] [devices]
+//   node tests/bench/bench.mjs [solve] [bound] [ingest] [get] [fanout] [training] [predict] [grid] [devices]
 import { execFileSync } from 'node:child_process';
 import { createServer } from 'node:http';
 import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
@@ -32,6 +32,21 @@ function solve() {
   row('joint solve of 10 000 ranges to 50 anchors, cold', `${time.solve_fifty_anchors.cpu_time.toFixed(0)} ms CPU`);
   row('live update, one range', `p50 ${time.live_update.p50_us.toFixed(1)} us, p99 ${time.live_update.p99_us.toFixed(1)} us`, 'limit of a range at 200 Hz: 5 ms');
   row('live path, per second of flight', `${(time.live_whole_flight.cpu_s_per_flight_s * 1e3).toFixed(1)} ms CPU`, 'limit 1000 ms');
+}
+
+// Numbers of core/ml's Method, for the names in the table.
+const methods = ['none', 'constant', 'logistic', 'random_forest', 'svm', 'boosted', 'average', 'univariate', 'multivariate'];
+
+function predict() {
+  const bench = join(process.env.ANCHORD_BENCH_DIR ?? '', 'features_bench');
+  if (!existsSync(bench)) return row('predict', 'not built', bench);
+  const out = JSON.parse(execFileSync(bench, ['--benchmark_format=json', '--benchmark_min_time=0.2'], { stdio: ['ignore', 'pipe', 'ignore'] })).benchmarks;
+  const by = Object.fromEntries(out.map((b) => [b.name, b]));
+  row('features of 1016-sample CIRs', `${(by.features_of_complex_cirs.items_per_second / 1e3).toFixed(0)} k/s`, 'one thread');
+  for (const name of Object.keys(by).filter((n) => n.startsWith('predict_single/'))) {
+    const method = name.split('/')[1];
+    row(`predict, ${methods[method]}, 7 features`, `${by[name].cpu_time.toFixed(0)} ns single`, `batch ${(by[`predict_batch/${method}`].items_per_second / 1e6).toFixed(2)} M/s, one thread`);
+  }
 }
 
 function bound() {
@@ -227,6 +242,10 @@ if (on('planner')) {
 if (on('solve')) {
   say('solving');
   solve();
+}
+if (on('predict')) {
+  say('features and predictions');
+  predict();
 }
 if (on('grid')) {
   say('grid');

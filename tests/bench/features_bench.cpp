@@ -2,7 +2,10 @@
 #include <benchmark/benchmark.h>
 
 #include <array>
+#include <string>
+#include <vector>
 
+#include "core/ml/learn.hpp"
 #include "core/ml/random.hpp"
 #include "core/ml/recipe.hpp"
 #include "core/nlos/features.hpp"
@@ -41,28 +44,69 @@ void features_of_complex_cirs(benchmark::State& state) {
 }
 BENCHMARK(features_of_complex_cirs);
 
-void predict_average_of_three(benchmark::State& state) {
+constexpr std::size_t k_features = 7, k_rows = 1000;
+
+// Two classes that overlap, seven features, a bias that grows behind walls.
+ml::Dataset made_up_rows() {
   ml::Dataset data;
-  ml::Recipe recipe;
-  for (int f = 0; f < 7; ++f) data.features.push_back("f" + std::to_string(f));
-  recipe.features = data.features;
+  for (std::size_t f = 0; f < k_features; ++f) data.features.push_back("f" + std::to_string(f));
   ml::Random random{2};
-  for (std::uint32_t i = 0; i < 1000; ++i) {
+  for (std::uint32_t i = 0; i < k_rows; ++i) {
     double sum = 0;
-    for (int f = 0; f < 7; ++f) {
+    for (std::size_t f = 0; f < k_features; ++f) {
       data.x.push_back(random.uniform());
       sum += data.x.back();
     }
     data.los.push_back(sum + random.uniform() > 4);
+    data.bias_m.push_back(data.los.back() ? 0.05 : 0.4 + 0.2 * random.uniform());
     data.weight.push_back(1);
     data.group.push_back(i);
     data.placement.push_back(i);
   }
-  const auto model = ml::fit_classifier(data, recipe).value();
+  return data;
+}
+
+ml::Model model_of(const ml::Dataset& data, ml::Method method) {
+  ml::Recipe recipe;
+  recipe.method = method;
+  recipe.features = data.features;
+  ml::Model model;
+  model.info.features = data.features;
+  if (ml::suits(method, ml::Task::nlos_id))
+    model.classifier = ml::fit_classifier(data, recipe).value();
+  else
+    model.regressor = ml::fit_regressor(data, recipe).value();
+  return model;
+}
+
+// One live range after another.
+void predict_single(benchmark::State& state) {
+  const auto data = made_up_rows();
+  const auto model = model_of(data, static_cast<ml::Method>(state.range(0)));
   std::size_t i = 0;
-  for (auto _ : state) benchmark::DoNotOptimize(model.p_los(data.row(i++ % data.rows())));
+  for (auto _ : state) benchmark::DoNotOptimize(ml::predict(model, data.row(i++ % k_rows)));
   state.SetItemsProcessed(state.iterations());
 }
-BENCHMARK(predict_average_of_three);
+
+// A whole table into memory, as an evaluation does.
+void predict_batch(benchmark::State& state) {
+  const auto data = made_up_rows();
+  const auto model = model_of(data, static_cast<ml::Method>(state.range(0)));
+  std::vector<ml::Prediction> out(k_rows);
+  for (auto _ : state) {
+    for (std::size_t i = 0; i < k_rows; ++i) out[i] = ml::predict(model, data.row(i));
+    benchmark::ClobberMemory();
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(k_rows));
+}
+
+void methods(benchmark::internal::Benchmark* bench) {
+  for (const auto method :
+       {ml::Method::logistic, ml::Method::random_forest, ml::Method::svm, ml::Method::boosted,
+        ml::Method::average, ml::Method::univariate, ml::Method::multivariate})
+    bench->Arg(static_cast<std::int64_t>(method));
+}
+BENCHMARK(predict_single)->Apply(methods);
+BENCHMARK(predict_batch)->Apply(methods);
 
 }  // namespace

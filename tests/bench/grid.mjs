@@ -23,14 +23,14 @@ export function grid(row, sizes = [943, 50_000], limitS = 300) {
     for (const n of sizes) {
       const data = join(dir, `${n}.csv`);
       writeFileSync(data, table(n));
-      for (const method of ['logistic', 'svm', 'random_forest', 'boosted']) {
+      for (const [task, method] of [['nlos_id', 'logistic'], ['nlos_id', 'svm'], ['nlos_id', 'random_forest'], ['nlos_id', 'boosted'], ['bias', 'polynomial'], ['bias', 'multivariate'], ['bias', 'svm'], ['bias', 'random_forest']]) {
         const start = performance.now();
         try {
-          const out = JSON.parse(execFileSync(binary, ['train', '--data', data, '--method', method, '--grid', '--folds', '5', '--out', join(dir, 'm.json'), '--json'], { timeout: limitS * 1000, maxBuffer: 1 << 28, stdio: ['ignore', 'pipe', 'ignore'] }));
-          row(`grid search of ${method}, ${n} samples, 5 folds`, `${((performance.now() - start) / 1000).toFixed(1)} s`, `${out.candidates.length} candidates`);
+          const out = JSON.parse(execFileSync(binary, ['train', '--data', data, '--task', task, '--method', method, '--grid', '--folds', '5', '--out', join(dir, 'm.json'), '--json'], { timeout: limitS * 1000, maxBuffer: 1 << 28, stdio: ['ignore', 'pipe', 'ignore'] }));
+          row(`grid search of ${method}, ${task}, ${n} samples, 5 folds`, `${((performance.now() - start) / 1000).toFixed(1)} s`, `${out.candidates.length} candidates`);
         } catch (error) {
           if (error.code !== 'ETIMEDOUT' && error.signal !== 'SIGTERM') throw error;
-          row(`grid search of ${method}, ${n} samples, 5 folds`, `more than ${limitS} s`);
+          row(`grid search of ${method}, ${task}, ${n} samples, 5 folds`, `more than ${limitS} s`);
         }
       }
     }

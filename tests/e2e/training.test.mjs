@@ -1,10 +1,13 @@
 // Training runs from outside: the worker process, its death and the server's, cancel, restart, and equal bytes.
 import assert from 'node:assert/strict';
-import { readFileSync, readdirSync } from 'node:fs';
+import { execFileSync } from 'node:child_process';
+import { createHash } from 'node:crypto';
+import { mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { Contract, checked } from './contract.mjs';
-import { eventually, root, startServer } from './server.mjs';
+import { binary, eventually, root, startServer } from './server.mjs';
 
 const contract = new Contract();
 let server, call;
@@ -69,6 +72,29 @@ test('two runs with one seed are equal to the byte', async () => {
   assert.equal(artifacts[0], artifacts[1]);
 });
 
+test('a frozen data set has one form and one digest through the service and the command line', async () => {
+  const dir = mkdtempSync(join(tmpdir(), 'anchord-doors-'));
+  const anchord = (...args) => execFileSync(binary, args, { cwd: dir, encoding: 'utf8', stdio: ['ignore', 'pipe', 'pipe'] });
+  try {
+    const set = (await call('GET', '/api/v1/datasets/set')).json;
+    writeFileSync(join(dir, 'rows.csv'), (await call('GET', '/api/v1/datasets/set/rows?format=csv')).text);
+    assert.match(anchord('dataset', 'check', 'rows.csv'), new RegExp(`^digest ${set.digest}\n`));
+    assert.equal(createHash('sha256').update(readFileSync(join(dir, 'rows.csv'))).digest('hex'), set.digest);
+    // What the command line freezes, the service takes for the same; and what either trains of it are the same bytes.
+    writeFileSync(join(dir, 'campaign.csv'), readFileSync(join(root, 'docs/examples/campaign.csv')));
+    const built = anchord('dataset', 'build', '--data', 'campaign.csv', '--aggregate', 'mean', '--hold-out', 'room 6', '--out', 'built.csv').match(/^digest (\w+)/)[1];
+    const frozen = await call('POST', '/api/v1/datasets', { expect: 201, json: { name: 'means', campaigns: ['campaign'], split: { test: ['room 6'] } } });
+    assert.equal(frozen.json.digest, built);
+    const sent = await call('POST', '/api/v1/datasets?name=built', { expect: 201, headers: { 'content-type': 'text/csv' }, body: readFileSync(join(dir, 'built.csv'), 'utf8') });
+    assert.equal(sent.json.digest, built);
+    const run = await call('POST', '/api/v1/training-runs', { expect: 201, json: { ...quick, dataset: 'built', importance: false }, headers: { prefer: 'wait=200' } });
+    anchord('train', '--data', 'built.csv', '--task', 'nlos_id', '--method', 'logistic,random_forest', '--folds', '4', '--seed', '7', '--out', 'model.json');
+    assert.equal((await call('GET', `${run.json.model}/artifact`)).text, readFileSync(join(dir, 'model.json'), 'utf8'));
+  } finally {
+    rmSync(dir, { recursive: true, force: true });
+  }
+});
+
 test('a canceled run ends within a second or two and leaves nothing', async () => {
   const models = (await call('GET', '/api/v1/models')).json.items.length;
   const { id, worker } = await begin(endless);
@@ -88,6 +114,7 @@ test('a worker that dies fails its job with the reason, and nothing else', async
   const job = await ended(id);
   assert.equal(job.state, 'failed');
   assert.match(job.problem.detail, /worker was ended by signal 9/);
+  assert.match(job.problem.detail, /start the run again/);
   assert.equal((await server.fetch('/healthz')).status, 200);
 });
 

@@ -25,6 +25,44 @@ TEST(Campaign, ReadsPlainTextOfOneMeasurementALine) {
   EXPECT_EQ(read.value().report.dropped.at("zero range"), 1U);
 }
 
+TEST(Campaign, ReadsDecimalCommasOrSaysWhatToDo) {
+  const auto text = import_campaign(
+      "# distance_m = 4,5\n1000 4512,5 -79,25\n1100;4498;-80,5\n1200,4510,-81.5\n1300,0,4511,0,-82,5\n");
+  ASSERT_TRUE(text) << text.error().message;
+  const auto& m = text.value().campaign.measurements;
+  ASSERT_EQ(m.size(), 3U);
+  EXPECT_NEAR(m[0].range_m, 4.5125, 1e-12);
+  EXPECT_EQ(m[0].rx_dbm, -79.25);
+  EXPECT_EQ(m[1].rx_dbm, -80.5);
+  EXPECT_EQ(m[2].rx_dbm, -81.5);
+  EXPECT_EQ(text.value().campaign.sites[0].distance_m, 4.5);
+  ASSERT_EQ(text.value().report.errors.size(), 1U);
+  EXPECT_EQ(text.value().report.errors[0].line, 5U);
+  EXPECT_NE(text.value().report.errors[0].detail.find("decimal commas"), std::string::npos);
+  const auto csv = import_campaign("site;range_m;true_range_m;los\na;4,52;4,5;1\na;4,48;4,5;1\n");
+  ASSERT_TRUE(csv) << csv.error().message;
+  ASSERT_EQ(csv.value().campaign.measurements.size(), 2U);
+  EXPECT_EQ(csv.value().campaign.measurements[0].range_m, 4.52);
+  EXPECT_EQ(csv.value().campaign.sites[0].distance_m, 4.5);
+  const auto torn = import_campaign("site,range_m,true_range_m,los\na,4,52,4,5,1\n");
+  ASSERT_TRUE(torn);
+  EXPECT_NE(torn.value().report.errors[0].detail.find("semicolons"), std::string::npos);
+  const auto truth = import_campaign("# distance_m = long\n1000 4512 -79\n");
+  EXPECT_EQ(truth.value().report.errors[0].line, 1U);
+}
+
+TEST(Campaign, TakesAnImpulseResponseOfAnNdjsonLine) {
+  const auto read = import_campaign(
+      R"({"range_m":5,"true_range_m":4.9,"cir":{"n":2,"dt_ps":1001.6,"first_path_idx":1,"b64":"AQACAP//BAA="}})"
+      "\n"
+      R"({"range_m":5,"true_range_m":4.9,"cir":{"n":3,"b64":"AQACAP//BAA="}})"
+      "\n");
+  ASSERT_TRUE(read) << read.error().message;
+  ASSERT_EQ(read.value().campaign.measurements.size(), 1U);
+  EXPECT_EQ(read.value().campaign.measurements[0].cir->re_im, (std::vector<std::int16_t>{1, 2, -1, 4}));
+  EXPECT_NE(read.value().report.errors[0].detail.find("/cir/b64"), std::string::npos);
+}
+
 TEST(Campaign, ReadsCsvAndNdjsonToTheSameCampaign) {
   const auto csv = import_campaign(
       "site,environment,material,distance_m,heading_deg,height_m,thickness_m,los,range_m,rx_dbm\n"

@@ -46,9 +46,9 @@ class LearningCli : public testing::Test {
     std::ifstream file(path, std::ios::binary);
     return {std::istreambuf_iterator<char>(file), {}};
   }
-  Ran run(const std::string& arguments) const {
-    const std::string command =
-        "cd '" + dir_.string() + "' && '" ANCHORD_BINARY "' " + arguments + " >out.txt 2>err.txt";
+  Ran run(const std::string& arguments, const std::string& before = "") const {
+    const std::string command = "cd '" + dir_.string() + "' && " + before + "'" ANCHORD_BINARY "' " +
+                                arguments + " >out.txt 2>err.txt";
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, slurp(dir_ / "out.txt"), slurp(dir_ / "err.txt")};
   }
@@ -89,6 +89,71 @@ TEST_F(LearningCli, TheSameSeedWritesTheSameBytes) {
   ASSERT_EQ(run("train --data rooms.csv --task bias --out b.json --seed 5").code, 0);
   EXPECT_FALSE(slurp(dir_ / "a.json").empty());
   EXPECT_EQ(slurp(dir_ / "a.json"), slurp(dir_ / "b.json"));
+}
+
+// Folds and trees go to threads as they come free: nothing of that may show.
+TEST_F(LearningCli, ThreadsAndCoresDoNotChangeAByteOfTheModel) {
+  const std::string grid =
+      " --seed 3 --folds 4 --try svm.c=1,3 --try random_forest.leaf_share=0.02,0.08 --try "
+      "boosted.rounds=20,40";
+  const std::vector<std::string> runs{
+      "--task nlos_id --method logistic,svm,random_forest,boosted,average,tree_average" + grid, "--task bias",
+      "--task nlos_bias --method polynomial,multivariate,least_absolute,svm,random_forest,boosted" + grid};
+  for (const auto& one : runs) {
+    std::string first;
+    for (const char* threads : {"1", "2", "5", "0"}) {
+      ASSERT_EQ(run("train --data rooms.csv --out t.json " + one + " --threads " + threads).code, 0)
+          << slurp(dir_ / "err.txt");
+      const auto bytes = slurp(dir_ / "t.json");
+      if (first.empty()) first = bytes;
+      EXPECT_EQ(bytes, first) << one << ", " << threads << " threads";
+    }
+    // One core, as many threads as the machine would have.
+    ASSERT_EQ(run("train --data rooms.csv --out t.json " + one + " --threads 4", "taskset -c 0 ").code, 0);
+    EXPECT_EQ(slurp(dir_ / "t.json"), first) << one;
+  }
+}
+
+TEST_F(LearningCli, AFrozenDataSetIsTheSameFileEachTimeAndTrainsWithItsOwnSplit) {
+  ASSERT_EQ(run("dataset build --data rooms.csv --hold-out room5 --aggregate none --out set.csv").code, 0)
+      << slurp(dir_ / "err.txt");
+  const auto made = slurp(dir_ / "out.txt");
+  ASSERT_EQ(run("dataset check set.csv").code, 0);
+  const auto digest = made.substr(7, 64);
+  EXPECT_EQ(slurp(dir_ / "out.txt").substr(7, 64), digest);
+  // The digest is that of the file, which other tools can take too.
+  ASSERT_EQ(std::system(("cd '" + dir_.string() + "' && sha256sum set.csv | grep -q ^" + digest).c_str()), 0);
+  std::filesystem::create_directories(dir_ / "elsewhere");
+  std::filesystem::copy(dir_ / "rooms.csv", dir_ / "elsewhere/rooms.csv");
+  ASSERT_EQ(
+      run("dataset build --data elsewhere/rooms.csv --hold-out room5 --aggregate none --out b.csv").code, 0);
+  EXPECT_EQ(slurp(dir_ / "b.csv"), slurp(dir_ / "set.csv"));
+  EXPECT_EQ(run("dataset check set.csv --digest " + digest).code, 0);
+  EXPECT_EQ(run("dataset check set.csv --digest 00").code, 2);
+  EXPECT_EQ(run("dataset check rooms.csv").code, 2);
+
+  const auto train = run("train --data set.csv --method logistic --folds 4 --out m.json --json");
+  ASSERT_EQ(train.code, 0) << train.err;
+  const auto model = nlohmann::json::parse(slurp(dir_ / "m.json"));
+  EXPECT_EQ(model.at("manifest").at("data").at("digest"), digest) << model.at("manifest");
+  const auto evaluate = run("evaluate --model m.json --data set.csv --json");
+  ASSERT_EQ(evaluate.code, 0) << evaluate.err;
+  EXPECT_EQ(nlohmann::json::parse(evaluate.out).at("n"), 192);
+}
+
+TEST_F(LearningCli, SaysBeforehandWhichMethodsCanDoATaskAndWhatIsTooMuch) {
+  const auto bias = run("train --data rooms.csv --task bias --method logistic --out m.json");
+  EXPECT_EQ(bias.code, 2);
+  EXPECT_NE(bias.err.find("logistic cannot learn bias"), std::string::npos) << bias.err;
+  EXPECT_NE(bias.err.find("multivariate"), std::string::npos) << bias.err;
+  EXPECT_EQ(run("train --data rooms.csv --task nlos_id --method constant --out m.json").code, 2);
+  std::string many;
+  for (int i = 1; i <= 100; ++i) many += (i > 1 ? "," : "") + std::to_string(i);
+  const auto much =
+      run("train --data rooms.csv --method random_forest --folds 1000 --try random_forest.trees=" + many +
+          " --try random_forest.leaf_share=" + many + " --out m.json");
+  EXPECT_EQ(much.code, 2);
+  EXPECT_NE(much.err.find("10000 settings x 1000 folds on 192 rows"), std::string::npos) << much.err;
 }
 
 TEST_F(LearningCli, UnusableInputExitsWithTwoNamesItAndLeavesNoModel) {

@@ -4,9 +4,11 @@
 #include <unistd.h>
 #include <zlib.h>
 
+#include <cmath>
 #include <fstream>
 
 #include "api/imports/gzip_lines.hpp"
+#include "api/learning/dataset_table.hpp"
 
 namespace anchord::api {
 namespace {
@@ -105,11 +107,71 @@ TEST_F(LabelledTableTest, DropsMissingAndImpossibleValuesAndSaysWhere) {
   EXPECT_EQ(t.value().dropped.at("range_m missing").first, 2U);
   EXPECT_NE(t.value().dropped.at("nlos missing").second.find("r.csv:5"), std::string::npos);
   std::vector<std::size_t> rows;
-  std::map<std::string, std::size_t> dropped;
+  Dropped dropped;
   const auto d = dataset_from(t.value(), {{"range_m", "rx_dbm"}, true, false}, rows, dropped);
   ASSERT_TRUE(d);
   EXPECT_EQ(rows, std::vector<std::size_t>{1});
-  EXPECT_EQ(dropped.at("no rx_dbm"), 1U);
+  EXPECT_EQ(dropped.at("no rx_dbm").first, 1U);
+  EXPECT_NE(dropped.at("no rx_dbm").second.find("r.csv:4"), std::string::npos);
+  // A feature no row has: the error names it, with the first line.
+  const auto none = dataset_from(t.value(), {{"range_m", "kurtosis"}, true, false}, rows, dropped);
+  ASSERT_FALSE(none);
+  EXPECT_NE(none.error().message.find("no kurtosis in 2 (first"), std::string::npos) << none.error().message;
+}
+
+TEST_F(LabelledTableTest, KeepsRowsWithoutATrueRangeForTheirClass) {
+  const auto t = read({plain("r.csv",
+                             "room,nlos,range_m,true_range_m\na,0,5.1,5\na,0,6.1,\na,0,6.3,NaN\na,1,7.9,7\n"
+                             "a,1,7.9,-3\na,1,7.9,long\n")});
+  ASSERT_TRUE(t) << t.error().message;
+  EXPECT_EQ(t.value().rows(), 4U);
+  EXPECT_EQ(t.value().dropped.at("true_range_m impossible").first, 1U);
+  EXPECT_NE(t.value().dropped.at("true_range_m is no number").second.find("r.csv:7"), std::string::npos);
+  // Nothing says that the two stand at one placement.
+  EXPECT_NE(t.value().placement[1], t.value().placement[2]);
+  std::vector<std::size_t> rows;
+  Dropped dropped;
+  const auto classes = dataset_from(t.value(), {{"range_m"}, true, false}, rows, dropped);
+  ASSERT_TRUE(classes);
+  EXPECT_EQ(classes.value().rows(), 4U);
+  EXPECT_FALSE(classes.value().has_truth());
+  EXPECT_TRUE(dropped.empty());
+  const auto bias = dataset_from(t.value(), {{"range_m"}, true, true}, rows, dropped);
+  ASSERT_TRUE(bias);
+  EXPECT_EQ(rows, (std::vector<std::size_t>{0, 3}));
+  EXPECT_NE(dropped.at("no true_range_m").second.find("r.csv:3"), std::string::npos);
+}
+
+TEST_F(LabelledTableTest, ReadsDecimalCommasBetweenSemicolonsAndRefusesThemBetweenCommas) {
+  const auto t = read({plain("r.csv",
+                             "env;nlos;range_m;true_range_m;rx_dbm\nhall;0;5,25;5,0;-80,5\n"
+                             "hall;1;1.234,5;5;-80\n")});
+  ASSERT_TRUE(t) << t.error().message;
+  ASSERT_EQ(t.value().rows(), 1U);
+  EXPECT_EQ(t.value().range_m[0], 5.25);
+  EXPECT_EQ(t.value().true_range_m[0], 5.0);
+  EXPECT_EQ(t.value().features[0].get(nlos::Feature::rx_dbm), -80.5);
+  EXPECT_NE(t.value().dropped.at("range_m is no number").second.find("r.csv:3"), std::string::npos);
+  const auto torn = read({plain("c.csv", "nlos,range_m\n0,5,25\n")});
+  ASSERT_FALSE(torn);
+  EXPECT_NE(torn.error().message.find("c.csv:2"), std::string::npos);
+  EXPECT_NE(torn.error().message.find("decimal commas need semicolons"), std::string::npos);
+}
+
+// The path to a file is none of the data's business: the same file elsewhere is the same data set.
+TEST_F(LabelledTableTest, RowsOfADataSetNameTheirFileAsCampaignAndTheirPlacementAsSetting) {
+  const auto t =
+      read({plain("may 5.csv", "env,nlos,range_m,true_range_m,fp_amp1\nhw,0,5.1,5,900\nhw,1,6.9,6,\n")});
+  ASSERT_TRUE(t);
+  const auto rows = dataset_rows(t.value());
+  ASSERT_EQ(rows.rows.size(), 2U);
+  EXPECT_EQ(rows.rows[0].campaign, "may 5");
+  EXPECT_EQ(rows.rows[0].environment, "hw");
+  EXPECT_EQ(rows.rows[0].setting, "hw/5/0");
+  EXPECT_EQ(rows.rows[1].los, false);
+  EXPECT_EQ(rows.registers, std::vector<std::string>{"fp_amp1"});
+  EXPECT_EQ(rows.rows[0].registers[0], 900);
+  EXPECT_TRUE(std::isnan(rows.rows[1].registers[0]));
 }
 
 TEST_F(LabelledTableTest, NamesTheLineOfABrokenRowAndTheColumnThatLacks) {

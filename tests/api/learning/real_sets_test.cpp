@@ -42,7 +42,7 @@ TEST_P(RealSet, HoldsItsFigureOnPlacesItHasNotSeen) {
   ASSERT_TRUE(table) << table.error().message;
   const bool identify = c.task == ml::Task::nlos_id;
   std::vector<std::size_t> rows;
-  std::map<std::string, std::size_t> dropped;
+  Dropped dropped;
   auto data = dataset_from(table.value(), {available_features(table.value(), identify), true, !identify},
                            rows, dropped);
   ASSERT_TRUE(data) << data.error().message;

@@ -122,6 +122,80 @@ TEST_F(LearningService, PromotesOnlyACorrectionThatHelpsUnlessAReasonIsGiven) {
   EXPECT_EQ(json(get("/api/v1/models/promotions"))["items"].size(), 4u);
 }
 
+TEST_F(LearningService, APromotionIsAnEventOfTheRecordAndSurvivesARestart) {
+  const auto mission =
+      json(post("/api/v1/missions", R"({"name":"flight","frame":"local","track_point":"tag_antenna",
+    "tags":[{"tag":"0x6e01","lever_arm_body_m":[0,0,0]}]})"));
+  const auto run = train("nlos_id", "logistic");
+  ASSERT_EQ(promote(run).status, 200);
+  const auto told = [&](const std::string& path) {
+    std::vector<std::string> texts;
+    const auto events = json(get(path));
+    for (const auto& event : events["items"])
+      if (event["code"] == "model.promoted") texts.push_back(event.value("text", ""));
+    return texts;
+  };
+  const std::string flight = "/api/v1/missions/" + mission.value("id", "") + "/events";
+  const auto live = told("/api/v1/events");
+  ASSERT_EQ(live.size(), 2u) << mission;  // once for all, once for the flight that was recording
+  ASSERT_EQ(told(flight).size(), 1u);
+  restart();
+  EXPECT_EQ(told("/api/v1/events"), live);
+  EXPECT_EQ(told(flight), std::vector<std::string>{live.front()});
+  EXPECT_EQ("/api/v1/models/" + json(get("/api/v1/models/active"))["models"]["nlos_id"].value("id", ""),
+            run["model"]);
+}
+
+TEST_F(LearningService, GivesTheImpulseResponseOfASample) {
+  const auto line = R"({"setting":"s","environment":"lab","true_distance_m":4.9,"los":true,"range_m":5,)"
+                    R"("cir":{"n":2,"dt_ps":1001.6,"first_path_idx":1,"rxpacc":900,"b64":"AQACAP//BAA="}})";
+  const auto sent = post("/api/v1/campaigns/hall/samples", line, "application/x-ndjson");
+  ASSERT_EQ(json(sent)["accepted"], 1) << sent.body;
+  const auto samples = json(get("/api/v1/campaigns/hall/samples", {{"environment", "lab"}}))["items"];
+  ASSERT_EQ(samples.size(), 1u);
+  EXPECT_EQ(samples[0]["has_cir"], true);
+  const auto path = "/api/v1/campaigns/hall/samples/" + samples[0]["id"].dump() + "/cir";
+  const auto cir = get(path);
+  ASSERT_EQ(cir.status, 200) << cir.body;
+  EXPECT_EQ(json(cir)["b64"], "AQACAP//BAA=");
+  EXPECT_EQ(json(cir)["first_path_idx"], 1);
+  EXPECT_EQ(get(path, {{"format", "binary"}}).body, std::string("\1\0\2\0\xFF\xFF\4\0", 8));
+  EXPECT_EQ(get("/api/v1/campaigns/hall/samples/1/cir").status, 404);
+  EXPECT_EQ(get("/api/v1/campaigns/hall/samples/none/cir").status, 404);
+}
+
+TEST_F(LearningService, NamesTheMethodsThatCanDoATask) {
+  const auto wrong =
+      post("/api/v1/training-runs", R"({"task":"bias","dataset":"set","methods":["logistic"]})");
+  ASSERT_EQ(wrong.status, 422) << wrong.body;
+  EXPECT_EQ(json(wrong)["errors"][0]["pointer"], "/methods/0");
+  EXPECT_NE(json(wrong)["errors"][0].value("detail", "").find("multivariate"), std::string::npos)
+      << wrong.body;
+}
+
+TEST_F(LearningService, AModelThatLiveRangesCannotFeedIsNotPromoted) {
+  auto csv = get("/api/v1/datasets/set/rows", {{"format", "csv"}}).body;
+  std::string with_register;
+  for (std::size_t at = 0, line = 0; at < csv.size(); ++line) {
+    const auto end = csv.find('\n', at);
+    with_register +=
+        csv.substr(at, end - at) + (line == 0 ? ",fp_amp1" : "," + std::to_string(9000 + line % 7)) + "\n";
+    at = end + 1;
+  }
+  ASSERT_EQ(post("/api/v1/datasets", with_register, "text/csv", {{"name", "registers"}}).status, 201);
+  Call options;
+  options.headers["prefer"] = "wait=120";
+  const auto run = json(call(
+      api::Method::post, "/api/v1/training-runs",
+      R"({"task":"nlos_id","dataset":"registers","methods":["logistic"],"features":["rx_dbm","fp_dbm","fp_amp1"],
+                             "cv":{"folds":4},"importance":false})",
+      options));
+  const auto refused = promote(run);
+  EXPECT_EQ(refused.status, 422) << refused.body;
+  EXPECT_NE(json(refused).value("detail", "").find("fp_amp1"), std::string::npos) << refused.body;
+  EXPECT_EQ(json(get("/api/v1/models/active"))["raw"], true);
+}
+
 TEST_F(LearningService, PredictsAndSaysWhatASampleLacks) {
   const auto sample = R"({"sample":{"distance_m":6,"rx_dbm":-81,"fp_dbm":-83}})";
   EXPECT_EQ(json(post("/api/v1/models/active/predict", sample))["note"], "no model is promoted");

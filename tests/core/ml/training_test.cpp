@@ -28,6 +28,43 @@ bool same_numbers(const TrainingOutcome& a, const TrainingOutcome& b) {
 
 }  // namespace
 
+TEST(Training, SaysBeforehandThatASearchWouldTakeDaysAndThatAMethodCannotLearnTheTask) {
+  TrainingSpec spec;
+  spec.methods = {Method::random_forest};
+  std::vector<double> values(100, 1);
+  spec.grid = {{Method::random_forest, {{"trees", values}, {"leaf_share", values}}}};
+  ASSERT_TRUE(spec.check());
+  EXPECT_TRUE(spec.check_size(5'000));
+  const auto much = spec.check_size(50'000);  // 10 000 settings x 10 folds x 50 000 rows
+  ASSERT_FALSE(much);
+  EXPECT_NE(much.error().message.find("10000 settings x 10 folds on 50000 rows"), std::string::npos)
+      << much.error().message;
+  // An SVM is fitted to a few thousand of them.
+  spec.methods = {Method::svm};
+  spec.grid = {{Method::svm, {{"c", values}, {"gamma", values}}}};
+  EXPECT_TRUE(spec.check_size(500'000));
+  spec.task = Task::bias, spec.methods = {Method::logistic}, spec.grid = {};
+  const auto unable = spec.check();
+  ASSERT_FALSE(unable);
+  EXPECT_NE(
+      unable.error().message.find("logistic cannot learn bias; the methods that can are none, constant"),
+      std::string::npos)
+      << unable.error().message;
+}
+
+TEST(Training, TellsOfHowManyRowsAnSvmWasFitted) {
+  TrainingSpec spec;
+  spec.methods = {Method::svm};
+  spec.folds = 2, spec.importance = false;
+  const auto few = train(learning_world(1, false), spec);
+  ASSERT_TRUE(few);
+  EXPECT_EQ(few.value().model.info.why.find("drawn evenly"), std::string::npos);
+  const auto many = train(learning_world(1, false, 1000), spec);  // 1000 placements of 5 rows each
+  ASSERT_TRUE(many);
+  EXPECT_NE(many.value().model.info.why.find("fitted to 4000 of 5000 rows, drawn evenly"), std::string::npos)
+      << many.value().model.info.why;
+}
+
 TEST(Training, ReportsGridFoldsImportanceAndPredictionsOfTheSameRun) {
   const auto data = learning_world(1, false);
   TrainingSpec spec;

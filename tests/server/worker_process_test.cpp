@@ -1,0 +1,81 @@
+// A worker that dies, in every way it may: the work gets a cause and advice, and the caller lives.
+#include "server/runtime/worker_process.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+namespace anchord::server {
+namespace {
+
+class WorkerProcess : public testing::Test {
+ protected:
+  void SetUp() override {
+    char path[] = "/tmp/anchord_worker_XXXXXX";
+    ASSERT_NE(mkdtemp(path), nullptr);
+    dir_ = path;
+  }
+  void TearDown() override { std::filesystem::remove_all(dir_); }
+
+  Result<std::string> run(const std::string& script, const std::string& message) const {
+    const auto program = dir_ / "program";
+    std::ofstream{program} << "#!/bin/sh\n" << script << '\n';
+    ::chmod(program.c_str(), 0755);
+    return work_in_process(program)(message, {}, [] { return false; });
+  }
+
+  std::filesystem::path dir_;
+};
+
+/// A forest on `rows` rows of two places.
+std::string training(std::size_t rows) {
+  std::string csv =
+      "feature_set,campaign,environment,setting,split,los,true_range_m,repeats,range_m,rx_dbm\n";
+  for (std::size_t i = 0; i < rows; ++i)
+    csv += "anchord-features-1,c,room " + std::to_string(i % 4) + ",s" + std::to_string(i) + ",train," +
+           (i % 2 == 0 ? "1" : "0") + ",5,1," + std::to_string(5 + static_cast<double>(i % 97) / 100) + "," +
+           std::to_string(-80 - static_cast<double>(i % 13)) + "\n";
+  return nlohmann::json{
+      {"kind", "training"},
+      {"csv", csv},
+      {"request", {{"task", "nlos_id"}, {"dataset", "x"}, {"methods", {"logistic"}}, {"importance", false}}}}
+      .dump();
+}
+
+}  // namespace
+
+TEST_F(WorkerProcess, AKilledWorkerIsToldAsAlmostCertainlyOutOfMemory) {
+  const auto result = run("kill -KILL $$", "{}");
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, Errc::link_lost);
+  EXPECT_NE(result.error().message.find("was ended by signal 9"), std::string::npos)
+      << result.error().message;
+  EXPECT_NE(result.error().message.find("no memory left"), std::string::npos) << result.error().message;
+}
+
+TEST_F(WorkerProcess, ACrashedWorkerSaysThatTheRunIsKeptAndWhatToTry) {
+  const auto result = run("kill -SEGV $$", "{}");
+  ASSERT_FALSE(result);
+  EXPECT_NE(result.error().message.find("fewer rows or another method"), std::string::npos)
+      << result.error().message;
+}
+
+TEST_F(WorkerProcess, RunsOutOfMemoryWithTheLimitInTheMessageInsteadOfAFaultWithoutWords) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "a sanitizer's shadow counts as data: no limit is set";
+#endif
+  const std::string real = "exec '" ANCHORD_BINARY "' worker";
+  ASSERT_TRUE(run(real, training(200))) << "the work itself is sound";
+  const auto result = run("ulimit -d 60000; " + real, training(200'000));
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, Errc::unsupported) << result.error().message;
+  EXPECT_NE(result.error().message.find("more memory than the 58 MiB"), std::string::npos)
+      << result.error().message;
+  EXPECT_NE(result.error().message.find("fewer"), std::string::npos) << result.error().message;
+}
+
+}  // namespace anchord::server
