@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "api/json/live_writer.hpp"
+#include "api/json/procedure_json.hpp"
 #include "api/json/wire_devices.hpp"
 #include "api/learning/promotion_events.hpp"
 #include "api/live/conversation.hpp"
@@ -22,6 +23,7 @@
 #include "api/services/kit_profiles.hpp"
 #include "core/ports/backups.hpp"
 #include "core/ports/devices.hpp"
+#include "core/ports/plan_store.hpp"
 #include "core/ports/store.hpp"
 
 namespace anchord::api {
@@ -41,7 +43,8 @@ struct Application::State {
         jobs(deps.jobs, hub, deps.clock),
         geo(deps.geoid_dir),
         calibrations({deps.measurements, deps.missions, deps.anchors, jobs, deps.clock, profiles_of(deps),
-                      models.get(), deps.learning != nullptr ? &deps.learning->models : nullptr}),
+                      models.get(), deps.learning != nullptr ? &deps.learning->models : nullptr,
+                      [this](const MissionId& id) { return clues_of_flight(id); }}),
         services{deps, hub,          events, alarms,         missions,   ingest,
                  jobs, calibrations, geo,    profiles.get(), deps.frames} {
     router.on_fault(deps.log_fault);
@@ -80,6 +83,18 @@ struct Application::State {
   KitProfiles* profiles_of(const Deps& from) {
     if (from.kits != nullptr) profiles = std::make_unique<KitProfiles>(*from.kits, from.missions, from.clock);
     return profiles.get();
+  }
+
+  /// What turns and height searches of a mission's flight told, as kept with it.
+  procedure::FlightClues clues_of_flight(const MissionId& id) const {
+    const auto kept = deps.plans != nullptr ? deps.plans->procedures()
+                                            : make_error(Errc::not_found, "no plans are kept here");
+    if (!kept) return {};
+    for (const auto& [mission, text] : kept.value()) {
+      const auto j = nlohmann::json::parse(text, nullptr, false);
+      if (mission == id && j.is_object()) return clues_of(j.value("clues", nlohmann::json()));
+    }
+    return {};
   }
 
   /// What the promoted models say of a range as it comes. Nothing while none is promoted.

@@ -258,4 +258,44 @@ std::optional<procedure::State> state_of(const nlohmann::json& j) {
   }
 }
 
+nlohmann::ordered_json stored_clues(const procedure::FlightClues& clues) {
+  const auto at = [](const Wgs84& p) { return Ordered{p.lat_deg, p.lon_deg, p.height_m}; };
+  Ordered out = Ordered::object();
+  for (const auto& [anchor, clue] : clues) {
+    Ordered one = Ordered::object();
+    if (const auto& b = clue.bearing)
+      one["bearing"] = {{"from", at(b->from)}, {"rad", b->bearing_rad}, {"sigma_rad", b->sigma_rad}};
+    if (const auto& h = clue.height) one["height"] = {{"at", at(h->at)}, {"sigma_m", h->sigma_m}};
+    out[to_string(anchor)] = std::move(one);
+  }
+  return out;
+}
+
+procedure::FlightClues clues_of(const nlohmann::json& j) {
+  const auto place = [](const nlohmann::json& v) {
+    return Wgs84{v.at(0).get<double>(), v.at(1).get<double>(), v.at(2).get<double>()};
+  };
+  procedure::FlightClues out;
+  if (!j.is_object()) return out;
+  for (const auto& [text, one] : j.items()) {
+    const auto anchor = parse_network_id(text);
+    if (!anchor) continue;
+    try {
+      procedure::FlightClue clue;
+      if (one.contains("bearing")) {
+        const auto& b = one.at("bearing");
+        clue.bearing = {place(b.at("from")), b.at("rad").get<double>(), b.at("sigma_rad").get<double>()};
+      }
+      if (one.contains("height")) {
+        const auto& h = one.at("height");
+        clue.height = {place(h.at("at")), h.at("sigma_m").get<double>()};
+      }
+      out[anchor.value()] = clue;
+    } catch (const nlohmann::json::exception&) {
+      continue;
+    }
+  }
+  return out;
+}
+
 }  // namespace anchord::api

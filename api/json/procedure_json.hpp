@@ -8,6 +8,7 @@
 #include "core/base/ids.hpp"
 #include "core/geo/enu.hpp"
 #include "core/ports/drone.hpp"
+#include "core/procedure/flight_clues.hpp"
 #include "core/procedure/flight_engine.hpp"
 
 namespace anchord::api {
@@ -51,5 +52,9 @@ nlohmann::ordered_json height_json(const MissionId& mission, NetworkId anchor, s
 /// The machine's state as it is kept, and back. errors: a document of another shape gives nothing.
 nlohmann::ordered_json stored_state(const procedure::State& state);
 std::optional<procedure::State> state_of(const nlohmann::json& json);
+
+/// Clues as they are kept with the mission, and back; entries of another shape are left out.
+nlohmann::ordered_json stored_clues(const procedure::FlightClues& clues);
+procedure::FlightClues clues_of(const nlohmann::json& json);
 
 }  // namespace anchord::api

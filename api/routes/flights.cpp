@@ -158,6 +158,51 @@ Response flight_action(Services& s, const Request& request, const std::string& a
   return json_response(202, flight_command_json(given));
 }
 
+namespace {
+
+/// The aircraft's own lists. What is asked for is in the audit log, as every command.
+Response upload(Services& s, const Request& request) {
+  static const std::vector<std::string_view> k_lists{"fence", "route"};
+  const auto mission = path_id<MissionId>(request);
+  std::vector<FieldError> errors;
+  const auto body = json_body(request);
+  Fields fields(body, "", errors);
+  const auto what = fields.word("what", k_lists, true);
+  const auto lease = fields.text("lease", 64).value_or("");
+  PlanId plan{};
+  if (const auto text = fields.text("plan", 36, true)) {
+    const auto id = parse_uuid(*text);
+    if (id)
+      plan = PlanId{id.value()};
+    else
+      fields.error("plan", "bad_id", id.error().message);
+  }
+  fields.finish();
+  refuse_if_any(errors);
+  const std::string list(k_lists[*what]), audited = "mission.upload " + list + ' ' + to_string(mission);
+  auto command = s.flights->upload(mission, list, plan, lease, request.principal);
+  if (!command) {
+    s.audit(request, audited, "refused: " + command.error().message);
+    if (command.error().code == Errc::invalid_argument) throw_problem(422, "state", command.error().message);
+  }
+  auto given = granted(std::move(command));
+  s.audit(request, audited);
+  if (const int wait_s = prefer_wait_s(request); wait_s > 0)
+    given = s.flights->settled(std::move(given), std::min(wait_s, 20));
+  return json_response(202, flight_command_json(given));
+}
+
+Response uploads(Services& s, const Request& request) {
+  check_query(request, {});
+  const auto mission = path_id<MissionId>(request);
+  value_or_problem(s.missions.mission(mission));
+  auto items = Ordered::array();
+  for (const auto& one : s.flights->uploads(mission)) items.push_back(flight_upload_json(one));
+  return json_response(200, Ordered{{"items", std::move(items)}});
+}
+
+}  // namespace
+
 void add_flight_routes(Router& router, Services& s) {
   const auto on = [&s](auto function) {
     return [&s, function](const Request& request) { return function(s, request); };
@@ -166,6 +211,8 @@ void add_flight_routes(Router& router, Services& s) {
   const std::string base = "/api/v1/missions/{id}/";
   router.add({Method::get, base + "control", readers(), on(who_has_control)});
   router.add({Method::post, base + "control", op, on(control)});
+  router.add({Method::get, base + "uploads", readers(), on(uploads)});
+  router.add({Method::post, base + "uploads", op, on(upload)});
   router.add({Method::get, base + "checklist", readers(), on(checklist)});
   router.add({Method::post, base + "checklist/{item}", op, on(override_item)});
   router.add({Method::get, base + "procedure", readers(),

@@ -1,7 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/exports/plan_export.hpp"
-#include "api/imports/qgc_plan.hpp"
+#include "api/imports/kml_plan.hpp"
 #include "api/json/plan_json.hpp"
 #include "api/json/reader.hpp"
 #include "api/routes/routes.hpp"
@@ -123,11 +123,13 @@ Response generate(Services&, const Request& request) {
 
 Response import(Services& s, const Request& request) {
   check_query(request, {"name", "dry_run"});
-  const auto body = json_body(request);
   std::vector<FieldError> errors;
   std::vector<std::string> notes;
-  const bool qgc = body.is_object() && body.value("fileType", nlohmann::json()) == "Plan";
-  Plan plan = qgc ? read_qgc_plan(body, notes, errors) : read_geojson_plan(body, errors);
+  const std::string_view type = request.header("content-type");
+  const bool kml = type.starts_with("application/vnd.google-earth.kml+xml") ||
+                   type.starts_with("application/xml") || type.starts_with("text/xml");
+  if (!kml) (void)json_body(request);  // refuses another type, broken text, compression
+  Plan plan = read_plan_file(request.body, notes, errors);
   plan.name = request.query_value("name").value_or("Imported plan").substr(0, 200);
   refuse_if_any(errors);
   if (query_flag(request, "dry_run")) {

@@ -75,6 +75,7 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
   fields.word("initial", {"search", "bearing_height"});
   if (const Json* clues = fields.child("clues")) read_clues(*clues, "/clues", options, errors);
   if (const Json* models = fields.child("models")) out.models = read_flight_models(*models, errors);
+  out.flight_clues = fields.boolean("flight_clues").value_or(true);
   out.compare_uncorrected = fields.boolean("compare_uncorrected").value_or(true);
   for (const char* later : {"frame", "use_anchor_anchor"}) {
     if (fields.child(later) != nullptr)
@@ -121,6 +122,7 @@ struct CalibrationService::Solved {
   std::vector<KitProfile> learned;
   Json profiles = Json::array();
   Evidence evidence;
+  std::size_t n_clues{0};                  ///< anchors with a bearing or a height as a prior
   std::vector<FlightModelsReport> models;  ///< what they did to each flight
 
   std::vector<std::size_t> of_kit(const std::string& kit) const {
@@ -262,6 +264,14 @@ Result<void> CalibrationService::solve_kit(const CalibrationRequest& request, co
     // Factors of a profile are told apart by this name.
     named.back().mission.name = KitProfiles::flight_key(solved.flights[i].mission);
   }
+  if (deps_.flight_clues && request.flight_clues && options.origin) {
+    procedure::FlightClues told;
+    for (const std::size_t i : members)
+      told = procedure::merged(std::move(told), deps_.flight_clues(solved.flights[i].mission.id));
+    // What the request says of an anchor stands; the flights fill in the rest.
+    of_kit.clues.merge(procedure::clues_in(told, EnuFrame(*options.origin)));
+    solved.n_clues += of_kit.clues.size();
+  }
   std::vector<const FlightData*> pointers;
   for (const auto& flight : named) pointers.push_back(&flight);
   KitProfile learned;
@@ -372,6 +382,7 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
   out.provenance_json = Json{
       {"profiles", std::move(solved.profiles)},
       {"base", std::move(base)},
+      {"n_clues", solved.n_clues},
       {"models", models.predictor.empty() ? Json(nullptr) : Json(flight_models_json(models, solved.models))},
       {"uncorrected", std::move(uncorrected)},
       {"flights",

@@ -10,6 +10,7 @@
 #include "core/base/result.hpp"
 #include "core/localize/flight_options.hpp"
 #include "core/ports/store.hpp"
+#include "core/procedure/flight_clues.hpp"
 #include "core/types/anchor.hpp"
 #include "core/types/flight_data.hpp"
 
@@ -29,6 +30,7 @@ struct CalibrationRequest {
   bool use_profile{true};     ///< the kit's stored profile tells the prior, and learns from these flights
   int iterations{0};          ///< growing parts of each flight solved too, for the report's curves
   FlightModelsWish models{};  ///< what corrects the ranges before anything is solved
+  bool flight_clues{true};    ///< bearings and heights that the flights found are priors
   bool compare_uncorrected{true};  ///< the positions without the models are kept beside
 };
 
@@ -52,6 +54,8 @@ class CalibrationService {
     KitProfiles* profiles{nullptr};        ///< null: flights learn from each other alone
     const ModelRegistry* models{nullptr};  ///< null, or no store: ranges are used raw
     ModelStore* model_store{nullptr};
+    /// What turns and height searches of a mission's flight told; absent: nothing.
+    std::function<procedure::FlightClues(const MissionId&)> flight_clues{};
   };
   explicit CalibrationService(Deps deps) : deps_(deps) {}
 

@@ -13,8 +13,8 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 4> k_by_a_pe
      {"airspace", "The airspace is clear and allowed"},
      {"people", "Nobody stands below the way"},
      {"pilot", "A pilot is ready with the remote control"}}};
-constexpr std::array<std::string_view, 8> k_by_itself{"drone", "battery", "rtk",  "corrections",
-                                                      "tag",   "plan",    "disk", "recording"};
+constexpr std::array<std::string_view, 9> k_by_itself{"drone", "battery", "rtk",       "corrections", "tag",
+                                                      "plan",  "disk",    "recording", "fence"};
 
 std::string words(const char* format, double value) {
   std::array<char, 120> out{};

@@ -51,6 +51,9 @@ std::vector<ChecklistItem> FlightService::State::checklist(const Mission* record
   facts.writable = storage.writable;
   facts.disk_free_bytes = static_cast<double>(storage.disk_free_bytes);
   auto items = make_checklist(facts);
+  if (plan != nullptr && !manual && deps.drone != nullptr) {
+    if (auto fence = fence_item(*plan)) items.push_back(std::move(*fence));
+  }
   if (const auto it = said.find(mission); it != said.end()) {
     for (auto& i : items) {
       const auto found = it->second.find(i.id);
@@ -68,6 +71,7 @@ Result<FlightCommand> FlightService::State::begin(const Mission& mission, const 
   if (flight && flight->flying()) return forbidden("a flight is in the air already");
   if (mission.frame != TrackFrame::wgs84)
     return forbidden("a mission in a local frame cannot be flown: an aircraft needs the globe");
+  preparing.emplace(mission.id, plan);
   std::string open;
   for (const auto& i : checklist(&mission, mission.id, &plan, manual)) {
     if (!i.green()) open += (open.empty() ? "" : ", ") + i.id;
@@ -137,10 +141,17 @@ Result<FlightCommand> FlightService::State::obey(const MissionId& mission, const
 void FlightService::State::recover() {
   const auto kept = deps.plans.procedures();
   if (!kept) return;
-  for (const auto& [mission, text] : kept.value()) deps.missions.prepare(mission);
-  const std::scoped_lock lock(mutex);
+  std::vector<std::pair<MissionId, nlohmann::json>> flying;
   for (const auto& [mission, text] : kept.value()) {
-    const auto j = nlohmann::json::parse(text, nullptr, false);
+    auto j = nlohmann::json::parse(text, nullptr, false);
+    if (j.is_object() && j.value("landed", false)) continue;
+    deps.missions.prepare(mission);
+    deps.missions.tell_clues(
+        mission, j.is_object() ? clues_of(j.value("clues", nlohmann::json())) : procedure::FlightClues{});
+    flying.emplace_back(mission, std::move(j));
+  }
+  const std::scoped_lock lock(mutex);
+  for (const auto& [mission, j] : flying) {
     std::vector<FieldError> errors;
     const bool whole = j.is_object() && j.contains("plan") && j.contains("state") && j.contains("origin") &&
                        j.contains("home_m") && j["origin"].size() == 3 && j["home_m"].size() == 3;
@@ -162,6 +173,7 @@ void FlightService::State::recover() {
     const bool manual = j.value("manual", false) || deps.drone == nullptr;
     flight.emplace(mission, std::move(plan), manual, EnuFrame(origin), home,
                    procedure::FlightEngine(std::move(setup).value(), *state, now_s()));
+    flight->clues_before = clues_of(j.value("clues", nlohmann::json()));
     // Not heard yet: the hold leaves with the first heartbeat.
     for (const auto& order : flight->engine.take_orders()) {
       if (!manual) flight->owed = order.kind;

@@ -62,12 +62,18 @@ void FlightService::step() {
   if (deciding) live = s.deps.missions.live(mission);
   std::string keep;
   bool keeps = false;
+  std::optional<procedure::FlightClues> clues;
   {
     const std::scoped_lock lock(s.mutex);
     s.round(live.empty() ? nullptr : &live.front());
     if (s.flight) keeps = s.flight->to_keep(keep);
+    if (s.flight && s.flight->clues_told != s.flight->engine.clues_version()) {
+      s.flight->clues_told = s.flight->engine.clues_version();
+      clues = s.flight->clues();
+    }
     s.publish();
   }
+  if (clues && mission) s.deps.missions.tell_clues(*mission, std::move(*clues));
   if (keeps && mission) (void)s.deps.plans.keep_procedure(*mission, keep, s.deps.clock.now()).has_value();
   s.changed.notify_all();
 }
@@ -131,6 +137,26 @@ Result<FlightCommand> FlightService::act(const MissionId& mission, const Order& 
   return state_->obey(mission, order.action, who);
 }
 
+Result<FlightCommand> FlightService::upload(const MissionId& mission, const std::string& what,
+                                            const PlanId& plan_id, const std::string& lease,
+                                            const Principal& who) {
+  BOOST_OUTCOME_TRYV(state_->deps.missions.mission(mission));
+  BOOST_OUTCOME_TRY(const auto stored, state_->deps.plans.plan(plan_id));
+  const Plan plan = plan_of(stored);
+  const std::scoped_lock lock(state_->mutex);
+  BOOST_OUTCOME_TRYV(state_->lease.renew(mission, lease, who, state_->deps.clock.now()));
+  return state_->upload(mission, plan, what, who.name);
+}
+
+std::vector<FlightUpload> FlightService::uploads(const MissionId& mission) {
+  const std::scoped_lock lock(state_->mutex);
+  std::vector<FlightUpload> out;
+  for (const auto& u : state_->uploads) {
+    if (u.mission == mission) out.push_back(u);
+  }
+  return out;
+}
+
 FlightCommand FlightService::settled(FlightCommand command, double wait_s) {
   std::unique_lock lock(state_->mutex);
   const auto latest = [&] {
@@ -149,6 +175,8 @@ std::vector<ChecklistItem> FlightService::checklist(const MissionId& mission,
     if (const auto stored = state_->deps.plans.plan(*plan_id)) plan = plan_of(stored.value());
   }
   const std::scoped_lock lock(state_->mutex);
+  const auto holder = state_->lease.holder(state_->deps.clock.now());
+  if (plan && holder && holder->mission == mission) state_->preparing.emplace(mission, *plan);
   return state_->checklist(record ? &record.value() : nullptr, mission, plan ? &*plan : nullptr,
                            state_->deps.drone == nullptr);
 }

@@ -12,6 +12,7 @@
 #include "api/services/mission_observer.hpp"
 #include "core/base/result.hpp"
 #include "core/types/fix.hpp"
+#include "core/types/plan.hpp"
 
 namespace anchord {
 class Drone;
@@ -24,6 +25,18 @@ class EventLog;
 class Hub;
 class MissionService;
 struct StorageStatus;
+
+/// A list given to the aircraft to keep, and what became of it.
+struct FlightUpload {
+  MissionId mission{};
+  PlanId plan{};
+  std::uint64_t revision{};
+  std::string what;  ///< fence, route
+  std::size_t n_items{};
+  double begun_s{};
+  FlightCommand command;
+};
+nlohmann::ordered_json flight_upload_json(const FlightUpload& upload);
 
 /// The one calibration flight that may be in the air: lease, checklist, procedure, commands, restart.
 ///
@@ -70,6 +83,15 @@ class FlightService final : public MissionObserver {
   Result<FlightCommand> act(const MissionId& mission, const Order& order, const Principal& who);
   /// Waits until the command is no longer `sent`, at most so long.
   FlightCommand settled(FlightCommand command, double wait_s);
+
+  /// Gives the aircraft on the ground the plan's fence or its route to keep; `what`: fence, route. Its fate
+  /// comes as a command's.
+  /// errors  conflict: no control; invalid_argument: no aircraft, in the air, nothing to give; not_found:
+  /// plan
+  Result<FlightCommand> upload(const MissionId& mission, const std::string& what, const PlanId& plan,
+                               const std::string& lease, const Principal& who);
+  /// Newest of each kind.
+  std::vector<FlightUpload> uploads(const MissionId& mission);
 
   std::vector<ChecklistItem> checklist(const MissionId& mission, const std::optional<PlanId>& plan);
   /// A manual item is confirmed, an automatic one overridden; the reason is kept with the name.

@@ -54,16 +54,23 @@ bool ActiveFlight::to_keep(std::string& text) {
   if (n == kept) return false;
   kept = n;
   text.clear();
-  if (!flying()) return true;
+  const auto told = stored_clues(clues());
+  if (!flying()) {
+    // What turns and height searches told outlives the flight: every calibration of it asks for it.
+    if (!told.empty()) text = nlohmann::ordered_json{{"landed", true}, {"clues", told}}.dump();
+    return true;
+  }
   const auto& o = frame.origin();
-  text = nlohmann::ordered_json{{"plan", nlohmann::json::parse(stored(plan).document_json)},
-                                {"plan_id", to_string(plan.id)},
-                                {"plan_revision", plan.version},
-                                {"manual", manual},
-                                {"origin", {o.lat_deg, o.lon_deg, o.height_m}},
-                                {"home_m", {home_m.x(), home_m.y(), home_m.z()}},
-                                {"state", stored_state(engine.state())}}
-             .dump();
+  text = nlohmann::ordered_json{
+      {"plan", nlohmann::json::parse(stored(plan).document_json)},
+      {"plan_id", to_string(plan.id)},
+      {"plan_revision", plan.version},
+      {"manual", manual},
+      {"origin", {o.lat_deg, o.lon_deg, o.height_m}},
+      {"home_m", {home_m.x(), home_m.y(), home_m.z()}},
+      {"state", stored_state(engine.state())},
+      {"clues",
+       told}}.dump();
   return true;
 }
 
@@ -215,6 +222,9 @@ void FlightService::State::read_reports() {
                : r.state == CommandState::refused ? "refused"
                                                   : "unconfirmed";
     c->text = r.text;
+    for (auto& u : uploads) {
+      if (u.command.number == c->number) u.command = *c;
+    }
     const auto mission = flight ? std::optional(flight->mission) : std::nullopt;
     if (r.state == CommandState::accepted) {
       unconfirmed.reset();
@@ -245,6 +255,7 @@ void FlightService::State::round(const MissionService::LiveView* live) {
     publish_soon();
   }
   read_reports();
+  give_fence();
   if (!flight || flight->aborted) return;
   auto& f = *flight;
   telemetry(f);

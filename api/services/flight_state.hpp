@@ -40,6 +40,12 @@ struct ActiveFlight {
   EnuFrame frame;  ///< of the plan, its ground at height 0
   Eigen::Vector3d home_m;
   procedure::FlightEngine engine;
+  /// What is known of the anchors' sides: of before a restart, and of the engine since.
+  procedure::FlightClues clues() const {
+    return procedure::merged(clues_before, procedure::flight_clues(engine.clues(), frame));
+  }
+  procedure::FlightClues clues_before;
+  std::uint64_t clues_told{0};  ///< version of the engine's clues that the mission knows
   bool aborted{false}, taken_over{false};
   std::uint64_t kept{~0ULL}, shown{~0ULL};
   double shown_s{-10};
@@ -83,6 +89,11 @@ struct FlightService::State {
   std::vector<ChecklistItem> checklist(const Mission* record, const MissionId& mission, const Plan* plan,
                                        bool manual);
   std::vector<std::pair<std::string_view, std::string>> alarms() const;
+  Result<FlightCommand> upload(const MissionId& mission, const Plan& plan, const std::string& what,
+                               const std::string& who);
+  const FlightUpload* uploaded(const Plan& plan, const std::string& what) const;
+  void give_fence();
+  std::optional<ChecklistItem> fence_item(const Plan& plan) const;
 
   Deps deps;
   std::mutex mutex;
@@ -97,6 +108,8 @@ struct FlightService::State {
   std::map<std::uint64_t, std::uint64_t> by_drone_number;  ///< number of the aircraft's -> ours
   std::optional<std::uint64_t> unconfirmed;                ///< of the newest command that got no answer
   std::uint64_t number{0};
+  std::vector<FlightUpload> uploads;                    ///< the newest of each kind
+  std::optional<std::pair<MissionId, Plan>> preparing;  ///< whose checklist is being worked off
 };
 
 }  // namespace anchord::api

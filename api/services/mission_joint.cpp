@@ -25,6 +25,7 @@ void MissionService::State::start_joint(const std::shared_ptr<Flight>& flight) {
   task.flight = flight->history.data(mission);
   task.options.origin = flight->live.origin();
   if (flight->frame == TrackFrame::wgs84 && !task.options.origin) return;
+  if (task.options.origin) task.options.clues = clues_in(flight->clues, EnuFrame(*task.options.origin));
   task.done = [self = this, flight, cut = flight->history.newest(), now](const FlightSolution* solution) {
     self->finish_joint(*flight, solution, cut, std::chrono::steady_clock::now() - now);
   };
@@ -46,6 +47,24 @@ void MissionService::State::finish_joint(Flight& flight, const FlightSolution* s
   flight.watch.note_lag(solution->shared.lag_s.value, solution->shared.lag_s.sigma);
   announce(flight, false);
   flight.dirty = true;
+}
+
+void MissionService::tell_clues(const MissionId& id, procedure::FlightClues clues) {
+  const auto flight = state_->find(id);
+  if (!flight) return;
+  const std::scoped_lock lock(flight->work_mutex);
+  flight->clues = std::move(clues);
+  flight->clues_told = false;
+  if (flight->history.n_ranges() > 0) ++flight->ranges_since_joint;  // worth another joint solution
+  State::tell_live(*flight);
+}
+
+/// Waits for the first good fix: before it there is no frame to tell them in.
+void MissionService::State::tell_live(Flight& flight) {
+  const auto origin = flight.live.origin();
+  if (flight.clues_told || !origin) return;
+  flight.live.tell(clues_in(flight.clues, EnuFrame(*origin)));
+  flight.clues_told = true;
 }
 
 }  // namespace anchord::api

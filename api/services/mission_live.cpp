@@ -102,6 +102,7 @@ void MissionService::State::work(Flight& flight) {
                     std::to_string(dropped) + " measurements left the live path; they are stored", flight.id);
   }
   const std::scoped_lock lock(flight.work_mutex);
+  tell_live(flight);
   std::size_t since_announced = 0;
   for (const auto& row : rows) {
     if (!flight.rebuilt.empty() && std::ranges::binary_search(flight.rebuilt, identity(row))) continue;

@@ -14,6 +14,7 @@
 #include "core/base/result.hpp"
 #include "core/base/time.hpp"
 #include "core/localize/accuracy_goal.hpp"
+#include "core/procedure/flight_clues.hpp"
 #include "core/types/estimate.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/mission.hpp"
@@ -76,6 +77,10 @@ class MissionService {
   /// Rows of one kind that were committed, in order of arrival.
   void accepted(std::vector<Range> ranges);
   void accepted(std::vector<Fix> fixes);
+
+  /// What the turns and height searches of its flight told of its anchors: priors of every running estimate
+  /// from now on.
+  void tell_clues(const MissionId& id, procedure::FlightClues clues);
 
   struct LiveView {
     Mission mission;

@@ -39,6 +39,8 @@ struct MissionService::Flight {
   std::deque<std::int64_t> range_times_us;
   std::atomic<bool> dirty{true};
   FlightHistory history;
+  procedure::FlightClues clues;
+  bool clues_told{true};  ///< to `live`, in its frame
   std::size_t ranges_since_joint{0};
   std::chrono::steady_clock::time_point joint_not_before{};
   bool joint_running{false};
@@ -104,6 +106,7 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   void finish_joint(Flight& flight, const FlightSolution* solution, UtcTime cut,
                     std::chrono::steady_clock::duration took);
   void publish_devices();
+  static void tell_live(Flight& flight);
 };
 
 }  // namespace anchord::api

@@ -154,17 +154,30 @@ void LiveAnchor::describe(const LiveOptions& options) {
     if (estimate_.reason.empty()) estimate_.reason = fit.error().message;
     return;
   }
-  const AnchorFit& best = fit.value();
-  position_m_ = best.position_m;
-  bias_m_ = best.bias_m;
-  estimate_.bias_m = best.bias_m;
-  estimate_.bias_sigma_m = best.bias_sigma_m;
+  AnchorFit best = fit.value();
   // The same tempering as the batch solve: two correlation times are one independent look.
   const double scale_m = scale_of(best.residuals_m);
   const double duration_s = std::max(seconds_between(*first_, *newest_), 1.0);
   const double looks = std::max(duration_s / (2.0 * k_correlation_s), 1.0);
   const double inflate = std::max(static_cast<double>(rows.size()) / looks, 1.0) *
                          std::max(scale_m * scale_m / (options.range_sigma_m * options.range_sigma_m), 0.1);
+  auto twin = solve_anchor_gauss_newton(rows, geometry.shape.mirrored(best.position_m), settings);
+  const bool two = twin && (twin.value().position_m - best.position_m).norm() > 0.4;
+  double worse = 0;  // of the twin: tempered likelihood ratio, and what the flight's clues hold against it
+  if (two) {
+    worse = std::max(twin.value().cost - best.cost, 0.0) / inflate;
+    if (const auto told = options.clues.find(estimate_.anchor); told != options.clues.end())
+      worse += clue_cost(told->second, {}, 1, twin.value().position_m) -
+               clue_cost(told->second, {}, 1, best.position_m);
+    if (worse < 0) {
+      std::swap(best, twin.value());
+      worse = -worse;
+    }
+  }
+  position_m_ = best.position_m;
+  bias_m_ = best.bias_m;
+  estimate_.bias_m = best.bias_m;
+  estimate_.bias_sigma_m = best.bias_sigma_m;
   const auto hypothesis = [&](const AnchorFit& f) {
     Hypothesis h;
     h.position.m = f.position_m;
@@ -176,10 +189,7 @@ void LiveAnchor::describe(const LiveOptions& options) {
   estimate_.best = hypothesis(best);
   estimate_.verdict = Verdict::ok;
   estimate_.reason.clear();
-  const auto twin = solve_anchor_gauss_newton(rows, geometry.shape.mirrored(best.position_m), settings);
-  if (twin && (twin.value().position_m - best.position_m).norm() > 0.4) {
-    // Tempered likelihood ratio of the two places.
-    const double worse = std::max(twin.value().cost - best.cost, 0.0) / inflate;
+  if (two) {
     const double odds = std::exp(-std::min(worse, 700.0));
     if (odds > 0.01) {
       estimate_.mirror = hypothesis(twin.value());

@@ -236,6 +236,8 @@ void LiveFlight::add(const Range& range, const std::optional<RangeModel>& model)
   if (!s.settle(entry)) s.park(std::move(entry));
 }
 
+void LiveFlight::tell(std::map<NetworkId, AnchorClues> clues) { state_->options.clues = std::move(clues); }
+
 void LiveFlight::adopt(const FlightSolution& solution, UtcTime cut) {
   State& s = *state_;
   s.options.bias_m = solution.shared.bias_m.value;

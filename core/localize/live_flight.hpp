@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/localize/side_clues.hpp"
 #include "core/types/estimate.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/mission.hpp"
@@ -52,7 +53,8 @@ struct LiveOptions {
   double bias_prior_sigma_m{0.3};
   double lag_s{0.0};  ///< of the kit; adopt() replaces both
   double bias_m{0.0};
-  std::optional<Wgs84> origin{};  ///< absent: the first good fix
+  std::optional<Wgs84> origin{};             ///< absent: the first good fix
+  std::map<NetworkId, AnchorClues> clues{};  ///< tell() replaces them
 };
 
 /// One flight as it happens: joins ranges to the track and keeps every anchor's estimate warm.
@@ -72,6 +74,8 @@ class LiveFlight {
   void add(const Fix& fix);
   /// `model`: its correction is taken off and its sigma used, before anything is solved.
   void add(const Range& range, const std::optional<RangeModel>& model = {});
+  /// What turns and height searches told, in metres of origin(): priors from the next solve on.
+  void tell(std::map<NetworkId, AnchorClues> clues);
   /// A joint solution of this flight's rows up to `cut`: its bias and lag hold from now on, and its positions
   /// are what later ranges refine. Solved in the frame of origin().
   void adopt(const FlightSolution& solution, UtcTime cut);

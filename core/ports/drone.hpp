@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/types/plan.hpp"
 #include "core/types/position.hpp"
 
 namespace anchord {
@@ -19,7 +20,7 @@ enum class CommandState : std::uint8_t {
 
 struct CommandReport {
   std::uint64_t number{};
-  std::string what;  ///< take_off, go_to, hold, return_home, land
+  std::string what;  ///< take_off, go_to, hold, return_home, land, upload
   CommandState state{};
   std::string text;
 };
@@ -41,6 +42,21 @@ struct DroneStatus {
   std::string text;  ///< newest warning of the autopilot
 };
 
+/// A place of the route that the autopilot keeps beside its commands, for the pilot's own screen and for a
+/// flight without us.
+struct RoutePoint {
+  LonLat at{};
+  double height_m{};  ///< above home
+  std::optional<double> heading_deg{};
+  double dwell_s{};
+};
+
+/// Areas that the autopilot keeps to by itself, whoever flies.
+struct DroneFence {
+  GeoPolygon inside;                ///< empty: none
+  std::vector<GeoPolygon> outside;  ///< not to be flown into
+};
+
 /// What the procedure may ask of an aircraft. Calls return at once with the number of the command; its fate
 /// comes through take_reports(). Heights above home. Before the aircraft was heard every command is refused.
 class Drone {
@@ -52,6 +68,10 @@ class Drone {
   virtual std::uint64_t hold() = 0;
   virtual std::uint64_t return_home() = 0;
   virtual std::uint64_t land() = 0;
+  /// Both replace what the autopilot kept, are read back and compared: accepted means that it keeps them.
+  /// They take seconds; unconfirmed after five questions without an answer.
+  virtual std::uint64_t upload_route(const std::vector<RoutePoint>& route) = 0;
+  virtual std::uint64_t upload_fence(const DroneFence& fence) = 0;
   /// The operator has looked and goes on after `taken_over`.
   virtual void take_back() = 0;
   virtual DroneStatus status() const = 0;

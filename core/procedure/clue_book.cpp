@@ -32,15 +32,25 @@ void ClueBook::begin_height_search() {
 }
 
 void ClueBook::conclude_turn() {
+  ++version_;
   for (auto& [anchor, clues] : clues_) {
-    if (const auto bearing = bearing_from_turn(clues.turn)) clues.bearing = bearing.value();
+    if (const auto bearing = bearing_from_turn(clues.turn)) {
+      clues.bearing = bearing.value();
+      if (const auto seen = newest_.find(anchor); seen != newest_.end())
+        clues.turned_at_m = seen->second.tag_m;
+    }
     guess(anchor, clues);
   }
 }
 
 void ClueBook::conclude_height_search() {
+  ++version_;
   for (auto& [anchor, clues] : clues_) {
-    if (const auto height = height_from_search(clues.heights)) clues.height = height.value();
+    if (const auto height = height_from_search(clues.heights)) {
+      clues.height = height.value();
+      if (const auto seen = newest_.find(anchor); seen != newest_.end())
+        clues.climbed_at_m = seen->second.tag_m;
+    }
     guess(anchor, clues);
   }
 }

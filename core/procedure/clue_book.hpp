@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <vector>
@@ -17,6 +18,7 @@ struct Clues {
   std::vector<HeightSample> heights;
   std::optional<Bearing> bearing{};
   std::optional<HeightGuess> height{};
+  std::optional<Eigen::Vector3d> turned_at_m{}, climbed_at_m{};  ///< where bearing and height were found
   std::optional<Eigen::Vector3d> guess_m{};  ///< eq 8.7 from the newest range; needs the bearing
 };
 
@@ -39,6 +41,8 @@ class ClueBook {
 
   const std::map<NetworkId, Clues>& clues() const { return clues_; }
   std::optional<Eigen::Vector3d> guess_m(NetworkId anchor) const;
+  /// Grows whenever a turn or a height search was concluded.
+  std::uint64_t version() const { return version_; }
 
  private:
   struct Seen {
@@ -48,6 +52,7 @@ class ClueBook {
   void guess(NetworkId anchor, Clues& clues);
 
   double default_height_m_;
+  std::uint64_t version_{0};
   std::map<NetworkId, Clues> clues_;
   std::map<NetworkId, Seen> newest_;
 };

@@ -92,6 +92,7 @@ class FlightEngine {
   const std::optional<Alarm>& alarm() const { return alarm_; }
   const std::optional<DecisionRecord>& decision() const { return decision_; }
   const std::map<NetworkId, Clues>& clues() const { return clues_.clues(); }
+  std::uint64_t clues_version() const { return clues_.version(); }
   std::optional<Eigen::Vector3d> position_m() const;
   double elapsed_s() const;  ///< from the start to the last transition
   double flown_s(double now_s) const { return started_s_ ? now_s - *started_s_ : 0; }

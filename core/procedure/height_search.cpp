@@ -42,11 +42,12 @@ Result<HeightGuess> height_from_search(std::span<const HeightSample> samples) {
     const Eigen::Vector3d slope{0, -1 / (2 * c[2]), c[1] / (2 * c[2] * c[2])};
     const double sigma = half * std::sqrt(std::max(0.0, slope.dot(cov * slope)));
     return HeightGuess{middle + half * peak,
-                       std::clamp(sigma, k_best_sigma_m, std::max(half, k_best_sigma_m)), false};
+                       std::clamp(sigma, k_best_sigma_m, std::max(half, k_best_sigma_m)),
+                       -c[2] / std::sqrt(std::max(cov(2, 2), 1e-12)), false};
   }
   const auto best = std::max_element(samples.begin(), samples.end(),
                                      [](const auto& a, const auto& b) { return a.rss_dbm < b.rss_dbm; });
-  return HeightGuess{best->height_m, std::max(half, k_best_sigma_m), true};
+  return HeightGuess{best->height_m, std::max(half, k_best_sigma_m), 0, true};
 }
 
 }  // namespace anchord::procedure

@@ -12,8 +12,9 @@ struct HeightSample {
 };
 struct HeightGuess {
   double height_m{};
-  double sigma_m{};  ///< at least 0.2 m, the accuracy of Fig 8.5b
-  bool at_edge{};    ///< the best RSS lay at an end of the search: the anchor may be beyond it
+  double sigma_m{};       ///< at least 0.2 m, the accuracy of Fig 8.5b
+  double significance{};  ///< of the curvature, in its sigmas: below about 4 the peak may be noise
+  bool at_edge{};         ///< the best RSS lay at an end of the search: the anchor may be beyond it
 };
 
 /// Height of the anchor from RSS over height (8.3.6): RSS is highest at the anchor's own height. A parabola

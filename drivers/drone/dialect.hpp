@@ -15,6 +15,7 @@ struct Dialect {
   /// custom_mode of HEARTBEAT for the modes that we command.
   std::uint32_t guided{}, hold{}, return_home{}, land{};
   bool take_off_above_sea{};  ///< param7 of TAKEOFF: above mean sea level (PX4) or above home (ArduPilot)
+  bool home_is_item_0{};      ///< of a mission list: a place for home comes first (ArduPilot)
   bool targets_by_command{};  ///< go-to by DO_REPOSITION (PX4 in hold) or by position targets (ArduPilot)
 };
 const Dialect& dialect_of(Autopilot autopilot);

@@ -51,6 +51,8 @@ class Session final : public Drone {
   std::uint64_t hold() override;
   std::uint64_t return_home() override;
   std::uint64_t land() override;
+  std::uint64_t upload_route(const std::vector<RoutePoint>& route) override;
+  std::uint64_t upload_fence(const DroneFence& fence) override;
   void take_back() override { status_.taken_over = false; }
   DroneStatus status() const override;
   std::vector<CommandReport> take_reports() override;
@@ -89,6 +91,8 @@ class Session final : public Drone {
     std::size_t count{}, next{};
     double last_s{};
     int tries{0};
+    bool check{false};                ///< of an upload: is read back
+    std::vector<MissionItem> wanted;  ///< of the reading back
   };
 
   void handle(const mavlink::Received& in);
@@ -109,6 +113,7 @@ class Session final : public Drone {
   double distance_m(double lat_deg, double lon_deg, double height_m) const;
   mavlink::Message addressed(std::string_view name) const;
   void send_item(std::size_t index);
+  std::uint64_t upload_checked(ItemList list, std::vector<MissionItem> items);
   void end_transfer(CommandState state, std::string text);
 
   SessionOptions options_;

@@ -1,4 +1,7 @@
 // Mission and fence lists of a Session: MISSION_COUNT, MISSION_REQUEST_INT, MISSION_ITEM_INT, MISSION_ACK.
+#include <cmath>
+#include <utility>
+
 #include "drivers/drone/session.hpp"
 
 namespace anchord::drone {
@@ -10,9 +13,82 @@ constexpr double k_wait_s = 1.5;
 constexpr int k_tries = 5;
 constexpr std::size_t k_max_items = 1000;
 
+// MAV_CMD and MAV_FRAME of the common set.
+constexpr int k_waypoint = 16, k_fence_inside = 5001, k_fence_outside = 5002;
+constexpr int k_global = 0, k_above_home = 6;
+
 std::string list_word(ItemList list) { return list == ItemList::fence ? "fence" : "mission"; }
 
+std::int32_t e7(double degrees) { return static_cast<std::int32_t>(std::llround(degrees * 1e7)); }
+
+MissionItem place(int command, int frame, const LonLat& at) {
+  MissionItem item;
+  item.command = command;
+  item.frame = frame;
+  item.x = e7(at.lat_deg);
+  item.y = e7(at.lon_deg);
+  return item;
+}
+
+void add_area(std::vector<MissionItem>& items, int command, const GeoPolygon& area) {
+  for (const auto& corner : area) {
+    items.push_back(place(command, k_global, corner));
+    items.back().p1 = static_cast<double>(area.size());
+  }
+}
+
+/// Autopilots keep a height as a float of centimetres, a frame in its other name, and parameters they do not
+/// use as nothing: what matters is the kind of item and its place.
+bool alike(const MissionItem& a, const MissionItem& b) {
+  return a.command == b.command && std::abs(a.x - b.x) <= 1 && std::abs(a.y - b.y) <= 1 &&
+         std::abs(a.z - b.z) < 0.02;
+}
+
+/// Item 0 of ArduPilot's missions is home, which it sets itself.
+std::string difference(const std::vector<MissionItem>& wanted, const std::vector<MissionItem>& kept,
+                       std::size_t first) {
+  if (wanted.size() != kept.size())
+    return "the autopilot keeps " + std::to_string(kept.size()) + " of " + std::to_string(wanted.size()) +
+           " items";
+  for (std::size_t i = first; i < wanted.size(); ++i) {
+    if (!alike(wanted[i], kept[i])) return "the autopilot keeps another item " + std::to_string(i);
+  }
+  return {};
+}
+
 }  // namespace
+
+std::uint64_t Session::upload_route(const std::vector<RoutePoint>& route) {
+  std::vector<MissionItem> items;
+  if (dialect_of(autopilot_).home_is_item_0)
+    items.push_back(place(k_waypoint, k_global,
+                          status_.home ? LonLat{status_.home->lon_deg, status_.home->lat_deg} : LonLat{}));
+  for (const auto& point : route) {
+    items.push_back(place(k_waypoint, k_above_home, point.at));
+    items.back().p1 = point.dwell_s;
+    items.back().p4 = point.heading_deg.value_or(std::nan(""));
+    items.back().z = point.height_m;
+  }
+  return upload_checked(ItemList::mission, std::move(items));
+}
+
+std::uint64_t Session::upload_fence(const DroneFence& fence) {
+  std::vector<MissionItem> items;
+  add_area(items, k_fence_inside, fence.inside);
+  for (const auto& area : fence.outside) add_area(items, k_fence_outside, area);
+  return upload_checked(ItemList::fence, std::move(items));
+}
+
+std::uint64_t Session::upload_checked(ItemList list, std::vector<MissionItem> items) {
+  if (!heard_s_) {
+    const std::uint64_t number = ++number_;
+    deaf(number, "upload");
+    return number;
+  }
+  const std::uint64_t number = upload(list, std::move(items));
+  if (transfer_ && transfer_->number == number) transfer_->check = true;
+  return number;
+}
 
 std::uint64_t Session::upload(ItemList list, std::vector<MissionItem> items) {
   const std::uint64_t number = ++number_;
@@ -22,7 +98,7 @@ std::uint64_t Session::upload(ItemList list, std::vector<MissionItem> items) {
     return number;
   }
   report(number, "upload", CommandState::sent, list_word(list));
-  transfer_ = Transfer{number, true, list, std::move(items), 0, 0, now_s_ - k_wait_s, 0};
+  transfer_ = Transfer{number, true, list, std::move(items), 0, 0, now_s_ - k_wait_s, 0, false, {}};
   transfer_->count = transfer_->items.size();
   drive_transfer();
   return number;
@@ -35,14 +111,28 @@ std::uint64_t Session::download(ItemList list) {
     return number;
   }
   report(number, "download", CommandState::sent, list_word(list));
-  transfer_ = Transfer{number, false, list, {}, 0, 0, now_s_ - k_wait_s, 0};
+  transfer_ = Transfer{number, false, list, {}, 0, 0, now_s_ - k_wait_s, 0, false, {}};
   drive_transfer();
   return number;
 }
 
 void Session::end_transfer(CommandState state, std::string text) {
-  report(transfer_->number, transfer_->up ? "upload" : "download", state, std::move(text));
-  transfer_.reset();
+  const Transfer done = *std::exchange(transfer_, std::nullopt);
+  if (state == CommandState::accepted && done.up && done.check) {
+    Transfer back{done.number, false, done.list, {}, 0, 0, now_s_ - k_wait_s, 0, true, done.items};
+    transfer_ = std::move(back);
+    return drive_transfer();
+  }
+  if (state == CommandState::accepted && done.check) {
+    const bool home_first = done.list == ItemList::mission && dialect_of(autopilot_).home_is_item_0;
+    if (auto differs = difference(done.wanted, items_, home_first ? 1 : 0); !differs.empty()) {
+      state = CommandState::refused;
+      text = std::move(differs);
+    } else {
+      text += ", read back";
+    }
+  }
+  report(done.number, done.up || done.check ? "upload" : "download", state, std::move(text));
 }
 
 void Session::send_item(std::size_t index) {
@@ -92,9 +182,12 @@ void Session::on_transfer(const Message& m) {
       send_item(static_cast<std::size_t>(seq));
     }
   } else if (t.up && m.is("MISSION_ACK")) {
+    if (m.integer("mission_type") != static_cast<std::int64_t>(t.list)) return;
     const auto type = m.integer("type");
     end_transfer(type == 0 ? CommandState::accepted : CommandState::refused,
-                 type == 0 ? std::to_string(t.count) + " items" : "MISSION_ACK type " + std::to_string(type));
+                 type == 0   ? std::to_string(t.count) + " items"
+                 : type == 3 ? "the autopilot does not keep this list (unsupported)"
+                             : "MISSION_ACK type " + std::to_string(type));
   } else if (!t.up && m.is("MISSION_COUNT") && t.count == 0) {
     answered();
     t.count = static_cast<std::size_t>(m.integer("count"));

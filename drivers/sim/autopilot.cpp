@@ -168,7 +168,9 @@ void AutopilotSim::lists(const Message& m, mavlink::Address from) {
     out.set("mission_type", m.integer("mission_type"));
     send(out);
   };
-  if (m.is("MISSION_COUNT")) {
+  if (m.integer("mission_type") == 1 && !options_.keeps_fences) {
+    to(Message("MISSION_ACK").set("type", 3));  // unsupported
+  } else if (m.is("MISSION_COUNT")) {
     list_of().clear();
     wanted_ = static_cast<std::size_t>(m.integer("count"));
     uploading_ = static_cast<int>(m.integer("mission_type"));

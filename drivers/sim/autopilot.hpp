@@ -21,6 +21,7 @@ struct AutopilotOptions {
   Eigen::Vector3d home_m{0, 0, 0};
   double geoid_m = 44;             ///< ellipsoid above mean sea level: what GLOBAL_POSITION_INT leaves out
   double ready_s = 25;             ///< until the pre-arm checks pass, as on the real thing
+  bool keeps_fences = true;        ///< false: refuses fence lists as unsupported
   double link_loss_s = 5;          ///< without a station's heartbeat: returns
   double loss = 0, duplicate = 0;  ///< chance of each frame it sends to be lost, to be sent twice
   std::uint64_t seed = 1;
@@ -46,6 +47,8 @@ class AutopilotSim {
   void set_silent(bool silent) { silent_ = silent; }
   std::uint32_t custom_mode() const { return custom_mode_; }
   bool failsafe() const { return failsafe_; }
+  const std::vector<mavlink::Message>& mission_list() const { return mission_; }
+  const std::vector<mavlink::Message>& fence_list() const { return fence_; }
 
  private:
   void handle(const mavlink::Message& m, mavlink::Address from);

@@ -6,9 +6,12 @@
 #include <memory>
 
 #include "api/exports/flight_plan_output.hpp"
+#include "api/exports/plan_export.hpp"
 #include "api/exports/plan_output.hpp"
+#include "api/imports/kml_plan.hpp"
 #include "api/imports/outline_geojson.hpp"
 #include "api/imports/plan_input.hpp"
+#include "core/planning/local_plan.hpp"
 #include "server/cli/commands.hpp"
 
 namespace anchord::cli {
@@ -57,6 +60,58 @@ int plan_next(const std::string& path, bool json) {
   return decision.value().chosen ? 0 : 1;
 }
 
+std::optional<api::OutlineRequest> outline_of_kml(const std::string& text,
+                                                  std::vector<api::FieldError>& errors) {
+  std::vector<std::string> notes;
+  const Plan plan = api::read_kml_plan(text, notes, errors);
+  for (const auto& note : notes) std::fprintf(stderr, "anchord plan: %s\n", note.c_str());
+  if (errors.empty() && plan.outline.empty())
+    errors.push_back({"", "required", "no polygon is the building's outline", ""});
+  if (!errors.empty()) return std::nullopt;
+  const auto local = planning::local_plan(plan);
+  if (!local) {
+    errors.push_back({"", "out_of_range", local.error().message, ""});
+    return std::nullopt;
+  }
+  const auto& l = local.value();
+  return api::OutlineRequest{l.origin, {l.outline, plan.building_height_m, l.no_fly, l.fence}};
+}
+
+/// Any plan file we read, said as one we write.
+int plan_import(const std::string& path, const std::string& format) {
+  const auto text = read_all(path);
+  if (!text) return 2;
+  std::vector<api::FieldError> errors;
+  std::vector<std::string> notes;
+  const Plan plan = api::read_plan_file(*text, notes, errors);
+  for (const auto& note : notes) std::fprintf(stderr, "anchord plan: %s\n", note.c_str());
+  if (!errors.empty()) {
+    print_errors(path, errors);
+    return 2;
+  }
+  const auto out = format == "plan" ? api::plan_qgc(plan) : api::plan_geojson(plan);
+  if (!out) {
+    std::fprintf(stderr, "anchord plan: %s: %s\n", path.c_str(), out.error().message.c_str());
+    return 2;
+  }
+  std::fputs(out.value().c_str(), stdout);
+  return 0;
+}
+
+void add_import(CLI::App& plan, int& exit_code) {
+  struct Import {
+    std::string file, format{"geojson"};
+  };
+  auto import = std::make_shared<Import>();
+  auto* command = plan.add_subcommand(
+      "import", "Outline, areas and waypoints of a .plan, GeoJSON or KML file, as GeoJSON or .plan");
+  command->add_option("FILE", import->file, "the file, - for standard input")->required();
+  command->add_option("--format", import->format, "geojson, or plan (QGroundControl)")
+      ->check(CLI::IsMember({"geojson", "plan"}))
+      ->capture_default_str();
+  command->callback([import, &exit_code] { exit_code = plan_import(import->file, import->format); });
+}
+
 struct Flight {
   std::string outline, format{"json"}, criterion{"a_optimal"};
   double building_height_m{0};
@@ -67,7 +122,12 @@ int plan_flight(const Flight& flight) {
   const auto text = read_all(flight.outline);
   if (!text) return 2;
   std::vector<api::FieldError> errors;
-  auto request = api::read_outline(*text, errors);
+  std::optional<api::OutlineRequest> request;
+  if (text->find_first_not_of(" \t\r\n\xEF\xBB\xBF") == text->find('<') &&
+      text->find('<') != std::string::npos)
+    request = outline_of_kml(*text, errors);
+  else
+    request = api::read_outline(*text, errors);
   if (!request) {
     print_errors(flight.outline, errors);
     return 2;
@@ -96,7 +156,9 @@ void add_flight(CLI::App& plan, int& exit_code) {
   auto& o = flight->options;
   auto* command =
       plan.add_subcommand("flight", "Waypoints of a whole flight from a building's outline alone");
-  command->add_option("OUTLINE", flight->outline, "GeoJSON (docs/formats.md, Outline), - for standard input")
+  command
+      ->add_option("OUTLINE", flight->outline,
+                   "GeoJSON or KML (docs/formats.md, Outline), - for standard input")
       ->required();
   command->add_option("--format", flight->format, "json, plan (QGroundControl) or geojson")
       ->check(CLI::IsMember({"json", "plan", "geojson"}));
@@ -137,6 +199,7 @@ void add_plan_command(CLI::App& app, int& exit_code) {
   command->add_flag("--json", next->json, "the same as --format json")->excludes(format);
   command->callback([next, &exit_code] { exit_code = plan_next(next->input, next->format == "json"); });
   add_flight(*plan, exit_code);
+  add_import(*plan, exit_code);
 }
 
 }  // namespace anchord::cli

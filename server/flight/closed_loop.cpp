@@ -99,7 +99,7 @@ Result<ClosedLoopResult> fly_closed_loop(const sim::World& world, const Plan& pl
   ClosedLoopResult out;
   out.data.mission = kit.mission();
   bool started = false;
-  std::uint64_t n_decided = 0;
+  std::uint64_t n_decided = 0, n_clues = 0;
   while (kit.now_s() < options.max_s) {
     auto measured = kit.advance(vehicle);
     const double now = kit.now_s();
@@ -113,7 +113,13 @@ Result<ClosedLoopResult> fly_closed_loop(const sim::World& world, const Plan& pl
       live.add(range);
       out.data.ranges.push_back(std::move(range));
     }
-    for (const auto& result : live.take_ranges()) engine.range(now, result.range.anchor, result.used());
+    for (const auto& result : live.take_ranges())
+      engine.range(now, result.range.anchor, result.used(), result.range.rss_dbm, result.range.distance_m);
+    if (options.use_clues && n_clues != engine.clues_version()) {
+      n_clues = engine.clues_version();
+      out.clues = procedure::clues_in(procedure::flight_clues(engine.clues(), frame), frame);
+      live.tell(out.clues);
+    }
     if (!started && now > 2) started = engine.command(now, Event::start, "the simulation");
     const bool deciding = engine.state().step == procedure::Step::find_next_point;
     engine.tick(now, deciding ? live.estimates() : std::vector<Estimate>{});
@@ -126,6 +132,8 @@ Result<ClosedLoopResult> fly_closed_loop(const sim::World& world, const Plan& pl
     if (engine.state().step == procedure::Step::done) break;
   }
   for (const auto& anchor : world.anchors) out.data.anchor_names[anchor.id] = to_string(anchor.id);
+  live.finish();
+  out.live = live.estimates();
   out.state = engine.state();
   out.n_decisions = n_decided;
   out.flight_s = kit.now_s();

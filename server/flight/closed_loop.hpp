@@ -2,12 +2,14 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/base/result.hpp"
 #include "core/localize/flight_solver.hpp"
+#include "core/procedure/flight_clues.hpp"
 #include "core/procedure/flight_engine.hpp"
 #include "core/types/flight_data.hpp"
 #include "core/types/plan.hpp"
@@ -23,11 +25,14 @@ struct ClosedLoopOptions {
   sim::VehicleOptions vehicle{};
   sim::RadioOptions radio{};
   double live_update_s = 4;  ///< of the running estimates
+  bool use_clues = true;     ///< what turns and height searches told is a prior
 };
 
 /// What was flown and what came of it.
 struct ClosedLoopResult {
   FlightData data;
+  std::map<NetworkId, AnchorClues> clues;  ///< for the solve; in metres of the plan's origin
+  std::vector<Estimate> live;              ///< as they stood at the end of the flight
   procedure::State state;
   double flight_s{}, wall_s{};
   std::vector<procedure::Happening> happenings;

@@ -127,6 +127,12 @@ std::uint64_t DroneLink::return_home() {
 std::uint64_t DroneLink::land() {
   return impl_->command([](drone::Session& s) { return s.land(); });
 }
+std::uint64_t DroneLink::upload_route(const std::vector<RoutePoint>& route) {
+  return impl_->command([&](drone::Session& s) { return s.upload_route(route); });
+}
+std::uint64_t DroneLink::upload_fence(const DroneFence& fence) {
+  return impl_->command([&](drone::Session& s) { return s.upload_fence(fence); });
+}
 void DroneLink::take_back() {
   const std::scoped_lock lock(impl_->mutex);
   impl_->session.take_back();

@@ -25,6 +25,8 @@ class DroneLink final : public Drone {
   std::uint64_t hold() override;
   std::uint64_t return_home() override;
   std::uint64_t land() override;
+  std::uint64_t upload_route(const std::vector<RoutePoint>& route) override;
+  std::uint64_t upload_fence(const DroneFence& fence) override;
   void take_back() override;
   DroneStatus status() const override;
   std::vector<CommandReport> take_reports() override;

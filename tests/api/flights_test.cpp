@@ -18,10 +18,11 @@ const Eigen::Vector3d k_home_m{-9, -9, 0};
 /// Session and autopilot, joined without a wire.
 class LoopDrone final : public Drone {
  public:
-  LoopDrone()
-      : autopilot([] {
+  explicit LoopDrone(bool keeps_fences = true)
+      : autopilot([&] {
           sim::AutopilotOptions o;
           o.ready_s = 0;
+          o.keeps_fences = keeps_fences;
           o.home_m = k_home_m;
           return o;
         }()) {}
@@ -45,6 +46,10 @@ class LoopDrone final : public Drone {
   std::uint64_t hold() override { return ++holds, session.hold(); }
   std::uint64_t return_home() override { return session.return_home(); }
   std::uint64_t land() override { return session.land(); }
+  std::uint64_t upload_route(const std::vector<RoutePoint>& route) override {
+    return session.upload_route(route);
+  }
+  std::uint64_t upload_fence(const DroneFence& fence) override { return session.upload_fence(fence); }
   void take_back() override { session.take_back(); }
   DroneStatus status() const override { return session.status(); }
   std::vector<CommandReport> take_reports() override { return session.take_reports(); }
@@ -72,9 +77,9 @@ class Flights : public AppFixture {
     deps.flight_clock = [this] { return drone_->now; };
   }
   std::string origin_text() const { return R"({"lon":3.7131,"lat":51.0231,"h_m":55.5})"; }
-  std::string make_plan() {
-    const auto made =
-        post("/api/v1/plans", R"({"name":"Hall","building_height_m":8,"origin":)" + origin_text() + R"(,
+  std::string make_plan(const std::string& more = "") {
+    const auto made = post("/api/v1/plans", R"({"name":"Hall",)" + more +
+                                                R"("building_height_m":8,"origin":)" + origin_text() + R"(,
       "outline":{"type":"Polygon","coordinates":[[[3.7131,51.0231],[3.7135275,51.0231],[3.7135275,51.0232799],[3.7131,51.0232799]]]},
       "settings":{"keep_out_m":4,"max_height_m":20},
       "waypoints":[{"lon":3.7130,"lat":51.02305,"height_above_ground_m":4},
@@ -196,6 +201,98 @@ TEST_F(Flights, StartsHoldsResumesAndLands) {
   EXPECT_TRUE(fly_until([&] { return procedure()["status"] == "done"; }, 60));
   EXPECT_FALSE(drone_->autopilot.vehicle().armed());
   EXPECT_EQ(act("hold", lease).status, 422) << "nothing flies any more";
+}
+
+TEST_F(Flights, TheFenceGoesUpWithTheChecklistAndBlocksStartUntilItIsKept) {
+  mission_ = mission();
+  const auto plan = make_plan(
+      R"("fence":{"type":"Polygon","coordinates":[[[3.712,51.022],[3.715,51.022],[3.715,51.0242],[3.712,51.0242]]]},)");
+  fly(12);
+  check_everything();
+  const auto state = [&] {
+    std::string out = "absent";
+    const Json list = json(get(base() + "/checklist", {{"plan", plan}}));
+    for (const auto& item : list["items"]) {
+      if (item["id"] == "fence") out = item["state"];
+    }
+    return out;
+  };
+  EXPECT_EQ(state(), "failed");
+  fly(3);
+  EXPECT_TRUE(drone_->autopilot.fence_list().empty()) << "nobody has control: nothing is sent";
+  const std::string lease = control()["lease"];
+  const auto early = act("start", lease, R"(,"plan":")" + plan + '"');
+  EXPECT_EQ(early.status, 422);
+  EXPECT_NE(early.body.find("fence"), std::string::npos) << early.body;
+  EXPECT_TRUE(fly_until([&] { return state() == "ok"; }, 10));
+  EXPECT_EQ(drone_->autopilot.fence_list().size(), 4u);
+  const Json kept = json(get(base() + "/uploads"));
+  ASSERT_EQ(kept["items"].size(), 1u) << kept;
+  EXPECT_EQ(kept["items"][0]["what"], "fence");
+  EXPECT_EQ(kept["items"][0]["command"]["state"], "accepted");
+  EXPECT_EQ(act("start", lease, R"(,"plan":")" + plan + '"').status, 202);
+}
+
+TEST_F(Flights, AnAircraftThatKeepsNoFencesMayFlyWhenTheOperatorSaysSo) {
+  drone_ = std::make_unique<LoopDrone>(false);
+  app_.reset();
+  database_.reset();
+  open();
+  mission_ = mission();
+  const auto plan = make_plan(
+      R"("fence":{"type":"Polygon","coordinates":[[[3.712,51.022],[3.715,51.022],[3.715,51.0242],[3.712,51.0242]]]},)");
+  fly(12);
+  check_everything();
+  const std::string lease = control()["lease"];
+  (void)get(base() + "/checklist", {{"plan", plan}});
+  fly(3);
+  const auto refused = act("start", lease, R"(,"plan":")" + plan + '"');
+  EXPECT_EQ(refused.status, 422);
+  ASSERT_EQ(post(base() + "/checklist/fence", R"({"reason":"the server's guard is enough here"})").status,
+            200);
+  EXPECT_EQ(act("start", lease, R"(,"plan":")" + plan + '"').status, 202);
+}
+
+TEST_F(Flights, ARouteIsGivenToTheAircraftByWhoHasControl) {
+  mission_ = mission();
+  const auto plan = make_plan();
+  fly(3);
+  const auto give = [&](const std::string& what, const std::string& lease) {
+    return post(base() + "/uploads",
+                R"({"what":")" + what + R"(","plan":")" + plan + R"(","lease":")" + lease + "\"}");
+  };
+  EXPECT_EQ(give("route", "").status, 409) << "no control";
+  const std::string lease = control()["lease"];
+  const auto given = give("route", lease);
+  ASSERT_EQ(given.status, 202) << given.body;
+  EXPECT_EQ(json(given)["state"], "sent");
+  const auto fate = [&] {
+    return json(get(base() + "/uploads"))["items"][0]["command"]["state"].get<std::string>();
+  };
+  EXPECT_TRUE(fly_until([&] { return fate() == "accepted"; }, 10));
+  ASSERT_EQ(drone_->autopilot.mission_list().size(), 3u) << "home and two waypoints";
+  EXPECT_EQ(drone_->autopilot.mission_list()[1].integer("x"), 510230500);
+  EXPECT_NEAR(drone_->autopilot.mission_list()[1].real("z"), 4, 0.1);
+  EXPECT_EQ(give("fence", lease).status, 422) << "this plan has none";
+  EXPECT_EQ(give("song", lease).status, 422);
+  drone_->link_down = true;
+  const auto lost = give("route", lease);
+  ASSERT_EQ(lost.status, 202) << lost.body;
+  EXPECT_TRUE(fly_until([&] { return fate() == "unconfirmed"; }, 20));
+  Call viewer;
+  viewer.roles = {api::Role::viewer};
+  EXPECT_EQ(call(api::Method::post, base() + "/uploads", R"({"what":"route","plan":")" + plan + "\"}", viewer)
+                .status,
+            403);
+}
+
+TEST_F(Flights, NothingIsGivenToAnAircraftInTheAir) {
+  const auto lease = take_off();
+  const std::string plan = json(get("/api/v1/plans"))["items"][0]["id"];
+  const auto given =
+      post(base() + "/uploads", R"({"what":"route","plan":")" + plan + R"(","lease":")" + lease + "\"}");
+  EXPECT_EQ(given.status, 422);
+  EXPECT_NE(given.body.find("in the air"), std::string::npos) << given.body;
 }
 
 TEST_F(Flights, OnlyOneHasControl) {

@@ -2,6 +2,8 @@
 
 #include <set>
 
+#include <gmock/gmock.h>
+
 #include "app_fixture.hpp"
 
 namespace anchord::test {
@@ -166,6 +168,76 @@ TEST_F(Plans, ReadAPlanAsQGroundControlWritesIt) {
   EXPECT_EQ(out["plan"]["no_fly"].size(), 1u);
   EXPECT_EQ(out["notes"].size(), 1u) << "the survey was left out and said so";
   EXPECT_EQ(json(get("/api/v1/plans"))["items"].size(), 0u) << "a dry run stores nothing";
+}
+
+// As Google Earth writes it, shortened.
+const std::string k_kml = R"(<?xml version="1.0" encoding="UTF-8"?>
+<kml xmlns="http://www.opengis.net/kml/2.2" xmlns:gx="http://www.google.com/kml/ext/2.2"><Document>
+ <name>Site.kml</name><Style id="s"><LineStyle><color>ff0000ff</color></LineStyle></Style>
+ <!-- drawn by hand -->
+ <Placemark><name>Hall &amp; store</name><Polygon><tessellate>1</tessellate><outerBoundaryIs><LinearRing><coordinates>
+  3.7131,51.0231,0 3.7135275,51.0231,0 3.7135275,51.0232799,0 3.7131,51.0232799,0 3.7131,51.0231,0
+ </coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark>
+ <Folder><name>No fly</name><Placemark><name>Pond</name><Polygon><outerBoundaryIs><LinearRing>
+  <coordinates>3.7140,51.0231 3.7142,51.0231 3.7142,51.0233</coordinates></LinearRing></outerBoundaryIs>
+  <innerBoundaryIs/></Polygon></Placemark></Folder>
+ <Placemark><name>Area</name><ExtendedData><Data name="kind"><value>fence</value></Data></ExtendedData><Polygon>
+  <outerBoundaryIs><LinearRing><coordinates>3.712,51.022 3.715,51.022 3.715,51.0242 3.712,51.0242</coordinates></LinearRing>
+  </outerBoundaryIs></Polygon></Placemark>
+ <Placemark><name><![CDATA[P1]]></name><Point><altitudeMode>relativeToGround</altitudeMode>
+  <coordinates>3.7130,51.02305,4.5</coordinates></Point></Placemark>
+ <Placemark><LineString><altitudeMode>relativeToGround</altitudeMode><coordinates>3.7129,51.0230,3
+  3.7136,51.0230,9</coordinates></LineString></Placemark>
+ <NetworkLink><name>elsewhere</name></NetworkLink>
+</Document></kml>)";
+const char* const k_kml_type = "application/vnd.google-earth.kml+xml";
+
+TEST_F(Plans, ReadOutlineAreasAndWaypointsOfKml) {
+  const auto answer = post("/api/v1/plans/import", k_kml, k_kml_type, {{"name", "From the map"}});
+  ASSERT_EQ(answer.status, 201) << answer.body;
+  const Json plan = json(answer);
+  EXPECT_EQ(plan["name"], "From the map");
+  ASSERT_EQ(plan["outline"]["coordinates"][0].size(), 5u) << "closed as GeoJSON wants it";
+  EXPECT_EQ(plan["outline"]["coordinates"][0][1][0], 3.7135275);
+  ASSERT_EQ(plan["no_fly"].size(), 1u);
+  EXPECT_EQ(plan["fence"]["coordinates"][0].size(), 5u);
+  ASSERT_EQ(plan["waypoints"].size(), 3u);
+  EXPECT_EQ(plan["waypoints"][0]["height_above_ground_m"], 4.5);
+  EXPECT_EQ(plan["waypoints"][2]["lat"], 51.0230);
+  const auto dry = post("/api/v1/plans/import", k_kml, k_kml_type, {{"dry_run", "true"}});
+  EXPECT_EQ(json(dry)["notes"].size(), 2u) << dry.body;
+}
+
+TEST_F(Plans, TellWhatIsWrongWithKml) {
+  const auto wrong = [&](const std::string& inside) {
+    const auto answer = post("/api/v1/plans/import",
+                             "<kml><Placemark><name>X</name>" + inside + "</Placemark></kml>", k_kml_type);
+    EXPECT_EQ(answer.status, 422) << answer.body;
+    return answer.body;
+  };
+  using testing::HasSubstr;
+  EXPECT_THAT(wrong("<Point><coordinates>3.7,51</coordinates></Point>"), HasSubstr("relativeToGround"));
+  EXPECT_THAT(
+      wrong("<Point><altitudeMode>absolute</altitudeMode><coordinates>3.7,51,60</coordinates></Point>"),
+      HasSubstr("above sea level"));
+  EXPECT_THAT(
+      wrong("<Polygon><outerBoundaryIs><LinearRing><coordinates>51.02;3.7 4,5 6,7</coordinates></LinearRing>"
+            "</outerBoundaryIs></Polygon>"),
+      HasSubstr("51.02;3.7"));
+  EXPECT_THAT(wrong("<Polygon><outerBoundaryIs><LinearRing><coordinates>3,51 4,51</coordinates></LinearRing>"
+                    "</outerBoundaryIs></Polygon>"),
+              HasSubstr("3 different corners"));
+  EXPECT_THAT(wrong("<Point><altitudeMode>relativeToGround</altitudeMode><coordinates>3.7,51,900</"
+                    "coordinates></Point>"),
+              HasSubstr("0 to 500 m"));
+  const auto broken = [&](const std::string& text) {
+    return post("/api/v1/plans/import", text, k_kml_type).body;
+  };
+  EXPECT_THAT(broken("<kml>\n<Placemark></kml>"), HasSubstr("line 2"));
+  EXPECT_THAT(broken("<!DOCTYPE kml [<!ENTITY a 'b'>]><kml/>"), HasSubstr("document type"));
+  EXPECT_THAT(broken("<gpx/>"), HasSubstr("not kml"));
+  EXPECT_THAT(broken("<kml><Document/></kml>"), HasSubstr("nothing is drawn"));
+  EXPECT_THAT(broken(std::string("PK\x03\x04", 4)), HasSubstr("unpack"));
 }
 
 TEST_F(Plans, OnlyAnOperatorMayChangeThem) {

@@ -157,6 +157,62 @@ TEST_P(EachAutopilot, UploadsAndDownloadsMissionAndFence) {
   }
 }
 
+const GeoPolygon k_fence{{3.712, 51.022}, {3.715, 51.022}, {3.715, 51.025}, {3.712, 51.025}},
+    k_pond{{3.713, 51.0235}, {3.7132, 51.0235}, {3.7131, 51.0236}};
+
+TEST_P(EachAutopilot, KeepsTheFenceAndTheRouteItWasGiven) {
+  auto lossy = options();
+  lossy.loss = 0.2;
+  lossy.duplicate = 0.1;
+  Pair pair(lossy);
+  pair.run(3);
+  const auto fence = pair.session.upload_fence({k_fence, {k_pond}});
+  ASSERT_TRUE(pair.run_until([&] { return pair.last(fence) == CommandState::accepted; }, 60))
+      << pair.words(fence);
+  EXPECT_EQ(pair.words(fence), "7 items, read back");
+  ASSERT_EQ(pair.autopilot.fence_list().size(), 7u);
+  // MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION and _EXCLUSION, with the number of corners in param1.
+  EXPECT_EQ(pair.autopilot.fence_list()[0].integer("command"), 5001);
+  EXPECT_EQ(pair.autopilot.fence_list()[0].real("param1"), 4);
+  EXPECT_EQ(pair.autopilot.fence_list()[0].integer("x"), 510220000);
+  EXPECT_EQ(pair.autopilot.fence_list()[6].integer("command"), 5002);
+  EXPECT_EQ(pair.autopilot.fence_list()[6].real("param1"), 3);
+  const auto route =
+      pair.session.upload_route({{{3.7130, 51.0230}, 4, 45, 3}, {{3.7135, 51.0230}, 9, {}, 0}});
+  ASSERT_TRUE(pair.run_until([&] { return pair.last(route) == CommandState::accepted; }, 60))
+      << pair.words(route);
+  // ArduPilot's item 0 is home.
+  const std::size_t first = GetParam() == Autopilot::ardupilot ? 1 : 0;
+  ASSERT_EQ(pair.autopilot.mission_list().size(), first + 2);
+  const auto& point = pair.autopilot.mission_list()[first];
+  EXPECT_EQ(point.integer("command"), 16);
+  EXPECT_EQ(point.integer("frame"), 6) << "above home";
+  EXPECT_EQ(point.integer("y"), 37130000);
+  EXPECT_EQ(point.real("z"), 4);
+  EXPECT_EQ(point.real("param4"), 45);
+}
+
+TEST(DroneSession, AnAutopilotWithoutFencesSaysSo) {
+  sim::AutopilotOptions old;
+  old.keeps_fences = false;
+  Pair pair(old);
+  pair.run(3);
+  const auto number = pair.session.upload_fence({k_fence, {}});
+  ASSERT_TRUE(pair.run_until([&] { return pair.last(number) == CommandState::refused; }, 10));
+  EXPECT_NE(pair.words(number).find("unsupported"), std::string::npos) << pair.words(number);
+}
+
+TEST(DroneSession, AListWithoutAnAnswerIsNotConfirmed) {
+  Pair pair;
+  pair.run(3);
+  pair.link_down = true;
+  const auto number = pair.session.upload_fence({k_fence, {}});
+  EXPECT_TRUE(pair.run_until([&] { return pair.last(number) == CommandState::unconfirmed; }, 10));
+  Session deaf;
+  EXPECT_EQ((deaf.upload_fence({k_fence, {}}), deaf.take_reports().back().state), CommandState::refused)
+      << "nobody was heard yet";
+}
+
 TEST(DroneSession, ArmingIsTriedUntilThePreArmChecksPass) {
   sim::AutopilotOptions slow;
   slow.ready_s = 25;

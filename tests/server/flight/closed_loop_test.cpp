@@ -8,6 +8,8 @@
 #include <cstdlib>
 #include <limits>
 
+#include "core/geo/enu.hpp"
+
 namespace anchord::flight {
 namespace {
 
@@ -41,6 +43,7 @@ Row fly(const sim::World& world, std::uint64_t seed) {
   row.wall_s = result.wall_s;
   FlightOptions solve;
   solve.origin = world.origin;
+  solve.clues = result.clues;
   const auto solution = solve_flight(thinned_at_rest(result.data), solve);
   EXPECT_TRUE(solution.has_value());
   const auto judged = judge(world, solution.value());
@@ -110,6 +113,72 @@ TEST(ClosedLoop, FindsEveryAnchorThroughWallsFromTheOutlineAlone) {
   EXPECT_EQ(table.ok, table.anchors);
   EXPECT_LT(table.median_m, 0.10);
   EXPECT_LT(table.median_m, table.ring_m);
+}
+
+/// Only the south front may be flown along, in one upright plane, as in a street: what is inside and its twin
+/// in the houses opposite fit alike.
+Plan street_plan(const sim::World& world) {
+  auto plan = plan_from_outline(world).value();
+  const EnuFrame frame(world.origin);
+  const auto at = [&](double x, double y) {
+    const auto p = frame.wgs84_from_enu(Enu{{x, y, 0}});
+    return LonLat{p.lon_deg, p.lat_deg};
+  };
+  plan.fence = {at(-11, -10), at(41, -10), at(41, -8), at(-11, -8)};
+  plan.waypoints.clear();
+  for (const double x : {-4.0, 4.0, 12.0, 20.0, 28.0, 35.0}) {
+    PlanWaypoint w;
+    w.at = at(x, -9);
+    w.height_m = plan.waypoints.size() % 2 == 0 ? 2.5 : 7.5;
+    w.turn = true;
+    w.height_search = true;
+    plan.waypoints.push_back(w);
+  }
+  return plan;
+}
+
+TEST(ClosedLoop, AFlightAlongOneFrontKnowsTheSideFromItsTurn) {
+  const auto world = sim::demonstration_world();
+  const auto plan = street_plan(world);
+  const auto flown = fly_closed_loop(world, plan, seeded(3));
+  ASSERT_TRUE(flown.has_value()) << flown.error().message;
+  const auto& result = flown.value();
+  EXPECT_EQ(procedure::to_string(result.state.step), "done") << result.state.reason;
+  EXPECT_GE(result.clues.size(), 4u);
+  FlightOptions options;
+  options.origin = world.origin;
+  const auto data = thinned_at_rest(result.data);
+  const auto blind = solve_flight(data, options);
+  options.clues = result.clues;
+  const auto told = solve_flight(data, options);
+  ASSERT_TRUE(blind && told);
+  // In doubt, or on the wrong side without a doubt.
+  const auto open = [](const Estimate& e) {
+    return !e.best || e.best->position.m.y() < 0 || (e.mirror && e.mirror->position.m.y() < 0);
+  };
+  int n_blind = 0, n_told = 0, n_live = 0;
+  for (const auto& a : blind.value().anchors) n_blind += open(a.estimate);
+  for (const auto& a : told.value().anchors) {
+    n_told += open(a.estimate);
+    ASSERT_TRUE(a.estimate.best);
+    if (result.clues.contains(a.estimate.anchor)) {
+      EXPECT_GT(a.estimate.best->position.m.y(), 0) << to_string(a.estimate.anchor);
+    } else {
+      EXPECT_NE(a.estimate.verdict, Verdict::ok) << "too far for its lobes: nobody claims a side";
+    }
+  }
+  for (const auto& e : result.live) {
+    n_live += open(e);
+    ASSERT_TRUE(e.best);
+    if (result.clues.contains(e.anchor)) {
+      EXPECT_GT(e.best->position.m.y(), 0) << to_string(e.anchor) << " in the air";
+    }
+  }
+  std::printf("one front: side open for %d of 6 anchors without the turn, %d with it, %d in the air\n",
+              n_blind, n_told, n_live);
+  EXPECT_GE(n_blind, 4) << "without the turn the street leaves both sides open";
+  EXPECT_LE(n_told, 2) << "where the lobes were not clear both stay";
+  EXPECT_LE(n_live, 2);
 }
 
 }  // namespace

@@ -1,0 +1,101 @@
+// What the aircraft's own autopilot is given to keep: the fence, before every flight, and the route.
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "api/services/event_log.hpp"
+#include "api/services/flight_state.hpp"
+
+namespace anchord::api {
+namespace {
+
+constexpr double k_retry_s = 10;
+
+bool has_fence(const Plan& plan) { return !plan.fence.empty() || !plan.no_fly.empty(); }
+
+}  // namespace
+
+nlohmann::ordered_json flight_upload_json(const FlightUpload& upload) {
+  return {{"what", upload.what},
+          {"plan", to_string(upload.plan)},
+          {"plan_revision", upload.revision},
+          {"items", upload.n_items},
+          {"command", flight_command_json(upload.command)}};
+}
+
+Result<FlightCommand> FlightService::State::upload(const MissionId& mission, const Plan& plan,
+                                                   const std::string& what, const std::string& who) {
+  const auto refuse = [](const char* why) { return make_error(Errc::invalid_argument, why); };
+  if (deps.drone == nullptr) return refuse("there is no aircraft to command: nothing keeps a list");
+  const auto status = deps.drone->status();
+  if (!status.connected) return refuse("the aircraft is not heard");
+  if ((flight && flight->flying()) || status.in_air)
+    return refuse("the aircraft is in the air: lists are given to it on the ground");
+  FlightUpload up{mission, plan.id, plan.version, what, 0, now_s(), {}};
+  std::uint64_t sent = 0;
+  if (what == "fence") {
+    if (!has_fence(plan)) return refuse("the plan has neither a fence nor a no-fly area");
+    up.n_items = plan.fence.size();
+    for (const auto& area : plan.no_fly) up.n_items += area.size();
+    sent = deps.drone->upload_fence({plan.fence, plan.no_fly});
+  } else {
+    if (plan.waypoints.empty()) return refuse("the plan has no waypoint");
+    // Heights of a plan are above its ground; a plan without an origin has it where the aircraft stands.
+    double ground_above_home_m = 0;
+    const auto h = heard.find(mission);
+    if (plan.origin && h != heard.end() && h->second.fix)
+      ground_above_home_m = plan.origin->height_m - h->second.fix->position.height_m;
+    std::vector<RoutePoint> route;
+    for (const auto& w : plan.waypoints)
+      route.push_back({w.at, w.height_m + ground_above_home_m, w.heading_deg,
+                       w.measure ? w.dwell_s.value_or(plan.settings.dwell_s) : 0});
+    up.n_items = route.size();
+    sent = deps.drone->upload_route(route);
+  }
+  up.command = note("upload_" + what, who, "sent");
+  by_drone_number[sent] = up.command.number;
+  std::erase_if(uploads, [&](const FlightUpload& u) { return u.what == what; });
+  uploads.push_back(up);
+  return up.command;
+}
+
+/// The newest of its kind, for this very plan.
+const FlightUpload* FlightService::State::uploaded(const Plan& plan, const std::string& what) const {
+  for (const auto& u : uploads) {
+    if (u.what == what && u.plan == plan.id && u.revision == plan.version) return &u;
+  }
+  return nullptr;
+}
+
+/// Whoever has control and looks at the checklist means to fly: the fence goes up by itself, and again ten
+/// seconds after it was not confirmed.
+void FlightService::State::give_fence() {
+  if (!preparing || deps.drone == nullptr || (flight && flight->flying())) return;
+  const auto holder = lease.holder(deps.clock.now());
+  if (!holder || holder->mission != preparing->first) return preparing.reset();
+  const Plan& plan = preparing->second;
+  if (!has_fence(plan)) return;
+  if (const auto* up = uploaded(plan, "fence")) {
+    const bool again = up->command.state == "unconfirmed" && now_s() - up->begun_s > k_retry_s;
+    if (!again) return;
+  }
+  const auto status = deps.drone->status();
+  if (status.connected && !status.in_air)
+    (void)upload(preparing->first, plan, "fence", "checklist").has_value();
+}
+
+std::optional<ChecklistItem> FlightService::State::fence_item(const Plan& plan) const {
+  if (!has_fence(plan)) return std::nullopt;
+  ChecklistItem item{"fence", "The aircraft keeps the fence itself", "", false, true, {}, {}};
+  const auto* up = uploaded(plan, "fence");
+  if (up == nullptr) {
+    item.detail = "not given to it yet: whoever has control and opens this list gives it";
+  } else {
+    item.ok = up->command.state == "accepted";
+    item.detail = up->command.state == "sent" ? "being given to it"
+                  : *item.ok                  ? up->command.text
+                             : up->command.state + ": " + up->command.text + "; the server's own guard holds";
+  }
+  return item;
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,126 @@
+// What a flight's turns and height searches tell: kept on the globe, priors in any frame, and what decides
+// between an anchor and its twin while the flight is in the air.
+#include "core/procedure/flight_clues.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "core/localize/live_flight.hpp"
+
+namespace anchord::procedure {
+namespace {
+
+constexpr NetworkId k_anchor{0x6a21}, k_other{0x6a22};
+constexpr double k_plane_y_m = -8;
+const Eigen::Vector3d k_inside(3, 4, 5), k_turned_at(0, k_plane_y_m, 7);
+
+TEST(FlightClues, MeanTheSameInAnotherFrame) {
+  const EnuFrame plan({51.0231, 3.7131, 55.5}), answers({51.0271, 3.7131, 60.0});
+  std::map<NetworkId, Clues> found;
+  found[k_anchor].bearing = Bearing{1.2, 0.4, 0.8};
+  found[k_anchor].turned_at_m = k_turned_at;
+  found[k_anchor].height = HeightGuess{5, 0.3, 9, false};
+  found[k_anchor].climbed_at_m = k_turned_at;
+  found[k_other].height = HeightGuess{9, 1.5, 0, true};
+  found[k_other].climbed_at_m = k_turned_at;
+  const auto kept = flight_clues(found, plan);
+  found[k_other].height = HeightGuess{9, 1.0, 2, false};
+  EXPECT_EQ(flight_clues(found, plan).size(), 1u) << "a peak of the noise";
+  ASSERT_EQ(kept.size(), 1u) << "the best level of the other lay at the end of its search";
+  const auto here = clues_in(kept, plan), there = clues_in(kept, answers);
+  EXPECT_LT((here.at(k_anchor).bearing->tag_m - k_turned_at).norm(), 1e-6);
+  EXPECT_DOUBLE_EQ(here.at(k_anchor).bearing->bearing_rad, 1.2);
+  EXPECT_DOUBLE_EQ(here.at(k_anchor).bearing->sigma_rad, 0.4);
+  EXPECT_NEAR(here.at(k_anchor).height->up_m, 5, 1e-6);
+  EXPECT_GT(here.at(k_anchor).height->sigma_m, 0.3);
+  // 0.004 degrees north of there is 445 m; the earth falls away by 16 mm meanwhile.
+  EXPECT_NEAR(there.at(k_anchor).bearing->tag_m.y(), k_plane_y_m - 445.1, 0.2);
+  EXPECT_NEAR(there.at(k_anchor).height->up_m, 5 - 4.5, 0.03);
+}
+
+TEST(FlightClues, OfALaterTurnReplaceTheFormer) {
+  FlightClues before, after;
+  before[k_anchor].bearing = FlightClue::Bearing{{}, 1, 0.4};
+  before[k_anchor].height = FlightClue::Height{{}, 1};
+  after[k_anchor].bearing = FlightClue::Bearing{{}, 2, 0.4};
+  const auto both = merged(before, after);
+  EXPECT_EQ(both.at(k_anchor).bearing->bearing_rad, 2);
+  EXPECT_TRUE(both.at(k_anchor).height);
+}
+
+/// A live flight in one upright plane before the facade: an anchor in the building and its twin in the open
+/// fit alike.
+LiveFlight facade() {
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> noise(0, 1);
+  Mission mission;
+  mission.frame = TrackFrame::local;
+  LiveFlight live(mission);
+  for (int i = 0; i < 900; ++i) {
+    const double t_s = 0.1 * i;
+    const Eigen::Vector3d at(12 * std::sin(0.11 * t_s), k_plane_y_m, 7 + 5 * std::sin(0.29 * t_s));
+    Fix fix;
+    fix.time = UtcTime::from_seconds(t_s);
+    fix.frame = TrackFrame::local;
+    fix.fix = FixClass::rtk_fixed;
+    fix.local_m = at + 0.01 * Eigen::Vector3d(noise(random), noise(random), noise(random));
+    live.add(fix);
+    Range range;
+    range.time = fix.time;
+    range.tag = NetworkId{0x6e01};
+    range.anchor = k_anchor;
+    range.distance_m = (k_inside - at).norm() + 0.05 * noise(random);
+    live.add(range);
+  }
+  return live;
+}
+
+AnchorClues seen_at(double bearing_rad, double sigma_rad) {
+  AnchorClues clues;
+  clues.bearing = {k_turned_at, bearing_rad, sigma_rad};
+  return clues;
+}
+double bearing_of(const Eigen::Vector3d& place_m) {
+  const Eigen::Vector3d way = place_m - k_turned_at;
+  return std::atan2(way.x(), way.y());
+}
+
+TEST(LiveTwins, StandBothUntilTheTurnHasTold) {
+  auto live = facade();
+  live.finish();
+  const auto before = live.estimates().front();
+  ASSERT_TRUE(before.best && before.mirror) << before.reason;
+  EXPECT_EQ(before.verdict, Verdict::ambiguous);
+}
+
+TEST(LiveTwins, AreDecidedByTheTurnWhicheverCameFirst) {
+  const Eigen::Vector3d twin(k_inside.x(), 2 * k_plane_y_m - k_inside.y(), k_inside.z());
+  for (const auto& wanted : {k_inside, twin}) {
+    auto live = facade();
+    live.tell({{k_anchor, seen_at(bearing_of(wanted) + 0.3, 0.35)}});
+    live.finish();
+    const auto after = live.estimates().front();
+    ASSERT_TRUE(after.best);
+    EXPECT_FALSE(after.mirror);
+    EXPECT_EQ(after.verdict, Verdict::ok) << after.reason;
+    EXPECT_LT((after.best->position.m - wanted).norm(), 0.5) << after.best->position.m.transpose();
+  }
+}
+
+TEST(LiveTwins, StandBothWhenTheBearingIsWeak) {
+  auto live = facade();
+  live.tell({{k_anchor, seen_at(bearing_of(k_inside), 100 * std::numbers::pi / 180)}});
+  live.finish();
+  const auto after = live.estimates().front();
+  ASSERT_TRUE(after.best && after.mirror) << "180 degrees are 1.8 sigma: four to one, not beyond 99 %";
+  EXPECT_LT((after.best->position.m - k_inside).norm(), 0.5);
+  EXPECT_GT(after.best->probability, 0.6);
+  EXPECT_LT(after.best->probability, 0.99);
+  EXPECT_NEAR(after.best->probability + after.mirror->probability, 1, 1e-9);
+}
+
+}  // namespace
+}  // namespace anchord::procedure
