@@ -1,72 +1,129 @@
 #include "core/planning/design.hpp"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 namespace anchord::planning {
+namespace {
 
-Design::Design(std::span<const Eigen::Vector3d> anchors, const FlightPlanOptions& options)
-    : anchors_(anchors.begin(), anchors.end()),
-      options_(options),
-      variance_m2_(options.range_sigma_m * options.range_sigma_m / options.ranges_per_point +
-                   options.point_sigma_m * options.point_sigma_m) {
-  const double prior = options.prior_sigma_m * options.prior_sigma_m;
-  const Eigen::Vector4d diagonal{prior, prior, prior, options.bias_sigma_m * options.bias_sigma_m};
-  covariances_.assign(anchors_.size(), diagonal.asDiagonal().toDenseMatrix());
-}
+constexpr double k_least_cosine = 0.2;  // a grazing ray leaves through the edge of the wall
 
-Eigen::Vector4d Design::row(std::size_t anchor, const Eigen::Vector3d& point) const {
-  const Eigen::Vector3d d = point - anchors_[anchor];
-  const double length = d.norm();
-  if (length > options_.max_range_m || length < 1e-6) return Eigen::Vector4d::Zero();
-  return {d.x() / length, d.y() / length, d.z() / length, 1.0};
-}
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-double Design::value_of(const Eigen::Matrix4d& covariance) const {
-  if (options_.criterion == Criterion::a_optimal) return covariance.topLeftCorner<3, 3>().trace();
-  return std::log(covariance.topLeftCorner<3, 3>().determinant());
-}
-
-void Design::update(const Eigen::Vector3d& point, double sign) {
-  for (std::size_t i = 0; i < anchors_.size(); ++i) {
-    const Eigen::Vector4d h = row(i, point), ph = covariances_[i] * h;
-    covariances_[i] -= sign * ph * ph.transpose() / (variance_m2_ + sign * h.dot(ph));
-  }
-}
-
-void Design::add(const Eigen::Vector3d& point) { update(point, 1); }
-void Design::remove(const Eigen::Vector3d& point) { update(point, -1); }
-
-double Design::value() const {
+/// Walls between two points, each by the inverse cosine; the roof counts as `roof` of them.
+double slant_between(const Building& building, double roof, const Eigen::Vector3d& from,
+                     const Eigen::Vector3d& to) {
+  const Polygon& outline = building.outline;
+  if (outline.size() < 3) return 0;
+  const Eigen::Vector3d way = to - from;
+  const double length = way.norm();
   double out = 0;
-  for (const auto& covariance : covariances_) out += value_of(covariance);
+  bool over = false;
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    const Eigen::Vector2d &a = outline[i], edge = outline[(i + 1) % outline.size()] - a;
+    const double across = cross(way.head<2>(), edge);
+    if (std::abs(across) < 1e-12) continue;
+    const Eigen::Vector2d begin = a - from.head<2>();
+    const double share = cross(begin, edge) / across, along = cross(begin, way.head<2>()) / across;
+    if (share <= 0 || share >= 1 || along < 0 || along >= 1) continue;
+    if (from.z() + share * way.z() > building.height_m) {
+      over = true;
+      continue;
+    }
+    out += 1 / std::max(std::abs(across) / edge.norm() / length, k_least_cosine);
+  }
+  // In over the top of a wall means in through the roof.
+  if (over) out += roof / std::max(std::abs(way.z()) / length, k_least_cosine);
   return out;
 }
 
-double Design::value_with(const Eigen::Vector3d& point) const {
+}  // namespace
+
+Design::Design(std::span<const Eigen::Vector3d> anchors, const FlightPlanOptions& options,
+               const Building& building)
+    : anchors_(anchors.begin(), anchors.end()), options_(options), building_(building) {
+  const double prior = options.prior_sigma_m * options.prior_sigma_m;
+  const Eigen::Vector4d diagonal{prior, prior, prior, options.bias_sigma_m * options.bias_sigma_m};
+  beliefs_.assign(anchors_.size(), Belief{diagonal.asDiagonal().toDenseMatrix()});
+}
+
+Sight Design::sight(const Eigen::Vector3d& point, const Eigen::Vector3d& anchor) const {
+  Sight out;
+  const Eigen::Vector3d d = point - anchor;
+  const double length = d.norm();
+  if (length > options_.max_range_m || length < 1e-6) return out;
+  out.row << d / length, 1.0;
+  out.slant = slant_between(building_, options_.roof_walls, point, anchor);
+  // The spread of late paths grows as the excess does.
+  const double noise_m = options_.range_sigma_m * std::max(1.0, out.slant);
+  out.variance_m2 =
+      noise_m * noise_m / options_.ranges_per_point + options_.point_sigma_m * options_.point_sigma_m;
+  return out;
+}
+
+std::vector<Sight> Design::sights(const Eigen::Vector3d& point) const {
+  std::vector<Sight> out;
+  out.reserve(anchors_.size());
+  for (const auto& anchor : anchors_) out.push_back(sight(point, anchor));
+  return out;
+}
+
+double Design::square_m2(const Belief& belief) const {
+  return belief.covariance.topLeftCorner<3, 3>().trace() +
+         options_.wall_excess_m * options_.wall_excess_m * belief.shift.head<3>().squaredNorm();
+}
+
+double Design::value_of(const Belief& belief) const {
+  if (options_.criterion == Criterion::a_optimal) return square_m2(belief);
+  const Eigen::Vector3d shift = options_.wall_excess_m * belief.shift.head<3>();
+  return std::log((belief.covariance.topLeftCorner<3, 3>() + shift * shift.transpose()).determinant());
+}
+
+void Design::update(std::span<const Sight> point, double sign) {
+  for (std::size_t i = 0; i < anchors_.size(); ++i) {
+    const Sight& s = point[i];
+    Belief& b = beliefs_[i];
+    const Eigen::Vector4d ph = b.covariance * s.row;
+    const double innovation = s.variance_m2 + sign * s.row.dot(ph);
+    b.shift += sign * ph * (s.slant - s.row.dot(b.shift)) / innovation;
+    b.covariance -= sign * ph * ph.transpose() / innovation;
+  }
+}
+
+double Design::value() const {
+  double out = 0;
+  for (const auto& belief : beliefs_) out += value_of(belief);
+  return out;
+}
+
+double Design::value_with(std::span<const Sight> point) const {
   double out = 0;
   for (std::size_t i = 0; i < anchors_.size(); ++i) {
-    const Eigen::Vector4d h = row(i, point), ph = covariances_[i] * h;
+    const Sight& s = point[i];
+    const Belief& b = beliefs_[i];
+    const Eigen::Vector4d ph = b.covariance * s.row;
+    const double innovation = s.variance_m2 + s.row.dot(ph);
+    const Eigen::Vector4d shift = b.shift + ph * (s.slant - s.row.dot(b.shift)) / innovation;
     if (options_.criterion == Criterion::a_optimal) {  // the trace alone needs no matrix
-      out += covariances_[i].topLeftCorner<3, 3>().trace() -
-             ph.head<3>().squaredNorm() / (variance_m2_ + h.dot(ph));
+      out += b.covariance.topLeftCorner<3, 3>().trace() - ph.head<3>().squaredNorm() / innovation +
+             options_.wall_excess_m * options_.wall_excess_m * shift.head<3>().squaredNorm();
     } else {
-      out += value_of(covariances_[i] - ph * ph.transpose() / (variance_m2_ + h.dot(ph)));
+      out += value_of({b.covariance - ph * ph.transpose() / innovation, shift});
     }
   }
   return out;
 }
 
-double Design::mean_variance_m2() const {
+double Design::mean_square_m2() const {
   double out = 0;
-  for (const auto& covariance : covariances_) out += covariance.topLeftCorner<3, 3>().trace();
-  return out / static_cast<double>(covariances_.size());
+  for (const auto& belief : beliefs_) out += square_m2(belief);
+  return out / static_cast<double>(beliefs_.size());
 }
 
 std::vector<double> Design::sigmas_m() const {
   std::vector<double> out;
-  for (const auto& covariance : covariances_)
-    out.push_back(std::sqrt(covariance.topLeftCorner<3, 3>().trace()));
+  for (const auto& belief : beliefs_) out.push_back(std::sqrt(square_m2(belief)));
   return out;
 }
 

@@ -82,7 +82,7 @@ std::vector<Candidate> candidates(const FlightPlanInput& input, const FlightPlan
                                   const Bounds& bounds) {
   std::vector<double> heights = options.heights_m;
   if (heights.empty())
-    heights = {2.0, std::max(3.0, input.building_height_m * 0.6), input.building_height_m + 4.0};
+    heights = {2.0, std::max(3.0, input.building_height_m * 0.6), input.building_height_m + 1.0};
   std::vector<Candidate> out;
   for (const double extra : options.ring_m) {
     const auto ring =
@@ -98,35 +98,37 @@ std::vector<Candidate> candidates(const FlightPlanInput& input, const FlightPlan
   return out;
 }
 
+using Sights = std::vector<std::vector<Sight>>;  // by candidate
+
 /// Best candidate not yet chosen, and the value with it.
-std::pair<std::size_t, double> best_of(const Design& design, const std::vector<Candidate>& all,
+std::pair<std::size_t, double> best_of(const Design& design, const Sights& all,
                                        const std::vector<bool>& chosen) {
   std::pair<std::size_t, double> best{all.size(), k_infinity};
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (chosen[i]) continue;
-    const double value = design.value_with(all[i].point_m);
+    const double value = design.value_with(all[i]);
     if (value < best.second) best = {i, value};
   }
   return best;
 }
 
-std::vector<std::size_t> choose(Design& design, const std::vector<Candidate>& all,
-                                const FlightPlanOptions& options, std::string& reason) {
+std::vector<std::size_t> choose(Design& design, const Sights& all, const FlightPlanOptions& options,
+                                std::string& reason) {
   std::vector<bool> chosen(all.size(), false);
   std::vector<std::size_t> out;
   const auto most = std::min(static_cast<std::size_t>(options.max_points), all.size());
   reason = "the largest number of points";
   while (out.size() < most) {
-    const double before = design.mean_variance_m2();
+    const double before = design.mean_square_m2();
     const auto [next, value] = best_of(design, all, chosen);
     if (next == all.size()) break;
-    design.add(all[next].point_m);
-    const double gain = 1 - design.mean_variance_m2() / before;
+    design.add(all[next]);
+    const double gain = 1 - design.mean_square_m2() / before;
     if (static_cast<int>(out.size()) >= options.min_points && gain < options.min_gain) {
-      design.remove(all[next].point_m);
+      design.remove(all[next]);
       std::array<char, 128> text{};
       std::snprintf(text.data(), text.size(),
-                    "one more point would lower the predicted variance by %.1f %% only", 100 * gain);
+                    "one more point would lower the predicted squared error by %.1f %% only", 100 * gain);
       reason = text.data();
       break;
     }
@@ -138,14 +140,14 @@ std::vector<std::size_t> choose(Design& design, const std::vector<Candidate>& al
     bool changed = false;
     for (auto& point : out) {
       const double before = design.value();
-      design.remove(all[point].point_m);
+      design.remove(all[point]);
       chosen[point] = false;
       const auto [next, value] = best_of(design, all, chosen);
       if (next < all.size() && value < before - 1e-6 * std::abs(before)) {
         point = next;
         changed = true;
       }
-      design.add(all[point].point_m);
+      design.add(all[point]);
       chosen[point] = true;
     }
     if (!changed) break;
@@ -258,6 +260,8 @@ Result<void> FlightPlanOptions::check() const {
   if (min_points < 4 || max_points < min_points || max_points > 500)
     return bad("need 4 <= min_points <= max_points <= 500");
   if (!(min_gain >= 0 && min_gain < 1)) return bad("min_gain must be 0 to 1");
+  if (!(wall_excess_m >= 0) || !(roof_walls >= 0))
+    return bad("wall_excess_m and roof_walls must not be negative");
   if (ranges_per_point < 1 || !(range_sigma_m > 0) || !(point_sigma_m >= 0) || !(prior_sigma_m > 0) ||
       !(bias_sigma_m > 0)) {
     return bad("ranges_per_point and sigmas must be positive");
@@ -304,9 +308,11 @@ Result<FlightPlan> plan_flight(const FlightPlanInput& input, const FlightPlanOpt
                                            std::to_string(std::lround(options.max_range_m)) +
                                            " m of where the aircraft may fly");
   }
-  Design design(plan.assumed_anchors_m, options);
+  Design design(plan.assumed_anchors_m, options, {input.outline, input.building_height_m});
+  Sights sights;
+  for (const auto& c : all) sights.push_back(design.sights(c.point_m));
   std::vector<Candidate> chosen;
-  for (const auto i : choose(design, all, options, plan.reason)) chosen.push_back(all[i]);
+  for (const auto i : choose(design, sights, options, plan.reason)) chosen.push_back(all[i]);
   if (!order(plan, chosen, input, options, bounds)) {
     auto kept = joined(chosen, bounds);
     for (const auto& c : chosen) design.remove(c.point_m);
@@ -318,7 +324,7 @@ Result<FlightPlan> plan_flight(const FlightPlanInput& input, const FlightPlanOpt
     BOOST_OUTCOME_TRY(order(plan, std::move(kept), input, options, bounds));
   }
   plan.predicted_sigma_m = design.sigmas_m();
-  plan.rms_m = std::sqrt(design.mean_variance_m2());
+  plan.rms_m = std::sqrt(design.mean_square_m2());
   plan.worst_m = *std::max_element(plan.predicted_sigma_m.begin(), plan.predicted_sigma_m.end());
   if (plan.n_out_of_range > 0) {
     plan.reason += "; " + std::to_string(plan.n_out_of_range) +

@@ -26,7 +26,8 @@ struct FlightPlanInput {
 struct FlightPlanOptions {
   double keep_out_m = 4;                ///< from the outline and from no-fly areas
   std::vector<double> ring_m = {0, 6};  ///< rings of candidates, beyond keep_out_m
-  std::vector<double> heights_m;        ///< above ground; empty: 2 m, mid-height and 4 m above the roof
+  std::vector<double> heights_m;        ///< above ground; empty: 2 m, mid-height and 1 m above the
+                                        ///< roof: from further up every ray goes through it
   double spacing_m = 3;                 ///< of candidates along a ring
   double anchor_spacing_m = 5;          ///< of the anchors assumed inside, at most `max_anchors` of them
   int max_anchors = 80;
@@ -35,14 +36,16 @@ struct FlightPlanOptions {
   Criterion criterion = Criterion::a_optimal;
   int min_points = 8;  ///< a flight with fewer cannot tell bias, height and mirror apart
   int max_points = 60;
-  /// Stops adding once a point lowers the mean predicted variance by less than this share.
+  /// Stops adding once a point lowers the mean expected squared error by less than this share.
   double min_gain = 0.02;
   int ranges_per_point = 20;    ///< n samples of the dwell
   double range_sigma_m = 0.15;  ///< through a facade: between 0.05 (line of sight) and 0.23 (NLOS)
   double point_sigma_m =
       0.05;  ///< common to all ranges of one point: RTK and multipath do not average out there
   double prior_sigma_m = 30;
-  double bias_sigma_m = 0.3;  ///< constant excess per anchor, estimated too
+  double bias_sigma_m = 0.3;   ///< constant excess per anchor, estimated too
+  double wall_excess_m = 0.2;  ///< of one wall at right angles, unknown: 22 cm of brick give 0.24, glass 0.02
+  double roof_walls = 2;       ///< a roof counts as so many walls: a slab is thicker and denser
   double speed_mps = 2;
   double dwell_s = 4;
 

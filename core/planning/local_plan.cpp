@@ -28,11 +28,11 @@ FlightPlanOptions flight_options(const Plan& plan) {
   return o;
 }
 
-/// 2 m, mid-height and 4 m above the roof, as far as the band allows.
+/// 2 m, mid-height and 1 m above the roof, as far as the band allows.
 std::vector<double> heights_of(const Plan& plan) {
   const auto& s = plan.settings;
   std::vector<double> out;
-  for (const double wanted : {2.0, plan.building_height_m / 2, plan.building_height_m + 4}) {
+  for (const double wanted : {2.0, plan.building_height_m / 2, plan.building_height_m + 1}) {
     const double height = std::clamp(wanted, s.min_height_m, s.max_height_m);
     if (std::none_of(out.begin(), out.end(), [&](double h) { return std::abs(h - height) < 0.5; })) {
       out.push_back(height);
@@ -69,12 +69,12 @@ void predict(const Plan& plan, const LocalPlan& local, PlanCheck& check) {
     check.assumed_anchors_m.clear();
     return;
   }
-  Design design(check.assumed_anchors_m, options);
+  Design design(check.assumed_anchors_m, options, {local.outline, plan.building_height_m});
   for (std::size_t i = 0; i < local.waypoints_m.size(); ++i) {
     if (plan.waypoints[i].measure) design.add(local.waypoints_m[i]);
   }
   check.predicted_sigma_m = design.sigmas_m();
-  check.rms_m = std::sqrt(design.mean_variance_m2());
+  check.rms_m = std::sqrt(design.mean_square_m2());
   check.worst_m = *std::max_element(check.predicted_sigma_m.begin(), check.predicted_sigma_m.end());
 }
 

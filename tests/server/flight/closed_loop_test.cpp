@@ -69,12 +69,12 @@ double median_of(std::vector<double> values) {
 }
 
 struct Table {
-  double median_m{}, ring_m{};
+  double median_m{}, ring_m{}, rings_m{};
   int anchors{}, ok{}, inside{};
 };
 Table fly_seeds(const char* name, const sim::World& world, std::uint64_t n) {
   std::printf("%s\nseed  flight_s  times_real  ok  inside95  median_m  worst_m  ring_4m  rings_3_9m\n", name);
-  std::vector<double> medians, rings;
+  std::vector<double> medians, rings, two_rings;
   Table out;
   for (std::uint64_t seed = 1; seed <= n; ++seed) {
     const auto r = fly(world, seed);
@@ -84,14 +84,16 @@ Table fly_seeds(const char* name, const sim::World& world, std::uint64_t n) {
     std::fflush(stdout);
     medians.push_back(r.median_m);
     rings.push_back(r.ring_m);
+    two_rings.push_back(r.rings_m);
     out.anchors += 6;
     out.ok += r.ok;
     out.inside += r.inside;
   }
   out.median_m = median_of(medians);
   out.ring_m = median_of(rings);
-  std::printf("all: %d of %d ok, %d inside, median %.3f m, ring %.3f m\n", out.ok, out.anchors, out.inside,
-              out.median_m, out.ring_m);
+  out.rings_m = median_of(two_rings);
+  std::printf("all: %d of %d ok, %d inside, median %.3f m, ring %.3f m, two rings %.3f m\n", out.ok,
+              out.anchors, out.inside, out.median_m, out.ring_m, out.rings_m);
   return out;
 }
 
@@ -106,6 +108,11 @@ TEST(ClosedLoop, FindsEveryAnchorThroughWindowsFromTheOutlineAlone) {
   EXPECT_EQ(table.ok, table.anchors);
   EXPECT_LT(table.median_m, 0.05);
   EXPECT_LT(table.median_m, table.ring_m);
+  // One flight is a throw of the dice; over twenty the plan also beats rings whose heights a person chose
+  // well.
+  if (seeds() >= 20) {
+    EXPECT_LT(table.median_m, table.rings_m);
+  }
 }
 
 TEST(ClosedLoop, FindsEveryAnchorThroughWallsFromTheOutlineAlone) {
@@ -113,6 +120,11 @@ TEST(ClosedLoop, FindsEveryAnchorThroughWallsFromTheOutlineAlone) {
   EXPECT_EQ(table.ok, table.anchors);
   EXPECT_LT(table.median_m, 0.10);
   EXPECT_LT(table.median_m, table.ring_m);
+  // One flight is a throw of the dice; over twenty the plan also beats rings whose heights a person chose
+  // well.
+  if (seeds() >= 20) {
+    EXPECT_LT(table.median_m, table.rings_m);
+  }
 }
 
 /// Only the south front may be flown along, in one upright plane, as in a street: what is inside and its twin

@@ -1,0 +1,154 @@
+// The aircraft behind a TCP port and behind a serial line (a pty), as an autopilot or a telemetry radio shows
+// itself: the link that the server flies by, a real socket, the simulated autopilot at the other end. UDP is
+// what the flights of tests/e2e fly by.
+#include "server/flight/drone_link.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <mutex>
+#include <thread>
+
+#include "drivers/sim/autopilot.hpp"
+#include "drivers/sim/ports.hpp"
+
+namespace anchord::flight {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr double k_hurry = 4;  // the aircraft's seconds in one of ours
+
+/// The autopilot at its port, on a thread of its own.
+class Aircraft {
+ public:
+  explicit Aircraft(std::unique_ptr<sim::Port> port) : port_(std::move(port)), autopilot_(options()) {
+    EXPECT_TRUE(port_->up());
+    thread_ = std::thread([this] { run(); });
+  }
+  ~Aircraft() {
+    over_ = true;
+    thread_.join();
+  }
+  std::uint16_t port() {
+    const std::scoped_lock lock(mutex_);
+    return port_->port();
+  }
+  void plug(bool in) {
+    const std::scoped_lock lock(mutex_);
+    if (in)
+      EXPECT_TRUE(port_->up());
+    else
+      port_->down();
+  }
+  std::size_t n_fence() {
+    const std::scoped_lock lock(mutex_);
+    return autopilot_.fence_list().size();
+  }
+
+ private:
+  static sim::AutopilotOptions options() {
+    sim::AutopilotOptions out;
+    out.ready_s = 1;
+    out.link_loss_s = 1e9;  // its failsafe is another test's
+    return out;
+  }
+  void run() {
+    const auto begun = Clock::now();
+    while (!over_) {
+      {
+        const std::scoped_lock lock(mutex_);
+        autopilot_.advance(k_hurry * std::chrono::duration<double>(Clock::now() - begun).count());
+        const auto out = autopilot_.take_bytes();
+        if (port_->is_up()) {
+          (void)port_->arrived();
+          for (const auto& heard : port_->hear())
+            autopilot_.feed({reinterpret_cast<const std::uint8_t*>(heard.bytes.data()), heard.bytes.size()});
+          port_->send_all({reinterpret_cast<const char*>(out.data()), out.size()});
+        }
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));  // the pace of the aircraft, not a wait
+    }
+  }
+
+  std::mutex mutex_;
+  std::unique_ptr<sim::Port> port_;
+  sim::AutopilotSim autopilot_;
+  std::atomic<bool> over_{false};
+  std::thread thread_;
+};
+
+template <class Done>
+bool until(Done done, double seconds) {
+  for (const auto end = Clock::now() + std::chrono::duration<double>(seconds); Clock::now() < end;) {
+    if (done()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  return done();
+}
+
+/// The last word on a command.
+CommandReport fate(DroneLink& link, std::uint64_t number) {
+  CommandReport last;
+  EXPECT_TRUE(until(
+      [&] {
+        for (const auto& r : link.take_reports()) {
+          if (r.number == number && r.state != CommandState::sent) last = r;
+        }
+        return last.number == number;
+      },
+      60))
+      << "no word on command " << number;
+  return last;
+}
+
+void fly(const std::string& address, Aircraft& aircraft) {
+  auto opened = DroneLink::open(address, {});
+  ASSERT_TRUE(opened) << opened.error().message;
+  auto& link = *opened.value();
+  ASSERT_TRUE(
+      until([&] { return link.status().connected && link.status().position && link.status().home; }, 30))
+      << address;
+  EXPECT_EQ(link.status().autopilot, "ArduPilot");
+  const auto accepted = [&](std::uint64_t number) {
+    const auto report = fate(link, number);
+    EXPECT_EQ(report.state, CommandState::accepted) << address << ' ' << report.what << ": " << report.text;
+  };
+  accepted(link.upload_fence({{{3.712, 51.022}, {3.715, 51.022}, {3.715, 51.025}, {3.712, 51.025}}, {}}));
+  EXPECT_EQ(aircraft.n_fence(), 4u);
+  accepted(link.take_off(3));
+  ASSERT_TRUE(until([&] { return link.status().relative_m.value_or(0) > 2.7; }, 30));
+  const auto home = *link.status().home;
+  accepted(link.go_to(home.lat_deg + 5e-5, home.lon_deg, 4, 90));
+  accepted(link.hold());
+  EXPECT_TRUE(until([&] { return link.status().mode == "BRAKE"; }, 10));
+  // The plug is pulled: said within seconds; put back: flown again without anybody's help.
+  aircraft.plug(false);
+  EXPECT_TRUE(until([&] { return !link.status().connected; }, 20));
+  aircraft.plug(true);
+  EXPECT_TRUE(until([&] { return link.status().connected; }, 20));
+  accepted(link.land());
+  EXPECT_TRUE(until([&] { return !link.status().armed; }, 30));
+}
+
+TEST(DroneLink, FliesTheAircraftOverTcpAndComesBackAfterALoss) {
+  Aircraft aircraft(sim::make_tcp(0));
+  fly("tcp://127.0.0.1:" + std::to_string(aircraft.port()), aircraft);
+}
+
+TEST(DroneLink, FliesTheAircraftOverASerialLineAndComesBackAfterALoss) {
+  const auto folder =
+      std::filesystem::temp_directory_path() / ("anchord-drone-" + std::to_string(::getpid()));
+  std::filesystem::create_directory(folder);
+  {
+    const std::string line = (folder / "telemetry").string();
+    Aircraft aircraft(sim::make_pty(line));
+    fly("serial:" + line + "?baud=57600", aircraft);
+  }
+  std::filesystem::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace anchord::flight
