@@ -61,6 +61,12 @@ Ordered device_json(const DeviceReport& d) {
                     {"sigma_h_m", maybe(d.rover->sigma_h_m)},
                     {"sigma_v_m", maybe(d.rover->sigma_v_m)}};
   }
+  if (d.clock) {
+    out["clock"] = {{"drift_ppm", d.clock->drift_ppm},
+                    {"sigma_s", d.clock->sigma_s},
+                    {"settled", d.clock->settled},
+                    {"skewed", d.clock->skewed}};
+  }
   return out;
 }
 

@@ -10,6 +10,7 @@
 
 namespace anchord::api {
 
+using Json = nlohmann::json;
 using Ordered = nlohmann::ordered_json;
 
 namespace {
@@ -113,6 +114,69 @@ Response act(Services& s, const Request& request) {
       200, {{"action", *action}, {"result", json.is_discarded() ? Ordered(nullptr) : std::move(json)}});
 }
 
+/// What the device says to a question; its state is the client's 422.
+Json ask(Services& s, const Uuid& id, std::string_view action, const std::string& arguments) {
+  const auto result = control(s).act(id, action, arguments);
+  if (!result && (result.error().code == Errc::unsupported || result.error().code == Errc::link_lost))
+    throw_problem(422, "state", result.error().message);
+  auto json = Json::parse(accepted(result), nullptr, false);
+  return json.is_discarded() ? Json() : json;
+}
+
+/// Of the settings themselves: whoever changes them at the device changes it as well.
+std::string settings_etag(const Json& settings) {
+  std::uint64_t hash = 14695981039346656037u;  // FNV-1a
+  for (const char c : settings.dump()) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211u;
+  return "\"u-" + std::to_string(hash) + '"';
+}
+
+Response uwb_answer(const Json& settings, const Json& devices) {
+  Ordered body;
+  for (const char* key : {"channel", "rate_kbps", "prf_mhz", "preamble_symbols", "gain_db"})
+    body[key] = settings.contains(key) ? Ordered(settings[key]) : Ordered(nullptr);
+  if (devices.is_array()) body["devices"] = devices;
+  Response response = json_response(200, body);
+  response.header("ETag", settings_etag(settings));
+  return response;
+}
+
+Response get_uwb(Services& s, const Request& request) {
+  check_query(request, {});
+  const auto device = value_or_problem(control(s).device(path_uuid(request)));
+  return uwb_answer(ask(s, device.config.id, "get_uwb", "{}"), nullptr);
+}
+
+/// Everywhere or nowhere: the tag and every device in its list, verified, else all back.
+Response put_uwb(Services& s, const Request& request) {
+  const auto device = value_or_problem(control(s).device(path_uuid(request)));
+  std::vector<FieldError> errors;
+  const auto body = json_body(request);
+  Fields fields(body, "", errors);
+  for (const char* key : {"channel", "rate_kbps", "prf_mhz", "preamble_symbols"})
+    fields.number(key, 0, 10'000, true);
+  fields.number("gain_db", 0, 33.5);
+  if (const auto* devices = fields.child("devices"); devices != nullptr && !devices->is_array())
+    fields.error("devices", "wrong_type", "must be a list of network ids");
+  fields.finish();
+  refuse_if_any(errors);
+  require_match(request, settings_etag(ask(s, device.config.id, "get_uwb", "{}")));
+  const auto done = ask(s, device.config.id, "set_uwb", body.dump());
+  const bool all = done.value("all", false);
+  s.audit(request, "device.uwb " + to_string(device.config.id) + " " + body.dump(), all ? "ok" : "failed");
+  if (!all) {
+    std::string why;
+    for (const auto& one : done.value("devices", Json::array())) {
+      if (!one.value("why", "").empty())
+        why += "; " + one.value("network_id", "") + " " + one.value("why", "");
+    }
+    throw_problem(422, "state",
+                  done.value("rolled_back", false)
+                      ? "not every device took them, so all have the old settings" + why
+                      : "not every device took them, and not all have the old settings either" + why);
+  }
+  return uwb_answer(ask(s, device.config.id, "get_uwb", "{}"), done.value("devices", Json::array()));
+}
+
 /// What the last discovery found.
 Response found_answer(DeviceControl& devices) {
   Ordered items = Ordered::array();
@@ -153,6 +217,9 @@ void add_device_routes(Router& router, Services& s) {
   router.add({Method::patch, "/api/v1/devices/{id}", operators, on(patch), 1 << 20, false, true});
   router.add({Method::del, "/api/v1/devices/{id}", operators, on(remove), 1 << 20, false, true});
   router.add({Method::post, "/api/v1/devices/{id}/actions", operators, on(act)});
+  router.add({Method::get, "/api/v1/devices/{id}/uwb-settings", readers(), on(get_uwb)});
+  router.add(
+      {Method::put, "/api/v1/devices/{id}/uwb-settings", operators, on(put_uwb), 1 << 20, false, true});
   router.add({Method::post, "/api/v1/discovery", operators, on(discover)});
   router.add({Method::get, "/api/v1/discovery", readers(), [&s](const Request& request) {
                 check_query(request, {});

@@ -44,6 +44,14 @@ struct DeviceReport {
     std::optional<double> age_s{}, sigma_h_m{}, sigma_v_m{};
   };
   std::optional<Rover> rover{};
+  /// Of a device that stamps by a clock of its own: how that runs against ours.
+  struct Clock {
+    double drift_ppm{};  ///< fast is positive
+    double sigma_s{};    ///< of its stamps
+    bool settled{};      ///< ten seconds of it were heard
+    bool skewed{};       ///< beyond what a crystal does: its stamps cannot be trusted
+  };
+  std::optional<Clock> clock{};
 };
 
 /// Whose clock the stamps come from.
@@ -51,7 +59,7 @@ struct DeviceClock {
   bool from_receiver{};
   std::optional<double> system_offset_s{};  ///< system clock minus UTC of the receiver
   double sigma_s{};
-  std::string skew;  ///< one line when the system clock is wrong; empty: none
+  std::string skew;  ///< one line when the system clock, or a device's, is wrong; empty: none
 };
 
 /// Something that could be a device.

@@ -169,6 +169,12 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     out.system_offset_s = time.system_offset_s();
     out.sigma_s = time.utc_of(now()).sigma_s;
     out.skew = time.skew().value_or("");
+    for (const auto& [slot, entry] : entries_) {
+      // No running numbers: this becomes an alarm, and a new text would ask for attention anew.
+      if (out.skew.empty() && entry.told.clock && entry.told.clock->skewed)
+        out.skew = "the clock of device \"" + entry.settings.name +
+                   "\" drifts by more than 200 ppm: its stamps cannot be trusted";
+    }
     return out;
   }
   std::uint16_t port(const std::string& id) const {
@@ -210,6 +216,9 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     found->second.told.identity = identity;
     find_conflicts();
     listener_.changed(found->second.settings.id);
+  }
+  void clock(std::uint16_t slot, const ClockReading& reading) override {
+    if (const auto found = entries_.find(slot); found != entries_.end()) found->second.told.clock = reading;
   }
   void heard(std::uint16_t slot) override {
     const auto found = entries_.find(slot);
@@ -313,6 +322,7 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
       entry.link.reset();
     }
     entry.device_number = 0;
+    entry.told.clock.reset();
     if (std::exchange(entry.fed, false)) {
       ++entry.told.lost;
       try {

@@ -32,6 +32,7 @@ struct DeviceState {
   std::optional<UtcTime> last_heard{};
   Identity identity;
   std::optional<RoverStatus> rover{};
+  std::optional<ClockReading> clock{};  ///< of this connection
   std::uint64_t bytes_in{0}, bytes_out{0}, frames{0}, fixes{0}, ranges{0}, opened{0}, lost{0};
   std::map<std::string, std::uint64_t> dropped;  ///< by reason
   double rows_per_s{0};                          ///< over the last five seconds
@@ -42,7 +43,7 @@ struct ClockState {
   bool from_receiver{false};
   std::optional<double> system_offset_s{};
   double sigma_s{0};
-  std::string skew;  ///< empty: none
+  std::string skew;  ///< one line when one of them, or a device's, is wrong; empty: none
 };
 
 /// Who hears of rows and changes. Called on the io thread; must not block.

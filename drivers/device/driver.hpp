@@ -26,6 +26,15 @@ struct Identity {
   bool operator==(const Identity&) const = default;
 };
 
+/// How a device's own clock runs against ours.
+struct ClockReading {
+  double drift_ppm{};  ///< fast is positive
+  double sigma_s{};    ///< of the newest stamp
+  bool settled{};      ///< ten seconds of it were heard
+  bool skewed{};       ///< it drifts more than a crystal can
+  bool operator==(const ClockReading&) const = default;
+};
+
 /// One epoch of a rover as the status strip shows it; with fix none as well.
 struct RoverStatus {
   UtcTime time{};
@@ -52,6 +61,8 @@ class DriverOutput {
   virtual void emit(Range range) = 0;
   virtual void rover(const RoverStatus& status) = 0;
   virtual void identified(const Identity& identity) = 0;
+  /// Of a device that stamps by a clock of its own.
+  virtual void clock(const ClockReading& reading) { (void)reading; }
   /// A good frame came: what the supervisor calls talking.
   virtual void heard() = 0;
   /// Bytes or rows not used. `reason` is of a small fixed set: it becomes a metric label.

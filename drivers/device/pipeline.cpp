@@ -4,6 +4,23 @@
 
 namespace anchord::device {
 
+namespace {
+
+/// The wire says microseconds, and a row's time is part of its identity: one that is sent again, by a replay
+/// or by another program, must be the row that was stored.
+template <class Row>
+void in_microseconds(Row& row) {
+  row.time.ns -= row.time.ns % 1000;
+  if (row.received) row.received->ns -= row.received->ns % 1000;
+}
+
+/// Databases know one zero; receivers send two (covariances that are not there but for their sign).
+void with_one_zero(Fix& fix) {
+  if (fix.covariance_m2) fix.covariance_m2->array() += 0.0;
+}
+
+}  // namespace
+
 class Pipeline::Device final : public DriverOutput {
  public:
   Device(Pipeline& owner, std::uint16_t slot, Settings settings, std::string json)
@@ -31,10 +48,13 @@ class Pipeline::Device final : public DriverOutput {
   void send(std::string_view bytes) override { owner_.sink_.send(slot_, bytes); }
   void emit(Fix fix) override {
     fix.mission = owner_.mission_;
+    in_microseconds(fix);
+    with_one_zero(fix);
     owner_.sink_.fix(slot_, fix);
   }
   void emit(Range range) override {
     range.mission = owner_.mission_;
+    in_microseconds(range);
     owner_.sink_.range(slot_, range);
   }
   void rover(const RoverStatus& status) override {
@@ -42,6 +62,7 @@ class Pipeline::Device final : public DriverOutput {
     owner_.sink_.rover(slot_, status);
   }
   void identified(const Identity& identity) override { owner_.sink_.identified(slot_, identity); }
+  void clock(const ClockReading& reading) override { owner_.sink_.clock(slot_, reading); }
   void heard() override { owner_.sink_.heard(slot_); }
   void dropped(std::string_view reason, std::uint64_t n) override { owner_.sink_.dropped(slot_, reason, n); }
   void answer(std::uint64_t id, Result<std::string> json) override { owner_.sink_.answer(slot_, id, json); }

@@ -248,11 +248,49 @@ Script<Result<void>> Tag::reset() {
   co_return again;
 }
 
-Script<Result<void>> Tag::blink(bool on) {
-  Bytes parameters{static_cast<std::uint8_t>(on ? 0xff : 0xf0)};
-  const Result<Bytes> accepted = co_await wire_.call(fn::led_ctrl, parameters, 0);
+Script<Result<void>> Tag::light(std::optional<std::uint16_t> other, bool on) {
+  Bytes parameters(1, static_cast<std::uint8_t>(on ? 0xff : 0xf0));
+  Result<Bytes> accepted = make_error(Errc::link_lost, "");
+  if (other) {
+    // Frames are lost, and this may be said again.
+    for (int i = 0; i < 3 && !accepted; ++i) {
+      accepted = co_await remote_call(*other, fn::led_ctrl, parameters, 0);
+    }
+  } else {
+    accepted = co_await wire_.call(fn::led_ctrl, parameters, 0);
+  }
   if (!accepted) co_return accepted.error();
   co_return boost::outcome_v2::success();
+}
+
+Script<Result<void>> Tag::set_light_control(std::optional<std::uint16_t> other, std::uint8_t config) {
+  Bytes data(1, config);
+  if (!other) {
+    wire_.write(reg::config_leds, data);
+    co_return boost::outcome_v2::success();
+  }
+  const Result<void> written = co_await remote_write(*other, reg::config_leds, data);
+  co_return written;
+}
+
+Script<Result<void>> Tag::blink(std::optional<std::uint16_t> other) {
+  constexpr int k_flashes = 3;
+  Result<Bytes> config = make_error(Errc::link_lost, "");
+  if (other) {
+    config = co_await remote_read(*other, reg::config_leds, 1);
+  } else {
+    config = co_await wire_.read(reg::config_leds, 1);
+  }
+  if (!config) co_return config.error();
+  // Lights that are under system control show nothing of LED_CTRL.
+  const std::uint8_t before = config.value()[0];
+  Result<void> done = co_await set_light_control(other, before & 0xf0);
+  for (int i = 0; done && i < 2 * k_flashes; ++i) {
+    done = co_await light(other, i % 2 == 0);
+    co_await wire_.pause(200 * k_ms);
+  }
+  const Result<void> given_back = co_await set_light_control(other, before);
+  co_return done ? given_back : done;
 }
 
 Script<Result<DeviceInfo>> Tag::stored_position(std::uint16_t id) {

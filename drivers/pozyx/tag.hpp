@@ -75,7 +75,9 @@ class Tag {
   Script<Result<void>> set_sensors_mode(std::uint8_t mode);
   Script<Result<std::optional<double>>> heading_deg();
   Script<Result<void>> reset();
-  Script<Result<void>> blink(bool on);  ///< LEDs, so that people see which tag it is
+  /// Three flashes of the lights of this tag, or of another device, so that people see which one it is: 1.2
+  /// s. The lights are the system's again afterwards.
+  Script<Result<void>> blink(std::optional<std::uint16_t> other);
 
   Script<Result<Bytes>> remote_read(std::uint16_t id, std::uint8_t address, std::size_t n);
   Script<Result<void>> remote_write(std::uint16_t id, std::uint8_t address, Bytes data);
@@ -87,6 +89,8 @@ class Tag {
  private:
   /// Events once one of `bits` or ERR is set; 0 when none came in time.
   Script<Result<std::uint8_t>> poll(std::uint8_t bits, std::int64_t patience_ns);
+  Script<Result<void>> light(std::optional<std::uint16_t> other, bool on);
+  Script<Result<void>> set_light_control(std::optional<std::uint16_t> other, std::uint8_t config);
   Script<Result<void>> transmit(std::uint16_t id, std::uint8_t operation, Bytes message);
   Script<Result<Bytes>> receive(std::uint16_t id, std::size_t n);
   Script<Result<void>> write_air(UwbSettings settings);

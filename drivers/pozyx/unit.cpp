@@ -56,7 +56,12 @@ void Unit::closed(const Arrival&) {
   const auto gone = [this](std::uint64_t id) {
     out_.answer(id, make_error(Errc::link_lost, "the tag was unplugged"));
   };
-  if (running_) gone(*std::exchange(running_, std::nullopt));
+  if (running_ && rebooting_) {
+    out_.answer(*std::exchange(running_, std::nullopt), std::string("{}"));
+  } else if (running_) {
+    gone(*std::exchange(running_, std::nullopt));
+  }
+  rebooting_ = false;
   for (const device::Command& command : std::exchange(commands_, {})) gone(command.id);
 }
 
@@ -220,6 +225,9 @@ void Unit::emit(const Ranging& ranging, std::uint16_t anchor, const std::optiona
   const std::int64_t device_ns = (*unwrap_)(ranging.info.time_ms) * 1'000'000;
   clock_.add(device_ns, ranging.seen_ns);
   const auto stamp = clock_.steady_of(device_ns);
+  // A fit that began anew knows nothing yet: what was known of the clock stays.
+  if (clock_.drift_known()) skewed_ = clock_.drift_too_large();
+  out_.clock({-clock_.drift() * 1e6, stamp ? stamp->sigma_ns * 1e-9 : 0, clock_.settled(), skewed_});
   Range range;
   range.time = utc_of(stamp ? stamp->ns : ranging.seen_ns);
   range.received = utc_of(ranging.seen_ns);

@@ -63,7 +63,7 @@ class Unit final : public device::Driver {
   Script<Result<std::string>> push_positions(std::string arguments);
   Script<Result<std::string>> range_between(std::string arguments);
   Script<Result<std::string>> discover();
-  Script<Result<std::string>> identify();
+  Script<Result<std::string>> identify(std::string arguments);
   void emit(const Ranging& ranging, std::uint16_t anchor, const std::optional<CirRecord>& cir,
             std::optional<double> heading_deg);
   void emit_between(const Ranging& ranging, std::uint16_t from, std::uint16_t to);
@@ -77,6 +77,7 @@ class Unit final : public device::Driver {
   std::unique_ptr<Session> session_;
   std::deque<device::Command> commands_;
   std::optional<std::uint64_t> running_{};  ///< command being executed
+  bool rebooting_{false};                   ///< ... is a reboot: its USB port may vanish
   TagIdentity identity_{};
   std::map<std::uint16_t, Anchor> anchors_;
   std::uint16_t newest_anchor_{0};
@@ -85,6 +86,7 @@ class Unit final : public device::Driver {
   std::size_t between_{0};
   timing::ClockModel clock_{};
   std::optional<timing::Unwrap> unwrap_{};
+  bool skewed_{false};
   std::uint64_t seq_{0};
 };
 

@@ -95,8 +95,13 @@ std::string identity_text(const TagIdentity& tag, const UwbSettings& uwb) {
               {"firmware", tag.firmware_text()},
               {"selftest", tag.selftest},
               {"selftest_passed", (tag.selftest & 0x30) == 0x30},
-              {"uwb", to_json(uwb)}}
+              {"uwb", to_json(uwb)},
+              {"lights", "blinked"}}
       .dump();
+}
+
+std::string light_text(std::uint16_t id) {
+  return Json{{"network_id", to_string(NetworkId{id})}, {"lights", "blinked"}}.dump();
 }
 
 Result<std::vector<std::uint16_t>> ids_of(std::string_view option, const Json& value) {
@@ -177,10 +182,10 @@ Script<Result<std::string>> Unit::outcome(device::Command command) {
   Result<std::string> out =
       make_error(Errc::unsupported,
                  "a pozyx device knows identify, discover, get_uwb, set_uwb, push_positions, range_between, "
-                 "blink, reset; not \"" +
+                 "reboot; not \"" +
                      command.name + "\"");
   if (command.name == "identify") {
-    out = co_await identify();
+    out = co_await identify(command.arguments_json);
   } else if (command.name == "discover") {
     out = co_await discover();
   } else if (command.name == "get_uwb") {
@@ -193,25 +198,31 @@ Script<Result<std::string>> Unit::outcome(device::Command command) {
     out = co_await push_positions(command.arguments_json);
   } else if (command.name == "range_between") {
     out = co_await range_between(command.arguments_json);
-  } else if (command.name == "blink" || command.name == "reset") {
-    Result<void> done = boost::outcome_v2::success();
-    if (command.name == "reset") {
-      done = co_await session_->tag.reset();
-      if (done) done = co_await prepare();
-    } else {
-      done = co_await session_->tag.blink(true);
-      co_await session_->wire.pause(1'000'000'000);
-      if (done) done = co_await session_->tag.blink(false);
-    }
+  } else if (command.name == "reboot") {
+    rebooting_ = true;
+    Result<void> done = co_await session_->tag.reset();
+    if (done) done = co_await prepare();
+    rebooting_ = false;
     if (!done) co_return done.error();
     out = std::string("{}");
   }
   co_return out;
 }
 
-Script<Result<std::string>> Unit::identify() {
+Script<Result<std::string>> Unit::identify(std::string arguments) {
+  const Json json = object_of(arguments);
+  std::optional<std::uint16_t> other;
+  if (json.is_object() && json.contains("network_id")) {
+    const Result<std::uint16_t> id = id_of("network_id", json["network_id"]);
+    if (!id) co_return id.error();
+    if (id.value() != identity_.id) other = id.value();
+  }
   const Result<TagIdentity> read = co_await session_->tag.identify();
   if (!read) co_return read.error();
+  const Result<void> blinked = co_await session_->tag.blink(other);
+  if (!blinked) co_return blinked.error();
+  out_.heard();  // it ranged to nobody meanwhile
+  if (other) co_return light_text(*other);
   co_return identity_text(read.value(), session_->tag.settings());
 }
 

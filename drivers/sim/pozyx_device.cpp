@@ -21,6 +21,7 @@ void PozyxDevice::start() {
   memory_[reg::firmware] = firmware_;
   memory_[reg::hardware] = is_tag_ ? 0x23 : 0x03;
   memory_[reg::selftest] = is_tag_ ? 0x3f : 0x30;
+  memory_[reg::config_leds] = 0x3f;  // all lights under system control
   memory_[reg::pos_num_anchors] = 0x84;
   memory_[reg::network_id] = static_cast<std::uint8_t>(label_ & 0xff);
   memory_[reg::network_id + 1] = static_cast<std::uint8_t>(label_ >> 8);
@@ -151,7 +152,15 @@ std::optional<PozyxDevice::Answer> PozyxDevice::call(std::uint8_t function, Byte
   const Known* device = known(parameters);
   Answer answer;
   switch (function) {
-    case fn::led_ctrl:
+    case fn::led_ctrl: {
+      if (parameters.size() != 1) return refuse(0x0d);
+      // Only lights that are not under system control follow.
+      const unsigned free = (parameters[0] >> 4) & ~unsigned{memory_[reg::config_leds]} & 0x0f;
+      const unsigned now = (lights_ & ~free) | (parameters[0] & free);
+      flashes_ += (now & ~unsigned{lights_}) != 0;
+      lights_ = static_cast<std::uint8_t>(now & 0x0f);
+      return answer;
+    }
     case fn::pos_set_anchor_ids:
       return answer;
     case fn::pos_get_anchor_ids:

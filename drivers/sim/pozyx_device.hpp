@@ -51,6 +51,7 @@ class PozyxDevice {
   void set_impulse(std::vector<std::int16_t> taps) { impulse_ = std::move(taps); }
   void set_i16(std::uint8_t address, double value);
   void set_bytes(std::uint8_t address, pozyx::ByteView data);
+  int flashes() const { return flashes_; }  ///< times a host switched a light on
   std::uint8_t register_value(std::uint8_t address) const { return memory_[address]; }
 
  private:
@@ -63,7 +64,8 @@ class PozyxDevice {
 
   std::uint16_t label_;
   bool is_tag_;
-  std::uint8_t firmware_, rates_, plen_;
+  std::uint8_t firmware_, rates_, plen_, lights_{0};
+  int flashes_{0};
   std::array<std::uint8_t, 256> memory_{};
   std::vector<Known> list_, saved_list_;
   std::map<std::uint8_t, std::uint8_t> flash_;

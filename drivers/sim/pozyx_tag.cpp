@@ -36,6 +36,7 @@ void PozyxTag::power_up(double now_s) {
   run_until(now_s);
   pending_.clear();
   replies_.clear();
+  fresh_ = false;
   lines_.clear();
   self_.reset();
   boot_s_ = now_s;
@@ -62,12 +63,16 @@ void PozyxTag::take(const Command& command, double now_s) {
       return;
     case Command::Kind::read:
       return say(reply_line(self_.read(command.address, command.count)), now_s);
-    case Command::Kind::function:
-      return say(reply_line(call(command, now_s)), now_s);
+    case Command::Kind::function: {
+      const Bytes answer = call(command, now_s);
+      const bool range =
+          command.address == fn::device_get_range_info && answer.front() == 1 && std::exchange(fresh_, false);
+      return say(reply_line(answer), now_s, range);
+    }
   }
 }
 
-void PozyxTag::say(std::string bytes, double now_s) {
+void PozyxTag::say(std::string bytes, double now_s, bool range) {
   if (faulty(FaultKind::silence, now_s)) return;
   double at_s = now_s + setup_.reply_s + (faulty(FaultKind::late, now_s) ? 0.150 : 0.0);
   if (faulty(FaultKind::garbage, now_s) && random_.chance(0.3)) {
@@ -77,7 +82,7 @@ void PozyxTag::say(std::string bytes, double now_s) {
     bytes = random_.chance(0.5) ? noise + bytes : bytes.substr(0, at) + noise + bytes.substr(at);
   }
   if (!replies_.empty()) at_s = std::max(at_s, replies_.back().at_s);
-  replies_.push_back({at_s, std::move(bytes)});
+  replies_.push_back({at_s, std::move(bytes), range});
 }
 
 Bytes PozyxTag::call(const Command& command, double now_s) {
@@ -150,6 +155,7 @@ void PozyxTag::range_local(std::uint16_t to, double now_s) {
     if (faulty(FaultKind::zero, at_s)) result.distance_m = 0;
     store_range(self_, to, result, at_s - 0.4 * took_s);
     self_.set_impulse(simulate_impulse(result, scenario_->impulse, random_));
+    fresh_ = true;
     self_.raise(event::func);
   });
 }
@@ -354,6 +360,12 @@ void PozyxTag::update_sensors(double now_s) {
   self_.set_i16(reg::euler, std::min(heading / k_turn * 360 * 16, 5759.0));
 }
 
+int PozyxTag::flashes(NetworkId id) const {
+  if (short_id(id) == self_.id()) return self_.flashes();
+  const auto found = others_.find(short_id(id));
+  return found == others_.end() ? 0 : found->second.flashes();
+}
+
 void PozyxTag::after(double at_s, std::function<void(double)> done) {
   pending_.push_back({at_s, std::move(done)});
 }
@@ -374,6 +386,7 @@ std::string PozyxTag::speak(double now_s) {
   std::string out;
   while (!replies_.empty() && replies_.front().at_s <= now_s) {
     out += replies_.front().bytes;
+    told_ += replies_.front().range;
     replies_.pop_front();
   }
   return out;

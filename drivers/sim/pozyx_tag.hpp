@@ -30,6 +30,10 @@ class PozyxTag {
   void power_up(double now_s);
 
   std::uint64_t exchanges() const { return exchanges_; }  ///< tried over the air
+  /// Ranges the host was told: those whose info has left by the wire. Of these a host may lose only the one
+  /// that is on the wire when the plug is pulled.
+  std::uint64_t told() const { return told_; }
+  int flashes(NetworkId id) const;  ///< times a host switched a light of this device on
 
  private:
   struct Pending {  ///< something on the air
@@ -39,10 +43,11 @@ class PozyxTag {
   struct Reply {
     double at_s{};
     std::string bytes;
+    bool range{false};  ///< info of a fresh range
   };
 
   void take(const pozyx::Command& command, double now_s);
-  void say(std::string bytes, double now_s);
+  void say(std::string bytes, double now_s, bool range = false);
   pozyx::Bytes call(const pozyx::Command& command, double now_s);
   /// Functions that use the air; false: refused.
   bool start(std::uint8_t function, pozyx::ByteView parameters, double now_s);
@@ -81,7 +86,8 @@ class PozyxTag {
   bool rx_unread_{false};
   double rx_full_until_s_{0};
   double boot_s_{0};
-  std::uint64_t exchanges_{0};
+  std::uint64_t exchanges_{0}, told_{0};
+  bool fresh_{false};  ///< the newest range was not asked for yet
 };
 
 }  // namespace anchord::sim

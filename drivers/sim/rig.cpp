@@ -25,6 +25,7 @@ class Unit {
   virtual void run(double now_s) = 0;
   virtual std::optional<double> next_s() const = 0;
   virtual void powered(double now_s) = 0;
+  virtual std::uint64_t told() const { return 0; }
 
   Result<void> up() {
     BOOST_OUTCOME_TRYV(port_->up());
@@ -60,6 +61,7 @@ class TagUnit final : public Unit {
   }
   std::optional<double> next_s() const override { return tag_.next_s(); }
   void powered(double now_s) override { tag_.power_up(now_s); }
+  std::uint64_t told() const override { return tag_.told(); }
 
  private:
   PozyxTag tag_;
@@ -177,6 +179,13 @@ class Rig::Impl {
     return false;
   }
 
+  std::uint64_t told_ranges(const std::string& name) const {
+    for (const auto& unit : units_) {
+      if (unit->served().name == name) return unit->told();
+    }
+    return 0;
+  }
+
   std::vector<ServedDevice> devices() const {
     std::vector<ServedDevice> out;
     for (const auto& unit : units_) out.push_back(unit->served());
@@ -236,6 +245,7 @@ void Rig::step(int at_most_ms, int also) { impl_->step(at_most_ms, also); }
 double Rig::now_s() const { return impl_->now_s(); }
 std::vector<ServedDevice> Rig::devices() const { return impl_->devices(); }
 bool Rig::plug(const std::string& name, bool in) { return impl_->plug(name, in); }
+std::uint64_t Rig::told_ranges(const std::string& name) const { return impl_->told_ranges(name); }
 void Rig::on_change(std::function<void(const ServedDevice&)> told) { impl_->told = std::move(told); }
 
 }  // namespace anchord::sim

@@ -46,6 +46,8 @@ class Rig {
   std::vector<ServedDevice> devices() const;
   /// Pulls or plugs one by hand, over what the scenario says. False: no such device.
   bool plug(const std::string& name, bool in);
+  /// Ranges that have left a tag by its wire.
+  std::uint64_t told_ranges(const std::string& name) const;
   /// Each time a device was pulled or plugged.
   void on_change(std::function<void(const ServedDevice&)> told);
 

@@ -81,7 +81,12 @@ void ClockModel::restart() {
   late_ = false;
 }
 
-bool ClockModel::drift_too_large() const { return settled() && std::abs(slope_) > 2e-4; }
+bool ClockModel::drift_too_large() const {
+  // Of a short stretch delays alone can look like drift: it must have added up to more than they explain.
+  if (!drift_known() || std::abs(slope_) <= 2e-4) return false;
+  const auto stretch_ns = static_cast<double>(buckets_.back().device_ns - buckets_.front().device_ns);
+  return std::abs(slope_) * stretch_ns > 1e7 + 5 * scale_ns_;
+}
 
 bool ClockModel::jumped(std::int64_t device_ns, std::int64_t arrival_ns) {
   if (device_ns < last_device_ns_ - options_.bucket_ns) return true;  // it began anew

@@ -13,7 +13,7 @@ struct ClockModelOptions {
   std::int64_t early_ns = 50'000'000;  ///< no sample can be early: this much means the device clock jumped
   std::int64_t late_ns = 250'000'000;  ///< late for `late_span_ns` on end: the device clock jumped back
   std::int64_t late_span_ns = 5'000'000'000;  ///< links stall for less
-  double max_drift = 1e-3;                    ///< crystals keep 1e-4; beyond 1e-3 it is not a clock
+  double max_drift = 1e-2;                    ///< crystals keep 1e-4; beyond 1e-2 it is not a clock
 };
 
 /// An instant with its standard uncertainty, nanoseconds.
@@ -52,6 +52,8 @@ class ClockModel {
   std::size_t samples() const { return samples_; }  ///< since the last jump
   std::uint64_t jumps() const { return jumps_; }
   bool settled() const { return buckets_.size() >= 10; }
+  bool drift_known() const { return buckets_.size() >= 20; }
+  /// Beyond 200 ppm, twice what the worst crystal does; false while it is not known.
   bool drift_too_large() const;
 
  private:

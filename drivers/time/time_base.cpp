@@ -46,18 +46,31 @@ std::optional<double> TimeBase::system_offset_s() const {
   return static_cast<double>(system_ns_ + newest_ns_ - utc_of(newest_ns_).time.ns) * 1e-9;
 }
 
+namespace {
+
+/// The greatest of 0.01, 0.02, 0.05, 0.1, ... that is not above (0.01 and up): the text of an alarm must not
+/// change with every millisecond.
+double round_down(double value_s) {
+  double step = 0.01;
+  while (step * 10 <= value_s && step < 1e9) step *= 10;
+  return value_s >= 5 * step ? 5 * step : value_s >= 2 * step ? 2 * step : step;
+}
+
+}  // namespace
+
 std::optional<std::string> TimeBase::skew() const {
   char text[160];
   if (const auto offset = system_offset_s()) {
     const double allowed = k_skew_limit_s + 3 * k_latency_sigma_s;
     if (std::abs(*offset) <= allowed) return std::nullopt;
-    std::snprintf(text, sizeof text, "the system clock is %.3f s %s the receiver's UTC", std::abs(*offset),
-                  *offset > 0 ? "ahead of" : "behind");
+    std::snprintf(text, sizeof text, "the system clock is more than %g s %s the receiver's UTC",
+                  round_down(std::abs(*offset)), *offset > 0 ? "ahead of" : "behind");
     return text;
   }
   const double stepped = static_cast<double>(system_ns_ - pinned_ns_.value_or(system_ns_)) * 1e-9;
   if (std::abs(stepped) <= k_skew_limit_s) return std::nullopt;
-  std::snprintf(text, sizeof text, "the system clock was moved by %+.3f s since the start", stepped);
+  std::snprintf(text, sizeof text, "the system clock was moved %s by more than %g s since the start",
+                stepped > 0 ? "ahead" : "back", round_down(std::abs(stepped)));
   return text;
 }
 

@@ -13,7 +13,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 struct Options {
-  std::string data_dir{"anchord-data"}, url, device, kind, address, name, action, arguments;
+  std::string data_dir{"anchord-data"}, url, device, kind, address, name, action, arguments, anchor;
   std::vector<std::string> settings;
   bool json{false};
 };
@@ -223,10 +223,13 @@ void add_devices_command(CLI::App& app, int& exit_code) {
   auto* gone = command->add_subcommand("remove", "Forget a device");
   gone->add_option("device", options->device, "Id, the beginning of it, or name")->required();
   gone->callback([run] { run(remove); });
-  auto* identify = command->add_subcommand("identify", "Let a device show itself, e.g. by its light");
+  auto* identify =
+      command->add_subcommand("identify", "Let the lights of a tag blink, or of an anchor in its reach");
   identify->add_option("device", options->device, "Id, the beginning of it, or name")->required();
+  identify->add_option("anchor", options->anchor, "Network id of an anchor, e.g. 0x6a21");
   identify->callback([run, options] {
     options->action = "identify";
+    if (!options->anchor.empty()) options->arguments = Json{{"network_id", options->anchor}}.dump();
     run(act);
   });
   auto* action = command->add_subcommand("action", "Anything else a device can be asked");

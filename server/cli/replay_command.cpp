@@ -23,8 +23,8 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr auto k_tick = std::chrono::milliseconds(100);
 
 struct Options {
-  std::string source, url{"http://127.0.0.1:8420"}, speed{"1"}, token_file, name, out;
-  bool loop{false}, url_given{false};
+  std::string source, url{"http://127.0.0.1:8420"}, speed{"1"}, token_file, name, out, mission;
+  bool loop{false}, url_given{false}, speed_given{false};
 };
 
 /// Infinity for "max"; nothing for what is no speed.
@@ -94,7 +94,7 @@ Result<FlightData> fetch_flight(RestClient& client, const std::string& id) {
 int replay(const Options& options) {
   const bool recording = device::is_recording(options.source);
   if (recording && !options.url_given)
-    return replay_recording(options.source, options.out.empty() ? "-" : options.out, nullptr);
+    return derive_recording(options.source, options.out.empty() ? "-" : options.out);
   const auto speed = parse_speed(options.speed);
   if (!speed) {
     std::fprintf(stderr, "anchord replay: --speed is a number above 0, or max: %s\n", options.speed.c_str());
@@ -110,7 +110,15 @@ int replay(const Options& options) {
     std::fprintf(stderr, "anchord replay: %s\n", client.error().message.c_str());
     return 2;
   }
-  if (recording) return replay_recording(options.source, {}, client.value().get());
+  if (recording) {
+    if (options.loop || !options.out.empty()) {
+      std::fprintf(stderr, "anchord replay: a recording sent to a server takes neither --loop nor --out\n");
+      return 2;
+    }
+    // Its rows keep their stamps and identities, so there is no live flight to imitate unless asked for.
+    const double pace = options.speed_given ? *speed : std::numeric_limits<double>::infinity();
+    return play_recording(options.source, {options.name, options.mission, pace}, *client.value());
+  }
   auto flight = parse_uuid(options.source) ? fetch_flight(*client.value(), options.source)
                                            : read_flight_folder(options.source);
   if (!flight) {
@@ -149,13 +157,18 @@ void add_replay_command(CLI::App& app, int& exit_code) {
                   ->capture_default_str();
   command->add_option("--out", options->out,
                       "Of a recording: folder for fixes.ndjson and ranges.ndjson; else standard output");
-  command->add_option("--speed", options->speed, "Times real time, or max")->capture_default_str();
+  auto* speed =
+      command->add_option("--speed", options->speed, "Times real time, or max (of a recording: max)")
+          ->capture_default_str();
   command->add_option("--token-file", options->token_file,
                       "File with an access token (gateway and operator)");
   command->add_option("--name", options->name, "Name of the mission; else that of the flight");
+  command->add_option("--mission", options->mission,
+                      "Of a recording: mission of that server for its rows; else the recorded ones");
   command->add_flag("--loop", options->loop, "Again and again, each time a new mission");
-  command->callback([options, url, &exit_code] {
+  command->callback([options, url, speed, &exit_code] {
     options->url_given = url->count() > 0;
+    options->speed_given = speed->count() > 0;
     exit_code = replay(*options);
   });
 }

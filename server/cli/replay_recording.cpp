@@ -1,53 +1,183 @@
 #include "server/cli/replay_recording.hpp"
 
+#include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <iostream>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <thread>
 
+#include "api/json/flight_requests.hpp"
 #include "api/json/wire_rows.hpp"
+#include "core/types/mission.hpp"
 #include "drivers/device/replay.hpp"
+#include "server/cli/progress.hpp"
 #include "server/cli/rest_client.hpp"
 
 namespace anchord::cli {
 namespace {
 
-constexpr int k_batch = 1000;
+using SteadyClock = std::chrono::steady_clock;
+
+// About a megabyte of rows with impulse responses: what a server takes in one gulp.
+constexpr int k_batch = 500;
+constexpr auto k_tick = std::chrono::milliseconds(100);
 
 int fail(const Error& error, int code) {
   std::fprintf(stderr, "anchord replay: %s\n", error.message.c_str());
   return code;
 }
 
+std::string line_of(const Fix& fix) { return api::fix_json(fix, std::nullopt).dump() + '\n'; }
+std::string line_of(const Range& range) { return api::range_json(range, std::nullopt).dump() + '\n'; }
+
 /// Rows of one kind on their way to the server.
 class Upload {
  public:
   Upload(RestClient& client, std::string path) : client_(client), path_(std::move(path)) {}
-  Result<void> add(const std::string& line) {
+  void add(const std::string& line) {
     batch_ += line;
-    return ++n_ < k_batch ? boost::outcome_v2::success() : send();
+    ++n_;
   }
+  bool full() const { return n_ >= k_batch; }
   Result<void> send() {
     if (n_ == 0) return boost::outcome_v2::success();
     BOOST_OUTCOME_TRY(const auto body, client_.post(path_, "application/x-ndjson", batch_));
-    const auto answer = nlohmann::json::parse(body, nullptr, false);
-    if (answer.is_object()) {
-      accepted += answer.value("accepted", std::uint64_t{0});
-      known += answer.value("duplicates", std::uint64_t{0});
-      refused += answer.value("rejected", std::uint64_t{0});
-    }
+    BOOST_OUTCOME_TRY(const auto answer, api::parse_ingest_answer(body));
+    accepted += answer.accepted;
+    known += answer.duplicates;
+    refused += answer.rejected;
+    if (first_error.empty()) first_error = answer.first_error;
     batch_.clear();
     n_ = 0;
     return boost::outcome_v2::success();
   }
   std::uint64_t accepted{}, known{}, refused{};
+  std::string first_error;
 
  private:
   RestClient& client_;
   std::string path_, batch_;
   int n_{0};
+};
+
+/// Missions of the recording on a server: its own where the server has it, else a new one.
+class Missions {
+ public:
+  Missions(RestClient& client, const RecordingTarget& target) : client_(client), target_(target) {}
+
+  Result<MissionId> of(const MissionId& recorded) {
+    if (const auto known = there_.find(recorded); known != there_.end()) return known->second;
+    const auto wanted = target_.mission.empty() ? to_string(recorded) : target_.mission;
+    const auto there = client_.get("/api/v1/missions/" + wanted);
+    if (there) {
+      BOOST_OUTCOME_TRY(const auto uuid, parse_uuid(wanted));
+      return there_[recorded] = MissionId{uuid};
+    }
+    if (there.error().code != Errc::not_found || !target_.mission.empty()) return there.error();
+    Mission mission;
+    mission.name = target_.name;
+    BOOST_OUTCOME_TRY(const auto body, client_.post("/api/v1/missions?devices=false", "application/json",
+                                                    api::mission_request_json(mission),
+                                                    to_string(make_uuid_v7(SystemClock{}.now()))));
+    BOOST_OUTCOME_TRY(const auto id, api::parse_created_id(body));
+    BOOST_OUTCOME_TRY(const auto uuid, parse_uuid(id));
+    std::fprintf(stderr,
+                 "replay: mission %s of the recording is not on this server: its rows go to the new mission "
+                 "%s without tags and lever arms, which no recording knows (--mission: one that has them)\n",
+                 to_string(recorded).c_str(), id.c_str());
+    made_.push_back(id);
+    return there_[recorded] = MissionId{uuid};
+  }
+  Result<void> finish() {
+    for (const auto& id : made_) {
+      BOOST_OUTCOME_TRY(client_.post("/api/v1/missions/" + id + "/actions", "application/json",
+                                     R"({"action":"finish"})", "finish-" + id));
+    }
+    return boost::outcome_v2::success();
+  }
+
+ private:
+  RestClient& client_;
+  RecordingTarget target_;
+  std::map<MissionId, MissionId> there_;
+  std::vector<std::string> made_;
+};
+
+/// Rows at the pace at which they were recorded, times `speed`; fixes before ranges, since a range waits on
+/// the server for the fix after it.
+class Player {
+ public:
+  Player(RestClient& client, const RecordingTarget& target)
+      : fixes_(client, "/api/v1/fixes"),
+        ranges_(client, "/api/v1/ranges"),
+        missions_(client, target),
+        speed_(target.speed) {}
+
+  template <class Row>
+  Result<void> take(Row row) {
+    BOOST_OUTCOME_TRY(wait_for(row.received.value_or(row.time)));
+    BOOST_OUTCOME_TRY(row.mission, missions_.of(row.mission));
+    if constexpr (std::is_same_v<Row, Fix>) {
+      fixes_.add(line_of(row));
+    } else {
+      ranges_.add(line_of(row));
+    }
+    return fixes_.full() || ranges_.full() ? send() : boost::outcome_v2::success();
+  }
+  Result<void> finish() {
+    BOOST_OUTCOME_TRY(send());
+    return missions_.finish();
+  }
+  /// False when the server refused rows.
+  bool report() const {
+    std::fprintf(stderr, "replay: %llu rows accepted, %llu known already, %llu refused\n",
+                 static_cast<unsigned long long>(fixes_.accepted + ranges_.accepted),
+                 static_cast<unsigned long long>(fixes_.known + ranges_.known),
+                 static_cast<unsigned long long>(fixes_.refused + ranges_.refused));
+    for (const auto* upload : {&fixes_, &ranges_}) {
+      if (!upload->first_error.empty())
+        std::fprintf(stderr, "anchord replay: refused first: %s\n", upload->first_error.c_str());
+    }
+    return fixes_.refused + ranges_.refused == 0;
+  }
+
+ private:
+  Result<void> send() {
+    BOOST_OUTCOME_TRY(fixes_.send());
+    BOOST_OUTCOME_TRY(ranges_.send());
+    sent_ = SteadyClock::now();
+    return boost::outcome_v2::success();
+  }
+  /// What is due meanwhile leaves every tick.
+  Result<void> wait_for(UtcTime recorded) {
+    if (interrupted()) return make_error(Errc::canceled, "stopped");
+    if (std::isinf(speed_)) return boost::outcome_v2::success();
+    if (!first_) {
+      first_ = recorded;
+      begun_ = sent_ = SteadyClock::now();
+    }
+    const auto due = begun_ + std::chrono::duration_cast<SteadyClock::duration>(
+                                  std::chrono::duration<double>(seconds_between(*first_, recorded) / speed_));
+    while (SteadyClock::now() < due) {
+      const auto next = sent_ + k_tick;
+      std::this_thread::sleep_until(std::min(next, due));
+      if (SteadyClock::now() >= next) {
+        BOOST_OUTCOME_TRYV(send());
+      }
+      if (interrupted()) return make_error(Errc::canceled, "stopped");
+    }
+    return boost::outcome_v2::success();
+  }
+
+  Upload fixes_, ranges_;
+  Missions missions_;
+  double speed_;
+  std::optional<UtcTime> first_{};
+  SteadyClock::time_point begun_{}, sent_{};
 };
 
 void report(const device::ReplaySummary& s) {
@@ -64,53 +194,43 @@ void report(const device::ReplaySummary& s) {
 /// Rows that no mission recorded were not stored when they came, and are not now.
 bool kept(const MissionId& mission) { return mission != MissionId{}; }
 
-std::string line_of(const Fix& fix) { return api::fix_json(fix, std::nullopt).dump() + '\n'; }
-std::string line_of(const Range& range) { return api::range_json(range, std::nullopt).dump() + '\n'; }
-
 template <class Take>
-int run(const std::string& file, Take fix, Take range) {
+Result<void> run(const std::string& file, Take take) {
   const device::ReplayRows rows{
-      [&](const Fix& row) { return kept(row.mission) ? fix(line_of(row)) : boost::outcome_v2::success(); },
-      [&](const Range& row) {
-        return kept(row.mission) ? range(line_of(row)) : boost::outcome_v2::success();
-      }};
-  const auto done = device::replay(file, rows);
-  if (!done) return fail(done.error(), done.error().code == Errc::bad_frame ? 2 : 1);
-  report(done.value());
-  return 0;
+      [&](const Fix& row) { return kept(row.mission) ? take(row) : boost::outcome_v2::success(); },
+      [&](const Range& row) { return kept(row.mission) ? take(row) : boost::outcome_v2::success(); }};
+  BOOST_OUTCOME_TRY(const auto done, device::replay(file, rows));
+  report(done);
+  return boost::outcome_v2::success();
 }
 
-using Line = std::function<Result<void>(const std::string&)>;
+int code_of(const Error& error) {
+  return error.code == Errc::canceled ? 0 : error.code == Errc::bad_frame ? 2 : 1;
+}
 
 int to_streams(const std::string& file, std::ostream& fixes, std::ostream& ranges) {
-  const auto into = [](std::ostream& out) -> Line {
-    return [&out](const std::string& line) -> Result<void> {
-      if (!(out << line)) return make_error(Errc::storage_full, "cannot write rows");
-      return boost::outcome_v2::success();
-    };
-  };
-  return run<Line>(file, into(fixes), into(ranges));
-}
-
-int to_server(const std::string& file, RestClient& client) {
-  Upload fixes(client, "/api/v1/fixes"), ranges(client, "/api/v1/ranges");
-  int code = run<Line>(
-      file, [&](const std::string& line) { return fixes.add(line); },
-      [&](const std::string& line) { return ranges.add(line); });
-  for (Upload* upload : {&fixes, &ranges}) {
-    if (const auto sent = upload->send(); code == 0 && !sent) code = fail(sent.error(), 1);
-  }
-  std::fprintf(stderr, "replay: %llu rows accepted, %llu known already, %llu refused\n",
-               static_cast<unsigned long long>(fixes.accepted + ranges.accepted),
-               static_cast<unsigned long long>(fixes.known + ranges.known),
-               static_cast<unsigned long long>(fixes.refused + ranges.refused));
-  return code == 0 && fixes.refused + ranges.refused > 0 ? 1 : code;
+  const auto done = run(file, [&](const auto& row) -> Result<void> {
+    constexpr bool fix = std::is_same_v<std::decay_t<decltype(row)>, Fix>;
+    if (!((fix ? fixes : ranges) << line_of(row))) return make_error(Errc::storage_full, "cannot write rows");
+    return boost::outcome_v2::success();
+  });
+  return done ? 0 : fail(done.error(), code_of(done.error()));
 }
 
 }  // namespace
 
-int replay_recording(const std::string& file, const std::string& folder, RestClient* client) {
-  if (client != nullptr) return to_server(file, *client);
+int play_recording(const std::string& file, const RecordingTarget& target, RestClient& client) {
+  auto named = target;
+  if (named.name.empty()) named.name = "recording " + std::filesystem::path(file).stem().string();
+  Player player(client, named);
+  auto done = run(file, [&](const auto& row) { return player.take(row); });
+  if (done) done = player.finish();
+  const bool all = player.report();
+  if (!done) return fail(done.error(), code_of(done.error()));
+  return all ? 0 : 1;
+}
+
+int derive_recording(const std::string& file, const std::string& folder) {
   if (folder == "-") return to_streams(file, std::cout, std::cout);
   std::error_code error;
   std::filesystem::create_directories(folder, error);

@@ -54,6 +54,8 @@ DeviceReport report_of(const DeviceConfig& config, const device::DeviceState& s)
     out.rover = DeviceReport::Rover{s.rover->time,  s.rover->fix,       s.rover->satellites,
                                     s.rover->age_s, s.rover->sigma_h_m, s.rover->sigma_v_m};
   }
+  if (s.clock)
+    out.clock = DeviceReport::Clock{s.clock->drift_ppm, s.clock->sigma_s, s.clock->settled, s.clock->skewed};
   return out;
 }
 
@@ -201,9 +203,14 @@ class DeviceManager::Impl final : public device::DeviceListener {
   void range(const std::string&, const Range& row) override { queue_.push(row); }
   void changed(const std::string& id) override {
     const auto state = loop_ ? loop_->device(id) : std::nullopt;
-    if (!state) return;
-    note("device \"" + state->settings.name + "\" is " + std::string(to_string(state->phase)) +
-         (state->reason.empty() ? "" : ": " + state->reason));
+    if (!state) {
+      told_.erase(id);
+      return;
+    }
+    const auto text = "device \"" + state->settings.name + "\" is " + std::string(to_string(state->phase)) +
+                      (state->reason.empty() ? "" : ": " + state->reason);
+    // It also comes when the device says who it is: the same news twice is none.
+    if (auto& told = told_[id]; std::exchange(told, text) != text) note(text);
   }
   void answer(const std::string&, std::uint64_t command, const Result<std::string>& json) override {
     const std::scoped_lock lock(answers_mutex_);
@@ -262,6 +269,7 @@ class DeviceManager::Impl final : public device::DeviceListener {
   boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work_;
   std::unique_ptr<record::Recorder> recorder_;
   std::unique_ptr<device::DeviceLoop> loop_;
+  std::map<std::string, std::string> told_;  ///< newest line of the log, by device
   std::thread io_thread_, writer_;
   RowQueue queue_;
   DeviceRows* rows_{nullptr};

@@ -3,6 +3,12 @@
 #include "api/services/event_log.hpp"
 #include "api/services/flight_watch.hpp"
 #include "app_fixture.hpp"
+#include "core/ports/devices.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <mutex>
+#include <thread>
 
 namespace anchord::test {
 namespace {
@@ -191,6 +197,63 @@ TEST_F(Alarms, AreQuietOnceAcknowledgedUntilTheyGetWorse) {
   board_.update({low}, at(3));
   EXPECT_FALSE(board_.standing()[0].acknowledged);
   EXPECT_EQ(codes(), "alarm.raised alarm.acknowledged");
+}
+
+/// Devices of which only the clock matters here.
+class ClockOnly final : public DeviceControl {
+ public:
+  void set(const std::string& skew) {
+    const std::scoped_lock lock(mutex_);
+    skew_ = skew;
+  }
+  DeviceClock clock() override {
+    const std::scoped_lock lock(mutex_);
+    return {true, 0.0, 0.02, skew_};
+  }
+  std::vector<DeviceReport> devices() override { return {}; }
+  Result<DeviceReport> device(const Uuid&) override { return none(); }
+  Result<DeviceReport> add(DeviceConfig) override { return none(); }
+  Result<DeviceReport> change(DeviceConfig, std::uint64_t) override { return none(); }
+  Result<void> remove(const Uuid&) override { return none(); }
+  Result<std::string> act(const Uuid&, std::string_view, std::string_view) override { return none(); }
+  std::vector<DiscoveredDevice> discover() override { return {}; }
+  std::vector<DiscoveredDevice> discovered() override { return {}; }
+  void record_into(const std::optional<MissionId>&) override {}
+  std::optional<MissionId> recording_into() override { return {}; }
+  std::string recorder_failure() override { return {}; }
+
+ private:
+  static Error none() { return make_error(Errc::not_found, "no device"); }
+  std::mutex mutex_;
+  std::string skew_;
+};
+
+class ClockAlarm : public AppFixture {
+ protected:
+  void configure(api::Application::Deps& deps) override { deps.devices = &devices_; }
+  /// The list of alarms once it holds what is asked for; the last one when 20 s pass first.
+  Json alarms_when(bool skewed) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    for (;;) {
+      Json items = json(get("/api/v1/alarms"))["items"];
+      const bool there = std::any_of(items.begin(), items.end(),
+                                     [](const Json& alarm) { return alarm.value("id", "") == "clock.skew"; });
+      if (there == skewed || std::chrono::steady_clock::now() > end) return items;
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+  }
+  ClockOnly devices_;
+};
+
+TEST_F(ClockAlarm, StandsFromTheDriftOfADeviceUntilItIsGood) {
+  EXPECT_TRUE(json(get("/api/v1/alarms"))["items"].empty());
+  devices_.set("the clock of device \"tag\" drifts by more than 200 ppm");
+  const auto raised = alarms_when(true);
+  ASSERT_EQ(raised.size(), 1u);
+  EXPECT_EQ(raised[0].value("id", ""), "clock.skew");
+  EXPECT_NE(raised[0].dump().find("drifts by more than 200 ppm"), std::string::npos) << raised[0];
+  devices_.set("");
+  EXPECT_TRUE(alarms_when(false).empty());
 }
 
 TEST_F(Alarms, AreServedAndAcknowledgedByOperatorsOnly) {

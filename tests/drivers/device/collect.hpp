@@ -32,6 +32,7 @@ struct Collect final : PipelineSink {
   }
   void rover(std::uint16_t, const RoverStatus& status) override { rovers.push_back(status); }
   void identified(std::uint16_t slot, const Identity& who) override { identities[slot] = who; }
+  void clock(std::uint16_t slot, const ClockReading& reading) override { clocks[slot] = reading; }
   void heard(std::uint16_t) override { ++heard_count; }
   void dropped(std::uint16_t, std::string_view reason, std::uint64_t n) override {
     drops[std::string(reason)] += n;
@@ -51,6 +52,7 @@ struct Collect final : PipelineSink {
   std::vector<Range> ranges;
   std::vector<RoverStatus> rovers;
   std::map<std::uint16_t, Identity> identities;
+  std::map<std::uint16_t, ClockReading> clocks;
   std::map<std::string, std::uint64_t> drops;
   std::map<std::uint64_t, std::string> answers;
   std::string rows;

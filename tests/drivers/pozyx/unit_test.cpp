@@ -155,7 +155,8 @@ TEST(PozyxUnit, HangsUpOnWhatIsNoPozyx) {
 TEST(PozyxUnit, DoesWhatTheOperatorAsks) {
   Flight flight;
   flight.run(3);
-  EXPECT_NE(flight.ask("identify").find("\"firmware\":\"1.3\""), std::string::npos);
+  EXPECT_NE(flight.ask("get_uwb").find("\"channel\":5"), std::string::npos);
+  EXPECT_EQ(flight.ask("reboot"), "{}");
   EXPECT_NE(flight.ask("discover").find("0x6001"), std::string::npos);
   EXPECT_NE(flight.ask("get_uwb").find("\"preamble_symbols\":1024"), std::string::npos);
   const std::string set = flight.ask(
@@ -165,13 +166,56 @@ TEST(PozyxUnit, DoesWhatTheOperatorAsks) {
   const std::string pushed = flight.ask(
       "push_positions", R"({"positions":[{"network_id":"0x6001","x_m":1.5,"y_m":-2,"z_m":2.25}]})");
   EXPECT_NE(pushed.find("\"all\":true"), std::string::npos) << pushed;
-  EXPECT_EQ(flight.ask("blink"), "{}");
   EXPECT_NE(flight.ask("fly").find("error: a pozyx device knows"), std::string::npos);
   EXPECT_NE(flight.ask("set_uwb", R"({"channel":6})").find("error: channel 6"), std::string::npos);
   EXPECT_NE(flight.ask("push_positions", "{}").find("error: positions"), std::string::npos);
   const std::size_t before = flight.sink.ranges.size();
   flight.run(3);
   EXPECT_GT(flight.sink.ranges.size(), before + 30) << "ranging goes on with the new settings";
+}
+
+TEST(PozyxUnit, IdentifiesATagOrAnAnchorByItsLights) {
+  Flight flight;
+  flight.run(3);
+  const std::string tag = flight.ask("identify");
+  EXPECT_NE(tag.find("\"firmware\":\"1.3\""), std::string::npos) << tag;
+  EXPECT_EQ(flight.wire.tag.flashes({0x6000}), 3);
+  EXPECT_EQ(flight.wire.tag.flashes({0x6002}), 0);
+  const std::string anchor = flight.ask("identify", R"({"network_id":"0x6002"})");
+  EXPECT_NE(anchor.find("\"lights\":\"blinked\""), std::string::npos) << anchor;
+  EXPECT_EQ(flight.wire.tag.flashes({0x6000}), 3);
+  EXPECT_EQ(flight.wire.tag.flashes({0x6002}), 3);
+  EXPECT_NE(flight.ask("identify", R"({"network_id":"0x6666"})").find("does not answer"), std::string::npos);
+  const std::size_t before = flight.sink.ranges.size();
+  flight.run(3);
+  EXPECT_GT(flight.sink.ranges.size(), before + 30) << "ranging goes on";
+}
+
+TEST(PozyxUnit, ARebootWhoseUsbPortVanishesIsDone) {
+  Flight flight(R"({"anchors":["0x6001"],"cir":"none"})");
+  flight.run(3);
+  flight.take(EventKind::command, device::to_json(device::Command{9, "reboot", "{}"}));
+  flight.run(0.5);
+  EXPECT_FALSE(flight.sink.answers.contains(9));
+  flight.take(EventKind::closed);
+  EXPECT_EQ(flight.sink.answers[9], "{}");
+}
+
+TEST(PozyxUnit, TellsThatTheTagsClockIsNoneAndThatAnotherTagsIsGood) {
+  const auto reading_of = [](double drift_ppm) {
+    sim::Scenario scenario = open_field();
+    scenario.tags[0].clock_drift_ppm = drift_ppm;
+    Flight flight(R"({"anchors":["0x6001"],"cir":"none"})", scenario);
+    flight.run(60);
+    return flight.sink.clocks[1];
+  };
+  const auto good = reading_of(60), bad = reading_of(600), awful = reading_of(-4000);
+  EXPECT_FALSE(good.skewed);
+  EXPECT_TRUE(good.settled);
+  EXPECT_NEAR(good.drift_ppm, 60, 20);  // stamps of a millisecond over a minute
+  EXPECT_TRUE(bad.skewed);
+  EXPECT_NEAR(bad.drift_ppm, 600, 20);
+  EXPECT_TRUE(awful.skewed);
 }
 
 TEST(PozyxUnit, RefusesSettingsItDoesNotKnow) {

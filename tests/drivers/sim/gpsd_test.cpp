@@ -1,10 +1,6 @@
 // A real gpsd between the simulated rover and our driver: what it makes of a Reach's NMEA, and what we make
 // of that.
-#include <arpa/inet.h>
 #include <gtest/gtest.h>
-#include <signal.h>
-#include <sys/socket.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <boost/asio/io_context.hpp>
@@ -12,40 +8,12 @@
 
 #include "drivers/device/device_loop.hpp"
 #include "drivers/sim/rig.hpp"
+#include "tests/drivers/sim/program.hpp"
 
 namespace anchord::sim {
 namespace {
 
 constexpr const char* k_gpsd = "/usr/sbin/gpsd";
-
-/// A port that was free a moment ago: gpsd takes a number, not a socket.
-int free_port() {
-  const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in at{};
-  at.sin_family = AF_INET;
-  at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof at;
-  ::bind(fd, reinterpret_cast<sockaddr*>(&at), size);
-  ::getsockname(fd, reinterpret_cast<sockaddr*>(&at), &size);
-  ::close(fd);
-  return ntohs(at.sin_port);
-}
-
-/// Read-only (-b), without waiting for a client (-n), in the foreground (-N), on loopback.
-struct Gpsd {
-  Gpsd(const std::string& source, int port) : pid(::fork()) {
-    if (pid != 0) return;
-    if (::freopen("/dev/null", "w", stderr) == nullptr) ::_exit(126);
-    const std::string number = std::to_string(port);
-    ::execl(k_gpsd, "gpsd", "-N", "-n", "-b", "-S", number.c_str(), source.c_str(), nullptr);
-    ::_exit(127);
-  }
-  ~Gpsd() {
-    ::kill(pid, SIGTERM);
-    ::waitpid(pid, nullptr, 0);
-  }
-  pid_t pid;
-};
 
 struct Rows final : device::DeviceListener {
   void fix(const std::string&, const Fix& row) override { fixes.push_back(row); }
@@ -63,8 +31,10 @@ TEST(RealGpsd, BetweenTheSimulatedRoverAndOurDriverKeepsPositionFixClassAndHeigh
   scenario.rovers[0].rate_hz = 5;
   auto rig = Rig::open(std::make_shared<const Scenario>(scenario), {});
   ASSERT_TRUE(rig) << rig.error().message;
-  const int port = free_port();
-  Gpsd gpsd("tcp://127.0.0.1:" + std::to_string(rig.value()->devices().at(0).tcp_port), port);
+  const int port = test::free_port();
+  // Read-only (-b), without waiting for a client (-n), in the foreground (-N), on loopback.
+  test::Program gpsd({k_gpsd, "-N", "-n", "-b", "-S", std::to_string(port),
+                      "tcp://127.0.0.1:" + std::to_string(rig.value()->devices().at(0).tcp_port)});
   boost::asio::io_context io{1};
   Rows rows;
   device::DeviceLoop loop(io, nullptr, rows, {});

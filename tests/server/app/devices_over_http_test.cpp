@@ -8,6 +8,7 @@
 #include <atomic>
 #include <chrono>
 #include <functional>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -15,6 +16,7 @@
 #include "core/base/time.hpp"
 #include "drivers/device/replay.hpp"
 #include "drivers/sim/rig.hpp"
+#include "server/runtime/device_manager.hpp"
 #include "tests/server/app/app_fixture.hpp"
 
 namespace anchord::test {
@@ -158,6 +160,49 @@ TEST(DevicesOverHttp, RefusesWhatNoDriverTakesAndTheSameAddressTwice) {
   EXPECT_EQ(server.last.status, 409) << server.last.body;
   server.ask("POST", "/api/v1/devices/" + made.value("id", "") + "/actions", {{"action", "identify"}});
   EXPECT_EQ(server.last.status, 422) << "it is not connected";
+}
+
+TEST(DeviceManager, SaysOnceThatADeviceTalksAndOnceThatItIsGone) {
+  struct Nowhere final : DeviceRows {
+    Result<void> take(std::vector<Fix>, std::vector<Range>) override { return boost::outcome_v2::success(); }
+  } nowhere;
+  std::mutex mutex;
+  std::vector<std::string> lines;
+  const auto count = [&](const std::string& part) {
+    const std::scoped_lock lock(mutex);
+    return std::count_if(lines.begin(), lines.end(),
+                         [&](const auto& line) { return line.find(part) != std::string::npos; });
+  };
+  std::string pattern = (std::filesystem::temp_directory_path() / "anchord_manager_XXXXXX").string();
+  const std::filesystem::path folder = mkdtemp(pattern.data());
+  {
+    auto receiver = std::make_unique<Receiver>();
+    server::DeviceManagerOptions options;
+    options.data_dir = folder;
+    options.log = [&](const std::string& text) {
+      const std::scoped_lock lock(mutex);
+      lines.push_back(text);
+    };
+    auto manager = std::move(server::DeviceManager::open(std::move(options))).value();
+    manager->start(nowhere);
+    DeviceConfig config;
+    config.kind = "gnss";
+    config.name = "rover";
+    config.address = receiver->address();
+    const auto id = manager->add(config).value().config.id;
+    const auto until = [&](const std::string& part, const auto& so) {
+      const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+      while ((count(part) == 0 || !so(manager->device(id).value())) && std::chrono::steady_clock::now() < end)
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    };
+    until("is talking", [](const DeviceReport& d) { return !d.model.empty() && d.frames > 10; });
+    EXPECT_EQ(count("device \"rover\" is talking"), 1);
+    receiver.reset();
+    until("is lost", [](const DeviceReport& d) { return d.state == "lost"; });
+    manager->stop();
+  }
+  EXPECT_EQ(count("device \"rover\" is talking"), 1);
+  std::filesystem::remove_all(folder);
 }
 
 TEST(DevicesOverHttp, AServerStartedAgainKnowsItsDevices) {
