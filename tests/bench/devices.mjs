@@ -133,6 +133,8 @@ async function play(recorded, tags, rate) {
     if (code !== 0) throw new Error(`replay ended with ${code}: ${said}`);
     const ranges = Number(/events, \d+ fixes, (\d+) ranges/.exec(said)?.[1]);
     const [accepted, known, refused] = /(\d+) rows accepted, (\d+) known already, (\d+) refused/.exec(said).slice(1).map(Number);
+    // The last ranges wait for the fix after them, and for nothing once the flight is over.
+    await server.fetch(`/api/v1/missions/${target.id}/actions`, { json: { action: 'finish' } });
     const [mission] = (await (await server.fetch('/api/v1/missions')).json()).items;
     for (const end = performance.now() + 10_000; heard.streamed < mission.n_ranges && performance.now() < end;) await wait(50);
     heard.client.terminate();
@@ -148,7 +150,7 @@ async function recorded_bytes(row, name, tags, options, seconds) {
   try {
     const megabytes = readdirSync(join(recorded.server.dataDir, 'recordings')).reduce((sum, part) => sum + statSync(join(recorded.server.dataDir, 'recordings', part)).size, 0) / 1e6;
     await recorded.server.stop();
-    const r = await play(recorded, tags, 1100);
+    const r = await play(recorded, tags, 1500);
     const whole = r.refused + r.known === 0 && r.streamed === r.stored && r.gaps === 0 && r.left === 0;
     row(name, `${r.perSecond.toFixed(0)} ranges/s, server ${percent(r.server)}, decoder ${percent(r.decoder)}; ${r.stored} stored, ${r.streamed} streamed, ${r.refused} refused, ${r.gaps} gaps, ${r.left} left the live path`,
       `aim 1 000 ranges/s on 2 cores without a drop${whole ? '' : ': MISSED'}; ${megabytes.toFixed(0)} MB recorded at ${recorded.perSecond.toFixed(0)} ranges/s`);

@@ -164,6 +164,7 @@ test('a flight by hand: control, checklist, start, hold, abort', async () => {
   await call('POST', `${path}/control`, { expect: 409, json: { action: 'take' } });
   await call('POST', `${path}/control`, { expect: 200, json: { action: 'renew', lease } });
   await call('GET', `${path}/control`, { expect: 200 });
+  await call('POST', `${path}/uploads`, { json: { what: 'fence', plan: ids.plan, lease } });  // there is no aircraft
   await call('GET', `${path}/checklist?plan=${ids.plan}`, { expect: 200 });
   for (const item of ['rtk', 'corrections', 'tag', 'disk', 'props', 'airspace', 'people', 'pilot']) {
     await call('POST', `${path}/checklist/${item}`, { expect: 200, json: { reason: 'contract test' } });
