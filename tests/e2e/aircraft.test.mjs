@@ -1,8 +1,8 @@
-// A flight through the real server and the simulated aircraft, MAVLink over UDP between them, measurements over REST: start, the
+// A flight through the real server and the simulated aircraft, MAVLink over TCP between them (ArduPilot's own simulator serves TCP too), measurements over REST: start, the
 // server killed in the air and started again (hold first), resume, land.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
-import { createSocket } from 'node:dgram';
+import { createServer } from 'node:net';
 import { after, before, test } from 'node:test';
 import { binary, eventually, startServer } from './server.mjs';
 
@@ -24,13 +24,13 @@ const accepted = async (answer) => {
 };
 
 before(async () => {
-  const socket = createSocket('udp4');
-  await new Promise((done) => socket.bind(0, '127.0.0.1', done));
+  const socket = createServer();
+  await new Promise((done) => socket.listen(0, '127.0.0.1', done));
   const { port } = socket.address();
   await new Promise((done) => socket.close(done));
-  server = await startServer({ auth: 'off', args: ['--drone-address', `udp://:${port}`] });
+  server = await startServer({ auth: 'off', args: ['--drone-address', `tcp://localhost:${port}`] });
   let said = '';
-  aircraft = spawn(binary, ['simulate', 'drone', '--mavlink', `udp://127.0.0.1:${port}`, '--url', server.url, '--ready', '2'], { stdio: ['ignore', 'ignore', 'pipe'] });
+  aircraft = spawn(binary, ['simulate', 'drone', '--mavlink', `tcp-listen://127.0.0.1:${port}`, '--url', server.url, '--ready', '2'], { stdio: ['ignore', 'ignore', 'pipe'] });
   aircraft.stderr.setEncoding('utf8').on('data', (text) => (said += text));
   mission = await eventually('the aircraft makes its mission', () => /mission ([0-9a-f-]{36})/.exec(said)?.[1]);
 });

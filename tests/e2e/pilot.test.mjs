@@ -39,15 +39,39 @@ async function hold(page, button) {
   await page.mouse.up();
 }
 
-test('a plan is imported as an outline, generated and saved', async () => {
-  const { page, id } = await openPage(browser, server, { hash: '#/plan' });
-  const outline = { type: 'Feature', properties: { kind: 'outline' }, geometry: { type: 'Polygon', coordinates: [[[3.7131, 51.0231], [3.7135275, 51.0231], [3.7135275, 51.0232799], [3.7131, 51.0232799], [3.7131, 51.0231]]] } };
-  await page.getByLabel('Plan file').setInputFiles({ name: 'hall.geojson', mimeType: 'application/geo+json', buffer: Buffer.from(JSON.stringify({ type: 'FeatureCollection', features: [outline] })) });
-  await eventually('the outline is there', async () => id('generate').isEnabled());
+/** Corner by corner with the mouse, as a person draws: metres east and north of the map's middle. */
+async function draw(id, shape, corners) {
+  await id(`draw-${shape}`).click();
+  const { width, height } = await id('plan-map').boundingBox();
+  for (const [e, n] of corners) await id('plan-map').click({ position: { x: width / 2 + e * PX_PER_M, y: height / 2 - n * PX_PER_M } });
+}
+const PX_PER_M = 8;  // of an empty map
+
+test('a person draws outline and fence on the map, presses generate, saves', async () => {
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/plan' });
+  // Either nobody flies yet and the page asks where the building is, or the map lies where the aircraft stands, 9 m outside the corner.
+  await id('where').or(id('plan-map')).first().waitFor();
+  const asked = await id('where').isVisible(), [e0, n0] = asked ? [-15, -10] : [9, 9];
+  if (asked) {
+    await id('where').fill('51.02319, 3.713314');
+    await page.getByRole('button', { name: 'Draw here' }).click();
+    await id('plan-map').waitFor();
+  }
+  await id('plan-name').fill('Hall, drawn');
+  await draw(id, 'outline', [[e0, n0], [e0 + 30, n0], [e0 + 30, n0 + 20], [e0, n0 + 20]]);
+  await draw(id, 'fence', [[e0 - 14, n0 - 14], [e0 + 41, n0 - 14], [e0 + 41, n0 + 31], [e0 - 14, n0 + 31]]);
   await id('generate').click();
   await id('waypoints').locator('tbody tr').nth(3).waitFor({ timeout: 30_000 });
+  await picture(page, 'plan-drawn-light');
   await id('save').click();
   await id('plan').getByText('revision 1').waitFor();
+  const plan = (await get('/api/v1/plans')).items[0];
+  assert.equal(plan.name, 'Hall, drawn');
+  const { outline, fence } = await get(`/api/v1/plans/${plan.id}`), west = Math.min(...outline.coordinates[0].map(([lon]) => lon)), east = Math.max(...outline.coordinates[0].map(([lon]) => lon));
+  // 30 m at 51 degrees north, 70.1 km a degree.
+  assert.ok(Math.abs((east - west) * 70_100 - 30) < 0.5, `${(east - west) * 70_100} m wide`);
+  assert.equal(fence.coordinates[0].length, 5);
+  assert.deepEqual(seen.errors, []);
   await page.close();
 });
 
@@ -70,9 +94,16 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
   await hold(page, id('cmd-start'));
   await id('procedure').getByText('RUNNING', { exact: true }).waitFor({ timeout: 20_000 });
   await eventually('anchors are heard', async () => (await procedure()).anchors.length > 3, 60_000, 250);
+  // The anchor that the page shows, as the person reads it: its region of 95 % shrinks while it is flown round.
+  const seen_m = async () => {
+    const found = /95 % horizontal\s*±\s*([\d.]+)\s*(mm|cm|m)\b/.exec(await id('anchor-card').first().innerText({ timeout: 5000 }).catch(() => ''));
+    return found && Number(found[1]) * { mm: 0.001, cm: 0.01, m: 1 }[found[2]];
+  };
+  const first_m = await eventually('the page tells how well an anchor is known', seen_m, 60_000, 100);
   await eventually('it is at work at a point', async () => (await procedure()).iteration > 0, 60_000, 250);
   await picture(page, 'flight-light');
   assert.deepEqual(await violations(page), []);
+  await eventually('the anchor converges: half as wide as at first', async () => { const now_m = await seen_m(); return now_m !== null && now_m < first_m / 2; }, 120_000, 250);
   await page.keyboard.press('h');
   await id('procedure').getByText('HOLD', { exact: true }).waitFor({ timeout: 10_000 });
   await eventually('the autopilot holds', async () => (await procedure()).drone.mode === 'BRAKE', 10_000);
@@ -83,6 +114,17 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
   await id('cmd-land').getByText('tap again').waitFor();
   await id('cmd-land').click();
   await id('procedure').getByText('DONE', { exact: true }).waitFor({ timeout: 60_000 });
+  // The report is two presses away: a calibration of the whole flight, then the page to print.
+  await page.getByRole('link', { name: /^Anchors/ }).click();
+  await id('review').click();
+  await id('draft').locator('tbody tr').nth(3).waitFor({ timeout: 60_000 });
+  await picture(page, 'landed-light');
+  const [report] = await Promise.all([browser.context.waitForEvent('page'), id('report').click()]);
+  await report.waitForLoadState();
+  assert.match(await report.locator('h1').first().textContent(), /alibration/);
+  for (const { network_id } of (await get('/api/v1/calibrations')).items[0].anchors ?? []) assert.ok(await report.getByText(network_id).count(), network_id);
+  await picture(report, 'report-light');
+  await report.close();
   assert.deepEqual(seen.errors, []);
   await page.close();
 });
