@@ -74,7 +74,7 @@ Response checklist(Services& s, const Request& request) {
     if (!id) throw_problem(422, "validation", "plan is no id", {{"/plan", "bad_id", id.error().message}});
     plan = PlanId{id.value()};
   }
-  return json_response(200, checklist_json(s.flights->checklist(mission, plan)));
+  return json_response(200, checklist_json(s.flights->checklist(mission, plan, request.principal)));
 }
 
 Response override_item(Services& s, const Request& request) {
@@ -89,7 +89,7 @@ Response override_item(Services& s, const Request& request) {
   refuse_if_any(errors);
   value_or_problem(s.flights->override_item(mission, item, *reason, request.principal));
   s.audit(request, "checklist." + item + ' ' + to_string(mission) + ": " + *reason);
-  return json_response(200, checklist_json(s.flights->checklist(mission, std::nullopt)));
+  return json_response(200, checklist_json(s.flights->checklist(mission, std::nullopt, request.principal)));
 }
 
 Response shown(Services& s, const Request& request, std::string (FlightService::*text)(const MissionId&)) {

@@ -93,7 +93,9 @@ class FlightService final : public MissionObserver {
   /// Newest of each kind.
   std::vector<FlightUpload> uploads(const MissionId& mission);
 
-  std::vector<ChecklistItem> checklist(const MissionId& mission, const std::optional<PlanId>& plan);
+  /// An operator who looks while nobody else has control means to fly: the aircraft gets the plan's fence.
+  std::vector<ChecklistItem> checklist(const MissionId& mission, const std::optional<PlanId>& plan,
+                                       const Principal& who);
   /// A manual item is confirmed, an automatic one overridden; the reason is kept with the name.
   Result<void> override_item(const MissionId& mission, const std::string& item, const std::string& reason,
                              const Principal& who);

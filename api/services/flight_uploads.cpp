@@ -66,12 +66,12 @@ const FlightUpload* FlightService::State::uploaded(const Plan& plan, const std::
   return nullptr;
 }
 
-/// Whoever has control and looks at the checklist means to fly: the fence goes up by itself, and again ten
-/// seconds after it was not confirmed.
+/// An operator who looks at the checklist, and lets nobody else's flight be disturbed, means to fly: the
+/// fence goes up by itself, and again ten seconds after it was not confirmed.
 void FlightService::State::give_fence() {
   if (!preparing || deps.drone == nullptr || (flight && flight->flying())) return;
   const auto holder = lease.holder(deps.clock.now());
-  if (!holder || holder->mission != preparing->first) return preparing.reset();
+  if (holder && holder->mission != preparing->first) return preparing.reset();
   const Plan& plan = preparing->second;
   if (!has_fence(plan)) return;
   if (const auto* up = uploaded(plan, "fence")) {
@@ -88,7 +88,7 @@ std::optional<ChecklistItem> FlightService::State::fence_item(const Plan& plan) 
   ChecklistItem item{"fence", "The aircraft keeps the fence itself", "", false, true, {}, {}};
   const auto* up = uploaded(plan, "fence");
   if (up == nullptr) {
-    item.detail = "not given to it yet: whoever has control and opens this list gives it";
+    item.detail = "not given to it yet";
   } else {
     item.ok = up->command.state == "accepted";
     item.detail = up->command.state == "sent" ? "being given to it"

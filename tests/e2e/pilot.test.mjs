@@ -81,6 +81,7 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
   await id('check-props').waitFor();
   assert.equal(await id('cmd-start').isEnabled(), false);
   await eventually('RTK is fixed for 10 s', async () => /ok|green/.test(await text(id('check-rtk').locator('.sr'))), 60_000, 500);
+  await eventually('the aircraft keeps the fence that was drawn', async () => /green/.test(await text(id('check-fence').locator('.sr'))), 20_000, 250);
   const { items } = await get(`/api/v1/missions/${mission}/checklist?plan=${(await get('/api/v1/plans')).items[0].id}`);
   for (const item of items.filter((i) => i.manual)) await id(`check-${item.id}`).getByRole('button', { name: 'Confirm' }).click();
   for (const item of items.filter((i) => i.state === 'failed')) {
