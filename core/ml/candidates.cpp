@@ -56,7 +56,6 @@ Recipe boosted(const LearnOptions& options, std::size_t rows) {
   r.boosted.depth = rows > 5000 ? 6 : 3;
   r.boosted.learning_rate = 0.05;
   r.boosted.column_share = 0.4;
-  r.boosted.min_child_weight = rows > 5000 ? 1 : 2;
   r.boosted.seed = options.seed;
   return r;
 }

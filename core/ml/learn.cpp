@@ -24,9 +24,30 @@ std::string fixed(double value, int digits) {
   return text.data();
 }
 
-// Settings of an SVM are compared on fewer rows where there are many of them; the pick is then validated and
-// fitted on all it may have.
-constexpr std::size_t k_few_svms = 8, k_search_rows = 2000;
+// Settings of an SVM are compared on fewer rows where there are many of them, drawn evenly: fitting grows
+// with the square of the rows, and scoring with the support vectors. The pick is validated and fitted on all
+// it may have.
+constexpr std::size_t k_few_svms = 8, k_search_rows = 2000, k_compared_rows = 4000;
+
+struct Compared {
+  Dataset data;
+  std::vector<std::size_t> fold;
+};
+
+// Nothing where the rows are few enough as they are, or a fold would be left with hardly any.
+std::optional<Compared> compared_rows(const Dataset& data, const std::vector<std::size_t>& fold) {
+  if (data.rows() <= k_compared_rows) return std::nullopt;
+  std::vector<std::size_t> rows, of_fold(*std::max_element(fold.begin(), fold.end()) + 1, 0);
+  Compared out;
+  for (std::size_t i = 0; i < k_compared_rows; ++i) {
+    rows.push_back((2 * i + 1) * data.rows() / (2 * k_compared_rows));
+    out.fold.push_back(fold[rows.back()]);
+    ++of_fold[out.fold.back()];
+  }
+  if (*std::min_element(of_fold.begin(), of_fold.end()) < 20) return std::nullopt;
+  out.data = data.subset(rows);
+  return out;
+}
 
 std::vector<Recipe> for_search(std::vector<Recipe> candidates) {
   const auto svms = std::count_if(candidates.begin(), candidates.end(),
@@ -84,15 +105,19 @@ Result<Picked> pick_classifier(const Dataset& data, const LearnOptions& options,
   const auto candidates = classifier_candidates(data, options);
   if (candidates.empty()) return make_error(Errc::not_found, "no candidate's features are in the data");
   const auto searched = for_search(candidates);
+  const auto few = compared_rows(data, fold);
   std::vector<OutOfFold> results;
   std::size_t best = 0;
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     tell(options, candidates[c].describe(), c, candidates.size());
-    BOOST_OUTCOME_TRY(auto result, cross_validate(data, searched[c], fold, true, options.run));
+    const bool light = few && searched[c].svm.max_rows != candidates[c].svm.max_rows;
+    const auto& on = light ? few->data : data;
+    const auto& on_fold = light ? few->fold : fold;
+    BOOST_OUTCOME_TRY(auto result, cross_validate(on, searched[c], on_fold, true, options.run));
     table.push_back(row_of(candidates[c], result));
-    table.back().confusion = confusion_at(result.p_los, data.los, 0.5);
-    table.back().brier = brier(result.p_los, data.los);
-    add_folds(data, fold, c, result, folds);
+    table.back().confusion = confusion_at(result.p_los, on.los, 0.5);
+    table.back().brier = brier(result.p_los, on.los);
+    add_folds(on, on_fold, c, result, folds);
     if (!results.empty() && result.loss < results[best].loss - k_tie_log_loss) best = c;
     results.push_back(std::move(result));
   }
@@ -182,6 +207,7 @@ Result<Learned> learn_regression(const Dataset& data, const LearnOptions& option
   Learned out;
   const auto candidates = regressor_candidates(data, options);
   const auto searched = for_search(candidates);
+  const auto few = compared_rows(data, fold);
   std::vector<OutOfFold> results;
   std::size_t best = !options.methods.empty() && candidates.size() > 1 ? 1 : 0;
   std::size_t constant = 0;
@@ -190,11 +216,14 @@ Result<Learned> learn_regression(const Dataset& data, const LearnOptions& option
   };
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     tell(options, candidates[c].describe(), c, candidates.size());
-    BOOST_OUTCOME_TRY(auto result, cross_validate(data, searched[c], fold, false, options.run));
+    const bool light = few && searched[c].svm.max_rows != candidates[c].svm.max_rows;
+    const auto& on = light ? few->data : data;
+    const auto& on_fold = light ? few->fold : fold;
+    BOOST_OUTCOME_TRY(auto result, cross_validate(on, searched[c], on_fold, false, options.run));
     out.table.push_back(row_of(candidates[c], result));
-    out.table.back().error = error_stats(minus(data.bias_m, result.bias_m, 1));
+    out.table.back().error = error_stats(minus(on.bias_m, result.bias_m, 1));
     out.table.back().worst_harm_m = result.worst_harm_m;
-    add_folds(data, fold, c, result, out.folds);
+    add_folds(on, on_fold, c, result, out.folds);
     results.push_back(std::move(result));
     if (candidates[c].method == Method::constant) constant = c;
     if (c > best && cost(results[c]) < cost(results[best]) * 0.99 - 1e-4) best = c;

@@ -63,10 +63,14 @@ struct BoostOptions {
   int rounds = 400;
   int depth = 6;
   double learning_rate = 0.05;
-  double lambda = 2;            ///< L2 on leaf values
-  double min_child_weight = 1;  ///< sum of second derivatives in a leaf
-  double column_share = 0.5;    ///< of the features, drawn per tree
-  bool classification = true;   ///< log loss; else squared error
+  double lambda = 2;  ///< L2 on leaf values
+  /// Sum of second derivatives in a leaf. Rows of a placement weigh little and certain rows less, so a bound
+  /// that bites here stops learning in small campaigns; `min_rows` keeps the leaves honest instead.
+  double min_child_weight = 0.02;
+  double min_rows = 10;        ///< in a leaf
+  double row_share = 0.7;      ///< of the rows, drawn per tree
+  double column_share = 0.5;   ///< of the features, drawn per tree
+  bool classification = true;  ///< log loss; else squared error
   std::uint64_t seed = 1;
 };
 /// Gradient boosted trees, second order, on the same bins. Classification scores are log odds.

@@ -203,7 +203,7 @@ Trees fit_forest(const TrainingRows& rows, const TreeOptions& options, std::vect
 Trees fit_boosted(const TrainingRows& rows, const BoostOptions& options, const Execution& run) {
   const Binned data{rows};
   const std::size_t n = rows.n();
-  Grower grower{data, {options.depth, options.lambda, options.min_child_weight, 1, 0}};
+  Grower grower{data, {options.depth, options.lambda, options.min_child_weight, options.min_rows, 0}};
   double sum_w = 0, sum_wy = 0;
   for (std::size_t i = 0; i < n; ++i) sum_w += rows.w[i], sum_wy += rows.w[i] * rows.y[i];
   const double mean = sum_wy / sum_w;
@@ -215,14 +215,17 @@ Trees fit_boosted(const TrainingRows& rows, const BoostOptions& options, const E
   Random random{options.seed};
   const auto columns = std::max<std::size_t>(
       1, static_cast<std::size_t>(std::lround(options.column_share * static_cast<double>(rows.d))));
-  std::vector<std::uint32_t> order(n);
+  std::vector<std::uint32_t> order;
   for (int round = 0; round < options.rounds && !run.cancelled(); ++round) {
     for (std::size_t i = 0; i < n; ++i) {
       const double p = options.classification ? 1 / (1 + std::exp(-f[i])) : 0;
       g[i] = rows.w[i] * (options.classification ? rows.y[i] - p : rows.y[i] - f[i]);
       h[i] = rows.w[i] * (options.classification ? std::max(p * (1 - p), 1e-9) : 1.0);
-      order[i] = static_cast<std::uint32_t>(i);
     }
+    order.clear();
+    for (std::size_t i = 0; i < n; ++i)
+      if (random.uniform() < options.row_share) order.push_back(static_cast<std::uint32_t>(i));
+    if (order.empty()) order.push_back(static_cast<std::uint32_t>(random.below(n)));
     auto allowed = first_n(rows.d);
     random.shuffle(allowed);
     allowed.resize(columns);
