@@ -73,14 +73,16 @@ Result<ml::Dataset> dataset_from(const LabelledTable& table, const SetRequest& r
       count(here, "no " + table.truth_column, table.where(i));
       continue;
     }
-    bool whole = true;
+    std::string lacking;
     for (std::size_t f = 0; f < sources.size(); ++f) {
       const auto value = sources[f].of(table, i);
-      if (!value) count(here, "no " + request.features[f], table.where(i));
-      whole = whole && value.has_value();
+      if (!value) lacking += (lacking.empty() ? "" : ", ") + request.features[f];
       values[f] = value.value_or(0);
     }
-    if (!whole) continue;
+    if (!lacking.empty()) {  // a row is counted once, with all that it lacks
+      count(here, "no " + lacking, table.where(i));
+      continue;
+    }
     out.x.insert(out.x.end(), values.begin(), values.end());
     if (table.labelled()) out.los.push_back(table.los[i].value_or(false) ? 1 : 0);
     out.weight.push_back(1);
