@@ -5,6 +5,7 @@
 
 #include "app_fixture.hpp"
 #include "core/ports/drone.hpp"
+#include "core/ports/plan_store.hpp"
 #include "drivers/drone/session.hpp"
 #include "drivers/sim/autopilot.hpp"
 #include "drivers/sim/wgs84.hpp"
@@ -358,6 +359,25 @@ TEST_F(Flights, AKilledServerTellsTheAircraftToHoldBeforeAnythingElse) {
   fly(1);
   EXPECT_FALSE(drone_->targets.empty());
   EXPECT_GT(drone_->now, at);
+}
+
+TEST_F(Flights, WhatATurnToldOutlivesTheFlightAndIsNoFlightToGoOnWith) {
+  mission_ = mission();
+  const MissionId id{parse_uuid(mission_).value()};
+  const std::string kept =
+      R"({"landed":true,"clues":{"0x6a21":{"bearing":{"from":[51.0231,3.7131,60],"rad":1.2,"sigma_rad":0.4}}}})";
+  ASSERT_TRUE(database_->plans().keep_procedure(id, kept, UtcTime{}));
+  app_.reset();
+  database_.reset();
+  const int holds = drone_->holds;
+  open();
+  fly(1);
+  EXPECT_EQ(get(base() + "/procedure").status, 404);
+  EXPECT_EQ(drone_->holds, holds) << "nothing flies, nothing is told to hold";
+  const auto stored = database_->plans().procedures();
+  ASSERT_TRUE(stored);
+  ASSERT_EQ(stored.value().size(), 1u);
+  EXPECT_EQ(stored.value()[0].second, kept);
 }
 
 TEST_F(Flights, WhenThePilotTakesOverNothingIsSentUntilTheOperatorTakesItBack) {

@@ -123,7 +123,9 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
   const [report] = await Promise.all([browser.context.waitForEvent('page'), id('report').click()]);
   await report.waitForLoadState();
   assert.match(await report.locator('h1').first().textContent(), /alibration/);
-  for (const { network_id } of (await get('/api/v1/calibrations')).items[0].anchors ?? []) assert.ok(await report.getByText(network_id).count(), network_id);
+  const [{ id: made }] = (await get('/api/v1/calibrations')).items, { anchors, provenance } = await get(`/api/v1/calibrations/${made}`);
+  for (const { network_id } of anchors) assert.ok(await report.getByText(network_id).count(), network_id);
+  assert.ok(provenance.n_clues > 0, 'what the turn and the height search told went into it');
   await picture(report, 'report-light');
   await report.close();
   assert.deepEqual(seen.errors, []);
