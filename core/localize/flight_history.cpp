@@ -14,13 +14,18 @@ void halve(std::vector<Row>& rows) {
 
 }  // namespace
 
-void FlightHistory::add(const Range& range) {
+void FlightHistory::add(const Range& range, const std::optional<RangeBelief>& belief) {
   if (ranges_seen_++ % range_stride_ != 0) return;
   newest_ = ranges_.empty() ? range.time : std::max(newest_, range.time);
   ranges_.push_back(range);
   ranges_.back().cir.reset();
+  if (belief || !beliefs_.empty()) {
+    beliefs_.resize(ranges_.size());
+    beliefs_.back() = belief;
+  }
   if (ranges_.size() < k_max_ranges) return;
   halve(ranges_);
+  halve(beliefs_);
   range_stride_ *= 2;
 }
 
@@ -37,6 +42,7 @@ FlightData FlightHistory::data(const Mission& mission) const {
   flight.mission = mission;
   flight.fixes = fixes_;
   flight.ranges = ranges_;
+  flight.beliefs = beliefs_;
   return flight;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "core/types/flight_data.hpp"
@@ -13,7 +14,8 @@ class FlightHistory {
  public:
   static constexpr std::size_t k_max_ranges = 24'000, k_max_fixes = 48'000;
 
-  void add(const Range& range);
+  /// `belief`: what a model says of the range as it is given here.
+  void add(const Range& range, const std::optional<RangeBelief>& belief = {});
   void add(const Fix& fix);
   /// A copy for a solver on another thread.
   FlightData data(const Mission& mission) const;
@@ -23,6 +25,7 @@ class FlightHistory {
 
  private:
   std::vector<Range> ranges_;
+  std::vector<std::optional<RangeBelief>> beliefs_;  ///< empty until a model spoke, then one for each range
   std::vector<Fix> fixes_;
   std::size_t range_stride_{1}, fix_stride_{1}, ranges_seen_{0}, fixes_seen_{0};
   UtcTime newest_{};

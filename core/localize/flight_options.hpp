@@ -55,6 +55,9 @@ struct FlightOptions {
   std::vector<Eigen::Vector2d>
       outline_m{};              ///< of the building, in the frame of the answers: anchors are inside
   double outline_sigma_m{1.0};  ///< of that; walls are thick and outlines drawn by hand
+  std::map<NetworkId, Eigen::Vector3d>
+      starts{};                ///< where to begin, in place of the search; the prior knows nothing of it
+  bool start_at_clues{false};  ///< begin where bearing and height of the clues meet, where both are known
   std::optional<double> level_sigma_db{};  ///< of RSS about the turn profile; absent: RSS is no clue
 
   std::optional<Wgs84> origin{};  ///< of the ENU answers; absent: the first fix good enough

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/localize/flight_checks.hpp"
 #include "core/localize/flight_verdict.hpp"
 #include "core/localize/joint_model.hpp"
 #include "core/localize/kit_prior.hpp"
@@ -11,19 +12,17 @@
 namespace anchord {
 namespace {
 
-constexpr double k_arm_asked_m = 0.3;  // as wide as a wrong entry in a form
-constexpr double k_arm_z = 4.0;
-constexpr double k_arm_least_m = 0.1;
-
 /// One flight under way through the passes.
 struct Work {
   FlightRows rows;
   JointFit fit;
   SharedPrior prior;
   ProfileFactor factor;
+  ProfileFactor alone;  ///< what the flight said before it was told anything
   std::string kit, name;
   double wide_bias_sigma_m{};  ///< of the flight alone
   BiasGate gate;
+  std::vector<Gate> checks;  ///< of the whole flight: every anchor must pass them
 };
 
 Result<void> solve_with(Work& work, const SharedPrior& prior, const FlightOptions& options) {
@@ -59,24 +58,13 @@ std::string sentence(const char* format, double a, double b, double c) {
   return text;
 }
 
-/// What the ranges say about the forward and left part of the arm if it is not held: one Gauss-Newton step
-/// from the solution. An arm declared wrongly moves every anchor, and no residual looks large.
-std::optional<Gate> suspicious_arm(const Work& work, const FlightOptions& options) {
-  if (options.lever_across_prior_m > 0 || !work.rows.track.has_attitude()) return std::nullopt;
-  SharedMatrix prior = work.prior.information;
-  prior.bottomRightCorner<2, 2>() = Eigen::Matrix2d::Identity() / (k_arm_asked_m * k_arm_asked_m);
-  const SharedMatrix system = work.fit.normal.reduced + prior;
-  const SharedVector step = system.ldlt().solve(work.fit.normal.reduced_gradient +
-                                                prior * (work.prior.mean - work.fit.state.shared));
-  const Eigen::Matrix2d covariance = system.inverse().bottomRightCorner<2, 2>();
-  const Eigen::Vector2d arm_m = step.tail<2>();
-  const double z = std::sqrt(arm_m.dot(covariance.inverse() * arm_m));
-  if (!(z > k_arm_z) || arm_m.norm() < k_arm_least_m) return std::nullopt;
-  return Gate{
-      "lever_arm", z, k_arm_z, false,
-      sentence(
-          "the ranges speak against the declared lever arm: %+.2f m forward, %+.2f m left of it (%.1f sigma)",
-          arm_m.x(), arm_m.y(), z)};
+std::size_t n_believed(const FlightRows& flight) {
+  std::size_t n = 0;
+  for (const AnchorRows& anchor : flight.anchors) {
+    n += static_cast<std::size_t>(
+        std::ranges::count_if(anchor.rows, [](const JointRow& row) { return row.belief.has_value(); }));
+  }
+  return n;
 }
 
 FlightSolution describe(const Work& work, const FlightData& flight, const FlightOptions& options) {
@@ -101,6 +89,10 @@ FlightSolution describe(const Work& work, const FlightData& flight, const Flight
     solution.notes.push_back(std::to_string(work.rows.pairs.size()) +
                              " distances between anchors took part in the solve");
   }
+  if (const std::size_t n = n_believed(work.rows); n > 0) {
+    solution.notes.push_back(std::to_string(n) +
+                             " ranges were weighed by the likelihood of a model, not by the loss");
+  }
   solution.shared.bias_z = work.gate.z;
   solution.shared.bias_determined = options.fixed_bias_m || work.gate.known;
   if (!solution.shared.bias_determined) {
@@ -108,15 +100,19 @@ FlightSolution describe(const Work& work, const FlightData& flight, const Flight
         sentence("bias not determined by this flight, profile missing: %.3f m with sigma %.3f m (z %.1f)",
                  work.gate.bias_m, work.gate.sigma_m, work.gate.z));
   }
-  const auto arm = suspicious_arm(work, options);
-  if (arm) solution.notes.push_back(arm->why);
+  for (const Gate& check : work.checks) {
+    if (!check.passed) solution.notes.push_back(check.why);
+  }
   if (!work.fit.converged) {
     solution.notes.push_back("the joint solve did not settle within " + std::to_string(work.fit.rounds) +
                              " rounds");
   }
   for (std::size_t i = 0; i < work.rows.anchors.size(); ++i) {
     AnchorSolution anchor = judge_anchor(work.rows, work.fit, i, options);
-    if (arm && anchor.estimate.best) anchor.estimate.gates.push_back(*arm);
+    if (anchor.estimate.best) {
+      auto& gates = anchor.estimate.gates;
+      gates.insert(gates.end(), work.checks.begin(), work.checks.end());
+    }
     anchor.estimate.bias_m = solution.shared.bias_m.value + anchor.delay_m.value_or(0.0);
     anchor.estimate.bias_sigma_m =
         std::hypot(solution.shared.bias_m.sigma, anchor.delay_sigma_m.value_or(options.delay_prior_m));
@@ -160,10 +156,12 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
   for (const FlightData* flight : flights) {
     auto rows = flight_rows(*flight, options);
     if (!rows) return make_error(rows.error().code, flight->mission.name + ": " + rows.error().message);
-    all.push_back({std::move(rows.value()), {}, {}, {}, flight->mission.kit, flight->mission.name, 0, {}});
+    all.push_back(
+        {std::move(rows.value()), {}, {}, {}, {}, flight->mission.kit, flight->mission.name, 0, {}, {}});
   }
   for (Work& work : all) {
     BOOST_OUTCOME_TRY(solve_with(work, wide_prior(options), options));
+    work.alone = work.factor;
   }
   // Two passes: what a flight says about the kit depends a little on what it was told.
   for (int pass = 0; pass < 2; ++pass) {
@@ -185,6 +183,14 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
   }
   if (!options.fixed_bias_m) {
     for (Work& work : all) add_doubt(work.fit, work.prior, work.gate);
+  }
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    Work& work = all[i];
+    BOOST_OUTCOME_TRY(const auto arm, check_lever_arm(work.rows, work.fit, work.prior, options));
+    if (arm) work.checks.push_back(*arm);
+    const auto others = others_of(all, i, options);
+    if (!others.empty() && !options.fixed_bias_m)
+      work.checks.push_back(check_profile(work.alone, others, options));
   }
   if (profile) {
     profile->kit = all.empty() ? "" : all.front().kit;

@@ -101,7 +101,7 @@ Gate halves(const FlightRows& flight, const JointFit& fit, std::size_t index, co
   const Eigen::Vector3d& at = fit.state.anchors[index].position_m;
   const auto early = solve_half({rows.begin(), middle}, at, block, rows.size(), options);
   const auto late = solve_half({middle, rows.end()}, at, block, rows.size(), options);
-  const double limit = chi2_quantile(limits.probability, options.dims == Dims::two ? 2 : 3);
+  const double limit = chi2_quantile(limits.agreement, options.dims == Dims::two ? 2 : 3);
   if (!early || !late) {
     return {"halves", std::nullopt, limit, false,
             std::string(early ? "the second" : "the first") + " half of the flight alone gives no answer"};
@@ -148,6 +148,13 @@ std::vector<Gate> gates_of(const FlightRows& flight, const JointFit& fit, std::s
       "side", side, limits.side_probability,
       estimate.mirror ? "probability of this side; the twin is given as mirror" : "no twin fits as well"));
   if (plane && !estimate.mirror) gates.back().why = "the track is a plane: height not determined";
+  if (!options.outline_m.empty()) {
+    const double outside_m = outside_outline_m(options.outline_m, estimate.best->position.m);
+    gates.push_back(
+        at_most("outline", outside_m, limits.outline_sigmas * options.outline_sigma_m,
+                text("%.2f m outside of the building's outline, which was a clue with sigma %.1f m",
+                     outside_m, options.outline_sigma_m)));
+  }
   gates.push_back(at_most("residual_scale", solution.residual_scale_m, limits.residual_scale_m,
                           "1.4826 x median absolute residual, metres"));
   gates.push_back(chi_square(solution, options, limits));

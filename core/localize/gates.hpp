@@ -13,12 +13,17 @@ struct GateLimits {
   double redundancy{30};          ///< ranges beyond the unknowns; fewer cannot show that one of them is wrong
   double rejected_share{0.5};     ///< beyond: the rejected are the majority, and may be the right ones
   double side_probability{0.99};  ///< of the chosen side against its twin
+  double outline_sigmas{3};       ///< outside of the building by more: the outline is wrong, or the answer
   double residual_scale_m{0.6};   ///< radios that work stay below 0.25 m
   double probability{0.999};      ///< of the chi-square tests: one good anchor in a thousand is held back
+  /// Of the tests of a flight against its own half and against its kit. Their covariances are tempered, so
+  /// that real flights stay below a fifth of this limit (halves 1.4 of 7.8, profile 3.2 of 9.5), while
+  /// anchors exchanged half-way reach 6 to 15, and a bias of 0.3 m where a flight can tell it 6 to 9.
+  double agreement{0.95};
 };
 
 /// Every gate one flight can ask of one anchor, in a fixed order: redundancy, rejected, geometry, precision,
-/// side, residual_scale, chi_square, halves, bias, settled.
+/// side, outline (where there is one), residual_scale, chi_square, halves, bias, settled.
 ///
 /// chi_square  means of the residuals over two correlation times, each against the residual scale: white
 ///             noise averages out there, an error of the model does not

@@ -67,6 +67,25 @@ class AnchorRanges final : public ceres::CostFunction {
   std::vector<double> sigma_m_;
 };
 
+/// What clues beside the ranges ask of one anchor.
+class ClueTerm final : public ceres::SizedCostFunction<3, 4> {
+ public:
+  ClueTerm(AnchorClues clues, const FlightOptions& options) : clues_(std::move(clues)), options_(options) {}
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const Eigen::Vector3d place_m(parameters[0][0], parameters[0][1], parameters[0][2]);
+    const auto rows = clue_rows(clues_, options_.outline_m, options_.outline_sigma_m, place_m);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      residuals[i] = -rows[i].missing;
+      if (jacobians && jacobians[0]) Eigen::Map<Eigen::Vector4d>(jacobians[0] + 4 * i) << rows[i].slope, 0.0;
+    }
+    return true;
+  }
+
+ private:
+  AnchorClues clues_;
+  const FlightOptions& options_;
+};
+
 /// The Gaussian prior on the shared unknowns: L^T (phi - mu) with information = L L^T.
 class SharedTerm final : public ceres::SizedCostFunction<6, 6> {
  public:
@@ -124,6 +143,10 @@ Result<JointState> polish_joint_ceres(const FlightRows& flight, JointState state
           new AnchorRanges(flight, flight.anchors[i], normal.anchors[i], options,
                            sigmas(flight, flight.anchors[i], state, i, normal.anchors[i])),
           nullptr, own[i].data(), shared.data());
+      if (!options.clues.empty() || !options.outline_m.empty()) {
+        problem.AddResidualBlock(new ClueTerm(clues_of(flight.anchors[i].id, options), options), nullptr,
+                                 own[i].data());
+      }
       ordering->AddElementToGroup(own[i].data(), 0);
     }
     ceres::Solver::Options ceres_options;

@@ -53,6 +53,29 @@ class Neighbours {
   std::vector<double> jumps_m_;
 };
 
+/// How much of what the beliefs claim may be claimed: 1 as long as the errors are what the model said. Larger
+/// ones make the slope of the likelihood vary more than its curvature allows, and the covariance is then that
+/// of a misspecified likelihood, H^-1 J H^-1 (Huber 1967; White 1982), by one number for the anchor.
+double believed_share(const std::vector<JointLine>& lines, const std::vector<const RangeBelief*>& beliefs) {
+  constexpr double step_m = 1e-3, allowed = 1.2;  // H and J are sums of some hundred terms: 20 % is chance
+  double curvature = 0, variance = 0, claimed = 0;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (!beliefs[i]) continue;
+    const auto at = [&](double error_m) {
+      return belief_value(*beliefs[i], error_m, lines[i].position_variance_m2);
+    };
+    const BeliefValue here = at(lines[i].residual_m);
+    claimed += here.information_per_m2;
+    variance += here.score_per_m * here.score_per_m;
+    curvature +=
+        (at(lines[i].residual_m + step_m).score_per_m - at(lines[i].residual_m - step_m).score_per_m) /
+        (2 * step_m);
+  }
+  if (!(claimed > 0)) return 1.0;
+  curvature = std::max(curvature, 1e-3 * claimed);
+  return std::min(1.0, allowed * curvature * std::min(1.0, curvature / variance) / claimed);
+}
+
 void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointState::Anchor& anchor,
                   const SharedVector& shared, const FlightOptions& options, double scale_floor_m,
                   double kept_scale_m, double common_scale_m, bool claims, AnchorBlock& block,
@@ -85,6 +108,7 @@ void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointS
   block.scale_m = kept_scale_m > 0 ? kept_scale_m
                                    : std::max({1.4826 * median(sizes), options.min_scale_m, scale_floor_m});
   const double scale2 = block.scale_m * block.scale_m;
+  const double believed = claims ? believed_share(lines, beliefs) : 1.0;
   double sum_square = 0;
   std::vector<double> weights;
   weights.reserve(lines.size());
@@ -98,6 +122,7 @@ void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointS
       counted = value.p_los;
       counted_m -= beliefs[i]->los_bias_m;
       line.residual_m = weight > 0 ? value.score_per_m * scale2 / weight : 0.0;
+      weight *= believed;
     } else {
       const double widening =
           (scale2 + std::max(line.position_variance_m2 - usual_variance_m2, 0.0)) / scale2;

@@ -22,6 +22,21 @@ bool has_beliefs(const FlightRows& flight) {
   });
 }
 
+/// The start somebody gave: a place, or where the bearing of the turn and the height search meet at the range
+/// measured nearest to the turn.
+std::optional<Eigen::Vector3d> told_start(NetworkId id, const std::vector<Observation>& rows,
+                                          const AnchorClues& clues, const FlightOptions& options) {
+  if (const auto told = options.starts.find(id); told != options.starts.end()) return told->second;
+  if (!options.start_at_clues || !clues.bearing || !clues.height) return std::nullopt;
+  const Eigen::Vector3d& turn_m = clues.bearing->tag_m;
+  const auto away = [&](const Observation& o) { return (o.tag_m - turn_m).norm(); };
+  const double range_m = std::ranges::min_element(rows, {}, away)->distance_m;
+  const double up_m = clues.height->up_m - turn_m.z();
+  const double across_m = std::sqrt(std::max(range_m * range_m - up_m * up_m, 0.25));
+  return Eigen::Vector3d(turn_m.x() + across_m * std::sin(clues.bearing->bearing_rad),
+                         turn_m.y() + across_m * std::cos(clues.bearing->bearing_rad), clues.height->up_m);
+}
+
 /// Best of many starts for one anchor; Cauchy of 0.3 m and a bias of its own, so that a kit's bias does not
 /// push the anchor into the wrong basin before the joint solve can see it.
 std::optional<Eigen::Vector3d> start_of(const FlightRows& flight, const AnchorRows& anchor,
@@ -41,7 +56,9 @@ std::optional<Eigen::Vector3d> start_of(const FlightRows& flight, const AnchorRo
   const double alike =
       std::max(2.0 * options.correlation_s * static_cast<double>(levels.size()) / span_s, 1.0);
   std::optional<AnchorFit> best;
-  for (Eigen::Vector3d start : start_candidates(rows, options.dims)) {
+  auto starts = start_candidates(rows, options.dims);
+  if (const auto told = told_start(anchor.id, rows, clues, options)) starts = {*told};
+  for (Eigen::Vector3d start : starts) {
     if (height_m) start.z() = *height_m;
     auto fit = solve_anchor_gauss_newton(rows, start, settings);
     if (!fit) continue;
@@ -88,8 +105,8 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
   // The Gauss-Newton rounds bring every method near; Ceres then does the rest where it is asked for.
   // Ranges between anchors are solved here whatever the method: their network is small and dense. So are
   // ranges a model spoke about, whose likelihood is no sum of squares.
-  const bool by_ceres = options.method != Method::gauss_newton && flight.pairs.empty() &&
-                        !has_beliefs(flight) && options.clues.empty() && options.outline_m.empty();
+  const bool by_ceres =
+      options.method != Method::gauss_newton && flight.pairs.empty() && !has_beliefs(flight);
   const int most_rounds = by_ceres ? 5 : k_max_rounds;
   struct Pace {
     Eigen::Vector3d last_m{0, 0, 0};

@@ -12,6 +12,7 @@ namespace anchord {
 namespace {
 
 constexpr std::size_t k_least_levels = 30;
+constexpr double k_outline_believed = 4.0;  // sigmas; odds of 3000 to 1
 
 double wrapped(double angle_rad) { return std::remainder(angle_rad, 2.0 * std::numbers::pi); }
 
@@ -40,34 +41,46 @@ double outside_m(std::span<const Eigen::Vector2d> outline, const Eigen::Vector2d
 
 }  // namespace
 
+double outside_outline_m(std::span<const Eigen::Vector2d> outline_m, const Eigen::Vector3d& place_m) {
+  return outside_m(outline_m, place_m.head<2>(), nullptr);
+}
+
+std::array<ClueRow, 3> clue_rows(const AnchorClues& clues, std::span<const Eigen::Vector2d> outline_m,
+                                 double outline_sigma_m, const Eigen::Vector3d& place_m) {
+  std::array<ClueRow, 3> rows;
+  if (const auto& b = clues.bearing) {
+    const Eigen::Vector2d way = (place_m - b->tag_m).head<2>();
+    const double far2 = std::max(way.squaredNorm(), 1.0);  // right above there is no bearing to speak of
+    rows[0] = {Eigen::Vector3d(way.y(), -way.x(), 0) / (far2 * b->sigma_rad),
+               wrapped(b->bearing_rad - bearing_of(b->tag_m, place_m)) / b->sigma_rad};
+  }
+  if (const auto& h = clues.height)
+    rows[1] = {Eigen::Vector3d::UnitZ() / h->sigma_m, (h->up_m - place_m.z()) / h->sigma_m};
+  Eigen::Vector2d away(0, 0);
+  const double outside = outside_m(outline_m, place_m.head<2>(), &away);
+  const double sigmas = outside / outline_sigma_m;
+  if (outside > 0) rows[2] = {Eigen::Vector3d(away.x(), away.y(), 0) / outline_sigma_m, -sigmas};
+  // Not every anchor hangs on the building: far outside, the outline is no longer believed to speak of this
+  // one, pulls it nowhere, and costs no more than the odds that a drawing is wrong.
+  if (sigmas > k_outline_believed) rows[2] = {Eigen::Vector3d::Zero(), -k_outline_believed};
+  return rows;
+}
+
 double clue_cost(const AnchorClues& clues, std::span<const Eigen::Vector2d> outline_m, double outline_sigma_m,
                  const Eigen::Vector3d& place_m) {
   double squares = 0;
-  const auto add = [&](double misfit, double sigma) { squares += misfit * misfit / (sigma * sigma); };
-  if (const auto& b = clues.bearing)
-    add(wrapped(bearing_of(b->tag_m, place_m) - b->bearing_rad), b->sigma_rad);
-  if (const auto& h = clues.height) add(place_m.z() - h->up_m, h->sigma_m);
-  add(outside_m(outline_m, place_m.head<2>(), nullptr), outline_sigma_m);
+  for (const ClueRow& row : clue_rows(clues, outline_m, outline_sigma_m, place_m))
+    squares += row.missing * row.missing;
   return 0.5 * squares;
 }
 
 ClueNormal clue_normal(const AnchorClues& clues, std::span<const Eigen::Vector2d> outline_m,
                        double outline_sigma_m, const Eigen::Vector3d& place_m) {
   ClueNormal normal;
-  const auto add = [&](const Eigen::Vector3d& slope, double missing, double sigma) {
-    normal.information += slope * slope.transpose() / (sigma * sigma);
-    normal.gradient += slope * missing / (sigma * sigma);
-  };
-  if (const auto& b = clues.bearing) {
-    const Eigen::Vector2d way = (place_m - b->tag_m).head<2>();
-    const double far2 = std::max(way.squaredNorm(), 1.0);  // right above there is no bearing to speak of
-    add({way.y() / far2, -way.x() / far2, 0}, wrapped(b->bearing_rad - bearing_of(b->tag_m, place_m)),
-        b->sigma_rad);
+  for (const ClueRow& row : clue_rows(clues, outline_m, outline_sigma_m, place_m)) {
+    normal.information += row.slope * row.slope.transpose();
+    normal.gradient += row.slope * row.missing;
   }
-  if (const auto& h = clues.height) add(Eigen::Vector3d::UnitZ(), h->up_m - place_m.z(), h->sigma_m);
-  Eigen::Vector2d away(0, 0);
-  const double outside = outside_m(outline_m, place_m.head<2>(), &away);
-  if (outside > 0) add({away.x(), away.y(), 0}, -outside, outline_sigma_m);
   return normal;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <optional>
 #include <span>
 #include <vector>
@@ -32,12 +33,24 @@ struct LevelSample {
   double rss_dbm{};
 };
 
+/// What one clue asks of a place: `missing` sigmas along `slope` (sigmas per metre). Zero where it asks
+/// nothing. Bearing, height, outline.
+struct ClueRow {
+  Eigen::Vector3d slope{0, 0, 0};
+  double missing{};
+};
+std::array<ClueRow, 3> clue_rows(const AnchorClues& clues, std::span<const Eigen::Vector2d> outline_m,
+                                 double outline_sigma_m, const Eigen::Vector3d& place_m);
+
 /// Half the squared misfit of a place, in sigmas: differences between two places are log odds.
 /// outline_m  corners of the building, ENU or local metres, empty for none: anchors are inside, and each
 /// metre
 ///            outside costs as the sigma says
 double clue_cost(const AnchorClues& clues, std::span<const Eigen::Vector2d> outline_m, double outline_sigma_m,
                  const Eigen::Vector3d& place_m);
+
+/// Metres a place is outside of the outline; 0 within it, and without one.
+double outside_outline_m(std::span<const Eigen::Vector2d> outline_m, const Eigen::Vector3d& place_m);
 
 /// Levels against the turn profile seen from a place, free space and level offset fitted: half the sum of
 /// squares over sigma^2. Samples of one flight are alike for seconds: divide by how many say the same.

@@ -1,0 +1,134 @@
+// Real flights (../shared/data) spoilt in ways that happen: whatever is still accepted must hold the truth.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <functional>
+#include <random>
+
+#include "tests/core/localize/real_flights.hpp"
+
+namespace anchord {
+namespace {
+
+using testing::FlightSet;
+using testing::Judged;
+
+struct Spoilt {
+  const char* how;
+  std::function<void(FlightData&)> spoil;
+};
+
+double since_start_s(const FlightData& flight, const Range& range) {
+  return seconds_between(flight.ranges.front().time, range.time);
+}
+
+void keep_part(FlightData& flight, double from, double to) {
+  const double end_s = since_start_s(flight, flight.ranges.back());
+  const FlightData whole = flight;
+  std::erase_if(flight.ranges, [&](const Range& r) {
+    const double share = since_start_s(whole, r) / end_s;
+    return share < from || share > to;
+  });
+}
+
+void shift(FlightData& flight, double by_s) {
+  for (auto& range : flight.ranges) range.time.ns += static_cast<std::int64_t>(by_s * 1e9);
+}
+
+void add_bias(FlightData& flight, double by_m) {
+  for (auto& range : flight.ranges) range.distance_m += by_m;
+}
+
+/// Ranges of the half of the places that lies west (or at small x).
+void keep_one_side(FlightData& flight) {
+  std::vector<std::pair<std::int64_t, double>> track;
+  for (const auto& fix : flight.fixes)
+    track.emplace_back(fix.time.ns, fix.frame == TrackFrame::local ? fix.local_m.x() : fix.position.lon_deg);
+  std::ranges::sort(track);
+  std::vector<double> sorted;
+  for (const auto& [time, x] : track) sorted.push_back(x);
+  std::ranges::sort(sorted);
+  const double middle = sorted[sorted.size() / 2];
+  std::erase_if(flight.ranges, [&](const Range& r) {
+    auto at = std::ranges::lower_bound(track, std::pair{r.time.ns, -1e9});
+    if (at == track.end()) --at;
+    return at->second > middle;
+  });
+}
+
+void block_some(FlightData& flight) {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (auto& range : flight.ranges)
+    if (uniform(random) < 0.3) range.distance_m += 0.3 + 1.7 * uniform(random);
+}
+
+void exchange_two_anchors_half_way(FlightData& flight) {
+  const NetworkId a = flight.anchor_names.begin()->first, b = std::next(flight.anchor_names.begin())->first;
+  const double half_s = 0.5 * since_start_s(flight, flight.ranges.back());
+  const UtcTime start = flight.ranges.front().time;
+  for (auto& range : flight.ranges) {
+    if (seconds_between(start, range.time) < half_s) continue;
+    if (range.anchor == a)
+      range.anchor = b;
+    else if (range.anchor == b)
+      range.anchor = a;
+  }
+}
+
+void keep_every_20th(FlightData& flight) {
+  std::vector<Range> few;
+  for (std::size_t i = 0; i < flight.ranges.size(); i += 20) few.push_back(flight.ranges[i]);
+  flight.ranges = std::move(few);
+}
+
+TEST(SpoiltRealFlights, AreNeverAcceptedBesideTheTruth) {
+  if (!std::filesystem::exists(ANCHORD_SHARED_DATA)) {
+    std::printf("SKIPPED: no real flights, looked for %s\n", ANCHORD_SHARED_DATA);
+    GTEST_SKIP() << "no real flights, looked for " << ANCHORD_SHARED_DATA;
+  }
+  const std::vector<Spoilt> ways{
+      {"bias -0.3 m", [](FlightData& f) { add_bias(f, -0.3); }},
+      {"bias +2 m", [](FlightData& f) { add_bias(f, 2.0); }},
+      {"track 0.5 s early", [](FlightData& f) { shift(f, 0.5); }},
+      {"track 0.5 s late", [](FlightData& f) { shift(f, -0.5); }},
+      {"30 % + 0.3 to 2 m", block_some},
+      {"every 20th range", keep_every_20th},
+      {"first third", [](FlightData& f) { keep_part(f, 0, 1.0 / 3); }},
+      {"one side", keep_one_side},
+      {"anchors exchanged", exchange_two_anchors_half_way},
+  };
+  int anchors = 0, accepted = 0, outside = 0;
+  for (const char* name : {"rcv-drone", "inrol-mocap"}) {
+    FlightSet set = testing::read_set(name);
+    for (std::size_t i = 0; i < set.flights.size(); ++i) {
+      // One flight of the large set is enough.
+      if (set.name == "inrol-mocap" && set.flights[i].mission.name != "env1_calib") continue;
+      for (const Spoilt& way : ways) {
+        FlightData flight = set.flights[i];
+        way.spoil(flight);
+        const auto solution = solve_flight(flight);
+        if (!solution) continue;  // no answer is no wrong answer
+        for (const Judged& one : testing::judge(set, i, solution.value())) {
+          ++anchors;
+          const Estimate& e = one.solution.estimate;
+          if (!e.acceptable()) continue;
+          ++accepted;
+          if (one.inside) continue;
+          ++outside;
+          std::printf("%s %s, %s: off by %.3f m, claimed %.3f m\n", set.flights[i].mission.name.c_str(),
+                      one.solution.name.c_str(), way.how, one.error_m(), one.claimed_3d_m);
+          // 95 % regions miss one anchor in twenty, by a little.
+          EXPECT_LT(one.error_m(), 1.5 * one.claimed_3d_m);
+        }
+      }
+    }
+  }
+  std::printf("%d anchors, %d accepted, %d of them outside of their 95 %% region\n", anchors, accepted,
+              outside);
+  EXPECT_LE(outside, accepted / 10) << "one in twenty, of flights that are spoilt";
+}
+
+}  // namespace
+}  // namespace anchord
