@@ -37,14 +37,14 @@ struct Application::State {
         alarms(events),
         models(deps.learning != nullptr ? std::make_unique<ModelRegistry>(deps.learning->models) : nullptr),
         missions({deps.missions, deps.measurements, deps.anchors, hub, events, deps.clock, deps.post,
-                  deps.goal, [this] { return device_rows(); }, judge(), needs_cir()}),
+                  deps.goal, [this] { return device_rows(); }, judge(), needs_cir(), deps.site_outline}),
         ingest(deps.measurements, missions),
         device_ingest(deps.measurements, missions),
         jobs(deps.jobs, hub, deps.clock),
         geo(deps.geoid_dir),
         calibrations({deps.measurements, deps.missions, deps.anchors, jobs, deps.clock, profiles_of(deps),
                       models.get(), deps.learning != nullptr ? &deps.learning->models : nullptr,
-                      [this](const MissionId& id) { return clues_of_flight(id); }}),
+                      [this](const MissionId& id) { return clues_of_flight(id); }, deps.frames}),
         services{deps, hub,          events, alarms,         missions,   ingest,
                  jobs, calibrations, geo,    profiles.get(), deps.frames} {
     router.on_fault(deps.log_fault);

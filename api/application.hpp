@@ -77,6 +77,7 @@ class Application {
     std::function<void(std::function<void()>)> post{};
     Backups* backups{nullptr};  ///< null: their routes do not exist and none are made
     AccuracyGoal goal{};        ///< how well a live anchor must be known to count as converged
+    bool site_outline{true};    ///< a site's outline is a clue for the anchors of its flights
     std::function<StorageStatus()> storage_status{};
     KitStore* kits{nullptr};                      ///< null: no kit profiles (tests)
     FrameStore* frames{nullptr};                  ///< null: no local frames (tests)

@@ -218,8 +218,12 @@ Ordered calibration_json(const Calibration& calibration, bool with_anchors) {
   out["provenance"] = provenance.is_object() ? std::move(provenance) : Ordered::object();
   if (!with_anchors) return out;
   Ordered anchors = Ordered::array();
-  for (const auto& estimate : calibration.anchors)
+  for (const auto& estimate : calibration.anchors) {
     anchors.push_back(estimate_result_json(estimate, calibration.frame));
+    // Told in a local frame too, where the calibration asked for one.
+    const auto local = Ordered::json_pointer("/frame/anchors/" + to_string(estimate.anchor));
+    if (out["provenance"].contains(local)) anchors.back()["local_m"] = out["provenance"][local];
+  }
   out["anchors"] = std::move(anchors);
   return out;
 }

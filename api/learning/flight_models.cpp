@@ -1,5 +1,6 @@
 #include "api/learning/flight_models.hpp"
 
+#include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
 
@@ -16,6 +17,14 @@ constexpr std::array<const char*, 4> k_tasks{"nlos_id", "los_bias", "nlos_bias",
 /// The radios' failure values are below it, and no correction may make a range one of them.
 constexpr double k_least_range_m = 0.05;
 
+/// Stated noise is a Gaussian of its own: no tail beside it.
+void state(const StatedNoise& noise, RangeBelief& belief) {
+  if (noise.los_m) belief.los_sigma_m = *noise.los_m;
+  if (!noise.nlos_m) return;
+  belief.nlos_sigma_m = *noise.nlos_m;
+  belief.nlos_tail_m = 0;
+}
+
 }  // namespace
 
 FlightModelsWish read_flight_models(const Json& models, std::vector<FieldError>& errors) {
@@ -31,6 +40,7 @@ FlightModelsWish read_flight_models(const Json& models, std::vector<FieldError>&
   }
   if (const auto word = fields.word("correction", {"weighted", "hard", "none"}))
     out.correction = static_cast<ml::Correction>(*word);
+  if (const auto word = fields.word("likelihood", {"one_sided", "loss"})) out.likelihood = *word == 0;
   fields.finish();
   return out;
 }
@@ -50,10 +60,13 @@ Result<ModelRegistry::Active> models_for(const FlightModelsWish& wish, const Mod
   return load_models(store, chosen, wish.correction.value_or(active->correction));
 }
 
-FlightModelsReport correct_flight(const ModelRegistry::Active& models, FlightData& flight) {
+FlightModelsReport correct_flight(const ModelRegistry::Active& models, FlightData& flight, bool likelihood,
+                                  const StatedNoise& noise) {
   FlightModelsReport out;
   double sum = 0;
-  for (auto& range : flight.ranges) {
+  std::vector<std::optional<RangeBelief>> beliefs(flight.ranges.size());
+  for (std::size_t i = 0; i < flight.ranges.size(); ++i) {
+    Range& range = flight.ranges[i];
     if (range.kind != RangeKind::tag_anchor || !(range.distance_m > k_least_range_m)) continue;
     ++out.n_ranges;
     const auto features = features_of(range);
@@ -64,14 +77,26 @@ FlightModelsReport correct_flight(const ModelRegistry::Active& models, FlightDat
       continue;
     }
     if (judged.verdict.los) ++(*judged.verdict.los ? out.n_los : out.n_nlos);
+    std::optional<RangeBelief> belief = belief_of(judged.verdict, models.correction);
+    if (noise.nlos_m && !belief && judged.verdict.p_los) belief = RangeBelief{*judged.verdict.p_los};
+    if (belief && likelihood) {
+      state(noise, *belief);
+      beliefs[i] = belief;
+    }
     if (!judged.verdict.bias_m) continue;
     const double corrected_m = range.distance_m - *judged.verdict.bias_m;
-    if (!(corrected_m > k_least_range_m)) continue;
+    if (!(corrected_m > k_least_range_m)) {
+      beliefs[i].reset();  // it is of the corrected range
+      continue;
+    }
     sum += *judged.verdict.bias_m;
     range.distance_m = corrected_m;
     ++out.n_corrected;
   }
   if (out.n_corrected > 0) out.mean_correction_m = sum / static_cast<double>(out.n_corrected);
+  out.n_believed = static_cast<std::size_t>(
+      std::ranges::count_if(beliefs, [](const auto& belief) { return belief.has_value(); }));
+  if (out.n_believed > 0) flight.beliefs = std::move(beliefs);
   return out;
 }
 
@@ -83,6 +108,8 @@ Ordered flight_models_json(const ModelRegistry::Active& models,
     out[task] = at == models.models.end() ? Ordered(nullptr) : Ordered(to_string(at->second));
   }
   out["correction"] = correction_word(models.correction);
+  out["likelihood"] =
+      std::ranges::any_of(flights, [](const auto& f) { return f.n_believed > 0; }) ? "one_sided" : "loss";
   Ordered list = Ordered::array();
   for (const auto& f : flights)
     list.push_back({{"n_ranges", f.n_ranges},
@@ -90,6 +117,7 @@ Ordered flight_models_json(const ModelRegistry::Active& models,
                     {"n_nlos", f.n_nlos},
                     {"n_corrected", f.n_corrected},
                     {"n_silent", f.n_silent},
+                    {"n_believed", f.n_believed},
                     {"mean_correction_m", f.mean_correction_m},
                     {"note", f.note.empty() ? Ordered(nullptr) : Ordered(f.note)}});
   out["flights"] = std::move(list);

@@ -16,6 +16,11 @@ namespace anchord::api {
 struct FlightModelsWish {
   std::map<std::string, std::string> tasks{};
   std::optional<ml::Correction> correction{};  ///< absent: the one in use
+  std::optional<bool> likelihood{};  ///< the mixture's density weighs each range, not the loss alone
+};
+/// Noise that a person states in place of what the models were trained with.
+struct StatedNoise {
+  std::optional<double> los_m{}, nlos_m{};
 };
 /// Reads the "models" of POST /calibrations; what is wrong goes to `errors`.
 FlightModelsWish read_flight_models(const nlohmann::json& models, std::vector<FieldError>& errors);
@@ -28,11 +33,16 @@ Result<ModelRegistry::Active> models_for(const FlightModelsWish& wish, const Mod
 /// What the models did to a flight.
 struct FlightModelsReport {
   std::size_t n_ranges{}, n_los{}, n_nlos{}, n_corrected{}, n_silent{};
+  std::size_t n_believed{};  ///< entered the solve by the model's likelihood
   double mean_correction_m{};
   std::string note;  ///< why some ranges were left as they came
 };
-/// Takes the models' corrections off the ranges of `flight` (a copy of the record, never the record).
-FlightModelsReport correct_flight(const ModelRegistry::Active& models, FlightData& flight);
+/// Takes the models' corrections off the ranges of `flight` (a copy of the record, never the record), and
+/// tells the solver what the models believe of the error that is left.
+/// likelihood  false: no beliefs; the solver's loss alone weighs the ranges
+/// noise       stated sigmas replace those of the beliefs; with nlos_m a class alone makes a belief too
+FlightModelsReport correct_flight(const ModelRegistry::Active& models, FlightData& flight,
+                                  bool likelihood = true, const StatedNoise& noise = {});
 
 /// For the provenance of a calibration: models by task, correction, and what they did to each flight.
 nlohmann::ordered_json flight_models_json(const ModelRegistry::Active& models,

@@ -130,7 +130,21 @@ std::optional<RangeModel> judge_range(const ModelRegistry::Active& active, const
   if (active.predictor.empty() || range.kind != RangeKind::tag_anchor) return std::nullopt;
   const auto verdict = active.predictor.judge(features_of(range), active.correction);
   if (!verdict.p_los && !verdict.bias_m) return std::nullopt;
-  return RangeModel{verdict.los, verdict.p_los, verdict.bias_m, verdict.sigma_m, verdict.outside_training};
+  return RangeModel{verdict.los,
+                    verdict.p_los,
+                    verdict.bias_m,
+                    verdict.sigma_m,
+                    verdict.outside_training,
+                    belief_of(verdict, active.correction)};
+}
+
+std::optional<RangeBelief> belief_of(const ml::RangeVerdict& verdict, ml::Correction how) {
+  if (!verdict.likelihood || !verdict.bias_m || verdict.outside_training || how != ml::Correction::weighted)
+    return std::nullopt;
+  const ml::RangeLikelihood& l = *verdict.likelihood;
+  return RangeBelief{l.p_los,        l.los_m - *verdict.bias_m,
+                     l.los_sigma_m,  l.nlos_m - *verdict.bias_m,
+                     l.nlos_sigma_m, l.nlos_excess_m};
 }
 
 }  // namespace anchord::api

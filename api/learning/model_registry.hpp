@@ -49,6 +49,11 @@ class ModelRegistry {
 /// In the form a flight keeps with the range. Nothing where the models say nothing.
 std::optional<RangeModel> judge_range(const ModelRegistry::Active& active, const Range& range);
 
+/// The same as a likelihood, of the error that is left once the correction is taken off. Nothing without a
+/// class and both biases, outside of what was trained (its density says nothing there), or where the
+/// corrections "hard" and "none" ask for the range as it is.
+std::optional<RangeBelief> belief_of(const ml::RangeVerdict& verdict, ml::Correction how);
+
 std::string_view correction_word(ml::Correction how);
 std::optional<ml::Correction> correction_of(std::string_view word);
 /// Promotions of this "task" say which correction is in use, in their reason.

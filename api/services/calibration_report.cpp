@@ -1,11 +1,10 @@
 #include "api/services/calibration_report.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "core/geo/enu.hpp"
+#include "api/json/outline_json.hpp"
 
 namespace anchord::api {
 
@@ -19,23 +18,6 @@ std::string number(double value, int decimals) {
   char text[48];
   std::snprintf(text, sizeof text, "%.*f", decimals, value);
   return text;
-}
-
-/// Outer ring of a GeoJSON Polygon in ENU.
-std::vector<Eigen::Vector2d> outline(const std::string& geojson, const std::optional<Wgs84>& origin) {
-  std::vector<Eigen::Vector2d> out;
-  const Json json = Json::parse(geojson, nullptr, false);
-  if (!origin || !json.is_object() || !json.contains("coordinates") || !json["coordinates"].is_array() ||
-      json["coordinates"].empty() || !json["coordinates"][0].is_array())
-    return out;
-  const EnuFrame frame(*origin);
-  for (const auto& at : json["coordinates"][0]) {
-    if (!at.is_array() || at.size() < 2 || !at[0].is_number() || !at[1].is_number()) return {};
-    const double lon = at[0].get<double>(), lat = at[1].get<double>();
-    if (!(std::abs(lat) <= 90)) return {};
-    out.emplace_back(frame.enu_from_wgs84({lat, lon, origin->height_m}).m.head<2>());
-  }
-  return out;
 }
 
 std::string place_of(const Anchor& anchor) {
@@ -151,7 +133,7 @@ Result<Report> calibration_report(AnchorStore& anchors, MissionStore& mission_st
   }
   if (report.site) {
     report.subtitle = report.site->name + ": " + report.subtitle;
-    report.outline_m = outline(report.site->outline_geojson, report.origin);
+    if (report.origin) report.outline_m = outline_in_enu(report.site->outline_geojson, *report.origin);
   }
   BOOST_OUTCOME_TRY(const auto revisions, anchors.revisions(1000, 0));
   std::map<NetworkId, PublishedPosition> published;

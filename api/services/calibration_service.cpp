@@ -5,9 +5,8 @@
 #include <set>
 
 #include "api/exports/evidence.hpp"
-#include "api/json/clues_json.hpp"
-#include "api/json/reader.hpp"
 #include "api/json/wire_resources.hpp"
+#include "api/services/calibration_place.hpp"
 #include "api/services/job_service.hpp"
 #include "api/services/kit_profiles.hpp"
 #include "core/geo/enu.hpp"
@@ -17,78 +16,6 @@
 namespace anchord::api {
 
 using Json = nlohmann::json;
-
-CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldError>& errors) {
-  CalibrationRequest out;
-  Fields fields(body, "", errors);
-  std::set<std::string> seen;
-  const auto read_ids = [&](const char* key, std::vector<MissionId>& ids) {
-    const Json* list = fields.child(key);
-    if (list == nullptr) return;
-    if (!list->is_array() || list->empty() || list->size() > 100)
-      return fields.error(key, "wrong_type", "must be an array of 1 to 100 mission ids");
-    for (std::size_t i = 0; i < list->size(); ++i) {
-      const auto& item = (*list)[i];
-      const auto id = parse_uuid(item.is_string() ? item.get_ref<const std::string&>() : "");
-      const std::string at = std::string("/") + key + '/' + std::to_string(i);
-      if (!id)
-        errors.push_back({at, "bad_id", id.error().message});
-      else if (!seen.insert(to_string(id.value())).second)
-        errors.push_back({at, "duplicate", "the mission stands twice"});
-      else
-        ids.push_back(MissionId{id.value()});
-    }
-  };
-  if (!fields.has("missions")) fields.error("missions", "required", "missions is missing");
-  read_ids("missions", out.missions);
-  read_ids("learn_from", out.learn_from);
-  auto& options = out.options;
-  if (const auto dims = fields.integer("dims", 2, 3)) options.dims = *dims == 2 ? Dims::two : Dims::three;
-  if (const auto solver = fields.word("solver", {"gauss_newton", "levenberg_marquardt", "dogleg"}))
-    options.method = static_cast<anchord::Method>(*solver);
-  if (const auto weights = fields.word("weights", {"inverse_variance", "dissertation"}))
-    options.weights = static_cast<Weights>(*weights);
-  if (const Json* loss = fields.child("loss")) {
-    Fields inner(*loss, "/loss", errors);
-    if (const auto type = inner.word("type", {"none", "huber", "cauchy", "tukey"}, true))
-      options.loss = static_cast<Loss>(*type);
-    // The robust scale comes from the residuals themselves; `scale` stretches it, 1.5 being the neutral value
-    // of api.md.
-    if (const auto scale = inner.number("scale", 0.1, 10)) options.mad_factor *= *scale / 1.5;
-    inner.finish();
-  }
-  if (const auto height = fields.number("anchor_height_m", -1000, 9000)) options.anchor_height_m = *height;
-  if (const auto gap = fields.number("max_gap_s", 0.01, 10)) options.max_gap_s = *gap;
-  if (const auto fix = fields.word("min_fix", {"none", "single", "dgps", "float", "fixed"}))
-    options.min_fix = static_cast<FixClass>(*fix);
-  if (const auto profile = fields.word("profile", {"kit", "none"})) out.use_profile = *profile == 0;
-  if (const auto steps = fields.integer("iterations", 0, 50)) out.iterations = static_cast<int>(*steps);
-  if (const Json* sigma = fields.child("sigma_m")) {
-    Fields inner(*sigma, "/sigma_m", errors);
-    if (const auto los = inner.number("los", 0.001, 1)) options.min_scale_m = *los;
-    if (const auto rtk = inner.number("rtk", 0, 1)) options.floor_sigma_m = *rtk;
-    inner.number("nlos", 0.001, 10);  // of ranges that a model calls NLOS; the loss weighs the others
-    inner.finish();
-  }
-  // Every anchor is searched for from some 17 places, those of bearing and height among them, so that the
-  // answer depends on none of them; the word is taken for those who send it.
-  fields.word("initial", {"search", "bearing_height"});
-  if (const Json* clues = fields.child("clues")) read_clues(*clues, "/clues", options, errors);
-  if (const Json* models = fields.child("models")) out.models = read_flight_models(*models, errors);
-  out.flight_clues = fields.boolean("flight_clues").value_or(true);
-  out.compare_uncorrected = fields.boolean("compare_uncorrected").value_or(true);
-  for (const char* later : {"frame", "use_anchor_anchor"}) {
-    if (fields.child(later) != nullptr)
-      fields.error(later, "unsupported", std::string(later) + " cannot be set in this version");
-  }
-  fields.finish();
-  out.settings_json = body.is_object() ? [&] {
-    Json settings = body;
-    settings.erase("missions");
-    return settings.dump();
-  }() : "{}";
-  return out;
-}
 
 Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission,
                                const std::function<bool()>& canceled, bool with_cir) {
@@ -205,6 +132,17 @@ Json flight_provenance(const FlightData& flight, const FlightSolution& s) {
           {"notes", s.notes}};
 }
 
+/// What was stated about the noise, and how many ranges it bore on: of sigma_m.nlos those a model classified.
+Json noise_provenance(const CalibrationRequest& request, const std::vector<FlightModelsReport>& models) {
+  std::size_t n_believed = 0;
+  for (const auto& report : models) n_believed += report.n_believed;
+  const auto stated = [](const std::optional<double>& v) { return v ? Json(*v) : Json(nullptr); };
+  return {{"los", stated(request.noise.los_m)},
+          {"nlos", stated(request.noise.nlos_m)},
+          {"rtk", request.options.floor_sigma_m},
+          {"n_nlos_applied", request.noise.nlos_m ? n_believed : 0}};
+}
+
 /// Where an anchor would stand without the models, and how far they moved it.
 Json without_models(const Estimate& raw, const Calibration& made) {
   const auto at = std::ranges::find(made.anchors, raw.anchor, &Estimate::anchor);
@@ -228,6 +166,11 @@ Result<Job> CalibrationService::submit(CalibrationRequest request) {
     auto chosen = models_for(request.models, *deps_.models, *deps_.model_store);
     if (!chosen) return make_error(Errc::invalid_argument, "models: " + chosen.error().message);
     models = std::move(chosen).value();
+  }
+  if (!request.frame.empty()) {  // asked now: a frame nobody fitted is no reason to solve for minutes
+    if (deps_.frames == nullptr) return make_error(Errc::invalid_argument, "frame: this server has none");
+    const auto frame = calibration_frame(*deps_.frames, request.frame);
+    if (!frame) return make_error(Errc::invalid_argument, "frame: " + frame.error().message);
   }
   const std::string settings = request.settings_json;
   return deps_.jobs.submit(
@@ -316,6 +259,8 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
   for (const auto& id : all) {
     BOOST_OUTCOME_TRY(auto mission, deps_.missions.mission(id));
     BOOST_OUTCOME_TRY(auto flight, load_flight(deps_.measurements, mission, canceled_now, models.needs_cir));
+    if (!request.use_anchor_anchor)
+      std::erase_if(flight.ranges, [](const Range& r) { return r.kind == RangeKind::anchor_anchor; });
     solved.flights.push_back(std::move(flight));
     job.progress(0.3 * static_cast<double>(solved.flights.size()) / static_cast<double>(all.size()), "load",
                  solved.flights.back().mission.name);
@@ -324,20 +269,27 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
   options.canceled = canceled_now;
   Calibration& out = solved.calibration;
   BOOST_OUTCOME_TRYV(choose_frame(solved.flights, options, out));
+  std::optional<CalibrationFrame> frame;
+  if (!request.frame.empty() && deps_.frames != nullptr) {
+    BOOST_OUTCOME_TRY(frame, calibration_frame(*deps_.frames, request.frame));
+  }
+  const auto outline =
+      use_site_outline(request.site_outline, solved.flights, out.origin, frame, deps_.anchors, options);
   job.progress(0.3, "solve", std::to_string(solved.flights.size()) + " flights");
   Solved raw;  // the same without the models
   CalibrationRequest wanted = request;
   if (!models.predictor.empty()) {
     raw.flights = solved.flights;
-    std::size_t n_corrected = 0;
+    std::size_t n_corrected = 0, n_believed = 0;
     for (auto& flight : solved.flights) {
-      solved.models.push_back(correct_flight(models, flight));
+      solved.models.push_back(correct_flight(models, flight, request.likelihood, request.noise));
       n_corrected += solved.models.back().n_corrected;
+      n_believed += solved.models.back().n_believed;
     }
     // A kit's profile tells the bias of raw ranges: of corrected ones it would take it off twice, and what
     // these teach is no bias of the kit.
     if (n_corrected > 0) wanted.use_profile = false;
-    if (n_corrected == 0 || !request.compare_uncorrected) raw.flights.clear();
+    if (n_corrected + n_believed == 0 || !request.compare_uncorrected) raw.flights.clear();
   }
   for (auto* flights : {&solved.flights, &raw.flights})
     for (auto& flight : *flights)
@@ -351,7 +303,6 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
     solved.learned = std::move(raw.learned);
   }
   if (canceled_now()) return make_error(Errc::canceled, "canceled");
-
   std::map<NetworkId, std::vector<Estimate>> by_anchor, by_anchor_raw;
   Json flights = Json::array();
   for (std::size_t i = 0; i < request.missions.size(); ++i) {
@@ -366,10 +317,11 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
   for (const auto& [id, estimates] : by_anchor) {
     Estimate estimate = fuse_estimates(estimates);
     if (out.origin) {
-      const EnuFrame frame(*out.origin);
-      if (estimate.best) estimate.best->wgs84 = frame.wgs84_from_enu(estimate.best->position);
-      if (estimate.mirror) estimate.mirror->wgs84 = frame.wgs84_from_enu(estimate.mirror->position);
+      const EnuFrame globe(*out.origin);
+      if (estimate.best) estimate.best->wgs84 = globe.wgs84_from_enu(estimate.best->position);
+      if (estimate.mirror) estimate.mirror->wgs84 = globe.wgs84_from_enu(estimate.mirror->position);
     }
+    if (frame && !out.origin) place_on_globe(*frame, estimate);
     out.anchors.push_back(std::move(estimate));
   }
   Json uncorrected = raw.flights.empty() ? Json(nullptr) : Json::array();
@@ -383,6 +335,9 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
       {"profiles", std::move(solved.profiles)},
       {"base", std::move(base)},
       {"n_clues", solved.n_clues},
+      {"frame", frame ? frame_provenance(*frame, out) : Json(nullptr)},
+      {"clues", {{"outline", outline}}},
+      {"sigma_m", noise_provenance(request, solved.models)},
       {"models", models.predictor.empty() ? Json(nullptr) : Json(flight_models_json(models, solved.models))},
       {"uncorrected", std::move(uncorrected)},
       {"flights",

@@ -14,6 +14,10 @@
 #include "core/types/anchor.hpp"
 #include "core/types/flight_data.hpp"
 
+namespace anchord {
+class FrameStore;
+}
+
 namespace anchord::api {
 
 class JobContext;
@@ -31,11 +35,15 @@ struct CalibrationRequest {
   int iterations{0};          ///< growing parts of each flight solved too, for the report's curves
   FlightModelsWish models{};  ///< what corrects the ranges before anything is solved
   bool flight_clues{true};    ///< bearings and heights that the flights found are priors
+  StatedNoise noise{};        ///< sigma_m
+  bool likelihood{true};      ///< of the models, where they have one
   bool compare_uncorrected{true};  ///< the positions without the models are kept beside
+  bool use_anchor_anchor{true};    ///< ranges between anchors take part
+  bool site_outline{true};         ///< the outline of the missions' site is a clue, where none is given
+  std::string frame;               ///< name or id of the local frame the answers are told in too
 };
 
-/// Reads the body of POST /calibrations; what is wrong is appended to `errors`. Settings this build does not
-/// have (frame, use_anchor_anchor, ...) are refused as `unsupported`, never ignored.
+/// Reads the body of POST /calibrations; what is wrong is appended to `errors`.
 CalibrationRequest read_calibration_request(const nlohmann::json& body, std::vector<FieldError>& errors);
 
 /// All rows of a mission as the solver takes them; impulse responses only where asked for.
@@ -56,6 +64,7 @@ class CalibrationService {
     ModelStore* model_store{nullptr};
     /// What turns and height searches of a mission's flight told; absent: nothing.
     std::function<procedure::FlightClues(const MissionId&)> flight_clues{};
+    FrameStore* frames{nullptr};  ///< null: no local frames
   };
   explicit CalibrationService(Deps deps) : deps_(deps) {}
 

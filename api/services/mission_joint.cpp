@@ -1,3 +1,4 @@
+#include "api/json/outline_json.hpp"
 #include "api/services/mission_service_state.hpp"
 #include "core/localize/flight_solver.hpp"
 
@@ -17,6 +18,10 @@ void MissionService::State::start_joint(const std::shared_ptr<Flight>& flight) {
     const std::scoped_lock lock(flight->queue_mutex);
     mission = flight->mission;
   }
+  std::string outline;
+  if (deps.site_outline && mission.site && flight->frame == TrackFrame::wgs84) {
+    if (const auto site = deps.anchors.site(*mission.site)) outline = site.value().outline_geojson;
+  }
   const std::unique_lock lock(flight->work_mutex, std::try_to_lock);
   if (!lock || flight->joint_running || flight->ranges_since_joint == 0) return;
   const auto now = std::chrono::steady_clock::now();
@@ -26,6 +31,7 @@ void MissionService::State::start_joint(const std::shared_ptr<Flight>& flight) {
   task.options.origin = flight->live.origin();
   if (flight->frame == TrackFrame::wgs84 && !task.options.origin) return;
   if (task.options.origin) task.options.clues = clues_in(flight->clues, EnuFrame(*task.options.origin));
+  if (!outline.empty()) task.options.outline_m = outline_in_enu(outline, *task.options.origin);
   task.done = [self = this, flight, cut = flight->history.newest(), now](const FlightSolution* solution) {
     self->finish_joint(*flight, solution, cut, std::chrono::steady_clock::now() - now);
   };

@@ -138,7 +138,7 @@ void MissionService::State::step(Flight& flight, const LiveRow& row, bool quiet)
         static_cast<double>(flight.range_times_us.back() - flight.range_times_us.front()) * 1e-6;
     state.range_rate_hz = span_s > 0 ? static_cast<double>(flight.range_times_us.size() - 1) / span_s : 0;
     flight.watch.note_range(time);
-    flight.history.add(corrected(*judged));
+    flight.history.add(corrected(*judged), belief_of(*judged));
     ++flight.ranges_since_joint;
     flight.live.add(*range, judged->model);
     return;

@@ -55,6 +55,7 @@ class MissionService {
     /// What the promoted models say of a range; absent: ranges are used raw.
     std::function<std::optional<RangeModel>(const Range&)> judge{};
     std::function<bool()> judge_needs_cir{};
+    bool site_outline{true};  ///< joint solutions take the site's outline as a clue: anchors are inside
   };
   explicit MissionService(Deps deps);
   ~MissionService();

@@ -226,6 +226,7 @@ void App::State::compose() {
   backups = std::make_unique<BackupKeeper>(*database, clock, std::move(keep));
   deps.backups = backups.get();
   deps.goal = {config.metres("goal.h95_m"), config.metres("goal.v95_m")};
+  deps.site_outline = config.text("solve.site_outline") == "on";
   deps.devices = devices.get();
   learning = std::make_unique<api::LearningStores>(
       api::LearningStores{database->campaigns(), database->labels(), database->datasets(),

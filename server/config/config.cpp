@@ -55,6 +55,9 @@ constexpr std::array k_options = {
     Option{"goal.h95_m", "0.2", "a live anchor is converged when its horizontal 95 % radius is within this",
            metres},
     Option{"goal.v95_m", "0.4", "and its vertical 95 % bound within this", metres},
+    Option{"solve.site_outline", "on",
+           "live solutions take the outline of the mission's site as a clue: anchors are inside", choice,
+           "on|off"},
     Option{"rate.per_s", "50", "requests a second of one token; beyond: 429", count},
     Option{"rate.burst", "200", "requests a token may send at once", count},
 };

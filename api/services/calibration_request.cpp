@@ -1,0 +1,110 @@
+// The body of POST /calibrations.
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "api/imports/flight_json.hpp"
+#include "api/json/clues_json.hpp"
+#include "api/json/reader.hpp"
+#include "api/services/calibration_service.hpp"
+
+namespace anchord::api {
+
+using Json = nlohmann::json;
+
+namespace {
+
+constexpr double k_far_m = 20'000;  // of the origin, as for the track
+
+/// A word, or where to begin for each anchor that is named.
+void read_initial(Fields& fields, const Json& initial, FlightOptions& options,
+                  std::vector<FieldError>& errors) {
+  if (initial.is_string()) {
+    const auto word = fields.word("initial", {"search", "bearing_height"});
+    options.start_at_clues = word && *word == 1;
+    return;
+  }
+  if (!initial.is_object() || initial.size() > 1000)
+    return fields.error("initial", "wrong_type",
+                        "search, bearing_height, or an object: anchor id -> [east, north, up] in metres");
+  Fields starts(initial, "/initial", errors);
+  for (const auto& [id, place] : initial.items()) {
+    if (const auto at = starts.numbers(id, 3, -k_far_m, k_far_m))
+      options.starts[network_id_of(id)] = {(*at)[0], (*at)[1], (*at)[2]};
+  }
+  starts.finish();
+}
+
+}  // namespace
+
+CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldError>& errors) {
+  CalibrationRequest out;
+  Fields fields(body, "", errors);
+  std::set<std::string> seen;
+  const auto read_ids = [&](const char* key, std::vector<MissionId>& ids) {
+    const Json* list = fields.child(key);
+    if (list == nullptr) return;
+    if (!list->is_array() || list->empty() || list->size() > 100)
+      return fields.error(key, "wrong_type", "must be an array of 1 to 100 mission ids");
+    for (std::size_t i = 0; i < list->size(); ++i) {
+      const auto& item = (*list)[i];
+      const auto id = parse_uuid(item.is_string() ? item.get_ref<const std::string&>() : "");
+      const std::string at = std::string("/") + key + '/' + std::to_string(i);
+      if (!id)
+        errors.push_back({at, "bad_id", id.error().message});
+      else if (!seen.insert(to_string(id.value())).second)
+        errors.push_back({at, "duplicate", "the mission stands twice"});
+      else
+        ids.push_back(MissionId{id.value()});
+    }
+  };
+  if (!fields.has("missions")) fields.error("missions", "required", "missions is missing");
+  read_ids("missions", out.missions);
+  read_ids("learn_from", out.learn_from);
+  auto& options = out.options;
+  if (const auto dims = fields.integer("dims", 2, 3)) options.dims = *dims == 2 ? Dims::two : Dims::three;
+  if (const auto solver = fields.word("solver", {"gauss_newton", "levenberg_marquardt", "dogleg"}))
+    options.method = static_cast<anchord::Method>(*solver);
+  if (const auto weights = fields.word("weights", {"inverse_variance", "dissertation"}))
+    options.weights = static_cast<Weights>(*weights);
+  if (const Json* loss = fields.child("loss")) {
+    Fields inner(*loss, "/loss", errors);
+    if (const auto type = inner.word("type", {"none", "huber", "cauchy", "tukey"}, true))
+      options.loss = static_cast<Loss>(*type);
+    // The robust scale comes from the residuals themselves; `scale` stretches it, 1.5 being the neutral value
+    // of api.md.
+    if (const auto scale = inner.number("scale", 0.1, 10)) options.mad_factor *= *scale / 1.5;
+    inner.finish();
+  }
+  if (const auto height = fields.number("anchor_height_m", -1000, 9000)) options.anchor_height_m = *height;
+  if (const auto gap = fields.number("max_gap_s", 0.01, 10)) options.max_gap_s = *gap;
+  if (const auto fix = fields.word("min_fix", {"none", "single", "dgps", "float", "fixed"}))
+    options.min_fix = static_cast<FixClass>(*fix);
+  if (const auto profile = fields.word("profile", {"kit", "none"})) out.use_profile = *profile == 0;
+  if (const auto steps = fields.integer("iterations", 0, 50)) out.iterations = static_cast<int>(*steps);
+  if (const Json* sigma = fields.child("sigma_m")) {
+    Fields inner(*sigma, "/sigma_m", errors);
+    if ((out.noise.los_m = inner.number("los", 0.001, 1))) options.min_scale_m = *out.noise.los_m;
+    if (const auto rtk = inner.number("rtk", 0, 1)) options.floor_sigma_m = *rtk;
+    out.noise.nlos_m = inner.number("nlos", 0.001, 10);
+    inner.finish();
+  }
+  if (const Json* initial = fields.child("initial")) read_initial(fields, *initial, options, errors);
+  if (const Json* clues = fields.child("clues")) read_clues(*clues, "/clues", options, errors);
+  if (const Json* models = fields.child("models")) out.models = read_flight_models(*models, errors);
+  out.flight_clues = fields.boolean("flight_clues").value_or(true);
+  out.compare_uncorrected = fields.boolean("compare_uncorrected").value_or(true);
+  // Who names a loss wants it: the likelihood of the models then takes its place only where asked for.
+  out.likelihood = out.models.likelihood.value_or(!fields.has("loss"));
+  if (auto frame = fields.text("frame", 80)) out.frame = std::move(*frame);
+  out.use_anchor_anchor = fields.boolean("use_anchor_anchor").value_or(true);
+  out.site_outline = fields.boolean("site_outline").value_or(true);
+  fields.finish();
+  out.settings_json = body.is_object() ? [&] {
+    Json settings = body;
+    settings.erase("missions");
+    return settings.dump();
+  }() : "{}";
+  return out;
+}
+
+}  // namespace anchord::api

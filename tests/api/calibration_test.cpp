@@ -1,0 +1,291 @@
+// What a calibration may be asked for, each shown to have an effect: the likelihood of a model, stated noise,
+// starts, a local frame, ranges between anchors, the site's outline.
+#include "app_fixture.hpp"
+#include "core/geo/enu.hpp"
+#include "tests/core/localize/flight_support.hpp"
+
+namespace anchord::test {
+namespace {
+
+using anchord::testing::MadeFlight;
+using api::Method;
+
+/// Levels a radio gives behind a wall (6 dB more of the first path lost) and in the open.
+struct Levels {
+  double rx_dbm, fp_dbm;
+};
+Levels levels(bool blocked, double distance_m, std::mt19937_64& random) {
+  std::normal_distribution<double> noise(0, 1);
+  const double rx_dbm = -75 - 0.3 * distance_m + noise(random);
+  return {rx_dbm, rx_dbm - (blocked ? 9.0 : 2.0) + 1.2 * noise(random)};
+}
+
+/// What a wall adds: 0.1 m, and an exponential delay of 0.3 m.
+double late_m(std::mt19937_64& random) {
+  return 0.1 + std::exponential_distribution<double>(1 / 0.3)(random);
+}
+
+/// A campaign of the same radio: 5 cm noise, late behind walls.
+std::string campaign_csv() {
+  std::mt19937_64 random(11);
+  std::normal_distribution<double> noise(0, 1);
+  std::string csv = "environment,setting,true_distance_m,los,range_m,rx_dbm,fp_dbm\n";
+  for (int room = 0; room < 6; ++room) {
+    for (int k = 0; k < 40; ++k) {
+      const bool los = k % 2 == 0;
+      const double distance_m = 2.0 + 0.8 * k + 0.1 * room;
+      const Levels level = levels(!los, distance_m, random);
+      const double wall_m = los ? 0.0 : late_m(random);
+      csv += "room " + std::to_string(room) + ",s" + std::to_string(room * 40 + k) + "," +
+             std::to_string(distance_m) + "," + (los ? "1" : "0") + "," +
+             std::to_string(distance_m + wall_m + 0.05 * noise(random)) + "," + std::to_string(level.rx_dbm) +
+             "," + std::to_string(level.fp_dbm) + "\n";
+    }
+  }
+  return csv;
+}
+
+class Calibrations : public AppFixture {
+ protected:
+  static MadeFlight made(std::uint64_t seed) {
+    MadeFlight m;
+    m.seed = seed;
+    m.frame = TrackFrame::wgs84;
+    return m;
+  }
+  /// The flight in the store; its mission.
+  std::string flown(const MadeFlight& m, double blocked_share = 0, const std::string& site = "") {
+    FlightData data = anchord::testing::make_flight(m);
+    std::mt19937_64 random(m.seed + 100);
+    std::uniform_real_distribution<double> uniform(0, 1);
+    Mission mission = data.mission;
+    mission.id.uuid = make_uuid_v7(clock_.now());
+    mission.created = clock_.now();
+    if (!site.empty()) mission.site = SiteId{parse_uuid(site).value()};
+    EXPECT_TRUE(database_->missions().insert(mission).has_value());
+    for (auto& fix : data.fixes) fix.mission = mission.id;
+    for (auto& range : data.ranges) {
+      range.mission = mission.id;
+      if (range.kind == RangeKind::anchor_anchor) continue;
+      // Some anchors stand behind more walls than others.
+      const bool blocked = uniform(random) < blocked_share * (range.anchor.value % 2 == 0 ? 1.7 : 0.3);
+      const Levels level = levels(blocked, range.distance_m, random);
+      if (blocked) range.distance_m += late_m(random);
+      range.rx_dbm = level.rx_dbm;
+      range.fp_dbm = level.fp_dbm;
+    }
+    EXPECT_TRUE(database_->measurements().append_fixes(data.fixes, true).has_value());
+    EXPECT_TRUE(database_->measurements().append_ranges(data.ranges, true).has_value());
+    return to_string(mission.id);
+  }
+  api::Response solve(const std::string& mission, Json more = Json::object()) {
+    more["missions"] = {mission};
+    Call options;
+    options.headers["prefer"] = "wait=120";
+    return call(Method::post, "/api/v1/calibrations", more.dump(), options);
+  }
+  Json solved(const std::string& mission, const Json& more = Json::object()) {
+    const auto response = solve(mission, more);
+    EXPECT_EQ(response.status, 201) << response.body;
+    return json(response);
+  }
+  /// Mean distance of the anchors from where they are.
+  static double error_m(const Json& calibration, const MadeFlight& m) {
+    const EnuFrame frame(m.origin);
+    double sum_m = 0;
+    for (std::size_t i = 0; i < m.anchors.size(); ++i) {
+      const auto& at = calibration["anchors"][i]["geometry"]["coordinates"];
+      sum_m += (frame.enu_from_wgs84({at[1].get<double>(), at[0].get<double>(), at[2].get<double>()}).m -
+                m.anchors[i])
+                   .norm();
+    }
+    return sum_m / static_cast<double>(m.anchors.size());
+  }
+  void promote_mixture() {
+    ASSERT_EQ(post("/api/v1/campaigns", R"({"name":"hall"})").status, 201);
+    ASSERT_EQ(post("/api/v1/campaigns/hall/samples", campaign_csv(), "text/csv").status, 200);
+    ASSERT_EQ(post("/api/v1/datasets", R"({"name":"set","campaigns":["hall"],"aggregation":"none",
+      "split":{"by":"environment","test":["room 5"]}})")
+                  .status,
+              201);
+    Call options;
+    options.headers["prefer"] = "wait=120";
+    const auto run =
+        call(Method::post, "/api/v1/training-runs",
+             R"({"task":"bias","dataset":"set","cv":{"folds":4,"seed":3},"importance":false})", options);
+    ASSERT_EQ(run.status, 201) << run.body;
+    const auto done = post(json(run).value("model", "") + "/promote", R"({"reason":"the same radio"})");
+    ASSERT_EQ(done.status, 200) << done.body;
+  }
+  std::string site(const Json& outline) {
+    const auto made = post(
+        "/api/v1/sites",
+        Json{{"name", "hall"}, {"origin", {{"lon", 4.7}, {"lat", 50.88}, {"h_m", 80}}}, {"outline", outline}}
+            .dump());
+    EXPECT_EQ(made.status, 201) << made.body;
+    return json(made).value("id", "");
+  }
+  /// A square of 2 x half_m about the place the flights are made at.
+  static Json square(double half_m) {
+    const EnuFrame frame(MadeFlight{}.origin);
+    Json ring = Json::array();
+    for (const auto& [e, n] : {std::pair{-1, -1}, {1, -1}, {1, 1}, {-1, 1}, {-1, -1}}) {
+      const Wgs84 at = frame.wgs84_from_enu({Eigen::Vector3d(half_m * e, half_m * n, 0)});
+      ring.push_back({at.lon_deg, at.lat_deg});
+    }
+    return {{"type", "Polygon"}, {"coordinates", {ring}}};
+  }
+};
+
+TEST_F(Calibrations, ALikelihoodThatKnowsBlockedPathsAreLateBeatsTheLoss) {
+  promote_mixture();
+  double one_sided_m = 0, loss_m = 0, raw_m = 0;
+  constexpr int k_flights = 3;
+  for (std::uint64_t seed = 1; seed <= k_flights; ++seed) {
+    const MadeFlight m = made(seed);
+    const auto mission = flown(m, 0.35);
+    const auto with = solved(mission);
+    const auto& told = with["provenance"]["models"];
+    EXPECT_EQ(told["likelihood"], "one_sided");
+    EXPECT_GT(told["flights"][0]["n_believed"], 0.8 * told["flights"][0]["n_ranges"].get<double>()) << told;
+    EXPECT_NE(with["provenance"]["flights"][0]["notes"].dump().find("likelihood of a model"),
+              std::string::npos);
+    one_sided_m += error_m(with, m) / k_flights;
+    const auto without = solved(mission, {{"models", {{"likelihood", "loss"}}}});
+    EXPECT_EQ(without["provenance"]["models"]["likelihood"], "loss");
+    EXPECT_EQ(without["provenance"]["models"]["flights"][0]["n_believed"], 0);
+    loss_m += error_m(without, m) / k_flights;
+    raw_m += error_m(solved(mission, {{"models", {{"bias", "none"}}}}), m) / k_flights;
+  }
+  std::printf("35 %% blocked: anchors off by %.3f m with the likelihood, %.3f m with the loss, %.3f m raw\n",
+              one_sided_m, loss_m, raw_m);
+  EXPECT_LT(one_sided_m, loss_m);
+  EXPECT_LT(one_sided_m, raw_m);
+}
+
+TEST_F(Calibrations, StatedNoiseOfBlockedRangesCountsAndSaysOnHowMany) {
+  promote_mixture();
+  const auto mission = flown(made(4), 0.3);
+  const auto narrow = solved(mission, {{"sigma_m", {{"los", 0.049}, {"nlos", 0.234}, {"rtk", 0.02}}}});
+  const auto wide = solved(mission, {{"sigma_m", {{"los", 0.049}, {"nlos", 5.0}, {"rtk", 0.02}}}});
+  const auto& told = narrow["provenance"]["sigma_m"];
+  EXPECT_EQ(told["nlos"], 0.234);
+  EXPECT_GT(told["n_nlos_applied"], 1000);
+  EXPECT_NE(narrow["anchors"][0]["enu_m"], wide["anchors"][0]["enu_m"]);
+  // Without a model no range is known to be blocked, and the provenance says so.
+  const auto none = solved(mission, {{"sigma_m", {{"nlos", 0.234}}}, {"models", {{"bias", "none"}}}});
+  EXPECT_EQ(none["provenance"]["sigma_m"]["n_nlos_applied"], 0);
+}
+
+TEST_F(Calibrations, BeginWhereTheyAreTold) {
+  MadeFlight flat = made(5);
+  flat.height_swing_m = 0;  // one plane at 6 m: every anchor has a twin above or below
+  flat.anchors = {{12, 2, 2}, {-10, 8, 2.5}, {3, -14, 2}, {-6, -9, 1.5}};
+  const auto mission = flown(flat);
+  const auto origin = solved(mission)["origin"];
+  const auto begun = [&](double up_m) {
+    Json starts = Json::object();
+    const EnuFrame frame(
+        {origin["lat"].get<double>(), origin["lon"].get<double>(), origin["h_m"].get<double>()});
+    const EnuFrame truth(flat.origin);
+    for (std::size_t i = 0; i < flat.anchors.size(); ++i) {
+      Eigen::Vector3d at = flat.anchors[i];
+      at.z() = up_m;
+      const auto enu = frame.enu_from_wgs84(truth.wgs84_from_enu({at})).m;
+      starts[to_string(NetworkId{static_cast<std::uint32_t>(0x6000 + i)})] = {enu.x(), enu.y(), enu.z()};
+    }
+    return solved(mission, {{"initial", starts}})["anchors"];
+  };
+  const auto low = begun(2), high = begun(10);
+  for (std::size_t i = 0; i < low.size(); ++i) {
+    // Which twin is told first follows the start; that there are two is told either way.
+    EXPECT_GT(high[i]["enu_m"][2].get<double>() - low[i]["enu_m"][2].get<double>(), 2.0) << i;
+    EXPECT_EQ(low[i]["verdict"], "ambiguous");
+  }
+  EXPECT_EQ(solve(mission, {{"initial", "anywhere"}}).status, 422);
+  EXPECT_EQ(solve(mission, {{"initial", {{"0x6000", {1, 2}}}}}).status, 422);
+  EXPECT_EQ(solve(mission, {{"initial", 3}}).status, 422);
+}
+
+TEST_F(Calibrations, TellTheirAnswerInALocalFrameToo) {
+  const MadeFlight m = made(6);
+  const auto mission = flown(m);
+  EXPECT_EQ(solve(mission, {{"frame", "hall-a"}}).status, 422);
+  ASSERT_EQ(post("/api/v1/frames", R"({"name":"hall-a"})").status, 201);
+  const auto unfitted = solve(mission, {{"frame", "hall-a"}});
+  EXPECT_EQ(unfitted.status, 422);
+  EXPECT_NE(unfitted.body.find("never fitted"), std::string::npos) << unfitted.body;
+  // x is north and y is west of a corner at (20, -30) m.
+  const EnuFrame frame(m.origin);
+  Json pairs = Json::array();
+  for (const auto& local : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(40, 0, 0), Eigen::Vector3d(0, 30, 0)}) {
+    const Wgs84 at = frame.wgs84_from_enu({Eigen::Vector3d(20 - local.y(), -30 + local.x(), 0)});
+    pairs.push_back({{"name", "p"},
+                     {"local_m", {local.x(), local.y(), local.z()}},
+                     {"lon", at.lon_deg},
+                     {"lat", at.lat_deg},
+                     {"h_m", at.height_m}});
+  }
+  const auto fit = post("/api/v1/frames/hall-a/fit", Json{{"parameters", 4}, {"pairs", pairs}}.dump());
+  ASSERT_EQ(fit.status, 200) << fit.body;
+  const auto answer = solved(mission, {{"frame", "hall-a"}});
+  EXPECT_EQ(answer["provenance"]["frame"]["name"], "hall-a");
+  for (std::size_t i = 0; i < m.anchors.size(); ++i) {
+    const auto& local = answer["anchors"][i]["local_m"];
+    EXPECT_NEAR(local[0].get<double>(), m.anchors[i].y() + 30, 0.2);
+    EXPECT_NEAR(local[1].get<double>(), 20 - m.anchors[i].x(), 0.2);
+  }
+  EXPECT_TRUE(solved(mission)["anchors"][0]["local_m"].is_null());
+}
+
+TEST_F(Calibrations, LeaveRangesBetweenAnchorsOutWhereAsked) {
+  MadeFlight m = made(7);
+  m.pairs = true;
+  const auto mission = flown(m);
+  const auto notes = [&](const Json& more) {
+    return solved(mission, more)["provenance"]["flights"][0]["notes"].dump();
+  };
+  EXPECT_NE(notes(Json::object()).find("6 distances between anchors"), std::string::npos);
+  EXPECT_NE(notes({{"use_anchor_anchor", true}}).find("6 distances between anchors"), std::string::npos);
+  EXPECT_EQ(notes({{"use_anchor_anchor", false}}).find("distances between anchors"), std::string::npos);
+}
+
+TEST_F(Calibrations, TakeTheOutlineOfTheSiteAsAClueUnlessToldNotTo) {
+  // Before one wall, up and down: the twin of every anchor is as far in front of the wall as the anchor is
+  // behind.
+  MadeFlight facade = made(8);
+  facade.width_m = 0;
+  facade.anchors = {{12, 8, 1.5}, {-10, 9, 6}, {3, 12, 2}, {-6, 10, 9}};
+  Json outline = square(30);
+  const EnuFrame frame(facade.origin);
+  for (auto& corner : outline["coordinates"][0]) {  // its southern wall at n = 4 m
+    if (corner[1].get<double>() < facade.origin.lat_deg)
+      corner[1] = frame.wgs84_from_enu({Eigen::Vector3d(0, 4, 0)}).lat_deg;
+  }
+  const auto mission = flown(facade, 0, site(outline));
+  const auto without = solved(mission, {{"site_outline", false}});
+  EXPECT_EQ(without["provenance"]["clues"]["outline"]["source"], "none");
+  const auto with = solved(mission);
+  const auto& told = with["provenance"]["clues"]["outline"];
+  EXPECT_EQ(told["source"], "site");
+  EXPECT_EQ(told["sigma_m"], 1.0);
+  for (std::size_t i = 0; i < facade.anchors.size(); ++i) {
+    EXPECT_EQ(without["anchors"][i]["verdict"], "ambiguous") << i;
+    EXPECT_EQ(with["anchors"][i]["verdict"], "ok") << with["anchors"][i]["reason"];
+  }
+  EXPECT_LT(error_m(with, facade), 0.3);
+}
+
+TEST_F(Calibrations, HoldBackAnAnchorFarOutsideOfTheOutline) {
+  const MadeFlight m = made(9);
+  const auto answer = solved(flown(m, 0, site(square(5))));  // anchors stand up to 14 m from its middle
+  ASSERT_FALSE(answer["anchors"][0]["geometry"].is_null()) << answer["anchors"][0];
+  std::string failed;
+  for (const auto& gate : answer["anchors"][0]["quality"]["gates"])
+    if (!gate["passed"].get<bool>()) failed += gate["name"].get<std::string>() + " ";
+  EXPECT_EQ(failed, "outline ");
+  EXPECT_LT(error_m(answer, m), 0.3) << "a clue of a metre moves no good answer";
+}
+
+}  // namespace
+}  // namespace anchord::test
