@@ -4,10 +4,9 @@
 #include <utility>
 
 #include "server/http/body_pipe.hpp"
-#include "server/http/rate_floor.hpp"
+#include "server/http/http_wire.hpp"
 #include "server/http/request_id.hpp"
 #include "server/http/request_judge.hpp"
-#include "server/http/request_parser.hpp"
 #include "server/http/response_writer.hpp"
 #include "server/http/sessions.hpp"
 #include "server/runtime/worker_pool.hpp"
@@ -19,7 +18,6 @@ using SteadyClock = std::chrono::steady_clock;
 template <class T>
 using awaitable = asio::awaitable<T>;
 
-constexpr std::size_t k_head_read_bytes = 4096;
 constexpr std::size_t k_piece_bytes = 16 * 1024;
 
 enum class BodyEnd : std::uint8_t { complete, lost, refused };
@@ -29,15 +27,12 @@ enum class BodyEnd : std::uint8_t { complete, lost, refused };
 class HttpSession final : public Connection, public std::enable_shared_from_this<HttpSession> {
  public:
   HttpSession(tcp::socket socket, std::shared_ptr<SessionContext> context, ConnectionSlot slot)
-      : stream_(std::move(socket)),
-        bell_(stream_.get_executor()),
+      : wire_(std::move(socket), context->limits),
+        bell_(wire_.executor()),
         context_(std::move(context)),
         slot_(std::move(slot)),
-        limits_(context_->limits) {
-    error_code ignored;
-    const auto peer = stream_.socket().remote_endpoint(ignored);
-    remote_ = peer.address().to_string(ignored);
-  }
+        limits_(context_->limits),
+        remote_(wire_.remote()) {}
   ~HttpSession() override { context_->leave(this); }
 
   static awaitable<void> run(std::shared_ptr<HttpSession> self) {
@@ -47,39 +42,35 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
   }
 
   void stop() override {
-    asio::post(stream_.get_executor(), [self = shared_from_this()] {
-      if (self->idle_) self->close();
+    asio::post(wire_.executor(), [self = shared_from_this()] {
+      if (self->wire_.idle()) self->close();
     });
   }
   void abort() override {
-    asio::post(stream_.get_executor(), [self = shared_from_this()] { self->close(); });
+    asio::post(wire_.executor(), [self = shared_from_this()] { self->close(); });
   }
 
  private:
-  std::string_view buffered() const {
-    const auto bytes = buffer_.cdata();
-    return {static_cast<const char*>(bytes.data()), bytes.size()};
-  }
   void close() {
-    error_code ignored;
-    stream_.socket().close(ignored);
+    wire_.close();
     bell_.cancel();
   }
 
   /// One request and its answer. False: the connection is finished.
   awaitable<bool> serve_one(bool first) {
-    const std::optional<std::size_t> head_end = co_await read_head(first);
-    if (!head_end) co_return false;
+    const HttpWire::Head head = co_await wire_.read_head(first, context_->stopping);
     started_ = SteadyClock::now();
+    if (head.refusal) co_await refuse(*head.refusal);
+    if (head.size == 0) co_return false;
     RequestParser parser(limits_);
-    auto broken = parser.parse_head(buffered().substr(0, *head_end));
+    auto broken = parser.parse_head(wire_.buffered().substr(0, head.size));
     Judgement judgement;
     if (broken) {
       judgement = std::move(*broken);
     } else {
       judgement = judge_head(parser.head(), limits_, context_->hosts);
     }
-    buffer_.consume(*head_end);
+    wire_.consume(head.size);
     if (auto* refusal = std::get_if<Refusal>(&judgement)) {
       co_await refuse(*refusal);
       co_return false;
@@ -91,53 +82,18 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
     Admission admission = context_->gateway.admit(*request_, judged.host, judged.websocket);
     route_ = admission.route;
     if (admission.websocket && !admission.refusal) {
-      if (buffer_.size() != 0) {
+      if (!wire_.buffered().empty()) {
         const Refusal early{400, "malformed", "data before the WebSocket handshake was answered"};
         co_await refuse(early);
         co_return false;
       }
       auto peer = admission.websocket();
-      stream_.expires_never();
       context_->gateway.answered(*request_, route_, 101, seconds(), 0);
-      start_ws_session(std::move(stream_), context_, std::move(slot_), *request_, admission.subprotocol,
+      start_ws_session(wire_.take(), context_, std::move(slot_), *request_, admission.subprotocol,
                        std::move(peer));
       co_return false;
     }
     co_return co_await exchange(parser, judged, admission);
-  }
-
-  /// Bytes of one head in the buffer: its size, or null when the connection has ended.
-  awaitable<std::optional<std::size_t>> read_head(bool first) {
-    HeadScan scan;
-    if (buffer_.size() == 0) buffer_.shrink_to_fit();  // an idle connection holds no buffer
-    bool started = buffer_.size() != 0;
-    auto deadline = SteadyClock::now() + (first || started ? limits_.head_time : limits_.keep_alive);
-    for (;;) {
-      // RFC 9112 section 2.2: an empty line before the request line is a habit of old clients.
-      while (scan.scanned == 0 && buffered().starts_with("\r\n")) buffer_.consume(2);
-      if (const auto bytes = buffered(); !bytes.empty() && !(bytes == "\r" && scan.scanned == 0)) {
-        auto seen = scan_head(bytes, scan, limits_);
-        if (auto* refusal = std::get_if<Refusal>(&seen)) {
-          started_ = SteadyClock::now();
-          co_await refuse(*refusal);
-          co_return std::nullopt;
-        }
-        scan = std::get<HeadScan>(seen);
-        if (scan.head_end != 0) co_return scan.head_end;
-      }
-      if (!started && context_->stopping) co_return std::nullopt;
-      idle_ = !started;
-      stream_.expires_at(deadline);
-      const auto space = buffer_.prepare(k_head_read_bytes);
-      const auto [error, n] = co_await stream_.async_read_some(space, k_wait);
-      idle_ = false;
-      if (error) co_return std::nullopt;
-      buffer_.commit(n);
-      if (!started) {
-        started = true;
-        deadline = SteadyClock::now() + limits_.head_time;
-      }
-    }
   }
 
   awaitable<bool> exchange(RequestParser& parser, JudgedHead& judged, Admission& admission) {
@@ -153,9 +109,9 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
           413, "too-large", "the body may have at most " + std::to_string(limit) + " bytes here");
       keep = false;
     } else {
-      if (judged.expects_continue && buffer_.size() == 0) {
+      if (judged.expects_continue && wire_.buffered().empty()) {
         const std::string go_on = "HTTP/1.1 100 Continue\r\n\r\n";
-        const bool sent = co_await write_all(go_on, {});
+        const bool sent = co_await wire_.write(go_on, {});
         if (!sent) co_return false;
       }
       BodyEnd end = BodyEnd::complete;
@@ -182,47 +138,25 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
     co_return co_await answer(response, judged, keep);
   }
 
-  /// The next decoded piece: false when nothing more will come (see `end`).
-  awaitable<bool> next_piece(RequestParser& parser, RateFloor& floor, std::span<char> out,
-                             std::size_t& produced, BodyEnd& end) {
-    for (;;) {
-      const auto step = parser.decode(buffered(), out);
-      buffer_.consume(step.consumed);
-      if (step.refusal) {
-        refusal_ = *step.refusal;
-        end = BodyEnd::refused;
-        co_return false;
-      }
-      produced = step.produced;
-      if (step.produced > 0 || step.done) co_return true;
-      stream_.expires_at(floor.deadline());
-      const auto space =
-          buffer_.prepare(std::max<std::size_t>(limits_.read_buffer_bytes - buffer_.size(), 4096));
-      const auto [error, n] = co_await stream_.async_read_some(space, k_wait);
-      if (error) {
-        end = BodyEnd::lost;
-        co_return false;
-      }
-      floor.received(SteadyClock::now(), n);
-      buffer_.commit(n);
-    }
+  BodyEnd ended(const HttpWire::Piece& piece) {
+    if (!piece.refusal) return BodyEnd::lost;
+    refusal_ = *piece.refusal;
+    return BodyEnd::refused;
   }
 
   awaitable<BodyEnd> read_body(RequestParser& parser, const JudgedHead& judged, std::uint64_t limit,
                                std::string& body) {
     if (parser.done()) co_return BodyEnd::complete;
-    buffer_.reserve(limits_.read_buffer_bytes);
+    wire_.expect_body();
     RateFloor floor(SteadyClock::now(), limits_.body_window, limits_.body_floor_bytes_per_s);
-    BodyEnd end = BodyEnd::complete;
     if (judged.framing == Framing::length)
       body.reserve(std::min<std::uint64_t>(judged.content_length, 1u << 20));
     while (!parser.done()) {
       const std::size_t at = body.size();
       body.resize(at + k_piece_bytes);
-      std::size_t produced = 0;
-      const bool more = co_await next_piece(parser, floor, {body.data() + at, k_piece_bytes}, produced, end);
-      body.resize(at + produced);
-      if (!more) co_return end;
+      const auto got = co_await wire_.next_piece(parser, floor, {body.data() + at, k_piece_bytes});
+      body.resize(at + got.produced);
+      if (!got.more()) co_return ended(got);
       if (body.size() > limit) {
         refusal_ =
             Refusal{413, "too-large", "the body may have at most " + std::to_string(limit) + " bytes here"};
@@ -240,7 +174,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
       if (auto self = weak.lock()) self->ring();
     });
     request_->body_stream = pipe.get();
-    buffer_.reserve(limits_.read_buffer_bytes);
+    wire_.expect_body();
     RateFloor floor(SteadyClock::now(), limits_.body_window, limits_.body_floor_bytes_per_s);
     std::string piece(k_piece_bytes, '\0');
     std::shared_ptr<Job> job;
@@ -256,10 +190,10 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
         floor.waited(SteadyClock::now() - before);
         continue;
       }
-      std::size_t produced = 0;
-      const bool more =
-          co_await next_piece(parser, floor, {piece.data(), std::min(space, piece.size())}, produced, end);
-      if (!more) {
+      const auto got =
+          co_await wire_.next_piece(parser, floor, {piece.data(), std::min(space, piece.size())});
+      if (!got.more()) {
+        end = ended(got);
         if (end == BodyEnd::lost) {
           pipe->fail(400, "the connection ended, or fell below 1 KiB/s, inside the body");
         } else {
@@ -267,7 +201,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
         }
         break;
       }
-      total += produced;
+      total += got.produced;
       if (total > admission.body_limit) {
         refusal_ =
             Refusal{413, "too-large",
@@ -276,7 +210,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
         end = BodyEnd::refused;
         break;
       }
-      pipe->feed({piece.data(), produced});
+      pipe->feed({piece.data(), got.produced});
     }
     if (parser.done()) pipe->finish();
     if (end == BodyEnd::complete && !job && parser.done())
@@ -308,7 +242,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
           job->response = self->guarded(run, *request);
           if (pipe) pipe->abandon();
           gzip_response(job->response, request->header("accept-encoding"), from);
-          asio::post(self->stream_.get_executor(), [job, self] {
+          asio::post(self->wire_.executor(), [job, self] {
             job->done = true;
             self->bell_.cancel();
           });
@@ -347,27 +281,11 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
   }
 
   void ring() {
-    asio::post(stream_.get_executor(), [self = shared_from_this()] { self->bell_.cancel(); });
+    asio::post(wire_.executor(), [self = shared_from_this()] { self->bell_.cancel(); });
   }
   awaitable<void> wait_for_bell() {
     bell_.expires_at(SteadyClock::time_point::max());
     co_await bell_.async_wait(k_wait);
-  }
-
-  /// Writes both, in order; false when the peer is gone or makes no progress.
-  awaitable<bool> write_all(std::string_view a, std::string_view b) {
-    while (!a.empty() || !b.empty()) {
-      const std::array<asio::const_buffer, 2> buffers{asio::buffer(a.data(), a.size()),
-                                                      asio::buffer(b.data(), b.size())};
-      stream_.expires_after(limits_.write_stall);
-      const auto [error, n] = co_await stream_.async_write_some(buffers, k_wait);
-      if (error) co_return false;
-      bytes_out_ += n;
-      const std::size_t of_a = std::min(n, a.size());
-      a.remove_prefix(of_a);
-      b.remove_prefix(n - of_a);
-    }
-    co_return true;
   }
 
   awaitable<bool> answer(api::Response& response, const JudgedHead& judged, bool keep) {
@@ -383,16 +301,15 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
     const bool bodiless = head_only || response.status == 204 || response.status == 304;
     bool sent = false;
     if (bodiless || !streamed) {
-      sent = co_await write_all(head, bodiless ? std::string_view{} : std::string_view{response.body});
+      sent = co_await wire_.write(head, bodiless ? std::string_view{} : std::string_view{response.body});
     } else {
-      sent = co_await write_all(head, {});
+      sent = co_await wire_.write(head, {});
       if (sent) sent = co_await write_stream(response, coding == BodyCoding::chunked);
     }
-    context_->gateway.answered(*request_, route_, response.status, seconds(), bytes_out_);
-    bytes_out_ = 0;
+    context_->gateway.answered(*request_, route_, response.status, seconds(), wire_.take_bytes_out());
     request_.reset();
     if (!sent) co_return false;
-    if (!keep) co_await say_goodbye();
+    if (!keep) co_await wire_.say_goodbye();
     co_return keep;
   }
 
@@ -408,7 +325,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
           *failed = true;  // too late for a status: the missing end tells the client
           if (self->context_->log_fault) self->context_->log_fault(fault.what());
         }
-        asio::post(self->stream_.get_executor(), [job, self] {
+        asio::post(self->wire_.executor(), [job, self] {
           job->done = true;
           self->bell_.cancel();
         });
@@ -426,10 +343,10 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
         std::array<char, 24> size{};
         const int n = std::snprintf(size.data(), size.size(), "%zx\r\n", piece.size());
         piece.append("\r\n");
-        const bool sent = co_await write_all({size.data(), static_cast<std::size_t>(n)}, piece);
+        const bool sent = co_await wire_.write({size.data(), static_cast<std::size_t>(n)}, piece);
         if (!sent) co_return false;
       } else if (!last) {
-        const bool sent = co_await write_all(piece, {});
+        const bool sent = co_await wire_.write(piece, {});
         if (!sent) co_return false;
       }
       if (last) co_return true;
@@ -444,34 +361,15 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
     const std::string id = request.request_id.empty() ? request_id_of({}) : request.request_id;
     const std::string head =
         response_head(response, id, BodyCoding::length, response.body.size(), false, false);
-    const bool sent = co_await write_all(head, response.body);
-    context_->gateway.answered(request, route_, refusal.status, seconds(), bytes_out_);
-    if (sent) co_await say_goodbye();
-  }
-
-  /// Half-closes and throws away what the peer still sends, for a moment: closing with unread bytes would
-  /// reset the connection and take the answer with it.
-  awaitable<void> say_goodbye() {
-    error_code ignored;
-    stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
-    if (ignored) co_return;
-    const auto deadline = SteadyClock::now() + limits_.linger;
-    buffer_.clear();
-    for (std::size_t thrown = 0; thrown < 16 * limits_.drain_bytes;) {
-      stream_.expires_at(deadline);
-      const auto space = buffer_.prepare(k_head_read_bytes);
-      const auto [error, n] = co_await stream_.async_read_some(space, k_wait);
-      if (error) break;
-      thrown += n;
-    }
-    stream_.socket().close(ignored);
+    const bool sent = co_await wire_.write(head, response.body);
+    context_->gateway.answered(request, route_, refusal.status, seconds(), wire_.take_bytes_out());
+    if (sent) co_await wire_.say_goodbye();
   }
 
   double seconds() const { return std::chrono::duration<double>(SteadyClock::now() - started_).count(); }
 
-  beast::tcp_stream stream_;
+  HttpWire wire_;
   asio::steady_timer bell_;
-  beast::flat_buffer buffer_;
   std::shared_ptr<SessionContext> context_;
   ConnectionSlot slot_;
   const HttpLimits& limits_;
@@ -479,8 +377,6 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
   std::shared_ptr<api::Request> request_;  ///< of the exchange that runs
   Refusal refusal_;
   SteadyClock::time_point started_{};
-  std::size_t bytes_out_{0};
-  bool idle_{false};
 };
 
 }  // namespace

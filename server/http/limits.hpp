@@ -32,6 +32,7 @@ struct HttpLimits {
 struct WsLimits {
   std::size_t max_connections{64};       ///< beyond: close 4029
   std::size_t message_bytes{64 * 1024};  ///< inbound; beyond: close 1009
+  std::size_t max_fragments{4096};       ///< of one message; beyond: close 1009
   std::chrono::milliseconds ping{15'000};
   std::chrono::milliseconds idle{45'000};  ///< nothing from the peer, not even a pong
   std::chrono::milliseconds write_stall{30'000};

@@ -109,9 +109,17 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
 
   awaitable<void> read_all() {
     beast::flat_buffer buffer;
+    std::size_t pieces = 0;  // each fragment takes at least one read
     for (;;) {
-      const auto [error, n] = co_await ws_.async_read(buffer, k_wait);
+      const auto [error, n] = co_await ws_.async_read_some(buffer, 0, k_wait);
       if (error) co_return;
+      if (!ws_.is_message_done()) {
+        if (++pieces < context_->ws_limits.max_fragments) continue;
+        const websocket::close_reason reason(websocket::close_code::too_big, "too many fragments");
+        co_await ws_.async_close(reason, k_wait);
+        co_return;
+      }
+      pieces = 0;
       const auto bytes = buffer.cdata();
       peer_->on_message({static_cast<const char*>(bytes.data()), bytes.size()}, ws_.got_binary());
       buffer.consume(buffer.size());

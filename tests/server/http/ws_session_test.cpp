@@ -117,6 +117,7 @@ TEST_F(WsSession, SurvivesAClientThatVanishes) {
 server::HttpServerOptions small_limits() {
   auto options = quick_options();
   options.ws_limits.message_bytes = 1000;
+  options.ws_limits.max_fragments = 100;
   options.ws_limits.max_connections = 2;
   options.ws_limits.ping = milliseconds(50);
   options.ws_limits.idle = milliseconds(300);
@@ -137,6 +138,19 @@ TEST_F(WsLimitsTest, ClosesWith1009WhenAMessageIsTooLarge) {
   fragments.send(1, std::string(600, 'x'), false);
   fragments.send(0, std::string(600, 'x'));
   EXPECT_EQ(fragments.ended_with(), 1009);
+}
+
+TEST_F(WsLimitsTest, ClosesWith1009WhenAMessageComesInTooManyFragments) {
+  WsClient client(server_.port);
+  client.send(1, "x", false);
+  for (int i = 0; i < 98; ++i) client.send(0, "x", false);
+  client.send(0, "x", true);
+  const auto frame = client.frame();
+  ASSERT_TRUE(frame) << "a hundred are allowed";
+  EXPECT_EQ(frame->payload, std::string(100, 'x'));
+  client.send(1, "x", false);
+  for (int i = 0; i < 100; ++i) client.send(0, "x", false);
+  EXPECT_EQ(client.ended_with(), 1009);
 }
 
 TEST_F(WsLimitsTest, ClosesWith4029BeyondItsConnections) {
