@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <charconv>
 #include <nlohmann/json.hpp>
+#include <set>
+
+#include "api/contract_fields.hpp"
 
 namespace anchord::api {
 
@@ -71,13 +74,45 @@ std::string next_link(const Request& request, const std::string& next_cursor) {
   return '<' + url + "cursor=" + percent_encoded(next_cursor) + ">; rel=\"next\"";
 }
 
+namespace {
+
+/// The path as the contract has it: "/api/v1/campaigns/{id}/samples".
+std::string contract_path(const Request& request) {
+  std::string path = request.path;
+  for (const auto& [name, value] : request.params) {
+    if (const auto at = path.find('/' + value); at != std::string::npos)
+      path.replace(at + 1, value.size(), '{' + name + '}');
+  }
+  return path;
+}
+
+/// A name that no item can have is a slip of the hand: said, and not answered with less than was asked for.
+std::set<std::string> wanted_fields(const Request& request, const std::string& list) {
+  const auto known = item_fields(contract_path(request));
+  std::set<std::string> wanted;
+  for (std::size_t from = 0; from <= list.size();) {
+    const std::size_t end = std::min(list.find(',', from), list.size());
+    const std::string name = list.substr(from, end - from);
+    if (!known.empty() && !known.contains(name)) {
+      std::string all;
+      for (const auto& each : known) all += (all.empty() ? "" : ", ") + each;
+      bad_query("fields", "has an unknown name: \"" + name.substr(0, 60) + "\"; there are " + all);
+    }
+    wanted.insert(name);
+    from = end + 1;
+  }
+  return wanted;
+}
+
+}  // namespace
+
 Response list_response(const Request& request, Ordered items, const std::string& next_cursor) {
   if (const auto fields = request.query_value("fields")) {
-    const std::string wanted = ',' + *fields + ',';
+    const auto wanted = wanted_fields(request, *fields);
     for (auto& item : items) {
       Ordered kept = Ordered::object();
       for (auto& [key, value] : item.items()) {
-        if (wanted.find(',' + key + ',') != std::string::npos) kept[key] = value;
+        if (wanted.contains(key)) kept[key] = std::move(value);
       }
       item = std::move(kept);
     }
