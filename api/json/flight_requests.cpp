@@ -89,9 +89,20 @@ Result<std::vector<Fix>> parse_fixes(std::string_view ndjson) {
                          [](const Json& row, auto& errors) { return read_fix(row, std::nullopt, errors); });
 }
 
-Result<std::vector<Range>> parse_ranges(std::string_view ndjson) {
-  return parse_rows<Range>(
-      ndjson, [](const Json& row, auto& errors) { return read_range(row, std::nullopt, errors).range; });
+Result<RangePage> parse_range_page(std::string_view body) {
+  Json json = parsed(body);
+  const auto items = json.is_object() ? json.find("items") : json.end();
+  if (items == json.end() || !items->is_array())
+    return make_error(Errc::bad_frame, "not a page of ranges: " + std::string(body.substr(0, 200)));
+  RangePage page;
+  for (Json& row : *items) {
+    std::vector<FieldError> errors;
+    if (row.is_object()) row.erase("id");
+    page.rows.push_back(read_range(row, std::nullopt, errors).range);
+    if (!errors.empty()) return make_error(Errc::bad_frame, "a stored range: " + errors.front().detail);
+  }
+  page.next_cursor = text_of(json, "next_cursor");
+  return page;
 }
 
 std::string mission_request_json(const Mission& mission) {

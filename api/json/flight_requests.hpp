@@ -27,11 +27,15 @@ struct IngestAnswer {
 Result<IngestAnswer> parse_ingest_answer(std::string_view body);
 /// "id" of a created resource.
 Result<std::string> parse_created_id(std::string_view body);
-/// A mission, its fixes or its ranges as the server gives them (rows as NDJSON), for a replay.
+/// A mission, its fixes (NDJSON) or a page of its ranges as the server gives them, for a replay.
 /// errors  bad_frame, with the line
 Result<Mission> parse_mission(std::string_view body);
 Result<std::vector<Fix>> parse_fixes(std::string_view ndjson);
-Result<std::vector<Range>> parse_ranges(std::string_view ndjson);
+struct RangePage {
+  std::vector<Range> rows;
+  std::string next_cursor;  ///< empty: the last page
+};
+Result<RangePage> parse_range_page(std::string_view body);
 /// "detail" and the first of "errors" of a problem answer; the body's beginning when it is none.
 std::string problem_text(std::string_view body);
 

@@ -79,15 +79,28 @@ Result<void> play_once(const Options& options, RestClient& client, const FlightD
   return upload.finish_mission();
 }
 
-/// A flight the server has, as it gives it; impulse responses stay where they are.
+/// Ranges with their impulse responses, a page at a time: as text they are several times their size.
+Result<std::vector<Range>> fetch_ranges(RestClient& client, const std::string& mission) {
+  const std::string first = "/api/v1/ranges?cir=true&limit=1000&mission=" + mission;
+  std::vector<Range> rows;
+  std::string cursor;
+  do {
+    BOOST_OUTCOME_TRY(const auto body, client.get(cursor.empty() ? first : first + "&cursor=" + cursor));
+    BOOST_OUTCOME_TRY(auto page, api::parse_range_page(body));
+    std::ranges::move(page.rows, std::back_inserter(rows));
+    cursor = page.next_cursor;  // of digits and a dot
+  } while (!cursor.empty());
+  return rows;
+}
+
+/// A flight the server has, as it gives it.
 Result<FlightData> fetch_flight(RestClient& client, const std::string& id) {
   FlightData flight;
   BOOST_OUTCOME_TRY(const auto mission, client.get("/api/v1/missions/" + id));
   BOOST_OUTCOME_TRY(flight.mission, api::parse_mission(mission));
   BOOST_OUTCOME_TRY(const auto fixes, client.get("/api/v1/fixes?format=ndjson&mission=" + id));
   BOOST_OUTCOME_TRY(flight.fixes, api::parse_fixes(fixes));
-  BOOST_OUTCOME_TRY(const auto ranges, client.get("/api/v1/ranges?format=ndjson&mission=" + id));
-  BOOST_OUTCOME_TRY(flight.ranges, api::parse_ranges(ranges));
+  BOOST_OUTCOME_TRY(flight.ranges, fetch_ranges(client, id));
   return flight;
 }
 
