@@ -116,6 +116,8 @@ Response Idempotency::run(Request& request, const std::function<Response(Request
     Response response;
     response.status = kept->status;
     response.header("Content-Type", kept->status >= 400 ? "application/problem+json" : "application/json");
+    if (!kept->location.empty()) response.header("Location", kept->location);
+    if (!kept->etag.empty()) response.header("ETag", kept->etag);
     response.header("Idempotent-Replayed", "true");
     response.body = kept->body;
     return response;
@@ -133,7 +135,12 @@ Response Idempotency::run(Request& request, const std::function<Response(Request
     response = handler(request);
   }
   if (response.status < 500 && !response.body_stream) {
-    auto saved = answers_.keep_answer({key, who, hash.hex(), response.body, response.status, clock_.now()});
+    StoredAnswer answer{key, who, hash.hex(), response.body, {}, {}, response.status, clock_.now()};
+    for (const auto& [name, value] : response.headers) {
+      if (name == "Location") answer.location = value;
+      if (name == "ETag") answer.etag = value;
+    }
+    auto saved = answers_.keep_answer(answer);
     if (!saved) return problem_of(saved.error());
   }
   return response;

@@ -180,6 +180,7 @@ class JobStore {
 /// Answers kept for Idempotency-Key (24 h), and the append-only audit log with its hash chain.
 struct StoredAnswer {
   std::string key, principal, request_sha256_hex, body;
+  std::string location, etag;  ///< its headers of these names; empty: it had none
   int status{};
   UtcTime created{};
 };

@@ -7,11 +7,11 @@ namespace anchord::sql {
 namespace {
 
 constexpr const char* k_answer =
-    "SELECT idempotency_key, principal, request_sha256_hex, body, status, created_t_ns FROM stored_answer "
-    "WHERE principal = ?1 AND idempotency_key = ?2";
+    "SELECT idempotency_key, principal, request_sha256_hex, body, status, created_t_ns, location, etag "
+    "FROM stored_answer WHERE principal = ?1 AND idempotency_key = ?2";
 constexpr const char* k_keep =
-    "INSERT INTO stored_answer (principal, idempotency_key, request_sha256_hex, status, body, created_t_ns) "
-    "VALUES (?1, ?2, ?3, ?4, ?5, ?6) ON CONFLICT DO NOTHING RETURNING status";
+    "INSERT INTO stored_answer (principal, idempotency_key, request_sha256_hex, status, body, created_t_ns, "
+    "location, etag) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8) ON CONFLICT DO NOTHING RETURNING status";
 constexpr const char* k_drop = "DELETE FROM stored_answer WHERE created_t_ns < ?1 RETURNING status";
 constexpr const char* k_newest_entry =
     "SELECT number, chain_sha256_hex FROM audit ORDER BY number DESC LIMIT 1";
@@ -60,6 +60,8 @@ class SqlAccessStore final : public AccessStore {
       for (const std::byte byte : body) found.body += static_cast<char>(byte);
       found.status = query.as<int>();
       found.created = query.time();
+      found.location = query.text();
+      found.etag = query.text();
       return Found{std::move(found)};
     });
   }
@@ -67,7 +69,8 @@ class SqlAccessStore final : public AccessStore {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       Query query(c, k_keep);
       query << answer.principal << answer.key << answer.request_sha256_hex << answer.status
-            << std::as_bytes(std::span{answer.body}) << answer.created;
+            << std::as_bytes(std::span{answer.body}) << answer.created << answer.location
+            << answer.etag;
       if (query.returned()) return std::nullopt;
       return make_error(Errc::conflict, "an answer is kept under this key already");
     });

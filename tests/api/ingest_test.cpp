@@ -231,6 +231,17 @@ TEST_F(Ingest, IsForGatewaysAndNotForViewers) {
   EXPECT_EQ(call(Method::post, "/api/v1/ranges", row(1), viewer).status, 200);
   EXPECT_EQ(call(Method::get, "/api/v1/ranges", "", viewer).status, 403);
 }
+TEST_F(Ingest, GivesTheFieldsAskedForAndSaysWhichDoNotExist) {
+  post("/api/v1/ranges", row(1), "application/json");
+  const auto picked = get("/api/v1/ranges", {{"mission", id_}, {"fields", "anchor,fp_dbm,distance_m"}});
+  const auto item = json(picked)["items"][0];
+  EXPECT_TRUE(item.contains("anchor") && item.contains("distance_m"));
+  EXPECT_EQ(item.size(), 2u) << "the row has no first-path power, which is not an error: " << item;
+  const auto slip = get("/api/v1/ranges", {{"mission", id_}, {"fields", "anchor,distance"}});
+  EXPECT_EQ(slip.status, 422);
+  EXPECT_NE(text(slip).find("\\\"distance\\\""), std::string::npos) << text(slip);
+  EXPECT_NE(text(slip).find("distance_m"), std::string::npos) << "names those that exist";
+}
 TEST_F(Ingest, ExportsWhatItTookAsCsvAndNdjson) {
   std::string body;
   for (int i = 0; i < 2500; ++i) body += row(i) + "\n";
@@ -239,6 +250,17 @@ TEST_F(Ingest, ExportsWhatItTookAsCsvAndNdjson) {
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 2501);
   const auto lines = text(get("/api/v1/ranges", {{"format", "ndjson"}, {"mission", id_}}));
   EXPECT_EQ(std::count(lines.begin(), lines.end(), '\n'), 2500);
+}
+TEST_F(Ingest, SaysAgainWhereTheCreatedThingIs) {
+  Call options;
+  options.headers["idempotency-key"] = "create-once";
+  const std::string mission = R"({"name":"twice asked","frame":"wgs84","track_point":"body","tags":[]})";
+  const auto first = call(Method::post, "/api/v1/missions", mission, options);
+  const auto second = call(Method::post, "/api/v1/missions", mission, options);
+  EXPECT_EQ(second.status, 201);
+  EXPECT_TRUE(header(first, "Location").starts_with("/api/v1/missions/"));
+  EXPECT_EQ(header(second, "Location"), header(first, "Location"));
+  EXPECT_EQ(header(second, "ETag"), header(first, "ETag"));
 }
 TEST_F(Ingest, AnswersAnIdempotencyKeyOnce) {
   Call options;

@@ -394,13 +394,15 @@ TEST_P(AccessContract, FailsJobsThatARestartCutOff) {
 }
 
 TEST_P(AccessContract, KeepsOneAnswerForAPrincipalAndKey) {
-  const StoredAnswer answer{"key", "me", "hash", std::string("a\0b", 3), 201, k_noon};
+  const StoredAnswer answer{"key", "me", "hash", std::string("a\0b", 3), "/there", "\"7\"", 201, k_noon};
   ASSERT_TRUE(db_->access().keep_answer(answer));
   EXPECT_EQ(db_->access().keep_answer(answer).error().code, Errc::conflict);
   const auto found = db_->access().answer("me", "key").value();
   ASSERT_TRUE(found);
   EXPECT_EQ(found->body, answer.body);
   EXPECT_EQ(found->status, 201);
+  EXPECT_EQ(found->location, "/there");
+  EXPECT_EQ(found->etag, "\"7\"");
   EXPECT_FALSE(db_->access().answer("you", "key").value());
   EXPECT_EQ(db_->access().drop_answers_before(k_noon).value(), 0u);
   EXPECT_EQ(db_->access().drop_answers_before(UtcTime{k_noon.ns + 1}).value(), 1u);
