@@ -54,6 +54,26 @@ test('the confusion on screen is that of the API, and the slider tells what a th
   await page.close();
 });
 
+test('runs ticked in the table stand side by side, with the figures of the API and a warning where they are of different data', async () => {
+  await post('/api/v1/datasets', { name: 'other set', campaigns: ['halls'], aggregation: 'none', split: { test: ['room 5'] } });
+  const second = await post('/api/v1/training-runs', { task: 'nlos_id', dataset: 'other set', methods: ['logistic'], cv: { folds: 4, seed: 7 } }, { prefer: 'wait=200' });
+  const { page, seen, id } = await openPage(browser, server, { hash: `#/models/runs/${training.id}` });
+  await id(`compare-${training.id}`).check();
+  await page.getByText('Tick one more run').waitFor();
+  await id(`compare-${second.id}`).check();
+  const line = id('compare').getByRole('row', { name: /^Accuracy, held-out places/ });
+  await line.waitFor();
+  const shown = (await line.locator('td').allTextContents()).map(parseFloat);
+  const accuracy = await Promise.all([training, second].map(async (r) => (await get(`/api/v1/training-runs/${r.id}`)).test.accuracy));
+  assert.deepEqual(shown, accuracy.map((a) => Number((100 * a).toFixed(1))));
+  await id('compare').getByText('Not trained on one data set').waitFor();
+  assert.match(page.url(), new RegExp(`compare=${training.id},${second.id}`));
+  assert.deepEqual(await violations(page), []);
+  await picture(page, 'compare-light');
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});
+
 test('the plain rules stand beside the learned models, with the rates of the API', async () => {
   const { page, seen, id } = await openPage(browser, server, { hash: '#/models' });
   await id('task-rules').click();

@@ -10,7 +10,7 @@ import { Icon, Mark } from './marks';
 import { SignIn } from './sign_in';
 import { Strip } from './strip';
 
-/// `#/live`, `#/plan/<id>`, `#/anchors`, `#/anchors/0x6a2f`, `#/measurements`, `#/models`, `#/models/runs/<id>`, `#/replay/<mission>?t=12.5`, `#/system`.
+/// `#/live`, `#/plan/<id>`, `#/anchors`, `#/anchors/0x6a2f`, `#/measurements`, `#/models`, `#/models/runs/<id>?compare=<id>,<id>`, `#/replay/<mission>?t=12.5`, `#/system`.
 export const route = signal(location.hash);
 addEventListener('hashchange', () => (route.value = location.hash));
 
@@ -50,7 +50,7 @@ export function App() {
         {view === 'measurements' && <Later load={load_measurements} props={{}} />}
         {view === 'replay' && <Later load={load_replay} props={{ id: named }} />}
         {view === 'system' && <Later load={load_system} props={{}} />}
-        {view === 'models' && <Later load={load_models} props={{ run: args[0] === 'runs' ? named : null }} />}
+        {view === 'models' && <Later load={load_models} props={{ path: args[0] === 'runs' ? named : null }} />}
       </main>
       <SignIn />
       <Help />

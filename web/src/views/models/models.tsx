@@ -11,6 +11,7 @@ import { CopyBox } from '../../ui/copy_box';
 import { fixed } from '../../ui/format';
 import { Chip } from '../../ui/marks';
 import { BiasPanel } from './bias';
+import { Compare } from './compare';
 import { ConfusionPanel, ThresholdPanel } from './classification';
 import { GridPanel, ImportancePanel, SplitPanel } from './evidence';
 import { Promote } from './promote';
@@ -22,7 +23,9 @@ const task = signal<Task>('nlos_id'), rules_open = signal(false);
 
 interface Loaded { readonly task: Task; readonly runs: readonly Run[]; readonly models: readonly Model[] }
 
-export function Models({ run: wanted }: { run: string | null }) {
+/// `path` is what stands behind `#/models/runs/`: a run, and perhaps `?compare=` with two to four of them.
+export function Models({ path }: { path: string | null }) {
+  const [wanted, asked] = (path ?? '').split('?'), compared = (new URLSearchParams(asked).get('compare') ?? '').split(',').filter(Boolean);
   const [all, set_all] = useState<Loaded | null>(null), [page, set_page] = useState<{ run: Run; numbers: RunNumbers } | null>(null), [problem, set_problem] = useState(''), [dialog, set_dialog] = useState(false), [curl, set_curl] = useState(false), [again, set_again] = useState(0);
   const reload = (): void => set_again((n) => n + 1);
   useEffect(() => { document.title = 'Models - anchord'; }, []);
@@ -42,6 +45,8 @@ export function Models({ run: wanted }: { run: string | null }) {
     void run_page(chosen.id).then(async (run) => { if (run) { const numbers = await run_numbers(run); if (!gone) set_page({ run, numbers }); } }).catch((e: unknown) => { if (!gone) set_problem(said(e)); });
     return () => { gone = true; };
   }, [chosen?.id, chosen?.state, chosen?.fraction]);
+  const address = (run: string, ids: readonly string[] = compared): string => `#/models/runs/${run}${ids.length ? `?compare=${ids.join()}` : ''}`;
+  const compare = (id: string): void => { location.hash = address(chosen?.id ?? id, compared.includes(id) ? compared.filter((c) => c !== id) : [...compared, id]); };
   const engineer = may('engineer'), shown = page && page.run.id === chosen?.id ? page : null;
   const undo = async (): Promise<void> => { try { await roll_back(of, idempotency_key()); say('Rolled back'); reload(); } catch (e) { set_problem(said(e)); } };
   return (
@@ -66,8 +71,9 @@ export function Models({ run: wanted }: { run: string | null }) {
         {!rules_open.value && <>
         {!all && !problem && <p class="pad" role="status">Loading the training runs.</p>}
         {all?.task === of && runs.length === 0 && <Nothing />}
+        {compared.length > 1 && <Compare task={of} runs={compared} close={() => (location.hash = address(chosen?.id ?? '', []))} />}
         {chosen && shown && <Numbers run={shown.run} numbers={shown.numbers} />}
-        <section class="cell-p wide">{(runs.length > 0 || models.length > 0) && <RunTable task={of} runs={runs} models={models} selected={chosen?.id ?? null} />}</section>
+        <section class="cell-p wide">{(runs.length > 0 || models.length > 0) && <RunTable task={of} runs={runs} models={models} selected={chosen?.id ?? null} compared={compared} compare={compare} address={address} />}{compared.length === 1 && <p class="sub" role="status">Tick one more run to see them side by side.</p>}</section>
         </>}
       </div>
       {dialog && chosen?.model && <Promote model={chosen.model} name={method_words(chosen.method)} close={() => set_dialog(false)} done={() => { set_dialog(false); reload(); }} />}
