@@ -43,6 +43,15 @@ export const add_device = (kind: string, address: string, name: string): Promise
 export const act_on_device = (id: string, action: string): Promise<unknown> => request('POST', `/devices/${id}/actions`, { action }, { 'Idempotency-Key': idempotency_key() });
 /// The newest state is what the button showed; a device is changed by one person at a time.
 export const change_device = (id: string, change: object): Promise<unknown> => request('PATCH', `/devices/${id}`, change, { 'If-Match': '*', 'Content-Type': 'application/merge-patch+json' });
+export interface Radio { readonly channel: number; readonly rate_kbps: number; readonly prf_mhz: number; readonly preamble_symbols: number; readonly gain_db: number | null; readonly devices: readonly { readonly network_id: string }[] }
+const radio_of = (v: unknown): Radio => {
+  const o = obj(v), devices = Array.isArray(o?.devices) ? o.devices.map(obj).filter((d) => d !== null) : [];
+  return { channel: num(o?.channel) ?? 0, rate_kbps: num(o?.rate_kbps) ?? 0, prf_mhz: num(o?.prf_mhz) ?? 0, preamble_symbols: num(o?.preamble_symbols) ?? 0, gain_db: num(o?.gain_db), devices: devices.map((d) => ({ network_id: str(d!.network_id) })) };
+};
+export const read_radio = async (id: string): Promise<Radio> => radio_of(await request('GET', `/devices/${id}/uwb-settings`));
+export async function set_radio(id: string, { devices: _, gain_db, ...radio }: Radio): Promise<Radio> {
+  return radio_of(await request('PUT', `/devices/${id}/uwb-settings`, { ...radio, ...(gain_db === null ? {} : { gain_db }) }, { 'If-Match': '*' }));
+}
 export const forget_device = (id: string): Promise<unknown> => request('DELETE', `/devices/${id}`, undefined, { 'If-Match': '*' });
 
 export const tokens = (): Promise<Token[]> => items('/tokens', (o) => ({ id: str(o.id), name: str(o.name), roles: words(o.roles), created_at: str(o.created_at), expires_at: str(o.expires_at) || null, revoked_at: str(o.revoked_at) || null, last_used_at: str(o.last_used_at) || null }));

@@ -6,13 +6,14 @@ import { may } from '../../state/session';
 import { devices as live_devices, mission_list, say, server_now_us } from '../../state/store';
 import { age, fixed, grouped } from '../../ui/format';
 import { Chip, Q, type Shape, type Tone } from '../../ui/marks';
+import { RadioPanel } from './radio';
 
 const LOOK: Record<string, [Shape, Tone]> = { talking: ['ok', 'ok'], live: ['ok', 'ok'], open: ['estimating', 'info'], found: ['found', 'info'], silent: ['caution', 'caution'], late: ['caution', 'caution'], lost: ['bad', 'bad'], off: ['off', 'off'] };
 const KINDS: readonly (readonly [string, string, string])[] = [['pozyx', 'Pozyx tag', 'serial:/dev/serial/by-id/...'], ['gnss', 'RTK rover', 'tcp://192.168.2.15:9001'], ['ntrip', 'NTRIP corrections', 'ntrip://caster.example:2101/MOUNT']];
 const kind_words = (kind: string): string => KINDS.find(([id]) => id === kind)?.[1] ?? kind;
 
 export function DevicesPanel() {
-  const [all, set_all] = useState<readonly Device[] | null>(null), [problem, set_problem] = useState(''), [found, set_found] = useState<readonly Found[] | null>(null), [busy, set_busy] = useState(''), [adding, set_adding] = useState<{ kind: string; address: string } | null>(null);
+  const [all, set_all] = useState<readonly Device[] | null>(null), [problem, set_problem] = useState(''), [found, set_found] = useState<readonly Found[] | null>(null), [busy, set_busy] = useState(''), [adding, set_adding] = useState<{ kind: string; address: string } | null>(null), [radio, set_radio] = useState<string | null>(null);
   const load = (): void => { fetch_devices().then((d) => { set_all(d); set_problem(''); }, (e: unknown) => set_problem(said(e))); };
   useEffect(() => { load(); const timer = setInterval(load, 3000); return () => clearInterval(timer); }, []);
   const operator = may('operator', 'engineer');
@@ -22,6 +23,7 @@ export function DevicesPanel() {
     set_busy('');
   };
   const driven = all?.filter((d) => d.id !== null) ?? [], heard = all?.filter((d) => d.id === null) ?? [];
+  const tuned = driven.find((d) => d.id === radio);
   return (
     <section class="sys-p wide" data-testid="devices">
       <div class="hd">
@@ -36,14 +38,15 @@ export function DevicesPanel() {
       {driven.length > 0 && <div class="scrollx"><table class="tbl" data-testid="driven">
         <caption class="sr">Devices that this server drives</caption>
         <thead><tr><th scope="col">Device</th><th scope="col">State</th><th scope="col">Address</th><th scope="col" class="num">Rate</th><th scope="col" class="num">Frames</th><th scope="col" class="num">Not used</th><th scope="col">Firmware</th>{operator && <th scope="col">Actions</th>}</tr></thead>
-        <tbody>{driven.map((d) => <DrivenRow key={d.id} d={d} operator={operator} busy={busy !== ''} run={run} />)}</tbody>
+        <tbody>{driven.map((d) => <DrivenRow key={d.id} d={d} operator={operator} busy={busy !== ''} run={run} tune={() => set_radio(d.id)} />)}</tbody>
       </table></div>}
+      {tuned && <RadioPanel device={tuned} may_change={operator} close={() => set_radio(null)} />}
       {heard.length > 0 && <Heard heard={heard} />}
     </section>
   );
 }
 
-function DrivenRow({ d, operator, busy, run }: { d: Device; operator: boolean; busy: boolean; run: (what: string, work: () => Promise<unknown>, done: string) => Promise<void> }) {
+function DrivenRow({ d, operator, busy, run, tune }: { d: Device; operator: boolean; busy: boolean; tune: () => void; run: (what: string, work: () => Promise<unknown>, done: string) => Promise<void> }) {
   const state = d.enabled ? (d.state ?? 'off') : 'off', [shape, tone] = LOOK[state] ?? ['off', 'off'], dropped = Object.entries(d.dropped).filter(([, n]) => n > 0), total = dropped.reduce((a, [, n]) => a + n, 0);
   return (
     <tr>
@@ -55,6 +58,7 @@ function DrivenRow({ d, operator, busy, run }: { d: Device; operator: boolean; b
       <td>{[d.model, d.firmware].filter(Boolean).join(' ') || <span class="mut">–</span>}</td>
       {operator && <td class="acts">
         {d.kind === 'pozyx' && <button class="btn small" disabled={busy || state !== 'talking'} onClick={() => void run('identify', () => act_on_device(d.id!, 'identify'), 'Its lights blink')}>Identify</button>}
+        {d.kind === 'pozyx' && <button class="btn small" data-testid="radio-open" disabled={busy || state !== 'talking'} onClick={tune}>Radio</button>}
         <button class="btn small" disabled={busy} onClick={() => void run('enable', () => change_device(d.id!, { enabled: !d.enabled }), d.enabled ? 'Switched off' : 'Switched on')}>{d.enabled ? 'Switch off' : 'Switch on'}</button>
         {!d.enabled && <button class="btn small" disabled={busy} onClick={() => void run('forget', () => forget_device(d.id!), 'Forgotten')}>Forget</button>}
       </td>}
