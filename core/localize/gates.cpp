@@ -101,7 +101,7 @@ Gate halves(const FlightRows& flight, const JointFit& fit, std::size_t index, co
   const Eigen::Vector3d& at = fit.state.anchors[index].position_m;
   const auto early = solve_half({rows.begin(), middle}, at, block, rows.size(), options);
   const auto late = solve_half({middle, rows.end()}, at, block, rows.size(), options);
-  const double limit = chi2_quantile(limits.agreement, options.dims == Dims::two ? 2 : 3);
+  const double limit = chi2_quantile(limits.probability, options.dims == Dims::two ? 2 : 3);
   if (!early || !late) {
     return {"halves", std::nullopt, limit, false,
             std::string(early ? "the second" : "the first") + " half of the flight alone gives no answer"};

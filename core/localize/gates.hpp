@@ -16,9 +16,9 @@ struct GateLimits {
   double outline_sigmas{3};       ///< outside of the building by more: the outline is wrong, or the answer
   double residual_scale_m{0.6};   ///< radios that work stay below 0.25 m
   double probability{0.999};      ///< of the chi-square tests: one good anchor in a thousand is held back
-  /// Of the tests of a flight against its own half and against its kit. Their covariances are tempered, so
-  /// that real flights stay below a fifth of this limit (halves 1.4 of 7.8, profile 3.2 of 9.5), while
-  /// anchors exchanged half-way reach 6 to 15, and a bias of 0.3 m where a flight can tell it 6 to 9.
+  /// Of a flight against its kit. Its covariances are tempered, so that real flights stay below a third of
+  /// this limit (3.2 of 9.5), while a bias of 0.3 m where a flight can tell it reaches 6 to 9. Not of the
+  /// halves: walls that block one of them only make good anchors reach 15.
   double agreement{0.95};
 };
 
