@@ -75,6 +75,18 @@ test('a person draws outline and fence on the map, presses generate, saves', asy
   await page.close();
 });
 
+test('a plan drawn in a map program is imported, and a wrong one is refused', async () => {
+  const { page, id } = await openPage(browser, server, { hash: '#/plan' });
+  await id('plan').getByText('revision 1').waitFor();
+  await page.getByRole('button', { name: 'New', exact: true }).click();
+  const kml = (inside) => ({ name: 'site.kml', mimeType: 'application/vnd.google-earth.kml+xml', buffer: Buffer.from(`<?xml version="1.0"?><kml xmlns="http://www.opengis.net/kml/2.2"><Placemark><name>Hall</name>${inside}</Placemark></kml>`) });
+  await page.getByLabel('Plan file').setInputFiles(kml('<Point><coordinates>3.7131,51.0231</coordinates></Point>'));
+  await id('plan').getByText('That did not work').waitFor();
+  await page.getByLabel('Plan file').setInputFiles(kml('<Polygon><outerBoundaryIs><LinearRing><coordinates>3.7131,51.0231 3.7135275,51.0231 3.7135275,51.0232799 3.7131,51.0231</coordinates></LinearRing></outerBoundaryIs></Polygon>'));
+  await eventually('the outline is there', async () => id('generate').isEnabled());
+  await page.close();
+});
+
 test('start is blocked until the checklist is green; then the aircraft flies, holds at one press, goes on, and lands', async () => {
   const { page, seen, id } = await openPage(browser, server);
   await id('open-checklist').click({ timeout: 20_000 });

@@ -21,7 +21,7 @@ export async function request(method: string, path: string, body?: unknown, head
     answer = await fetch(api_url(path), {
       method, credentials: 'same-origin', cache: 'no-cache',
       headers: { Accept: 'application/json, application/geo+json, application/problem+json', 'X-Anchord': '1', ...(body === undefined ? {} : { 'Content-Type': 'application/json' }), ...headers },
-      ...(body === undefined ? {} : { body: JSON.stringify(body) }),
+      ...(body === undefined ? {} : { body: typeof body === 'string' ? body : JSON.stringify(body) }),
     });
   } catch {
     throw new ApiError(problem_of(null, 0));

@@ -57,7 +57,7 @@ export async function generate(p: Plan): Promise<{ plan: Plan; check: Check }> {
   return { plan: { ...p, waypoints: made.waypoints }, check: check_of(obj(answer?.check)) };
 }
 export async function import_file(name: string, text: string): Promise<{ plan: Plan; notes: string[] }> {
-  const answer = obj(await request('POST', `/plans/import?dry_run=true&name=${encodeURIComponent(name)}`, JSON.parse(text)));
+  const answer = obj(await request('POST', `/plans/import?dry_run=true&name=${encodeURIComponent(name)}`, text, { 'Content-Type': text.trimStart().startsWith('<') ? 'application/vnd.google-earth.kml+xml' : 'application/json' }));
   return { plan: plan_of(obj(answer?.plan) ?? {}), notes: Array.isArray(answer?.notes) ? answer.notes.filter((n): n is string => typeof n === 'string') : [] };
 }
 export const export_url = (id: string, format: 'plan' | 'geojson'): string => api_url(`/plans/${id}/export?format=${format}`);
