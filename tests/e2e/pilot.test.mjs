@@ -48,15 +48,16 @@ async function draw(id, shape, corners) {
 const PX_PER_M = 8;  // of an empty map
 
 test('a person draws outline and fence on the map, presses generate, saves', async () => {
-  const { page, seen, id } = await openPage(browser, server, { hash: '#/plan' });
-  // Either nobody flies yet and the page asks where the building is, or the map lies where the aircraft stands, 9 m outside the corner.
-  await id('where').or(id('plan-map')).first().waitFor();
-  const asked = await id('where').isVisible(), [e0, n0] = asked ? [-15, -10] : [9, 9];
-  if (asked) {
-    await id('where').fill('51.02319, 3.713314');
-    await page.getByRole('button', { name: 'Draw here' }).click();
-    await id('plan-map').waitFor();
-  }
+  const { page, seen, id } = await openPage(browser, server);
+  await page.getByText('Simulated drone').first().waitFor();
+  // The map lies where the aircraft stands, 9 m outside the corner, once its first good fix has come.
+  await eventually('the map of the plan lies at the aircraft', async () => {
+    await page.getByRole('link', { name: /^Plan/ }).click();
+    if (await id('plan-map').waitFor({ timeout: 3000 }).then(() => true, () => false)) return true;
+    await page.getByRole('link', { name: /^Live/ }).click();
+    return false;
+  }, 30_000);
+  const [e0, n0] = [9, 9];
   await id('plan-name').fill('Hall, drawn');
   await draw(id, 'outline', [[e0, n0], [e0 + 30, n0], [e0 + 30, n0 + 20], [e0, n0 + 20]]);
   await draw(id, 'fence', [[e0 - 14, n0 - 14], [e0 + 41, n0 - 14], [e0 + 41, n0 + 31], [e0 - 14, n0 + 31]]);
