@@ -34,8 +34,13 @@ export async function request(method: string, path: string, body?: unknown, head
   if (!answer.ok) throw new ApiError(problem_of(parsed, answer.status));
   return parsed;
 }
+/// What is wrong with each field, where the problem's own words do not say it already; the first five.
+function fields_said({ errors, detail }: Problem): string {
+  const more = errors.filter((e) => e.detail && !detail.includes(e.detail)).slice(0, 5).map((e) => `${e.pointer.replace(/^\//, '').replaceAll('/', ' ')} ${e.detail}`.trim());
+  return more.length ? `: ${more.join('; ')}` : '';
+}
 /// A failure in the words of the server, with the number under which its log has it.
-export const said = (e: unknown): string => (e instanceof ApiError ? `${e.message}${e.problem.request_id ? ` (request ${e.problem.request_id})` : ''}` : e instanceof Error ? e.message : String(e));
+export const said = (e: unknown): string => (e instanceof ApiError ? `${e.message}${fields_said(e.problem)}${e.problem.request_id ? ` (request ${e.problem.request_id})` : ''}` : e instanceof Error ? e.message : String(e));
 
 /// One try per press of a button, even if the answer is lost on the way: the server keeps the first result under the key.
 export const idempotency_key = (): string => Array.from(crypto.getRandomValues(new Uint8Array(16)), (b) => b.toString(16).padStart(2, '0')).join('');
