@@ -79,10 +79,17 @@ Framer::Step Framer::step(std::string_view rest, bool final) const {
     if (looks_for(Protocol::gpsd) && c == '{') return line(rest, final, Protocol::gpsd, k_max_gpsd);
     if (looks_for(Protocol::llh) && (digit(c) || c == '%'))
       return line(rest, final, Protocol::llh, k_max_llh);
-    if (c == '#') {
-      const auto end = rest.find('\n');
-      if (end != std::string_view::npos) return {Step::Kind::skip, end + 1, {}, "comment line"};
-      if (!final && rest.size() < k_max_llh) return {};
+    if (looks_for(Protocol::llh) && c == '#') {
+      // Only of text, and never longer than a line may be: noise that looks so must not cost the frames
+      // after.
+      std::size_t i = 1;
+      while (i < rest.size() && i < k_max_llh && (printable(rest[i]) || rest[i] == '\t' || rest[i] == '\r'))
+        ++i;
+      if (i == rest.size() && i < k_max_llh) {
+        if (!final) return {};
+      } else if (i < rest.size() && rest[i] == '\n') {
+        return {Step::Kind::skip, i + 1, {}, "comment line"};
+      }
     }
   }
   const bool blank = c == '\n' || c == '\r' || c == ' ' || c == '\t';

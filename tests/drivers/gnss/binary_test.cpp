@@ -143,6 +143,16 @@ TEST(UbxFraming, AFalseHeaderSwallowsNothing) {
   EXPECT_EQ(skips["ubx: length not believable"], 1U);
 }
 
+// Found by fuzzing: a # after a frame swallowed good frames up to the next line end, where both came at once.
+TEST(UbxFraming, ANumberSignBetweenFramesSwallowsNothing) {
+  for (const std::optional<Protocol> only : {std::optional<Protocol>(), std::optional(Protocol::ubx)}) {
+    Decoder decoder(DecoderOptions{only, {}, {}});
+    Epochs epochs;
+    decoder.feed(k_pvt + "#" + k_pvt + k_hp + "\n", epochs);
+    EXPECT_EQ(decoder.frames(Protocol::ubx), 3U);
+  }
+}
+
 // Values of the format's description; GPS time of week 378017.8 s in week 2318 is 18 leap seconds ahead.
 TEST(Erb, DecodesAnEpoch) {
   const auto epochs = decode(erb_epoch());
