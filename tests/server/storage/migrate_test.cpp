@@ -42,7 +42,8 @@ TEST_F(Migrate, FindsEveryLandedMigrationAsItWas) {
             "1 5b9e60fa88e5313cd602de900b5ef1fd26ec48251481d3a023274024847ee06c\n"
             "2 ad11b0eed4c5aff882920b5fcc638e5259e0c6473959d36e0761e034016131e5\n"
             "3 9cc8bb069b7b00cc826ce0963d78aa7083e5eb65208fa55d54c1986363e232dd\n"
-            "4 b61b44684821815843481b6e9fdc70b291983fb47986fc58515f0ff89c06d2ce\n");
+            "4 b61b44684821815843481b6e9fdc70b291983fb47986fc58515f0ff89c06d2ce\n"
+            "5 f6fddabd2c8bebecb1b9370fa20c1a691b2facf7483f685b5be0583a65374ef3\n");
 }
 
 TEST_F(Migrate, KnowsTheDigestOfAPublishedVector) {
