@@ -69,8 +69,7 @@ class SqlAccessStore final : public AccessStore {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       Query query(c, k_keep);
       query << answer.principal << answer.key << answer.request_sha256_hex << answer.status
-            << std::as_bytes(std::span{answer.body}) << answer.created << answer.location
-            << answer.etag;
+            << std::as_bytes(std::span{answer.body}) << answer.created << answer.location << answer.etag;
       if (query.returned()) return std::nullopt;
       return make_error(Errc::conflict, "an answer is kept under this key already");
     });
