@@ -125,6 +125,47 @@ test('measurements are filtered, plotted and opened one by one', async () => {
   await page.close();
 });
 
+/** One DW1000 record: noise of `noise`, a first path at tap 740 and a tail that fades with `tau` taps. */
+function response(noise, first, tau) {
+  const bytes = Buffer.alloc(1016 * 4);
+  for (let k = 0; k < 1016; k++) bytes.writeInt16LE(k < 740 ? noise * (k % 2 ? 1 : -1) : Math.round(first * Math.exp(-(k - 740) / tau)) + noise, 4 * k);
+  return { n: 1016, dt_ps: 1001.6, first_path_idx: 740, rxpacc: 1001, b64: bytes.toString('base64') };
+}
+
+test('a campaign of impulse responses is imported, and a sample shows its response with the features of the API', async () => {
+  await post('/api/v1/campaigns', { name: 'responses' });
+  const rows = Array.from({ length: 12 }, (_, i) => ({
+    environment: `place ${1 + (i % 2)}`, setting: `s${i}`, true_distance_m: 5, los: i % 2 === 0, range_m: 5.02 + 0.03 * i, rx_dbm: -80 - i / 10, fp_dbm: -83 - i / 10,
+    cir: response(20, 4000 - 100 * i, i % 2 ? 30 : 6),
+  }));
+  const imported = await server.fetch('/api/v1/campaigns/responses/samples', { method: 'POST', headers: { 'content-type': 'application/x-ndjson' }, body: rows.map((r) => JSON.stringify(r)).join('\n') });
+  assert.equal(imported.status, 200, await imported.text());
+  const { items } = await get('/api/v1/campaigns/responses/samples?features=true');
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/measurements' });
+  await id('source').selectOption({ label: 'responses' });
+  await eventually('its rows are listed', async () => (await id('rows').locator('tbody tr').count()) === 12);
+  // By keys alone: the first row is chosen from the table, and its taps are read in a table.
+  await id('rows').locator('tbody button').first().focus();
+  await page.keyboard.press('Enter');
+  const plot = id('impulse').getByRole('img', { name: /^Impulse response of 1016 taps, 1\.00 ns each, first path at tap 740\.0/ });
+  await plot.waitFor();
+  for (const mark of ['first', 'noise', 'delay', 'peak']) assert.equal(await plot.locator(`[data-mark="${mark}"]`).count(), 1, mark);
+  const shown = parseFloat((await text(id('impulse').locator('h2'))).match(/, ([\d.]+) m$/)[1]), sample = items.find((s) => s.range_m.toFixed(3) === shown.toFixed(3));
+  for (const name of ['kurtosis', 'mean_excess_delay_ns', 'rms_delay_spread_ns', 'rx_dbm', 'fp_dbm'])
+    assert.equal(parseFloat((await text(id(`feature-${name}`).locator('td').first())).replace('\u2212', '-')), Number(sample.features[name].toFixed(2)), name);
+  await id('taps-toggle').focus();
+  await page.keyboard.press('Enter');
+  assert.match(await text(id('taps').locator('tbody th', { hasText: 'strongest' })), /^740/);
+  // Kept beside, the first stays under the second.
+  await id('keep').click();
+  await page.keyboard.press('j');
+  await plot.locator('[data-mark="kept"]').waitFor();
+  assert.deepEqual(await violations(page), []);
+  await picture(page, 'campaign-cir-light');
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});
+
 test('a person draws an outline, generates a flight, moves a point by keys, saves, and a second editor is told', async () => {
   const { page, seen, id } = await openPage(browser, server, { hash: '#/plan' });
   const map = id('plan-map');

@@ -54,11 +54,15 @@ export async function campaigns(): Promise<Source[]> {
 }
 
 /// Base64 of int16 pairs re, im, little endian, as the server keeps what the radio gave.
-export async function impulse(id: number): Promise<Impulse | null> {
-  const o = obj(await request('GET', `/ranges/${id}/cir`)), raw = atob(str(o?.b64));
+export function impulse_of(answer: unknown): Impulse | null {
+  const o = obj(answer), raw = atob(str(o?.b64));
   const bytes = new DataView(Uint8Array.from(raw, (c) => c.charCodeAt(0)).buffer), dt_ps = num(o?.dt_ps);
   const magnitude = Array.from({ length: Math.floor(bytes.byteLength / 4) }, (_, i) => Math.hypot(bytes.getInt16(4 * i, true), bytes.getInt16(4 * i + 2, true)));
   return magnitude.length ? { tap_ns: dt_ps ? dt_ps / 1000 : DW1000_TAP_NS, first_path: num(o?.first_path_idx), magnitude } : null;
+}
+export async function impulse(source: Source, id: number): Promise<Impulse | null> {
+  const of = source.kind === 'mission' ? `/ranges/${id}` : `/campaigns/${encodeURIComponent(source.id)}/samples/${id}`;
+  return impulse_of(await request('GET', `${of}/cir`));
 }
 
 /// Exactly what is filtered, streamed by the server into a file. A campaign is taken out as the rows of a data set.

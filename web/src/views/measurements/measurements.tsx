@@ -6,6 +6,7 @@ import { said } from '../../api/client';
 import { campaigns as fetch_campaigns, download_url, page_of, type Sample, type Source } from '../../api/measurements';
 import { mission_id, ordered_missions } from '../../state/store';
 import { fixed, grouped } from '../../ui/format';
+import { keys_on } from '../../ui/help';
 import { Icon } from '../../ui/marks';
 import { chosen, CLASS_FILTERS, EVERYTHING, type Choice } from './choice';
 import { ImpulsePanel } from './impulse';
@@ -17,7 +18,8 @@ interface Loaded { readonly of: string; readonly samples: readonly Sample[]; rea
 export function Measurements() {
   const [campaigns, set_campaigns] = useState<readonly Source[]>([]), [wanted, set_wanted] = useState<string | null>(null), [loaded, set_loaded] = useState<Loaded | null>(null);
   const [problem, set_problem] = useState(''), [again, set_again] = useState(0), [choice, set_choice] = useState<Choice>(EVERYTHING), [selected, set_selected] = useState<number | null>(null);
-  useEffect(() => { document.title = 'Measurements - anchord'; fetch_campaigns().then(set_campaigns, () => undefined); }, []);
+  useEffect(() => { document.title = 'Measurements - anchord'; }, []);
+  useEffect(() => { fetch_campaigns().then(set_campaigns, () => undefined); }, [again]);
   const missions: Source[] = ordered_missions.value.map((m) => ({ kind: 'mission', id: m.mission, name: m.name || m.mission.slice(0, 8) })), sources = [...missions, ...campaigns];
   const source = sources.find((s) => s.id === (wanted ?? mission_id.value)) ?? sources[0] ?? null, key = source ? `${source.kind}/${source.id}` : '';
   const failed = (e: unknown): void => set_problem(said(e));
@@ -42,7 +44,7 @@ export function Measurements() {
   useEffect(() => {
     const on_key = (e: KeyboardEvent): void => {
       if (e.ctrlKey || e.metaKey || e.altKey || (e.target instanceof HTMLElement && e.target.closest('input, select, textarea'))) return;
-      if (e.key === 'j' || e.key === 'k') step(e.key === 'j' ? 1 : -1);
+      if (keys_on.value && (e.key === 'j' || e.key === 'k')) step(e.key === 'j' ? 1 : -1);
       if (e.key === 'Escape') set_selected(null);
     };
     addEventListener('keydown', on_key);
@@ -61,7 +63,7 @@ export function Measurements() {
         <Limit name="From" value={choice.min_m} set={(v) => set_choice({ ...choice, min_m: v })} /><Limit name="to" value={choice.max_m} set={(v) => set_choice({ ...choice, max_m: v })} />
         <span class="grow" />
         <span class="mut" data-testid="counts" role="status">{grouped(shown.length)} of {grouped(all.length)} loaded</span>
-        {current?.next && <button class="btn" data-testid="more" onClick={() => void more()}>Load older</button>}
+        {current?.next && <button class="btn" data-testid="more" onClick={() => void more()}>{source?.kind === 'campaign' ? 'Load more' : 'Load older'}</button>}
         {source && download_url(source, choice.who, 'csv') && <a class="btn" href={download_url(source, choice.who, 'csv')!} download={`ranges-${source.id}.csv`}><Icon name="download" />CSV</a>}
       </div>
       {problem && <div class="problem" role="status"><b>The measurements could not be read.</b> {problem} <button class="btn small" onClick={() => set_again(again + 1)}>Try again</button></div>}
@@ -85,7 +87,7 @@ function Rows({ source, samples, selected, select }: { source: Source; samples: 
   return (
     <section class="cell-p wide">
       <table class="tbl" data-testid="rows">
-        <caption class="sr">Measurements that pass the filter, newest first</caption>
+        <caption class="sr">Measurements that pass the filter</caption>
         <thead><tr><th scope="col">{source.kind === 'campaign' ? 'Place' : 'Anchor'}</th><th scope="col">Time, UTC</th><th scope="col">Label</th><th scope="col" class="num">Distance, m</th><th scope="col" class="num">True, m</th><th scope="col" class="num">Bias, mm</th><th scope="col" class="num">Level, dBm</th><th scope="col">Response</th></tr></thead>
         <tbody>{samples.slice(0, ROWS_SHOWN).map((s) => (
           <tr key={s.id} class={s.id === selected ? 'sel' : ''} onClick={() => select(s.id)}>

@@ -42,13 +42,16 @@ export function LevelPanel({ samples, selected, select }: { samples: readonly Sa
     </section>
   );
 }
+const AGAINST: readonly (readonly [string, string, (v: number) => string])[] = [['truth', 'true distance', metre_words], ['heading_deg', 'heading', (v) => `${fixed(v, 0)}°`], ['height_difference_m', 'height difference', (v) => `${fixed(v, 1)} m`]];
 export function TruthPanel({ samples, selected, select }: { samples: readonly Sample[]; selected: number | null; select: (id: number) => void }) {
-  if (!samples.some((s) => s.truth_m !== null)) return null;
+  const [wanted, set_wanted] = useState('truth'), value = (s: Sample, of: string): number | null => (of === 'truth' ? s.truth_m : (s.features[of] ?? null));
+  const true_ones = samples.filter((s) => s.truth_m !== null), offered = AGAINST.filter(([of]) => true_ones.some((s) => value(s, of) !== null)), [against, words, xw] = offered.find(([of]) => of === wanted) ?? AGAINST[0]!;
+  if (!true_ones.length) return null;
   return (
     <section class="cell-p" data-testid="plot-bias">
-      <h2>Bias over distance</h2>
-      <p class="sub">measured less true distance, where the truth is known</p>
-      <Scatter samples={samples} x={(s) => s.truth_m} y={(s) => (s.truth_m === null ? null : s.distance_m - s.truth_m)} xw={metre_words} yw={(v) => `${fixed(v * 1000, 0)} mm`} label="Bias against true distance" selected={selected} select={select} />
+      <div class="hd"><h2>Bias</h2>{offered.length > 1 && <select class="input" aria-label="Bias against" value={against} onChange={(e) => set_wanted(e.currentTarget.value)}>{offered.map(([of, name]) => <option key={of} value={of}>against {name}</option>)}</select>}</div>
+      <p class="sub">measured less true distance, where the truth is known{offered.length > 1 ? '' : `, against ${words}`}</p>
+      <Scatter samples={true_ones} x={(s) => value(s, against)} y={(s) => s.distance_m - s.truth_m!} xw={xw} yw={(v) => `${fixed(v * 1000, 0)} mm`} label={`Bias against ${words}`} selected={selected} select={select} />
     </section>
   );
 }
