@@ -205,6 +205,23 @@ test('a person draws an outline, generates a flight, moves a point by keys, save
   await page.close();
 });
 
+test('a plan that was not saved is back after a reload, and can be thrown away', async () => {
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/plan' });
+  await eventually('the plan is open', async () => (await id('plan-name').inputValue()) === 'Hall B');
+  await id('plan-name').fill('Hall Z');
+  await page.reload();
+  await id('brought-back').waitFor();
+  assert.equal(await id('plan-name').inputValue(), 'Hall Z');
+  assert.deepEqual(await violations(page), []);
+  await id('brought-back').getByRole('button', { name: 'Discard them' }).click();
+  await eventually('what is saved is shown', async () => (await id('plan-name').inputValue()) === 'Hall B');
+  await page.reload();
+  await eventually('and stays', async () => (await id('plan-name').inputValue()) === 'Hall B');
+  assert.equal(await id('brought-back').count(), 0);
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});
+
 test('system tells the state of the server, and a token is shown once', async () => {
   const { page, seen, id } = await openPage(browser, server, { hash: '#/system' });
   await id('health').getByText('DB', { exact: true }).waitFor();

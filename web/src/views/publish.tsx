@@ -7,13 +7,14 @@ import type { MissionMsg } from '../live/messages';
 import { current_scene, revision, say } from '../state/store';
 import { accuracy, fixed } from '../ui/format';
 import { Icon, Mark, StatusChip } from '../ui/marks';
+import { use_draft } from '../ui/use_draft';
 import { gate_words, VERDICT_WORDS } from '../ui/words';
 
 export const publish_open = signal(false);
 
 export function Publish({ mission }: { mission: MissionMsg }) {
-  const [draft, set_draft] = useState<Calibration | null>(null), [moved, set_moved] = useState<ReadonlyMap<string, Moved>>(new Map()), [reasons, set_reasons] = useState<Readonly<Record<string, string>>>({}), [problem, set_problem] = useState(''), [busy, set_busy] = useState<'' | 'calibrating' | 'publishing'>('calibrating');
-  const keys = useRef({ calibrate: idempotency_key(), publish: idempotency_key() }), note = useRef<HTMLInputElement>(null), box = useRef<HTMLElement>(null);
+  const [draft, set_draft] = useState<Calibration | null>(null), [moved, set_moved] = useState<ReadonlyMap<string, Moved>>(new Map()), [problem, set_problem] = useState(''), [busy, set_busy] = useState<'' | 'calibrating' | 'publishing'>('calibrating');
+  const keys = useRef({ calibrate: idempotency_key(), publish: idempotency_key() }), [form, change, forget] = use_draft(`publish/${mission.mission}`, { note: '', reasons: {} as Readonly<Record<string, string>> }), { note, reasons } = form, box = useRef<HTMLElement>(null);
   const guarded = async (what: 'calibrating' | 'publishing', work: () => Promise<void>): Promise<void> => {
     set_busy(what);
     set_problem('');
@@ -26,12 +27,13 @@ export function Publish({ mission }: { mission: MissionMsg }) {
     set_moved(await moved_since_published(made.id).catch(() => new Map()));
   });
   useEffect(() => { box.current?.focus(); solve(); }, []);
-  const good = draft?.rows.filter(passes) ?? [], overrides = Object.entries(reasons).filter(([, reason]) => reason.trim() !== '').map(([network_id, reason]) => ({ network_id, reason: reason.trim() }));
+  const good = draft?.rows.filter(passes) ?? [], overrides = Object.entries(reasons).filter(([id, reason]) => reason.trim() !== '' && draft?.rows.some((r) => r.anchor === id && may_override(r))).map(([network_id, reason]) => ({ network_id, reason: reason.trim() }));
   const going = good.length + overrides.length;
   const send = (): void => void guarded('publishing', async () => {
-    const n = await publish(draft!.id, note.current?.value.trim() ?? '', overrides, keys.current.publish);
+    const n = await publish(draft!.id, note.trim(), overrides, keys.current.publish);
     if (n !== null) revision.value = Math.max(revision.value ?? 0, n);
     say(`Published${n === null ? '' : ` as revision ${n}`}`);
+    forget();
     publish_open.value = false;
   });
   return (
@@ -46,11 +48,11 @@ export function Publish({ mission }: { mission: MissionMsg }) {
             <table class="tbl" data-testid="draft">
               <caption class="sr">Result of the calibration for each anchor</caption>
               <thead><tr><th scope="col">Anchor</th><th scope="col">Result</th><th scope="col" class="num">95 % h</th><th scope="col" class="num">95 % v</th><th scope="col" class="num">From live, m</th><th scope="col" class="num">From published, m</th><th scope="col">Published</th></tr></thead>
-              <tbody>{draft.rows.map((r) => <DraftRow key={r.anchor} r={r} moved={moved.get(r.anchor)} reason={reasons[r.anchor]} set_reason={(reason) => set_reasons({ ...reasons, [r.anchor]: reason })} />)}</tbody>
+              <tbody>{draft.rows.map((r) => <DraftRow key={r.anchor} r={r} moved={moved.get(r.anchor)} reason={reasons[r.anchor]} set_reason={(reason) => change({ reasons: { ...reasons, [r.anchor]: reason } })} />)}</tbody>
             </table>
           </div>
           <label class="lab" for="note">Note</label>
-          <input id="note" ref={note} placeholder="What this revision is about" maxLength={200} />
+          <input id="note" value={note} onInput={(e) => change({ note: e.currentTarget.value })} placeholder="What this revision is about" maxLength={200} />
           <div class="actions"><a class="btn" href={report_url(draft.id)} target="_blank" rel="noreferrer" data-testid="report">Report to print</a><span class="grow" /><button class="btn" onClick={() => (publish_open.value = false)}>Not now</button><button class="btn primary" data-testid="publish-now" disabled={busy !== '' || going === 0} onClick={send}>{busy === 'publishing' ? 'Publishing' : `Publish ${going} of ${draft.rows.length} anchors`}</button></div>
         </>
       )}

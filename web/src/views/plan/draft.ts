@@ -1,5 +1,6 @@
 /// The plan being edited, in metres about its own origin for the map, and every change as a new draft, so that undo is a list. No DOM.
 import type { Corner, Plan, Waypoint } from '../../api/plans';
+import { num, obj, str } from '../../live/messages';
 import { enu_from_geodetic, geodetic_from_enu, type Geodetic } from '../../map/enu';
 
 export type Shape = 'outline' | 'fence' | 'waypoints' | `no_fly/${number}`;
@@ -42,3 +43,13 @@ export const begun = (p: Plan): History => ({ now: p, before: [], after: [] });
 export const changed = (h: History, now: Plan): History => ({ now, before: [...h.before, h.now].slice(-UNDO_MAX), after: [] });
 export const undone = (h: History): History => (h.before.length ? { now: h.before[h.before.length - 1]!, before: h.before.slice(0, -1), after: [h.now, ...h.after] } : h);
 export const redone = (h: History): History => (h.after.length ? { now: h.after[0]!, before: [...h.before, h.now], after: h.after.slice(1) } : h);
+
+/// Under which an unsaved plan is kept on this device.
+export const draft_key = (id: string | null): string => `plan/${id ?? 'new'}`;
+const cornered = (v: unknown): boolean => Array.isArray(v) && v.every((c) => num(obj(c)?.lon) !== null && num(obj(c)?.lat) !== null);
+/// A plan that was kept, if it is one.
+export function plan_from_draft(kept: unknown): Plan | null {
+  const o = obj(kept);
+  if (!o || (o.id !== null && !str(o.id)) || typeof o.name !== 'string' || num(o.revision) === null || num(o.building_height_m) === null || !obj(o.settings) || !obj(o.rest)) return null;
+  return cornered(o.outline) && cornered(o.fence) && cornered(o.waypoints) && Array.isArray(o.no_fly) && o.no_fly.every(cornered) ? (o as unknown as Plan) : null;
+}

@@ -1,33 +1,46 @@
 /// Plan: outline, areas and waypoints, drawn or typed; generated from the outline; judged while it is edited; saved by revision.
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
 import './plan.css';
 import { ApiError, said } from '../../api/client';
 import { check as fetch_check, EMPTY, export_url, generate, import_file, plans as fetch_plans, read, remove, save, type Check, type Plan as PlanDoc } from '../../api/plans';
 import type { Geodetic } from '../../map/enu';
 import { may } from '../../state/session';
+import { draft_of, drop_draft, keep_draft, newest_draft } from '../../state/drafts';
 import { current_mission, say } from '../../state/store';
-import { clock, fixed, grouped } from '../../ui/format';
+import { age, clock, fixed, grouped } from '../../ui/format';
 import { Chip, Icon } from '../../ui/marks';
-import { begun, changed, origin_of, redone, undone, type History, type Picked, type Shape } from './draft';
+import { begun, changed, draft_key, origin_of, plan_from_draft, redone, undone, type History, type Picked, type Shape } from './draft';
 import { PlanMap } from './plan_map';
 import { Corners, SettingFields, Waypoints } from './points';
 
 export function Plan({ id }: { id: string | null }) {
   const [all, set_all] = useState<readonly PlanDoc[] | null>(null), [history, set_history] = useState<History>(begun(EMPTY)), [saved, set_saved] = useState<PlanDoc>(EMPTY), [drawing, set_drawing] = useState<Shape>('outline'), [picked, pick] = useState<Picked | null>(null);
-  const [check, set_check] = useState<Check | null>(null), [problem, set_problem] = useState(''), [theirs, set_theirs] = useState<PlanDoc | null>(null), [notes, set_notes] = useState<readonly string[]>([]), [busy, set_busy] = useState(''), [origin, set_origin] = useState<Geodetic | null>(null);
+  const [check, set_check] = useState<Check | null>(null), [problem, set_problem] = useState(''), [theirs, set_theirs] = useState<PlanDoc | null>(null), [notes, set_notes] = useState<readonly string[]>([]), [busy, set_busy] = useState(''), [origin, set_origin] = useState<Geodetic | null>(null), [back_ms, set_back] = useState<number | null>(null);
   const file = useRef<HTMLInputElement>(null), plan = history.now, dirty = plan !== saved, engineer = may('engineer', 'operator');
   // Metres are about one origin for as long as a plan is open: a map that moves while it is drawn on cannot be used.
-  const open = (p: PlanDoc): void => { set_origin(origin_of(p, current_mission.peek()?.origin ?? null)); set_history(begun(p)); set_saved(p); pick(null); set_check(null); set_theirs(null); set_notes([]); };
+  const open = (p: PlanDoc): void => { set_origin(origin_of(p, current_mission.peek()?.origin ?? null)); set_history(begun(p)); set_saved(p); pick(null); set_check(null); set_theirs(null); set_notes([]); set_back(null); };
+  /// What was not saved when the page went away is on the drawing again, as one change that can be undone.
+  const open_with_draft = (p: PlanDoc): void => {
+    const draft = draft_of(draft_key(p.id)), kept = plan_from_draft(draft?.value);
+    open(p);
+    if (!draft || !kept || kept.id !== p.id) return;
+    set_origin(origin_of(kept, origin_of(p, current_mission.peek()?.origin ?? null)));
+    set_history(changed(begun(p), kept));
+    set_back(draft.at_ms);
+  };
   const guarded = async (what: string, work: () => Promise<void>): Promise<void> => { set_busy(what); set_problem(''); try { await work(); } catch (e) { set_problem(said(e)); } set_busy(''); };
   useEffect(() => {
     document.title = 'Plan - anchord';
-    fetch_plans().then((list) => { set_all(list); const wanted = list.find((p) => p.id === id) ?? list[0]; open(wanted ?? EMPTY); }, (e: unknown) => set_problem(said(e)));
+    fetch_plans().then((list) => { set_all(list); const last = id ? null : newest_draft('plan/')?.key, wanted = list.find((p) => p.id === id) ?? list.find((p) => draft_key(p.id) === last) ?? (last === draft_key(null) ? EMPTY : list[0]); open_with_draft(wanted ?? EMPTY); }, (e: unknown) => set_problem(said(e)));
   }, [id]);
   useEffect(() => { if (saved.id && !dirty) fetch_check(saved.id).then(set_check, () => undefined); }, [saved]);
+  // With the change itself, not after the next picture: the page may be gone by then.
+  useLayoutEffect(() => { if (all === null) return; if (dirty) keep_draft(draft_key(plan.id), plan); else drop_draft(draft_key(plan.id)); }, [plan, saved, all === null]);
   const change = (p: PlanDoc): void => { set_history(changed(history, p)); set_check(null); };
   const keep = (): void => void guarded('save', async () => {
     try {
       const kept = await save(plan);
+      drop_draft(draft_key(plan.id));
       set_history(begun(kept));
       set_saved(kept);
       set_theirs(null);
@@ -47,7 +60,7 @@ export function Plan({ id }: { id: string | null }) {
     <div class="plan" data-testid="plan">
       <div class="toolbar">
         <h1>Plan</h1>
-        {all && all.length > 0 && <select aria-label="Plan" data-testid="plan-choice" value={plan.id ?? ''} disabled={dirty} onChange={(e) => { const p = all.find((x) => x.id === e.currentTarget.value); if (p) open(p); }}>{!plan.id && <option value="">new plan</option>}{all.map((p) => <option key={p.id} value={p.id!}>{p.name}</option>)}</select>}
+        {all && all.length > 0 && <select aria-label="Plan" data-testid="plan-choice" value={plan.id ?? ''} disabled={dirty} onChange={(e) => { const p = all.find((x) => x.id === e.currentTarget.value); if (p) open_with_draft(p); }}>{!plan.id && <option value="">new plan</option>}{all.map((p) => <option key={p.id} value={p.id!}>{p.name}</option>)}</select>}
         <input class="planname" aria-label="Name of the plan" placeholder="Name" value={plan.name} data-testid="plan-name" maxLength={200} onInput={(e) => set_history({ ...history, now: { ...plan, name: e.currentTarget.value } })} />
         <span class="mut">{plan.id ? `revision ${plan.revision}${dirty ? ', changed' : ''}` : 'not saved'}</span>
         <span class="grow" />
@@ -59,6 +72,7 @@ export function Plan({ id }: { id: string | null }) {
         {engineer && <button class="btn primary" data-testid="save" disabled={!dirty || busy !== ''} onClick={keep}>Save</button>}
       </div>
       {problem && <div class="problem" role="status"><b>That did not work.</b> {problem}</div>}
+      {back_ms !== null && dirty && <div class="callout" role="status" data-testid="brought-back"><b>Your changes of {age(Date.now() - back_ms)} ago are back.</b> They were not saved when the page was closed. <button class="btn small" onClick={() => open(saved)}>Discard them</button></div>}
       {theirs && <Conflict mine={plan} theirs={theirs} keep_mine={() => { set_history(changed(history, { ...plan, revision: theirs.revision })); set_theirs(null); }} take_theirs={() => open(theirs)} />}
       <div class="planbody">
         <div class="planleft">
