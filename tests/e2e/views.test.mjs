@@ -222,6 +222,34 @@ test('a plan that was not saved is back after a reload, and can be thrown away',
   await page.close();
 });
 
+test('facility data of an anchor are edited where they stand, kept over a reload, and never overwrite another\'s', async () => {
+  const { features: [anchor] } = await get('/api/v1/anchors?view=live');
+  const name = anchor.properties.network_id;
+  const { page, seen, id } = await openPage(browser, server, { hash: `#/anchors/${name}` });
+  await id('facility-edit').click();
+  const form = id('facility').getByRole('form');
+  await form.getByLabel('Name', { exact: true }).fill('Hall A north-west');
+  await form.getByRole('button', { name: 'Add a system' }).click();
+  await form.getByLabel('System 1', { exact: true }).fill('archibus');
+  await form.getByLabel('Name in system 1').fill('EQ-7');
+  await page.reload();
+  assert.equal(await form.getByLabel('Name', { exact: true }).inputValue(), 'Hall A north-west');
+  // Somebody else fills in the room meanwhile: told, and both stand in the end.
+  const read = await server.fetch(`/api/v1/anchors/${name}`);
+  assert.equal((await server.fetch(`/api/v1/anchors/${name}`, { method: 'PATCH', headers: { 'if-match': read.headers.get('etag') }, json: { space: 'A0.12' } })).status, 200);
+  await id('facility-save').click();
+  await id('facility').getByText('Somebody changed this anchor meanwhile').waitFor();
+  assert.equal(await form.getByLabel('Room').inputValue(), 'A0.12');
+  assert.deepEqual(await violations(page), []);
+  await picture(page, 'facility-light');
+  await id('facility-save').click();
+  await id('facility').getByText('EQ-7').waitFor();
+  const { properties } = await get(`/api/v1/anchors/${name}`);
+  assert.deepEqual([properties.name, properties.space, properties.external_ids], ['Hall A north-west', 'A0.12', [{ system: 'archibus', id: 'EQ-7' }]]);
+  assert.deepEqual(seen.errors.filter((e) => !e.includes('412')), []);
+  await page.close();
+});
+
 test('system tells the state of the server, and a token is shown once', async () => {
   const { page, seen, id } = await openPage(browser, server, { hash: '#/system' });
   await id('health').getByText('DB', { exact: true }).waitFor();

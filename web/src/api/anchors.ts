@@ -1,6 +1,6 @@
 /// Anchors as the Anchors view shows them, whether they come from the stream, from a published revision or from a fresh calibration.
 import { cov6, ellipse, estimate, mirror, num, obj, str, STATUS, vec3, VERDICT, type EstimateMsg, type Mirror } from '../live/messages';
-import { ellipse_from_covariance } from '../map/enu';
+import { ellipse_from_covariance, enu_from_geodetic } from '../map/enu';
 import { api_url, request } from './client';
 
 /// One acceptance test of the server: its number against its limit.
@@ -93,3 +93,16 @@ export async function moved_since_published(calibration: string): Promise<Map<st
   return out;
 }
 export const report_url = (calibration: string): string => api_url(`/calibrations/${encodeURIComponent(calibration)}/report`);
+
+/// One published position of an anchor, and how far it is from the one before; null where either has no place on the globe.
+export interface Past { readonly revision: number; readonly published_at: string; readonly status: string; readonly h95_m: number | null; readonly v95_m: number | null; readonly horizontal_m: number | null; readonly vertical_m: number | null }
+export function past_of(answer: unknown): Past[] {
+  const items = obj(answer)?.items, list = (Array.isArray(items) ? items : []).map(obj).filter((o) => o !== null) as Record<string, unknown>[];
+  return list.map((o, i) => {
+    const here = point(o.geometry), before = list[i + 1] ? point(list[i + 1]!.geometry) : null, relative = obj(obj(o.accuracy)?.relative);
+    const known = here.lon !== null && here.lat !== null && before?.lon != null && before.lat !== null;
+    const shift = known ? enu_from_geodetic({ lon: here.lon!, lat: here.lat!, h_m: here.h_m ?? 0 }, { lon: before!.lon!, lat: before!.lat!, h_m: before!.h_m ?? 0 }) : null;
+    return { revision: num(o.revision) ?? 0, published_at: str(o.published_at), status: str(o.verdict), h95_m: num(relative?.h95_m), v95_m: num(relative?.v95_m), horizontal_m: shift && Math.hypot(shift[0], shift[1]), vertical_m: shift && shift[2] };
+  });
+}
+export const past = async (anchor: string): Promise<Past[]> => past_of(await request('GET', `/anchors/${encodeURIComponent(anchor)}/history`));

@@ -15,7 +15,10 @@ export function problem_of(body: unknown, status: number): Problem {
 
 export const api_url = (path: string): string => new URL(`api/v1${path}`, document.baseURI.split('#')[0]).toString();
 
-export async function request(method: string, path: string, body?: unknown, headers: Record<string, string> = {}): Promise<unknown> {
+/// `etag` names the state that was read; sent back as If-Match, a change of another state is refused.
+export interface Answer { readonly body: unknown; readonly etag: string }
+export const request = async (method: string, path: string, body?: unknown, headers: Record<string, string> = {}): Promise<unknown> => (await exchange(method, path, body, headers)).body;
+export async function exchange(method: string, path: string, body?: unknown, headers: Record<string, string> = {}): Promise<Answer> {
   let answer: Response;
   try {
     answer = await fetch(api_url(path), {
@@ -32,7 +35,7 @@ export async function request(method: string, path: string, body?: unknown, head
     parsed = text ? JSON.parse(text) : null;
   } catch { /* not JSON: the status alone speaks */ }
   if (!answer.ok) throw new ApiError(problem_of(parsed, answer.status));
-  return parsed;
+  return { body: parsed, etag: answer.headers.get('etag') ?? '' };
 }
 /// What is wrong with each field, where the problem's own words do not say it already; the first five.
 function fields_said({ errors, detail }: Problem): string {

@@ -3,11 +3,13 @@ import { age, accuracy, bearing, date, fixed, latlon, metres, percent, plain } f
 import { CopyBox } from '../ui/copy_box';
 import { Mark, Q, StatusChip } from '../ui/marks';
 import { GATES, gate_words, why_not_done, VERDICT_WORDS } from '../ui/words';
+import { AnchorPast } from './anchor_past';
 import { Convergence } from './convergence';
+import { FacilityPanel } from './facility';
 import { Covariance, Loupe } from './loupe';
 import { current_scene, now_ms, tick } from '../state/store';
 
-export function AnchorDetail({ row: r, live }: { row: AnchorRow; live: boolean }) {
+export function AnchorDetail({ row: r, live, changed }: { row: AnchorRow; live: boolean; changed: () => void }) {
   tick.value;
   const why = why_not_done(r), heard = live ? current_scene()?.anchors.get(r.anchor) : undefined;
   const geo = r.lat !== null && r.lon !== null;
@@ -39,6 +41,8 @@ export function AnchorDetail({ row: r, live }: { row: AnchorRow; live: boolean }
           {r.cov_enu_m2 && <Covariance c={r.cov_enu_m2} />}
         </section>
       </div>
+      <FacilityPanel anchor={r.anchor} changed={changed} />
+      {!live && <AnchorPast anchor={r.anchor} />}
       {live && <section class="sec-p"><Convergence anchor={r.anchor} /></section>}
     </div>
   );

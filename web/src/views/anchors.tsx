@@ -74,7 +74,7 @@ export function Anchors({ anchor }: { anchor: string | null }) {
         {rows.length ? <AnchorTable rows={rows} selected={selected?.anchor ?? null} live={live} /> : <Nothing live={live} filtered={all.length > 0} />}
       </section>
       <MapBox content={() => ({ anchors: on_map, selected: selected?.anchor ?? null, scene: live ? current_scene() : null, link_lost: link.peek() === 'lost', running: mission?.state === 'recording' })} onSelect={(a) => (chosen_anchor.value = a)} label="Map of the anchors in the table" follow={false} version={version} />
-      <aside class="detailbox" aria-label="Selected anchor" tabIndex={0}>{selected ? <AnchorDetail row={selected} live={live} /> : <p class="why pad">Nothing is selected.</p>}</aside>
+      <aside class="detailbox" aria-label="Selected anchor" tabIndex={0}>{selected ? <AnchorDetail row={selected} live={live} changed={() => void load_published()} /> : <p class="why pad">Nothing is selected.</p>}</aside>
       {publish_open.value && mission && <Publish mission={mission} />}
     </div>
   );
