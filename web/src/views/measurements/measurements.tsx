@@ -8,6 +8,8 @@ import { mission_id, ordered_missions } from '../../state/store';
 import { fixed, grouped } from '../../ui/format';
 import { keys_on } from '../../ui/help';
 import { Icon } from '../../ui/marks';
+import { may } from '../../state/session';
+import { CampaignMode } from './campaign_mode';
 import { chosen, CLASS_FILTERS, EVERYTHING, type Choice } from './choice';
 import { ImpulsePanel } from './impulse';
 import { HistogramPanel, LevelPanel, TruthPanel } from './plots';
@@ -17,7 +19,7 @@ interface Loaded { readonly of: string; readonly samples: readonly Sample[]; rea
 
 export function Measurements() {
   const [campaigns, set_campaigns] = useState<readonly Source[]>([]), [wanted, set_wanted] = useState<string | null>(null), [loaded, set_loaded] = useState<Loaded | null>(null);
-  const [problem, set_problem] = useState(''), [again, set_again] = useState(0), [choice, set_choice] = useState<Choice>(EVERYTHING), [selected, set_selected] = useState<number | null>(null);
+  const [problem, set_problem] = useState(''), [again, set_again] = useState(0), [choice, set_choice] = useState<Choice>(EVERYTHING), [selected, set_selected] = useState<number | null>(null), [labelling, set_labelling] = useState(false);
   useEffect(() => { document.title = 'Measurements - anchord'; }, []);
   useEffect(() => { fetch_campaigns().then(set_campaigns, () => undefined); }, [again]);
   const missions: Source[] = ordered_missions.value.map((m) => ({ kind: 'mission', id: m.mission, name: m.name || m.mission.slice(0, 8) })), sources = [...missions, ...campaigns];
@@ -64,10 +66,12 @@ export function Measurements() {
         <span class="grow" />
         <span class="mut" data-testid="counts" role="status">{grouped(shown.length)} of {grouped(all.length)} loaded</span>
         {current?.next && <button class="btn" data-testid="more" onClick={() => void more()}>{source?.kind === 'campaign' ? 'Load more' : 'Load older'}</button>}
+        {may('engineer', 'gateway') && <button class="btn" data-testid="label-field" aria-expanded={labelling} onClick={() => set_labelling(!labelling)}>Label in the field</button>}
         {source && download_url(source, choice.who, 'csv') && <a class="btn" href={download_url(source, choice.who, 'csv')!} download={`ranges-${source.id}.csv`}><Icon name="download" />CSV</a>}
       </div>
       {problem && <div class="problem" role="status"><b>The measurements could not be read.</b> {problem} <button class="btn small" onClick={() => set_again(again + 1)}>Try again</button></div>}
       <div class="page" tabIndex={0} role="region" aria-label="Measurements">
+        {labelling && <CampaignMode campaigns={campaigns} close={() => set_labelling(false)} taken={() => set_again(again + 1)} />}
         {!source && <div class="empty small"><p>Nothing has been measured yet. Fly, import a flight folder, or import a campaign with ground truth.</p></div>}
         {source && !current && !problem && <p class="pad" role="status">Loading the measurements.</p>}
         {current && all.length === 0 && <div class="empty small"><p>{source!.name} has no measurements.</p></div>}
