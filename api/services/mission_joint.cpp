@@ -8,6 +8,8 @@ namespace {
 
 constexpr std::size_t k_min_joint_ranges = 100;  // below, the own search of each anchor is as good
 constexpr auto k_joint_pause = std::chrono::seconds(2);
+constexpr int k_joint_rest =
+    15;  // times what the last took: a long flight leaves 90 % of a core free as well
 
 }  // namespace
 
@@ -45,9 +47,8 @@ void MissionService::State::finish_joint(Flight& flight, const FlightSolution* s
                                          std::chrono::steady_clock::duration took) {
   const std::scoped_lock lock(flight.work_mutex);
   flight.joint_running = false;
-  // Three times as long a pause as the solution took: a quarter of one core at most, however long the flight.
   flight.joint_not_before = std::chrono::steady_clock::now() +
-                            std::max<std::chrono::steady_clock::duration>(k_joint_pause, 3 * took);
+                            std::max<std::chrono::steady_clock::duration>(k_joint_pause, k_joint_rest * took);
   if (solution == nullptr || stopped) return;
   flight.live.adopt(*solution, cut);
   flight.watch.note_lag(solution->shared.lag_s.value, solution->shared.lag_s.sigma);

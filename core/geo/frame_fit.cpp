@@ -51,11 +51,11 @@ Centred centre(std::span<const FramePair> pairs) {
 Eigen::Vector3d spread(const Eigen::Matrix3Xd& centred_m, FrameModel model) {
   Eigen::Matrix3Xd points = centred_m;
   if (model == FrameModel::four) points.row(2).setZero();
-  const Eigen::JacobiSVD<Eigen::Matrix3Xd> svd(points);
-  Eigen::Vector3d sd = Eigen::Vector3d::Zero();
-  const auto& s = svd.singularValues();
-  sd.head(s.size()) = s / std::sqrt(static_cast<double>(centred_m.cols()));
-  return sd;
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (Eigen::Index i = 0; i < points.cols(); ++i) scatter += points.col(i) * points.col(i).transpose();
+  scatter /= static_cast<double>(points.cols());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter, Eigen::EigenvaluesOnly);
+  return eigen.eigenvalues().reverse().cwiseMax(0).cwiseSqrt();
 }
 
 Result<void> check(std::span<const FramePair> pairs, const FrameFitOptions& options) {
@@ -148,11 +148,10 @@ void fill_covariance(std::span<const FramePair> pairs, const Centred& c, const F
   active.push_back(5);
   if (options.fit_scale) active.push_back(6);
   const auto n = static_cast<Eigen::Index>(active.size());
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);
+  FrameCovariance information = FrameCovariance::Zero();
   double chi2 = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const auto whole = jacobian(fit.transform, c.local_m.col(static_cast<Eigen::Index>(i)));
-    const Eigen::MatrixXd j = whole(Eigen::all, active);
+    const auto j = jacobian(fit.transform, c.local_m.col(static_cast<Eigen::Index>(i)));
     information += c.weights[i] * j.transpose() * j;
     chi2 += c.weights[i] * fit.residuals[i].residual_m.squaredNorm();
   }
@@ -163,12 +162,19 @@ void fill_covariance(std::span<const FramePair> pairs, const Centred& c, const F
     return;
   }
   const double factor = fit.dof > 0 ? chi2 / fit.dof : 1.0;
-  const Eigen::MatrixXd inverse = information.inverse() * (known ? std::max(1.0, factor) : factor);
-  FrameCovariance covariance = FrameCovariance::Zero();
-  for (Eigen::Index r = 0; r < n; ++r) {
-    for (Eigen::Index k = 0; k < n; ++k)
-      covariance(active[static_cast<std::size_t>(r)], active[static_cast<std::size_t>(k)]) = inverse(r, k);
+  // A parameter that is not fitted stands alone with 1 while the rest is inverted.
+  const auto fitted = [&](Eigen::Index k) {
+    return std::find(active.begin(), active.end(), k) != active.end();
+  };
+  for (Eigen::Index k = 0; k < information.rows(); ++k) {
+    if (fitted(k)) continue;
+    information.row(k).setZero();
+    information.col(k).setZero();
+    information(k, k) = 1;
   }
+  FrameCovariance covariance = information.inverse() * (known ? std::max(1.0, factor) : factor);
+  for (Eigen::Index k = 0; k < information.rows(); ++k)
+    if (!fitted(k)) covariance(k, k) = 0;
   fit.covariance = covariance;
 }
 

@@ -46,9 +46,9 @@ double residual_m(const Observation& o, const Unknowns& at, Eigen::Vector4d* der
   const double distance_m = difference.norm();
   if (derivative) {
     // On the tag itself there is no direction; any unit vector is a subgradient, up is as good as another.
-    const Eigen::Vector3d u =
+    derivative->head<3>() =
         distance_m > 1e-9 ? Eigen::Vector3d(difference / distance_m) : Eigen::Vector3d(0, 0, 1);
-    *derivative << u, 1.0;
+    (*derivative)[3] = 1.0;
   }
   return o.distance_m - distance_m - at[3];
 }

@@ -9,6 +9,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <thread>
+#include <utility>
 
 #include "api/json/flight_requests.hpp"
 #include "api/json/wire_rows.hpp"
@@ -16,6 +17,7 @@
 #include "drivers/device/replay.hpp"
 #include "server/cli/progress.hpp"
 #include "server/cli/rest_client.hpp"
+#include "server/cli/row_upload.hpp"
 
 namespace anchord::cli {
 namespace {
@@ -34,43 +36,17 @@ int fail(const Error& error, int code) {
 std::string line_of(const Fix& fix) { return api::fix_json(fix, std::nullopt).dump() + '\n'; }
 std::string line_of(const Range& range) { return api::range_json(range, std::nullopt).dump() + '\n'; }
 
-/// Rows of one kind on their way to the server.
-class Upload {
- public:
-  Upload(RestClient& client, std::string path) : client_(client), path_(std::move(path)) {}
-  void add(const std::string& line) {
-    batch_ += line;
-    ++n_;
-  }
-  bool full() const { return n_ >= k_batch; }
-  Result<void> send() {
-    if (n_ == 0) return boost::outcome_v2::success();
-    BOOST_OUTCOME_TRY(const auto body, client_.post(path_, "application/x-ndjson", batch_));
-    BOOST_OUTCOME_TRY(const auto answer, api::parse_ingest_answer(body));
-    accepted += answer.accepted;
-    known += answer.duplicates;
-    refused += answer.rejected;
-    if (first_error.empty()) first_error = answer.first_error;
-    batch_.clear();
-    n_ = 0;
-    return boost::outcome_v2::success();
-  }
-  std::uint64_t accepted{}, known{}, refused{};
-  std::string first_error;
-
- private:
-  RestClient& client_;
-  std::string path_, batch_;
-  int n_{0};
-};
-
 /// Missions of the recording on a server: its own where the server has it, else a new one.
 class Missions {
  public:
   Missions(RestClient& client, const RecordingTarget& target) : client_(client), target_(target) {}
 
-  Result<MissionId> of(const MissionId& recorded) {
-    if (const auto known = there_.find(recorded); known != there_.end()) return known->second;
+  std::optional<MissionId> known(const MissionId& recorded) const {
+    const auto found = there_.find(recorded);
+    return found == there_.end() ? std::nullopt : std::optional(found->second);
+  }
+  /// Asks the server, and makes it there.
+  Result<MissionId> find(const MissionId& recorded) {
     const auto wanted = target_.mission.empty() ? to_string(recorded) : target_.mission;
     const auto there = client_.get("/api/v1/missions/" + wanted);
     if (there) {
@@ -112,45 +88,45 @@ class Missions {
 class Player {
  public:
   Player(RestClient& client, const RecordingTarget& target)
-      : fixes_(client, "/api/v1/fixes"),
-        ranges_(client, "/api/v1/ranges"),
-        missions_(client, target),
-        speed_(target.speed) {}
+      : upload_(client), missions_(client, target), speed_(target.speed) {}
 
   template <class Row>
   Result<void> take(Row row) {
     BOOST_OUTCOME_TRY(wait_for(row.received.value_or(row.time)));
-    BOOST_OUTCOME_TRY(row.mission, missions_.of(row.mission));
-    if constexpr (std::is_same_v<Row, Fix>) {
-      fixes_.add(line_of(row));
-    } else {
-      ranges_.add(line_of(row));
-    }
-    return fixes_.full() || ranges_.full() ? send() : boost::outcome_v2::success();
+    BOOST_OUTCOME_TRY(row.mission, mission_of(row.mission));
+    (std::is_same_v<Row, Fix> ? batch_.fixes : batch_.ranges) += line_of(row);
+    return ++batch_.n == k_batch ? send() : boost::outcome_v2::success();
   }
   Result<void> finish() {
     BOOST_OUTCOME_TRY(send());
+    BOOST_OUTCOME_TRY(upload_.drain());
     return missions_.finish();
   }
   /// False when the server refused rows.
-  bool report() const {
+  bool report() {
+    // Its failure is told by whoever sent; what was answered counts all the same.
+    (void)upload_.drain();
+    const auto answers = upload_.answers();
     std::fprintf(stderr, "replay: %llu rows accepted, %llu known already, %llu refused\n",
-                 static_cast<unsigned long long>(fixes_.accepted + ranges_.accepted),
-                 static_cast<unsigned long long>(fixes_.known + ranges_.known),
-                 static_cast<unsigned long long>(fixes_.refused + ranges_.refused));
-    for (const auto* upload : {&fixes_, &ranges_}) {
-      if (!upload->first_error.empty())
-        std::fprintf(stderr, "anchord replay: refused first: %s\n", upload->first_error.c_str());
+                 static_cast<unsigned long long>(answers.accepted),
+                 static_cast<unsigned long long>(answers.known),
+                 static_cast<unsigned long long>(answers.refused));
+    for (const auto* first : {&answers.first_error_fixes, &answers.first_error_ranges}) {
+      if (!first->empty()) std::fprintf(stderr, "anchord replay: refused first: %s\n", first->c_str());
     }
-    return fixes_.refused + ranges_.refused == 0;
+    return answers.refused == 0;
   }
 
  private:
+  /// Of the server. Asking for one that is new waits until the upload leaves the client alone.
+  Result<MissionId> mission_of(const MissionId& recorded) {
+    if (const auto known = missions_.known(recorded)) return *known;
+    BOOST_OUTCOME_TRY(upload_.drain());
+    return missions_.find(recorded);
+  }
   Result<void> send() {
-    BOOST_OUTCOME_TRY(fixes_.send());
-    BOOST_OUTCOME_TRY(ranges_.send());
     sent_ = SteadyClock::now();
-    return boost::outcome_v2::success();
+    return batch_.n == 0 ? boost::outcome_v2::success() : upload_.send(std::exchange(batch_, {}));
   }
   /// What is due meanwhile leaves every tick.
   Result<void> wait_for(UtcTime recorded) {
@@ -173,7 +149,8 @@ class Player {
     return boost::outcome_v2::success();
   }
 
-  Upload fixes_, ranges_;
+  RowBatch batch_{};
+  RowUpload upload_;
   Missions missions_;
   double speed_;
   std::optional<UtcTime> first_{};

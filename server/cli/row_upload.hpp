@@ -1,0 +1,60 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "core/base/result.hpp"
+
+namespace anchord::cli {
+
+class RestClient;
+
+/// Lines of fixes and ranges that go to the server together.
+struct RowBatch {
+  std::string fixes, ranges;
+  int n{0};
+};
+
+/// What the server said of the rows so far.
+struct RowAnswers {
+  std::uint64_t accepted{}, known{}, refused{};
+  std::string first_error_fixes, first_error_ranges;
+};
+
+/// Sends batches in their order on a thread of its own, fixes before ranges, while the next is being derived.
+/// One batch is under way and one waits; who brings a third waits for room. Everything it tells its owner, it
+/// tells on the owner's thread; the client is the thread's own between send() and drain().
+class RowUpload {
+ public:
+  explicit RowUpload(RestClient& client);
+  ~RowUpload();
+  RowUpload(const RowUpload&) = delete;
+  RowUpload& operator=(const RowUpload&) = delete;
+
+  /// errors: those of an earlier batch, after which nothing more is sent
+  Result<void> send(RowBatch batch);
+  /// Waits until all is answered.
+  Result<void> drain();
+  RowAnswers answers() const;
+
+ private:
+  void run();
+  Result<void> post(const RowBatch& batch);
+  Result<void> post_rows(const std::string& path, const std::string& lines,
+                         std::string RowAnswers::*first_error);
+
+  RestClient& client_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::optional<RowBatch> waiting_{};
+  bool busy_{false}, closing_{false};
+  std::optional<Error> failed_{};
+  RowAnswers answers_{};
+  std::thread thread_;
+};
+
+}  // namespace anchord::cli
