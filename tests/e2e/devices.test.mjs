@@ -72,7 +72,7 @@ test('identify makes lights blink, of the tag or of an anchor, over REST and by 
   const rover = await cli('identify', 'rover');
   assert.equal(rover.code, 1);
   assert.match(rover.stderr, /rover takes no "identify"/);
-  assert.equal((await device('good')).state, 'talking');
+  await eventually('talking as before', async () => (await device('good')).state === 'talking');
 });
 
 test('a recorded flight, played again, is the same rows: known to its own server, made anew on another', async () => {
