@@ -6,7 +6,7 @@ import { bearing, fixed, latlon, metres } from '../ui/format';
 import { StatusChip } from '../ui/marks';
 import { VERDICT_WORDS } from '../ui/words';
 
-interface Column { readonly key: string; readonly head: string; readonly cell: (r: AnchorRow) => string; readonly sort: (r: AnchorRow) => number | string; readonly wide?: boolean }
+interface Column { readonly key: string; readonly head: string; readonly cell: (r: AnchorRow) => string; readonly sort: (r: AnchorRow) => number | string; readonly width?: 'wide' | 'side-by' }   ///< wide: of large screens only; side-by: not where the detail stands beside the table
 const n = (v: number | null | undefined): number => v ?? Infinity;
 const ellipse_words = (r: AnchorRow): string => (r.ellipse95 ? `${fixed(r.ellipse95.major_m, 2)} × ${fixed(r.ellipse95.minor_m, 2)} m @ ${bearing(r.ellipse95.azimuth_deg)}°` : '–');
 
@@ -21,8 +21,8 @@ const QUALITY: Column[] = [
   { key: 'sv', head: 'σ v, m', cell: (r) => fixed(sigma_v(r.cov_enu_m2), 3), sort: (r) => n(sigma_v(r.cov_enu_m2)) },
   { key: 'e95', head: '95 % ellipse', cell: ellipse_words, sort: (r) => n(r.ellipse95?.major_m) },
   { key: 'gdop', head: 'GDOP', cell: (r) => fixed(r.gdop, 2), sort: (r) => n(r.gdop) },
-  { key: 'n', head: 'Ranges', cell: (r) => String(r.n_ranges), sort: (r) => r.n_ranges },
-  { key: 'rms', head: 'RMS, mm', cell: (r) => fixed(r.rms_residual_m === null ? null : r.rms_residual_m * 1000, 0), sort: (r) => n(r.rms_residual_m), wide: true },
+  { key: 'n', head: 'Ranges', cell: (r) => String(r.n_ranges), sort: (r) => r.n_ranges, width: 'side-by' },
+  { key: 'rms', head: 'RMS, mm', cell: (r) => fixed(r.rms_residual_m === null ? null : r.rms_residual_m * 1000, 0), sort: (r) => n(r.rms_residual_m), width: 'wide' },
 ];
 export const columns = (live: boolean): Column[] => [...(live ? PLACE_ENU : PLACE_GEO), ...QUALITY];
 
@@ -46,13 +46,13 @@ export function AnchorTable({ rows, selected, live }: { rows: readonly AnchorRow
   return (
     <table class="tbl" data-testid="anchor-table">
       <caption class="sr">{live ? 'Live estimates of the anchors in this flight' : 'Published anchor positions'}</caption>
-      <thead><tr>{head('id', 'Anchor', '')}{head('status', 'Status', '')}{shown.map((c) => head(c.key, c.head, `num${c.wide ? ' wide' : ''}`))}</tr></thead>
+      <thead><tr>{head('id', 'Anchor', '')}{head('status', 'Status', '')}{shown.map((c) => head(c.key, c.head, `num ${c.width ?? ''}`))}</tr></thead>
       <tbody>
         {rows.map((r) => (
           <tr key={r.anchor} class={r.anchor === selected ? 'sel' : ''} data-testid={`row-${r.anchor}`} onClick={() => (chosen_anchor.value = r.anchor)}>
             <th scope="row"><button class="id" aria-pressed={r.anchor === selected} onClick={() => (chosen_anchor.value = r.anchor)}>{r.anchor}</button>{r.name && <span class="mut block">{r.name}</span>}</th>
             <td><StatusChip status={r.status} /></td>
-            {r.enu_m || r.lat !== null ? shown.map((c) => <td key={c.key} class={`num${c.wide ? ' wide' : ''}`}>{c.cell(r)}</td>) : <td class="mut" colSpan={shown.length}>{VERDICT_WORDS[r.verdict]}{r.reason && `: ${r.reason}`}</td>}
+            {r.enu_m || r.lat !== null ? shown.map((c) => <td key={c.key} class={`num ${c.width ?? ''}`}>{c.cell(r)}</td>) : <td class="mut" colSpan={shown.length}>{VERDICT_WORDS[r.verdict]}{r.reason && `: ${r.reason}`}</td>}
           </tr>
         ))}
       </tbody>

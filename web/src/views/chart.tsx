@@ -21,6 +21,8 @@ export function Drawing({ label, draw, cls = '' }: { label: string; draw: (w: nu
 export const scale = (from: readonly [number, number], to: readonly [number, number]): Scale => (v) => to[0] + ((v - from[0]) / (from[1] - from[0] || 1)) * (to[1] - to[0]);
 export const line = (points: readonly (readonly [number, number])[]): string => points.map(([x, y], i) => `${i ? 'L' : 'M'}${x.toFixed(1)} ${y.toFixed(1)}`).join('');
 
+/// Decimals at which ticks differ: none where they are whole.
+export const decimals = (ts: readonly number[]): number => (ts.length < 2 ? 0 : Math.min(3, Math.max(0, -Math.floor(Math.log10(Math.abs(ts[1]! - ts[0]!)) + 1e-9))));
 /// Three to six round numbers between two ends.
 export function ticks(min: number, max: number, about = 5): number[] {
   const raw = (max - min) / about, power = 10 ** Math.floor(Math.log10(raw || 1)), step = [1, 2, 5, 10].map((k) => k * power).find((s) => s >= raw) ?? raw;

@@ -14,11 +14,11 @@ const decades = (min: number, max: number): number[] => {
 export function make_convergence(box: HTMLElement, look: Look, limit_m: number): uPlot {
   const font = `${look.rem * 0.75}px ${look.font}`;
   return new uPlot({
-    width: box.clientWidth, height: box.clientHeight, legend: { show: false }, cursor: { show: false }, padding: [6, 8, 0, 0],
+    width: box.clientWidth, height: box.clientHeight, legend: { show: false }, cursor: { show: false }, padding: [6, 20, 0, 0],
     // Room for the limit even when all values are far above it: the distance to it is the point of the chart.
     scales: { x: { time: false }, y: { distr: 3, log: 10, range: (_u, min, max) => [10 ** Math.floor(Math.log10(Math.min(min || 1, limit_m * 0.6))), 10 ** Math.ceil(Math.log10(Math.max(max || 1, 1)))] } },
     axes: [
-      { stroke: look.text, font, size: look.rem * 1.4, gap: 2, grid: { show: false }, ticks: { show: false }, values: (_u, v) => v.map((x) => `${x} s`) },
+      { stroke: look.text, font, size: look.rem * 1.7, gap: 8, grid: { show: false }, ticks: { show: false }, values: (_u, v) => v.map((x) => `${x} s`) },
       { stroke: look.text, font, size: look.rem * 3, gap: 4, splits: (_u, _i, min, max) => decades(min, max), grid: { stroke: look.line, width: 1 }, ticks: { show: false }, values: (_u, v) => v.map(words) },
     ],
     series: [{}, { stroke: look.ink, width: look.width, points: { show: false }, spanGaps: false }],

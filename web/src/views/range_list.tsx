@@ -1,4 +1,4 @@
-import { chosen_anchor, watched_mission, watched_scene, now_ms, tick, watched_lost } from '../state/store';
+import { chosen_anchor, replayed, watched_mission, watched_scene, now_ms, tick, watched_lost } from '../state/store';
 import { range_class, rate_hz, type RangeRow } from '../state/scene';
 import { age, fixed, range_m } from '../ui/format';
 import { CLASS_LOOK, Mark, Q } from '../ui/marks';
@@ -17,7 +17,7 @@ export function RangeList({ selected }: { selected: string | null }) {
   return (
     <section class="sec-p ranges" data-testid="range-list">
       <div class="hd"><h2>Ranges</h2><span class="meta">{!rows.length ? '' : lost ? `nothing for ${age(now - (scene?.range_at_ms ?? now))}` : running ? `${heard} of ${rows.length} heard, ${fixed(total_hz, 0)} Hz` : `${rows.length} anchors, flight ended`}</span></div>
-      {rows.length === 0 ? <p class="why">{running ? 'No range yet. Is the tag powered, and is an anchor in reach?' : 'The last 20 s of ranges are shown while a flight is recorded.'}</p> : (
+      {rows.length === 0 ? <p class="why">{replayed.value ? 'No range up to this moment.' : running ? 'No range yet. Is the tag powered, and is an anchor in reach?' : 'The last 20 s of ranges are shown while a flight is recorded.'}</p> : (
         <table class="rg">
           <caption class="sr">Live ranges by anchor{modelled ? '' : '. No line-of-sight model is active, so all are unclear.'}</caption>
           <thead><tr><th scope="col">Anchor</th><th scope="col">Corrected</th><th scope="col" class="pl">{modelled ? 'P(LOS)' : 'RSS'}</th><th scope="col" class="sp">Last 20 s</th><th scope="col" class="r">Hz</th></tr></thead>

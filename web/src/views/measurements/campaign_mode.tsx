@@ -57,7 +57,7 @@ export function CampaignMode({ campaigns, close, taken }: { campaigns: readonly 
   return (
     <section class="cell-p wide take" data-testid="campaign-mode" aria-label="Label in the field">
       <div class="hd"><h2>Label in the field</h2><span class="meta">{mission ? `from ${mission.name || 'the flight'}${mission.state === 'recording' ? '' : ', which has ended'}` : 'no flight'}</span><button class="btn quiet" aria-label="Close labelling" onClick={close}><Icon name="close" /></button></div>
-      <p class="why">Stand still, type what the laser metre says, press Record. The next ranges of the anchor join the campaign with this truth; the place is filled in again for the next one.</p>
+      <p class="why">Stand still, type what the laser metre says, press Record. The next ranges of the anchor join the campaign with this truth. The form stays filled in for the next place.</p>
       <datalist id="campaign-names">{campaigns.map((c) => <option key={c.id} value={c.name} />)}</datalist>
       <form onSubmit={(e) => { e.preventDefault(); void record(); }}>
         <div class="takeform">

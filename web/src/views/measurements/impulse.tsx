@@ -1,5 +1,5 @@
 /// One measurement: its impulse response over time, and where its features stand among LOS and NLOS.
-import { useEffect, useState } from 'preact/hooks';
+import { useEffect, useRef, useState } from 'preact/hooks';
 import { said } from '../../api/client';
 import { impulse, type Impulse, type Sample, type Source } from '../../api/measurements';
 import { fixed } from '../../ui/format';
@@ -17,10 +17,13 @@ export function ImpulsePanel({ source, sample, all, close, step }: { source: Sou
     if (sample.has_cir) impulse(source, sample.id).then((response) => { if (!gone) set_loaded({ id: sample.id, response }); }, (e: unknown) => { if (!gone) set_problem(said(e)); });
     return () => { gone = true; };
   }, [source.id, sample.id]);
+  const box = useRef<HTMLElement>(null);
   useEffect(() => set_kept([]), [source.id]);
+  // Chosen far down in the list, it would open out of sight.
+  useEffect(() => box.current?.scrollIntoView({ block: 'nearest' }), [sample.id]);
   const response = loaded?.id === sample.id ? loaded.response : null, others = kept.filter((k) => k.sample.id !== sample.id), is_kept = others.length < kept.length;
   return (
-    <section class="cell-p wide impulse" data-testid="impulse" aria-label="Selected measurement">
+    <section class="cell-p wide impulse" ref={box} data-testid="impulse" aria-label="Selected measurement">
       <div class="hd">
         <h2>{sample.who}, {fixed(sample.distance_m, 3)} m</h2>
         {sample.los !== null && <Chip shape={sample.los ? 'ok' : 'caution'} tone={sample.los ? 'ok' : 'caution'} word={sample.los ? 'LOS' : 'NLOS'} />}

@@ -63,11 +63,10 @@ export function Measurements() {
         <select class="input" aria-label={source?.kind === 'campaign' ? 'Place' : 'Anchor'} data-testid="who" value={choice.who} onChange={(e) => set_choice({ ...choice, who: e.currentTarget.value })}><option value="">{source?.kind === 'campaign' ? 'Every place' : 'Every anchor'}</option>{who.map((w) => <option key={w} value={w}>{w}</option>)}</select>
         <div class="seg" role="group" aria-label="Label">{CLASS_FILTERS.map(([id, words]) => <button key={id} class={choice.label === id ? 'on' : ''} aria-pressed={choice.label === id} onClick={() => set_choice({ ...choice, label: id })}>{words}</button>)}</div>
         <Limit name="From" value={choice.min_m} set={(v) => set_choice({ ...choice, min_m: v })} /><Limit name="to" value={choice.max_m} set={(v) => set_choice({ ...choice, max_m: v })} />
-        <span class="grow" />
-        <span class="mut" data-testid="counts" role="status">{grouped(shown.length)} of {grouped(all.length)} loaded</span>
+        <span class="tools"><span class="mut" data-testid="counts" role="status">{grouped(shown.length)} of {grouped(all.length)} loaded</span>
         {current?.next && <button class="btn" data-testid="more" onClick={() => void more()}>{source?.kind === 'campaign' ? 'Load more' : 'Load older'}</button>}
         {may('engineer', 'gateway') && <button class="btn" data-testid="label-field" aria-expanded={labelling} onClick={() => set_labelling(!labelling)}>Label in the field</button>}
-        {source && download_url(source, choice.who, 'csv') && <a class="btn" href={download_url(source, choice.who, 'csv')!} download={`ranges-${source.id}.csv`}><Icon name="download" />CSV</a>}
+        {source && download_url(source, choice.who, 'csv') && <a class="btn" href={download_url(source, choice.who, 'csv')!} download={`ranges-${source.id}.csv`}><Icon name="download" />CSV</a>}</span>
       </div>
       {problem && <div class="problem" role="status"><b>The measurements could not be read.</b> {problem} <button class="btn small" onClick={() => set_again(again + 1)}>Try again</button></div>}
       <div class="page" tabIndex={0} role="region" aria-label="Measurements">
@@ -76,7 +75,7 @@ export function Measurements() {
         {source && !current && !problem && <p class="pad" role="status">Loading the measurements.</p>}
         {current && all.length === 0 && <div class="empty small"><p>{source!.name} has no measurements.</p></div>}
         {sample && source && <ImpulsePanel source={source} sample={sample} all={all} close={() => set_selected(null)} step={step} />}
-        {all.length > 0 && <><LevelPanel samples={shown} selected={selected} select={set_selected} /><TruthPanel samples={shown} selected={selected} select={set_selected} /><HistogramPanel samples={shown} /><Rows source={source!} samples={shown} selected={selected} select={set_selected} /></>}
+        {all.length > 0 && <><div class="plots"><LevelPanel samples={shown} selected={selected} select={set_selected} /><TruthPanel samples={shown} selected={selected} select={set_selected} /><HistogramPanel samples={shown} /></div><Rows source={source!} samples={shown} selected={selected} select={set_selected} /></>}
       </div>
     </div>
   );

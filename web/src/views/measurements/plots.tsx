@@ -2,7 +2,7 @@
 import { useState } from 'preact/hooks';
 import type { Sample } from '../../api/measurements';
 import { fixed, grouped } from '../../ui/format';
-import { Axes, Drawing, scale, ticks } from '../chart';
+import { Axes, decimals, Drawing, scale, ticks } from '../chart';
 import { feature_words } from '../models/words';
 import { histogram } from './choice';
 
@@ -12,7 +12,8 @@ const span = (v: readonly number[], pad: number): [number, number] => {
   return [lo - room, hi + room];
 };
 
-interface Cloud { readonly samples: readonly Sample[]; readonly x: (s: Sample) => number | null; readonly y: (s: Sample) => number | null; readonly xw: (v: number) => string; readonly yw: (v: number) => string; readonly label: string; readonly selected: number | null; readonly select: (id: number) => void }
+type Words = (v: number, decimals: number) => string;
+interface Cloud { readonly samples: readonly Sample[]; readonly x: (s: Sample) => number | null; readonly y: (s: Sample) => number | null; readonly xw: Words; readonly yw: Words; readonly label: string; readonly selected: number | null; readonly select: (id: number) => void }
 function Scatter({ samples, x, y, xw, yw, label, selected, select }: Cloud) {
   const known = samples.flatMap((s) => { const a = x(s), b = y(s); return a === null || b === null ? [] : [{ s, a, b }]; });
   const step = Math.max(1, Math.ceil(known.length / POINTS_MAX)), drawn = known.filter(({ s }, i) => i % step === 0 || s.id === selected);
@@ -22,9 +23,9 @@ function Scatter({ samples, x, y, xw, yw, label, selected, select }: Cloud) {
     (los === false ? `M${px} ${py - r}l${r} ${1.7 * r}h${-2 * r}z` : `M${px - r} ${py}a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0z`);
   return <>
     <Drawing cls="scatter" label={`${label}, ${drawn.length} measurements`} draw={(w, h) => {
-      const f = { w, h, left: 56, right: 10, top: 8, bottom: 24 }, sx = scale([x0, x1], [f.left, w - f.right]), sy = scale([y0, y1], [h - f.bottom, f.top]);
+      const f = { w, h, left: 76, right: 10, top: 8, bottom: 24 }, xs = ticks(x0, x1), ys = ticks(y0, y1, 4), sx = scale([x0, x1], [f.left, w - f.right]), sy = scale([y0, y1], [h - f.bottom, f.top]);
       return <>
-        <Axes f={f} x={sx} y={sy} xs={ticks(x0, x1)} ys={ticks(y0, y1, 4)} xw={xw} yw={yw} />
+        <Axes f={f} x={sx} y={sy} xs={xs} ys={ys} xw={(v) => xw(v, decimals(xs))} yw={(v) => yw(v, decimals(ys))} />
         {drawn.map(({ s, a, b }) => <path key={s.id} class={`pt ${s.los === null ? 'none' : s.los ? 'los' : 'nlos'}${s.id === selected ? ' sel' : ''}`} d={shape(s.los, sx(a), sy(b), s.id === selected ? 7 : 3)} onClick={() => select(s.id)} />)}
       </>;
     }} />
@@ -32,17 +33,17 @@ function Scatter({ samples, x, y, xw, yw, label, selected, select }: Cloud) {
   </>;
 }
 
-const metre_words = (v: number): string => `${fixed(v, 0)} m`;
+const metre_words: Words = (v, d) => `${fixed(v, d)} m`;
 export function LevelPanel({ samples, selected, select }: { samples: readonly Sample[]; selected: number | null; select: (id: number) => void }) {
   return (
     <section class="cell-p" data-testid="plot-level">
       <h2>Level over distance</h2>
       <p class="sub">received level against measured distance</p>
-      <Scatter samples={samples} x={(s) => s.distance_m} y={(s) => s.rx_dbm} xw={metre_words} yw={(v) => `${fixed(v, 0)} dBm`} label="Received level against distance" selected={selected} select={select} />
+      <Scatter samples={samples} x={(s) => s.distance_m} y={(s) => s.rx_dbm} xw={metre_words} yw={(v, d) => `${fixed(v, d)} dBm`} label="Received level against distance" selected={selected} select={select} />
     </section>
   );
 }
-const AGAINST: readonly (readonly [string, string, (v: number) => string])[] = [['truth', 'true distance', metre_words], ['heading_deg', 'heading', (v) => `${fixed(v, 0)}°`], ['height_difference_m', 'height difference', (v) => `${fixed(v, 1)} m`]];
+const AGAINST: readonly (readonly [string, string, Words])[] = [['truth', 'true distance', metre_words], ['heading_deg', 'heading', (v, d) => `${fixed(v, d)}°`], ['height_difference_m', 'height difference', metre_words]];
 export function TruthPanel({ samples, selected, select }: { samples: readonly Sample[]; selected: number | null; select: (id: number) => void }) {
   const [wanted, set_wanted] = useState('truth'), value = (s: Sample, of: string): number | null => (of === 'truth' ? s.truth_m : (s.features[of] ?? null));
   const true_ones = samples.filter((s) => s.truth_m !== null), offered = AGAINST.filter(([of]) => true_ones.some((s) => value(s, of) !== null)), [against, words, xw] = offered.find(([of]) => of === wanted) ?? AGAINST[0]!;
