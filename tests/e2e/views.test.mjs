@@ -149,6 +149,8 @@ test('a campaign of impulse responses is imported, and a sample shows its respon
   await page.keyboard.press('Enter');
   const plot = id('impulse').getByRole('img', { name: /^Impulse response of 1016 taps, 1\.00 ns each, first path at tap 740\.0/ });
   await plot.waitFor();
+  // Chosen below, it is in sight above.
+  await eventually('the plot is in sight', () => plot.evaluate((e) => { const r = e.getBoundingClientRect(), at = document.elementFromPoint(r.x + r.width / 2, r.y + 30); return at !== null && e.contains(at); }));
   for (const mark of ['first', 'noise', 'delay', 'peak']) assert.equal(await plot.locator(`[data-mark="${mark}"]`).count(), 1, mark);
   const shown = parseFloat((await text(id('impulse').locator('h2'))).match(/, ([\d.]+) m$/)[1]), sample = items.find((s) => s.range_m.toFixed(3) === shown.toFixed(3));
   for (const name of ['kurtosis', 'mean_excess_delay_ns', 'rms_delay_spread_ns', 'rx_dbm', 'fp_dbm'])

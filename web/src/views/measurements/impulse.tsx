@@ -9,7 +9,7 @@ import { percentile } from './choice';
 import { marks_of, ordered, unit_of } from './response';
 import { KEPT_MAX, ResponsePlot, type Kept } from './response_plot';
 
-export function ImpulsePanel({ source, sample, all, close, step }: { source: Source; sample: Sample; all: readonly Sample[]; close: () => void; step: (by: number) => void }) {
+export function ImpulsePanel({ source, sample, opened, all, close, step }: { source: Source; sample: Sample; opened: number; all: readonly Sample[]; close: () => void; step: (by: number) => void }) {
   const [loaded, set_loaded] = useState<{ id: number; response: Impulse | null } | null>(null), [problem, set_problem] = useState(''), [kept, set_kept] = useState<readonly Kept[]>([]);
   useEffect(() => {
     let gone = false;
@@ -20,7 +20,7 @@ export function ImpulsePanel({ source, sample, all, close, step }: { source: Sou
   const box = useRef<HTMLElement>(null);
   useEffect(() => set_kept([]), [source.id]);
   // Chosen far down in the list, it would open out of sight.
-  useEffect(() => box.current?.scrollIntoView({ block: 'nearest' }), [sample.id]);
+  useEffect(() => box.current?.scrollIntoView({ block: 'start' }), [opened]);
   const response = loaded?.id === sample.id ? loaded.response : null, others = kept.filter((k) => k.sample.id !== sample.id), is_kept = others.length < kept.length;
   return (
     <section class="cell-p wide impulse" ref={box} data-testid="impulse" aria-label="Selected measurement">

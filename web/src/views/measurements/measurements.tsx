@@ -19,7 +19,7 @@ interface Loaded { readonly of: string; readonly samples: readonly Sample[]; rea
 
 export function Measurements() {
   const [campaigns, set_campaigns] = useState<readonly Source[]>([]), [wanted, set_wanted] = useState<string | null>(null), [loaded, set_loaded] = useState<Loaded | null>(null);
-  const [problem, set_problem] = useState(''), [again, set_again] = useState(0), [choice, set_choice] = useState<Choice>(EVERYTHING), [selected, set_selected] = useState<number | null>(null), [labelling, set_labelling] = useState(false);
+  const [problem, set_problem] = useState(''), [again, set_again] = useState(0), [choice, set_choice] = useState<Choice>(EVERYTHING), [selected, set_selected] = useState<number | null>(null), [labelling, set_labelling] = useState(false), [opened, set_opened] = useState(0);
   useEffect(() => { document.title = 'Measurements - anchord'; }, []);
   useEffect(() => { fetch_campaigns().then(set_campaigns, () => undefined); }, [again]);
   const missions: Source[] = ordered_missions.value.map((m) => ({ kind: 'mission', id: m.mission, name: m.name || m.mission.slice(0, 8) })), sources = [...missions, ...campaigns];
@@ -39,6 +39,8 @@ export function Measurements() {
     if (!source || !current?.next) return;
     try { const page = await page_of(source, current.next, ''); set_loaded({ of: key, samples: [...current.samples, ...page.samples], next: page.next }); } catch (e) { failed(e); }
   };
+  /// Chosen by a press, not stepped to: the panel comes into sight.
+  const open = (id: number): void => { set_selected(id); set_opened((n) => n + 1); };
   const step = (by: number): void => {
     const at = shown.findIndex((s) => s.id === selected), next = shown[Math.max(0, Math.min(shown.length - 1, at + by))];
     if (next) set_selected(next.id);
@@ -74,8 +76,8 @@ export function Measurements() {
         {!source && <div class="empty small"><p>Nothing has been measured yet. Fly, import a flight folder, or import a campaign with ground truth.</p></div>}
         {source && !current && !problem && <p class="pad" role="status">Loading the measurements.</p>}
         {current && all.length === 0 && <div class="empty small"><p>{source!.name} has no measurements.</p></div>}
-        {sample && source && <ImpulsePanel source={source} sample={sample} all={all} close={() => set_selected(null)} step={step} />}
-        {all.length > 0 && <><div class="plots"><LevelPanel samples={shown} selected={selected} select={set_selected} /><TruthPanel samples={shown} selected={selected} select={set_selected} /><HistogramPanel samples={shown} /></div><Rows source={source!} samples={shown} selected={selected} select={set_selected} /></>}
+        {sample && source && <ImpulsePanel source={source} sample={sample} opened={opened} all={all} close={() => set_selected(null)} step={step} />}
+        {all.length > 0 && <><div class="plots"><LevelPanel samples={shown} selected={selected} select={open} /><TruthPanel samples={shown} selected={selected} select={open} /><HistogramPanel samples={shown} /></div><Rows source={source!} samples={shown} selected={selected} select={open} /></>}
       </div>
     </div>
   );
