@@ -294,7 +294,7 @@ test('a place is labelled in the field: its truth is typed, one press records, a
   const { page, seen, id } = await openPage(browser, server, { hash: '#/measurements' });
   await id('label-field').click();
   for (const [field, value] of Object.entries({ campaign: 'yard', environment: 'yard', distance_m: '4,95', material: 'brick', wanted: '6' })) await id(`take-${field}`).fill(value);
-  await eventually('the anchor is heard', async () => { await heard(1); return (await text(id('take-anchor'))).includes('0x6a77'); }, 20_000, 300);
+  await eventually('the anchor is heard', async () => { await heard(1); return (await text(id('take-anchor'))).includes('0x6a77'); }, 60_000, 300);
   await id('take-anchor').selectOption('0x6a77');
   await id('campaign-mode').getByRole('button', { name: 'NLOS', exact: true }).click();
   assert.deepEqual(await violations(page), []);
@@ -302,7 +302,7 @@ test('a place is labelled in the field: its truth is typed, one press records, a
   await id('take-now').waitFor();
   // Only what comes after the press counts; the first look has fixed where that is once it says 0 of 6.
   await id('take-now').getByText('0 of 6').waitFor();
-  await eventually('six come after the press', async () => { await heard(1); return id('take-done').filter({ hasText: 'kept' }).count(); }, 20_000, 300);
+  await eventually('six come after the press', async () => { await heard(1); return id('take-done').filter({ hasText: 'kept' }).count(); }, 60_000, 300);
   assert.match(await text(id('take-done')), /6 of 6 kept as 4\.95 m, brick, NLOS/);
   const { items } = await get('/api/v1/campaigns/yard/samples');
   assert.equal(items.length, 6);

@@ -4,7 +4,7 @@ import { ApiError, idempotency_key, said } from '../../api/client';
 import { import_lines, make_campaign, newest_us, ranges_after, settings_of, type Setting } from '../../api/campaign';
 import type { Source } from '../../api/measurements';
 import { num } from '../../live/messages';
-import { current_mission, current_scene, tick } from '../../state/store';
+import { current_mission, current_scene, devices, tick } from '../../state/store';
 import { fixed, grouped } from '../../ui/format';
 import { Icon, Mark, Q } from '../../ui/marks';
 import { use_draft } from '../../ui/use_draft';
@@ -16,7 +16,9 @@ const NUMBERS: readonly (readonly ['distance_m' | 'heading_deg' | 'height_differ
 
 export function CampaignMode({ campaigns, close, taken }: { campaigns: readonly Source[]; close: () => void; taken: (campaign: string) => void }) {
   tick.value;
-  const mission = current_mission.value, scene = current_scene(), heard = [...new Set([...(scene?.ranges.keys() ?? []), ...(scene?.anchors.keys() ?? [])])].sort();
+  const mission = current_mission.value, scene = current_scene();
+  // Without a position of the tag ranges are worked off late; that an anchor talks is known at once.
+  const talking = devices.value.filter((d) => d.kind === 'anchor' && d.state === 'live').map((d) => d.network_id), heard = [...new Set([...(scene?.ranges.keys() ?? []), ...(scene?.anchors.keys() ?? []), ...talking])].sort();
   const [place, change] = use_draft<Place>('campaign', NEW_PLACE), [take, set_take] = useState<Take | null>(null), [done, set_done] = useState(''), [problem, set_problem] = useState(''), [settings, set_settings] = useState<readonly Setting[]>([]);
   const running = useRef<{ stopped: boolean } | null>(null), wanted = typed_number(place.wanted) ?? 0, lacks = missing(place), anchors = place.anchor && !heard.includes(place.anchor) ? [place.anchor, ...heard] : heard;
   const look = (): void => { const name = place.campaign.trim(); if (campaigns.some((c) => c.name === name)) settings_of(name).then(set_settings, () => undefined); else set_settings([]); };
