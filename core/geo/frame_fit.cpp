@@ -273,6 +273,15 @@ Eigen::Matrix3d FrameFit::covariance_at(const Eigen::Vector3d& local_m) const {
   return j * *covariance * j.transpose();
 }
 
+std::optional<Eigen::Matrix3d> FrameFit::enu_covariance(const Eigen::Vector3d& local_m,
+                                                        const Eigen::Matrix3d& local_covariance_m2) const {
+  if (!covariance) return std::nullopt;
+  const double up_scale = transform.model == FrameModel::four ? 1.0 : transform.scale;
+  const Eigen::Vector3d scales(transform.scale, transform.scale, up_scale);
+  const Eigen::Matrix3d enu_by_local = transform.enu_from_local * scales.asDiagonal();
+  return enu_by_local * local_covariance_m2 * enu_by_local.transpose() + covariance_at(local_m);
+}
+
 Result<FrameFit> fit_frame(std::span<const FramePair> pairs, const FrameFitOptions& options) {
   BOOST_OUTCOME_TRYV(check(pairs, options));
   const Centred c = centre(pairs);

@@ -62,6 +62,11 @@ struct FrameFit {
 
   /// Covariance (m^2, ENU) that the transform adds to a point of the local frame; zero matrix without one.
   Eigen::Matrix3d covariance_at(const Eigen::Vector3d& local_m) const;
+  /// Covariance (m^2, ENU) of a place known in the local frame with `local_covariance_m2` (m^2, local axes)
+  /// once it is told on the globe: turned and scaled into ENU, plus what the fit adds. Errors of the place
+  /// and of the fit are taken as independent. Nothing where the fit tells no covariance.
+  std::optional<Eigen::Matrix3d> enu_covariance(const Eigen::Vector3d& local_m,
+                                                const Eigen::Matrix3d& local_covariance_m2) const;
 };
 
 struct FrameFitOptions {

@@ -68,6 +68,64 @@ Gate chi_square(const AnchorSolution& solution, const FlightOptions& options, co
            window_s, solution.residual_scale_m, chi2, dof));
 }
 
+/// What an anchor's ranges say of themselves, beside those of the flight's other anchors. All ranges through
+/// one wall fit a place behind the anchor, and no residual is large: what shows is that they scatter more
+/// than the others' and that, the place left free, they want to be shorter.
+struct Lateness {
+  double scale_ratio{};  ///< residual scale over the median of the others'; 0 with fewer than two of those
+  double delay_m{}, delay_z{};  ///< own delay without its prior, in sigmas of that and of the prior
+  bool blocked(const GateLimits& limits) const { return scale_ratio > limit(limits); }
+  double limit(const GateLimits& limits) const {
+    return delay_z > limits.late_z ? limits.late_scale_ratio : limits.scale_ratio;
+  }
+};
+
+Lateness lateness_of(const JointFit& fit, std::size_t index, const FlightOptions& options) {
+  Lateness out;
+  const AnchorBlock& block = fit.normal.anchors[index];
+  std::vector<double> others_m;
+  for (std::size_t i = 0; i < fit.normal.anchors.size(); ++i) {
+    if (i != index && fit.state.anchors[i].active) others_m.push_back(fit.normal.anchors[i].scale_m);
+  }
+  if (others_m.size() < 2) return out;
+  const auto middle = others_m.begin() + static_cast<std::ptrdiff_t>((others_m.size() - 1) / 2);
+  std::ranges::nth_element(others_m, middle);
+  out.scale_ratio = block.scale_m / *middle;
+  const double prior = 1.0 / (options.delay_prior_m * options.delay_prior_m);
+  Eigen::Matrix3d place = block.own.topLeftCorner<3, 3>();
+  place.diagonal().array() += 1e-6 * place.diagonal().maxCoeff() + 1e-12;
+  const Eigen::Vector3d with = block.own.topRightCorner<3, 1>();
+  const double told = block.own(3, 3) - prior - with.dot(place.ldlt().solve(with));
+  if (!(told > 1e-6)) return out;
+  // At the solution the ranges hold against the prior's pull, prior * delay.
+  out.delay_m = fit.state.anchors[index].delay_m * (1.0 + prior / told);
+  const double bias_m2 = std::max(fit.shared_covariance(k_shared_bias, k_shared_bias), 0.0);
+  out.delay_z = out.delay_m / std::sqrt(1.0 / told + 1.0 / prior + bias_m2);
+  return out;
+}
+
+/// The anchor, and the company it is in: where a quarter of the anchors stand out, the bias they share with
+/// the rest is drawn to theirs, and nobody is believed.
+Gate blocked(const JointFit& fit, std::size_t index, const FlightOptions& options, const GateLimits& limits) {
+  const Lateness own = lateness_of(fit, index, options);
+  Gate gate =
+      at_most("blocked", own.scale_ratio, own.limit(limits),
+              text("residuals %.1f times those of the other anchors; left free, its ranges are %+.2f m "
+                   "long (%.1f sigma)",
+                   own.scale_ratio, own.delay_m, own.delay_z));
+  std::size_t n = 0, n_blocked = 0;
+  for (std::size_t i = 0; i < fit.normal.anchors.size(); ++i) {
+    if (!fit.state.anchors[i].active) continue;
+    ++n;
+    n_blocked += lateness_of(fit, i, options).blocked(limits) ? 1 : 0;
+  }
+  if (gate.passed && n_blocked > 1 && 4 * n_blocked >= n) {
+    gate.passed = false;
+    gate.why += text("; %zu of %zu anchors stand out so", n_blocked, n);
+  }
+  return gate;
+}
+
 struct Half {
   Eigen::Vector3d position_m;
   Eigen::Matrix3d covariance_m2;
@@ -140,8 +198,15 @@ std::vector<Gate> gates_of(const FlightRows& flight, const JointFit& fit, std::s
   const GeometryLimits geometry;
   gates.push_back(at_least("geometry", solution.geometry.line_ratio, geometry.line,
                            "width of the track across its main direction over the median range"));
-  gates.push_back(at_most("precision", solution.geometry.sigma_ratio, 0.08,
-                          "largest horizontal sigma over the median range"));
+  // Of the height too: where a flight cannot tell height from bias, a wrong bias goes there unseen.
+  const double largest_m = std::sqrt(std::max(
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(estimate.best->covariance_m2).eigenvalues().maxCoeff(),
+      0.0));
+  const double spread = options.dims == Dims::two
+                            ? solution.geometry.sigma_ratio
+                            : largest_m / std::max(solution.geometry.median_range_m, 1e-3);
+  gates.push_back(
+      at_most("precision", spread, limits.precision, "largest sigma, of height too, over the median range"));
   const bool plane = options.dims == Dims::three && solution.determined == Determined::horizontal;
   const double side = plane && !estimate.mirror ? 0.5 : estimate.best->probability;
   gates.push_back(at_least(
@@ -155,6 +220,12 @@ std::vector<Gate> gates_of(const FlightRows& flight, const JointFit& fit, std::s
                 text("%.2f m outside of the building's outline, which was a clue with sigma %.1f m",
                      outside_m, options.outline_sigma_m)));
   }
+  // What a model has judged is corrected and weighed as what it is: late ranges are no surprise there.
+  const auto& rows = flight.anchors[index].rows;
+  const auto n_judged =
+      std::ranges::count_if(rows, [](const JointRow& row) { return row.belief.has_value(); });
+  if (2 * static_cast<std::size_t>(n_judged) < rows.size())
+    gates.push_back(blocked(fit, index, options, limits));
   gates.push_back(at_most("residual_scale", solution.residual_scale_m, limits.residual_scale_m,
                           "1.4826 x median absolute residual, metres"));
   gates.push_back(chi_square(solution, options, limits));

@@ -15,18 +15,24 @@ struct GateLimits {
   double side_probability{0.99};  ///< of the chosen side against its twin
   double outline_sigmas{3};       ///< outside of the building by more: the outline is wrong, or the answer
   double residual_scale_m{0.6};   ///< radios that work stay below 0.25 m
-  double probability{0.999};      ///< of the chi-square tests: one good anchor in a thousand is held back
-  /// Of a flight against its kit. Its covariances are tempered, so that real flights stay below a third of
-  /// this limit (3.2 of 9.5), while a bias of 0.3 m where a flight can tell it reaches 6 to 9. Not of the
+  double precision{0.08};         ///< largest sigma over the median range; real flights that tell: 0.072
+  double scale_ratio{2.25};  ///< residual scale over the other anchors'; 1.96 seen, 2.65 and up if blocked
+  double late_scale_ratio{1.5};  ///< the same where the ranges want to be shorter by more than
+  double late_z{1.2};  ///< this many sigmas; real anchors scatter so (1.96) or are late (1.08), not both
+  double probability{0.999};  ///< of the chi-square tests: one good anchor in a thousand is held back
+  /// Of a flight against its kit. Its covariances are tempered, so that real flights stay below half of
+  /// this limit (3.2 of 7.8), while a bias of 0.3 m where a flight can tell it reaches 6 to 9. Not of the
   /// halves: walls that block one of them only make good anchors reach 15.
-  double agreement{0.95};
+  double agreement{0.90};
 };
 
 /// Every gate one flight can ask of one anchor, in a fixed order: redundancy, rejected, geometry, precision,
-/// side, outline (where there is one), residual_scale, chi_square, halves, bias, settled.
+/// side, outline (where there is one), blocked, residual_scale, chi_square, halves, bias, settled.
 ///
 /// chi_square  means of the residuals over two correlation times, each against the residual scale: white
 ///             noise averages out there, an error of the model does not
+/// precision   of the place in space; in the plane where heights are held (Dims::two)
+/// blocked     residual scale beside the other anchors', and what delay the ranges want of their own
 /// halves      the anchor from the first and from the second half of the flight, by their distance in the
 ///             metric of both covariances: an anchor that moved, a clock that slipped, a base that jumped
 /// solution    estimate, geometry and residuals filled

@@ -121,6 +121,32 @@ TEST(FrameFit, ClaimsACovarianceThatTheSpreadOfManyFitsConfirms) {
   }
 }
 
+TEST(FrameFit, AddsWhatItIsUncertainToAPlaceToldOnTheGlobe) {
+  // Four corners of a square of 20 m, each known to sigma: by hand, with r^2 = 200 m^2 each and the place
+  // 50 m from the middle, the shift has sigma^2/4, turn and scale sigma^2 / 800 each, so that the place has
+  // sigma^2 (1/4 + 2500/800) along either horizontal axis and sigma^2/4 upwards.
+  constexpr double sigma_m = 0.08;
+  const auto truth = turned(FrameModel::four, 30, 0, 1.0);
+  auto pairs = pairs_of({{-10, -10, 0}, {10, -10, 0}, {10, 10, 0}, {-10, 10, 0}}, truth);
+  for (auto& pair : pairs) pair.sigma_m = sigma_m;
+  const auto fit = fit_frame(pairs, {.model = FrameModel::four});
+  ASSERT_TRUE(fit.has_value());
+  const Eigen::Matrix3d local_m2 = Vector3d(0.09, 0.01, 0.04).asDiagonal();
+  const auto told = fit.value().enu_covariance({30, 40, 0}, local_m2);
+  ASSERT_TRUE(told);
+  // The long axis of the local ellipse, x, points 30 degrees north of east.
+  const double plane = sigma_m * sigma_m * (0.25 + 2500.0 / 800.0), c2 = 0.75, s2 = 0.25,
+               cs = std::sqrt(3) / 4;
+  EXPECT_NEAR((*told)(0, 0), 0.09 * c2 + 0.01 * s2 + plane, 1e-9);
+  EXPECT_NEAR((*told)(1, 1), 0.09 * s2 + 0.01 * c2 + plane, 1e-9);
+  EXPECT_NEAR((*told)(0, 1), (0.09 - 0.01) * cs, 1e-9);
+  EXPECT_NEAR((*told)(2, 2), 0.04 + sigma_m * sigma_m / 4, 1e-9);
+  // A fit that does not know how good it is claims nothing, and not that it is perfect.
+  FrameFit bare = fit.value();
+  bare.covariance.reset();
+  EXPECT_FALSE(bare.enu_covariance({30, 40, 0}, local_m2));
+}
+
 TEST(FrameFit, WeighsPairsByTheirSigma) {
   auto pairs = pairs_of(k_hall, turned(FrameModel::seven, 0, 0, 1));
   for (auto& pair : pairs) pair.sigma_m = 0.01;

@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "core/localize/belief_likelihood.hpp"
+#include "core/localize/flight_solver.hpp"
+#include "tests/core/localize/flight_support.hpp"
 
 namespace anchord {
 namespace {
@@ -61,6 +63,53 @@ TEST(BeliefLikelihood, StaysFiniteFarOut) {
     const auto v = belief_value(half(), e, 4e-4);
     EXPECT_TRUE(std::isfinite(v.score_per_m) && std::isfinite(v.curvature_per_m2)) << e;
   }
+}
+
+/// Mean of e' C^-1 e over anchors and seeds, position errors against their claimed covariance: 3 where it is
+/// honest. White noise, nothing else unknown, so nothing else can widen the claim.
+double mean_normalised_square(double noise_m, double believed_m) {
+  FlightOptions options;
+  options.fixed_bias_m = 0;
+  options.delay_prior_m = options.curve_prior_m = options.lag_prior_s = options.lever_prior_m = 1e-5;
+  options.correlation_s = 0;
+  options.floor_sigma_m = 0;
+  constexpr int k_seeds = 25;
+  double sum = 0;
+  int n = 0;
+  for (int seed = 1; seed <= k_seeds; ++seed) {
+    testing::MadeFlight made;
+    made.seed = static_cast<std::uint64_t>(seed);
+    made.noise_m = noise_m;
+    made.duration_s = 60;
+    FlightData flight = testing::make_flight(made);
+    RangeBelief belief;
+    belief.p_los = 0.9;
+    belief.los_sigma_m = believed_m;
+    belief.nlos_bias_m = 0.5;
+    flight.beliefs.assign(flight.ranges.size(), belief);
+    const auto solution = solve_flight(flight, options);
+    EXPECT_TRUE(solution.has_value());
+    for (std::size_t a = 0; solution && a < made.anchors.size(); ++a) {
+      const auto& anchor = solution.value().anchors[a];
+      const Eigen::Vector3d off = anchor.estimate.best.value().position.m - made.anchors[a];
+      sum += off.dot(anchor.fit_covariance_m2.ldlt().solve(off));
+      ++n;
+    }
+  }
+  return sum / n;
+}
+
+TEST(BeliefLikelihood, IsClaimedInFullWhereItKeepsWhatItPromises) {
+  // 100 chi-squares with three degrees of freedom: their mean is 3 with a sigma of 0.25.
+  EXPECT_NEAR(mean_normalised_square(0.05, 0.05), 3.0, 1.0);
+}
+
+// Unshrunk, the score squared claims (0.1 / 0.05)^4 = 16 times the information there is over 4, and the mean
+// is beyond 12. A quarter more than the sandwich is claimed by rule (chance in its sums).
+TEST(BeliefLikelihood, IsClaimedForLessWhereErrorsAreTwiceWhatItPromises) {
+  const double mean = mean_normalised_square(0.10, 0.05);
+  EXPECT_LT(mean, 5.0);
+  EXPECT_GT(mean, 1.5) << "nor is everything thrown away";
 }
 
 }  // namespace

@@ -159,6 +159,43 @@ TEST(Gates, TellAMovedAnchorFromOneThatStayed) {
   EXPECT_FALSE(gate(fuse_estimates(moved), "flights").passed);
 }
 
+// Every range to one anchor goes through a wall: half a metre and an exponential delay on top. It fits a
+// place behind the anchor, and only beside the others it shows.
+TEST(Gates, HoldBackAnAnchorWhoseRangesAreAllBlocked) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    MadeFlight made;
+    made.seed = seed;
+    FlightData flight = make_flight(made);
+    std::mt19937_64 random(seed);
+    std::exponential_distribution<double> late_m(1 / 0.3);
+    for (auto& range : flight.ranges)
+      if (range.anchor.value == 0x6000) range.distance_m += 0.5 + late_m(random);
+    const auto s = solve_flight(flight);
+    ASSERT_TRUE(s);
+    const auto& anchors = s.value().anchors;
+    EXPECT_GT((anchors[0].estimate.best.value().position.m - made.anchors[0]).norm(), 0.2);
+    EXPECT_FALSE(gate(anchors[0].estimate, "blocked").passed) << gate(anchors[0].estimate, "blocked").why;
+    for (std::size_t i = 1; i < anchors.size(); ++i)
+      EXPECT_TRUE(gate(anchors[i].estimate, "blocked").passed) << gate(anchors[i].estimate, "blocked").why;
+  }
+}
+
+TEST(Gates, HoldBackAHeightThatNoFlightSaw) {
+  MadeFlight made;
+  made.height_swing_m = 0.7;  // anchors far below: the plane is told from its twin, the height hardly
+  made.anchors = {{12, 2, 5.5}, {-10, 8, 5.6}, {3, -14, 6.3}};
+  made.noise_m = 0.2;
+  const auto s = solve_flight(make_flight(made));
+  ASSERT_TRUE(s);
+  for (const auto& anchor : s.value().anchors) {
+    const auto& c = anchor.estimate.best.value().covariance_m2;
+    const double share = std::sqrt(c(2, 2)) / anchor.geometry.median_range_m;
+    if (share > 0.08) {
+      EXPECT_FALSE(gate(anchor.estimate, "precision").passed) << gate(anchor.estimate, "precision").why;
+    }
+  }
+}
+
 TEST(Gates, UseTheTabulatedQuantilesOfChiSquare) {
   // Tables: 16.27 (3, 99.9 %), 7.815 (3, 95 %), 29.59 (10, 99.9 %).
   EXPECT_NEAR(chi2_quantile(0.999, 3), 16.27, 0.02 * 16.27);
