@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <functional>
 #include <nlohmann/json.hpp>
 
@@ -38,11 +39,33 @@ std::string_view trimmed(std::string_view text) {
 // Fields of one line by name; a view into the line or the document.
 using Row = std::map<std::string, std::string, std::less<>>;
 
-std::optional<std::string> find(const Row& row, const Names& names) {
+// The cell of the first of the names that has something in it; null where none has.
+const Row::value_type* cell(const Row& row, const Names& names) {
   for (const auto name : names)
-    if (const auto at = row.find(name); at != row.end() && !at->second.empty()) return at->second;
+    if (const auto at = row.find(name); at != row.end() && !at->second.empty()) return &*at;
+  return nullptr;
+}
+
+std::optional<std::string> find(const Row& row, const Names& names) {
+  if (const auto* found = cell(row, names)) return found->second;
   return std::nullopt;
 }
+
+constexpr const char* k_unreadable = "unreadable line";
+constexpr const char* k_impossible = "impossible value";
+constexpr const char* k_missing = "missing value";
+
+// Why a line cannot be used; the first thing wrong with it.
+struct Fault {
+  const char* reason{nullptr};  // null: nothing wrong
+  std::string column{}, detail{};
+
+  void set(const char* why, std::string_view where, std::string what) {
+    if (!reason) reason = why, column = where, detail = std::move(what);
+  }
+};
+
+std::string in_quotes(std::string_view text) { return '"' + std::string{text.substr(0, 40)} + '"'; }
 
 class Importer {
  public:
@@ -108,9 +131,9 @@ class Importer {
     if (const auto parsed = cell_number(value, true); parsed && value.find(',') != std::string::npos)
       value[value.find(',')] = '.';
     const Row row{{std::string{trimmed(text.substr(0, at))}, std::move(value)}};
-    std::string fault;
+    Fault fault;
     auto changed = site_of(row, defaults_, fault);
-    if (!fault.empty()) return refuse(number_of_line, fault);
+    if (fault.reason) return refuse(number_of_line, std::move(fault));
     defaults_ = std::move(changed);
   }
 
@@ -132,7 +155,7 @@ class Importer {
     }
     ++out_.report.lines;
     if (cells.size() != header_.size())
-      return refuse(at, wrong_cell_count(cells.size(), header_.size(), separator_));
+      return refuse(at, {k_unreadable, {}, wrong_cell_count(cells.size(), header_.size(), separator_)});
     Row row;
     for (std::size_t c = 0; c < cells.size(); ++c) row.emplace(header_[c], cells[c]);
     take_row(row, at);
@@ -141,8 +164,8 @@ class Importer {
   void take_json(std::string_view line, std::size_t at) {
     ++out_.report.lines;
     nlohmann::json object;
-    if (const auto fault = parse_json(line, object)) return refuse(at, fault->detail);
-    if (!object.is_object()) return refuse(at, "not a JSON object");
+    if (const auto fault = parse_json(line, object)) return refuse(at, {k_unreadable, {}, fault->detail});
+    if (!object.is_object()) return refuse(at, {k_unreadable, {}, "not a JSON object"});
     Row row;
     std::optional<Cir> cir;
     for (const auto& [key, value] : object.items()) {
@@ -150,7 +173,8 @@ class Importer {
       if (key == "cir" && value.is_object()) {
         std::vector<FieldError> errors;
         cir = read_cir(value, "/cir", errors);
-        if (!errors.empty()) return refuse(at, errors.front().pointer + " " + errors.front().detail);
+        if (!errors.empty())
+          return refuse(at, {k_impossible, key, errors.front().pointer + " " + errors.front().detail});
       } else if (value.is_boolean())
         row.emplace(key, value.get<bool>() ? "1" : "0");
       else if (value.is_string())
@@ -158,7 +182,7 @@ class Importer {
       else if (value.is_number())
         row.emplace(key, value.dump());
       else
-        return refuse(at, key + " is neither a number nor text");
+        return refuse(at, {k_impossible, key, key + " is neither a number nor text"});
     }
     take_row(row, at, std::move(cir));
   }
@@ -171,9 +195,11 @@ class Importer {
     const auto commas = std::count(line.begin(), line.end(), ',');
     if (commas_alone && commas > 2)
       return refuse(at,
-                    std::to_string(commas + 1) +
-                        " numbers separated by commas alone: decimal commas need blanks or semicolons "
-                        "between the numbers, else give time in ms, distance in mm and level in dBm only");
+                    {k_unreadable,
+                     {},
+                     std::to_string(commas + 1) +
+                         " numbers separated by commas alone: decimal commas need blanks or semicolons "
+                         "between the numbers, else give time in ms, distance in mm and level in dBm only"});
     const auto digit = [&](std::size_t i) { return i < line.size() && line[i] >= '0' && line[i] <= '9'; };
     std::array<double, 3> value{};
     std::size_t n = 0;
@@ -187,11 +213,11 @@ class Importer {
              (!commas_alone && end < line.size() && line[end] == ',' && digit(end + 1)))
         ++end;
       const auto number = cell_number(line.substr(i, end - i), true);
-      if (!number) return refuse(at, "not a number in \"" + std::string{line} + "\"");
+      if (!number) return refuse(at, {k_unreadable, {}, "not a number in " + in_quotes(line)});
       value[n++] = *number;
       i = end;
     }
-    if (n < 2) return refuse(at, "needs a time in ms and a distance in mm");
+    if (n < 2) return refuse(at, {k_missing, {}, "needs a time in ms and a distance in mm"});
     CampaignMeasurement m;
     m.t_s = value[0] / 1000;
     m.range_m = value[1] / 1000;
@@ -200,49 +226,62 @@ class Importer {
   }
 
   void take_row(const Row& row, std::size_t at, std::optional<Cir> cir = std::nullopt) {
-    std::string fault;
+    Fault fault;
     auto site = site_of(row, defaults_, fault);
     CampaignMeasurement m;
-    const auto value = [&](const Names& names) -> std::optional<double> {
-      const auto text = find(row, names);
-      if (!text) return std::nullopt;
-      const auto parsed = number(*text);
-      if (!parsed && fault.empty()) fault = std::string{names.front()} + " is not a number: " + *text;
+    std::string range_column;
+    const auto value = [&](const Names& names, double low, double high) -> std::optional<double> {
+      const auto* found = cell(row, names);
+      if (!found || says_nothing(found->second)) return std::nullopt;
+      const auto parsed = number(found->second);
+      if (!parsed)
+        fault.set(k_impossible, found->first, found->first + " is not a number: " + in_quotes(found->second));
+      else if (*parsed < low || *parsed > high)
+        fault.set(k_impossible, found->first, found->first + " impossible: " + in_quotes(found->second));
       return parsed;
     };
-    auto range = value(k_measured);
-    if (!range)
-      if (const auto mm = value(k_measured_mm)) range = *mm / 1000;
+    const auto range = [&](const Names& names, double metres) -> std::optional<double> {
+      const auto found = value(names, 0, k_furthest_m / metres);
+      if (const auto* where = cell(row, names)) range_column = where->first;
+      return found ? std::optional{*found * metres} : std::nullopt;
+    };
+    auto range_m = range(k_measured, 1);
+    if (!range_m) range_m = range(k_measured_mm, 1e-3);
     // "distance_m" is the measured one where another column holds the truth.
-    if (!range && find(row, k_campaign_truth)) range = value({"distance_m", "distance"});
-    if (!range && fault.empty()) fault = "no measured range (range_m, or range_mm)";
-    m.t_s = value({"t_s", "unix_s", "time_s"});
+    if (!range_m && find(row, k_campaign_truth)) range_m = range({"distance_m", "distance"}, 1);
+    for (const auto& names : {k_measured, k_measured_mm})
+      for (const auto name : names)
+        if (range_column.empty() && row.contains(name)) range_column = name;
+    if (!range_m) fault.set(k_missing, range_column, "no measured range (range_m, or range_mm)");
+    constexpr double k_any = 1e300, k_register = 1e9;
+    m.t_s = value({"t_s", "unix_s", "time_s"}, -k_any, k_any);
     if (!m.t_s)
-      if (const auto ms = value({"t_ms", "timestamp_ms"})) m.t_s = *ms / 1000;
-    m.rx_dbm = value(k_rx), m.fp_dbm = value(k_fp);
-    m.fp_amp1 = value(k_f1), m.fp_amp2 = value(k_f2), m.fp_amp3 = value(k_f3);
-    m.cir_power = value(k_cir_power), m.preamble_count = value(k_count);
-    m.std_noise = value(k_std_noise), m.max_noise = value(k_max_noise), m.fp_index = value(k_fp_index);
-    if (!fault.empty()) return refuse(at, fault);
-    m.range_m = *range;
+      if (const auto ms = value({"t_ms", "timestamp_ms"}, -k_any, k_any)) m.t_s = *ms / 1000;
+    m.rx_dbm = value(k_rx, -200, 50), m.fp_dbm = value(k_fp, -200, 50);
+    m.fp_amp1 = value(k_f1, 0, k_register), m.fp_amp2 = value(k_f2, 0, k_register);
+    m.fp_amp3 = value(k_f3, 0, k_register), m.cir_power = value(k_cir_power, 0, k_register);
+    m.preamble_count = value(k_count, 0, k_register);
+    m.std_noise = value(k_std_noise, 0, k_register), m.max_noise = value(k_max_noise, 0, k_register);
+    m.fp_index = value(k_fp_index, 0, k_register);
+    if (fault.reason) return refuse(at, std::move(fault));
+    m.range_m = *range_m;
     m.cir = std::move(cir);
-    keep(site, std::move(m), at);
+    keep(site, std::move(m), at, range_column);
   }
 
   std::optional<double> number(std::string_view text) const { return cell_number(text, separator_ != ','); }
 
-  CampaignSite site_of(const Row& row, CampaignSite site, std::string& fault) const {
+  CampaignSite site_of(const Row& row, CampaignSite site, Fault& fault) const {
     const auto text = [&](const Names& names, std::string& out) {
       if (auto found = find(row, names)) out = std::move(*found);
     };
     const auto value = [&](const Names& names, double low, double high, std::optional<double>& out) {
-      const auto found = find(row, names);
-      if (!found) return;
-      const auto parsed = number(*found);
-      if (!parsed || *parsed < low || *parsed > high) {
-        if (fault.empty()) fault = std::string{names.front()} + " impossible: " + *found;
-        return;
-      }
+      const auto* found = cell(row, names);
+      if (!found || says_nothing(found->second)) return;
+      const auto parsed = number(found->second);
+      if (!parsed || *parsed < low || *parsed > high)
+        return fault.set(k_impossible, found->first,
+                         found->first + " impossible: " + in_quotes(found->second));
       out = parsed;
     };
     text(k_site_name, site.name), text(k_environment, site.environment), text({"material"}, site.material);
@@ -260,11 +299,13 @@ class Importer {
       return std::nullopt;
     };
     const auto label = [&](const Names& names, bool means_los) {
-      const auto found = find(row, names);
-      if (!found) return;
+      const auto* cell_of = cell(row, names);
+      if (!cell_of) return;
+      const auto* found = &cell_of->second;
       const auto parsed = truth_of(*found);
-      if (!parsed && fault.empty())
-        fault = std::string{names.front()} + " is neither LOS nor NLOS: " + *found;
+      if (!parsed)
+        fault.set(k_impossible, cell_of->first,
+                  cell_of->first + " is neither LOS nor NLOS: " + in_quotes(*found));
       // The words say themselves what they are; only 0 and 1 depend on the column's name.
       const bool word = found->size() > 1 && (found->front() == 'L' || found->front() == 'l' ||
                                               found->front() == 'N' || found->front() == 'n');
@@ -275,16 +316,17 @@ class Importer {
     return site;
   }
 
-  void keep(const CampaignSite& site, CampaignMeasurement m, std::size_t at) {
+  void keep(const CampaignSite& site, CampaignMeasurement m, std::size_t at, const std::string& column = {}) {
     m.site = index_of(site);
     m.line = at;
     auto& report = out_.report.sites[m.site];
     if (m.range_m == 0) {  // the radio's way to say that there was no answer (5.2)
-      ++out_.report.dropped["zero range"];
+      count("zero range", {at, column, "a range of zero is the radio's way to say: no answer"});
       ++report.zero;
       return;
     }
-    if (!(m.range_m > 0) || m.range_m > k_furthest_m) return refuse(at, "range impossible");
+    if (!(m.range_m > 0) || m.range_m > k_furthest_m)
+      return refuse(at, {k_impossible, column, "range impossible: " + metres(m.range_m)});
     out_.campaign.measurements.push_back(std::move(m));
   }
 
@@ -302,9 +344,22 @@ class Importer {
     return last_;
   }
 
-  void refuse(std::size_t at, std::string detail) {
-    ++out_.report.dropped["unreadable line"];
-    if (out_.report.errors.size() < k_most_errors) out_.report.errors.push_back({at, std::move(detail)});
+  void count(const char* reason, CampaignLineError error) {
+    auto& drop = out_.report.dropped[reason];
+    ++drop.count;
+    if (drop.first.size() < CampaignDrop::k_most_named) drop.first.push_back(std::move(error));
+  }
+
+  void refuse(std::size_t at, Fault fault) {
+    CampaignLineError error{at, std::move(fault.column), std::move(fault.detail)};
+    if (out_.report.errors.size() < k_most_errors) out_.report.errors.push_back(error);
+    count(fault.reason, std::move(error));
+  }
+
+  static std::string metres(double value_m) {
+    std::array<char, 40> text{};
+    std::snprintf(text.data(), text.size(), "%.3f m", value_m);
+    return text.data();
   }
 
   void finish() {
@@ -323,7 +378,7 @@ class Importer {
       const std::size_t s = measurements[i].site;
       if (outlier[i]) {
         ++out_.report.sites[s].outliers;
-        ++out_.report.dropped["range off its site's median"];
+        count("range off its site's median", {measurements[i].line, {}, metres(measurements[i].range_m)});
         continue;
       }
       of_site[s].push_back(measurements[i].range_m);

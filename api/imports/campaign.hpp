@@ -23,9 +23,18 @@ struct CampaignOptions {
   double outlier_floor_m{0.5};  ///< and never nearer than this: a quiet site has a tiny MAD
 };
 
+/// One line that was not kept.
 struct CampaignLineError {
   std::size_t line{};
+  std::string column{};  ///< as the source spells it; empty where the whole line is at fault
   std::string detail{};
+};
+
+/// What one reason cost, and its first lines: enough to open the file and see.
+struct CampaignDrop {
+  static constexpr std::size_t k_most_named = 20;
+  std::size_t count{};
+  std::vector<CampaignLineError> first{};  ///< at most k_most_named, in the order of the source
 };
 
 /// What was read, and everything that was not kept.
@@ -33,8 +42,10 @@ struct CampaignReport {
   CampaignFormat format{};
   std::size_t lines{};  ///< measurements seen
   std::size_t kept{};
-  std::map<std::string, std::size_t> dropped{};  ///< reason -> how many
-  std::vector<CampaignLineError> errors{};       ///< the first 100 of them
+  /// By reason: "missing value", "impossible value", "unreadable line", "zero range", "range off its site's
+  /// median".
+  std::map<std::string, CampaignDrop> dropped{};
+  std::vector<CampaignLineError> errors{};  ///< the first 100 that could not be used, whatever the reason
   struct Site {
     std::string name{};
     std::size_t kept{}, zero{}, outliers{};

@@ -46,10 +46,19 @@ std::string name_of(const CampaignSite& site) {
          (site.los ? (*site.los ? "los" : "nlos") : "-");
 }
 
+Ordered lines_json(const std::vector<CampaignLineError>& lines) {
+  Ordered out = Ordered::array();
+  for (const auto& one : lines)
+    out.push_back({{"line", one.line},
+                   {"column", one.column.empty() ? Ordered(nullptr) : Ordered(one.column)},
+                   {"detail", one.detail}});
+  return out;
+}
+
 Ordered report_json(const CampaignReport& report) {
-  Ordered dropped = Ordered::array(), errors = Ordered::array(), settings = Ordered::array();
-  for (const auto& [reason, n] : report.dropped) dropped.push_back({{"reason", reason}, {"count", n}});
-  for (const auto& error : report.errors) errors.push_back({{"line", error.line}, {"detail", error.detail}});
+  Ordered dropped = Ordered::array(), settings = Ordered::array();
+  for (const auto& [reason, drop] : report.dropped)
+    dropped.push_back({{"reason", reason}, {"count", drop.count}, {"first", lines_json(drop.first)}});
   for (const auto& site : report.sites)
     settings.push_back({{"setting", site.name},
                         {"kept", site.kept},
@@ -60,7 +69,7 @@ Ordered report_json(const CampaignReport& report) {
   return {{"read", report.lines},
           {"kept", report.kept},
           {"dropped", std::move(dropped)},
-          {"errors", std::move(errors)},
+          {"errors", lines_json(report.errors)},
           {"settings", std::move(settings)}};
 }
 

@@ -34,9 +34,12 @@ api::CampaignOptions options_of(const CampaignArguments& a) {
 
 void print_report(const api::CampaignReport& r, std::FILE* to) {
   std::fprintf(to, "%zu measurements, %zu kept, %zu sites\n", r.lines, r.kept, r.sites.size());
-  for (const auto& [reason, count] : r.dropped)
-    std::fprintf(to, "  dropped %zu: %s\n", count, reason.c_str());
-  for (const auto& e : r.errors) std::fprintf(to, "  line %zu: %s\n", e.line, e.detail.c_str());
+  for (const auto& [reason, drop] : r.dropped) {
+    std::fprintf(to, "  dropped %zu: %s\n", drop.count, reason.c_str());
+    for (const auto& e : drop.first) std::fprintf(to, "    line %zu: %s\n", e.line, e.detail.c_str());
+    if (drop.count > drop.first.size())
+      std::fprintf(to, "    and %zu more\n", drop.count - drop.first.size());
+  }
   for (const auto& s : r.sites)
     std::fprintf(to, "  %-24s %6zu kept, %zu zero, %zu outliers, median %.3f m, sd %.3f m\n", s.name.c_str(),
                  s.kept, s.zero, s.outliers, s.median_m, s.sd_m);

@@ -22,7 +22,7 @@ TEST(Campaign, ReadsPlainTextOfOneMeasurementALine) {
   EXPECT_EQ(c.sites[0].environment, "hall A");
   EXPECT_NEAR(*c.sites[0].distance_m, 4.5, 1e-12);
   EXPECT_EQ(c.sites[0].los, true);
-  EXPECT_EQ(read.value().report.dropped.at("zero range"), 1U);
+  EXPECT_EQ(read.value().report.dropped.at("zero range").count, 1U);
 }
 
 TEST(Campaign, ReadsDecimalCommasOrSaysWhatToDo) {
@@ -89,11 +89,47 @@ TEST(Campaign, BadLinesNeverSinkGoodOnesAndAreNamed) {
   const auto& r = read.value().report;
   EXPECT_EQ(r.lines, 5U);
   EXPECT_EQ(r.kept, 2U);
-  EXPECT_EQ(r.dropped.at("unreadable line"), 3U);
+  EXPECT_EQ(r.dropped.at("unreadable line").count, 1U);
+  EXPECT_EQ(r.dropped.at("impossible value").count, 2U);
   ASSERT_EQ(r.errors.size(), 3U);
   EXPECT_EQ(r.errors[0].line, 3U);
   EXPECT_EQ(r.errors[1].line, 4U);
   EXPECT_EQ(r.errors[2].line, 5U);
+}
+
+TEST(Campaign, NamesLineColumnAndReasonOfMissingAndImpossibleValues) {
+  std::string text =
+      "site,range_m,true_range_m,los,rx_dbm,std_noise\n"
+      "a,2.0,1.9,1,-80,40\n"   // line 2, good
+      "a,,1.9,1,-80,40\n"      // 3: no range
+      "a,2.0,1.9,1,-800,40\n"  // 4: no such level
+      "a,2.0,-3,1,-80,40\n"    // 5: no such truth
+      "a,2.0,1.9,1,-80,-1\n"   // 6: no such noise
+      "a,0,1.9,1,-80,40\n"     // 7: no answer
+      "a,2.0,1.9,1,n/a,\n"     // 8, good: levels may be missing
+      "a,inf,1.9,1,-80,40\n";  // 9
+  for (int i = 0; i < 30; ++i) text += "a,-2.0,1.9,1,-80,40\n";
+  const auto read = import_campaign(text);
+  ASSERT_TRUE(read);
+  const auto& r = read.value().report;
+  EXPECT_EQ(r.kept, 2U);
+  const auto& missing = r.dropped.at("missing value");
+  EXPECT_EQ(missing.count, 1U);
+  EXPECT_EQ(missing.first.at(0).line, 3U);
+  const auto& impossible = r.dropped.at("impossible value");
+  EXPECT_EQ(impossible.count, 34U);
+  ASSERT_EQ(impossible.first.size(), 20U);
+  EXPECT_EQ(impossible.first[0].line, 4U);
+  EXPECT_EQ(impossible.first[0].column, "rx_dbm");
+  EXPECT_NE(impossible.first[0].detail.find("-800"), std::string::npos);
+  EXPECT_EQ(impossible.first[1].column, "true_range_m");
+  EXPECT_EQ(impossible.first[2].column, "std_noise");
+  EXPECT_EQ(impossible.first[3].line, 9U);
+  EXPECT_EQ(impossible.first[3].column, "range_m");
+  EXPECT_EQ(impossible.first[19].line, 25U);
+  EXPECT_EQ(r.dropped.at("zero range").first.at(0).line, 7U);
+  EXPECT_EQ(r.dropped.at("zero range").first.at(0).column, "range_m");
+  EXPECT_EQ(r.errors.size(), 35U);
 }
 
 // Twenty ranges within 2 cm of 5 m, and one of 9 m: the median stays, the outlier goes and is reported.

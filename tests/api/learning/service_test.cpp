@@ -61,7 +61,24 @@ class LearningService : public AppFixture {
 TEST_F(LearningService, ReportsWhatAnImportDropped) {
   ASSERT_EQ(imported_.status, 200) << imported_.body;
   EXPECT_EQ(json(imported_)["accepted"], 180);
-  EXPECT_EQ(json(imported_)["dropped"][0], (Json{{"reason", "zero range"}, {"count", 1}}));
+  const auto dropped = json(imported_)["dropped"];
+  ASSERT_EQ(dropped.size(), 1u);
+  EXPECT_EQ(dropped[0]["reason"], "zero range");
+  EXPECT_EQ(dropped[0]["count"], 1);
+  EXPECT_EQ(dropped[0]["first"][0]["line"], 182);
+  EXPECT_EQ(dropped[0]["first"][0]["column"], "range_m");
+  const auto answer = post("/api/v1/campaigns/hall/samples",
+                           "environment,setting,true_distance_m,los,range_m,rx_dbm\n"
+                           "room 9,t9,2,1,2.05,-80\nroom 9,t9,2,1,,-80\nroom 9,t9,2,1,2.05,900\nroom 9,t9\n",
+                           "text/csv");
+  ASSERT_EQ(answer.status, 200) << answer.body;
+  const auto bad = json(answer);
+  EXPECT_EQ(bad["kept"], 1);
+  ASSERT_EQ(bad["errors"].size(), 3u);
+  EXPECT_EQ(bad["errors"][0]["line"], 3);
+  EXPECT_EQ(bad["errors"][0]["column"], "range_m");
+  EXPECT_EQ(bad["errors"][1]["column"], "rx_dbm");
+  EXPECT_TRUE(bad["errors"][2]["column"].is_null());
   EXPECT_EQ(post("/api/v1/campaigns/hall/samples", "x", "application/pdf").status, 415);
   EXPECT_EQ(post("/api/v1/campaigns/nowhere/samples", "x", "text/csv").status, 404);
   EXPECT_EQ(post("/api/v1/campaigns", R"({"name":"hall"})").status, 409);
