@@ -10,6 +10,11 @@ namespace {
 
 constexpr double k_harm_price = 0.5;  // metres of mean error that a metre of harm to the worst place is worth
 constexpr double k_harmless_m = 0.02;
+// A no-harm pick is taken where it keeps this share of what the best one saves.
+constexpr double k_kept_saving = 0.5;
+// Nats of mean likelihood within which the tail that corrects best is taken: a few dozen places tell no
+// finer.
+constexpr double k_likely = 0.15;
 constexpr std::array<double, 5> k_quantiles{0.2, 0.3, 0.4, 0.5, 0.6};
 constexpr std::array<double, 5> k_gains{0, 0.25, 0.5, 0.75, 1};
 
@@ -88,13 +93,20 @@ const std::vector<std::vector<std::string>> k_tails{{"rx_free_space_db", "rx_min
                                                     {"rx_dbm", "rx_minus_fp_db"},
                                                     {"fp_dbm", "range_m"}};
 
-// Densities with the tail of the least held-out negative log-likelihood; the earlier one within 0.01.
-Result<std::vector<BiasDensity>> best_densities(const Dataset& data, const std::vector<double>& p_los,
-                                                const std::vector<std::size_t>& fold, Shape& shape,
-                                                const LearnOptions& options) {
+// Each row's density by one of the tails, from folds without it.
+struct Tail {
+  std::vector<std::string> features{};
+  std::vector<BiasDensity> densities{};
+  double nll{};
+};
+
+// The tails worth a look, the likeliest on held-out places first: one that is clearly less likely than
+// another, or than constants, would serve the estimator badly, however well its median corrects.
+Result<std::vector<Tail>> likely_tails(const Dataset& data, const std::vector<double>& p_los,
+                                       const std::vector<std::size_t>& fold, const Shape& shape,
+                                       double nll_constants, const LearnOptions& options) {
   const auto weight = placement_weights(data);
-  std::vector<BiasDensity> best;
-  double best_nll = 0;
+  std::vector<Tail> out;
   for (std::size_t t = 0; t < k_tails.size(); ++t) {
     if (options.progress)
       options.progress(0.4 + 0.6 * static_cast<double>(t) / static_cast<double>(k_tails.size()),
@@ -104,10 +116,12 @@ Result<std::vector<BiasDensity>> best_densities(const Dataset& data, const std::
     if (indices_of(data, one.tail).size() != one.tail.size() && t > 0) continue;
     BOOST_OUTCOME_TRY(auto densities, out_of_fold(data, p_los, fold, one, options.run));
     const double nll = mean_nll(data, densities, weight);
-    if (!best.empty() && nll > best_nll - 0.01) continue;
-    best = std::move(densities), best_nll = nll, shape.tail = one.tail;
+    out.push_back({std::move(one.tail), std::move(densities), nll});
   }
-  return best;
+  std::stable_sort(out.begin(), out.end(), [](const Tail& a, const Tail& b) { return a.nll < b.nll; });
+  const double most = std::max(out.front().nll, std::min(out.front().nll + k_likely, nll_constants));
+  std::erase_if(out, [most](const Tail& one) { return one.nll > most; });
+  return out;
 }
 
 // Grouped error of the shared curve alone, on LOS rows.
@@ -131,6 +145,19 @@ Result<double> los_loss(const Dataset& data, const std::vector<std::size_t>& fol
     }
   }
   return sum / std::max(total, 1e-12);
+}
+
+// One way to correct, and what it costs on held-out places.
+struct Choice {
+  std::size_t row{}, tail{};
+  double quantile{}, gain{}, cost{};
+  std::vector<double> correction_m{};
+};
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string out;
+  for (const auto& name : names) out += (out.empty() ? "" : " and ") + name;
+  return out;
 }
 
 std::string fixed(double value) {
@@ -199,34 +226,49 @@ Result<Learned> learn_bias_mixture(const Dataset& data, const LearnOptions& opti
   if (cancelled("constants", 0.3)) return make_error(Errc::canceled, "cancelled");
   BOOST_OUTCOME_TRY(const auto constants, out_of_fold(data, base_rate, fold, {}, options.run));
   out.nll_constants = mean_nll(data, constants, weight);
-  BOOST_OUTCOME_TRY(const auto densities, best_densities(data, out.p_los, fold, best_shape, options));
-  out.nll = mean_nll(data, densities, weight);
-  std::array<std::vector<double>, k_quantiles.size()> quantile;
-  for (std::size_t q = 0; q < k_quantiles.size(); ++q)
-    for (const auto& density : densities) quantile[q].push_back(density.quantile(k_quantiles[q]));
+  BOOST_OUTCOME_TRY(auto tails, likely_tails(data, out.p_los, fold, best_shape, out.nll_constants, options));
 
-  // How much of it to apply: least mean error, harm to the worst place beyond 2 cm priced in; nothing at all
-  // is among the choices.
+  // Which tail, and how much of it to apply: the least mean error among those that do no place more than 2 cm
+  // of harm. Where that would throw most of the saving away, the harm is priced instead. Nothing at all is
+  // among the choices.
   std::vector<CandidateRow> table{
       bias_row(data, "none (no correction)", std::vector<double>(data.rows(), 0.0)),
       bias_row(data, "class medians weighted by P(LOS)", weighted_class_medians(data, out.p_los, fold))};
-  double best_cost = 1e9, best_q = 0.5, best_gain = 0;
-  std::size_t best_row = 0;
-  for (std::size_t q = 0; q < k_quantiles.size(); ++q) {
-    for (const double gain : k_gains) {
-      std::vector<double> correction;
-      for (const double v : quantile[q]) correction.push_back(gain * v);
-      auto row =
-          bias_row(data, "mixture, quantile " + fixed(k_quantiles[q]) + ", gain " + fixed(gain), correction);
-      const double cost = row.error.mae_m + k_harm_price * std::max(0.0, row.worst_harm_m - k_harmless_m);
-      if (gain > 0) table.push_back(row);
-      if (cost < best_cost - 1e-4) {
-        best_cost = cost, best_q = k_quantiles[q], best_gain = gain;
-        best_row = gain > 0 ? table.size() - 1 : 0;
-        out.correction_m = std::move(correction);
+  const double raw_mae = table.front().error.mae_m;
+  Choice harmless{0, 0, 0.5, 0, raw_mae, {}}, priced{0, 0, 0.5, 0, raw_mae, {}};
+  for (std::size_t t = 0; t < tails.size(); ++t) {
+    for (const double q : k_quantiles) {
+      std::vector<double> whole;
+      for (const auto& density : tails[t].densities) whole.push_back(density.quantile(q));
+      for (const double gain : k_gains) {
+        if (gain == 0) continue;
+        std::vector<double> correction;
+        for (const double v : whole) correction.push_back(gain * v);
+        table.push_back(bias_row(
+            data,
+            "mixture of " + joined(tails[t].features) + ", quantile " + fixed(q) + ", gain " + fixed(gain),
+            correction));
+        const auto& row = table.back();
+        const double cost = row.error.mae_m + k_harm_price * std::max(0.0, row.worst_harm_m - k_harmless_m);
+        const Choice one{table.size() - 1, t, q, gain, cost, std::move(correction)};
+        // A less likely tail must correct clearly better.
+        const auto better = [&](const Choice& than) {
+          return cost < (than.tail == t ? than.cost : 0.99 * than.cost) - 1e-4;
+        };
+        if (row.worst_harm_m <= k_harmless_m && better(harmless)) harmless = one;
+        if (better(priced)) priced = one;
       }
     }
   }
+  const double saved = raw_mae - table[harmless.row].error.mae_m;
+  const bool no_harm = saved >= k_kept_saving * (raw_mae - table[priced.row].error.mae_m);
+  Choice& best = no_harm ? harmless : priced;
+  const std::size_t best_row = best.row;
+  const double best_q = best.quantile, best_gain = best.gain;
+  best_shape.tail = tails[best.tail].features;
+  out.nll = tails[best.tail].nll;
+  out.correction_m = std::move(best.correction_m);
+  if (out.correction_m.empty()) out.correction_m.assign(data.rows(), 0.0);
   table[best_row].picked = true;
   std::vector<std::size_t> all(data.rows());
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
@@ -249,8 +291,10 @@ Result<Learned> learn_bias_mixture(const Dataset& data, const LearnOptions& opti
               (best_shape.shared.empty()
                    ? std::string{"constant"}
                    : "of " + best_shape.shared.front() + " and others, kappa " + fixed(best_shape.kappa)) +
-              "; quantile " + fixed(best_q) + " and gain " + fixed(best_gain) +
-              " had the least held-out error with harm beyond 2 cm priced in";
+              "; late by " + joined(best_shape.tail) + "; quantile " + fixed(best_q) + " and gain " +
+              fixed(best_gain) +
+              (no_harm ? " had the least held-out error of those that harm no place by more than 2 cm"
+                       : " had the least held-out error with harm beyond 2 cm priced in");
   const auto raw = table.front().error, corrected = table[best_row].error;
   info.metrics.insert(info.metrics.end(), {{"mae_raw_m", raw.mae_m},
                                            {"mae_m", corrected.mae_m},
