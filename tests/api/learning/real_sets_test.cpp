@@ -6,6 +6,7 @@
 #include <cctype>
 #include <cstdio>
 #include <filesystem>
+#include <sstream>
 
 #include "api/imports/labelled_table.hpp"
 #include "core/ml/learn.hpp"
@@ -17,7 +18,7 @@ const std::filesystem::path k_data = ANCHORD_SHARED_DATA;
 
 struct Case {
   const char* name;
-  const char* file;
+  const char* file;  // several with blanks between: each is a place
   std::vector<std::string> group_by;
   std::size_t folds;
   ml::Task task;
@@ -32,7 +33,9 @@ class RealSet : public testing::TestWithParam<Case> {};
 
 TEST_P(RealSet, HoldsItsFigureOnPlacesItHasNotSeen) {
   const Case& c = GetParam();
-  const std::vector<std::filesystem::path> paths{k_data / c.file};
+  std::vector<std::filesystem::path> paths;
+  std::istringstream files{c.file};
+  for (std::string file; files >> file;) paths.push_back(k_data / file);
   if (!std::filesystem::exists(paths.front()))
     GTEST_SKIP() << "REAL DATA ABSENT: " << paths.front()
                  << " is not beside the checkout; nothing was proven here";
@@ -43,7 +46,8 @@ TEST_P(RealSet, HoldsItsFigureOnPlacesItHasNotSeen) {
   const bool identify = c.task == ml::Task::nlos_id;
   std::vector<std::size_t> rows;
   Dropped dropped;
-  auto data = dataset_from(table.value(), {available_features(table.value(), identify), true, !identify},
+  auto data = dataset_from(table.value(),
+                           {available_features(table.value(), identify), table.value().labelled(), !identify},
                            rows, dropped);
   ASSERT_TRUE(data) << data.error().message;
   if (c.task == ml::Task::los_bias || c.task == ml::Task::nlos_bias)
@@ -77,7 +81,12 @@ TEST_P(RealSet, HoldsItsFigureOnPlacesItHasNotSeen) {
       c.name, raw, corrected, c.bar, corrected <= c.bar ? "reached" : "NOT REACHED", harm,
       harm <= 0.02 ? "reached" : "NOT REACHED", l.nll, l.nll_constants, l.model.info.method.c_str());
   EXPECT_LE(corrected, c.least * raw);
-  EXPECT_LT(l.nll, l.nll_constants);
+  if (c.task == ml::Task::bias) {
+    EXPECT_LE(harm, 0.02);
+  }
+  if (table.value().labelled()) {  // else a constant may be all that can be learned
+    EXPECT_LT(l.nll, l.nll_constants);
+  }
 }
 
 using enum ml::Task;
@@ -117,6 +126,18 @@ INSTANTIATE_TEST_SUITE_P(
              0.65 * 0.216 / 0.510,
              0,
              0.5,
+             0},
+        // Its plain figure is of headings that are kept back; here one flight of three is, without levels or
+        // labels. Both circles keep 10 m, so the range alone tells much of its own error: a flattered figure,
+        // of which only the harm is worth holding (a constant of the other flights leaves 0.18 m).
+        Case{"ctu-drone-pair",
+             "ctu-drone-pair/line.csv.gz ctu-drone-pair/theta_0.csv.gz ctu-drone-pair/theta_180.csv.gz",
+             {},
+             3,
+             bias,
+             0.118,
+             0,
+             1.0,
              0},
         Case{"outdoor-static LOS",
              "outdoor-static/static.csv.gz",
