@@ -21,6 +21,7 @@ std::string data(const char* name, std::string_view value) {
 std::string placemark(const AnchorFeature& feature) {
   const auto& estimate = *feature.estimate;
   const auto& at = *estimate.best->wgs84;
+  const GlobeAccuracy place = map_accuracy(feature).value_or(GlobeAccuracy{});
   const bool sea_level = feature.height_orthometric_m.has_value();
   const std::string id = to_string(feature.anchor.network_id);
   std::string out = "<Placemark id=\"a" + id + "\"><name>" +
@@ -32,8 +33,8 @@ std::string placemark(const AnchorFeature& feature) {
   }
   out += "<ExtendedData>" + data("network_id", id) + data("status", feature.status) +
          data("revision", feature.revision ? std::to_string(*feature.revision) : "") +
-         data("h_ellipsoidal_m", number(at.height_m, 4)) + data("h95_m", number(estimate.h95_m, 4)) +
-         data("v95_m", number(estimate.v95_m, 4)) + data("verdict", verdict_word(estimate.verdict)) +
+         data("h_ellipsoidal_m", number(at.height_m, 4)) + data("h95_m", number(place.h95_m, 4)) +
+         data("v95_m", number(place.v95_m, 4)) + data("verdict", verdict_word(estimate.verdict)) +
          data("gates_failed", failed) +
          data("override_reason", feature.overridden ? feature.overridden->reason : "") +
          data("frame", feature.site ? feature.site->crs_frame : "") + "</ExtendedData>";

@@ -43,30 +43,36 @@ std::size_t n_refused(const Estimate& estimate) {
   return sum;
 }
 
-Ordered accuracy(const Estimate& estimate, const std::optional<Site>& site) {
-  if (!estimate.best || !estimate.best->covariance_m2.allFinite()) return nullptr;
-  const auto& c = estimate.best->covariance_m2;
+Ordered spread(const Eigen::Matrix3d& c, double h95_m, double v95_m) {
   const ErrorEllipse ellipse = error_ellipse(c);
   const auto sigma = [&](int i) { return metres(std::sqrt(std::max(0.0, c(i, i)))); };
-  Ordered relative{{"sigma_e_m", sigma(0)},
-                   {"sigma_n_m", sigma(1)},
-                   {"sigma_u_m", sigma(2)},
-                   {"cov_enu_m2", {c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)}},
-                   {"ellipse95",
-                    {{"major_m", metres(ellipse.major_m)},
-                     {"minor_m", metres(ellipse.minor_m)},
-                     {"azimuth_deg", rounded(ellipse.azimuth_deg, 10)}}},
-                   {"h95_m", metres(estimate.h95_m)},
-                   {"v95_m", metres(estimate.v95_m)}};
-  Ordered absolute = nullptr;
-  if (site && site->base_sigma_m) {
+  return {{"sigma_e_m", sigma(0)},
+          {"sigma_n_m", sigma(1)},
+          {"sigma_u_m", sigma(2)},
+          {"cov_enu_m2", {c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)}},
+          {"ellipse95",
+           {{"major_m", metres(ellipse.major_m)},
+            {"minor_m", metres(ellipse.minor_m)},
+            {"azimuth_deg", rounded(ellipse.azimuth_deg, 10)}}},
+          {"h95_m", metres(h95_m)},
+          {"v95_m", metres(v95_m)}};
+}
+
+Ordered accuracy(const Estimate& estimate, TrackFrame frame, const std::optional<Site>& site,
+                 const std::optional<GlobeAccuracy>& globe) {
+  if (!estimate.best || !estimate.best->covariance_m2.allFinite()) return nullptr;
+  Ordered out{{"relative", spread(estimate.best->covariance_m2, estimate.h95_m, estimate.v95_m)}};
+  out["globe"] = globe ? spread(globe->covariance_m2, globe->h95_m, globe->v95_m) : Ordered(nullptr);
+  out["absolute"] = nullptr;
+  // Local metres say nothing of the globe until a frame does.
+  if (site && site->base_sigma_m && (frame == TrackFrame::wgs84 || globe)) {
     // The base's own coordinates err alike for all anchors: 95 % of it in the plane is 2.4477 sigma,
     // upwards 1.96.
     const double s = *site->base_sigma_m;
-    absolute = {{"h95_m", metres(std::hypot(estimate.h95_m, 2.4477 * s))},
-                {"v95_m", metres(std::hypot(estimate.v95_m, 1.96 * s))}};
+    out["absolute"] = {{"h95_m", metres(std::hypot(globe ? globe->h95_m : estimate.h95_m, 2.4477 * s))},
+                       {"v95_m", metres(std::hypot(globe ? globe->v95_m : estimate.v95_m, 1.96 * s))}};
   }
-  return {{"relative", std::move(relative)}, {"absolute", std::move(absolute)}};
+  return out;
 }
 
 Ordered quality(const Estimate& estimate, const std::optional<Override>& overridden) {
@@ -116,6 +122,26 @@ std::string number(double value, int decimals) {
 
 }  // namespace
 
+std::optional<GlobeAccuracy> map_accuracy(const AnchorFeature& feature) {
+  if (feature.globe) return feature.globe;
+  if (!feature.estimate || !feature.estimate->best) return std::nullopt;
+  const Estimate& e = *feature.estimate;
+  return GlobeAccuracy{e.best->covariance_m2, e.h95_m, e.v95_m};
+}
+
+std::optional<GlobeAccuracy> globe_accuracy(const Ordered& provenance, NetworkId anchor) {
+  const Ordered::json_pointer at("/frame/globe/" + to_string(anchor));
+  if (!provenance.is_object() || !provenance.contains(at) || !provenance[at].is_object()) return std::nullopt;
+  const Ordered& told = provenance[at];
+  const auto c = told.value("cov_enu_m2", std::vector<double>{});
+  if (c.size() != 6) return std::nullopt;
+  GlobeAccuracy out;
+  out.covariance_m2 << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
+  out.h95_m = told.value("h95_m", 0.0);
+  out.v95_m = told.value("v95_m", 0.0);
+  return out;
+}
+
 Ordered gate_json(const Gate& gate) {
   const auto finite = [](double v) { return std::isfinite(v) ? Ordered(v) : Ordered(nullptr); };
   return {{"name", gate.name},
@@ -126,7 +152,8 @@ Ordered gate_json(const Gate& gate) {
 }
 
 Ordered estimate_result_json(const Estimate& estimate, TrackFrame frame, const std::optional<Site>& site,
-                             const std::optional<Override>& overridden) {
+                             const std::optional<Override>& overridden,
+                             const std::optional<GlobeAccuracy>& globe) {
   Ordered out{{"network_id", to_string(estimate.anchor)},
               {"verdict", verdict_word(estimate.verdict)},
               {"reason", estimate.reason}};
@@ -134,7 +161,7 @@ Ordered estimate_result_json(const Estimate& estimate, TrackFrame frame, const s
   out["enu_m"] = estimate.best ? vector_json(estimate.best->position.m) : Ordered(nullptr);
   out["local_m"] =
       estimate.best && frame == TrackFrame::local ? vector_json(estimate.best->position.m) : Ordered(nullptr);
-  out["accuracy"] = accuracy(estimate, site);
+  out["accuracy"] = accuracy(estimate, frame, site, globe);
   out["quality"] = quality(estimate, overridden);
   out["mirror"] = mirror(estimate);
   return out;
@@ -175,7 +202,8 @@ Ordered anchor_feature_json(const AnchorFeature& feature) {
   p["local_m"] = placed && feature.frame == TrackFrame::local ? vector_json(estimate->best->position.m)
                  : feature.local_m                            ? vector_json(*feature.local_m)
                                                               : Ordered(nullptr);
-  p["accuracy"] = estimate ? accuracy(*estimate, feature.site) : Ordered(nullptr);
+  p["accuracy"] =
+      estimate ? accuracy(*estimate, feature.frame, feature.site, feature.globe) : Ordered(nullptr);
   p["quality"] = estimate ? quality(*estimate, feature.overridden) : Ordered(nullptr);
   p["provenance"] = {
       {"calibration", feature.calibration ? Ordered(to_string(*feature.calibration)) : Ordered(nullptr)},
@@ -199,8 +227,9 @@ Ordered flat_feature_json(const AnchorFeature& feature) {
     flat[key] = full["properties"][key];
   const auto& estimate = feature.estimate;
   flat["verdict"] = estimate ? Ordered(verdict_word(estimate->verdict)) : Ordered(nullptr);
-  flat["h95_m"] = estimate && estimate->best ? Ordered(metres(estimate->h95_m)) : Ordered(nullptr);
-  flat["v95_m"] = estimate && estimate->best ? Ordered(metres(estimate->v95_m)) : Ordered(nullptr);
+  const auto place = map_accuracy(feature);
+  flat["h95_m"] = place ? Ordered(metres(place->h95_m)) : Ordered(nullptr);
+  flat["v95_m"] = place ? Ordered(metres(place->v95_m)) : Ordered(nullptr);
   flat["acceptable"] = estimate ? Ordered(estimate->acceptable()) : Ordered(nullptr);
   flat["override_reason"] = feature.overridden ? Ordered(feature.overridden->reason) : Ordered(nullptr);
   flat["e_m"] = feature.projected ? Ordered(rounded(feature.projected->e_m, 1e3)) : Ordered(nullptr);
@@ -253,13 +282,14 @@ std::string anchor_csv_row(const AnchorFeature& feature) {
     add(placed && feature.frame == TrackFrame::local ? number(estimate->best->position.m[i], 4)
         : feature.local_m                            ? number((*feature.local_m)[i], 4)
                                                      : "");
+  const GlobeAccuracy place = map_accuracy(feature).value_or(GlobeAccuracy{});
   for (int i = 0; i < 3; ++i)
-    add(placed ? number(std::sqrt(std::max(0.0, estimate->best->covariance_m2(i, i))), 4) : "");
-  const ErrorEllipse ellipse = placed ? error_ellipse(estimate->best->covariance_m2) : ErrorEllipse{};
+    add(placed ? number(std::sqrt(std::max(0.0, place.covariance_m2(i, i))), 4) : "");
+  const ErrorEllipse ellipse = placed ? error_ellipse(place.covariance_m2) : ErrorEllipse{};
   for (const double value : {ellipse.major_m, ellipse.minor_m}) add(placed ? number(value, 4) : "");
   add(placed ? number(ellipse.azimuth_deg, 1) : "");
-  add(placed ? number(estimate->h95_m, 4) : "");
-  add(placed ? number(estimate->v95_m, 4) : "");
+  add(placed ? number(place.h95_m, 4) : "");
+  add(placed ? number(place.v95_m, 4) : "");
   add(estimate ? verdict_word(estimate->verdict) : "");
   add(feature.site ? csv_text(feature.site->crs_frame) : "");
   add(feature.site && feature.site->crs_epoch ? number(*feature.site->crs_epoch, 2) : "");

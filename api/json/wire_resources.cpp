@@ -219,7 +219,8 @@ Ordered calibration_json(const Calibration& calibration, bool with_anchors) {
   if (!with_anchors) return out;
   Ordered anchors = Ordered::array();
   for (const auto& estimate : calibration.anchors) {
-    anchors.push_back(estimate_result_json(estimate, calibration.frame));
+    anchors.push_back(estimate_result_json(estimate, calibration.frame, std::nullopt, std::nullopt,
+                                           globe_accuracy(out["provenance"], estimate.anchor)));
     // Told in a local frame too, where the calibration asked for one.
     const auto local = Ordered::json_pointer("/frame/anchors/" + to_string(estimate.anchor));
     if (out["provenance"].contains(local)) anchors.back()["local_m"] = out["provenance"][local];
@@ -237,11 +238,12 @@ Ordered revision_json(const Revision& revision) {
           {"note", revision.note}};
 }
 
-Ordered published_json(const PublishedPosition& position) {
+Ordered published_json(const PublishedPosition& position, const std::optional<GlobeAccuracy>& globe) {
   Ordered out{{"revision", position.since_revision},
               {"published_at", to_rfc3339(position.published)},
               {"calibration", to_string(position.calibration)}};
-  out.update(estimate_result_json(position.estimate, position.frame, std::nullopt, position.overridden));
+  out.update(
+      estimate_result_json(position.estimate, position.frame, std::nullopt, position.overridden, globe));
   return out;
 }
 

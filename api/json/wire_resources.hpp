@@ -21,6 +21,15 @@ void patch_site(const nlohmann::json& body, bool whole, Site& site, std::vector<
 /// Applies the FM fields of a merge-patch to `anchor`.
 void patch_anchor(const nlohmann::json& body, Anchor& anchor, std::vector<FieldError>& errors);
 
+/// How good a place on the globe is that a fitted frame gave (frame_provenance).
+struct GlobeAccuracy {
+  Eigen::Matrix3d covariance_m2{Eigen::Matrix3d::Zero()};  ///< ENU axes
+  double h95_m{}, v95_m{};
+};
+/// From the provenance of a calibration; nothing where no frame put the anchor on the globe, or its fit does
+/// not tell how good it is.
+std::optional<GlobeAccuracy> globe_accuracy(const nlohmann::ordered_json& provenance, NetworkId anchor);
+
 /// What an anchor feature (api.md section 4) is made of.
 struct AnchorFeature {
   Anchor anchor;
@@ -33,6 +42,7 @@ struct AnchorFeature {
   std::optional<Estimate> estimate{};
   std::optional<Site> site{};
   std::optional<Override> overridden{};
+  std::optional<GlobeAccuracy> globe{};      ///< of a place a fitted frame gave
   std::optional<Eigen::Vector3d> local_m{};  ///< in the positioning system's frame, where one is fitted
   struct Projected {
     int epsg{};
@@ -43,6 +53,8 @@ struct AnchorFeature {
   std::optional<double> height_orthometric_m{};
   std::string geoid;  ///< its name, or why there is none
 };
+/// Of the place the map shows: with the frame's fit where one gave it. For writers of one figure each.
+std::optional<GlobeAccuracy> map_accuracy(const AnchorFeature& feature);
 nlohmann::ordered_json anchor_feature_json(const AnchorFeature& feature);
 /// No nested objects, for GIS readers.
 nlohmann::ordered_json flat_feature_json(const AnchorFeature& feature);
@@ -55,10 +67,12 @@ nlohmann::ordered_json gate_json(const Gate& gate);
 /// position, accuracy, quality and mirror of one estimate, as in calibrations.
 nlohmann::ordered_json estimate_result_json(const Estimate& estimate, TrackFrame frame,
                                             const std::optional<Site>& site = {},
-                                            const std::optional<Override>& overridden = {});
+                                            const std::optional<Override>& overridden = {},
+                                            const std::optional<GlobeAccuracy>& globe = {});
 nlohmann::ordered_json calibration_json(const Calibration& calibration, bool with_anchors);
 nlohmann::ordered_json revision_json(const Revision& revision);
-nlohmann::ordered_json published_json(const PublishedPosition& position);
+nlohmann::ordered_json published_json(const PublishedPosition& position,
+                                      const std::optional<GlobeAccuracy>& globe = {});
 nlohmann::ordered_json job_json(const Job& job);
 std::string_view job_state_word(JobState state);
 

@@ -32,12 +32,11 @@ class Lookup {
     }
     return it->second;
   }
-  const std::vector<MissionId>& missions(const CalibrationId& id) {
-    auto [it, fresh] = missions_.try_emplace(id);
-    if (fresh) {
-      if (auto found = store_.calibration(id)) it->second = found.value().missions;
-    }
-    return it->second;
+  const std::vector<MissionId>& missions(const CalibrationId& id) { return calibration(id).missions; }
+  /// Of a published place that a fitted frame gave.
+  std::optional<GlobeAccuracy> globe(const PublishedPosition& position) {
+    if (position.frame != TrackFrame::local) return std::nullopt;
+    return globe_accuracy(calibration(position.calibration).provenance, position.estimate.anchor);
   }
 
   /// What the position is called elsewhere: the positioning system's frame, the map, sea level.
@@ -72,11 +71,24 @@ class Lookup {
     return it->second ? &*it->second : nullptr;
   }
 
+  struct Made {
+    std::vector<MissionId> missions;
+    Ordered provenance;
+  };
+  const Made& calibration(const CalibrationId& id) {
+    auto [it, fresh] = calibrations_.try_emplace(id);
+    if (fresh) {
+      if (auto found = store_.calibration(id))
+        it->second = {found.value().missions, Ordered::parse(found.value().provenance_json, nullptr, false)};
+    }
+    return it->second;
+  }
+
   Services& services_;
   std::map<SiteId, std::optional<FrameDefinition>> frames_;
   AnchorStore& store_;
   std::map<SiteId, std::optional<Site>> sites_;
-  std::map<CalibrationId, std::vector<MissionId>> missions_;
+  std::map<CalibrationId, Made> calibrations_;
 };
 
 AnchorFeature published_feature(Lookup& lookup, Anchor anchor, const PublishedPosition& position,
@@ -92,6 +104,7 @@ AnchorFeature published_feature(Lookup& lookup, Anchor anchor, const PublishedPo
   feature.frame = position.frame;
   feature.estimate = position.estimate;
   feature.overridden = position.overridden;
+  feature.globe = lookup.globe(position);
   lookup.name_elsewhere(feature);
   return feature;
 }
@@ -294,8 +307,9 @@ Response history(Services& s, const Request& request) {
   check_query(request, {});
   const Anchor anchor = path_anchor(s, request);
   Ordered items = Ordered::array();
+  Lookup lookup(s);
   for (const auto& position : value_or_problem(s.deps.anchors.history(anchor.network_id)))
-    items.push_back(published_json(position));
+    items.push_back(published_json(position, lookup.globe(position)));
   return list_response(request, std::move(items), "");
 }
 

@@ -5,6 +5,7 @@
 
 #include "api/json/outline_json.hpp"
 #include "core/geo/enu.hpp"
+#include "core/localize/error_ellipse.hpp"
 #include "core/ports/site_store.hpp"
 #include "core/ports/store.hpp"
 
@@ -30,6 +31,20 @@ Json outline_provenance(const char* source, const Json& site, const FlightOption
           {"why", why.empty() ? Json(nullptr) : Json(why)}};
 }
 
+/// Of an estimate in local metres, once the frame has put it on the globe.
+Json accuracy_on_globe(const FrameFit& fit, const Estimate& estimate) {
+  const auto& local = *estimate.best;
+  const auto covariance = fit.enu_covariance(local.position.m, local.covariance_m2);
+  if (!covariance || !covariance->allFinite()) return nullptr;
+  const auto& c = *covariance;
+  const ErrorEllipse ellipse = error_ellipse(c);
+  // A height with a twin claims more than its covariance; so does the place on the globe.
+  const double twin_m = std::max(estimate.v95_m - error_ellipse(local.covariance_m2).v95_m, 0.0);
+  return {{"cov_enu_m2", {c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)}},
+          {"h95_m", ellipse.h95_m},
+          {"v95_m", ellipse.v95_m + twin_m}};
+}
+
 }  // namespace
 
 Result<CalibrationFrame> calibration_frame(FrameStore& frames, const std::string& name_or_id) {
@@ -52,6 +67,8 @@ void place_on_globe(const CalibrationFrame& frame, Estimate& estimate) {
 Json frame_provenance(const CalibrationFrame& frame, const Calibration& calibration) {
   const EnuFrame globe(frame.definition.origin);
   Json anchors = Json::object();
+  Json accuracies = calibration.frame == TrackFrame::local && frame.definition.fit.covariance ? Json::object()
+                                                                                              : Json(nullptr);
   for (const auto& estimate : calibration.anchors) {
     if (!estimate.best) continue;
     Eigen::Vector3d local_m = estimate.best->position.m;
@@ -60,12 +77,12 @@ Json frame_provenance(const CalibrationFrame& frame, const Calibration& calibrat
       local_m = frame.definition.fit.transform.local_from(globe.enu_from_wgs84(*estimate.best->wgs84).m);
     }
     anchors[to_string(estimate.anchor)] = {local_m.x(), local_m.y(), local_m.z()};
+    if (accuracies.is_object())
+      accuracies[to_string(estimate.anchor)] = accuracy_on_globe(frame.definition.fit, estimate);
   }
-  return {{"id", to_string(frame.frame.id)},
-          {"name", frame.frame.name},
-          {"version", frame.frame.version},
-          {"fit_rms_m", frame.definition.fit.rms_m},
-          {"anchors", std::move(anchors)}};
+  return {{"id", to_string(frame.frame.id)}, {"name", frame.frame.name},
+          {"version", frame.frame.version},  {"fit_rms_m", frame.definition.fit.rms_m},
+          {"anchors", std::move(anchors)},   {"globe", std::move(accuracies)}};
 }
 
 Json use_site_outline(bool wanted, std::span<const FlightData> flights, const std::optional<Wgs84>& origin,

@@ -26,11 +26,14 @@ struct CalibrationFrame {
 /// By UUID or by name. errors: not_found, invalid_argument (never fitted)
 Result<CalibrationFrame> calibration_frame(FrameStore& frames, const std::string& name_or_id);
 
-/// Gives an estimate in metres of the frame its place on the globe; what the frame's own fit is uncertain
-/// stays out of the covariance and stands in the provenance.
+/// Gives an estimate in metres of the frame its place on the globe. Its covariance stays that of the local
+/// metres; the one of the place on the globe, what the frame's fit is uncertain included, is told by
+/// frame_provenance.
 void place_on_globe(const CalibrationFrame& frame, Estimate& estimate);
 
 /// Which frame, and where it puts every anchor: {"id", "name", "version", "anchors": {id: [x, y, z]}, ...}.
+/// Of flights in local metres also "globe": {id: {"cov_enu_m2", "h95_m", "v95_m"}}, accuracy of the places on
+/// the globe; null where the fit does not tell how good it is (no redundant pair, no sigma).
 nlohmann::json frame_provenance(const CalibrationFrame& frame, const Calibration& calibration);
 
 /// Takes the outline of the flights' site into `options`, in the metres of the answers: anchors are inside,

@@ -207,6 +207,42 @@ TEST_F(Calibrations, BeginWhereTheyAreTold) {
   EXPECT_EQ(solve(mission, {{"initial", 3}}).status, 422);
 }
 
+// Clues so weak that as priors they weigh nothing (half the squared misfit is below 0.004): what follows them
+// is where the search begins, and nothing else.
+TEST_F(Calibrations, BeginWhereBearingAndHeightMeet) {
+  MadeFlight flat = made(11);
+  flat.height_swing_m = 0;  // one plane at 6 m: a twin of every anchor 8 to 9 m above it
+  flat.anchors = {{12, 2, 2}, {-10, 8, 2.5}, {3, -14, 2}, {-6, -9, 1.5}};
+  const auto mission = flown(flat);
+  const auto at = solved(mission)["origin"];
+  const EnuFrame frame({at["lat"].get<double>(), at["lon"].get<double>(), at["h_m"].get<double>()});
+  const EnuFrame truth(flat.origin);
+  const auto told = [&](const Eigen::Vector3d& place_m) {
+    return frame.enu_from_wgs84(truth.wgs84_from_enu({place_m})).m;
+  };
+  const auto begun = [&](double up_m, const char* initial) {
+    const Eigen::Vector3d turn = told({0, 0, 6});
+    Json anchors = Json::object();
+    for (std::size_t i = 0; i < flat.anchors.size(); ++i) {
+      const Eigen::Vector3d way = told({flat.anchors[i].x(), flat.anchors[i].y(), up_m}) - turn;
+      anchors[to_string(NetworkId{static_cast<std::uint32_t>(0x6000 + i)})] = {
+          {"bearing",
+           {{"from_m", {turn.x(), turn.y(), turn.z()}},
+            {"bearing_deg", std::atan2(way.x(), way.y()) * 57.29577951308232},
+            {"sigma_deg", 180}}},
+          {"height", {{"up_m", turn.z() + way.z()}, {"sigma_m", 100}}}};
+    }
+    return solved(mission, {{"initial", initial}, {"clues", {{"anchors", anchors}}}})["anchors"];
+  };
+  const auto low = begun(2, "bearing_height"), high = begun(10, "bearing_height");
+  const auto searched = begun(2, "search"), searched_high = begun(10, "search");
+  for (std::size_t i = 0; i < low.size(); ++i) {
+    const auto up_m = [&](const Json& anchors) { return anchors[i]["enu_m"][2].get<double>(); };
+    EXPECT_GT(up_m(high) - up_m(low), 2.0) << i;
+    EXPECT_NEAR(up_m(searched), up_m(searched_high), 1.0) << "the clues alone decide nothing";
+  }
+}
+
 TEST_F(Calibrations, TellTheirAnswerInALocalFrameToo) {
   const MadeFlight m = made(6);
   const auto mission = flown(m);
@@ -236,6 +272,53 @@ TEST_F(Calibrations, TellTheirAnswerInALocalFrameToo) {
     EXPECT_NEAR(local[1].get<double>(), 20 - m.anchors[i].x(), 0.2);
   }
   EXPECT_TRUE(solved(mission)["anchors"][0]["local_m"].is_null());
+}
+
+// By hand, as in frame_fit_test.cpp: four corners at 25 m from their middle, 0.2 m each, leave a place r from
+// it uncertain by 0.2 m sqrt(1/4 + r^2 / 2500) along either horizontal axis, and by 0.1 m upwards.
+TEST_F(Calibrations, CountWhatTheFrameIsUncertainAboutPlacesOnTheGlobe) {
+  constexpr double sigma_m = 0.2;
+  MadeFlight m = made(10);
+  m.frame = TrackFrame::local;
+  const auto mission = flown(m);
+  ASSERT_EQ(post("/api/v1/frames", R"({"name":"hall-b"})").status, 201);
+  const EnuFrame frame(m.origin);
+  Json pairs = Json::array();
+  for (const auto& local : {Eigen::Vector3d(20, 15, 0), Eigen::Vector3d(-20, 15, 0),
+                            Eigen::Vector3d(-20, -15, 0), Eigen::Vector3d(20, -15, 0)}) {
+    const Wgs84 at = frame.wgs84_from_enu({Eigen::Vector3d(-local.y(), local.x(), 0)});
+    pairs.push_back({{"name", "corner"},
+                     {"local_m", {local.x(), local.y(), local.z()}},
+                     {"lon", at.lon_deg},
+                     {"lat", at.lat_deg},
+                     {"h_m", at.height_m},
+                     {"sigma_m", sigma_m}});
+  }
+  const auto fit = post("/api/v1/frames/hall-b/fit", Json{{"parameters", 4}, {"pairs", pairs}}.dump());
+  ASSERT_EQ(fit.status, 200) << fit.body;
+  EXPECT_TRUE(solved(mission)["anchors"][0]["accuracy"]["globe"].is_null());
+  const auto answer = solved(mission, {{"frame", "hall-b"}});
+  for (std::size_t i = 0; i < m.anchors.size(); ++i) {
+    const auto& accuracy = answer["anchors"][i]["accuracy"];
+    const auto &local = accuracy["relative"]["cov_enu_m2"], &globe = accuracy["globe"]["cov_enu_m2"];
+    const double plane =
+        sigma_m * sigma_m * (0.25 + m.anchors[i].head<2>().squaredNorm() / 2500.0);  // 4 mm2 for the error
+    EXPECT_NEAR(globe[0].get<double>(), local[3].get<double>() + plane, 1e-3) << "east is -y of the frame";
+    EXPECT_NEAR(globe[3].get<double>(), local[0].get<double>() + plane, 1e-3);
+    EXPECT_NEAR(globe[1].get<double>(), -local[1].get<double>(), 1e-3);
+    EXPECT_NEAR(globe[5].get<double>(), local[5].get<double>() + 0.01, 1e-5);
+    EXPECT_GT(accuracy["globe"]["h95_m"].get<double>(), 2.44 * std::sqrt(plane));
+    EXPECT_LT(accuracy["relative"]["h95_m"].get<double>(), 0.25) << "the frame's share stays out of it";
+  }
+  // What is published tells the same, and the map's table gives the figure of what it maps.
+  const auto published =
+      post("/api/v1/calibrations/" + answer.value("id", "") + "/publish", R"({"note":"local"})");
+  ASSERT_EQ(published.status, 201) << published.body;
+  const auto feature = json(get("/api/v1/anchors"))["features"][0]["properties"];
+  EXPECT_EQ(feature["accuracy"]["globe"], answer["anchors"][0]["accuracy"]["globe"]);
+  const auto flat =
+      json(get("/api/v1/exports/anchors.geojson", {{"flat", "true"}}))["features"][0]["properties"];
+  EXPECT_EQ(flat["h95_m"], answer["anchors"][0]["accuracy"]["globe"]["h95_m"]);
 }
 
 TEST_F(Calibrations, LeaveRangesBetweenAnchorsOutWhereAsked) {
