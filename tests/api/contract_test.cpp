@@ -8,6 +8,7 @@
 #include "api/services/access.hpp"
 #include "app_fixture.hpp"
 #include "core/ports/backups.hpp"
+#include "tests/paths.hpp"
 
 namespace anchord::test {
 namespace {

@@ -19,6 +19,7 @@
 #include <thread>
 #include <vector>
 
+#include "tests/paths.hpp"
 #include "tests/server/storage/scratch_dir.hpp"
 
 namespace {

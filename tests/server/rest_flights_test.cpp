@@ -21,6 +21,7 @@
 #include "api/json/wire_rows.hpp"
 #include "core/geo/enu.hpp"
 #include "server/http/http_client.hpp"
+#include "tests/paths.hpp"
 
 namespace anchord {
 namespace {

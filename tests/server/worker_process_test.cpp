@@ -1,5 +1,6 @@
 // A worker that dies, in every way it may: the work gets a cause and advice, and the caller lives.
 #include "server/runtime/worker_process.hpp"
+#include "tests/paths.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/exports/flight_plan_output.hpp"
+#include "tests/paths.hpp"
 
 namespace anchord::api {
 namespace {

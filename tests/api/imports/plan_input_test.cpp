@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "api/exports/plan_output.hpp"
+#include "tests/paths.hpp"
 
 namespace anchord::api {
 namespace {

@@ -11,6 +11,8 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "tests/paths.hpp"
+
 namespace anchord {
 namespace {
 

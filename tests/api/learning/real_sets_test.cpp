@@ -10,6 +10,7 @@
 
 #include "api/imports/labelled_table.hpp"
 #include "core/ml/learn.hpp"
+#include "tests/paths.hpp"
 
 namespace anchord::api {
 namespace {

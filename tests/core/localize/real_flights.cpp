@@ -9,6 +9,7 @@
 #include "api/imports/flight_folder.hpp"
 #include "api/imports/flight_json.hpp"
 #include "core/geo/enu.hpp"
+#include "tests/paths.hpp"
 
 namespace anchord::testing {
 namespace {

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "tests/core/localize/real_flights.hpp"
+#include "tests/paths.hpp"
 
 namespace anchord {
 namespace {

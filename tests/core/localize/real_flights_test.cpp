@@ -14,6 +14,7 @@
 #include "api/exports/solve_output.hpp"
 #include "api/imports/csv_table.hpp"
 #include "api/imports/flight_json.hpp"
+#include "tests/paths.hpp"
 
 namespace anchord {
 namespace {

@@ -1,4 +1,5 @@
 #include "core/procedure/machine.hpp"
+#include "tests/paths.hpp"
 
 #include <gtest/gtest.h>
 

@@ -10,6 +10,7 @@
 
 #include "drivers/gnss/text.hpp"
 #include "samples.hpp"
+#include "tests/paths.hpp"
 
 // Recorded logs and the values an independent decoder (or the producer's own input) has for them.
 

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/paths.hpp"
+
 namespace anchord::pozyx {
 
 /// One question of the host and the tag's answer, if it has one.

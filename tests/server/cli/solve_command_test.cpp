@@ -9,6 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "tests/paths.hpp"
+
 namespace {
 
 namespace fs = std::filesystem;

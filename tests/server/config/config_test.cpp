@@ -1,4 +1,5 @@
 #include "server/config/config.hpp"
+#include "tests/paths.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

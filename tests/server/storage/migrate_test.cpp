@@ -8,6 +8,7 @@
 #include <sstream>
 #include <thread>
 
+#include "tests/paths.hpp"
 #include "tests/server/storage/child.hpp"
 #include "tests/server/storage/store_contract.hpp"
 
