@@ -8,8 +8,8 @@ namespace {
 
 constexpr std::size_t k_min_joint_ranges = 100;  // below, the own search of each anchor is as good
 constexpr auto k_joint_pause = std::chrono::seconds(2);
-constexpr int k_joint_rest =
-    15;  // times what the last took: a long flight leaves 90 % of a core free as well
+// Times as long a pause as the last solution took: 4 % of one core at most, however long the flight.
+constexpr int k_joint_rest = 24;
 
 }  // namespace
 
