@@ -37,6 +37,7 @@ void MissionService::State::accept(std::vector<R> rows) {
       --queued;
     }
     flight->queue.push_back(std::move(judged));
+    flight->closing = flight->mission.state == MissionState::finished;
     ++queued;
   }
   for (const auto& f : all()) schedule(f);
@@ -48,7 +49,8 @@ template void MissionService::State::accept(std::vector<Fix>);
 void MissionService::State::schedule(const std::shared_ptr<Flight>& flight) {
   {
     const std::scoped_lock lock(flight->queue_mutex);
-    if (flight->scheduled || flight->queue.empty() || stopped || flight->rebuilding) return;
+    if (flight->scheduled || stopped || flight->rebuilding) return;
+    if (flight->queue.empty() && !flight->closing) return;
     flight->scheduled = true;
   }
   post([self = shared_from_this(), flight] {
@@ -57,7 +59,7 @@ void MissionService::State::schedule(const std::shared_ptr<Flight>& flight) {
     {
       const std::scoped_lock lock(flight->queue_mutex);
       flight->scheduled = false;
-      again = !flight->queue.empty();
+      again = !flight->queue.empty() || flight->closing;
     }
     if (again) self->schedule(flight);
   });
@@ -112,11 +114,18 @@ void MissionService::State::work(Flight& flight) {
       since_announced = 0;
     }
   }
+  bool closing = false;
+  {
+    const std::scoped_lock queue(flight.queue_mutex);
+    if (flight.queue.empty()) {
+      flight.rebuilt = {};
+      closing = std::exchange(flight.closing, false);
+    }
+  }
+  if (closing) flight.live.finish();
   announce(flight, false);
   publish_pose(flight);
   flight.dirty = true;
-  const std::scoped_lock queue(flight.queue_mutex);
-  if (flight.queue.empty()) flight.rebuilt = {};
 }
 
 void MissionService::State::step(Flight& flight, const LiveRow& row, bool quiet) {

@@ -52,8 +52,10 @@ Result<Mission> MissionService::finish(const MissionId& id) {
     {
       const std::scoped_lock lock(flight->queue_mutex);
       flight->mission = current;
+      flight->closing = true;
     }
     flight->dirty = true;
+    state_->schedule(flight);
   }
   state_->deps.events.add("info", "mission.finished", current.name + " finished", id);
   return current;

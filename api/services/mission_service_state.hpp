@@ -28,6 +28,7 @@ struct MissionService::Flight {
   Mission mission;  ///< under queue_mutex
   std::deque<LiveRow> queue;
   bool scheduled{false};
+  bool closing{false};  ///< finished, and what waits for a fix is not told yet
   std::uint64_t dropped{0};
   UtcTime last_arrival{};
   std::optional<UtcTime> fix_arrival{}, range_arrival{};

@@ -130,6 +130,11 @@ struct LiveFlight::State {
     while (it != end) it = settle(it->second) ? waiting.erase(it) : std::next(it);
   }
 
+  void settle_all() {
+    for (auto it = waiting.begin(); it != waiting.end();)
+      it = settle(it->second) ? waiting.erase(it) : std::next(it);
+  }
+
   void park(Waiting entry) {
     const std::int64_t ns = entry.range.time.ns;
     const auto late_ns = static_cast<std::int64_t>(options.max_wait_s * 1e9);
@@ -241,12 +246,14 @@ void LiveFlight::tell(std::map<NetworkId, AnchorClues> clues) { state_->options.
 void LiveFlight::adopt(const FlightSolution& solution, UtcTime cut) {
   State& s = *state_;
   s.options.bias_m = solution.shared.bias_m.value;
-  s.options.lag_s = solution.shared.lag_s.value;
+  const double lag_before_s = std::exchange(s.options.lag_s, solution.shared.lag_s.value);
   for (const auto& anchor : solution.anchors) {
     const NetworkId id = anchor.estimate.anchor;
     auto& live = s.anchors.try_emplace(id, id).first->second;
     if (live.adopt(anchor, solution.shared, cut)) s.changed.insert(id);
   }
+  // A smaller lag lets ranges that wait for the next fix stand before the last one, where no later fix looks.
+  if (s.options.lag_s < lag_before_s) s.settle_all();
 }
 
 void LiveFlight::hold(bool held) {
@@ -261,7 +268,6 @@ void LiveFlight::hold(bool held) {
 
 void LiveFlight::finish() {
   for (auto& [ns, entry] : state_->waiting) state_->tell(entry, "outside_track");
-  state_->waiting.clear();
   for (auto& [id, anchor] : state_->anchors) {
     if (anchor.solve(state_->options)) state_->changed.insert(id);
   }

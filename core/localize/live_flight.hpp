@@ -82,7 +82,8 @@ class LiveFlight {
   /// While held, ranges are joined but nothing is solved: for reading in what was stored. Letting go solves
   /// every anchor once.
   void hold(bool held);
-  /// Ends the stream: waiting ranges are decided, every anchor is solved once more.
+  /// Ends the stream: ranges that wait for a fix are told as refused (and stay parked, should it come after
+  /// all), every anchor is solved once more.
   void finish();
 
   /// Decided since the last call, in order of decision.

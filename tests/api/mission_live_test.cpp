@@ -52,6 +52,7 @@ class MissionLive : public AppFixture {
                   {"distance_m", range.distance_m}};
     });
     for (const auto& [path, body] : {std::pair{"/api/v1/fixes", fixes}, {"/api/v1/ranges", ranges}}) {
+      if (body.empty()) continue;
       const auto answer = post(path, body, "application/x-ndjson", {{"mission", mission}});
       ASSERT_EQ(answer.status, 200) << answer.body;
       ASSERT_EQ(json(answer)["rejected"], 0) << answer.body;
@@ -106,6 +107,28 @@ TEST_F(MissionLive, TakesRowsThatComeWhileItReadsWhatWasStored) {
   EXPECT_LE(n, flight.ranges.size());
   EXPECT_GT(n, flight.ranges.size() * 95 / 100) << "but for those at the ends of the track";
   app_->stop();
+}
+
+/// Nobody looks for a fix behind the last one any more: no range is left without a word.
+TEST_F(MissionLive, TellsOfEveryRangeOnceTheFlightIsFinished) {
+  auto flight = streamed(MadeFlight{});
+  const auto id = mission("local");
+  deliver(id, flight, 0, 30);
+  flight.fixes.clear();
+  deliver(id, flight, 30, 31);
+  const auto sent =
+      std::ranges::count_if(flight.ranges, [](const Range& r) { return r.time.seconds() < 31; });
+  const auto told = [&] {
+    std::ptrdiff_t n = 0;
+    for (const auto& [anchor, properties] : live(id)) {
+      const auto& quality = properties["quality"];
+      n += quality["n_ranges"].get<std::ptrdiff_t>() + quality["n_refused"].get<std::ptrdiff_t>();
+    }
+    return n;
+  };
+  EXPECT_LT(told(), sent) << "the last second waits for a fix";
+  ASSERT_EQ(post("/api/v1/missions/" + id + "/actions", R"({"action":"finish"})").status, 200);
+  EXPECT_EQ(told(), sent);
 }
 
 TEST_F(MissionLive, CallsAnAnchorConvergedOnlyWithinTheGoal) {

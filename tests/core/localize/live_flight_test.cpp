@@ -342,5 +342,56 @@ TEST(LiveFlight, GoesOnFromAJointSolution) {
   }
 }
 
+/// A flight that was told a lag of 0.1 s; then fixes at 0 and 1 s and a range to anchor 7 at 0.95 s, which
+/// waits.
+LiveFlight with_a_range_that_waits_for_its_lag() {
+  Mission mission;
+  mission.frame = TrackFrame::local;
+  LiveFlight live(mission, {.max_gap_s = 2, .lag_s = 0.1});
+  for (const double t_s : {0.0, 1.0}) {
+    Fix fix;
+    fix.time = UtcTime::from_seconds(1'700'000'000 + t_s);
+    fix.frame = TrackFrame::local;
+    fix.fix = FixClass::rtk_fixed;
+    fix.local_m = {t_s, 0, 10};
+    live.add(fix);
+  }
+  Range range;
+  range.time = UtcTime::from_seconds(1'700'000'000.95);
+  range.tag = NetworkId{1};
+  range.anchor = NetworkId{7};
+  range.distance_m = 12;
+  live.add(range);
+  return live;
+}
+
+TEST(LiveFlight, UsesAWaitingRangeWhenTheJointSolutionMakesTheLagSmaller) {
+  auto live = with_a_range_that_waits_for_its_lag();
+  ASSERT_TRUE(live.take_ranges().empty());
+  FlightSolution without_lag;
+  live.adopt(without_lag, {});
+  const auto told = live.take_ranges();
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_TRUE(told.front().used()) << told.front().refused;
+  EXPECT_NEAR(told.front().tag_enu_m.value().x(), 0.95, 1e-6);
+}
+
+TEST(LiveFlight, TellsWhatStillWaitsAtItsEndAndUsesItWhenTheFixComesAfterAll) {
+  auto live = with_a_range_that_waits_for_its_lag();
+  live.finish();
+  const auto told = live.take_ranges();
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told.front().refused, "outside_track");
+  Fix late;
+  late.time = UtcTime::from_seconds(1'700'000'002);
+  late.frame = TrackFrame::local;
+  late.fix = FixClass::rtk_fixed;
+  late.local_m = {2, 0, 10};
+  live.add(late);
+  const auto used = live.take_ranges();
+  ASSERT_EQ(used.size(), 1U);
+  EXPECT_TRUE(used.front().used()) << used.front().refused;
+}
+
 }  // namespace
 }  // namespace anchord
