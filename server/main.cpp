@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <cstdio>
 
 #include "server/cli/commands.hpp"
 
@@ -29,6 +30,10 @@ int main(int argc, char** argv) {
   anchord::cli::add_version_command(app, exit_code);
   anchord::cli::add_worker_command(app, exit_code);
   try {
+    if (argc < 2) {
+      std::fputs(app.help().c_str(), stderr);
+      return 2;
+    }
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     const int code = app.exit(error);

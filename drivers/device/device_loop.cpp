@@ -51,6 +51,15 @@ class Rate {
   std::int64_t second_{0};
 };
 
+/// For a device whose bytes make no frame.
+std::string unreadable(const Settings& settings, const link::Address& address) {
+  std::string out = "bytes come, but they make no frame: is it a " + settings.kind + " device";
+  if (settings.kind == "gnss") out += ", of the format that is set (auto takes any)";
+  if (address.kind == link::Kind::serial)
+    out += ", and is its rate " + std::to_string(address.baud) + " baud";
+  return out + "?";
+}
+
 /// A device is one entry; the slot is its number in the recording.
 struct Entry {
   Entry(asio::io_context& io, Settings s, link::Address a)
@@ -64,7 +73,8 @@ struct Entry {
   std::optional<std::int64_t> armed_ns{};
   std::uint64_t generation{0};  ///< of the link, so that a late report of an old one is known
   std::uint64_t device_number{0};
-  DeviceState told;  ///< counters, identity, rover
+  std::uint64_t bytes_understood{0};  ///< of this link, up to its last good frame
+  DeviceState told;                   ///< counters, identity, rover
   Rate rate;
   std::int64_t hang_up_wait_ns{0};
   std::string hang_up;
@@ -225,6 +235,7 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     if (found == entries_.end()) return;
     ++found->second.told.frames;
     found->second.told.last_heard = now_.utc;
+    if (const auto& link = found->second.link) found->second.bytes_understood = link->counters().bytes_in;
     happen(slot, {Happened::heard, now()});
   }
   void dropped(std::uint16_t slot, std::string_view reason, std::uint64_t n) override {
@@ -265,6 +276,8 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     if (entry.link) {
       out.bytes_in += entry.link->counters().bytes_in;
       out.bytes_out += entry.link->counters().bytes_out;
+      if (out.phase == Phase::silent && entry.link->counters().bytes_in > entry.bytes_understood)
+        out.reason = unreadable(entry.settings, entry.address);
     }
     return out;
   }
@@ -381,6 +394,7 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
       }
     }
     entry.link = link::make_link(io_, entry.address);
+    entry.bytes_understood = 0;
     const auto generation = ++entry.generation;
     const auto current = [weak = weak_from_this(), slot, generation]() -> std::shared_ptr<Impl> {
       auto self = weak.lock();

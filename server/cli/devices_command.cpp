@@ -3,6 +3,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "api/json/flight_requests.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/server_address.hpp"
 #include "server/http/http_client.hpp"
@@ -44,8 +45,8 @@ class Server {
     BOOST_OUTCOME_TRY(const auto answer, client_.call(method, target, body));
     auto json = Json::parse(answer.body, nullptr, false);
     if (answer.status >= 400) {
-      const auto detail = json.is_object() ? json.value("detail", answer.body) : answer.body;
-      return make_error(answer.status == 404 ? Errc::not_found : Errc::invalid_argument, detail);
+      return make_error(answer.status == 404 ? Errc::not_found : Errc::invalid_argument,
+                        api::problem_text(answer.body));
     }
     if (json.is_discarded()) json = nullptr;
     return json;
@@ -96,39 +97,33 @@ void print_device(const Json& d) {
   if (n > 0) std::printf("    not used: %s\n", dropped.dump().c_str());
 }
 
-int show(const Options& options, const Result<Json>& list, void (*print)(const Json&)) {
+int show(const Options& options, const Result<Json>& list, const char* none, void (*print)(const Json&)) {
   if (!list) return fail(list.error().message);
   if (options.json) {
     std::printf("%s\n", list.value().dump(1).c_str());
     return 0;
   }
   for (const auto& item : list.value()) print(item);
-  if (list.value().empty()) std::printf("none\n");
+  if (list.value().empty()) std::printf("%s\n", none);
   return 0;
 }
 
-int list(const Options& options, Server& server) { return show(options, configured(server), print_device); }
+int list(const Options& options, Server& server) {
+  return show(options, configured(server), "none is set up: anchord devices discover, then add",
+              print_device);
+}
 
 int discover(const Options& options, Server& server) {
   server.header("Prefer", "wait=20");
   auto found = server.call("POST", "/api/v1/discovery", "{}");
   if (!found) return fail(found.error().message);
   if (!found.value().contains("items")) return fail("the discovery takes longer than 20 s: ask again");
-  return show(options, found.value()["items"], [](const Json& d) {
+  const char* none = "no serial port that is not in use; a device of the network is added by its address";
+  return show(options, found.value()["items"], none, [](const Json& d) {
     const auto kind = text(d, "kind");
     std::printf("%-6s %s\n    %s\n", kind.empty() ? "?" : kind.c_str(), text(d, "address").c_str(),
                 text(d, "evidence").c_str());
   });
-}
-
-int add(const Options& options, Server& server) {
-  const Json body{{"kind", options.kind},
-                  {"address", options.address},
-                  {"name", options.name.empty() ? options.kind : options.name}};
-  const auto made = server.call("POST", "/api/v1/devices", body.dump());
-  if (!made) return fail(made.error().message);
-  std::printf("%s\n", text(made.value(), "id").c_str());
-  return 0;
 }
 
 /// "name=rover", "enabled=false", "address=...", everything else is an option of the kind.
@@ -150,6 +145,18 @@ Result<Json> patch_of(const std::vector<std::string>& settings) {
     }
   }
   return out;
+}
+
+int add(const Options& options, Server& server) {
+  auto body = patch_of(options.settings);
+  if (!body) return fail(body.error().message, 2);
+  body.value()["kind"] = options.kind;
+  body.value()["address"] = options.address;
+  body.value()["name"] = options.name.empty() ? options.kind : options.name;
+  const auto made = server.call("POST", "/api/v1/devices", body.value().dump());
+  if (!made) return fail(made.error().message);
+  std::printf("%s\n", text(made.value(), "id").c_str());
+  return 0;
 }
 
 int settings(const Options& options, Server& server) {
@@ -197,10 +204,13 @@ int act(const Options& options, Server& server) {
 void add_devices_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("devices", "Tags, rovers and correction services of a running server");
   auto options = std::make_shared<Options>();
-  command->add_option("--data-dir", options->data_dir, "Folder of the server")->capture_default_str();
+  command->add_option("--data-dir", options->data_dir, "Folder of the server")
+      ->capture_default_str()
+      ->envname("ANCHORD_DATA_DIR");
   command->add_option("--url", options->url, "Another server");
   command->add_flag("--json", options->json, "As the server gives it");
   command->require_subcommand(0, 1);
+  command->fallthrough();
   const auto run = [options, &exit_code](int (*what)(const Options&, Server&)) {
     auto server = Server::of(*options);
     exit_code = server ? what(*options, server.value()) : fail(server.error().message);
@@ -213,6 +223,7 @@ void add_devices_command(CLI::App& app, int& exit_code) {
   made->add_option("kind", options->kind, "gnss, pozyx or ntrip")->required();
   made->add_option("address", options->address, "serial:/dev/serial/by-id/..., tcp://host:port, ...")
       ->required();
+  made->add_option("settings", options->settings, "key=value, e.g. format=ubx, mount=RTCM3");
   made->add_option("--name", options->name, "For people");
   made->callback([run] { run(add); });
   auto* set =

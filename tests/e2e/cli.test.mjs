@@ -10,6 +10,13 @@ test('version prints the name and a version', async () => {
   const { code, stdout } = await run(['version']);
   assert.equal(code, 0);
   assert.match(stdout, /^anchord \d+\.\d+\.\d+/);
+  assert.deepEqual(await run(['--version']), { code, stdout, stderr: '' });
+});
+
+test('without a subcommand all of them are named, on stderr', async () => {
+  const { code, stdout, stderr } = await run([]);
+  assert.deepEqual([code, stdout], [2, '']);
+  for (const word of ['serve', 'devices', 'decode', 'solve']) assert.match(stderr, new RegExp(`^ +${word} `, 'm'));
 });
 
 test('an unknown subcommand ends with 2 and says something on stderr', async () => {

@@ -75,6 +75,17 @@ test('identify makes lights blink, of the tag or of an anchor, over REST and by 
   await eventually('talking as before', async () => (await device('good')).state === 'talking');
 });
 
+test('a device is set up with its settings by one command, and what is wrong with one is said', async () => {
+  const caster = await run(['devices', 'add', 'ntrip', 'tcp://127.0.0.1:1', 'mount=RTCM3', 'enabled=false', '--name', 'caster', '--data-dir', server.dataDir]);
+  assert.equal(caster.code, 0, caster.stderr);
+  const { name, enabled, options } = await get(`/api/v1/devices/${caster.stdout.trim()}`);
+  assert.deepEqual([name, enabled, options.mount], ['caster', false, 'RTCM3']);
+  assert.equal((await cli('remove', 'caster')).code, 0);
+  const lidar = await cli('add', 'lidar', 'tcp://127.0.0.1:1');
+  assert.equal(lidar.code, 1);
+  assert.match(lidar.stderr, /kind/);
+});
+
 test('a recorded flight, played again, is the same rows: known to its own server, made anew on another', async () => {
   const body = { name: 'flight', frame: 'wgs84', track_point: 'gnss_antenna' };
   const mission = (await (await server.fetch('/api/v1/missions', { json: body })).json()).id;

@@ -226,6 +226,8 @@ TEST(DeviceLoop, GarbageIsOpenButNotTalkingAndIsCounted) {
   ASSERT_TRUE(run_until(io, [&] { return loop.device("r")->phase == Phase::silent; }));
   EXPECT_EQ(loop.device("r")->frames, 0U);
   EXPECT_FALSE(loop.device("r")->dropped.empty());
+  // What to do is another thing where bytes come than where none do.
+  EXPECT_NE(loop.device("r")->reason.find("115200 baud"), std::string::npos) << loop.device("r")->reason;
 }
 
 TEST(DeviceLoop, AnswersCommandsAndSaysWhenNothingIsConnected) {
