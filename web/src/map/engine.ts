@@ -4,9 +4,10 @@ import Layer from 'ol/layer/Layer.js';
 import OlMap from 'ol/Map.js';
 import Projection from 'ol/proj/Projection.js';
 import View from 'ol/View.js';
+import { to_px, type Camera } from './camera';
 import { magnification } from './enu';
 import { read_palette, type Palette } from './palette';
-import { draw_fast, draw_slow, draw_top, to_px, type Camera, type Content } from './picture';
+import { draw_fast, draw_slow, draw_top, type Content } from './picture';
 
 export type Mode = 'fit' | 'follow' | 'free';
 export interface MapView {

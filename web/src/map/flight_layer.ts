@@ -1,6 +1,6 @@
 /// What is to be flown, under everything else: outline, fence, no-fly areas, waypoints, the planner's candidates and its choice.
+import { to_px, type Camera } from './camera';
 import type { Palette } from './palette';
-import { to_px, type Camera } from './picture';
 import { reticle, type Ctx } from './symbols';
 
 export type Point = readonly [number, number];

@@ -2,13 +2,11 @@
 import type { EstimateMsg, FixClass, Vec3 } from '../live/messages';
 import { interpolated, range_class, type Scene } from '../state/scene';
 import { accuracy, age, percent } from '../ui/format';
+import { to_px, type Camera } from './camera';
 import { round_length } from './enu';
 import { draw_flight, type FlightPicture } from './flight_layer';
 import { range_colour, status_colour, trail_style, type Palette } from './palette';
 import { anchor_symbol, drone, ellipse_at, label, reticle, type Box, type Ctx } from './symbols';
-
-export interface Camera { readonly e: number; readonly n: number; readonly px_per_m: number; readonly w: number; readonly h: number }
-export const to_px = (cam: Camera, m: Vec3 | readonly [number, number]): [number, number] => [cam.w / 2 + (m[0] - cam.e) * cam.px_per_m, cam.h / 2 - (m[1] - cam.n) * cam.px_per_m];
 
 export interface Content {
   readonly anchors: readonly EstimateMsg[];
