@@ -142,7 +142,11 @@ Result<Command> parse_command(std::string_view line) {
 
 void Lines::feed(std::string_view bytes) {
   while (!bytes.empty()) {
-    const std::size_t end = bytes.find_first_of("\r\n");
+    if (end_ == End::carriage_return && partial_.empty() && !skipping_ && bytes.front() == '\n') {
+      bytes.remove_prefix(1);
+      continue;
+    }
+    const std::size_t end = bytes.find_first_of(end_ == End::either ? "\r\n" : "\r");
     const std::string_view piece = bytes.substr(0, end);
     if (skipping_) {
       dropped_ += piece.size();

@@ -47,10 +47,15 @@ struct Command {
 Result<Command> parse_command(std::string_view line);
 std::string reply_line(ByteView data);
 
-/// Cuts a stream into lines at CR, LF or both; empty ones are left out. A line longer than k_max_line is
-/// dropped as a whole and counted, so that noise cannot make it grow.
+/// Cuts a stream into lines; empty ones are left out. A line longer than k_max_line is dropped as a whole and
+/// counted, so that noise cannot make it grow.
 class Lines {
  public:
+  /// What ends a line. A host takes CR, LF or both. A tag is told to end commands with CR alone: an LF is
+  /// borne where it stands before a command, as terminals send it after a CR, and is noise in the middle of
+  /// one.
+  enum class End : std::uint8_t { either, carriage_return };
+  explicit Lines(End end = End::either) : end_(end) {}
   void feed(std::string_view bytes);
   std::optional<std::string> next();
   void clear();
@@ -58,6 +63,7 @@ class Lines {
   std::uint64_t dropped_bytes() const { return dropped_; }
 
  private:
+  End end_;
   std::string partial_;
   std::vector<std::string> lines_;
   std::size_t at_{0};

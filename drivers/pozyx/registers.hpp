@@ -15,18 +15,20 @@ inline constexpr std::uint8_t who_am_i = 0x00, firmware = 0x01, hardware = 0x02,
                               config_leds = 0x15, pos_alg = 0x16, pos_num_anchors = 0x17, pos_interval = 0x18,
                               network_id = 0x1a, uwb_channel = 0x1c, uwb_rates = 0x1d, uwb_plen = 0x1e,
                               uwb_gain = 0x1f, xtal_trim = 0x20, range_protocol = 0x21, operation_mode = 0x22,
-                              sensors_mode = 0x23, pos_x = 0x30, pos_y = 0x34, pos_z = 0x38, sensors = 0x50,
-                              euler = 0x66, device_list_size = 0x81, rx_network_id = 0x82, rx_data_len = 0x84;
+                              sensors_mode = 0x23, pos_x = 0x30, pos_y = 0x34, pos_z = 0x38, pos_err = 0x3c,
+                              sensors = 0x50, max_lin_acc = 0x4e, euler = 0x66, temperature = 0x80,
+                              device_list_size = 0x81, rx_network_id = 0x82, rx_data_len = 0x84,
+                              blink_index = 0x89;
 }  // namespace reg
 
 namespace fn {
 inline constexpr std::uint8_t reset = 0xb0, led_ctrl = 0xb1, tx_data = 0xb2, tx_send = 0xb3, rx_data = 0xb4,
                               do_ranging = 0xb5, do_positioning = 0xb6, pos_set_anchor_ids = 0xb7,
                               pos_get_anchor_ids = 0xb8, flash_reset = 0xb9, flash_save = 0xba,
-                              flash_details = 0xbb, devices_get_ids = 0xc0, devices_discover = 0xc1,
-                              devices_calibrate = 0xc2, devices_clear = 0xc3, device_add = 0xc4,
-                              device_get_info = 0xc5, device_get_coords = 0xc6, device_get_range_info = 0xc7,
-                              cir_data = 0xc8, positioning_with_data = 0xcc;
+                              flash_details = 0xbb, do_aloha = 0xbc, devices_get_ids = 0xc0,
+                              devices_discover = 0xc1, devices_calibrate = 0xc2, devices_clear = 0xc3,
+                              device_add = 0xc4, device_get_info = 0xc5, device_get_coords = 0xc6,
+                              device_get_range_info = 0xc7, cir_data = 0xc8, positioning_with_data = 0xcc;
 }  // namespace fn
 
 /// Bits of INT_STATUS (register 05). Reading it clears it.
@@ -53,7 +55,8 @@ struct Register {
   std::string_view name;
 };
 
-/// Every register of the map, by rising address. The sensor block is one row per value.
+/// Every register of the map, by rising address. The sensor block is one row per value. 24, 26 and 89 belong
+/// to the blinking of newer firmware: only the maker's Python client names them.
 inline constexpr std::array k_registers{Register{0x00, 1, Access::read, "WHO_AM_I"},
                                         Register{0x01, 1, Access::read, "FIRMWARE_VER"},
                                         Register{0x02, 1, Access::read, "HARDWARE_VER"},
@@ -77,6 +80,8 @@ inline constexpr std::array k_registers{Register{0x00, 1, Access::read, "WHO_AM_
                                         Register{0x21, 1, Access::read_write, "RANGE_PROTOCOL"},
                                         Register{0x22, 1, Access::read_write, "OPERATION_MODE"},
                                         Register{0x23, 1, Access::read_write, "SENSORS_MODE"},
+                                        Register{0x24, 2, Access::read_write, "CONFIG_BLINK_PAYLOAD"},
+                                        Register{0x26, 1, Access::read_write, "ALOHA_VARIATION"},
                                         Register{0x27, 1, Access::read_write, "CONFIG_GPIO1"},
                                         Register{0x28, 1, Access::read_write, "CONFIG_GPIO2"},
                                         Register{0x29, 1, Access::read_write, "CONFIG_GPIO3"},
@@ -106,7 +111,8 @@ inline constexpr std::array k_registers{Register{0x00, 1, Access::read, "WHO_AM_
                                         Register{0x85, 1, Access::read_write, "GPIO1"},
                                         Register{0x86, 1, Access::read_write, "GPIO2"},
                                         Register{0x87, 1, Access::read_write, "GPIO3"},
-                                        Register{0x88, 1, Access::read_write, "GPIO4"}};
+                                        Register{0x88, 1, Access::read_write, "GPIO4"},
+                                        Register{0x89, 4, Access::read, "BLINK_INDEX"}};
 
 /// The register that holds this address, if any.
 constexpr const Register* register_at(std::uint8_t address) {

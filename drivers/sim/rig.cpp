@@ -51,11 +51,11 @@ class Unit {
 
 class TagUnit final : public Unit {
  public:
-  TagUnit(ServedDevice served, std::unique_ptr<Port> made, std::shared_ptr<const Scenario> scenario,
-          const TagSetup& setup, Whereabouts where)
-      : Unit(std::move(served), std::move(made)), tag_(std::move(scenario), setup, std::move(where)) {}
+  TagUnit(ServedDevice served, std::unique_ptr<Port> made, std::shared_ptr<PozyxAir> air,
+          const TagSetup& setup)
+      : Unit(std::move(served), std::move(made)), tag_(std::move(air), setup) {}
   void run(double now_s) override {
-    (void)port().arrived();
+    if (!port().arrived().empty()) tag_.opened();
     for (const auto& heard : port().hear()) tag_.hear(heard.bytes, now_s);
     port().send_all(tag_.speak(now_s));
   }
@@ -138,10 +138,11 @@ class Rig::Impl {
     const auto link_of = [&](const std::string& own, const std::string& name) {
       return !own.empty() || options.links_folder.empty() ? own : options.links_folder + "/" + name;
     };
+    const auto air = std::make_shared<PozyxAir>(scenario_, where);
     for (const TagSetup& tag : scenario_->tags) {
       ServedDevice served{tag.name, "pozyx", "", "", "", link_of(tag.link, tag.name)};
       auto port = make_pty(served.link);
-      units_.push_back(std::make_unique<TagUnit>(std::move(served), std::move(port), scenario_, tag, where));
+      units_.push_back(std::make_unique<TagUnit>(std::move(served), std::move(port), air, tag));
     }
     for (const RoverSetup& rover : scenario_->rovers) {
       const bool pty = rover.port == RoverPort::pty;

@@ -3,75 +3,11 @@
 #include <gtest/gtest.h>
 
 #include "drivers/pozyx/diagnostics.hpp"
-#include "drivers/pozyx/registers.hpp"
 #include "tests/drivers/pozyx/transcript.hpp"
+#include "tests/drivers/sim/pozyx_host.hpp"
 
 namespace anchord::sim {
 namespace {
-
-using namespace pozyx;
-
-/// A tag 0x6000 at the origin, anchors 0x6001..3 some 4 m away in the open; nothing is lost.
-Scenario open_field() {
-  Scenario scenario;
-  scenario.seed = 3;
-  scenario.world.anchors = {{{0x6001}, {4, 0, 0}}, {{0x6002}, {0, 4, 0}}, {{0x6003}, {-4, 0, 0}}};
-  scenario.radio.loss_chance = 0;
-  scenario.radio.zero_chance = 0;
-  scenario.path.emplace_back();
-  TagSetup tag;
-  tag.id = {0x6000};
-  tag.firmware = 0x13;
-  tag.rates = 0x80;
-  tag.plen = 0x0c;
-  tag.lever_arm_m = {0, 0, 0};
-  scenario.tags = {tag};
-  return scenario;
-}
-
-/// A host with the patience of the maker's client: one question, its answer within 100 ms.
-struct Host {
-  explicit Host(Scenario s)
-      : scenario(std::make_shared<const Scenario>(std::move(s))),
-        tag(scenario, scenario->tags.at(0),
-            [path = FlightPath(scenario->path, scenario->speed_mps, scenario->loop)](double t) {
-              return path.at(t);
-            }) {}
-
-  std::string ask(const std::string& question) {
-    tag.hear(question + "\r", now_s);
-    const auto due_s = tag.next_s();
-    if (!due_s || *due_s > now_s + 0.1) return {};
-    now_s = *due_s;
-    std::string answer = tag.speak(now_s);
-    all += answer;
-    EXPECT_TRUE(answer.ends_with("\r\n")) << answer;
-    answer.resize(answer.size() - 2);
-    return answer;
-  }
-  /// Register 05 once one of these bits is set, or 0 after a while.
-  int poll(std::uint8_t bits, double patience_s) {
-    for (const double until_s = now_s + patience_s; now_s < until_s; now_s += 0.001) {
-      const int events = parse_reply(ask("R,05,1"), 1).value()[0];
-      if (events & bits) return events;
-    }
-    return 0;
-  }
-  RangeInfo info(const std::string& id) {
-    const Bytes reply = parse_reply(ask("F,c7," + id + ",11"), 11).value();
-    return range_info(ByteView(reply).subspan(1));
-  }
-  int range(const std::string& id) {
-    ask("R,05,1");
-    EXPECT_EQ(ask("F,b5," + id + ",1"), "D,01");
-    return poll(event::func | event::err, 0.5);
-  }
-
-  std::shared_ptr<const Scenario> scenario;
-  PozyxTag tag;
-  double now_s{1.0};
-  std::string all;
-};
 
 TEST(SimulatedTag, AnswersTheConversationsOfTheProtocolDescription) {
   for (const char* name : {"local.txt", "client.txt", "remote.txt"}) {
@@ -187,12 +123,41 @@ TEST(SimulatedTag, KeepsTheAcknowledgementUntilASlowHostHasReadIt) {
   EXPECT_EQ(host.ask("R,05,1"), "D,18");
 }
 
+TEST(SimulatedTag, EndsACommandAtACarriageReturnAlone) {
+  Host host(open_field());
+  const auto said = [&](std::string_view bytes) {
+    host.tag.hear(bytes, host.now_s);
+    host.now_s += 0.01;
+    return host.tag.speak(host.now_s);
+  };
+  EXPECT_EQ(said("R,00,1\r"), "D,43\r\n");
+  EXPECT_EQ(said("R,00,1\r\nR,1a,2\r\n"), "D,43\r\nD,0060\r\n") << "CR LF, two in one write";
+  EXPECT_EQ(said("r,1A,2\r"), "D,0060\r\n");
+  EXPECT_EQ(said("R,0"), "");
+  EXPECT_EQ(said("0,1\r"), "D,43\r\n") << "a command in two pieces";
+  EXPECT_EQ(said("R,00,1\n"), "");
+  EXPECT_EQ(said("R,00,1\r"), "") << "an LF in the middle of a line is noise";
+  EXPECT_EQ(said("R,00,1\r"), "D,43\r\n");
+  EXPECT_EQ(said(std::string(5000, '#') + "\rR,00,1\r"), "D,43\r\n") << "garbage";
+}
+
+TEST(SimulatedTag, BeginsAnewWithTheNextHost) {
+  Host host(open_field());
+  host.tag.hear("R,1a,2\rR,0", host.now_s);
+  host.tag.opened();
+  EXPECT_EQ(host.tag.speak(host.now_s + 1), "") << "an answer nobody waits for any more";
+  host.now_s += 1;
+  EXPECT_EQ(host.ask("R,00,1"), "D,43");
+}
+
 TEST(SimulatedTag, GivesItsPositionWithDataOnNewerFirmwareOnly) {
   Scenario scenario = open_field();
   scenario.world.anchors.push_back({{0x6004}, {0, -4, 1}});
   Host host(scenario);
-  for (const char* id : {"0160", "0260", "0360", "0460"})
-    host.ask(std::string("F,c4,") + id + "01000000000000000000000000,1");
+  host.ask("F,c4,016001a00f00000000000000000000,1");  // (4000, 0, 0) mm and so on
+  host.ask("F,c4,02600100000000a00f000000000000,1");
+  host.ask("F,c4,03600160f0ffff0000000000000000,1");
+  host.ask("F,c4,0460010000000060f0ffffe8030000,1");
   host.ask("R,05,1");
   EXPECT_EQ(host.ask("F,b6,,1"), "D,01");
   EXPECT_NE(host.poll(event::pos | event::err, 1) & event::pos, 0);
@@ -207,9 +172,8 @@ TEST(SimulatedTag, ForgetsTheGainWithNewSettingsAndHearsNobodyWithOthers) {
   Host host(open_field());
   host.ask("W,1f,30");
   EXPECT_EQ(host.ask("R,1f,1"), "D,30");
-  host.ask("W,1c,050000");
-  host.ask("W,1d,814c");
-  EXPECT_EQ(host.ask("R,1f,1"), "D,17");
+  host.ask("W,1d,8108");
+  EXPECT_EQ(host.ask("R,1c,4"), "D,05810817");
   EXPECT_EQ(host.range("0160"), 0x01);
   host.ask("W,1d,800c");
   EXPECT_EQ(host.range("0160"), 0x10);
