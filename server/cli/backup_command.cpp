@@ -1,6 +1,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "api/json/flight_requests.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/server_address.hpp"
 #include "server/http/http_client.hpp"
@@ -37,7 +38,7 @@ std::optional<int> through_server(const Options& options) {
   client.value().set_header("Prefer", "wait=600");
   const auto answer = client.value().call("POST", "/api/v1/backups");
   if (!answer) return fail(answer.error().message);
-  if (answer.value().status >= 400) return fail(answer.value().body);
+  if (answer.value().status >= 400) return fail(api::problem_text(answer.value().body));
   std::printf("%s\n", answer.value().body.c_str());
   return 0;
 }

@@ -1,6 +1,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "api/json/flight_requests.hpp"
 #include "api/services/access.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/server_address.hpp"
@@ -47,7 +48,7 @@ int through_server(const Options& options, const std::string& url, std::string_v
   if (!token.empty()) client.value().set_header("Authorization", "Bearer " + token);
   const auto answer = client.value().call(method, target, body);
   if (!answer) return fail(answer.error().message);
-  if (answer.value().status >= 400) return fail(answer.value().body);
+  if (answer.value().status >= 400) return fail(api::problem_text(answer.value().body));
   if (!answer.value().body.empty()) std::printf("%s\n", answer.value().body.c_str());
   return 0;
 }

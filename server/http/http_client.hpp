@@ -2,10 +2,9 @@
 
 #include <chrono>
 #include <map>
+#include <memory>
 #include <string>
 #include <string_view>
-#include <utility>
-#include <vector>
 
 #include "core/base/result.hpp"
 
@@ -17,12 +16,12 @@ struct ClientResponse {
   std::string body;
 };
 
-/// A small blocking HTTP/1.1 client for our own commands (health check, replay, token): one connection, kept
-/// alive, reopened once when the server had closed it. Plain http only; no redirects, no proxies. One thread
-/// at a time.
+/// A blocking HTTP client for our own commands and tests: one connection, kept alive. No redirects, no
+/// proxies. One thread at a time.
 class HttpClient {
  public:
-  /// "http://127.0.0.1:8420". Errors: invalid_argument.
+  /// "http://127.0.0.1:8420" or "https://host/prefix"; targets of call() come after the prefix.
+  /// Errors: invalid_argument.
   static Result<HttpClient> to(std::string_view url,
                                std::chrono::milliseconds timeout = std::chrono::seconds(30));
   ~HttpClient();
@@ -30,23 +29,16 @@ class HttpClient {
   HttpClient& operator=(HttpClient&&) = delete;
 
   /// Header sent with every call, e.g. "Authorization".
-  void set_header(std::string name, std::string value);
+  void set_header(const std::string& name, const std::string& value);
   /// Any status is an answer. Errors: link_lost (no connection, time-out, not HTTP).
   Result<ClientResponse> call(std::string_view method, std::string_view target, std::string_view body = {},
-                              std::string_view content_type = "application/json");
+                              std::string_view content_type = "application/json",
+                              const std::map<std::string, std::string>& headers = {});
 
  private:
-  HttpClient() = default;
-  Result<void> connect();
-  void close();
-  Result<ClientResponse> exchange(const std::string& request);
-  Result<void> fill();
-
-  std::string host_, port_;
-  std::chrono::milliseconds timeout_{};
-  std::vector<std::pair<std::string, std::string>> headers_;
-  int fd_{-1};
-  std::string input_;
+  struct State;
+  explicit HttpClient(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
 };
 
 }  // namespace anchord::server
