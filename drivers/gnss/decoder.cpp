@@ -2,17 +2,20 @@
 
 namespace anchord::gnss {
 
-Decoder::Decoder(const DecoderOptions& options) : framer_(options.only, skips_), nmea_(options.gst_order) {
+Decoder::Decoder(const DecoderOptions& options)
+    : framer_(options.only, skips_), nmea_(options.gst_order), llh_(options.llh_time) {
   if (options.reference) nmea_.set_reference(*options.reference);
 }
 
 void Decoder::feed(std::string_view bytes, Epochs& out) {
+  fed_ += bytes.size();
   framer_.feed(bytes, [&](const Frame& frame) { take(frame, out); });
 }
 
 void Decoder::finish(Epochs& out) {
   framer_.finish([&](const Frame& frame) { take(frame, out); });
   ubx_.finish(out);
+  count_without_pvt(fed_);
   erb_.finish(out);
   gpsd_.finish(out);
   if (!out.empty() && out.back().time && out.back().protocol != Protocol::nmea)
@@ -40,34 +43,65 @@ void Decoder::take_binary(const Parsed& parsed, Assembler& assembler, const Fram
 }
 
 void Decoder::take(const Frame& frame, Epochs& out) {
-  ++frames_[static_cast<std::size_t>(frame.protocol)];
   switch (frame.protocol) {
-    case Protocol::nmea: {
-      const auto message = nmea::parse(frame.bytes);
-      if (!message) return skips_.count("nmea: field not readable", frame.offset, frame.bytes);
-      if (!nmea_.add(message.value(), out)) skips_.count("nmea: same time again", frame.offset, frame.bytes);
-      return;
-    }
+    case Protocol::nmea:
+      return take_nmea(frame, out);
     case Protocol::ubx:
-      return take_binary(ubx::parse(frame.bytes), ubx_, frame, "ubx: payload not readable", out);
+      good(frame);
+      take_binary(ubx::parse(frame.bytes), ubx_, frame, "ubx: payload not readable", out);
+      return count_without_pvt(frame.offset);
     case Protocol::erb:
+      good(frame);
       return take_binary(erb::parse(frame.bytes), erb_, frame, "erb: payload not readable", out);
-    case Protocol::llh: {
-      auto epoch = llh_.line(frame.bytes);
-      if (!epoch) {
-        const bool form = epoch.error().code == Errc::unsupported;
-        return skips_.count(form ? "llh: ECEF or baseline form" : "llh: line not readable", frame.offset,
-                            frame.bytes);
-      }
-      if (epoch.value()) out.push_back(*epoch.value());
-      return;
-    }
+    case Protocol::llh:
+      return take_llh(frame, out);
     case Protocol::gpsd:
-      if (const auto done = gpsd_.line(frame.bytes, out); !done) {
-        skips_.count("gpsd: line not readable", frame.offset, frame.bytes);
-      }
-      return;
+      return take_gpsd(frame, out);
   }
+}
+
+/// The first of its kind is told whole: what is wrong, and the text of it.
+void Decoder::skip(std::string_view reason, const Frame& frame, const Error& why) {
+  const bool first = skips_[reason] == 0;
+  skips_.count(reason, frame.offset, first ? why.message + ": " + std::string(frame.bytes) : std::string());
+}
+
+void Decoder::take_nmea(const Frame& frame, Epochs& out) {
+  good(frame);
+  const auto message = nmea::parse(frame.bytes);
+  if (!message) return skip("nmea: field not readable", frame, message.error());
+  const auto* gns = std::get_if<nmea::Gns>(&message.value());
+  const auto* gga = gns ? gns : std::get_if<nmea::Gga>(&message.value());
+  if (gga && gga->quality.value_or(0) > 5) {
+    skips_.count("nmea: quality 6 to 9, dead reckoning or not measured", frame.offset, frame.bytes);
+  }
+  if (!nmea_.add(message.value(), out)) skips_.count("nmea: same time again", frame.offset, frame.bytes);
+}
+
+void Decoder::take_llh(const Frame& frame, Epochs& out) {
+  auto epoch = llh_.line(frame.bytes);
+  if (!epoch) {
+    const bool form = epoch.error().code == Errc::unsupported;
+    return skip(form ? "llh: no WGS84 position" : "llh: line not readable", frame, epoch.error());
+  }
+  good(frame);
+  if (epoch.value()) out.push_back(*epoch.value());
+}
+
+void Decoder::take_gpsd(const Frame& frame, Epochs& out) {
+  const auto done = gpsd_.line(frame.bytes, out);
+  if (!done) {
+    const bool timeless = done.error().code == Errc::unsupported;
+    return skip(timeless ? "gpsd: position without a time" : "gpsd: line not readable", frame, done.error());
+  }
+  good(frame);
+}
+
+void Decoder::count_without_pvt(std::uint64_t offset) {
+  const auto now = ubx_.without_pvt();
+  if (now > without_pvt_)
+    skips_.count("ubx: position without NAV-PVT, which tells the fix", offset, {}, now - without_pvt_);
+  without_pvt_ = now;
 }
 
 }  // namespace anchord::gnss

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string_view>
 
+#include "core/base/result.hpp"
 #include "drivers/gnss/epoch.hpp"
 #include "drivers/gnss/erb.hpp"
 #include "drivers/gnss/framer.hpp"
@@ -18,6 +19,7 @@ struct DecoderOptions {
   std::optional<Protocol> only{};  ///< absent: every format the stream holds
   nmea::GstOrder gst_order{nmea::GstOrder::larger_for_both};
   std::optional<UtcTime> reference{};  ///< some instant of the stream, for NMEA that never says the date
+  llh::TimeSystem llh_time{llh::TimeSystem::utc};  ///< of LLH lines that no header came before
 };
 
 /// Bytes of a receiver in, epochs out, whatever it speaks and however the bytes are cut. No clock, no port,
@@ -38,11 +40,19 @@ class Decoder {
   void set_reference(UtcTime time) { nmea_.set_reference(time); }
 
   const Skips& skips() const { return skips_; }
-  /// Good frames of a format so far.
+  /// Good frames of a format so far; of those without a checksum, the lines that could be read.
   std::uint64_t frames(Protocol protocol) const { return frames_[static_cast<std::size_t>(protocol)]; }
+  /// LLH epochs whose time is of DecoderOptions::llh_time, because no header named another.
+  std::uint64_t llh_time_assumed() const { return llh_.time_assumed(); }
 
  private:
   void take(const Frame& frame, Epochs& out);
+  void take_nmea(const Frame& frame, Epochs& out);
+  void take_llh(const Frame& frame, Epochs& out);
+  void take_gpsd(const Frame& frame, Epochs& out);
+  void count_without_pvt(std::uint64_t offset);
+  void skip(std::string_view reason, const Frame& frame, const Error& why);
+  void good(const Frame& frame) { ++frames_[static_cast<std::size_t>(frame.protocol)]; }
   template <class Parsed, class Assembler>
   void take_binary(const Parsed& parsed, Assembler& assembler, const Frame& frame, const char* reason,
                    Epochs& out);
@@ -50,6 +60,7 @@ class Decoder {
   Skips skips_;
   Framer framer_;
   std::array<std::uint64_t, 5> frames_{};
+  std::uint64_t without_pvt_{0}, fed_{0};
   nmea::Assembler nmea_;
   ubx::Assembler ubx_;
   erb::Assembler erb_;

@@ -40,7 +40,7 @@ void Skips::count(std::string_view reason, std::uint64_t offset, std::string_vie
   auto it = entries_.find(reason);
   if (it == entries_.end()) {
     Entry entry{0, offset, {}};
-    for (const char c : bytes.substr(0, 80)) entry.example += c >= 0x20 && c < 0x7f ? c : '.';
+    for (const char c : bytes.substr(0, 160)) entry.example += c >= 0x20 && c < 0x7f ? c : '.';
     it = entries_.emplace(std::string(reason), std::move(entry)).first;
   }
   it->second.count += n;

@@ -45,7 +45,7 @@ class Skips {
   struct Entry {
     std::uint64_t count{};
     std::uint64_t first_offset{};  ///< of the stream, bytes
-    std::string example;           ///< at most 80 printable characters of the first one
+    std::string example;           ///< at most 160 printable characters of the first one
   };
   void count(std::string_view reason, std::uint64_t offset, std::string_view bytes = {}, std::uint64_t n = 1);
   const std::map<std::string, Entry, std::less<>>& entries() const { return entries_; }

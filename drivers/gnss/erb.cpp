@@ -31,6 +31,9 @@ Result<Message> parse_position(std::string_view p) {
   out.acc_3d_m = std::hypot(read_le<std::uint32_t>(p, 36), read_le<std::uint32_t>(p, 40)) * 1e-3;
   // Comparisons are false for NaN, so it ends here too.
   if (!(std::abs(out.lat_deg) <= 90) || !(std::abs(out.lon_deg) <= 180)) return bad("POS", "off the globe");
+  // What Reach sends before its first solution: the ECEF origin, a finite number that is no position.
+  constexpr double k_below_ground_m = -6e6;
+  if (out.height_m < k_below_ground_m) return Message(Other{});
   if (!(std::abs(out.height_m) < 1e5) || !(std::abs(out.msl_m) < 1e5))
     return bad("POS", "height not believable");
   return Message(out);
@@ -122,7 +125,8 @@ void Assembler::publish(Epochs& out) {
   if (!group.status) return;  // neither week nor fix: nothing to say about this time
   Epoch epoch;
   epoch.protocol = Protocol::erb;
-  if (group.tow_ms < k_week_ms && group.status->gps_week > 0) {
+  // Before it knows the time Reach sends tow 0 of a week like 65014.
+  if (group.tow_ms < k_week_ms && group.status->gps_week > 0 && group.status->gps_week <= k_last_gps_week) {
     epoch.time =
         utc_from_gps_week(group.status->gps_week, static_cast<std::int64_t>(group.tow_ms) * 1'000'000);
   }

@@ -1,6 +1,7 @@
 #include "drivers/gnss/framer.hpp"
 
 #include <algorithm>
+#include <array>
 
 namespace anchord::gnss {
 namespace {
@@ -31,6 +32,36 @@ int hex_digit(char c) {
 bool printable(char c) { return c >= 0x20 && c < 0x7f; }
 bool digit(char c) { return c >= '0' && c <= '9'; }
 
+/// CRC-24Q of RTCM 10403.3 section 4.2, as a table for the bytes.
+constexpr std::array<std::uint32_t, 256> crc24q_table() {
+  std::array<std::uint32_t, 256> table{};
+  for (std::uint32_t i = 0; i < table.size(); ++i) {
+    std::uint32_t crc = i << 16;
+    for (int bit = 0; bit < 8; ++bit) crc = (crc << 1) ^ ((crc & 0x800000U) != 0 ? 0x1864CFBU : 0U);
+    table[i] = crc & 0xffffffU;
+  }
+  return table;
+}
+
+std::uint32_t crc24q(std::string_view bytes) {
+  static constexpr auto k_table = crc24q_table();
+  std::uint32_t crc = 0;
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    crc = ((crc << 8) ^ k_table[((crc >> 16) ^ byte(bytes, i)) & 0xffU]) & 0xffffffU;
+  }
+  return crc;
+}
+
+enum class Start : std::uint8_t { no, maybe, yes };
+/// Whether the stream goes on with these bytes; maybe: so far, and more must come to know.
+Start starts_with(std::string_view rest, std::string_view with) {
+  if (rest.substr(0, with.size()) == with) return Start::yes;
+  return rest.size() < with.size() && with.substr(0, rest.size()) == rest ? Start::maybe : Start::no;
+}
+
+// Windows editors put it before a text. It is part of no line, and no noise.
+constexpr std::string_view k_byte_order_mark = "\xef\xbb\xbf";
+
 }  // namespace
 
 void Framer::feed(std::string_view bytes, const Sink& sink) {
@@ -57,9 +88,11 @@ void Framer::drain(const Sink& sink, bool final) {
       line_start_ = true;
     } else {
       if (s.reason != nullptr) skips_.count(s.reason, offset_ + at, rest.substr(0, 80));
-      // Blanks before a line are part of neither it nor anything else.
+      // Blanks before a line are part of neither it nor anything else. Longer than a byte are only whole
+      // things: a comment, a correction, a mark.
       const char last = rest[s.length - 1];
-      line_start_ = last == '\n' || last == '\r' || (line_start_ && (last == ' ' || last == '\t'));
+      const bool blank = last == ' ' || last == '\t';
+      line_start_ = s.length > 1 || last == '\n' || last == '\r' || (line_start_ && blank);
     }
     at += s.length;
   }
@@ -75,8 +108,25 @@ Framer::Step Framer::step(std::string_view rest, bool final) const {
     if (s.kind != Step::Kind::skip || s.reason != nullptr) return s;
   }
   if (looks_for(Protocol::nmea) && c == '$') return nmea(rest, final);
+  if (!only_ && byte(rest, 0) == 0xd3) {
+    const Step s = rtcm3(rest, final);
+    if (s.kind != Step::Kind::skip || s.reason != nullptr) return s;
+  }
+  return text(rest, final);
+}
+
+Framer::Step Framer::text(std::string_view rest, bool final) const {
+  const char c = rest[0];
+  if (looks_for(Protocol::gpsd) && c == '{') {
+    // Behind a logger's own time (gpspipe -t) it must look like a report, since a brace is nothing rare.
+    const Start report = line_start_ ? Start::yes : starts_with(rest, R"({"class":")");
+    if (report == Start::yes) return line(rest, final, Protocol::gpsd, k_max_gpsd);
+    if (report == Start::maybe && !final) return {};
+  }
   if (line_start_) {
-    if (looks_for(Protocol::gpsd) && c == '{') return line(rest, final, Protocol::gpsd, k_max_gpsd);
+    const Start mark = starts_with(rest, k_byte_order_mark);
+    if (mark == Start::yes) return {Step::Kind::skip, k_byte_order_mark.size(), {}, nullptr};
+    if (mark == Start::maybe && !final) return {};
     if (looks_for(Protocol::llh) && (digit(c) || c == '%'))
       return line(rest, final, Protocol::llh, k_max_llh);
     if (looks_for(Protocol::llh) && c == '#') {
@@ -129,6 +179,18 @@ Framer::Step Framer::erb(std::string_view rest, bool final) const {
     return {Step::Kind::skip, 1, {}, "erb: checksum wrong"};
   }
   return {Step::Kind::frame, whole, {Protocol::erb, rest.substr(0, whole), 0}, nullptr};
+}
+
+/// Preamble d3, six bits 0, ten bits of length, message, CRC-24Q (RTCM 10403.3 section 4).
+Framer::Step Framer::rtcm3(std::string_view rest, bool final) const {
+  const Step not_rtcm{Step::Kind::skip, 1, {}, nullptr};
+  const Step wait = final ? not_rtcm : Step{};
+  if (rest.size() < 3) return wait;
+  if ((byte(rest, 1) & 0xfcU) != 0) return not_rtcm;
+  const std::size_t whole = 6 + (byte(rest, 2) | static_cast<std::size_t>(byte(rest, 1)) << 8);
+  if (rest.size() < whole) return wait;
+  if (crc24q(rest.substr(0, whole)) != 0) return not_rtcm;  // over its own CRC the remainder is 0
+  return {Step::Kind::skip, whole, {}, "rtcm3: corrections, no position"};
 }
 
 Framer::Step Framer::nmea(std::string_view rest, bool final) const {

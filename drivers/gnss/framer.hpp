@@ -25,7 +25,8 @@ inline constexpr std::size_t k_max_nmea = 256, k_max_ubx_payload = 8192, k_max_e
 ///
 /// A frame that turns out wrong costs its first byte only: what follows inside it is searched again, so noise
 /// that looks like a header swallows nothing. Memory: at most one longest frame and the chunk being fed. Text
-/// lines without a checksum (LLH) count only when their end was seen.
+/// lines without a checksum (LLH) count only when their end was seen. RTCM 3 (corrections on the same wire)
+/// is recognised where every format is looked for, and counted as such.
 class Framer {
  public:
   using Sink = std::function<void(const Frame&)>;
@@ -47,6 +48,8 @@ class Framer {
   Step step(std::string_view rest, bool final) const;
   Step ubx(std::string_view rest, bool final) const;
   Step erb(std::string_view rest, bool final) const;
+  Step rtcm3(std::string_view rest, bool final) const;
+  Step text(std::string_view rest, bool final) const;
   Step nmea(std::string_view rest, bool final) const;
   Step line(std::string_view rest, bool final, Protocol protocol, std::size_t limit) const;
   bool looks_for(Protocol protocol) const { return !only_ || *only_ == protocol; }

@@ -49,9 +49,13 @@ int gps_minus_utc_s(std::int64_t gps_ns) {
 
 UtcTime utc_from_gps(std::int64_t gps_ns) { return {gps_ns - gps_minus_utc_s(gps_ns) * k_second_ns}; }
 
-UtcTime utc_from_gps_week(int week, std::int64_t ns_of_week) {
+std::int64_t gps_week_ns(int week, std::int64_t ns_of_week) {
   const std::int64_t full_week = week < 1024 ? week + 2048 : week;
-  return utc_from_gps((k_gps_epoch_s + full_week * 604'800) * k_second_ns + ns_of_week);
+  return (k_gps_epoch_s + full_week * 604'800) * k_second_ns + ns_of_week;
+}
+
+UtcTime utc_from_gps_week(int week, std::int64_t ns_of_week) {
+  return utc_from_gps(gps_week_ns(week, ns_of_week));
 }
 
 UtcTime nearest_time_of_day(UtcTime reference, std::int64_t tod_ns) {

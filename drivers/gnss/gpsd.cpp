@@ -43,8 +43,9 @@ FixClass fix_of(int mode, std::optional<int> status) {
     case 4:
       return FixClass::rtk_float;
     case 5:
+    case 7:
     case 8:
-      return FixClass::none;  // dead reckoning, simulated
+      return FixClass::none;  // dead reckoning, surveyed or typed in, simulated: nothing was measured
     default:
       return FixClass::single;
   }
@@ -62,33 +63,85 @@ bool too_deep(std::string_view text) {
   return deepest > 16;
 }
 
-}  // namespace
-
-void Assembler::publish(Epochs& out) {
-  if (!current_) return;
-  current_->satellites = satellites_;
-  current_->hdop = hdop_;
-  published_ = current_->time;
-  out.push_back(*std::exchange(current_, std::nullopt));
+/// Satellites in use: uSat, or counted where the server (before 3.21) has none.
+std::optional<int> satellites_of(const Json& sky) {
+  if (const auto used = small_integer(sky, "uSat")) return used;
+  const auto list = sky.find("satellites");
+  if (list == sky.end() || !list->is_array()) return std::nullopt;
+  return static_cast<int>(std::count_if(list->begin(), list->end(), [](const Json& satellite) {
+    const auto used = satellite.find("used");  // end() too where it is no object
+    return used != satellite.end() && used->is_boolean() && used->get<bool>();
+  }));
 }
 
-void Assembler::merge(const Epoch& report, Epochs& out) {
-  if (current_ && current_->time != report.time) publish(out);
-  if (!current_) {
-    if (published_ == report.time) return;  // a late TPV of an epoch already out
-    current_ = report;
+/// A TPV as an epoch. errors: bad_frame (no mode, off the globe).
+Result<Epoch> report_of(const Json& tpv) {
+  const auto mode = small_integer(tpv, "mode");
+  if (!mode) return bad("TPV without mode");
+  Epoch out;
+  out.protocol = Protocol::gpsd;
+  out.fix = fix_of(*mode, small_integer(tpv, "status"));
+  if (out.fix == FixClass::none) return out;
+  out.lat_deg = number(tpv, "lat");
+  out.lon_deg = number(tpv, "lon");
+  if (!out.lat_deg || !out.lon_deg) {  // some sentences have told the mode before the position
+    out.lat_deg = out.lon_deg = std::nullopt;
+    out.fix = FixClass::none;
+    return out;
+  }
+  if (std::abs(*out.lat_deg) > 90 || std::abs(*out.lon_deg) > 180)
+    return bad("TPV with a position off the globe");
+  out.height_ellipsoid_m = number(tpv, "altHAE");  // never "alt": it was either height, by version
+  out.height_msl_m = number(tpv, "altMSL");
+  out.age_s = number(tpv, "dgpsAge");
+  return out;
+}
+
+}  // namespace
+
+void Assembler::Device::publish(Epochs& out) {
+  if (!current) return;
+  current->satellites = satellites;
+  current->hdop = hdop;
+  published = current->time;
+  out.push_back(*std::exchange(current, std::nullopt));
+}
+
+void Assembler::Device::merge(const Epoch& report, Epochs& out) {
+  if (current && current->time != report.time) publish(out);
+  if (!current) {
+    if (published == report.time) return;  // a late TPV of an epoch already out
+    current = report;
     return;
   }
   // One TPV per sentence: the first may lack height or status. The most complete one wins field by field.
-  if (report.fix > current_->fix) current_->fix = report.fix;
+  if (report.fix > current->fix) current->fix = report.fix;
   const auto take = [](std::optional<double>& to, const std::optional<double>& from) {
     if (from) to = from;
   };
-  take(current_->lat_deg, report.lat_deg);
-  take(current_->lon_deg, report.lon_deg);
-  take(current_->height_ellipsoid_m, report.height_ellipsoid_m);
-  take(current_->height_msl_m, report.height_msl_m);
-  take(current_->age_s, report.age_s);
+  take(current->lat_deg, report.lat_deg);
+  take(current->lon_deg, report.lon_deg);
+  take(current->height_ellipsoid_m, report.height_ellipsoid_m);
+  take(current->height_msl_m, report.height_msl_m);
+  take(current->age_s, report.age_s);
+}
+
+void Assembler::finish(Epochs& out) {
+  for (auto& [path, device] : devices_) device.publish(out);
+}
+
+Result<Assembler::Device*> Assembler::device_of(std::optional<std::string> path) {
+  constexpr std::size_t k_max_devices = 16;
+  if (path) {
+    last_ = std::move(*path);
+    if (auto unnamed = devices_.extract(""); !unnamed.empty()) {
+      unnamed.key() = last_;
+      devices_.insert(std::move(unnamed));
+    }
+  }
+  if (devices_.size() >= k_max_devices && devices_.find(last_) == devices_.end())
+    return bad("more than 16 devices");
+  return &devices_[last_];
 }
 
 Result<void> Assembler::line(std::string_view text, Epochs& out) {
@@ -98,44 +151,35 @@ Result<void> Assembler::line(std::string_view text, Epochs& out) {
   const auto name = json.find("class");
   if (name == json.end() || !name->is_string()) return bad("no class");
   const auto& kind = name->get_ref<const std::string&>();
+  if (kind != "TPV" && kind != "GST" && kind != "SKY") return boost::outcome_v2::success();
 
+  const auto at = json.find("device");
+  const bool named = at != json.end() && at->is_string();
+  BOOST_OUTCOME_TRY(auto* known, device_of(named ? std::optional(at->get<std::string>()) : std::nullopt));
+  Device& device = *known;
   if (kind == "SKY") {
-    hdop_ = number(json, "hdop");
-    if (const auto used = small_integer(json, "uSat")) satellites_ = used;
+    // Servers since 3.23 tell the DOPs and the satellites in reports of their own.
+    if (const auto hdop = number(json, "hdop")) device.hdop = hdop;
+    if (const auto satellites = satellites_of(json)) device.satellites = satellites;
     return boost::outcome_v2::success();
   }
-  if (kind != "TPV" && kind != "GST") return boost::outcome_v2::success();
   const auto time = time_of(json);
-  if (!time) return boost::outcome_v2::success();  // no fix yet, or a position without a date: of no use
-
   if (kind == "TPV") {
-    const auto mode = small_integer(json, "mode");
-    if (!mode) return bad("TPV without mode");
-    Epoch report;
-    report.protocol = Protocol::gpsd;
+    BOOST_OUTCOME_TRY(auto report, report_of(json));
     report.time = time;
-    report.fix = fix_of(*mode, small_integer(json, "status"));
-    if (report.fix != FixClass::none) {
-      report.lat_deg = number(json, "lat");
-      report.lon_deg = number(json, "lon");
-      report.height_ellipsoid_m = number(json, "altHAE");  // never "alt": it was either height, by version
-      report.height_msl_m = number(json, "altMSL");
-      report.age_s = number(json, "dgpsAge");
-      if (!report.lat_deg || !report.lon_deg || std::abs(*report.lat_deg) > 90 ||
-          std::abs(*report.lon_deg) > 180) {
-        return bad("TPV without a position on the globe");
-      }
-    }
-    merge(report, out);
+    if (!time && report.fix == FixClass::none) return boost::outcome_v2::success();  // nothing yet
+    if (!time) return make_error(Errc::unsupported, "time absent or not readable");
+    device.merge(report, out);
     return boost::outcome_v2::success();
   }
 
-  if (current_ && current_->time == time && current_->fix != FixClass::none) {
+  auto& current = device.current;
+  if (time && current && current->time == time && current->fix != FixClass::none) {
     const auto lat = number(json, "lat"), lon = number(json, "lon"), alt = number(json, "alt");
     // gpsd passes a producer's swapped axes through, so the larger serves for both (see nmea.hpp, GstOrder).
-    if (lat && lon && *lat > 0 && *lon > 0) current_->sigma_e_m = current_->sigma_n_m = std::max(*lat, *lon);
-    if (alt && *alt > 0) current_->sigma_u_m = alt;
-    publish(out);
+    if (lat && lon && *lat > 0 && *lon > 0) current->sigma_e_m = current->sigma_n_m = std::max(*lat, *lon);
+    if (alt && *alt > 0) current->sigma_u_m = alt;
+    device.publish(out);
   }
   return boost::outcome_v2::success();
 }

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <map>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "core/base/result.hpp"
@@ -9,23 +11,31 @@
 namespace anchord::gnss::gpsd {
 
 /// Reports of a gpsd (protocol 3), one JSON object per line. Several TPV of one time are merged; published
-/// with the GST of that time or when the next time begins. eph and its sisters are not used: with NMEA
-/// receivers they are HDOP times a constant, metres where RTK has centimetres. Not thread-safe.
+/// with the GST of that time or when the next time begins. Each of a gpsd's devices is its own receiver:
+/// their reports are never mixed. eph and its sisters are not used: with NMEA receivers they are HDOP times a
+/// constant, metres where RTK has centimetres. Not thread-safe.
 class Assembler {
  public:
-  /// errors: bad_frame (not JSON, not an object, value out of its domain). Unknown classes and fields are
-  /// fine.
+  /// errors: bad_frame (not JSON, not an object, value out of its domain, one device more than the 16 that
+  /// are told apart), unsupported (a position without a time). Unknown classes and fields are fine.
   Result<void> line(std::string_view text, Epochs& out);
-  void finish(Epochs& out) { publish(out); }
+  void finish(Epochs& out);
 
  private:
-  void merge(const Epoch& report, Epochs& out);
-  void publish(Epochs& out);
+  struct Device {
+    std::optional<Epoch> current;
+    std::optional<UtcTime> published;
+    std::optional<int> satellites;
+    std::optional<double> hdop;
 
-  std::optional<Epoch> current_;
-  std::optional<UtcTime> published_;
-  std::optional<int> satellites_;
-  std::optional<double> hdop_;
+    void merge(const Epoch& report, Epochs& out);
+    void publish(Epochs& out);
+  };
+  /// Whose report it is; one without a name is of the device named last, or of the first one to be named.
+  Result<Device*> device_of(std::optional<std::string> path);
+
+  std::map<std::string, Device, std::less<>> devices_;  ///< by path
+  std::string last_;
 };
 
 }  // namespace anchord::gnss::gpsd

@@ -62,6 +62,12 @@ std::optional<Eigen::Matrix3d> covariance_enu(const std::vector<double>& v, std:
   return out;
 }
 
+/// A count: tools that rewrite such files print "1.0000000" too.
+std::optional<int> whole(double value) {
+  if (!(value >= 0 && value <= 1000) || value != std::floor(value)) return std::nullopt;
+  return static_cast<int>(value);
+}
+
 /// Degrees, minutes, seconds in three columns; the sign is that of the degrees, "-0" included.
 std::optional<double> from_dms(std::string_view degrees_text, double degrees, double minutes,
                                double seconds) {
@@ -76,10 +82,12 @@ void Decoder::header(std::string_view text) {
   const auto has = [&](std::string_view word) { return text.find(word) != std::string_view::npos; };
   if (has("geodetic")) geodetic_height_ = true;
   if (has("ellipsoidal")) geodetic_height_ = false;
-  const bool columns = has("Q") && has("ns") && has("ratio");
-  if (!columns) return;
-  other_form_ = has("x-ecef") || has("e-baseline") || has("x/y/z");
-  const auto words = split(text.substr(1), " \t", true);
+  if (has("lat/lon/height=")) other_datum_ = !has("lat/lon/height=WGS84");
+  // The line that names the columns, whichever of them there are.
+  const bool position = has("latitude("), other = has("x-ecef") || has("e-baseline");
+  if (!position && !other) return;
+  other_form_ = other;
+  const auto words = split(text.substr(1), " \t,;", true);
   if (words.empty()) return;
   if (words[0] == "GPST")
     system_ = TimeSystem::gpst;
@@ -89,15 +97,43 @@ void Decoder::header(std::string_view text) {
     system_ = TimeSystem::utc;
 }
 
+/// Two columns: date and time of day, or GPS week and seconds of it. RTKLIB shifts both forms to the system
+/// it names, though its own reader takes the second one for GPS time always.
+Result<UtcTime> Decoder::time_of(std::string_view first, std::string_view second) {
+  const bool calendar = first.find('/') != std::string_view::npos;
+  std::optional<std::int64_t> ns;
+  if (calendar) {
+    ns = calendar_ns(first, second);
+  } else {
+    const auto week = to_integer(first);
+    const auto seconds = to_seconds(second);
+    if (week && *week <= k_last_gps_week && seconds && seconds->whole <= 604'800) {
+      ns = gps_week_ns(*week, seconds->whole * k_second_ns + seconds->fraction_ns);
+    }
+  }
+  if (!ns) return bad("time '" + std::string(first) + " " + std::string(second) + "' does not exist");
+  if (!system_ && calendar) ++time_assumed_;
+  switch (system_.value_or(calendar ? unnamed_ : TimeSystem::gpst)) {
+    case TimeSystem::gpst:
+      return utc_from_gps(*ns);
+    case TimeSystem::jst:
+      return UtcTime{*ns - 9 * 3600 * k_second_ns};
+    case TimeSystem::utc:
+      break;
+  }
+  return UtcTime{*ns};
+}
+
 Result<std::optional<Epoch>> Decoder::line(std::string_view text) {
   if (text.empty()) return std::optional<Epoch>{};
   if (text.front() == '%') {
     header(text);
     return std::optional<Epoch>{};
   }
-  if (other_form_) return make_error(Errc::unsupported, "ECEF or baseline columns: write LLH instead");
+  if (other_form_)
+    return make_error(Errc::unsupported, "ECEF or baseline columns, write latitude and longitude instead");
+  if (other_datum_) return make_error(Errc::unsupported, "datum is not WGS84");
   const auto words = split(text, " \t,;", true);
-  const bool calendar = !words.empty() && words[0].find('/') != std::string_view::npos;
   const std::size_t first = 2;  // after the time, which always has two columns
   if (words.size() < first + 13) {
     return bad(std::to_string(words.size()) + " columns, an LLH line has at least 15");
@@ -112,26 +148,6 @@ Result<std::optional<Epoch>> Decoder::line(std::string_view text) {
 
   Epoch out;
   out.protocol = Protocol::llh;
-  std::optional<std::int64_t> ns;
-  bool gps_time = system_ == TimeSystem::gpst;
-  if (calendar) {
-    ns = calendar_ns(words[0], words[1]);
-  } else {
-    const auto week = to_integer(words[0]);
-    const auto seconds = to_seconds(words[1]);
-    if (week && *week < 10'000 && seconds && seconds->whole < 604'800) {
-      out.time = utc_from_gps_week(*week, seconds->whole * k_second_ns + seconds->fraction_ns);
-    }
-  }
-  if (ns && gps_time)
-    out.time = utc_from_gps(*ns);
-  else if (ns && system_ == TimeSystem::jst)
-    out.time = UtcTime{*ns - 9 * 3600 * k_second_ns};
-  else if (ns)
-    out.time = UtcTime{*ns};
-  if (!out.time)
-    return bad("time '" + std::string(words[0]) + " " + std::string(words[1]) + "' does not exist");
-
   // Decimal degrees, or degrees minutes seconds twice: four columns more.
   const bool dms = v.size() == 17 || v.size() == 26;
   const std::size_t at = dms ? 6 : 2;  // index of the height in v
@@ -143,11 +159,13 @@ Result<std::optional<Epoch>> Decoder::line(std::string_view text) {
   if (!lat || !lon || std::abs(*lat) > 90 || std::abs(*lon) > 180)
     return bad("latitude or longitude off the globe");
   if (std::abs(v[at]) > 1e5) return bad("height not believable");
-  const auto q = to_integer(words[first + at + 1]), satellites = to_integer(words[first + at + 2]);
+  const auto q = whole(v[at + 1]), satellites = whole(v[at + 2]);
   const auto fix = q ? fix_of(*q) : std::nullopt;
   if (!fix) return bad("Q '" + std::string(words[first + at + 1]) + "' is not 0 to 7");
   if (!satellites || *satellites > 200) return bad("satellites '" + std::string(words[first + at + 2]) + "'");
 
+  BOOST_OUTCOME_TRY(const auto time, time_of(words[0], words[1]));
+  out.time = time;
   out.satellites = satellites;
   out.fix = *fix;
   if (*fix == FixClass::none) return std::optional(out);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string_view>
 
@@ -8,20 +9,30 @@
 
 namespace anchord::gnss::llh {
 
+enum class TimeSystem : std::uint8_t { utc, gpst, jst };
+
 /// RTKLIB solution text, line by line. Header lines may come at any time or never; until one says otherwise
-/// time is UTC (as Reach streams it) and height ellipsoidal. Not thread-safe.
+/// a date and time are of the system given here, a week and its seconds GPS time, and height is ellipsoidal.
+/// Not thread-safe.
 class Decoder {
  public:
+  /// `unnamed`: UTC is what Reach streams without a header; files of RTKLIB itself are GPST by default.
+  explicit Decoder(TimeSystem unnamed = TimeSystem::utc) : unnamed_(unnamed) {}
   /// One line without its end. An epoch, nothing for headers and blank lines, or an error: bad_frame (too few
-  /// columns, not a number, out of its domain), unsupported (ECEF and baseline forms: no geodetic position in
-  /// them).
+  /// columns, not a number, out of its domain), unsupported (ECEF and baseline forms, Tokyo datum: no WGS84
+  /// position in them).
   Result<std::optional<Epoch>> line(std::string_view text);
+  /// Epochs whose time is of the unnamed system, because no header had said.
+  std::uint64_t time_assumed() const { return time_assumed_; }
 
  private:
   void header(std::string_view text);
-  enum class TimeSystem : std::uint8_t { utc, gpst, jst } system_{TimeSystem::utc};
-  bool geodetic_height_{false};  ///< above the geoid, "geodetic" in the header
-  bool other_form_{false};
+  Result<UtcTime> time_of(std::string_view first, std::string_view second);
+  TimeSystem unnamed_;
+  std::optional<TimeSystem> system_{};  ///< absent: no header yet
+  bool geodetic_height_{false};         ///< above the geoid, "geodetic" in the header
+  bool other_form_{false}, other_datum_{false};
+  std::uint64_t time_assumed_{0};
 };
 
 }  // namespace anchord::gnss::llh

@@ -1,6 +1,5 @@
 #include "drivers/gnss/nmea.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
@@ -101,6 +100,36 @@ Result<Message> parse_gga(FieldReader f) {
   return f.done(out);
 }
 
+/// Quality digit of the best mode letter: GPS may be fixed while another system floats along.
+std::optional<int> quality_of_modes(std::string_view modes) {
+  struct Mode {
+    char letter;
+    int quality;
+  };
+  constexpr std::array k_best_first{Mode{'R', 4}, Mode{'F', 5}, Mode{'P', 3}, Mode{'D', 2}, Mode{'A', 1},
+                                    Mode{'E', 6}, Mode{'M', 7}, Mode{'S', 8}, Mode{'N', 0}};
+  for (const auto& mode : k_best_first) {
+    if (modes.find(mode.letter) != std::string_view::npos) return mode.quality;
+  }
+  return std::nullopt;
+}
+
+Result<Message> parse_gns(FieldReader f) {
+  Gns out;
+  if (f.count() < 13) f.fail(f.count());
+  out.tod_ns = f.tod_ns(1);
+  out.lat_deg = f.angle(2, 90, 'N', 'S');
+  out.lon_deg = f.angle(4, 180, 'E', 'W');
+  out.quality = quality_of_modes(f.text(6));
+  if (!out.quality && !f.text(6).empty()) f.fail(6);
+  out.satellites = f.integer(7);
+  out.hdop = f.not_negative(8);
+  out.height_msl_m = f.number(9);
+  out.geoid_separation_m = f.number(10);
+  out.age_s = f.not_negative(11);
+  return f.done(out);
+}
+
 Result<Message> parse_rmc(FieldReader f) {
   Rmc out;
   if (f.count() < 10) f.fail(f.count());
@@ -154,44 +183,9 @@ struct Kind {
   std::string_view name;
   Result<Message> (*parse)(FieldReader);
 };
-constexpr std::array k_kinds{Kind{"GGA", parse_gga}, Kind{"RMC", parse_rmc}, Kind{"GST", parse_gst},
-                             Kind{"GSA", parse_gsa}, Kind{"VTG", parse_vtg}, Kind{"ZDA", parse_zda}};
-
-FixClass fix_of_quality(int quality) {
-  switch (quality) {
-    case 1:
-    case 3:
-      return FixClass::single;  // 3: PPS, the precise single solution
-    case 2:
-      return FixClass::dgps;
-    case 4:
-      return FixClass::rtk_fixed;
-    case 5:
-      return FixClass::rtk_float;
-    default:
-      return FixClass::none;  // 6 dead reckoning, 7 manual, 8 simulator, 9 unknown: no measured position
-  }
-}
-
-FixClass fix_of_mode(char mode) {
-  switch (mode) {
-    case 0:
-    case 'A':
-      return FixClass::single;
-    case 'D':
-      return FixClass::dgps;
-    case 'R':
-      return FixClass::rtk_fixed;
-    case 'F':
-      return FixClass::rtk_float;
-    default:
-      return FixClass::none;
-  }
-}
-
-std::optional<double> positive(std::optional<double> value) {
-  return value && *value > 0 ? value : std::nullopt;  // a sigma of 0 means unknown, not perfect
-}
+constexpr std::array k_kinds{Kind{"GGA", parse_gga}, Kind{"GNS", parse_gns}, Kind{"RMC", parse_rmc},
+                             Kind{"GST", parse_gst}, Kind{"GSA", parse_gsa}, Kind{"VTG", parse_vtg},
+                             Kind{"ZDA", parse_zda}};
 
 }  // namespace
 
@@ -203,121 +197,6 @@ Result<Message> parse(std::string_view sentence) {
     }
   }
   return Message(Other{});
-}
-
-template <class T>
-bool Assembler::put(std::optional<T>& slot, const T& value, Epochs& out) {
-  const bool same_time = group_.any && group_.tod_ns == value.tod_ns;
-  if (same_time && slot && value.tod_ns) return false;
-  if (!same_time || slot) {
-    publish(out);
-    // `slot` is a member of group_, which publish() has emptied.
-    group_.tod_ns = value.tod_ns;
-  }
-  group_.any = true;
-  slot = value;
-  return true;
-}
-
-bool Assembler::add(const Message& message, Epochs& out) {
-  if (const auto* gga = std::get_if<Gga>(&message)) return put(group_.gga, *gga, out);
-  if (const auto* rmc = std::get_if<Rmc>(&message)) return put(group_.rmc, *rmc, out);
-  if (const auto* gst = std::get_if<Gst>(&message)) return put(group_.gst, *gst, out);
-  if (const auto* zda = std::get_if<Zda>(&message)) return put(group_.zda, *zda, out);
-  if (const auto* gsa = std::get_if<Gsa>(&message)) {
-    if (gsa->hdop) group_.hdop = gsa->hdop;  // no time of its own: belongs to what is being collected
-  }
-  return true;
-}
-
-void Assembler::apply_sigmas(const Group& group, Epoch& epoch) {
-  if (!group.gga || !group.tod_ns) return;
-  const int quality = group.gga->quality.value_or(0);
-  if (group.gst) kept_ = KeptSigmas{*group.gst, *group.tod_ns, quality};
-  constexpr std::int64_t k_keep_ns = 2 * k_second_ns;  // Reach: GGA 5 Hz, GST 1 Hz by default
-  if (!kept_ || epoch.fix == FixClass::none) return;
-  const std::int64_t age_ns = (*group.tod_ns - kept_->tod_ns + k_day_ns) % k_day_ns;
-  if (kept_->quality != quality || age_ns > k_keep_ns) return;
-  epoch.sigma_n_m = positive(kept_->gst.sigma_lat_m);
-  epoch.sigma_e_m = positive(kept_->gst.sigma_lon_m);
-  epoch.sigma_u_m = positive(kept_->gst.sigma_height_m);
-  if (order_ == GstOrder::larger_for_both && epoch.sigma_n_m && epoch.sigma_e_m) {
-    epoch.sigma_n_m = epoch.sigma_e_m = std::max(*epoch.sigma_n_m, *epoch.sigma_e_m);
-  }
-}
-
-void Assembler::publish(Epochs& out) {
-  const Group group = std::exchange(group_, Group{});
-  if (!group.any) return;
-  std::optional<std::int64_t> days = group.zda ? group.zda->days : std::nullopt;
-  if (!days && group.rmc) days = group.rmc->days;
-  if (days && group.tod_ns) set_reference({*days * k_day_ns + *group.tod_ns});
-  if (!group.gga && !(group.rmc && group.rmc->valid)) {
-    if (group.gst && kept_ && group.tod_ns) kept_ = KeptSigmas{*group.gst, *group.tod_ns, kept_->quality};
-    return;
-  }
-
-  Epoch epoch;
-  if (group.gga) {
-    const Gga& gga = *group.gga;
-    epoch.fix = fix_of_quality(gga.quality.value_or(0));
-    epoch.satellites = gga.satellites;
-    epoch.hdop = gga.hdop ? gga.hdop : group.hdop;
-    if (epoch.fix != FixClass::none) {
-      epoch.lat_deg = gga.lat_deg;
-      epoch.lon_deg = gga.lon_deg;
-      epoch.height_msl_m = gga.height_msl_m;
-      if (gga.height_msl_m && gga.geoid_separation_m) {
-        epoch.height_ellipsoid_m = *gga.height_msl_m + *gga.geoid_separation_m;
-      }
-      epoch.age_s = gga.age_s;
-    }
-  } else {
-    epoch.fix = fix_of_mode(group.rmc->mode);
-    epoch.lat_deg = group.rmc->lat_deg;
-    epoch.lon_deg = group.rmc->lon_deg;
-    epoch.hdop = group.hdop;
-  }
-  if (!epoch.lat_deg || !epoch.lon_deg) {
-    epoch.fix = FixClass::none;
-    epoch.lat_deg = epoch.lon_deg = epoch.height_msl_m = epoch.height_ellipsoid_m = std::nullopt;
-  }
-  apply_sigmas(group, epoch);
-  emit(std::move(epoch), group.tod_ns, out);
-}
-
-void Assembler::emit(Epoch epoch, std::optional<std::int64_t> tod_ns, Epochs& out) {
-  constexpr std::size_t k_max_waiting = 600;  // a minute at 10 Hz
-  epoch.protocol = Protocol::nmea;
-  epoch.time_of_day_ns = tod_ns;
-  waiting_.push_back(std::move(epoch));
-  if (reference_ || waiting_.size() > k_max_waiting) flush(out);
-}
-
-void Assembler::flush(Epochs& out) {
-  if (reference_) {
-    // Backwards from the newest, each next to the one after it: they may span a midnight.
-    UtcTime next = *reference_;
-    bool newest = true;
-    for (auto it = waiting_.rbegin(); it != waiting_.rend(); ++it) {
-      if (!it->time_of_day_ns) continue;
-      it->time = next = nearest_time_of_day(next, *it->time_of_day_ns);
-      if (std::exchange(newest, false)) reference_ = next;
-    }
-  }
-  for (auto& waited : waiting_) out.push_back(std::move(waited));
-  waiting_.clear();
-}
-
-void Assembler::set_reference(UtcTime time) { reference_ = time; }
-
-void Assembler::quiet(Epochs& out) {
-  if (group_.gga || (group_.rmc && group_.rmc->valid)) publish(out);
-}
-
-void Assembler::finish(Epochs& out) {
-  publish(out);
-  flush(out);
 }
 
 }  // namespace anchord::gnss::nmea

@@ -16,11 +16,13 @@ struct Gga {
   std::optional<int> quality, satellites;
   std::optional<double> hdop, height_msl_m, geoid_separation_m, age_s;
 };
+/// The same with one mode letter per satellite system; quality is GGA's digit for the best of them.
+struct Gns : Gga {};
 struct Rmc {
   std::optional<std::int64_t> tod_ns, days;  ///< days since 1970-01-01
   bool valid{false};
   std::optional<double> lat_deg, lon_deg, speed_mps, course_deg;
-  char mode{0};  ///< A, D, R, F, E, N; 0 before NMEA 2.3
+  char mode{0};  ///< A, D, R, F, P, E, N; 0 before NMEA 2.3
 };
 struct Gst {
   std::optional<std::int64_t> tod_ns;
@@ -37,7 +39,7 @@ struct Zda {
 };
 /// A good sentence that carries nothing needed here.
 struct Other {};
-using Message = std::variant<Other, Gga, Rmc, Gst, Gsa, Vtg, Zda>;
+using Message = std::variant<Other, Gga, Gns, Rmc, Gst, Gsa, Vtg, Zda>;
 
 /// The text between $ and *, checksum already checked. errors: bad_frame, naming the field. Pure.
 Result<Message> parse(std::string_view sentence);
@@ -53,8 +55,9 @@ enum class GstOrder : std::uint8_t {
 
 /// Joins the sentences of one time into an epoch, which is published when the next time begins.
 ///
-/// The date comes from RMC or ZDA (or set_reference) and runs on over midnight; epochs before the first date
-/// wait, at most 600 of them. Sigmas of the last GST serve for 2 s while the quality stays. Not thread-safe.
+/// The position is GGA's, else GNS's, else that of a valid RMC. The date comes from RMC or ZDA (or
+/// set_reference) and runs on over midnight; epochs before the first date wait, at most 600 of them. Sigmas
+/// of the last GST serve for 2 s while the quality stays. Not thread-safe.
 class Assembler {
  public:
   explicit Assembler(GstOrder order = GstOrder::larger_for_both) : order_(order) {}
@@ -70,11 +73,15 @@ class Assembler {
   struct Group {
     std::optional<std::int64_t> tod_ns;
     std::optional<Gga> gga;
+    std::optional<Gns> gns;
     std::optional<Rmc> rmc;
     std::optional<Gst> gst;
     std::optional<Zda> zda;
     std::optional<double> hdop;
     bool any{false};
+
+    const Gga* position() const { return gga ? &*gga : gns ? &*gns : nullptr; }
+    bool has_position() const { return position() != nullptr || (rmc && rmc->valid); }
   };
   template <class T>
   bool put(std::optional<T>& slot, const T& value, Epochs& out);

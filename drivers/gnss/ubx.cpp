@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "drivers/gnss/bytes.hpp"
 #include "drivers/gnss/gps_time.hpp"
@@ -18,9 +19,10 @@ Error too_short(const char* name, std::size_t size) {
 
 bool on_earth(double lat_deg, double lon_deg) { return std::abs(lat_deg) <= 90 && std::abs(lon_deg) <= 180; }
 
-/// flags3 bits 4..1, lastCorrectionAge: upper end of each class in seconds; 0 = not available, 12 = older.
+/// flags3 bits 4..1, lastCorrectionAge: upper end of each class in seconds; 0 = not available. The last class
+/// has no end: 120 s and older, told as 120, since "unknown" would look better than it is.
 std::optional<double> age_of_class(unsigned index) {
-  constexpr std::array k_upper_s{0.0, 1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 90.0, 120.0};
+  constexpr std::array k_upper_s{0.0, 1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 90.0, 120.0, 120.0};
   if (index == 0 || index >= k_upper_s.size()) return std::nullopt;
   return k_upper_s[index];
 }
@@ -124,13 +126,19 @@ Result<Message> parse_end(std::string_view p) {
   return Message(EndOfEpoch{read_le<std::uint32_t>(p, 0)});
 }
 
+Result<Message> parse_old(std::string_view p) {
+  if (p.size() < 4) return too_short("NAV-POSLLH or NAV-SOL", p.size());
+  return Message(OldPosition{read_le<std::uint32_t>(p, 0)});
+}
+
 struct Kind {
   std::uint8_t message_class, id;
   Result<Message> (*parse)(std::string_view);
 };
 constexpr std::array k_kinds{Kind{0x01, 0x07, parse_pvt},        Kind{0x01, 0x14, parse_hp},
                              Kind{0x01, 0x36, parse_covariance}, Kind{0x01, 0x3c, parse_relative},
-                             Kind{0x01, 0x04, parse_dop},        Kind{0x01, 0x61, parse_end}};
+                             Kind{0x01, 0x04, parse_dop},        Kind{0x01, 0x61, parse_end},
+                             Kind{0x01, 0x02, parse_old},        Kind{0x01, 0x06, parse_old}};
 
 }  // namespace
 
@@ -148,6 +156,7 @@ Result<Message> parse(std::string_view frame) {
 void Assembler::select(std::uint32_t itow_ms, Epochs& out) {
   if (group_ && group_->itow_ms == itow_ms) return;
   publish(out);
+  if (group_) kinds_ |= group_->kinds();
   group_ = Group{};
   group_->itow_ms = itow_ms;
 }
@@ -160,20 +169,26 @@ void Assembler::add(const Message& message, Epochs& out) {
           select(m.itow_ms, out);
           if constexpr (std::is_same_v<T, Pvt>) group_->pvt = m;
           if constexpr (std::is_same_v<T, HpPosition>) group_->hp = m;
-          if constexpr (std::is_same_v<T, Covariance>) group_->covariance = m, has_covariance_ = true;
+          if constexpr (std::is_same_v<T, Covariance>) group_->covariance = m;
           if constexpr (std::is_same_v<T, RelativePosition>) group_->relative = m;
           if constexpr (std::is_same_v<T, Dop>) group_->dop = m;
+          if constexpr (std::is_same_v<T, OldPosition>) group_->old_position = true;
           if constexpr (std::is_same_v<T, EndOfEpoch>) has_end_ = true, publish(out);
         }
       },
       message);
-  // Where the receiver marks the end of its epochs, everything of them is waited for.
-  if (!has_end_ && group_ && group_->pvt && group_->hp && (!has_covariance_ || group_->covariance))
-    publish(out);
+  // Where the receiver marks the end of its epochs, everything of them is waited for; elsewhere what its
+  // epochs have held so far, and the first one for the second, since nothing is known of them before.
+  if (has_end_ || !group_ || !group_->pvt || !group_->hp || kinds_ == 0) return;
+  if ((group_->kinds() & kinds_) == kinds_) publish(out);
 }
 
 void Assembler::publish(Epochs& out) {
-  if (!group_ || group_->published || !group_->pvt) return;
+  if (!group_ || group_->published) return;
+  if (!group_->pvt) {
+    if ((group_->old_position || group_->hp) && !std::exchange(group_->counted, true)) ++without_pvt_;
+    return;
+  }
   group_->published = true;
   const Pvt& pvt = *group_->pvt;
   Epoch epoch;

@@ -46,19 +46,27 @@ struct Dop {
 struct EndOfEpoch {
   std::uint32_t itow_ms{};
 };
+/// NAV-POSLLH (01 02) or NAV-SOL (01 06): the way of receivers before NAV-PVT. Not decoded, only noticed.
+struct OldPosition {
+  std::uint32_t itow_ms{};
+};
 struct Other {};
-using Message = std::variant<Other, Pvt, HpPosition, Covariance, RelativePosition, Dop, EndOfEpoch>;
+using Message =
+    std::variant<Other, Pvt, HpPosition, Covariance, RelativePosition, Dop, EndOfEpoch, OldPosition>;
 
 /// A whole frame whose checksum is right. errors: bad_frame (payload too short for its kind, value out of its
 /// domain). Pure.
 Result<Message> parse(std::string_view frame);
 
-/// Joins the messages of one iTOW; published when the next one begins, on NAV-EOE, or as soon as PVT and
-/// HPPOSLLH (and NAV-COV, where the stream has it) are in. Without a PVT there is no fix type and no epoch.
+/// Joins the messages of one iTOW; published when the next one begins, on NAV-EOE, or as soon as PVT,
+/// HPPOSLLH and every other kind that the stream has shown in a former epoch are in. Without a PVT there is
+/// no fix type and no epoch.
 class Assembler {
  public:
   void add(const Message& message, Epochs& out);
   void finish(Epochs& out) { publish(out); }
+  /// Times that had a position in another message, but no NAV-PVT to say what it is worth.
+  std::uint64_t without_pvt() const { return without_pvt_; }
 
  private:
   struct Group {
@@ -68,13 +76,22 @@ class Assembler {
     std::optional<Covariance> covariance;
     std::optional<RelativePosition> relative;
     std::optional<Dop> dop;
-    bool published{false};
+    bool old_position{false};
+    bool published{false}, counted{false};
+
+    /// One bit per kind of message that is in.
+    unsigned kinds() const {
+      return (pvt ? 1U : 0U) | (hp ? 2U : 0U) | (covariance ? 4U : 0U) | (relative ? 8U : 0U) |
+             (dop ? 16U : 0U);
+    }
   };
   void select(std::uint32_t itow_ms, Epochs& out);
   void publish(Epochs& out);
 
   std::optional<Group> group_;
-  bool has_covariance_{false}, has_end_{false};
+  unsigned kinds_{0};  ///< of all finished groups
+  bool has_end_{false};
+  std::uint64_t without_pvt_{0};
 };
 
 }  // namespace anchord::gnss::ubx

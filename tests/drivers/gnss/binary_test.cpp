@@ -212,5 +212,89 @@ TEST(GpsTime, KnowsLeapSecondsAndTenBitWeeks) {
       "2024-06-15T23:59:50.000000Z");
 }
 
+std::string dop(std::uint32_t itow_ms, int horizontal_cents) {
+  auto frame = ubx(0x01, 0x04, 18);
+  put(frame, 6, itow_ms, 4);
+  put(frame, 6 + 12, horizontal_cents, 2);
+  return with_fletcher(frame);
+}
+
+// u-blox 9 sends PVT, HPPOSLLH, then DOP. Publishing at HPPOSLLH lost the DOP and the covariance of the first
+// epoch, and the DOP of every one where NAV-EOE is off.
+TEST(Ubx, WaitsForWhatComesBehindTheHighPrecisionPosition) {
+  const auto first = decode(k_pvt + k_hp + dop(378017800, 90)).at(0);
+  EXPECT_NEAR(first.hdop.value(), 0.9, 1e-12);
+
+  auto pvt = k_pvt.substr(0, k_pvt.size() - 2), hp = k_hp.substr(0, k_hp.size() - 2);
+  put(pvt, 6, 378018000, 4), put(hp, 6 + 4, 378018000, 4);
+  Decoder decoder;
+  Epochs epochs;
+  decoder.feed(k_pvt + k_hp + dop(378017800, 90) + with_fletcher(pvt) + with_fletcher(hp), epochs);
+  EXPECT_EQ(epochs.size(), 1U);  // the second one still lacks what the first one had
+  decoder.feed(dop(378018000, 80), epochs);
+  ASSERT_EQ(epochs.size(), 2U);  // and is whole now, without waiting for a third
+  EXPECT_NEAR(epochs[1].hdop.value(), 0.8, 1e-12);
+}
+
+// Receivers before NAV-PVT, or F9 set to HPPOSLLH alone: no fix type, so no epoch, but never in silence.
+TEST(Ubx, SaysThatPositionsWithoutPvtAreNotUsed) {
+  auto old = ubx(0x01, 0x02, 28), solution = ubx(0x01, 0x06, 52);
+  put(old, 6, 1000, 4), put(solution, 6, 1000, 4);
+  Skips skips;
+  EXPECT_TRUE(decode(with_fletcher(old) + with_fletcher(solution) + k_hp, {}, &skips).empty());
+  EXPECT_EQ(skips["ubx: position without NAV-PVT, which tells the fix"], 2U);
+  Skips with;
+  put(old, 6, 378017800, 4);
+  EXPECT_EQ(decode(with_fletcher(old) + k_pvt, {}, &with).size(), 1U);
+  EXPECT_TRUE(with.entries().empty());
+}
+
+// flags3 bits 4..1 of the interface description: 1 is 0..1 s, 8 is 30..45 s, 12 is 120 s and older.
+TEST(Ubx, TellsTheUpperEndOfTheAgeClass) {
+  for (const auto& [index, age_s] : {std::pair{0, std::optional<double>()},
+                                     {1, {1.0}},
+                                     {8, {45.0}},
+                                     {11, {120.0}},
+                                     {12, {120.0}},
+                                     {13, {}}}) {
+    auto frame = k_pvt.substr(0, k_pvt.size() - 2);
+    put(frame, 6 + 78, index << 1, 2);
+    EXPECT_EQ(decode(with_fletcher(frame)).at(0).age_s, age_s) << index;
+  }
+}
+
+// The example message of RTCM 10403 (type 1005 of station 2003), with the CRC printed there.
+TEST(Rtcm3Framing, CountsCorrectionsOnTheSameWireAndLosesNothing) {
+  const auto rtcm = from_hex("d3 00 13 3e d7 d3 02 02 98 0e de ef 34 b4 bd 62 ac 09 41 98 6f 33 36 0b 98");
+  Skips skips;
+  EXPECT_EQ(decode(rtcm + k_pvt + rtcm + k_hp + rtcm, {}, &skips).size(), 1U);
+  EXPECT_EQ(skips["rtcm3: corrections, no position"], 3U);
+  EXPECT_EQ(skips.entries().size(), 1U);
+
+  auto broken = rtcm;
+  broken[10] ^= 1;
+  Skips noise;
+  EXPECT_EQ(decode(broken + k_pvt, {}, &noise).size(), 1U);
+  EXPECT_EQ(noise["byte outside any frame"], rtcm.size() - 1);  // one of its bytes is a tab, a blank
+  // A header that claims more than comes must not hold back what is inside.
+  EXPECT_EQ(decode(from_hex("d3 03 ff") + k_pvt + k_hp).size(), 1U);
+}
+
+// Seen in a recording of a Reach without antenna: tow 0 of week 65014, at the origin of the Earth's frame.
+TEST(Erb, HasNeitherTimeNorPositionBeforeTheFirstSolution) {
+  auto pos = k_erb_pos.substr(0, k_erb_pos.size() - 2), stat = k_erb_stat.substr(0, k_erb_stat.size() - 2);
+  put(pos, 5, 0, 4), put(stat, 5, 0, 4);
+  const double origin[] = {0, -90, -6378137, -6378107.465999603};
+  std::memcpy(&pos[9], origin, sizeof origin);
+  put(stat, 9, 65014, 2);
+  stat[11] = stat[12] = stat[13] = 0;
+  Skips skips;
+  const auto epochs = decode(with_fletcher(pos) + with_fletcher(stat), {}, &skips);
+  ASSERT_EQ(epochs.size(), 1U);
+  EXPECT_FALSE(epochs[0].time || epochs[0].lat_deg);
+  EXPECT_EQ(epochs[0].fix, FixClass::none);
+  EXPECT_TRUE(skips.entries().empty());
+}
+
 }  // namespace
 }  // namespace anchord::gnss

@@ -179,5 +179,53 @@ TEST(NmeaFraming, RejectsMissingAndWrongChecksumsByName) {
   EXPECT_EQ(skips["nmea: another sentence starts inside"], 1U);
 }
 
+// GNS instead of GGA: some makers send nothing else with a height. By NMEA 0183 4.x its fields 9 and 10 are
+// height and separation without units between, and field 6 has a letter per system.
+TEST(Nmea, TakesThePositionOfGnsWhereNoGgaComes) {
+  const auto e = decode(sentence("GNZDA,120000.00,13,06,2024,00,00") +
+                        sentence("GNGNS,120000.00,5101.5,N,00342.6,E,RRNN,14,0.9,22.5,45.0,0.8,0000,S"))
+                     .at(0);
+  EXPECT_EQ(to_rfc3339(e.time.value()), "2024-06-13T12:00:00.000000Z");
+  EXPECT_NEAR(e.lat_deg.value(), 51.025, 1e-12);
+  EXPECT_NEAR(e.lon_deg.value(), 3.71, 1e-12);
+  EXPECT_EQ(e.height_msl_m, 22.5);
+  EXPECT_EQ(e.height_ellipsoid_m, 67.5);
+  EXPECT_EQ(e.fix, FixClass::rtk_fixed);
+  EXPECT_EQ(e.satellites, 14);
+  EXPECT_EQ(e.age_s, 0.8);
+}
+
+TEST(Nmea, PrefersGgaToGnsOfTheSameTime) {
+  const auto epochs = decode(sentence("GNGNS,120000.00,5101.5,N,00342.6,E,AA,9,1.1,22.0,45.0,,,S") +
+                             gga("120000.00") + sentence("GNGNS,120000.00,,,,,AA,9,1.1,,,,,S"));
+  ASSERT_EQ(epochs.size(), 1U);
+  EXPECT_EQ(epochs[0].fix, FixClass::rtk_fixed);
+  EXPECT_EQ(epochs[0].satellites, 14);
+}
+
+TEST(Nmea, ReadsTheBestModeLetterOfGns) {
+  for (const auto& [modes, fix] : {std::pair{"RFN", FixClass::rtk_fixed},
+                                   {"FD", FixClass::rtk_float},
+                                   {"DA", FixClass::dgps},
+                                   {"NA", FixClass::single},
+                                   {"P", FixClass::single},
+                                   {"EN", FixClass::none},
+                                   {"S", FixClass::none},
+                                   {"NNN", FixClass::none}}) {
+    const auto e =
+        decode(sentence("GNGNS,120000.00,5101.5,N,00342.6,E," + std::string(modes) + ",14,0.9,22.5,45.0,,"))
+            .at(0);
+    EXPECT_EQ(e.fix, fix) << modes;
+    EXPECT_EQ(e.lat_deg.has_value(), fix != FixClass::none) << modes;
+  }
+}
+
+TEST(Nmea, SaysWhyAPositionThatWasNotMeasuredIsMissing) {
+  Skips skips;
+  EXPECT_EQ(decode(gga("120000.00", "6") + gga("120001.00", "8") + gga("120002.00", "5"), {}, &skips).size(),
+            3U);
+  EXPECT_EQ(skips["nmea: quality 6 to 9, dead reckoning or not measured"], 2U);
+}
+
 }  // namespace
 }  // namespace anchord::gnss

@@ -90,7 +90,56 @@ TEST(Llh, SaysThatEcefColumnsHoldNoGeodeticPosition) {
              "2024/06/16 00:00:13.600 4000000.0 300000.0 4900000.0 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n",
              {}, &skips)
           .empty());
-  EXPECT_EQ(skips["llh: ECEF or baseline form"], 1U);
+  EXPECT_EQ(skips["llh: no WGS84 position"], 1U);
+}
+
+// rnx2rtkp -u writes the second of the week in UTC too: 18 s before GPS time in 2024.
+TEST(Llh, ShiftsTheSecondOfTheWeekWhereTheHeaderSaysUtc) {
+  const std::string line = "2319 8.000 51.0 3.7 62.8 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n";
+  EXPECT_EQ(to_rfc3339(decode(k_llh_header + line).at(0).time.value()), "2024-06-16T00:00:08.000000Z");
+  EXPECT_EQ(to_rfc3339(decode(line).at(0).time.value()), "2024-06-15T23:59:50.000000Z");
+}
+
+TEST(Llh, KnowsTheColumnsOfAHeaderWithoutRatio) {
+  EXPECT_EQ(
+      to_rfc3339(decode("%  GPST  latitude(deg) longitude(deg)  height(m)   Q  ns sdn(m)\n" + k_llh_fixed)
+                     .at(0)
+                     .time.value()),
+      "2024-06-15T23:59:55.600000Z");
+  EXPECT_EQ(
+      to_rfc3339(
+          decode("%  GPST,latitude(deg),longitude(deg),height(m),Q,ns\n" + k_llh_fixed).at(0).time.value()),
+      "2024-06-15T23:59:55.600000Z");
+}
+
+TEST(Llh, TakesTimeWithoutAHeaderForUtcUnlessTold) {
+  Decoder reach;
+  Epochs epochs;
+  reach.feed(k_llh_fixed, epochs);
+  EXPECT_EQ(reach.llh_time_assumed(), 1U);
+  EXPECT_EQ(to_rfc3339(epochs.at(0).time.value()), "2024-06-16T00:00:13.600000Z");
+  reach.feed(k_llh_header + k_llh_fixed, epochs);
+  EXPECT_EQ(reach.llh_time_assumed(), 1U);
+  DecoderOptions options;
+  options.llh_time = llh::TimeSystem::gpst;
+  EXPECT_EQ(to_rfc3339(decode(k_llh_fixed, options).at(0).time.value()), "2024-06-15T23:59:55.600000Z");
+}
+
+// As tools print that read and rewrite such files.
+TEST(Llh, ReadsCountsThatAreWrittenAsDecimals) {
+  const auto e =
+      decode("2024/06/16 00:00:13.600 51.0 3.7 61.0 2.0000000 13.0000000 0.3 0.2 0.5 0 0 0 1.1 12.5\n").at(0);
+  EXPECT_EQ(e.fix, FixClass::rtk_float);
+  EXPECT_EQ(e.satellites, 13);
+  EXPECT_TRUE(decode("2024/06/16 00:00:13.600 51.0 3.7 61.0 1.5 13 0.3 0.2 0.5 0 0 0 1.1 12.5\n").empty());
+}
+
+TEST(Llh, RefusesAnotherDatum) {
+  Skips skips;
+  EXPECT_TRUE(
+      decode("% (lat/lon/height=Tokyo/ellipsoidal,Q=1:fix)\n" + k_llh_header + k_llh_fixed, {}, &skips)
+          .empty());
+  EXPECT_EQ(skips["llh: no WGS84 position"], 1U);
 }
 
 TEST(Llh, DoesNotUseALineWhoseEndIsMissing) {
@@ -110,9 +159,9 @@ TEST(Gpsd, DecodesAFloatingEpochWithItsSigmas) {
              "\r\n"
              R"({"class":"SKY","hdop":0.9,"uSat":14})"
              "\r\n"
-             R"({"class":"TPV","device":"x","mode":1})"
+             R"({"class":"TPV","device":"udp://127.0.0.1:29471","mode":1})"
              "\r\n"
-             R"({"class":"GST","device":"x"})"
+             R"({"class":"GST","device":"udp://127.0.0.1:29471"})"
              "\r\n" +
              k_tpv +
              R"({"class":"GST","time":"2024-06-15T23:59:54.000Z","rms":0.4,"lat":0.17,"lon":0.31,"alt":0.55})"
@@ -153,6 +202,80 @@ TEST(Gpsd, DropsPositionsWithoutTimeAndOldHeights) {
   EXPECT_FALSE(epochs[0].height_ellipsoid_m);  // "alt" was either height, by version
 }
 
+std::string tpv(const char* device, const char* time, const char* rest) {
+  return std::string(R"({"class":"TPV","device":")") + device + R"(","time":"2024-06-15T23:59:)" + time +
+         "Z\"" + rest + "}\n";
+}
+
+// Two receivers at one gpsd, of the same second: one position must not be made of both.
+TEST(Gpsd, KeepsItsDevicesApart) {
+  const auto epochs = decode(
+      tpv("/dev/a", "54.000", R"(,"mode":3,"status":3,"lat":51.0,"lon":3.0,"altHAE":60.0)") +
+      tpv("/dev/b", "54.000", R"(,"mode":2,"lat":52.0,"lon":4.0)") +
+      R"({"class":"GST","device":"/dev/b","time":"2024-06-15T23:59:54.000Z","lat":2.0,"lon":3.0,"alt":4.0})"
+      "\n" +
+      tpv("/dev/a", "55.000", R"(,"mode":1)") + tpv("/dev/b", "55.000", R"(,"mode":1)"));
+  ASSERT_EQ(epochs.size(), 4U);
+  EXPECT_EQ(epochs[0].lat_deg, 52.0);  // b, with its GST
+  EXPECT_FALSE(epochs[0].height_ellipsoid_m);
+  EXPECT_EQ(epochs[0].sigma_n_m, 3.0);
+  EXPECT_EQ(epochs[1].lat_deg, 51.0);
+  EXPECT_EQ(epochs[1].fix, FixClass::rtk_fixed);
+  EXPECT_FALSE(epochs[1].sigma_n_m);
+}
+
+// gpsd 3.23 and later tell DOPs and satellites in two SKY; before 3.21 there is no uSat.
+TEST(Gpsd, JoinsTheSkyReportsOfNewAndOldServers) {
+  const auto e =
+      decode(
+          R"({"class":"SKY","device":"udp://127.0.0.1:29471","hdop":0.8,"pdop":1.2})"
+          "\n"
+          R"({"class":"SKY","device":"udp://127.0.0.1:29471","nSat":3,"uSat":2,"satellites":[{"PRN":1,"used":true}]})"
+          "\n" +
+          k_tpv)
+          .at(0);
+  EXPECT_EQ(e.hdop, 0.8);
+  EXPECT_EQ(e.satellites, 2);
+  // clang-format off
+  const auto old = decode(R"({"class":"SKY","device":"udp://127.0.0.1:29471","satellites":[{"PRN":1,"used":true},{"PRN":2,"used":false},{"PRN":3,"used":true},7]})" "\n" + k_tpv);
+  // clang-format on
+  EXPECT_EQ(old.at(0).satellites, 2);
+}
+
+TEST(Gpsd, KeepsAnEpochWhoseFirstReportHasNoPositionYet) {
+  Skips skips;
+  const auto epochs = decode(tpv("/dev/a", "54.000", R"(,"mode":3,"epv":43.7)") +
+                                 tpv("/dev/a", "54.000", R"(,"mode":3,"lat":51.0,"lon":3.0,"altHAE":60.0)") +
+                                 tpv("/dev/a", "55.000", R"(,"mode":3)"),
+                             {}, &skips);
+  ASSERT_EQ(epochs.size(), 2U);
+  EXPECT_EQ(epochs[0].lat_deg, 51.0);
+  EXPECT_EQ(epochs[1].fix, FixClass::none);
+  EXPECT_TRUE(skips.entries().empty());
+}
+
+// 7 is a surveyed or typed position (NMEA quality 7): as little measured there as here.
+TEST(Gpsd, TakesNoPositionThatWasNotMeasured) {
+  for (const char* status : {"5", "7", "8"}) {
+    const auto e = decode(tpv("/dev/a", "54.000",
+                              (R"(,"mode":3,"lat":51.0,"lon":3.0,"status":)" + std::string(status)).c_str()))
+                       .at(0);
+    EXPECT_EQ(e.fix, FixClass::none) << status;
+    EXPECT_FALSE(e.lat_deg) << status;
+  }
+}
+
+TEST(Gpsd, CountsPositionsWithoutATime) {
+  Skips skips;
+  EXPECT_TRUE(decode(R"({"class":"TPV","mode":3,"lat":51.0,"lon":3.0,"altHAE":60.0})"
+                     "\n"
+                     R"({"class":"TPV","mode":1})"
+                     "\n",
+                     {}, &skips)
+                  .empty());
+  EXPECT_EQ(skips["gpsd: position without a time"], 1U);
+}
+
 TEST(Gpsd, CountsWhatIsNoReport) {
   Skips skips;
   EXPECT_TRUE(decode("{\"class\":\n{\"x\":1}\n{]\n" + std::string(1000, '{') + "\n", {}, &skips).empty());
@@ -167,6 +290,35 @@ TEST(Detection, TakesEveryFormatOfOneStream) {
 
 TEST(Detection, FindsSentencesBehindALoggersTimeStamp) {
   EXPECT_EQ(decode("2024-06-13 09:00:00.123 " + k_rmc + "2024-06-13 09:00:00.124 " + k_gga).size(), 1U);
+}
+
+// Windows editors put the mark before the text. It hid the header, and GPS time was then read as UTC.
+TEST(Detection, AByteOrderMarkHidesNothing) {
+  std::string header = k_llh_header;
+  header.replace(3, 4, "GPST");
+  Skips skips;
+  const auto epochs = decode("\xef\xbb\xbf" + header + k_llh_fixed, {}, &skips);
+  EXPECT_EQ(to_rfc3339(epochs.at(0).time.value()), "2024-06-15T23:59:55.600000Z");
+  EXPECT_TRUE(skips.entries().empty());
+  EXPECT_EQ(decode("\xef\xbb\xbf" + k_tpv).size(), 1U);
+  for (std::size_t cut = 1; cut < 4; ++cut) {
+    Decoder decoder;
+    Epochs out;
+    const auto whole = "\xef\xbb\xbf" + k_tpv;
+    decoder.feed(whole.substr(0, cut), out);
+    decoder.feed(whole.substr(cut), out);
+    decoder.finish(out);
+    EXPECT_EQ(out.size(), 1U) << cut;
+  }
+}
+
+// gpspipe -wt and loggers write their own time before each report.
+TEST(Detection, FindsReportsBehindALoggersTimeStamp) {
+  EXPECT_EQ(decode("2024-06-15 23:59:54: " + k_tpv).size(), 1U);
+  EXPECT_EQ(decode("[1718495994.5] " + k_tpv).size(), 1U);
+  Skips skips;
+  EXPECT_TRUE(decode("a {brace} is nothing rare {\n", {}, &skips).empty());
+  EXPECT_EQ(skips["gpsd: line not readable"], 0U);
 }
 
 }  // namespace
