@@ -1,9 +1,13 @@
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <cstdio>
-#include <fstream>
-#include <iostream>
+#include <cstring>
 #include <memory>
 #include <utility>
 
@@ -80,80 +84,184 @@ std::string header() {
   return out + "\n";
 }
 
-void report(const gnss::Decoder& decoder, std::size_t epochs, std::size_t dateless) {
-  std::fprintf(stderr, "%zu epochs from", epochs);
-  for (const auto p : {gnss::Protocol::nmea, gnss::Protocol::ubx, gnss::Protocol::erb, gnss::Protocol::llh,
-                       gnss::Protocol::gpsd}) {
-    if (decoder.frames(p) > 0) {
-      std::fprintf(stderr, " %llu %s", static_cast<unsigned long long>(decoder.frames(p)),
-                   std::string(gnss::to_string(p)).c_str());
-    }
+constexpr std::array k_protocols{gnss::Protocol::nmea, gnss::Protocol::ubx, gnss::Protocol::erb,
+                                 gnss::Protocol::llh, gnss::Protocol::gpsd};
+
+/// What was found, for the report at the end.
+struct Found {
+  std::uint64_t bytes{0}, epochs{0}, dateless{0}, timeless{0};
+  std::array<std::uint64_t, k_fix_words.size()> by_fix{};
+  std::array<std::uint64_t, k_protocols.size()> by_protocol{};
+  bool utf16{false};
+
+  void add(const gnss::Epoch& epoch) {
+    ++epochs;
+    ++by_fix[static_cast<std::size_t>(epoch.fix)];
+    ++by_protocol[static_cast<std::size_t>(epoch.protocol)];
+    if (!epoch.time) ++(epoch.time_of_day_ns ? dateless : timeless);
   }
-  std::fputs(" frames\n", stderr);
-  if (dateless > 0) {
-    std::fprintf(stderr, "%zu epochs without a date: no RMC or ZDA in the stream; give one with --date\n",
-                 dateless);
+};
+
+/// "12 fixed, 3 float" of what there is; empty of nothing.
+template <class Counts, class Name>
+std::string listed(const Counts& counts, const Name& name) {
+  std::string out;
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    if (counts[i] > 0) out += (out.empty() ? "" : ", ") + std::to_string(counts[i]) + ' ' + name(i);
+  }
+  return out;
+}
+std::string protocol_name(std::size_t i) { return std::string(gnss::to_string(k_protocols[i])); }
+
+/// Why there is nothing, for somebody who expected something.
+const char* why_nothing(const Found& found, bool any_frames, bool all_formats) {
+  if (found.bytes == 0) return "the input is empty";
+  if (found.utf16) return "the input is UTF-16 text: save it as UTF-8";
+  if (any_frames)
+    return "no position among them: wanted are GGA, GNS or RMC (nmea), NAV-PVT (ubx), POS and STAT (erb), "
+           "solution lines (llh), TPV with a time (gpsd)";
+  return all_formats ? "nothing in it is NMEA, UBX, ERB, LLH or gpsd JSON with a right checksum or form"
+                     : "nothing in it is of this format: --format auto looks for all";
+}
+
+void report(const gnss::Decoder& decoder, const Found& found, bool all_formats) {
+  std::array<std::uint64_t, k_protocols.size()> frames{};
+  for (std::size_t i = 0; i < frames.size(); ++i) frames[i] = decoder.frames(k_protocols[i]);
+  const auto from = listed(frames, protocol_name);
+  std::fprintf(stderr, "%llu epochs from %s frames of %llu bytes\n",
+               static_cast<unsigned long long>(found.epochs), from.empty() ? "no" : from.c_str(),
+               static_cast<unsigned long long>(found.bytes));
+  if (found.epochs == 0) {
+    std::fprintf(stderr, "%s\n", why_nothing(found, !from.empty(), all_formats));
+  } else {
+    const auto fixes = listed(found.by_fix, [](std::size_t i) { return std::string(k_fix_words[i]); });
+    std::fprintf(stderr, "fix: %s\n", fixes.c_str());
+  }
+  if (found.by_protocol != decltype(found.by_protocol){} &&
+      std::count(found.by_protocol.begin(), found.by_protocol.end(), 0U) + 1 <
+          static_cast<std::ptrdiff_t>(k_protocols.size())) {
+    std::fprintf(stderr, "epochs in several formats (%s), often the same ones again: --format takes one\n",
+                 listed(found.by_protocol, protocol_name).c_str());
+  }
+  if (found.dateless > 0) {
+    std::fprintf(stderr, "%llu epochs without a date: no RMC or ZDA in the stream; give one with --date\n",
+                 static_cast<unsigned long long>(found.dateless));
+  }
+  if (found.timeless > 0) {
+    std::fprintf(stderr, "%llu epochs without a time: the receiver did not know it\n",
+                 static_cast<unsigned long long>(found.timeless));
+  }
+  if (decoder.llh_time_assumed() > 0) {
+    std::fprintf(stderr,
+                 "llh: %llu lines before any header that names the time system, read as --llh-time says (utc "
+                 "unless given); RTKLIB itself writes gpst, 18 s ahead of it\n",
+                 static_cast<unsigned long long>(decoder.llh_time_assumed()));
   }
   for (const auto& [reason, entry] : decoder.skips().entries()) {
-    std::fprintf(stderr, "skipped: %s: %llu, first at byte %llu: %s\n", reason.c_str(),
+    std::fprintf(stderr, "skipped: %s: %llu, first at byte %llu%s%s\n", reason.c_str(),
                  static_cast<unsigned long long>(entry.count),
-                 static_cast<unsigned long long>(entry.first_offset), entry.example.c_str());
+                 static_cast<unsigned long long>(entry.first_offset), entry.example.empty() ? "" : ": ",
+                 entry.example.c_str());
   }
 }
 
 struct Decode {
-  std::string file, format{"auto"}, gst{"larger"}, date;
+  std::string file, format{"auto"}, gst{"larger"}, date, llh_time{"utc"};
   bool csv{false}, json{false};
 };
 
-int run(const Decode& options) {
-  gnss::DecoderOptions decoder_options;
-  for (const auto p : {gnss::Protocol::nmea, gnss::Protocol::ubx, gnss::Protocol::erb, gnss::Protocol::llh,
-                       gnss::Protocol::gpsd}) {
-    if (options.format == gnss::to_string(p)) decoder_options.only = p;
+/// Nothing where the date is none; told to the user.
+std::optional<gnss::DecoderOptions> decoder_options(const Decode& options) {
+  gnss::DecoderOptions out;
+  for (const auto p : k_protocols) {
+    if (options.format == gnss::to_string(p)) out.only = p;
   }
-  if (options.gst == "standard") decoder_options.gst_order = gnss::nmea::GstOrder::standard;
+  if (options.llh_time == "gpst") out.llh_time = gnss::llh::TimeSystem::gpst;
+  if (options.gst == "standard") out.gst_order = gnss::nmea::GstOrder::standard;
   if (!options.date.empty()) {
     const auto noon = parse_rfc3339(options.date + "T12:00:00Z");
     if (!noon) {
       std::fprintf(stderr, "anchord decode: --date %s: %s\n", options.date.c_str(),
                    noon.error().message.c_str());
-      return 2;
+      return std::nullopt;
     }
-    decoder_options.reference = noon.value();
+    out.reference = noon.value();
   }
-  std::ifstream file;
-  if (options.file != "-") {
-    file.open(options.file, std::ios::binary);
-    if (!file) {
-      std::fprintf(stderr, "anchord decode: cannot read %s\n", options.file.c_str());
-      return 2;
-    }
-  }
-  std::istream& in = options.file == "-" ? std::cin : file;
+  return out;
+}
 
-  gnss::Decoder decoder(decoder_options);
+/// A file or standard input, read as it comes, so that a live stream in a pipe shows each epoch at once.
+class Input {
+ public:
+  explicit Input(const std::string& path)
+      : fd_(path == "-" ? STDIN_FILENO : ::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
+    if (fd_ < 0) error_ = errno;
+  }
+  ~Input() {
+    if (fd_ > STDIN_FILENO) ::close(fd_);
+  }
+  Input(const Input&) = delete;
+  Input& operator=(const Input&) = delete;
+
+  /// What is there, at most a buffer of it; empty at the end and after an error.
+  std::string_view read() {
+    if (error_ != 0) return {};
+    ssize_t got = -1;
+    do got = ::read(fd_, buffer_.data(), buffer_.size());
+    while (got < 0 && errno == EINTR);
+    if (got < 0) error_ = errno;
+    return {buffer_.data(), got > 0 ? static_cast<std::size_t>(got) : 0};
+  }
+  /// Of errno; 0 while all is well.
+  int error() const { return error_; }
+
+ private:
+  int fd_;
+  int error_{0};
+  std::array<char, 65536> buffer_{};
+};
+
+/// 0 with epochs, 1 without any, 2 where the input cannot be read or the output not be written.
+int run(const Decode& options) {
+  const auto decoder_options_given = decoder_options(options);
+  if (!decoder_options_given) return 2;
+  Input input(options.file);
+  auto bytes = input.read();
+  if (input.error() != 0) {
+    std::fprintf(stderr, "anchord decode: cannot read %s: %s\n", options.file.c_str(),
+                 std::strerror(input.error()));
+    return 2;
+  }
+
+  gnss::Decoder decoder(*decoder_options_given);
   gnss::Epochs epochs;
-  std::size_t count = 0, dateless = 0;
-  const auto flush = [&] {
+  Found found;
+  found.utf16 = bytes.substr(0, 2) == "\xff\xfe" || bytes.substr(0, 2) == "\xfe\xff";
+  const auto write = [&] {
     for (const auto& epoch : epochs) {
       const auto line = line_of(epoch, options.json);
       std::fwrite(line.data(), 1, line.size(), stdout);
-      if (!epoch.time && epoch.time_of_day_ns) ++dateless;
-      ++count;
+      found.add(epoch);
     }
+    if (!epochs.empty()) std::fflush(stdout);
     epochs.clear();
   };
   if (!options.json) std::fputs(header().c_str(), stdout);
-  std::array<char, 65536> buffer{};
-  while (in.read(buffer.data(), buffer.size()), in.gcount() > 0) {
-    decoder.feed({buffer.data(), static_cast<std::size_t>(in.gcount())}, epochs);
-    flush();
+  for (; !bytes.empty() && std::ferror(stdout) == 0; bytes = input.read()) {
+    found.bytes += bytes.size();
+    decoder.feed(bytes, epochs);
+    write();
   }
   decoder.finish(epochs);
-  flush();
-  report(decoder, count, dateless);
-  return count > 0 ? 0 : 1;
+  write();
+  report(decoder, found, !decoder_options_given->only);
+  if (input.error() != 0)
+    std::fprintf(stderr, "anchord decode: reading %s broke off: %s\n", options.file.c_str(),
+                 std::strerror(input.error()));
+  const bool unwritten = std::fflush(stdout) != 0 || std::ferror(stdout) != 0;
+  if (unwritten) std::fprintf(stderr, "anchord decode: cannot write the output\n");
+  if (input.error() != 0 || unwritten) return 2;
+  return found.epochs > 0 ? 0 : 1;
 }
 
 }  // namespace
@@ -172,6 +280,11 @@ void add_decode_command(CLI::App& app, int& exit_code) {
           "the standard order")
       ->check(CLI::IsMember({"larger", "standard"}));
   command->add_option("--date", options->date, "YYYY-MM-DD of an NMEA log that has no RMC or ZDA");
+  command
+      ->add_option(
+          "--llh-time", options->llh_time,
+          "time system of LLH lines without a header: utc as Reach streams them, gpst as RTKLIB does")
+      ->check(CLI::IsMember({"utc", "gpst"}));
   auto* csv = command->add_flag("--csv", options->csv, "CSV with a header line (default)");
   command->add_flag("--json", options->json, "one JSON object per line, null for unknown")->excludes(csv);
   command->callback([options, &exit_code] { exit_code = run(*options); });
