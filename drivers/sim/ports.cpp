@@ -78,8 +78,10 @@ class Pty final : public Port {
     if (master_ < 0) return;
     ::close(std::exchange(master_, -1));
     open_ = false;
+    // Another simulator may have taken the link meanwhile.
     std::error_code ignored;
-    if (!link_.empty()) std::filesystem::remove(link_, ignored);
+    if (!link_.empty() && std::filesystem::read_symlink(link_, ignored) == path_)
+      std::filesystem::remove(link_, ignored);
   }
   bool is_up() const override { return master_ >= 0; }
   std::vector<int> arrived() override {
@@ -91,7 +93,9 @@ class Pty final : public Port {
   }
   std::vector<Heard> hear() override {
     std::string bytes;
-    if (master_ >= 0 && open_) read_all(master_, bytes);
+    // Also what a host said before it closed the port: it has to be done, and not to be taken for the next
+    // host's.
+    if (master_ >= 0) read_all(master_, bytes);
     return bytes.empty() ? std::vector<Heard>{} : std::vector<Heard>{{0, std::move(bytes)}};
   }
   void send(int, std::string_view bytes) override { send_all(bytes); }

@@ -1,8 +1,11 @@
 // Simulated devices on real ptys and sockets, and the server's own device loop at the other end.
 #include "drivers/sim/rig.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <boost/asio/io_context.hpp>
 #include <chrono>
@@ -107,6 +110,83 @@ TEST(Rig, ServesATagAndARoverOfEachFormatToTheRealDrivers) {
     EXPECT_EQ(device.phase, device::Phase::talking) << device.settings.name << ": " << device.reason;
   EXPECT_TRUE(all);
   for (const auto& [name, fixes] : bench.rows.fixes) EXPECT_EQ(fixes.back().fix, FixClass::rtk_fixed) << name;
+}
+
+/// A host that opens a simulated tag's pty by hand, in the thread that turns the rig.
+class RawHost {
+ public:
+  RawHost(Rig& rig, const std::string& path)
+      : rig_(rig), fd_(::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK)) {
+    EXPECT_GE(fd_, 0) << path;
+    rig_.step(10);  // where the rig sees it arrive
+  }
+  ~RawHost() { ::close(fd_); }
+  void say(std::string_view bytes) {
+    EXPECT_EQ(::write(fd_, bytes.data(), bytes.size()), static_cast<ssize_t>(bytes.size()));
+  }
+  /// Its answer, without CR LF; empty after 10 s.
+  std::string ask(const std::string& question) {
+    say(question + "\r");
+    std::string answer;
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+    while (!answer.ends_with("\r\n") && std::chrono::steady_clock::now() < end) {
+      rig_.step(1);
+      std::array<char, 512> buffer{};
+      const auto n = ::read(fd_, buffer.data(), buffer.size());
+      if (n > 0) answer.append(buffer.data(), static_cast<std::size_t>(n));
+    }
+    return answer.substr(0, answer.find('\r'));
+  }
+
+ private:
+  Rig& rig_;
+  int fd_;
+};
+
+TEST(Rig, DoesWhatAHostSaidBeforeItClosedThePortAndTellsTheNextOneNothingOfIt) {
+  auto rig = Rig::open(std::make_shared<const Scenario>(demonstration_scenario()), {}).value();
+  const std::string path = rig->devices().at(0).pty;
+  {
+    RawHost host(*rig, path);
+    host.say("W,15,2a\rR,00,1\rR,0");
+  }
+  rig->step(10);
+  for (int i = 0; i < 3; ++i) {
+    RawHost host(*rig, path);
+    EXPECT_EQ(host.ask("R,15,1"), "D,2A");
+  }
+}
+
+TEST(Rig, HasTagsThatHearEachOther) {
+  Scenario scenario = demonstration_scenario();
+  scenario.radio.loss_chance = scenario.radio.zero_chance = 0;
+  TagSetup& other = scenario.tags.emplace_back(scenario.tags[0]);
+  other.name = "other";
+  other.id = {0x6e02};
+  other.lever_arm_m.x() += 1;
+  auto rig = Rig::open(std::make_shared<const Scenario>(scenario), {}).value();
+  RawHost first(*rig, rig->devices().at(0).pty), second(*rig, rig->devices().at(1).pty);
+  EXPECT_EQ(first.ask("F,b2,0041,1"), "D,01");
+  EXPECT_EQ(first.ask("F,b3,026e06,1"), "D,01");  // data to 0x6e02
+  std::string events;
+  for (int i = 0; i < 10'000 && events != "D,08"; ++i) events = second.ask("R,05,1");
+  EXPECT_EQ(second.ask("R,82,3"), "D,016E01");
+  EXPECT_EQ(second.ask("F,b4,0001,2"), "D,0141");
+}
+
+TEST(Rig, LeavesTheLinkToWhoTookIt) {
+  std::string folder = (fs::temp_directory_path() / "anchord_links_XXXXXX").string();
+  ASSERT_NE(mkdtemp(folder.data()), nullptr);
+  RigOptions options;
+  options.links_folder = folder;
+  const auto scenario = std::make_shared<const Scenario>(demonstration_scenario());
+  auto first = Rig::open(scenario, options).value();
+  auto second = Rig::open(scenario, options).value();
+  first.reset();
+  EXPECT_EQ(fs::read_symlink(second->devices().at(0).link), second->devices().at(0).pty);
+  second.reset();
+  EXPECT_TRUE(fs::is_empty(folder));
+  fs::remove_all(folder);
 }
 
 TEST(Rig, RefusesAScenarioThatCannotRunAndAPortThatIsTaken) {
