@@ -29,25 +29,6 @@ Ordered place(const Eigen::Vector3d& enu_m, const EnuFrame& frame) {
       {"lon", at.lon_deg}, {"lat", at.lat_deg}, {"height_above_ground_m", enu_m.z()}, {"enu_m", xyz(enu_m)}};
 }
 
-Ordered drone_json(const DroneStatus& d) {
-  return {{"connected", d.connected},
-          {"silent_s", finite_or_null(d.silent_s)},
-          {"autopilot", d.autopilot},
-          {"mode", d.mode},
-          {"armed", d.armed},
-          {"in_air", d.in_air},
-          {"failsafe", d.failsafe},
-          {"taken_over", d.taken_over},
-          {"lon", d.position ? Ordered(d.position->lon_deg) : Ordered(nullptr)},
-          {"lat", d.position ? Ordered(d.position->lat_deg) : Ordered(nullptr)},
-          {"above_home_m", or_null(d.relative_m)},
-          {"heading_deg", or_null(d.heading_deg)},
-          {"speed_mps", or_null(d.speed_mps)},
-          {"battery", or_null(d.battery)},
-          {"gps_fix", d.gps_fix},
-          {"text", d.text}};
-}
-
 Ordered anchors_json(const procedure::FlightEngine& engine) {
   Ordered out = Ordered::array();
   for (const auto& a : engine.state().anchors) {
@@ -68,6 +49,25 @@ Ordered anchors_json(const procedure::FlightEngine& engine) {
 }
 
 }  // namespace
+
+Ordered drone_json(const DroneStatus& d) {
+  return {{"connected", d.connected},
+          {"silent_s", finite_or_null(d.silent_s)},
+          {"autopilot", d.autopilot},
+          {"mode", d.mode},
+          {"armed", d.armed},
+          {"in_air", d.in_air},
+          {"failsafe", d.failsafe},
+          {"taken_over", d.taken_over},
+          {"lon", d.position ? Ordered(d.position->lon_deg) : Ordered(nullptr)},
+          {"lat", d.position ? Ordered(d.position->lat_deg) : Ordered(nullptr)},
+          {"above_home_m", or_null(d.relative_m)},
+          {"heading_deg", or_null(d.heading_deg)},
+          {"speed_mps", or_null(d.speed_mps)},
+          {"battery", or_null(d.battery)},
+          {"gps_fix", d.gps_fix},
+          {"text", d.text}};
+}
 
 Ordered flight_command_json(const FlightCommand& c) {
   return {{"number", c.number}, {"action", c.action}, {"state", c.state},

@@ -21,6 +21,7 @@ struct FlightCommand {
   std::string text, by;
   UtcTime at{};
 };
+nlohmann::ordered_json drone_json(const DroneStatus& drone);
 nlohmann::ordered_json flight_command_json(const FlightCommand& command);
 
 /// What stands beside the machine's state in the message of topic `procedure`.

@@ -4,6 +4,7 @@
 
 #include "api/json/reader.hpp"
 #include "api/json/wire_rows.hpp"
+#include "core/geo/enu.hpp"
 
 namespace anchord::api {
 
@@ -66,6 +67,14 @@ Ordered device_json(const DeviceReport& d) {
                     {"sigma_s", d.clock->sigma_s},
                     {"settled", d.clock->settled},
                     {"skewed", d.clock->skewed}};
+  }
+  if (d.base) {
+    const Wgs84 at = wgs84_from_ecef({d.base->ecef_m[0], d.base->ecef_m[1], d.base->ecef_m[2]});
+    out["base"] = {{"station", d.base->station},
+                   {"lon", at.lon_deg},
+                   {"lat", at.lat_deg},
+                   {"h_m", at.height_m},
+                   {"antenna_height_m", maybe(d.base->antenna_height_m)}};
   }
   return out;
 }

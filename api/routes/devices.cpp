@@ -141,9 +141,11 @@ Response uwb_answer(const Json& settings, const Json& devices) {
 }
 
 Response get_uwb(Services& s, const Request& request) {
-  check_query(request, {});
+  check_query(request, {"devices"});
   const auto device = value_or_problem(control(s).device(path_uuid(request)));
-  return uwb_answer(ask(s, device.config.id, "get_uwb", "{}"), nullptr);
+  const bool others = query_flag(request, "devices");
+  const Json settings = ask(s, device.config.id, "get_uwb", others ? R"({"devices":true})" : "{}");
+  return uwb_answer(settings, others ? settings.value("devices", Json::array()) : Json());
 }
 
 /// Everywhere or nowhere: the tag and every device in its list, verified, else all back.

@@ -2,9 +2,13 @@
 
 #include "api/contract.hpp"
 #include "api/exports/docs_page.hpp"
+#include "api/json/procedure_json.hpp"
+#include "api/json/wire_devices.hpp"
 #include "api/live/hub.hpp"
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
+#include "core/ports/devices.hpp"
+#include "core/ports/drone.hpp"
 #include "core/ports/store.hpp"
 
 namespace anchord::api {
@@ -35,15 +39,19 @@ Response version(Services& s, const Request&) {
 
 Response system(Services& s, const Request&) {
   const StorageStatus storage = s.storage();
-  return json_response(200, {{"t_us", s.deps.clock.now().us()},
-                             {"recording", s.missions.recording()},
-                             {"queue_depth", storage.queue_depth + s.missions.queued()},
-                             {"db_bytes", storage.db_bytes},
-                             {"disk_free_bytes", storage.disk_free_bytes},
-                             {"ws_clients", s.hub.clients()},
-                             {"synchronous", storage.synchronous},
-                             {"writable", storage.writable},
-                             {"reason", storage.reason}});
+  auto* devices = s.deps.devices;
+  return json_response(
+      200, {{"t_us", s.deps.clock.now().us()},
+            {"recording", s.missions.recording()},
+            {"queue_depth", storage.queue_depth + s.missions.queued()},
+            {"db_bytes", storage.db_bytes},
+            {"disk_free_bytes", storage.disk_free_bytes},
+            {"ws_clients", s.hub.clients()},
+            {"synchronous", storage.synchronous},
+            {"writable", storage.writable},
+            {"reason", storage.reason},
+            {"clock", devices == nullptr ? Ordered(nullptr) : clock_json(devices->clock())},
+            {"drone", s.deps.drone == nullptr ? Ordered(nullptr) : drone_json(s.deps.drone->status())}});
 }
 
 Response metrics(Services& s, const Request&) {

@@ -8,6 +8,7 @@
 
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
+#include "core/types/base_station.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/range.hpp"
 
@@ -52,6 +53,7 @@ struct DeviceReport {
     bool skewed{};       ///< beyond what a crystal does: its stamps cannot be trusted
   };
   std::optional<Clock> clock{};
+  std::optional<BaseStation> base{};  ///< of an NTRIP client: where its corrections come from
 };
 
 /// Whose clock the stamps come from.

@@ -230,6 +230,9 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
   void clock(std::uint16_t slot, const ClockReading& reading) override {
     if (const auto found = entries_.find(slot); found != entries_.end()) found->second.told.clock = reading;
   }
+  void base(std::uint16_t slot, const BaseStation& station) override {
+    if (const auto found = entries_.find(slot); found != entries_.end()) found->second.told.base = station;
+  }
   void heard(std::uint16_t slot) override {
     const auto found = entries_.find(slot);
     if (found == entries_.end()) return;
@@ -336,6 +339,7 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     }
     entry.device_number = 0;
     entry.told.clock.reset();
+    entry.told.base.reset();
     if (std::exchange(entry.fed, false)) {
       ++entry.told.lost;
       try {

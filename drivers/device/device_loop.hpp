@@ -33,6 +33,7 @@ struct DeviceState {
   Identity identity;
   std::optional<RoverStatus> rover{};
   std::optional<ClockReading> clock{};  ///< of this connection
+  std::optional<BaseStation> base{};    ///< of this connection
   std::uint64_t bytes_in{0}, bytes_out{0}, frames{0}, fixes{0}, ranges{0}, opened{0}, lost{0};
   std::map<std::string, std::uint64_t> dropped;  ///< by reason
   double rows_per_s{0};                          ///< over the last five seconds

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "core/base/result.hpp"
+#include "core/types/base_station.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/range.hpp"
 #include "drivers/link/byte_link.hpp"
@@ -63,6 +64,8 @@ class DriverOutput {
   virtual void identified(const Identity& identity) = 0;
   /// Of a device that stamps by a clock of its own.
   virtual void clock(const ClockReading& reading) { (void)reading; }
+  /// Where the corrections of an NTRIP client come from.
+  virtual void base(const BaseStation& station) { (void)station; }
   /// A good frame came: what the supervisor calls talking.
   virtual void heard() = 0;
   /// Bytes or rows not used. `reason` is of a small fixed set: it becomes a metric label.

@@ -63,6 +63,7 @@ class Pipeline::Device final : public DriverOutput {
   }
   void identified(const Identity& identity) override { owner_.sink_.identified(slot_, identity); }
   void clock(const ClockReading& reading) override { owner_.sink_.clock(slot_, reading); }
+  void base(const BaseStation& station) override { owner_.sink_.base(slot_, station); }
   void heard() override { owner_.sink_.heard(slot_); }
   void dropped(std::string_view reason, std::uint64_t n) override { owner_.sink_.dropped(slot_, reason, n); }
   void answer(std::uint64_t id, Result<std::string> json) override { owner_.sink_.answer(slot_, id, json); }

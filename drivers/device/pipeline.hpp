@@ -26,6 +26,7 @@ class PipelineSink {
   virtual void rover(std::uint16_t slot, const RoverStatus& status) = 0;
   virtual void identified(std::uint16_t slot, const Identity& identity) = 0;
   virtual void clock(std::uint16_t slot, const ClockReading& reading) { (void)slot, (void)reading; }
+  virtual void base(std::uint16_t slot, const BaseStation& station) { (void)slot, (void)station; }
   virtual void heard(std::uint16_t slot) = 0;
   virtual void dropped(std::uint16_t slot, std::string_view reason, std::uint64_t n) = 0;
   virtual void answer(std::uint16_t slot, std::uint64_t command_id, const Result<std::string>& json) = 0;

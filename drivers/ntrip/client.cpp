@@ -223,7 +223,9 @@ void Client::begin_stream(const device::Arrival& at) {
 void Client::stream(std::string_view bytes) {
   if (chunked_) return unchunk(bytes);
   out_.corrections(bytes);
+  const auto before = frames_.base();
   if (frames_.feed(bytes) > 0) out_.heard();
+  if (frames_.base() && frames_.base() != before) out_.base(*frames_.base());
   if (frames_.skipped() > skipped_) out_.dropped("no_rtcm_bytes", frames_.skipped() - skipped_);
   skipped_ = frames_.skipped();
 }

@@ -1,5 +1,8 @@
 #include "drivers/ntrip/rtcm.hpp"
 
+#include <cmath>
+#include <cstddef>
+
 namespace anchord::ntrip {
 
 std::uint32_t crc24q(std::string_view bytes) {
@@ -12,6 +15,38 @@ std::uint32_t crc24q(std::string_view bytes) {
     }
   }
   return crc & 0xffffff;
+}
+
+namespace {
+
+/// Unsigned field of `n` bits from bit `from`, most significant first.
+std::uint64_t bits(std::string_view body, std::size_t from, std::size_t n) {
+  std::uint64_t out = 0;
+  for (std::size_t i = from; i < from + n; ++i)
+    out = out << 1 | (static_cast<unsigned char>(body[i / 8]) >> (7 - i % 8) & 1u);
+  return out;
+}
+
+/// Two's complement of 38 bits in steps of 0.1 mm.
+double coordinate_m(std::string_view body, std::size_t from) {
+  const std::uint64_t raw = bits(body, from, 38);
+  const auto value = static_cast<std::int64_t>(raw) - ((raw >> 37 & 1u) != 0 ? std::int64_t{1} << 38 : 0);
+  return static_cast<double>(value) * 1e-4;
+}
+
+}  // namespace
+
+std::optional<BaseStation> base_station(std::string_view body) {
+  if (body.size() < 19) return std::nullopt;
+  const auto number = bits(body, 0, 12);
+  if (number != 1005 && (number != 1006 || body.size() < 21)) return std::nullopt;
+  BaseStation out;
+  out.station = static_cast<int>(bits(body, 12, 12));
+  out.ecef_m = {coordinate_m(body, 34), coordinate_m(body, 74), coordinate_m(body, 114)};
+  if (number == 1006) out.antenna_height_m = static_cast<double>(bits(body, 152, 16)) * 1e-4;
+  const double radius_m = std::hypot(out.ecef_m[0], out.ecef_m[1], out.ecef_m[2]);
+  if (radius_m < 6.3e6 || radius_m > 6.4e6) return std::nullopt;
+  return out;
 }
 
 int RtcmCounter::feed(std::string_view bytes) {
@@ -39,6 +74,7 @@ int RtcmCounter::feed(std::string_view bytes) {
       continue;
     }
     if (length >= 2) newest_ = static_cast<int>(byte(at + 3) << 4 | byte(at + 4) >> 4);
+    if (const auto told = base_station(frame.substr(3, length))) base_ = told;
     ++good;
     at += whole;
   }

@@ -1,13 +1,21 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
+
+#include "core/types/base_station.hpp"
 
 namespace anchord::ntrip {
 
 /// CRC-24Q of RTCM 3 (polynomial 0x1864CFB, start 0).
 std::uint32_t crc24q(std::string_view bytes);
+
+/// Body (without header and checksum) of message 1005 or 1006; absent for another one, a short one, or a
+/// place that is not near the earth's surface (a base not yet told its own sends zeros). RTCM 10403.3,
+/// tables 3.5-6, 3.5-7.
+std::optional<BaseStation> base_station(std::string_view body);
 
 /// Counts whole RTCM 3 frames in a stream of corrections. The bytes themselves go on as they came: it is the
 /// rover that decodes them. Holds at most one frame.
@@ -15,13 +23,15 @@ class RtcmCounter {
  public:
   /// Good frames that end in these bytes.
   int feed(std::string_view bytes);
-  std::uint64_t skipped() const { return skipped_; }  ///< bytes that belong to no good frame
-  int newest_message() const { return newest_; }      ///< number of the last one, e.g. 1077; 0: none yet
+  std::uint64_t skipped() const { return skipped_; }                ///< bytes that belong to no good frame
+  const std::optional<BaseStation>& base() const { return base_; }  ///< the newest it told of
+  int newest_message() const { return newest_; }  ///< number of the last one, e.g. 1077; 0: none yet
 
  private:
   std::string held_;
   std::uint64_t skipped_{0};
   int newest_{0};
+  std::optional<BaseStation> base_{};
 };
 
 }  // namespace anchord::ntrip

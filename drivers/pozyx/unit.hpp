@@ -59,6 +59,7 @@ class Unit final : public device::Driver {
   Script<int> look_around();
   Script<int> execute(device::Command command);
   Script<Result<std::string>> outcome(device::Command command);
+  Script<Result<std::string>> get_uwb(std::string arguments);
   Script<Result<std::string>> set_uwb(std::string arguments);
   Script<Result<std::string>> push_positions(std::string arguments);
   Script<Result<std::string>> range_between(std::string arguments);

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "drivers/pozyx/registers.hpp"
 #include "drivers/pozyx/unit.hpp"
 
 namespace anchord::pozyx {
@@ -83,6 +84,23 @@ std::string devices_text(const std::vector<std::uint16_t>& ids) {
   Json list = Json::array();
   for (const std::uint16_t id : ids) list.push_back(to_string(NetworkId{id}));
   return Json{{"devices", list}}.dump();
+}
+
+/// How the settings of another device stand to the tag's own.
+Json compared(std::uint16_t id, const UwbSettings& own, const Result<UwbSettings>& theirs) {
+  Json out{{"network_id", to_string(NetworkId{id})}, {"done", false}};
+  if (!theirs) {
+    out["why"] = theirs.error().message;
+    return out;
+  }
+  const UwbSettings& s = theirs.value();
+  const bool same = same_air(own, s);
+  out["done"] = same;
+  if (!same) {
+    out["why"] = "has " + pozyx::to_string(s);
+    if (s.gain_db) out["why"] = out["why"].get<std::string>() + ", gain " + Json(*s.gain_db).dump() + " dB";
+  }
+  return out;
 }
 
 std::string range_text(const RangeInfo& info) {
@@ -189,9 +207,7 @@ Script<Result<std::string>> Unit::outcome(device::Command command) {
   } else if (command.name == "discover") {
     out = co_await discover();
   } else if (command.name == "get_uwb") {
-    const Result<UwbSettings> read = co_await session_->tag.uwb();
-    if (!read) co_return read.error();
-    out = to_json(read.value()).dump();
+    out = co_await get_uwb(command.arguments_json);
   } else if (command.name == "set_uwb") {
     out = co_await set_uwb(command.arguments_json);
   } else if (command.name == "push_positions") {
@@ -237,6 +253,31 @@ Script<Result<std::string>> Unit::discover() {
     for (const std::uint16_t id : seen) anchors_[id];
   }
   co_return devices_text(seen);
+}
+
+Script<Result<std::string>> Unit::get_uwb(std::string arguments) {
+  const Json json = object_of(arguments);
+  const bool others = json.is_object() && json.value("devices", Json(false)) == Json(true);
+  const Result<UwbSettings> own = co_await session_->tag.uwb();
+  if (!own) co_return own.error();
+  Json out = to_json(own.value());
+  if (others) {
+    // Three tries of a second each for one that is silent: the answer must come while somebody waits for it.
+    constexpr std::int64_t k_patience_ns = 15'000'000'000;
+    const std::int64_t until_ns = session_->wire.now_ns() + k_patience_ns;
+    std::vector<std::uint16_t> ids;
+    for (const auto& [id, anchor] : anchors_) ids.push_back(id);
+    out["devices"] = Json::array();
+    for (const std::uint16_t id : ids) {
+      Result<Bytes> registers = make_error(Errc::link_lost, "not asked: the others took too long");
+      if (session_->wire.now_ns() < until_ns)
+        registers = co_await session_->tag.remote_read(id, reg::uwb_channel, 4);
+      out_.heard();  // it ranged to nobody meanwhile
+      Result<UwbSettings> theirs = registers ? uwb_settings(registers.value()) : registers.error();
+      out["devices"].push_back(compared(id, own.value(), theirs));
+    }
+  }
+  co_return out.dump();
 }
 
 Script<Result<std::string>> Unit::set_uwb(std::string arguments) {

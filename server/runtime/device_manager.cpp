@@ -56,6 +56,7 @@ DeviceReport report_of(const DeviceConfig& config, const device::DeviceState& s)
   }
   if (s.clock)
     out.clock = DeviceReport::Clock{s.clock->drift_ppm, s.clock->sigma_s, s.clock->settled, s.clock->skewed};
+  out.base = s.base;
   return out;
 }
 

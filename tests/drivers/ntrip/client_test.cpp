@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <utility>
@@ -47,6 +48,30 @@ TEST(Crc24q, OfTheStandardsExampleIsItsOwn) {
   EXPECT_EQ(counter.feed(k_1005 + "\xd3\xd3junk" + k_1005), 2);
   EXPECT_EQ(counter.newest_message(), 1005);
   EXPECT_EQ(counter.skipped(), 6u);
+}
+
+TEST(BaseStation, OfTheStandardsExampleIsItsOwn) {
+  const auto base = base_station(std::string_view(k_1005).substr(3, 19));
+  ASSERT_TRUE(base);
+  EXPECT_EQ(base->station, 2003);
+  EXPECT_NEAR(base->ecef_m[0], 1114104.5999, 1e-9);
+  EXPECT_NEAR(base->ecef_m[1], -4850729.7108, 1e-9);
+  EXPECT_NEAR(base->ecef_m[2], 3975521.4643, 1e-9);
+  EXPECT_FALSE(base->antenna_height_m);
+}
+
+TEST(BaseStation, HasItsAntennaHeightIn1006AndIsNotGuessedFromAnythingElse) {
+  // The example's number raised by one, and 1.5234 m behind it.
+  std::string body(std::string_view(k_1005).substr(3, 19));
+  body[1] = static_cast<char>(static_cast<unsigned char>(body[1]) + 0x10);
+  EXPECT_FALSE(base_station(body)) << "1006 without its height is cut";
+  body += std::string("\x3b\x82", 2);
+  ASSERT_TRUE(base_station(body));
+  EXPECT_NEAR(base_station(body)->antenna_height_m.value_or(0), 1.5234, 1e-9);
+  std::string zeros(std::string_view(k_1005).substr(3, 19));
+  std::fill(zeros.begin() + 4, zeros.end(), '\0');
+  EXPECT_FALSE(base_station(zeros)) << "the centre of the earth";
+  for (std::size_t n = 0; n < 19; ++n) EXPECT_FALSE(base_station(std::string_view(k_1005).substr(3, n)));
 }
 
 TEST(Base64, AsInRfc4648) {

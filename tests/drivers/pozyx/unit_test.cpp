@@ -174,6 +174,23 @@ TEST(PozyxUnit, DoesWhatTheOperatorAsks) {
   EXPECT_GT(flight.sink.ranges.size(), before + 30) << "ranging goes on with the new settings";
 }
 
+TEST(PozyxUnit, TellsWhichAnchorHasOtherSettingsThanTheTag) {
+  Flight flight(R"({"anchors":["0x6001","0x6002","0x6666"]})");
+  flight.run(3);
+  const std::string told = flight.ask("get_uwb", R"({"devices":true})");
+  EXPECT_NE(told.find(R"({"done":true,"network_id":"0x6001"},{"done":true,"network_id":"0x6002"})"),
+            std::string::npos)
+      << told;
+  EXPECT_NE(told.find(R"({"done":false,"network_id":"0x6666","why":"0x6666 does not answer)"),
+            std::string::npos)
+      << told;
+  // The tag alone goes to another channel: nobody is heard there.
+  EXPECT_NE(flight.ask("set_uwb", R"({"channel":2,"all":false})").find("\"channel\":2"), std::string::npos);
+  const std::string alone = flight.ask("get_uwb", R"({"devices":true})");
+  EXPECT_EQ(alone.find("\"done\":true"), std::string::npos) << alone;
+  EXPECT_EQ(flight.ask("get_uwb").find("devices"), std::string::npos);
+}
+
 TEST(PozyxUnit, IdentifiesATagOrAnAnchorByItsLights) {
   Flight flight;
   flight.run(3);
