@@ -92,6 +92,12 @@ Response remove(Services& s, const Request& request) {
   return response;
 }
 
+/// The request is sound; it is the device that cannot, does not answer, or answers rubbish.
+bool of_the_device(const Error& error) {
+  return error.code == Errc::unsupported || error.code == Errc::link_lost || error.code == Errc::bad_frame ||
+         error.code == Errc::checksum_mismatch;
+}
+
 Response act(Services& s, const Request& request) {
   const auto device = value_or_problem(control(s).device(path_uuid(request)));
   std::vector<FieldError> errors;
@@ -106,9 +112,7 @@ Response act(Services& s, const Request& request) {
   const auto result =
       control(s).act(device.config.id, *action, arguments == nullptr ? "{}" : arguments->dump());
   s.audit(request, "device.action " + to_string(device.config.id) + " " + *action, result ? "ok" : "failed");
-  if (!result && (result.error().code == Errc::unsupported || result.error().code == Errc::link_lost)) {
-    throw_problem(422, "state", result.error().message);
-  }
+  if (!result && of_the_device(result.error())) throw_problem(422, "state", result.error().message);
   auto json = Ordered::parse(accepted(result), nullptr, false);
   return json_response(
       200, {{"action", *action}, {"result", json.is_discarded() ? Ordered(nullptr) : std::move(json)}});
@@ -117,8 +121,7 @@ Response act(Services& s, const Request& request) {
 /// What the device says to a question; its state is the client's 422.
 Json ask(Services& s, const Uuid& id, std::string_view action, const std::string& arguments) {
   const auto result = control(s).act(id, action, arguments);
-  if (!result && (result.error().code == Errc::unsupported || result.error().code == Errc::link_lost))
-    throw_problem(422, "state", result.error().message);
+  if (!result && of_the_device(result.error())) throw_problem(422, "state", result.error().message);
   auto json = Json::parse(accepted(result), nullptr, false);
   return json.is_discarded() ? Json() : json;
 }

@@ -9,7 +9,7 @@ export type CommandState = 'sent' | 'accepted' | 'refused' | 'unconfirmed';
 export interface Spot { readonly lon: number; readonly lat: number; readonly height_m: number | null; readonly plan_m: Vec3 | null }
 export interface CommandMsg { readonly number: number; readonly action: string; readonly state: CommandState; readonly text: string; readonly by: string; readonly t_us: number }
 export interface AnchorTask { readonly anchor: string; readonly done: boolean; readonly why: string; readonly iterations: number }
-export interface DroneMsg { readonly connected: boolean; readonly mode: string; readonly armed: boolean; readonly in_air: boolean; readonly taken_over: boolean; readonly failsafe: boolean; readonly battery: number | null; readonly above_home_m: number | null; readonly text: string; readonly autopilot: string }
+export interface DroneMsg { readonly connected: boolean; readonly silent_s: number | null; readonly gps_fix: number | null; readonly mode: string; readonly armed: boolean; readonly in_air: boolean; readonly taken_over: boolean; readonly failsafe: boolean; readonly battery: number | null; readonly above_home_m: number | null; readonly text: string; readonly autopilot: string }
 export interface ControlMsg { readonly holder: string; readonly since_us: number; readonly expires_us: number }
 export interface ProcedureMsg {
   readonly mission: string; readonly t_us: number; readonly plan: string | null; readonly plan_name: string; readonly plan_revision: number; readonly mode: 'auto' | 'manual'; readonly status: FlightStatus; readonly step: Step; readonly reason: string;
@@ -33,17 +33,21 @@ function spot(o: Record<string, unknown> | null): Spot | null {
   return lon === null || lat === null ? null : { lon, lat, height_m: num(o?.height_above_ground_m), plan_m: vec3(o?.enu_m) };
 }
 
+export function drone(v: unknown): DroneMsg | null {
+  const d = obj(v);
+  return d && { connected: d.connected === true, silent_s: num(d.silent_s), mode: str(d.mode), armed: d.armed === true, in_air: d.in_air === true, taken_over: d.taken_over === true, failsafe: d.failsafe === true, battery: num(d.battery), above_home_m: num(d.above_home_m), text: str(d.text), autopilot: str(d.autopilot), gps_fix: num(d.gps_fix) };
+}
 export function procedure(v: unknown): ProcedureMsg | null {
   const o = obj(v);
   if (!o || !str(o.mission)) return null;
-  const target = spot(obj(o.target)), alarm = obj(o.alarm), d = obj(o.drone), c = obj(o.control);
+  const target = spot(obj(o.target)), alarm = obj(o.alarm), c = obj(o.control);
   return {
     mission: str(o.mission), t_us: count(o.t_us), plan: str(o.plan) || null, plan_name: str(o.plan_name), plan_revision: count(o.plan_revision), mode: word(o.mode, ['auto', 'manual'] as const, 'auto'),
     status: word(o.status, ['ready', 'running', 'hold', 'return', 'landing', 'done', 'aborted'] as const, 'ready'), step: word(o.step, STEPS, 'ready'), reason: str(o.reason), in_step_s: num(o.in_step_s), step_limit_s: num(o.step_limit_s), elapsed_s: num(o.elapsed_s),
     waypoint: count(o.waypoint), n_waypoints: count(o.n_waypoints), part: count(o.part), k: count(o.k), iteration: count(o.iteration), target: target && { ...target, heading_deg: num(obj(o.target)?.heading_deg) }, distance_m: num(o.distance_m),
     anchors: list(o.anchors).map((a) => ({ anchor: str(a.network_id), done: a.done === true, why: str(a.why), iterations: count(a.iterations) })), battery_needed: num(o.battery_needed),
     alarm: alarm && { id: str(alarm.id), reaction: str(alarm.reaction), text: str(alarm.text) },
-    drone: d && { connected: d.connected === true, mode: str(d.mode), armed: d.armed === true, in_air: d.in_air === true, taken_over: d.taken_over === true, failsafe: d.failsafe === true, battery: num(d.battery), above_home_m: num(d.above_home_m), text: str(d.text), autopilot: str(d.autopilot) },
+    drone: drone(o.drone),
     control: c && { holder: str(c.holder), since_us: count(c.since_us), expires_us: count(c.expires_us) },
     commands: list(o.commands).map((x) => ({ number: count(x.number), action: str(x.action), state: word(x.state, ['sent', 'accepted', 'refused', 'unconfirmed'] as const, 'sent'), text: str(x.text), by: str(x.by), t_us: count(x.t_us) })),
   };

@@ -7,7 +7,9 @@ import { system } from '../../state/store';
 import { bytes, fixed, grouped } from '../../ui/format';
 import { Chip } from '../../ui/marks';
 import { AccessPanel, AuditPanel } from './access';
+import { BasePanel, LeverPanel } from './base';
 import { DevicesPanel } from './devices';
+import { TimePanel } from './time';
 
 export function System() {
   useEffect(() => { document.title = 'System - anchord'; }, []);
@@ -15,6 +17,9 @@ export function System() {
     <div class="system" data-testid="system" tabIndex={0} role="region" aria-label="System">
       <h1 class="sr">System</h1>
       <DevicesPanel />
+      <BasePanel />
+      <LeverPanel />
+      <TimePanel />
       <HealthPanel />
       {may('admin') && <AccessPanel />}
       {may('admin') && <AuditPanel />}

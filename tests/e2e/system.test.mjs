@@ -1,0 +1,129 @@
+// Devices on the dashboard: simulated ones with faults, over real ptys and sockets, and a caster. What is wrong is said at a glance, with what to do, and
+// what can be mended there is mended there.
+import assert from 'node:assert/strict';
+import { spawn } from 'node:child_process';
+import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { createServer } from 'node:net';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { createInterface } from 'node:readline';
+import { after, before, test } from 'node:test';
+import { openBrowser, openPage, picture, text, violations } from './browser.mjs';
+import { binary, eventually, startServer } from './server.mjs';
+
+// The example of message 1005 in RTCM 10403: station 2003, ECEF 1114104.5999, -4850729.7108, 3975521.4643.
+const RTCM_1005 = Buffer.from('d300133ed7d30202980edeef34b4bd62ac0941986f33360b98', 'hex');
+
+let folder, simulator, server, browser, caster;
+const made = {}, served = {};
+const get = async (path) => (await server.fetch(path)).json();
+const add = async (name, json) => {
+  const answer = await server.fetch('/api/v1/devices', { json: { name, ...json } });
+  assert.equal(answer.status, 201, await answer.clone().text());
+  made[name] = (await answer.json()).id;
+};
+
+before(async () => {
+  folder = mkdtempSync(join(tmpdir(), 'anchord system '));
+  const always = { from_s: 0, until_s: 1e5 };
+  writeFileSync(join(folder, 'scenario.json'), JSON.stringify({
+    schema: 'anchord.scenario/1', name: 'faults', seed: 5,
+    tags: [{ name: 'good', id: '0x6e01' }, { name: 'refusing', id: '0x6e02' }],
+    rovers: [{ name: 'rover', format: 'ubx', port: 'tcp', rate_hz: 5 }, { name: 'cellar', format: 'nmea', port: 'tcp', rate_hz: 5 }],
+    faults: [{ device: 'refusing', kind: 'refuse', ...always }, { device: 'cellar', kind: 'fix_loss', ...always }],
+    radio: { loss_chance: 0, sensitivity_dbm: -130 },
+  }));
+  simulator = spawn(binary, ['simulate', join(folder, 'scenario.json'), '--json', '--links', folder], { stdio: ['ignore', 'pipe', 'inherit'] });
+  await new Promise((done, fail) => {
+    createInterface({ input: simulator.stdout }).on('line', (line) => {
+      const device = JSON.parse(line);
+      served[device.name] = device;
+      if (Object.keys(served).length === 4) done();
+    });
+    simulator.once('exit', (code) => fail(new Error(`anchord simulate ended with ${code}`)));
+  });
+  caster = createServer((socket) => {
+    socket.once('data', () => socket.write(Buffer.concat([Buffer.from('ICY 200 OK\r\n\r\n'), RTCM_1005])));
+    const timer = setInterval(() => socket.write(RTCM_1005), 500);
+    socket.on('error', () => undefined).on('close', () => clearInterval(timer));
+  });
+  await new Promise((done) => caster.listen(0, '127.0.0.1', done));
+  server = await startServer();
+  for (const name of ['good', 'refusing', 'cellar']) await add(name, { kind: served[name].kind, address: served[name].address });
+  // As somebody in a hurry types it: a port on which nothing listens.
+  await add('rover', { kind: 'gnss', address: 'tcp://127.0.0.1:9' });
+  await add('same port', { kind: 'pozyx', address: `serial:${served.good.pty}` });
+  browser = await openBrowser();
+});
+after(async () => {
+  await browser?.close();
+  await server?.dispose();
+  simulator?.kill('SIGTERM');
+  caster?.close();
+  if (folder) rmSync(folder, { recursive: true, force: true });
+});
+
+const word = async (id, name) => text(id(`device-${made[name]}`).locator('.chip'));
+
+test('each device says at a glance whether it works, and what to do where it does not', async () => {
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/system' });
+  const expected = { good: 'WORKING', refusing: 'NO RANGES', cellar: 'NO FIX', rover: 'NEVER SEEN', 'same port': 'PORT TWICE' };
+  for (const [name, wanted] of Object.entries(expected)) await eventually(`${name} is ${wanted}`, async () => (await word(id, name)) === wanted, 30_000, 200);
+  assert.match(await text(id(`device-${made.refusing}`)), /refuses to range.*Reboot/);
+  assert.match(await text(id(`device-${made['same port']}`)), /the same port as device "good"/);
+  assert.match(await text(id('device-summary')), /4 need you.*1 working/);
+  await id(`device-${made.refusing}`).getByTestId('details').click();
+  await id('drops').getByText('the tag refused to range').waitFor();
+  assert.deepEqual(await violations(page), []);
+  await picture(page, 'devices-light');
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});
+
+test('a wrong address is mended in its form, and the device works', async () => {
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/system' });
+  await id(`device-${made.rover}`).getByTestId('details').click();
+  await id('edit-device').click();
+  await id('device-port').fill('70000');
+  await id('device-form').getByText('A port number is 1 to 65535.').waitFor();
+  assert.ok(await id('device-send').isDisabled());
+  await id('device-port').fill(String(served.rover.port));
+  await id('device-send').click();
+  await eventually('the rover works', async () => (await word(id, 'rover')) === 'WORKING', 20_000, 200);
+  assert.equal((await get(`/api/v1/devices/${made.rover}`)).address, served.rover.address);
+  assert.match(await text(id(`device-${made.rover}`)), /FIX, \d+ satellites/);
+  await eventually('the time is the receiver\'s', async () => /TIME OF THE RECEIVER/.test(await text(id('clocks'))), 30_000, 200);
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});
+
+test('a caster is set up in the form, and tells where the base stands', async () => {
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/system' });
+  await id('add-device').click();
+  await id('device-kind').selectOption('ntrip');
+  await id('device-host').fill('127.0.0.1');
+  await id('device-port').fill(String(caster.address().port));
+  assert.ok(await id('device-send').isDisabled(), 'no mount point yet');
+  await id('device-mount').fill('NEAR');
+  await id('device-send').click();
+  await id('base-place').waitFor();
+  // Of that ECEF by the textbook's iteration on WGS 84, apart from this code.
+  const shown = (await text(id('base-place'))).replaceAll('\u202f', '');
+  for (const part of ['38.804759430', '−77.064773596', '114.561', 'Station2003']) assert.ok(shown.includes(part), `${part} in ${shown}`);
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});
+
+test('the radio of a tag is compared with every anchor in its reach', async () => {
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/system' });
+  const row = id(`device-${made.good}`);
+  await eventually('it works', async () => (await word(id, 'good')) === 'WORKING', 30_000, 200);
+  await row.getByTestId('radio-open').click();
+  await id('radio-compared').waitFor({ timeout: 30_000 });
+  const { devices } = await get(`/api/v1/devices/${made.good}/uwb-settings?devices=true`);
+  assert.ok(devices.length >= 3 && devices.every((d) => d.done), JSON.stringify(devices));
+  await id('radio-compared').getByText(/^ ?All \d+ anchors it knows have the same settings\.$/).waitFor();
+  assert.deepEqual(await violations(page), []);
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});
