@@ -13,6 +13,7 @@ describe('what a device stands for', () => {
     expect(said({}, recent(0, { refused: 80 }))).toEqual(['bad', 'NO RANGES']);
     expect(said({}, recent(0, { zero_distance: 60 }))).toEqual(['bad', 'NO RANGES']);
     expect(said({}, recent(0))).toEqual(['bad', 'NO RANGES']);
+    expect(standing(device({}), recent(0, { stray_line: 1 })).what).toContain('knows no anchor');
     expect(said({}, recent(10, { bad_reply: 69, no_answer: 5 }))).toEqual(['caution', 'FEW RANGES']);
   });
   it('waits for five seconds of looking before it complains', () => expect(standing(device({}), { span_s: 2, rows: 0, dropped: {} }).word).toBe('WORKING'));
@@ -23,6 +24,7 @@ describe('what a device stands for', () => {
     expect(said(rover('float'))).toEqual(['caution', 'FLOAT']);
     expect(said(rover('single'))).toEqual(['bad', 'SINGLE']);
     expect(said(rover('none'), recent(0, { no_fix: 50 }))).toEqual(['bad', 'NO FIX']);
+    expect(said({ kind: 'gnss', rover: null }, recent(0, { no_time: 50 }))).toEqual(['bad', 'NO FIX']);
     expect(said({ kind: 'gnss', rover: null }, recent(0, { no_ellipsoidal_height: 50 }))).toEqual(['bad', 'NO POSITIONS']);
     expect(said(rover('fixed'), recent(50, { byte_outside_any_frame: 560 }))).toEqual(['caution', 'NOISY']);
   });

@@ -29,10 +29,12 @@ export const flights = (): Promise<Flight[]> => items('/missions?limit=5', (o) =
   tags: (Array.isArray(o.tags) ? o.tags : []).map(obj).flatMap((t) => { const arm_m = vec3(t?.lever_arm_body_m); return t && arm_m ? [{ tag: str(t.tag), antenna: num(t.antenna) ?? 0, arm_m }] : []; }),
 }));
 const valued = (v: unknown): Valued => ({ value: num(obj(v)?.value), sigma: num(obj(v)?.sigma) });
-/// null: the kit has learned nothing yet.
-export async function kit(name: string): Promise<Kit | null> {
-  try {
-    const o = obj(await request('GET', `/devices/${encodeURIComponent(name)}/profile`)), next = obj(o?.next_flight), bias = obj(o?.bias);
-    return o && { kit: str(o.kit), n_flights: num(o.n_flights) ?? 0, lag_s: valued(next?.lag_s), lever_up_m: valued(next?.lever_up_m), bias_m: valued(next?.bias_m), calibrated: bias?.calibrated === true };
-  } catch { return null; }
+/// What the kit of the newest flight has learned; null where it has learned nothing yet: a profile comes with the first calibration of a kit's flights.
+export async function kit_of(list: readonly Flight[]): Promise<Kit | null> {
+  const name = list.find((f) => f.kit)?.kit;
+  if (!name) return null;
+  const solved = (await items('/calibrations?limit=50&fields=id,missions', (o) => (Array.isArray(o.missions) ? o.missions : []))).flat();
+  if (!list.some((f) => f.kit === name && solved.includes(f.id))) return null;
+  const o = obj(await request('GET', `/devices/${encodeURIComponent(name)}/profile`)), next = obj(o?.next_flight), bias = obj(o?.bias);
+  return o && { kit: str(o.kit), n_flights: num(o.n_flights) ?? 0, lag_s: valued(next?.lag_s), lever_up_m: valued(next?.lever_up_m), bias_m: valued(next?.bias_m), calibrated: bias?.calibrated === true };
 }

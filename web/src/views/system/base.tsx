@@ -2,7 +2,7 @@
 import { useEffect, useState } from 'preact/hooks';
 import { said } from '../../api/client';
 import { devices as fetch_devices, type Device } from '../../api/devices';
-import { change_site, create_site, flights as fetch_flights, kit as fetch_kit, sites as fetch_sites, type BaseSource, type Flight, type Kit, type Site } from '../../api/site';
+import { change_site, create_site, flights as fetch_flights, kit_of, sites as fetch_sites, type BaseSource, type Flight, type Kit, type Site } from '../../api/site';
 import { may } from '../../state/session';
 import { say } from '../../state/store';
 import { accuracy, fixed, latlon, plain } from '../../ui/format';
@@ -23,7 +23,7 @@ export function BasePanel() {
     fetch_sites().then(set_list, (e: unknown) => set_problem(said(e)));
     fetch_devices().then((all) => set_bases(all.filter((d) => d.kind === 'ntrip' && d.enabled)), () => undefined);
   };
-  useEffect(() => { load(); const timer = setInterval(load, 10_000); return () => clearInterval(timer); }, []);
+  useEffect(() => { load(); const timer = setInterval(load, 3000); return () => clearInterval(timer); }, []);
   const site = list?.find((s) => s.id === chosen) ?? list?.[0] ?? null, words = site && base_words(site), told = bases.find((d) => d.base)?.base ?? null, admin = may('admin');
   return (
     <section class="sys-p" data-testid="base">
@@ -75,7 +75,7 @@ const POINTS: Record<string, string> = { gnss_antenna: 'the GNSS antenna', body:
 /// Where the UWB antennas sit from the point whose track is flown: of the newest flight, with what its kit has learned of it.
 export function LeverPanel() {
   const [flight, set_flight] = useState<Flight | null | undefined>(undefined), [kit, set_kit] = useState<Kit | null>(null);
-  useEffect(() => { fetch_flights().then((all) => { const newest = all.find((f) => f.tags.length > 0) ?? all[0] ?? null; set_flight(newest); if (newest?.kit) void fetch_kit(newest.kit).then(set_kit); }, () => set_flight(null)); }, []);
+  useEffect(() => { fetch_flights().then((all) => { const newest = all.find((f) => f.tags.length > 0) ?? all[0] ?? null; set_flight(newest); kit_of(all).then(set_kit, () => undefined); }, () => set_flight(null)); }, []);
   const none = flight && flight.track_point !== 'tag_antenna' && (flight.tags.length === 0 || flight.tags.every((t) => t.arm_m.every((x) => x === 0)));
   return (
     <section class="sys-p" data-testid="levers">

@@ -78,10 +78,11 @@ const LOW_FIX: Readonly<Record<string, readonly [Tone, string, string]>> = {
 };
 /// Of a tag or rover whose link is good: does it deliver what it is there for?
 function delivering(d: Device, recent: Lately): Standing {
-  const drops = lost_messages(recent.dropped), [first] = by_count(recent.dropped), known = recent.span_s >= 5;
+  // One stray line is no reason; what comes once in two seconds is.
+  const drops = lost_messages(recent.dropped), [first] = by_count(recent.dropped).filter(([, n]) => 2 * n >= recent.span_s), known = recent.span_s >= 5;
   if (d.kind === 'pozyx') {
     // A failed exchange now and then is the air; more than half of them is a fault.
-    const none = known && recent.rows === 0, many = known && drops > recent.rows;
+    const none = known && recent.rows === 0, many = known && drops > recent.rows && first !== undefined;
     if (none || many) {
       const word = none ? 'NO RANGES' : 'FEW RANGES', say = (what: string, todo: string): Standing => (none ? bad(word, what, todo) : caution(word, what, todo)), most = none ? 'Every' : 'Nearly every';
       if (!first) return say('The tag talks, but it knows no anchor to range to.', 'Switch anchors on in its reach. If they are on, their radio settings differ: Radio.');
@@ -93,7 +94,8 @@ function delivering(d: Device, recent: Lately): Standing {
     }
   }
   if (d.kind === 'gnss') {
-    const fix = d.rover?.fix ?? null, low = fix === null ? undefined : LOW_FIX[fix];
+    // A receiver that never had a fix knows no time either: nothing of it is an epoch yet.
+    const fix = d.rover?.fix ?? (known && recent.rows === 0 && (first?.[0] === 'no_time' || first?.[0] === 'no_fix') ? 'none' : null), low = fix === null ? undefined : LOW_FIX[fix];
     if (low) return stand(low[0] === 'bad' ? 'bad' : 'caution', low[0], low[1], fix === 'none' ? 'The receiver talks, but it has no position.' : fix === 'float' ? 'The position is good to decimetres, not centimetres; ranges taken now weigh less.' : 'The position is good to metres only.', low[2]);
     if (known && recent.rows === 0) return bad('NO POSITIONS', first ? `It talks, but nothing of it can be used: ${dropped_words(first[0])}.` : 'It talks, but sends no positions.', first?.[0] === 'no_ellipsoidal_height' ? 'Let the receiver send the height above the ellipsoid (GGA with geoid separation, or UBX NAV-PVT).' : 'Let the receiver send positions: GGA with GST, UBX NAV-PVT, ERB or LLH.');
     if (d.rover?.age_s != null && d.rover.age_s > 5) return caution('OLD FIX', `The corrections are ${Math.round(d.rover.age_s)} s old.`, 'Check the radio link to the base, or the caster.');

@@ -1,7 +1,7 @@
 /// Clocks: whose time stamps what, how far the others are from it; and the aircraft as its autopilot tells.
 import { useEffect, useState } from 'preact/hooks';
 import { devices as fetch_devices, type Device } from '../../api/devices';
-import { flights as fetch_flights, kit as fetch_kit, type Kit } from '../../api/site';
+import { flights as fetch_flights, kit_of, type Kit } from '../../api/site';
 import { clock_and_drone, type ServerClock } from '../../api/system';
 import type { DroneMsg } from '../../live/flight_messages';
 import { age, fixed, percent } from '../../ui/format';
@@ -15,7 +15,7 @@ export function TimePanel() {
   useEffect(() => {
     const ask = (): void => { Promise.all([clock_and_drone(), fetch_devices()]).then(([now, devices]) => set_look({ ...now, devices }), () => undefined); };
     ask();
-    void fetch_flights().then((all) => { const name = all.find((f) => f.kit)?.kit; if (name) void fetch_kit(name).then(set_kit); }, () => undefined);
+    fetch_flights().then(kit_of).then(set_kit, () => undefined);
     const timer = setInterval(ask, 3000);
     return () => clearInterval(timer);
   }, []);
