@@ -200,7 +200,7 @@ Framer::Step Framer::nmea(std::string_view rest, bool final) const {
     if (rest[i] == '\r' || rest[i] == '\n') return {Step::Kind::skip, 1, {}, "nmea: no checksum"};
     if (rest[i] == '$') return {Step::Kind::skip, 1, {}, "nmea: another sentence starts inside"};
     if (!printable(rest[i])) return {Step::Kind::skip, 1, {}, "nmea: byte that is no text"};
-    if (i >= k_max_nmea) return {Step::Kind::skip, 1, {}, "nmea: longer than 256 bytes"};
+    if (i >= k_max_nmea) return {Step::Kind::skip, 1, {}, "nmea: longer than 1024 bytes"};
     sum ^= byte(rest, i);
   }
   if (rest.size() < i + 3) return final ? Step{Step::Kind::skip, 1, {}, "nmea: cut off at the end"} : Step{};

@@ -17,8 +17,9 @@ struct Frame {
   std::uint64_t offset{};  ///< of its first byte in the stream
 };
 
-/// Longest frames believed. A longer one is taken for noise and the search goes on at its second byte.
-inline constexpr std::size_t k_max_nmea = 256, k_max_ubx_payload = 8192, k_max_erb_payload = 645,
+/// Longest frames believed; of NMEA, a receiver's own $PUBX,03 of 40 satellites is 1000 bytes. A longer one
+/// is taken for noise and the search goes on at its second byte.
+inline constexpr std::size_t k_max_nmea = 1024, k_max_ubx_payload = 8192, k_max_erb_payload = 645,
                              k_max_llh = 1024, k_max_gpsd = 16'384;
 
 /// Cuts a byte stream into frames; all formats share one buffer and the earliest complete valid frame wins.

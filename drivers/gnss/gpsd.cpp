@@ -1,6 +1,7 @@
 #include "drivers/gnss/gpsd.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -75,7 +76,7 @@ std::optional<int> satellites_of(const Json& sky) {
 }
 
 /// A TPV as an epoch. errors: bad_frame (no mode, off the globe).
-Result<Epoch> report_of(const Json& tpv) {
+Result<Epoch> epoch_of(const Json& tpv) {
   const auto mode = small_integer(tpv, "mode");
   if (!mode) return bad("TPV without mode");
   Epoch out;
@@ -144,32 +145,34 @@ Result<Assembler::Device*> Assembler::device_of(std::optional<std::string> path)
   return &devices_[last_];
 }
 
-Result<void> Assembler::line(std::string_view text, Epochs& out) {
-  if (too_deep(text)) return bad("nested too deeply");
-  const Json json = Json::parse(text.begin(), text.end(), nullptr, false);
-  if (!json.is_object()) return bad("not a JSON object");
-  const auto name = json.find("class");
-  if (name == json.end() || !name->is_string()) return bad("no class");
-  const auto& kind = name->get_ref<const std::string&>();
-  if (kind != "TPV" && kind != "GST" && kind != "SKY") return boost::outcome_v2::success();
+struct Assembler::Report {
+  const Json& json;
+  std::string_view kind;
 
-  const auto at = json.find("device");
-  const bool named = at != json.end() && at->is_string();
-  BOOST_OUTCOME_TRY(auto* known, device_of(named ? std::optional(at->get<std::string>()) : std::nullopt));
+  std::optional<std::string> device() const {
+    const auto at = json.find("device");
+    if (at == json.end() || !at->is_string()) return std::nullopt;
+    return at->get<std::string>();
+  }
+};
+
+Result<void> Assembler::take(const Report& report, Epochs& out) {
+  const Json& json = report.json;
+  BOOST_OUTCOME_TRY(auto* known, device_of(report.device()));
   Device& device = *known;
-  if (kind == "SKY") {
+  if (report.kind == "SKY") {
     // Servers since 3.23 tell the DOPs and the satellites in reports of their own.
     if (const auto hdop = number(json, "hdop")) device.hdop = hdop;
     if (const auto satellites = satellites_of(json)) device.satellites = satellites;
     return boost::outcome_v2::success();
   }
   const auto time = time_of(json);
-  if (kind == "TPV") {
-    BOOST_OUTCOME_TRY(auto report, report_of(json));
-    report.time = time;
-    if (!time && report.fix == FixClass::none) return boost::outcome_v2::success();  // nothing yet
+  if (report.kind == "TPV") {
+    BOOST_OUTCOME_TRY(auto epoch, epoch_of(json));
+    epoch.time = time;
+    if (!time && epoch.fix == FixClass::none) return boost::outcome_v2::success();  // nothing yet
     if (!time) return make_error(Errc::unsupported, "time absent or not readable");
-    device.merge(report, out);
+    device.merge(epoch, out);
     return boost::outcome_v2::success();
   }
 
@@ -182,6 +185,31 @@ Result<void> Assembler::line(std::string_view text, Epochs& out) {
     device.publish(out);
   }
   return boost::outcome_v2::success();
+}
+
+Result<void> Assembler::line(std::string_view text, Epochs& out) {
+  if (too_deep(text)) return bad("nested too deeply");
+  const Json json = Json::parse(text.begin(), text.end(), nullptr, false);
+  if (!json.is_object()) return bad("not a JSON object");
+  const auto name = json.find("class");
+  if (name == json.end() || !name->is_string()) return bad("no class");
+  const auto& kind = name->get_ref<const std::string&>();
+  if (kind == "TPV" || kind == "GST" || kind == "SKY") return take({json, kind}, out);
+  Result<void> done = boost::outcome_v2::success();
+  if (kind != "POLL") return done;
+  // An answer to ?POLL holds the newest of each; a GST ends an epoch, so it comes last.
+  constexpr std::array<std::pair<const char*, std::string_view>, 3> k_lists{
+      {{"sky", "SKY"}, {"tpv", "TPV"}, {"gst", "GST"}}};
+  for (const auto& [key, of] : k_lists) {
+    const auto list = json.find(key);
+    if (list == json.end() || !list->is_array()) continue;
+    for (const auto& one : *list) {
+      if (!one.is_object()) continue;
+      auto taken = take({one, of}, out);
+      if (done && !taken) done = std::move(taken);
+    }
+  }
+  return done;
 }
 
 }  // namespace anchord::gnss::gpsd

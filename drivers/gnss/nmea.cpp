@@ -89,9 +89,11 @@ Result<Message> parse_gga(FieldReader f) {
   Gga out;
   if (f.count() < 13) f.fail(f.count());
   out.tod_ns = f.tod_ns(1);
-  out.lat_deg = f.angle(2, 90, 'N', 'S');
-  out.lon_deg = f.angle(4, 180, 'E', 'W');
   out.quality = f.integer(6);
+  if (out.quality.value_or(0) > 0) {  // without a fix some makers print 8960 degrees and minutes here
+    out.lat_deg = f.angle(2, 90, 'N', 'S');
+    out.lon_deg = f.angle(4, 180, 'E', 'W');
+  }
   out.satellites = f.integer(7);
   out.hdop = f.not_negative(8);
   out.height_msl_m = f.number(9);
@@ -135,8 +137,10 @@ Result<Message> parse_rmc(FieldReader f) {
   if (f.count() < 10) f.fail(f.count());
   out.tod_ns = f.tod_ns(1);
   out.valid = f.text(2) == "A";
-  out.lat_deg = f.angle(3, 90, 'N', 'S');
-  out.lon_deg = f.angle(5, 180, 'E', 'W');
+  if (out.valid) {
+    out.lat_deg = f.angle(3, 90, 'N', 'S');
+    out.lon_deg = f.angle(5, 180, 'E', 'W');
+  }
   if (const auto knots = f.not_negative(7)) out.speed_mps = *knots * k_mps_per_knot;
   out.course_deg = f.number(8);
   if (const auto date = f.text(9); !date.empty()) {

@@ -148,6 +148,19 @@ TEST(Nmea, RefusesWhatIsOutOfItsDomainThoughTheChecksumIsRight) {
   }
 }
 
+// SiRF before its first fix: a latitude that cannot be, marked as no fix. The time is good all the same.
+TEST(Nmea, TakesTheTimeOfASentenceWhosePositionIsAPlaceholder) {
+  Skips skips;
+  const auto epochs = decode(sentence("GPGGA,235946.00,8960.000000,N,00000.0,E,0,0,,137.0,M,13.0,M,,") +
+                                 sentence("GPRMC,235946.00,V,36000.0,N,72000.0,E,0.0,,190120,,,N"),
+                             {}, &skips);
+  ASSERT_EQ(epochs.size(), 1U);
+  EXPECT_EQ(to_rfc3339(epochs[0].time.value()), "2020-01-19T23:59:46.000000Z");
+  EXPECT_EQ(epochs[0].fix, FixClass::none);
+  EXPECT_FALSE(epochs[0].lat_deg || epochs[0].height_msl_m);
+  EXPECT_TRUE(skips.entries().empty());
+}
+
 TEST(Nmea, UsesRmcAloneWhereNoGgaComes) {
   const auto e = decode(sentence("GNRMC,120000.00,A,5101.0,N,00342.0,E,0,0,130624,,,R")).at(0);
   EXPECT_EQ(e.fix, FixClass::rtk_fixed);
@@ -225,6 +238,17 @@ TEST(Nmea, SaysWhyAPositionThatWasNotMeasuredIsMissing) {
   EXPECT_EQ(decode(gga("120000.00", "6") + gga("120001.00", "8") + gga("120002.00", "5"), {}, &skips).size(),
             3U);
   EXPECT_EQ(skips["nmea: quality 6 to 9, dead reckoning or not measured"], 2U);
+}
+
+// $PUBX,03 and their like are longer than the 256 bytes that positions need, and no noise.
+TEST(NmeaFraming, TakesLongSentencesOfAMakersOwn) {
+  std::string satellites = "PUBX,03,32";
+  for (int i = 0; i < 32; ++i) satellites += ",12,U,207,43,28,009";
+  Skips skips;
+  EXPECT_EQ(decode(sentence(satellites) + k_rmc + k_gga, {}, &skips).size(), 1U);
+  EXPECT_TRUE(skips.entries().empty());
+  decode("$" + std::string(2000, 'A') + "\r\n", {}, &skips);
+  EXPECT_EQ(skips["nmea: longer than 1024 bytes"], 1U);
 }
 
 }  // namespace

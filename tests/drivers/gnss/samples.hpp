@@ -82,6 +82,11 @@ inline const std::string k_rmc =
     "$GNRMC,090000.20,A,5101.3687380,N,00342.6274020,E,0.70,109.44,130624,,,D*47\r\n";
 inline const std::string k_gst = "$GNGST,090000.20,0.231,0.021,0.012,35.2,0.014,0.009,0.021*79\r\n";
 
+// Recorded with gpsd 3.22; the TPV is the format's description's.
+inline const std::string k_tpv =
+    R"({"class":"TPV","device":"udp://127.0.0.1:29471","status":4,"mode":3,"time":"2024-06-15T23:59:54.000Z","ept":0.005,"lat":51.022879722,"lon":3.710443322,"altHAE":63.5760,"altMSL":18.6140,"alt":18.6140,"track":277.8400,"speed":3.925,"climb":0.210,"geoidSep":44.962,"eph":4.275})"
+    "\r\n";
+
 inline std::string erb_epoch() {
   return k_erb_ver + k_erb_pos + k_erb_stat + k_erb_dops + k_erb_vel + k_erb_rtk;
 }
