@@ -29,6 +29,13 @@ std::shared_ptr<const ml::Model>* slot(ml::ModelSet& set, const std::string& tas
   return nullptr;
 }
 
+bool needs_cir(const ml::Model& model) {
+  return std::ranges::any_of(model.info.features, [](const std::string& name) {
+    const auto feature = nlos::feature_of(name);
+    return feature && std::ranges::find(k_of_cir, *feature) != k_of_cir.end();
+  });
+}
+
 void put_lacking(const ml::Model* model, const nlos::FeatureVector& features, std::string& out) {
   if (model == nullptr) return;
   for (const auto& name : model->info.features) {
@@ -69,10 +76,23 @@ Result<ModelRegistry::Active> load_models(ModelStore& store, const std::map<std:
     if (place == nullptr) return make_error(Errc::invalid_argument, "there is no task " + task);
     BOOST_OUTCOME_TRY(*place, read_model(store, id));
     out.models[task] = id;
-    for (const auto& name : (*place)->info.features) {
-      const auto feature = nlos::feature_of(name);
-      out.needs_cir |= feature && std::find(k_of_cir.begin(), k_of_cir.end(), *feature) != k_of_cir.end();
-    }
+    out.needs_cir |= needs_cir(**place);
+  }
+  BOOST_OUTCOME_TRY(out.predictor, ml::Predictor::make(std::move(set)));
+  return out;
+}
+
+Result<ModelRegistry::Active> models_together(std::vector<ml::Model> models, ml::Correction how) {
+  ModelRegistry::Active out;
+  out.correction = how;
+  ml::ModelSet set;
+  for (auto& model : models) {
+    const std::string task(ml::task_name(model.info.task));
+    auto* place = slot(set, task);
+    if (place == nullptr || *place)
+      return make_error(Errc::invalid_argument, "two models of the task " + task);
+    out.needs_cir |= needs_cir(model);
+    *place = std::make_shared<const ml::Model>(std::move(model));
   }
   BOOST_OUTCOME_TRY(out.predictor, ml::Predictor::make(std::move(set)));
   return out;

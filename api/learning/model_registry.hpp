@@ -64,4 +64,8 @@ inline constexpr std::string_view k_correction_task = "correction";
 Result<ModelRegistry::Active> load_models(ModelStore& store, const std::map<std::string, ModelId>& models,
                                           ml::Correction how);
 
+/// The same without a store: each model takes the place of the task it was trained for.
+/// errors: invalid_argument (two of one task), those of Predictor::make
+Result<ModelRegistry::Active> models_together(std::vector<ml::Model> models, ml::Correction how);
+
 }  // namespace anchord::api

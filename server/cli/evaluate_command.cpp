@@ -1,10 +1,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <fstream>
-#include <iterator>
 #include <memory>
 
-#include "api/json/model_artifact.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"
 
@@ -43,11 +40,8 @@ Result<Gathered> gather(const EvaluateArguments& a, const ml::ModelInfo& info) {
 }
 
 int evaluate(const EvaluateArguments& a) {
-  std::ifstream file(a.model, std::ios::binary);
-  if (!file) return refuse("evaluate", a.model + ": cannot be read");
-  std::string text(std::istreambuf_iterator<char>(file), {});
-  auto model = api::read_model_artifact(text);
-  if (!model) return refuse("evaluate", a.model + ": " + model.error().message);
+  auto model = read_model_file(a.model);
+  if (!model) return refuse("evaluate", model.error().message);
   if (a.threshold >= 0 && model.value().classifier) model.value().classifier->threshold = a.threshold;
 
   auto gathered = gather(a, model.value().info);

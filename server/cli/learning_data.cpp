@@ -4,8 +4,10 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 
 #include "api/imports/gzip_lines.hpp"
+#include "api/json/model_artifact.hpp"
 
 namespace anchord::cli {
 
@@ -124,6 +126,21 @@ bool write_whole(const std::string& path, const std::string& text) {
 int refuse(const char* command, const std::string& message) {
   std::fprintf(stderr, "anchord %s: %s\n", command, message.c_str());
   return 2;
+}
+
+Result<ml::Model> read_model_file(const std::string& path) {
+  std::error_code failed;
+  const auto bytes = std::filesystem::file_size(path, failed);
+  if (failed) return make_error(Errc::not_found, path + ": cannot be read");
+  // Refused by its size before it is read: nothing hostile fills the memory.
+  if (bytes > api::k_max_artifact_bytes)
+    return make_error(Errc::bad_frame, path + ": larger than any model artifact");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return make_error(Errc::not_found, path + ": cannot be read");
+  const std::string text(std::istreambuf_iterator<char>(file), {});
+  auto model = api::read_model_artifact(text);
+  if (!model) return make_error(model.error().code, path + ": " + model.error().message);
+  return model;
 }
 
 }  // namespace anchord::cli

@@ -47,6 +47,10 @@ struct FrozenRows {
 Result<FrozenRows> rows_for(const DataOptions& options, const FrozenFile& file, ml::Task task,
                             const std::vector<std::string>& features);
 
+/// A model artifact, refused by its size before it is read. errors: not_found, those of read_model_artifact,
+/// with the file's name
+Result<ml::Model> read_model_file(const std::string& path);
+
 /// Written beside and renamed, so that whoever dies half-way leaves no half file.
 bool write_whole(const std::string& path, const std::string& text);
 

@@ -2,12 +2,9 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <memory>
 
 #include "api/exports/model_report.hpp"
-#include "api/json/model_artifact.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"
 
@@ -20,21 +17,6 @@ struct ModelsArguments {
   bool json{false};
 };
 
-Result<ml::Model> read_model(const std::string& path) {
-  std::error_code failed;
-  const auto bytes = std::filesystem::file_size(path, failed);
-  if (failed) return make_error(Errc::not_found, path + ": cannot be read");
-  // Refused by its size before it is read: nothing hostile fills the memory.
-  if (bytes > api::k_max_artifact_bytes)
-    return make_error(Errc::bad_frame, path + ": larger than any model artifact");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return make_error(Errc::not_found, path + ": cannot be read");
-  const std::string text(std::istreambuf_iterator<char>(file), {});
-  auto model = api::read_model_artifact(text);
-  if (!model) return make_error(model.error().code, path + ": " + model.error().message);
-  return model;
-}
-
 int list(const ModelsArguments& a) {
   std::error_code failed;
   std::vector<std::string> paths;
@@ -45,7 +27,7 @@ int list(const ModelsArguments& a) {
   std::sort(paths.begin(), paths.end());
   std::vector<api::NamedModel> models;
   for (const auto& path : paths)  // other JSON files in the folder are none of ours
-    if (auto model = read_model(path)) models.push_back({path, std::move(model).value()});
+    if (auto model = read_model_file(path)) models.push_back({path, std::move(model).value()});
   std::fputs((a.json ? api::models_json(models) : api::models_text(models)).c_str(), stdout);
   return 0;
 }
@@ -53,7 +35,7 @@ int list(const ModelsArguments& a) {
 int show(const ModelsArguments& a) {
   std::vector<api::NamedModel> models;
   for (const auto& path : a.files) {
-    auto model = read_model(path);
+    auto model = read_model_file(path);
     if (!model) return refuse("models", model.error().message);
     models.push_back({path, std::move(model).value()});
   }
@@ -67,7 +49,7 @@ int show(const ModelsArguments& a) {
 int check(const ModelsArguments& a) {
   bool good = true;
   for (const auto& path : a.files) {
-    const auto model = read_model(path);
+    const auto model = read_model_file(path);
     good = good && model.has_value();
     if (model)
       std::printf("%s: good\n", path.c_str());

@@ -9,9 +9,11 @@
 #include "api/imports/flight_folder.hpp"
 #include "api/json/clues_json.hpp"
 #include "api/json/kit_profile_json.hpp"
+#include "api/learning/flight_models.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "core/localize/kit_prior.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/learning_data.hpp"
 #include "server/cli/solve_report.hpp"
 
 namespace anchord::cli {
@@ -27,6 +29,8 @@ struct Arguments {
   int dims{3};
   std::optional<double> bias_m, height_m;
   std::string profile, out, clues;
+  std::vector<std::string> models;
+  std::string likelihood{"one_sided"};
   SolveReportOptions report;
 };
 
@@ -98,6 +102,32 @@ Result<std::vector<FlightData>> read_all(const std::vector<std::string>& folders
   return flights;
 }
 
+/// What the service does with promoted models, with the artifacts named.
+Result<void> apply_models(const Arguments& a, std::vector<FlightData>& flights) {
+  if (a.models.empty()) return boost::outcome_v2::success();
+  if (!a.profile.empty())
+    return make_error(
+        Errc::invalid_argument,
+        "--models and --profile: a kit's profile tells the bias of raw ranges, and of corrected "
+        "ones it would be taken off twice");
+  std::vector<ml::Model> models;
+  for (const auto& file : a.models) {
+    BOOST_OUTCOME_TRY(auto model, read_model_file(file));
+    models.push_back(std::move(model));
+  }
+  BOOST_OUTCOME_TRY(const auto together, api::models_together(std::move(models), ml::Correction::weighted));
+  for (auto& flight : flights) {
+    const auto report = api::correct_flight(together, flight, a.likelihood == "one_sided");
+    std::fprintf(stderr, "  %s: models corrected %zu of %zu ranges, by %.3f m on average, and weigh %zu\n",
+                 flight.mission.name.c_str(), report.n_corrected, report.n_ranges, report.mean_correction_m,
+                 report.n_believed);
+    if (report.n_corrected + report.n_believed == 0)
+      return make_error(Errc::invalid_argument,
+                        flight.mission.name + ": the models say nothing of its ranges: " + report.note);
+  }
+  return boost::outcome_v2::success();
+}
+
 std::vector<const FlightData*> pointers(const std::vector<FlightData>& flights) {
   std::vector<const FlightData*> all;
   for (const auto& flight : flights) all.push_back(&flight);
@@ -107,8 +137,9 @@ std::vector<const FlightData*> pointers(const std::vector<FlightData>& flights) 
 int solve(const Arguments& a) {
   const auto options = options_of(a);
   if (!options) return complain(options.error());
-  const auto flights = read_all(a.folders);
+  auto flights = read_all(a.folders);
   if (!flights) return complain(flights.error());
+  if (const auto corrected = apply_models(a, flights.value()); !corrected) return complain(corrected.error());
   std::fprintf(stderr, "solving %zu flight%s\n", flights.value().size(),
                flights.value().size() == 1 ? "" : "s");
   const auto solutions = solve_flights(pointers(flights.value()), options.value());
@@ -211,6 +242,12 @@ void add_solve_command(CLI::App& app, int& exit_code) {
   command->add_option(
       "--clues", arguments->clues,
       "JSON: outline, bearings, heights, RSS that tell an anchor from its twin (docs/formats.md)");
+  command->add_option("--models", arguments->models,
+                      "Model artifacts (anchord train) that correct and weigh the ranges, one a task");
+  command
+      ->add_option("--likelihood", arguments->likelihood,
+                   "With --models: one_sided, the models' own likelihood, or loss, their corrections alone")
+      ->check(CLI::IsMember({"one_sided", "loss"}));
   command->add_option("--format", arguments->format, "table, json, geojson or csv, on standard output")
       ->check(CLI::IsMember({"table", "json", "geojson", "csv"}));
   command->add_option("--report", arguments->report.file,

@@ -3,10 +3,13 @@
 #include <sys/wait.h>
 
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <random>
+#include <sstream>
 #include <string>
 
 #include "tests/paths.hpp"
@@ -84,6 +87,91 @@ TEST_F(SolveCommand, TakesTheProfileItMade) {
   ASSERT_EQ(run("profile fit " + quoted() + " --out " + kit).exit_code, 0);
   EXPECT_NE(run("profile show " + kit).out.find("1 flights"), std::string::npos);
   EXPECT_EQ(run("solve " + quoted() + " --profile " + kit).exit_code, 0);
+}
+
+/// Levels of one range: behind a wall 7 dB more of the first path are lost.
+std::string levels(bool blocked, double distance_m, std::mt19937_64& random) {
+  std::normal_distribution<double> noise(0, 1);
+  const double rx_dbm = -75 - 0.3 * distance_m + noise(random);
+  return std::to_string(rx_dbm) + ',' + std::to_string(rx_dbm - (blocked ? 9.0 : 2.0) + 1.2 * noise(random));
+}
+
+/// What a wall adds: 0.2 m, and an exponential delay of 0.5 m.
+double late_m(std::mt19937_64& random) {
+  return 0.2 + std::exponential_distribution<double>(1 / 0.5)(random);
+}
+
+TEST_F(SolveCommand, CorrectsAndWeighsRangesWithTheModelsNamed) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> noise(0, 1);
+  {
+    std::ofstream campaign(folder_ / "campaign.csv");
+    campaign << "environment,setting,true_distance_m,los,range_m,rx_dbm,fp_dbm\n";
+    for (int room = 0; room < 6; ++room) {
+      for (int k = 0; k < 40; ++k) {
+        const bool blocked = k % 2 == 1;
+        const double distance_m = 2.0 + 0.8 * k;
+        campaign << "room " << room << ",s" << room * 40 + k << ',' << distance_m << ',' << !blocked << ','
+                 << 1.05 * distance_m + 0.05 * noise(random) + (blocked ? late_m(random) : 0) << ','
+                 << levels(blocked, distance_m, random) << '\n';
+      }
+    }
+  }
+  // A constant the flight would find by itself; a radio whose metre is 5 cm too long it does not.
+  std::ifstream in(folder_ / "ranges.csv");
+  std::string line, all;
+  std::getline(in, line);
+  ASSERT_EQ(line, "t_s,tag_id,antenna,anchor_id,range_m,rx_dbm,fp_dbm,rss_dbm,seq");
+  all = line + '\n';
+  while (std::getline(in, line)) {
+    std::vector<std::string> cells;
+    std::istringstream row(line);
+    for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
+    ASSERT_GE(cells.size(), 5U) << line;
+    const double distance_m = std::stod(cells[4]);
+    all += cells[0] + ',' + cells[1] + ',' + cells[2] + ',' + cells[3] + ',' +
+           std::to_string(1.05 * distance_m) + ',' + levels(false, distance_m, random) + ",,\n";
+  }
+  in.close();
+  std::ofstream(folder_ / "ranges.csv") << all;
+  const std::string model = "'" + (folder_ / "bias.json").string() + "'";
+  ASSERT_EQ(run("train --task bias --data '" + (folder_ / "campaign.csv").string() +
+                "' --group-by environment --placement setting --out " + model)
+                .exit_code,
+            0);
+  const auto error_m = [&](const std::string& more) {
+    const Answer answer = run("solve " + quoted() + " --format json" + more);
+    EXPECT_EQ(answer.exit_code, 0);
+    const auto flight = nlohmann::json::parse(answer.out)["flights"][0];
+    EXPECT_EQ(flight["notes"].dump().find("likelihood of a model") != std::string::npos, !more.empty());
+    std::ifstream truth(folder_ / "anchors_truth.csv");
+    std::string row;
+    std::getline(truth, row);
+    double sum_m = 0;
+    int n = 0;
+    while (std::getline(truth, row)) {
+      std::istringstream cells(row);
+      std::string id, lat, lon;
+      std::getline(cells, id, ',');
+      std::getline(cells, lat, ',');
+      std::getline(cells, lon, ',');
+      for (const auto& anchor : flight["anchors"]) {
+        if (anchor["anchor_id"] != id) continue;
+        const double north_m = (anchor["lat"].get<double>() - std::stod(lat)) * 111'200;
+        const double east_m =
+            (anchor["lon"].get<double>() - std::stod(lon)) * 111'200 * std::cos(std::stod(lat) / 57.2957795);
+        sum_m += std::hypot(north_m, east_m);
+        ++n;
+      }
+    }
+    EXPECT_EQ(n, 6);
+    return sum_m / n;
+  };
+  const double raw_m = error_m(""), with_m = error_m(" --models " + model);
+  std::printf("ranges a twentieth too long: off by %.3f m raw, %.3f m with the model\n", raw_m, with_m);
+  EXPECT_LT(with_m, 0.7 * raw_m);
+  EXPECT_EQ(run("solve " + quoted() + " --models " + model + " " + model).exit_code, 2) << "one a task";
+  EXPECT_EQ(run("solve " + quoted() + " --models /nowhere.json").exit_code, 2);
 }
 
 }  // namespace
