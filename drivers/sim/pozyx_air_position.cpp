@@ -54,9 +54,9 @@ bool PozyxAir::position(PozyxStation& self, ByteView parameters, double now_s, P
   write(self, reg::pos_interval, Bytes{0, 0}, now_s);  // a single position ends the continuous ones
   const double took_s = 4 * air_s(self);
   Random& random = (asker ? *asker : self).random;
-  // By then a host has long read the acknowledgement, unless it is one that never does.
-  constexpr double k_patience_s = 0.02;
-  if (asker) asker->rx_full_until_s = now_s + took_s + k_patience_s;
+  // As with ranges; but who gets flags does not read the acknowledgement at all, and need not be waited for.
+  const double patience_s = newer(self.device) ? 0.02 : 0.1;
+  if (asker) asker->rx_full_until_s = now_s + took_s + patience_s;
   const auto done = [this, &self, &random, asker, flags](double at_s) {
     if (!locate(self, at_s, random) || !asker) return;
     std::optional<Bytes> data = self.device.read(reg::pos_x, 12);

@@ -216,10 +216,13 @@ PozyxDevice::Answer PozyxDevice::save(ByteView parameters) {
   return {};
 }
 
+/// Offset 0..1015 and 1..49 coefficients are what the description allows, each for itself. It does not say
+/// what follows the last coefficient: a published reader of the maker's client asks 49 at 980 all the same
+/// and goes on with what it gets, so that it is answered here, with zeros.
 PozyxDevice::Answer PozyxDevice::impulse(ByteView parameters) const {
   if (parameters.size() != 3) return {false, {}};
   const std::size_t offset = u16_at(parameters, 0), count = parameters[2];
-  if (count < 1 || count > k_max_cir_per_call || offset + count > 1016) return {false, {}};
+  if (offset >= 1016 || count < 1 || count > k_max_cir_per_call) return {false, {}};
   Answer answer;
   for (std::size_t i = 2 * offset; i < 2 * (offset + count); ++i)
     put_u16(answer.result, i < impulse_.size() ? static_cast<std::uint16_t>(impulse_[i]) : 0);

@@ -83,6 +83,18 @@ TEST(SimulatedTag, KeepsTheImpulseResponseUntilTheNextReception) {
   host.range("0260");
   EXPECT_NE(first, whole());
   EXPECT_EQ(host.ask("F,c8,c80332,201"), "D,00") << "50 coefficients are too many";
+  EXPECT_EQ(host.ask("F,c8,f80301,5"), "D,00") << "there is no coefficient 1016";
+}
+
+// A published reader asks for 49 coefficients at each of 0, 49 .. 980, in room for 48: the last ones do not
+// exist.
+TEST(SimulatedTag, AnswersAReadOfTheImpulseResponseBeyondItsEnd) {
+  Host host(open_field());
+  host.range("0160");
+  const std::string last = host.ask("F,c8,d40324,145"), beyond = host.ask("F,c8,d40331,193");
+  EXPECT_EQ(beyond.size(), 2 + 2 * 193u);
+  EXPECT_EQ(beyond.substr(0, last.size()), last);
+  EXPECT_EQ(beyond.substr(last.size()), std::string(2 * 48, '0'));
 }
 
 TEST(SimulatedTag, RangesBetweenTwoOthers) {
