@@ -17,8 +17,8 @@ struct TagPosition {
   Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();
 };
 
-/// The tag's own positioning: damped Gauss-Newton over equally weighted ranges, from a metre below the middle
-/// of the anchors. The firmware's method is not published; this one stands for any.
+/// The tag's own positioning: damped Gauss-Newton over equally weighted ranges, from below and above the
+/// middle of the anchors. The firmware's method is not published; this one stands for any.
 ///
 /// solve_z   false: the height is height_m and only the plane is searched
 /// returns   nothing below three anchors (four with the height), or where they do not determine it

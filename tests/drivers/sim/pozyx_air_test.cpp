@@ -103,6 +103,19 @@ TEST(SimulatedTags, PositionInTheFrameOfTheirDeviceList) {
   EXPECT_EQ(host.ask("F,b8,,9"), "D,010160026003600460") << "automatic selection tells whom it took";
 }
 
+TEST(SimulatedTags, PositionThemselvesAboveTheirAnchorsToo) {
+  for (const double height_m : {-4.0, 8.0}) {
+    Scenario scenario = two_tags();
+    scenario.path[0].enu_m.z() = height_m;
+    Host host(scenario);
+    tell_anchors(host);
+    host.ask("R,05,1");
+    host.ask("F,b6,,1");
+    EXPECT_EQ(host.poll(event::pos | event::err, 0.5), event::pos);
+    EXPECT_NEAR(coordinates_m(parse_reply(host.ask("R,30,12"), 12).value()).z(), height_m, 1.0);
+  }
+}
+
 TEST(SimulatedTags, GiveNoPositionWithoutEnoughAnchorsOrFromOnePlace) {
   Host host(two_tags());
   host.ask("F,b6,,1");
