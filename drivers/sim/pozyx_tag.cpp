@@ -73,9 +73,11 @@ Bytes PozyxTag::call(const Command& command, double now_s) {
   } else {
     answer = air_->call(*self_, command.address, command.data, now_s);
   }
+  // As many bytes as were asked for: hosts ask for whole lists and for more ranges than there are, and find
+  // zeros after the last. Only a refusal is short.
   Bytes out = answer.with_status();
-  if (out.size() > command.count) out.resize(command.count);
-  return out;  // fewer than asked where the function refuses or has no more
+  if (answer.accepted || out.size() > command.count) out.resize(command.count);
+  return out;
 }
 
 int PozyxTag::flashes(NetworkId id) const {

@@ -174,7 +174,8 @@ TEST(SimulatedTag, GivesItsPositionWithDataOnNewerFirmwareOnly) {
   EXPECT_EQ(host.ask("F,b6,,1"), "D,01");
   EXPECT_NE(host.poll(event::pos | event::err, 1) & event::pos, 0);
   const std::string position = host.ask("R,30,12"), with_data = host.ask("F,cc,0100,73");
-  EXPECT_EQ(with_data, "D,01" + position.substr(2) + "01");  // three coordinates and a status
+  // Three coordinates, a status, and zeros up to what was asked for.
+  EXPECT_EQ(with_data, "D,01" + position.substr(2) + "01" + std::string(2 * 59, '0'));
   scenario.tags[0].firmware = 0x11;
   Host old(scenario);
   EXPECT_EQ(old.ask("F,cc,0100,73"), "D,00");
