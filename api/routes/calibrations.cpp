@@ -1,5 +1,7 @@
+#include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "api/exports/evidence.hpp"
 #include "api/json/live_writer.hpp"
 #include "api/json/reader.hpp"
 #include "api/json/wire_resources.hpp"
@@ -295,6 +297,31 @@ Response report(Services& s, const Request& request) {
   return response;
 }
 
+/// What each range says against the answer, as kept with the calibration; ?anchor= only those to one.
+Response residuals(Services& s, const Request& request) {
+  check_query(request, {"anchor"});
+  const auto wanted = query_network_id(request, "anchor");
+  const auto calibration = value_or_problem(s.deps.anchors.calibration(path_id<CalibrationId>(request)));
+  const auto text = value_or_problem(s.deps.anchors.evidence(calibration.id));
+  const auto flights = text.empty() ? Evidence{}.flights : value_or_problem(parse_evidence(text)).flights;
+  Ordered items = Ordered::array();
+  const auto number = [](double value) { return std::isfinite(value) ? Ordered(value) : Ordered(nullptr); };
+  for (std::size_t i = 0; i < flights.size() && i < calibration.missions.size(); ++i) {
+    for (const auto& [anchor, rows] : flights[i].residuals) {
+      if (wanted && anchor != *wanted) continue;
+      for (const auto& r : rows)
+        items.push_back({{"mission", to_string(calibration.missions[i])},
+                         {"network_id", to_string(anchor)},
+                         {"t_us", r.time.us()},
+                         {"distance_m", number(r.distance_m)},
+                         {"residual_m", number(r.residual_m)},
+                         {"standardised", number(r.standardised)},
+                         {"weight", number(r.weight)}});
+    }
+  }
+  return json_response(200, {{"items", std::move(items)}});
+}
+
 Response revisions(Services& s, const Request& request) {
   check_query(request, {"limit", "cursor", "fields"});
   const auto page = page_query(request);
@@ -338,6 +365,7 @@ void add_calibration_routes(Router& router, Services& s) {
                 return response;
               }});
   router.add({Method::get, "/api/v1/calibrations/{id}/report", readers(), on(report)});
+  router.add({Method::get, "/api/v1/calibrations/{id}/residuals", readers(), on(residuals)});
   router.add({Method::post, "/api/v1/calibrations/{id}/publish", Access::any_of({Role::engineer, Role::op}),
               on(publish)});
   router.add({Method::get, "/api/v1/revisions", readers(), on(revisions)});

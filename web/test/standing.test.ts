@@ -33,6 +33,12 @@ describe('what a device stands for', () => {
     expect([twin.word, twin.what]).toEqual(['ID TWICE', '0x6e07 is also device "twin".']);
     expect(said({ clock: { drift_ppm: 899, sigma_s: 1e-4, settled: true, skewed: true } })).toEqual(['bad', 'CLOCK WRONG']);
   });
+  it('tells a tag that was moved to another port from two tags with one id', () => {
+    const conflict = '0x6e02 is also device "new" (01a1ff6b-46f3-7fd2-b37d-f69d00c91ff0)', was = { state: 'lost', reason: '/dev/x: no such device: is it plugged in and powered?', conflict };
+    expect(standing(device(was), recent(0))).toMatchObject({ word: 'ELSEWHERE', tone: 'caution', what: '0x6e02 speaks as device "new".' });
+    expect(standing(device({ conflict }), recent(300), false).word).toBe('WORKING');
+    expect(standing(device(was), recent(0), false).word).toBe('UNPLUGGED');
+  });
   it('gives the command of a port that may not be opened', () => {
     const s = standing(device({ state: 'lost', reason: '/dev/ttyACM0: permission denied: it belongs to group uucp; run "sudo usermod -aG uucp $USER" and log in again' }), recent(0));
     expect([s.word, s.command]).toEqual(['NOT ALLOWED', 'sudo usermod -aG uucp $USER']);

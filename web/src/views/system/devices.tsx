@@ -30,7 +30,7 @@ function use_devices(): { readonly all: readonly Device[] | null; readonly rows:
     }, (e: unknown) => set_problem(said(e)));
   };
   useEffect(() => { load(); const timer = setInterval(load, 2000); return () => clearInterval(timer); }, []);
-  const rows = (all ?? []).filter((d) => d.id !== null).map((d) => { const recent = lately(looks.current.get(d.id!) ?? []); return { d, recent, s: standing(d, recent) }; });
+  const rows = (all ?? []).filter((d) => d.id !== null).map((d) => { const recent = lately(looks.current.get(d.id!) ?? []); const twin = all!.some((o) => o.id !== null && o.id !== d.id && o.network_id !== null && o.network_id === d.network_id && o.state !== 'lost' && o.state !== 'off' && o.state !== 'found'); return { d, recent, s: standing(d, recent, twin) }; });
   return { all, rows, problem, load };
 }
 

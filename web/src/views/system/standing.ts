@@ -105,11 +105,14 @@ function delivering(d: Device, recent: Lately): Standing {
   }
   return stand('ok', 'ok', 'WORKING');
 }
-export function standing(d: Device, recent: Lately): Standing {
+/// `twin_speaks`: another device here with this one's id has a link.
+export function standing(d: Device, recent: Lately, twin_speaks = true): Standing {
   if (!d.enabled || d.state === 'off') return stand('off', 'off', 'OFF');
-  if (/is also device/.test(d.conflict)) return bad('ID TWICE', sentence(without_ids(d.conflict)), 'Two tags with one id cannot be told apart: switch one of them off, or give it another id with the maker\'s tool.');
+  const twin = twin_speaks && /is also device/.test(d.conflict), linked = d.state !== 'lost' && d.state !== 'found';
+  if (twin && !linked) return caution('ELSEWHERE', sentence(without_ids(d.conflict).replace('is also', 'speaks as')), 'If the tag was moved to another port: forget this one. If these are two tags: one needs another id.');
+  if (twin) return bad('ID TWICE', sentence(without_ids(d.conflict)), 'Two tags with one id cannot be told apart: switch one of them off, or give it another id with the maker\'s tool.');
   if (d.state === 'found' && (d.counters.opened ?? 0) === 0 && !d.reason.includes(':')) return stand('found', 'info', 'OPENING', 'Its link is being opened.');
-  if (d.state === 'lost' || d.state === 'found') return not_linked(d);
+  if (!linked) return not_linked(d);
   if (d.state === 'silent') return silent(d, total(recent.dropped) > (recent.dropped.no_reply ?? 0) || /make no frame/.test(d.reason));
   if (d.state === 'open' && (d.counters.opened ?? 0) > 1) return caution('OPENED AGAIN', 'Its link was lost and is open again.', 'Nothing readable came yet; this takes some seconds.');
   if (d.state === 'open') return stand('estimating', 'info', 'OPENING', 'Waiting for the first readable bytes.');
