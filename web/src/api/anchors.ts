@@ -15,9 +15,11 @@ export interface AnchorRow extends EstimateMsg {
   readonly calibrated_at: string | null;
   readonly revision: number | null;
   readonly crs: string;
+  readonly calibration: string | null;     ///< that it comes from; null of a running estimate
+  readonly building: string; readonly floor: string; readonly height_msl_m: number | null;
 }
 
-export const row_of_estimate = (e: EstimateMsg): AnchorRow => ({ ...e, name: '', absolute_h95_m: null, absolute_v95_m: null, calibrated_at: null, revision: null, crs: '', gates: [], acceptable: null, override: '' });
+export const row_of_estimate = (e: EstimateMsg): AnchorRow => ({ ...e, name: '', absolute_h95_m: null, absolute_v95_m: null, calibrated_at: null, revision: null, crs: '', gates: [], acceptable: null, override: '', calibration: null, building: '', floor: '', height_msl_m: null });
 
 const gates_of = (v: unknown): Gate[] => (Array.isArray(v) ? v.map(obj).filter((o) => o !== null && str(o.name) !== '').map((o) => ({ name: str(o!.name), value: num(o!.value), limit: num(o!.limit), passed: o!.passed === true, why: str(o!.why) })) : []);
 const point = (v: unknown): { lon: number | null; lat: number | null; h_m: number | null } => {
@@ -56,6 +58,7 @@ export function row_of(p: Record<string, unknown>, geometry: unknown): AnchorRow
     ...base, ellipse95: ellipse(relative?.ellipse95) ?? (cov && ellipse_from_covariance(cov)), mirror: twin, probability: base.probability ?? (twin?.probability == null ? null : 1 - twin.probability),
     name: str(p.name), absolute_h95_m: num(absolute?.h95_m), absolute_v95_m: num(absolute?.v95_m), calibrated_at: str(p.calibrated_at) || null, revision: num(p.revision), crs: crs_words(p.crs),
     gates: gates_of(quality?.gates), acceptable: typeof quality?.acceptable === 'boolean' ? quality.acceptable : null, override: str(obj(quality?.override)?.reason),
+    calibration: str(provenance?.calibration) || null, building: str(p.building), floor: str(p.floor), height_msl_m: num(p.height_orthometric_m),
   };
 }
 export function rows_of_collection(answer: unknown): { rows: AnchorRow[]; revision: number | null } {
@@ -80,8 +83,14 @@ export async function calibrate(mission: string, key: string): Promise<Calibrati
 }
 /// An anchor that fails a gate goes out only with the reason a person gives for it.
 export interface Override { readonly network_id: string; readonly reason: string }
-export async function publish(calibration: string, note: string, overrides: readonly Override[], key: string): Promise<number | null> {
-  const body = { ...(note ? { note } : {}), ...(overrides.length ? { overrides } : {}) };
+/// The revision's note carries who was left out by a person, and why: 500 characters at most.
+export function note_of(note: string, out: readonly (readonly [string, string])[]): string {
+  const words = out.map(([id, why]) => `${id}${why.trim() ? ` (${why.trim()})` : ''}`).join(', ');
+  return [note.trim(), words && `Left out: ${words}.`].filter(Boolean).join(' ').slice(0, 500);
+}
+/// `only`: those a person chose; null: all that pass every gate.
+export async function publish(calibration: string, note: string, overrides: readonly Override[], key: string, only: readonly string[] | null = null): Promise<number | null> {
+  const body = { ...(note ? { note } : {}), ...(only ? { anchors: only } : {}), ...(overrides.length ? { overrides } : {}) };
   return num(obj(await request('POST', `/calibrations/${encodeURIComponent(calibration)}/publish`, body, { 'Idempotency-Key': key }))?.revision);
 }
 

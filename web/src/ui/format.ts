@@ -23,6 +23,12 @@ export function latlon(deg: number | null | undefined): string {
   const [whole, part] = fixed(deg, 9).split('.') as [string, string];
   return `${whole}.${part.replace(/(\d{3})(?=\d)/g, '$1\u202f')}`;
 }
+/// Degrees, minutes and seconds with the hemisphere: 51°01′23.45298″ N. Five decimals of a second are 0.3 mm. Carries are whole: never 60″.
+export function dms(deg: number | null | undefined, axis: 'lat' | 'lon'): string {
+  if (deg == null || !Number.isFinite(deg)) return MISSING;
+  const units = Math.round(Math.abs(deg) * 3600 * 1e5), s = units % 6_000_000, m = Math.floor(units / 6_000_000) % 60, d = Math.floor(units / 360_000_000);
+  return `${d}°${String(m).padStart(2, '0')}′${(s / 1e5).toFixed(5).padStart(8, '0')}″\u00a0${axis === 'lat' ? (deg < 0 ? 'S' : 'N') : deg < 0 ? 'W' : 'E'}`;
+}
 /// What is pasted elsewhere: plain ASCII.
 export const plain = (v: number | null | undefined, decimals: number): string => (v == null ? '' : v.toFixed(decimals));
 

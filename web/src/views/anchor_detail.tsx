@@ -1,9 +1,11 @@
 import type { AnchorRow } from '../api/anchors';
-import { age, accuracy, bearing, date, fixed, latlon, metres, percent, plain } from '../ui/format';
+import { age, accuracy, bearing, date, dms, fixed, latlon, metres, percent, plain } from '../ui/format';
 import { CopyBox } from '../ui/copy_box';
 import { Mark, Q, StatusChip } from '../ui/marks';
 import { GATES, gate_words, why_not_done, VERDICT_WORDS } from '../ui/words';
+import { choice } from './anchor_columns';
 import { AnchorPast } from './anchor_past';
+import { AnchorResiduals } from './anchor_residuals';
 import { Convergence } from './convergence';
 import { FacilityPanel } from './facility';
 import { Covariance, Loupe } from './loupe';
@@ -19,8 +21,8 @@ export function AnchorDetail({ row: r, live, changed }: { row: AnchorRow; live: 
         <div class="hd big"><h2>{r.anchor}</h2>{r.name && <span class="meta">{r.name}</span>}<StatusChip status={r.status} /><span class="grow" />{heard && <span class="meta">updated {age(now_ms() - heard.at_ms)} ago</span>}</div>
         {why && <div class={`callout ${r.status === 'ambiguous' ? 'caution' : r.status === 'moved' ? 'bad' : 'info'}`} data-testid="why"><b>{why.title}</b><p>{why.text}</p></div>}
         <dl class="kv pos">
-          {geo && <div><dt>Latitude</dt><dd data-testid="latitude"><Q v={latlon(r.lat)} u="°" /></dd></div>}
-          {geo && <div><dt>Longitude</dt><dd data-testid="longitude"><Q v={latlon(r.lon)} u="°" /></dd></div>}
+          {geo && <div><dt>Latitude</dt><dd data-testid="latitude"><Degrees v={r.lat} axis="lat" /></dd></div>}
+          {geo && <div><dt>Longitude</dt><dd data-testid="longitude"><Degrees v={r.lon} axis="lon" /></dd></div>}
           {geo && <div><dt>Ellipsoidal h</dt><dd><Q v={metres(r.h_m)} u="m" /></dd></div>}
           {r.enu_m && (live || !geo) && <div><dt>{geo ? 'E, N, U' : 'x, y, z'}</dt><dd><Q v={r.enu_m.map((x) => metres(x)).join(', ')} u="m" /></dd></div>}
         </dl>
@@ -41,12 +43,15 @@ export function AnchorDetail({ row: r, live, changed }: { row: AnchorRow; live: 
           {r.cov_enu_m2 && <Covariance c={r.cov_enu_m2} />}
         </section>
       </div>
+      <AnchorResiduals row={r} mission={live ? r.mission || null : null} />
       <FacilityPanel anchor={r.anchor} changed={changed} />
       {!live && <AnchorPast anchor={r.anchor} />}
       {live && <section class="sec-p"><Convergence anchor={r.anchor} /></section>}
     </div>
   );
 }
+
+const Degrees = ({ v, axis }: { v: number | null; axis: 'lat' | 'lon' }) => (choice.value.dms ? <span class="q n">{dms(v, axis)}</span> : <Q v={latlon(v)} u="°" />);
 
 function Twin({ r }: { r: AnchorRow }) {
   const m = r.mirror!;

@@ -8,8 +8,10 @@ import { MapBox } from '../map/map_box';
 import { me, may_publish } from '../state/session';
 import { chosen_anchor, current_mission, current_scene, link, revision, synced, tick } from '../state/store';
 import { Icon } from '../ui/marks';
+import { ColumnPicker } from './anchor_columns';
 import { AnchorTable, sorted_rows } from './anchor_table';
 import { AnchorDetail } from './anchor_detail';
+import { compare_open, CompareCalibrations } from './compare_calibrations';
 import { Publish, publish_open } from './publish';
 
 export const source = signal<'live' | 'published'>('live');
@@ -65,9 +67,11 @@ export function Anchors({ anchor }: { anchor: string | null }) {
         </div>
         <label class="search"><span class="sr">Filter anchors</span><input id="filter" ref={search} value={filter.value} placeholder={`Filter ${all.length} anchor${all.length === 1 ? '' : 's'}`} data-testid="filter" onInput={(e) => (filter.value = e.currentTarget.value)} /><kbd aria-hidden="true">/</kbd></label>
         <span class="grow" />
+        <ColumnPicker live={live} />
+        <button class="btn" data-testid="compare" disabled={link.value === 'lost'} onClick={() => { publish_open.value = false; compare_open.value = true; }}>Compare</button>
         <a class="btn" href={api_url(`/anchors${query}format=csv`)} download="anchors.csv" data-testid="csv"><Icon name="download" />CSV</a>
         <a class="btn" href={api_url(`/anchors${query}format=geojson`)} download="anchors.geojson" data-testid="geojson"><Icon name="download" />GeoJSON</a>
-        {may_publish.value && <button class="btn primary" data-testid="review" disabled={!mission || !all.length || link.value === 'lost'} onClick={() => (publish_open.value = true)}>Review and publish{live && all.length ? `, ${ready} of ${all.length}` : ''}</button>}
+        {may_publish.value && <button class="btn primary" data-testid="review" disabled={!mission || !all.length || link.value === 'lost'} onClick={() => { compare_open.value = false; publish_open.value = true; }}>Review and publish{live && all.length ? `, ${ready} of ${all.length}` : ''}</button>}
       </div>
       <section class="tablebox" aria-label="Anchor table" tabIndex={0}>
         {problem.value && !live && <div class="problem" role="status"><b>The published positions could not be read.</b> {problem.value} <button class="btn small" onClick={() => void load_published()}>Try again</button></div>}
@@ -75,6 +79,7 @@ export function Anchors({ anchor }: { anchor: string | null }) {
       </section>
       <MapBox content={() => ({ anchors: on_map, selected: selected?.anchor ?? null, scene: live ? current_scene() : null, link_lost: link.peek() === 'lost', running: mission?.state === 'recording' })} onSelect={(a) => (chosen_anchor.value = a)} label="Map of the anchors in the table" follow={false} version={version} />
       <aside class="detailbox" aria-label="Selected anchor" tabIndex={0}>{selected ? <AnchorDetail row={selected} live={live} changed={() => void load_published()} /> : <p class="why pad">Nothing is selected.</p>}</aside>
+      {compare_open.value && <CompareCalibrations />}
       {publish_open.value && mission && <Publish mission={mission} />}
     </div>
   );
