@@ -293,6 +293,15 @@ Script<Result<void>> Tag::blink(std::optional<std::uint16_t> other) {
   co_return done ? given_back : done;
 }
 
+Script<bool> Tag::listed_as_tag(std::uint16_t id) {
+  constexpr std::size_t k_info_bytes = 15, k_flag_at = 2;
+  constexpr std::uint8_t k_tag = 2;
+  Bytes parameters;
+  put_u16(parameters, id);
+  const Result<Bytes> info = co_await wire_.call(fn::device_get_info, parameters, k_info_bytes);
+  co_return info&& info.value()[k_flag_at] == k_tag;
+}
+
 Script<Result<DeviceInfo>> Tag::stored_position(std::uint16_t id) {
   Bytes parameters;
   put_u16(parameters, id);

@@ -70,6 +70,9 @@ class Tag {
   /// position registers, verified. save: keeps the list in flash.
   Script<Result<Applied>> push_positions(std::vector<DeviceInfo> devices, bool save);
   Script<Result<DeviceInfo>> stored_position(std::uint16_t id);
+  /// Whether the device list has it as a tag. No public source says that a discovery marks what it finds;
+  /// where it does not, a tag is taken for an anchor.
+  Script<bool> listed_as_tag(std::uint16_t id);
   /// Distance between two other devices, this tag only relays. Never an error of the wire without `failure`.
   Script<Ranging> range_between(std::uint16_t from, std::uint16_t to);
   Script<Result<void>> set_sensors_mode(std::uint8_t mode);

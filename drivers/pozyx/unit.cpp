@@ -139,11 +139,20 @@ Script<int> Unit::look_around() {
   // Random slots miss devices: often at first, then once a minute for those that came later.
   constexpr int k_looks = 8;
   const Result<std::vector<std::uint16_t>> found = co_await session_->tag.discover(0, false);
-  if (found) {
-    for (const std::uint16_t id : found.value()) anchors_[id];
-  }
+  if (found) co_await adopt(found.value());
   if (!anchors_.empty()) ++looks_;
   look_at_ns_ = session_->wire.now_ns() + (looks_ == 0 ? 1 : looks_ < k_looks ? 2 : 60) * k_s;
+  co_return 0;
+}
+
+/// Other tags of the kit are in the list too, once somebody asked for all devices: they move, and their
+/// ranges are nobody's anchor.
+Script<int> Unit::adopt(std::vector<std::uint16_t> found) {
+  for (const std::uint16_t id : found) {
+    if (anchors_.contains(id)) continue;
+    const bool tag = co_await session_->tag.listed_as_tag(id);
+    if (!tag) anchors_[id];
+  }
   co_return 0;
 }
 

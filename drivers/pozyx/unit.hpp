@@ -64,6 +64,7 @@ class Unit final : public device::Driver {
   Script<Result<std::string>> push_positions(std::string arguments);
   Script<Result<std::string>> range_between(std::string arguments);
   Script<Result<std::string>> discover();
+  Script<int> adopt(std::vector<std::uint16_t> found);
   Script<Result<std::string>> identify(std::string arguments);
   void emit(const Ranging& ranging, std::uint16_t anchor, const std::optional<CirRecord>& cir,
             std::optional<double> heading_deg);

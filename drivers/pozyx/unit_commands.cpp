@@ -249,9 +249,7 @@ Script<Result<std::string>> Unit::discover() {
     if (!found) co_return found.error();
     seen = found.value();
   }
-  if (options_.anchors.empty()) {
-    for (const std::uint16_t id : seen) anchors_[id];
-  }
+  if (options_.anchors.empty()) co_await adopt(seen);
   co_return devices_text(seen);
 }
 

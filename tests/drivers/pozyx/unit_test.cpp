@@ -65,6 +65,20 @@ TEST(PozyxUnit, FindsTheAnchorsByItselfAndRangesToThemInTurn) {
   EXPECT_TRUE(flight.sink.drops.empty()) << flight.sink.drops.begin()->first;
 }
 
+TEST(PozyxUnit, DoesNotTakeAnotherTagOfTheKitForAnAnchor) {
+  sim::Scenario scenario = open_field();
+  scenario.tags.push_back(scenario.tags[0]);
+  scenario.tags[1].name = "other";
+  scenario.tags[1].id = {0x6010};
+  scenario.tags[1].lever_arm_m = {1, 0, 0};
+  Flight flight(R"({"cir":"none"})", scenario);
+  flight.run(5);
+  EXPECT_NE(flight.ask("discover").find("0x6010"), std::string::npos) << "it is told, as what is in reach";
+  flight.run(30);
+  EXPECT_GT(flight.sink.ranges.size(), 100u);
+  for (const Range& range : flight.sink.ranges) EXPECT_NE(range.anchor.value, 0x6010u);
+}
+
 TEST(PozyxUnit, StampsRangesByTheTagsOwnClock) {
   sim::Scenario scenario = open_field();
   scenario.tags[0].clock_drift_ppm = 40;
