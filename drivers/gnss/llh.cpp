@@ -62,6 +62,12 @@ std::optional<Eigen::Matrix3d> covariance_enu(const std::vector<double>& v, std:
   return out;
 }
 
+/// Digits behind the point.
+std::size_t decimals(std::string_view number) {
+  const auto point = number.find('.');
+  return point == std::string_view::npos ? 0 : number.size() - point - 1;
+}
+
 /// A count: tools that rewrite such files print "1.0000000" too.
 std::optional<int> whole(double value) {
   if (!(value >= 0 && value <= 1000) || value != std::floor(value)) return std::nullopt;
@@ -87,6 +93,7 @@ void Decoder::header(std::string_view text) {
   const bool position = has("latitude("), other = has("x-ecef") || has("e-baseline");
   if (!position && !other) return;
   other_form_ = other;
+  column_header_ = true;
   const auto words = split(text.substr(1), " \t,;", true);
   if (words.empty()) return;
   if (words[0] == "GPST")
@@ -155,6 +162,14 @@ Result<std::optional<Epoch>> Decoder::line(std::string_view text) {
   if (dms) {
     lat = from_dms(words[first], v[0], v[1], v[2]);
     lon = from_dms(words[first + 3], v[3], v[4], v[5]);
+  }
+  // RTKLIB prints degrees with nine decimals and metres with four: without a header a short baseline would
+  // pass for a position near 0 N 0 E, and any table of whole numbers for one too.
+  if (!column_header_ && !dms) {
+    const auto lat_decimals = decimals(words[first]), lon_decimals = decimals(words[first + 1]);
+    if (lat_decimals == 0 || lon_decimals == 0) return bad("degrees without decimals");
+    if (lat_decimals == 4 && lon_decimals == 4)
+      return make_error(Errc::unsupported, "looks like a baseline, and no header says otherwise");
   }
   if (!lat || !lon || std::abs(*lat) > 90 || std::abs(*lon) > 180)
     return bad("latitude or longitude off the globe");

@@ -31,7 +31,7 @@ class Decoder {
   TimeSystem unnamed_;
   std::optional<TimeSystem> system_{};  ///< absent: no header yet
   bool geodetic_height_{false};         ///< above the geoid, "geodetic" in the header
-  bool other_form_{false}, other_datum_{false};
+  bool column_header_{false}, other_form_{false}, other_datum_{false};
   std::uint64_t time_assumed_{0};
 };
 

@@ -134,6 +134,17 @@ TEST(Llh, ReadsCountsThatAreWrittenAsDecimals) {
   EXPECT_TRUE(decode("2024/06/16 00:00:13.600 51.0 3.7 61.0 1.5 13 0.3 0.2 0.5 0 0 0 1.1 12.5\n").empty());
 }
 
+// rnx2rtkp -a, or a stream of it joined late: 12 m east and 5 m south of the base, in four decimals.
+TEST(Llh, TakesNoShortBaselineWithoutAHeaderForDegrees) {
+  const std::string line =
+      "2024/06/16 00:00:13.600 12.3456 -4.5678 1.2345 1 13 0.01 0.01 0.02 0 0 0 1.1 12.5\n";
+  Skips skips;
+  EXPECT_TRUE(decode(line, {}, &skips).empty());
+  EXPECT_EQ(skips["llh: no WGS84 position"], 1U);
+  EXPECT_EQ(decode(k_llh_header + line).size(), 1U);
+  EXPECT_TRUE(decode("128, 64, 32, 16, 8, 4, 2, 1, 0, 0, 0, 0, 0, 0, 0\n").empty());  // a table of anything
+}
+
 TEST(Llh, RefusesAnotherDatum) {
   Skips skips;
   EXPECT_TRUE(
