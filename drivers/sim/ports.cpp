@@ -67,6 +67,11 @@ class Pty final : public Port {
     ::close(slave);
     if (link_.empty()) return boost::outcome_v2::success();
     std::error_code error;
+    // A link of another simulator may be taken over; a device or file of that name is somebody's.
+    const auto there = std::filesystem::symlink_status(link_, error);
+    if (std::filesystem::exists(there) && !std::filesystem::is_symlink(there))
+      return make_error(Errc::conflict, link_ + ": is there already, and no link");
+    error.clear();
     const std::string part = link_ + ".part";
     std::filesystem::remove(part, error);
     std::filesystem::create_symlink(path_, part, error);

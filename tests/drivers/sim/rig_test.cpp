@@ -189,6 +189,17 @@ TEST(Rig, LeavesTheLinkToWhoTookIt) {
   fs::remove_all(folder);
 }
 
+TEST(Rig, ReplacesNothingButALinkByItsLink) {
+  std::string folder = (fs::temp_directory_path() / "anchord_links_XXXXXX").string();
+  ASSERT_NE(mkdtemp(folder.data()), nullptr);
+  Scenario scenario = demonstration_scenario();
+  scenario.tags[0].link = folder + "/somebodys";
+  ASSERT_EQ(::close(::open(scenario.tags[0].link.c_str(), O_CREAT | O_WRONLY | O_CLOEXEC, 0600)), 0);
+  EXPECT_EQ(Rig::open(std::make_shared<const Scenario>(scenario), {}).error().code, Errc::conflict);
+  EXPECT_TRUE(fs::is_regular_file(scenario.tags[0].link));
+  fs::remove_all(folder);
+}
+
 TEST(Rig, RefusesAScenarioThatCannotRunAndAPortThatIsTaken) {
   Scenario scenario = demonstration_scenario();
   auto first = Rig::open(std::make_shared<const Scenario>(scenario), {});
