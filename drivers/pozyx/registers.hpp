@@ -12,13 +12,13 @@ namespace anchord::pozyx {
 namespace reg {
 inline constexpr std::uint8_t who_am_i = 0x00, firmware = 0x01, hardware = 0x02, selftest = 0x03,
                               error_code = 0x04, int_status = 0x05, calib_status = 0x06, int_mask = 0x10,
-                              config_leds = 0x15, pos_alg = 0x16, pos_num_anchors = 0x17, pos_interval = 0x18,
-                              network_id = 0x1a, uwb_channel = 0x1c, uwb_rates = 0x1d, uwb_plen = 0x1e,
-                              uwb_gain = 0x1f, xtal_trim = 0x20, range_protocol = 0x21, operation_mode = 0x22,
-                              sensors_mode = 0x23, pos_x = 0x30, pos_y = 0x34, pos_z = 0x38, pos_err = 0x3c,
-                              sensors = 0x50, max_lin_acc = 0x4e, euler = 0x66, temperature = 0x80,
-                              device_list_size = 0x81, rx_network_id = 0x82, rx_data_len = 0x84,
-                              blink_index = 0x89;
+                              pos_filter = 0x14, config_leds = 0x15, pos_alg = 0x16, pos_num_anchors = 0x17,
+                              pos_interval = 0x18, network_id = 0x1a, uwb_channel = 0x1c, uwb_rates = 0x1d,
+                              uwb_plen = 0x1e, uwb_gain = 0x1f, xtal_trim = 0x20, range_protocol = 0x21,
+                              operation_mode = 0x22, sensors_mode = 0x23, pos_x = 0x30, pos_y = 0x34,
+                              pos_z = 0x38, pos_err = 0x3c, sensors = 0x50, max_lin_acc = 0x4e, euler = 0x66,
+                              temperature = 0x80, device_list_size = 0x81, rx_network_id = 0x82,
+                              rx_data_len = 0x84, blink_index = 0x89;
 }  // namespace reg
 
 namespace fn {

@@ -69,6 +69,7 @@ void PozyxAir::restart(PozyxStation& station, double now_s) {
   station.fresh = station.asked_imu = false;
   station.polling_since_s.reset();
   station.used.clear();
+  station.positions_m.clear();
   position_for_ever(station, now_s);  // where an interval is in flash
 }
 

@@ -24,6 +24,7 @@ struct PozyxStation {
   bool fresh{false};           ///< its newest range was not asked for yet
   std::uint64_t rounds{0};     ///< of continuous positioning: another number ends the one that runs
   std::vector<std::pair<std::uint16_t, std::uint32_t>> used{};  ///< anchors and mm of its newest position
+  std::vector<Eigen::Vector3d> positions_m{};                   ///< newest last, for its filter
   double imu_s{0};                                              ///< of its newest inertial event
   bool asked_imu{false};                                        ///< a host has set a sensor mode
   std::optional<double> polling_since_s{};                      ///< its host does nothing but look for events

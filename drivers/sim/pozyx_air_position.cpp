@@ -109,7 +109,11 @@ bool PozyxAir::locate(PozyxStation& self, double at_s, Random& random) {
     return false;
   }
   if (automatic) device.positioning_ids() = chosen;
-  device.set_bytes(reg::pos_x, millimetres(found->at_m));
+  if (self.positions_m.size() == k_longest_filter) self.positions_m.erase(self.positions_m.begin());
+  self.positions_m.push_back(found->at_m);
+  Eigen::Vector3d at_m = filter_position(self.positions_m, device.register_value(reg::pos_filter));
+  if (!solve_z) at_m.z() = found->at_m.z();  // given, and not in need of it
+  device.set_bytes(reg::pos_x, millimetres(at_m));
   set_position_error(device, found->covariance_m2);
   device.raise(event::pos);
   return true;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 namespace anchord::sim {
 namespace {
@@ -60,6 +61,31 @@ std::optional<TagPosition> tag_position(std::span<const AnchorRange> anchors, bo
   }
   if (!best) return std::nullopt;
   return best->position;
+}
+
+Eigen::Vector3d filter_position(std::span<const Eigen::Vector3d> newest_last, unsigned setting) {
+  const std::size_t n = std::min<std::size_t>(newest_last.size(), 2 * (setting >> 4 & 0x0f) + 1);
+  const auto window = newest_last.last(n);
+  const unsigned kind = setting & 0x0f;
+  if (kind == 4) {
+    Eigen::Vector3d median = Eigen::Vector3d::Zero();
+    for (int axis = 0; axis < 3; ++axis) {
+      std::vector<double> values;
+      for (const Eigen::Vector3d& at_m : window) values.push_back(at_m(axis));
+      std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(n / 2), values.end());
+      median(axis) = values[n / 2];
+    }
+    return median;
+  }
+  if (kind != 1 && kind != 3) return window.back();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double weights = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double weight = kind == 3 ? 1.0 : static_cast<double>(std::min(i + 1, n - i));
+    sum += weight * window[i];
+    weights += weight;
+  }
+  return sum / weights;
 }
 
 }  // namespace anchord::sim

@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cctype>
+#include <cmath>
 #include <fstream>
 #include <map>
 #include <set>
 
+#include "drivers/sim/pozyx_position.hpp"
 #include "tests/drivers/sim/pozyx_host.hpp"
 #include "tests/paths.hpp"
 
@@ -114,6 +116,42 @@ TEST(SimulatedTags, PositionThemselvesAboveTheirAnchorsToo) {
     EXPECT_EQ(host.poll(event::pos | event::err, 0.5), event::pos);
     EXPECT_NEAR(coordinates_m(parse_reply(host.ask("R,30,12"), 12).value()).z(), height_m, 1.0);
   }
+}
+
+TEST(SimulatedTags, FilterTheirPositionsAsRegister14Says) {
+  // Root of the mean square distance of 40 positions from their mean, by the first coordinate; mm.
+  const auto spread_mm = [](const std::string& filter) {
+    Host host(two_tags());
+    tell_anchors(host);
+    host.ask("W,14," + filter);
+    std::vector<double> x_mm;
+    for (int i = 0; i < 80; ++i) {
+      host.ask("R,05,1");
+      host.ask("F,b6,,1");
+      EXPECT_EQ(host.poll(event::pos | event::err, 0.5), event::pos);
+      if (i >= 40) x_mm.push_back(i32_at(parse_reply(host.ask("R,30,4"), 4).value(), 0));
+    }
+    double mean = 0, squares = 0;
+    for (const double x : x_mm) mean += x / 40;
+    for (const double x : x_mm) squares += (x - mean) * (x - mean) / 40;
+    return std::sqrt(squares);
+  };
+  const double raw_mm = spread_mm("00");
+  EXPECT_GT(raw_mm, 10);
+  EXPECT_EQ(spread_mm("50"), raw_mm) << "a strength without a filter";
+  EXPECT_EQ(spread_mm("03"), raw_mm) << "a filter without a strength";
+  // Eleven samples: 1 / sqrt(11) = 0.30, the median a quarter more, the triangle of them 0.37.
+  for (const char* kind : {"51", "53", "54"}) EXPECT_LT(spread_mm(kind), 0.6 * raw_mm) << kind;
+}
+
+TEST(PositionFilter, IsLateByItsStrength) {
+  std::vector<Eigen::Vector3d> way_m;
+  for (int i = 0; i < 31; ++i) way_m.emplace_back(i, 2 * i, -i);
+  for (const unsigned kind : {1u, 3u, 4u})
+    EXPECT_LT((filter_position(way_m, kind | 7u << 4) - way_m[30 - 7]).norm(), 1e-9) << kind;
+  way_m.back() = {1000, 1000, 1000};
+  // Of (28, 56, -28), (29, 58, -29) and the outlier, each axis for itself.
+  EXPECT_EQ(filter_position(way_m, 0x14), Eigen::Vector3d(29, 58, -28));
 }
 
 TEST(SimulatedTags, GiveNoPositionWithoutEnoughAnchorsOrFromOnePlace) {
