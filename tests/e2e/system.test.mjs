@@ -116,6 +116,30 @@ test('a caster is set up in the form, and tells where the base stands', async ()
   await page.close();
 });
 
+test('a site is named with datum and base, and a device is forgotten by two presses', async () => {
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/system' });
+  const form = id('base-form');
+  await form.getByLabel('Name of the site').fill('yard');
+  await form.getByLabel('Datum of its coordinates').fill('ETRS89');
+  await form.getByLabel('Epoch, year').fill('2026,5');
+  await id('base-source').selectOption('survey_in');
+  await form.getByLabel('σ of its place, mm').fill('850');
+  await id('base-send').click();
+  await id('base').getByText('SURVEYED IN', { exact: true }).waitFor();
+  const { crs } = (await get('/api/v1/sites')).items.find((s) => s.name === 'yard');
+  assert.deepEqual([crs.frame, crs.epoch, crs.base], ['ETRS89', 2026.5, { source: 'survey_in', sigma_m: 0.85 }]);
+  assert.match(await text(id('base')), /good to ±85 cm/);
+  await id(`device-${made['same port']}`).getByTestId('details').click();
+  await id('forget').click();
+  assert.equal((await server.fetch(`/api/v1/devices/${made['same port']}`)).status, 200, 'one press asks');
+  await id('forget').click();
+  await eventually('it is gone', async () => (await server.fetch(`/api/v1/devices/${made['same port']}`)).status === 404);
+  await id(`device-${made['same port']}`).waitFor({ state: 'detached' });
+  assert.deepEqual(await violations(page), []);
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});
+
 test('the radio of a tag is compared with every anchor in its reach', async () => {
   const { page, seen, id } = await openPage(browser, server, { hash: '#/system' });
   const row = id(`device-${made.good}`);

@@ -48,13 +48,16 @@ describe('what a device stands for', () => {
     ['UNPLUGGED', '/dev/x: no such device: is it plugged in and powered?', {}], ['UNPLUGGED', 'serial:/dev/x: unplugged', {}], ['NEVER SEEN', '/dev/x: no such device: is it plugged in and powered?', { last_seen_us: null, in_state_s: 3 }],
     ['PORT BUSY', '/dev/x: busy: another program has this port open', {}], ['PORT TWICE', '/dev/pts/1: the same port as device "tag" (01a1ff6b-4649-78c7-a9aa-0611fa043203)', {}],
     ['LOST', 'tcp://127.0.0.1:9: refused: is the service of the device switched on?', {}], ['LOST', 'tcp://10.0.0.9:9001: no answer: is it on this network?', {}], ['SILENT', 'silent for too long: opened again', {}],
-    ['REFUSED', 'the caster refuses user or password', { kind: 'ntrip' }], ['NO SUCH MOUNT', 'the caster has no mount "X"; it has A, B', { kind: 'ntrip' }], ['NO POZYX', 'no Pozyx answers on this port', { network_id: null }], ['SILENT', 'no Pozyx answers on this port', {}],
+    ['LOST', 'tcp://10.0.0.9:9001: the other side closed', {}], ['REFUSED', 'the caster refuses user or password', { kind: 'ntrip' }], ['NO SUCH MOUNT', 'the caster has no mount "X"; it has A, B', { kind: 'ntrip' }], ['NO POZYX', 'no Pozyx answers on this port', { network_id: null }], ['SILENT', 'no Pozyx answers on this port', {}],
   ])('is %s for "%s"', (word, reason, part) => {
     const s = standing(device({ state: 'lost', reason, ...part }), recent(0));
     expect([s.word, s.tone]).toEqual([word, 'bad']);
     expect(s.what.length * s.todo.length).toBeGreaterThan(0);
     expect(s.what).not.toMatch(/[0-9a-f]{8}-/);
   });
+  it('says of a caster that what it sends is no RTCM', () => expect(standing(device({ kind: 'ntrip', state: 'open', counters: { opened: 3 } }), recent(0, { no_rtcm_bytes: 900 })).what).toContain('no RTCM 3'));
+  it('does not repeat the address', () => expect(standing(device({ state: 'lost', reason: 'tcp://10.0.0.9:9001: Connection reset by peer' }), recent(0)).what).toBe('Connection reset by peer.'));
+  it('waits for a device that is to connect', () => expect(standing(device({ kind: 'gnss', state: 'found', reason: 'not opened yet', address: 'tcp-listen://0.0.0.0:9002', counters: {} }), recent(0))).toMatchObject({ word: 'WAITING', todo: 'Let its output connect to this computer, port 9002.' }));
   it('is off when it was switched off, whatever else', () => expect(said({ enabled: false, state: 'off', conflict: 'x is also device y' })).toEqual(['off', 'OFF']));
   it('adds up to one line', () => expect(summary([standing(device({}), recent(9)), standing(device({ state: 'silent' }), recent(0)), standing(device({ enabled: false }), recent(0))])).toEqual({ working: 1, look: 0, wrong: 1, off: 1 }));
 });

@@ -47,7 +47,8 @@ const caution = (word: string, what: string, todo: string): Standing => stand('c
 
 /// Of a link that does not stand: `reason` is the server's line.
 function not_linked(d: Device): Standing {
-  const reason = sentence(without_ids(d.reason)), by_id = d.address.includes('/by-id/'), word = d.in_state_s !== null && d.last_seen_us === null && d.state === 'lost' ? 'NEVER SEEN' : 'LOST';
+  // The address stands beside it already.
+  const reason = sentence(without_ids(d.reason).replace(/^(\w[\w-]*:)?\/\S*: /, '')), by_id = d.address.includes('/by-id/'), word = d.in_state_s !== null && d.last_seen_us === null && d.state === 'lost' ? 'NEVER SEEN' : 'LOST';
   if (/permission denied/.test(d.reason)) {
     const command = /"([^"]+)"/.exec(d.reason)?.[1] ?? 'sudo usermod -aG dialout $USER', group = /belongs to group (\S+?)[;,]/.exec(d.reason)?.[1] ?? 'dialout';
     return bad('NOT ALLOWED', `The port belongs to the group ${group}, and the server is not in it.`, 'Run this on the computer of the server as the user that runs it, log in again and start the server again:', command);
@@ -59,6 +60,7 @@ function not_linked(d: Device): Standing {
   if (/no mount/.test(d.reason)) return bad('NO SUCH MOUNT', reason, 'Edit: take one of the mount points named here.');
   if (/caster|mount/.test(d.reason)) return bad('REFUSED', reason, 'Check address, mount point and NTRIP version.');
   if (/refused: is the service/.test(d.reason)) return bad(word, 'The computer at this address answers, but nothing listens on this port.', 'Switch the output of the device on, or check the port in its address.');
+  if (/the other side closed/.test(d.reason)) return bad(word, 'The other side closed the connection.', 'It is opened again by itself. Where that repeats: another program may hold its only place.');
   if (/no such host/.test(d.reason)) return bad(word, 'There is no computer of this name.', 'Check the address; a number always works.');
   if (/no answer|unreachable|timed out|No route/i.test(d.reason)) return bad(word, 'Nobody answers at this address.', 'Check power, cable or Wi-Fi of the device, and that it is on this network.');
   if (/no Pozyx answers/.test(d.reason)) return d.network_id ? silent(d) : bad('NO POZYX', 'The port is open, but no Pozyx answers on it.', 'Another device may be in this port: Discover tells which one speaks.');
@@ -67,7 +69,7 @@ function not_linked(d: Device): Standing {
 }
 function silent(d: Device, noise = /make no frame/.test(d.reason)): Standing {
   if (d.kind === 'pozyx') return bad('SILENT', noise ? 'The cable is open, but what comes cannot be read.' : 'The cable is open, but the tag says nothing.', noise ? 'Is this port a Pozyx at all? Discover tells. If it is: unplug it and plug it in again, then try another cable.' : 'Unplug the tag and plug it in again. If it stays silent: another cable, another port.');
-  if (d.kind === 'ntrip') return bad('SILENT', 'The caster is connected, but sends no corrections.', 'Check the mount point; some casters want the position of the rover first.');
+  if (d.kind === 'ntrip') return bad('SILENT', noise ? 'Bytes come from the caster, but they are no RTCM 3.' : 'The caster is connected, but sends no corrections.', noise ? 'Edit: take a mount point that gives RTCM 3.' : 'Check the mount point; some casters want to be told where the rover is (Edit).');
   return bad('SILENT', noise ? 'Bytes come, but none of them can be read.' : 'The link is open, but the receiver says nothing.', noise ? 'Edit: the baud rate, or the format, is another one.' : 'Switch its output on (position, NMEA or UBX) in the receiver, or check its baud rate.');
 }
 const LOW_FIX: Readonly<Record<string, readonly [Tone, string, string]>> = {
@@ -111,9 +113,11 @@ export function standing(d: Device, recent: Lately, twin_speaks = true): Standin
   const twin = twin_speaks && /is also device/.test(d.conflict), linked = d.state !== 'lost' && d.state !== 'found';
   if (twin && !linked) return caution('ELSEWHERE', sentence(without_ids(d.conflict).replace('is also', 'speaks as')), 'If the tag was moved to another port: forget this one. If these are two tags: one needs another id.');
   if (twin) return bad('ID TWICE', sentence(without_ids(d.conflict)), 'Two tags with one id cannot be told apart: switch one of them off, or give it another id with the maker\'s tool.');
+  if (d.state === 'found' && d.address.startsWith('tcp-listen:')) return caution('WAITING', (d.counters.opened ?? 0) > 0 ? 'The device is no longer connected.' : 'The device has not connected yet.', `Let its output connect to this computer, port ${d.address.split(':').at(-1)}.`);
   if (d.state === 'found' && (d.counters.opened ?? 0) === 0 && !d.reason.includes(':')) return stand('found', 'info', 'OPENING', 'Its link is being opened.');
   if (!linked) return not_linked(d);
   if (d.state === 'silent') return silent(d, total(recent.dropped) > (recent.dropped.no_reply ?? 0) || /make no frame/.test(d.reason));
+  if (d.state === 'open' && noise_bytes(recent.dropped) > 0) return silent(d, true);
   if (d.state === 'open' && (d.counters.opened ?? 0) > 1) return caution('OPENED AGAIN', 'Its link was lost and is open again.', 'Nothing readable came yet; this takes some seconds.');
   if (d.state === 'open') return stand('estimating', 'info', 'OPENING', 'Waiting for the first readable bytes.');
   const now = delivering(d, recent);

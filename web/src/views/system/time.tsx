@@ -53,12 +53,12 @@ function Aircraft({ drone: d }: { drone: DroneMsg | null }) {
     <section class="sys-p" data-testid="aircraft">
       <h2>Aircraft</h2>
       {!d ? <p class="why">Flown by hand: this server talks to no autopilot. The setting drone.address (MAVLink, like udp://:14550) gives it one at its next start.</p> : <>
-        <div>{d.connected ? d.failsafe ? <Chip shape="bad" tone="bad" word="FAILSAFE" /> : <Chip shape="ok" tone="ok" word="CONNECTED" /> : <Chip shape="bad" tone="bad" word="NO LINK" />} <span class="why">{d.connected ? d.text : `Nothing was heard of the autopilot${d.silent_s === null ? '' : ` for ${age(d.silent_s * 1000)}`}: power, telemetry radio, drone.address.`}</span></div>
+        <div>{d.connected ? d.failsafe ? <Chip shape="bad" tone="bad" word="FAILSAFE" /> : <Chip shape="ok" tone="ok" word="CONNECTED" /> : <Chip shape="bad" tone="bad" word="NO LINK" />} <span class="why">{d.connected ? d.text : `Nothing was heard of the autopilot ${d.autopilot && d.silent_s !== null ? `for ${age(d.silent_s * 1000)}` : 'yet'}: power, telemetry radio, drone.address.`}</span></div>
         <dl class="kv s">
           <div><dt>Autopilot</dt><dd>{d.autopilot || '–'}</dd></div><div><dt>Mode</dt><dd>{d.mode || '–'}</dd></div>
           <div><dt>Battery</dt><dd class={d.connected ? '' : 'stale'}>{d.battery === null ? '–' : <Q v={percent(d.battery)} u="%" />}</dd></div>
           <div><dt>State</dt><dd>{d.in_air ? 'in the air' : d.armed ? 'armed' : 'on the ground'}</dd></div>
-          <div><dt>Last heard</dt><dd>{d.silent_s === null ? '–' : `${age(d.silent_s * 1000)} ago`}</dd></div>
+          <div><dt>Last heard</dt><dd>{d.silent_s === null || !d.autopilot ? 'never' : `${age(d.silent_s * 1000)} ago`}</dd></div>
         </dl>
       </>}
     </section>
