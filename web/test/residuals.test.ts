@@ -1,6 +1,6 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import { note_of } from '../src/api/anchors';
-import { at_instant, bearing_from, by_suspicion, weight_by_sector, type Residual } from '../src/api/residuals';
+import { at_instant, bearing_from, by_suspicion, common_shift, weight_by_sector, type Residual } from '../src/api/residuals';
 import { dms } from '../src/ui/format';
 
 const row = (part: Partial<Residual>): Residual => ({ mission: 'm', t_us: 0, distance_m: 10, residual_m: 0, standardised: 0, weight: 1, bearing_deg: 0, ...part });
@@ -23,6 +23,17 @@ describe('the bearing from an anchor', () => {
 describe('the weight by direction', () => {
   it('adds up to one, north on both sides of zero', () => expect(weight_by_sector([row({ bearing_deg: 350 }), row({ bearing_deg: 10 }), row({ bearing_deg: 91, weight: 0.5 }), row({ bearing_deg: 180, weight: 0 }), row({ bearing_deg: null })])).toEqual([0.8, 0, 0.2, 0, 0, 0, 0, 0]));
   it('is nothing where all were rejected', () => expect(weight_by_sector([row({ weight: 0 })]).every((w) => w === 0)).toBe(true));
+});
+
+describe('a shift of all anchors', () => {
+  const of = (...list: [number, number][]) => common_shift(list.map(([e, n]) => ({ delta_m: [e, n, 0] as [number, number, number] })));
+  it('is the base where all go the same way', () => {
+    const shift = of([0.10, 0.11], [0.12, 0.09], [0.09, 0.10]);
+    expect(shift?.size_m).toBeCloseTo(0.1438, 3);
+    expect(shift?.bearing_deg).toBeCloseTo(45.9, 1);
+  });
+  it('is not, where some go further than others: those were moved', () => expect(of([3.765, -2.075], [1.714, -0.192], [2.582, -0.925], [3.67, -1.224])).toBeNull());
+  it('is nothing below two centimetres, in all directions, or of two', () => expect([of([0.01, 0], [0.01, 0], [0.01, 0]), of([0.1, 0], [-0.1, 0], [0, 0.1]), of([1, 0], [1, 0])]).toEqual([null, null, null]));
 });
 
 describe('ranges to doubt', () => {

@@ -68,3 +68,12 @@ export async function shifts(of: string, against: string): Promise<Shift[]> {
     anchor: str(o.network_id), change: (['agrees', 'moved', 'added', 'removed'] as const).find((c) => c === o.change) ?? 'not_comparable', delta_m: vec3(o.delta_enu_m), horizontal_m: num(o.horizontal_m), vertical_m: num(o.vertical_m), chi2: num(o.chi2), chi2_limit: num(o.chi2_limit), now_m: vec3(obj(o.now)?.enu_m),
   }));
 }
+/// All anchors shifted alike are the base, not the anchors: three or more, at least 2 cm, and apart from each other by less than a tenth of it, or than
+/// what solving twice differs by (5 cm, where the shift is twice that).
+export function common_shift(rows: readonly Pick<Shift, 'delta_m'>[]): { readonly size_m: number; readonly bearing_deg: number } | null {
+  const d = rows.flatMap((r) => (r.delta_m ? [r.delta_m] : []));
+  if (d.length < 3) return null;
+  const [e, n] = [0, 1].map((i) => d.reduce((sum, v) => sum + v[i]!, 0) / d.length) as [number, number], size_m = Math.hypot(e, n);
+  const spread_m = Math.sqrt(d.reduce((sum, v) => sum + (v[0] - e) ** 2 + (v[1] - n) ** 2, 0) / d.length);
+  return size_m > 0.02 && spread_m < Math.max(0.1 * size_m, Math.min(0.05, size_m / 2)) ? { size_m, bearing_deg: bearing_from([0, 0, 0], [e, n, 0]) } : null;
+}
