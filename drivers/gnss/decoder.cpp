@@ -18,8 +18,10 @@ void Decoder::finish(Epochs& out) {
   count_without_pvt(fed_);
   erb_.finish(out);
   gpsd_.finish(out);
-  if (!out.empty() && out.back().time && out.back().protocol != Protocol::nmea)
-    nmea_.set_reference(*out.back().time);
+  if (!out.empty()) {
+    const Epoch& last = out.back();
+    if (last.time && last.protocol != Protocol::nmea) nmea_.set_reference(*last.time);
+  }
   nmea_.finish(out);
 }
 
@@ -38,7 +40,8 @@ void Decoder::take_binary(const Parsed& parsed, Assembler& assembler, const Fram
   assembler.add(parsed.value(), out);
   // A receiver that speaks both on one wire tells NMEA the date.
   for (std::size_t i = before; i < out.size(); ++i) {
-    if (out[i].time) nmea_.set_reference(*out[i].time);
+    const Epoch& epoch = out[i];
+    if (epoch.time) nmea_.set_reference(*epoch.time);
   }
 }
 
@@ -79,13 +82,13 @@ void Decoder::take_nmea(const Frame& frame, Epochs& out) {
 }
 
 void Decoder::take_llh(const Frame& frame, Epochs& out) {
-  auto epoch = llh_.line(frame.bytes);
-  if (!epoch) {
-    const bool form = epoch.error().code == Errc::unsupported;
-    return skip(form ? "llh: no WGS84 position" : "llh: line not readable", frame, epoch.error());
+  const auto line = llh_.line(frame.bytes);
+  if (!line) {
+    const bool form = line.error().code == Errc::unsupported;
+    return skip(form ? "llh: no WGS84 position" : "llh: line not readable", frame, line.error());
   }
   good(frame);
-  if (epoch.value()) out.push_back(*epoch.value());
+  if (const auto& epoch = line.value()) out.push_back(*epoch);
 }
 
 void Decoder::take_gpsd(const Frame& frame, Epochs& out) {

@@ -101,11 +101,12 @@ Result<Epoch> epoch_of(const Json& tpv) {
 }  // namespace
 
 void Assembler::Device::publish(Epochs& out) {
-  if (!current) return;
-  current->satellites = satellites;
-  current->hdop = hdop;
-  published = current->time;
-  out.push_back(*std::exchange(current, std::nullopt));
+  auto done = std::exchange(current, std::nullopt);
+  if (!done) return;
+  done->satellites = satellites;
+  done->hdop = hdop;
+  published = done->time;
+  out.push_back(std::move(*done));
 }
 
 void Assembler::Device::merge(const Epoch& report, Epochs& out) {

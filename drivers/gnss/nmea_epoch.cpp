@@ -114,7 +114,7 @@ void Assembler::publish(Epochs& out) {
       }
       epoch.age_s = gga.age_s;
     }
-  } else {
+  } else if (group.rmc) {
     epoch.fix = fix_of_mode(group.rmc->mode);
     epoch.lat_deg = group.rmc->lat_deg;
     epoch.lon_deg = group.rmc->lon_deg;
@@ -142,8 +142,9 @@ void Assembler::flush(Epochs& out) {
     UtcTime next = *reference_;
     bool newest = true;
     for (auto it = waiting_.rbegin(); it != waiting_.rend(); ++it) {
-      if (!it->time_of_day_ns) continue;
-      it->time = next = nearest_time_of_day(next, *it->time_of_day_ns);
+      Epoch& waited = *it;
+      if (!waited.time_of_day_ns) continue;
+      waited.time = next = nearest_time_of_day(next, *waited.time_of_day_ns);
       if (std::exchange(newest, false)) reference_ = next;
     }
   }
