@@ -2,10 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <fstream>
 #include <map>
+#include <random>
 #include <set>
 
 #include "drivers/sim/pozyx_position.hpp"
@@ -263,6 +265,45 @@ TEST(SimulatedTags, DoNotForgetCoordinatesInADiscovery) {
     host.now_s += 0.3;
   }
   EXPECT_EQ(host.ask("F,c6,0160,13"), "D,012EFBFFFF52AA0800BE0A0000");
+}
+
+// Any command with any parameters, over both wires, at any pace: every read and function has one answer.
+TEST(SimulatedTags, AnswerWhateverTheyAreAsked) {
+  for (const std::uint8_t firmware : {std::uint8_t{0x11}, std::uint8_t{0x13}}) {
+    Scenario scenario = two_tags();
+    scenario.tags[0].firmware = scenario.tags[1].firmware = firmware;
+    Host first(scenario);
+    Host second(first, 1);
+    std::mt19937 random(firmware);
+    const auto below = [&](unsigned n) { return static_cast<std::size_t>(random() % n); };
+    constexpr std::array<const char*, 6> k_ids{"0160", "0260", "1060", "0060", "0000", "7777"};
+    for (int i = 0; i < 40'000; ++i) {
+      Host& host = i % 2 ? first : second;
+      host.now_s = std::max(first.now_s, second.now_s) + 0.001 * static_cast<double>(below(40));
+      const auto address = static_cast<std::uint8_t>(below(8) ? 0xb0 + below(0x1d) : below(256));
+      Bytes parameters(below(2) ? below(18) : 0);
+      for (std::uint8_t& byte : parameters)
+        byte = static_cast<std::uint8_t>(below(3) ? below(6) : below(256));
+      const std::string text = (below(3) ? k_ids[below(6)] : "") + hex(parameters),
+                        tail = std::to_string(below(256));
+      const std::size_t kind = below(8);
+      if (kind == 0) {
+        if (address >= 0x1a && address <= 0x1e) continue;  // they would hear nobody for the rest of the time
+        host.tag.hear("W," + hex(Bytes{address}) + "," + text + "\r", host.now_s);
+        continue;
+      }
+      std::string question =
+          (kind < 3 ? "R," : "F,") + hex(Bytes{address}) + "," + (kind < 3 ? "" : text + ",") + tail;
+      if (kind == 6) question = "F,b2,00" + hex(Bytes{address}) + text + ",1";
+      if (kind == 7)
+        question = std::string("F,b3,") + k_ids[below(6)] + "0" + std::to_string(2 * (1 + below(4))) + ",1";
+      const std::string answer = host.ask(question);
+      ASSERT_TRUE(answer.starts_with("D,")) << question << " " << answer;
+      ASSERT_LE(answer.size(), 2 + 2 * 255u);
+    }
+    EXPECT_EQ(first.ask("R,00,1"), "D,43");
+    EXPECT_GT(first.tag.exchanges() + second.tag.exchanges(), 50u);
+  }
 }
 
 TEST(SimulatedTags, CalibrateAnchorsIntoTheMakersFrame) {
