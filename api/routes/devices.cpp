@@ -147,6 +147,9 @@ Response get_uwb(Services& s, const Request& request) {
   check_query(request, {"devices"});
   const auto device = value_or_problem(control(s).device(path_uuid(request)));
   const bool others = query_flag(request, "devices");
+  // Asking them stops ranging for seconds: not for those who only look.
+  if (others && !request.principal.has(Role::op) && !request.principal.has(Role::admin))
+    throw_problem(403, "forbidden", "asking the anchors stops ranging; this needs the role operator");
   const Json settings = ask(s, device.config.id, "get_uwb", others ? R"({"devices":true})" : "{}");
   return uwb_answer(settings, others ? settings.value("devices", Json::array()) : Json());
 }

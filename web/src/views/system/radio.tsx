@@ -25,7 +25,7 @@ export function RadioPanel({ device, may_change, told, close }: { device: Device
   };
   // Asking the anchors stops ranging for some seconds: by itself only while nothing is recorded.
   const look = (): Promise<Radio | null> => work('look', () => compare_radio(device.id!));
-  useEffect(() => { void work('read', () => read_radio(device.id!)).then((r) => { if (r && !flying) void look(); }); }, [device.id]);
+  useEffect(() => { void work('read', () => read_radio(device.id!)).then((r) => { if (r && may_change && !flying) void look(); }); }, [device.id]);
   const apply = async (wanted: Radio): Promise<void> => {
     const answer = await work('set', () => set_radio(device.id!, wanted));
     if (answer) set_done(answer);
@@ -51,7 +51,7 @@ export function RadioPanel({ device, may_change, told, close }: { device: Device
       {done && <p role="status" data-testid="radio-done"><Mark shape="ok" tone="ok" /> Set and verified: {[device.network_id, ...done.devices.map((d) => d.network_id)].filter(Boolean).join(', ')}.</p>}
       <div class="actions">
         <button type="button" class="btn" onClick={close}>Close</button>
-        <button type="button" class="btn" data-testid="radio-compare" disabled={busy !== ''} onClick={() => void look()}>{flying ? 'Compare with the anchors (stops ranging)' : 'Compare with the anchors'}</button>
+        {may_change && <button type="button" class="btn" data-testid="radio-compare" disabled={busy !== ''} onClick={() => void look()}>{flying ? 'Compare with the anchors (stops ranging)' : 'Compare with the anchors'}</button>}
         {may_change && <button class="btn primary" data-testid="radio-apply" disabled={busy !== '' || !radio}>{busy === 'set' ? 'Setting and verifying each' : changed ? 'Apply to all and verify' : 'Apply to all again'}</button>}
       </div>
       {changed && busy === '' && <p class="mut">Where one device does not follow, all go back to the settings of now.</p>}
