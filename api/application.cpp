@@ -45,8 +45,8 @@ struct Application::State {
         calibrations({deps.measurements, deps.missions, deps.anchors, jobs, deps.clock, profiles_of(deps),
                       models.get(), deps.learning != nullptr ? &deps.learning->models : nullptr,
                       [this](const MissionId& id) { return clues_of_flight(id); }, deps.frames}),
-        services{deps, hub,          events, alarms,         missions,   ingest,
-                 jobs, calibrations, geo,    profiles.get(), deps.frames} {
+        services{deps, hub,          events, alarms,         missions,     ingest,
+                 jobs, calibrations, geo,    profiles.get(), models.get(), deps.frames} {
     router.on_fault(deps.log_fault);
     add_mission_routes(router, services);
     add_measurement_routes(router, services);

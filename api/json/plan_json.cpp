@@ -265,7 +265,10 @@ Ordered plan_check_json(const planning::PlanCheck& check) {
     Ordered anchors = Ordered::array();
     for (std::size_t i = 0; i < check.assumed_anchors_m.size(); ++i) {
       const auto& at = check.assumed_anchors_m[i];
-      anchors.push_back({{"enu_m", {at.x(), at.y(), at.z()}}, {"sigma_m", check.predicted_sigma_m[i]}});
+      const auto& gdop = check.predicted_gdop[i];
+      anchors.push_back({{"enu_m", {at.x(), at.y(), at.z()}},
+                         {"sigma_m", check.predicted_sigma_m[i]},
+                         {"gdop", gdop ? Ordered(*gdop) : Ordered(nullptr)}});
     }
     predicted = {{"rms_m", check.rms_m}, {"worst_m", check.worst_m}, {"anchors", std::move(anchors)}};
   }

@@ -13,18 +13,6 @@ namespace {
 
 using Ordered = nlohmann::ordered_json;
 
-std::optional<double> query_number(const Request& request, const char* name, double low, double high) {
-  const auto text = request.query_value(name);
-  if (!text) return std::nullopt;
-  double value = 0;
-  const auto [end, status] = std::from_chars(text->data(), text->data() + text->size(), value);
-  if (status != std::errc{} || end != text->data() + text->size() || !(value >= low && value <= high))
-    throw_problem(422, "validation", std::string(name) + " must be a number",
-                  {{std::string("/") + name, "bad_value",
-                    "must be " + std::to_string(low) + ".." + std::to_string(high)}});
-  return value;
-}
-
 CampaignFormat format_of(const Request& request) {
   std::string_view type = request.header("content-type");
   type = type.substr(0, type.find(';'));

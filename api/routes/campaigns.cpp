@@ -3,10 +3,12 @@
 
 #include "api/json/reader.hpp"
 #include "api/json/wire_learning.hpp"
+#include "api/json/wire_resources.hpp"
 #include "api/json/wire_rows.hpp"
 #include "api/learning/campaign_rows.hpp"
 #include "api/learning/range_features.hpp"
 #include "api/routes/learning.hpp"
+#include "api/routes/measurement_query.hpp"
 #include "api/routes/support.hpp"
 
 namespace anchord::api {
@@ -87,17 +89,72 @@ Response import(LearningServices& l, const Request& request) {
   return json_response(200, report);
 }
 
+struct SamplePage {
+  std::vector<CampaignStore::StoredSample> rows;
+  std::int64_t next{};  ///< 0 at the end
+};
+
+/// One page; of a class where one is asked for: then it may hold fewer rows than the limit and yet go on.
+Result<SamplePage> sample_page(CampaignStore& store, const ModelRegistry::Active& active,
+                               std::optional<PredictedClass> wanted, CampaignStore::Filter filter) {
+  const std::size_t limit = filter.limit;
+  SamplePage out;
+  for (std::size_t looked = 0; out.rows.size() < limit && looked < k_class_scan_max;) {
+    const std::size_t here = limit - out.rows.size();
+    filter.limit = here + 1;  // one more than asked tells whether there is a next page
+    BOOST_OUTCOME_TRY(auto rows, store.samples(filter));
+    const bool more = rows.size() > here;
+    if (more) rows.pop_back();
+    looked += rows.size();
+    out.next = more ? rows.back().id : 0;
+    filter.after = out.next;
+    for (auto& row : rows) {
+      if (wanted && class_of(ModelRegistry::judge(active, features_of(row.sample, row.truth))) != *wanted)
+        continue;
+      out.rows.push_back(std::move(row));
+    }
+    if (!more) break;
+  }
+  return out;
+}
+
+constexpr const char* k_sample_header =
+    "id,t_us,seq,environment,setting,true_distance_m,los,heading_deg,height_difference_m,material,thickness_"
+    "m,"
+    "range_m,rx_dbm,fp_dbm,std_noise\r\n";
+/// By the names an import knows, so that what is taken out can be brought in again.
+std::string sample_csv(const CampaignStore::StoredSample& s) {
+  const auto number = [](const auto& v) { return v ? Ordered(*v).dump() : std::string(); };
+  const auto& x = s.sample;
+  const auto& truth = s.truth;
+  return std::to_string(s.id) + ',' + (x.time ? std::to_string(x.time->us()) : "") + ',' + number(x.seq) +
+         ',' + csv_text(truth.environment) + ',' + csv_text(truth.setting) + ',' + number(truth.distance_m) +
+         ',' + (truth.los ? (*truth.los ? "1" : "0") : "") + ',' + number(truth.heading_deg) + ',' +
+         number(truth.height_difference_m) + ',' + csv_text(truth.material) + ',' +
+         number(truth.thickness_m) + ',' + Ordered(x.range_m).dump() + ',' + number(x.rx_dbm) + ',' +
+         number(x.fp_dbm) + ',' + number(x.std_noise) + "\r\n";
+}
+
 Response samples(LearningServices& l, const Request& request) {
-  check_query(request, {"limit", "cursor", "fields", "setting", "environment", "los", "features"});
+  check_query(request, {"limit", "cursor", "fields", "format", "setting", "environment", "los", "features",
+                        "min_distance_m", "max_distance_m", "min_level_dbm", "max_level_dbm", "label",
+                        "class", "predicted", "every"});
   const auto page = page_query(request, 10'000);
   const bool with_features = query_flag(request, "features");
   CampaignStore::Filter filter;
   filter.campaign = named(l, request).id;
   filter.setting = request.query_value("setting");
   filter.environment = request.query_value("environment");
-  if (request.query_value("los")) filter.los = query_flag(request, "los");
-  filter.limit = page.limit + 1;
-  filter.with_cir = with_features;
+  filter.limits = query_limits(request);
+  if (request.query_value("los"))
+    filter.limits.label =
+        query_flag(request, "los") ? MeasurementLimits::Label::los : MeasurementLimits::Label::nlos;
+  filter.every = query_every(request);
+  const auto wanted = query_class(request);
+  const bool judged = wanted || query_flag(request, "predicted");
+  const auto active = l.models.active();
+  filter.limit = page.limit;
+  filter.with_cir = with_features || (judged && active->needs_cir);
   if (!page.cursor.empty()) {
     const auto [end, error] =
         std::from_chars(page.cursor.data(), page.cursor.data() + page.cursor.size(), filter.after);
@@ -105,16 +162,40 @@ Response samples(LearningServices& l, const Request& request) {
       throw_problem(422, "validation", "cursor is not one of ours",
                     {{"/cursor", "bad_cursor", "is not one of ours"}});
   }
-  auto rows = value_or_problem(l.stores.campaigns.samples(filter));
-  const bool more = rows.size() > page.limit;
-  if (more) rows.pop_back();
-  Ordered items = Ordered::array();
-  for (const auto& row : rows) {
+  const auto item_of = [with_features, judged, active](const CampaignStore::StoredSample& row) {
     Ordered item = sample_json(row);
-    if (with_features) item["features"] = features_json(features_of(row.sample, row.truth));
-    items.push_back(std::move(item));
+    if (!with_features && !judged) return item;
+    const auto features = features_of(row.sample, row.truth);
+    if (with_features) item["features"] = features_json(features);
+    if (judged) item["predicted"] = predicted_json(ModelRegistry::judge(*active, features));
+    return item;
+  };
+  const std::string format = negotiate(request, {"json", "ndjson", "csv"});
+  if (format == "json") {
+    const auto found = value_or_problem(sample_page(l.stores.campaigns, *active, wanted, filter));
+    Ordered items = Ordered::array();
+    for (const auto& row : found.rows) items.push_back(item_of(row));
+    return list_response(request, std::move(items), found.next ? std::to_string(found.next) : "");
   }
-  return list_response(request, std::move(items), more ? std::to_string(rows.back().id) : "");
+  const bool csv = format == "csv";
+  filter.limit = 1000;
+  Response response;
+  response.header("Content-Type", csv ? "text/csv; charset=utf-8" : "application/x-ndjson");
+  response.body_stream = [&store = l.stores.campaigns, active, wanted, filter, item_of, csv, begun = false,
+                          done = false]() mutable -> std::string {
+    std::string out = csv && !begun ? k_sample_header : "";
+    begun = true;
+    while (out.empty() && !done) {
+      const auto found = sample_page(store, *active, wanted, filter);
+      // The status is sent already; an early end is all that can still be told.
+      if (!found) throw BodyError(503, found.error().message);
+      for (const auto& row : found.value().rows) out += csv ? sample_csv(row) : item_of(row).dump() + '\n';
+      filter.after = found.value().next;
+      done = filter.after == 0;
+    }
+    return out;
+  };
+  return response;
 }
 
 /// The impulse response a sample came with, as that of a range.

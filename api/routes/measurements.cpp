@@ -5,6 +5,7 @@
 #include "api/json/wire_resources.hpp"
 #include "api/json/wire_rows.hpp"
 #include "api/learning/range_features.hpp"
+#include "api/routes/measurement_query.hpp"
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
 #include "core/ports/store.hpp"
@@ -90,23 +91,26 @@ Response stream(const Request& request, MeasurementStore::Filter filter, std::st
   response.body_stream = [state, fetch, write]() -> std::string {
     std::string out = std::exchange(state->header, {});
     if (!out.empty() || state->done) return out;
-    state->filter.limit = std::min<std::size_t>(1000, state->left);
-    const auto page = fetch(state->filter);
-    // The status is sent already; an early end is all that can still be told.
-    if (!page) throw BodyError(503, page.error().message);
-    for (std::size_t i = 0; i < page.value().rows.size(); ++i)
-      out += write(page.value().rows[i], page.value().ids[i]);
-    state->left -= page.value().rows.size();
-    state->filter.after = page.value().next;
-    state->done = page.value().next.empty() || state->left == 0;
+    // A page of a class may be empty and yet not the last: an empty answer here would be the end.
+    while (out.empty() && !state->done) {
+      state->filter.limit = std::min<std::size_t>(1000, state->left);
+      const auto page = fetch(state->filter);
+      // The status is sent already; an early end is all that can still be told.
+      if (!page) throw BodyError(503, page.error().message);
+      for (std::size_t i = 0; i < page.value().rows.size(); ++i)
+        out += write(page.value().rows[i], page.value().ids[i]);
+      state->left -= page.value().rows.size();
+      state->filter.after = page.value().next;
+      state->done = page.value().next.empty() || state->left == 0;
+    }
     return out;
   };
   return response;
 }
 
 template <class Fetch, class Json, class Csv>
-Response rows(const Request& request, Fetch fetch, Json json, Csv csv, const char* header) {
-  auto filter = filter_of(request);
+Response rows(const Request& request, MeasurementStore::Filter filter, Fetch fetch, Json json, Csv csv,
+              const char* header, std::optional<std::uint64_t> total = std::nullopt) {
   const std::string format = negotiate(request, {"json", "ndjson", "csv"});
   if (format == "csv") return stream(request, filter, "text/csv; charset=utf-8", header, fetch, csv);
   if (format == "ndjson")
@@ -115,32 +119,84 @@ Response rows(const Request& request, Fetch fetch, Json json, Csv csv, const cha
   const auto page = value_or_problem(fetch(filter));
   Ordered items = Ordered::array();
   for (std::size_t i = 0; i < page.rows.size(); ++i) items.push_back(json(page.rows[i], page.ids[i]));
-  return list_response(request, std::move(items), page.next);
+  return list_response(request, std::move(items), page.next, total);
+}
+
+FixClass query_fix(const std::string& text) {
+  for (const auto fix :
+       {FixClass::none, FixClass::single, FixClass::dgps, FixClass::rtk_float, FixClass::rtk_fixed})
+    if (text == fix_word(fix)) return fix;
+  throw_problem(422, "validation", "fix is not one of its words",
+                {{"/fix", "unknown_value", "must be none, single, dgps, float or fixed"}});
+}
+
+/// One page of what the promoted models call `wanted`: they are asked row by row, since nothing of theirs is
+/// stored.
+Result<MeasurementStore::Page<Range>> classed(MeasurementStore& store, const ModelRegistry::Active& active,
+                                              PredictedClass wanted, MeasurementStore::Filter filter) {
+  const std::size_t limit = filter.limit;
+  MeasurementStore::Page<Range> out;
+  for (std::size_t looked = 0; out.rows.size() < limit && looked < k_class_scan_max;) {
+    filter.limit = limit - out.rows.size();
+    BOOST_OUTCOME_TRY(auto page, store.ranges(filter));
+    looked += page.rows.size();
+    for (std::size_t i = 0; i < page.rows.size(); ++i) {
+      if (class_of(ModelRegistry::judge(active, features_of(page.rows[i]))) != wanted) continue;
+      out.rows.push_back(std::move(page.rows[i]));
+      out.ids.push_back(page.ids[i]);
+    }
+    out.next = filter.after = std::move(page.next);
+    if (out.next.empty()) break;
+  }
+  return out;
 }
 
 Response list_ranges(Services& s, const Request& request) {
-  check_query(request, {"limit", "cursor", "fields", "format", "mission", "anchor", "tag", "since", "until",
-                        "sort", "cir", "features"});
-  const bool with_cir = query_flag(request, "cir"), with_features = query_flag(request, "features");
-  return rows(
+  check_query(
       request,
-      [&store = s.deps.measurements, with_cir, with_features](MeasurementStore::Filter filter) {
-        filter.with_cir = with_cir || with_features;
-        return store.ranges(filter);
+      {"limit",         "cursor",        "fields", "format", "mission",  "anchor",         "tag",
+       "since",         "until",         "sort",   "cir",    "features", "min_distance_m", "max_distance_m",
+       "min_level_dbm", "max_level_dbm", "label",  "fix",    "class",    "predicted",      "every",
+       "count"});
+  const bool with_cir = query_flag(request, "cir"), with_features = query_flag(request, "features");
+  auto filter = filter_of(request);
+  filter.limits = query_limits(request);
+  if (const auto fix = request.query_value("fix")) filter.fix = query_fix(*fix);
+  filter.every = query_every(request);
+  const auto wanted = query_class(request);
+  std::optional<std::uint64_t> total;
+  if (const auto count = request.query_value("count")) {
+    if (*count != "exact" || wanted)
+      throw_problem(422, "validation", "what is counted is stored",
+                    {{"/count", "unknown_value", "must be exact, and goes without class"}});
+    total = value_or_problem(s.deps.measurements.count_ranges(filter));
+  }
+  const bool judged = wanted || query_flag(request, "predicted");
+  const auto active =
+      judged && s.models != nullptr ? s.models->active() : std::make_shared<const ModelRegistry::Active>();
+  filter.with_cir = with_cir || with_features || (judged && active->needs_cir);
+  return rows(
+      request, std::move(filter),
+      [&store = s.deps.measurements, active, wanted](const MeasurementStore::Filter& page) {
+        return wanted ? classed(store, *active, *wanted, page) : store.ranges(page);
       },
-      [with_cir, with_features](const Range& row, std::int64_t id) {
+      [with_cir, with_features, judged, active](const Range& row, std::int64_t id) {
         Ordered json = range_json(row, id);
-        if (with_features) json["features"] = features_json(features_of(row));
+        if (with_features || judged) {
+          const auto features = features_of(row);
+          if (with_features) json["features"] = features_json(features);
+          if (judged) json["predicted"] = predicted_json(ModelRegistry::judge(*active, features));
+        }
         if (!with_cir) json.erase("cir");
         return json;
       },
-      range_csv, k_range_header);
+      range_csv, k_range_header, total);
 }
 
 Response list_fixes(Services& s, const Request& request) {
   check_query(request, {"limit", "cursor", "fields", "format", "mission", "since", "until", "sort"});
   return rows(
-      request,
+      request, filter_of(request),
       [&store = s.deps.measurements](const MeasurementStore::Filter& filter) { return store.fixes(filter); },
       [](const Fix& row, std::int64_t id) { return fix_json(row, id); }, fix_csv, k_fix_header);
 }

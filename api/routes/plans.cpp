@@ -105,6 +105,16 @@ Response validate(Services& s, const Request& request) {
   return json_response(200, plan_check_json(value_or_problem(planning::check_plan(plan))));
 }
 
+/// The same of a plan that need not be stored: what is drawn is judged while it is drawn.
+Response validate_body(Services&, const Request& request) {
+  std::vector<FieldError> errors;
+  auto body = json_body(request);
+  if (body.is_object() && !body.contains("name")) body["name"] = "Drawn";
+  const Plan plan = read_plan(body, errors);
+  refuse_if_any(errors);
+  return json_response(200, plan_check_json(value_or_problem(planning::check_plan(plan))));
+}
+
 /// The body is a plan that need not be stored; the answer is the same one with waypoints, and its check.
 Response generate(Services&, const Request& request) {
   std::vector<FieldError> errors;
@@ -171,6 +181,7 @@ void add_plan_routes(Router& router, Services& s) {
   router.add({Method::get, "/api/v1/plans", readers(), on(list)});
   router.add({Method::post, "/api/v1/plans", op, on(create), k_body});
   router.add({Method::post, "/api/v1/plans/generate", op, on(generate), k_body});
+  router.add({Method::post, "/api/v1/plans/validate", op, on(validate_body), k_body});
   router.add({Method::post, "/api/v1/plans/import", op, on(import), k_body});
   router.add({Method::get, "/api/v1/plans/{id}", readers(), [&s](const Request& request) {
                 check_query(request, {});

@@ -12,6 +12,7 @@ namespace anchord::api {
 class AlarmBoard;
 class GeoService;
 class KitProfiles;
+class ModelRegistry;
 
 class Fields;
 class FlightService;
@@ -28,6 +29,7 @@ struct Services {
   CalibrationService& calibrations;
   GeoService& geo;
   KitProfiles* profiles{nullptr};   ///< null: their routes do not exist
+  ModelRegistry* models{nullptr};   ///< null: no ranges are judged (tests)
   FrameStore* frames{nullptr};      ///< null: their routes do not exist
   FlightService* flights{nullptr};  ///< null: no plans, nothing is flown (tests)
 

@@ -106,7 +106,8 @@ std::set<std::string> wanted_fields(const Request& request, const std::string& l
 
 }  // namespace
 
-Response list_response(const Request& request, Ordered items, const std::string& next_cursor) {
+Response list_response(const Request& request, Ordered items, const std::string& next_cursor,
+                       std::optional<std::uint64_t> total) {
   if (const auto fields = request.query_value("fields")) {
     const auto wanted = wanted_fields(request, *fields);
     for (auto& item : items) {
@@ -120,6 +121,7 @@ Response list_response(const Request& request, Ordered items, const std::string&
   Ordered body;
   body["items"] = std::move(items);
   body["next_cursor"] = next_cursor.empty() ? Ordered(nullptr) : Ordered(next_cursor);
+  if (total) body["total"] = *total;
   Response response = json_response(200, body);
   if (!next_cursor.empty()) response.header("Link", next_link(request, next_cursor));
   return response;
@@ -142,6 +144,18 @@ std::optional<UtcTime> query_time(const Request& request, const char* name) {
   const auto time = parse_rfc3339(*text);
   if (!time) bad_query(name, "must be RFC 3339 with Z, or microseconds");
   return time.value();
+}
+
+std::optional<double> query_number(const Request& request, const char* name, double low, double high) {
+  const auto text = request.query_value(name);
+  if (!text) return std::nullopt;
+  double value = 0;
+  const auto [end, status] = std::from_chars(text->data(), text->data() + text->size(), value);
+  if (status != std::errc{} || end != text->data() + text->size() || !(value >= low && value <= high))
+    throw_problem(422, "validation", std::string(name) + " must be a number",
+                  {{std::string("/") + name, "bad_value",
+                    "must be " + std::to_string(low) + ".." + std::to_string(high)}});
+  return value;
 }
 
 std::optional<MissionId> query_mission(const Request& request) {

@@ -30,7 +30,9 @@ struct PageQuery {
 };
 PageQuery page_query(const Request& request, std::size_t max_limit = 1000);
 /// {"items":[...],"next_cursor":...} with Link rel="next"; `fields=a,b` keeps only these members.
-Response list_response(const Request& request, nlohmann::ordered_json items, const std::string& next_cursor);
+/// `total` only where the client asked for a count.
+Response list_response(const Request& request, nlohmann::ordered_json items, const std::string& next_cursor,
+                       std::optional<std::uint64_t> total = std::nullopt);
 std::string next_link(const Request& request, const std::string& next_cursor);
 
 /// The path parameter as an id; 404 when it is none, for then there is nothing at this address.
@@ -53,6 +55,8 @@ std::optional<UtcTime> query_time(const Request& request, const char* name);
 std::optional<MissionId> query_mission(const Request& request);
 std::optional<NetworkId> query_network_id(const Request& request, const char* name);
 bool query_flag(const Request& request, const char* name);
+/// 422 outside of low..high.
+std::optional<double> query_number(const Request& request, const char* name, double low, double high);
 
 /// 412, with the present ETag, unless If-Match names it.
 void require_match(const Request& request, const std::string& etag);

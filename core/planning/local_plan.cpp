@@ -8,6 +8,7 @@
 
 #include "core/geo/enu.hpp"
 #include "core/planning/design.hpp"
+#include "core/planning/gdop.hpp"
 
 namespace anchord::planning {
 namespace {
@@ -74,6 +75,16 @@ void predict(const Plan& plan, const LocalPlan& local, PlanCheck& check) {
     if (plan.waypoints[i].measure) design.add(local.waypoints_m[i]);
   }
   check.predicted_sigma_m = design.sigmas_m();
+  for (const auto& anchor : check.assumed_anchors_m) {
+    Geometry<3> geometry(anchor);
+    for (std::size_t i = 0; i < local.waypoints_m.size(); ++i) {
+      if (plan.waypoints[i].measure && (local.waypoints_m[i] - anchor).norm() <= options.max_range_m) {
+        geometry.add(local.waypoints_m[i]);
+      }
+    }
+    const auto seen = geometry.gdop();
+    check.predicted_gdop.push_back(seen ? std::optional(seen.value().root) : std::nullopt);
+  }
   check.rms_m = std::sqrt(design.mean_square_m2());
   check.worst_m = *std::max_element(check.predicted_sigma_m.begin(), check.predicted_sigma_m.end());
 }

@@ -44,6 +44,9 @@ struct PlanCheck {
   /// Of anchors assumed 5 m apart inside the outline; empty without outline or measuring points.
   std::vector<Eigen::Vector3d> assumed_anchors_m;
   std::vector<double> predicted_sigma_m;
+  /// Of the measuring points within reach, seen from each assumed anchor; root of the trace. Absent: fewer
+  /// than three, or all in one plane with it.
+  std::vector<std::optional<double>> predicted_gdop;
   double rms_m{}, worst_m{};
   bool flyable() const;  ///< no error among the issues
 };

@@ -9,6 +9,7 @@
 
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
+#include "core/ports/measurement_limits.hpp"
 #include "core/types/campaign_record.hpp"
 
 /// What learning keeps: campaigns, frozen data sets, training runs, models and who promoted them. The rules
@@ -51,7 +52,8 @@ class CampaignStore {
   struct Filter {
     CampaignId campaign{};
     std::optional<std::string> setting, environment;
-    std::optional<bool> los;
+    MeasurementLimits limits;
+    std::size_t every{1};  ///< of those that match only each n-th, the first included
     std::size_t limit{100};
     std::int64_t after{0};  ///< sample id
     bool with_cir{false};

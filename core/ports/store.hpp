@@ -10,6 +10,7 @@
 
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
+#include "core/ports/measurement_limits.hpp"
 #include "core/types/anchor.hpp"
 #include "core/types/estimate.hpp"
 #include "core/types/fix.hpp"
@@ -48,6 +49,10 @@ class MeasurementStore {
     std::optional<MissionId> mission;
     std::optional<NetworkId> anchor, tag;
     std::optional<UtcTime> since, until;
+    MeasurementLimits limits;  ///< of ranges
+    std::optional<FixClass>
+        fix;  ///< of ranges: of the newest position at most 2 s before it; none: there is no such
+    std::size_t every{1};  ///< of those that match only each n-th, the first included: for a picture of many
     std::size_t limit{100};
     std::string after;
     bool with_cir{false};
@@ -63,6 +68,8 @@ class MeasurementStore {
   virtual Result<Page<Fix>> fixes(const Filter& filter) = 0;
   virtual Result<Range> range(std::int64_t id) = 0;  ///< with CIR and truth
   virtual Result<std::uint64_t> count_ranges(const MissionId& mission) = 0;
+  /// All that match, whatever `every`, `limit` and `after` say. Looks at each row of the mission.
+  virtual Result<std::uint64_t> count_ranges(const Filter& filter) = 0;
   virtual Result<std::uint64_t> count_fixes(const MissionId& mission) = 0;
   /// All radios of one mission, or of all (one row per mission and device), newest first.
   virtual Result<std::vector<DeviceSeen>> devices(const std::optional<MissionId>& mission) = 0;

@@ -237,16 +237,21 @@ class SqlCampaignStore final : public CampaignStore {
           int next = 3;
           if (filter.setting) sql += " AND s.name = ?" + std::to_string(next++);
           if (filter.environment) sql += " AND s.environment = ?" + std::to_string(next++);
-          if (filter.los) sql += " AND s.los = ?" + std::to_string(next++);
+          const auto bare = [&](const std::string& text) { sql += " AND " + text; };
+          const auto term = [&](const std::string& text) { bare(text + "?" + std::to_string(next++)); };
+          limit_terms(filter.limits, {"x.range_m", "x.rx_dbm", "s.los"}, term, bare);
           sql += " ORDER BY x.sample_id LIMIT ?" + std::to_string(next);
           Query query(c, sql);
           query << *key << filter.after;
           if (filter.setting) query << *filter.setting;
           if (filter.environment) query << *filter.environment;
-          if (filter.los) query << *filter.los;
-          query << row_limit(filter.limit);
+          bind_limits(query, filter.limits);
+          const std::size_t every = std::max<std::size_t>(filter.every, 1);
+          query << row_limit(filter.limit) * static_cast<std::int64_t>(every);
           std::vector<StoredSample> found;
-          while (query.step()) {
+          // A page after another begins behind a row that was taken.
+          for (std::size_t row = filter.after > 0 ? 1 : 0; query.step(); ++row) {
+            if (row % every != 0) continue;
             found.push_back(read_sample(query));
             if (filter.with_cir) take_cir(c, found.back());
           }

@@ -181,6 +181,12 @@ bool same_content(const Fix& a, const Fix& b) {
          a.satellites == b.satellites;
 }
 
+void bind_limits(Query& query, const MeasurementLimits& limits) {
+  for (const auto* limit :
+       {&limits.min_distance_m, &limits.max_distance_m, &limits.min_level_dbm, &limits.max_level_dbm})
+    if (*limit) query << **limit;
+}
+
 void bind_covariance(Query& query, const Eigen::Matrix3d& m) {
   query << m(0, 0) << m(0, 1) << m(0, 2) << m(1, 1) << m(1, 2) << m(2, 2);
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/ports/measurement_limits.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/range.hpp"
 #include "server/storage/sql.hpp"
@@ -58,6 +59,26 @@ struct Table<Fix> {
   static Fix read(Query& query);
   static std::string refusal(const Fix& row);
 };
+
+/// Limits as SQL: `term(text)` gets what compares with the next parameter, `bare(text)` what has none.
+/// bind_limits() binds in the same order.
+struct LimitColumns {
+  std::string_view distance, level, los;
+};
+template <class Term, class Bare>
+void limit_terms(const MeasurementLimits& limits, const LimitColumns& columns, Term term, Bare bare) {
+  const auto text = [](std::string_view column, const char* relation) {
+    return std::string(column) + relation;
+  };
+  if (limits.min_distance_m) term(text(columns.distance, " >= "));
+  if (limits.max_distance_m) term(text(columns.distance, " <= "));
+  if (limits.min_level_dbm) term(text(columns.level, " >= "));
+  if (limits.max_level_dbm) term(text(columns.level, " <= "));
+  if (limits.label == MeasurementLimits::Label::none) bare(text(columns.los, " IS NULL"));
+  if (limits.label == MeasurementLimits::Label::los) bare(text(columns.los, " = 1"));
+  if (limits.label == MeasurementLimits::Label::nlos) bare(text(columns.los, " = 0"));
+}
+void bind_limits(Query& query, const MeasurementLimits& limits);
 
 void insert_cir(Connection& connection, std::int64_t range_id, const Cir& cir);
 std::optional<Cir> read_cir(Connection& connection, std::int64_t range_id);

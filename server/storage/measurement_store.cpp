@@ -165,21 +165,52 @@ Result<std::optional<Cursor>> parse_cursor(const std::string& text) {
   return make_error(Errc::invalid_argument, "not a cursor of ours: \"" + text + "\"");
 }
 
-/// Text of one page: the parameters appear in the order in which bind_page binds them.
+constexpr LimitColumns k_range_limits{"distance_m", "ifnull(rx_dbm, rss_dbm)", "truth_los"};
+/// Class of the newest position at most 2 s before a range; 0, none, where there is no such.
+constexpr const char* k_fix_class =
+    "ifnull((SELECT f.fix_class FROM fix f WHERE f.mission_key = uwb_range.mission_key AND f.t_ns <= "
+    "uwb_range.t_ns AND f.t_ns >= uwb_range.t_ns - 2000000000 ORDER BY f.t_ns DESC LIMIT 1), 0) = ";
+
+/// What matches: the parameters appear in the order in which bind_filter() binds them; n is how many.
 template <class Row>
-std::string page_text(const MeasurementStore::Filter& filter, bool after) {
-  int n = 0;
+std::string where_text(const MeasurementStore::Filter& filter, int& n) {
   std::string where;
-  const auto term = [&](const std::string& text) {
-    where += (where.empty() ? " WHERE " : " AND ") + text + "?" + std::to_string(++n);
-  };
+  const auto bare = [&](const std::string& text) { where += (where.empty() ? " WHERE " : " AND ") + text; };
+  const auto term = [&](const std::string& text) { bare(text + "?" + std::to_string(++n)); };
   if (filter.mission) term("mission_key = ");
   if (filter.since) term("t_ns >= ");
   if (filter.until) term("t_ns < ");
   if constexpr (std::is_same_v<Row, Range>) {
     if (filter.anchor) term("anchor = ");
     if (filter.tag) term("tag = ");
+    limit_terms(filter.limits, k_range_limits, term, bare);
+    if (filter.fix) term(k_fix_class);
   }
+  return where;
+}
+
+template <class Row>
+void bind_filter(Query& query, const MeasurementStore::Filter& filter,
+                 const std::optional<std::int64_t>& mission_key) {
+  if (mission_key) query << *mission_key;
+  if (filter.since) query << *filter.since;
+  if (filter.until) query << *filter.until;
+  if constexpr (std::is_same_v<Row, Range>) {
+    if (filter.anchor) query << *filter.anchor;
+    if (filter.tag) query << *filter.tag;
+    bind_limits(query, filter.limits);
+    if (filter.fix) query << static_cast<int>(*filter.fix);
+  }
+}
+
+/// Text of one page: the filter's parameters, then those of the cursor, then the limit.
+template <class Row>
+std::string page_text(const MeasurementStore::Filter& filter, bool after) {
+  int n = 0;
+  std::string where = where_text<Row>(filter, n);
+  const auto term = [&](const std::string& text) {
+    where += (where.empty() ? " WHERE " : " AND ") + text + "?" + std::to_string(++n);
+  };
   const std::string id(Table<Row>::id);
   if (after) {
     // The first comparison is implied by the second, but an index can follow only the first.
@@ -212,18 +243,14 @@ Result<MeasurementStore::Page<Row>> read_page(Connection& connection,
     if (!key) return page;
   }
   Query query(connection, page_text<Row>(filter, cursor.has_value()));
-  if (key) query << *key;
-  if (filter.since) query << *filter.since;
-  if (filter.until) query << *filter.until;
-  if constexpr (std::is_same_v<Row, Range>) {
-    if (filter.anchor) query << *filter.anchor;
-    if (filter.tag) query << *filter.tag;
-  }
+  bind_filter<Row>(query, filter, key);
   if (cursor) query << cursor->t_ns << cursor->id;
   // One more than asked tells whether there is a next page.
-  query << row_limit(filter.limit) + 1;
+  const std::size_t every = std::max<std::size_t>(filter.every, 1);
+  query << (row_limit(filter.limit) + 1) * static_cast<std::int64_t>(every);
   std::map<std::int64_t, MissionId> missions;
-  while (query.step()) {
+  for (std::size_t row = cursor ? 1 : 0; query.step(); ++row) {
+    if (row % every != 0) continue;
     if (page.rows.size() == filter.limit) {
       if (filter.limit > 0)
         page.next = std::to_string(page.rows.back().time.ns) + "." + std::to_string(page.ids.back());
@@ -273,6 +300,16 @@ class SqlMeasurementStore final : public MeasurementStore {
   }
   Result<std::uint64_t> count_ranges(const MissionId& mission) override {
     return count(mission, k_count_ranges);
+  }
+  Result<std::uint64_t> count_ranges(const Filter& filter) override {
+    return read_value<std::uint64_t>(gate_, [&](Connection& c) -> Result<std::uint64_t> {
+      const auto key = filter.mission ? mission_key(c, *filter.mission) : std::nullopt;
+      if (filter.mission && !key) return std::uint64_t{0};
+      int n = 0;
+      Query query(c, "SELECT count(*) FROM uwb_range" + where_text<Range>(filter, n));
+      bind_filter<Range>(query, filter, key);
+      return query.step() ? query.as<std::uint64_t>() : 0;
+    });
   }
   Result<std::uint64_t> count_fixes(const MissionId& mission) override {
     return count(mission, k_count_fixes);

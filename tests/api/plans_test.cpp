@@ -3,6 +3,7 @@
 #include <set>
 
 #include <gmock/gmock.h>
+#include <Eigen/Dense>
 
 #include "app_fixture.hpp"
 
@@ -103,6 +104,30 @@ TEST_F(Plans, ValidateTellsWhatIsWrongAndWhatTheFlightWouldBring) {
   EXPECT_EQ(issues.count("/waypoints/0"), 0u);
   EXPECT_EQ(check["n_measure"], 3);
   EXPECT_GT(check["predicted"]["worst_m"], 0);
+}
+
+TEST_F(Plans, ADrawnPlanIsJudgedAsAStoredOneAndNothingIsStored) {
+  const Json plan = hall();
+  const auto drawn = post("/api/v1/plans/validate", plan.dump());
+  ASSERT_EQ(drawn.status, 200) << drawn.body;
+  EXPECT_EQ(json(get("/api/v1/plans"))["items"].size(), 0u);
+  const auto made = make(plan);
+  EXPECT_EQ(json(drawn), json(post("/api/v1/plans/" + made["id"].get<std::string>() + "/validate", "")));
+  // Three measuring points, by hand: rows of unit vectors in metres about the middle of the hall.
+  const Json seen = json(drawn)["predicted"]["anchors"][0];
+  const Eigen::Vector3d anchor(seen["enu_m"][0], seen["enu_m"][1], seen["enu_m"][2]);
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  for (int i = 0; i < 3; ++i) {
+    const auto& w = plan["waypoints"][static_cast<std::size_t>(i)];
+    const Eigen::Vector3d point((w["lon"].get<double>() - 3.71331375) * 70'200,
+                                (w["lat"].get<double>() - 51.02323995) * 111'200,
+                                w["height_above_ground_m"].get<double>());
+    const Eigen::Vector3d u = (point - anchor).normalized();
+    normal += u * u.transpose();
+  }
+  const double gdop = std::sqrt(normal.inverse().trace());
+  EXPECT_NEAR(seen["gdop"].get<double>(), gdop, 0.02 * gdop);  // degrees to metres by three digits
+  EXPECT_EQ(post("/api/v1/plans/validate", R"({"name":"x","outlin":null})").status, 422);
 }
 
 TEST_F(Plans, GenerateFliesRoundTheOutlineWithoutAnyWaypointSet) {

@@ -125,6 +125,61 @@ test('measurements are filtered, plotted and opened one by one', async () => {
   await page.close();
 });
 
+test('the filter is the server\'s: the list, the count and the file are of the same rows, and only what is in sight is in the page', async () => {
+  const { items: [{ id: mission }] } = await get('/api/v1/missions'), { items } = await get(`/api/v1/ranges?mission=${mission}&limit=10000`);
+  const limit = Math.round(items.map((r) => r.distance_m).sort((a, b) => a - b)[Math.floor(items.length / 2)] * 2) / 2, near = items.filter((r) => r.distance_m <= limit);
+  assert.ok(near.length > 500 && near.length < items.length, `${near.length} of ${items.length}`);
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/measurements' });
+  await id('source').selectOption(mission);
+  const count = async () => (await text(id('counts'))).split(' of ').map((n) => Number(n.replace(/\D/g, '')));
+  await eventually('all are counted', async () => (await count())[0] === items.length);
+  await id('distance-to').fill(String(limit));
+  await id('distance-to').press('Enter');
+  await eventually('fewer are counted', async () => (await count()).join() === [near.length, items.length].join());
+  const file = await server.fetch(await id('download-ndjson').getAttribute('href'));
+  assert.deepEqual((await file.text()).trim().split('\n').map((l) => JSON.parse(l).id).sort(), near.map((r) => r.id).sort());
+  // To the oldest, page by page: what was gone through is not kept in the page.
+  const list = id('rows'), oldest = near.reduce((a, b) => (b.t_us < a.t_us ? b : a));
+  await eventually('the end is reached', async () => { await id('rows-box').evaluate((e) => { e.scrollTop = e.scrollHeight; }); return Number(await list.getAttribute('aria-rowcount')) === near.length + 1; }, 30_000, 100);
+  await eventually('the oldest is listed', async () => (await list.locator('tbody tr:not(.space)').last().locator('td').nth(3).textContent()) === oldest.distance_m.toFixed(3));
+  assert.ok((await list.locator('tbody tr').count()) < 60);
+  await id('turn').click();
+  await eventually('the oldest is first', async () => (await text(list.locator('tbody tr:not(.space)').first().locator('td').nth(3))) === oldest.distance_m.toFixed(3));
+  assert.deepEqual(await violations(page), []);
+  // No model is promoted: no measurement of the flight is called LOS, and the way out is said.
+  await id('predicted').selectOption('los');
+  await page.getByText('Nothing passes this filter').waitFor();
+  await id('reset').click();
+  await eventually('all are back', async () => (await count())[0] === items.length);
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});
+
+test('measurements are filtered by what the promoted model calls them, and the level is drawn against the line of a data set', async () => {
+  const model = training.model.split('/').pop();
+  await post(`/api/v1/models/${model}/promote`, { reason: 'to filter by it' });
+  const { items } = await get('/api/v1/campaigns/halls/samples?limit=1000&predicted=true'), called = items.filter((s) => s.predicted.p_los < 0.4);
+  assert.ok(called.length > 20 && called.length < items.length - 20, `${called.length} of ${items.length}`);
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/measurements' });
+  await id('source').selectOption({ label: 'halls' });
+  await id('predicted').selectOption('nlos');
+  await eventually('those are counted', async () => (await text(id('counts'))) === `${called.length} of ${items.length}`);
+  for (const cell of await id('rows').locator('tbody tr:not(.space) td:nth-of-type(3)').allTextContents()) assert.match(cell, /^NLOS 0\.[0-3]/);
+  const file = await server.fetch(await id('download-csv').getAttribute('href'));
+  assert.equal((await file.text()).trim().split('\r\n').length, called.length + 1);
+  const { thresholds: { rss } } = await get('/api/v1/datasets/set/rules'), words = id('line-words');
+  await id('line').selectOption({ label: 'line of set' });
+  await eventually('the line is named', async () => (await text(words)).includes(`LOS above ${rss.at_zero_dbm.toFixed(1).replace('-', '\u2212')} dBm`));
+  const labelled = called.filter((s) => s.truth.los === false), under = labelled.filter((s) => s.rx_dbm <= rss.at_zero_dbm + rss.slope_dbm_per_m * s.range_m);
+  assert.ok((await text(words)).replaceAll('\u00a0', ' ').includes(`${((100 * under.length) / labelled.length).toFixed(1)} % of NLOS below`), await text(words));
+  await id('plot-level').locator('[data-mark="line"]').waitFor();
+  assert.deepEqual(await violations(page), []);
+  await picture(page, 'measurements-filtered-light');
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+  await post('/api/v1/models/rollback', { task: 'nlos_id' });
+});
+
 /** One DW1000 record: noise of `noise`, a first path at tap 740 and a tail that fades with `tau` taps. */
 function response(noise, first, tau) {
   const bytes = Buffer.alloc(1016 * 4);
@@ -203,6 +258,62 @@ test('a person draws an outline, generates a flight, moves a point by keys, save
   await id('conflict').waitFor();
   await id('conflict').getByRole('button', { name: 'Take theirs' }).click();
   await eventually('theirs is shown', async () => (await id('plan-name').inputValue()) === 'Hall B');
+  assert.deepEqual(seen.errors.filter((e) => !e.includes('412')), []);
+  await page.close();
+});
+
+test('waypoints are spaced evenly and made denser, judged while they are drawn, and two versions stand side by side', async () => {
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/plan' });
+  await eventually('the plan is open', async () => (await id('plan-name').inputValue()) === 'Hall B');
+  const before = (await get('/api/v1/plans')).items[0], stored = () => get(`/api/v1/plans/${before.id}`), points = id('waypoints').locator('tbody tr');
+  await id('spacing').fill('6');
+  await id('space-evenly').click();
+  await eventually('other waypoints are there', async () => (await points.count()) !== before.waypoints.length);
+  const n = await points.count();
+  await id('waypoints').getByRole('button', { name: '2', exact: true }).click();
+  await id('denser').click();
+  await eventually('two more', async () => (await points.count()) === n + 2);
+  // Judged without being saved: time, and the map of what is expected.
+  await id('predicted').locator('tbody tr').first().waitFor();
+  await id('check').getByText('BE FLOWN').waitFor();
+  const drawn = (await text(id('flight-time'))).split(':').reduce((s, x) => 60 * s + Number(x), 0);
+  assert.ok(Math.abs(drawn - (await text(id('profile').locator('.meta'))).split(' ')[0].split(':').reduce((s, x) => 60 * s + Number(x), 0)) <= 1);
+  assert.equal((await stored()).revision, before.revision);
+  const cells = await id('plan-map').locator('.cand, .unseen').count();
+  await id('predicted-of').selectOption('none');
+  assert.ok(cells > 0);
+  assert.equal(await id('plan-map').locator('.cand, .unseen').count(), 0);
+  await id('predicted-of').selectOption('gdop');
+  await id('expect-address').fill('6A77');
+  await id('expect').click();
+  await id('save').click();
+  await id('plan').getByText(`revision ${before.revision + 1}`).waitFor();
+  const kept = await stored(), check = await post(`/api/v1/plans/${before.id}/validate`);
+  assert.deepEqual([kept.expected_anchors, kept.waypoints.length], [['0x6a77'], n + 2]);
+  assert.ok(Math.abs(check.duration_s - drawn) < 1.5, `${check.duration_s} ${drawn}`);
+  // Evenly: neighbours away from the denser place are the spacing apart, within a tenth.
+  const metres = (a, b) => Math.hypot((a.lon - b.lon) * 111_320 * Math.cos((a.lat * Math.PI) / 180), (a.lat - b.lat) * 111_230);
+  const gaps = kept.waypoints.slice(4).map((w, i, all) => (i ? metres(w, all[i - 1]) : null)).filter((g) => g !== null);
+  assert.ok(gaps.every((g) => g < 6.6) && gaps.filter((g) => g > 5.4).length >= gaps.length * 0.7, gaps.map((g) => g.toFixed(2)).join(' '));
+  assert.deepEqual(await violations(page), []);
+  await picture(page, 'plan-even-light');
+  // Somebody else moves a waypoint: both are drawn, and the line says which and how.
+  const waypoints = kept.waypoints.map((w, i) => (i === 3 ? { ...w, height_above_ground_m: w.height_above_ground_m + 2 } : w));
+  assert.equal((await server.fetch(`/api/v1/plans/${before.id}`, { method: 'PATCH', headers: { 'if-match': `"p-${kept.revision}"` }, json: { waypoints } })).status, 200);
+  await id('plan-name').fill('Hall D');
+  await id('save').click();
+  const lines = id('differences').locator('tbody tr');
+  await lines.first().waitFor();
+  assert.deepEqual((await lines.allTextContents()).map((l) => l.replace(/\u2212/g, '-')), ['NameHall DHall B', `Waypoint 4${waypoints[3].height_above_ground_m - 2}.0 m high${waypoints[3].height_above_ground_m}.0 m high`]);
+  assert.equal(await id('conflict').locator('svg .only').count(), 2);
+  assert.deepEqual(await violations(page), []);
+  await picture(page, 'plan-conflict-light');
+  await id('conflict').getByRole('button', { name: 'Keep mine, then save' }).click();
+  await id('save').click();
+  await eventually('mine is stored over theirs', async () => (await stored()).name === 'Hall D');
+  await id('plan-name').fill('Hall B');
+  await id('save').click();
+  await eventually('and its old name again', async () => (await stored()).name === 'Hall B');
   assert.deepEqual(seen.errors.filter((e) => !e.includes('412')), []);
   await page.close();
 });

@@ -224,6 +224,86 @@ TEST_P(MeasurementStoreContract, FiltersByAnchorTagAndHalfOpenTime) {
   EXPECT_EQ(db_->measurements().ranges(filter).value().rows.size(), 2u);  // 2, 3
 }
 
+TEST_P(MeasurementStoreContract, FiltersByDistanceLevelAndLabelAndCountsTheSameRows) {
+  const auto mission = stored_mission();
+  std::vector<Range> rows;
+  for (int i = 0; i < 10; ++i) {
+    rows.push_back(range_at(mission.id, i));
+    rows.back().distance_m = i;
+    rows.back().rx_dbm.reset();
+    rows.back().rss_dbm.reset();
+    rows.back().truth.reset();
+  }
+  rows[2].rx_dbm = -80;
+  rows[3].rss_dbm = -80;  // stands in where there is no RX power
+  rows[4].rx_dbm = -90, rows[4].rss_dbm = -80;
+  rows[5].truth = RangeTruth{std::nullopt, true};
+  rows[6].truth = RangeTruth{6.0, false};
+  rows[7].truth = RangeTruth{7.0, std::nullopt};
+  append(rows);
+  const auto found = [&](const MeasurementLimits& limits) {
+    MeasurementStore::Filter filter;
+    filter.mission = mission.id;
+    filter.limits = limits;
+    std::vector<int> out;
+    for (const auto& row : db_->measurements().ranges(filter).value().rows)
+      out.push_back(static_cast<int>(row.distance_m));
+    EXPECT_EQ(db_->measurements().count_ranges(filter).value(), out.size());
+    return out;
+  };
+  using Label = MeasurementLimits::Label;
+  EXPECT_THAT(found({3.0, 5.0, {}, {}, {}}), ElementsAre(3, 4, 5));
+  EXPECT_THAT(found({{}, {}, -85.0, -70.0, {}}), ElementsAre(2, 3));
+  EXPECT_THAT(found({{}, {}, {}, -85.0, {}}), ElementsAre(4)) << "what has no level passes no limit on it";
+  EXPECT_THAT(found({{}, {}, {}, {}, Label::los}), ElementsAre(5));
+  EXPECT_THAT(found({{}, {}, {}, {}, Label::nlos}), ElementsAre(6));
+  EXPECT_THAT(found({{}, {}, {}, {}, Label::none}), ElementsAre(0, 1, 2, 3, 4, 7, 8, 9));
+}
+
+TEST_P(MeasurementStoreContract, FiltersByTheFixThatHeldWhenARangeWasTaken) {
+  const auto mission = stored_mission();
+  std::vector<Range> rows;
+  for (int i = 0; i < 4; ++i) rows.push_back(range_at(mission.id, i));
+  rows[0].time = UtcTime{k_noon.ns - 1};              // before the first position
+  rows[1].time = k_noon;                              // with it
+  rows[2].time = UtcTime{k_noon.ns + 1'500'000'000};  // after the second
+  rows[3].time = UtcTime{k_noon.ns + 3'000'000'001};  // more than 2 s after the last
+  append(rows);
+  auto first = fix_at(mission.id, 0), second = fix_at(mission.id, 1);
+  first.time = k_noon, first.fix = FixClass::rtk_float;
+  second.time = UtcTime{k_noon.ns + 1'000'000'000}, second.fix = FixClass::rtk_fixed;
+  ASSERT_TRUE(db_->measurements().append_fixes({first, second}, true));
+  const auto times = [&](FixClass fix) {
+    MeasurementStore::Filter filter;
+    filter.mission = mission.id;
+    filter.fix = fix;
+    std::vector<std::int64_t> out;
+    for (const auto& row : db_->measurements().ranges(filter).value().rows) out.push_back(row.time.ns);
+    return out;
+  };
+  EXPECT_THAT(times(FixClass::rtk_float), ElementsAre(rows[1].time.ns));
+  EXPECT_THAT(times(FixClass::rtk_fixed), ElementsAre(rows[2].time.ns));
+  EXPECT_THAT(times(FixClass::none), ElementsAre(rows[0].time.ns, rows[3].time.ns));
+}
+
+TEST_P(MeasurementStoreContract, GivesEachNthRowOverAllPages) {
+  const auto mission = stored_mission();
+  std::vector<Range> rows;
+  for (int i = 0; i < 23; ++i) rows.push_back(range_at(mission.id, i)), rows.back().distance_m = i;
+  append(rows);
+  MeasurementStore::Filter filter;
+  filter.mission = mission.id;
+  filter.every = 5;
+  filter.limit = 2;
+  std::vector<int> found;
+  do {
+    const auto page = db_->measurements().ranges(filter).value();
+    for (const auto& row : page.rows) found.push_back(static_cast<int>(row.distance_m));
+    filter.after = page.next;
+  } while (!filter.after.empty());
+  EXPECT_THAT(found, ElementsAre(0, 5, 10, 15, 20));
+}
+
 TEST_P(MeasurementStoreContract, RefusesACursorThatIsNotItsOwn) {
   for (const char* cursor : {"x", "1", "1.", "1.2x", "99999999999999999999.1"}) {
     MeasurementStore::Filter filter;

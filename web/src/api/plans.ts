@@ -1,5 +1,5 @@
 /// Plans: what is to be flown. Corners and waypoints in WGS84, as the server keeps them.
-import { num, obj, str } from '../live/messages';
+import { num, obj, str, vec3 } from '../live/messages';
 import { api_url, idempotency_key, request } from './client';
 
 export interface Corner { readonly lon: number; readonly lat: number }
@@ -7,13 +7,15 @@ export interface Waypoint extends Corner { readonly height_above_ground_m: numbe
 export type Settings = Readonly<Record<string, number | boolean | string | null>>;
 export interface Plan {
   readonly id: string | null; readonly revision: number; readonly name: string; readonly outline: readonly Corner[]; readonly no_fly: readonly (readonly Corner[])[]; readonly fence: readonly Corner[];
-  readonly building_height_m: number; readonly settings: Settings; readonly waypoints: readonly Waypoint[];
+  readonly building_height_m: number; readonly settings: Settings; readonly expected: readonly string[]; readonly waypoints: readonly Waypoint[];
   readonly rest: Readonly<Record<string, unknown>>;   ///< what this page does not edit, kept as it came
 }
 export interface Issue { readonly severity: 'error' | 'warning'; readonly code: string; readonly pointer: string; readonly text: string }
-export interface Check { readonly flyable: boolean; readonly issues: readonly Issue[]; readonly length_m: number | null; readonly duration_s: number | null; readonly n_measure: number | null; readonly rms_m: number | null; readonly worst_m: number | null }
+/// An anchor assumed in the building: where, about the plan's origin, and what the flight would make of it.
+export interface Assumed { readonly e: number; readonly n: number; readonly up: number; readonly sigma_m: number; readonly gdop: number | null }
+export interface Check { readonly flyable: boolean; readonly issues: readonly Issue[]; readonly length_m: number | null; readonly duration_s: number | null; readonly n_measure: number | null; readonly rms_m: number | null; readonly worst_m: number | null; readonly assumed: readonly Assumed[] }
 
-export const EMPTY: Plan = { id: null, revision: 0, name: '', outline: [], no_fly: [], fence: [], building_height_m: 8, settings: { keep_out_m: 4, speed_mps: 2 }, waypoints: [], rest: {} };
+export const EMPTY: Plan = { id: null, revision: 0, name: '', outline: [], no_fly: [], fence: [], building_height_m: 8, settings: { keep_out_m: 4, speed_mps: 2 }, expected: [], waypoints: [], rest: {} };
 
 const list = (v: unknown): Record<string, unknown>[] => (Array.isArray(v) ? v.map(obj).filter((o) => o !== null) as Record<string, unknown>[] : []);
 /// A GeoJSON ring closes itself; the page works with open ones.
@@ -24,21 +26,22 @@ function ring_of(polygon: unknown): Corner[] {
   return corners.length > 1 && first!.lon === last!.lon && first!.lat === last!.lat ? corners.slice(0, -1) : corners;
 }
 function plan_of(o: Record<string, unknown>): Plan {
-  const { id, revision, name, outline, no_fly, fence, building_height_m, settings, waypoints, created_at: _made, changed_at: _changed, links: _links, ...rest } = o;
+  const { id, revision, name, outline, no_fly, fence, building_height_m, settings, expected_anchors, waypoints, created_at: _made, changed_at: _changed, links: _links, ...rest } = o;
   return {
     id: str(id) || null, revision: num(revision) ?? 0, name: str(name), outline: ring_of(outline), no_fly: Array.isArray(no_fly) ? no_fly.map(ring_of) : [], fence: ring_of(fence), building_height_m: num(building_height_m) ?? 8,
-    settings: (obj(settings) ?? {}) as Settings, rest,
+    settings: (obj(settings) ?? {}) as Settings, rest, expected: Array.isArray(expected_anchors) ? expected_anchors.filter((a): a is string => typeof a === 'string') : [],
     waypoints: list(waypoints).map((w) => ({ lon: num(w.lon) ?? 0, lat: num(w.lat) ?? 0, height_above_ground_m: num(w.height_above_ground_m) ?? 0, heading_deg: num(w.heading_deg), dwell_s: num(w.dwell_s), measure: w.measure !== false, turn: w.turn === true, height_search: w.height_search === true })),
   };
 }
 const polygon = (corners: readonly Corner[]): object | null => (corners.length < 3 ? null : { type: 'Polygon', coordinates: [[...corners, corners[0]!].map((c) => [c.lon, c.lat])] });
 export function body_of(p: Plan): object {
-  return { ...p.rest, name: p.name || 'Plan', outline: polygon(p.outline), no_fly: p.no_fly.map(polygon).filter((x) => x !== null), fence: polygon(p.fence), building_height_m: p.building_height_m, settings: p.settings, waypoints: p.waypoints };
+  return { ...p.rest, name: p.name || 'Plan', outline: polygon(p.outline), no_fly: p.no_fly.map(polygon).filter((x) => x !== null), fence: polygon(p.fence), building_height_m: p.building_height_m, settings: p.settings, expected_anchors: p.expected, waypoints: p.waypoints };
 }
 function check_of(o: Record<string, unknown> | null): Check {
   const predicted = obj(o?.predicted);
   return {
     flyable: o?.flyable === true, length_m: num(o?.length_m), duration_s: num(o?.duration_s), n_measure: num(o?.n_measure), rms_m: num(predicted?.rms_m), worst_m: num(predicted?.worst_m),
+    assumed: list(predicted?.anchors).flatMap((a) => { const at = vec3(a.enu_m), sigma_m = num(a.sigma_m); return at && sigma_m !== null ? [{ e: at[0], n: at[1], up: at[2], sigma_m, gdop: num(a.gdop) }] : []; }),
     issues: list(o?.issues).map((i) => ({ severity: i.severity === 'error' ? 'error' : 'warning', code: str(i.code), pointer: str(i.pointer), text: str(i.text) })),
   };
 }
@@ -51,6 +54,8 @@ export async function save(p: Plan): Promise<Plan> {
 export const remove = (p: Plan): Promise<unknown> => request('DELETE', `/plans/${p.id}`, undefined, { 'If-Match': `"p-${p.revision}"` });
 export const read = async (id: string): Promise<Plan> => plan_of(obj(await request('GET', `/plans/${id}`)) ?? {});
 export const check = async (id: string): Promise<Check> => check_of(obj(await request('POST', `/plans/${id}/validate`, {})));
+/// Of what is drawn, stored or not.
+export const check_drawn = async (p: Plan): Promise<Check> => check_of(obj(await request('POST', '/plans/validate', body_of(p))));
 /// Waypoints from the outline alone; nothing is stored.
 export async function generate(p: Plan): Promise<{ plan: Plan; check: Check }> {
   const answer = obj(await request('POST', '/plans/generate', body_of(p))), made = plan_of(obj(answer?.plan) ?? {});

@@ -17,6 +17,11 @@ function threshold_of(o: Record<string, unknown> | null): string {
   if (zero !== null && slope !== null) return `LOS above ${zero.toFixed(1)} ${slope < 0 ? '−' : '+'} ${Math.abs(slope).toFixed(2)} d dBm`.replace('-', '−');
   return value === null ? '' : `LOS ${o?.los_above === true ? 'above' : 'below'} ${value.toPrecision(3)}`;
 }
+/// RSS line fitted to the LOS rows of a data set; null where it has too few with a level.
+export async function rss_line_of(dataset: string): Promise<{ readonly at_zero_dbm: number; readonly slope_dbm_per_m: number } | null> {
+  const rss = obj(obj(obj(await request('GET', `/datasets/${encodeURIComponent(dataset)}/rules`))?.thresholds)?.rss), [zero, slope] = [num(rss?.at_zero_dbm), num(rss?.slope_dbm_per_m)];
+  return zero === null || slope === null ? null : { at_zero_dbm: zero, slope_dbm_per_m: slope };
+}
 export async function rules_of(dataset: string): Promise<Rules> {
   const o = obj(await request('GET', `/datasets/${encodeURIComponent(dataset)}/rules`)), printed = obj(o?.printed) ?? {}, fitted = obj(o?.fitted) ?? {}, thresholds = obj(o?.thresholds) ?? {};
   const names = [...new Set([...Object.keys(printed), ...Object.keys(fitted)])];

@@ -1,16 +1,31 @@
-/// What of the loaded measurements is looked at. No DOM.
-import type { Sample } from '../../api/measurements';
+/// What the plots of many measurements are made of. No DOM.
+import type { Filter, Sample } from '../../api/measurements';
 
-export type ClassFilter = 'all' | 'los' | 'nlos' | 'unlabelled';
-export const CLASS_FILTERS: readonly (readonly [ClassFilter, string])[] = [['all', 'All'], ['los', 'LOS'], ['nlos', 'NLOS'], ['unlabelled', 'No label']];
+type Label = 'los' | 'nlos' | 'none';
+export const LABELS: readonly (readonly [Filter['label'], string])[] = [['', 'All'], ['los', 'LOS'], ['nlos', 'NLOS'], ['none', 'No label']];
+const label_of = (s: Sample): Label => (s.los === null ? 'none' : s.los ? 'los' : 'nlos');
 
-export interface Choice { readonly who: string; readonly label: ClassFilter; readonly min_m: number | null; readonly max_m: number | null }
-export const EVERYTHING: Choice = { who: '', label: 'all', min_m: null, max_m: null };
+export const DRAWN_MAX = 2000;   ///< measurements the plots are made of; of more, each n-th
+export const every_of = (total: number | null): number => Math.max(1, Math.ceil((total ?? 0) / DRAWN_MAX));
 
-const label_of = (s: Sample): ClassFilter => (s.los === null ? 'unlabelled' : s.los ? 'los' : 'nlos');
-export function chosen(samples: readonly Sample[], c: Choice): Sample[] {
-  return samples.filter((s) => (!c.who || s.who === c.who) && (c.label === 'all' || label_of(s) === c.label)
-    && (c.min_m === null || s.distance_m >= c.min_m) && (c.max_m === null || s.distance_m <= c.max_m));
+/// `2026-05-04T10:09` or with seconds, meant as UTC, in microseconds; null where it is none.
+export function typed_time(text: string): number | null {
+  const ms = /^\d{4}-\d\d-\d\dT\d\d:\d\d(:\d\d(\.\d+)?)?$/.test(text) ? Date.parse(`${text}Z`) : NaN;
+  return Number.isNaN(ms) ? null : ms * 1000;
+}
+export const time_text = (t_us: number | null): string => (t_us === null ? '' : new Date(t_us / 1000).toISOString().slice(0, 19));
+
+/// Level that a link in line of sight is expected to exceed at a distance.
+export interface RssLine { readonly at_zero_dbm: number; readonly slope_dbm_per_m: number }
+export const PRINTED_LINE: RssLine = { at_zero_dbm: -80.3977, slope_dbm_per_m: -0.84708 };   ///< dissertation, eq 5.1
+export const level_at = (line: RssLine, distance_m: number): number => line.at_zero_dbm + line.slope_dbm_per_m * distance_m;
+/// Shares of the labelled ones that lie on their side: above is LOS, on the line or below is NLOS (eq 5.2).
+export function sides(samples: readonly Sample[], line: RssLine): { readonly los: number | null; readonly nlos: number | null } {
+  const share = (los: boolean): number | null => {
+    const kind = samples.filter((s) => s.los === los && s.rx_dbm !== null);
+    return kind.length ? kind.filter((s) => s.rx_dbm! > level_at(line, s.distance_m) === los).length / kind.length : null;
+  };
+  return { los: share(true), nlos: share(false) };
 }
 
 /// Share of values below v, in per cent: where a feature stands among its kind. Null where there is nothing to compare with.
@@ -26,10 +41,10 @@ export function histogram(samples: readonly Sample[], feature: string, bins = 24
   const at = (q: number): number => sorted[Math.min(sorted.length - 1, Math.floor(q * sorted.length))]!;
   const lo = at(0.005), hi = at(0.995), width = (hi - lo) / bins;
   if (!(width > 0)) return null;
-  const count = (label: ClassFilter): number[] => {
+  const count = (label: Label): number[] => {
     const out = new Array<number>(bins).fill(0);
     for (const s of valued) if (label_of(s) === label) out[Math.max(0, Math.min(bins - 1, Math.floor((s.features[feature]! - lo) / width)))]!++;
     return out;
   };
-  return { edges: Array.from({ length: bins + 1 }, (_, i) => lo + i * width), los: count('los'), nlos: count('nlos'), unlabelled: count('unlabelled') };
+  return { edges: Array.from({ length: bins + 1 }, (_, i) => lo + i * width), los: count('los'), nlos: count('nlos'), unlabelled: count('none') };
 }

@@ -13,6 +13,11 @@ export function origin_of(p: Plan, otherwise: Geodetic | null): Geodetic | null 
   const mean = (f: (c: Corner) => number): number => at.reduce((a, c) => a + f(c), 0) / at.length;
   return { lon: mean((c) => c.lon), lat: mean((c) => c.lat), h_m: 0 };
 }
+/// Where the server puts the origin of a plan: its own, else the middle of its outline, else of its waypoints.
+export function plan_origin(p: Plan): Geodetic | null {
+  const own = obj(p.rest.origin), [lon, lat] = [num(own?.lon), num(own?.lat)];
+  return lon !== null && lat !== null ? { lon, lat, h_m: 0 } : p.outline.length || p.waypoints.length ? origin_of({ ...p, fence: [] }, null) : null;
+}
 export const to_m = (c: Corner, o: Geodetic): [number, number] => { const [e, n] = enu_from_geodetic({ lon: c.lon, lat: c.lat, h_m: o.h_m }, o); return [e, n]; };
 export const from_m = (e: number, n: number, o: Geodetic): Corner => { const { lon, lat } = geodetic_from_enu(e, n, o); return { lon, lat }; };
 
@@ -51,5 +56,6 @@ const cornered = (v: unknown): boolean => Array.isArray(v) && v.every((c) => num
 export function plan_from_draft(kept: unknown): Plan | null {
   const o = obj(kept);
   if (!o || (o.id !== null && !str(o.id)) || typeof o.name !== 'string' || num(o.revision) === null || num(o.building_height_m) === null || !obj(o.settings) || !obj(o.rest)) return null;
-  return cornered(o.outline) && cornered(o.fence) && cornered(o.waypoints) && Array.isArray(o.no_fly) && o.no_fly.every(cornered) ? (o as unknown as Plan) : null;
+  const expected = Array.isArray(o.expected) && o.expected.every((a) => typeof a === 'string') ? o.expected : [];   // older drafts have none
+  return cornered(o.outline) && cornered(o.fence) && cornered(o.waypoints) && Array.isArray(o.no_fly) && o.no_fly.every(cornered) ? ({ ...o, expected } as unknown as Plan) : null;
 }

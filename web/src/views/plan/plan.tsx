@@ -1,24 +1,33 @@
 /// Plan: outline, areas and waypoints, drawn or typed; generated from the outline; judged while it is edited; saved by revision.
 import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
+import '../desk.css';
 import './plan.css';
+import { published, type AnchorRow } from '../../api/anchors';
 import { ApiError, said } from '../../api/client';
-import { check as fetch_check, EMPTY, export_url, generate, import_file, plans as fetch_plans, read, remove, save, type Check, type Plan as PlanDoc } from '../../api/plans';
+import { check as fetch_check, check_drawn, EMPTY, export_url, generate, import_file, plans as fetch_plans, read, remove, save, type Check, type Plan as PlanDoc } from '../../api/plans';
 import type { Geodetic } from '../../map/enu';
 import { may } from '../../state/session';
 import { draft_of, drop_draft, keep_draft, newest_draft } from '../../state/drafts';
 import { current_mission, say } from '../../state/store';
-import { age, clock, fixed, grouped } from '../../ui/format';
-import { Chip, Icon } from '../../ui/marks';
+import { age } from '../../ui/format';
+import { Icon } from '../../ui/marks';
+import { CheckPanel, Profile } from './check_panel';
+import { Conflict } from './conflict';
 import { begun, changed, draft_key, origin_of, plan_from_draft, redone, undone, type History, type Picked, type Shape } from './draft';
+import { Expected, placed } from './expected';
 import { PlanMap } from './plan_map';
 import { Corners, SettingFields, Waypoints } from './points';
+import { cells, PredictedPanel, type Shown } from './predicted_panel';
+import { WayTools } from './way_tools';
+
+const JUDGED_AFTER_MS = 500;   ///< of no change: a drag is not judged at every step
 
 export function Plan({ id }: { id: string | null }) {
   const [all, set_all] = useState<readonly PlanDoc[] | null>(null), [history, set_history] = useState<History>(begun(EMPTY)), [saved, set_saved] = useState<PlanDoc>(EMPTY), [drawing, set_drawing] = useState<Shape>('outline'), [picked, pick] = useState<Picked | null>(null);
-  const [check, set_check] = useState<Check | null>(null), [problem, set_problem] = useState(''), [theirs, set_theirs] = useState<PlanDoc | null>(null), [notes, set_notes] = useState<readonly string[]>([]), [busy, set_busy] = useState(''), [origin, set_origin] = useState<Geodetic | null>(null), [back_ms, set_back] = useState<number | null>(null);
+  const [judged, set_judged] = useState<{ readonly of: string; readonly check: Check } | null>(null), [problem, set_problem] = useState(''), [theirs, set_theirs] = useState<PlanDoc | null>(null), [notes, set_notes] = useState<readonly string[]>([]), [busy, set_busy] = useState(''), [origin, set_origin] = useState<Geodetic | null>(null), [back_ms, set_back] = useState<number | null>(null), [snap, set_snap] = useState(true), [shown, show] = useState<Shown>({ of: 'gdop', up: null }), [known, set_known] = useState<ReadonlyMap<string, AnchorRow>>(new Map());
   const file = useRef<HTMLInputElement>(null), plan = history.now, dirty = plan !== saved, engineer = may('engineer', 'operator');
   // Metres are about one origin for as long as a plan is open: a map that moves while it is drawn on cannot be used.
-  const open = (p: PlanDoc): void => { set_origin(origin_of(p, current_mission.peek()?.origin ?? null)); set_history(begun(p)); set_saved(p); pick(null); set_check(null); set_theirs(null); set_notes([]); set_back(null); };
+  const open = (p: PlanDoc): void => { set_origin(origin_of(p, current_mission.peek()?.origin ?? null)); set_history(begun(p)); set_saved(p); pick(null); set_judged(null); set_theirs(null); set_notes([]); set_back(null); };
   /// What was not saved when the page went away is on the drawing again, as one change that can be undone.
   const open_with_draft = (p: PlanDoc): void => {
     const draft = draft_of(draft_key(p.id)), kept = plan_from_draft(draft?.value);
@@ -33,10 +42,19 @@ export function Plan({ id }: { id: string | null }) {
     document.title = 'Plan - anchord';
     fetch_plans().then((list) => { set_all(list); const last = id ? null : newest_draft('plan/')?.key, wanted = list.find((p) => p.id === id) ?? list.find((p) => draft_key(p.id) === last) ?? (last === draft_key(null) ? EMPTY : list[0]); open_with_draft(wanted ?? EMPTY); }, (e: unknown) => set_problem(said(e)));
   }, [id]);
-  useEffect(() => { if (saved.id && !dirty) fetch_check(saved.id).then(set_check, () => undefined); }, [saved]);
+  useEffect(() => { published().then(({ rows }) => set_known(new Map(rows.map((r) => [r.anchor, r]))), () => undefined); }, []);
+  // Judged while it is drawn; whoever may only look sees what is saved judged. The last judgement stays, grey, until the next comes.
+  const drawn = JSON.stringify({ ...plan, name: '', revision: 0, id: null }), check = judged?.check ?? null;
+  useEffect(() => {
+    const judge = dirty ? (engineer && (plan.waypoints.length > 0 || plan.outline.length > 2) ? () => check_drawn(plan) : null) : saved.id ? () => fetch_check(saved.id!) : null;
+    if (!judge) return;
+    let gone = false;
+    const timer = setTimeout(() => judge().then((c) => { if (!gone) set_judged({ of: drawn, check: c }); }, () => undefined), dirty ? JUDGED_AFTER_MS : 0);
+    return () => { gone = true; clearTimeout(timer); };
+  }, [drawn, dirty, saved.id]);
   // With the change itself, not after the next picture: the page may be gone by then.
   useLayoutEffect(() => { if (all === null) return; if (dirty) keep_draft(draft_key(plan.id), plan); else drop_draft(draft_key(plan.id)); }, [plan, saved, all === null]);
-  const change = (p: PlanDoc): void => { set_history(changed(history, p)); set_check(null); };
+  const change = (p: PlanDoc): void => set_history(changed(history, p));
   const keep = (): void => void guarded('save', async () => {
     try {
       const kept = await save(plan);
@@ -52,7 +70,7 @@ export function Plan({ id }: { id: string | null }) {
       else throw e;
     }
   });
-  const propose = (): void => void guarded('generate', async () => { const made = await generate(plan); set_history(changed(history, made.plan)); set_check(made.check); say(`${made.plan.waypoints.length} waypoints proposed`); });
+  const propose = (): void => void guarded('generate', async () => { const made = await generate(plan); set_history(changed(history, made.plan)); say(`${made.plan.waypoints.length} waypoints proposed`); });
   const bring = (f: File): void => void guarded('import', async () => { const made = await import_file(f.name.replace(/\.\w+$/, ''), await f.text()); set_history(changed(history, { ...made.plan, id: plan.id, revision: plan.revision, name: plan.name || made.plan.name })); set_notes(made.notes); set_origin(origin_of(made.plan, origin)); });
   const no_flies = plan.no_fly.map((_, i): [Shape, string] => [`no_fly/${i}`, `No-fly ${i + 1}`]);
   const areas: readonly (readonly [Shape, string])[] = [['outline', 'Outline'], ['fence', 'Fence'], ...no_flies, [`no_fly/${plan.no_fly.length}`, 'New no-fly'], ['waypoints', 'Waypoints']];
@@ -64,7 +82,7 @@ export function Plan({ id }: { id: string | null }) {
         <input class="planname" aria-label="Name of the plan" placeholder="Name" value={plan.name} data-testid="plan-name" maxLength={200} onInput={(e) => set_history({ ...history, now: { ...plan, name: e.currentTarget.value } })} />
         <span class="mut">{plan.id ? `revision ${plan.revision}${dirty ? ', changed' : ''}` : 'not saved'}</span>
         <span class="grow" />
-        <button class="btn" disabled={!history.before.length} onClick={() => { set_history(undone(history)); set_check(null); }}>Undo</button><button class="btn" disabled={!history.after.length} onClick={() => { set_history(redone(history)); set_check(null); }}>Redo</button>
+        <button class="btn" disabled={!history.before.length} onClick={() => set_history(undone(history))}>Undo</button><button class="btn" disabled={!history.after.length} onClick={() => set_history(redone(history))}>Redo</button>
         {engineer && <button class="btn" onClick={() => open(EMPTY)} disabled={dirty}>New</button>}
         <button class="btn" onClick={() => file.current?.click()}>Import</button><input ref={file} type="file" accept=".plan,.json,.geojson,.kml" class="sr" tabIndex={-1} aria-label="Plan file" onChange={(e) => { const f = e.currentTarget.files?.[0]; if (f) bring(f); e.currentTarget.value = ''; }} />
         {plan.id && !dirty && <><a class="btn" href={export_url(plan.id, 'plan')} download={`${plan.name}.plan`}><Icon name="download" />.plan</a><a class="btn" href={export_url(plan.id, 'geojson')} download={`${plan.name}.geojson`}><Icon name="download" />GeoJSON</a></>}
@@ -73,51 +91,28 @@ export function Plan({ id }: { id: string | null }) {
       </div>
       {problem && <div class="problem" role="status"><b>That did not work.</b> {problem}</div>}
       {back_ms !== null && dirty && <div class="callout" role="status" data-testid="brought-back"><b>Your changes of {age(Date.now() - back_ms)} ago are back.</b> They were not saved when the page was closed. <button class="btn small" onClick={() => open(saved)}>Discard them</button></div>}
-      {theirs && <Conflict mine={plan} theirs={theirs} keep_mine={() => { set_history(changed(history, { ...plan, revision: theirs.revision })); set_theirs(null); }} take_theirs={() => open(theirs)} />}
+      {theirs && <Conflict mine={plan} theirs={theirs} origin={origin} keep_mine={() => { set_history(changed(history, { ...plan, revision: theirs.revision })); set_theirs(null); }} take_theirs={() => open(theirs)} />}
       <div class="planbody">
         <div class="planleft">
-          <div class="drawbar seg" role="group" aria-label="What a tap adds">{areas.map(([shape, words]) => <button key={words} class={drawing === shape ? 'on' : ''} aria-pressed={drawing === shape} data-testid={`draw-${words.toLowerCase().replace(' ', '-')}`} onClick={() => set_drawing(shape)}>{words}</button>)}</div>
-          {origin ? <PlanMap plan={plan} origin={origin} drawing={drawing} picked={picked} pick={pick} change={change} /> : <Where set={set_origin} />}
+          <div class="drawrow"><div class="drawbar seg" role="group" aria-label="What a tap adds">{areas.map(([shape, words]) => <button key={words} class={drawing === shape ? 'on' : ''} aria-pressed={drawing === shape} data-testid={`draw-${words.toLowerCase().replace(' ', '-')}`} onClick={() => set_drawing(shape)}>{words}</button>)}</div><button class="btn" aria-pressed={snap} data-testid="snap" title="To right angles and half metres" onClick={() => set_snap(!snap)}>{snap ? 'Snap on' : 'Snap off'}</button></div>
+          {origin ? <PlanMap plan={plan} origin={origin} drawing={drawing} picked={picked} snap={snap} cells={cells(check, shown, plan, origin)} anchors={placed(plan, known, origin)} pick={pick} change={change} /> : <Where set={set_origin} />}
         </div>
         <div class="planside" tabIndex={0} role="region" aria-label="Plan in numbers">
-          <CheckPanel check={check} dirty={dirty} plan={plan} />
+          <CheckPanel check={check} old={judged !== null && judged.of !== drawn} plan={plan} waits={dirty && !engineer ? 'Save to have it checked.' : 'Checking.'} />
+          {origin && <Profile plan={plan} origin={origin} picked={picked} pick={pick} />}
+          <PredictedPanel check={check} shown={shown} set={show} />
           {notes.length > 0 && <div class="callout"><b>Imported.</b><ul>{notes.map((n) => <li key={n}>{n}</li>)}</ul></div>}
-          <section class="sec-p"><div class="hd"><h2>Waypoints</h2><span class="meta">{plan.waypoints.length}</span></div><Waypoints plan={plan} picked={picked} pick={pick} change={change} /></section>
+          <section class="sec-p"><div class="hd"><h2>Waypoints</h2><span class="meta">{plan.waypoints.length}</span></div>{engineer && <WayTools plan={plan} origin={origin} picked={picked} change={change} />}<Waypoints plan={plan} picked={picked} pick={pick} change={change} /></section>
           <section class="sec-p"><h2>Areas</h2>
             {plan.outline.length === 0 && <p class="why">The outline of the building comes first: tap its corners, or import a GeoJSON.</p>}
             <Corners plan={plan} shape="outline" name="Outline" picked={picked} pick={pick} change={change} /><Corners plan={plan} shape="fence" name="Fence" picked={picked} pick={pick} change={change} />
             {plan.no_fly.map((_, i) => <Corners key={i} plan={plan} shape={`no_fly/${i}`} name={`No-fly ${i + 1}`} picked={picked} pick={pick} change={change} />)}
           </section>
+          <Expected plan={plan} known={known} origin={origin} change={change} />
           <section class="sec-p"><h2>Settings</h2><SettingFields plan={plan} change={change} /></section>
           {engineer && plan.id && !dirty && <section class="sec-p"><button class="btn" onClick={() => void guarded('remove', async () => { await remove(plan); set_all((all ?? []).filter((p) => p.id !== plan.id)); open(EMPTY); say('Plan removed'); })}>Remove this plan</button></section>}
         </div>
       </div>
-    </div>
-  );
-}
-
-function CheckPanel({ check, dirty, plan }: { check: Check | null; dirty: boolean; plan: PlanDoc }) {
-  return (
-    <section class="sec-p" data-testid="check">
-      <div class="hd"><h2>Check</h2>{check && <Chip shape={check.flyable ? 'ok' : 'bad'} tone={check.flyable ? 'ok' : 'bad'} word={check.flyable ? 'CAN BE FLOWN' : 'CANNOT BE FLOWN'} />}</div>
-      {!check && <p class="why">{plan.outline.length < 3 && !plan.waypoints.length ? 'Nothing is drawn yet.' : dirty ? 'Save to have it checked.' : 'Checking.'}</p>}
-      {check && <dl class="kv">
-        <div><dt>Flight</dt><dd>{clock(check.duration_s, true)}</dd></div><div><dt>Way</dt><dd>{grouped(check.length_m)} m</dd></div><div><dt>Measuring points</dt><dd>{grouped(check.n_measure)}</dd></div>
-        <div><dt>Error expected</dt><dd>{check.rms_m === null ? '–' : `${fixed(check.rms_m * 100, 1)} cm`}</dd></div><div><dt>Worst anchor</dt><dd>{check.worst_m === null ? '–' : `${fixed(check.worst_m * 100, 1)} cm`}</dd></div>
-      </dl>}
-      {check && <ul class="issues">{check.issues.map((i, k) => <li key={k}><Chip shape={i.severity === 'error' ? 'bad' : 'caution'} tone={i.severity === 'error' ? 'bad' : 'caution'} word={i.severity.toUpperCase()} /> {i.text}</li>)}</ul>}
-    </section>
-  );
-}
-
-/// Both versions side by side in numbers; the person decides.
-function Conflict({ mine, theirs, keep_mine, take_theirs }: { mine: PlanDoc; theirs: PlanDoc; keep_mine: () => void; take_theirs: () => void }) {
-  const row = (name: string, f: (p: PlanDoc) => string | number) => <tr class={f(mine) === f(theirs) ? '' : 'sel'}><th scope="row">{name}</th><td>{f(mine)}</td><td>{f(theirs)}</td></tr>;
-  return (
-    <div class="callout caution" role="alertdialog" aria-label="The plan was changed by somebody else" data-testid="conflict">
-      <b>Somebody else saved this plan meanwhile (revision {theirs.revision}).</b>
-      <table class="tbl"><thead><tr><td /><th scope="col">Mine</th><th scope="col">Theirs</th></tr></thead><tbody>{row('Name', (p) => p.name)}{row('Waypoints', (p) => p.waypoints.length)}{row('Corners of the outline', (p) => p.outline.length)}{row('No-fly areas', (p) => p.no_fly.length)}{row('Building height, m', (p) => p.building_height_m)}</tbody></table>
-      <span class="actions"><button class="btn" onClick={take_theirs}>Take theirs</button><button class="btn" onClick={keep_mine}>Keep mine, then save</button></span>
     </div>
   );
 }

@@ -3,14 +3,18 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 import type { Plan } from '../../api/plans';
 import { length_words, round_length, type Geodetic } from '../../map/enu';
 import { Icon } from '../../ui/marks';
+import { fixed } from '../../ui/format';
 import { added, corners, from_m, moved, removed, to_m, type Picked, type Shape } from './draft';
+import type { Placed } from './expected';
+import { SIDES_PX, type Cell } from './predicted_panel';
+import { snapped } from './snap';
 
-interface Props { plan: Plan; origin: Geodetic; drawing: Shape; picked: Picked | null; pick: (p: Picked | null) => void; change: (p: Plan) => void }
+interface Props { plan: Plan; origin: Geodetic; drawing: Shape; picked: Picked | null; snap: boolean; cells: readonly Cell[]; anchors: readonly Placed[]; pick: (p: Picked | null) => void; change: (p: Plan) => void }
 interface View { readonly e: number; readonly n: number; readonly px_per_m: number }
 const HIT_PX = 18, STEP_M = 0.5, FINE_M = 0.1;
 
-export function PlanMap({ plan, origin, drawing, picked, pick, change }: Props) {
-  const box = useRef<HTMLDivElement>(null), [size, set_size] = useState<[number, number]>([0, 0]), [view, set_view] = useState<View | null>(null), drag = useRef<{ x: number; y: number; view: View; far: boolean } | null>(null);
+export function PlanMap({ plan, origin, drawing, picked, snap, cells, anchors, pick, change }: Props) {
+  const [over, set_over] = useState<[number, number] | null>(null), box = useRef<HTMLDivElement>(null), [size, set_size] = useState<[number, number]>([0, 0]), [view, set_view] = useState<View | null>(null), drag = useRef<{ x: number; y: number; view: View; far: boolean } | null>(null);
   useEffect(() => {
     const look = (): void => { if (box.current) set_size([box.current.clientWidth, box.current.clientHeight]); };
     look();
@@ -34,12 +38,17 @@ export function PlanMap({ plan, origin, drawing, picked, pick, change }: Props) 
     for (const shape of shapes) metres(shape).forEach((m, index) => { const [a, b] = px(m), d = Math.hypot(a - x, b - y); if (d < near) { near = d; best = { shape, index }; } });
     return best;
   };
+  /// Where a point goes that is set at these pixels.
+  const target = (x: number, y: number): { readonly at: readonly [number, number]; readonly how: string } => {
+    const there: [number, number] = [v.e + (x - w / 2) / v.px_per_m, v.n - (y - h / 2) / v.px_per_m];
+    return snap ? snapped(there, drawing === 'waypoints' ? [] : metres(drawing), v.px_per_m) : { at: there, how: '' };
+  };
   const tap = (x: number, y: number): void => {
     const hit = at(x, y);
     if (hit) { pick(hit); return; }
     // The view stays while points are added: a map that jumps under the finger cannot be drawn on.
     set_view(v);
-    change(added(plan, drawing, from_m(v.e + (x - w / 2) / v.px_per_m, v.n - (y - h / 2) / v.px_per_m, origin)));
+    change(added(plan, drawing, from_m(...target(x, y).at, origin)));
     pick({ shape: drawing, index: corners(plan, drawing).length });
   };
   const key = (e: KeyboardEvent): void => {
@@ -55,24 +64,32 @@ export function PlanMap({ plan, origin, drawing, picked, pick, change }: Props) 
   };
   const local = (e: PointerEvent): [number, number] => { const r = box.current!.getBoundingClientRect(); return [e.clientX - r.left, e.clientY - r.top]; };
   const path = (shape: Shape): string => metres(shape).map((m, i) => { const [x, y] = px(m); return `${i ? 'L' : 'M'}${x.toFixed(1)} ${y.toFixed(1)}`; }).join('') + (shape !== 'waypoints' && corners(plan, shape).length > 2 ? 'Z' : '');
+  /// What a tap here would set, with the length it makes.
+  const Ghost = ({ over: [x, y] }: { over: [number, number] }) => {
+    const to = target(x, y), last = metres(drawing).at(-1), [gx, gy] = px(to.at), from = last && px(last);
+    return <g class="ghost" data-testid="ghost">{from && <path d={`M${from[0]} ${from[1]}L${gx} ${gy}`} />}<circle cx={gx} cy={gy} r="6" />{last && <text class="halo" x={gx + 12} y={gy - 10}>{fixed(Math.hypot(to.at[0] - last[0], to.at[1] - last[1]), 2)} m{to.how && to.how !== 'half metres' ? `, ${to.how}` : ''}</text>}</g>;
+  };
   const bar_m = round_length(130 / v.px_per_m);
   return (
     <div class="planmap" ref={box} role="application" tabIndex={0} aria-label="Plan map: a tap adds a point, arrows move the picked one" data-testid="plan-map" onKeyDown={key}
       onWheel={(e) => { e.preventDefault(); zoom(e.deltaY < 0 ? 1.2 : 1 / 1.2); }}
       onPointerDown={(e) => { if (e.target instanceof Element && e.target.closest('button')) return; const [x, y] = local(e); drag.current = { x, y, view: v, far: false }; }}
-      onPointerMove={(e) => { const d = drag.current; if (!d) return; const [x, y] = local(e); d.far ||= Math.hypot(x - d.x, y - d.y) > 6; if (d.far) set_view({ ...d.view, e: d.view.e - (x - d.x) / v.px_per_m, n: d.view.n + (y - d.y) / v.px_per_m }); }}
+      onPointerMove={(e) => { const d = drag.current, [x, y] = local(e); if (e.pointerType === 'mouse') set_over(e.target instanceof Element && e.target.closest('button') ? null : [x, y]); if (!d) return; d.far ||= Math.hypot(x - d.x, y - d.y) > 6; if (d.far) set_view({ ...d.view, e: d.view.e - (x - d.x) / v.px_per_m, n: d.view.n + (y - d.y) / v.px_per_m }); }}
       onPointerUp={(e) => { const d = drag.current; drag.current = null; if (d && !d.far) { const [x, y] = local(e); tap(x, y); } }}
-      onPointerCancel={() => (drag.current = null)}>
+      onPointerLeave={() => set_over(null)} onPointerCancel={() => (drag.current = null)}>
       {w > 0 && <svg width={w} height={h} aria-hidden="true">
         <Grid v={v} w={w} h={h} />
         {plan.fence.length > 0 && <path class="fence" d={path('fence')} />}
         {plan.no_fly.map((_, i) => <path key={i} class="nofly" d={path(`no_fly/${i}`)} />)}
         <path class="outline" d={path('outline')} />
+        {cells.map((c, i) => { const [x, y] = px([c.e, c.n]), s = c.step === null ? 0 : SIDES_PX[c.step]!; return c.step === null ? <path key={i} class="unseen" d={`M${x - 5} ${y - 5}l10 10m0 -10l-10 10`} /> : <g key={i}><rect class={`cand c${c.step}`} x={x - s / 2} y={y - s / 2} width={s} height={s} />{v.px_per_m > 9 && <text class="candtext halo" x={x} y={y + 20} text-anchor="middle">{c.words}</text>}</g>; })}
+        {anchors.map((a) => { const [x, y] = px([a.e, a.n]); return <g key={a.id} class="expectedat"><circle cx={x} cy={y} r="8" /><path d={`M${x - 4} ${y}h8M${x} ${y - 4}v8`} /><text class="halo" x={x} y={y - 13} text-anchor="middle">{a.id}</text></g>; })}
         <path class="way" d={path('waypoints')} />
         {shapes.map((shape) => metres(shape).map((m, index) => {
           const [x, y] = px(m), on = picked?.shape === shape && picked.index === index, way = shape === 'waypoints';
           return <g key={`${shape}${index}`} class={`${way ? 'wp' : 'corner'}${on ? ' on' : ''}`}><circle cx={x} cy={y} r={on ? 11 : way ? 10 : 5} />{way && <text x={x} y={y + 4} text-anchor="middle">{index + 1}</text>}</g>;
         }))}
+        {over && !at(...over) && !drag.current?.far && <Ghost over={over} />}
       </svg>}
       <div class="mapui">
         <div class="mgrp"><button class="mb" aria-label="Zoom in" onClick={() => zoom(1.5)}><Icon name="plus" /></button><button class="mb" aria-label="Zoom out" onClick={() => zoom(1 / 1.5)}><Icon name="minus" /></button></div>

@@ -1,0 +1,23 @@
+/// The flight over time, from the waypoints alone: straight ways at the plan's speed, dwelling where it measures. No DOM.
+import type { Plan } from '../../api/plans';
+import type { Geodetic } from '../../map/enu';
+import { to_m } from './draft';
+
+export const SPEED_MPS = 2, DWELL_S = 4;   ///< of a plan that says nothing else: the server's defaults
+export interface Moment { readonly t_s: number; readonly height_m: number; readonly waypoint: number }
+const number = (v: unknown, usual: number): number => (typeof v === 'number' && v > 0 ? v : usual);
+
+/// Arrival at each waypoint, and its departure where it dwells; from the first waypoint on, as the server's check counts.
+export function profile(p: Plan, origin: Geodetic): Moment[] {
+  const speed = number(p.settings.speed_mps, SPEED_MPS), dwell = number(p.settings.dwell_s, DWELL_S), out: Moment[] = [];
+  let t = 0;
+  p.waypoints.forEach((w, i) => {
+    const before = p.waypoints[i - 1];
+    if (before) { const [a, b] = [to_m(before, origin), to_m(w, origin)]; t += Math.hypot(a[0] - b[0], a[1] - b[1], before.height_above_ground_m - w.height_above_ground_m) / speed; }
+    out.push({ t_s: t, height_m: w.height_above_ground_m, waypoint: i });
+    if (!w.measure) return;
+    t += w.dwell_s ?? dwell;
+    out.push({ t_s: t, height_m: w.height_above_ground_m, waypoint: i });
+  });
+  return out;
+}

@@ -1,0 +1,74 @@
+/// Waypoints set by a tool: evenly along the outline, or more of them about one. Metres about the plan's origin. No DOM.
+import type { Plan, Waypoint } from '../../api/plans';
+import type { Geodetic } from '../../map/enu';
+import { from_m, NEW_WAYPOINT, to_m } from './draft';
+
+export type Point = readonly [number, number];
+const away = (a: Point, b: Point): number => Math.hypot(a[0] - b[0], a[1] - b[1]);
+
+export function distance_to_edge(p: Point, ring: readonly Point[]): number {
+  return Math.min(...ring.map((a, i) => {
+    const b = ring[(i + 1) % ring.length]!, [dx, dy] = [b[0] - a[0], b[1] - a[1]], t = Math.max(0, Math.min(1, ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / (dx * dx + dy * dy || 1)));
+    return away(p, [a[0] + t * dx, a[1] + t * dy]);
+  }));
+}
+export function inside(p: Point, ring: readonly Point[]): boolean {
+  let odd = false;
+  ring.forEach((a, i) => { const b = ring[(i + 1) % ring.length]!; if (a[1] > p[1] !== b[1] > p[1] && p[0] < ((b[0] - a[0]) * (p[1] - a[1])) / (b[1] - a[1]) + a[0]) odd = !odd; });
+  return odd;
+}
+
+const FINE_M = 0.1;   ///< of the curve that is measured off
+/// The curve at `distance_m` outside of a ring, finely: edges moved outwards, arcs round corners that point outwards; what then lies too
+/// near to another part (the inside of an L) is left out. As core/planning/ring.cpp does it.
+function curve(outline: readonly Point[], distance_m: number): Point[] {
+  const area = outline.reduce((sum, a, i) => { const b = outline[(i + 1) % outline.length]!; return sum + a[0] * b[1] - a[1] * b[0]; }, 0), ring = area < 0 ? [...outline].reverse() : [...outline], out: Point[] = [];
+  const keep = (p: Point): void => { if (!inside(p, ring) && distance_to_edge(p, ring) >= distance_m - 1e-6) out.push(p); };
+  const normal = (a: Point, b: Point): Point => { const l = away(a, b); return [(b[1] - a[1]) / l, (a[0] - b[0]) / l]; };
+  const corners = ring.filter((p, i) => away(p, ring[(i + 1) % ring.length]!) > 1e-6);
+  corners.forEach((a, i) => {
+    const b = corners[(i + 1) % corners.length]!, c = corners[(i + 2) % corners.length]!, n = normal(a, b), next = normal(b, c), steps = Math.ceil(away(a, b) / FINE_M);
+    for (let k = 0; k <= steps; k++) keep([a[0] + ((b[0] - a[0]) * k) / steps + distance_m * n[0], a[1] + ((b[1] - a[1]) * k) / steps + distance_m * n[1]]);
+    const turn = Math.atan2(n[0] * next[1] - n[1] * next[0], n[0] * next[0] + n[1] * next[1]), arc = Math.ceil((turn * distance_m) / FINE_M);
+    for (let k = 1; k < arc; k++) { const w = (turn * k) / arc; keep([b[0] + distance_m * (Math.cos(w) * n[0] - Math.sin(w) * n[1]), b[1] + distance_m * (Math.sin(w) * n[0] + Math.cos(w) * n[1])]); }
+  });
+  return out;
+}
+
+/// Points as evenly as a whole number of them allows, `spacing_m` apart or a little less or more; at least three.
+export function spaced_along(outline: readonly Point[], distance_m: number, spacing_m: number): Point[] {
+  if (outline.length < 3) return [];
+  const fine = curve(outline, distance_m), gaps = fine.map((p, i) => away(p, fine[(i + 1) % fine.length]!)), whole = gaps.reduce((a, b) => a + b, 0);
+  if (!(whole > 0)) return [];
+  const n = Math.max(3, Math.round(whole / spacing_m)), out: Point[] = [];
+  for (let i = 0, gone = 0, k = 0; k < n; i++) {
+    for (; k < n && (k * whole) / n < gone + gaps[i]! + 1e-9; k++) { const t = ((k * whole) / n - gone) / (gaps[i]! || 1), a = fine[i]!, b = fine[(i + 1) % fine.length]!; out.push([a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]); }
+    gone += gaps[i]!;
+    if (i === fine.length - 1) break;
+  }
+  return out;
+}
+
+/// The plan with its waypoints spaced evenly along the outline at the keep-out distance, those left out that lie in a no-fly area or outside of the
+/// fence. Height and flags are those of the first waypoint there was.
+export function with_even_spacing(p: Plan, origin: Geodetic, spacing_m: number): { readonly plan: Plan; readonly left_out: number } {
+  const metres = (list: readonly { lon: number; lat: number }[]): Point[] => list.map((c) => to_m({ lon: c.lon, lat: c.lat }, origin)), keep_out = typeof p.settings.keep_out_m === 'number' ? p.settings.keep_out_m : 4;
+  const areas = p.no_fly.map(metres).filter((a) => a.length > 2), fence = metres(p.fence), all = spaced_along(metres(p.outline), keep_out + 0.01, spacing_m);
+  const legal = all.filter((q) => areas.every((a) => !inside(q, a) && distance_to_edge(q, a) >= keep_out) && (fence.length < 3 || inside(q, fence)));
+  const like: Omit<Waypoint, 'lon' | 'lat'> = { ...(p.waypoints[0] ?? NEW_WAYPOINT), heading_deg: null };
+  return { plan: { ...p, waypoints: legal.map((q) => ({ ...like, ...from_m(q[0], q[1], origin) })) }, left_out: all.length - legal.length };
+}
+
+const LEAST_M = 0.5;   ///< nearer than this two points measure the same
+/// One more waypoint half-way to each neighbour of waypoint `index`, the first and last of a flight round the building being neighbours.
+export function denser(p: Plan, index: number, origin: Geodetic): Plan {
+  const list = p.waypoints, here = list[index], n = list.length;
+  if (!here || n < 2) return p;
+  const middle = (other: Waypoint): Waypoint[] => {
+    const [a, b] = [to_m(here, origin), to_m(other, origin)];
+    return away(a, b) < 2 * LEAST_M ? [] : [{ ...here, measure: true, height_above_ground_m: (here.height_above_ground_m + other.height_above_ground_m) / 2, heading_deg: null, ...from_m((a[0] + b[0]) / 2, (a[1] + b[1]) / 2, origin) }];
+  };
+  // With two points there is one way between them, not two.
+  const before = n > 2 || index > 0 ? middle(list[(index + n - 1) % n]!) : [], after = n > 2 || index === 0 ? middle(list[(index + 1) % n]!) : [];
+  return { ...p, waypoints: [...list.slice(0, index), ...before, here, ...after, ...list.slice(index + 1)] };
+}
