@@ -128,7 +128,7 @@ test('measurements are filtered, plotted and opened one by one', async () => {
 test('the filter is the server\'s: the list, the count and the file are of the same rows, and only what is in sight is in the page', async () => {
   const { items: [{ id: mission }] } = await get('/api/v1/missions'), { items } = await get(`/api/v1/ranges?mission=${mission}&limit=10000`);
   const limit = Math.round(items.map((r) => r.distance_m).sort((a, b) => a - b)[Math.floor(items.length / 2)] * 2) / 2, near = items.filter((r) => r.distance_m <= limit);
-  assert.ok(near.length > 500 && near.length < items.length, `${near.length} of ${items.length}`);
+  assert.ok(near.length > 250 && near.length < items.length, `${near.length} of ${items.length}`);
   const { page, seen, id } = await openPage(browser, server, { hash: '#/measurements' });
   await id('source').selectOption(mission);
   const count = async () => (await text(id('counts'))).split(' of ').map((n) => Number(n.replace(/\D/g, '')));
@@ -304,7 +304,7 @@ test('waypoints are spaced evenly and made denser, judged while they are drawn, 
   await id('save').click();
   const lines = id('differences').locator('tbody tr');
   await lines.first().waitFor();
-  assert.deepEqual((await lines.allTextContents()).map((l) => l.replace(/\u2212/g, '-')), ['NameHall DHall B', `Waypoint 4${waypoints[3].height_above_ground_m - 2}.0 m high${waypoints[3].height_above_ground_m}.0 m high`]);
+  assert.deepEqual((await lines.allTextContents()).map((l) => l.replace(/\u2212/g, '-')), ['NameHall DHall B', `Waypoint 4${(waypoints[3].height_above_ground_m - 2).toFixed(1)} m high${waypoints[3].height_above_ground_m.toFixed(1)} m high`]);
   assert.equal(await id('conflict').locator('svg .only').count(), 2);
   assert.deepEqual(await violations(page), []);
   await picture(page, 'plan-conflict-light');

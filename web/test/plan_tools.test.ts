@@ -6,7 +6,7 @@ import { typed_address } from '../src/views/plan/expected';
 import { floors, step_of, summary } from '../src/views/plan/predicted';
 import { profile } from '../src/views/plan/profile';
 import { snapped } from '../src/views/plan/snap';
-import { denser, distance_to_edge, inside, spaced_along, with_even_spacing, type Point } from '../src/views/plan/tools';
+import { denser, distance_to_edge, inside, spaced_along, typed_heights, usual_heights, with_even_spacing, type Point } from '../src/views/plan/tools';
 
 const ORIGIN = { lon: 3.7131, lat: 51.0231, h_m: 0 };
 const at = (e: number, n: number) => from_m(e, n, ORIGIN);
@@ -31,13 +31,19 @@ describe('points along an outline', () => {
     for (const q of spaced_along(l, 4, 2)) { expect(distance_to_edge(q, l)).toBeGreaterThan(3.99); expect(inside(q, l)).toBe(false); }
   });
   it('are at least three, and none without an outline', () => { expect(spaced_along(square, 4, 100)).toHaveLength(3); expect(spaced_along([[0, 0], [1, 0]], 4, 5)).toEqual([]); });
-  it('take height and flags of the first waypoint, and leave out what may not be flown', () => {
-    const no_fly = [at(-10, 5), at(-2, 5), at(-2, 15), at(-10, 15)], { plan, left_out } = with_even_spacing({ ...hall, no_fly: [no_fly], waypoints: [wp(0, -4, { height_above_ground_m: 7, turn: true, heading_deg: 90 })] }, ORIGIN, 5);
-    expect(plan.waypoints[0]).toMatchObject({ height_above_ground_m: 7, turn: true, heading_deg: null });
+  it('take the heights in turn and the flags of the first waypoint, and leave out what may not be flown', () => {
+    const no_fly = [at(-10, 5), at(-2, 5), at(-2, 15), at(-10, 15)], { plan, left_out } = with_even_spacing({ ...hall, no_fly: [no_fly], waypoints: [wp(0, -4, { height_above_ground_m: 7, turn: true, heading_deg: 90 })] }, ORIGIN, 5, [3, 9]);
+    expect(plan.waypoints.slice(0, 3)).toMatchObject([3, 9, 3].map((h) => ({ height_above_ground_m: h, turn: true, heading_deg: null })));
     expect(plan.waypoints.length + left_out).toBe(21);
     for (const w of plan.waypoints) { const [e, n] = to_m(w, ORIGIN); expect(e < -2 - 4 && n > 1 && n < 19).toBe(false); expect(e > -6 || n < 1 || n > 19).toBe(true); }
     expect(left_out).toBeGreaterThan(2);
   });
+});
+
+describe('heights of even spacing', () => {
+  it('are 2 m and above the roof of 8 m, within the band', () => { expect(usual_heights(hall)).toEqual([2, 9]); expect(usual_heights({ ...hall, settings: { min_height_m: 3, max_height_m: 6 } })).toEqual([3, 6]); });
+  it('are those flown so far where there are several', () => expect(usual_heights({ ...hall, waypoints: [wp(0, 0, { height_above_ground_m: 7 }), wp(1, 0, { height_above_ground_m: 3 }), wp(2, 0, { height_above_ground_m: 7 }), wp(2, 0, { measure: false, height_above_ground_m: 20 })] })).toEqual([3, 7]));
+  it('are typed as a list, with decimal commas too', () => expect([typed_heights('2, 9'), typed_heights('2 9,5'), typed_heights('4'), typed_heights('4; 8'), typed_heights('2, x'), typed_heights('-2')]).toEqual([[2, 9], [2, 9.5], [4], [4, 8], null, null]));
 });
 
 describe('denser here', () => {

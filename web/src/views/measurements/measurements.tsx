@@ -21,6 +21,7 @@ import { arrived, at_end, index_of, known, lacking, nothing, PAGE_ROWS, row, typ
 /// What is asked: another source or filter is another question, and late answers to the last one are dropped.
 interface Asked { readonly key: string; readonly rows: Rows<Sample>; readonly total: number | null; readonly drawn: readonly Sample[] | null; readonly every: number }
 
+const SCANNED = 20_000;   ///< rows the server looks through for one page of a class
 const everything = (f: Filter): boolean => JSON.stringify(f) === JSON.stringify(EVERYTHING);
 
 export function Measurements() {
@@ -59,6 +60,8 @@ export function Measurements() {
   useEffect(() => set_sample(null), [of]);
   const drawn = current?.drawn ?? [], rows = current?.rows ?? nothing<Sample>(), n_known = known(rows), selected = sample?.id ?? null, at = useMemo(() => (selected === null ? -1 : index_of(rows, (s) => s.id === selected)), [rows, selected]);
   const look = (first: number, last: number): void => { const page = current && current.rows.sizes.length ? lacking(current.rows, first, last) : null; if (page !== null) load(page, current!.rows.cursors[page] ?? null); };
+  // Pages of a rare class may be empty for long: then there is no list yet whose end could ask for the next.
+  useEffect(() => { if (n_known === 0 && !at_end(rows)) look(0, 0); }, [rows]);
   /// Chosen by a press, not stepped to: the panel comes into sight.
   const open = (s: Sample): void => { set_sample(s); set_opened((n) => n + 1); };
   const step = (by: number): void => {
@@ -95,6 +98,7 @@ export function Measurements() {
         {labelling && <CampaignMode campaigns={campaigns} close={() => set_labelling(false)} taken={() => set_again(again + 1)} />}
         {!source && <div class="empty small"><p>Nothing has been measured yet. Fly, import a flight folder, or import a campaign with ground truth.</p></div>}
         {source && !current && !problem && <p class="pad" role="status">Loading the measurements.</p>}
+        {current && n_known === 0 && !at_end(rows) && rows.sizes.length > 0 && !problem && <p class="pad" role="status">Looking further: none in the first {grouped(rows.sizes.length * SCANNED)}.</p>}
         {current && at_end(rows) && n_known === 0 && <div class="empty small"><p>{everything(filter) ? `${source!.name} has no measurements.` : 'Nothing passes this filter. Show all takes it away.'}</p></div>}
         {sample && source && <ImpulsePanel source={source} sample={sample} opened={opened} all={drawn} close={() => set_sample(null)} step={step} />}
         {drawn.length > 0 && <><div class="plots"><LevelPanel samples={drawn} selected={selected} select={open} /><TruthPanel samples={drawn} selected={selected} select={open} /><HistogramPanel samples={drawn} /></div>

@@ -9,12 +9,11 @@ export function Conflict({ mine, theirs, origin, keep_mine, take_theirs }: { min
   const lines = differences(mine, theirs);
   return (
     <div class="callout caution conflict" role="alertdialog" aria-label="The plan was changed by somebody else" data-testid="conflict">
-      <b>Somebody else saved this plan meanwhile (revision {theirs.revision}).</b> Nothing of either is lost yet.
+      <div class="first"><span><b>Somebody else saved this plan meanwhile (revision {theirs.revision}).</b> Nothing of either is lost yet.</span><span class="actions"><button class="btn" onClick={take_theirs}>Take theirs</button><button class="btn" onClick={keep_mine}>Keep mine, then save</button></span></div>
       {origin && <div class="pair">{([['Mine', mine], ['Theirs', theirs]] as const).map(([name, p]) => <figure key={name}><figcaption>{name}</figcaption><Small plan={p} other={p === mine ? theirs : mine} origin={origin} name={name} /></figure>)}</div>}
       <div class="scrollx" tabIndex={0} role="region" aria-label="What differs"><table class="tbl" data-testid="differences"><caption class="sr">What differs between the two versions</caption>
         <thead><tr><th scope="col">Differs in</th><th scope="col">Mine</th><th scope="col">Theirs</th></tr></thead>
         <tbody>{lines.length ? lines.map((d) => <tr key={d.name}><th scope="row">{d.name}</th><td>{d.mine}</td><td>{d.theirs}</td></tr>) : <tr><th scope="row">Nothing</th><td colSpan={2}>both are the same but for their revision</td></tr>}</tbody></table></div>
-      <span class="actions"><button class="btn" onClick={take_theirs}>Take theirs</button><button class="btn" onClick={keep_mine}>Keep mine, then save</button></span>
     </div>
   );
 }

@@ -90,7 +90,7 @@ export function Plan({ id }: { id: string | null }) {
         {engineer && <button class="btn primary" data-testid="save" disabled={!dirty || busy !== ''} onClick={keep}>Save</button>}
       </div>
       {problem && <div class="problem" role="status"><b>That did not work.</b> {problem}</div>}
-      {back_ms !== null && dirty && <div class="callout" role="status" data-testid="brought-back"><b>Your changes of {age(Date.now() - back_ms)} ago are back.</b> They were not saved when the page was closed. <button class="btn small" onClick={() => open(saved)}>Discard them</button></div>}
+      {back_ms !== null && dirty && !theirs && <div class="callout" role="status" data-testid="brought-back"><b>Your changes of {age(Date.now() - back_ms)} ago are back.</b> They were not saved when the page was closed. <button class="btn small" onClick={() => open(saved)}>Discard them</button></div>}
       {theirs && <Conflict mine={plan} theirs={theirs} origin={origin} keep_mine={() => { set_history(changed(history, { ...plan, revision: theirs.revision })); set_theirs(null); }} take_theirs={() => open(theirs)} />}
       <div class="planbody">
         <div class="planleft">

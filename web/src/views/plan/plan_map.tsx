@@ -11,7 +11,7 @@ import { snapped } from './snap';
 
 interface Props { plan: Plan; origin: Geodetic; drawing: Shape; picked: Picked | null; snap: boolean; cells: readonly Cell[]; anchors: readonly Placed[]; pick: (p: Picked | null) => void; change: (p: Plan) => void }
 interface View { readonly e: number; readonly n: number; readonly px_per_m: number }
-const HIT_PX = 18, STEP_M = 0.5, FINE_M = 0.1;
+const HIT_PX = 18, STEP_M = 0.5, FINE_M = 0.1, BESIDE_M = 2;
 
 export function PlanMap({ plan, origin, drawing, picked, snap, cells, anchors, pick, change }: Props) {
   const [over, set_over] = useState<[number, number] | null>(null), box = useRef<HTMLDivElement>(null), [size, set_size] = useState<[number, number]>([0, 0]), [view, set_view] = useState<View | null>(null), drag = useRef<{ x: number; y: number; view: View; far: boolean } | null>(null);
@@ -53,6 +53,15 @@ export function PlanMap({ plan, origin, drawing, picked, snap, cells, anchors, p
   };
   const key = (e: KeyboardEvent): void => {
     const by = { ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowLeft: [-1, 0], ArrowRight: [1, 0] }[e.key], step = e.shiftKey ? FINE_M : STEP_M;
+    // By keys alone: a point in the middle of what is seen, or beside the picked one, which the arrows then move.
+    if (e.key === 'Enter' && e.target === box.current) {
+      const from = picked && corners(plan, picked.shape)[picked.index], [pe, pn] = from ? to_m(from, origin) : [v.e, v.n];
+      set_view(v);
+      change(added(plan, drawing, from_m(from ? pe + BESIDE_M : pe, pn, origin)));
+      pick({ shape: drawing, index: corners(plan, drawing).length });
+      e.preventDefault();
+      return;
+    }
     if (!picked) return;
     const here = corners(plan, picked.shape)[picked.index];
     if (!here) return;
@@ -71,7 +80,7 @@ export function PlanMap({ plan, origin, drawing, picked, snap, cells, anchors, p
   };
   const bar_m = round_length(130 / v.px_per_m);
   return (
-    <div class="planmap" ref={box} role="application" tabIndex={0} aria-label="Plan map: a tap adds a point, arrows move the picked one" data-testid="plan-map" onKeyDown={key}
+    <div class="planmap" ref={box} role="application" tabIndex={0} aria-label="Plan map: a tap or Enter adds a point, arrows move the picked one, Delete takes it away" data-testid="plan-map" onKeyDown={key}
       onWheel={(e) => { e.preventDefault(); zoom(e.deltaY < 0 ? 1.2 : 1 / 1.2); }}
       onPointerDown={(e) => { if (e.target instanceof Element && e.target.closest('button')) return; const [x, y] = local(e); drag.current = { x, y, view: v, far: false }; }}
       onPointerMove={(e) => { const d = drag.current, [x, y] = local(e); if (e.pointerType === 'mouse') set_over(e.target instanceof Element && e.target.closest('button') ? null : [x, y]); if (!d) return; d.far ||= Math.hypot(x - d.x, y - d.y) > 6; if (d.far) set_view({ ...d.view, e: d.view.e - (x - d.x) / v.px_per_m, n: d.view.n + (y - d.y) / v.px_per_m }); }}

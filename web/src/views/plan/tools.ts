@@ -49,14 +49,26 @@ export function spaced_along(outline: readonly Point[], distance_m: number, spac
   return out;
 }
 
+/// Heights to space waypoints at where none are typed: those flown so far where there are several, else 2 m and 1 m above the roof, within the band.
+/// From one height alone nobody can tell how high an anchor hangs.
+export function usual_heights(p: Plan): number[] {
+  const flown = [...new Set(p.waypoints.filter((w) => w.measure).map((w) => w.height_above_ground_m))].sort((a, b) => a - b), limit = (key: string, usual: number): number => { const v = p.settings[key]; return typeof v === 'number' ? v : usual; };
+  return flown.length > 1 ? flown : [...new Set([2, p.building_height_m + 1].map((h) => Math.max(limit('min_height_m', 1.5), Math.min(limit('max_height_m', 30), h))))];
+}
+/// `2, 9` or `2 9,5` in metres; null where it is no list of heights.
+export function typed_heights(text: string): number[] | null {
+  const parts = text.trim().split(/;\s*|,\s+|\s+/).map((t) => Number(t.replace(',', '.')));
+  return text.trim() && parts.length <= 10 && parts.every((h) => Number.isFinite(h) && h > 0 && h <= 500) ? parts : null;
+}
+
 /// The plan with its waypoints spaced evenly along the outline at the keep-out distance, those left out that lie in a no-fly area or outside of the
-/// fence. Height and flags are those of the first waypoint there was.
-export function with_even_spacing(p: Plan, origin: Geodetic, spacing_m: number): { readonly plan: Plan; readonly left_out: number } {
+/// fence. The heights are taken in turn; the flags are those of the first waypoint there was.
+export function with_even_spacing(p: Plan, origin: Geodetic, spacing_m: number, heights_m: readonly number[]): { readonly plan: Plan; readonly left_out: number } {
   const metres = (list: readonly { lon: number; lat: number }[]): Point[] => list.map((c) => to_m({ lon: c.lon, lat: c.lat }, origin)), keep_out = typeof p.settings.keep_out_m === 'number' ? p.settings.keep_out_m : 4;
   const areas = p.no_fly.map(metres).filter((a) => a.length > 2), fence = metres(p.fence), all = spaced_along(metres(p.outline), keep_out + 0.01, spacing_m);
   const legal = all.filter((q) => areas.every((a) => !inside(q, a) && distance_to_edge(q, a) >= keep_out) && (fence.length < 3 || inside(q, fence)));
   const like: Omit<Waypoint, 'lon' | 'lat'> = { ...(p.waypoints[0] ?? NEW_WAYPOINT), heading_deg: null };
-  return { plan: { ...p, waypoints: legal.map((q) => ({ ...like, ...from_m(q[0], q[1], origin) })) }, left_out: all.length - legal.length };
+  return { plan: { ...p, waypoints: legal.map((q, i) => ({ ...like, height_above_ground_m: heights_m[i % heights_m.length]!, ...from_m(q[0], q[1], origin) })) }, left_out: all.length - legal.length };
 }
 
 const LEAST_M = 0.5;   ///< nearer than this two points measure the same
