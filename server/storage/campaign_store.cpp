@@ -240,18 +240,17 @@ class SqlCampaignStore final : public CampaignStore {
           const auto bare = [&](const std::string& text) { sql += " AND " + text; };
           const auto term = [&](const std::string& text) { bare(text + "?" + std::to_string(next++)); };
           limit_terms(filter.limits, {"x.range_m", "x.rx_dbm", "s.los"}, term, bare);
+          if (filter.every > 1) term(thinned("x.sample_id"));
           sql += " ORDER BY x.sample_id LIMIT ?" + std::to_string(next);
           Query query(c, sql);
           query << *key << filter.after;
           if (filter.setting) query << *filter.setting;
           if (filter.environment) query << *filter.environment;
           bind_limits(query, filter.limits);
-          const std::size_t every = std::max<std::size_t>(filter.every, 1);
-          query << row_limit(filter.limit) * static_cast<std::int64_t>(every);
+          if (filter.every > 1) query << static_cast<std::int64_t>(filter.every);
+          query << row_limit(filter.limit);
           std::vector<StoredSample> found;
-          // A page after another begins behind a row that was taken.
-          for (std::size_t row = filter.after > 0 ? 1 : 0; query.step(); ++row) {
-            if (row % every != 0) continue;
+          while (query.step()) {
             found.push_back(read_sample(query));
             if (filter.with_cir) take_cir(c, found.back());
           }

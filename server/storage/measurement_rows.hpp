@@ -79,6 +79,11 @@ void limit_terms(const MeasurementLimits& limits, const LimitColumns& columns, T
   if (limits.label == MeasurementLimits::Label::nlos) bare(text(columns.los, " = 0"));
 }
 void bind_limits(Query& query, const MeasurementLimits& limits);
+/// About one row in n, n bound behind it: by a hash of the id (Knuth's multiplier, its upper bits), for each
+/// n-th of radios that talk in turn would be always the same one.
+inline std::string thinned(std::string_view id) {
+  return "0 = ((" + std::string(id) + " & 16777215) * 2654435761 >> 12 & 1048575) % ";
+}
 
 void insert_cir(Connection& connection, std::int64_t range_id, const Cir& cir);
 std::optional<Cir> read_cir(Connection& connection, std::int64_t range_id);

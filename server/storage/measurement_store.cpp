@@ -185,6 +185,7 @@ std::string where_text(const MeasurementStore::Filter& filter, int& n) {
     if (filter.tag) term("tag = ");
     limit_terms(filter.limits, k_range_limits, term, bare);
     if (filter.fix) term(k_fix_class);
+    if (filter.every > 1) term(thinned("range_id"));
   }
   return where;
 }
@@ -200,6 +201,7 @@ void bind_filter(Query& query, const MeasurementStore::Filter& filter,
     if (filter.tag) query << *filter.tag;
     bind_limits(query, filter.limits);
     if (filter.fix) query << static_cast<int>(*filter.fix);
+    if (filter.every > 1) query << static_cast<std::int64_t>(filter.every);
   }
 }
 
@@ -246,11 +248,9 @@ Result<MeasurementStore::Page<Row>> read_page(Connection& connection,
   bind_filter<Row>(query, filter, key);
   if (cursor) query << cursor->t_ns << cursor->id;
   // One more than asked tells whether there is a next page.
-  const std::size_t every = std::max<std::size_t>(filter.every, 1);
-  query << (row_limit(filter.limit) + 1) * static_cast<std::int64_t>(every);
+  query << row_limit(filter.limit) + 1;
   std::map<std::int64_t, MissionId> missions;
-  for (std::size_t row = cursor ? 1 : 0; query.step(); ++row) {
-    if (row % every != 0) continue;
+  while (query.step()) {
     if (page.rows.size() == filter.limit) {
       if (filter.limit > 0)
         page.next = std::to_string(page.rows.back().time.ns) + "." + std::to_string(page.ids.back());
@@ -301,7 +301,9 @@ class SqlMeasurementStore final : public MeasurementStore {
   Result<std::uint64_t> count_ranges(const MissionId& mission) override {
     return count(mission, k_count_ranges);
   }
-  Result<std::uint64_t> count_ranges(const Filter& filter) override {
+  Result<std::uint64_t> count_ranges(const Filter& all) override {
+    Filter filter = all;
+    filter.every = 1;
     return read_value<std::uint64_t>(gate_, [&](Connection& c) -> Result<std::uint64_t> {
       const auto key = filter.mission ? mission_key(c, *filter.mission) : std::nullopt;
       if (filter.mission && !key) return std::uint64_t{0};

@@ -136,7 +136,7 @@ test('the filter is the server\'s: the list, the count and the file are of the s
   await id('distance-to').fill(String(limit));
   await id('distance-to').press('Enter');
   await eventually('fewer are counted', async () => (await count()).join() === [near.length, items.length].join());
-  const file = await server.fetch(await id('download-ndjson').getAttribute('href'));
+  const file = await fetch(await id('download-ndjson').getAttribute('href'));
   assert.deepEqual((await file.text()).trim().split('\n').map((l) => JSON.parse(l).id).sort(), near.map((r) => r.id).sort());
   // To the oldest, page by page: what was gone through is not kept in the page.
   const list = id('rows'), oldest = near.reduce((a, b) => (b.t_us < a.t_us ? b : a));
@@ -165,7 +165,7 @@ test('measurements are filtered by what the promoted model calls them, and the l
   await id('predicted').selectOption('nlos');
   await eventually('those are counted', async () => (await text(id('counts'))) === `${called.length} of ${items.length}`);
   for (const cell of await id('rows').locator('tbody tr:not(.space) td:nth-of-type(3)').allTextContents()) assert.match(cell, /^NLOS 0\.[0-3]/);
-  const file = await server.fetch(await id('download-csv').getAttribute('href'));
+  const file = await fetch(await id('download-csv').getAttribute('href'));
   assert.equal((await file.text()).trim().split('\r\n').length, called.length + 1);
   const { thresholds: { rss } } = await get('/api/v1/datasets/set/rules'), words = id('line-words');
   await id('line').selectOption({ label: 'line of set' });
@@ -288,7 +288,7 @@ test('waypoints are spaced evenly and made denser, judged while they are drawn, 
   await id('expect').click();
   await id('save').click();
   await id('plan').getByText(`revision ${before.revision + 1}`).waitFor();
-  const kept = await stored(), check = await post(`/api/v1/plans/${before.id}/validate`);
+  const kept = await stored(), check = await post(`/api/v1/plans/${before.id}/validate`, {});
   assert.deepEqual([kept.expected_anchors, kept.waypoints.length], [['0x6a77'], n + 2]);
   assert.ok(Math.abs(check.duration_s - drawn) < 1.5, `${check.duration_s} ${drawn}`);
   // Evenly: neighbours away from the denser place are the spacing apart, within a tenth.

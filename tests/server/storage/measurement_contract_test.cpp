@@ -286,22 +286,33 @@ TEST_P(MeasurementStoreContract, FiltersByTheFixThatHeldWhenARangeWasTaken) {
   EXPECT_THAT(times(FixClass::none), ElementsAre(rows[0].time.ns, rows[3].time.ns));
 }
 
-TEST_P(MeasurementStoreContract, GivesEachNthRowOverAllPages) {
+TEST_P(MeasurementStoreContract, ThinsEvenlyOverAllPagesAndOutOfStepWithRadiosThatTalkInTurn) {
   const auto mission = stored_mission();
   std::vector<Range> rows;
-  for (int i = 0; i < 23; ++i) rows.push_back(range_at(mission.id, i)), rows.back().distance_m = i;
+  for (int i = 0; i < 4000; ++i) rows.push_back(range_at(mission.id, i));  // four anchors in turn
   append(rows);
   MeasurementStore::Filter filter;
   filter.mission = mission.id;
-  filter.every = 5;
-  filter.limit = 2;
-  std::vector<int> found;
-  do {
-    const auto page = db_->measurements().ranges(filter).value();
-    for (const auto& row : page.rows) found.push_back(static_cast<int>(row.distance_m));
-    filter.after = page.next;
-  } while (!filter.after.empty());
-  EXPECT_THAT(found, ElementsAre(0, 5, 10, 15, 20));
+  filter.every = 4;
+  const auto found = [&](std::size_t limit) {
+    filter.limit = limit;
+    std::vector<std::int64_t> ids;
+    do {
+      const auto page = db_->measurements().ranges(filter).value();
+      ids.insert(ids.end(), page.ids.begin(), page.ids.end());
+      filter.after = page.next;
+    } while (!filter.after.empty());
+    return ids;
+  };
+  const auto ids = found(10'000);
+  EXPECT_NEAR(static_cast<double>(ids.size()), 1000,
+              110);  // four sigma of a fair draw: sqrt(4000 x 1/4 x 3/4) = 27
+  EXPECT_EQ(found(77), ids) << "the same ones, whatever the page";
+  for (const std::uint32_t anchor : {0x100u, 0x101u, 0x102u, 0x103u}) {
+    filter.anchor = NetworkId{anchor};
+    EXPECT_NEAR(static_cast<double>(found(10'000).size()), 250, 56) << anchor;
+  }
+  EXPECT_EQ(db_->measurements().count_ranges(filter).value(), 1000u) << "a count is of all";
 }
 
 TEST_P(MeasurementStoreContract, RefusesACursorThatIsNotItsOwn) {

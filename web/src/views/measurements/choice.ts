@@ -5,7 +5,7 @@ type Label = 'los' | 'nlos' | 'none';
 export const LABELS: readonly (readonly [Filter['label'], string])[] = [['', 'All'], ['los', 'LOS'], ['nlos', 'NLOS'], ['none', 'No label']];
 const label_of = (s: Sample): Label => (s.los === null ? 'none' : s.los ? 'los' : 'nlos');
 
-export const DRAWN_MAX = 2000;   ///< measurements the plots are made of; of more, each n-th
+export const DRAWN_MAX = 2000;   ///< measurements the plots are made of; of more, about one in n
 export const every_of = (total: number | null): number => Math.max(1, Math.ceil((total ?? 0) / DRAWN_MAX));
 
 /// `2026-05-04T10:09` or with seconds, meant as UTC, in microseconds; null where it is none.

@@ -2,7 +2,7 @@
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { said } from '../../api/client';
 import { impulse, type Impulse, type Sample, type Source } from '../../api/measurements';
-import { fixed } from '../../ui/format';
+import { fixed, grouped } from '../../ui/format';
 import { Chip, Icon, Q } from '../../ui/marks';
 import { feature_words } from '../models/words';
 import { percentile } from './choice';
@@ -54,7 +54,7 @@ function Features({ sample, all, response }: { sample: Sample; all: readonly Sam
   const plain = (cls: string, name: string, value: string) => <tr><th scope="row"><Key cls={cls} />{name}</th><td class="num">{value}</td><td class="num mut">–</td><td class="num mut">–</td></tr>;
   return (
     <table class="tbl reads" data-testid="features">
-      <caption>% of the loaded LOS and NLOS measurements that lie below</caption>
+      <caption>% of the LOS and NLOS measurements {all.length ? `(of ${grouped(all.length)} looked at) ` : ''}that lie below</caption>
       <thead><tr><th scope="col">Feature</th><th scope="col" class="num">Value</th><th scope="col" class="num">of LOS</th><th scope="col" class="num">of NLOS</th></tr></thead>
       <tbody>
         {marks && plain('s first', 'First path, tap', fixed(marks.first, 1))}

@@ -26,7 +26,7 @@ const everything = (f: Filter): boolean => JSON.stringify(f) === JSON.stringify(
 
 export function Measurements() {
   const [campaigns, set_campaigns] = useState<readonly Source[]>([]), [wanted, set_wanted] = useState<string | null>(null), [filters, set_filters] = useState<{ of: string; filter: Filter }>({ of: '', filter: EVERYTHING }), [oldest_first, set_oldest] = useState(false);
-  const [asked, set_asked] = useState<Asked | null>(null), [who, set_who] = useState<{ of: string; list: readonly Who[]; n: number | null }>({ of: '', list: [], n: null }), busy = useRef(new Set<string>());
+  const [asked, set_asked] = useState<Asked | null>(null), [who, set_who] = useState<{ of: string; list: readonly Who[]; n: number | null }>({ of: '', list: [], n: null }), busy = useRef(new Set<string>()), [whole, set_whole] = useState<{ of: string; samples: readonly Sample[] }>({ of: '', samples: [] });
   const [problem, set_problem] = useState(''), [again, set_again] = useState(0), [sample, set_sample] = useState<Sample | null>(null), [labelling, set_labelling] = useState(false), [opened, set_opened] = useState(0);
   useEffect(() => { document.title = 'Measurements - anchord'; }, []);
   useEffect(() => { fetch_campaigns().then(set_campaigns, () => undefined); }, [again]);
@@ -51,7 +51,9 @@ export function Measurements() {
       try {
         const settings = source.kind === 'campaign' ? await settings_of(source.id) : [], n = settings.reduce((sum, s) => sum + s.n, 0), total = await count_of(source, filter), every = every_of(total ?? n);
         if (source.kind === 'campaign' && now.current === key) set_who({ of, n, list: [...new Map(settings.map((s) => { const w: Who = s.environment ? { name: s.environment, by: 'environment' } : { name: s.setting, by: 'setting' }; return [w.name, w]; })).values()] });
-        const drawn = (await page_of(source, filter, { limit: DRAWN_MAX, cursor: null, oldest_first, every })).samples;
+        const drawn = (await page_of(source, filter, { limit: Math.ceil(DRAWN_MAX * 1.1), cursor: null, oldest_first, every })).samples;
+        // What a feature is ranked among is not what happens to be filtered.
+        if (everything(filter) && now.current === key) set_whole({ of, samples: drawn });
         put(() => ({ drawn, every, total: filter.cls ? null : total }));
         if (source.kind === 'mission' && now.current === key) set_who((w) => ({ of, n: everything(filter) ? total : w.of === of ? w.n : null, list: [...new Set([...(w.of === of ? w.list.map((x) => x.name) : []), ...drawn.map((s) => s.who)])].sort().map((name) => ({ name, by: 'environment' })) }));
       } catch (e) { failed(e); }
@@ -100,9 +102,9 @@ export function Measurements() {
         {source && !current && !problem && <p class="pad" role="status">Loading the measurements.</p>}
         {current && n_known === 0 && !at_end(rows) && rows.sizes.length > 0 && !problem && <p class="pad" role="status">Looking further: none in the first {grouped(rows.sizes.length * SCANNED)}.</p>}
         {current && at_end(rows) && n_known === 0 && <div class="empty small"><p>{everything(filter) ? `${source!.name} has no measurements.` : 'Nothing passes this filter. Show all takes it away.'}</p></div>}
-        {sample && source && <ImpulsePanel source={source} sample={sample} opened={opened} all={drawn} close={() => set_sample(null)} step={step} />}
+        {sample && source && <ImpulsePanel source={source} sample={sample} opened={opened} all={whole.of === of ? whole.samples : drawn} close={() => set_sample(null)} step={step} />}
         {drawn.length > 0 && <><div class="plots"><LevelPanel samples={drawn} selected={selected} select={open} /><TruthPanel samples={drawn} selected={selected} select={open} /><HistogramPanel samples={drawn} /></div>
-          {current!.every > 1 && <p class="sub thinned" data-testid="thinned">The plots are made of {grouped(drawn.length)} of them, {current!.every === 2 ? 'each second' : `one in ${grouped(current!.every)}`}.</p>}</>}
+          {current!.every > 1 && <p class="sub thinned" data-testid="thinned">The plots are made of {grouped(drawn.length)} of them, about one in {grouped(current!.every)}.</p>}</>}
         {n_known > 0 && <RowList source={source!} rows={rows} selected={selected} at={at} oldest_first={oldest_first} select={open} look={look} turn={() => set_oldest(!oldest_first)} />}
       </div>
     </div>
