@@ -212,6 +212,16 @@ TEST(DeviceLoop, TwoDevicesOnOnePortAreReportedAndTheFirstGoesOn) {
   fs::remove(second_name);
 }
 
+TEST(DeviceLoop, TwoMountPointsOfOneCasterAreTwoDevices) {
+  boost::asio::io_context io;
+  Listener listener;
+  DeviceLoop loop(io, nullptr, listener, quick());
+  const std::string caster = "tcp://127.0.0.1:1";
+  EXPECT_TRUE(loop.add({"near", "ntrip", "near", caster, R"({"mount":"NEAR"})"}));
+  EXPECT_TRUE(loop.add({"far", "ntrip", "far", caster, R"({"mount":"FAR"})"}));
+  EXPECT_FALSE(loop.add(gnss("rover", caster)));
+}
+
 TEST(DeviceLoop, GarbageIsOpenButNotTalkingAndIsCounted) {
   boost::asio::io_context io;
   Listener listener;
