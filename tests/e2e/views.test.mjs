@@ -291,9 +291,10 @@ test('waypoints are spaced evenly and made denser, judged while they are drawn, 
   const kept = await stored(), check = await post(`/api/v1/plans/${before.id}/validate`, {});
   assert.deepEqual([kept.expected_anchors, kept.waypoints.length], [['0x6a77'], n + 2]);
   assert.ok(Math.abs(check.duration_s - drawn) < 1.5, `${check.duration_s} ${drawn}`);
+  assert.deepEqual(check.issues.filter((i) => i.severity === 'error'), []);
   // Evenly: neighbours away from the denser place are the spacing apart, within a tenth.
   const metres = (a, b) => Math.hypot((a.lon - b.lon) * 111_320 * Math.cos((a.lat * Math.PI) / 180), (a.lat - b.lat) * 111_230);
-  const gaps = kept.waypoints.slice(4).map((w, i, all) => (i ? metres(w, all[i - 1]) : null)).filter((g) => g !== null);
+  const gaps = kept.waypoints.filter((w) => w.measure).slice(4).map((w, i, all) => (i ? metres(w, all[i - 1]) : null)).filter((g) => g !== null);
   assert.ok(gaps.every((g) => g < 6.6) && gaps.filter((g) => g > 5.4).length >= gaps.length * 0.7, gaps.map((g) => g.toFixed(2)).join(' '));
   assert.deepEqual(await violations(page), []);
   await picture(page, 'plan-even-light');

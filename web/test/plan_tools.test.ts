@@ -33,10 +33,21 @@ describe('points along an outline', () => {
   it('are at least three, and none without an outline', () => { expect(spaced_along(square, 4, 100)).toHaveLength(3); expect(spaced_along([[0, 0], [1, 0]], 4, 5)).toEqual([]); });
   it('take the heights in turn and the flags of the first waypoint, and leave out what may not be flown', () => {
     const no_fly = [at(-10, 5), at(-2, 5), at(-2, 15), at(-10, 15)], { plan, left_out } = with_even_spacing({ ...hall, no_fly: [no_fly], waypoints: [wp(0, -4, { height_above_ground_m: 7, turn: true, heading_deg: 90 })] }, ORIGIN, 5, [3, 9]);
-    expect(plan.waypoints.slice(0, 3)).toMatchObject([3, 9, 3].map((h) => ({ height_above_ground_m: h, turn: true, heading_deg: null })));
-    expect(plan.waypoints.length + left_out).toBe(21);
-    for (const w of plan.waypoints) { const [e, n] = to_m(w, ORIGIN); expect(e < -2 - 4 && n > 1 && n < 19).toBe(false); expect(e > -6 || n < 1 || n > 19).toBe(true); }
+    expect(plan.waypoints.filter((w) => w.measure).slice(0, 3)).toMatchObject([3, 9, 3].map((h) => ({ height_above_ground_m: h, turn: true, heading_deg: null })));
+    expect(plan.waypoints.filter((w) => w.measure).length + left_out).toBe(21);
+    for (const w of plan.waypoints.filter((x) => x.measure)) { const [e, n] = to_m(w, ORIGIN); expect(e < -2 - 4 && n > 1 && n < 19).toBe(false); expect(e > -6 || n < 1 || n > 19).toBe(true); }
     expect(left_out).toBeGreaterThan(2);
+  });
+});
+
+describe('the way between evenly spaced points', () => {
+  const wedge: Point[] = [[0, 0], [40, 0], [0, 8]], l: Point[] = [[0, 0], [30, 0], [30, 10], [10, 10], [10, 30], [0, 30]];
+  it.each([['a hall', square, 5], ['a hall, few points', square, 12], ['an L', l, 6], ['a wedge', wedge, 5], ['a wedge, few points', wedge, 11]] as const)('never comes nearer to a wall than the keep-out: %s', (_, ring, spacing) => {
+    const made = with_even_spacing({ ...EMPTY, outline: ring.map(([e, n]) => at(e, n)) }, ORIGIN, spacing, [4]).plan.waypoints.map((w) => to_m(w, ORIGIN));
+    made.slice(1).forEach((b, i) => {
+      const a = made[i]!;
+      for (let k = 0; k <= 50; k++) { const p: Point = [a[0] + ((b[0] - a[0]) * k) / 50, a[1] + ((b[1] - a[1]) * k) / 50]; expect(inside(p, ring)).toBe(false); expect(distance_to_edge(p, ring)).toBeGreaterThan(3.995); }
+    });
   });
 });
 

@@ -90,6 +90,29 @@ TEST_P(LearningStoreContract, GivesBackACampaignsSettingsAndSamples) {
   EXPECT_EQ(db_->campaigns().sample(c.id, samples[1].id).value().sample.range_m, 5.4);
 }
 
+TEST_P(LearningStoreContract, FiltersSamplesByDistanceLevelAndLabel) {
+  const auto c = stored_campaign();
+  auto near = row("a", 5, 1), strong = row("a", 6, 2), open = row("b", 7, 3), untold = row("c", 8, 4);
+  strong.sample.rx_dbm = -80;
+  open.truth.los = true;
+  untold.truth.los.reset();
+  ASSERT_TRUE(db_->campaigns().append(c.id, {near, strong, open, untold}));
+  const auto found = [&](const MeasurementLimits& limits) {
+    CampaignStore::Filter filter;
+    filter.campaign = c.id;
+    filter.limits = limits;
+    std::vector<double> out;
+    for (const auto& s : db_->campaigns().samples(filter).value()) out.push_back(s.sample.range_m);
+    return out;
+  };
+  using Label = MeasurementLimits::Label;
+  EXPECT_EQ(found({6.0, 7.0, {}, {}, {}}), (std::vector<double>{6, 7}));
+  EXPECT_EQ(found({{}, {}, -85.0, -75.0, {}}), std::vector<double>{6});
+  EXPECT_EQ(found({{}, {}, {}, {}, Label::nlos}), (std::vector<double>{5, 6}));
+  EXPECT_EQ(found({{}, {}, {}, {}, Label::los}), std::vector<double>{7});
+  EXPECT_EQ(found({{}, {}, {}, {}, Label::none}), std::vector<double>{8});
+}
+
 TEST_P(LearningStoreContract, CountsARepeatedSampleAndRefusesAnotherTruthForASettingWhole) {
   const auto c = stored_campaign();
   ASSERT_TRUE(db_->campaigns().append(c.id, {row("a", 5.2, 1)}));

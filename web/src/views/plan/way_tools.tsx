@@ -11,7 +11,7 @@ export function WayTools({ plan, origin, picked, change }: { plan: Plan; origin:
   const space = (): void => {
     const made = with_even_spacing(plan, origin!, spacing_m, heights!);
     change(made.plan);
-    say(`${made.plan.waypoints.length} waypoints along the outline${made.left_out ? `; ${made.left_out} left out in no-fly areas or outside of the fence` : ''}`);
+    say(`${made.plan.waypoints.filter((w) => w.measure).length} measuring points along the outline${made.left_out ? `; ${made.left_out} left out in no-fly areas or outside of the fence` : ''}`);
   };
   return (
     <div class="waytools">
