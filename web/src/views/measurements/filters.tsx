@@ -1,4 +1,5 @@
 /// The filters in one band: each is a field of the server's own query, so that what is listed, drawn and downloaded is the same.
+import { useState } from 'preact/hooks';
 import { EVERYTHING, type Filter, type Source } from '../../api/measurements';
 import { LABELS, time_text, typed_time } from './choice';
 
@@ -24,6 +25,9 @@ export function Filters({ source, filter: f, who, set }: Props) {
   );
 }
 
-const End = ({ name, value, step, set }: { name: string; value: number | null; step: string; set: (v: number | null) => void }) => (
-  <input type="number" step={step} inputMode="decimal" value={value ?? ''} aria-label={name} data-testid={name.toLowerCase().replace(' ', '-')} onChange={(e) => { const v = e.currentTarget.value; set(v === '' || !Number.isFinite(Number(v)) ? null : Number(v)); }} />
-);
+/// What is being typed is the field's own until it is done: the page is drawn anew whenever something arrives.
+function End({ name, value, step, set }: { name: string; value: number | null; step: string; set: (v: number | null) => void }) {
+  const [typed, type] = useState<string | null>(null);
+  const done = (v: string): void => { type(null); set(v === '' || !Number.isFinite(Number(v)) ? null : Number(v)); };
+  return <input type="number" step={step} inputMode="decimal" value={typed ?? value ?? ''} aria-label={name} data-testid={name.toLowerCase().replace(' ', '-')} onInput={(e) => type(e.currentTarget.value)} onChange={(e) => done(e.currentTarget.value)} />;
+}

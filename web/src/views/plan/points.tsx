@@ -1,4 +1,5 @@
 /// Every point of the plan as numbers: nothing on the map is only on the map.
+import { useState } from 'preact/hooks';
 import type { Plan, Waypoint } from '../../api/plans';
 import { fixed } from '../../ui/format';
 import { corners, moved, removed, type Picked, type Shape } from './draft';
@@ -7,9 +8,10 @@ interface Props { plan: Plan; picked: Picked | null; pick: (p: Picked | null) =>
 
 /// A number that is taken when it is one: half-typed text changes nothing.
 function Cell({ label, value, set, decimals, min, max, empty }: { label: string; value: number | null; set: (v: number | null) => void; decimals: number; min?: number; max?: number; empty?: string }) {
-  const text = value === null ? '' : value.toFixed(decimals);
+  // What is being typed is the field's own until it is done: the page is drawn anew when a judgement of the plan comes.
+  const text = value === null ? '' : value.toFixed(decimals), [typed, type] = useState<string | null>(null);
   const take = (t: string): void => { const v = Number(t.replace(',', '.')); if (t.trim() === '') { if (empty !== undefined) set(null); } else if (Number.isFinite(v) && v >= (min ?? -Infinity) && v <= (max ?? Infinity)) set(v); };
-  return <input class="cell" inputMode="decimal" aria-label={label} value={text} placeholder={empty} onChange={(e) => { take(e.currentTarget.value); e.currentTarget.value = text; }} />;
+  return <input class="cell" inputMode="decimal" aria-label={label} value={typed ?? text} placeholder={empty} onInput={(e) => type(e.currentTarget.value)} onChange={(e) => { type(null); take(e.currentTarget.value); e.currentTarget.value = text; }} />;
 }
 
 export function Waypoints({ plan, picked, pick, change }: Props) {
