@@ -44,11 +44,13 @@ const shots = process.env.ANCHORD_SHOTS;  // a folder: keep pictures of what was
 export const picture = async (page, name) => { if (shots) await page.screenshot({ path: join(shots, `${name}.png`) }); };
 
 const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
-/** What axe finds wrong on the page as it is. */
+/** What axe finds wrong on the page as it is, and whether it is wider than its window. */
 export async function violations(page) {
   await page.evaluate(axe);
   const found = await page.evaluate(() => globalThis.axe.run(document, { resultTypes: ['violations'] }));
-  return found.violations.map((v) => `${v.id}: ${v.nodes.map((n) => n.target.join(' ')).join(', ')}`);
+  const [page_px, window_px] = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
+  const sideways = page_px > window_px + 1 ? [`wider than its window: ${page_px} px in ${window_px}`] : [];
+  return [...found.violations.map((v) => `${v.id}: ${v.nodes.map((n) => n.target.join(' ')).join(', ')}`), ...sideways];
 }
 
 /** Text of the first match; empty while there is none. */

@@ -84,7 +84,7 @@ export function Plan({ id }: { id: string | null }) {
         <span class="grow" />
         <button class="btn" disabled={!history.before.length} onClick={() => set_history(undone(history))}>Undo</button><button class="btn" disabled={!history.after.length} onClick={() => set_history(redone(history))}>Redo</button>
         {engineer && <button class="btn" onClick={() => open(EMPTY)} disabled={dirty}>New</button>}
-        <button class="btn" onClick={() => file.current?.click()}>Import</button><input ref={file} type="file" accept=".plan,.json,.geojson,.kml" class="sr" tabIndex={-1} aria-label="Plan file" onChange={(e) => { const f = e.currentTarget.files?.[0]; if (f) bring(f); e.currentTarget.value = ''; }} />
+        <button class="btn" onClick={() => file.current?.click()}>Import</button><input ref={file} type="file" accept=".plan,.json,.geojson,.kml" hidden aria-label="Plan file" onChange={(e) => { const f = e.currentTarget.files?.[0]; if (f) bring(f); e.currentTarget.value = ''; }} />
         {plan.id && !dirty && <><a class="btn" href={export_url(plan.id, 'plan')} download={`${plan.name}.plan`}><Icon name="download" />.plan</a><a class="btn" href={export_url(plan.id, 'geojson')} download={`${plan.name}.geojson`}><Icon name="download" />GeoJSON</a></>}
         {engineer && <button class="btn" data-testid="generate" disabled={plan.outline.length < 3 || busy !== ''} onClick={propose}>{busy === 'generate' ? 'Planning' : 'Generate'}</button>}
         {engineer && <button class="btn primary" data-testid="save" disabled={!dirty || busy !== ''} onClick={keep}>Save</button>}
