@@ -53,7 +53,7 @@ class CampaignStore {
     CampaignId campaign{};
     std::optional<std::string> setting, environment;
     MeasurementLimits limits;
-    std::size_t every{1};  ///< of those that match only each n-th, the first included
+    std::size_t every{1};  ///< about one in n of those that match, by a hash of the id
     std::size_t limit{100};
     std::int64_t after{0};  ///< sample id
     bool with_cir{false};

@@ -52,7 +52,7 @@ class MeasurementStore {
     MeasurementLimits limits;  ///< of ranges
     std::optional<FixClass>
         fix;  ///< of ranges: of the newest position at most 2 s before it; none: there is no such
-    std::size_t every{1};  ///< of those that match only each n-th, the first included: for a picture of many
+    std::size_t every{1};  ///< about one in n of those that match, by a hash of the id: for a picture of many
     std::size_t limit{100};
     std::string after;
     bool with_cir{false};
