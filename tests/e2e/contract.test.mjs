@@ -62,7 +62,10 @@ test('plans: made, generated, imported, checked, changed, exported', async () =>
   const made = await call('POST', '/api/v1/plans/generate', { expect: 200, json: { name: 'Hall A', outline, building_height_m: 8 } });
   ids.plan = (await call('POST', '/api/v1/plans', { expect: 201, json: made.json.plan })).json.id;
   const path = `/api/v1/plans/${ids.plan}`;
-  await call('POST', `${path}/validate`, { expect: 200 });
+  const stored = await call('POST', `${path}/validate`, { expect: 200 });
+  const drawn = await call('POST', '/api/v1/plans/validate', { expect: 200, json: made.json.plan });
+  assert.deepEqual(drawn.json, stored.json, 'drawn and stored are judged alike');
+  await call('POST', '/api/v1/plans/validate', { expect: 422, json: { ...made.json.plan, building_height_m: 'high' } });
   await call('GET', `${path}/export?format=geojson`, { expect: 200 });
   const file = await call('GET', `${path}/export`, { expect: 200 });
   await call('POST', '/api/v1/plans/import?dry_run=true', { expect: 200, json: file.json });
