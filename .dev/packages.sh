@@ -25,8 +25,9 @@ apt() {
 # software of the machine may want it): ours is unpacked below build/ and found there, headers are all we use.
 private_boost_dir=build/boost-1.81
 other_boost() {
-  dpkg-query -W -f='${Package} ${db:Status-Status}\n' 'libboost1.*-dev' 2>/dev/null |
-    awk '$2 == "installed" && $1 ~ /^libboost1\.[0-9]+-dev$/ && $1 != "libboost1.81-dev" {print $1; exit}'
+  # dpkg-query fails where the pattern matches nothing, which is what every fresh machine answers.
+  { dpkg-query -W -f='${Package} ${db:Status-Status}\n' 'libboost1.*-dev' 2>/dev/null || true; } |
+    awk '$2 == "installed" && $1 ~ /^libboost1\.[0-9]+-dev$/ && $1 != "libboost1.81-dev" && !found {print $1; found = 1}'
 }
 unpack_private_boost() {
   [[ -e $private_boost_dir/usr/include/boost/version.hpp ]] && return
