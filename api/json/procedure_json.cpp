@@ -51,6 +51,15 @@ Ordered anchors_json(const procedure::FlightEngine& engine) {
 }  // namespace
 
 Ordered drone_json(const DroneStatus& d) {
+  Ordered others = Ordered::array();
+  for (const auto& o : d.others) {
+    others.push_back({{"sender", o.sender},
+                      {"system", o.system},
+                      {"component", o.component},
+                      {"kind", o.kind},
+                      {"frames", o.frames},
+                      {"silent_s", o.silent_s}});
+  }
   return {{"connected", d.connected},
           {"silent_s", finite_or_null(d.silent_s)},
           {"autopilot", d.autopilot},
@@ -66,7 +75,11 @@ Ordered drone_json(const DroneStatus& d) {
           {"speed_mps", or_null(d.speed_mps)},
           {"battery", or_null(d.battery)},
           {"gps_fix", d.gps_fix},
-          {"text", d.text}};
+          {"text", d.text},
+          {"peer", d.peer},
+          {"link_signed", d.link_signed},
+          {"frames_refused", d.frames_refused},
+          {"others", std::move(others)}};
 }
 
 Ordered flight_command_json(const FlightCommand& c) {

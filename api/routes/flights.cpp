@@ -1,5 +1,6 @@
 #include <nlohmann/json.hpp>
 
+#include "api/json/procedure_json.hpp"
 #include "api/json/reader.hpp"
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
@@ -201,6 +202,27 @@ Response uploads(Services& s, const Request& request) {
   return json_response(200, Ordered{{"items", std::move(items)}});
 }
 
+/// Another aircraft on the link. Whatever it answers is in the audit log.
+Response change_aircraft(Services& s, const Request& request) {
+  const auto mission = path_id<MissionId>(request);
+  std::vector<FieldError> errors;
+  const auto body = json_body(request);
+  Fields fields(body, "", errors);
+  const auto lease = fields.text("lease", 64).value_or("");
+  const auto sender = fields.text("sender", 100).value_or("");
+  fields.finish();
+  refuse_if_any(errors);
+  const std::string audited = "mission.aircraft " + to_string(mission) + (sender.empty() ? "" : " " + sender);
+  auto changed = s.flights->change_aircraft(mission, lease, sender, request.principal);
+  if (!changed) {
+    s.audit(request, audited, "refused: " + changed.error().message);
+    if (changed.error().code == Errc::invalid_argument) throw_problem(422, "state", changed.error().message);
+  }
+  const auto status = granted(std::move(changed));
+  s.audit(request, audited);
+  return json_response(200, drone_json(status));
+}
+
 }  // namespace
 
 void add_flight_routes(Router& router, Services& s) {
@@ -213,6 +235,7 @@ void add_flight_routes(Router& router, Services& s) {
   router.add({Method::post, base + "control", op, on(control)});
   router.add({Method::get, base + "uploads", readers(), on(uploads)});
   router.add({Method::post, base + "uploads", op, on(upload)});
+  router.add({Method::post, base + "aircraft", op, on(change_aircraft)});
   router.add({Method::get, base + "checklist", readers(), on(checklist)});
   router.add({Method::post, base + "checklist/{item}", op, on(override_item)});
   router.add({Method::get, base + "procedure", readers(),

@@ -148,6 +148,27 @@ Result<FlightCommand> FlightService::upload(const MissionId& mission, const std:
   return state_->upload(mission, plan, what, who.name);
 }
 
+Result<DroneStatus> FlightService::change_aircraft(const MissionId& mission, const std::string& lease,
+                                                   const std::string& sender, const Principal& who) {
+  BOOST_OUTCOME_TRYV(state_->deps.missions.mission(mission));
+  const std::scoped_lock lock(state_->mutex);
+  BOOST_OUTCOME_TRYV(state_->lease.renew(mission, lease, who, state_->deps.clock.now()));
+  auto* drone = state_->deps.drone;
+  if (drone == nullptr)
+    return make_error(Errc::invalid_argument, "this server talks to no autopilot (drone.address)");
+  const auto before = drone->status();
+  if (before.connected && (before.in_air || (state_->flight && state_->flight->flying())))
+    return make_error(Errc::invalid_argument,
+                      "the aircraft in the air answers; land it before another one takes the link");
+  drone->change_peer(sender);
+  state_->deps.events.add(
+      "warning", "drone.changed",
+      who.name + (sender.empty() ? ": the next autopilot that is heard is the aircraft"
+                                 : ": the autopilot at " + sender + " is the aircraft"),
+      mission);
+  return drone->status();
+}
+
 std::vector<FlightUpload> FlightService::uploads(const MissionId& mission) {
   const std::scoped_lock lock(state_->mutex);
   std::vector<FlightUpload> out;

@@ -93,6 +93,11 @@ class FlightService final : public MissionObserver {
   /// Newest of each kind.
   std::vector<FlightUpload> uploads(const MissionId& mission);
 
+  /// The aircraft on the link is another one: that of `sender`, or, empty, the next whose autopilot is heard.
+  /// errors  conflict: no control; invalid_argument: no link, or the aircraft that flies answers
+  Result<DroneStatus> change_aircraft(const MissionId& mission, const std::string& lease,
+                                      const std::string& sender, const Principal& who);
+
   /// An operator who looks while nobody else has control means to fly: the aircraft gets the plan's fence.
   std::vector<ChecklistItem> checklist(const MissionId& mission, const std::optional<PlanId>& plan,
                                        const Principal& who);

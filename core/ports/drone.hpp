@@ -25,6 +25,16 @@ struct CommandReport {
   std::string text;
 };
 
+/// Somebody else on the aircraft's link: another vehicle, a ground station, a datagram of a stranger. Counted
+/// and shown, never obeyed.
+struct OtherOnLink {
+  std::string sender;  ///< address and port; empty: the aircraft's own end of the link
+  int system{}, component{};
+  std::string kind;  ///< autopilot, ground station, other, unsigned, no MAVLink
+  std::uint64_t frames{};
+  double silent_s{};
+};
+
 /// How the aircraft is, as its autopilot tells. Ages in seconds.
 struct DroneStatus {
   bool connected{false};  ///< heard within the last 3 s
@@ -40,6 +50,10 @@ struct DroneStatus {
   std::optional<Wgs84> home{};
   int gps_fix{};     ///< MAVLink's number: 5 RTK float, 6 RTK fixed
   std::string text;  ///< newest warning of the autopilot
+  std::string peer;  ///< address and port of the aircraft where the link has senders (UDP)
+  bool link_signed{false};              ///< frames without our key's signature are refused
+  std::uint64_t frames_refused{};       ///< unsigned, badly signed, or signed a second time
+  std::vector<OtherOnLink> others;
 };
 
 /// A place of the route that the autopilot keeps beside its commands, for the pilot's own screen and for a
@@ -74,6 +88,9 @@ class Drone {
   virtual std::uint64_t upload_fence(const DroneFence& fence) = 0;
   /// The operator has looked and goes on after `taken_over`.
   virtual void take_back() = 0;
+  /// A person says that the aircraft on the link is another one: that of `sender`, or, empty, the next one
+  /// whose autopilot is heard.
+  virtual void change_peer(const std::string& sender) { (void)sender; }
   virtual DroneStatus status() const = 0;
   virtual std::vector<CommandReport> take_reports() = 0;
 };

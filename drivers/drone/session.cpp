@@ -16,6 +16,7 @@ constexpr int k_return = 20, k_land = 21, k_take_off = 22, k_set_mode = 176, k_r
 constexpr double k_degree = std::numbers::pi / 180,
                  k_metres_per_degree = 111'195;  // mean earth radius 6371 km
 constexpr int k_armed = 0x80;
+constexpr double k_vehicle_kept_s = 10;
 
 std::string result_word(std::int64_t result) {
   switch (result) {
@@ -66,8 +67,29 @@ void Session::feed(double now_s, std::int64_t unix_us, std::span<const std::uint
   framer_.set_time(mavlink::signature_time(unix_us));
   std::vector<mavlink::Received> in;
   framer_.feed(bytes, in);
+  packer_.set_time(framer_.newest_signature());  // the autopilot refuses stamps behind its own
   for (const auto& one : in) handle(one);
 }
+
+/// Nothing of one aircraft is another's.
+void Session::forget_vehicle() {
+  heard_s_.reset();
+  vehicle_ = {0, 0};
+  autopilot_ = Autopilot::unknown;
+  status_ = {};
+  custom_mode_ = 0;
+  commanded_mode_.reset();
+  commanded_s_.reset();
+  home_msl_m_.reset();
+  refusal_.clear();
+  take_off_.reset();
+  target_.reset();
+  pending_.clear();
+  if (transfer_) end_transfer(CommandState::unconfirmed, "the aircraft on the link is another one");
+  transfer_.reset();
+  rates_s_ = -100;
+}
+
 
 void Session::handle(const mavlink::Received& in) {
   const auto& m = in.message;
@@ -106,7 +128,11 @@ void Session::handle(const mavlink::Received& in) {
 void Session::on_heartbeat(const mavlink::Received& in) {
   const auto& m = in.message;
   if (m.integer("autopilot") == 8 || m.integer("type") == 6) return;  // another station
-  if (heard_s_ && in.from != vehicle_) return;  // one vehicle a session: the first heard
+  if (heard_s_ && in.from != vehicle_) {
+    // One vehicle a session: the first heard, until it is silent for long and was not armed.
+    if (now_s_ - *heard_s_ <= k_vehicle_kept_s || status_.armed) return;
+    forget_vehicle();
+  }
   vehicle_ = in.from;
   autopilot_ = autopilot_of(m.integer("autopilot"));
   heard_s_ = now_s_;

@@ -44,6 +44,8 @@ class Session final : public Drone {
   /// At least ten times a second: heartbeat, repeats, time-outs.
   void tick(double now_s, std::int64_t unix_us);
   std::vector<std::uint8_t> take_bytes();
+  /// The aircraft on the link is another one: the next autopilot that is heard is taken.
+  void forget_vehicle();
 
   std::uint64_t take_off(double height_m) override;
   std::uint64_t go_to(double lat_deg, double lon_deg, double height_m,

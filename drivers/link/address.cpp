@@ -70,6 +70,13 @@ Result<Address> parse_address(std::string_view text) {
   return bad(text, "begin with serial:, tcp://, tcp-listen:// or udp://");
 }
 
+bool others_may_reach(const Address& address) {
+  if (address.kind == Kind::serial || address.host.empty()) return false;
+  const bool loopback =
+      address.host == "localhost" || address.host == "::1" || address.host.rfind("127.", 0) == 0;
+  return !loopback;
+}
+
 std::string to_string(const Address& address) {
   if (address.kind == Kind::serial) {
     return "serial:" + address.path + (address.baud == 115200 ? "" : "?baud=" + std::to_string(address.baud));

@@ -15,7 +15,7 @@ enum class Kind : std::uint8_t { serial, tcp, tcp_listen, udp };
 ///   tcp://192.168.2.15:9001                              we connect
 ///   tcp-listen://:9002  tcp-listen://127.0.0.1:9002      the device connects; port 0: the system chooses
 ///   udp://:14550  udp://0.0.0.0:14550                    we bind (loopback, or every network) and answer the
-///                                                        latest sender
+///                                                        latest sender that is welcome
 ///   udp://192.168.2.15:14550                             we send there and take what comes back from there
 /// IPv6 hosts stand in brackets.
 struct Address {
@@ -30,6 +30,8 @@ struct Address {
 
 /// errors: invalid_argument, naming the part that is wrong
 Result<Address> parse_address(std::string_view text);
+/// Whether its bytes pass a network that others may be on: any host but a loopback one.
+bool others_may_reach(const Address& address);
 /// The form parse_address() takes, defaults left out.
 std::string to_string(const Address& address);
 

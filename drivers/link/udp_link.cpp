@@ -78,7 +78,7 @@ class UdpLink final : public ByteLink {
       socket.async_receive_from(
           asio::buffer(buffer), sender, [self = shared_from_this()](ErrorCode error, std::size_t n) {
             if (self->shared->closed) return;
-            if (!error && self->welcome()) self->shared->took({self->buffer.data(), n});
+            if (!error && self->welcome({self->buffer.data(), n})) self->shared->took({self->buffer.data(), n});
             if (self->shared->closed) return;
             // "Connection refused" is the echo of a datagram that nobody took: the device may come yet.
             if (error && error != asio::error::connection_refused && error != asio::error::message_size) {
@@ -88,10 +88,17 @@ class UdpLink final : public ByteLink {
           });
     }
 
-    bool welcome() {
-      if (fixed) return sender == *remote;
+    bool welcome(std::string_view bytes) {
+      if (fixed && sender != *remote) return false;
+      const auto& judge = shared->handlers.welcome;
+      if (judge && !judge(bytes, name_of(sender), arrival_now())) return false;
       remote = sender;
       return true;
+    }
+
+    static std::string name_of(const udp::endpoint& who) {
+      const std::string host = who.address().to_string();
+      return (who.address().is_v6() ? '[' + host + ']' : host) + ':' + std::to_string(who.port());
     }
 
     Result<void> write(std::string_view bytes) {

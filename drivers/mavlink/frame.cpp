@@ -83,8 +83,8 @@ std::vector<std::uint8_t> Packer::pack(const Message& message) {
 }
 
 void Framer::require_signature(const Secret& secret, std::uint64_t now) {
-  secret_ = secret;
-  now_ = now;
+  book_ = std::make_shared<SignatureBook>(secret);
+  book_->set_time(now);
 }
 
 void Framer::feed(std::span<const std::uint8_t> bytes, std::vector<Received>& out) {
@@ -132,12 +132,12 @@ std::size_t Framer::take(std::span<const std::uint8_t> bytes, std::vector<Receiv
     return 1;
   }
   const Address from = v2 ? Address{bytes[5], bytes[6]} : Address{bytes[3], bytes[4]};
-  if (secret_) {
+  if (book_) {
     if (!is_signed) {
       ++counters_.unsigned_refused;
       return whole;
     }
-    if (!signature_is_good(bytes.first(whole))) {
+    if (!book_->accepts(bytes.first(whole))) {
       ++counters_.bad_signature;
       return whole;
     }
@@ -145,26 +145,28 @@ std::size_t Framer::take(std::span<const std::uint8_t> bytes, std::vector<Receiv
   const std::uint8_t sequence = v2 ? bytes[4] : bytes[2];
   count_sequence(from, sequence);
   ++counters_.received;
-  out.push_back({from, sequence, v2 ? 2 : 1, is_signed && secret_.has_value(),
+  out.push_back({from, sequence, v2 ? 2 : 1, is_signed && book_ != nullptr,
                  Message(*info, bytes.subspan(head, length))});
   return whole;
 }
 
-bool Framer::signature_is_good(std::span<const std::uint8_t> frame) {
+bool SignatureBook::accepts(std::span<const std::uint8_t> frame) {
   const auto signature = frame.last(k_signature);
-  const auto wanted = signature_of(*secret_, frame.first(frame.size() - 6));
+  const auto wanted = signature_of(secret_, frame.first(frame.size() - 6));
   if (!std::equal(wanted.begin(), wanted.end(), signature.begin() + 7)) return false;
   constexpr std::uint64_t k_minute = 6'000'000;  // 10 us units
   const std::uint64_t time = time_of(signature);
   const std::pair<Address, std::uint8_t> stream{{frame[5], frame[6]}, signature[0]};
-  const auto known = newest_.find(stream);
-  if (known == newest_.end()) {
-    if (time + k_minute < now_ || newest_.size() >= k_max_senders) return false;
-    newest_[stream] = time;
-    return true;
+  const auto known = streams_.find(stream);
+  if (known == streams_.end()) {
+    if (time + k_minute < now_ || streams_.size() >= k_max_senders) return false;
+    streams_[stream] = time;
+  } else if (time <= known->second) {
+    return false;  // a replay
+  } else {
+    known->second = time;
   }
-  if (time <= known->second) return false;  // a replay
-  known->second = time;
+  newest_ = std::max(newest_, time);
   return true;
 }
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -51,6 +52,23 @@ class Packer {
   std::uint64_t timestamp_{0};
 };
 
+/// Who signed what last: the time stamp must grow per sender and link, and a sender that is new may be at most
+/// one minute behind. Shared by framers that read pieces of one link.
+class SignatureBook {
+ public:
+  explicit SignatureBook(const Secret& secret) : secret_(secret) {}
+  void set_time(std::uint64_t now) { now_ = now; }
+  /// Enters the frame's time stamp when its signature is good.
+  bool accepts(std::span<const std::uint8_t> frame);
+  /// The newest time stamp accepted: ours must not be behind it.
+  std::uint64_t newest() const { return newest_; }
+
+ private:
+  Secret secret_;
+  std::uint64_t now_{0}, newest_{0};
+  std::map<std::pair<Address, std::uint8_t>, std::uint64_t> streams_;  ///< time stamp per sender and link
+};
+
 /// Finds frames in a byte stream, v1 and v2. Pure: bytes in, messages out.
 ///
 /// A wrong sum, an unknown flag or a bad signature costs one byte, not the stream: the search goes on behind
@@ -66,21 +84,25 @@ class Framer {
   /// From now on only frames with this signature count; the time stamp must grow per sender and link. A new
   /// sender may be at most one minute older than `now` (10 us units).
   void require_signature(const Secret& secret, std::uint64_t now);
-  void set_time(std::uint64_t now) { now_ = now; }
+  void require_signature(std::shared_ptr<SignatureBook> book) { book_ = std::move(book); }
+  void set_time(std::uint64_t now) {
+    if (book_) book_->set_time(now);
+  }
+  /// 10 us units; 0 without signatures.
+  std::uint64_t newest_signature() const { return book_ ? book_->newest() : 0; }
+  /// A datagram has ended: what is left of it never becomes a frame.
+  void drop_partial() { buffer_.clear(); }
 
   void feed(std::span<const std::uint8_t> bytes, std::vector<Received>& out);
   const Counters& counters() const { return counters_; }
 
  private:
   std::size_t take(std::span<const std::uint8_t> bytes, std::vector<Received>& out, bool& waits);
-  bool signature_is_good(std::span<const std::uint8_t> frame);
   void count_sequence(Address from, std::uint8_t sequence);
 
   std::vector<std::uint8_t> buffer_;
   Counters counters_;
-  std::optional<Secret> secret_;
-  std::uint64_t now_{0};
-  std::map<std::pair<Address, std::uint8_t>, std::uint64_t> newest_;  ///< time stamp per sender and link
+  std::shared_ptr<SignatureBook> book_;
   std::map<Address, std::uint8_t> sequences_;
 };
 

@@ -12,6 +12,8 @@
 
 #include "api/application.hpp"
 #include "api/live/hub.hpp"
+#include "drivers/drone/signing_key.hpp"
+#include "drivers/link/address.hpp"
 #include "server/app/front_door.hpp"
 #include "server/app/metrics.hpp"
 #include "server/flight/drone_link.hpp"
@@ -106,6 +108,7 @@ struct App::State {
 
   Result<void> first_token();
   Result<void> open_devices();
+  Result<void> open_drone();
   void resume_recording();
   void compose();
   Result<void> listen();
@@ -186,6 +189,31 @@ Result<void> App::State::open_devices() {
   options.from_config = config.list("devices");
   options.log = [](const std::string& text) { log(LogLevel::info, "device", {{"what", text}}); };
   BOOST_OUTCOME_TRY(devices, DeviceManager::open(std::move(options)));
+  return boost::outcome_v2::success();
+}
+
+/// Whoever can reach the aircraft's link can fly it, unless frames are signed.
+Result<void> App::State::open_drone() {
+  const auto& address = config.text("drone.address");
+  if (address.empty()) return boost::outcome_v2::success();
+  std::optional<mavlink::Secret> key;
+  if (const auto& file = config.text("drone.signing_key_file"); !file.empty()) {
+    auto read = drone::read_signing_key(file);
+    if (!read) return make_error(read.error().code, "drone.signing_key_file: " + read.error().message);
+    key = read.value();
+  }
+  auto where = link::parse_address(address);
+  if (!where) return make_error(where.error().code, "drone.address: " + where.error().message);
+  if (link::others_may_reach(where.value()) && !key && !config.flag("insecure")) {
+    return make_error(Errc::invalid_argument,
+                      "drone.address " + address +
+                          " can be reached by others, who could fly the aircraft; give "
+                          "--drone-signing-key-file (MAVLink 2 signing), or say --insecure");
+  }
+  auto opened = flight::DroneLink::open(
+      address, [](std::string_view what) { log(LogLevel::warning, "drone", {{"what", what}}); }, key);
+  if (!opened) return make_error(opened.error().code, "drone.address: " + opened.error().message);
+  drone = std::move(opened).value();
   return boost::outcome_v2::success();
 }
 
@@ -273,13 +301,7 @@ Result<std::unique_ptr<App>> App::start(const Config& config) {
   BOOST_OUTCOME_TRYV(s.access->load());
   BOOST_OUTCOME_TRYV(s.first_token());
   BOOST_OUTCOME_TRYV(s.open_devices());
-  if (const auto& address = s.config.text("drone.address"); !address.empty()) {
-    auto drone = flight::DroneLink::open(address, [](std::string_view what) {
-      log(LogLevel::warning, "drone", {{"what", what}});
-    });
-    if (!drone) return make_error(drone.error().code, "drone.address: " + drone.error().message);
-    s.drone = std::move(drone).value();
-  }
+  BOOST_OUTCOME_TRYV(s.open_drone());
   s.compose();
   auto app = std::unique_ptr<App>(new App(std::move(state)));
   BOOST_OUTCOME_TRYV(app->state_->listen());

@@ -39,6 +39,8 @@ constexpr std::array k_options = {
     Option{"drone.address", "",
            "where the autopilot speaks MAVLink, like udp://:14550, tcp://127.0.0.1:5760 or "
            "serial:/dev/ttyACM0; empty: flown by hand"},
+    Option{"drone.signing_key_file", "",
+           "file (mode 0600) with the key of MAVLink 2 signing; frames without its signature are refused"},
     Option{"http.io_threads", "1", "threads of the sockets", count},
     Option{"http.workers", "4", "threads that run handlers", count},
     Option{"http.queue", "256", "requests that may wait for a handler; beyond: 503", count},

@@ -6,6 +6,7 @@
 #include <mutex>
 #include <thread>
 
+#include "drivers/drone/peer_gate.hpp"
 #include "drivers/drone/session.hpp"
 #include "drivers/link/byte_link.hpp"
 
@@ -21,8 +22,20 @@ double seconds(const link::Arrival& at) { return static_cast<double>(at.steady_n
 }  // namespace
 
 struct DroneLink::Impl {
-  Impl(link::Address where, std::function<void(std::string_view)> tell)
-      : address(std::move(where)), log(std::move(tell)), timer(io) {}
+  Impl(link::Address where, std::function<void(std::string_view)> tell,
+       const std::optional<mavlink::Secret>& key)
+      : address(std::move(where)),
+        log(std::move(tell)),
+        timer(io),
+        gate(key),
+        session(options_with(key)),
+        is_signed(key.has_value()) {}
+
+  static drone::SessionOptions options_with(const std::optional<mavlink::Secret>& key) {
+    drone::SessionOptions out;
+    out.secret = key;
+    return out;
+  }
 
   void run() {
     open();
@@ -30,12 +43,34 @@ struct DroneLink::Impl {
     io.run();
   }
 
+  static std::span<const std::uint8_t> bytes_of(std::string_view in) {
+    return {reinterpret_cast<const std::uint8_t*>(in.data()), in.size()};
+  }
+
+  /// Told once, who it is and who it is no longer.
+  bool admits(std::string_view in, const std::string& sender, const link::Arrival& at) {
+    std::string told;
+    bool admitted = false;
+    {
+      const std::scoped_lock lock(mutex);
+      const auto before = gate.peer();
+      admitted = gate.admits(seconds(at), at.utc.us(), sender, bytes_of(in));
+      if (gate.peer() != before && !sender.empty()) told = "the aircraft on the link is at " + sender;
+    }
+    if (log && !told.empty()) log(told);
+    return admitted;
+  }
+
   void open() {
     bytes = link::make_link(io, address);
     link::LinkHandlers handlers;
+    handlers.welcome = [this](std::string_view in, const std::string& sender, const link::Arrival& at) {
+      return admits(in, sender, at);
+    };
     handlers.on_bytes = [this](std::string_view in, const link::Arrival& at) {
+      if (address.kind != link::Kind::udp && !admits(in, "", at)) return;
       const std::scoped_lock lock(mutex);
-      session.feed(seconds(at), at.utc.us(), {reinterpret_cast<const std::uint8_t*>(in.data()), in.size()});
+      session.feed(seconds(at), at.utc.us(), bytes_of(in));
     };
     handlers.on_closed = [this](const Error& why) {
       if (log && why.message != last_trouble) log("aircraft: " + why.message);
@@ -91,14 +126,17 @@ struct DroneLink::Impl {
   int closed_for{0};  ///< rounds since the link was lost; 0: it is open or opening
   std::string last_trouble;
   mutable std::mutex mutex;
+  drone::PeerGate gate;
   drone::Session session;
+  bool is_signed{false};
   std::thread thread;
 };
 
 Result<std::unique_ptr<DroneLink>> DroneLink::open(const std::string& address,
-                                                   std::function<void(std::string_view)> log) {
+                                                   std::function<void(std::string_view)> log,
+                                                   const std::optional<mavlink::Secret>& key) {
   BOOST_OUTCOME_TRY(auto where, link::parse_address(address));
-  auto impl = std::make_unique<Impl>(std::move(where), std::move(log));
+  auto impl = std::make_unique<Impl>(std::move(where), std::move(log), key);
   auto* running = impl.get();
   impl->thread = std::thread([running] { running->run(); });
   return std::unique_ptr<DroneLink>(new DroneLink(std::move(impl)));
@@ -137,9 +175,19 @@ void DroneLink::take_back() {
   const std::scoped_lock lock(impl_->mutex);
   impl_->session.take_back();
 }
+void DroneLink::change_peer(const std::string& sender) {
+  const std::scoped_lock lock(impl_->mutex);
+  impl_->gate.change(sender);
+  impl_->session.forget_vehicle();
+}
 DroneStatus DroneLink::status() const {
   const std::scoped_lock lock(impl_->mutex);
-  return impl_->session.status();
+  DroneStatus out = impl_->session.status();
+  out.peer = impl_->gate.peer().value_or("");
+  out.link_signed = impl_->is_signed;
+  out.frames_refused = impl_->gate.frames_refused();
+  out.others = impl_->gate.others(seconds(link::arrival_now()));
+  return out;
 }
 std::vector<CommandReport> DroneLink::take_reports() {
   const std::scoped_lock lock(impl_->mutex);

@@ -2,11 +2,13 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
 #include "core/base/result.hpp"
 #include "core/ports/drone.hpp"
+#include "drivers/mavlink/frame.hpp"
 
 namespace anchord::flight {
 
@@ -14,9 +16,11 @@ namespace anchord::flight {
 /// on a thread of its own. A lost link is opened again each second. Thread-safe.
 class DroneLink final : public Drone {
  public:
-  /// `log`: one line for the operator's log. errors  invalid_argument: the address
+  /// `log`: one line for the operator's log. `key`: of MAVLink 2 signing; frames without it are refused.
+  /// errors  invalid_argument: the address
   static Result<std::unique_ptr<DroneLink>> open(const std::string& address,
-                                                 std::function<void(std::string_view)> log);
+                                                 std::function<void(std::string_view)> log,
+                                                 const std::optional<mavlink::Secret>& key = {});
   ~DroneLink() override;
 
   std::uint64_t take_off(double height_m) override;
@@ -28,6 +32,7 @@ class DroneLink final : public Drone {
   std::uint64_t upload_route(const std::vector<RoutePoint>& route) override;
   std::uint64_t upload_fence(const DroneFence& fence) override;
   void take_back() override;
+  void change_peer(const std::string& sender) override;
   DroneStatus status() const override;
   std::vector<CommandReport> take_reports() override;
 

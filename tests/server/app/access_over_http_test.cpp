@@ -275,6 +275,12 @@ TEST(Listening, NeedsInsecureBeyondLoopback) {
   EXPECT_FALSE(plain.app);
   AppFixture insecure(Settings{{"listen", "0.0.0.0:0"}, {"insecure", "true"}});
   EXPECT_TRUE(insecure.app) << insecure.error.message;
+  AppFixture aircraft(Settings{{"drone.address", "udp://0.0.0.0:0"}});
+  EXPECT_FALSE(aircraft.app) << "whoever reaches the link flies the aircraft";
+  EXPECT_NE(aircraft.error.message.find("--drone-signing-key-file"), std::string::npos)
+      << aircraft.error.message;
+  AppFixture known(Settings{{"drone.address", "udp://0.0.0.0:0"}, {"insecure", "true"}});
+  EXPECT_TRUE(known.app) << known.error.message;
 }
 
 TEST(AuthOff, StillRefusesForeignPagesAndPlainForms) {

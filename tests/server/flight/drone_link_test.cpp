@@ -3,9 +3,12 @@
 // what the flights of tests/e2e fly by.
 #include "server/flight/drone_link.hpp"
 
+#include <arpa/inet.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <filesystem>
@@ -131,6 +134,67 @@ void fly(const std::string& address, Aircraft& aircraft) {
   EXPECT_TRUE(until([&] { return link.status().connected; }, 20));
   accepted(link.land());
   EXPECT_TRUE(until([&] { return !link.status().armed; }, 30));
+}
+
+/// An autopilot that says who it is from a UDP socket of its own.
+class Sender {
+ public:
+  explicit Sender(std::uint16_t to, std::uint8_t system)
+      : socket_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)), packer_({system, 1}) {
+    to_.sin_family = AF_INET;
+    to_.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    to_.sin_port = htons(to);
+  }
+  ~Sender() { ::close(socket_); }
+  void beat() {
+    const auto frame =
+        packer_.pack(mavlink::Message("HEARTBEAT").set("type", 2).set("autopilot", 3).set("custom_mode", 4));
+    (void)::sendto(socket_, frame.data(), frame.size(), 0, reinterpret_cast<const sockaddr*>(&to_), sizeof to_);
+  }
+  /// Frames of the server that came here.
+  std::size_t heard() {
+    std::array<char, 2048> buffer{};
+    while (::recv(socket_, buffer.data(), buffer.size(), 0) > 0) ++n_;
+    return n_;
+  }
+
+ private:
+  int socket_;
+  sockaddr_in to_{};
+  mavlink::Packer packer_;
+  std::size_t n_{0};
+};
+
+std::uint16_t free_port() {
+  const int probe = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  sockaddr_in at{};
+  at.sin_family = AF_INET;
+  at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof at;
+  EXPECT_EQ(::bind(probe, reinterpret_cast<sockaddr*>(&at), size), 0);
+  ::getsockname(probe, reinterpret_cast<sockaddr*>(&at), &size);
+  ::close(probe);
+  return ntohs(at.sin_port);
+}
+
+TEST(DroneLink, ADatagramOfAStrangerTakesNothingOverUdp) {
+  const auto port = free_port();
+  auto opened = DroneLink::open("udp://:" + std::to_string(port), {});
+  ASSERT_TRUE(opened) << opened.error().message;
+  auto& link = *opened.value();
+  Sender aircraft(port, 1), stranger(port, 1);
+  ASSERT_TRUE(until([&] { return aircraft.beat(), link.status().connected && aircraft.heard() > 0; }, 10));
+  const auto peer = link.status().peer;
+  EXPECT_FALSE(peer.empty());
+  ASSERT_TRUE(until([&] { return stranger.beat(), !link.status().others.empty(); }, 10));
+  EXPECT_EQ(link.status().others.front().kind, "autopilot");
+  const auto before = aircraft.heard();
+  (void)link.land();
+  ASSERT_TRUE(until([&] { return aircraft.heard() > before; }, 10)) << "the command goes to the aircraft";
+  EXPECT_EQ(stranger.heard(), 0u);
+  EXPECT_EQ(link.status().peer, peer);
+  link.change_peer(link.status().others.front().sender);
+  ASSERT_TRUE(until([&] { return stranger.beat(), stranger.heard() > 0; }, 10)) << "a person changed it";
 }
 
 TEST(DroneLink, FliesTheAircraftOverTcpAndComesBackAfterALoss) {

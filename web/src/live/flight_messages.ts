@@ -9,7 +9,8 @@ export type CommandState = 'sent' | 'accepted' | 'refused' | 'unconfirmed';
 export interface Spot { readonly lon: number; readonly lat: number; readonly height_m: number | null; readonly plan_m: Vec3 | null }
 export interface CommandMsg { readonly number: number; readonly action: string; readonly state: CommandState; readonly text: string; readonly by: string; readonly t_us: number }
 export interface AnchorTask { readonly anchor: string; readonly done: boolean; readonly why: string; readonly iterations: number }
-export interface DroneMsg { readonly connected: boolean; readonly silent_s: number | null; readonly gps_fix: number | null; readonly mode: string; readonly armed: boolean; readonly in_air: boolean; readonly taken_over: boolean; readonly failsafe: boolean; readonly battery: number | null; readonly above_home_m: number | null; readonly text: string; readonly autopilot: string }
+export interface DroneMsg { readonly connected: boolean; readonly silent_s: number | null; readonly gps_fix: number | null; readonly mode: string; readonly armed: boolean; readonly in_air: boolean; readonly taken_over: boolean; readonly failsafe: boolean; readonly battery: number | null; readonly above_home_m: number | null; readonly text: string; readonly autopilot: string; readonly peer: string; readonly link_signed: boolean; readonly frames_refused: number; readonly others: readonly OtherOnLink[] }
+export interface OtherOnLink { readonly sender: string; readonly system: number; readonly component: number; readonly kind: string; readonly frames: number; readonly silent_s: number | null }
 export interface ControlMsg { readonly holder: string; readonly since_us: number; readonly expires_us: number }
 export interface ProcedureMsg {
   readonly mission: string; readonly t_us: number; readonly plan: string | null; readonly plan_name: string; readonly plan_revision: number; readonly mode: 'auto' | 'manual'; readonly status: FlightStatus; readonly step: Step; readonly reason: string;
@@ -35,7 +36,8 @@ function spot(o: Record<string, unknown> | null): Spot | null {
 
 export function drone(v: unknown): DroneMsg | null {
   const d = obj(v);
-  return d && { connected: d.connected === true, silent_s: num(d.silent_s), mode: str(d.mode), armed: d.armed === true, in_air: d.in_air === true, taken_over: d.taken_over === true, failsafe: d.failsafe === true, battery: num(d.battery), above_home_m: num(d.above_home_m), text: str(d.text), autopilot: str(d.autopilot), gps_fix: num(d.gps_fix) };
+  return d && { connected: d.connected === true, silent_s: num(d.silent_s), mode: str(d.mode), armed: d.armed === true, in_air: d.in_air === true, taken_over: d.taken_over === true, failsafe: d.failsafe === true, battery: num(d.battery), above_home_m: num(d.above_home_m), text: str(d.text), autopilot: str(d.autopilot), gps_fix: num(d.gps_fix),
+    peer: str(d.peer), link_signed: d.link_signed === true, frames_refused: count(d.frames_refused), others: list(d.others).map((o) => ({ sender: str(o.sender), system: count(o.system), component: count(o.component), kind: str(o.kind), frames: count(o.frames), silent_s: num(o.silent_s) })) };
 }
 export function procedure(v: unknown): ProcedureMsg | null {
   const o = obj(v);

@@ -1,0 +1,109 @@
+#include "drivers/drone/peer_gate.hpp"
+
+#include <algorithm>
+
+namespace anchord::drone {
+namespace {
+
+constexpr double k_silent_s = 10;     ///< the heartbeat comes each second
+constexpr std::size_t k_others = 32;  ///< of a hostile network; the longest silent one is forgotten
+
+bool is_autopilot(const mavlink::Message& m) {
+  // MAV_AUTOPILOT_INVALID (8) and MAV_TYPE_GCS (6) are stations, cameras, gimbals.
+  return m.is("HEARTBEAT") && m.integer("autopilot") != 8 && m.integer("type") != 6;
+}
+
+std::string kind_of(const mavlink::Message& m) {
+  if (is_autopilot(m)) return "autopilot";
+  return m.is("HEARTBEAT") && m.integer("type") == 6 ? "ground station" : "other";
+}
+
+}  // namespace
+
+PeerGate::PeerGate(const std::optional<mavlink::Secret>& secret) {
+  if (!secret) return;
+  book_ = std::make_shared<mavlink::SignatureBook>(*secret);
+  stranger_.require_signature(book_);
+  stream_.require_signature(book_);
+}
+
+void PeerGate::change(const std::string& sender) {
+  peer_.reset();
+  vehicle_ = {0, 0};
+  armed_ = false;
+  wanted_ = sender.empty() ? std::nullopt : std::optional(sender);
+}
+
+void PeerGate::note(const std::string& sender, mavlink::Address from, const std::string& kind, double now_s) {
+  auto& seen = others_[{sender, from.system, from.component}];
+  if (seen.frames == 0 || kind != "other") seen.kind = kind;
+  ++seen.frames;
+  seen.last_s = now_s;
+  if (others_.size() <= k_others) return;
+  others_.erase(std::min_element(others_.begin(), others_.end(), [](const auto& a, const auto& b) {
+    return a.second.last_s < b.second.last_s;
+  }));
+}
+
+/// The frames in it; what was refused is counted, and noted with its sender.
+std::vector<mavlink::Received> PeerGate::read(mavlink::Framer& framer, const std::string& sender, double now_s,
+                                              std::span<const std::uint8_t> bytes) {
+  const auto refused = [&] { return framer.counters().unsigned_refused + framer.counters().bad_signature; };
+  const auto before = refused();
+  std::vector<mavlink::Received> in;
+  framer.feed(bytes, in);
+  if (const auto n = refused() - before; n > 0) {
+    refused_ += n;
+    note(sender, {0, 0}, "unsigned", now_s);
+  }
+  return in;
+}
+
+bool PeerGate::may_take(const mavlink::Received& heartbeat, const std::string& sender, double now_s) const {
+  if (!is_autopilot(heartbeat.message) || (wanted_ && *wanted_ != sender)) return false;
+  if (!peer_) return true;
+  if (now_s - heard_s_ <= k_silent_s) return false;
+  return !armed_ || heartbeat.from == vehicle_;
+}
+
+bool PeerGate::admits(double now_s, std::int64_t unix_us, const std::string& sender,
+                      std::span<const std::uint8_t> bytes) {
+  if (book_) book_->set_time(mavlink::signature_time(unix_us));
+  const bool of_peer = peer_ && *peer_ == sender;
+  auto& framer = of_peer ? stream_ : stranger_;
+  const auto in = read(framer, sender, now_s, bytes);
+  if (!sender.empty()) stranger_.drop_partial();
+  bool taken = of_peer;
+  for (const auto& one : in) {
+    const bool heartbeat = is_autopilot(one.message);
+    const bool is_vehicle = of_peer && one.from == vehicle_;
+    if (!is_vehicle && may_take(one, sender, now_s)) {
+      peer_ = sender;
+      wanted_.reset();
+      vehicle_ = one.from;
+      stream_.drop_partial();
+      others_.erase({sender, one.from.system, one.from.component});
+      taken = true;
+    }
+    if (taken && one.from == vehicle_) {
+      if (!heartbeat) continue;
+      heard_s_ = now_s;
+      armed_ = (one.message.integer("base_mode") & 0x80) != 0;
+    } else {
+      note(sender, one.from, kind_of(one.message), now_s);
+    }
+  }
+  if (in.empty() && !taken && !book_) note(sender, {0, 0}, "no MAVLink", now_s);
+  return taken;
+}
+
+std::vector<OtherOnLink> PeerGate::others(double now_s) const {
+  std::vector<OtherOnLink> out;
+  for (const auto& [who, seen] : others_) {
+    const auto& [sender, system, component] = who;
+    out.push_back({sender, system, component, seen.kind, seen.frames, std::max(0.0, now_s - seen.last_s)});
+  }
+  return out;
+}
+
+}  // namespace anchord::drone

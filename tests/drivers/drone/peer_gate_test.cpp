@@ -1,0 +1,140 @@
+// Who on the aircraft's link is the aircraft: taken once, kept, counted against strangers; with a key only
+// signed frames count.
+#include "drivers/drone/peer_gate.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "drivers/drone/signing_key.hpp"
+
+namespace anchord::drone {
+namespace {
+
+using mavlink::Address;
+using mavlink::Message;
+using mavlink::Packer;
+
+constexpr std::int64_t k_unix_us = 1'777'888'800'000'000;
+const std::string k_aircraft = "192.0.2.10:14550", k_stranger = "192.0.2.66:4000";
+
+Message heartbeat(bool armed = false) {
+  return Message("HEARTBEAT").set("type", 2).set("autopilot", 3).set("base_mode", armed ? 0x89 : 0x09);
+}
+
+struct Link {
+  explicit Link(std::optional<mavlink::Secret> key = {}) : gate(key) {}
+  bool hear(const std::string& sender, const std::vector<std::uint8_t>& bytes) {
+    return gate.admits(now, k_unix_us + static_cast<std::int64_t>(now * 1e6), sender, bytes);
+  }
+  PeerGate gate;
+  double now{0};
+};
+
+TEST(PeerGate, TakesTheFirstAutopilotAndKeepsItAgainstStrangers) {
+  Link link;
+  Packer copter({1, 1}), other({1, 1}), station({255, 190});
+  EXPECT_FALSE(link.hear(k_stranger, {'h', 'e', 'l', 'l', 'o'})) << "no MAVLink is no aircraft";
+  EXPECT_FALSE(link.hear(k_stranger, station.pack(Message("HEARTBEAT").set("type", 6).set("autopilot", 8))));
+  EXPECT_FALSE(link.hear(k_aircraft, copter.pack(Message("SYS_STATUS")))) << "not before its heartbeat";
+  EXPECT_TRUE(link.hear(k_aircraft, copter.pack(heartbeat())));
+  EXPECT_EQ(link.gate.peer(), k_aircraft);
+  for (int i = 0; i < 50; ++i) {
+    link.now += 1;
+    EXPECT_FALSE(link.hear(k_stranger, other.pack(heartbeat()))) << "one datagram took the aircraft before";
+    EXPECT_TRUE(link.hear(k_aircraft, copter.pack(heartbeat())));
+  }
+  EXPECT_EQ(link.gate.peer(), k_aircraft);
+  std::uint64_t counted = 0;
+  for (const auto& one : link.gate.others(link.now)) {
+    EXPECT_EQ(one.sender == k_stranger || one.system == 1, true);
+    if (one.sender == k_stranger && one.kind == "autopilot") counted = one.frames;
+  }
+  EXPECT_EQ(counted, 50u);
+}
+
+TEST(PeerGate, AnotherIsTakenAfterTenSecondsOfSilenceOnly) {
+  Link link;
+  Packer copter({1, 1}), other({2, 1});
+  ASSERT_TRUE(link.hear(k_aircraft, copter.pack(heartbeat())));
+  link.now = 9.9;
+  EXPECT_FALSE(link.hear(k_stranger, other.pack(heartbeat())));
+  link.now = 10.1;
+  EXPECT_TRUE(link.hear(k_stranger, other.pack(heartbeat())));
+  EXPECT_EQ(link.gate.peer(), k_stranger);
+}
+
+TEST(PeerGate, AnAircraftThatWasArmedIsFollowedByItsOwnSystemIdAlone) {
+  Link link;
+  Packer copter({1, 1}), other({2, 1});
+  ASSERT_TRUE(link.hear(k_aircraft, copter.pack(heartbeat(true))));
+  link.now = 30;
+  EXPECT_FALSE(link.hear(k_stranger, other.pack(heartbeat())));
+  EXPECT_TRUE(link.hear("192.0.2.10:50001", copter.pack(heartbeat(true)))) << "its radio has a new port";
+}
+
+TEST(PeerGate, APersonChangesIt) {
+  Link link;
+  Packer copter({1, 1}), other({2, 1}), third({3, 1});
+  ASSERT_TRUE(link.hear(k_aircraft, copter.pack(heartbeat(true))));
+  link.gate.change(k_stranger);
+  EXPECT_FALSE(link.hear(k_aircraft, copter.pack(heartbeat(true))));
+  EXPECT_FALSE(link.hear("192.0.2.7:1", third.pack(heartbeat())));
+  EXPECT_TRUE(link.hear(k_stranger, other.pack(heartbeat())));
+  link.gate.change("");
+  EXPECT_TRUE(link.hear("192.0.2.7:1", third.pack(heartbeat()))) << "the next that is heard";
+}
+
+TEST(PeerGate, ThousandsOfStrangersAreAHandfulOfRows) {
+  Link link;
+  for (int i = 0; i < 5000; ++i) link.hear("192.0.2.1:" + std::to_string(i), {'x'});
+  EXPECT_LE(link.gate.others(0).size(), 32u);
+}
+
+TEST(PeerGate, WithAKeyOnlySignedFramesTakeTheLinkAndAReplayDoesNot) {
+  mavlink::Secret key{};
+  key.fill(9);
+  Link link(key);
+  const auto stamp = mavlink::signature_time(k_unix_us);
+  Packer copter({1, 1}), forger({1, 1}), other({1, 1});
+  EXPECT_FALSE(link.hear(k_stranger, forger.pack(heartbeat())));
+  mavlink::Secret wrong{};
+  other.sign_with(wrong, 0, stamp);
+  EXPECT_FALSE(link.hear(k_stranger, other.pack(heartbeat())));
+  EXPECT_EQ(link.gate.frames_refused(), 2u);
+  copter.sign_with(key, 0, stamp);
+  const auto first = copter.pack(heartbeat());
+  EXPECT_TRUE(link.hear(k_aircraft, first));
+  link.now = 30;
+  EXPECT_FALSE(link.hear(k_stranger, first)) << "recorded and sent again";
+  link.now = 31;
+  copter.set_time(stamp + 3'100'000);
+  EXPECT_TRUE(link.hear("192.0.2.10:50001", copter.pack(heartbeat())));
+  EXPECT_EQ(link.gate.others(link.now).front().kind, "unsigned");
+}
+
+TEST(SigningKey, IsHexadecimalOrRawAndItsFileIsTheOwnersAlone) {
+  const std::string hex = "000102030405060708090A0B0c0d0e0f101112131415161718191a1b1c1d1e1f";
+  const auto key = parse_signing_key(hex + "\n");
+  ASSERT_TRUE(key) << key.error().message;
+  EXPECT_EQ(key.value()[31], 0x1f);
+  EXPECT_TRUE(parse_signing_key(std::string(32, '\xff')));
+  EXPECT_FALSE(parse_signing_key("secret"));
+  EXPECT_FALSE(parse_signing_key(std::string(64, 'g')));
+  const std::string file = testing::TempDir() + "/anchord-signing-key-" + std::to_string(::getpid());
+  std::ofstream(file) << hex << '\n';
+  ::chmod(file.c_str(), 0644);
+  const auto open = read_signing_key(file);
+  ASSERT_FALSE(open);
+  EXPECT_NE(open.error().message.find("0600"), std::string::npos) << open.error().message;
+  EXPECT_EQ(open.error().message.find("0001"), std::string::npos) << "never the key itself";
+  ::chmod(file.c_str(), 0600);
+  EXPECT_TRUE(read_signing_key(file));
+  ::unlink(file.c_str());
+  EXPECT_FALSE(read_signing_key(file));
+}
+
+}  // namespace
+}  // namespace anchord::drone
