@@ -21,6 +21,8 @@
 #include "api/services/flight_service.hpp"
 #include "api/services/geo_service.hpp"
 #include "api/services/kit_profiles.hpp"
+#include "core/base/text.hpp"
+#include "core/base/to_wire.hpp"
 #include "core/ports/backups.hpp"
 #include "core/ports/devices.hpp"
 #include "core/ports/plan_store.hpp"
@@ -152,7 +154,7 @@ std::string Application::State::device_rows() {
   std::string out;
   if (deps.devices == nullptr) return out;
   for (const auto& device : deps.devices->devices()) {
-    out += (out.empty() ? "" : ",") + device_row_json(device).dump();
+    out += (out.empty() ? "" : ",") + to_wire(device_row_json(device));
   }
   return out;
 }

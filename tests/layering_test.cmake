@@ -1,6 +1,7 @@
 # The dependency rule of the house as a test: who may include what, read off every #include of the product.
 #   cmake -DROOT=<project> -P tests/layering_test.cmake                checks the project
 #   cmake -DSELF_TEST=<scratch dir> -P tests/layering_test.cmake       checks that a broken rule is found
+# And what only one file may do, for everybody: the table `single` below.
 cmake_minimum_required(VERSION 3.25)
 
 # One row a folder, the deepest first:
@@ -37,7 +38,13 @@ set(migrations_own "^(migrations/|core/base/)")
 set(migrations_header "^$")
 set(migrations_source "^$")
 
-# violations_of(ROOT OUT): one line per broken include.
+# What is done in one place: a regular expression on lines, the files that may, and why nobody else.
+set(single dump)
+set(dump_line "(\\.|->)dump\\(")
+set(dump_files "^core/base/to_wire\\.hpp$")
+set(dump_why "JSON is written by to_wire (core/base/to_wire.hpp): a bare dump() throws on bytes that are not UTF-8")
+
+# violations_of(ROOT OUT): one line per broken rule.
 function(violations_of root out)
   set(found "")
   set(count 0)
@@ -49,6 +56,14 @@ function(violations_of root out)
         if(file MATCHES "^${candidate}/")
           set(folder ${candidate})
           break()
+        endif()
+      endforeach()
+      foreach(rule IN LISTS single)
+        if(NOT file MATCHES "${${rule}_files}")
+          file(STRINGS "${root}/${file}" lines REGEX "${${rule}_line}")
+          if(lines)
+            list(APPEND found "${file}: ${${rule}_why}")
+          endif()
         endif()
       endforeach()
       file(STRINGS "${root}/${file}" lines REGEX "^[ \t]*#[ \t]*include")
@@ -99,6 +114,18 @@ function(expect file include verdict)
   endif()
 endfunction()
 
+# expect_text(FILE TEXT VERDICT): the same of a line of code.
+function(expect_text file text verdict)
+  file(REMOVE_RECURSE "${SELF_TEST}")
+  file(WRITE "${SELF_TEST}/${file}" "// a file\n${text}\n")
+  violations_of("${SELF_TEST}" broken)
+  if(verdict STREQUAL "clean" AND broken)
+    message(SEND_ERROR "refused wrongly: ${broken}")
+  elseif(verdict STREQUAL "broken" AND NOT broken)
+    message(SEND_ERROR "not noticed: ${file} has ${text}")
+  endif()
+endfunction()
+
 if(SELF_TEST)
   expect(core/a.hpp "\"core/base/ids.hpp\"" clean)
   expect(core/a.cpp "<ceres/ceres.h>" clean)
@@ -126,6 +153,11 @@ if(SELF_TEST)
   expect(server/a.cpp "<sqlite3.h>" broken)
   expect(server/a.hpp "<CLI/CLI.hpp>" broken)
   expect(server/a.cpp "\"drivers/sim/flight.hpp\"" clean)
+  expect_text(api/routes/a.cpp "out = json.dump()" broken)
+  expect_text(api/routes/a.cpp "out = json->dump(-1, ' ', false, Json::error_handler_t::replace)" broken)
+  expect_text(drivers/a.cpp "      .dump(1)" broken)
+  expect_text(core/base/to_wire.hpp "return json.dump(indent)" clean)
+  expect_text(server/a.cpp "out = to_wire(json) + core_dump(1)" clean)
   file(REMOVE_RECURSE "${SELF_TEST}")
   file(MAKE_DIRECTORY "${SELF_TEST}")
   violations_of("${SELF_TEST}" broken)

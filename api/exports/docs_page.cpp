@@ -1,5 +1,6 @@
 #include "api/exports/docs_page.hpp"
 #include "api/exports/report.hpp"
+#include "core/base/to_wire.hpp"
 
 #include <algorithm>
 #include <map>
@@ -36,15 +37,15 @@ std::string type_of(const Ordered& schema) {
   }
   std::string out;
   if (const auto type = schema.find("type"); type != schema.end())
-    out = html_text(type->is_string() ? type->get<std::string>() : type->dump());
+    out = html_text(type->is_string() ? type->get<std::string>() : to_wire(*type));
   if (const auto items = schema.find("items"); items != schema.end()) out += " of " + type_of(*items);
-  if (const auto words = schema.find("enum"); words != schema.end()) out += " " + html_text(words->dump());
-  if (const auto value = schema.find("const"); value != schema.end()) out += " " + html_text(value->dump());
+  if (const auto words = schema.find("enum"); words != schema.end()) out += " " + html_text(to_wire(*words));
+  if (const auto value = schema.find("const"); value != schema.end()) out += " " + html_text(to_wire(*value));
   for (const char* limit : {"format", "minimum", "maximum", "minItems", "maxItems", "maxLength", "default"}) {
     const auto at = schema.find(limit);
     if (at != schema.end())
-      out +=
-          std::string(", ") + limit + " " + html_text(at->is_string() ? at->get<std::string>() : at->dump());
+      out += std::string(", ") + limit + " " +
+             html_text(at->is_string() ? at->get<std::string>() : to_wire(*at));
   }
   return out;
 }
@@ -94,7 +95,7 @@ std::string operation_of(const std::string& method, const std::string& path, con
                     html_text(path) + "</code></h3>\n<p>" + text_of(operation, "summary") + "</p>\n";
   if (const auto more = text_of(operation, "description"); !more.empty()) out += "<p>" + more + "</p>\n";
   if (const auto roles = operation.find("x-roles"); roles != operation.end())
-    out += "<p>Roles: " + html_text(roles->dump()) + "</p>\n";
+    out += "<p>Roles: " + html_text(to_wire(*roles)) + "</p>\n";
   Ordered parameters = shared;
   for (const auto& one : operation.value("parameters", Ordered::array())) parameters.push_back(one);
   out += parameters_of(parameters, document);

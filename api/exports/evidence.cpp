@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/base/to_wire.hpp"
 #include "core/geo/enu.hpp"
 
 namespace anchord {
@@ -162,7 +163,7 @@ FlightEvidence evidence_of(const FlightData& flight, const FlightSolution& solut
 std::string evidence_json(const Evidence& evidence) {
   Json out{{"flights", Json::array()}, {"course", course_json(evidence.course)}};
   for (const auto& flight : evidence.flights) out["flights"].push_back(flight_json(flight));
-  return out.dump();
+  return to_wire(out);
 }
 
 Result<Evidence> parse_evidence(std::string_view text) {

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "core/base/to_wire.hpp"
 #include "core/geo/enu.hpp"
 
 namespace anchord::api {
@@ -56,7 +57,7 @@ std::string flight_plan_json(const planning::FlightPlan& plan, const Wgs84& orig
                                 {"heading_deg", heading_deg(w)},
                                 {"measure", w.measure}});
   }
-  return out.dump(2) + "\n";
+  return to_wire(out, 2) + "\n";
 }
 
 std::string flight_plan_geojson(const planning::FlightPlan& plan, const Wgs84& origin) {
@@ -86,7 +87,7 @@ std::string flight_plan_geojson(const planning::FlightPlan& plan, const Wgs84& o
   Json out;
   out["type"] = "FeatureCollection";
   out["features"] = features;
-  return out.dump(2) + "\n";
+  return to_wire(out, 2) + "\n";
 }
 
 std::string flight_plan_qgc(const planning::FlightPlan& plan, const Wgs84& origin,
@@ -146,7 +147,7 @@ std::string flight_plan_qgc(const planning::FlightPlan& plan, const Wgs84& origi
                     {"hoverSpeed", options.speed_mps},
                     {"plannedHomePosition", home},
                     {"items", items}};
-  return out.dump(2) + "\n";
+  return to_wire(out, 2) + "\n";
 }
 
 }  // namespace anchord::api

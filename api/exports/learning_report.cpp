@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "core/base/to_wire.hpp"
+
 namespace anchord::api {
 namespace {
 
@@ -187,7 +189,7 @@ std::string train_json(const ml::TrainingOutcome& outcome, const RowReport& rows
     out["selection"] = list;
   }
   if (outcome.test) out["test"] = test_json(*outcome.test);
-  return out.dump(2) + "\n";
+  return to_wire(out, 2) + "\n";
 }
 
 std::string train_text(const ml::TrainingOutcome& outcome, const RowReport& rows,
@@ -286,7 +288,7 @@ std::string evaluation_json(const ml::Evaluation& e, const ml::Model& model, con
   }
   out["places"] = places;
   out["data"] = json_of(rows);
-  return out.dump(2) + "\n";
+  return to_wire(out, 2) + "\n";
 }
 
 std::string evaluation_text(const ml::Evaluation& e, const ml::Model& model, const RowReport& rows) {

@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "core/base/to_wire.hpp"
+
 namespace anchord::api {
 namespace {
 
@@ -44,7 +46,7 @@ std::string models_json(const std::vector<NamedModel>& models) {
                    {"metrics", metrics}});
     if (model.classifier) out.back()["threshold"] = model.classifier->threshold;
   }
-  return nlohmann::ordered_json{{"models", out}}.dump(2) + "\n";
+  return to_wire(nlohmann::ordered_json{{"models", out}}, 2) + "\n";
 }
 
 std::string models_text(const std::vector<NamedModel>& models) {

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/base/to_wire.hpp"
 #include "core/planning/local_plan.hpp"
 
 namespace anchord::api {
@@ -90,7 +91,7 @@ Result<std::string> plan_qgc(const Plan& plan) {
                     {"hoverSpeed", plan.settings.speed_mps},
                     {"plannedHomePosition", {home.lat_deg, home.lon_deg, 0}},
                     {"items", items.take()}};
-  return out.dump(2) + "\n";
+  return to_wire(out, 2) + "\n";
 }
 
 Result<std::string> plan_geojson(const Plan& plan) {
@@ -120,7 +121,7 @@ Result<std::string> plan_geojson(const Plan& plan) {
   Json out;
   out["type"] = "FeatureCollection";
   out["features"] = std::move(features);
-  return out.dump(2) + "\n";
+  return to_wire(out, 2) + "\n";
 }
 
 }  // namespace anchord::api

@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "core/base/to_wire.hpp"
+
 namespace anchord::api {
 namespace {
 
@@ -65,7 +67,7 @@ std::string decision_json(const planning::Decision& decision, const PlanRequest&
   out["reason"] = decision.reason;
   out["candidates"] = Json::array();
   for (const auto& c : decision.candidates) out["candidates"].push_back(candidate_json(c, request));
-  return out.dump(2) + "\n";
+  return to_wire(out, 2) + "\n";
 }
 
 std::string decision_text(const planning::Decision& decision, const PlanRequest& request) {

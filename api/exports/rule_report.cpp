@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "core/base/to_wire.hpp"
+
 namespace anchord::api {
 namespace {
 
@@ -100,7 +102,7 @@ std::string rules_json(const std::vector<RuleReport>& reports) {
                     {"printed", rates_json(r.printed)},
                     {"fitted", rates_json(r.fitted)},
                     {"thresholds", thresholds_json(r.rules)}});
-  return Json{{"positive", "LOS"}, {"data_sets", sets}}.dump(2) + "\n";
+  return to_wire(Json{{"positive", "LOS"}, {"data_sets", sets}}, 2) + "\n";
 }
 
 }  // namespace anchord::api

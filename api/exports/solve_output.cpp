@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/exports/solve_table.hpp"
+#include "core/base/to_wire.hpp"
 #include "core/localize/error_ellipse.hpp"
 
 namespace anchord {
@@ -156,7 +157,7 @@ std::string geojson(std::span<const SolvedFlight> flights) {
           {{"type", "Feature"}, {"geometry", std::move(geometry)}, {"properties", std::move(properties)}});
     }
   }
-  return all.dump(1) + "\n";
+  return to_wire(all, 1) + "\n";
 }
 
 }  // namespace
@@ -188,7 +189,7 @@ std::string solve_output(std::span<const SolvedFlight> flights, SolveFormat form
   }
   Json all = {{"schema", "anchord.solve/1"}, {"flights", Json::array()}};
   for (const auto& flight : flights) all["flights"].push_back(flight_json(flight));
-  return all.dump(1) + "\n";
+  return to_wire(all, 1) + "\n";
 }
 
 }  // namespace anchord

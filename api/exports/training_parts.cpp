@@ -4,6 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/base/to_wire.hpp"
+
 namespace anchord::api {
 namespace {
 
@@ -274,9 +276,7 @@ std::map<std::string, std::string> training_parts(const ml::TrainingOutcome& o, 
                {"nll_constants", maybe(o.nll_constants)},
                {"bias", o.bias ? bias_json(*o.bias) : Json(nullptr)},
                {"test", o.test ? test_json(*o.test) : Json(nullptr)}};
-  const auto text = [](const Json& json) {
-    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-  };
+  const auto text = [](const Json& json) { return to_wire(json); };
   return {{"summary", text(summary)},
           {"folds", text(folds_json(o, bias))},
           {"grid", text({{"items", grid}})},

@@ -2,6 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/base/to_wire.hpp"
+
 namespace anchord::api {
 
 using Json = nlohmann::ordered_json;
@@ -59,7 +61,7 @@ std::string problem_json(int status, std::string_view type, std::string_view det
     body["errors"] = std::move(list);
   }
   // Bytes of the client may be inside; anything that is not UTF-8 becomes U+FFFD instead of an exception.
-  return body.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return to_wire(body);
 }
 
 Response problem(int status, std::string_view type, std::string detail,

@@ -12,6 +12,8 @@
 #include "api/imports/column_names.hpp"
 #include "api/json/reader.hpp"
 #include "api/json/wire_rows.hpp"
+#include "core/base/text.hpp"
+#include "core/base/to_wire.hpp"
 #include "core/ml/dataset.hpp"
 
 namespace anchord::api {
@@ -65,7 +67,7 @@ struct Fault {
   }
 };
 
-std::string in_quotes(std::string_view text) { return '"' + std::string{text.substr(0, 40)} + '"'; }
+std::string in_quotes(std::string_view text) { return '"' + to_utf8(text, 40) + '"'; }
 
 class Importer {
  public:
@@ -180,7 +182,7 @@ class Importer {
       else if (value.is_string())
         row.emplace(key, value.get<std::string>());
       else if (value.is_number())
-        row.emplace(key, value.dump());
+        row.emplace(key, to_wire(value));
       else
         return refuse(at, {k_impossible, key, key + " is neither a number nor text"});
     }

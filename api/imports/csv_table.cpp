@@ -6,6 +6,8 @@
 #include <charconv>
 #include <utility>
 
+#include "core/base/text.hpp"
+
 namespace anchord {
 namespace {
 
@@ -135,7 +137,7 @@ Result<double> CsvTable::number(std::size_t column) const {
   double value{};
   const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (text.empty() || code != std::errc{} || end != text.data() + text.size()) {
-    return error(header_[column] + ": '" + std::string(fields_[column].substr(0, 40)) + "' is not a number");
+    return error(header_[column] + ": '" + to_utf8(fields_[column], 40) + "' is not a number");
   }
   return value;
 }

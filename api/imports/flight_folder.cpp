@@ -8,6 +8,7 @@
 
 #include "api/imports/csv_table.hpp"
 #include "api/imports/flight_json.hpp"
+#include "core/base/text.hpp"
 
 namespace anchord {
 namespace {
@@ -111,7 +112,7 @@ class PoseColumns {
     for (const auto& [word, fix] : words) {
       if (table.text(*fix_) == word) return fix;
     }
-    return table.error("fix: '" + std::string(table.text(*fix_).substr(0, 20)) +
+    return table.error("fix: '" + to_utf8(table.text(*fix_), 20) +
                        "', expected 2 (fixed), 1 (float), 0 (neither), or fixed, float, dgps, single, none");
   }
 

@@ -5,6 +5,8 @@
 #include <initializer_list>
 #include <nlohmann/json.hpp>
 
+#include "core/base/to_wire.hpp"
+
 namespace anchord {
 namespace {
 
@@ -225,7 +227,7 @@ Result<void> write_flight_json(const FlightDeclaration& flight, const std::files
                             {"lever_arm_body_m", {arm.x(), arm.y(), arm.z()}}});
   }
   std::ofstream out(file, std::ios::binary);
-  out << json.dump(1) << '\n';
+  out << to_wire(json, 1) << '\n';
   out.close();
   if (!out) return make_error(Errc::storage_unavailable, file.string() + ": cannot be written");
   return boost::outcome_v2::success();

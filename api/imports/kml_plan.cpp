@@ -10,6 +10,7 @@
 #include "api/imports/qgc_plan.hpp"
 #include "api/imports/xml_tree.hpp"
 #include "api/json/reader.hpp"
+#include "core/base/text.hpp"
 
 namespace anchord::api {
 namespace {
@@ -95,7 +96,7 @@ class Reader {
 
   void placemark(const XmlNode& node, Kind folder) {
     at_ = "/Placemark/" + std::to_string(n_++);
-    name_ = std::string(node.child_text("name")).substr(0, 60);
+    name_ = to_utf8(node.child_text("name"), 60);
     Kind kind = kind_of(data_of(node));
     if (kind == Kind::unsaid) kind = kind_of(node.child_text("name"));
     if (kind == Kind::unsaid) kind = folder;
@@ -145,7 +146,7 @@ class Reader {
       if (!good) {
         return fail("out_of_range",
                     "coordinates must be lon,lat or lon,lat,height in degrees and metres, not " +
-                        std::string(one.substr(0, 60))),
+                        to_utf8(one, 60)),
                std::nullopt;
       }
       out.push_back({{*parts[0], *parts[1]}, parts.size() == 3 ? parts[2] : std::nullopt});
@@ -226,7 +227,7 @@ Plan read_kml_plan(std::string_view text, std::vector<std::string>& notes, std::
   }
   if (root.value().name != "kml") {
     errors.push_back(
-        {"", "unknown_value", "the document is " + root.value().name.substr(0, 40) + ", not kml"});
+        {"", "unknown_value", "the document is " + to_utf8(root.value().name, 40) + ", not kml"});
     return {};
   }
   Reader reader(notes, errors);

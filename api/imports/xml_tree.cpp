@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cctype>
 
+#include "core/base/text.hpp"
+
 namespace anchord::api {
 namespace {
 
@@ -120,7 +122,7 @@ class Parser {
     at_ += 2;
     BOOST_OUTCOME_TRY(const auto closing, until(">", "a closing tag"));
     if (trimmed(std::string(closing)) != full)
-      return fail(std::string(full) + " is closed as " + std::string(closing.substr(0, 40)));
+      return fail(std::string(full) + " is closed as " + to_utf8(closing, 40));
     node.text = trimmed(std::move(node.text));
     return node;
   }

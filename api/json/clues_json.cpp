@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "api/imports/flight_json.hpp"
+#include "core/base/text.hpp"
 
 namespace anchord::api {
 namespace {
@@ -74,7 +75,7 @@ void read_clues(const nlohmann::json& value, const std::string& base, FlightOpti
       errors.push_back({base + "/anchors", "wrong_type", "an object: anchor id -> its clues"});
     } else {
       for (const auto& [id, clues] : anchors->items()) {
-        const std::string at = base + "/anchors/" + id.substr(0, 40);
+        const std::string at = base + "/anchors/" + to_utf8(id, 40);
         read_anchor(clues, at, options.clues[network_id_of(id)], errors);
       }
     }

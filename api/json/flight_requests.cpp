@@ -4,6 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "api/json/wire_rows.hpp"
+#include "core/base/text.hpp"
+#include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 namespace {
@@ -32,9 +34,7 @@ std::string text_of(const Json& object, const char* key) {
 }
 
 // Nothing of a recording is thrown away for bytes that are not UTF-8.
-std::string dumped(const Ordered& json) {
-  return json.dump(-1, ' ', false, Ordered::error_handler_t::replace);
-}
+std::string dumped(const Ordered& json) { return to_wire(json); }
 
 template <class Row, class Read>
 Result<std::vector<Row>> parse_rows(std::string_view ndjson, Read read) {
@@ -93,7 +93,7 @@ Result<RangePage> parse_range_page(std::string_view body) {
   Json json = parsed(body);
   const auto items = json.is_object() ? json.find("items") : json.end();
   if (items == json.end() || !items->is_array())
-    return make_error(Errc::bad_frame, "not a page of ranges: " + std::string(body.substr(0, 200)));
+    return make_error(Errc::bad_frame, "not a page of ranges: " + to_utf8(body, 200));
   RangePage page;
   for (Json& row : *items) {
     std::vector<FieldError> errors;
@@ -143,7 +143,7 @@ Result<IngestAnswer> parse_ingest_answer(std::string_view body) {
   const auto duplicates = count("duplicates");
   const auto rejected = count("rejected");
   if (!accepted || !duplicates || !rejected) {
-    return make_error(Errc::bad_frame, "not the answer of an ingest: " + std::string(body.substr(0, 200)));
+    return make_error(Errc::bad_frame, "not the answer of an ingest: " + to_utf8(body, 200));
   }
   IngestAnswer answer{*accepted, *duplicates, *rejected, {}};
   const auto errors = json.find("errors");
@@ -156,8 +156,7 @@ Result<IngestAnswer> parse_ingest_answer(std::string_view body) {
 
 Result<std::string> parse_created_id(std::string_view body) {
   std::string id = text_of(parsed(body), "id");
-  if (id.empty())
-    return make_error(Errc::bad_frame, "an answer without an id: " + std::string(body.substr(0, 200)));
+  if (id.empty()) return make_error(Errc::bad_frame, "an answer without an id: " + to_utf8(body, 200));
   return id;
 }
 
@@ -169,7 +168,7 @@ std::string problem_text(std::string_view body) {
     const Json& first = json["errors"].front();
     text += " (" + text_of(first, "pointer") + ": " + text_of(first, "detail") + ")";
   }
-  return text.empty() ? std::string(body.substr(0, 200)) : text;
+  return text.empty() ? to_utf8(body, 200) : text;
 }
 
 }  // namespace anchord::api

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/json/reader.hpp"
+#include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 
@@ -92,11 +93,10 @@ std::string frame_definition_json(const FrameDefinition& definition) {
                      {"local_m", vector_json(pair.local_m)},
                      {"enu_m", vector_json(pair.enu_m)},
                      {"sigma_m", pair.sigma_m ? Ordered(*pair.sigma_m) : Ordered(nullptr)}});
-  return Ordered{{"origin", origin_json(definition.origin)},
-                 {"fitted_at", to_rfc3339(definition.fitted)},
-                 {"pairs", std::move(pairs)},
-                 {"fit", frame_fit_json(definition.fit, definition.pairs)}}
-      .dump();
+  return to_wire(Ordered{{"origin", origin_json(definition.origin)},
+                         {"fitted_at", to_rfc3339(definition.fitted)},
+                         {"pairs", std::move(pairs)},
+                         {"fit", frame_fit_json(definition.fit, definition.pairs)}});
 }
 
 std::optional<FrameDefinition> frame_definition(const LocalFrame& frame) {

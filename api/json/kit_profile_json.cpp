@@ -3,6 +3,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/base/to_wire.hpp"
+
 namespace anchord {
 namespace {
 
@@ -61,7 +63,7 @@ std::string kit_profile_json(const KitProfile& profile) {
     }
     json["factors"].push_back(std::move(one));
   }
-  return json.dump(1) + "\n";
+  return to_wire(json, 1) + "\n";
 }
 
 Result<KitProfile> parse_kit_profile(std::string_view text) {

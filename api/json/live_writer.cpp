@@ -5,6 +5,7 @@
 
 #include "api/json/reader.hpp"
 #include "api/json/wire_rows.hpp"
+#include "core/base/text.hpp"
 #include "core/localize/accuracy_goal.hpp"
 #include "core/localize/error_ellipse.hpp"
 
@@ -46,7 +47,7 @@ class Object {
     return *this;
   }
   Object& text(std::string_view value) {
-    out_ += json_text(value);
+    append_json_text(out_, value);
     return *this;
   }
   Object& raw(std::string_view json) {
@@ -92,25 +93,6 @@ std::optional<double> heading_deg(const Fix& fix) {
 }
 
 }  // namespace
-
-std::string json_text(std::string_view text) {
-  std::string out = "\"";
-  const bool utf8 = is_utf8(text);
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (c == '"' || c == '\\')
-      out += '\\', out += c;
-    else if (c == '\n')
-      out += "\\n";
-    else if (byte < 0x20)
-      out += ' ';
-    else if (byte >= 0x80 && !utf8)
-      out += '?';
-    else
-      out += c;
-  }
-  return out + '"';
-}
 
 std::string_view verdict_word(Verdict verdict) {
   switch (verdict) {

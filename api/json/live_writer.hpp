@@ -35,7 +35,4 @@ struct MissionLiveState {
 std::string mission_state_json(const Mission& mission, const MissionLiveState& state);
 std::string_view mission_state_word(MissionState state);
 
-/// JSON string with quotes and escapes; bytes that are not UTF-8 become '?'.
-std::string json_text(std::string_view text);
-
 }  // namespace anchord::api

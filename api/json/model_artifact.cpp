@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/base/to_wire.hpp"
 #include "core/nlos/features.hpp"
 
 namespace anchord::api {
@@ -109,7 +110,7 @@ std::string write_model_artifact(const ml::Model& model) {
         {"fallback_m", r.fallback_m},  {"sigma_m", r.sigma_m}};
   }
   if (model.mixture) out["mixture"] = json_of(*model.mixture);
-  return out.dump() + "\n";
+  return to_wire(out) + "\n";
 }
 
 }  // namespace anchord::api

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "api/json/reader.hpp"
+#include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 namespace {
@@ -234,7 +235,7 @@ Plan read_plan(const Json& body, std::vector<FieldError>& errors) {
 }
 
 StoredPlan stored(const Plan& plan) {
-  return {plan.id,      plan.name,    plan.site,   document_json(plan).dump(),
+  return {plan.id,      plan.name,    plan.site,   to_wire(document_json(plan)),
           plan.created, plan.changed, plan.version};
 }
 

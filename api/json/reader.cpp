@@ -3,6 +3,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/base/text.hpp"
+#include "core/base/to_wire.hpp"
+
 namespace anchord::api {
 
 using Json = nlohmann::json;
@@ -10,7 +13,7 @@ using Json = nlohmann::json;
 namespace {
 
 std::string short_json(const Json& value) {
-  std::string text = value.dump(-1, ' ', false, Json::error_handler_t::replace);
+  std::string text = to_wire(value);
   if (text.size() > 100) return {};
   return text;
 }
@@ -40,7 +43,7 @@ class Builder final : public nlohmann::json_sax<Json> {
   bool number_unsigned(number_unsigned_t value) override { return put(Json(value)); }
   bool number_float(number_float_t value, const string_t& text) override {
     if (!std::isfinite(value))
-      return fail("non_finite", "'" + text.substr(0, 40) + "' is not a finite number");
+      return fail("non_finite", "'" + to_utf8(text, 40) + "' is not a finite number");
     return put(Json(value));
   }
   bool string(string_t& value) override { return put(Json(std::move(value))); }
@@ -51,7 +54,7 @@ class Builder final : public nlohmann::json_sax<Json> {
   bool end_array() override { return close(); }
   bool key(string_t& name) override {
     if (stack_.back()->contains(name))
-      return fail("duplicate_key", "key '" + name.substr(0, 60) + "' stands twice in one object", name);
+      return fail("duplicate_key", "key '" + to_utf8(name, 60) + "' stands twice in one object", name);
     keys_.back() = name;
     return true;
   }
@@ -135,39 +138,6 @@ bool mentions_non_finite(std::string_view text) {
 
 }  // namespace
 
-bool is_utf8(std::string_view bytes) {
-  std::size_t i = 0;
-  while (i < bytes.size()) {
-    const auto lead = static_cast<unsigned char>(bytes[i]);
-    std::size_t extra = 0;
-    std::uint32_t point = 0;
-    if (lead < 0x80) {
-      ++i;
-      continue;
-    }
-    if (lead >= 0xc2 && lead <= 0xdf)
-      extra = 1, point = lead & 0x1fu;
-    else if (lead >= 0xe0 && lead <= 0xef)
-      extra = 2, point = lead & 0x0fu;
-    else if (lead >= 0xf0 && lead <= 0xf4)
-      extra = 3, point = lead & 0x07u;
-    else
-      return false;
-    if (bytes.size() - i <= extra) return false;
-    for (std::size_t k = 1; k <= extra; ++k) {
-      const auto next = static_cast<unsigned char>(bytes[i + k]);
-      if ((next & 0xc0u) != 0x80u) return false;
-      point = (point << 6) | (next & 0x3fu);
-    }
-    if ((extra == 2 && (point < 0x800 || (point >= 0xd800 && point <= 0xdfff))) ||
-        (extra == 3 && (point < 0x10000 || point > 0x10ffff))) {
-      return false;
-    }
-    i += extra + 1;
-  }
-  return true;
-}
-
 std::optional<FieldError> parse_json(std::string_view text, Json& out) {
   if (!is_utf8(text)) return FieldError{"", "bad_utf8", "the text is not UTF-8"};
   Builder builder(out);
@@ -212,7 +182,7 @@ std::optional<double> Fields::finite(const Json& value, const std::string& at, d
     return std::nullopt;
   }
   if (number < min || number > max) {
-    const auto bound = [](double x) { return Json(x).dump(); };
+    const auto bound = [](double x) { return to_wire(Json(x)); };
     errors_.push_back({at, "out_of_range", "must be " + bound(min) + ".." + bound(max), short_json(value)});
     return std::nullopt;
   }
@@ -331,8 +301,7 @@ void Fields::finish() {
   if (object_ == nullptr) return;
   for (const auto& [key, value] : object_->items()) {
     if (known_.find(key) == known_.end()) {
-      errors_.push_back(
-          {pointer(key), "unknown_field", "there is no field '" + key.substr(0, 60) + "' here"});
+      errors_.push_back({pointer(key), "unknown_field", "there is no field '" + to_utf8(key, 60) + "' here"});
     }
   }
 }

@@ -16,9 +16,6 @@ namespace anchord::api {
 /// Deepest nesting of arrays and objects in any request.
 inline constexpr int k_max_json_depth = 32;
 
-/// True for well-formed UTF-8 (no surrogates, no overlong forms).
-bool is_utf8(std::string_view bytes);
-
 /// Parses one JSON document. Refused, each with its own code and never half-read: broken syntax
 /// (`malformed`), broken UTF-8 (`bad_utf8`), nesting beyond 32 (`too_deep`), a key twice in one object
 /// (`duplicate_key`), numbers that are no finite double, NaN and Infinity (`non_finite`). Never throws.

@@ -4,6 +4,7 @@
 
 #include "api/json/reader.hpp"
 #include "api/json/wire_rows.hpp"
+#include "core/base/to_wire.hpp"
 #include "core/geo/enu.hpp"
 
 namespace anchord::api {
@@ -116,12 +117,12 @@ void patch_device(const Json& body, bool whole, DeviceConfig& device, std::vecto
   if (const auto address = fields.text("address", 500, whole)) device.address = *address;
   if (const auto enabled = fields.boolean("enabled")) device.enabled = *enabled;
   if (const Json* options = fields.child("options")) {
-    if (!options->is_object() || options->dump().size() > 10'000) {
+    if (!options->is_object() || to_wire(*options).size() > 10'000) {
       fields.error("options", "wrong_type", "must be an object below 10 kB");
     } else {
       auto merged = Json::parse(device.options_json, nullptr, false);
       merged.merge_patch(*options);
-      device.options_json = merged.dump();
+      device.options_json = to_wire(merged);
     }
   } else if (body.contains("options")) {
     device.options_json = "{}";

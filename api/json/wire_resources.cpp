@@ -4,6 +4,7 @@
 
 #include "api/json/live_writer.hpp"
 #include "api/json/reader.hpp"
+#include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 
@@ -140,10 +141,10 @@ void patch_site(const Json& body, bool whole, Site& site, std::vector<FieldError
   if (const Json* outline = fields.child("outline")) {
     const bool polygon = outline->is_object() && outline->value("type", Json()) == "Polygon" &&
                          outline->contains("coordinates") && (*outline)["coordinates"].is_array();
-    if (!polygon || outline->dump().size() > 100'000)
+    if (!polygon || to_wire(*outline).size() > 100'000)
       fields.error("outline", "wrong_type", "must be a GeoJSON Polygon below 100 kB");
     else
-      site.outline_geojson = outline->dump();
+      site.outline_geojson = to_wire(*outline);
   } else if (cleared("outline")) {
     site.outline_geojson.clear();
   }

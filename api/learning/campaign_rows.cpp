@@ -7,6 +7,7 @@
 #include "api/http/problem.hpp"
 #include "api/imports/campaign.hpp"
 #include "api/routes/support.hpp"
+#include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 namespace {
@@ -27,7 +28,7 @@ CampaignFormat format_of(const Request& request) {
 std::string name_of(const CampaignSite& site) {
   if (!site.name.empty()) return site.name;
   const auto part = [](const std::optional<double>& value) {
-    return value ? nlohmann::json(*value).dump() : std::string("-");
+    return value ? to_wire(nlohmann::json(*value)) : std::string("-");
   };
   return site.environment + "/" + part(site.distance_m) + "/" + part(site.heading_deg) + "/" +
          part(site.height_m) + "/" + site.material + "/" + part(site.thickness_m) + "/" +
@@ -80,7 +81,7 @@ CampaignRows read_campaign_rows(const Request& request) {
     throw_problem(422, "validation", read.error().message, {{"", "unreadable", read.error().message}});
   const auto& campaign = read.value().campaign;
   CampaignRows out;
-  out.report_json = report_json(read.value().report).dump(-1, ' ', false, Ordered::error_handler_t::replace);
+  out.report_json = to_wire(report_json(read.value().report));
   for (const auto& m : campaign.measurements) {
     const auto& site = campaign.sites[m.site];
     CampaignRow row;

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "core/base/sha256.hpp"
+#include "core/base/text.hpp"
 
 namespace anchord::api {
 namespace {
@@ -113,7 +114,7 @@ Result<std::vector<Column>> columns_of(const std::vector<std::string>& header,
   for (auto& column : out) {
     const auto at = std::find(registers.begin(), registers.end(), column.name);
     if (!column.feature && at == registers.end())
-      return bad(1, "no feature is named " + column.name.substr(0, 60));
+      return bad(1, "no feature is named " + to_utf8(column.name, 60));
     column.slot = static_cast<std::size_t>(at - registers.begin());
   }
   return out;
@@ -219,7 +220,7 @@ Result<DatasetTable> DatasetTable::parse(std::string_view text) {
       return bad(line, std::to_string(cells.size()) + " cells, the header has " + std::to_string(width));
     if (cells[0] != nlos::k_feature_set_version)
       return make_error(Errc::unsupported, "line " + std::to_string(line) + ": features of the version " +
-                                               cells[0].substr(0, 60) + ", this program has " +
+                                               to_utf8(cells[0], 60) + ", this program has " +
                                                std::string(nlos::k_feature_set_version));
     DatasetRow row;
     row.campaign = plain(cells[1]);

@@ -6,6 +6,7 @@
 
 #include "api/json/reader.hpp"
 #include "api/learning/range_features.hpp"
+#include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 namespace {
@@ -143,7 +144,7 @@ DatasetQuery read_dataset_query(const Json& body, CampaignStore& campaigns, Miss
     inner.finish();
   }
   fields.finish();
-  out.json = body.is_object() ? body.dump() : "{}";
+  out.json = body.is_object() ? to_wire(body) : "{}";
   return out;
 }
 

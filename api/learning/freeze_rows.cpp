@@ -7,6 +7,7 @@
 #include <numeric>
 #include <set>
 
+#include "core/base/to_wire.hpp"
 #include "core/ml/dataset.hpp"
 #include "core/ml/random.hpp"
 
@@ -184,16 +185,15 @@ std::string split_report_json(const DatasetTable& table, Place split_by,
   Ordered faults = Ordered::array();
   for (const auto& [reason, n] : dropped) faults.push_back({{"reason", reason}, {"count", n}});
   const bool leak = !environments.empty() || !settings.empty() || duplicates > 0;
-  return Ordered{
-      {"leak", leak},
-      {"split_by", place_word(split_by)},
-      {"train", train.json()},
-      {"test", test.json()},
-      {"shared", {{"environments", environments}, {"campaigns", campaigns}, {"settings", settings}}},
-      {"duplicate_rows", duplicates},
-      {"dropped", faults},
-      {"warnings", warnings}}
-      .dump(-1, ' ', false, Ordered::error_handler_t::replace);
+  return to_wire(
+      Ordered{{"leak", leak},
+              {"split_by", place_word(split_by)},
+              {"train", train.json()},
+              {"test", test.json()},
+              {"shared", {{"environments", environments}, {"campaigns", campaigns}, {"settings", settings}}},
+              {"duplicate_rows", duplicates},
+              {"dropped", faults},
+              {"warnings", warnings}});
 }
 
 FrozenDataset counted(DatasetTable table, Place split_by, const std::map<std::string, std::size_t>& dropped) {
@@ -213,18 +213,18 @@ std::string split_report_text(const FrozenDataset& set) {
   std::string out;
   for (const char* name : {"train", "test"}) {
     const auto& part = report.at(name);
-    out += std::string(name) + (name[1] == 'e' ? "  " : " ") + part.at("rows").dump() + " rows (" +
-           part.at("los").dump() + " LOS, " + part.at("nlos").dump() + " NLOS), " +
-           part.at("settings").dump() + " settings, " + std::to_string(part.at("environments").size()) +
+    out += std::string(name) + (name[1] == 'e' ? "  " : " ") + to_wire(part.at("rows")) + " rows (" +
+           to_wire(part.at("los")) + " LOS, " + to_wire(part.at("nlos")) + " NLOS), " +
+           to_wire(part.at("settings")) + " settings, " + std::to_string(part.at("environments").size()) +
            " environments\n";
   }
   for (const auto& one : report.at("dropped"))
-    out += "dropped " + one.at("count").dump() + ": " + one.at("reason").get<std::string>() + "\n";
+    out += "dropped " + to_wire(one.at("count")) + ": " + one.at("reason").get<std::string>() + "\n";
   const auto& shared = report.at("shared");
   out += std::string("leak  ") + (report.at("leak").get<bool>() ? "YES" : "none") + ": " +
          std::to_string(shared.at("environments").size()) + " environments and " +
          std::to_string(shared.at("settings").size()) + " settings on both sides, " +
-         report.at("duplicate_rows").dump() + " rows equal to rows of the other side\n";
+         to_wire(report.at("duplicate_rows")) + " rows equal to rows of the other side\n";
   for (const auto& warning : report.at("warnings")) out += "note  " + warning.get<std::string>() + "\n";
   return out;
 }

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/json/reader.hpp"
+#include "core/base/text.hpp"
 
 namespace anchord::api {
 namespace {
@@ -47,7 +48,7 @@ void read_grid(const Json& grid, ml::TrainingSpec& spec, std::vector<FieldError>
     return;
   }
   for (const auto& [name, axes] : grid.items()) {
-    const std::string at = "/grid/" + name.substr(0, 60);
+    const std::string at = "/grid/" + to_utf8(name, 60);
     const auto method = ml::method_of(name);
     if (!method || !axes.is_object()) {
       errors.push_back({at, "unknown_value", "must be a method with an object of settings"});
@@ -55,7 +56,7 @@ void read_grid(const Json& grid, ml::TrainingSpec& spec, std::vector<FieldError>
     }
     const auto known = ml::grid_settings(*method);
     for (const auto& [setting, values] : axes.items()) {
-      const std::string here = at + "/" + setting.substr(0, 60);
+      const std::string here = at + "/" + to_utf8(setting, 60);
       if (std::find(known.begin(), known.end(), setting) == known.end()) {
         std::string all;
         for (const auto& word : known) all += (all.empty() ? "" : ", ") + word;

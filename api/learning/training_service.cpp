@@ -6,6 +6,7 @@
 #include "api/services/event_log.hpp"
 #include "api/services/job_service.hpp"
 #include "core/base/sha256.hpp"
+#include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 namespace {
@@ -16,17 +17,15 @@ using Json = nlohmann::json;
 
 std::string manifest_of(const std::string& artifact) {
   const auto json = Json::parse(artifact, nullptr, false);
-  return json.is_object() && json.contains("manifest") ? json["manifest"].dump() : "{}";
+  return json.is_object() && json.contains("manifest") ? to_wire(json["manifest"]) : "{}";
 }
 
 Result<std::string> TrainingService::work(const TrainingRun& run, JobContext& job) {
   BOOST_OUTCOME_TRY(const auto csv, deps_.datasets.csv(run.dataset));
-  const std::string message = Json{
-      {"kind", "training"},
-      {"csv", csv},
-      {"request", Json::parse(run.request_json)},
-      {"code_version",
-       deps_.code_version}}.dump();
+  const std::string message = to_wire(Json{{"kind", "training"},
+                                           {"csv", csv},
+                                           {"request", Json::parse(run.request_json)},
+                                           {"code_version", deps_.code_version}});
   BOOST_OUTCOME_TRY(
       const auto answer,
       deps_.run_work(

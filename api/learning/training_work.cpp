@@ -5,6 +5,7 @@
 #include "api/json/reader.hpp"
 #include "api/learning/training_request.hpp"
 #include "api/learning/worker_port.hpp"
+#include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 namespace {
@@ -37,7 +38,7 @@ Result<std::string> train_work(const Json& message, const std::stop_token& stop,
   out["summary"] = std::move(parts.at("summary"));
   parts.erase("summary");
   out["parts"] = std::move(parts);
-  return out.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return to_wire(out);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "api/http/router.hpp"
 #include "api/json/reader.hpp"
 #include "api/live/frames.hpp"
+#include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 
@@ -35,7 +36,7 @@ void Conversation::on_open(std::function<void()> wake) {
                                {"epoch", hub_.epoch()}, {"t_us", hub_.clock().now().us()},
                                {"hb_ms", 1000},         {"topics", topic_names},
                                {"roles", roles}};
-  say(hello.dump());
+  say(to_wire(hello));
   if (hub_.join(*this))
     joined_ = true;
   else
@@ -63,7 +64,7 @@ void Conversation::on_text(std::string_view text) {
                                   {"id", message.value("id", Json())},
                                   {"c_us", message.value("c_us", Json())},
                                   {"t_us", hub_.clock().now().us()}};
-    return say(answer.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    return say(to_wire(answer));
   }
   refuse(message, 422, "validation", "op is sub, unsub or time");
 }
@@ -130,7 +131,7 @@ void Conversation::subscribe(const Json& message) {
                              {"sub", subscription.id},
                              {"from_seq", start.recovered ? since->second + 1 : start.last_seq + 1},
                              {"recovered", start.recovered}};
-  std::string frames = ack.dump();
+  std::string frames = to_wire(ack);
   {
     const std::scoped_lock lock(mutex_);
     bool room = outbox_.control(std::move(frames));
@@ -168,14 +169,14 @@ void Conversation::unsubscribe(const Json& message) {
   }
   nlohmann::ordered_json ack{{"op", "ack"}, {"id", id ? Json(*id) : Json()}, {"sub", it->first}};
   subscriptions_.erase(it);
-  say(ack.dump());
+  say(to_wire(ack));
 }
 
 void Conversation::refuse(const Json& message, int status, std::string_view type, std::string_view detail) {
   const Json id = message.is_object() && message.contains("id") && message["id"].is_number_integer()
                       ? message["id"]
                       : Json();
-  say(R"({"op":"err","id":)" + id.dump() + R"(,"problem":)" + problem_json(status, type, detail) + '}');
+  say(R"({"op":"err","id":)" + to_wire(id) + R"(,"problem":)" + problem_json(status, type, detail) + '}');
 }
 
 void Conversation::say(std::string frame) {

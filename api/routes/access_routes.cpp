@@ -6,6 +6,7 @@
 #include "api/http/router.hpp"
 #include "api/routes/support.hpp"
 #include "api/services/access.hpp"
+#include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 namespace {
@@ -65,7 +66,7 @@ Response answer(int status, const json& body) {
   Response response;
   response.status = status;
   response.header("Content-Type", "application/json").header("Cache-Control", "no-store");
-  response.body = body.dump(-1, ' ', false, json::error_handler_t::replace);
+  response.body = to_wire(body);
   return response;
 }
 

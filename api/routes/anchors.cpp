@@ -10,6 +10,8 @@
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
 #include "api/services/geo_service.hpp"
+#include "core/base/text.hpp"
+#include "core/base/to_wire.hpp"
 #include "core/geo/enu.hpp"
 #include "core/ports/site_store.hpp"
 #include "core/ports/store.hpp"
@@ -230,7 +232,7 @@ Response list(Services& s, const Request& request) {
   if (format == "ndjson") {
     Response response;
     response.header("Content-Type", "application/x-ndjson");
-    for (const auto& feature : all) response.body += anchor_feature_json(feature).dump() + '\n';
+    for (const auto& feature : all) response.body += to_wire(anchor_feature_json(feature)) + '\n';
     return response;
   }
   Ordered features = Ordered::array();
@@ -249,7 +251,7 @@ Anchor path_anchor(Services& s, const Request& request) {
   const auto& text = request.params.at("id");
   if (const auto id = parse_uuid(text)) return value_or_problem(s.deps.anchors.anchor(AnchorId{id.value()}));
   const auto network_id = parse_network_id(text);
-  if (!network_id) throw_problem(404, "not-found", "there is no anchor " + text.substr(0, 60));
+  if (!network_id) throw_problem(404, "not-found", "there is no anchor " + to_utf8(text, 60));
   return value_or_problem(s.deps.anchors.anchor(network_id.value()));
 }
 

@@ -11,6 +11,7 @@
 #include "api/routes/support.hpp"
 #include "api/services/calibration_report.hpp"
 #include "api/services/position_diff.hpp"
+#include "core/base/to_wire.hpp"
 #include "core/ports/store.hpp"
 
 namespace anchord::api {
@@ -114,7 +115,7 @@ std::vector<Gate> failures(const Estimate& estimate) {
                               errors);
   auto body = Ordered::parse(response.body);
   body["gates"] = std::move(gates);
-  response.body = body.dump();
+  response.body = to_wire(body);
   throw ProblemException{std::move(response)};
 }
 
@@ -248,10 +249,9 @@ Response publish(Services& s, const Request& request) {
       calibration.id, anchors, request.principal.token_id, wanted.note, s.deps.clock.now(), overrides));
   for (const auto& id : anchors) value_or_problem(s.deps.anchors.find_or_create(id, s.deps.clock.now()));
   s.hub.publish(Topic::revisions,
-                Ordered{{"revision", revision.number},
-                        {"t_us", revision.published.us()},
-                        {"calibration", to_string(calibration.id)}}
-                    .dump(),
+                to_wire(Ordered{{"revision", revision.number},
+                                {"t_us", revision.published.us()},
+                                {"calibration", to_string(calibration.id)}}),
                 revision.published.us());
   s.events.add(overrides.empty() ? "info" : "warning", "revision.published",
                "revision " + std::to_string(revision.number) + " with " + std::to_string(anchors.size()) +

@@ -10,6 +10,8 @@
 #include "api/routes/learning.hpp"
 #include "api/routes/measurement_query.hpp"
 #include "api/routes/support.hpp"
+#include "core/base/text.hpp"
+#include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 
@@ -124,14 +126,14 @@ constexpr const char* k_sample_header =
     "range_m,rx_dbm,fp_dbm,std_noise\r\n";
 /// By the names an import knows, so that what is taken out can be brought in again.
 std::string sample_csv(const CampaignStore::StoredSample& s) {
-  const auto number = [](const auto& v) { return v ? Ordered(*v).dump() : std::string(); };
+  const auto number = [](const auto& v) { return v ? to_wire(Ordered(*v)) : std::string(); };
   const auto& x = s.sample;
   const auto& truth = s.truth;
   return std::to_string(s.id) + ',' + (x.time ? std::to_string(x.time->us()) : "") + ',' + number(x.seq) +
          ',' + csv_text(truth.environment) + ',' + csv_text(truth.setting) + ',' + number(truth.distance_m) +
          ',' + (truth.los ? (*truth.los ? "1" : "0") : "") + ',' + number(truth.heading_deg) + ',' +
          number(truth.height_difference_m) + ',' + csv_text(truth.material) + ',' +
-         number(truth.thickness_m) + ',' + Ordered(x.range_m).dump() + ',' + number(x.rx_dbm) + ',' +
+         number(truth.thickness_m) + ',' + to_wire(Ordered(x.range_m)) + ',' + number(x.rx_dbm) + ',' +
          number(x.fp_dbm) + ',' + number(x.std_noise) + "\r\n";
 }
 
@@ -189,7 +191,7 @@ Response samples(LearningServices& l, const Request& request) {
       const auto found = sample_page(store, *active, wanted, filter);
       // The status is sent already; an early end is all that can still be told.
       if (!found) throw BodyError(503, found.error().message);
-      for (const auto& row : found.value().rows) out += csv ? sample_csv(row) : item_of(row).dump() + '\n';
+      for (const auto& row : found.value().rows) out += csv ? sample_csv(row) : to_wire(item_of(row)) + '\n';
       filter.after = found.value().next;
       done = filter.after == 0;
     }
@@ -205,7 +207,7 @@ Response sample_cir(LearningServices& l, const Request& request) {
   std::int64_t id = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id);
   if (error != std::errc{} || end != text.data() + text.size())
-    throw_problem(404, "not-found", "no sample " + text.substr(0, 40));
+    throw_problem(404, "not-found", "no sample " + to_utf8(text, 40));
   const auto row = value_or_problem(l.stores.campaigns.sample(named(l, request).id, id));
   if (!row.sample.cir) throw_problem(404, "not-found", "this sample came without an impulse response");
   if (negotiate(request, {"json", "binary"}) == "json") return json_response(200, cir_json(*row.sample.cir));

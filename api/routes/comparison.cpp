@@ -7,6 +7,7 @@
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
 #include "api/services/position_diff.hpp"
+#include "core/base/text.hpp"
 #include "core/ports/store.hpp"
 
 namespace anchord::api {
@@ -97,7 +98,7 @@ Response revision_diff(Services& s, const Request& request) {
   check_query(request, {"against"});
   const auto& text = request.params.at("number");
   const auto number = revision_number(text);
-  if (!number) throw_problem(404, "not-found", "there is no revision " + text.substr(0, 20));
+  if (!number) throw_problem(404, "not-found", "there is no revision " + to_utf8(text, 20));
   const auto now = placed(value_or_problem(s.deps.anchors.published(*number)));
   std::string against;
   const auto before = other(s, request, *number > 1 ? std::to_string(*number - 1) : "nothing", against);

@@ -8,6 +8,7 @@
 #include "api/learning/rule_rows.hpp"
 #include "api/routes/learning.hpp"
 #include "api/routes/support.hpp"
+#include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 
@@ -119,7 +120,7 @@ Response rows(LearningServices& l, const Request& request) {
   const auto table = value_or_problem(DatasetTable::parse(csv));
   if (format == "ndjson") {
     response.header("Content-Type", "application/x-ndjson");
-    for (std::size_t i = 0; i < table.rows.size(); ++i) response.body += row_json(table, i).dump() + '\n';
+    for (std::size_t i = 0; i < table.rows.size(); ++i) response.body += to_wire(row_json(table, i)) + '\n';
     return response;
   }
   const auto page = page_query(request, 10'000);

@@ -5,6 +5,7 @@
 #include "api/routes/job_answer.hpp"
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
+#include "core/base/to_wire.hpp"
 #include "core/ports/devices.hpp"
 #include "core/ports/store.hpp"
 
@@ -110,7 +111,7 @@ Response act(Services& s, const Request& request) {
   fields.finish();
   refuse_if_any(errors);
   const auto result =
-      control(s).act(device.config.id, *action, arguments == nullptr ? "{}" : arguments->dump());
+      control(s).act(device.config.id, *action, arguments == nullptr ? "{}" : to_wire(*arguments));
   s.audit(request, "device.action " + to_string(device.config.id) + " " + *action, result ? "ok" : "failed");
   if (!result && of_the_device(result.error())) throw_problem(422, "state", result.error().message);
   auto json = Ordered::parse(accepted(result), nullptr, false);
@@ -129,7 +130,7 @@ Json ask(Services& s, const Uuid& id, std::string_view action, const std::string
 /// Of the settings themselves: whoever changes them at the device changes it as well.
 std::string settings_etag(const Json& settings) {
   std::uint64_t hash = 14695981039346656037u;  // FNV-1a
-  for (const char c : settings.dump()) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211u;
+  for (const char c : to_wire(settings)) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211u;
   return "\"u-" + std::to_string(hash) + '"';
 }
 
@@ -168,9 +169,9 @@ Response put_uwb(Services& s, const Request& request) {
   fields.finish();
   refuse_if_any(errors);
   require_match(request, settings_etag(ask(s, device.config.id, "get_uwb", "{}")));
-  const auto done = ask(s, device.config.id, "set_uwb", body.dump());
+  const auto done = ask(s, device.config.id, "set_uwb", to_wire(body));
   const bool all = done.value("all", false);
-  s.audit(request, "device.uwb " + to_string(device.config.id) + " " + body.dump(), all ? "ok" : "failed");
+  s.audit(request, "device.uwb " + to_string(device.config.id) + " " + to_wire(body), all ? "ok" : "failed");
   if (!all) {
     std::string why;
     for (const auto& one : done.value("devices", Json::array())) {

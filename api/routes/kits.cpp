@@ -5,6 +5,8 @@
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
 #include "api/services/kit_profiles.hpp"
+#include "core/base/text.hpp"
+#include "core/base/to_wire.hpp"
 #include "core/localize/kit_prior.hpp"
 
 namespace anchord::api {
@@ -63,13 +65,13 @@ Response read(Services& s, const Request& request) {
 Response put(Services& s, const Request& request) {
   const auto& id = request.params.at("id");
   const auto known = s.profiles->kit_of(id);
-  const auto profile = parse_kit_profile(json_body(request).dump());
+  const auto profile = parse_kit_profile(to_wire(json_body(request)));
   if (!profile)
     throw_problem(422, "validation", profile.error().message, {{"", "bad_profile", profile.error().message}});
   const std::string kit = known ? known.value() : profile.value().kit;
   if (profile.value().kit != kit || kit.empty())
     throw_problem(422, "validation", "the profile is of another kit",
-                  {{"/kit", "other_kit", "must be '" + kit.substr(0, 80) + "'"}});
+                  {{"/kit", "other_kit", "must be '" + to_utf8(kit, 80) + "'"}});
   if (!known && id != kit) throw ProblemException{problem_of(known.error())};
   const auto before = value_or_problem(s.profiles->store().profile(kit));
   const std::uint64_t version = before ? before->version : 0;

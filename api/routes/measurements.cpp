@@ -8,6 +8,7 @@
 #include "api/routes/measurement_query.hpp"
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
+#include "core/base/to_wire.hpp"
 #include "core/ports/store.hpp"
 
 #include <charconv>
@@ -38,7 +39,7 @@ MeasurementStore::Filter filter_of(const Request& request) {
 
 std::string csv_number(const auto& value) {
   if (!value) return "";
-  return nlohmann::json(*value).dump();
+  return to_wire(nlohmann::json(*value));
 }
 
 constexpr const char* k_range_header =
@@ -49,7 +50,7 @@ std::string range_csv(const Range& r, std::int64_t id) {
   return std::to_string(id) + ',' + std::to_string(r.time.us()) + ',' + to_string(r.mission) + ',' +
          (r.kind == RangeKind::tag_anchor ? "tag_anchor" : "anchor_anchor") + ',' + to_string(r.tag) + ',' +
          std::to_string(r.antenna) + ',' + to_string(r.anchor) + ',' + csv_number(r.seq) + ',' +
-         nlohmann::json(r.distance_m).dump() + ',' + csv_number(r.rss_dbm) + ',' + csv_number(r.fp_dbm) +
+         to_wire(nlohmann::json(r.distance_m)) + ',' + csv_number(r.rss_dbm) + ',' + csv_number(r.fp_dbm) +
          ',' + csv_number(r.rx_dbm) + ',' + csv_number(r.std_noise) + ',' + csv_number(r.heading_deg) + ',' +
          csv_number(truth.distance_m) + ',' + csv_number(truth.los) + "\r\n";
 }
@@ -59,7 +60,7 @@ constexpr const char* k_fix_header =
     "satellites\r\n";
 std::string fix_csv(const Fix& f, std::int64_t id) {
   const bool globe = f.frame == TrackFrame::wgs84;
-  const auto number = [](double v) { return nlohmann::json(v).dump(); };
+  const auto number = [](double v) { return to_wire(nlohmann::json(v)); };
   std::string row = std::to_string(id) + ',' + std::to_string(f.time.us()) + ',' + to_string(f.mission) +
                     ',' + csv_number(f.seq);
   row += ',' +
@@ -115,7 +116,7 @@ Response rows(const Request& request, MeasurementStore::Filter filter, Fetch fet
   if (format == "csv") return stream(request, filter, "text/csv; charset=utf-8", header, fetch, csv);
   if (format == "ndjson")
     return stream(request, filter, "application/x-ndjson", "", fetch,
-                  [json](const auto& row, std::int64_t id) { return json(row, id).dump() + '\n'; });
+                  [json](const auto& row, std::int64_t id) { return to_wire(json(row, id)) + '\n'; });
   const auto page = value_or_problem(fetch(filter));
   Ordered items = Ordered::array();
   for (std::size_t i = 0; i < page.rows.size(); ++i) items.push_back(json(page.rows[i], page.ids[i]));

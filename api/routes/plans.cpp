@@ -6,6 +6,8 @@
 #include "api/json/reader.hpp"
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
+#include "core/base/text.hpp"
+#include "core/base/to_wire.hpp"
 #include "core/ports/store.hpp"
 
 namespace anchord::api {
@@ -83,7 +85,7 @@ Response put(Services& s, const Request& request) {
 Response patch(Services& s, const Request& request) {
   const Plan old = load(s, request);
   require_match(request, etag(old));
-  auto whole = nlohmann::json::parse(plan_json(old).dump());
+  auto whole = nlohmann::json::parse(to_wire(plan_json(old)));
   whole.merge_patch(json_body(request));
   std::vector<FieldError> errors;
   Plan plan = read_plan(whole, errors);
@@ -140,7 +142,7 @@ Response import(Services& s, const Request& request) {
                    type.starts_with("application/xml") || type.starts_with("text/xml");
   if (!kml) (void)json_body(request);  // refuses another type, broken text, compression
   Plan plan = read_plan_file(request.body, notes, errors);
-  plan.name = request.query_value("name").value_or("Imported plan").substr(0, 200);
+  plan.name = to_utf8(request.query_value("name").value_or("Imported plan"), 200);
   refuse_if_any(errors);
   if (query_flag(request, "dry_run")) {
     auto out = plan_json(plan);

@@ -6,6 +6,8 @@
 #include <set>
 
 #include "api/contract_fields.hpp"
+#include "core/base/text.hpp"
+#include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 
@@ -41,7 +43,7 @@ Response json_response(int status, const Ordered& body, std::string_view content
   Response response;
   response.status = status;
   response.header("Content-Type", std::string(content_type));
-  response.body = body.dump(-1, ' ', false, Ordered::error_handler_t::replace);
+  response.body = to_wire(body);
   return response;
 }
 
@@ -49,7 +51,7 @@ void check_query(const Request& request, std::initializer_list<std::string_view>
   std::vector<FieldError> errors;
   for (const auto& [key, value] : request.query) {
     if (std::find(allowed.begin(), allowed.end(), key) == allowed.end())
-      errors.push_back({"/" + key.substr(0, 60), "unknown_field", "no such query parameter"});
+      errors.push_back({"/" + to_utf8(key, 60), "unknown_field", "no such query parameter"});
   }
   if (!errors.empty()) throw_problem(422, "validation", "unknown query parameter", errors);
 }
@@ -96,7 +98,7 @@ std::set<std::string> wanted_fields(const Request& request, const std::string& l
     if (!known.empty() && !known.contains(name)) {
       std::string all;
       for (const auto& each : known) all += (all.empty() ? "" : ", ") + each;
-      bad_query("fields", "has an unknown name: \"" + name.substr(0, 60) + "\"; there are " + all);
+      bad_query("fields", "has an unknown name: \"" + to_utf8(name, 60) + "\"; there are " + all);
     }
     wanted.insert(name);
     from = end + 1;

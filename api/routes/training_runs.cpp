@@ -8,6 +8,7 @@
 #include "api/routes/job_answer.hpp"
 #include "api/routes/learning.hpp"
 #include "api/routes/support.hpp"
+#include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 
@@ -70,7 +71,7 @@ Response create(LearningServices& l, const Request& request) {
   auto request_body = body;
   request_body["dataset"] = to_string(dataset->id);
   Job job = value_or_problem(l.training.submit(dataset->id, std::string(ml::task_name(wanted.spec.task)),
-                                               request_body.dump(), request.principal.name));
+                                               to_wire(request_body), request.principal.name));
   l.services.audit(request, "training.start " + to_string(job.id));
   return job_outcome(l.services, request, std::move(job), [&](const Job& done) { return finished(l, done); });
 }

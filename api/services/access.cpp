@@ -10,6 +10,7 @@
 
 #include "api/http/idempotency.hpp"
 #include "api/services/secrets.hpp"
+#include "core/base/text.hpp"
 
 namespace anchord::api {
 namespace {
@@ -147,7 +148,7 @@ Result<NewToken> AccessService::create_token(std::string_view name, const std::v
     if (!parse_role(word)) {
       return make_error(
           Errc::invalid_argument,
-          "'" + word.substr(0, 40) + "' is no role; viewer, integrator, gateway, engineer, operator, admin");
+          "'" + to_utf8(word, 40) + "' is no role; viewer, integrator, gateway, engineer, operator, admin");
     }
   }
   const UtcTime now = state_->clock.now();

@@ -6,6 +6,7 @@
 #include "api/json/clues_json.hpp"
 #include "api/json/reader.hpp"
 #include "api/services/calibration_service.hpp"
+#include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 
@@ -102,7 +103,7 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
   out.settings_json = body.is_object() ? [&] {
     Json settings = body;
     settings.erase("missions");
-    return settings.dump();
+    return to_wire(settings);
   }() : "{}";
   return out;
 }

@@ -9,6 +9,7 @@
 #include "api/services/calibration_place.hpp"
 #include "api/services/job_service.hpp"
 #include "api/services/kit_profiles.hpp"
+#include "core/base/to_wire.hpp"
 #include "core/geo/enu.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "core/localize/fuse.hpp"
@@ -331,7 +332,7 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
   if (const auto& site = solved.flights.front().mission.site) {
     if (const auto found = deps_.anchors.site(*site)) base = site_base(found.value());
   }
-  out.provenance_json = Json{
+  out.provenance_json = to_wire(Json{
       {"profiles", std::move(solved.profiles)},
       {"base", std::move(base)},
       {"n_clues", solved.n_clues},
@@ -340,8 +341,7 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
       {"sigma_m", noise_provenance(request, solved.models)},
       {"models", models.predictor.empty() ? Json(nullptr) : Json(flight_models_json(models, solved.models))},
       {"uncorrected", std::move(uncorrected)},
-      {"flights",
-       std::move(flights)}}.dump();
+      {"flights", std::move(flights)}});
   out.evidence_json = evidence_json(solved.evidence);
   out.created = deps_.clock.now();
   out.id.uuid = job.job().id.uuid;  // the job and what it makes share their number

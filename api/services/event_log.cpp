@@ -4,6 +4,7 @@
 
 #include "api/json/live_writer.hpp"
 #include "api/live/hub.hpp"
+#include "core/base/text.hpp"
 
 namespace anchord::api {
 

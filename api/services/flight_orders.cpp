@@ -5,6 +5,7 @@
 #include "api/live/hub.hpp"
 #include "api/services/event_log.hpp"
 #include "api/services/flight_state.hpp"
+#include "core/base/to_wire.hpp"
 #include "core/ports/plan_store.hpp"
 
 namespace anchord::api {
@@ -218,7 +219,7 @@ void FlightService::State::publish() {
   const auto key = to_string(f.mission);
   const bool moved = n != f.shown;
   if (moved || now - f.shown_s >= 1) {
-    deps.hub.publish(Topic::procedure, procedure(f).dump(), t_us, key);
+    deps.hub.publish(Topic::procedure, to_wire(procedure(f)), t_us, key);
     f.shown_s = now;
   }
   const auto step = f.engine.state().step;
@@ -226,15 +227,16 @@ void FlightService::State::publish() {
   if (turning || climbing || moved) {
     for (const auto& [anchor, clues] : f.engine.clues()) {
       if (!clues.turn.empty() && (turning || moved))
-        deps.hub.publish(Topic::mission_turn, turn_json(f.mission, anchor, t_us, clues, turning).dump(), t_us,
-                         key + to_string(anchor), anchor);
-      if (!clues.heights.empty() && (climbing || moved))
-        deps.hub.publish(Topic::mission_height, height_json(f.mission, anchor, t_us, clues, climbing).dump(),
+        deps.hub.publish(Topic::mission_turn, to_wire(turn_json(f.mission, anchor, t_us, clues, turning)),
                          t_us, key + to_string(anchor), anchor);
+      if (!clues.heights.empty() && (climbing || moved))
+        deps.hub.publish(Topic::mission_height,
+                         to_wire(height_json(f.mission, anchor, t_us, clues, climbing)), t_us,
+                         key + to_string(anchor), anchor);
     }
   }
   if (moved && f.engine.decision())
-    deps.hub.publish(Topic::mission_grid, grid_json(f.mission, t_us, f.engine, f.frame).dump(), t_us, key);
+    deps.hub.publish(Topic::mission_grid, to_wire(grid_json(f.mission, t_us, f.engine, f.frame)), t_us, key);
   f.shown = n;
 }
 

@@ -7,6 +7,7 @@
 #include "api/services/event_log.hpp"
 #include "api/services/flight_state.hpp"
 #include "api/services/mission_service.hpp"
+#include "core/base/to_wire.hpp"
 #include "core/localize/live_flight.hpp"
 #include "core/ports/plan_store.hpp"
 
@@ -219,14 +220,14 @@ Result<void> FlightService::override_item(const MissionId& mission, const std::s
 std::string FlightService::procedure_text(const MissionId& mission) {
   const std::scoped_lock lock(state_->mutex);
   const auto* flight = state_->flight_of(mission);
-  return flight == nullptr ? std::string{} : state_->procedure(*flight).dump();
+  return flight == nullptr ? std::string{} : to_wire(state_->procedure(*flight));
 }
 
 std::string FlightService::grid_text(const MissionId& mission) {
   const std::scoped_lock lock(state_->mutex);
   const auto* f = state_->flight_of(mission);
   return f == nullptr ? std::string{}
-                      : grid_json(mission, state_->deps.clock.now().us(), f->engine, f->frame).dump();
+                      : to_wire(grid_json(mission, state_->deps.clock.now().us(), f->engine, f->frame));
 }
 
 std::vector<std::string> FlightService::turn_texts(const MissionId& mission) {
@@ -236,7 +237,7 @@ std::vector<std::string> FlightService::turn_texts(const MissionId& mission) {
     const bool running = f->engine.state().step == procedure::Step::turn;
     for (const auto& [anchor, clues] : f->engine.clues()) {
       if (!clues.turn.empty())
-        out.push_back(turn_json(mission, anchor, state_->deps.clock.now().us(), clues, running).dump());
+        out.push_back(to_wire(turn_json(mission, anchor, state_->deps.clock.now().us(), clues, running)));
     }
   }
   return out;
@@ -249,7 +250,7 @@ std::vector<std::string> FlightService::height_texts(const MissionId& mission) {
     const bool running = f->engine.state().step == procedure::Step::height_search;
     for (const auto& [anchor, clues] : f->engine.clues()) {
       if (!clues.heights.empty())
-        out.push_back(height_json(mission, anchor, state_->deps.clock.now().us(), clues, running).dump());
+        out.push_back(to_wire(height_json(mission, anchor, state_->deps.clock.now().us(), clues, running)));
     }
   }
   return out;

@@ -10,6 +10,7 @@
 #include "api/application.hpp"
 #include "api/live/hub.hpp"
 #include "api/services/event_log.hpp"
+#include "core/base/to_wire.hpp"
 #include "core/localize/live_flight.hpp"
 
 namespace anchord::api {
@@ -57,20 +58,18 @@ bool ActiveFlight::to_keep(std::string& text) {
   const auto told = stored_clues(clues());
   if (!flying()) {
     // What turns and height searches told outlives the flight: every calibration of it asks for it.
-    if (!told.empty()) text = nlohmann::ordered_json{{"landed", true}, {"clues", told}}.dump();
+    if (!told.empty()) text = to_wire(nlohmann::ordered_json{{"landed", true}, {"clues", told}});
     return true;
   }
   const auto& o = frame.origin();
-  text = nlohmann::ordered_json{
-      {"plan", nlohmann::json::parse(stored(plan).document_json)},
-      {"plan_id", to_string(plan.id)},
-      {"plan_revision", plan.version},
-      {"manual", manual},
-      {"origin", {o.lat_deg, o.lon_deg, o.height_m}},
-      {"home_m", {home_m.x(), home_m.y(), home_m.z()}},
-      {"state", stored_state(engine.state())},
-      {"clues",
-       told}}.dump();
+  text = to_wire(nlohmann::ordered_json{{"plan", nlohmann::json::parse(stored(plan).document_json)},
+                                        {"plan_id", to_string(plan.id)},
+                                        {"plan_revision", plan.version},
+                                        {"manual", manual},
+                                        {"origin", {o.lat_deg, o.lon_deg, o.height_m}},
+                                        {"home_m", {home_m.x(), home_m.y(), home_m.z()}},
+                                        {"state", stored_state(engine.state())},
+                                        {"clues", told}});
   return true;
 }
 

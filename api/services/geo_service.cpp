@@ -1,5 +1,7 @@
 #include "api/services/geo_service.hpp"
 
+#include "core/base/text.hpp"
+
 namespace anchord::api {
 
 Result<const Projection*> GeoService::projection(int epsg, const std::string& datum) {
@@ -7,8 +9,7 @@ Result<const Projection*> GeoService::projection(int epsg, const std::string& da
     return make_error(Errc::invalid_argument, "the datum of the base is not stated (crs.frame of the site)");
   const auto geographic = geographic_epsg(datum);
   if (!geographic)
-    return make_error(Errc::unsupported,
-                      "the datum '" + datum.substr(0, 40) + "' is none that is known here");
+    return make_error(Errc::unsupported, "the datum '" + to_utf8(datum, 40) + "' is none that is known here");
   const std::scoped_lock lock(mutex_);
   const std::pair key{epsg, *geographic};
   auto found = projections_.find(key);

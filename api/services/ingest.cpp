@@ -9,6 +9,8 @@
 #include "api/json/wire_rows.hpp"
 #include "api/services/mission_service.hpp"
 #include "api/services/row_source.hpp"
+#include "core/base/text.hpp"
+#include "core/base/to_wire.hpp"
 #include "core/ports/store.hpp"
 
 namespace anchord::api {
@@ -96,7 +98,7 @@ class IngestRun {
     if (!dry_run) errors.push_back({"/dry_run", "wrong_type", "must be true or false"});
     for (const auto& [key, value] : request_.query) {
       if (key != "atomic" && key != "dry_run" && key != "mission")
-        errors.push_back({"/" + key.substr(0, 60), "unknown_field", "no such query parameter"});
+        errors.push_back({"/" + to_utf8(key, 60), "unknown_field", "no such query parameter"});
     }
     if (const auto text = request_.query_value("mission")) {
       const auto id = parse_uuid(*text);
@@ -337,7 +339,7 @@ class IngestRun {
     if (dry_run_) body["dry_run"] = true;
     Response response;
     response.header("Content-Type", "application/json");
-    response.body = body.dump(-1, ' ', false, Ordered::error_handler_t::replace);
+    response.body = to_wire(body);
     return response;
   }
 

@@ -11,6 +11,7 @@
 #include "api/http/problem.hpp"
 #include "api/json/wire_resources.hpp"
 #include "api/live/hub.hpp"
+#include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 namespace {
@@ -42,7 +43,7 @@ struct JobService::State {
   bool started{false}, stopping{false};
 
   void tell(const Job& job) {
-    hub.publish(Topic::jobs, job_json(job).dump(), clock.now().us(), to_string(job.id));
+    hub.publish(Topic::jobs, to_wire(job_json(job)), clock.now().us(), to_string(job.id));
   }
   void save(const Job& job) {
     // A job that cannot be written is still shown live; after a restart it counts as interrupted.

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "api/json/kit_profile_json.hpp"
+#include "core/base/text.hpp"
 
 namespace anchord::api {
 namespace {
@@ -35,7 +36,7 @@ Result<std::string> KitProfiles::kit_of(const std::string& device) {
                       });
     if (flew) return mission.kit;
   }
-  return make_error(Errc::not_found, "no kit and no tag of a kit is called " + device.substr(0, 60));
+  return make_error(Errc::not_found, "no kit and no tag of a kit is called " + to_utf8(device, 60));
 }
 
 Result<std::optional<KitProfiles::InUse>> KitProfiles::for_flights(const std::string& kit,

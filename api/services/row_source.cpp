@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/json/reader.hpp"
+#include "core/base/text.hpp"
 
 namespace anchord::api {
 
@@ -171,8 +172,8 @@ CsvRows::CsvRows(RowKind kind, std::string_view header, std::vector<FieldError>&
   for (const auto& name : *names) {
     const auto it = columns(kind).find(name);
     if (it == columns(kind).end()) {
-      errors.push_back({"/" + name.substr(0, 60), "unknown_field",
-                        "there is no column '" + name.substr(0, 60) + "' here"});
+      errors.push_back(
+          {"/" + to_utf8(name, 60), "unknown_field", "there is no column '" + to_utf8(name, 60) + "' here"});
     } else if (std::find(pointers_.begin(), pointers_.end(), it->second) != pointers_.end()) {
       errors.push_back({"/" + name, "duplicate_key", "column '" + name + "' stands twice"});
     } else {

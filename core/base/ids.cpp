@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <random>
 
+#include "core/base/text.hpp"
+
 namespace anchord {
 
 Uuid make_uuid_v7(UtcTime now) {
@@ -35,7 +37,7 @@ std::string to_string(const Uuid& id) {
 
 Result<Uuid> parse_uuid(std::string_view text) {
   const auto bad = [&] {
-    return make_error(Errc::invalid_argument, "'" + std::string(text.substr(0, 40)) + "' is not a UUID");
+    return make_error(Errc::invalid_argument, "'" + to_utf8(text, 40) + "' is not a UUID");
   };
   if (text.size() != 36) return bad();
   Uuid id;
@@ -76,9 +78,9 @@ Result<NetworkId> parse_network_id(std::string_view text) {
   const auto [end, error] =
       std::from_chars(digits.data(), digits.data() + digits.size(), id.value, hex ? 16 : 10);
   if (digits.empty() || error != std::errc{} || end != digits.data() + digits.size()) {
-    return make_error(Errc::invalid_argument,
-                      "'" + std::string(text.substr(0, 40)) +
-                          "' is not a network id like 0x6a2f or 27183 (32 bits at most)");
+    return make_error(
+        Errc::invalid_argument,
+        "'" + to_utf8(text, 40) + "' is not a network id like 0x6a2f or 27183 (32 bits at most)");
   }
   return id;
 }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/base/text.hpp"
+
 namespace anchord {
 
 UtcTime UtcTime::from_seconds(double s) { return {static_cast<std::int64_t>(std::llround(s * 1e9))}; }
@@ -25,8 +27,8 @@ std::string to_rfc3339(UtcTime t) {
 Result<UtcTime> parse_rfc3339(std::string_view text) {
   using namespace std::chrono;
   const auto bad = [&] {
-    return make_error(Errc::invalid_argument, "'" + std::string(text.substr(0, 40)) +
-                                                  "' is not a UTC time like 2026-05-04T10:11:12.345678Z");
+    return make_error(Errc::invalid_argument,
+                      "'" + to_utf8(text, 40) + "' is not a UTC time like 2026-05-04T10:11:12.345678Z");
   };
   const auto digits = [&](std::size_t at, std::size_t n) -> int {
     int value = 0;

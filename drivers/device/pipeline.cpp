@@ -1,10 +1,13 @@
 #include "drivers/device/pipeline.hpp"
 
+#include "core/base/text.hpp"
 #include "drivers/device/settings.hpp"
 
 namespace anchord::device {
 
 namespace {
+
+constexpr std::size_t k_most_word = 200, k_most_reason = 10'000;
 
 /// The wire says microseconds, and a row's time is part of its identity: one that is sent again, by a replay
 /// or by another program, must be the row that was stored.
@@ -61,15 +64,25 @@ class Pipeline::Device final : public DriverOutput {
     if (status.position) owner_.rover_ = status;
     owner_.sink_.rover(slot_, status);
   }
-  void identified(const Identity& identity) override { owner_.sink_.identified(slot_, identity); }
+  // The door of every driver: whatever a device said, its words go on as UTF-8 and bounded.
+  void identified(const Identity& identity) override {
+    Identity clean = identity;
+    for (auto* word : {&clean.model, &clean.firmware, &clean.serial}) *word = to_utf8(*word, k_most_word);
+    owner_.sink_.identified(slot_, clean);
+  }
   void clock(const ClockReading& reading) override { owner_.sink_.clock(slot_, reading); }
   void base(const BaseStation& station) override { owner_.sink_.base(slot_, station); }
   void heard() override { owner_.sink_.heard(slot_); }
-  void dropped(std::string_view reason, std::uint64_t n) override { owner_.sink_.dropped(slot_, reason, n); }
-  void answer(std::uint64_t id, Result<std::string> json) override { owner_.sink_.answer(slot_, id, json); }
+  void dropped(std::string_view reason, std::uint64_t n) override {
+    owner_.sink_.dropped(slot_, to_utf8(reason, k_most_word), n);
+  }
+  void answer(std::uint64_t id, Result<std::string> json) override {
+    if (!json) json = make_error(json.error().code, to_utf8(json.error().message));
+    owner_.sink_.answer(slot_, id, json);
+  }
   void corrections(std::string_view bytes) override { owner_.correct(bytes); }
   void hang_up(std::string_view why, std::int64_t wait_ns) override {
-    owner_.sink_.hang_up(slot_, why, wait_ns);
+    owner_.sink_.hang_up(slot_, to_utf8(why, k_most_reason), wait_ns);
   }
   std::optional<RoverStatus> rover_position() const override { return owner_.rover_; }
   timing::TimeBase& time() override { return owner_.time_; }

@@ -2,6 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/base/to_wire.hpp"
+
 namespace anchord::device {
 namespace {
 
@@ -17,8 +19,6 @@ Json object_of(const std::string& text) {
   return json.is_object() ? json : Json::object();
 }
 
-std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
-
 Result<Json> parsed(std::string_view text) {
   if (text.size() > 65'536) return make_error(Errc::bad_frame, "longer than 64 KiB");
   auto json = Json::parse(text.begin(), text.end(), nullptr, false);
@@ -29,23 +29,24 @@ Result<Json> parsed(std::string_view text) {
 }  // namespace
 
 std::string to_json(const Settings& s) {
-  return dump({{"id", s.id},
-               {"kind", s.kind},
-               {"name", s.name},
-               {"address", s.address},
-               {"options", object_of(s.options_json)}});
+  return to_wire(Json{{"id", s.id},
+                      {"kind", s.kind},
+                      {"name", s.name},
+                      {"address", s.address},
+                      {"options", object_of(s.options_json)}});
 }
 
 Result<Settings> parse_settings(std::string_view text) {
   BOOST_OUTCOME_TRY(const auto json, parsed(text));
   Settings out{text_of(json, "id"), text_of(json, "kind"), text_of(json, "name"), text_of(json, "address"),
                "{}"};
-  if (const auto it = json.find("options"); it != json.end() && it->is_object()) out.options_json = dump(*it);
+  if (const auto it = json.find("options"); it != json.end() && it->is_object())
+    out.options_json = to_wire(*it);
   return out;
 }
 
 std::string to_json(const Command& c) {
-  return dump({{"id", c.id}, {"name", c.name}, {"arguments", object_of(c.arguments_json)}});
+  return to_wire(Json{{"id", c.id}, {"name", c.name}, {"arguments", object_of(c.arguments_json)}});
 }
 
 Result<Command> parse_command(std::string_view text) {
@@ -55,7 +56,7 @@ Result<Command> parse_command(std::string_view text) {
     out.id = it->get<std::uint64_t>();
   out.name = text_of(json, "name");
   if (const auto it = json.find("arguments"); it != json.end() && it->is_object())
-    out.arguments_json = dump(*it);
+    out.arguments_json = to_wire(*it);
   return out;
 }
 

@@ -2,12 +2,13 @@
 
 #include <charconv>
 
+#include "core/base/text.hpp"
+
 namespace anchord::link {
 namespace {
 
 Error bad(std::string_view text, std::string_view why) {
-  return make_error(Errc::invalid_argument,
-                    "\"" + std::string(text.substr(0, 200)) + "\": " + std::string(why));
+  return make_error(Errc::invalid_argument, "\"" + to_utf8(text, 200) + "\": " + std::string(why));
 }
 
 template <class T>

@@ -15,6 +15,8 @@
 #include <filesystem>
 #include <set>
 
+#include "core/base/text.hpp"
+
 namespace anchord::link {
 namespace {
 
@@ -113,7 +115,10 @@ std::vector<SerialPort> list_serial_ports(const std::string& by_id_folder, const
     std::error_code gone;  // pulled while we look
     const auto device = fs::canonical(it->path(), gone);
     if (gone || !seen.insert(device.string()).second) continue;
-    out.push_back({it->path().string(), device.string(), it->path().filename().string()});
+    // A maker's name that is not UTF-8 could not come back as an address: such a port goes by its device.
+    const auto path = it->path().string();
+    out.push_back(
+        {is_utf8(path) ? path : device.string(), device.string(), to_utf8(it->path().filename().string())});
   }
   for (fs::directory_iterator it(dev_folder, error), end; !error && it != end; it.increment(error)) {
     const auto name = it->path().filename().string();

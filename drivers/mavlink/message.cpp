@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/base/check.hpp"
+#include "core/base/text.hpp"
 #include "drivers/mavlink/message_table.hpp"
 
 namespace anchord::mavlink {
@@ -198,9 +199,8 @@ double Message::real(std::string_view field, std::size_t index) const {
 
 std::string Message::text(std::string_view field) const {
   const Field& f = at(field, 0);
-  std::string out(payload_.begin() + static_cast<std::ptrdiff_t>(f.offset),
-                  payload_.begin() + static_cast<std::ptrdiff_t>(f.offset + f.count));
-  return out.substr(0, out.find('\0'));  // full fields have no zero at the end
+  const std::string_view all(reinterpret_cast<const char*>(payload_.data()) + f.offset, f.count);
+  return to_utf8(all.substr(0, all.find('\0')));  // full fields have no zero at the end
 }
 
 Message& Message::set(std::string_view field, std::int64_t value, std::size_t index) {

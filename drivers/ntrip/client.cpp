@@ -7,6 +7,8 @@
 #include <cstdlib>
 #include <fstream>
 
+#include "core/base/text.hpp"
+
 namespace anchord::ntrip {
 namespace {
 
@@ -181,7 +183,7 @@ bool Client::status_line(const std::string& line) {
   } else if (code == 409) {
     refuse("mount \"" + options_.mount + "\" is busy", 30);
   } else {
-    refuse("the caster answers \"" + line.substr(0, 80) + "\"", 30);
+    refuse("the caster answers \"" + to_utf8(line, 80) + "\"", 30);
   }
   return false;
 }
@@ -196,8 +198,7 @@ void Client::header_line(const std::string& line) {
 
 void Client::table_line(const std::string& line) {
   if (line.starts_with("STR;") && mounts_.size() < 200) {
-    mounts_ +=
-        (mounts_.empty() ? "" : ", ") + line.substr(4, std::min<std::size_t>(line.find(';', 4) - 4, 40));
+    mounts_ += (mounts_.empty() ? "" : ", ") + to_utf8(line.substr(4, line.find(';', 4) - 4), 40);
   }
   if (line.starts_with("ENDSOURCETABLE")) table_end();
 }

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "core/base/to_wire.hpp"
 #include "drivers/pozyx/registers.hpp"
 #include "drivers/pozyx/unit.hpp"
 
@@ -83,7 +84,7 @@ Json to_json(const Applied& applied) {
 std::string devices_text(const std::vector<std::uint16_t>& ids) {
   Json list = Json::array();
   for (const std::uint16_t id : ids) list.push_back(to_string(NetworkId{id}));
-  return Json{{"devices", list}}.dump();
+  return to_wire(Json{{"devices", list}});
 }
 
 /// How the settings of another device stand to the tag's own.
@@ -98,28 +99,27 @@ Json compared(std::uint16_t id, const UwbSettings& own, const Result<UwbSettings
   out["done"] = same;
   if (!same) {
     out["why"] = "has " + pozyx::to_string(s);
-    if (s.gain_db) out["why"] = out["why"].get<std::string>() + ", gain " + Json(*s.gain_db).dump() + " dB";
+    if (s.gain_db) out["why"] = out["why"].get<std::string>() + ", gain " + to_wire(Json(*s.gain_db)) + " dB";
   }
   return out;
 }
 
 std::string range_text(const RangeInfo& info) {
-  return Json{{"distance_m", info.distance_mm * 1e-3}, {"rss_dbm", info.rss_dbm}}.dump();
+  return to_wire(Json{{"distance_m", info.distance_mm * 1e-3}, {"rss_dbm", info.rss_dbm}});
 }
 
 std::string identity_text(const TagIdentity& tag, const UwbSettings& uwb) {
-  return Json{{"network_id", to_string(NetworkId{tag.id})},
-              {"model", tag.model()},
-              {"firmware", tag.firmware_text()},
-              {"selftest", tag.selftest},
-              {"selftest_passed", (tag.selftest & 0x30) == 0x30},
-              {"uwb", to_json(uwb)},
-              {"lights", "blinked"}}
-      .dump();
+  return to_wire(Json{{"network_id", to_string(NetworkId{tag.id})},
+                      {"model", tag.model()},
+                      {"firmware", tag.firmware_text()},
+                      {"selftest", tag.selftest},
+                      {"selftest_passed", (tag.selftest & 0x30) == 0x30},
+                      {"uwb", to_json(uwb)},
+                      {"lights", "blinked"}});
 }
 
 std::string light_text(std::uint16_t id) {
-  return Json{{"network_id", to_string(NetworkId{id})}, {"lights", "blinked"}}.dump();
+  return to_wire(Json{{"network_id", to_string(NetworkId{id})}, {"lights", "blinked"}});
 }
 
 Result<std::vector<std::uint16_t>> ids_of(std::string_view option, const Json& value) {
@@ -275,7 +275,7 @@ Script<Result<std::string>> Unit::get_uwb(std::string arguments) {
       out["devices"].push_back(compared(id, own.value(), theirs));
     }
   }
-  co_return out.dump();
+  co_return to_wire(out);
 }
 
 Script<Result<std::string>> Unit::set_uwb(std::string arguments) {
@@ -285,7 +285,7 @@ Script<Result<std::string>> Unit::set_uwb(std::string arguments) {
   if (json.value("all", Json(true)) != Json(true)) {
     const Result<UwbSettings> set = co_await session_->tag.set_uwb(wanted.value());
     if (!set) co_return set.error();
-    co_return to_json(set.value()).dump();
+    co_return to_wire(to_json(set.value()));
   }
   std::vector<std::uint16_t> others;
   if (json.contains("devices")) {
@@ -297,7 +297,7 @@ Script<Result<std::string>> Unit::set_uwb(std::string arguments) {
   }
   const Result<Applied> applied = co_await session_->tag.set_uwb_everywhere(wanted.value(), others);
   if (!applied) co_return applied.error();
-  co_return to_json(applied.value()).dump();
+  co_return to_wire(to_json(applied.value()));
 }
 
 Script<Result<std::string>> Unit::push_positions(std::string arguments) {
@@ -306,7 +306,7 @@ Script<Result<std::string>> Unit::push_positions(std::string arguments) {
   const Result<Applied> applied =
       co_await session_->tag.push_positions(push.value().devices, push.value().save);
   if (!applied) co_return applied.error();
-  co_return to_json(applied.value()).dump();
+  co_return to_wire(to_json(applied.value()));
 }
 
 Script<Result<std::string>> Unit::range_between(std::string arguments) {

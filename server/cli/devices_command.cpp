@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/json/flight_requests.hpp"
+#include "core/base/to_wire.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/server_address.hpp"
 #include "server/http/http_client.hpp"
@@ -94,13 +95,13 @@ void print_device(const Json& d) {
   for (const char* key : {"reason", "conflict"}) {
     if (!text(d, key).empty()) std::printf("    %s\n", text(d, key).c_str());
   }
-  if (n > 0) std::printf("    not used: %s\n", dropped.dump().c_str());
+  if (n > 0) std::printf("    not used: %s\n", to_wire(dropped).c_str());
 }
 
 int show(const Options& options, const Result<Json>& list, const char* none, void (*print)(const Json&)) {
   if (!list) return fail(list.error().message);
   if (options.json) {
-    std::printf("%s\n", list.value().dump(1).c_str());
+    std::printf("%s\n", to_wire(list.value(), 1).c_str());
     return 0;
   }
   for (const auto& item : list.value()) print(item);
@@ -153,7 +154,7 @@ int add(const Options& options, Server& server) {
   body.value()["kind"] = options.kind;
   body.value()["address"] = options.address;
   body.value()["name"] = options.name.empty() ? options.kind : options.name;
-  const auto made = server.call("POST", "/api/v1/devices", body.value().dump());
+  const auto made = server.call("POST", "/api/v1/devices", to_wire(body.value()));
   if (!made) return fail(made.error().message);
   std::printf("%s\n", text(made.value(), "id").c_str());
   return 0;
@@ -163,14 +164,14 @@ int settings(const Options& options, Server& server) {
   const auto device = find(server, options.device);
   if (!device) return fail(device.error().message);
   if (options.settings.empty()) {
-    std::printf("%s\n", device.value().dump(1).c_str());
+    std::printf("%s\n", to_wire(device.value(), 1).c_str());
     return 0;
   }
   const auto patch = patch_of(options.settings);
   if (!patch) return fail(patch.error().message, 2);
   server.header("If-Match", "*");
   const auto changed =
-      server.call("PATCH", "/api/v1/devices/" + text(device.value(), "id"), patch.value().dump());
+      server.call("PATCH", "/api/v1/devices/" + text(device.value(), "id"), to_wire(patch.value()));
   if (!changed) return fail(changed.error().message);
   print_device(changed.value());
   return 0;
@@ -193,9 +194,9 @@ int act(const Options& options, Server& server) {
     if (!body["arguments"].is_object()) return fail("--arguments is a JSON object", 2);
   }
   const auto done =
-      server.call("POST", "/api/v1/devices/" + text(device.value(), "id") + "/actions", body.dump());
+      server.call("POST", "/api/v1/devices/" + text(device.value(), "id") + "/actions", to_wire(body));
   if (!done) return fail(done.error().message);
-  std::printf("%s\n", done.value().value("result", Json()).dump(1).c_str());
+  std::printf("%s\n", to_wire(done.value().value("result", Json()), 1).c_str());
   return 0;
 }
 
@@ -240,7 +241,7 @@ void add_devices_command(CLI::App& app, int& exit_code) {
   identify->add_option("anchor", options->anchor, "Network id of an anchor, e.g. 0x6a21");
   identify->callback([run, options] {
     options->action = "identify";
-    if (!options->anchor.empty()) options->arguments = Json{{"network_id", options->anchor}}.dump();
+    if (!options->anchor.empty()) options->arguments = to_wire(Json{{"network_id", options->anchor}});
     run(act);
   });
   auto* action = command->add_subcommand("action", "Anything else a device can be asked");

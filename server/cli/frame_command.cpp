@@ -8,6 +8,7 @@
 
 #include "api/imports/csv_table.hpp"
 #include "api/json/frame_json.hpp"
+#include "core/base/to_wire.hpp"
 #include "core/geo/enu.hpp"
 #include "core/geo/frame_fit.hpp"
 #include "server/cli/commands.hpp"
@@ -117,7 +118,7 @@ int fit_command(const Arguments& a) {
     json["origin"] = nullptr;
     if (const auto& at = pairs.value().origin)
       json["origin"] = {{"lon", at->lon_deg}, {"lat", at->lat_deg}, {"h_m", at->height_m}};
-    std::printf("%s\n", json.dump(1).c_str());
+    std::printf("%s\n", to_wire(json, 1).c_str());
   } else {
     print(pairs.value(), fit.value());
   }

@@ -13,6 +13,7 @@
 
 #include "api/json/flight_requests.hpp"
 #include "api/json/wire_rows.hpp"
+#include "core/base/to_wire.hpp"
 #include "core/types/mission.hpp"
 #include "drivers/device/replay.hpp"
 #include "server/cli/progress.hpp"
@@ -33,8 +34,8 @@ int fail(const Error& error, int code) {
   return code;
 }
 
-std::string line_of(const Fix& fix) { return api::fix_json(fix, std::nullopt).dump() + '\n'; }
-std::string line_of(const Range& range) { return api::range_json(range, std::nullopt).dump() + '\n'; }
+std::string line_of(const Fix& fix) { return to_wire(api::fix_json(fix, std::nullopt)) + '\n'; }
+std::string line_of(const Range& range) { return to_wire(api::range_json(range, std::nullopt)) + '\n'; }
 
 /// Missions of the recording on a server: its own where the server has it, else a new one.
 class Missions {

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "core/base/to_wire.hpp"
 #include "drivers/sim/rig.hpp"
 #include "drivers/sim/scenario_file.hpp"
 #include "server/cli/progress.hpp"
@@ -36,7 +37,7 @@ void print(const sim::ServedDevice& d, bool json) {
                     {"port", d.tcp_port != 0 ? Json(d.tcp_port) : Json(nullptr)},
                     {"address", d.address},
                     {"plugged", d.plugged}};
-    std::printf("%s\n", line.dump().c_str());
+    std::printf("%s\n", to_wire(line).c_str());
   } else {
     std::printf("%-12s %-6s %-5s %s%s\n", d.name.c_str(), d.kind.c_str(), d.format.c_str(), d.address.c_str(),
                 d.plugged ? (d.link.empty() ? "" : (" -> " + d.pty).c_str()) : " (unplugged)");

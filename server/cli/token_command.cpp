@@ -3,6 +3,7 @@
 
 #include "api/json/flight_requests.hpp"
 #include "api/services/access.hpp"
+#include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/server_address.hpp"
 #include "server/http/http_client.hpp"
@@ -80,9 +81,8 @@ int create(const Options& options) {
   if (!expires) return fail(expires.error().message, 2);
   if (const auto url = server_of(options)) {
     std::string roles;
-    for (const auto& role : options.roles)
-      roles += (roles.empty() ? "\"" : ",\"") + server::json_escaped(role) + "\"";
-    std::string body = R"({"name":")" + server::json_escaped(options.name) + R"(","roles":[)" + roles + "]";
+    for (const auto& role : options.roles) roles += (roles.empty() ? "" : ",") + json_text(role);
+    std::string body = R"({"name":)" + json_text(options.name) + R"(,"roles":[)" + roles + "]";
     if (expires.value()) body += R"(,"expires_at":")" + to_rfc3339(*expires.value()) + "\"";
     return through_server(options, *url, "POST", "/api/v1/tokens", body + "}");
   }

@@ -1,5 +1,6 @@
 #include "server/http/http_client.hpp"
 
+#include "core/base/text.hpp"
 #include "server/http/text.hpp"
 
 // Last, and never before Eigen: it brings <resolv.h>, whose macro `_res` breaks Eigen's headers.
@@ -40,8 +41,7 @@ Result<HttpClient> HttpClient::to(std::string_view url, std::chrono::millisecond
   const auto scheme = url.find("://");
   const auto word = url.substr(0, scheme == std::string_view::npos ? 0 : scheme);
   const auto bad = [&] {
-    return make_error(Errc::invalid_argument,
-                      "'" + std::string(url.substr(0, 80)) + "' is not like http://127.0.0.1:8420");
+    return make_error(Errc::invalid_argument, "'" + to_utf8(url, 80) + "' is not like http://127.0.0.1:8420");
   };
   if (word != "http" && word != "https") return bad();
   const auto slash = url.find('/', scheme + 3);

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <thread>
 
+#include "core/base/text.hpp"
 #include "server/http/sessions.hpp"
 
 namespace anchord::server {
@@ -16,8 +17,8 @@ constexpr std::string_view k_full =
 
 Result<tcp::endpoint> parse_endpoint(std::string_view text) {
   const auto bad = [&] {
-    return make_error(Errc::invalid_argument, "'" + std::string(text.substr(0, 80)) +
-                                                  "' is not an address like 127.0.0.1:8420 or [::1]:8420");
+    return make_error(Errc::invalid_argument,
+                      "'" + to_utf8(text, 80) + "' is not an address like 127.0.0.1:8420 or [::1]:8420");
   };
   const auto colon = text.rfind(':');
   if (colon == std::string_view::npos) return bad();

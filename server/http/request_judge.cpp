@@ -5,6 +5,7 @@
 #include <charconv>
 #include <optional>
 
+#include "core/base/text.hpp"
 #include "server/http/target.hpp"
 #include "server/http/text.hpp"
 
@@ -78,7 +79,12 @@ std::optional<Refusal> take_fields(const ParsedHead& head, const HttpLimits& lim
   for (const auto& [name, value] : head.fields) {
     const std::string key = lower(name);
     if (!plain_value(value)) return Refusal{400, "malformed", "control character in header " + key};
-    const auto [at, fresh] = request.headers.try_emplace(key, trim(value));
+    const bool text = is_utf8(value);
+    // What decides or names something must be what it says; of the rest only a message or the log may tell.
+    if (!text && (std::ranges::find(k_single, key) != k_single.end() || key.starts_with("if-")))
+      return Refusal{400, "malformed", "header " + key + " is not UTF-8"};
+    const auto [at, fresh] =
+        request.headers.try_emplace(key, text ? std::string(trim(value)) : to_utf8(trim(value)));
     if (fresh) continue;
     if (std::ranges::find(k_single, key) != k_single.end()) {
       return Refusal{400, "malformed", "header " + key + " is there twice"};

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "core/base/text.hpp"
 #include "server/http/text.hpp"
 
 namespace anchord::server {
@@ -34,7 +35,7 @@ std::optional<std::string> decode(std::string_view text, bool query) {
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) return std::nullopt;
     out.push_back(c);
   }
-  if (!valid_utf8(out)) return std::nullopt;
+  if (!is_utf8(out)) return std::nullopt;
   return out;
 }
 
@@ -69,7 +70,7 @@ std::variant<Target, std::string> split_target(std::string_view target, std::siz
   }
   const auto mark = target.find('?');
   auto path = decode(target.substr(0, mark), false);
-  if (!path) return "broken percent-encoding in the path"s;
+  if (!path) return "broken percent-encoding in the path, or bytes that are not UTF-8"s;
   parts.path = path->empty() ? "/" : std::move(*path);
   if (has_dot_segment(parts.path) || parts.path.find('\\') != std::string::npos)
     return "dot segments in the path"s;
@@ -80,7 +81,8 @@ std::variant<Target, std::string> split_target(std::string_view target, std::siz
     auto key = decode(pair.substr(0, equals), true);
     auto value =
         decode(equals == std::string_view::npos ? std::string_view{} : pair.substr(equals + 1), true);
-    if (!key || !value || key->empty()) return "broken percent-encoding in the query"s;
+    if (!key || !value || key->empty())
+      return "broken percent-encoding in the query, or bytes that are not UTF-8"s;
     if (parts.query.size() >= max_parameters)
       return "more than " + std::to_string(max_parameters) + " query parameters";
     if (!parts.query.emplace(*key, std::move(*value)).second)

@@ -13,7 +13,5 @@ bool iequals(std::string_view a, std::string_view b);
 std::string_view trim(std::string_view text);
 /// At every separator; "a,,b" gives three.
 std::vector<std::string_view> split(std::string_view text, char separator);
-/// Well-formed UTF-8 (no overlong forms, no surrogates).
-bool valid_utf8(std::string_view text);
 
 }  // namespace anchord::server

@@ -9,6 +9,8 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "core/base/to_wire.hpp"
+
 namespace anchord::server {
 
 namespace fs = std::filesystem;
@@ -41,7 +43,7 @@ Result<std::vector<DeviceConfig>> read_devices(const fs::path& file) {
     device.name = word("name");
     device.address = word("address");
     if (const auto it = item.find("options"); it != item.end() && it->is_object())
-      device.options_json = it->dump();
+      device.options_json = to_wire(*it);
     if (const auto it = item.find("enabled"); it != item.end() && it->is_boolean())
       device.enabled = it->get<bool>();
     if (const auto it = item.find("version"); it != item.end() && it->is_number_unsigned()) {
@@ -63,9 +65,7 @@ Result<void> write_devices(const fs::path& file, const std::vector<DeviceConfig>
                     {"enabled", d.enabled},
                     {"version", d.version}});
   }
-  const auto text = Json{{"schema", "anchord.devices/1"}, {"devices", std::move(list)}}.dump(
-                        1, ' ', false, Json::error_handler_t::replace) +
-                    "\n";
+  const auto text = to_wire(Json{{"schema", "anchord.devices/1"}, {"devices", std::move(list)}}, 1) + "\n";
   const fs::path part = file.string() + ".part";
   const int fd = ::open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
   const bool written = fd >= 0 &&

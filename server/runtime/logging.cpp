@@ -4,11 +4,8 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
-#include <array>
-#include <cstdio>
-
+#include "core/base/text.hpp"
 #include "core/base/time.hpp"
-#include "server/http/text.hpp"
 
 namespace anchord::server {
 namespace {
@@ -67,34 +64,14 @@ bool start_logging(std::string_view level) {
 void log(LogLevel level, std::string_view message, std::initializer_list<LogField> fields) {
   if (!logger().should_log(of(level))) return;
   std::string line = R"({"ts":")" + to_rfc3339(SystemClock().now()) + R"(","level":")";
-  line.append(word(level)).append(R"(","msg":")").append(json_escaped(message)).append("\"");
+  line.append(word(level)).append(R"(","msg":)");
+  append_json_text(line, message);
   for (const auto& [key, value] : fields) {
-    line.append(",\"").append(json_escaped(key)).append("\":\"").append(json_escaped(value)).append("\"");
+    append_json_text(line += ',', key);
+    append_json_text(line += ':', value);
   }
   line.append("}");
   logger().log(of(level), spdlog::string_view_t(line.data(), line.size()));
-}
-
-std::string json_escaped(std::string_view text) {
-  std::string out;
-  out.reserve(text.size() + 8);
-  const bool utf8 = valid_utf8(text);
-  for (const char c : text) {
-    const auto u = static_cast<unsigned char>(c);
-    if (c == '"' || c == '\\') {
-      out.push_back('\\');
-      out.push_back(c);
-    } else if (u < 0x20 || u == 0x7f) {
-      std::array<char, 8> code{};
-      std::snprintf(code.data(), code.size(), "\\u%04x", static_cast<unsigned>(u));
-      out.append(code.data());
-    } else if (u >= 0x80 && !utf8) {
-      out.append("\xef\xbf\xbd");
-    } else {
-      out.push_back(c);
-    }
-  }
-  return out;
 }
 
 }  // namespace anchord::server

@@ -17,7 +17,4 @@ bool start_logging(std::string_view level);
 /// line or send codes to a terminal. Never hand a token to it. Thread-safe.
 void log(LogLevel level, std::string_view message, std::initializer_list<LogField> fields = {});
 
-/// As a JSON string without the quotes; bytes that are not UTF-8 become U+FFFD.
-std::string json_escaped(std::string_view text);
-
 }  // namespace anchord::server

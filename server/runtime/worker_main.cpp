@@ -16,6 +16,7 @@
 #include <thread>
 #include <vector>
 
+#include "core/base/to_wire.hpp"
 #include "server/runtime/frames.hpp"
 #include "server/runtime/worker_process.hpp"
 
@@ -88,7 +89,7 @@ int worker_main() {
   std::mutex writing;
   const auto send = [&writing](const Json& json) {
     const std::scoped_lock lock(writing);
-    if (!write_frame(k_socket, json.dump(-1, ' ', false, Json::error_handler_t::replace))) _exit(1);
+    if (!write_frame(k_socket, to_wire(json))) _exit(1);
   };
   // Hears the server while the work goes on: a word to stop, or its end.
   std::thread listener([&stop] {

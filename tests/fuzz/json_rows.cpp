@@ -6,6 +6,7 @@
 
 #include "api/json/reader.hpp"
 #include "api/json/wire_rows.hpp"
+#include "core/base/to_wire.hpp"
 #include "tests/fuzz/check.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -22,14 +23,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (errors.empty()) {
       fuzz::require(range.range.distance_m >= 0.05 && range.range.distance_m <= 150,
                     "a range is 0.05 to 150 m");
-      (void)api::range_json(range.range, 1).dump();
+      (void)to_wire(api::range_json(range.range, 1));
     }
     errors.clear();
     const Fix fix = api::read_fix(row, std::nullopt, errors);
     if (errors.empty()) {
       fuzz::require(std::isfinite(fix.position.lat_deg) && std::abs(fix.position.lat_deg) <= 90,
                     "latitude in bounds");
-      (void)api::fix_json(fix, std::nullopt).dump();
+      (void)to_wire(api::fix_json(fix, std::nullopt));
     }
   }
   (void)api::from_base64(std::string_view(reinterpret_cast<const char*>(data), size));

@@ -1,0 +1,104 @@
+#include "core/base/text.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "core/base/to_wire.hpp"
+
+namespace anchord {
+namespace {
+
+const std::string k_fffd = "\xef\xbf\xbd";
+
+std::string replaced(int n, const std::string& rest = {}) {
+  std::string out;
+  while (n-- > 0) out += k_fffd;
+  return out + rest;
+}
+
+// Tables 3-8 to 3-11 of the Unicode standard, chapter 3.9.
+TEST(ToUtf8, ReplacesEachMaximalSubpartOnce) {
+  EXPECT_EQ(to_utf8("\xc0\xaf\xe0\x80\xbf\xf0\x81\x82\x41"), replaced(8, "A"));
+  EXPECT_EQ(to_utf8("\xed\xa0\x80\xed\xbf\xbf\xed\xaf\x41"), replaced(8, "A"));
+  EXPECT_EQ(to_utf8("\xf4\x91\x92\x93\xff\x41\x80\xbf\x42"), replaced(5, "A") + replaced(2, "B"));
+  EXPECT_EQ(to_utf8("\xe1\x80\xe2\xf0\x91\x92\xf1\xbf\x41"), replaced(4, "A"));
+}
+
+TEST(ToUtf8, LeavesWellFormedTextAsItIs) {
+  for (const std::string text : {"", "ICY 401",
+                                 "Br\xc3\xbc"
+                                 "cke",
+                                 "\xe2\x82\xac", "\xf0\x9f\x9a\x81", "\xf4\x8f\xbf\xbf"}) {
+    EXPECT_TRUE(is_utf8(text)) << text;
+    EXPECT_EQ(to_utf8(text), text);
+  }
+}
+
+TEST(ToUtf8, CutsBetweenCharactersAndNeverInsideOne) {
+  const std::string text = "a\xc3\xbc\xe2\x82\xac\xf0\x9f\x9a\x81";  // 1 + 2 + 3 + 4 bytes
+  const std::size_t borders[] = {0, 1, 1, 3, 3, 3, 6, 6, 6, 6, 10, 10};
+  for (std::size_t n = 0; n < std::size(borders); ++n) {
+    EXPECT_EQ(to_utf8(text, n), text.substr(0, borders[n])) << n;
+    EXPECT_TRUE(is_utf8(to_utf8("\xff" + text + "\xff", n))) << n;
+    EXPECT_LE(to_utf8("\xff" + text + "\xff", n).size(), n);
+  }
+}
+
+TEST(ToUtf8, MakesUtf8OfEveryPairOfBytesAndOfEveryCutCharacter) {
+  for (int a = 0; a < 256; ++a) {
+    for (int b = 0; b < 256; ++b) {
+      const std::string bytes{static_cast<char>(a), static_cast<char>(b)};
+      const auto text = to_utf8(bytes);
+      ASSERT_TRUE(is_utf8(text)) << a << ' ' << b;
+      ASSERT_EQ(is_utf8(bytes), text == bytes) << a << ' ' << b;
+    }
+  }
+  const std::string whole = "\xf0\x9f\x9a\x81";
+  for (std::size_t n = 1; n < whole.size(); ++n) EXPECT_EQ(to_utf8(whole.substr(0, n)), k_fffd);
+}
+
+TEST(Printable, ShowsWhatWouldMoveATerminal) {
+  EXPECT_EQ(printable("a\x1b[2Jb\r\n\x7f\xc2\x9b"
+                      "c\xff"),
+            "a\\x1b[2Jb\\x0d\\x0a\\x7f\\x9bc" + k_fffd);
+  EXPECT_EQ(printable("Br\xc3\xbc"
+                      "cke \xc2\xa0"),
+            "Br\xc3\xbc"
+            "cke \xc2\xa0");
+}
+
+TEST(JsonText, IsOneJsonStringOnOneLineForEveryPairOfBytes) {
+  for (int a = 0; a < 256; ++a) {
+    for (int b = 0; b < 256; ++b) {
+      const std::string bytes{'x', static_cast<char>(a), static_cast<char>(b)};
+      const auto text = json_text(bytes);
+      const auto read = nlohmann::json::parse(text, nullptr, false);
+      ASSERT_TRUE(read.is_string()) << a << ' ' << b;
+      ASSERT_EQ(read.get<std::string>(), to_utf8(bytes));
+      for (const char c : text)
+        ASSERT_TRUE(static_cast<unsigned char>(c) >= 0x20 && c != 0x7f) << a << ' ' << b;
+    }
+  }
+  EXPECT_EQ(json_text("\xc2\x9b"
+                      "2J"),
+            R"("\u009b2J")");  // CSI of an eight-bit terminal
+  EXPECT_EQ(json_text("say \"a\\b\"\n"), R"("say \"a\\b\"\n")");
+}
+
+TEST(ToWire, ThrowsOnNoBytesAndWritesNoNumberThatIsNone) {
+  const nlohmann::ordered_json json{{"reason",
+                                     "ICY 4\xff\xfe"
+                                     "1 Nicht erlaubt"},
+                                    {"key \xf0\x9f", std::nan("")},
+                                    {"far", std::numeric_limits<double>::infinity()}};
+  const auto text = to_wire(json);
+  EXPECT_EQ(text, "{\"reason\":\"ICY 4" + replaced(2) + "1 Nicht erlaubt\",\"key " + k_fffd +
+                      "\":null,\"far\":null}");
+  EXPECT_TRUE(nlohmann::json::parse(to_wire(json, 2), nullptr, false).is_object());
+}
+
+}  // namespace
+}  // namespace anchord
