@@ -2,9 +2,9 @@
 
 # cmd_bench [NAME...]: tables on stdout; see tests/bench/README.md.
 cmd_bench() {
-  install_packages
+  install_packages test bench
   ensure_node
-  [[ -d tests/node_modules ]] || (cd tests && npm ci --loglevel=error)
+  ensure_test_packages
   build_preset bench
   ANCHORD_BINARY=$PWD/build/bench/anchord ANCHORD_BENCH_DIR=$PWD/build/bench node tests/bench/bench.mjs "$@"
 }

@@ -1,13 +1,25 @@
-# build_preset PRESET [ninja targets...]: configure and build, with progress.
-build_preset() {
-  local preset=$1 ; shift
-  local -a settings=()
+configure_preset() {
+  local preset=$1 ; local -a settings=()
   [[ -d $private_boost_dir/usr ]] && settings+=("-DCMAKE_PREFIX_PATH=$PWD/$private_boost_dir/usr")
   say "configuring $preset"
   cmake --preset "$preset" "${settings[@]}" || die "cmake --preset $preset failed: its own message stands above"
-  say "building $preset with $(jobs_count) jobs"
-  NINJA_STATUS='[%f/%t %es] ' ninja -C "build/$preset" -j "$(jobs_count)" "$@" ||
+}
+
+# build_preset PRESET [ninja targets...]: configure and build, with progress.
+build_preset() {
+  local preset=$1 jobs ; shift
+  configure_preset "$preset"
+  jobs=$(jobs_count)
+  say "building $preset with $jobs jobs"
+  NINJA_STATUS='[%f/%t %es] ' ninja -C "build/$preset" -j "$jobs" "$@" ||
     die "the build failed: its own message stands above"
+}
+
+cmd_setup() {
+  install_packages
+  ensure_node
+  configure_preset release
+  say "ready to build: ./dev build"
 }
 
 cmd_build() {

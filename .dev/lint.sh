@@ -1,6 +1,9 @@
 # Only looks. Layout, bug patterns, headers that stand alone, the two contracts.
 
-own_sources() { git ls-files --cached --others --exclude-standard -- '*.cpp' '*.hpp'; }
+own_sources() {
+  git rev-parse --is-inside-work-tree >/dev/null 2>&1 || die "lint and fmt read the list of files from git: no git here, or no repository"
+  git ls-files --cached --others --exclude-standard -- '*.cpp' '*.hpp'
+}
 
 cmd_fmt() {
   install_packages lint
@@ -10,14 +13,17 @@ cmd_fmt() {
 
 # clang-tidy remembers what was clean: a file is looked at again when it, any own header or the rules changed.
 tidy() {
-  local seen=build/lint failed=0 rules file
+  local seen=build/lint failed=0 rules file files mark jobs
   mkdir -p "$seen"
+  jobs=$(jobs_count)
+  files=$(own_sources | grep '\.cpp$' | grep -v '^tests/')
   rules=$(own_sources | grep '\.hpp$' | tr '\n' '\0' | xargs -0 cat .clang-tidy | sha256sum | cut -c1-16)
   while read -r file; do
-    local mark="$seen/$(sha256sum <"$file" | cut -c1-16)-$rules"
+    mark=$(sha256sum <"$file" | cut -c1-16)
+    mark=$seen/$mark-$rules
     [[ -e $mark ]] || printf '%s\0%s\0' "$file" "$mark"
-  done < <(own_sources | grep '\.cpp$' | grep -v '^tests/') >"$seen/todo"
-  xargs -0 -r -n 2 -P "$(jobs_count)" bash -c '
+  done <<<"$files" >"$seen/todo"
+  xargs -0 -r -n 2 -P "$jobs" bash -c '
     echo "    $1" >&2
     timeout 300 clang-tidy-16 -p build/release --quiet --extra-arg=-Wno-unknown-warning-option "$1" 2>/dev/null && touch "$2"' tidy <"$seen/todo" || failed=1
   return $failed
@@ -34,12 +40,12 @@ cmd_lint() {
     case $part in
       layout) own_sources | tr '\n' '\0' | xargs -0 -r clang-format --dry-run --Werror || wrong+=(layout) ;;
       contracts)
-        [[ -d tests/node_modules ]] || (cd tests && npm ci --loglevel=error)
+        ensure_test_packages
         node tests/node_modules/@redocly/cli/bin/cli.js lint --config tests/lint/redocly.yaml api/openapi.yaml || wrong+=(openapi)
         node tests/lint/asyncapi.mjs api/asyncapi.yaml || wrong+=(asyncapi) ;;
       headers) build_preset dev all_verify_interface_header_sets || wrong+=(headers) ;;
       bugs)
-        cmake --preset release >/dev/null
+        configure_preset release >/dev/null
         tidy || wrong+=(bugs) ;;
       *) die "lint knows layout, contracts, headers, bugs; not '$part'" ;;
     esac

@@ -15,7 +15,7 @@ ensure_node() {
     if ! command -v npm >/dev/null; then
       local missing_text="nodejs npm"
       say "no npm here: installing Debian's nodejs and npm"
-      apt update || true
+      apt update -o APT::Update::Error-Mode=any || say "apt-get update failed: going on with the package lists at hand"
       apt install -y --no-install-recommends --no-remove nodejs npm || die "apt-get could not install nodejs and npm"
     fi
     say "Node $(node --version 2>/dev/null || echo absent) is older than $node_minimum: installing Node 22 from npm into $node_private"

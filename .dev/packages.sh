@@ -18,7 +18,8 @@ apt() {
     command -v sudo >/dev/null || die "not root and no sudo: run as root: apt-get install -y --no-install-recommends $missing_text"
     root=(sudo)
   fi
-  "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -q "$@"
+  # A machine just started may be installing its updates: wait for it.
+  "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -q -o DPkg::Lock::Timeout=300 "$@"
 }
 
 # libboost1.81-dev declares a conflict with every other libboost*-dev. Where such a one is installed it stays (other
@@ -42,23 +43,29 @@ unpack_private_boost() {
 install_packages() {
   command -v dpkg-query >/dev/null && command -v apt-get >/dev/null ||
     die "this needs Debian 12: no apt-get here. Install the packages of .ci/packages by other means and call cmake --preset release"
-  local -a missing=() ; local name boost_conflict missing_text
+  local -a missing=() ; local name names boost_conflict missing_text network=
   boost_conflict=$(other_boost)
+  names=$(package_names "$@")
+  [[ -n $names ]] || die ".ci/packages lists nothing: is this checkout complete?"
   while read -r name; do
     [[ $name == libboost1.81-dev && -n $boost_conflict ]] && continue
     is_installed "$name" || missing+=("$name")
-  done < <(package_names "$@")
+  done <<<"$names"
   if ((${#missing[@]})); then
     missing_text="${missing[*]}"
     say "installing ${#missing[@]} Debian packages: $missing_text"
-    apt update || say "apt-get update failed: going on with the package lists at hand"
+    # Error-Mode: without it a machine with no network "updates" with exit code 0.
+    apt update -o APT::Update::Error-Mode=any || {
+      network="; apt-get update failed too: is there a network?"
+      say "apt-get update failed: going on with the package lists at hand"
+    }
     for name in "${missing[@]}"; do
       apt-cache show "$name" >/dev/null 2>&1 ||
-        die "Debian package '$name' is not available from the sources of this machine (needed: Debian 12 bookworm, main)"
+        die "Debian package '$name' is not available from the sources of this machine (needed: Debian 12 bookworm, main)$network"
     done
     # --no-remove: nothing of the user's goes away for our sake.
     apt install -y --no-install-recommends --no-remove "${missing[@]}" ||
-      die "apt-get could not install: $missing_text (its own message stands above)"
+      die "apt-get could not install: $missing_text (its own message stands above)$network"
   fi
   if [[ -n $boost_conflict ]]; then unpack_private_boost "$boost_conflict"; fi
 }

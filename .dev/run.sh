@@ -13,29 +13,31 @@ stop_children() {
 # Status code of GET PATH on the running server; bash's own sockets, so that curl is not needed.
 http_status() {
   local line
-  exec 9<>"/dev/tcp/${run_address%:*}/${run_address#*:}" || return 1
-  printf 'GET %s HTTP/1.1\r\nHost: %s\r\nConnection: close\r\n\r\n' "$1" "$run_address" >&9
+  connect || return 1
+  printf 'GET %s HTTP/1.1\r\nHost: %s\r\nConnection: close\r\n\r\n' "$1" "$run_address" >&9 || true
   IFS= read -r -t 2 line <&9 || line=
   exec 9>&- 9<&-
   [[ $line =~ ^HTTP/1\.1\ ([0-9]{3}) ]] && echo "${BASH_REMATCH[1]}"
-} 2>/dev/null
+}
+# Descriptor 9 to the server. Nobody there is an answer, not an error to print.
+connect() { { exec 9<>"/dev/tcp/${run_address%:*}/${run_address#*:}"; } 2>/dev/null; }
 
 # Status code of POST PATH with a JSON body; the answer's body is left in $reply.
 http_post() {
-  local line length=0
+  local line length=0 status LC_ALL=C   # lengths are in bytes
   reply=
-  exec 9<>"/dev/tcp/${run_address%:*}/${run_address#*:}" || return 1
+  connect || return 1
   printf 'POST %s HTTP/1.1\r\nHost: %s\r\nContent-Type: application/json\r\nContent-Length: %d\r\nConnection: close\r\n\r\n%s' \
-    "$1" "$run_address" "${#2}" "$2" >&9
+    "$1" "$run_address" "${#2}" "$2" >&9 || true
   IFS= read -r -t 5 line <&9 || line=
-  local status=${line:9:3}
+  status=${line:9:3}
   while IFS= read -r -t 5 line <&9 && [[ $line != $'\r' ]]; do
     [[ ${line,,} =~ ^content-length:\ *([0-9]+) ]] && length=${BASH_REMATCH[1]}
   done
   ((length == 0)) || IFS= read -r -t 5 -N "$length" reply <&9 || true
   exec 9>&- 9<&-
   echo "$status"
-} 2>/dev/null
+}
 
 # Simulated devices on their ports; $devices is what the server is told of them. Fails when they do not come up.
 start_devices() {
@@ -58,10 +60,14 @@ start_devices() {
 fly_devices() {
   local mission
   while true; do
-    [[ $(http_post /api/v1/missions "{\"name\":\"demonstration\",\"kit\":\"simulated\",\"frame\":\"wgs84\",\"track_point\":\"gnss_antenna\",\"tags\":[{\"tag\":\"0x6e01\",\"antenna\":0,\"lever_arm_body_m\":[0.12,0,-0.28]}]}"; echo "$reply" >build/run-mission.json) == 201 ]] || return 1
+    [[ $(http_post /api/v1/missions "{\"name\":\"demonstration\",\"kit\":\"simulated\",\"frame\":\"wgs84\",\"track_point\":\"gnss_antenna\",\"tags\":[{\"tag\":\"0x6e01\",\"antenna\":0,\"lever_arm_body_m\":[0.12,0,-0.28]}]}"; echo "$reply" >build/run-mission.json) == 201 ]] || {
+      say "the simulated flight cannot start, the server is up without it: $(cat build/run-mission.json)"
+      return
+    }
     mission=$(sed -n 's/.*"id":"\([0-9a-f-]*\)".*/\1/p' build/run-mission.json)
     for _ in {1..240}; do sleep 1; done
-    http_post "/api/v1/missions/$mission/actions" '{"action":"finish"}' >/dev/null
+    http_post "/api/v1/missions/$mission/actions" '{"action":"finish"}' >/dev/null ||
+      say "the simulated flight could not be finished: no answer from $run_address"
   done
 }
 
@@ -95,9 +101,9 @@ cmd_run() {
     fly_devices &
   else
     rm -rf "$flight"
-    "$server" simulate flight --seed "$seed" --out "$flight"
+    "$server" simulate flight --seed "$seed" --out "$flight" || die "the flight could not be simulated: see above"
     "$server" replay "$flight" --url "http://$run_address" --speed 1 --loop &
   fi
   run_pids+=($!)
-  wait "$server_pid"
+  wait "$server_pid" || die "the server ended with exit code $?: its own message stands above"
 }

@@ -1,16 +1,18 @@
 # cmd_test [ctest arguments...]: everything through CTest, one honest summary line at the end.
 cmd_test() {
-  install_packages
+  install_packages test ${ANCHORD_FRESH_ROOT:+fresh}
   ensure_node
   build_preset release
-  local log=$build_dir/test.log junit=$build_dir/junit.xml status=0
+  local log=$build_dir/test.log junit=$build_dir/junit.xml status=0 jobs
+  jobs=$(jobs_count)
   rm -f "$junit"
   say "testing"
-  ctest --test-dir "$build_dir" --output-on-failure --no-tests=error -j "$(jobs_count)" \
+  ctest --test-dir "$build_dir" --output-on-failure --no-tests=error -j "$jobs" \
     --output-junit "$PWD/$junit" "$@" 2>&1 | tee "$log" || status=$?
   [[ -s $junit ]] || die "ctest wrote no results (exit code $status): see $log"
   summarize "$junit" || status=1
-  ((status == 0)) || return 1
+  # The summary is the sentence.
+  ((status == 0)) || exit 1
 }
 
 # Counts from CTest's own JUnit file, case by case: what neither ran well nor was skipped by its own word has failed,

@@ -24,15 +24,15 @@ set(drivers_source "^(nlohmann/json\\.hpp$|sys/|arpa/|netinet/|linux/|termios\\.
 
 set(api_own "^(api/|core/)")
 set(api_header "^(${everywhere}|nlohmann/json_fwd\\.hpp$)")
-set(api_source "^(nlohmann/json\\.hpp$|simdjson\\.h$|zlib\\.h$|openssl/)")
+set(api_source "^(nlohmann/json\\.hpp$|zlib\\.h$|openssl/)")
 
 set(server/storage_own "^(server/storage/|migrations/|${base_types_ports})")
 set(server/storage_header "^(${everywhere})")
-set(server/storage_source "^(sqlite3\\.h$|SQLiteCpp/|soci/|openssl/|sys/|unistd\\.h$|fcntl\\.h$)")
+set(server/storage_source "^(sqlite3\\.h$|SQLiteCpp/|openssl/|sys/|unistd\\.h$|fcntl\\.h$)")
 
 set(server_own "^(server/|api/|drivers/|core/|migrations/|web/assets\\.hpp$)")
 set(server_header "^(${everywhere}|boost/)")
-set(server_source "^(CLI/|linux/(filter|seccomp)\\.h$|spawn\\.h$|httplib\\.h$|spdlog/|fmt/|prometheus/|openssl/|toml\\+\\+/|toml\\.hpp$|nlohmann/json|simdjson\\.h$|zlib\\.h$|sys/|netdb\\.h$|netinet/|arpa/|unistd\\.h$|fcntl\\.h$|signal\\.h$|poll\\.h$|pthread\\.h$|termios\\.h$)")
+set(server_source "^(CLI/|linux/(filter|seccomp)\\.h$|spawn\\.h$|httplib\\.h$|spdlog/|fmt/|prometheus/|openssl/|toml\\+\\+/|toml\\.hpp$|nlohmann/json|zlib\\.h$|sys/|netdb\\.h$|netinet/|arpa/|unistd\\.h$|fcntl\\.h$|signal\\.h$|poll\\.h$|pthread\\.h$|termios\\.h$)")
 
 set(migrations_own "^(migrations/|core/base/)")
 set(migrations_header "^$")

@@ -28,7 +28,7 @@ before(async () => {
   await new Promise((done) => socket.listen(0, '127.0.0.1', done));
   const { port } = socket.address();
   await new Promise((done) => socket.close(done));
-  server = await startServer({ auth: 'off', args: ['--drone-address', `tcp://localhost:${port}`] });
+  server = await startServer({ auth: 'off', args: ['--drone-address', `tcp://127.0.0.1:${port}`] });
   let said = '';
   aircraft = spawn(binary, ['simulate', 'drone', '--mavlink', `tcp-listen://127.0.0.1:${port}`, '--url', server.url, '--ready', '2'], { stdio: ['ignore', 'ignore', 'pipe'] });
   aircraft.stderr.setEncoding('utf8').on('data', (text) => (said += text));
