@@ -25,7 +25,7 @@ std::int64_t steady_us() {
 Conversation::Conversation(Hub& hub, Principal principal)
     : hub_(hub), principal_(std::move(principal)), outbox_(hub.counters()) {}
 
-Conversation::~Conversation() { on_close(); }
+Conversation::~Conversation() = default;
 
 void Conversation::on_open(std::function<void()> wake) {
   wake_ = std::move(wake);
@@ -37,16 +37,10 @@ void Conversation::on_open(std::function<void()> wake) {
                                {"hb_ms", 1000},         {"topics", topic_names},
                                {"roles", roles}};
   say(to_wire(hello));
-  if (hub_.join(*this))
-    joined_ = true;
-  else
-    close(4029, "too_many");
+  membership_ = hub_.join(*this);
 }
 
-void Conversation::on_close() {
-  if (joined_) hub_.leave(*this);
-  joined_ = false;
-}
+void Conversation::on_close() { membership_ = {}; }
 
 void Conversation::on_text(std::string_view text) {
   Json message;
@@ -125,7 +119,7 @@ void Conversation::subscribe(const Json& message) {
     const std::scoped_lock lock(mutex_);
     outbox_.add(subscription);
   }
-  const Resumed start = hub_.subscribe(*this, topic->topic, since);
+  const Resumed start = membership_.subscribe(topic->topic, since);
   nlohmann::ordered_json ack{{"op", "ack"},
                              {"id", id ? Json(*id) : Json()},
                              {"sub", subscription.id},
@@ -162,7 +156,7 @@ void Conversation::unsubscribe(const Json& message) {
     return refuse(message, 422, "validation", errors.front().pointer + ": " + errors.front().detail);
   const auto it = subscriptions_.find(static_cast<std::uint64_t>(*sub));
   if (it == subscriptions_.end()) return refuse(message, 404, "not-found", "there is no such subscription");
-  hub_.unsubscribe(*this, it->second);
+  membership_.unsubscribe(it->second);
   {
     const std::scoped_lock lock(mutex_);
     outbox_.remove(it->first);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "api/live/frames.hpp"
+#include "core/base/check.hpp"
 
 namespace anchord::api {
 namespace {
@@ -96,10 +97,7 @@ void Hub::send(Topic topic, std::vector<LiveElement> elements, std::int64_t t_us
     channel.history_bytes += message->bytes();
     trim(about, channel, now_us);
   }
-  for (auto it = channel.listeners.begin(); it != channel.listeners.end();
-       it = channel.listeners.upper_bound(*it)) {
-    (*it)->on_message(topic, message);
-  }
+  for (const auto& [listener, subscriptions] : channel.listeners) listener->on_message(topic, message);
 }
 
 void Hub::trim(const TopicInfo& topic, Channel& channel, std::int64_t now_us) {
@@ -115,12 +113,36 @@ void Hub::trim(const TopicInfo& topic, Channel& channel, std::int64_t now_us) {
   }
 }
 
-bool Hub::join(HubListener& listener) {
+HubMembership::HubMembership(HubMembership&& other) noexcept
+    : hub_(std::exchange(other.hub_, nullptr)), listener_(std::exchange(other.listener_, nullptr)) {}
+
+HubMembership& HubMembership::operator=(HubMembership&& other) noexcept {
+  HubMembership ended(std::move(*this));
+  hub_ = std::exchange(other.hub_, nullptr);
+  listener_ = std::exchange(other.listener_, nullptr);
+  return *this;
+}
+
+HubMembership::~HubMembership() {
+  if (hub_ != nullptr) hub_->leave(*listener_);
+}
+
+Resumed HubMembership::subscribe(Topic topic,
+                                 const std::optional<std::pair<std::string, std::uint64_t>>& since) {
+  ANCHORD_CHECK(hub_ != nullptr, "a subscription to " << info(topic).name << " without a membership");
+  return hub_->subscribe(*listener_, topic, since);
+}
+
+void HubMembership::unsubscribe(Topic topic) {
+  ANCHORD_CHECK(hub_ != nullptr, "the end of a subscription to " << info(topic).name << " without a membership");
+  hub_->unsubscribe(*listener_, topic);
+}
+
+HubMembership Hub::join(HubListener& listener) {
   const std::scoped_lock lock(mutex_);
-  if (connections_.size() >= k_max_connections) return false;
-  connections_.insert(&listener);
+  ANCHORD_CHECK(connections_.insert(&listener).second, "a listener joins the hub twice");
   if (closed_) listener.on_bye(k_bye_code, k_bye_reason);  // came between shut_down() and the closing door
-  return true;
+  return {*this, listener};
 }
 
 void Hub::leave(HubListener& listener) {
@@ -133,7 +155,7 @@ Resumed Hub::subscribe(HubListener& listener, Topic topic,
                        const std::optional<std::pair<std::string, std::uint64_t>>& since) {
   const std::scoped_lock lock(mutex_);
   auto& channel = channels_[static_cast<std::size_t>(topic)];
-  channel.listeners.insert(&listener);
+  ++channel.listeners[&listener];
   Resumed out;
   out.last_seq = channel.seq;
   out.t_us = clock_.now().us();
@@ -168,7 +190,7 @@ void Hub::unsubscribe(HubListener& listener, Topic topic) {
   const std::scoped_lock lock(mutex_);
   auto& listeners = channels_[static_cast<std::size_t>(topic)].listeners;
   const auto it = listeners.find(&listener);
-  if (it != listeners.end()) listeners.erase(it);
+  if (it != listeners.end() && --it->second == 0) listeners.erase(it);
 }
 
 void Hub::tick() {

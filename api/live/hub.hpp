@@ -84,6 +84,30 @@ class HubListener {
   virtual void on_bye(std::uint16_t code, std::string_view reason) = 0;
 };
 
+class Hub;
+struct Resumed;
+
+/// One listener's place among the clients of a hub: as long as it lives the listener is told, and nobody without
+/// one can subscribe. Its end takes the listener out of everything, and waits for a call that is under way; never
+/// end it inside a call of the hub to this listener. One thread at a time.
+class HubMembership {
+ public:
+  HubMembership() = default;
+  HubMembership(HubMembership&& other) noexcept;
+  HubMembership& operator=(HubMembership&& other) noexcept;
+  ~HubMembership();
+
+  explicit operator bool() const { return hub_ != nullptr; }
+  Resumed subscribe(Topic topic, const std::optional<std::pair<std::string, std::uint64_t>>& since);
+  void unsubscribe(Topic topic);
+
+ private:
+  friend class Hub;
+  HubMembership(Hub& hub, HubListener& listener) : hub_(&hub), listener_(&listener) {}
+  Hub* hub_{nullptr};
+  HubListener* listener_{nullptr};
+};
+
 struct HubCounters {
   std::atomic<std::uint64_t> dropped{0}, conflated{0}, slow_disconnects{0}, published{0};
 };
@@ -104,7 +128,6 @@ class Hub {
   static constexpr std::size_t k_event_history = 10'000;
   static constexpr std::int64_t k_stream_history_us = 30'000'000;
   static constexpr std::size_t k_stream_history_bytes = 8u << 20;
-  static constexpr std::size_t k_max_connections = 64;
 
   Hub(const Clock& clock, std::string server_name);
 
@@ -120,12 +143,8 @@ class Hub {
   /// Forgets a key of a state topic (a removed mission).
   void forget(Topic topic, const std::string& key);
 
-  /// False when there are too many connections.
-  bool join(HubListener& listener);
-  void leave(HubListener& listener);
-  Resumed subscribe(HubListener& listener, Topic topic,
-                    const std::optional<std::pair<std::string, std::uint64_t>>& since);
-  void unsubscribe(HubListener& listener, Topic topic);
+  /// How many may come is decided where connections are accepted (ws.max_connections), not here.
+  [[nodiscard]] HubMembership join(HubListener& listener);
 
   /// Every 50 ms: sends what was collected; wakes clients with due frames; a heartbeat each second.
   void tick();
@@ -136,6 +155,11 @@ class Hub {
   HubCounters& counters() { return counters_; }
 
  private:
+  friend class HubMembership;
+  void leave(HubListener& listener);
+  Resumed subscribe(HubListener& listener, Topic topic,
+                    const std::optional<std::pair<std::string, std::uint64_t>>& since);
+  void unsubscribe(HubListener& listener, Topic topic);
   void send(Topic topic, std::vector<LiveElement> elements, std::int64_t t_us);
   struct Channel {
     std::uint64_t seq{0};
@@ -145,7 +169,7 @@ class Hub {
     std::map<std::string, std::pair<LiveElement, std::int64_t>> newest;
     std::vector<LiveElement> collected;
     std::int64_t collected_t_us{0};
-    std::multiset<HubListener*> listeners;
+    std::map<HubListener*, std::size_t> listeners;  ///< with the number of their subscriptions
   };
   void trim(const TopicInfo& topic, Channel& channel, std::int64_t now_us);
 
