@@ -1,4 +1,4 @@
-#include "server/app/base64.hpp"
+#include "server/http/base64.hpp"
 
 #include <cstdint>
 

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "core/base/text.hpp"
+#include "server/http/base64.hpp"
 #include "server/http/target.hpp"
 #include "server/http/text.hpp"
 
@@ -140,12 +141,19 @@ std::optional<Refusal> judge_upgrade(const ParsedHead& head, JudgedHead& good) {
   if (request.header("upgrade").empty()) return std::nullopt;
   if (!listed(request.header("connection"), "upgrade")) return std::nullopt;  // an offer we may ignore
   if (!iequals(request.header("upgrade"), "websocket")) return std::nullopt;
-  if (head.version < 11 || request.method != api::Method::get || good.framing != Framing::none ||
-      request.header("sec-websocket-key").size() != 24) {
+  if (head.version < 11 || request.method != api::Method::get || good.framing != Framing::none) {
     return Refusal{400, "malformed", "WebSocket handshake is not complete"};
   }
+  // RFC 6455 section 4.4: the answer names the version that is spoken here.
   if (request.header("sec-websocket-version") != "13") {
-    return Refusal{426, "malformed", "only WebSocket version 13"};
+    return Refusal{426,
+                   "malformed",
+                   "only WebSocket version 13",
+                   {{"Sec-WebSocket-Version", "13"}, {"Upgrade", "websocket"}}};
+  }
+  const auto key = base64_decoded(request.header("sec-websocket-key"));
+  if (!key || key->size() != 16) {
+    return Refusal{400, "malformed", "Sec-WebSocket-Key must be 16 bytes in base64"};
   }
   good.websocket = true;
   return std::nullopt;

@@ -40,6 +40,7 @@ struct Refusal {
   int status{400};
   std::string_view type{"malformed"};  ///< last part of the problem type
   std::string detail;
+  std::vector<std::pair<std::string, std::string>> headers{};  ///< what else the answer must carry
 };
 
 using Judgement = std::variant<JudgedHead, Refusal>;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/http/sessions.hpp"
+#include "server/http/text.hpp"
 
 namespace anchord::server {
 namespace {
@@ -49,17 +50,13 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
       co_await self->ws_.async_close(reason, k_wait);
       co_return;
     }
+    const Conversing conversing(*self);
     self->peer_->on_open([weak = self->weak_from_this()] {
       if (auto session = weak.lock()) session->wake();
     });
     self->spawn(write_all(self));
     self->spawn(ping_all(self));
     co_await self->read_all();
-    self->closed_ = true;
-    self->bell_.cancel();
-    self->pulse_.cancel();
-    self->stall_.cancel();
-    self->peer_->on_close();
   }
 
   void stop() override {
@@ -86,6 +83,25 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
   }
 
  private:
+  /// However the conversation ends (a close, an exception, the end of the io context), the peer is told before
+  /// the session can go: whoever wakes it from another thread must not be the one who destroys it.
+  class Conversing {
+   public:
+    explicit Conversing(WsSession& session) : session_(session) {}
+    ~Conversing() {
+      session_.closed_ = true;
+      session_.bell_.cancel();
+      session_.pulse_.cancel();
+      session_.stall_.cancel();
+      session_.peer_->on_close();
+    }
+    Conversing(const Conversing&) = delete;
+    Conversing& operator=(const Conversing&) = delete;
+
+   private:
+    WsSession& session_;
+  };
+
   void configure(const std::string& subprotocol) {
     const WsLimits& limits = context_->ws_limits;
     websocket::stream_base::timeout timeout{};
@@ -101,10 +117,23 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
       response.set(http::field::server, "anchord");  // else Beast names itself and its version
       if (!subprotocol.empty()) response.set(http::field::sec_websocket_protocol, subprotocol);
     }));
+    ws_.control_callback([this](websocket::frame_type kind, beast::string_view) {
+      if (kind == websocket::frame_type::close) refuse_close_code();
+    });
     error_code ignored;
     // A peer that does not read may hold this much in the kernel; without a bound it grows to megabytes.
     beast::get_lowest_layer(ws_).socket().set_option(asio::socket_base::send_buffer_size(256 * 1024),
                                                      ignored);
+  }
+
+  /// Beast answers a close with the code that came, and takes codes for good that RFC 6455 section 7.4.2 gives to
+  /// nobody (5000 and above). Called before it answers: an answer of our own, begun here, is the only one.
+  void refuse_close_code() {
+    const auto code = static_cast<std::uint16_t>(ws_.reason().code);
+    if (code < 5000 || !ws_.is_open()) return;
+    const websocket::close_reason reason(websocket::close_code::protocol_error, "no such close code");
+    ws_.async_close(reason, [self = shared_from_this()](const error_code&) {});
+    if (ws_.is_open()) cut();  // a write is under way: ours would come after the echo
   }
 
   awaitable<void> read_all() {
@@ -121,7 +150,14 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
       }
       pieces = 0;
       const auto bytes = buffer.cdata();
-      peer_->on_message({static_cast<const char*>(bytes.data()), bytes.size()}, ws_.got_binary());
+      const std::string_view message(static_cast<const char*>(bytes.data()), bytes.size());
+      // Beast checks a text as it comes, but not that it is complete when the last fragment is empty.
+      if (!ws_.got_binary() && !valid_utf8(message)) {
+        const websocket::close_reason reason(websocket::close_code::bad_payload, "the text is not UTF-8");
+        co_await ws_.async_close(reason, k_wait);
+        co_return;
+      }
+      peer_->on_message(message, ws_.got_binary());
       buffer.consume(buffer.size());
       bell_.cancel();
     }

@@ -194,7 +194,14 @@ TEST(RequestJudge, AsksForACompleteWebSocketHandshake) {
   const std::string key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
   EXPECT_TRUE(good(get("/", base + key + "Sec-WebSocket-Version: 13\r\n")).websocket);
   EXPECT_EQ(status(get("/", base + key + "Sec-WebSocket-Version: 8\r\n")), 426);
+  EXPECT_EQ(status(get("/", base + key)), 426);
   EXPECT_EQ(status(get("/", base + "Sec-WebSocket-Version: 13\r\n")), 400);
+  // RFC 6455 section 4.1: 16 bytes in base64. Only the length of the text was looked at.
+  for (const char* bad : {"", "x", "!!!!!!!!!!!!!!!!!!!!!!!!", "AAAAAAAAAAAAAAAAAAAAAAAA", "dGhlIHNhbXBsZSBub25jZQ=",
+                          "dGhlIHNhbXBsZSBub25jZQ", "dGhlIHNhbXBsZSBub25j====", "dGhlIHNhbXBsZQ=="}) {
+    const std::string other = "Sec-WebSocket-Key: " + std::string(bad) + "\r\n";
+    EXPECT_EQ(status(get("/", base + other + "Sec-WebSocket-Version: 13\r\n")), 400) << bad;
+  }
   EXPECT_FALSE(good(get("/", "Host: localhost\r\nUpgrade: h2c\r\nConnection: Upgrade\r\n")).websocket);
 }
 

@@ -85,11 +85,52 @@ TEST_F(WsSession, ClosesWith1002OnProtocolErrors) {
   EXPECT_EQ(ends([](WsClient& c) { c.send(8, std::string("\x03\xec", 2)); }), 1002);  // 1004 must not be sent
 }
 
+TEST_F(WsSession, ClosesWith1007WhenTheLastFragmentIsEmptyAndACharacterIsNotComplete) {
+  for (const char* head : {"\xe2\x82", "abc\xf0\x9f\x98", "\xc3"}) {
+    WsClient client(server_.port);
+    client.send(1, head, false);
+    client.send(0, "", true);
+    EXPECT_EQ(client.ended_with(), 1007) << head;
+  }
+  WsClient whole(server_.port);
+  whole.send(1, "\xe2\x82\xac", false);
+  whole.send(0, "", true);
+  const auto frame = whole.frame();
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->payload, "\xe2\x82\xac");
+}
+
+std::string close_payload(int code, const std::string& reason = {}) {
+  return std::string{static_cast<char>(code >> 8), static_cast<char>(code)} + reason;
+}
+
 TEST_F(WsSession, AnswersACloseWithItsCode) {
-  WsClient client(server_.port);
-  client.send(8, std::string("\x03\xe8", 2) + "bye");
-  EXPECT_EQ(client.ended_with(), 1000);
-  EXPECT_TRUE(client.socket.read_to_end());
+  for (const int code : {1000, 1001, 1003, 1007, 1011, 3000, 4010, 4999}) {
+    WsClient client(server_.port);
+    client.send(8, close_payload(code, "bye"));
+    EXPECT_EQ(client.ended_with(), code);
+    EXPECT_TRUE(client.socket.read_to_end());
+  }
+}
+
+// RFC 6455 section 7.4: codes that nobody may send are a protocol error; 5000 and 65535 came back as they were.
+TEST_F(WsSession, AnswersACloseCodeThatNobodyMaySendWith1002) {
+  for (const int code : {0, 999, 1004, 1005, 1006, 1014, 1015, 1016, 2999, 5000, 5001, 65535}) {
+    WsClient client(server_.port);
+    client.send(8, close_payload(code));
+    EXPECT_EQ(client.ended_with(), 1002) << code;
+    EXPECT_TRUE(client.socket.read_to_end()) << code;
+  }
+}
+
+TEST_F(WsSession, NamesItsVersionToAClientThatSpeaksAnother) {
+  RawSocket socket(server_.port);
+  socket.send(
+      "GET /ws HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+      "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 12\r\n\r\n");
+  const auto answer = socket.response();
+  EXPECT_EQ(status_of(answer), 426) << answer;
+  EXPECT_NE(answer.find("Sec-WebSocket-Version: 13\r\n"), std::string::npos) << answer;
 }
 
 TEST_F(WsSession, ClosesWith1001WhenTheServerStops) {
