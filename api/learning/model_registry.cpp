@@ -106,6 +106,8 @@ std::shared_ptr<const ModelRegistry::Active> ModelRegistry::active() const {
 }
 
 Result<void> ModelRegistry::reload() {
+  // One at a time, or the slower of two promotions leaves the older state in use.
+  const std::scoped_lock one_at_a_time(reload_mutex_);
   BOOST_OUTCOME_TRY(const auto promotions, store_.active());
   std::map<std::string, ModelId> wanted;
   ml::Correction how = ml::Correction::weighted;

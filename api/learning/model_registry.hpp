@@ -42,6 +42,7 @@ class ModelRegistry {
 
  private:
   ModelStore& store_;
+  std::mutex reload_mutex_;
   mutable std::mutex mutex_;
   std::shared_ptr<const Active> active_;
 };

@@ -231,6 +231,9 @@ std::vector<NetworkId> chosen(const Calibration& calibration, const PublishReque
 Response publish(Services& s, const Request& request) {
   auto calibration = value_or_problem(s.deps.anchors.calibration(path_id<CalibrationId>(request)));
   const auto wanted = read_publish(json_body(request, true));
+  // What is judged below is judged against this revision; the store refuses when another came in between.
+  const auto newest = value_or_problem(s.deps.anchors.revisions(1, 0));
+  const std::uint64_t judged_on = newest.empty() ? 0 : newest.front().number;
   ask_whether_moved(s, calibration);
   std::vector<Override> overrides;
   const auto anchors = chosen(calibration, wanted, overrides, request.principal.token_id);
@@ -245,8 +248,12 @@ Response publish(Services& s, const Request& request) {
     s.audit(request, "calibration.override " + to_string(calibration.id) + ' ' + to_string(one.anchor) +
                          " reason: " + one.reason + "; failed:" + words);
   }
-  const auto revision = value_or_problem(s.deps.anchors.publish(
-      calibration.id, anchors, request.principal.token_id, wanted.note, s.deps.clock.now(), overrides));
+  const auto published = s.deps.anchors.publish(calibration.id, anchors, request.principal.token_id,
+                                                wanted.note, s.deps.clock.now(), overrides, judged_on);
+  if (!published)
+    s.audit(request, "calibration.publish " + to_string(calibration.id),
+            "refused: " + published.error().message);
+  const auto revision = value_or_problem(published);
   for (const auto& id : anchors) value_or_problem(s.deps.anchors.find_or_create(id, s.deps.clock.now()));
   s.hub.publish(Topic::revisions,
                 to_wire(Ordered{{"revision", revision.number},

@@ -86,7 +86,7 @@ Response patch(Services& s, const Request& request) {
 Response remove(Services& s, const Request& request) {
   const auto device = value_or_problem(control(s).device(path_uuid(request)));
   require_match(request, etag(device));
-  value_or_problem(control(s).remove(device.config.id));
+  value_or_problem(control(s).remove(device.config.id, device.config.version));
   s.audit(request, "device.delete " + to_string(device.config.id));
   Response response;
   response.status = 204;

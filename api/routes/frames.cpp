@@ -84,7 +84,7 @@ Response patch(Services& s, const Request& request) {
 Response remove(Services& s, const Request& request) {
   const LocalFrame frame = find(s, request.params.at("id"));
   require_match(request, etag(frame));
-  value_or_problem(s.frames->remove(frame.id));
+  value_or_problem(s.frames->remove(frame.id, frame.version));
   s.audit(request, "frame.delete " + frame.name);
   Response response;
   response.status = 204;

@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "api/json/model_artifact.hpp"
@@ -17,6 +19,34 @@ using Json = nlohmann::json;
 namespace {
 
 constexpr std::size_t k_most_samples = 10'000;
+
+/// Who is promoted, as the store has it: what a decision is made on, and what it is tied to.
+struct Standing {
+  std::uint64_t newest{};  ///< number of the newest promotion of any task; 0: none
+  std::map<std::string, ModelId> models{};
+
+  bool has(const StoredModel& model) const {
+    const auto at = models.find(model.task);
+    return at != models.end() && at->second == model.id;
+  }
+  std::string etag() const { return "\"m-" + std::to_string(newest) + '"'; }
+};
+
+Standing standing(LearningServices& l) {
+  Standing out;
+  for (const auto& one : value_or_problem(l.stores.models.active())) {
+    out.newest = std::max(out.newest, one.number);
+    if (one.model) out.models[one.task] = *one.model;
+  }
+  return out;
+}
+
+/// If-Match of GET /models/active is optional; the store holds every decision to the state it was made on.
+Standing standing_for(LearningServices& l, const Request& request) {
+  auto now = standing(l);
+  if (!request.header("if-match").empty()) require_match(request, now.etag());
+  return now;
+}
 
 bool is_active(LearningServices& l, const StoredModel& model) {
   const auto active = l.models.active();
@@ -93,6 +123,22 @@ Ordered active_json(LearningServices& l) {
                                           : Ordered(nullptr)}};
 }
 
+Response active_answer(LearningServices& l) {
+  const auto now = standing(l);
+  Response response = json_response(200, active_json(l));
+  response.header("ETag", now.etag());
+  return response;
+}
+
+/// Audited before it happens, as publications are; what the store then refuses is audited as refused.
+Promotion promoted(LearningServices& l, const Request& request, const std::string& what,
+                   const Promotion& promotion, const Standing& judged_on) {
+  l.services.audit(request, what);
+  auto done = l.stores.models.promote(promotion, judged_on.newest);
+  if (!done) l.services.audit(request, what, "refused: " + done.error().message);
+  return value_or_problem(std::move(done));
+}
+
 void announce(LearningServices& l, const Promotion& done, const std::string& method) {
   value_or_problem(l.models.reload());
   const auto words = promotion_words(done, method);
@@ -109,27 +155,27 @@ Response patch_active(LearningServices& l, const Request& request) {
   fields.finish();
   refuse_if_any(errors);
   const auto how = static_cast<ml::Correction>(*word);
-  l.services.audit(request, "models.correction " + std::string(correction_word(how)));
-  const auto done = value_or_problem(
-      l.stores.models.promote({0, std::string(k_correction_task), std::nullopt, request.principal.name,
-                               std::string(correction_word(how)), l.services.deps.clock.now(), false}));
+  const auto before = standing_for(l, request);
+  const auto done = promoted(l, request, "models.correction " + std::string(correction_word(how)),
+                             {0, std::string(k_correction_task), std::nullopt, request.principal.name,
+                              std::string(correction_word(how)), l.services.deps.clock.now(), false},
+                             before);
   announce(l, done, "");
-  return json_response(200, active_json(l));
+  return active_answer(l);
 }
 
-std::optional<ml::Model> active_model(LearningServices& l, const std::string& task) {
-  const auto active = l.models.active();
-  const auto at = active->models.find(task);
-  if (at == active->models.end()) return std::nullopt;
+std::optional<ml::Model> active_model(LearningServices& l, const Standing& now, const std::string& task) {
+  const auto at = now.models.find(task);
+  if (at == now.models.end()) return std::nullopt;
   auto model = read_model_artifact(value_or_problem(l.stores.models.artifact(at->second)));
   if (!model) return std::nullopt;
   return std::move(model).value();
 }
 
-GateReport judge(LearningServices& l, const StoredModel& stored) {
+GateReport judge(LearningServices& l, const Standing& now, const StoredModel& stored) {
   const auto model =
       value_or_problem(read_model_artifact(value_or_problem(l.stores.models.artifact(stored.id))));
-  const auto current = active_model(l, stored.task);
+  const auto current = active_model(l, now, stored.task);
   std::optional<DatasetTable> table;
   if (stored.run) {
     const auto run = value_or_problem(l.stores.runs.run(*stored.run));
@@ -148,20 +194,21 @@ Response promote(LearningServices& l, const Request& request) {
   const auto reason = fields.text("reason", 500).value_or("");
   fields.finish();
   refuse_if_any(errors);
-  if (is_active(l, stored)) throw_problem(422, "state", "the model is active already");
+  const auto before = standing_for(l, request);
+  if (before.has(stored)) throw_problem(422, "state", "the model is active already");
   // One that live ranges cannot be judged by would ground the others with it.
   if (const auto able = load_models(l.stores.models, {{stored.task, stored.id}}, ml::Correction::weighted);
       !able)
     throw_problem(422, "unsupported", able.error().message);
-  const auto gate = judge(l, stored);
+  const auto gate = judge(l, before, stored);
   if (!gate.passed && reason.empty())
     throw_problem(422, "state", gate.why + " (give a reason to promote all the same)");
-  // Audited before it happens, as publications are.
-  l.services.audit(request, "model.promote " + to_string(stored.id) +
-                                (gate.passed ? "" : " against the gate: " + gate.why) +
-                                (reason.empty() ? "" : " reason: " + reason));
-  const auto done = value_or_problem(l.stores.models.promote(
-      {0, stored.task, stored.id, request.principal.name, reason, l.services.deps.clock.now(), false}));
+  const auto done = promoted(
+      l, request,
+      "model.promote " + to_string(stored.id) + (gate.passed ? "" : " against the gate: " + gate.why) +
+          (reason.empty() ? "" : " reason: " + reason),
+      {0, stored.task, stored.id, request.principal.name, reason, l.services.deps.clock.now(), false},
+      before);
   announce(l, done, stored.method);
   Ordered answer = promotion_json(done);
   answer["gate"] = gate_json(gate);
@@ -171,7 +218,8 @@ Response promote(LearningServices& l, const Request& request) {
 Response gate_of_model(LearningServices& l, const Request& request) {
   check_query(request, {});
   return json_response(
-      200, gate_json(judge(l, value_or_problem(l.stores.models.model(path_id<ModelId>(request))))));
+      200,
+      gate_json(judge(l, standing(l), value_or_problem(l.stores.models.model(path_id<ModelId>(request))))));
 }
 
 /// What was active before the newest promotion that still stands.
@@ -200,10 +248,11 @@ Response roll_back(LearningServices& l, const Request& request) {
   fields.finish();
   refuse_if_any(errors);
   const std::string name(ml::task_name(static_cast<ml::Task>(*task)));
+  const auto before = standing_for(l, request);
   const auto back = before_the_newest(value_or_problem(l.stores.models.promotions(name, 100'000)));
-  l.services.audit(request, "model.rollback " + name + (reason.empty() ? "" : " reason: " + reason));
-  const auto done = value_or_problem(l.stores.models.promote(
-      {0, name, back, request.principal.name, reason, l.services.deps.clock.now(), true}));
+  const auto done =
+      promoted(l, request, "model.rollback " + name + (reason.empty() ? "" : " reason: " + reason),
+               {0, name, back, request.principal.name, reason, l.services.deps.clock.now(), true}, before);
   announce(l, done, "");
   return json_response(200, promotion_json(done));
 }
@@ -265,7 +314,7 @@ void add_model_routes(Router& router, LearningServices& l) {
   router.add({Method::post, "/api/v1/models", engineer, on(upload), k_max_artifact_bytes});
   router.add({Method::get, "/api/v1/models/active", readers(), [&l](const Request& request) {
                 check_query(request, {});
-                return json_response(200, active_json(l));
+                return active_answer(l);
               }});
   router.add({Method::patch, "/api/v1/models/active", engineer, on(patch_active)});
   router.add({Method::get, "/api/v1/models/promotions", readers(), on(promotions)});

@@ -60,7 +60,7 @@ Response patch(Services& s, const Request& request) {
 Response remove(Services& s, const Request& request) {
   const Site site = value_or_problem(s.deps.anchors.site(path_id<SiteId>(request)));
   require_match(request, etag(site));
-  value_or_problem(s.deps.anchors.remove(site.id));
+  value_or_problem(s.deps.anchors.remove(site.id, site.version));
   s.audit(request, "site.delete " + to_string(site.id));
   Response response;
   response.status = 204;

@@ -37,12 +37,7 @@ Result<void> MissionService::create(const Mission& mission) {
 }
 
 Result<Mission> MissionService::finish(const MissionId& id) {
-  BOOST_OUTCOME_TRY(auto current, state_->deps.missions.mission(id));
-  if (current.state == MissionState::finished)
-    return make_error(Errc::conflict, current.name + " is finished already");
-  current.state = MissionState::finished;
-  current.finished = state_->deps.clock.now();
-  BOOST_OUTCOME_TRY(state_->deps.missions.update(current));
+  BOOST_OUTCOME_TRY(const auto current, state_->deps.missions.finish(id, state_->deps.clock.now()));
   ++state_->finished;
   {
     const std::scoped_lock lock(state_->mutex);

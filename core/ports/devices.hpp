@@ -82,7 +82,7 @@ class DeviceControl {
   virtual Result<DeviceReport> device(const Uuid& id) = 0;
   virtual Result<DeviceReport> add(DeviceConfig config) = 0;  ///< gives it its id
   virtual Result<DeviceReport> change(DeviceConfig config, std::uint64_t expected_version) = 0;
-  virtual Result<void> remove(const Uuid& id) = 0;
+  virtual Result<void> remove(const Uuid& id, std::uint64_t expected_version) = 0;
   /// Answer of the device, a JSON value.
   virtual Result<std::string> act(const Uuid& id, std::string_view action,
                                   std::string_view arguments_json) = 0;

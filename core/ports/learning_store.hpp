@@ -162,8 +162,11 @@ class ModelStore {
   virtual Result<StoredModel> model(const ModelId& id) = 0;
   virtual Result<std::vector<StoredModel>> models(std::size_t limit, const std::optional<ModelId>& after) = 0;
   virtual Result<std::string> artifact(const ModelId& id) = 0;
-  virtual Result<void> remove(const ModelId& id) = 0;                 ///< conflict once it was promoted
-  virtual Result<Promotion> promote(const Promotion& promotion) = 0;  ///< its number is given back
+  virtual Result<void> remove(const ModelId& id) = 0;  ///< conflict once it was promoted
+  /// Its number is given back. conflict when the newest promotion of all tasks is no longer `judged_on` (0:
+  /// none): the caller decided against another state.
+  virtual Result<Promotion> promote(const Promotion& promotion,
+                                    std::optional<std::uint64_t> judged_on = std::nullopt) = 0;
   /// The newest promotion of each task.
   virtual Result<std::vector<Promotion>> active() = 0;
   /// Newest first, of one task or all.

@@ -30,7 +30,7 @@ class FrameStore {
   virtual Result<LocalFrame> frame(const std::string& name) = 0;
   virtual Result<std::vector<LocalFrame>> frames(std::size_t limit, const std::optional<FrameId>& after) = 0;
   virtual Result<std::vector<LocalFrame>> frames_of(const SiteId& site) = 0;  ///< oldest first
-  virtual Result<void> remove(const FrameId& id) = 0;
+  virtual Result<void> remove(const FrameId& id, std::uint64_t expected_version) = 0;
 };
 
 }  // namespace anchord

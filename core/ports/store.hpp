@@ -83,6 +83,8 @@ class MissionStore {
   virtual ~MissionStore() = default;
   virtual Result<void> insert(const Mission& mission) = 0;
   virtual Result<void> update(const Mission& mission) = 0;
+  /// The mission as it is then; conflict when it was finished already.
+  virtual Result<Mission> finish(const MissionId& id, UtcTime now) = 0;
   virtual Result<Mission> mission(const MissionId& id) = 0;
   virtual Result<std::vector<Mission>> missions(std::size_t limit, const std::optional<MissionId>& after) = 0;
   virtual Result<void> remove(const MissionId& id) = 0;
@@ -109,7 +111,7 @@ class AnchorStore {
   virtual Result<void> update(const Site& site, std::uint64_t expected_version) = 0;
   virtual Result<Site> site(const SiteId& id) = 0;
   virtual Result<std::vector<Site>> sites(std::size_t limit, const std::optional<SiteId>& after) = 0;
-  virtual Result<void> remove(const SiteId& id) = 0;
+  virtual Result<void> remove(const SiteId& id, std::uint64_t expected_version) = 0;
 
   virtual Result<Anchor> find_or_create(NetworkId network_id, UtcTime now) = 0;
   virtual Result<void> update(const Anchor& anchor, std::uint64_t expected_version) = 0;
@@ -126,10 +128,13 @@ class AnchorStore {
   virtual Result<void> remove(const CalibrationId& id) = 0;  ///< conflict when a revision uses it
   /// A new revision: the named anchors (each with a position in the calibration, else invalid_argument) take
   /// their position from it, all others keep that of the revision before. Which verdicts may be published is
-  /// not decided here; `overrides` (of named anchors) are kept with the revision.
+  /// not decided here; `overrides` (of named anchors) are kept with the revision. conflict when every named
+  /// anchor stands at its position of this calibration already, or when the newest revision is no longer
+  /// `judged_on` (0: none), against which the caller decided.
   virtual Result<Revision> publish(const CalibrationId& id, const std::vector<NetworkId>& anchors,
                                    std::string_view by, std::string_view note, UtcTime now,
-                                   const std::vector<Override>& overrides = {}) = 0;
+                                   const std::vector<Override>& overrides = {},
+                                   std::optional<std::uint64_t> judged_on = std::nullopt) = 0;
   /// before: 0 for the newest page.
   virtual Result<std::vector<Revision>> revisions(std::size_t limit, std::uint64_t before) = 0;
   /// All positions of a revision, of the newest when absent (empty when nothing was ever published).

@@ -149,6 +149,17 @@ class DeviceManager::Impl final : public device::DeviceListener {
     return boost::outcome_v2::success();
   }
 
+  /// The file as the devices are now. What is written last is the newest, whoever changed what.
+  Result<void> save() {
+    const std::scoped_lock one_at_a_time(save_mutex_);
+    std::vector<DeviceConfig> all;
+    {
+      const std::scoped_lock lock(mutex_);
+      all = configs_;
+    }
+    return write_devices(file(), all);
+  }
+
   void start(DeviceRows& rows) {
     rows_ = &rows;
     writer_ = std::thread([this] { write_rows(); });
@@ -275,7 +286,8 @@ class DeviceManager::Impl final : public device::DeviceListener {
   RowQueue queue_;
   DeviceRows* rows_{nullptr};
 
-  std::mutex mutex_;  ///< the next four
+  std::mutex save_mutex_;  ///< taken before mutex_
+  std::mutex mutex_;       ///< the next four
   std::vector<DiscoveredDevice> discovered_;
   std::vector<DeviceConfig> configs_;
   std::optional<MissionId> mission_;
@@ -340,18 +352,15 @@ Result<DeviceReport> DeviceManager::add(DeviceConfig config) {
     const auto begun = impl_->on_io([&] { return impl_->begin(config); });
     if (!begun) return begun.error();
   }
-  std::vector<DeviceConfig> all;
   {
     const std::scoped_lock lock(impl_->mutex_);
     impl_->configs_.push_back(config);
-    all = impl_->configs_;
   }
-  BOOST_OUTCOME_TRYV(write_devices(impl_->file(), all));
+  BOOST_OUTCOME_TRYV(impl_->save());
   return device(config.id);
 }
 
 Result<DeviceReport> DeviceManager::change(DeviceConfig config, std::uint64_t expected_version) {
-  std::vector<DeviceConfig> all;
   DeviceConfig before;
   {
     const std::scoped_lock lock(impl_->mutex_);
@@ -364,7 +373,6 @@ Result<DeviceReport> DeviceManager::change(DeviceConfig config, std::uint64_t ex
     before = *found;
     config.version = expected_version + 1;
     *found = config;
-    all = impl_->configs_;
   }
   const bool same_link = before.kind == config.kind && before.address == config.address &&
                          before.options_json == config.options_json && before.name == config.name &&
@@ -386,24 +394,26 @@ Result<DeviceReport> DeviceManager::change(DeviceConfig config, std::uint64_t ex
       return changed.error();
     }
   }
-  BOOST_OUTCOME_TRYV(write_devices(impl_->file(), all));
+  BOOST_OUTCOME_TRYV(impl_->save());
   return device(config.id);
 }
 
-Result<void> DeviceManager::remove(const Uuid& id) {
-  std::vector<DeviceConfig> all;
+Result<void> DeviceManager::remove(const Uuid& id, std::uint64_t expected_version) {
   {
     const std::scoped_lock lock(impl_->mutex_);
-    if (std::erase_if(impl_->configs_, [&](const auto& c) { return c.id == id; }) == 0) {
+    const auto found = std::find_if(impl_->configs_.begin(), impl_->configs_.end(),
+                                    [&](const auto& c) { return c.id == id; });
+    if (found == impl_->configs_.end())
       return make_error(Errc::not_found, "there is no device " + to_string(id));
-    }
-    all = impl_->configs_;
+    if (found->version != expected_version)
+      return make_error(Errc::conflict, "the device was changed meanwhile");
+    impl_->configs_.erase(found);
   }
   impl_->on_io([&] {
     if (impl_->loop_) (void)impl_->loop_->remove(to_string(id));
     return 0;
   });
-  return write_devices(impl_->file(), all);
+  return impl_->save();
 }
 
 Result<std::string> DeviceManager::act(const Uuid& id, std::string_view action,

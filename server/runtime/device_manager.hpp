@@ -38,7 +38,7 @@ class DeviceManager final : public DeviceControl {
   Result<DeviceReport> device(const Uuid& id) override;
   Result<DeviceReport> add(DeviceConfig config) override;
   Result<DeviceReport> change(DeviceConfig config, std::uint64_t expected_version) override;
-  Result<void> remove(const Uuid& id) override;
+  Result<void> remove(const Uuid& id, std::uint64_t expected_version) override;
   Result<std::string> act(const Uuid& id, std::string_view action, std::string_view arguments_json) override;
   std::vector<DiscoveredDevice> discover() override;
   std::vector<DiscoveredDevice> discovered() override;

@@ -23,7 +23,7 @@ constexpr const char* k_site_columns =
 constexpr const char* k_site_users =
     "SELECT (SELECT count(*) FROM mission WHERE site_id = ?1) + (SELECT count(*) FROM anchor WHERE site_id = "
     "?1) + (SELECT count(*) FROM local_frame WHERE site_id = ?1)";
-constexpr const char* k_site_remove = "DELETE FROM site WHERE id = ?1 RETURNING version";
+constexpr const char* k_site_remove = "DELETE FROM site WHERE id = ?1 AND version = ?2 RETURNING version";
 
 constexpr const char* k_anchor_insert =
     "INSERT INTO anchor (id, network_id, site_id, name, building, floor, space, asset_tag, ifc_guid, "
@@ -177,7 +177,7 @@ class SqlAnchorStore final : public AnchorStore {
       return found;
     });
   }
-  Result<void> remove(const SiteId& id) override {
+  Result<void> remove(const SiteId& id, std::uint64_t expected_version) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       Query users(c, k_site_users);
       users << id;
@@ -185,8 +185,10 @@ class SqlAnchorStore final : public AnchorStore {
         return make_error(Errc::conflict, "site " + to_string(id) + " has missions or anchors");
       }
       Query query(c, k_site_remove);
-      query << id;
-      return query.returned() ? std::nullopt : std::optional(absent("site", id));
+      query << id << expected_version;
+      if (query.returned()) return std::nullopt;
+      const auto stored = find_site(c, id);
+      return stored ? moved_on("the site", expected_version, stored->version) : absent("site", id);
     });
   }
 
@@ -265,9 +267,11 @@ class SqlAnchorStore final : public AnchorStore {
   }
   Result<Revision> publish(const CalibrationId& id, const std::vector<NetworkId>& anchors,
                            std::string_view by, std::string_view note, UtcTime now,
-                           const std::vector<Override>& overrides) override {
-    return write_value<Revision>(
-        gate_, 1, [&](Connection& c) { return publish_revision(c, id, anchors, by, note, now, overrides); });
+                           const std::vector<Override>& overrides,
+                           std::optional<std::uint64_t> judged_on) override {
+    return write_value<Revision>(gate_, 1, [&](Connection& c) {
+      return publish_revision(c, id, anchors, by, note, now, overrides, judged_on);
+    });
   }
   Result<std::vector<Revision>> revisions(std::size_t limit, std::uint64_t before) override {
     return read_value<std::vector<Revision>>(

@@ -39,6 +39,9 @@ constexpr const char* k_carry_on =
 constexpr const char* k_set_position =
     "INSERT INTO revision_position (number, network_id, since_number) VALUES (?1, ?2, ?1) "
     "ON CONFLICT (number, network_id) DO UPDATE SET since_number = excluded.since_number";
+constexpr const char* k_stands =
+    "SELECT 1 FROM revision_position p JOIN revision r ON r.number = p.since_number "
+    "WHERE p.number = ?1 AND p.network_id = ?2 AND r.calibration_key = ?3";
 constexpr const char* k_insert_override =
     "INSERT INTO revision_override (number, network_id, reason, overridden_by) VALUES (?1, ?2, ?3, ?4)";
 constexpr const char* k_override =
@@ -109,6 +112,17 @@ std::vector<PublishedPosition> read_positions(Connection& c, Query& query) {
     found.push_back(std::move(position));
   }
   return found;
+}
+
+/// Whether each of these anchors has its position of this calibration in that revision.
+bool all_stand(Connection& c, std::uint64_t revision, std::int64_t calibration_key,
+               const std::vector<NetworkId>& anchors) {
+  Query query(c, k_stands);
+  return !anchors.empty() && std::ranges::all_of(anchors, [&](NetworkId anchor) {
+    query.again();
+    query << revision << anchor << calibration_key;
+    return query.step();
+  });
 }
 
 std::optional<Error> check_duplicates(const Calibration& calibration) {
@@ -191,11 +205,18 @@ std::optional<Error> remove_calibration(Connection& c, const CalibrationId& id) 
 
 Result<Revision> publish_revision(Connection& c, const CalibrationId& id,
                                   const std::vector<NetworkId>& anchors, std::string_view by,
-                                  std::string_view note, UtcTime now,
-                                  const std::vector<Override>& overrides) {
+                                  std::string_view note, UtcTime now, const std::vector<Override>& overrides,
+                                  std::optional<std::uint64_t> judged_on) {
   const auto key = key_of(c, id);
   if (!key) return absent(id);
   const std::uint64_t before = newest_revision(c);
+  if (judged_on && *judged_on != before)
+    return make_error(Errc::conflict, "revision " + std::to_string(before) +
+                                          " was published meanwhile; look at the anchors again");
+  if (all_stand(c, before, *key, anchors))
+    return make_error(Errc::conflict, "revision " + std::to_string(before) +
+                                          " has these positions of calibration " + to_string(id) +
+                                          " already");
   const Revision revision{before + 1, id, now, std::string(by), std::string(note)};
   Query insert(c, k_insert_revision);
   insert << revision.number << *key << now << by << note;

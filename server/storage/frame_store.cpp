@@ -11,7 +11,7 @@ constexpr const char* k_update =
     "WHERE id = ?1 AND version = ?7 RETURNING version";
 constexpr const char* k_columns =
     "SELECT id, name, site_id, definition_json, created_t_ns, version FROM local_frame ";
-constexpr const char* k_remove = "DELETE FROM local_frame WHERE id = ?1 RETURNING version";
+constexpr const char* k_remove = "DELETE FROM local_frame WHERE id = ?1 AND version = ?2 RETURNING version";
 constexpr const char* k_site = "SELECT count(*) FROM site WHERE id = ?1";
 
 void bind(Query& query, const LocalFrame& f, std::uint64_t version) {
@@ -84,11 +84,14 @@ class SqlFrameStore final : public FrameStore {
       return all(query);
     });
   }
-  Result<void> remove(const FrameId& id) override {
+  Result<void> remove(const FrameId& id, std::uint64_t expected_version) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       Query query(c, k_remove);
-      query << id;
+      query << id << expected_version;
       if (query.returned()) return std::nullopt;
+      Query known(c, std::string(k_columns) + "WHERE id = ?1");
+      known << id;
+      if (known.step()) return make_error(Errc::conflict, "the frame was changed in between");
       return make_error(Errc::not_found, "no frame " + to_string(id));
     });
   }

@@ -15,6 +15,8 @@ constexpr const char* k_update =
     "UPDATE mission SET site_id = ?2, name = ?3, kit = ?4, radio = ?5, frame = ?6, track_point = ?7, state = "
     "?8, "
     "created_t_ns = ?9, finished_t_ns = ?10 WHERE id = ?1 RETURNING mission_key";
+constexpr const char* k_finish =
+    "UPDATE mission SET state = ?3, finished_t_ns = ?2 WHERE id = ?1 AND state <> ?3 RETURNING mission_key";
 constexpr const char* k_columns =
     "SELECT mission_key, id, site_id, name, kit, radio, frame, track_point, state, created_t_ns, "
     "finished_t_ns "
@@ -83,6 +85,14 @@ Mission read(Connection& connection, Query& query) {
   return m;
 }
 
+Result<Mission> find(Connection& c, const MissionId& id) {
+  static const std::string text = std::string(k_columns) + "WHERE id = ?1";
+  Query query(c, text);
+  query << id;
+  if (!query.step()) return no_mission(id);
+  return read(c, query);
+}
+
 class SqlMissionStore final : public MissionStore {
  public:
   SqlMissionStore(Gate& gate, AdmitMission admit) : gate_(gate), admit_(std::move(admit)) {}
@@ -115,14 +125,19 @@ class SqlMissionStore final : public MissionStore {
     });
   }
 
-  Result<Mission> mission(const MissionId& id) override {
-    return read_value<Mission>(gate_, [&](Connection& c) -> Result<Mission> {
-      static const std::string text = std::string(k_columns) + "WHERE id = ?1";
-      Query query(c, text);
-      query << id;
-      if (!query.step()) return no_mission(id);
-      return read(c, query);
+  Result<Mission> finish(const MissionId& id, UtcTime now) override {
+    return write_value<Mission>(gate_, 1, [&](Connection& c) -> Result<Mission> {
+      Query query(c, k_finish);
+      query << id << now << static_cast<int>(MissionState::finished);
+      const bool done = query.returned().has_value();
+      auto mission = find(c, id);
+      if (mission && !done) return make_error(Errc::conflict, mission.value().name + " is finished already");
+      return mission;
     });
+  }
+
+  Result<Mission> mission(const MissionId& id) override {
+    return read_value<Mission>(gate_, [&](Connection& c) { return find(c, id); });
   }
 
   Result<std::vector<Mission>> missions(std::size_t limit, const std::optional<MissionId>& after) override {

@@ -20,6 +20,7 @@ constexpr const char* k_remove = "DELETE FROM model WHERE id = ?1 RETURNING mode
 constexpr const char* k_promote =
     "INSERT INTO model_promotion (task, model_key, t_ns, promoted_by, reason, is_rollback) VALUES (?1, "
     "(SELECT model_key FROM model WHERE id = ?2), ?3, ?4, ?5, ?6) RETURNING number";
+constexpr const char* k_newest = "SELECT coalesce(max(number), 0) FROM model_promotion";
 constexpr const char* k_promotions =
     "SELECT p.number, p.task, m.id, p.t_ns, p.promoted_by, p.reason, p.is_rollback FROM model_promotion p "
     "LEFT JOIN model m ON m.model_key = p.model_key ";
@@ -106,8 +107,13 @@ class SqlModelStore final : public ModelStore {
     });
   }
 
-  Result<Promotion> promote(const Promotion& promotion) override {
+  Result<Promotion> promote(const Promotion& promotion, std::optional<std::uint64_t> judged_on) override {
     return write_value<Promotion>(gate_, 1, [&](Connection& c) -> Result<Promotion> {
+      Query newest(c, k_newest);
+      const std::uint64_t before = newest.step() ? newest.as<std::uint64_t>() : 0;
+      if (judged_on && *judged_on != before)
+        return make_error(Errc::conflict, "promotion " + std::to_string(before) +
+                                              " came meanwhile; look at the active models again");
       if (promotion.model) {
         Query known(c, "SELECT task FROM model WHERE id = ?1");
         known << *promotion.model;

@@ -214,7 +214,7 @@ class ClockOnly final : public DeviceControl {
   Result<DeviceReport> device(const Uuid&) override { return none(); }
   Result<DeviceReport> add(DeviceConfig) override { return none(); }
   Result<DeviceReport> change(DeviceConfig, std::uint64_t) override { return none(); }
-  Result<void> remove(const Uuid&) override { return none(); }
+  Result<void> remove(const Uuid&, std::uint64_t) override { return none(); }
   Result<std::string> act(const Uuid&, std::string_view, std::string_view) override { return none(); }
   std::vector<DiscoveredDevice> discover() override { return {}; }
   std::vector<DiscoveredDevice> discovered() override { return {}; }

@@ -1,7 +1,9 @@
 // A flight over REST against the simulated autopilot, through the real session: plan, checklist, control,
 // start, hold, resume, land; strangers, a silent aircraft, a server killed in flight. Time is the test's,
 // nothing sleeps.
+#include <algorithm>
 #include <cmath>
+#include <thread>
 
 #include "app_fixture.hpp"
 #include "core/ports/drone.hpp"
@@ -182,6 +184,18 @@ TEST_F(Flights, StartIsBlockedUntilTheChecklistIsGreen) {
   EXPECT_EQ(post(base() + "/checklist/plan", R"({"reason":"never mind"})").status, 422) << "not overridable";
   EXPECT_EQ(post(base() + "/checklist/weather", R"({"reason":"sunny"})").status, 404);
   EXPECT_EQ(act("start", lease, R"(,"plan":")" + plan + '"').status, 202);
+}
+
+TEST_F(Flights, OneOfEightTakesControl) {
+  mission_ = mission();
+  std::vector<int> status(8);
+  {
+    std::vector<std::jthread> threads;
+    for (auto& one : status)
+      threads.emplace_back([&] { one = post(base() + "/control", R"({"action":"take"})").status; });
+  }
+  EXPECT_EQ(std::ranges::count(status, 200), 1) << testing::PrintToString(status);
+  EXPECT_EQ(std::ranges::count(status, 409), 7) << testing::PrintToString(status);
 }
 
 TEST_F(Flights, StartsHoldsResumesAndLands) {

@@ -1,4 +1,7 @@
 // Campaign, data set, training run, promotion and live use through the routes, over a real database.
+#include <algorithm>
+#include <thread>
+
 #include "drivers/sim/flight.hpp"
 #include "tests/api/app_fixture.hpp"
 
@@ -137,6 +140,36 @@ TEST_F(LearningService, PromotesOnlyACorrectionThatHelpsUnlessAReasonIsGiven) {
   EXPECT_TRUE(json(post("/api/v1/models/rollback", R"({"task":"los_bias"})"))["model"].is_null());
   EXPECT_EQ(post("/api/v1/models/rollback", R"({"task":"los_bias"})").status, 422);
   EXPECT_EQ(json(get("/api/v1/models/promotions"))["items"].size(), 4u);
+}
+
+TEST_F(LearningService, OneOfEightPromotionsAndRollbacksOfOneStateIsMade) {
+  const auto run = train("los_bias", "constant");
+  const auto together = [&](const std::string& path, const std::string& body, const std::string& if_match) {
+    std::vector<int> status(8);
+    std::vector<std::jthread> threads;
+    for (auto& one : status) {
+      threads.emplace_back([&] {
+        Call options;
+        if (!if_match.empty()) options.headers["if-match"] = if_match;
+        one = call(api::Method::post, path, body, options).status;
+      });
+    }
+    threads.clear();
+    return status;
+  };
+  const auto none = train("los_bias", "none");
+  ASSERT_EQ(promote(none, R"({"reason":"something to go back to"})").status, 200);
+  const auto promoted = together(run.value("model", "") + "/promote", R"({"reason":"now"})", "");
+  EXPECT_EQ(std::ranges::count(promoted, 200), 1) << testing::PrintToString(promoted);
+  for (const int one : promoted) EXPECT_TRUE(one == 200 || one == 409 || one == 422) << one;
+  EXPECT_EQ(json(get("/api/v1/models/promotions"))["items"].size(), 2u);
+  // Two presses of one button are one rollback where the client says what it saw.
+  const auto seen = header(get("/api/v1/models/active"), "ETag");
+  const auto back = together("/api/v1/models/rollback", R"({"task":"los_bias"})", seen);
+  EXPECT_EQ(std::ranges::count(back, 200), 1) << testing::PrintToString(back);
+  for (const int one : back) EXPECT_TRUE(one == 200 || one == 409 || one == 412) << one;
+  EXPECT_EQ("/api/v1/models/" + json(get("/api/v1/models/active"))["models"]["los_bias"].value("id", ""),
+            none["model"]);
 }
 
 TEST_F(LearningService, APromotionIsAnEventOfTheRecordAndSurvivesARestart) {

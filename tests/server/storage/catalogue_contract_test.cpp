@@ -131,9 +131,10 @@ TEST_P(AnchorStoreContract, ChangesASiteOnlyFromTheVersionNamed) {
   m.id = MissionId{make_uuid_v7(k_noon)};
   m.site = site.id;
   ASSERT_TRUE(db_->missions().insert(m));
-  EXPECT_EQ(db_->anchors().remove(site.id).error().code, Errc::conflict);
+  EXPECT_EQ(db_->anchors().remove(site.id, 2).error().code, Errc::conflict);
   ASSERT_TRUE(db_->missions().remove(m.id));
-  ASSERT_TRUE(db_->anchors().remove(site.id));
+  EXPECT_EQ(db_->anchors().remove(site.id, 1).error().code, Errc::conflict) << "it changed since";
+  ASSERT_TRUE(db_->anchors().remove(site.id, 2));
   EXPECT_EQ(db_->anchors().site(site.id).error().code, Errc::not_found);
   EXPECT_EQ(db_->anchors().update(site, 2).error().code, Errc::not_found);
 }
@@ -342,8 +343,9 @@ TEST_P(AnchorStoreContract, KeepsFramesByNameAndVersion) {
   EXPECT_EQ(db_->frames().frame("hall-a").value().version, 2u);
   EXPECT_EQ(db_->frames().frames_of(site.id).value().size(), 1u);
   EXPECT_EQ(db_->frames().frames(1, std::nullopt).value().size(), 1u);
-  EXPECT_EQ(db_->anchors().remove(site.id).error().code, Errc::conflict) << "a frame stands on it";
-  ASSERT_TRUE(db_->frames().remove(frame.id));
+  EXPECT_EQ(db_->anchors().remove(site.id, 1).error().code, Errc::conflict) << "a frame stands on it";
+  EXPECT_EQ(db_->frames().remove(frame.id, 1).error().code, Errc::conflict) << "it changed since";
+  ASSERT_TRUE(db_->frames().remove(frame.id, 2));
   EXPECT_EQ(db_->frames().frame(frame.id).error().code, Errc::not_found);
 }
 

@@ -1,3 +1,6 @@
+#include <atomic>
+#include <thread>
+
 #include "tests/server/storage/backends.hpp"
 
 namespace anchord {
@@ -186,6 +189,25 @@ TEST_P(LearningStoreContract, SaysWhichModelIsActiveAndKeepsTheHistory) {
   EXPECT_EQ(db_->models().promote({0, "los_bias", b.id, "me", "", k_noon, false}).error().code,
             Errc::conflict);
   EXPECT_EQ(db_->models().remove(b.id).error().code, Errc::conflict);
+}
+
+TEST_P(LearningStoreContract, OfEightPromotionsJudgedOnOneStateOneIsMade) {
+  const auto a = model_of(std::nullopt);
+  ASSERT_TRUE(db_->models().insert(a, "{}"));
+  std::atomic<int> made = 0, late = 0;
+  {
+    std::vector<std::jthread> threads;
+    for (int i = 0; i < 8; ++i) {
+      threads.emplace_back([&] {
+        const auto done = db_->models().promote({0, "nlos_id", a.id, "me", "", k_noon, false}, 0);
+        ++(done ? made : late);
+        EXPECT_TRUE(done || done.error().code == Errc::conflict);
+      });
+    }
+  }
+  EXPECT_EQ(made, 1);
+  EXPECT_EQ(late, 7);
+  EXPECT_EQ(db_->models().promotions("", 10).value().size(), 1u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Backends, LearningStoreContract, backends(), backend_name);
