@@ -20,6 +20,7 @@ int serve(const server::Config& config) {
   sigaddset(&signals, SIGINT);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   signal(SIGPIPE, SIG_IGN);
+  signal(SIGXFSZ, SIG_IGN);  // a file size limit is an answer (507), as a full disk is
   umask(077);  // the database holds tokens and positions
 
   server::start_logging(config.text("log_level"));
