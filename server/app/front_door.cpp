@@ -4,8 +4,8 @@
 #include <array>
 
 #include "api/http/problem.hpp"
-#include "server/app/base64.hpp"
 #include "server/app/live_peer.hpp"
+#include "server/http/base64.hpp"
 #include "server/http/request_judge.hpp"
 #include "server/http/static_files.hpp"
 #include "server/http/text.hpp"
