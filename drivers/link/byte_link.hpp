@@ -39,12 +39,12 @@ struct LinkHandlers {
   std::function<void()> on_open{};  ///< bytes can flow; a listening link: each time a peer came
   /// As the operating system hands them: any cut, for UDP one datagram. Valid during the call only.
   std::function<void(std::string_view bytes, const Arrival& at)> on_bytes{};
-  /// UDP: whether this datagram counts, and its sender is who we answer from now on. Absent: the latest sender
-  /// is. What is not welcome never reaches on_bytes.
-  std::function<bool(std::string_view bytes, const std::string& sender, const Arrival& at)> welcome{};
   /// Once, after which the link is dead and a new one is made: did not open, or was lost. For people, one
   /// line.
   std::function<void(const Error& why)> on_closed{};
+  /// UDP: whether this datagram counts, and its sender is who we answer from now on. Absent: the latest sender
+  /// is. What is not welcome never reaches on_bytes.
+  std::function<bool(std::string_view bytes, const std::string& sender, const Arrival& at)> welcome{};
 };
 
 /// A two-way byte stream to one device. Never blocks; every queue is bounded. No clock, no retry: a
