@@ -5,6 +5,7 @@
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -69,6 +70,22 @@ Error explained(const std::string& path, int error) {
   }
 }
 
+/// Opening alone makes some devices act (a watchdog resets the machine), and an address may come from whoever may
+/// set up devices: only what the system calls a terminal line is opened.
+bool terminal_line(const std::string& path) {
+  struct stat info {};
+  if (::stat(path.c_str(), &info) != 0 || !S_ISCHR(info.st_mode)) return false;
+  const unsigned kind = major(info.st_rdev);
+  if (kind >= 136 && kind <= 143) return true;  // pseudo terminals (Linux, devices.txt); not in sysfs
+  std::error_code error;
+  const auto subsystem = std::filesystem::read_symlink(
+      "/sys/dev/char/" + std::to_string(kind) + ":" + std::to_string(minor(info.st_rdev)) + "/subsystem",
+      error);
+  // Without sysfs: ttyS, ttyACM, ttyUSB, ttyAMA.
+  if (error) return kind == 4 || kind == 166 || kind == 188 || kind == 204;
+  return subsystem.filename() == "tty";
+}
+
 /// 0, or the errno that says what went wrong.
 int prepare(int fd, speed_t speed) {
   if (::isatty(fd) == 0) return ENOTTY;
@@ -97,6 +114,9 @@ Result<int> open_serial(const std::string& path, int baud) {
     return make_error(Errc::invalid_argument,
                       path + ": " + std::to_string(baud) + " baud is not a usual rate");
   }
+  struct stat info {};
+  if (::stat(path.c_str(), &info) != 0) return explained(path, errno);
+  if (!terminal_line(path)) return explained(path, ENOTTY);
   const int fd = ::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
   if (fd < 0) return explained(path, errno);
   if (const int error = prepare(fd, known->code); error != 0) {

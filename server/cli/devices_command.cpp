@@ -1,5 +1,6 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -135,6 +136,20 @@ Result<Json> patch_of(const std::vector<std::string>& settings) {
     if (equals == std::string::npos)
       return make_error(Errc::invalid_argument, "\"" + setting + "\" is not key=value");
     const auto key = setting.substr(0, equals), raw = setting.substr(equals + 1);
+    if (key == "password_file") {
+      // Read here, with the rights of who asks: the server takes no path.
+      std::ifstream in(raw);
+      std::string password;
+      if (!std::getline(in, password))
+        return make_error(Errc::invalid_argument, "password_file: " + raw + " cannot be read, or is empty");
+      if (password.ends_with('\r')) password.pop_back();
+      out["options"]["password"] = password;
+      continue;
+    }
+    if (key == "password") {
+      out["options"][key] = raw;  // 123456 is a text too
+      continue;
+    }
     auto value = Json::parse(raw, nullptr, false);
     if (value.is_discarded()) value = raw;
     if (key == "name" || key == "address" || key == "kind") {

@@ -1,15 +1,11 @@
 #include "server/runtime/device_file.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
-
-#include <cerrno>
-#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "core/base/to_wire.hpp"
+#include "server/runtime/private_file.hpp"
 
 namespace anchord::server {
 
@@ -65,21 +61,8 @@ Result<void> write_devices(const fs::path& file, const std::vector<DeviceConfig>
                     {"enabled", d.enabled},
                     {"version", d.version}});
   }
-  const auto text = to_wire(Json{{"schema", "anchord.devices/1"}, {"devices", std::move(list)}}, 1) + "\n";
-  const fs::path part = file.string() + ".part";
-  const int fd = ::open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-  const bool written = fd >= 0 &&
-                       ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
-                       ::fsync(fd) == 0;
-  const int failure = errno;
-  if (fd >= 0) ::close(fd);
-  std::error_code error;
-  if (written) fs::rename(part, file, error);
-  if (!written || error) {
-    return make_error(failure == ENOSPC ? Errc::storage_full : Errc::storage_unavailable,
-                      "cannot write " + file.string() + ": " + std::strerror(failure));
-  }
-  return boost::outcome_v2::success();
+  return write_private(
+      file, to_wire(Json{{"schema", "anchord.devices/1"}, {"devices", std::move(list)}}, 1) + "\n");
 }
 
 }  // namespace anchord::server

@@ -16,6 +16,7 @@
 #include "drivers/link/address.hpp"
 #include "drivers/record/recorder.hpp"
 #include "server/runtime/device_file.hpp"
+#include "server/runtime/device_secrets.hpp"
 
 namespace anchord::server {
 namespace {
@@ -24,10 +25,6 @@ constexpr auto k_batch_time = std::chrono::milliseconds(100);
 constexpr std::size_t k_batch_rows = 200;
 constexpr auto k_answer_time =
     std::chrono::seconds(25);  ///< settings of six anchors by radio take half of it
-
-device::Settings settings_of(const DeviceConfig& c) {
-  return {to_string(c.id), c.kind, c.name, c.address, c.options_json};
-}
 
 DeviceReport report_of(const DeviceConfig& config, const device::DeviceState& s) {
   DeviceReport out;
@@ -118,7 +115,8 @@ class RowQueue {
 
 class DeviceManager::Impl final : public device::DeviceListener {
  public:
-  explicit Impl(DeviceManagerOptions options) : options_(std::move(options)), work_(io_.get_executor()) {
+  explicit Impl(DeviceManagerOptions options)
+      : options_(std::move(options)), secrets_(options_.data_dir), work_(io_.get_executor()) {
     device::LoopOptions loop;
     loop.seed = std::random_device{}();
     loop_ = std::make_unique<device::DeviceLoop>(io_, nullptr, *this, loop);
@@ -128,6 +126,12 @@ class DeviceManager::Impl final : public device::DeviceListener {
 
   Result<void> load() {
     BOOST_OUTCOME_TRY(auto devices, read_devices(file()));
+    for (auto& config : devices) {
+      if (!DeviceSecrets::drop_password_file(config)) continue;
+      unusable_[config.id] =
+          "not started: password_file is not read any more, since it could be set over REST; send the password "
+          "itself (options.password, or anchord devices settings DEVICE password_file=FILE)";
+    }
     for (const auto& text : options_.from_config) {
       const auto equals = text.find('=');
       if (equals == std::string::npos) {
@@ -170,6 +174,10 @@ class DeviceManager::Impl final : public device::DeviceListener {
     }
     for (const auto& config : configs) {
       if (!config.enabled) continue;
+      if (unusable_.contains(config.id)) {
+        note(config.name + ": " + unusable_.at(config.id));
+        continue;
+      }
       if (const auto begun = on_io([&] { return begin(config); }); !begun)
         note(config.name + ": " + begun.error().message);
     }
@@ -235,7 +243,8 @@ class DeviceManager::Impl final : public device::DeviceListener {
   Result<void> begin(const DeviceConfig& config) {
     if (!loop_) return make_error(Errc::canceled, "the server stops");
     if (!recorder_) open_recorder();
-    return loop_->add(settings_of(config));
+    return loop_->add(
+        {to_string(config.id), config.kind, config.name, config.address, secrets_.driver_options(config)});
   }
 
   /// Made with the first device: a server without devices leaves no empty recordings.
@@ -277,6 +286,7 @@ class DeviceManager::Impl final : public device::DeviceListener {
   std::filesystem::path file() const { return options_.data_dir / "devices.json"; }
 
   DeviceManagerOptions options_;
+  const DeviceSecrets secrets_;
   boost::asio::io_context io_{1};
   boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work_;
   std::unique_ptr<record::Recorder> recorder_;
@@ -286,8 +296,9 @@ class DeviceManager::Impl final : public device::DeviceListener {
   RowQueue queue_;
   DeviceRows* rows_{nullptr};
 
-  std::mutex save_mutex_;  ///< taken before mutex_
-  std::mutex mutex_;       ///< the next four
+  std::mutex save_mutex_;                 ///< taken before mutex_
+  std::mutex mutex_;                      ///< the next five
+  std::map<Uuid, std::string> unusable_;  ///< kept devices that may not be started as they are, and why
   std::vector<DiscoveredDevice> discovered_;
   std::vector<DeviceConfig> configs_;
   std::optional<MissionId> mission_;
@@ -314,9 +325,11 @@ void DeviceManager::stop() { impl_->stop(); }
 
 std::vector<DeviceReport> DeviceManager::devices() {
   std::vector<DeviceConfig> configs;
+  std::map<Uuid, std::string> unusable;
   {
     const std::scoped_lock lock(impl_->mutex_);
     configs = impl_->configs_;
+    unusable = impl_->unusable_;
   }
   if (configs.empty()) return {};
   const auto states = impl_->on_io(
@@ -331,7 +344,10 @@ std::vector<DeviceReport> DeviceManager::devices() {
     } else {
       DeviceReport off;
       off.config = config;
-      off.reason = config.enabled ? "its settings are not usable" : "switched off";
+      const auto why = unusable.find(config.id);
+      off.reason = !config.enabled           ? "switched off"
+                   : why != unusable.end() ? why->second
+                                           : "its settings are not usable";
       out.push_back(std::move(off));
     }
   }
@@ -348,9 +364,15 @@ Result<DeviceReport> DeviceManager::device(const Uuid& id) {
 Result<DeviceReport> DeviceManager::add(DeviceConfig config) {
   config.id = make_uuid_v7(SystemClock{}.now());
   config.version = 1;
+  BOOST_OUTCOME_TRY(const auto secret, DeviceSecrets::split(std::move(config), nullptr));
+  config = secret.config;
+  BOOST_OUTCOME_TRYV(impl_->secrets_.store(secret));
   if (config.enabled) {
     const auto begun = impl_->on_io([&] { return impl_->begin(config); });
-    if (!begun) return begun.error();
+    if (!begun) {
+      impl_->secrets_.forget(config.id);
+      return begun.error();
+    }
   }
   {
     const std::scoped_lock lock(impl_->mutex_);
@@ -362,6 +384,7 @@ Result<DeviceReport> DeviceManager::add(DeviceConfig config) {
 
 Result<DeviceReport> DeviceManager::change(DeviceConfig config, std::uint64_t expected_version) {
   DeviceConfig before;
+  DeviceSecrets::Change secret;
   {
     const std::scoped_lock lock(impl_->mutex_);
     const auto found = std::find_if(impl_->configs_.begin(), impl_->configs_.end(),
@@ -371,28 +394,40 @@ Result<DeviceReport> DeviceManager::change(DeviceConfig config, std::uint64_t ex
     if (found->version != expected_version)
       return make_error(Errc::conflict, "the device was changed meanwhile");
     before = *found;
+    BOOST_OUTCOME_TRY(secret, DeviceSecrets::split(std::move(config), &before));
+    config = secret.config;
     config.version = expected_version + 1;
     *found = config;
   }
-  const bool same_link = before.kind == config.kind && before.address == config.address &&
+  const auto password = impl_->secrets_.kept(before.id);
+  const auto stored = impl_->secrets_.store(secret);
+  const bool same_link = !secret.given && before.kind == config.kind && before.address == config.address &&
                          before.options_json == config.options_json && before.name == config.name &&
                          before.enabled == config.enabled;
   if (!same_link) {
     const auto changed = impl_->on_io([&]() -> Result<void> {
+      if (!stored) return stored.error();
       if (!impl_->loop_) return make_error(Errc::canceled, "the server stops");
       (void)impl_->loop_->remove(to_string(config.id));
       if (!config.enabled) return boost::outcome_v2::success();
       auto begun = impl_->begin(config);
-      if (!begun && before.enabled) (void)impl_->begin(before);
+      if (begun || !before.enabled) return begun;
+      if (secret.given) impl_->secrets_.put_back(before.id, password);
+      (void)impl_->begin(before).has_value();
       return begun;
     });
     if (!changed) {
+      if (secret.given) impl_->secrets_.put_back(before.id, password);
       const std::scoped_lock lock(impl_->mutex_);
       for (auto& c : impl_->configs_) {
         if (c.id == before.id) c = before;
       }
       return changed.error();
     }
+  }
+  {
+    const std::scoped_lock lock(impl_->mutex_);
+    impl_->unusable_.erase(config.id);
   }
   BOOST_OUTCOME_TRYV(impl_->save());
   return device(config.id);
@@ -413,6 +448,7 @@ Result<void> DeviceManager::remove(const Uuid& id, std::uint64_t expected_versio
     if (impl_->loop_) (void)impl_->loop_->remove(to_string(id));
     return 0;
   });
+  impl_->secrets_.forget(id);
   return impl_->save();
 }
 

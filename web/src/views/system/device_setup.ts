@@ -12,11 +12,11 @@ export interface Setup {
   readonly kind: string; readonly name: string; readonly link: string; readonly path: string; readonly baud: string; readonly host: string; readonly port: string;
   readonly format: string; readonly corrections: string; readonly latency_ms: string; readonly gpsd_device: string;
   readonly anchors: string; readonly cir: string; readonly heading: boolean; readonly anchor_anchor_s: string;
-  readonly mount: string; readonly user: string; readonly password_file: string; readonly version: string; readonly send_gga: boolean;
+  readonly mount: string; readonly user: string; readonly password: string; readonly password_set: boolean; readonly version: string; readonly send_gga: boolean;
 }
 export const EMPTY: Setup = {
   kind: 'pozyx', name: '', link: 'serial', path: '', baud: '115200', host: '', port: '', format: 'auto', corrections: 'own', latency_ms: '', gpsd_device: '', anchors: '', cir: 'window', heading: false, anchor_anchor_s: '',
-  mount: '', user: '', password_file: '', version: '2', send_gga: false,
+  mount: '', user: '', password: '', password_set: false, version: '2', send_gga: false,
 };
 
 export function address_of(s: Setup): string {
@@ -37,7 +37,7 @@ export function setup_of(d: Device): Setup {
   return {
     ...EMPTY, kind: d.kind, name: d.name, ...parts_of(d.address), format: text(o.format) || 'auto', corrections: text(o.corrections) || 'own', latency_ms: text(o.latency_ms), gpsd_device: text(o.gpsd_device),
     anchors: Array.isArray(o.anchors) ? o.anchors.filter((a) => typeof a === 'string').join(' ') : '', cir: text(o.cir) || 'window', heading: o.heading === true, anchor_anchor_s: text(o.anchor_anchor_s),
-    mount: text(o.mount), user: text(o.user), password_file: text(o.password_file), version: text(o.version) || '2', send_gga: o.send_gga === true,
+    mount: text(o.mount), user: text(o.user), password_set: o.password_set === true, version: text(o.version) || '2', send_gga: o.send_gga === true,
   };
 }
 const number = (s: string): number | null => { const t = s.trim().replace(',', '.'); return t === '' || !Number.isFinite(Number(t)) ? null : Number(t); };
@@ -46,7 +46,7 @@ function options_of(s: Setup): Record<string, unknown> {
   const other = <T,>(v: T, usual: T): T | null => (v === usual ? null : v), ids = s.anchors.split(/[\s,;]+/).filter(Boolean);
   if (s.kind === 'gnss') return { format: other(s.format, 'auto'), corrections: other(s.corrections, 'own'), latency_ms: number(s.latency_ms), gpsd_device: s.gpsd_device.trim() || null };
   if (s.kind === 'pozyx') return { anchors: ids.length ? ids : null, cir: other(s.cir, 'window'), heading: other(s.heading, false), anchor_anchor_s: number(s.anchor_anchor_s) || null };
-  return { mount: s.mount.trim() || null, user: s.user.trim() || null, password_file: s.password_file.trim() || null, version: other(Number(s.version), 2), send_gga: other(s.send_gga, false) };
+  return { mount: s.mount.trim() || null, user: s.user.trim() || null, password: s.password || null, version: other(Number(s.version), 2), send_gga: other(s.send_gga, false) };
 }
 export const config_of = (s: Setup): DeviceForm => ({ kind: s.kind, name: s.name.trim(), address: address_of(s), options: Object.fromEntries(Object.entries(options_of(s)).filter(([, v]) => v !== null)) });
 /// Merge-patch of what changed; null when nothing did.

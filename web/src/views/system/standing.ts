@@ -56,7 +56,7 @@ function not_linked(d: Device): Standing {
   if (/the same port as/.test(d.conflict || d.reason)) return bad('PORT TWICE', `It is ${/the same port as device "[^"]*"/.exec(d.conflict || d.reason)![0]}: one port serves one device.`, 'Forget one of the two, or give this one its own port.');
   if (/busy/.test(d.reason)) return bad('PORT BUSY', 'Another program has this port open.', 'Close it there (gpsd, ModemManager, a terminal); this server then takes the port by itself.');
   if (/no such device|unplugged/.test(d.reason)) return bad(word === 'NEVER SEEN' ? word : 'UNPLUGGED', 'Its port is not there.', `Plug it in and switch it on: it is taken up within a second.${by_id ? '' : ' If the plug moved, Discover finds its new port; a name under by-id stays.'}`);
-  if (/user or password/.test(d.reason)) return bad('REFUSED', reason, 'Edit: check the user, and the file on the server that holds the password.');
+  if (/user or password/.test(d.reason)) return bad('REFUSED', reason, 'Edit: check the user, and send the password again.');
   if (/no mount/.test(d.reason)) return bad('NO SUCH MOUNT', reason, 'Edit: take one of the mount points named here.');
   if (/caster|mount/.test(d.reason)) return bad('REFUSED', reason, 'Check address, mount point and NTRIP version.');
   if (/refused: is the service/.test(d.reason)) return bad(word, 'The computer at this address answers, but nothing listens on this port.', 'Switch the output of the device on, or check the port in its address.');

@@ -1,0 +1,28 @@
+#include "server/runtime/private_file.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+namespace anchord::server {
+
+Result<void> write_private(const std::filesystem::path& file, const std::string& text) {
+  const std::filesystem::path part = file.string() + ".part";
+  const int fd = ::open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+  const bool written = fd >= 0 &&
+                       ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
+                       ::fsync(fd) == 0;
+  const int failure = errno;
+  if (fd >= 0) ::close(fd);
+  std::error_code error;
+  if (written) std::filesystem::rename(part, file, error);
+  if (!written || error) {
+    return make_error(failure == ENOSPC ? Errc::storage_full : Errc::storage_unavailable,
+                      "cannot write " + file.string() + ": " + (error ? error.message() : std::strerror(failure)));
+  }
+  return boost::outcome_v2::success();
+}
+
+}  // namespace anchord::server
