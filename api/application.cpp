@@ -21,6 +21,7 @@
 #include "api/services/flight_service.hpp"
 #include "api/services/geo_service.hpp"
 #include "api/services/kit_profiles.hpp"
+#include "api/services/late_writer.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/backups.hpp"
@@ -33,7 +34,11 @@ namespace anchord::api {
 struct Application::State {
   explicit State(Deps d)
       : deps(std::move(d)),
-        router(&deps.access_store, &deps.clock),
+        late([this](std::string_view what) {
+          if (deps.log_fault) deps.log_fault("", what);
+        }),
+        prompt(deps.access_store, late),
+        router(&deps.access_store, &deps.clock, &prompt),
         hub(deps.clock, "anchord " + deps.build.version),
         events(hub, deps.clock),
         alarms(events),
@@ -49,6 +54,7 @@ struct Application::State {
                       [this](const MissionId& id) { return clues_of_flight(id); }, deps.frames}),
         services{deps, hub,          events, alarms,         missions,     ingest,
                  jobs, calibrations, geo,    profiles.get(), models.get(), deps.frames} {
+    services.prompt = &prompt;
     router.on_fault(deps.log_fault);
     add_mission_routes(router, services);
     add_measurement_routes(router, services);
@@ -114,6 +120,8 @@ struct Application::State {
   void second();
 
   Deps deps;
+  LateWriter late;
+  PromptAccessStore prompt;
   Router router;
   Hub hub;
   EventLog events;
@@ -149,6 +157,12 @@ void Services::audit(const Request& request, std::string what, std::string resul
       {deps.clock.now(), request.principal.token_id, std::move(what), request.remote, std::move(result)}));
 }
 
+void Services::audit_soon(const Request& request, std::string what, std::string result) const {
+  value_or_problem((prompt != nullptr ? *prompt : deps.access_store)
+                       .append_audit({deps.clock.now(), request.principal.token_id, std::move(what),
+                                      request.remote, std::move(result)}));
+}
+
 /// Rows of topic `devices` for what is set up here.
 std::string Application::State::device_rows() {
   std::string out;
@@ -180,7 +194,8 @@ void Application::State::beat() {
 
 void Application::State::second() {
   const UtcTime now = deps.clock.now();
-  if (deps.access != nullptr) deps.access->flush();
+  // Not here: alarms and heartbeats must not wait for the disk.
+  if (deps.access != nullptr) late.idle_task([access = deps.access] { access->flush(); });
   const StorageStatus storage = services.storage();
   std::string json = R"({"t_us":)" + std::to_string(now.us()) + R"(,"recording":)" +
                      (missions.recording() ? "true" : "false");
@@ -225,7 +240,9 @@ Hub& Application::hub() { return state_->hub; }
 DeviceRows& Application::device_rows() { return state_->device_ingest; }
 
 WsHandlerFactory Application::ws_factory() {
-  return [this](const Principal& who) { return std::make_unique<Conversation>(state_->hub, who); };
+  return [this](const Principal& who, std::function<bool()> holds) {
+    return std::make_unique<Conversation>(state_->hub, who, std::move(holds));
+  };
 }
 
 void Application::start() {
@@ -259,6 +276,7 @@ void Application::stop() {
   state_->hub.shut_down();
   state_->jobs.stop();
   state_->missions.stop();
+  state_->late.stop();
 }
 
 }  // namespace anchord::api

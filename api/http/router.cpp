@@ -156,13 +156,15 @@ bool Access::permits(const Principal& who) const {
 
 struct Router::State {
   std::vector<Route> routes;
-  std::unique_ptr<Idempotency> idempotency;
+  std::unique_ptr<Idempotency> idempotency, of_commands;
   std::function<void(std::string_view, std::string_view)> fault;
 };
 
-Router::Router(AccessStore* answers, const Clock* clock) : state_(std::make_unique<State>()) {
-  if (answers != nullptr && clock != nullptr)
-    state_->idempotency = std::make_unique<Idempotency>(*answers, *clock);
+Router::Router(AccessStore* answers, const Clock* clock, AccessStore* prompt)
+    : state_(std::make_unique<State>()) {
+  if (answers == nullptr || clock == nullptr) return;
+  state_->idempotency = std::make_unique<Idempotency>(*answers, *clock);
+  state_->of_commands = std::make_unique<Idempotency>(prompt != nullptr ? *prompt : *answers, *clock);
 }
 Router::~Router() = default;
 Router::Router(Router&&) noexcept = default;
@@ -245,12 +247,17 @@ Response Router::dispatch(const Route& route, Request& request) const {
       response = problem(428, "precondition-required", "send If-Match with the ETag that was read");
     } else if (route.method == Method::post && state_->idempotency &&
                !request.header("idempotency-key").empty()) {
-      response = state_->idempotency->run(request, guarded);
+      const bool prompt = route.work_for(request) == Work::command;
+      response = (prompt ? state_->of_commands : state_->idempotency)->run(request, guarded);
     } else {
       response = guarded(request);
     }
   } catch (const BodyError& lost) {
-    response = problem(lost.status(), lost.status() == 413 ? "too-large" : "malformed", lost.what());
+    response = problem(lost.status(),
+                       lost.status() == 413   ? "too-large"
+                       : lost.status() == 401 ? "unauthorized"
+                                              : "malformed",
+                       lost.what());
     response.header("Connection", "close");
   } catch (const std::bad_alloc&) {
     response = problem(503, "overloaded", "out of memory");
@@ -263,8 +270,9 @@ Response Router::dispatch(const Route& route, Request& request) const {
   complete_problem(request, response);
   if (!request.request_id.empty()) response.header("X-Request-Id", request.request_id);
   if (!has_header(response, "Cache-Control")) {
-    response.header("Cache-Control",
-                    response.status >= 400 || request.method != Method::get ? "no-store" : "no-cache");
+    // A browser may keep an answer and asks each time whether it still holds; positions are not for proxies.
+    const bool kept = response.status < 400 && (request.method == Method::get || request.method == Method::head);
+    response.header("Cache-Control", kept ? "private, no-cache" : "no-store");
   }
   return response;
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "api/http/message.hpp"
+#include "api/http/work.hpp"
 
 namespace anchord {
 class AccessStore;
@@ -47,7 +48,16 @@ struct Route {
   std::uint64_t body_limit{1 << 20};
   bool streams_body{false};    ///< the handler pulls Request::body_stream instead of reading body
   bool needs_if_match{false};  ///< 428 without the header; the handler compares it
+  Work work{Work::ordinary};
+  /// Where the body decides (actions of a mission); asked on an io thread, with the whole body. Else `work` holds.
+  std::function<Work(const Request&)> work_of{};
+
+  Work work_for(const Request& request) const { return work_of ? work_of(request) : work; }
 };
+/// The same route, run by another executor than the ordinary one.
+inline Route as_command(Route route) { return route.work = Work::command, route; }
+inline Route as_flight(Route route) { return route.work = Work::flight, route; }
+inline Route as_heavy(Route route) { return route.work = Work::heavy, route; }
 
 struct Resolution {
   enum class Kind : std::uint8_t { matched, not_found, method_not_allowed };
@@ -60,8 +70,9 @@ struct Resolution {
 /// The route table. Filled at start, then read from any thread.
 class Router {
  public:
-  /// Where answers to Idempotency-Key are kept; both may be null in tests (then the header is ignored).
-  explicit Router(AccessStore* answers = nullptr, const Clock* clock = nullptr);
+  /// Where answers to Idempotency-Key are kept; all may be null in tests (then the header is ignored). `prompt`
+  /// keeps those of commands, which must not wait for the disk; null: as the others.
+  explicit Router(AccessStore* answers = nullptr, const Clock* clock = nullptr, AccessStore* prompt = nullptr);
   ~Router();
   Router(Router&&) noexcept;
   Router& operator=(Router&&) noexcept;

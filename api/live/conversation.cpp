@@ -22,8 +22,8 @@ std::int64_t steady_us() {
 
 }  // namespace
 
-Conversation::Conversation(Hub& hub, Principal principal)
-    : hub_(hub), principal_(std::move(principal)), outbox_(hub.counters()) {}
+Conversation::Conversation(Hub& hub, Principal principal, std::function<bool()> holds)
+    : hub_(hub), principal_(std::move(principal)), holds_(std::move(holds)), outbox_(hub.counters()) {}
 
 Conversation::~Conversation() = default;
 
@@ -207,6 +207,8 @@ void Conversation::on_message(Topic topic, const std::shared_ptr<const LiveMessa
 }
 
 void Conversation::on_tick(UtcTime now, bool heartbeat) {
+  // Four times a second: a login that was revoked sees nothing more after a moment.
+  if (ticks_++ % 5 == 0 && holds_ && !holds_()) return close(4001, "auth");
   bool due = false;
   {
     const std::scoped_lock lock(mutex_);

@@ -16,7 +16,8 @@ class Conversation final : public WsHandler, private HubListener {
  public:
   static constexpr std::size_t k_max_subscriptions = 32;
 
-  Conversation(Hub& hub, Principal principal);
+  /// `holds`: false ends the conversation with 4001; empty: it always does (tests).
+  Conversation(Hub& hub, Principal principal, std::function<bool()> holds = {});
   ~Conversation() override;
 
   void on_open(std::function<void()> wake) override;
@@ -38,12 +39,14 @@ class Conversation final : public WsHandler, private HubListener {
 
   Hub& hub_;
   const Principal principal_;
+  const std::function<bool()> holds_;
   std::function<void()> wake_;
   std::mutex mutex_;  ///< guards outbox_ and close_; never held while the hub is called
   Outbox outbox_;
   std::optional<std::pair<std::uint16_t, std::string>> close_;
   std::map<std::uint64_t, Topic> subscriptions_;  ///< touched by the session's strand alone
   std::uint64_t next_sub_{100};
+  unsigned ticks_{0};  ///< of the hub; touched under its lock alone
   HubMembership membership_;  ///< from on_open to on_close; last, so that it ends before what the hub calls
 };
 

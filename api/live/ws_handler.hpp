@@ -28,6 +28,8 @@ class WsHandler {
   virtual std::optional<std::pair<std::uint16_t, std::string>> close_request() = 0;
 };
 
-using WsHandlerFactory = std::function<std::unique_ptr<WsHandler>(const Principal&)>;
+/// `holds`: does the login still stand? Asked several times a second, from any thread; must not wait.
+using WsHandlerFactory =
+    std::function<std::unique_ptr<WsHandler>(const Principal&, std::function<bool()> holds)>;
 
 }  // namespace anchord::api

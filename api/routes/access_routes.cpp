@@ -76,6 +76,12 @@ std::string cookie(std::string_view value, std::int64_t max_age_s) {
          "; Path=/; HttpOnly; SameSite=Strict; Max-Age=" + std::to_string(max_age_s);
 }
 
+/// Of the session that asks; a token in the header goes before a cookie, as at the door.
+std::string_view cookie_of(const Request& request) {
+  if (!request.header("authorization").empty()) return {};
+  return cookie_value(request.header("cookie"), k_session_cookie);
+}
+
 Response create_token(AccessService& access, const Request& request) {
   const json body = body_of(request, {"name", "roles", "expires_at"});
   std::vector<FieldError> faults;
@@ -136,7 +142,15 @@ Response login(AccessService& access, const Request& request) {
   const std::string token = text_field(body, "token", faults);
   if (!faults.empty()) throw_problem(422, "validation", "token is missing", faults);
   const auto opened = access.open_session(token, request.remote);
-  if (!opened) throw_problem(401, "unauthorized", opened.error().message);
+  if (!opened) {
+    if (const auto wait_s = access.guard().failed(token, request.remote, LoginGuard::Clock::now())) {
+      auto response = problem(429, "rate-limited",
+                              "too many wrong tokens from " + request.remote + "; wait " +
+                                  std::to_string(*wait_s) + " s (a right one is taken at once)");
+      throw ProblemException{std::move(response.header("Retry-After", std::to_string(*wait_s)))};
+    }
+    throw_problem(401, "unauthorized", opened.error().message);
+  }
   const auto who = access.session(opened.value());
   auto response = answer(200, who ? principal_json(*who) : json::object());
   return response.header("Set-Cookie", cookie(opened.value(), access.options().session_lifetime.count()));
@@ -160,13 +174,14 @@ void add_access_routes(Router& router, AccessService& access) {
   router.add(
       {del, "/api/v1/tokens/{id}", admin, [&access](const Request& r) { return revoke_token(access, r); }});
   router.add(
-      {post, "/api/v1/session", Access::open(), [&access](const Request& r) { return login(access, r); }});
+      {post, "/api/v1/session", Access::open(), [&access](const Request& r) { return login(access, r); }, 4096});
   router.add(
       {del, "/api/v1/session", Access::open(), [&access](const Request& r) { return logout(access, r); }});
   router.add({get, "/api/v1/me", Access::any_token(),
               [](const Request& r) { return answer(200, principal_json(r.principal)); }});
   router.add({post, "/api/v1/ws-tickets", Access::any_token(), [&access](const Request& r) {
-                return answer(201, {{"ticket", access.make_ticket(r.principal)},
+                return answer(201, {{"ticket", access.make_ticket(access.login_of(
+                                        r.principal, cookie_of(r)))},
                                     {"expires_in_s", access.options().ticket_lifetime.count()}});
               }});
 }

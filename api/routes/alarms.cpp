@@ -9,15 +9,15 @@ namespace anchord::api {
 
 void add_alarm_routes(Router& router, Services& s) {
   using Ordered = nlohmann::ordered_json;
-  router.add({Method::get, "/api/v1/alarms", readers(), [&s](const Request& request) {
+  router.add(as_command({Method::get, "/api/v1/alarms", readers(), [&s](const Request& request) {
                 check_query(request, {"fields"});
                 Ordered items = Ordered::array();
                 for (const auto& alarm : s.alarms.standing())
                   items.push_back(Ordered::parse(alarm_json(alarm)));
                 return list_response(request, std::move(items), "");
-              }});
+              }}));
   router.add(
-      {Method::post, "/api/v1/alarms/{id}/ack", Access::any_of({Role::op}), [&s](const Request& request) {
+      as_command({Method::post, "/api/v1/alarms/{id}/ack", Access::any_of({Role::op}), [&s](const Request& request) {
          const auto body = json_body(request, true);
          std::vector<FieldError> errors;
          Fields fields(body, "", errors);
@@ -26,9 +26,9 @@ void add_alarm_routes(Router& router, Services& s) {
          refuse_if_any(errors);
          const std::string& id = request.params.at("id");
          const auto alarm = value_or_problem(s.alarms.acknowledge(id, request.principal.name));
-         s.audit(request, "alarm.ack " + alarm.condition.id + (note.empty() ? "" : " note: " + note));
+         s.audit_soon(request, "alarm.ack " + alarm.condition.id + (note.empty() ? "" : " note: " + note));
          return json_response(200, Ordered::parse(alarm_json(alarm)));
-       }});
+       }, k_command_bytes}));
 }
 
 }  // namespace anchord::api

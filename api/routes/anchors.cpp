@@ -360,11 +360,11 @@ void add_anchor_routes(Router& router, Services& s) {
               }});
   router.add({Method::patch, "/api/v1/anchors/{id}", Access::any_of({Role::integrator}), on(patch), 1 << 20,
               false, true});
-  router.add({Method::get, "/api/v1/anchors/{id}/estimates", readers(), on(estimates)});
+  router.add(as_heavy({Method::get, "/api/v1/anchors/{id}/estimates", readers(), on(estimates)}));
   router.add({Method::get, "/api/v1/anchors/{id}/history", readers(), on(history)});
-  router.add({Method::get, "/api/v1/exports/anchors.geojson", readers(), on(export_geojson)});
-  router.add({Method::get, "/api/v1/exports/anchors.csv", readers(), on(export_csv)});
-  router.add({Method::get, "/api/v1/exports/anchors.kml", readers(), on(export_kml)});
+  router.add(as_heavy({Method::get, "/api/v1/exports/anchors.geojson", readers(), on(export_geojson)}));
+  router.add(as_heavy({Method::get, "/api/v1/exports/anchors.csv", readers(), on(export_csv)}));
+  router.add(as_heavy({Method::get, "/api/v1/exports/anchors.kml", readers(), on(export_kml)}));
 }
 
 }  // namespace anchord::api

@@ -371,8 +371,8 @@ void add_calibration_routes(Router& router, Services& s) {
                 response.status = 204;
                 return response;
               }});
-  router.add({Method::get, "/api/v1/calibrations/{id}/report", readers(), on(report)});
-  router.add({Method::get, "/api/v1/calibrations/{id}/residuals", readers(), on(residuals)});
+  router.add(as_heavy({Method::get, "/api/v1/calibrations/{id}/report", readers(), on(report)}));
+  router.add(as_heavy({Method::get, "/api/v1/calibrations/{id}/residuals", readers(), on(residuals)}));
   router.add({Method::post, "/api/v1/calibrations/{id}/publish", Access::any_of({Role::engineer, Role::op}),
               on(publish)});
   router.add({Method::get, "/api/v1/revisions", readers(), on(revisions)});

@@ -166,7 +166,7 @@ void add_dataset_routes(Router& router, LearningServices& l) {
   };
   const auto engineer = Access::any_of({Role::engineer});
   router.add({Method::get, "/api/v1/datasets", readers(), on(list)});
-  router.add({Method::post, "/api/v1/datasets", engineer, on(create), k_max_csv_bytes});
+  router.add(as_heavy({Method::post, "/api/v1/datasets", engineer, on(create), k_max_csv_bytes}));
   router.add({Method::get, "/api/v1/datasets/{id}", readers(), [&l](const Request& request) {
                 check_query(request, {});
                 const auto record = named(l, request);
@@ -182,8 +182,8 @@ void add_dataset_routes(Router& router, LearningServices& l) {
                 response.status = 204;
                 return response;
               }});
-  router.add({Method::get, "/api/v1/datasets/{id}/rows", readers(), on(rows)});
-  router.add({Method::get, "/api/v1/datasets/{id}/rules", readers(), on(rules)});
+  router.add(as_heavy({Method::get, "/api/v1/datasets/{id}/rows", readers(), on(rows)}));
+  router.add(as_heavy({Method::get, "/api/v1/datasets/{id}/rules", readers(), on(rules)}));
 }
 
 }  // namespace anchord::api

@@ -46,7 +46,7 @@ Response control(Services& s, const Request& request) {
   const auto done = std::string("control.") + std::string(k_control[*action]) + ' ' + to_string(mission);
   if (*action == 0) {
     const auto lease = granted(s.flights->take_control(mission, request.principal, by_force));
-    s.audit(request, done + (by_force ? " by force" : ""));
+    s.audit_soon(request, done + (by_force ? " by force" : ""));
     return json_response(200, lease_json(lease, true));
   }
   value_or_problem(s.missions.mission(mission));
@@ -54,7 +54,7 @@ Response control(Services& s, const Request& request) {
     return json_response(
         200, lease_json(granted(s.flights->renew_control(mission, *key, request.principal)), true));
   granted(s.flights->release_control(mission, *key, request.principal));
-  s.audit(request, done);
+  s.audit_soon(request, done);
   return json_response(200, Ordered{{"held", false}});
 }
 
@@ -126,6 +126,14 @@ const std::vector<std::string_view>& flight_actions() {
   return k_actions;
 }
 
+/// What an aircraft in the air is told must not wait behind what begins and ends flights, which reads the disk
+/// and checks plans. A body that cannot be read is refused by either executor.
+Work work_of_action(const Request& request) {
+  const auto body = nlohmann::json::parse(request.body, nullptr, false);
+  const auto action = body.is_object() ? body.value("action", nlohmann::json()) : nlohmann::json();
+  return action == "start" || action == "finish" ? Work::flight : Work::command;
+}
+
 /// The part of POST /missions/{id}/actions that moves an aircraft. Whatever it answers is in the audit log.
 Response flight_action(Services& s, const Request& request, const std::string& action, Fields& fields,
                        std::vector<FieldError>& errors) {
@@ -149,11 +157,11 @@ Response flight_action(Services& s, const Request& request, const std::string& a
   const std::string what = "mission." + action + ' ' + to_string(mission);
   auto command = s.flights->act(mission, order, request.principal);
   if (!command) {
-    s.audit(request, what, "refused: " + command.error().message);
+    s.audit_soon(request, what, "refused: " + command.error().message);
     if (command.error().code == Errc::invalid_argument) throw_problem(422, "state", command.error().message);
   }
   auto given = granted(std::move(command));
-  s.audit(request, what);
+  s.audit_soon(request, what);
   if (const int wait_s = prefer_wait_s(request); wait_s > 0)
     given = s.flights->settled(std::move(given), std::min(wait_s, 3));
   return json_response(202, flight_command_json(given));
@@ -231,13 +239,13 @@ void add_flight_routes(Router& router, Services& s) {
   };
   const auto op = Access::any_of({Role::op});
   const std::string base = "/api/v1/missions/{id}/";
-  router.add({Method::get, base + "control", readers(), on(who_has_control)});
-  router.add({Method::post, base + "control", op, on(control)});
+  router.add(as_command({Method::get, base + "control", readers(), on(who_has_control)}));
+  router.add(as_command({Method::post, base + "control", op, on(control), k_command_bytes}));
   router.add({Method::get, base + "uploads", readers(), on(uploads)});
-  router.add({Method::post, base + "uploads", op, on(upload)});
-  router.add({Method::post, base + "aircraft", op, on(change_aircraft)});
-  router.add({Method::get, base + "checklist", readers(), on(checklist)});
-  router.add({Method::post, base + "checklist/{item}", op, on(override_item)});
+  router.add(as_flight({Method::post, base + "uploads", op, on(upload), k_command_bytes}));
+  router.add(as_flight({Method::post, base + "aircraft", op, on(change_aircraft), k_command_bytes}));
+  router.add(as_flight({Method::get, base + "checklist", readers(), on(checklist)}));
+  router.add(as_flight({Method::post, base + "checklist/{item}", op, on(override_item), k_command_bytes}));
   router.add({Method::get, base + "procedure", readers(),
               [&s](const Request& request) { return shown(s, request, &FlightService::procedure_text); }});
   router.add({Method::get, base + "grid", readers(),

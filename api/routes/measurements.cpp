@@ -234,7 +234,7 @@ void add_measurement_routes(Router& router, Services& s) {
   };
   ingest("/api/v1/ranges", [&s](const Request& request) { return s.ingest.ranges(request); });
   ingest("/api/v1/fixes", [&s](const Request& request) { return s.ingest.fixes(request); });
-  router.add({Method::get, "/api/v1/ranges", readers(), on(list_ranges)});
+  router.add(as_heavy({Method::get, "/api/v1/ranges", readers(), on(list_ranges)}));
   router.add({Method::get, "/api/v1/ranges/{id}", readers(), [&s](const Request& request) {
                 check_query(request, {});
                 std::int64_t id = 0;
@@ -246,7 +246,7 @@ void add_measurement_routes(Router& router, Services& s) {
                 return json_response(200, json);
               }});
   router.add({Method::get, "/api/v1/ranges/{id}/cir", readers(), on(range_cir)});
-  router.add({Method::get, "/api/v1/fixes", readers(), on(list_fixes)});
+  router.add(as_heavy({Method::get, "/api/v1/fixes", readers(), on(list_fixes)}));
 }
 
 }  // namespace anchord::api

@@ -141,9 +141,12 @@ void add_mission_routes(Router& router, Services& s) {
                 response.status = 204;
                 return response;
               }});
-  router.add({Method::post, "/api/v1/missions/{id}/actions", Access::any_of({Role::op}), on(act)});
+  Route actions{Method::post, "/api/v1/missions/{id}/actions", Access::any_of({Role::op}), on(act),
+                k_command_bytes};
+  actions.work_of = work_of_action;
+  router.add(std::move(actions));
   router.add({Method::get, "/api/v1/missions/{id}/events", readers(), on(events)});
-  router.add({Method::get, "/api/v1/missions/{id}/track", readers(), on(track)});
+  router.add(as_heavy({Method::get, "/api/v1/missions/{id}/track", readers(), on(track)}));
   router.add({Method::get, "/api/v1/events", readers(), on(events)});
 }
 

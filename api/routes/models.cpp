@@ -311,7 +311,7 @@ void add_model_routes(Router& router, LearningServices& l) {
   };
   const auto engineer = Access::any_of({Role::engineer});
   router.add({Method::get, "/api/v1/models", readers(), on(list)});
-  router.add({Method::post, "/api/v1/models", engineer, on(upload), k_max_artifact_bytes});
+  router.add(as_heavy({Method::post, "/api/v1/models", engineer, on(upload), k_max_artifact_bytes}));
   router.add({Method::get, "/api/v1/models/active", readers(), [&l](const Request& request) {
                 check_query(request, {});
                 return active_answer(l);
@@ -332,10 +332,10 @@ void add_model_routes(Router& router, LearningServices& l) {
                 response.status = 204;
                 return response;
               }});
-  router.add({Method::get, "/api/v1/models/{id}/artifact", readers(), on(artifact)});
-  router.add({Method::get, "/api/v1/models/{id}/gate", readers(), on(gate_of_model)});
-  router.add({Method::post, "/api/v1/models/{id}/promote", engineer, on(promote)});
-  router.add({Method::post, "/api/v1/models/{id}/predict", readers(), on(predict)});
+  router.add(as_heavy({Method::get, "/api/v1/models/{id}/artifact", readers(), on(artifact)}));
+  router.add(as_heavy({Method::get, "/api/v1/models/{id}/gate", readers(), on(gate_of_model)}));
+  router.add(as_heavy({Method::post, "/api/v1/models/{id}/promote", engineer, on(promote)}));
+  router.add(as_heavy({Method::post, "/api/v1/models/{id}/predict", readers(), on(predict)}));
 }
 
 }  // namespace anchord::api

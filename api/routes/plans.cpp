@@ -182,9 +182,9 @@ void add_plan_routes(Router& router, Services& s) {
   const auto op = Access::any_of({Role::op});
   router.add({Method::get, "/api/v1/plans", readers(), on(list)});
   router.add({Method::post, "/api/v1/plans", op, on(create), k_body});
-  router.add({Method::post, "/api/v1/plans/generate", op, on(generate), k_body});
-  router.add({Method::post, "/api/v1/plans/validate", op, on(validate_body), k_body});
-  router.add({Method::post, "/api/v1/plans/import", op, on(import), k_body});
+  router.add(as_heavy({Method::post, "/api/v1/plans/generate", op, on(generate), k_body}));
+  router.add(as_heavy({Method::post, "/api/v1/plans/validate", op, on(validate_body), k_body}));
+  router.add(as_heavy({Method::post, "/api/v1/plans/import", op, on(import), k_body}));
   router.add({Method::get, "/api/v1/plans/{id}", readers(), [&s](const Request& request) {
                 check_query(request, {});
                 return answer(200, load(s, request));
@@ -192,8 +192,8 @@ void add_plan_routes(Router& router, Services& s) {
   router.add({Method::put, "/api/v1/plans/{id}", op, on(put), k_body, false, true});
   router.add({Method::patch, "/api/v1/plans/{id}", op, on(patch), k_body, false, true});
   router.add({Method::del, "/api/v1/plans/{id}", op, on(remove), 1 << 20, false, true});
-  router.add({Method::post, "/api/v1/plans/{id}/validate", readers(), on(validate)});
-  router.add({Method::get, "/api/v1/plans/{id}/export", readers(), on(export_plan)});
+  router.add(as_heavy({Method::post, "/api/v1/plans/{id}/validate", readers(), on(validate)}));
+  router.add(as_heavy({Method::get, "/api/v1/plans/{id}/export", readers(), on(export_plan)}));
 }
 
 }  // namespace anchord::api

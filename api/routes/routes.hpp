@@ -32,12 +32,15 @@ struct Services {
   ModelRegistry* models{nullptr};   ///< null: no ranges are judged (tests)
   FrameStore* frames{nullptr};      ///< null: their routes do not exist
   FlightService* flights{nullptr};  ///< null: no plans, nothing is flown (tests)
+  AccessStore* prompt{nullptr};     ///< for commands: takes at once what it writes soon (LateWriter)
 
   StorageStatus storage() const { return deps.storage_status ? deps.storage_status() : StorageStatus{}; }
   /// Begins a backup in a job. Errors: those of the job queue.
   Result<Job> begin_backup() const;
   /// One line in the audit log: who did what from where.
   void audit(const Request& request, std::string what, std::string result = "ok") const;
+  /// The same of a command, which was given already and whose answer waits for the disk only a moment.
+  void audit_soon(const Request& request, std::string what, std::string result = "ok") const;
 };
 
 void add_mission_routes(Router& router, Services& services);
@@ -54,6 +57,10 @@ void add_plan_routes(Router& router, Services& services);
 void add_alarm_routes(Router& router, Services& services);
 void add_backup_routes(Router& router, Services& services);
 void add_flight_routes(Router& router, Services& services);
+/// Bodies of commands are small, and parsed before an executor is chosen.
+inline constexpr std::uint64_t k_command_bytes = 16 * 1024;
+/// Of POST /missions/{id}/actions, by the action.
+Work work_of_action(const Request& request);
 /// start, hold, resume, skip, return, land, abort.
 const std::vector<std::string_view>& flight_actions();
 Response flight_action(Services& services, const Request& request, const std::string& action, Fields& fields,

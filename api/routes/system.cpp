@@ -91,7 +91,7 @@ Response document(std::string_view text) {
 Response audit_log(Services& s, const Request& request) {
   check_query(request, {"limit"});
   Ordered items = Ordered::array();
-  for (const auto& entry : value_or_problem(s.deps.access_store.audit(page_query(request).limit))) {
+  for (const auto& entry : value_or_problem((s.prompt != nullptr ? *s.prompt : s.deps.access_store).audit(page_query(request).limit))) {
     items.push_back({{"at", to_rfc3339(entry.time)},
                      {"who", entry.who},
                      {"what", entry.what},
@@ -120,12 +120,12 @@ void add_system_routes(Router& router, Services& s) {
   router.add({Method::get, "/healthz", Access::open(), [](const Request&) {
                 return json_response(200, {{"status", "ok"}});
               }});
-  router.add({Method::get, "/readyz", Access::open(), on(ready)});
+  router.add(as_command({Method::get, "/readyz", Access::open(), on(ready)}));
   router.add({Method::get, "/version", Access::open(), on(version)});
   router.add({Method::get, "/metrics", readers(), on(metrics)});
   router.add({Method::get, "/problems/{type}", Access::open(), explain});
   router.add({Method::get, "/api/v1/system", readers(), on(system)});
-  router.add({Method::get, "/api/v1/audit", Access::any_of({Role::admin}), on(audit_log)});
+  router.add(as_heavy({Method::get, "/api/v1/audit", Access::any_of({Role::admin}), on(audit_log)}));
   router.add({Method::get, "/api/docs", Access::open(), [](const Request&) {
                 static const std::string page = docs_page(openapi_json());
                 Response response;

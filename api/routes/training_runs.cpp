@@ -145,10 +145,10 @@ void add_training_run_routes(Router& router, LearningServices& l) {
   router.add({Method::del, base + "/{id}", engineer, on(remove)});
   router.add({Method::post, base + "/{id}/restart", engineer, on(restart)});
   for (const char* name : {"folds", "grid", "importance", "selection", "confusion", "roc", "cdf"}) {
-    router.add({Method::get, base + "/{id}/" + name, readers(),
-                [&l, name](const Request& request) { return part(l, request, name); }});
+    router.add(as_heavy({Method::get, base + "/{id}/" + name, readers(),
+                [&l, name](const Request& request) { return part(l, request, name); }}));
   }
-  router.add({Method::get, base + "/{id}/predictions", readers(), on(predictions)});
+  router.add(as_heavy({Method::get, base + "/{id}/predictions", readers(), on(predictions)}));
 }
 
 }  // namespace anchord::api

@@ -60,7 +60,7 @@ struct Session {
 };
 
 struct Ticket {
-  Principal principal;
+  Login login;
   UtcTime until{};
 };
 
@@ -85,6 +85,7 @@ struct AccessService::State {
   std::map<std::string, Ticket, std::less<>> tickets;  ///< by SHA-256 of the ticket
   std::uint64_t next_order{0};
 
+  LoginGuard guard;
   mutable std::mutex notes_mutex;  ///< apart: verify() is shared, and notes what it saw
   struct Refusal {
     UtcTime first{};
@@ -99,6 +100,20 @@ struct AccessService::State {
   void note_use(const std::string& key) const {
     const std::scoped_lock lock(notes_mutex);
     used[key] = clock.now();
+  }
+
+  /// The mutex is held.
+  bool holds(const Login& login) const {
+    const UtcTime now = clock.now();
+    if (!login.session_sha256.empty()) {
+      const auto session = sessions.find(login.session_sha256);
+      if (session == sessions.end() || session->second.until <= now) return false;
+    }
+    std::string key = login.who.token_id;
+    std::erase(key, '-');
+    const auto token = tokens.find(key);
+    return token != tokens.end() && live(token->second, now) &&
+           principal_of(token->second).roles == login.who.roles;
   }
 
   /// Null unless the secret is right and the token lives. The mutex is held.
@@ -249,25 +264,37 @@ std::optional<Principal> AccessService::session(std::string_view cookie) const {
   return principal_of(token->second);
 }
 
-std::string AccessService::make_ticket(const Principal& principal) {
+Login AccessService::login_of(const Principal& who, std::string_view cookie) const {
+  return {who, cookie.empty() ? std::string{} : sha256_hex(cookie)};
+}
+
+bool AccessService::holds(const Login& login) const {
+  if (state_->options.auth_off) return true;
+  const std::shared_lock lock(state_->mutex);
+  return state_->holds(login);
+}
+
+LoginGuard& AccessService::guard() { return state_->guard; }
+
+std::string AccessService::make_ticket(Login login) {
   const std::string ticket = random_hex_256();
   const std::unique_lock lock(state_->mutex);
   const UtcTime now = state_->clock.now();
   std::erase_if(state_->tickets, [&](const auto& entry) { return entry.second.until <= now; });
   if (state_->tickets.size() >= state_->options.max_tickets) state_->tickets.erase(state_->tickets.begin());
-  state_->tickets[sha256_hex(ticket)] = {principal, after(now, state_->options.ticket_lifetime)};
+  state_->tickets[sha256_hex(ticket)] = {std::move(login), after(now, state_->options.ticket_lifetime)};
   return ticket;
 }
 
-std::optional<Principal> AccessService::take_ticket(std::string_view ticket) {
+std::optional<Login> AccessService::take_ticket(std::string_view ticket) {
   if (ticket.size() != k_secret_digits) return std::nullopt;
   const std::unique_lock lock(state_->mutex);
   const auto at = state_->tickets.find(sha256_hex(ticket));
   if (at == state_->tickets.end()) return std::nullopt;
-  const Ticket found = std::move(at->second);
+  Ticket found = std::move(at->second);
   state_->tickets.erase(at);
-  if (found.until <= state_->clock.now()) return std::nullopt;
-  return found.principal;
+  if (found.until <= state_->clock.now() || !state_->holds(found.login)) return std::nullopt;
+  return std::move(found.login);
 }
 
 void AccessService::note_refusal(std::string_view who, std::string_view what, std::string_view from) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "api/http/message.hpp"
+#include "api/services/login_guard.hpp"
 #include "core/base/result.hpp"
 #include "core/base/time.hpp"
 #include "core/ports/store.hpp"
@@ -27,6 +28,12 @@ struct AccessOptions {
 struct NewToken {
   Token token;
   std::string text;  ///< anc_<id>_<secret>
+};
+
+/// By what somebody came in; what it opens (streams, uploads) ends with it.
+struct Login {
+  Principal who;
+  std::string session_sha256{};  ///< of the browser session; empty: by a token
 };
 
 /// Who may come in: tokens, browser sessions and WebSocket tickets.
@@ -55,6 +62,8 @@ class AccessService {
 
   /// Null for anything that is not a live token.
   std::optional<Principal> verify(std::string_view token_text) const;
+  /// Slows those who guess; asked after verify(), so that what is right is never refused.
+  LoginGuard& guard();
 
   /// Login of a browser: the cookie's value. Audited, also when refused.
   Result<std::string> open_session(std::string_view token_text, std::string_view from);
@@ -62,9 +71,15 @@ class AccessService {
   /// Null when unknown, too old, or its token was revoked or has expired since.
   std::optional<Principal> session(std::string_view cookie) const;
 
-  std::string make_ticket(const Principal& principal);
-  /// The principal the ticket was made for, once.
-  std::optional<Principal> take_ticket(std::string_view ticket);
+  /// `cookie`: of the browser session that asks; empty: it is a token.
+  Login login_of(const Principal& who, std::string_view cookie) const;
+  /// Does it still open what it opened? False once its token was revoked or has expired, its roles are others, or
+  /// its session has ended. Never waits: for every tick of every stream.
+  bool holds(const Login& login) const;
+
+  std::string make_ticket(Login login);
+  /// The login the ticket was made for, once, and only while that holds.
+  std::optional<Login> take_ticket(std::string_view ticket);
 
   /// Notes a request that was refused for who sent it; flush() writes it. Never waits: for the io thread.
   /// Equal ones are counted, beyond 1000 different ones between two flushes only their number is kept.

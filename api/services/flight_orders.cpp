@@ -15,6 +15,8 @@ using procedure::Event;
 
 namespace {
 
+constexpr std::size_t k_checks = 8;
+
 std::optional<Event> event_of_action(const std::string& action) {
   if (action == "hold") return Event::hold;
   if (action == "resume") return Event::resume;
@@ -28,16 +30,31 @@ Error forbidden(std::string why) { return make_error(Errc::invalid_argument, std
 
 }  // namespace
 
+FlightService::State::Groundwork FlightService::State::groundwork(const Plan* plan) {
+  Groundwork ground{plan, nullptr, deps.storage ? deps.storage() : StorageStatus{}};
+  if (plan == nullptr) return ground;
+  {
+    const std::scoped_lock lock(checks_mutex);
+    for (const auto& known : checks) {
+      if (known.plan == plan->id && known.revision == plan->version) ground.check = known.check;
+    }
+  }
+  if (ground.check) return ground;
+  if (auto judged = planning::check_plan(*plan))
+    ground.check = std::make_shared<const planning::PlanCheck>(std::move(judged).value());
+  const std::scoped_lock lock(checks_mutex);
+  checks.push_back({plan->id, plan->version, ground.check});
+  if (checks.size() > k_checks) checks.pop_front();
+  return ground;
+}
+
 std::vector<ChecklistItem> FlightService::State::checklist(const Mission* record, const MissionId& mission,
-                                                           const Plan* plan, bool manual) {
+                                                           const Groundwork& ground, bool manual) {
+  const Plan* plan = ground.plan;
   ChecklistFacts facts;
   facts.mission = record;
-  std::optional<planning::PlanCheck> check;
-  if (plan != nullptr) {
-    if (auto judged = planning::check_plan(*plan)) check = std::move(judged).value();
-    facts.min_battery = plan->settings.min_battery;
-  }
-  facts.plan = check ? &*check : nullptr;
+  if (plan != nullptr) facts.min_battery = plan->settings.min_battery;
+  facts.plan = ground.check.get();
   if (!manual && deps.drone != nullptr) facts.drone = deps.drone->status();
   const double now = now_s();
   if (const auto it = heard.find(mission); it != heard.end()) {
@@ -48,9 +65,8 @@ std::vector<ChecklistItem> FlightService::State::checklist(const Mission* record
     if (facts.fix_age_s && h.correction_age_s)
       facts.correction_age_s = *facts.fix_age_s + *h.correction_age_s;
   }
-  const StorageStatus storage = deps.storage ? deps.storage() : StorageStatus{};
-  facts.writable = storage.writable;
-  facts.disk_free_bytes = static_cast<double>(storage.disk_free_bytes);
+  facts.writable = ground.storage.writable;
+  facts.disk_free_bytes = static_cast<double>(ground.storage.disk_free_bytes);
   auto items = make_checklist(facts);
   if (plan != nullptr && !manual && deps.drone != nullptr) {
     if (auto fence = fence_item(*plan)) items.push_back(std::move(*fence));
@@ -66,15 +82,16 @@ std::vector<ChecklistItem> FlightService::State::checklist(const Mission* record
   return items;
 }
 
-Result<FlightCommand> FlightService::State::begin(const Mission& mission, const Plan& plan, bool manual,
-                                                  const Principal& who) {
+Result<FlightCommand> FlightService::State::begin(const Mission& mission, const Groundwork& ground,
+                                                  bool manual, const Principal& who) {
+  const Plan& plan = *ground.plan;
   manual = manual || deps.drone == nullptr;
   if (flight && flight->flying()) return forbidden("a flight is in the air already");
   if (mission.frame != TrackFrame::wgs84)
     return forbidden("a mission in a local frame cannot be flown: an aircraft needs the globe");
   preparing.emplace(mission.id, plan);
   std::string open;
-  for (const auto& i : checklist(&mission, mission.id, &plan, manual)) {
+  for (const auto& i : checklist(&mission, mission.id, ground, manual)) {
     if (!i.green()) open += (open.empty() ? "" : ", ") + i.id;
   }
   if (!open.empty()) return forbidden("the checklist is not green: " + open);

@@ -132,10 +132,14 @@ Result<FlightCommand> FlightService::act(const MissionId& mission, const Order& 
     BOOST_OUTCOME_TRY(const auto stored, state_->deps.plans.plan(*order.plan));
     plan = plan_of(stored);
   }
+  std::optional<State::Groundwork> ground;
+  if (plan) ground = state_->groundwork(&*plan);
   const std::scoped_lock lock(state_->mutex);
   BOOST_OUTCOME_TRYV(state_->lease.renew(mission, order.lease, who, state_->deps.clock.now()));
-  if (plan) return state_->begin(record, *plan, order.manual, who);
-  return state_->obey(mission, order.action, who);
+  auto given = ground ? state_->begin(record, *ground, order.manual, who)
+                      : state_->obey(mission, order.action, who);
+  state_->changed.notify_all();
+  return given;
 }
 
 Result<FlightCommand> FlightService::upload(const MissionId& mission, const std::string& what,
@@ -183,7 +187,8 @@ FlightCommand FlightService::settled(FlightCommand command, double wait_s) {
   std::unique_lock lock(state_->mutex);
   const auto latest = [&] {
     if (const auto* found = state_->find(command.number)) command = *found;
-    return command.state != "sent" || state_->stopping;
+    // A newer command ends the wait: who waits holds a thread that the next command may need.
+    return command.state != "sent" || state_->stopping || state_->newest_by_person > command.number;
   };
   state_->changed.wait_for(lock, std::chrono::duration<double>(wait_s), latest);
   return command;
@@ -197,9 +202,10 @@ std::vector<ChecklistItem> FlightService::checklist(const MissionId& mission,
   if (plan_id) {
     if (const auto stored = state_->deps.plans.plan(*plan_id)) plan = plan_of(stored.value());
   }
+  const auto ground = state_->groundwork(plan ? &*plan : nullptr);
   const std::scoped_lock lock(state_->mutex);
   if (plan && (who.has(Role::op) || who.has(Role::admin))) state_->preparing.emplace(mission, *plan);
-  return state_->checklist(record ? &record.value() : nullptr, mission, plan ? &*plan : nullptr,
+  return state_->checklist(record ? &record.value() : nullptr, mission, ground,
                            state_->deps.drone == nullptr);
 }
 
@@ -207,8 +213,9 @@ Result<void> FlightService::override_item(const MissionId& mission, const std::s
                                           const std::string& reason, const Principal& who) {
   BOOST_OUTCOME_TRYV(state_->deps.missions.mission(mission));
   if (!is_checklist_item(item)) return make_error(Errc::not_found, "the checklist has no item " + item);
+  const auto ground = state_->groundwork(nullptr);
   const std::scoped_lock lock(state_->mutex);
-  for (const auto& one : state_->checklist(nullptr, mission, nullptr, state_->deps.drone == nullptr)) {
+  for (const auto& one : state_->checklist(nullptr, mission, ground, state_->deps.drone == nullptr)) {
     if (one.id == item && !one.overridable)
       return make_error(Errc::invalid_argument, item + " cannot be overridden: " + one.text);
   }

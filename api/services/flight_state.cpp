@@ -90,6 +90,7 @@ FlightCommand* FlightService::State::find(std::uint64_t wanted) {
 }
 
 FlightCommand& FlightService::State::note(std::string action, std::string by, std::string state) {
+  if (by != "procedure" && by != "checklist") newest_by_person = number + 1;
   commands.push_back({++number, std::move(action), std::move(state), "", std::move(by), deps.clock.now()});
   if (commands.size() > k_commands) commands.pop_front();
   return commands.back();

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <thread>
 
+#include "api/application.hpp"
 #include "api/json/plan_json.hpp"
 #include "api/services/flight_service.hpp"
 #include "api/services/mission_service.hpp"
@@ -67,13 +68,20 @@ struct FlightService::State {
   struct Said {
     std::string who, reason;
   };
+  /// What a checklist takes long to find out: asked before the lock is taken, never under it.
+  struct Groundwork {
+    const Plan* plan{nullptr};
+    std::shared_ptr<const planning::PlanCheck> check;  ///< null without a plan, or when it cannot be checked
+    StorageStatus storage;
+  };
 
   double now_s() const;
   const ActiveFlight* flight_of(const MissionId& mission) const;
   FlightCommand* find(std::uint64_t number);
   void hear(const Fix& fix);
   void hear(const MissionId& mission, const RangeResult& result);
-  Result<FlightCommand> begin(const Mission& mission, const Plan& plan, bool manual, const Principal& who);
+  Result<FlightCommand> begin(const Mission& mission, const Groundwork& ground, bool manual,
+                              const Principal& who);
   Result<FlightCommand> obey(const MissionId& mission, const std::string& action, const Principal& who);
   void recover();
   void round(const MissionService::LiveView* live);
@@ -86,8 +94,9 @@ struct FlightService::State {
   void publish();
   void publish_soon();
   nlohmann::ordered_json procedure(const ActiveFlight& f) const;
-  std::vector<ChecklistItem> checklist(const Mission* record, const MissionId& mission, const Plan* plan,
-                                       bool manual);
+  Groundwork groundwork(const Plan* plan);
+  std::vector<ChecklistItem> checklist(const Mission* record, const MissionId& mission,
+                                       const Groundwork& ground, bool manual);
   std::vector<std::pair<std::string_view, std::string>> alarms() const;
   Result<FlightCommand> upload(const MissionId& mission, const Plan& plan, const std::string& what,
                                const std::string& who);
@@ -107,9 +116,17 @@ struct FlightService::State {
   std::deque<FlightCommand> commands;                      ///< newest last, at most 30
   std::map<std::uint64_t, std::uint64_t> by_drone_number;  ///< number of the aircraft's -> ours
   std::optional<std::uint64_t> unconfirmed;                ///< of the newest command that got no answer
-  std::uint64_t number{0};
+  std::uint64_t number{0}, newest_by_person{0};
   std::vector<FlightUpload> uploads;                    ///< the newest of each kind
   std::optional<std::pair<MissionId, Plan>> preparing;  ///< whose checklist is being worked off
+
+  struct Checked {
+    PlanId plan{};
+    std::uint64_t revision{};
+    std::shared_ptr<const planning::PlanCheck> check;
+  };
+  std::mutex checks_mutex;
+  std::deque<Checked> checks;  ///< newest last, at most 8: pages ask for the same one every second
 };
 
 }  // namespace anchord::api

@@ -1,8 +1,6 @@
 #include "server/app/app.hpp"
 
-#include <fcntl.h>
 #include <sys/resource.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -23,6 +21,7 @@
 #include "server/runtime/backup_keeper.hpp"
 #include "server/runtime/device_manager.hpp"
 #include "server/runtime/logging.hpp"
+#include "server/runtime/private_file.hpp"
 #include "server/runtime/worker_pool.hpp"
 #include "server/runtime/worker_process.hpp"
 #include "server/storage/sqlite_database.hpp"
@@ -72,20 +71,6 @@ std::size_t raise_descriptor_limit() {
   return static_cast<std::size_t>(limit.rlim_cur);
 }
 
-/// Writes a file only its owner may read, whole or not at all.
-Result<void> write_private(const fs::path& file, const std::string& text) {
-  const fs::path part = file.string() + ".part";
-  const int fd = ::open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-  const bool written = fd >= 0 &&
-                       ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
-                       ::fsync(fd) == 0;
-  if (fd >= 0) ::close(fd);
-  std::error_code error;
-  if (written) fs::rename(part, file, error);
-  if (!written || error) return make_error(Errc::storage_unavailable, "cannot write " + file.string());
-  return boost::outcome_v2::success();
-}
-
 }  // namespace
 
 struct App::State {
@@ -95,7 +80,7 @@ struct App::State {
   std::unique_ptr<BackupKeeper> backups;
   std::unique_ptr<Metrics> metrics;
   std::unique_ptr<api::AccessService> access;
-  std::unique_ptr<WorkerPool> pool, stream_pool, live_pool;
+  std::unique_ptr<WorkerPool> pool, stream_pool, live_pool, command_pool, flight_pool, heavy_pool;
   std::unique_ptr<DeviceManager> devices;
   std::unique_ptr<api::LearningStores> learning;
   std::unique_ptr<flight::DroneLink> drone;
@@ -104,6 +89,7 @@ struct App::State {
   std::unique_ptr<HttpServer> http;
   std::vector<std::string> urls;
   fs::path data_dir;
+  TrustedProxies proxies;
   bool stopped{false};
 
   Result<void> first_token();
@@ -132,6 +118,9 @@ Result<std::unique_ptr<Database>> open_store(const Config& config) {
   StorageOptions options;
   options.data_dir = config.text("data_dir");
   const std::string& word = config.text("storage.synchronous");
+  // One for each thread that reads, so that a command never waits for somebody else's to be free.
+  options.readers = config.count("http.workers") + config.count("http.heavy_workers") +
+                    config.count("http.upload_workers") + 10;
   options.synchronous = word == "normal"  ? Synchronous::normal
                         : word == "extra" ? Synchronous::extra
                                           : Synchronous::full;
@@ -162,11 +151,14 @@ Result<void> App::State::listen() {
   options.ws_limits = ws_limits(config);
   options.hosts = host_policy(config);
   options.io_threads = config.count("http.io_threads");
+  options.is_proxy = [this](std::string_view address) { return proxies.trusts(address); };
   options.log_fault = [](std::string_view what) { log(LogLevel::error, "fault", {{"what", what}}); };
   const std::size_t descriptors = raise_descriptor_limit();
   options.limits.max_connections =
       std::min(options.limits.max_connections, descriptors - std::min<std::size_t>(descriptors / 2, 128));
-  http = std::make_unique<HttpServer>(options, *door, *pool, *stream_pool);
+  http = std::make_unique<HttpServer>(
+      options, *door,
+      Executors{*pool, *stream_pool, command_pool.get(), flight_pool.get(), heavy_pool.get()});
   for (const auto& endpoint : config.list("listen")) {
     BOOST_OUTCOME_TRY(const auto port, http->listen(endpoint));
     urls.push_back("http://" + endpoint.substr(0, endpoint.rfind(':')) + ":" + std::to_string(port));
@@ -175,6 +167,10 @@ Result<void> App::State::listen() {
                  [this] { return static_cast<double>(http->connections()); });
   metrics->gauge("anchord_ws_clients", "WebSocket clients",
                  [this] { return static_cast<double>(http->websockets()); });
+  metrics->gauge("anchord_command_queue", "Commands that wait for their executor",
+                 [this] { return static_cast<double>(command_pool->queued()); });
+  metrics->gauge("anchord_heavy_queue", "Computations that wait for their executor",
+                 [this] { return static_cast<double>(heavy_pool->queued()); });
   metrics->gauge("anchord_worker_queue", "Requests that wait for a handler",
                  [this] { return static_cast<double>(pool->queued()); });
   http->start();
@@ -231,6 +227,12 @@ void App::State::compose() {
   pool =
       std::make_unique<WorkerPool>("anchord-work", config.count("http.workers"), config.count("http.queue"));
   stream_pool = std::make_unique<WorkerPool>("anchord-upload", config.count("http.upload_workers"), 64);
+  // Commands compute nothing and wait for nothing, so few threads do; what else belongs to flying may wait for
+  // the disk, and must not make them wait.
+  command_pool = std::make_unique<WorkerPool>("anchord-command", 4, 256);
+  flight_pool = std::make_unique<WorkerPool>("anchord-flight", 2, 64);
+  heavy_pool = std::make_unique<WorkerPool>("anchord-heavy", config.count("http.heavy_workers"),
+                                            config.count("http.heavy_queue"), 10);
   // Apart from the handlers, so that a flight that is being solved never makes a page wait.
   live_pool = std::make_unique<WorkerPool>("anchord-live", 2, 4096);
   api::Application::Deps deps{.measurements = database->measurements(),
@@ -277,6 +279,9 @@ void App::State::compose() {
   options.hosts = host_policy(config);
   options.rate_per_s = static_cast<double>(config.count("rate.per_s"));
   options.rate_burst = static_cast<double>(config.count("rate.burst"));
+  options.places = {config.count("ws.max_connections"), config.count("ws.per_token"),
+                    config.count("ws.reserved")};
+  options.proxies = proxies;
   door = std::make_unique<FrontDoor>(application->router(), application->ws_factory(), *access, *metrics,
                                      options);
 }
@@ -292,6 +297,7 @@ Result<std::unique_ptr<App>> App::start(const Config& config) {
   auto& s = *state;
   s.config = config;
   s.data_dir = config.text("data_dir");
+  BOOST_OUTCOME_TRY(s.proxies, TrustedProxies::parse(config.list("trusted_proxies")));
   BOOST_OUTCOME_TRY(s.database, open_store(config));
   s.metrics = std::make_unique<Metrics>(ANCHORD_VERSION);
   api::AccessOptions access_options;
@@ -328,7 +334,8 @@ void App::stop() {
   step("devices");
   if (s.application) s.application->stop();  // first, so that nobody waits in a handler for a job
   step("application");
-  for (auto* workers : {s.pool.get(), s.stream_pool.get(), s.live_pool.get()}) {
+  for (auto* workers : {s.command_pool.get(), s.flight_pool.get(), s.pool.get(), s.heavy_pool.get(),
+                        s.stream_pool.get(), s.live_pool.get()}) {
     if (workers != nullptr) workers->stop();
   }
   step("workers");

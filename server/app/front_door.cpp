@@ -75,9 +75,21 @@ FrontDoor::FrontDoor(const api::Router& router, api::WsHandlerFactory live, api:
       metrics_(metrics),
       options_(std::move(options)),
       rate_(options_.rate_per_s, options_.rate_burst),
-      logins_(options_.login_per_s, options_.login_burst) {}
+      places_(options_.places) {}
 
-std::optional<api::Response> FrontDoor::identify(api::Request& request, bool websocket) {
+/// Whoever guesses is told to wait; whoever has the right secret never comes here.
+api::Response FrontDoor::wrong_secret(const api::Request& request, std::string_view secret,
+                                      std::string_view what) {
+  const auto wait_s = access_.guard().failed(secret, request.remote, api::LoginGuard::Clock::now());
+  if (!wait_s) return problem(401, "unauthorized", std::string(what));
+  auto response = problem(429, "rate-limited",
+                          "too many wrong tokens from " + request.remote + "; wait " + std::to_string(*wait_s) +
+                              " s (a right one is taken at once)");
+  response.header("Retry-After", std::to_string(*wait_s));
+  return response;
+}
+
+std::optional<api::Response> FrontDoor::identify(api::Request& request, bool websocket, api::Login& login) {
   for (const auto& [key, value] : request.query) {
     // A long-lived secret in an address ends in logs, histories and Referer headers.
     if (key == "token" || key == "access_token" || value.starts_with("anc_")) {
@@ -87,23 +99,27 @@ std::optional<api::Response> FrontDoor::identify(api::Request& request, bool web
   if (access_.options().auth_off) {
     request.principal = api::local_principal();
   } else if (const auto authorization = request.header("authorization"); !authorization.empty()) {
-    const auto who = access_.verify(credential(authorization));
+    const std::string secret = credential(authorization);
+    const auto who = access_.verify(secret);
     if (!who) {
       access_.note_refusal("nobody", "a token that is not known, expired or revoked", request.remote);
-      return problem(401, "unauthorized", "the token is not known, expired or revoked");
+      return wrong_secret(request, secret, "the token is not known, expired or revoked");
     }
     request.principal = *who;
+    login = {*who, {}};
     return std::nullopt;  // no browser adds this header by itself
   } else if (const auto ticket = request.query_value("ticket"); ticket && websocket) {
-    const auto who = access_.take_ticket(*ticket);
-    if (!who) return problem(401, "unauthorized", "the ticket is used up, expired or unknown");
-    request.principal = *who;
+    const auto made = access_.take_ticket(*ticket);
+    if (!made) return wrong_secret(request, *ticket, "the ticket is used up, expired or unknown");
+    request.principal = made->who;
+    login = *made;
     return std::nullopt;
   } else if (const auto cookie = api::cookie_value(request.header("cookie"), api::k_session_cookie);
              !cookie.empty()) {
     const auto who = access_.session(cookie);
     if (!who) return std::nullopt;  // an old cookie is nobody, not an error: the login page must still load
     request.principal = *who;
+    login = access_.login_of(*who, cookie);
     if (unsafe(request.method) && request.header("x-anchord") != "1") {
       return problem(403, "forbidden", "changes by a browser session need the header X-Anchord: 1");
     }
@@ -122,21 +138,16 @@ std::optional<api::Response> FrontDoor::identify(api::Request& request, bool web
 
 std::optional<api::Response> FrontDoor::limit(const api::Request& request) {
   if (access_.options().auth_off) return std::nullopt;
-  const auto now = RateLimit::Clock::now();
-  std::optional<int> wait_s;
-  if (request.method == api::Method::post && request.path == "/api/v1/session") {
-    wait_s = logins_.take(request.remote, now);
-  } else {
-    const std::string& id = request.principal.token_id;
-    wait_s = rate_.take(id.empty() ? "address " + request.remote : id, now);
-  }
+  const std::string& id = request.principal.token_id;
+  const auto wait_s =
+      rate_.take(id.empty() ? "address " + request.remote : id, RateLimit::Clock::now());
   if (!wait_s) return std::nullopt;
   auto response = problem(429, "rate-limited", "too many requests");
   response.header("Retry-After", std::to_string(*wait_s));
   return response;
 }
 
-Admission FrontDoor::live(api::Request& request, bool websocket) {
+Admission FrontDoor::live(api::Request& request, bool websocket, api::Login login) {
   const std::string route(k_live_path);
   using enum api::Role;
   if (request.principal.roles.empty()) {
@@ -148,7 +159,7 @@ Admission FrontDoor::live(api::Request& request, bool websocket) {
   }
   if (!websocket) {
     auto response = problem(426, "malformed", "this address speaks WebSocket, subprotocol anchord.v1");
-    response.header("Upgrade", "websocket");
+    response.header("Upgrade", "websocket").header("Sec-WebSocket-Version", "13");
     return refused(std::move(response), route);
   }
   Admission admission;
@@ -160,11 +171,57 @@ Admission FrontDoor::live(api::Request& request, bool websocket) {
     }
     admission.subprotocol = k_subprotocol;
   }
-  admission.websocket = [this, who = request.principal] { return make_live_peer(live_(who)); };
+  auto place = places_.take(request.principal, !access_.options().auth_off);
+  if (const auto* no = std::get_if<WsPlaces::Refusal>(&place)) {
+    // A browser sees the close code of a connection, never the status of a handshake.
+    admission.websocket = [why = *no] { return make_refusing_peer(why.first, why.second); };
+    return admission;
+  }
+  admission.websocket = [this, who = request.principal, login = std::move(login),
+                         held = std::get<std::shared_ptr<void>>(std::move(place))] {
+    return make_live_peer(live_(who, [this, login] { return access_.holds(login); }), held);
+  };
   return admission;
 }
 
+namespace {
+
+/// An upload ends with the login that began it.
+class HeldReader final : public api::BodyReader {
+ public:
+  HeldReader(api::BodyReader& inner, std::function<bool()> holds) : inner_(inner), holds_(std::move(holds)) {}
+  std::size_t read(std::span<char> buffer) override {
+    if (!holds_()) throw api::BodyError(401, "the login ended during the upload");
+    return inner_.read(buffer);
+  }
+
+ private:
+  api::BodyReader& inner_;
+  std::function<bool()> holds_;
+};
+
+}  // namespace
+
+/// The handler, and what it opens: a body that comes or goes in pieces ends within a piece of the login's end.
+api::Response FrontDoor::run(const api::Route& route, api::Request& request, const api::Login& login) {
+  if (login.who.token_id.empty()) return router_.dispatch(route, request);
+  const auto holds = [this, login] { return access_.holds(login); };
+  std::optional<HeldReader> held;
+  api::BodyReader* const inner = request.body_stream;
+  if (inner != nullptr) request.body_stream = &held.emplace(*inner, holds);
+  auto response = router_.dispatch(route, request);
+  request.body_stream = inner;
+  if (response.body_stream) {
+    response.body_stream = [pull = std::move(response.body_stream), holds] {
+      if (!holds()) throw std::runtime_error("the login ended while its answer was sent");
+      return pull();
+    };
+  }
+  return response;
+}
+
 Admission FrontDoor::admit(api::Request& request, std::string_view host, bool websocket) {
+  request.remote = options_.proxies.client(request.remote, request.header("x-forwarded-for"));
   if (closed_) {
     auto response = problem(503, "overloaded", "the server stops");
     response.header("Retry-After", "5");
@@ -174,14 +231,15 @@ Admission FrontDoor::admit(api::Request& request, std::string_view host, bool we
       !origin_allowed(request.header("origin"), host, options_.hosts)) {
     return refused(problem(403, "forbidden", "pages of this origin are not allowed; see allowed_origins"));
   }
-  if (auto no = identify(request, websocket)) return refused(std::move(*no));
+  api::Login login;
+  if (auto no = identify(request, websocket, login)) return refused(std::move(*no));
   auto found = router_.resolve(request.method, request.path);
   const bool probe = request.path == "/healthz" || request.path == "/readyz";
   const bool file = found.kind == api::Resolution::Kind::not_found && !request.path.starts_with("/api");
   if (!probe && !file) {
     if (auto wait = limit(request)) return refused(std::move(*wait));
   }
-  if (request.path == k_live_path) return live(request, websocket);
+  if (request.path == k_live_path) return live(request, websocket, std::move(login));
   if (found.kind == api::Resolution::Kind::not_found && !unsafe(request.method)) {
     if (auto response = static_file(request)) {
       if (request.method == api::Method::options)
@@ -208,7 +266,13 @@ Admission FrontDoor::admit(api::Request& request, std::string_view host, bool we
   admission.body_limit = route.body_limit;
   admission.streams_body = route.streams_body;
   admission.quick = request.path == "/healthz";  // says that the event loop turns, so it is answered by it
-  admission.run = [this, &route](api::Request& r) { return router_.dispatch(route, r); };
+  admission.run = [this, &route, login = std::move(login)](api::Request& r) { return run(route, r, login); };
+  admission.work = [&route](const api::Request& r) { return route.work_for(r); };
+  // With login off everybody is the same one.
+  if (!access_.options().auth_off) {
+    const std::string& id = request.principal.token_id;
+    admission.share = id.empty() ? "address " + request.remote : id;
+  }
   return admission;
 }
 

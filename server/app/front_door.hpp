@@ -10,7 +10,9 @@
 #include "api/live/ws_handler.hpp"
 #include "api/services/access.hpp"
 #include "server/app/metrics.hpp"
+#include "server/app/proxies.hpp"
 #include "server/app/rate_limit.hpp"
+#include "server/app/ws_places.hpp"
 #include "server/http/gateway.hpp"
 #include "server/http/limits.hpp"
 
@@ -19,7 +21,8 @@ namespace anchord::server {
 struct FrontDoorOptions {
   HostPolicy hosts{};
   double rate_per_s{50}, rate_burst{200};
-  double login_per_s{5.0 / 60}, login_burst{5};  ///< per address
+  TrustedProxies proxies{};
+  WsPlaceLimits places{};
 };
 
 /// Between the transport and the application: who asks, from which page, how often, and which route answers.
@@ -37,16 +40,19 @@ class FrontDoor final : public Gateway {
   void close() { closed_ = true; }
 
  private:
-  std::optional<api::Response> identify(api::Request& request, bool websocket);
+  std::optional<api::Response> identify(api::Request& request, bool websocket, api::Login& login);
+  api::Response wrong_secret(const api::Request& request, std::string_view secret, std::string_view what);
   std::optional<api::Response> limit(const api::Request& request);
-  Admission live(api::Request& request, bool websocket);
+  Admission live(api::Request& request, bool websocket, api::Login login);
+  api::Response run(const api::Route& route, api::Request& request, const api::Login& login);
 
   const api::Router& router_;
   api::WsHandlerFactory live_;
   api::AccessService& access_;
   Metrics& metrics_;
   FrontDoorOptions options_;
-  RateLimit rate_, logins_;
+  RateLimit rate_;
+  WsPlaces places_;
   std::atomic<bool> closed_{false};
 };
 

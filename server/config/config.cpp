@@ -25,6 +25,8 @@ constexpr std::array k_options = {
     Option{"insecure", "false", "allow other addresses than loopback although there is no TLS", flag},
     Option{"allowed_hosts", "", "host names and addresses clients may use, besides loopback", list},
     Option{"allowed_origins", "", "pages of other origins that may call, like https://portal.example", list},
+    Option{"trusted_proxies", "",
+           "addresses or networks of proxies whose X-Forwarded-For says who asks", list},
     Option{"devices", "",
            "devices of this machine, kind=address, separated by commas; more by REST or anchord devices",
            list},
@@ -44,13 +46,19 @@ constexpr std::array k_options = {
     Option{"http.io_threads", "1", "threads of the sockets", count},
     Option{"http.workers", "4", "threads that run handlers", count},
     Option{"http.queue", "256", "requests that may wait for a handler; beyond: 503", count},
+    Option{"http.heavy_workers", "2", "threads for computations and large answers, below the others in rank", count},
+    Option{"http.heavy_queue", "32", "computations that may wait; beyond: 503", count},
+    Option{"http.heavy_per_token", "8", "computations of one token that may wait or run; beyond: 429", count},
     Option{"http.upload_workers", "8", "threads for uploads that stream", count},
-    Option{"http.max_connections", "4096", "sockets at once; beyond: 503 and close", count},
+    Option{"http.max_connections", "4096", "sockets at once; beyond: the oldest idle one goes, else 503", count},
     Option{"http.keep_alive_s", "75", "idle time of a connection between requests", seconds},
     Option{"http.head_s", "10", "time a request head may take", seconds},
     Option{"http.body_window_s", "20", "how long a body may stay below 1 KiB/s", seconds},
     Option{"http.write_stall_s", "30", "time without progress of a write", seconds},
-    Option{"ws.max_connections", "64", "WebSocket clients at once; beyond: close 4029", count},
+    Option{"http.max_per_address", "1024", "sockets of one address at once, trusted proxies apart", count},
+    Option{"ws.max_connections", "64", "WebSocket clients at once; beyond: close 1013", count},
+    Option{"ws.per_token", "50", "of them, of one token; beyond: close 4029", count},
+    Option{"ws.reserved", "8", "of them, for operators and admins alone", count},
     Option{"ws.message_bytes", "65536", "largest message a client may send", count},
     Option{"ws.ping_s", "15", "period of protocol pings", seconds},
     Option{"ws.idle_s", "45", "silence after which a peer is dead", seconds},
@@ -213,12 +221,13 @@ HttpLimits http_limits(const Config& config) {
   limits.head_time = config.seconds("http.head_s");
   limits.body_window = config.seconds("http.body_window_s");
   limits.write_stall = config.seconds("http.write_stall_s");
+  limits.max_per_address = config.count("http.max_per_address");
+  limits.heavy_per_token = config.count("http.heavy_per_token");
   return limits;
 }
 
 WsLimits ws_limits(const Config& config) {
   WsLimits limits;
-  limits.max_connections = config.count("ws.max_connections");
   limits.message_bytes = config.count("ws.message_bytes");
   limits.ping = config.seconds("ws.ping_s");
   limits.idle = config.seconds("ws.idle_s");

@@ -12,8 +12,14 @@
 namespace anchord::server {
 namespace {
 
-constexpr std::string_view k_full =
-    "HTTP/1.1 503 Service Unavailable\r\nRetry-After: 5\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
+/// Answer to one who finds no place, without reading what he asks.
+std::string no_place(const std::string& why) {
+  const std::string body = R"({"type":"/problems/overloaded","title":"The server is overloaded","status":503,"detail":")" +
+                           why + R"(; try again"})";
+  return "HTTP/1.1 503 Service Unavailable\r\nRetry-After: 5\r\nContent-Type: application/problem+json\r\n"
+         "Content-Length: " +
+         std::to_string(body.size()) + "\r\nConnection: close\r\n\r\n" + body;
+}
 
 Result<tcp::endpoint> parse_endpoint(std::string_view text) {
   const auto bad = [&] {
@@ -65,27 +71,30 @@ struct HttpServer::State {
         continue;
       }
       error_code ignored;
-      if (context->connections.load() >= context->limits.max_connections) {
+      const auto address = socket.remote_endpoint(ignored).address().to_string(ignored);
+      auto entry = context->book.enter(address, context->is_proxy && context->is_proxy(address));
+      if (entry.evict) entry.evict->evict();
+      if (!entry.place) {
+        const std::string answer = no_place(entry.why);
         socket.non_blocking(true, ignored);
-        socket.write_some(asio::buffer(k_full.data(), k_full.size()), ignored);
+        socket.write_some(asio::buffer(answer), ignored);
         socket.shutdown(tcp::socket::shutdown_both, ignored);
         continue;
       }
       socket.set_option(tcp::no_delay(true), ignored);
       ++context->connections;
-      ConnectionSlot slot(nullptr, [context](void*) { --context->connections; });
+      ConnectionSlot slot(nullptr, [context, place = std::move(entry.place)](void*) { --context->connections; });
       start_http_session(std::move(socket), context, std::move(slot));
     }
   }
 };
 
-HttpServer::HttpServer(HttpServerOptions options, Gateway& gateway, WorkerPool& pool, WorkerPool& stream_pool)
+HttpServer::HttpServer(HttpServerOptions options, Gateway& gateway, Executors pools)
     : state_(std::make_unique<State>()) {
-  state_->context = std::make_shared<SessionContext>(gateway, pool, stream_pool);
-  state_->context->limits = options.limits;
-  state_->context->ws_limits = options.ws_limits;
+  state_->context = std::make_shared<SessionContext>(gateway, pools, options.limits, options.ws_limits);
   state_->context->hosts = std::move(options.hosts);
   state_->context->log_fault = std::move(options.log_fault);
+  state_->context->is_proxy = std::move(options.is_proxy);
   state_->io_threads = options.io_threads;
 }
 

@@ -9,12 +9,11 @@
 #include <vector>
 
 #include "core/base/result.hpp"
+#include "server/http/executors.hpp"
 #include "server/http/gateway.hpp"
 #include "server/http/limits.hpp"
 
 namespace anchord::server {
-
-class WorkerPool;
 
 struct HttpServerOptions {
   HttpLimits limits{};
@@ -22,12 +21,14 @@ struct HttpServerOptions {
   HostPolicy hosts{};
   std::size_t io_threads{1};  ///< connections are on strands, so more is configuration
   std::function<void(std::string_view what)> log_fault{};
+  /// Many ask from behind this address: its number of sockets is not limited by itself.
+  std::function<bool(std::string_view address)> is_proxy{};
 };
 
 /// Accepts connections and runs them. Hides Asio and Beast from its users.
 class HttpServer {
  public:
-  HttpServer(HttpServerOptions options, Gateway& gateway, WorkerPool& pool, WorkerPool& stream_pool);
+  HttpServer(HttpServerOptions options, Gateway& gateway, Executors pools);
   /// stop(0).
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;

@@ -32,8 +32,12 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
         context_(std::move(context)),
         slot_(std::move(slot)),
         limits_(context_->limits),
+        pool_(&context_->pools.ordinary),
         remote_(wire_.remote()) {}
-  ~HttpSession() override { context_->leave(this); }
+  ~HttpSession() override {
+    context_->book.busy(this);
+    context_->leave(this);
+  }
 
   static awaitable<void> run(std::shared_ptr<HttpSession> self) {
     self->context_->enter(self.get(), self->weak_from_this());
@@ -44,6 +48,11 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
   void stop() override {
     asio::post(wire_.executor(), [self = shared_from_this()] {
       if (self->wire_.idle()) self->close();
+    });
+  }
+  void evict() override {
+    asio::post(wire_.executor(), [self = shared_from_this()] {
+      if (self->awaits_head_) self->close();
     });
   }
   void abort() override {
@@ -58,7 +67,11 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
 
   /// One request and its answer. False: the connection is finished.
   awaitable<bool> serve_one(bool first) {
+    awaits_head_ = true;
+    context_->book.idle(remote_, this, weak_from_this());
     const HttpWire::Head head = co_await wire_.read_head(first, context_->stopping);
+    awaits_head_ = false;
+    context_->book.busy(this);
     started_ = SteadyClock::now();
     if (head.refusal) co_await refuse(*head.refusal);
     if (head.size == 0) co_return false;
@@ -183,7 +196,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
     while (!parser.done() && !pipe->abandoned()) {
       const std::size_t space = pipe->space();
       if (space == 0) {
-        if (!job) job = submit(context_->stream_pool, admission.run, pipe);
+        if (!job) job = submit(context_->pools.uploads, admission.run, pipe);
         if (!job) break;
         const auto before = SteadyClock::now();
         while (pipe->space() == 0 && !job->done) co_await wait_for_bell();
@@ -214,7 +227,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
     }
     if (parser.done()) pipe->finish();
     if (end == BodyEnd::complete && !job && parser.done())
-      job = submit(context_->stream_pool, admission.run, pipe);
+      job = submit(context_->pools.uploads, admission.run, pipe);
     if (!job) {
       if (end == BodyEnd::complete) response = overloaded();
       co_return end;
@@ -271,7 +284,20 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
       gzip_response(response, request_->header("accept-encoding"), limits_.gzip_from_bytes);
       co_return;
     }
-    const auto job = submit(context_->pool, admission.run, nullptr);
+    const api::Work work = admission.work ? admission.work(*request_) : api::Work::ordinary;
+    pool_ = &context_->pools.of(work);
+    if (work == api::Work::heavy && !admission.share.empty()) {
+      share_ = context_->heavy_shares.take(admission.share);
+      if (!share_) {
+        response = context_->gateway.problem(
+            429, "rate-limited",
+            "this token has " + std::to_string(context_->heavy_shares.per_name()) +
+                " computations or large answers under way; wait for one of them to end");
+        response.header("Retry-After", "1");
+        co_return;
+      }
+    }
+    const auto job = submit(*pool_, admission.run, nullptr);
     if (!job) {
       response = overloaded();
       co_return;
@@ -308,6 +334,8 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
     }
     context_->gateway.answered(*request_, route_, response.status, seconds(), wire_.take_bytes_out());
     request_.reset();
+    share_.reset();
+    pool_ = &context_->pools.ordinary;
     if (!sent) co_return false;
     if (!keep) co_await wire_.say_goodbye();
     co_return keep;
@@ -330,7 +358,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
           self->bell_.cancel();
         });
       };
-      while (!context_->pool.try_submit(pull)) {
+      while (!pool_->try_submit(pull)) {
         if (context_->stopping) co_return false;
         bell_.expires_after(std::chrono::milliseconds(20));
         co_await bell_.async_wait(k_wait);
@@ -356,6 +384,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
   /// Answer of a framing error or an excess: then close, never read on.
   awaitable<void> refuse(Refusal refusal) {
     auto response = context_->gateway.problem(refusal.status, refusal.type, std::move(refusal.detail));
+    for (auto& [name, value] : refusal.headers) response.header(std::move(name), std::move(value));
     api::Request none;
     const api::Request& request = request_ ? *request_ : none;
     const std::string id = request.request_id.empty() ? request_id_of({}) : request.request_id;
@@ -373,6 +402,9 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
   std::shared_ptr<SessionContext> context_;
   ConnectionSlot slot_;
   const HttpLimits& limits_;
+  bool awaits_head_{false};
+  WorkerPool* pool_;             ///< of the exchange that runs
+  std::shared_ptr<void> share_;  ///< of heavy work, while it runs and is sent
   std::string remote_, route_;
   std::shared_ptr<api::Request> request_;  ///< of the exchange that runs
   Refusal refusal_;

@@ -11,7 +11,8 @@ namespace anchord::server {
 /// Every bound of the transport in one place. Defaults are the promises of the documentation; tests shorten
 /// times.
 struct HttpLimits {
-  std::size_t max_connections{4096};         ///< beyond: 503 and close
+  std::size_t max_connections{4096};  ///< beyond: the oldest idle one goes; when none is idle, 503 and close
+  std::size_t max_per_address{1024};  ///< the same of one address
   std::size_t request_line_bytes{8 * 1024};  ///< beyond: 414
   std::size_t head_bytes{16 * 1024};         ///< beyond: 431
   std::size_t headers{100};                  ///< beyond: 431
@@ -21,6 +22,7 @@ struct HttpLimits {
   std::size_t read_buffer_bytes{64 * 1024};  ///< reserved before a body: small reads cost twice the CPU
   std::size_t body_pipe_bytes{256 * 1024};   ///< between socket and a handler that streams
   std::size_t gzip_from_bytes{1024};
+  std::size_t heavy_per_token{8};  ///< computations of one token that wait or run; beyond: 429
   std::chrono::milliseconds keep_alive{75'000};   ///< idle between requests
   std::chrono::milliseconds head_time{10'000};    ///< first byte to last byte of a head
   std::chrono::milliseconds body_window{20'000};  ///< a body may fall behind its floor rate by this much
@@ -30,7 +32,6 @@ struct HttpLimits {
 };
 
 struct WsLimits {
-  std::size_t max_connections{64};       ///< beyond: close 4029
   std::size_t message_bytes{64 * 1024};  ///< inbound; beyond: close 1009
   std::size_t max_fragments{4096};       ///< of one message; beyond: close 1009
   std::chrono::milliseconds ping{15'000};

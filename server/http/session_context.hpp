@@ -9,30 +9,34 @@
 #include <string_view>
 #include <unordered_map>
 
+#include "server/http/connection_book.hpp"
+#include "server/http/executors.hpp"
 #include "server/http/gateway.hpp"
 #include "server/http/limits.hpp"
 
 namespace anchord::server {
-
-class WorkerPool;
 
 /// A connection that can be asked to end. stop() is called from any thread.
 class Connection {
  public:
   virtual ~Connection() = default;
   virtual void stop() = 0;   ///< finish what runs, say goodbye, end
+  virtual void evict() {}    ///< end, if it waits for a request
   virtual void abort() = 0;  ///< end now
 };
 
 /// What all sessions share; outlives them.
 struct SessionContext {
   Gateway& gateway;
-  WorkerPool& pool;         ///< ordinary handlers
-  WorkerPool& stream_pool;  ///< handlers that wait for a body: a slow upload must not hold the others up
+  Executors pools;
   HttpLimits limits{};
   WsLimits ws_limits{};
   HostPolicy hosts{};
   std::function<void(std::string_view what)> log_fault{};
+  std::function<bool(std::string_view address)> is_proxy{};
+
+  Shares heavy_shares{limits.heavy_per_token};
+  ConnectionBook book{limits.max_connections, limits.max_per_address};
 
   std::atomic<bool> stopping{false};
   std::atomic<std::size_t> connections{0};  ///< sockets, WebSockets included

@@ -32,7 +32,7 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
         context_(std::move(context)),
         slot_(std::move(slot)),
         peer_(std::move(peer)) {
-    over_limit_ = ++context_->websockets > context_->ws_limits.max_connections;
+    ++context_->websockets;
   }
   ~WsSession() override {
     --context_->websockets;
@@ -45,11 +45,6 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
     self->configure(subprotocol);
     const auto [error] = co_await self->ws_.async_accept(request, k_wait);
     if (error) co_return;
-    if (self->over_limit_) {
-      const websocket::close_reason reason(static_cast<websocket::close_code>(4029), "too many connections");
-      co_await self->ws_.async_close(reason, k_wait);
-      co_return;
-    }
     const Conversing conversing(*self);
     self->peer_->on_open([weak = self->weak_from_this()] {
       if (auto session = weak.lock()) session->wake();
@@ -229,7 +224,7 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
   ConnectionSlot slot_;
   std::unique_ptr<WsPeer> peer_;
   std::atomic<bool> woken_{false};
-  bool closed_{false}, going_away_{false}, over_limit_{false};
+  bool closed_{false}, going_away_{false};
 };
 
 }  // namespace

@@ -1,16 +1,23 @@
 #include "server/runtime/worker_pool.hpp"
 
 #include <pthread.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 #include <utility>
 
 namespace anchord::server {
 
-WorkerPool::WorkerPool(std::string name, std::size_t threads, std::size_t queue_limit)
+WorkerPool::WorkerPool(std::string name, std::size_t threads, std::size_t queue_limit, int nice)
     : queue_limit_(queue_limit) {
   threads_.reserve(threads);
   for (std::size_t i = 0; i < threads; ++i) {
-    threads_.emplace_back([this] { run(); });
+    threads_.emplace_back([this, nice] {
+      // On Linux niceness belongs to the thread. A system that refuses it only shares more evenly.
+      if (nice != 0) (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(SYS_gettid)), nice);
+      run();
+    });
     pthread_setname_np(threads_.back().native_handle(), name.substr(0, 15).c_str());
   }
 }

@@ -14,7 +14,8 @@ namespace anchord::server {
 /// Threads that run handlers. Bounded: a full queue is an answer (503), not a wait. Thread-safe.
 class WorkerPool {
  public:
-  WorkerPool(std::string name, std::size_t threads, std::size_t queue_limit);
+  /// `nice`: added to the niceness of its threads, so that heavy work takes only the time others leave.
+  WorkerPool(std::string name, std::size_t threads, std::size_t queue_limit, int nice = 0);
   /// stop().
   ~WorkerPool();
   WorkerPool(const WorkerPool&) = delete;

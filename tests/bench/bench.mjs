@@ -1,5 +1,5 @@
 // ./dev bench: one table. Every figure of ours stands beside a peer or a limit taken in the same run.
-//   node tests/bench/bench.mjs [solve] [bound] [ingest] [get] [fanout] [training] [predict] [grid] [devices]
+//   node tests/bench/bench.mjs [solve] [bound] [ingest] [get] [fanout] [training] [predict] [grid] [devices] [commands]
 import { execFileSync } from 'node:child_process';
 import { createServer } from 'node:http';
 import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
@@ -7,6 +7,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { LiveClient } from '../e2e/live.mjs';
 import { eventually, root, run, startServer } from '../e2e/server.mjs';
+import { commands } from './commands.mjs';
 import { devices } from './devices.mjs';
 import { grid } from './grid.mjs';
 import { cpuSeconds, hammer, percentile, request } from './load.mjs';
@@ -250,6 +251,13 @@ if (on('predict')) {
 if (on('grid')) {
   say('grid');
   grid(row);
+}
+if (on('commands')) {
+  say('commands to an aircraft beside a flood');
+  await commands(row).catch((error) => {
+    row('commands', `FAILED: ${error.message.split('\n')[0]}`);
+    process.exitCode = 1;
+  });
 }
 if (['ingest', 'get', 'fanout', 'training', 'devices'].some(on)) {
   const server = await startServer();

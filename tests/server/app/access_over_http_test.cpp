@@ -93,6 +93,24 @@ TEST(Addresses, ThatAreMistypedGetAProblemAndNoPage) {
   }
 }
 
+// docs/operations.md says so.
+TEST(Caching, LetsABrowserAskAgainAndKeepsSecretsAndErrorsNowhere) {
+  AppFixture server;
+  ASSERT_TRUE(server.app) << server.error.message;
+  const auto admin = server.bearer(server.admin);
+  const auto control = [&](const char* method, const char* path, const char* body = "") {
+    return server.call(method, path, body, admin).headers["cache-control"];
+  };
+  EXPECT_EQ(control("GET", "/api/v1/missions"), "private, no-cache");
+  EXPECT_EQ(control("HEAD", "/api/v1/missions"), "private, no-cache");
+  EXPECT_EQ(control("GET", "/api/v1/nothing"), "no-store");
+  EXPECT_EQ(control("GET", "/api/v1/missions?limit=x"), "no-store");
+  EXPECT_EQ(control("POST", "/api/v1/missions", "{}"), "no-store");
+  EXPECT_EQ(control("POST", "/api/v1/ws-tickets", "{}"), "no-store");
+  EXPECT_EQ(control("GET", "/api/v1/tokens"), "no-store");
+  EXPECT_EQ(control("GET", "/api/v1/me"), "no-store");
+}
+
 TEST(DocsPage, ShowsEveryOperationWithoutScriptsOrForeignAddresses) {
   AppFixture server;
   ASSERT_TRUE(server.app) << server.error.message;
@@ -203,10 +221,10 @@ TEST(BrowserSession, NeedsTheHeaderAndTheOwnOriginForChanges) {
 TEST(BrowserSession, IsNotOpenedByAGuessAndGuessesAreFew) {
   AppFixture server;
   ASSERT_TRUE(server.app) << server.error.message;
-  int last = 0;
-  for (int i = 0; i < 6; ++i)
-    last = server.call("POST", "/api/v1/session", R"({"token":"anc_guess"})").status;
-  EXPECT_EQ(last, 429);
+  server::ClientResponse last;
+  for (int i = 0; i < 6; ++i) last = server.call("POST", "/api/v1/session", R"({"token":"anc_guess"})");
+  EXPECT_EQ(last.status, 429);
+  EXPECT_GE(std::stoi(last.headers["retry-after"]), 1);
 }
 
 TEST(LiveAccess, TakesATicketOnceAndNoOtherOrigin) {

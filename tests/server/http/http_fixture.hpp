@@ -62,6 +62,19 @@ class ProbeGateway final : public server::Gateway {
         changed.wait(lock, [this] { return released; });
         return text("held");
       };
+    } else if (request.path == "/heavy") {
+      admission.work = [](const api::Request&) { return api::Work::heavy; };
+      admission.share = std::string(request.header("x-token"));
+      admission.run = [this](api::Request&) {
+        std::unique_lock lock(mutex);
+        ++held;
+        changed.notify_all();
+        changed.wait(lock, [this] { return released; });
+        return text("computed");
+      };
+    } else if (request.path == "/command") {
+      admission.work = [](const api::Request&) { return api::Work::command; };
+      admission.run = [](api::Request&) { return text("held position"); };
     } else if (request.path == "/throw") {
       admission.run = [](api::Request&) -> api::Response { throw std::runtime_error("bug"); };
     } else if (request.path == "/denied") {
@@ -114,19 +127,23 @@ struct TestServer {
                       std::size_t queue = 4)
       : pool("test-work", workers, queue),
         uploads("test-upload", 2, 4),
-        http(std::move(options), gateway, pool, uploads) {}
+        commands("test-command", 1, 4),
+        heavy("test-heavy", 2, 2),
+        http(std::move(options), gateway, {pool, uploads, &commands, nullptr, &heavy}) {}
   ~TestServer() {
     gateway.release();
     http.stop(std::chrono::milliseconds(200));
     pool.stop();
     uploads.stop();
+    commands.stop();
+    heavy.stop();
   }
   void start() {
     port = http.listen("127.0.0.1:0").value();
     http.start();
   }
   ProbeGateway gateway;
-  server::WorkerPool pool, uploads;
+  server::WorkerPool pool, uploads, commands, heavy;
   server::HttpServer http;
   std::uint16_t port{0};
 };

@@ -346,29 +346,118 @@ TEST(HttpTimes, CutsAReaderThatDoesNotRead) {
   EXPECT_EQ(server.http.connections(), 0u);
 }
 
-TEST(HttpLimitsTest, RefusesConnectionsBeyondTheLimitAndRecovers) {
+TEST(HttpLimitsTest, RefusesConnectionsWhenAllAreAtWorkAndRecovers) {
   auto options = quick_options();
   options.limits.max_connections = 2;
   TestServer server(options);
   server.start();
-  auto first = std::make_unique<RawSocket>(server.port);
-  RawSocket second(server.port);
-  first->send(k_get);
-  second.send(k_get);
-  EXPECT_EQ(status_of(first->response()), 200);
-  EXPECT_EQ(status_of(second.response()), 200);
+  RawSocket first(server.port), second(server.port);
+  first.send("GET /hold HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  second.send("GET /hold HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  server.gateway.wait_for_held(2);
   RawSocket third(server.port);
   EXPECT_TRUE(third.read_to_end());
   EXPECT_EQ(status_of(third.input), 503);
-  first.reset();
-  const auto end = SteadyClock::now() + milliseconds(10'000);
-  int status = 0;
-  while (status != 200 && SteadyClock::now() < end) {
-    RawSocket again(server.port);
-    again.send(k_get);
-    status = status_of(again.response());
+  EXPECT_NE(third.input.find("all 2 connections are at work"), std::string::npos) << third.input;
+  EXPECT_NE(third.input.find("Retry-After: 5"), std::string::npos);
+  server.gateway.release();
+  EXPECT_EQ(status_of(first.response()), 200);
+  RawSocket again(server.port);
+  again.send(k_get);
+  EXPECT_EQ(status_of(again.response()), 200);
+}
+
+// Idle sockets took every place until their time-out, 75 s later.
+TEST(HttpLimitsTest, GivesThePlaceOfTheOldestIdleConnectionToWhoComes) {
+  auto options = quick_options();
+  options.limits.max_connections = 3;
+  TestServer server(options);
+  server.start();
+  RawSocket oldest(server.port), second(server.port), third(server.port);
+  for (auto* socket : {&oldest, &second, &third}) {
+    socket->send(k_get);
+    EXPECT_EQ(status_of(socket->response()), 200);
   }
-  EXPECT_EQ(status, 200);
+  RawSocket fourth(server.port);
+  fourth.send(k_get);
+  EXPECT_EQ(status_of(fourth.response()), 200);
+  EXPECT_TRUE(oldest.read_to_end());
+  second.send(k_get);
+  EXPECT_EQ(status_of(second.response()), 200) << "only one had to go";
+  // One that dribbles a head waits for a request as well.
+  RawSocket slow(server.port);
+  slow.send("GET / HT");
+  for (int i = 0; i < 10; ++i) {
+    RawSocket next(server.port);
+    next.send(k_get);
+    EXPECT_EQ(status_of(next.response()), 200) << i;
+  }
+}
+
+TEST(HttpLimitsTest, BoundsTheConnectionsOfOneAddressApart) {
+  auto options = quick_options();
+  options.limits.max_connections = 10;
+  options.limits.max_per_address = 2;
+  TestServer server(options, 4);
+  server.start();
+  RawSocket first(server.port), second(server.port);
+  first.send("GET /hold HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  second.send("GET /hold HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  server.gateway.wait_for_held(2);
+  RawSocket third(server.port);
+  EXPECT_TRUE(third.read_to_end());
+  EXPECT_NE(third.input.find("all 2 connections of one address"), std::string::npos) << third.input;
+}
+
+// `land` took 86 s beside the plan checks of one viewer: all requests waited in one line.
+TEST(Executors, AnswerACommandWhileComputationsHoldTheirsAndItsQueue) {
+  TestServer server;
+  server.start();
+  std::vector<std::unique_ptr<RawSocket>> computing;
+  const auto compute = [&](const std::string& token) {
+    computing.push_back(std::make_unique<RawSocket>(server.port));
+    computing.back()->send("GET /heavy HTTP/1.1\r\nHost: localhost\r\nX-Token: " + token + "\r\n\r\n");
+  };
+  for (int i = 0; i < 4; ++i) compute("t" + std::to_string(i));
+  server.gateway.wait_for_held(2);
+  while (server.heavy.queued() < 2) std::this_thread::yield();
+  RawSocket command(server.port);
+  for (int i = 0; i < 100; ++i) {
+    command.send("GET /command HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    ASSERT_EQ(body_of(command.response()), "held position") << i;
+  }
+  EXPECT_EQ(server.gateway.held, 2) << "not one computation has ended meanwhile";
+  RawSocket ordinary(server.port);
+  ordinary.send(k_get);
+  EXPECT_EQ(status_of(ordinary.response()), 200) << "nor do they hold up what is ordinary";
+  compute("late");
+  EXPECT_EQ(status_of(computing.back()->response()), 503) << "the queue is full: said at once";
+  server.gateway.release();
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(body_of(computing[i]->response()), "computed");
+}
+
+TEST(Executors, GiveOneTokenOnlyItsShareOfComputations) {
+  auto options = quick_options();
+  options.limits.heavy_per_token = 2;
+  TestServer server(options);
+  server.start();
+  const std::string ask = "GET /heavy HTTP/1.1\r\nHost: localhost\r\nX-Token: ";
+  RawSocket first(server.port), second(server.port), third(server.port), other(server.port);
+  first.send(ask + "a\r\n\r\n");
+  second.send(ask + "a\r\n\r\n");
+  server.gateway.wait_for_held(2);
+  third.send(ask + "a\r\n\r\n");
+  const auto refused = third.response();
+  EXPECT_EQ(status_of(refused), 429) << refused;
+  EXPECT_NE(refused.find("Retry-After: 1"), std::string::npos);
+  other.send(ask + "b\r\n\r\n");
+  while (server.heavy.queued() < 1) std::this_thread::yield();
+  server.gateway.release();
+  EXPECT_EQ(status_of(first.response()), 200);
+  EXPECT_EQ(status_of(other.response()), 200);
+  EXPECT_EQ(status_of(second.response()), 200);
+  third.send(ask + "a\r\n\r\n");
+  EXPECT_EQ(status_of(third.response()), 200) << "its share came back";
 }
 
 TEST(HttpStop, FinishesWhatRunsAndEndsIdleConnections) {

@@ -159,7 +159,6 @@ server::HttpServerOptions small_limits() {
   auto options = quick_options();
   options.ws_limits.message_bytes = 1000;
   options.ws_limits.max_fragments = 100;
-  options.ws_limits.max_connections = 2;
   options.ws_limits.ping = milliseconds(50);
   options.ws_limits.idle = milliseconds(300);
   options.ws_limits.write_stall = milliseconds(300);
@@ -192,12 +191,6 @@ TEST_F(WsLimitsTest, ClosesWith1009WhenAMessageComesInTooManyFragments) {
   client.send(1, "x", false);
   for (int i = 0; i < 100; ++i) client.send(0, "x", false);
   EXPECT_EQ(client.ended_with(), 1009);
-}
-
-TEST_F(WsLimitsTest, ClosesWith4029BeyondItsConnections) {
-  WsClient one(server_.port), two(server_.port), three(server_.port);
-  EXPECT_TRUE(three.open());
-  EXPECT_EQ(three.ended_with(), 4029);
 }
 
 TEST_F(WsLimitsTest, PingsAndDropsAPeerThatDoesNotAnswer) {

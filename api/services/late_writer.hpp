@@ -1,0 +1,84 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <thread>
+
+#include "core/base/result.hpp"
+#include "core/ports/store.hpp"
+
+namespace anchord::api {
+
+/// Writes that their sender waits for only a moment: a command to an aircraft is answered although the disk is
+/// slow, and its line in the audit log follows. One thread, in order. A write that fails because the store is in
+/// trouble is tried again until it succeeds; at most 4096 wait, then the oldest is lost, which is logged.
+/// Thread-safe.
+class LateWriter {
+ public:
+  using Write = std::function<Result<void>()>;
+  static constexpr std::size_t k_max_waiting = 4096;
+  static constexpr std::chrono::milliseconds k_patience{50};
+
+  explicit LateWriter(std::function<void(std::string_view what)> log);
+  /// stop().
+  ~LateWriter();
+  LateWriter(const LateWriter&) = delete;
+  LateWriter& operator=(const LateWriter&) = delete;
+
+  /// Waits until it is written, at most so long. True: it is; false: it will be.
+  bool write(Write write, std::chrono::milliseconds patience = k_patience);
+  /// Work that nobody waits for, when no write does. A second one while the first has not begun is dropped.
+  void idle_task(std::function<void()> task);
+  /// Until everything that was given so far is written, at most so long.
+  bool flush(std::chrono::milliseconds patience);
+  /// Tries what waits once more, then ends. Idempotent.
+  void stop();
+  std::size_t waiting() const;
+
+ private:
+  struct Entry;
+  void run();
+  Result<void> guarded(const Write& write) const;
+  void report(std::string_view what) const {
+    if (log_) log_(what);
+  }
+
+  const std::function<void(std::string_view)> log_;
+  mutable std::mutex mutex_;
+  std::condition_variable work_, written_;
+  std::deque<std::shared_ptr<Entry>> entries_;
+  std::function<void()> task_;
+  bool stopping_{false};
+  std::thread thread_;
+};
+
+/// An AccessStore that answers its writers at once (LateWriter) and remembers what is not on the disk yet.
+class PromptAccessStore final : public AccessStore {
+ public:
+  /// Both must outlive it; the writer ends first.
+  PromptAccessStore(AccessStore& inner, LateWriter& writer) : inner_(inner), writer_(writer) {}
+
+  Result<std::optional<StoredAnswer>> answer(std::string_view principal, std::string_view key) override;
+  Result<void> keep_answer(const StoredAnswer& answer) override;
+  Result<std::size_t> drop_answers_before(UtcTime time) override { return inner_.drop_answers_before(time); }
+  Result<void> append_audit(const AuditEntry& entry) override;
+  /// With what is still to be written, if that takes no longer than a second.
+  Result<std::vector<AuditEntry>> audit(std::size_t limit) override;
+  Result<void> verify_audit() override { return inner_.verify_audit(); }
+
+ private:
+  AccessStore& inner_;
+  LateWriter& writer_;
+  std::mutex mutex_;
+  std::map<std::pair<std::string, std::string>, StoredAnswer> pending_;  ///< by principal and key
+};
+
+}  // namespace anchord::api

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "api/http/work.hpp"
+
+namespace anchord::server {
+
+class WorkerPool;
+
+/// The pools that run handlers, by the class of the route. One that is absent is served by `ordinary` (tests).
+struct Executors {
+  WorkerPool& ordinary;
+  WorkerPool& uploads;  ///< handlers that wait for a body: a slow upload must not hold the others up
+  WorkerPool* command{nullptr};
+  WorkerPool* flight{nullptr};
+  WorkerPool* heavy{nullptr};
+
+  WorkerPool& of(api::Work work) const {
+    WorkerPool* own = nullptr;
+    switch (work) {
+      case api::Work::command:
+        own = command;
+        break;
+      case api::Work::flight:
+        own = flight;
+        break;
+      case api::Work::heavy:
+        own = heavy;
+        break;
+      case api::Work::ordinary:
+        break;
+    }
+    return own != nullptr ? *own : ordinary;
+  }
+};
+
+/// So many of a kind at once for each name. Thread-safe.
+class Shares {
+ public:
+  explicit Shares(std::size_t per_name) : state_(std::make_shared<State>()), per_name_(per_name) {}
+
+  /// One share, for as long as somebody holds it; null when the name has all of its own.
+  std::shared_ptr<void> take(const std::string& name) {
+    const std::lock_guard lock(state_->mutex);
+    auto& taken = state_->taken[name];
+    if (taken >= per_name_) return nullptr;
+    ++taken;
+    return {nullptr, [state = state_, name](void*) {
+              const std::lock_guard back(state->mutex);
+              const auto at = state->taken.find(name);
+              if (--at->second == 0) state->taken.erase(at);
+            }};
+  }
+  std::size_t per_name() const { return per_name_; }
+
+ private:
+  struct State {
+    std::mutex mutex;
+    std::map<std::string, std::size_t> taken;
+  };
+  const std::shared_ptr<State> state_;
+  const std::size_t per_name_;
+};
+
+}  // namespace anchord::server
