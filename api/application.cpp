@@ -118,6 +118,7 @@ struct Application::State {
   void beat();
   std::string device_rows();
   void second();
+  void keep_house();
 
   Deps deps;
   LateWriter late;
@@ -145,6 +146,7 @@ struct Application::State {
     LearningServices services;
   };
   std::unique_ptr<Learning> learning;
+  std::uint64_t houses{0};  ///< rounds of keep_house()
   std::mutex mutex;
   std::condition_variable stop_told;
   bool stopping{false}, started{false};
@@ -183,19 +185,29 @@ void Application::State::beat() {
     hub.tick();
     if (n % 10 == 0) missions.tick();
     if (n % 20 == 0) second();
-    if (n % 72'000 == 0) {
-      // Hourly: answers to Idempotency-Key are promised for a day.
-      (void)deps.access_store.drop_answers_before({deps.clock.now().ns - 24LL * 3600 * 1'000'000'000})
-          .has_value();
-    }
     lock.lock();
+  }
+}
+
+/// About once a second, on the thread of late writes.
+void Application::State::keep_house() {
+  if (deps.access != nullptr) deps.access->flush();
+  // Daily and after every flight (reliability.md section 2).
+  if (deps.backups != nullptr && deps.backups->due(missions.finished())) {
+    if (const auto begun = services.begin_backup(); !begun)
+      events.add("warning", "backup.failed", begun.error().message);
+  }
+  if (++houses % 3600 == 0) {
+    // Hourly: answers to Idempotency-Key are promised for a day.
+    (void)deps.access_store.drop_answers_before({deps.clock.now().ns - 24LL * 3600 * 1'000'000'000})
+        .has_value();
   }
 }
 
 void Application::State::second() {
   const UtcTime now = deps.clock.now();
-  // Not here: alarms and heartbeats must not wait for the disk.
-  if (deps.access != nullptr) late.idle_task([access = deps.access] { access->flush(); });
+  // Alarms and heartbeats must not wait for the disk.
+  late.idle_task([this] { keep_house(); });
   const StorageStatus storage = services.storage();
   std::string json = R"({"t_us":)" + std::to_string(now.us()) + R"(,"recording":)" +
                      (missions.recording() ? "true" : "false");
@@ -222,11 +234,6 @@ void Application::State::second() {
     }
   }
   alarms.update(std::move(holding), now);
-  // Daily and after every flight (reliability.md section 2).
-  if (deps.backups != nullptr && deps.backups->due(missions.finished())) {
-    if (const auto begun = services.begin_backup(); !begun)
-      events.add("warning", "backup.failed", begun.error().message);
-  }
   std::string list = "[";
   for (const auto& alarm : alarms.standing()) list += (list.size() > 1 ? "," : "") + alarm_json(alarm);
   hub.publish(Topic::alarms, list + ']', now.us());

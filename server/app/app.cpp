@@ -230,7 +230,7 @@ void App::State::compose() {
   // Commands compute nothing and wait for nothing, so few threads do; what else belongs to flying may wait for
   // the disk, and must not make them wait.
   command_pool = std::make_unique<WorkerPool>("anchord-command", 4, 256);
-  flight_pool = std::make_unique<WorkerPool>("anchord-flight", 2, 64);
+  flight_pool = std::make_unique<WorkerPool>("anchord-flight", 4, 64);
   heavy_pool = std::make_unique<WorkerPool>("anchord-heavy", config.count("http.heavy_workers"),
                                             config.count("http.heavy_queue"), 10);
   // Apart from the handlers, so that a flight that is being solved never makes a page wait.
