@@ -24,6 +24,7 @@
 #include "server/runtime/private_file.hpp"
 #include "server/runtime/worker_pool.hpp"
 #include "server/runtime/worker_process.hpp"
+#include "server/storage/data_folder.hpp"
 #include "server/storage/sqlite_database.hpp"
 
 namespace anchord::server {

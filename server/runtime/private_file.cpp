@@ -6,6 +6,8 @@
 #include <cerrno>
 #include <cstring>
 
+#include "server/storage/data_folder.hpp"
+
 namespace anchord::server {
 
 Result<void> write_private(const std::filesystem::path& file, const std::string& text) {
@@ -18,7 +20,9 @@ Result<void> write_private(const std::filesystem::path& file, const std::string&
   if (fd >= 0) ::close(fd);
   std::error_code error;
   if (written) std::filesystem::rename(part, file, error);
-  if (!written || error) {
+  // A name that is not synced is the old file again after a power cut.
+  const bool named = written && !error && sql::sync_path(std::filesystem::absolute(file).parent_path());
+  if (!named) {
     return make_error(failure == ENOSPC ? Errc::storage_full : Errc::storage_unavailable,
                       "cannot write " + file.string() + ": " + (error ? error.message() : std::strerror(failure)));
   }

@@ -90,7 +90,10 @@ Result<BackupReport> back_up(SqliteConnection& source, const std::filesystem::pa
   if (error) return make_error(Errc::storage_unavailable, "backup: " + error.message());
   std::ofstream(file.string() + ".sha256") << report.sha256_hex << "  " << file.filename().string() << '\n';
   BOOST_OUTCOME_TRY(sync_path(file.string() + ".sha256"));
-  BOOST_OUTCOME_TRY(sync_path(std::filesystem::absolute(file).parent_path()));
+  const auto folder = std::filesystem::absolute(file).parent_path();
+  BOOST_OUTCOME_TRY(sync_path(folder));
+  // The folder may be new too. Where we may not look above it, somebody else made it, before.
+  static_cast<void>(sync_path(folder.parent_path()));
   report.file = file;
   report.bytes = std::filesystem::file_size(file, error);
   return report;

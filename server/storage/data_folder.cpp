@@ -47,6 +47,17 @@ Result<void> write_small(const std::filesystem::path& path, std::string_view tex
   return sync_path(path.parent_path());
 }
 
+/// The names of new folders must outlive a power cut, or all that is acknowledged in them goes with them. As far up
+/// as we may look: what was there before needs no help.
+void sync_names_above(const std::filesystem::path& dir) {
+  auto folder = std::filesystem::absolute(dir).lexically_normal();
+  if (!folder.has_filename()) folder = folder.parent_path();
+  while (folder.has_relative_path()) {
+    folder = folder.parent_path();
+    if (!sync_path(folder)) return;
+  }
+}
+
 std::string shell_quoted(const std::filesystem::path& path) { return "'" + path.string() + "'"; }
 
 }  // namespace
@@ -57,7 +68,10 @@ Result<std::unique_ptr<DataFolder>> DataFolder::open(const std::filesystem::path
   std::error_code error;
   const bool fresh = std::filesystem::create_directories(dir, error);
   if (error) return system_error("data folder " + dir.string(), error.value());
-  if (fresh) ::chmod(dir.c_str(), k_private_folder);
+  if (fresh) {
+    ::chmod(dir.c_str(), k_private_folder);
+    sync_names_above(dir);
+  }
   const auto path = dir / k_lock;
   const int fd = open_file(path, O_RDWR | O_CREAT);
   if (fd < 0) return system_error("data folder " + dir.string() + ": " + k_lock, errno);
@@ -98,8 +112,10 @@ std::uint64_t DataFolder::free_bytes() const {
 }
 
 bool DataFolder::has_reserve() const {
-  std::error_code ignored;
-  return reserve_bytes_ == 0 || std::filesystem::exists(dir_ / k_reserve, ignored);
+  // A power cut may leave its name without its space.
+  std::error_code error;
+  const auto bytes = std::filesystem::file_size(dir_ / k_reserve, error);
+  return reserve_bytes_ == 0 || (!error && bytes >= reserve_bytes_);
 }
 
 void DataFolder::fill_reserve(std::uint64_t keep_free_bytes) {

@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "core/base/check.hpp"
+#include "server/storage/data_folder.hpp"
 
 namespace anchord::sql {
 namespace {
@@ -20,13 +21,18 @@ std::string quoted(std::string text) {
   return "'" + text + "'";
 }
 
-void copy_before(SqliteConnection& connection, const std::filesystem::path& dir, std::int64_t version) {
+Result<void> copy_before(SqliteConnection& connection, const std::filesystem::path& dir,
+                         std::int64_t version) {
   std::error_code ignored;
   std::filesystem::create_directories(dir, ignored);
   const auto file = dir / ("before-migration-" + std::to_string(version + 1) + ".db");
   // Left by a start that was killed: it may be half a copy.
   std::filesystem::remove(file, ignored);
   connection.execute("VACUUM INTO " + quoted(file.string()));
+  // SQLite does not sync what it vacuums into; the migration that follows is synced, and this is its way back.
+  BOOST_OUTCOME_TRYV(sync_path(file));
+  BOOST_OUTCOME_TRYV(sync_path(dir));
+  return sync_path(std::filesystem::absolute(dir).parent_path());  // the folder may be new too
 }
 
 Result<void> verify_applied(SqliteConnection& connection, std::span<const Migration> migrations) {
@@ -87,7 +93,9 @@ Result<void> migrate(SqliteConnection& connection, std::span<const Migration> mi
     BOOST_OUTCOME_TRY(verify_applied(connection, migrations));
   }
   if (version == newest) return boost::outcome_v2::success();
-  if (version > 0) copy_before(connection, backup_dir, version);
+  if (version > 0) {
+    BOOST_OUTCOME_TRYV(copy_before(connection, backup_dir, version));
+  }
   for (const Migration& migration : migrations.subspan(static_cast<std::size_t>(version))) {
     apply(connection, migration, now);
   }
