@@ -63,7 +63,7 @@ TEST(ToUtf8, MakesUtf8OfEveryPairOfBytesAndOfEveryCutCharacter) {
 TEST(Printable, ShowsWhatWouldMoveATerminal) {
   EXPECT_EQ(printable("a\x1b[2Jb\r\n\x7f\xc2\x9b"
                       "c\xff"),
-            "a\\x1b[2Jb\\x0d\\x0a\\x7f\\x9bc" + k_fffd);
+            "a\\x1b[2Jb\\x0d\n\\x7f\\x9bc" + k_fffd);
   EXPECT_EQ(printable("Br\xc3\xbc"
                       "cke \xc2\xa0"),
             "Br\xc3\xbc"
