@@ -4,7 +4,6 @@
 #include <condition_variable>
 #include <mutex>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "api/json/live_writer.hpp"
 #include "api/json/procedure_json.hpp"
@@ -22,6 +21,7 @@
 #include "api/services/geo_service.hpp"
 #include "api/services/kit_profiles.hpp"
 #include "api/services/late_writer.hpp"
+#include "core/base/guard.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/backups.hpp"
@@ -30,6 +30,12 @@
 #include "core/ports/store.hpp"
 
 namespace anchord::api {
+namespace {
+
+/// An alarm about a failed task stands so long after the newest failure.
+constexpr auto k_failure_stands = std::chrono::minutes(5);
+
+}  // namespace
 
 struct Application::State {
   explicit State(Deps d)
@@ -119,6 +125,9 @@ struct Application::State {
   std::string device_rows();
   void second();
   void keep_house();
+  void tell_system(UtcTime now, ServerPulse& pulse);
+  void tell_alarms(UtcTime now, std::vector<AlarmCondition> holding,
+                   std::vector<std::pair<std::string_view, std::string>>& of_flight);
 
   Deps deps;
   LateWriter late;
@@ -150,7 +159,7 @@ struct Application::State {
   std::mutex mutex;
   std::condition_variable stop_told;
   bool stopping{false}, started{false};
-  std::thread heart;
+  Thread heart;
 };
 
 void Services::audit(const Request& request, std::string what, std::string result) const {
@@ -182,32 +191,59 @@ void Application::State::beat() {
     stop_told.wait_for(lock, std::chrono::milliseconds(50), [&] { return stopping; });
     if (stopping) return;
     lock.unlock();
-    hub.tick();
-    if (n % 10 == 0) missions.tick();
+    (void)guarded("live stream", [this] { hub.tick(); });
+    if (n % 10 == 0) (void)guarded("mission states", [this] { missions.tick(); });
     if (n % 20 == 0) second();
     lock.lock();
   }
 }
 
-/// About once a second, on the thread of late writes.
+/// About once a second, on the thread of late writes; each part behind a guard of its own.
 void Application::State::keep_house() {
-  if (deps.access != nullptr) deps.access->flush();
-  // Daily and after every flight (reliability.md section 2).
-  if (deps.backups != nullptr && deps.backups->due(missions.finished())) {
+  (void)guarded("last uses of tokens", [this] {
+    if (deps.access != nullptr) deps.access->flush();
+  });
+  (void)guarded("scheduled backup", [this] {
+    // Daily and after every flight (reliability.md section 2).
+    if (deps.backups == nullptr || !deps.backups->due(missions.finished())) return;
     if (const auto begun = services.begin_backup(); !begun)
       events.add("warning", "backup.failed", begun.error().message);
-  }
-  if (++houses % 3600 == 0) {
-    // Hourly: answers to Idempotency-Key are promised for a day.
+  });
+  if (++houses % 3600 != 0) return;
+  // Hourly: answers to Idempotency-Key are promised for a day.
+  (void)guarded("old answers", [this] {
     (void)deps.access_store.drop_answers_before({deps.clock.now().ns - 24LL * 3600 * 1'000'000'000})
         .has_value();
-  }
+  });
 }
 
+/// Each part behind the guard of its own: what fails in one must not keep the alarm about it from the page.
 void Application::State::second() {
   const UtcTime now = deps.clock.now();
+  ServerPulse pulse;
   // Alarms and heartbeats must not wait for the disk.
   late.idle_task([this] { keep_house(); });
+  (void)guarded("server status", [&] { tell_system(now, pulse); });
+  (void)guarded("device clocks", [&] {
+    if (deps.devices == nullptr) return;
+    pulse.clock_skew = deps.devices->clock().skew;
+    pulse.unrecorded = deps.devices->recorder_failure();
+    pulse.not_started = deps.devices->not_started();
+  });
+  std::vector<FlightPulse> pulses;
+  (void)guarded("mission states", [&] { pulses = missions.pulses(); });
+  std::vector<std::pair<std::string_view, std::string>> of_flight;
+  (void)guarded("flight alarms", [&] {
+    if (flights) of_flight = flights->alarms();
+  });
+  for (const auto& failure : task_failures(k_failure_stands)) {
+    pulse.failed_tasks +=
+        (pulse.failed_tasks.empty() ? "" : "; ") + failure.task + " (" + to_utf8(failure.what, 120) + ')';
+  }
+  (void)guarded("alarms", [&] { tell_alarms(now, alarm_conditions(pulses, pulse), of_flight); });
+}
+
+void Application::State::tell_system(UtcTime now, ServerPulse& pulse) {
   const StorageStatus storage = services.storage();
   std::string json = R"({"t_us":)" + std::to_string(now.us()) + R"(,"recording":)" +
                      (missions.recording() ? "true" : "false");
@@ -217,21 +253,18 @@ void Application::State::second() {
           std::to_string(hub.clients());
   json += R"(,"synchronous":)" + json_text(storage.synchronous) + '}';
   hub.publish(Topic::system, std::move(json), now.us());
+  pulse.writable = storage.writable;
+  pulse.reason = storage.reason;
+  pulse.disk_free_bytes = storage.disk_free_bytes;
+  pulse.queued_rows = storage.queue_depth + missions.queued();
+}
 
-  ServerPulse pulse{storage.writable, storage.reason, storage.disk_free_bytes,
-                    storage.queue_depth + missions.queued()};
-  if (deps.devices != nullptr) {
-    pulse.clock_skew = deps.devices->clock().skew;
-    pulse.unrecorded = deps.devices->recorder_failure();
-  }
-  auto holding = alarm_conditions(missions.pulses(), pulse);
-  if (flights) {
-    for (auto& [id, text] : flights->alarms()) {
-      const bool told =
-          std::any_of(holding.begin(), holding.end(), [&](const auto& c) { return c.id == id; });
-      if (!text.empty() && !told)
-        holding.push_back({std::string(id), AlarmPriority::critical, std::move(text), std::nullopt});
-    }
+void Application::State::tell_alarms(UtcTime now, std::vector<AlarmCondition> holding,
+                                     std::vector<std::pair<std::string_view, std::string>>& of_flight) {
+  for (auto& [id, text] : of_flight) {
+    const bool told = std::any_of(holding.begin(), holding.end(), [&](const auto& c) { return c.id == id; });
+    if (!text.empty() && !told)
+      holding.push_back({std::string(id), AlarmPriority::critical, std::move(text), std::nullopt});
   }
   alarms.update(std::move(holding), now);
   std::string list = "[";
@@ -254,7 +287,9 @@ WsHandlerFactory Application::ws_factory() {
 
 void Application::start() {
   if (std::exchange(state_->started, true)) return;
-  if (state_->models) {
+  // Whatever is kept, the server starts: what cannot be taken up again is told.
+  (void)guarded("models and events at the start", [this] {
+    if (!state_->models) return;
     const auto loaded = state_->models->reload();
     if (!loaded && state_->deps.log_fault) state_->deps.log_fault("", loaded.error().message);
     const auto before = promotion_events(state_->deps.learning->models, state_->deps.missions);
@@ -262,10 +297,10 @@ void Application::start() {
       state_->events.restore(before.value());
     else if (state_->deps.log_fault)
       state_->deps.log_fault("", before.error().message);
-  }
+  });
   if (state_->flights) state_->flights->start();
   state_->jobs.start();
-  state_->heart = std::thread([this] { state_->beat(); });
+  state_->heart = Thread("anchord-beat", [this] { state_->beat(); });
 }
 
 void Application::fly() {

@@ -1,6 +1,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "core/base/guard.hpp"
 #include "server/cli/commands.hpp"
 
 int main(int argc, char** argv) {
@@ -29,15 +30,16 @@ int main(int argc, char** argv) {
   anchord::cli::add_solve_command(app, exit_code);
   anchord::cli::add_version_command(app, exit_code);
   anchord::cli::add_worker_command(app, exit_code);
-  try {
-    if (argc < 2) {
-      std::fputs(app.help().c_str(), stderr);
-      return 2;
-    }
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    const int code = app.exit(error);
-    return code == 0 ? 0 : 2;
+  if (argc < 2) {
+    std::fputs(app.help().c_str(), stderr);
+    return 2;
   }
-  return exit_code;
+  const auto ran = anchord::guarded("the command", [&] {
+    try {
+      app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+      exit_code = app.exit(error) == 0 ? 0 : 2;
+    }
+  });
+  return ran ? exit_code : 1;
 }

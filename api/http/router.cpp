@@ -5,6 +5,8 @@
 
 #include "api/http/idempotency.hpp"
 #include "api/http/problem.hpp"
+#include "core/base/guard.hpp"
+#include "core/base/text.hpp"
 
 namespace anchord::api {
 namespace {
@@ -91,18 +93,10 @@ void conditional_get(const Request& request, Response& response) {
 void complete_problem(const Request& request, Response& response) {
   if (response.status < 400 || response.body.size() < 2 || response.body.back() != '}') return;
   if (response.body.find("\"instance\":") != std::string::npos) return;
-  const auto quote = [](std::string_view text) {
-    std::string out;
-    for (const char c : text) {
-      const auto byte = static_cast<unsigned char>(c);
-      if (c == '"' || c == '\\') out += '\\';
-      if (byte >= 0x20 && byte < 0x7f) out += c;  // what is left out cannot break the JSON
-    }
-    return out;
-  };
   response.body.pop_back();
-  response.body +=
-      ",\"instance\":\"" + quote(request.path) + "\",\"request_id\":\"" + quote(request.request_id) + "\"}";
+  append_json_text(response.body += ",\"instance\":", request.path);
+  append_json_text(response.body += ",\"request_id\":", request.request_id);
+  response.body += '}';
 }
 
 }  // namespace
@@ -226,14 +220,14 @@ Response Router::handle(Request& request) const {
 
 Response Router::dispatch(const Route& route, Request& request) const {
   Response response;
-  const auto guarded = [&](Request& r) {
+  const auto handled = [&](Request& r) {
     try {
       return route.handler(r);
     } catch (ProblemException& refused) {
       return std::move(refused.response);
     }
   };
-  try {
+  const auto answer = [&] {
     if (!route.access.permits(request.principal)) {
       if (request.principal.roles.empty()) {
         response = problem(401, "unauthorized", "send a token as Authorization: Bearer");
@@ -248,22 +242,28 @@ Response Router::dispatch(const Route& route, Request& request) const {
     } else if (route.method == Method::post && state_->idempotency &&
                !request.header("idempotency-key").empty()) {
       const bool prompt = route.work_for(request) == Work::command;
-      response = (prompt ? state_->of_commands : state_->idempotency)->run(request, guarded);
+      response = (prompt ? state_->of_commands : state_->idempotency)->run(request, handled);
     } else {
-      response = guarded(request);
+      response = handled(request);
     }
-  } catch (const BodyError& lost) {
-    response = problem(lost.status(),
-                       lost.status() == 413   ? "too-large"
-                       : lost.status() == 401 ? "unauthorized"
-                                              : "malformed",
-                       lost.what());
-    response.header("Connection", "close");
-  } catch (const std::bad_alloc&) {
-    response = problem(503, "overloaded", "out of memory");
-    if (state_->fault) state_->fault(request.request_id, "out of memory");
-  } catch (const std::exception& fault) {
-    if (state_->fault) state_->fault(request.request_id, fault.what());
+  };
+  const auto ran = guarded(route.pattern, [&] {
+    try {
+      answer();
+    } catch (const BodyError& lost) {
+      response = problem(lost.status(),
+                         lost.status() == 413   ? "too-large"
+                         : lost.status() == 401 ? "unauthorized"
+                                                : "malformed",
+                         lost.what());
+      response.header("Connection", "close");
+    } catch (const std::bad_alloc&) {
+      response = problem(503, "overloaded", "out of memory");
+      if (state_->fault) state_->fault(request.request_id, "out of memory");
+    }
+  });
+  if (!ran) {
+    if (state_->fault) state_->fault(request.request_id, ran.what);
     response = problem(500, "internal", "");
   }
   conditional_get(request, response);

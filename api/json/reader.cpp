@@ -331,6 +331,19 @@ Json json_body(const Request& request, bool may_be_empty) {
   return body;
 }
 
+nlohmann::ordered_json kept_json(std::string_view text) {
+  auto json = nlohmann::ordered_json::parse(text, nullptr, false);
+  return json.is_discarded() ? nlohmann::ordered_json(nullptr) : json;
+}
+
+const std::string& text_body(const Request& request) {
+  if (!is_utf8(request.body)) {
+    throw_problem(400, "malformed", "the file is not UTF-8: save it as UTF-8 and send it again",
+                  {{"", "bad_utf8", "the text is not UTF-8"}});
+  }
+  return request.body;
+}
+
 void refuse_if_any(const std::vector<FieldError>& errors) {
   if (errors.empty()) return;
   throw_problem(

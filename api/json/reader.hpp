@@ -64,6 +64,10 @@ std::string media_type(const Request& request);
 /// The parsed body of an ordinary JSON request. Throws ProblemException: 415 without application/json (or
 /// merge-patch), 400 where it cannot be read. An empty body reads as {} when `may_be_empty`.
 nlohmann::json json_body(const Request& request, bool may_be_empty = false);
+/// JSON that is kept as text; null where it is empty or cannot be read, so that it never spoils an answer.
+nlohmann::ordered_json kept_json(std::string_view text);
+/// The body of a route that takes a file as it is (CSV, KML, a model): UTF-8, or 400.
+const std::string& text_body(const Request& request);
 
 /// Throws the 422 that lists `errors`, unless there are none.
 void refuse_if_any(const std::vector<FieldError>& errors);

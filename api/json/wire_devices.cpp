@@ -55,7 +55,7 @@ Ordered device_json(const DeviceReport& d) {
               {"kind", d.config.kind},
               {"name", d.config.name},
               {"address", d.config.address},
-              {"options", Ordered::parse(d.config.options_json, nullptr, false)},
+              {"options", kept_json(d.config.options_json)},
               {"enabled", d.config.enabled},
               {"state", d.state},
               {"reason", text_or_null(d.reason)},

@@ -112,8 +112,7 @@ Mission read_mission(const Json& body, std::vector<FieldError>& errors) {
 
 Ordered site_json(const Site& site) {
   Ordered out{{"id", to_string(site.id)}, {"name", site.name}, {"origin", wgs84_json(site.origin)}};
-  out["outline"] =
-      site.outline_geojson.empty() ? Ordered(nullptr) : Ordered::parse(site.outline_geojson, nullptr, false);
+  out["outline"] = kept_json(site.outline_geojson);
   out["crs"] = {{"frame", site.crs_frame.empty() ? Ordered(nullptr) : Ordered(site.crs_frame)},
                 {"epoch", or_null(site.crs_epoch)},
                 {"base",
@@ -283,8 +282,7 @@ Ordered job_json(const Job& job) {
   out["started_at"] = job.started ? Ordered(to_rfc3339(*job.started)) : Ordered(nullptr);
   out["finished_at"] = job.finished ? Ordered(to_rfc3339(*job.finished)) : Ordered(nullptr);
   out["links"] = std::move(links);
-  out["problem"] =
-      job.problem_json.empty() ? Ordered(nullptr) : Ordered::parse(job.problem_json, nullptr, false);
+  out["problem"] = kept_json(job.problem_json);
   return out;
 }
 

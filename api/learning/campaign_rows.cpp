@@ -6,6 +6,7 @@
 
 #include "api/http/problem.hpp"
 #include "api/imports/campaign.hpp"
+#include "api/json/reader.hpp"
 #include "api/routes/support.hpp"
 #include "core/base/to_wire.hpp"
 
@@ -76,7 +77,7 @@ CampaignRows read_campaign_rows(const Request& request) {
   d.height_m = query_number(request, "height_difference_m", -1000, 1000);
   d.thickness_m = query_number(request, "thickness_m", 0, 100);
   if (request.query_value("los")) d.los = query_flag(request, "los");
-  const auto read = import_campaign(request.body, options);
+  const auto read = import_campaign(text_body(request), options);
   if (!read)
     throw_problem(422, "validation", read.error().message, {{"", "unreadable", read.error().message}});
   const auto& campaign = read.value().campaign;

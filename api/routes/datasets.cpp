@@ -41,7 +41,7 @@ Response list(LearningServices& l, const Request& request) {
 
 /// The rows come with the request: what GET .../rows gave elsewhere.
 FrozenDataset read_csv(const Request& request) {
-  auto table = DatasetTable::parse(request.body);
+  auto table = DatasetTable::parse(text_body(request));
   if (!table)
     throw_problem(422, "validation", table.error().message, {{"", "bad_csv", table.error().message}});
   return frozen_before(std::move(table).value());

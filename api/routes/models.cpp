@@ -70,7 +70,7 @@ Response list(LearningServices& l, const Request& request) {
 /// An artifact from elsewhere. Everything about it is checked before it is kept.
 Response upload(LearningServices& l, const Request& request) {
   check_query(request, {});
-  auto read = read_model_artifact(request.body);
+  auto read = read_model_artifact(text_body(request));
   if (!read)
     throw_problem(422, "validation", read.error().message, {{"", "bad_model", read.error().message}});
   const auto& model = read.value();

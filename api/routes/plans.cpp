@@ -141,7 +141,7 @@ Response import(Services& s, const Request& request) {
   const bool kml = type.starts_with("application/vnd.google-earth.kml+xml") ||
                    type.starts_with("application/xml") || type.starts_with("text/xml");
   if (!kml) (void)json_body(request);  // refuses another type, broken text, compression
-  Plan plan = read_plan_file(request.body, notes, errors);
+  Plan plan = read_plan_file(text_body(request), notes, errors);
   plan.name = to_utf8(request.query_value("name").value_or("Imported plan"), 200);
   refuse_if_any(errors);
   if (query_flag(request, "dry_run")) {

@@ -74,8 +74,17 @@ std::vector<AlarmCondition> alarm_conditions(const std::vector<FlightPulse>& fli
                    "more measurements come than can be worked off; all are stored, live numbers come late",
                    {}});
   }
+  if (!server.failed_tasks.empty()) {
+    out.push_back({"server.task_failed",
+                   AlarmPriority::warning,
+                   "a task of the server failed and goes on; the log has it, send it with a report: " +
+                       server.failed_tasks,
+                   {}});
+  }
   if (!server.clock_skew.empty())
     out.push_back({"clock.skew", AlarmPriority::warning, server.clock_skew, {}});
+  if (!server.not_started.empty())
+    out.push_back({"device.not_started", AlarmPriority::warning, server.not_started, {}});
   if (!server.unrecorded.empty()) {
     out.push_back({"recording.failed",
                    AlarmPriority::critical,

@@ -41,6 +41,8 @@ struct ServerPulse {
   std::uint64_t disk_free_bytes{};  ///< 0: not known
   std::uint64_t queued_rows{};      ///< wait for the writer or for the live path
   std::string clock_skew{};         ///< the system clock against the receiver's, in words; empty: right
+  std::string failed_tasks{};       ///< of the server, with what they threw; empty: none lately
+  std::string not_started{};        ///< devices that are kept but do not run, and why; empty: all do
   std::string unrecorded{};         ///< why raw bytes of the devices are not recorded; empty: they are
 };
 

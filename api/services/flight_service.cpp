@@ -19,13 +19,16 @@ FlightService::FlightService(Deps deps) : state_(std::make_unique<State>(std::mo
 FlightService::~FlightService() { stop(); }
 
 void FlightService::start() {
-  state_->recover();
+  if (!guarded("flight before the restart", [this] { state_->recover(); })) {
+    state_->deps.events.add("critical", "procedure.lost",
+                            "the flight before the restart cannot be read: the pilot has it", std::nullopt);
+  }
   if (state_->deps.now_s || state_->thread.joinable()) return;
-  state_->thread = std::thread([this] {
+  state_->thread = Thread("anchord-flight", [this] {
     std::unique_lock lock(state_->mutex);
     while (!state_->stopping) {
       lock.unlock();
-      step();
+      (void)guarded("flight", [this] { step(); });
       lock.lock();
       state_->wake.wait_for(lock, std::chrono::milliseconds(100), [&] { return state_->stopping; });
     }

@@ -5,12 +5,12 @@
 #include <deque>
 #include <map>
 #include <mutex>
-#include <thread>
 
 #include "api/application.hpp"
 #include "api/json/plan_json.hpp"
 #include "api/services/flight_service.hpp"
 #include "api/services/mission_service.hpp"
+#include "core/base/guard.hpp"
 #include "core/procedure/flight_engine.hpp"
 
 namespace anchord::api {
@@ -107,7 +107,7 @@ struct FlightService::State {
   Deps deps;
   std::mutex mutex;
   std::condition_variable wake, changed;
-  std::thread thread;
+  Thread thread;
   bool stopping{false};
   ControlLease lease;
   std::optional<ActiveFlight> flight;

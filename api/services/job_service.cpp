@@ -6,11 +6,11 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <thread>
 
 #include "api/http/problem.hpp"
 #include "api/json/wire_resources.hpp"
 #include "api/live/hub.hpp"
+#include "core/base/guard.hpp"
 #include "core/base/to_wire.hpp"
 
 namespace anchord::api {
@@ -29,7 +29,7 @@ struct JobService::State {
   /// One kind of job.
   struct Lane {
     std::deque<Task> queue{};
-    std::thread thread{};
+    Thread thread{};
   };
   class Context;
 
@@ -79,7 +79,7 @@ struct JobService::State {
     changed.notify_all();
   }
   void run_lane(const std::shared_ptr<State>& self, Lane& lane) {
-    if (!lane.thread.joinable()) lane.thread = std::thread([self, &lane] { self->loop(lane); });
+    if (!lane.thread.joinable()) lane.thread = Thread("anchord-job", [self, &lane] { self->loop(lane); });
   }
   void loop(Lane& lane);
   void run(const Task& task);
@@ -217,7 +217,7 @@ void JobService::State::loop(Lane& lane) {
       task = std::move(lane.queue.front());
       lane.queue.pop_front();
     }
-    run(task);
+    (void)guarded("job", [&] { run(task); });
     const std::scoped_lock lock(mutex);
     canceled.erase(task.id);
   }
@@ -232,11 +232,8 @@ void JobService::State::run(const Task& task) {
   Context context(*this, job);
   context.progress(0, "load", "");
   Result<JobEnd> result = make_error(Errc::internal, "");
-  try {  // the door of jobs: whatever is thrown ends this job alone
-    result = task.work(context);
-  } catch (const std::exception& fault) {
-    result = make_error(Errc::internal, fault.what());
-  }
+  const auto ran = guarded("job", [&] { result = task.work(context); });
+  if (!ran) result = make_error(Errc::internal, ran.what);
   job.finished = clock.now();
   if (result) {
     job.state = JobState::succeeded;

@@ -4,7 +4,7 @@
 
 namespace anchord::api {
 
-JointWorker::JointWorker() : thread_([this] { loop(); }) {}
+JointWorker::JointWorker() : thread_("anchord-joint", [this] { loop(); }) {}
 JointWorker::~JointWorker() { stop(); }
 
 bool JointWorker::idle() const {
@@ -46,12 +46,11 @@ void JointWorker::loop() {
       const std::scoped_lock lock(mutex_);
       return stopping_;
     };
-    try {  // the door of this thread: a fault ends one solution, not the server
+    const auto ran = guarded("joint solution", [&] {
       const auto solution = solve_flight(task.flight, task.options);
       task.done(solution ? &solution.value() : nullptr);
-    } catch (const std::exception&) {
-      task.done(nullptr);
-    }
+    });
+    if (!ran) (void)guarded("joint solution", [&] { task.done(nullptr); });
     const std::scoped_lock lock(mutex_);
     busy_ = false;
   }

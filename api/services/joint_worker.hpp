@@ -5,8 +5,8 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <thread>
 
+#include "core/base/guard.hpp"
 #include "core/localize/flight_options.hpp"
 #include "core/types/flight_data.hpp"
 
@@ -40,7 +40,7 @@ class JointWorker {
   std::condition_variable changed_;
   std::optional<Task> next_;
   bool busy_{false}, stopping_{false};
-  std::thread thread_;
+  Thread thread_;
 };
 
 }  // namespace anchord::api

@@ -21,7 +21,7 @@ struct LateWriter::Entry {
 };
 
 LateWriter::LateWriter(std::function<void(std::string_view)> log)
-    : log_(std::move(log)), thread_([this] { run(); }) {}
+    : log_(std::move(log)), thread_("anchord-late", [this] { run(); }) {}
 LateWriter::~LateWriter() { stop(); }
 
 bool LateWriter::write(Write write, std::chrono::milliseconds patience) {
@@ -73,13 +73,10 @@ void LateWriter::stop() {
 }
 
 /// The thread outlives whatever a write throws.
-Result<void> LateWriter::guarded(const Write& write) const {
-  try {
-    return write();
-  } catch (const std::exception& fault) {
-    report(fault.what());
-    return make_error(Errc::internal, fault.what());
-  }
+Result<void> LateWriter::attempt(const Write& write) {
+  Result<void> done = boost::outcome_v2::success();
+  const auto ran = guarded("late write", [&] { done = write(); });
+  return ran ? done : make_error(Errc::internal, ran.what);
 }
 
 void LateWriter::run() {
@@ -92,17 +89,14 @@ void LateWriter::run() {
       if (stopping_) return;
       const auto task = std::exchange(task_, nullptr);
       lock.unlock();
-      (void)guarded([&task]() -> Result<void> {
-        task();
-        return boost::outcome_v2::success();
-      }).has_value();
+      (void)guarded("late task", task);
       lock.lock();
       continue;
     }
     const auto entry = entries_.front();
     const bool last_try = stopping_;
     lock.unlock();
-    const auto written = guarded(entry->write);
+    const auto written = attempt(entry->write);
     const bool again = !written && passing(written.error()) && !last_try;
     if (!written && !troubled) report("a write that follows its answer failed: " + written.error().message);
     lock.lock();

@@ -10,8 +10,8 @@
 #include <mutex>
 #include <string>
 #include <string_view>
-#include <thread>
 
+#include "core/base/guard.hpp"
 #include "core/base/result.hpp"
 #include "core/ports/store.hpp"
 
@@ -46,7 +46,7 @@ class LateWriter {
  private:
   struct Entry;
   void run();
-  Result<void> guarded(const Write& write) const;
+  static Result<void> attempt(const Write& write);
   void report(std::string_view what) const {
     if (log_) log_(what);
   }
@@ -57,7 +57,7 @@ class LateWriter {
   std::deque<std::shared_ptr<Entry>> entries_;
   std::function<void()> task_;
   bool stopping_{false};
-  std::thread thread_;
+  Thread thread_;
 };
 
 /// An AccessStore that answers its writers at once (LateWriter) and remembers what is not on the disk yet.

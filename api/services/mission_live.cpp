@@ -2,6 +2,7 @@
 #include "api/services/event_log.hpp"
 #include "api/services/mission_observer.hpp"
 #include "api/services/mission_service_state.hpp"
+#include "core/base/guard.hpp"
 
 namespace anchord::api {
 
@@ -54,11 +55,15 @@ void MissionService::State::schedule(const std::shared_ptr<Flight>& flight) {
     flight->scheduled = true;
   }
   post([self = shared_from_this(), flight] {
-    if (!self->stopped) self->work(*flight);
+    const auto ran = guarded("live path", [&] {
+      if (!self->stopped) self->work(*flight);
+    });
     bool again = false;
     {
       const std::scoped_lock lock(flight->queue_mutex);
       flight->scheduled = false;
+      // Its rows are stored; a close that throws would be tried for ever.
+      if (!ran) flight->closing = false;
       again = !flight->queue.empty() || flight->closing;
     }
     if (again) self->schedule(flight);
@@ -72,7 +77,7 @@ void MissionService::State::post(std::function<void()> task) {
     ++running;
   }
   auto counted = [self = shared_from_this(), task = std::move(task)] {
-    task();
+    (void)guarded("live path", task);
     {
       const std::scoped_lock lock(self->running_mutex);
       --self->running;

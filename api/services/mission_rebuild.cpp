@@ -1,4 +1,5 @@
 #include "api/services/mission_service_state.hpp"
+#include "core/base/guard.hpp"
 
 namespace anchord::api {
 
@@ -24,7 +25,14 @@ void MissionService::State::begin_rebuild(const std::shared_ptr<Flight>& flight)
 void MissionService::State::continue_rebuild(const std::shared_ptr<Flight>& flight) {
   post([self = shared_from_this(), flight] {
     if (self->stopped) return;
-    if (self->rebuild_slice(*flight)) return self->continue_rebuild(flight);
+    bool more = false;
+    const auto ran = guarded("flight rebuilt", [&] { more = self->rebuild_slice(*flight); });
+    if (more) return self->continue_rebuild(flight);
+    if (!ran) {  // what was read so far stands; rows that come now are not held up by it
+      const std::scoped_lock lock(flight->work_mutex);
+      flight->rebuild.reset();
+      flight->live.hold(false);
+    }
     flight->rebuilding = false;
     self->schedule(flight);
   });

@@ -92,7 +92,7 @@ std::string printable(std::string_view bytes) {
     i += n;
     if (!good)
       out += k_replacement;
-    else if (control(character))
+    else if (control(character) && character != "\n" && character != "\t")
       append_code(out, "\\x%02x", character);
     else
       out += character;

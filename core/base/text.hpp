@@ -14,8 +14,8 @@ bool is_utf8(std::string_view bytes);
 /// characters, never inside one. For the door of a driver or a request: behind it every string is UTF-8.
 std::string to_utf8(std::string_view bytes, std::size_t max_bytes = std::string_view::npos);
 
-/// As to_utf8, and control characters (C0, DEL, C1: what moves a terminal's cursor or forges a line) as \x1b.
-/// For text that is printed on a terminal.
+/// As to_utf8, and control characters (C0, DEL, C1: what moves a terminal's cursor or changes its colours) as
+/// \x1b; line ends and tabs stay. For text that is printed on a terminal.
 std::string printable(std::string_view bytes);
 
 /// A JSON string with its quotes. Bears any bytes (to_utf8), and no control character leaves it unescaped: a

@@ -8,6 +8,8 @@
 #include <thread>
 #include <vector>
 
+#include "core/base/guard.hpp"
+
 namespace anchord::ml {
 namespace {
 
@@ -43,9 +45,10 @@ Result<void> parallel_for(std::size_t n, const Execution& how,
   std::size_t threads = how.threads == 0 ? std::thread::hardware_concurrency() : how.threads;
   threads = std::clamp<std::size_t>(threads, 1, std::max<std::size_t>(n, 1));
   {
-    std::vector<std::jthread> helpers;
-    for (std::size_t t = 1; t < threads; ++t) helpers.emplace_back(run);
+    std::vector<Thread> helpers;
+    for (std::size_t t = 1; t < threads; ++t) helpers.emplace_back("anchord-ml", run);
     run();
+    for (auto& helper : helpers) helper.join();
   }
   if (how.cancelled()) return make_error(Errc::canceled, "cancelled");
   if (outcome.thrown) std::rethrow_exception(outcome.thrown);

@@ -96,6 +96,8 @@ class DeviceControl {
   virtual std::optional<MissionId> recording_into() = 0;
   /// Why raw bytes are not being recorded; empty while they are, or while there is no device.
   virtual std::string recorder_failure() = 0;
+  /// Devices that are kept and could not be started, with why and what to do, one line; empty: none.
+  virtual std::string not_started() { return {}; }
 };
 
 /// Who takes the rows of devices: stores them and hands them to the live flight. Blocks on the database.

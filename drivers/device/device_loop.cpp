@@ -6,9 +6,9 @@
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
 #include <deque>
-#include <exception>
 #include <random>
 
+#include "core/base/guard.hpp"
 #include "drivers/device/pipeline.hpp"
 #include "drivers/device/settings.hpp"
 #include "drivers/link/serial_port.hpp"
@@ -270,6 +270,12 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     return std::nullopt;
   }
 
+  /// The name under which a fault of this device is told.
+  std::string task_of(std::uint16_t slot) const {
+    const auto found = entries_.find(slot);
+    return found == entries_.end() ? "driver" : "driver of device \"" + found->second.settings.name + '"';
+  }
+
   DeviceState state_of(const Entry& entry) const {
     auto out = entry.told;
     out.settings = entry.settings;
@@ -305,17 +311,14 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
   /// The third door of exceptions: what a driver throws ends its link, not the flight.
   void feed(const record::Event& event) {
     const auto slot = event.slot;
-    std::string fault;
-    try {
+    const auto ran = guarded(task_of(slot), [&] {
       if (const auto done = take(event); !done) count(slot, "refused_event", 1);
-    } catch (const std::exception& error) {
-      fault = std::string("fault in the driver: ") + error.what();
-    }
+    });
     const auto found = entries_.find(slot);
     if (found == entries_.end()) return;
-    if (!fault.empty()) {
+    if (!ran) {
       count(slot, "driver_fault", 1);
-      found->second.hang_up = fault;
+      found->second.hang_up = "fault in the driver: " + ran.what;
     }
     if (!found->second.hang_up.empty()) {
       const auto why = std::exchange(found->second.hang_up, {});
@@ -344,11 +347,10 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     entry.told.base.reset();
     if (std::exchange(entry.fed, false)) {
       ++entry.told.lost;
-      try {
+      const auto ran = guarded(task_of(slot), [&] {
         (void)take({EventKind::closed, slot, link::arrival_now(), {}});
-      } catch (const std::exception&) {
-        count(slot, "driver_fault", 1);
-      }
+      });
+      if (!ran) count(slot, "driver_fault", 1);
     }
   }
 
@@ -450,7 +452,8 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
       const auto found = self->entries_.find(slot);
       if (found == self->entries_.end()) return;
       found->second.armed_ns.reset();
-      self->rang(slot);
+      // Armed again in any case: a device whose timer is gone is never tried again.
+      if (!guarded(self->task_of(slot), [&] { self->rang(slot); })) self->arm(slot);
     });
   }
 
@@ -467,7 +470,7 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     poll_.async_wait([weak = weak_from_this()](const boost::system::error_code& error) {
       const auto self = weak.lock();
       if (error || !self || self->stopped_) return;
-      self->look();
+      (void)guarded("serial ports", [&] { self->look(); });
       self->poll();
     });
   }

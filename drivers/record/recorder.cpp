@@ -12,7 +12,8 @@
 #include <cstring>
 #include <map>
 #include <mutex>
-#include <thread>
+
+#include "core/base/guard.hpp"
 
 namespace anchord::record {
 namespace fs = std::filesystem;
@@ -67,7 +68,7 @@ struct Recorder::State {
   bool stopping{false};
 
   std::atomic<std::uint64_t> written{0}, lost{0};
-  std::thread syncer;
+  Thread syncer;
 
   Result<void> next_part(const link::Arrival& at);
   void remember(const Event& event);
@@ -154,7 +155,7 @@ void Recorder::State::sync_loop() {
 }
 
 Recorder::Recorder(std::unique_ptr<State> state) : state_(std::move(state)) {
-  state_->syncer = std::thread([state_now = state_.get()] { state_now->sync_loop(); });
+  state_->syncer = Thread("anchord-record", [state_now = state_.get()] { state_now->sync_loop(); });
 }
 
 Recorder::~Recorder() {

@@ -153,7 +153,6 @@ Result<void> App::State::listen() {
   options.hosts = host_policy(config);
   options.io_threads = config.count("http.io_threads");
   options.is_proxy = [this](std::string_view address) { return proxies.trusts(address); };
-  options.log_fault = [](std::string_view what) { log(LogLevel::error, "fault", {{"what", what}}); };
   const std::size_t descriptors = raise_descriptor_limit();
   options.limits.max_connections =
       std::min(options.limits.max_connections, descriptors - std::min<std::size_t>(descriptors / 2, 128));

@@ -2,6 +2,7 @@
 #include <cstdio>
 
 #include "api/json/flight_requests.hpp"
+#include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/server_address.hpp"
 #include "server/http/http_client.hpp"
@@ -20,7 +21,7 @@ struct Options {
 };
 
 int fail(const std::string& message, int code = 1) {
-  std::fprintf(stderr, "anchord: %s\n", message.c_str());
+  std::fprintf(stderr, "anchord: %s\n", printable(message).c_str());
   return code;
 }
 

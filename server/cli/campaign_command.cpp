@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "api/imports/campaign.hpp"
+#include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"
 
@@ -35,8 +36,9 @@ api::CampaignOptions options_of(const CampaignArguments& a) {
 void print_report(const api::CampaignReport& r, std::FILE* to) {
   std::fprintf(to, "%zu measurements, %zu kept, %zu sites\n", r.lines, r.kept, r.sites.size());
   for (const auto& [reason, drop] : r.dropped) {
-    std::fprintf(to, "  dropped %zu: %s\n", drop.count, reason.c_str());
-    for (const auto& e : drop.first) std::fprintf(to, "    line %zu: %s\n", e.line, e.detail.c_str());
+    std::fprintf(to, "  dropped %zu: %s\n", drop.count, printable(reason).c_str());
+    for (const auto& e : drop.first)
+      std::fprintf(to, "    line %zu: %s\n", e.line, printable(e.detail).c_str());
     if (drop.count > drop.first.size())
       std::fprintf(to, "    and %zu more\n", drop.count - drop.first.size());
   }

@@ -1,6 +1,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/config_flags.hpp"
 
@@ -10,10 +11,11 @@ namespace {
 Result<server::Config> loaded(const ConfigFlags& flags) {
   auto config = flags.load();
   if (!config) {
-    std::fprintf(stderr, "%s\n", config.error().message.c_str());
+    std::fprintf(stderr, "%s\n", printable(config.error().message).c_str());
     return config;
   }
-  for (const auto& warning : config.value().warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
+  for (const auto& warning : config.value().warnings)
+    std::fprintf(stderr, "warning: %s\n", printable(warning).c_str());
   return config;
 }
 

@@ -11,6 +11,7 @@
 #include <memory>
 #include <utility>
 
+#include "core/base/text.hpp"
 #include "core/base/time.hpp"
 #include "drivers/gnss/decoder.hpp"
 #include "server/cli/commands.hpp"
@@ -158,7 +159,7 @@ void report(const gnss::Decoder& decoder, const Found& found, bool all_formats) 
                  static_cast<unsigned long long>(decoder.llh_time_assumed()));
   }
   for (const auto& [reason, entry] : decoder.skips().entries()) {
-    std::fprintf(stderr, "skipped: %s: %llu, first at byte %llu%s%s\n", reason.c_str(),
+    std::fprintf(stderr, "skipped: %s: %llu, first at byte %llu%s%s\n", printable(reason).c_str(),
                  static_cast<unsigned long long>(entry.count),
                  static_cast<unsigned long long>(entry.first_offset), entry.example.empty() ? "" : ": ",
                  entry.example.c_str());
@@ -182,7 +183,7 @@ std::optional<gnss::DecoderOptions> decoder_options(const Decode& options) {
     const auto noon = parse_rfc3339(options.date + "T12:00:00Z");
     if (!noon) {
       std::fprintf(stderr, "anchord decode: --date %s: %s\n", options.date.c_str(),
-                   noon.error().message.c_str());
+                   printable(noon.error().message).c_str());
       return std::nullopt;
     }
     out.reference = noon.value();

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/json/flight_requests.hpp"
+#include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/server_address.hpp"
@@ -22,7 +23,7 @@ struct Options {
 };
 
 int fail(const std::string& message, int code = 1) {
-  std::fprintf(stderr, "anchord devices: %s\n", message.c_str());
+  std::fprintf(stderr, "anchord devices: %s\n", printable(message).c_str());
   return code;
 }
 

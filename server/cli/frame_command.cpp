@@ -8,6 +8,7 @@
 
 #include "api/imports/csv_table.hpp"
 #include "api/json/frame_json.hpp"
+#include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/geo/enu.hpp"
 #include "core/geo/frame_fit.hpp"
@@ -96,13 +97,13 @@ void print(const Pairs& pairs, const FrameFit& fit) {
     else
       std::printf("cannot be told\n");
   }
-  for (const auto& note : fit.notes) std::printf("note: %s\n", note.c_str());
+  for (const auto& note : fit.notes) std::printf("note: %s\n", printable(note).c_str());
 }
 
 int fit_command(const Arguments& a) {
   const auto pairs = read_pairs(a.pairs);
   if (!pairs) {
-    std::fprintf(stderr, "anchord: %s\n", pairs.error().message.c_str());
+    std::fprintf(stderr, "anchord: %s\n", printable(pairs.error().message).c_str());
     return 2;
   }
   FrameFitOptions options;
@@ -110,7 +111,7 @@ int fit_command(const Arguments& a) {
   options.fit_scale = !a.fixed_scale;
   const auto fit = fit_frame(pairs.value().pairs, options);
   if (!fit) {
-    std::fprintf(stderr, "anchord: %s: %s\n", a.pairs.c_str(), fit.error().message.c_str());
+    std::fprintf(stderr, "anchord: %s: %s\n", a.pairs.c_str(), printable(fit.error().message).c_str());
     return fit.error().code == Errc::invalid_argument ? 2 : 1;
   }
   if (a.json) {

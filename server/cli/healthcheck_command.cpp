@@ -1,6 +1,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/server_address.hpp"
 #include "server/http/http_client.hpp"
@@ -21,12 +22,12 @@ void add_healthcheck_command(CLI::App& app, int& exit_code) {
         !url->empty() ? *url : running_server(*data_dir).value_or("http://127.0.0.1:8420");
     auto client = server::HttpClient::to(address, std::chrono::seconds(5));
     if (!client) {
-      std::fprintf(stderr, "%s\n", client.error().message.c_str());
+      std::fprintf(stderr, "%s\n", printable(client.error().message).c_str());
       return;
     }
     const auto answer = client.value().call("GET", "/readyz");
     if (!answer) {
-      std::fprintf(stderr, "%s\n", answer.error().message.c_str());
+      std::fprintf(stderr, "%s\n", printable(answer.error().message).c_str());
       return;
     }
     std::printf("%s\n", answer.value().body.c_str());

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "api/imports/flight_folder.hpp"
+#include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/flight_upload.hpp"
 #include "server/cli/progress.hpp"
@@ -84,14 +85,14 @@ Result<std::string> import_into_folder(const Options& options, FlightData flight
 int import_flight(const Options& options) {
   auto flight = read_flight_folder(options.folder);
   if (!flight) {
-    std::fprintf(stderr, "anchord import: %s\n", flight.error().message.c_str());
+    std::fprintf(stderr, "anchord import: %s\n", printable(flight.error().message).c_str());
     return 2;
   }
   prepare_rows(flight.value());
   const auto id = options.data_dir.empty() ? import_by_rest(options, std::move(flight).value())
                                            : import_into_folder(options, std::move(flight).value());
   if (!id) {
-    std::fprintf(stderr, "anchord import: %s\n", id.error().message.c_str());
+    std::fprintf(stderr, "anchord import: %s\n", printable(id.error().message).c_str());
     return 1;
   }
   std::printf("%s\n", id.value().c_str());

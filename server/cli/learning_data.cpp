@@ -8,6 +8,7 @@
 
 #include "api/imports/gzip_lines.hpp"
 #include "api/json/model_artifact.hpp"
+#include "core/base/text.hpp"
 
 namespace anchord::cli {
 
@@ -124,7 +125,7 @@ bool write_whole(const std::string& path, const std::string& text) {
 }
 
 int refuse(const char* command, const std::string& message) {
-  std::fprintf(stderr, "anchord %s: %s\n", command, message.c_str());
+  std::fprintf(stderr, "anchord %s: %s\n", command, printable(message).c_str());
   return 2;
 }
 

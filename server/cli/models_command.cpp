@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "api/exports/model_report.hpp"
+#include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"
 
@@ -54,7 +55,7 @@ int check(const ModelsArguments& a) {
     if (model)
       std::printf("%s: good\n", path.c_str());
     else
-      std::printf("%s\n", model.error().message.c_str());
+      std::printf("%s\n", printable(model.error().message).c_str());
   }
   return good ? 0 : 2;
 }

@@ -11,6 +11,7 @@
 #include "api/imports/kml_plan.hpp"
 #include "api/imports/outline_geojson.hpp"
 #include "api/imports/plan_input.hpp"
+#include "core/base/text.hpp"
 #include "core/planning/local_plan.hpp"
 #include "server/cli/commands.hpp"
 
@@ -35,7 +36,7 @@ void print_errors(const std::string& path, const std::vector<api::FieldError>& e
                errors.size() == 1 ? "" : "s");
   for (const auto& e : errors) {
     std::fprintf(stderr, "  %s: %s: %s%s%s\n", e.pointer.empty() ? "(document)" : e.pointer.c_str(),
-                 e.code.c_str(), e.detail.c_str(), e.value_json.empty() ? "" : ", not ",
+                 e.code.c_str(), printable(e.detail).c_str(), e.value_json.empty() ? "" : ", not ",
                  e.value_json.c_str());
   }
 }
@@ -51,7 +52,7 @@ int plan_next(const std::string& path, bool json) {
   }
   const auto decision = planning::next_point(request->input, request->options);
   if (!decision) {
-    std::fprintf(stderr, "anchord plan: %s: %s\n", path.c_str(), decision.error().message.c_str());
+    std::fprintf(stderr, "anchord plan: %s: %s\n", path.c_str(), printable(decision.error().message).c_str());
     return 2;
   }
   const auto out =
@@ -64,7 +65,7 @@ std::optional<api::OutlineRequest> outline_of_kml(const std::string& text,
                                                   std::vector<api::FieldError>& errors) {
   std::vector<std::string> notes;
   const Plan plan = api::read_kml_plan(text, notes, errors);
-  for (const auto& note : notes) std::fprintf(stderr, "anchord plan: %s\n", note.c_str());
+  for (const auto& note : notes) std::fprintf(stderr, "anchord plan: %s\n", printable(note).c_str());
   if (errors.empty() && plan.outline.empty())
     errors.push_back({"", "required", "no polygon is the building's outline", ""});
   if (!errors.empty()) return std::nullopt;
@@ -84,14 +85,14 @@ int plan_import(const std::string& path, const std::string& format) {
   std::vector<api::FieldError> errors;
   std::vector<std::string> notes;
   const Plan plan = api::read_plan_file(*text, notes, errors);
-  for (const auto& note : notes) std::fprintf(stderr, "anchord plan: %s\n", note.c_str());
+  for (const auto& note : notes) std::fprintf(stderr, "anchord plan: %s\n", printable(note).c_str());
   if (!errors.empty()) {
     print_errors(path, errors);
     return 2;
   }
   const auto out = format == "plan" ? api::plan_qgc(plan) : api::plan_geojson(plan);
   if (!out) {
-    std::fprintf(stderr, "anchord plan: %s: %s\n", path.c_str(), out.error().message.c_str());
+    std::fprintf(stderr, "anchord plan: %s: %s\n", path.c_str(), printable(out.error().message).c_str());
     return 2;
   }
   std::fputs(out.value().c_str(), stdout);
@@ -137,7 +138,8 @@ int plan_flight(const Flight& flight) {
   if (flight.criterion == "d_optimal") options.criterion = planning::Criterion::d_optimal;
   const auto plan = planning::plan_flight(request->input, options);
   if (!plan) {
-    std::fprintf(stderr, "anchord plan: %s: %s\n", flight.outline.c_str(), plan.error().message.c_str());
+    std::fprintf(stderr, "anchord plan: %s: %s\n", flight.outline.c_str(),
+                 printable(plan.error().message).c_str());
     return plan.error().code == Errc::invalid_argument ? 2 : 1;
   }
   std::string out;

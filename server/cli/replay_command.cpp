@@ -10,6 +10,7 @@
 
 #include "api/imports/flight_folder.hpp"
 #include "api/json/flight_requests.hpp"
+#include "core/base/text.hpp"
 #include "drivers/device/replay.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/flight_upload.hpp"
@@ -115,12 +116,12 @@ int replay(const Options& options) {
   }
   const auto token = read_token_file(options.token_file);
   if (!token) {
-    std::fprintf(stderr, "anchord replay: %s\n", token.error().message.c_str());
+    std::fprintf(stderr, "anchord replay: %s\n", printable(token.error().message).c_str());
     return 2;
   }
   auto client = RestClient::make(options.url, token.value(), interrupted);
   if (!client) {
-    std::fprintf(stderr, "anchord replay: %s\n", client.error().message.c_str());
+    std::fprintf(stderr, "anchord replay: %s\n", printable(client.error().message).c_str());
     return 2;
   }
   if (recording) {
@@ -135,7 +136,7 @@ int replay(const Options& options) {
   auto flight = parse_uuid(options.source) ? fetch_flight(*client.value(), options.source)
                                            : read_flight_folder(options.source);
   if (!flight) {
-    std::fprintf(stderr, "anchord replay: %s\n", flight.error().message.c_str());
+    std::fprintf(stderr, "anchord replay: %s\n", printable(flight.error().message).c_str());
     return 2;
   }
   if (flight.value().fixes.empty() && flight.value().ranges.empty()) {
@@ -151,7 +152,7 @@ int replay(const Options& options) {
     result = play_once(options, *client.value(), flight.value(), *speed);
   } while (result && options.loop && !interrupted());
   if (result) return 0;
-  std::fprintf(stderr, "anchord replay: %s\n", result.error().message.c_str());
+  std::fprintf(stderr, "anchord replay: %s\n", printable(result.error().message).c_str());
   return result.error().code == Errc::canceled ? 0 : 1;
 }
 

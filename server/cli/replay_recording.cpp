@@ -13,6 +13,7 @@
 
 #include "api/json/flight_requests.hpp"
 #include "api/json/wire_rows.hpp"
+#include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/types/mission.hpp"
 #include "drivers/device/replay.hpp"
@@ -30,7 +31,7 @@ constexpr int k_batch = 500;
 constexpr auto k_tick = std::chrono::milliseconds(100);
 
 int fail(const Error& error, int code) {
-  std::fprintf(stderr, "anchord replay: %s\n", error.message.c_str());
+  std::fprintf(stderr, "anchord replay: %s\n", printable(error.message).c_str());
   return code;
 }
 
@@ -166,7 +167,8 @@ void report(const device::ReplaySummary& s) {
     std::fprintf(stderr, "replay: the last %llu bytes are torn\n",
                  static_cast<unsigned long long>(s.unreadable_bytes));
   for (const auto& [reason, n] : s.dropped)
-    std::fprintf(stderr, "not used: %s: %llu\n", reason.c_str(), static_cast<unsigned long long>(n));
+    std::fprintf(stderr, "not used: %s: %llu\n", printable(reason).c_str(),
+                 static_cast<unsigned long long>(n));
 }
 
 /// Rows that no mission recorded were not stored when they came, and are not now.

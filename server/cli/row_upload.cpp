@@ -7,7 +7,7 @@
 
 namespace anchord::cli {
 
-RowUpload::RowUpload(RestClient& client) : client_(client), thread_([this] { run(); }) {}
+RowUpload::RowUpload(RestClient& client) : client_(client), thread_("anchord-upload", [this] { run(); }) {}
 
 RowUpload::~RowUpload() {
   {
@@ -48,7 +48,9 @@ void RowUpload::run() {
     busy_ = true;
     changed_.notify_all();
     lock.unlock();
-    auto done = post(batch);
+    Result<void> done = boost::outcome_v2::success();
+    if (const auto ran = guarded("upload", [&] { done = post(batch); }); !ran)
+      done = make_error(Errc::internal, ran.what);
     lock.lock();
     busy_ = false;
     if (!done) failed_ = std::move(done).error();

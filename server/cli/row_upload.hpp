@@ -5,8 +5,8 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 
+#include "core/base/guard.hpp"
 #include "core/base/result.hpp"
 
 namespace anchord::cli {
@@ -54,7 +54,7 @@ class RowUpload {
   bool busy_{false}, closing_{false};
   std::optional<Error> failed_{};
   RowAnswers answers_{};
-  std::thread thread_;
+  Thread thread_;
 };
 
 }  // namespace anchord::cli

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "core/base/text.hpp"
 #include "server/app/app.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/config_flags.hpp"
@@ -27,7 +28,7 @@ int serve(const server::Config& config) {
   for (const auto& warning : config.warnings) server::log(server::LogLevel::warning, warning);
   auto app = server::App::start(config);
   if (!app) {
-    std::fprintf(stderr, "anchord: %s\n", app.error().message.c_str());
+    std::fprintf(stderr, "anchord: %s\n", printable(app.error().message).c_str());
     return app.error().code == Errc::invalid_argument ? 2 : 1;
   }
   int received = 0;
@@ -46,7 +47,7 @@ void add_serve_command(CLI::App& app, int& exit_code) {
   command->callback([&exit_code, flags] {
     const auto config = flags->load();
     if (!config) {
-      std::fprintf(stderr, "anchord: %s\n", config.error().message.c_str());
+      std::fprintf(stderr, "anchord: %s\n", printable(config.error().message).c_str());
       exit_code = 2;
       return;
     }

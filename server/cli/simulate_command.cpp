@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "api/imports/flight_folder.hpp"
+#include "core/base/text.hpp"
 #include "drivers/sim/flight.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/simulate_devices.hpp"
@@ -31,11 +32,11 @@ bool write_truth(const sim::SimulatedFlight& flight, const std::filesystem::path
 int simulate(const sim::SimulationOptions& options, const std::filesystem::path& folder) {
   const auto flight = sim::simulate_flight(sim::demonstration_world(), options);
   if (!flight) {
-    std::fprintf(stderr, "anchord simulate: %s\n", flight.error().message.c_str());
+    std::fprintf(stderr, "anchord simulate: %s\n", printable(flight.error().message).c_str());
     return 2;
   }
   if (const auto written = write_flight_folder(flight.value().data, folder); !written) {
-    std::fprintf(stderr, "anchord simulate: %s\n", written.error().message.c_str());
+    std::fprintf(stderr, "anchord simulate: %s\n", printable(written.error().message).c_str());
     return 1;
   }
   if (!write_truth(flight.value(), folder / "anchors_truth.csv")) {

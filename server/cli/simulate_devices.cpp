@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "drivers/sim/rig.hpp"
 #include "drivers/sim/scenario_file.hpp"
@@ -21,7 +22,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 int fail(const std::string& message, int code) {
-  std::fprintf(stderr, "anchord simulate: %s\n", message.c_str());
+  std::fprintf(stderr, "anchord simulate: %s\n", printable(message).c_str());
   return code;
 }
 

@@ -8,6 +8,8 @@
 #include <thread>
 
 #include "api/json/flight_requests.hpp"
+#include "core/base/guard.hpp"
+#include "core/base/text.hpp"
 #include "drivers/link/byte_link.hpp"
 #include "drivers/sim/autopilot.hpp"
 #include "server/cli/progress.hpp"
@@ -31,7 +33,8 @@ struct Options {
 /// Anything that goes wrong with one delivery is told and the flight goes on: a tag does not stop either.
 template <class T>
 bool told(const Result<T>& result) {
-  if (!result) std::fprintf(stderr, "anchord simulate drone: %s\n", result.error().message.c_str());
+  if (!result)
+    std::fprintf(stderr, "anchord simulate drone: %s\n", printable(result.error().message).c_str());
   return result.has_value();
 }
 
@@ -143,12 +146,12 @@ int simulate_drone(const Options& options) {
   link::LinkHandlers handlers;
   handlers.on_bytes = [&](std::string_view in, const link::Arrival&) { world.hear(in); };
   handlers.on_closed = [&](const Error& why) {
-    std::fprintf(stderr, "anchord simulate drone: %s\n", why.message.c_str());
+    std::fprintf(stderr, "anchord simulate drone: %s\n", printable(why.message).c_str());
     lost = true;
   };
   bytes->open(std::move(handlers));
   std::atomic<bool> over{false};
-  std::thread deliverer([&] {
+  Thread deliverer("deliverer", [&] {
     while (!over && !interrupted()) {
       std::this_thread::sleep_for(std::chrono::milliseconds(200));
       world.deliver();

@@ -10,6 +10,7 @@
 #include "api/json/clues_json.hpp"
 #include "api/json/kit_profile_json.hpp"
 #include "api/learning/flight_models.hpp"
+#include "core/base/text.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "core/localize/kit_prior.hpp"
 #include "server/cli/commands.hpp"
@@ -35,7 +36,7 @@ struct Arguments {
 };
 
 int complain(const Error& error) {
-  std::fprintf(stderr, "anchord: %s\n", error.message.c_str());
+  std::fprintf(stderr, "anchord: %s\n", printable(error.message).c_str());
   return k_unusable;
 }
 

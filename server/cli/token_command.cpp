@@ -36,7 +36,7 @@ Result<std::optional<UtcTime>> expiry(const std::string& text, UtcTime now) {
 }
 
 int fail(const std::string& message, int code = 1) {
-  std::fprintf(stderr, "anchord: %s\n", message.c_str());
+  std::fprintf(stderr, "anchord: %s\n", printable(message).c_str());
   return code;
 }
 

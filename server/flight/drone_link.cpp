@@ -4,8 +4,8 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <mutex>
-#include <thread>
 
+#include "core/base/guard.hpp"
 #include "drivers/drone/peer_gate.hpp"
 #include "drivers/drone/session.hpp"
 #include "drivers/link/byte_link.hpp"
@@ -38,9 +38,9 @@ struct DroneLink::Impl {
   }
 
   void run() {
-    open();
+    (void)guarded("aircraft", [this] { open(); });
     round();
-    io.run();
+    run_guarded("aircraft", io);
   }
 
   static std::span<const std::uint8_t> bytes_of(std::string_view in) {
@@ -65,12 +65,17 @@ struct DroneLink::Impl {
     bytes = link::make_link(io, address);
     link::LinkHandlers handlers;
     handlers.welcome = [this](std::string_view in, const std::string& sender, const link::Arrival& at) {
-      return admits(in, sender, at);
+      bool welcome = false;
+      (void)guarded("aircraft", [&] { welcome = admits(in, sender, at); });
+      return welcome;
     };
     handlers.on_bytes = [this](std::string_view in, const link::Arrival& at) {
-      if (address.kind != link::Kind::udp && !admits(in, "", at)) return;
-      const std::scoped_lock lock(mutex);
-      session.feed(seconds(at), at.utc.us(), bytes_of(in));
+      // Guarded here, so that the link reads on after a frame that we cannot bear.
+      (void)guarded("aircraft", [&] {
+        if (address.kind != link::Kind::udp && !admits(in, "", at)) return;
+        const std::scoped_lock lock(mutex);
+        session.feed(seconds(at), at.utc.us(), bytes_of(in));
+      });
     };
     handlers.on_closed = [this](const Error& why) {
       if (log && why.message != last_trouble) log("aircraft: " + why.message);
@@ -80,7 +85,16 @@ struct DroneLink::Impl {
     bytes->open(std::move(handlers));
   }
 
+  /// The next round comes whatever happens in this one: without it no heartbeat and no command would leave.
   void round() {
+    (void)guarded("aircraft", [this] { talk(); });
+    timer.expires_after(k_round);
+    timer.async_wait([this](const boost::system::error_code& error) {
+      if (!error) round();
+    });
+  }
+
+  void talk() {
     if (closed_for > 0 && ++closed_for > k_rounds_to_reopen) {
       closed_for = 0;
       open();
@@ -93,10 +107,6 @@ struct DroneLink::Impl {
       out = session.take_bytes();
     }
     write(out);
-    timer.expires_after(k_round);
-    timer.async_wait([this](const boost::system::error_code& error) {
-      if (!error) round();
-    });
   }
 
   /// What cannot leave is lost, as on any radio; the session repeats it or says that it was not confirmed.
@@ -129,7 +139,7 @@ struct DroneLink::Impl {
   drone::PeerGate gate;
   drone::Session session;
   bool is_signed{false};
-  std::thread thread;
+  Thread thread;
 };
 
 Result<std::unique_ptr<DroneLink>> DroneLink::open(const std::string& address,
@@ -138,7 +148,7 @@ Result<std::unique_ptr<DroneLink>> DroneLink::open(const std::string& address,
   BOOST_OUTCOME_TRY(auto where, link::parse_address(address));
   auto impl = std::make_unique<Impl>(std::move(where), std::move(log), key);
   auto* running = impl.get();
-  impl->thread = std::thread([running] { running->run(); });
+  impl->thread = Thread("anchord-drone", [running] { running->run(); });
   return std::unique_ptr<DroneLink>(new DroneLink(std::move(impl)));
 }
 

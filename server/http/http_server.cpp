@@ -6,6 +6,7 @@
 #include <charconv>
 #include <thread>
 
+#include "core/base/guard.hpp"
 #include "core/base/text.hpp"
 #include "server/http/sessions.hpp"
 
@@ -53,7 +54,7 @@ struct HttpServer::State {
   asio::io_context io;
   asio::executor_work_guard<asio::io_context::executor_type> work{io.get_executor()};
   std::vector<std::shared_ptr<tcp::acceptor>> acceptors;
-  std::vector<std::thread> threads;
+  std::vector<Thread> threads;
   std::size_t io_threads{1};
   bool stopped{false};
 
@@ -93,7 +94,6 @@ HttpServer::HttpServer(HttpServerOptions options, Gateway& gateway, Executors po
     : state_(std::make_unique<State>()) {
   state_->context = std::make_shared<SessionContext>(gateway, pools, options.limits, options.ws_limits);
   state_->context->hosts = std::move(options.hosts);
-  state_->context->log_fault = std::move(options.log_fault);
   state_->context->is_proxy = std::move(options.is_proxy);
   state_->io_threads = options.io_threads;
 }
@@ -121,13 +121,10 @@ void HttpServer::start() {
   auto& s = *state_;
   for (const auto& acceptor : s.acceptors) {
     asio::co_spawn(s.io, State::accept_all(acceptor, s.context, s.io),
-                   [context = s.context](const std::exception_ptr& fault) {
-                     if (fault && context->log_fault) context->log_fault("a listener ended by an exception");
-                   });
+                   [](const std::exception_ptr& fault) { (void)guarded_end("listener", fault); });
   }
   for (std::size_t i = 0; i < s.io_threads; ++i) {
-    s.threads.emplace_back([&s] { s.io.run(); });
-    pthread_setname_np(s.threads.back().native_handle(), "anchord-io");
+    s.threads.emplace_back("anchord-io", [&s] { run_guarded("connections", s.io); });
   }
 }
 

@@ -20,7 +20,6 @@ struct HttpServerOptions {
   WsLimits ws_limits{};
   HostPolicy hosts{};
   std::size_t io_threads{1};  ///< connections are on strands, so more is configuration
-  std::function<void(std::string_view what)> log_fault{};
   /// Many ask from behind this address: its number of sockets is not limited by itself.
   std::function<bool(std::string_view address)> is_proxy{};
 };

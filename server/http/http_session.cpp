@@ -3,6 +3,7 @@
 #include <string>
 #include <utility>
 
+#include "core/base/guard.hpp"
 #include "server/http/body_pipe.hpp"
 #include "server/http/http_wire.hpp"
 #include "server/http/request_id.hpp"
@@ -252,7 +253,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
     const bool taken =
         pool.try_submit([job, self = shared_from_this(), run = std::move(run), pipe = std::move(pipe),
                          request = request_, from = limits_.gzip_from_bytes] {
-          job->response = self->guarded(run, *request);
+          job->response = self->handle(run, *request);
           if (pipe) pipe->abandon();
           gzip_response(job->response, request->header("accept-encoding"), from);
           asio::post(self->wire_.executor(), [job, self] {
@@ -263,13 +264,10 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
     return taken ? job : nullptr;
   }
 
-  api::Response guarded(const std::function<api::Response(api::Request&)>& run, api::Request& request) {
-    try {
-      return run(request);
-    } catch (const std::exception& fault) {
-      if (context_->log_fault) context_->log_fault(fault.what());
-      return context_->gateway.problem(500, "internal", "");
-    }
+  api::Response handle(const std::function<api::Response(api::Request&)>& run, api::Request& request) {
+    api::Response response;
+    const auto ran = guarded("request", [&] { response = run(request); });
+    return ran ? std::move(response) : context_->gateway.problem(500, "internal", "");
   }
 
   api::Response overloaded() {
@@ -280,7 +278,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
 
   awaitable<void> run_handler(Admission& admission, api::Response& response) {
     if (admission.quick) {
-      response = guarded(admission.run, *request_);
+      response = handle(admission.run, *request_);
       gzip_response(response, request_->header("accept-encoding"), limits_.gzip_from_bytes);
       co_return;
     }
@@ -347,12 +345,8 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
       const auto job = std::make_shared<Job>();
       const auto failed = std::make_shared<bool>(false);
       const auto pull = [job, failed, source, self = shared_from_this()] {
-        try {
-          job->response.body = (*source)();
-        } catch (const std::exception& fault) {
-          *failed = true;  // too late for a status: the missing end tells the client
-          if (self->context_->log_fault) self->context_->log_fault(fault.what());
-        }
+        const auto ran = guarded("answer", [&] { job->response.body = (*source)(); });
+        *failed = !ran;  // too late for a status: the missing end tells the client
         asio::post(self->wire_.executor(), [job, self] {
           job->done = true;
           self->bell_.cancel();
@@ -416,14 +410,8 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
 void start_http_session(tcp::socket socket, std::shared_ptr<SessionContext> context, ConnectionSlot slot) {
   const auto executor = socket.get_executor();
   auto session = std::make_shared<HttpSession>(std::move(socket), context, std::move(slot));
-  asio::co_spawn(executor, HttpSession::run(session), [context, session](const std::exception_ptr& fault) {
-    if (!fault) return;
-    try {
-      std::rethrow_exception(fault);
-    } catch (const std::exception& what) {
-      if (context->log_fault) context->log_fault(what.what());
-    }
-  });
+  asio::co_spawn(executor, HttpSession::run(session),
+                 [session](const std::exception_ptr& fault) { (void)guarded_end("connection", fault); });
 }
 
 }  // namespace anchord::server

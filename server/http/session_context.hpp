@@ -32,7 +32,6 @@ struct SessionContext {
   HttpLimits limits{};
   WsLimits ws_limits{};
   HostPolicy hosts{};
-  std::function<void(std::string_view what)> log_fault{};
   std::function<bool(std::string_view address)> is_proxy{};
 
   Shares heavy_shares{limits.heavy_per_token};

@@ -6,6 +6,7 @@
 #include <boost/beast/websocket/stream_base.hpp>
 #include <utility>
 
+#include "core/base/guard.hpp"
 #include "server/http/sessions.hpp"
 #include "server/http/text.hpp"
 
@@ -67,13 +68,7 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
   void spawn(awaitable<void> part) {
     asio::co_spawn(ws_.get_executor(), std::move(part),
                    [self = shared_from_this()](const std::exception_ptr& fault) {
-                     if (!fault) return;
-                     try {
-                       std::rethrow_exception(fault);
-                     } catch (const std::exception& what) {
-                       if (self->context_->log_fault) self->context_->log_fault(what.what());
-                     }
-                     self->cut();
+                     if (!guarded_end("WebSocket", fault)) self->cut();
                    });
   }
 

@@ -11,6 +11,8 @@
 #include <random>
 #include <thread>
 
+#include "core/base/guard.hpp"
+#include "core/base/text.hpp"
 #include "drivers/device/device_loop.hpp"
 #include "drivers/device/discover.hpp"
 #include "drivers/link/address.hpp"
@@ -120,20 +122,17 @@ class DeviceManager::Impl final : public device::DeviceListener {
     device::LoopOptions loop;
     loop.seed = std::random_device{}();
     loop_ = std::make_unique<device::DeviceLoop>(io_, nullptr, *this, loop);
-    io_thread_ = std::thread([this] { io_.run(); });
+    io_thread_ = Thread("anchord-devices", [this] { run_guarded("devices", io_); });
   }
   ~Impl() override { stop(); }
 
   Result<void> load() {
-    BOOST_OUTCOME_TRY(auto devices, read_devices(file()));
-    for (auto& config : devices) {
-      if (!DeviceSecrets::drop_password_file(config)) continue;
-      unusable_[config.id] =
-          "not started: password_file is not read any more, since it could be set over REST; send the password "
-          "itself (options.password, or anchord devices settings DEVICE password_file=FILE)";
-    }
+    auto kept = read_devices(file());
+    auto& devices = kept.devices;
     for (const auto& text : options_.from_config) {
       const auto equals = text.find('=');
+      if (!is_utf8(text))
+        return make_error(Errc::invalid_argument, "devices: \"" + to_utf8(text) + "\" is not UTF-8");
       if (equals == std::string::npos) {
         return make_error(Errc::invalid_argument, "devices: \"" + text + "\" is not kind=address");
       }
@@ -143,44 +142,84 @@ class DeviceManager::Impl final : public device::DeviceListener {
       config.name = config.kind;
       BOOST_OUTCOME_TRYV(link::parse_address(config.address));
       const bool known = std::any_of(devices.begin(), devices.end(),
-                                     [&](const auto& d) { return d.address == config.address; });
+                                     [&](const auto& d) { return d.config.address == config.address; });
       if (known) continue;
       config.id = make_uuid_v7(SystemClock{}.now());
-      devices.push_back(std::move(config));
+      devices.push_back({std::move(config), {}, {}});
     }
     const std::scoped_lock lock(mutex_);
-    configs_ = std::move(devices);
-    return boost::outcome_v2::success();
-  }
-
-  /// The file as the devices are now. What is written last is the newest, whoever changed what.
-  Result<void> save() {
-    const std::scoped_lock one_at_a_time(save_mutex_);
-    std::vector<DeviceConfig> all;
-    {
-      const std::scoped_lock lock(mutex_);
-      all = configs_;
+    spoilt_ = !kept.problem.empty() ||
+              std::any_of(devices.begin(), devices.end(), [](const auto& d) { return !d.problem.empty(); });
+    for (auto& device : devices) {
+      if (!DeviceSecrets::drop_password_file(device.config) || !device.problem.empty()) continue;
+      device.problem =
+          "password_file is not read any more, since it could be set over REST; send the password itself "
+          "(options.password, or anchord devices settings DEVICE password_file=FILE)";
     }
-    return write_devices(file(), all);
+    file_problem_ = std::move(kept.problem);
+    kept_ = std::move(devices);
+    return boost::outcome_v2::success();
   }
 
   void start(DeviceRows& rows) {
     rows_ = &rows;
-    writer_ = std::thread([this] { write_rows(); });
-    std::vector<DeviceConfig> configs;
+    writer_ = Thread("anchord-rows", [this] { write_rows(); });
+    std::vector<KeptDevice> devices;
     {
       const std::scoped_lock lock(mutex_);
-      configs = configs_;
+      devices = kept_;
     }
-    for (const auto& config : configs) {
-      if (!config.enabled) continue;
-      if (unusable_.contains(config.id)) {
-        note(config.name + ": " + unusable_.at(config.id));
-        continue;
+    // A device that cannot be started is one device less, never a server less.
+    for (auto& device : devices) {
+      if (device.problem.empty() && device.config.enabled) {
+        if (const auto begun = on_io([&] { return begin(device.config); }); !begun)
+          device.problem = begun.error().message;
       }
-      if (const auto begun = on_io([&] { return begin(config); }); !begun)
-        note(config.name + ": " + begun.error().message);
+      if (!device.problem.empty()) set_problem(device.config.id, device.problem);
     }
+    if (const auto trouble = not_started(); !trouble.empty()) note(trouble);
+  }
+
+  void set_problem(const Uuid& id, const std::string& problem) {
+    const std::scoped_lock lock(mutex_);
+    for (auto& device : kept_) {
+      if (device.config.id == id) device.problem = problem;
+    }
+  }
+
+  /// What is kept and does not run, with what to do; empty: nothing.
+  std::string not_started() {
+    const std::scoped_lock lock(mutex_);
+    if (!file_problem_.empty()) {
+      return "the devices that are kept cannot be read: " + file_problem_ +
+             "; repair the file and start the server again, or set the devices up anew "
+             "(a copy of the file is kept then)";
+    }
+    std::string out;
+    for (const auto& [config, problem, entry] : kept_) {
+      if (problem.empty()) continue;
+      out += (out.empty() ? "not started: device \"" : "; device \"") + config.name + "\" (" + problem + ')';
+    }
+    return out.empty() ? out : out + "; correct their settings or remove them";
+  }
+
+  /// The file as the devices are now; what could not be read in the old one is kept beside it. What is
+  /// written last is the newest, whoever changed what.
+  Result<void> save() {
+    const std::scoped_lock one_at_a_time(save_mutex_);
+    std::vector<KeptDevice> all;
+    bool spoilt = false;
+    {
+      const std::scoped_lock lock(mutex_);
+      all = kept_;
+      spoilt = spoilt_;
+    }
+    if (spoilt) BOOST_OUTCOME_TRYV(keep_unreadable(file()));
+    BOOST_OUTCOME_TRYV(write_devices(file(), all));
+    const std::scoped_lock lock(mutex_);
+    spoilt_ = false;
+    file_problem_.clear();
+    return boost::outcome_v2::success();
   }
 
   void stop() {
@@ -242,9 +281,13 @@ class DeviceManager::Impl final : public device::DeviceListener {
 
   Result<void> begin(const DeviceConfig& config) {
     if (!loop_) return make_error(Errc::canceled, "the server stops");
-    if (!recorder_) open_recorder();
-    return loop_->add(
-        {to_string(config.id), config.kind, config.name, config.address, secrets_.driver_options(config)});
+    Result<void> begun = boost::outcome_v2::success();
+    const auto ran = guarded("start of device \"" + config.name + '"', [&] {
+      if (!recorder_) open_recorder();
+      begun = loop_->add(
+          {to_string(config.id), config.kind, config.name, config.address, secrets_.driver_options(config)});
+    });
+    return ran ? begun : make_error(Errc::internal, "its settings cannot be used: " + ran.what);
   }
 
   /// Made with the first device: a server without devices leaves no empty recordings.
@@ -267,7 +310,8 @@ class DeviceManager::Impl final : public device::DeviceListener {
     while (queue_.take(fixes, ranges)) {
       if (fixes.empty() && ranges.empty()) continue;
       for (int attempt = 1;; ++attempt) {
-        const auto done = rows_->take(fixes, ranges);
+        Result<void> done = make_error(Errc::internal, "the rows could not be taken");
+        (void)guarded("rows of devices", [&] { done = rows_->take(fixes, ranges); });
         if (done) break;
         if (attempt == 1) note("rows of devices are not stored: " + done.error().message);
         // A full disk may be helped, and a locked database comes back; meanwhile the queue holds what comes.
@@ -292,15 +336,16 @@ class DeviceManager::Impl final : public device::DeviceListener {
   std::unique_ptr<record::Recorder> recorder_;
   std::unique_ptr<device::DeviceLoop> loop_;
   std::map<std::string, std::string> told_;  ///< newest line of the log, by device
-  std::thread io_thread_, writer_;
+  Thread io_thread_, writer_;
   RowQueue queue_;
   DeviceRows* rows_{nullptr};
 
-  std::mutex save_mutex_;                 ///< taken before mutex_
-  std::mutex mutex_;                      ///< the next five
-  std::map<Uuid, std::string> unusable_;  ///< kept devices that may not be started as they are, and why
+  std::mutex save_mutex_;  ///< taken before mutex_
+  std::mutex mutex_;       ///< the next six
   std::vector<DiscoveredDevice> discovered_;
-  std::vector<DeviceConfig> configs_;
+  std::vector<KeptDevice> kept_;
+  std::string file_problem_;
+  bool spoilt_{false};  ///< the file holds what could not be read: it is copied before it is replaced
   std::optional<MissionId> mission_;
   std::string recorder_failure_;
 
@@ -324,18 +369,16 @@ void DeviceManager::start(DeviceRows& rows) { impl_->start(rows); }
 void DeviceManager::stop() { impl_->stop(); }
 
 std::vector<DeviceReport> DeviceManager::devices() {
-  std::vector<DeviceConfig> configs;
-  std::map<Uuid, std::string> unusable;
+  std::vector<KeptDevice> kept;
   {
     const std::scoped_lock lock(impl_->mutex_);
-    configs = impl_->configs_;
-    unusable = impl_->unusable_;
+    kept = impl_->kept_;
   }
-  if (configs.empty()) return {};
+  if (kept.empty()) return {};
   const auto states = impl_->on_io(
       [&] { return impl_->loop_ ? impl_->loop_->devices() : std::vector<device::DeviceState>{}; });
   std::vector<DeviceReport> out;
-  for (const auto& config : configs) {
+  for (const auto& [config, problem, entry] : kept) {
     const auto id = to_string(config.id);
     const auto state =
         std::find_if(states.begin(), states.end(), [&](const auto& s) { return s.settings.id == id; });
@@ -344,10 +387,8 @@ std::vector<DeviceReport> DeviceManager::devices() {
     } else {
       DeviceReport off;
       off.config = config;
-      const auto why = unusable.find(config.id);
-      off.reason = !config.enabled           ? "switched off"
-                   : why != unusable.end() ? why->second
-                                           : "its settings are not usable";
+      off.reason = problem.empty() ? config.enabled ? "not started yet" : "switched off"
+                                   : "not started: " + problem + "; correct its settings or remove it";
       out.push_back(std::move(off));
     }
   }
@@ -376,34 +417,35 @@ Result<DeviceReport> DeviceManager::add(DeviceConfig config) {
   }
   {
     const std::scoped_lock lock(impl_->mutex_);
-    impl_->configs_.push_back(config);
+    impl_->kept_.push_back({config, {}, {}});
   }
   BOOST_OUTCOME_TRYV(impl_->save());
   return device(config.id);
 }
 
 Result<DeviceReport> DeviceManager::change(DeviceConfig config, std::uint64_t expected_version) {
-  DeviceConfig before;
+  KeptDevice kept;
   DeviceSecrets::Change secret;
+  const auto of_id = [id = config.id](const auto& c) { return c.config.id == id; };
   {
     const std::scoped_lock lock(impl_->mutex_);
-    const auto found = std::find_if(impl_->configs_.begin(), impl_->configs_.end(),
-                                    [&](const auto& c) { return c.id == config.id; });
-    if (found == impl_->configs_.end())
+    const auto found = std::find_if(impl_->kept_.begin(), impl_->kept_.end(), of_id);
+    if (found == impl_->kept_.end())
       return make_error(Errc::not_found, "there is no device " + to_string(config.id));
-    if (found->version != expected_version)
+    if (found->config.version != expected_version)
       return make_error(Errc::conflict, "the device was changed meanwhile");
-    before = *found;
-    BOOST_OUTCOME_TRY(secret, DeviceSecrets::split(std::move(config), &before));
+    kept = *found;
+    BOOST_OUTCOME_TRY(secret, DeviceSecrets::split(std::move(config), &kept.config));
     config = secret.config;
     config.version = expected_version + 1;
-    *found = config;
+    *found = {config, {}, {}};
   }
+  const auto& before = kept.config;
   const auto password = impl_->secrets_.kept(before.id);
   const auto stored = impl_->secrets_.store(secret);
-  const bool same_link = !secret.given && before.kind == config.kind && before.address == config.address &&
-                         before.options_json == config.options_json && before.name == config.name &&
-                         before.enabled == config.enabled;
+  const bool same_link = !secret.given && kept.problem.empty() && before.kind == config.kind &&
+                         before.address == config.address && before.options_json == config.options_json &&
+                         before.name == config.name && before.enabled == config.enabled;
   if (!same_link) {
     const auto changed = impl_->on_io([&]() -> Result<void> {
       if (!stored) return stored.error();
@@ -411,7 +453,7 @@ Result<DeviceReport> DeviceManager::change(DeviceConfig config, std::uint64_t ex
       (void)impl_->loop_->remove(to_string(config.id));
       if (!config.enabled) return boost::outcome_v2::success();
       auto begun = impl_->begin(config);
-      if (begun || !before.enabled) return begun;
+      if (begun || !before.enabled || !kept.problem.empty()) return begun;
       if (secret.given) impl_->secrets_.put_back(before.id, password);
       (void)impl_->begin(before).has_value();
       return begun;
@@ -419,15 +461,10 @@ Result<DeviceReport> DeviceManager::change(DeviceConfig config, std::uint64_t ex
     if (!changed) {
       if (secret.given) impl_->secrets_.put_back(before.id, password);
       const std::scoped_lock lock(impl_->mutex_);
-      for (auto& c : impl_->configs_) {
-        if (c.id == before.id) c = before;
-      }
+      const auto found = std::find_if(impl_->kept_.begin(), impl_->kept_.end(), of_id);
+      if (found != impl_->kept_.end()) *found = kept;
       return changed.error();
     }
-  }
-  {
-    const std::scoped_lock lock(impl_->mutex_);
-    impl_->unusable_.erase(config.id);
   }
   BOOST_OUTCOME_TRYV(impl_->save());
   return device(config.id);
@@ -436,13 +473,13 @@ Result<DeviceReport> DeviceManager::change(DeviceConfig config, std::uint64_t ex
 Result<void> DeviceManager::remove(const Uuid& id, std::uint64_t expected_version) {
   {
     const std::scoped_lock lock(impl_->mutex_);
-    const auto found = std::find_if(impl_->configs_.begin(), impl_->configs_.end(),
-                                    [&](const auto& c) { return c.id == id; });
-    if (found == impl_->configs_.end())
+    const auto found = std::find_if(impl_->kept_.begin(), impl_->kept_.end(),
+                                    [&](const auto& c) { return c.config.id == id; });
+    if (found == impl_->kept_.end())
       return make_error(Errc::not_found, "there is no device " + to_string(id));
-    if (found->version != expected_version)
+    if (found->config.version != expected_version)
       return make_error(Errc::conflict, "the device was changed meanwhile");
-    impl_->configs_.erase(found);
+    impl_->kept_.erase(found);
   }
   impl_->on_io([&] {
     if (impl_->loop_) (void)impl_->loop_->remove(to_string(id));
@@ -484,7 +521,7 @@ std::vector<DiscoveredDevice> DeviceManager::discover() {
   std::vector<std::string> ours;
   {
     const std::scoped_lock lock(impl_->mutex_);
-    for (const auto& c : impl_->configs_) ours.push_back(c.address);
+    for (const auto& c : impl_->kept_) ours.push_back(c.config.address);
   }
   std::vector<DiscoveredDevice> out;
   for (auto& found : device::discover(ours)) {
@@ -530,6 +567,8 @@ std::string DeviceManager::recorder_failure() {
   }
   return impl_->on_io([&] { return impl_->recorder_ ? impl_->recorder_->failed() : std::string(); });
 }
+
+std::string DeviceManager::not_started() { return impl_->not_started(); }
 
 std::string DeviceManager::metrics() {
   const auto all = devices();

@@ -24,8 +24,7 @@ class DeviceManager final : public DeviceControl {
  public:
   static constexpr std::size_t k_max_waiting_rows = 100'000;
 
-  /// errors: storage_unavailable, bad_frame (devices.json cannot be read: it is left as it is),
-  /// invalid_argument (from_config)
+  /// errors: invalid_argument (from_config)
   static Result<std::unique_ptr<DeviceManager>> open(DeviceManagerOptions options);
   ~DeviceManager() override;
 
@@ -46,6 +45,7 @@ class DeviceManager final : public DeviceControl {
   void record_into(const std::optional<MissionId>& mission) override;
   std::optional<MissionId> recording_into() override;
   std::string recorder_failure() override;
+  std::string not_started() override;
 
   /// Prometheus text of all devices.
   std::string metrics();

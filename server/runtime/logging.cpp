@@ -4,7 +4,7 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
-#include "core/base/text.hpp"
+#include "core/base/guard.hpp"
 #include "core/base/time.hpp"
 
 namespace anchord::server {
@@ -35,26 +35,16 @@ spdlog::level::level_enum of(LogLevel level) {
   return spdlog::level::err;
 }
 
-std::string_view word(LogLevel level) {
-  switch (level) {
-    case LogLevel::debug:
-      return "debug";
-    case LogLevel::info:
-      return "info";
-    case LogLevel::warning:
-      return "warning";
-    case LogLevel::error:
-      return "error";
-  }
-  return "error";
-}
-
 }  // namespace
 
 bool start_logging(std::string_view level) {
   for (const LogLevel known : {LogLevel::debug, LogLevel::info, LogLevel::warning, LogLevel::error}) {
-    if (level == word(known)) {
+    if (level == log_word(known)) {
       logger().set_level(of(known));
+      on_task_failure([](const TaskFailure& failure) {
+        log(LogLevel::error, "task failed",
+            {{"task", failure.task}, {"what", failure.what}, {"count", std::to_string(failure.count)}});
+      });
       return true;
     }
   }
@@ -63,14 +53,7 @@ bool start_logging(std::string_view level) {
 
 void log(LogLevel level, std::string_view message, std::initializer_list<LogField> fields) {
   if (!logger().should_log(of(level))) return;
-  std::string line = R"({"ts":")" + to_rfc3339(SystemClock().now()) + R"(","level":")";
-  line.append(word(level)).append(R"(","msg":)");
-  append_json_text(line, message);
-  for (const auto& [key, value] : fields) {
-    append_json_text(line += ',', key);
-    append_json_text(line += ':', value);
-  }
-  line.append("}");
+  const std::string line = log_line(SystemClock().now(), level, message, fields);
   logger().log(of(level), spdlog::string_view_t(line.data(), line.size()));
 }
 

@@ -13,9 +13,10 @@
 #include <cstdio>
 #include <mutex>
 #include <nlohmann/json.hpp>
-#include <thread>
+#include <stop_token>
 #include <vector>
 
+#include "core/base/guard.hpp"
 #include "core/base/to_wire.hpp"
 #include "server/runtime/frames.hpp"
 #include "server/runtime/worker_process.hpp"
@@ -92,7 +93,7 @@ int worker_main() {
     if (!write_frame(k_socket, to_wire(json))) _exit(1);
   };
   // Hears the server while the work goes on: a word to stop, or its end.
-  std::thread listener([&stop] {
+  Thread listener("listener", [&stop] {
     std::string text;
     while (true) {
       const auto read = read_frame(k_socket, text, -1);
@@ -102,24 +103,28 @@ int worker_main() {
   });
   listener.detach();
   Result<std::string> result = make_error(Errc::internal, "");
-  try {  // the door of jobs, in this process
-    result = api::do_work(message, stop.get_token(), [&send](const api::WorkProgress& p) {
-      send({{"op", "progress"},
-            {"stage", p.stage},
-            {"stage_index", p.stage_index},
-            {"stage_count", p.stage_count},
-            {"fraction", p.fraction},
-            {"detail", p.detail}});
-    });
-  } catch (const std::bad_alloc&) {
-    message.clear(), message.shrink_to_fit();  // room for the answer
-    result =
-        make_error(Errc::unsupported, "the training needs more memory than the " + allowed_memory() +
-                                          " a worker may take: use a data set of means or medians, fewer "
-                                          "rows, features or trees, and start the run again");
-  } catch (const std::exception& fault) {
-    result = make_error(Errc::link_lost, std::string("the worker failed: ") + fault.what() +
-                                             "; the run, its rows and settings are kept");
+  const auto told = [&send](const api::WorkProgress& p) {
+    send({{"op", "progress"},
+          {"stage", p.stage},
+          {"stage_index", p.stage_index},
+          {"stage_count", p.stage_count},
+          {"fraction", p.fraction},
+          {"detail", p.detail}});
+  };
+  const auto ran = guarded("training", [&] {  // the door of jobs, in this process
+    try {
+      result = api::do_work(message, stop.get_token(), told);
+    } catch (const std::bad_alloc&) {
+      message.clear(), message.shrink_to_fit();  // room for the answer
+      result =
+          make_error(Errc::unsupported, "the training needs more memory than the " + allowed_memory() +
+                                            " a worker may take: use a data set of means or medians, fewer "
+                                            "rows, features or trees, and start the run again");
+    }
+  });
+  if (!ran) {
+    result = make_error(Errc::link_lost,
+                        "the worker failed: " + ran.what + "; the run, its rows and settings are kept");
   }
   if (result)
     send({{"op", "done"}, {"result", result.value()}});

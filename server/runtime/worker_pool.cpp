@@ -1,6 +1,5 @@
 #include "server/runtime/worker_pool.hpp"
 
-#include <pthread.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -10,15 +9,14 @@
 namespace anchord::server {
 
 WorkerPool::WorkerPool(std::string name, std::size_t threads, std::size_t queue_limit, int nice)
-    : queue_limit_(queue_limit) {
+    : name_(std::move(name)), queue_limit_(queue_limit) {
   threads_.reserve(threads);
   for (std::size_t i = 0; i < threads; ++i) {
-    threads_.emplace_back([this, nice] {
+    threads_.emplace_back(name_, [this, nice] {
       // On Linux niceness belongs to the thread. A system that refuses it only shares more evenly.
       if (nice != 0) (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(SYS_gettid)), nice);
       run();
     });
-    pthread_setname_np(threads_.back().native_handle(), name.substr(0, 15).c_str());
   }
 }
 
@@ -60,7 +58,7 @@ void WorkerPool::run() {
       task = std::move(queue_.front());
       queue_.pop_front();
     }
-    task();
+    (void)guarded(name_, task);
   }
 }
 

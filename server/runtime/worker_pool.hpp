@@ -6,8 +6,9 @@
 #include <functional>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <vector>
+
+#include "core/base/guard.hpp"
 
 namespace anchord::server {
 
@@ -21,7 +22,8 @@ class WorkerPool {
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
 
-  /// False when the queue is full or the pool stops; the task is then not run. Tasks must not throw.
+  /// False when the queue is full or the pool stops; the task is then not run. What a task throws ends it
+  /// alone (guarded).
   [[nodiscard]] bool try_submit(std::function<void()> task);
   /// Refuses new tasks, runs those in the queue, joins. Idempotent; not from a task.
   void stop();
@@ -29,12 +31,13 @@ class WorkerPool {
 
  private:
   void run();
+  const std::string name_;
   const std::size_t queue_limit_;
   mutable std::mutex mutex_;
   std::condition_variable work_;
   std::deque<std::function<void()>> queue_;
   bool stopping_{false};
-  std::vector<std::thread> threads_;
+  std::vector<Thread> threads_;
 };
 
 }  // namespace anchord::server

@@ -2,8 +2,8 @@
 
 #include <atomic>
 #include <fstream>
-#include <thread>
 
+#include "core/base/guard.hpp"
 #include "migrations/migration.hpp"
 #include "server/storage/backup.hpp"
 #include "server/storage/data_folder.hpp"
@@ -58,7 +58,7 @@ class SqliteDatabase final : public Database, private sql::Gate {
         training_runs_(sql::make_training_run_store(*this)),
         models_(sql::make_model_store(*this)),
         plans_(sql::make_plan_store(*this)) {
-    if (check_in_background) checker_ = std::thread([this] { check_in_background_thread(); });
+    if (check_in_background) checker_ = Thread("anchord-check", [this] { check_in_background_thread(); });
   }
   ~SqliteDatabase() override {
     if (checker_.joinable()) checker_.join();
@@ -172,7 +172,7 @@ class SqliteDatabase final : public Database, private sql::Gate {
   std::unique_ptr<TrainingRunStore> training_runs_;
   std::unique_ptr<ModelStore> models_;
   std::unique_ptr<PlanStore> plans_;
-  std::thread checker_;
+  Thread checker_;
 };
 
 Error damaged(const DataFolder& folder, const std::string& what) {

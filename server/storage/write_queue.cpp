@@ -21,7 +21,7 @@ WriteQueue::WriteQueue(std::unique_ptr<SqliteConnection> connection, Open open,
       give_up_reserve_(std::move(give_up_reserve)),
       limits_(limits),
       connection_(std::move(connection)),
-      thread_([this] { run(); }) {}
+      thread_("anchord-writer", [this] { run(); }) {}
 
 WriteQueue::~WriteQueue() {
   {
@@ -60,21 +60,29 @@ void WriteQueue::run() {
   for (;;) {
     Group group = take();
     if (group.empty()) {
-      checkpoint_if(true);
-      // A database that fell away is tried again also when nobody writes, so that readiness comes back by
-      // itself.
-      if (connection_ == nullptr) ensure_connection();
+      (void)guarded("database writer", [this] {
+        checkpoint_if(true);
+        // A database that fell away is tried again also when nobody writes, so that readiness comes back by
+        // itself.
+        if (connection_ == nullptr) ensure_connection();
+      });
       const std::lock_guard lock(mutex_);
       if (stopping_ && queue_.empty()) break;
       continue;
     }
-    commit(group);
+    const auto ran = guarded("database writer", [&] { commit(group); });
+    if (!ran) {
+      // Nothing is known of what was written: a new connection recovers, and nobody is told that it is
+      // stored.
+      connection_.reset();
+      for (Task* task : group) task->error = make_error(Errc::internal, "storage: " + ran.what);
+    }
     {
       const std::lock_guard lock(mutex_);
       for (Task* task : group) task->done = true;
     }
     wake_callers_.notify_all();
-    checkpoint_if(false);
+    (void)guarded("database writer", [this] { checkpoint_if(false); });
   }
   connection_.reset();
 }

@@ -8,9 +8,9 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include "core/base/guard.hpp"
 #include "server/storage/sql.hpp"
 #include "server/storage/sqlite_connection.hpp"
 #include "server/storage/sqlite_database.hpp"
@@ -78,7 +78,7 @@ class WriteQueue {
   bool stopping_{false};
   Status status_;
 
-  std::thread thread_;
+  Thread thread_;
 };
 
 }  // namespace anchord::sql

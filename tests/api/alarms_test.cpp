@@ -206,8 +206,14 @@ class ClockOnly final : public DeviceControl {
     const std::scoped_lock lock(mutex_);
     skew_ = skew;
   }
+  /// What the next questions throw; empty: nothing.
+  void throws(const std::string& what) {
+    const std::scoped_lock lock(mutex_);
+    throws_ = what;
+  }
   DeviceClock clock() override {
     const std::scoped_lock lock(mutex_);
+    if (!throws_.empty()) throw std::runtime_error(throws_);
     return {true, 0.0, 0.02, skew_};
   }
   std::vector<DeviceReport> devices() override { return {}; }
@@ -225,20 +231,20 @@ class ClockOnly final : public DeviceControl {
  private:
   static Error none() { return make_error(Errc::not_found, "no device"); }
   std::mutex mutex_;
-  std::string skew_;
+  std::string skew_, throws_;
 };
 
 class ClockAlarm : public AppFixture {
  protected:
   void configure(api::Application::Deps& deps) override { deps.devices = &devices_; }
   /// The list of alarms once it holds what is asked for; the last one when 20 s pass first.
-  Json alarms_when(bool skewed) {
+  Json alarms_when(bool there_is, const std::string& id = "clock.skew") {
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
     for (;;) {
       Json items = json(get("/api/v1/alarms"))["items"];
       const bool there = std::any_of(items.begin(), items.end(),
-                                     [](const Json& alarm) { return alarm.value("id", "") == "clock.skew"; });
-      if (there == skewed || std::chrono::steady_clock::now() > end) return items;
+                                     [&](const Json& alarm) { return alarm.value("id", "") == id; });
+      if (there == there_is || std::chrono::steady_clock::now() > end) return items;
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
   }
@@ -254,6 +260,26 @@ TEST_F(ClockAlarm, StandsFromTheDriftOfADeviceUntilItIsGood) {
   EXPECT_NE(raised[0].dump().find("drifts by more than 200 ppm"), std::string::npos) << raised[0];
   devices_.set("");
   EXPECT_TRUE(alarms_when(false).empty());
+}
+
+// A caster's answer in Latin-1 once threw in the heartbeat and ended the server.
+TEST_F(ClockAlarm, ATaskThatThrowsIsAnAlarmAndTheHeartbeatGoesOn) {
+  devices_.throws("bytes \xff\xfe");
+  const auto raised = alarms_when(true, "server.task_failed");
+  ASSERT_EQ(raised.size(), 1u);
+  EXPECT_EQ(raised[0].value("priority", ""), "warning");
+  const auto text = raised[0].value("text", "");
+  EXPECT_NE(text.find("device clocks (bytes \xef\xbf\xbd\xef\xbf\xbd)"), std::string::npos) << text;
+  devices_.throws("");
+  devices_.set("the clock of device \"tag\" drifts by more than 200 ppm");
+  EXPECT_EQ(alarms_when(true).size(), 2u);  // it beats on: what comes after is seen
+}
+
+TEST(AlarmRules, NameTheDevicesThatAreKeptAndDoNotRun) {
+  api::ServerPulse server;
+  server.not_started = "not started: device \"caster\" (kind: no driver for \"x\")";
+  server.failed_tasks = "heartbeat (out of memory)";
+  EXPECT_EQ(raised(well(), server), "server.task_failed device.not_started");
 }
 
 TEST_F(Alarms, AreServedAndAcknowledgedByOperatorsOnly) {

@@ -139,6 +139,15 @@ TEST(NtripClient, SaysWhyThereIsNoStream) {
                 "3.2;\r\nSTR;FAR;x;\r\nENDSOURCETABLE\r\n"),
             "the caster has no mount \"BASE\"; it has NEAR, FAR");
   EXPECT_EQ(why(std::string(20'000, 'x')), "the caster's answer is no NTRIP");
+  // In Latin-1, and cut at 80 bytes: the text is UTF-8 and ends between characters.
+  EXPECT_EQ(why("ICY 4\xff\xfe"
+                "1 Nicht erlaubt\r\n"),
+            "the caster answers \"ICY 4\xef\xbf\xbd\xef\xbf\xbd"
+            "1 Nicht erlaubt\"");
+  EXPECT_EQ(why(std::string(79, 'x') + "\xc3\xbc und mehr\r\n"),
+            "the caster answers \"" + std::string(79, 'x') + "\"");
+  EXPECT_EQ(why("SOURCETABLE 200 OK\r\n\r\nSTR;M\xfcnchen;x\r\nENDSOURCETABLE\r\n"),
+            "the caster has no mount \"BASE\"; it has M\xef\xbf\xbdnchen");
   Link silent;
   silent.take(EventKind::opened, 2);
   silent.now_ns += 11'000'000'000;
