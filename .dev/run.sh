@@ -58,13 +58,19 @@ start_devices() {
 
 # A flight of four minutes through the drivers, again and again.
 fly_devices() {
-  local mission
+  local mission held
   while true; do
     [[ $(http_post /api/v1/missions "{\"name\":\"demonstration\",\"kit\":\"simulated\",\"frame\":\"wgs84\",\"track_point\":\"gnss_antenna\",\"tags\":[{\"tag\":\"0x6e01\",\"antenna\":0,\"lever_arm_body_m\":[0.12,0,-0.28]}]}"; echo "$reply" >build/run-mission.json) == 201 ]] || {
       say "the simulated flight cannot start, the server is up without it: $(cat build/run-mission.json)"
       return
     }
     mission=$(sed -n 's/.*"id":"\([0-9a-f-]*\)".*/\1/p' build/run-mission.json)
+    # A flight that an earlier run left recording still has the devices: it is over, and they are free.
+    held=$(sed -n 's/.*"held_by":{"mission":"\([0-9a-f-]*\)".*/\1/p' build/run-mission.json)
+    if [[ -n $held ]]; then
+      http_post "/api/v1/missions/$held/actions" '{"action":"finish"}' >/dev/null
+      [[ $(http_post "/api/v1/missions/$mission/actions" '{"action":"take_devices"}') == 200 ]] || return 1
+    fi
     for _ in {1..240}; do sleep 1; done
     http_post "/api/v1/missions/$mission/actions" '{"action":"finish"}' >/dev/null ||
       say "the simulated flight could not be finished: no answer from $run_address"

@@ -16,11 +16,15 @@
 #include "api/routes/routes.hpp"
 #include "api/services/access.hpp"
 #include "api/services/alarm_board.hpp"
+#include "api/services/clock_watch.hpp"
 #include "api/services/device_ingest.hpp"
+#include "api/services/device_stream.hpp"
 #include "api/services/flight_service.hpp"
 #include "api/services/geo_service.hpp"
+#include "api/services/housekeeping.hpp"
 #include "api/services/kit_profiles.hpp"
 #include "api/services/late_writer.hpp"
+#include "api/services/running_time.hpp"
 #include "core/base/guard.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
@@ -44,13 +48,19 @@ struct Application::State {
           if (deps.log_fault) deps.log_fault("", what);
         }),
         prompt(deps.access_store, late),
-        router(&deps.access_store, &deps.clock, &prompt),
+        steady(deps.steady != nullptr ? *deps.steady : system_steady_clock()),
+        running(deps.service, steady),
+        router(&deps.access_store, [this] { return running.now_ns(); }, &prompt),
         hub(deps.clock, "anchord " + deps.build.version),
         events(hub, deps.clock),
         alarms(events),
         models(deps.learning != nullptr ? std::make_unique<ModelRegistry>(deps.learning->models) : nullptr),
         missions({deps.missions, deps.measurements, deps.anchors, hub, events, deps.clock, deps.post,
-                  deps.goal, [this] { return device_rows(); }, judge(), needs_cir(), deps.site_outline}),
+                  deps.goal, [this] { return device_rows(); }, judge(), needs_cir(), deps.site_outline,
+                  &steady}),
+        stream({deps.devices, deps.service, deps.missions, events}),
+        housekeeping({deps.bin, running, events, [this] { return router.purge_answers(); },
+                      deps.keep_deleted_ns, deps.housekeeping_by_hand}),
         ingest(deps.measurements, missions),
         device_ingest(deps.measurements, missions),
         jobs(deps.jobs, hub, deps.clock),
@@ -62,7 +72,11 @@ struct Application::State {
                  jobs, calibrations, geo,    profiles.get(), models.get(), deps.frames} {
     services.prompt = &prompt;
     router.on_fault(deps.log_fault);
+    services.stream = &stream;
+    services.running = &running;
+    services.housekeeping = &housekeeping;
     add_mission_routes(router, services);
+    add_mission_bin_routes(router, services);
     add_measurement_routes(router, services);
     add_site_routes(router, services);
     add_anchor_routes(router, services);
@@ -76,7 +90,7 @@ struct Application::State {
       add_plan_routes(router, services);
       flights = std::make_unique<FlightService>(
           FlightService::Deps{missions, *deps.plans, hub, events, deps.clock, deps.drone,
-                              [this] { return services.storage(); }, deps.flight_clock});
+                              [this] { return services.storage(); }, deps.flight_clock, &steady});
       missions.observe(flights.get());
       services.flights = flights.get();
       add_flight_routes(router, services);
@@ -132,12 +146,17 @@ struct Application::State {
   Deps deps;
   LateWriter late;
   PromptAccessStore prompt;
+  const SteadyClock& steady;
+  RunningTime running;
   Router router;
   Hub hub;
   EventLog events;
   AlarmBoard alarms;
   std::unique_ptr<ModelRegistry> models;
   MissionService missions;
+  DeviceStream stream;
+  Housekeeping housekeeping;
+  ClockWatch clock_watch;
   IngestService ingest;
   DeviceIngest device_ingest;
   JobService jobs;
@@ -155,7 +174,6 @@ struct Application::State {
     LearningServices services;
   };
   std::unique_ptr<Learning> learning;
-  std::uint64_t houses{0};  ///< rounds of keep_house()
   std::mutex mutex;
   std::condition_variable stop_told;
   bool stopping{false}, started{false};
@@ -209,12 +227,6 @@ void Application::State::keep_house() {
     if (const auto begun = services.begin_backup(); !begun)
       events.add("warning", "backup.failed", begun.error().message);
   });
-  if (++houses % 3600 != 0) return;
-  // Hourly: answers to Idempotency-Key are promised for a day.
-  (void)guarded("old answers", [this] {
-    (void)deps.access_store.drop_answers_before({deps.clock.now().ns - 24LL * 3600 * 1'000'000'000})
-        .has_value();
-  });
 }
 
 /// Each part behind the guard of its own: what fails in one must not keep the alarm about it from the page.
@@ -266,6 +278,9 @@ void Application::State::tell_alarms(UtcTime now, std::vector<AlarmCondition> ho
     if (!text.empty() && !told)
       holding.push_back({std::string(id), AlarmPriority::critical, std::move(text), std::nullopt});
   }
+  if (auto step = clock_watch.look(now, steady.now()); !step.empty())
+    holding.push_back({"clock.step", AlarmPriority::warning, std::move(step), std::nullopt});
+  for (auto& alarm : stream.alarms()) holding.push_back(std::move(alarm));
   alarms.update(std::move(holding), now);
   std::string list = "[";
   for (const auto& alarm : alarms.standing()) list += (list.size() > 1 ? "," : "") + alarm_json(alarm);
@@ -298,14 +313,18 @@ void Application::start() {
     else if (state_->deps.log_fault)
       state_->deps.log_fault("", before.error().message);
   });
+  state_->stream.resume();
   if (state_->flights) state_->flights->start();
   state_->jobs.start();
+  state_->housekeeping.start();
   state_->heart = Thread("anchord-beat", [this] { state_->beat(); });
 }
 
 void Application::fly() {
   if (state_->flights) state_->flights->step();
 }
+
+void Application::keep_house() { state_->housekeeping.round(); }
 
 void Application::stop() {
   {
@@ -314,6 +333,7 @@ void Application::stop() {
   }
   state_->stop_told.notify_all();
   if (state_->heart.joinable()) state_->heart.join();
+  state_->housekeeping.stop();
   if (state_->flights) state_->flights->stop();
   state_->hub.shut_down();
   state_->jobs.stop();

@@ -26,9 +26,12 @@ class JobStore;
 class KitStore;
 class LabelStore;
 class MeasurementStore;
+class MissionBin;
 class MissionStore;
 class PlanStore;
 class ModelStore;
+class ServiceStore;
+class SteadyClock;
 class TrainingRunStore;
 }  // namespace anchord
 
@@ -88,6 +91,11 @@ class Application {
     std::function<std::string()> metrics_text{};  ///< Prometheus text of the server, appended to ours
     std::function<void(std::string_view request_id, std::string_view what)> log_fault{};
     LearningStores* learning{nullptr};  ///< null: the routes of learning do not exist (tests)
+    MissionBin* bin{nullptr};             ///< null: no mission can be deleted (tests)
+    ServiceStore* service{nullptr};       ///< null: running time and whose the devices are end with the process
+    const SteadyClock* steady{nullptr};   ///< what every duration is measured by; null: the system's
+    std::int64_t keep_deleted_ns{30LL * 86'400 * 1'000'000'000};  ///< a deleted mission, in running time
+    bool housekeeping_by_hand{false};     ///< set: keep_house() is called by hand (tests)
     RunWork run_work{};                 ///< runs heavy work; absent: on the job's own thread
   };
 
@@ -105,6 +113,8 @@ class Application {
   void start();
   /// One round of the flight in the air; only where Deps::flight_clock is set (tests).
   void fly();
+  /// Removes what is due; only where Deps::housekeeping_by_hand is set (tests).
+  void keep_house();
   /// Says bye to WebSocket clients, parks jobs, joins. Idempotent.
   void stop();
 

@@ -11,7 +11,7 @@
 namespace anchord::api {
 namespace {
 
-constexpr std::int64_t k_keep_ns = 24LL * 3600 * 1'000'000'000;
+constexpr std::size_t k_purged_at_once = 200;
 
 class Sha256 {
  public:
@@ -85,7 +85,70 @@ std::string sha256_hex(std::string_view bytes) {
   return hash.hex();
 }
 
-Response Idempotency::run(Request& request, const std::function<Response(Request&)>& handler) {
+AnswerUse Idempotency::use_of(const std::string& who) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (const auto at = use_.find(who); at != use_.end()) return at->second;
+  }
+  const auto stored = answers_.answer_use(who);
+  const std::scoped_lock lock(mutex_);
+  return use_.emplace(who, stored ? stored.value() : AnswerUse{}).first->second;
+}
+
+Idempotency::Room Idempotency::make_room(const std::string& who, Keeps keeps) {
+  const AnswerUse use = use_of(who);
+  if (use.count < k_max_answers && use.bytes < k_max_bytes) return {};
+  if (keeps == Keeps::answer) {
+    return {true, "this token has " + std::to_string(use.count) + " kept answers of " +
+                      std::to_string(use.bytes) + " bytes of the last 24 h (limits " +
+                      std::to_string(k_max_answers) + " and " + std::to_string(k_max_bytes) +
+                      "): send the request without Idempotency-Key, or later"};
+  }
+  (void)answers_.drop_oldest_answers(who, k_max_answers / 10).has_value();
+  const std::scoped_lock lock(mutex_);
+  use_.erase(who);
+  return {};
+}
+
+void Idempotency::keep(const Request& request, const Response& response, std::string hash) {
+  StoredAnswer answer;
+  answer.key = std::string(request.header("idempotency-key"));
+  answer.principal = request.principal.token_id;
+  answer.request_sha256_hex = std::move(hash);
+  answer.status = response.status;
+  answer.created_ran_ns = running_ns_();
+  for (const auto& [name, value] : response.headers) {
+    if (name == "Location") answer.location = value;
+    if (name == "ETag") answer.etag = value;
+  }
+  if (response.body.size() <= k_max_answer_bytes) {
+    answer.body = response.body;
+  } else {
+    answer.body = R"({"replayed":true,"detail":"done by the first request; its answer of )" +
+                  std::to_string(response.body.size()) + " bytes was not kept (limit " +
+                  std::to_string(k_max_answer_bytes) + R"(): read the resource itself"})";
+  }
+  // It was done, whatever becomes of this: an error here would tell the client that it was not.
+  if (!answers_.keep_answer(answer, answer.created_ran_ns - k_keep_ns)) return;
+  const std::scoped_lock lock(mutex_);
+  if (const auto at = use_.find(answer.principal); at != use_.end()) {
+    ++at->second.count;
+    at->second.bytes += answer.body.size();
+  }
+}
+
+void Idempotency::forget_use() {
+  const std::scoped_lock lock(mutex_);
+  use_.clear();
+}
+
+bool Idempotency::purge() {
+  const auto dropped = answers_.drop_answers_before(running_ns_() - k_keep_ns, k_purged_at_once);
+  forget_use();
+  return dropped && dropped.value() == k_purged_at_once;
+}
+
+Response Idempotency::run(Request& request, Keeps keeps, const std::function<Response(Request&)>& handler) {
   const std::string key(request.header("idempotency-key"));
   if (key.size() > 128) return problem(400, "malformed", "Idempotency-Key is longer than 128 characters");
   const std::string& who = request.principal.token_id;
@@ -102,7 +165,7 @@ Response Idempotency::run(Request& request, const std::function<Response(Request
   auto stored = answers_.answer(who, key);
   if (!stored) return problem_of(stored.error());
   const auto& kept = stored.value();
-  if (kept && clock_.now().ns - kept->created.ns < k_keep_ns) {
+  if (kept && running_ns_() - kept->created_ran_ns < k_keep_ns) {
     if (request.body_stream != nullptr) {
       HashingReader reader(*request.body_stream, hash);
       drain(reader);
@@ -115,11 +178,18 @@ Response Idempotency::run(Request& request, const std::function<Response(Request
     }
     Response response;
     response.status = kept->status;
-    response.header("Content-Type", kept->status >= 400 ? "application/problem+json" : "application/json");
+    response.header("Content-Type", "application/json");
     if (!kept->location.empty()) response.header("Location", kept->location);
     if (!kept->etag.empty()) response.header("ETag", kept->etag);
     response.header("Idempotent-Replayed", "true");
     response.body = kept->body;
+    return response;
+  }
+  if (const Room room = make_room(who, keeps); room.refused) {
+    Response response = problem(429, "quota", room.why);
+    for (auto& [name, value] : response.headers) {
+      if (name == "Retry-After") value = "3600";
+    }
     return response;
   }
 
@@ -134,15 +204,7 @@ Response Idempotency::run(Request& request, const std::function<Response(Request
     hash.add(request.body);
     response = handler(request);
   }
-  if (response.status < 500 && !response.body_stream) {
-    StoredAnswer answer{key, who, hash.hex(), response.body, {}, {}, response.status, clock_.now()};
-    for (const auto& [name, value] : response.headers) {
-      if (name == "Location") answer.location = value;
-      if (name == "ETag") answer.etag = value;
-    }
-    auto saved = answers_.keep_answer(answer);
-    if (!saved) return problem_of(saved.error());
-  }
+  if (response.status < 400 && !response.body_stream) keep(request, response, hash.hex());
   return response;
 }
 

@@ -29,6 +29,8 @@ const std::vector<ProblemType>& problem_types() {
       {"state", "Not in this state", "The present state does not permit this action."},
       {"precondition-required", "Precondition required", "Send If-Match with the ETag that was read."},
       {"rate-limited", "Too many requests", "Wait for Retry-After seconds."},
+      {"quota", "Quota used up",
+       "The token has as many kept answers as it may have; detail says which limit and what to do."},
       {"internal", "Internal error", "A fault of the server; the request id finds it in the log."},
       {"overloaded", "Try again later", "A queue is full or storage is unavailable; nothing was changed."},
       {"read-only", "Storage is full", "Nothing was stored; free disk space."},

@@ -3,7 +3,6 @@
 #include <cctype>
 #include <new>
 
-#include "api/http/idempotency.hpp"
 #include "api/http/problem.hpp"
 #include "core/base/guard.hpp"
 #include "core/base/text.hpp"
@@ -89,6 +88,12 @@ void conditional_get(const Request& request, Response& response) {
   }
 }
 
+/// Asks what would be done, and changes nothing.
+bool is_dry_run(const Request& request) {
+  const auto asked = request.query_value("dry_run");
+  return asked && *asked != "false" && *asked != "0";
+}
+
 /// A problem made below knows neither where it happened nor for whom: say both here.
 void complete_problem(const Request& request, Response& response) {
   if (response.status < 400 || response.body.size() < 2 || response.body.back() != '}') return;
@@ -154,11 +159,17 @@ struct Router::State {
   std::function<void(std::string_view, std::string_view)> fault;
 };
 
-Router::Router(AccessStore* answers, const Clock* clock, AccessStore* prompt)
+Router::Router(AccessStore* answers, std::function<std::int64_t()> running_ns, AccessStore* prompt)
     : state_(std::make_unique<State>()) {
-  if (answers == nullptr || clock == nullptr) return;
-  state_->idempotency = std::make_unique<Idempotency>(*answers, *clock);
-  state_->of_commands = std::make_unique<Idempotency>(prompt != nullptr ? *prompt : *answers, *clock);
+  if (answers == nullptr || !running_ns) return;
+  state_->idempotency = std::make_unique<Idempotency>(*answers, running_ns);
+  state_->of_commands =
+      std::make_unique<Idempotency>(prompt != nullptr ? *prompt : *answers, std::move(running_ns));
+}
+bool Router::purge_answers() const {
+  if (!state_->idempotency) return false;
+  state_->of_commands->forget_use();  // they share what is kept
+  return state_->idempotency->purge();
 }
 Router::~Router() = default;
 Router::Router(Router&&) noexcept = default;
@@ -239,10 +250,10 @@ Response Router::dispatch(const Route& route, Request& request) const {
       }
     } else if (route.needs_if_match && request.header("if-match").empty()) {
       response = problem(428, "precondition-required", "send If-Match with the ETag that was read");
-    } else if (route.method == Method::post && state_->idempotency &&
-               !request.header("idempotency-key").empty()) {
+    } else if (route.method == Method::post && state_->idempotency && route.keeps != Keeps::nothing &&
+               !is_dry_run(request) && !request.header("idempotency-key").empty()) {
       const bool prompt = route.work_for(request) == Work::command;
-      response = (prompt ? state_->of_commands : state_->idempotency)->run(request, handled);
+      response = (prompt ? state_->of_commands : state_->idempotency)->run(request, route.keeps, handled);
     } else {
       response = handled(request);
     }

@@ -8,13 +8,9 @@
 #include <string_view>
 #include <vector>
 
+#include "api/http/idempotency.hpp"
 #include "api/http/message.hpp"
 #include "api/http/work.hpp"
-
-namespace anchord {
-class AccessStore;
-class Clock;
-}  // namespace anchord
 
 namespace anchord::api {
 
@@ -51,13 +47,25 @@ struct Route {
   Work work{Work::ordinary};
   /// Where the body decides (actions of a mission); asked on an io thread, with the whole body. Else `work` holds.
   std::function<Work(const Request&)> work_of{};
-
+  Keeps keeps{Keeps::answer
   Work work_for(const Request& request) const { return work_of ? work_of(request) : work; }
 };
 /// The same route, run by another executor than the ordinary one.
 inline Route as_command(Route route) { return route.work = Work::command, route; }
 inline Route as_flight(Route route) { return route.work = Work::flight, route; }
 inline Route as_heavy(Route route) { return route.work = Work::heavy, route; }
+ ///< of POST, for its Idempotency-Key
+};
+/// A POST that changes nothing, or whose answer is a secret: nothing is kept of it.
+inline Route keeps_nothing(Route route) {
+  route.keeps = Keeps::nothing;
+  return route;
+}
+/// A POST that must be done whatever the token has kept already: commands of a flight, measurements.
+inline Route keeps_always(Route route) {
+  route.keeps = Keeps::always;
+  return route;
+}
 
 struct Resolution {
   enum class Kind : std::uint8_t { matched, not_found, method_not_allowed };
@@ -70,9 +78,10 @@ struct Resolution {
 /// The route table. Filled at start, then read from any thread.
 class Router {
  public:
-  /// Where answers to Idempotency-Key are kept; all may be null in tests (then the header is ignored). `prompt`
-  /// keeps those of commands, which must not wait for the disk; null: as the others.
-  explicit Router(AccessStore* answers = nullptr, const Clock* clock = nullptr, AccessStore* prompt = nullptr);
+  /// Where answers to Idempotency-Key are kept, and running time to age them by; without both the header is
+  /// ignored (tests). `prompt` keeps those of commands, which must not wait for the disk; null: as the others.
+  explicit Router(AccessStore* answers = nullptr, std::function<std::int64_t()> running_ns = {},
+                  AccessStore* prompt = nullptr);
   ~Router();
   Router(Router&&) noexcept;
   Router& operator=(Router&&) noexcept;
@@ -91,6 +100,9 @@ class Router {
   Response refuse(const Resolution& resolution, const Request& request) const;
 
   const std::vector<Route>& routes() const;
+
+  /// Drops kept answers that have expired, a slice at a time; says whether there may be more.
+  bool purge_answers() const;
 
   /// Told about every exception that reached the door (a bug, or the ground gave way); for the log.
   void on_fault(std::function<void(std::string_view request_id, std::string_view what)> log);

@@ -4,6 +4,7 @@
 
 #include "api/live/frames.hpp"
 #include "core/base/check.hpp"
+#include "core/base/steady.hpp"
 
 namespace anchord::api {
 namespace {
@@ -91,7 +92,7 @@ void Hub::send(Topic topic, std::vector<LiveElement> elements, std::int64_t t_us
   if (about.cls == TopicClass::state) {
     for (const auto& element : message->elements) channel.newest[element.key] = {element, t_us};
   } else {
-    const std::int64_t now_us = clock_.now().us();
+    const std::int64_t now_us = system_steady_clock().now().ns / 1000;
     channel.history.push_back(message);
     channel.history_at_us.push_back(now_us);
     channel.history_bytes += message->bytes();

@@ -14,9 +14,11 @@ using Ordered = nlohmann::ordered_json;
 
 Ordered backup_json(const Backup& backup) {
   return {{"name", backup.name},
+          {"sequence", backup.sequence},
           {"made_at", to_rfc3339(backup.made)},
           {"bytes", backup.bytes},
-          {"sha256", backup.sha256_hex}};
+          {"sha256", backup.sha256_hex},
+          {"good", backup.good ? Ordered(*backup.good) : Ordered(nullptr)}};
 }
 
 }  // namespace

@@ -242,6 +242,21 @@ Response label(LearningServices& l, const Request& request) {
   return json_response(200, {{"labelled", n}});
 }
 
+/// A training that runs stands on a data set of these campaigns: its report would name one that is gone.
+void refuse_while_trained_on(LearningServices& l, const CampaignRecord& campaign) {
+  for (const auto& job : value_or_problem(l.services.deps.jobs.jobs(1000, std::nullopt))) {
+    if (job.kind != "training" || (job.state != JobState::queued && job.state != JobState::running)) continue;
+    const auto run = l.stores.runs.run(TrainingRunId{job.id.uuid});
+    if (!run) continue;
+    const auto dataset = l.stores.datasets.dataset(run.value().dataset);
+    if (dataset && dataset.value().query_json.find(to_string(campaign.id)) != std::string::npos)
+      throw_problem(409, "conflict",
+                    "training run " + to_string(job.id) + " uses " + campaign.name + " (" +
+                        (job.state == JobState::running ? "running" : "queued") +
+                        "): wait for it, or cancel its job first");
+  }
+}
+
 }  // namespace
 
 void add_campaign_routes(Router& router, LearningServices& l) {
@@ -259,6 +274,7 @@ void add_campaign_routes(Router& router, LearningServices& l) {
   router.add(
       {Method::del, "/api/v1/campaigns/{id}", Access::any_of({Role::engineer}), [&l](const Request& request) {
          const auto campaign = named(l, request);
+         refuse_while_trained_on(l, campaign);
          value_or_problem(l.stores.campaigns.remove(campaign.id));
          l.services.audit(request, "campaign.delete " + to_string(campaign.id) + " " + campaign.name);
          Response response;

@@ -5,6 +5,7 @@
 #include "api/routes/job_answer.hpp"
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
+#include "api/services/device_stream.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/devices.hpp"
 #include "core/ports/store.hpp"
@@ -86,6 +87,10 @@ Response patch(Services& s, const Request& request) {
 Response remove(Services& s, const Request& request) {
   const auto device = value_or_problem(control(s).device(path_uuid(request)));
   require_match(request, etag(device));
+  if (const auto holder = s.stream->holder(); holder && device.config.enabled)
+    throw_problem(409, "conflict",
+                  device.config.name + " is in use: " + holder->name +
+                      " records with it; finish that mission first, or switch the device off");
   value_or_problem(control(s).remove(device.config.id, device.config.version));
   s.audit(request, "device.delete " + to_string(device.config.id));
   Response response;

@@ -34,7 +34,7 @@ T granted(Result<T> result) {
 }
 
 Response control(Services& s, const Request& request) {
-  const auto mission = path_id<MissionId>(request);
+  const auto mission = named_mission(s, request).id;
   std::vector<FieldError> errors;
   const auto body = json_body(request);
   Fields fields(body, "", errors);
@@ -49,7 +49,6 @@ Response control(Services& s, const Request& request) {
     s.audit_soon(request, done + (by_force ? " by force" : ""));
     return json_response(200, lease_json(lease, true));
   }
-  value_or_problem(s.missions.mission(mission));
   if (*action == 1)
     return json_response(
         200, lease_json(granted(s.flights->renew_control(mission, *key, request.principal)), true));
@@ -60,15 +59,14 @@ Response control(Services& s, const Request& request) {
 
 Response who_has_control(Services& s, const Request& request) {
   check_query(request, {});
-  value_or_problem(s.missions.mission(path_id<MissionId>(request)));
+  named_mission(s, request);
   const auto lease = s.flights->control();
   return json_response(200, lease ? lease_json(*lease, false) : Ordered{{"held", false}});
 }
 
 Response checklist(Services& s, const Request& request) {
   check_query(request, {"plan"});
-  const auto mission = path_id<MissionId>(request);
-  value_or_problem(s.missions.mission(mission));
+  const auto mission = named_mission(s, request).id;
   std::optional<PlanId> plan;
   if (const auto text = request.query_value("plan")) {
     const auto id = parse_uuid(*text);
@@ -79,7 +77,7 @@ Response checklist(Services& s, const Request& request) {
 }
 
 Response override_item(Services& s, const Request& request) {
-  const auto mission = path_id<MissionId>(request);
+  const auto mission = named_mission(s, request).id;
   const auto item = request.params.at("item");
   std::vector<FieldError> errors;
   const auto body = json_body(request);
@@ -95,8 +93,7 @@ Response override_item(Services& s, const Request& request) {
 
 Response shown(Services& s, const Request& request, std::string (FlightService::*text)(const MissionId&)) {
   check_query(request, {});
-  const auto mission = path_id<MissionId>(request);
-  value_or_problem(s.missions.mission(mission));
+  const auto mission = named_mission(s, request).id;
   Response response;
   response.body = (s.flights->*text)(mission);
   if (response.body.empty())
@@ -108,8 +105,7 @@ Response shown(Services& s, const Request& request, std::string (FlightService::
 Response profiles(Services& s, const Request& request,
                   std::vector<std::string> (FlightService::*texts)(const MissionId&)) {
   check_query(request, {});
-  const auto mission = path_id<MissionId>(request);
-  value_or_problem(s.missions.mission(mission));
+  const auto mission = named_mission(s, request).id;
   Response response;
   for (const auto& one : (s.flights->*texts)(mission))
     response.body += (response.body.empty() ? "" : ",") + one;
@@ -172,7 +168,7 @@ namespace {
 /// The aircraft's own lists. What is asked for is in the audit log, as every command.
 Response upload(Services& s, const Request& request) {
   static const std::vector<std::string_view> k_lists{"fence", "route"};
-  const auto mission = path_id<MissionId>(request);
+  const auto mission = named_mission(s, request).id;
   std::vector<FieldError> errors;
   const auto body = json_body(request);
   Fields fields(body, "", errors);
@@ -203,8 +199,7 @@ Response upload(Services& s, const Request& request) {
 
 Response uploads(Services& s, const Request& request) {
   check_query(request, {});
-  const auto mission = path_id<MissionId>(request);
-  value_or_problem(s.missions.mission(mission));
+  const auto mission = named_mission(s, request).id;
   auto items = Ordered::array();
   for (const auto& one : s.flights->uploads(mission)) items.push_back(flight_upload_json(one));
   return json_response(200, Ordered{{"items", std::move(items)}});
@@ -212,7 +207,7 @@ Response uploads(Services& s, const Request& request) {
 
 /// Another aircraft on the link. Whatever it answers is in the audit log.
 Response change_aircraft(Services& s, const Request& request) {
-  const auto mission = path_id<MissionId>(request);
+  const auto mission = named_mission(s, request).id;
   std::vector<FieldError> errors;
   const auto body = json_body(request);
   Fields fields(body, "", errors);
@@ -240,12 +235,12 @@ void add_flight_routes(Router& router, Services& s) {
   const auto op = Access::any_of({Role::op});
   const std::string base = "/api/v1/missions/{id}/";
   router.add(as_command({Method::get, base + "control", readers(), on(who_has_control)}));
-  router.add(as_command({Method::post, base + "control", op, on(control), k_command_bytes}));
+  router.add(keeps_always(as_command({Method::post, base + "control", op, on(control), k_command_bytes})));
   router.add({Method::get, base + "uploads", readers(), on(uploads)});
-  router.add(as_flight({Method::post, base + "uploads", op, on(upload), k_command_bytes}));
-  router.add(as_flight({Method::post, base + "aircraft", op, on(change_aircraft), k_command_bytes}));
+  router.add(keeps_always(as_flight({Method::post, base + "uploads", op, on(upload), k_command_bytes})));
+  router.add(keeps_always(as_flight({Method::post, base + "aircraft", op, on(change_aircraft), k_command_bytes})));
   router.add(as_flight({Method::get, base + "checklist", readers(), on(checklist)}));
-  router.add(as_flight({Method::post, base + "checklist/{item}", op, on(override_item), k_command_bytes}));
+  router.add(keeps_always(as_flight({Method::post, base + "checklist/{item}", op, on(override_item), k_command_bytes})));
   router.add({Method::get, base + "procedure", readers(),
               [&s](const Request& request) { return shown(s, request, &FlightService::procedure_text); }});
   router.add({Method::get, base + "grid", readers(),

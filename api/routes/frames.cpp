@@ -256,7 +256,7 @@ void add_frame_routes(Router& router, Services& s) {
   router.add({Method::patch, "/api/v1/frames/{id}", engineer, on(patch), 1 << 20, false, true});
   router.add({Method::del, "/api/v1/frames/{id}", engineer, on(remove), 1 << 20, false, true});
   router.add(as_heavy({Method::post, "/api/v1/frames/{id}/fit", engineer, on(fit)}));
-  router.add(as_heavy({Method::post, "/api/v1/transform", readers(), on(transform)}));
+  router.add(keeps_nothing(as_heavy({Method::post, "/api/v1/transform", readers(), on(transform)})));
 }
 
 }  // namespace anchord::api

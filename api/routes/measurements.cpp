@@ -229,8 +229,8 @@ void add_measurement_routes(Router& router, Services& s) {
     return [&s, function](const Request& request) { return function(s, request); };
   };
   const auto ingest = [&router](const char* path, Handler handler) {
-    router.add({Method::post, path, Access::any_of({Role::gateway}), std::move(handler),
-                IngestService::k_max_body_bytes, true});
+    router.add(keeps_always({Method::post, path, Access::any_of({Role::gateway}), std::move(handler),
+                             IngestService::k_max_body_bytes, true}));
   };
   ingest("/api/v1/ranges", [&s](const Request& request) { return s.ingest.ranges(request); });
   ingest("/api/v1/fixes", [&s](const Request& request) { return s.ingest.fixes(request); });

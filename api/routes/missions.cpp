@@ -5,6 +5,8 @@
 #include "api/json/wire_rows.hpp"
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
+#include "api/services/device_stream.hpp"
+#include "api/services/flight_service.hpp"
 #include "core/ports/devices.hpp"
 #include "core/ports/store.hpp"
 
@@ -12,15 +14,31 @@ namespace anchord::api {
 
 using Ordered = nlohmann::ordered_json;
 
+Response binned_missions(Services& services, const Request& request);
+Response binned_mission(Services& services, const Request& request);
+
 namespace {
 
+/// Whether it has the rows of this server's devices, and who has them instead; absent: there are none.
+void say_devices(Services& s, const Mission& mission, Ordered& out) {
+  if (s.deps.devices == nullptr) return;
+  const auto holder = s.stream->holder();
+  Ordered devices{{"recording", holder && holder->id == mission.id}, {"held_by", nullptr}};
+  if (mission.state == MissionState::recording && holder && holder->id != mission.id)
+    devices["held_by"] = Ordered{{"mission", to_string(holder->id)}, {"name", holder->name}};
+  out["devices"] = std::move(devices);
+}
+
 Ordered with_counts(Services& s, const Mission& mission) {
-  return mission_json(mission, value_or_problem(s.deps.measurements.count_ranges(mission.id)),
-                      value_or_problem(s.deps.measurements.count_fixes(mission.id)));
+  auto out = mission_json(mission, value_or_problem(s.deps.measurements.count_ranges(mission.id)),
+                          value_or_problem(s.deps.measurements.count_fixes(mission.id)));
+  say_devices(s, mission, out);
+  return out;
 }
 
 Response list(Services& s, const Request& request) {
-  check_query(request, {"limit", "cursor", "fields"});
+  check_query(request, {"limit", "cursor", "fields", "deleted"});
+  if (query_flag(request, "deleted")) return binned_missions(s, request);
   const auto page = page_query(request);
   auto rows = value_or_problem(s.deps.missions.missions(page.limit + 1, cursor_id<MissionId>(page.cursor)));
   const bool more = rows.size() > page.limit;
@@ -30,52 +48,113 @@ Response list(Services& s, const Request& request) {
   return list_response(request, std::move(items), more ? to_string(rows.back().id) : "");
 }
 
+/// What a new mission wants of the devices, taken out of its body.
+struct DevicesWanted {
+  bool any{true};    ///< ?devices=false: an upload or a replay brings its own rows
+  bool take{false};  ///< from a mission that has them
+  std::string lease;
+};
+DevicesWanted read_devices_wanted(const Request& request, nlohmann::json& body,
+                                  std::vector<FieldError>& errors) {
+  DevicesWanted wanted;
+  wanted.any = !request.query_value("devices") || query_flag(request, "devices");
+  if (!body.is_object()) return wanted;
+  nlohmann::json mine = nlohmann::json::object();
+  for (const char* key : {"take_devices", "lease"}) {
+    if (const auto at = body.find(key); at != body.end()) {
+      mine[key] = *at;
+      body.erase(at);
+    }
+  }
+  Fields fields(mine, "", errors);
+  wanted.take = fields.boolean("take_devices").value_or(false);
+  wanted.lease = fields.text("lease", 64).value_or("");
+  if (wanted.take && !wanted.any)
+    fields.error("take_devices", "contradiction", "contradicts devices=false");
+  return wanted;
+}
+
+/// Taking them from another mission is whoever commands that one's right.
+void require_right_to_take(Services& s, const Request& request, const MissionId& taker,
+                           const std::string& lease) {
+  const auto holder = s.stream->holder();
+  if (!holder || holder->id == taker) return;
+  require_control(s, request, holder->id, lease,
+                  holder->name + " (mission " + to_string(holder->id) +
+                      ") records with the devices; taking them needs the lease of its control");
+}
+
 Response create(Services& s, const Request& request) {
   std::vector<FieldError> errors;
-  Mission mission = read_mission(json_body(request), errors);
+  auto body = json_body(request);
+  const auto wanted = read_devices_wanted(request, body, errors);
+  Mission mission = read_mission(body, errors);
   if (mission.site && !s.deps.anchors.site(*mission.site))
     errors.push_back({"/site", "unknown_site", "there is no such site"});
+  // A local frame has no place for a rover's positions.
+  const bool records = wanted.any && mission.frame == TrackFrame::wgs84;
+  if (wanted.take && !records && errors.empty())
+    errors.push_back({"/take_devices", "contradiction", "a mission in a local frame records no devices"});
   refuse_if_any(errors);
   mission.created = s.deps.clock.now();
   mission.id.uuid = make_uuid_v7(mission.created);
-  const bool with_devices = !request.query_value("devices") || query_flag(request, "devices");
+  if (wanted.take) require_right_to_take(s, request, mission.id, wanted.lease);
   value_or_problem(s.missions.create(mission));
-  // A local frame has no place for a rover's positions.
-  if (s.deps.devices != nullptr && with_devices && mission.frame == TrackFrame::wgs84)
-    s.deps.devices->record_into(mission.id);
-  s.audit(request, "mission.create " + to_string(mission.id));
-  Response response = json_response(201, mission_json(mission, 0, 0));
+  if (wanted.take)
+    s.stream->take(mission, request.principal.name);
+  else if (records)
+    s.stream->begin(mission);
+  s.audit(request, "mission.create " + to_string(mission.id) + (wanted.take ? " taking the devices" : ""));
+  Response response = mission_answer(s, 201, mission);
   response.header("Location", "/api/v1/missions/" + to_string(mission.id));
   return response;
 }
 
-Response act(Services& s, const Request& request) {
-  const auto id = path_id<MissionId>(request);
-  value_or_problem(s.missions.mission(id));
-  std::vector<FieldError> errors;
-  const auto body = json_body(request);
-  Fields fields(body, "", errors);
-  std::vector<std::string_view> actions{"finish"};
-  if (s.flights != nullptr) actions.insert(actions.end(), flight_actions().begin(), flight_actions().end());
-  const auto action = fields.word("action", actions, true);
-  if (action.value_or(0) > 0) return flight_action(s, request, std::string(actions[*action]), fields, errors);
-  fields.finish();
-  refuse_if_any(errors);
+Response finish(Services& s, const Request& request, const MissionId& id, const std::string& lease) {
+  if (s.flights != nullptr && s.flights->flies(id))
+    require_control(s, request, id, lease, "this mission is in the air; finishing it needs its lease");
   const auto finished = s.missions.finish(id);
   if (!finished && finished.error().code == Errc::conflict)
     throw_problem(422, "state", finished.error().message);
-  auto mission = value_or_problem(finished);
-  if (s.deps.devices != nullptr && s.deps.devices->recording_into() == id) s.deps.devices->record_into({});
+  const auto mission = value_or_problem(finished);
+  s.stream->ended(id);
   s.audit(request, "mission.finish " + to_string(id));
-  return json_response(200, with_counts(s, mission));
+  return mission_answer(s, 200, mission);
+}
+
+/// Rows of the devices for a mission that records without them: at once when nobody has them.
+Response take_devices(Services& s, const Request& request, const Mission& mission, const std::string& lease) {
+  if (s.deps.devices == nullptr) throw_problem(422, "state", "this server has no devices of its own");
+  if (mission.state != MissionState::recording)
+    throw_problem(422, "state", mission.name + " does not record: devices are for a mission that does");
+  if (mission.frame != TrackFrame::wgs84)
+    throw_problem(422, "state", mission.name + " is in a local frame: a rover's positions have no place in it");
+  require_right_to_take(s, request, mission.id, lease);
+  s.stream->take(mission, request.principal.name);
+  s.audit(request, "mission.take_devices " + to_string(mission.id));
+  return mission_answer(s, 200, mission);
+}
+
+Response act(Services& s, const Request& request) {
+  const Mission mission = named_mission(s, request);
+  std::vector<FieldError> errors;
+  const auto body = json_body(request);
+  Fields fields(body, "", errors);
+  std::vector<std::string_view> actions{"finish", "take_devices"};
+  if (s.flights != nullptr) actions.insert(actions.end(), flight_actions().begin(), flight_actions().end());
+  const auto action = fields.word("action", actions, true);
+  if (action.value_or(0) > 1) return flight_action(s, request, std::string(actions[*action]), fields, errors);
+  const auto lease = fields.text("lease", 64).value_or("");
+  fields.finish();
+  refuse_if_any(errors);
+  return *action == 0 ? finish(s, request, mission.id, lease) : take_devices(s, request, mission, lease);
 }
 
 Response events(Services& s, const Request& request) {
   check_query(request, {"limit", "since", "mission"});
   std::optional<MissionId> mission = query_mission(request);
   if (request.params.count("id") > 0) {
-    mission = path_id<MissionId>(request);
-    value_or_problem(s.missions.mission(*mission));
+    mission = named_mission(s, request).id;
   }
   Ordered items = Ordered::array();
   for (const auto& event : s.events.newest(page_query(request).limit, mission, query_time(request, "since")))
@@ -86,8 +165,8 @@ Response events(Services& s, const Request& request) {
 /// The flown way as one GeoJSON line (in a local frame as local_m), a page of at most 10 000 points.
 Response track(Services& s, const Request& request) {
   check_query(request, {"limit", "cursor", "since", "until"});
-  const auto id = path_id<MissionId>(request);
-  const auto mission = value_or_problem(s.missions.mission(id));
+  const auto mission = named_mission(s, request);
+  const auto id = mission.id;
   const auto page = page_query(request, 10'000);
   MeasurementStore::Filter filter;
   filter.mission = id;
@@ -122,6 +201,14 @@ Response track(Services& s, const Request& request) {
 
 }  // namespace
 
+Response mission_answer(Services& s, int status, const Mission& mission) {
+  Response response = json_response(status, with_counts(s, mission));
+  std::uint64_t hash = 14695981039346656037ULL;  // FNV-1a, 64 bit
+  for (const char c : response.body) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
+  response.header("ETag", "\"m-" + std::to_string(hash) + '"');
+  return response;
+}
+
 void add_mission_routes(Router& router, Services& s) {
   const auto on = [&s](auto function) {
     return [&s, function](const Request& request) { return function(s, request); };
@@ -129,22 +216,14 @@ void add_mission_routes(Router& router, Services& s) {
   router.add({Method::get, "/api/v1/missions", readers(), on(list)});
   router.add({Method::post, "/api/v1/missions", Access::any_of({Role::op}), on(create)});
   router.add({Method::get, "/api/v1/missions/{id}", readers(), [&s](const Request& request) {
-                check_query(request, {});
-                return json_response(
-                    200, with_counts(s, value_or_problem(s.missions.mission(path_id<MissionId>(request)))));
-              }});
-  router.add({Method::del, "/api/v1/missions/{id}", Access::any_of({Role::op}), [&s](const Request& request) {
-                const auto id = path_id<MissionId>(request);
-                value_or_problem(s.missions.remove(id));
-                s.audit(request, "mission.delete " + to_string(id));
-                Response response;
-                response.status = 204;
-                return response;
+                check_query(request, {"deleted"});
+                return query_flag(request, "deleted") ? binned_mission(s, request)
+                                                      : mission_answer(s, 200, named_mission(s, request));
               }});
   Route actions{Method::post, "/api/v1/missions/{id}/actions", Access::any_of({Role::op}), on(act),
                 k_command_bytes};
   actions.work_of = work_of_action;
-  router.add(std::move(actions));
+  router.add(keeps_always(std::move(actions)));
   router.add({Method::get, "/api/v1/missions/{id}/events", readers(), on(events)});
   router.add(as_heavy({Method::get, "/api/v1/missions/{id}/track", readers(), on(track)}));
   router.add({Method::get, "/api/v1/events", readers(), on(events)});

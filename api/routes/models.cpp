@@ -335,7 +335,7 @@ void add_model_routes(Router& router, LearningServices& l) {
   router.add(as_heavy({Method::get, "/api/v1/models/{id}/artifact", readers(), on(artifact)}));
   router.add(as_heavy({Method::get, "/api/v1/models/{id}/gate", readers(), on(gate_of_model)}));
   router.add(as_heavy({Method::post, "/api/v1/models/{id}/promote", engineer, on(promote)}));
-  router.add(as_heavy({Method::post, "/api/v1/models/{id}/predict", readers(), on(predict)}));
+  router.add(keeps_nothing(as_heavy({Method::post, "/api/v1/models/{id}/predict", readers(), on(predict)})));
 }
 
 }  // namespace anchord::api

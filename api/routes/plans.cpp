@@ -6,6 +6,7 @@
 #include "api/json/reader.hpp"
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
+#include "api/services/flight_service.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/store.hpp"
@@ -95,6 +96,9 @@ Response patch(Services& s, const Request& request) {
 Response remove(Services& s, const Request& request) {
   const Plan plan = load(s, request);
   require_match(request, etag(plan));
+  if (const auto mission = s.flights != nullptr ? s.flights->flown_with(plan.id) : std::nullopt)
+    throw_problem(409, "conflict",
+                  plan.name + " is being flown by mission " + to_string(*mission) + ": land first");
   value_or_problem(s.deps.plans->remove(plan.id, plan.version));
   s.audit(request, "plan.delete " + to_string(plan.id));
   Response response;
@@ -182,8 +186,8 @@ void add_plan_routes(Router& router, Services& s) {
   const auto op = Access::any_of({Role::op});
   router.add({Method::get, "/api/v1/plans", readers(), on(list)});
   router.add({Method::post, "/api/v1/plans", op, on(create), k_body});
-  router.add(as_heavy({Method::post, "/api/v1/plans/generate", op, on(generate), k_body}));
-  router.add(as_heavy({Method::post, "/api/v1/plans/validate", op, on(validate_body), k_body}));
+  router.add(keeps_nothing(as_heavy({Method::post, "/api/v1/plans/generate", op, on(generate), k_body})));
+  router.add(keeps_nothing(as_heavy({Method::post, "/api/v1/plans/validate", op, on(validate_body), k_body})));
   router.add(as_heavy({Method::post, "/api/v1/plans/import", op, on(import), k_body}));
   router.add({Method::get, "/api/v1/plans/{id}", readers(), [&s](const Request& request) {
                 check_query(request, {});
@@ -192,7 +196,7 @@ void add_plan_routes(Router& router, Services& s) {
   router.add({Method::put, "/api/v1/plans/{id}", op, on(put), k_body, false, true});
   router.add({Method::patch, "/api/v1/plans/{id}", op, on(patch), k_body, false, true});
   router.add({Method::del, "/api/v1/plans/{id}", op, on(remove), 1 << 20, false, true});
-  router.add(as_heavy({Method::post, "/api/v1/plans/{id}/validate", readers(), on(validate)}));
+  router.add(keeps_nothing(as_heavy({Method::post, "/api/v1/plans/{id}/validate", readers(), on(validate)})));
   router.add(as_heavy({Method::get, "/api/v1/plans/{id}/export", readers(), on(export_plan)}));
 }
 

@@ -10,7 +10,10 @@
 namespace anchord::api {
 
 class AlarmBoard;
+class DeviceStream;
 class GeoService;
+class Housekeeping;
+class RunningTime;
 class KitProfiles;
 class ModelRegistry;
 
@@ -33,6 +36,9 @@ struct Services {
   FrameStore* frames{nullptr};      ///< null: their routes do not exist
   FlightService* flights{nullptr};  ///< null: no plans, nothing is flown (tests)
   AccessStore* prompt{nullptr};     ///< for commands: takes at once what it writes soon (LateWriter)
+  DeviceStream* stream{nullptr};    ///< these three are set from the start
+  RunningTime* running{nullptr};
+  Housekeeping* housekeeping{nullptr};
 
   StorageStatus storage() const { return deps.storage_status ? deps.storage_status() : StorageStatus{}; }
   /// Begins a backup in a job. Errors: those of the job queue.
@@ -43,7 +49,16 @@ struct Services {
   void audit_soon(const Request& request, std::string what, std::string result = "ok") const;
 };
 
+/// A mission by the path: 404 where none ever was, 410 for one in the bin, with the way back.
+Mission named_mission(Services& services, const Request& request);
+/// With its ETag, which covers all that the body says.
+Response mission_answer(Services& services, int status, const Mission& mission);
+/// 409 no-control unless the request names the lease of this mission's control.
+void require_control(Services& services, const Request& request, const MissionId& mission,
+                     const std::string& lease, const std::string& what);
+
 void add_mission_routes(Router& router, Services& services);
+void add_mission_bin_routes(Router& router, Services& services);
 void add_measurement_routes(Router& router, Services& services);
 void add_site_routes(Router& router, Services& services);
 void add_anchor_routes(Router& router, Services& services);

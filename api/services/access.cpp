@@ -41,10 +41,6 @@ bool split_token(std::string_view text, std::string& id, std::string_view& secre
   return true;
 }
 
-bool live(const Token& token, UtcTime now) {
-  return !token.revoked && (!token.expires || now < *token.expires);
-}
-
 Principal principal_of(const Token& token) {
   Principal who{to_string(token.id), token.name, {}};
   for (const auto& word : token.roles) {
@@ -55,17 +51,17 @@ Principal principal_of(const Token& token) {
 
 struct Session {
   std::string token_id;  ///< key of the token cache
-  UtcTime until{};
+  SteadyTime until{};
   std::uint64_t order{};
 };
 
 struct Ticket {
   Login login;
-  UtcTime until{};
+  SteadyTime until{};
 };
 
-UtcTime after(UtcTime now, std::chrono::seconds time) {
-  return {now.ns + std::chrono::nanoseconds(time).count()};
+SteadyTime in(SteadyTime now, std::chrono::seconds time) {
+  return later(now, std::chrono::nanoseconds(time).count());
 }
 
 }  // namespace
@@ -80,6 +76,9 @@ struct AccessService::State {
 
   mutable std::shared_mutex mutex;
   std::map<std::string, Token, std::less<>> tokens;  ///< by the id's 32 digits
+  /// When those that expire end, by the steady clock. Read off the system clock once, when a token is first
+  /// seen: a step of it during a flight locks nobody out and brings nobody back.
+  std::map<std::string, SteadyTime, std::less<>> ends;
   std::map<std::string, Session, std::less<>>
       sessions;  ///< by SHA-256 of the cookie: a memory dump gives no login
   std::map<std::string, Ticket, std::less<>> tickets;  ///< by SHA-256 of the ticket
@@ -95,7 +94,19 @@ struct AccessService::State {
   std::map<std::string, Refusal> refusals;
   std::uint64_t unnamed_refusals{0};
   mutable std::map<std::string, UtcTime> used;  ///< by the id's 32 digits, since the last flush of them
-  UtcTime used_flushed{};
+  SteadyTime used_flushed{};
+
+  SteadyTime steady_now() const {
+    return (options.steady != nullptr ? *options.steady : system_steady_clock()).now();
+  }
+  void note_end(const std::string& key, const Token& token) {
+    if (token.expires) ends.try_emplace(key, later(steady_now(), token.expires->ns - clock.now().ns));
+  }
+  bool live(const std::string& key, const Token& token) const {
+    if (token.revoked) return false;
+    const auto end = ends.find(key);
+    return end == ends.end() || steady_now() < end->second;
+  }
 
   void note_use(const std::string& key) const {
     const std::scoped_lock lock(notes_mutex);
@@ -125,7 +136,7 @@ struct AccessService::State {
     // The comparison is done in any case, so that time does not tell which ids exist.
     const std::string expected = at == tokens.end() ? std::string(64, '0') : at->second.secret_sha256_hex;
     const bool same = equal_in_constant_time(sha256_hex(secret), expected);
-    return at != tokens.end() && same && live(at->second, clock.now()) ? &at->second : nullptr;
+    return at != tokens.end() && same && live(at->first, at->second) ? &at->second : nullptr;
   }
 };
 
@@ -142,6 +153,7 @@ Result<void> AccessService::load() {
   state_->tokens.clear();
   for (auto& token : all) {
     const std::string key = without_dashes(token.id.uuid);
+    state_->note_end(key, token);
     state_->tokens.emplace(key, std::move(token));
   }
   return boost::outcome_v2::success();
@@ -149,8 +161,8 @@ Result<void> AccessService::load() {
 
 bool AccessService::has_tokens() const {
   const std::shared_lock lock(state_->mutex);
-  const UtcTime now = state_->clock.now();
-  return std::ranges::any_of(state_->tokens, [&](const auto& entry) { return live(entry.second, now); });
+  return std::ranges::any_of(state_->tokens,
+                             [&](const auto& entry) { return state_->live(entry.first, entry.second); });
 }
 
 Result<NewToken> AccessService::create_token(std::string_view name, const std::vector<std::string>& roles,
@@ -181,6 +193,7 @@ Result<NewToken> AccessService::create_token(std::string_view name, const std::v
   BOOST_OUTCOME_TRYV(state_->store.insert(made.token));
   {
     const std::unique_lock lock(state_->mutex);
+    state_->note_end(key, made.token);
     state_->tokens.emplace(key, made.token);
   }
   audit(by.token_id, "token create " + to_string(made.token.id), from, "done");
@@ -225,14 +238,14 @@ Result<std::string> AccessService::open_session(std::string_view token_text, std
     const std::unique_lock lock(state_->mutex);
     if (const Token* token = state_->find(token_text)) {
       who = to_string(token->id);
-      const UtcTime now = state_->clock.now();
+      const SteadyTime now = state_->steady_now();
       std::erase_if(state_->sessions, [&](const auto& entry) { return entry.second.until <= now; });
       if (state_->sessions.size() >= state_->options.max_sessions) {
         state_->sessions.erase(std::ranges::min_element(
             state_->sessions, {}, [](const auto& entry) { return entry.second.order; }));
       }
       state_->sessions[sha256_hex(cookie)] = {
-          without_dashes(token->id.uuid), after(now, state_->options.session_lifetime), state_->next_order++};
+          without_dashes(token->id.uuid), in(now, state_->options.session_lifetime), state_->next_order++};
     }
   }
   audit(who.empty() ? "nobody" : who, "login", from, who.empty() ? "refused" : "done");
@@ -256,10 +269,9 @@ std::optional<Principal> AccessService::session(std::string_view cookie) const {
   if (cookie.size() != k_secret_digits) return std::nullopt;
   const std::shared_lock lock(state_->mutex);
   const auto at = state_->sessions.find(sha256_hex(cookie));
-  const UtcTime now = state_->clock.now();
-  if (at == state_->sessions.end() || at->second.until <= now) return std::nullopt;
+  if (at == state_->sessions.end() || at->second.until <= state_->steady_now()) return std::nullopt;
   const auto token = state_->tokens.find(at->second.token_id);
-  if (token == state_->tokens.end() || !live(token->second, now)) return std::nullopt;
+  if (token == state_->tokens.end() || !state_->live(token->first, token->second)) return std::nullopt;
   state_->note_use(token->first);
   return principal_of(token->second);
 }
@@ -279,10 +291,10 @@ LoginGuard& AccessService::guard() { return state_->guard; }
 std::string AccessService::make_ticket(Login login) {
   const std::string ticket = random_hex_256();
   const std::unique_lock lock(state_->mutex);
-  const UtcTime now = state_->clock.now();
+  const SteadyTime now = state_->steady_now();
   std::erase_if(state_->tickets, [&](const auto& entry) { return entry.second.until <= now; });
   if (state_->tickets.size() >= state_->options.max_tickets) state_->tickets.erase(state_->tickets.begin());
-  state_->tickets[sha256_hex(ticket)] = {std::move(login), after(now, state_->options.ticket_lifetime)};
+  state_->tickets[sha256_hex(ticket)] = {std::move(login), in(now, state_->options.ticket_lifetime)};
   return ticket;
 }
 
@@ -293,7 +305,7 @@ std::optional<Login> AccessService::take_ticket(std::string_view ticket) {
   if (at == state_->tickets.end()) return std::nullopt;
   Ticket found = std::move(at->second);
   state_->tickets.erase(at);
-  if (found.until <= state_->clock.now() || !state_->holds(found.login)) return std::nullopt;
+  if (found.until <= state_->steady_now() || !state_->holds(found.login)) return std::nullopt;
   return std::move(found.login);
 }
 
@@ -321,9 +333,10 @@ void AccessService::flush() {
     const std::scoped_lock lock(state_->notes_mutex);
     refusals.swap(state_->refusals);
     unnamed = std::exchange(state_->unnamed_refusals, 0);
-    if (now.ns - state_->used_flushed.ns >= k_minute_ns) {
+    const SteadyTime steady = state_->steady_now();
+    if (steady.ns - state_->used_flushed.ns >= k_minute_ns) {
       used.swap(state_->used);
-      state_->used_flushed = now;
+      state_->used_flushed = steady;
     }
   }
   const auto write = [&](const State::Refusal& refusal) {

@@ -11,6 +11,7 @@
 #include "api/http/message.hpp"
 #include "api/services/login_guard.hpp"
 #include "core/base/result.hpp"
+#include "core/base/steady.hpp"
 #include "core/base/time.hpp"
 #include "core/ports/store.hpp"
 
@@ -21,7 +22,8 @@ struct AccessOptions {
   std::chrono::seconds session_lifetime{12 * 3600};  ///< a browser login: one working day
   std::size_t max_sessions{1000};                    ///< oldest login leaves first
   std::size_t max_tickets{1000};
-  bool auth_off{false};  ///< demonstration on loopback: everybody is `local`, with every right
+  const SteadyClock* steady{nullptr};  ///< what sessions, tickets and expiry run on; null: the system's
+  bool auth_off{false};                ///< demonstration on loopback: everybody is `local`, with every right
 };
 
 /// A token as shown once to the person who asked for it; only its hash is kept.

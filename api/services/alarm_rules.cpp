@@ -16,7 +16,7 @@ constexpr std::uint64_t k_low_bytes = 2ULL << 30, k_refuse_bytes = 500ULL << 20;
 constexpr std::uint64_t k_many_rows = 40'000;
 constexpr double k_over_s = 30;
 
-double silence_s(const std::optional<UtcTime>& arrival, UtcTime now) {
+double silence_s(const std::optional<SteadyTime>& arrival, SteadyTime now) {
   return arrival ? seconds_between(*arrival, now) : 1e9;
 }
 

@@ -6,18 +6,20 @@
 #include <vector>
 
 #include "core/base/ids.hpp"
+#include "core/base/steady.hpp"
 #include "core/base/time.hpp"
 #include "core/types/fix.hpp"
 
 namespace anchord::api {
 
-/// How a flight that records stands now. Measured times are of the rows, arrivals of our own clock.
+/// How a flight that records stands now. Measured times are of the rows, arrivals of the steady clock: silence
+/// is a duration.
 struct FlightPulse {
   MissionId mission{};
   std::string name;
-  UtcTime now{};
+  SteadyTime now{};
   std::optional<UtcTime> newest_fix{}, newest_range{};        ///< measured
-  std::optional<UtcTime> fix_arrival{}, range_arrival{};      ///< newest of each
+  std::optional<SteadyTime> fix_arrival{}, range_arrival{};   ///< newest of each
   FixClass fix{FixClass::none};                               ///< of the newest
   std::optional<UtcTime> below_float_since{}, float_since{};  ///< measured; absent while it is better
   std::optional<double> correction_age_s{};                   ///< of the newest fix, where it says

@@ -40,7 +40,7 @@ std::vector<LiveEvent> EventLog::newest(std::size_t limit, const std::optional<M
   std::vector<LiveEvent> out;
   for (auto it = events_.rbegin(); it != events_.rend() && out.size() < limit; ++it) {
     if (mission && it->mission != mission) continue;
-    if (since && it->time < *since) break;
+    if (since && it->time < *since) continue;  // not in order of time where the clock was set back
     out.push_back(*it);
   }
   return out;

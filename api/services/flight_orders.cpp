@@ -213,7 +213,7 @@ nlohmann::ordered_json FlightService::State::procedure(const ActiveFlight& f) co
   v.t_us = deps.clock.now().us();
   v.now_s = now_s();
   if (!f.manual) v.drone = deps.drone->status();
-  if (const auto held = lease.holder(deps.clock.now())) {
+  if (const auto held = lease.holder(moment())) {
     v.holder = held->name;
     v.holder_since_us = held->since.us();
     v.holder_until_us = held->until.us();

@@ -95,7 +95,7 @@ void FlightService::on_range(const MissionId& mission, const RangeResult& result
 Result<Lease> FlightService::take_control(const MissionId& mission, const Principal& who, bool by_force) {
   BOOST_OUTCOME_TRYV(state_->deps.missions.mission(mission));
   const std::scoped_lock lock(state_->mutex);
-  const auto now = state_->deps.clock.now();
+  const auto now = state_->moment();
   const auto before = state_->lease.holder(now);
   auto lease = state_->lease.take(mission, who, now, by_force);
   if (lease) {
@@ -110,13 +110,13 @@ Result<Lease> FlightService::take_control(const MissionId& mission, const Princi
 Result<Lease> FlightService::renew_control(const MissionId& mission, const std::string& key,
                                            const Principal& who) {
   const std::scoped_lock lock(state_->mutex);
-  return state_->lease.renew(mission, key, who, state_->deps.clock.now());
+  return state_->lease.renew(mission, key, who, state_->moment());
 }
 
 Result<void> FlightService::release_control(const MissionId& mission, const std::string& key,
                                             const Principal& who) {
   const std::scoped_lock lock(state_->mutex);
-  BOOST_OUTCOME_TRYV(state_->lease.release(mission, key, who, state_->deps.clock.now()));
+  BOOST_OUTCOME_TRYV(state_->lease.release(mission, key, who, state_->moment()));
   state_->deps.events.add("info", "control.released", who.name + " gave control back", mission);
   state_->publish_soon();
   return boost::outcome_v2::success();
@@ -124,7 +124,19 @@ Result<void> FlightService::release_control(const MissionId& mission, const std:
 
 std::optional<Lease> FlightService::control() {
   const std::scoped_lock lock(state_->mutex);
-  return state_->lease.holder(state_->deps.clock.now());
+  return state_->lease.holder(state_->moment());
+}
+
+bool FlightService::flies(const MissionId& mission) {
+  const std::scoped_lock lock(state_->mutex);
+  const auto* flight = state_->flight_of(mission);
+  return flight != nullptr && flight->flying();
+}
+
+std::optional<MissionId> FlightService::flown_with(const PlanId& plan) {
+  const std::scoped_lock lock(state_->mutex);
+  const auto& flight = state_->flight;
+  return flight && flight->flying() && flight->plan.id == plan ? std::optional(flight->mission) : std::nullopt;
 }
 
 Result<FlightCommand> FlightService::act(const MissionId& mission, const Order& order, const Principal& who) {
@@ -138,7 +150,7 @@ Result<FlightCommand> FlightService::act(const MissionId& mission, const Order& 
   std::optional<State::Groundwork> ground;
   if (plan) ground = state_->groundwork(&*plan);
   const std::scoped_lock lock(state_->mutex);
-  BOOST_OUTCOME_TRYV(state_->lease.renew(mission, order.lease, who, state_->deps.clock.now()));
+  BOOST_OUTCOME_TRYV(state_->lease.renew(mission, order.lease, who, state_->moment()));
   auto given = ground ? state_->begin(record, *ground, order.manual, who)
                       : state_->obey(mission, order.action, who);
   state_->changed.notify_all();
@@ -152,7 +164,7 @@ Result<FlightCommand> FlightService::upload(const MissionId& mission, const std:
   BOOST_OUTCOME_TRY(const auto stored, state_->deps.plans.plan(plan_id));
   const Plan plan = plan_of(stored);
   const std::scoped_lock lock(state_->mutex);
-  BOOST_OUTCOME_TRYV(state_->lease.renew(mission, lease, who, state_->deps.clock.now()));
+  BOOST_OUTCOME_TRYV(state_->lease.renew(mission, lease, who, state_->moment()));
   return state_->upload(mission, plan, what, who.name);
 }
 
@@ -160,7 +172,7 @@ Result<DroneStatus> FlightService::change_aircraft(const MissionId& mission, con
                                                    const std::string& sender, const Principal& who) {
   BOOST_OUTCOME_TRYV(state_->deps.missions.mission(mission));
   const std::scoped_lock lock(state_->mutex);
-  BOOST_OUTCOME_TRYV(state_->lease.renew(mission, lease, who, state_->deps.clock.now()));
+  BOOST_OUTCOME_TRYV(state_->lease.renew(mission, lease, who, state_->moment()));
   auto* drone = state_->deps.drone;
   if (drone == nullptr)
     return make_error(Errc::invalid_argument, "this server talks to no autopilot (drone.address)");

@@ -53,6 +53,7 @@ class FlightService final : public MissionObserver {
     Drone* drone{nullptr};  ///< null: flown by hand ("manual")
     std::function<StorageStatus()> storage;
     std::function<double()> now_s{};  ///< steady seconds; set: no thread, the owner calls step() (tests)
+    const SteadyClock* steady{nullptr};  ///< what the lease runs on; null: the system's
   };
   explicit FlightService(Deps deps);
   ~FlightService() override;
@@ -71,6 +72,9 @@ class FlightService final : public MissionObserver {
   Result<Lease> renew_control(const MissionId& mission, const std::string& key, const Principal& who);
   Result<void> release_control(const MissionId& mission, const std::string& key, const Principal& who);
   std::optional<Lease> control();
+  /// Whether this mission's flight is in the air; and which mission flies this plan.
+  bool flies(const MissionId& mission);
+  std::optional<MissionId> flown_with(const PlanId& plan);
 
   struct Order {
     std::string action;  ///< start, hold, resume, skip, return, land, abort

@@ -248,7 +248,7 @@ void FlightService::State::tell_happenings(ActiveFlight& f) {
 }
 
 void FlightService::State::round(const MissionService::LiveView* live) {
-  if (lease.just_ended(deps.clock.now())) {
+  if (lease.just_ended(moment())) {
     deps.events.add(flight && flight->flying() ? "warning" : "info", "control.ended",
                     "control ended: it was not renewed for a minute",
                     flight ? std::optional(flight->mission) : std::nullopt);

@@ -76,6 +76,9 @@ struct FlightService::State {
   };
 
   double now_s() const;
+  Moment moment() const {
+    return {deps.clock.now(), (deps.steady != nullptr ? *deps.steady : system_steady_clock()).now()};
+  }
   const ActiveFlight* flight_of(const MissionId& mission) const;
   FlightCommand* find(std::uint64_t number);
   void hear(const Fix& fix);

@@ -70,7 +70,7 @@ const FlightUpload* FlightService::State::uploaded(const Plan& plan, const std::
 /// fence goes up by itself, and again ten seconds after it was not confirmed.
 void FlightService::State::give_fence() {
   if (!preparing || deps.drone == nullptr || (flight && flight->flying())) return;
-  const auto holder = lease.holder(deps.clock.now());
+  const auto holder = lease.holder(moment());
   if (holder && holder->mission != preparing->first) return preparing.reset();
   const Plan& plan = preparing->second;
   if (!has_fence(plan)) return;

@@ -119,20 +119,28 @@ Result<std::optional<StoredAnswer>> PromptAccessStore::answer(std::string_view p
   return inner_.answer(principal, key);
 }
 
-Result<void> PromptAccessStore::keep_answer(const StoredAnswer& answer) {
+Result<void> PromptAccessStore::keep_answer(const StoredAnswer& answer, std::int64_t expired_ran_ns) {
   const std::pair name(answer.principal, answer.key);
   {
     const std::scoped_lock lock(mutex_);
     if (pending_.size() >= LateWriter::k_max_waiting) pending_.erase(pending_.begin());
     pending_[name] = answer;
   }
-  writer_.write([this, answer, name]() -> Result<void> {
-    auto kept = inner_.keep_answer(answer);
+  writer_.write([this, answer, name, expired_ran_ns]() -> Result<void> {
+    auto kept = inner_.keep_answer(answer, expired_ran_ns);
     const std::scoped_lock lock(mutex_);
     if (kept || !passing(kept.error())) pending_.erase(name);
     return kept;
   });
   return boost::outcome_v2::success();
+}
+
+Result<std::size_t> PromptAccessStore::drop_oldest_answers(std::string_view principal, std::size_t most) {
+  writer_.write([this, who = std::string(principal), most]() -> Result<void> {
+    BOOST_OUTCOME_TRYV(inner_.drop_oldest_answers(who, most));
+    return boost::outcome_v2::success();
+  });
+  return most;
 }
 
 Result<void> PromptAccessStore::append_audit(const AuditEntry& entry) {

@@ -67,8 +67,12 @@ class PromptAccessStore final : public AccessStore {
   PromptAccessStore(AccessStore& inner, LateWriter& writer) : inner_(inner), writer_(writer) {}
 
   Result<std::optional<StoredAnswer>> answer(std::string_view principal, std::string_view key) override;
-  Result<void> keep_answer(const StoredAnswer& answer) override;
-  Result<std::size_t> drop_answers_before(UtcTime time) override { return inner_.drop_answers_before(time); }
+  Result<void> keep_answer(const StoredAnswer& answer, std::int64_t expired_ran_ns) override;
+  Result<AnswerUse> answer_use(std::string_view principal) override { return inner_.answer_use(principal); }
+  Result<std::size_t> drop_answers_before(std::int64_t ran_ns, std::size_t most) override {
+    return inner_.drop_answers_before(ran_ns, most);
+  }
+  Result<std::size_t> drop_oldest_answers(std::string_view principal, std::size_t most) override;
   Result<void> append_audit(const AuditEntry& entry) override;
   /// With what is still to be written, if that takes no longer than a second.
   Result<std::vector<AuditEntry>> audit(std::size_t limit) override;

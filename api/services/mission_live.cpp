@@ -23,7 +23,7 @@ LiveRow MissionService::State::row_of(Range range) const {
 
 template <class R>
 void MissionService::State::accept(std::vector<R> rows) {
-  const UtcTime now = deps.clock.now();
+  const SteadyTime now = steady_now();
   std::shared_ptr<Flight> flight;
   for (auto& row : rows) {
     if (!flight || flight->id != row.mission) flight = find(row.mission);
@@ -142,7 +142,7 @@ void MissionService::State::step(Flight& flight, const LiveRow& row, bool quiet)
     const Range* range = &judged->range;
     ++state.n_ranges;
     if (!quiet) {
-      const UtcTime now = deps.clock.now();
+      const SteadyTime now = steady_now();
       radios.heard(range->tag, range->kind == RangeKind::tag_anchor, time, now);
       radios.heard(range->anchor, false, time, now);
     }
@@ -220,7 +220,7 @@ void MissionService::State::announce(Flight& flight, bool quiet) {
 
 void MissionService::State::publish_devices() {
   const UtcTime now = deps.clock.now();
-  std::string rows = radios.rows_json(now);
+  std::string rows = radios.rows_json(steady_now());
   if (const std::string more = deps.device_rows ? deps.device_rows() : std::string(); !more.empty())
     rows += (rows.empty() ? "" : ",") + more;
   if (!rows.empty()) deps.hub.publish(Topic::devices, '[' + rows + ']', now.us());

@@ -12,15 +12,17 @@ MissionService::~MissionService() { stop(); }
 void MissionService::observe(MissionObserver* observer) { state_->observer = observer; }
 
 Result<Mission> MissionService::mission(const MissionId& id) {
+  std::uint64_t forgotten = 0;
   {
     const std::scoped_lock lock(state_->mutex);
     const auto it = state_->cache.find(id);
     if (it != state_->cache.end()) return it->second;
+    forgotten = state_->forgotten;
   }
   BOOST_OUTCOME_TRY(auto mission, state_->deps.missions.mission(id));
   const std::scoped_lock lock(state_->mutex);
   if (state_->cache.size() > 1000) state_->cache.clear();
-  state_->cache[id] = mission;
+  if (forgotten == state_->forgotten) state_->cache[id] = mission;
   return mission;
 }
 
@@ -56,14 +58,13 @@ Result<Mission> MissionService::finish(const MissionId& id) {
   return current;
 }
 
-Result<void> MissionService::remove(const MissionId& id) {
-  BOOST_OUTCOME_TRY(state_->deps.missions.remove(id));
+void MissionService::forget(const MissionId& id) {
   const std::scoped_lock lock(state_->mutex);
+  ++state_->forgotten;
   state_->cache.erase(id);
   state_->flights.erase(id);
   for (const Topic topic : {Topic::mission_state, Topic::drone_pose, Topic::rtk_status})
     state_->deps.hub.forget(topic, to_string(id));
-  return boost::outcome_v2::success();
 }
 
 void MissionService::prepare(const MissionId& id) {
@@ -150,7 +151,7 @@ void MissionService::tick() {
 std::uint64_t MissionService::finished() const { return state_->finished; }
 
 std::vector<FlightPulse> MissionService::pulses() {
-  const UtcTime now = state_->deps.clock.now();
+  const SteadyTime now = state_->steady_now();
   const auto steady = std::chrono::steady_clock::now();
   std::vector<FlightPulse> out;
   for (const auto& flight : state_->all()) {
@@ -173,7 +174,7 @@ std::vector<FlightPulse> MissionService::pulses() {
 std::size_t MissionService::queued() const { return state_->queued; }
 
 bool MissionService::recording() const {
-  const UtcTime now = state_->deps.clock.now();
+  const SteadyTime now = state_->steady_now();
   const std::scoped_lock lock(state_->mutex);
   return std::any_of(state_->flights.begin(), state_->flights.end(), [&](const auto& entry) {
     const std::scoped_lock queue(entry.second->queue_mutex);

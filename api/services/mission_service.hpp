@@ -12,6 +12,7 @@
 #include "api/services/alarm_rules.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
+#include "core/base/steady.hpp"
 #include "core/base/time.hpp"
 #include "core/localize/accuracy_goal.hpp"
 #include "core/procedure/flight_clues.hpp"
@@ -56,6 +57,7 @@ class MissionService {
     std::function<std::optional<RangeModel>(const Range&)> judge{};
     std::function<bool()> judge_needs_cir{};
     bool site_outline{true};  ///< joint solutions take the site's outline as a clue: anchors are inside
+    const SteadyClock* steady{nullptr};  ///< what silence is measured by; null: the system's
   };
   explicit MissionService(Deps deps);
   ~MissionService();
@@ -66,7 +68,8 @@ class MissionService {
   Result<void> create(const Mission& mission);
   /// conflict when it is finished already.
   Result<Mission> finish(const MissionId& id);
-  Result<void> remove(const MissionId& id);
+  /// It was deleted: nothing of it is followed, shown or cached any more.
+  void forget(const MissionId& id);
 
   /// Before rows of this mission are stored: makes its live flight, and has what the store holds already read
   /// in by tasks of the pool, so that a restart in flight goes on where it was and no request waits for it.

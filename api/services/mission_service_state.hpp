@@ -30,8 +30,8 @@ struct MissionService::Flight {
   bool scheduled{false};
   bool closing{false};  ///< finished, and what waits for a fix is not told yet
   std::uint64_t dropped{0};
-  UtcTime last_arrival{};
-  std::optional<UtcTime> fix_arrival{}, range_arrival{};
+  SteadyTime last_arrival{};
+  std::optional<SteadyTime> fix_arrival{}, range_arrival{};
   std::mutex work_mutex;  ///< the strand: everything below
   LiveFlight live;
   std::map<NetworkId, std::string> statuses;
@@ -66,6 +66,7 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   Deps deps;
   std::mutex mutex;
   std::map<MissionId, Mission> cache;
+  std::uint64_t forgotten{0};  ///< missions that left: what was read before is not cached after
   std::map<MissionId, std::shared_ptr<Flight>> flights;
   RadioWatch radios;
   std::atomic<std::size_t> queued{0};
@@ -78,6 +79,9 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   std::int64_t ticks{0};
   JointWorker joint;
 
+  SteadyTime steady_now() const {
+    return (deps.steady != nullptr ? *deps.steady : system_steady_clock()).now();
+  }
   std::vector<std::shared_ptr<Flight>> all() {
     std::vector<std::shared_ptr<Flight>> out;
     const std::scoped_lock lock(mutex);

@@ -4,7 +4,7 @@
 
 namespace anchord::api {
 
-void RadioWatch::heard(NetworkId id, bool tag, UtcTime measured, UtcTime now) {
+void RadioWatch::heard(NetworkId id, bool tag, UtcTime measured, SteadyTime now) {
   const std::scoped_lock lock(mutex_);
   auto& radio = radios_[id];
   const double step_s = seconds_between(radio.last_seen, measured);
@@ -15,7 +15,7 @@ void RadioWatch::heard(NetworkId id, bool tag, UtcTime measured, UtcTime now) {
   radio.last_arrival = now;
 }
 
-std::string RadioWatch::rows_json(UtcTime now) const {
+std::string RadioWatch::rows_json(SteadyTime now) const {
   std::string json;
   const std::scoped_lock lock(mutex_);
   for (const auto& [id, radio] : radios_) {

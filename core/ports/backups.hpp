@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,20 +12,23 @@ namespace anchord {
 
 /// A copy of the database that passed its checks.
 struct Backup {
-  std::string name;  ///< of the file; the time it was made is in it
-  UtcTime made{};
+  std::string name;          ///< of the file: its number, and the time it was made
+  std::uint64_t sequence{};  ///< which is newer; 0 for files of before there were numbers
+  UtcTime made{};            ///< by the system clock as it stood then; decides nothing
   std::uint64_t bytes{};
   std::string sha256_hex;
+  std::optional<bool> good{};  ///< its digest and integrity were checked by this process; absent: not yet
 };
 
 /// Copies of the database on disk. Thread-safe.
 class Backups {
  public:
   virtual ~Backups() = default;
-  /// Makes one while writes go on, checks it, and drops the oldest beyond those to keep. Takes seconds.
+  /// Makes one while writes go on, checks it, and drops those older than the newest so many that are whole.
+  /// Takes seconds.
   /// Errors: storage_full, storage_unavailable, conflict (one is being made).
   virtual Result<Backup> make() = 0;
-  virtual std::vector<Backup> list() const = 0;  ///< newest first
+  virtual std::vector<Backup> list() const = 0;  ///< newest first, by sequence
   /// Whether one is to be begun now: the newest is older than the schedule wants, or a flight ended since the
   /// last was begun (`flights_ended` only grows). Never while the schedule is off, at most each ten minutes.
   virtual bool due(std::uint64_t flights_ended) = 0;

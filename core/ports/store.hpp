@@ -75,9 +75,9 @@ class MeasurementStore {
   virtual Result<std::vector<DeviceSeen>> devices(const std::optional<MissionId>& mission) = 0;
 };
 
-/// Flights, newest first in lists (`after`: the last id of the page before). insert answers storage_full
-/// already when little space is left, so that a flight that runs can finish. remove takes the measurements
-/// along; conflict when a calibration was made from it.
+/// Flights, newest first in lists (`after`: the last id of the page before): in order of insertion, whatever
+/// the clock said. insert answers storage_full already when little space is left, so that a flight that runs
+/// can finish. Deleting is MissionBin's (core/ports/mission_bin.hpp).
 class MissionStore {
  public:
   virtual ~MissionStore() = default;
@@ -87,7 +87,6 @@ class MissionStore {
   virtual Result<Mission> finish(const MissionId& id, UtcTime now) = 0;
   virtual Result<Mission> mission(const MissionId& id) = 0;
   virtual Result<std::vector<Mission>> missions(std::size_t limit, const std::optional<MissionId>& after) = 0;
-  virtual Result<void> remove(const MissionId& id) = 0;
 };
 
 /// Position of one anchor in a published revision.
@@ -189,12 +188,17 @@ class JobStore {
   virtual Result<std::size_t> fail_unfinished(UtcTime now, std::string_view problem_json) = 0;
 };
 
-/// Answers kept for Idempotency-Key (24 h), and the append-only audit log with its hash chain.
+/// Answers kept for Idempotency-Key, and the append-only audit log with its hash chain.
 struct StoredAnswer {
   std::string key, principal, request_sha256_hex, body;
   std::string location, etag;  ///< its headers of these names; empty: it had none
   int status{};
-  UtcTime created{};
+  std::int64_t created_ran_ns{};  ///< running time of the service (ServiceStore): no clock step ends it early
+};
+/// What the kept answers of one principal take.
+struct AnswerUse {
+  std::size_t count{};
+  std::uint64_t bytes{};  ///< of bodies
 };
 struct AuditEntry {
   UtcTime time{};
@@ -205,9 +209,13 @@ class AccessStore {
  public:
   virtual ~AccessStore() = default;
   virtual Result<std::optional<StoredAnswer>> answer(std::string_view principal, std::string_view key) = 0;
-  /// Conflict when the principal has an answer under this key already.
-  virtual Result<void> keep_answer(const StoredAnswer& answer) = 0;
-  virtual Result<std::size_t> drop_answers_before(UtcTime time) = 0;
+  /// Takes the place of one that was kept before `expired_ran_ns`; conflict when the principal has a younger
+  /// one under this key.
+  virtual Result<void> keep_answer(const StoredAnswer& answer, std::int64_t expired_ran_ns) = 0;
+  virtual Result<AnswerUse> answer_use(std::string_view principal) = 0;
+  /// The oldest first, at most so many in one short transaction; says how many went.
+  virtual Result<std::size_t> drop_answers_before(std::int64_t ran_ns, std::size_t most) = 0;
+  virtual Result<std::size_t> drop_oldest_answers(std::string_view principal, std::size_t most) = 0;
   virtual Result<void> append_audit(const AuditEntry& entry) = 0;
   virtual Result<std::vector<AuditEntry>> audit(std::size_t limit) = 0;  ///< newest first
   /// conflict, naming the entry, when the hash chain is broken.

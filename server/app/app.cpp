@@ -96,7 +96,6 @@ struct App::State {
   Result<void> first_token();
   Result<void> open_devices();
   Result<void> open_drone();
-  void resume_recording();
   void compose();
   Result<void> listen();
 };
@@ -213,16 +212,6 @@ Result<void> App::State::open_drone() {
   return boost::outcome_v2::success();
 }
 
-/// A flight that was running when the server stopped goes on; what is older than a day was forgotten.
-void App::State::resume_recording() {
-  const auto newest = database->missions().missions(1, std::nullopt);
-  if (!newest || newest.value().empty()) return;
-  const auto& mission = newest.value().front();
-  const bool running = mission.state == MissionState::recording && mission.frame == TrackFrame::wgs84 &&
-                       seconds_between(mission.created, clock.now()) < 86'400;
-  if (running) devices->record_into(mission.id);
-}
-
 void App::State::compose() {
   pool =
       std::make_unique<WorkerPool>("anchord-work", config.count("http.workers"), config.count("http.queue"));
@@ -263,6 +252,10 @@ void App::State::compose() {
                           database->training_runs(), database->models()});
   deps.learning = learning.get();
   deps.run_work = work_in_process();
+  deps.bin = &database->bin();
+  deps.service = &database->service();
+  deps.keep_deleted_ns = static_cast<std::int64_t>(config.count("missions.keep_deleted_days")) * 86'400 *
+                         1'000'000'000;
   deps.post = [this](std::function<void()> task) {
     if (!live_pool->try_submit(task)) task();  // a full queue slows the sender, loses nothing
   };
@@ -273,7 +266,6 @@ void App::State::compose() {
   };
   application = std::make_unique<api::Application>(std::move(deps));
   application->start();
-  resume_recording();
   devices->start(application->device_rows());
   FrontDoorOptions options;
   options.hosts = host_policy(config);

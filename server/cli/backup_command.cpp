@@ -53,7 +53,7 @@ int make(const Options& options) {
   auto database = open_database(storage);
   if (!database) return fail(database.error().message);
   const SystemClock clock;
-  server::BackupKeeper keeper(*database.value(), clock, {options.folder(), options.keep, 24, false});
+  server::BackupKeeper keeper(*database.value(), clock, {options.folder(), options.keep, 24, false, nullptr});
   const auto made = keeper.make();
   if (!made) return fail(made.error().message);
   std::printf("%s  %llu bytes  sha256 %s\n", (options.folder() / made.value().name).c_str(),
@@ -84,7 +84,7 @@ void add_backup_command(CLI::App& app, int& exit_code) {
   };
   common(command);
   command->add_option("--dir", options->dir, "where to put it, when no server runs [DATA_DIR/backups]");
-  command->add_option("--keep", options->keep, "how many to keep there")->check(CLI::Range(1, 10'000));
+  command->add_option("--keep", options->keep, "how many whole ones to keep there, at least 7")->check(CLI::Range(1, 10'000));
   command->callback([&exit_code, options, command] {
     if (command->get_subcommands().empty()) exit_code = make(*options);
   });

@@ -36,8 +36,10 @@ constexpr std::array k_options = {
     Option{"backup.schedule", "on",
            "a copy of the database every backup.every_h hours and after every flight", choice, "on|off"},
     Option{"backup.every_h", "24", "hours between two scheduled backups", count},
-    Option{"backup.keep", "7", "backups that are kept; the oldest goes first", count},
+    Option{"backup.keep", "7", "backups found whole that are kept, never fewer than 7; older ones go", count},
     Option{"backup.dir", "", "where backups are put, another disk if there is one [DATA_DIR/backups]"},
+    Option{"missions.keep_deleted_days", "30",
+           "days of running time that a deleted mission can be restored", count},
     Option{"drone.address", "",
            "where the autopilot speaks MAVLink, like udp://:14550, tcp://127.0.0.1:5760 or "
            "serial:/dev/ttyACM0; empty: flown by hand"},

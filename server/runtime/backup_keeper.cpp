@@ -1,8 +1,9 @@
 #include "server/runtime/backup_keeper.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <fstream>
-#include <optional>
+#include <tuple>
 
 #include "server/storage/sqlite_database.hpp"
 
@@ -12,24 +13,38 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view k_prefix = "anchord-", k_suffix = "Z.db";
+constexpr std::size_t k_digits = 6;
+constexpr std::int64_t k_hour_ns = 3600LL * 1'000'000'000;
 // At most one in ten minutes, failed ones and days of many short flights included.
 constexpr std::int64_t k_pause_ns = 600'000'000'000, k_look_ns = 2'000'000'000;
+// What was read whole and found good is believed for a day while its size and time stay.
+constexpr std::int64_t k_believed_ns = 24 * k_hour_ns;
 
-/// anchord-2026-11-21T08-30-00.123456Z.db: no colons, which some file systems refuse.
-std::string name_of(UtcTime time) {
+/// anchord-000012-2026-11-21T08-30-00.123456Z.db: no colons, which some file systems refuse.
+std::string name_of(std::uint64_t sequence, UtcTime time) {
+  std::string number = std::to_string(sequence);
+  if (number.size() < k_digits) number.insert(0, k_digits - number.size(), '0');
   std::string text = to_rfc3339(time);
   std::ranges::replace(text, ':', '-');
-  return std::string(k_prefix) + text + ".db";
+  return std::string(k_prefix) + number + '-' + text + ".db";
 }
 
-std::optional<UtcTime> time_of(const std::string& name) {
+/// Number and time of a name of ours; older ones have no number.
+std::optional<std::pair<std::uint64_t, UtcTime>> read_name(const std::string& name) {
   if (!name.starts_with(k_prefix) || !name.ends_with(k_suffix)) return std::nullopt;
   std::string text = name.substr(k_prefix.size(), name.size() - k_prefix.size() - 3);
+  std::uint64_t sequence = 0;
+  if (const auto dash = text.find('-'); dash != std::string::npos && dash >= k_digits) {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + dash, sequence);
+    if (error != std::errc{} || end != text.data() + dash) return std::nullopt;
+    text.erase(0, dash + 1);
+  }
   const auto t = text.find('T');
   if (t == std::string::npos) return std::nullopt;
   std::replace(text.begin() + static_cast<std::ptrdiff_t>(t), text.end(), '-', ':');
   const auto time = parse_rfc3339(text);
-  return time ? std::optional(time.value()) : std::nullopt;
+  if (!time) return std::nullopt;
+  return std::pair(sequence, time.value());
 }
 
 }  // namespace
@@ -37,19 +52,71 @@ std::optional<UtcTime> time_of(const std::string& name) {
 BackupKeeper::BackupKeeper(Database& database, const Clock& clock, Options options)
     : database_(database), clock_(clock), options_(std::move(options)) {}
 
+SteadyTime BackupKeeper::steady_now() const {
+  return (options_.steady != nullptr ? *options_.steady : system_steady_clock()).now();
+}
+
 std::vector<Backup> BackupKeeper::list() const {
   std::vector<Backup> out;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(options_.dir, error)) {
     const std::string name = entry.path().filename().string();
-    const auto made = time_of(name);
+    const auto made = read_name(name);
     if (!made) continue;
-    Backup backup{name, *made, entry.file_size(error), {}};
+    Backup backup{name, made->first, made->second, entry.file_size(error), {}, {}};
     std::ifstream(entry.path().string() + ".sha256") >> backup.sha256_hex;
+    {
+      const std::scoped_lock lock(checked_mutex_);
+      if (const auto at = checked_.find(name); at != checked_.end()) backup.good = at->second.good;
+    }
     out.push_back(std::move(backup));
   }
-  std::ranges::sort(out, std::ranges::greater{}, &Backup::made);
+  std::ranges::sort(out, std::ranges::greater{}, [](const Backup& b) { return std::tuple(b.sequence, b.made); });
   return out;
+}
+
+void BackupKeeper::note_checked(const std::string& name, bool good) {
+  std::error_code error;
+  const auto file = options_.dir / name;
+  const Checked found{fs::file_size(file, error), fs::last_write_time(file, error), steady_now(), good};
+  const std::scoped_lock lock(checked_mutex_);
+  checked_[name] = found;
+}
+
+/// Its digest stands beside it and is right, and integrity_check finds nothing. Reads all of it, once a day.
+bool BackupKeeper::whole(const Backup& backup) {
+  std::error_code error;
+  const auto file = options_.dir / backup.name;
+  {
+    const std::scoped_lock lock(checked_mutex_);
+    const auto at = checked_.find(backup.name);
+    if (at != checked_.end() && at->second.bytes == fs::file_size(file, error) &&
+        at->second.written == fs::last_write_time(file, error) &&
+        steady_now().ns - at->second.at.ns < k_believed_ns)
+      return at->second.good;
+  }
+  const bool good = !backup.sha256_hex.empty() && check_backup(file).has_value();
+  note_checked(backup.name, good);
+  return good;
+}
+
+/// What is older than the newest so many whole ones; while there are fewer, nothing goes.
+void BackupKeeper::drop_old() {
+  const std::size_t keep = std::max(options_.keep, k_fewest);
+  const auto all = list();
+  if (all.size() <= keep) return;
+  std::size_t good = 0;
+  std::error_code error;
+  for (const auto& backup : all) {
+    if (good < keep) {
+      if (whole(backup)) ++good;
+      continue;
+    }
+    fs::remove(options_.dir / backup.name, error);
+    fs::remove(options_.dir / (backup.name + ".sha256"), error);
+    const std::scoped_lock lock(checked_mutex_);
+    checked_.erase(backup.name);
+  }
 }
 
 Result<Backup> BackupKeeper::make() {
@@ -64,33 +131,41 @@ Result<Backup> BackupKeeper::make() {
   if (!error && space.available < needed)
     return make_error(Errc::storage_full,
                       "no backup: it would leave less than 500 MiB free in " + options_.dir.string());
+  const auto before = list();
   const UtcTime now = clock_.now();
-  const std::string name = name_of(now);
+  const std::uint64_t sequence = (before.empty() ? 0 : before.front().sequence) + 1;
+  const std::string name = name_of(sequence, now);
   BOOST_OUTCOME_TRY(const auto report, database_.backup(options_.dir / name));
-  const auto all = list();
-  for (std::size_t i = std::max<std::size_t>(options_.keep, 1); i < all.size(); ++i) {
-    fs::remove(options_.dir / all[i].name, error);
-    fs::remove(options_.dir / (all[i].name + ".sha256"), error);
+  note_checked(name, true);  // backup() checked what it wrote
+  {
+    const std::scoped_lock due(due_mutex_);
+    newest_ = steady_now();
   }
-  return Backup{name, now, report.bytes, report.sha256_hex};
+  drop_old();
+  return Backup{name, sequence, now, report.bytes, report.sha256_hex, true};
 }
 
 bool BackupKeeper::due(std::uint64_t flights_ended) {
   if (!options_.scheduled) return false;
   const std::scoped_lock lock(due_mutex_);
-  const UtcTime now = clock_.now();
-  if (looked_first_.ns == 0) looked_first_ = now;
+  const SteadyTime now = steady_now();
+  const std::int64_t every_ns = static_cast<std::int64_t>(options_.every_h) * k_hour_ns;
+  if (!newest_) {
+    // Without any, the day counts from the start: a fresh installation has nothing to lose yet. The age of one
+    // of an earlier start is the system clock's word; where it cannot be right, it is time for a new one.
+    const auto all = list();
+    const std::int64_t age_ns = all.empty() ? 0 : clock_.now().ns - all.front().made.ns;
+    newest_ = later(now, -(age_ns < 0 ? every_ns : std::min(age_ns, every_ns)));
+    not_before_ = now;
+  }
   if (now < not_before_) return false;
-  // Without any, the day counts from the start: a fresh installation has nothing to lose yet.
-  const auto all = list();
-  const UtcTime last = all.empty() ? looked_first_ : all.front().made;
-  const bool old = now.ns - last.ns >= static_cast<std::int64_t>(options_.every_h) * 3600 * 1'000'000'000;
+  const bool old = now.ns - newest_->ns >= every_ns;
   if (!old && flights_ended == flights_saved_) {
-    not_before_ = {now.ns + k_look_ns};
+    not_before_ = later(now, k_look_ns);
     return false;
   }
   flights_saved_ = flights_ended;
-  not_before_ = {now.ns + k_pause_ns};
+  not_before_ = later(now, k_pause_ns);
   return true;
 }
 

@@ -1,8 +1,12 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <mutex>
+#include <optional>
+#include <string>
 
+#include "core/base/steady.hpp"
 #include "core/ports/backups.hpp"
 
 namespace anchord {
@@ -11,14 +15,17 @@ class Database;
 
 namespace anchord::server {
 
-/// Backups of one database in one folder, named anchord-<UTC time>.db; other files there are left alone.
+/// Backups of one database in one folder, named anchord-<number>-<UTC time>.db; other files there are left
+/// alone. The number says which is newer: a clock that ran ahead must not make every later backup the oldest.
 class BackupKeeper final : public Backups {
  public:
+  static constexpr std::size_t k_fewest = 7;  ///< whole ones that are always left, whatever Options::keep says
   struct Options {
     std::filesystem::path dir;
-    std::size_t keep{7};  ///< older ones go, but never the only one
+    std::size_t keep{k_fewest};  ///< whole ones; what is older than the last of them goes, whole or not
     std::size_t every_h{24};
-    bool scheduled{true};  ///< false: only when asked for
+    bool scheduled{true};                ///< false: only when asked for
+    const SteadyClock* steady{nullptr};  ///< what the schedule runs on; null: the system's
   };
   BackupKeeper(Database& database, const Clock& clock, Options options);
   Result<Backup> make() override;
@@ -26,12 +33,27 @@ class BackupKeeper final : public Backups {
   bool due(std::uint64_t flights_ended) override;
 
  private:
+  /// What was found of a file when it was read whole.
+  struct Checked {
+    std::uint64_t bytes{};
+    std::filesystem::file_time_type written{};
+    SteadyTime at{};
+    bool good{false};
+  };
+  SteadyTime steady_now() const;
+  bool whole(const Backup& backup);
+  void note_checked(const std::string& name, bool good);
+  void drop_old();
+
   Database& database_;
   const Clock& clock_;
   const Options options_;
   std::mutex making_;
+  mutable std::mutex checked_mutex_;
+  std::map<std::string, Checked> checked_;
   std::mutex due_mutex_;
-  UtcTime looked_first_{}, not_before_{};
+  std::optional<SteadyTime> newest_{};  ///< when the newest was made, or the first look
+  SteadyTime not_before_{};
   std::uint64_t flights_saved_{0};
 };
 

@@ -11,8 +11,18 @@ constexpr const char* k_answer =
     "FROM stored_answer WHERE principal = ?1 AND idempotency_key = ?2";
 constexpr const char* k_keep =
     "INSERT INTO stored_answer (principal, idempotency_key, request_sha256_hex, status, body, created_t_ns, "
-    "location, etag) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8) ON CONFLICT DO NOTHING RETURNING status";
-constexpr const char* k_drop = "DELETE FROM stored_answer WHERE created_t_ns < ?1 RETURNING status";
+    "location, etag) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8) ON CONFLICT (principal, idempotency_key) DO UPDATE "
+    "SET request_sha256_hex = excluded.request_sha256_hex, status = excluded.status, body = excluded.body, "
+    "created_t_ns = excluded.created_t_ns, location = excluded.location, etag = excluded.etag "
+    "WHERE stored_answer.created_t_ns < ?9 RETURNING status";
+constexpr const char* k_use =
+    "SELECT count(*), ifnull(sum(length(body)), 0) FROM stored_answer WHERE principal = ?1";
+constexpr const char* k_drop =
+    "DELETE FROM stored_answer WHERE (principal, idempotency_key) IN (SELECT principal, idempotency_key FROM "
+    "stored_answer WHERE created_t_ns < ?1 ORDER BY created_t_ns LIMIT ?2) RETURNING status";
+constexpr const char* k_drop_oldest =
+    "DELETE FROM stored_answer WHERE principal = ?1 AND idempotency_key IN (SELECT idempotency_key FROM "
+    "stored_answer WHERE principal = ?1 ORDER BY created_t_ns LIMIT ?2) RETURNING status";
 constexpr const char* k_newest_entry =
     "SELECT number, chain_sha256_hex FROM audit ORDER BY number DESC LIMIT 1";
 constexpr const char* k_append =
@@ -59,29 +69,39 @@ class SqlAccessStore final : public AccessStore {
       const auto body = query.blob();
       for (const std::byte byte : body) found.body += static_cast<char>(byte);
       found.status = query.as<int>();
-      found.created = query.time();
+      found.created_ran_ns = query.integer();
       found.location = query.text();
       found.etag = query.text();
       return Found{std::move(found)};
     });
   }
-  Result<void> keep_answer(const StoredAnswer& answer) override {
+  Result<void> keep_answer(const StoredAnswer& answer, std::int64_t expired_ran_ns) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       Query query(c, k_keep);
       query << answer.principal << answer.key << answer.request_sha256_hex << answer.status
-            << std::as_bytes(std::span{answer.body}) << answer.created << answer.location << answer.etag;
+            << std::as_bytes(std::span{answer.body}) << answer.created_ran_ns << answer.location << answer.etag
+            << expired_ran_ns;
       if (query.returned()) return std::nullopt;
       return make_error(Errc::conflict, "an answer is kept under this key already");
     });
   }
-  Result<std::size_t> drop_answers_before(UtcTime time) override {
-    return write_value<std::size_t>(gate_, 1, [&](Connection& c) -> Result<std::size_t> {
-      Query query(c, k_drop);
-      query << time;
-      std::size_t n = 0;
-      while (query.step()) ++n;
-      return n;
+  Result<AnswerUse> answer_use(std::string_view principal) override {
+    return read_value<AnswerUse>(gate_, [&](Connection& c) -> Result<AnswerUse> {
+      Query query(c, k_use);
+      query << principal;
+      AnswerUse use;
+      if (query.step()) {
+        use.count = query.as<std::size_t>();
+        use.bytes = query.as<std::uint64_t>();
+      }
+      return use;
     });
+  }
+  Result<std::size_t> drop_answers_before(std::int64_t ran_ns, std::size_t most) override {
+    return drop([&](Query& query) { query << ran_ns << row_limit(most); }, k_drop);
+  }
+  Result<std::size_t> drop_oldest_answers(std::string_view principal, std::size_t most) override {
+    return drop([&](Query& query) { query << principal << row_limit(most); }, k_drop_oldest);
   }
   Result<void> append_audit(const AuditEntry& entry) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
@@ -135,6 +155,16 @@ class SqlAccessStore final : public AccessStore {
   }
 
  private:
+  template <class Bind>
+  Result<std::size_t> drop(Bind bind, const char* text) {
+    return write_value<std::size_t>(gate_, 1, [&](Connection& c) -> Result<std::size_t> {
+      Query query(c, text);
+      bind(query);
+      std::size_t n = 0;
+      while (query.step()) ++n;
+      return n;
+    });
+  }
   Gate& gate_;
 };
 

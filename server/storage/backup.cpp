@@ -106,6 +106,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+}  // namespace
+
 Result<void> check_backup(const fs::path& backup) {
   std::error_code error;
   if (!fs::is_regular_file(backup, error)) return make_error(Errc::not_found, "no file " + backup.string());
@@ -129,8 +131,6 @@ Result<void> check_backup(const fs::path& backup) {
   }
   return boost::outcome_v2::success();
 }
-
-}  // namespace
 
 Result<std::optional<fs::path>> restore_backup(const fs::path& data_dir, const fs::path& backup) {
   BOOST_OUTCOME_TRY(const auto folder, sql::DataFolder::open(data_dir, 0));

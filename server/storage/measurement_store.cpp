@@ -21,11 +21,11 @@ constexpr const char* k_note_device =
 constexpr const char* k_devices_of_mission =
     "SELECT d.network_id, d.kind, m.id, d.first_t_ns, d.last_t_ns, d.n_ranges "
     "FROM device_seen d JOIN mission m ON m.mission_key = d.mission_key "
-    "WHERE m.id = ?1 ORDER BY d.last_t_ns DESC, d.network_id";
+    "WHERE m.id = ?1 AND m.mission_key NOT IN (SELECT mission_key FROM mission_bin) ORDER BY d.last_t_ns DESC, d.network_id";
 constexpr const char* k_devices =
     "SELECT d.network_id, d.kind, m.id, d.first_t_ns, d.last_t_ns, d.n_ranges "
-    "FROM device_seen d JOIN mission m ON m.mission_key = d.mission_key ORDER BY d.last_t_ns DESC, "
-    "d.network_id";
+    "FROM device_seen d JOIN mission m ON m.mission_key = d.mission_key "
+    "WHERE m.mission_key NOT IN (SELECT mission_key FROM mission_bin) ORDER BY d.last_t_ns DESC, d.network_id";
 constexpr const char* k_count_ranges = "SELECT count(*) FROM uwb_range WHERE mission_key = ?1";
 constexpr const char* k_count_fixes = "SELECT count(*) FROM fix WHERE mission_key = ?1";
 
@@ -177,7 +177,10 @@ std::string where_text(const MeasurementStore::Filter& filter, int& n) {
   std::string where;
   const auto bare = [&](const std::string& text) { where += (where.empty() ? " WHERE " : " AND ") + text; };
   const auto term = [&](const std::string& text) { bare(text + "?" + std::to_string(++n)); };
-  if (filter.mission) term("mission_key = ");
+  if (filter.mission)
+    term("mission_key = ");
+  else
+    bare("mission_key NOT IN (SELECT mission_key FROM mission_bin)");
   if (filter.since) term("t_ns >= ");
   if (filter.until) term("t_ns < ");
   if constexpr (std::is_same_v<Row, Range>) {
@@ -286,7 +289,7 @@ class SqlMeasurementStore final : public MeasurementStore {
   Result<Range> range(std::int64_t id) override {
     return read_value<Range>(gate_, [&](Connection& c) -> Result<Range> {
       static const std::string text =
-          "SELECT " + std::string(Table<Range>::columns) + " FROM uwb_range WHERE range_id = ?1";
+          "SELECT " + std::string(Table<Range>::columns) + " FROM uwb_range WHERE range_id = ?1 AND mission_key NOT IN (SELECT mission_key FROM mission_bin)";
       Query query(c, text);
       query << id;
       if (!query.step()) return make_error(Errc::not_found, "no range " + std::to_string(id));

@@ -6,7 +6,11 @@
 namespace anchord::sql {
 namespace {
 
-constexpr const char* k_key = "SELECT mission_key FROM mission WHERE id = ?1";
+// What is in the bin exists for the bin alone (mission_bin_store.cpp).
+constexpr const char* k_not_binned = "mission_key NOT IN (SELECT mission_key FROM mission_bin)";
+constexpr const char* k_key =
+    "SELECT mission_key FROM mission WHERE id = ?1 AND mission_key NOT IN (SELECT mission_key FROM mission_bin)";
+constexpr const char* k_id_taken = "SELECT count(*) FROM mission WHERE id = ?1";
 constexpr const char* k_insert =
     "INSERT INTO mission (id, site_id, name, kit, radio, frame, track_point, state, created_t_ns, "
     "finished_t_ns) "
@@ -28,10 +32,10 @@ constexpr const char* k_tags =
     "SELECT tag, antenna, lever_arm_forward_m, lever_arm_left_m, lever_arm_up_m FROM mission_tag "
     "WHERE mission_key = ?1 ORDER BY ordinal";
 constexpr const char* k_drop_tags = "DELETE FROM mission_tag WHERE mission_key = ?1";
-constexpr const char* k_calibrations =
-    "SELECT count(*) FROM calibration_mission cm JOIN mission m ON m.mission_key = cm.mission_key WHERE m.id "
-    "= ?1";
-constexpr const char* k_remove = "DELETE FROM mission WHERE id = ?1 RETURNING mission_key";
+constexpr const char* k_binned =
+    "SELECT b.deleted_t_ns, b.deleted_ran_ns, b.deleted_by, b.emptying, (SELECT count(*) FROM uwb_range r WHERE "
+    "r.mission_key = b.mission_key), (SELECT count(*) FROM fix f WHERE f.mission_key = b.mission_key), m.id "
+    "FROM mission_bin b JOIN mission m ON m.mission_key = b.mission_key ORDER BY b.deleted_ran_ns DESC, b.mission_key DESC";
 constexpr const char* k_site = "SELECT 1 FROM site WHERE id = ?1";
 
 Error no_mission(const MissionId& id) { return make_error(Errc::not_found, "no mission " + to_string(id)); }
@@ -86,7 +90,7 @@ Mission read(Connection& connection, Query& query) {
 }
 
 Result<Mission> find(Connection& c, const MissionId& id) {
-  static const std::string text = std::string(k_columns) + "WHERE id = ?1";
+  static const std::string text = std::string(k_columns) + "WHERE id = ?1 AND " + k_not_binned;
   Query query(c, text);
   query << id;
   if (!query.step()) return no_mission(id);
@@ -100,7 +104,9 @@ class SqlMissionStore final : public MissionStore {
   Result<void> insert(const Mission& mission) override {
     if (auto refusal = admit_()) return *std::move(refusal);
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      if (mission_key(c, mission.id))
+      Query taken(c, k_id_taken);
+      taken << mission.id;
+      if (taken.step() && taken.integer() > 0)
         return make_error(Errc::conflict, "mission " + to_string(mission.id) + " exists");
       if (auto error = check_site(c, mission)) return error;
       Query query(c, k_insert);
@@ -113,6 +119,7 @@ class SqlMissionStore final : public MissionStore {
   Result<void> update(const Mission& mission) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       if (auto error = check_site(c, mission)) return error;
+      if (!mission_key(c, mission.id)) return no_mission(mission.id);
       Query query(c, k_update);
       bind(query, mission);
       const auto key = query.returned();
@@ -142,30 +149,18 @@ class SqlMissionStore final : public MissionStore {
 
   Result<std::vector<Mission>> missions(std::size_t limit, const std::optional<MissionId>& after) override {
     return read_value<std::vector<Mission>>(gate_, [&](Connection& c) -> Result<std::vector<Mission>> {
-      static const std::string first = std::string(k_columns) + "ORDER BY id DESC LIMIT ?1";
-      static const std::string next = std::string(k_columns) + "WHERE id < ?1 ORDER BY id DESC LIMIT ?2";
+      // By the database's own numbers: an id has the time of a clock in it that somebody may have set back.
+      static const std::string first =
+          std::string(k_columns) + "WHERE " + k_not_binned + " ORDER BY mission_key DESC LIMIT ?1";
+      static const std::string next = std::string(k_columns) + "WHERE " + k_not_binned +
+                                      " AND mission_key < (SELECT mission_key FROM mission WHERE id = ?1) "
+                                      "ORDER BY mission_key DESC LIMIT ?2";
       Query query(c, after ? next : first);
       if (after) query << *after;
       query << row_limit(limit);
       std::vector<Mission> found;
       while (query.step()) found.push_back(read(c, query));
       return found;
-    });
-  }
-
-  Result<void> remove(const MissionId& id) override {
-    return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      Query used(c, k_calibrations);
-      used << id;
-      used.step();
-      const std::int64_t n = used.integer();
-      if (n > 0) {
-        return make_error(Errc::conflict, "mission " + to_string(id) + " is used by " + std::to_string(n) +
-                                              (n == 1 ? " calibration" : " calibrations"));
-      }
-      Query query(c, k_remove);
-      query << id;
-      return query.returned() ? std::nullopt : std::optional(no_mission(id));
     });
   }
 
@@ -184,6 +179,26 @@ std::optional<std::int64_t> mission_key(Connection& connection, const MissionId&
   Query query(connection, k_key);
   query << id;
   return query.step() ? std::optional(query.integer()) : std::nullopt;
+}
+
+std::vector<BinnedMission> read_binned_missions(Connection& connection) {
+  static const std::string text = std::string(k_columns) + "WHERE id = ?1";
+  std::vector<BinnedMission> found;
+  Query query(connection, k_binned);
+  while (query.step()) {
+    BinnedMission one;
+    one.deleted = query.time();
+    one.deleted_ran_ns = query.integer();
+    one.deleted_by = query.text();
+    one.emptying = query.integer() != 0;
+    one.n_ranges = query.as<std::uint64_t>();
+    one.n_fixes = query.as<std::uint64_t>();
+    Query mission(connection, text);
+    mission << query.id<MissionId>();
+    if (mission.step()) one.mission = read(connection, mission);
+    found.push_back(std::move(one));
+  }
+  return found;
 }
 
 std::int64_t row_limit(std::size_t limit) {

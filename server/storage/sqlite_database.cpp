@@ -57,7 +57,9 @@ class SqliteDatabase final : public Database, private sql::Gate {
         datasets_(sql::make_dataset_store(*this)),
         training_runs_(sql::make_training_run_store(*this)),
         models_(sql::make_model_store(*this)),
-        plans_(sql::make_plan_store(*this)) {
+        plans_(sql::make_plan_store(*this)),
+        bin_(sql::make_mission_bin(*this)),
+        service_(sql::make_service_store(*this)) {
     if (check_in_background) checker_ = Thread("anchord-check", [this] { check_in_background_thread(); });
   }
   ~SqliteDatabase() override {
@@ -78,6 +80,8 @@ class SqliteDatabase final : public Database, private sql::Gate {
   TrainingRunStore& training_runs() override { return *training_runs_; }
   ModelStore& models() override { return *models_; }
   PlanStore& plans() override { return *plans_; }
+  MissionBin& bin() override { return *bin_; }
+  ServiceStore& service() override { return *service_; }
 
   StorageHealth health() override {
     const auto status = writer_.status();
@@ -172,6 +176,8 @@ class SqliteDatabase final : public Database, private sql::Gate {
   std::unique_ptr<TrainingRunStore> training_runs_;
   std::unique_ptr<ModelStore> models_;
   std::unique_ptr<PlanStore> plans_;
+  std::unique_ptr<MissionBin> bin_;
+  std::unique_ptr<ServiceStore> service_;
   Thread checker_;
 };
 

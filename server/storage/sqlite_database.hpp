@@ -9,6 +9,7 @@
 
 #include "core/base/result.hpp"
 #include "core/ports/learning_store.hpp"
+#include "core/ports/mission_bin.hpp"
 #include "core/ports/plan_store.hpp"
 #include "core/ports/site_store.hpp"
 #include "core/ports/store.hpp"
@@ -79,6 +80,8 @@ class Database {
   virtual TrainingRunStore& training_runs() = 0;
   virtual ModelStore& models() = 0;
   virtual PlanStore& plans() = 0;
+  virtual MissionBin& bin() = 0;
+  virtual ServiceStore& service() = 0;
   virtual StorageHealth health() = 0;
   /// Online copy while writes go on: fsynced, integrity-checked, with its SHA-256. The file must not exist.
   virtual Result<BackupReport> backup(const std::filesystem::path& file) = 0;
@@ -89,6 +92,10 @@ class Database {
 /// by anchord; the file is untouched), storage_unavailable (damaged, or missing where one was: with the
 /// commands that recover), storage_full.
 Result<std::unique_ptr<Database>> open_database(const StorageOptions& options);
+
+/// Whether a backup is whole: its SHA-256 where it was written down, integrity_check, ours and not newer.
+/// Reads all of it. Errors: not_found, unsupported.
+Result<void> check_backup(const std::filesystem::path& backup);
 
 /// Puts a backup in the place of a folder's database, which nobody may have open. The backup is checked
 /// first (its .sha256 where there is one, integrity_check), and what stood there is kept beside it.

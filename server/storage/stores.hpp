@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "core/ports/learning_store.hpp"
+#include "core/ports/mission_bin.hpp"
 #include "core/ports/plan_store.hpp"
 #include "core/ports/site_store.hpp"
 #include "core/ports/store.hpp"
@@ -29,9 +30,13 @@ std::unique_ptr<DatasetStore> make_dataset_store(Gate& gate);
 std::unique_ptr<TrainingRunStore> make_training_run_store(Gate& gate);
 std::unique_ptr<ModelStore> make_model_store(Gate& gate);
 std::unique_ptr<PlanStore> make_plan_store(Gate& gate);
+std::unique_ptr<MissionBin> make_mission_bin(Gate& gate);
+std::unique_ptr<ServiceStore> make_service_store(Gate& gate);
 
-/// The short form of a mission's id; nothing when there is no such mission.
+/// The short form of a mission's id; nothing when there is no such mission, or when it is in the bin.
 std::optional<std::int64_t> mission_key(Connection& connection, const MissionId& id);
+/// What is in the bin, last deleted first.
+std::vector<BinnedMission> read_binned_missions(Connection& connection);
 
 /// SQL's LIMIT of a page size that comes from outside.
 std::int64_t row_limit(std::size_t limit);

@@ -17,13 +17,16 @@ using api::AlarmPriority;
 using api::FlightPulse;
 
 UtcTime at(double s) { return UtcTime::from_seconds(1e9 + s); }
+/// The same by the steady clock, which knows nothing of 2001.
+SteadyTime steady(double s) { return {static_cast<std::int64_t>(s * 1e9)}; }
 
 /// A flight in which everything is well at second 100.
 FlightPulse well() {
   FlightPulse f;
   f.name = "flight";
-  f.now = at(100);
-  f.newest_fix = f.newest_range = f.fix_arrival = f.range_arrival = at(100);
+  f.now = steady(100);
+  f.newest_fix = f.newest_range = at(100);
+  f.fix_arrival = f.range_arrival = steady(100);
   f.fix = FixClass::rtk_fixed;
   f.as_it_happens = true;
   return f;
@@ -49,9 +52,11 @@ TEST(AlarmRules, CallRtkLostAfterTwoSecondsBelowFloat) {
 
 TEST(AlarmRules, CallRtkLostWhenTheRoverFallsSilentWhileRangesCome) {
   auto f = well();
-  f.newest_fix = f.fix_arrival = at(97);
+  f.newest_fix = at(97);
+  f.fix_arrival = steady(97);
   EXPECT_EQ(raised(f), "rtk.lost");
-  f.newest_fix = f.fix_arrival = at(98.5);
+  f.newest_fix = at(98.5);
+  f.fix_arrival = steady(98.5);
   EXPECT_EQ(raised(f), "");
 }
 
@@ -72,7 +77,8 @@ TEST(AlarmRules, CallFloatAfterFiveSecondsWhileRanging) {
 
 TEST(AlarmRules, CallForRangesAfterFiveSecondsWithout) {
   auto f = well();
-  f.newest_range = f.range_arrival = at(94);
+  f.newest_range = at(94);
+  f.range_arrival = steady(94);
   EXPECT_EQ(raised(f), "uwb.none");
   f.newest_range.reset();
   f.range_arrival.reset();
@@ -94,7 +100,7 @@ TEST(AlarmRules, SayNothingOfUploadsAndOfFlightsThatAreOver) {
   f.as_it_happens = false;
   EXPECT_EQ(raised(f), "");
   f.as_it_happens = true;
-  f.now = at(140);
+  f.now = steady(140);
   EXPECT_EQ(raised(f), "");
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -50,6 +51,9 @@ class AppFixture : public ::testing::Test {
     deps.post = std::move(post);
     deps.goal = goal;
     deps.learning = &*learning_;
+    deps.bin = &database_->bin();
+    deps.service = &database_->service();
+    deps.housekeeping_by_hand = true;
     configure(deps);
     app_ = std::make_unique<api::Application>(std::move(deps));
     app_->start();
@@ -115,7 +119,14 @@ class AppFixture : public ::testing::Test {
     return json(response).value("id", "");
   }
 
-  SystemClock clock_;
+  /// The system's, unless a test sets it: ahead by so much.
+  struct SetClock final : Clock {
+    UtcTime now() const override {
+      return {SystemClock{}.now().ns + static_cast<std::int64_t>(ahead_s * 1e9)};
+    }
+    std::atomic<double> ahead_s{0};
+  };
+  SetClock clock_;
   std::filesystem::path dir_;
   std::unique_ptr<Database> database_;
   std::optional<api::LearningStores> learning_;

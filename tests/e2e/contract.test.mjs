@@ -250,7 +250,20 @@ test('wrong requests get the problems that are promised', async () => {
 
 test('what can be deleted', async () => {
   const etag = (path) => call('GET', path, { expect: 200 }).then((answer) => answer.headers.get('etag'));
-  for (const path of [`/api/v1/missions/${ids.spare}`, `/api/v1/frames/${ids.frame}`, `/api/v1/sites/${ids.site}`]) {
+  const spare = `/api/v1/missions/${ids.spare}`;
+  await call('DELETE', spare, { expect: 409, headers: { 'if-match': await etag(spare) } });  // it records
+  await call('POST', `${spare}/actions`, { expect: 422, json: { action: 'take_devices', lease: 'x', no_such_field: 1 } });
+  await call('POST', `${spare}/actions`, { expect: 200, json: { action: 'finish' } });
+  await call('DELETE', spare, { expect: 428 });
+  await call('DELETE', spare, { expect: 412, headers: { 'if-match': '"m-0"' } });
+  await call('DELETE', spare, { expect: 204, headers: { 'if-match': await etag(spare) } });
+  await call('GET', spare, { expect: 410 });
+  assert.equal((await call('GET', '/api/v1/missions?deleted=true', { expect: 200 })).json.items[0].id, ids.spare);
+  await call('POST', `${spare}/restore`, { expect: 200 });
+  await call('POST', `${spare}/restore`, { expect: 409 });
+  await call('DELETE', spare, { expect: 204, headers: { 'if-match': await etag(spare) } });
+  await call('DELETE', `${spare}?purge=true`, { expect: 204, headers: { 'if-match': await etag(`${spare}?deleted=true`) } });
+  for (const path of [`/api/v1/frames/${ids.frame}`, `/api/v1/sites/${ids.site}`]) {
     const answer = await call('DELETE', path, { headers: { 'if-match': (await etag(path)) ?? '*' } });
     assert.ok(answer.status < 300, `${path}: ${answer.status} ${answer.text}`);
   }

@@ -127,6 +127,31 @@ test('a recorded flight, played again, is the same rows: known to its own server
   assert.equal((await run(['replay', file, '--url', server.url, '--loop'])).code, 2);
 });
 
+test('a second flight gets no rows of the devices until it takes them, and gives them back', async () => {
+  const body = { frame: 'wgs84', track_point: 'gnss_antenna' };
+  const make = async (more) => (await server.fetch('/api/v1/missions', { json: { ...body, ...more } })).json();
+  const n_ranges = async (mission) => (await get(`/api/v1/missions/${mission.id}`)).n_ranges;
+  const finish = (mission) => server.fetch(`/api/v1/missions/${mission.id}/actions`, { json: { action: 'finish' } });
+  const first = await make({ name: 'first' });
+  assert.deepEqual(first.devices, { recording: true, held_by: null });
+  await eventually('ranges of the first', async () => await n_ranges(first) > 5, 30_000);
+  const second = await make({ name: 'second' });
+  assert.deepEqual(second.devices, { recording: false, held_by: { mission: first.id, name: 'first' } });
+  const before = await n_ranges(first);
+  await eventually('the first goes on', async () => await n_ranges(first) > before + 5, 30_000);
+  assert.equal(await n_ranges(second), 0);
+  const { lease } = await (await server.fetch(`/api/v1/missions/${first.id}/control`, { json: { action: 'take' } })).json();
+  const third = await make({ name: 'third', take_devices: true, lease });
+  assert.equal(third.devices.recording, true);
+  await eventually('ranges of the third', async () => await n_ranges(third) > 5, 30_000);
+  await finish(third);
+  const handed_back = await n_ranges(first);
+  await eventually('the first has them back', async () => await n_ranges(first) > handed_back + 5, 30_000);
+  assert.equal(await n_ranges(second), 0);
+  await finish(second);
+  await finish(first);
+});
+
 test('a device clock that drifts raises an alarm, and it is over with the device', async () => {
   const skew = async () => (await get('/api/v1/alarms')).items.find((alarm) => alarm.id === 'clock.skew');
   await eventually('the alarm', skew, 60_000);

@@ -10,10 +10,22 @@
 namespace anchord::test {
 namespace {
 
+constexpr double k_300_days_h = 300 * 24;
+
+struct HandSteady final : SteadyClock {
+  SteadyTime now() const override { return time; }
+  SteadyTime time{5'000'000'000};
+};
 struct HandClock final : Clock {
   UtcTime now() const override { return time; }
   UtcTime time{1'777'889'472'000'000'000};
-  void pass_h(double hours) { time.ns += static_cast<std::int64_t>(hours * 3.6e12); }
+  HandSteady steady;
+  void pass_h(double hours) {
+    step_h(hours);
+    steady.time.ns += static_cast<std::int64_t>(hours * 3.6e12);
+  }
+  /// Somebody sets it; no time passes.
+  void step_h(double hours) { time.ns += static_cast<std::int64_t>(hours * 3.6e12); }
 };
 
 class BackupFiles : public ::testing::Test {
@@ -30,7 +42,7 @@ class BackupFiles : public ::testing::Test {
   std::filesystem::path data() const { return dir_.path() / "data"; }
   std::filesystem::path copies() const { return dir_.path() / "copies"; }
   server::BackupKeeper keeper(std::size_t keep = 7) {
-    return server::BackupKeeper(*database_, clock_, {copies(), keep, 24, true});
+    return server::BackupKeeper(*database_, clock_, {copies(), keep, 24, true, &clock_.steady});
   }
   MissionId mission(const std::string& name) {
     Mission mission;
@@ -46,19 +58,85 @@ class BackupFiles : public ::testing::Test {
 };
 
 TEST_F(BackupFiles, KeepsTheNewestAndNothingOfOthers) {
-  auto backups = keeper(2);
+  auto backups = keeper();
   std::filesystem::create_directories(copies());
   std::ofstream(copies() / "before-migration-2.db") << "not ours to delete";
-  for (int i = 0; i < 4; ++i) {
+  for (int i = 0; i < 9; ++i) {
     clock_.pass_h(1);
     ASSERT_TRUE(backups.make());
   }
   const auto kept = backups.list();
-  ASSERT_EQ(kept.size(), 2u);
+  ASSERT_EQ(kept.size(), 7u);
   EXPECT_EQ(kept[0].made, clock_.time) << "newest first";
+  EXPECT_EQ(kept[0].sequence, 9u);
   EXPECT_EQ(kept[0].sha256_hex.size(), 64u);
   EXPECT_EQ(kept[0].bytes, std::filesystem::file_size(copies() / kept[0].name));
   EXPECT_TRUE(std::filesystem::exists(copies() / "before-migration-2.db"));
+}
+
+// A clock that ran ahead while seven were made: from then on each new one was the oldest by name, and went.
+TEST_F(BackupFiles, KeepsEachNewOneAfterTheClockRanAhead) {
+  auto backups = keeper();
+  clock_.step_h(k_300_days_h);
+  for (int i = 0; i < 7; ++i) ASSERT_TRUE(backups.make());
+  clock_.step_h(-k_300_days_h);
+  for (int i = 0; i < 3; ++i) {
+    const auto made = backups.make();
+    ASSERT_TRUE(made);
+    EXPECT_TRUE(std::filesystem::exists(copies() / made.value().name));
+    EXPECT_EQ(backups.list().front().name, made.value().name);
+  }
+  EXPECT_EQ(backups.list().size(), 7u);
+  EXPECT_EQ(keeper().list().front().sequence, 10u) << "also for the next process";
+}
+
+TEST_F(BackupFiles, NumbersGoOnAfterFilesOfBeforeThereWereNumbers) {
+  std::filesystem::create_directories(copies());
+  std::ofstream(copies() / "anchord-2030-01-01T00-00-00.000000Z.db") << "of an older anchord, its clock ahead";
+  const auto made = keeper().make();
+  ASSERT_TRUE(made);
+  EXPECT_EQ(made.value().sequence, 1u);
+  const auto all = keeper().list();
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_EQ(all[0].name, made.value().name);
+}
+
+TEST_F(BackupFiles, NeverFallBelowSevenGoodOnesAndABadOneCountsForNothing) {
+  auto backups = keeper(1);
+  for (int i = 0; i < 7; ++i) ASSERT_TRUE(backups.make());
+  ASSERT_EQ(backups.list().size(), 7u) << "asked for one, kept seven";
+  const auto spoil = [&](const std::string& name) {
+    std::fstream file(copies() / name, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(9000);
+    file.put('?');
+    clock_.pass_h(25);  // what was found good is read again
+  };
+  const auto all = backups.list();
+  spoil(all[1].name);
+  std::filesystem::remove(copies() / (all[2].name + ".sha256"));
+  ASSERT_TRUE(backups.make());
+  ASSERT_TRUE(backups.make());
+  EXPECT_EQ(backups.list().size(), 9u) << "seven good ones among nine: nothing may go";
+  ASSERT_TRUE(backups.make());
+  const auto left = backups.list();
+  ASSERT_EQ(left.size(), 9u) << "the oldest good one went";
+  EXPECT_EQ(std::ranges::count(left, std::optional(false), &Backup::good), 2);
+  EXPECT_EQ(std::ranges::count(left, std::optional(true), &Backup::good), 7);
+}
+
+TEST_F(BackupFiles, AreDueByTheSteadyClockWhateverTheSystemClockSays) {
+  auto backups = keeper();
+  EXPECT_FALSE(backups.due(0));
+  clock_.step_h(k_300_days_h);
+  EXPECT_FALSE(backups.due(0)) << "a step ahead is no day that passed";
+  ASSERT_TRUE(backups.make());
+  clock_.step_h(-2 * k_300_days_h);
+  clock_.pass_h(23);
+  EXPECT_FALSE(backups.due(0));
+  clock_.pass_h(1.1);
+  EXPECT_TRUE(backups.due(0)) << "a step back holds none up";
+  auto next_start = keeper();
+  EXPECT_TRUE(next_start.due(0)) << "the newest seems to be of the future: better one more";
 }
 
 TEST_F(BackupFiles, AreDueEachDayAndAfterEveryFlightButNotAllTheTime) {
@@ -76,7 +154,7 @@ TEST_F(BackupFiles, AreDueEachDayAndAfterEveryFlightButNotAllTheTime) {
   EXPECT_FALSE(backups.due(2)) << "another, half a minute later";
   clock_.pass_h(0.2);
   EXPECT_TRUE(backups.due(2));
-  server::BackupKeeper off(*database_, clock_, {copies(), 7, 24, false});
+  server::BackupKeeper off(*database_, clock_, {copies(), 7, 24, false, &clock_.steady});
   clock_.pass_h(100);
   EXPECT_FALSE(off.due(9));
 }

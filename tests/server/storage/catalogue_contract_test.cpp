@@ -55,7 +55,7 @@ TEST_P(MissionStoreContract, UpdatesAllOfAMissionAndNamesAnUnknownOne) {
   m.id = MissionId{make_uuid_v7(k_noon)};
   EXPECT_EQ(db_->missions().update(m).error().code, Errc::not_found);
   EXPECT_EQ(db_->missions().mission(m.id).error().code, Errc::not_found);
-  EXPECT_EQ(db_->missions().remove(m.id).error().code, Errc::not_found);
+  EXPECT_EQ(db_->bin().put(m.id, k_noon, 0, "me").error().code, Errc::not_found);
 }
 
 TEST_P(MissionStoreContract, RefusesTheSameIdTwiceAndASiteThatIsNotThere) {
@@ -82,18 +82,121 @@ TEST_P(MissionStoreContract, ListsNewestFirstPageByPage) {
   EXPECT_EQ(next[2].id, ids[0]);
 }
 
-TEST_P(MissionStoreContract, TakesMeasurementsAlongWhenRemovedUnlessACalibrationUsesIt) {
+TEST_P(MissionStoreContract, ListsByInsertionAlsoWhenTheClockWasSetBack) {
+  Mission ahead, after;
+  ahead.id = MissionId{make_uuid_v7(UtcTime{k_noon.ns + 300LL * 86'400 * 1'000'000'000})};
+  after.id = MissionId{make_uuid_v7(k_noon)};
+  ASSERT_TRUE(db_->missions().insert(ahead));
+  ASSERT_TRUE(db_->missions().insert(after));
+  EXPECT_EQ(db_->missions().missions(1, std::nullopt).value()[0].id, after.id);
+  EXPECT_EQ(db_->missions().missions(1, after.id).value()[0].id, ahead.id);
+}
+
+TEST_P(MissionStoreContract, HidesWhatIsInTheBinAndGivesItBackWhole) {
+  auto m = stored_mission();
+  const auto other = stored_mission();
+  m.state = MissionState::finished;
+  ASSERT_TRUE(db_->missions().update(m));
+  ASSERT_TRUE(db_->measurements().append_ranges({range_at(m.id, 1), range_at(other.id, 1)}, false));
+  ASSERT_TRUE(db_->measurements().append_fixes({fix_at(m.id, 1)}, false));
+  const auto id = db_->measurements().ranges({.mission = m.id}).value().ids.at(0);
+  EXPECT_EQ(db_->bin().restore(m.id).error().code, Errc::not_found) << "it is not in there";
+  ASSERT_TRUE(db_->bin().put(m.id, k_noon, 7, "me"));
+  EXPECT_EQ(db_->bin().put(m.id, k_noon, 7, "me").error().code, Errc::not_found) << "twice";
+  EXPECT_EQ(db_->missions().mission(m.id).error().code, Errc::not_found);
+  EXPECT_EQ(db_->missions().update(m).error().code, Errc::not_found);
+  EXPECT_EQ(db_->missions().insert(m).error().code, Errc::conflict) << "its id is taken";
+  EXPECT_EQ(db_->missions().missions(10, std::nullopt).value().size(), 1u);
+  EXPECT_EQ(db_->measurements().ranges({}).value().rows.size(), 1u) << "no query finds its rows";
+  EXPECT_TRUE(db_->measurements().ranges({.mission = m.id}).value().rows.empty());
+  EXPECT_TRUE(db_->measurements().fixes({}).value().rows.empty());
+  EXPECT_EQ(db_->measurements().range(id).error().code, Errc::not_found);
+  EXPECT_EQ(db_->measurements().count_ranges({}).value(), 1u);
+  EXPECT_EQ(db_->measurements().devices(m.id).value().size(), 0u);
+  EXPECT_EQ(db_->measurements().append_ranges({range_at(m.id, 2)}, false).value()[0], RowOutcome::unknown_mission);
+  const auto list = db_->bin().list().value();
+  ASSERT_EQ(list.size(), 1u);
+  EXPECT_EQ(list[0].mission.name, m.name);
+  EXPECT_EQ(list[0].deleted_by, "me");
+  EXPECT_EQ(list[0].deleted_ran_ns, 7);
+  EXPECT_EQ(list[0].n_ranges, 1u);
+  EXPECT_EQ(list[0].n_fixes, 1u);
+  ASSERT_TRUE(db_->bin().restore(m.id));
+  EXPECT_EQ(db_->missions().mission(m.id).value().state, MissionState::finished);
+  EXPECT_EQ(db_->measurements().ranges({.mission = m.id}).value().rows.size(), 1u);
+  EXPECT_TRUE(db_->bin().list().value().empty());
+}
+
+TEST_P(MissionStoreContract, PutsNothingIntoTheBinThatRecordsOrACalibrationStandsOn) {
+  auto recording = stored_mission();
+  recording.state = MissionState::recording;
+  ASSERT_TRUE(db_->missions().update(recording));
+  EXPECT_EQ(db_->bin().put(recording.id, k_noon, 0, "me").error().code, Errc::conflict);
+  auto used = stored_mission();
+  used.state = MissionState::finished;
+  ASSERT_TRUE(db_->missions().update(used));
+  ASSERT_TRUE(db_->measurements().append_ranges({range_at(used.id, 1)}, false));
+  stored_calibration(used, {1});
+  const auto refused = db_->bin().put(used.id, k_noon, 0, "me");
+  EXPECT_EQ(refused.error().code, Errc::conflict);
+  EXPECT_NE(refused.error().message.find("1 calibration"), std::string::npos) << refused.error().message;
+}
+
+TEST_P(MissionStoreContract, EmptiesTheBinByRunningTimeASliceAtATime) {
+  auto old = stored_mission(), young = stored_mission();
+  for (auto* m : {&old, &young}) {
+    m->state = MissionState::finished;
+    ASSERT_TRUE(db_->missions().update(*m));
+    std::vector<Range> rows;
+    for (int i = 1; i <= 10; ++i) {
+      rows.push_back(range_at(m->id, i));
+      rows.back().cir = Cir{};
+    }
+    ASSERT_TRUE(db_->measurements().append_ranges(rows, false));
+    ASSERT_TRUE(db_->measurements().append_fixes({fix_at(m->id, 1)}, false));
+  }
+  ASSERT_TRUE(db_->bin().put(old.id, k_noon, 100, "me"));
+  ASSERT_TRUE(db_->bin().put(young.id, k_noon, 200, "me"));
+  EXPECT_EQ(db_->bin().remove_rows(5).value(), 0u) << "nothing is due";
+  EXPECT_EQ(db_->bin().empty_before(200).value(), 1u);
+  EXPECT_EQ(db_->bin().restore(old.id).error().code, Errc::conflict) << "too late";
+  EXPECT_TRUE(db_->bin().binned(old.id).value().emptying);
+  EXPECT_EQ(db_->bin().remove_rows(6).value(), 6u);
+  EXPECT_EQ(db_->bin().remove_rows(6).value(), 6u) << "four ranges, the fix and the mission";
+  EXPECT_EQ(db_->bin().remove_rows(6).value(), 0u);
+  EXPECT_EQ(db_->bin().binned(old.id).error().code, Errc::not_found);
+  ASSERT_TRUE(db_->bin().restore(young.id));
+  EXPECT_EQ(db_->measurements().ranges({.limit = 50}).value().rows.size(), 10u);
+}
+
+TEST_P(MissionStoreContract, KeepsRunningTimeAndTheStreamOfTheDevices) {
+  EXPECT_EQ(db_->service().running_ns().value(), 0);
+  ASSERT_TRUE(db_->service().keep_running_ns(500));
+  ASSERT_TRUE(db_->service().keep_running_ns(400));
+  EXPECT_EQ(db_->service().running_ns().value(), 500) << "never goes back";
+  const auto a = stored_mission(), b = stored_mission();
+  EXPECT_TRUE(db_->service().device_stream().value().empty());
+  ASSERT_TRUE(db_->service().keep_device_stream({b.id, a.id}));
+  EXPECT_EQ(db_->service().device_stream().value(), (std::vector{b.id, a.id}));
+  ASSERT_TRUE(db_->service().keep_device_stream({a.id}));
+  EXPECT_EQ(db_->service().device_stream().value(), std::vector{a.id});
+}
+
+TEST_P(MissionStoreContract, TakesMeasurementsAlongWhenTheBinIsEmptied) {
   const auto used = stored_mission();
-  const auto unused = stored_mission();
+  auto unused = stored_mission();
+  unused.state = MissionState::finished;
+  ASSERT_TRUE(db_->missions().update(unused));
   for (const auto& m : {used, unused}) {
     Range row = range_at(m.id, 1);
     row.cir = Cir{};
     ASSERT_TRUE(db_->measurements().append_ranges({row}, false));
     ASSERT_TRUE(db_->measurements().append_fixes({fix_at(m.id, 1)}, false));
   }
-  stored_calibration(used, {1});
-  EXPECT_EQ(db_->missions().remove(used.id).error().code, Errc::conflict);
-  ASSERT_TRUE(db_->missions().remove(unused.id));
+  ASSERT_TRUE(db_->bin().put(unused.id, k_noon, 0, "me"));
+  ASSERT_TRUE(db_->bin().empty(unused.id));
+  while (db_->bin().remove_rows(1).value() > 0) {
+  }
   const auto left = db_->measurements().ranges({}).value();
   ASSERT_EQ(left.rows.size(), 1u);
   EXPECT_EQ(left.rows[0].mission, used.id);
@@ -132,7 +235,12 @@ TEST_P(AnchorStoreContract, ChangesASiteOnlyFromTheVersionNamed) {
   m.site = site.id;
   ASSERT_TRUE(db_->missions().insert(m));
   EXPECT_EQ(db_->anchors().remove(site.id, 2).error().code, Errc::conflict);
-  ASSERT_TRUE(db_->missions().remove(m.id));
+  m.state = MissionState::finished;
+  ASSERT_TRUE(db_->missions().update(m));
+  ASSERT_TRUE(db_->bin().put(m.id, k_noon, 0, "me"));
+  EXPECT_EQ(db_->anchors().remove(site.id, 2).error().code, Errc::conflict) << "it may come back";
+  ASSERT_TRUE(db_->bin().empty(m.id));
+  EXPECT_EQ(db_->bin().remove_rows(10).value(), 1u);
   EXPECT_EQ(db_->anchors().remove(site.id, 1).error().code, Errc::conflict) << "it changed since";
   ASSERT_TRUE(db_->anchors().remove(site.id, 2));
   EXPECT_EQ(db_->anchors().site(site.id).error().code, Errc::not_found);
@@ -396,9 +504,13 @@ TEST_P(AccessContract, FailsJobsThatARestartCutOff) {
 }
 
 TEST_P(AccessContract, KeepsOneAnswerForAPrincipalAndKey) {
-  const StoredAnswer answer{"key", "me", "hash", std::string("a\0b", 3), "/there", "\"7\"", 201, k_noon};
-  ASSERT_TRUE(db_->access().keep_answer(answer));
-  EXPECT_EQ(db_->access().keep_answer(answer).error().code, Errc::conflict);
+  const StoredAnswer answer{"key", "me", "hash", std::string("a\0b", 3), "/there", "\"7\"", 201, 1000};
+  ASSERT_TRUE(db_->access().keep_answer(answer, 0));
+  EXPECT_EQ(db_->access().keep_answer(answer, 1000).error().code, Errc::conflict);
+  ASSERT_TRUE(db_->access().keep_answer(answer, 1001)) << "in the place of one that has expired";
+  EXPECT_EQ(db_->access().answer_use("me").value().count, 1u);
+  EXPECT_EQ(db_->access().answer_use("me").value().bytes, 3u);
+  EXPECT_EQ(db_->access().answer_use("you").value().count, 0u);
   const auto found = db_->access().answer("me", "key").value();
   ASSERT_TRUE(found);
   EXPECT_EQ(found->body, answer.body);
@@ -406,8 +518,18 @@ TEST_P(AccessContract, KeepsOneAnswerForAPrincipalAndKey) {
   EXPECT_EQ(found->location, "/there");
   EXPECT_EQ(found->etag, "\"7\"");
   EXPECT_FALSE(db_->access().answer("you", "key").value());
-  EXPECT_EQ(db_->access().drop_answers_before(k_noon).value(), 0u);
-  EXPECT_EQ(db_->access().drop_answers_before(UtcTime{k_noon.ns + 1}).value(), 1u);
+  EXPECT_EQ(db_->access().drop_answers_before(1000, 10).value(), 0u);
+  EXPECT_EQ(db_->access().drop_answers_before(1001, 10).value(), 1u);
+  for (int i = 0; i < 5; ++i) {
+    StoredAnswer one = answer;
+    one.key = std::to_string(i);
+    one.created_ran_ns = 10 * i;
+    ASSERT_TRUE(db_->access().keep_answer(one, 0));
+  }
+  EXPECT_EQ(db_->access().drop_answers_before(100, 2).value(), 2u) << "a slice";
+  EXPECT_EQ(db_->access().drop_oldest_answers("me", 2).value(), 2u);
+  EXPECT_TRUE(db_->access().answer("me", "4").value()) << "the youngest stays";
+  EXPECT_EQ(db_->access().answer_use("me").value().count, 1u);
 }
 
 TEST_P(AccessContract, ChainsTheAuditLog) {

@@ -5,7 +5,7 @@ import { request } from '../api/client';
 import { fix_class, mission, num, obj, str, vec3, type MissionMsg } from '../live/messages';
 import { enu_from_geodetic } from '../map/enu';
 import type { TrailPoint } from './scene';
-import { current_mission, link, mission_id, mission_list, now_ms, scene_of, synced, tick } from './store';
+import { current_mission, events, link, mission_id, mission_list, now_ms, scene_of, synced, tick } from './store';
 
 const micros = (rfc3339: unknown): number | null => {
   const ms = Date.parse(str(rfc3339));
@@ -66,4 +66,10 @@ export function follow_archive(): void {
     void load_track(m);
   });
   effect(() => { if (link.value === 'lost') asked = tracked = null; });
+  let restored = '';
+  effect(() => {
+    const id = events.value.filter((e) => e.code === 'mission.restored').at(-1)?.id ?? '';   // somebody brought a deleted flight back
+    if (id && id !== restored) void load_missions();
+    restored = id;
+  });
 }

@@ -94,7 +94,11 @@ const handlers: Record<string, Handler> = {
   },
   devices: (data) => (devices.value = m.all(data, m.device)),
   system: (data) => { for (const s of m.all(data, m.system)) system.value = { value: s, at_ms: now_ms() }; },
-  events: (data, whole) => (events.value = [...(whole ? [] : events.value), ...m.all(data, m.event)].slice(-50)),
+  events: (data, whole) => {
+    const news = m.all(data, m.event), gone = news.filter((e) => e.code === 'mission.deleted' && !news.some((x) => x.code === 'mission.restored' && x.mission === e.mission && x.t_us > e.t_us));
+    events.value = [...(whole ? [] : events.value), ...news].slice(-50);
+    if (gone.length && !whole) mission_list.value = mission_list.value.filter((x) => !gone.some((e) => e.mission === x.mission));
+  },
   alarms: (data) => (server_alarms.value = m.all(data, m.alarm)),
   revisions: (data) => { for (const r of m.all(data, m.revision)) revision.value = Math.max(revision.value ?? 0, r.revision); },
   procedure: (data) => { for (const p of m.all(data, f.procedure)) scene_of(p.mission).add_procedure(p, now_ms()); },

@@ -8,6 +8,7 @@ import { may } from '../../state/session';
 import { current_mission, current_scene, link, live_source, say, server_now_us, tick } from '../../state/store';
 import { clock, fixed, percent } from '../../ui/format';
 import { Checklist, checklist_open } from './checklist';
+import { DevicesNote } from './devices_note';
 import { HoldButton } from './hold_button';
 import { flying } from './words';
 
@@ -52,6 +53,7 @@ export function FlightBar() {
   return (
     <div class="fbar" data-testid="flight-bar">
       {p && <Progress p={p} />}
+      <DevicesNote mission={mission.mission} />
       <div class="cmds" data-testid="commands">
         {problem.value && <p class="problem" role="alert">{problem.value}</p>}
         {!operator ? null : other ? <p class="why" data-testid="control">{other.holder} has control, since {new Date(other.since_us / 1000).toISOString().slice(11, 16)} UTC. {taken_by.value && <HoldButton testid="take-anyway" disabled={lost} note="hold" onConfirm={() => void take(mission.mission, true)}>Take it from them</HoldButton>}<button class="btn small" onClick={() => void take(mission.mission, false)}>Ask</button></p>

@@ -9,6 +9,7 @@ import { Chip } from '../../ui/marks';
 import { AccessPanel, AuditPanel } from './access';
 import { BasePanel, LeverPanel } from './base';
 import { DevicesPanel } from './devices';
+import { FlightsPanel } from './flights';
 import { TimePanel } from './time';
 
 export function System() {
@@ -20,6 +21,7 @@ export function System() {
       <BasePanel />
       <LeverPanel />
       <TimePanel />
+      <FlightsPanel />
       <HealthPanel />
       {may('admin') && <AccessPanel />}
       {may('admin') && <AuditPanel />}

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+
+#include "core/base/guard.hpp"
+#include "core/base/result.hpp"
+
+namespace anchord {
+class MissionBin;
+}
+
+namespace anchord::api {
+
+class EventLog;
+class RunningTime;
+
+/// What is removed after its time, little by little on a thread of its own: deleted missions, kept answers. A
+/// slice is one short transaction and is followed by a pause, so that a flight that records never waits for it.
+class Housekeeping {
+ public:
+  struct Deps {
+    MissionBin* bin{nullptr};  ///< null: none (tests)
+    const RunningTime& running;
+    EventLog& events;
+    std::function<bool()> purge_answers;  ///< one slice; true: there may be more
+    std::int64_t keep_deleted_ns{30LL * 86'400 * 1'000'000'000};
+    bool by_hand{false};  ///< no thread: the owner calls round() (tests)
+  };
+  explicit Housekeeping(Deps deps) : deps_(std::move(deps)) {}
+  ~Housekeeping() { stop(); }
+
+  void start();
+  void stop();
+  /// Something was marked for removal: begin now.
+  void wake();
+  /// Everything that is due.
+  void round();
+
+ private:
+  void loop();
+  bool pause();
+  void remove_marked();
+
+  const Deps deps_;
+  std::mutex mutex_;
+  std::condition_variable told_;
+  bool stopping_{false}, woken_{false};
+  Thread thread_;
+};
+
+}  // namespace anchord::api
