@@ -47,15 +47,13 @@ struct Route {
   Work work{Work::ordinary};
   /// Where the body decides (actions of a mission); asked on an io thread, with the whole body. Else `work` holds.
   std::function<Work(const Request&)> work_of{};
-  Keeps keeps{Keeps::answer
+  Keeps keeps{Keeps::answer};  ///< of POST, for its Idempotency-Key
   Work work_for(const Request& request) const { return work_of ? work_of(request) : work; }
 };
 /// The same route, run by another executor than the ordinary one.
 inline Route as_command(Route route) { return route.work = Work::command, route; }
 inline Route as_flight(Route route) { return route.work = Work::flight, route; }
 inline Route as_heavy(Route route) { return route.work = Work::heavy, route; }
- ///< of POST, for its Idempotency-Key
-};
 /// A POST that changes nothing, or whose answer is a secret: nothing is kept of it.
 inline Route keeps_nothing(Route route) {
   route.keeps = Keeps::nothing;
