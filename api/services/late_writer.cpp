@@ -30,7 +30,7 @@ bool LateWriter::write(Write write, std::chrono::milliseconds patience) {
   std::unique_lock lock(mutex_);
   if (stopping_) {
     lock.unlock();
-    return guarded(entry->write).has_value();  // nobody would come for it
+    return attempt(entry->write).has_value();  // nobody would come for it
   }
   if (entries_.size() >= k_max_waiting) {
     entries_.pop_front();
