@@ -313,7 +313,7 @@ void Application::start() {
     else if (state_->deps.log_fault)
       state_->deps.log_fault("", before.error().message);
   });
-  state_->stream.resume();
+  (void)guarded("devices of the flight at the start", [this] { state_->stream.resume(); });
   if (state_->flights) state_->flights->start();
   state_->jobs.start();
   state_->housekeeping.start();

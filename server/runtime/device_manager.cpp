@@ -148,14 +148,14 @@ class DeviceManager::Impl final : public device::DeviceListener {
       devices.push_back({std::move(config), {}, {}});
     }
     const std::scoped_lock lock(mutex_);
-    spoilt_ = !kept.problem.empty() ||
-              std::any_of(devices.begin(), devices.end(), [](const auto& d) { return !d.problem.empty(); });
     for (auto& device : devices) {
       if (!DeviceSecrets::drop_password_file(device.config) || !device.problem.empty()) continue;
       device.problem =
           "password_file is not read any more, since it could be set over REST; send the password itself "
           "(options.password, or anchord devices settings DEVICE password_file=FILE)";
     }
+    spoilt_ = !kept.problem.empty() ||
+              std::any_of(devices.begin(), devices.end(), [](const auto& d) { return !d.problem.empty(); });
     file_problem_ = std::move(kept.problem);
     kept_ = std::move(devices);
     return boost::outcome_v2::success();

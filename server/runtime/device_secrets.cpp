@@ -11,12 +11,23 @@ namespace anchord::server {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
+namespace {
+
+/// Of options that are kept: what is no object, or no word of ours, has none.
+bool password_set(const Json& options) {
+  if (!options.is_object()) return false;
+  const auto it = options.find("password_set");
+  return it != options.end() && it->is_boolean() && it->get<bool>();
+}
+
+}  // namespace
+
 Result<DeviceSecrets::Change> DeviceSecrets::split(DeviceConfig config, const DeviceConfig* before) {
   Change change;
   auto options = Json::parse(config.options_json, nullptr, false);
   if (!options.is_object()) options = Json::object();
   const auto had = before != nullptr ? Json::parse(before->options_json, nullptr, false) : Json::object();
-  bool set = had.is_object() && had.value("password_set", false);
+  bool set = password_set(had);
   if (const auto given = options.find("password"); given != options.end() && given->is_string()) {
     change.given = true;
     change.password = given->get<std::string>();
@@ -42,7 +53,8 @@ Result<void> DeviceSecrets::store(const Change& change) const {
   std::error_code error;
   fs::create_directories(folder_, error);
   if (!error) fs::permissions(folder_, fs::perms::owner_all, error);
-  if (error) return make_error(Errc::storage_unavailable, "cannot make " + folder_.string() + ": " + error.message());
+  if (error)
+    return make_error(Errc::storage_unavailable, "cannot make " + folder_.string() + ": " + error.message());
   return write_private(file(change.config.id), change.password + "\n");
 }
 
@@ -69,7 +81,7 @@ void DeviceSecrets::put_back(const Uuid& id, const std::string& password) const 
 std::string DeviceSecrets::driver_options(const DeviceConfig& config) const {
   auto options = Json::parse(config.options_json, nullptr, false);
   if (!options.is_object() || !options.contains("password_set")) return config.options_json;
-  const bool set = options.value("password_set", false);
+  const bool set = password_set(options);
   options.erase("password_set");
   if (set) options["password_file"] = file(config.id).string();
   return to_wire(options);
