@@ -115,15 +115,14 @@ struct AccessService::State {
 
   /// The mutex is held.
   bool holds(const Login& login) const {
-    const UtcTime now = clock.now();
     if (!login.session_sha256.empty()) {
       const auto session = sessions.find(login.session_sha256);
-      if (session == sessions.end() || session->second.until <= now) return false;
+      if (session == sessions.end() || session->second.until <= steady_now()) return false;
     }
     std::string key = login.who.token_id;
     std::erase(key, '-');
     const auto token = tokens.find(key);
-    return token != tokens.end() && live(token->second, now) &&
+    return token != tokens.end() && live(token->first, token->second) &&
            principal_of(token->second).roles == login.who.roles;
   }
 
