@@ -166,6 +166,8 @@ Result<void> App::State::listen() {
                  [this] { return static_cast<double>(http->connections()); });
   metrics->gauge("anchord_ws_clients", "WebSocket clients",
                  [this] { return static_cast<double>(http->websockets()); });
+  metrics->gauge("anchord_log_lost_lines", "Lines of the log that nobody read in time",
+                 [] { return static_cast<double>(lost_log_lines()); });
   metrics->gauge("anchord_command_queue", "Commands that wait for their executor",
                  [this] { return static_cast<double>(command_pool->queued()); });
   metrics->gauge("anchord_heavy_queue", "Computations that wait for their executor",

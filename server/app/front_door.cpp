@@ -131,11 +131,15 @@ std::optional<api::Response> FrontDoor::identify(api::Request& request, bool web
   return std::nullopt;
 }
 
-std::optional<api::Response> FrontDoor::limit(const api::Request& request) {
+std::optional<api::Response> FrontDoor::limit(const api::Request& request, const api::Resolution& found) {
   if (access_.options().auth_off) return std::nullopt;
   const std::string& id = request.principal.token_id;
-  const auto wait_s =
-      rate_.take(id.empty() ? "address " + request.remote : id, RateLimit::Clock::now());
+  std::string name = id.empty() ? "address " + request.remote : id;
+  // Apart, so that a page which asks too often does not use up what a command or a login needs.
+  const bool change = found.kind == api::Resolution::Kind::matched && unsafe(request.method);
+  if (change && (found.route->work_of || found.route->work == api::Work::command)) name += " commands";
+  if (change && found.route->pattern == "/api/v1/session") name += " logins";
+  const auto wait_s = rate_.take(name, RateLimit::Clock::now());
   if (!wait_s) return std::nullopt;
   auto response = problem(429, "rate-limited", "too many requests");
   response.header("Retry-After", std::to_string(*wait_s));
@@ -232,7 +236,7 @@ Admission FrontDoor::admit(api::Request& request, std::string_view host, bool we
   const bool probe = request.path == "/healthz" || request.path == "/readyz";
   const bool file = found.kind == api::Resolution::Kind::not_found && !request.path.starts_with("/api");
   if (!probe && !file) {
-    if (auto wait = limit(request)) return refused(std::move(*wait));
+    if (auto wait = limit(request, found)) return refused(std::move(*wait));
   }
   if (request.path == k_live_path) return live(request, websocket, std::move(login));
   if (found.kind == api::Resolution::Kind::not_found && !unsafe(request.method)) {

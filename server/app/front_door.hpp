@@ -42,7 +42,7 @@ class FrontDoor final : public Gateway {
  private:
   std::optional<api::Response> identify(api::Request& request, bool websocket, api::Login& login);
   api::Response wrong_secret(const api::Request& request, std::string_view secret, std::string_view what);
-  std::optional<api::Response> limit(const api::Request& request);
+  std::optional<api::Response> limit(const api::Request& request, const api::Resolution& found);
   Admission live(api::Request& request, bool websocket, api::Login login);
   api::Response run(const api::Route& route, api::Request& request, const api::Login& login);
 

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "core/base/guard.hpp"
+#include "core/base/text.hpp"
 #include "server/http/sessions.hpp"
-#include "server/http/text.hpp"
 
 namespace anchord::server {
 namespace {
@@ -142,7 +142,7 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
       const auto bytes = buffer.cdata();
       const std::string_view message(static_cast<const char*>(bytes.data()), bytes.size());
       // Beast checks a text as it comes, but not that it is complete when the last fragment is empty.
-      if (!ws_.got_binary() && !valid_utf8(message)) {
+      if (!ws_.got_binary() && !is_utf8(message)) {
         const websocket::close_reason reason(websocket::close_code::bad_payload, "the text is not UTF-8");
         co_await ws_.async_close(reason, k_wait);
         co_return;

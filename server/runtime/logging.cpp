@@ -1,5 +1,6 @@
 #include "server/runtime/logging.hpp"
 
+#include <spdlog/async.h>
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
@@ -10,10 +11,19 @@
 namespace anchord::server {
 namespace {
 
+/// Nobody waits for whoever reads the log: when it is not read, the oldest of so many lines go.
+constexpr std::size_t k_waiting_lines = 8192;
+
+const std::shared_ptr<spdlog::details::thread_pool>& writer() {
+  static const auto pool = std::make_shared<spdlog::details::thread_pool>(k_waiting_lines, 1);
+  return pool;
+}
+
 spdlog::logger& logger() {
   static const auto instance = [] {
-    auto made =
-        std::make_shared<spdlog::logger>("anchord", std::make_shared<spdlog::sinks::stdout_sink_mt>());
+    auto made = std::make_shared<spdlog::async_logger>(
+        "anchord", std::make_shared<spdlog::sinks::stdout_sink_mt>(), writer(),
+        spdlog::async_overflow_policy::overrun_oldest);
     made->set_formatter(std::make_unique<spdlog::pattern_formatter>("%v"));
     made->flush_on(spdlog::level::info);
     return made;
@@ -50,6 +60,8 @@ bool start_logging(std::string_view level) {
   }
   return false;
 }
+
+std::size_t lost_log_lines() { return writer()->overrun_counter(); }
 
 void log(LogLevel level, std::string_view message, std::initializer_list<LogField> fields) {
   if (!logger().should_log(of(level))) return;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string_view>
 
 #include "server/runtime/log_line.hpp"
@@ -10,7 +11,9 @@ namespace anchord::server {
 /// before the threads. Unknown word: false.
 bool start_logging(std::string_view level);
 
-/// A log_line. Never hand a token to it. Thread-safe.
+/// A log_line. Never hand a token to it. Never waits for whoever reads it: the oldest of 8192 unread lines is
+/// lost. Thread-safe.
 void log(LogLevel level, std::string_view message, std::initializer_list<LogField> fields = {});
+std::size_t lost_log_lines();
 
 }  // namespace anchord::server

@@ -86,11 +86,12 @@ TEST(DeviceSecrets, NoFileOfTheServerIsReadBecauseItWasNamedOverRest) {
   ASSERT_EQ(made.status, 201) << made.body;
   auto change = pilot;
   change["If-Match"] = "*";
-  const auto patched =
-      server.call("PATCH", made.headers.at("location"), Json{{"options", {{"password_file", file}}}}.dump(), change);
+  const auto patched = server.call("PATCH", made.headers.at("location"),
+                                   Json{{"options", {{"password_file", file}}}}.dump(), change);
   EXPECT_EQ(patched.status, 422) << patched.body;
   const auto asked = caster.request();
-  EXPECT_NE(asked.find("Authorization: Basic bWU6\r\n"), std::string::npos) << "a user without a password: " << asked;
+  EXPECT_NE(asked.find("Authorization: Basic bWU6\r\n"), std::string::npos)
+      << "a user without a password: " << asked;
 }
 
 TEST(DeviceSecrets, APasswordGoesToTheCasterAndComesBackNowhere) {
@@ -123,11 +124,13 @@ TEST(DeviceSecrets, APasswordGoesToTheCasterAndComesBackNowhere) {
   const auto renamed = server.call("PATCH", path, R"({"name":"base"})", change);
   EXPECT_EQ(renamed.status, 200) << renamed.body;
   EXPECT_NE(caster.request().find("bWU6c2VjcmV0"), std::string::npos) << "it is kept";
-  const auto with_it = server.call(
-      "PATCH", path, Json{{"address", stranger.address}, {"options", {{"password", "other"}}}}.dump(), change);
+  const auto with_it =
+      server.call("PATCH", path,
+                  Json{{"address", stranger.address}, {"options", {{"password", "other"}}}}.dump(), change);
   EXPECT_EQ(with_it.status, 200) << with_it.body;
   EXPECT_NE(stranger.request().find("Authorization: Basic bWU6b3RoZXI=\r\n"), std::string::npos);
-  const auto forgotten = server.call("PATCH", path, Json{{"options", {{"password", nullptr}}}}.dump(), change);
+  const auto forgotten =
+      server.call("PATCH", path, Json{{"options", {{"password", nullptr}}}}.dump(), change);
   EXPECT_EQ(forgotten.status, 200) << forgotten.body;
   EXPECT_FALSE(Json::parse(forgotten.body)["options"].contains("password_set")) << forgotten.body;
   EXPECT_FALSE(std::filesystem::exists(secret));
@@ -143,7 +146,8 @@ TEST(DeviceSecrets, AKeptDeviceThatNamesAFileIsNotStartedUntilItsPasswordIsSent)
   const std::string admin = server.admin;
   const std::string id = "0197a3c2-5d10-7b1e-9c55-0a1b2c3d4e5f";
   server.app.reset();
-  Json device = caster_device(caster.address, {{"password_file", (data / server::k_admin_token_file).string()}});
+  Json device =
+      caster_device(caster.address, {{"password_file", (data / server::k_admin_token_file).string()}});
   device["id"] = id;
   device["enabled"] = true;
   device["version"] = 3;
@@ -160,7 +164,9 @@ TEST(DeviceSecrets, AKeptDeviceThatNamesAFileIsNotStartedUntilItsPasswordIsSent)
   EXPECT_NE(shown.body.find("password_file is not read any more"), std::string::npos) << shown.body;
   auto change = server.bearer(admin);
   change["If-Match"] = "*";
-  EXPECT_EQ(server.call("PATCH", "/api/v1/devices/" + id, R"({"options":{"password":"secret"}})", change).status, 200);
+  EXPECT_EQ(
+      server.call("PATCH", "/api/v1/devices/" + id, R"({"options":{"password":"secret"}})", change).status,
+      200);
   EXPECT_NE(caster.request().find("Authorization: Basic bWU6c2VjcmV0\r\n"), std::string::npos)
       << "the first it hears is the new password";
 }
@@ -174,7 +180,8 @@ void collect(const Json& contract, const Json& schema, std::set<std::string>& na
   }
   if (!schema.is_object()) return;
   if (const auto ref = schema.find("$ref"); ref != schema.end() && ref->is_string()) {
-    return collect(contract, contract.at(Json::json_pointer(ref->get<std::string>().substr(1))), names, depth + 1);
+    return collect(contract, contract.at(Json::json_pointer(ref->get<std::string>().substr(1))), names,
+                   depth + 1);
   }
   if (const auto properties = schema.find("properties"); properties != schema.end()) {
     for (const auto& [name, inner] : properties->items()) {
@@ -183,12 +190,14 @@ void collect(const Json& contract, const Json& schema, std::set<std::string>& na
     }
   }
   for (const char* key : {"items", "allOf", "oneOf", "anyOf", "additionalProperties", "schema"}) {
-    if (const auto inner = schema.find(key); inner != schema.end()) collect(contract, *inner, names, depth + 1);
+    if (const auto inner = schema.find(key); inner != schema.end())
+      collect(contract, *inner, names, depth + 1);
   }
 }
 
-// The rule: what comes over REST names no file of the server and no address that it opens, with these exceptions,
-// each decided: an address of a device (a port that is a terminal line, or a socket) is what setting one up means.
+// The rule: what comes over REST names no file of the server and no address that it opens, with these
+// exceptions, each decided: an address of a device (a port that is a terminal line, or a socket) is what
+// setting one up means.
 TEST(RequestFields, NameNoPathAndNoAddressOfTheServer) {
   AppFixture server;
   ASSERT_TRUE(server.app) << server.error.message;
@@ -198,17 +207,17 @@ TEST(RequestFields, NameNoPathAndNoAddressOfTheServer) {
     for (const auto& [method, operation] : operations.items()) {
       if (!operation.is_object() || !operation.contains("requestBody")) continue;
       const auto& body = operation["requestBody"];
-      const Json& whole =
-          body.contains("$ref")
-              ? contract.at(Json::json_pointer(body["$ref"].get<std::string>().substr(1)))
-              : body;
+      const Json& whole = body.contains("$ref")
+                              ? contract.at(Json::json_pointer(body["$ref"].get<std::string>().substr(1)))
+                              : body;
       for (const auto& [type, media] : whole["content"].items()) collect(contract, media, names);
     }
   }
   EXPECT_GT(names.size(), 50u) << "the walk found the fields";
   std::set<std::string> suspects;
   for (const auto& name : names) {
-    for (const char* word : {"path", "file", "dir", "folder", "url", "uri", "address", "host", "href", "command"}) {
+    for (const char* word :
+         {"path", "file", "dir", "folder", "url", "uri", "address", "host", "href", "command"}) {
       if (name.find(word) != std::string::npos) suspects.insert(name);
     }
   }
@@ -223,8 +232,9 @@ TEST(DeviceAddresses, OpenNothingThatIsNoTerminalLine) {
   ASSERT_TRUE(server.app) << server.error.message;
   const auto pilot = server.bearer(server.token(R"(["operator"])"));
   const std::string file = (server.folder / "data" / "anchord.db").string();
-  for (const auto& address : {"serial:" + file, std::string("serial:/dev/null"), std::string("serial:/dev/mem"),
-                              std::string("file:///etc/passwd"), std::string("http://127.0.0.1/")}) {
+  for (const auto& address :
+       {"serial:" + file, std::string("serial:/dev/null"), std::string("serial:/dev/mem"),
+        std::string("file:///etc/passwd"), std::string("http://127.0.0.1/")}) {
     const auto made = server.call("POST", "/api/v1/devices",
                                   Json{{"kind", "gnss"}, {"name", "x"}, {"address", address}}.dump(), pilot);
     if (made.status != 201) {

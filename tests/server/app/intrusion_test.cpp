@@ -71,10 +71,11 @@ TEST(LiveClients, AHundredAreServedWhereTheSettingAllowsThemAndLeaveNothingBehin
 }
 
 TEST(LiveClients, OneTokenDoesNotTakeThePlacesOfOthersAndOperatorsHaveSomeOfTheirOwn) {
-  AppFixture server(
-      Settings{{"ws.max_connections", "8"}, {"ws.per_token", "4"}, {"ws.reserved", "2"}, {"rate.burst", "1000"}});
+  AppFixture server(Settings{
+      {"ws.max_connections", "8"}, {"ws.per_token", "4"}, {"ws.reserved", "2"}, {"rate.burst", "1000"}});
   ASSERT_TRUE(server.app) << server.error.message;
-  const auto greedy = bearer_line(server.token(R"(["viewer"])")), other = bearer_line(server.token(R"(["viewer"])"));
+  const auto greedy = bearer_line(server.token(R"(["viewer"])")),
+             other = bearer_line(server.token(R"(["viewer"])"));
   const auto pilot = bearer_line(server.token(R"(["operator"])"));
   std::vector<std::unique_ptr<WsClient>> clients;
   const auto ends = [&](const std::string& headers) {
@@ -104,9 +105,9 @@ TEST(EndedLogins, CloseTheStreamsOfARevokedToken) {
   const auto opened = server.call("POST", "/api/v1/session", login_body(token));
   const std::string cookie = "Cookie: " + cookie_of(opened) + "\r\n";
   const auto ticket_answer = server.call("POST", "/api/v1/ws-tickets", "{}", server.bearer(token));
-  const std::string ticket =
-      ticket_answer.body.substr(ticket_answer.body.find(R"("ticket":")") + 10, 64);
-  WsClient by_token(server.port, "/api/v1/ws", bearer_line(token)), by_cookie(server.port, "/api/v1/ws", cookie);
+  const std::string ticket = ticket_answer.body.substr(ticket_answer.body.find(R"("ticket":")") + 10, 64);
+  WsClient by_token(server.port, "/api/v1/ws", bearer_line(token)),
+      by_cookie(server.port, "/api/v1/ws", cookie);
   WsClient of_admin(server.port, "/api/v1/ws", bearer_line(server.admin));
   ASSERT_TRUE(subscribe(by_token, "system"));
   ASSERT_TRUE(subscribe(by_cookie, "system"));
@@ -131,7 +132,8 @@ TEST(EndedLogins, CloseTheStreamsOfASessionAtLogoutAndLeaveTheOthersOfItsToken) 
   ASSERT_TRUE(subscribe(first, "system"));
   ASSERT_TRUE(subscribe(second, "system"));
   ASSERT_EQ(
-      server.call("DELETE", "/api/v1/session", {}, {{"Cookie", cookie_of(one)}, {"X-Anchord", "1"}}).status, 204);
+      server.call("DELETE", "/api/v1/session", {}, {{"Cookie", cookie_of(one)}, {"X-Anchord", "1"}}).status,
+      204);
   EXPECT_EQ(first.ended_with(), 4001);
   EXPECT_TRUE(receives(second, R"("op":"data")"));
 }
@@ -155,8 +157,10 @@ TEST(Guesses, OfAStrangerDoNotLockTheOperatorOutBehindAProxy) {
   const std::map<std::string, std::string> stranger{{"X-Forwarded-For", "203.0.113.9"}},
       field{{"X-Forwarded-For", "198.51.100.7"}};
   const auto guess = login_body(wrong_secret_of(server.admin));
-  for (int i = 0; i < 5; ++i) EXPECT_EQ(server.call("POST", "/api/v1/session", guess, stranger).status, 401) << i;
-  for (int i = 0; i < 20; ++i) EXPECT_EQ(server.call("POST", "/api/v1/session", guess, stranger).status, 429) << i;
+  for (int i = 0; i < 5; ++i)
+    EXPECT_EQ(server.call("POST", "/api/v1/session", guess, stranger).status, 401) << i;
+  for (int i = 0; i < 20; ++i)
+    EXPECT_EQ(server.call("POST", "/api/v1/session", guess, stranger).status, 429) << i;
   EXPECT_EQ(server.call("POST", "/api/v1/session", guess, field).status, 401) << "a mistake of another place";
   EXPECT_EQ(server.call("POST", "/api/v1/session", login_body(server.admin), field).status, 200);
   EXPECT_EQ(server.call("POST", "/api/v1/session", login_body(server.admin), stranger).status, 200)
@@ -172,8 +176,9 @@ TEST(Guesses, CannotChangeTheirAddressByAHeaderThatNobodyTrusts) {
   const auto guess = login_body(wrong_secret_of(server.admin));
   int last = 0;
   for (int i = 0; i < 6; ++i) {
-    last = server.call("POST", "/api/v1/session", guess, {{"X-Forwarded-For", "203.0.113." + std::to_string(i)}})
-               .status;
+    last =
+        server.call("POST", "/api/v1/session", guess, {{"X-Forwarded-For", "203.0.113." + std::to_string(i)}})
+            .status;
   }
   EXPECT_EQ(last, 429);
 }
@@ -184,9 +189,11 @@ TEST(Guesses, InHeadersAndTicketsAreSlowedAndValidOnesAreNot) {
   int refused = 0, slowed = 0;
   for (int i = 0; i < 500; ++i) {
     const std::string digits = std::to_string(100'000 + i);
-    const int status = server.call("GET", "/api/v1/me", {},
-                                   server.bearer("anc_" + std::string(26, '0') + digits + "_" + std::string(64, 'a')))
-                           .status;
+    const int status =
+        server
+            .call("GET", "/api/v1/me", {},
+                  server.bearer("anc_" + std::string(26, '0') + digits + "_" + std::string(64, 'a')))
+            .status;
     ++(status == 429 ? slowed : refused);
     if (i % 50 == 0) EXPECT_EQ(server.call("GET", "/api/v1/me", {}, server.bearer(server.admin)).status, 200);
   }
@@ -196,7 +203,8 @@ TEST(Guesses, InHeadersAndTicketsAreSlowedAndValidOnesAreNot) {
   WsClient ticket(server.port, "/api/v1/ws?ticket=" + std::string(64, 'b'));
   EXPECT_EQ(status_of(ticket.handshake), 429);
   const auto made = server.call("POST", "/api/v1/ws-tickets", "{}", server.bearer(server.admin));
-  WsClient good(server.port, "/api/v1/ws?ticket=" + made.body.substr(made.body.find(R"("ticket":")") + 10, 64));
+  WsClient good(server.port,
+                "/api/v1/ws?ticket=" + made.body.substr(made.body.find(R"("ticket":")") + 10, 64));
   EXPECT_TRUE(good.open());
 }
 
@@ -210,8 +218,24 @@ TEST(IdleSockets, OfOneAddressDoNotStarveAWorkingOperator) {
   for (int i = 0; i < 600; ++i) {
     idle.push_back(std::make_unique<RawSocket>(server.port));
     if (i % 100 == 0) EXPECT_EQ(client.call("GET", "/api/v1/me").value().status, 200) << i;
-    if (i % 50 == 0) EXPECT_EQ(server.call("GET", "/api/v1/me", {}, server.bearer(server.admin)).status, 200) << i;
+    if (i % 50 == 0)
+      EXPECT_EQ(server.call("GET", "/api/v1/me", {}, server.bearer(server.admin)).status, 200) << i;
   }
+}
+
+TEST(RateLimits, OfWhatAPageAsksLeaveCommandsAndLoginsTheirOwn) {
+  AppFixture server(Settings{{"rate.per_s", "1"}, {"rate.burst", "5"}});
+  ASSERT_TRUE(server.app) << server.error.message;
+  const auto admin = server.bearer(server.admin);
+  const auto mission = new_mission(server, admin);
+  int last = 0;
+  for (int i = 0; i < 10; ++i) last = server.call("GET", "/api/v1/me", {}, admin).status;
+  EXPECT_EQ(last, 429);
+  EXPECT_EQ(server.call("POST", mission + "/control", R"({"action":"take"})", admin).status, 200);
+  EXPECT_EQ(server.call("POST", mission + "/actions", R"({"action":"land"})", admin).status, 409);
+  for (int i = 0; i < 10; ++i) last = server.call("GET", "/api/v1/me").status;
+  EXPECT_EQ(last, 429) << "an address without a login";
+  EXPECT_EQ(server.call("POST", "/api/v1/session", login_body(server.admin)).status, 200);
 }
 
 TEST(RouteTable, DeclaresTheExecutorOfWhatKeepsAnAircraftSafeAndOfWhatComputes) {
@@ -269,7 +293,8 @@ TEST(Commands, AreAnsweredWhileTheDatabaseTakesNoWrite) {
   const auto mission = new_mission(server, pilot);
   sqlite3* other = nullptr;
   ASSERT_EQ(sqlite3_open((server.folder / "data" / "anchord.db").c_str(), &other), SQLITE_OK);
-  ASSERT_EQ(sqlite3_exec(other, "BEGIN IMMEDIATE", nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(other);
+  ASSERT_EQ(sqlite3_exec(other, "BEGIN IMMEDIATE", nullptr, nullptr, nullptr), SQLITE_OK)
+      << sqlite3_errmsg(other);
   std::atomic<bool> written{false};
   std::thread writer([&] {
     new_mission(server, pilot);
@@ -284,8 +309,9 @@ TEST(Commands, AreAnsweredWhileTheDatabaseTakesNoWrite) {
   const auto at = taken.body.find(R"("lease":")") + 9;
   const std::string lease = taken.body.substr(at, taken.body.find('"', at) - at);
   for (const char* action : {"hold", "land", "abort"}) {
-    const auto answer = server.call("POST", mission + "/actions",
-                                    R"({"action":")" + std::string(action) + R"(","lease":")" + lease + R"("})", pilot);
+    const auto answer =
+        server.call("POST", mission + "/actions",
+                    R"({"action":")" + std::string(action) + R"(","lease":")" + lease + R"("})", pilot);
     EXPECT_EQ(answer.status, 422) << answer.body;
     EXPECT_NE(answer.body.find("not being flown"), std::string::npos) << answer.body;
   }
