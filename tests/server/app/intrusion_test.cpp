@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "api/http/router.hpp"
+#include "server/app/proxies.hpp"
 #include "tests/server/app/app_fixture.hpp"
 #include "tests/server/http/ws_client.hpp"
 
@@ -221,6 +222,25 @@ TEST(IdleSockets, OfOneAddressDoNotStarveAWorkingOperator) {
     if (i % 50 == 0)
       EXPECT_EQ(server.call("GET", "/api/v1/me", {}, server.bearer(server.admin)).status, 200) << i;
   }
+}
+
+TEST(TrustedProxies, NameTheLastAddressThatIsNoProxyOfOurs) {
+  const auto some = server::TrustedProxies::parse({"127.0.0.1", "10.0.0.0/8", "2001:db8::/32"});
+  ASSERT_TRUE(some) << some.error().message;
+  const auto& proxies = some.value();
+  EXPECT_EQ(proxies.client("127.0.0.1", "203.0.113.9"), "203.0.113.9");
+  EXPECT_EQ(proxies.client("127.0.0.1", "203.0.113.9, 10.1.2.3"), "203.0.113.9");
+  EXPECT_EQ(proxies.client("10.255.0.1", "198.51.100.7, 203.0.113.9"), "203.0.113.9")
+      << "what the client wrote itself";
+  EXPECT_EQ(proxies.client("2001:db8::1", "2001:db8:1::2, [2001:db9::1]"), "[2001:db9::1]");
+  EXPECT_EQ(proxies.client("192.0.2.1", "203.0.113.9"), "192.0.2.1") << "no proxy of ours";
+  EXPECT_EQ(proxies.client("11.0.0.1", "203.0.113.9"), "11.0.0.1");
+  EXPECT_EQ(proxies.client("127.0.0.1", ""), "127.0.0.1");
+  EXPECT_EQ(proxies.client("127.0.0.1", "nonsense, <script>"), "127.0.0.1");
+  EXPECT_EQ(proxies.client("127.0.0.1", "203.0.113.9, nonsense, 10.0.0.1"), "10.0.0.1");
+  for (const char* bad : {"localhost", "10.0.0.0/33", "10.0.0.0/x", "::/129", "", "/8"})
+    EXPECT_FALSE(server::TrustedProxies::parse({bad})) << bad;
+  EXPECT_FALSE(server::TrustedProxies{}.trusts("127.0.0.1"));
 }
 
 TEST(RateLimits, OfWhatAPageAsksLeaveCommandsAndLoginsTheirOwn) {
