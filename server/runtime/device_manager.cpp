@@ -214,7 +214,9 @@ class DeviceManager::Impl final : public device::DeviceListener {
       all = kept_;
       spoilt = spoilt_;
     }
-    if (spoilt) BOOST_OUTCOME_TRYV(keep_unreadable(file()));
+    if (spoilt) {
+      BOOST_OUTCOME_TRYV(keep_unreadable(file()));
+    }
     BOOST_OUTCOME_TRYV(write_devices(file(), all));
     const std::scoped_lock lock(mutex_);
     spoilt_ = false;
