@@ -4,8 +4,6 @@
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
-#include <condition_variable>
-#include <deque>
 #include <future>
 #include <mutex>
 #include <random>
@@ -19,12 +17,11 @@
 #include "drivers/record/recorder.hpp"
 #include "server/runtime/device_file.hpp"
 #include "server/runtime/device_secrets.hpp"
+#include "server/runtime/row_queue.hpp"
 
 namespace anchord::server {
 namespace {
 
-constexpr auto k_batch_time = std::chrono::milliseconds(100);
-constexpr std::size_t k_batch_rows = 200;
 constexpr auto k_answer_time =
     std::chrono::seconds(25);  ///< settings of six anchors by radio take half of it
 
@@ -58,60 +55,6 @@ DeviceReport report_of(const DeviceConfig& config, const device::DeviceState& s)
   out.base = s.base;
   return out;
 }
-
-/// Rows on their way to the database, oldest first; the oldest leave when nobody takes them.
-class RowQueue {
- public:
-  template <class Row>
-  void push(Row row) {
-    const std::scoped_lock lock(mutex_);
-    auto& rows = of(row);
-    rows.push_back(std::move(row));
-    if (fixes_.size() + ranges_.size() > DeviceManager::k_max_waiting_rows) {
-      rows.pop_front();
-      ++dropped_;
-    }
-    if (fixes_.size() + ranges_.size() >= k_batch_rows) told_.notify_one();
-  }
-  /// Waits for a batch's time or size; false when stopping and empty.
-  bool take(std::vector<Fix>& fixes, std::vector<Range>& ranges) {
-    std::unique_lock lock(mutex_);
-    told_.wait_for(lock, k_batch_time,
-                   [this] { return stopping_ || fixes_.size() + ranges_.size() >= k_batch_rows; });
-    fixes.assign(std::make_move_iterator(fixes_.begin()), std::make_move_iterator(fixes_.end()));
-    ranges.assign(std::make_move_iterator(ranges_.begin()), std::make_move_iterator(ranges_.end()));
-    fixes_.clear();
-    ranges_.clear();
-    return !stopping_ || !fixes.empty() || !ranges.empty();
-  }
-  void stop() {
-    const std::scoped_lock lock(mutex_);
-    stopping_ = true;
-    told_.notify_all();
-  }
-  bool stopping() const {
-    const std::scoped_lock lock(mutex_);
-    return stopping_;
-  }
-  void lost(std::size_t n) {
-    const std::scoped_lock lock(mutex_);
-    dropped_ += n;
-  }
-  std::uint64_t dropped() const {
-    const std::scoped_lock lock(mutex_);
-    return dropped_;
-  }
-
- private:
-  std::deque<Fix>& of(const Fix&) { return fixes_; }
-  std::deque<Range>& of(const Range&) { return ranges_; }
-  mutable std::mutex mutex_;
-  std::condition_variable told_;
-  std::deque<Fix> fixes_;
-  std::deque<Range> ranges_;
-  std::uint64_t dropped_{0};
-  bool stopping_{false};
-};
 
 }  // namespace
 
@@ -339,7 +282,7 @@ class DeviceManager::Impl final : public device::DeviceListener {
   std::unique_ptr<device::DeviceLoop> loop_;
   std::map<std::string, std::string> told_;  ///< newest line of the log, by device
   Thread io_thread_, writer_;
-  RowQueue queue_;
+  RowQueue queue_{k_max_waiting_rows};
   DeviceRows* rows_{nullptr};
 
   std::mutex save_mutex_;  ///< taken before mutex_
