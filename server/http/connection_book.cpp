@@ -54,7 +54,8 @@ ConnectionBook::Entry ConnectionBook::enter(const std::string& address, bool man
   }
   ++own.sockets;
   ++state_->sockets;
-  entry.place = std::shared_ptr<void>(nullptr, [state = state_, address](void*) {
+  // Not null, whatever it points to: null says that there is no place.
+  entry.place = std::shared_ptr<void>(state_.get(), [state = state_, address](void*) {
     const std::lock_guard back(state->mutex);
     --state->sockets;
     const auto at = state->addresses.find(address);
