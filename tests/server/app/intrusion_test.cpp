@@ -196,7 +196,9 @@ TEST(Guesses, InHeadersAndTicketsAreSlowedAndValidOnesAreNot) {
                   server.bearer("anc_" + std::string(26, '0') + digits + "_" + std::string(64, 'a')))
             .status;
     ++(status == 429 ? slowed : refused);
-    if (i % 50 == 0) EXPECT_EQ(server.call("GET", "/api/v1/me", {}, server.bearer(server.admin)).status, 200);
+    if (i % 50 == 0) {
+      EXPECT_EQ(server.call("GET", "/api/v1/me", {}, server.bearer(server.admin)).status, 200);
+    }
   }
   // 20 a minute of one address, and a few for the time this takes.
   EXPECT_LT(refused, 60);
@@ -218,9 +220,12 @@ TEST(IdleSockets, OfOneAddressDoNotStarveAWorkingOperator) {
   std::vector<std::unique_ptr<RawSocket>> idle;
   for (int i = 0; i < 600; ++i) {
     idle.push_back(std::make_unique<RawSocket>(server.port));
-    if (i % 100 == 0) EXPECT_EQ(client.call("GET", "/api/v1/me").value().status, 200) << i;
-    if (i % 50 == 0)
+    if (i % 100 == 0) {
+      EXPECT_EQ(client.call("GET", "/api/v1/me").value().status, 200) << i;
+    }
+    if (i % 50 == 0) {
       EXPECT_EQ(server.call("GET", "/api/v1/me", {}, server.bearer(server.admin)).status, 200) << i;
+    }
   }
 }
 
@@ -286,7 +291,9 @@ TEST(RouteTable, DeclaresTheExecutorOfWhatKeepsAnAircraftSafeAndOfWhatComputes) 
       ++found;
       EXPECT_EQ(route.work, at->second) << name;
     }
-    if (route.pattern.starts_with("/api/v1/exports/")) EXPECT_EQ(route.work, Work::heavy) << name;
+    if (route.pattern.starts_with("/api/v1/exports/")) {
+      EXPECT_EQ(route.work, Work::heavy) << name;
+    }
     if (name != "POST /api/v1/missions/{id}/actions") continue;
     api::Request request;
     for (const char* action : {"hold", "land", "abort", "return", "resume", "skip", "nonsense"}) {

@@ -166,7 +166,9 @@ TEST_P(MissionStoreContract, EmptiesTheBinByRunningTimeASliceAtATime) {
   EXPECT_EQ(db_->bin().remove_rows(6).value(), 0u);
   EXPECT_EQ(db_->bin().binned(old.id).error().code, Errc::not_found);
   ASSERT_TRUE(db_->bin().restore(young.id));
-  EXPECT_EQ(db_->measurements().ranges({.limit = 50}).value().rows.size(), 10u);
+  MeasurementStore::Filter all;
+  all.limit = 50;
+  EXPECT_EQ(db_->measurements().ranges(all).value().rows.size(), 10u);
 }
 
 TEST_P(MissionStoreContract, KeepsRunningTimeAndTheStreamOfTheDevices) {
