@@ -15,7 +15,7 @@ using procedure::Event;
 
 namespace {
 
-constexpr std::size_t k_checks = 8;
+constexpr std::size_t k_checks = 64;
 
 std::optional<Event> event_of_action(const std::string& action) {
   if (action == "hold") return Event::hold;

@@ -129,7 +129,7 @@ struct FlightService::State {
     std::shared_ptr<const planning::PlanCheck> check;
   };
   std::mutex checks_mutex;
-  std::deque<Checked> checks;  ///< newest last, at most 8: pages ask for the same one every second
+  std::deque<Checked> checks;  ///< newest last, at most 64: pages ask for the same one every second
 };
 
 }  // namespace anchord::api

@@ -24,6 +24,17 @@ describe('the settings of a device', () => {
     expect(patch_of(was, { ...setup_of(was), format: 'auto', port: '9002' })).toEqual({ address: 'tcp://10.0.0.2:9002', options: { format: null } });
     expect(patch_of(was, { ...setup_of(was), corrections: 'ntrip' })).toEqual({ options: { corrections: 'ntrip' } });
   });
+  it('send a password when one is typed, know only that there is one, and ask for it again with another address', () => {
+    const was = device_of({ id: 'x', kind: 'ntrip', name: 'base', address: 'tcp://caster.example:2101', options: { mount: 'NEAR', user: 'me', password_set: true } });
+    const kept = setup_of(was);
+    expect(kept.password).toBe('');
+    expect(patch_of(was, kept)).toBeNull();
+    expect(missing(kept)).toBe('');
+    expect(patch_of(was, { ...kept, password: 'secret' })).toEqual({ options: { password: 'secret' } });
+    expect(missing({ ...kept, host: 'other.example' })).toBe('The password belongs to the old address: type it again.');
+    expect(missing({ ...kept, host: 'other.example', password: 'secret' })).toBe('');
+    expect(config_of({ ...caster, password: 'secret' }).options).toEqual({ mount: 'NEAR', user: 'me', password: 'secret', version: 1, send_gga: true });
+  });
   it('say what is missing before they are sent', () => {
     expect(missing(EMPTY)).toBe('Which port?');
     expect(missing({ ...caster, mount: ' ' })).toBe('Which mount point of the caster?');

@@ -75,7 +75,7 @@ function Caster({ s, change }: { s: Setup; change: Change }) {
   return <>
     <label><span class="lab">Mount point</span><input value={s.mount} data-testid="device-mount" onInput={(e) => change({ mount: e.currentTarget.value })} /></label>
     <label><span class="lab">User</span><input value={s.user} autocomplete="off" onInput={(e) => change({ user: e.currentTarget.value })} /></label>
-    <label class="grow"><span class="lab">Password</span><input type="password" value={s.password} autocomplete="new-password" placeholder={s.password_set ? 'kept on the server' : 'none'} data-testid="device-password" onInput={(e) => change({ password: e.currentTarget.value })} /></label>
+    <label class="grow"><span class="lab">Password</span><input type="password" value={s.password} autocomplete="new-password" placeholder={s.password_of ? 'kept on the server' : 'none'} data-testid="device-password" onInput={(e) => change({ password: e.currentTarget.value })} /></label>
     <label><span class="lab">NTRIP version</span><select value={s.version} onChange={(e) => change({ version: e.currentTarget.value })}><option value="2">2</option><option value="1">1</option></select></label>
     <label class="tick"><input type="checkbox" checked={s.send_gga} onChange={(e) => change({ send_gga: e.currentTarget.checked })} /> Tell it where the rover is</label>
   </>;

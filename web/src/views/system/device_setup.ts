@@ -7,16 +7,16 @@ export const kind_words = (kind: string): string => KINDS.find(([id]) => id === 
 export const LINKS = [['serial', 'USB or serial port'], ['tcp', 'TCP, this server connects'], ['tcp-listen', 'TCP, the device connects'], ['udp', 'UDP']] as const;
 export const BAUDS = [9600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600] as const;
 
-/// What is typed; numbers stay text until they are sent.
+/// What is typed; numbers stay text until they are sent. A password is only written: `password_of` is the address that the server keeps one for.
 export interface Setup {
   readonly kind: string; readonly name: string; readonly link: string; readonly path: string; readonly baud: string; readonly host: string; readonly port: string;
   readonly format: string; readonly corrections: string; readonly latency_ms: string; readonly gpsd_device: string;
   readonly anchors: string; readonly cir: string; readonly heading: boolean; readonly anchor_anchor_s: string;
-  readonly mount: string; readonly user: string; readonly password: string; readonly password_set: boolean; readonly version: string; readonly send_gga: boolean;
+  readonly mount: string; readonly user: string; readonly password: string; readonly password_of: string; readonly version: string; readonly send_gga: boolean;
 }
 export const EMPTY: Setup = {
   kind: 'pozyx', name: '', link: 'serial', path: '', baud: '115200', host: '', port: '', format: 'auto', corrections: 'own', latency_ms: '', gpsd_device: '', anchors: '', cir: 'window', heading: false, anchor_anchor_s: '',
-  mount: '', user: '', password: '', password_set: false, version: '2', send_gga: false,
+  mount: '', user: '', password: '', password_of: '', version: '2', send_gga: false,
 };
 
 export function address_of(s: Setup): string {
@@ -37,7 +37,7 @@ export function setup_of(d: Device): Setup {
   return {
     ...EMPTY, kind: d.kind, name: d.name, ...parts_of(d.address), format: text(o.format) || 'auto', corrections: text(o.corrections) || 'own', latency_ms: text(o.latency_ms), gpsd_device: text(o.gpsd_device),
     anchors: Array.isArray(o.anchors) ? o.anchors.filter((a) => typeof a === 'string').join(' ') : '', cir: text(o.cir) || 'window', heading: o.heading === true, anchor_anchor_s: text(o.anchor_anchor_s),
-    mount: text(o.mount), user: text(o.user), password_set: o.password_set === true, version: text(o.version) || '2', send_gga: o.send_gga === true,
+    mount: text(o.mount), user: text(o.user), password_of: o.password_set === true ? d.address : '', version: text(o.version) || '2', send_gga: o.send_gga === true,
   };
 }
 const number = (s: string): number | null => { const t = s.trim().replace(',', '.'); return t === '' || !Number.isFinite(Number(t)) ? null : Number(t); };
@@ -64,6 +64,7 @@ export function missing(s: Setup): string {
   if (s.link === 'tcp' && !s.host.trim()) return 'Which computer or address?';
   if (s.link !== 'serial' && !(Number(s.port) >= 1 && Number(s.port) <= 65_535)) return 'A port number is 1 to 65535.';
   if (s.kind === 'ntrip' && !s.mount.trim()) return 'Which mount point of the caster?';
+  if (s.password_of && !s.password && address_of(s) !== address_of({ ...s, ...parts_of(s.password_of) })) return 'The password belongs to the old address: type it again.';
   const id = s.kind === 'pozyx' ? s.anchors.split(/[\s,;]+/).filter(Boolean).find((a) => !/^0x[0-9a-fA-F]{1,8}$/.test(a)) : undefined;
   return id ? `${id} is no network id like 0x6a21.` : '';
 }
