@@ -92,6 +92,12 @@ TEST_P(MissionStoreContract, ListsByInsertionAlsoWhenTheClockWasSetBack) {
   EXPECT_EQ(db_->missions().missions(1, after.id).value()[0].id, ahead.id);
 }
 
+MeasurementStore::Filter of(const MissionId& mission) {
+  MeasurementStore::Filter filter;
+  filter.mission = mission;
+  return filter;
+}
+
 TEST_P(MissionStoreContract, HidesWhatIsInTheBinAndGivesItBackWhole) {
   auto m = stored_mission();
   const auto other = stored_mission();
@@ -99,7 +105,7 @@ TEST_P(MissionStoreContract, HidesWhatIsInTheBinAndGivesItBackWhole) {
   ASSERT_TRUE(db_->missions().update(m));
   ASSERT_TRUE(db_->measurements().append_ranges({range_at(m.id, 1), range_at(other.id, 1)}, false));
   ASSERT_TRUE(db_->measurements().append_fixes({fix_at(m.id, 1)}, false));
-  const auto id = db_->measurements().ranges({.mission = m.id}).value().ids.at(0);
+  const auto id = db_->measurements().ranges(of(m.id)).value().ids.at(0);
   EXPECT_EQ(db_->bin().restore(m.id).error().code, Errc::not_found) << "it is not in there";
   ASSERT_TRUE(db_->bin().put(m.id, k_noon, 7, "me"));
   EXPECT_EQ(db_->bin().put(m.id, k_noon, 7, "me").error().code, Errc::not_found) << "twice";
@@ -108,10 +114,10 @@ TEST_P(MissionStoreContract, HidesWhatIsInTheBinAndGivesItBackWhole) {
   EXPECT_EQ(db_->missions().insert(m).error().code, Errc::conflict) << "its id is taken";
   EXPECT_EQ(db_->missions().missions(10, std::nullopt).value().size(), 1u);
   EXPECT_EQ(db_->measurements().ranges({}).value().rows.size(), 1u) << "no query finds its rows";
-  EXPECT_TRUE(db_->measurements().ranges({.mission = m.id}).value().rows.empty());
+  EXPECT_TRUE(db_->measurements().ranges(of(m.id)).value().rows.empty());
   EXPECT_TRUE(db_->measurements().fixes({}).value().rows.empty());
   EXPECT_EQ(db_->measurements().range(id).error().code, Errc::not_found);
-  EXPECT_EQ(db_->measurements().count_ranges({}).value(), 1u);
+  EXPECT_EQ(db_->measurements().count_ranges(MeasurementStore::Filter{}).value(), 1u);
   EXPECT_EQ(db_->measurements().devices(m.id).value().size(), 0u);
   EXPECT_EQ(db_->measurements().append_ranges({range_at(m.id, 2)}, false).value()[0], RowOutcome::unknown_mission);
   const auto list = db_->bin().list().value();
@@ -123,7 +129,7 @@ TEST_P(MissionStoreContract, HidesWhatIsInTheBinAndGivesItBackWhole) {
   EXPECT_EQ(list[0].n_fixes, 1u);
   ASSERT_TRUE(db_->bin().restore(m.id));
   EXPECT_EQ(db_->missions().mission(m.id).value().state, MissionState::finished);
-  EXPECT_EQ(db_->measurements().ranges({.mission = m.id}).value().rows.size(), 1u);
+  EXPECT_EQ(db_->measurements().ranges(of(m.id)).value().rows.size(), 1u);
   EXPECT_TRUE(db_->bin().list().value().empty());
 }
 
