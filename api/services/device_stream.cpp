@@ -104,10 +104,14 @@ void DeviceStream::resume() {
 }
 
 std::vector<AlarmCondition> DeviceStream::alarms() const {
-  const std::scoped_lock lock(mutex_);
-  if (stack_.size() < 2) return {};
-  const Holder& has = stack_.back();
-  const Holder& lost = stack_[stack_.size() - 2];
+  Holder has, lost;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (stack_.size() < 2) return {};
+    has = stack_.back();
+    lost = stack_[stack_.size() - 2];
+  }
+  if (deps_.devices->devices().empty()) return {};  // nobody misses rows that there are none of
   return {{"devices.lost", AlarmPriority::critical,
            lost.name + ": its devices record into " + has.name + "; they come back when that ends", lost.id},
           {"devices.taken", AlarmPriority::warning, has.name + " has the devices of " + lost.name, has.id}};

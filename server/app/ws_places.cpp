@@ -21,7 +21,7 @@ std::variant<std::shared_ptr<void>, WsPlaces::Refusal> WsPlaces::take(const api:
   }
   ++own;
   ++state_->all;
-  return std::shared_ptr<void>(nullptr, [state = state_, name = who.token_id](void*) {
+  return std::shared_ptr<void>(state_.get(), [state = state_, name = who.token_id](void*) {
     const std::lock_guard back(state->mutex);
     --state->all;
     const auto at = state->by_token.find(name);

@@ -51,7 +51,8 @@ class Shares {
     auto& taken = state_->taken[name];
     if (taken >= per_name_) return nullptr;
     ++taken;
-    return {nullptr, [state = state_, name](void*) {
+    // Not null, whatever it points to: null says that there is none left.
+    return {state_.get(), [state = state_, name](void*) {
               const std::lock_guard back(state->mutex);
               const auto at = state->taken.find(name);
               if (--at->second == 0) state->taken.erase(at);
