@@ -1,3 +1,4 @@
+#include <grp.h>
 #include <gtest/gtest.h>
 #include <pty.h>
 #include <sys/stat.h>
@@ -116,14 +117,14 @@ TEST(SerialLink, AMissingDeviceAPlainFileAndAnOddRateAreToldApart) {
 TEST(SerialLink, APortOfAnotherGroupIsExplainedWithTheCommandThatHelps) {
   if (::geteuid() == 0) {
     // Permission bits do not bind root: the explanation is checked from a child without its rights.
+    Pty pty;
+    ASSERT_EQ(::chown(pty.path.c_str(), 0, 0), 0);
+    ASSERT_EQ(::chmod(pty.path.c_str(), 0660), 0);
     const pid_t child = ::fork();
     ASSERT_GE(child, 0);
-    const auto path = fs::temp_directory_path() / ("anchord_port_" + std::to_string(::getpid()));
     if (child == 0) {
-      std::ofstream(path) << "";
-      ::chmod(path.c_str(), 0660);
-      if (::setgid(65534) != 0 || ::setuid(65534) != 0) ::_exit(2);
-      const auto fd = open_serial(path.string(), 115200);
+      if (::setgroups(0, nullptr) != 0 || ::setgid(65534) != 0 || ::setuid(65534) != 0) ::_exit(2);
+      const auto fd = open_serial(pty.path, 115200);
       ::_exit(!fd && fd.error().message.find("usermod -aG root") != std::string::npos ? 0 : 1);
     }
     int status = 0;
