@@ -29,6 +29,8 @@ for package in $(listed "") $(listed @test) $(listed @bench) $(listed @lint) $(l
     for program in $(grep -E '^/usr/s?bin/[^/]+$' <<<"$files" | sed 's|.*/||'); do
       grep -rqwF --exclude-dir=node_modules --exclude-dir=build -e "$program" "${own[@]}" && { used=$program; break; }
     done
+    # Neither headers nor programs: a library that is loaded by its name.
+    [[ -n $used ]] || { grep -rqF --exclude-dir=node_modules --exclude-dir=build -e "$package" "${own[@]}" && used=$package; }
     [[ -n $used || $package == python3-* ]] || [[ $package == g++ || $package == ninja-build ]]
     pass_or_fail $? "nothing runs a program of $package: take it out of .ci/packages"
   fi

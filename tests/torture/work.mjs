@@ -1,6 +1,7 @@
 // What the clients of a tortured server do, and what each of them was promised. Every kind of work keeps a ledger of what was
 // sent and what was acknowledged; `check` holds the restarted server, and its database, to it.
 import assert from 'node:assert/strict';
+import { eventually } from '../e2e/server.mjs';
 
 export const k_batch_rows = 20;
 const lines = (rows) => ({ method: 'POST', headers: { 'content-type': 'application/x-ndjson' }, body: rows.map((row) => JSON.stringify(row)).join('\n') + '\n' });
@@ -64,7 +65,8 @@ export class Gateway {
   }
 }
 
-/** Missions with rows, finished and deleted: each is there whole or not at all. */
+/** Missions with rows, finished and deleted: each is there whole, or whole in the bin; every second one is then removed for good,
+ *  and that goes on after a restart until nothing of it is left. */
 export class Deleter {
   constructor() {
     this.open = [];
@@ -74,7 +76,7 @@ export class Deleter {
   async step(server) {
     const made = await ask(server, '/api/v1/missions?devices=false', { json: { name: 'to be deleted', frame: 'wgs84', track_point: 'gnss_antenna', tags: [] } });
     if (later(made)) return false;
-    const mission = { id: must(made, 201, 'POST missions').id, rows: 0, sent: false, gone: false };
+    const mission = { id: must(made, 201, 'POST missions').id, rows: 0, sent: false, gone: false, purgeSent: false, purged: false };
     this.open.push(mission);
     for (let i = 0; i < 2; i++) {
       const rows = Array.from({ length: k_batch_rows }, (_, n) => range(mission.id, 99, i * k_batch_rows + n));
@@ -94,17 +96,29 @@ export class Deleter {
     if (later(gone)) return false;
     must(gone, [200, 202, 204], `DELETE mission ${JSON.stringify(now.json).slice(0, 300)}`);
     mission.gone = true;
-    ++this.count;
+    if (++this.count % 2) return true;
+    const binned = await ask(server, `${path}?deleted=true`);
+    if (later(binned)) return false;
+    mission.purgeSent = true;
+    const purged = await ask(server, `${path}?purge=true`, { method: 'DELETE', headers: { 'if-match': binned.etag ?? '*' } });
+    if (later(purged)) return false;
+    must(purged, 204, 'DELETE mission for good');
+    mission.purged = true;
     return true;
   }
   async check(sql, server) {
     for (const mission of this.open) {
-      const now = await ask(server, `/api/v1/missions/${mission.id}`), gone = now?.status === 404 || now?.status === 410;  // 410: in the bin
+      const key = `(SELECT mission_key FROM mission WHERE id = ${blob(mission.id)})`;
+      const rows = () => sql(`SELECT count(*) AS n FROM uwb_range WHERE mission_key = ${key}`)[0].n;
+      const now = await ask(server, `/api/v1/missions/${mission.id}`), gone = [404, 410].includes(now?.status);
       assert.ok(gone || now?.status === 200, `GET mission: ${now?.status}`);
       if (mission.gone) assert.ok(gone, `mission ${mission.id} was deleted, and is there again`);
       if (!mission.sent) assert.ok(!gone, `mission ${mission.id} was acknowledged, and is not there`);
-      if (!gone) {
-        const [{ n }] = sql(`SELECT count(*) AS n FROM uwb_range WHERE mission_key = (SELECT mission_key FROM mission WHERE id = ${blob(mission.id)})`);
+      const [marked] = sql(`SELECT emptying FROM mission_bin WHERE mission_key = ${key}`);
+      if (mission.purged || marked?.emptying) {
+        await eventually(`mission ${mission.id}, removed for good, leaves nothing`, () => rows() === 0 && sql(`SELECT 1 FROM mission WHERE id = ${blob(mission.id)}`).length === 0, 20_000, 50);
+      } else if (!mission.purgeSent || marked) {
+        const n = rows();
         assert.ok(n >= mission.rows && n % k_batch_rows === 0, `mission ${mission.id} has ${n} rows, ${mission.rows} were acknowledged`);
       }
     }
@@ -120,7 +134,7 @@ export class Publisher {
     this.flight = flight;
     this.ready = [];
     this.published = [];
-    this.pending = new Set();
+    this.unanswered = null;
   }
   async prepare(server, want = 12) {
     if (!this.mission) {
@@ -138,13 +152,14 @@ export class Publisher {
   async step(server) {
     const calibration = this.ready[0];
     if (!calibration) return false;
-    this.pending.add(calibration.id);
+    const again = this.unanswered === calibration.id;
+    this.unanswered = calibration.id;
     const answer = await ask(server, `/api/v1/calibrations/${calibration.id}/publish`, { json: {} });
     if (later(answer)) return false;
     // 409: the publication whose answer was lost did take place.
-    const json = must(answer, [201, 409], 'publish');
+    const json = must(answer, again ? [201, 409] : 201, 'publish');
     this.ready.shift();
-    this.pending.delete(calibration.id);
+    this.unanswered = null;
     this.published.push({ id: calibration.id, revision: answer.status === 201 ? json.revision : null });
     return true;
   }
@@ -182,12 +197,12 @@ export class Promoter {
     }
   }
   async step(server) {
-    const model = this.models[this.acknowledged.length % 2];
+    const model = this.models[this.acknowledged.length % 2], again = this.sent === model;
     this.sent = model;
     const answer = await ask(server, `/api/v1/models/${model}/promote`, { json: { reason: 'torture' } });
     if (later(answer)) return false;
     // 409: it is the active one already, by the promotion whose answer was lost.
-    const json = must(answer, [200, 409], 'promote');
+    const json = must(answer, again ? [200, 409] : 200, 'promote');
     this.acknowledged.push({ model, number: answer.status === 200 ? json.number : null });
     this.sent = null;
     return true;
