@@ -77,7 +77,7 @@ export class Server {
     // The system chooses the port of ":0"; the server says which one it got.
     await eventually('the server tells its port', () => {
       if (ended) throw new Error(`the server ended (${JSON.stringify(ended)}):\n${output}`);
-      const match = /127\.0\.0\.1:([1-9]\d*)/.exec(output);
+      const match = /http:\/\/127\.0\.0\.1:([1-9]\d*)/.exec(output);  // the address of a device is not ours
       if (match) this.port = Number(match[1]);
       return match;
     }, deadlineMs);

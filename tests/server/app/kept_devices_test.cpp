@@ -59,7 +59,7 @@ std::string list(const std::string& entries) {
 
 TEST(KeptDevices, ASpoiltEntryCostsOnlyItselfAndSaysWhy) {
   const std::pair<std::string, std::string> k_cases[] = {
-      {R"({"id":"01890000-0000-7000-8000-000000000002","kind":"lidar","name":"x","address":"tcp://127.0.0.1:9"})",
+      {R"({"id":"01890000-0000-7000-8000-000000000002","kind":"lidar","name":"x","address":"tcp://127.0.0.1:11"})",
        "no driver for \"lidar\""},
       {R"({"id":"01890000-0000-7000-8000-000000000002","kind":"gnss","name":"x","address":"nowhere"})",
        "begin with serial:"},
