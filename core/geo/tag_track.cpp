@@ -6,6 +6,19 @@
 namespace anchord {
 namespace {
 
+double gap_limit_s(std::span<const TrackPose> poses) {
+  // Some sources pause between bursts (0.3 s every few samples): a limit from the median would refuse most of
+  // those tracks, one from the largest interval would bridge real gaps.
+  std::vector<double> interval_s;
+  for (std::size_t i = 1; i < poses.size(); ++i) interval_s.push_back(poses[i].t_s - poses[i - 1].t_s);
+  if (interval_s.empty()) return 0.5;
+  const auto at = interval_s.begin() + static_cast<std::ptrdiff_t>(interval_s.size() * 9 / 10);
+  std::nth_element(interval_s.begin(), at, interval_s.end());
+  return std::clamp(3.0 * *at, 0.1, 0.5);
+}
+
+}  // namespace
+
 double default_sigma_m(FixClass fix) {
   // RTK promises 20 mm (dissertation 3.2.3, 7.2.3); the others are the usual orders of magnitude of their
   // class.
@@ -23,19 +36,6 @@ double default_sigma_m(FixClass fix) {
   }
   return 100.0;
 }
-
-double gap_limit_s(std::span<const TrackPose> poses) {
-  // Some sources pause between bursts (0.3 s every few samples): a limit from the median would refuse most of
-  // those tracks, one from the largest interval would bridge real gaps.
-  std::vector<double> interval_s;
-  for (std::size_t i = 1; i < poses.size(); ++i) interval_s.push_back(poses[i].t_s - poses[i - 1].t_s);
-  if (interval_s.empty()) return 0.5;
-  const auto at = interval_s.begin() + static_cast<std::ptrdiff_t>(interval_s.size() * 9 / 10);
-  std::nth_element(interval_s.begin(), at, interval_s.end());
-  return std::clamp(3.0 * *at, 0.1, 0.5);
-}
-
-}  // namespace
 
 std::string_view to_string(TrackRefusal why) {
   switch (why) {

@@ -70,6 +70,8 @@ class TagTrack {
   bool has_attitude_{false};
 };
 
+/// Usual size of the error of one axis, by class.
+double default_sigma_m(FixClass fix);
 /// Pose of one fix; covariance by fix class where the source gave none (fixed: 400 mm^2 per axis, mission row
 /// 2).
 TrackPose pose_of(const Fix& fix, const std::optional<EnuFrame>& frame, UtcTime epoch);

@@ -87,4 +87,12 @@ Gate check_profile(const ProfileFactor& alone, std::span<const ProfileFactor> ot
                    what[static_cast<std::size_t>(oddest)], apart[oddest], z)};
 }
 
+Gate check_steps(double share, const FlightOptions& options) {
+  const double limit = options.track.max_step_share;
+  return {
+      "track", share, limit, share <= limit,
+      sentence("%.1f %% of the positions are off the others as a whole, limit %.1f %%: did the base move?",
+               100 * share, 100 * limit)};
+}
+
 }  // namespace anchord

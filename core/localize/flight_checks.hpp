@@ -24,4 +24,9 @@ Result<std::optional<Gate>> check_lever_arm(const FlightRows& rows, const JointF
 Gate check_profile(const ProfileFactor& alone, std::span<const ProfileFactor> others,
                    const FlightOptions& options);
 
+/// Did a part of the track stand off as a whole? The larger part is believed, and beyond max_step_share of
+/// the positions a person decides which of the two is true. Gate "track". share  of the good positions, in
+/// parts that are off
+Gate check_steps(double share, const FlightOptions& options);
+
 }  // namespace anchord

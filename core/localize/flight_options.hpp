@@ -8,6 +8,7 @@
 
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
+#include "core/geo/track_segments.hpp"
 #include "core/localize/kit_profile.hpp"
 #include "core/localize/side_clues.hpp"
 #include "core/localize/solver_options.hpp"
@@ -26,6 +27,7 @@ struct FlightOptions {
       anchor_height_m{};  ///< dims two: height of all anchors; absent: mean height of the track
 
   FixClass min_fix{FixClass::rtk_fixed};  ///< both neighbours of a range must be at least this
+  TrackLimits track{};                    ///< what the positions are held against
   std::optional<double> max_gap_s{};      ///< absent: 3 x the 90th percentile track interval, in [0.1, 0.5] s
   double min_range_m{0.05};               ///< reliability limit; 0 is the radios' failure value
   double max_range_m{150.0};
@@ -60,7 +62,7 @@ struct FlightOptions {
   bool start_at_clues{false};  ///< begin where bearing and height of the clues meet, where both are known
   std::optional<double> level_sigma_db{};  ///< of RSS about the turn profile; absent: RSS is no clue
 
-  std::optional<Wgs84> origin{};  ///< of the ENU answers; absent: the first fix good enough
+  std::optional<Wgs84> origin{};  ///< of the ENU answers; absent: the middle of the positions believed
   std::optional<KitProfile> profile{};
   std::function<bool()> canceled{};  ///< asked between rounds
   Result<void> check() const;

@@ -5,6 +5,8 @@
 #include <set>
 #include <tuple>
 
+#include "core/geo/track_check.hpp"
+
 namespace anchord {
 namespace {
 
@@ -25,54 +27,42 @@ std::optional<Eigen::Vector3d> lever_arm(const Mission& mission, const Range& ra
   return std::nullopt;
 }
 
-/// The first fix good enough, by time; the first of any class where none is.
-const Fix* origin_fix(const std::vector<Fix>& fixes, FixClass min_fix) {
-  const Fix* best = nullptr;
-  for (const Fix& fix : fixes) {
-    if (fix.frame != TrackFrame::wgs84) continue;
-    const bool good = fix.fix >= min_fix;
-    if (!best || (good && best->fix < min_fix) || ((good || best->fix < min_fix) && fix.time < best->time))
-      best = &fix;
-  }
-  return best;
-}
-
 double median(std::vector<double>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::ranges::nth_element(values, middle);
   return *middle;
 }
 
-bool usable(const Fix& fix, TrackFrame frame) {
-  if (fix.frame != frame || fix.fix == FixClass::none) return false;
-  if (frame == TrackFrame::local) return fix.local_m.allFinite() && fix.local_m.norm() < 1e6;
-  const Wgs84& p = fix.position;
-  return std::isfinite(p.lat_deg) && std::isfinite(p.lon_deg) && std::isfinite(p.height_m) &&
-         std::abs(p.lat_deg) <= 90 && std::abs(p.lon_deg) <= 180 && p.height_m >= -500 &&
-         p.height_m <= 9000 && !(p.lat_deg == 0 && p.lon_deg == 0);
-}
-
 }  // namespace
 
 Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& options) {
   const TrackFrame kind = flight.mission.frame;
-  std::vector<Fix> fixes;
-  std::ranges::copy_if(flight.fixes, std::back_inserter(fixes),
-                       [&](const Fix& f) { return usable(f, kind); });
+  auto checked = check_track(flight.fixes, kind, options.min_fix, options.track);
+  auto& fixes = checked.fixes;
   if (fixes.empty()) return make_error(Errc::too_few_observations, "no usable position in the track");
   if (flight.ranges.empty()) return make_error(Errc::too_few_observations, "no ranges");
   std::optional<EnuFrame> frame;
-  if (kind == TrackFrame::wgs84)
-    frame.emplace(options.origin.value_or(origin_fix(fixes, options.min_fix)->position));
-  if (frame) {
-    // 20 km: swapped coordinates and wild fixes are not part of any flight round a building.
-    std::erase_if(fixes, [&](const Fix& f) { return frame->enu_from_wgs84(f.position).m.norm() > 20'000; });
-    if (fixes.empty())
-      return make_error(Errc::too_few_observations, "no position within 20 km of the origin");
+  if (kind == TrackFrame::wgs84) {
+    frame.emplace(options.origin.value_or(*checked.centre));
+    // Swapped coordinates, or the origin of another site.
+    const double far_m = frame->enu_from_wgs84(*checked.centre).m.norm();
+    if (far_m > options.track.max_distance_m)
+      return make_error(Errc::too_few_observations,
+                        "the middle of the track is " + std::to_string(std::llround(far_m / 1000)) +
+                            " km from the origin, more than the " +
+                            std::to_string(std::llround(options.track.max_distance_m / 1000)) +
+                            " km of any flight: check the site's origin");
   }
-  const UtcTime epoch = std::ranges::min_element(fixes, {}, &Fix::time)->time;
-  FlightRows rows{epoch, frame, TagTrack(fixes, frame, epoch, {options.min_fix, options.max_gap_s}), {}, {},
-                  {},    0};
+  const UtcTime epoch = fixes.front().time;
+  FlightRows rows{epoch,
+                  frame,
+                  TagTrack(fixes, frame, epoch, {options.min_fix, options.max_gap_s}),
+                  {},
+                  {},
+                  {},
+                  0,
+                  std::move(checked.refused),
+                  checked.step_share};
   rows.track_span_s = rows.track.poses().back().t_s - rows.track.poses().front().t_s;
   bool arm_across = false;
   for (const auto& tag : flight.mission.tags)
@@ -80,9 +70,10 @@ Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& op
   if (arm_across && !rows.track.has_attitude()) {
     rows.notes.emplace_back("the track has no attitude: only the upward part of the lever arms is applied");
   }
-  if (fixes.size() != flight.fixes.size()) {
-    rows.notes.push_back(std::to_string(flight.fixes.size() - fixes.size()) +
-                         " positions not usable were left out");
+  rows.notes.insert(rows.notes.end(), checked.notes.begin(), checked.notes.end());
+  if (flight.n_fixes_excluded > 0) {
+    rows.fixes_refused["excluded"] = flight.n_fixes_excluded;
+    rows.notes.push_back(std::to_string(flight.n_fixes_excluded) + " positions were excluded by a person");
   }
   std::map<NetworkId, AnchorRows> anchors;
   std::set<std::tuple<std::int64_t, NetworkId, std::uint8_t, NetworkId, std::optional<std::uint64_t>>> seen;
@@ -110,6 +101,7 @@ Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& op
       ++anchor.refused[why];
     }
   }
+  for (const auto& [id, n] : flight.n_ranges_excluded) anchors[id].refused["excluded"] += n;
   for (auto& [id, anchor] : anchors) {
     anchor.id = id;
     const auto name = flight.anchor_names.find(id);

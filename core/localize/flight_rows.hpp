@@ -47,10 +47,14 @@ struct FlightRows {
   std::vector<PairRow> pairs;  ///< between anchors the tag heard too
   std::vector<std::string> notes;
   double track_span_s{};
+  std::map<std::string, std::size_t> fixes_refused{};  ///< reason -> count
+  double step_share{};  ///< of the good positions: in parts that are off as a whole (CheckedTrack)
 };
 
-/// Judges every row: finite, within bounds, not a repeat, of a declared tag. Refused ones are counted by
-/// reason. errors  too_few_observations: no usable fix or no range at all
+/// Judges every row: positions against each other (check_track), ranges finite, within bounds, not a repeat,
+/// of a declared tag. Refused ones are counted by reason. The origin is the one asked for, else the middle of
+/// the positions believed. errors  too_few_observations: no usable fix or no range at all, or an origin
+/// elsewhere
 Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& options);
 
 }  // namespace anchord

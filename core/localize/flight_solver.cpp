@@ -122,6 +122,7 @@ FlightSolution describe(const Work& work, const FlightData& flight, const Flight
     solution.n_used += anchor.estimate.n_used;
     solution.anchors.push_back(std::move(anchor));
   }
+  solution.fixes_refused = work.rows.fixes_refused;
   solution.n_ranges = flight.ranges.size();
   solution.n_fixes = flight.fixes.size();
   return solution;
@@ -135,7 +136,8 @@ Result<void> FlightOptions::check() const {
                     positive(curve_prior_m) && positive(lag_prior_s) && positive(lever_prior_m) &&
                     positive(mad_factor) && positive(min_scale_m) && correlation_s >= 0 &&
                     floor_sigma_m >= 0 && min_range_m >= 0 && max_range_m > min_range_m &&
-                    (!max_gap_s || positive(*max_gap_s)) &&
+                    (!max_gap_s || positive(*max_gap_s)) && positive(track.max_speed_mps) &&
+                    positive(track.max_acceleration_mps2) && positive(track.max_correction_age_s) &&
                     (!anchor_height_m || std::isfinite(*anchor_height_m)) &&
                     (!fixed_bias_m || std::isfinite(*fixed_bias_m));
   if (good) return boost::outcome_v2::success();
@@ -188,6 +190,7 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
     Work& work = all[i];
     BOOST_OUTCOME_TRY(const auto arm, check_lever_arm(work.rows, work.fit, work.prior, options));
     if (arm) work.checks.push_back(*arm);
+    if (work.rows.step_share > 0) work.checks.push_back(check_steps(work.rows.step_share, options));
     const auto others = others_of(all, i, options);
     if (!others.empty() && !options.fixed_bias_m)
       work.checks.push_back(check_profile(work.alone, others, options));

@@ -62,8 +62,9 @@ struct FlightSolution {
   std::string name;
   std::optional<Wgs84> origin;
   SharedSolution shared;
-  std::vector<AnchorSolution> anchors;         ///< in order of network id
-  std::map<std::string, std::size_t> refused;  ///< over all anchors, reason -> count
+  std::vector<AnchorSolution> anchors;               ///< in order of network id
+  std::map<std::string, std::size_t> refused;        ///< over all anchors, reason -> count
+  std::map<std::string, std::size_t> fixes_refused;  ///< reason -> count, of the positions
   std::size_t n_ranges{}, n_used{}, n_fixes{};
   std::vector<std::string> notes;  ///< for people: what limits this solution
 };

@@ -22,7 +22,7 @@ class LiveAnchor {
  public:
   explicit LiveAnchor(NetworkId id) { estimate_.anchor = id; }
 
-  void refuse(const std::string& why) { ++estimate_.refused[why]; }
+  void refuse(const std::string& why, std::size_t n = 1) { estimate_.refused[why] += n; }
   /// A refusal taken back: the fixes came after all.
   void forgive(const std::string& why);
   /// True when the estimate was solved anew: at most every update_interval_s of measurement time.

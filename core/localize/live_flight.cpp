@@ -12,21 +12,28 @@
 #include "core/geo/tag_track.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "core/localize/live_anchor.hpp"
+#include "core/localize/live_track.hpp"
 
 namespace anchord {
 namespace {
 
 /// No model is believed beyond the noise of the radio itself: 2 cm at best.
 constexpr double k_least_sigma_m = 0.02;
+constexpr double k_same_origin_m = 1e-3;
 
 }  // namespace
 
 struct LiveFlight::State {
   Mission mission;
   LiveOptions options;
-  std::optional<UtcTime> epoch;
-  std::optional<EnuFrame> frame;
-  std::deque<TrackPose> track;  ///< ascending; only as long as ranges may still ask for it
+  LiveTrack track;
+  struct Logged {
+    Range range;
+    std::optional<RangeModel> model;
+  };
+  std::vector<Logged> log;  ///< of good ranges, thinned: for when the track turns out to be another
+  std::size_t log_stride{1}, log_skipped{0};
+  bool replaying{false};
   struct Waiting {
     Range range;
     std::optional<RangeModel> model;
@@ -43,11 +50,12 @@ struct LiveFlight::State {
   using Identity = std::tuple<std::int64_t, NetworkId, std::uint8_t, NetworkId>;
   std::set<Identity> seen;  ///< of the last seconds, against repeats
 
-  State(Mission m, LiveOptions o) : mission(std::move(m)), options(std::move(o)) {
-    if (mission.frame == TrackFrame::wgs84 && options.origin) frame.emplace(*options.origin);
-  }
+  State(Mission m, LiveOptions o)
+      : mission(std::move(m)),
+        options(std::move(o)),
+        track(mission.frame, {options.min_fix, options.max_track, options.origin, options.track}) {}
 
-  double seconds(UtcTime t) const { return seconds_between(*epoch, t); }
+  double seconds(UtcTime t) const { return seconds_between(*track.epoch(), t); }
 
   std::optional<Eigen::Vector3d> lever_arm(const Range& range) const {
     for (const auto& antenna : mission.tags) {
@@ -77,6 +85,7 @@ struct LiveFlight::State {
   }
 
   void keep(RangeResult result) {
+    if (replaying) return;  // told already, for better or worse
     // Whoever does not collect loses the oldest, not the memory.
     if (results.size() >= std::min<std::size_t>(options.max_waiting, 5000))
       results.erase(results.begin(), results.begin() + static_cast<std::ptrdiff_t>(results.size() / 2));
@@ -89,11 +98,12 @@ struct LiveFlight::State {
   Fate decide(const Waiting& entry) {
     const Range& range = entry.range;
     const double t_s = seconds(range.time) + options.lag_s;
-    if (track.empty()) return Fate::waits;
-    if (t_s < track.front().t_s) return Fate::outside;
-    const auto after = std::ranges::lower_bound(track, t_s, {}, &TrackPose::t_s);
-    if (after == track.end()) return Fate::waits;
-    const auto before = after == track.begin() ? after : std::prev(after);
+    const auto& poses = track.poses();
+    if (poses.empty()) return Fate::waits;
+    if (t_s < poses.front().t_s) return Fate::outside;
+    const auto after = std::ranges::lower_bound(poses, t_s, {}, &TrackPose::t_s);
+    if (after == poses.end()) return Fate::waits;
+    const auto before = after == poses.begin() ? after : std::prev(after);
     if (after->t_s - before->t_s > options.max_gap_s) return Fate::gap;
     if (before->fix < options.min_fix || after->fix < options.min_fix) {
       refuse(range, "fix_not_good_enough");
@@ -113,7 +123,7 @@ struct LiveFlight::State {
 
   /// True when the range is done with; else it stays parked.
   bool settle(Waiting& entry) {
-    if (!epoch) return false;
+    if (!track.epoch()) return false;
     const std::string told = entry.told;
     const Fate fate = decide(entry);
     if (fate == Fate::outside) tell(entry, "outside_track");
@@ -124,7 +134,7 @@ struct LiveFlight::State {
 
   /// The track changed between these instants: whatever waits there is looked at again.
   void settle_between(double from_s, double to_s) {
-    const auto ns = [&](double t_s) { return epoch->ns + static_cast<std::int64_t>(t_s * 1e9); };
+    const auto ns = [&](double t_s) { return track.epoch()->ns + static_cast<std::int64_t>(t_s * 1e9); };
     auto it = waiting.lower_bound(ns(from_s - options.lag_s) - 1);
     const auto end = waiting.upper_bound(ns(to_s - options.lag_s) + 1);
     while (it != end) it = settle(it->second) ? waiting.erase(it) : std::next(it);
@@ -182,6 +192,68 @@ struct LiveFlight::State {
     result.residual_m = anchor.residual_m(row, options);
     keep(std::move(result));
   }
+
+  void remember(const Range& range, const std::optional<RangeModel>& model) {
+    if (log_skipped++ % log_stride != 0) return;
+    log.push_back({range, model});
+    log.back().range.cir.reset();
+    if (log.size() < options.max_logged) return;
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < log.size(); i += 2) log[kept++] = std::move(log[i]);
+    log.resize(kept);
+    log_stride *= 2;
+  }
+
+  void solve_all() {
+    for (auto& [id, anchor] : anchors) {
+      if (anchor.solve(options)) changed.insert(id);
+    }
+    for (auto& [id, anchor] : uncorrected) (void)anchor.solve(options);
+  }
+
+  /// The track is another: what was joined to the old one is joined to this one, and every anchor begins
+  /// anew.
+  void rebuild() {
+    const auto before = std::exchange(anchors, {});
+    for (const auto& [id, anchor] : before) {
+      auto& fresh = anchors.try_emplace(id, id).first->second;
+      for (const auto& [why, n] : anchor.estimate({}).refused) {
+        // Of the range itself, whatever the track; the others are asked again.
+        if (why == "zero_range" || why == "out_of_bounds" || why == "duplicate" || why == "excluded")
+          fresh.refuse(why, n);
+      }
+    }
+    uncorrected.clear();
+    waiting.clear();
+    newest_range_ns = 0;
+    told_until_ns = std::numeric_limits<std::int64_t>::min();
+    const bool was_held = std::exchange(held, true);
+    replaying = true;
+    for (const Logged& one : log) {
+      Waiting entry{one.range, one.model, {}};
+      if (!settle(entry)) park(std::move(entry));
+    }
+    replaying = false;
+    held = was_held;
+    if (!held) solve_all();
+    for (const auto& [id, anchor] : anchors) changed.insert(id);
+  }
+
+  void follow(const LiveTrack::Change& change, const Fix& fix) {
+    if (change.newest) {
+      const TrackPose& now = *change.newest;
+      LivePose live{
+          {track.epoch()->ns + std::llround(now.t_s * 1e9)}, fix, now.position_m, std::nullopt, tag_at(now)};
+      const double since_s = pose ? seconds_between(pose->time, live.time) : 0;
+      if (since_s > 0 && since_s < 2.0 && !change.rebuilt)
+        live.speed_mps = (now.position_m - pose->enu_m).norm() / since_s;
+      pose = std::move(live);
+    }
+    if (change.rebuilt)
+      rebuild();
+    else if (change.added)
+      settle_between(change.from_s, change.to_s);
+  }
 };
 
 LiveFlight::LiveFlight(Mission mission, LiveOptions options)
@@ -192,31 +264,7 @@ LiveFlight& LiveFlight::operator=(LiveFlight&&) noexcept = default;
 
 void LiveFlight::add(const Fix& fix) {
   State& s = *state_;
-  if (fix.fix == FixClass::none) return;
-  const bool globe = s.mission.frame == TrackFrame::wgs84;
-  if ((fix.frame == TrackFrame::wgs84) != globe) return;
-  if (globe && !s.frame) {
-    if (fix.fix < s.options.min_fix) return;  // a bad origin would shift every later number by metres
-    s.frame.emplace(fix.position);
-  }
-  if (!s.epoch) s.epoch = fix.time;
-  TrackPose pose = pose_of(fix, s.frame, *s.epoch);
-  if (!pose.position_m.allFinite() || !pose.covariance_m2.allFinite()) return;
-  const auto place = std::ranges::lower_bound(s.track, pose.t_s, {}, &TrackPose::t_s);
-  if (place != s.track.end() && place->t_s == pose.t_s) return;
-  if (place == s.track.end()) {
-    LivePose live{fix.time, fix, pose.position_m, std::nullopt, s.tag_at(pose)};
-    if (!s.track.empty() && pose.t_s - s.track.back().t_s < 2.0) {
-      live.speed_mps = (pose.position_m - s.track.back().position_m).norm() / (pose.t_s - s.track.back().t_s);
-    }
-    s.pose = std::move(live);
-  }
-  const double t_s = pose.t_s;
-  const auto at = s.track.insert(place, std::move(pose));
-  const double from_s = at == s.track.begin() ? t_s : std::prev(at)->t_s;
-  const double to_s = std::next(at) == s.track.end() ? t_s : std::next(at)->t_s;
-  s.settle_between(from_s, to_s);
-  if (s.track.size() > s.options.max_track) s.track.pop_front();
+  s.follow(s.track.add(fix), fix);
 }
 
 void LiveFlight::add(const Range& range, const std::optional<RangeModel>& model) {
@@ -236,15 +284,22 @@ void LiveFlight::add(const Range& range, const std::optional<RangeModel>& model)
     return;
   }
   while (s.seen.size() > 4 * s.options.max_waiting) s.seen.erase(s.seen.begin());
+  s.remember(range, model);
   State::Waiting entry{range, model, {}};
   entry.range.cir.reset();
   if (!s.settle(entry)) s.park(std::move(entry));
 }
 
+void LiveFlight::leave_out(const Range& range) { state_->refuse(range, "excluded"); }
+
 void LiveFlight::tell(std::map<NetworkId, AnchorClues> clues) { state_->options.clues = std::move(clues); }
 
 void LiveFlight::adopt(const FlightSolution& solution, UtcTime cut) {
   State& s = *state_;
+  // Solved before the origin was another: its numbers are of another frame.
+  if (solution.origin && s.track.frame() &&
+      s.track.frame()->enu_from_wgs84(*solution.origin).m.norm() > k_same_origin_m)
+    return;
   s.options.bias_m = solution.shared.bias_m.value;
   const double lag_before_s = std::exchange(s.options.lag_s, solution.shared.lag_s.value);
   for (const auto& anchor : solution.anchors) {
@@ -260,18 +315,14 @@ void LiveFlight::hold(bool held) {
   State& s = *state_;
   s.held = held;
   if (held) return;
-  for (auto& [id, anchor] : s.anchors) {
-    if (anchor.solve(s.options)) s.changed.insert(id);
-  }
-  for (auto& [id, anchor] : s.uncorrected) (void)anchor.solve(s.options);
+  s.follow(s.track.settle(), s.pose ? s.pose->fix : Fix{});
+  s.solve_all();
 }
 
 void LiveFlight::finish() {
+  state_->follow(state_->track.settle(), state_->pose ? state_->pose->fix : Fix{});
   for (auto& [ns, entry] : state_->waiting) state_->tell(entry, "outside_track");
-  for (auto& [id, anchor] : state_->anchors) {
-    if (anchor.solve(state_->options)) state_->changed.insert(id);
-  }
-  for (auto& [id, anchor] : state_->uncorrected) (void)anchor.solve(state_->options);
+  state_->solve_all();
 }
 
 std::vector<RangeResult> LiveFlight::take_ranges() { return std::exchange(state_->results, {}); }
@@ -279,22 +330,22 @@ std::vector<RangeResult> LiveFlight::take_ranges() { return std::exchange(state_
 std::vector<Estimate> LiveFlight::take_estimates() {
   std::vector<Estimate> changed;
   for (const NetworkId id : std::exchange(state_->changed, {})) {
-    changed.push_back(state_->anchors.at(id).estimate(state_->frame));
+    changed.push_back(state_->anchors.at(id).estimate(state_->track.frame()));
   }
   return changed;
 }
 
 std::vector<Estimate> LiveFlight::estimates() const {
   std::vector<Estimate> all;
-  for (const auto& [id, anchor] : state_->anchors) all.push_back(anchor.estimate(state_->frame));
+  for (const auto& [id, anchor] : state_->anchors) all.push_back(anchor.estimate(state_->track.frame()));
   return all;
 }
 
 std::optional<double> LiveFlight::uncorrected_shift_m(NetworkId anchor) const {
   const auto raw = state_->uncorrected.find(anchor);
   if (raw == state_->uncorrected.end()) return std::nullopt;
-  const auto with = state_->anchors.at(anchor).estimate(state_->frame),
-             without = raw->second.estimate(state_->frame);
+  const auto with = state_->anchors.at(anchor).estimate(state_->track.frame()),
+             without = raw->second.estimate(state_->track.frame());
   if (!with.best || !without.best) return std::nullopt;
   return (with.best->position.m - without.best->position.m).norm();
 }
@@ -302,8 +353,10 @@ std::optional<double> LiveFlight::uncorrected_shift_m(NetworkId anchor) const {
 std::optional<LivePose> LiveFlight::pose() const { return state_->pose; }
 
 std::optional<Wgs84> LiveFlight::origin() const {
-  if (!state_->frame) return std::nullopt;
-  return state_->frame->origin();
+  if (!state_->track.frame()) return std::nullopt;
+  return state_->track.frame()->origin();
 }
+
+std::map<std::string, std::size_t> LiveFlight::fixes_refused() const { return state_->track.refused(); }
 
 }  // namespace anchord

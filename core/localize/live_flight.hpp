@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/geo/track_segments.hpp"
 #include "core/localize/side_clues.hpp"
 #include "core/types/estimate.hpp"
 #include "core/types/fix.hpp"
@@ -53,7 +54,11 @@ struct LiveOptions {
   double bias_prior_sigma_m{0.3};
   double lag_s{0.0};  ///< of the kit; adopt() replaces both
   double bias_m{0.0};
-  std::optional<Wgs84> origin{};             ///< absent: the first good fix
+  std::size_t max_logged{
+      12'000};          ///< ranges kept for when the track turns out to be another; then every second
+  TrackLimits track{};  ///< what the positions are held against
+  std::optional<Wgs84> origin{};  ///< of the site; absent: the first good fix, or the middle of the flight
+                                  ///< once that one turned out to be no part of it
   std::map<NetworkId, AnchorClues> clues{};  ///< tell() replaces them
 };
 
@@ -74,6 +79,8 @@ class LiveFlight {
   void add(const Fix& fix);
   /// `model`: its correction is taken off and its sigma used, before anything is solved.
   void add(const Range& range, const std::optional<RangeModel>& model = {});
+  /// A range a person took out of use: counted as "excluded" and told, nothing else.
+  void leave_out(const Range& range);
   /// What turns and height searches told, in metres of origin(): priors from the next solve on.
   void tell(std::map<NetworkId, AnchorClues> clues);
   /// A joint solution of this flight's rows up to `cut`: its bias and lag hold from now on, and its positions
@@ -96,8 +103,11 @@ class LiveFlight {
   /// it was corrected.
   std::optional<double> uncorrected_shift_m(NetworkId anchor) const;
   std::optional<LivePose> pose() const;
-  std::optional<Wgs84> origin()
-      const;  ///< of the ENU numbers; none in a local frame or before the first good fix
+  /// Of the ENU numbers; none in a local frame or before the first good fix. Another one when the first
+  /// positions turned out to be no part of the flight: every estimate is in the new one then.
+  std::optional<Wgs84> origin() const;
+  /// Positions that are no part of the track, reason -> count as it stands; "old_correction" counts as float.
+  std::map<std::string, std::size_t> fixes_refused() const;
 
  private:
   struct State;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/base/ids.hpp"
+#include "core/types/exclusion.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/mission.hpp"
 #include "core/types/range.hpp"
@@ -21,7 +22,11 @@ struct FlightData {
   std::map<NetworkId, std::string> anchor_names;  ///< id text as the source wrote it
   /// What a model believes of each range: empty, or one for every range, in their order.
   std::vector<std::optional<RangeBelief>> beliefs{};
-  std::vector<std::string> notes;  ///< what the reader saw and did not use, for people
+  /// Left out by a person before anything else was looked at, by anchor; they are counted as "excluded".
+  std::map<NetworkId, std::size_t> n_ranges_excluded{};
+  std::size_t n_fixes_excluded{};
+  std::vector<Exclusion> exclusions{};  ///< of its record, those taken back too
+  std::vector<std::string> notes;       ///< what the reader saw and did not use, for people
 };
 
 }  // namespace anchord
