@@ -57,7 +57,7 @@ struct Application::State {
         models(deps.learning != nullptr ? std::make_unique<ModelRegistry>(deps.learning->models) : nullptr),
         missions({deps.missions, deps.measurements, deps.anchors, hub, events, deps.clock, deps.post,
                   deps.goal, [this] { return device_rows(); }, judge(), needs_cir(), deps.site_outline,
-                  &steady}),
+                  &steady, deps.exclusions, deps.track}),
         stream({deps.devices, deps.service, deps.missions, events}),
         housekeeping({deps.bin, running, events, [this] { return router.purge_answers(); },
                       deps.keep_deleted_ns, deps.housekeeping_by_hand}),
@@ -67,7 +67,8 @@ struct Application::State {
         geo(deps.geoid_dir),
         calibrations({deps.measurements, deps.missions, deps.anchors, jobs, deps.clock, profiles_of(deps),
                       models.get(), deps.learning != nullptr ? &deps.learning->models : nullptr,
-                      [this](const MissionId& id) { return clues_of_flight(id); }, deps.frames}),
+                      [this](const MissionId& id) { return clues_of_flight(id); }, deps.frames,
+                      deps.exclusions, deps.track}),
         services{deps, hub,          events, alarms,         missions,     ingest,
                  jobs, calibrations, geo,    profiles.get(), models.get(), deps.frames} {
     services.prompt = &prompt;
@@ -84,6 +85,7 @@ struct Application::State {
     add_comparison_routes(router, services);
     if (services.profiles != nullptr) add_kit_routes(router, services);
     if (services.frames != nullptr) add_frame_routes(router, services);
+    if (deps.exclusions != nullptr) add_exclusion_routes(router, services);
     add_device_routes(router, services);
     add_job_routes(router, services);
     if (deps.plans != nullptr) {

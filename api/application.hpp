@@ -9,6 +9,7 @@
 #include "api/http/router.hpp"
 #include "api/learning/worker_port.hpp"
 #include "api/live/ws_handler.hpp"
+#include "core/geo/track_segments.hpp"
 #include "core/localize/accuracy_goal.hpp"
 
 namespace anchord {
@@ -20,6 +21,7 @@ class Clock;
 class DatasetStore;
 class DeviceControl;
 class DeviceRows;
+class ExclusionStore;
 class FrameStore;
 class Drone;
 class JobStore;
@@ -84,6 +86,8 @@ class Application {
     std::function<StorageStatus()> storage_status{};
     KitStore* kits{nullptr};                      ///< null: no kit profiles (tests)
     FrameStore* frames{nullptr};                  ///< null: no local frames (tests)
+    ExclusionStore* exclusions{nullptr};          ///< null: their routes do not exist (tests)
+    TrackLimits track{};                          ///< what the positions of a flight are held against
     DeviceControl* devices{nullptr};              ///< of this server; null: it has none
     std::string geoid_dir{};                      ///< empty: where GeographicLib looks
     Drone* drone{nullptr};                        ///< null: flights are flown by hand

@@ -132,6 +132,8 @@ Json flight_json(const SolvedFlight& flight) {
   json["n_used"] = s.n_used;
   json["refused"] = Json::object();
   for (const auto& [why, count] : s.refused) json["refused"][why] = count;
+  json["fixes_refused"] = Json::object();
+  for (const auto& [why, count] : s.fixes_refused) json["fixes_refused"][why] = count;
   json["notes"] = s.notes;
   json["anchors"] = Json::array();
   for (const auto& anchor : s.anchors) json["anchors"].push_back(anchor_json(anchor, globe));

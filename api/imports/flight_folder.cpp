@@ -2,16 +2,21 @@
 
 #include <array>
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <numbers>
 #include <string>
 #include <string_view>
 
 #include "api/imports/csv_table.hpp"
 #include "api/imports/flight_json.hpp"
+#include "api/json/exclusion_json.hpp"
 #include "core/base/text.hpp"
 
 namespace anchord {
 namespace {
+
+constexpr std::uintmax_t k_most_exclusion_bytes = 64u << 20;
 
 UtcTime time_of(UtcTime epoch, double t_s) { return {epoch.ns + std::llround(t_s * 1e9)}; }
 
@@ -234,7 +239,33 @@ Result<void> read_ranges(const std::filesystem::path& folder, const FlightDeclar
   return boost::outcome_v2::success();
 }
 
+/// Which rows a person took out of use; a folder without the file has none.
+Result<void> read_exclusions(const std::filesystem::path& file, FlightData& data) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(file, ignored)) return boost::outcome_v2::success();
+  const auto size = std::filesystem::file_size(file, ignored);
+  if (ignored || size > k_most_exclusion_bytes)
+    return make_error(Errc::invalid_argument, file.string() + ": larger than 64 MiB");
+  std::ifstream in(file, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  if (!in) return make_error(Errc::invalid_argument, file.string() + ": cannot be read");
+  auto read = parse_exclusions_file(text);
+  if (!read) return make_error(read.error().code, file.parent_path().string() + '/' + read.error().message);
+  data.exclusions = std::move(read).value();
+  return boost::outcome_v2::success();
+}
+
 }  // namespace
+
+void leave_out_excluded(FlightData& flight) {
+  flight.n_fixes_excluded +=
+      std::erase_if(flight.fixes, [&](const Fix& fix) { return excluded(flight.exclusions, fix); });
+  std::erase_if(flight.ranges, [&](const Range& range) {
+    const bool out = excluded(flight.exclusions, range);
+    if (out) ++flight.n_ranges_excluded[range.anchor];
+    return out;
+  });
+}
 
 Result<FlightData> read_flight_folder(const std::filesystem::path& folder) {
   std::error_code ignored;
@@ -248,6 +279,7 @@ Result<FlightData> read_flight_folder(const std::filesystem::path& folder) {
     BOOST_OUTCOME_TRY(read_track(folder, flight, data));
   }
   BOOST_OUTCOME_TRY(read_ranges(folder, flight, data));
+  BOOST_OUTCOME_TRY(read_exclusions(folder / "exclusions.json", data));
   return data;
 }
 

@@ -14,7 +14,11 @@ namespace anchord {
 /// Rows keep their order. Values that are numbers but absurd (zero ranges, nan) pass: the solver refuses and
 /// counts them. Columns it does not know are listed in FlightData::notes. errors  not_found (folder or file),
 /// invalid_argument; the message begins with file and line
+/// exclusions.json, where there is one, comes as FlightData::exclusions; nothing is left out yet.
 Result<FlightData> read_flight_folder(const std::filesystem::path& folder);
+
+/// Takes the rows out that FlightData::exclusions say, and counts them. Before anything is solved.
+void leave_out_excluded(FlightData& flight);
 
 /// Writes the same layout, plain CSV, times to the microsecond; creates the folder. CIRs and truth are not
 /// part of it. errors  storage_unavailable (cannot write), invalid_argument (fixes of two frames, not the

@@ -4,6 +4,7 @@
 
 #include "api/imports/flight_folder.hpp"
 #include "api/imports/flight_json.hpp"
+#include "api/json/exclusion_json.hpp"
 
 namespace anchord {
 namespace {
@@ -111,7 +112,11 @@ Result<void> write_flight_folder(const FlightData& flight, const std::filesystem
     declaration.quaternion = declaration.quaternion || fix.enu_from_body.has_value();
   BOOST_OUTCOME_TRY(write_flight_json(declaration, folder / "flight.json"));
   BOOST_OUTCOME_TRY(write_track(flight, epoch, declaration.quaternion, folder / "track.csv"));
-  return write_ranges(flight, epoch, folder / "ranges.csv");
+  BOOST_OUTCOME_TRY(write_ranges(flight, epoch, folder / "ranges.csv"));
+  if (flight.exclusions.empty()) return boost::outcome_v2::success();
+  std::ofstream out(folder / "exclusions.json", std::ios::binary);
+  out << exclusions_file_json(flight.exclusions);
+  return closed(out, folder / "exclusions.json");
 }
 
 }  // namespace anchord

@@ -335,6 +335,10 @@ std::string mission_state_json(const Mission& mission, const MissionLiveState& s
       .key("anchors_converged")
       .integer(static_cast<std::int64_t>(state.anchors_converged));
   out.key("range_rate_hz").number(state.range_rate_hz, 1);
+  std::string refused;
+  for (const auto& [reason, n] : state.fixes_refused)
+    refused += (refused.empty() ? "" : ",") + json_text(reason) + ':' + std::to_string(n);
+  out.key("fixes_refused").raw('{' + refused + '}');
   return out.take();
 }
 

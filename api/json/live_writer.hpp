@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 
@@ -28,6 +29,8 @@ struct MissionLiveState {
   std::uint64_t n_ranges{}, n_fixes{};
   std::size_t anchors_found{}, anchors_converged{};
   double range_rate_hz{};
+  std::map<std::string, std::size_t> fixes_refused{};  ///< positions that are no part of the track, by reason
+  std::size_t n_fixes_excluded{};
   std::optional<Wgs84> origin{};
   UtcTime time{};                    ///< of the newest measurement; creation before the first
   std::optional<UtcTime> started{};  ///< first measurement

@@ -80,6 +80,7 @@ Work work_of_action(const Request& request);
 const std::vector<std::string_view>& flight_actions();
 Response flight_action(Services& services, const Request& request, const std::string& action, Fields& fields,
                        std::vector<FieldError>& errors);
+void add_exclusion_routes(Router& router, Services& services);
 void add_system_routes(Router& router, Services& services);
 
 }  // namespace anchord::api

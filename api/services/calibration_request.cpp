@@ -80,6 +80,9 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
   if (const auto gap = fields.number("max_gap_s", 0.01, 10)) options.max_gap_s = *gap;
   if (const auto fix = fields.word("min_fix", {"none", "single", "dgps", "float", "fixed"}))
     options.min_fix = static_cast<FixClass>(*fix);
+  out.max_correction_age_s = fields.number("max_correction_age_s", 0.1, 3600);
+  out.max_speed_mps = fields.number("max_speed_mps", 1, 1000);
+  out.max_acceleration_mps2 = fields.number("max_acceleration_mps2", 1, 1000);
   if (const auto profile = fields.word("profile", {"kit", "none"})) out.use_profile = *profile == 0;
   if (const auto steps = fields.integer("iterations", 0, 50)) out.iterations = static_cast<int>(*steps);
   if (const Json* sigma = fields.child("sigma_m")) {

@@ -5,12 +5,15 @@
 #include <set>
 
 #include "api/exports/evidence.hpp"
+#include "api/json/exclusion_json.hpp"
 #include "api/json/wire_resources.hpp"
 #include "api/services/calibration_place.hpp"
 #include "api/services/job_service.hpp"
 #include "api/services/kit_profiles.hpp"
+#include "core/base/sha256.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/geo/enu.hpp"
+#include "core/geo/track_check.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "core/localize/fuse.hpp"
 
@@ -19,16 +22,23 @@ namespace anchord::api {
 using Json = nlohmann::json;
 
 Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission,
-                               const std::function<bool()>& canceled, bool with_cir) {
+                               const std::function<bool()>& canceled, bool with_cir,
+                               const std::vector<Exclusion>& exclusions) {
   FlightData flight;
   flight.mission = mission;
+  flight.exclusions = exclusions;
   MeasurementStore::Filter filter;
   filter.mission = mission.id;
   filter.limit = 10'000;
   do {
     if (canceled()) return make_error(Errc::canceled, "canceled");
     BOOST_OUTCOME_TRY(auto page, store.fixes(filter));
-    for (auto& row : page.rows) flight.fixes.push_back(std::move(row));
+    for (auto& row : page.rows) {
+      if (excluded(exclusions, row))
+        ++flight.n_fixes_excluded;
+      else
+        flight.fixes.push_back(std::move(row));
+    }
     filter.after = page.next;
   } while (!filter.after.empty());
   filter.with_cir = with_cir;
@@ -36,7 +46,12 @@ Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission,
   do {
     if (canceled()) return make_error(Errc::canceled, "canceled");
     BOOST_OUTCOME_TRY(auto page, store.ranges(filter));
-    for (auto& row : page.rows) flight.ranges.push_back(std::move(row));
+    for (auto& row : page.rows) {
+      if (excluded(exclusions, row))
+        ++flight.n_ranges_excluded[row.anchor];
+      else
+        flight.ranges.push_back(std::move(row));
+    }
     filter.after = page.next;
   } while (!filter.after.empty());
   return flight;
@@ -69,8 +84,25 @@ struct CalibrationService::Solved {
 
 namespace {
 
-/// One frame for all flights, so that their answers can be compared.
-Result<void> choose_frame(const std::vector<FlightData>& flights, FlightOptions& options, Calibration& out) {
+/// The one site's origin where the flights are near it; nothing else is as steady from calibration to
+/// calibration.
+std::optional<Wgs84> site_origin(const std::vector<FlightData>& flights, AnchorStore& anchors,
+                                 const Wgs84& middle, double max_distance_m) {
+  const auto& site = flights.front().mission.site;
+  if (!site) return std::nullopt;
+  for (const auto& flight : flights)
+    if (flight.mission.site != site) return std::nullopt;
+  const auto found = anchors.site(*site);
+  if (!found || !found.value().origin) return std::nullopt;
+  const bool near =
+      (ecef_from_wgs84(*found.value().origin) - ecef_from_wgs84(middle)).norm() <= max_distance_m;
+  return near ? found.value().origin : std::nullopt;
+}
+
+/// One frame for all flights, so that their answers can be compared: the site's, else the middle of the first
+/// flight's positions as far as they are believed.
+Result<void> choose_frame(const std::vector<FlightData>& flights, AnchorStore& anchors,
+                          FlightOptions& options, Calibration& out) {
   out.frame = flights.front().mission.frame;
   for (const auto& flight : flights) {
     if (flight.mission.frame != out.frame)
@@ -84,12 +116,10 @@ Result<void> choose_frame(const std::vector<FlightData>& flights, FlightOptions&
                         first.name + " and " + flight.mission.name +
                             " are in local frames of different sites and cannot be solved together");
     if (out.frame != TrackFrame::wgs84 || options.origin) continue;
-    for (const auto& fix : flight.fixes) {
-      if (fix.fix >= options.min_fix && fix.frame == TrackFrame::wgs84) {
-        options.origin = fix.position;
-        break;
-      }
-    }
+    const auto checked = check_track(flight.fixes, out.frame, options.min_fix, options.track);
+    if (!checked.centre) continue;
+    const auto of_site = site_origin(flights, anchors, *checked.centre, options.track.max_distance_m);
+    options.origin = of_site ? of_site : checked.centre;
   }
   out.origin = out.frame == TrackFrame::wgs84 ? options.origin : std::nullopt;
   return boost::outcome_v2::success();
@@ -116,6 +146,24 @@ Json site_base(const Site& site) {
           {"sigma_m", site.base_sigma_m ? Json(*site.base_sigma_m) : Json(nullptr)}};
 }
 
+/// Those that applied, by id: which rows they are is in the record, and the digest says that it is that
+/// record.
+Json exclusions_provenance(const std::vector<Exclusion>& exclusions) {
+  Json items = Json::array();
+  Sha256 digest;
+  for (const auto& e : exclusions) {
+    if (!e.applies()) continue;
+    digest.add(std::string_view(exclusion_canonical(e)));
+    items.push_back({{"id", to_string(e.id)},
+                     {"kind", e.selection.kind == RowKind::ranges ? "ranges" : "fixes"},
+                     {"n_rows", e.n_rows},
+                     {"reason", e.reason},
+                     {"by", e.by}});
+  }
+  const bool none = items.empty();
+  return {{"items", std::move(items)}, {"sha256", none ? Json(nullptr) : Json(digest.hex())}};
+}
+
 Json flight_provenance(const FlightData& flight, const FlightSolution& s) {
   const auto valued = [](const Valued& v) { return Json{{"value", v.value}, {"sigma", v.sigma}}; };
   return {{"mission", to_string(flight.mission.id)},
@@ -130,6 +178,8 @@ Json flight_provenance(const FlightData& flight, const FlightSolution& s) {
           {"n_ranges", s.n_ranges},
           {"n_used", s.n_used},
           {"refused", s.refused},
+          {"fixes_refused", s.fixes_refused},
+          {"exclusions", exclusions_provenance(flight.exclusions)},
           {"notes", s.notes}};
 }
 
@@ -259,7 +309,12 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
   all.insert(all.end(), request.learn_from.begin(), request.learn_from.end());
   for (const auto& id : all) {
     BOOST_OUTCOME_TRY(auto mission, deps_.missions.mission(id));
-    BOOST_OUTCOME_TRY(auto flight, load_flight(deps_.measurements, mission, canceled_now, models.needs_cir));
+    std::vector<Exclusion> exclusions;
+    if (deps_.exclusions != nullptr) {
+      BOOST_OUTCOME_TRY(exclusions, deps_.exclusions->exclusions(id));
+    }
+    BOOST_OUTCOME_TRY(auto flight,
+                      load_flight(deps_.measurements, mission, canceled_now, models.needs_cir, exclusions));
     if (!request.use_anchor_anchor)
       std::erase_if(flight.ranges, [](const Range& r) { return r.kind == RangeKind::anchor_anchor; });
     solved.flights.push_back(std::move(flight));
@@ -267,9 +322,14 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
                  solved.flights.back().mission.name);
   }
   FlightOptions options = request.options;
+  options.track = deps_.track;
+  const auto take = [](const std::optional<double>& told, double& limit) { limit = told.value_or(limit); };
+  take(request.max_correction_age_s, options.track.max_correction_age_s);
+  take(request.max_speed_mps, options.track.max_speed_mps);
+  take(request.max_acceleration_mps2, options.track.max_acceleration_mps2);
   options.canceled = canceled_now;
   Calibration& out = solved.calibration;
-  BOOST_OUTCOME_TRYV(choose_frame(solved.flights, options, out));
+  BOOST_OUTCOME_TRYV(choose_frame(solved.flights, deps_.anchors, options, out));
   std::optional<CalibrationFrame> frame;
   if (!request.frame.empty() && deps_.frames != nullptr) {
     BOOST_OUTCOME_TRY(frame, calibration_frame(*deps_.frames, request.frame));

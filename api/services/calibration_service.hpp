@@ -9,6 +9,7 @@
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
 #include "core/localize/flight_options.hpp"
+#include "core/ports/exclusion_store.hpp"
 #include "core/ports/store.hpp"
 #include "core/procedure/flight_clues.hpp"
 #include "core/types/anchor.hpp"
@@ -30,7 +31,8 @@ struct CalibrationRequest {
   std::vector<MissionId>
       learn_from;  ///< other flights of the same kit: they tell its bias and lag, not positions
   FlightOptions options;
-  std::string settings_json;  ///< as accepted
+  std::string settings_json;                                                         ///< as accepted
+  std::optional<double> max_correction_age_s, max_speed_mps, max_acceleration_mps2;  ///< else the service's
   bool use_profile{true};     ///< the kit's stored profile tells the prior, and learns from these flights
   int iterations{0};          ///< growing parts of each flight solved too, for the report's curves
   FlightModelsWish models{};  ///< what corrects the ranges before anything is solved
@@ -46,9 +48,11 @@ struct CalibrationRequest {
 /// Reads the body of POST /calibrations; what is wrong is appended to `errors`.
 CalibrationRequest read_calibration_request(const nlohmann::json& body, std::vector<FieldError>& errors);
 
-/// All rows of a mission as the solver takes them; impulse responses only where asked for.
+/// All rows of a mission as the solver takes them, less those of `exclusions` that apply, which are counted;
+/// impulse responses only where asked for.
 Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission,
-                               const std::function<bool()>& canceled, bool with_cir = false);
+                               const std::function<bool()>& canceled, bool with_cir = false,
+                               const std::vector<Exclusion>& exclusions = {});
 
 /// Batch solves as jobs of kind `calibration`. Thread-safe.
 class CalibrationService {
@@ -64,7 +68,9 @@ class CalibrationService {
     ModelStore* model_store{nullptr};
     /// What turns and height searches of a mission's flight told; absent: nothing.
     std::function<procedure::FlightClues(const MissionId&)> flight_clues{};
-    FrameStore* frames{nullptr};  ///< null: no local frames
+    FrameStore* frames{nullptr};          ///< null: no local frames
+    ExclusionStore* exclusions{nullptr};  ///< null: nothing is ever excluded (tests)
+    TrackLimits track{};                  ///< what positions are held against where the request does not say
   };
   explicit CalibrationService(Deps deps) : deps_(deps) {}
 

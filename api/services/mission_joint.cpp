@@ -34,8 +34,10 @@ void MissionService::State::start_joint(const std::shared_ptr<Flight>& flight) {
   if (flight->frame == TrackFrame::wgs84 && !task.options.origin) return;
   if (task.options.origin) task.options.clues = clues_in(flight->clues, EnuFrame(*task.options.origin));
   if (!outline.empty()) task.options.outline_m = outline_in_enu(outline, *task.options.origin);
-  task.done = [self = this, flight, cut = flight->history.newest(), now](const FlightSolution* solution) {
-    self->finish_joint(*flight, solution, cut, std::chrono::steady_clock::now() - now);
+  task.options.track = deps.track;
+  task.done = [self = this, flight, cut = flight->history.newest(), now,
+               beginning = flight->beginning](const FlightSolution* solution) {
+    self->finish_joint(*flight, solution, cut, std::chrono::steady_clock::now() - now, beginning);
   };
   // Set before the worker can be done.
   flight->joint_running = true;
@@ -44,12 +46,12 @@ void MissionService::State::start_joint(const std::shared_ptr<Flight>& flight) {
 }
 
 void MissionService::State::finish_joint(Flight& flight, const FlightSolution* solution, UtcTime cut,
-                                         std::chrono::steady_clock::duration took) {
+                                         std::chrono::steady_clock::duration took, std::uint64_t beginning) {
   const std::scoped_lock lock(flight.work_mutex);
   flight.joint_running = false;
   flight.joint_not_before = std::chrono::steady_clock::now() +
                             std::max<std::chrono::steady_clock::duration>(k_joint_pause, k_joint_rest * took);
-  if (solution == nullptr || stopped) return;
+  if (solution == nullptr || stopped || beginning != flight.beginning) return;
   flight.live.adopt(*solution, cut);
   flight.watch.note_lag(solution->shared.lag_s.value, solution->shared.lag_s.sigma);
   announce(flight, false);

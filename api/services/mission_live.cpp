@@ -3,6 +3,7 @@
 #include "api/services/mission_observer.hpp"
 #include "api/services/mission_service_state.hpp"
 #include "core/base/guard.hpp"
+#include "core/geo/enu.hpp"
 
 namespace anchord::api {
 
@@ -109,6 +110,14 @@ void MissionService::State::work(Flight& flight) {
                     std::to_string(dropped) + " measurements left the live path; they are stored", flight.id);
   }
   const std::scoped_lock lock(flight.work_mutex);
+  if (flight.rebuilding) {
+    // It begins anew: what was taken goes back to the head of the queue, and is worked off after what is
+    // stored.
+    const std::scoped_lock queue(flight.queue_mutex);
+    queued += rows.size();
+    for (auto it = rows.rbegin(); it != rows.rend(); ++it) flight.queue.push_front(std::move(*it));
+    return;
+  }
   tell_live(flight);
   std::size_t since_announced = 0;
   for (const auto& row : rows) {
@@ -152,6 +161,7 @@ void MissionService::State::step(Flight& flight, const LiveRow& row, bool quiet)
         static_cast<double>(flight.range_times_us.back() - flight.range_times_us.front()) * 1e-6;
     state.range_rate_hz = span_s > 0 ? static_cast<double>(flight.range_times_us.size() - 1) / span_s : 0;
     flight.watch.note_range(time);
+    if (excluded(flight.exclusions, *range)) return flight.live.leave_out(*range);
     flight.history.add(corrected(*judged), belief_of(*judged));
     ++flight.ranges_since_joint;
     flight.live.add(*range, judged->model);
@@ -160,8 +170,12 @@ void MissionService::State::step(Flight& flight, const LiveRow& row, bool quiet)
   const auto& fix = std::get<Fix>(row);
   ++state.n_fixes;
   flight.watch.note(fix);
-  flight.history.add(fix);
-  flight.live.add(fix);
+  if (excluded(flight.exclusions, fix)) {
+    ++state.n_fixes_excluded;
+  } else {
+    flight.history.add(fix);
+    flight.live.add(fix);
+  }
   if (quiet) return;
   if (auto* told = observer.load()) told->on_fix(fix);
   const std::int64_t now_us = fix.time.us();
@@ -211,11 +225,37 @@ void MissionService::State::announce(Flight& flight, bool quiet) {
                      live_estimate_json(id, estimate, flight.live.uncorrected_shift_m(estimate.anchor)),
                      estimate.time.us(), to_string(id) + to_string(estimate.anchor), estimate.anchor);
   }
-  flight.state.origin = flight.live.origin();
+  tell_fixes(flight, quiet);
   flight.state.anchors_found = flight.statuses.size();
   flight.state.anchors_converged =
       static_cast<std::size_t>(std::count_if(flight.statuses.begin(), flight.statuses.end(),
                                              [](const auto& entry) { return entry.second == "converged"; }));
+}
+
+/// Positions that are no part of the track, by reason; the first of each reason is an event, and so is an
+/// origin that turned out to be none.
+void MissionService::State::tell_fixes(Flight& flight, bool quiet) {
+  flight.state.fixes_refused = flight.live.fixes_refused();
+  if (flight.state.n_fixes_excluded > 0)
+    flight.state.fixes_refused["excluded"] = flight.state.n_fixes_excluded;
+  for (const auto& [reason, n] : flight.state.fixes_refused) {
+    if (reason == "not_usable" || !flight.fixes_told.try_emplace(reason, n).second || quiet) continue;
+    deps.events.add("warning", "track." + reason,
+                    reason == "excluded" ? "positions were excluded by a person"
+                                         : "a position is not believed: " + reason +
+                                               "; more of them are counted in the flight's state",
+                    flight.id);
+  }
+  const auto origin = flight.live.origin();
+  const auto& before = flight.state.origin;
+  if (before && origin && EnuFrame(*before).enu_from_wgs84(*origin).m.norm() > 1e-3) {
+    flight.clues_told = false;
+    if (!quiet)
+      deps.events.add("warning", "track.origin",
+                      "the first positions were no part of the flight: its origin is another from here on",
+                      flight.id);
+  }
+  flight.state.origin = origin;
 }
 
 void MissionService::State::publish_devices() {

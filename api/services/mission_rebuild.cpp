@@ -3,6 +3,22 @@
 
 namespace anchord::api {
 
+/// The site's origin, where it has one, is that of its flights.
+LiveOptions MissionService::State::live_options(const Mission& mission) const {
+  LiveOptions options;
+  options.track = deps.track;
+  if (mission.site && mission.frame == TrackFrame::wgs84) {
+    if (const auto site = deps.anchors.site(*mission.site)) options.origin = site.value().origin;
+  }
+  return options;
+}
+
+std::vector<Exclusion> MissionService::State::exclusions_of(const MissionId& id) const {
+  if (deps.exclusions == nullptr) return {};
+  auto all = deps.exclusions->exclusions(id);
+  return all ? std::move(all).value() : std::vector<Exclusion>{};
+}
+
 void MissionService::State::begin_rebuild(const std::shared_ptr<Flight>& flight) {
   const auto n = deps.measurements.count_ranges(flight->id),
              fixes = deps.measurements.count_fixes(flight->id);
@@ -41,6 +57,7 @@ void MissionService::State::continue_rebuild(const std::shared_ptr<Flight>& flig
 /// Two sorted streams merged by time, a page of each in memory; one page of either a call. False at the end.
 bool MissionService::State::rebuild_slice(Flight& flight) {
   const std::scoped_lock lock(flight.work_mutex);
+  if (!flight.rebuild) return false;  // it began anew twice, and the other round was the last
   auto& r = *flight.rebuild;
   bool failed = false;
   const auto refill = [&](auto& rows, auto& filter, bool& more, auto read) {

@@ -71,13 +71,42 @@ void MissionService::prepare(const MissionId& id) {
   if (state_->find(id)) return;
   const auto record = mission(id);
   if (!record) return;
-  auto flight = std::make_shared<Flight>(record.value());
+  auto flight = std::make_shared<Flight>(record.value(), state_->live_options(record.value()));
+  flight->exclusions = state_->exclusions_of(id);
   flight->state.time = record.value().created;
   // Told before it can be found: rows that come meanwhile wait in the queue.
   flight->rebuilding = true;
   {
     const std::scoped_lock lock(state_->mutex);
     if (!state_->flights.emplace(id, flight).second) return;
+  }
+  state_->begin_rebuild(flight);
+}
+
+void MissionService::exclusions_changed(const MissionId& id) {
+  const auto flight = state_->find(id);
+  if (!flight) return;
+  // Rows that come from here on wait in the queue until what is stored is in.
+  flight->rebuilding = true;
+  Mission mission;
+  {
+    const std::scoped_lock lock(flight->queue_mutex);
+    mission = flight->mission;
+  }
+  {
+    const std::scoped_lock lock(flight->work_mutex);
+    ++flight->beginning;
+    flight->exclusions = state_->exclusions_of(id);
+    flight->live = LiveFlight(mission, flight->options);
+    flight->history.clear();
+    flight->fixes_told.clear();
+    flight->clues_told = false;
+    flight->ranges_since_joint = 0;
+    flight->range_times_us.clear();
+    flight->rebuilt.clear();
+    const UtcTime started = flight->state.time;
+    flight->state = {};
+    flight->state.time = started;
   }
   state_->begin_rebuild(flight);
 }

@@ -14,6 +14,7 @@
 #include "core/base/result.hpp"
 #include "core/base/steady.hpp"
 #include "core/base/time.hpp"
+#include "core/geo/track_segments.hpp"
 #include "core/localize/accuracy_goal.hpp"
 #include "core/procedure/flight_clues.hpp"
 #include "core/types/estimate.hpp"
@@ -24,6 +25,7 @@
 
 namespace anchord {
 class AnchorStore;
+class ExclusionStore;
 class MeasurementStore;
 class MissionStore;
 }  // namespace anchord
@@ -58,6 +60,8 @@ class MissionService {
     std::function<bool()> judge_needs_cir{};
     bool site_outline{true};  ///< joint solutions take the site's outline as a clue: anchors are inside
     const SteadyClock* steady{nullptr};  ///< what silence is measured by; null: the system's
+    ExclusionStore* exclusions{nullptr};  ///< null: nothing is ever excluded (tests)
+    TrackLimits track{};                  ///< what the positions of a flight are held against
   };
   explicit MissionService(Deps deps);
   ~MissionService();
@@ -78,6 +82,9 @@ class MissionService {
   bool wants_cir() const;
   /// An event in the record of every flight that records now.
   void note_in_flights(const std::string& code, const std::string& text);
+  /// What a person took out of use of this mission changed: its live flight, where there is one, begins anew
+  /// with what the store holds, less that.
+  void exclusions_changed(const MissionId& id);
   /// Rows of one kind that were committed, in order of arrival.
   void accepted(std::vector<Range> ranges);
   void accepted(std::vector<Fix> fixes);

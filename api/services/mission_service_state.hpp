@@ -15,15 +15,18 @@
 #include "api/services/radio_watch.hpp"
 #include "core/localize/flight_history.hpp"
 #include "core/localize/live_flight.hpp"
+#include "core/ports/exclusion_store.hpp"
 #include "core/ports/store.hpp"
 
 namespace anchord::api {
 
 /// One followed flight. `queue_mutex` guards what requests touch, `work_mutex` is the strand of the rest.
 struct MissionService::Flight {
-  explicit Flight(const Mission& m) : id(m.id), frame(m.frame), mission(m), live(m) {}
+  Flight(const Mission& m, LiveOptions o)
+      : id(m.id), frame(m.frame), options(std::move(o)), mission(m), live(m, options) {}
   const MissionId id;
   const TrackFrame frame;
+  const LiveOptions options;
   std::mutex queue_mutex;
   Mission mission;  ///< under queue_mutex
   std::deque<LiveRow> queue;
@@ -34,6 +37,10 @@ struct MissionService::Flight {
   std::optional<SteadyTime> fix_arrival{}, range_arrival{};
   std::mutex work_mutex;  ///< the strand: everything below
   LiveFlight live;
+  std::vector<Exclusion> exclusions;
+  std::uint64_t beginning{
+      0};  ///< raised when the live flight begins anew: what was solved before is not adopted
+  std::map<std::string, std::size_t> fixes_told{};  ///< refusals of positions that are in the record
   std::map<NetworkId, std::string> statuses;
   MissionLiveState state;
   std::int64_t last_pose_us{0}, last_rtk_us{0};
@@ -107,9 +114,12 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   void continue_rebuild(const std::shared_ptr<Flight>& flight);
   bool rebuild_slice(Flight& flight);
   void post(std::function<void()> task);
+  LiveOptions live_options(const Mission& mission) const;
+  std::vector<Exclusion> exclusions_of(const MissionId& id) const;
+  void tell_fixes(Flight& flight, bool quiet);
   void start_joint(const std::shared_ptr<Flight>& flight);
   void finish_joint(Flight& flight, const FlightSolution* solution, UtcTime cut,
-                    std::chrono::steady_clock::duration took);
+                    std::chrono::steady_clock::duration took, std::uint64_t beginning);
   void publish_devices();
   static void tell_live(Flight& flight);
 };

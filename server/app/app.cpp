@@ -238,6 +238,7 @@ void App::State::compose() {
   deps.drone = drone.get();
   deps.access = access.get();
   deps.kits = &database->kits();
+  deps.exclusions = &database->exclusions();
   deps.frames = &database->frames();
   BackupKeeper::Options keep;
   keep.dir = config.text("backup.dir").empty() ? data_dir / "backups" : fs::path(config.text("backup.dir"));
@@ -248,6 +249,8 @@ void App::State::compose() {
   deps.backups = backups.get();
   deps.goal = {config.metres("goal.h95_m"), config.metres("goal.v95_m")};
   deps.site_outline = config.text("solve.site_outline") == "on";
+  deps.track.max_correction_age_s =
+      std::chrono::duration<double>(config.seconds("solve.max_correction_age_s")).count();
   deps.devices = devices.get();
   learning = std::make_unique<api::LearningStores>(
       api::LearningStores{database->campaigns(), database->labels(), database->datasets(),

@@ -5,6 +5,8 @@
 
 #include "api/imports/flight_folder.hpp"
 #include "core/base/text.hpp"
+#include "api/json/exclusion_json.hpp"
+#include "api/json/flight_requests.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/flight_upload.hpp"
 #include "server/cli/progress.hpp"
@@ -27,6 +29,7 @@ Result<std::string> import_by_rest(const Options& options, FlightData flight) {
   BOOST_OUTCOME_TRY(const auto token, read_token_file(options.token_file));
   BOOST_OUTCOME_TRY(const auto client, RestClient::make(options.url, token, interrupted));
   const std::string name = name_of(options, flight);
+  const auto exclusions = flight.exclusions;
   FlightUpload upload(*client, std::move(flight));
   BOOST_OUTCOME_TRY(upload.create_mission(name));
   {
@@ -35,6 +38,16 @@ Result<std::string> import_by_rest(const Options& options, FlightData flight) {
       BOOST_OUTCOME_TRY(upload.send_next_batch());
       progress.show(upload.fraction());
     }
+  }
+  const std::string record = "/api/v1/missions/" + upload.mission_id() + "/exclusions";
+  for (const auto& one : exclusions) {
+    BOOST_OUTCOME_TRY(const auto made,
+                      client->post(record, "application/json", api::exclusion_request_json(one),
+                                   to_string(make_uuid_v7(SystemClock{}.now()))));
+    if (!one.included) continue;
+    BOOST_OUTCOME_TRY(const auto id, api::parse_created_id(made));
+    BOOST_OUTCOME_TRYV(client->post(record + '/' + id + "/include", "application/json", "{}",
+                                    to_string(make_uuid_v7(SystemClock{}.now()))));
   }
   BOOST_OUTCOME_TRY(upload.finish_mission());
   std::fprintf(stderr, "%s: %s\n", name.c_str(), upload.summary().c_str());
@@ -78,6 +91,14 @@ Result<std::string> import_into_folder(const Options& options, FlightData flight
   BOOST_OUTCOME_TRY(append_all(flight.ranges, mission.id, refused, [&](std::vector<Range> rows) {
     return store.append_ranges(std::move(rows), false);
   }));
+  for (Exclusion one : flight.exclusions) {
+    one.id = ExclusionId{make_uuid_v7(now)};
+    one.mission = mission.id;
+    const auto word = std::exchange(one.included, std::nullopt);
+    BOOST_OUTCOME_TRYV(db->exclusions().insert(one, {}));
+    if (!word) continue;
+    BOOST_OUTCOME_TRYV(db->exclusions().include(mission.id, one.id, *word));
+  }
   std::fprintf(stderr, "%s: %zu rows stored, %zu refused\n", mission.name.c_str(), n, refused);
   return to_string(mission.id);
 }

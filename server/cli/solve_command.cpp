@@ -29,6 +29,7 @@ struct Arguments {
       min_fix{"fixed"};
   int dims{3};
   std::optional<double> bias_m, height_m;
+  double max_correction_age_s{TrackLimits{}.max_correction_age_s};
   std::string profile, out, clues;
   std::vector<std::string> models;
   std::string likelihood{"one_sided"};
@@ -81,6 +82,7 @@ Result<FlightOptions> options_of(const Arguments& a) {
                     : a.min_fix == "single" ? FixClass::single
                                             : FixClass::rtk_fixed;
   options.fixed_bias_m = a.bias_m;
+  options.track.max_correction_age_s = a.max_correction_age_s;
   options.anchor_height_m = a.height_m;
   if (!a.profile.empty()) {
     BOOST_OUTCOME_TRY(options.profile, read_profile(a.profile));
@@ -98,6 +100,7 @@ Result<std::vector<FlightData>> read_all(const std::vector<std::string>& folders
     std::fprintf(stderr, "reading %s\n", folder.c_str());
     BOOST_OUTCOME_TRY(auto flight, read_flight_folder(folder));
     std::fprintf(stderr, "  %zu positions, %zu ranges\n", flight.fixes.size(), flight.ranges.size());
+    leave_out_excluded(flight);
     flights.push_back(std::move(flight));
   }
   return flights;
@@ -229,6 +232,11 @@ void add_options(CLI::App& command, Arguments& a) {
                      "Height of all anchors for --dims 2; default: mean height of the track");
   command.add_option("--min-fix", a.min_fix, "Least fix class of the track: fixed, float, dgps or single")
       ->check(CLI::IsMember({"fixed", "float", "dgps", "single"}));
+  command
+      .add_option("--max-correction-age", a.max_correction_age_s,
+                  "Seconds; RTK fixed with older corrections counts as float")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str();
   command.add_option("--bias", a.bias_m,
                      "Range bias of the kit in metres, taken as known instead of estimated");
   command.add_option("--profile", a.profile, "Kit profile of earlier flights (anchord profile fit)");

@@ -70,6 +70,8 @@ constexpr std::array k_options = {
     Option{"solve.site_outline", "on",
            "live solutions take the outline of the mission's site as a clue: anchors are inside", choice,
            "on|off"},
+    Option{"solve.max_correction_age_s", "30",
+           "RTK fixed with corrections older than this counts as float, live and in calibrations", seconds},
     Option{"rate.per_s", "50", "requests a second of one token; beyond: 429", count},
     Option{"rate.burst", "200", "requests a token may send at once", count},
 };

@@ -59,7 +59,8 @@ class SqliteDatabase final : public Database, private sql::Gate {
         models_(sql::make_model_store(*this)),
         plans_(sql::make_plan_store(*this)),
         bin_(sql::make_mission_bin(*this)),
-        service_(sql::make_service_store(*this)) {
+        service_(sql::make_service_store(*this)),
+        exclusions_(sql::make_exclusion_store(*this)) {
     if (check_in_background) checker_ = Thread("anchord-check", [this] { check_in_background_thread(); });
   }
   ~SqliteDatabase() override {
@@ -82,6 +83,7 @@ class SqliteDatabase final : public Database, private sql::Gate {
   PlanStore& plans() override { return *plans_; }
   MissionBin& bin() override { return *bin_; }
   ServiceStore& service() override { return *service_; }
+  ExclusionStore& exclusions() override { return *exclusions_; }
 
   StorageHealth health() override {
     const auto status = writer_.status();
@@ -178,6 +180,7 @@ class SqliteDatabase final : public Database, private sql::Gate {
   std::unique_ptr<PlanStore> plans_;
   std::unique_ptr<MissionBin> bin_;
   std::unique_ptr<ServiceStore> service_;
+  std::unique_ptr<ExclusionStore> exclusions_;
   Thread checker_;
 };
 

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "core/base/result.hpp"
+#include "core/ports/exclusion_store.hpp"
 #include "core/ports/learning_store.hpp"
 #include "core/ports/mission_bin.hpp"
 #include "core/ports/plan_store.hpp"
@@ -82,6 +83,7 @@ class Database {
   virtual PlanStore& plans() = 0;
   virtual MissionBin& bin() = 0;
   virtual ServiceStore& service() = 0;
+  virtual ExclusionStore& exclusions() = 0;
   virtual StorageHealth health() = 0;
   /// Online copy while writes go on: fsynced, integrity-checked, with its SHA-256. The file must not exist.
   virtual Result<BackupReport> backup(const std::filesystem::path& file) = 0;

@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 
+#include "core/ports/exclusion_store.hpp"
 #include "core/ports/learning_store.hpp"
 #include "core/ports/mission_bin.hpp"
 #include "core/ports/plan_store.hpp"
@@ -32,6 +33,7 @@ std::unique_ptr<ModelStore> make_model_store(Gate& gate);
 std::unique_ptr<PlanStore> make_plan_store(Gate& gate);
 std::unique_ptr<MissionBin> make_mission_bin(Gate& gate);
 std::unique_ptr<ServiceStore> make_service_store(Gate& gate);
+std::unique_ptr<ExclusionStore> make_exclusion_store(Gate& gate);
 
 /// The short form of a mission's id; nothing when there is no such mission, or when it is in the bin.
 std::optional<std::int64_t> mission_key(Connection& connection, const MissionId& id);

@@ -48,6 +48,7 @@ class AppFixture : public ::testing::Test {
     deps.plans = &database_->plans();
     deps.kits = &database_->kits();
     deps.frames = &database_->frames();
+    deps.exclusions = &database_->exclusions();
     deps.post = std::move(post);
     deps.goal = goal;
     deps.learning = &*learning_;

@@ -35,6 +35,15 @@ test('a site, a mission, its measurements', async () => {
   await call('POST', `/api/v1/missions/${ids.mission}/actions`, { expect: 200, json: { action: 'finish' } });
 });
 
+test('measurements taken out of use, and back', async () => {
+  const { json } = await call('GET', `/api/v1/ranges?mission=${ids.mission}&limit=2`, { expect: 200 });
+  const path = `/api/v1/missions/${ids.mission}/exclusions`;
+  const made = await call('POST', path, { expect: 201, json: { kind: 'ranges', ids: json.items.map((one) => one.id), reason: 'a bird' } });
+  await call('GET', path, { expect: 200 });
+  await call('POST', `${path}/${made.json.id}/include`, { expect: 200, json: { reason: 'no bird' } });
+  await call('POST', `${path}/${made.json.id}/include`, { expect: 409, json: {} });
+});
+
 test('a calibration, published', async () => {
   const solved = await call('POST', '/api/v1/calibrations', { json: { missions: [ids.mission] }, headers: { prefer: 'wait=120' } });
   assert.ok(solved.status < 300, solved.text);
