@@ -54,7 +54,10 @@ struct Application::State {
         hub(deps.clock, "anchord " + deps.build.version),
         events(hub, deps.clock),
         alarms(events),
-        models(deps.learning != nullptr ? std::make_unique<ModelRegistry>(deps.learning->models) : nullptr),
+        signer(signer_of(deps)),
+        models(deps.learning != nullptr
+                   ? std::make_unique<ModelRegistry>(ModelSource(deps.learning->models, signer.get()))
+                   : nullptr),
         missions({deps.missions, deps.measurements, deps.anchors, hub, events, deps.clock, deps.post,
                   deps.goal, [this] { return device_rows(); }, judge(), needs_cir(), deps.site_outline,
                   &steady, deps.exclusions, deps.track}),
@@ -66,8 +69,7 @@ struct Application::State {
         jobs(deps.jobs, hub, deps.clock),
         geo(deps.geoid_dir),
         calibrations({deps.measurements, deps.missions, deps.anchors, jobs, deps.clock, profiles_of(deps),
-                      models.get(), deps.learning != nullptr ? &deps.learning->models : nullptr,
-                      [this](const MissionId& id) { return clues_of_flight(id); }, deps.frames,
+                      models.get(), [this](const MissionId& id) { return clues_of_flight(id); }, deps.frames,
                       deps.exclusions, deps.track}),
         services{deps, hub,          events, alarms,         missions,     ingest,
                  jobs, calibrations, geo,    profiles.get(), models.get(), deps.frames} {
@@ -109,6 +111,13 @@ struct Application::State {
     if (deps.backups != nullptr) add_backup_routes(router, services);
     add_system_routes(router, services);
   }
+
+  static std::unique_ptr<ModelSigner> signer_of(const Deps& from) {
+    if (from.model_key.empty()) return nullptr;
+    return std::make_unique<ModelSigner>(ModelSigner::parse_seed(from.model_key).value());
+  }
+  /// Once, when the key is new: what a run made here, and what was promoted before promotions judged uploads.
+  void sign_models_of_before();
 
   KitProfiles* profiles_of(const Deps& from) {
     if (from.kits != nullptr) profiles = std::make_unique<KitProfiles>(*from.kits, from.missions, from.clock);
@@ -154,6 +163,7 @@ struct Application::State {
   Hub hub;
   EventLog events;
   AlarmBoard alarms;
+  std::unique_ptr<ModelSigner> signer;
   std::unique_ptr<ModelRegistry> models;
   MissionService missions;
   DeviceStream stream;
@@ -170,7 +180,8 @@ struct Application::State {
   struct Learning {
     explicit Learning(State& s)
         : training({s.deps.learning->datasets, s.deps.learning->runs, s.jobs, s.events, s.deps.clock,
-                    s.deps.run_work ? s.deps.run_work : RunWork(work_inline), s.deps.build.version}),
+                    s.deps.run_work ? s.deps.run_work : RunWork(work_inline), s.deps.build.version,
+                    s.signer.get()}),
           services{s.services, *s.deps.learning, training, *s.models} {}
     TrainingService training;
     LearningServices services;
@@ -292,6 +303,33 @@ void Application::State::tell_alarms(UtcTime now, std::vector<AlarmCondition> ho
 Application::Application(Deps deps) : state_(std::make_unique<State>(std::move(deps))) {}
 Application::~Application() { stop(); }
 
+void Application::State::sign_models_of_before() {
+  auto& store = deps.learning->models;
+  std::set<ModelId> promoted;
+  if (const auto all = store.promotions("", 100'000)) {
+    for (const auto& one : all.value())
+      if (one.model) promoted.insert(*one.model);
+  }
+  std::optional<ModelId> after;
+  std::size_t n = 0;
+  while (true) {
+    const auto page = store.models(100, after);
+    if (!page || page.value().empty()) break;
+    for (const auto& model : page.value()) {
+      after = model.id;
+      if (!model.signature.empty() || (!model.run && !promoted.contains(model.id))) continue;
+      const auto text = store.artifact(model.id);
+      if (!text) continue;
+      const auto purpose = model.run ? ModelStanding::made : ModelStanding::vouched;
+      if (store.sign(model.id, signer->sign(purpose, text.value()))) ++n;
+    }
+  }
+  if (n > 0)
+    events.add(
+        "info", "model.signed",
+        std::to_string(n) + " models of before are signed with this server's new key " + signer->key_id());
+}
+
 Router& Application::router() { return state_->router; }
 Hub& Application::hub() { return state_->hub; }
 DeviceRows& Application::device_rows() { return state_->device_ingest; }
@@ -307,7 +345,10 @@ void Application::start() {
   // Whatever is kept, the server starts: what cannot be taken up again is told.
   (void)guarded("models and events at the start", [this] {
     if (!state_->models) return;
+    if (state_->signer && state_->deps.model_key_is_new) state_->sign_models_of_before();
     const auto loaded = state_->models->reload();
+    if (const auto& fault = state_->models->active()->fault; !fault.empty())
+      state_->events.add("warning", "model.refused", fault);
     if (!loaded && state_->deps.log_fault) state_->deps.log_fault("", loaded.error().message);
     const auto before = promotion_events(state_->deps.learning->models, state_->deps.missions);
     if (before)

@@ -100,7 +100,9 @@ class Application {
     const SteadyClock* steady{nullptr};   ///< what every duration is measured by; null: the system's
     std::int64_t keep_deleted_ns{30LL * 86'400 * 1'000'000'000};  ///< a deleted mission, in running time
     bool housekeeping_by_hand{false};     ///< set: keep_house() is called by hand (tests)
-    RunWork run_work{};                 ///< runs heavy work; absent: on the job's own thread
+    std::string model_key{};       ///< 64 hex digits, what models are signed with; empty: none are (tests)
+    bool model_key_is_new{false};  ///< models of before it existed are signed at the start
+    RunWork run_work{};            ///< runs heavy work; absent: on the job's own thread
   };
 
   explicit Application(Deps deps);

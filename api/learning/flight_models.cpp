@@ -45,8 +45,7 @@ FlightModelsWish read_flight_models(const Json& models, std::vector<FieldError>&
   return out;
 }
 
-Result<ModelRegistry::Active> models_for(const FlightModelsWish& wish, const ModelRegistry& registry,
-                                         ModelStore& store) {
+Result<ModelRegistry::Active> models_for(const FlightModelsWish& wish, const ModelRegistry& registry) {
   const auto active = registry.active();
   std::map<std::string, ModelId> chosen = active->models;
   for (const auto& [task, text] : wish.tasks) {
@@ -57,7 +56,7 @@ Result<ModelRegistry::Active> models_for(const FlightModelsWish& wish, const Mod
       chosen[task] = ModelId{uuid};
     }
   }
-  return load_models(store, chosen, wish.correction.value_or(active->correction));
+  return load_models(registry.source(), chosen, wish.correction.value_or(active->correction), true);
 }
 
 FlightModelsReport correct_flight(const ModelRegistry::Active& models, FlightData& flight, bool likelihood,

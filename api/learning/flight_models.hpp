@@ -26,9 +26,8 @@ struct StatedNoise {
 FlightModelsWish read_flight_models(const nlohmann::json& models, std::vector<FieldError>& errors);
 
 /// The models the wish means now. errors: not_found (no such model), unsupported, invalid_argument (of
-/// another task)
-Result<ModelRegistry::Active> models_for(const FlightModelsWish& wish, const ModelRegistry& registry,
-                                         ModelStore& store);
+/// another task), conflict (edited after it was signed, or from elsewhere and never promoted)
+Result<ModelRegistry::Active> models_for(const FlightModelsWish& wish, const ModelRegistry& registry);
 
 /// What the models did to a flight.
 struct FlightModelsReport {

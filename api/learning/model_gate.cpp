@@ -11,8 +11,12 @@ namespace {
 /// The same figure twice may differ in its last digit.
 constexpr double k_slack = 1e-9;
 
+/// Fewer rows tell nothing of a model that nobody here has seen.
+constexpr std::size_t k_least_rows = 10;
+
 struct Figures {
   std::optional<double> accuracy{}, fpr{}, mae_m{}, mae_raw_m{};
+  std::optional<double> commonest{};  ///< share of the more frequent class: what always saying it would reach
 };
 
 std::optional<double> metric(const ml::Model& model, std::string_view name) {
@@ -22,11 +26,11 @@ std::optional<double> metric(const ml::Model& model, std::string_view name) {
 }
 
 Figures manifest_figures(const ml::Model& model) {
-  return {metric(model, "accuracy"), metric(model, "fpr"), metric(model, "mae_m"),
-          metric(model, "mae_raw_m")};
+  return {metric(model, "accuracy"), metric(model, "fpr"), metric(model, "mae_m"), metric(model, "mae_raw_m"),
+          std::nullopt};
 }
 
-std::optional<Figures> measured(const ml::Model& model, const DatasetTable& table) {
+std::optional<Figures> measured(const ml::Model& model, const DatasetTable& table, std::size_t least_rows) {
   DatasetTable test;
   for (const auto& row : table.rows)
     if (row.test) test.rows.push_back(row);
@@ -36,12 +40,15 @@ std::optional<Figures> measured(const ml::Model& model, const DatasetTable& tabl
   if (task == ml::Task::los_bias) wish.only_los = true;
   if (task == ml::Task::nlos_bias) wish.only_los = false;
   const auto rows = learning_rows(test, wish);
-  if (!rows) return std::nullopt;
+  if (!rows || rows.value().source.size() < least_rows) return std::nullopt;
   const auto e = ml::evaluate(model, rows.value().data);
   Figures out;
   if (e.confusion && task == ml::Task::nlos_id) {
     out.accuracy = e.confusion->accuracy();
     if (e.confusion->fp + e.confusion->tn > 0) out.fpr = e.confusion->fpr();
+    const auto los = static_cast<double>(e.confusion->tp + e.confusion->fn),
+               nlos = static_cast<double>(e.confusion->fp + e.confusion->tn);
+    if (los + nlos > 0) out.commonest = std::max(los, nlos) / (los + nlos);
   }
   if (e.all) {
     out.mae_m = e.all->corrected.mae_m;
@@ -58,13 +65,19 @@ std::string figure(double value) {
 
 }  // namespace
 
-GateReport gate_of(const ml::Model& candidate, const ml::Model* current, const DatasetTable* held_out) {
-  Figures mine = manifest_figures(candidate), theirs = current ? manifest_figures(*current) : Figures{};
-  std::string basis = "manifest";
-  if (held_out != nullptr) {
-    const auto a = measured(candidate, *held_out);
-    const auto b = current ? measured(*current, *held_out) : std::optional<Figures>(Figures{});
-    if (a && b) mine = *a, theirs = *b, basis = "held_out";
+GateReport gate_of(const ml::Model& candidate, const ml::Model* current, const GateData& data) {
+  Figures mine{}, theirs{};
+  std::string basis = "none";
+  if (data.believe_manifest) {
+    mine = manifest_figures(candidate);
+    if (current != nullptr) theirs = manifest_figures(*current);
+    basis = "manifest";
+  }
+  if (data.held_out != nullptr) {
+    const std::size_t least = data.believe_manifest ? 1 : k_least_rows;
+    const auto a = measured(candidate, *data.held_out, least);
+    const auto b = current ? measured(*current, *data.held_out, least) : std::optional<Figures>(Figures{});
+    if (a && b) mine = *a, theirs = *b, basis = data.basis;
   }
   GateReport out;
   const auto fail = [&](GateCheck& check, const std::string& why) {
@@ -79,8 +92,23 @@ GateReport gate_of(const ml::Model& candidate, const ml::Model* current, const D
                       " of the active model");
     out.checks.push_back(std::move(check));
   };
+  if (basis == "none") {
+    GateCheck judged{"judged", std::nullopt, std::nullopt, true, basis};
+    fail(judged, "the model is from elsewhere, and no data set of this server has " +
+                     std::to_string(k_least_rows) +
+                     " rows that can judge it: freeze one with other places, or promote it with a reason");
+    out.checks.push_back(std::move(judged));
+    return out;
+  }
   if (candidate.info.task == ml::Task::nlos_id) {
     no_worse("fpr", mine.fpr, theirs.fpr);
+    if (mine.commonest && !data.believe_manifest) {
+      GateCheck helps{"helps", mine.accuracy, mine.commonest, true, basis};
+      if (!mine.accuracy || *mine.accuracy < *mine.commonest + k_slack)
+        fail(helps, "accuracy " + figure(mine.accuracy.value_or(0)) + " is no better than the " +
+                        figure(*mine.commonest) + " of always saying the same class");
+      out.checks.push_back(std::move(helps));
+    }
     if (mine.accuracy) out.checks.push_back({"accuracy", mine.accuracy, theirs.accuracy, true, basis});
     return out;
   }

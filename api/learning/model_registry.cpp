@@ -15,9 +15,14 @@ using nlos::Feature;
 constexpr std::array k_of_cir{Feature::kurtosis, Feature::mean_excess_delay_ns, Feature::rms_delay_spread_ns,
                               Feature::early_energy, Feature::peak_delay_ns};
 
-Result<std::shared_ptr<const ml::Model>> read_model(ModelStore& store, const ModelId& id) {
-  BOOST_OUTCOME_TRY(const auto text, store.artifact(id));
-  BOOST_OUTCOME_TRY(auto model, read_model_artifact(text));
+Result<std::shared_ptr<const ml::Model>> read_model(const ModelSource& source, const ModelId& id,
+                                                    bool vouched_only) {
+  BOOST_OUTCOME_TRY(const auto artifact, source.artifact(id));
+  if (vouched_only && source.signer() != nullptr && artifact.standing == ModelStanding::foreign)
+    return make_error(Errc::conflict, "model " + to_string(id) +
+                                          " is not signed by this server: it was made elsewhere, or before "
+                                          "models were signed. Promote it, which judges it on kept data");
+  BOOST_OUTCOME_TRY(auto model, read_model_artifact(artifact.text));
   return std::make_shared<const ml::Model>(std::move(model));
 }
 
@@ -66,15 +71,16 @@ std::optional<ml::Correction> correction_of(std::string_view word) {
   return std::nullopt;
 }
 
-Result<ModelRegistry::Active> load_models(ModelStore& store, const std::map<std::string, ModelId>& models,
-                                          ml::Correction how) {
+Result<ModelRegistry::Active> load_models(const ModelSource& source,
+                                          const std::map<std::string, ModelId>& models, ml::Correction how,
+                                          bool vouched_only) {
   ModelRegistry::Active out;
   out.correction = how;
   ml::ModelSet set;
   for (const auto& [task, id] : models) {
     auto* place = slot(set, task);
     if (place == nullptr) return make_error(Errc::invalid_argument, "there is no task " + task);
-    BOOST_OUTCOME_TRY(*place, read_model(store, id));
+    BOOST_OUTCOME_TRY(*place, read_model(source, id, vouched_only));
     out.models[task] = id;
     out.needs_cir |= needs_cir(**place);
   }
@@ -98,7 +104,8 @@ Result<ModelRegistry::Active> models_together(std::vector<ml::Model> models, ml:
   return out;
 }
 
-ModelRegistry::ModelRegistry(ModelStore& store) : store_(store), active_(std::make_shared<const Active>()) {}
+ModelRegistry::ModelRegistry(ModelSource source)
+    : source_(source), active_(std::make_shared<const Active>()) {}
 
 std::shared_ptr<const ModelRegistry::Active> ModelRegistry::active() const {
   const std::scoped_lock lock(mutex_);
@@ -108,7 +115,7 @@ std::shared_ptr<const ModelRegistry::Active> ModelRegistry::active() const {
 Result<void> ModelRegistry::reload() {
   // One at a time, or the slower of two promotions leaves the older state in use.
   const std::scoped_lock one_at_a_time(reload_mutex_);
-  BOOST_OUTCOME_TRY(const auto promotions, store_.active());
+  BOOST_OUTCOME_TRY(const auto promotions, source_.store().active());
   std::map<std::string, ModelId> wanted;
   ml::Correction how = ml::Correction::weighted;
   for (const auto& one : promotions) {
@@ -117,7 +124,7 @@ Result<void> ModelRegistry::reload() {
     else if (one.model)
       wanted[one.task] = *one.model;
   }
-  auto loaded = load_models(store_, wanted, how);
+  auto loaded = load_models(source_, wanted, how, true);
   Active next;
   if (loaded) {
     next = std::move(loaded).value();

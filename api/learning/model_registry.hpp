@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "api/learning/model_signer.hpp"
 #include "core/ml/predictor.hpp"
 #include "core/ports/learning_store.hpp"
 #include "core/types/range.hpp"
@@ -23,7 +24,7 @@ struct RangeJudgement {
 /// Which models are active, ready for use. Thread-safe: a promotion takes effect at the next range judged.
 class ModelRegistry {
  public:
-  explicit ModelRegistry(ModelStore& store);
+  explicit ModelRegistry(ModelSource source);
 
   struct Active {
     ml::Predictor predictor{};
@@ -38,10 +39,12 @@ class ModelRegistry {
   /// `fault` says so.
   Result<void> reload();
 
+  const ModelSource& source() const { return source_; }
+
   static RangeJudgement judge(const Active& active, const nlos::FeatureVector& features);
 
  private:
-  ModelStore& store_;
+  ModelSource source_;
   std::mutex reload_mutex_;
   mutable std::mutex mutex_;
   std::shared_ptr<const Active> active_;
@@ -61,9 +64,11 @@ std::optional<ml::Correction> correction_of(std::string_view word);
 inline constexpr std::string_view k_correction_task = "correction";
 
 /// Active in place of the given ones where `overrides` names another; an absent id is no model. For a
-/// calibration with models of its choice.
-Result<ModelRegistry::Active> load_models(ModelStore& store, const std::map<std::string, ModelId>& models,
-                                          ml::Correction how);
+/// calibration with models of its choice. One that was edited after it was signed is a conflict, and so, with
+/// `vouched_only`, is one from elsewhere that was never promoted here.
+Result<ModelRegistry::Active> load_models(const ModelSource& source,
+                                          const std::map<std::string, ModelId>& models, ml::Correction how,
+                                          bool vouched_only);
 
 /// The same without a store: each model takes the place of the task it was trained for.
 /// errors: invalid_argument (two of one task), those of Predictor::make

@@ -12,6 +12,7 @@ namespace anchord::api {
 class JobService;
 class JobContext;
 class EventLog;
+class ModelSigner;
 
 /// Training runs as jobs of kind `training`: the rows go to a worker, what comes back is stored whole or not
 /// at all. Thread-safe.
@@ -25,6 +26,7 @@ class TrainingService {
     const Clock& clock;
     RunWork run_work;
     std::string code_version;
+    const ModelSigner* signer{nullptr};  ///< null: nothing is signed (tests)
   };
   explicit TrainingService(Deps deps) : deps_(std::move(deps)) {}
 

@@ -5,7 +5,9 @@
 #include "api/json/model_artifact.hpp"
 #include "api/json/reader.hpp"
 #include "api/json/wire_learning.hpp"
+#include "api/learning/kept_data.hpp"
 #include "api/learning/model_gate.hpp"
+#include "api/learning/model_signer.hpp"
 #include "api/learning/promotion_events.hpp"
 #include "api/routes/learning.hpp"
 #include "api/routes/support.hpp"
@@ -67,6 +69,20 @@ Response list(LearningServices& l, const Request& request) {
   return list_response(request, std::move(items), more ? to_string(rows.back().id) : "");
 }
 
+/// Keeps the signature of one that this server signed.
+ModelStanding standing_of_upload(LearningServices& l, const std::string& artifact,
+                                 const std::string& signature, std::string& kept) {
+  const ModelSigner* signer = l.models.source().signer();
+  if (signer == nullptr || signature.empty()) return ModelStanding::foreign;
+  const auto standing = signer->standing(artifact, signature);
+  if (standing == ModelStanding::changed)
+    throw_problem(422, "validation", "the artifact was edited after this server signed it",
+                  {{"/signature", "edited",
+                    "is not of this content: send the artifact as it was exported, or without a signature"}});
+  if (standing != ModelStanding::foreign) kept = signature;
+  return standing;
+}
+
 /// An artifact from elsewhere. Everything about it is checked before it is kept.
 Response upload(LearningServices& l, const Request& request) {
   check_query(request, {});
@@ -86,22 +102,37 @@ Response upload(LearningServices& l, const Request& request) {
   stored.created = l.services.deps.clock.now();
   stored.id.uuid = make_uuid_v7(stored.created);
   stored.created_by = request.principal.name;
+  // One that left this server comes back as what it was, if not a number of it is another.
+  const auto standing = standing_of_upload(l, artifact, signature_in(request.body), stored.signature);
   value_or_problem(l.stores.models.insert(stored, artifact));
-  l.services.audit(request, "model.upload " + to_string(stored.id) + " " + stored.sha256_hex);
-  Response response = json_response(201, model_json(stored, false));
+  l.services.audit(request, "model.upload " + to_string(stored.id) + " " + stored.sha256_hex + " " +
+                                std::string(to_string(standing)));
+  Ordered body = model_json(stored, false);
+  body["standing"] = to_string(standing);
+  Response response = json_response(201, body);
   response.header("Location", "/api/v1/models/" + to_string(stored.id));
   return response;
 }
 
+/// What is stored, and whether it may be used: one that was edited is told as such, not hidden.
+Response one_model(LearningServices& l, const Request& request) {
+  const auto model = value_or_problem(l.stores.models.model(path_id<ModelId>(request)));
+  const auto found = l.models.source().artifact(model.id);
+  Ordered body = model_json(model, is_active(l, model));
+  body["standing"] = to_string(found ? found.value().standing : ModelStanding::changed);
+  return json_response(200, body);
+}
+
 Response artifact(LearningServices& l, const Request& request) {
   check_query(request, {});
-  const auto model = value_or_problem(l.stores.models.model(path_id<ModelId>(request)));
+  const auto found = value_or_problem(l.models.source().artifact(path_id<ModelId>(request)));
+  const auto& model = found.stored;
   Response response;
   response.header("Content-Type", "application/json");
-  response.header("ETag", "\"" + model.sha256_hex + "\"");
+  response.header("ETag", "\"" + model.sha256_hex + "-" + std::string(to_string(found.standing)) + "\"");
   response.header("Content-Disposition",
                   "attachment; filename=\"" + model.task + "-" + model.sha256_hex.substr(0, 12) + ".json\"");
-  response.body = value_or_problem(l.stores.models.artifact(model.id));
+  response.body = exported_artifact(found.text, model.signature);
   return response;
 }
 
@@ -167,27 +198,42 @@ Response patch_active(LearningServices& l, const Request& request) {
 std::optional<ml::Model> active_model(LearningServices& l, const Standing& now, const std::string& task) {
   const auto at = now.models.find(task);
   if (at == now.models.end()) return std::nullopt;
-  auto model = read_model_artifact(value_or_problem(l.stores.models.artifact(at->second)));
+  const auto artifact = l.models.source().artifact(at->second);
+  if (!artifact) return std::nullopt;  // it was edited: it is not in use, and nothing is measured against it
+  auto model = read_model_artifact(artifact.value().text);
   if (!model) return std::nullopt;
   return std::move(model).value();
 }
 
-GateReport judge(LearningServices& l, const Standing& now, const StoredModel& stored) {
-  const auto model =
-      value_or_problem(read_model_artifact(value_or_problem(l.stores.models.artifact(stored.id))));
-  const auto current = active_model(l, now, stored.task);
-  std::optional<DatasetTable> table;
-  if (stored.run) {
-    const auto run = value_or_problem(l.stores.runs.run(*stored.run));
-    auto parsed = DatasetTable::parse(value_or_problem(l.stores.datasets.csv(run.dataset)));
-    if (parsed) table = std::move(parsed).value();
+/// Made here: by the places its own run held out, or its own figures. From elsewhere: by what this server
+/// keeps.
+GateReport judge(LearningServices& l, const Standing& now, const ModelSource::Artifact& candidate) {
+  const auto model = value_or_problem(read_model_artifact(candidate.text));
+  const auto current = active_model(l, now, candidate.stored.task);
+  GateData data;
+  DatasetTable table;
+  if (candidate.standing == ModelStanding::made) {
+    if (candidate.stored.run) {
+      const auto run = value_or_problem(l.stores.runs.run(*candidate.stored.run));
+      auto parsed = DatasetTable::parse(value_or_problem(l.stores.datasets.csv(run.dataset)));
+      if (parsed) {
+        table = std::move(parsed).value();
+        data.held_out = &table;
+      }
+    }
+  } else {
+    table = value_or_problem(kept_data(l.stores.datasets, model)).table;
+    data = {&table, "kept_data", false};
   }
-  return gate_of(model, current ? &*current : nullptr, table ? &*table : nullptr);
+  auto report = gate_of(model, current ? &*current : nullptr, data);
+  report.standing = to_string(candidate.standing);
+  return report;
 }
 
 Response promote(LearningServices& l, const Request& request) {
   check_query(request, {});
-  const auto stored = value_or_problem(l.stores.models.model(path_id<ModelId>(request)));
+  const auto candidate = value_or_problem(l.models.source().artifact(path_id<ModelId>(request)));
+  const auto& stored = candidate.stored;
   std::vector<FieldError> errors;
   const auto body = json_body(request, true);
   Fields fields(body, "", errors);
@@ -197,18 +243,26 @@ Response promote(LearningServices& l, const Request& request) {
   const auto before = standing_for(l, request);
   if (before.has(stored)) throw_problem(422, "state", "the model is active already");
   // One that live ranges cannot be judged by would ground the others with it.
-  if (const auto able = load_models(l.stores.models, {{stored.task, stored.id}}, ml::Correction::weighted);
+  if (const auto able =
+          load_models(l.models.source(), {{stored.task, stored.id}}, ml::Correction::weighted, false);
       !able)
     throw_problem(422, "unsupported", able.error().message);
-  const auto gate = judge(l, before, stored);
+  const auto gate = judge(l, before, candidate);
   if (!gate.passed && reason.empty())
     throw_problem(422, "state", gate.why + " (give a reason to promote all the same)");
   const auto done = promoted(
       l, request,
       "model.promote " + to_string(stored.id) + (gate.passed ? "" : " against the gate: " + gate.why) +
           (reason.empty() ? "" : " reason: " + reason),
-      {0, stored.task, stored.id, request.principal.name, reason, l.services.deps.clock.now(), false},
+      {0, stored.task, stored.id, request.principal.name, reason, l.services.deps.clock.now(), false,
+       candidate.standing == ModelStanding::made
+           ? std::string{}
+           : l.models.source().signature(ModelStanding::vouched, candidate.text)},
       before);
+  if (!gate.passed)
+    l.services.events.add("warning", "model.override",
+                          request.principal.name + " promoted model " + to_string(stored.id) +
+                              " against the gate (" + gate.why + "): " + reason);
   announce(l, done, stored.method);
   Ordered answer = promotion_json(done);
   answer["gate"] = gate_json(gate);
@@ -290,7 +344,7 @@ Response predict(LearningServices& l, const Request& request) {
   std::shared_ptr<const ModelRegistry::Active> models = l.models.active();
   if (request.params.at("id") != "active") {
     const auto stored = value_or_problem(l.stores.models.model(path_id<ModelId>(request)));
-    auto loaded = load_models(l.stores.models, {{stored.task, stored.id}}, ml::Correction::weighted);
+    auto loaded = load_models(l.models.source(), {{stored.task, stored.id}}, ml::Correction::weighted, false);
     if (!loaded) throw_problem(422, "unsupported", loaded.error().message);
     models = std::make_shared<const ModelRegistry::Active>(std::move(loaded).value());
   }
@@ -321,8 +375,7 @@ void add_model_routes(Router& router, LearningServices& l) {
   router.add({Method::post, "/api/v1/models/rollback", engineer, on(roll_back)});
   router.add({Method::get, "/api/v1/models/{id}", readers(), [&l](const Request& request) {
                 check_query(request, {});
-                const auto model = value_or_problem(l.stores.models.model(path_id<ModelId>(request)));
-                return json_response(200, model_json(model, is_active(l, model)));
+                return one_model(l, request);
               }});
   router.add({Method::del, "/api/v1/models/{id}", engineer, [&l](const Request& request) {
                 const auto id = path_id<ModelId>(request);

@@ -212,9 +212,9 @@ Result<Job> CalibrationService::submit(CalibrationRequest request) {
     BOOST_OUTCOME_TRYV(deps_.missions.mission(id));
   }
   ModelRegistry::Active models;
-  if (deps_.models != nullptr && deps_.model_store != nullptr) {
+  if (deps_.models != nullptr) {
     // Chosen now: a promotion while the job waits changes nothing of what was asked for.
-    auto chosen = models_for(request.models, *deps_.models, *deps_.model_store);
+    auto chosen = models_for(request.models, *deps_.models);
     if (!chosen) return make_error(Errc::invalid_argument, "models: " + chosen.error().message);
     models = std::move(chosen).value();
   }

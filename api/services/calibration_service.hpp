@@ -64,8 +64,7 @@ class CalibrationService {
     JobService& jobs;
     const Clock& clock;
     KitProfiles* profiles{nullptr};        ///< null: flights learn from each other alone
-    const ModelRegistry* models{nullptr};  ///< null, or no store: ranges are used raw
-    ModelStore* model_store{nullptr};
+    const ModelRegistry* models{nullptr};  ///< null: ranges are used raw
     /// What turns and height searches of a mission's flight told; absent: nothing.
     std::function<procedure::FlightClues(const MissionId&)> flight_clues{};
     FrameStore* frames{nullptr};          ///< null: no local frames

@@ -112,6 +112,7 @@ struct StoredModel {
   std::string method;
   std::string sha256_hex;              ///< of the artifact
   std::string manifest_json;           ///< of the artifact: features, scaler, data digest, seed, metrics
+  std::string signature{};             ///< of this server's key over the artifact; empty: nobody vouches for it
   std::optional<TrainingRunId> run{};  ///< absent: uploaded
   UtcTime created{};
   std::string created_by;
@@ -152,6 +153,7 @@ struct Promotion {
   std::string by, reason;
   UtcTime time{};
   bool rollback{};
+  std::string signature{};  ///< to be kept with the model, in the same transaction; empty: as it is
 };
 
 /// Models of a task take turns: the newest promotion of a task says which is active.
@@ -162,6 +164,7 @@ class ModelStore {
   virtual Result<StoredModel> model(const ModelId& id) = 0;
   virtual Result<std::vector<StoredModel>> models(std::size_t limit, const std::optional<ModelId>& after) = 0;
   virtual Result<std::string> artifact(const ModelId& id) = 0;
+  virtual Result<void> sign(const ModelId& id, std::string_view signature) = 0;
   virtual Result<void> remove(const ModelId& id) = 0;  ///< conflict once it was promoted
   /// Its number is given back. conflict when the newest promotion of all tasks is no longer `judged_on` (0:
   /// none): the caller decided against another state.

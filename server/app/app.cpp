@@ -14,6 +14,7 @@
 #include "drivers/link/address.hpp"
 #include "server/app/front_door.hpp"
 #include "server/app/metrics.hpp"
+#include "server/app/model_key.hpp"
 #include "server/flight/drone_link.hpp"
 #include "server/http/http_server.hpp"
 #include "server/http/request_judge.hpp"
@@ -84,6 +85,7 @@ struct App::State {
   std::unique_ptr<WorkerPool> pool, stream_pool, live_pool, command_pool, flight_pool, heavy_pool;
   std::unique_ptr<DeviceManager> devices;
   std::unique_ptr<api::LearningStores> learning;
+  ModelKey model_key;
   std::unique_ptr<flight::DroneLink> drone;
   std::unique_ptr<api::Application> application;
   std::unique_ptr<FrontDoor> door;
@@ -208,7 +210,11 @@ Result<void> App::State::open_drone() {
                           "--drone-signing-key-file (MAVLink 2 signing), or say --insecure");
   }
   auto opened = flight::DroneLink::open(
-      address, [](std::string_view what) { log(LogLevel::warning, "drone", {{"what", what}}); }, key);
+      address,
+      [](std::string_view what) {
+        log(LogLevel::warning, "drone", {{"what", what}});
+      },
+      key);
   if (!opened) return make_error(opened.error().code, "drone.address: " + opened.error().message);
   drone = std::move(opened).value();
   return boost::outcome_v2::success();
@@ -256,6 +262,8 @@ void App::State::compose() {
       api::LearningStores{database->campaigns(), database->labels(), database->datasets(),
                           database->training_runs(), database->models()});
   deps.learning = learning.get();
+  deps.model_key = model_key.text;
+  deps.model_key_is_new = model_key.fresh;
   deps.run_work = work_in_process();
   deps.bin = &database->bin();
   deps.service = &database->service();
@@ -303,6 +311,7 @@ Result<std::unique_ptr<App>> App::start(const Config& config) {
                                                   access_options);
   BOOST_OUTCOME_TRYV(s.access->load());
   BOOST_OUTCOME_TRYV(s.first_token());
+  BOOST_OUTCOME_TRY(s.model_key, read_or_make_model_key(s.data_dir));
   BOOST_OUTCOME_TRYV(s.open_devices());
   BOOST_OUTCOME_TRYV(s.open_drone());
   s.compose();

@@ -2,9 +2,13 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <memory>
 
 #include "api/exports/model_report.hpp"
+#include "api/json/model_artifact.hpp"
+#include "api/learning/model_signer.hpp"
 #include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"
@@ -14,7 +18,7 @@ namespace {
 
 struct ModelsArguments {
   std::vector<std::string> files;
-  std::string folder{"."};
+  std::string folder{"."}, data_dir;
   bool json{false};
 };
 
@@ -47,15 +51,48 @@ int show(const ModelsArguments& a) {
   return 0;
 }
 
+/// The key a data folder's server signs with; nothing where none is named.
+Result<std::optional<api::ModelSigner>> signer_of(const std::string& data_dir) {
+  if (data_dir.empty()) return std::optional<api::ModelSigner>{};
+  const std::string file = data_dir + "/models.key";
+  std::ifstream in(file, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  if (!in) return make_error(Errc::not_found, file + ": cannot be read");
+  BOOST_OUTCOME_TRY(const auto seed, api::ModelSigner::parse_seed(text));
+  return std::optional<api::ModelSigner>(api::ModelSigner(seed));
+}
+
+/// In words; false where the file was edited after that server signed it.
+bool signature_words(const std::string& path, const ml::Model& model, const api::ModelSigner* signer,
+                     std::string& words) {
+  std::ifstream in(path, std::ios::binary);
+  const std::string signature = api::signature_in(std::string{std::istreambuf_iterator<char>(in), {}});
+  words = signature.empty() ? "not signed" : "signed, " + signature.substr(0, signature.rfind(':'));
+  if (signature.empty() || signer == nullptr) return true;
+  const auto standing = signer->standing(api::write_model_artifact(model), signature);
+  words = standing == api::ModelStanding::changed ? "EDITED after it was signed by this server"
+          : standing == api::ModelStanding::foreign
+              ? "signed by another server"
+              : "signed by this server, " + std::string(to_string(standing));
+  return standing != api::ModelStanding::changed;
+}
+
 int check(const ModelsArguments& a) {
+  const auto signer = signer_of(a.data_dir);
+  if (!signer) return refuse("models", signer.error().message);
   bool good = true;
   for (const auto& path : a.files) {
     const auto model = read_model_file(path);
-    good = good && model.has_value();
-    if (model)
-      std::printf("%s: good\n", path.c_str());
-    else
+    if (!model) {
+      good = false;
       std::printf("%s\n", printable(model.error().message).c_str());
+      continue;
+    }
+    std::string words;
+    const bool kept =
+        signature_words(path, model.value(), signer.value() ? &*signer.value() : nullptr, words);
+    good = good && kept;
+    std::printf("%s: %s, %s\n", printable(path).c_str(), kept ? "good" : "bad", words.c_str());
   }
   return good ? 0 : 2;
 }
@@ -76,6 +113,7 @@ void add_models_command(CLI::App& app, int& exit_code) {
   shown->callback([a, &exit_code] { exit_code = show(*a); });
   auto* checked = models->add_subcommand("check", "Read artifacts as a server would, and say what is wrong");
   checked->add_option("files", a->files, "Artifacts")->required();
+  checked->add_option("--data-dir", a->data_dir, "Data folder of the server whose signatures are verified");
   checked->callback([a, &exit_code] { exit_code = check(*a); });
 }
 

@@ -5,15 +5,17 @@ namespace anchord::sql {
 namespace {
 
 constexpr const char* k_insert =
-    "INSERT INTO model (id, run_key, task, method, sha256_hex, manifest_json, created_t_ns, created_by) "
-    "VALUES (?1, (SELECT run_key FROM training_run WHERE id = ?2), ?3, ?4, ?5, ?6, ?7, ?8) "
+    "INSERT INTO model (id, run_key, task, method, sha256_hex, manifest_json, created_t_ns, created_by, "
+    "signature) VALUES (?1, (SELECT run_key FROM training_run WHERE id = ?2), ?3, ?4, ?5, ?6, ?7, ?8, ?9) "
     "RETURNING model_key";
 constexpr const char* k_insert_artifact = "INSERT INTO model_artifact (model_key, json) VALUES (?1, ?2)";
 constexpr const char* k_columns =
-    "SELECT m.id, r.id, m.task, m.method, m.sha256_hex, m.manifest_json, m.created_t_ns, m.created_by FROM "
+    "SELECT m.id, r.id, m.task, m.method, m.sha256_hex, m.manifest_json, m.created_t_ns, m.created_by, "
+    "m.signature FROM "
     "model m LEFT JOIN training_run r ON r.run_key = m.run_key ";
 constexpr const char* k_artifact =
     "SELECT a.json FROM model_artifact a JOIN model m ON m.model_key = a.model_key WHERE m.id = ?1";
+constexpr const char* k_sign = "UPDATE model SET signature = ?2 WHERE id = ?1 RETURNING model_key";
 constexpr const char* k_promoted =
     "SELECT count(*) FROM model_promotion p JOIN model m ON m.model_key = p.model_key WHERE m.id = ?1";
 constexpr const char* k_remove = "DELETE FROM model WHERE id = ?1 RETURNING model_key";
@@ -37,6 +39,7 @@ StoredModel read(Query& query) {
   m.manifest_json = query.text();
   m.created = query.time();
   m.created_by = query.text();
+  m.signature = query.text();
   return m;
 }
 
@@ -94,6 +97,15 @@ class SqlModelStore final : public ModelStore {
     });
   }
 
+  Result<void> sign(const ModelId& id, std::string_view signature) override {
+    return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+      Query query(c, k_sign);
+      query << id << signature;
+      if (query.returned()) return std::nullopt;
+      return no_model(id);
+    });
+  }
+
   Result<void> remove(const ModelId& id) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       Query promoted(c, k_promoted);
@@ -121,6 +133,11 @@ class SqlModelStore final : public ModelStore {
         if (known.text() != promotion.task)
           return make_error(Errc::conflict,
                             "model " + to_string(*promotion.model) + " is not of task " + promotion.task);
+      }
+      if (promotion.model && !promotion.signature.empty()) {
+        Query sign(c, k_sign);
+        sign << *promotion.model << promotion.signature;
+        sign.run();
       }
       Query query(c, k_promote);
       query << promotion.task << promotion.model << promotion.time << promotion.by << promotion.reason
@@ -161,7 +178,7 @@ class SqlModelStore final : public ModelStore {
 void insert_model(Connection& connection, const StoredModel& m, std::string_view artifact) {
   Query query(connection, k_insert);
   query << m.id << m.run << m.task << m.method << m.sha256_hex << m.manifest_json << m.created
-        << m.created_by;
+        << m.created_by << m.signature;
   const auto key = query.returned();
   Query content(connection, k_insert_artifact);
   content << key << artifact;

@@ -55,6 +55,7 @@ class AppFixture : public ::testing::Test {
     deps.bin = &database_->bin();
     deps.service = &database_->service();
     deps.housekeeping_by_hand = true;
+    deps.model_key = std::string(64, '7');
     configure(deps);
     app_ = std::make_unique<api::Application>(std::move(deps));
     app_->start();

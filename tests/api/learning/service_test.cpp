@@ -1,4 +1,6 @@
 // Campaign, data set, training run, promotion and live use through the routes, over a real database.
+#include <sqlite3.h>
+
 #include <algorithm>
 #include <thread>
 
@@ -170,6 +172,127 @@ TEST_F(LearningService, OneOfEightPromotionsAndRollbacksOfOneStateIsMade) {
   for (const int one : back) EXPECT_TRUE(one == 200 || one == 409 || one == 412) << one;
   EXPECT_EQ("/api/v1/models/" + json(get("/api/v1/models/active"))["models"]["los_bias"].value("id", ""),
             none["model"]);
+}
+
+/// Artifacts that left the server, and what comes back.
+class SignedModels : public LearningService {
+ protected:
+  void SetUp() override {
+    LearningService::SetUp();
+    run_ = train("los_bias", "constant");
+    path_ = run_.value("model", "");
+    exported_ = Json::parse(get(path_ + "/artifact").body);
+    ASSERT_TRUE(exported_.contains("signature")) << exported_.dump().substr(0, 300);
+  }
+  /// The correction is another one, the figures it claims are the old ones.
+  Json edited() const {
+    Json out = exported_;
+    for (const char* key : {"fallback_m", "min_m", "max_m"})
+      out["regressor"][key] = out["regressor"][key].get<double>() + 0.6;
+    auto& scorer = out["regressor"]["scorer"];
+    const char* offset = scorer.contains("offset") ? "offset" : "base";
+    if (scorer.contains(offset)) scorer[offset] = scorer[offset].get<double>() + 0.6;
+    return out;
+  }
+  api::Response upload(const Json& artifact) { return post("/api/v1/models", artifact.dump()); }
+  api::Response promote_id(const std::string& id, const std::string& body = "") {
+    return post("/api/v1/models/" + id + "/promote", body);
+  }
+  Json run_, exported_;
+  std::string path_;
+};
+
+TEST_F(SignedModels, AnEditedArtifactIsRefusedAtTheDoor) {
+  const auto refused = upload(edited());
+  EXPECT_EQ(refused.status, 422);
+  EXPECT_NE(refused.body.find("edited"), std::string::npos) << refused.body;
+}
+
+TEST_F(SignedModels, AManifestFromElsewhereIsNotBelievedButMeasuredHere) {
+  Json foreign = edited();
+  foreign.erase("signature");
+  const auto made = upload(foreign);
+  ASSERT_EQ(made.status, 201) << made.body;
+  EXPECT_EQ(json(made)["standing"], "foreign");
+  const auto id = json(made).value("id", "");
+  const auto refused = promote_id(id);
+  EXPECT_EQ(refused.status, 422) << refused.body;
+  const auto gate = json(get("/api/v1/models/" + id + "/gate"));
+  EXPECT_EQ(gate["passed"], false);
+  EXPECT_EQ(gate["checks"][0]["basis"], "kept_data") << gate;
+  EXPECT_TRUE(json(get("/api/v1/models/active"))["models"]["los_bias"].is_null());
+  // A calibration does not take it by the back door either.
+  EXPECT_EQ(post("/api/v1/calibrations",
+                 R"({"missions":[")" + mission() + R"("],"models":{"los_bias":")" + id + "\"}}")
+                .status,
+            422);
+  // By a person's word, which is an event and in the audit log.
+  ASSERT_EQ(promote_id(id, R"({"reason":"measured by hand"})").status, 200);
+  EXPECT_NE(get("/api/v1/events").body.find("model.override"), std::string::npos);
+  EXPECT_NE(get("/api/v1/audit").body.find("measured by hand"), std::string::npos);
+  EXPECT_EQ(json(get("/api/v1/models/" + id))["standing"], "vouched");
+}
+
+TEST_F(SignedModels, AGoodOneFromElsewherePassesOnWhatIsKeptHere) {
+  Json foreign = exported_;
+  foreign["signature"] = "made:0011223344556677:" + std::string(128, 'a');  // another server's
+  foreign["manifest"]["metrics"]["mae_m"] = 9.0;                            // whatever it claims
+  const auto made = upload(foreign);
+  ASSERT_EQ(made.status, 201) << made.body;
+  EXPECT_EQ(json(made)["standing"], "foreign");
+  const auto done = promote_id(json(made).value("id", ""));
+  EXPECT_EQ(done.status, 200) << done.body;
+  EXPECT_EQ(json(done)["gate"]["checks"][0]["basis"], "kept_data");
+}
+
+TEST_F(SignedModels, ExportAndImportOnTheSameServerKeepTheStanding) {
+  const auto made = upload(exported_);
+  ASSERT_EQ(made.status, 201) << made.body;
+  EXPECT_EQ(json(made)["standing"], "made");
+  EXPECT_EQ(promote_id(json(made).value("id", "")).status, 200);
+}
+
+TEST_F(SignedModels, WithoutKeptDataOnlyAReasonPromotesWhatIsFromElsewhere) {
+  Json foreign = exported_;
+  foreign.erase("signature");
+  foreign["manifest"]["features"] = Json::array({"std_noise"});  // nothing kept here has it
+  const auto made = upload(foreign);
+  if (made.status == 201) {
+    const auto gate = json(get("/api/v1/models/" + json(made).value("id", "") + "/gate"));
+    EXPECT_EQ(gate["passed"], false) << gate;
+    EXPECT_EQ(gate["checks"][0]["basis"], "none") << gate;
+  } else {
+    EXPECT_EQ(made.status, 422) << made.body;  // a constant needs no feature, and may name none
+  }
+}
+
+TEST_F(SignedModels, AnArtifactEditedInTheDatabaseIsNotUsedAndSaysSo) {
+  ASSERT_EQ(promote(run_).status, 200);
+  ASSERT_FALSE(json(get("/api/v1/models/active"))["raw"]);
+  app_.reset();
+  database_.reset();
+  Json bytes = edited();
+  bytes.erase("signature");
+  {
+    sqlite3* db = nullptr;
+    ASSERT_EQ(sqlite3_open((dir_ / "data" / "anchord.db").c_str(), &db), SQLITE_OK);
+    sqlite3_stmt* change = nullptr;
+    ASSERT_EQ(sqlite3_prepare_v2(db, "UPDATE model_artifact SET json = ?1", -1, &change, nullptr), SQLITE_OK);
+    const std::string text = bytes.dump();
+    sqlite3_bind_text(change, 1, text.c_str(), -1, SQLITE_TRANSIENT);
+    EXPECT_EQ(sqlite3_step(change), SQLITE_DONE);
+    sqlite3_finalize(change);
+    sqlite3_close(db);
+  }
+  open();
+  const auto active = json(get("/api/v1/models/active"));
+  EXPECT_EQ(active["raw"], true);
+  EXPECT_NE(active.value("note", "").find("edited"), std::string::npos) << active;
+  EXPECT_NE(get("/api/v1/events").body.find("model.refused"), std::string::npos);
+  EXPECT_EQ(json(get(path_))["standing"], "changed");
+  EXPECT_EQ(get(path_ + "/artifact").status, 409);
+  EXPECT_EQ(post(path_ + "/promote", R"({"reason":"never mind"})").status, 409) << "no reason is good enough";
+  EXPECT_EQ(post(path_ + "/predict", R"({"sample":{"distance_m":6}})").status, 422);
 }
 
 TEST_F(LearningService, APromotionIsAnEventOfTheRecordAndSurvivesARestart) {

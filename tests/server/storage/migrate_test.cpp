@@ -45,7 +45,8 @@ TEST_F(Migrate, FindsEveryLandedMigrationAsItWas) {
             "3 9cc8bb069b7b00cc826ce0963d78aa7083e5eb65208fa55d54c1986363e232dd\n"
             "4 b61b44684821815843481b6e9fdc70b291983fb47986fc58515f0ff89c06d2ce\n"
             "5 f6fddabd2c8bebecb1b9370fa20c1a691b2facf7483f685b5be0583a65374ef3\n"
-            "6 fa850be7202896aa8b044cc8cab22219a207f27ab439030bb69bc0bbc91eae96\n");
+            "6 fa850be7202896aa8b044cc8cab22219a207f27ab439030bb69bc0bbc91eae96\n"
+            "7 928ced75f17f95eee611eef5bcb10890a421087a2d744c12b04838d2bc94e8cc\n");
 }
 
 TEST_F(Migrate, KnowsTheDigestOfAPublishedVector) {

@@ -12,6 +12,7 @@ import { Icon } from '../../ui/marks';
 import { may } from '../../state/session';
 import { CampaignMode } from './campaign_mode';
 import { DRAWN_MAX, every_of } from './choice';
+import { ExcludePanel } from './exclude';
 import { Filters, type Who } from './filters';
 import { ImpulsePanel } from './impulse';
 import { HistogramPanel, LevelPanel, TruthPanel } from './plots';
@@ -27,7 +28,7 @@ const everything = (f: Filter): boolean => JSON.stringify(f) === JSON.stringify(
 export function Measurements() {
   const [campaigns, set_campaigns] = useState<readonly Source[]>([]), [wanted, set_wanted] = useState<string | null>(null), [filters, set_filters] = useState<{ of: string; filter: Filter }>({ of: '', filter: EVERYTHING }), [oldest_first, set_oldest] = useState(false);
   const [asked, set_asked] = useState<Asked | null>(null), [who, set_who] = useState<{ of: string; list: readonly Who[]; n: number | null }>({ of: '', list: [], n: null }), busy = useRef(new Set<string>()), [whole, set_whole] = useState<{ of: string; samples: readonly Sample[] }>({ of: '', samples: [] });
-  const [problem, set_problem] = useState(''), [again, set_again] = useState(0), [sample, set_sample] = useState<Sample | null>(null), [labelling, set_labelling] = useState(false), [opened, set_opened] = useState(0);
+  const [problem, set_problem] = useState(''), [again, set_again] = useState(0), [sample, set_sample] = useState<Sample | null>(null), [labelling, set_labelling] = useState(false), [excluding, set_excluding] = useState(false), [opened, set_opened] = useState(0);
   useEffect(() => { document.title = 'Measurements - anchord'; }, []);
   useEffect(() => { fetch_campaigns().then(set_campaigns, () => undefined); }, [again]);
   const missions: Source[] = ordered_missions.value.map((m) => ({ kind: 'mission', id: m.mission, name: m.name || m.mission.slice(0, 8) })), sources = [...missions, ...campaigns];
@@ -92,12 +93,14 @@ export function Measurements() {
         <span class="mut" data-testid="counts" role="status">{count}</span>
         <span class="tools">
         {may('engineer', 'gateway') && <button class="btn" data-testid="label-field" aria-expanded={labelling} onClick={() => set_labelling(!labelling)}>Label in the field</button>}
+        {source?.kind === 'mission' && <button class="btn" data-testid="exclude" aria-expanded={excluding} onClick={() => set_excluding(!excluding)}>Out of use</button>}
         {source && (['csv', 'ndjson'] as const).map((format) => <a key={format} class="btn" data-testid={`download-${format}`} href={download_url(source, filter, format)} download={`${source.kind === 'mission' ? 'ranges' : 'samples'}-${source.id}.${format}`}><Icon name="download" />{format.toUpperCase()}</a>)}</span>
       </div>
       {problem && <div class="problem" role="status"><b>The measurements could not be read.</b> {problem} <button class="btn small" onClick={() => set_again(again + 1)}>Try again</button></div>}
       <div class="page" tabIndex={0} role="region" aria-label="Measurements">
         {source && <Filters source={source} filter={filter} who={who.of === of ? who.list : []} set={(f) => set_filters({ of, filter: f })} />}
         {labelling && <CampaignMode campaigns={campaigns} close={() => set_labelling(false)} taken={() => set_again(again + 1)} />}
+        {excluding && source?.kind === 'mission' && <ExcludePanel mission={source.id} filter={filter} sample={sample} close={() => set_excluding(false)} />}
         {!source && <div class="empty small"><p>Nothing has been measured yet. Fly, import a flight folder, or import a campaign with ground truth.</p></div>}
         {source && !current && !problem && <p class="pad" role="status">Loading the measurements.</p>}
         {current && n_known === 0 && !at_end(rows) && rows.sizes.length > 0 && !problem && <p class="pad" role="status">Looking further: none in the first {grouped(rows.sizes.length * SCANNED)}.</p>}

@@ -1,0 +1,34 @@
+#include "api/learning/kept_data.hpp"
+
+#include <algorithm>
+
+namespace anchord::api {
+namespace {
+
+constexpr std::size_t k_most_sets = 20, k_most_rows = 50'000;
+
+}  // namespace
+
+Result<KeptData> kept_data(DatasetStore& datasets, const ml::Model& model) {
+  KeptData out;
+  BOOST_OUTCOME_TRY(const auto sets, datasets.datasets(k_most_sets, std::nullopt));
+  for (const auto& set : sets) {
+    BOOST_OUTCOME_TRY(const auto csv, datasets.csv(set.id));
+    auto parsed = DatasetTable::parse(csv);
+    if (!parsed) continue;
+    auto& rows = parsed.value().rows;
+    const bool held_out = std::ranges::any_of(rows, [](const DatasetRow& row) { return row.test; });
+    if (!held_out && set.digest == model.info.data_digest) continue;
+    if (held_out) std::erase_if(rows, [](const DatasetRow& row) { return !row.test; });
+    if (out.table.rows.size() + rows.size() > k_most_rows) continue;
+    for (auto& row : rows) {
+      row.test = true;
+      row.registers.clear();  // live ranges have none, and other sets have others
+      out.table.rows.push_back(std::move(row));
+    }
+    out.names.push_back(set.name);
+  }
+  return out;
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,178 @@
+#include "api/learning/model_signer.hpp"
+
+#include <openssl/evp.h>
+#include <openssl/rand.h>
+
+#include <nlohmann/json.hpp>
+
+#include "core/base/sha256.hpp"
+#include "core/base/text.hpp"
+
+namespace anchord::api {
+namespace {
+
+constexpr std::size_t k_signature_bytes = 64, k_key_bytes = 32;
+
+std::string hex(std::span<const std::uint8_t> bytes) {
+  std::string out;
+  for (const auto byte : bytes) {
+    out += "0123456789abcdef"[byte >> 4];
+    out += "0123456789abcdef"[byte & 15];
+  }
+  return out;
+}
+
+std::optional<std::vector<std::uint8_t>> from_hex(std::string_view text) {
+  if (text.size() % 2 != 0) return std::nullopt;
+  const auto digit = [](char c) {
+    return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
+  };
+  std::vector<std::uint8_t> out;
+  for (std::size_t i = 0; i < text.size(); i += 2) {
+    const int high = digit(text[i]), low = digit(text[i + 1]);
+    if (high < 0 || low < 0) return std::nullopt;
+    out.push_back(static_cast<std::uint8_t>(16 * high + low));
+  }
+  return out;
+}
+
+/// What the signature is of. The purpose is part of it: "vouched" is not turned into "made".
+std::string message(std::string_view purpose, std::string_view artifact) {
+  return "anchord-model-1 " + std::string(purpose) + '\n' + std::string(artifact);
+}
+
+struct Parts {
+  std::string_view purpose, key, value;
+};
+std::optional<Parts> parts_of(std::string_view signature) {
+  const auto first = signature.find(':');
+  const auto second = first == std::string_view::npos ? first : signature.find(':', first + 1);
+  if (second == std::string_view::npos) return std::nullopt;
+  return Parts{signature.substr(0, first), signature.substr(first + 1, second - first - 1),
+               signature.substr(second + 1)};
+}
+
+using Pkey = std::unique_ptr<EVP_PKEY, decltype(&EVP_PKEY_free)>;
+using Context = std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)>;
+
+const unsigned char* bytes_of(std::string_view text) {
+  return reinterpret_cast<const unsigned char*>(text.data());
+}
+
+}  // namespace
+
+std::string_view to_string(ModelStanding standing) {
+  switch (standing) {
+    case ModelStanding::made:
+      return "made";
+    case ModelStanding::vouched:
+      return "vouched";
+    case ModelStanding::foreign:
+      return "foreign";
+    case ModelStanding::changed:
+      return "changed";
+  }
+  return "foreign";
+}
+
+struct ModelSigner::Key {
+  Pkey pkey;
+};
+
+ModelSigner::Seed ModelSigner::random_seed() {
+  Seed seed{};
+  if (RAND_bytes(seed.data(), static_cast<int>(seed.size())) != 1)
+    throw std::runtime_error("the system gives no random bytes for the key of the models");
+  return seed;
+}
+
+Result<ModelSigner::Seed> ModelSigner::parse_seed(std::string_view text) {
+  while (!text.empty() && (text.back() == '\n' || text.back() == '\r' || text.back() == ' '))
+    text.remove_suffix(1);
+  const auto bytes = from_hex(text);
+  Seed seed{};
+  if (!bytes || bytes->size() != seed.size())
+    return make_error(Errc::invalid_argument, "the key of the models is not 64 hex digits");
+  std::ranges::copy(*bytes, seed.begin());
+  return seed;
+}
+
+std::string ModelSigner::to_text(const Seed& seed) { return hex(seed); }
+
+ModelSigner::ModelSigner(const Seed& seed)
+    : key_(std::make_unique<Key>(
+          Key{Pkey(EVP_PKEY_new_raw_private_key(EVP_PKEY_ED25519, nullptr, seed.data(), seed.size()),
+                   &EVP_PKEY_free)})) {
+  if (!key_->pkey) throw std::runtime_error("OpenSSL cannot make an Ed25519 key");
+  std::array<std::uint8_t, k_key_bytes> open{};
+  std::size_t size = open.size();
+  if (EVP_PKEY_get_raw_public_key(key_->pkey.get(), open.data(), &size) != 1)
+    throw std::runtime_error("OpenSSL gives no public key");
+  Sha256 sum;
+  sum.add(std::string_view(reinterpret_cast<const char*>(open.data()), open.size()));
+  key_id_ = sum.hex().substr(0, 16);
+}
+
+ModelSigner::~ModelSigner() = default;
+ModelSigner::ModelSigner(ModelSigner&&) noexcept = default;
+
+std::string ModelSigner::sign(ModelStanding purpose, std::string_view artifact) const {
+  const std::string text = message(to_string(purpose), artifact);
+  const Context context(EVP_MD_CTX_new(), &EVP_MD_CTX_free);
+  std::array<std::uint8_t, k_signature_bytes> value{};
+  std::size_t size = value.size();
+  if (EVP_DigestSignInit(context.get(), nullptr, nullptr, nullptr, key_->pkey.get()) != 1 ||
+      EVP_DigestSign(context.get(), value.data(), &size, bytes_of(text), text.size()) != 1)
+    throw std::runtime_error("OpenSSL cannot sign a model");
+  return std::string(to_string(purpose)) + ':' + key_id_ + ':' + hex(value);
+}
+
+ModelStanding ModelSigner::standing(std::string_view artifact, std::string_view signature) const {
+  const auto parts = parts_of(signature);
+  if (!parts || parts->key != key_id_) return ModelStanding::foreign;
+  const bool made = parts->purpose == to_string(ModelStanding::made);
+  if (!made && parts->purpose != to_string(ModelStanding::vouched)) return ModelStanding::changed;
+  const auto value = from_hex(parts->value);
+  if (!value || value->size() != k_signature_bytes) return ModelStanding::changed;
+  const std::string text = message(parts->purpose, artifact);
+  const Context context(EVP_MD_CTX_new(), &EVP_MD_CTX_free);
+  const bool good =
+      EVP_DigestVerifyInit(context.get(), nullptr, nullptr, nullptr, key_->pkey.get()) == 1 &&
+      EVP_DigestVerify(context.get(), value->data(), value->size(), bytes_of(text), text.size()) == 1;
+  if (!good) return ModelStanding::changed;
+  return made ? ModelStanding::made : ModelStanding::vouched;
+}
+
+Result<ModelSource::Artifact> ModelSource::artifact(const ModelId& id) const {
+  Artifact out;
+  BOOST_OUTCOME_TRY(out.stored, store_->model(id));
+  BOOST_OUTCOME_TRY(out.text, store_->artifact(id));
+  if (signer_ == nullptr)
+    out.standing = out.stored.run ? ModelStanding::made : ModelStanding::foreign;
+  else
+    out.standing = signer_->standing(out.text, out.stored.signature);
+  if (out.standing == ModelStanding::changed)
+    return make_error(Errc::conflict,
+                      "model " + anchord::to_string(id) +
+                          " is not what this server signed: its artifact was edited. Train it "
+                          "again, or upload the artifact it should be");
+  return out;
+}
+
+std::string ModelSource::signature(ModelStanding purpose, std::string_view artifact) const {
+  return signer_ == nullptr ? std::string{} : signer_->sign(purpose, artifact);
+}
+
+std::string exported_artifact(std::string_view artifact, std::string_view signature) {
+  const auto end = artifact.rfind('}');
+  if (signature.empty() || end == std::string_view::npos) return std::string(artifact);
+  return std::string(artifact.substr(0, end)) + ",\"signature\":" + json_text(signature) + "}\n";
+}
+
+std::string signature_in(std::string_view exported) {
+  const auto root = nlohmann::json::parse(exported, nullptr, false);
+  const auto at = root.is_object() ? root.find("signature") : root.end();
+  return at != root.end() && at->is_string() ? at->get<std::string>() : std::string{};
+}
+
+}  // namespace anchord::api
