@@ -134,18 +134,18 @@ TEST_F(Exclusions, TheLiveFlightAppliesThemAtOnce) {
   const auto made = exclude(span(40, 80));
   const auto after = live(first_);
   ASSERT_TRUE(after.is_object());
-  EXPECT_EQ(after["n_used"].get<int>() + made["n_rows"].get<int>(), before["n_used"].get<int>()) << after;
+  EXPECT_EQ(after["n_ranges"].get<int>() + made["n_rows"].get<int>(), before["n_ranges"].get<int>()) << after;
   // What comes later within an open span is left out too.
   exclude(R"({"kind":"ranges","anchor":")" + to_string(first_) + R"(","since":)" + std::to_string(us(100)) +
           R"(,"reason":"taken down"})");
-  const int n = live(first_)["n_used"].get<int>();
+  const int n = live(first_)["n_ranges"].get<int>();
   const auto sent = post("/api/v1/ranges",
                          R"({"t_us":)" + std::to_string(us(110.0005)) + R"(,"tag":")" +
                              to_string(flight_.ranges.front().tag) + R"(","anchor":")" + to_string(first_) +
                              "\",\"distance_m\":7.5}\n",
                          "application/x-ndjson", {{"mission", mission_}});
   ASSERT_EQ(json(sent)["accepted"], 1) << sent.body;
-  EXPECT_EQ(live(first_)["n_used"].get<int>(), n);
+  EXPECT_EQ(live(first_)["n_ranges"].get<int>(), n);
 }
 
 TEST_F(Exclusions, PositionsAndSingleRowsToo) {

@@ -125,6 +125,30 @@ test('measurements are filtered, plotted and opened one by one', async () => {
   await page.close();
 });
 
+test('a range is taken out of use with a reason, and used again', async () => {
+  const { items: [{ id: mission }] } = await get('/api/v1/missions'), record = async () => (await get(`/api/v1/missions/${mission}/exclusions`)).items;
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/measurements' });
+  await id('source').selectOption(mission);
+  await id('rows').locator('tbody tr:not(.space)').first().click();
+  await id('exclude').click();
+  await id('exclude-picked').waitFor();
+  assert.equal(await text(id('exclude-picked')), '1');
+  assert.ok(await id('exclude-now').isDisabled(), 'not without a reason');
+  await id('exclude-reason').fill('a crane stood in the way');
+  await id('exclude-now').click();
+  await eventually('it is in the record', async () => (await record()).length === 1);
+  const [one] = await record();
+  assert.deepEqual([one.kind, one.n_rows, one.reason, one.included], ['ranges', 1, 'a crane stood in the way', null]);
+  await id('exclusion-list').getByText('a crane stood in the way').waitFor();
+  assert.deepEqual(await violations(page), []);
+  await picture(page, 'measurements-out-of-use-light');
+  await id('include').click();
+  await eventually('it is used again', async () => (await record())[0].included !== null);
+  await id('exclusion-list').getByText('used again').waitFor();
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});
+
 test('the filter is the server\'s: the list, the count and the file are of the same rows, and only what is in sight is in the page', async () => {
   const { items: [{ id: mission }] } = await get('/api/v1/missions'), { items } = await get(`/api/v1/ranges?mission=${mission}&limit=10000`);
   const limit = Math.round(items.map((r) => r.distance_m).sort((a, b) => a - b)[Math.floor(items.length / 2)] * 2) / 2, near = items.filter((r) => r.distance_m <= limit);

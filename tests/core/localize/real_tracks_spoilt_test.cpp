@@ -2,6 +2,7 @@
 // clean flight has them, in the solve and live.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdio>
 
 #include "core/localize/flight_solver.hpp"
