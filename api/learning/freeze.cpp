@@ -7,6 +7,7 @@
 #include "api/json/reader.hpp"
 #include "api/learning/range_features.hpp"
 #include "core/base/to_wire.hpp"
+#include "core/ports/exclusion_store.hpp"
 
 namespace anchord::api {
 namespace {
@@ -75,10 +76,15 @@ Result<std::vector<DatasetRow>> rows_of_campaigns(const DatasetQuery& query, Cam
 }
 
 Result<void> add_rows_of_missions(const DatasetQuery& query, MeasurementStore& measurements,
-                                  MissionStore& missions, std::vector<DatasetRow>& rows,
+                                  MissionStore& missions, ExclusionStore* exclusions,
+                                  std::vector<DatasetRow>& rows,
                                   std::map<std::string, std::size_t>& dropped) {
   for (const auto& id : query.missions) {
     BOOST_OUTCOME_TRY(const auto mission, missions.mission(id));
+    std::vector<Exclusion> out_of_use;
+    if (exclusions != nullptr) {
+      BOOST_OUTCOME_TRY(out_of_use, exclusions->exclusions(id));
+    }
     MeasurementStore::Filter filter;
     filter.mission = id;
     filter.limit = 1000;
@@ -86,6 +92,10 @@ Result<void> add_rows_of_missions(const DatasetQuery& query, MeasurementStore& m
     do {
       BOOST_OUTCOME_TRY(const auto page, measurements.ranges(filter));
       for (const auto& range : page.rows) {
+        if (excluded(out_of_use, range)) {
+          ++dropped["excluded"];
+          continue;
+        }
         if (!range.truth) {
           ++dropped["no label"];
           continue;
@@ -149,10 +159,11 @@ DatasetQuery read_dataset_query(const Json& body, CampaignStore& campaigns, Miss
 }
 
 Result<FrozenDataset> freeze(const DatasetQuery& query, CampaignStore& campaigns,
-                             MeasurementStore& measurements, MissionStore& missions) {
+                             MeasurementStore& measurements, MissionStore& missions,
+                             ExclusionStore* exclusions) {
   std::map<std::string, std::size_t> dropped;
   BOOST_OUTCOME_TRY(auto rows, rows_of_campaigns(query, campaigns));
-  BOOST_OUTCOME_TRYV(add_rows_of_missions(query, measurements, missions, rows, dropped));
+  BOOST_OUTCOME_TRYV(add_rows_of_missions(query, measurements, missions, exclusions, rows, dropped));
   const auto impossible =
       std::remove_if(rows.begin(), rows.end(), [](const DatasetRow& row) { return !(row.range_m() > 0); });
   if (impossible != rows.end())

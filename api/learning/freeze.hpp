@@ -9,6 +9,10 @@
 #include "core/ports/learning_store.hpp"
 #include "core/ports/store.hpp"
 
+namespace anchord {
+class ExclusionStore;
+}  // namespace anchord
+
 namespace anchord::api {
 
 /// What a data set is made of.
@@ -25,9 +29,10 @@ struct DatasetQuery {
 DatasetQuery read_dataset_query(const nlohmann::json& body, CampaignStore& campaigns, MissionStore& missions,
                                 std::vector<FieldError>& errors);
 
-/// Reads everything the query names, drops faults, aggregates, splits. errors: too_few_observations (no row),
-/// not_found (a test place that is not there)
+/// Reads everything the query names, less what a person took out of use, drops faults, aggregates, splits.
+/// errors: too_few_observations (no row), not_found (a test place that is not there)
 Result<FrozenDataset> freeze(const DatasetQuery& query, CampaignStore& campaigns,
-                             MeasurementStore& measurements, MissionStore& missions);
+                             MeasurementStore& measurements, MissionStore& missions,
+                             ExclusionStore* exclusions = nullptr);
 
 }  // namespace anchord::api

@@ -67,7 +67,8 @@ Response create(LearningServices& l, const Request& request) {
     refuse_if_any(errors);
     record.name = query.name;
     record.query_json = query.json;
-    auto made = freeze(query, l.stores.campaigns, l.services.deps.measurements, l.services.deps.missions);
+    auto made = freeze(query, l.stores.campaigns, l.services.deps.measurements, l.services.deps.missions,
+                       l.services.deps.exclusions);
     if (!made && (made.error().code == Errc::too_few_observations || made.error().code == Errc::not_found ||
                   made.error().code == Errc::invalid_argument))
       throw_problem(422, "validation", made.error().message, {{"", "no_rows", made.error().message}});

@@ -170,14 +170,16 @@ void MissionService::State::step(Flight& flight, const LiveRow& row, bool quiet)
   const auto& fix = std::get<Fix>(row);
   ++state.n_fixes;
   flight.watch.note(fix);
+  bool believed = false;
   if (excluded(flight.exclusions, fix)) {
     ++state.n_fixes_excluded;
   } else {
     flight.history.add(fix);
-    flight.live.add(fix);
+    believed = flight.live.add(fix);
   }
   if (quiet) return;
-  if (auto* told = observer.load()) told->on_fix(fix);
+  // Whoever flies by it hears of no place where the aircraft cannot be.
+  if (auto* told = observer.load(); told != nullptr && believed) told->on_fix(fix);
   const std::int64_t now_us = fix.time.us();
   if (now_us - flight.last_pose_us >= k_pose_interval_us || now_us < flight.last_pose_us) {
     flight.last_pose_us = now_us;

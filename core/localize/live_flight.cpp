@@ -262,9 +262,11 @@ LiveFlight::~LiveFlight() = default;
 LiveFlight::LiveFlight(LiveFlight&&) noexcept = default;
 LiveFlight& LiveFlight::operator=(LiveFlight&&) noexcept = default;
 
-void LiveFlight::add(const Fix& fix) {
+bool LiveFlight::add(const Fix& fix) {
   State& s = *state_;
-  s.follow(s.track.add(fix), fix);
+  const auto change = s.track.add(fix);
+  s.follow(change, fix);
+  return change.believed;
 }
 
 void LiveFlight::add(const Range& range, const std::optional<RangeModel>& model) {

@@ -76,7 +76,8 @@ class LiveFlight {
   LiveFlight(LiveFlight&&) noexcept;
   LiveFlight& operator=(LiveFlight&&) noexcept;
 
-  void add(const Fix& fix);
+  /// False where no aircraft could have been there, as far as is known by now: nobody should steer by it.
+  bool add(const Fix& fix);
   /// `model`: its correction is taken off and its sigma used, before anything is solved.
   void add(const Range& range, const std::optional<RangeModel>& model = {});
   /// A range a person took out of use: counted as "excluded" and told, nothing else.

@@ -60,9 +60,13 @@ LiveTrack::Change LiveTrack::add(const Fix& given) {
   if (flight_ && seconds(fix) > segments_.segment(*flight_).last_s + options_.limits.max_ahead_s &&
       seconds(fix) > newest_s_ + options_.limits.max_ahead_s) {
     pending_ = fix;
+    change.believed = false;
     return change;
   }
-  join(change, process(fix));
+  Change now = process(fix);
+  const bool believed = now.believed || now.rebuilt;
+  join(change, std::move(now));
+  change.believed = believed;
   return change;
 }
 
@@ -82,7 +86,9 @@ LiveTrack::Change LiveTrack::process(const Fix& fix) {
   } else if (!poses_.empty() &&
              (in_frame(known.place_m) - poses_.back().position_m).norm() > options_.limits.max_distance_m) {
     ++counted_[std::string(to_string(FixRefusal::far_away))];
-    return {};
+    Change change;
+    change.believed = false;
+    return change;
   }
   pose.position_m = in_frame(known.place_m);
   const std::size_t part = known.part;
@@ -143,6 +149,7 @@ LiveTrack::Change LiveTrack::insert(Known known, TrackPose pose) {
   const bool agrees =
       known.in_track || (known.part < k_apart && segments_.segment(known.part).n >= k_told_parts);
   if (newest && agrees) change.newest = pose;
+  change.believed = agrees;
   if (known.in_track) {
     const auto place = std::ranges::lower_bound(poses_, t_s, {}, &TrackPose::t_s);
     const auto at = poses_.insert(place, std::move(pose));

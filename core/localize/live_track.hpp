@@ -28,6 +28,7 @@ class LiveTrack {
     bool added{false};  ///< between from_s and to_s the track is another
     double from_s{}, to_s{};
     bool rebuilt{false};  ///< everything is another: poses, perhaps the origin
+    bool believed{true};  ///< false: no aircraft could have been there, as far as is known by now
     /// The newest position, also of a part that is not the flight yet once it has three; in the frame.
     std::optional<TrackPose> newest{};
   };
