@@ -271,9 +271,8 @@ Response promote(LearningServices& l, const Request& request) {
 
 Response gate_of_model(LearningServices& l, const Request& request) {
   check_query(request, {});
-  return json_response(
-      200,
-      gate_json(judge(l, standing(l), value_or_problem(l.stores.models.model(path_id<ModelId>(request))))));
+  const auto candidate = value_or_problem(l.models.source().artifact(path_id<ModelId>(request)));
+  return json_response(200, gate_json(judge(l, standing(l), candidate)));
 }
 
 /// What was active before the newest promotion that still stands.
