@@ -88,7 +88,8 @@ class Torture {
         while (running) if (!(await one.step(server))) break;
       });
       for (const client of clients) client.catch((error) => (fault ??= error));
-      await this.wait(350);
+      // Long enough now and then for what takes several requests.
+      await this.wait(n % 5 === 0 ? 2000 : 350);
       await server.end();
       running = false;
       await Promise.allSettled(clients);

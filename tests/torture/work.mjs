@@ -33,7 +33,7 @@ export async function newMission(server, name) {
 /** Batches one after the other, each again until it is answered for. */
 export class Gateway {
   constructor(number) {
-    this.tag = 100 + number;
+    this.tag = String(100 + number);
     this.acknowledged = 0;
     this.total = 0;
   }
@@ -79,7 +79,7 @@ export class Deleter {
     const mission = { id: must(made, 201, 'POST missions').id, rows: 0, sent: false, gone: false, purgeSent: false, purged: false };
     this.open.push(mission);
     for (let i = 0; i < 2; i++) {
-      const rows = Array.from({ length: k_batch_rows }, (_, n) => range(mission.id, 99, i * k_batch_rows + n));
+      const rows = Array.from({ length: k_batch_rows }, (_, n) => range(mission.id, '99', i * k_batch_rows + n));
       const answer = await ask(server, '/api/v1/ranges', lines(rows));
       if (later(answer)) return false;
       must(answer, 200, 'POST ranges');
@@ -136,7 +136,7 @@ export class Publisher {
     this.published = [];
     this.unanswered = null;
   }
-  async prepare(server, want = 12) {
+  async prepare(server, want = 20) {
     if (!this.mission) {
       this.mission = must(await ask(server, '/api/v1/missions?devices=false', { json: this.flight.mission }), 201, 'POST missions').id;
       must(await ask(server, `/api/v1/fixes?mission=${this.mission}`, lines(this.flight.fixes)), 200, 'POST fixes');
@@ -201,8 +201,8 @@ export class Promoter {
     this.sent = model;
     const answer = await ask(server, `/api/v1/models/${model}/promote`, { json: { reason: 'torture' } });
     if (later(answer)) return false;
-    // 409: it is the active one already, by the promotion whose answer was lost.
-    const json = must(answer, again ? [200, 409] : 200, 'promote');
+    // 422: it is the active one already, by the promotion whose answer was lost.
+    const json = must(answer, again ? [200, 409, 422] : 200, 'promote');
     this.acknowledged.push({ model, number: answer.status === 200 ? json.number : null });
     this.sent = null;
     return true;
@@ -246,7 +246,7 @@ export class Installer {
     return true;
   }
   async check(_, server) {
-    const now = new Set(must(await ask(server, '/api/v1/devices?limit=200'), 200, 'GET devices').items.map((d) => d.id));
+    const now = new Set(must(await ask(server, '/api/v1/devices'), 200, 'GET devices').items.filter((d) => d.address?.includes('torture-')).map((d) => d.id));
     for (const [id, state] of this.devices) {
       if (state === 'there') assert.ok(now.has(id), `device ${id} was acknowledged, and is not there`);
       if (state === 'gone') assert.ok(!now.has(id), `device ${id} was taken out, and is there again`);
