@@ -43,7 +43,8 @@ Ordered anchors_json(const procedure::FlightEngine& engine) {
                    {"waiting", a.waiting},
                    {"weight", procedure::weight_of(a)},
                    {"bearing_deg", bearing ? Ordered(degrees(bearing->bearing_rad)) : Ordered(nullptr)},
-                   {"height_m", height ? Ordered(height->height_m) : Ordered(nullptr)}});
+                   {"height_m", height ? Ordered(height->height_m) : Ordered(nullptr)},
+                   {"height_at_edge", height ? Ordered(height->at_edge) : Ordered(nullptr)}});
   }
   return out;
 }
@@ -74,6 +75,12 @@ Ordered drone_json(const DroneStatus& d) {
           {"heading_deg", or_null(d.heading_deg)},
           {"speed_mps", or_null(d.speed_mps)},
           {"battery", or_null(d.battery)},
+          {"battery_v", or_null(d.battery_v)},
+          {"battery_age_s", finite_or_null(d.battery_age_s)},
+          {"position_age_s", finite_or_null(d.position_age_s)},
+          {"stale", d.stale},
+          {"ready_to_arm", or_null(d.ready_to_arm)},
+          {"not_ready", d.not_ready},
           {"gps_fix", d.gps_fix},
           {"text", d.text},
           {"peer", d.peer},
@@ -117,7 +124,7 @@ Ordered procedure_json(const ProcedureView& v, const procedure::FlightEngine& en
               {"k", t.k},
               {"iteration", s.visited.size()},
               {"target", std::move(target)},
-              {"distance_m", flying && at ? Ordered((*at - s.target_m).norm()) : Ordered(nullptr)},
+              {"distance_m", flying ? or_null(engine.distance_left_m()) : Ordered(nullptr)},
               {"anchors", anchors_json(engine)}};
   out["battery_needed"] =
       at ? Ordered(procedure::return_margin(engine.setup().limits, *at)) : Ordered(nullptr);
@@ -125,6 +132,7 @@ Ordered procedure_json(const ProcedureView& v, const procedure::FlightEngine& en
                                           {"reaction", procedure::to_string(engine.alarm()->reaction)},
                                           {"text", engine.alarm()->text}}
                                 : Ordered(nullptr);
+  out["shift_m"] = v.shift_m ? xyz(*v.shift_m) : Ordered(nullptr);
   out["drone"] = v.drone ? drone_json(*v.drone) : Ordered(nullptr);
   out["control"] =
       v.holder

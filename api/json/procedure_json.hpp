@@ -20,6 +20,7 @@ struct FlightCommand {
   std::string state;   ///< sent, accepted, refused, unconfirmed
   std::string text, by;
   UtcTime at{};
+  MissionId mission{};
 };
 nlohmann::ordered_json drone_json(const DroneStatus& drone);
 nlohmann::ordered_json flight_command_json(const FlightCommand& command);
@@ -35,6 +36,7 @@ struct ProcedureView {
   std::int64_t t_us{};
   double now_s{};
   std::optional<DroneStatus> drone{};
+  std::optional<Eigen::Vector3d> shift_m{};  ///< rover minus autopilot
   std::optional<std::string> holder{};
   std::int64_t holder_since_us{}, holder_until_us{};
   std::vector<FlightCommand> commands;

@@ -118,7 +118,7 @@ Response profiles(Services& s, const Request& request,
 
 const std::vector<std::string_view>& flight_actions() {
   static const std::vector<std::string_view> k_actions{"start",  "hold", "resume", "skip",
-                                                       "return", "land", "abort"};
+                                                       "return", "land", "abort",  "disarm"};
   return k_actions;
 }
 

@@ -7,6 +7,7 @@
 
 #include "core/planning/local_plan.hpp"
 #include "core/ports/drone.hpp"
+#include "core/types/fix.hpp"
 #include "core/types/mission.hpp"
 
 namespace anchord::api {
@@ -26,6 +27,7 @@ struct ChecklistFacts {
   const planning::PlanCheck* plan{};    ///< absent: no plan chosen
   std::optional<DroneStatus> drone{};   ///< absent: flown by hand
   std::optional<double> fix_age_s{};    ///< newest fix of the mission
+  std::optional<FixClass> fix{};        ///< of it
   std::optional<double> fixed_for_s{};  ///< RTK fixed without a break
   std::optional<double> correction_age_s{};
   std::optional<double> range_age_s{};  ///< newest range

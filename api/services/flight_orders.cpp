@@ -10,12 +10,12 @@
 
 namespace anchord::api {
 
-using procedure::Command;
 using procedure::Event;
 
 namespace {
 
 constexpr std::size_t k_checks = 64;
+constexpr std::ptrdiff_t k_shown_commands = 30;
 
 std::optional<Event> event_of_action(const std::string& action) {
   if (action == "hold") return Event::hold;
@@ -60,6 +60,7 @@ std::vector<ChecklistItem> FlightService::State::checklist(const Mission* record
   if (const auto it = heard.find(mission); it != heard.end()) {
     const auto& h = it->second;
     if (h.fix_s) facts.fix_age_s = now - *h.fix_s;
+    if (h.fix) facts.fix = h.fix->fix;
     if (h.fixed_since_s) facts.fixed_for_s = now - *h.fixed_since_s;
     if (h.range_s) facts.range_age_s = now - *h.range_s;
     if (facts.fix_age_s && h.correction_age_s)
@@ -87,6 +88,14 @@ Result<FlightCommand> FlightService::State::begin(const Mission& mission, const 
   const Plan& plan = *ground.plan;
   manual = manual || deps.drone == nullptr;
   if (flight && flight->flying()) return forbidden("a flight is in the air already");
+  const bool in_air = !manual && deps.drone->status().in_air;
+  std::optional<Wgs84> took_off_from;
+  if (in_air) {
+    if (const auto* before = flight_of(mission.id))
+      took_off_from = before->frame.wgs84_from_enu(Enu{before->home_m});
+    if (!took_off_from)
+      return forbidden("the aircraft is in the air and it is not known where it took off: land it first");
+  }
   if (mission.frame != TrackFrame::wgs84)
     return forbidden("a mission in a local frame cannot be flown: an aircraft needs the globe");
   preparing.emplace(mission.id, plan);
@@ -99,39 +108,62 @@ Result<FlightCommand> FlightService::State::begin(const Mission& mission, const 
   if (!h.fix || h.fix->frame != TrackFrame::wgs84) return forbidden("it is not known where the aircraft is");
   BOOST_OUTCOME_TRY(Wgs84 origin, planning::plan_origin(plan));
   // A plan without an origin has its ground where the aircraft stands.
-  if (!plan.origin) origin.height_m = h.fix->position.height_m;
+  if (!plan.origin) origin.height_m = (took_off_from ? *took_off_from : h.fix->position).height_m;
   Plan flown = plan;
   flown.origin = origin;
   const EnuFrame frame(origin);
-  const Eigen::Vector3d home = frame.enu_from_wgs84(h.fix->position).m;
+  const Eigen::Vector3d here = frame.enu_from_wgs84(h.fix->position).m;
+  // Home is on the ground: where this mission took off, when it starts again in the air.
+  const Eigen::Vector3d home = took_off_from ? frame.enu_from_wgs84(*took_off_from).m : here;
   BOOST_OUTCOME_TRY(auto setup, procedure::flight_setup(flown, home));
   const double now = now_s();
-  flight.emplace(mission.id, flown, manual, frame, home, procedure::FlightEngine(std::move(setup)));
+  // A new flight is a new object, and so is what the link knows of it.
+  flight.emplace(mission.id, flown, manual, frame, home,
+                 procedure::FlightControl(std::move(setup), frame, manual ? nullptr : deps.drone));
   auto& f = *flight;
-  f.engine.fix(now, home, h.fix->fix);
-  if (manual) f.by_hand.position_m = home, f.former_s = now;
-  telemetry(f);
+  f.control.fix(now, here, h.fix->fix);
+  if (manual) {
+    f.by_hand.position_m = here, f.former_s = now;
+    f.control.by_hand(now, f.by_hand);
+  }
   by_drone_number.clear();
   unconfirmed.reset();
-  auto& command = note("start", who.name, "sent");
-  f.engine.command(now, Event::start, who.name);
-  send_orders(f, &command);
+  const auto number_of_start = note(mission.id, "start", who.name, "sent").number;
+  f.control.start(now, who.name);
+  note_dispatched(f, find(number_of_start));
   tell_happenings(f);
   said.erase(mission.id);  // of the next flight every item is asked again
+  return *find(number_of_start);
+}
+
+/// Whatever the server believes: who has control can always tell the aircraft to hold, to land, to disarm.
+Result<FlightCommand> FlightService::State::obey_directly(const MissionId& mission, const std::string& action,
+                                                          const Principal& who) {
+  auto& command = note(mission, action, who.name, "sent");
+  if (deps.drone == nullptr) {
+    command.state = "accepted", command.text = "shown to the pilot";
+    return command;
+  }
+  if (flight && flight->flying() && !flight->manual && flight->control.taken_over()) deps.drone->take_back();
+  by_drone_number[action == "hold"   ? deps.drone->hold()
+                  : action == "land" ? deps.drone->land()
+                                     : deps.drone->disarm()] = command.number;
   return command;
 }
 
 Result<FlightCommand> FlightService::State::obey(const MissionId& mission, const std::string& action,
                                                  const Principal& who) {
-  if (!flight_of(mission) || !flight->flying()) return forbidden("this mission is not being flown");
+  const bool flies = flight_of(mission) && flight->flying();
+  const bool always = action == "hold" || action == "land" || action == "disarm";
+  if (action == "disarm" || (always && !flies)) return obey_directly(mission, action, who);
+  if (!flies) return forbidden("this mission is not being flown");
   auto& f = *flight;
   if (action == "abort") {
-    auto& command = note(action, who.name, "sent");
-    if (f.manual) {
+    auto& command = note(mission, action, who.name, "sent");
+    if (f.manual)
       command.state = "accepted";
-    } else {
-      by_drone_number[deps.drone->hold()] = command.number;
-    }
+    else
+      by_drone_number[f.control.abort()] = command.number;
     f.aborted = true;
     deps.events.add("warning", "procedure.aborted",
                     "aborted by " + who.name + ": the aircraft is the pilot's", mission);
@@ -139,21 +171,14 @@ Result<FlightCommand> FlightService::State::obey(const MissionId& mission, const
   }
   const auto event = event_of_action(action);
   if (!event) return forbidden("there is no action " + action);
-  if (f.taken_over) {
-    if (*event != Event::resume && *event != Event::return_home && *event != Event::land &&
-        *event != Event::hold)
-      return forbidden("the pilot or a failsafe has taken over; resume, hold, return or land take it back");
-    f.taken_over = false;
-    deps.drone->take_back();
+  const auto number_of_order = note(mission, action, who.name, "sent").number;
+  if (const auto why_not = f.control.command(now_s(), *event, who.name); !why_not.empty()) {
+    std::erase_if(commands, [&](const FlightCommand& c) { return c.number == number_of_order; });
+    return forbidden(action + ": " + why_not);
   }
-  if (!f.engine.command(now_s(), *event, who.name)) {
-    return forbidden("nothing to " + action + " in step " +
-                     std::string(procedure::to_string(f.engine.state().step)));
-  }
-  auto& command = note(action, who.name, "sent");
-  send_orders(f, &command);
+  note_dispatched(f, find(number_of_order));
   tell_happenings(f);
-  return command;
+  return *find(number_of_order);
 }
 
 void FlightService::State::recover() {
@@ -190,12 +215,10 @@ void FlightService::State::recover() {
     if (!setup) continue;
     const bool manual = j.value("manual", false) || deps.drone == nullptr;
     flight.emplace(mission, std::move(plan), manual, EnuFrame(origin), home,
-                   procedure::FlightEngine(std::move(setup).value(), *state, now_s()));
+                   procedure::FlightControl(std::move(setup).value(), EnuFrame(origin),
+                                            manual ? nullptr : deps.drone, *state, now_s()));
     flight->clues_before = clues_of(j.value("clues", nlohmann::json()));
-    // Not heard yet: the hold leaves with the first heartbeat.
-    for (const auto& order : flight->engine.take_orders()) {
-      if (!manual) flight->owed = order.kind;
-    }
+    // Not heard yet: whether the hold leaves is decided by the mode that the first heartbeat shows.
     tell_happenings(*flight);
     deps.events.add("critical", "procedure.restarted",
                     "server restarted in flight: told to hold, waiting for the operator", mission);
@@ -213,13 +236,18 @@ nlohmann::ordered_json FlightService::State::procedure(const ActiveFlight& f) co
   v.t_us = deps.clock.now().us();
   v.now_s = now_s();
   if (!f.manual) v.drone = deps.drone->status();
+  v.shift_m = f.control.shift_m();
   if (const auto held = lease.holder(moment())) {
     v.holder = held->name;
     v.holder_since_us = held->since.us();
     v.holder_until_us = held->until.us();
   }
-  v.commands.assign(commands.begin(), commands.end());
-  return procedure_json(v, f.engine, f.frame);
+  for (const auto& c : commands) {
+    if (c.mission == f.mission) v.commands.push_back(c);
+  }
+  if (v.commands.size() > k_shown_commands)
+    v.commands.erase(v.commands.begin(), v.commands.end() - k_shown_commands);
+  return procedure_json(v, f.control.engine(), f.frame);
 }
 
 void FlightService::State::publish_soon() {
@@ -231,7 +259,7 @@ void FlightService::State::publish() {
   if (!flight) return;
   auto& f = *flight;
   const double now = now_s();
-  const auto n = f.engine.state().n_transitions;
+  const auto n = f.control.engine().state().n_transitions;
   const std::int64_t t_us = deps.clock.now().us();
   const auto key = to_string(f.mission);
   const bool moved = n != f.shown;
@@ -239,10 +267,10 @@ void FlightService::State::publish() {
     deps.hub.publish(Topic::procedure, to_wire(procedure(f)), t_us, key);
     f.shown_s = now;
   }
-  const auto step = f.engine.state().step;
+  const auto step = f.control.engine().state().step;
   const bool turning = step == procedure::Step::turn, climbing = step == procedure::Step::height_search;
   if (turning || climbing || moved) {
-    for (const auto& [anchor, clues] : f.engine.clues()) {
+    for (const auto& [anchor, clues] : f.control.engine().clues()) {
       if (!clues.turn.empty() && (turning || moved))
         deps.hub.publish(Topic::mission_turn, to_wire(turn_json(f.mission, anchor, t_us, clues, turning)),
                          t_us, key + to_string(anchor), anchor);
@@ -252,8 +280,8 @@ void FlightService::State::publish() {
                          key + to_string(anchor), anchor);
     }
   }
-  if (moved && f.engine.decision())
-    deps.hub.publish(Topic::mission_grid, to_wire(grid_json(f.mission, t_us, f.engine, f.frame)), t_us, key);
+  if (moved && f.control.engine().decision())
+    deps.hub.publish(Topic::mission_grid, to_wire(grid_json(f.mission, t_us, f.control.engine(), f.frame)), t_us, key);
   f.shown = n;
 }
 
@@ -261,16 +289,22 @@ std::vector<std::pair<std::string_view, std::string>> FlightService::State::alar
   const bool flying = flight && flight->flying();
   std::vector<std::pair<std::string_view, std::string>> out;
   for (const auto id : k_flight_alarms) {
-    const auto& alarm = flying ? flight->engine.alarm() : std::nullopt;
+    const auto& alarm = flying ? flight->control.engine().alarm() : std::nullopt;
     out.emplace_back(id, alarm && alarm->id == id ? alarm->text : "");
   }
   out.emplace_back("drone.taken_over",
-                   flying && flight->taken_over ? "the pilot or a failsafe has the aircraft" : "");
+                   flying && flight->control.taken_over() ? "the pilot or a failsafe has the aircraft" : "");
   std::string silent;
   for (const auto& c : commands) {
     if (flying && unconfirmed && c.number == *unconfirmed) silent = c.action + " " + c.state + ": " + c.text;
   }
   out.emplace_back("cmd.unconfirmed", std::move(silent));
+  std::string stale;
+  if (flying && !flight->manual && deps.drone != nullptr) {
+    for (const auto& name : deps.drone->status().stale) stale += (stale.empty() ? "" : ", ") + name;
+    if (!stale.empty()) stale = "not heard for 5 s although the autopilot answers: " + stale;
+  }
+  out.emplace_back("drone.telemetry", std::move(stale));
   return out;
 }
 

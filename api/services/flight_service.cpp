@@ -41,8 +41,10 @@ void FlightService::stop() {
     if (state_->stopping) return;
     state_->stopping = true;
     // Whoever stops the server in flight leaves an aircraft that stands, not one that goes on.
+    // One that lands, or that the pilot has, is left to it.
     if (state_->flight && state_->flight->flying() && !state_->flight->manual &&
-        state_->deps.drone != nullptr)
+        state_->deps.drone != nullptr && !state_->flight->control.taken_over() &&
+        state_->flight->control.engine().state().step != procedure::Step::landing)
       state_->deps.drone->hold();
   }
   state_->wake.notify_all();
@@ -59,7 +61,7 @@ void FlightService::step() {
     const std::scoped_lock lock(s.mutex);
     if (s.flight) {
       mission = s.flight->mission;
-      deciding = s.flight->engine.state().step == procedure::Step::find_next_point;
+      deciding = s.flight->control.engine().state().step == procedure::Step::find_next_point;
     }
   }
   std::vector<MissionService::LiveView> live;
@@ -71,8 +73,8 @@ void FlightService::step() {
     const std::scoped_lock lock(s.mutex);
     s.round(live.empty() ? nullptr : &live.front());
     if (s.flight) keeps = s.flight->to_keep(keep);
-    if (s.flight && s.flight->clues_told != s.flight->engine.clues_version()) {
-      s.flight->clues_told = s.flight->engine.clues_version();
+    if (s.flight && s.flight->clues_told != s.flight->control.engine().clues_version()) {
+      s.flight->clues_told = s.flight->control.engine().clues_version();
       clues = s.flight->clues();
     }
     s.publish();
@@ -97,7 +99,10 @@ Result<Lease> FlightService::take_control(const MissionId& mission, const Princi
   const std::scoped_lock lock(state_->mutex);
   const auto now = state_->moment();
   const auto before = state_->lease.holder(now);
-  auto lease = state_->lease.take(mission, who, now, by_force);
+  // Who has the aircraft of a mission that is not being flown keeps nobody from today's.
+  const bool idle = before && before->mission != mission &&
+                    !(state_->flight && state_->flight->flying() && state_->flight->mission == before->mission);
+  auto lease = state_->lease.take(mission, who, now, by_force || idle);
   if (lease) {
     state_->deps.events.add(before ? "warning" : "info", "control.taken",
                             who.name + (before ? " took control from " + before->name : " has control"),
@@ -249,15 +254,15 @@ std::string FlightService::grid_text(const MissionId& mission) {
   const std::scoped_lock lock(state_->mutex);
   const auto* f = state_->flight_of(mission);
   return f == nullptr ? std::string{}
-                      : to_wire(grid_json(mission, state_->deps.clock.now().us(), f->engine, f->frame));
+                      : to_wire(grid_json(mission, state_->deps.clock.now().us(), f->control.engine(), f->frame));
 }
 
 std::vector<std::string> FlightService::turn_texts(const MissionId& mission) {
   const std::scoped_lock lock(state_->mutex);
   std::vector<std::string> out;
   if (const auto* f = state_->flight_of(mission)) {
-    const bool running = f->engine.state().step == procedure::Step::turn;
-    for (const auto& [anchor, clues] : f->engine.clues()) {
+    const bool running = f->control.engine().state().step == procedure::Step::turn;
+    for (const auto& [anchor, clues] : f->control.engine().clues()) {
       if (!clues.turn.empty())
         out.push_back(to_wire(turn_json(mission, anchor, state_->deps.clock.now().us(), clues, running)));
     }
@@ -269,8 +274,8 @@ std::vector<std::string> FlightService::height_texts(const MissionId& mission) {
   const std::scoped_lock lock(state_->mutex);
   std::vector<std::string> out;
   if (const auto* f = state_->flight_of(mission)) {
-    const bool running = f->engine.state().step == procedure::Step::height_search;
-    for (const auto& [anchor, clues] : f->engine.clues()) {
+    const bool running = f->control.engine().state().step == procedure::Step::height_search;
+    for (const auto& [anchor, clues] : f->control.engine().clues()) {
       if (!clues.heights.empty())
         out.push_back(to_wire(height_json(mission, anchor, state_->deps.clock.now().us(), clues, running)));
     }

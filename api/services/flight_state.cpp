@@ -3,9 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include "api/application.hpp"
 #include "api/live/hub.hpp"
@@ -15,26 +13,23 @@
 
 namespace anchord::api {
 
-using procedure::Command;
-using procedure::Event;
 using procedure::Step;
 
 namespace {
 
-constexpr double k_degree = std::numbers::pi / 180;
 constexpr double k_in_air_m = 0.7;  ///< by hand: above home this much counts as flying
-constexpr std::size_t k_commands = 30, k_missions = 8;
+constexpr std::size_t k_commands = 60, k_missions = 8;
 
 }  // namespace
 
 bool ActiveFlight::flying() const {
-  const auto step = engine.state().step;
+  const auto step = control.engine().state().step;
   return !aborted && step != Step::ready && step != Step::done;
 }
 
 std::string ActiveFlight::status() const {
   if (aborted) return "aborted";
-  switch (engine.state().step) {
+  switch (control.engine().state().step) {
     case Step::ready:
       return "ready";
     case Step::hold:
@@ -51,7 +46,7 @@ std::string ActiveFlight::status() const {
 }
 
 bool ActiveFlight::to_keep(std::string& text) {
-  const auto n = engine.state().n_transitions + (aborted ? 1'000'000 : 0);
+  const auto n = control.engine().state().n_transitions + (aborted ? 1'000'000 : 0);
   if (n == kept) return false;
   kept = n;
   text.clear();
@@ -68,7 +63,7 @@ bool ActiveFlight::to_keep(std::string& text) {
                                         {"manual", manual},
                                         {"origin", {o.lat_deg, o.lon_deg, o.height_m}},
                                         {"home_m", {home_m.x(), home_m.y(), home_m.z()}},
-                                        {"state", stored_state(engine.state())},
+                                        {"state", stored_state(control.engine().state())},
                                         {"clues", told}});
   return true;
 }
@@ -89,9 +84,11 @@ FlightCommand* FlightService::State::find(std::uint64_t wanted) {
   return nullptr;
 }
 
-FlightCommand& FlightService::State::note(std::string action, std::string by, std::string state) {
+FlightCommand& FlightService::State::note(const MissionId& mission, std::string action, std::string by,
+                                          std::string state) {
   if (by != "procedure" && by != "checklist") newest_by_person = number + 1;
-  commands.push_back({++number, std::move(action), std::move(state), "", std::move(by), deps.clock.now()});
+  commands.push_back(
+      {++number, std::move(action), std::move(state), "", std::move(by), deps.clock.now(), mission});
   if (commands.size() > k_commands) commands.pop_front();
   return commands.back();
 }
@@ -111,7 +108,7 @@ void FlightService::State::hear(const Fix& fix) {
   if (!flight || flight->mission != fix.mission || fix.frame != TrackFrame::wgs84) return;
   auto& f = *flight;
   const Eigen::Vector3d at = f.frame.enu_from_wgs84(fix.position).m;
-  f.engine.fix(now, at, fix.fix);
+  f.control.fix(now, at, fix.fix);
   if (f.manual && fix.fix != FixClass::none) {
     auto& v = f.by_hand;
     if (f.former_m && now > *f.former_s) v.speed_mps = (at - *f.former_m).norm() / (now - *f.former_s);
@@ -127,93 +124,39 @@ void FlightService::State::hear(const MissionId& mission, const RangeResult& res
   heard[mission].range_s = now;
   if (!flight || flight->mission != mission) return;
   // No estimate yet is no reason: what counts is that the exchange worked.
-  flight->engine.range(now, result.range.anchor, result.used(), result.range.rss_dbm,
+  flight->control.engine().range(now, result.range.anchor, result.used(), result.range.rss_dbm,
                        result.range.distance_m);
 }
 
-void FlightService::State::telemetry(ActiveFlight& f) {
-  const double now = now_s();
-  if (f.manual) {
-    if (f.by_hand.position_m && f.former_s) f.engine.vehicle(*f.former_s, f.by_hand);
-    return;
-  }
-  const DroneStatus d = deps.drone->status();
-  if (d.autopilot.empty()) return;  // never heard
-  procedure::VehicleView view;
-  if (d.position) {
-    Eigen::Vector3d at =
-        f.frame.enu_from_wgs84({d.position->lat_deg, d.position->lon_deg, f.frame.origin().height_m}).m;
-    // The autopilot's height is above sea level or home; home is where we know both.
-    at.z() = f.home_m.z() + d.relative_m.value_or(0);
-    view.position_m = at;
-  }
-  if (d.heading_deg) view.heading_rad = *d.heading_deg * k_degree;
-  view.speed_mps = d.speed_mps.value_or(0);
-  view.armed = d.armed;
-  view.in_air = d.in_air;
-  view.battery = d.battery;
-  // A heartbeat comes once a second: that much silence is none.
-  f.engine.vehicle(now - std::max(0.0, d.silent_s - 1.2), view);
-  if (d.taken_over && !f.taken_over) {
-    f.taken_over = true;
-    f.engine.command(now, Event::hold, "");
-    (void)f.engine.take_orders();  // the aircraft is the pilot's: not even a hold is sent
-  }
-  if (f.owed && d.connected) {
-    const Command late{*std::exchange(f.owed, std::nullopt), {0, 0, 0}, std::nullopt};
-    auto& c = note(std::string(procedure::to_string(late.kind)), "procedure", "sent");
-    by_drone_number[send(f, late)] = c.number;
-  }
-}
-
-std::uint64_t FlightService::State::send(ActiveFlight& f, const Command& order) {
-  auto& drone = *deps.drone;
-  switch (order.kind) {
-    case Command::Kind::take_off:
-      return drone.take_off(order.point_m.z() - f.home_m.z());
-    case Command::Kind::go_to: {
-      const Wgs84 to = f.frame.wgs84_from_enu(Enu{order.point_m});
-      std::optional<double> heading;
-      if (order.heading_rad) heading = std::fmod(*order.heading_rad / k_degree + 720, 360.0);
-      return drone.go_to(to.lat_deg, to.lon_deg, order.point_m.z() - f.home_m.z(), heading);
-    }
-    case Command::Kind::hold:
-      return drone.hold();
-    case Command::Kind::return_home:
-      return drone.return_home();
-    case Command::Kind::land:
-      return drone.land();
-    case Command::Kind::measure:
-    case Command::Kind::decide:
-      break;
-  }
-  return 0;
-}
-
 /// The first order that follows from an operator's command decides that command's fate.
-void FlightService::State::send_orders(ActiveFlight& f, FlightCommand* cause) {
-  for (const auto& order : f.engine.take_orders()) {
-    if (f.manual) {
-      if (cause != nullptr) cause->state = "accepted", cause->text = "shown to the pilot";
-      continue;
-    }
-    const bool must_arrive = order.kind == Command::Kind::hold || order.kind == Command::Kind::land ||
-                             order.kind == Command::Kind::return_home;
-    if (must_arrive && !deps.drone->status().connected) f.owed = order.kind;
-    const std::uint64_t sent = send(f, order);
-    if (cause != nullptr) {
-      by_drone_number[sent] = std::exchange(cause, nullptr)->number;
+void FlightService::State::note_dispatched(ActiveFlight& f, FlightCommand* cause) {
+  const auto wanted = cause == nullptr ? 0 : cause->number;
+  for (const auto& one : f.control.take_dispatched()) {
+    auto* command = cause;
+    if (cause == nullptr)
+      command = f.manual ? nullptr
+                         : &note(f.mission, std::string(procedure::to_string(one.kind)), "procedure", "sent");
+    cause = nullptr;
+    if (command == nullptr) continue;
+    if (one.number != 0) {
+      by_drone_number[one.number] = command->number;
+    } else if (one.not_sent.empty()) {
+      command->state = "accepted", command->text = "shown to the pilot";
     } else {
-      by_drone_number[sent] = note(std::string(procedure::to_string(order.kind)), "procedure", "sent").number;
+      command->state = "refused", command->text = one.not_sent;
     }
   }
-  if (cause != nullptr) cause->state = "accepted", cause->text = f.engine.state().reason;
+  if (cause != nullptr) {
+    if (auto* unanswered = find(wanted))
+      unanswered->state = "accepted", unanswered->text = f.control.engine().state().reason;
+  }
   while (by_drone_number.size() > 200) by_drone_number.erase(by_drone_number.begin());
 }
 
 void FlightService::State::read_reports() {
   if (deps.drone == nullptr) return;
   for (const auto& r : deps.drone->take_reports()) {
+    if (flight && flight->flying() && !flight->manual) flight->control.report(now_s(), r);
     const auto ours = by_drone_number.find(r.number);
     if (ours == by_drone_number.end()) continue;
     auto* c = find(ours->second);
@@ -226,20 +169,19 @@ void FlightService::State::read_reports() {
       if (u.command.number == c->number) u.command = *c;
     }
     const auto mission = flight ? std::optional(flight->mission) : std::nullopt;
+    const bool superseded = r.text.rfind("followed by ", 0) == 0 || r.text == "the flight is over";
     if (r.state == CommandState::accepted) {
       unconfirmed.reset();
-    } else {
+    } else if (!superseded) {
       if (r.state == CommandState::refused)
         deps.events.add("warning", "cmd.refused", c->action + " refused: " + r.text, mission);
       unconfirmed = c->number;
-      if (flight && r.what == "go_to" && r.state == CommandState::refused)
-        flight->engine.command(now_s(), Event::unreachable, "");
     }
   }
 }
 
 void FlightService::State::tell_happenings(ActiveFlight& f) {
-  for (auto& h : f.engine.take_happenings()) {
+  for (auto& h : f.control.engine().take_happenings()) {
     const bool by_the_board =
         h.code.ends_with(".cleared") ||
         std::find(k_flight_alarms.begin(), k_flight_alarms.end(), h.code) != k_flight_alarms.end();
@@ -258,7 +200,7 @@ void FlightService::State::round(const MissionService::LiveView* live) {
   give_fence();
   if (!flight || flight->aborted) return;
   auto& f = *flight;
-  telemetry(f);
+  if (f.manual && f.by_hand.position_m && f.former_s) f.control.by_hand(*f.former_s, f.by_hand);
   std::vector<Estimate> estimates;
   if (live != nullptr && live->origin) {
     const EnuFrame theirs(*live->origin);
@@ -272,9 +214,9 @@ void FlightService::State::round(const MissionService::LiveView* live) {
     }
   }
   // Without answers a decision would be one of ignorance: it is made when they were read.
-  const bool ready = f.engine.state().step != Step::find_next_point || live != nullptr;
-  if (ready) f.engine.tick(now_s(), estimates);
-  if (!f.taken_over) send_orders(f, nullptr);
+  const bool ready = f.control.engine().state().step != Step::find_next_point || live != nullptr;
+  f.control.round(now_s(), estimates, ready);
+  note_dispatched(f, nullptr);
   tell_happenings(f);
 }
 

@@ -11,7 +11,7 @@
 #include "api/services/flight_service.hpp"
 #include "api/services/mission_service.hpp"
 #include "core/base/guard.hpp"
-#include "core/procedure/flight_engine.hpp"
+#include "core/procedure/flight_control.hpp"
 
 namespace anchord::api {
 
@@ -22,13 +22,13 @@ inline constexpr std::array<std::string_view, 5> k_flight_alarms{
 /// One flight, in the air or just landed. Under the service's lock.
 struct ActiveFlight {
   ActiveFlight(const MissionId& m, Plan p, bool by_pilot, EnuFrame f, Eigen::Vector3d home,
-               procedure::FlightEngine e)
+               procedure::FlightControl c)
       : mission(m),
         plan(std::move(p)),
         manual(by_pilot),
         frame(std::move(f)),
         home_m(std::move(home)),
-        engine(std::move(e)) {}
+        control(std::move(c)) {}
 
   bool flying() const;
   std::string status() const;
@@ -40,19 +40,17 @@ struct ActiveFlight {
   bool manual{false};
   EnuFrame frame;  ///< of the plan, its ground at height 0
   Eigen::Vector3d home_m;
-  procedure::FlightEngine engine;
+  procedure::FlightControl control;
   /// What is known of the anchors' sides: of before a restart, and of the engine since.
   procedure::FlightClues clues() const {
-    return procedure::merged(clues_before, procedure::flight_clues(engine.clues(), frame));
+    return procedure::merged(clues_before, procedure::flight_clues(control.engine().clues(), frame));
   }
   procedure::FlightClues clues_before;
   std::uint64_t clues_told{0};  ///< version of the engine's clues that the mission knows
-  bool aborted{false}, taken_over{false};
+  bool aborted{false};
   std::uint64_t kept{~0ULL}, shown{~0ULL};
   double shown_s{-10};
   std::size_t shown_iteration{~std::size_t{0}};
-  std::optional<procedure::Command::Kind>
-      owed{};                                 ///< hold, return or land for an aircraft that was not heard
   std::optional<Eigen::Vector3d> former_m{};  ///< manual: the last fix, for its speed
   std::optional<double> former_s{};
   procedure::VehicleView by_hand{};
@@ -88,12 +86,12 @@ struct FlightService::State {
   Result<FlightCommand> obey(const MissionId& mission, const std::string& action, const Principal& who);
   void recover();
   void round(const MissionService::LiveView* live);
-  void telemetry(ActiveFlight& f);
-  void send_orders(ActiveFlight& f, FlightCommand* cause);
-  std::uint64_t send(ActiveFlight& f, const procedure::Command& order);
+  void note_dispatched(ActiveFlight& f, FlightCommand* cause);
   void read_reports();
   void tell_happenings(ActiveFlight& f);
-  FlightCommand& note(std::string action, std::string by, std::string state);
+  Result<FlightCommand> obey_directly(const MissionId& mission, const std::string& action,
+                                      const Principal& who);
+  FlightCommand& note(const MissionId& mission, std::string action, std::string by, std::string state);
   void publish();
   void publish_soon();
   nlohmann::ordered_json procedure(const ActiveFlight& f) const;

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/services/event_log.hpp"
+#include "api/services/flight_parameters.hpp"
 #include "api/services/flight_state.hpp"
 
 namespace anchord::api {
@@ -34,9 +35,11 @@ Result<FlightCommand> FlightService::State::upload(const MissionId& mission, con
   std::uint64_t sent = 0;
   if (what == "fence") {
     if (!has_fence(plan)) return refuse("the plan has neither a fence nor a no-fly area");
+    DroneFence fence{plan.fence, plan.no_fly};
+    if (plan.outline.size() >= 3) fence.outside.push_back(plan.outline);  // the building itself
     up.n_items = plan.fence.size();
-    for (const auto& area : plan.no_fly) up.n_items += area.size();
-    sent = deps.drone->upload_fence({plan.fence, plan.no_fly});
+    for (const auto& area : fence.outside) up.n_items += area.size();
+    sent = deps.drone->upload_fence(fence);
   } else {
     if (plan.waypoints.empty()) return refuse("the plan has no waypoint");
     // Heights of a plan are above its ground; a plan without an origin has it where the aircraft stands.
@@ -51,7 +54,7 @@ Result<FlightCommand> FlightService::State::upload(const MissionId& mission, con
     up.n_items = route.size();
     sent = deps.drone->upload_route(route);
   }
-  up.command = note("upload_" + what, who, "sent");
+  up.command = note(mission, "upload_" + what, who, "sent");
   by_drone_number[sent] = up.command.number;
   std::erase_if(uploads, [&](const FlightUpload& u) { return u.what == what; });
   uploads.push_back(up);
@@ -69,6 +72,10 @@ const FlightUpload* FlightService::State::uploaded(const Plan& plan, const std::
 /// An operator who looks at the checklist, and lets nobody else's flight be disturbed, means to fly: the
 /// fence goes up by itself, and again ten seconds after it was not confirmed.
 void FlightService::State::give_fence() {
+  if (deps.drone != nullptr && !(flight && flight->flying())) {
+    const auto status = deps.drone->status();
+    if (status.connected && !status.in_air) deps.drone->ask_parameters(flight_parameters(status.autopilot));
+  }
   if (!preparing || deps.drone == nullptr || (flight && flight->flying())) return;
   const auto holder = lease.holder(moment());
   if (holder && holder->mission != preparing->first) return preparing.reset();

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,13 +37,18 @@ struct OtherOnLink {
   double silent_s{};
 };
 
-/// How the aircraft is, as its autopilot tells. Ages in seconds.
+/// What the autopilot's mode means to us; `other`: a pilot's, or one that nobody here commands.
+enum class ModeKind : std::uint8_t { other, guided, hold, return_home, land };
+
+/// How the aircraft is, as its autopilot tells. Ages in seconds; infinity: never.
 struct DroneStatus {
   bool connected{false};  ///< heard within the last 3 s
   double silent_s{};
   std::string autopilot;  ///< "ArduPilot", "PX4" or empty
   std::string mode;       ///< word of the autopilot's mode
-  bool armed{false}, in_air{false}, failsafe{false};
+  ModeKind mode_kind{};
+  bool armed{false}, failsafe{false};
+  bool in_air{false};  ///< armed and not said to stand on the ground: what is not known counts as flying
   bool taken_over{
       false};  ///< somebody else changed the mode: no target is sent until the operator starts anew
   std::optional<Wgs84> position{};     ///< height_m above the ellipsoid where known, else above sea level
@@ -50,6 +57,17 @@ struct DroneStatus {
   std::optional<Wgs84> home{};
   int gps_fix{};     ///< MAVLink's number: 5 RTK float, 6 RTK fixed
   std::string text;  ///< newest warning of the autopilot
+  double position_age_s{std::numeric_limits<double>::infinity()};
+  double battery_age_s{std::numeric_limits<double>::infinity()};
+  /// Telemetry that is older than 5 s although the autopilot is heard: nothing may be judged by it.
+  std::vector<std::string> stale;
+  std::optional<bool> ready_to_arm{};  ///< the autopilot's own pre-arm checks
+  std::string not_ready;               ///< why not, in its words
+  std::optional<double> battery_v{};
+  int battery_warning{};  ///< the autopilot's own: 0 none, 1 low, 2 critical
+  /// Values of the parameters that were asked for; those it does not know are absent.
+  std::map<std::string, double> parameters;
+  std::vector<std::string> parameters_unknown;  ///< asked five times in vain
   std::string peer;  ///< address and port of the aircraft where the link has senders (UDP)
   bool link_signed{false};              ///< frames without our key's signature are refused
   std::uint64_t frames_refused{};       ///< unsigned, badly signed, or signed a second time
@@ -73,20 +91,32 @@ struct DroneFence {
 
 /// What the procedure may ask of an aircraft. Calls return at once with the number of the command; its fate
 /// comes through take_reports(). Heights above home. Before the aircraft was heard every command is refused.
+///
+/// Targets and take-off belong to a flight: new_flight() begins one with nothing of the one before, end_flight()
+/// ends it, and outside of one neither is sent. Hold, return, land and disarm are always sent.
 class Drone {
  public:
   virtual ~Drone() = default;
-  virtual std::uint64_t take_off(double height_m) = 0;
+  /// `speed_mps`: of the targets that follow.
+  virtual void new_flight(double speed_mps) = 0;
+  /// Whatever waits is dropped and reported; what was armed for it and still stands on the ground is disarmed.
+  virtual void end_flight() = 0;
+  virtual std::uint64_t take_off(double above_ground_m) = 0;  ///< from where it stands
   virtual std::uint64_t go_to(double lat_deg, double lon_deg, double height_m,
                               std::optional<double> heading_deg) = 0;
+  /// Corrects the target that is being flown to; without one nothing happens. Not reported.
+  virtual void steer(double lat_deg, double lon_deg, double height_m) = 0;
   virtual std::uint64_t hold() = 0;
   virtual std::uint64_t return_home() = 0;
   virtual std::uint64_t land() = 0;
+  virtual std::uint64_t disarm() = 0;  ///< never by force: in the air the autopilot refuses it
   /// Both replace what the autopilot kept, are read back and compared: accepted means that it keeps them.
   /// They take seconds; unconfirmed after five questions without an answer.
   virtual std::uint64_t upload_route(const std::vector<RoutePoint>& route) = 0;
   virtual std::uint64_t upload_fence(const DroneFence& fence) = 0;
-  /// The operator has looked and goes on after `taken_over`.
+  /// Values come into the status; asked again after the autopilot was restarted.
+  virtual void ask_parameters(const std::vector<std::string>& names) = 0;
+  /// The operator has looked and goes on after `taken_over`, from the mode that is shown.
   virtual void take_back() = 0;
   /// A person says that the aircraft on the link is another one: that of `sender`, or, empty, the next one
   /// whose autopilot is heard.

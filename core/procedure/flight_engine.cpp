@@ -118,6 +118,60 @@ void FlightEngine::range(double now_s, NetworkId anchor, bool used, std::optiona
 void FlightEngine::vehicle(double now_s, const VehicleView& view) {
   vehicle_ = view;
   vehicle_s_ = now_s;
+  was_armed_ |= view.armed;
+}
+
+void FlightEngine::order(const Command& command) {
+  orders_.push_back(command);
+  leg_ = command.kind == Command::Kind::go_to ? std::optional(command) : std::nullopt;
+}
+
+void FlightEngine::taken_over(double now_s, const std::string& mode) {
+  taken_over_ = true;
+  leg_.reset();
+  legs_.clear();
+  pending_.reset();
+  feed(now_s, Event::taken_over, mode);
+  tell(now_s, "warning", "drone.taken_over", "the pilot or a failsafe has the aircraft: " + mode);
+}
+
+/// What is wrong is judged anew: it was only told of before.
+void FlightEngine::taken_back(double now_s) {
+  taken_over_ = false;
+  alarm_.reset();
+  if (state_.deadline_s > 0) state_.deadline_s = std::max(state_.deadline_s, now_s + 10);
+}
+
+void FlightEngine::retell(double now_s) {
+  if (!legs_.empty()) return next_leg(now_s);
+  if (state_.step == Step::return_home) execute(now_s, {Command::Kind::return_home, {0, 0, 0}, std::nullopt});
+}
+
+std::optional<double> FlightEngine::distance_left_m() const {
+  const auto at = position_m();
+  if (!at || !leg_) return std::nullopt;
+  return (*at - (legs_.empty() ? leg_->point_m : legs_.back())).norm();
+}
+
+/// Straight up to the lower end of the band, where it is: what comes down by itself does not stop by a hold.
+void FlightEngine::climb(double now_s) {
+  constexpr double k_again_s = 3, k_above_floor_m = 0.5;
+  if (!fix_m_ || (climb_s_ && now_s - *climb_s_ < k_again_s)) return;
+  climb_s_ = now_s;
+  Eigen::Vector3d up = *fix_m_;
+  up.z() = setup_.settings.min_height_m + k_above_floor_m;
+  orders_.clear();
+  order({Command::Kind::go_to, up, std::nullopt});
+}
+
+/// On the ground and disarmed for a while, whoever did it; before it was armed that is where a flight begins.
+bool FlightEngine::down(double now_s) {
+  constexpr double k_sure_s = 2;
+  const bool now_down = vehicle_s_ && now_s - *vehicle_s_ < 3 && !vehicle_.in_air && !vehicle_.armed &&
+                        (was_armed_ || state_.step != Step::take_off);
+  if (!now_down) down_s_.reset();
+  if (now_down && !down_s_) down_s_ = now_s;
+  return now_down && now_s - *down_s_ >= k_sure_s;
 }
 
 bool FlightEngine::command(double now_s, Event event, const std::string& who) {
@@ -142,6 +196,7 @@ void FlightEngine::apply(double now_s, const Advance& step) {
     if (to == Step::height_search) clues_.begin_height_search();
   }
   state_ = step.state;
+  if (state_.step == Step::done) leg_.reset();
   if (measured) {
     for (const auto& a : state_.anchors) {
       if (a.samples_here > 0) measured_at_[a.id].push_back(state_.visited.back());
@@ -156,20 +211,27 @@ void FlightEngine::apply(double now_s, const Advance& step) {
 
 void FlightEngine::execute(double now_s, const Command& c) {
   switch (c.kind) {
-    case Command::Kind::take_off:
-      if (const auto refused = refuse_command(setup_.limits, position_m(), c)) {
+    case Command::Kind::take_off: {
+      // Above where it stands, which need not be the plan's ground, and into the band.
+      const double home_m = setup_.limits.home_m.z();
+      Command up = c;
+      up.point_m.z() = std::max(home_m + setup_.settings.take_off_m, setup_.settings.min_height_m);
+      climb_to_m_ = up.point_m.z();
+      if (const auto refused = refuse_command(setup_.limits, position_m(), up)) {
         tell(now_s, "critical", "cmd.refused", refused->text);
         pending_ = Event::land;
         pending_text_ = refused->text;
       } else {
-        order(c);
+        order(up);
       }
       return;
+    }
     case Command::Kind::go_to:
       return fly(now_s, c.point_m, c.heading_rad, false);
     case Command::Kind::return_home: {
       Eigen::Vector3d above = setup_.limits.home_m;
-      above.z() = std::max({above.z(), setup_.settings.take_off_m, setup_.settings.min_height_m});
+      above.z() = std::clamp(above.z() + setup_.settings.take_off_m, setup_.settings.min_height_m,
+                             setup_.settings.max_height_m);
       return fly(now_s, above, std::nullopt, true);
     }
     case Command::Kind::hold:
@@ -226,12 +288,30 @@ void FlightEngine::look_out(double now_s) {
   now.since_good_fix_s = age(good_fix_s_);
   now.autopilot_silent_s = age(vehicle_s_);
   now.battery = vehicle_.battery;
+  now.battery_warning = vehicle_.battery_warning;
+  now.cell_v = vehicle_.cell_v;
   now.flying = in_flight(state_.step) && (vehicle_.in_air || state_.step != Step::take_off);
-  const auto alarm = watch(setup_.limits, now);
+  if (fix_m_ && fix_m_->z() >= setup_.settings.min_height_m) above_floor_ = true;
+  now.floor = above_floor_ && vehicle_.in_air && state_.step != Step::take_off && state_.step != Step::landing;
+  SafetyLimits limits = setup_.limits;
+  // What disagrees agrees again when it does so clearly.
+  if (alarm_ && alarm_->id == "position.disagree") limits.disagree_m *= 2.0 / 3;
+  const auto alarm = watch(limits, now);
+  if (taken_over_) {
+    if (alarm && (!alarm_ || alarm_->id != alarm->id)) tell(now_s, "critical", alarm->id, alarm->text);
+    alarm_ = alarm;
+    return;
+  }
+  if (alarm && alarm->climbs && alarm_ && alarm_->climbs) climb(now_s);
   if (alarm && (!alarm_ || alarm_->id != alarm->id || alarm_->reaction < alarm->reaction)) {
     tell(now_s, "critical", alarm->id, alarm->text);
     alarm_ = alarm;
     const auto step = state_.step;
+    if (alarm->climbs) {
+      if (step != Step::hold) feed(now_s, Event::hold, alarm->text);
+      climb_s_.reset();
+      return climb(now_s);
+    }
     if (alarm->reaction == Reaction::land && step != Step::landing) {
       feed(now_s, Event::land, alarm->text);
     } else if (alarm->reaction == Reaction::return_home && step != Step::landing &&
@@ -251,12 +331,14 @@ void FlightEngine::look_for_arrival(double now_s) {
   if (legs_.empty()) return;
   const auto at = position_m();
   if (!at) return;
-  const bool last = legs_.size() == 1;
-  const bool near = (*at - legs_.front()).norm() <= (last ? setup_.arrive_m : 2 * setup_.arrive_m);
+  const bool last = legs_.size() == 1, home = state_.step == Step::return_home;
+  const double within_m = home ? setup_.home_arrive_m : last ? setup_.arrive_m : 2 * setup_.arrive_m;
+  const auto& believed = vehicle_.corrected_m;
+  const bool near = (*at - legs_.front()).norm() <= within_m &&
+                    (!believed || (*believed - legs_.front()).norm() <= setup_.arrive_believed_m + within_m);
   const bool turned = !last || !state_.heading_rad || !vehicle_.heading_rad ||
-                      state_.step == Step::return_home ||
-                      apart(*state_.heading_rad, *vehicle_.heading_rad) <= setup_.arrive_rad;
-  const bool still = !last || vehicle_.speed_mps <= setup_.arrive_mps;
+                      home || apart(*state_.heading_rad, *vehicle_.heading_rad) <= setup_.arrive_rad;
+  const bool still = !last || vehicle_.speed_mps <= (home ? setup_.home_arrive_mps : setup_.arrive_mps);
   if (!near || !turned || !still) {
     settled_s_.reset();
     return;
@@ -279,7 +361,8 @@ void FlightEngine::work(double now_s, std::span<const Estimate> estimates) {
   switch (state_.step) {
     case Step::take_off: {
       const auto at = vehicle_.position_m ? vehicle_.position_m : fix_m_;
-      if (vehicle_.in_air && at && at->z() >= 0.9 * setup_.settings.take_off_m) feed(now_s, Event::airborne);
+      const double home_m = setup_.limits.home_m.z();
+      if (vehicle_.in_air && at && at->z() - home_m >= 0.9 * (climb_to_m_ - home_m)) feed(now_s, Event::airborne);
       return;
     }
     case Step::search_anchors: {
@@ -311,8 +394,6 @@ void FlightEngine::work(double now_s, std::span<const Estimate> estimates) {
       return;
     case Step::return_home:
     case Step::landing:
-      if (vehicle_s_ && !vehicle_.in_air && !vehicle_.armed) feed(now_s, Event::landed);
-      return;
     case Step::ready:
     case Step::go_to_waypoint:
     case Step::move_around:
@@ -425,7 +506,9 @@ void FlightEngine::decide(double now_s, std::span<const Estimate> estimates) {
 
 void FlightEngine::tick(double now_s, std::span<const Estimate> estimates) {
   if (!in_flight(state_.step)) return;
+  if (down(now_s) && feed(now_s, Event::landed)) return;
   look_out(now_s);
+  if (taken_over_) return;
   if (pending_) {
     const auto event = *std::exchange(pending_, std::nullopt);
     if (feed(now_s, event, std::exchange(pending_text_, {}))) return;

@@ -32,6 +32,8 @@ struct FlightSetup {
   int samples = 20;                 ///< ranges wanted of each anchor at a point
   double min_gain = 0.1;            ///< share of the value; a point that brings less is not flown to
   double arrive_m = 0.5, arrive_rad = 0.25, arrive_mps = 0.4;
+  double arrive_believed_m = 1.5;                  ///< the autopilot must think so as well, roughly
+  double home_arrive_m = 1.5, home_arrive_mps = 1;  ///< landing does not wait for centimetres
 };
 
 /// errors  invalid_argument: no waypoint, plan nowhere, settings
@@ -44,6 +46,10 @@ struct VehicleView {
   double speed_mps{};
   bool armed{false}, in_air{false};
   std::optional<double> battery{};
+  int battery_warning{};           ///< the autopilot's own: 1 low, 2 critical
+  std::optional<double> cell_v{};  ///< mean of the battery's cells
+  /// Where it believes to be, put right by what the rover said of it lately.
+  std::optional<Eigen::Vector3d> corrected_m{};
 };
 
 /// One decision and what became of it.
@@ -81,6 +87,13 @@ class FlightEngine {
   /// What the operator wants: start, hold, resume, skip, return_home, land. False: means nothing in this
   /// step.
   bool command(double now_s, Event event, const std::string& who);
+  /// The pilot or a failsafe has the aircraft: alarms are told, nothing is reacted to and no time runs out.
+  void taken_over(double now_s, const std::string& mode);
+  void taken_back(double now_s);
+  /// Arming or take-off did not happen.
+  bool not_taken_off(double now_s, const std::string& why) { return feed(now_s, Event::not_taken_off, why); }
+  /// The present leg, or the way home, once more from where the aircraft is now.
+  void retell(double now_s);
   /// At least twice a second. The estimates are looked at when a decision is due.
   void tick(double now_s, std::span<const Estimate> estimates);
 
@@ -94,6 +107,9 @@ class FlightEngine {
   const std::map<NetworkId, Clues>& clues() const { return clues_.clues(); }
   std::uint64_t clues_version() const { return clues_.version(); }
   std::optional<Eigen::Vector3d> position_m() const;
+  /// The target that the aircraft flies to or stands at; none while it holds, lands or takes off.
+  const std::optional<Command>& leg() const { return leg_; }
+  std::optional<double> distance_left_m() const;
   double elapsed_s() const;  ///< from the start to the last transition
   double flown_s(double now_s) const { return started_s_ ? now_s - *started_s_ : 0; }
   const std::map<NetworkId, std::vector<Eigen::Vector3d>>& measured_at() const { return measured_at_; }
@@ -105,7 +121,9 @@ class FlightEngine {
   void execute(double now_s, const Command& command);
   void fly(double now_s, const Eigen::Vector3d& to_m, std::optional<double> heading, bool home);
   void next_leg(double now_s);
-  void order(const Command& command) { orders_.push_back(command); }
+  void order(const Command& command);
+  void climb(double now_s);
+  bool down(double now_s);
   void tell(double now_s, std::string level, std::string code, std::string text);
   void look_out(double now_s);
   void look_for_arrival(double now_s);
@@ -120,6 +138,10 @@ class FlightEngine {
   std::optional<double> vehicle_s_, fix_s_, good_fix_s_, started_s_;
   std::optional<Eigen::Vector3d> fix_m_;
   FixClass fix_{FixClass::none};
+  std::optional<double> down_s_, climb_s_;  ///< seen on the ground and disarmed since; told to climb last
+  double climb_to_m_{4};
+  bool was_armed_{false}, above_floor_{false}, taken_over_{false};
+  std::optional<Command> leg_;
   std::deque<Eigen::Vector3d> legs_;  ///< still to be flown to, the present one first
   std::optional<Event> pending_;      ///< an order was refused: fed at the next tick
   std::string pending_text_;

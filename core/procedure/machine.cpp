@@ -215,6 +215,7 @@ std::vector<Command> Entry::run() {
       return {go_to()};
     case Step::hold:
       s_.interrupted = way_.from;
+      if (way_.event == Event::taken_over) return {};
       return {only(Command::Kind::hold)};
     case Step::return_home:
       return {only(Command::Kind::return_home)};

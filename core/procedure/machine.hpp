@@ -57,8 +57,10 @@ enum class Event : std::uint8_t {
   skip,
   return_home,
   land,
+  taken_over,     ///< by the pilot or a failsafe: nothing is commanded any more
+  not_taken_off,  ///< arming or take-off refused, or not seen to happen
 };
-inline constexpr std::size_t k_event_count = 18;
+inline constexpr std::size_t k_event_count = 20;
 std::string_view to_string(Event event);
 std::optional<Event> event_of(std::string_view word);
 

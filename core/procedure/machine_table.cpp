@@ -14,6 +14,7 @@ constexpr Transition k_table[] = {
     {S::ready, E::start, G::always, S::take_off, "started by the operator"},
 
     {S::take_off, E::airborne, G::always, S::go_to_waypoint, "in the air, to the first waypoint"},
+    {S::take_off, E::not_taken_off, G::always, S::done, "not taken off"},
     {S::take_off, E::timeout, G::tries_left, S::take_off, "take-off not confirmed, once more"},
     {S::take_off, E::timeout, G::always, S::landing, "take-off not confirmed, giving up"},
 
@@ -69,7 +70,7 @@ constexpr Transition k_table[] = {
     {S::find_next_point, E::point, G::always, S::go_to_point, "better point found"},
     {S::find_next_point, E::done_here, G::waypoint_left, S::go_to_waypoint,
      "enough here, to the next waypoint"},
-    {S::find_next_point, E::done_here, G::always, S::return_home, "every anchor is done"},
+    {S::find_next_point, E::done_here, G::always, S::return_home, "nothing more to gain at the last waypoint"},
     {S::find_next_point, E::no_point, G::waypoint_left, S::go_to_waypoint,
      "no better point from here, to the next waypoint"},
     {S::find_next_point, E::no_point, G::always, S::return_home, "no better point and no waypoint left"},
@@ -112,7 +113,7 @@ constexpr std::array k_step_words{
 constexpr std::array k_event_words{"start",        "airborne",    "arrived",   "heard",       "sampled",
                                    "point",        "no_point",    "done_here", "unreachable", "connected",
                                    "disconnected", "landed",      "timeout",   "hold",        "resume",
-                                   "skip",         "return_home", "land"};
+                                   "skip",         "return_home", "land",      "taken_over",  "not_taken_off"};
 constexpr std::array k_guard_words{"always",        "wants_turn",    "wants_height", "legs_left",
                                    "moves_left",    "waypoint_left", "tries_left",   "anything_sampled",
                                    "was_returning", "had_point"};
@@ -140,7 +141,14 @@ std::span<const Transition> transitions() {
       if (from != S::return_home)
         out.push_back({from, E::return_home, G::always, S::return_home, "told to return"});
       out.push_back({from, E::land, G::always, S::landing, "told to land"});
+      if (from != S::hold)
+        out.push_back(
+            {from, E::taken_over, G::always, S::hold, "the pilot or a failsafe has the aircraft"});
+      if (from != S::return_home)
+        out.push_back({from, E::landed, G::always, S::done, "down and disarmed without being told"});
     }
+    out.push_back(
+        {S::landing, E::taken_over, G::always, S::hold, "the pilot or a failsafe has the aircraft"});
     out.push_back({S::landing, E::hold, G::always, S::hold, "landing stopped, told to hold"});
     return out;
   }();

@@ -29,14 +29,14 @@ std::optional<Alarm> breach(const SafetyLimits& limits, const Eigen::Vector3d& a
   if (*refusal == planning::Refusal::outside_fence) {
     const double out_m = planning::distance_to_edge_m(limits.bounds.fence, at_m.head<2>());
     if (out_m <= limits.tolerance_m && at_m.allFinite()) return std::nullopt;
-    return Alarm{Reaction::hold, "fence.breach", text("%.1f m outside the fence", out_m)};
+    return Alarm{Reaction::hold, false, "fence.breach", text("%.1f m outside the fence", out_m)};
   }
   if (*refusal == planning::Refusal::too_high) {
     return Alarm{
-        Reaction::hold, "fence.breach",
+        Reaction::hold, false, "fence.breach",
         text("%.1f m high, the band ends at %.1f m", at_m.z(), limits.bounds.max_height_m.value_or(0))};
   }
-  return Alarm{Reaction::hold, "fence.breach",
+  return Alarm{Reaction::hold, false, "fence.breach",
                text("nearer than %.1f m to the building or a no-fly area", limits.bounds.keep_out_m)};
 }
 
@@ -103,38 +103,56 @@ double return_margin(const SafetyLimits& limits, const Eigen::Vector3d& position
 std::optional<Alarm> watch(const SafetyLimits& limits, const Situation& now) {
   if (!now.flying) return std::nullopt;
   if (now.battery && *now.battery <= limits.critical_battery) {
-    return Alarm{Reaction::land, "drone.battery",
+    return Alarm{Reaction::land, false, "drone.battery",
                  text("battery at %.0f %%: landing here", 100 * *now.battery)};
   }
+  if (now.battery_warning >= 2) {
+    return Alarm{Reaction::land, false, "drone.battery", "the autopilot says the battery is critical: landing here"};
+  }
+  if (now.cell_v && *now.cell_v <= limits.critical_cell_v) {
+    return Alarm{Reaction::land, false, "drone.battery", text("battery at %.2f V a cell: landing here", *now.cell_v)};
+  }
+  if (now.battery_warning == 1) {
+    return Alarm{Reaction::return_home, false, "drone.battery", "the autopilot says the battery is low"};
+  }
+  if (now.cell_v && *now.cell_v <= limits.low_cell_v) {
+    return Alarm{Reaction::return_home, false, "drone.battery",
+                 text("battery at %.2f V a cell, %.2f V are needed", *now.cell_v, limits.low_cell_v)};
+  }
   if (now.battery && now.position_m && *now.battery <= return_margin(limits, *now.position_m)) {
-    return Alarm{Reaction::return_home, "drone.battery",
+    return Alarm{Reaction::return_home, false, "drone.battery",
                  text("battery at %.0f %%, needed to return %.0f %%", 100 * *now.battery,
                       100 * return_margin(limits, *now.position_m))};
   }
   if (now.position_m && now.position_age_s <= limits.position_age_s) {
+    const auto floor_m = limits.bounds.min_height_m;
+    if (now.floor && floor_m && now.position_m->z() < *floor_m - limits.floor_tolerance_m) {
+      return Alarm{Reaction::hold, true, "fence.breach",
+                   text("%.1f m high, the band begins at %.1f m: climbing", now.position_m->z(), *floor_m)};
+    }
     if (auto alarm = breach(limits, *now.position_m)) return alarm;
   }
   if (now.autopilot_silent_s > limits.link_return_s) {
-    return Alarm{Reaction::return_home, "drone.link",
+    return Alarm{Reaction::return_home, false, "drone.link",
                  text("autopilot silent for %.0f s", now.autopilot_silent_s)};
   }
   if (now.autopilot_silent_s > limits.link_hold_s) {
-    return Alarm{Reaction::hold, "drone.link", text("autopilot silent for %.0f s", now.autopilot_silent_s)};
+    return Alarm{Reaction::hold, false, "drone.link", text("autopilot silent for %.0f s", now.autopilot_silent_s)};
   }
   if (!now.position_m || now.position_age_s > limits.position_age_s) {
     if (now.position_age_s > limits.rtk_return_s) {
-      return Alarm{Reaction::return_home, "rtk.lost", text("no position for %.0f s", now.position_age_s)};
+      return Alarm{Reaction::return_home, false, "rtk.lost", text("no position for %.0f s", now.position_age_s)};
     }
-    return Alarm{Reaction::hold, "rtk.lost", text("no position for %.1f s", now.position_age_s)};
+    return Alarm{Reaction::hold, false, "rtk.lost", text("no position for %.1f s", now.position_age_s)};
   }
   if (now.wants_rtk && now.since_good_fix_s > limits.rtk_return_s) {
-    return Alarm{Reaction::return_home, "rtk.lost", text("no RTK for %.0f s", now.since_good_fix_s)};
+    return Alarm{Reaction::return_home, false, "rtk.lost", text("no RTK for %.0f s", now.since_good_fix_s)};
   }
   if (now.wants_rtk && now.since_good_fix_s > limits.rtk_hold_s) {
-    return Alarm{Reaction::hold, "rtk.lost", text("no RTK for %.1f s", now.since_good_fix_s)};
+    return Alarm{Reaction::hold, false, "rtk.lost", text("no RTK for %.1f s", now.since_good_fix_s)};
   }
   if (now.autopilot_m && (*now.autopilot_m - *now.position_m).norm() > limits.disagree_m) {
-    return Alarm{Reaction::hold, "position.disagree",
+    return Alarm{Reaction::hold, false, "position.disagree",
                  text("autopilot and rover disagree by %.1f m", (*now.autopilot_m - *now.position_m).norm())};
   }
   return std::nullopt;

@@ -26,6 +26,8 @@ struct SafetyLimits {
   double rtk_hold_s = 2, rtk_return_s = 10;    ///< without at least float
   double link_hold_s = 3, link_return_s = 15;  ///< autopilot silent
   double disagree_m = 3;                       ///< autopilot's position against the rover's
+  double floor_tolerance_m = 0.5;              ///< below the band by so much, by the rover: climbs
+  double low_cell_v = 3.5, critical_cell_v = 3.3;  ///< of a lithium cell under load
 };
 
 struct Refused {
@@ -49,6 +51,9 @@ struct Situation {
   double autopilot_silent_s{};
   std::optional<double> battery{};  ///< share, 0..1
   bool flying{false};
+  bool floor{false};  ///< on its way between take-off and landing: the band's lower end counts
+  int battery_warning{};                  ///< the autopilot's own: 1 low, 2 critical
+  std::optional<double> cell_v{};         ///< of the battery, the mean of its cells
   bool wants_rtk{true};
 };
 
@@ -56,6 +61,7 @@ enum class Reaction : std::uint8_t { hold, return_home, land };
 std::string_view to_string(Reaction reaction);
 struct Alarm {
   Reaction reaction{};
+  bool climbs{false};  ///< hold, but higher: to the lower end of the band
   std::string id;    ///< alarm of dashboard.md
   std::string text;  ///< with the numbers
 };

@@ -10,9 +10,10 @@ constexpr std::uint32_t px4(std::uint32_t main, std::uint32_t sub) { return main
 
 // ArduCopter mode.h; PX4 px4_custom_mode.h. Hold is BRAKE for ArduPilot (stops at once) and AUTO/LOITER for
 // PX4.
-constexpr Dialect k_ardupilot{Autopilot::ardupilot, "ArduPilot", 4, 17, 6, 9, false, true, false};
-constexpr Dialect k_px4{Autopilot::px4, "PX4", px4(4, 3), px4(4, 3), px4(4, 5), px4(4, 6), true, false, true};
-constexpr Dialect k_unknown{Autopilot::unknown, "", 0, 0, 0, 0, false, false, false};
+constexpr Dialect k_ardupilot{Autopilot::ardupilot, "ArduPilot", 4, 17, 6, 9, 4, false, true, false};
+constexpr Dialect k_px4{Autopilot::px4, "PX4", px4(4, 3), px4(4, 3), px4(4, 5), px4(4, 6), px4(4, 2),
+                        true,           false, true};
+constexpr Dialect k_unknown{Autopilot::unknown, "", 0, 0, 0, 0, 0, false, false, false};
 
 constexpr std::array<std::pair<std::uint32_t, std::string_view>, 12> k_ardupilot_modes{{{0, "STABILIZE"},
                                                                                         {2, "ALT_HOLD"},
@@ -55,6 +56,16 @@ Autopilot autopilot_of(std::int64_t heartbeat_autopilot) {
   if (heartbeat_autopilot == 3) return Autopilot::ardupilot;
   if (heartbeat_autopilot == 12) return Autopilot::px4;
   return Autopilot::unknown;
+}
+
+ModeKind mode_kind(Autopilot autopilot, std::uint32_t custom_mode) {
+  const auto& d = dialect_of(autopilot);
+  if (autopilot == Autopilot::unknown) return ModeKind::other;
+  if (custom_mode == d.guided) return ModeKind::guided;
+  if (custom_mode == d.hold) return ModeKind::hold;
+  if (custom_mode == d.return_home) return ModeKind::return_home;
+  if (custom_mode == d.land) return ModeKind::land;
+  return ModeKind::other;
 }
 
 ModeParams mode_params(Autopilot autopilot, std::uint32_t custom_mode) {

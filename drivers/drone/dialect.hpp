@@ -4,6 +4,8 @@
 #include <optional>
 #include <string_view>
 
+#include "core/ports/drone.hpp"
+
 namespace anchord::drone {
 
 enum class Autopilot : std::uint8_t { unknown, ardupilot, px4 };
@@ -14,6 +16,7 @@ struct Dialect {
   std::string_view name;
   /// custom_mode of HEARTBEAT for the modes that we command.
   std::uint32_t guided{}, hold{}, return_home{}, land{};
+  std::uint32_t climbing{};   ///< shown while it takes off: PX4's own mode for it
   bool take_off_above_sea{};  ///< param7 of TAKEOFF: above mean sea level (PX4) or above home (ArduPilot)
   bool home_is_item_0{};      ///< of a mission list: a place for home comes first (ArduPilot)
   bool targets_by_command{};  ///< go-to by DO_REPOSITION (PX4 in hold) or by position targets (ArduPilot)
@@ -26,6 +29,7 @@ Autopilot autopilot_of(std::int64_t heartbeat_autopilot);
 struct ModeParams {
   double main{}, sub{};
 };
+ModeKind mode_kind(Autopilot autopilot, std::uint32_t custom_mode);
 ModeParams mode_params(Autopilot autopilot, std::uint32_t custom_mode);
 std::string_view mode_word(Autopilot autopilot, std::uint32_t custom_mode);
 

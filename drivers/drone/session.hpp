@@ -9,6 +9,7 @@
 
 #include "core/ports/drone.hpp"
 #include "drivers/drone/dialect.hpp"
+#include "drivers/drone/telemetry.hpp"
 #include "drivers/mavlink/frame.hpp"
 
 namespace anchord::drone {
@@ -25,17 +26,19 @@ enum class ItemList : std::uint8_t { mission = 0, fence = 1 };
 
 struct SessionOptions {
   mavlink::Address self{255, 190};  ///< 255: what ArduPilot's failsafe listens to by default
-  double confirm_s = 2.0;           ///< no acknowledgement by then: unconfirmed
-  double repeat_s = 1.0;            ///< a command is sent twice within confirm_s, confirmation counted up
-  double arm_s = 60;  ///< arming is tried this long: pre-arm checks take up to 30 s after the fix
+  double confirm_s = 2.0;           ///< neither answered nor seen to be done by then: unconfirmed, given up
+  double repeat_s = 0.5;            ///< within confirm_s, confirmation counted up
+  double climb_s = 15;              ///< a take-off that was accepted shows by then
   double max_jump_m = 200;
   std::optional<mavlink::Secret> secret{};  ///< of MAVLink signing; set on the autopilot over a wire
 };
 
 /// One conversation with one autopilot: bytes and time in, bytes out. No socket, no clock, no thread.
 ///
-/// Never trusts an acknowledgement alone: arming, mode and targets are confirmed by telemetry. A mode change
-/// that we did not command is the pilot's or a failsafe's: from then on no target is sent.
+/// Never trusts an acknowledgement alone: arming, mode and targets are confirmed by telemetry. Whatever was not
+/// confirmed within confirm_s is reported and never sent again by itself. Any mode that was not commanded in a
+/// flight is the pilot's or a failsafe's: what waits is dropped, and no target, take-off or repeat is sent until
+/// take_back().
 class Session final : public Drone {
  public:
   explicit Session(SessionOptions options = {});
@@ -47,15 +50,20 @@ class Session final : public Drone {
   /// The aircraft on the link is another one: the next autopilot that is heard is taken.
   void forget_vehicle();
 
-  std::uint64_t take_off(double height_m) override;
+  void new_flight(double speed_mps) override;
+  void end_flight() override;
+  std::uint64_t take_off(double above_ground_m) override;
   std::uint64_t go_to(double lat_deg, double lon_deg, double height_m,
                       std::optional<double> heading_deg) override;
+  void steer(double lat_deg, double lon_deg, double height_m) override;
   std::uint64_t hold() override;
   std::uint64_t return_home() override;
   std::uint64_t land() override;
+  std::uint64_t disarm() override;
   std::uint64_t upload_route(const std::vector<RoutePoint>& route) override;
   std::uint64_t upload_fence(const DroneFence& fence) override;
-  void take_back() override { status_.taken_over = false; }
+  void ask_parameters(const std::vector<std::string>& names) override;
+  void take_back() override;
   DroneStatus status() const override;
   std::vector<CommandReport> take_reports() override;
 
@@ -66,24 +74,49 @@ class Session final : public Drone {
   const mavlink::Framer::Counters& counters() const { return framer_.counters(); }
 
  private:
+  /// Waits for its answer.
   struct Pending {
     std::uint64_t number{};
-    std::string what;
+    std::string what;  ///< of the report; part_of_another: mode, arm and climb of a take-off or a target
     mavlink::Message message;
     int command{};
+    bool part{false};       ///< of a command that reports itself
+    bool by_mode{false};    ///< the mode shows that it was done
     double first_s{}, last_s{};
-    int sent{1};
+  };
+  /// An answer names its command's kind only: the oldest of that kind that was sent is the one it answers.
+  struct Sent {
+    int command{};
+    std::uint64_t number{};
+    double at_s{};
   };
   struct TakeOff {
     std::uint64_t number{};
-    double height_m{}, begun_s{}, tried_s{-10};
+    double above_ground_m{}, from_m{};
     enum class Stage : std::uint8_t { mode, arm, climb } stage{Stage::mode};
+    double stage_s{};
+    bool told{false}, armed_here{false};
+    std::optional<double> refused_s{};
+    std::string refusal;
   };
   struct Target {
     std::uint64_t number{};
     mavlink::Message message;
     double lat_deg{}, lon_deg{}, height_m{}, begun_s{}, sent_s{}, from_m{};
-    bool confirmed{false};
+    bool confirmed{false}, given_up{false};
+  };
+  /// Of one flight, and gone with it.
+  struct Flight {
+    double speed_mps{};
+    bool taken_over{false};
+    std::optional<std::uint32_t> wanted{};  ///< the mode that was commanded last
+    bool reached{false};
+    std::optional<std::uint32_t> former{};        ///< shown when it was commanded
+    std::optional<double> acked_s{};              ///< the command for it was accepted
+    std::map<std::uint32_t, double> passing;      ///< modes commanded before, and until when they may show
+    bool speed_due{false};
+    std::optional<TakeOff> take_off;
+    std::optional<Target> target;
   };
   struct Transfer {
     std::uint64_t number{};
@@ -101,18 +134,32 @@ class Session final : public Drone {
   void on_heartbeat(const mavlink::Received& in);
   void on_ack(const mavlink::Message& m);
   void on_transfer(const mavlink::Message& m);
-  void ask_rates();
+  void on_answer(Pending& done, std::int64_t result);
   void send(const mavlink::Message& message);
-  void command(std::uint64_t number, const std::string& what, int command_number,
-               std::initializer_list<double> params);
+  void send_command(const mavlink::Message& message, int command, std::uint64_t number);
+  mavlink::Message command_long(int command, std::initializer_list<double> params) const;
+  void command(std::uint64_t number, const std::string& what, int command,
+               std::initializer_list<double> params, bool part = false, bool by_mode = false);
   std::uint64_t mode(const std::string& what, std::uint32_t Dialect::*custom_mode);
+  void command_mode(std::uint64_t number, const std::string& what, std::uint32_t custom_mode, bool part);
+  void want(std::uint32_t custom_mode);
+  bool belongs(std::uint32_t shown, std::uint32_t wanted) const;
+  void judge_mode();
+  void take_over();
   bool deaf(std::uint64_t number, const std::string& what);
   void report(std::uint64_t number, const std::string& what, CommandState state, std::string text);
+  std::string said_since(double since_s) const;
   void drive_take_off();
+  void next_stage(TakeOff& t, TakeOff::Stage stage);
+  void end_take_off(CommandState state, std::string text);
+  void drop_target(const std::string& why);
   void drive_target();
+  void drive_speed();
   void drive_transfer();
   void repeat_commands();
   double distance_m(double lat_deg, double lon_deg, double height_m) const;
+  mavlink::Message target_message(double lat_deg, double lon_deg, double height_m,
+                                  std::optional<double> heading_deg) const;
   mavlink::Message addressed(std::string_view name) const;
   void send_item(std::size_t index);
   std::uint64_t upload_checked(ItemList list, std::vector<MissionItem> items);
@@ -122,20 +169,16 @@ class Session final : public Drone {
   mavlink::Framer framer_;
   mavlink::Packer packer_;
   std::vector<std::uint8_t> out_;
-  double now_s_{0}, heartbeat_s_{-10}, rates_s_{-100};
-  std::optional<double> heard_s_, target_told_s_;
+  double now_s_{0}, heartbeat_s_{-10};
+  std::optional<double> heard_s_;
   mavlink::Address vehicle_{0, 0};
   Autopilot autopilot_{Autopilot::unknown};
-  DroneStatus status_;
+  Telemetry telemetry_;
   std::uint32_t custom_mode_{0};
-  std::optional<std::uint32_t> commanded_mode_;
-  std::optional<double> commanded_s_;
-  std::optional<double> home_msl_m_;
-  std::string refusal_;  ///< newest text of the autopilot that says why it refuses
   std::uint64_t number_{0};
   std::deque<Pending> pending_;
-  std::optional<TakeOff> take_off_;
-  std::optional<Target> target_;
+  std::deque<Sent> sent_;
+  std::optional<Flight> flight_;
   std::optional<Transfer> transfer_;
   std::vector<MissionItem> items_;
   std::vector<CommandReport> reports_;

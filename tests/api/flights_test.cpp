@@ -41,7 +41,12 @@ class LoopDrone final : public Drone {
       if (!link_down) autopilot.feed(out);
     }
   }
+  void new_flight(double speed_mps) override { session.new_flight(speed_mps); }
+  void end_flight() override { session.end_flight(); }
   std::uint64_t take_off(double m) override { return session.take_off(m); }
+  void steer(double lat, double lon, double m) override { session.steer(lat, lon, m); }
+  std::uint64_t disarm() override { return session.disarm(); }
+  void ask_parameters(const std::vector<std::string>& names) override { session.ask_parameters(names); }
   std::uint64_t go_to(double lat, double lon, double m, std::optional<double> heading) override {
     targets.push_back({lat, lon, m});
     return session.go_to(lat, lon, m, heading);
@@ -215,7 +220,75 @@ TEST_F(Flights, StartsHoldsResumesAndLands) {
   ASSERT_EQ(act("land", lease).status, 202);
   EXPECT_TRUE(fly_until([&] { return procedure()["status"] == "done"; }, 60));
   EXPECT_FALSE(drone_->autopilot.vehicle().armed());
-  EXPECT_EQ(act("hold", lease).status, 422) << "nothing flies any more";
+  for (const char* always : {"hold", "land", "disarm"})
+    EXPECT_EQ(act(always, lease).status, 202) << always << ": sent, whatever the server believes";
+  EXPECT_EQ(act("return", lease).status, 422) << "nothing flies any more";
+}
+
+TEST_F(Flights, ARefusalToArmIsReportedWithinTwoSecondsInTheAutopilotsWords) {
+  mission_ = mission();
+  const auto plan = make_plan();
+  fly(12);
+  check_everything();
+  drone_->autopilot.refuse_arming("Throttle too high");
+  fly(2);
+  const auto arming = [&] {
+    Json out;
+    const Json list = json(get(base() + "/checklist", {{"plan", plan}}));
+    for (const auto& item : list["items"]) {
+      if (item["id"] == "arming") out = item;
+    }
+    return out;
+  };
+  EXPECT_EQ(arming()["state"], "failed");
+  EXPECT_NE(arming()["detail"].get<std::string>().find("Throttle too high"), std::string::npos) << arming();
+  ASSERT_EQ(post(base() + "/checklist/arming", R"({"reason":"let it say so"})").status, 200);
+  const std::string lease = control()["lease"];
+  const auto started = act("start", lease, R"(,"plan":")" + plan + '"');
+  ASSERT_EQ(started.status, 202) << started.body;
+  fly(2);
+  EXPECT_EQ(command_state(json(started)["number"]), "refused");
+  EXPECT_EQ(procedure()["status"], "done");
+  EXPECT_NE(procedure()["reason"].get<std::string>().find("Throttle too high"), std::string::npos);
+  drone_->autopilot.refuse_arming("");
+  fly(15);
+  EXPECT_FALSE(drone_->autopilot.vehicle().armed());
+}
+
+TEST_F(Flights, NothingOnTheChecklistIsGreenOnStaleTelemetry) {
+  mission_ = mission();
+  const auto plan = make_plan();
+  fly(12);
+  const auto state = [&](const std::string& id) {
+    std::string out = "absent";
+    const Json list = json(get(base() + "/checklist", {{"plan", plan}}));
+    for (const auto& item : list["items"]) {
+      if (item["id"] == id) out = item["state"];
+    }
+    return out;
+  };
+  EXPECT_EQ(state("drone"), "ok");
+  EXPECT_EQ(state("parameters"), "ok");
+  drone_->autopilot.options().loss_in = 1;  // the requests for its telemetry are lost
+  ASSERT_TRUE(drone_->autopilot.restart());
+  fly(9);
+  for (const char* id : {"drone", "arming", "battery"}) EXPECT_EQ(state(id), "failed") << id;
+  drone_->autopilot.options().loss_in = 0;
+  EXPECT_TRUE(fly_until([&] { return state("drone") == "ok"; }, 20));
+  drone_->autopilot.set_parameter("FS_GCS_ENABLE", 0);
+  ASSERT_TRUE(drone_->autopilot.restart());
+  EXPECT_TRUE(fly_until([&] { return state("parameters") == "failed"; }, 20));
+}
+
+TEST_F(Flights, ALeaseOnAMissionThatIsNotFlownBlocksNoOther) {
+  mission_ = mission();
+  control();
+  const auto yesterdays = mission_;
+  mission_ = mission();
+  Call other;
+  other.token_id = "another";
+  EXPECT_EQ(call(api::Method::post, base() + "/control", R"({"action":"take"})", other).status, 200);
+  EXPECT_NE(mission_, yesterdays);
 }
 
 TEST_F(Flights, TheFenceGoesUpWithTheChecklistAndBlocksStartUntilItIsKept) {
@@ -243,7 +316,7 @@ TEST_F(Flights, TheFenceGoesUpWithTheChecklistAndBlocksStartUntilItIsKept) {
   EXPECT_EQ(early.status, 422);
   EXPECT_NE(early.body.find("fence"), std::string::npos) << early.body;
   EXPECT_TRUE(fly_until([&] { return state() == "ok"; }, 10));
-  EXPECT_EQ(drone_->autopilot.fence_list().size(), 4u);
+  EXPECT_EQ(drone_->autopilot.fence_list().size(), 8u) << "the fence, and the building as an area to stay out of";
   const Json kept = json(get(base() + "/uploads"));
   ASSERT_EQ(kept["items"].size(), 1u) << kept;
   EXPECT_EQ(kept["items"][0]["what"], "fence");

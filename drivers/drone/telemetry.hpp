@@ -1,0 +1,69 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/ports/drone.hpp"
+#include "drivers/drone/dialect.hpp"
+#include "drivers/mavlink/message.hpp"
+
+namespace anchord::drone {
+
+/// What the autopilot tells of itself, each stream with its age. A stream that is older than 3 s is asked for
+/// again (an autopilot that was restarted sends nothing but its heartbeat), one at a time so that the answers
+/// can be told apart; older than 5 s it is stale. Parameters are asked for one by one.
+class Telemetry {
+ public:
+  Telemetry();
+  void hear(const mavlink::Message& m, Autopilot autopilot, double now_s);
+  /// What to ask for now: COMMAND_LONG 511 or PARAM_REQUEST_READ, not addressed yet.
+  std::optional<mavlink::Message> question(double now_s);
+  void answer(std::int64_t result);  ///< to the newest 511
+  void ask_parameters(const std::vector<std::string>& names);
+
+  void fill(DroneStatus& out, double now_s) const;
+  const DroneStatus& newest() const { return status_; }
+  bool fresh(std::string_view stream, double now_s, double within_s) const;
+  std::optional<double> home_msl_m() const;
+  bool armed() const { return status_.armed; }
+  bool in_air(double now_s) const;
+  /// The newest warning of the autopilot, and when it came.
+  const std::string& warning() const { return warning_; }
+  double warning_s() const { return warning_s_; }
+
+ private:
+  struct Stream {
+    int id{};
+    std::string_view name;
+    double interval_s{};
+    bool watched{false};  ///< flights are judged by it
+    double heard_s{-1e9}, asked_s{-1e9};
+    int asked{0};
+  };
+  struct Parameter {
+    std::optional<double> value{};
+    double asked_s{-1e9};
+    int asked{0};
+  };
+
+  void restarted();
+  void hear_status_text(const mavlink::Message& m, double now_s);
+  void hear_battery(const mavlink::Message& m, double now_s);
+  void hear_parameter(const mavlink::Message& m, Autopilot autopilot);
+
+  DroneStatus status_;
+  std::array<Stream, 7> streams_;
+  std::map<std::string, Parameter> parameters_;
+  std::optional<double> first_s_;
+  double battery_s_{-1e9}, question_s_{-1e9}, warning_s_{-1e9};
+  std::optional<std::size_t> open_;  ///< stream whose question has no answer yet
+  std::int64_t boot_ms_{0}, landed_{0};
+  std::string warning_;
+};
+
+}  // namespace anchord::drone
