@@ -73,6 +73,16 @@ ModeParams mode_params(Autopilot autopilot, std::uint32_t custom_mode) {
   return {static_cast<double>(custom_mode >> 16U & 0xFFU), static_cast<double>(custom_mode >> 24U)};
 }
 
+std::optional<std::uint32_t> mode_of(Autopilot autopilot, std::string_view wanted) {
+  const auto find = [&](const auto& modes) -> std::optional<std::uint32_t> {
+    for (const auto& [mode, word] : modes) {
+      if (word == wanted) return mode;
+    }
+    return std::nullopt;
+  };
+  return autopilot == Autopilot::px4 ? find(k_px4_modes) : find(k_ardupilot_modes);
+}
+
 std::string_view mode_word(Autopilot autopilot, std::uint32_t custom_mode) {
   if (autopilot == Autopilot::px4) {
     for (const auto& [mode, word] : k_px4_modes) {

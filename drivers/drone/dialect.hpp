@@ -31,6 +31,8 @@ struct ModeParams {
 };
 ModeKind mode_kind(Autopilot autopilot, std::uint32_t custom_mode);
 ModeParams mode_params(Autopilot autopilot, std::uint32_t custom_mode);
+/// The mode of that word; none: there is no such mode.
+std::optional<std::uint32_t> mode_of(Autopilot autopilot, std::string_view word);
 std::string_view mode_word(Autopilot autopilot, std::uint32_t custom_mode);
 
 }  // namespace anchord::drone

@@ -10,7 +10,8 @@ namespace {
 
 using mavlink::Message;
 
-constexpr int k_set_mode = 176, k_arm = 400, k_interval = 511;  // MAV_CMD
+// MAV_CMD of the common set.
+constexpr int k_take_off = 22, k_set_mode = 176, k_reposition = 192, k_arm = 400, k_interval = 511;
 constexpr double k_answers_late_s = 4, k_superseded_s = 3, k_lost_s = 10;
 
 std::string result_word(std::int64_t result) {
@@ -175,7 +176,9 @@ void Session::repeat_commands() {
       if (!lost.part) report(lost.number, lost.what, CommandState::unconfirmed, "no answer within 2 s");
       continue;
     }
-    if (now_s_ - p.last_s >= options_.repeat_s) {
+    // What changes the mode waits for a heartbeat: it would show that the pilot has changed it meanwhile.
+    const bool changes_mode = p.command == k_set_mode || p.command == k_reposition || p.command == k_take_off;
+    if (now_s_ - p.last_s >= options_.repeat_s && (!changes_mode || *heard_s_ > p.last_s)) {
       p.last_s = now_s_;
       if (p.message.is("COMMAND_LONG")) p.message.set("confirmation", p.message.integer("confirmation") + 1);
       send_command(p.message, p.command, p.number);

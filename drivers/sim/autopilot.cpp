@@ -72,7 +72,7 @@ std::optional<Eigen::Vector3d> AutopilotSim::aim_m() const {
 void AutopilotSim::send(const Message& m, double delay_s) {
   const auto bytes = packer_.pack(m);
   const bool lost = random_.chance(options_.loss), twice = random_.chance(options_.duplicate);
-  if (lost || silent_ || now_s_ < boot_s_) return;
+  if (lost || silent_ || now_s_ < std::max(boot_s_, silent_until_s_)) return;
   for (int i = 0; i < (twice ? 2 : 1); ++i) out_.push_back({now_s_ + options_.latency_s + delay_s, bytes});
 }
 
@@ -106,14 +106,14 @@ void AutopilotSim::hear(std::span<const std::uint8_t> bytes) {
   framer_.feed(bytes, in);
   for (const auto& one : in) {
     const bool lost = random_.chance(options_.loss_in);
-    if (!lost && !silent_ && now_s_ >= boot_s_) handle(one.message, one.from);
+    if (!lost && !silent_ && now_s_ >= std::max(boot_s_, silent_until_s_)) handle(one.message, one.from);
   }
 }
 
 void AutopilotSim::set_mode(std::uint32_t custom_mode) {
   const auto& d = drone::dialect_of(options_.dialect);
   if (custom_mode == custom_mode_) return;  // as Copter::set_mode: nothing begins anew
-  if (custom_mode_ == shown_mode_) mode_s_ = now_s_;
+  mode_s_ = now_s_;
   custom_mode_ = custom_mode;
   returning_ = false;
   heading_.reset();

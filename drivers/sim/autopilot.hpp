@@ -63,6 +63,7 @@ class AutopilotSim {
   bool restart();                             ///< battery swap: on the ground only
   void refuse_arming(const std::string& why);  ///< empty: no longer
   void set_silent(bool silent) { silent_ = silent; }
+  void be_silent(double seconds) { silent_until_s_ = now_s_ + seconds; }
   void set_battery_warning(int charge_state) { charge_state_ = charge_state; }
   void set_parameter(const std::string& name, double value) { parameters_[name].value = value; }
   AutopilotOptions& options() { return options_; }
@@ -121,7 +122,7 @@ class AutopilotSim {
   std::map<int, double> intervals_, next_s_;
   std::optional<double> station_s_, armed_s_;
   std::uint32_t custom_mode_{0}, shown_mode_{0};
-  double mode_s_{0}, prearm_told_s_{-100};
+  double silent_until_s_{0}, mode_s_{0}, prearm_told_s_{-100};
   bool failsafe_{false}, silent_{false}, ready_told_{false}, returning_{false};
   std::string refusal_;
   int charge_state_{0};

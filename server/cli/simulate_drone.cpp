@@ -1,8 +1,13 @@
+#include <poll.h>
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <array>
 #include <atomic>
 #include <boost/asio/io_context.hpp>
 #include <chrono>
 #include <cstdio>
+#include <fstream>
 #include <memory>
 #include <mutex>
 #include <thread>
@@ -11,7 +16,7 @@
 #include "core/base/guard.hpp"
 #include "core/base/text.hpp"
 #include "drivers/link/byte_link.hpp"
-#include "drivers/sim/autopilot.hpp"
+#include "drivers/sim/autopilot_script.hpp"
 #include "server/cli/progress.hpp"
 #include "server/cli/rest_client.hpp"
 #include "server/cli/simulate_drone.hpp"
@@ -24,7 +29,7 @@ namespace {
 using SteadyClock = std::chrono::steady_clock;
 
 struct Options {
-  std::string mavlink{"udp://127.0.0.1:14550"}, url{"http://127.0.0.1:8420"}, token_file, mission;
+  std::string mavlink{"udp://127.0.0.1:14550"}, url{"http://127.0.0.1:8420"}, token_file, mission, scenario;
   std::uint64_t seed{1};
   double ready_s{5}, wind_mps{0}, battery_s{1200};
   bool px4{false}, walls{false};
@@ -66,6 +71,7 @@ class World {
 
   /// Flies on to the present; what was measured meanwhile goes to the server.
   void round(link::ByteLink& bytes) {
+    happen();
     const double now_s = std::chrono::duration<double>(SteadyClock::now() - start_).count();
     while (kit_.now_s() + flight::SimKit::k_step_s <= now_s) {
       const Eigen::Vector3d before = autopilot_.vehicle().position_m();
@@ -83,6 +89,30 @@ class World {
     }
     const auto out = autopilot_.take_bytes();
     if (!out.empty()) (void)bytes.write({reinterpret_cast<const char*>(out.data()), out.size()}).has_value();
+  }
+  Result<void> read_scenario() {
+    if (options_.scenario.empty()) return boost::outcome_v2::success();
+    std::ifstream in(options_.scenario);
+    if (!in) return make_error(Errc::not_found, options_.scenario + ": cannot be read");
+    BOOST_OUTCOME_TRY(script_, sim::AutopilotScript::read(in));
+    return boost::outcome_v2::success();
+  }
+  /// What the scenario and whoever sits before it let happen.
+  void happen() {
+    for (const auto& words : script_.due(autopilot_))
+      std::fprintf(stderr, "anchord simulate drone: %s\n", words.c_str());
+    pollfd typed{STDIN_FILENO, POLLIN, 0};
+    // In the background a terminal is somebody else's: reading it would stop us.
+    const bool ours = ::isatty(STDIN_FILENO) == 0 || ::tcgetpgrp(STDIN_FILENO) == ::getpgrp();
+    while (reads_ && ours && ::poll(&typed, 1, 0) > 0) {
+      std::array<char, 200> bytes{};
+      const auto n = ::read(STDIN_FILENO, bytes.data(), bytes.size());
+      reads_ = n > 0;
+      if (n > 0) typed_.append(bytes.data(), static_cast<std::size_t>(n));
+    }
+    for (std::size_t end = 0; (end = typed_.find('\n')) != std::string::npos; typed_.erase(0, end + 1)) {
+      if (end > 0) (void)told(sim::happen(autopilot_, std::string_view(typed_).substr(0, end)));
+    }
   }
   void hear(std::string_view in) {
     autopilot_.feed({reinterpret_cast<const std::uint8_t*>(in.data()), in.size()});
@@ -126,6 +156,9 @@ class World {
   sim::AutopilotSim autopilot_;
   flight::SimKit kit_;
   SteadyClock::time_point start_;
+  sim::AutopilotScript script_;
+  std::string typed_;
+  bool reads_{true};
   MissionId mission_id_{};
   std::mutex mutex_;
   std::string mission_, fixes_, ranges_;
@@ -139,6 +172,7 @@ int simulate_drone(const Options& options) {
   auto client = RestClient::make(options.url, token.value(), interrupted);
   if (!told(client)) return 2;
   World world(options, *client.value());
+  if (!told(world.read_scenario())) return 2;
   if (!told(world.find_mission())) return 1;
   boost::asio::io_context io;
   const auto bytes = link::make_link(io, address.value());
@@ -185,6 +219,9 @@ void add_simulate_drone(CLI::App& simulate, int& exit_code) {
   command->add_option("--ready", o->ready_s, "seconds until the pre-arm checks pass")->capture_default_str();
   command->add_option("--wind", o->wind_mps, "from the west, m/s")->capture_default_str();
   command->add_option("--battery", o->battery_s, "seconds of flight on it")->capture_default_str();
+  command->add_option("--scenario", o->scenario,
+                      "file of lines \"seconds what happens\", like \"30 pilot LOITER\"; the same without the "
+                      "seconds on standard input (drivers/sim/autopilot.md)");
   command->add_flag("--px4", o->px4, "speaks as PX4; default ArduPilot");
   command->add_flag("--walls", o->walls, "brick fronts instead of glass");
   command->callback([o, &exit_code] { exit_code = simulate_drone(*o); });

@@ -206,6 +206,9 @@ class History {
   void inside() {
     const auto aim = rig_.autopilot.aim_m();
     const auto step = rig_.step_now();
+    if (aim && (!aim_m_ || (*aim - *aim_m_).norm() > 0.5)) aim_m_ = aim, aim_s_ = rig_.now;
+    // What it aims at by itself for a moment, when its mode changes, is nobody's target.
+    if (rig_.now - aim_s_ < 2) return;
     if (!aim || !rig_.flying() || rig_.control->taken_over() || step == Step::take_off || step == Step::hold ||
         rig_.autopilot.custom_mode() != dialect().guided || pilot_s_ || rig_.link_down)
       return;
@@ -222,7 +225,8 @@ class History {
   /// Somebody looks after it in the end: the history ends on the ground, or in the pilot's hands.
   void end() {
     rig_.rtk_lost = false;
-    for (int i = 0; i < 6 && broken_.empty() && rig_.autopilot.vehicle().in_air(); ++i) {
+    const auto over = [&] { return !rig_.autopilot.vehicle().in_air() && !rig_.flying(); };
+    for (int i = 0; i < 6 && broken_.empty() && !over(); ++i) {
       rig_.link_down = false;
       advance(rig_.now + 8);
       if (rig_.flying() && rig_.control->taken_over()) {  // the pilot lands it
@@ -231,8 +235,7 @@ class History {
       } else {
         order(rig_.flying() && i == 0 ? "return" : "land");
       }
-      for (const double until_s = rig_.now + 120; rig_.now < until_s && broken_.empty() &&
-                                                  rig_.autopilot.vehicle().in_air();)
+      for (const double until_s = rig_.now + 120; rig_.now < until_s && broken_.empty() && !over();)
         advance(rig_.now + 1);
     }
     if (broken_.empty() && rig_.autopilot.vehicle().in_air()) fail("it is still in the air");
@@ -249,6 +252,8 @@ class History {
   double link_s_{0}, ordered_s_{0};
   bool refuses_{false}, had_leg_{false};
   std::optional<double> pilot_s_, known_s_, ended_s_;
+  std::optional<Eigen::Vector3d> aim_m_;
+  double aim_s_{0};
   std::uint32_t pilot_mode_{0};
   std::size_t seen_wire_{0};
   Step last_step_{};
