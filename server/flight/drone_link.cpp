@@ -16,6 +16,7 @@ namespace {
 namespace asio = boost::asio;
 constexpr auto k_round = std::chrono::milliseconds(50);
 constexpr int k_rounds_to_reopen = 20;
+constexpr std::int64_t k_write_ms = 1'500;
 
 double seconds(const link::Arrival& at) { return static_cast<double>(at.steady_ns) * 1e-9; }
 
@@ -62,7 +63,10 @@ struct DroneLink::Impl {
   }
 
   void open() {
-    bytes = link::make_link(io, address);
+    // A stream that does not take what is sent is closed: what waited in it must not come out minutes later.
+    link::LinkOptions options;
+    options.write_deadline_ms = k_write_ms;
+    bytes = link::make_link(io, address, options);
     link::LinkHandlers handlers;
     handlers.welcome = [this](std::string_view in, const std::string& sender, const link::Arrival& at) {
       bool welcome = false;
@@ -159,8 +163,24 @@ DroneLink::~DroneLink() {
   impl_->thread.join();
 }
 
-std::uint64_t DroneLink::take_off(double height_m) {
-  return impl_->command([&](drone::Session& s) { return s.take_off(height_m); });
+void DroneLink::new_flight(double speed_mps) {
+  impl_->command([&](drone::Session& s) { return s.new_flight(speed_mps), 0U; });
+}
+void DroneLink::end_flight() {
+  impl_->command([](drone::Session& s) { return s.end_flight(), 0U; });
+}
+std::uint64_t DroneLink::take_off(double above_ground_m) {
+  return impl_->command([&](drone::Session& s) { return s.take_off(above_ground_m); });
+}
+void DroneLink::steer(double lat_deg, double lon_deg, double height_m) {
+  impl_->command([&](drone::Session& s) { return s.steer(lat_deg, lon_deg, height_m), 0U; });
+}
+std::uint64_t DroneLink::disarm() {
+  return impl_->command([](drone::Session& s) { return s.disarm(); });
+}
+void DroneLink::ask_parameters(const std::vector<std::string>& names) {
+  const std::scoped_lock lock(impl_->mutex);
+  impl_->session.ask_parameters(names);
 }
 std::uint64_t DroneLink::go_to(double lat_deg, double lon_deg, double height_m,
                                std::optional<double> heading_deg) {

@@ -23,14 +23,19 @@ class DroneLink final : public Drone {
                                                  const std::optional<mavlink::Secret>& key = {});
   ~DroneLink() override;
 
-  std::uint64_t take_off(double height_m) override;
+  void new_flight(double speed_mps) override;
+  void end_flight() override;
+  std::uint64_t take_off(double above_ground_m) override;
   std::uint64_t go_to(double lat_deg, double lon_deg, double height_m,
                       std::optional<double> heading_deg) override;
+  void steer(double lat_deg, double lon_deg, double height_m) override;
   std::uint64_t hold() override;
   std::uint64_t return_home() override;
   std::uint64_t land() override;
+  std::uint64_t disarm() override;
   std::uint64_t upload_route(const std::vector<RoutePoint>& route) override;
   std::uint64_t upload_fence(const DroneFence& fence) override;
+  void ask_parameters(const std::vector<std::string>& names) override;
   void take_back() override;
   void change_peer(const std::string& sender) override;
   DroneStatus status() const override;

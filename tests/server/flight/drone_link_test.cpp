@@ -121,6 +121,7 @@ void fly(const std::string& address, Aircraft& aircraft) {
   };
   accepted(link.upload_fence({{{3.712, 51.022}, {3.715, 51.022}, {3.715, 51.025}, {3.712, 51.025}}, {}}));
   EXPECT_EQ(aircraft.n_fence(), 4u);
+  link.new_flight(2);
   accepted(link.take_off(3));
   ASSERT_TRUE(until([&] { return link.status().relative_m.value_or(0) > 2.7; }, 30));
   const auto home = *link.status().home;
