@@ -113,9 +113,12 @@ expect "an ordinary user in a checkout of root's" 1 '^dev: /home/a pilot/anchord
 in_root chown -R pilot: "/home/a pilot"
 attempt in_root "${as_pilot[@]}" ./dev setup
 expect "an ordinary user without sudo" 1 'dev: not root and no sudo: run as root: apt-get install -y --no-install-recommends .*g\+\+'
+# A machine that was never online: apt has no lists, and gets none.
 if unshare --net true 2>/dev/null; then
+  mv "$new/var/lib/apt/lists" "$new/var/lib/apt/lists.aside"
   attempt unshare --net env -i PATH="$path" chroot "$new" /bin/bash -c 'cd "$1" && ./dev setup' bash "$checkout"
   expect "no network" 1 $'\ndev: .*is there a network'
+  rm -rf "$new/var/lib/apt/lists" && mv "$new/var/lib/apt/lists.aside" "$new/var/lib/apt/lists"
 fi
 seconds_of "what it says to an ordinary user, and without a network"
 
@@ -131,7 +134,8 @@ if [[ -x ${ANCHORD_BINARY:-} ]]; then
   expect "the executable with @runtime alone" 0 'anchord'
   in_root bash -c 'echo $$ >/tmp/pid; exec anchord serve --listen 127.0.0.1:0 --auth off --data-dir /tmp/data' >"$store/serve.log" 2>&1 &
   server=$!
-  until [[ -s $new/tmp/data/address ]] || ! kill -0 "$server" 2>/dev/null || ((SECONDS - begin > 60)); do sleep 0.2; done
+  deadline=$((SECONDS + 60))
+  until [[ -s $new/tmp/data/address ]] || ! kill -0 "$server" 2>/dev/null || ((SECONDS > deadline)); do sleep 0.2; done
   address=$(cat "$new/tmp/data/address" 2>/dev/null) || address=127.0.0.1:1
   address=${address#http://}
   # ask PATH JSON: the answer of the server in the root, whose loopback is ours.
