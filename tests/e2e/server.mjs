@@ -115,7 +115,7 @@ export class Server {
 
   /** SIGKILL, as a crash. */
   async kill() {
-    return this.#end('SIGKILL', 5_000);
+    return this.#end('SIGKILL', 60_000);  // of a machine that does much else
   }
 
   async restart() {

@@ -13,6 +13,7 @@ import { Deleter, Gateway, Installer, Promoter, Publisher } from './work.mjs';
 
 const k_args = ['--rate-per-s', '100000', '--rate-burst', '100000', '--backup-schedule', 'off'];
 const k_rest_every = 25;       // kills between two rests, in which missions begin anew and calibrations are made
+const k_start_ms = 90_000;     // a hang is found all the same; a busy machine is none
 const k_other_every = 10;      // kills between two of a migration, and of a first start
 
 /** Rows of a query on the live database, as objects; a reader of its own that never writes. */
@@ -62,7 +63,7 @@ class Torture {
   /** Ready, and whole. */
   async restarted(server, disk) {
     const began = performance.now();
-    await server.start();
+    await server.start(k_start_ms);
     this.restarts.push(performance.now() - began);
     const sql = query(join(disk.data, 'anchord.db'));
     assert.deepEqual(sql('PRAGMA integrity_check'), [{ integrity_check: 'ok' }]);
@@ -80,7 +81,7 @@ class Torture {
     this.work = work;
     let server = this.begin(disk, cut);
     this.server = server;
-    await server.start();
+    await server.start(k_start_ms);
     for (const one of work) await one.prepare(server);
     for (let n = 1; n <= times; n++) {
       let running = true, fault = null;
@@ -165,7 +166,7 @@ class Torture {
 
   /** Everything below the folder, for who looks for the cause. */
   keep(to) {
-    rmSync(to, { recursive: true, force: true });
+    rmSync(to, { recursive: true, force: true, maxRetries: 3 });
     cpSync(this.folder, to, { recursive: true });
   }
 
@@ -209,5 +210,5 @@ if (process.argv[1] === fileURLToPath(import.meta.url)) {
     console.error('torture [KILLS [CUTS]]: numbers');
     process.exit(2);
   }
-  process.exit((await torture({ kills, cuts, seed, keepIn: join(root, 'build/torture-failure') })) ? 0 : 1);
+  process.exit((await torture({ kills, cuts, seed, keepIn: join(root, `build/torture-failure-${seed}`) })) ? 0 : 1);
 }

@@ -26,6 +26,17 @@ const must = (answer, status, what) => {
 // Of a server that ends or whose queue is full: to be sent again.
 const later = (answer) => answer === null || answer.status === 503 || answer.status === 429;
 
+/** Id of what a job made, once it has ended. */
+async function result(server, job) {
+  const done = await eventually(`job ${job} ends`, async () => {
+    const now = must(await ask(server, `/api/v1/jobs/${job}`), 200, 'GET job');
+    return ['succeeded', 'failed', 'canceled'].includes(now.state) && now;
+  }, 600_000, 200);
+  const link = done.links.find((one) => one.rel === 'result');
+  assert.ok(link, `job ${job}: ${JSON.stringify(done).slice(0, 400)}`);
+  return link.href.split('/').at(-1);
+}
+
 export async function newMission(server, name) {
   return must(await ask(server, '/api/v1/missions?devices=false', { json: { name, frame: 'wgs84', track_point: 'gnss_antenna', tags: [] } }), 201, 'POST missions').id;
 }
@@ -145,8 +156,9 @@ export class Publisher {
     }
     while (this.ready.length < want) {
       const solved = await ask(server, '/api/v1/calibrations', { json: { missions: [this.mission] }, headers: { prefer: 'wait=60' } });
-      const { id, anchors } = must(solved, [200, 201], 'POST calibrations');
-      this.ready.push({ id, anchors: anchors.length });
+      const made = must(solved, [200, 201, 202], 'POST calibrations');
+      // 202: a busy machine needs longer; the job says where the calibration is.
+      this.ready.push({ id: solved.status === 202 ? await result(server, made.id) : made.id });
     }
   }
   async step(server) {
@@ -193,7 +205,9 @@ export class Promoter {
     this.models = [];
     for (const seed of [1, 2]) {
       const run = await ask(server, '/api/v1/training-runs', { headers: { prefer: 'wait=120' }, json: { task: 'nlos_id', dataset: 'torture', methods: ['logistic'], cv: { folds: 3, seed } } });
-      this.models.push(must(run, 201, 'POST training-runs').model.split('/').at(-1));
+      const made = must(run, [201, 202], 'POST training-runs');
+      const done = run.status === 201 ? made : must(await ask(server, `/api/v1/training-runs/${await result(server, made.id)}`), 200, 'GET training-run');
+      this.models.push(done.model.split('/').at(-1));
     }
   }
   async step(server) {
