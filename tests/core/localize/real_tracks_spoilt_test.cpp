@@ -80,7 +80,7 @@ INSTANTIATE_TEST_SUITE_P(OfEachSet, RealTracks,
                          ::testing::Values(RealFlight{"outdoor-rtk", "los_A_case1"},
                                            RealFlight{"rcv-drone", "seq3"},
                                            RealFlight{"viral-drone", "nya_01"}),
-                         [](const auto& info) { return std::string(info.param.flight); });
+                         [](const auto& made) { return std::string(made.param.flight); });
 
 }  // namespace
 }  // namespace anchord

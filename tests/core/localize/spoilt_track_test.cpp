@@ -65,7 +65,7 @@ TEST_P(SpoiltTrack, MovesNoAnchorOfTheLiveFlight) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Ways, SpoiltTrack, ::testing::ValuesIn(testing::spoilt_ways()),
-                         [](const auto& info) { return info.param.name; });
+                         [](const auto& made) { return made.param.name; });
 
 TEST(SpoiltTrackSolve, RefusesToAcceptWhenAPartOfTheTrackIsOffAsAWhole) {
   auto flight = make_flight(globe());
