@@ -122,8 +122,8 @@ const std::vector<std::string_view>& flight_actions() {
   return k_actions;
 }
 
-/// What an aircraft in the air is told must not wait behind what begins and ends flights, which reads the disk
-/// and checks plans. A body that cannot be read is refused by either executor.
+/// What an aircraft in the air is told must not wait behind what begins and ends flights, which reads the
+/// disk and checks plans. A body that cannot be read is refused by either executor.
 Work work_of_action(const Request& request) {
   const auto body = nlohmann::json::parse(request.body, nullptr, false);
   const auto action = body.is_object() ? body.value("action", nlohmann::json()) : nlohmann::json();
@@ -238,9 +238,11 @@ void add_flight_routes(Router& router, Services& s) {
   router.add(keeps_always(as_command({Method::post, base + "control", op, on(control), k_command_bytes})));
   router.add({Method::get, base + "uploads", readers(), on(uploads)});
   router.add(keeps_always(as_flight({Method::post, base + "uploads", op, on(upload), k_command_bytes})));
-  router.add(keeps_always(as_flight({Method::post, base + "aircraft", op, on(change_aircraft), k_command_bytes})));
+  router.add(
+      keeps_always(as_flight({Method::post, base + "aircraft", op, on(change_aircraft), k_command_bytes})));
   router.add(as_flight({Method::get, base + "checklist", readers(), on(checklist)}));
-  router.add(keeps_always(as_flight({Method::post, base + "checklist/{item}", op, on(override_item), k_command_bytes})));
+  router.add(keeps_always(
+      as_flight({Method::post, base + "checklist/{item}", op, on(override_item), k_command_bytes})));
   router.add({Method::get, base + "procedure", readers(),
               [&s](const Request& request) { return shown(s, request, &FlightService::procedure_text); }});
   router.add({Method::get, base + "grid", readers(),

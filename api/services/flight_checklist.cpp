@@ -15,8 +15,9 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 4> k_by_a_pe
      {"airspace", "The airspace is clear and allowed"},
      {"people", "Nobody stands below the way"},
      {"pilot", "A pilot is ready with the remote control"}}};
-constexpr std::array<std::string_view, 11> k_by_itself{"drone", "arming", "parameters", "battery",   "rtk",  "corrections",
-                                                       "tag",   "plan",   "disk",       "recording", "fence"};
+constexpr std::array<std::string_view, 11> k_by_itself{"drone", "arming",      "parameters", "battery",
+                                                       "rtk",   "corrections", "tag",        "plan",
+                                                       "disk",  "recording",   "fence"};
 constexpr double k_fresh_s = 5;  ///< nothing is green on older telemetry
 
 std::string words(const char* format, double value) {
@@ -59,26 +60,26 @@ std::vector<ChecklistItem> make_checklist(const ChecklistFacts& f) {
     if (!d.connected || !stale.empty()) arming.ok = false;
     out.push_back(std::move(arming));
     const auto parameters = check_parameters(d);
-    out.push_back(item("parameters", "The autopilot's failsafes are set", parameters.complete && parameters.wrong.empty(),
-                       true,
+    out.push_back(item("parameters", "The autopilot's failsafes are set",
+                       parameters.complete && parameters.wrong.empty(), true,
                        !parameters.wrong.empty() ? parameters.wrong
-                       : parameters.complete     ? std::to_string(d.parameters.size()) + " read, as they should be"
-                                                 : "being read"));
+                       : parameters.complete
+                           ? std::to_string(d.parameters.size()) + " read, as they should be"
+                           : "being read"));
     // What the flight may use is what is above the reserve; 30 % of it stays as a margin.
     const double need = f.min_battery + 1.3 * (f.plan != nullptr ? f.plan->duration_s : 0) / 1200;
     out.push_back(item("battery", "The battery suffices for the plan and 30 % more",
                        d.battery && d.battery_age_s < k_fresh_s && d.battery_warning == 0 &&
                            *d.battery >= std::min(need, 0.95),
                        true,
-                       d.battery_warning > 0            ? "the autopilot itself warns of it"
+                       d.battery_warning > 0 ? "the autopilot itself warns of it"
                        : d.battery && d.battery_age_s < k_fresh_s
                            ? words("%.0f %% left, ", 100 * *d.battery) + words("%.0f %% wanted", 100 * need)
                            : "unknown"));
   }
-  out.push_back(
-      item("rtk", "RTK is fixed for 10 s", f.fixed_for_s && *f.fixed_for_s >= 10 && *f.fix_age_s < 2, true,
-           f.fixed_for_s ? words("fixed for %.0f s", *f.fixed_for_s)
-                                     : fix_word(f.fix) + ", " + age(f.fix_age_s)));
+  out.push_back(item(
+      "rtk", "RTK is fixed for 10 s", f.fixed_for_s && *f.fixed_for_s >= 10 && *f.fix_age_s < 2, true,
+      f.fixed_for_s ? words("fixed for %.0f s", *f.fixed_for_s) : fix_word(f.fix) + ", " + age(f.fix_age_s)));
   out.push_back(item("corrections", "Corrections are younger than 2 s",
                      f.correction_age_s && *f.correction_age_s < 2, true, age(f.correction_age_s)));
   out.push_back(item("tag", "The tag ranges or is heard", f.range_age_s && *f.range_age_s < 10, true,

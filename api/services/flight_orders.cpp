@@ -281,7 +281,8 @@ void FlightService::State::publish() {
     }
   }
   if (moved && f.control.engine().decision())
-    deps.hub.publish(Topic::mission_grid, to_wire(grid_json(f.mission, t_us, f.control.engine(), f.frame)), t_us, key);
+    deps.hub.publish(Topic::mission_grid, to_wire(grid_json(f.mission, t_us, f.control.engine(), f.frame)),
+                     t_us, key);
   f.shown = n;
 }
 

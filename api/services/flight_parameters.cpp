@@ -20,20 +20,22 @@ bool server(double value) { return value == 255; }
 bool satellites(double value) { return value == 3; }
 
 // ArduCopter Parameters.cpp, AP_BattMonitor, AC_Fence, AP_NavEKF_Source; MAV_GCS_SYSID is the newer name.
-constexpr std::array<Rule, 9> k_ardupilot{{{"FS_GCS_ENABLE", set, "not 0: a failsafe when the link is lost"},
-                                           {"FS_THR_ENABLE", set, "not 0: a failsafe when the remote control is lost"},
-                                           {"BATT_FS_LOW_ACT", set, "not 0: a failsafe of the battery"},
-                                           {"FS_EKF_ACTION", set, "not 0: a failsafe when the position is lost"},
-                                           {"FENCE_ENABLE", set, "1: the fence is kept"},
-                                           {"FENCE_ACTION", set, "not 0: more than a report at the fence"},
-                                           {"EK3_SRC1_POSXY", satellites, "3: the position is GNSS"},
-                                           {"SYSID_MYGCS", server, "255: the server's heartbeats count"},
-                                           {"MAV_GCS_SYSID", server, "255: the server's heartbeats count"}}};
+constexpr std::array<Rule, 9> k_ardupilot{
+    {{"FS_GCS_ENABLE", set, "not 0: a failsafe when the link is lost"},
+     {"FS_THR_ENABLE", set, "not 0: a failsafe when the remote control is lost"},
+     {"BATT_FS_LOW_ACT", set, "not 0: a failsafe of the battery"},
+     {"FS_EKF_ACTION", set, "not 0: a failsafe when the position is lost"},
+     {"FENCE_ENABLE", set, "1: the fence is kept"},
+     {"FENCE_ACTION", set, "not 0: more than a report at the fence"},
+     {"EK3_SRC1_POSXY", satellites, "3: the position is GNSS"},
+     {"SYSID_MYGCS", server, "255: the server's heartbeats count"},
+     {"MAV_GCS_SYSID", server, "255: the server's heartbeats count"}}};
 // PX4: commander_params.c, navigator geofence_params.c.
-constexpr std::array<Rule, 4> k_px4{{{"NAV_DLL_ACT", returns_or_lands, "2 or more: return or land when the link is lost"},
-                                     {"NAV_RCL_ACT", returns_or_lands, "2 or more: return or land when the remote control is lost"},
-                                     {"COM_LOW_BAT_ACT", returns_or_lands, "2 or more: land or return on a low battery"},
-                                     {"GF_ACTION", returns_or_lands, "2 or more: hold or return at the fence"}}};
+constexpr std::array<Rule, 4> k_px4{
+    {{"NAV_DLL_ACT", returns_or_lands, "2 or more: return or land when the link is lost"},
+     {"NAV_RCL_ACT", returns_or_lands, "2 or more: return or land when the remote control is lost"},
+     {"COM_LOW_BAT_ACT", returns_or_lands, "2 or more: land or return on a low battery"},
+     {"GF_ACTION", returns_or_lands, "2 or more: hold or return at the fence"}}};
 
 std::span<const Rule> rules(std::string_view autopilot) {
   if (autopilot == "ArduPilot") return k_ardupilot;
@@ -58,8 +60,8 @@ ParameterCheck check_parameters(const DroneStatus& drone) {
       out.complete = out.complete && std::find(unknown.begin(), unknown.end(), rule.name) != unknown.end();
     } else if (!rule.good(it->second)) {
       std::array<char, 160> text{};
-      std::snprintf(text.data(), text.size(), "%s%s is %g, wanted %s", out.wrong.empty() ? "" : "; ", rule.name,
-                    it->second, rule.wanted);
+      std::snprintf(text.data(), text.size(), "%s%s is %g, wanted %s", out.wrong.empty() ? "" : "; ",
+                    rule.name, it->second, rule.wanted);
       out.wrong += text.data();
     }
   }

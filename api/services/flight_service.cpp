@@ -100,8 +100,9 @@ Result<Lease> FlightService::take_control(const MissionId& mission, const Princi
   const auto now = state_->moment();
   const auto before = state_->lease.holder(now);
   // Who has the aircraft of a mission that is not being flown keeps nobody from today's.
-  const bool idle = before && before->mission != mission &&
-                    !(state_->flight && state_->flight->flying() && state_->flight->mission == before->mission);
+  const bool idle =
+      before && before->mission != mission &&
+      !(state_->flight && state_->flight->flying() && state_->flight->mission == before->mission);
   auto lease = state_->lease.take(mission, who, now, by_force || idle);
   if (lease) {
     state_->deps.events.add(before ? "warning" : "info", "control.taken",
@@ -141,7 +142,8 @@ bool FlightService::flies(const MissionId& mission) {
 std::optional<MissionId> FlightService::flown_with(const PlanId& plan) {
   const std::scoped_lock lock(state_->mutex);
   const auto& flight = state_->flight;
-  return flight && flight->flying() && flight->plan.id == plan ? std::optional(flight->mission) : std::nullopt;
+  return flight && flight->flying() && flight->plan.id == plan ? std::optional(flight->mission)
+                                                               : std::nullopt;
 }
 
 Result<FlightCommand> FlightService::act(const MissionId& mission, const Order& order, const Principal& who) {
@@ -156,8 +158,8 @@ Result<FlightCommand> FlightService::act(const MissionId& mission, const Order& 
   if (plan) ground = state_->groundwork(&*plan);
   const std::scoped_lock lock(state_->mutex);
   BOOST_OUTCOME_TRYV(state_->lease.renew(mission, order.lease, who, state_->moment()));
-  auto given = ground ? state_->begin(record, *ground, order.manual, who)
-                      : state_->obey(mission, order.action, who);
+  auto given =
+      ground ? state_->begin(record, *ground, order.manual, who) : state_->obey(mission, order.action, who);
   state_->changed.notify_all();
   return given;
 }
@@ -186,11 +188,10 @@ Result<DroneStatus> FlightService::change_aircraft(const MissionId& mission, con
     return make_error(Errc::invalid_argument,
                       "the aircraft in the air answers; land it before another one takes the link");
   drone->change_peer(sender);
-  state_->deps.events.add(
-      "warning", "drone.changed",
-      who.name + (sender.empty() ? ": the next autopilot that is heard is the aircraft"
-                                 : ": the autopilot at " + sender + " is the aircraft"),
-      mission);
+  state_->deps.events.add("warning", "drone.changed",
+                          who.name + (sender.empty() ? ": the next autopilot that is heard is the aircraft"
+                                                     : ": the autopilot at " + sender + " is the aircraft"),
+                          mission);
   return drone->status();
 }
 
@@ -253,8 +254,9 @@ std::string FlightService::procedure_text(const MissionId& mission) {
 std::string FlightService::grid_text(const MissionId& mission) {
   const std::scoped_lock lock(state_->mutex);
   const auto* f = state_->flight_of(mission);
-  return f == nullptr ? std::string{}
-                      : to_wire(grid_json(mission, state_->deps.clock.now().us(), f->control.engine(), f->frame));
+  return f == nullptr
+             ? std::string{}
+             : to_wire(grid_json(mission, state_->deps.clock.now().us(), f->control.engine(), f->frame));
 }
 
 std::vector<std::string> FlightService::turn_texts(const MissionId& mission) {

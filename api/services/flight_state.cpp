@@ -125,7 +125,7 @@ void FlightService::State::hear(const MissionId& mission, const RangeResult& res
   if (!flight || flight->mission != mission) return;
   // No estimate yet is no reason: what counts is that the exchange worked.
   flight->control.engine().range(now, result.range.anchor, result.used(), result.range.rss_dbm,
-                       result.range.distance_m);
+                                 result.range.distance_m);
 }
 
 /// The first order that follows from an operator's command decides that command's fate.

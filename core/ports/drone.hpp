@@ -68,9 +68,9 @@ struct DroneStatus {
   /// Values of the parameters that were asked for; those it does not know are absent.
   std::map<std::string, double> parameters;
   std::vector<std::string> parameters_unknown;  ///< asked five times in vain
-  std::string peer;  ///< address and port of the aircraft where the link has senders (UDP)
-  bool link_signed{false};              ///< frames without our key's signature are refused
-  std::uint64_t frames_refused{};       ///< unsigned, badly signed, or signed a second time
+  std::string peer;                ///< address and port of the aircraft where the link has senders (UDP)
+  bool link_signed{false};         ///< frames without our key's signature are refused
+  std::uint64_t frames_refused{};  ///< unsigned, badly signed, or signed a second time
   std::vector<OtherOnLink> others;
 };
 
@@ -92,14 +92,15 @@ struct DroneFence {
 /// What the procedure may ask of an aircraft. Calls return at once with the number of the command; its fate
 /// comes through take_reports(). Heights above home. Before the aircraft was heard every command is refused.
 ///
-/// Targets and take-off belong to a flight: new_flight() begins one with nothing of the one before, end_flight()
-/// ends it, and outside of one neither is sent. Hold, return, land and disarm are always sent.
+/// Targets and take-off belong to a flight: new_flight() begins one with nothing of the one before,
+/// end_flight() ends it, and outside of one neither is sent. Hold, return, land and disarm are always sent.
 class Drone {
  public:
   virtual ~Drone() = default;
   /// `speed_mps`: of the targets that follow.
   virtual void new_flight(double speed_mps) = 0;
-  /// Whatever waits is dropped and reported; what was armed for it and still stands on the ground is disarmed.
+  /// Whatever waits is dropped and reported; what was armed for it and still stands on the ground is
+  /// disarmed.
   virtual void end_flight() = 0;
   virtual std::uint64_t take_off(double above_ground_m) = 0;  ///< from where it stands
   virtual std::uint64_t go_to(double lat_deg, double lon_deg, double height_m,

@@ -24,7 +24,8 @@ FlightControl::FlightControl(FlightSetup setup, EnuFrame frame, Drone* drone)
   if (drone_ != nullptr) drone_->new_flight(setup.limits.speed_mps);
 }
 
-FlightControl::FlightControl(FlightSetup setup, EnuFrame frame, Drone* drone, const State& stored, double now_s)
+FlightControl::FlightControl(FlightSetup setup, EnuFrame frame, Drone* drone, const State& stored,
+                             double now_s)
     : frame_(std::move(frame)),
       drone_(drone),
       home_m_(setup.limits.home_m),
@@ -170,7 +171,8 @@ FlightControl::Aim FlightControl::aim(const Eigen::Vector3d& point_m, const Dron
   const Eigen::Vector3d shift = shift_m_.value_or(Eigen::Vector3d::Zero());
   const Wgs84 to = frame_.wgs84_from_enu(Enu{point_m - shift});
   // Higher or lower by so much than it is by now; home may be anywhere.
-  const double up_m = autopilot_m_ ? point_m.z() - (autopilot_m_->z() + shift.z()) : point_m.z() - home_m_.z();
+  const double up_m =
+      autopilot_m_ ? point_m.z() - (autopilot_m_->z() + shift.z()) : point_m.z() - home_m_.z();
   return {to.lat_deg, to.lon_deg, (autopilot_m_ ? d.relative_m.value_or(0) : 0) + up_m};
 }
 
@@ -223,12 +225,11 @@ std::string FlightControl::command(double now_s, Event event, const std::string&
   const bool meant = engine_.command(now_s, event, who);
   dispatch();
   const bool always = event == Event::hold || event == Event::land;
-  if (!meant && !always)
-    return "nothing to do in step " + std::string(to_string(engine_.state().step));
+  if (!meant && !always) return "nothing to do in step " + std::string(to_string(engine_.state().step));
   if (always && drone_ != nullptr && dispatched_.size() == before) {
     const bool holds = event == Event::hold;
-    dispatched_.push_back({holds ? Command::Kind::hold : Command::Kind::land,
-                           holds ? drone_->hold() : drone_->land(), ""});
+    dispatched_.push_back(
+        {holds ? Command::Kind::hold : Command::Kind::land, holds ? drone_->hold() : drone_->land(), ""});
   }
   return {};
 }

@@ -15,10 +15,10 @@ namespace anchord::procedure {
 
 /// One flight and its aircraft: the engine's orders become commands, telemetry becomes what the engine sees.
 ///
-/// An order is sent in its moment or not at all: while the pilot has the aircraft it is dropped and told. After
-/// a silence or a restart of the server nothing is sent again; what the step wants is decided anew, and only
-/// when the aircraft still is in a mode of ours. Targets are shifted by what the rover says of the autopilot's
-/// position, and corrected once a second.
+/// An order is sent in its moment or not at all: while the pilot has the aircraft it is dropped and told.
+/// After a silence or a restart of the server nothing is sent again; what the step wants is decided anew, and
+/// only when the aircraft still is in a mode of ours. Targets are shifted by what the rover says of the
+/// autopilot's position, and corrected once a second.
 ///
 /// Driven by calls alone: no clock, no thread. Not thread-safe. A new flight is a new object.
 class FlightControl {
@@ -37,8 +37,8 @@ class FlightControl {
 
   void fix(double now_s, const Eigen::Vector3d& enu_m, FixClass fix);
   bool start(double now_s, const std::string& who);
-  /// hold, resume, skip, return_home, land of an operator. Hold and land are always sent. Empty: done; else why
-  /// not.
+  /// hold, resume, skip, return_home, land of an operator. Hold and land are always sent. Empty: done; else
+  /// why not.
   std::string command(double now_s, Event event, const std::string& who);
   /// Hold, and nothing more: the aircraft is the pilot's.
   std::uint64_t abort();

@@ -292,7 +292,8 @@ void FlightEngine::look_out(double now_s) {
   now.cell_v = vehicle_.cell_v;
   now.flying = in_flight(state_.step) && (vehicle_.in_air || state_.step != Step::take_off);
   if (fix_m_ && fix_m_->z() >= setup_.settings.min_height_m) above_floor_ = true;
-  now.floor = above_floor_ && vehicle_.in_air && state_.step != Step::take_off && state_.step != Step::landing;
+  now.floor =
+      above_floor_ && vehicle_.in_air && state_.step != Step::take_off && state_.step != Step::landing;
   SafetyLimits limits = setup_.limits;
   // What disagrees agrees again when it does so clearly.
   if (alarm_ && alarm_->id == "position.disagree") limits.disagree_m *= 2.0 / 3;
@@ -336,8 +337,8 @@ void FlightEngine::look_for_arrival(double now_s) {
   const auto& believed = vehicle_.corrected_m;
   const bool near = (*at - legs_.front()).norm() <= within_m &&
                     (!believed || (*believed - legs_.front()).norm() <= setup_.arrive_believed_m + within_m);
-  const bool turned = !last || !state_.heading_rad || !vehicle_.heading_rad ||
-                      home || apart(*state_.heading_rad, *vehicle_.heading_rad) <= setup_.arrive_rad;
+  const bool turned = !last || !state_.heading_rad || !vehicle_.heading_rad || home ||
+                      apart(*state_.heading_rad, *vehicle_.heading_rad) <= setup_.arrive_rad;
   const bool still = !last || vehicle_.speed_mps <= (home ? setup_.home_arrive_mps : setup_.arrive_mps);
   if (!near || !turned || !still) {
     settled_s_.reset();
@@ -362,7 +363,8 @@ void FlightEngine::work(double now_s, std::span<const Estimate> estimates) {
     case Step::take_off: {
       const auto at = vehicle_.position_m ? vehicle_.position_m : fix_m_;
       const double home_m = setup_.limits.home_m.z();
-      if (vehicle_.in_air && at && at->z() - home_m >= 0.9 * (climb_to_m_ - home_m)) feed(now_s, Event::airborne);
+      if (vehicle_.in_air && at && at->z() - home_m >= 0.9 * (climb_to_m_ - home_m))
+        feed(now_s, Event::airborne);
       return;
     }
     case Step::search_anchors: {

@@ -32,7 +32,7 @@ struct FlightSetup {
   int samples = 20;                 ///< ranges wanted of each anchor at a point
   double min_gain = 0.1;            ///< share of the value; a point that brings less is not flown to
   double arrive_m = 0.5, arrive_rad = 0.25, arrive_mps = 0.4;
-  double arrive_believed_m = 1.5;                  ///< the autopilot must think so as well, roughly
+  double arrive_believed_m = 1.5;                   ///< the autopilot must think so as well, roughly
   double home_arrive_m = 1.5, home_arrive_mps = 1;  ///< landing does not wait for centimetres
 };
 

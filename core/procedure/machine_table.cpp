@@ -70,7 +70,8 @@ constexpr Transition k_table[] = {
     {S::find_next_point, E::point, G::always, S::go_to_point, "better point found"},
     {S::find_next_point, E::done_here, G::waypoint_left, S::go_to_waypoint,
      "enough here, to the next waypoint"},
-    {S::find_next_point, E::done_here, G::always, S::return_home, "nothing more to gain at the last waypoint"},
+    {S::find_next_point, E::done_here, G::always, S::return_home,
+     "nothing more to gain at the last waypoint"},
     {S::find_next_point, E::no_point, G::waypoint_left, S::go_to_waypoint,
      "no better point from here, to the next waypoint"},
     {S::find_next_point, E::no_point, G::always, S::return_home, "no better point and no waypoint left"},
@@ -110,10 +111,10 @@ constexpr std::array k_step_words{
     "ready",   "take_off",      "go_to_waypoint", "search_anchors",  "move_around", "step_to_waypoint",
     "turn",    "height_search", "ranging",        "find_next_point", "go_to_point", "check_connections",
     "go_back", "hold",          "return_home",    "landing",         "done"};
-constexpr std::array k_event_words{"start",        "airborne",    "arrived",   "heard",       "sampled",
-                                   "point",        "no_point",    "done_here", "unreachable", "connected",
-                                   "disconnected", "landed",      "timeout",   "hold",        "resume",
-                                   "skip",         "return_home", "land",      "taken_over",  "not_taken_off"};
+constexpr std::array k_event_words{
+    "start",     "airborne",    "arrived",     "heard",        "sampled",    "point",        "no_point",
+    "done_here", "unreachable", "connected",   "disconnected", "landed",     "timeout",      "hold",
+    "resume",    "skip",        "return_home", "land",         "taken_over", "not_taken_off"};
 constexpr std::array k_guard_words{"always",        "wants_turn",    "wants_height", "legs_left",
                                    "moves_left",    "waypoint_left", "tries_left",   "anything_sampled",
                                    "was_returning", "had_point"};
@@ -142,8 +143,7 @@ std::span<const Transition> transitions() {
         out.push_back({from, E::return_home, G::always, S::return_home, "told to return"});
       out.push_back({from, E::land, G::always, S::landing, "told to land"});
       if (from != S::hold)
-        out.push_back(
-            {from, E::taken_over, G::always, S::hold, "the pilot or a failsafe has the aircraft"});
+        out.push_back({from, E::taken_over, G::always, S::hold, "the pilot or a failsafe has the aircraft"});
       if (from != S::return_home)
         out.push_back({from, E::landed, G::always, S::done, "down and disarmed without being told"});
     }

@@ -107,10 +107,12 @@ std::optional<Alarm> watch(const SafetyLimits& limits, const Situation& now) {
                  text("battery at %.0f %%: landing here", 100 * *now.battery)};
   }
   if (now.battery_warning >= 2) {
-    return Alarm{Reaction::land, false, "drone.battery", "the autopilot says the battery is critical: landing here"};
+    return Alarm{Reaction::land, false, "drone.battery",
+                 "the autopilot says the battery is critical: landing here"};
   }
   if (now.cell_v && *now.cell_v <= limits.critical_cell_v) {
-    return Alarm{Reaction::land, false, "drone.battery", text("battery at %.2f V a cell: landing here", *now.cell_v)};
+    return Alarm{Reaction::land, false, "drone.battery",
+                 text("battery at %.2f V a cell: landing here", *now.cell_v)};
   }
   if (now.battery_warning == 1) {
     return Alarm{Reaction::return_home, false, "drone.battery", "the autopilot says the battery is low"};
@@ -137,11 +139,13 @@ std::optional<Alarm> watch(const SafetyLimits& limits, const Situation& now) {
                  text("autopilot silent for %.0f s", now.autopilot_silent_s)};
   }
   if (now.autopilot_silent_s > limits.link_hold_s) {
-    return Alarm{Reaction::hold, false, "drone.link", text("autopilot silent for %.0f s", now.autopilot_silent_s)};
+    return Alarm{Reaction::hold, false, "drone.link",
+                 text("autopilot silent for %.0f s", now.autopilot_silent_s)};
   }
   if (!now.position_m || now.position_age_s > limits.position_age_s) {
     if (now.position_age_s > limits.rtk_return_s) {
-      return Alarm{Reaction::return_home, false, "rtk.lost", text("no position for %.0f s", now.position_age_s)};
+      return Alarm{Reaction::return_home, false, "rtk.lost",
+                   text("no position for %.0f s", now.position_age_s)};
     }
     return Alarm{Reaction::hold, false, "rtk.lost", text("no position for %.1f s", now.position_age_s)};
   }

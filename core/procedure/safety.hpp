@@ -19,14 +19,14 @@ struct SafetyLimits {
   double max_jump_m = 200;   ///< no target further than this from where the aircraft is
   double tolerance_m = 1.0;  ///< wind and control: a breach is beyond it
   double speed_mps = 2;
-  double battery_per_s = 1.0 / 1200;           ///< share used in flight: 20 minutes a battery
-  double min_battery = 0.3;                    ///< must be left above home
-  double critical_battery = 0.12;              ///< lands where it is
-  double position_age_s = 2;                   ///< older: it is not known where the aircraft is
-  double rtk_hold_s = 2, rtk_return_s = 10;    ///< without at least float
-  double link_hold_s = 3, link_return_s = 15;  ///< autopilot silent
-  double disagree_m = 3;                       ///< autopilot's position against the rover's
-  double floor_tolerance_m = 0.5;              ///< below the band by so much, by the rover: climbs
+  double battery_per_s = 1.0 / 1200;               ///< share used in flight: 20 minutes a battery
+  double min_battery = 0.3;                        ///< must be left above home
+  double critical_battery = 0.12;                  ///< lands where it is
+  double position_age_s = 2;                       ///< older: it is not known where the aircraft is
+  double rtk_hold_s = 2, rtk_return_s = 10;        ///< without at least float
+  double link_hold_s = 3, link_return_s = 15;      ///< autopilot silent
+  double disagree_m = 3;                           ///< autopilot's position against the rover's
+  double floor_tolerance_m = 0.5;                  ///< below the band by so much, by the rover: climbs
   double low_cell_v = 3.5, critical_cell_v = 3.3;  ///< of a lithium cell under load
 };
 
@@ -51,9 +51,9 @@ struct Situation {
   double autopilot_silent_s{};
   std::optional<double> battery{};  ///< share, 0..1
   bool flying{false};
-  bool floor{false};  ///< on its way between take-off and landing: the band's lower end counts
-  int battery_warning{};                  ///< the autopilot's own: 1 low, 2 critical
-  std::optional<double> cell_v{};         ///< of the battery, the mean of its cells
+  bool floor{false};               ///< on its way between take-off and landing: the band's lower end counts
+  int battery_warning{};           ///< the autopilot's own: 1 low, 2 critical
+  std::optional<double> cell_v{};  ///< of the battery, the mean of its cells
   bool wants_rtk{true};
 };
 
@@ -62,8 +62,8 @@ std::string_view to_string(Reaction reaction);
 struct Alarm {
   Reaction reaction{};
   bool climbs{false};  ///< hold, but higher: to the lower end of the band
-  std::string id;    ///< alarm of dashboard.md
-  std::string text;  ///< with the numbers
+  std::string id;      ///< alarm of dashboard.md
+  std::string text;    ///< with the numbers
 };
 
 /// The gravest thing that is wrong, or nothing. Order: battery critical, battery return margin, fence and

@@ -109,7 +109,8 @@ void Session::judge_mode() {
       if (!p.by_mode || p.number == 0) continue;
       Pending done = p;
       done.by_mode = false;
-      std::erase_if(pending_, [&](const Pending& q) { return q.number == done.number && q.command == done.command; });
+      std::erase_if(pending_,
+                    [&](const Pending& q) { return q.number == done.number && q.command == done.command; });
       on_answer(done, 0);
       break;
     }
@@ -124,8 +125,8 @@ void Session::judge_mode() {
 
 void Session::take_over() {
   flight_->taken_over = true;
-  const std::string why = "the pilot or a failsafe has taken over: " +
-                          std::string(mode_word(autopilot_, custom_mode_));
+  const std::string why =
+      "the pilot or a failsafe has taken over: " + std::string(mode_word(autopilot_, custom_mode_));
   for (const auto& p : std::exchange(pending_, {})) {
     if (!p.part) report(p.number, p.what, CommandState::refused, why);
   }

@@ -35,10 +35,10 @@ struct SessionOptions {
 
 /// One conversation with one autopilot: bytes and time in, bytes out. No socket, no clock, no thread.
 ///
-/// Never trusts an acknowledgement alone: arming, mode and targets are confirmed by telemetry. Whatever was not
-/// confirmed within confirm_s is reported and never sent again by itself. Any mode that was not commanded in a
-/// flight is the pilot's or a failsafe's: what waits is dropped, and no target, take-off or repeat is sent until
-/// take_back().
+/// Never trusts an acknowledgement alone: arming, mode and targets are confirmed by telemetry. Whatever was
+/// not confirmed within confirm_s is reported and never sent again by itself. Any mode that was not commanded
+/// in a flight is the pilot's or a failsafe's: what waits is dropped, and no target, take-off or repeat is
+/// sent until take_back().
 class Session final : public Drone {
  public:
   explicit Session(SessionOptions options = {});
@@ -80,8 +80,8 @@ class Session final : public Drone {
     std::string what;  ///< of the report; part_of_another: mode, arm and climb of a take-off or a target
     mavlink::Message message;
     int command{};
-    bool part{false};       ///< of a command that reports itself
-    bool by_mode{false};    ///< the mode shows that it was done
+    bool part{false};     ///< of a command that reports itself
+    bool by_mode{false};  ///< the mode shows that it was done
     double first_s{}, last_s{};
   };
   /// An answer names its command's kind only: the oldest of that kind that was sent is the one it answers.
@@ -111,9 +111,9 @@ class Session final : public Drone {
     bool taken_over{false};
     std::optional<std::uint32_t> wanted{};  ///< the mode that was commanded last
     bool reached{false};
-    std::optional<std::uint32_t> former{};        ///< shown when it was commanded
-    std::optional<double> acked_s{};              ///< the command for it was accepted
-    std::map<std::uint32_t, double> passing;      ///< modes commanded before, and until when they may show
+    std::optional<std::uint32_t> former{};    ///< shown when it was commanded
+    std::optional<double> acked_s{};          ///< the command for it was accepted
+    std::map<std::uint32_t, double> passing;  ///< modes commanded before, and until when they may show
     bool speed_due{false};
     std::optional<TakeOff> take_off;
     std::optional<Target> target;

@@ -80,7 +80,8 @@ void Session::want(std::uint32_t custom_mode) {
   f.acked_s.reset();
 }
 
-void Session::command_mode(std::uint64_t number, const std::string& what, std::uint32_t custom_mode, bool part) {
+void Session::command_mode(std::uint64_t number, const std::string& what, std::uint32_t custom_mode,
+                           bool part) {
   const bool shown = belongs(custom_mode_, custom_mode);
   want(custom_mode);
   const auto params = mode_params(autopilot_, custom_mode);
@@ -126,9 +127,8 @@ void Session::on_ack(const Message& m) {
       std::find_if(sent_.begin(), sent_.end(), [&](const Sent& s) { return s.command == command; });
   if (sent == sent_.end()) return;
   const auto number = sent->number;
-  const auto it = std::find_if(pending_.begin(), pending_.end(), [&](const Pending& p) {
-    return p.command == command && p.number == number;
-  });
+  const auto it = std::find_if(pending_.begin(), pending_.end(),
+                               [&](const Pending& p) { return p.command == command && p.number == number; });
   if (result == 5) {  // in progress: more follow
     if (it != pending_.end()) it->first_s = it->last_s = now_s_;
     return;
@@ -158,7 +158,8 @@ void Session::on_answer(Pending& done, std::int64_t result) {
   if (done.part) return;  // telemetry decides
   if (result == 0) return report(done.number, done.what, CommandState::accepted, "");
   const auto said = said_since(done.first_s);
-  report(done.number, done.what, CommandState::refused, result_word(result) + (said.empty() ? "" : ": " + said));
+  report(done.number, done.what, CommandState::refused,
+         result_word(result) + (said.empty() ? "" : ": " + said));
 }
 
 void Session::repeat_commands() {

@@ -15,8 +15,8 @@ using mavlink::Message;
 constexpr int k_take_off = 22, k_speed = 178, k_reposition = 192, k_arm = 400;
 constexpr double k_degree = std::numbers::pi / 180,
                  k_metres_per_degree = 111'195;  // mean earth radius 6371 km
-constexpr double k_reason_s = 0.8;    ///< the autopilot's words may come behind its refusal
-constexpr double k_risen_m = 0.5;     ///< in the air
+constexpr double k_reason_s = 0.8;               ///< the autopilot's words may come behind its refusal
+constexpr double k_risen_m = 0.5;                ///< in the air
 constexpr double k_target_again_s = 0.4;
 
 }  // namespace
@@ -49,7 +49,8 @@ std::uint64_t Session::take_off(double above_ground_m) {
     return refuse("the height must be above 0 and at most 120 m");
   if (!flight_) return refuse("nothing is being flown");
   if (flight_->taken_over) return refuse("the pilot or a failsafe has taken over");
-  if (!telemetry_.fresh("GLOBAL_POSITION_INT", now_s_, 3)) return refuse("the autopilot does not tell where it is");
+  if (!telemetry_.fresh("GLOBAL_POSITION_INT", now_s_, 3))
+    return refuse("the autopilot does not tell where it is");
   end_take_off(CommandState::refused, "followed by another take-off");
   TakeOff t;
   t.number = number;
@@ -162,7 +163,8 @@ std::uint64_t Session::go_to(double lat_deg, double lon_deg, double height_m,
   }
   if (!flight_) return refuse("nothing is being flown");
   if (flight_->taken_over)
-    return refuse("the pilot or a failsafe has taken over: " + std::string(mode_word(autopilot_, custom_mode_)));
+    return refuse("the pilot or a failsafe has taken over: " +
+                  std::string(mode_word(autopilot_, custom_mode_)));
   if (!telemetry_.fresh("GLOBAL_POSITION_INT", now_s_, 5))
     return refuse("the autopilot has not told where it is");
   if (!telemetry_.armed()) return refuse("the aircraft is disarmed");
@@ -185,8 +187,9 @@ std::uint64_t Session::go_to(double lat_deg, double lon_deg, double height_m,
     // silence.
     command_mode(number, "mode", d.guided, true);
   }
-  flight_->target = Target{number, std::move(m), lat_deg, lon_deg, height_m, now_s_, now_s_,
-                           distance_m(lat_deg, lon_deg, height_m), false, false};
+  flight_->target = Target{number,   std::move(m), lat_deg, lon_deg,
+                           height_m, now_s_,       now_s_,  distance_m(lat_deg, lon_deg, height_m),
+                           false,    false};
   if (!d.targets_by_command) send(flight_->target->message);
   return number;
 }

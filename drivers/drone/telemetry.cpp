@@ -26,7 +26,8 @@ Telemetry::Telemetry()
                 {147, "BATTERY_STATUS", 1, false}}} {}
 
 bool Telemetry::fresh(std::string_view stream, double now_s, double within_s) const {
-  const auto it = std::find_if(streams_.begin(), streams_.end(), [&](const Stream& s) { return s.name == stream; });
+  const auto it =
+      std::find_if(streams_.begin(), streams_.end(), [&](const Stream& s) { return s.name == stream; });
   return it != streams_.end() && now_s - it->heard_s <= within_s;
 }
 
@@ -73,10 +74,12 @@ void Telemetry::hear_battery(const Message& m, double now_s) {
   }
   if (m.is("SYS_STATUS")) {
     // 0 and UINT16_MAX: not measured.
-    if (const auto mv = m.integer("voltage_battery"); mv > 0 && mv < 65535) status_.battery_v = m.real("voltage_battery") / 1000;
+    if (const auto mv = m.integer("voltage_battery"); mv > 0 && mv < 65535)
+      status_.battery_v = m.real("voltage_battery") / 1000;
     const bool told = (m.integer("onboard_control_sensors_present") & k_prearm_bit) != 0;
-    status_.ready_to_arm = told ? std::optional((m.integer("onboard_control_sensors_health") & k_prearm_bit) != 0)
-                                : std::nullopt;
+    status_.ready_to_arm =
+        told ? std::optional((m.integer("onboard_control_sensors_health") & k_prearm_bit) != 0)
+             : std::nullopt;
     if (status_.ready_to_arm.value_or(true)) status_.not_ready.clear();
     return;
   }

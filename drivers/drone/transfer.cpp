@@ -62,8 +62,7 @@ std::uint64_t Session::upload_route(const std::vector<RoutePoint>& route) {
   std::vector<MissionItem> items;
   const auto& home = telemetry_.newest().home;
   if (dialect_of(autopilot_).home_is_item_0)
-    items.push_back(place(k_waypoint, k_global,
-                          home ? LonLat{home->lon_deg, home->lat_deg} : LonLat{}));
+    items.push_back(place(k_waypoint, k_global, home ? LonLat{home->lon_deg, home->lat_deg} : LonLat{}));
   for (const auto& point : route) {
     items.push_back(place(k_waypoint, k_above_home, point.at));
     items.back().p1 = point.dwell_s;

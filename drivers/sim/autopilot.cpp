@@ -31,14 +31,15 @@ AutopilotSim::AutopilotSim(AutopilotOptions options)
     framer_.require_signature(*options_.secret, now);
   }
   if (options_.dialect == drone::Autopilot::px4)
-    parameters_ = {{"NAV_DLL_ACT", {2, true}},   {"COM_DL_LOSS_T", {10, true}}, {"COM_LOW_BAT_ACT", {3, true}},
-                   {"NAV_RCL_ACT", {2, true}},   {"GF_ACTION", {2, true}},      {"MPC_XY_CRUISE", {5, false}},
-                   {"EKF2_HGT_REF", {1, true}},  {"COM_OBL_RC_ACT", {0, true}}};
+    parameters_ = {{"NAV_DLL_ACT", {2, true}},  {"COM_DL_LOSS_T", {10, true}}, {"COM_LOW_BAT_ACT", {3, true}},
+                   {"NAV_RCL_ACT", {2, true}},  {"GF_ACTION", {2, true}},      {"MPC_XY_CRUISE", {5, false}},
+                   {"EKF2_HGT_REF", {1, true}}, {"COM_OBL_RC_ACT", {0, true}}};
   else
-    parameters_ = {{"FS_GCS_ENABLE", {1, true}},   {"FS_GCS_TIMEOUT", {5, false}}, {"BATT_FS_LOW_ACT", {2, true}},
-                   {"FS_THR_ENABLE", {1, true}},   {"FENCE_ENABLE", {1, true}},    {"FENCE_ACTION", {1, true}},
-                   {"WPNAV_SPEED", {800, false}},  {"EK3_SRC1_POSXY", {3, true}},  {"EK3_SRC1_POSZ", {1, true}},
-                   {"SYSID_MYGCS", {255, true}},   {"FS_EKF_ACTION", {1, true}}};
+    parameters_ = {
+        {"FS_GCS_ENABLE", {1, true}},  {"FS_GCS_TIMEOUT", {5, false}}, {"BATT_FS_LOW_ACT", {2, true}},
+        {"FS_THR_ENABLE", {1, true}},  {"FENCE_ENABLE", {1, true}},    {"FENCE_ACTION", {1, true}},
+        {"WPNAV_SPEED", {800, false}}, {"EK3_SRC1_POSXY", {3, true}},  {"EK3_SRC1_POSZ", {1, true}},
+        {"SYSID_MYGCS", {255, true}},  {"FS_EKF_ACTION", {1, true}}};
   restart();
 }
 
@@ -60,7 +61,8 @@ Eigen::Vector3d AutopilotSim::metres(double lat_deg, double lon_deg) const {
 
 Eigen::Vector3d AutopilotSim::error_m() const {
   Eigen::Vector3d out = options_.gnss_offset_m;
-  out.z() += std::clamp(options_.baro_drift_mps * airborne_s_, -options_.baro_drift_max_m, options_.baro_drift_max_m);
+  out.z() += std::clamp(options_.baro_drift_mps * airborne_s_, -options_.baro_drift_max_m,
+                        options_.baro_drift_max_m);
   return out;
 }
 
@@ -144,7 +146,8 @@ void AutopilotSim::fail(Failsafe failsafe) {
   const auto& d = drone::dialect_of(options_.dialect);
   if (!vehicle_.in_air()) return;
   failsafe_ = true;
-  const bool lands = failsafe == Failsafe::ekf || (failsafe == Failsafe::battery && vehicle_.battery() < 0.05);
+  const bool lands =
+      failsafe == Failsafe::ekf || (failsafe == Failsafe::battery && vehicle_.battery() < 0.05);
   set_mode(lands ? d.land : d.return_home);
   text(2, failsafe == Failsafe::radio     ? "Radio Failsafe"
           : failsafe == Failsafe::battery ? "Battery Failsafe"
@@ -179,7 +182,8 @@ void AutopilotSim::refuse_arming(const std::string& why) {
 void AutopilotSim::watch_failsafes() {
   const auto& d = drone::dialect_of(options_.dialect);
   const bool busy = failsafe_ || custom_mode_ == d.land || custom_mode_ == d.return_home;
-  const bool enabled = parameters_[options_.dialect == drone::Autopilot::px4 ? "NAV_DLL_ACT" : "FS_GCS_ENABLE"].value > 0;
+  const bool enabled =
+      parameters_[options_.dialect == drone::Autopilot::px4 ? "NAV_DLL_ACT" : "FS_GCS_ENABLE"].value > 0;
   if (enabled && station_s_ && now_s_ - *station_s_ > options_.link_loss_s && vehicle_.in_air() && !busy)
     fail(Failsafe::station);
   if (options_.battery_failsafe && vehicle_.in_air() && custom_mode_ != d.land) {

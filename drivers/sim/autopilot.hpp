@@ -60,7 +60,7 @@ class AutopilotSim {
   void pilot_lands();                                ///< by hand, and disarms
   enum class Failsafe : std::uint8_t { radio, battery, ekf, station };
   void fail(Failsafe failsafe);
-  bool restart();                             ///< battery swap: on the ground only
+  bool restart();                              ///< battery swap: on the ground only
   void refuse_arming(const std::string& why);  ///< empty: no longer
   void set_silent(bool silent) { silent_ = silent; }
   void be_silent(double seconds) { silent_until_s_ = now_s_ + seconds; }

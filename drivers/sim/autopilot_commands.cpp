@@ -59,7 +59,8 @@ std::string AutopilotSim::not_ready() const {
 /// RTL, LAND and BRAKE do not allow arming (Mode::allows_arming).
 bool AutopilotSim::armable() const {
   const auto& d = drone::dialect_of(options_.dialect);
-  return custom_mode_ == d.guided || (custom_mode_ != d.return_home && custom_mode_ != d.land && custom_mode_ != d.hold);
+  return custom_mode_ == d.guided ||
+         (custom_mode_ != d.return_home && custom_mode_ != d.land && custom_mode_ != d.hold);
 }
 
 int AutopilotSim::arm(bool on) {

@@ -27,8 +27,7 @@ void AutopilotSim::lists(const Message& m, mavlink::Address from) {
     if (m.integer("seq") != static_cast<std::int64_t>(list.size())) return;
     list.push_back(m);
     const bool last = list.size() == wanted_;
-    to(last ? Message("MISSION_ACK")
-            : Message(request).set("seq", static_cast<std::int64_t>(list.size())));
+    to(last ? Message("MISSION_ACK") : Message(request).set("seq", static_cast<std::int64_t>(list.size())));
     if (last) uploading_ = -1;
   } else if (m.is("MISSION_REQUEST_LIST")) {
     to(Message("MISSION_COUNT").set("count", static_cast<std::int64_t>(list_of().size())));

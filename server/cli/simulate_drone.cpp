@@ -219,9 +219,10 @@ void add_simulate_drone(CLI::App& simulate, int& exit_code) {
   command->add_option("--ready", o->ready_s, "seconds until the pre-arm checks pass")->capture_default_str();
   command->add_option("--wind", o->wind_mps, "from the west, m/s")->capture_default_str();
   command->add_option("--battery", o->battery_s, "seconds of flight on it")->capture_default_str();
-  command->add_option("--scenario", o->scenario,
-                      "file of lines \"seconds what happens\", like \"30 pilot LOITER\"; the same without the "
-                      "seconds on standard input (drivers/sim/autopilot.md)");
+  command->add_option(
+      "--scenario", o->scenario,
+      "file of lines \"seconds what happens\", like \"30 pilot LOITER\"; the same without the "
+      "seconds on standard input (drivers/sim/autopilot.md)");
   command->add_flag("--px4", o->px4, "speaks as PX4; default ArduPilot");
   command->add_flag("--walls", o->walls, "brick fronts instead of glass");
   command->callback([o, &exit_code] { exit_code = simulate_drone(*o); });

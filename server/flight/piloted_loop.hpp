@@ -18,8 +18,8 @@ struct PilotedLoopResult {
   bool landed{false};
 };
 
-/// The closed loop flown over MAVLink: the same world, measurements, procedure and planner, with the real session
-/// and the simulated autopilot between the procedure and the vehicle.
+/// The closed loop flown over MAVLink: the same world, measurements, procedure and planner, with the real
+/// session and the simulated autopilot between the procedure and the vehicle.
 Result<PilotedLoopResult> fly_piloted_loop(const sim::World& world, const Plan& plan,
                                            const PilotedLoopOptions& options);
 

@@ -315,7 +315,8 @@ TEST_F(Flights, TheFenceGoesUpWithTheChecklistAndBlocksStartUntilItIsKept) {
   EXPECT_EQ(early.status, 422);
   EXPECT_NE(early.body.find("fence"), std::string::npos) << early.body;
   EXPECT_TRUE(fly_until([&] { return state() == "ok"; }, 10));
-  EXPECT_EQ(drone_->autopilot.fence_list().size(), 8u) << "the fence, and the building as an area to stay out of";
+  EXPECT_EQ(drone_->autopilot.fence_list().size(), 8u)
+      << "the fence, and the building as an area to stay out of";
   const Json kept = json(get(base() + "/uploads"));
   ASSERT_EQ(kept["items"].size(), 1u) << kept;
   EXPECT_EQ(kept["items"][0]["what"], "fence");

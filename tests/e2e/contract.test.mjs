@@ -179,6 +179,7 @@ test('a flight by hand: control, checklist, start, hold, abort', async () => {
   await call('POST', `${path}/control`, { expect: 200, json: { action: 'renew', lease } });
   await call('GET', `${path}/control`, { expect: 200 });
   await call('POST', `${path}/uploads`, { json: { what: 'fence', plan: ids.plan, lease } });  // there is no aircraft
+  await call('POST', `${path}/aircraft`, { expect: 422, json: { lease } });  // nor a link to one
   await call('GET', `${path}/checklist?plan=${ids.plan}`, { expect: 200 });
   for (const item of ['rtk', 'corrections', 'tag', 'disk', 'props', 'airspace', 'people', 'pilot']) {
     await call('POST', `${path}/checklist/${item}`, { expect: 200, json: { reason: 'contract test' } });
@@ -198,7 +199,8 @@ test('a flight by hand: control, checklist, start, hold, abort', async () => {
   await call('POST', `${path}/actions`, { expect: 409, json: { action: 'hold', lease: 'not mine' } });
   await call('POST', `${path}/actions`, { expect: 202, json: { action: 'hold', lease }, headers: { prefer: 'wait=2' } });
   await call('POST', `${path}/actions`, { expect: 202, json: { action: 'abort', lease } });
-  await call('POST', `${path}/actions`, { expect: 422, json: { action: 'hold', lease } });
+  await call('POST', `${path}/actions`, { expect: 202, json: { action: 'hold', lease } });  // always, whatever the server believes
+  await call('POST', `${path}/actions`, { expect: 422, json: { action: 'return', lease } });
   await call('POST', `${path}/control`, { expect: 200, json: { action: 'release', lease } });
 });
 

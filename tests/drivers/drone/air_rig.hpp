@@ -22,10 +22,10 @@ class AirRig {
   /// A command on the wire: heartbeats, questions for telemetry and parameters are none.
   struct Wire {
     double at_s{};
-    int command{};        ///< MAV_CMD; 86 for a position target
+    int command{};         ///< MAV_CMD; 86 for a position target
     std::uint32_t mode{};  ///< of 176
     double p1{};
-    std::int64_t again{};                            ///< confirmation
+    std::int64_t again{};  ///< confirmation
   };
 
   explicit AirRig(sim::AutopilotOptions options = {}, Eigen::Vector3d home_m = {-9, -9, 0})
@@ -33,7 +33,8 @@ class AirRig {
 
   static procedure::FlightSetup setup(const Eigen::Vector3d& home_m) {
     procedure::FlightSetup s;
-    s.settings.waypoints = {{{-8, -5, 4}, 0.5, true, true, false, 1}, {{-8, 12, 6}, 0.5, true, false, false, 1}};
+    s.settings.waypoints = {{{-8, -5, 4}, 0.5, true, true, false, 1},
+                            {{-8, 12, 6}, 0.5, true, false, false, 1}};
     s.settings.ranging_s = 4;
     s.settings.take_off_m = 4;
     s.settings.min_height_m = 2;

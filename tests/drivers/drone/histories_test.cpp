@@ -112,7 +112,8 @@ class History {
       pilot(copter.custom_mode(), "pilot lands");
     } else if (dice < 0.24) {
       if (!copter.vehicle().in_air() || copter.custom_mode() == dialect().return_home) return;
-      copter.fail(random_.chance(0.5) ? sim::AutopilotSim::Failsafe::radio : sim::AutopilotSim::Failsafe::ekf);
+      copter.fail(random_.chance(0.5) ? sim::AutopilotSim::Failsafe::radio
+                                      : sim::AutopilotSim::Failsafe::ekf);
       pilot(copter.custom_mode(), "failsafe");
     } else if (dice < 0.36) {
       rig_.link_down = true;
@@ -135,8 +136,8 @@ class History {
       seen_wire_ = rig_.wire.size();
       say("server back");
     } else {
-      static const std::array<const char*, 9> k_actions{"start",  "hold", "resume", "skip",  "return",
-                                                        "land",   "hold", "resume", "disarm"};
+      static const std::array<const char*, 9> k_actions{"start", "hold", "resume", "skip",  "return",
+                                                        "land",  "hold", "resume", "disarm"};
       auto action = std::string(k_actions[static_cast<std::size_t>(random_.uniform() * 9)]);
       if (random_.chance(0.04)) action = "abort";
       order(action);
@@ -153,7 +154,8 @@ class History {
     say("    sends " + words + (w.again ? " again" : ""));
     const double since_order_s = rig_.now - ordered_s_;
     const bool disarms = w.command == 400 && w.p1 < 0.5;
-    if (!rig_.flying() && since_order_s > k_oldest_s && !disarms && !(ended_s_ && rig_.now - *ended_s_ < k_oldest_s))
+    if (!rig_.flying() && since_order_s > k_oldest_s && !disarms &&
+        !(ended_s_ && rig_.now - *ended_s_ < k_oldest_s))
       fail(words + " although nothing flies");
     if (pilot_s_ && known_s_ && rig_.now - *known_s_ > 0.01 && ordered_s_ <= *pilot_s_ && !disarms)
       fail(words + " although the pilot has the aircraft");
@@ -191,8 +193,8 @@ class History {
     }
   }
 
-  /// What the server commanded lately cannot be told from a pilot who chose the same; nor can the mode that the
-  /// aircraft was in when an operator took it back, until the answer and a heartbeat have come.
+  /// What the server commanded lately cannot be told from a pilot who chose the same; nor can the mode that
+  /// the aircraft was in when an operator took it back, until the answer and a heartbeat have come.
   bool distinct() {
     const bool ours = pilot_mode_ == dialect().land || pilot_mode_ == dialect().return_home ||
                       pilot_mode_ == dialect().hold || pilot_mode_ == dialect().guided;
@@ -209,8 +211,8 @@ class History {
     if (aim && (!aim_m_ || (*aim - *aim_m_).norm() > 0.5)) aim_m_ = aim, aim_s_ = rig_.now;
     // What it aims at by itself for a moment, when its mode changes, is nobody's target.
     if (rig_.now - aim_s_ < 2) return;
-    if (!aim || !rig_.flying() || rig_.control->taken_over() || step == Step::take_off || step == Step::hold ||
-        rig_.autopilot.custom_mode() != dialect().guided || pilot_s_ || rig_.link_down)
+    if (!aim || !rig_.flying() || rig_.control->taken_over() || step == Step::take_off ||
+        step == Step::hold || rig_.autopilot.custom_mode() != dialect().guided || pilot_s_ || rig_.link_down)
       return;
     auto bounds = AirRig::setup(rig_.home).limits.bounds;
     bounds.keep_out_m -= 1;
@@ -230,7 +232,8 @@ class History {
       rig_.link_down = false;
       advance(rig_.now + 8);
       if (rig_.flying() && rig_.control->taken_over()) {  // the pilot lands it
-        if (rig_.autopilot.custom_mode() != dialect().land && rig_.autopilot.custom_mode() != dialect().return_home)
+        if (rig_.autopilot.custom_mode() != dialect().land &&
+            rig_.autopilot.custom_mode() != dialect().return_home)
           rig_.autopilot.pilot_lands();
       } else {
         order(rig_.flying() && i == 0 ? "return" : "land");

@@ -150,7 +150,8 @@ class Sender {
   void beat() {
     const auto frame =
         packer_.pack(mavlink::Message("HEARTBEAT").set("type", 2).set("autopilot", 3).set("custom_mode", 4));
-    (void)::sendto(socket_, frame.data(), frame.size(), 0, reinterpret_cast<const sockaddr*>(&to_), sizeof to_);
+    (void)::sendto(socket_, frame.data(), frame.size(), 0, reinterpret_cast<const sockaddr*>(&to_),
+                   sizeof to_);
   }
   /// Frames of the server that came here.
   std::size_t heard() {

@@ -1,5 +1,6 @@
-// The whole mission flown over MAVLink with everything off at once: GNSS offset, a barometer that drifts, wind, a
-// slow and lossy link. ANCHORD_SEEDS=20 for the whole table; one seed and dialect keep the test short.
+// The whole mission flown over MAVLink with everything off at once: GNSS offset, a barometer that drifts,
+// wind, a slow and lossy link. ANCHORD_SEEDS=20 for the whole table; one seed and dialect keep the test
+// short.
 #include "server/flight/piloted_loop.hpp"
 
 #include <gtest/gtest.h>
@@ -53,8 +54,9 @@ TEST(PilotedLoop, LandsAtHomeClearOfTheBuildingAndFindsTheAnchorsWithEverythingO
       worst_m = std::max(worst_m, j.error_m);
       ok += j.verdict == Verdict::ok;
     }
-    std::printf("%4llu  %8.0f  %11.2f  %8.2f  %6.2f  %2d  %8.3f  %7.3f\n", static_cast<unsigned long long>(seed),
-                r.flown.flight_s, r.clearance_m, r.lowest_m, r.home_m, ok, median_error_m(judged), worst_m);
+    std::printf("%4llu  %8.0f  %11.2f  %8.2f  %6.2f  %2d  %8.3f  %7.3f\n",
+                static_cast<unsigned long long>(seed), r.flown.flight_s, r.clearance_m, r.lowest_m, r.home_m,
+                ok, median_error_m(judged), worst_m);
     std::fflush(stdout);
     EXPECT_TRUE(r.landed) << "seed " << seed << ": " << r.flown.state.reason;
     EXPECT_LT(r.home_m, 3) << "seed " << seed;
