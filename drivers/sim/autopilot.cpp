@@ -31,15 +31,17 @@ AutopilotSim::AutopilotSim(AutopilotOptions options)
     framer_.require_signature(*options_.secret, now);
   }
   if (options_.dialect == drone::Autopilot::px4)
-    parameters_ = {{"NAV_DLL_ACT", {2, true}},  {"COM_DL_LOSS_T", {10, true}}, {"COM_LOW_BAT_ACT", {3, true}},
-                   {"NAV_RCL_ACT", {2, true}},  {"GF_ACTION", {2, true}},      {"MPC_XY_CRUISE", {5, false}},
-                   {"EKF2_HGT_REF", {1, true}}, {"COM_OBL_RC_ACT", {0, true}}};
+    parameters_ = {{"NAV_DLL_ACT", {2, true}},     {"COM_DL_LOSS_T", {options_.link_loss_s, true}},
+                   {"COM_LOW_BAT_ACT", {3, true}}, {"NAV_RCL_ACT", {2, true}},
+                   {"GF_ACTION", {2, true}},       {"MPC_XY_CRUISE", {5, false}},
+                   {"EKF2_HGT_REF", {1, true}},    {"COM_OBL_RC_ACT", {0, true}}};
   else
-    parameters_ = {
-        {"FS_GCS_ENABLE", {1, true}},  {"FS_GCS_TIMEOUT", {5, false}}, {"BATT_FS_LOW_ACT", {2, true}},
-        {"FS_THR_ENABLE", {1, true}},  {"FENCE_ENABLE", {1, true}},    {"FENCE_ACTION", {1, true}},
-        {"WPNAV_SPEED", {800, false}}, {"EK3_SRC1_POSXY", {3, true}},  {"EK3_SRC1_POSZ", {1, true}},
-        {"SYSID_MYGCS", {255, true}},  {"FS_EKF_ACTION", {1, true}}};
+    parameters_ = {{"FS_GCS_ENABLE", {1, true}},   {"FS_GCS_TIMEOUT", {options_.link_loss_s, false}},
+                   {"BATT_FS_LOW_ACT", {2, true}}, {"FS_THR_ENABLE", {1, true}},
+                   {"FENCE_ENABLE", {1, true}},    {"FENCE_ACTION", {1, true}},
+                   {"WPNAV_SPEED", {800, false}},  {"EK3_SRC1_POSXY", {3, true}},
+                   {"EK3_SRC1_POSZ", {1, true}},   {"SYSID_MYGCS", {255, true}},
+                   {"FS_EKF_ACTION", {1, true}}};
   restart();
 }
 
@@ -182,9 +184,10 @@ void AutopilotSim::refuse_arming(const std::string& why) {
 void AutopilotSim::watch_failsafes() {
   const auto& d = drone::dialect_of(options_.dialect);
   const bool busy = failsafe_ || custom_mode_ == d.land || custom_mode_ == d.return_home;
-  const bool enabled =
-      parameters_[options_.dialect == drone::Autopilot::px4 ? "NAV_DLL_ACT" : "FS_GCS_ENABLE"].value > 0;
-  if (enabled && station_s_ && now_s_ - *station_s_ > options_.link_loss_s && vehicle_.in_air() && !busy)
+  const bool px4 = options_.dialect == drone::Autopilot::px4;
+  const bool enabled = parameters_[px4 ? "NAV_DLL_ACT" : "FS_GCS_ENABLE"].value > 0;
+  const double patience_s = parameters_[px4 ? "COM_DL_LOSS_T" : "FS_GCS_TIMEOUT"].value;
+  if (enabled && station_s_ && now_s_ - *station_s_ > patience_s && vehicle_.in_air() && !busy)
     fail(Failsafe::station);
   if (options_.battery_failsafe && vehicle_.in_air() && custom_mode_ != d.land) {
     if (vehicle_.battery() < 0.05 || (vehicle_.battery() < 0.15 && !busy)) fail(Failsafe::battery);

@@ -26,7 +26,7 @@ struct AutopilotOptions {
   double cruise_mps = 8;           ///< its own speed in GUIDED until it is told another
   bool keeps_fences = true;        ///< false: refuses fence lists as unsupported
   bool old_requests = false;       ///< asks for items by MISSION_REQUEST, as before MISSION_REQUEST_INT
-  double link_loss_s = 5;          ///< without a station's heartbeat: returns
+  double link_loss_s = 5;          ///< without a station's heartbeat: returns (its parameter)
   double loss = 0, duplicate = 0;  ///< chance of each frame it sends to be lost, to be sent twice
   double loss_in = 0;              ///< of each frame sent to it
   double latency_s = 0;            ///< of the link, each way

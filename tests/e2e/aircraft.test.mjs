@@ -30,7 +30,8 @@ before(async () => {
   await new Promise((done) => socket.close(done));
   server = await startServer({ auth: 'off', args: ['--drone-address', `tcp://127.0.0.1:${port}`] });
   let said = '';
-  aircraft = spawn(binary, ['simulate', 'drone', '--mavlink', `tcp-listen://127.0.0.1:${port}`, '--url', server.url, '--ready', '2'], { stdio: ['ignore', 'ignore', 'pipe'] });
+  aircraft = spawn(binary, ['simulate', 'drone', '--mavlink', `tcp-listen://127.0.0.1:${port}`, '--url', server.url, '--ready', '2'], { stdio: ['pipe', 'ignore', 'pipe'] });
+  aircraft.stdin.write('parameter FS_GCS_TIMEOUT 60\n');  // a slow restart of the server is not what its failsafe is for here
   aircraft.stderr.setEncoding('utf8').on('data', (text) => (said += text));
   mission = await eventually('the aircraft makes its mission', () => /mission ([0-9a-f-]{36})/.exec(said)?.[1]);
 });
