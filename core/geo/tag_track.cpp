@@ -2,19 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace anchord {
 namespace {
 
-double gap_limit_s(std::span<const TrackPose> poses) {
-  // Some sources pause between bursts (0.3 s every few samples): a limit from the median would refuse most of
-  // those tracks, one from the largest interval would bridge real gaps.
-  std::vector<double> interval_s;
-  for (std::size_t i = 1; i < poses.size(); ++i) interval_s.push_back(poses[i].t_s - poses[i - 1].t_s);
-  if (interval_s.empty()) return 0.5;
-  const auto at = interval_s.begin() + static_cast<std::ptrdiff_t>(interval_s.size() * 9 / 10);
-  std::nth_element(interval_s.begin(), at, interval_s.end());
-  return std::clamp(3.0 * *at, 0.1, 0.5);
+/// A place known this badly says nothing of an anchor beside ranges that are good to a decimetre.
+constexpr double k_most_missed_m = 0.5;
+
+std::vector<TrackPose> good_enough(std::span<const TrackPose> poses, FixClass min_fix) {
+  std::vector<TrackPose> good;
+  std::ranges::copy_if(poses, std::back_inserter(good), [&](const TrackPose& p) { return p.fix >= min_fix; });
+  return good;
 }
 
 }  // namespace
@@ -90,7 +89,7 @@ TagPoint interpolate(const TrackPose& before, const TrackPose& after, double t_s
 
 TagTrack::TagTrack(std::span<const Fix> fixes, const std::optional<EnuFrame>& frame, UtcTime epoch,
                    const TrackOptions& options)
-    : min_fix_(options.min_fix) {
+    : min_fix_(options.min_fix), max_gap_s_(options.max_gap_s) {
   poses_.reserve(fixes.size());
   for (const Fix& fix : fixes) {
     TrackPose pose = pose_of(fix, frame, epoch);
@@ -105,7 +104,7 @@ TagTrack::TagTrack(std::span<const Fix> fixes, const std::optional<EnuFrame>& fr
   poses_.erase(twins.begin(), twins.end());
   has_attitude_ = !poses_.empty() &&
                   std::ranges::all_of(poses_, [](const TrackPose& p) { return p.attitude.has_value(); });
-  max_gap_s_ = options.max_gap_s.value_or(gap_limit_s(poses_));
+  missed_ = InterpolationError(good_enough(poses_, min_fix_));
 }
 
 TagPoint TagTrack::at(double t_s, const Eigen::Vector3d& lever_arm_body_m) const {
@@ -126,7 +125,9 @@ TagPoint TagTrack::at(double t_s, const Eigen::Vector3d& lever_arm_body_m) const
     }
     return interpolate(*before, *before, t_s, lever_arm_body_m);
   }
-  if (after->t_s - before->t_s > max_gap_s_) {
+  const double interval_s = after->t_s - before->t_s;
+  const double missed_m = missed_.sigma_m(interval_s, (t_s - before->t_s) / interval_s);
+  if (max_gap_s_ ? interval_s > *max_gap_s_ : missed_m > k_most_missed_m) {
     point.refused = TrackRefusal::gap;
     return point;
   }
@@ -134,7 +135,9 @@ TagPoint TagTrack::at(double t_s, const Eigen::Vector3d& lever_arm_body_m) const
     point.refused = TrackRefusal::fix_class;
     return point;
   }
-  return interpolate(*before, *after, t_s, lever_arm_body_m);
+  point = interpolate(*before, *after, t_s, lever_arm_body_m);
+  point.covariance_m2.diagonal().array() += missed_m * missed_m;
+  return point;
 }
 
 }  // namespace anchord

@@ -10,6 +10,7 @@
 
 #include "core/base/time.hpp"
 #include "core/geo/enu.hpp"
+#include "core/geo/interpolation_error.hpp"
 #include "core/types/fix.hpp"
 
 namespace anchord {
@@ -41,16 +42,19 @@ struct TagPoint {
 
 struct TrackOptions {
   FixClass min_fix{FixClass::rtk_fixed};
-  std::optional<double> max_gap_s{};  ///< absent: 3 x the 90th percentile interval, within [0.1, 0.5] s
+  /// Longest interval between neighbours to place a range in; absent: any whose interpolation error stays
+  /// below 0.5 m.
+  std::optional<double> max_gap_s{};
 };
 
 /// Where a tag antenna was at any instant between two epochs of the track.
 ///
 /// Position linear between the neighbours, attitude by slerp, lever arm added (body: forward, left, up).
-/// Never extrapolates, never bridges a gap, and both neighbours must be of the asked class. Covariance is the
-/// mean of the neighbours' weighted by nearness: their errors are nearly the same error, so interpolation
-/// does not average it. Without attitude the body is taken as level, and only the upward part of the lever
-/// arm is applied. Const calls from any thread.
+/// Never extrapolates, and both neighbours must be of the asked class. Covariance is the mean of the
+/// neighbours' weighted by nearness (their errors are nearly the same error, so interpolation does not
+/// average it), plus what the straight line between them misses: the longer the gap, the less a range in it
+/// counts. Without attitude the body is taken as level, and only the upward part of the lever arm is applied.
+/// Const calls from any thread.
 class TagTrack {
  public:
   /// fixes  any order; all of one TrackFrame; `frame` is needed for wgs84 and ignored for local
@@ -61,12 +65,13 @@ class TagTrack {
   TagPoint at(double t_s, const Eigen::Vector3d& lever_arm_body_m = Eigen::Vector3d::Zero()) const;
   std::span<const TrackPose> poses() const { return poses_; }
   bool has_attitude() const { return has_attitude_; }
-  double max_gap_s() const { return max_gap_s_; }
+  const InterpolationError& interpolation_error() const { return missed_; }
 
  private:
   std::vector<TrackPose> poses_;  ///< ascending in time, no two at one instant
   FixClass min_fix_;
-  double max_gap_s_{};
+  std::optional<double> max_gap_s_;
+  InterpolationError missed_{std::span<const TrackPose>{}};
   bool has_attitude_{false};
 };
 

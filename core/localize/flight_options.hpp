@@ -23,12 +23,19 @@ struct FlightOptions {
   Method method{Method::gauss_newton};
   Weights weights{Weights::inverse_variance};
   Loss loss{Loss::tukey};
-  std::optional<double>
-      anchor_height_m{};  ///< dims two: height of all anchors; absent: mean height of the track
+  /// Dims two only: height of all anchors, ellipsoidal where the track is global, else z of its local frame;
+  /// absent: mean height of the track.
+  std::optional<double> anchor_height_m{};
+  /// Dims three: about where all anchors are that have no height among their clues, such as the poles they
+  /// stand on; same reference.
+  struct HeightPrior {
+    double height_m{}, sigma_m{1.0};
+  };
+  std::optional<HeightPrior> height_prior{};
 
   FixClass min_fix{FixClass::rtk_fixed};  ///< both neighbours of a range must be at least this
   TrackLimits track{};                    ///< what the positions are held against
-  std::optional<double> max_gap_s{};      ///< absent: 3 x the 90th percentile track interval, in [0.1, 0.5] s
+  std::optional<double> max_gap_s{};      ///< longest track interval; absent: interpolation error up to 0.5 m
   double min_range_m{0.05};               ///< reliability limit; 0 is the radios' failure value
   double max_range_m{150.0};
 

@@ -3,53 +3,104 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <set>
 
 #include "core/localize/flight_checks.hpp"
+#include "core/localize/flight_digest.hpp"
 #include "core/localize/flight_verdict.hpp"
 #include "core/localize/joint_model.hpp"
 #include "core/localize/kit_prior.hpp"
+#include "core/localize/unplaced.hpp"
 
 namespace anchord {
 namespace {
 
+constexpr double k_most_bias_m = 200;  // a DW1000 whose antenna delay was never set: 154 m
+
 /// One flight under way through the passes.
 struct Work {
   FlightRows rows;
-  JointFit fit;
-  SharedPrior prior;
-  ProfileFactor factor;
-  ProfileFactor alone;  ///< what the flight said before it was told anything
-  std::string kit, name;
-  double wide_bias_sigma_m{};  ///< of the flight alone
-  BiasGate gate;
-  std::vector<Gate> checks;  ///< of the whole flight: every anchor must pass them
+  FlightOptions options{};  ///< in the frame of the rows
+  JointFit fit{};
+  std::vector<StartSearch> searches{};
+  SharedPrior prior{};
+  ProfileFactor factor{};
+  ProfileFactor alone{};  ///< what the flight said before it was told anything
+  std::string kit{}, name{}, digest{};
+  BiasGate gate{};
+  std::vector<Gate> checks{};  ///< of the whole flight: every anchor must pass them
 };
 
-Result<void> solve_with(Work& work, const SharedPrior& prior, const FlightOptions& options) {
+/// The options in the flight's own frame: heights above its origin, the height prior with every anchor that
+/// has no height of its own.
+FlightOptions in_frame_of(const FlightRows& rows, FlightOptions options) {
+  const double origin_m = rows.frame ? rows.frame->origin().height_m : 0.0;
+  if (options.anchor_height_m) *options.anchor_height_m -= origin_m;
+  if (!options.height_prior) return options;
+  for (const AnchorRows& anchor : rows.anchors) {
+    auto& height = options.clues[anchor.id].height;
+    if (!height) height = {options.height_prior->height_m - origin_m, options.height_prior->sigma_m};
+  }
+  return options;
+}
+
+Result<void> solve_with(Work& work, const SharedPrior& prior) {
+  const FlightOptions& options = work.options;
   work.prior = prior;
-  BOOST_OUTCOME_TRY(work.fit, solve_joint(work.rows, joint_start(work.rows, prior, options), prior, options));
+  JointStart start = joint_start(work.rows, prior, options);
+  work.searches = std::move(start.searches);
+  BOOST_OUTCOME_TRY(work.fit, solve_joint(work.rows, start.state, prior, options));
   work.factor = profile_factor(work.fit, prior, work.name);
+  work.factor.digest = work.digest;
   return boost::outcome_v2::success();
 }
 
 bool same_kit(const Work& a, const Work& b) { return !a.kit.empty() && a.kit == b.kit; }
 
-/// Factors of the other flights of the kit: those solved now, and the stored profile's except this very
-/// flight's.
+/// The very same flight? By content; profiles of old tell flights apart by name alone.
+bool same_flight(const Work& work, const ProfileFactor& factor) {
+  return factor.digest.empty() ? work.name == factor.flight : work.digest == factor.digest;
+}
+
+bool profile_fits(const Work& work, const FlightOptions& options) {
+  return options.profile && (options.profile->kit.empty() || options.profile->kit == work.kit);
+}
+
+/// Factors of the other flights of the kit: those solved now, and the stored profile's; this very flight is
+/// no other, and what is given twice counts once.
 std::vector<ProfileFactor> others_of(const std::vector<Work>& all, std::size_t index,
                                      const FlightOptions& options) {
   std::vector<ProfileFactor> factors;
+  std::set<std::string> counted{all[index].digest};
   for (std::size_t i = 0; i < all.size(); ++i) {
-    if (i != index && same_kit(all[i], all[index])) factors.push_back(all[i].factor);
+    if (i != index && same_kit(all[i], all[index]) && counted.insert(all[i].digest).second)
+      factors.push_back(all[i].factor);
   }
-  if (options.profile && (options.profile->kit.empty() || options.profile->kit == all[index].kit)) {
-    for (const auto& factor : options.profile->factors) {
-      const bool solved_now = std::ranges::any_of(
-          all, [&](const Work& w) { return same_kit(w, all[index]) && w.name == factor.flight; });
-      if (!solved_now && factor.flight != all[index].name) factors.push_back(factor);
-    }
+  if (!profile_fits(all[index], options)) return factors;
+  for (const auto& factor : options.profile->factors) {
+    const bool solved_now = std::ranges::any_of(
+        all, [&](const Work& w) { return same_kit(w, all[index]) && same_flight(w, factor); });
+    if (!solved_now && !same_flight(all[index], factor) &&
+        (factor.digest.empty() || counted.insert(factor.digest).second))
+      factors.push_back(factor);
   }
   return factors;
+}
+
+/// What of the given knowledge about the kit was not used, for people.
+void note_unused(std::vector<Work>& all, const FlightOptions& options) {
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    Work& work = all[i];
+    for (std::size_t k = 0; k < i; ++k) {
+      if (all[k].digest != work.digest) continue;
+      work.rows.notes.push_back("the same flight as " + all[k].name + ", to the last range: it counts once");
+      break;
+    }
+    if (options.profile && !profile_fits(work, options)) {
+      work.rows.notes.push_back("the profile is of kit '" + options.profile->kit + "', this flight of kit '" +
+                                work.kit + "': not used");
+    }
+  }
 }
 
 std::string sentence(const char* format, double a, double b, double c) {
@@ -67,12 +118,16 @@ std::size_t n_believed(const FlightRows& flight) {
   return n;
 }
 
-FlightSolution describe(const Work& work, const FlightData& flight, const FlightOptions& options) {
+FlightSolution describe(const Work& work, const FlightData& flight) {
+  const FlightOptions& options = work.options;
   FlightSolution solution;
   solution.mission = flight.mission.id;
   solution.name = flight.mission.name;
   if (work.rows.frame) solution.origin = work.rows.frame->origin();
-  solution.notes = flight.notes;
+  const Unplaced unplaced = unplaced_of(work.rows, flight, options);
+  solution.placed = unplaced.n_placed > 0 || unplaced.n_ranges == 0;
+  if (!unplaced.why.empty()) solution.notes.push_back(unplaced.why);
+  solution.notes.insert(solution.notes.end(), flight.notes.begin(), flight.notes.end());
   solution.notes.insert(solution.notes.end(), work.rows.notes.begin(), work.rows.notes.end());
   const auto valued = [&](int i) {
     return Valued{work.fit.state.shared[i], std::sqrt(std::max(work.fit.shared_covariance(i, i), 0.0))};
@@ -113,6 +168,7 @@ FlightSolution describe(const Work& work, const FlightData& flight, const Flight
       auto& gates = anchor.estimate.gates;
       gates.insert(gates.end(), work.checks.begin(), work.checks.end());
     }
+    anchor.search = work.searches[i];
     anchor.estimate.bias_m = solution.shared.bias_m.value + anchor.delay_m.value_or(0.0);
     anchor.estimate.bias_sigma_m =
         std::hypot(solution.shared.bias_m.sigma, anchor.delay_sigma_m.value_or(options.delay_prior_m));
@@ -132,14 +188,24 @@ FlightSolution describe(const Work& work, const FlightData& flight, const Flight
 
 Result<void> FlightOptions::check() const {
   const auto positive = [](double v) { return std::isfinite(v) && v > 0; };
-  const bool good = positive(bias_prior_m) && positive(calibrated_bias_prior_m) && positive(delay_prior_m) &&
-                    positive(curve_prior_m) && positive(lag_prior_s) && positive(lever_prior_m) &&
-                    positive(mad_factor) && positive(min_scale_m) && correlation_s >= 0 &&
-                    floor_sigma_m >= 0 && min_range_m >= 0 && max_range_m > min_range_m &&
-                    (!max_gap_s || positive(*max_gap_s)) && positive(track.max_speed_mps) &&
-                    positive(track.max_acceleration_mps2) && positive(track.max_correction_age_s) &&
-                    (!anchor_height_m || std::isfinite(*anchor_height_m)) &&
-                    (!fixed_bias_m || std::isfinite(*fixed_bias_m));
+  const bool good =
+      positive(bias_prior_m) && positive(calibrated_bias_prior_m) && positive(delay_prior_m) &&
+      positive(curve_prior_m) && positive(lag_prior_s) && positive(lever_prior_m) && positive(mad_factor) &&
+      positive(min_scale_m) && correlation_s >= 0 && floor_sigma_m >= 0 && min_range_m >= 0 &&
+      max_range_m > min_range_m && (!max_gap_s || positive(*max_gap_s)) && positive(track.max_speed_mps) &&
+      positive(track.max_acceleration_mps2) && positive(track.max_correction_age_s) &&
+      (!anchor_height_m || std::isfinite(*anchor_height_m)) &&
+      (!height_prior || (std::isfinite(height_prior->height_m) && positive(height_prior->sigma_m)));
+  if (anchor_height_m && dims != Dims::two)
+    return make_error(Errc::invalid_argument,
+                      "a held anchor height needs two dimensions: set dims to 2, or give a height prior");
+  if (height_prior && dims == Dims::two)
+    return make_error(Errc::invalid_argument,
+                      "a height prior needs three dimensions: set dims to 3, or hold the height instead");
+  if (fixed_bias_m && !(std::abs(*fixed_bias_m) <= k_most_bias_m)) {
+    return make_error(Errc::invalid_argument, "range bias " + std::to_string(*fixed_bias_m) +
+                                                  " m: in metres, at most 200 either way");
+  }
   if (good) return boost::outcome_v2::success();
   return make_error(Errc::invalid_argument,
                     "flight options: sigmas, limits and factors must be positive and finite");
@@ -158,11 +224,16 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
   for (const FlightData* flight : flights) {
     auto rows = flight_rows(*flight, options);
     if (!rows) return make_error(rows.error().code, flight->mission.name + ": " + rows.error().message);
-    all.push_back(
-        {std::move(rows.value()), {}, {}, {}, {}, flight->mission.kit, flight->mission.name, 0, {}, {}});
+    Work work{.rows = std::move(rows.value())};
+    work.options = in_frame_of(work.rows, options);
+    work.kit = flight->mission.kit;
+    work.name = flight->mission.name;
+    work.digest = flight_digest(*flight);
+    all.push_back(std::move(work));
   }
+  note_unused(all, options);
   for (Work& work : all) {
-    BOOST_OUTCOME_TRY(solve_with(work, wide_prior(options), options));
+    BOOST_OUTCOME_TRY(solve_with(work, wide_prior(options)));
     work.alone = work.factor;
   }
   // Two passes: what a flight says about the kit depends a little on what it was told.
@@ -180,7 +251,7 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
       const bool same =
           priors[i].mean == all[i].prior.mean && priors[i].information == all[i].prior.information;
       if (same) continue;
-      BOOST_OUTCOME_TRY(solve_with(all[i], priors[i], options));
+      BOOST_OUTCOME_TRY(solve_with(all[i], priors[i]));
     }
   }
   if (!options.fixed_bias_m) {
@@ -188,7 +259,7 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
   }
   for (std::size_t i = 0; i < all.size(); ++i) {
     Work& work = all[i];
-    BOOST_OUTCOME_TRY(const auto arm, check_lever_arm(work.rows, work.fit, work.prior, options));
+    BOOST_OUTCOME_TRY(const auto arm, check_lever_arm(work.rows, work.fit, work.prior, work.options));
     if (arm) work.checks.push_back(*arm);
     if (work.rows.step_share > 0) work.checks.push_back(check_steps(work.rows.step_share, options));
     const auto others = others_of(all, i, options);
@@ -201,7 +272,7 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
     if (!all.empty()) profile->factors.push_back(all.front().factor);
   }
   std::vector<FlightSolution> solutions;
-  for (std::size_t i = 0; i < all.size(); ++i) solutions.push_back(describe(all[i], *flights[i], options));
+  for (std::size_t i = 0; i < all.size(); ++i) solutions.push_back(describe(all[i], *flights[i]));
   return solutions;
 }
 

@@ -9,6 +9,7 @@
 
 #include "core/base/result.hpp"
 #include "core/localize/flight_options.hpp"
+#include "core/localize/start_search.hpp"
 #include "core/types/estimate.hpp"
 #include "core/types/flight_data.hpp"
 
@@ -52,6 +53,7 @@ struct AnchorSolution {
   std::optional<double> delay_m;                               ///< d_a: this unit against the kit
   std::optional<double> delay_sigma_m;
   double residual_scale_m{};  ///< robust, 1.4826 MAD
+  StartSearch search;
   std::vector<RangeResidual>
       residuals;  ///< of every range the track could place, by time; weight 0: rejected
 };
@@ -66,6 +68,7 @@ struct FlightSolution {
   std::map<std::string, std::size_t> refused;        ///< over all anchors, reason -> count
   std::map<std::string, std::size_t> fixes_refused;  ///< reason -> count, of the positions
   std::size_t n_ranges{}, n_used{}, n_fixes{};
+  bool placed{true};               ///< false: not one range is anywhere on the track; the first note says why
   std::vector<std::string> notes;  ///< for people: what limits this solution
 };
 

@@ -49,7 +49,7 @@ class Clues {
 };
 
 struct Twin {
-  AnchorFit fit;
+  AnchorMinimum fit;
   double worse{};  ///< tempered cost above the solution's
   double horizontal_m{};
 };
@@ -69,21 +69,22 @@ std::vector<Twin> twins_of(const FlightRows& flight, const JointFit& fit, std::s
   SolverOptions settings;
   settings.dims = options.dims;
   settings.estimate_bias = true;
+  settings.step_tolerance_m = 1e-6;
   // Bias prior in the scale of the thinned, untempered cost below.
   const double unit =
       static_cast<double>(block.n_in_track) / (static_cast<double>(rows.size()) * block.kappa);
   settings.bias_prior_sigma_m = options.delay_prior_m * std::sqrt(unit);
-  const auto polish = [&](const Eigen::Vector3d& start) -> std::optional<AnchorFit> {
+  const auto polish = [&](const Eigen::Vector3d& start) -> std::optional<AnchorMinimum> {
     settings.loss = Loss::cauchy;
     settings.loss_sigmas = 2.0;
-    const auto rough = solve_anchor_gauss_newton(rows, start, settings);
+    const auto rough = descend_to_minimum(rows, start, settings);
     if (!rough) return std::nullopt;
     settings.loss = options.loss;
     settings.loss_sigmas =
         default_bend(options.loss) * (options.loss == Loss::tukey ? options.mad_factor : 1.0);
-    auto fine = solve_anchor_gauss_newton(rows, rough.value().position_m, settings);
+    const auto fine = descend_to_minimum(rows, rough.value().position_m, settings);
     if (!fine) return std::nullopt;
-    return std::move(fine.value());
+    return fine.value();
   };
   const auto here = polish(solution);
   std::vector<Twin> twins;
@@ -94,7 +95,9 @@ std::vector<Twin> twins_of(const FlightRows& flight, const JointFit& fit, std::s
     const Eigen::AngleAxisd turn(k * std::numbers::pi / 4.0, axis);
     starts.push_back(shape.centroid_m + turn * (solution - shape.centroid_m));
   }
-  for (const auto& start : starts) {
+  for (auto& start : starts) {
+    // A held height has no mirror; only what lies beside it can fit as well.
+    if (options.dims == Dims::two) start.z() = solution.z();
     auto there = polish(start);
     if (!there) continue;
     const double worse =
@@ -105,7 +108,7 @@ std::vector<Twin> twins_of(const FlightRows& flight, const JointFit& fit, std::s
     if (worse > k_twin_cost || close(solution) || close(here->position_m)) continue;
     if (std::ranges::any_of(twins, [&](const Twin& t) { return close(t.fit.position_m); })) continue;
     const double horizontal_m = (there->position_m - here->position_m).head<2>().norm();
-    twins.push_back({std::move(*there), worse, horizontal_m});
+    twins.push_back({*there, worse, horizontal_m});
   }
   std::ranges::sort(twins, {}, &Twin::worse);
   return twins;

@@ -120,7 +120,8 @@ std::vector<double> sigmas(const FlightRows& flight, const AnchorRows& rows, con
 }  // namespace
 
 Result<JointState> polish_joint_ceres(const FlightRows& flight, JointState state, const SharedPrior& prior,
-                                      const FlightOptions& options) {
+                                      const FlightOptions& options, bool& settled) {
+  settled = false;
   for (int round = 0; round < 20; ++round) {
     if (options.canceled && options.canceled()) return make_error(Errc::canceled, "canceled");
     const JointNormal normal = build_normal(flight, state, options, 0.0);
@@ -169,6 +170,7 @@ Result<JointState> polish_joint_ceres(const FlightRows& flight, JointState state
       state.anchors[i].position_m = position;
       state.anchors[i].delay_m = own[i][3];
     }
+    settled = largest < 1e-3;
     if (largest < 1e-5) break;
   }
   return state;

@@ -6,6 +6,7 @@
 #include "core/localize/flight_options.hpp"
 #include "core/localize/flight_rows.hpp"
 #include "core/localize/observation.hpp"
+#include "core/localize/start_search.hpp"
 
 namespace anchord {
 
@@ -102,13 +103,18 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
                              const FlightOptions& options);
 
 /// The same minimum by Ceres, positions and delays eliminated first (Schur), Levenberg-Marquardt or dogleg.
+/// settled  set: the last round of scales moved nothing any more
 /// errors: canceled, no_convergence
 Result<JointState> polish_joint_ceres(const FlightRows& flight, JointState state, const SharedPrior& prior,
-                                      const FlightOptions& options);
+                                      const FlightOptions& options, bool& settled);
 
 /// Start of every anchor by itself: closed form, reflections and a ring, each polished robustly, the best
-/// kept.
-JointState joint_start(const FlightRows& flight, const SharedPrior& prior, const FlightOptions& options);
+/// kept. An anchor without a place has too few rows and takes no part.
+struct JointStart {
+  JointState state;
+  std::vector<StartSearch> searches;  ///< one for each anchor
+};
+JointStart joint_start(const FlightRows& flight, const SharedPrior& prior, const FlightOptions& options);
 
 /// Rows of one anchor at given shared values, thinned to at most `most`, with the range curve and bias taken
 /// off.

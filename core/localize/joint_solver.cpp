@@ -4,15 +4,12 @@
 #include <limits>
 
 #include "core/localize/joint_model.hpp"
-#include "core/localize/linear.hpp"
-#include "core/localize/solver.hpp"
 
 namespace anchord {
 namespace {
 
 constexpr int k_max_rounds = 60;
 constexpr int k_scale_rounds = 20;
-constexpr std::size_t k_min_rows = 5;  // one more than x, y, z and a shared bias ask for
 
 double clipped(double value, double limit) { return std::clamp(value, -limit, limit); }
 
@@ -22,81 +19,7 @@ bool has_beliefs(const FlightRows& flight) {
   });
 }
 
-/// The start somebody gave: a place, or where the bearing of the turn and the height search meet at the range
-/// measured nearest to the turn.
-std::optional<Eigen::Vector3d> told_start(NetworkId id, const std::vector<Observation>& rows,
-                                          const AnchorClues& clues, const FlightOptions& options) {
-  if (const auto told = options.starts.find(id); told != options.starts.end()) return told->second;
-  if (!options.start_at_clues || !clues.bearing || !clues.height) return std::nullopt;
-  const Eigen::Vector3d& turn_m = clues.bearing->tag_m;
-  const auto away = [&](const Observation& o) { return (o.tag_m - turn_m).norm(); };
-  const double range_m = std::ranges::min_element(rows, {}, away)->distance_m;
-  const double up_m = clues.height->up_m - turn_m.z();
-  const double across_m = std::sqrt(std::max(range_m * range_m - up_m * up_m, 0.25));
-  return Eigen::Vector3d(turn_m.x() + across_m * std::sin(clues.bearing->bearing_rad),
-                         turn_m.y() + across_m * std::cos(clues.bearing->bearing_rad), clues.height->up_m);
-}
-
-/// Best of many starts for one anchor; Cauchy of 0.3 m and a bias of its own, so that a kit's bias does not
-/// push the anchor into the wrong basin before the joint solve can see it.
-std::optional<Eigen::Vector3d> start_of(const FlightRows& flight, const AnchorRows& anchor,
-                                        const SharedPrior& prior, const FlightOptions& options,
-                                        std::optional<double> height_m) {
-  auto rows = observations_of(flight, anchor, prior.mean, 200, 0.3);
-  if (rows.size() < k_min_rows) return std::nullopt;
-  SolverOptions settings;
-  settings.dims = options.dims;
-  settings.loss = Loss::cauchy;
-  settings.loss_sigmas = 1.0;
-  settings.estimate_bias = !options.fixed_bias_m;
-  settings.bias_prior_sigma_m = 0.5;
-  const AnchorClues clues = clues_of(anchor.id, options);
-  const auto levels = levels_of(flight, anchor, prior.mean, options);
-  const double span_s = std::max(anchor.rows.back().t_s - anchor.rows.front().t_s, 1.0);
-  const double alike =
-      std::max(2.0 * options.correlation_s * static_cast<double>(levels.size()) / span_s, 1.0);
-  std::optional<AnchorFit> best;
-  auto starts = start_candidates(rows, options.dims);
-  if (const auto told = told_start(anchor.id, rows, clues, options)) starts = {*told};
-  for (Eigen::Vector3d start : starts) {
-    if (height_m) start.z() = *height_m;
-    auto fit = solve_anchor_gauss_newton(rows, start, settings);
-    if (!fit) continue;
-    // The twin fits as well: a clue, told in the same unit, is what decides where to begin.
-    const Eigen::Vector3d& place_m = fit.value().position_m;
-    fit.value().cost += clue_cost(clues, options.outline_m, options.outline_sigma_m, place_m);
-    if (!levels.empty()) fit.value().cost += level_cost(levels, place_m, *options.level_sigma_db) / alike;
-    if (!best || fit.value().cost < best->cost) best = std::move(fit.value());
-  }
-  if (best) return best->position_m;
-  // No start converged (a line, for example): the joint solve is heavily damped there and may begin anywhere
-  // near.
-  const auto linear = start_candidates(rows, options.dims);
-  Eigen::Vector3d start = linear.front();
-  if (height_m) start.z() = *height_m;
-  return start;
-}
-
 }  // namespace
-
-JointState joint_start(const FlightRows& flight, const SharedPrior& prior, const FlightOptions& options) {
-  JointState state;
-  state.shared = prior.mean;
-  std::optional<double> height_m;
-  if (options.dims == Dims::two) {
-    double sum_m = 0;
-    for (const auto& pose : flight.track.poses()) sum_m += pose.position_m.z();
-    height_m = options.anchor_height_m.value_or(sum_m / static_cast<double>(flight.track.poses().size()));
-  }
-  for (const AnchorRows& rows : flight.anchors) {
-    JointState::Anchor anchor;
-    const auto start = start_of(flight, rows, prior, options, height_m);
-    anchor.active = start.has_value();
-    if (start) anchor.position_m = *start;
-    state.anchors.push_back(anchor);
-  }
-  return state;
-}
 
 Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, const SharedPrior& prior,
                              const FlightOptions& options) {
@@ -163,9 +86,12 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
     const double enough = fit.rounds < 25 ? 1e-4 : 1e-3;
     fit.converged = fit.rounds >= 3 && largest < enough;
   }
-  if (by_ceres) {
-    BOOST_OUTCOME_TRY(fit.state, polish_joint_ceres(flight, std::move(fit.state), prior, options));
-    fit.converged = true;
+  // What the rounds leave wandering, a trust region settles; of the two kinds it cannot solve, the verdict
+  // says that they wander.
+  const bool wanders = !fit.converged && flight.pairs.empty() && !has_beliefs(flight);
+  if (by_ceres || wanders) {
+    BOOST_OUTCOME_TRY(fit.state,
+                      polish_joint_ceres(flight, std::move(fit.state), prior, options, fit.converged));
     fit.normal = build_normal(flight, fit.state, options, 0.0, nullptr, true);
   } else {
     const JointNormal scales = std::move(fit.normal);

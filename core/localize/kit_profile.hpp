@@ -20,6 +20,7 @@ using SharedMatrix = Eigen::Matrix<double, 6, 6>;
 /// What one flight says about the shared unknowns, flight-to-flight wander already allowed for.
 struct ProfileFactor {
   std::string flight;
+  std::string digest{};  ///< of the flight's content (flight_digest); empty in profiles of old
   Eigen::Matrix4d information{Eigen::Matrix4d::Zero()};
   Eigen::Vector4d information_mean{Eigen::Vector4d::Zero()};  ///< information * mean
 };

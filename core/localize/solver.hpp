@@ -52,8 +52,23 @@ struct AnchorFit {
 Result<AnchorFit> solve_anchor(std::span<const Observation> observations, const Eigen::Vector3d& start,
                                const SolverOptions& options = {});
 
-/// The same problem by damped Gauss-Newton (eq 7.26-7.27) on fixed-size Eigen matrices: light enough for the
-/// live path, and an independent check of the other. `method` is ignored.
+/// Where a descent from one start ended.
+struct AnchorMinimum {
+  Eigen::Vector3d position_m{0, 0, 0};
+  double bias_m{0};
+  double cost{};  ///< half the sum of rho, prior of the bias included
+  int iterations{};
+  bool settled{false};  ///< false: out of iterations; place and cost are those of the last step
+};
+/// Descent of solve_anchor_gauss_newton without covariance, for the search among many starts: what did not
+/// settle, or leaves a direction unmeasured, still has a place and a cost to compete with.
+/// errors  invalid_argument, too_few_observations; no_convergence only where the numbers stopped being finite
+Result<AnchorMinimum> descend_to_minimum(std::span<const Observation> observations,
+                                         const Eigen::Vector3d& start, const SolverOptions& options = {});
+
+/// The same problem by damped Gauss-Newton (eq 7.26-7.27), with the curvature of the loss near the minimum,
+/// on fixed-size Eigen matrices: light enough for the live path, and an independent check of the other.
+/// `method` is ignored.
 Result<AnchorFit> solve_anchor_gauss_newton(std::span<const Observation> observations,
                                             const Eigen::Vector3d& start, const SolverOptions& options = {});
 
