@@ -41,6 +41,17 @@ void put_place(Json& json, const Hypothesis& h, bool globe) {
   }
 }
 
+Json search_json(const StartSearch& search) {
+  Json json = {{"n_starts", search.n_starts}, {"n_settled", search.n_settled}, {"places", Json::array()}};
+  for (const auto& place : search.places) {
+    json["places"].push_back({{"enu_m", vector_of(place.position_m)},
+                              {"cost", number(place.cost, 3)},
+                              {"n_starts", place.n_starts},
+                              {"n_settled", place.n_settled}});
+  }
+  return json;
+}
+
 Json anchor_json(const AnchorSolution& anchor, bool globe) {
   const Estimate& e = anchor.estimate;
   Json json;
@@ -66,6 +77,9 @@ Json anchor_json(const AnchorSolution& anchor, bool globe) {
     for (const char* key : {"lon", "lat", "h_m", "enu_m", "cov_enu_m2", "ellipse95", "h95_m", "v95_m",
                             "rms_residual_m", "probability"}) {
       json[key] = nullptr;
+    }
+    for (const char* key : {"x_m", "y_m", "z_m"}) {
+      if (!globe) json[key] = nullptr;
     }
   }
   json["mirror"] = nullptr;
@@ -95,6 +109,7 @@ Json anchor_json(const AnchorSolution& anchor, bool globe) {
                       {"line_ratio", number(g.line_ratio, 4)},
                       {"plane_ratio", number(g.plane_ratio, 4)},
                       {"sigma_ratio", number(g.sigma_ratio, 4)}};
+  json["search"] = search_json(anchor.search);
   json["acceptable"] = e.acceptable();
   json["gates"] = Json::array();
   for (const Gate& gate : e.gates) {
@@ -130,6 +145,7 @@ Json flight_json(const SolvedFlight& flight) {
   json["n_fixes"] = s.n_fixes;
   json["n_ranges"] = s.n_ranges;
   json["n_used"] = s.n_used;
+  json["placed"] = s.placed;
   json["refused"] = Json::object();
   for (const auto& [why, count] : s.refused) json["refused"][why] = count;
   json["fixes_refused"] = Json::object();

@@ -42,6 +42,8 @@ std::string solve_table(std::span<const SolvedFlight> flights) {
   for (const auto& flight : flights) {
     const FlightSolution& s = *flight.solution;
     const bool globe = flight.data->mission.frame == TrackFrame::wgs84;
+    // What there is to read first where the flight gives nothing.
+    if (!s.placed) out += "NOT SOLVED: " + s.notes.front() + "\n";
     append(out, "%s  kit %s  %zu ranges, %zu used\n", s.name.c_str(), flight.data->mission.kit.c_str(),
            s.n_ranges, s.n_used);
     append(out,
@@ -89,7 +91,7 @@ std::string solve_csv(std::span<const SolvedFlight> flights) {
       "flight,anchor_id,network_id,verdict,determined,lon,lat,h_m,e_m,n_m,u_m,cov_ee_m2,cov_en_m2,cov_eu_m2,"
       "cov_nn_m2,"
       "cov_nu_m2,cov_uu_m2,h95_m,v95_m,mirror_e_m,mirror_n_m,mirror_u_m,probability,n_ranges,n_refused,gdop,"
-      "bias_m,lag_s,reason\n";
+      "bias_m,lag_s,reason,acceptable,failed_gates\n";
   for (const auto& flight : flights) {
     for (const auto& anchor : flight.solution->anchors) {
       const Estimate& e = anchor.estimate;
@@ -119,7 +121,11 @@ std::string solve_csv(std::span<const SolvedFlight> flights) {
       append(out, ",%zu,%zu,", e.n_used, total(e.refused));
       if (e.gdop) append(out, "%.3f", *e.gdop);
       append(out, ",%.4f,%.4f,", e.bias_m.value_or(0.0), e.lag_s.value_or(0.0));
-      out += field(e.reason) + "\n";
+      std::string failed;
+      for (const Gate& gate : e.gates) {
+        if (!gate.passed) failed += (failed.empty() ? "" : " ") + gate.name;
+      }
+      out += field(e.reason) + (e.acceptable() ? ",1," : ",0,") + failed + "\n";
     }
   }
   return out;

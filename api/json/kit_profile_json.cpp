@@ -17,12 +17,14 @@ Result<ProfileFactor> parse_factor(const Json& json, std::size_t index) {
   const std::string where = "factors[" + std::to_string(index) + "]";
   if (!json.is_object()) return wrong(where + " is not an object");
   for (const auto& [key, value] : json.items()) {
-    if (key != "flight" && key != "information" && key != "information_mean")
+    if (key != "flight" && key != "digest" && key != "information" && key != "information_mean")
       return wrong(where + ": unknown key '" + key + "'");
   }
   ProfileFactor factor;
   if (json.contains("flight") && json["flight"].is_string())
     factor.flight = json["flight"].get<std::string>();
+  if (json.contains("digest") && json["digest"].is_string())
+    factor.digest = json["digest"].get<std::string>();
   const auto finite = [](const Json& v) { return v.is_number() && std::isfinite(v.get<double>()); };
   if (!json.contains("information") || !json["information"].is_array() || json["information"].size() != 16 ||
       !json.contains("information_mean") || !json["information_mean"].is_array() ||
@@ -55,8 +57,10 @@ std::string kit_profile_json(const KitProfile& profile) {
                {"order", {"bias_m", "curve_m_per_efold", "lag_s", "lever_up_m"}},
                {"factors", Json::array()}};
   for (const auto& factor : profile.factors) {
-    Json one = {
-        {"flight", factor.flight}, {"information", Json::array()}, {"information_mean", Json::array()}};
+    Json one = {{"flight", factor.flight}};
+    if (!factor.digest.empty()) one["digest"] = factor.digest;
+    one["information"] = Json::array();
+    one["information_mean"] = Json::array();
     for (Eigen::Index r = 0; r < 4; ++r) {
       for (Eigen::Index c = 0; c < 4; ++c) one["information"].push_back(factor.information(r, c));
       one["information_mean"].push_back(factor.information_mean[r]);

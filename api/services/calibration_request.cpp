@@ -76,7 +76,21 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
     if (const auto scale = inner.number("scale", 0.1, 10)) options.mad_factor *= *scale / 1.5;
     inner.finish();
   }
-  if (const auto height = fields.number("anchor_height_m", -1000, 9000)) options.anchor_height_m = *height;
+  if (const auto height = fields.number("anchor_height_m", -1000, 9000)) {
+    options.anchor_height_m = *height;
+    if (options.dims != Dims::two)
+      fields.error("anchor_height_m", "needs_dims_2", "a held height needs dims 2; in 3: height_prior");
+  }
+  if (const Json* prior = fields.child("height_prior")) {
+    Fields inner(*prior, "/height_prior", errors);
+    const auto height = inner.number("height_m", -1000, 9000, true);
+    const auto sigma = inner.number("sigma_m", 0.01, 100, true);
+    inner.finish();
+    if (options.dims == Dims::two)
+      fields.error("height_prior", "needs_dims_3", "a height prior needs dims 3; in 2: anchor_height_m");
+    else if (height && sigma)
+      options.height_prior = {*height, *sigma};
+  }
   if (const auto gap = fields.number("max_gap_s", 0.01, 10)) options.max_gap_s = *gap;
   if (const auto fix = fields.word("min_fix", {"none", "single", "dgps", "float", "fixed"}))
     options.min_fix = static_cast<FixClass>(*fix);

@@ -28,7 +28,8 @@ struct Arguments {
   std::string format{"table"}, solver{"gauss_newton"}, weights{"inverse_variance"}, loss{"tukey"},
       min_fix{"fixed"};
   int dims{3};
-  std::optional<double> bias_m, height_m;
+  std::optional<double> bias_m, height_m, max_gap_s;
+  std::vector<double> height_prior;
   double max_correction_age_s{TrackLimits{}.max_correction_age_s};
   std::string profile, out, clues;
   std::vector<std::string> models;
@@ -84,6 +85,8 @@ Result<FlightOptions> options_of(const Arguments& a) {
   options.fixed_bias_m = a.bias_m;
   options.track.max_correction_age_s = a.max_correction_age_s;
   options.anchor_height_m = a.height_m;
+  options.max_gap_s = a.max_gap_s;
+  if (a.height_prior.size() == 2) options.height_prior = {a.height_prior[0], a.height_prior[1]};
   if (!a.profile.empty()) {
     BOOST_OUTCOME_TRY(options.profile, read_profile(a.profile));
   }
@@ -132,6 +135,18 @@ Result<void> apply_models(const Arguments& a, std::vector<FlightData>& flights) 
   return boost::outcome_v2::success();
 }
 
+/// A profile of another kit would be left out in silence.
+Result<void> check_profile_kit(const FlightOptions& options, const std::vector<FlightData>& flights) {
+  if (!options.profile || options.profile->kit.empty()) return boost::outcome_v2::success();
+  for (const auto& flight : flights) {
+    if (flight.mission.kit == options.profile->kit) continue;
+    return make_error(Errc::invalid_argument, "--profile is of kit '" + options.profile->kit + "', flight " +
+                                                  flight.mission.name + " of kit '" + flight.mission.kit +
+                                                  "': give that kit's profile, or none");
+  }
+  return boost::outcome_v2::success();
+}
+
 std::vector<const FlightData*> pointers(const std::vector<FlightData>& flights) {
   std::vector<const FlightData*> all;
   for (const auto& flight : flights) all.push_back(&flight);
@@ -143,6 +158,8 @@ int solve(const Arguments& a) {
   if (!options) return complain(options.error());
   auto flights = read_all(a.folders);
   if (!flights) return complain(flights.error());
+  if (const auto fits = check_profile_kit(options.value(), flights.value()); !fits)
+    return complain(fits.error());
   if (const auto corrected = apply_models(a, flights.value()); !corrected) return complain(corrected.error());
   std::fprintf(stderr, "solving %zu flight%s\n", flights.value().size(),
                flights.value().size() == 1 ? "" : "s");
@@ -167,7 +184,14 @@ int solve(const Arguments& a) {
         !written)
       return complain(written.error());
   }
-  return std::fflush(stdout) == 0 ? 0 : 1;
+  if (std::fflush(stdout) != 0) return 1;
+  int exit_code = 0;
+  for (const auto& solution : solutions.value()) {
+    if (solution.placed) continue;
+    std::fprintf(stderr, "anchord: %s: %s\n", solution.name.c_str(), solution.notes.front().c_str());
+    exit_code = k_unusable;
+  }
+  return exit_code;
 }
 
 int fit_profile(const Arguments& a) {
@@ -175,6 +199,8 @@ int fit_profile(const Arguments& a) {
   if (!options) return complain(options.error());
   const auto flights = read_all(a.folders);
   if (!flights) return complain(flights.error());
+  if (const auto fits = check_profile_kit(options.value(), flights.value()); !fits)
+    return complain(fits.error());
   for (const auto& flight : flights.value()) {
     if (flight.mission.kit.empty() || flight.mission.kit != flights.value().front().mission.kit) {
       return complain(make_error(Errc::invalid_argument, "flights of one kit are needed: '" +
@@ -185,6 +211,12 @@ int fit_profile(const Arguments& a) {
   KitProfile profile;
   const auto solutions = solve_flights(pointers(flights.value()), options.value(), &profile);
   if (!solutions) return complain(solutions.error());
+  for (const auto& solution : solutions.value()) {
+    for (const auto& note : solution.notes)
+      std::fprintf(stderr, "note: %s: %s\n", solution.name.c_str(), note.c_str());
+    if (!solution.placed)
+      return complain(make_error(Errc::too_few_observations, solution.name + ": " + solution.notes.front()));
+  }
   std::ofstream out(a.out, std::ios::binary);
   out << kit_profile_json(profile);
   out.close();
@@ -207,7 +239,10 @@ int show_profile(const std::string& file) {
   std::printf("kit %s, %zu flights\n", profile.value().kit.c_str(), profile.value().factors.size());
   for (const auto& factor : profile.value().factors) std::printf("  %s\n", factor.flight.c_str());
   std::printf("bias %.3f m (sigma %.3f), %s (z %.1f, limit %.1f)\n", gate.bias_m, gate.sigma_m,
-              gate.calibrated ? "taken as calibrated" : "not calibrated", gate.z, options.bias_gate_z);
+              !gate.known       ? "not determined"
+              : gate.calibrated ? "taken as calibrated"
+                                : "not calibrated",
+              gate.z, options.bias_gate_z);
   std::printf(
       "prior of the next flight: bias %.3f m (%.3f), range curve %.3f m per e-fold (%.3f), lag %.3f s "
       "(%.3f), antenna up "
@@ -229,7 +264,17 @@ void add_options(CLI::App& command, Arguments& a) {
       ->check(CLI::IsMember({"none", "huber", "cauchy", "tukey"}));
   command.add_option("--dims", a.dims, "3, or 2 with the height held")->check(CLI::IsMember({2, 3}));
   command.add_option("--height", a.height_m,
-                     "Height of all anchors for --dims 2; default: mean height of the track");
+                     "With --dims 2: height of all anchors in metres, ellipsoidal where the track is global "
+                     "(the heights of the table), else z; default: mean height of the track");
+  command
+      .add_option("--height-prior", a.height_prior,
+                  "HEIGHT,SIGMA in metres: about where all anchors are, such as the poles they stand on; "
+                  "reference as for --height")
+      ->delimiter(',')
+      ->expected(2);
+  command.add_option("--max-gap", a.max_gap_s,
+                     "Longest interval of the track, in seconds, to place a range in; default: as long as "
+                     "interpolation misses by less than 0.5 m");
   command.add_option("--min-fix", a.min_fix, "Least fix class of the track: fixed, float, dgps or single")
       ->check(CLI::IsMember({"fixed", "float", "dgps", "single"}));
   command
@@ -251,22 +296,28 @@ void add_solve_command(CLI::App& app, int& exit_code) {
   command->add_option(
       "--clues", arguments->clues,
       "JSON: outline, bearings, heights, RSS that tell an anchor from its twin (docs/formats.md)");
-  command->add_option("--models", arguments->models,
-                      "Model artifacts (anchord train) that correct and weigh the ranges, one a task");
+  auto* models =
+      command->add_option("--models", arguments->models,
+                          "Model artifacts (anchord train) that correct and weigh the ranges, one a task");
   command
       ->add_option("--likelihood", arguments->likelihood,
                    "With --models: one_sided, the models' own likelihood, or loss, their corrections alone")
-      ->check(CLI::IsMember({"one_sided", "loss"}));
+      ->check(CLI::IsMember({"one_sided", "loss"}))
+      ->needs(models);
   command->add_option("--format", arguments->format, "table, json, geojson or csv, on standard output")
       ->check(CLI::IsMember({"table", "json", "geojson", "csv"}));
-  command->add_option("--report", arguments->report.file,
-                      "Also write a printable page to this HTML file; of several flights FILE-1.html, ...");
-  command->add_option("--truth", arguments->report.truth,
-                      "For the page: anchors_truth.csv with the surveyed positions to compare with");
+  auto* report = command->add_option(
+      "--report", arguments->report.file,
+      "Also write a printable page to this HTML file; of several flights FILE-1.html, ...");
+  command
+      ->add_option("--truth", arguments->report.truth,
+                   "For the page: anchors_truth.csv with the surveyed positions to compare with")
+      ->needs(report);
   command
       ->add_option("--iterations", arguments->report.iterations,
                    "For the page: growing parts of the flight to solve, for the error curves; 0 for none")
-      ->check(CLI::Range(0, 50));
+      ->check(CLI::Range(0, 50))
+      ->needs(report);
   command->callback([arguments, &exit_code] { exit_code = solve(*arguments); });
 }
 

@@ -7,10 +7,12 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include "tests/paths.hpp"
 
@@ -23,10 +25,10 @@ struct Answer {
   std::string out;
 };
 
-/// Standard output alone; standard error goes nowhere.
-Answer run(const std::string& arguments) {
+/// Standard output alone; standard error goes nowhere, or where `errors` sends it.
+Answer run(const std::string& arguments, const char* errors = "2>/dev/null") {
   Answer answer;
-  FILE* pipe = popen((std::string("'") + ANCHORD_BINARY + "' " + arguments + " 2>/dev/null").c_str(), "r");
+  FILE* pipe = popen((std::string("'") + ANCHORD_BINARY + "' " + arguments + " " + errors).c_str(), "r");
   if (!pipe) return {-1, ""};
   std::array<char, 4096> chunk{};
   for (std::size_t n = 0; (n = std::fread(chunk.data(), 1, chunk.size(), pipe)) > 0;)
@@ -87,6 +89,84 @@ TEST_F(SolveCommand, TakesTheProfileItMade) {
   ASSERT_EQ(run("profile fit " + quoted() + " --out " + kit).exit_code, 0);
   EXPECT_NE(run("profile show " + kit).out.find("1 flights"), std::string::npos);
   EXPECT_EQ(run("solve " + quoted() + " --profile " + kit).exit_code, 0);
+}
+
+/// Rewrites a table of the flight, row by row; `change` gets the cells, and may drop the row.
+void rewrite(const fs::path& file, const std::function<bool(std::vector<std::string>&)>& change) {
+  std::ifstream in(file);
+  std::string line, all;
+  std::getline(in, line);
+  all = line + '\n';
+  while (std::getline(in, line)) {
+    std::vector<std::string> cells;
+    std::istringstream row(line);
+    for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
+    if (!change(cells)) continue;
+    for (std::size_t i = 0; i < cells.size(); ++i) all += (i > 0 ? "," : "") + cells[i];
+    all += '\n';
+  }
+  in.close();
+  std::ofstream(file) << all;
+}
+
+TEST_F(SolveCommand, SolvesATrackOfOneHertz) {
+  double last_s = -1;
+  rewrite(folder_ / "track.csv", [&](std::vector<std::string>& cells) {
+    if (std::stod(cells[0]) - last_s < 0.95) return false;
+    last_s = std::stod(cells[0]);
+    return true;
+  });
+  const Answer answer = run("solve " + quoted() + " --format json");
+  EXPECT_EQ(answer.exit_code, 0);
+  const auto json = nlohmann::json::parse(answer.out, nullptr, false);
+  ASSERT_FALSE(json.is_discarded());
+  EXPECT_TRUE(json["flights"][0]["placed"].get<bool>());
+  for (const auto& anchor : json["flights"][0]["anchors"]) EXPECT_TRUE(anchor["enu_m"].is_array());
+}
+
+TEST_F(SolveCommand, SaysFirstWhyNoRangeCouldBePlacedAndEndsWithTwo) {
+  rewrite(folder_ / "ranges.csv", [](std::vector<std::string>& cells) {
+    cells[4] = std::to_string(1000 * std::stod(cells[4]));
+    return true;
+  });
+  const Answer answer = run("solve " + quoted());
+  EXPECT_EQ(answer.exit_code, 2);
+  EXPECT_EQ(answer.out.rfind("NOT SOLVED: none of ", 0), 0U) << answer.out;
+  EXPECT_NE(answer.out.find("range_m is in metres"), std::string::npos) << answer.out;
+}
+
+TEST_F(SolveCommand, RefusesWhatWouldDoNothing) {
+  const auto refused = [&](const std::string& options, const std::string& what) {
+    const Answer answer = run("solve " + quoted() + " " + options, "2>&1");
+    EXPECT_EQ(answer.exit_code, 2) << options;
+    EXPECT_NE(answer.out.find(what), std::string::npos) << options << ": " << answer.out;
+  };
+  refused("--height 12", "--dims 2");
+  refused("--dims 2 --height-prior 12,1", "height prior");
+  refused("--likelihood loss", "--models");
+  refused("--truth anchors_truth.csv", "--report");
+  refused("--bias 1e9", "200");
+  const fs::path kit = folder_ / "kit.json";
+  ASSERT_EQ(run("profile fit " + quoted() + " --out '" + kit.string() + "'").exit_code, 0);
+  std::stringstream text;
+  text << std::ifstream(kit).rdbuf();
+  auto json = nlohmann::json::parse(text.str());
+  json["kit"] = "another kit";
+  std::ofstream(kit) << json.dump();
+  refused("--profile '" + kit.string() + "'", "another kit");
+}
+
+TEST_F(SolveCommand, HoldsTheHeightInTheMetresOfItsOwnTable) {
+  const auto solved = nlohmann::json::parse(run("solve " + quoted() + " --format json").out);
+  const double height_m = solved["flights"][0]["anchors"][0]["h_m"].get<double>();
+  const Answer answer =
+      run("solve " + quoted() + " --dims 2 --height " + std::to_string(height_m) + " --format json");
+  ASSERT_EQ(answer.exit_code, 0);
+  const auto flat = nlohmann::json::parse(answer.out)["flights"][0]["anchors"][0];
+  EXPECT_NEAR(flat["h_m"].get<double>(), height_m, 0.01);
+  EXPECT_TRUE(flat["mirror"].is_null());
+  EXPECT_NEAR(flat["enu_m"][0].get<double>(), solved["flights"][0]["anchors"][0]["enu_m"][0].get<double>(),
+              0.3);
 }
 
 /// Levels of one range: behind a wall 7 dB more of the first path are lost.
