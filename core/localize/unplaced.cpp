@@ -67,6 +67,7 @@ Unplaced unplaced_of(const FlightRows& rows, const FlightData& flight, const Fli
   std::map<std::string, std::size_t> reasons;
   for (const AnchorRows& anchor : rows.anchors) {
     for (const auto& [why, count] : anchor.refused) {
+      if (why == "excluded") continue;  // a person's choice, and no surprise to anybody
       reasons[why] += count;
       out.n_ranges += count;
     }
