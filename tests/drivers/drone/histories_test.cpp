@@ -186,6 +186,7 @@ class History {
         known_s_ = rig_.now;
       if (rig_.control && rig_.step_now() != last_step_) {
         last_step_ = rig_.step_now();
+        step_s_ = rig_.now;
         say(rig_.reason());
       }
       judge(seen_wire_);
@@ -210,7 +211,7 @@ class History {
     const auto step = rig_.step_now();
     if (aim && (!aim_m_ || (*aim - *aim_m_).norm() > 0.5)) aim_m_ = aim, aim_s_ = rig_.now;
     // What it aims at by itself for a moment, when its mode changes, is nobody's target.
-    if (rig_.now - aim_s_ < 2) return;
+    if (rig_.now - aim_s_ < 2 || rig_.now - step_s_ < 2.5) return;
     if (!aim || !rig_.flying() || rig_.control->taken_over() || step == Step::take_off ||
         step == Step::hold || rig_.autopilot.custom_mode() != dialect().guided || pilot_s_ || rig_.link_down)
       return;
@@ -256,7 +257,7 @@ class History {
   bool refuses_{false}, had_leg_{false};
   std::optional<double> pilot_s_, known_s_, ended_s_;
   std::optional<Eigen::Vector3d> aim_m_;
-  double aim_s_{0};
+  double aim_s_{0}, step_s_{0};
   std::uint32_t pilot_mode_{0};
   std::size_t seen_wire_{0};
   Step last_step_{};
