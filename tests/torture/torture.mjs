@@ -79,10 +79,11 @@ class Torture {
     const gateways = [0, 1, 2].map((n) => new Gateway(n));
     const work = [...gateways, new Deleter(), new Publisher(await simulatedFlight({ seed: 7, duration: 60 })), new Promoter(readFileSync(join(root, 'docs/examples/campaign.csv'), 'utf8')), new Installer()];
     this.work = work;
+    const calibrations = Math.min(20, Math.ceil(times / 2));  // each is published once
     let server = this.begin(disk, cut);
     this.server = server;
     await server.start(k_start_ms);
-    for (const one of work) await one.prepare(server);
+    for (const one of work) await one.prepare(server, calibrations);
     for (let n = 1; n <= times; n++) {
       let running = true, fault = null;
       const clients = work.map(async (one) => {
@@ -102,7 +103,7 @@ class Torture {
       if (n % k_other_every === 0) await this.migration(cut);
       if (n % k_other_every === 5) await this.firstStart(cut);
       if (n % k_rest_every === 0 && n < times) {
-        for (const one of work) await one.prepare(server);
+        for (const one of work) await one.prepare(server, calibrations);
         this.print(`    ${n} of ${times} ${what}s: ${this.summary(work)}`);
       }
     }

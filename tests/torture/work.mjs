@@ -147,7 +147,7 @@ export class Publisher {
     this.published = [];
     this.unanswered = null;
   }
-  async prepare(server, want = 20) {
+  async prepare(server, want) {
     if (!this.mission) {
       this.mission = must(await ask(server, '/api/v1/missions?devices=false', { json: this.flight.mission }), 201, 'POST missions').id;
       must(await ask(server, `/api/v1/fixes?mission=${this.mission}`, lines(this.flight.fixes)), 200, 'POST fixes');
