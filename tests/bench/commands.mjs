@@ -5,6 +5,7 @@ import { createSocket } from 'node:dgram';
 import { writeFileSync } from 'node:fs';
 import { connect } from 'node:net';
 import { join } from 'node:path';
+import { Worker } from 'node:worker_threads';
 import { binary, eventually, startServer } from '../e2e/server.mjs';
 import { percentile } from './load.mjs';
 
@@ -40,15 +41,15 @@ function histogram(times) {
 
 export async function commands(row, seconds = 10) {
   const port = await free_port();
-  const server = await startServer({ auth: 'on', args: ['--drone-address', `udp://:${port}`, '--rate-per-s', '100000', '--rate-burst', '100000', '--log-level', 'error'] });
+  const server = await startServer({ auth: 'on', args: ['--drone-address', `udp://:${port}`, '--rate-per-s', '100000', '--rate-burst', '100000'] });
   const must = async (path, options, ...good) => {
     const answer = await server.fetch(path, options), text = await answer.text();
     if (!good.includes(answer.status)) throw new Error(`${options?.json ? 'POST' : 'GET'} ${path}: ${answer.status} ${text.slice(0, 400)}`);
     return text ? JSON.parse(text) : null;
   };
   const token = async (...roles) => (await must('/api/v1/tokens', { json: { name: roles.join(), roles } }, 201)).token;
-  let aircraft, flooding = true;
-  const floods = [], sockets = [];
+  let aircraft, flood;
+  const sockets = [];
   try {
     const [pilot, kit, viewer, second] = [await token('operator'), await token('gateway', 'operator'), await token('viewer'), await token('operator')];
     const file = join(server.dataDir, 'kit.token');
@@ -77,27 +78,27 @@ export async function commands(row, seconds = 10) {
     const drive = async (times, s) => { for (let n = 0, end = performance.now() + s * 1000; performance.now() < end; n++) { await command(n % 2 ? 'resume' : 'hold', times); await new Promise((done) => setTimeout(done, 30)); } };
     await drive(quiet, 3);
 
-    let answered = 0, refused = 0;
-    const flood = (n, path, options) => {
-      for (let i = 0; i < n; i++) floods.push((async () => { while (flooding) { const answer = await server.fetch(path, options).catch(() => null); await answer?.arrayBuffer().catch(() => {}); if (answer?.ok) answered++; else { refused++; await new Promise((done) => setTimeout(done, 200)); } } })());
-    };
-    flood(195, `/api/v1/plans/${heavy}/validate`, { method: 'POST', token: viewer });
-    flood(6, '/api/v1/plans/generate', { token: second, json: { ...plan(2), settings: { keep_out_m: 2, max_height_m: 60 } } });
-    flood(8, `/api/v1/fixes?mission=${mission}&limit=10000`, { token: viewer });
-    flood(4, '/api/v1/me', { token: `anc_${'0'.repeat(32)}_${'a'.repeat(64)}` });
+    flood = new Worker(new URL('./flood.mjs', import.meta.url), { workerData: { url: server.url, floods: [
+      { n: 195, path: `/api/v1/plans/${heavy}/validate`, method: 'POST', token: viewer },
+      { n: 6, path: '/api/v1/plans/generate', method: 'POST', token: second, json: { ...plan(2), settings: { keep_out_m: 2, max_height_m: 60 } } },
+      { n: 8, path: `/api/v1/fixes?mission=${mission}&limit=10000`, token: viewer },
+      { n: 4, path: '/api/v1/me', token: `anc_${'0'.repeat(32)}_${'a'.repeat(64)}` },
+    ] } });
     for (let i = 0; i < 500; i++) sockets.push(connect(server.port, '127.0.0.1').on('error', () => {}));
     await new Promise((done) => setTimeout(done, 1000));
     await drive(beside, seconds);
     const landing = [];
     await command('land', landing);
-    flooding = false;
-    await Promise.allSettled(floods);
+    const { answered, refused } = await new Promise((done) => {
+      flood.once('message', done);
+      flood.postMessage('stop');
+    });
     const p = (times, share) => `${percentile(times, share).toFixed(1)} ms`;
     row('hold and resume, nothing beside', `p50 ${p(quiet, 0.5)}, p99 ${p(quiet, 0.99)}`, histogram(quiet));
     row('hold and resume beside the flood', `p50 ${p(beside, 0.5)}, p99 ${p(beside, 0.99)}, worst ${p(beside, 1)}`, `limit 100 ms at p99; ${histogram(beside)}`);
     row('land beside the flood', `${landing[0].toFixed(1)} ms`, `${answered} requests of the flood were answered, ${refused} refused; the generator shares the machine`);
   } finally {
-    flooding = false;
+    await flood?.terminate();
     for (const socket of sockets) socket.destroy();
     aircraft?.kill('SIGINT');
     await server.dispose();

@@ -418,8 +418,11 @@ TEST(Executors, AnswerACommandWhileComputationsHoldTheirsAndItsQueue) {
     computing.push_back(std::make_unique<RawSocket>(server.port));
     computing.back()->send("GET /heavy HTTP/1.1\r\nHost: localhost\r\nX-Token: " + token + "\r\n\r\n");
   };
-  for (int i = 0; i < 4; ++i) compute("t" + std::to_string(i));
-  server.gateway.wait_for_held(2);
+  compute("t0");
+  compute("t1");
+  server.gateway.wait_for_held(2);  // both threads have one, so the next two wait
+  compute("t2");
+  compute("t3");
   while (server.heavy.queued() < 2) std::this_thread::yield();
   RawSocket command(server.port);
   for (int i = 0; i < 100; ++i) {
