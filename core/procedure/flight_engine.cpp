@@ -158,10 +158,12 @@ void FlightEngine::climb(double now_s) {
   constexpr double k_again_s = 3, k_above_floor_m = 0.5;
   if (!fix_m_ || (climb_s_ && now_s - *climb_s_ < k_again_s)) return;
   climb_s_ = now_s;
-  Eigen::Vector3d up = *fix_m_;
-  up.z() = setup_.settings.min_height_m + k_above_floor_m;
+  Command up{Command::Kind::go_to, *fix_m_, std::nullopt};
+  const double floor_m = setup_.limits.bounds.min_height_m.value_or(setup_.settings.min_height_m);
+  up.point_m.z() = std::max(floor_m, setup_.settings.min_height_m) + k_above_floor_m;
+  if (refuse_command(setup_.limits, fix_m_, up)) return;  // straight up is not allowed here: it holds
   orders_.clear();
-  order({Command::Kind::go_to, up, std::nullopt});
+  order(up);
 }
 
 /// On the ground and disarmed for a while, whoever did it; before it was armed that is where a flight begins.

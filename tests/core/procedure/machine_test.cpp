@@ -178,7 +178,7 @@ TEST(ProcedureMachine, EveryStepInFlightHasALongestStayAndAWayOut) {
 
 TEST(ProcedureMachine, AnEventWithoutARowChangesNothing) {
   const auto state = at(Step::ranging);
-  const auto step = advance(two_waypoints(), state, {Event::landed, 5, {}, {}, {}});
+  const auto step = advance(two_waypoints(), state, {Event::airborne, 5, {}, {}, {}});
   EXPECT_EQ(step.transition, nullptr);
   EXPECT_EQ(step.state.step, Step::ranging);
   EXPECT_TRUE(step.commands.empty());
