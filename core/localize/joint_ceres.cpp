@@ -120,11 +120,12 @@ std::vector<double> sigmas(const FlightRows& flight, const AnchorRows& rows, con
 }  // namespace
 
 Result<JointState> polish_joint_ceres(const FlightRows& flight, JointState state, const SharedPrior& prior,
-                                      const FlightOptions& options, bool& settled) {
+                                      const FlightOptions& options, bool& settled,
+                                      const JointNormal* scales_from) {
   settled = false;
   for (int round = 0; round < 20; ++round) {
     if (options.canceled && options.canceled()) return make_error(Errc::canceled, "canceled");
-    const JointNormal normal = build_normal(flight, state, options, 0.0);
+    const JointNormal normal = build_normal(flight, state, options, 0.0, scales_from);
     ceres::Problem problem;
     SharedVector shared = state.shared;
     std::vector<Four> own(state.anchors.size());

@@ -104,9 +104,11 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
 
 /// The same minimum by Ceres, positions and delays eliminated first (Schur), Levenberg-Marquardt or dogleg.
 /// settled  set: the last round of scales moved nothing any more
+/// scales_from  residual scales to keep instead of measuring them anew
 /// errors: canceled, no_convergence
 Result<JointState> polish_joint_ceres(const FlightRows& flight, JointState state, const SharedPrior& prior,
-                                      const FlightOptions& options, bool& settled);
+                                      const FlightOptions& options, bool& settled,
+                                      const JointNormal* scales_from = nullptr);
 
 /// Start of every anchor by itself: closed form, reflections and a ring, each polished robustly, the best
 /// kept. An anchor without a place has too few rows and takes no part.

@@ -89,14 +89,14 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
   // What the rounds leave wandering, a trust region settles; of the two kinds it cannot solve, the verdict
   // says that they wander.
   const bool wanders = !fit.converged && flight.pairs.empty() && !has_beliefs(flight);
+  const JointNormal scales = std::move(fit.normal);
+  // Measured anew, the scales of a flight that wanders would lead it on to another answer.
+  const JointNormal* kept = by_ceres ? nullptr : &scales;
   if (by_ceres || wanders) {
     BOOST_OUTCOME_TRY(fit.state,
-                      polish_joint_ceres(flight, std::move(fit.state), prior, options, fit.converged));
-    fit.normal = build_normal(flight, fit.state, options, 0.0, nullptr, true);
-  } else {
-    const JointNormal scales = std::move(fit.normal);
-    fit.normal = build_normal(flight, fit.state, options, 0.0, &scales, true);
+                      polish_joint_ceres(flight, std::move(fit.state), prior, options, fit.converged, kept));
   }
+  fit.normal = build_normal(flight, fit.state, options, 0.0, kept, true);
   if (!flight.pairs.empty()) {
     const DenseNormal dense = dense_normal(flight, fit.state, fit.normal, prior, options);
     const Eigen::Index n = dense.matrix.rows() - 6;
