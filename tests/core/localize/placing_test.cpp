@@ -124,7 +124,10 @@ TEST(Unplaced, IsSaidFirstWithNumbersAndWhatToDo) {
   EXPECT_NE(first_note(late).find("both need one clock"), std::string::npos);
   auto sparse = flight;
   keep_every(sparse, 300);
-  EXPECT_NE(first_note(sparse).find("track_gap"), std::string::npos);
+  // A range right beside one of the few positions has its place; the others do not.
+  const auto solved = solve_flight(sparse).value();
+  ASSERT_FALSE(solved.notes.empty());
+  EXPECT_NE(solved.notes.front().find("track_gap"), std::string::npos) << solved.notes.front();
   auto milliseconds = flight;
   for (auto& range : milliseconds.ranges) range.time.ns *= 1000;
   EXPECT_NE(first_note(milliseconds).find("t_s is in seconds"), std::string::npos);
