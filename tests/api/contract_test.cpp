@@ -49,6 +49,7 @@ TEST_F(Contract, EveryOperationHasARouteAndEveryRouteAnOperation) {
   deps.kits = &database_->kits();
   deps.frames = &database_->frames();
   deps.learning = &*learning_;
+  deps.exclusions = &database_->exclusions();
   NoBackups backups;
   deps.backups = &backups;
   api::Application app(std::move(deps));

@@ -108,7 +108,7 @@ before(async () => {
   mission = await eventually('the aircraft makes its mission', () => /mission ([0-9a-f-]{36})/.exec(output)?.[1]);
 
   // A stranger speaks MAVLink 1 at the same port once the aircraft is there: a heartbeat of an autopilot and a request to disarm.
-  await eventually('the aircraft is there', async () => (await procedure())?.drone?.mode, 20_000, 100);
+  await eventually('the aircraft is there', async () => (await call('pilot', 'GET', '/api/v1/system')).json?.drone?.mode, 20_000, 100);
   const stranger = createSocket('udp4');
   stranger.on('message', () => strangerReceived++);
   sockets.push(stranger);

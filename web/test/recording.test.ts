@@ -2,7 +2,7 @@ import { describe, expect, it } from 'vitest';
 import type { MissionMsg, RangeMsg } from '../src/live/messages';
 import { after, Player, poses_of, type Recording } from '../src/state/recording';
 
-const mission: MissionMsg = { mission: 'm', name: 'flight', state: 'finished', t_us: 0, started_us: 0, frame: 'local', origin: null, n_ranges: 0, n_fixes: 0, anchors_found: 0, anchors_converged: 0, range_rate_hz: null };
+const mission: MissionMsg = { mission: 'm', name: 'flight', state: 'finished', t_us: 0, started_us: 0, frame: 'local', origin: null, n_ranges: 0, n_fixes: 0, anchors_found: 0, anchors_converged: 0, range_rate_hz: null, fixes_refused: {} };
 const fix = (t_s: number, e: number) => ({ t_us: t_s * 1e6, local_m: [e, 0, 5], fix: 'fixed' });
 const range = (t_s: number): RangeMsg => ({ t_us: t_s * 1e6, mission: 'm', tag: '0x1', anchor: '0x2', distance_m: t_s, corrected_m: t_s, sigma_m: null, rss_dbm: null, p_los: null, used: true, refused: null });
 const seconds = Array.from({ length: 600 }, (_, i) => i);

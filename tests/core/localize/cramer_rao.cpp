@@ -63,7 +63,7 @@ CramerRao cramer_rao(Ranges ranges, int flights, std::uint64_t seed) {
     std::array<Eigen::Matrix3d, 8> information;
     information.fill(Eigen::Matrix3d::Zero());
     for (int i = 0; i < k_places; ++i) {
-      const UtcTime time = UtcTime::from_seconds(0.1 * i);
+      const UtcTime time = UtcTime::from_seconds(0.5 * i);  // 4 m/s
       Fix fix;
       fix.time = time;
       fix.frame = TrackFrame::local;

@@ -30,6 +30,7 @@ export interface MissionMsg {
   readonly mission: string; readonly name: string; readonly state: 'planned' | 'recording' | 'finished'; readonly t_us: number; readonly started_us: number | null;
   readonly frame: 'wgs84' | 'local'; readonly origin: { readonly lon: number; readonly lat: number; readonly h_m: number } | null;
   readonly n_ranges: number; readonly n_fixes: number; readonly anchors_found: number; readonly anchors_converged: number; readonly range_rate_hz: number | null;
+  readonly fixes_refused: Readonly<Record<string, number>>;  ///< by reason
 }
 export interface DeviceMsg { readonly network_id: string; readonly kind: string; readonly state: 'live' | 'late' | 'lost'; readonly last_seen_us: number | null; readonly rate_hz: number | null }
 export interface SystemMsg { readonly t_us: number; readonly recording: boolean; readonly queue_depth: number | null; readonly db_bytes: number | null; readonly disk_free_bytes: number | null; readonly ws_clients: number | null; readonly synchronous: string }
@@ -102,6 +103,7 @@ export function mission(v: unknown): MissionMsg | null {
   return {
     mission: str(o.mission), name: str(o.name), state: word(o.state, ['planned', 'recording', 'finished'] as const, 'recording'), t_us: count(o.t_us), started_us: num(o.started_us), frame: word(o.frame, ['wgs84', 'local'] as const, 'wgs84'),
     origin: lon == null || lat == null || h_m == null ? null : { lon, lat, h_m }, n_ranges: count(o.n_ranges), n_fixes: count(o.n_fixes), anchors_found: count(o.anchors_found), anchors_converged: count(o.anchors_converged), range_rate_hz: num(o.range_rate_hz),
+    fixes_refused: Object.fromEntries(Object.entries(obj(o.fixes_refused) ?? {}).map(([reason, n]) => [reason, count(n)])),
   };
 }
 export function device(v: unknown): DeviceMsg | null {
