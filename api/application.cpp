@@ -50,7 +50,8 @@ struct Application::State {
         prompt(deps.access_store, late),
         steady(deps.steady != nullptr ? *deps.steady : system_steady_clock()),
         running(deps.service, steady),
-        router(&deps.access_store, [this] { return running.now_ns(); }, &prompt),
+        router(
+            &deps.access_store, [this] { return running.now_ns(); }, &prompt),
         hub(deps.clock, "anchord " + deps.build.version),
         events(hub, deps.clock),
         alarms(events),

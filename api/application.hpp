@@ -95,11 +95,11 @@ class Application {
     std::function<std::string()> metrics_text{};  ///< Prometheus text of the server, appended to ours
     std::function<void(std::string_view request_id, std::string_view what)> log_fault{};
     LearningStores* learning{nullptr};  ///< null: the routes of learning do not exist (tests)
-    MissionBin* bin{nullptr};             ///< null: no mission can be deleted (tests)
-    ServiceStore* service{nullptr};       ///< null: running time and whose the devices are end with the process
-    const SteadyClock* steady{nullptr};   ///< what every duration is measured by; null: the system's
+    MissionBin* bin{nullptr};           ///< null: no mission can be deleted (tests)
+    ServiceStore* service{nullptr};     ///< null: running time and whose the devices are end with the process
+    const SteadyClock* steady{nullptr};  ///< what every duration is measured by; null: the system's
     std::int64_t keep_deleted_ns{30LL * 86'400 * 1'000'000'000};  ///< a deleted mission, in running time
-    bool housekeeping_by_hand{false};     ///< set: keep_house() is called by hand (tests)
+    bool housekeeping_by_hand{false};  ///< set: keep_house() is called by hand (tests)
     std::string model_key{};       ///< 64 hex digits, what models are signed with; empty: none are (tests)
     bool model_key_is_new{false};  ///< models of before it existed are signed at the start
     RunWork run_work{};            ///< runs heavy work; absent: on the job's own thread

@@ -22,15 +22,16 @@ enum class Keeps : std::uint8_t {
   always,   ///< kept; beyond the quota the token's oldest go: a command or a measurement is never refused
 };
 
-/// Idempotency-Key of POST: the answer is kept by (principal, key) for 24 h of running time. The same key with
-/// another request is 422, a request still running 409. Only answers of 2xx and 3xx are kept: what was refused
-/// changed nothing and may be tried again. Thread-safe.
+/// Idempotency-Key of POST: the answer is kept by (principal, key) for 24 h of running time. The same key
+/// with another request is 422, a request still running 409. Only answers of 2xx and 3xx are kept: what was
+/// refused changed nothing and may be tried again. Thread-safe.
 class Idempotency {
  public:
   static constexpr std::int64_t k_keep_ns = 24LL * 3600 * 1'000'000'000;
-  static constexpr std::size_t k_max_answers = 2000;             ///< of one token
-  static constexpr std::uint64_t k_max_bytes = 8ULL << 20;       ///< of one token, bodies
-  static constexpr std::size_t k_max_answer_bytes = 64U << 10;  ///< a larger body is not kept, only that it was done
+  static constexpr std::size_t k_max_answers = 2000;        ///< of one token
+  static constexpr std::uint64_t k_max_bytes = 8ULL << 20;  ///< of one token, bodies
+  static constexpr std::size_t k_max_answer_bytes =
+      64U << 10;  ///< a larger body is not kept, only that it was done
 
   /// running_ns: running time of the service (RunningTime).
   Idempotency(AccessStore& answers, std::function<std::int64_t()> running_ns)

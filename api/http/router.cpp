@@ -282,7 +282,8 @@ Response Router::dispatch(const Route& route, Request& request) const {
   if (!request.request_id.empty()) response.header("X-Request-Id", request.request_id);
   if (!has_header(response, "Cache-Control")) {
     // A browser may keep an answer and asks each time whether it still holds; positions are not for proxies.
-    const bool kept = response.status < 400 && (request.method == Method::get || request.method == Method::head);
+    const bool kept =
+        response.status < 400 && (request.method == Method::get || request.method == Method::head);
     response.header("Cache-Control", kept ? "private, no-cache" : "no-store");
   }
   return response;

@@ -45,7 +45,8 @@ struct Route {
   bool streams_body{false};    ///< the handler pulls Request::body_stream instead of reading body
   bool needs_if_match{false};  ///< 428 without the header; the handler compares it
   Work work{Work::ordinary};
-  /// Where the body decides (actions of a mission); asked on an io thread, with the whole body. Else `work` holds.
+  /// Where the body decides (actions of a mission); asked on an io thread, with the whole body. Else `work`
+  /// holds.
   std::function<Work(const Request&)> work_of{};
   Keeps keeps{Keeps::answer};  ///< of POST, for its Idempotency-Key
   Work work_for(const Request& request) const { return work_of ? work_of(request) : work; }
@@ -77,7 +78,8 @@ struct Resolution {
 class Router {
  public:
   /// Where answers to Idempotency-Key are kept, and running time to age them by; without both the header is
-  /// ignored (tests). `prompt` keeps those of commands, which must not wait for the disk; null: as the others.
+  /// ignored (tests). `prompt` keeps those of commands, which must not wait for the disk; null: as the
+  /// others.
   explicit Router(AccessStore* answers = nullptr, std::function<std::int64_t()> running_ns = {},
                   AccessStore* prompt = nullptr);
   ~Router();

@@ -26,13 +26,14 @@ Ordered network_id(const DeviceReport& d) {
   return d.network_id ? Ordered(to_string(*d.network_id)) : Ordered(nullptr);
 }
 
-/// A secret is a value that comes and never goes back. A file of the server is not named over REST: whoever may
-/// set up devices must not be able to have any file read and sent to an address of his choice.
+/// A secret is a value that comes and never goes back. A file of the server is not named over REST: whoever
+/// may set up devices must not be able to have any file read and sent to an address of his choice.
 void check_secret(const Json& options, Json& merged, std::vector<FieldError>& errors) {
   if (options.contains("password_file")) {
-    errors.push_back({"/options/password_file", "refused",
-                      "a file of the server is not named over REST: send the password itself as "
-                      "options.password; it is kept in a file that only the server reads and never returned"});
+    errors.push_back(
+        {"/options/password_file", "refused",
+         "a file of the server is not named over REST: send the password itself as "
+         "options.password; it is kept in a file that only the server reads and never returned"});
   }
   const auto given = options.find("password");
   if (given == options.end()) return;
@@ -41,8 +42,9 @@ void check_secret(const Json& options, Json& merged, std::vector<FieldError>& er
     return;
   }
   const auto* text = given->is_string() ? given->get_ptr<const Json::string_t*>() : nullptr;
-  const bool plain = text != nullptr && text->size() <= 200 &&
-                     std::none_of(text->begin(), text->end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; });
+  const bool plain =
+      text != nullptr && text->size() <= 200 &&
+      std::none_of(text->begin(), text->end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; });
   if (!plain)
     errors.push_back({"/options/password", "out_of_range",
                       "must be a text of at most 200 bytes without control characters; empty: forget it"});

@@ -184,7 +184,8 @@ Ordered gate_json(const GateReport& gate) {
                       {"current", maybe(check.current)},
                       {"passed", check.passed},
                       {"basis", check.basis}});
-  return {{"passed", gate.passed}, {"standing", gate.standing}, {"why", gate.why}, {"checks", std::move(checks)}};
+  return {
+      {"passed", gate.passed}, {"standing", gate.standing}, {"why", gate.why}, {"checks", std::move(checks)}};
 }
 
 Ordered judgement_json(const RangeJudgement& j) {

@@ -46,7 +46,7 @@ class Conversation final : public WsHandler, private HubListener {
   std::optional<std::pair<std::uint16_t, std::string>> close_;
   std::map<std::uint64_t, Topic> subscriptions_;  ///< touched by the session's strand alone
   std::uint64_t next_sub_{100};
-  unsigned ticks_{0};  ///< of the hub; touched under its lock alone
+  unsigned ticks_{0};         ///< of the hub; touched under its lock alone
   HubMembership membership_;  ///< from on_open to on_close; last, so that it ends before what the hub calls
 };
 

@@ -135,7 +135,8 @@ Resumed HubMembership::subscribe(Topic topic,
 }
 
 void HubMembership::unsubscribe(Topic topic) {
-  ANCHORD_CHECK(hub_ != nullptr, "the end of a subscription to " << info(topic).name << " without a membership");
+  ANCHORD_CHECK(hub_ != nullptr,
+                "the end of a subscription to " << info(topic).name << " without a membership");
   hub_->unsubscribe(*listener_, topic);
 }
 

@@ -87,9 +87,9 @@ class HubListener {
 class Hub;
 struct Resumed;
 
-/// One listener's place among the clients of a hub: as long as it lives the listener is told, and nobody without
-/// one can subscribe. Its end takes the listener out of everything, and waits for a call that is under way; never
-/// end it inside a call of the hub to this listener. One thread at a time.
+/// One listener's place among the clients of a hub: as long as it lives the listener is told, and nobody
+/// without one can subscribe. Its end takes the listener out of everything, and waits for a call that is
+/// under way; never end it inside a call of the hub to this listener. One thread at a time.
 class HubMembership {
  public:
   HubMembership() = default;

@@ -173,17 +173,17 @@ void add_access_routes(Router& router, AccessService& access) {
       {post, "/api/v1/tokens", admin, [&access](const Request& r) { return create_token(access, r); }}));
   router.add(
       {del, "/api/v1/tokens/{id}", admin, [&access](const Request& r) { return revoke_token(access, r); }});
-  router.add(keeps_nothing(
-      {post, "/api/v1/session", Access::open(), [&access](const Request& r) { return login(access, r); }, 4096}));
+  router.add(keeps_nothing({post, "/api/v1/session", Access::open(),
+                            [&access](const Request& r) { return login(access, r); }, 4096}));
   router.add(
       {del, "/api/v1/session", Access::open(), [&access](const Request& r) { return logout(access, r); }});
   router.add({get, "/api/v1/me", Access::any_token(),
               [](const Request& r) { return answer(200, principal_json(r.principal)); }});
-  router.add(keeps_nothing({post, "/api/v1/ws-tickets", Access::any_token(), [&access](const Request& r) {
-                return answer(201, {{"ticket", access.make_ticket(access.login_of(
-                                        r.principal, cookie_of(r)))},
-                                    {"expires_in_s", access.options().ticket_lifetime.count()}});
-              }}));
+  router.add(keeps_nothing(
+      {post, "/api/v1/ws-tickets", Access::any_token(), [&access](const Request& r) {
+         return answer(201, {{"ticket", access.make_ticket(access.login_of(r.principal, cookie_of(r)))},
+                             {"expires_in_s", access.options().ticket_lifetime.count()}});
+       }}));
 }
 
 }  // namespace anchord::api

@@ -284,7 +284,8 @@ void add_campaign_routes(Router& router, LearningServices& l) {
   router.add(as_heavy({Method::patch, "/api/v1/ranges", Access::any_of({Role::engineer}), on(label)}));
   router.add(as_heavy({Method::get, "/api/v1/campaigns/{id}/samples", readers(), on(samples)}));
   router.add({Method::get, "/api/v1/campaigns/{id}/samples/{sample}/cir", readers(), on(sample_cir)});
-  router.add(as_heavy({Method::post, "/api/v1/campaigns/{id}/samples", writers, on(import), k_max_import_bytes}));
+  router.add(
+      as_heavy({Method::post, "/api/v1/campaigns/{id}/samples", writers, on(import), k_max_import_bytes}));
 }
 
 }  // namespace anchord::api

@@ -109,9 +109,9 @@ Response revision_diff(Services& s, const Request& request) {
 
 void add_comparison_routes(Router& router, Services& s) {
   router.add(as_heavy({Method::get, "/api/v1/calibrations/{id}/diff", readers(),
-              [&s](const Request& request) { return calibration_diff(s, request); }}));
+                       [&s](const Request& request) { return calibration_diff(s, request); }}));
   router.add(as_heavy({Method::get, "/api/v1/revisions/{number}/diff", readers(),
-              [&s](const Request& request) { return revision_diff(s, request); }}));
+                       [&s](const Request& request) { return revision_diff(s, request); }}));
 }
 
 }  // namespace anchord::api

@@ -69,8 +69,7 @@ Response purge(Services& s, const Request& request, const MissionId& id) {
 
 void refuse_in_use(Services& s, const Mission& mission) {
   if (s.flights != nullptr && s.flights->flies(mission.id))
-    throw_problem(409, "conflict",
-                  mission.name + " is in the air: land and finish it, then delete it");
+    throw_problem(409, "conflict", mission.name + " is in the air: land and finish it, then delete it");
   if (mission.state == MissionState::recording)
     throw_problem(409, "conflict",
                   mission.name + R"( records: finish it first (POST actions {"action":"finish"}))");
@@ -89,8 +88,7 @@ Response remove(Services& s, const Request& request) {
     require_control(s, request, id, std::string(request.header("anchord-lease")),
                     "deleting a mission needs the role admin, or control of it with its lease in the header "
                     "Anchord-Lease");
-  value_or_problem(
-      bin(s).put(id, s.deps.clock.now(), s.running->now_ns(), request.principal.name));
+  value_or_problem(bin(s).put(id, s.deps.clock.now(), s.running->now_ns(), request.principal.name));
   s.missions.forget(id);
   if (s.flights != nullptr && s.flights->flies(id)) {  // it took off between the look and the deed
     value_or_problem(bin(s).restore(id));
@@ -98,8 +96,7 @@ Response remove(Services& s, const Request& request) {
   }
   // Control of what is gone is nobody's: the aircraft is free for another flight at once.
   if (s.flights != nullptr)
-    (void)s.flights
-        ->release_control(id, std::string(request.header("anchord-lease")), request.principal)
+    (void)s.flights->release_control(id, std::string(request.header("anchord-lease")), request.principal)
         .has_value();
   s.audit(request, "mission.delete " + to_string(id));
   s.events.add("warning", "mission.deleted", mission.name + " was deleted by " + request.principal.name, id);

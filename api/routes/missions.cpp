@@ -69,8 +69,7 @@ DevicesWanted read_devices_wanted(const Request& request, nlohmann::json& body,
   Fields fields(mine, "", errors);
   wanted.take = fields.boolean("take_devices").value_or(false);
   wanted.lease = fields.text("lease", 64).value_or("");
-  if (wanted.take && !wanted.any)
-    fields.error("take_devices", "contradiction", "contradicts devices=false");
+  if (wanted.take && !wanted.any) fields.error("take_devices", "contradiction", "contradicts devices=false");
   return wanted;
 }
 
@@ -128,7 +127,8 @@ Response take_devices(Services& s, const Request& request, const Mission& missio
   if (mission.state != MissionState::recording)
     throw_problem(422, "state", mission.name + " does not record: devices are for a mission that does");
   if (mission.frame != TrackFrame::wgs84)
-    throw_problem(422, "state", mission.name + " is in a local frame: a rover's positions have no place in it");
+    throw_problem(422, "state",
+                  mission.name + " is in a local frame: a rover's positions have no place in it");
   require_right_to_take(s, request, mission.id, lease);
   s.stream->take(mission, request.principal.name);
   s.audit(request, "mission.take_devices " + to_string(mission.id));

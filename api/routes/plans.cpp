@@ -187,7 +187,8 @@ void add_plan_routes(Router& router, Services& s) {
   router.add({Method::get, "/api/v1/plans", readers(), on(list)});
   router.add({Method::post, "/api/v1/plans", op, on(create), k_body});
   router.add(keeps_nothing(as_heavy({Method::post, "/api/v1/plans/generate", op, on(generate), k_body})));
-  router.add(keeps_nothing(as_heavy({Method::post, "/api/v1/plans/validate", op, on(validate_body), k_body})));
+  router.add(
+      keeps_nothing(as_heavy({Method::post, "/api/v1/plans/validate", op, on(validate_body), k_body})));
   router.add(as_heavy({Method::post, "/api/v1/plans/import", op, on(import), k_body}));
   router.add({Method::get, "/api/v1/plans/{id}", readers(), [&s](const Request& request) {
                 check_query(request, {});

@@ -91,7 +91,8 @@ Response document(std::string_view text) {
 Response audit_log(Services& s, const Request& request) {
   check_query(request, {"limit"});
   Ordered items = Ordered::array();
-  for (const auto& entry : value_or_problem((s.prompt != nullptr ? *s.prompt : s.deps.access_store).audit(page_query(request).limit))) {
+  for (const auto& entry : value_or_problem(
+           (s.prompt != nullptr ? *s.prompt : s.deps.access_store).audit(page_query(request).limit))) {
     items.push_back({{"at", to_rfc3339(entry.time)},
                      {"who", entry.who},
                      {"what", entry.what},

@@ -146,7 +146,7 @@ void add_training_run_routes(Router& router, LearningServices& l) {
   router.add({Method::post, base + "/{id}/restart", engineer, on(restart)});
   for (const char* name : {"folds", "grid", "importance", "selection", "confusion", "roc", "cdf"}) {
     router.add(as_heavy({Method::get, base + "/{id}/" + name, readers(),
-                [&l, name](const Request& request) { return part(l, request, name); }}));
+                         [&l, name](const Request& request) { return part(l, request, name); }}));
   }
   router.add(as_heavy({Method::get, base + "/{id}/predictions", readers(), on(predictions)}));
 }

@@ -75,8 +75,8 @@ class AccessService {
 
   /// `cookie`: of the browser session that asks; empty: it is a token.
   Login login_of(const Principal& who, std::string_view cookie) const;
-  /// Does it still open what it opened? False once its token was revoked or has expired, its roles are others, or
-  /// its session has ended. Never waits: for every tick of every stream.
+  /// Does it still open what it opened? False once its token was revoked or has expired, its roles are
+  /// others, or its session has ended. Never waits: for every tick of every stream.
   bool holds(const Login& login) const;
 
   std::string make_ticket(Login login);

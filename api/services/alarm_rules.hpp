@@ -12,8 +12,8 @@
 
 namespace anchord::api {
 
-/// How a flight that records stands now. Measured times are of the rows, arrivals of the steady clock: silence
-/// is a duration.
+/// How a flight that records stands now. Measured times are of the rows, arrivals of the steady clock:
+/// silence is a duration.
 struct FlightPulse {
   MissionId mission{};
   std::string name;

@@ -19,13 +19,8 @@ Result<Lease> ControlLease::take(const MissionId& mission, const Principal& who,
                                  bool by_force) {
   if (const auto held = holder(now); held && !by_force)
     return make_error(Errc::conflict, held->name + " has control since " + to_rfc3339(held->since));
-  lease_ = Lease{mission,
-                 to_string(make_uuid_v7(now.utc)),
-                 who.token_id,
-                 who.name,
-                 now.utc,
-                 {},
-                 later(now.steady, k_lasts_ns)};
+  lease_ = Lease{mission, to_string(make_uuid_v7(now.utc)), who.token_id, who.name, now.utc,
+                 {},      later(now.steady, k_lasts_ns)};
   return *holder(now);
 }
 

@@ -17,7 +17,7 @@ struct Lease {
   std::string key;  ///< known to the holder alone; two browsers of one person are two
   std::string token_id, name;
   UtcTime since{};
-  UtcTime until{};         ///< for people: by the system clock as it stood when this was read
+  UtcTime until{};            ///< for people: by the system clock as it stood when this was read
   SteadyTime until_steady{};  ///< what counts
 };
 /// Now, for a stamp and for a duration.
@@ -26,8 +26,8 @@ struct Moment {
   SteadyTime steady{};
 };
 
-/// The one lease of the one aircraft. Ends by itself unless it is renewed; every command renews it. Runs on the
-/// steady clock: no step of the system clock ends or prolongs it. Not thread-safe: its owner locks.
+/// The one lease of the one aircraft. Ends by itself unless it is renewed; every command renews it. Runs on
+/// the steady clock: no step of the system clock ends or prolongs it. Not thread-safe: its owner locks.
 class ControlLease {
  public:
   static constexpr std::int64_t k_lasts_ns = 60'000'000'000;

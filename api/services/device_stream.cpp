@@ -84,17 +84,17 @@ void DeviceStream::resume() {
   if (deps_.devices == nullptr || deps_.store == nullptr) return;
   const auto kept = deps_.store->device_stream();
   if (!kept) {
-    deps_.events.add("critical", "devices.not_resumed",
-                     "what the devices recorded into before the restart cannot be read: " +
-                         kept.error().message,
-                     {});
+    deps_.events.add(
+        "critical", "devices.not_resumed",
+        "what the devices recorded into before the restart cannot be read: " + kept.error().message, {});
     return;
   }
   const std::scoped_lock changing(changing_);
   std::vector<Holder> next;
   for (const auto& id : kept.value()) {
     const auto mission = deps_.missions.mission(id);
-    if (mission && mission.value().state == MissionState::recording) next.push_back({id, mission.value().name});
+    if (mission && mission.value().state == MissionState::recording)
+      next.push_back({id, mission.value().name});
   }
   change(std::move(next));
   if (const auto now = holder()) {

@@ -22,9 +22,9 @@ class EventLog;
 
 /// Which mission has the rows of this server's devices.
 ///
-/// The devices are one kit's and follow its flight: the first mission that records has them until it ends, and
-/// no other gets them by being created. Taking them is asked for by name, is an event and an alarm on both
-/// missions, and is undone when the taker ends. Kept over a restart. Thread-safe.
+/// The devices are one kit's and follow its flight: the first mission that records has them until it ends,
+/// and no other gets them by being created. Taking them is asked for by name, is an event and an alarm on
+/// both missions, and is undone when the taker ends. Kept over a restart. Thread-safe.
 class DeviceStream {
  public:
   /// devices null: this server has none, and nothing here does anything.

@@ -52,7 +52,7 @@ class FlightService final : public MissionObserver {
     const Clock& clock;
     Drone* drone{nullptr};  ///< null: flown by hand ("manual")
     std::function<StorageStatus()> storage;
-    std::function<double()> now_s{};  ///< steady seconds; set: no thread, the owner calls step() (tests)
+    std::function<double()> now_s{};     ///< steady seconds; set: no thread, the owner calls step() (tests)
     const SteadyClock* steady{nullptr};  ///< what the lease runs on; null: the system's
   };
   explicit FlightService(Deps deps);

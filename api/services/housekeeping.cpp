@@ -14,7 +14,8 @@ using Steady = std::chrono::steady_clock;
 
 constexpr auto k_every = std::chrono::seconds(60);
 constexpr auto k_pause = std::chrono::milliseconds(40);
-// Rows of one slice: begun small and grown while a slice stays well below the 50 ms an ingest may wait for it.
+// Rows of one slice: begun small and grown while a slice stays well below the 50 ms an ingest may wait for
+// it.
 constexpr std::size_t k_first_rows = 200, k_fewest_rows = 20, k_most_rows = 2000;
 constexpr auto k_quick = std::chrono::milliseconds(15), k_slow = std::chrono::milliseconds(40);
 

@@ -18,7 +18,8 @@ class EventLog;
 class RunningTime;
 
 /// What is removed after its time, little by little on a thread of its own: deleted missions, kept answers. A
-/// slice is one short transaction and is followed by a pause, so that a flight that records never waits for it.
+/// slice is one short transaction and is followed by a pause, so that a flight that records never waits for
+/// it.
 class Housekeeping {
  public:
   struct Deps {

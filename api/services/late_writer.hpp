@@ -17,10 +17,10 @@
 
 namespace anchord::api {
 
-/// Writes that their sender waits for only a moment: a command to an aircraft is answered although the disk is
-/// slow, and its line in the audit log follows. One thread, in order. A write that fails because the store is in
-/// trouble is tried again until it succeeds; at most 4096 wait, then the oldest is lost, which is logged.
-/// Thread-safe.
+/// Writes that their sender waits for only a moment: a command to an aircraft is answered although the disk
+/// is slow, and its line in the audit log follows. One thread, in order. A write that fails because the store
+/// is in trouble is tried again until it succeeds; at most 4096 wait, then the oldest is lost, which is
+/// logged. Thread-safe.
 class LateWriter {
  public:
   using Write = std::function<Result<void>()>;

@@ -27,10 +27,10 @@ std::optional<int> LoginGuard::failed(std::string_view token_text, std::string_v
   const std::string token(public_part(token_text)), from(address);
   const std::lock_guard lock(mutex_);
   std::optional<int> wait;
-  for (const auto& one : {take("both " + token + ' ' + from, k_both, k_both / k_minute_s, now),
-                          take("address " + from, k_address, k_address / k_minute_s, now),
-                          token == "other" ? std::nullopt
-                                           : take("token " + token, k_token, k_token / k_minute_s, now)}) {
+  for (const auto& one :
+       {take("both " + token + ' ' + from, k_both, k_both / k_minute_s, now),
+        take("address " + from, k_address, k_address / k_minute_s, now),
+        token == "other" ? std::nullopt : take("token " + token, k_token, k_token / k_minute_s, now)}) {
     if (one) wait = std::max(wait.value_or(0), *one);
   }
   return wait;
@@ -51,7 +51,8 @@ std::optional<int> LoginGuard::take(const std::string& name, double burst, doubl
   bucket.level = std::min(burst, bucket.level + elapsed_s * per_s) - 1;
   bucket.seen = now;
   if (bucket.level >= 0) return std::nullopt;
-  // Below zero: every failure makes the wait longer, to a bound, so that a mistake of yesterday is over today.
+  // Below zero: every failure makes the wait longer, to a bound, so that a mistake of yesterday is over
+  // today.
   bucket.level = std::max(bucket.level, -k_longest_wait_s * per_s);
   return std::max(1, static_cast<int>(std::ceil(-bucket.level / per_s)));
 }

@@ -10,10 +10,10 @@
 
 namespace anchord::api {
 
-/// Slows whoever sends secrets that are wrong: per token and address, per address, and per token from everywhere.
-/// Counts only failures, and is asked only about them, so that nobody's bad tries refuse a secret that is right.
-/// The wait grows with every further failure, up to a minute. Bounded: who was idle longest is forgotten. Steady
-/// clock. Thread-safe.
+/// Slows whoever sends secrets that are wrong: per token and address, per address, and per token from
+/// everywhere. Counts only failures, and is asked only about them, so that nobody's bad tries refuse a secret
+/// that is right. The wait grows with every further failure, up to a minute. Bounded: who was idle longest is
+/// forgotten. Steady clock. Thread-safe.
 class LoginGuard {
  public:
   using Clock = std::chrono::steady_clock;

@@ -59,7 +59,7 @@ class MissionService {
     std::function<std::optional<RangeModel>(const Range&)> judge{};
     std::function<bool()> judge_needs_cir{};
     bool site_outline{true};  ///< joint solutions take the site's outline as a clue: anchors are inside
-    const SteadyClock* steady{nullptr};  ///< what silence is measured by; null: the system's
+    const SteadyClock* steady{nullptr};   ///< what silence is measured by; null: the system's
     ExclusionStore* exclusions{nullptr};  ///< null: nothing is ever excluded (tests)
     TrackLimits track{};                  ///< what the positions of a flight are held against
   };

@@ -11,8 +11,9 @@ class ServiceStore;
 namespace anchord::api {
 
 /// How long this database has been served, over all starts: what "24 h" and "30 days" mean where a record
-/// outlives the process. Only running makes it pass, so that no step of the system clock empties a bin. A crash
-/// loses what passed since the last keep(), at most a minute: things last that much longer. Thread-safe.
+/// outlives the process. Only running makes it pass, so that no step of the system clock empties a bin. A
+/// crash loses what passed since the last keep(), at most a minute: things last that much longer.
+/// Thread-safe.
 class RunningTime {
  public:
   /// Without a store it counts from this start (tests).

@@ -5,17 +5,20 @@
 
 namespace anchord {
 
-/// An instant of a clock that nobody sets: nanoseconds since an arbitrary start, the same for the whole process.
+/// An instant of a clock that nobody sets: nanoseconds since an arbitrary start, the same for the whole
+/// process.
 struct SteadyTime {
   std::int64_t ns{};
   auto operator<=>(const SteadyTime&) const = default;
 };
 
-constexpr double seconds_between(SteadyTime a, SteadyTime b) { return static_cast<double>(b.ns - a.ns) * 1e-9; }
+constexpr double seconds_between(SteadyTime a, SteadyTime b) {
+  return static_cast<double>(b.ns - a.ns) * 1e-9;
+}
 constexpr SteadyTime later(SteadyTime t, std::int64_t ns) { return {t.ns + ns}; }
 
-/// Where durations come from: leases, tickets, sessions, schedules, silence. Clock (core/base/time.hpp) is for
-/// stamps alone, for a person or NTP may set it by years at any moment.
+/// Where durations come from: leases, tickets, sessions, schedules, silence. Clock (core/base/time.hpp) is
+/// for stamps alone, for a person or NTP may set it by years at any moment.
 class SteadyClock {
  public:
   virtual ~SteadyClock() = default;

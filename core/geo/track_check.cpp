@@ -31,7 +31,8 @@ void check_stamps(std::span<const Fix> fixes, const TrackLimits& limits, std::ve
     if (refusals[i] == FixRefusal::none) order.push_back(i);
   }
   if (order.size() < 2 * k_neighbours + 1) return;
-  const bool received = std::ranges::all_of(order, [&](std::size_t i) { return fixes[i].received.has_value(); });
+  const bool received =
+      std::ranges::all_of(order, [&](std::size_t i) { return fixes[i].received.has_value(); });
   if (received) std::ranges::stable_sort(order, {}, [&](std::size_t i) { return fixes[i].received->ns; });
   std::size_t ascending = 0;
   for (std::size_t k = 1; k < order.size(); ++k)

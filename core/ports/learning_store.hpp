@@ -110,9 +110,9 @@ struct StoredModel {
   ModelId id{};
   std::string task;  ///< nlos_id, los_bias, nlos_bias, bias
   std::string method;
-  std::string sha256_hex;              ///< of the artifact
-  std::string manifest_json;           ///< of the artifact: features, scaler, data digest, seed, metrics
-  std::string signature{};             ///< of this server's key over the artifact; empty: nobody vouches for it
+  std::string sha256_hex;     ///< of the artifact
+  std::string manifest_json;  ///< of the artifact: features, scaler, data digest, seed, metrics
+  std::string signature{};    ///< of this server's key over the artifact; empty: nobody vouches for it
   std::optional<TrainingRunId> run{};  ///< absent: uploaded
   UtcTime created{};
   std::string created_by;

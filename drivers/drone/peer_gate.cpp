@@ -46,8 +46,8 @@ void PeerGate::note(const std::string& sender, mavlink::Address from, const std:
 }
 
 /// The frames in it; what was refused is counted, and noted with its sender.
-std::vector<mavlink::Received> PeerGate::read(mavlink::Framer& framer, const std::string& sender, double now_s,
-                                              std::span<const std::uint8_t> bytes) {
+std::vector<mavlink::Received> PeerGate::read(mavlink::Framer& framer, const std::string& sender,
+                                              double now_s, std::span<const std::uint8_t> bytes) {
   const auto refused = [&] { return framer.counters().unsigned_refused + framer.counters().bad_signature; };
   const auto before = refused();
   std::vector<mavlink::Received> in;

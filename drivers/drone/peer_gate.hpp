@@ -15,8 +15,8 @@
 namespace anchord::drone {
 
 /// Who on the link is the aircraft. The first autopilot whose heartbeat is heard is taken, and kept until its
-/// heartbeat has been missing for 10 s or a person changes it; an aircraft that was armed when it fell silent is
-/// followed by its own system id alone. With a key only signed frames count. Everybody else is counted.
+/// heartbeat has been missing for 10 s or a person changes it; an aircraft that was armed when it fell silent
+/// is followed by its own system id alone. With a key only signed frames count. Everybody else is counted.
 ///
 /// Pure: datagrams (or pieces of a stream, whose sender is "") and time in, a verdict out. Not thread-safe.
 class PeerGate {

@@ -22,22 +22,23 @@ int digit(char c) {
 Result<mavlink::Secret> parse_signing_key(std::string_view text) {
   mavlink::Secret out{};
   if (text.size() == out.size()) {
-    std::transform(text.begin(), text.end(), out.begin(), [](char c) { return static_cast<std::uint8_t>(c); });
+    std::transform(text.begin(), text.end(), out.begin(),
+                   [](char c) { return static_cast<std::uint8_t>(c); });
     return out;
   }
   while (!text.empty() && std::string_view(" \t\r\n").find(text.back()) != std::string_view::npos)
     text.remove_suffix(1);
   if (text.size() != 2 * out.size()) {
-    return make_error(Errc::invalid_argument, "a MAVLink signing key is 64 hexadecimal digits or 32 bytes; this "
-                                              "file has " +
-                                                  std::to_string(text.size()) + " characters");
+    return make_error(Errc::invalid_argument,
+                      "a MAVLink signing key is 64 hexadecimal digits or 32 bytes; this "
+                      "file has " +
+                          std::to_string(text.size()) + " characters");
   }
   for (std::size_t i = 0; i < out.size(); ++i) {
     const int high = digit(text[2 * i]), low = digit(text[2 * i + 1]);
     if (high < 0 || low < 0)
-      return make_error(Errc::invalid_argument,
-                        "character " + std::to_string(2 * i + (high < 0 ? 1 : 2)) +
-                            " of the MAVLink signing key is no hexadecimal digit");
+      return make_error(Errc::invalid_argument, "character " + std::to_string(2 * i + (high < 0 ? 1 : 2)) +
+                                                    " of the MAVLink signing key is no hexadecimal digit");
     out[i] = static_cast<std::uint8_t>(high << 4 | low);
   }
   return out;
@@ -45,8 +46,7 @@ Result<mavlink::Secret> parse_signing_key(std::string_view text) {
 
 Result<mavlink::Secret> read_signing_key(const std::string& file) {
   struct stat found {};
-  if (::stat(file.c_str(), &found) != 0)
-    return make_error(Errc::not_found, file + ": there is no such file");
+  if (::stat(file.c_str(), &found) != 0) return make_error(Errc::not_found, file + ": there is no such file");
   if ((found.st_mode & (S_IRWXG | S_IRWXO)) != 0)
     return make_error(Errc::invalid_argument,
                       file + ": others may read this key; set its permissions to 0600 (chmod 600)");

@@ -70,8 +70,8 @@ Error explained(const std::string& path, int error) {
   }
 }
 
-/// Opening alone makes some devices act (a watchdog resets the machine), and an address may come from whoever may
-/// set up devices: only what the system calls a terminal line is opened.
+/// Opening alone makes some devices act (a watchdog resets the machine), and an address may come from whoever
+/// may set up devices: only what the system calls a terminal line is opened.
 bool terminal_line(const std::string& path) {
   struct stat info {};
   if (::stat(path.c_str(), &info) != 0 || !S_ISCHR(info.st_mode)) return false;

@@ -78,7 +78,8 @@ class UdpLink final : public ByteLink {
       socket.async_receive_from(
           asio::buffer(buffer), sender, [self = shared_from_this()](ErrorCode error, std::size_t n) {
             if (self->shared->closed) return;
-            if (!error && self->welcome({self->buffer.data(), n})) self->shared->took({self->buffer.data(), n});
+            if (!error && self->welcome({self->buffer.data(), n}))
+              self->shared->took({self->buffer.data(), n});
             if (self->shared->closed) return;
             // "Connection refused" is the echo of a datagram that nobody took: the device may come yet.
             if (error && error != asio::error::connection_refused && error != asio::error::message_size) {

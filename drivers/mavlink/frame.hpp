@@ -52,8 +52,8 @@ class Packer {
   std::uint64_t timestamp_{0};
 };
 
-/// Who signed what last: the time stamp must grow per sender and link, and a sender that is new may be at most
-/// one minute behind. Shared by framers that read pieces of one link.
+/// Who signed what last: the time stamp must grow per sender and link, and a sender that is new may be at
+/// most one minute behind. Shared by framers that read pieces of one link.
 class SignatureBook {
  public:
   explicit SignatureBook(const Secret& secret) : secret_(secret) {}

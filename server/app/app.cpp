@@ -224,8 +224,8 @@ void App::State::compose() {
   pool =
       std::make_unique<WorkerPool>("anchord-work", config.count("http.workers"), config.count("http.queue"));
   stream_pool = std::make_unique<WorkerPool>("anchord-upload", config.count("http.upload_workers"), 64);
-  // Commands compute nothing and wait for nothing, so few threads do; what else belongs to flying may wait for
-  // the disk, and must not make them wait.
+  // Commands compute nothing and wait for nothing, so few threads do; what else belongs to flying may wait
+  // for the disk, and must not make them wait.
   command_pool = std::make_unique<WorkerPool>("anchord-command", 4, 256);
   flight_pool = std::make_unique<WorkerPool>("anchord-flight", 4, 64);
   heavy_pool = std::make_unique<WorkerPool>("anchord-heavy", config.count("http.heavy_workers"),
@@ -267,8 +267,8 @@ void App::State::compose() {
   deps.run_work = work_in_process();
   deps.bin = &database->bin();
   deps.service = &database->service();
-  deps.keep_deleted_ns = static_cast<std::int64_t>(config.count("missions.keep_deleted_days")) * 86'400 *
-                         1'000'000'000;
+  deps.keep_deleted_ns =
+      static_cast<std::int64_t>(config.count("missions.keep_deleted_days")) * 86'400 * 1'000'000'000;
   deps.post = [this](std::function<void()> task) {
     if (!live_pool->try_submit(task)) task();  // a full queue slows the sender, loses nothing
   };

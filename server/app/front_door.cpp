@@ -78,8 +78,8 @@ api::Response FrontDoor::wrong_secret(const api::Request& request, std::string_v
   const auto wait_s = access_.guard().failed(secret, request.remote, api::LoginGuard::Clock::now());
   if (!wait_s) return problem(401, "unauthorized", std::string(what));
   auto response = problem(429, "rate-limited",
-                          "too many wrong tokens from " + request.remote + "; wait " + std::to_string(*wait_s) +
-                              " s (a right one is taken at once)");
+                          "too many wrong tokens from " + request.remote + "; wait " +
+                              std::to_string(*wait_s) + " s (a right one is taken at once)");
   response.header("Retry-After", std::to_string(*wait_s));
   return response;
 }
@@ -201,7 +201,8 @@ class HeldReader final : public api::BodyReader {
 
 }  // namespace
 
-/// The handler, and what it opens: a body that comes or goes in pieces ends within a piece of the login's end.
+/// The handler, and what it opens: a body that comes or goes in pieces ends within a piece of the login's
+/// end.
 api::Response FrontDoor::run(const api::Route& route, api::Request& request, const api::Login& login) {
   if (login.who.token_id.empty()) return router_.dispatch(route, request);
   const auto holds = [this, login] { return access_.holds(login); };

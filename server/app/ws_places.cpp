@@ -6,7 +6,8 @@ namespace anchord::server {
 
 WsPlaces::WsPlaces(WsPlaceLimits limits) : limits_(limits), state_(std::make_shared<State>()) {}
 
-std::variant<std::shared_ptr<void>, WsPlaces::Refusal> WsPlaces::take(const api::Principal& who, bool counted) {
+std::variant<std::shared_ptr<void>, WsPlaces::Refusal> WsPlaces::take(const api::Principal& who,
+                                                                      bool counted) {
   const bool flies = who.has(api::Role::op) || who.has(api::Role::admin);
   const std::size_t reserved = flies ? 0 : std::min(limits_.reserved, limits_.all / 2);
   const std::lock_guard lock(state_->mutex);

@@ -25,8 +25,9 @@ class WsPlaces {
   using Refusal = std::pair<std::uint16_t, std::string>;  ///< close code and reason
 
   explicit WsPlaces(WsPlaceLimits limits);
-  /// A place for as long as somebody holds it, or why there is none: 4029 (the token has all of its own), 1013
-  /// (the server is full). `counted`: does the token count by itself (not with login off, where all are one)?
+  /// A place for as long as somebody holds it, or why there is none: 4029 (the token has all of its own),
+  /// 1013 (the server is full). `counted`: does the token count by itself (not with login off, where all are
+  /// one)?
   std::variant<std::shared_ptr<void>, Refusal> take(const api::Principal& who, bool counted);
   std::size_t taken() const;
 

@@ -84,7 +84,8 @@ void add_backup_command(CLI::App& app, int& exit_code) {
   };
   common(command);
   command->add_option("--dir", options->dir, "where to put it, when no server runs [DATA_DIR/backups]");
-  command->add_option("--keep", options->keep, "how many whole ones to keep there, at least 7")->check(CLI::Range(1, 10'000));
+  command->add_option("--keep", options->keep, "how many whole ones to keep there, at least 7")
+      ->check(CLI::Range(1, 10'000));
   command->callback([&exit_code, options, command] {
     if (command->get_subcommands().empty()) exit_code = make(*options);
   });

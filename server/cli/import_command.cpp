@@ -4,9 +4,9 @@
 #include <string>
 
 #include "api/imports/flight_folder.hpp"
-#include "core/base/text.hpp"
 #include "api/json/exclusion_json.hpp"
 #include "api/json/flight_requests.hpp"
+#include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/flight_upload.hpp"
 #include "server/cli/progress.hpp"

@@ -22,7 +22,7 @@ int serve(const server::Config& config) {
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   signal(SIGPIPE, SIG_IGN);
   signal(SIGXFSZ, SIG_IGN);  // a file size limit is an answer (507), as a full disk is
-  umask(077);  // the database holds tokens and positions
+  umask(077);                // the database holds tokens and positions
 
   server::start_logging(config.text("log_level"));
   for (const auto& warning : config.warnings) server::log(server::LogLevel::warning, warning);

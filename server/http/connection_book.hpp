@@ -12,8 +12,8 @@ namespace anchord::server {
 
 class Connection;
 
-/// Every socket by its address, and those that wait for a request, oldest first: who comes when all places are
-/// taken gets the place of one that asks for nothing. Thread-safe.
+/// Every socket by its address, and those that wait for a request, oldest first: who comes when all places
+/// are taken gets the place of one that asks for nothing. Thread-safe.
 class ConnectionBook {
  public:
   ConnectionBook(std::size_t all, std::size_t per_address) : all_(all), per_address_(per_address) {}

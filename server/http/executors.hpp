@@ -13,7 +13,8 @@ namespace anchord::server {
 
 class WorkerPool;
 
-/// The pools that run handlers, by the class of the route. One that is absent is served by `ordinary` (tests).
+/// The pools that run handlers, by the class of the route. One that is absent is served by `ordinary`
+/// (tests).
 struct Executors {
   WorkerPool& ordinary;
   WorkerPool& uploads;  ///< handlers that wait for a body: a slow upload must not hold the others up

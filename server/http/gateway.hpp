@@ -38,7 +38,8 @@ struct Admission {
   std::uint64_t body_limit{0};
   bool streams_body{false};
   bool quick{false};  ///< never blocks: runs on the io thread
-  std::function<api::Work(const api::Request&)> work;  ///< which executor, once the body is whole; empty: ordinary
+  std::function<api::Work(const api::Request&)>
+      work;           ///< which executor, once the body is whole; empty: ordinary
   std::string share;  ///< whose share of heavy work it takes; empty: only the queue bounds it
   std::function<api::Response(api::Request&)> run;
   std::function<std::unique_ptr<WsPeer>()> websocket;  ///< set: complete the upgrade

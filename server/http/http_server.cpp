@@ -15,8 +15,9 @@ namespace {
 
 /// Answer to one who finds no place, without reading what he asks.
 std::string no_place(const std::string& why) {
-  const std::string body = R"({"type":"/problems/overloaded","title":"The server is overloaded","status":503,"detail":")" +
-                           why + R"(; try again"})";
+  const std::string body =
+      R"({"type":"/problems/overloaded","title":"The server is overloaded","status":503,"detail":")" + why +
+      R"(; try again"})";
   return "HTTP/1.1 503 Service Unavailable\r\nRetry-After: 5\r\nContent-Type: application/problem+json\r\n"
          "Content-Length: " +
          std::to_string(body.size()) + "\r\nConnection: close\r\n\r\n" + body;
@@ -84,7 +85,8 @@ struct HttpServer::State {
       }
       socket.set_option(tcp::no_delay(true), ignored);
       ++context->connections;
-      ConnectionSlot slot(nullptr, [context, place = std::move(entry.place)](void*) { --context->connections; });
+      ConnectionSlot slot(nullptr,
+                          [context, place = std::move(entry.place)](void*) { --context->connections; });
       start_http_session(std::move(socket), context, std::move(slot));
     }
   }

@@ -22,7 +22,7 @@ struct HttpLimits {
   std::size_t read_buffer_bytes{64 * 1024};  ///< reserved before a body: small reads cost twice the CPU
   std::size_t body_pipe_bytes{256 * 1024};   ///< between socket and a handler that streams
   std::size_t gzip_from_bytes{1024};
-  std::size_t heavy_per_token{8};  ///< computations of one token that wait or run; beyond: 429
+  std::size_t heavy_per_token{8};                 ///< computations of one token that wait or run; beyond: 429
   std::chrono::milliseconds keep_alive{75'000};   ///< idle between requests
   std::chrono::milliseconds head_time{10'000};    ///< first byte to last byte of a head
   std::chrono::milliseconds body_window{20'000};  ///< a body may fall behind its floor rate by this much

@@ -73,8 +73,8 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
   }
 
  private:
-  /// However the conversation ends (a close, an exception, the end of the io context), the peer is told before
-  /// the session can go: whoever wakes it from another thread must not be the one who destroys it.
+  /// However the conversation ends (a close, an exception, the end of the io context), the peer is told
+  /// before the session can go: whoever wakes it from another thread must not be the one who destroys it.
   class Conversing {
    public:
     explicit Conversing(WsSession& session) : session_(session) {}
@@ -116,8 +116,9 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
                                                      ignored);
   }
 
-  /// Beast answers a close with the code that came, and takes codes for good that RFC 6455 section 7.4.2 gives to
-  /// nobody (5000 and above). Called before it answers: an answer of our own, begun here, is the only one.
+  /// Beast answers a close with the code that came, and takes codes for good that RFC 6455 section 7.4.2
+  /// gives to nobody (5000 and above). Called before it answers: an answer of our own, begun here, is the
+  /// only one.
   void refuse_close_code() {
     const auto code = static_cast<std::uint16_t>(ws_.reason().code);
     if (code < 5000 || !ws_.is_open()) return;

@@ -71,7 +71,8 @@ std::vector<Backup> BackupKeeper::list() const {
     }
     out.push_back(std::move(backup));
   }
-  std::ranges::sort(out, std::ranges::greater{}, [](const Backup& b) { return std::tuple(b.sequence, b.made); });
+  std::ranges::sort(out, std::ranges::greater{},
+                    [](const Backup& b) { return std::tuple(b.sequence, b.made); });
   return out;
 }
 
@@ -151,8 +152,8 @@ bool BackupKeeper::due(std::uint64_t flights_ended) {
   const SteadyTime now = steady_now();
   const std::int64_t every_ns = static_cast<std::int64_t>(options_.every_h) * k_hour_ns;
   if (!newest_) {
-    // Without any, the day counts from the start: a fresh installation has nothing to lose yet. The age of one
-    // of an earlier start is the system clock's word; where it cannot be right, it is time for a new one.
+    // Without any, the day counts from the start: a fresh installation has nothing to lose yet. The age of
+    // one of an earlier start is the system clock's word; where it cannot be right, it is time for a new one.
     const auto all = list();
     const std::int64_t age_ns = all.empty() ? 0 : clock_.now().ns - all.front().made.ns;
     newest_ = later(now, -(age_ns < 0 ? every_ns : std::min(age_ns, every_ns)));

@@ -19,7 +19,8 @@ namespace anchord::server {
 /// alone. The number says which is newer: a clock that ran ahead must not make every later backup the oldest.
 class BackupKeeper final : public Backups {
  public:
-  static constexpr std::size_t k_fewest = 7;  ///< whole ones that are always left, whatever Options::keep says
+  static constexpr std::size_t k_fewest =
+      7;  ///< whole ones that are always left, whatever Options::keep says
   struct Options {
     std::filesystem::path dir;
     std::size_t keep{k_fewest};  ///< whole ones; what is older than the last of them goes, whole or not

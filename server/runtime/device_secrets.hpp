@@ -8,15 +8,15 @@
 
 namespace anchord::server {
 
-/// Passwords of devices: one file each in `secrets/` of the data folder (0700, files 0600). They come over REST,
-/// are read by the driver alone, and are in no answer, no setting and no log. One thread at a time.
+/// Passwords of devices: one file each in `secrets/` of the data folder (0700, files 0600). They come over
+/// REST, are read by the driver alone, and are in no answer, no setting and no log. One thread at a time.
 class DeviceSecrets {
  public:
   explicit DeviceSecrets(std::filesystem::path data_dir) : folder_(std::move(data_dir) / "secrets") {}
 
-  /// Takes `password` out of the options of a device that is to be set up or changed, and says in `password_set`
-  /// whether it has one. `before` is what it was; null: new. Nothing is stored yet.
-  /// errors  invalid_argument: the address changes and the password of the old one would go to the new one
+  /// Takes `password` out of the options of a device that is to be set up or changed, and says in
+  /// `password_set` whether it has one. `before` is what it was; null: new. Nothing is stored yet. errors
+  /// invalid_argument: the address changes and the password of the old one would go to the new one
   struct Change {
     DeviceConfig config;
     bool given{false};     ///< there was a password, or the wish to forget it
@@ -32,8 +32,8 @@ class DeviceSecrets {
   /// Options as the driver takes them: with the file, where there is a password.
   std::string driver_options(const DeviceConfig& config) const;
 
-  /// Of a devices.json of before 0.6, where a file could be named over REST: takes that name out. Returns whether
-  /// there was one.
+  /// Of a devices.json of before 0.6, where a file could be named over REST: takes that name out. Returns
+  /// whether there was one.
   static bool drop_password_file(DeviceConfig& config);
 
  private:

@@ -21,9 +21,9 @@ const std::shared_ptr<spdlog::details::thread_pool>& writer() {
 
 spdlog::logger& logger() {
   static const auto instance = [] {
-    auto made = std::make_shared<spdlog::async_logger>(
-        "anchord", std::make_shared<spdlog::sinks::stdout_sink_mt>(), writer(),
-        spdlog::async_overflow_policy::overrun_oldest);
+    auto made =
+        std::make_shared<spdlog::async_logger>("anchord", std::make_shared<spdlog::sinks::stdout_sink_mt>(),
+                                               writer(), spdlog::async_overflow_policy::overrun_oldest);
     made->set_formatter(std::make_unique<spdlog::pattern_formatter>("%v"));
     made->flush_on(spdlog::level::info);
     return made;

@@ -23,8 +23,9 @@ Result<void> write_private(const std::filesystem::path& file, const std::string&
   // A name that is not synced is the old file again after a power cut.
   const bool named = written && !error && sql::sync_path(std::filesystem::absolute(file).parent_path());
   if (!named) {
-    return make_error(failure == ENOSPC ? Errc::storage_full : Errc::storage_unavailable,
-                      "cannot write " + file.string() + ": " + (error ? error.message() : std::strerror(failure)));
+    return make_error(
+        failure == ENOSPC ? Errc::storage_full : Errc::storage_unavailable,
+        "cannot write " + file.string() + ": " + (error ? error.message() : std::strerror(failure)));
   }
   return boost::outcome_v2::success();
 }

@@ -11,7 +11,8 @@ constexpr const char* k_answer =
     "FROM stored_answer WHERE principal = ?1 AND idempotency_key = ?2";
 constexpr const char* k_keep =
     "INSERT INTO stored_answer (principal, idempotency_key, request_sha256_hex, status, body, created_t_ns, "
-    "location, etag) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8) ON CONFLICT (principal, idempotency_key) DO UPDATE "
+    "location, etag) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8) ON CONFLICT (principal, idempotency_key) DO "
+    "UPDATE "
     "SET request_sha256_hex = excluded.request_sha256_hex, status = excluded.status, body = excluded.body, "
     "created_t_ns = excluded.created_t_ns, location = excluded.location, etag = excluded.etag "
     "WHERE stored_answer.created_t_ns < ?9 RETURNING status";
@@ -79,8 +80,8 @@ class SqlAccessStore final : public AccessStore {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       Query query(c, k_keep);
       query << answer.principal << answer.key << answer.request_sha256_hex << answer.status
-            << std::as_bytes(std::span{answer.body}) << answer.created_ran_ns << answer.location << answer.etag
-            << expired_ran_ns;
+            << std::as_bytes(std::span{answer.body}) << answer.created_ran_ns << answer.location
+            << answer.etag << expired_ran_ns;
       if (query.returned()) return std::nullopt;
       return make_error(Errc::conflict, "an answer is kept under this key already");
     });

@@ -182,7 +182,8 @@ class SqlAnchorStore final : public AnchorStore {
       Query users(c, k_site_users);
       users << id;
       if (users.step() && users.integer() > 0) {
-        return make_error(Errc::conflict, "site " + to_string(id) + " has missions (deleted ones in the bin count) or anchors");
+        return make_error(Errc::conflict, "site " + to_string(id) +
+                                              " has missions (deleted ones in the bin count) or anchors");
       }
       Query query(c, k_site_remove);
       query << id << expected_version;

@@ -47,8 +47,8 @@ Result<void> write_small(const std::filesystem::path& path, std::string_view tex
   return sync_path(path.parent_path());
 }
 
-/// The names of new folders must outlive a power cut, or all that is acknowledged in them goes with them. As far up
-/// as we may look: what was there before needs no help.
+/// The names of new folders must outlive a power cut, or all that is acknowledged in them goes with them. As
+/// far up as we may look: what was there before needs no help.
 void sync_names_above(const std::filesystem::path& dir) {
   auto folder = std::filesystem::absolute(dir).lexically_normal();
   if (!folder.has_filename()) folder = folder.parent_path();

@@ -21,11 +21,13 @@ constexpr const char* k_note_device =
 constexpr const char* k_devices_of_mission =
     "SELECT d.network_id, d.kind, m.id, d.first_t_ns, d.last_t_ns, d.n_ranges "
     "FROM device_seen d JOIN mission m ON m.mission_key = d.mission_key "
-    "WHERE m.id = ?1 AND m.mission_key NOT IN (SELECT mission_key FROM mission_bin) ORDER BY d.last_t_ns DESC, d.network_id";
+    "WHERE m.id = ?1 AND m.mission_key NOT IN (SELECT mission_key FROM mission_bin) ORDER BY d.last_t_ns "
+    "DESC, d.network_id";
 constexpr const char* k_devices =
     "SELECT d.network_id, d.kind, m.id, d.first_t_ns, d.last_t_ns, d.n_ranges "
     "FROM device_seen d JOIN mission m ON m.mission_key = d.mission_key "
-    "WHERE m.mission_key NOT IN (SELECT mission_key FROM mission_bin) ORDER BY d.last_t_ns DESC, d.network_id";
+    "WHERE m.mission_key NOT IN (SELECT mission_key FROM mission_bin) ORDER BY d.last_t_ns DESC, "
+    "d.network_id";
 constexpr const char* k_count_ranges = "SELECT count(*) FROM uwb_range WHERE mission_key = ?1";
 constexpr const char* k_count_fixes = "SELECT count(*) FROM fix WHERE mission_key = ?1";
 
@@ -289,7 +291,8 @@ class SqlMeasurementStore final : public MeasurementStore {
   Result<Range> range(std::int64_t id) override {
     return read_value<Range>(gate_, [&](Connection& c) -> Result<Range> {
       static const std::string text =
-          "SELECT " + std::string(Table<Range>::columns) + " FROM uwb_range WHERE range_id = ?1 AND mission_key NOT IN (SELECT mission_key FROM mission_bin)";
+          "SELECT " + std::string(Table<Range>::columns) +
+          " FROM uwb_range WHERE range_id = ?1 AND mission_key NOT IN (SELECT mission_key FROM mission_bin)";
       Query query(c, text);
       query << id;
       if (!query.step()) return make_error(Errc::not_found, "no range " + std::to_string(id));

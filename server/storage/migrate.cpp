@@ -29,7 +29,8 @@ Result<void> copy_before(SqliteConnection& connection, const std::filesystem::pa
   // Left by a start that was killed: it may be half a copy.
   std::filesystem::remove(file, ignored);
   connection.execute("VACUUM INTO " + quoted(file.string()));
-  // SQLite does not sync what it vacuums into; the migration that follows is synced, and this is its way back.
+  // SQLite does not sync what it vacuums into; the migration that follows is synced, and this is its way
+  // back.
   BOOST_OUTCOME_TRYV(sync_path(file));
   BOOST_OUTCOME_TRYV(sync_path(dir));
   return sync_path(std::filesystem::absolute(dir).parent_path());  // the folder may be new too

@@ -6,8 +6,9 @@
 namespace anchord::sql {
 namespace {
 
-constexpr const char* k_state = "SELECT mission_key, state FROM mission WHERE id = ?1 AND mission_key NOT IN "
-                                "(SELECT mission_key FROM mission_bin)";
+constexpr const char* k_state =
+    "SELECT mission_key, state FROM mission WHERE id = ?1 AND mission_key NOT IN "
+    "(SELECT mission_key FROM mission_bin)";
 constexpr const char* k_calibrations = "SELECT count(*) FROM calibration_mission WHERE mission_key = ?1";
 constexpr const char* k_put =
     "INSERT INTO mission_bin (mission_key, deleted_t_ns, deleted_ran_ns, deleted_by, emptying) "
@@ -19,12 +20,15 @@ constexpr const char* k_restore = "DELETE FROM mission_bin WHERE mission_key = ?
 constexpr const char* k_empty = "UPDATE mission_bin SET emptying = 1 WHERE mission_key = ?1";
 constexpr const char* k_empty_before =
     "UPDATE mission_bin SET emptying = 1 WHERE emptying = 0 AND deleted_ran_ns < ?1 RETURNING mission_key";
-constexpr const char* k_emptying = "SELECT mission_key FROM mission_bin WHERE emptying = 1 ORDER BY mission_key LIMIT 1";
+constexpr const char* k_emptying =
+    "SELECT mission_key FROM mission_bin WHERE emptying = 1 ORDER BY mission_key LIMIT 1";
 // Children first and few at a time; the impulse responses go with their ranges.
 constexpr std::array k_rows{
-    "DELETE FROM uwb_range WHERE range_id IN (SELECT range_id FROM uwb_range WHERE mission_key = ?1 LIMIT ?2) "
+    "DELETE FROM uwb_range WHERE range_id IN (SELECT range_id FROM uwb_range WHERE mission_key = ?1 LIMIT "
+    "?2) "
     "RETURNING range_id",
-    "DELETE FROM fix WHERE fix_id IN (SELECT fix_id FROM fix WHERE mission_key = ?1 LIMIT ?2) RETURNING fix_id"};
+    "DELETE FROM fix WHERE fix_id IN (SELECT fix_id FROM fix WHERE mission_key = ?1 LIMIT ?2) RETURNING "
+    "fix_id"};
 constexpr const char* k_remove = "DELETE FROM mission WHERE mission_key = ?1";
 
 constexpr const char* k_running = "SELECT running_ns FROM service_state WHERE one = 1";
@@ -56,9 +60,10 @@ class SqlMissionBin final : public MissionBin {
       used << key;
       const std::int64_t n = used.step() ? used.integer() : 0;
       if (n > 0) {
-        return make_error(Errc::conflict, "mission " + to_string(id) + " is used by " + std::to_string(n) +
-                                              (n == 1 ? " calibration" : " calibrations") +
-                                              ", whose positions rest on its measurements: delete those first");
+        return make_error(Errc::conflict,
+                          "mission " + to_string(id) + " is used by " + std::to_string(n) +
+                              (n == 1 ? " calibration" : " calibrations") +
+                              ", whose positions rest on its measurements: delete those first");
       }
       Query query(c, k_put);
       query << key << now << ran_ns << by;

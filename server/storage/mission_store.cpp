@@ -9,7 +9,8 @@ namespace {
 // What is in the bin exists for the bin alone (mission_bin_store.cpp).
 constexpr const char* k_not_binned = "mission_key NOT IN (SELECT mission_key FROM mission_bin)";
 constexpr const char* k_key =
-    "SELECT mission_key FROM mission WHERE id = ?1 AND mission_key NOT IN (SELECT mission_key FROM mission_bin)";
+    "SELECT mission_key FROM mission WHERE id = ?1 AND mission_key NOT IN (SELECT mission_key FROM "
+    "mission_bin)";
 constexpr const char* k_id_taken = "SELECT count(*) FROM mission WHERE id = ?1";
 constexpr const char* k_insert =
     "INSERT INTO mission (id, site_id, name, kit, radio, frame, track_point, state, created_t_ns, "
@@ -33,9 +34,11 @@ constexpr const char* k_tags =
     "WHERE mission_key = ?1 ORDER BY ordinal";
 constexpr const char* k_drop_tags = "DELETE FROM mission_tag WHERE mission_key = ?1";
 constexpr const char* k_binned =
-    "SELECT b.deleted_t_ns, b.deleted_ran_ns, b.deleted_by, b.emptying, (SELECT count(*) FROM uwb_range r WHERE "
+    "SELECT b.deleted_t_ns, b.deleted_ran_ns, b.deleted_by, b.emptying, (SELECT count(*) FROM uwb_range r "
+    "WHERE "
     "r.mission_key = b.mission_key), (SELECT count(*) FROM fix f WHERE f.mission_key = b.mission_key), m.id "
-    "FROM mission_bin b JOIN mission m ON m.mission_key = b.mission_key ORDER BY b.deleted_ran_ns DESC, b.mission_key DESC";
+    "FROM mission_bin b JOIN mission m ON m.mission_key = b.mission_key ORDER BY b.deleted_ran_ns DESC, "
+    "b.mission_key DESC";
 constexpr const char* k_site = "SELECT 1 FROM site WHERE id = ?1";
 
 Error no_mission(const MissionId& id) { return make_error(Errc::not_found, "no mission " + to_string(id)); }

@@ -177,8 +177,8 @@ class SqlModelStore final : public ModelStore {
 
 void insert_model(Connection& connection, const StoredModel& m, std::string_view artifact) {
   Query query(connection, k_insert);
-  query << m.id << m.run << m.task << m.method << m.sha256_hex << m.manifest_json << m.created
-        << m.created_by << m.signature;
+  query << m.id << m.run << m.task << m.method << m.sha256_hex << m.manifest_json << m.created << m.created_by
+        << m.signature;
   const auto key = query.returned();
   Query content(connection, k_insert_artifact);
   content << key << artifact;

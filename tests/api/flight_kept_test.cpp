@@ -1,5 +1,5 @@
-// A flight is never lost: what may be deleted, whose the devices are, what a stepped clock changes, and what an
-// Idempotency-Key keeps on the disk.
+// A flight is never lost: what may be deleted, whose the devices are, what a stepped clock changes, and what
+// an Idempotency-Key keeps on the disk.
 #include <gmock/gmock.h>
 
 #include <cstdio>
@@ -66,7 +66,8 @@ TEST_F(MissionBinRules, WhatIsInTheBinIsGoneForEverythingElseAndComesBackWhole) 
   const auto id = finished("kept");
   ranges(id, 3);
   ASSERT_EQ(remove(id).status, 204);
-  for (const char* more : {"", "/events", "/track", "/control", "/checklist", "/procedure", "/uploads", "/grid"}) {
+  for (const char* more :
+       {"", "/events", "/track", "/control", "/checklist", "/procedure", "/uploads", "/grid"}) {
     const auto answer = get(path(id, more));
     EXPECT_EQ(answer.status, 410) << more << answer.body;
     EXPECT_THAT(answer.body, HasSubstr("restore")) << more;
@@ -75,9 +76,9 @@ TEST_F(MissionBinRules, WhatIsInTheBinIsGoneForEverythingElseAndComesBackWhole) 
   EXPECT_EQ(post(path(id, "/actions"), R"({"action":"finish"})").status, 410);
   EXPECT_TRUE(json(get("/api/v1/missions"))["items"].empty());
   EXPECT_TRUE(json(get("/api/v1/ranges"))["items"].empty());
-  const auto row = post("/api/v1/ranges",
-                        R"({"t_us":1777889473000000,"tag":"0x6e01","anchor":"0x6a2f","distance_m":7.4})",
-                        "application/x-ndjson", {{"mission", id}});
+  const auto row =
+      post("/api/v1/ranges", R"({"t_us":1777889473000000,"tag":"0x6e01","anchor":"0x6a2f","distance_m":7.4})",
+           "application/x-ndjson", {{"mission", id}});
   EXPECT_NE(row.status, 200) << row.body;
   EXPECT_EQ(post("/api/v1/calibrations", R"({"missions":[")" + id + "\"]}").status, 422);
   const Json bin = json(get("/api/v1/missions", {{"deleted", "true"}}))["items"];
@@ -191,12 +192,14 @@ TEST_F(MissionBinRules, ABigDeleteStallsNoIngest) {
     return waits;
   };
   const auto report = [&](const char* how, Waits waits) {
-    std::printf("    %zu rows %s: ingest of 50 rows waits p50 %.1f, p99 %.1f, at most %.0f ms (%zu batches)\n", rows,
-                how, waits.part(0.5), waits.part(0.99), waits.part(1), waits.ms.size());
+    std::printf(
+        "    %zu rows %s: ingest of 50 rows waits p50 %.1f, p99 %.1f, at most %.0f ms (%zu batches)\n", rows,
+        how, waits.part(0.5), waits.part(0.99), waits.part(1), waits.ms.size());
   };
   if (asked != nullptr) {
     fill("in one go");
-    report("in one transaction", ingest_while([&] { (void)database_->bin().remove_rows(2 * rows + 10).has_value(); }));
+    report("in one transaction",
+           ingest_while([&] { (void)database_->bin().remove_rows(2 * rows + 10).has_value(); }));
   }
   const auto id = fill("in slices");
   auto waits = ingest_while([&] { app_->keep_house(); });
@@ -231,9 +234,10 @@ TEST_F(DevicesFollow, TheFlightThatRecordsAndNoOtherByBeingMade) {
 TEST_F(DevicesFollow, AreTakenWithTheLeaseAloneAndGoBack) {
   const std::string first = make_id("first");
   const auto take = [&](const std::string& key) {
-    return post("/api/v1/missions",
-                R"({"name":"second","frame":"wgs84","track_point":"tag_antenna","take_devices":true,"lease":")" +
-                    key + "\"}");
+    return post(
+        "/api/v1/missions",
+        R"({"name":"second","frame":"wgs84","track_point":"tag_antenna","take_devices":true,"lease":")" +
+            key + "\"}");
   };
   const auto refused = take("");
   EXPECT_EQ(refused.status, 409);
@@ -268,7 +272,9 @@ TEST_F(DevicesFollow, ARestartAndTheFlightGoesOnWithThemWhateverWasMadeSince) {
 
 TEST_F(DevicesFollow, AFreeStreamIsTakenByAnActionOfAMissionThatRecords) {
   const auto first = make_id("first"), second = make_id("second");
-  const auto take = [&](const std::string& id) { return post(path(id, "/actions"), R"({"action":"take_devices"})"); };
+  const auto take = [&](const std::string& id) {
+    return post(path(id, "/actions"), R"({"action":"take_devices"})");
+  };
   EXPECT_EQ(take(second).status, 409);
   finish(first);
   EXPECT_EQ(take(first).status, 422) << "it does not record";
@@ -292,7 +298,9 @@ class ClockSteps : public KeptFixture {};
 TEST_F(ClockSteps, EndNoLeaseAndProlongNone) {
   const auto id = make_id("led");
   const auto key = lease(id);
-  const auto renew = [&] { return post(path(id, "/control"), R"({"action":"renew","lease":")" + key + "\"}"); };
+  const auto renew = [&] {
+    return post(path(id, "/control"), R"({"action":"renew","lease":")" + key + "\"}");
+  };
   clock_.ahead_s = 300.0 * 86'400;
   EXPECT_EQ(renew().status, 200);
   clock_.ahead_s = -300.0 * 86'400;
@@ -308,7 +316,8 @@ TEST_F(ClockSteps, LockNobodyOutAndBringNobodyBack) {
   options.steady = &steady_;
   api::AccessService access(database_->tokens(), database_->access(), clock_, options);
   const api::Principal admin{"a", "a", {Role::admin}};
-  const auto made = access.create_token("t", {"operator"}, UtcTime{clock_.now().ns + 3'600'000'000'000}, admin, "here");
+  const auto made =
+      access.create_token("t", {"operator"}, UtcTime{clock_.now().ns + 3'600'000'000'000}, admin, "here");
   ASSERT_TRUE(made) << made.error().message;
   const auto cookie = access.open_session(made.value().text, "here");
   ASSERT_TRUE(cookie);
@@ -384,8 +393,11 @@ TEST_F(KeptAnswers, AViewerWhoPostsForSecondsLeavesTheDiskAsItWas) {
       "waypoints":[{"lon":3.7130,"lat":51.02305,"height_above_ground_m":4}]})"))["id"];
   Json points = Json::array();
   for (int i = 0; i < 2000; ++i) points.push_back({3.71 + i * 1e-6, 51.02, 50.0});
-  const std::string transform = Json{{"from", "geo"}, {"to", "enu"}, {"points", points},
-                                     {"origin", {{"lon", 3.71}, {"lat", 51.02}, {"h_m", 50.0}}}}.dump();
+  const std::string transform = Json{{"from", "geo"},
+                                     {"to", "enu"},
+                                     {"points", points},
+                                     {"origin", {{"lon", 3.71}, {"lat", 51.02}, {"h_m", 50.0}}}}
+                                    .dump();
   // What was written before is on its way from the WAL into the file for a moment.
   auto before = folder_bytes();
   for (const auto last = std::chrono::steady_clock::now() + std::chrono::seconds(20);
@@ -436,7 +448,8 @@ TEST_F(KeptAnswers, ATokenHasAQuotaThatNeverStandsInTheWayOfACommand) {
     full.created_ran_ns = static_cast<std::int64_t>(i);
     ASSERT_TRUE(database_->access().keep_answer(full, 0));
   }
-  const auto refused = keyed("/api/v1/missions", R"({"name":"x","frame":"local","track_point":"body"})", "new");
+  const auto refused =
+      keyed("/api/v1/missions", R"({"name":"x","frame":"local","track_point":"body"})", "new");
   EXPECT_EQ(refused.status, 429);
   EXPECT_THAT(refused.body, HasSubstr("2000"));
   EXPECT_THAT(refused.body, HasSubstr("without Idempotency-Key"));
@@ -445,7 +458,8 @@ TEST_F(KeptAnswers, ATokenHasAQuotaThatNeverStandsInTheWayOfACommand) {
   const auto id = make_id("commanded");
   const auto done = keyed(path(id, "/actions"), R"({"action":"finish"})", "finish");
   EXPECT_EQ(done.status, 200) << done.body;
-  EXPECT_EQ(header(keyed(path(id, "/actions"), R"({"action":"finish"})", "finish"), "Idempotent-Replayed"), "true");
+  EXPECT_EQ(header(keyed(path(id, "/actions"), R"({"action":"finish"})", "finish"), "Idempotent-Replayed"),
+            "true");
 }
 
 TEST_F(KeptAnswers, GoAfterADayOfRunningAndNotWithTheClock) {

@@ -152,8 +152,8 @@ TEST_F(HubRules, TakesAtMost32Subscriptions) {
   EXPECT_EQ(of(frames, "err").size(), 1u);
 }
 
-// Client 65 was not joined, yet could subscribe, and its end never left the hub: the next message went to freed
-// memory. How many may come is decided where connections are accepted.
+// Client 65 was not joined, yet could subscribe, and its end never left the hub: the next message went to
+// freed memory. How many may come is decided where connections are accepted.
 TEST_F(HubRules, TellsEveryClientThatSubscribedAndForgetsThoseThatLeft) {
   for (int round = 0; round < 2; ++round) {
     std::vector<std::unique_ptr<api::Conversation>> many;

@@ -83,8 +83,9 @@ class KeptFixture : public AppFixture {
   }
   std::string etag(const std::string& id) { return header(get(path(id)), "ETag"); }
   Json make(const std::string& name, const std::string& more = "") {
-    const auto made = post("/api/v1/missions", R"({"name":")" + name +
-                                                   R"(","frame":"wgs84","track_point":"tag_antenna")" + more + '}');
+    const auto made =
+        post("/api/v1/missions",
+             R"({"name":")" + name + R"(","frame":"wgs84","track_point":"tag_antenna")" + more + '}');
     EXPECT_EQ(made.status, 201) << made.body;
     return json(made);
   }
@@ -99,7 +100,8 @@ class KeptFixture : public AppFixture {
     EXPECT_EQ(done.status, 200) << done.body;
   }
   std::string lease(const std::string& id, std::vector<api::Role> roles = {api::Role::admin}) {
-    const auto taken = ask(api::Method::post, path(id, "/control"), R"({"action":"take","force":true})", roles);
+    const auto taken =
+        ask(api::Method::post, path(id, "/control"), R"({"action":"take","force":true})", roles);
     EXPECT_EQ(taken.status, 200) << taken.body;
     return json(taken).value("lease", "");
   }
@@ -144,7 +146,8 @@ class KeptFixture : public AppFixture {
     for (const char* item : {"props", "airspace", "people", "pilot", "tag", "disk", "battery"})
       post(path(id, "/checklist/") + item, R"({"reason":"looked at it"})");
     const std::string key = lease(id);
-    const auto started = post(path(id, "/actions"), R"({"action":"start","lease":")" + key + R"(","plan":")" + plan_ + "\"}");
+    const auto started =
+        post(path(id, "/actions"), R"({"action":"start","lease":")" + key + R"(","plan":")" + plan_ + "\"}");
     EXPECT_EQ(started.status, 202) << started.body;
     return key;
   }

@@ -1,4 +1,5 @@
-// Who may delete, finish, take and restore in which state: role x route x state, and every route that deletes.
+// Who may delete, finish, take and restore in which state: role x route x state, and every route that
+// deletes.
 #include <array>
 #include <set>
 
@@ -32,17 +33,17 @@ struct Row {
   std::array<int, 3> status;  ///< of operator, operator with the lease, admin; everybody else: 403
 };
 constexpr Row k_matrix[]{
-    {"recording", "delete", {409, 409, 409}},  {"recording", "finish", {200, 200, 200}},
-    {"recording", "take", {200, 200, 200}},    {"recording", "restore", {409, 409, 409}},
-    {"recording", "purge", {403, 403, 409}},   {"held", "take", {409, 409, 409}},
-    {"flying", "delete", {409, 409, 409}},     {"flying", "restore", {409, 409, 409}},
-    {"flying", "purge", {403, 403, 409}},      {"flying", "finish", {409, 200, 409}},
-    {"finished", "delete", {409, 204, 204}},   {"finished", "finish", {422, 422, 422}},
-    {"finished", "take", {422, 422, 422}},     {"finished", "restore", {409, 409, 409}},
-    {"finished", "purge", {403, 403, 409}},    {"calibrated", "delete", {409, 409, 409}},
-    {"calibrated", "purge", {403, 403, 409}},  {"deleted", "delete", {410, 410, 410}},
-    {"deleted", "finish", {410, 410, 410}},    {"deleted", "take", {410, 410, 410}},
-    {"deleted", "restore", {200, 200, 200}},   {"deleted", "purge", {403, 403, 204}},
+    {"recording", "delete", {409, 409, 409}}, {"recording", "finish", {200, 200, 200}},
+    {"recording", "take", {200, 200, 200}},   {"recording", "restore", {409, 409, 409}},
+    {"recording", "purge", {403, 403, 409}},  {"held", "take", {409, 409, 409}},
+    {"flying", "delete", {409, 409, 409}},    {"flying", "restore", {409, 409, 409}},
+    {"flying", "purge", {403, 403, 409}},     {"flying", "finish", {409, 200, 409}},
+    {"finished", "delete", {409, 204, 204}},  {"finished", "finish", {422, 422, 422}},
+    {"finished", "take", {422, 422, 422}},    {"finished", "restore", {409, 409, 409}},
+    {"finished", "purge", {403, 403, 409}},   {"calibrated", "delete", {409, 409, 409}},
+    {"calibrated", "purge", {403, 403, 409}}, {"deleted", "delete", {410, 410, 410}},
+    {"deleted", "finish", {410, 410, 410}},   {"deleted", "take", {410, 410, 410}},
+    {"deleted", "restore", {200, 200, 200}},  {"deleted", "purge", {403, 403, 204}},
 };
 
 class StateMatrix : public KeptFixture {
@@ -81,7 +82,8 @@ class StateMatrix : public KeptFixture {
     if (operation == "delete" || operation == "purge") {
       std::map<std::string, std::string> query;
       if (operation == "purge") query["purge"] = "true";
-      return ask(Method::del, path(id), "", who.roles, {{"if-match", "*"}, {"anchord-lease", key}}, query).status;
+      return ask(Method::del, path(id), "", who.roles, {{"if-match", "*"}, {"anchord-lease", key}}, query)
+          .status;
     }
     if (operation == "restore") return ask(Method::post, path(id, "/restore"), "", who.roles).status;
     const std::string action = operation == "take" ? "take_devices" : operation;
@@ -118,7 +120,8 @@ TEST_F(StateMatrix, OfPlansDevicesAndSitesHoldsToo) {
   const auto id = make_id("in use");
   const auto key = fly(id);
   const std::string device = "/api/v1/devices/" + to_string(Uuid{{1}}), plan = "/api/v1/plans/" + plan_;
-  const std::string site = "/api/v1/sites/" + json(post("/api/v1/sites", R"({"name":"used"})"))["id"].get<std::string>();
+  const std::string site =
+      "/api/v1/sites/" + json(post("/api/v1/sites", R"({"name":"used"})"))["id"].get<std::string>();
   const auto at = make("at the site", R"(,"site":")" + site.substr(14) + '"');
   ASSERT_TRUE(at.contains("id")) << at;
   const auto try_all = [&](int operators, int admin, const std::string& target, bool operators_may) {
@@ -136,8 +139,8 @@ TEST_F(StateMatrix, OfPlansDevicesAndSitesHoldsToo) {
   EXPECT_EQ(ask(Method::del, device, "", {Role::op}, {{"if-match", "*"}}).status, 204);
 }
 
-// A route that deletes and is not in this list was not thought about: say here what keeps it from deleting what
-// is in use.
+// A route that deletes and is not in this list was not thought about: say here what keeps it from deleting
+// what is in use.
 TEST_F(StateMatrix, EveryRouteThatDeletesIsKnown) {
   const std::set<std::string> known{
       "/api/v1/missions/{id}",       // recording, flying, calibrated: 409

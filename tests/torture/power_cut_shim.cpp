@@ -1,13 +1,17 @@
-// A disk that forgets what was not synced, for a program under test: loaded before libc (LD_PRELOAD), it keeps beside the data
-// folder POWER_CUT_DATA a second one, POWER_CUT_DISK, which holds only what a power cut would leave:
+// A disk that forgets what was not synced, for a program under test: loaded before libc (LD_PRELOAD), it
+// keeps beside the data folder POWER_CUT_DATA a second one, POWER_CUT_DISK, which holds only what a power cut
+// would leave:
 //   content   of a file when fsync or fdatasync of it returned;
-//   names     of a folder when fsync of the folder returned. A file that is new, renamed or removed is on the disk by its old
+//   names     of a folder when fsync of the folder returned. A file that is new, renamed or removed is on the
+//   disk by its old
 //             name until then: POSIX promises no more, and file systems differ in what else they do.
-// A kernel writes back earlier whenever it likes, so one write in four leaves some of its 512-byte sectors on the disk at once:
-// torn writes and files longer than what is in them. POWER_CUT_SEED makes that repeatable for one order of calls.
+// A kernel writes back earlier whenever it likes, so one write in four leaves some of its 512-byte sectors on
+// the disk at once: torn writes and files longer than what is in them. POWER_CUT_SEED makes that repeatable
+// for one order of calls.
 //
-// SQLite's files are followed by byte ranges and read through the program's own descriptor, since closing another one would
-// end its locks; all others are copied whole. `-shm` holds nothing that outlives the machine.
+// SQLite's files are followed by byte ranges and read through the program's own descriptor, since closing
+// another one would end its locks; all others are copied whole. `-shm` holds nothing that outlives the
+// machine.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -59,7 +63,8 @@ class Disk {
     std::error_code ignored;
     fs::create_directories(names_, ignored);
     fs::create_directories(files_, ignored);
-    // What stood there before is on the disk: names/ was copied from it, and its files get the name by which we know them.
+    // What stood there before is on the disk: names/ was copied from it, and its files get the name by which
+    // we know them.
     for (const auto& entry : fs::recursive_directory_iterator(names_, ignored)) {
       const fs::path real = data_ / fs::relative(entry.path(), names_, ignored);
       if (entry.is_regular_file(ignored)) fs::create_hard_link(entry.path(), files_ / key(real), ignored);
@@ -120,7 +125,8 @@ class Disk {
   /// One file through all its names: inode and time of birth, since inodes are used again.
   static std::string key(const fs::path& path) {
     struct statx info {};
-    if (::statx(AT_FDCWD, path.c_str(), AT_SYMLINK_NOFOLLOW, STATX_INO | STATX_BTIME, &info) != 0) return "none";
+    if (::statx(AT_FDCWD, path.c_str(), AT_SYMLINK_NOFOLLOW, STATX_INO | STATX_BTIME, &info) != 0)
+      return "none";
     return std::to_string(info.stx_ino) + "-" + std::to_string(info.stx_btime.tv_sec) + "-" +
            std::to_string(info.stx_btime.tv_nsec);
   }
@@ -218,7 +224,8 @@ void after(F&& note) {
 ssize_t wrote_at(int fd, ssize_t n, off_t at) {
   if (n > 0) {
     after([&] {
-      if (const auto path = disk().path_of(fd); !path.empty()) disk().wrote(fd, path, at, static_cast<std::size_t>(n));
+      if (const auto path = disk().path_of(fd); !path.empty())
+        disk().wrote(fd, path, at, static_cast<std::size_t>(n));
     });
   }
   return n;

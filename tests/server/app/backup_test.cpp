@@ -92,7 +92,8 @@ TEST_F(BackupFiles, KeepsEachNewOneAfterTheClockRanAhead) {
 
 TEST_F(BackupFiles, NumbersGoOnAfterFilesOfBeforeThereWereNumbers) {
   std::filesystem::create_directories(copies());
-  std::ofstream(copies() / "anchord-2030-01-01T00-00-00.000000Z.db") << "of an older anchord, its clock ahead";
+  std::ofstream(copies() / "anchord-2030-01-01T00-00-00.000000Z.db")
+      << "of an older anchord, its clock ahead";
   const auto made = keeper().make();
   ASSERT_TRUE(made);
   EXPECT_EQ(made.value().sequence, 1u);

@@ -234,8 +234,7 @@ TEST(DeviceAddresses, OpenNothingThatIsNoTerminalLine) {
   const auto pilot = server.bearer(server.token(R"(["operator"])"));
   const std::string file = (server.folder / "data" / "anchord.db").string();
   for (const auto& address :
-       {"serial:" + file, std::string("serial:/dev/null"),
-        std::string("serial:/dev/zero"),
+       {"serial:" + file, std::string("serial:/dev/null"), std::string("serial:/dev/zero"),
         std::string("file:///etc/passwd"), std::string("http://127.0.0.1/")}) {
     const auto made = server.call("POST", "/api/v1/devices",
                                   Json{{"kind", "gnss"}, {"name", "x"}, {"address", address}}.dump(), pilot);

@@ -197,8 +197,9 @@ TEST(RequestJudge, AsksForACompleteWebSocketHandshake) {
   EXPECT_EQ(status(get("/", base + key)), 426);
   EXPECT_EQ(status(get("/", base + "Sec-WebSocket-Version: 13\r\n")), 400);
   // RFC 6455 section 4.1: 16 bytes in base64. Only the length of the text was looked at.
-  for (const char* bad : {"", "x", "!!!!!!!!!!!!!!!!!!!!!!!!", "AAAAAAAAAAAAAAAAAAAAAAAA", "dGhlIHNhbXBsZSBub25jZQ=",
-                          "dGhlIHNhbXBsZSBub25jZQ", "dGhlIHNhbXBsZSBub25j====", "dGhlIHNhbXBsZQ=="}) {
+  for (const char* bad : {"", "x", "!!!!!!!!!!!!!!!!!!!!!!!!", "AAAAAAAAAAAAAAAAAAAAAAAA",
+                          "dGhlIHNhbXBsZSBub25jZQ=", "dGhlIHNhbXBsZSBub25jZQ",
+                          "dGhlIHNhbXBsZSBub25j====", "dGhlIHNhbXBsZQ=="}) {
     const std::string other = "Sec-WebSocket-Key: " + std::string(bad) + "\r\n";
     EXPECT_EQ(status(get("/", base + other + "Sec-WebSocket-Version: 13\r\n")), 400) << bad;
   }

@@ -113,7 +113,8 @@ TEST_F(WsSession, AnswersACloseWithItsCode) {
   }
 }
 
-// RFC 6455 section 7.4: codes that nobody may send are a protocol error; 5000 and 65535 came back as they were.
+// RFC 6455 section 7.4: codes that nobody may send are a protocol error; 5000 and 65535 came back as they
+// were.
 TEST_F(WsSession, AnswersACloseCodeThatNobodyMaySendWith1002) {
   for (const int code : {0, 999, 1004, 1005, 1006, 1014, 1015, 1016, 2999, 5000, 5001, 65535}) {
     WsClient client(server_.port);

@@ -119,7 +119,8 @@ TEST_P(MissionStoreContract, HidesWhatIsInTheBinAndGivesItBackWhole) {
   EXPECT_EQ(db_->measurements().range(id).error().code, Errc::not_found);
   EXPECT_EQ(db_->measurements().count_ranges(MeasurementStore::Filter{}).value(), 1u);
   EXPECT_EQ(db_->measurements().devices(m.id).value().size(), 0u);
-  EXPECT_EQ(db_->measurements().append_ranges({range_at(m.id, 2)}, false).value()[0], RowOutcome::unknown_mission);
+  EXPECT_EQ(db_->measurements().append_ranges({range_at(m.id, 2)}, false).value()[0],
+            RowOutcome::unknown_mission);
   const auto list = db_->bin().list().value();
   ASSERT_EQ(list.size(), 1u);
   EXPECT_EQ(list[0].mission.name, m.name);
