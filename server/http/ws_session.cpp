@@ -121,10 +121,17 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
   /// only one.
   void refuse_close_code() {
     const auto code = static_cast<std::uint16_t>(ws_.reason().code);
-    if (code < 5000 || !ws_.is_open()) return;
+    if (code < 5000 || !ws_.is_open() || std::exchange(closing_, true)) return;
     const websocket::close_reason reason(websocket::close_code::protocol_error, "no such close code");
     ws_.async_close(reason, [self = shared_from_this()](const error_code&) {});
     if (ws_.is_open()) cut();  // a write is under way: ours would come after the echo
+  }
+
+  /// Reader, writer and the server's stop may all want the end; Beast ends the program when two closes are
+  /// under way at once, so the first one is the only one.
+  awaitable<void> close_once(websocket::close_reason reason) {
+    if (std::exchange(closing_, true)) co_return;
+    co_await ws_.async_close(reason, k_wait);
   }
 
   awaitable<void> read_all() {
@@ -136,7 +143,7 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
       if (!ws_.is_message_done()) {
         if (++pieces < context_->ws_limits.max_fragments) continue;
         const websocket::close_reason reason(websocket::close_code::too_big, "too many fragments");
-        co_await ws_.async_close(reason, k_wait);
+        co_await close_once(reason);
         co_return;
       }
       pieces = 0;
@@ -145,7 +152,7 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
       // Beast checks a text as it comes, but not that it is complete when the last fragment is empty.
       if (!ws_.got_binary() && !is_utf8(message)) {
         const websocket::close_reason reason(websocket::close_code::bad_payload, "the text is not UTF-8");
-        co_await ws_.async_close(reason, k_wait);
+        co_await close_once(reason);
         co_return;
       }
       peer_->on_message(message, ws_.got_binary());
@@ -171,7 +178,7 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
       if (goodbye) {
         const websocket::close_reason reason(static_cast<websocket::close_code>(goodbye->first),
                                              goodbye->second);
-        co_await self->ws_.async_close(reason, k_wait);
+        co_await self->close_once(reason);
         co_return;
       }
       self->bell_.expires_at(std::chrono::steady_clock::time_point::max());
@@ -220,7 +227,7 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
   ConnectionSlot slot_;
   std::unique_ptr<WsPeer> peer_;
   std::atomic<bool> woken_{false};
-  bool closed_{false}, going_away_{false};
+  bool closed_{false}, closing_{false}, going_away_{false};
 };
 
 }  // namespace
