@@ -8,7 +8,7 @@ cmd_bench() {
   if [[ ${1:-} == soak ]]; then
     shift
     build_preset release anchord
-    ANCHORD_BINARY=$PWD/$build_dir/anchord node tests/bench/soak.mjs "$@" || die "the soak found something: its table stands above"
+    ANCHORD_BINARY=$PWD/$build_dir/anchord node tests/bench/soak.mjs "$@" || die "the soak found something: see its table above"
     return
   fi
   build_preset bench

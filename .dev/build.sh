@@ -2,7 +2,7 @@ configure_preset() {
   local preset=$1 ; local -a settings=()
   [[ -d $private_boost_dir/usr ]] && settings+=("-DCMAKE_PREFIX_PATH=$PWD/$private_boost_dir/usr")
   say "configuring $preset"
-  cmake --preset "$preset" "${settings[@]}" || die "cmake --preset $preset failed: its own message stands above"
+  cmake --preset "$preset" "${settings[@]}" || die "cmake --preset $preset failed: see its own message above"
 }
 
 # build_preset PRESET [ninja targets...]: configure and build, with progress.
@@ -12,7 +12,7 @@ build_preset() {
   jobs=$(jobs_count)
   say "building $preset with $jobs jobs"
   NINJA_STATUS='[%f/%t %es] ' ninja -C "build/$preset" -j "$jobs" "$@" ||
-    die "the build failed: its own message stands above"
+    die "the build failed: see its own message above"
 }
 
 cmd_setup() {

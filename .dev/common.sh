@@ -66,5 +66,5 @@ version_number() {
 ensure_test_packages() {
   [[ -d tests/node_modules ]] && return
   say "installing the packages of the end-to-end tests"
-  (cd tests && npm ci --loglevel=error) || die "npm ci in tests/ failed: its own message stands above (is the npm registry reachable?)"
+  (cd tests && npm ci --loglevel=error) || die "npm ci in tests/ failed: see its own message above (is the npm registry reachable?)"
 }

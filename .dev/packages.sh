@@ -65,7 +65,7 @@ install_packages() {
     done
     # --no-remove: nothing of the user's goes away for our sake.
     apt install -y --no-install-recommends --no-remove "${missing[@]}" ||
-      die "apt-get could not install: $missing_text (its own message stands above)$network"
+      die "apt-get could not install: $missing_text (see its own message above)$network"
   fi
   if [[ -n $boost_conflict ]]; then unpack_private_boost "$boost_conflict"; fi
 }

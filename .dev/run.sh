@@ -96,7 +96,7 @@ cmd_run() {
   server_pid=$!
   run_pids+=("$server_pid")
   until [[ $(http_status /readyz) == 200 ]]; do
-    kill -0 "$server_pid" 2>/dev/null || die "the server ended at once: its own message stands above"
+    kill -0 "$server_pid" 2>/dev/null || die "the server ended at once: see its own message above"
     ((++tries <= 150)) || die "the server is not ready after 30 s: see /readyz on http://$run_address"
     sleep 0.2
   done
@@ -111,5 +111,5 @@ cmd_run() {
     "$server" replay "$flight" --url "http://$run_address" --speed 1 --loop &
   fi
   run_pids+=($!)
-  wait "$server_pid" || die "the server ended with exit code $?: its own message stands above"
+  wait "$server_pid" || die "the server ended with exit code $?: see its own message above"
 }

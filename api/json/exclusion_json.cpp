@@ -140,7 +140,7 @@ ExclusionRequest read_exclusion_request(const Json& body, std::vector<FieldError
   s.tag = read_id(fields, "tag");
   out.reason = fields.text("reason", 500, true).value_or("");
   if (fields.has("reason") && out.reason.find_first_not_of(" \t\r\n") == std::string::npos)
-    fields.error("reason", "required", "say why: it stands in the record and in every calibration");
+    fields.error("reason", "required", "give a reason: it is shown in the record and in every calibration");
   const int ways = (out.ids.empty() ? 0 : 1) + (s.rows.empty() ? 0 : 1) +
                    (s.since || s.until || s.anchor || s.tag ? 1 : 0);
   fields.finish();

@@ -54,7 +54,7 @@ class Builder final : public nlohmann::json_sax<Json> {
   bool end_array() override { return close(); }
   bool key(string_t& name) override {
     if (stack_.back()->contains(name))
-      return fail("duplicate_key", "key '" + to_utf8(name, 60) + "' stands twice in one object", name);
+      return fail("duplicate_key", "key '" + to_utf8(name, 60) + "' occurs twice in one object", name);
     keys_.back() = name;
     return true;
   }

@@ -100,7 +100,7 @@ Mission read_mission(const Json& body, std::vector<FieldError>& errors) {
         inner.finish();
         for (const auto& other : mission.tags) {
           if (other.tag == tag.tag && other.antenna == tag.antenna)
-            inner.error("tag", "duplicate", "this antenna of the tag stands twice");
+            inner.error("tag", "duplicate", "this antenna of the tag occurs twice");
         }
         mission.tags.push_back(tag);
       }

@@ -106,7 +106,7 @@ Result<std::vector<Column>> columns_of(const std::vector<std::string>& header,
   std::vector<Column> out;
   std::set<std::string> seen;
   for (std::size_t c = k_columns.size() + 1; c < header.size(); ++c) {
-    if (!seen.insert(header[c]).second) return bad(1, "column " + header[c] + " stands twice");
+    if (!seen.insert(header[c]).second) return bad(1, "column " + header[c] + " occurs twice");
     out.push_back({header[c], nlos::feature_of(header[c]), 0});
   }
   for (const auto name : register_columns())

@@ -93,11 +93,11 @@ GateReport gate_of(const ml::Model& candidate, const ml::Model* current, const G
     out.checks.push_back(std::move(check));
   };
   if (basis == "none") {
-    GateCheck judged{"judged", std::nullopt, std::nullopt, true, basis};
-    fail(judged, "the model is from elsewhere, and no data set of this server has " +
-                     std::to_string(k_least_rows) +
-                     " rows that can judge it: freeze one with other places, or promote it with a reason");
-    out.checks.push_back(std::move(judged));
+    GateCheck evaluated{"evaluated", std::nullopt, std::nullopt, true, basis};
+    fail(evaluated, "the model is from elsewhere, and no data set of this server has " +
+                        std::to_string(k_least_rows) +
+                        " rows to evaluate it on: freeze one with other places, or promote it with a reason");
+    out.checks.push_back(std::move(evaluated));
     return out;
   }
   if (candidate.info.task == ml::Task::nlos_id) {

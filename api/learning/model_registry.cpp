@@ -19,9 +19,10 @@ Result<std::shared_ptr<const ml::Model>> read_model(const ModelSource& source, c
                                                     bool vouched_only) {
   BOOST_OUTCOME_TRY(const auto artifact, source.artifact(id));
   if (vouched_only && source.signer() != nullptr && artifact.standing == ModelStanding::foreign)
-    return make_error(Errc::conflict, "model " + to_string(id) +
-                                          " is not signed by this server: it was made elsewhere, or before "
-                                          "models were signed. Promote it, which judges it on kept data");
+    return make_error(Errc::conflict,
+                      "model " + to_string(id) +
+                          " is not signed by this server: it was made elsewhere, or before "
+                          "models were signed. Promote it: it is then evaluated on kept data");
   BOOST_OUTCOME_TRY(auto model, read_model_artifact(artifact.text));
   return std::make_shared<const ml::Model>(std::move(model));
 }

@@ -146,7 +146,7 @@ Response login(AccessService& access, const Request& request) {
     if (const auto wait_s = access.guard().failed(token, request.remote, LoginGuard::Clock::now())) {
       auto response = problem(429, "rate-limited",
                               "too many wrong tokens from " + request.remote + "; wait " +
-                                  std::to_string(*wait_s) + " s (a right one is taken at once)");
+                                  std::to_string(*wait_s) + " s (a valid one is accepted at once)");
       throw ProblemException{std::move(response.header("Retry-After", std::to_string(*wait_s)))};
     }
     throw_problem(401, "unauthorized", opened.error().message);

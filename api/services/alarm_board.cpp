@@ -81,7 +81,8 @@ Result<Alarm> AlarmBoard::acknowledge(std::string_view id, std::string_view by) 
     const std::scoped_lock lock(mutex_);
     const auto at =
         std::ranges::find(alarms_, id, [](const Alarm& a) { return std::string_view(a.condition.id); });
-    if (at == alarms_.end()) return make_error(Errc::not_found, "no alarm " + to_utf8(id, 60) + " stands");
+    if (at == alarms_.end())
+      return make_error(Errc::not_found, "there is no active alarm " + to_utf8(id, 60));
     if (at->acknowledged) return *at;
     at->acknowledged = true;
     found = *at;

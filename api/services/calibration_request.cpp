@@ -53,7 +53,7 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
       if (!id)
         errors.push_back({at, "bad_id", id.error().message});
       else if (!seen.insert(to_string(id.value())).second)
-        errors.push_back({at, "duplicate", "the mission stands twice"});
+        errors.push_back({at, "duplicate", "the mission occurs twice"});
       else
         ids.push_back(MissionId{id.value()});
     }

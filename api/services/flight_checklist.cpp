@@ -46,14 +46,14 @@ std::vector<ChecklistItem> make_checklist(const ChecklistFacts& f) {
   if (f.drone) {
     const auto& d = *f.drone;
     std::string stale;
-    for (const auto& name : d.stale) stale += (stale.empty() ? "not heard for 5 s: " : ", ") + name;
+    for (const auto& name : d.stale) stale += (stale.empty() ? "no telemetry for 5 s: " : ", ") + name;
     out.push_back(item("drone", "The aircraft answers", d.connected && !d.failsafe && stale.empty(), false,
-                       !d.connected     ? "not heard"
+                       !d.connected     ? "no heartbeat"
                        : !stale.empty() ? stale
                                         : d.autopilot + ", " + d.mode + (d.failsafe ? ", failsafe" : "")));
     auto arming = item("arming", "The autopilot is ready to arm", d.ready_to_arm.value_or(false), true,
                        d.ready_to_arm.value_or(false) ? "its own checks pass"
-                       : !d.ready_to_arm              ? "it does not say; look at its own display"
+                       : !d.ready_to_arm              ? "no reason reported: see the ground station"
                        : d.not_ready.empty()          ? "its own checks do not pass yet"
                                                       : d.not_ready);
     if (!d.ready_to_arm && d.connected) arming.ok.reset();

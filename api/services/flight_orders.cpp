@@ -303,7 +303,7 @@ std::vector<std::pair<std::string_view, std::string>> FlightService::State::alar
   std::string stale;
   if (flying && !flight->manual && deps.drone != nullptr) {
     for (const auto& name : deps.drone->status().stale) stale += (stale.empty() ? "" : ", ") + name;
-    if (!stale.empty()) stale = "not heard for 5 s although the autopilot answers: " + stale;
+    if (!stale.empty()) stale = "no telemetry for 5 s although the autopilot answers: " + stale;
   }
   out.emplace_back("drone.telemetry", std::move(stale));
   return out;

@@ -188,10 +188,11 @@ Result<DroneStatus> FlightService::change_aircraft(const MissionId& mission, con
     return make_error(Errc::invalid_argument,
                       "the aircraft in the air answers; land it before another one takes the link");
   drone->change_peer(sender);
-  state_->deps.events.add("warning", "drone.changed",
-                          who.name + (sender.empty() ? ": the next autopilot that is heard is the aircraft"
-                                                     : ": the autopilot at " + sender + " is the aircraft"),
-                          mission);
+  state_->deps.events.add(
+      "warning", "drone.changed",
+      who.name + (sender.empty() ? ": the next autopilot whose heartbeat is received is the aircraft"
+                                 : ": the autopilot at " + sender + " is the aircraft"),
+      mission);
   return drone->status();
 }
 

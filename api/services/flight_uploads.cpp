@@ -28,7 +28,7 @@ Result<FlightCommand> FlightService::State::upload(const MissionId& mission, con
   const auto refuse = [](const char* why) { return make_error(Errc::invalid_argument, why); };
   if (deps.drone == nullptr) return refuse("there is no aircraft to command: nothing keeps a list");
   const auto status = deps.drone->status();
-  if (!status.connected) return refuse("the aircraft is not heard");
+  if (!status.connected) return refuse("no heartbeat of the aircraft is received: check its link");
   if ((flight && flight->flying()) || status.in_air)
     return refuse("the aircraft is in the air: lists are given to it on the ground");
   FlightUpload up{mission, plan.id, plan.version, what, 0, now_s(), {}};

@@ -40,7 +40,7 @@ bool LateWriter::write(Write write, std::chrono::milliseconds patience) {
   work_.notify_one();
   const bool done = written_.wait_for(lock, patience, [&] { return entry->done; });
   lock.unlock();
-  if (lost) report("a line of the audit log was lost: the store has not taken any for too long");
+  if (lost) report("a line of the audit log was lost: the database accepted no write for too long");
   return done;
 }
 

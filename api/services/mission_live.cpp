@@ -244,7 +244,7 @@ void MissionService::State::tell_fixes(Flight& flight, bool quiet) {
     if (reason == "not_usable" || !flight.fixes_told.try_emplace(reason, n).second || quiet) continue;
     deps.events.add("warning", "track." + reason,
                     reason == "excluded" ? "positions were excluded by a person"
-                                         : "a position is not believed: " + reason +
+                                         : "a position is rejected: " + reason +
                                                "; more of them are counted in the flight's state",
                     flight.id);
   }

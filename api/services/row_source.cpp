@@ -175,7 +175,7 @@ CsvRows::CsvRows(RowKind kind, std::string_view header, std::vector<FieldError>&
       errors.push_back(
           {"/" + to_utf8(name, 60), "unknown_field", "there is no column '" + to_utf8(name, 60) + "' here"});
     } else if (std::find(pointers_.begin(), pointers_.end(), it->second) != pointers_.end()) {
-      errors.push_back({"/" + name, "duplicate_key", "column '" + name + "' stands twice"});
+      errors.push_back({"/" + name, "duplicate_key", "column '" + name + "' occurs twice"});
     } else {
       pointers_.push_back(it->second);
     }

@@ -28,7 +28,7 @@ std::string gap(const FlightRows& rows) {
   for (std::size_t i = 1; i < poses.size(); ++i) interval_s.push_back(poses[i].t_s - poses[i - 1].t_s);
   const double usual_s = median(interval_s);
   std::string why = text(
-      "the track has one position in %.3g s, and a straight line across that misses the way by "
+      "the track has one position in %.3g s, and a straight line across that misses the flight path by "
       "%.2f m (limit 0.5 m, or max_gap_s): give a denser track",
       usual_s, rows.track.interpolation_error().sigma_m(usual_s, 0.5));
   if (usual_s > 20) why += "; if its times are milliseconds: t_s is in seconds";

@@ -206,7 +206,7 @@ void FlightControl::dispatch() {
     if (taken_over_)
       out.not_sent = "not sent: the pilot or a failsafe has the aircraft";
     else if (adopts_)
-      out.not_sent = "not sent: the aircraft has not been heard since the restart";
+      out.not_sent = "not sent: no heartbeat of the aircraft since the restart";
     else if (drone_ != nullptr)
       out.number = send(order);
     dispatched_.push_back(std::move(out));

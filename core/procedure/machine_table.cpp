@@ -145,7 +145,7 @@ std::span<const Transition> transitions() {
       if (from != S::hold)
         out.push_back({from, E::taken_over, G::always, S::hold, "the pilot or a failsafe has the aircraft"});
       if (from != S::return_home)
-        out.push_back({from, E::landed, G::always, S::done, "down and disarmed without being told"});
+        out.push_back({from, E::landed, G::always, S::done, "landed and disarmed without a command"});
     }
     out.push_back(
         {S::landing, E::taken_over, G::always, S::hold, "the pilot or a failsafe has the aircraft"});

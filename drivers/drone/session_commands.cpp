@@ -64,7 +64,7 @@ void Session::command(std::uint64_t number, const std::string& what, int command
 bool Session::deaf(std::uint64_t number, const std::string& what) {
   if (heard_s_ && autopilot_ != Autopilot::unknown) return false;
   report(number, what, CommandState::refused,
-         heard_s_ ? "neither ArduPilot nor PX4" : "the aircraft has not been heard");
+         heard_s_ ? "neither ArduPilot nor PX4" : "no heartbeat of the aircraft is received");
   return true;
 }
 

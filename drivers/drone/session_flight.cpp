@@ -50,7 +50,7 @@ std::uint64_t Session::take_off(double above_ground_m) {
   if (!flight_) return refuse("nothing is being flown");
   if (flight_->taken_over) return refuse("the pilot or a failsafe has taken over");
   if (!telemetry_.fresh("GLOBAL_POSITION_INT", now_s_, 3))
-    return refuse("the autopilot does not tell where it is");
+    return refuse("the autopilot does not report its position");
   end_take_off(CommandState::refused, "followed by another take-off");
   TakeOff t;
   t.number = number;
@@ -166,7 +166,7 @@ std::uint64_t Session::go_to(double lat_deg, double lon_deg, double height_m,
     return refuse("the pilot or a failsafe has taken over: " +
                   std::string(mode_word(autopilot_, custom_mode_)));
   if (!telemetry_.fresh("GLOBAL_POSITION_INT", now_s_, 5))
-    return refuse("the autopilot has not told where it is");
+    return refuse("the autopilot has not reported its position");
   if (!telemetry_.armed()) return refuse("the aircraft is disarmed");
   if (const double m = distance_m(lat_deg, lon_deg, height_m); m > options_.max_jump_m) {
     return refuse("the target is " + std::to_string(std::lround(m)) + " m away");

@@ -79,7 +79,7 @@ api::Response FrontDoor::wrong_secret(const api::Request& request, std::string_v
   if (!wait_s) return problem(401, "unauthorized", std::string(what));
   auto response = problem(429, "rate-limited",
                           "too many wrong tokens from " + request.remote + "; wait " +
-                              std::to_string(*wait_s) + " s (a right one is taken at once)");
+                              std::to_string(*wait_s) + " s (a valid one is accepted at once)");
   response.header("Retry-After", std::to_string(*wait_s));
   return response;
 }

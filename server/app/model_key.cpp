@@ -52,7 +52,7 @@ Result<ModelKey> read_or_make_model_key(const std::filesystem::path& data_dir) {
     return make_error(Errc::invalid_argument,
                       file.string() +
                           " is not 64 hex digits: bring it back from a copy, or remove it for a new key "
-                          "(models signed with the old one are then judged again before they are used)");
+                          "(models signed with the old one are then evaluated again before they are used)");
   return ModelKey{api::ModelSigner::to_text(seed.value()), false};
 }
 

@@ -212,7 +212,7 @@ Result<Revision> publish_revision(Connection& c, const CalibrationId& id,
   const std::uint64_t before = newest_revision(c);
   if (judged_on && *judged_on != before)
     return make_error(Errc::conflict, "revision " + std::to_string(before) +
-                                          " was published meanwhile; look at the anchors again");
+                                          " was published meanwhile: read the anchors again");
   if (all_stand(c, before, *key, anchors))
     return make_error(Errc::conflict, "revision " + std::to_string(before) +
                                           " has these positions of calibration " + to_string(id) +

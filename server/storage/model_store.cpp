@@ -125,7 +125,7 @@ class SqlModelStore final : public ModelStore {
       const std::uint64_t before = newest.step() ? newest.as<std::uint64_t>() : 0;
       if (judged_on && *judged_on != before)
         return make_error(Errc::conflict, "promotion " + std::to_string(before) +
-                                              " came meanwhile; look at the active models again");
+                                              " came meanwhile: read the active models again");
       if (promotion.model) {
         Query known(c, "SELECT task FROM model WHERE id = ?1");
         known << *promotion.model;

@@ -33,7 +33,7 @@ export function ExcludePanel({ mission, filter, sample, close }: { mission: stri
         <label><span class="lab">Reason, kept in the record</span><input class="input" data-testid="exclude-reason" value={reason} maxLength={500} onInput={(e) => set_reason(e.currentTarget.value)} /></label>
         <button class="btn primary" data-testid="exclude-now" disabled={busy || !what || reason.trim() === ''} onClick={() => void send()}>Exclude</button>
       </div>}
-      {!what && able && <p class="sub">{kind === 'ranges' && by_rows ? 'Choose a row in the list or a plot.' : 'Set a time in the filter above: what it says is taken out.'}</p>}
+      {!what && able && <p class="sub">{kind === 'ranges' && by_rows ? 'Choose a row in the list or a plot.' : 'Set a time span in the filter above: the rows in it are excluded.'}</p>}
       {list && list.length === 0 && <p class="pad">Every measurement of this flight is in use.</p>}
       {list && list.length > 0 && <table class="tbl" data-testid="exclusion-list"><caption class="sr">What was taken out of use</caption>
         <thead><tr><th scope="col">What</th><th scope="col">Which</th><th scope="col" class="num">Rows</th><th scope="col">Reason</th><th scope="col">By</th><th scope="col">State</th></tr></thead>

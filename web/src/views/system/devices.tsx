@@ -59,7 +59,7 @@ export function DevicesPanel() {
       <RadioWarning devices={rows.filter((r) => r.s.tone === 'ok').map((r) => r.d)} compared={compared} look={operator ? (id) => set_radio(id) : null} />
       {rows.length > 0 && <div class="scrollx"><table class="tbl devs" data-testid="driven">
         <caption class="sr">Devices that this server drives</caption>
-        <thead><tr><th scope="col">Device</th><th scope="col">State</th><th scope="col">What it does, or what to do</th><th scope="col" class="num">Last heard</th><th scope="col" class="num wide">Rate</th><th scope="col" class="num wide">Not used</th><th scope="col"><span class="sr">Actions</span></th></tr></thead>
+        <thead><tr><th scope="col">Device</th><th scope="col">State</th><th scope="col">What it does, or what to do</th><th scope="col" class="num">Last seen</th><th scope="col" class="num wide">Rate</th><th scope="col" class="num wide">Not used</th><th scope="col"><span class="sr">Actions</span></th></tr></thead>
         <tbody>{rows.map((r) => (
           <Fragment key={r.d.id}>
             <DrivenRow row={r} operator={operator} busy={busy !== ''} run={run} tune={() => set_radio(radio === r.d.id ? null : r.d.id)} open={open === r.d.id} toggle={() => set_open(open === r.d.id ? null : r.d.id)} />

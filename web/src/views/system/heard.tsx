@@ -13,7 +13,7 @@ export function Heard({ heard }: { heard: readonly Device[] }) {
       <h3>Radios heard</h3>
       <table class="tbl" data-testid="heard">
         <caption class="sr">Radios that were heard in any flight</caption>
-        <thead><tr><th scope="col">Radio</th><th scope="col">Kind</th><th scope="col">State</th><th scope="col">Last heard</th></tr></thead>
+        <thead><tr><th scope="col">Radio</th><th scope="col">Kind</th><th scope="col">State</th><th scope="col">Last seen</th></tr></thead>
         <tbody>{heard.slice(0, 100).map((d, i) => {
           // Silence is news only while a flight is recorded.
           const now = flying ? live.get(d.network_id ?? '')?.state : undefined, [shape, tone] = LOOK[now ?? ''] ?? ['off', 'off'];

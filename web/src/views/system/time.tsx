@@ -59,7 +59,7 @@ function Aircraft({ drone: d }: { drone: DroneMsg | null }) {
           <div><dt>Battery</dt><dd class={d.connected ? '' : 'stale'}>{d.battery === null ? '–' : <Q v={percent(d.battery)} u="%" />}</dd></div>
           <div><dt>State</dt><dd>{d.in_air ? 'in the air' : d.armed ? 'armed' : 'on the ground'}</dd></div>
           <div><dt>Link</dt><dd>{d.peer || '–'}, {d.link_signed ? 'signed' : 'not signed'}</dd></div>
-          <div><dt>Last heard</dt><dd>{d.silent_s === null || !d.autopilot ? 'never' : `${age(d.silent_s * 1000)} ago`}</dd></div>
+          <div><dt>Last seen</dt><dd>{d.silent_s === null || !d.autopilot ? 'never' : `${age(d.silent_s * 1000)} ago`}</dd></div>
         </dl>
         {d.frames_refused > 0 && <div class="callout caution" role="status"><b>{d.frames_refused} frames refused.</b> Unsigned, or signed with another key: somebody else sends on this link, or the autopilot has not this server&apos;s key.</div>}
         {d.others.length > 0 && <Others others={d.others} />}
@@ -72,7 +72,7 @@ function Others({ others }: { others: readonly OtherOnLink[] }) {
   return (
     <table class="reads" data-testid="link-others">
       <caption>Others on the link: counted, not obeyed</caption>
-      <thead><tr><th scope="col">Sender</th><th scope="col">What</th><th scope="col" class="num">System</th><th scope="col" class="num">Frames</th><th scope="col" class="num">Last heard</th></tr></thead>
+      <thead><tr><th scope="col">Sender</th><th scope="col">What</th><th scope="col" class="num">System</th><th scope="col" class="num">Frames</th><th scope="col" class="num">Last seen</th></tr></thead>
       <tbody>{others.map((o) => <tr key={`${o.sender} ${o.system} ${o.component}`}><th scope="row">{o.sender || 'same end'}</th><td>{o.kind}</td><td class="num">{o.system}/{o.component}</td><td class="num">{o.frames}</td><td class="num">{age((o.silent_s ?? 0) * 1000)} ago</td></tr>)}</tbody>
     </table>
   );
