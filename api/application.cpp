@@ -150,7 +150,7 @@ struct Application::State {
   void beat();
   std::string device_rows();
   void second();
-  void keep_house();
+  void background_round();
   void tell_system(UtcTime now, ServerPulse& pulse);
   void tell_alarms(UtcTime now, std::vector<AlarmCondition> holding,
                    std::vector<std::pair<std::string_view, std::string>>& of_flight);
@@ -231,7 +231,7 @@ void Application::State::beat() {
 }
 
 /// About once a second, on the thread of late writes; each part behind a guard of its own.
-void Application::State::keep_house() {
+void Application::State::background_round() {
   (void)guarded("last uses of tokens", [this] {
     if (deps.access != nullptr) deps.access->flush();
   });
@@ -248,7 +248,7 @@ void Application::State::second() {
   const UtcTime now = deps.clock.now();
   ServerPulse pulse;
   // Alarms and heartbeats must not wait for the disk.
-  late.idle_task([this] { keep_house(); });
+  late.idle_task([this] { background_round(); });
   (void)guarded("server status", [&] { tell_system(now, pulse); });
   (void)guarded("device clocks", [&] {
     if (deps.devices == nullptr) return;
@@ -368,7 +368,7 @@ void Application::fly() {
   if (state_->flights) state_->flights->step();
 }
 
-void Application::keep_house() { state_->housekeeping.round(); }
+void Application::housekeeping_round() { state_->housekeeping.round(); }
 
 void Application::stop() {
   {

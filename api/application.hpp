@@ -99,7 +99,7 @@ class Application {
     ServiceStore* service{nullptr};     ///< null: running time and whose the devices are end with the process
     const SteadyClock* steady{nullptr};  ///< what every duration is measured by; null: the system's
     std::int64_t keep_deleted_ns{30LL * 86'400 * 1'000'000'000};  ///< a deleted mission, in running time
-    bool housekeeping_by_hand{false};  ///< set: keep_house() is called by hand (tests)
+    bool housekeeping_by_hand{false};  ///< set: housekeeping_round() is called by hand (tests)
     std::string model_key{};       ///< 64 hex digits, what models are signed with; empty: none are (tests)
     bool model_key_is_new{false};  ///< models of before it existed are signed at the start
     RunWork run_work{};            ///< runs heavy work; absent: on the job's own thread
@@ -120,7 +120,7 @@ class Application {
   /// One round of the flight in the air; only where Deps::flight_clock is set (tests).
   void fly();
   /// Removes what is due; only where Deps::housekeeping_by_hand is set (tests).
-  void keep_house();
+  void housekeeping_round();
   /// Says bye to WebSocket clients, parks jobs, joins. Idempotent.
   void stop();
 

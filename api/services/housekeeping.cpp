@@ -23,7 +23,7 @@ constexpr auto k_quick = std::chrono::milliseconds(15), k_slow = std::chrono::mi
 
 void Housekeeping::start() {
   if (deps_.by_hand || thread_.joinable()) return;
-  thread_ = Thread("anchord-house", [this] { loop(); });
+  thread_ = Thread("anchord-purge", [this] { loop(); });
 }
 
 void Housekeeping::stop() {

@@ -102,17 +102,17 @@ TEST_F(MissionBinRules, TheBinIsEmptiedByRunningTimeAndNoClockStep) {
   ranges(id, 50);
   ASSERT_EQ(remove(id).status, 204);
   clock_.ahead_s = 300.0 * 86'400;
-  app_->keep_house();
+  app_->housekeeping_round();
   EXPECT_EQ(json(get("/api/v1/missions", {{"deleted", "true"}}))["items"].size(), 1u) << "a step of 300 days";
   now_s_ = now_s_ + 20.0 * 86'400;
-  app_->keep_house();
+  app_->housekeeping_round();
   restart();
   now_s_ = now_s_ + 9.9 * 86'400;  // the days before the restart count
-  app_->keep_house();
+  app_->housekeeping_round();
   ASSERT_EQ(json(get("/api/v1/missions", {{"deleted", "true"}}))["items"].size(), 1u);
   EXPECT_LT(json(get("/api/v1/missions", {{"deleted", "true"}}))["items"][0]["kept_for_s"], 86'400);
   now_s_ = now_s_ + 0.2 * 86'400;
-  app_->keep_house();
+  app_->housekeeping_round();
   EXPECT_TRUE(json(get("/api/v1/missions", {{"deleted", "true"}}))["items"].empty());
   EXPECT_EQ(get(path(id)).status, 404) << "nothing is left of it";
 }
@@ -129,7 +129,7 @@ TEST_F(MissionBinRules, OnlyAdminsEmptyItEarlyAndOnlyWhatIsInIt) {
   const auto match = header(get(path(id), {{"deleted", "true"}}), "ETag");
   EXPECT_EQ(purge({Role::admin}, match).status, 204);
   EXPECT_EQ(ask(Method::post, path(id, "/restore")).status, 409) << "too late";
-  app_->keep_house();
+  app_->housekeeping_round();
   EXPECT_EQ(get(path(id)).status, 404);
 }
 
@@ -202,7 +202,7 @@ TEST_F(MissionBinRules, ABigDeleteStallsNoIngest) {
            ingest_while([&] { (void)database_->bin().remove_rows(2 * rows + 10).has_value(); }));
   }
   const auto id = fill("in slices");
-  auto waits = ingest_while([&] { app_->keep_house(); });
+  auto waits = ingest_while([&] { app_->housekeeping_round(); });
   report("in slices", waits);
   EXPECT_LT(waits.part(0.99), 250) << "the promise of ingest (docs/durability.md)";
   EXPECT_EQ(get(path(id)).status, 404);
@@ -466,12 +466,12 @@ TEST_F(KeptAnswers, GoAfterADayOfRunningAndNotWithTheClock) {
   const std::string body = R"({"name":"x","frame":"local","track_point":"body"})";
   const auto first = keyed("/api/v1/missions", body, "k");
   clock_.ahead_s = 300.0 * 86'400;
-  app_->keep_house();
+  app_->housekeeping_round();
   EXPECT_EQ(keyed("/api/v1/missions", body, "k").body, first.body);
   now_s_ = now_s_ + 86'401;
   EXPECT_NE(keyed("/api/v1/missions", body, "k").body, first.body) << "a new one takes its place";
   now_s_ = now_s_ + 86'401;
-  app_->keep_house();
+  app_->housekeeping_round();
   EXPECT_EQ(database_->access().answer_use("tester").value().count, 0u);
 }
 
