@@ -59,12 +59,7 @@ Response include(Services& s, const Request& request) {
   check_query(request, {});
   const auto mission = path_id<MissionId>(request);
   const auto id = path_id<ExclusionId>(request, "exclusion");
-  std::vector<FieldError> errors;
-  const auto body = json_body(request, true);
-  Fields fields(body, "", errors);
-  const auto reason = fields.text("reason", 500).value_or("");
-  fields.finish();
-  refuse_if_any(errors);
+  const auto reason = optional_reason(request);
   const auto done = value_or_problem(
       s.deps.exclusions->include(mission, id, {s.deps.clock.now(), request.principal.name, reason}));
   s.audit(request, "rows.include " + to_string(mission) + ' ' + to_string(id) + ' ' + words(done) +

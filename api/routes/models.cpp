@@ -234,12 +234,7 @@ Response promote(LearningServices& l, const Request& request) {
   check_query(request, {});
   const auto candidate = value_or_problem(l.models.source().artifact(path_id<ModelId>(request)));
   const auto& stored = candidate.stored;
-  std::vector<FieldError> errors;
-  const auto body = json_body(request, true);
-  Fields fields(body, "", errors);
-  const auto reason = fields.text("reason", 500).value_or("");
-  fields.finish();
-  refuse_if_any(errors);
+  const auto reason = optional_reason(request);
   const auto before = standing_for(l, request);
   if (before.has(stored)) throw_problem(422, "state", "the model is active already");
   // One that live ranges cannot be judged by would ground the others with it.

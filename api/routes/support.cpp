@@ -6,6 +6,7 @@
 #include <set>
 
 #include "api/contract_fields.hpp"
+#include "api/json/reader.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 
@@ -134,6 +135,16 @@ Uuid path_uuid(const Request& request, const char* name) {
   const auto id = parse_uuid(it == request.params.end() ? "" : it->second);
   if (!id) throw_problem(404, "not-found", "there is nothing at this address");
   return id.value();
+}
+
+std::string optional_reason(const Request& request) {
+  std::vector<FieldError> errors;
+  const auto body = json_body(request, true);
+  Fields fields(body, "", errors);
+  auto reason = fields.text("reason", 500).value_or("");
+  fields.finish();
+  refuse_if_any(errors);
+  return reason;
 }
 
 std::optional<UtcTime> query_time(const Request& request, const char* name) {

@@ -50,6 +50,8 @@ std::optional<I> cursor_id(const std::string& cursor) {
                   {{"/cursor", "bad_cursor", "is not one of ours"}});
   return I{id.value()};
 }
+/// `reason` of a body that has nothing else and may be absent; empty without.
+std::string optional_reason(const Request& request);
 /// RFC 3339 or integer microseconds.
 std::optional<UtcTime> query_time(const Request& request, const char* name);
 std::optional<MissionId> query_mission(const Request& request);

@@ -121,6 +121,34 @@ class AppFixture : public ::testing::Test {
     return json(response).value("id", "");
   }
 
+  /// A stored calibration of anchors 0x6a2f and 0x6a3c, `finish` having made of each what the test needs; its
+  /// id.
+  std::string stored_calibration(const std::function<void(Estimate&)>& finish) {
+    Calibration c;
+    c.id.uuid = make_uuid_v7(clock_.now());
+    c.missions = {MissionId{parse_uuid(mission()).value()}};
+    c.origin = Wgs84{51.023, 3.713, 55};
+    c.settings_json = "{}";
+    c.created = clock_.now();
+    for (const std::uint32_t id : {0x6a2fu, 0x6a3cu}) {
+      Estimate e;
+      e.anchor = {id};
+      e.time = clock_.now();
+      e.verdict = Verdict::ok;
+      e.best.emplace();
+      e.best->wgs84 = Wgs84{51.0231, 3.7131, 58.4};
+      e.best->covariance_m2 = Eigen::Vector3d(4e-4, 4e-4, 1e-3).asDiagonal();
+      e.h95_m = 0.05;
+      e.v95_m = 0.06;
+      e.n_used = 100;
+      e.gates = {{"redundancy", 96.0, 30.0, true, ""}};
+      finish(e);
+      c.anchors.push_back(e);
+    }
+    EXPECT_TRUE(database_->anchors().insert(c).has_value());
+    return to_string(c.id);
+  }
+
   /// The system's, unless a test sets it: ahead by so much.
   struct SetClock final : Clock {
     UtcTime now() const override {

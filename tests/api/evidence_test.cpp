@@ -45,29 +45,11 @@ class EvidenceRoutes : public AppFixture {
   }
   /// A stored calibration: 0x6a2f passes its gates, 0x6a3c fails one, both at `east_m`.
   std::string stored(double east_m = 0) {
-    Calibration c;
-    c.id.uuid = make_uuid_v7(clock_.now());
-    c.missions = {MissionId{parse_uuid(mission()).value()}};
-    c.origin = Wgs84{51.023, 3.713, 55};
-    c.settings_json = "{}";
-    c.created = clock_.now();
-    for (const std::uint32_t id : {0x6a2fu, 0x6a3cu}) {
-      Estimate e;
-      e.anchor = {id};
-      e.time = clock_.now();
-      e.verdict = Verdict::ok;
-      e.best.emplace();
+    return stored_calibration([&](Estimate& e) {
+      const bool passes = e.anchor == NetworkId{0x6a2f};
       e.best->position.m = {east_m, 7, 3};
-      e.best->wgs84 = Wgs84{51.0231, 3.7131, 58.4};
-      e.best->covariance_m2 = Eigen::Vector3d(4e-4, 4e-4, 1e-3).asDiagonal();
-      e.h95_m = 0.05;
-      e.v95_m = 0.06;
-      e.n_used = 100;
-      e.gates = {{"chi_square", id == 0x6a2f ? 3.0 : 31.25, 16.25, id == 0x6a2f, "residuals keep a pattern"}};
-      c.anchors.push_back(e);
-    }
-    EXPECT_TRUE(database_->anchors().insert(c).has_value());
-    return to_string(c.id);
+      e.gates = {{"chi_square", passes ? 3.0 : 31.25, 16.25, passes, "residuals keep a pattern"}};
+    });
   }
 };
 

@@ -16,31 +16,11 @@ class Resources : public AppFixture {
   }
   /// A stored calibration with one believed and one ambiguous anchor.
   std::string calibration() {
-    Calibration c;
-    c.id.uuid = make_uuid_v7(clock_.now());
-    c.missions = {MissionId{parse_uuid(mission()).value()}};
-    c.origin = Wgs84{51.023, 3.713, 55};
-    c.settings_json = "{}";
-    c.created = clock_.now();
-    for (const auto& [id, verdict] :
-         {std::pair{0x6a2fu, Verdict::ok}, std::pair{0x6a3cu, Verdict::ambiguous}}) {
-      Estimate e;
-      e.anchor = {id};
-      e.time = clock_.now();
-      e.verdict = verdict;
-      e.reason = verdict == Verdict::ok ? "" : "the mirrored place fits as well";
-      Hypothesis best;
-      best.wgs84 = Wgs84{51.0231, 3.7131, 58.4};
-      best.covariance_m2 = Eigen::Vector3d(4e-4, 4e-4, 1e-3).asDiagonal();
-      e.best = best;
-      e.h95_m = 0.05;
-      e.v95_m = 0.06;
-      e.n_used = 100;
-      e.gates = {{"redundancy", 96.0, 30.0, true, ""}};
-      c.anchors.push_back(e);
-    }
-    EXPECT_TRUE(database_->anchors().insert(c).has_value());
-    return to_string(c.id);
+    return stored_calibration([](Estimate& e) {
+      if (e.anchor == NetworkId{0x6a2f}) return;
+      e.verdict = Verdict::ambiguous;
+      e.reason = "the mirrored place fits as well";
+    });
   }
 };
 

@@ -43,24 +43,7 @@ class Rivals : public AppFixture {
     for (const int one : status) EXPECT_TRUE(one == good || others.contains(one)) << one;
   }
   std::string calibration() {
-    Calibration c;
-    c.id.uuid = make_uuid_v7(clock_.now());
-    c.missions = {MissionId{parse_uuid(mission()).value()}};
-    c.origin = Wgs84{51.023, 3.713, 55};
-    c.settings_json = "{}";
-    c.created = clock_.now();
-    for (const std::uint32_t id : {0x6a2fu, 0x6a3cu}) {
-      Estimate e;
-      e.anchor = {id};
-      e.time = clock_.now();
-      e.verdict = Verdict::ok;
-      e.best = Hypothesis{};
-      e.best->wgs84 = Wgs84{51.0231, 3.7131, 58.4};
-      e.gates = {{"redundancy", 96.0, 30.0, true, ""}};
-      c.anchors.push_back(e);
-    }
-    EXPECT_TRUE(database_->anchors().insert(c).has_value());
-    return to_string(c.id);
+    return stored_calibration([](Estimate&) {});
   }
   std::size_t revisions() { return json(get("/api/v1/revisions"))["items"].size(); }
 };
