@@ -83,7 +83,7 @@ Ordered drone_json(const DroneStatus& d) {
           {"not_ready", d.not_ready},
           {"gps_fix", d.gps_fix},
           {"text", d.text},
-          {"peer", d.peer},
+          {"peer", d.identity.peer},
           {"link_signed", d.link_signed},
           {"frames_refused", d.frames_refused},
           {"others", std::move(others)}};

@@ -181,6 +181,16 @@ Result<FlightCommand> FlightService::State::obey(const MissionId& mission, const
   return *find(number_of_order);
 }
 
+namespace {
+
+/// System 0 where it is not said: whoever is heard first.
+DroneIdentity aircraft_of(const nlohmann::json& stored) {
+  if (!stored.is_object()) return {};
+  return {stored.value("peer", ""), stored.value("system", 0), stored.value("component", 0)};
+}
+
+}  // namespace
+
 void FlightService::State::recover() {
   const auto kept = deps.plans.procedures();
   if (!kept) return;
@@ -214,6 +224,9 @@ void FlightService::State::recover() {
     auto setup = procedure::flight_setup(plan, home);
     if (!setup) continue;
     const bool manual = j.value("manual", false) || deps.drone == nullptr;
+    // Before the flight, which is a new one on the link.
+    const auto aircraft = aircraft_of(j.value("aircraft", nlohmann::json()));
+    if (!manual && aircraft.system > 0) deps.drone->expect(aircraft);
     flight.emplace(mission, std::move(plan), manual, EnuFrame(origin), home,
                    procedure::FlightControl(std::move(setup).value(), EnuFrame(origin),
                                             manual ? nullptr : deps.drone, *state, now_s()));

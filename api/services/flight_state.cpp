@@ -8,6 +8,7 @@
 #include "api/application.hpp"
 #include "api/live/hub.hpp"
 #include "api/services/event_log.hpp"
+#include "api/services/late_writer.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/localize/live_flight.hpp"
 
@@ -61,11 +62,26 @@ bool ActiveFlight::to_keep(std::string& text) {
                                         {"plan_id", to_string(plan.id)},
                                         {"plan_revision", plan.version},
                                         {"manual", manual},
+                                        {"aircraft",
+                                         {{"peer", aircraft.peer},
+                                          {"system", aircraft.system},
+                                          {"component", aircraft.component}}},
                                         {"origin", {o.lat_deg, o.lon_deg, o.height_m}},
                                         {"home_m", {home_m.x(), home_m.y(), home_m.z()}},
                                         {"state", stored_state(control.engine().state())},
                                         {"clues", told}});
   return true;
+}
+
+/// A disk that is slow or full makes no flight wait: what is written last is what a restart finds.
+void FlightService::State::keep(const MissionId& mission, std::string document) const {
+  const auto write = [&plans = deps.plans, mission, document = std::move(document), now = deps.clock.now()] {
+    return plans.keep_procedure(mission, document, now);
+  };
+  if (deps.late != nullptr)
+    deps.late->write(write);
+  else
+    (void)write().has_value();
 }
 
 double FlightService::State::now_s() const {

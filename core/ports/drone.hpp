@@ -40,6 +40,12 @@ struct OtherOnLink {
 /// What the autopilot's mode means to us; `other`: a pilot's, or one that nobody here commands.
 enum class ModeKind : std::uint8_t { other, guided, hold, return_home, land };
 
+/// Which aircraft of a link is ours.
+struct DroneIdentity {
+  std::string peer;               ///< address and port where the link has senders (UDP)
+  int system{}, component{};      ///< MAVLink ids; system 0: none was heard
+};
+
 /// How the aircraft is, as its autopilot tells. Ages in seconds; infinity: never.
 struct DroneStatus {
   bool connected{false};  ///< heard within the last 3 s
@@ -68,7 +74,7 @@ struct DroneStatus {
   /// Values of the parameters that were asked for; those it does not know are absent.
   std::map<std::string, double> parameters;
   std::vector<std::string> parameters_unknown;  ///< asked five times in vain
-  std::string peer;                ///< address and port of the aircraft where the link has senders (UDP)
+  DroneIdentity identity{};
   bool link_signed{false};         ///< frames without our key's signature are refused
   std::uint64_t frames_refused{};  ///< unsigned, badly signed, or signed a second time
   std::vector<OtherOnLink> others;
@@ -122,6 +128,8 @@ class Drone {
   /// A person says that the aircraft on the link is another one: that of `sender`, or, empty, the next one
   /// whose autopilot is heard.
   virtual void change_peer(const std::string& sender) { (void)sender; }
+  /// A flight goes on after a restart: nobody but its aircraft is taken, until a person changes it.
+  virtual void expect(const DroneIdentity& aircraft) { (void)aircraft; }
   virtual DroneStatus status() const = 0;
   virtual std::vector<CommandReport> take_reports() = 0;
 };

@@ -34,6 +34,14 @@ void PeerGate::change(const std::string& sender) {
   wanted_ = sender.empty() ? std::nullopt : std::optional(sender);
 }
 
+void PeerGate::expect(double now_s, const DroneIdentity& aircraft) {
+  change("");
+  peer_ = aircraft.peer;
+  vehicle_ = {static_cast<std::uint8_t>(aircraft.system), static_cast<std::uint8_t>(aircraft.component)};
+  armed_ = true;
+  heard_s_ = now_s;
+}
+
 void PeerGate::note(const std::string& sender, mavlink::Address from, const std::string& kind, double now_s) {
   auto& seen = others_[{sender, from.system, from.component}];
   if (seen.frames == 0 || kind != "other") seen.kind = kind;

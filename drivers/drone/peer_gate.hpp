@@ -28,8 +28,11 @@ class PeerGate {
               std::span<const std::uint8_t> bytes);
   /// Empty: the next autopilot that is heard.
   void change(const std::string& sender);
+  /// The aircraft of a flight that goes on: as if it had been heard now, armed.
+  void expect(double now_s, const DroneIdentity& aircraft);
 
   const std::optional<std::string>& peer() const { return peer_; }
+  const mavlink::Address& vehicle() const { return vehicle_; }
   std::vector<OtherOnLink> others(double now_s) const;
   std::uint64_t frames_refused() const { return refused_; }
 

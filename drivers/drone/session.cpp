@@ -53,6 +53,7 @@ void Session::feed(double now_s, std::int64_t unix_us, std::span<const std::uint
 void Session::forget_vehicle() {
   heard_s_.reset();
   vehicle_ = {0, 0};
+  expected_.reset();
   autopilot_ = Autopilot::unknown;
   custom_mode_ = 0;
   flight_.reset();
@@ -63,6 +64,11 @@ void Session::forget_vehicle() {
     transfer_->check = false;
     end_transfer(CommandState::unconfirmed, "the aircraft on the link is another one");
   }
+}
+
+void Session::expect_vehicle(mavlink::Address vehicle) {
+  forget_vehicle();
+  expected_ = vehicle;
 }
 
 void Session::handle(const mavlink::Received& in) {
@@ -77,6 +83,8 @@ void Session::handle(const mavlink::Received& in) {
 void Session::on_heartbeat(const mavlink::Received& in) {
   const auto& m = in.message;
   if (m.integer("autopilot") == 8 || m.integer("type") == 6) return;  // another station
+  if (expected_ && in.from != *expected_) return;
+  expected_.reset();
   if (heard_s_ && in.from != vehicle_) {
     // One vehicle a session: the first heard, until it is silent for long and was not armed.
     if (now_s_ - *heard_s_ <= k_vehicle_kept_s || telemetry_.armed()) return;
@@ -186,6 +194,7 @@ DroneStatus Session::status() const {
   out.mode = heard_s_ ? std::string(mode_word(autopilot_, custom_mode_)) : "";
   out.mode_kind = heard_s_ ? mode_kind(autopilot_, custom_mode_) : ModeKind::other;
   out.taken_over = flight_ && flight_->taken_over;
+  out.identity = {"", vehicle_.system, vehicle_.component};
   return out;
 }
 

@@ -49,6 +49,8 @@ class Session final : public Drone {
   std::vector<std::uint8_t> take_bytes();
   /// The aircraft on the link is another one: the next autopilot that is heard is taken.
   void forget_vehicle();
+  /// Until it was heard no other is taken.
+  void expect_vehicle(mavlink::Address vehicle);
 
   void new_flight(double speed_mps) override;
   void end_flight() override;
@@ -172,6 +174,7 @@ class Session final : public Drone {
   double now_s_{0}, heartbeat_s_{-10};
   std::optional<double> heard_s_;
   mavlink::Address vehicle_{0, 0};
+  std::optional<mavlink::Address> expected_;
   Autopilot autopilot_{Autopilot::unknown};
   Telemetry telemetry_;
   std::uint32_t custom_mode_{0};

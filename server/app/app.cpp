@@ -279,6 +279,7 @@ void App::State::compose() {
   };
   application = std::make_unique<api::Application>(std::move(deps));
   application->start();
+  if (drone) drone->start();  // after a flight that goes on has said which aircraft is its own
   devices->start(application->device_rows());
   FrontDoorOptions options;
   options.hosts = host_policy(config);

@@ -150,17 +150,19 @@ Result<std::unique_ptr<DroneLink>> DroneLink::open(const std::string& address,
                                                    std::function<void(std::string_view)> log,
                                                    const std::optional<mavlink::Secret>& key) {
   BOOST_OUTCOME_TRY(auto where, link::parse_address(address));
-  auto impl = std::make_unique<Impl>(std::move(where), std::move(log), key);
-  auto* running = impl.get();
-  impl->thread = Thread("anchord-drone", [running] { running->run(); });
-  return std::unique_ptr<DroneLink>(new DroneLink(std::move(impl)));
+  return std::unique_ptr<DroneLink>(
+      new DroneLink(std::make_unique<Impl>(std::move(where), std::move(log), key)));
 }
 
 DroneLink::DroneLink(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 DroneLink::~DroneLink() {
   // Posted after the last command's bytes, so that a farewell hold still leaves.
   asio::post(impl_->io, [this] { impl_->io.stop(); });
-  impl_->thread.join();
+  if (impl_->thread.joinable()) impl_->thread.join();
+}
+
+void DroneLink::start() {
+  impl_->thread = Thread("anchord-drone", [running = impl_.get()] { running->run(); });
 }
 
 void DroneLink::new_flight(double speed_mps) {
@@ -210,10 +212,15 @@ void DroneLink::change_peer(const std::string& sender) {
   impl_->gate.change(sender);
   impl_->session.forget_vehicle();
 }
+void DroneLink::expect(const DroneIdentity& aircraft) {
+  const std::scoped_lock lock(impl_->mutex);
+  impl_->gate.expect(seconds(link::arrival_now()), aircraft);
+  impl_->session.expect_vehicle(impl_->gate.vehicle());
+}
 DroneStatus DroneLink::status() const {
   const std::scoped_lock lock(impl_->mutex);
   DroneStatus out = impl_->session.status();
-  out.peer = impl_->gate.peer().value_or("");
+  out.identity.peer = impl_->gate.peer().value_or("");
   out.link_signed = impl_->is_signed;
   out.frames_refused = impl_->gate.frames_refused();
   out.others = impl_->gate.others(seconds(link::arrival_now()));

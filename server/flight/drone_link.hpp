@@ -13,7 +13,7 @@
 namespace anchord::flight {
 
 /// The aircraft at an address (drivers/link/address.hpp): a MAVLink session behind a socket or a serial port
-/// on a thread of its own. A lost link is opened again each second. Thread-safe.
+/// on a thread of its own from start() on. A lost link is opened again each second. Thread-safe.
 class DroneLink final : public Drone {
  public:
   /// `log`: one line for the operator's log. `key`: of MAVLink 2 signing; frames without it are refused.
@@ -22,6 +22,8 @@ class DroneLink final : public Drone {
                                                  std::function<void(std::string_view)> log,
                                                  const std::optional<mavlink::Secret>& key = {});
   ~DroneLink() override;
+  /// Once, after expect(): nobody is heard before.
+  void start();
 
   void new_flight(double speed_mps) override;
   void end_flight() override;
@@ -38,6 +40,7 @@ class DroneLink final : public Drone {
   void ask_parameters(const std::vector<std::string>& names) override;
   void take_back() override;
   void change_peer(const std::string& sender) override;
+  void expect(const DroneIdentity& aircraft) override;
   DroneStatus status() const override;
   std::vector<CommandReport> take_reports() override;
 

@@ -75,6 +75,35 @@ TEST(PeerGate, AnAircraftThatWasArmedIsFollowedByItsOwnSystemIdAlone) {
   EXPECT_TRUE(link.hear("192.0.2.10:50001", copter.pack(heartbeat(true)))) << "its radio has a new port";
 }
 
+TEST(PeerGate, TheAircraftOfAFlightThatGoesOnIsWaitedFor) {
+  Link link;
+  Packer copter({1, 1}), other({66, 1}), forger({1, 1});
+  link.now = 100;
+  link.gate.expect(link.now, {k_aircraft, 1, 1});
+  EXPECT_FALSE(link.hear(k_stranger, other.pack(heartbeat(true)))) << "first on the link, and not ours";
+  EXPECT_FALSE(link.hear(k_stranger, forger.pack(heartbeat(true)))) << "our id from elsewhere";
+  link.now = 105;
+  EXPECT_TRUE(link.hear(k_aircraft, copter.pack(heartbeat(true))));
+  EXPECT_EQ(link.gate.peer(), k_aircraft);
+}
+
+TEST(PeerGate, TheAircraftOfAFlightThatGoesOnMayComeFromAnotherPortAfterTenSeconds) {
+  Link link;
+  Packer copter({1, 1}), other({66, 1});
+  link.gate.expect(link.now, {k_aircraft, 1, 1});
+  link.now = 10.1;
+  EXPECT_FALSE(link.hear(k_stranger, other.pack(heartbeat(true)))) << "however long it is silent";
+  EXPECT_TRUE(link.hear("192.0.2.10:50001", copter.pack(heartbeat(true)))) << "its radio has a new port";
+}
+
+TEST(PeerGate, APersonChangesTheAircraftOfAFlightThatGoesOn) {
+  Link link;
+  Packer other({66, 1});
+  link.gate.expect(link.now, {k_aircraft, 1, 1});
+  link.gate.change(k_stranger);
+  EXPECT_TRUE(link.hear(k_stranger, other.pack(heartbeat())));
+}
+
 TEST(PeerGate, APersonChangesIt) {
   Link link;
   Packer copter({1, 1}), other({2, 1}), third({3, 1});

@@ -111,6 +111,7 @@ void fly(const std::string& address, Aircraft& aircraft) {
   auto opened = DroneLink::open(address, {});
   ASSERT_TRUE(opened) << opened.error().message;
   auto& link = *opened.value();
+  link.start();
   ASSERT_TRUE(
       until([&] { return link.status().connected && link.status().position && link.status().home; }, 30))
       << address;
@@ -145,13 +146,20 @@ class Sender {
     to_.sin_family = AF_INET;
     to_.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     to_.sin_port = htons(to);
+    EXPECT_EQ(::connect(socket_, reinterpret_cast<const sockaddr*>(&to_), sizeof to_), 0);  // it has a port now
   }
   ~Sender() { ::close(socket_); }
+  /// As the server sees it, once something was sent.
+  std::string address() {
+    sockaddr_in own{};
+    socklen_t size = sizeof own;
+    ::getsockname(socket_, reinterpret_cast<sockaddr*>(&own), &size);
+    return "127.0.0.1:" + std::to_string(ntohs(own.sin_port));
+  }
   void beat() {
     const auto frame =
         packer_.pack(mavlink::Message("HEARTBEAT").set("type", 2).set("autopilot", 3).set("custom_mode", 4));
-    (void)::sendto(socket_, frame.data(), frame.size(), 0, reinterpret_cast<const sockaddr*>(&to_),
-                   sizeof to_);
+    (void)::send(socket_, frame.data(), frame.size(), 0);
   }
   /// Frames of the server that came here.
   std::size_t heard() {
@@ -184,9 +192,10 @@ TEST(DroneLink, ADatagramOfAStrangerTakesNothingOverUdp) {
   auto opened = DroneLink::open("udp://:" + std::to_string(port), {});
   ASSERT_TRUE(opened) << opened.error().message;
   auto& link = *opened.value();
+  link.start();
   Sender aircraft(port, 1), stranger(port, 1);
   ASSERT_TRUE(until([&] { return aircraft.beat(), link.status().connected && aircraft.heard() > 0; }, 10));
-  const auto peer = link.status().peer;
+  const auto peer = link.status().identity.peer;
   EXPECT_FALSE(peer.empty());
   ASSERT_TRUE(until([&] { return stranger.beat(), !link.status().others.empty(); }, 10));
   EXPECT_EQ(link.status().others.front().kind, "autopilot");
@@ -194,9 +203,24 @@ TEST(DroneLink, ADatagramOfAStrangerTakesNothingOverUdp) {
   (void)link.land();
   ASSERT_TRUE(until([&] { return aircraft.heard() > before; }, 10)) << "the command goes to the aircraft";
   EXPECT_EQ(stranger.heard(), 0u);
-  EXPECT_EQ(link.status().peer, peer);
+  EXPECT_EQ(link.status().identity.peer, peer);
   link.change_peer(link.status().others.front().sender);
   ASSERT_TRUE(until([&] { return stranger.beat(), stranger.heard() > 0; }, 10)) << "a person changed it";
+}
+
+TEST(DroneLink, AStrangerWhoIsHeardFirstDoesNotTakeAFlightThatGoesOn) {
+  const auto port = free_port();
+  Sender aircraft(port, 1), stranger(port, 66);
+  auto opened = DroneLink::open("udp://:" + std::to_string(port), {});
+  ASSERT_TRUE(opened) << opened.error().message;
+  auto& link = *opened.value();
+  link.expect({aircraft.address(), 1, 1});
+  link.start();
+  ASSERT_TRUE(until([&] { return stranger.beat(), !link.status().others.empty(); }, 10));
+  EXPECT_FALSE(link.status().connected);
+  ASSERT_TRUE(until([&] { return aircraft.beat(), link.status().connected && aircraft.heard() > 0; }, 10));
+  EXPECT_EQ(link.status().identity.system, 1);
+  EXPECT_EQ(stranger.heard(), 0u);
 }
 
 TEST(DroneLink, FliesTheAircraftOverTcpAndComesBackAfterALoss) {
