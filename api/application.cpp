@@ -61,7 +61,7 @@ struct Application::State {
                    : nullptr),
         missions({deps.missions, deps.measurements, deps.anchors, hub, events, deps.clock, deps.post,
                   deps.goal, [this] { return device_rows(); }, judge(), needs_cir(), deps.site_outline,
-                  &steady, deps.exclusions, deps.track}),
+                  &steady, deps.exclusions, deps.track, &late}),
         stream({deps.devices, deps.service, deps.missions, events}),
         housekeeping({deps.bin, running, events, [this] { return router.purge_answers(); },
                       deps.keep_deleted_ns, deps.housekeeping_by_hand}),
@@ -95,7 +95,7 @@ struct Application::State {
       add_plan_routes(router, services);
       flights = std::make_unique<FlightService>(
           FlightService::Deps{missions, *deps.plans, hub, events, deps.clock, deps.drone,
-                              [this] { return services.storage(); }, deps.flight_clock, &steady});
+                              [this] { return services.storage(); }, deps.flight_clock, &steady, &late});
       missions.observe(flights.get());
       services.flights = flights.get();
       add_flight_routes(router, services);

@@ -10,12 +10,13 @@ namespace anchord::api {
 
 class MissionService;
 
-/// Rows of our own devices on the way that uploads take: stored, and once committed to the live flight.
-/// Thread-safe; blocks on the database.
+/// Rows of our own devices on the way that uploads take: to the live flight as they come, then into the
+/// store. Thread-safe.
 class DeviceIngest final : public DeviceRows {
  public:
   DeviceIngest(MeasurementStore& store, MissionService& missions) : store_(store), missions_(missions) {}
-  Result<void> take(std::vector<Fix> fixes, std::vector<Range> ranges) override;
+  void live(DeviceBatch& batch) override;
+  Result<void> store(const DeviceBatch& batch) override;
 
  private:
   MeasurementStore& store_;

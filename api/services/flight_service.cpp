@@ -72,7 +72,10 @@ void FlightService::step() {
   {
     const std::scoped_lock lock(s.mutex);
     s.round(live.empty() ? nullptr : &live.front());
-    if (s.flight) keeps = s.flight->to_keep(keep);
+    if (s.flight) {
+      if (!s.flight->manual) s.flight->aircraft = s.deps.drone->status().identity;
+      keeps = s.flight->to_keep(keep);
+    }
     if (s.flight && s.flight->clues_told != s.flight->control.engine().clues_version()) {
       s.flight->clues_told = s.flight->control.engine().clues_version();
       clues = s.flight->clues();
@@ -80,7 +83,7 @@ void FlightService::step() {
     s.publish();
   }
   if (clues && mission) s.deps.missions.tell_clues(*mission, std::move(*clues));
-  if (keeps && mission) (void)s.deps.plans.keep_procedure(*mission, keep, s.deps.clock.now()).has_value();
+  if (keeps && mission) s.keep(*mission, std::move(keep));
   s.changed.notify_all();
 }
 

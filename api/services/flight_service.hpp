@@ -23,6 +23,7 @@ namespace anchord::api {
 
 class EventLog;
 class Hub;
+class LateWriter;
 class MissionService;
 struct StorageStatus;
 
@@ -54,6 +55,7 @@ class FlightService final : public MissionObserver {
     std::function<StorageStatus()> storage;
     std::function<double()> now_s{};     ///< steady seconds; set: no thread, the owner calls step() (tests)
     const SteadyClock* steady{nullptr};  ///< what the lease runs on; null: the system's
+    LateWriter* late{nullptr};           ///< null: what it writes it writes at once
   };
   explicit FlightService(Deps deps);
   ~FlightService() override;

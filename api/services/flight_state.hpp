@@ -38,6 +38,7 @@ struct ActiveFlight {
   MissionId mission;
   Plan plan;
   bool manual{false};
+  DroneIdentity aircraft;  ///< that it was begun with
   EnuFrame frame;  ///< of the plan, its ground at height 0
   Eigen::Vector3d home_m;
   procedure::FlightControl control;
@@ -87,6 +88,7 @@ struct FlightService::State {
   void recover();
   void round(const MissionService::LiveView* live);
   void note_dispatched(ActiveFlight& f, FlightCommand* cause);
+  void keep(const MissionId& mission, std::string document) const;
   void read_reports();
   void tell_happenings(ActiveFlight& f);
   Result<FlightCommand> obey_directly(const MissionId& mission, const std::string& action,

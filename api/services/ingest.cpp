@@ -251,28 +251,30 @@ class IngestRun {
     }
     if (!poses_.empty()) store_poses();
     const bool with_cir = service_.missions_.wants_cir();
-    std::vector<Row> live;
+    std::vector<Arrived<Row>> live;
     live.reserve(rows_.size());
     for (const auto& row : rows_) {
       if constexpr (std::is_same_v<Row, Range>)
-        live.push_back(with_cir ? row : without_cir(row));
+        live.push_back({with_cir ? row : without_cir(row)});
       else
-        live.push_back(row);
+        live.push_back({row});
     }
+    // All or nothing is known only afterwards.
+    if (!atomic_) service_.missions_.arrived(live);
     auto stored = append(service_.store_, std::move(rows_), atomic_);
     rows_.clear();
     if (!stored) {
+      service_.missions_.not_stored(live);
       std::string before = accepted_ + duplicates_ == 0 ? ""
                                                         : "; " + std::to_string(accepted_ + duplicates_) +
                                                               " rows before are stored, send all again";
       throw ProblemException{problem_of(make_error(stored.error().code, stored.error().message + before))};
     }
-    settle(stored.value(), std::move(live));
+    settle(stored.value(), live);
     lines_.clear();
   }
 
-  void settle(const std::vector<RowOutcome>& outcomes, std::vector<Row> live) {
-    std::vector<Row> fresh;
+  void settle(const std::vector<RowOutcome>& outcomes, std::span<const Arrived<Row>> live) {
     bool sunk = false;
     for (const auto outcome : outcomes)
       sunk = sunk || outcome == RowOutcome::conflict || outcome == RowOutcome::unknown_mission;
@@ -283,7 +285,6 @@ class IngestRun {
           if (sunk) break;
           ++accepted_;
           ++service_.counters_.accepted;
-          fresh.push_back(std::move(live[i]));
           break;
         case RowOutcome::duplicate:
           ++duplicates_;
@@ -299,19 +300,20 @@ class IngestRun {
           break;
       }
     }
-    if (!fresh.empty()) service_.missions_.accepted(std::move(fresh));
+    if (!sunk) service_.missions_.accepted(live, outcomes);
   }
 
   void store_poses() {
-    auto live = poses_;
+    std::vector<Arrived<Fix>> live;
+    for (const auto& pose : poses_) live.push_back({pose});
+    service_.missions_.arrived(live);
     auto stored = service_.store_.append_fixes(std::move(poses_), false);
     poses_.clear();
-    if (!stored) throw ProblemException{problem_of(stored.error())};
-    std::vector<Fix> fresh;
-    for (std::size_t i = 0; i < stored.value().size(); ++i) {
-      if (stored.value()[i] == RowOutcome::accepted) fresh.push_back(std::move(live[i]));
+    if (!stored) {
+      service_.missions_.not_stored(live);
+      throw ProblemException{problem_of(stored.error())};
     }
-    if (!fresh.empty()) service_.missions_.accepted(std::move(fresh));
+    service_.missions_.accepted(live, stored.value());
   }
 
   Response answer() {

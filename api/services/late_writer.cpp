@@ -2,16 +2,12 @@
 
 #include <utility>
 
+#include "core/base/retry.hpp"
+
 namespace anchord::api {
 namespace {
 
 constexpr auto k_pause = std::chrono::milliseconds(500);
-
-/// Worth another try: the store, not the row, is what is wrong.
-bool passing(const Error& error) {
-  return error.code == Errc::storage_full || error.code == Errc::storage_unavailable ||
-         error.code == Errc::queue_full;
-}
 
 }  // namespace
 
@@ -97,7 +93,7 @@ void LateWriter::run() {
     const bool last_try = stopping_;
     lock.unlock();
     const auto written = attempt(entry->write);
-    const bool again = !written && passing(written.error()) && !last_try;
+    const bool again = !written && may_pass(written.error().code) && !last_try;
     if (!written && !troubled) report("a write that follows its answer failed: " + written.error().message);
     lock.lock();
     troubled = again;
@@ -129,7 +125,7 @@ Result<void> PromptAccessStore::keep_answer(const StoredAnswer& answer, std::int
   writer_.write([this, answer, name, expired_ran_ns]() -> Result<void> {
     auto kept = inner_.keep_answer(answer, expired_ran_ns);
     const std::scoped_lock lock(mutex_);
-    if (kept || !passing(kept.error())) pending_.erase(name);
+    if (kept || !may_pass(kept.error().code)) pending_.erase(name);
     return kept;
   });
   return boost::outcome_v2::success();

@@ -23,30 +23,73 @@ LiveRow MissionService::State::row_of(Range range) const {
 }
 
 template <class R>
-void MissionService::State::accept(std::vector<R> rows) {
+void MissionService::State::enqueue(Flight& flight, const R& row, SteadyTime now) {
+  LiveRow judged = row_of(row);
+  const std::scoped_lock lock(flight.queue_mutex);
+  flight.last_arrival = now;
+  (std::is_same_v<R, Fix> ? flight.fix_arrival : flight.range_arrival) = now;
+  if (flight.queue.size() >= k_max_queued_rows) {
+    flight.queue.pop_front();
+    ++flight.dropped;
+    --queued;
+  }
+  flight.queue.push_back(std::move(judged));
+  flight.closing = flight.mission.state == MissionState::finished;
+  ++queued;
+}
+
+template <class R>
+void MissionService::State::take_newest(std::span<Arrived<R>> rows) {
   const SteadyTime now = steady_now();
   std::shared_ptr<Flight> flight;
-  for (auto& row : rows) {
+  for (auto& [row, live] : rows) {
     if (!flight || flight->id != row.mission) flight = find(row.mission);
     if (!flight) continue;
-    LiveRow judged = row_of(std::move(row));
-    const std::scoped_lock lock(flight->queue_mutex);
-    flight->last_arrival = now;
-    (std::is_same_v<R, Fix> ? flight->fix_arrival : flight->range_arrival) = now;
-    if (flight->queue.size() >= k_max_queued_rows) {
-      flight->queue.pop_front();
-      ++flight->dropped;
-      --queued;
+    {
+      const std::scoped_lock lock(flight->queue_mutex);
+      // While it is read back from the store its newest row is not known.
+      live = !flight->rebuilding && flight->newest.note(row);
     }
-    flight->queue.push_back(std::move(judged));
-    flight->closing = flight->mission.state == MissionState::finished;
-    ++queued;
+    if (live) enqueue(*flight, row, now);
   }
   for (const auto& f : all()) schedule(f);
 }
 
-template void MissionService::State::accept(std::vector<Range>);
-template void MissionService::State::accept(std::vector<Fix>);
+template <class R>
+void MissionService::State::accept(std::span<const Arrived<R>> rows, std::span<const RowOutcome> outcomes) {
+  const SteadyTime now = steady_now();
+  std::shared_ptr<Flight> flight;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const auto& [row, live] = rows[i];
+    if (live || outcomes[i] != RowOutcome::accepted) continue;
+    if (!flight || flight->id != row.mission) flight = find(row.mission);
+    if (!flight) continue;
+    {
+      const std::scoped_lock lock(flight->queue_mutex);
+      flight->newest.note(row);
+      if (!flight->ahead.empty() && flight->ahead.erase(identity(row)) > 0) continue;
+    }
+    enqueue(*flight, row, now);
+  }
+  for (const auto& f : all()) schedule(f);
+}
+
+template <class R>
+void MissionService::State::remember_ahead(std::span<const Arrived<R>> rows) {
+  for (const auto& [row, live] : rows) {
+    const auto flight = live ? find(row.mission) : nullptr;
+    if (!flight) continue;
+    const std::scoped_lock lock(flight->queue_mutex);
+    if (flight->ahead.size() < k_max_queued_rows) flight->ahead.insert(identity(row));
+  }
+}
+
+template void MissionService::State::take_newest(std::span<Arrived<Range>>);
+template void MissionService::State::take_newest(std::span<Arrived<Fix>>);
+template void MissionService::State::accept(std::span<const Arrived<Range>>, std::span<const RowOutcome>);
+template void MissionService::State::accept(std::span<const Arrived<Fix>>, std::span<const RowOutcome>);
+template void MissionService::State::remember_ahead(std::span<const Arrived<Range>>);
+template void MissionService::State::remember_ahead(std::span<const Arrived<Fix>>);
 
 void MissionService::State::schedule(const std::shared_ptr<Flight>& flight) {
   {
@@ -212,8 +255,11 @@ void MissionService::State::announce(Flight& flight, bool quiet) {
     auto& known = flight.statuses[estimate.anchor];
     if (known.empty()) {
       // From its first range on an anchor has an identity that facility data can hang on.
-      const auto anchor = deps.anchors.find_or_create(estimate.anchor, deps.clock.now());
-      if (!quiet && anchor)
+      later([&anchors = deps.anchors, who = estimate.anchor, now = deps.clock.now()]() -> Result<void> {
+        BOOST_OUTCOME_TRYV(anchors.find_or_create(who, now));
+        return boost::outcome_v2::success();
+      });
+      if (!quiet)
         deps.events.add("info", "anchor.found", "anchor " + to_string(estimate.anchor) + " found", id);
     }
     if (status != known && !quiet && (status == "converged" || status == "ambiguous")) {

@@ -72,6 +72,10 @@ bool MissionService::State::rebuild_slice(Flight& flight) {
   refill(r.ranges, r.range_filter, r.more_ranges, [&](auto& f) { return deps.measurements.ranges(f); });
   refill(r.fixes, r.fix_filter, r.more_fixes, [&](auto& f) { return deps.measurements.fixes(f); });
   const auto take = [&](auto& rows) {
+    {
+      const std::scoped_lock queue(flight.queue_mutex);
+      flight.newest.note(rows.front());
+    }
     const LiveRow row = row_of(std::move(rows.front()));
     rows.pop_front();
     flight.rebuilt.push_back(identity(row));

@@ -127,8 +127,16 @@ void MissionService::note_in_flights(const std::string& code, const std::string&
   for (const auto& id : recording) state_->deps.events.add("info", code, text, id);
 }
 
-void MissionService::accepted(std::vector<Range> ranges) { state_->accept(std::move(ranges)); }
-void MissionService::accepted(std::vector<Fix> fixes) { state_->accept(std::move(fixes)); }
+void MissionService::arrived(std::span<Arrived<Range>> ranges) { state_->take_newest(ranges); }
+void MissionService::arrived(std::span<Arrived<Fix>> fixes) { state_->take_newest(fixes); }
+void MissionService::accepted(std::span<const Arrived<Range>> ranges, std::span<const RowOutcome> outcomes) {
+  state_->accept(ranges, outcomes);
+}
+void MissionService::accepted(std::span<const Arrived<Fix>> fixes, std::span<const RowOutcome> outcomes) {
+  state_->accept(fixes, outcomes);
+}
+void MissionService::not_stored(std::span<const Arrived<Range>> ranges) { state_->remember_ahead(ranges); }
+void MissionService::not_stored(std::span<const Arrived<Fix>> fixes) { state_->remember_ahead(fixes); }
 
 std::vector<MissionService::LiveView> MissionService::live(const std::optional<MissionId>& id) {
   std::vector<std::shared_ptr<Flight>> wanted;

@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@
 #include "core/geo/track_segments.hpp"
 #include "core/localize/accuracy_goal.hpp"
 #include "core/procedure/flight_clues.hpp"
+#include "core/types/arrived.hpp"
 #include "core/types/estimate.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/mission.hpp"
@@ -25,6 +27,7 @@
 
 namespace anchord {
 class AnchorStore;
+enum class RowOutcome : std::uint8_t;
 class ExclusionStore;
 class MeasurementStore;
 class MissionStore;
@@ -34,6 +37,7 @@ namespace anchord::api {
 
 class EventLog;
 class Hub;
+class LateWriter;
 class MissionObserver;
 
 /// Flights: their records and, for each, the one LiveFlight that follows the accepted measurements and feeds
@@ -62,6 +66,7 @@ class MissionService {
     const SteadyClock* steady{nullptr};   ///< what silence is measured by; null: the system's
     ExclusionStore* exclusions{nullptr};  ///< null: nothing is ever excluded (tests)
     TrackLimits track{};                  ///< what the positions of a flight are held against
+    LateWriter* late{nullptr};            ///< null: what it writes it writes at once
   };
   explicit MissionService(Deps deps);
   ~MissionService();
@@ -85,9 +90,17 @@ class MissionService {
   /// What a person took out of use of this mission changed: its live flight, where there is one, begins anew
   /// with what the store holds, less that.
   void exclusions_changed(const MissionId& id);
-  /// Rows of one kind that were committed, in order of arrival.
-  void accepted(std::vector<Range> ranges);
-  void accepted(std::vector<Fix> fixes);
+  /// Rows of one kind as they come, before they are stored: whatever is newer than all that came before of its
+  /// tag and anchor (or rover) cannot be a repetition, goes to the live flight and is marked. The rest waits
+  /// for the store's word. Never waits for the store.
+  void arrived(std::span<Arrived<Range>> ranges);
+  void arrived(std::span<Arrived<Fix>> fixes);
+  /// The store's word on each: what it accepted and the live flight does not have goes there now.
+  void accepted(std::span<const Arrived<Range>> ranges, std::span<const RowOutcome> outcomes);
+  void accepted(std::span<const Arrived<Fix>> fixes, std::span<const RowOutcome> outcomes);
+  /// They were not stored and may be sent again: the live flight does not take them twice.
+  void not_stored(std::span<const Arrived<Range>> ranges);
+  void not_stored(std::span<const Arrived<Fix>> fixes);
 
   /// What the turns and height searches of its flight told of its anchors: priors of every running estimate
   /// from now on.

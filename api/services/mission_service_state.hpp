@@ -5,11 +5,13 @@
 #include <chrono>
 #include <condition_variable>
 #include <deque>
+#include <unordered_set>
 #include <variant>
 
 #include "api/json/live_writer.hpp"
 #include "api/services/flight_watch.hpp"
 #include "api/services/joint_worker.hpp"
+#include "api/services/late_writer.hpp"
 #include "api/services/live_row.hpp"
 #include "api/services/mission_service.hpp"
 #include "api/services/radio_watch.hpp"
@@ -30,6 +32,8 @@ struct MissionService::Flight {
   std::mutex queue_mutex;
   Mission mission;  ///< under queue_mutex
   std::deque<LiveRow> queue;
+  NewestRows newest;
+  std::unordered_set<std::size_t> ahead;  ///< identities of what it took and the store did not; at most 100 000
   bool scheduled{false};
   bool closing{false};  ///< finished, and what waits for a fix is not told yet
   std::uint64_t dropped{0};
@@ -101,8 +105,22 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
     return it == flights.end() ? nullptr : it->second;
   }
 
+  // Of Range and of Fix:
   template <class R>
-  void accept(std::vector<R> rows);  ///< of Range and of Fix
+  void take_newest(std::span<Arrived<R>> rows);
+  template <class R>
+  void accept(std::span<const Arrived<R>> rows, std::span<const RowOutcome> outcomes);
+  template <class R>
+  void remember_ahead(std::span<const Arrived<R>> rows);
+  template <class R>
+  void enqueue(Flight& flight, const R& row, SteadyTime now);
+  /// A write that the live path does not wait for.
+  void later(std::function<Result<void>()> write) const {
+    if (deps.late != nullptr)
+      deps.late->write(std::move(write), std::chrono::milliseconds(0));
+    else
+      (void)write().has_value();
+  }
   LiveRow row_of(Range range) const;
   static LiveRow row_of(Fix fix) { return fix; }
   void schedule(const std::shared_ptr<Flight>& flight);

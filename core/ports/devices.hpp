@@ -8,6 +8,7 @@
 
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
+#include "core/types/arrived.hpp"
 #include "core/types/base_station.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/range.hpp"
@@ -100,11 +101,23 @@ class DeviceControl {
   virtual std::string not_started() { return {}; }
 };
 
-/// Who takes the rows of devices: stores them and hands them to the live flight. Blocks on the database.
+/// Rows of devices, of each kind in the order of their arrival.
+struct DeviceBatch {
+  std::vector<Arrived<Fix>> fixes;
+  std::vector<Arrived<Range>> ranges;
+  std::size_t size() const { return fixes.size() + ranges.size(); }
+  bool empty() const { return size() == 0; }
+};
+
+/// Who takes the rows of devices: first for the live flight, then to be kept. The two come from a thread each,
+/// so that a flight never waits for a disk.
 class DeviceRows {
  public:
   virtual ~DeviceRows() = default;
-  virtual Result<void> take(std::vector<Fix> fixes, std::vector<Range> ranges) = 0;
+  /// Never waits for the database. Marks what the live flight took.
+  virtual void live(DeviceBatch& batch) = 0;
+  /// Blocks on the database. After an error the same batch may come again.
+  virtual Result<void> store(const DeviceBatch& batch) = 0;
 };
 
 }  // namespace anchord

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "core/base/guard.hpp"
+#include "core/base/retry.hpp"
 #include "core/base/text.hpp"
 #include "drivers/device/device_loop.hpp"
 #include "drivers/device/discover.hpp"
@@ -24,6 +25,8 @@ namespace {
 
 constexpr auto k_answer_time =
     std::chrono::seconds(25);  ///< settings of six anchors by radio take half of it
+
+constexpr std::chrono::milliseconds k_live_batch{20}, k_store_batch{100};
 
 DeviceReport report_of(const DeviceConfig& config, const device::DeviceState& s) {
   DeviceReport out;
@@ -106,7 +109,8 @@ class DeviceManager::Impl final : public device::DeviceListener {
 
   void start(DeviceRows& rows) {
     rows_ = &rows;
-    writer_ = Thread("anchord-rows", [this] { write_rows(); });
+    live_rows_ = Thread("anchord-rows", [this] { hand_on_rows(); });
+    writer_ = Thread("anchord-store", [this] { write_rows(); });
     std::vector<KeptDevice> devices;
     {
       const std::scoped_lock lock(mutex_);
@@ -180,7 +184,9 @@ class DeviceManager::Impl final : public device::DeviceListener {
       });
       io_thread_.join();
     }
-    queue_.stop();
+    arrived_.stop();
+    if (live_rows_.joinable()) live_rows_.join();
+    unstored_.stop();
     if (writer_.joinable()) writer_.join();
     const std::scoped_lock lock(answers_mutex_);
     for (auto& [id, promise] : answers_) promise.set_value(make_error(Errc::canceled, "the server stops"));
@@ -203,8 +209,8 @@ class DeviceManager::Impl final : public device::DeviceListener {
   }
 
   // --- io thread -------------------------------------------------------------------------------------------
-  void fix(const std::string&, const Fix& row) override { queue_.push(row); }
-  void range(const std::string&, const Range& row) override { queue_.push(row); }
+  void fix(const std::string&, const Fix& row) override { arrived_.push(row); }
+  void range(const std::string&, const Range& row) override { arrived_.push(row); }
   void changed(const std::string& id) override {
     const auto state = loop_ ? loop_->device(id) : std::nullopt;
     if (!state) {
@@ -248,20 +254,29 @@ class DeviceManager::Impl final : public device::DeviceListener {
     }
   }
 
+  // --- thread of the live flight ---------------------------------------------------------------------------
+  void hand_on_rows() {
+    DeviceBatch batch;
+    while (arrived_.take(batch)) {
+      if (batch.empty()) continue;
+      (void)guarded("live rows of devices", [&] { rows_->live(batch); });
+      unstored_.push(std::exchange(batch, {}));
+    }
+  }
+
   // --- writer thread ---------------------------------------------------------------------------------------
   void write_rows() {
-    std::vector<Fix> fixes;
-    std::vector<Range> ranges;
-    while (queue_.take(fixes, ranges)) {
-      if (fixes.empty() && ranges.empty()) continue;
+    DeviceBatch batch;
+    while (unstored_.take(batch)) {
+      if (batch.empty()) continue;
       for (int attempt = 1;; ++attempt) {
         Result<void> done = make_error(Errc::internal, "the rows could not be taken");
-        (void)guarded("rows of devices", [&] { done = rows_->take(fixes, ranges); });
+        (void)guarded("rows of devices", [&] { done = rows_->store(batch); });
         if (done) break;
         if (attempt == 1) note("rows of devices are not stored: " + done.error().message);
         // A full disk may be helped, and a locked database comes back; meanwhile the queue holds what comes.
-        if (queue_.stopping() || attempt >= 30) {
-          queue_.lost(fixes.size() + ranges.size());
+        if (unstored_.stopping() || (attempt >= 30 && !may_pass(done.error().code))) {
+          unstored_.lost(batch.size());
           break;
         }
         std::this_thread::sleep_for(std::chrono::seconds(1));
@@ -281,8 +296,8 @@ class DeviceManager::Impl final : public device::DeviceListener {
   std::unique_ptr<record::Recorder> recorder_;
   std::unique_ptr<device::DeviceLoop> loop_;
   std::map<std::string, std::string> told_;  ///< newest line of the log, by device
-  Thread io_thread_, writer_;
-  RowQueue queue_{k_max_waiting_rows};
+  Thread io_thread_, live_rows_, writer_;
+  RowQueue arrived_{k_max_waiting_rows, k_live_batch}, unstored_{k_max_waiting_rows, k_store_batch};
   DeviceRows* rows_{nullptr};
 
   std::mutex save_mutex_;  ///< taken before mutex_
@@ -550,7 +565,7 @@ std::string DeviceManager::metrics() {
   out +=
       "# HELP anchord_device_rows_lost_total Rows that the database did not take in time\n"
       "# TYPE anchord_device_rows_lost_total counter\nanchord_device_rows_lost_total " +
-      std::to_string(impl_->queue_.dropped()) + "\n";
+      std::to_string(impl_->arrived_.dropped() + impl_->unstored_.dropped()) + "\n";
   return out;
 }
 

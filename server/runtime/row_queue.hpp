@@ -8,38 +8,38 @@
 #include <iterator>
 #include <mutex>
 #include <utility>
-#include <vector>
 
-#include "core/types/fix.hpp"
-#include "core/types/range.hpp"
+#include "core/ports/devices.hpp"
 
 namespace anchord::server {
 
-/// Rows on their way to the database, oldest first; the oldest leave when nobody takes them. Thread-safe.
+/// Rows on their way from one thread to another, oldest first; the oldest leave when nobody takes them.
+/// Thread-safe.
 class RowQueue {
  public:
-  explicit RowQueue(std::size_t most_rows) : most_rows_(most_rows) {}
+  RowQueue(std::size_t most_rows, std::chrono::milliseconds batch_time)
+      : most_rows_(most_rows), batch_time_(batch_time) {}
   template <class Row>
   void push(Row row) {
     const std::scoped_lock lock(mutex_);
-    auto& rows = of(row);
-    rows.push_back(std::move(row));
-    if (fixes_.size() + ranges_.size() > most_rows_) {
-      rows.pop_front();
-      ++dropped_;
-    }
-    if (fixes_.size() + ranges_.size() >= k_batch_rows) told_.notify_one();
+    add(Arrived<Row>{std::move(row), false});
+    if (size() >= k_batch_rows) told_.notify_one();
+  }
+  void push(DeviceBatch batch) {
+    const std::scoped_lock lock(mutex_);
+    for (auto& row : batch.fixes) add(std::move(row));
+    for (auto& row : batch.ranges) add(std::move(row));
+    if (size() >= k_batch_rows) told_.notify_one();
   }
   /// Waits for a batch's time or size; false when stopping and empty.
-  bool take(std::vector<Fix>& fixes, std::vector<Range>& ranges) {
+  bool take(DeviceBatch& batch) {
     std::unique_lock lock(mutex_);
-    told_.wait_for(lock, k_batch_time,
-                   [this] { return stopping_ || fixes_.size() + ranges_.size() >= k_batch_rows; });
-    fixes.assign(std::make_move_iterator(fixes_.begin()), std::make_move_iterator(fixes_.end()));
-    ranges.assign(std::make_move_iterator(ranges_.begin()), std::make_move_iterator(ranges_.end()));
+    told_.wait_for(lock, batch_time_, [this] { return stopping_ || size() >= k_batch_rows; });
+    batch.fixes.assign(std::make_move_iterator(fixes_.begin()), std::make_move_iterator(fixes_.end()));
+    batch.ranges.assign(std::make_move_iterator(ranges_.begin()), std::make_move_iterator(ranges_.end()));
     fixes_.clear();
     ranges_.clear();
-    return !stopping_ || !fixes.empty() || !ranges.empty();
+    return !stopping_ || !batch.empty();
   }
   void stop() {
     const std::scoped_lock lock(mutex_);
@@ -60,15 +60,24 @@ class RowQueue {
   }
 
  private:
-  static constexpr auto k_batch_time = std::chrono::milliseconds(100);
   static constexpr std::size_t k_batch_rows = 200;
-  std::deque<Fix>& of(const Fix&) { return fixes_; }
-  std::deque<Range>& of(const Range&) { return ranges_; }
+  std::deque<Arrived<Fix>>& of(const Arrived<Fix>&) { return fixes_; }
+  std::deque<Arrived<Range>>& of(const Arrived<Range>&) { return ranges_; }
+  std::size_t size() const { return fixes_.size() + ranges_.size(); }
+  template <class Row>
+  void add(Arrived<Row> row) {
+    auto& rows = of(row);
+    rows.push_back(std::move(row));
+    if (size() <= most_rows_) return;
+    rows.pop_front();
+    ++dropped_;
+  }
   const std::size_t most_rows_;
+  const std::chrono::milliseconds batch_time_;
   mutable std::mutex mutex_;
   std::condition_variable told_;
-  std::deque<Fix> fixes_;
-  std::deque<Range> ranges_;
+  std::deque<Arrived<Fix>> fixes_;
+  std::deque<Arrived<Range>> ranges_;
   std::uint64_t dropped_{0};
   bool stopping_{false};
 };

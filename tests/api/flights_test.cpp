@@ -1,11 +1,16 @@
 // A flight over REST against the simulated autopilot, through the real session: plan, checklist, control,
 // start, hold, resume, land; strangers, a silent aircraft, a server killed in flight. Time is the test's,
 // nothing sleeps.
+#include <sqlite3.h>
+
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <set>
 #include <thread>
 
 #include "app_fixture.hpp"
+#include "core/ports/devices.hpp"
 #include "core/ports/drone.hpp"
 #include "core/ports/plan_store.hpp"
 #include "drivers/drone/session.hpp"
@@ -59,12 +64,17 @@ class LoopDrone final : public Drone {
   }
   std::uint64_t upload_fence(const DroneFence& fence) override { return session.upload_fence(fence); }
   void take_back() override { session.take_back(); }
+  void expect(const DroneIdentity& aircraft) override {
+    expected = aircraft;
+    session.expect_vehicle({static_cast<std::uint8_t>(aircraft.system), static_cast<std::uint8_t>(aircraft.component)});
+  }
   DroneStatus status() const override { return session.status(); }
   std::vector<CommandReport> take_reports() override { return session.take_reports(); }
 
   sim::AutopilotSim autopilot;
   drone::Session session;
   std::vector<Wgs84> targets;
+  std::optional<DroneIdentity> expected;
   double now{0};
   int holds{0};
   bool link_down{false};
@@ -423,6 +433,43 @@ TEST_F(Flights, ACommandWithoutAnAnswerIsNotConfirmedWithinTwoSeconds) {
   EXPECT_EQ(command_state(json(hold)["number"]), "unconfirmed");
 }
 
+TEST_F(Flights, GoesOnWhileTheDatabaseTakesNoWriteForHalfAMinute) {
+  take_off();
+  sqlite3* other = nullptr;
+  ASSERT_EQ(sqlite3_open((dir_ / "data" / "anchord.db").c_str(), &other), SQLITE_OK);
+  ASSERT_EQ(sqlite3_exec(other, "BEGIN IMMEDIATE", nullptr, nullptr, nullptr), SQLITE_OK);
+  DeviceBatch unstored;
+  std::set<std::string> steps;
+  double worst_s = 0;
+  for (const double end = drone_->now + 30; drone_->now < end - 1e-9;) {
+    drone_->run_until(drone_->now + 0.1);
+    Fix fix;
+    fix.mission = MissionId{parse_uuid(mission_).value()};
+    fix.time = UtcTime::from_us(k_unix_us + std::llround(drone_->now * 1e6));
+    fix.position = sim::wgs84_from_enu({51.0231, 3.7131, 55.5}, drone_->autopilot.vehicle().position_m());
+    fix.fix = FixClass::rtk_fixed;
+    fix.correction_age_s = 0.8;
+    DeviceBatch batch;
+    batch.fixes.push_back({fix});
+    const auto began = std::chrono::steady_clock::now();
+    app_->device_rows().live(batch);
+    app_->fly();
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
+    worst_s = std::max(worst_s, took.count());
+    unstored.fixes.push_back(batch.fixes.front());
+    const Json now = procedure();
+    steps.insert(now["step"]);
+    ASSERT_NE(now["status"], "hold") << now["reason"];
+  }
+  EXPECT_TRUE(steps.contains("search_anchors")) << "the first waypoint was reached: " << Json(steps).dump();
+  EXPECT_LT(worst_s, 1.0) << "a database that is locked is waited for 5 s";
+  ASSERT_EQ(sqlite3_exec(other, "ROLLBACK", nullptr, nullptr, nullptr), SQLITE_OK);
+  sqlite3_close(other);
+  const auto before = json(get(base()))["n_fixes"].get<int>();
+  ASSERT_TRUE(app_->device_rows().store(unstored));
+  EXPECT_EQ(json(get(base()))["n_fixes"].get<int>(), before + 300);
+}
+
 TEST_F(Flights, AKilledServerTellsTheAircraftToHoldBeforeAnythingElse) {
   take_off();
   fly(2);
@@ -435,6 +482,8 @@ TEST_F(Flights, AKilledServerTellsTheAircraftToHoldBeforeAnythingElse) {
   const int farewell = drone_->holds - holds;
   EXPECT_EQ(farewell, 1) << "an orderly stop says hold as well";
   open();
+  ASSERT_TRUE(drone_->expected) << "any autopilot that is heard would be taken for the aircraft";
+  EXPECT_EQ(drone_->expected->system, 1);
   fly(0.5);
   EXPECT_GT(drone_->holds, holds + farewell);
   EXPECT_EQ(procedure()["status"], "hold");

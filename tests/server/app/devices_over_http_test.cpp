@@ -167,7 +167,8 @@ TEST(DevicesOverHttp, RefusesWhatNoDriverTakesAndTheSameAddressTwice) {
 
 TEST(DeviceManager, SaysOnceThatADeviceTalksAndOnceThatItIsGone) {
   struct Nowhere final : DeviceRows {
-    Result<void> take(std::vector<Fix>, std::vector<Range>) override { return boost::outcome_v2::success(); }
+    void live(DeviceBatch&) override {}
+    Result<void> store(const DeviceBatch&) override { return boost::outcome_v2::success(); }
   } nowhere;
   std::mutex mutex;
   std::vector<std::string> lines;

@@ -18,7 +18,8 @@ constexpr auto k_good =
     R"({"id":"01890000-0000-7000-8000-000000000001","kind":"gnss","name":"rover","address":"tcp://127.0.0.1:9","options":{},"enabled":true,"version":3})";
 
 struct Nowhere final : DeviceRows {
-  Result<void> take(std::vector<Fix>, std::vector<Range>) override { return boost::outcome_v2::success(); }
+  void live(DeviceBatch&) override {}
+  Result<void> store(const DeviceBatch&) override { return boost::outcome_v2::success(); }
 };
 
 /// A manager on a folder with this file in it.
