@@ -16,6 +16,7 @@ void halve(std::vector<Row>& rows) {
 
 void FlightHistory::add(const Range& range, const std::optional<RangeBelief>& belief) {
   if (ranges_seen_++ % range_stride_ != 0) return;
+  if (ranges_.empty()) ranges_.reserve(k_max_ranges);  // growing by doubling needs three times as much
   newest_ = ranges_.empty() ? range.time : std::max(newest_, range.time);
   ranges_.push_back(range);
   ranges_.back().cir.reset();
@@ -31,6 +32,7 @@ void FlightHistory::add(const Range& range, const std::optional<RangeBelief>& be
 
 void FlightHistory::add(const Fix& fix) {
   if (fixes_seen_++ % fix_stride_ != 0) return;
+  if (fixes_.empty()) fixes_.reserve(k_max_fixes);
   fixes_.push_back(fix);
   if (fixes_.size() < k_max_fixes) return;
   halve(fixes_);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <deque>
 #include <thread>
 
 #include "api/http/router.hpp"
@@ -69,6 +70,59 @@ TEST(LiveClients, AHundredAreServedWhereTheSettingAllowsThemAndLeaveNothingBehin
   }
   new_mission(server, {});
   EXPECT_EQ(server.call("GET", "/api/v1/system").status, 200);
+}
+
+// 2 000 come and go over real sockets while rows stream: some say goodbye, some vanish, some never read.
+TEST(LiveClients, TwoThousandComeAndGoWhileRowsStream) {
+  AppFixture server(Settings{{"auth", "off"},
+                             {"ws.max_connections", "300"},
+                             {"ws.per_token", "300"},
+                             {"http.max_per_address", "2000"},
+                             {"rate.per_s", "100000"},
+                             {"rate.burst", "100000"}});
+  ASSERT_TRUE(server.app) << server.error.message;
+  const auto mission = new_mission(server, {});
+  const auto id = mission.substr(mission.rfind('/') + 1);
+  constexpr int k_threads = 4, k_each = 500, k_kept = 25;
+  std::atomic<int> served{0};
+  std::vector<std::thread> crowd;
+  for (int t = 0; t < k_threads; ++t) {
+    crowd.emplace_back([&, t] {
+      std::deque<std::unique_ptr<WsClient>> here;
+      for (int i = 0; i < k_each; ++i) {
+        auto client = std::make_unique<WsClient>(server.port, "/api/v1/ws");
+        if (client->open() && subscribe(*client, i % 2 == 0 ? "ranges" : "fixes")) ++served;
+        here.push_back(std::move(client));
+        if (here.size() < k_kept) continue;
+        if ((i + t) % 3 == 0) here.front()->send(8, std::string("\x03\xe8", 2));
+        here.pop_front();
+      }
+    });
+  }
+  std::atomic<bool> flying{true};
+  std::thread stream([&] {
+    auto client = server::HttpClient::to(server.url).value();
+    for (int i = 0; flying; ++i) {
+      std::string rows;
+      for (int k = 0; k < 20; ++k) {
+        rows += R"({"t_us":)" + std::to_string(1'780'000'000'000'000 + (i * 20 + k) * 10'000LL) +
+                R"(,"tag":"0x6e02","anchor":"0x6a21","distance_m":5})" + "\n";
+      }
+      EXPECT_EQ(client.call("POST", "/api/v1/ranges?mission=" + id, rows, "application/x-ndjson").value().status,
+                200);
+    }
+  });
+  for (auto& one : crowd) one.join();
+  flying = false;
+  stream.join();
+  EXPECT_EQ(served, k_threads * k_each);
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  std::string metrics;
+  do {
+    metrics = server.call("GET", "/metrics").body;
+  } while (metrics.find("anchord_ws_clients 0\n") == std::string::npos &&
+           std::chrono::steady_clock::now() < end);
+  EXPECT_NE(metrics.find("anchord_ws_clients 0\n"), std::string::npos) << "all places came back";
 }
 
 TEST(LiveClients, OneTokenDoesNotTakeThePlacesOfOthersAndOperatorsHaveSomeOfTheirOwn) {
