@@ -54,7 +54,8 @@ void FlightService::stop() {
 
 void FlightService::step() {
   auto& s = *state_;
-  // The estimates belong to the mission's strand, whose observer asks for our lock: never ask for both.
+  // The estimates belong to the mission's strand, whose observer asks for our lock: never ask for both. Nor is
+  // that strand waited for: safety is looked after here, whatever the estimator does.
   std::optional<MissionId> mission;
   bool deciding = false;
   {
@@ -64,14 +65,14 @@ void FlightService::step() {
       deciding = s.flight->control.engine().state().step == procedure::Step::find_next_point;
     }
   }
-  std::vector<MissionService::LiveView> live;
-  if (deciding) live = s.deps.missions.live(mission);
+  std::optional<MissionService::LiveView> live;
+  if (deciding) live = s.deps.missions.live_at_hand(*mission);
   std::string keep;
   bool keeps = false;
   std::optional<procedure::FlightClues> clues;
   {
     const std::scoped_lock lock(s.mutex);
-    s.round(live.empty() ? nullptr : &live.front());
+    s.round(live ? &*live : nullptr);
     if (s.flight) {
       if (!s.flight->manual) s.flight->aircraft = s.deps.drone->status().identity;
       keeps = s.flight->to_keep(keep);

@@ -61,11 +61,23 @@ void MissionService::State::finish_joint(Flight& flight, const FlightSolution* s
 void MissionService::tell_clues(const MissionId& id, procedure::FlightClues clues) {
   const auto flight = state_->find(id);
   if (!flight) return;
-  const std::scoped_lock lock(flight->work_mutex);
-  flight->clues = std::move(clues);
-  flight->clues_told = false;
-  if (flight->history.n_ranges() > 0) ++flight->ranges_since_joint;  // worth another joint solution
-  State::tell_live(*flight);
+  {
+    const std::scoped_lock lock(flight->queue_mutex);
+    flight->new_clues = std::move(clues);
+  }
+  state_->schedule(flight);
+}
+
+void MissionService::State::take_clues(Flight& flight) {
+  std::optional<procedure::FlightClues> clues;
+  {
+    const std::scoped_lock lock(flight.queue_mutex);
+    clues = std::exchange(flight.new_clues, std::nullopt);
+  }
+  if (!clues) return;
+  flight.clues = std::move(*clues);
+  flight.clues_told = false;
+  if (flight.history.n_ranges() > 0) ++flight.ranges_since_joint;  // worth another joint solution
 }
 
 /// Waits for the first good fix: before it there is no frame to tell them in.

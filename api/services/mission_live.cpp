@@ -95,7 +95,7 @@ void MissionService::State::schedule(const std::shared_ptr<Flight>& flight) {
   {
     const std::scoped_lock lock(flight->queue_mutex);
     if (flight->scheduled || stopped || flight->rebuilding) return;
-    if (flight->queue.empty() && !flight->closing) return;
+    if (flight->queue.empty() && !flight->closing && !flight->new_clues) return;
     flight->scheduled = true;
   }
   post([self = shared_from_this(), flight] {
@@ -108,7 +108,7 @@ void MissionService::State::schedule(const std::shared_ptr<Flight>& flight) {
       flight->scheduled = false;
       // Its rows are stored; a close that throws would be tried for ever.
       if (!ran) flight->closing = false;
-      again = !flight->queue.empty() || flight->closing;
+      again = !flight->queue.empty() || flight->closing || flight->new_clues;
     }
     if (again) self->schedule(flight);
   });
@@ -161,6 +161,7 @@ void MissionService::State::work(Flight& flight) {
     for (auto it = rows.rbegin(); it != rows.rend(); ++it) flight.queue.push_front(std::move(*it));
     return;
   }
+  take_clues(flight);
   tell_live(flight);
   std::size_t since_announced = 0;
   for (const auto& row : rows) {
@@ -183,6 +184,15 @@ void MissionService::State::work(Flight& flight) {
   announce(flight, false);
   publish_pose(flight);
   flight.dirty = true;
+  bool view_wanted = false;
+  {
+    const std::scoped_lock queue(flight.queue_mutex);
+    view_wanted = std::exchange(flight.view_wanted, false);
+  }
+  if (!view_wanted) return;
+  auto made = view(flight);
+  const std::scoped_lock queue(flight.queue_mutex);
+  flight.view = std::move(made);
 }
 
 void MissionService::State::step(Flight& flight, const LiveRow& row, bool quiet) {

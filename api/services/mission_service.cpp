@@ -155,15 +155,30 @@ std::vector<MissionService::LiveView> MissionService::live(const std::optional<M
   }
   std::vector<LiveView> out;
   for (const auto& flight : wanted) {
-    Mission mission;
-    {
-      const std::scoped_lock lock(flight->queue_mutex);
-      mission = flight->mission;
-    }
     const std::scoped_lock lock(flight->work_mutex);
-    out.push_back({std::move(mission), flight->live.origin(), flight->live.estimates()});
-    for (auto& estimate : out.back().estimates) judge_goal(estimate, state_->deps.goal);
+    out.push_back(state_->view(*flight));
   }
+  return out;
+}
+
+std::optional<MissionService::LiveView> MissionService::live_at_hand(const MissionId& id) {
+  const auto flight = state_->find(id);
+  if (!flight) return std::nullopt;
+  if (const std::unique_lock lock(flight->work_mutex, std::try_to_lock); lock) return state_->view(*flight);
+  const std::scoped_lock lock(flight->queue_mutex);
+  flight->view_wanted = true;
+  return std::exchange(flight->view, std::nullopt);
+}
+
+MissionService::LiveView MissionService::State::view(Flight& flight) const {
+  LiveView out;
+  {
+    const std::scoped_lock lock(flight.queue_mutex);
+    out.mission = flight.mission;
+  }
+  out.origin = flight.live.origin();
+  out.estimates = flight.live.estimates();
+  for (auto& estimate : out.estimates) judge_goal(estimate, deps.goal);
   return out;
 }
 

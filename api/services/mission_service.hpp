@@ -103,7 +103,7 @@ class MissionService {
   void not_stored(std::span<const Arrived<Fix>> fixes);
 
   /// What the turns and height searches of its flight told of its anchors: priors of every running estimate
-  /// from now on.
+  /// from now on. Never waits.
   void tell_clues(const MissionId& id, procedure::FlightClues clues);
 
   struct LiveView {
@@ -113,6 +113,9 @@ class MissionService {
   };
   /// Running estimates of one mission, or of every recording one.
   std::vector<LiveView> live(const std::optional<MissionId>& id);
+  /// The same for whoever must not wait: nothing while its rows are worked off, and then what they gave as
+  /// soon as they are.
+  std::optional<LiveView> live_at_hand(const MissionId& id);
 
   /// Each 500 ms: mission.state of what moved, devices once a second; a joint solution is begun where enough
   /// ranges came since the last (at most a quarter of one core).

@@ -34,6 +34,9 @@ struct MissionService::Flight {
   std::deque<LiveRow> queue;
   NewestRows newest;
   std::unordered_set<std::size_t> ahead;  ///< identities of what it took and the store did not; at most 100 000
+  std::optional<procedure::FlightClues> new_clues;
+  bool view_wanted{false};  ///< by one who does not wait: made as soon as the strand is at rest
+  std::optional<LiveView> view;
   bool scheduled{false};
   bool closing{false};  ///< finished, and what waits for a fix is not told yet
   std::uint64_t dropped{0};
@@ -140,6 +143,8 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
                     std::chrono::steady_clock::duration took, std::uint64_t beginning);
   void publish_devices();
   static void tell_live(Flight& flight);
+  static void take_clues(Flight& flight);
+  LiveView view(Flight& flight) const;  ///< under its work_mutex
 };
 
 }  // namespace anchord::api
