@@ -24,7 +24,7 @@ void FlightService::start() {
                             "the flight before the restart cannot be read: the pilot has it", std::nullopt);
   }
   if (state_->deps.now_s || state_->thread.joinable()) return;
-  state_->thread = Thread("anchord-flight", [this] {
+  state_->thread = Thread("anchord-fly", [this] {
     std::unique_lock lock(state_->mutex);
     while (!state_->stopping) {
       lock.unlock();
