@@ -66,6 +66,13 @@ test('a local frame, fitted to the published anchors', async () => {
   await call('POST', '/api/v1/transform', { expect: 200, json: { from: 'local', to: 'geo', frame: 'hall-a', points: [pairs[0].local_m] } });
 });
 
+test('a plan that says nothing flies by the defaults of the contract', async () => {
+  const { json: made } = await call('POST', '/api/v1/plans', { expect: 201, json: { name: 'defaults' } });
+  const [settings] = contract.deref('/components/schemas/PlanSettings'), [plan] = contract.deref('/components/schemas/PlanBody');
+  for (const [name, rule] of Object.entries(settings.properties)) assert.deepEqual(made.settings[name], rule.default, name);
+  assert.equal(made.building_height_m, plan.properties.building_height_m.default);
+});
+
 test('plans: made, generated, imported, checked, changed, exported', async () => {
   const outline = { type: 'Polygon', coordinates: [[[3.7131, 51.0231], [3.71353, 51.0231], [3.71353, 51.02328], [3.7131, 51.02328], [3.7131, 51.0231]]] };
   const made = await call('POST', '/api/v1/plans/generate', { expect: 200, json: { name: 'Hall A', outline, building_height_m: 8 } });

@@ -4,7 +4,7 @@ import { enu_from_geodetic, geodetic_from_enu } from '../src/map/enu';
 import { added, begun, changed, corners, from_m, moved, NEW_WAYPOINT, origin_of, redone, removed, to_m, undone } from '../src/views/plan/draft';
 
 const ORIGIN = { lon: 3.7131, lat: 51.0231, h_m: 0 };
-const square: Plan = { ...EMPTY, name: 'Hall', outline: [[0, 0], [30, 0], [30, 20], [0, 20]].map(([e, n]) => from_m(e!, n!, ORIGIN)) };
+const square: Plan = { ...EMPTY, name: 'Hall', building_height_m: 8, outline: [[0, 0], [30, 0], [30, 20], [0, 20]].map(([e, n]) => from_m(e!, n!, ORIGIN)) };
 
 describe('metres of the plan map', () => {
   it.each([[0, 0], [250, -400], [-999, 750]])('come back as they went, %d %d', (e, n) => {

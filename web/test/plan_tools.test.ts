@@ -12,7 +12,7 @@ const ORIGIN = { lon: 3.7131, lat: 51.0231, h_m: 0 };
 const at = (e: number, n: number) => from_m(e, n, ORIGIN);
 const wp = (e: number, n: number, over: Partial<Waypoint> = {}): Waypoint => ({ ...NEW_WAYPOINT, ...at(e, n), ...over });
 const square: Point[] = [[0, 0], [20, 0], [20, 20], [0, 20]];
-const hall: Plan = { ...EMPTY, name: 'Hall', outline: square.map(([e, n]) => at(e, n)) };
+const hall: Plan = { ...EMPTY, name: 'Hall', building_height_m: 8, outline: square.map(([e, n]) => at(e, n)) };
 const gaps = (p: readonly Point[]): number[] => p.map((a, i) => { const b = p[(i + 1) % p.length]!; return Math.hypot(a[0] - b[0], a[1] - b[1]); });
 
 describe('points along an outline', () => {

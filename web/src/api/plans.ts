@@ -1,10 +1,18 @@
 /// Plans: what is to be flown. Corners and waypoints in WGS84, as the server keeps them.
 import { num, obj, str, vec3 } from '../live/messages';
 import { api_url, idempotency_key, request } from './client';
+import { LIMITS } from './generated/limits';
+import type { components } from './generated/schema';
 
 export interface Corner { readonly lon: number; readonly lat: number }
 export interface Waypoint extends Corner { readonly height_above_ground_m: number; readonly heading_deg: number | null; readonly dwell_s: number | null; readonly measure: boolean; readonly turn: boolean; readonly height_search: boolean }
-export type Settings = Readonly<Record<string, number | boolean | string | null>>;
+/// As stored: what is absent is the server's default.
+export type Settings = Readonly<Partial<components['schemas']['PlanSettings']>>;
+export const SETTINGS = LIMITS.PlanSettings;
+/// Settings that are a number, and what they are while the plan says nothing.
+export type NumberSetting = { [K in keyof typeof SETTINGS]: (typeof SETTINGS)[K] extends { readonly default: number } ? K : never }[keyof typeof SETTINGS];
+export const setting = (p: Plan, key: NumberSetting): number => p.settings[key] ?? SETTINGS[key].default;
+const BUILDING_HEIGHT_M = LIMITS.PlanBody.building_height_m.default;
 export interface Plan {
   readonly id: string | null; readonly revision: number; readonly name: string; readonly outline: readonly Corner[]; readonly no_fly: readonly (readonly Corner[])[]; readonly fence: readonly Corner[];
   readonly building_height_m: number; readonly settings: Settings; readonly expected: readonly string[]; readonly waypoints: readonly Waypoint[];
@@ -15,7 +23,7 @@ export interface Issue { readonly severity: 'error' | 'warning'; readonly code: 
 export interface Assumed { readonly e: number; readonly n: number; readonly up: number; readonly sigma_m: number; readonly gdop: number | null }
 export interface Check { readonly flyable: boolean; readonly issues: readonly Issue[]; readonly length_m: number | null; readonly duration_s: number | null; readonly n_measure: number | null; readonly rms_m: number | null; readonly worst_m: number | null; readonly assumed: readonly Assumed[] }
 
-export const EMPTY: Plan = { id: null, revision: 0, name: '', outline: [], no_fly: [], fence: [], building_height_m: 8, settings: { keep_out_m: 4, speed_mps: 2 }, expected: [], waypoints: [], rest: {} };
+export const EMPTY: Plan = { id: null, revision: 0, name: '', outline: [], no_fly: [], fence: [], building_height_m: BUILDING_HEIGHT_M, settings: {}, expected: [], waypoints: [], rest: {} };
 
 const list = (v: unknown): Record<string, unknown>[] => (Array.isArray(v) ? v.map(obj).filter((o) => o !== null) as Record<string, unknown>[] : []);
 /// A GeoJSON ring closes itself; the page works with open ones.
@@ -28,7 +36,7 @@ function ring_of(polygon: unknown): Corner[] {
 function plan_of(o: Record<string, unknown>): Plan {
   const { id, revision, name, outline, no_fly, fence, building_height_m, settings, expected_anchors, waypoints, created_at: _made, changed_at: _changed, links: _links, ...rest } = o;
   return {
-    id: str(id) || null, revision: num(revision) ?? 0, name: str(name), outline: ring_of(outline), no_fly: Array.isArray(no_fly) ? no_fly.map(ring_of) : [], fence: ring_of(fence), building_height_m: num(building_height_m) ?? 8,
+    id: str(id) || null, revision: num(revision) ?? 0, name: str(name), outline: ring_of(outline), no_fly: Array.isArray(no_fly) ? no_fly.map(ring_of) : [], fence: ring_of(fence), building_height_m: num(building_height_m) ?? BUILDING_HEIGHT_M,
     settings: (obj(settings) ?? {}) as Settings, rest, expected: Array.isArray(expected_anchors) ? expected_anchors.filter((a): a is string => typeof a === 'string') : [],
     waypoints: list(waypoints).map((w) => ({ lon: num(w.lon) ?? 0, lat: num(w.lat) ?? 0, height_above_ground_m: num(w.height_above_ground_m) ?? 0, heading_deg: num(w.heading_deg), dwell_s: num(w.dwell_s), measure: w.measure !== false, turn: w.turn === true, height_search: w.height_search === true })),
   };

@@ -1,5 +1,5 @@
 /// What the server finds wrong with the plan as it is drawn, how long it flies, and how its height goes.
-import type { Check, Plan } from '../../api/plans';
+import { setting, type Check, type Plan } from '../../api/plans';
 import type { Geodetic } from '../../map/enu';
 import { clock, fixed, grouped } from '../../ui/format';
 import { Chip } from '../../ui/marks';
@@ -23,9 +23,9 @@ export function CheckPanel({ check, old, plan, waits }: { check: Check | null; o
 
 /// Height over time, with the band it must stay in and the roof. A press near a waypoint picks it.
 export function Profile({ plan, origin, picked, pick }: { plan: Plan; origin: Geodetic; picked: Picked | null; pick: (p: Picked) => void }) {
-  const moments = profile(plan, origin), end = moments[moments.length - 1]?.t_s ?? 0, limit = (key: string, usual: number): number => { const v = plan.settings[key]; return typeof v === 'number' ? v : usual; };
+  const moments = profile(plan, origin), end = moments[moments.length - 1]?.t_s ?? 0;
   if (plan.waypoints.length < 2) return null;
-  const low = limit('min_height_m', 1.5), high = limit('max_height_m', 30), top = Math.max(plan.building_height_m, ...moments.map((m) => m.height_m)) * 1.15, out = moments.filter((m) => m.height_m < low || m.height_m > high), heights = moments.map((m) => m.height_m);
+  const low = setting(plan, 'min_height_m'), high = setting(plan, 'max_height_m'), top = Math.max(plan.building_height_m, ...moments.map((m) => m.height_m)) * 1.15, out = moments.filter((m) => m.height_m < low || m.height_m > high), heights = moments.map((m) => m.height_m);
   return (
     <section class="sec-p" data-testid="profile">
       <div class="hd"><h2>Height over time</h2><span class="meta">{clock(end, true)} from the first waypoint to the last</span></div>

@@ -1,5 +1,5 @@
 /// What two versions of a plan differ in, in words a person can decide by. No DOM.
-import type { Corner, Plan, Waypoint } from '../../api/plans';
+import { SETTINGS, type Corner, type Plan, type Settings, type Waypoint } from '../../api/plans';
 import { fixed } from '../../ui/format';
 import { to_m } from './draft';
 
@@ -30,8 +30,9 @@ export function differences(mine: Plan, theirs: Plan): Difference[] {
   put('Building height', `${fixed(mine.building_height_m, 1)} m`, `${fixed(theirs.building_height_m, 1)} m`);
   for (const [name, a, b] of [['Outline', mine.outline, theirs.outline], ['Fence', mine.fence, theirs.fence]] as const) if (!same(a, b)) out.push({ name, mine: corners_words(a, b)[0], theirs: corners_words(a, b)[1] });
   for (let i = 0; i < Math.max(mine.no_fly.length, theirs.no_fly.length); i++) { const [a, b] = [mine.no_fly[i] ?? [], theirs.no_fly[i] ?? []]; if (!same(a, b)) out.push({ name: `No-fly ${i + 1}`, mine: corners_words(a, b)[0], theirs: corners_words(a, b)[1] }); }
-  const word = (v: unknown): string => (v == null ? 'as usual' : typeof v === 'number' ? String(Number(v.toFixed(3))) : String(v));
-  for (const key of [...new Set([...Object.keys(mine.settings), ...Object.keys(theirs.settings)])].sort()) put(key.replace(/_(m|s|mps)$/, (_, u: string) => `, ${u === 'mps' ? 'm/s' : u}`).replaceAll('_', ' ').replace(/^./, (c) => c.toUpperCase()), word(mine.settings[key]), word(theirs.settings[key]));
+  const word = (v: unknown): string => (v === null ? 'none' : typeof v === 'number' ? String(Number(v.toFixed(3))) : String(v));
+  const keys = [...new Set([...Object.keys(mine.settings), ...Object.keys(theirs.settings)])] as (keyof Settings)[];
+  for (const key of keys.sort()) put(key.replace(/_(m|s|mps)$/, (_, u: string) => `, ${u === 'mps' ? 'm/s' : u}`).replaceAll('_', ' ').replace(/^./, (c) => c.toUpperCase()), word(mine.settings[key] ?? SETTINGS[key].default), word(theirs.settings[key] ?? SETTINGS[key].default));
   put('Expected anchors', mine.expected.join(', ') || 'none', theirs.expected.join(', ') || 'none');
   put('Waypoints', String(mine.waypoints.length), String(theirs.waypoints.length));
   for (let i = 0; i < Math.max(mine.waypoints.length, theirs.waypoints.length); i++) {

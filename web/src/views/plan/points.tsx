@@ -1,6 +1,6 @@
 /// Every point of the plan as numbers: nothing on the map is only on the map.
 import { useState } from 'preact/hooks';
-import type { Plan, Waypoint } from '../../api/plans';
+import { SETTINGS, type NumberSetting, type Plan, type Waypoint } from '../../api/plans';
 import { fixed } from '../../ui/format';
 import { corners, moved, removed, type Picked, type Shape } from './draft';
 
@@ -61,17 +61,30 @@ export function Corners({ plan, shape, name, picked, pick, change }: Props & { s
   );
 }
 
-const FIELDS: readonly (readonly [string, string, number, number, number, number])[] = [
-  ['keep_out_m', 'Keep-out, m', 4, 0.5, 100, 1], ['min_height_m', 'Lowest, m', 1.5, 0.5, 500, 1], ['max_height_m', 'Highest, m', 30, 1, 500, 1], ['speed_mps', 'Speed, m/s', 2, 0.1, 15, 1],
-  ['dwell_s', 'Dwell, s', 4, 0.5, 120, 1], ['k', 'Steps k', 3, 1, 20, 0], ['grid_step_m', 'Grid step, m', 2, 0.1, 50, 1], ['target_sigma_m', 'Target σ, m', 0.05, 0.001, 10, 3], ['max_iterations', 'Iterations, most', 40, 1, 1000, 0],
+const FIELDS: readonly (readonly [NumberSetting, string, number])[] = [
+  ['keep_out_m', 'Keep-out, m', 1], ['min_height_m', 'Lowest, m', 1], ['max_height_m', 'Highest, m', 1],
+  ['speed_mps', 'Speed, m/s', 1], ['dwell_s', 'Dwell, s', 1], ['k', 'Steps k', 0], ['grid_step_m', 'Grid step, m', 1],
+  ['target_sigma_m', 'Target σ, m', 3], ['max_iterations', 'Iterations, most', 0],
 ];
+const RULES = { d_optimal: 'most information (D)', a_optimal: 'least mean error (A)', dissertation: 'dissertation, GDOP' } as const;
+type Rule = keyof typeof RULES;
 export function SettingFields({ plan, change }: { plan: Plan; change: (p: Plan) => void }) {
-  const value = (key: string): number | null => { const v = plan.settings[key]; return typeof v === 'number' ? v : null; };
+  const set = (key: NumberSetting, v: number | null): void => {
+    const { [key]: _old, ...others } = plan.settings;
+    change({ ...plan, settings: v === null ? others : { ...others, [key]: v } });
+  };
   return (
     <div class="settings">
       <label><span class="lab">Building height, m</span><Cell label="Building height" value={plan.building_height_m} decimals={1} min={1} max={500} set={(v) => v !== null && change({ ...plan, building_height_m: v })} /></label>
-      {FIELDS.map(([key, words, usual, min, max, decimals]) => <label key={key}><span class="lab">{words}</span><Cell label={words} value={value(key)} decimals={decimals} min={min} max={max} empty={fixed(usual, decimals)} set={(v) => { const { [key]: _old, ...others } = plan.settings; change({ ...plan, settings: v === null ? others : { ...others, [key]: v } }); }} /></label>)}
-      <label><span class="lab">Planner</span><select value={String(plan.settings.rule ?? 'd_optimal')} onChange={(e) => change({ ...plan, settings: { ...plan.settings, rule: e.currentTarget.value } })}><option value="d_optimal">most information (D)</option><option value="a_optimal">least mean error (A)</option><option value="dissertation">dissertation, GDOP</option></select></label>
+      {FIELDS.map(([key, words, decimals]) => {
+        const { default: usual, minimum, maximum } = SETTINGS[key];
+        return <label key={key}><span class="lab">{words}</span><Cell label={words} value={plan.settings[key] ?? null} decimals={decimals} min={minimum} max={maximum} empty={fixed(usual, decimals)} set={(v) => set(key, v)} /></label>;
+      })}
+      <label><span class="lab">Planner</span>
+        <select value={plan.settings.rule ?? SETTINGS.rule.default} onChange={(e) => change({ ...plan, settings: { ...plan.settings, rule: e.currentTarget.value as Rule } })}>
+          {(Object.keys(RULES) as Rule[]).map((rule) => <option key={rule} value={rule}>{RULES[rule]}</option>)}
+        </select>
+      </label>
     </div>
   );
 }

@@ -1,15 +1,13 @@
 /// The flight over time, from the waypoints alone: straight ways at the plan's speed, dwelling where it measures. No DOM.
-import type { Plan } from '../../api/plans';
+import { setting, type Plan } from '../../api/plans';
 import type { Geodetic } from '../../map/enu';
 import { to_m } from './draft';
 
-export const SPEED_MPS = 2, DWELL_S = 4;   ///< of a plan that says nothing else: the server's defaults
 export interface Moment { readonly t_s: number; readonly height_m: number; readonly waypoint: number }
-const number = (v: unknown, usual: number): number => (typeof v === 'number' && v > 0 ? v : usual);
 
 /// Arrival at each waypoint, and its departure where it dwells; from the first waypoint on, as the server's check counts.
 export function profile(p: Plan, origin: Geodetic): Moment[] {
-  const speed = number(p.settings.speed_mps, SPEED_MPS), dwell = number(p.settings.dwell_s, DWELL_S), out: Moment[] = [];
+  const speed = setting(p, 'speed_mps'), dwell = setting(p, 'dwell_s'), out: Moment[] = [];
   let t = 0;
   p.waypoints.forEach((w, i) => {
     const before = p.waypoints[i - 1];

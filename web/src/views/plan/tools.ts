@@ -1,5 +1,5 @@
 /// Waypoints set by a tool: evenly along the outline, or more of them about one. Metres about the plan's origin. No DOM.
-import type { Plan, Waypoint } from '../../api/plans';
+import { setting, type Plan, type Waypoint } from '../../api/plans';
 import type { Geodetic } from '../../map/enu';
 import { from_m, NEW_WAYPOINT, to_m } from './draft';
 
@@ -66,8 +66,9 @@ function round_corner(a: OnCurve, b: OnCurve, outline: readonly Point[], keep_ou
 /// Heights to space waypoints at where none are typed: those flown so far where there are several, else 2 m and 1 m above the roof, within the band.
 /// From one height alone nobody can tell how high an anchor hangs.
 export function usual_heights(p: Plan): number[] {
-  const flown = [...new Set(p.waypoints.filter((w) => w.measure).map((w) => w.height_above_ground_m))].sort((a, b) => a - b), limit = (key: string, usual: number): number => { const v = p.settings[key]; return typeof v === 'number' ? v : usual; };
-  return flown.length > 1 ? flown : [...new Set([2, p.building_height_m + 1].map((h) => Math.max(limit('min_height_m', 1.5), Math.min(limit('max_height_m', 30), h))))];
+  const flown = [...new Set(p.waypoints.filter((w) => w.measure).map((w) => w.height_above_ground_m))].sort((a, b) => a - b);
+  const in_band = (h: number): number => Math.max(setting(p, 'min_height_m'), Math.min(setting(p, 'max_height_m'), h));
+  return flown.length > 1 ? flown : [...new Set([2, p.building_height_m + 1].map(in_band))];
 }
 /// `2, 9` or `2 9,5` in metres; null where it is no list of heights.
 export function typed_heights(text: string): number[] | null {
@@ -78,7 +79,7 @@ export function typed_heights(text: string): number[] | null {
 /// The plan with its waypoints spaced evenly along the outline at the keep-out distance, those left out that lie in a no-fly area or outside of the
 /// fence. The heights are taken in turn; the flags are those of the first waypoint there was.
 export function with_even_spacing(p: Plan, origin: Geodetic, spacing_m: number, heights_m: readonly number[]): { readonly plan: Plan; readonly left_out: number } {
-  const metres = (list: readonly { lon: number; lat: number }[]): Point[] => list.map((c) => to_m({ lon: c.lon, lat: c.lat }, origin)), keep_out = typeof p.settings.keep_out_m === 'number' ? p.settings.keep_out_m : 4;
+  const metres = (list: readonly { lon: number; lat: number }[]): Point[] => list.map((c) => to_m({ lon: c.lon, lat: c.lat }, origin)), keep_out = setting(p, 'keep_out_m');
   const areas = p.no_fly.map(metres).filter((a) => a.length > 2), fence = metres(p.fence), outline = metres(p.outline), all = spaced(outline, keep_out + 0.01, spacing_m);
   const legal = all.filter(({ at: q }) => areas.every((a) => !inside(q, a) && distance_to_edge(q, a) >= keep_out) && (fence.length < 3 || inside(q, fence)));
   const like: Omit<Waypoint, 'lon' | 'lat'> = { ...(p.waypoints[0] ?? NEW_WAYPOINT), heading_deg: null };

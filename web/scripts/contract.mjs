@@ -1,0 +1,33 @@
+// What the page believes of the API comes from the contract: src/api/generated/schema.d.ts (types) and limits.ts (of every property
+// with a default: that, its least and most). Not committed; written anew before each check, build and test.
+import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
+import { fileURLToPath } from 'node:url';
+import yaml from 'js-yaml';
+import openapiTS, { astToString } from 'openapi-typescript';
+
+const contract = new URL('../../api/openapi.yaml', import.meta.url), folder = fileURLToPath(new URL('../src/api/generated/', import.meta.url));
+
+/** Only where it changed, so that nothing is built for nothing. */
+function put(name, text) {
+  let former;
+  try { former = readFileSync(folder + name, 'utf8'); } catch { /* the first time */ }
+  if (former !== text) writeFileSync(folder + name, text);
+}
+
+const KEYS = ['default', 'minimum', 'maximum', 'enum'];
+function limits(schemas) {
+  const out = {};
+  for (const [name, schema] of Object.entries(schemas)) {
+    const of = {};
+    for (const [property, rule] of Object.entries(schema.properties ?? {})) {
+      if ('default' in rule) of[property] = Object.fromEntries(KEYS.filter((k) => k in rule).map((k) => [k, rule[k]]));
+    }
+    if (Object.keys(of).length) out[name] = of;
+  }
+  return out;
+}
+
+mkdirSync(folder, { recursive: true });
+put('schema.d.ts', astToString(await openapiTS(contract)));
+const { components } = yaml.load(readFileSync(contract, 'utf8'));
+put('limits.ts', `/// Written by scripts/contract.mjs from api/openapi.yaml.\nexport const LIMITS = ${JSON.stringify(limits(components.schemas), null, 1)} as const;\n`);
