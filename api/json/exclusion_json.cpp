@@ -208,7 +208,7 @@ Result<std::vector<Exclusion>> parse_exclusions_file(std::string_view text) {
     if (const auto time = parse_rfc3339(word_of(item, "created_at"))) e.created = time.value();
     if (item.contains("included") && item["included"].is_object()) {
       auto& told = item["included"];
-      e.included.emplace();
+      e.included = Exclusion::Included{};
       e.included->by = word_of(told, "by");
       e.included->reason = word_of(told, "reason");
       if (const auto time = parse_rfc3339(word_of(told, "at"))) e.included->time = time.value();

@@ -26,13 +26,12 @@ Response list(LearningServices& l, const Request& request) {
   check_query(request, {"limit", "cursor", "fields", "task"});
   const auto page = page_query(request);
   const auto task = request.query_value("task");
-  auto rows = value_or_problem(l.stores.runs.runs(page.limit + 1, cursor_id<TrainingRunId>(page.cursor)));
+  auto rows =
+      value_or_problem(l.stores.runs.runs(page.limit + 1, cursor_id<TrainingRunId>(page.cursor), task));
   const bool more = rows.size() > page.limit;
   if (more) rows.pop_back();
   Ordered items = Ordered::array();
-  for (const auto& run : rows) {
-    if (!task || run.task == *task) items.push_back(run_json(l, run, false));
-  }
+  for (const auto& run : rows) items.push_back(run_json(l, run, false));
   return list_response(request, std::move(items), more ? to_string(rows.back().id) : "");
 }
 

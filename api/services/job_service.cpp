@@ -74,7 +74,7 @@ struct JobService::State {
       Lane& lane = lanes[job.kind];
       canceled.erase(job.id);  // of an earlier life of the same job
       lane.queue.push_back({job.id, std::move(work)});
-      if (started) run_lane(self, lane);
+      if (started && !stopping) run_lane(self, lane);
     }
     changed.notify_all();
   }
@@ -127,13 +127,15 @@ void JobService::start() {
 }
 
 void JobService::stop() {
+  std::vector<Thread> running;
   {
     const std::scoped_lock lock(state_->mutex);
     state_->stopping = true;
+    for (auto& [kind, lane] : state_->lanes) running.push_back(std::move(lane.thread));
   }
   state_->changed.notify_all();
-  for (auto& [kind, lane] : state_->lanes) {  // no lane is added while stopping
-    if (lane.thread.joinable()) lane.thread.join();
+  for (auto& thread : running) {
+    if (thread.joinable()) thread.join();
   }
 }
 

@@ -134,8 +134,9 @@ class TrainingRunStore {
   virtual ~TrainingRunStore() = default;
   virtual Result<void> insert(const TrainingRun& run) = 0;
   virtual Result<TrainingRun> run(const TrainingRunId& id) = 0;
-  virtual Result<std::vector<TrainingRun>> runs(std::size_t limit,
-                                                const std::optional<TrainingRunId>& after) = 0;
+  /// Newest first; `task`: of this one alone.
+  virtual Result<std::vector<TrainingRun>> runs(std::size_t limit, const std::optional<TrainingRunId>& after,
+                                                const std::optional<std::string>& task = {}) = 0;
   /// Results, model and link between them in one transaction: there is a whole run or none.
   virtual Result<void> finish(const TrainingRunId& id, std::string_view summary_json,
                               const std::map<std::string, std::string>& parts, const StoredModel& model,

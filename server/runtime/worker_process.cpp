@@ -122,6 +122,11 @@ void tell(const api::WorkProgressSink& progress, const Json& j) {
             j.value("detail", std::string())});
 }
 
+Errc errc_of(const Json& number) {
+  const bool known = number.is_number_unsigned() && number.get<std::uint64_t>() <= static_cast<unsigned>(Errc::internal);
+  return known ? static_cast<Errc>(number.get<int>()) : Errc::internal;
+}
+
 Result<std::string> run(const std::filesystem::path& program, const std::string& message,
                         const api::WorkProgressSink& progress, const std::function<bool()>& canceled) {
   int ends[2];
@@ -153,15 +158,19 @@ Result<std::string> run(const std::filesystem::path& program, const std::string&
       case FrameRead::frame:
         break;
     }
+    // It may be anything: the worker ran on data from outside.
     auto json = Json::parse(text, nullptr, false);
-    const std::string op = json.is_object() ? json.value("op", std::string()) : "";
+    const auto word = [&](const char* key) {
+      const auto at = json.is_object() ? json.find(key) : json.end();
+      return at != json.end() && at->is_string() ? at->get<std::string>() : std::string();
+    };
+    const std::string op = word("op");
     if (op == "progress") {
       tell(progress, json);
     } else if (op == "done") {
-      return json["result"].get<std::string>();
+      return word("result");
     } else if (op == "failed") {
-      return make_error(static_cast<Errc>(json.value("code", static_cast<int>(Errc::internal))),
-                        json.value("message", std::string()));
+      return make_error(errc_of(json["code"]), word("message"));
     } else {
       return make_error(Errc::internal, "the worker's message cannot be read");
     }

@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -77,6 +78,24 @@ TEST_F(WorkerProcess, RunsOutOfMemoryWithTheLimitInTheMessageInsteadOfAFaultWith
   EXPECT_NE(result.error().message.find("more memory than the 58 MiB"), std::string::npos)
       << result.error().message;
   EXPECT_NE(result.error().message.find("fewer"), std::string::npos) << result.error().message;
+}
+
+TEST_F(WorkerProcess, AWorkerThatAnswersNonsenseIsAFailureAndNeverOurs) {
+  // Frames of 4 bytes of length and a text, over the socket that is its input.
+  const auto says = [&](const std::string& text) {
+    char size[20];
+    std::snprintf(size, sizeof size, "\\%03o\\000\\000\\000", static_cast<unsigned>(text.size()));
+    return run("printf '" + std::string(size) + text + "' >&0; sleep 1", "{}");
+  };
+  for (const char* text : {"no JSON", "[]", R"({"op":7})", R"({"op":"failed","code":"x","message":3})",
+                           R"({"op":"failed","code":99999})", R"({"op":"failed","code":-1})"}) {
+    const auto result = says(text);
+    ASSERT_FALSE(result) << text;
+    EXPECT_EQ(result.error().code, Errc::internal) << text;
+  }
+  const auto known = says(R"({"op":"failed","code":7,"message":"m"})");
+  ASSERT_FALSE(known);
+  EXPECT_EQ(known.error().code, static_cast<Errc>(7));
 }
 
 }  // namespace anchord::server
