@@ -11,6 +11,7 @@
 #include "api/json/wire_resources.hpp"
 #include "api/live/hub.hpp"
 #include "core/base/guard.hpp"
+#include "core/base/memory.hpp"
 #include "core/base/to_wire.hpp"
 
 namespace anchord::api {
@@ -211,6 +212,7 @@ Result<Job> JobService::cancel(const JobId& id) {
 
 void JobService::State::loop(Lane& lane) {
   while (true) {
+    give_back_memory();
     Task task;
     {
       std::unique_lock lock(mutex);

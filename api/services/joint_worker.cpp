@@ -1,5 +1,6 @@
 #include "api/services/joint_worker.hpp"
 
+#include "core/base/memory.hpp"
 #include "core/localize/flight_solver.hpp"
 
 namespace anchord::api {
@@ -34,6 +35,7 @@ void JointWorker::stop() {
 
 void JointWorker::loop() {
   while (true) {
+    give_back_memory();
     Task task;
     {
       std::unique_lock lock(mutex_);
