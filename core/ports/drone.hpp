@@ -50,6 +50,7 @@ struct DroneIdentity {
 struct DroneStatus {
   bool connected{false};  ///< heard within the last 3 s
   double silent_s{};
+  double mode_age_s{};    ///< of the heartbeat, which alone shows the mode
   std::string autopilot;  ///< "ArduPilot", "PX4" or empty
   std::string mode;       ///< word of the autopilot's mode
   ModeKind mode_kind{};

@@ -146,7 +146,7 @@ void FlightControl::round(double now_s, std::span<const Estimate> estimates, boo
   look(now_s, d);
   follow_link(now_s, d);
   // Just behind a heartbeat: one that shows a pilot's mode must not be crossed by a command.
-  const bool may = !taken_over_ && d.connected && d.silent_s < k_just_heard_s;
+  const bool may = !taken_over_ && d.connected && d.mode_age_s < k_just_heard_s;
   if (tells_again_ && may && (!told_s_ || now_s - *told_s_ > k_tell_again_s)) {
     tells_again_ = false;
     told_s_ = now_s;

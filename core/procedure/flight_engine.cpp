@@ -293,9 +293,11 @@ void FlightEngine::look_out(double now_s) {
   now.battery_warning = vehicle_.battery_warning;
   now.cell_v = vehicle_.cell_v;
   now.flying = in_flight(state_.step) && (vehicle_.in_air || state_.step != Step::take_off);
-  if (fix_m_ && fix_m_->z() >= setup_.settings.min_height_m) above_floor_ = true;
-  now.floor =
-      above_floor_ && vehicle_.in_air && state_.step != Step::take_off && state_.step != Step::landing;
+  // The height of a fix without RTK is off by metres: nothing is flown by it.
+  const bool height_known = fix_m_ && now.since_good_fix_s <= setup_.limits.position_age_s;
+  if (height_known && fix_m_->z() >= setup_.settings.min_height_m) above_floor_ = true;
+  now.floor = above_floor_ && height_known && vehicle_.in_air && state_.step != Step::take_off &&
+              state_.step != Step::landing && !lands_by_itself();
   SafetyLimits limits = setup_.limits;
   // What disagrees agrees again when it does so clearly.
   if (alarm_ && alarm_->id == "position.disagree") limits.disagree_m *= 2.0 / 3;
@@ -328,6 +330,14 @@ void FlightEngine::look_out(double now_s) {
   }
   if (!alarm && alarm_) tell(now_s, "info", alarm_->id + ".cleared", "no longer");
   alarm_ = alarm;
+}
+
+/// The autopilot's own return ends with its landing, which nobody here commands: near home it may come down.
+bool FlightEngine::lands_by_itself() const {
+  constexpr double k_near_home_m = 5;
+  const auto at = position_m();
+  return state_.step == Step::return_home && legs_.empty() && at &&
+         (*at - setup_.limits.home_m).head<2>().norm() < k_near_home_m;
 }
 
 void FlightEngine::look_for_arrival(double now_s) {

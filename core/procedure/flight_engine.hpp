@@ -126,6 +126,7 @@ class FlightEngine {
   bool down(double now_s);
   void tell(double now_s, std::string level, std::string code, std::string text);
   void look_out(double now_s);
+  bool lands_by_itself() const;
   void look_for_arrival(double now_s);
   void work(double now_s, std::span<const Estimate> estimates);
   void judge_anchors(double now_s, std::span<const Estimate> estimates);

@@ -10,8 +10,11 @@ namespace {
 using mavlink::Message;
 
 constexpr double k_vehicle_kept_s = 10, k_silent_s = 3;
-/// A mode that was accepted shows in the heartbeat by then: PX4 answers before its state machine has run.
-constexpr double k_mode_shows_s = 1.5;
+constexpr double k_mode_kept_s =
+    5;  ///< other messages show that the link lives; whose mode it is they do not
+/// Of ours. ArduPilot's failsafe waits for 5 s by default (FS_GCS_TIMEOUT): of one heartbeat a second and a
+/// link that loses every third, five in a row are lost every few minutes; of twenty, never.
+constexpr double k_heartbeat_s = 0.25;
 
 }  // namespace
 
@@ -52,6 +55,7 @@ void Session::feed(double now_s, std::int64_t unix_us, std::span<const std::uint
 /// Nothing of one aircraft is another's.
 void Session::forget_vehicle() {
   heard_s_.reset();
+  beat_s_.reset();
   vehicle_ = {0, 0};
   expected_.reset();
   autopilot_ = Autopilot::unknown;
@@ -75,9 +79,17 @@ void Session::handle(const mavlink::Received& in) {
   const auto& m = in.message;
   if (m.is("HEARTBEAT")) return on_heartbeat(in);
   if (in.from != vehicle_) return;
+  keep_alive();
   if (m.is("COMMAND_ACK")) return on_ack(m);
   telemetry_.hear(m, autopilot_, now_s_);
   on_transfer(m);
+}
+
+/// Whatever comes of the vehicle shows that the link lives, so that a lost heartbeat or two are no silence
+/// (PX4 sends one a second). After a silence nothing but a heartbeat ends it: the mode may be another's now.
+void Session::keep_alive() {
+  if (!beat_s_ || now_s_ - *beat_s_ > k_mode_kept_s || now_s_ - *heard_s_ > k_silent_s) return;
+  heard_s_ = now_s_;
 }
 
 void Session::on_heartbeat(const mavlink::Received& in) {
@@ -92,24 +104,18 @@ void Session::on_heartbeat(const mavlink::Received& in) {
   }
   vehicle_ = in.from;
   autopilot_ = autopilot_of(m.integer("autopilot"));
-  heard_s_ = now_s_;
+  heard_s_ = beat_s_ = now_s_;
   telemetry_.hear(m, autopilot_, now_s_);
   custom_mode_ = static_cast<std::uint32_t>(m.integer("custom_mode"));
   if (!telemetry_.armed()) drop_target("the aircraft is disarmed");
   judge_mode();
 }
 
-/// PX4 shows a mode of its own while it climbs, and lands at the end of its return.
-bool Session::belongs(std::uint32_t shown, std::uint32_t wanted) const {
-  const auto& d = dialect_of(autopilot_);
-  return shown == wanted || (wanted == d.return_home && shown == d.land);
-}
-
 /// Any mode that was not commanded is the pilot's, or a failsafe's.
 void Session::judge_mode() {
   if (!flight_ || flight_->taken_over || !flight_->wanted) return;
   auto& f = *flight_;
-  if (belongs(custom_mode_, *f.wanted)) {
+  if (custom_mode_ == *f.wanted) {
     if (!f.reached && custom_mode_ == dialect_of(autopilot_).guided) f.speed_due = true;
     f.reached = true;
     f.former.reset();
@@ -125,7 +131,11 @@ void Session::judge_mode() {
     return;
   }
   const auto passing = f.passing.find(custom_mode_);
-  if (passing != f.passing.end() && now_s_ < passing->second) return;
+  if (passing != f.passing.end() && now_s_ < passing->second) {
+    // It has left the mode it was in: who brings it back there is not us.
+    if (f.former && *f.former != custom_mode_) f.former.reset();
+    return;
+  }
   const bool not_yet = !f.reached && f.former && custom_mode_ == *f.former &&
                        !(f.acked_s && now_s_ - *f.acked_s > k_mode_shows_s);
   if (!not_yet) take_over();
@@ -159,7 +169,7 @@ void Session::take_back() {
 void Session::tick(double now_s, std::int64_t unix_us) {
   now_s_ = now_s;
   packer_.set_time(mavlink::signature_time(unix_us));
-  if (now_s_ - heartbeat_s_ >= 1) {
+  if (now_s_ - heartbeat_s_ >= k_heartbeat_s - 1e-9) {
     heartbeat_s_ = now_s_;
     send(Message("HEARTBEAT")
              .set("type", 6)
@@ -189,6 +199,7 @@ DroneStatus Session::status() const {
   telemetry_.fill(out, now_s_);
   out.autopilot = std::string(dialect_of(autopilot_).name);
   out.silent_s = heard_s_ ? now_s_ - *heard_s_ : now_s_;
+  out.mode_age_s = beat_s_ ? now_s_ - *beat_s_ : now_s_;
   out.connected = heard_s_ && out.silent_s <= k_silent_s;
   if (!out.connected) out.stale.clear();  // the silence itself is what is wrong
   out.mode = heard_s_ ? std::string(mode_word(autopilot_, custom_mode_)) : "";

@@ -14,6 +14,9 @@
 
 namespace anchord::drone {
 
+/// A mode that was accepted shows in the heartbeat by then: PX4 answers before its state machine has run.
+inline constexpr double k_mode_shows_s = 1.5;
+
 /// An item of a mission or a fence, as MISSION_ITEM_INT has it.
 struct MissionItem {
   int command{}, frame{};
@@ -44,7 +47,7 @@ class Session final : public Drone {
   explicit Session(SessionOptions options = {});
 
   void feed(double now_s, std::int64_t unix_us, std::span<const std::uint8_t> bytes);
-  /// At least ten times a second: heartbeat, repeats, time-outs.
+  /// At least ten times a second: heartbeats, repeats, time-outs.
   void tick(double now_s, std::int64_t unix_us);
   std::vector<std::uint8_t> take_bytes();
   /// The aircraft on the link is another one: the next autopilot that is heard is taken.
@@ -98,7 +101,7 @@ class Session final : public Drone {
     enum class Stage : std::uint8_t { mode, arm, climb } stage{Stage::mode};
     double stage_s{};
     bool told{false}, armed_here{false};
-    std::optional<double> refused_s{};
+    std::optional<double> refused_s{}, risen_s{};
     std::string refusal;
   };
   struct Target {
@@ -145,7 +148,7 @@ class Session final : public Drone {
   std::uint64_t mode(const std::string& what, std::uint32_t Dialect::*custom_mode);
   void command_mode(std::uint64_t number, const std::string& what, std::uint32_t custom_mode, bool part);
   void want(std::uint32_t custom_mode);
-  bool belongs(std::uint32_t shown, std::uint32_t wanted) const;
+  void keep_alive();
   void judge_mode();
   void take_over();
   bool deaf(std::uint64_t number, const std::string& what);
@@ -172,7 +175,8 @@ class Session final : public Drone {
   mavlink::Packer packer_;
   std::vector<std::uint8_t> out_;
   double now_s_{0}, heartbeat_s_{-10};
-  std::optional<double> heard_s_;
+  std::optional<double> heard_s_;  ///< any message of the vehicle, see keep_alive()
+  std::optional<double> beat_s_;   ///< its heartbeat: what mode it is in is as old as that
   mavlink::Address vehicle_{0, 0};
   std::optional<mavlink::Address> expected_;
   Autopilot autopilot_{Autopilot::unknown};

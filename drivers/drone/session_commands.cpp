@@ -76,13 +76,13 @@ void Session::want(std::uint32_t custom_mode) {
   f.passing.erase(custom_mode);
   f.former = custom_mode_;
   f.wanted = custom_mode;
-  f.reached = belongs(custom_mode_, custom_mode);
+  f.reached = custom_mode_ == custom_mode;
   f.acked_s.reset();
 }
 
 void Session::command_mode(std::uint64_t number, const std::string& what, std::uint32_t custom_mode,
                            bool part) {
-  const bool shown = belongs(custom_mode_, custom_mode);
+  const bool shown = custom_mode_ == custom_mode;
   want(custom_mode);
   const auto params = mode_params(autopilot_, custom_mode);
   command(number, what, k_set_mode, {1, params.main, params.sub}, part, !shown);
@@ -179,7 +179,7 @@ void Session::repeat_commands() {
     }
     // What changes the mode waits for a heartbeat: it would show that the pilot has changed it meanwhile.
     const bool changes_mode = p.command == k_set_mode || p.command == k_reposition || p.command == k_take_off;
-    if (now_s_ - p.last_s >= options_.repeat_s && (!changes_mode || *heard_s_ > p.last_s)) {
+    if (now_s_ - p.last_s >= options_.repeat_s && (!changes_mode || *beat_s_ > p.last_s)) {
       p.last_s = now_s_;
       if (p.message.is("COMMAND_LONG")) p.message.set("confirmation", p.message.integer("confirmation") + 1);
       send_command(p.message, p.command, p.number);

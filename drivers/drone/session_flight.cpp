@@ -95,8 +95,13 @@ void Session::drive_take_off() {
   if (t.stage == Stage::mode && (custom_mode_ == d.guided || d.take_off_above_sea)) next_stage(t, Stage::arm);
   if (t.stage == Stage::arm && telemetry_.armed()) next_stage(t, Stage::climb);
   const double risen_m = telemetry_.newest().relative_m.value_or(t.from_m) - t.from_m;
-  if (t.stage == Stage::climb && telemetry_.fresh("GLOBAL_POSITION_INT", now_s_, 3) && risen_m > k_risen_m)
-    return end_take_off(CommandState::accepted, "in the air");
+  if (t.stage == Stage::climb && telemetry_.fresh("GLOBAL_POSITION_INT", now_s_, 3) && risen_m > k_risen_m) {
+    if (custom_mode_ == d.guided || custom_mode_ == d.climbing)
+      return end_take_off(CommandState::accepted, "in the air");
+    // It flies, and its heartbeat still shows the mode in which it stood: the pilot has it back.
+    if (!t.risen_s) t.risen_s = now_s_;
+    if (*beat_s_ - *t.risen_s > k_mode_shows_s) return take_over();
+  }
   const double patience_s = t.stage == Stage::climb ? options_.climb_s : options_.confirm_s + 0.2;
   if (now_s_ - t.stage_s > patience_s) {
     const auto said = said_since(t.stage_s);

@@ -31,17 +31,19 @@ AutopilotSim::AutopilotSim(AutopilotOptions options)
     framer_.require_signature(*options_.secret, now);
   }
   if (options_.dialect == drone::Autopilot::px4)
-    parameters_ = {{"NAV_DLL_ACT", {2, true}},     {"COM_DL_LOSS_T", {options_.link_loss_s, true}},
-                   {"COM_LOW_BAT_ACT", {3, true}}, {"NAV_RCL_ACT", {2, true}},
-                   {"GF_ACTION", {2, true}},       {"MPC_XY_CRUISE", {5, false}},
-                   {"EKF2_HGT_REF", {1, true}},    {"COM_OBL_RC_ACT", {0, true}}};
+    parameters_ = {
+        {"NAV_DLL_ACT", {2, true}},     {"COM_DL_LOSS_T", {options_.link_loss_s.value_or(10), true}},
+        {"COM_LOW_BAT_ACT", {3, true}}, {"NAV_RCL_ACT", {2, true}},
+        {"GF_ACTION", {2, true}},       {"MPC_XY_CRUISE", {5, false}},
+        {"EKF2_HGT_REF", {1, true}},    {"COM_OBL_RC_ACT", {0, true}}};
   else
-    parameters_ = {{"FS_GCS_ENABLE", {1, true}},   {"FS_GCS_TIMEOUT", {options_.link_loss_s, false}},
-                   {"BATT_FS_LOW_ACT", {2, true}}, {"FS_THR_ENABLE", {1, true}},
-                   {"FENCE_ENABLE", {1, true}},    {"FENCE_ACTION", {1, true}},
-                   {"WPNAV_SPEED", {800, false}},  {"EK3_SRC1_POSXY", {3, true}},
-                   {"EK3_SRC1_POSZ", {1, true}},   {"SYSID_MYGCS", {255, true}},
-                   {"FS_EKF_ACTION", {1, true}}};
+    parameters_ = {
+        {"FS_GCS_ENABLE", {1, true}},   {"FS_GCS_TIMEOUT", {options_.link_loss_s.value_or(5), false}},
+        {"BATT_FS_LOW_ACT", {2, true}}, {"FS_THR_ENABLE", {1, true}},
+        {"FENCE_ENABLE", {1, true}},    {"FENCE_ACTION", {1, true}},
+        {"WPNAV_SPEED", {800, false}},  {"EK3_SRC1_POSXY", {3, true}},
+        {"EK3_SRC1_POSZ", {1, true}},   {"SYSID_MYGCS", {255, true}},
+        {"FS_EKF_ACTION", {1, true}}};
   restart();
 }
 
@@ -200,7 +202,7 @@ void AutopilotSim::fly(double seconds) {
   if (was_in_air) airborne_s_ += seconds;
   if (vehicle_.in_air() && aim_m_) vehicle_.go_to(*aim_m_ - error_m(), heading_);
   vehicle_.advance(seconds);
-  if (vehicle_.in_air() && aim_m_ && (believed_m() - *aim_m_).norm() < (returning_ ? 0.3 : 1.0)) {
+  if (vehicle_.in_air() && aim_m_ && (believed_m() - *aim_m_).norm() < 1.0) {
     if (returning_) {  // lands without leaving its mode
       aim_m_.reset();
       vehicle_.land();

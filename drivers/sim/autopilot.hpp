@@ -21,12 +21,14 @@ struct AutopilotOptions {
   VehicleOptions vehicle{};
   Wgs84 origin{51.0231, 3.7131, 55.5};  ///< of the vehicle's metres; its home is at home_m
   Eigen::Vector3d home_m{0, 0, 0};
-  double geoid_m = 44;             ///< ellipsoid above mean sea level: what GLOBAL_POSITION_INT leaves out
-  double ready_s = 25;             ///< until the pre-arm checks pass, as on the real thing
-  double cruise_mps = 8;           ///< its own speed in GUIDED until it is told another
-  bool keeps_fences = true;        ///< false: refuses fence lists as unsupported
-  bool old_requests = false;       ///< asks for items by MISSION_REQUEST, as before MISSION_REQUEST_INT
-  double link_loss_s = 5;          ///< without a station's heartbeat: returns (its parameter)
+  double geoid_m = 44;        ///< ellipsoid above mean sea level: what GLOBAL_POSITION_INT leaves out
+  double ready_s = 25;        ///< until the pre-arm checks pass, as on the real thing
+  double cruise_mps = 8;      ///< its own speed in GUIDED until it is told another
+  bool keeps_fences = true;   ///< false: refuses fence lists as unsupported
+  bool old_requests = false;  ///< asks for items by MISSION_REQUEST, as before MISSION_REQUEST_INT
+  /// Without a station's heartbeat for so long it returns; none: its default, 5 s (FS_GCS_TIMEOUT) or 10 s
+  /// (COM_DL_LOSS_T).
+  std::optional<double> link_loss_s{};
   double loss = 0, duplicate = 0;  ///< chance of each frame it sends to be lost, to be sent twice
   double loss_in = 0;              ///< of each frame sent to it
   double latency_s = 0;            ///< of the link, each way
@@ -75,6 +77,8 @@ class AutopilotSim {
   double now_s() const { return now_s_; }
   /// Where it would stand if it reached what it aims at, in truth.
   std::optional<Eigen::Vector3d> aim_m() const;
+  /// Where the target of message 86 or command 192 would bring it, in truth.
+  Eigen::Vector3d asked_m(const mavlink::Message& target) const;
   const std::vector<mavlink::Message>& mission_list() const { return mission_; }
   const std::vector<mavlink::Message>& fence_list() const { return fence_; }
 

@@ -51,6 +51,15 @@ void AutopilotSim::target(double lat_deg, double lon_deg, double above_home_m,
   if (heading_rad) heading_ = heading_rad;
 }
 
+Eigen::Vector3d AutopilotSim::asked_m(const Message& m) const {
+  const bool command = m.is("COMMAND_INT");
+  const double home_msl = options_.origin.height_m + home_m_.z() - options_.geoid_m;
+  Eigen::Vector3d to =
+      metres(m.real(command ? "x" : "lat_int") * 1e-7, m.real(command ? "y" : "lon_int") * 1e-7);
+  to.z() = home_m_.z() + (command ? m.real("z") - home_msl : m.real("alt"));
+  return to - error_m();
+}
+
 std::string AutopilotSim::not_ready() const {
   if (now_s_ - boot_s_ < options_.ready_s) return "Need Position Estimate";
   return refusal_;

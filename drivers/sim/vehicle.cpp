@@ -71,12 +71,13 @@ void Vehicle::advance(double seconds) {
   heading_ += std::clamp(turn, -options_.yaw_rate_rad_s * seconds, options_.yaw_rate_rad_s * seconds);
   heading_ = std::fmod(heading_ + 2 * std::numbers::pi, 2 * std::numbers::pi);
   if (mode_ == Mode::return_home && (position_ - target_).norm() < 0.3) land();
-  if (mode_ == Mode::land && position_.z() <= options_.ground_m) {
-    position_.z() = options_.ground_m;
-    velocity_.setZero();
-    mode_ = Mode::ground;
-    armed_ = false;
-  }
+  if (position_.z() > options_.ground_m) return;
+  position_.z() = options_.ground_m;  // wherever it aims
+  velocity_.z() = std::max(0.0, velocity_.z());
+  if (mode_ != Mode::land) return;
+  velocity_.setZero();
+  mode_ = Mode::ground;
+  armed_ = false;
 }
 
 }  // namespace anchord::sim

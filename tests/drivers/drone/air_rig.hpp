@@ -25,7 +25,8 @@ class AirRig {
     int command{};         ///< MAV_CMD; 86 for a position target
     std::uint32_t mode{};  ///< of 176
     double p1{};
-    std::int64_t again{};  ///< confirmation
+    std::int64_t again{};                       ///< confirmation
+    std::optional<Eigen::Vector3d> target_m{};  ///< of 86 and 192, in truth
   };
 
   explicit AirRig(sim::AutopilotOptions options = {}, Eigen::Vector3d home_m = {-9, -9, 0})
@@ -229,6 +230,7 @@ class AirRig {
     w.at_s = now;
     if (m.is("SET_POSITION_TARGET_GLOBAL_INT")) {
       w.command = 86;
+      w.target_m = autopilot.asked_m(m);
     } else if (m.is("COMMAND_LONG") || m.is("COMMAND_INT")) {
       w.command = static_cast<int>(m.integer("command"));
       w.p1 = m.real("param1");
@@ -238,6 +240,7 @@ class AirRig {
                      ? static_cast<std::uint32_t>(m.integer("param2")) << 16U |
                            static_cast<std::uint32_t>(m.integer("param3")) << 24U
                      : static_cast<std::uint32_t>(m.integer("param2"));
+      if (w.command == 192) w.target_m = autopilot.asked_m(m);
       if (m.is("COMMAND_LONG")) w.again = m.integer("confirmation");
     } else {
       return;

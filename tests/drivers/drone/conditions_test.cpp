@@ -201,12 +201,92 @@ TEST_P(Conditions, APilotWhoTakesOverDuringTheTakeOffKeepsIt) {
   }
 }
 
+// PX4 stands in POSCTL before it takes off: with its answers lost, the pilot who goes back to that mode while
+// it climbs looked like an autopilot that has not changed its mode yet, and was told to take off once more.
+TEST_P(Conditions, APilotWhoGoesBackToTheModeOfTheGroundDuringTheTakeOffIsSeen) {
+  for (const double ack_loss : {0.0, 1.0}) {
+    for (const double after_s : {0.5, 1.0, 1.5, 2.0, 2.5, 3.0}) {
+      auto o = options();
+      o.ack_loss = ack_loss;
+      AirRig rig(o);
+      rig.run(7);
+      const auto on_the_ground = rig.autopilot.custom_mode();
+      ASSERT_TRUE(rig.start());
+      ASSERT_TRUE(rig.run_until([&] { return rig.autopilot.vehicle().in_air(); }, 5));
+      rig.run(after_s);
+      rig.autopilot.pilot_takes_over(on_the_ground);
+      rig.run(6);
+      const double at = rig.now;
+      rig.run(70);  // a take-off is given up, or told again, after a minute
+      EXPECT_EQ(rig.autopilot.custom_mode(), on_the_ground) << ack_loss << ' ' << after_s;
+      EXPECT_EQ(kinds(rig.since(at)), "") << ack_loss << ' ' << after_s;
+    }
+  }
+}
+
+// ArduPilot's RTL and PX4's Return land in their own mode: LAND is somebody else's.
+TEST_P(Conditions, AFailsafeThatLandsOnTheWayHomeIsLeftToLand) {
+  AirRig rig(options());
+  ASSERT_TRUE(rig.fly());
+  rig.run(3);
+  rig.session->return_home();
+  rig.run(2);
+  ASSERT_EQ(rig.autopilot.custom_mode(), dialect().return_home);
+  rig.autopilot.fail(Failsafe::ekf);
+  rig.run(1.5);
+  EXPECT_TRUE(rig.control->taken_over());
+  EXPECT_EQ(rig.autopilot.custom_mode(), dialect().land);
+}
+
+// A link that loses half is a poor one and no silence: at one heartbeat a second the failsafe (5 s) came
+// within minutes.
+TEST_P(Conditions, AFailsafeOfTheLinkDoesNotComeOnAPoorLink) {
+  AirRig rig(options());
+  ASSERT_TRUE(rig.fly());
+  rig.act("hold");
+  rig.run(3);
+  rig.autopilot.options().loss_in = 0.5;
+  for (int i = 0; i < 50; ++i) {
+    rig.autopilot.vehicle().set_battery(0.9);
+    rig.run(10);
+    ASSERT_EQ(rig.autopilot.custom_mode(), dialect().hold) << "after " << 10 * i << " s";
+  }
+}
+
+TEST_P(Conditions, LostHeartbeatsAreNoSilenceWhileOtherTelemetryComes) {
+  AirRig rig(options());
+  ASSERT_TRUE(rig.fly());
+  rig.act("hold");
+  rig.run(3);
+  rig.autopilot.options().loss = 0.4;
+  for (int i = 0; i < 50; ++i) {
+    rig.autopilot.vehicle().set_battery(0.9);
+    rig.run(10);
+  }
+  for (const auto& h : rig.happenings) EXPECT_NE(h.code, "drone.link") << h.time_s << " s: " << h.text;
+}
+
+TEST_P(Conditions, AfterASilenceOnlyAHeartbeatBringsTheLinkBack) {
+  AirRig rig(options());
+  ASSERT_TRUE(rig.fly());
+  rig.link_down = true;
+  rig.run(4);
+  ASSERT_FALSE(rig.session->status().connected);
+  mavlink::Packer other({1, 1});
+  const auto position = mavlink::Message("GLOBAL_POSITION_INT").set("lat", 510231000).set("lon", 37131000);
+  rig.session->feed(rig.now, AirRig::k_unix_us, other.pack(position));
+  EXPECT_FALSE(rig.session->status().connected) << "whose mode it is now is not known";
+  rig.link_down = false;
+  rig.run(2);
+  EXPECT_TRUE(rig.session->status().connected);
+}
+
 TEST_P(Conditions, AFailsafeThatReturnsWhileTheLinkWasCutIsNotOverridden) {
   AirRig rig(options());
   ASSERT_TRUE(rig.fly());
   rig.run(3);
   rig.link_down = true;
-  rig.run(8);
+  rig.run(12);
   ASSERT_EQ(rig.autopilot.custom_mode(), dialect().return_home);
   rig.link_down = false;
   const double at = rig.now;
@@ -301,6 +381,37 @@ TEST_P(Conditions, ABarometerThatDriftsDoesNotBringItBelowTheBand) {
     rig.act("return");
     EXPECT_TRUE(rig.run_until([&] { return rig.done(); }, 180)) << rig.reason();
   }
+}
+
+// Told to return without RTK it flies by itself and lands, through the lower end of the band: it was sent up
+// again from there, and then home, for as long as the battery lasted.
+TEST_P(Conditions, TheAutopilotsOwnReturnIsLeftToLand) {
+  for (const bool rtk_comes_back : {false, true}) {
+    AirRig rig(options());
+    ASSERT_TRUE(rig.fly());
+    rig.run(4);
+    rig.rtk_lost = true;
+    ASSERT_TRUE(rig.until_step(Step::return_home, 15)) << rig.reason();
+    rig.run(1);
+    const double at = rig.now;
+    rig.rtk_lost = !rtk_comes_back;
+    EXPECT_TRUE(rig.run_until([&] { return rig.done(); }, 90)) << rig.reason();
+    EXPECT_EQ(kinds(rig.since(at)), "");
+  }
+}
+
+TEST_P(Conditions, AHeightWithoutRtkSendsNobodyUp) {
+  AirRig rig(options());
+  ASSERT_TRUE(rig.fly());
+  rig.act("hold");
+  rig.run(5);
+  rig.rtk_lost = true;
+  const double at = rig.now;
+  while (rig.now < at + 8) {
+    rig.control->fix(rig.now, rig.rover() - Eigen::Vector3d(0, 0, 4), FixClass::single);
+    rig.step();
+  }
+  for (const auto& h : rig.happenings) EXPECT_NE(h.code, "fence.breach") << h.text;
 }
 
 // The rest.

@@ -127,6 +127,7 @@ class History {
       say(refuses_ ? "arming is refused" : "arming is allowed");
     } else if (dice < 0.50) {
       rig_.rtk_lost = !rig_.rtk_lost;
+      lost_s_ = rig_.now;
       say(rig_.rtk_lost ? "RTK lost" : "RTK back");
     } else if (dice < 0.56) {
       say("server killed");
@@ -166,6 +167,7 @@ class History {
       fail(words + " is " + std::to_string(rig_.now - first_s_[key]) + " s old");
     if ((w.command == 86 || w.command == 192) && rig_.control && !had_leg_ && !rig_.control->engine().leg())
       fail("a target although there is none");
+    if (w.target_m && rover_known()) within(*w.target_m, "sends it");
   }
 
   void advance(double until_s) {
@@ -180,7 +182,9 @@ class History {
       rig_.step();
       if (flew && !rig_.flying()) ended_s_ = rig_.now;
       // A failsafe of the autopilot's own, as that of the cut link.
-      if (rig_.autopilot.failsafe() && rig_.autopilot.custom_mode() != mode)
+      if (rig_.autopilot.failsafe() && rig_.autopilot.custom_mode() != mode &&
+          (rig_.autopilot.custom_mode() == dialect().return_home ||
+           rig_.autopilot.custom_mode() == dialect().land))
         pilot(rig_.autopilot.custom_mode(), "failsafe of its own");
       if (pilot_s_ && !known_s_ && rig_.shown_mode == pilot_mode_ && rig_.shown_s > *pilot_s_ && distinct())
         known_s_ = rig_.now;
@@ -213,16 +217,25 @@ class History {
     // What it aims at by itself for a moment, when its mode changes, is nobody's target.
     if (rig_.now - aim_s_ < 2 || rig_.now - step_s_ < 2.5) return;
     if (!aim || !rig_.flying() || rig_.control->taken_over() || step == Step::take_off ||
-        step == Step::hold || rig_.autopilot.custom_mode() != dialect().guided || pilot_s_ || rig_.link_down)
+        step == Step::hold || rig_.autopilot.custom_mode() != dialect().guided || pilot_s_ ||
+        rig_.link_down || !rover_known())
       return;
+    within(*aim, "aims");
+  }
+
+  /// Without RTK for longer than the procedure flies without it, nobody knows by the rover where it is.
+  bool rover_known() const { return !rig_.rtk_lost || rig_.now - lost_s_ < 10; }
+
+  /// A metre is the tolerance of a breach: GNSS is off by more than that, and corrected by the rover.
+  void within(const Eigen::Vector3d& aim, const std::string& who) {
     auto bounds = AirRig::setup(rig_.home).limits.bounds;
     bounds.keep_out_m -= 1;
     *bounds.min_height_m -= 1;
     *bounds.max_height_m += 1;
     for (auto& corner : bounds.fence) corner += (corner - Eigen::Vector2d(15, 10)).normalized();
-    if (const auto refusal = planning::refuse_point(bounds, *aim))
-      fail("aims at " + std::to_string(aim->x()) + ' ' + std::to_string(aim->y()) + ' ' +
-           std::to_string(aim->z()) + ": " + std::string(planning::to_string(*refusal)));
+    if (const auto refusal = planning::refuse_point(bounds, aim))
+      fail(who + " to " + std::to_string(aim.x()) + ' ' + std::to_string(aim.y()) + ' ' +
+           std::to_string(aim.z()) + ": " + std::string(planning::to_string(*refusal)));
   }
 
   /// Somebody looks after it in the end: the history ends on the ground, or in the pilot's hands.
@@ -257,7 +270,7 @@ class History {
   bool refuses_{false}, had_leg_{false};
   std::optional<double> pilot_s_, known_s_, ended_s_;
   std::optional<Eigen::Vector3d> aim_m_;
-  double aim_s_{0}, step_s_{0};
+  double aim_s_{0}, step_s_{0}, lost_s_{0};
   std::uint32_t pilot_mode_{0};
   std::size_t seen_wire_{0};
   Step last_step_{};
