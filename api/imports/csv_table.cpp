@@ -70,7 +70,7 @@ Result<CsvTable> CsvTable::open(const std::filesystem::path& folder, const std::
   split(line, names);
   for (const auto name : names) {
     if (std::ranges::find(table.header_, name) != table.header_.end()) {
-      return table.error("column '" + std::string(name) + "' stands there twice");
+      return table.error("column '" + std::string(name) + "' occurs twice");
     }
     table.header_.emplace_back(name);
   }

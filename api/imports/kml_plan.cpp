@@ -78,7 +78,7 @@ class Reader {
     if (node.name == "Placemark") return placemark(node, kind);
     if (node.name == "NetworkLink" || node.name == "GroundOverlay" || node.name == "PhotoOverlay" ||
         node.name == "ScreenOverlay") {
-      return note(node.name + " was left out: only what stands in the file itself is read");
+      return note(node.name + " was left out: only what the file itself contains is read");
     }
     for (const auto& child : node.children) walk(child, kind);
   }

@@ -64,7 +64,7 @@ std::vector<AlarmCondition> alarm_conditions(const std::vector<FlightPulse>& fli
   if (server.disk_free_bytes > 0 && server.disk_free_bytes < k_low_bytes) {
     out.push_back({"disk.low",
                    AlarmPriority::warning,
-                   server.disk_free_bytes < k_refuse_bytes ? "less than 500 MiB free: new flights are refused"
+                   server.disk_free_bytes < k_refuse_bytes ? "less than 500 MiB free: no new flight starts"
                                                            : "less than 2 GiB free on the disk of the data",
                    {}});
   }

@@ -70,7 +70,7 @@ void describe(Report& report, const std::vector<Mission>& missions, const std::s
     fixes += flight.n_fixes;
     if (!flight.shared.bias_determined)
       report.remarks.push_back(flight.name +
-                               " cannot tell its own range bias, and no profile of the kit does: "
+                               " does not determine its own range bias, and no profile of the kit gives it: "
                                "the regions allow for it.");
   }
   report.methods.push_back(std::to_string(missions.size()) +

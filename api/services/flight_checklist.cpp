@@ -13,7 +13,7 @@ namespace {
 constexpr std::array<std::pair<std::string_view, std::string_view>, 4> k_by_a_person{
     {{"props", "Propellers and battery are fastened"},
      {"airspace", "The airspace is clear and allowed"},
-     {"people", "Nobody stands below the way"},
+     {"people", "Nobody is below the flight path"},
      {"pilot", "A pilot is ready with the remote control"}}};
 constexpr std::array<std::string_view, 11> k_by_itself{"drone", "arming",      "parameters", "battery",
                                                        "rtk",   "corrections", "tag",        "plan",
@@ -68,7 +68,7 @@ std::vector<ChecklistItem> make_checklist(const ChecklistFacts& f) {
                            : "being read"));
     // What the flight may use is what is above the reserve; 30 % of it stays as a margin.
     const double need = f.min_battery + 1.3 * (f.plan != nullptr ? f.plan->duration_s : 0) / 1200;
-    out.push_back(item("battery", "The battery suffices for the plan and 30 % more",
+    out.push_back(item("battery", "The battery covers the plan plus 30 % reserve",
                        d.battery && d.battery_age_s < k_fresh_s && d.battery_warning == 0 &&
                            *d.battery >= std::min(need, 0.95),
                        true,
@@ -82,7 +82,7 @@ std::vector<ChecklistItem> make_checklist(const ChecklistFacts& f) {
       f.fixed_for_s ? words("fixed for %.0f s", *f.fixed_for_s) : fix_word(f.fix) + ", " + age(f.fix_age_s)));
   out.push_back(item("corrections", "Corrections are younger than 2 s",
                      f.correction_age_s && *f.correction_age_s < 2, true, age(f.correction_age_s)));
-  out.push_back(item("tag", "The tag ranges or is heard", f.range_age_s && *f.range_age_s < 10, true,
+  out.push_back(item("tag", "The tag ranges, or is in range", f.range_age_s && *f.range_age_s < 10, true,
                      "newest range: " + age(f.range_age_s)));
   std::string why = "no plan is chosen";
   if (f.plan != nullptr) {

@@ -234,7 +234,7 @@ void FlightService::State::recover() {
     // Not heard yet: whether the hold leaves is decided by the mode that the first heartbeat shows.
     tell_happenings(*flight);
     deps.events.add("critical", "procedure.restarted",
-                    "server restarted in flight: told to hold, waiting for the operator", mission);
+                    "server restarted in flight: hold commanded, waiting for the operator", mission);
   }
 }
 

@@ -93,7 +93,7 @@ Ran note_task_failure(std::string_view task) noexcept {
     if (enter(task, out.what, failure, tell)) tell ? tell(failure) : tell_stderr(failure);
   } catch (...) {
     // No memory to tell of it, or the log itself throws: stderr takes constant bytes.
-    std::fputs("anchord: a task failed, and telling of it failed too\n", stderr);
+    std::fputs("anchord: a task failed, and so did logging it\n", stderr);
   }
   return out;
 }

@@ -219,7 +219,7 @@ Result<void> order(FlightPlan& plan, std::vector<Candidate> chosen, const Flight
       const auto any = route(bounds, from, to);
       if (!any) {
         return make_error(Errc::not_found,
-                          "no legal way joins two points of the flight: widen the fence or the keep-out");
+                          "no permitted path joins two points of the flight: widen the fence or reduce the clearance");
       }
       way.assign(any->begin(), any->end() - 1);
     }

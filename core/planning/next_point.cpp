@@ -207,7 +207,7 @@ std::string refused_words(const std::vector<CandidateValue>& candidates) {
   std::string out;
   for (const auto& [why, n] : counts)
     out += (out.empty() ? "" : ", ") + std::to_string(n) + " " + std::string(why);
-  return out.empty() ? "none refused" : "refused: " + out;
+  return out.empty() ? "none rejected" : "refused: " + out;
 }
 
 std::string words(const Decision& decision, const NextPointOptions& options, bool ridge) {

@@ -103,7 +103,7 @@ void Decoder::take_gpsd(const Frame& frame, Epochs& out) {
 void Decoder::count_without_pvt(std::uint64_t offset) {
   const auto now = ubx_.without_pvt();
   if (now > without_pvt_)
-    skips_.count("ubx: position without NAV-PVT, which tells the fix", offset, {}, now - without_pvt_);
+    skips_.count("ubx: position without NAV-PVT, which gives the fix", offset, {}, now - without_pvt_);
   without_pvt_ = now;
 }
 

@@ -46,7 +46,7 @@ Result<Address> socket(std::string_view text, std::string_view rest, Kind kind) 
   if (host.starts_with('[') && host.ends_with(']')) {
     host = host.substr(1, host.size() - 2);
   } else if (host.find(':') != std::string_view::npos) {
-    return bad(text, "an IPv6 address stands in brackets");
+    return bad(text, "write an IPv6 address in brackets");
   }
   if (host.find_first_of("/?#@ ") != std::string_view::npos) return bad(text, "this is no host name");
   out.host = std::string(host);

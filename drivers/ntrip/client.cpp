@@ -177,7 +177,7 @@ bool Client::status_line(const std::string& line) {
     return true;
   }
   if (code == 401) {
-    refuse("the caster refuses user or password", 60);
+    refuse("the caster rejects user or password", 60);
   } else if (code == 404) {
     refuse("the caster has no mount \"" + options_.mount + "\"", 60);
   } else if (code == 409) {

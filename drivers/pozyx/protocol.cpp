@@ -210,7 +210,7 @@ std::string_view error_text(std::uint8_t code) {
                                      Row{0x03, "device list full"},
                                      Row{0x04, "communication queue full"},
                                      Row{0x05, "I2C read"},
-                                     Row{0x06, "UWB settings refused"},
+                                     Row{0x06, "UWB settings rejected"},
                                      Row{0x07, "operation queue full"},
                                      Row{0x08, "bus fault"},
                                      Row{0x09, "flash invalid"},

@@ -35,7 +35,7 @@ Metrics::Metrics(std::string_view version) : state_(std::make_unique<State>()) {
                            .Register(registry);
   prometheus::BuildGauge()
       .Name("anchord_build_info")
-      .Help("Always 1; the labels tell the build")
+      .Help("Always 1; the labels identify the build")
       .Register(registry)
       .Add({{"version", std::string(version)}})
       .Set(1);

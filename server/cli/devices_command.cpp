@@ -232,7 +232,7 @@ void add_devices_command(CLI::App& app, int& exit_code) {
     auto server = Server::of(*options);
     exit_code = server ? what(*options, server.value()) : fail(server.error().message);
   };
-  command->add_subcommand("list", "What is set up, and how it stands")->callback([run] { run(list); });
+  command->add_subcommand("list", "Configured devices and their state")->callback([run] { run(list); });
   command->add_subcommand("discover", "Listen at every port that is not in use")->callback([run] {
     run(discover);
   });

@@ -99,7 +99,7 @@ Result<std::string> import_into_folder(const Options& options, FlightData flight
     if (!word) continue;
     BOOST_OUTCOME_TRYV(db->exclusions().include(mission.id, one.id, *word));
   }
-  std::fprintf(stderr, "%s: %zu rows stored, %zu refused\n", mission.name.c_str(), n, refused);
+  std::fprintf(stderr, "%s: %zu rows stored, %zu rejected\n", mission.name.c_str(), n, refused);
   return to_string(mission.id);
 }
 

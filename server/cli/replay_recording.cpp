@@ -109,12 +109,12 @@ class Player {
     // Its failure is told by whoever sent; what was answered counts all the same.
     (void)upload_.drain();
     const auto answers = upload_.answers();
-    std::fprintf(stderr, "replay: %llu rows accepted, %llu known already, %llu refused\n",
+    std::fprintf(stderr, "replay: %llu rows accepted, %llu known already, %llu rejected\n",
                  static_cast<unsigned long long>(answers.accepted),
                  static_cast<unsigned long long>(answers.known),
                  static_cast<unsigned long long>(answers.refused));
     for (const auto* first : {&answers.first_error_fixes, &answers.first_error_ranges}) {
-      if (!first->empty()) std::fprintf(stderr, "anchord replay: refused first: %s\n", first->c_str());
+      if (!first->empty()) std::fprintf(stderr, "anchord replay: first rejected: %s\n", first->c_str());
     }
     return answers.refused == 0;
   }

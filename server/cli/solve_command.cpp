@@ -115,7 +115,7 @@ Result<void> apply_models(const Arguments& a, std::vector<FlightData>& flights) 
   if (!a.profile.empty())
     return make_error(
         Errc::invalid_argument,
-        "--models and --profile: a kit's profile tells the bias of raw ranges, and of corrected "
+        "--models and --profile: a kit's profile gives the bias of raw ranges, and of corrected "
         "ones it would be taken off twice");
   std::vector<ml::Model> models;
   for (const auto& file : a.models) {
@@ -268,7 +268,7 @@ void add_options(CLI::App& command, Arguments& a) {
                      "(the heights of the table), else z; default: mean height of the track");
   command
       .add_option("--height-prior", a.height_prior,
-                  "HEIGHT,SIGMA in metres: about where all anchors are, such as the poles they stand on; "
+                  "HEIGHT,SIGMA in metres: about where all anchors are, such as the poles they are on; "
                   "reference as for --height")
       ->delimiter(',')
       ->expected(2);
@@ -295,7 +295,7 @@ void add_solve_command(CLI::App& app, int& exit_code) {
   add_options(*command, *arguments);
   command->add_option(
       "--clues", arguments->clues,
-      "JSON: outline, bearings, heights, RSS that tell an anchor from its twin (docs/formats.md)");
+      "JSON: outline, bearings, heights, RSS: priors that separate an anchor from its mirror (docs/formats.md)");
   auto* models =
       command->add_option("--models", arguments->models,
                           "Model artifacts (anchord train) that correct and weigh the ranges, one a task");

@@ -44,7 +44,7 @@ constexpr std::array k_options = {
            "where the autopilot speaks MAVLink, like udp://:14550, tcp://127.0.0.1:5760 or "
            "serial:/dev/ttyACM0; empty: flown by hand"},
     Option{"drone.signing_key_file", "",
-           "file (mode 0600) with the key of MAVLink 2 signing; frames without its signature are refused"},
+           "file (mode 0600) with the key of MAVLink 2 signing; frames without its signature are rejected"},
     Option{"http.io_threads", "1", "threads of the sockets", count},
     Option{"http.workers", "4", "threads that run handlers", count},
     Option{"http.queue", "256", "requests that may wait for a handler; beyond: 503", count},
@@ -70,7 +70,7 @@ constexpr std::array k_options = {
            metres},
     Option{"goal.v95_m", "0.4", "and its vertical 95 % bound within this", metres},
     Option{"solve.site_outline", "on",
-           "live solutions take the outline of the mission's site as a clue: anchors are inside", choice,
+           "live solutions take the outline of the mission's site as a prior: anchors are inside", choice,
            "on|off"},
     Option{"solve.max_correction_age_s", "30",
            "RTK fixed with corrections older than this counts as float, live and in calibrations", seconds},

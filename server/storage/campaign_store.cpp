@@ -193,7 +193,7 @@ class SqlCampaignStore final : public CampaignStore {
           at = known.try_emplace(truth.setting, insert_setting(c, *key, truth), truth).first;
         } else if (!same_truth(at->second.second, truth)) {
           return make_error(Errc::conflict, "row " + std::to_string(i + 1) + ": setting " + truth.setting +
-                                                " stands with another truth");
+                                                " exists with another truth");
         }
         ++(insert_sample(c, at->second.first, rows[i].sample) ? done.accepted : done.duplicates);
       }

@@ -96,7 +96,7 @@ RowOutcome judge_stored(Connection& connection, std::int64_t key, const Row& row
                                   std::string(Table<Row>::same_identity);
   Query query(connection, text);
   Table<Row>::bind_identity(query, key, row);
-  if (!query.step()) throw SqlError(Failure::internal, "a row that was refused as present is not there");
+  if (!query.step()) throw SqlError(Failure::internal, "a row that was rejected as present is not there");
   const std::int64_t id = query.integer();
   query.skip();
   Row stored = Table<Row>::read(query);

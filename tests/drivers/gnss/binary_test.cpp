@@ -242,7 +242,7 @@ TEST(Ubx, SaysThatPositionsWithoutPvtAreNotUsed) {
   put(old, 6, 1000, 4), put(solution, 6, 1000, 4);
   Skips skips;
   EXPECT_TRUE(decode(with_fletcher(old) + with_fletcher(solution) + k_hp, {}, &skips).empty());
-  EXPECT_EQ(skips["ubx: position without NAV-PVT, which tells the fix"], 2U);
+  EXPECT_EQ(skips["ubx: position without NAV-PVT, which gives the fix"], 2U);
   Skips with;
   put(old, 6, 378017800, 4);
   EXPECT_EQ(decode(with_fletcher(old) + k_pvt, {}, &with).size(), 1U);

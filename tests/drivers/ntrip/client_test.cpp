@@ -132,7 +132,7 @@ TEST(NtripClient, SaysWhyThereIsNoStream) {
     EXPECT_EQ(link.to_rover(), "");
     return link.sink.hung_up;
   };
-  EXPECT_EQ(why("HTTP/1.0 401 Unauthorized\r\n"), "the caster refuses user or password");
+  EXPECT_EQ(why("HTTP/1.0 401 Unauthorized\r\n"), "the caster rejects user or password");
   EXPECT_EQ(why("HTTP/1.1 404 Not Found\r\n"), "the caster has no mount \"BASE\"");
   EXPECT_EQ(why("HTTP/1.1 503 Busy\r\n"), "the caster answers \"HTTP/1.1 503 Busy\"");
   EXPECT_EQ(why("SOURCETABLE 200 OK\r\nServer: x\r\n\r\nCAS;a;b\r\nSTR;NEAR;Gent;RTCM "
