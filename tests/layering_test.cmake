@@ -24,7 +24,7 @@ set(drivers_source "^(nlohmann/json\\.hpp$|sys/|arpa/|netinet/|linux/|termios\\.
 
 set(api_own "^(api/|core/)")
 set(api_header "^(${everywhere}|nlohmann/json_fwd\\.hpp$)")
-set(api_source "^(nlohmann/json\\.hpp$|zlib\\.h$|openssl/)")
+set(api_source "^(malloc\\.h$|nlohmann/json\\.hpp$|zlib\\.h$|openssl/)")
 
 set(server/storage_own "^(server/storage/|migrations/|${base_types_ports})")
 set(server/storage_header "^(${everywhere})")

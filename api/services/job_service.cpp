@@ -10,8 +10,8 @@
 #include "api/http/problem.hpp"
 #include "api/json/wire_resources.hpp"
 #include "api/live/hub.hpp"
+#include "api/services/memory.hpp"
 #include "core/base/guard.hpp"
-#include "core/base/memory.hpp"
 #include "core/base/to_wire.hpp"
 
 namespace anchord::api {

@@ -1,6 +1,6 @@
 #include "api/services/joint_worker.hpp"
 
-#include "core/base/memory.hpp"
+#include "api/services/memory.hpp"
 #include "core/localize/flight_solver.hpp"
 
 namespace anchord::api {

@@ -204,8 +204,8 @@ void AutopilotSim::fly(double seconds) {
   vehicle_.advance(seconds);
   if (vehicle_.in_air() && aim_m_ && (believed_m() - *aim_m_).norm() < 1.0) {
     if (returning_) {  // lands without leaving its mode
+      vehicle_.land_at((*aim_m_ - error_m()).head<2>());
       aim_m_.reset();
-      vehicle_.land();
     } else if (d.climbing != d.guided && custom_mode_ == d.climbing) {
       custom_mode_ = d.guided;  // PX4: AUTO_TAKEOFF ends in AUTO_LOITER
       mode_s_ = now_s_;

@@ -43,10 +43,12 @@ void Vehicle::return_home() {
   target_ = {home_.x(), home_.y(), std::max(position_.z(), home_.z() + 4)};
 }
 
-void Vehicle::land() {
+void Vehicle::land() { land_at(position_.head<2>()); }
+
+void Vehicle::land_at(const Eigen::Vector2d& place_m) {
   if (mode_ == Mode::ground) return;
   mode_ = Mode::land;
-  target_ = {position_.x(), position_.y(), options_.ground_m - 1};
+  target_ = {place_m.x(), place_m.y(), options_.ground_m - 1};
 }
 
 Eigen::Vector3d Vehicle::position_m() const {

@@ -1,11 +1,9 @@
 #pragma once
 
-#include <malloc.h>
-
-namespace anchord {
+namespace anchord::api {
 
 /// After work that needed much memory for a short time: its free pages go back to the system, which the
 /// allocator would keep for the next time. Some milliseconds.
-inline void give_back_memory() { ::malloc_trim(0); }
+void give_back_memory();
 
-}  // namespace anchord
+}  // namespace anchord::api
