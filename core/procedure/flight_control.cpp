@@ -179,7 +179,7 @@ FlightControl::Aim FlightControl::aim(const Eigen::Vector3d& point_m, const Dron
 std::uint64_t FlightControl::send(const Command& order) {
   switch (order.kind) {
     case Command::Kind::take_off:
-      return drone_->take_off(order.point_m.z() - home_m_.z());
+      return take_off_ = drone_->take_off(order.point_m.z() - home_m_.z());
     case Command::Kind::go_to: {
       std::optional<double> heading;
       if (order.heading_rad) heading = std::fmod(*order.heading_rad / k_degree + 720, 360.0);
@@ -214,6 +214,10 @@ void FlightControl::dispatch() {
 }
 
 std::string FlightControl::command(double now_s, Event event, const std::string& who) {
+  if (adopts_ && drone_->status().connected) {  // the operator decides, before the first round could
+    adopts_ = false;
+    drone_->take_back();
+  }
   if (taken_over_) {
     if (event == Event::skip)
       return "the pilot or a failsafe has taken over; resume, hold, return or land take it back";
@@ -244,7 +248,8 @@ std::uint64_t FlightControl::abort() {
 
 void FlightControl::report(double now_s, const CommandReport& r) {
   if (over_ || taken_over_ || r.state == CommandState::sent || r.state == CommandState::accepted) return;
-  if (r.what == "take_off" && engine_.state().step == Step::take_off) {
+  // What became of an earlier one, of this flight or of the last, says nothing of this.
+  if (r.what == "take_off" && r.number == take_off_ && engine_.state().step == Step::take_off) {
     engine_.not_taken_off(now_s, r.text);
   } else if (r.what == "go_to" && r.number == last_target_) {
     if (r.state == CommandState::refused) {
