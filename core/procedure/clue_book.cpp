@@ -55,6 +55,14 @@ void ClueBook::conclude_height_search() {
   }
 }
 
+std::optional<bool> ClueBook::lobe_seen(NetworkId anchor) const {
+  constexpr double k_noise = 0.1;  ///< from there on the bearing's sigma is at its widest
+  const auto it = clues_.find(anchor);
+  if (it == clues_.end()) return std::nullopt;
+  const auto bearing = bearing_from_turn(it->second.turn);
+  return bearing ? std::optional(bearing.value().confidence > k_noise) : std::nullopt;
+}
+
 void ClueBook::guess(NetworkId anchor, Clues& clues) {
   const auto seen = newest_.find(anchor);
   if (!clues.bearing || seen == newest_.end()) return;

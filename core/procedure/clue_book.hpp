@@ -38,6 +38,8 @@ class ClueBook {
   /// Anchors whose samples say something get a bearing, or a height; the others keep what they had.
   void conclude_turn();
   void conclude_height_search();
+  /// Whether the turn's samples show a lobe of it; none: there are too few to say.
+  std::optional<bool> lobe_seen(NetworkId anchor) const;
 
   const std::map<NetworkId, Clues>& clues() const { return clues_; }
   std::optional<Eigen::Vector3d> guess_m(NetworkId anchor) const;

@@ -106,7 +106,11 @@ void FlightEngine::range(double now_s, NetworkId anchor, bool used, std::optiona
                          std::optional<double> distance_m) {
   if (!in_flight(state_.step)) return;
   const auto at = position_m();
-  if (distance_m && at) clues_.ranged(anchor, *at, *distance_m);
+  if (distance_m && at) {
+    clues_.ranged(anchor, *at, *distance_m);
+    distance_m_[anchor] = *distance_m;
+    near_enough(anchor, *distance_m);
+  }
   if (rss_dbm && state_.step == Step::turn && vehicle_.heading_rad)
     clues_.turned(anchor, *vehicle_.heading_rad, *rss_dbm);
   if (rss_dbm && state_.step == Step::height_search && at) clues_.climbed(anchor, at->z(), *rss_dbm);
@@ -181,8 +185,28 @@ bool FlightEngine::command(double now_s, Event event, const std::string& who) {
   return feed(now_s, event, who.empty() ? std::string{} : "by " + who);
 }
 
+/// From where a turn saw no lobe of an anchor a height search, which needs one, sees nothing either.
+void FlightEngine::note_lobes() {
+  for (auto& task : state_.anchors) {
+    const auto seen = task.samples_here > 0 ? clues_.lobe_seen(task.id) : std::nullopt;
+    if (!seen) continue;
+    task.no_lobe = !*seen;
+    if (const auto at = distance_m_.find(task.id); task.no_lobe && at != distance_m_.end())
+      no_lobe_m_[task.id] = at->second;
+  }
+}
+
+void FlightEngine::near_enough(NetworkId anchor, double distance_m) {
+  constexpr double k_nearer = 0.7;
+  const auto from = no_lobe_m_.find(anchor);
+  if (from == no_lobe_m_.end() || distance_m > k_nearer * from->second) return;
+  for (auto& task : state_.anchors) task.no_lobe = task.no_lobe && task.id != anchor;
+  no_lobe_m_.erase(from);
+}
+
 bool FlightEngine::feed(double now_s, Event event, std::string text, std::optional<Eigen::Vector3d> point,
                         std::optional<double> heading) {
+  if (state_.step == Step::turn && event == Event::arrived && state_.legs <= 1) note_lobes();
   const auto step = advance(setup_.settings, state_, {event, now_s, point, heading, std::move(text)});
   if (step.transition == nullptr) return false;
   apply(now_s, step);

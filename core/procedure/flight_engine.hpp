@@ -127,6 +127,8 @@ class FlightEngine {
   void tell(double now_s, std::string level, std::string code, std::string text);
   void look_out(double now_s);
   bool lands_by_itself() const;
+  void note_lobes();
+  void near_enough(NetworkId anchor, double distance_m);
   void look_for_arrival(double now_s);
   void work(double now_s, std::span<const Estimate> estimates);
   void judge_anchors(double now_s, std::span<const Estimate> estimates);
@@ -150,6 +152,7 @@ class FlightEngine {
   std::optional<Alarm> alarm_;
   std::optional<DecisionRecord> decision_;
   std::map<NetworkId, std::vector<Eigen::Vector3d>> measured_at_;
+  std::map<NetworkId, double> distance_m_, no_lobe_m_;  ///< newest; where the turn saw no lobe
   std::vector<Command> orders_;
   std::vector<Happening> happenings_;
 };

@@ -29,7 +29,7 @@ bool holds(Guard guard, const Settings& settings, const State& s) {
              any_heard(s, [](const AnchorTask& a) { return !a.has_bearing; });
     case Guard::wants_height:
       return waypoint_of(settings, s).height_search &&
-             any_heard(s, [](const AnchorTask& a) { return !a.has_height; });
+             any_heard(s, [](const AnchorTask& a) { return !a.has_height && !a.no_lobe; });
     case Guard::legs_left:
       return s.legs > 1;
     case Guard::moves_left:
@@ -147,7 +147,7 @@ void Entry::height_leg() {
   s_.target_m = s_.former_m;
   s_.target_m.z() = std::clamp(base + up, t_.min_height_m, t_.max_height_m);
   if (s_.legs == 1) {
-    for (auto& a : s_.anchors) a.has_height |= a.samples_here > 0;
+    for (auto& a : s_.anchors) a.has_height |= a.samples_here > 0 && !a.no_lobe;
   }
 }
 

@@ -68,7 +68,7 @@ std::optional<Event> event_of(std::string_view word);
 enum class Guard : std::uint8_t {
   always,
   wants_turn,        ///< an anchor is heard whose bearing is not known, and turns are allowed here
-  wants_height,      ///< no turn wanted, and a height not known
+  wants_height,      ///< no turn wanted, and a height not known that a search could see
   legs_left,         ///< of the turn or the height search
   moves_left,        ///< of the three directions
   waypoint_left,     ///< there is another waypoint
@@ -126,8 +126,9 @@ struct Settings {
 struct AnchorTask {
   NetworkId id{};
   bool has_bearing{false}, has_height{false};
-  int iterations{};  ///< points where it was ranged
-  int waiting{};     ///< points since it was ranged last: the planner serves who waits longest first
+  bool no_lobe{false};  ///< the turn saw none of it, from this far: a height search would see no peak
+  int iterations{};     ///< points where it was ranged
+  int waiting{};        ///< points since it was ranged last: the planner serves who waits longest first
   int samples_here{};
   bool done{false};
   std::string why;  ///< why it is done, or why not yet

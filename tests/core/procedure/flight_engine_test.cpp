@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <numbers>
+#include <utility>
 
 namespace anchord::procedure {
 namespace {
@@ -31,11 +32,11 @@ FlightSetup setup() {
 }
 
 struct Flown {
-  FlightEngine engine{setup()};
+  FlightEngine engine;
   double now{100};
   VehicleView view;
 
-  Flown() {
+  explicit Flown(FlightSetup given = setup()) : engine(std::move(given)) {
     view.position_m = k_place;
     view.heading_rad = 0.5;
     view.armed = view.in_air = true;
@@ -270,6 +271,58 @@ TEST(FlightEngine, ATurnGivesABearingAndAFirstGuess) {
   ASSERT_TRUE(clues.guess_m);
   EXPECT_NEAR(clues.guess_m->x(), k_place.x() + 25, 1.5) << "25 m to the east";
   EXPECT_NEAR(clues.guess_m->y(), k_place.y(), 5);
+}
+
+TEST(FlightEngine, EveryExpectedAnchorIsDoneOnlyWhenItIs) {
+  for (const bool second_is_expected : {false, true}) {
+    auto given = setup();
+    given.expected = {k_anchor};
+    if (second_is_expected) given.expected.push_back(NetworkId{0x6a22});
+    given.exit.max_iterations = 1;
+    given.exit.min_iterations = 1;
+    Flown f(std::move(given));
+    ways().at(Step::ranging)(f);
+    f.hear();
+    f.feed({Event::sampled});
+    f.here();
+    f.engine.tick(f.now, {});
+    EXPECT_TRUE(f.engine.state().anchors[0].done);
+    EXPECT_EQ(f.engine.state().step, second_is_expected ? Step::go_to_waypoint : Step::return_home)
+        << f.engine.state().reason;
+    EXPECT_NE(f.engine.state().reason.find(second_is_expected ? "every anchor heard so far is done"
+                                                              : "every expected anchor is done"),
+              std::string::npos)
+        << f.engine.state().reason;
+  }
+}
+
+// From afar RSS does not change with the heading by more than its noise: the search would be flown for
+// nothing.
+TEST(FlightEngine, ATurnThatSeesNoLobeIsFollowedByNoHeightSearchUntilItIsNearer) {
+  for (const bool lobes : {false, true}) {
+    Flown f;
+    ways().at(Step::turn)(f);
+    unsigned noise = 1;
+    while (f.engine.state().step == Step::turn) {
+      const double from = *f.view.heading_rad, to = *f.engine.state().heading_rad;
+      const double turn = std::remainder(to - from, 2 * std::numbers::pi);
+      for (int i = 0; i < 40; ++i) {
+        f.view.heading_rad = from + turn * i / 40;
+        f.here();
+        noise = noise * 1'103'515'245U + 12'345U;
+        const double db =
+            (noise >> 16U) % 100 / 50.0 - 1 + (lobes ? 6 * turn_profile(*f.view.heading_rad - 1) : 0);
+        f.engine.range(f.now, k_anchor, true, -85 + db, 60.0);
+      }
+      f.view.heading_rad = to;
+      f.here();
+      ASSERT_TRUE(f.engine.command(f.now, Event::arrived, ""));
+    }
+    EXPECT_EQ(f.engine.state().step, lobes ? Step::height_search : Step::ranging);
+    EXPECT_EQ(f.engine.state().anchors[0].no_lobe, !lobes);
+    f.engine.range(f.now, k_anchor, true, -75.0, 30.0);
+    EXPECT_FALSE(f.engine.state().anchors[0].no_lobe) << "half as far: the next search may see it";
+  }
 }
 
 }  // namespace

@@ -245,6 +245,22 @@ TEST(ProcedureMachine, TurnsInFourQuartersOnTheSpotThenSearchesTheHeight) {
   EXPECT_TRUE(step.state.anchors[0].has_height);
 }
 
+TEST(ProcedureMachine, FliesNoHeightSearchForAnAnchorThatTheTurnDidNotSee) {
+  const auto settings = two_waypoints();
+  State s = at(Step::search_anchors);
+  s.anchors = {heard(true, false)};
+  s.anchors[0].no_lobe = true;
+  EXPECT_EQ(advance(settings, s, {Event::heard, 1, {}, {}, {}}).state.step, Step::ranging);
+  s.anchors.push_back(heard(true, false));  // somebody else's can be seen
+  auto step = advance(settings, s, {Event::heard, 1, {}, {}, {}});
+  while (step.state.step == Step::height_search) {
+    for (auto& a : step.state.anchors) a.samples_here = 30;
+    step = advance(settings, step.state, {Event::arrived, 2, {}, {}, {}});
+  }
+  EXPECT_FALSE(step.state.anchors[0].has_height) << "its turn comes when it is nearer";
+  EXPECT_TRUE(step.state.anchors[1].has_height);
+}
+
 TEST(ProcedureMachine, RemembersAPointItCouldNotReachAndGoesBack) {
   State s = at(Step::find_next_point);
   s.target_m = {1, 1, 4};
