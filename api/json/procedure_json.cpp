@@ -44,7 +44,8 @@ Ordered anchors_json(const procedure::FlightEngine& engine) {
                    {"weight", procedure::weight_of(a)},
                    {"bearing_deg", bearing ? Ordered(degrees(bearing->bearing_rad)) : Ordered(nullptr)},
                    {"height_m", height ? Ordered(height->height_m) : Ordered(nullptr)},
-                   {"height_at_edge", height ? Ordered(height->at_edge) : Ordered(nullptr)}});
+                   {"height_at_edge", height ? Ordered(height->at_edge) : Ordered(nullptr)},
+                   {"no_lobe", a.no_lobe}});
   }
   return out;
 }
@@ -79,6 +80,7 @@ Ordered drone_json(const DroneStatus& d) {
           {"battery_age_s", finite_or_null(d.battery_age_s)},
           {"position_age_s", finite_or_null(d.position_age_s)},
           {"stale", d.stale},
+          {"streams_refused", d.streams_refused},
           {"ready_to_arm", or_null(d.ready_to_arm)},
           {"not_ready", d.not_ready},
           {"gps_fix", d.gps_fix},
@@ -215,6 +217,7 @@ Ordered stored_state(const procedure::State& s) {
     anchors.push_back({{"id", to_string(a.id)},
                        {"bearing", a.has_bearing},
                        {"height", a.has_height},
+                       {"no_lobe", a.no_lobe},
                        {"iterations", a.iterations},
                        {"waiting", a.waiting},
                        {"done", a.done},
@@ -266,6 +269,7 @@ std::optional<procedure::State> state_of(const nlohmann::json& j) {
       task.id = id.value();
       a.at("bearing").get_to(task.has_bearing);
       a.at("height").get_to(task.has_height);
+      task.no_lobe = a.value("no_lobe", false);
       a.at("iterations").get_to(task.iterations);
       a.at("waiting").get_to(task.waiting);
       a.at("done").get_to(task.done);

@@ -47,6 +47,8 @@ std::vector<ChecklistItem> make_checklist(const ChecklistFacts& f) {
     const auto& d = *f.drone;
     std::string stale;
     for (const auto& name : d.stale) stale += (stale.empty() ? "no telemetry for 5 s: " : ", ") + name;
+    for (const auto& refused : d.streams_refused)
+      if (!stale.empty()) stale += "; the autopilot refuses " + refused;
     out.push_back(item("drone", "The aircraft answers", d.connected && !d.failsafe && stale.empty(), false,
                        !d.connected     ? "no heartbeat"
                        : !stale.empty() ? stale

@@ -68,8 +68,9 @@ struct DroneStatus {
   double battery_age_s{std::numeric_limits<double>::infinity()};
   /// Telemetry that is older than 5 s although the autopilot is heard: nothing may be judged by it.
   std::vector<std::string> stale;
-  std::optional<bool> ready_to_arm{};  ///< the autopilot's own pre-arm checks
-  std::string not_ready;               ///< why not, in its words
+  std::vector<std::string> streams_refused;  ///< by the autopilot, when it was asked for them: name, result
+  std::optional<bool> ready_to_arm{};        ///< the autopilot's own pre-arm checks
+  std::string not_ready;                     ///< why not, in its words
   std::optional<double> battery_v{};
   int battery_warning{};  ///< the autopilot's own: 0 none, 1 low, 2 critical
   /// Values of the parameters that were asked for; those it does not know are absent.

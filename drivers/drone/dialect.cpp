@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::uint32_t px4(std::uint32_t main, std::uint32_t sub) { return main << 16U | sub << 24U; }
 
-// ArduCopter mode.h; PX4 px4_custom_mode.h. Hold is BRAKE for ArduPilot (stops at once) and AUTO/LOITER for
+// ArduCopter mode.h Mode::Number; PX4 commander/px4_custom_mode.h. Hold is BRAKE for ArduPilot (stops at once) and AUTO/LOITER for
 // PX4.
 constexpr Dialect k_ardupilot{Autopilot::ardupilot, "ArduPilot", 4, 17, 6, 9, 4, false, true, false};
 constexpr Dialect k_px4{Autopilot::px4, "PX4",     px4(4, 3), px4(4, 3), px4(4, 5),
@@ -56,6 +56,29 @@ Autopilot autopilot_of(std::int64_t heartbeat_autopilot) {
   if (heartbeat_autopilot == 3) return Autopilot::ardupilot;
   if (heartbeat_autopilot == 12) return Autopilot::px4;
   return Autopilot::unknown;
+}
+
+std::optional<int> stream_group(Autopilot autopilot, int message_id) {
+  if (autopilot != Autopilot::ardupilot) return std::nullopt;  // PX4 knows no groups
+  switch (message_id) {
+    case 1:       // SYS_STATUS
+    case 24:      // GPS_RAW_INT
+      return 2;   // EXTENDED_STATUS
+    case 33:      // GLOBAL_POSITION_INT
+      return 6;   // POSITION
+    case 147:     // BATTERY_STATUS
+      return 12;  // EXTRA3
+    default:
+      return std::nullopt;
+  }
+}
+
+std::string result_word(std::int64_t result) {
+  constexpr std::array<std::string_view, 5> k_words{"accepted", "temporarily rejected", "denied",
+                                                    "unsupported", "failed"};
+  if (result >= 0 && result < static_cast<std::int64_t>(k_words.size()))
+    return std::string(k_words[static_cast<std::size_t>(result)]);
+  return "result " + std::to_string(result);
 }
 
 ModeKind mode_kind(Autopilot autopilot, std::uint32_t custom_mode) {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "core/ports/drone.hpp"
@@ -24,6 +25,12 @@ struct Dialect {
 const Dialect& dialect_of(Autopilot autopilot);
 /// By the autopilot number of HEARTBEAT: 3 ArduPilot, 12 PX4.
 Autopilot autopilot_of(std::int64_t heartbeat_autopilot);
+
+/// MAV_DATA_STREAM group in which that message comes by REQUEST_DATA_STREAM, for an autopilot that refuses
+/// SET_MESSAGE_INTERVAL (ArduPilot before 4.0); none: it comes in no group.
+std::optional<int> stream_group(Autopilot autopilot, int message_id);
+/// Word of MAV_RESULT.
+std::string result_word(std::int64_t result);
 
 /// Parameters 2 and 3 of DO_SET_MODE.
 struct ModeParams {

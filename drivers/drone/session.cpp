@@ -179,7 +179,7 @@ void Session::tick(double now_s, std::int64_t unix_us) {
   }
   if (!heard_s_) return;
   if (now_s_ - *heard_s_ <= k_silent_s) {
-    if (auto question = telemetry_.question(now_s_)) {
+    if (auto question = telemetry_.question(autopilot_, now_s_)) {
       question->set("target_system", vehicle_.system).set("target_component", vehicle_.component);
       if (question->is("COMMAND_LONG"))
         send_command(*question, static_cast<int>(question->integer("command")), 0);

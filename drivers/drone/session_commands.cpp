@@ -14,23 +14,6 @@ using mavlink::Message;
 constexpr int k_take_off = 22, k_set_mode = 176, k_reposition = 192, k_arm = 400, k_interval = 511;
 constexpr double k_answers_late_s = 4, k_superseded_s = 3, k_lost_s = 10;
 
-std::string result_word(std::int64_t result) {
-  switch (result) {
-    case 0:
-      return "accepted";
-    case 1:
-      return "temporarily rejected";
-    case 2:
-      return "denied";
-    case 3:
-      return "unsupported";
-    case 4:
-      return "failed";
-    default:
-      return "result " + std::to_string(result);
-  }
-}
-
 }  // namespace
 
 void Session::send_command(const Message& message, int command, std::uint64_t number) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 namespace anchord::drone {
 namespace {
@@ -44,7 +45,7 @@ std::optional<double> Telemetry::home_msl_m() const {
 
 /// Another life of the autopilot: what it said in the last one is no longer so.
 void Telemetry::restarted() {
-  for (auto& s : streams_) s.heard_s = s.asked_s = -1e9, s.asked = 0;
+  for (auto& s : streams_) s.heard_s = s.asked_s = -1e9, s.asked = 0, s.result = 0, s.by_group = false;
   for (auto& [name, p] : parameters_) p = {};
   status_.home.reset();
   status_.battery.reset();
@@ -101,7 +102,7 @@ void Telemetry::hear_parameter(const Message& m, Autopilot autopilot) {
 void Telemetry::hear(const Message& m, Autopilot autopilot, double now_s) {
   if (!first_s_) first_s_ = now_s;
   for (auto& s : streams_) {
-    if (static_cast<int>(m.id()) == s.id) s.heard_s = now_s, s.asked = 0;
+    if (static_cast<int>(m.id()) == s.id) s.heard_s = now_s, s.asked = 0, s.result = 0;
   }
   if (m.is("HEARTBEAT")) {
     status_.armed = (m.integer("base_mode") & k_armed) != 0;
@@ -137,20 +138,33 @@ void Telemetry::ask_parameters(const std::vector<std::string>& names) {
   for (const auto& name : names) parameters_.try_emplace(name);
 }
 
-void Telemetry::answer(std::int64_t) { open_.reset(); }
+void Telemetry::answer(std::int64_t result) {
+  if (open_) streams_[*open_].result = result;
+  open_.reset();
+}
 
-std::optional<Message> Telemetry::question(double now_s) {
+std::optional<Message> Telemetry::question(Autopilot autopilot, double now_s) {
   if (open_ && now_s - question_s_ < k_answer_s) return std::nullopt;
   open_.reset();
   if (now_s - question_s_ < k_pace_s) return std::nullopt;
   for (std::size_t i = 0; i < streams_.size(); ++i) {
     auto& s = streams_[i];
     const bool never = s.asked_s < -1e8;  // it may come by itself, more slowly
+    // A refusal is answered at once, by the group if there is one.
+    const auto group = s.result != 0 ? stream_group(autopilot, s.id) : std::nullopt;
+    const bool now = group && !std::exchange(s.by_group, group.has_value());
     // What it does not have is not asked for for ever at the same pace.
     const double patience_s = s.asked < k_tries ? 2 : 10;
-    if ((!never && now_s - s.heard_s <= k_ask_again_s) || now_s - s.asked_s < patience_s) continue;
+    const bool comes = !never && now_s - s.heard_s <= k_ask_again_s;
+    if (comes || (!now && now_s - s.asked_s < patience_s)) continue;
     s.asked_s = question_s_ = now_s;
     ++s.asked;
+    if (group) {
+      Message m("REQUEST_DATA_STREAM");
+      m.set("req_stream_id", *group).set("start_stop", 1);
+      m.set("req_message_rate", std::max(1L, std::lround(1 / s.interval_s)));
+      return m;
+    }
     open_ = i;
     Message m("COMMAND_LONG");
     m.set("command", 511).set("param1", s.id).set_real("param2", s.interval_s * 1e6);
@@ -178,6 +192,7 @@ void Telemetry::fill(DroneStatus& out, double now_s) const {
   for (const auto& s : streams_) {
     const double since_s = std::max(s.heard_s, first_s_.value_or(now_s));
     if (s.watched && now_s - since_s > k_stale_s) out.stale.emplace_back(s.name);
+    if (s.result != 0) out.streams_refused.push_back(std::string(s.name) + ": " + result_word(s.result));
   }
   for (const auto& [name, p] : parameters_) {
     if (p.value)

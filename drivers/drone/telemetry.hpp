@@ -16,13 +16,14 @@ namespace anchord::drone {
 
 /// What the autopilot tells of itself, each stream with its age. A stream that is older than 3 s is asked for
 /// again (an autopilot that was restarted sends nothing but its heartbeat), one at a time so that the answers
-/// can be told apart; older than 5 s it is stale. Parameters are asked for one by one.
+/// can be told apart; one that is refused is shown, and asked for as part of its group where the autopilot
+/// has groups; older than 5 s it is stale. Parameters are asked for one by one.
 class Telemetry {
  public:
   Telemetry();
   void hear(const mavlink::Message& m, Autopilot autopilot, double now_s);
-  /// What to ask for now: COMMAND_LONG 511 or PARAM_REQUEST_READ, not addressed yet.
-  std::optional<mavlink::Message> question(double now_s);
+  /// What to ask for now: COMMAND_LONG 511, REQUEST_DATA_STREAM or PARAM_REQUEST_READ, not addressed yet.
+  std::optional<mavlink::Message> question(Autopilot autopilot, double now_s);
   void answer(std::int64_t result);  ///< to the newest 511
   void ask_parameters(const std::vector<std::string>& names);
 
@@ -44,6 +45,8 @@ class Telemetry {
     bool watched{false};  ///< flights are judged by it
     double heard_s{-1e9}, asked_s{-1e9};
     int asked{0};
+    std::int64_t result{0};  ///< MAV_RESULT of the newest answer
+    bool by_group{false};    ///< asked for by its group since it was refused
   };
   struct Parameter {
     std::optional<double> value{};

@@ -18,7 +18,7 @@ struct MessageRow {
 
 /// Every message that anchord reads or sends: MAVLink common set, wire order (base fields by falling size of
 /// their type). CRC_EXTRA is computed again from the names in message_test.cpp.
-inline constexpr std::array<MessageRow, 50> k_messages{{
+inline constexpr std::array<MessageRow, 51> k_messages{{
     {0, "HEARTBEAT", 50,
      "custom_mode:u32 type:u8 autopilot:u8 base_mode:u8 system_status:u8 mavlink_version:u8"},
     {1, "SYS_STATUS", 124,
@@ -62,6 +62,8 @@ inline constexpr std::array<MessageRow, 50> k_messages{{
      "chan6_raw:u16 chan7_raw:u16 chan8_raw:u16 chan9_raw:u16 chan10_raw:u16 chan11_raw:u16 "
      "chan12_raw:u16 chan13_raw:u16 chan14_raw:u16 chan15_raw:u16 chan16_raw:u16 chan17_raw:u16 "
      "chan18_raw:u16 chancount:u8 rssi:u8"},
+    {66, "REQUEST_DATA_STREAM", 148,
+     "req_message_rate:u16 target_system:u8 target_component:u8 req_stream_id:u8 start_stop:u8"},
     {73, "MISSION_ITEM_INT", 38,
      "param1:f param2:f param3:f param4:f x:i32 y:i32 z:f seq:u16 command:u16 target_system:u8 "
      "target_component:u8 frame:u8 current:u8 autocontinue:u8 | mission_type:u8"},

@@ -25,6 +25,7 @@ struct AutopilotOptions {
   double ready_s = 25;        ///< until the pre-arm checks pass, as on the real thing
   double cruise_mps = 8;      ///< its own speed in GUIDED until it is told another
   bool keeps_fences = true;   ///< false: refuses fence lists as unsupported
+  bool old_streams = false;   ///< ArduPilot before 4.0: knows groups of messages and no 511
   bool old_requests = false;  ///< asks for items by MISSION_REQUEST, as before MISSION_REQUEST_INT
   /// Without a station's heartbeat for so long it returns; none: its default, 5 s (FS_GCS_TIMEOUT) or 10 s
   /// (COM_DL_LOSS_T).
@@ -38,6 +39,7 @@ struct AutopilotOptions {
   Eigen::Vector3d gnss_offset_m{0, 0, 0};
   double baro_drift_mps = 0, baro_drift_max_m = 10;
   bool battery_failsafe = false;  ///< returns below 15 %, lands below 5 %
+  double sag_v = 0;               ///< its voltage is so much lower than its share of charge says
   std::uint64_t seed = 1;
   std::int64_t start_unix_us =
       1'777'888'800'000'000;  ///< its clock when it was switched on: signatures carry it
@@ -96,6 +98,7 @@ class AutopilotSim {
   void handle(const mavlink::Message& m, mavlink::Address from);
   int run_command(const mavlink::Message& m);
   int set_interval(const mavlink::Message& m);
+  void set_group(const mavlink::Message& m);
   int arm(bool on);
   int take_off(double param7);
   int reposition(const mavlink::Message& m);

@@ -37,6 +37,8 @@ void AutopilotSim::handle(const Message& m, mavlink::Address from) {
            with_yaw ? std::optional(m.real("yaw")) : std::nullopt);
   } else if (m.is("PARAM_REQUEST_READ")) {
     parameter(m);
+  } else if (m.is("REQUEST_DATA_STREAM")) {
+    set_group(m);
   } else {
     lists(m, from);
   }
@@ -81,7 +83,8 @@ int AutopilotSim::arm(bool on) {
   if (vehicle_.armed()) return k_accepted;
   const std::string why = !armable() ? "Mode not armable" : not_ready();
   if (!why.empty()) {
-    text(2, (px4 ? "Arming denied! " : "Arm: ") + why);
+    if (px4) text(2, "Arming denied: Resolve system health failures first");
+    text(2, (px4 ? "Preflight Fail: " : "Arm: ") + why);
     return px4 ? k_rejected_now : k_failed;
   }
   vehicle_.arm();
@@ -113,7 +116,7 @@ int AutopilotSim::reposition(const Message& m) {
   if (!m.is("COMMAND_INT") || m.integer("frame") != 5) return k_denied;
   if (!vehicle_.in_air()) return k_rejected_now;
   if (m.integer("param2") == 1) set_mode(d.guided);
-  if (custom_mode_ != d.guided) return k_rejected_now;
+  if (custom_mode_ != d.guided) return k_accepted;  // and flown to by nobody: that is the navigator's Loiter
   const double home_msl = options_.origin.height_m + home_m_.z() - options_.geoid_m;
   const double yaw = m.real("param4"), speed = m.real("param1");
   if (speed > 0) vehicle_.set_speed(speed);
@@ -122,7 +125,22 @@ int AutopilotSim::reposition(const Message& m) {
   return k_accepted;
 }
 
+/// Groups of ArduCopter's GCS_MAVLink: EXTENDED_STATUS, POSITION, EXTRA3.
+void AutopilotSim::set_group(const Message& m) {
+  if (options_.dialect == drone::Autopilot::px4 || m.integer("req_message_rate") <= 0) return;
+  const auto group = m.integer("req_stream_id");
+  const std::vector<int> ids = group == 2    ? std::vector<int>{1, 24}
+                               : group == 6  ? std::vector<int>{33}
+                               : group == 12 ? std::vector<int>{147}
+                                             : std::vector<int>{};
+  for (const int id : ids) {
+    intervals_[id] = m.integer("start_stop") == 1 ? 1 / m.real("req_message_rate") : 0;
+    next_s_[id] = now_s_;
+  }
+}
+
 int AutopilotSim::set_interval(const Message& m) {
+  if (options_.old_streams) return k_unsupported;
   const int id = static_cast<int>(m.integer("param1"));
   const bool heartbeat_of_px4 = id == 0 && options_.dialect == drone::Autopilot::px4;
   if (!heartbeat_of_px4) {

@@ -25,6 +25,7 @@ std::optional<Failsafe> failsafe_of(const std::string& word) {
 /// The options that are one number.
 double* number(AutopilotOptions& o, const std::string& word) {
   if (word == "drift") return &o.baro_drift_mps;
+  if (word == "sag") return &o.sag_v;
   if (word == "latency") return &o.latency_s;
   if (word == "acks_late") return &o.ack_delay_s;
   if (word == "acks_lost") return &o.ack_loss;
@@ -60,6 +61,8 @@ Result<void> happen(AutopilotSim& autopilot, std::string_view words) {
   } else if (what == "gnss" && in >> o.gnss_offset_m.x() >> o.gnss_offset_m.y() >> o.gnss_offset_m.z()) {
   } else if (what == "loss" && in >> value) {
     o.loss = o.loss_in = value;
+  } else if (what == "old_streams" && in >> value) {
+    o.old_streams = value > 0;
   } else if (what == "parameter" && in >> word >> value) {
     autopilot.set_parameter(word, value);
   } else if (what == "battery" && in >> value) {

@@ -57,7 +57,7 @@ Message AutopilotSim::telemetry_message(int id) const {
           .set("onboard_control_sensors_enabled", k_prearm_bit)
           .set("onboard_control_sensors_health", ready ? k_prearm_bit : 0)
           .set("battery_remaining", std::llround(vehicle_.battery() * 100))
-          .set("voltage_battery", std::llround(13'200 + 3'600 * vehicle_.battery()));
+          .set("voltage_battery", std::llround(13'200 + 3'600 * vehicle_.battery() - 1'000 * options_.sag_v));
     case 147:
       return Message("BATTERY_STATUS")
           .set("battery_remaining", std::llround(vehicle_.battery() * 100))

@@ -9,6 +9,11 @@ describe('a message of the procedure', () => {
     expect(procedure({ mission: 'm' })).toMatchObject({ step: 'ready', status: 'ready', target: null, drone: null, control: null, commands: [] });
   });
   it('never takes an unknown word for a state', () => expect(procedure({ mission: 'm', step: 'loop', status: '<b>', commands: [{ state: 'maybe' }] })).toMatchObject({ step: 'ready', status: 'ready', commands: [{ state: 'sent' }] }));
+  it('says whose height lies at an edge, and who is too far for a height search', () => {
+    const p = procedure({ mission: 'm', anchors: [{ network_id: '0x1', height_at_edge: true, no_lobe: false }, { network_id: '0x2', height_at_edge: null, no_lobe: true }, { network_id: '0x3' }] })!;
+    expect(p.anchors.map((a) => [a.at_edge, a.no_lobe])).toEqual([[true, false], [false, true], [false, false]]);
+  });
+  it('shows the telemetry that the autopilot refuses', () => expect(procedure({ mission: 'm', drone: { streams_refused: ['SYS_STATUS: unsupported'] } })!.drone!.streams_refused).toEqual(['SYS_STATUS: unsupported']));
   it('drops the choice of a decision whose candidates did not all arrive whole', () => {
     const c = { lon: 1, lat: 2, value: 3 };
     expect(grid({ mission: 'm', candidates: [c, c], chosen: 1 })!.chosen).toBe(1);

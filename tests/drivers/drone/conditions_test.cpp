@@ -1,32 +1,10 @@
 // What happened to real flights, in ArduPilot's and in PX4's dialect: the real session and procedure against
 // the simulated autopilot, faster than real time.
-#include <gtest/gtest.h>
-
-#include "air_rig.hpp"
+#include "conditions.hpp"
 
 namespace anchord::test {
 namespace {
 
-using drone::Autopilot;
-using procedure::Step;
-using Failsafe = sim::AutopilotSim::Failsafe;
-
-class Conditions : public ::testing::TestWithParam<Autopilot> {
- protected:
-  sim::AutopilotOptions options() const {
-    sim::AutopilotOptions o;
-    o.dialect = GetParam();
-    return o;
-  }
-  const drone::Dialect& dialect() const { return drone::dialect_of(GetParam()); }
-  /// A mode that nobody here commands: LOITER, POSCTL.
-  std::uint32_t pilots() const { return GetParam() == Autopilot::px4 ? 3U << 16U : 5U; }
-  static std::string kinds(const std::vector<AirRig::Wire>& wire) {
-    std::string out;
-    for (const auto& w : wire) out += std::to_string(w.command) + ' ';
-    return out;
-  }
-};
 INSTANTIATE_TEST_SUITE_P(Dialects, Conditions, ::testing::Values(Autopilot::ardupilot, Autopilot::px4),
                          [](const auto& given) { return std::string(drone::dialect_of(given.param).name); });
 
@@ -44,6 +22,16 @@ TEST_P(Conditions, AFlightAfterATakeOverFliesAndLandsAtAnEmptyBattery) {
   rig.autopilot.vehicle().set_battery(0.02);
   EXPECT_TRUE(rig.until_step(Step::landing, 5)) << rig.reason();
   EXPECT_TRUE(rig.run_until([&] { return rig.done() && !rig.autopilot.vehicle().armed(); }, 60));
+}
+
+// Its report came when the next flight was there already, and ended that.
+TEST_P(Conditions, WhatBecameOfTheLastTakeOffIsNotTheNextFlights) {
+  AirRig rig(options());
+  rig.run(7);
+  ASSERT_TRUE(rig.start());
+  rig.act("abort");
+  ASSERT_TRUE(rig.start());
+  EXPECT_TRUE(rig.until_step(Step::go_to_waypoint, 60)) << rig.reason();
 }
 
 TEST_P(Conditions, WhatWaitedWhileThePilotFlewIsNeverSent) {
@@ -151,6 +139,31 @@ TEST_P(Conditions, ALostRequestForAStreamIsMadeAgainAndAStaleOneIsSaid) {
   rig.autopilot.options().loss_in = 0.3;
   rig.run(12);
   EXPECT_TRUE(rig.session->status().stale.empty());
+}
+
+// ArduPilot before 4.0 knows no SET_MESSAGE_INTERVAL but groups of messages; PX4 has none.
+TEST_P(Conditions, ARefusedStreamIsShownAndAskedForByItsGroup) {
+  auto o = options();
+  o.old_streams = true;
+  AirRig rig(o);
+  rig.run(9);
+  auto status = rig.session->status();
+  const auto refused = [&](const std::string& name) {
+    return std::count(status.streams_refused.begin(), status.streams_refused.end(), name + ": unsupported");
+  };
+  EXPECT_EQ(refused("EXTENDED_SYS_STATE"), 1) << "it is in no group";
+  const bool groups = GetParam() == Autopilot::ardupilot;
+  EXPECT_EQ(refused("GLOBAL_POSITION_INT"), groups ? 0 : 1);
+  EXPECT_EQ(status.position_age_s < 1, groups);
+  EXPECT_EQ(status.battery.has_value(), groups);
+  EXPECT_EQ(status.gps_fix, groups ? 6 : 0);
+  // After a battery swap with newer firmware it is asked for by itself again.
+  rig.autopilot.options().old_streams = false;
+  ASSERT_TRUE(rig.autopilot.restart());
+  rig.run(20);
+  status = rig.session->status();
+  EXPECT_TRUE(status.streams_refused.empty()) << status.streams_refused.front();
+  EXPECT_TRUE(status.stale.empty()) << status.stale.front();
 }
 
 TEST_P(Conditions, TheAutopilotsOwnBatteryWarningCounts) {
@@ -467,6 +480,23 @@ TEST_P(Conditions, AServerThatWasKilledHoldsByItselfOnlyWhatItFlew) {
       rig.act("resume");
       rig.run(4);
       EXPECT_EQ(rig.autopilot.custom_mode(), dialect().guided);
+    }
+  }
+}
+
+// Between the first heartbeat after the restart and the next round of the procedure it was "not sent".
+TEST_P(Conditions, AnOrderRightAfterARestartReachesTheWire) {
+  for (const char* action : {"hold", "land"}) {
+    for (const int early : {0, 1}) {
+      AirRig rig(options());
+      ASSERT_TRUE(rig.fly());
+      rig.run(1);
+      rig.restart_server(2);
+      for (int i = 0; i < early; ++i) rig.step();
+      ASSERT_TRUE(rig.run_until([&] { return rig.session->status().connected; }, 3));
+      const auto before = rig.wire.size();
+      EXPECT_EQ(rig.act(action), "");
+      EXPECT_GT(rig.wire.size(), before) << action << ' ' << early;
     }
   }
 }

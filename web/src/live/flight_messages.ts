@@ -8,8 +8,8 @@ export type CommandState = 'sent' | 'accepted' | 'refused' | 'unconfirmed';
 
 export interface Spot { readonly lon: number; readonly lat: number; readonly height_m: number | null; readonly plan_m: Vec3 | null }
 export interface CommandMsg { readonly number: number; readonly action: string; readonly state: CommandState; readonly text: string; readonly by: string; readonly t_us: number }
-export interface AnchorTask { readonly anchor: string; readonly done: boolean; readonly why: string; readonly iterations: number; readonly at_edge: boolean }
-export interface DroneMsg { readonly connected: boolean; readonly silent_s: number | null; readonly gps_fix: number | null; readonly mode: string; readonly armed: boolean; readonly in_air: boolean; readonly taken_over: boolean; readonly failsafe: boolean; readonly battery: number | null; readonly above_home_m: number | null; readonly text: string; readonly autopilot: string; readonly peer: string; readonly link_signed: boolean; readonly frames_refused: number; readonly others: readonly OtherOnLink[] }
+export interface AnchorTask { readonly anchor: string; readonly done: boolean; readonly why: string; readonly iterations: number; readonly at_edge: boolean; readonly no_lobe: boolean }
+export interface DroneMsg { readonly connected: boolean; readonly silent_s: number | null; readonly gps_fix: number | null; readonly mode: string; readonly armed: boolean; readonly in_air: boolean; readonly taken_over: boolean; readonly failsafe: boolean; readonly battery: number | null; readonly above_home_m: number | null; readonly text: string; readonly autopilot: string; readonly peer: string; readonly link_signed: boolean; readonly frames_refused: number; readonly streams_refused: readonly string[]; readonly others: readonly OtherOnLink[] }
 export interface OtherOnLink { readonly sender: string; readonly system: number; readonly component: number; readonly kind: string; readonly frames: number; readonly silent_s: number | null }
 export interface ControlMsg { readonly holder: string; readonly since_us: number; readonly expires_us: number }
 export interface ProcedureMsg {
@@ -37,7 +37,7 @@ function spot(o: Record<string, unknown> | null): Spot | null {
 export function drone(v: unknown): DroneMsg | null {
   const d = obj(v);
   return d && { connected: d.connected === true, silent_s: num(d.silent_s), mode: str(d.mode), armed: d.armed === true, in_air: d.in_air === true, taken_over: d.taken_over === true, failsafe: d.failsafe === true, battery: num(d.battery), above_home_m: num(d.above_home_m), text: str(d.text), autopilot: str(d.autopilot), gps_fix: num(d.gps_fix),
-    peer: str(d.peer), link_signed: d.link_signed === true, frames_refused: count(d.frames_refused), others: list(d.others).map((o) => ({ sender: str(o.sender), system: count(o.system), component: count(o.component), kind: str(o.kind), frames: count(o.frames), silent_s: num(o.silent_s) })) };
+    peer: str(d.peer), link_signed: d.link_signed === true, frames_refused: count(d.frames_refused), streams_refused: Array.isArray(d.streams_refused) ? d.streams_refused.filter((s): s is string => typeof s === 'string') : [], others: list(d.others).map((o) => ({ sender: str(o.sender), system: count(o.system), component: count(o.component), kind: str(o.kind), frames: count(o.frames), silent_s: num(o.silent_s) })) };
 }
 export function procedure(v: unknown): ProcedureMsg | null {
   const o = obj(v);
@@ -47,7 +47,7 @@ export function procedure(v: unknown): ProcedureMsg | null {
     mission: str(o.mission), t_us: count(o.t_us), plan: str(o.plan) || null, plan_name: str(o.plan_name), plan_revision: count(o.plan_revision), mode: word(o.mode, ['auto', 'manual'] as const, 'auto'),
     status: word(o.status, ['ready', 'running', 'hold', 'return', 'landing', 'done', 'aborted'] as const, 'ready'), step: word(o.step, STEPS, 'ready'), reason: str(o.reason), in_step_s: num(o.in_step_s), step_limit_s: num(o.step_limit_s), elapsed_s: num(o.elapsed_s),
     waypoint: count(o.waypoint), n_waypoints: count(o.n_waypoints), part: count(o.part), k: count(o.k), iteration: count(o.iteration), target: target && { ...target, heading_deg: num(obj(o.target)?.heading_deg) }, distance_m: num(o.distance_m),
-    anchors: list(o.anchors).map((a) => ({ anchor: str(a.network_id), done: a.done === true, why: str(a.why), iterations: count(a.iterations), at_edge: a.height_at_edge === true })), battery_needed: num(o.battery_needed),
+    anchors: list(o.anchors).map((a) => ({ anchor: str(a.network_id), done: a.done === true, why: str(a.why), iterations: count(a.iterations), at_edge: a.height_at_edge === true, no_lobe: a.no_lobe === true })), battery_needed: num(o.battery_needed),
     alarm: alarm && { id: str(alarm.id), reaction: str(alarm.reaction), text: str(alarm.text) },
     drone: drone(o.drone),
     control: c && { holder: str(c.holder), since_us: count(c.since_us), expires_us: count(c.expires_us) },

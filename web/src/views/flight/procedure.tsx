@@ -35,7 +35,7 @@ export function Procedure() {
 function NotDone({ p }: { p: ProcedureMsg }) {
   const open = p.anchors.filter((a) => !a.done && a.why);
   if (!open.length) return null;
-  return <details class="notdone"><summary>{open.length} of {p.anchors.length} anchors not done</summary><ul>{open.map((a) => <li key={a.anchor}><b>{a.anchor}</b> {a.why}{a.at_edge && <span class="sub"> Its height lies at an end of the height search, perhaps beyond.</span>}</li>)}</ul></details>;
+  return <details class="notdone"><summary>{open.length} of {p.anchors.length} anchors not done</summary><ul>{open.map((a) => <li key={a.anchor}><b>{a.anchor}</b> {a.why}{a.at_edge && <span class="sub"> Its height lies at an end of the height search, perhaps beyond.</span>}{a.no_lobe && <span class="sub"> The turn saw no lobe of it from this far: no height search until it is nearer.</span>}</li>)}</ul></details>;
 }
 
 export function NextPoint() {

@@ -62,6 +62,7 @@ function Aircraft({ drone: d }: { drone: DroneMsg | null }) {
           <div><dt>Last seen</dt><dd>{d.silent_s === null || !d.autopilot ? 'never' : `${age(d.silent_s * 1000)} ago`}</dd></div>
         </dl>
         {d.frames_refused > 0 && <div class="callout caution" role="status"><b>{d.frames_refused} frames refused.</b> Unsigned, or signed with another key: somebody else sends on this link, or the autopilot has not this server&apos;s key.</div>}
+        {d.streams_refused.length > 0 && <div class="callout caution" role="status"><b>The autopilot refuses telemetry: {d.streams_refused.join(', ')}.</b> ArduPilot sends it from 4.0 on.</div>}
         {d.others.length > 0 && <Others others={d.others} />}
       </>}
     </section>
