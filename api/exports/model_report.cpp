@@ -44,6 +44,7 @@ std::string models_json(const std::vector<NamedModel>& models) {
                    {"code_version", i.code_version},
                    {"why", i.why},
                    {"metrics", metrics}});
+    if (!i.not_for_live.empty()) out.back()["not_for_live"] = i.not_for_live;
     if (model.classifier) out.back()["threshold"] = model.classifier->threshold;
   }
   return to_wire(nlohmann::ordered_json{{"models", out}}, 2) + "\n";
@@ -72,6 +73,7 @@ std::string model_text(const NamedModel& one) {
                 static_cast<unsigned long long>(i.seed), i.code_version.c_str());
   if (one.model.classifier) out += format("  threshold %.3f\n", one.model.classifier->threshold);
   for (const auto& [name, value] : i.metrics) out += format("  %-22s %.4f\n", name.c_str(), value);
+  if (!i.not_for_live.empty()) out += "  NOT FOR LIVE ranges: " + i.not_for_live + "\n";
   return out + "  why       " + i.why + "\n";
 }
 

@@ -208,7 +208,10 @@ Json cdf_json(const ml::TrainingOutcome& o) {
     items.push_back({{"method", name}, {"read", std::move(read)}, {"points", std::move(list)}});
   };
   curve("none", o.cdf_raw);
-  curve(o.model.info.method.c_str(), o.cdf_corrected);
+  // A mixture's manifest names its classifier as method; the curve is of the correction that was picked.
+  const auto picked = std::find_if(o.candidates.begin(), o.candidates.end(),
+                                   [](const ml::CandidateRow& row) { return row.picked; });
+  curve((picked != o.candidates.end() ? picked->name : o.model.info.method).c_str(), o.cdf_corrected);
   return {{"items", std::move(items)}};
 }
 

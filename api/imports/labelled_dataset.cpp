@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <numeric>
 #include <set>
 
 #include "api/imports/labelled_table.hpp"
@@ -55,6 +56,28 @@ std::string LabelledTable::where(std::size_t row) const {
   return file_names[file[row]] + ":" + std::to_string(line[row]);
 }
 
+namespace {
+
+/// How well each true range is known, where a column says it.
+std::vector<std::optional<double>> truth_sigmas_m(const LabelledTable& table,
+                                                  std::span<const std::size_t> rows) {
+  std::vector<std::optional<double>> out(rows.size());
+  for (const std::string_view name : {"truth_sigma_m", "truth_sd_m", "truth_accuracy_m"}) {
+    const auto at = std::ranges::find(table.raw_names, name);
+    if (at == table.raw_names.end()) continue;
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      const double value =
+          table
+              .raw[rows[k] * table.raw_names.size() + static_cast<std::size_t>(at - table.raw_names.begin())];
+      if (value >= 0 && value <= 100) out[k] = value;
+    }
+    break;
+  }
+  return out;
+}
+
+}  // namespace
+
 Result<ml::Dataset> dataset_from(const LabelledTable& table, const SetRequest& request,
                                  std::vector<std::size_t>& rows, Dropped& dropped) {
   if (request.need_label && !table.labelled())
@@ -106,6 +129,7 @@ Result<ml::Dataset> dataset_from(const LabelledTable& table, const SetRequest& r
   const auto true_m = [&](std::size_t i) { return table.true_range_m[i]; };
   if (table.has_truth() && std::all_of(rows.begin(), rows.end(), [&](auto i) { return true_m(i); }))
     for (const auto i : rows) out.bias_m.push_back(table.range_m[i] - *true_m(i));
+  ml::weigh_by_truth(out, truth_sigmas_m(table, rows));
   return out;
 }
 
@@ -127,8 +151,12 @@ DatasetTable dataset_rows(const LabelledTable& table, const std::string& campaig
     columns.push_back(static_cast<std::size_t>(at - table.raw_names.begin()));
     out.registers.emplace_back(name);
   }
+  std::vector<std::size_t> all(table.rows());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  const auto truth_sigma_m = truth_sigmas_m(table, all);
   for (std::size_t i = 0; i < table.rows(); ++i) {
     DatasetRow row;
+    row.truth_sigma_m = truth_sigma_m[i];
     const std::string file = i < table.file.size() ? files[table.file[i]] : "campaign";
     row.campaign = campaign.empty() ? file : campaign;
     row.environment = table.grouping == Grouping::file ? file : named(table.group_names, table.group[i]);

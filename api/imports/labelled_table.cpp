@@ -98,11 +98,10 @@ std::string joined(const std::vector<std::string_view>& cells, std::span<const s
   return out;
 }
 
-using CirShapes = std::unordered_map<std::string, nlos::CirShape>;
-
+/// Magnitudes by their row's key, until the ranging says where its first path is.
 struct CirTable {
   std::vector<std::string> join_names;
-  CirShapes shapes;
+  std::unordered_map<std::string, std::vector<float>> taps;
 };
 
 Result<CirTable> read_cir(const std::filesystem::path& path) {
@@ -139,8 +138,7 @@ Result<CirTable> read_cir(const std::filesystem::path& path) {
     magnitude.clear();
     for (const auto& [tap, column] : taps) magnitude.push_back(static_cast<float>(number(cells[column])));
     if (std::any_of(magnitude.begin(), magnitude.end(), [](float v) { return std::isnan(v); })) continue;
-    if (const auto shape = nlos::cir_shape(magnitude, std::nullopt))
-      out.shapes.emplace(joined(cells, joins), *shape);
+    out.taps.emplace(joined(cells, joins), magnitude);
   }
   return out;
 }
@@ -182,15 +180,15 @@ class Reader {
                           file_ + ":" + std::to_string(lines.line_number()) + ": " +
                               wrong_cell_count(cells.size(), header_.names.size(), separator));
       ++out_.rows_read;
-      const nlos::CirShape* shape = nullptr;
+      const std::vector<float>* taps = nullptr;
       if (cir) {
-        const auto found = cir->shapes.find(joined(cells, joins));
-        if (found != cir->shapes.end()) shape = &found->second;
+        const auto found = cir->taps.find(joined(cells, joins));
+        if (found != cir->taps.end()) taps = &found->second;
       }
-      if (cir && shape == nullptr)
+      if (cir && taps == nullptr)
         drop("no CIR in the CIR table", lines.line_number());
       else
-        take_row(cells, lines.line_number(), shape);
+        take_row(cells, lines.line_number(), taps);
     }
     return boost::outcome_v2::success();
   }
@@ -359,7 +357,8 @@ class Reader {
     return says_nothing(cell) ? " missing" : " is no number";
   }
 
-  void take_row(const std::vector<std::string_view>& cells, std::size_t line, const nlos::CirShape* shape) {
+  void take_row(const std::vector<std::string_view>& cells, std::size_t line,
+                const std::vector<float>* taps) {
     values_.clear();
     for (const auto cell : cells) values_.push_back(number(cell, decimal_comma_));
     const auto value = [&](const Names& names) {
@@ -391,7 +390,11 @@ class Reader {
     s.std_noise = value(k_std_noise), s.max_noise = value(k_max_noise);
     s.fp_index = value(k_fp_index);
     s.height_difference_m = value(k_height), s.heading_deg = value(k_heading);
-    if (shape) s.cir = *shape;
+    // The receiver's own first path where the file tells it: found again in magnitudes it lies 2 ns beside.
+    if (taps) {
+      s.cir = nlos::cir_shape(*taps, s.fp_index);
+      if (!s.cir) return drop("no first path in the CIR", line);
+    }
     out_.features.push_back(nlos::compute_features(s));
     for (const auto c : raw_columns_) out_.raw.push_back(c == k_none ? k_nan : values_[c]);
     out_.range_m.push_back(range);

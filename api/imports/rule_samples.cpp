@@ -41,7 +41,7 @@ std::vector<nlos::RuleSample> rule_samples(const LabelledTable& table) {
     s.rss_dbm = f.get(Feature::rx_dbm);
     s.kurtosis = f.get(Feature::kurtosis);
     s.mean_excess_delay_ns = f.get(Feature::mean_excess_delay_ns);
-    s.rms_delay_spread_ns = f.get(Feature::rms_delay_spread_ns);
+    s.rms_delay_spread_ns = f.get(Feature::rms_delay_spread_whole_ns);
     s.rx_minus_fp_db = f.get(Feature::rx_minus_fp_db);
     if (const auto found = spread.find(table.placement[i]); found != spread.end())
       s.range_sd_m = found->second;

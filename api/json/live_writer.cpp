@@ -73,6 +73,19 @@ class Object {
   std::string out_;
 };
 
+/// The models that gave the range its class or bias, by task; nothing where none did.
+void models(Object& out, const RangeModels& spoke) {
+  std::string list;
+  const auto put = [&list](const char* task, const std::optional<ModelId>& id) {
+    if (id) list.append(list.empty() ? "{\"" : ",\"").append(task).append("\":\"" + to_string(*id) + "\"");
+  };
+  put("nlos_id", spoke.nlos_id);
+  put("los_bias", spoke.los_bias);
+  put("nlos_bias", spoke.nlos_bias);
+  put("bias", spoke.bias);
+  if (!list.empty()) out.key("models").raw(list + "}");
+}
+
 void place(Object& out, const std::optional<Wgs84>& at) {
   out.key("lon").optional(at ? std::optional(at->lon_deg) : std::nullopt, 9);
   out.key("lat").optional(at ? std::optional(at->lat_deg) : std::nullopt, 9);
@@ -194,6 +207,7 @@ std::string live_range_json(const MissionId& mission, const RangeResult& result)
     out.raw("null");
   else
     out.text(result.refused);
+  if (result.model) models(out, result.model->models);
   return out.take();
 }
 

@@ -102,6 +102,7 @@ std::string write_model_artifact(const ml::Model& model) {
         {"metrics", metrics},
         {"code_version", i.code_version},
         {"why", i.why}}}};
+  if (!i.not_for_live.empty()) out["manifest"]["not_for_live"] = i.not_for_live;
   if (model.classifier) out["classifier"] = json_of(*model.classifier);
   if (model.regressor) {
     const auto& r = *model.regressor;

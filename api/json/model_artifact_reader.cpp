@@ -289,6 +289,7 @@ ml::ModelInfo info_of(Walk& w, const Json& root) {
       out.metrics.emplace_back(name, w.number_of(value, at + "/metrics/" + name, -k_huge, k_huge));
   out.code_version = w.text(j, at, "code_version");
   out.why = w.text(j, at, "why");
+  if (w.ok() && j.contains("not_for_live")) out.not_for_live = w.text(j, at, "not_for_live");
   return out;
 }
 
@@ -308,10 +309,11 @@ Result<ml::Model> read_model_artifact(std::string_view text) {
   ml::Model model;
   model.info = info_of(w, root);
   const std::size_t features = model.info.features.size();
-  if (w.ok() && model.info.feature_set != nlos::k_feature_set_version)
-    return make_error(Errc::unsupported, "feature set " + model.info.feature_set +
-                                             ", this program computes " +
-                                             std::string{nlos::k_feature_set_version});
+  for (const auto& name : model.info.features)
+    if (w.ok() && !nlos::means_the_same(model.info.feature_set, name))
+      return make_error(Errc::unsupported,
+                        name + " of the feature set " + model.info.feature_set + ", this program computes " +
+                            std::string{nlos::k_feature_set_version} + ": train the model again");
   if (w.ok() && root.contains("classifier"))
     model.classifier = classifier_of(w, root["classifier"], features);
   if (w.ok() && root.contains("regressor")) model.regressor = regressor_of(w, root["regressor"], features);

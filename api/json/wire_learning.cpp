@@ -188,6 +188,18 @@ Ordered gate_json(const GateReport& gate) {
       {"passed", gate.passed}, {"standing", gate.standing}, {"why", gate.why}, {"checks", std::move(checks)}};
 }
 
+Ordered range_models_json(const RangeModels& models) {
+  Ordered out = Ordered::object();
+  const auto put = [&out](const char* task, const std::optional<ModelId>& id) {
+    if (id) out[task] = to_string(*id);
+  };
+  put("nlos_id", models.nlos_id);
+  put("los_bias", models.los_bias);
+  put("nlos_bias", models.nlos_bias);
+  put("bias", models.bias);
+  return out;
+}
+
 Ordered judgement_json(const RangeJudgement& j) {
   const auto& v = j.verdict;
   Ordered out{{"los", maybe(v.los)},
@@ -195,7 +207,8 @@ Ordered judgement_json(const RangeJudgement& j) {
               {"bias_m", maybe(v.bias_m)},
               {"sigma_m", maybe(v.sigma_m)},
               {"outside_training", v.outside_training},
-              {"note", j.note.empty() ? Ordered(nullptr) : Ordered(j.note)}};
+              {"note", j.note.empty() ? Ordered(nullptr) : Ordered(j.note)},
+              {"models", range_models_json(j.models)}};
   out["likelihood"] = v.likelihood ? Ordered{{"p_los", v.likelihood->p_los},
                                              {"los_m", v.likelihood->los_m},
                                              {"los_sigma_m", v.likelihood->los_sigma_m},

@@ -27,6 +27,8 @@ nlohmann::ordered_json training_run_json(const TrainingRun& run, const DatasetRe
 nlohmann::ordered_json model_json(const StoredModel& model, bool active);
 nlohmann::ordered_json promotion_json(const Promotion& promotion);
 nlohmann::ordered_json gate_json(const GateReport& gate);
+/// Ids by task, of those that spoke.
+nlohmann::ordered_json range_models_json(const RangeModels& models);
 nlohmann::ordered_json judgement_json(const RangeJudgement& judgement);
 
 /// One sample to predict: diagnostics and features by name. What is wrong goes to `errors`.

@@ -1,5 +1,6 @@
 #include "api/learning/campaign_rows.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -8,6 +9,7 @@
 #include "api/imports/campaign.hpp"
 #include "api/json/reader.hpp"
 #include "api/routes/support.hpp"
+#include "core/base/sha256.hpp"
 #include "core/base/to_wire.hpp"
 
 namespace anchord::api {
@@ -63,6 +65,38 @@ Ordered report_json(const CampaignReport& report) {
           {"settings", std::move(settings)}};
 }
 
+/// What the rows are, however the file spelt them: a copy of a file is no second campaign. A single row
+/// without a time is not held against the ones before: a still link measures the same number twice.
+std::string digest_of(const std::vector<CampaignRow>& rows) {
+  const bool timed =
+      std::ranges::all_of(rows, [](const CampaignRow& row) { return row.sample.time.has_value(); });
+  if (timed || rows.size() < 2) return {};
+  Sha256 sha;
+  const auto text = [&sha](std::string_view value) {
+    sha.add(static_cast<std::uint64_t>(value.size()));
+    sha.add(value);
+  };
+  const auto number = [&sha](const std::optional<double>& value) {
+    sha.add(std::uint64_t{value.has_value()});
+    sha.add(value.value_or(0));
+  };
+  for (const auto& [truth, x] : rows) {
+    for (const auto* word : {&truth.setting, &truth.environment, &truth.material}) text(*word);
+    number(truth.los ? std::optional<double>(*truth.los ? 1 : 0) : std::nullopt);
+    for (const auto& value : {truth.distance_m, truth.heading_deg, truth.height_difference_m,
+                              truth.thickness_m, truth.truth_sigma_m})
+      number(value);
+    number(x.time ? std::optional(x.time->seconds()) : std::nullopt);
+    for (const auto& value : {std::optional(x.range_m), x.rx_dbm, x.fp_dbm, x.fp_amp1, x.fp_amp2, x.fp_amp3,
+                              x.cir_power, x.preamble_count, x.std_noise, x.max_noise, x.fp_index})
+      number(value);
+    sha.add(static_cast<std::uint64_t>(x.cir ? x.cir->re_im.size() : 0));
+    if (!x.cir) continue;
+    for (const auto tap : x.cir->re_im) sha.add(static_cast<double>(tap));
+  }
+  return sha.hex();
+}
+
 }  // namespace
 
 CampaignRows read_campaign_rows(const Request& request) {
@@ -106,6 +140,7 @@ CampaignRows read_campaign_rows(const Request& request) {
     x.cir = m.cir;
     out.rows.push_back(std::move(row));
   }
+  out.digest = digest_of(out.rows);
   return out;
 }
 

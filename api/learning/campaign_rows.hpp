@@ -12,6 +12,7 @@ namespace anchord::api {
 /// line. Query parameters name the truth of rows that tell none.
 struct CampaignRows {
   std::vector<CampaignRow> rows;
+  std::string digest;       ///< SHA-256 of the rows; empty where each has a time or there is but one
   std::string report_json;  ///< what was read, what was dropped and why, line by line for the first 100
 };
 /// Throws ProblemException: 415, 422.

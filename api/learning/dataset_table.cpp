@@ -22,6 +22,7 @@ constexpr std::array<std::string_view, 7> k_columns{"campaign", "environment",  
 constexpr std::string_view k_formula = "=+-@\t\r";
 /// Features that name the version in the first line, so that other formulas are never mixed in.
 constexpr std::string_view k_version_column = "feature_set";
+constexpr std::string_view k_truth_sigma = "truth_sigma_m";
 constexpr double k_nan = std::numeric_limits<double>::quiet_NaN();
 
 void put_number(std::string& out, double value) {
@@ -98,6 +99,7 @@ Error bad(std::size_t line, const std::string& what) {
 struct Column {
   std::string name;
   std::optional<Feature> feature{};
+  bool truth_sigma{false};
   std::size_t slot{};  ///< of the registers, which keep their own order
 };
 
@@ -107,13 +109,13 @@ Result<std::vector<Column>> columns_of(const std::vector<std::string>& header,
   std::set<std::string> seen;
   for (std::size_t c = k_columns.size() + 1; c < header.size(); ++c) {
     if (!seen.insert(header[c]).second) return bad(1, "column " + header[c] + " occurs twice");
-    out.push_back({header[c], nlos::feature_of(header[c]), 0});
+    out.push_back({header[c], nlos::feature_of(header[c]), header[c] == k_truth_sigma, 0});
   }
   for (const auto name : register_columns())
     if (seen.erase(std::string(name)) > 0) registers.emplace_back(name);
   for (auto& column : out) {
     const auto at = std::find(registers.begin(), registers.end(), column.name);
-    if (!column.feature && at == registers.end())
+    if (!column.feature && !column.truth_sigma && at == registers.end())
       return bad(1, "no feature is named " + to_utf8(column.name, 60));
     column.slot = static_cast<std::size_t>(at - registers.begin());
   }
@@ -177,9 +179,12 @@ std::string DatasetTable::csv() const {
     kept.push_back(c);
     out.append(",").append(registers[c]);
   }
+  const bool truth_sigma =
+      std::any_of(rows.begin(), rows.end(), [](const auto& row) { return row.truth_sigma_m.has_value(); });
+  if (truth_sigma) out.append(",").append(k_truth_sigma);
   out += '\n';
   for (const auto& row : rows) {
-    out += nlos::k_feature_set_version;
+    out += feature_set;
     for (const auto* text : {&row.campaign, &row.environment, &row.setting}) {
       out += ',';
       put_text(out, *text);
@@ -198,6 +203,8 @@ std::string DatasetTable::csv() const {
       out += ',';
       if (!std::isnan(row.registers[c])) put_number(out, row.registers[c]);
     }
+    if (truth_sigma) out += ',';
+    if (row.truth_sigma_m) put_number(out, *row.truth_sigma_m);
     out += '\n';
   }
   return out;
@@ -218,10 +225,16 @@ Result<DatasetTable> DatasetTable::parse(std::string_view text) {
     if (cells.size() == 1 && cells[0].empty()) continue;
     if (cells.size() != width)
       return bad(line, std::to_string(cells.size()) + " cells, the header has " + std::to_string(width));
-    if (cells[0] != nlos::k_feature_set_version)
-      return make_error(Errc::unsupported, "line " + std::to_string(line) + ": features of the version " +
-                                               to_utf8(cells[0], 60) + ", this program has " +
-                                               std::string(nlos::k_feature_set_version));
+    if (out.rows.empty()) out.feature_set = cells[0];
+    const auto other = std::find_if(columns.begin(), columns.end(),
+                                    [&](const Column& c) { return !nlos::means_the_same(cells[0], c.name); });
+    if (cells[0] != out.feature_set || other != columns.end())
+      return make_error(
+          Errc::unsupported,
+          "line " + std::to_string(line) + ": " +
+              (other != columns.end() ? other->name + " of the version " : "features of the version ") +
+              to_utf8(cells[0], 60) + ", this program has " + std::string(nlos::k_feature_set_version) +
+              ": freeze the data set again");
     DatasetRow row;
     row.campaign = plain(cells[1]);
     row.environment = plain(cells[2]);
@@ -247,7 +260,11 @@ Result<DatasetTable> DatasetTable::parse(std::string_view text) {
       if (cell.empty()) continue;
       const auto value = number(cell);
       if (!value) return bad(line, columns[c].name + " must be a number");
-      if (columns[c].feature)
+      if (columns[c].truth_sigma && !(*value >= 0 && *value <= 100))
+        return bad(line, "truth_sigma_m must be 0 to 100 m");
+      if (columns[c].truth_sigma)
+        row.truth_sigma_m = *value;
+      else if (columns[c].feature)
         row.features.set(*columns[c].feature, *value);
       else
         row.registers[columns[c].slot] = *value;
@@ -289,6 +306,7 @@ Result<std::vector<Source>> sources_of(const DatasetTable& table, const std::vec
     out.push_back({name, feature, static_cast<std::size_t>(column - table.registers.begin())});
   }
   for (std::size_t f = 0; names.empty() && f < k_feature_count; ++f) {
+    if (!nlos::live_ranges_have(static_cast<Feature>(f))) continue;
     std::size_t present = 0;
     for (const auto& row : table.rows) present += row.features.present.test(f) ? 1 : 0;
     // A feature that one row in a hundred lacks is worth that row.
@@ -300,6 +318,14 @@ Result<std::vector<Source>> sources_of(const DatasetTable& table, const std::vec
 }
 
 }  // namespace
+
+std::string not_for_live(const DatasetTable& table) {
+  std::size_t most = 1;
+  for (const auto& row : table.rows) most = std::max(most, row.repeats);
+  if (most == 1) return {};
+  return "its rows are means or medians of up to " + std::to_string(most) +
+         " rangings, a live range is one: train on a data set with aggregation none";
+}
 
 LearningWish wish_of(ml::Task task, const DatasetTable& table) {
   LearningWish wish;
@@ -326,6 +352,7 @@ Result<LearningRows> learning_rows(const DatasetTable& table, const LearningWish
   }
   std::map<std::string, std::uint32_t> groups, placements;
   std::set<std::string> held_out;
+  std::vector<std::optional<double>> truth_sigma_m;
   for (std::size_t i = 0; i < table.rows.size(); ++i) {
     const auto& row = table.rows[i];
     const auto drop = [&](const std::string& why) { ++out.dropped[why]; };
@@ -355,6 +382,7 @@ Result<LearningRows> learning_rows(const DatasetTable& table, const LearningWish
     if (wish.need_label) out.data.los.push_back(*row.los ? 1 : 0);
     if (wish.need_truth) out.data.bias_m.push_back(row.range_m() - *row.true_range_m);
     out.data.weight.push_back(1);
+    truth_sigma_m.push_back(row.truth_sigma_m);
     std::string group = place_name(row, wish.group_by);
     const auto side = sides[group];
     if (row.test && side.first) group += " (test)";
@@ -374,6 +402,7 @@ Result<LearningRows> learning_rows(const DatasetTable& table, const LearningWish
       why += (why.empty() ? ": " : ", ") + std::to_string(n) + " " + reason;
     return make_error(Errc::too_few_observations, "no row of the data set can be used" + why);
   }
+  ml::weigh_by_truth(out.data, truth_sigma_m);
   out.held_out.assign(held_out.begin(), held_out.end());
   return out;
 }

@@ -22,7 +22,8 @@ struct DatasetRow {
   std::optional<double> true_range_m{};
   std::size_t repeats{1};  ///< how many measurements it stands for
   nlos::FeatureVector features{};
-  std::vector<double> registers{};  ///< of DatasetTable::registers; NaN where it has none
+  std::vector<double> registers{};        ///< of DatasetTable::registers; NaN where it has none
+  std::optional<double> truth_sigma_m{};  ///< of true_range_m; absent: exact beside the radio
 
   double range_m() const { return features.get(nlos::Feature::range_m).value_or(0); }
 };
@@ -36,11 +37,12 @@ std::string place_name(const DatasetRow& row, Place place);
 /// Rows of a frozen data set.
 struct DatasetTable {
   std::vector<DatasetRow> rows;
-  std::vector<std::string> registers{};  ///< of register_columns(), in that order
+  std::vector<std::string> registers{};                  ///< of register_columns(), in that order
+  std::string feature_set{nlos::k_feature_set_version};  ///< a table of the version before stays what it was
 
   /// The canonical text: RFC 4180, features in the order of nlos::Feature and only those any row has, then
-  /// the registers, shortest digits that give the same double back. Texts that begin like a formula get an
-  /// apostrophe.
+  /// the registers and truth_sigma_m where any row has it, shortest digits that give the same double back.
+  /// Texts that begin like a formula get an apostrophe.
   std::string csv() const;
   /// errors: bad_frame (names the line), unsupported (another version of the features)
   static Result<DatasetTable> parse(std::string_view csv);
@@ -65,11 +67,16 @@ struct LearningRows {
   std::vector<std::string> held_out;  ///< names of the groups with test rows
 };
 struct LearningWish {
-  std::vector<std::string> features{};  ///< empty: those (nearly) all rows have
+  /// Empty: those (nearly) all rows have, and ranges of a flight can have.
+  std::vector<std::string> features{};
   bool need_label{}, need_truth{};
   std::optional<bool> only_los{};
   Place group_by{Place::environment};
 };
+/// Why a model of these rows misleads on single ranges: some are means or medians, whose noise is less than a
+/// range's. Empty where every row is one ranging.
+std::string not_for_live(const DatasetTable& table);
+
 /// What a task needs of the rows.
 LearningWish wish_of(ml::Task task, const DatasetTable& table);
 /// errors: not_found (feature), too_few_observations (nothing left)

@@ -63,8 +63,8 @@ Result<std::vector<DatasetRow>> rows_of_campaigns(const DatasetQuery& query, Cam
                                                      one.truth.environment) == query.environments.end())
           continue;
         rows.push_back({campaign.name, one.truth.environment, one.truth.setting, false, one.truth.los,
-                        one.truth.distance_m, 1, features_of(one.sample, one.truth),
-                        registers_of(one.sample)});
+                        one.truth.distance_m, 1, features_of(one.sample, one.truth), registers_of(one.sample),
+                        one.truth.truth_sigma_m ? one.truth.truth_sigma_m : campaign.truth_sigma_m});
         if (rows.size() > k_most_rows)
           return make_error(Errc::invalid_argument, "more than 500000 measurements: ask for fewer campaigns");
       }

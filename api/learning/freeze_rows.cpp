@@ -39,8 +39,13 @@ std::vector<DatasetRow> without_outliers(std::vector<DatasetRow> rows,
   return kept;
 }
 
+/// The spreads (the dissertation's Std among them) come with means as with medians.
 nlos::FeatureVector mean_of(const std::vector<nlos::FeatureVector>& all) {
   nlos::FeatureVector out;
+  const auto spreads = nlos::aggregate_at_rest(all);
+  for (const auto f :
+       {nlos::Feature::log_range_spread, nlos::Feature::log_fp_spread, nlos::Feature::log_rx_minus_fp_spread})
+    out.set(f, spreads.get(f));
   for (std::size_t f = 0; f < k_feature_count; ++f) {
     double sum = 0;
     bool every = true;

@@ -13,12 +13,12 @@ namespace anchord::api {
 
 enum class Aggregation : std::uint8_t {
   none,
-  mean,    ///< of each feature over the measurements of a setting (6.2.1)
-  median,  ///< the same, and with 3 measurements or more their spreads as features
+  mean,    ///< of each feature over the measurements of a setting (6.2.1), and from 3 on their spreads
+  median,  ///< the same with medians
 };
 
 struct FreezeOptions {
-  Aggregation aggregation{Aggregation::mean};
+  Aggregation aggregation{Aggregation::none};  ///< a live range is one ranging: so are the rows
   bool filter_faults{true};
   Place split_by{Place::environment};
   std::vector<std::string> test;  ///< names of places

@@ -9,7 +9,7 @@ constexpr std::size_t k_most_sets = 20, k_most_rows = 50'000;
 
 }  // namespace
 
-Result<KeptData> kept_data(DatasetStore& datasets, const ml::Model& model) {
+Result<KeptData> kept_data(DatasetStore& datasets, std::span<const std::string> learned) {
   KeptData out;
   BOOST_OUTCOME_TRY(const auto sets, datasets.datasets(k_most_sets, std::nullopt));
   for (const auto& set : sets) {
@@ -18,7 +18,7 @@ Result<KeptData> kept_data(DatasetStore& datasets, const ml::Model& model) {
     if (!parsed) continue;
     auto& rows = parsed.value().rows;
     const bool held_out = std::ranges::any_of(rows, [](const DatasetRow& row) { return row.test; });
-    if (!held_out && set.digest == model.info.data_digest) continue;
+    if (!held_out && std::ranges::find(learned, set.digest) != learned.end()) continue;
     if (held_out) std::erase_if(rows, [](const DatasetRow& row) { return !row.test; });
     if (out.table.rows.size() + rows.size() > k_most_rows) continue;
     for (auto& row : rows) {

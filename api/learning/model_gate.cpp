@@ -11,9 +11,6 @@ namespace {
 /// The same figure twice may differ in its last digit.
 constexpr double k_slack = 1e-9;
 
-/// Fewer rows tell nothing of a model that nobody here has seen.
-constexpr std::size_t k_least_rows = 10;
-
 struct Figures {
   std::optional<double> accuracy{}, fpr{}, mae_m{}, mae_raw_m{};
   std::optional<double> commonest{};  ///< share of the more frequent class: what always saying it would reach
@@ -30,19 +27,12 @@ Figures manifest_figures(const ml::Model& model) {
           std::nullopt};
 }
 
-std::optional<Figures> measured(const ml::Model& model, const DatasetTable& table, std::size_t least_rows) {
-  DatasetTable test;
-  for (const auto& row : table.rows)
-    if (row.test) test.rows.push_back(row);
-  if (test.rows.empty()) return std::nullopt;
+Figures figures_on(const ml::Model& model, const ml::Dataset& rows) {
   const auto task = model.info.task;
-  LearningWish wish{model.info.features, task != ml::Task::bias, task != ml::Task::nlos_id, {}, {}};
-  if (task == ml::Task::los_bias) wish.only_los = true;
-  if (task == ml::Task::nlos_bias) wish.only_los = false;
-  const auto rows = learning_rows(test, wish);
-  if (!rows || rows.value().source.size() < least_rows) return std::nullopt;
-  const auto e = ml::evaluate(model, rows.value().data);
   Figures out;
+  const auto narrowed = rows.with_features(model.info.features);
+  if (!narrowed) return out;  // the rows were chosen by the features of both models
+  const auto e = ml::evaluate(model, narrowed.value());
   if (e.confusion && task == ml::Task::nlos_id) {
     out.accuracy = e.confusion->accuracy();
     if (e.confusion->fp + e.confusion->tn > 0) out.fpr = e.confusion->fpr();
@@ -57,6 +47,37 @@ std::optional<Figures> measured(const ml::Model& model, const DatasetTable& tabl
   return out;
 }
 
+struct Compared {
+  Figures candidate{}, current{};
+};
+
+/// Both on the rows that have what either needs; nothing where there are too few of them.
+std::optional<Compared> measured(const ml::Model& candidate, const ml::Model* current, const GateRows& on) {
+  if (on.table == nullptr) return std::nullopt;
+  DatasetTable test;
+  test.registers = on.table->registers;
+  for (const auto& row : on.table->rows)
+    if (row.test && row.repeats == 1) test.rows.push_back(row);
+  if (test.rows.empty()) return std::nullopt;
+  const auto task = candidate.info.task;
+  LearningWish wish{candidate.info.features, task != ml::Task::bias, task != ml::Task::nlos_id, {}, {}};
+  if (current != nullptr)
+    for (const auto& name : current->info.features)
+      if (std::ranges::find(wish.features, name) == wish.features.end()) wish.features.push_back(name);
+  if (task == ml::Task::los_bias) wish.only_los = true;
+  if (task == ml::Task::nlos_bias) wish.only_los = false;
+  const auto rows = learning_rows(test, wish);
+  if (!rows || rows.value().source.size() < on.least_rows) return std::nullopt;
+  return Compared{figures_on(candidate, rows.value().data),
+                  current != nullptr ? figures_on(*current, rows.value().data) : Figures{}};
+}
+
+/// Cross-validated on the same rows and folds, so that what the manifests claim can be compared.
+bool same_rows(const ml::ModelInfo& a, const ml::ModelInfo& b) {
+  return a.data_digest == b.data_digest && a.rows == b.rows && a.group_by == b.group_by &&
+         a.folds == b.folds && a.seed == b.seed;
+}
+
 std::string figure(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.4f", value);
@@ -68,16 +89,18 @@ std::string figure(double value) {
 GateReport gate_of(const ml::Model& candidate, const ml::Model* current, const GateData& data) {
   Figures mine{}, theirs{};
   std::string basis = "none";
-  if (data.believe_manifest) {
-    mine = manifest_figures(candidate);
-    if (current != nullptr) theirs = manifest_figures(*current);
-    basis = "manifest";
+  for (const auto& on : data.rows) {
+    const auto both = measured(candidate, current, on);
+    if (!both) continue;
+    mine = both->candidate, theirs = both->current, basis = on.basis;
+    break;
   }
-  if (data.held_out != nullptr) {
-    const std::size_t least = data.believe_manifest ? 1 : k_least_rows;
-    const auto a = measured(candidate, *data.held_out, least);
-    const auto b = current ? measured(*current, *data.held_out, least) : std::optional<Figures>(Figures{});
-    if (a && b) mine = *a, theirs = *b, basis = data.basis;
+  bool apart = false;  // made here, but never measured on the rows the active one was
+  if (basis == "none" && data.believe_manifest) {
+    apart = current != nullptr && !same_rows(candidate.info, current->info);
+    mine = manifest_figures(candidate);
+    if (current != nullptr && !apart) theirs = manifest_figures(*current);
+    basis = "manifest";
   }
   GateReport out;
   const auto fail = [&](GateCheck& check, const std::string& why) {
@@ -92,11 +115,25 @@ GateReport gate_of(const ml::Model& candidate, const ml::Model* current, const G
                       " of the active model");
     out.checks.push_back(std::move(check));
   };
+  if (!candidate.info.not_for_live.empty()) {
+    GateCheck single{"single_ranges", std::nullopt, std::nullopt, true, "manifest"};
+    fail(single, "the model is not for live ranges: " + candidate.info.not_for_live);
+    out.checks.push_back(std::move(single));
+  }
+  if (apart) {
+    GateCheck rows{"same_rows", std::nullopt, std::nullopt, true, "none"};
+    fail(
+        rows,
+        "no rows of single ranges that neither was trained on can compare it with the active model: freeze a "
+        "data set with aggregation none that holds out places, or promote it with a reason");
+    out.checks.push_back(std::move(rows));
+  }
   if (basis == "none") {
     GateCheck evaluated{"evaluated", std::nullopt, std::nullopt, true, basis};
-    fail(evaluated, "the model is from elsewhere, and no data set of this server has " +
-                        std::to_string(k_least_rows) +
-                        " rows to evaluate it on: freeze one with other places, or promote it with a reason");
+    fail(evaluated,
+         "the model is from elsewhere, and no data set of this server has " +
+             std::to_string(k_least_kept_rows) +
+             " single ranges to evaluate it on: freeze one with other places, or promote it with a reason");
     out.checks.push_back(std::move(evaluated));
     return out;
   }

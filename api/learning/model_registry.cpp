@@ -35,6 +35,22 @@ std::shared_ptr<const ml::Model>* slot(ml::ModelSet& set, const std::string& tas
   return nullptr;
 }
 
+/// Takes those that no range of a flight can feed (promoted by an older program) out of `wanted`, and says
+/// which: another model of the same class would speak for them in silence.
+std::string leave_unfed(const ModelSource& source, std::map<std::string, ModelId>& wanted) {
+  std::string out;
+  std::erase_if(wanted, [&](const auto& one) {
+    const auto model = read_model(source, one.second, true);
+    if (!model) return false;  // loading it says why
+    const std::string lacking = lacking_in_flight(*model.value());
+    if (lacking.empty()) return false;
+    out += (out.empty() ? "" : "; ") + ("the promoted model of " + one.first) +
+           " is not in use: no range of a flight has " + lacking;
+    return true;
+  });
+  return out;
+}
+
 bool needs_cir(const ml::Model& model) {
   return std::ranges::any_of(model.info.features, [](const std::string& name) {
     const auto feature = nlos::feature_of(name);
@@ -83,6 +99,7 @@ Result<ModelRegistry::Active> load_models(const ModelSource& source,
     if (place == nullptr) return make_error(Errc::invalid_argument, "there is no task " + task);
     BOOST_OUTCOME_TRY(*place, read_model(source, id, vouched_only));
     out.models[task] = id;
+    out.ids[static_cast<std::size_t>((*place)->info.task)] = id;
     out.needs_cir |= needs_cir(**place);
   }
   BOOST_OUTCOME_TRY(out.predictor, ml::Predictor::make(std::move(set)));
@@ -125,10 +142,12 @@ Result<void> ModelRegistry::reload() {
     else if (one.model)
       wanted[one.task] = *one.model;
   }
+  const std::string unfed = leave_unfed(source_, wanted);
   auto loaded = load_models(source_, wanted, how, true);
   Active next;
   if (loaded) {
     next = std::move(loaded).value();
+    next.fault = unfed;
   } else {
     // A stored model of an older program: fly without it, and say so, rather than not at all.
     next.correction = how;
@@ -146,6 +165,7 @@ RangeJudgement ModelRegistry::judge(const Active& active, const nlos::FeatureVec
     return out;
   }
   out.verdict = active.predictor.judge(features, active.correction);
+  out.models = models_of(active, out.verdict);
   if (!out.verdict.p_los && !out.verdict.bias_m) {
     std::string lacking;
     const auto& set = active.predictor.models();
@@ -165,7 +185,17 @@ std::optional<RangeModel> judge_range(const ModelRegistry::Active& active, const
                     verdict.bias_m,
                     verdict.sigma_m,
                     verdict.outside_training,
-                    belief_of(verdict, active.correction)};
+                    belief_of(verdict, active.correction),
+                    models_of(active, verdict)};
+}
+
+RangeModels models_of(const ModelRegistry::Active& active, const ml::RangeVerdict& verdict) {
+  const auto spoke = [&](ml::Task task) -> std::optional<ModelId> {
+    if (!verdict.spoke.test(static_cast<std::size_t>(task))) return std::nullopt;
+    return active.ids[static_cast<std::size_t>(task)];
+  };
+  return {spoke(ml::Task::nlos_id), spoke(ml::Task::los_bias), spoke(ml::Task::nlos_bias),
+          spoke(ml::Task::bias)};
 }
 
 std::optional<RangeBelief> belief_of(const ml::RangeVerdict& verdict, ml::Correction how) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -18,6 +19,7 @@ namespace anchord::api {
 /// What the promoted models say about one range, or why they say nothing.
 struct RangeJudgement {
   ml::RangeVerdict verdict{};
+  RangeModels models{};
   std::string note;  ///< empty when classified: "no model is promoted", "lacks std_noise ..."
 };
 
@@ -28,7 +30,8 @@ class ModelRegistry {
 
   struct Active {
     ml::Predictor predictor{};
-    std::map<std::string, ModelId> models{};  ///< by task
+    std::map<std::string, ModelId> models{};      ///< by task
+    std::array<std::optional<ModelId>, 4> ids{};  ///< the same, by ml::Task
     ml::Correction correction{ml::Correction::weighted};
     bool needs_cir{false};
     std::string fault{};  ///< why a promoted model is not in use
@@ -52,6 +55,9 @@ class ModelRegistry {
 
 /// In the form a flight keeps with the range. Nothing where the models say nothing.
 std::optional<RangeModel> judge_range(const ModelRegistry::Active& active, const Range& range);
+
+/// Of those active, the models that gave a verdict its class or bias.
+RangeModels models_of(const ModelRegistry::Active& active, const ml::RangeVerdict& verdict);
 
 /// The same as a likelihood, of the error that is left once the correction is taken off. Nothing without a
 /// class and both biases, outside of what was trained (its density says nothing there), or where the

@@ -1,5 +1,8 @@
 #include "api/learning/range_features.hpp"
 
+#include <cmath>
+#include <numbers>
+
 namespace anchord::api {
 namespace {
 
@@ -7,6 +10,8 @@ void take_cir(const std::optional<Cir>& cir, nlos::DiagnosticSample& s) {
   if (!cir) return;
   nlos::CirOptions options;
   if (cir->dt_ps > 0) options.tap_ns = cir->dt_ps * 1e-3;
+  // STD_NOISE is of |h|, whose variance in noise (Rayleigh) is 1 - pi / 4 of its mean square.
+  if (s.std_noise) options.noise_rms = *s.std_noise / std::sqrt(1 - std::numbers::pi / 4);
   s.cir = nlos::cir_shape(std::span<const std::int16_t>(cir->re_im), cir->first_path_idx, options);
   if (!s.preamble_count) s.preamble_count = cir->preamble_count;
   if (!s.fp_index) s.fp_index = cir->first_path_idx;
@@ -20,7 +25,7 @@ nlos::FeatureVector features_of(const Range& range) {
   s.rx_dbm = range.rx_dbm ? range.rx_dbm : range.rss_dbm;
   s.fp_dbm = range.fp_dbm;
   s.std_noise = range.std_noise;
-  s.heading_deg = range.heading_deg;
+  // Its heading is a compass's; a campaign's heading_deg is the orientation a person noted (5.2).
   take_cir(range.cir, s);
   return nlos::compute_features(s);
 }
@@ -36,6 +41,36 @@ nlos::FeatureVector features_of(const CampaignSample& x, const GroundTruth& trut
   s.heading_deg = truth.heading_deg, s.height_difference_m = truth.height_difference_m;
   take_cir(x.cir, s);
   return nlos::compute_features(s);
+}
+
+std::string lacking_in_flight(const ml::Model& model) {
+  std::string out;
+  for (const auto& name : model.info.features) {
+    const auto feature = nlos::feature_of(name);
+    const char* why = "a column of its table alone";
+    if (feature && nlos::live_ranges_have(*feature)) continue;
+    if (feature) {
+      switch (nlos::needs_of(*feature)) {
+        case nlos::Needs::range:
+        case nlos::Needs::impulse:
+          break;
+        case nlos::Needs::record:
+          why = "of a whole impulse response, of which a flight reads a window";
+          break;
+        case nlos::Needs::registers:
+          why = "from registers that only campaigns keep";
+          break;
+        case nlos::Needs::label:
+          why = "noted by a person in campaigns";
+          break;
+        case nlos::Needs::rest:
+          why = "of several rangings at rest";
+          break;
+      }
+    }
+    out += (out.empty() ? "" : ", ") + name + " (" + why + ")";
+  }
+  return out;
 }
 
 }  // namespace anchord::api

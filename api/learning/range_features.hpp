@@ -1,5 +1,8 @@
 #pragma once
 
+#include <string>
+
+#include "core/ml/model.hpp"
 #include "core/nlos/features.hpp"
 #include "core/ports/learning_store.hpp"
 #include "core/types/range.hpp"
@@ -10,5 +13,9 @@ namespace anchord::api {
 /// model meets in the air what it was trained on.
 nlos::FeatureVector features_of(const Range& range);
 nlos::FeatureVector features_of(const CampaignSample& sample, const GroundTruth& truth);
+
+/// Features the model asks for that no range of a flight has, by name and with what would give them; empty
+/// where it can judge ranges.
+std::string lacking_in_flight(const ml::Model& model);
 
 }  // namespace anchord::api

@@ -46,7 +46,7 @@ Result<RuleReport> rules_of(const DatasetTable& table, std::string name, Place g
     s.rss_dbm = f.get(Feature::rx_dbm);
     s.kurtosis = f.get(Feature::kurtosis);
     s.mean_excess_delay_ns = f.get(Feature::mean_excess_delay_ns);
-    s.rms_delay_spread_ns = f.get(Feature::rms_delay_spread_ns);
+    s.rms_delay_spread_ns = f.get(Feature::rms_delay_spread_whole_ns);
     s.rx_minus_fp_db = f.get(Feature::rx_minus_fp_db);
     s.range_sd_m = spreads.at(setting_of(row)).sd_m();
     if (const auto spread = f.get(Feature::log_range_spread)) s.range_sd_m = std::exp(*spread) - 0.005;

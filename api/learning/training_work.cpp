@@ -29,10 +29,11 @@ Result<std::string> train_work(const Json& message, const std::stop_token& stop,
                       if (progress) progress({p.stage, p.stage_index, p.stage_count, p.fraction, p.detail});
                     }));
   auto& info = outcome.model.info;
-  info.feature_set = nlos::k_feature_set_version;
+  info.feature_set = table.feature_set;
   info.group_by = place_word(request.group_by);
   info.code_version = message.value("code_version", std::string());
   info.data_digest = dataset_digest(csv);
+  info.not_for_live = not_for_live(table);
   auto parts = training_parts(outcome, table, rows);
   nlohmann::ordered_json out{{"artifact", write_model_artifact(outcome.model)}};
   out["summary"] = std::move(parts.at("summary"));

@@ -80,7 +80,7 @@ Response import(LearningServices& l, const Request& request) {
   auto read = read_campaign_rows(request);
   CampaignStore::Appended done;
   if (!dry_run && !read.rows.empty()) {
-    done = value_or_problem(l.stores.campaigns.append(campaign.id, read.rows));
+    done = value_or_problem(l.stores.campaigns.append(campaign.id, read.rows, read.digest));
     l.services.audit(request, "campaign.import " + to_string(campaign.id) + " " +
                                   std::to_string(done.accepted) + " samples");
   }

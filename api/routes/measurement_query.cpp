@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "api/json/wire_learning.hpp"
 #include "api/routes/support.hpp"
 
 namespace anchord::api {
@@ -72,7 +73,8 @@ nlohmann::ordered_json predicted_json(const RangeJudgement& judgement) {
   };
   return {{"class", word(class_of(judgement))},
           {"p_los", maybe(judgement.verdict.p_los)},
-          {"bias_m", maybe(judgement.verdict.bias_m)}};
+          {"bias_m", maybe(judgement.verdict.bias_m)},
+          {"models", range_models_json(judgement.models)}};
 }
 
 }  // namespace anchord::api

@@ -9,6 +9,7 @@
 #include "api/learning/model_gate.hpp"
 #include "api/learning/model_signer.hpp"
 #include "api/learning/promotion_events.hpp"
+#include "api/learning/range_features.hpp"
 #include "api/routes/learning.hpp"
 #include "api/routes/support.hpp"
 #include "core/base/sha256.hpp"
@@ -205,26 +206,25 @@ std::optional<ml::Model> active_model(LearningServices& l, const Standing& now, 
   return std::move(model).value();
 }
 
-/// Made here: by the places its own run held out, or its own figures. From elsewhere: by what this server
-/// keeps.
+/// Made here: by the places its own run held out, else by what this server keeps, else its own figures. From
+/// elsewhere: by what this server keeps.
 GateReport judge(LearningServices& l, const Standing& now, const ModelSource::Artifact& candidate) {
   const auto model = value_or_problem(read_model_artifact(candidate.text));
   const auto current = active_model(l, now, candidate.stored.task);
   GateData data;
-  DatasetTable table;
-  if (candidate.standing == ModelStanding::made) {
-    if (candidate.stored.run) {
-      const auto run = value_or_problem(l.stores.runs.run(*candidate.stored.run));
-      auto parsed = DatasetTable::parse(value_or_problem(l.stores.datasets.csv(run.dataset)));
-      if (parsed) {
-        table = std::move(parsed).value();
-        data.held_out = &table;
-      }
+  data.believe_manifest = candidate.standing == ModelStanding::made;
+  DatasetTable own;
+  if (data.believe_manifest && candidate.stored.run) {
+    const auto run = value_or_problem(l.stores.runs.run(*candidate.stored.run));
+    if (auto parsed = DatasetTable::parse(value_or_problem(l.stores.datasets.csv(run.dataset)))) {
+      own = std::move(parsed).value();
+      data.rows.push_back({&own, "held_out", 1});
     }
-  } else {
-    table = value_or_problem(kept_data(l.stores.datasets, model)).table;
-    data = {&table, "kept_data", false};
   }
+  std::vector<std::string> learned{model.info.data_digest};
+  if (current) learned.push_back(current->info.data_digest);
+  const auto kept = value_or_problem(kept_data(l.stores.datasets, learned)).table;
+  data.rows.push_back({&kept, "kept_data", k_least_kept_rows});
   auto report = gate_of(model, current ? &*current : nullptr, data);
   report.standing = to_string(candidate.standing);
   return report;
@@ -237,6 +237,11 @@ Response promote(LearningServices& l, const Request& request) {
   const auto reason = optional_reason(request);
   const auto before = standing_for(l, request);
   if (before.has(stored)) throw_problem(422, "state", "the model is active already");
+  const auto model = value_or_problem(read_model_artifact(candidate.text));
+  if (const auto lacking = lacking_in_flight(model); !lacking.empty())
+    throw_problem(422, "unsupported",
+                  "no range of a flight can feed the model: none has " + lacking +
+                      "; train without, or use it with predict and evaluate");
   // One that live ranges cannot be judged by would ground the others with it.
   if (const auto able =
           load_models(l.models.source(), {{stored.task, stored.id}}, ml::Correction::weighted, false);

@@ -79,6 +79,8 @@ std::string Dataset::digest() const {
   for (const double value : x) sha.add(value);
   for (const auto value : los) sha.add(static_cast<std::uint64_t>(value));
   for (const double value : bias_m) sha.add(value);
+  if (std::ranges::any_of(weight, [](double w) { return w != 1; }))
+    for (const double value : weight) sha.add(value);
   for (const auto value : group) sha.add(static_cast<std::uint64_t>(value));
   for (const auto value : placement) sha.add(static_cast<std::uint64_t>(value));
   return sha.hex();
@@ -102,6 +104,32 @@ std::vector<std::size_t> range_outliers(std::span<const double> range_m,
   return out;
 }
 
+void weigh_by_truth(Dataset& data, std::span<const std::optional<double>> truth_sigma_m) {
+  constexpr double k_least_scatter_m = 0.01;  // of the radio itself, however alike the biases look
+  if (!data.has_truth() ||
+      std::ranges::none_of(truth_sigma_m, [](const auto& s) { return s.value_or(0) > 0; }))
+    return;
+  for (const bool is_los : {true, false}) {
+    std::vector<std::size_t> rows;
+    std::vector<double> biases;
+    for (std::size_t i = 0; i < data.rows(); ++i) {
+      if ((!data.labelled() || data.los[i] != 0) != is_los) continue;
+      rows.push_back(i);
+      biases.push_back(data.bias_m[i]);
+    }
+    if (rows.empty()) continue;
+    const double middle = median(biases);
+    for (double& b : biases) b = std::abs(b - middle);
+    const double scatter_m = std::max(k_least_scatter_m, 1.4826 * median(biases));
+    double sum = 0;
+    for (const std::size_t i : rows) {
+      const double sigma_m = truth_sigma_m[i].value_or(0);
+      sum += data.weight[i] = scatter_m * scatter_m / (scatter_m * scatter_m + sigma_m * sigma_m);
+    }
+    for (const std::size_t i : rows) data.weight[i] *= static_cast<double>(rows.size()) / sum;
+  }
+}
+
 Dataset aggregate_placements(const Dataset& data, bool mean) {
   const auto middle = [mean](const std::vector<double>& v) { return mean ? mean_of(v) : median(v); };
   std::vector<std::size_t> firsts;
@@ -122,7 +150,6 @@ Dataset aggregate_placements(const Dataset& data, bool mean) {
     }
     if (data.has_truth()) out.bias_m[at] = middle(values);
     if (data.labelled()) out.los[at] = 2 * los > rows.size() ? 1 : 0;
-    out.weight[at] = 1;
     ++at;
   }
   return out;
@@ -140,7 +167,7 @@ Dataset thin_placements(const Dataset& data, std::size_t per_placement) {
     const std::size_t n = std::min(per_placement, rows.size());
     for (std::size_t j = 0; j < n; ++j) {
       taken.push_back(rows[(2 * j + 1) * rows.size() / (2 * n)]);
-      weight.push_back(1.0 / static_cast<double>(n));
+      weight.push_back(data.weight[taken.back()] / static_cast<double>(n));
     }
   }
   Dataset out = data.subset(taken);

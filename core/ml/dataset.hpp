@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -44,15 +45,19 @@ std::vector<std::size_t> range_outliers(std::span<const double> range_m,
                                         std::span<const std::uint32_t> placement, double mads = 8,
                                         double floor_m = 0.5);
 
+/// Rows whose truth is known worse weigh less: by s^2 / (s^2 + sigma^2), s the scatter of the biases of their
+/// class, which no truth explains; each class keeps its mean weight. No sigma: the truth counts as exact.
+void weigh_by_truth(Dataset& data, std::span<const std::optional<double>> truth_sigma_m);
+
 /// One row per placement: the median (or the mean, as 6.2.1 does) of each feature and of the bias; class by
-/// majority; weight 1.
+/// majority; weight of its first row.
 Dataset aggregate_placements(const Dataset& data, bool mean = false);
 
 /// Name of a place, or its number where it has none.
 std::string place_name(const Dataset& data, std::uint32_t group);
 
-/// At most `per_placement` rows of each placement, evenly spread over it, each weighing 1 / their number:
-/// every placement counts alike.
+/// At most `per_placement` rows of each placement, evenly spread over it, each weighing its own weight /
+/// their number: every placement counts alike.
 Dataset thin_placements(const Dataset& data, std::size_t per_placement);
 
 /// Fold 0..k-1 of each row: whole groups, shuffled by the seed, largest first into the lightest fold. Fewer

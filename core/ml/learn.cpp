@@ -133,12 +133,14 @@ Result<Picked> pick_classifier(const Dataset& data, const LearnOptions& options,
   return Picked{candidates[best], std::move(results[best]), why};
 }
 
-// Threshold with at most `max_fpr` of the out-of-fold NLOS rows on the LOS side.
+// Threshold with at most `max_fpr` of the out-of-fold NLOS rows on the LOS side. A cap only ever tightens:
+// where the usual threshold keeps it already, nothing is given away.
 double threshold_for(std::span<const double> p_los, std::span<const std::uint8_t> los, double max_fpr) {
+  constexpr double k_usual = 0.5;
   double threshold = 0.995;
   for (const auto& point : roc(p_los, los))
     if (point.fpr <= max_fpr && point.threshold < 1) threshold = std::min(threshold, point.threshold);
-  return threshold;
+  return std::max(threshold, k_usual);
 }
 
 }  // namespace

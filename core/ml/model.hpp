@@ -120,6 +120,9 @@ struct ModelInfo {
   std::uint64_t seed{};
   std::string code_version{};
   std::string why{};  ///< how the method was picked
+  /// Why it misleads on single ranges, as live ones are: trained on means or medians. Empty: it may judge
+  /// them.
+  std::string not_for_live{};
   std::vector<std::pair<std::string, double>>
       metrics{};  ///< of the cross-validation, in the order of the table
 };

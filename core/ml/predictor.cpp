@@ -21,6 +21,8 @@ double furthest_sd(const Scaler& scaler, std::span<const double> x) {
 
 constexpr double k_outside_sd = 3;
 
+constexpr std::size_t bit(Task task) { return static_cast<std::size_t>(task); }
+
 }  // namespace
 
 BiasDensity RangeLikelihood::density() const {
@@ -33,10 +35,11 @@ Result<Predictor::Slot> Predictor::slot_of(const Model* model, Task first, Task 
   if (model->info.task != first && model->info.task != other)
     return make_error(Errc::invalid_argument, "a model of task " + std::string{task_name(model->info.task)} +
                                                   " cannot serve as " + std::string{task_name(first)});
-  if (!model->info.feature_set.empty() && model->info.feature_set != nlos::k_feature_set_version)
-    return make_error(Errc::unsupported, "the model was trained on " + model->info.feature_set +
-                                             ", this build computes " +
-                                             std::string{nlos::k_feature_set_version});
+  for (const auto& name : model->info.features)
+    if (!model->info.feature_set.empty() && !nlos::means_the_same(model->info.feature_set, name))
+      return make_error(Errc::unsupported, "the model was trained on " + name + " of " +
+                                               model->info.feature_set + ", this build computes " +
+                                               std::string{nlos::k_feature_set_version} + ": train it again");
   if (model->info.features.size() > k_max_features)
     return make_error(Errc::invalid_argument, "the model asks for more than 64 features");
   for (const auto& name : model->info.features) {
@@ -83,6 +86,7 @@ RangeVerdict Predictor::judge(const nlos::FeatureVector& features, Correction ho
     out.p_los = slot->model->classifier->p_los(x);
     out.los = *out.p_los >= slot->model->classifier->threshold;
     out.outside_training = furthest_sd(slot->model->classifier->scaler, x) > k_outside_sd;
+    out.spoke.set(bit(slot == &bias_ ? Task::bias : Task::nlos_id));
   }
   struct OneClass {
     double bias_m{}, sigma_m{};
@@ -103,7 +107,9 @@ RangeVerdict Predictor::judge(const nlos::FeatureVector& features, Correction ho
                           (1 - p) * (nlos->sigma_m * nlos->sigma_m + nlos->bias_m * nlos->bias_m);
     out.bias_m = mean;
     out.sigma_m = std::sqrt(std::max(1e-6, second - mean * mean));
+    out.spoke.set(bit(Task::los_bias)).set(bit(Task::nlos_bias));
   } else if (const auto* m = bias_.model; m != nullptr && gather(bias_, features, x)) {
+    out.spoke.set(bit(Task::bias));
     if (m->mixture && m->classifier) {
       const double p = out.p_los.value_or(m->classifier->p_los(x));
       const auto density = density_of(*m->mixture, p, x);
@@ -122,6 +128,7 @@ RangeVerdict Predictor::judge(const nlos::FeatureVector& features, Correction ho
       out.outside_training |= furthest_sd(m->regressor->scaler, x) > k_outside_sd;
     }
   } else if (los && !nlos_bias_.model) {
+    out.spoke.set(bit(Task::los_bias));
     out.bias_m = out.p_los ? *out.p_los * los->bias_m : los->bias_m;
     out.sigma_m = los->sigma_m;
   }

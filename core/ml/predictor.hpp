@@ -1,5 +1,6 @@
 #pragma once
 
+#include <bitset>
 #include <memory>
 #include <optional>
 #include <span>
@@ -35,6 +36,7 @@ struct RangeVerdict {
   std::optional<double> bias_m{};   ///< subtract from the measured range
   std::optional<double> sigma_m{};  ///< of what is left
   std::optional<RangeLikelihood> likelihood{};
+  std::bitset<4> spoke{};   ///< by Task: the models that gave the class or the bias
   bool outside_training{};  ///< a feature lies beyond 3 sd of the training rows: the correction was shrunk
 };
 

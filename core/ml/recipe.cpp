@@ -187,7 +187,7 @@ std::vector<double> placement_weights(const Dataset& data) {
   std::map<std::uint32_t, double> count;
   for (const auto id : data.placement) count[id] += 1;
   std::vector<double> weight;
-  for (const auto id : data.placement) weight.push_back(1 / count[id]);
+  for (std::size_t i = 0; i < data.rows(); ++i) weight.push_back(data.weight[i] / count[data.placement[i]]);
   return weight;
 }
 

@@ -122,6 +122,46 @@ Recipe ranking_forest(const Dataset& data, const TrainingSpec& spec) {
   return r;
 }
 
+// What the pick is compared by: negative log-likelihood of a mixture, else the loss of its row in the table.
+double loss_of(const Learned& learned) {
+  if (learned.model.mixture) return learned.nll;
+  for (const auto& row : learned.table)
+    if (row.picked) return row.loss;
+  return learned.nll;
+}
+
+// Log losses and likelihoods closer than this are noise on a few hundred placements, MAE by its share.
+constexpr double k_tie_log_loss = 0.01, k_tie_share = 0.01;
+
+// The features that the filter kept compete with those of the pick: with fewer features, a tie is enough. The
+// winner is what `learned` becomes, and its manifest says which it was.
+Result<void> try_selection(const Dataset& data, LearnOptions options, const std::vector<ForwardStep>& steps,
+                           Learned& learned) {
+  options.features.clear();
+  for (const auto& step : steps)
+    if (step.kept) options.features.push_back(step.feature);
+  const std::size_t before = learned.model.info.features.size(), after = options.features.size();
+  if (after == 0 || after >= before) return boost::outcome_v2::success();
+  BOOST_OUTCOME_TRY(auto fewer, learn(data, options));
+  const double whole = loss_of(learned), less = loss_of(fewer);
+  const bool by_share = !learned.model.mixture && options.task != Task::nlos_id;
+  const bool followed = less <= whole + (by_share ? k_tie_share * whole : k_tie_log_loss);
+  for (auto& row : fewer.folds) row.candidate += learned.table.size();
+  for (auto& row : followed ? learned.table : fewer.table) row.picked = false;
+  learned.table.insert(learned.table.end(), fewer.table.begin(), fewer.table.end());
+  learned.folds.insert(learned.folds.end(), fewer.folds.begin(), fewer.folds.end());
+  std::array<char, 160> text{};
+  std::snprintf(text.data(), text.size(), "; the feature filter keeps %zu of %zu: loss %.3f against %.3f, %s",
+                after, before, less, whole, followed ? "so the model uses them" : "so it is not followed");
+  if (followed) {
+    fewer.table = std::move(learned.table);
+    fewer.folds = std::move(learned.folds);
+    learned = std::move(fewer);
+  }
+  learned.model.info.why += text.data();
+  return boost::outcome_v2::success();
+}
+
 }  // namespace
 
 Result<PlaceSplit> split_places(const Dataset& data, const std::vector<std::string>& held_out,
@@ -205,7 +245,7 @@ Result<void> TrainingSpec::check_size(std::size_t rows) const {
   std::array<char, 200> text{};
   std::snprintf(text.data(), text.size(),
                 "%.0f settings x %zu folds on %zu rows are %.2g row fits, more than the %.0e that end within "
-                "hours: take a smaller grid, fewer folds, or a data set of means or medians",
+                "hours: take a smaller grid, fewer folds, or a data set of fewer rows",
                 settings, folds, rows, row_fits, k_most_row_fits);
   return make_error(Errc::invalid_argument, text.data());
 }
@@ -232,14 +272,6 @@ Result<TrainingOutcome> train(const Dataset& data, const TrainingSpec& spec, std
                        spec.search, spec.grid,    spec.max_fpr,  run,        {}};
   options.progress = [&reporter](double share, const std::string& detail) { reporter.tell(share, detail); };
   BOOST_OUTCOME_TRY(auto learned, learn(train_set, options));
-  out.model = std::move(learned.model);
-  out.candidates = std::move(learned.table);
-  out.class_candidates = std::move(learned.class_table);
-  out.folds = std::move(learned.folds);
-  out.fold_places = places_of_folds(train_set, learned.fold);
-  out.predictions = predictions_of(data, split, learned);
-  add_curves(train_set, learned, spec, out);
-
   const bool classification = spec.task == Task::nlos_id || (spec.task == Task::bias && data.labelled());
   if (spec.importance) {
     reporter.enter("importance");
@@ -257,7 +289,15 @@ Result<TrainingOutcome> train(const Dataset& data, const TrainingSpec& spec, std
     for (const auto& one : ranking) order.push_back(one.feature);
     BOOST_OUTCOME_TRY(out.selection, forward_filter(train_set, learned.picked, order, learned.fold,
                                                     classification, 0.002, run));
+    BOOST_OUTCOME_TRY(try_selection(train_set, options, out.selection, learned));
   }
+  out.model = std::move(learned.model);
+  out.candidates = std::move(learned.table);
+  out.class_candidates = std::move(learned.class_table);
+  out.folds = std::move(learned.folds);
+  out.fold_places = places_of_folds(train_set, learned.fold);
+  out.predictions = predictions_of(data, split, learned);
+  add_curves(train_set, learned, spec, out);
   reporter.enter("test");
   if (!split.test.empty()) add_test(data, split, out);
   if (run.cancelled()) return make_error(Errc::canceled, "cancelled");

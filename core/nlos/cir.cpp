@@ -6,6 +6,9 @@
 namespace anchord::nlos {
 namespace {
 
+/// PRF 16 MHz has 992 taps, 64 MHz 1016.
+constexpr std::size_t k_whole_record = 992;
+
 struct Complex {
   const std::int16_t* re_im;
   double power(std::size_t k) const {
@@ -51,10 +54,28 @@ std::optional<double> find_first_path(const Taps& taps, std::size_t n, std::size
 }
 
 template <class Taps>
+WholeRecordShape whole_shape(const Taps& taps, std::size_t n, double first_path, double tap_ns) {
+  double m1 = 0, m2 = 0, m3 = 0, m4 = 0, sum_t = 0, sum_tt = 0;
+  for (std::size_t k = 0; k < n; ++k) {
+    const double power = taps.power(k), h = std::sqrt(power), t = static_cast<double>(k) - first_path;
+    m1 += h, m2 += power, m3 += power * h, m4 += power * power;
+    sum_t += power * t, sum_tt += power * t * t;
+  }
+  const auto count = static_cast<double>(n);
+  const double mu = m1 / count, var = m2 / count - mu * mu;
+  const double mu4 = m4 / count - 4 * mu * m3 / count + 6 * mu * mu * m2 / count - 3 * mu * mu * mu * mu;
+  const double mean_tap = sum_t / m2;
+  return {var > 1e-12 * (m2 / count) ? mu4 / (var * var) : 0.0, mean_tap * tap_ns,
+          std::sqrt(std::max(0.0, sum_tt / m2 - mean_tap * mean_tap)) * tap_ns};
+}
+
+template <class Taps>
 std::optional<CirShape> shape_of(const Taps& taps, std::size_t n, std::optional<double> first_path_idx,
                                  const CirOptions& o) {
   const bool has_noise = n > o.noise_end && o.noise_end > o.noise_begin;
-  const double noise_power = has_noise ? mean_power(taps, o.noise_begin, o.noise_end) : 0.0;
+  const double noise_power = has_noise     ? mean_power(taps, o.noise_begin, o.noise_end)
+                             : o.noise_rms ? *o.noise_rms * *o.noise_rms
+                                           : 0.0;
   if (!first_path_idx) {
     if (!has_noise) return std::nullopt;
     first_path_idx =
@@ -64,8 +85,8 @@ std::optional<CirShape> shape_of(const Taps& taps, std::size_t n, std::optional<
   const double fp = *first_path_idx;
   if (!(fp >= 0) || !(fp < static_cast<double>(n))) return std::nullopt;
   const auto fp_tap = static_cast<std::size_t>(fp);
-  const std::size_t begin = fp_tap - std::min(fp_tap, o.window_before);
-  const std::size_t end = std::min(n, fp_tap + o.window_after + 1);
+  if (fp_tap < o.window_before || fp_tap + o.window_after >= n) return std::nullopt;
+  const std::size_t begin = fp_tap - o.window_before, end = fp_tap + o.window_after + 1;
 
   double sum_q = 0, sum_qt = 0, sum_qtt = 0,
          early = 0;                       // q: power above the noise, t: taps from the first path
@@ -108,6 +129,7 @@ std::optional<CirShape> shape_of(const Taps& taps, std::size_t n, std::optional<
   shape.noise_rms = std::sqrt(noise_power);
   for (std::size_t k = fp_tap + 1; k <= fp_tap + 3 && k < n; ++k) shape.first_path_energy += taps.power(k);
   for (std::size_t k = end; k < n; ++k) all += taps.power(k);
+  if (has_noise && !(n < k_whole_record)) shape.whole = whole_shape(taps, n, fp, o.tap_ns);
   shape.energy = std::max(0.0, all - noise_power * static_cast<double>(n - begin));
   return shape;
 }

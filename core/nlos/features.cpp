@@ -30,7 +30,10 @@ constexpr std::array<std::string_view, k_feature_count> k_names{"range_m",
                                                                 "heading_deg",
                                                                 "log_range_spread",
                                                                 "log_fp_spread",
-                                                                "log_rx_minus_fp_spread"};
+                                                                "log_rx_minus_fp_spread",
+                                                                "kurtosis_whole",
+                                                                "mean_excess_delay_whole_ns",
+                                                                "rms_delay_spread_whole_ns"};
 
 // 5 % quantile of 20 log10(s / sqrt N) of the register in three public sets; of CIR noise taps it lies 10 dB
 // higher.
@@ -116,6 +119,62 @@ std::optional<Feature> feature_of(std::string_view name) {
   return static_cast<Feature>(found - k_names.begin());
 }
 
+bool means_the_same(std::string_view version, std::string_view name) {
+  if (version == k_feature_set_version) return true;
+  if (version != k_feature_set_before) return false;
+  for (const auto windowed : {Feature::kurtosis, Feature::mean_excess_delay_ns, Feature::rms_delay_spread_ns,
+                              Feature::early_energy, Feature::peak_delay_ns})
+    if (feature_name(windowed) == name) return false;
+  return true;
+}
+
+Needs needs_of(Feature feature) {
+  switch (feature) {
+    case Feature::range_m:
+    case Feature::range_db:
+    case Feature::rx_dbm:
+    case Feature::fp_dbm:
+    case Feature::rx_minus_fp_db:
+    case Feature::rx_free_space_db:
+    case Feature::fp_free_space_db:
+      return Needs::range;
+    case Feature::noise_excess_db:
+    case Feature::total_snr_db:
+    case Feature::preamble_db:
+    case Feature::fp_index:
+    case Feature::kurtosis:
+    case Feature::mean_excess_delay_ns:
+    case Feature::rms_delay_spread_ns:
+    case Feature::early_energy:
+    case Feature::peak_delay_ns:
+      return Needs::impulse;
+    case Feature::fp_snr_db:
+    case Feature::fp_shape12_db:
+    case Feature::fp_shape32_db:
+    case Feature::max_noise_db:
+      return Needs::registers;
+    case Feature::kurtosis_whole:
+    case Feature::mean_excess_delay_whole_ns:
+    case Feature::rms_delay_spread_whole_ns:
+      return Needs::record;
+    case Feature::height_difference_m:
+    case Feature::heading_deg:
+      return Needs::label;
+    case Feature::log_range_spread:
+    case Feature::log_fp_spread:
+    case Feature::log_rx_minus_fp_spread:
+      return Needs::rest;
+    case Feature::count:
+      break;
+  }
+  return Needs::label;
+}
+
+bool live_ranges_have(Feature feature) {
+  const Needs needs = needs_of(feature);
+  return needs == Needs::range || needs == Needs::impulse;
+}
+
 void FeatureVector::set(Feature feature, std::optional<double> value) {
   if (!value || !std::isfinite(*value)) return;
   values[static_cast<std::size_t>(feature)] = *value;
@@ -156,6 +215,11 @@ FeatureVector compute_features(const DiagnosticSample& s) {
     out.set(Feature::rms_delay_spread_ns, s.cir->rms_delay_spread_ns);
     out.set(Feature::early_energy, s.cir->early_energy);
     out.set(Feature::peak_delay_ns, s.cir->peak_delay_ns);
+    if (const auto& whole = s.cir->whole) {
+      out.set(Feature::kurtosis_whole, whole->kurtosis);
+      out.set(Feature::mean_excess_delay_whole_ns, whole->mean_excess_delay_ns);
+      out.set(Feature::rms_delay_spread_whole_ns, whole->rms_delay_spread_ns);
+    }
   }
   return out;
 }

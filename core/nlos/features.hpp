@@ -3,6 +3,7 @@
 #include <array>
 #include <bitset>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string_view>
@@ -17,24 +18,29 @@ namespace anchord::nlos {
 
 /// Raised when a formula changes, so that a model is never fed numbers that mean something else. New names at
 /// the end do not raise it.
-inline constexpr std::string_view k_feature_set_version = "anchord-features-1";
+inline constexpr std::string_view k_feature_set_version = "anchord-features-2";
+
+/// The one before: its shapes of the impulse response were over 126 taps, of which a flight has 50.
+/// Everything else is as it was.
+inline constexpr std::string_view k_feature_set_before = "anchord-features-1";
 
 enum class Feature : std::size_t {
-  range_m,               ///< R as measured
-  range_db,              ///< 20 log10 R
-  rx_dbm,                ///< P_RX, eq 5.7
-  fp_dbm,                ///< P_FP, eq 5.6
-  rx_minus_fp_db,        ///< D = P_RX - P_FP
-  noise_excess_db,       ///< E = 20 log10(s / sqrt N) - 7.4: a level meter that goes on where P_RX saturates
-  fp_snr_db,             ///< S = 20 log10(max F / s)
-  total_snr_db,          ///< T = 10 log10(C 2^17) - 20 log10 s
-  preamble_db,           ///< L = 20 log10 N
-  fp_shape12_db,         ///< 20 log10(F1 / F2)
-  fp_shape32_db,         ///< 20 log10(F3 / F2)
-  rx_free_space_db,      ///< X = P_RX + 20 log10 R
-  fp_free_space_db,      ///< P_FP + 20 log10 R
-  fp_index,              ///< first-path tap
-  max_noise_db,          ///< 20 log10(max noise / s)
+  range_m,           ///< R as measured
+  range_db,          ///< 20 log10 R
+  rx_dbm,            ///< P_RX, eq 5.7
+  fp_dbm,            ///< P_FP, eq 5.6
+  rx_minus_fp_db,    ///< D = P_RX - P_FP
+  noise_excess_db,   ///< E = 20 log10(s / sqrt N) - 7.4: a level meter that goes on where P_RX saturates
+  fp_snr_db,         ///< S = 20 log10(max F / s)
+  total_snr_db,      ///< T = 10 log10(C 2^17) - 20 log10 s
+  preamble_db,       ///< L = 20 log10 N
+  fp_shape12_db,     ///< 20 log10(F1 / F2)
+  fp_shape32_db,     ///< 20 log10(F3 / F2)
+  rx_free_space_db,  ///< X = P_RX + 20 log10 R
+  fp_free_space_db,  ///< P_FP + 20 log10 R
+  fp_index,          ///< first-path tap
+  max_noise_db,      ///< 20 log10(max noise / s)
+  // Over the window of CirOptions, the taps -5 to +44 about the first path, less the noise:
   kurtosis,              ///< eq 5.3
   mean_excess_delay_ns,  ///< eq 5.4
   rms_delay_spread_ns,   ///< eq 5.5
@@ -45,10 +51,30 @@ enum class Feature : std::size_t {
   log_range_spread,        ///< ln(0.005 + sd R) over a window at rest
   log_fp_spread,           ///< ln(0.01 + (q90 - q10) / 2.56) of P_FP
   log_rx_minus_fp_spread,  ///< same of D
+  kurtosis_whole,          ///< eq 5.3 to 5.5 over every tap of a whole record, as printed
+  mean_excess_delay_whole_ns,
+  rms_delay_spread_whole_ns,
   count
 };
 
 inline constexpr std::size_t k_feature_count = static_cast<std::size_t>(Feature::count);
+
+/// The least a source must give for a feature to exist.
+enum class Needs : std::uint8_t {
+  range,      ///< a range of a flight: distance, levels, STD_NOISE
+  impulse,    ///< a range of a flight with its CIR and preamble count
+  record,     ///< the whole CIR, noise and all: a flight reads a window
+  registers,  ///< what only campaigns and recordings keep: amplitudes, MAX_NOISE
+  label,      ///< what a person noted of the place; a flight's heading is of another zero
+  rest,       ///< repeats at rest: a mean or median of several rangings
+};
+Needs needs_of(Feature feature);
+
+/// Whether some range of a flight can have it; a model that asks for another can never judge one.
+bool live_ranges_have(Feature feature);
+
+/// Whether features of that name mean the same in another version as here.
+bool means_the_same(std::string_view version, std::string_view feature_name);
 
 std::string_view feature_name(Feature feature);
 std::optional<Feature> feature_of(std::string_view name);

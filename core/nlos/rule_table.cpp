@@ -1,6 +1,7 @@
 #include "core/nlos/rule_table.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/nlos/cir.hpp"
 
@@ -8,8 +9,8 @@ namespace anchord::nlos {
 namespace {
 
 constexpr std::array<std::string_view, k_rule_count> k_names{
-    "rss",           "kurtosis", "mean_excess_delay", "rms_delay",
-    "rms_delay_far", "range_sd", "first_path",        "weighted"};
+    "rss",          "kurtosis", "mean_excess_delay", "rms_delay", "rms_delay_far",
+    "rms_delay_95", "range_sd", "first_path",        "weighted"};
 
 std::size_t at(Rule rule) { return static_cast<std::size_t>(rule); }
 
@@ -21,6 +22,7 @@ std::optional<double> value_of(Rule rule, const RuleSample& s) {
     case Rule::mean_excess_delay:
       return s.mean_excess_delay_ns;
     case Rule::rms_delay:
+    case Rule::rms_delay_95:
       return s.rms_delay_spread_ns;
     case Rule::rms_delay_far:
       return s.distance_m && *s.distance_m > k_far_m ? s.rms_delay_spread_ns : std::nullopt;
@@ -37,8 +39,9 @@ std::optional<double> value_of(Rule rule, const RuleSample& s) {
 }
 
 constexpr std::array k_threshold_rules{Rule::kurtosis,      Rule::mean_excess_delay, Rule::rms_delay,
-                                       Rule::rms_delay_far, Rule::range_sd,          Rule::first_path};
-// The far variant looks at what rms_delay looks at: it has a column, but no second voice.
+                                       Rule::rms_delay_far, Rule::rms_delay_95,      Rule::range_sd,
+                                       Rule::first_path};
+// The variants look at what rms_delay looks at: they have a column, but no second voice.
 constexpr std::array k_voices{Rule::rss,       Rule::kurtosis, Rule::mean_excess_delay,
                               Rule::rms_delay, Rule::range_sd, Rule::first_path};
 
@@ -77,6 +80,8 @@ RuleSet printed_rules() {
   const ThresholdRule rms{k_rms_delay_rule.threshold * tap_ns, k_rms_delay_rule.los_above};
   out.threshold[at(Rule::rms_delay)] = rms;
   out.threshold[at(Rule::rms_delay_far)] = rms;
+  out.threshold[at(Rule::rms_delay_95)] = {std::sqrt(k_rms_delay_squared_rule.threshold) * tap_ns,
+                                           k_rms_delay_squared_rule.los_above};
   out.threshold[at(Rule::range_sd)] = k_range_sd_rule_m;
   out.threshold[at(Rule::first_path)] = k_first_path_rule_db;
   for (const Rule rule : {Rule::rss, Rule::rms_delay, Rule::range_sd, Rule::first_path})
@@ -95,8 +100,11 @@ RuleSet fit_rules(std::span<const RuleSample> samples) {
     for (const auto& s : samples)
       if (const auto value = value_of(rule, s)) (s.los ? los : nlos).push_back(*value);
     if (los.empty() || nlos.empty()) continue;
-    const bool by_share = rule == Rule::rms_delay || rule == Rule::rms_delay_far;
-    const auto fitted = by_share ? fit_threshold_for_nlos_share(nlos, false, 0.90) : fit_threshold(los, nlos);
+    const bool by_share =
+        rule == Rule::rms_delay || rule == Rule::rms_delay_far || rule == Rule::rms_delay_95;
+    const double share = rule == Rule::rms_delay_95 ? 0.95 : 0.90;
+    const auto fitted =
+        by_share ? fit_threshold_for_nlos_share(nlos, false, share) : fit_threshold(los, nlos);
     if (fitted) out.threshold[at(rule)] = fitted.value();
   }
   const auto row = judge_rules(out, samples);

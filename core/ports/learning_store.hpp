@@ -37,8 +37,10 @@ class CampaignStore {
     std::size_t accepted{}, duplicates{};
   };
   /// All or none. A setting is known by its name; its first row's truth stands (conflict names a row that
-  /// says otherwise). Rows with a time are unique by (setting, time, seq).
-  virtual Result<Appended> append(const CampaignId& id, const std::vector<CampaignRow>& rows) = 0;
+  /// says otherwise). Rows with a time are unique by (setting, time, seq). Rows of an import whose digest the
+  /// campaign has are all duplicates; an empty digest is of no import.
+  virtual Result<Appended> append(const CampaignId& id, const std::vector<CampaignRow>& rows,
+                                  std::string_view import_digest = {}) = 0;
 
   struct Setting {
     GroundTruth truth;

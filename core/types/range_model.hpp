@@ -2,9 +2,15 @@
 
 #include <optional>
 
+#include "core/base/ids.hpp"
 #include "core/types/range_belief.hpp"
 
 namespace anchord {
+
+/// The models that gave a range its class or its bias, by their task.
+struct RangeModels {
+  std::optional<ModelId> nlos_id{}, los_bias{}, nlos_bias{}, bias{};
+};
 
 /// What the promoted models say of a range: made from the measurement when it is used, never stored with it.
 struct RangeModel {
@@ -14,6 +20,7 @@ struct RangeModel {
   std::optional<double> sigma_m{};  ///< of what is left
   bool outside_training{false};
   std::optional<RangeBelief> belief{};  ///< of the error that is left once bias_m is off
+  RangeModels models{};
 };
 
 }  // namespace anchord

@@ -12,7 +12,7 @@ namespace {
 
 struct DatasetArguments {
   DataOptions data;
-  std::string out, file, digest, campaign, aggregate{"mean"};
+  std::string out, file, digest, campaign, aggregate{"none"};
   std::vector<std::string> held_out;
   bool keep_outliers{false};
   double held_out_share{0};
@@ -70,7 +70,10 @@ void add_dataset_command(CLI::App& app, int& exit_code) {
   auto* built =
       dataset->add_subcommand("build", "Aggregate, split by whole places, look for leaks, take the digest");
   add_data_options(*built, a->data);
-  built->add_option("--aggregate", a->aggregate, "none, mean or median of each measurement point")
+  built
+      ->add_option("--aggregate", a->aggregate,
+                   "none (single ranges, as flights have them), or mean or median of each "
+                   "measurement point: models of these are not for live ranges")
       ->check(CLI::IsMember({"none", "mean", "median"}))
       ->capture_default_str();
   built->add_option("--hold-out", a->held_out, "Places for the final test")->delimiter(',');

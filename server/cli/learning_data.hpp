@@ -41,7 +41,7 @@ struct FrozenRows {
   ml::Dataset data{};
   api::RowReport report{};
   std::vector<std::string> held_out{};  ///< the data set's own test places
-  std::string group_by{}, digest{};
+  std::string group_by{}, digest{}, not_for_live{}, feature_set{};
 };
 /// What a task needs of a frozen data set, as the service takes it: nothing is computed or dropped again.
 Result<FrozenRows> rows_for(const DataOptions& options, const FrozenFile& file, ml::Task task,

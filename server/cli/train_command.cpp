@@ -66,6 +66,8 @@ struct Gathered {
   api::RowReport report;
   std::vector<std::string> held_out;  // a frozen data set's own test places
   std::string digest;                 // of a frozen data set
+  std::string not_for_live{};         // why its rows are not as live ranges are
+  std::string feature_set{nlos::k_feature_set_version};
 };
 
 Result<Gathered> gather_table(const TrainArguments& a, ml::Task task) {
@@ -91,7 +93,8 @@ Result<Gathered> gather(const TrainArguments& a, ml::Task task) {
   BOOST_OUTCOME_TRY(const auto frozen, read_frozen(a.data));
   if (frozen) {
     BOOST_OUTCOME_TRY(auto rows, rows_for(a.data, *frozen, task, a.features));
-    return Gathered{std::move(rows.data), std::move(rows.report), std::move(rows.held_out), rows.digest};
+    return Gathered{std::move(rows.data), std::move(rows.report), std::move(rows.held_out),
+                    rows.digest,          rows.not_for_live,      rows.feature_set};
   }
   BOOST_OUTCOME_TRY(auto out, gather_table(a, task));
   if (out.data.labelled() && (task == ml::Task::los_bias || task == ml::Task::nlos_bias)) {
@@ -119,7 +122,7 @@ int train(const TrainArguments& a) {
   if (const auto able = asked.check(); !able) return refuse("train", able.error().message);
   const auto gathered = gather(a, *task);
   if (!gathered) return refuse("train", gathered.error().message);
-  const auto& [data, report, frozen_test, digest] = gathered.value();
+  const auto& [data, report, frozen_test, digest, not_for_live, feature_set] = gathered.value();
 
   ml::TrainingSpec spec;
   spec.task = *task, spec.features = a.features, spec.folds = a.folds, spec.seed = a.seed;
@@ -136,9 +139,10 @@ int train(const TrainArguments& a) {
   auto learned = ml::train(data, spec);
   if (!learned) return refuse("train", a.data.files.front() + ": " + learned.error().message);
   auto& info = learned.value().model.info;
-  info.feature_set = nlos::k_feature_set_version;
+  info.feature_set = feature_set;
   info.group_by = report.group_by.empty() ? "row" : report.group_by;
   info.code_version = ANCHORD_VERSION;
+  info.not_for_live = not_for_live;
   if (!digest.empty()) info.data_digest = digest;
   if (!write_whole(a.out, api::write_model_artifact(learned.value().model))) {
     std::fprintf(stderr, "anchord train: cannot write %s\n", a.out.c_str());

@@ -18,6 +18,9 @@ constexpr const char* k_columns =
     "SELECT id, name, radio, note, truth_sigma_m, created_t_ns, version FROM campaign ";
 constexpr const char* k_key = "SELECT campaign_key FROM campaign WHERE id = ?1";
 constexpr const char* k_remove = "DELETE FROM campaign WHERE id = ?1 RETURNING campaign_key";
+constexpr const char* k_insert_import =
+    "INSERT INTO campaign_import (campaign_key, digest) VALUES (?1, ?2) ON CONFLICT DO NOTHING "
+    "RETURNING campaign_key";
 constexpr const char* k_setting_columns =
     "s.name, s.environment, s.distance_m, s.los, s.heading_deg, s.height_difference_m, s.material, "
     "s.thickness_m, s.truth_sigma_m";
@@ -172,10 +175,16 @@ class SqlCampaignStore final : public CampaignStore {
     });
   }
 
-  Result<Appended> append(const CampaignId& id, const std::vector<CampaignRow>& rows) override {
+  Result<Appended> append(const CampaignId& id, const std::vector<CampaignRow>& rows,
+                          std::string_view import_digest) override {
     return write_value<Appended>(gate_, rows.size() + 1, [&](Connection& c) -> Result<Appended> {
       const auto key = key_of(c, id);
       if (!key) return no_campaign(id);
+      if (!import_digest.empty()) {
+        Query import(c, k_insert_import);
+        import << *key << import_digest;
+        if (!import.returned()) return Appended{0, rows.size()};
+      }
       std::map<std::string, std::pair<std::int64_t, GroundTruth>, std::less<>> known;
       Query settings(c, std::string("SELECT s.setting_key, ") + k_setting_columns +
                             " FROM campaign_setting s WHERE s.campaign_key = ?1");

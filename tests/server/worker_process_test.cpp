@@ -38,7 +38,7 @@ std::string training(std::size_t rows) {
   std::string csv =
       "feature_set,campaign,environment,setting,split,los,true_range_m,repeats,range_m,rx_dbm\n";
   for (std::size_t i = 0; i < rows; ++i)
-    csv += "anchord-features-1,c,room " + std::to_string(i % 4) + ",s" + std::to_string(i) + ",train," +
+    csv += "anchord-features-2,c,room " + std::to_string(i % 4) + ",s" + std::to_string(i) + ",train," +
            (i % 2 == 0 ? "1" : "0") + ",5,1," + std::to_string(5 + static_cast<double>(i % 97) / 100) + "," +
            std::to_string(-80 - static_cast<double>(i % 13)) + "\n";
   return nlohmann::json{

@@ -1,6 +1,8 @@
 // Frozen data sets: the one CSV form of the service and the command line.
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "api/imports/labelled_table.hpp"
 #include "api/learning/freeze_rows.hpp"
 
@@ -65,6 +67,55 @@ TEST(FrozenTable, AggregatesToOneRowOfEachSetting) {
   EXPECT_EQ(row.repeats, 3U);
   EXPECT_EQ(row.registers[0], 9001);
   EXPECT_TRUE(frozen(Aggregation::median).table.rows.front().features.get(Feature::log_range_spread));
+}
+
+TEST(FrozenTable, IsOfSingleRangesByDefault) {
+  const auto set = freeze_rows(rooms(), {}, {}).value();
+  EXPECT_EQ(set.table.rows.size(), 36U);
+  EXPECT_EQ(not_for_live(set.table), "");
+  EXPECT_NE(not_for_live(frozen(Aggregation::mean).table).find("3 rangings"), std::string::npos);
+}
+
+// ln(0.005 + sd) of 2.10 m, 2.11 m and 2.12 m, whose standard deviation is 0.01 m.
+TEST(FrozenTable, MeansKeepTheStandardDeviationOfTheirRanges) {
+  const auto spread = frozen(Aggregation::mean).table.rows.front().features.get(Feature::log_range_spread);
+  ASSERT_TRUE(spread);
+  EXPECT_NEAR(*spread, std::log(0.015), 1e-9);
+}
+
+TEST(FrozenTable, KeepsHowWellATruthIsKnownAndWeighsByIt) {
+  auto table = rooms();
+  EXPECT_EQ(table.csv().find("truth_sigma_m"), std::string::npos) << "no column without a value";
+  for (auto& row : table.rows)
+    if (row.environment == "room 1") row.truth_sigma_m = 0.5;
+  const auto again = DatasetTable::parse(table.csv());
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again.value().csv(), table.csv());
+  const auto rows = learning_rows(again.value(), {{"range_m"}, true, true, {}, {}}).value();
+  for (std::size_t i = 0; i < rows.source.size(); ++i) {
+    if (table.rows[rows.source[i]].environment == "room 1")
+      EXPECT_LT(rows.data.weight[i], 0.1);
+    else
+      EXPECT_GT(rows.data.weight[i], 1.0);
+  }
+}
+
+// A set frozen by the version before keeps its text, its digest and its use, unless it has shapes of another
+// window.
+TEST(FrozenTable, OfTheFeaturesBeforeStaysWhatItWas) {
+  auto csv = rooms().csv();
+  const std::string now(nlos::k_feature_set_version), before(nlos::k_feature_set_before);
+  for (auto at = csv.find(now); at != std::string::npos; at = csv.find(now))
+    csv.replace(at, now.size(), before);
+  const auto old = DatasetTable::parse(csv);
+  ASSERT_TRUE(old) << old.error().message;
+  EXPECT_EQ(old.value().csv(), csv);
+  auto shapes = rooms();
+  for (auto& row : shapes.rows) row.features.set(Feature::kurtosis, 9);
+  shapes.feature_set = before;
+  const auto refused = DatasetTable::parse(shapes.csv());
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("kurtosis"), std::string::npos) << refused.error().message;
 }
 
 TEST(FrozenTable, DigestChangesWithOneValueOneLabelAndTheSplit) {

@@ -80,7 +80,7 @@ TEST(ModelArtifact, RefusesWhatIsWrongAndNamesThePlace) {
   EXPECT_NE(message("{}"), "");
   EXPECT_EQ(read_model_artifact(replaced(good, "anchord-model-1", "anchord-model-9")).error().code,
             Errc::unsupported);
-  EXPECT_EQ(read_model_artifact(replaced(good, "anchord-features-1", "anchord-features-0")).error().code,
+  EXPECT_EQ(read_model_artifact(replaced(good, "anchord-features-2", "anchord-features-0")).error().code,
             Errc::unsupported);
   EXPECT_NE(message(replaced(good, "\"threshold\":0.5", "\"threshold\":1.5")).find("/classifier/threshold"),
             std::string::npos);

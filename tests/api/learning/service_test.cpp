@@ -89,6 +89,34 @@ TEST_F(LearningService, ReportsWhatAnImportDropped) {
   EXPECT_EQ(post("/api/v1/campaigns", R"({"name":"hall"})").status, 409);
 }
 
+TEST_F(LearningService, TheSameCampaignSentTwiceIsOneCampaign) {
+  const auto again = json(post("/api/v1/campaigns/hall/samples", campaign_csv(), "text/csv"));
+  EXPECT_EQ(again["accepted"], 0) << again;
+  EXPECT_EQ(again["duplicates"], 180);
+  EXPECT_EQ(json(post("/api/v1/datasets", R"({"name":"once","campaigns":["hall"]})"))["train"], 180);
+  // Another spelling of the same numbers is the same campaign; one number more is another.
+  auto semicolons = campaign_csv();
+  std::ranges::replace(semicolons, ',', ';');
+  EXPECT_EQ(json(post("/api/v1/campaigns/hall/samples", semicolons, "text/csv"))["accepted"], 0);
+  const auto more = campaign_csv() + "room 0,s0,2.0,1,2.05,-77,-79\n";
+  EXPECT_EQ(json(post("/api/v1/campaigns/hall/samples", more, "text/csv"))["accepted"], 181);
+  // A still link may measure one number twice.
+  const auto one =
+      R"({"setting":"s0","environment":"room 0","true_distance_m":2.0,"los":true,"range_m":2.1})";
+  for (int i = 0; i < 2; ++i)
+    EXPECT_EQ(json(post("/api/v1/campaigns/hall/samples", one, "application/x-ndjson"))["accepted"], 1);
+}
+
+TEST_F(LearningService, TheCurveOfABiasRunIsNamedByItsCorrection) {
+  const auto run = train("bias", "auto");
+  const auto curves = json(get("/api/v1/training-runs/" + run.value("id", "") + "/cdf"))["items"];
+  ASSERT_EQ(curves.size(), 2u) << curves;
+  EXPECT_EQ(curves[0]["method"], "none");
+  const auto name = curves[1].value("method", "");
+  EXPECT_TRUE(name.starts_with("mixture") || name.starts_with("class medians") || name.starts_with("none"))
+      << name;
+}
+
 TEST_F(LearningService, FreezesRowsWhoseCsvGivesTheSameDigest) {
   EXPECT_EQ(dataset_["train"], 150);
   EXPECT_EQ(dataset_["test"], 30);
@@ -142,6 +170,38 @@ TEST_F(LearningService, PromotesOnlyACorrectionThatHelpsUnlessAReasonIsGiven) {
   EXPECT_TRUE(json(post("/api/v1/models/rollback", R"({"task":"los_bias"})"))["model"].is_null());
   EXPECT_EQ(post("/api/v1/models/rollback", R"({"task":"los_bias"})").status, 422);
   EXPECT_EQ(json(get("/api/v1/models/promotions"))["items"].size(), 4u);
+}
+
+// A mean of three is less noisy than the range it will judge: its own figures say nothing of flights.
+TEST_F(LearningService, AModelOfMeansIsMarkedNotForLiveAndMeasuredOnSingleRanges) {
+  ASSERT_EQ(post("/api/v1/datasets", R"({"name":"means","campaigns":["hall"],"aggregation":"mean"})").status,
+            201);
+  Call options;
+  options.headers["prefer"] = "wait=120";
+  const auto means = json(call(api::Method::post, "/api/v1/training-runs",
+                               R"({"task":"los_bias","dataset":"means","methods":["constant"],
+                                   "cv":{"folds":4,"seed":3},"importance":false})",
+                               options));
+  const auto manifest = json(get(means.value("model", "")))["manifest"];
+  EXPECT_NE(manifest.value("not_for_live", "").find("means"), std::string::npos) << manifest;
+  const auto refused = promote(means);
+  EXPECT_EQ(refused.status, 422) << refused.body;
+  EXPECT_NE(refused.body.find("not for live"), std::string::npos) << refused.body;
+  ASSERT_EQ(promote(means, R"({"reason":"as the dissertation did"})").status, 200);
+  // What takes over from it is compared on the thirty single ranges of room 5, fifteen of them LOS.
+  const auto single = train("los_bias", "constant");
+  const auto gate = json(get(single.value("model", "") + "/gate"));
+  ASSERT_FALSE(gate["checks"].empty()) << gate;
+  EXPECT_EQ(gate["checks"][0]["name"], "mae_m");
+  EXPECT_EQ(gate["checks"][0]["basis"], "held_out");
+  EXPECT_FALSE(gate["checks"][0]["current"].is_null()) << gate;
+  EXPECT_TRUE(json(get(single.value("model", "")))["manifest"]["not_for_live"].is_null());
+}
+
+TEST_F(LearningService, ByDefaultADataSetKeepsSingleRanges) {
+  const auto made = post("/api/v1/datasets", R"({"name":"all","campaigns":["hall"]})");
+  ASSERT_EQ(made.status, 201) << made.body;
+  EXPECT_EQ(json(made)["train"], 180);
 }
 
 TEST_F(LearningService, OneOfEightPromotionsAndRollbacksOfOneStateIsMade) {
@@ -369,6 +429,40 @@ TEST_F(LearningService, AModelThatLiveRangesCannotFeedIsNotPromoted) {
   EXPECT_EQ(json(get("/api/v1/models/active"))["raw"], true);
 }
 
+// What a person noted of a place is in every campaign row, and in no range of a flight.
+TEST_F(LearningService, AModelOfWhatAPersonNotedIsRefusedByTheNameOfTheFeature) {
+  auto csv = campaign_csv();
+  std::string noted;
+  for (std::size_t at = 0, line = 0; at < csv.size(); ++line) {
+    const auto end = csv.find('\n', at);
+    noted += csv.substr(at, end - at) +
+             (line == 0       ? ",height_difference_m"
+              : line % 2 == 0 ? ",1.5"
+                              : ",1.5") +
+             "\n";
+    at = end + 1;
+  }
+  ASSERT_EQ(post("/api/v1/campaigns", R"({"name":"noted"})").status, 201);
+  ASSERT_EQ(post("/api/v1/campaigns/noted/samples", noted, "text/csv").status, 200);
+  ASSERT_EQ(post("/api/v1/datasets", R"({"name":"noted","campaigns":["noted"]})").status, 201);
+  const auto trained = [&](const std::string& features) {
+    Call options;
+    options.headers["prefer"] = "wait=120";
+    return json(call(api::Method::post, "/api/v1/training-runs",
+                     R"({"task":"nlos_id","dataset":"noted","methods":["logistic"],)" + features +
+                         R"("cv":{"folds":4},"importance":false})",
+                     options));
+  };
+  const auto run = trained(R"("features":["rx_dbm","fp_dbm","height_difference_m"],)");
+  for (const auto* body : {"", R"({"reason":"never mind"})"}) {
+    const auto refused = promote(run, body);
+    EXPECT_EQ(refused.status, 422) << refused.body;
+    EXPECT_NE(refused.body.find("height_difference_m"), std::string::npos) << refused.body;
+  }
+  // Where nothing is named, nothing is taken that flights lack.
+  EXPECT_EQ(promote(trained("")).status, 200);
+}
+
 TEST_F(LearningService, PredictsAndSaysWhatASampleLacks) {
   const auto sample = R"({"sample":{"distance_m":6,"rx_dbm":-81,"fp_dbm":-83}})";
   EXPECT_EQ(json(post("/api/v1/models/active/predict", sample))["note"], "no model is promoted");
@@ -377,6 +471,8 @@ TEST_F(LearningService, PredictsAndSaysWhatASampleLacks) {
   const auto judged = json(post("/api/v1/models/active/predict", sample));
   EXPECT_EQ(judged["los"], true);
   EXPECT_GT(judged["p_los"], 0.5);
+  EXPECT_EQ("/api/v1/models/" + judged["models"].value("nlos_id", ""), run["model"]);
+  EXPECT_EQ(judged["models"].size(), 1u);
   const auto batch =
       json(post(run.value("model", "") + "/predict",
                 R"({"samples":[{"distance_m":6,"rx_dbm":-81,"fp_dbm":-89},{"distance_m":6}]})"));

@@ -90,4 +90,31 @@ TEST(RangeOutliers, AreFarFromTheirPlacementsMedian) {
   EXPECT_TRUE(range_outliers(std::vector<double>{1, 9}, std::vector<std::uint32_t>{0, 0}).empty());
 }
 
+// Biases of 0, 0.1, 0.2 m: their median is 0.1 m and 1.4826 MAD 0.14826 m, the scatter s. A truth known to s
+// itself halves a row's weight, s^2 / (s^2 + s^2), beside 1 of the others; the mean stays 1.
+TEST(Dataset, AWorseTruthWeighsLess) {
+  Dataset data;
+  data.bias_m = {0.0, 0.1, 0.2};
+  data.weight = {1, 1, 1};
+  data.group = {0, 0, 0}, data.placement = {0, 1, 2};
+  const std::vector<std::optional<double>> sigma_m{std::nullopt, 0.14826, 0.0};
+  weigh_by_truth(data, sigma_m);
+  EXPECT_NEAR(data.weight[0], 1 / 2.5 * 3, 1e-9);
+  EXPECT_NEAR(data.weight[1], 0.5 / 2.5 * 3, 1e-9);
+  EXPECT_NEAR(data.weight[2], 1 / 2.5 * 3, 1e-9);
+  // Thinning and the weights of placements keep it.
+  EXPECT_NEAR(thin_placements(data, 5).weight[1], 0.6, 1e-9);
+}
+
+TEST(Dataset, WithoutAnyTruthSigmaEveryRowWeighsOne) {
+  Dataset data;
+  data.bias_m = {0.0, 0.5};
+  data.weight = {1, 1};
+  data.group = {0, 1}, data.placement = {0, 1};
+  const auto digest = data.digest();
+  weigh_by_truth(data, std::vector<std::optional<double>>(2));
+  EXPECT_EQ(data.weight, (std::vector<double>{1, 1}));
+  EXPECT_EQ(data.digest(), digest);
+}
+
 }  // namespace anchord::ml

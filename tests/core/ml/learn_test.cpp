@@ -87,4 +87,21 @@ TEST(Learn, ThresholdKeepsTheAskedFalsePositiveRateOnHeldOutPlaces) {
             0.05);
 }
 
+// A cap above what the usual threshold gives away must not give away more.
+TEST(Learn, ACapNeverRaisesTheFalsePositiveRate) {
+  const auto data = world(4, false);
+  LearnOptions options;
+  const auto usual = learn(data, options);
+  ASSERT_TRUE(usual);
+  const double before = confusion_at(usual.value().p_los, data.los, 0.5).fpr();
+  for (const double cap : {0.02, 0.1, 0.3, 1.0}) {
+    options.max_fpr = cap;
+    const auto capped = learn(data, options);
+    ASSERT_TRUE(capped);
+    const double after =
+        confusion_at(capped.value().p_los, data.los, capped.value().model.classifier->threshold).fpr();
+    EXPECT_LE(after, std::min(cap, before)) << cap;
+  }
+}
+
 }  // namespace anchord::ml

@@ -57,6 +57,23 @@ TEST(Predictor, WeighsBothBiasesByTheProbability) {
   EXPECT_NEAR(v.likelihood->nlos_m, 0.6, 1e-12);
 }
 
+TEST(Predictor, SaysWhichModelsGaveTheAnswer) {
+  const auto spoke = [](ModelSet set, const nlos::FeatureVector& f) {
+    return Predictor::make(std::move(set)).value().judge(f).spoke.to_string();  // bias, nlos, los, id
+  };
+  EXPECT_EQ(spoke({classifier(), {}, {}, {}}, sample(1)), "0001");
+  EXPECT_EQ(spoke({classifier(),
+                   constant_bias(Task::los_bias, 0.1, 0.05),
+                   constant_bias(Task::nlos_bias, 0.6, 0.3),
+                   {}},
+                  sample(1)),
+            "0111");
+  FeatureVector bare;
+  bare.set(Feature::range_m, 2.0);
+  EXPECT_EQ(spoke({classifier(), {}, {}, constant_bias(Task::bias, 0.1, 0.05)}, bare), "1000")
+      << "the classifier could not speak";
+}
+
 TEST(Predictor, HardSwitchTakesTheBiasOfTheClassCalled) {
   const auto made = Predictor::make(
       {classifier(), constant_bias(Task::los_bias, 0.1, 0.05), constant_bias(Task::nlos_bias, 0.6, 0.3), {}});
@@ -73,6 +90,19 @@ TEST(Predictor, SaysNothingOfASampleThatLacksItsFeature) {
   const auto v = made.value().judge(f);
   EXPECT_FALSE(v.p_los);
   EXPECT_FALSE(v.bias_m);
+}
+
+// Its shapes of the impulse response were over another window; its levels are what they were.
+TEST(Predictor, TakesAModelOfTheFeaturesBeforeWhereTheyMeanTheSame) {
+  auto levels = classifier();
+  levels->info.feature_set = nlos::k_feature_set_before;
+  EXPECT_TRUE(Predictor::make({levels, {}, {}, {}}));
+  auto shape = classifier();
+  shape->info.features = {"kurtosis"};
+  shape->info.feature_set = nlos::k_feature_set_before;
+  const auto refused = Predictor::make({shape, {}, {}, {}});
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("kurtosis"), std::string::npos) << refused.error().message;
 }
 
 TEST(Predictor, RefusesAModelInTheWrongSlotAndColumnsLiveRangesLack) {

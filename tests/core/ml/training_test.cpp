@@ -95,6 +95,40 @@ TEST(Training, ReportsGridFoldsImportanceAndPredictionsOfTheSameRun) {
   EXPECT_TRUE(o.selection.front().kept);
 }
 
+// One feature tells the classes apart, the other six are noise: the model is of what the filter keeps, and
+// says so.
+TEST(Training, AModelUsesTheFeaturesThatTheFilterKeeps) {
+  Random random{5};
+  Dataset data;
+  data.features = {"a", "b", "c", "d", "e", "f", "g"};
+  for (std::uint32_t i = 0; i < 400; ++i) {
+    const bool los = i % 2 == 0;
+    for (std::size_t c = 0; c < 7; ++c)
+      data.x.push_back(random.uniform() - 0.5 + (c == 3 ? (los ? 0.3 : -0.3) : 0.0));
+    data.los.push_back(los ? 1 : 0);
+    data.weight.push_back(1);
+    data.group.push_back(i % 8), data.placement.push_back(i);
+  }
+  TrainingSpec spec;
+  spec.methods = {Method::logistic};
+  spec.features = data.features;
+  spec.folds = 4;
+  spec.selection = true;
+  const auto run = train(data, spec);
+  ASSERT_TRUE(run) << run.error().message;
+  const auto& info = run.value().model.info;
+  std::vector<std::string> kept;
+  for (const auto& step : run.value().selection)
+    if (step.kept) kept.push_back(step.feature);
+  EXPECT_EQ(kept.front(), "d");
+  EXPECT_LT(kept.size(), 7U);
+  EXPECT_EQ(info.features, kept) << info.why;
+  EXPECT_NE(info.why.find("keeps " + std::to_string(kept.size()) + " of 7"), std::string::npos) << info.why;
+  std::size_t picked = 0;
+  for (const auto& row : run.value().candidates) picked += row.picked ? 1 : 0;
+  EXPECT_EQ(picked, 1U);
+}
+
 TEST(Training, LeakReportFindsAPlacementInTwoPlacesAndCopiedRows) {
   auto data = learning_world(1, false);
   data.placement[100] = data.placement[0];  // rows 0 and 100 are of different places

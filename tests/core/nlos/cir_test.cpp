@@ -61,6 +61,50 @@ TEST(CirShape, OfAnExponentialDecayMatchesTheClosedForm) {
   EXPECT_NEAR(shape->rms_delay_spread_ns, std::sqrt(r) / (1 - r), 1e-5);
 }
 
+// A record of noise with a decaying path, and the 128 taps from 672 on that a tag reads of it.
+TEST(CirShape, IsTheSameForAWholeRecordAndTheWindowATagReads) {
+  std::vector<float> whole;
+  std::uint32_t state = 1;
+  const auto uniform = [&state] {
+    state = state * 1664525U + 1013904223U;
+    return (static_cast<double>(state >> 8) + 0.5) / 16777216.0;
+  };
+  for (int k = 0; k < 1016; ++k) {
+    const double noise = 30 * std::sqrt(-2 * std::log(uniform()));  // Rayleigh: rms 30 sqrt 2
+    const double path = k < 746 ? 0 : 4000 * std::exp(-0.05 * (k - 746)) * uniform();
+    whole.push_back(static_cast<float>(std::hypot(noise, path)));
+  }
+  const std::vector<float> window(whole.begin() + 672, whole.begin() + 800);
+  const auto a = cir_shape(whole, 746.4);
+  ASSERT_TRUE(a && a->whole);
+  CirOptions told;
+  told.noise_rms = a->noise_rms;
+  const auto b = cir_shape(window, 746.4 - 672, told);
+  ASSERT_TRUE(b);
+  EXPECT_FALSE(b->whole) << "of a window nobody can say what the whole record is like";
+  EXPECT_NEAR(a->kurtosis, b->kurtosis, 1e-9);
+  EXPECT_NEAR(a->mean_excess_delay_ns, b->mean_excess_delay_ns, 1e-9);
+  EXPECT_NEAR(a->rms_delay_spread_ns, b->rms_delay_spread_ns, 1e-9);
+  EXPECT_NEAR(a->early_energy, b->early_energy, 1e-12);
+  EXPECT_NEAR(a->peak_delay_ns, b->peak_delay_ns, 1e-9);
+  // A first path so late that the record ends inside the window has no features, rather than other ones.
+  EXPECT_FALSE(cir_shape(window, 90.0, told));
+}
+
+// Eq 5.5 over every tap: two equal taps 600 apart spread by 300, far beyond the printed 68.7.
+TEST(CirShape, OfAWholeRecordIsAsPrintedAndCanExceedThePrintedThreshold) {
+  std::vector<float> h(1016, 0.0F);
+  h[100] = h[700] = 500.0F;
+  CirOptions o;
+  o.tap_ns = 1;
+  const auto shape = cir_shape(h, 700.0, o);
+  ASSERT_TRUE(shape && shape->whole);
+  EXPECT_NEAR(shape->whole->rms_delay_spread_ns, 300, 1e-9);
+  EXPECT_NEAR(shape->whole->mean_excess_delay_ns, -300, 1e-9);
+  const double p = 2.0 / 1016;  // |h| is Bernoulli
+  EXPECT_NEAR(shape->whole->kurtosis, (1 - 3 * p * (1 - p)) / (p * (1 - p)), 1e-6);
+}
+
 TEST(CirShape, IsTheSameForComplexTapsAndTheirMagnitude) {
   std::vector<std::int16_t> re_im;
   std::vector<float> magnitude;

@@ -60,6 +60,18 @@ TEST(Features, AtRestAreMediansAndTheirSpreads) {
   EXPECT_FALSE(f.get(Feature::rx_dbm));
 }
 
+// Every feature by the least that gives it: what a flight's range with levels and CIR has is what models of
+// flights may ask for.
+TEST(Features, OfRangesOfAFlightAreThoseOfLevelsAndImpulseResponse) {
+  std::size_t live = 0;
+  for (std::size_t f = 0; f < k_feature_count; ++f) live += live_ranges_have(static_cast<Feature>(f)) ? 1 : 0;
+  EXPECT_EQ(live, 16U);
+  for (const char* name : {"height_difference_m", "heading_deg", "log_range_spread", "fp_snr_db",
+                           "max_noise_db", "rms_delay_spread_whole_ns"})
+    EXPECT_FALSE(live_ranges_have(*feature_of(name))) << name;
+  EXPECT_EQ(needs_of(Feature::kurtosis), Needs::impulse);
+}
+
 TEST(RangeSpread, SlidesAndDropsZeroRanges) {
   RangeSpread window{3};
   window.add(1);

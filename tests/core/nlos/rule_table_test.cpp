@@ -44,9 +44,10 @@ TEST(RuleTable, PrintedThresholdsAreThoseOfChapterFive) {
   s.range_sd_m = 0.049, s.rx_minus_fp_db = 6.1, s.rms_delay_spread_ns = 68.7, s.distance_m = 6.0;
   EXPECT_EQ(rules.says_los(Rule::range_sd, s), true);
   EXPECT_EQ(rules.says_los(Rule::first_path, s), false);
-  EXPECT_EQ(rules.says_los(Rule::rms_delay, s), true);   // 68.7 taps of 1.0016 ns are 68.81 ns
-  EXPECT_FALSE(rules.says_los(Rule::rms_delay_far, s));  // nearer than 6.5 m
-  EXPECT_FALSE(rules.says_los(Rule::kurtosis, s));       // no figure is printed for it
+  EXPECT_EQ(rules.says_los(Rule::rms_delay, s), true);      // 68.7 taps of 1.0016 ns are 68.81 ns
+  EXPECT_FALSE(rules.says_los(Rule::rms_delay_far, s));     // nearer than 6.5 m
+  EXPECT_FALSE(rules.says_los(Rule::kurtosis, s));          // no figure is printed for it
+  EXPECT_EQ(rules.says_los(Rule::rms_delay_95, s), false);  // 68.7 squared is 4720, above 4430
 }
 
 // Two voices of three say LOS, all weigh the same: p_NLOS = 1/3 (eq 5.8).

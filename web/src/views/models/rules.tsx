@@ -6,7 +6,7 @@ import { fixed, grouped } from '../../ui/format';
 import { Q } from '../../ui/marks';
 
 const NAMES: Record<string, string> = {
-  rss: 'RSS over distance', kurtosis: 'Kurtosis', mean_excess_delay: 'Mean excess delay', rms_delay: 'RMS delay spread', rms_delay_far: 'RMS delay spread, beyond 6.5 m', range_sd: 'Spread of repeated ranges', first_path: 'RX-FP difference', weighted: 'Weighted vote',
+  rss: 'RSS over distance', kurtosis: 'Kurtosis', mean_excess_delay: 'Mean excess delay', rms_delay: 'RMS delay spread', rms_delay_far: 'RMS delay spread, beyond 6.5 m', rms_delay_95: 'RMS delay spread, 95 % threshold', range_sd: 'Spread of repeated ranges', first_path: 'RX-FP difference', weighted: 'Weighted vote',
 };
 
 export function Rules() {
