@@ -82,8 +82,8 @@ test('a frozen data set has one form and one digest through the service and the 
     assert.equal(createHash('sha256').update(readFileSync(join(dir, 'rows.csv'))).digest('hex'), set.digest);
     // What the command line freezes, the service takes for the same; and what either trains of it are the same bytes.
     writeFileSync(join(dir, 'campaign.csv'), readFileSync(join(root, 'docs/examples/campaign.csv')));
-    const built = anchord('dataset', 'build', '--data', 'campaign.csv', '--aggregate', 'mean', '--hold-out', 'room 6', '--out', 'built.csv').match(/^digest (\w+)/)[1];
-    const frozen = await call('POST', '/api/v1/datasets', { expect: 201, json: { name: 'means', campaigns: ['campaign'], split: { test: ['room 6'] } } });
+    const built = anchord('dataset', 'build', '--data', 'campaign.csv', '--hold-out', 'room 6', '--out', 'built.csv').match(/^digest (\w+)/)[1];
+    const frozen = await call('POST', '/api/v1/datasets', { expect: 201, json: { name: 'frozen', campaigns: ['campaign'], split: { test: ['room 6'] } } });
     assert.equal(frozen.json.digest, built);
     const sent = await call('POST', '/api/v1/datasets?name=built', { expect: 201, headers: { 'content-type': 'text/csv' }, body: readFileSync(join(dir, 'built.csv'), 'utf8') });
     assert.equal(sent.json.digest, built);
