@@ -218,7 +218,7 @@ class History {
     if (rig_.now - aim_s_ < 2 || rig_.now - step_s_ < 2.5) return;
     if (!aim || !rig_.flying() || rig_.control->taken_over() || step == Step::take_off ||
         step == Step::hold || rig_.autopilot.custom_mode() != dialect().guided || pilot_s_ ||
-        rig_.link_down || !rover_known())
+        rig_.link_down || !rover_known() || !rig_.control->engine().leg())
       return;
     within(*aim, "aims");
   }
