@@ -36,6 +36,13 @@ const std::array<TopicInfo, k_topic_count>& topics() {
   return k_topics;
 }
 
+namespace {
+
+/// What the age of a message is measured by: the wall clock may step.
+std::int64_t steady_us() { return system_steady_clock().now().ns / 1000; }
+
+}  // namespace
+
 const TopicInfo& info(Topic topic) { return topics()[static_cast<std::size_t>(topic)]; }
 
 const TopicInfo* find_topic(std::string_view name) {
@@ -92,16 +99,16 @@ void Hub::send(Topic topic, std::vector<LiveElement> elements, std::int64_t t_us
   if (about.cls == TopicClass::state) {
     for (const auto& element : message->elements) channel.newest[element.key] = {element, t_us};
   } else {
-    const std::int64_t now_us = system_steady_clock().now().ns / 1000;
     channel.history.push_back(message);
-    channel.history_at_us.push_back(now_us);
+    channel.history_at_us.push_back(steady_us());
     channel.history_bytes += message->bytes();
-    trim(about, channel, now_us);
+    trim(about, channel);
   }
   for (const auto& [listener, subscriptions] : channel.listeners) listener->on_message(topic, message);
 }
 
-void Hub::trim(const TopicInfo& topic, Channel& channel, std::int64_t now_us) {
+void Hub::trim(const TopicInfo& topic, Channel& channel) {
+  const std::int64_t now_us = steady_us();
   const auto too_much = [&] {
     if (topic.cls == TopicClass::event) return channel.history.size() > k_event_history;
     return now_us - channel.history_at_us.front() > k_stream_history_us ||
@@ -202,7 +209,7 @@ void Hub::tick() {
     auto& channel = channels_[static_cast<std::size_t>(topic.topic)];
     if (!channel.collected.empty())
       send(topic.topic, std::exchange(channel.collected, {}), channel.collected_t_us);
-    if (topic.cls == TopicClass::stream) trim(topic, channel, now.us());
+    if (topic.cls == TopicClass::stream) trim(topic, channel);
   }
   // A clock that was set back must not silence the heartbeat.
   const std::int64_t since_us = now.us() - last_heartbeat_us_;

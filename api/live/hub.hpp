@@ -171,7 +171,7 @@ class Hub {
     std::int64_t collected_t_us{0};
     std::map<HubListener*, std::size_t> listeners;  ///< with the number of their subscriptions
   };
-  void trim(const TopicInfo& topic, Channel& channel, std::int64_t now_us);
+  void trim(const TopicInfo& topic, Channel& channel);
 
   const Clock& clock_;
   std::string server_name_, epoch_;

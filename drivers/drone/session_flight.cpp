@@ -26,7 +26,7 @@ void Session::new_flight(double speed_mps) {
   for (const auto& p : std::exchange(pending_, {})) {
     if (!p.part) report(p.number, p.what, CommandState::unconfirmed, "a new flight begins");
   }
-  flight_.emplace();
+  flight_ = Flight{};
   flight_->speed_mps = speed_mps;
 }
 

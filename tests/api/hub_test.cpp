@@ -49,6 +49,20 @@ TEST_F(HubRules, GreetsThenAnswersASubscriptionWithAckAndSnap) {
   EXPECT_EQ(frames[2]["data"][0]["mission"], "m");
 }
 
+TEST_F(HubRules, AStreamIsResumedWithAllThatWasMissedHoweverOftenTheHubTicked) {
+  for (int i = 0; i < 5; ++i) {
+    hub_.publish(Topic::ranges, R"({"n":)" + std::to_string(i) + "}", i);
+    hub_.tick();
+  }
+  auto client = connect();
+  client->on_text(R"({"op":"sub","id":1,"topic":"ranges","since":{"epoch":")" + hub_.epoch() + R"(","seq":2}})");
+  const auto frames = read(*client);
+  EXPECT_EQ(of(frames, "ack")[0]["recovered"], true);
+  std::vector<int> missed;
+  for (const auto& frame : of(frames, "data")) missed.push_back(frame["seq"]);
+  EXPECT_EQ(missed, (std::vector{3, 4, 5}));
+}
+
 TEST_F(HubRules, KeepsOnlyTheNewestStatePerKeyForASlowClient) {
   auto client = connect();
   client->on_text(R"({"op":"sub","id":1,"topic":"anchors.estimates"})");

@@ -81,7 +81,8 @@ test('a client that comes back with epoch and seq gets what it missed, once', as
   const ack = await subscribe(second, 'ranges', { epoch: hello.epoch, seq: last.seq });
   assert.equal(ack.recovered, true, JSON.stringify(ack));
   const missed = await second.next('what was missed', (m) => m.op === 'data' && m.sub === ack.sub);
-  assert.ok(missed.seq > last.seq);
+  assert.equal(missed.prev, last.seq, 'from the first that was missed');
+  assert.equal(missed.seq, last.seq + 1);
   await second.close();
 });
 
