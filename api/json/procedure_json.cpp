@@ -38,6 +38,7 @@ Ordered anchors_json(const procedure::FlightEngine& engine) {
     const auto height = known ? clues->second.height : std::nullopt;
     out.push_back({{"network_id", to_string(a.id)},
                    {"done", a.done},
+                   {"reached", a.reached},
                    {"why", a.why},
                    {"iterations", a.iterations},
                    {"waiting", a.waiting},
@@ -221,6 +222,7 @@ Ordered stored_state(const procedure::State& s) {
                        {"iterations", a.iterations},
                        {"waiting", a.waiting},
                        {"done", a.done},
+                       {"reached", a.reached},
                        {"why", a.why}});
   }
   return {{"step", procedure::to_string(s.step)},
@@ -273,6 +275,7 @@ std::optional<procedure::State> state_of(const nlohmann::json& j) {
       a.at("iterations").get_to(task.iterations);
       a.at("waiting").get_to(task.waiting);
       a.at("done").get_to(task.done);
+      task.reached = a.value("reached", false);
       a.at("why").get_to(task.why);
       s.anchors.push_back(std::move(task));
     }

@@ -446,6 +446,20 @@ void FlightEngine::work(double now_s, std::span<const Estimate> estimates) {
   }
 }
 
+/// Done is not reached: a limit of points, time or battery ends an anchor too.
+std::string FlightEngine::outcome(const std::string& which) const {
+  std::string without;
+  std::size_t n = 0;
+  for (const auto& task : state_.anchors) {
+    if (!task.done || task.reached) continue;
+    ++n;
+    without += (without.empty() ? "" : ", ") + to_string(task.id);
+  }
+  if (n == 0) return "every " + which + " anchor is done";
+  return "every " + which + " anchor is done or given up; " + std::to_string(n) +
+         " without the accuracy that was wanted: " + without;
+}
+
 void FlightEngine::judge_anchors(double now_s, std::span<const Estimate> estimates) {
   for (auto& task : state_.anchors) {
     if (task.done) continue;
@@ -462,6 +476,7 @@ void FlightEngine::judge_anchors(double now_s, std::span<const Estimate> estimat
     }
     if (const auto exit = exit_of(setup_.exit, progress)) {
       task.done = true;
+      task.reached = exit->reached;
       task.why = exit->reason;
       tell(now_s, exit->reached ? "info" : "warning", "anchor.done",
            to_string(task.id) + ": " + exit->reason);
@@ -483,7 +498,7 @@ void FlightEngine::decide(double now_s, std::span<const Estimate> estimates) {
   };
   if (!setup_.expected.empty() && std::all_of(setup_.expected.begin(), setup_.expected.end(), is_done)) {
     state_.waypoint = setup_.settings.waypoints.size() - 1;
-    return finish(Event::done_here, "every expected anchor is done");
+    return finish(Event::done_here, outcome("expected"));
   }
   planning::NextPointInput input;
   input.visited = state_.visited;
@@ -513,7 +528,7 @@ void FlightEngine::decide(double now_s, std::span<const Estimate> estimates) {
     }
     input.anchors.push_back(std::move(anchor));
   }
-  if (input.anchors.empty()) return finish(Event::done_here, "every anchor heard so far is done");
+  if (input.anchors.empty()) return finish(Event::done_here, outcome("received"));
   auto decided = planning::next_point(input, setup_.planner);
   if (!decided) return finish(Event::no_point, decided.error().message);
   const double before = decided.value().value_before;

@@ -131,6 +131,7 @@ class FlightEngine {
   void near_enough(NetworkId anchor, double distance_m);
   void look_for_arrival(double now_s);
   void work(double now_s, std::span<const Estimate> estimates);
+  std::string outcome(const std::string& which) const;
   void judge_anchors(double now_s, std::span<const Estimate> estimates);
   void decide(double now_s, std::span<const Estimate> estimates);
 

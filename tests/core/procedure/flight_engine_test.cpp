@@ -289,10 +289,10 @@ TEST(FlightEngine, EveryExpectedAnchorIsDoneOnlyWhenItIs) {
     EXPECT_TRUE(f.engine.state().anchors[0].done);
     EXPECT_EQ(f.engine.state().step, second_is_expected ? Step::go_to_waypoint : Step::return_home)
         << f.engine.state().reason;
-    EXPECT_NE(f.engine.state().reason.find(second_is_expected ? "every anchor heard so far is done"
-                                                              : "every expected anchor is done"),
+    const std::string which = second_is_expected ? "received" : "expected";
+    EXPECT_NE(f.engine.state().reason.find("every " + which + " anchor is done or given up; 1 without the accuracy"),
               std::string::npos)
-        << f.engine.state().reason;
+        << "its one point is over, its accuracy was not reached: " << f.engine.state().reason;
   }
 }
 
