@@ -128,8 +128,7 @@ void read_tag(Reader r, Mission& mission) {
     }
   }
   for (const auto& other : mission.tags) {
-    if (other.tag == antenna.tag && other.antenna == antenna.antenna)
-      r.fail("tag '" + id + "' occurs twice");
+    if (other.tag == antenna.tag && other.antenna == antenna.antenna) r.fail("tag '" + id + "' occurs twice");
   }
   mission.tags.push_back(antenna);
 }

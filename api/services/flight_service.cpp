@@ -54,8 +54,8 @@ void FlightService::stop() {
 
 void FlightService::step() {
   auto& s = *state_;
-  // The estimates belong to the mission's strand, whose observer asks for our lock: never ask for both. Nor is
-  // that strand waited for: safety is looked after here, whatever the estimator does.
+  // The estimates belong to the mission's strand, whose observer asks for our lock: never ask for both. Nor
+  // is that strand waited for: safety is looked after here, whatever the estimator does.
   std::optional<MissionId> mission;
   bool deciding = false;
   {

@@ -58,18 +58,16 @@ bool ActiveFlight::to_keep(std::string& text) {
     return true;
   }
   const auto& o = frame.origin();
-  text = to_wire(nlohmann::ordered_json{{"plan", nlohmann::json::parse(stored(plan).document_json)},
-                                        {"plan_id", to_string(plan.id)},
-                                        {"plan_revision", plan.version},
-                                        {"manual", manual},
-                                        {"aircraft",
-                                         {{"peer", aircraft.peer},
-                                          {"system", aircraft.system},
-                                          {"component", aircraft.component}}},
-                                        {"origin", {o.lat_deg, o.lon_deg, o.height_m}},
-                                        {"home_m", {home_m.x(), home_m.y(), home_m.z()}},
-                                        {"state", stored_state(control.engine().state())},
-                                        {"clues", told}});
+  text = to_wire(nlohmann::ordered_json{
+      {"plan", nlohmann::json::parse(stored(plan).document_json)},
+      {"plan_id", to_string(plan.id)},
+      {"plan_revision", plan.version},
+      {"manual", manual},
+      {"aircraft", {{"peer", aircraft.peer}, {"system", aircraft.system}, {"component", aircraft.component}}},
+      {"origin", {o.lat_deg, o.lon_deg, o.height_m}},
+      {"home_m", {home_m.x(), home_m.y(), home_m.z()}},
+      {"state", stored_state(control.engine().state())},
+      {"clues", told}});
   return true;
 }
 

@@ -39,7 +39,7 @@ struct ActiveFlight {
   Plan plan;
   bool manual{false};
   DroneIdentity aircraft;  ///< that it was begun with
-  EnuFrame frame;  ///< of the plan, its ground at height 0
+  EnuFrame frame;          ///< of the plan, its ground at height 0
   Eigen::Vector3d home_m;
   procedure::FlightControl control;
   /// What is known of the anchors' sides: of before a restart, and of the engine since.

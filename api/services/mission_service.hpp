@@ -90,9 +90,9 @@ class MissionService {
   /// What a person took out of use of this mission changed: its live flight, where there is one, begins anew
   /// with what the store holds, less that.
   void exclusions_changed(const MissionId& id);
-  /// Rows of one kind as they come, before they are stored: whatever is newer than all that came before of its
-  /// tag and anchor (or rover) cannot be a repetition, goes to the live flight and is marked. The rest waits
-  /// for the store's word. Never waits for the store.
+  /// Rows of one kind as they come, before they are stored: whatever is newer than all that came before of
+  /// its tag and anchor (or rover) cannot be a repetition, goes to the live flight and is marked. The rest
+  /// waits for the store's word. Never waits for the store.
   void arrived(std::span<Arrived<Range>> ranges);
   void arrived(std::span<Arrived<Fix>> fixes);
   /// The store's word on each: what it accepted and the live flight does not have goes there now.

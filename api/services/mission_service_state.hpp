@@ -33,7 +33,8 @@ struct MissionService::Flight {
   Mission mission;  ///< under queue_mutex
   std::deque<LiveRow> queue;
   NewestRows newest;
-  std::unordered_set<std::size_t> ahead;  ///< identities of what it took and the store did not; at most 100 000
+  std::unordered_set<std::size_t>
+      ahead;  ///< identities of what it took and the store did not; at most 100 000
   std::optional<procedure::FlightClues> new_clues;
   bool view_wanted{false};  ///< by one who does not wait: made as soon as the strand is at rest
   std::optional<LiveView> view;

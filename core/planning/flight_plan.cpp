@@ -218,8 +218,9 @@ Result<void> order(FlightPlan& plan, std::vector<Candidate> chosen, const Flight
     if (way.empty()) {
       const auto any = route(bounds, from, to);
       if (!any) {
-        return make_error(Errc::not_found,
-                          "no permitted path joins two points of the flight: widen the fence or reduce the clearance");
+        return make_error(
+            Errc::not_found,
+            "no permitted path joins two points of the flight: widen the fence or reduce the clearance");
       }
       way.assign(any->begin(), any->end() - 1);
     }

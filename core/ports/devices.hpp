@@ -109,8 +109,8 @@ struct DeviceBatch {
   bool empty() const { return size() == 0; }
 };
 
-/// Who takes the rows of devices: first for the live flight, then to be kept. The two come from a thread each,
-/// so that a flight never waits for a disk.
+/// Who takes the rows of devices: first for the live flight, then to be kept. The two come from a thread
+/// each, so that a flight never waits for a disk.
 class DeviceRows {
  public:
   virtual ~DeviceRows() = default;

@@ -42,8 +42,8 @@ enum class ModeKind : std::uint8_t { other, guided, hold, return_home, land };
 
 /// Which aircraft of a link is ours.
 struct DroneIdentity {
-  std::string peer;               ///< address and port where the link has senders (UDP)
-  int system{}, component{};      ///< MAVLink ids; system 0: none was heard
+  std::string peer;           ///< address and port where the link has senders (UDP)
+  int system{}, component{};  ///< MAVLink ids; system 0: none was heard
 };
 
 /// How the aircraft is, as its autopilot tells. Ages in seconds; infinity: never.

@@ -132,7 +132,7 @@ struct AnchorTask {
   int samples_here{};
   bool done{false};
   bool reached{false};  ///< its accuracy; done without it: a limit ended it
-  std::string why;  ///< why it is done, or why not yet
+  std::string why;      ///< why it is done, or why not yet
   bool operator==(const AnchorTask&) const = default;
 };
 

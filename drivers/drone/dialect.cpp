@@ -8,8 +8,8 @@ namespace {
 
 constexpr std::uint32_t px4(std::uint32_t main, std::uint32_t sub) { return main << 16U | sub << 24U; }
 
-// ArduCopter mode.h Mode::Number; PX4 commander/px4_custom_mode.h. Hold is BRAKE for ArduPilot (stops at once) and AUTO/LOITER for
-// PX4.
+// ArduCopter mode.h Mode::Number; PX4 commander/px4_custom_mode.h. Hold is BRAKE for ArduPilot (stops at
+// once) and AUTO/LOITER for PX4.
 constexpr Dialect k_ardupilot{Autopilot::ardupilot, "ArduPilot", 4, 17, 6, 9, 4, false, true, false};
 constexpr Dialect k_px4{Autopilot::px4, "PX4",     px4(4, 3), px4(4, 3), px4(4, 5),
                         px4(4, 6),      px4(4, 2), true,      false,     true};

@@ -29,7 +29,7 @@ class Vehicle {
   void go_to(const Eigen::Vector3d& point_m, std::optional<double> heading_rad);
   void hold();
   void return_home();
-  void land();                                  ///< where it is
+  void land();                                   ///< where it is
   void land_at(const Eigen::Vector2d& place_m);  ///< going there while it sinks
   void set_speed(double mps) { options_.max_speed_mps = mps; }
   void set_battery(double share) { battery_ = share; }

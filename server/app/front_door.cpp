@@ -88,7 +88,8 @@ std::optional<api::Response> FrontDoor::identify(api::Request& request, bool web
   for (const auto& [key, value] : request.query) {
     // A long-lived secret in an address ends in logs, histories and Referer headers.
     if (key == "token" || key == "access_token" || value.starts_with("anc_")) {
-      return problem(400, "malformed", "a token in the address is not accepted; send it as Authorization: Bearer");
+      return problem(400, "malformed",
+                     "a token in the address is not accepted; send it as Authorization: Bearer");
     }
   }
   if (access_.options().auth_off) {

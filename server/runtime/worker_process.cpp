@@ -123,7 +123,8 @@ void tell(const api::WorkProgressSink& progress, const Json& j) {
 }
 
 Errc errc_of(const Json& number) {
-  const bool known = number.is_number_unsigned() && number.get<std::uint64_t>() <= static_cast<unsigned>(Errc::internal);
+  const bool known =
+      number.is_number_unsigned() && number.get<std::uint64_t>() <= static_cast<unsigned>(Errc::internal);
   return known ? static_cast<Errc>(number.get<int>()) : Errc::internal;
 }
 

@@ -62,8 +62,9 @@ class SqlTrainingRunStore final : public TrainingRunStore {
                                         const std::optional<std::string>& task) override {
     return read_value<std::vector<TrainingRun>>(
         gate_, [&](Connection& c) -> Result<std::vector<TrainingRun>> {
-          Query query(c, std::string(k_columns) + "WHERE (?1 IS NULL OR r.id < ?1) AND (?2 IS NULL OR r.task = ?2) "
-                                                  "ORDER BY r.id DESC LIMIT ?3");
+          Query query(c, std::string(k_columns) +
+                             "WHERE (?1 IS NULL OR r.id < ?1) AND (?2 IS NULL OR r.task = ?2) "
+                             "ORDER BY r.id DESC LIMIT ?3");
           query << after << task << row_limit(limit);
           std::vector<TrainingRun> found;
           while (query.step()) found.push_back(read(query));

@@ -78,7 +78,8 @@ TEST_F(Flights, StartingAgainInTheAirNeedsAHomeOnTheGround) {
   ASSERT_EQ(again.status, 202) << again.body;
   fly(1);
   const std::string step = procedure()["step"];
-  EXPECT_TRUE(step == "go_to_waypoint" || step == "search_anchors") << "it is up already, maybe there: " << step;
+  EXPECT_TRUE(step == "go_to_waypoint" || step == "search_anchors")
+      << "it is up already, maybe there: " << step;
   ASSERT_EQ(act("return", lease).status, 202);
   EXPECT_TRUE(fly_until([&] { return procedure()["step"] == "done"; }, 120)) << procedure().dump(1);
   EXPECT_LT((drone_->autopilot.vehicle().position_m() - k_home_m).norm(), 2) << "on the ground, at home";

@@ -55,7 +55,8 @@ TEST_F(HubRules, AStreamIsResumedWithAllThatWasMissedHoweverOftenTheHubTicked) {
     hub_.tick();
   }
   auto client = connect();
-  client->on_text(R"({"op":"sub","id":1,"topic":"ranges","since":{"epoch":")" + hub_.epoch() + R"(","seq":2}})");
+  client->on_text(R"({"op":"sub","id":1,"topic":"ranges","since":{"epoch":")" + hub_.epoch() +
+                  R"(","seq":2}})");
   const auto frames = read(*client);
   EXPECT_EQ(of(frames, "ack")[0]["recovered"], true);
   std::vector<int> missed;

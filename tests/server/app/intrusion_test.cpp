@@ -108,8 +108,9 @@ TEST(LiveClients, TwoThousandComeAndGoWhileRowsStream) {
         rows += R"({"t_us":)" + std::to_string(1'780'000'000'000'000 + (i * 20 + k) * 10'000LL) +
                 R"(,"tag":"0x6e02","anchor":"0x6a21","distance_m":5})" + "\n";
       }
-      EXPECT_EQ(client.call("POST", "/api/v1/ranges?mission=" + id, rows, "application/x-ndjson").value().status,
-                200);
+      EXPECT_EQ(
+          client.call("POST", "/api/v1/ranges?mission=" + id, rows, "application/x-ndjson").value().status,
+          200);
     }
   });
   for (auto& one : crowd) one.join();

@@ -38,8 +38,7 @@ std::set<std::string> running() {
 }
 
 TEST(Threads, OfARunningServerAreThoseThatTheArchitectureLists) {
-  AppFixture server(
-      Settings{{"drone.address", "tcp://127.0.0.1:9"}, {"devices", "gnss=tcp://127.0.0.1:9"}});
+  AppFixture server(Settings{{"drone.address", "tcp://127.0.0.1:9"}, {"devices", "gnss=tcp://127.0.0.1:9"}});
   ASSERT_TRUE(server.app) << server.error.message;
   const auto [listed, at_times] = documented();
   ASSERT_GT(listed.size(), 10u);

@@ -146,7 +146,8 @@ class Sender {
     to_.sin_family = AF_INET;
     to_.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     to_.sin_port = htons(to);
-    EXPECT_EQ(::connect(socket_, reinterpret_cast<const sockaddr*>(&to_), sizeof to_), 0);  // it has a port now
+    EXPECT_EQ(::connect(socket_, reinterpret_cast<const sockaddr*>(&to_), sizeof to_),
+              0);  // it has a port now
   }
   ~Sender() { ::close(socket_); }
   /// As the server sees it, once something was sent.
