@@ -12,6 +12,9 @@ namespace {
 constexpr std::uint16_t k_bye_code = 4010;
 constexpr std::string_view k_bye_reason = "shutting_down";
 
+/// What the age of a message is measured by: the wall clock may step.
+std::int64_t steady_us() { return system_steady_clock().now().ns / 1000; }
+
 }  // namespace
 
 const std::array<TopicInfo, k_topic_count>& topics() {
@@ -35,13 +38,6 @@ const std::array<TopicInfo, k_topic_count>& topics() {
   }};
   return k_topics;
 }
-
-namespace {
-
-/// What the age of a message is measured by: the wall clock may step.
-std::int64_t steady_us() { return system_steady_clock().now().ns / 1000; }
-
-}  // namespace
 
 const TopicInfo& info(Topic topic) { return topics()[static_cast<std::size_t>(topic)]; }
 

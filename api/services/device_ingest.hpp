@@ -15,7 +15,7 @@ class MissionService;
 class DeviceIngest final : public DeviceRows {
  public:
   DeviceIngest(MeasurementStore& store, MissionService& missions) : store_(store), missions_(missions) {}
-  void live(DeviceBatch& batch) override;
+  void live(const DeviceBatch& batch) override;
   Result<void> store(const DeviceBatch& batch) override;
 
  private:

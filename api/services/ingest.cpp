@@ -251,20 +251,19 @@ class IngestRun {
     }
     if (!poses_.empty()) store_poses();
     const bool with_cir = service_.missions_.wants_cir();
-    std::vector<Arrived<Row>> live;
+    std::vector<Row> live;
     live.reserve(rows_.size());
     for (const auto& row : rows_) {
       if constexpr (std::is_same_v<Row, Range>)
-        live.push_back({with_cir ? row : without_cir(row)});
+        live.push_back(with_cir ? row : without_cir(row));
       else
-        live.push_back({row});
+        live.push_back(row);
     }
     // All or nothing is known only afterwards.
     if (!atomic_) service_.missions_.arrived(live);
     auto stored = append(service_.store_, std::move(rows_), atomic_);
     rows_.clear();
     if (!stored) {
-      service_.missions_.not_stored(live);
       std::string before = accepted_ + duplicates_ == 0 ? ""
                                                         : "; " + std::to_string(accepted_ + duplicates_) +
                                                               " rows before are stored, send all again";
@@ -274,7 +273,7 @@ class IngestRun {
     lines_.clear();
   }
 
-  void settle(const std::vector<RowOutcome>& outcomes, std::span<const Arrived<Row>> live) {
+  void settle(const std::vector<RowOutcome>& outcomes, std::span<const Row> live) {
     bool sunk = false;
     for (const auto outcome : outcomes)
       sunk = sunk || outcome == RowOutcome::conflict || outcome == RowOutcome::unknown_mission;
@@ -304,15 +303,11 @@ class IngestRun {
   }
 
   void store_poses() {
-    std::vector<Arrived<Fix>> live;
-    for (const auto& pose : poses_) live.push_back({pose});
+    const auto live = poses_;
     service_.missions_.arrived(live);
     auto stored = service_.store_.append_fixes(std::move(poses_), false);
     poses_.clear();
-    if (!stored) {
-      service_.missions_.not_stored(live);
-      throw ProblemException{problem_of(stored.error())};
-    }
+    if (!stored) throw ProblemException{problem_of(stored.error())};
     service_.missions_.accepted(live, stored.value());
   }
 

@@ -32,14 +32,14 @@ std::size_t identity(const LiveRow& row) {
   return identity(std::get<Fix>(row));
 }
 
-bool NewestRows::note(const Range& range) {
+bool RowsAhead::note(const Range& range) {
   const auto [at, is_first] = ranges_.try_emplace({range.tag, range.anchor, range.antenna}, range.time);
   if (!is_first && !(at->second < range.time)) return false;
   at->second = range.time;
   return true;
 }
 
-bool NewestRows::note(const Fix& fix) {
+bool RowsAhead::note(const Fix& fix) {
   if (fix_ && !(*fix_ < fix.time)) return false;
   fix_ = fix.time;
   return true;

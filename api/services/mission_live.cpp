@@ -39,35 +39,16 @@ void MissionService::State::enqueue(Flight& flight, const R& row, SteadyTime now
 }
 
 template <class R>
-void MissionService::State::take_newest(std::span<Arrived<R>> rows) {
+void MissionService::State::take_newest(std::span<const R> rows) {
   const SteadyTime now = steady_now();
   std::shared_ptr<Flight> flight;
-  for (auto& [row, live] : rows) {
+  for (const auto& row : rows) {
     if (!flight || flight->id != row.mission) flight = find(row.mission);
     if (!flight) continue;
     {
       const std::scoped_lock lock(flight->queue_mutex);
       // While it is read back from the store its newest row is not known.
-      live = !flight->rebuilding && flight->newest.note(row);
-    }
-    if (live) enqueue(*flight, row, now);
-  }
-  for (const auto& f : all()) schedule(f);
-}
-
-template <class R>
-void MissionService::State::accept(std::span<const Arrived<R>> rows, std::span<const RowOutcome> outcomes) {
-  const SteadyTime now = steady_now();
-  std::shared_ptr<Flight> flight;
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const auto& [row, live] = rows[i];
-    if (live || outcomes[i] != RowOutcome::accepted) continue;
-    if (!flight || flight->id != row.mission) flight = find(row.mission);
-    if (!flight) continue;
-    {
-      const std::scoped_lock lock(flight->queue_mutex);
-      flight->newest.note(row);
-      if (!flight->ahead.empty() && flight->ahead.erase(identity(row)) > 0) continue;
+      if (flight->rebuilding || !flight->ahead.take(row)) continue;
     }
     enqueue(*flight, row, now);
   }
@@ -75,21 +56,26 @@ void MissionService::State::accept(std::span<const Arrived<R>> rows, std::span<c
 }
 
 template <class R>
-void MissionService::State::remember_ahead(std::span<const Arrived<R>> rows) {
-  for (const auto& [row, live] : rows) {
-    const auto flight = live ? find(row.mission) : nullptr;
+void MissionService::State::accept(std::span<const R> rows, std::span<const RowOutcome> outcomes) {
+  const SteadyTime now = steady_now();
+  std::shared_ptr<Flight> flight;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (!flight || flight->id != rows[i].mission) flight = find(rows[i].mission);
     if (!flight) continue;
-    const std::scoped_lock lock(flight->queue_mutex);
-    if (flight->ahead.size() < k_max_queued_rows) flight->ahead.insert(identity(row));
+    {
+      const std::scoped_lock lock(flight->queue_mutex);
+      // Of several senders of one row the store accepts one: whoever was live with it, it has been had.
+      if (outcomes[i] != RowOutcome::accepted || flight->ahead.settle(rows[i])) continue;
+    }
+    enqueue(*flight, rows[i], now);
   }
+  for (const auto& f : all()) schedule(f);
 }
 
-template void MissionService::State::take_newest(std::span<Arrived<Range>>);
-template void MissionService::State::take_newest(std::span<Arrived<Fix>>);
-template void MissionService::State::accept(std::span<const Arrived<Range>>, std::span<const RowOutcome>);
-template void MissionService::State::accept(std::span<const Arrived<Fix>>, std::span<const RowOutcome>);
-template void MissionService::State::remember_ahead(std::span<const Arrived<Range>>);
-template void MissionService::State::remember_ahead(std::span<const Arrived<Fix>>);
+template void MissionService::State::take_newest(std::span<const Range>);
+template void MissionService::State::take_newest(std::span<const Fix>);
+template void MissionService::State::accept(std::span<const Range>, std::span<const RowOutcome>);
+template void MissionService::State::accept(std::span<const Fix>, std::span<const RowOutcome>);
 
 void MissionService::State::schedule(const std::shared_ptr<Flight>& flight) {
   {
@@ -193,6 +179,7 @@ void MissionService::State::work(Flight& flight) {
   auto made = view(flight);
   const std::scoped_lock queue(flight.queue_mutex);
   flight.view = std::move(made);
+  flight.view_made = steady_now();
 }
 
 void MissionService::State::step(Flight& flight, const LiveRow& row, bool quiet) {

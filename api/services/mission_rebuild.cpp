@@ -74,7 +74,7 @@ bool MissionService::State::rebuild_slice(Flight& flight) {
   const auto take = [&](auto& rows) {
     {
       const std::scoped_lock queue(flight.queue_mutex);
-      flight.newest.note(rows.front());
+      flight.ahead.note(rows.front());
     }
     const LiveRow row = row_of(std::move(rows.front()));
     rows.pop_front();

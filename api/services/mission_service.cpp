@@ -5,6 +5,11 @@
 #include "api/services/mission_service_state.hpp"
 
 namespace anchord::api {
+namespace {
+
+constexpr double k_view_s = 2;  ///< old, the estimates that were made for one who does not wait
+
+}  // namespace
 
 MissionService::MissionService(Deps deps) : state_(std::make_shared<State>(std::move(deps))) {}
 MissionService::~MissionService() { stop(); }
@@ -92,6 +97,7 @@ void MissionService::exclusions_changed(const MissionId& id) {
   {
     const std::scoped_lock lock(flight->queue_mutex);
     mission = flight->mission;
+    flight->ahead.forget();
   }
   {
     const std::scoped_lock lock(flight->work_mutex);
@@ -127,16 +133,14 @@ void MissionService::note_in_flights(const std::string& code, const std::string&
   for (const auto& id : recording) state_->deps.events.add("info", code, text, id);
 }
 
-void MissionService::arrived(std::span<Arrived<Range>> ranges) { state_->take_newest(ranges); }
-void MissionService::arrived(std::span<Arrived<Fix>> fixes) { state_->take_newest(fixes); }
-void MissionService::accepted(std::span<const Arrived<Range>> ranges, std::span<const RowOutcome> outcomes) {
+void MissionService::arrived(std::span<const Range> ranges) { state_->take_newest(ranges); }
+void MissionService::arrived(std::span<const Fix> fixes) { state_->take_newest(fixes); }
+void MissionService::accepted(std::span<const Range> ranges, std::span<const RowOutcome> outcomes) {
   state_->accept(ranges, outcomes);
 }
-void MissionService::accepted(std::span<const Arrived<Fix>> fixes, std::span<const RowOutcome> outcomes) {
+void MissionService::accepted(std::span<const Fix> fixes, std::span<const RowOutcome> outcomes) {
   state_->accept(fixes, outcomes);
 }
-void MissionService::not_stored(std::span<const Arrived<Range>> ranges) { state_->remember_ahead(ranges); }
-void MissionService::not_stored(std::span<const Arrived<Fix>> fixes) { state_->remember_ahead(fixes); }
 
 std::vector<MissionService::LiveView> MissionService::live(const std::optional<MissionId>& id) {
   std::vector<std::shared_ptr<Flight>> wanted;
@@ -167,7 +171,10 @@ std::optional<MissionService::LiveView> MissionService::live_at_hand(const Missi
   if (const std::unique_lock lock(flight->work_mutex, std::try_to_lock); lock) return state_->view(*flight);
   const std::scoped_lock lock(flight->queue_mutex);
   flight->view_wanted = true;
-  return std::exchange(flight->view, std::nullopt);
+  // One that was made for an earlier question and never fetched is none.
+  auto made = std::exchange(flight->view, std::nullopt);
+  return made && seconds_between(flight->view_made, state_->steady_now()) < k_view_s ? std::move(made)
+                                                                                     : std::nullopt;
 }
 
 MissionService::LiveView MissionService::State::view(Flight& flight) const {

@@ -18,7 +18,6 @@
 #include "core/geo/track_segments.hpp"
 #include "core/localize/accuracy_goal.hpp"
 #include "core/procedure/flight_clues.hpp"
-#include "core/types/arrived.hpp"
 #include "core/types/estimate.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/mission.hpp"
@@ -91,16 +90,13 @@ class MissionService {
   /// with what the store holds, less that.
   void exclusions_changed(const MissionId& id);
   /// Rows of one kind as they come, before they are stored: whatever is newer than all that came before of
-  /// its tag and anchor (or rover) cannot be a repetition, goes to the live flight and is marked. The rest
-  /// waits for the store's word. Never waits for the store.
-  void arrived(std::span<Arrived<Range>> ranges);
-  void arrived(std::span<Arrived<Fix>> fixes);
-  /// The store's word on each: what it accepted and the live flight does not have goes there now.
-  void accepted(std::span<const Arrived<Range>> ranges, std::span<const RowOutcome> outcomes);
-  void accepted(std::span<const Arrived<Fix>> fixes, std::span<const RowOutcome> outcomes);
-  /// They were not stored and may be sent again: the live flight does not take them twice.
-  void not_stored(std::span<const Arrived<Range>> ranges);
-  void not_stored(std::span<const Arrived<Fix>> fixes);
+  /// its tag and anchor (or rover) cannot be a repetition and goes to the live flight. The rest waits for the
+  /// store's word. Never waits for the store.
+  void arrived(std::span<const Range> ranges);
+  void arrived(std::span<const Fix> fixes);
+  /// The store's word on each: what it accepted and the live flight has not had goes there now.
+  void accepted(std::span<const Range> ranges, std::span<const RowOutcome> outcomes);
+  void accepted(std::span<const Fix> fixes, std::span<const RowOutcome> outcomes);
 
   /// What the turns and height searches of its flight told of its anchors: priors of every running estimate
   /// from now on. Never waits.

@@ -5,7 +5,6 @@
 #include <chrono>
 #include <condition_variable>
 #include <deque>
-#include <unordered_set>
 #include <variant>
 
 #include "api/json/live_writer.hpp"
@@ -32,12 +31,11 @@ struct MissionService::Flight {
   std::mutex queue_mutex;
   Mission mission;  ///< under queue_mutex
   std::deque<LiveRow> queue;
-  NewestRows newest;
-  std::unordered_set<std::size_t>
-      ahead;  ///< identities of what it took and the store did not; at most 100 000
+  RowsAhead ahead{k_max_queued_rows};
   std::optional<procedure::FlightClues> new_clues;
   bool view_wanted{false};  ///< by one who does not wait: made as soon as the strand is at rest
   std::optional<LiveView> view;
+  SteadyTime view_made{};
   bool scheduled{false};
   bool closing{false};  ///< finished, and what waits for a fix is not told yet
   std::uint64_t dropped{0};
@@ -111,11 +109,9 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
 
   // Of Range and of Fix:
   template <class R>
-  void take_newest(std::span<Arrived<R>> rows);
+  void take_newest(std::span<const R> rows);
   template <class R>
-  void accept(std::span<const Arrived<R>> rows, std::span<const RowOutcome> outcomes);
-  template <class R>
-  void remember_ahead(std::span<const Arrived<R>> rows);
+  void accept(std::span<const R> rows, std::span<const RowOutcome> outcomes);
   template <class R>
   void enqueue(Flight& flight, const R& row, SteadyTime now);
   /// A write that the live path does not wait for.

@@ -8,7 +8,6 @@
 
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
-#include "core/types/arrived.hpp"
 #include "core/types/base_station.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/range.hpp"
@@ -103,8 +102,8 @@ class DeviceControl {
 
 /// Rows of devices, of each kind in the order of their arrival.
 struct DeviceBatch {
-  std::vector<Arrived<Fix>> fixes;
-  std::vector<Arrived<Range>> ranges;
+  std::vector<Fix> fixes;
+  std::vector<Range> ranges;
   std::size_t size() const { return fixes.size() + ranges.size(); }
   bool empty() const { return size() == 0; }
 };
@@ -114,8 +113,8 @@ struct DeviceBatch {
 class DeviceRows {
  public:
   virtual ~DeviceRows() = default;
-  /// Never waits for the database. Marks what the live flight took.
-  virtual void live(DeviceBatch& batch) = 0;
+  /// Never waits for the database.
+  virtual void live(const DeviceBatch& batch) = 0;
   /// Blocks on the database. After an error the same batch may come again.
   virtual Result<void> store(const DeviceBatch& batch) = 0;
 };

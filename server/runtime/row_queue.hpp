@@ -22,7 +22,7 @@ class RowQueue {
   template <class Row>
   void push(Row row) {
     const std::scoped_lock lock(mutex_);
-    add(Arrived<Row>{std::move(row), false});
+    add(std::move(row));
     if (size() >= k_batch_rows) told_.notify_one();
   }
   void push(DeviceBatch batch) {
@@ -61,11 +61,11 @@ class RowQueue {
 
  private:
   static constexpr std::size_t k_batch_rows = 200;
-  std::deque<Arrived<Fix>>& of(const Arrived<Fix>&) { return fixes_; }
-  std::deque<Arrived<Range>>& of(const Arrived<Range>&) { return ranges_; }
+  std::deque<Fix>& of(const Fix&) { return fixes_; }
+  std::deque<Range>& of(const Range&) { return ranges_; }
   std::size_t size() const { return fixes_.size() + ranges_.size(); }
   template <class Row>
-  void add(Arrived<Row> row) {
+  void add(Row row) {
     auto& rows = of(row);
     rows.push_back(std::move(row));
     if (size() <= most_rows_) return;
@@ -76,8 +76,8 @@ class RowQueue {
   const std::chrono::milliseconds batch_time_;
   mutable std::mutex mutex_;
   std::condition_variable told_;
-  std::deque<Arrived<Fix>> fixes_;
-  std::deque<Arrived<Range>> ranges_;
+  std::deque<Fix> fixes_;
+  std::deque<Range> ranges_;
   std::uint64_t dropped_{0};
   bool stopping_{false};
 };

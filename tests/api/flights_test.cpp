@@ -291,7 +291,7 @@ TEST_F(Flights, GoesOnWhileTheDatabaseTakesNoWriteForHalfAMinute) {
     fix.fix = FixClass::rtk_fixed;
     fix.correction_age_s = 0.8;
     DeviceBatch batch;
-    batch.fixes.push_back({fix});
+    batch.fixes.push_back(fix);
     const auto began = std::chrono::steady_clock::now();
     app_->device_rows().live(batch);
     app_->fly();

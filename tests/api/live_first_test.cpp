@@ -89,7 +89,7 @@ class LiveFirst : public AppFixture {
       fix.position = {51.0231, 3.7131 + i * 1e-7, 55.5};
       fix.fix = FixClass::rtk_fixed;
       fix.seq = i;
-      out.fixes.push_back({fix});
+      out.fixes.push_back(fix);
     }
     return out;
   }
@@ -146,7 +146,7 @@ TEST_F(LiveFirst, WhatMustBeWholeIsLiveOnlyOnceItIsStored) {
 
 TEST_F(LiveFirst, RowsOfDevicesAreLiveBeforeTheyAreStoredAndNotAgainAfter) {
   const auto flight = listened_mission();
-  auto batch = of_device(flight, 0, 25);
+  const auto batch = of_device(flight, 0, 25);
   app_->device_rows().live(batch);
   EXPECT_EQ(live(), 25);
   EXPECT_EQ(stored(flight), 0);
@@ -157,17 +157,30 @@ TEST_F(LiveFirst, RowsOfDevicesAreLiveBeforeTheyAreStoredAndNotAgainAfter) {
   ASSERT_TRUE(app_->device_rows().store(batch));
   EXPECT_EQ(stored(flight), 25);
   EXPECT_EQ(live(), 0);
-  auto repeated = of_device(flight, 20, 30);
+  const auto repeated = of_device(flight, 20, 30);
   app_->device_rows().live(repeated);
   ASSERT_TRUE(app_->device_rows().store(repeated));
   EXPECT_EQ(live(), 5);
+}
+
+TEST_F(LiveFirst, ARowOfTwoSendersIsLiveOnceWhoeverIsStoredFirst) {
+  const auto flight = listened_mission();
+  const auto batch = of_device(flight, 0, 25);
+  app_->device_rows().live(batch);
+  EXPECT_EQ(live(), 25);
+  ASSERT_EQ(send(flight, fixes(0, 25)).status, 200);
+  EXPECT_EQ(stored(flight), 25) << "the second sender was stored first";
+  EXPECT_EQ(live(), 0);
+  ASSERT_TRUE(app_->device_rows().store(batch));
+  EXPECT_EQ(stored(flight), 25);
+  EXPECT_EQ(live(), 0);
 }
 
 TEST_F(LiveFirst, RowsOfAMissionThatNobodyLookedAtAreLiveOnceTheyAreStored) {
   const auto flight = mission();
   restart();
   listen();
-  auto batch = of_device(flight, 0, 25);
+  const auto batch = of_device(flight, 0, 25);
   app_->device_rows().live(batch);
   EXPECT_EQ(live(), 0);
   ASSERT_TRUE(app_->device_rows().store(batch));

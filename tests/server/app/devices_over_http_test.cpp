@@ -167,7 +167,7 @@ TEST(DevicesOverHttp, RefusesWhatNoDriverTakesAndTheSameAddressTwice) {
 
 TEST(DeviceManager, SaysOnceThatADeviceTalksAndOnceThatItIsGone) {
   struct Nowhere final : DeviceRows {
-    void live(DeviceBatch&) override {}
+    void live(const DeviceBatch&) override {}
     Result<void> store(const DeviceBatch&) override { return boost::outcome_v2::success(); }
   } nowhere;
   std::mutex mutex;

@@ -18,7 +18,7 @@ constexpr auto k_good =
     R"({"id":"01890000-0000-7000-8000-000000000001","kind":"gnss","name":"rover","address":"tcp://127.0.0.1:9","options":{},"enabled":true,"version":3})";
 
 struct Nowhere final : DeviceRows {
-  void live(DeviceBatch&) override {}
+  void live(const DeviceBatch&) override {}
   Result<void> store(const DeviceBatch&) override { return boost::outcome_v2::success(); }
 };
 
