@@ -64,6 +64,8 @@ class MeasurementStore {
     std::vector<std::int64_t> ids;  ///< row ids, parallel to rows: the {id} of /ranges/{id}
     std::string next;               ///< empty at the end
   };
+  /// Errors of a page or count: not_found where filter.mission is not there (any more): who reads page by
+  /// page never takes the beginning of a flight deleted meanwhile for the whole.
   virtual Result<Page<Range>> ranges(const Filter& filter) = 0;
   virtual Result<Page<Fix>> fixes(const Filter& filter) = 0;
   virtual Result<Range> range(std::int64_t id) = 0;  ///< with CIR and truth

@@ -239,6 +239,10 @@ MissionId mission_id(Connection& connection, std::int64_t key) {
   return query.id<MissionId>();
 }
 
+Error gone(const MissionId& id) {
+  return make_error(Errc::not_found, "no mission " + to_string(id) + ": it was deleted, or never was here");
+}
+
 template <class Row>
 Result<MeasurementStore::Page<Row>> read_page(Connection& connection,
                                               const MeasurementStore::Filter& filter) {
@@ -247,7 +251,8 @@ Result<MeasurementStore::Page<Row>> read_page(Connection& connection,
   std::optional<std::int64_t> key;
   if (filter.mission) {
     key = mission_key(connection, *filter.mission);
-    if (!key) return page;
+    // Also between two pages: what was deleted meanwhile must not pass for a whole flight.
+    if (!key) return gone(*filter.mission);
   }
   Query query(connection, page_text<Row>(filter, cursor.has_value()));
   bind_filter<Row>(query, filter, key);
@@ -312,7 +317,7 @@ class SqlMeasurementStore final : public MeasurementStore {
     filter.every = 1;
     return read_value<std::uint64_t>(gate_, [&](Connection& c) -> Result<std::uint64_t> {
       const auto key = filter.mission ? mission_key(c, *filter.mission) : std::nullopt;
-      if (filter.mission && !key) return std::uint64_t{0};
+      if (filter.mission && !key) return gone(*filter.mission);
       int n = 0;
       Query query(c, "SELECT count(*) FROM uwb_range" + where_text<Range>(filter, n));
       bind_filter<Range>(query, filter, key);

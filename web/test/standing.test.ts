@@ -16,7 +16,13 @@ describe('what a device stands for', () => {
     expect(standing(device({}), recent(0, { stray_line: 1 })).what).toContain('knows no anchor');
     expect(said({}, recent(10, { bad_reply: 69, no_answer: 5 }))).toEqual(['caution', 'FEW RANGES']);
   });
-  it('waits for five seconds of looking before it complains', () => expect(standing(device({}), { span_s: 2, rows: 0, dropped: {} }).word).toBe('WORKING'));
+  it('waits for five seconds of looking before it complains', () => expect(standing(device({ counters: { ranges: 40 } }), { span_s: 2, rows: 0, dropped: {} }).word).toBe('WORKING'));
+  it('does not call a device working that has delivered nothing yet', () => {
+    const little: Lately = { span_s: 2, rows: 0, dropped: {} };
+    expect(said({ kind: 'gnss', rover: null, counters: { frames: 1 } }, little)).toEqual(['info', 'OPENING']);
+    expect(said({ counters: { frames: 7 } }, little)).toEqual(['info', 'OPENING']);
+    expect(said({ kind: 'ntrip', counters: { frames: 1 } }, little)).toEqual(['ok', 'WORKING']);
+  });
   it('names the fix of a rover, and what a float costs', () => {
     const rover = (fix: string, age_s: number | null = 1): Record<string, unknown> => ({ kind: 'gnss', network_id: null, rover: { fix, satellites: 12, age_s, sigma_h_m: 0.01 } });
     expect(said(rover('fixed'))).toEqual(['ok', 'WORKING']);

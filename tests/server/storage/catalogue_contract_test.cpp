@@ -114,7 +114,9 @@ TEST_P(MissionStoreContract, HidesWhatIsInTheBinAndGivesItBackWhole) {
   EXPECT_EQ(db_->missions().insert(m).error().code, Errc::conflict) << "its id is taken";
   EXPECT_EQ(db_->missions().missions(10, std::nullopt).value().size(), 1u);
   EXPECT_EQ(db_->measurements().ranges({}).value().rows.size(), 1u) << "no query finds its rows";
-  EXPECT_TRUE(db_->measurements().ranges(of(m.id)).value().rows.empty());
+  EXPECT_EQ(db_->measurements().ranges(of(m.id)).error().code, Errc::not_found);
+  EXPECT_EQ(db_->measurements().fixes(of(m.id)).error().code, Errc::not_found);
+  EXPECT_EQ(db_->measurements().count_ranges(of(m.id)).error().code, Errc::not_found);
   EXPECT_TRUE(db_->measurements().fixes({}).value().rows.empty());
   EXPECT_EQ(db_->measurements().range(id).error().code, Errc::not_found);
   EXPECT_EQ(db_->measurements().count_ranges(MeasurementStore::Filter{}).value(), 1u);
@@ -132,6 +134,26 @@ TEST_P(MissionStoreContract, HidesWhatIsInTheBinAndGivesItBackWhole) {
   EXPECT_EQ(db_->missions().mission(m.id).value().state, MissionState::finished);
   EXPECT_EQ(db_->measurements().ranges(of(m.id)).value().rows.size(), 1u);
   EXPECT_TRUE(db_->bin().list().value().empty());
+}
+
+TEST_P(MissionStoreContract, NeverGivesTheRestOfAFlightDeletedBetweenTwoPages) {
+  auto m = stored_mission();
+  m.state = MissionState::finished;
+  ASSERT_TRUE(db_->missions().update(m));
+  ASSERT_TRUE(db_->measurements()
+                  .append_ranges({range_at(m.id, 1), range_at(m.id, 2), range_at(m.id, 3)}, false)
+                  .has_value());
+  auto filter = of(m.id);
+  filter.limit = 2;
+  const auto page = db_->measurements().ranges(filter).value();
+  ASSERT_EQ(page.rows.size(), 2u);
+  filter.after = page.next;
+  ASSERT_TRUE(db_->bin().put(m.id, k_noon, 0, "me"));
+  EXPECT_EQ(db_->measurements().ranges(filter).error().code, Errc::not_found) << "in the bin";
+  ASSERT_TRUE(db_->bin().empty(m.id));
+  while (db_->bin().remove_rows(1).value() > 0) {
+  }
+  EXPECT_EQ(db_->measurements().ranges(filter).error().code, Errc::not_found) << "gone";
 }
 
 TEST_P(MissionStoreContract, PutsNothingIntoTheBinThatRecordsOrACalibrationStandsOn) {

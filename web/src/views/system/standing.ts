@@ -105,6 +105,9 @@ function delivering(d: Device, recent: Lately): Standing {
     // A receiver's text at start-up is some lines; what goes on is the line.
     if (noise_bytes(recent.dropped) > 20 * recent.span_s) return caution('NOISY', `Garbage comes between its messages: ${noise_bytes(recent.dropped)} bytes in ${Math.round(recent.span_s)} s. What is whole is used.`, 'A loose plug, a cable beside motor wires, or two formats mixed.');
   }
+  // Linked for less than the five seconds that a verdict takes: not wrong yet, but nothing was delivered that would make it working.
+  if (d.kind === 'gnss' && !d.rover && recent.rows === 0) return stand('estimating', 'info', 'OPENING', 'It talks; waiting for its first position.');
+  if (d.kind === 'pozyx' && !d.counters.ranges && recent.rows === 0) return stand('estimating', 'info', 'OPENING', 'It talks; waiting for its first range.');
   return stand('ok', 'ok', 'WORKING');
 }
 /// `twin_speaks`: another device here with this one's id has a link.
@@ -131,7 +134,7 @@ export function standing(d: Device, recent: Lately, twin_speaks = true): Standin
 export function doing(d: Device): string {
   if (d.kind === 'gnss' && d.rover) return [({ fixed: 'FIX', float: 'FLOAT', dgps: 'DGPS', single: 'SINGLE', none: 'no fix' } as Record<string, string>)[d.rover.fix] ?? d.rover.fix, d.rover.satellites === null ? '' : `${d.rover.satellites} satellites`, d.rover.age_s === null ? '' : `corrections ${d.rover.age_s.toFixed(1)} s old`, d.rover.sigma_h_m === null ? '' : `σ ${d.rover.sigma_h_m < 1 ? `${Math.round(d.rover.sigma_h_m * 100)} cm` : `${d.rover.sigma_h_m.toFixed(1)} m`}`].filter(Boolean).join(', ');
   if (d.kind === 'pozyx') return d.counters.ranges ? `${d.counters.ranges.toLocaleString('en').replaceAll(',', ' ')} ranges` : '';
-  return d.counters.frames ? `${d.counters.frames.toLocaleString('en').replaceAll(',', ' ')} corrections` : '';
+  return d.kind === 'ntrip' && d.counters.frames ? `${d.counters.frames.toLocaleString('en').replaceAll(',', ' ')} correction${d.counters.frames === 1 ? '' : 's'}` : '';
 }
 /// For the line above the table.
 export function summary(all: readonly Standing[]): { readonly working: number; readonly look: number; readonly wrong: number; readonly off: number } {
