@@ -24,29 +24,67 @@ const say = (text) => console.error(`==> ${text}`);
 function solve() {
   const bench = join(process.env.ANCHORD_BENCH_DIR ?? '', 'solve_bench');
   if (!existsSync(bench)) return row('solve', 'not built', bench);
-  const out = JSON.parse(execFileSync(bench, ['--benchmark_format=json', '--benchmark_min_time=0.2'], { stdio: ['ignore', 'pipe', 'ignore'] }));
+  const out = JSON.parse(
+    execFileSync(bench, ['--benchmark_format=json', '--benchmark_min_time=0.2'], {
+      stdio: ['ignore', 'pipe', 'ignore'],
+    }),
+  );
   const time = Object.fromEntries(out.benchmarks.map((b) => [b.name, b]));
   for (const n of [10, 100, 1000, 10000]) {
-    row(`solve one anchor, ${n} ranges, cold`, `${time[`solve_gauss_newton/${n}`].cpu_time.toFixed(1)} us CPU`, `Ceres ${time[`solve_ceres/${n}`].cpu_time.toFixed(0)} us`);
+    row(
+      `solve one anchor, ${n} ranges, cold`,
+      `${time[`solve_gauss_newton/${n}`].cpu_time.toFixed(1)} us CPU`,
+      `Ceres ${time[`solve_ceres/${n}`].cpu_time.toFixed(0)} us`,
+    );
   }
   row('solve a flight of 3 700 ranges, 6 anchors', `${time.solve_whole_flight.cpu_time.toFixed(0)} ms CPU`);
   row('joint solve of 10 000 ranges to 50 anchors, cold', `${time.solve_fifty_anchors.cpu_time.toFixed(0)} ms CPU`);
-  row('live update, one range', `p50 ${time.live_update.p50_us.toFixed(1)} us, p99 ${time.live_update.p99_us.toFixed(1)} us`, 'limit of a range at 200 Hz: 5 ms');
-  row('live path, per second of flight', `${(time.live_whole_flight.cpu_s_per_flight_s * 1e3).toFixed(1)} ms CPU`, 'limit 1000 ms');
+  row(
+    'live update, one range',
+    `p50 ${time.live_update.p50_us.toFixed(1)} us, p99 ${time.live_update.p99_us.toFixed(1)} us`,
+    'limit of a range at 200 Hz: 5 ms',
+  );
+  row(
+    'live path, per second of flight',
+    `${(time.live_whole_flight.cpu_s_per_flight_s * 1e3).toFixed(1)} ms CPU`,
+    'limit 1000 ms',
+  );
 }
 
 // Numbers of core/ml's Method, for the names in the table.
-const methods = ['none', 'constant', 'logistic', 'random_forest', 'svm', 'boosted', 'average', 'univariate', 'multivariate'];
+const methods = [
+  'none',
+  'constant',
+  'logistic',
+  'random_forest',
+  'svm',
+  'boosted',
+  'average',
+  'univariate',
+  'multivariate',
+];
 
 function predict() {
   const bench = join(process.env.ANCHORD_BENCH_DIR ?? '', 'features_bench');
   if (!existsSync(bench)) return row('predict', 'not built', bench);
-  const out = JSON.parse(execFileSync(bench, ['--benchmark_format=json', '--benchmark_min_time=0.2'], { stdio: ['ignore', 'pipe', 'ignore'] })).benchmarks;
+  const out = JSON.parse(
+    execFileSync(bench, ['--benchmark_format=json', '--benchmark_min_time=0.2'], {
+      stdio: ['ignore', 'pipe', 'ignore'],
+    }),
+  ).benchmarks;
   const by = Object.fromEntries(out.map((b) => [b.name, b]));
-  row('features of 1016-sample CIRs', `${(by.features_of_complex_cirs.items_per_second / 1e3).toFixed(0)} k/s`, 'one thread');
+  row(
+    'features of 1016-sample CIRs',
+    `${(by.features_of_complex_cirs.items_per_second / 1e3).toFixed(0)} k/s`,
+    'one thread',
+  );
   for (const name of Object.keys(by).filter((n) => n.startsWith('predict_single/'))) {
     const method = name.split('/')[1];
-    row(`predict, ${methods[method]}, 7 features`, `${by[name].cpu_time.toFixed(0)} ns single`, `batch ${(by[`predict_batch/${method}`].items_per_second / 1e6).toFixed(2)} M/s, one thread`);
+    row(
+      `predict, ${methods[method]}, 7 features`,
+      `${by[name].cpu_time.toFixed(0)} ns single`,
+      `batch ${(by[`predict_batch/${method}`].items_per_second / 1e6).toFixed(2)} M/s, one thread`,
+    );
   }
 }
 
@@ -54,7 +92,12 @@ function bound() {
   const bench = join(process.env.ANCHORD_BENCH_DIR ?? '', 'cramer_rao_bench');
   if (!existsSync(bench)) return row('bound', 'not built', bench);
   const out = JSON.parse(execFileSync(bench, ['200'], { stdio: ['ignore', 'pipe', 'ignore'] }));
-  const one = (name, what, limit) => row(`RMSE over the Cramer-Rao bound, ${what}`, `${out[name].ratio.toFixed(3)}, 95 % region holds ${(100 * out[name].coverage).toFixed(1)} %`, limit);
+  const one = (name, what, limit) =>
+    row(
+      `RMSE over the Cramer-Rao bound, ${what}`,
+      `${out[name].ratio.toFixed(3)}, 95 % region holds ${(100 * out[name].coverage).toFixed(1)} %`,
+      limit,
+    );
   one('labelled', 'correct weights', 'limit 1.05, 93 to 97 %');
   one('unlabelled', 'a fifth blocked, unlabelled', 'limit 1.3, 93 to 97 %');
   one('unmodelled', 'a fifth blocked, no model at all');
@@ -63,12 +106,26 @@ function bound() {
 function planner() {
   const bench = join(process.env.ANCHORD_BENCH_DIR ?? '', 'planner_bench');
   if (!existsSync(bench)) return row('planner', 'not built', bench);
-  const out = JSON.parse(execFileSync(bench, ['--benchmark_format=json', '--benchmark_min_time=0.2'], { stdio: ['ignore', 'pipe', 'ignore'] }));
+  const out = JSON.parse(
+    execFileSync(bench, ['--benchmark_format=json', '--benchmark_min_time=0.2'], {
+      stdio: ['ignore', 'pipe', 'ignore'],
+    }),
+  );
   const ns = Object.fromEntries(out.benchmarks.map((b) => [b.name, b.per_candidate * 1e9]));
-  row('planner, 41^3 candidates, 1 000 past points, per candidate', `${ns.batch_kernel.toFixed(1)} ns CPU`, `rebuild and invert ${(ns.rebuild_and_invert / 1e3).toFixed(1)} us`);
+  row(
+    'planner, 41^3 candidates, 1 000 past points, per candidate',
+    `${ns.batch_kernel.toFixed(1)} ns CPU`,
+    `rebuild and invert ${(ns.rebuild_and_invert / 1e3).toFixed(1)} us`,
+  );
 }
 
-const mission = (name) => ({ name, kit: 'bench', frame: 'wgs84', track_point: 'gnss_antenna', tags: [{ tag: '0x6e01', antenna: 0, lever_arm_body_m: [0, 0, 0] }] });
+const mission = (name) => ({
+  name,
+  kit: 'bench',
+  frame: 'wgs84',
+  track_point: 'gnss_antenna',
+  tags: [{ tag: '0x6e01', antenna: 0, lever_arm_body_m: [0, 0, 0] }],
+});
 
 async function newMission(server, name) {
   const answer = await server.fetch('/api/v1/missions', { json: mission(name) });
@@ -92,34 +149,55 @@ async function ingest(server) {
   const samples = Buffer.alloc(1016 * 4);
   for (let i = 0; i < samples.length; i++) samples[i] = (i * 37) & 0xff;
   const cir = `,"cir":{"n":1016,"dt_ps":1001.6,"first_path_idx":744.2,"rxpacc":1001,"b64":"${samples.toString('base64')}"}`;
-  for (const [name, extra, perBody, bodies] of [['without CIR', '', 10_000, 6], ['with CIR', cir, 1000, 6]]) {
+  for (const [name, extra, perBody, bodies] of [
+    ['without CIR', '', 10_000, 6],
+    ['with CIR', cir, 1000, 6],
+  ]) {
     const texts = Array.from({ length: bodies }, () => ndjson(perBody, id, extra));
-    const cpu = cpuSeconds(server.pid), start = performance.now();
+    const cpu = cpuSeconds(server.pid),
+      start = performance.now();
     for (const body of texts) {
-      const answer = await server.fetch('/api/v1/ranges', { method: 'POST', headers: { 'content-type': 'application/x-ndjson' }, body });
+      const answer = await server.fetch('/api/v1/ranges', {
+        method: 'POST',
+        headers: { 'content-type': 'application/x-ndjson' },
+        body,
+      });
       const result = await answer.json();
-      if (result.accepted !== perBody) throw new Error(`ingest: ${answer.status} ${JSON.stringify(result).slice(0, 500)}`);
+      if (result.accepted !== perBody)
+        throw new Error(`ingest: ${answer.status} ${JSON.stringify(result).slice(0, 500)}`);
     }
-    const seconds = (performance.now() - start) / 1000, total = perBody * bodies;
-    row(`ingest over HTTP ${name}`, `${Math.round(total / seconds)} rows/s, ${((cpuSeconds(server.pid) - cpu) / total * 1e6).toFixed(1)} us CPU a row`,
-      name === 'without CIR' ? `SQLite alone ${sqliteAlone(total)} rows/s` : 'aim 2 000 rows/s');
+    const seconds = (performance.now() - start) / 1000,
+      total = perBody * bodies;
+    row(
+      `ingest over HTTP ${name}`,
+      `${Math.round(total / seconds)} rows/s, ${(((cpuSeconds(server.pid) - cpu) / total) * 1e6).toFixed(1)} us CPU a row`,
+      name === 'without CIR' ? `SQLite alone ${sqliteAlone(total)} rows/s` : 'aim 2 000 rows/s',
+    );
   }
   const one = [];
   for (let i = 0; i < 200; i++) {
     const body = ndjson(1, id, '');
     const start = performance.now();
-    const answer = await server.fetch('/api/v1/ranges', { method: 'POST', headers: { 'content-type': 'application/x-ndjson' }, body });
+    const answer = await server.fetch('/api/v1/ranges', {
+      method: 'POST',
+      headers: { 'content-type': 'application/x-ndjson' },
+      body,
+    });
     await answer.arrayBuffer();
     one.push(performance.now() - start);
   }
-  row('POST of one range, acknowledged after fsync', `p50 ${percentile(one, 0.5).toFixed(2)} ms, p99 ${percentile(one, 0.99).toFixed(2)} ms`);
+  row(
+    'POST of one range, acknowledged after fsync',
+    `p50 ${percentile(one, 0.5).toFixed(2)} ms, p99 ${percentile(one, 0.99).toFixed(2)} ms`,
+  );
 }
 
 /** The same rows by the sqlite3 program into a table with one key, WAL, FULL, 1 000 rows a transaction: the limit. */
 function sqliteAlone(count) {
   const folder = mkdtempSync(join(tmpdir(), 'anchord-bench-'));
   try {
-    let sql = 'PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; CREATE TABLE r(id INTEGER PRIMARY KEY, t INTEGER, tag INTEGER, anchor INTEGER, seq INTEGER, d REAL, rss REAL, fp REAL, rx REAL, UNIQUE(t, tag, anchor, seq)) STRICT;\n';
+    let sql =
+      'PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; CREATE TABLE r(id INTEGER PRIMARY KEY, t INTEGER, tag INTEGER, anchor INTEGER, seq INTEGER, d REAL, rss REAL, fp REAL, rx REAL, UNIQUE(t, tag, anchor, seq)) STRICT;\n';
     for (let i = 0; i < count; i++) {
       if (i % 1000 === 0) sql += 'BEGIN;\n';
       sql += `INSERT INTO r(t,tag,anchor,seq,d,rss,fp,rx) VALUES(${1777889472000000 + i * 100},28161,${27168 + (i % 6)},${i},7.5,-84.3,-86.1,-82.7);\n`;
@@ -138,8 +216,13 @@ async function get(server) {
   await run(['simulate', 'flight', '--seed', '7', '--duration', '60', '--out', flight]);
   const { code, stderr } = await run(['import', 'flight', flight, '--url', server.url]);
   if (code !== 0) throw new Error(`import: ${stderr}`);
-  const id = (await (await server.fetch('/api/v1/missions')).json()).items?.find((m) => m.name.startsWith('simulated'))?.id;
-  const solved = await server.fetch('/api/v1/calibrations', { json: { missions: [id] }, headers: { prefer: 'wait=60' } });
+  const id = (await (await server.fetch('/api/v1/missions')).json()).items?.find((m) =>
+    m.name.startsWith('simulated'),
+  )?.id;
+  const solved = await server.fetch('/api/v1/calibrations', {
+    json: { missions: [id] },
+    headers: { prefer: 'wait=60' },
+  });
   const calibration = await solved.json();
   const published = await server.fetch(`/api/v1/calibrations/${calibration.id}/publish`, { json: {} });
   if (!published.ok) throw new Error(`publish: ${published.status} ${await published.text()}`);
@@ -147,17 +230,26 @@ async function get(server) {
   const cpu = cpuSeconds(server.pid);
   const ours = await hammer(server.port, request('GET', '/api/v1/anchors/0x6a21', { port: server.port }));
   const perRequest = ((cpuSeconds(server.pid) - cpu) / ours.count) * 1e6;
-  const peer = createServer((_, response) => response.writeHead(200, { 'content-type': 'application/geo+json', 'content-length': Buffer.byteLength(body) }).end(body));
+  const peer = createServer((_, response) =>
+    response
+      .writeHead(200, { 'content-type': 'application/geo+json', 'content-length': Buffer.byteLength(body) })
+      .end(body),
+  );
   await new Promise((done) => peer.listen(0, '127.0.0.1', done));
   const plain = await hammer(peer.address().port, request('GET', '/', { port: 1 }));
   peer.close();
-  row('GET of one anchor, 4 connections', `${Math.round(ours.perSecond)} a second, p99 ${ours.p99Ms.toFixed(2)} ms, ${perRequest.toFixed(0)} us CPU`, `the same bytes from a bare Node server in the generator's process ${Math.round(plain.perSecond)}`);
+  row(
+    'GET of one anchor, 4 connections',
+    `${Math.round(ours.perSecond)} a second, p99 ${ours.p99Ms.toFixed(2)} ms, ${perRequest.toFixed(0)} us CPU`,
+    `the same bytes from a bare Node server in the generator's process ${Math.round(plain.perSecond)}`,
+  );
 }
 
 /** 100 ranges a second, 5 s long, to `count` clients: how late each delivery came, in ms. */
 async function liveLatency(server, name, count) {
   const id = await newMission(server, name);
-  const clients = [], late = [];
+  const clients = [],
+    late = [];
   let gaps = 0;
   for (let i = 0; i < count; i++) {
     const client = await LiveClient.open(server);
@@ -165,25 +257,48 @@ async function liveLatency(server, name, count) {
       const now = (performance.timeOrigin + performance.now()) * 1000;
       const message = JSON.parse(String(data));
       if (message.op === 'gap') gaps++;
-      if (message.op === 'data') for (const range of [message.data].flat()) if (range.mission === id) late.push((now - range.t_us) / 1000);
+      if (message.op === 'data')
+        for (const range of [message.data].flat()) if (range.mission === id) late.push((now - range.t_us) / 1000);
     });
     client.send({ op: 'sub', id: 1, topic: 'ranges' });
     await client.next('ack', (m) => m.op === 'ack');
     clients.push(client);
   }
   // 100 ranges a second, each stamped when it is sent; a fix every 50 ms, since a range waits for the fix after it.
-  const seconds = 5, cpu = cpuSeconds(server.pid), start = performance.now();
+  const seconds = 5,
+    cpu = cpuSeconds(server.pid),
+    start = performance.now();
   const nowUs = () => Math.round((performance.timeOrigin + performance.now()) * 1000);
-  let sent = 0, seq = 0;
+  let sent = 0,
+    seq = 0;
   const post = (path, json) => server.fetch(path, { json }).then((r) => r.arrayBuffer());
   const pending = [];
-  const fix = (seq) => post('/api/v1/fixes', { t_us: nowUs(), mission: id, lon: 3.7131, lat: 51.0231, h_m: 60, fix: 'fixed', sigma_m: [0.01, 0.01, 0.02], q: [0, 0, 0, 1], seq });
-  await fix(1_000_000);  // ranges from before the first fix would wait for a track that never covers them
+  const fix = (seq) =>
+    post('/api/v1/fixes', {
+      t_us: nowUs(),
+      mission: id,
+      lon: 3.7131,
+      lat: 51.0231,
+      h_m: 60,
+      fix: 'fixed',
+      sigma_m: [0.01, 0.01, 0.02],
+      q: [0, 0, 0, 1],
+      seq,
+    });
+  await fix(1_000_000); // ranges from before the first fix would wait for a track that never covers them
   await new Promise((done) => {
     const timer = setInterval(() => {
       const due = Math.floor(((performance.now() - start) / 1000) * 100);
       const batch = [];
-      while (sent < due && sent < seconds * 100) batch.push({ t_us: nowUs(), tag: '0x6e01', anchor: `0x6a2${sent % 6}`, distance_m: 7 + (sent % 10) / 10, seq: sent++, mission: id });
+      while (sent < due && sent < seconds * 100)
+        batch.push({
+          t_us: nowUs(),
+          tag: '0x6e01',
+          anchor: `0x6a2${sent % 6}`,
+          distance_m: 7 + (sent % 10) / 10,
+          seq: sent++,
+          mission: id,
+        });
       if (batch.length) pending.push(post('/api/v1/ranges', batch));
       if (++seq % 5 === 0) pending.push(fix(seq));
       if (sent >= seconds * 100) {
@@ -203,8 +318,11 @@ async function liveLatency(server, name, count) {
 
 async function fanout(server) {
   const { late, want, gaps, share, p50, p99 } = await liveLatency(server, 'bench fan-out', 50);
-  row('fan-out of 100 ranges/s to 50 clients', `p50 ${p50.toFixed(1)} ms, p99 ${p99.toFixed(1)} ms, ${late.length} of ${want} delivered, ${gaps} gaps, ${(share * 100).toFixed(0)} % of a core`,
-    'from the stamp in the row to the parsed message, fsync and the wait for the next fix (50 ms) included');
+  row(
+    'fan-out of 100 ranges/s to 50 clients',
+    `p50 ${p50.toFixed(1)} ms, p99 ${p99.toFixed(1)} ms, ${late.length} of ${want} delivered, ${gaps} gaps, ${(share * 100).toFixed(0)} % of a core`,
+    'from the stamp in the row to the parsed message, fsync and the wait for the next fix (50 ms) included',
+  );
 }
 
 /** Live ranges with and without a grid search that keeps every core busy. */
@@ -217,19 +335,37 @@ async function training(server) {
   };
   await send('/api/v1/campaigns', { json: { name: 'bench' } }, 201);
   const csv = readFileSync(join(root, 'docs/examples/campaign.csv'));
-  await send('/api/v1/campaigns/bench/samples', { method: 'POST', headers: { 'content-type': 'text/csv' }, body: csv }, 200);
+  await send(
+    '/api/v1/campaigns/bench/samples',
+    { method: 'POST', headers: { 'content-type': 'text/csv' }, body: csv },
+    200,
+  );
   await send('/api/v1/datasets', { json: { name: 'bench', campaigns: ['bench'], aggregation: 'none' } }, 201);
   const quiet = await liveLatency(server, 'bench without training', 4);
   const values = (n, from, step) => Array.from({ length: n }, (_, i) => Number((from * step ** i).toPrecision(6)));
-  const job = await send('/api/v1/training-runs', { json: { task: 'nlos_id', dataset: 'bench', methods: ['svm'], importance: false,
-    grid: { svm: { c: values(90, 0.1, 1.1), gamma: values(90, 0.001, 1.1) } } } }, 202);
+  const job = await send(
+    '/api/v1/training-runs',
+    {
+      json: {
+        task: 'nlos_id',
+        dataset: 'bench',
+        methods: ['svm'],
+        importance: false,
+        grid: { svm: { c: values(90, 0.1, 1.1), gamma: values(90, 0.001, 1.1) } },
+      },
+    },
+    202,
+  );
   const now = () => send(`/api/v1/jobs/${job.id}`, {}, 200);
   await eventually('the search runs', async () => (await now()).progress.stage === 'search', 30_000);
   const busy = await liveLatency(server, 'bench with training', 4);
   const still = (await now()).state;
   await server.fetch(`/api/v1/jobs/${job.id}`, { method: 'DELETE' });
-  row('live range, 100/s to 4 clients, beside a grid search', `p50 ${busy.p50.toFixed(1)} ms, p99 ${busy.p99.toFixed(1)} ms (search ${still})`,
-    `without it p50 ${quiet.p50.toFixed(1)} ms, p99 ${quiet.p99.toFixed(1)} ms`);
+  row(
+    'live range, 100/s to 4 clients, beside a grid search',
+    `p50 ${busy.p50.toFixed(1)} ms, p99 ${busy.p99.toFixed(1)} ms (search ${still})`,
+    `without it p50 ${quiet.p50.toFixed(1)} ms, p99 ${quiet.p99.toFixed(1)} ms`,
+  );
 }
 
 if (on('bound')) {
@@ -262,7 +398,13 @@ if (on('commands')) {
 if (['ingest', 'get', 'fanout', 'training', 'devices'].some(on)) {
   const server = await startServer();
   try {
-    for (const [name, task] of [['ingest', ingest], ['get', get], ['fanout', fanout], ['training', training], ['devices', (s) => devices(s, row)]]) {
+    for (const [name, task] of [
+      ['ingest', ingest],
+      ['get', get],
+      ['fanout', fanout],
+      ['training', training],
+      ['devices', (s) => devices(s, row)],
+    ]) {
       if (!on(name)) continue;
       say(name);
       await task(server).catch((error) => {
@@ -275,5 +417,7 @@ if (['ingest', 'get', 'fanout', 'training', 'devices'].some(on)) {
   }
 }
 const width = [0, 1].map((column) => Math.max(...rows.map((r) => r[column].length)));
-console.log(rows.map(([work, figure, beside]) => `${work.padEnd(width[0])}  ${figure.padEnd(width[1])}  ${beside}`).join('\n'));
+console.log(
+  rows.map(([work, figure, beside]) => `${work.padEnd(width[0])}  ${figure.padEnd(width[1])}  ${beside}`).join('\n'),
+);
 process.exit();

@@ -13,16 +13,42 @@ const origin = { lon: 3.7131, lat: 51.0231, h_m: 55.5 };
 const at = (east, north) => [origin.lon + east / 70_100, origin.lat + north / 111_250];
 /** A star-shaped hall and many waypoints round it: a check of some tenths of a second. */
 function plan(n) {
-  const ring = Array.from({ length: 60 }, (_, i) => at(15 + (10 + 3 * (i % 2)) * Math.cos((i * Math.PI) / 30), 10 + (7 + 2 * (i % 2)) * Math.sin((i * Math.PI) / 30)));
+  const ring = Array.from({ length: 60 }, (_, i) =>
+    at(15 + (10 + 3 * (i % 2)) * Math.cos((i * Math.PI) / 30), 10 + (7 + 2 * (i % 2)) * Math.sin((i * Math.PI) / 30)),
+  );
   return {
-    name: 'flood', building_height_m: 8, origin, outline: { type: 'Polygon', coordinates: [[...ring, ring[0]]] }, settings: { keep_out_m: 2, max_height_m: 60 },
-    waypoints: Array.from({ length: n }, (_, i) => { const [lon, lat] = at(15 + 22 * Math.cos((i * 2 * Math.PI) / n), 10 + 18 * Math.sin((i * 2 * Math.PI) / n)); return { lon, lat, height_above_ground_m: 4 + (i % 40) }; }),
+    name: 'flood',
+    building_height_m: 8,
+    origin,
+    outline: { type: 'Polygon', coordinates: [[...ring, ring[0]]] },
+    settings: { keep_out_m: 2, max_height_m: 60 },
+    waypoints: Array.from({ length: n }, (_, i) => {
+      const [lon, lat] = at(15 + 22 * Math.cos((i * 2 * Math.PI) / n), 10 + 18 * Math.sin((i * 2 * Math.PI) / n));
+      return { lon, lat, height_above_ground_m: 4 + (i % 40) };
+    }),
   };
 }
 const flight_plan = {
-  name: 'Hall', building_height_m: 8, origin, settings: { keep_out_m: 4, max_height_m: 20 },
-  outline: { type: 'Polygon', coordinates: [[[3.7131, 51.0231], [3.7135275, 51.0231], [3.7135275, 51.0232799], [3.7131, 51.0232799], [3.7131, 51.0231]]] },
-  waypoints: [{ lon: 3.7130, lat: 51.02305, height_above_ground_m: 4 }, { lon: 3.71362, lat: 51.02305, height_above_ground_m: 9 }],
+  name: 'Hall',
+  building_height_m: 8,
+  origin,
+  settings: { keep_out_m: 4, max_height_m: 20 },
+  outline: {
+    type: 'Polygon',
+    coordinates: [
+      [
+        [3.7131, 51.0231],
+        [3.7135275, 51.0231],
+        [3.7135275, 51.0232799],
+        [3.7131, 51.0232799],
+        [3.7131, 51.0231],
+      ],
+    ],
+  },
+  waypoints: [
+    { lon: 3.713, lat: 51.02305, height_above_ground_m: 4 },
+    { lon: 3.71362, lat: 51.02305, height_above_ground_m: 9 },
+  ],
 };
 
 async function free_port() {
@@ -36,38 +62,95 @@ async function free_port() {
 function histogram(times) {
   const edges = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 5000, Infinity];
   let from = 0;
-  return edges.map((to) => { const n = times.filter((t) => t >= from && t < to).length; const line = n ? `${from}..${to} ms: ${n}` : ''; from = to; return line; }).filter(Boolean).join(', ');
+  return edges
+    .map((to) => {
+      const n = times.filter((t) => t >= from && t < to).length;
+      const line = n ? `${from}..${to} ms: ${n}` : '';
+      from = to;
+      return line;
+    })
+    .filter(Boolean)
+    .join(', ');
 }
 
 export async function commands(row, seconds = 10) {
   const port = await free_port();
-  const server = await startServer({ auth: 'on', args: ['--drone-address', `udp://:${port}`, '--rate-per-s', '100000', '--rate-burst', '100000'] });
+  const server = await startServer({
+    auth: 'on',
+    args: ['--drone-address', `udp://:${port}`, '--rate-per-s', '100000', '--rate-burst', '100000'],
+  });
   const must = async (path, options, ...good) => {
-    const answer = await server.fetch(path, options), text = await answer.text();
-    if (!good.includes(answer.status)) throw new Error(`${options?.json ? 'POST' : 'GET'} ${path}: ${answer.status} ${text.slice(0, 400)}`);
+    const answer = await server.fetch(path, options),
+      text = await answer.text();
+    if (!good.includes(answer.status))
+      throw new Error(`${options?.json ? 'POST' : 'GET'} ${path}: ${answer.status} ${text.slice(0, 400)}`);
     return text ? JSON.parse(text) : null;
   };
   const token = async (...roles) => (await must('/api/v1/tokens', { json: { name: roles.join(), roles } }, 201)).token;
   let aircraft, flood;
   const sockets = [];
   try {
-    const [pilot, kit, viewer, second] = [await token('operator'), await token('gateway', 'operator'), await token('viewer'), await token('operator')];
+    const [pilot, kit, viewer, second] = [
+      await token('operator'),
+      await token('gateway', 'operator'),
+      await token('viewer'),
+      await token('operator'),
+    ];
     const file = join(server.dataDir, 'kit.token');
     writeFileSync(file, kit);
     let said = '';
-    aircraft = spawn(binary, ['simulate', 'drone', '--mavlink', `udp://127.0.0.1:${port}`, '--url', server.url, '--ready', '1', '--token-file', file], { stdio: ['ignore', 'ignore', 'pipe'] });
+    aircraft = spawn(
+      binary,
+      [
+        'simulate',
+        'drone',
+        '--mavlink',
+        `udp://127.0.0.1:${port}`,
+        '--url',
+        server.url,
+        '--ready',
+        '1',
+        '--token-file',
+        file,
+      ],
+      { stdio: ['ignore', 'ignore', 'pipe'] },
+    );
     aircraft.stderr.setEncoding('utf8').on('data', (chunk) => (said += chunk));
     const mission = await eventually('the aircraft makes its mission', () => /mission ([0-9a-f-]{36})/.exec(said)?.[1]);
-    const base = `/api/v1/missions/${mission}`, as = (json) => ({ token: pilot, json });
-    const flown = (await must('/api/v1/plans', as(flight_plan), 201)).id, heavy = (await must('/api/v1/plans', as(plan(400)), 201)).id;
+    const base = `/api/v1/missions/${mission}`,
+      as = (json) => ({ token: pilot, json });
+    const flown = (await must('/api/v1/plans', as(flight_plan), 201)).id,
+      heavy = (await must('/api/v1/plans', as(plan(400)), 201)).id;
     await must(`${base}/checklist?plan=${flown}`, { token: pilot }, 200);
-    await eventually('the aircraft is heard and its fixes come', async () => (await must(`${base}/checklist?plan=${flown}`, { token: pilot }, 200)).items.filter((i) => i.state === 'failed').every((i) => i.overridable), 30_000, 200);
-    for (const item of (await must(`${base}/checklist?plan=${flown}`, { token: pilot }, 200)).items.filter((i) => i.state !== 'ok')) await must(`${base}/checklist/${item.id}`, as({ reason: 'bench' }), 200);
+    await eventually(
+      'the aircraft is heard and its fixes come',
+      async () =>
+        (await must(`${base}/checklist?plan=${flown}`, { token: pilot }, 200)).items
+          .filter((i) => i.state === 'failed')
+          .every((i) => i.overridable),
+      30_000,
+      200,
+    );
+    for (const item of (await must(`${base}/checklist?plan=${flown}`, { token: pilot }, 200)).items.filter(
+      (i) => i.state !== 'ok',
+    ))
+      await must(`${base}/checklist/${item.id}`, as({ reason: 'bench' }), 200);
     const { lease } = await must(`${base}/control`, as({ action: 'take' }), 200);
-    await eventually('the flight begins', async () => (await server.fetch(`${base}/actions`, as({ action: 'start', plan: flown, lease }))).status === 202, 30_000, 300);
-    await eventually('the aircraft flies', async () => (await must(`${base}/procedure`, { token: pilot }, 200)).status === 'running', 20_000, 100);
+    await eventually(
+      'the flight begins',
+      async () => (await server.fetch(`${base}/actions`, as({ action: 'start', plan: flown, lease }))).status === 202,
+      30_000,
+      300,
+    );
+    await eventually(
+      'the aircraft flies',
+      async () => (await must(`${base}/procedure`, { token: pilot }, 200)).status === 'running',
+      20_000,
+      100,
+    );
 
-    const quiet = [], beside = [];
+    const quiet = [],
+      beside = [];
     const command = async (action, times) => {
       const start = performance.now();
       const answer = await server.fetch(`${base}/actions`, as({ action, lease }));
@@ -75,15 +158,31 @@ export async function commands(row, seconds = 10) {
       times.push(performance.now() - start);
       if (answer.status !== 202 && answer.status !== 422) throw new Error(`${action}: ${answer.status}`);
     };
-    const drive = async (times, s) => { for (let n = 0, end = performance.now() + s * 1000; performance.now() < end; n++) { await command(n % 2 ? 'resume' : 'hold', times); await new Promise((done) => setTimeout(done, 30)); } };
+    const drive = async (times, s) => {
+      for (let n = 0, end = performance.now() + s * 1000; performance.now() < end; n++) {
+        await command(n % 2 ? 'resume' : 'hold', times);
+        await new Promise((done) => setTimeout(done, 30));
+      }
+    };
     await drive(quiet, 3);
 
-    flood = new Worker(new URL('./flood.mjs', import.meta.url), { workerData: { url: server.url, floods: [
-      { n: 195, path: `/api/v1/plans/${heavy}/validate`, method: 'POST', token: viewer },
-      { n: 6, path: '/api/v1/plans/generate', method: 'POST', token: second, json: { ...plan(2), settings: { keep_out_m: 2, max_height_m: 60 } } },
-      { n: 8, path: `/api/v1/fixes?mission=${mission}&limit=10000`, token: viewer },
-      { n: 4, path: '/api/v1/me', token: `anc_${'0'.repeat(32)}_${'a'.repeat(64)}` },
-    ] } });
+    flood = new Worker(new URL('./flood.mjs', import.meta.url), {
+      workerData: {
+        url: server.url,
+        floods: [
+          { n: 195, path: `/api/v1/plans/${heavy}/validate`, method: 'POST', token: viewer },
+          {
+            n: 6,
+            path: '/api/v1/plans/generate',
+            method: 'POST',
+            token: second,
+            json: { ...plan(2), settings: { keep_out_m: 2, max_height_m: 60 } },
+          },
+          { n: 8, path: `/api/v1/fixes?mission=${mission}&limit=10000`, token: viewer },
+          { n: 4, path: '/api/v1/me', token: `anc_${'0'.repeat(32)}_${'a'.repeat(64)}` },
+        ],
+      },
+    });
     for (let i = 0; i < 500; i++) sockets.push(connect(server.port, '127.0.0.1').on('error', () => {}));
     await new Promise((done) => setTimeout(done, 1000));
     await drive(beside, seconds);
@@ -95,8 +194,16 @@ export async function commands(row, seconds = 10) {
     });
     const p = (times, share) => `${percentile(times, share).toFixed(1)} ms`;
     row('hold and resume, nothing beside', `p50 ${p(quiet, 0.5)}, p99 ${p(quiet, 0.99)}`, histogram(quiet));
-    row('hold and resume beside the flood', `p50 ${p(beside, 0.5)}, p99 ${p(beside, 0.99)}, worst ${p(beside, 1)}`, `limit 100 ms at p99; ${histogram(beside)}`);
-    row('land beside the flood', `${landing[0].toFixed(1)} ms`, `${answered} requests of the flood were answered, ${refused} refused; the generator shares the machine`);
+    row(
+      'hold and resume beside the flood',
+      `p50 ${p(beside, 0.5)}, p99 ${p(beside, 0.99)}, worst ${p(beside, 1)}`,
+      `limit 100 ms at p99; ${histogram(beside)}`,
+    );
+    row(
+      'land beside the flood',
+      `${landing[0].toFixed(1)} ms`,
+      `${answered} requests of the flood were answered, ${refused} refused; the generator shares the machine`,
+    );
   } finally {
     await flood?.terminate();
     for (const socket of sockets) socket.destroy();

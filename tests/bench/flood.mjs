@@ -3,11 +3,15 @@
 // Any message ends it; it answers {answered, refused}.
 import { parentPort, workerData } from 'node:worker_threads';
 
-let flooding = true, answered = 0, refused = 0;
+let flooding = true,
+  answered = 0,
+  refused = 0;
 const one = async ({ path, method = 'GET', token, json }) => {
   const headers = { authorization: `Bearer ${token}`, ...(json ? { 'content-type': 'application/json' } : {}) };
   while (flooding) {
-    const answer = await fetch(workerData.url + path, { method, headers, body: json && JSON.stringify(json) }).catch(() => null);
+    const answer = await fetch(workerData.url + path, { method, headers, body: json && JSON.stringify(json) }).catch(
+      () => null,
+    );
     await answer?.arrayBuffer().catch(() => {});
     if (answer?.ok) answered++;
     else {

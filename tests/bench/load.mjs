@@ -18,7 +18,9 @@ function worker(port, request, until, status, times) {
   return new Promise((done, fail) => {
     const socket = connect(port, '127.0.0.1');
     socket.setNoDelay(true);
-    let sent = 0, pending = Buffer.alloc(0), need = -1;
+    let sent = 0,
+      pending = Buffer.alloc(0),
+      need = -1;
     const fire = () => {
       sent = performance.now();
       socket.write(request);
@@ -31,7 +33,8 @@ function worker(port, request, until, status, times) {
         const end = pending.indexOf('\r\n\r\n');
         if (end < 0) return;
         const head = pending.toString('latin1', 0, end);
-        if (!head.startsWith(`HTTP/1.1 ${status}`)) return fail(new Error(head + pending.toString('utf8', end, end + 500)));
+        if (!head.startsWith(`HTTP/1.1 ${status}`))
+          return fail(new Error(head + pending.toString('utf8', end, end + 500)));
         need = end + 4 + Number(/content-length: *(\d+)/i.exec(head)?.[1] ?? 0);
       }
       if (pending.length < need) return;
@@ -49,10 +52,18 @@ function worker(port, request, until, status, times) {
 
 /** {perSecond, p50Ms, p99Ms} of one request over `connections` connections for `seconds`. */
 export async function hammer(port, request, { connections = 4, seconds = 3, status = 200 } = {}) {
-  const times = [], start = performance.now();
-  await Promise.all(Array.from({ length: connections }, () => worker(port, request, start + seconds * 1000, status, times)));
+  const times = [],
+    start = performance.now();
+  await Promise.all(
+    Array.from({ length: connections }, () => worker(port, request, start + seconds * 1000, status, times)),
+  );
   const took = (performance.now() - start) / 1000;
-  return { perSecond: times.length / took, p50Ms: percentile(times, 0.5), p99Ms: percentile(times, 0.99), count: times.length };
+  return {
+    perSecond: times.length / took,
+    p50Ms: percentile(times, 0.5),
+    p99Ms: percentile(times, 0.99),
+    count: times.length,
+  };
 }
 
 export function request(method, path, { body, type = 'application/x-ndjson', port } = {}) {

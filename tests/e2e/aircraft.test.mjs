@@ -9,18 +9,26 @@ import { binary, eventually, startServer } from './server.mjs';
 let server, aircraft, mission, plan, lease;
 const get = async (path) => (await server.fetch(path)).json();
 const send = async (path, json) => {
-  const answer = await server.fetch(path, { method: 'POST', headers: { 'content-type': 'application/json' }, body: JSON.stringify(json) });
+  const answer = await server.fetch(path, {
+    method: 'POST',
+    headers: { 'content-type': 'application/json' },
+    body: JSON.stringify(json),
+  });
   return { status: answer.status, json: await answer.json() };
 };
 const procedure = () => get(`/api/v1/missions/${mission}/procedure`);
 const act = (action, more = {}) => send(`/api/v1/missions/${mission}/actions`, { action, lease, ...more });
 const accepted = async (answer) => {
   assert.equal(answer.status, 202, JSON.stringify(answer.json));
-  return eventually(`command ${answer.json.action} is accepted`, async () => {
-    const found = (await procedure()).commands.find((c) => c.number === answer.json.number);
-    assert.notEqual(found?.state, 'refused', JSON.stringify(found));
-    return found?.state === 'accepted';
-  }, 60_000);
+  return eventually(
+    `command ${answer.json.action} is accepted`,
+    async () => {
+      const found = (await procedure()).commands.find((c) => c.number === answer.json.number);
+      assert.notEqual(found?.state, 'refused', JSON.stringify(found));
+      return found?.state === 'accepted';
+    },
+    60_000,
+  );
 };
 
 before(async () => {
@@ -30,8 +38,12 @@ before(async () => {
   await new Promise((done) => socket.close(done));
   server = await startServer({ auth: 'off', args: ['--drone-address', `tcp://127.0.0.1:${port}`] });
   let said = '';
-  aircraft = spawn(binary, ['simulate', 'drone', '--mavlink', `tcp-listen://127.0.0.1:${port}`, '--url', server.url, '--ready', '2'], { stdio: ['pipe', 'ignore', 'pipe'] });
-  aircraft.stdin.write('parameter FS_GCS_TIMEOUT 60\n');  // a slow restart of the server is not what its failsafe is for here
+  aircraft = spawn(
+    binary,
+    ['simulate', 'drone', '--mavlink', `tcp-listen://127.0.0.1:${port}`, '--url', server.url, '--ready', '2'],
+    { stdio: ['pipe', 'ignore', 'pipe'] },
+  );
+  aircraft.stdin.write('parameter FS_GCS_TIMEOUT 60\n'); // a slow restart of the server is not what its failsafe is for here
   aircraft.stderr.setEncoding('utf8').on('data', (text) => (said += text));
   mission = await eventually('the aircraft makes its mission', () => /mission ([0-9a-f-]{36})/.exec(said)?.[1]);
 });
@@ -41,12 +53,33 @@ after(async () => {
 });
 
 test('planned from the outline, checked, started', async () => {
-  const outline = { type: 'Polygon', coordinates: [[[3.7131, 51.0231], [3.7135275, 51.0231], [3.7135275, 51.0232799], [3.7131, 51.0232799], [3.7131, 51.0231]]] };
-  const made = await send('/api/v1/plans/generate', { name: 'Hall', outline, building_height_m: 8, settings: { max_height_m: 14 } });
+  const outline = {
+    type: 'Polygon',
+    coordinates: [
+      [
+        [3.7131, 51.0231],
+        [3.7135275, 51.0231],
+        [3.7135275, 51.0232799],
+        [3.7131, 51.0232799],
+        [3.7131, 51.0231],
+      ],
+    ],
+  };
+  const made = await send('/api/v1/plans/generate', {
+    name: 'Hall',
+    outline,
+    building_height_m: 8,
+    settings: { max_height_m: 14 },
+  });
   assert.equal(made.status, 200);
   plan = (await send('/api/v1/plans', made.json.plan)).json.id;
   const list = () => get(`/api/v1/missions/${mission}/checklist?plan=${plan}`);
-  await eventually('RTK is fixed for 10 s', async () => (await list()).items.find((i) => i.id === 'rtk').state === 'ok', 60_000, 500);
+  await eventually(
+    'RTK is fixed for 10 s',
+    async () => (await list()).items.find((i) => i.id === 'rtk').state === 'ok',
+    60_000,
+    500,
+  );
   for (const item of (await list()).items.filter((i) => i.state !== 'ok')) {
     assert.ok(item.manual || item.overridable, JSON.stringify(item));
     assert.equal((await send(`/api/v1/missions/${mission}/checklist/${item.id}`, { reason: 'a test' })).status, 200);
@@ -59,10 +92,15 @@ test('planned from the outline, checked, started', async () => {
 test('killed in the air: hold before anything else, then on', async () => {
   await server.kill();
   await server.start();
-  const back = await eventually('the flight is back', async () => {
-    const p = await procedure();
-    return p.step === 'hold' && p.drone.mode === 'BRAKE' && p;
-  }, 30_000, 100);
+  const back = await eventually(
+    'the flight is back',
+    async () => {
+      const p = await procedure();
+      return p.step === 'hold' && p.drone.mode === 'BRAKE' && p;
+    },
+    30_000,
+    100,
+  );
   assert.match(back.reason, /restarted/);
   lease = (await send(`/api/v1/missions/${mission}/control`, { action: 'take' })).json.lease;
   await accepted(await act('resume'));

@@ -21,7 +21,10 @@ before(async () => {
   const missions = (await get('/api/v1/missions')).items;
   solved = [];
   for (const m of missions) {
-    const answer = await server.fetch('/api/v1/calibrations', { json: { missions: [m.id] }, headers: { prefer: 'wait=100' } });
+    const answer = await server.fetch('/api/v1/calibrations', {
+      json: { missions: [m.id] },
+      headers: { prefer: 'wait=100' },
+    });
     assert.equal(answer.status, 201, await answer.clone().text());
     solved.push(await answer.json());
   }
@@ -37,8 +40,10 @@ test('residuals of the chosen anchor are those of its calibration, with directio
   const { page, seen, id } = await openPage(browser, server, { hash: '#/anchors/0x6a22' });
   await id('sectors').waitFor({ timeout: 20_000 });
   // The newest calibration that has the flight on screen.
-  const mission = (await get('/api/v1/missions')).items[0].id, solve = solved.find((c) => c.missions.includes(mission));
-  const { items } = await get(`/api/v1/calibrations/${solve.id}/residuals?anchor=0x6a22`), used = items.filter((r) => r.weight > 0).length;
+  const mission = (await get('/api/v1/missions')).items[0].id,
+    solve = solved.find((c) => c.missions.includes(mission));
+  const { items } = await get(`/api/v1/calibrations/${solve.id}/residuals?anchor=0x6a22`),
+    used = items.filter((r) => r.weight > 0).length;
   assert.ok(used > 30, `${used} used`);
   assert.ok((await text(id('residuals'))).includes(`${used} ranges with weight, ${items.length - used} rejected`));
   assert.equal(await id('residuals').locator('.resid').first().locator('circle').count(), used);
@@ -57,7 +62,8 @@ test('two calibrations are compared: shift of each anchor as the API has it, and
   await id('compare-against').selectOption(solved[1].id);
   await id('shifts').locator('tbody tr').first().waitFor();
   const { items, n_moved } = await get(`/api/v1/calibrations/${solved[0].id}/diff?against=${solved[1].id}`);
-  const shown = (await id('shifts').locator('tbody tr').allTextContents()).length, first = await id('shifts').locator('tbody tr').first().locator('td').allTextContents();
+  const shown = (await id('shifts').locator('tbody tr').allTextContents()).length,
+    first = await id('shifts').locator('tbody tr').first().locator('td').allTextContents();
   assert.equal(shown, items.length);
   const words = (m) => (m * 1000).toFixed(0).replace(/^-0$/, '0').replace('-', '−');
   assert.deepEqual(first.slice(2, 5), items[0].delta_enu_m.map(words));
@@ -87,7 +93,8 @@ test('columns are chosen and stay, degrees may have minutes, and one anchor is l
   await id('review').click();
   const leave = id('draft').getByTestId(/^leave-/);
   await leave.first().waitFor({ timeout: 60_000 });
-  const good = (await leave.count()), out = (await leave.first().getAttribute('data-testid')).slice('leave-'.length);
+  const good = await leave.count(),
+    out = (await leave.first().getAttribute('data-testid')).slice('leave-'.length);
   assert.ok(good >= 2, `${good} may go out`);
   await leave.first().click();
   await page.getByLabel(`Why ${out} is left out`).fill('its pole was hit');

@@ -8,14 +8,27 @@ import { chromium } from 'playwright-core';
 export const chromiumPath = process.env.ANCHORD_CHROMIUM ?? '/usr/bin/chromium';
 export const haveChromium = existsSync(chromiumPath);
 
-const flags = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run', '--disable-background-networking',
-  '--disable-component-update', '--disable-sync', '--enable-unsafe-swiftshader'];
+const flags = [
+  '--no-sandbox',
+  '--disable-gpu',
+  '--disable-quic',
+  '--no-first-run',
+  '--disable-background-networking',
+  '--disable-component-update',
+  '--disable-sync',
+  '--enable-unsafe-swiftshader',
+];
 
 /** A browser context with a profile of its own: {context, page, close()}. `options` go to Playwright's context. */
 export async function openBrowser(options = {}) {
   const profile = mkdtempSync(join(tmpdir(), 'anchord-chromium-'));
   const context = await chromium.launchPersistentContext(profile, {
-    executablePath: chromiumPath, headless: true, args: flags, viewport: { width: 1440, height: 900 }, ...options });
+    executablePath: chromiumPath,
+    headless: true,
+    args: flags,
+    viewport: { width: 1440, height: 900 },
+    ...options,
+  });
   const page = context.pages()[0] ?? (await context.newPage());
   return {
     context,
@@ -40,8 +53,10 @@ export async function openPage(browser, server, { hash = '#/live', theme = 'ligh
   return { page, seen, id: (name) => page.getByTestId(name) };
 }
 
-const shots = process.env.ANCHORD_SHOTS;  // a folder: keep pictures of what was tested
-export const picture = async (page, name) => { if (shots) await page.screenshot({ path: join(shots, `${name}.png`) }); };
+const shots = process.env.ANCHORD_SHOTS; // a folder: keep pictures of what was tested
+export const picture = async (page, name) => {
+  if (shots) await page.screenshot({ path: join(shots, `${name}.png`) });
+};
 
 const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 /** What axe finds wrong on the page as it is, and whether it is wider than its window. */
@@ -54,4 +69,11 @@ export async function violations(page) {
 }
 
 /** Text of the first match; empty while there is none. */
-export const text = (locator) => locator.first().textContent({ timeout: 5000 }).then((t) => t ?? '', () => '');
+export const text = (locator) =>
+  locator
+    .first()
+    .textContent({ timeout: 5000 })
+    .then(
+      (t) => t ?? '',
+      () => '',
+    );

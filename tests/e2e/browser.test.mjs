@@ -28,7 +28,9 @@ after(async () => {
 
 /** Plays the flight into the server; `ended` resolves with its exit code. */
 function replay(server, speed) {
-  const child = spawn(binary, ['replay', flight, '--url', server.url, '--speed', String(speed)], { stdio: ['ignore', 'ignore', 'pipe'] });
+  const child = spawn(binary, ['replay', flight, '--url', server.url, '--speed', String(speed)], {
+    stdio: ['ignore', 'ignore', 'pipe'],
+  });
   let stderr = '';
   child.stderr.setEncoding('utf8').on('data', (c) => (stderr += c));
   const ended = new Promise((done) => child.once('exit', (code) => done({ code, stderr })));
@@ -52,14 +54,21 @@ test('a cold start offline shows what to do first, asks no other host and logs n
 test('the script and the styles stay within their budgets', async () => {
   const page = await (await fetch(flown.url)).text();
   const first = [...page.matchAll(/(?:src|href)="\.\/(assets\/[^"]+)"/g)].map((m) => m[1]);
-  const size = async (path) => gzipSync(Buffer.from(await (await fetch(`${flown.url}/${path}`)).arrayBuffer()), { level: 9 }).length;
+  const size = async (path) =>
+    gzipSync(Buffer.from(await (await fetch(`${flown.url}/${path}`)).arrayBuffer()), { level: 9 }).length;
   const sizes = Object.fromEntries(await Promise.all(first.map(async (p) => [p, await size(p)])));
-  const js = Object.entries(sizes).filter(([p]) => p.endsWith('.js')).reduce((s, [, n]) => s + n, 0);
-  const css = Object.entries(sizes).filter(([p]) => p.endsWith('.css')).reduce((s, [, n]) => s + n, 0);
+  const js = Object.entries(sizes)
+    .filter(([p]) => p.endsWith('.js'))
+    .reduce((s, [, n]) => s + n, 0);
+  const css = Object.entries(sizes)
+    .filter(([p]) => p.endsWith('.css'))
+    .reduce((s, [, n]) => s + n, 0);
   const entry = await (await fetch(`${flown.url}/${first.find((p) => p.endsWith('.js'))}`)).text();
   const chunks = [...new Set([...entry.matchAll(/\.\/([\w-]+\.js)/g)].map((m) => m[1]))];
   const lazy = await Promise.all(chunks.map((c) => size(`assets/${c}`)));
-  console.log(`first load ${js} B gz script, ${css} B gz style; chunks ${chunks.map((c, i) => `${c} ${lazy[i]}`).join(', ')}`);
+  console.log(
+    `first load ${js} B gz script, ${css} B gz style; chunks ${chunks.map((c, i) => `${c} ${lazy[i]}`).join(', ')}`,
+  );
   assert.ok(js > 5000 && js <= 60_000, `first load ${js} B gz`);
   assert.ok(css <= 15_000, `style ${css} B gz`);
   assert.ok(chunks.length >= 2, 'map and plot are chunks of their own');
@@ -96,12 +105,21 @@ test('a simulated flight converges on screen, and what is published is what the 
     await id('progress').waitFor({ timeout: 20_000 });
     await eventually('ranges arrive', async () => (await id('range-list').locator('tbody tr').count()) >= 3, 20_000);
     await eventually('the fix is shown', async () => (await text(id('status-rtk'))).match(/FIX|FLOAT/), 10_000);
-    await eventually('height and speed are read', async () => /Height[−\d.]+.*Speed[\d.]+/.test(await text(id('rtk-card'))), 10_000);
+    await eventually(
+      'height and speed are read',
+      async () => /Height[−\d.]+.*Speed[\d.]+/.test(await text(id('rtk-card'))),
+      10_000,
+    );
     await picture(page, 'live-converging');
-    await eventually('three anchors converge', async () => {
-      const done = /(\d+) of (\d+)/.exec(await text(id('progress').locator('dd')));
-      return done && Number(done[1]) >= 3;
-    }, 60_000, 250);
+    await eventually(
+      'three anchors converge',
+      async () => {
+        const done = /(\d+) of (\d+)/.exec(await text(id('progress').locator('dd')));
+        return done && Number(done[1]) >= 3;
+      },
+      60_000,
+      250,
+    );
     for (const theme of ['light', 'dark', 'sun']) {
       while ((await page.locator('html').getAttribute('data-theme')) !== theme) await id('theme').click();
       assert.deepEqual(await violations(page), [], `live, ${theme}`);
@@ -209,14 +227,24 @@ test('a server that goes silent is late, then lost with an alarm while a flight 
 });
 
 test('a tablet upright, a wide screen and text of 200 % lose nothing', async () => {
-  for (const [width, height, zoom] of [[768, 1024, 1], [2560, 1440, 1], [1280, 1024, 2]]) {
+  for (const [width, height, zoom] of [
+    [768, 1024, 1],
+    [2560, 1440, 1],
+    [1280, 1024, 2],
+  ]) {
     const { page, id } = await openPage(browser, flown, { width: width / zoom, height: height / zoom });
     await id('live').waitFor();
     for (const name of ['status-link', 'status-alarms', 'theme', 'nav-anchors']) {
       const box = await id(name).boundingBox();
-      assert.ok(box && box.x >= -1 && box.x + box.width <= width / zoom + 1 && box.width >= 24 && box.height >= 24, `${name} at ${width}x${height}/${zoom}: ${JSON.stringify(box)}`);
+      assert.ok(
+        box && box.x >= -1 && box.x + box.width <= width / zoom + 1 && box.width >= 24 && box.height >= 24,
+        `${name} at ${width}x${height}/${zoom}: ${JSON.stringify(box)}`,
+      );
     }
-    assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth + 1), `no sideways scrolling at ${width}/${zoom}`);
+    assert.ok(
+      await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth + 1),
+      `no sideways scrolling at ${width}/${zoom}`,
+    );
     await picture(page, `live-${width}-${zoom}`);
     await page.close();
   }

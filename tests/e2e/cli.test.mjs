@@ -29,8 +29,21 @@ test('an unknown subcommand ends with 2 and says something on stderr', async () 
 test('the simulated flight is the same, byte for byte, with the same seed, and another with another', async () => {
   const folder = mkdtempSync(join(tmpdir(), 'anchord e2e '));
   try {
-    for (const [name, seed] of [['one', '7'], ['two', '7'], ['other', '8']]) {
-      const { code, stderr } = await run(['simulate', 'flight', '--seed', seed, '--duration', '40', '--out', join(folder, name)]);
+    for (const [name, seed] of [
+      ['one', '7'],
+      ['two', '7'],
+      ['other', '8'],
+    ]) {
+      const { code, stderr } = await run([
+        'simulate',
+        'flight',
+        '--seed',
+        seed,
+        '--duration',
+        '40',
+        '--out',
+        join(folder, name),
+      ]);
       assert.equal(code, 0, stderr);
     }
     for (const file of ['flight.json', 'track.csv', 'ranges.csv', 'anchors_truth.csv']) {

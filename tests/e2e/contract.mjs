@@ -24,8 +24,20 @@ export class Contract {
       for (const method of methods.filter((m) => item[m])) {
         const template = own + path;
         // Fixed segments win over parameters: /anchors/import before /anchors/{id}.
-        const pattern = new RegExp(`^${template.split(/(\{[^}]+\})/).map((part) => (part.startsWith('{') ? '[^/]+' : part.replace(/[.*+?^$()|[\]\\]/g, '\\$&'))).join('')}$`);
-        this.operations.push({ method, template, pattern, name: `${method.toUpperCase()} ${template}`, pointer: `/paths/${escape(path)}/${method}`, parameters: (template.match(/\{/g) ?? []).length });
+        const pattern = new RegExp(
+          `^${template
+            .split(/(\{[^}]+\})/)
+            .map((part) => (part.startsWith('{') ? '[^/]+' : part.replace(/[.*+?^$()|[\]\\]/g, '\\$&')))
+            .join('')}$`,
+        );
+        this.operations.push({
+          method,
+          template,
+          pattern,
+          name: `${method.toUpperCase()} ${template}`,
+          pointer: `/paths/${escape(path)}/${method}`,
+          parameters: (template.match(/\{/g) ?? []).length,
+        });
       }
     }
     this.operations.sort((a, b) => a.parameters - b.parameters);
@@ -53,8 +65,12 @@ export class Contract {
     let valid = this.compiled.get(ref);
     if (!valid) this.compiled.set(ref, (valid = this.ajv.compile({ $ref: ref })));
     if (valid(value)) return;
-    const errors = valid.errors.slice(0, 8).map((e) => `  ${e.instancePath || '/'} ${e.message} ${JSON.stringify(e.params)}`);
-    throw new Error(`${what} does not keep the contract:\n${errors.join('\n')}\n${JSON.stringify(value).slice(0, 1500)}`);
+    const errors = valid.errors
+      .slice(0, 8)
+      .map((e) => `  ${e.instancePath || '/'} ${e.message} ${JSON.stringify(e.params)}`);
+    throw new Error(
+      `${what} does not keep the contract:\n${errors.join('\n')}\n${JSON.stringify(value).slice(0, 1500)}`,
+    );
   }
 
   operation(method, path) {
@@ -69,7 +85,8 @@ export class Contract {
     const what = `${operation.name} -> ${response.status}`;
     const responses = this.at(`${operation.pointer}/responses`);
     const key = [String(response.status), `${String(response.status)[0]}XX`, 'default'].find((k) => responses[k]);
-    if (!key) throw new Error(`${what}: the contract has no such status (${Object.keys(responses)}): ${text.slice(0, 300)}`);
+    if (!key)
+      throw new Error(`${what}: the contract has no such status (${Object.keys(responses)}): ${text.slice(0, 300)}`);
     const [promised, pointer] = this.deref(`${operation.pointer}/responses/${key}`);
     for (const name of Object.keys(promised.headers ?? {})) {
       const [header] = this.deref(`${pointer}/headers/${escape(name)}`);
@@ -81,7 +98,10 @@ export class Contract {
       if (promised.content && method.toUpperCase() !== 'HEAD') throw new Error(`${what}: the promised body is missing`);
       return;
     }
-    if (!promised.content[type]) throw new Error(`${what}: type '${type}' is not promised (${Object.keys(promised.content)}): ${text.slice(0, 300)}`);
+    if (!promised.content[type])
+      throw new Error(
+        `${what}: type '${type}' is not promised (${Object.keys(promised.content)}): ${text.slice(0, 300)}`,
+      );
     if (type.includes('json') && !type.includes('ndjson') && promised.content[type].schema) {
       let body;
       try {
@@ -99,7 +119,8 @@ export class Contract {
     const [body, pointer] = this.deref(`${operation.pointer}/requestBody`);
     if (!body?.content) throw new Error(`${operation.name}: took a body, the contract knows none`);
     const type = Object.keys(body.content).find((t) => /^application\/(merge-patch\+)?json$/.test(t));
-    if (type && body.content[type].schema) this.check(`${pointer}/content/${escape(type)}/schema`, json, `request of ${operation.name}`);
+    if (type && body.content[type].schema)
+      this.check(`${pointer}/content/${escape(type)}/schema`, json, `request of ${operation.name}`);
   }
 
   uncalled() {
@@ -122,6 +143,11 @@ export function checked(server, contract) {
       throw new Error(`${method} ${path}: ${response.status} instead of ${expect}: ${text.slice(0, 600)}`);
     }
     const type = response.headers.get('content-type') ?? '';
-    return { status: response.status, headers: response.headers, text, json: type.includes('json') && !type.includes('ndjson') && text ? JSON.parse(text) : undefined };
+    return {
+      status: response.status,
+      headers: response.headers,
+      text,
+      json: type.includes('json') && !type.includes('ndjson') && text ? JSON.parse(text) : undefined,
+    };
   };
 }

@@ -27,10 +27,19 @@ after(() => server?.dispose());
 test('a site, a mission, its measurements', async () => {
   ids.site = (await call('POST', '/api/v1/sites', { expect: 201, json: { name: 'Contract site' } })).json.id;
   ids.mission = (await call('POST', '/api/v1/missions', { expect: 201, json: flight.mission })).json.id;
-  ids.spare = (await call('POST', '/api/v1/missions', { expect: 201, json: { ...flight.mission, name: 'spare' } })).json.id;
+  ids.spare = (
+    await call('POST', '/api/v1/missions', { expect: 201, json: { ...flight.mission, name: 'spare' } })
+  ).json.id;
   await call('POST', `/api/v1/fixes?mission=${ids.mission}`, { expect: 200, ...lines(flight.fixes) });
   await call('POST', `/api/v1/ranges?mission=${ids.mission}`, { expect: 200, ...lines(flight.ranges) });
-  const cir = { t_us: flight.ranges[9].t_us + 1, tag: '0x6e01', anchor: '0x6a21', distance_m: 9, mission: ids.spare, cir: { n: 2, dt_ps: 1001.6, first_path_idx: 0.5, rxpacc: 1001, b64: 'AAEAAv//AAA=' } };
+  const cir = {
+    t_us: flight.ranges[9].t_us + 1,
+    tag: '0x6e01',
+    anchor: '0x6a21',
+    distance_m: 9,
+    mission: ids.spare,
+    cir: { n: 2, dt_ps: 1001.6, first_path_idx: 0.5, rxpacc: 1001, b64: 'AAEAAv//AAA=' },
+  };
   await call('POST', '/api/v1/ranges', { expect: 200, json: [cir] });
   await call('POST', `/api/v1/missions/${ids.mission}/actions`, { expect: 200, json: { action: 'finish' } });
 });
@@ -38,23 +47,33 @@ test('a site, a mission, its measurements', async () => {
 test('measurements taken out of use, and back', async () => {
   const { json } = await call('GET', `/api/v1/ranges?mission=${ids.mission}&limit=2`, { expect: 200 });
   const path = `/api/v1/missions/${ids.mission}/exclusions`;
-  const made = await call('POST', path, { expect: 201, json: { kind: 'ranges', ids: json.items.map((one) => one.id), reason: 'a bird' } });
+  const made = await call('POST', path, {
+    expect: 201,
+    json: { kind: 'ranges', ids: json.items.map((one) => one.id), reason: 'a bird' },
+  });
   await call('GET', path, { expect: 200 });
   await call('POST', `${path}/${made.json.id}/include`, { expect: 200, json: { reason: 'no bird' } });
   await call('POST', `${path}/${made.json.id}/include`, { expect: 409, json: {} });
 });
 
 test('a calibration, published', async () => {
-  const solved = await call('POST', '/api/v1/calibrations', { json: { missions: [ids.mission] }, headers: { prefer: 'wait=120' } });
+  const solved = await call('POST', '/api/v1/calibrations', {
+    json: { missions: [ids.mission] },
+    headers: { prefer: 'wait=120' },
+  });
   assert.ok(solved.status < 300, solved.text);
   ids.calibration = solved.json.id;
   const job = await call('POST', '/api/v1/calibrations', { json: { missions: [ids.mission] } });
   assert.ok([200, 201, 202].includes(job.status));
   await call('POST', `/api/v1/calibrations/${ids.calibration}/publish`, { json: {} });
   // Its kit learned from it; a first profile of another one is put.
-  const profile = (await call('GET', `/api/v1/devices/${flight.mission.kit}/profile`, { expect: 200 }));
+  const profile = await call('GET', `/api/v1/devices/${flight.mission.kit}/profile`, { expect: 200 });
   await call('PUT', `/api/v1/devices/${flight.mission.kit}/profile`, { expect: 428, json: profile.json.profile });
-  await call('PUT', `/api/v1/devices/${flight.mission.kit}/profile`, { expect: 200, json: profile.json.profile, headers: { 'if-match': profile.headers.get('etag') } });
+  await call('PUT', `/api/v1/devices/${flight.mission.kit}/profile`, {
+    expect: 200,
+    json: profile.json.profile,
+    headers: { 'if-match': profile.headers.get('etag') },
+  });
 });
 
 test('a local frame, fitted to the published anchors', async () => {
@@ -63,19 +82,38 @@ test('a local frame, fitted to the published anchors', async () => {
   const pairs = json.features.map(({ properties }) => ({ anchor: properties.network_id, local_m: properties.enu_m }));
   const fit = await call('POST', `/api/v1/frames/${ids.frame}/fit`, { expect: 200, json: { pairs, parameters: 4 } });
   assert.ok(fit.json.fit.rms_m < 0.001, `ENU numbers are a local frame of their own: ${fit.json.fit.rms_m}`);
-  await call('POST', '/api/v1/transform', { expect: 200, json: { from: 'local', to: 'geo', frame: 'hall-a', points: [pairs[0].local_m] } });
+  await call('POST', '/api/v1/transform', {
+    expect: 200,
+    json: { from: 'local', to: 'geo', frame: 'hall-a', points: [pairs[0].local_m] },
+  });
 });
 
 test('a plan that says nothing flies by the defaults of the contract', async () => {
   const { json: made } = await call('POST', '/api/v1/plans', { expect: 201, json: { name: 'defaults' } });
-  const [settings] = contract.deref('/components/schemas/PlanSettings'), [plan] = contract.deref('/components/schemas/PlanBody');
-  for (const [name, rule] of Object.entries(settings.properties)) assert.deepEqual(made.settings[name], rule.default, name);
+  const [settings] = contract.deref('/components/schemas/PlanSettings'),
+    [plan] = contract.deref('/components/schemas/PlanBody');
+  for (const [name, rule] of Object.entries(settings.properties))
+    assert.deepEqual(made.settings[name], rule.default, name);
   assert.equal(made.building_height_m, plan.properties.building_height_m.default);
 });
 
 test('plans: made, generated, imported, checked, changed, exported', async () => {
-  const outline = { type: 'Polygon', coordinates: [[[3.7131, 51.0231], [3.71353, 51.0231], [3.71353, 51.02328], [3.7131, 51.02328], [3.7131, 51.0231]]] };
-  const made = await call('POST', '/api/v1/plans/generate', { expect: 200, json: { name: 'Hall A', outline, building_height_m: 8 } });
+  const outline = {
+    type: 'Polygon',
+    coordinates: [
+      [
+        [3.7131, 51.0231],
+        [3.71353, 51.0231],
+        [3.71353, 51.02328],
+        [3.7131, 51.02328],
+        [3.7131, 51.0231],
+      ],
+    ],
+  };
+  const made = await call('POST', '/api/v1/plans/generate', {
+    expect: 200,
+    json: { name: 'Hall A', outline, building_height_m: 8 },
+  });
   ids.plan = (await call('POST', '/api/v1/plans', { expect: 201, json: made.json.plan })).json.id;
   const path = `/api/v1/plans/${ids.plan}`;
   const stored = await call('POST', `${path}/validate`, { expect: 200 });
@@ -100,49 +138,103 @@ test('a campaign, a data set, a training run, a model', async () => {
   const made = await call('POST', '/api/v1/campaigns', { expect: 201, json: { name: 'contract' } });
   ids.campaign = made.json.id;
   await call('PATCH', `/api/v1/campaigns/${ids.campaign}`, { expect: 428, headers: merge, body: '{"note":"x"}' });
-  await call('PATCH', `/api/v1/campaigns/${ids.campaign}`, { expect: 200, headers: { ...merge, 'if-match': made.headers.get('etag') }, body: '{"note":"x"}' });
-  const csv = { headers: { 'content-type': 'text/csv' }, body: readFileSync(join(root, 'docs/examples/campaign.csv'), 'utf8') };
+  await call('PATCH', `/api/v1/campaigns/${ids.campaign}`, {
+    expect: 200,
+    headers: { ...merge, 'if-match': made.headers.get('etag') },
+    body: '{"note":"x"}',
+  });
+  const csv = {
+    headers: { 'content-type': 'text/csv' },
+    body: readFileSync(join(root, 'docs/examples/campaign.csv'), 'utf8'),
+  };
   await call('POST', `/api/v1/campaigns/${ids.campaign}/samples`, { expect: 200, ...csv });
   await call('GET', `/api/v1/campaigns/${ids.campaign}/samples?features=true&los=true`, { expect: 200 });
   await call('POST', '/api/v1/campaigns', { expect: 201, json: { name: 'with responses' } });
-  const heard = JSON.stringify({ setting: 's', true_distance_m: 4.9, los: true, range_m: 5, cir: { n: 2, dt_ps: 1001.6, first_path_idx: 1, b64: 'AQACAP//BAA=' } });
-  await call('POST', '/api/v1/campaigns/with%20responses/samples', { expect: 200, headers: { 'content-type': 'application/x-ndjson' }, body: `${heard}\n` });
+  const heard = JSON.stringify({
+    setting: 's',
+    true_distance_m: 4.9,
+    los: true,
+    range_m: 5,
+    cir: { n: 2, dt_ps: 1001.6, first_path_idx: 1, b64: 'AQACAP//BAA=' },
+  });
+  await call('POST', '/api/v1/campaigns/with%20responses/samples', {
+    expect: 200,
+    headers: { 'content-type': 'application/x-ndjson' },
+    body: `${heard}\n`,
+  });
   const sample = (await call('GET', '/api/v1/campaigns/with%20responses/samples', { expect: 200 })).json.items[0];
   await call('GET', `/api/v1/campaigns/with%20responses/samples/${sample.id}/cir`, { expect: 200 });
   await call('GET', `/api/v1/campaigns/${ids.campaign}/samples/${sample.id}/cir`, { expect: 404 });
   await call('PATCH', `/api/v1/ranges?mission=${ids.spare}`, { expect: 200, json: { los: true, distance_m: 8.9 } });
-  ids.dataset = (await call('POST', '/api/v1/datasets', { expect: 201, json: { name: 'contract', campaigns: ['contract'], split: { test: ['room 6'] } } })).json.id;
+  ids.dataset = (
+    await call('POST', '/api/v1/datasets', {
+      expect: 201,
+      json: { name: 'contract', campaigns: ['contract'], split: { test: ['room 6'] } },
+    })
+  ).json.id;
   const rows = (await call('GET', `/api/v1/datasets/${ids.dataset}/rows?format=csv`, { expect: 200 })).text;
   await call('GET', `/api/v1/datasets/${ids.dataset}/rows?format=ndjson`, { expect: 200 });
-  const copy = (await call('POST', '/api/v1/datasets?name=copy', { expect: 201, headers: csv.headers, body: rows })).json;
+  const copy = (await call('POST', '/api/v1/datasets?name=copy', { expect: 201, headers: csv.headers, body: rows }))
+    .json;
   await call('DELETE', `/api/v1/datasets/${copy.id}`, { expect: 204 });
-  const train = (task, methods) => call('POST', '/api/v1/training-runs', { expect: 201, headers: { prefer: 'wait=120' }, json: { task, dataset: 'contract', methods, cv: { folds: 3, seed: 1 } } });
+  const train = (task, methods) =>
+    call('POST', '/api/v1/training-runs', {
+      expect: 201,
+      headers: { prefer: 'wait=120' },
+      json: { task, dataset: 'contract', methods, cv: { folds: 3, seed: 1 } },
+    });
   const bias = (await train('los_bias', ['constant'])).json;
   const run = (await train('nlos_id', ['logistic'])).json;
   ids.run = run.id;
   ids.model = run.model.split('/').at(-1);
-  await call('POST', '/api/v1/training-runs', { expect: 422, json: { task: 'nlos_id', dataset: 'nowhere', methods: ['magic'] } });
+  await call('POST', '/api/v1/training-runs', {
+    expect: 422,
+    json: { task: 'nlos_id', dataset: 'nowhere', methods: ['magic'] },
+  });
   await call('POST', `/api/v1/training-runs/${ids.run}/restart`, { expect: 422 });
   await call('DELETE', `/api/v1/training-runs/${bias.id}`, { expect: 204 });
   await call('DELETE', bias.model, { expect: 204 });
   await call('POST', `/api/v1/models/${ids.model}/promote`, { expect: 200, json: { reason: 'contract' } });
   await call('PATCH', '/api/v1/models/active', { expect: 200, json: { correction: 'hard' } });
-  await call('POST', '/api/v1/models/active/predict', { expect: 200, json: { sample: { distance_m: 5, rx_dbm: -80, fp_dbm: -83, std_noise: 45 } } });
+  await call('POST', '/api/v1/models/active/predict', {
+    expect: 200,
+    json: { sample: { distance_m: 5, rx_dbm: -80, fp_dbm: -83, std_noise: 45 } },
+  });
   await call('POST', `/api/v1/models/${ids.model}/predict`, { expect: 200, json: { samples: [{ distance_m: 5 }] } });
   const artifact = (await call('GET', `/api/v1/models/${ids.model}/artifact`, { expect: 200 })).json;
   await call('POST', '/api/v1/models', { expect: 201, json: artifact });
-  await call('POST', '/api/v1/models', { expect: 422, headers: { 'content-type': 'application/json' }, body: '{"format":"pickle"}' });
+  await call('POST', '/api/v1/models', {
+    expect: 422,
+    headers: { 'content-type': 'application/json' },
+    body: '{"format":"pickle"}',
+  });
 });
 
 /** Of a simulated tag that is there for this only. */
 async function radio_settings() {
   const folder = mkdtempSync(join(tmpdir(), 'anchord e2e '));
-  const simulator = spawn(binary, ['simulate', 'demonstration', '--json', '--links', folder], { stdio: ['ignore', 'pipe', 'inherit'] });
+  const simulator = spawn(binary, ['simulate', 'demonstration', '--json', '--links', folder], {
+    stdio: ['ignore', 'pipe', 'inherit'],
+  });
   try {
-    const tag = await new Promise((done) => createInterface({ input: simulator.stdout }).on('line', (line) => JSON.parse(line).kind === 'pozyx' && done(JSON.parse(line))));
-    const made = await call('POST', '/api/v1/devices', { expect: 201, json: { kind: 'pozyx', name: 'tag', address: tag.address } });
-    const path = `/api/v1/devices/${made.json.id}`, uwb = `${path}/uwb-settings`;
-    await eventually('the tag ranges', async () => (await call('GET', path, { expect: 200 })).json.counters.ranges > 20, 30_000, 200);
+    const tag = await new Promise((done) =>
+      createInterface({ input: simulator.stdout }).on(
+        'line',
+        (line) => JSON.parse(line).kind === 'pozyx' && done(JSON.parse(line)),
+      ),
+    );
+    const made = await call('POST', '/api/v1/devices', {
+      expect: 201,
+      json: { kind: 'pozyx', name: 'tag', address: tag.address },
+    });
+    const path = `/api/v1/devices/${made.json.id}`,
+      uwb = `${path}/uwb-settings`;
+    await eventually(
+      'the tag ranges',
+      async () => (await call('GET', path, { expect: 200 })).json.counters.ranges > 20,
+      30_000,
+      200,
+    );
     const now = await call('GET', uwb, { expect: 200 });
     const wanted = { channel: 2, rate_kbps: 850, prf_mhz: 64, preamble_symbols: 512, devices: ['0x6a21', '0x6a22'] };
     await call('PUT', uwb, { expect: 428, json: wanted });
@@ -162,40 +254,58 @@ async function radio_settings() {
 }
 
 test('devices: set up, refused, changed, asked, looked for', async () => {
-  const device = { kind: 'gnss', name: 'rover', address: 'serial:/dev/serial/by-id/of-the-contract-test', options: { format: 'nmea' } };
+  const device = {
+    kind: 'gnss',
+    name: 'rover',
+    address: 'serial:/dev/serial/by-id/of-the-contract-test',
+    options: { format: 'nmea' },
+  };
   const made = await call('POST', '/api/v1/devices', { expect: 201, json: device });
   ids.device = made.json.id;
   await call('POST', '/api/v1/devices', { expect: 409, json: device });
   await call('POST', '/api/v1/devices', { expect: 422, json: { ...device, address: 'teapot:1' } });
-  const path = `/api/v1/devices/${ids.device}`, patch = { json: { name: 'rover of the contract test' } };
+  const path = `/api/v1/devices/${ids.device}`,
+    patch = { json: { name: 'rover of the contract test' } };
   await call('PATCH', path, { expect: 428, ...patch });
   await call('PATCH', path, { expect: 200, ...patch, headers: { 'if-match': made.headers.get('etag') } });
   await call('PATCH', path, { expect: 412, ...patch, headers: { 'if-match': made.headers.get('etag') } });
-  await call('POST', `${path}/actions`, { expect: 422, json: { action: 'identify' } });  // it is not plugged in
+  await call('POST', `${path}/actions`, { expect: 422, json: { action: 'identify' } }); // it is not plugged in
   await call('POST', '/api/v1/discovery', { expect: 200, json: {}, headers: { prefer: 'wait=30' } });
-  const spare = await call('POST', '/api/v1/devices', { expect: 201, json: { kind: 'ntrip', address: 'tcp://127.0.0.1:1', options: { mount: 'M' }, enabled: false } });
+  const spare = await call('POST', '/api/v1/devices', {
+    expect: 201,
+    json: { kind: 'ntrip', address: 'tcp://127.0.0.1:1', options: { mount: 'M' }, enabled: false },
+  });
   await radio_settings();
-  await call('DELETE', `/api/v1/devices/${spare.json.id}`, { expect: 204, headers: { 'if-match': spare.headers.get('etag') } });
+  await call('DELETE', `/api/v1/devices/${spare.json.id}`, {
+    expect: 204,
+    headers: { 'if-match': spare.headers.get('etag') },
+  });
 });
 
 test('a flight by hand: control, checklist, start, hold, abort', async () => {
-  ids.flown = (await call('POST', '/api/v1/missions', { expect: 201, json: { ...flight.mission, name: 'flown' } })).json.id;
+  ids.flown = (
+    await call('POST', '/api/v1/missions', { expect: 201, json: { ...flight.mission, name: 'flown' } })
+  ).json.id;
   const path = `/api/v1/missions/${ids.flown}`;
   const lease = (await call('POST', `${path}/control`, { expect: 200, json: { action: 'take' } })).json.lease;
   await call('POST', `${path}/control`, { expect: 409, json: { action: 'take' } });
   await call('POST', `${path}/control`, { expect: 200, json: { action: 'renew', lease } });
   await call('GET', `${path}/control`, { expect: 200 });
-  await call('POST', `${path}/uploads`, { json: { what: 'fence', plan: ids.plan, lease } });  // there is no aircraft
-  await call('POST', `${path}/aircraft`, { expect: 422, json: { lease } });  // nor a link to one
+  await call('POST', `${path}/uploads`, { json: { what: 'fence', plan: ids.plan, lease } }); // there is no aircraft
+  await call('POST', `${path}/aircraft`, { expect: 422, json: { lease } }); // nor a link to one
   await call('GET', `${path}/checklist?plan=${ids.plan}`, { expect: 200 });
   for (const item of ['rtk', 'corrections', 'tag', 'disk', 'props', 'airspace', 'people', 'pilot']) {
     await call('POST', `${path}/checklist/${item}`, { expect: 200, json: { reason: 'contract test' } });
   }
   await call('POST', `${path}/checklist/recording`, { expect: 422, json: { reason: 'contract test' } });
-  await call('POST', `/api/v1/fixes?mission=${ids.flown}`, { expect: 200, ...lines([{ ...flight.fixes[0], t_us: Date.now() * 1000 }]) });
+  await call('POST', `/api/v1/fixes?mission=${ids.flown}`, {
+    expect: 200,
+    ...lines([{ ...flight.fixes[0], t_us: Date.now() * 1000 }]),
+  });
   const start = { action: 'start', lease, plan: ids.plan, mode: 'manual' };
   let started;
-  for (const end = Date.now() + 20_000; Date.now() < end;) {  // the fix takes its way through the live path
+  for (const end = Date.now() + 20_000; Date.now() < end;) {
+    // the fix takes its way through the live path
     started = await call('POST', `${path}/actions`, { json: start });
     if (started.status === 202) break;
     await new Promise((resolve) => setTimeout(resolve, 100));
@@ -204,9 +314,13 @@ test('a flight by hand: control, checklist, start, hold, abort', async () => {
   await call('GET', `${path}/procedure`, { expect: 200 });
   await call('GET', `${path}/grid`, { expect: 200 });
   await call('POST', `${path}/actions`, { expect: 409, json: { action: 'hold', lease: 'not mine' } });
-  await call('POST', `${path}/actions`, { expect: 202, json: { action: 'hold', lease }, headers: { prefer: 'wait=2' } });
+  await call('POST', `${path}/actions`, {
+    expect: 202,
+    json: { action: 'hold', lease },
+    headers: { prefer: 'wait=2' },
+  });
   await call('POST', `${path}/actions`, { expect: 202, json: { action: 'abort', lease } });
-  await call('POST', `${path}/actions`, { expect: 202, json: { action: 'hold', lease } });  // always, whatever the server believes
+  await call('POST', `${path}/actions`, { expect: 202, json: { action: 'hold', lease } }); // always, whatever the server believes
   await call('POST', `${path}/actions`, { expect: 422, json: { action: 'return', lease } });
   await call('POST', `${path}/control`, { expect: 200, json: { action: 'release', lease } });
 });
@@ -215,19 +329,40 @@ test('everything that can be read', async () => {
   ids.job = (await call('GET', '/api/v1/jobs', { expect: 200 })).json.items[0]?.id;
   ids.range = (await call('GET', `/api/v1/ranges?mission=${ids.spare}`, { expect: 200 })).json.items[0].id;
   ids.anchor = '0x6a21';
-  const given = { '/sites/': ids.site, '/missions/': ids.mission, '/ranges/': ids.range, '/anchors/': ids.anchor, '/calibrations/': ids.calibration, '/jobs/': ids.job, '/plans/': ids.plan, '/profile': flight.mission.kit, '/devices/': ids.device, '/frames/': ids.frame, '/revisions/': '1',
-    '/campaigns/': ids.campaign, '/datasets/': ids.dataset, '/training-runs/': ids.run, '/models/': ids.model };
-  const wrong = [];  // all at once, as a person wants them
+  const given = {
+    '/sites/': ids.site,
+    '/missions/': ids.mission,
+    '/ranges/': ids.range,
+    '/anchors/': ids.anchor,
+    '/calibrations/': ids.calibration,
+    '/jobs/': ids.job,
+    '/plans/': ids.plan,
+    '/profile': flight.mission.kit,
+    '/devices/': ids.device,
+    '/frames/': ids.frame,
+    '/revisions/': '1',
+    '/campaigns/': ids.campaign,
+    '/datasets/': ids.dataset,
+    '/training-runs/': ids.run,
+    '/models/': ids.model,
+  };
+  const wrong = []; // all at once, as a person wants them
   for (const { method, template } of contract.operations.filter((o) => o.method === 'get')) {
-    if (template === '/api/v1/ws' || template.includes('{sample}') || template.endsWith('/uwb-settings')) continue;  // tests of their own
+    if (template === '/api/v1/ws' || template.includes('{sample}') || template.endsWith('/uwb-settings')) continue; // tests of their own
     const resource = Object.keys(given).find((part) => template.includes(part));
-    const id = /missions\/[^/]+\/(procedure|grid)$/.test(template) ? ids.flown : resource ? given[resource] : 'validation';
+    const id = /missions\/[^/]+\/(procedure|grid)$/.test(template)
+      ? ids.flown
+      : resource
+        ? given[resource]
+        : 'validation';
     const path = template.replace(/\{[^}]+\}/, id);
     try {
       const answer = await call(method.toUpperCase(), path);
       if (answer.status >= 400) wrong.push(`${template}: ${answer.status} ${answer.text.slice(0, 300)}`);
       if (template.includes('{id}') && template.startsWith('/api/')) {
-        await call('GET', template.replace(/\{[^}]+\}/, template.includes('/ranges/') ? '999999999' : unknown), { expect: 404 });
+        await call('GET', template.replace(/\{[^}]+\}/, template.includes('/ranges/') ? '999999999' : unknown), {
+          expect: 404,
+        });
       }
     } catch (error) {
       wrong.push(error.message);
@@ -250,7 +385,8 @@ test('changes with preconditions, tokens, sessions, tickets', async () => {
   }
   const backup = (await call('POST', '/api/v1/backups', { expect: 201, headers: { prefer: 'wait=60' } })).json;
   assert.ok((await call('GET', '/api/v1/backups', { expect: 200 })).json.items.some((b) => b.name === backup.name));
-  const made = (await call('POST', '/api/v1/tokens', { expect: 201, json: { name: 'viewer', roles: ['viewer'] } })).json;
+  const made = (await call('POST', '/api/v1/tokens', { expect: 201, json: { name: 'viewer', roles: ['viewer'] } }))
+    .json;
   await call('DELETE', `/api/v1/tokens/${made.id}`);
   await call('POST', '/api/v1/ws-tickets', {});
   await call('POST', '/api/v1/session', { json: { token: server.token }, token: '' });
@@ -260,7 +396,11 @@ test('changes with preconditions, tokens, sessions, tickets', async () => {
 test('wrong requests get the problems that are promised', async () => {
   await call('GET', '/api/v1/missions', { expect: 401, token: '' });
   await call('POST', '/api/v1/missions', { expect: 422, json: { name: 'x', no_such_field: 1 } });
-  await call('POST', '/api/v1/missions', { expect: 400, headers: { 'content-type': 'application/json' }, body: '{"name":' });
+  await call('POST', '/api/v1/missions', {
+    expect: 400,
+    headers: { 'content-type': 'application/json' },
+    body: '{"name":',
+  });
   await call('POST', '/api/v1/missions', { expect: 415, headers: { 'content-type': 'text/plain' }, body: 'hello' });
   await call('POST', '/api/v1/ranges', { expect: 415, headers: { 'content-type': 'image/png' }, body: 'x' });
   await call('POST', '/api/v1/calibrations', { json: { missions: [unknown] } });
@@ -269,8 +409,11 @@ test('wrong requests get the problems that are promised', async () => {
 test('what can be deleted', async () => {
   const etag = (path) => call('GET', path, { expect: 200 }).then((answer) => answer.headers.get('etag'));
   const spare = `/api/v1/missions/${ids.spare}`;
-  await call('DELETE', spare, { expect: 409, headers: { 'if-match': await etag(spare) } });  // it records
-  await call('POST', `${spare}/actions`, { expect: 422, json: { action: 'take_devices', lease: 'x', no_such_field: 1 } });
+  await call('DELETE', spare, { expect: 409, headers: { 'if-match': await etag(spare) } }); // it records
+  await call('POST', `${spare}/actions`, {
+    expect: 422,
+    json: { action: 'take_devices', lease: 'x', no_such_field: 1 },
+  });
   await call('POST', `${spare}/actions`, { expect: 200, json: { action: 'finish' } });
   await call('DELETE', spare, { expect: 428 });
   await call('DELETE', spare, { expect: 412, headers: { 'if-match': '"m-0"' } });
@@ -280,7 +423,10 @@ test('what can be deleted', async () => {
   await call('POST', `${spare}/restore`, { expect: 200 });
   await call('POST', `${spare}/restore`, { expect: 409 });
   await call('DELETE', spare, { expect: 204, headers: { 'if-match': await etag(spare) } });
-  await call('DELETE', `${spare}?purge=true`, { expect: 204, headers: { 'if-match': await etag(`${spare}?deleted=true`) } });
+  await call('DELETE', `${spare}?purge=true`, {
+    expect: 204,
+    headers: { 'if-match': await etag(`${spare}?deleted=true`) },
+  });
   for (const path of [`/api/v1/frames/${ids.frame}`, `/api/v1/sites/${ids.site}`]) {
     const answer = await call('DELETE', path, { headers: { 'if-match': (await etag(path)) ?? '*' } });
     assert.ok(answer.status < 300, `${path}: ${answer.status} ${answer.text}`);
@@ -292,7 +438,7 @@ test('what can be deleted', async () => {
 });
 
 test('no operation of the contract was left out', () => {
-  const left = contract.uncalled().filter((name) => name !== 'GET /api/v1/ws');  // live.test.mjs
+  const left = contract.uncalled().filter((name) => name !== 'GET /api/v1/ws'); // live.test.mjs
   assert.deepEqual(left, []);
   assert.ok(contract.operations.length > 30, `only ${contract.operations.length} operations in the contract`);
 });

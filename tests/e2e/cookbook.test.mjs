@@ -14,9 +14,14 @@ function commandsOf(page) {
 
 function shell(script, { cwd, env }) {
   return new Promise((done, fail) => {
-    const child = spawn('bash', ['-euo', 'pipefail', '-x', '-c', script], { cwd, env, stdio: ['ignore', 'pipe', 'pipe'] });
+    const child = spawn('bash', ['-euo', 'pipefail', '-x', '-c', script], {
+      cwd,
+      env,
+      stdio: ['ignore', 'pipe', 'pipe'],
+    });
     let output = '';
-    for (const stream of [child.stdout, child.stderr]) stream.setEncoding('utf8').on('data', (chunk) => (output += chunk));
+    for (const stream of [child.stdout, child.stderr])
+      stream.setEncoding('utf8').on('data', (chunk) => (output += chunk));
     child.once('error', fail);
     child.once('close', (code) => done({ code, output }));
   });
@@ -29,7 +34,10 @@ test('every command of the cookbook does what the page says', async () => {
   const cwd = mkdtempSync(join(tmpdir(), 'anchord cookbook '));
   try {
     cpSync(join(root, 'docs/examples'), join(cwd, 'docs/examples'), { recursive: true });
-    const { code, output } = await shell(commands.join('\n'), { cwd, env: { ...process.env, U: server.url, T: server.token } });
+    const { code, output } = await shell(commands.join('\n'), {
+      cwd,
+      env: { ...process.env, U: server.url, T: server.token },
+    });
     assert.equal(code, 0, output.slice(-4000));
   } finally {
     await server.dispose();

@@ -10,7 +10,7 @@ import { after, before, test } from 'node:test';
 import { binary, eventually, run, startServer } from './server.mjs';
 
 let folder, simulator, server;
-const made = {};  // id by name
+const made = {}; // id by name
 const get = async (path, from = server) => (await from.fetch(path)).json();
 const device = (name) => get(`/api/v1/devices/${made[name]}`);
 /** Without a difference of a thousand impulse responses. */
@@ -20,13 +20,20 @@ const cli = (...words) => run(['devices', '--data-dir', server.dataDir, ...words
 before(async () => {
   folder = mkdtempSync(join(tmpdir(), 'anchord e2e '));
   const scenario = {
-    schema: 'anchord.scenario/1', name: 'two tags and a rover', seed: 5,
-    tags: [{ name: 'good', id: '0x6e01' }, { name: 'mad', id: '0x6e02', clock_drift_ppm: 900 }],
+    schema: 'anchord.scenario/1',
+    name: 'two tags and a rover',
+    seed: 5,
+    tags: [
+      { name: 'good', id: '0x6e01' },
+      { name: 'mad', id: '0x6e02', clock_drift_ppm: 900 },
+    ],
     rovers: [{ name: 'rover', format: 'ubx', port: 'tcp', rate_hz: 10 }],
     radio: { loss_chance: 0, sensitivity_dbm: -130 },
   };
   writeFileSync(join(folder, 'scenario.json'), JSON.stringify(scenario));
-  simulator = spawn(binary, ['simulate', join(folder, 'scenario.json'), '--json', '--links', folder], { stdio: ['ignore', 'pipe', 'inherit'] });
+  simulator = spawn(binary, ['simulate', join(folder, 'scenario.json'), '--json', '--links', folder], {
+    stdio: ['ignore', 'pipe', 'inherit'],
+  });
   const served = [];
   await new Promise((done, fail) => {
     createInterface({ input: simulator.stdout }).on('line', (line) => served.push(JSON.parse(line)) === 3 && done());
@@ -76,7 +83,18 @@ test('identify makes lights blink, of the tag or of an anchor, over REST and by 
 });
 
 test('a device is set up with its settings by one command, and what is wrong with one is said', async () => {
-  const caster = await run(['devices', 'add', 'ntrip', 'tcp://127.0.0.1:1', 'mount=RTCM3', 'enabled=false', '--name', 'caster', '--data-dir', server.dataDir]);
+  const caster = await run([
+    'devices',
+    'add',
+    'ntrip',
+    'tcp://127.0.0.1:1',
+    'mount=RTCM3',
+    'enabled=false',
+    '--name',
+    'caster',
+    '--data-dir',
+    server.dataDir,
+  ]);
   assert.equal(caster.code, 0, caster.stderr);
   const { name, enabled, options } = await get(`/api/v1/devices/${caster.stdout.trim()}`);
   assert.deepEqual([name, enabled, options.mount], ['caster', false, 'RTCM3']);
@@ -89,7 +107,11 @@ test('a device is set up with its settings by one command, and what is wrong wit
 test('a recorded flight, played again, is the same rows: known to its own server, made anew on another', async () => {
   const body = { name: 'flight', frame: 'wgs84', track_point: 'gnss_antenna' };
   const mission = (await (await server.fetch('/api/v1/missions', { json: body })).json()).id;
-  await eventually('ranges of the flight', async () => (await get(`/api/v1/ranges?limit=60&mission=${mission}`)).items.length >= 60, 30_000);
+  await eventually(
+    'ranges of the flight',
+    async () => (await get(`/api/v1/ranges?limit=60&mission=${mission}`)).items.length >= 60,
+    30_000,
+  );
   await server.fetch(`/api/v1/missions/${mission}/actions`, { json: { action: 'finish' } });
   const rows = async (from, of) => {
     const lines = [];
@@ -98,13 +120,23 @@ test('a recorded flight, played again, is the same rows: known to its own server
     }
     return lines.map((line) => line.replace(/^\{"id":\d+,/, '{').replaceAll(of, 'MISSION')).sort();
   };
-  const recordings = join(server.dataDir, 'recordings'), file = join(recordings, readdirSync(recordings).sort()[0]);
+  const recordings = join(server.dataDir, 'recordings'),
+    file = join(recordings, readdirSync(recordings).sort()[0]);
   const out = await run(['replay', file, '--out', join(folder, 'rows')]);
   assert.equal(out.code, 0, out.stderr);
-  const derived = ['fixes', 'ranges'].flatMap((name) => readFileSync(join(folder, 'rows', `${name}.ndjson`), 'utf8').trim().split('\n'));
+  const derived = ['fixes', 'ranges'].flatMap((name) =>
+    readFileSync(join(folder, 'rows', `${name}.ndjson`), 'utf8')
+      .trim()
+      .split('\n'),
+  );
   // What came up to the finish is on its way to the database for a moment.
   let live = [];
-  await eventually('every derived row is stored', async () => (live = await rows(server, mission)).length >= derived.length, 10_000, 100);
+  await eventually(
+    'every derived row is stored',
+    async () => (live = await rows(server, mission)).length >= derived.length,
+    10_000,
+    100,
+  );
   same(derived.map((line) => line.replaceAll(mission, 'MISSION')).sort(), live);
   assert.ok(live.length >= 60 && live.some((row) => row.includes('"cir":{')), `${live.length} rows`);
 
@@ -134,19 +166,21 @@ test('a second flight gets no rows of the devices until it takes them, and gives
   const finish = (mission) => server.fetch(`/api/v1/missions/${mission.id}/actions`, { json: { action: 'finish' } });
   const first = await make({ name: 'first' });
   assert.deepEqual(first.devices, { recording: true, held_by: null });
-  await eventually('ranges of the first', async () => await n_ranges(first) > 5, 30_000);
+  await eventually('ranges of the first', async () => (await n_ranges(first)) > 5, 30_000);
   const second = await make({ name: 'second' });
   assert.deepEqual(second.devices, { recording: false, held_by: { mission: first.id, name: 'first' } });
   const before = await n_ranges(first);
-  await eventually('the first goes on', async () => await n_ranges(first) > before + 5, 30_000);
+  await eventually('the first goes on', async () => (await n_ranges(first)) > before + 5, 30_000);
   assert.equal(await n_ranges(second), 0);
-  const { lease } = await (await server.fetch(`/api/v1/missions/${first.id}/control`, { json: { action: 'take' } })).json();
+  const { lease } = await (
+    await server.fetch(`/api/v1/missions/${first.id}/control`, { json: { action: 'take' } })
+  ).json();
   const third = await make({ name: 'third', take_devices: true, lease });
   assert.equal(third.devices.recording, true);
-  await eventually('ranges of the third', async () => await n_ranges(third) > 5, 30_000);
+  await eventually('ranges of the third', async () => (await n_ranges(third)) > 5, 30_000);
   await finish(third);
   const handed_back = await n_ranges(first);
-  await eventually('the first has them back', async () => await n_ranges(first) > handed_back + 5, 30_000);
+  await eventually('the first has them back', async () => (await n_ranges(first)) > handed_back + 5, 30_000);
   assert.equal(await n_ranges(second), 0);
   await finish(second);
   await finish(first);

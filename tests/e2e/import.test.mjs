@@ -60,7 +60,10 @@ test('a replay is a fresh mission that happens now', async () => {
     }
     const { items } = await json(server, '/api/v1/missions');
     assert.equal(items.length, 2);
-    assert.deepEqual(items.map((mission) => mission.state), ['finished', 'finished']);
+    assert.deepEqual(
+      items.map((mission) => mission.state),
+      ['finished', 'finished'],
+    );
     assert.equal(items[0].n_ranges, items[1].n_ranges);
     const fixes = (await json(server, `/api/v1/fixes?mission=${items[0].id}&limit=1000`)).items;
     const newest = Math.max(...fixes.map((fix) => fix.t_us)) / 1000;
@@ -80,24 +83,37 @@ test('a replay of a stored mission brings its impulse responses along', async ()
   const server = await startServer({ auth: 'off' });
   const post = async (path, body) => {
     const answer = await server.fetch(path, {
-      method: 'POST', headers: { 'content-type': 'application/json' }, body: JSON.stringify(body),
+      method: 'POST',
+      headers: { 'content-type': 'application/json' },
+      body: JSON.stringify(body),
     });
     assert.ok(answer.ok, await answer.clone().text());
     return answer.json();
   };
   try {
-    const { id } = await post('/api/v1/missions', { name: 'with CIR', frame: 'wgs84', track_point: 'gnss_antenna', tags: [] });
+    const { id } = await post('/api/v1/missions', {
+      name: 'with CIR',
+      frame: 'wgs84',
+      track_point: 'gnss_antenna',
+      tags: [],
+    });
     const samples = Buffer.alloc(1016 * 4);
     for (let i = 0; i < samples.length; ++i) samples[i] = (i * 37) % 251;
     const cir = { n: 1016, dt_ps: 1001.6, first_path_idx: 742.5, rxpacc: 118, b64: samples.toString('base64') };
     const row = { mission: id, tag: '0x6e01', anchor: '0x6a01', distance_m: 12.5 };
-    await post('/api/v1/ranges', [1, 2, 3].map((i) => ({ ...row, t_us: 1_700_000_000_000_000 + i, seq: i, ...(i === 2 ? { cir } : {}) })));
+    await post(
+      '/api/v1/ranges',
+      [1, 2, 3].map((i) => ({ ...row, t_us: 1_700_000_000_000_000 + i, seq: i, ...(i === 2 ? { cir } : {}) })),
+    );
 
     const replayed = await run(['replay', id, '--url', server.url, '--speed', 'max', '--name', 'again']);
     assert.equal(replayed.code, 0, replayed.stderr);
     const again = (await json(server, '/api/v1/missions')).items.find((mission) => mission.name === 'again');
     const { items } = await json(server, `/api/v1/ranges?mission=${again.id}&cir=true&sort=t_us`);
-    assert.deepEqual(items.map((range) => range.cir), [undefined, cir, undefined]);
+    assert.deepEqual(
+      items.map((range) => range.cir),
+      [undefined, cir, undefined],
+    );
   } finally {
     await server.dispose();
   }

@@ -6,12 +6,17 @@ export class LiveClient {
   static async open(server, { headers = {}, token = server.token, path = '/api/v1/ws', protocol = 'anchord.v1' } = {}) {
     const all = { ...headers };
     if (token) all.authorization = `Bearer ${token}`;
-    const socket = new WebSocket(server.url.replace('http', 'ws') + path, protocol, { headers: all, perMessageDeflate: false });
+    const socket = new WebSocket(server.url.replace('http', 'ws') + path, protocol, {
+      headers: all,
+      perMessageDeflate: false,
+    });
     const client = new LiveClient(socket);
     await new Promise((done, fail) => {
       socket.once('open', done);
       socket.once('error', fail);
-      socket.once('unexpected-response', (_, response) => fail(Object.assign(new Error(`upgrade refused: ${response.statusCode}`), { status: response.statusCode })));
+      socket.once('unexpected-response', (_, response) =>
+        fail(Object.assign(new Error(`upgrade refused: ${response.statusCode}`), { status: response.statusCode })),
+      );
     });
     return client;
   }
@@ -48,8 +53,19 @@ export class LiveClient {
         this.waiters = this.waiters.filter((waiter) => waiter !== look);
         how(value);
       };
-      const timer = setTimeout(() => finish(fail, new Error(
-        `${what}: not within ${deadlineMs} ms; last messages: ${this.messages.slice(-5).map((m) => JSON.stringify(m).slice(0, 200)).join('\n')}`)), deadlineMs);
+      const timer = setTimeout(
+        () =>
+          finish(
+            fail,
+            new Error(
+              `${what}: not within ${deadlineMs} ms; last messages: ${this.messages
+                .slice(-5)
+                .map((m) => JSON.stringify(m).slice(0, 200))
+                .join('\n')}`,
+            ),
+          ),
+        deadlineMs,
+      );
       this.waiters.push(look);
       look();
     });

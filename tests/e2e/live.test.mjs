@@ -5,7 +5,10 @@ import { ndjson, simulatedFlight } from './flight.mjs';
 import { LiveClient } from './live.mjs';
 import { startServer } from './server.mjs';
 
-let server, flight, mission, delivered = 0;
+let server,
+  flight,
+  mission,
+  delivered = 0;
 
 before(async () => {
   server = await startServer();
@@ -17,7 +20,11 @@ before(async () => {
 after(() => server?.dispose());
 
 const post = async (path, rows) => {
-  const answer = await server.fetch(`${path}?mission=${mission}`, { method: 'POST', headers: { 'content-type': 'application/x-ndjson' }, body: ndjson(rows) });
+  const answer = await server.fetch(`${path}?mission=${mission}`, {
+    method: 'POST',
+    headers: { 'content-type': 'application/x-ndjson' },
+    body: ndjson(rows),
+  });
   const result = await answer.json();
   assert.equal(result.accepted, rows.length, JSON.stringify(result).slice(0, 400));
 };
@@ -27,7 +34,8 @@ async function deliver(count) {
   for (const end = delivered + count; delivered < end;) {
     const rows = flight.ranges.slice(delivered, Math.min(end, delivered + 20));
     delivered += rows.length;
-    const until = rows.at(-1).t_us + 200_000, from = fixesDelivered;
+    const until = rows.at(-1).t_us + 200_000,
+      from = fixesDelivered;
     while (fixesDelivered < flight.fixes.length && flight.fixes[fixesDelivered].t_us <= until) fixesDelivered++;
     if (fixesDelivered > from) await post('/api/v1/fixes', flight.fixes.slice(from, fixesDelivered));
     await post('/api/v1/ranges', rows);
@@ -54,10 +62,13 @@ test('what is delivered arrives with seq after seq, and estimates follow', async
   const client = await LiveClient.open(server);
   const ranges = await subscribe(client, 'ranges');
   const estimates = await subscribe(client, 'anchors.estimates');
-  await deliver(500);  // half of the flight: enough sides of the building for a first estimate
+  await deliver(500); // half of the flight: enough sides of the building for a first estimate
   await client.next('a range', (m) => m.op === 'data' && m.sub === ranges.sub);
   // The snapshot may still be empty: the first anchors are found with the rows just delivered.
-  await client.next('an estimate', (m) => (m.op === 'data' || m.op === 'snap') && m.sub === estimates.sub && JSON.stringify(m.data).includes('0x6a2'));
+  await client.next(
+    'an estimate',
+    (m) => (m.op === 'data' || m.op === 'snap') && m.sub === estimates.sub && JSON.stringify(m.data).includes('0x6a2'),
+  );
   await deliver(150);
   const firstCount = client.messages.length;
   await client.next('more ranges', (m) => m.op === 'data' && m.sub === ranges.sub, { from: firstCount });
@@ -113,25 +124,34 @@ test('a foreign page is refused at the door', async () => {
 });
 
 test('a reader that stalls harms nobody else, and hears of its gap', async () => {
-  const stalled = await LiveClient.open(server), reader = await LiveClient.open(server);
-  const slow = await subscribe(stalled, 'ranges'), fast = await subscribe(reader, 'ranges');
+  const stalled = await LiveClient.open(server),
+    reader = await LiveClient.open(server);
+  const slow = await subscribe(stalled, 'ranges'),
+    fast = await subscribe(reader, 'ranges');
   stalled.socket._socket.pause();
   // Far more than the socket buffers and the queue of one connection hold: the same instants, other sequence numbers.
   const one = flight.ranges.slice(0, 1000);
   for (let round = 1; round <= 30; round++) {
     const rows = one.map((row) => ({ ...row, seq: row.seq + round * 1_000_000 }));
-    const answer = await server.fetch(`/api/v1/ranges?mission=${mission}`, { method: 'POST', headers: { 'content-type': 'application/x-ndjson' }, body: ndjson(rows) });
+    const answer = await server.fetch(`/api/v1/ranges?mission=${mission}`, {
+      method: 'POST',
+      headers: { 'content-type': 'application/x-ndjson' },
+      body: ndjson(rows),
+    });
     assert.equal(answer.status, 200);
     await answer.arrayBuffer();
   }
   await reader.next('data for the one who reads', (m) => m.op === 'data' && m.sub === fast.sub);
   assert.equal((await server.fetch('/healthz')).status, 200);
   stalled.socket._socket.resume();
-  await stalled.next('data or gap after the stall', (m) => (m.op === 'gap' || m.op === 'data') && m.sub === slow.sub, { deadlineMs: 20_000 });
+  await stalled.next('data or gap after the stall', (m) => (m.op === 'gap' || m.op === 'data') && m.sub === slow.sub, {
+    deadlineMs: 20_000,
+  });
   const seen = stalled.messages.filter((m) => m.sub === slow.sub && (m.op === 'data' || m.op === 'gap'));
   let last = null;
   for (const message of seen) {
-    if (message.op === 'data' && last !== null) assert.ok(message.prev === last || seen.some((m) => m.op === 'gap'), 'a hole without a gap message');
+    if (message.op === 'data' && last !== null)
+      assert.ok(message.prev === last || seen.some((m) => m.op === 'gap'), 'a hole without a gap message');
     last = message.op === 'data' ? message.seq : message.to_seq;
   }
   stalled.terminate();

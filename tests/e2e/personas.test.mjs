@@ -15,7 +15,12 @@ async function call(who, method, path, { expect, ...init } = {}) {
   const text = await response.text();
   if (expect !== undefined) assert.equal(response.status, expect, `${who} ${method} ${path}: ${text.slice(0, 800)}`);
   const type = response.headers.get('content-type') ?? '';
-  return { status: response.status, headers: response.headers, text, json: type.includes('json') && text ? JSON.parse(text) : undefined };
+  return {
+    status: response.status,
+    headers: response.headers,
+    text,
+    json: type.includes('json') && text ? JSON.parse(text) : undefined,
+  };
 }
 const lines = (rows) => ({ headers: { 'content-type': 'application/x-ndjson' }, body: ndjson(rows) });
 
@@ -42,7 +47,10 @@ test('without a token every route of the API says 401, and the health probes ans
 
 test('the admin makes a token for each role', async () => {
   for (const role of ['viewer', 'integrator', 'gateway', 'engineer', 'operator']) {
-    const { json } = await call('admin', 'POST', '/api/v1/tokens', { expect: 201, json: { name: role, roles: [role] } });
+    const { json } = await call('admin', 'POST', '/api/v1/tokens', {
+      expect: 201,
+      json: { name: role, roles: [role] },
+    });
     tokens[role] = json.token ?? json.secret;
     assert.ok(tokens[role], JSON.stringify(json));
   }
@@ -58,20 +66,33 @@ test('a viewer may read, and may neither deliver nor publish', async () => {
 test('the operator opens a mission, the gateway delivers it; sending all again counts duplicates', async () => {
   mission = (await call('operator', 'POST', '/api/v1/missions', { expect: 201, json: flight.mission })).json.id;
   await call('gateway', 'GET', '/api/v1/missions', { expect: 403 });
-  const good = flight.ranges.filter((row) => row.distance_m > 0), zero = flight.ranges.length - good.length;
+  const good = flight.ranges.filter((row) => row.distance_m > 0),
+    zero = flight.ranges.length - good.length;
   assert.ok(zero > 0, 'the simulated device never failed');
-  const fixes = (await call('gateway', 'POST', `/api/v1/fixes?mission=${mission}`, { expect: 200, ...lines(flight.fixes) })).json;
+  const fixes = (
+    await call('gateway', 'POST', `/api/v1/fixes?mission=${mission}`, { expect: 200, ...lines(flight.fixes) })
+  ).json;
   assert.equal(fixes.accepted, flight.fixes.length, JSON.stringify(fixes).slice(0, 500));
-  const first = (await call('gateway', 'POST', `/api/v1/ranges?mission=${mission}`, { expect: 200, ...lines(flight.ranges) })).json;
-  assert.deepEqual([first.accepted, first.duplicates, first.rejected], [good.length, 0, zero], JSON.stringify(first).slice(0, 500));
+  const first = (
+    await call('gateway', 'POST', `/api/v1/ranges?mission=${mission}`, { expect: 200, ...lines(flight.ranges) })
+  ).json;
+  assert.deepEqual(
+    [first.accepted, first.duplicates, first.rejected],
+    [good.length, 0, zero],
+    JSON.stringify(first).slice(0, 500),
+  );
   assert.equal(first.errors[0].code, 'zero_distance');
-  const again = (await call('gateway', 'POST', `/api/v1/ranges?mission=${mission}`, { expect: 200, ...lines(good) })).json;
+  const again = (await call('gateway', 'POST', `/api/v1/ranges?mission=${mission}`, { expect: 200, ...lines(good) }))
+    .json;
   assert.deepEqual([again.accepted, again.duplicates], [0, good.length]);
 });
 
 test('the engineer solves it, and every anchor lies inside the region it claims', async () => {
   await call('operator', 'POST', `/api/v1/missions/${mission}/actions`, { json: { action: 'finish' } });
-  const { json } = await call('engineer', 'POST', '/api/v1/calibrations', { json: { missions: [mission] }, headers: { prefer: 'wait=120' } });
+  const { json } = await call('engineer', 'POST', '/api/v1/calibrations', {
+    json: { missions: [mission] },
+    headers: { prefer: 'wait=120' },
+  });
   calibration = json.id;
   assert.equal(json.anchors?.length, 6, JSON.stringify(json).slice(0, 800));
 });
@@ -85,10 +106,18 @@ test('nothing is published by itself; the operator publishes, and the integrator
   assert.equal(json.type, 'FeatureCollection');
   assert.equal(json.features.length, 6);
   for (const feature of json.features) {
-    const [lon, lat, h_m] = feature.geometry.coordinates, id = feature.properties.network_id, truth = flight.truth[id];
+    const [lon, lat, h_m] = feature.geometry.coordinates,
+      id = feature.properties.network_id,
+      truth = flight.truth[id];
     const { h95_m, v95_m } = feature.properties.accuracy.relative;
-    assert.ok(metresBetween({ lon, lat }, truth) < h95_m, `${id}: ${metresBetween({ lon, lat }, truth)} m off, claims ${h95_m}`);
-    assert.ok(Math.abs(h_m - truth.h_m) < 1.5 * v95_m, `${id}: ${Math.abs(h_m - truth.h_m)} m off in height, claims ${v95_m}`);
+    assert.ok(
+      metresBetween({ lon, lat }, truth) < h95_m,
+      `${id}: ${metresBetween({ lon, lat }, truth)} m off, claims ${h95_m}`,
+    );
+    assert.ok(
+      Math.abs(h_m - truth.h_m) < 1.5 * v95_m,
+      `${id}: ${Math.abs(h_m - truth.h_m)} m off in height, claims ${v95_m}`,
+    );
   }
   const one = await call('integrator', 'GET', '/api/v1/anchors/0x6a21', { expect: 200 });
   assert.equal(one.json.properties.network_id, '0x6a21');
@@ -99,8 +128,12 @@ test('nothing is published by itself; the operator publishes, and the integrator
 
 test('facility fields need If-Match, and an outdated one is refused', async () => {
   const { headers } = await call('integrator', 'GET', '/api/v1/anchors/0x6a21', { expect: 200 });
-  const patch = (etag, expect) => call('integrator', 'PATCH', '/api/v1/anchors/0x6a21', {
-    expect, body: JSON.stringify({ name: 'Hall A north-west' }), headers: { 'content-type': 'application/merge-patch+json', ...(etag ? { 'if-match': etag } : {}) } });
+  const patch = (etag, expect) =>
+    call('integrator', 'PATCH', '/api/v1/anchors/0x6a21', {
+      expect,
+      body: JSON.stringify({ name: 'Hall A north-west' }),
+      headers: { 'content-type': 'application/merge-patch+json', ...(etag ? { 'if-match': etag } : {}) },
+    });
   await patch(undefined, 428);
   await patch('"not-this-one"', 412);
   const { json } = await patch(headers.get('etag'), 200);

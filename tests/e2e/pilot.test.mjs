@@ -18,7 +18,11 @@ before(async () => {
   await new Promise((done) => socket.close(done));
   server = await startServer({ auth: 'off', args: ['--drone-address', `udp://:${port}`] });
   let said = '';
-  aircraft = spawn(binary, ['simulate', 'drone', '--mavlink', `udp://127.0.0.1:${port}`, '--url', server.url, '--ready', '2'], { stdio: ['ignore', 'ignore', 'pipe'] });
+  aircraft = spawn(
+    binary,
+    ['simulate', 'drone', '--mavlink', `udp://127.0.0.1:${port}`, '--url', server.url, '--ready', '2'],
+    { stdio: ['ignore', 'ignore', 'pipe'] },
+  );
   aircraft.stderr.setEncoding('utf8').on('data', (chunk) => (said += chunk));
   mission = await eventually('the aircraft makes its mission', () => /mission ([0-9a-f-]{36})/.exec(said)?.[1]);
   browser = await openBrowser();
@@ -43,24 +47,47 @@ async function hold(page, button) {
 async function draw(id, shape, corners) {
   await id(`draw-${shape}`).click();
   const { width, height } = await id('plan-map').boundingBox();
-  for (const [e, n] of corners) await id('plan-map').click({ position: { x: width / 2 + e * PX_PER_M, y: height / 2 - n * PX_PER_M } });
+  for (const [e, n] of corners)
+    await id('plan-map').click({ position: { x: width / 2 + e * PX_PER_M, y: height / 2 - n * PX_PER_M } });
 }
-const PX_PER_M = 8;  // of an empty map
+const PX_PER_M = 8; // of an empty map
 
 test('a person draws outline and fence on the map, presses generate, saves', async () => {
   const { page, seen, id } = await openPage(browser, server);
   await page.getByText('Simulated drone').first().waitFor();
   // The map lies where the aircraft stands, 9 m outside the corner, once its first good fix has come.
-  await eventually('the map of the plan lies at the aircraft', async () => {
-    await page.getByRole('link', { name: /^Plan/ }).click();
-    if (await id('plan-map').waitFor({ timeout: 3000 }).then(() => true, () => false)) return true;
-    await page.getByRole('link', { name: /^Live/ }).click();
-    return false;
-  }, 30_000);
+  await eventually(
+    'the map of the plan lies at the aircraft',
+    async () => {
+      await page.getByRole('link', { name: /^Plan/ }).click();
+      if (
+        await id('plan-map')
+          .waitFor({ timeout: 3000 })
+          .then(
+            () => true,
+            () => false,
+          )
+      )
+        return true;
+      await page.getByRole('link', { name: /^Live/ }).click();
+      return false;
+    },
+    30_000,
+  );
   const [e0, n0] = [9, 9];
   await id('plan-name').fill('Hall, drawn');
-  await draw(id, 'outline', [[e0, n0], [e0 + 30, n0], [e0 + 30, n0 + 20], [e0, n0 + 20]]);
-  await draw(id, 'fence', [[e0 - 14, n0 - 14], [e0 + 41, n0 - 14], [e0 + 41, n0 + 31], [e0 - 14, n0 + 31]]);
+  await draw(id, 'outline', [
+    [e0, n0],
+    [e0 + 30, n0],
+    [e0 + 30, n0 + 20],
+    [e0, n0 + 20],
+  ]);
+  await draw(id, 'fence', [
+    [e0 - 14, n0 - 14],
+    [e0 + 41, n0 - 14],
+    [e0 + 41, n0 + 31],
+    [e0 - 14, n0 + 31],
+  ]);
   await id('generate').click();
   await id('waypoints').locator('tbody tr').nth(3).waitFor({ timeout: 30_000 });
   await picture(page, 'plan-drawn-light');
@@ -68,7 +95,9 @@ test('a person draws outline and fence on the map, presses generate, saves', asy
   await id('plan').getByText('revision 1').waitFor();
   const plan = (await get('/api/v1/plans')).items[0];
   assert.equal(plan.name, 'Hall, drawn');
-  const { outline, fence } = await get(`/api/v1/plans/${plan.id}`), west = Math.min(...outline.coordinates[0].map(([lon]) => lon)), east = Math.max(...outline.coordinates[0].map(([lon]) => lon));
+  const { outline, fence } = await get(`/api/v1/plans/${plan.id}`),
+    west = Math.min(...outline.coordinates[0].map(([lon]) => lon)),
+    east = Math.max(...outline.coordinates[0].map(([lon]) => lon));
   // 30 m at 51 degrees north, 70.1 km a degree.
   assert.ok(Math.abs((east - west) * 70_100 - 30) < 0.5, `${(east - west) * 70_100} m wide`);
   assert.equal(fence.coordinates[0].length, 5);
@@ -80,10 +109,22 @@ test('a plan drawn in a map program is imported, and a wrong one is refused', as
   const { page, id } = await openPage(browser, server, { hash: '#/plan' });
   await id('plan').getByText('revision 1').waitFor();
   await page.getByRole('button', { name: 'New', exact: true }).click();
-  const kml = (inside) => ({ name: 'site.kml', mimeType: 'application/vnd.google-earth.kml+xml', buffer: Buffer.from(`<?xml version="1.0"?><kml xmlns="http://www.opengis.net/kml/2.2"><Placemark><name>Hall</name>${inside}</Placemark></kml>`) });
+  const kml = (inside) => ({
+    name: 'site.kml',
+    mimeType: 'application/vnd.google-earth.kml+xml',
+    buffer: Buffer.from(
+      `<?xml version="1.0"?><kml xmlns="http://www.opengis.net/kml/2.2"><Placemark><name>Hall</name>${inside}</Placemark></kml>`,
+    ),
+  });
   await page.getByLabel('Plan file').setInputFiles(kml('<Point><coordinates>3.7131,51.0231</coordinates></Point>'));
   await id('plan').getByText('That did not work').waitFor();
-  await page.getByLabel('Plan file').setInputFiles(kml('<Polygon><outerBoundaryIs><LinearRing><coordinates>3.7131,51.0231 3.7135275,51.0231 3.7135275,51.0232799 3.7131,51.0231</coordinates></LinearRing></outerBoundaryIs></Polygon>'));
+  await page
+    .getByLabel('Plan file')
+    .setInputFiles(
+      kml(
+        '<Polygon><outerBoundaryIs><LinearRing><coordinates>3.7131,51.0231 3.7135275,51.0231 3.7135275,51.0232799 3.7131,51.0231</coordinates></LinearRing></outerBoundaryIs></Polygon>',
+      ),
+    );
   await eventually('the outline is there', async () => id('generate').isEnabled());
   await page.close();
 });
@@ -93,10 +134,21 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
   await id('open-checklist').click({ timeout: 20_000 });
   await id('check-props').waitFor();
   assert.equal(await id('cmd-start').isEnabled(), false);
-  await eventually('RTK is fixed for 10 s', async () => /ok|green/.test(await text(id('check-rtk').locator('.sr'))), 60_000, 500);
-  await eventually('the aircraft keeps the fence that was drawn', async () => /green/.test(await text(id('check-fence').locator('.sr'))), 20_000, 250);
+  await eventually(
+    'RTK is fixed for 10 s',
+    async () => /ok|green/.test(await text(id('check-rtk').locator('.sr'))),
+    60_000,
+    500,
+  );
+  await eventually(
+    'the aircraft keeps the fence that was drawn',
+    async () => /green/.test(await text(id('check-fence').locator('.sr'))),
+    20_000,
+    250,
+  );
   const { items } = await get(`/api/v1/missions/${mission}/checklist?plan=${(await get('/api/v1/plans')).items[0].id}`);
-  for (const item of items.filter((i) => i.manual)) await id(`check-${item.id}`).getByRole('button', { name: 'Confirm' }).click();
+  for (const item of items.filter((i) => i.manual))
+    await id(`check-${item.id}`).getByRole('button', { name: 'Confirm' }).click();
   for (const item of items.filter((i) => i.state === 'failed')) {
     await id(`check-${item.id}`).getByRole('button', { name: 'Override' }).click();
     await id(`check-${item.id}`).getByRole('textbox').fill('a test on the ground');
@@ -110,14 +162,27 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
   await eventually('anchors are heard', async () => (await procedure()).anchors.length > 3, 60_000, 250);
   // The anchor that the page shows, as the person reads it: its region of 95 % shrinks while it is flown round.
   const seen_m = async () => {
-    const found = /95 % horizontal\s*±\s*([\d.]+)\s*(mm|cm|m)\b/.exec(await id('anchor-card').first().innerText({ timeout: 5000 }).catch(() => ''));
+    const found = /95 % horizontal\s*±\s*([\d.]+)\s*(mm|cm|m)\b/.exec(
+      await id('anchor-card')
+        .first()
+        .innerText({ timeout: 5000 })
+        .catch(() => ''),
+    );
     return found && Number(found[1]) * { mm: 0.001, cm: 0.01, m: 1 }[found[2]];
   };
   const first_m = await eventually('the page tells how well an anchor is known', seen_m, 60_000, 100);
   await eventually('it is at work at a point', async () => (await procedure()).iteration > 0, 60_000, 250);
   await picture(page, 'flight-light');
   assert.deepEqual(await violations(page), []);
-  await eventually('the anchor converges: half as wide as at first', async () => { const now_m = await seen_m(); return now_m !== null && now_m < first_m / 2; }, 120_000, 250);
+  await eventually(
+    'the anchor converges: half as wide as at first',
+    async () => {
+      const now_m = await seen_m();
+      return now_m !== null && now_m < first_m / 2;
+    },
+    120_000,
+    250,
+  );
   await page.keyboard.press('h');
   await id('procedure').getByText('HOLD', { exact: true }).waitFor({ timeout: 10_000 });
   await eventually('the autopilot holds', async () => (await procedure()).drone.mode === 'BRAKE', 10_000);
@@ -136,7 +201,8 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
   const [report] = await Promise.all([browser.context.waitForEvent('page'), id('report').click()]);
   await report.waitForLoadState();
   assert.match(await report.locator('h1').first().textContent(), /alibration/);
-  const [{ id: made }] = (await get('/api/v1/calibrations')).items, { anchors, provenance } = await get(`/api/v1/calibrations/${made}`);
+  const [{ id: made }] = (await get('/api/v1/calibrations')).items,
+    { anchors, provenance } = await get(`/api/v1/calibrations/${made}`);
   for (const { network_id } of anchors) assert.ok(await report.getByText(network_id).count(), network_id);
   assert.ok(provenance.n_clues > 0, 'what the turn and the height search told went into it');
   await picture(report, 'report-light');

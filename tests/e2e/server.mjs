@@ -75,16 +75,27 @@ export class Server {
       child.once('exit', (code, signal) => done((ended = { code, signal })));
     });
     // The system chooses the port of ":0"; the server says which one it got.
-    await eventually('the server tells its port', () => {
-      if (ended) throw new Error(`the server ended (${JSON.stringify(ended)}):\n${output}`);
-      const match = /http:\/\/127\.0\.0\.1:([1-9]\d*)/.exec(output);  // the address of a device is not ours
-      if (match) this.port = Number(match[1]);
-      return match;
-    }, deadlineMs);
-    await eventually('the server is ready', async () => {
-      if (ended) throw new Error(`the server ended (${JSON.stringify(ended)}):\n${output}`);
-      return fetch(`${this.url}/readyz`).then((r) => r.status === 200, () => false);
-    }, deadlineMs);
+    await eventually(
+      'the server tells its port',
+      () => {
+        if (ended) throw new Error(`the server ended (${JSON.stringify(ended)}):\n${output}`);
+        const match = /http:\/\/127\.0\.0\.1:([1-9]\d*)/.exec(output); // the address of a device is not ours
+        if (match) this.port = Number(match[1]);
+        return match;
+      },
+      deadlineMs,
+    );
+    await eventually(
+      'the server is ready',
+      async () => {
+        if (ended) throw new Error(`the server ended (${JSON.stringify(ended)}):\n${output}`);
+        return fetch(`${this.url}/readyz`).then(
+          (r) => r.status === 200,
+          () => false,
+        );
+      },
+      deadlineMs,
+    );
     if (this.auth === 'on') this.token ??= this.#firstRunToken();
     return this;
   }
@@ -115,7 +126,7 @@ export class Server {
 
   /** SIGKILL, as a crash. */
   async kill() {
-    return this.#end('SIGKILL', 60_000);  // of a machine that does much else
+    return this.#end('SIGKILL', 60_000); // of a machine that does much else
   }
 
   async restart() {
@@ -157,7 +168,8 @@ export async function startServer(options) {
 export function run(args, { input, deadlineMs = 120_000 } = {}) {
   return new Promise((done, fail) => {
     const child = spawn(binary, args, { stdio: ['pipe', 'pipe', 'pipe'] });
-    let stdout = '', stderr = '';
+    let stdout = '',
+      stderr = '';
     const timer = setTimeout(() => {
       child.kill('SIGKILL');
       fail(new Error(`anchord ${args.join(' ')}: not within ${deadlineMs} ms\n${stderr}`));

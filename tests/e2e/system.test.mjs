@@ -15,7 +15,8 @@ import { binary, eventually, startServer } from './server.mjs';
 const RTCM_1005 = Buffer.from('d300133ed7d30202980edeef34b4bd62ac0941986f33360b98', 'hex');
 
 let folder, simulator, server, browser, caster;
-const made = {}, served = {};
+const made = {},
+  served = {};
 const get = async (path) => (await server.fetch(path)).json();
 const add = async (name, json) => {
   const answer = await server.fetch('/api/v1/devices', { json: { name, ...json } });
@@ -26,14 +27,30 @@ const add = async (name, json) => {
 before(async () => {
   folder = mkdtempSync(join(tmpdir(), 'anchord system '));
   const always = { from_s: 0, until_s: 1e5 };
-  writeFileSync(join(folder, 'scenario.json'), JSON.stringify({
-    schema: 'anchord.scenario/1', name: 'faults', seed: 5,
-    tags: [{ name: 'good', id: '0x6e01' }, { name: 'refusing', id: '0x6e02' }],
-    rovers: [{ name: 'rover', format: 'ubx', port: 'tcp', rate_hz: 5 }, { name: 'cellar', format: 'nmea', port: 'tcp', rate_hz: 5 }],
-    faults: [{ device: 'refusing', kind: 'refuse', ...always }, { device: 'cellar', kind: 'fix_loss', ...always }],
-    radio: { loss_chance: 0, sensitivity_dbm: -130 },
-  }));
-  simulator = spawn(binary, ['simulate', join(folder, 'scenario.json'), '--json', '--links', folder], { stdio: ['ignore', 'pipe', 'inherit'] });
+  writeFileSync(
+    join(folder, 'scenario.json'),
+    JSON.stringify({
+      schema: 'anchord.scenario/1',
+      name: 'faults',
+      seed: 5,
+      tags: [
+        { name: 'good', id: '0x6e01' },
+        { name: 'refusing', id: '0x6e02' },
+      ],
+      rovers: [
+        { name: 'rover', format: 'ubx', port: 'tcp', rate_hz: 5 },
+        { name: 'cellar', format: 'nmea', port: 'tcp', rate_hz: 5 },
+      ],
+      faults: [
+        { device: 'refusing', kind: 'refuse', ...always },
+        { device: 'cellar', kind: 'fix_loss', ...always },
+      ],
+      radio: { loss_chance: 0, sensitivity_dbm: -130 },
+    }),
+  );
+  simulator = spawn(binary, ['simulate', join(folder, 'scenario.json'), '--json', '--links', folder], {
+    stdio: ['ignore', 'pipe', 'inherit'],
+  });
   await new Promise((done, fail) => {
     createInterface({ input: simulator.stdout }).on('line', (line) => {
       const device = JSON.parse(line);
@@ -51,7 +68,11 @@ before(async () => {
   server = await startServer();
   for (const name of ['good', 'cellar']) await add(name, { kind: served[name].kind, address: served[name].address });
   // A tag that refuses finds no anchors either: it is told whom to range to.
-  await add('refusing', { kind: 'pozyx', address: served.refusing.address, options: { anchors: ['0x6a21', '0x6a22'] } });
+  await add('refusing', {
+    kind: 'pozyx',
+    address: served.refusing.address,
+    options: { anchors: ['0x6a21', '0x6a22'] },
+  });
   // As somebody in a hurry types it: a port on which nothing listens.
   await add('rover', { kind: 'gnss', address: 'tcp://127.0.0.1:9' });
   await add('same port', { kind: 'pozyx', address: `serial:${served.good.pty}` });
@@ -69,8 +90,15 @@ const word = async (id, name) => text(id(`device-${made[name]}`).locator('.chip'
 
 test('each device says at a glance whether it works, and what to do where it does not', async () => {
   const { page, seen, id } = await openPage(browser, server, { hash: '#/system' });
-  const expected = { good: 'WORKING', refusing: 'NO RANGES', cellar: 'NO FIX', rover: 'NEVER SEEN', 'same port': 'PORT TWICE' };
-  for (const [name, wanted] of Object.entries(expected)) await eventually(`${name} is ${wanted}`, async () => (await word(id, name)) === wanted, 30_000, 200);
+  const expected = {
+    good: 'WORKING',
+    refusing: 'NO RANGES',
+    cellar: 'NO FIX',
+    rover: 'NEVER SEEN',
+    'same port': 'PORT TWICE',
+  };
+  for (const [name, wanted] of Object.entries(expected))
+    await eventually(`${name} is ${wanted}`, async () => (await word(id, name)) === wanted, 30_000, 200);
   assert.match(await text(id(`device-${made.refusing}`)), /refuses to range.*Reboot/);
   assert.match(await text(id(`device-${made['same port']}`)), /the same port as device "good"/);
   assert.match(await text(id('device-summary')), /4 need you.*1 working/);
@@ -94,7 +122,12 @@ test('a wrong address is mended in its form, and the device works', async () => 
   await eventually('the rover works', async () => (await word(id, 'rover')) === 'WORKING', 20_000, 200);
   assert.equal((await get(`/api/v1/devices/${made.rover}`)).address, served.rover.address);
   assert.match(await text(id(`device-${made.rover}`)), /FIX, \d+ satellites/);
-  await eventually('the time is the receiver\'s', async () => /TIME OF THE RECEIVER/.test(await text(id('clocks'))), 30_000, 200);
+  await eventually(
+    "the time is the receiver's",
+    async () => /TIME OF THE RECEIVER/.test(await text(id('clocks'))),
+    30_000,
+    200,
+  );
   assert.deepEqual(seen.errors, []);
   await page.close();
 });
@@ -111,7 +144,8 @@ test('a caster is set up in the form, and tells where the base stands', async ()
   await id('base-place').waitFor();
   // Of that ECEF by the textbook's iteration on WGS 84, apart from this code.
   const shown = (await text(id('base-place'))).replaceAll('\u202f', '');
-  for (const part of ['38.804759430', '−77.064773600', '114.561', 'Station2003']) assert.ok(shown.includes(part), `${part} in ${shown}`);
+  for (const part of ['38.804759430', '−77.064773600', '114.561', 'Station2003'])
+    assert.ok(shown.includes(part), `${part} in ${shown}`);
   assert.deepEqual(seen.errors, []);
   await page.close();
 });
@@ -133,7 +167,10 @@ test('a site is named with datum and base, and a device is forgotten by two pres
   await id('forget').click();
   assert.equal((await server.fetch(`/api/v1/devices/${made['same port']}`)).status, 200, 'one press asks');
   await id('forget').click();
-  await eventually('it is gone', async () => (await server.fetch(`/api/v1/devices/${made['same port']}`)).status === 404);
+  await eventually(
+    'it is gone',
+    async () => (await server.fetch(`/api/v1/devices/${made['same port']}`)).status === 404,
+  );
   await id(`device-${made['same port']}`).waitFor({ state: 'detached' });
   assert.deepEqual(await violations(page), []);
   assert.deepEqual(seen.errors, []);
@@ -147,7 +184,8 @@ test('the radio of a tag is compared with every anchor in its reach', async () =
   await row.getByTestId('radio-open').click();
   await id('radio-compared').waitFor({ timeout: 30_000 });
   // Which of the six are in reach at this instant is the flight's; every one of them is accounted for.
-  const told = await text(id('radio-compared')), { devices } = await get(`/api/v1/devices/${made.good}/uwb-settings?devices=true`);
+  const told = await text(id('radio-compared')),
+    { devices } = await get(`/api/v1/devices/${made.good}/uwb-settings?devices=true`);
   assert.ok(devices.length >= 3, JSON.stringify(devices));
   assert.match(told, /All \d anchors it knows have the same settings|\d of \d anchors could not be seen/);
   assert.deepEqual(await violations(page), []);

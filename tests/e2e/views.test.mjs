@@ -25,10 +25,23 @@ before(async () => {
   assert.equal(replayed.code, 0, replayed.stderr);
   await post('/api/v1/campaigns', { name: 'halls' });
   const csv = readFileSync(join(root, 'docs/examples/campaign.csv'), 'utf8');
-  const imported = await server.fetch('/api/v1/campaigns/halls/samples', { method: 'POST', headers: { 'content-type': 'text/csv' }, body: csv });
+  const imported = await server.fetch('/api/v1/campaigns/halls/samples', {
+    method: 'POST',
+    headers: { 'content-type': 'text/csv' },
+    body: csv,
+  });
   assert.equal(imported.status, 200, await imported.text());
-  await post('/api/v1/datasets', { name: 'set', campaigns: ['halls'], aggregation: 'none', split: { test: ['room 6'] } });
-  training = await post('/api/v1/training-runs', { task: 'nlos_id', dataset: 'set', methods: ['logistic', 'random_forest'], cv: { folds: 4, seed: 7 } }, { prefer: 'wait=200' });
+  await post('/api/v1/datasets', {
+    name: 'set',
+    campaigns: ['halls'],
+    aggregation: 'none',
+    split: { test: ['room 6'] },
+  });
+  training = await post(
+    '/api/v1/training-runs',
+    { task: 'nlos_id', dataset: 'set', methods: ['logistic', 'random_forest'], cv: { folds: 4, seed: 7 } },
+    { prefer: 'wait=200' },
+  );
   browser = await openBrowser();
 });
 after(async () => {
@@ -41,13 +54,17 @@ test('the confusion on screen is that of the API, and the slider tells what a th
   const { page, seen, id } = await openPage(browser, server, { hash: '#/models' });
   await id('confusion').waitFor();
   const { test: held_out } = await get(`/api/v1/training-runs/${training.id}/confusion`);
-  const cells = await id('confusion').locator('tbody td b').allTextContents(), c = held_out.confusion;
+  const cells = await id('confusion').locator('tbody td b').allTextContents(),
+    c = held_out.confusion;
   assert.deepEqual(cells.map(Number), [c.tp, c.fn, c.fp, c.tn]);
   assert.equal(parseFloat(await text(id('fpr'))), Number(((100 * c.fp) / (c.fp + c.tn)).toFixed(1)));
   const { points } = await get(`/api/v1/training-runs/${training.id}/roc`);
   await id('threshold-slider').fill('0.9');
   const near = points.filter((p) => p.threshold >= 0.9).reduce((a, b) => (b.threshold < a.threshold ? b : a));
-  await eventually('the slider speaks', async () => parseFloat(await text(id('slider-fpr'))) === Number((100 * near.fpr).toFixed(1)));
+  await eventually(
+    'the slider speaks',
+    async () => parseFloat(await text(id('slider-fpr'))) === Number((100 * near.fpr).toFixed(1)),
+  );
   assert.deepEqual(await violations(page), []);
   await picture(page, 'models-light');
   assert.deepEqual(seen.errors, []);
@@ -55,8 +72,17 @@ test('the confusion on screen is that of the API, and the slider tells what a th
 });
 
 test('runs ticked in the table stand side by side, with the figures of the API and a warning where they are of different data', async () => {
-  await post('/api/v1/datasets', { name: 'other set', campaigns: ['halls'], aggregation: 'none', split: { test: ['room 5'] } });
-  const second = await post('/api/v1/training-runs', { task: 'nlos_id', dataset: 'other set', methods: ['logistic'], cv: { folds: 4, seed: 7 } }, { prefer: 'wait=200' });
+  await post('/api/v1/datasets', {
+    name: 'other set',
+    campaigns: ['halls'],
+    aggregation: 'none',
+    split: { test: ['room 5'] },
+  });
+  const second = await post(
+    '/api/v1/training-runs',
+    { task: 'nlos_id', dataset: 'other set', methods: ['logistic'], cv: { folds: 4, seed: 7 } },
+    { prefer: 'wait=200' },
+  );
   const { page, seen, id } = await openPage(browser, server, { hash: `#/models/runs/${training.id}` });
   await id(`compare-${training.id}`).check();
   await page.getByText('Tick one more run').waitFor();
@@ -64,8 +90,13 @@ test('runs ticked in the table stand side by side, with the figures of the API a
   const line = id('compare').getByRole('row', { name: /^Accuracy, held-out places/ });
   await line.waitFor();
   const shown = (await line.locator('td').allTextContents()).map(parseFloat);
-  const accuracy = await Promise.all([training, second].map(async (r) => (await get(`/api/v1/training-runs/${r.id}`)).test.accuracy));
-  assert.deepEqual(shown, accuracy.map((a) => Number((100 * a).toFixed(1))));
+  const accuracy = await Promise.all(
+    [training, second].map(async (r) => (await get(`/api/v1/training-runs/${r.id}`)).test.accuracy),
+  );
+  assert.deepEqual(
+    shown,
+    accuracy.map((a) => Number((100 * a).toFixed(1))),
+  );
   await id('compare').getByText('Not trained on one data set').waitFor();
   assert.match(page.url(), new RegExp(`compare=${training.id},${second.id}`));
   assert.deepEqual(await violations(page), []);
@@ -98,7 +129,10 @@ test('a model is promoted past the gate, takes effect, and is rolled back by one
   if (await reason.count()) await reason.fill('first model of this building');
   await dialog.getByRole('button', { name: /^Promote/ }).click();
   await dialog.waitFor({ state: 'detached' });
-  await eventually('it is active', async () => (await get('/api/v1/models/active')).models?.nlos_id?.id === training.model.split('/').pop());
+  await eventually(
+    'it is active',
+    async () => (await get('/api/v1/models/active')).models?.nlos_id?.id === training.model.split('/').pop(),
+  );
   await page.getByText('ACTIVE').first().waitFor();
   await id('rollback').click();
   await eventually('none is active', async () => !(await get('/api/v1/models/active')).models?.nlos_id);
@@ -118,7 +152,11 @@ test('measurements are filtered, plotted and opened one by one', async () => {
   await id('features').waitFor();
   const first = await text(id('impulse').locator('h2'));
   await page.keyboard.press('j');
-  await eventually('the next one is open', async () => (await text(id('impulse').locator('h2'))) !== first || (await id('rows').locator('tr.sel').count()) === 1);
+  await eventually(
+    'the next one is open',
+    async () =>
+      (await text(id('impulse').locator('h2'))) !== first || (await id('rows').locator('tr.sel').count()) === 1,
+  );
   assert.deepEqual(await violations(page), []);
   await picture(page, 'measurements-light');
   assert.deepEqual(seen.errors, []);
@@ -126,7 +164,10 @@ test('measurements are filtered, plotted and opened one by one', async () => {
 });
 
 test('a range is taken out of use with a reason, and used again', async () => {
-  const { items: [{ id: mission }] } = await get('/api/v1/missions'), record = async () => (await get(`/api/v1/missions/${mission}/exclusions`)).items;
+  const {
+      items: [{ id: mission }],
+    } = await get('/api/v1/missions'),
+    record = async () => (await get(`/api/v1/missions/${mission}/exclusions`)).items;
   const { page, seen, id } = await openPage(browser, server, { hash: '#/measurements' });
   await id('source').selectOption(mission);
   await id('rows').locator('tbody tr:not(.space)').first().click();
@@ -149,9 +190,13 @@ test('a range is taken out of use with a reason, and used again', async () => {
   await page.close();
 });
 
-test('the filter is the server\'s: the list, the count and the file are of the same rows, and only what is in sight is in the page', async () => {
-  const { items: [{ id: mission }] } = await get('/api/v1/missions'), { items } = await get(`/api/v1/ranges?mission=${mission}&limit=10000`);
-  const limit = Math.round(items.map((r) => r.distance_m).sort((a, b) => a - b)[Math.floor(items.length / 2)] * 2) / 2, near = items.filter((r) => r.distance_m <= limit);
+test("the filter is the server's: the list, the count and the file are of the same rows, and only what is in sight is in the page", async () => {
+  const {
+      items: [{ id: mission }],
+    } = await get('/api/v1/missions'),
+    { items } = await get(`/api/v1/ranges?mission=${mission}&limit=10000`);
+  const limit = Math.round(items.map((r) => r.distance_m).sort((a, b) => a - b)[Math.floor(items.length / 2)] * 2) / 2,
+    near = items.filter((r) => r.distance_m <= limit);
   assert.ok(near.length > 250 && near.length < items.length, `${near.length} of ${items.length}`);
   const { page, seen, id } = await openPage(browser, server, { hash: '#/measurements' });
   await id('source').selectOption(mission);
@@ -161,16 +206,45 @@ test('the filter is the server\'s: the list, the count and the file are of the s
   await id('distance-to').press('Enter');
   await eventually('fewer are counted', async () => (await count()).join() === [near.length, items.length].join());
   const file = await fetch(await id('download-ndjson').getAttribute('href'));
-  assert.deepEqual((await file.text()).trim().split('\n').map((l) => JSON.parse(l).id).sort(), near.map((r) => r.id).sort());
+  assert.deepEqual(
+    (await file.text())
+      .trim()
+      .split('\n')
+      .map((l) => JSON.parse(l).id)
+      .sort(),
+    near.map((r) => r.id).sort(),
+  );
   // To the oldest, page by page: what was gone through is not kept in the page.
-  const list = id('rows'), oldest = near.reduce((a, b) => (b.t_us < a.t_us ? b : a));
+  const list = id('rows'),
+    oldest = near.reduce((a, b) => (b.t_us < a.t_us ? b : a));
   // The last page may come after the last scroll, and makes the list longer.
-  const to_end = () => id('rows-box').evaluate((e) => { e.scrollTop = e.scrollHeight; });
-  await eventually('the end is reached', async () => { await to_end(); return Number(await list.getAttribute('aria-rowcount')) === near.length + 1; }, 30_000, 100);
-  await eventually('the oldest is listed', async () => { await to_end(); return (await list.locator('tbody tr:not(.space)').last().locator('td').nth(3).textContent()) === oldest.distance_m.toFixed(3); });
+  const to_end = () =>
+    id('rows-box').evaluate((e) => {
+      e.scrollTop = e.scrollHeight;
+    });
+  await eventually(
+    'the end is reached',
+    async () => {
+      await to_end();
+      return Number(await list.getAttribute('aria-rowcount')) === near.length + 1;
+    },
+    30_000,
+    100,
+  );
+  await eventually('the oldest is listed', async () => {
+    await to_end();
+    return (
+      (await list.locator('tbody tr:not(.space)').last().locator('td').nth(3).textContent()) ===
+      oldest.distance_m.toFixed(3)
+    );
+  });
   assert.ok((await list.locator('tbody tr').count()) < 60);
   await id('turn').click();
-  await eventually('the oldest is first', async () => (await text(list.locator('tbody tr:not(.space)').first().locator('td').nth(3))) === oldest.distance_m.toFixed(3));
+  await eventually(
+    'the oldest is first',
+    async () =>
+      (await text(list.locator('tbody tr:not(.space)').first().locator('td').nth(3))) === oldest.distance_m.toFixed(3),
+  );
   assert.deepEqual(await violations(page), []);
   // No model is promoted: no measurement of the flight is called LOS, and the way out is said.
   await id('predicted').selectOption('los');
@@ -184,20 +258,36 @@ test('the filter is the server\'s: the list, the count and the file are of the s
 test('measurements are filtered by what the promoted model calls them, and the level is drawn against the line of a data set', async () => {
   const model = training.model.split('/').pop();
   await post(`/api/v1/models/${model}/promote`, { reason: 'to filter by it' });
-  const { items } = await get('/api/v1/campaigns/halls/samples?limit=1000&predicted=true'), called = items.filter((s) => s.predicted.p_los < 0.4);
+  const { items } = await get('/api/v1/campaigns/halls/samples?limit=1000&predicted=true'),
+    called = items.filter((s) => s.predicted.p_los < 0.4);
   assert.ok(called.length > 20 && called.length < items.length - 20, `${called.length} of ${items.length}`);
   const { page, seen, id } = await openPage(browser, server, { hash: '#/measurements' });
   await id('source').selectOption({ label: 'halls' });
   await id('predicted').selectOption('nlos');
-  await eventually('those are counted', async () => (await text(id('counts'))) === `${called.length} of ${items.length}`);
-  for (const cell of await id('rows').locator('tbody tr:not(.space) td:nth-of-type(3)').allTextContents()) assert.match(cell, /^NLOS 0\.[0-3]/);
+  await eventually(
+    'those are counted',
+    async () => (await text(id('counts'))) === `${called.length} of ${items.length}`,
+  );
+  for (const cell of await id('rows').locator('tbody tr:not(.space) td:nth-of-type(3)').allTextContents())
+    assert.match(cell, /^NLOS 0\.[0-3]/);
   const file = await fetch(await id('download-csv').getAttribute('href'));
   assert.equal((await file.text()).trim().split('\r\n').length, called.length + 1);
-  const { thresholds: { rss } } = await get('/api/v1/datasets/set/rules'), words = id('line-words');
+  const {
+      thresholds: { rss },
+    } = await get('/api/v1/datasets/set/rules'),
+    words = id('line-words');
   await id('line').selectOption({ label: 'line of set' });
-  await eventually('the line is named', async () => (await text(words)).includes(`LOS above ${rss.at_zero_dbm.toFixed(1).replace('-', '\u2212')} dBm`));
-  const labelled = called.filter((s) => s.truth.los === false), under = labelled.filter((s) => s.rx_dbm <= rss.at_zero_dbm + rss.slope_dbm_per_m * s.range_m);
-  assert.ok((await text(words)).replaceAll('\u00a0', ' ').includes(`${((100 * under.length) / labelled.length).toFixed(1)} % of NLOS below`), await text(words));
+  await eventually('the line is named', async () =>
+    (await text(words)).includes(`LOS above ${rss.at_zero_dbm.toFixed(1).replace('-', '\u2212')} dBm`),
+  );
+  const labelled = called.filter((s) => s.truth.los === false),
+    under = labelled.filter((s) => s.rx_dbm <= rss.at_zero_dbm + rss.slope_dbm_per_m * s.range_m);
+  assert.ok(
+    (await text(words))
+      .replaceAll('\u00a0', ' ')
+      .includes(`${((100 * under.length) / labelled.length).toFixed(1)} % of NLOS below`),
+    await text(words),
+  );
   await id('plot-level').locator('[data-mark="line"]').waitFor();
   assert.deepEqual(await violations(page), []);
   await picture(page, 'measurements-filtered-light');
@@ -209,17 +299,31 @@ test('measurements are filtered by what the promoted model calls them, and the l
 /** One DW1000 record: noise of `noise`, a first path at tap 740 and a tail that fades with `tau` taps. */
 function response(noise, first, tau) {
   const bytes = Buffer.alloc(1016 * 4);
-  for (let k = 0; k < 1016; k++) bytes.writeInt16LE(k < 740 ? noise * (k % 2 ? 1 : -1) : Math.round(first * Math.exp(-(k - 740) / tau)) + noise, 4 * k);
+  for (let k = 0; k < 1016; k++)
+    bytes.writeInt16LE(
+      k < 740 ? noise * (k % 2 ? 1 : -1) : Math.round(first * Math.exp(-(k - 740) / tau)) + noise,
+      4 * k,
+    );
   return { n: 1016, dt_ps: 1001.6, first_path_idx: 740, rxpacc: 1001, b64: bytes.toString('base64') };
 }
 
 test('a campaign of impulse responses is imported, and a sample shows its response with the features of the API', async () => {
   await post('/api/v1/campaigns', { name: 'responses' });
   const rows = Array.from({ length: 12 }, (_, i) => ({
-    environment: `place ${1 + (i % 2)}`, setting: `s${i}`, true_distance_m: 5, los: i % 2 === 0, range_m: 5.02 + 0.03 * i, rx_dbm: -80 - i / 10, fp_dbm: -83 - i / 10,
+    environment: `place ${1 + (i % 2)}`,
+    setting: `s${i}`,
+    true_distance_m: 5,
+    los: i % 2 === 0,
+    range_m: 5.02 + 0.03 * i,
+    rx_dbm: -80 - i / 10,
+    fp_dbm: -83 - i / 10,
     cir: response(20, 4000 - 100 * i, i % 2 ? 30 : 6),
   }));
-  const imported = await server.fetch('/api/v1/campaigns/responses/samples', { method: 'POST', headers: { 'content-type': 'application/x-ndjson' }, body: rows.map((r) => JSON.stringify(r)).join('\n') });
+  const imported = await server.fetch('/api/v1/campaigns/responses/samples', {
+    method: 'POST',
+    headers: { 'content-type': 'application/x-ndjson' },
+    body: rows.map((r) => JSON.stringify(r)).join('\n'),
+  });
   assert.equal(imported.status, 200, await imported.text());
   const { items } = await get('/api/v1/campaigns/responses/samples?features=true');
   const { page, seen, id } = await openPage(browser, server, { hash: '#/measurements' });
@@ -228,14 +332,28 @@ test('a campaign of impulse responses is imported, and a sample shows its respon
   // By keys alone: the first row is chosen from the table, and its taps are read in a table.
   await id('rows').locator('tbody button').first().focus();
   await page.keyboard.press('Enter');
-  const plot = id('impulse').getByRole('img', { name: /^Impulse response of 1016 taps, 1\.00 ns each, first path at tap 740\.0/ });
+  const plot = id('impulse').getByRole('img', {
+    name: /^Impulse response of 1016 taps, 1\.00 ns each, first path at tap 740\.0/,
+  });
   await plot.waitFor();
   // Chosen below, it is in sight above.
-  await eventually('the plot is in sight', () => plot.evaluate((e) => { const r = e.getBoundingClientRect(), at = document.elementFromPoint(r.x + r.width / 2, r.y + 30); return at !== null && e.contains(at); }));
-  for (const mark of ['first', 'noise', 'delay', 'peak']) assert.equal(await plot.locator(`[data-mark="${mark}"]`).count(), 1, mark);
-  const shown = parseFloat((await text(id('impulse').locator('h2'))).match(/, ([\d.]+) m$/)[1]), sample = items.find((s) => s.range_m.toFixed(3) === shown.toFixed(3));
+  await eventually('the plot is in sight', () =>
+    plot.evaluate((e) => {
+      const r = e.getBoundingClientRect(),
+        at = document.elementFromPoint(r.x + r.width / 2, r.y + 30);
+      return at !== null && e.contains(at);
+    }),
+  );
+  for (const mark of ['first', 'noise', 'delay', 'peak'])
+    assert.equal(await plot.locator(`[data-mark="${mark}"]`).count(), 1, mark);
+  const shown = parseFloat((await text(id('impulse').locator('h2'))).match(/, ([\d.]+) m$/)[1]),
+    sample = items.find((s) => s.range_m.toFixed(3) === shown.toFixed(3));
   for (const name of ['kurtosis', 'mean_excess_delay_ns', 'rms_delay_spread_ns', 'rx_dbm', 'fp_dbm'])
-    assert.equal(parseFloat((await text(id(`feature-${name}`).locator('td').first())).replace('\u2212', '-')), Number(sample.features[name].toFixed(2)), name);
+    assert.equal(
+      parseFloat((await text(id(`feature-${name}`).locator('td').first())).replace('\u2212', '-')),
+      Number(sample.features[name].toFixed(2)),
+      name,
+    );
   await id('taps-toggle').focus();
   await page.keyboard.press('Enter');
   assert.match(await text(id('taps').locator('tbody th', { hasText: 'strongest' })), /^740/);
@@ -254,7 +372,13 @@ test('a person draws an outline, generates a flight, moves a point by keys, save
   const map = id('plan-map');
   await map.waitFor();
   const box = await map.boundingBox();
-  for (const [x, y] of [[0.35, 0.35], [0.65, 0.35], [0.65, 0.6], [0.35, 0.6]]) await page.mouse.click(box.x + x * box.width, box.y + y * box.height);
+  for (const [x, y] of [
+    [0.35, 0.35],
+    [0.65, 0.35],
+    [0.65, 0.6],
+    [0.35, 0.6],
+  ])
+    await page.mouse.click(box.x + x * box.width, box.y + y * box.height);
   await id('plan-name').fill('Hall A');
   await id('generate').click();
   await id('waypoints').locator('tbody tr').nth(3).waitFor({ timeout: 20_000 });
@@ -264,7 +388,9 @@ test('a person draws an outline, generates a flight, moves a point by keys, save
   await id('check').getByText('BE FLOWN').waitFor();
   assert.deepEqual(await violations(page), []);
   await picture(page, 'plan-light');
-  const { items: [stored] } = await get('/api/v1/plans');
+  const {
+    items: [stored],
+  } = await get('/api/v1/plans');
   assert.equal(stored.name, 'Hall A');
   assert.ok(stored.waypoints.length >= 4);
   assert.equal(stored.outline.coordinates[0].length, 5);
@@ -277,21 +403,30 @@ test('a person draws an outline, generates a flight, moves a point by keys, save
   const moved = await get(`/api/v1/plans/${stored.id}`);
   assert.ok(Math.abs((moved.waypoints[0].lat - stored.waypoints[0].lat) * 111_000 - 0.5) < 0.02);
   // Somebody else saves; this page must not overwrite it in silence.
-  const other = await server.fetch(`/api/v1/plans/${stored.id}`, { method: 'PATCH', headers: { 'if-match': '"p-2"' }, json: { name: 'Hall B' } });
+  const other = await server.fetch(`/api/v1/plans/${stored.id}`, {
+    method: 'PATCH',
+    headers: { 'if-match': '"p-2"' },
+    json: { name: 'Hall B' },
+  });
   assert.equal(other.status, 200);
   await id('plan-name').fill('Hall C');
   await id('save').click();
   await id('conflict').waitFor();
   await id('conflict').getByRole('button', { name: 'Take theirs' }).click();
   await eventually('theirs is shown', async () => (await id('plan-name').inputValue()) === 'Hall B');
-  assert.deepEqual(seen.errors.filter((e) => !e.includes('412')), []);
+  assert.deepEqual(
+    seen.errors.filter((e) => !e.includes('412')),
+    [],
+  );
   await page.close();
 });
 
 test('waypoints are spaced evenly and made denser, judged while they are drawn, and two versions stand side by side', async () => {
   const { page, seen, id } = await openPage(browser, server, { hash: '#/plan' });
   await eventually('the plan is open', async () => (await id('plan-name').inputValue()) === 'Hall B');
-  const before = (await get('/api/v1/plans')).items[0], stored = () => get(`/api/v1/plans/${before.id}`), points = id('waypoints').locator('tbody tr');
+  const before = (await get('/api/v1/plans')).items[0],
+    stored = () => get(`/api/v1/plans/${before.id}`),
+    points = id('waypoints').locator('tbody tr');
   await id('spacing').fill('6');
   await id('space-evenly').click();
   await eventually('other waypoints are there', async () => (await points.count()) !== before.waypoints.length);
@@ -303,7 +438,15 @@ test('waypoints are spaced evenly and made denser, judged while they are drawn, 
   await id('predicted').locator('tbody tr').first().waitFor();
   await id('check').getByText('BE FLOWN').waitFor();
   const drawn = (await text(id('flight-time'))).split(':').reduce((s, x) => 60 * s + Number(x), 0);
-  assert.ok(Math.abs(drawn - (await text(id('profile').locator('.meta'))).split(' ')[0].split(':').reduce((s, x) => 60 * s + Number(x), 0)) <= 1);
+  assert.ok(
+    Math.abs(
+      drawn -
+        (await text(id('profile').locator('.meta')))
+          .split(' ')[0]
+          .split(':')
+          .reduce((s, x) => 60 * s + Number(x), 0),
+    ) <= 1,
+  );
   assert.equal((await stored()).revision, before.revision);
   const cells = await id('plan-map').locator('.cand, .unseen').count();
   await id('predicted-of').selectOption('none');
@@ -313,25 +456,56 @@ test('waypoints are spaced evenly and made denser, judged while they are drawn, 
   await id('expect-address').fill('6A77');
   await id('expect').click();
   await id('save').click();
-  await id('plan').getByText(`revision ${before.revision + 1}`).waitFor();
-  const kept = await stored(), check = await post(`/api/v1/plans/${before.id}/validate`, {});
+  await id('plan')
+    .getByText(`revision ${before.revision + 1}`)
+    .waitFor();
+  const kept = await stored(),
+    check = await post(`/api/v1/plans/${before.id}/validate`, {});
   assert.deepEqual([kept.expected_anchors, kept.waypoints.length], [['0x6a77'], n + 2]);
   assert.ok(Math.abs(check.duration_s - drawn) < 1.5, `${check.duration_s} ${drawn}`);
-  assert.deepEqual(check.issues.filter((i) => i.severity === 'error'), []);
+  assert.deepEqual(
+    check.issues.filter((i) => i.severity === 'error'),
+    [],
+  );
   // Evenly: neighbours away from the denser place are the spacing apart, within a tenth.
-  const metres = (a, b) => Math.hypot((a.lon - b.lon) * 111_320 * Math.cos((a.lat * Math.PI) / 180), (a.lat - b.lat) * 111_230);
-  const gaps = kept.waypoints.filter((w) => w.measure).slice(4).map((w, i, all) => (i ? metres(w, all[i - 1]) : null)).filter((g) => g !== null);
-  assert.ok(gaps.every((g) => g < 6.6) && gaps.filter((g) => g > 5.4).length >= gaps.length * 0.7, gaps.map((g) => g.toFixed(2)).join(' '));
+  const metres = (a, b) =>
+    Math.hypot((a.lon - b.lon) * 111_320 * Math.cos((a.lat * Math.PI) / 180), (a.lat - b.lat) * 111_230);
+  const gaps = kept.waypoints
+    .filter((w) => w.measure)
+    .slice(4)
+    .map((w, i, all) => (i ? metres(w, all[i - 1]) : null))
+    .filter((g) => g !== null);
+  assert.ok(
+    gaps.every((g) => g < 6.6) && gaps.filter((g) => g > 5.4).length >= gaps.length * 0.7,
+    gaps.map((g) => g.toFixed(2)).join(' '),
+  );
   assert.deepEqual(await violations(page), []);
   await picture(page, 'plan-even-light');
   // Somebody else moves a waypoint: both are drawn, and the line says which and how.
-  const waypoints = kept.waypoints.map((w, i) => (i === 3 ? { ...w, height_above_ground_m: w.height_above_ground_m + 2 } : w));
-  assert.equal((await server.fetch(`/api/v1/plans/${before.id}`, { method: 'PATCH', headers: { 'if-match': `"p-${kept.revision}"` }, json: { waypoints } })).status, 200);
+  const waypoints = kept.waypoints.map((w, i) =>
+    i === 3 ? { ...w, height_above_ground_m: w.height_above_ground_m + 2 } : w,
+  );
+  assert.equal(
+    (
+      await server.fetch(`/api/v1/plans/${before.id}`, {
+        method: 'PATCH',
+        headers: { 'if-match': `"p-${kept.revision}"` },
+        json: { waypoints },
+      })
+    ).status,
+    200,
+  );
   await id('plan-name').fill('Hall D');
   await id('save').click();
   const lines = id('differences').locator('tbody tr');
   await lines.first().waitFor();
-  assert.deepEqual((await lines.allTextContents()).map((l) => l.replace(/\u2212/g, '-')), ['NameHall DHall B', `Waypoint 4${(waypoints[3].height_above_ground_m - 2).toFixed(1)} m high${waypoints[3].height_above_ground_m.toFixed(1)} m high`]);
+  assert.deepEqual(
+    (await lines.allTextContents()).map((l) => l.replace(/\u2212/g, '-')),
+    [
+      'NameHall DHall B',
+      `Waypoint 4${(waypoints[3].height_above_ground_m - 2).toFixed(1)} m high${waypoints[3].height_above_ground_m.toFixed(1)} m high`,
+    ],
+  );
   assert.equal(await id('conflict').locator('svg .only').count(), 2);
   assert.deepEqual(await violations(page), []);
   await picture(page, 'plan-conflict-light');
@@ -341,7 +515,10 @@ test('waypoints are spaced evenly and made denser, judged while they are drawn, 
   await id('plan-name').fill('Hall B');
   await id('save').click();
   await eventually('and its old name again', async () => (await stored()).name === 'Hall B');
-  assert.deepEqual(seen.errors.filter((e) => !e.includes('412')), []);
+  assert.deepEqual(
+    seen.errors.filter((e) => !e.includes('412')),
+    [],
+  );
   await page.close();
 });
 
@@ -362,8 +539,10 @@ test('a plan that was not saved is back after a reload, and can be thrown away',
   await page.close();
 });
 
-test('facility data of an anchor are edited where they stand, kept over a reload, and never overwrite another\'s', async () => {
-  const { features: [anchor] } = await get('/api/v1/anchors?view=live');
+test("facility data of an anchor are edited where they stand, kept over a reload, and never overwrite another's", async () => {
+  const {
+    features: [anchor],
+  } = await get('/api/v1/anchors?view=live');
   const name = anchor.properties.network_id;
   const { page, seen, id } = await openPage(browser, server, { hash: `#/anchors/${name}` });
   await id('facility-edit').click();
@@ -376,7 +555,16 @@ test('facility data of an anchor are edited where they stand, kept over a reload
   assert.equal(await form.getByLabel('Name', { exact: true }).inputValue(), 'Hall A north-west');
   // Somebody else fills in the room meanwhile: told, and both stand in the end.
   const read = await server.fetch(`/api/v1/anchors/${name}`);
-  assert.equal((await server.fetch(`/api/v1/anchors/${name}`, { method: 'PATCH', headers: { 'if-match': read.headers.get('etag') }, json: { space: 'A0.12' } })).status, 200);
+  assert.equal(
+    (
+      await server.fetch(`/api/v1/anchors/${name}`, {
+        method: 'PATCH',
+        headers: { 'if-match': read.headers.get('etag') },
+        json: { space: 'A0.12' },
+      })
+    ).status,
+    200,
+  );
   await id('facility-save').click();
   await id('facility').getByText('Somebody changed this anchor meanwhile').waitFor();
   assert.equal(await form.getByLabel('Room').inputValue(), 'A0.12');
@@ -385,8 +573,14 @@ test('facility data of an anchor are edited where they stand, kept over a reload
   await id('facility-save').click();
   await id('facility').getByText('EQ-7').waitFor();
   const { properties } = await get(`/api/v1/anchors/${name}`);
-  assert.deepEqual([properties.name, properties.space, properties.external_ids], ['Hall A north-west', 'A0.12', [{ system: 'archibus', id: 'EQ-7' }]]);
-  assert.deepEqual(seen.errors.filter((e) => !e.includes('412')), []);
+  assert.deepEqual(
+    [properties.name, properties.space, properties.external_ids],
+    ['Hall A north-west', 'A0.12', [{ system: 'archibus', id: 'EQ-7' }]],
+  );
+  assert.deepEqual(
+    seen.errors.filter((e) => !e.includes('412')),
+    [],
+  );
   await page.close();
 });
 
@@ -426,13 +620,47 @@ test('a stored flight is replayed: time moves, a jump shows that moment, and no 
 });
 
 test('a place is labelled in the field: its truth is typed, one press records, and the form is there after a reload', async () => {
-  const { id: mission } = await post('/api/v1/missions', { name: 'yard', frame: 'wgs84', track_point: 'gnss_antenna', tags: [] });
+  const { id: mission } = await post('/api/v1/missions', {
+    name: 'yard',
+    frame: 'wgs84',
+    track_point: 'gnss_antenna',
+    tags: [],
+  });
   let seq = 0;
-  const heard = async (n) => post('/api/v1/ranges', Array.from({ length: n }, () => ({ mission, tag: '0x6e01', anchor: '0x6a77', t_us: 1_800_000_000_000_000 + ++seq * 50_000, seq, distance_m: 5 + 0.01 * (seq % 3), rx_dbm: -80, fp_dbm: -84, cir: response(20, 3000, 12) })));
+  const heard = async (n) =>
+    post(
+      '/api/v1/ranges',
+      Array.from({ length: n }, () => ({
+        mission,
+        tag: '0x6e01',
+        anchor: '0x6a77',
+        t_us: 1_800_000_000_000_000 + ++seq * 50_000,
+        seq,
+        distance_m: 5 + 0.01 * (seq % 3),
+        rx_dbm: -80,
+        fp_dbm: -84,
+        cir: response(20, 3000, 12),
+      })),
+    );
   const { page, seen, id } = await openPage(browser, server, { hash: '#/measurements' });
   await id('label-field').click();
-  for (const [field, value] of Object.entries({ campaign: 'yard', environment: 'yard', distance_m: '4,95', material: 'brick', wanted: '6' })) await id(`take-${field}`).fill(value);
-  await eventually('the anchor is heard', async () => { await heard(1); return (await text(id('take-anchor'))).includes('0x6a77'); }, 60_000, 300);
+  for (const [field, value] of Object.entries({
+    campaign: 'yard',
+    environment: 'yard',
+    distance_m: '4,95',
+    material: 'brick',
+    wanted: '6',
+  }))
+    await id(`take-${field}`).fill(value);
+  await eventually(
+    'the anchor is heard',
+    async () => {
+      await heard(1);
+      return (await text(id('take-anchor'))).includes('0x6a77');
+    },
+    60_000,
+    300,
+  );
   await id('take-anchor').selectOption('0x6a77');
   await id('campaign-mode').getByRole('button', { name: 'NLOS', exact: true }).click();
   assert.deepEqual(await violations(page), []);
@@ -440,11 +668,23 @@ test('a place is labelled in the field: its truth is typed, one press records, a
   await id('take-now').waitFor();
   // Only what comes after the press counts; the first look has fixed where that is once it says 0 of 6.
   await id('take-now').getByText('0 of 6').waitFor();
-  await eventually('six come after the press', async () => { await heard(1); return id('take-done').filter({ hasText: 'kept' }).count(); }, 60_000, 300);
+  await eventually(
+    'six come after the press',
+    async () => {
+      await heard(1);
+      return id('take-done').filter({ hasText: 'kept' }).count();
+    },
+    60_000,
+    300,
+  );
   assert.match(await text(id('take-done')), /6 of 6 kept as 4\.95 m, brick, NLOS/);
   const { items } = await get('/api/v1/campaigns/yard/samples');
   assert.equal(items.length, 6);
-  for (const s of items) assert.deepEqual([s.truth.distance_m, s.truth.los, s.truth.material, s.has_cir, s.rx_dbm], [4.95, false, 'brick', true, -80]);
+  for (const s of items)
+    assert.deepEqual(
+      [s.truth.distance_m, s.truth.los, s.truth.material, s.has_cir, s.rx_dbm],
+      [4.95, false, 'brick', true, -80],
+    );
   await id('taken').getByText('4.95 m, brick, NLOS').waitFor();
   await picture(page, 'campaign-mode-light');
   await page.reload();

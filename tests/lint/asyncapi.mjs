@@ -14,7 +14,8 @@ let wrong = 0;
 
 function complain(where, errors) {
   wrong++;
-  for (const error of errors.slice(0, 20)) console.error(`${file}: ${where}${error.instancePath}: ${error.message} ${JSON.stringify(error.params)}`);
+  for (const error of errors.slice(0, 20))
+    console.error(`${file}: ${where}${error.instancePath}: ${error.message} ${JSON.stringify(error.params)}`);
 }
 
 let schema;
@@ -40,5 +41,7 @@ for (const [name, message] of Object.entries(document.components?.messages ?? {}
     if (!check(example.payload)) complain(`/components/messages/${name}/examples/${index}`, check.errors);
   }
 }
-console.log(`${file}: AsyncAPI ${document.asyncapi}, ${Object.keys(document.channels ?? {}).length} channels, ${examples} examples, ${wrong} wrong`);
+console.log(
+  `${file}: AsyncAPI ${document.asyncapi}, ${Object.keys(document.channels ?? {}).length} channels, ${examples} examples, ${wrong} wrong`,
+);
 process.exit(wrong ? 1 : 0);

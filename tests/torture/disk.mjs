@@ -17,9 +17,15 @@ export class Disk {
     mkdirSync(join(this.disk, 'names'), { recursive: true });
     mkdirSync(this.data, { recursive: true, mode: 0o700 });
     for (const name of readdirSync(this.data)) {
-      if (!name.endsWith('-shm')) cpSync(join(this.data, name), join(this.disk, 'names', name), { recursive: true, preserveTimestamps: true });
+      if (!name.endsWith('-shm'))
+        cpSync(join(this.data, name), join(this.disk, 'names', name), { recursive: true, preserveTimestamps: true });
     }
-    return { LD_PRELOAD: this.shim, POWER_CUT_DATA: this.data, POWER_CUT_DISK: this.disk, POWER_CUT_SEED: String(++this.seed) };
+    return {
+      LD_PRELOAD: this.shim,
+      POWER_CUT_DATA: this.data,
+      POWER_CUT_DISK: this.disk,
+      POWER_CUT_SEED: String(++this.seed),
+    };
   }
 
   /** The power came back: only what was on the disk is there. The server must be dead by now. */

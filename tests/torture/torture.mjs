@@ -12,12 +12,15 @@ import { Disk } from './disk.mjs';
 import { Deleter, Gateway, Installer, Promoter, Publisher } from './work.mjs';
 
 const k_args = ['--rate-per-s', '100000', '--rate-burst', '100000', '--backup-schedule', 'off'];
-const k_rest_every = 25;       // kills between two rests, in which missions begin anew and calibrations are made
-const k_start_ms = 90_000;     // a hang is found all the same; a busy machine is none
-const k_other_every = 10;      // kills between two of a migration, and of a first start
+const k_rest_every = 25; // kills between two rests, in which missions begin anew and calibrations are made
+const k_start_ms = 90_000; // a hang is found all the same; a busy machine is none
+const k_other_every = 10; // kills between two of a migration, and of a first start
 
 /** Rows of a query on the live database, as objects; a reader of its own that never writes. */
-const query = (file) => (sql) => JSON.parse(execFileSync('sqlite3', ['-readonly', '-json', file, sql], { encoding: 'utf8', maxBuffer: 1 << 28 }) || '[]');
+const query = (file) => (sql) =>
+  JSON.parse(
+    execFileSync('sqlite3', ['-readonly', '-json', file, sql], { encoding: 'utf8', maxBuffer: 1 << 28 }) || '[]',
+  );
 
 /** Repeatable, for one order of calls: mulberry32. */
 function generator(seed) {
@@ -77,15 +80,22 @@ class Torture {
     const disk = new Disk(join(this.folder, cut ? 'cut' : 'kill'), this.shim, this.seed);
     mkdirSync(disk.data, { recursive: true, mode: 0o700 });
     const gateways = [0, 1, 2].map((n) => new Gateway(n));
-    const work = [...gateways, new Deleter(), new Publisher(await simulatedFlight({ seed: 7, duration: 60 })), new Promoter(readFileSync(join(root, 'docs/examples/campaign.csv'), 'utf8')), new Installer()];
+    const work = [
+      ...gateways,
+      new Deleter(),
+      new Publisher(await simulatedFlight({ seed: 7, duration: 60 })),
+      new Promoter(readFileSync(join(root, 'docs/examples/campaign.csv'), 'utf8')),
+      new Installer(),
+    ];
     this.work = work;
-    const calibrations = Math.min(20, Math.ceil(times / 2));  // each is published once
+    const calibrations = Math.min(20, Math.ceil(times / 2)); // each is published once
     let server = this.begin(disk, cut);
     this.server = server;
     await server.start(k_start_ms);
     for (const one of work) await one.prepare(server, calibrations);
     for (let n = 1; n <= times; n++) {
-      let running = true, fault = null;
+      let running = true,
+        fault = null;
       const clients = work.map(async (one) => {
         while (running) if (!(await one.step(server))) break;
       });
@@ -118,15 +128,23 @@ class Torture {
 
   /** A database of an older version; its first start with today's program is ended, the second must find one version or the other. */
   async migration(cut) {
-    const stored = readdirSync(join(root, 'tests/data/storage')).filter((name) => /^version_\d+\.sql$/.test(name)).sort();
+    const stored = readdirSync(join(root, 'tests/data/storage'))
+      .filter((name) => /^version_\d+\.sql$/.test(name))
+      .sort();
     const newest = readdirSync(join(root, 'migrations/sqlite')).filter((name) => name.endsWith('.sql')).length;
     const version = 1 + Math.floor(this.random() * Math.min(stored.length, newest - 1));
     const disk = new Disk(join(this.folder, 'migration'), this.shim, this.seed);
     rmSync(join(this.folder, 'migration'), { recursive: true, force: true });
     mkdirSync(disk.data, { recursive: true, mode: 0o700 });
-    const file = join(disk.data, 'anchord.db'), sql = query(file);
-    execFileSync('sqlite3', [file], { input: readFileSync(join(root, 'tests/data/storage', `version_${version}.sql`)) });
-    const counted = () => sql('SELECT (SELECT count(*) FROM mission) AS missions, (SELECT count(*) FROM uwb_range) AS ranges, (SELECT count(*) FROM fix) AS fixes, (SELECT count(*) FROM anchor) AS anchors');
+    const file = join(disk.data, 'anchord.db'),
+      sql = query(file);
+    execFileSync('sqlite3', [file], {
+      input: readFileSync(join(root, 'tests/data/storage', `version_${version}.sql`)),
+    });
+    const counted = () =>
+      sql(
+        'SELECT (SELECT count(*) FROM mission) AS missions, (SELECT count(*) FROM uwb_range) AS ranges, (SELECT count(*) FROM fix) AS fixes, (SELECT count(*) FROM anchor) AS anchors',
+      );
     const before = counted();
     await this.interrupted(disk, cut, 120);
     const server = (this.other = this.begin(disk, false));
@@ -134,7 +152,9 @@ class Torture {
     assert.deepEqual(counted(), before, `rows of a database of version ${version} after its migration`);
     const [{ user_version: now }] = sql('PRAGMA user_version');
     assert.equal(now, newest, 'the version after the migration');
-    const copies = readdirSync(join(disk.data, 'backups')).filter((name) => name.startsWith('before-migration-') && name.endsWith('.db'));
+    const copies = readdirSync(join(disk.data, 'backups')).filter(
+      (name) => name.startsWith('before-migration-') && name.endsWith('.db'),
+    );
     assert.ok(copies.length > 0, 'the copy from before the migration is gone');
     for (const copy of copies) {
       const old = query(join(disk.data, 'backups', copy));
@@ -159,7 +179,7 @@ class Torture {
   async interrupted(disk, cut, longestMs) {
     const server = (this.other = this.begin(disk, cut));
     const started = server.start();
-    started.catch(() => {});  // it is killed before it is ready
+    started.catch(() => {}); // it is killed before it is ready
     await this.wait(longestMs);
     await server.end();
     await Promise.allSettled([started]);
@@ -179,7 +199,14 @@ class Torture {
 }
 
 /** True when nothing was lost. `keepIn`: where the folders of a failure go. */
-export async function torture({ kills, cuts, seed = 1, shim = process.env.ANCHORD_POWER_CUT_SHIM, keepIn, print = console.log }) {
+export async function torture({
+  kills,
+  cuts,
+  seed = 1,
+  shim = process.env.ANCHORD_POWER_CUT_SHIM,
+  keepIn,
+  print = console.log,
+}) {
   const run = new Torture({ seed, shim, print });
   const began = performance.now();
   try {
@@ -188,8 +215,11 @@ export async function torture({ kills, cuts, seed = 1, shim = process.env.ANCHOR
       assert.ok(shim && existsSync(shim), `no ANCHORD_POWER_CUT_SHIM: ${shim}`);
       await run.underLoad(cuts, true);
     }
-    const sorted = run.restarts.sort((a, b) => a - b), { migrations, firstStarts } = run.counts;
-    print(`==> ${run.counts.kills} kills, ${run.counts.cuts} power cuts, ${migrations} interrupted migrations, ${firstStarts} interrupted first starts (seed ${seed}); restart to ready: median ${(sorted[sorted.length >> 1] / 1000).toFixed(2)} s, worst ${(sorted.at(-1) / 1000).toFixed(2)} s; ${((performance.now() - began) / 1000).toFixed(0)} s`);
+    const sorted = run.restarts.sort((a, b) => a - b),
+      { migrations, firstStarts } = run.counts;
+    print(
+      `==> ${run.counts.kills} kills, ${run.counts.cuts} power cuts, ${migrations} interrupted migrations, ${firstStarts} interrupted first starts (seed ${seed}); restart to ready: median ${(sorted[sorted.length >> 1] / 1000).toFixed(2)} s, worst ${(sorted.at(-1) / 1000).toFixed(2)} s; ${((performance.now() - began) / 1000).toFixed(0)} s`,
+    );
     return true;
   } catch (error) {
     print(`FAILED after ${run.counts.kills} kills and ${run.counts.cuts} power cuts (seed ${seed}): ${error.stack}`);
@@ -206,7 +236,11 @@ export async function torture({ kills, cuts, seed = 1, shim = process.env.ANCHOR
 }
 
 if (process.argv[1] === fileURLToPath(import.meta.url)) {
-  const [kills, cuts, seed] = [process.argv[2] ?? 1000, process.argv[3] ?? 100, process.env.ANCHORD_TORTURE_SEED ?? 1].map(Number);
+  const [kills, cuts, seed] = [
+    process.argv[2] ?? 1000,
+    process.argv[3] ?? 100,
+    process.env.ANCHORD_TORTURE_SEED ?? 1,
+  ].map(Number);
   if (![kills, cuts, seed].every((n) => Number.isInteger(n) && n >= 0)) {
     console.error('torture [KILLS [CUTS]]: numbers');
     process.exit(2);

@@ -5,12 +5,17 @@ import { fileURLToPath } from 'node:url';
 import yaml from 'js-yaml';
 import openapiTS, { astToString } from 'openapi-typescript';
 
-const contract = new URL('../../api/openapi.yaml', import.meta.url), folder = fileURLToPath(new URL('../src/api/generated/', import.meta.url));
+const contract = new URL('../../api/openapi.yaml', import.meta.url),
+  folder = fileURLToPath(new URL('../src/api/generated/', import.meta.url));
 
 /** Only where it changed, so that nothing is built for nothing. */
 function put(name, text) {
   let former;
-  try { former = readFileSync(folder + name, 'utf8'); } catch { /* the first time */ }
+  try {
+    former = readFileSync(folder + name, 'utf8');
+  } catch {
+    /* the first time */
+  }
   if (former !== text) writeFileSync(folder + name, text);
 }
 
@@ -30,4 +35,7 @@ function limits(schemas) {
 mkdirSync(folder, { recursive: true });
 put('schema.d.ts', astToString(await openapiTS(contract)));
 const { components } = yaml.load(readFileSync(contract, 'utf8'));
-put('limits.ts', `/// Written by scripts/contract.mjs from api/openapi.yaml.\nexport const LIMITS = ${JSON.stringify(limits(components.schemas), null, 1)} as const;\n`);
+put(
+  'limits.ts',
+  `/// Written by scripts/contract.mjs from api/openapi.yaml.\nexport const LIMITS = ${JSON.stringify(limits(components.schemas), null, 1)} as const;\n`,
+);

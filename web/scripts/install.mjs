@@ -8,11 +8,19 @@ import { fileURLToPath } from 'node:url';
 
 const web = join(dirname(fileURLToPath(import.meta.url)), '..');
 const stamp = join(web, 'node_modules', '.anchord-lock');
-const hash = createHash('sha256').update(readFileSync(join(web, 'package-lock.json'))).update(process.version).digest('hex');
+const hash = createHash('sha256')
+  .update(readFileSync(join(web, 'package-lock.json')))
+  .update(process.version)
+  .digest('hex');
 if (existsSync(stamp) && readFileSync(stamp, 'utf8') === hash) process.exit(0);
-const run = spawnSync(process.argv[2] ?? 'npm', ['ci', '--no-audit', '--no-fund', '--loglevel=error'], { cwd: web, stdio: 'inherit' });
+const run = spawnSync(process.argv[2] ?? 'npm', ['ci', '--no-audit', '--no-fund', '--loglevel=error'], {
+  cwd: web,
+  stdio: 'inherit',
+});
 if (run.status !== 0) {
-  console.error('anchord: npm could not install the packages of web/package-lock.json; the first build needs a package registry (or configure with -DANCHORD_WEB=OFF)');
+  console.error(
+    'anchord: npm could not install the packages of web/package-lock.json; the first build needs a package registry (or configure with -DANCHORD_WEB=OFF)',
+  );
   process.exit(1);
 }
 writeFileSync(stamp, hash);

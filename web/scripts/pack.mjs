@@ -6,7 +6,14 @@ import { extname, join, resolve, sep } from 'node:path';
 import { brotliCompressSync, constants, gzipSync } from 'node:zlib';
 
 const [dist, out] = [resolve(process.argv[2] ?? 'dist'), resolve(process.argv[3] ?? 'packed')];
-const types = { '.html': 'text/html; charset=utf-8', '.js': 'text/javascript; charset=utf-8', '.css': 'text/css; charset=utf-8', '.svg': 'image/svg+xml', '.json': 'application/json', '.txt': 'text/plain; charset=utf-8' };
+const types = {
+  '.html': 'text/html; charset=utf-8',
+  '.js': 'text/javascript; charset=utf-8',
+  '.css': 'text/css; charset=utf-8',
+  '.svg': 'image/svg+xml',
+  '.json': 'application/json',
+  '.txt': 'text/plain; charset=utf-8',
+};
 
 const blob = [];
 let size = 0;
@@ -23,18 +30,31 @@ const row = (path) => {
   const type = types[extname(path)];
   if (!type) throw new Error(`no content type for ${path}`);
   const etag = createHash('sha256').update(bytes).digest('hex').slice(0, 20);
-  const encodings = [put(bytes), gzip.length < bytes.length ? put(gzip) : none, br.length < bytes.length ? put(br) : none];
+  const encodings = [
+    put(bytes),
+    gzip.length < bytes.length ? put(gzip) : none,
+    br.length < bytes.length ? put(br) : none,
+  ];
   return `    {"/${path}", "${type}", "\\"${etag}\\"", ${encodings.join(', ')}, ${path.startsWith('assets/')}},`;
 };
 
-const paths = readdirSync(dist, { recursive: true, withFileTypes: true }).filter((e) => e.isFile())
-  .map((e) => join(e.parentPath, e.name).slice(dist.length + 1).split(sep).join('/')).sort();
+const paths = readdirSync(dist, { recursive: true, withFileTypes: true })
+  .filter((e) => e.isFile())
+  .map((e) =>
+    join(e.parentPath, e.name)
+      .slice(dist.length + 1)
+      .split(sep)
+      .join('/'),
+  )
+  .sort();
 const rows = paths.map(row);
 mkdirSync(out, { recursive: true });
 const file = join(out, 'web_assets.bin');
 const escaped = file.replaceAll('\\', '\\\\').replaceAll('"', '\\"');
 writeFileSync(file, Buffer.concat(blob));
-writeFileSync(join(out, 'web_assets.cpp'), `// Made by web/scripts/pack.mjs; do not edit.
+writeFileSync(
+  join(out, 'web_assets.cpp'),
+  `// Made by web/scripts/pack.mjs; do not edit.
 #include "web/assets.hpp"
 
 #include <array>
@@ -65,5 +85,6 @@ ${rows.join('\n')}
 }
 
 }  // namespace anchord::web
-`);
+`,
+);
 console.log(`packed ${paths.length} files, ${size} bytes`);

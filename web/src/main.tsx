@@ -18,11 +18,17 @@ render(<App />, document.getElementById('app')!);
 addEventListener('keydown', on_key);
 /// Signed out, the stream rests until somebody signs in; the last picture stays.
 let started = false;
-void refresh_me().then(() => effect(() => {
-  if (me.value === null) return client.pause();
-  if (!started) {
-    connect(client, () => void refresh_me(), () => void load_missions());
-    follow_archive();
-  }
-  started = true;
-}));
+void refresh_me().then(() =>
+  effect(() => {
+    if (me.value === null) return client.pause();
+    if (!started) {
+      connect(
+        client,
+        () => void refresh_me(),
+        () => void load_missions(),
+      );
+      follow_archive();
+    }
+    started = true;
+  }),
+);

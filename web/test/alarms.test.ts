@@ -1,7 +1,15 @@
 import { describe, expect, it } from 'vitest';
 import { AlarmLimiter, Conditions, merged, type Alarm, type Situation } from '../src/ui/alarm_rules';
 
-const calm: Situation = { now_ms: 0, link: 'live', silence_ms: 0, recording: true, fix: 'fixed', correction_age_s: 1, range_silence_ms: 0 };
+const calm: Situation = {
+  now_ms: 0,
+  link: 'live',
+  silence_ms: 0,
+  recording: true,
+  fix: 'fixed',
+  correction_age_s: 1,
+  range_silence_ms: 0,
+};
 const ids = (list: readonly Alarm[]): string[] => list.map((a) => a.id);
 
 describe('Conditions', () => {
@@ -32,16 +40,38 @@ describe('Conditions', () => {
   it('are listed once per id with the word of the server, critical first', () => {
     const own = new Conditions();
     own.standing({ ...calm, fix: 'none' });
-    const list = merged(own.standing({ ...calm, fix: 'none', now_ms: 3000 }), [
-      { id: 'disk.low', priority: 'warning', since_us: 0, text: 'Disk is low', acknowledged: false }, { id: 'rtk.lost', priority: 'critical', since_us: 1_000_000, text: 'RTK lost at the server', acknowledged: true },
-    ], 3_000_000, 3000);
-    expect(list.map((a) => [a.id, a.title, a.acknowledged])).toEqual([['rtk.lost', 'RTK lost at the server', true], ['disk.low', 'Disk is low', false]]);
+    const list = merged(
+      own.standing({ ...calm, fix: 'none', now_ms: 3000 }),
+      [
+        { id: 'disk.low', priority: 'warning', since_us: 0, text: 'Disk is low', acknowledged: false },
+        {
+          id: 'rtk.lost',
+          priority: 'critical',
+          since_us: 1_000_000,
+          text: 'RTK lost at the server',
+          acknowledged: true,
+        },
+      ],
+      3_000_000,
+      3000,
+    );
+    expect(list.map((a) => [a.id, a.title, a.acknowledged])).toEqual([
+      ['rtk.lost', 'RTK lost at the server', true],
+      ['disk.low', 'Disk is low', false],
+    ]);
     expect(list[0]!.since_ms).toBe(1000);
   });
 });
 
 describe('AlarmLimiter', () => {
-  const alarm = (id: string, priority: Alarm['priority'], acknowledged = false): Alarm => ({ id, priority, title: id, advice: '', since_ms: 0, acknowledged });
+  const alarm = (id: string, priority: Alarm['priority'], acknowledged = false): Alarm => ({
+    id,
+    priority,
+    title: id,
+    advice: '',
+    since_ms: 0,
+    acknowledged,
+  });
   const [critical, warning] = [alarm('link.lost', 'critical'), alarm('rtk.float', 'warning')];
   it('repeats a critical alarm every 10 s and a warning never while it stands', () => {
     const l = new AlarmLimiter();
@@ -60,7 +90,8 @@ describe('AlarmLimiter', () => {
     l.due([], 29_000);
     expect(l.due([warning], 30_000)).toBe(warning);
   });
-  it('sounds one at a time, the most urgent', () => expect(new AlarmLimiter().due([warning, critical], 0)).toBe(critical));
+  it('sounds one at a time, the most urgent', () =>
+    expect(new AlarmLimiter().due([warning, critical], 0)).toBe(critical));
   it('is quiet for advisories and for what was acknowledged', () => {
     expect(new AlarmLimiter().due([alarm('ws.slow', 'advisory'), alarm('x', 'critical', true)], 0)).toBeNull();
   });

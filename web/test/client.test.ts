@@ -9,11 +9,25 @@ class World {
   sockets: FakeSocket[] = [];
   private timers: { at: number; call: () => void; on: boolean }[] = [];
   environment = {
-    open: (): Socket => { const s = new FakeSocket(); this.sockets.push(s); return s; },
-    now_ms: () => this.now, wall_us: () => this.wall_offset_us + this.now * 1000, random: () => 1,
-    after: (ms: number, call: () => void) => { const t = { at: this.now + ms, call, on: true }; this.timers.push(t); return () => { t.on = false; }; },
+    open: (): Socket => {
+      const s = new FakeSocket();
+      this.sockets.push(s);
+      return s;
+    },
+    now_ms: () => this.now,
+    wall_us: () => this.wall_offset_us + this.now * 1000,
+    random: () => 1,
+    after: (ms: number, call: () => void) => {
+      const t = { at: this.now + ms, call, on: true };
+      this.timers.push(t);
+      return () => {
+        t.on = false;
+      };
+    },
   };
-  get socket(): FakeSocket { return this.sockets[this.sockets.length - 1]!; }
+  get socket(): FakeSocket {
+    return this.sockets[this.sockets.length - 1]!;
+  }
   advance(ms: number): void {
     const end = this.now + ms;
     for (;;) {
@@ -31,16 +45,27 @@ class FakeSocket implements Socket {
   onmessage: ((e: { data: unknown }) => void) | null = null;
   onclose: ((e: { code: number }) => void) | null = null;
   sent: Record<string, unknown>[] = [];
-  send(text: string): void { this.sent.push(JSON.parse(text)); }
-  close(): void { /* the client forgets us */ }
-  say(m: object): void { this.onmessage?.({ data: JSON.stringify(m) }); }
-  sub(topic: string): Record<string, unknown> { return this.sent.filter((x) => x.op === 'sub' && x.topic === topic).at(-1)!; }
+  send(text: string): void {
+    this.sent.push(JSON.parse(text));
+  }
+  close(): void {
+    /* the client forgets us */
+  }
+  say(m: object): void {
+    this.onmessage?.({ data: JSON.stringify(m) });
+  }
+  sub(topic: string): Record<string, unknown> {
+    return this.sent.filter((x) => x.op === 'sub' && x.topic === topic).at(-1)!;
+  }
 }
 
 let world: World, client: LiveClient, log: string[], links: LinkState[];
-const hello = (epoch = 'e1'): void => world.socket.say({ op: 'hello', epoch, t_us: 0, hb_ms: 1000, topics: ['events'], roles: [] });
-const ack = (recovered: boolean, sub = 11): void => world.socket.say({ op: 'ack', id: world.socket.sub('events').id, sub, from_seq: 1, recovered });
-const data = (seq: number, prev: number | null, sub = 11): void => world.socket.say({ op: 'data', sub, seq, prev, t_us: 5, data: { n: seq } });
+const hello = (epoch = 'e1'): void =>
+  world.socket.say({ op: 'hello', epoch, t_us: 0, hb_ms: 1000, topics: ['events'], roles: [] });
+const ack = (recovered: boolean, sub = 11): void =>
+  world.socket.say({ op: 'ack', id: world.socket.sub('events').id, sub, from_seq: 1, recovered });
+const data = (seq: number, prev: number | null, sub = 11): void =>
+  world.socket.say({ op: 'data', sub, seq, prev, t_us: 5, data: { n: seq } });
 const beat = (): void => world.socket.say({ op: 'hb', t_us: 0 });
 
 beforeEach(() => {
@@ -49,12 +74,18 @@ beforeEach(() => {
   links = [];
   client = new LiveClient(['events'], world.environment);
   client.start({
-    snap: (t, d) => log.push(`snap ${t} ${JSON.stringify(d)}`), data: (_t, d) => log.push(`data ${(d as { n: number }).n}`), gap: (_t, n) => log.push(`gap ${n}`), restarted: () => log.push('restarted'),
-    resumed: (n, again) => log.push(`resumed ${n} ${again}`), link: (s) => links.push(s), refused: () => log.push('refused'),
+    snap: (t, d) => log.push(`snap ${t} ${JSON.stringify(d)}`),
+    data: (_t, d) => log.push(`data ${(d as { n: number }).n}`),
+    gap: (_t, n) => log.push(`gap ${n}`),
+    restarted: () => log.push('restarted'),
+    resumed: (n, again) => log.push(`resumed ${n} ${again}`),
+    link: (s) => links.push(s),
+    refused: () => log.push('refused'),
   });
 });
 function up_to(seq: number): void {
-  hello(); ack(false);
+  hello();
+  ack(false);
   world.socket.say({ op: 'snap', sub: 11, seq: seq - 1, t_us: 1, data: [] });
   data(seq, seq - 1);
 }
@@ -72,28 +103,37 @@ describe('LiveClient', () => {
     expect(world.socket.sent.filter((x) => x.op === 'sub').map((x) => x.topic)).toEqual(['events']);
   });
   it('drops a duplicate and counts it', () => {
-    up_to(5); data(5, 4); data(4, 3);
+    up_to(5);
+    data(5, 4);
+    data(4, 3);
     expect(log.filter((l) => l === 'data 5')).toHaveLength(1);
     expect(client.counters.duplicates).toBe(2);
   });
   it('accepts a jump that prev explains (filtered or conflated)', () => {
-    up_to(5); data(9, 5);
+    up_to(5);
+    data(9, 5);
     expect(log.at(-1)).toBe('data 9');
     expect(client.counters.holes).toBe(0);
   });
   it('subscribes again from where it stands when a jump was not announced', () => {
-    up_to(5); data(9, 8);
+    up_to(5);
+    data(9, 8);
     expect(client.counters.holes).toBe(1);
     expect(log).not.toContain('data 9');
     expect(world.socket.sent.some((x) => x.op === 'unsub' && x.sub === 11)).toBe(true);
     expect(world.socket.sub('events').since).toEqual({ epoch: 'e1', seq: 5 });
-    ack(true, 12); data(6, 5, 12); data(7, 6, 12);
+    ack(true, 12);
+    data(6, 5, 12);
+    data(7, 6, 12);
     expect(log.slice(-2)).toEqual(['data 6', 'data 7']);
   });
   it('does not ask for ever when the server keeps leaving holes', () => {
-    up_to(5); data(9, 8);
+    up_to(5);
+    data(9, 8);
     const asked = world.socket.sent.filter((x) => x.op === 'sub').length;
-    ack(true, 12); data(20, 19, 12); data(21, 20, 12);
+    ack(true, 12);
+    data(20, 19, 12);
+    data(21, 20, 12);
     expect(world.socket.sent.filter((x) => x.op === 'sub').length).toBe(asked);
     expect(log.at(-1)).toBe('data 21');
   });
@@ -111,16 +151,22 @@ describe('LiveClient', () => {
     expect(world.sockets).toHaveLength(2);
     hello();
     expect(world.socket.sub('events').since).toEqual({ epoch: 'e1', seq: 5 });
-    ack(true, 3); data(5, 4, 3); data(6, 5, 3); data(7, 6, 3); beat();
+    ack(true, 3);
+    data(5, 4, 3);
+    data(6, 5, 3);
+    data(7, 6, 3);
+    beat();
     expect(log.slice(-3)).toEqual(['data 6', 'data 7', 'resumed 2 false']);
   });
   it('takes the snapshot when the history is gone', () => {
     up_to(5);
     world.socket.onclose!({ code: 1006 });
     world.advance(600);
-    hello(); ack(false, 3);
+    hello();
+    ack(false, 3);
     world.socket.say({ op: 'snap', sub: 3, seq: 900, t_us: 1, data: [1] });
-    data(901, 900, 3); beat();
+    data(901, 900, 3);
+    beat();
     expect(log.slice(-3)).toEqual(['snap events [1]', 'data 901', 'resumed 1 true']);
   });
   it('forgets everything when the epoch changed', () => {
@@ -133,7 +179,7 @@ describe('LiveClient', () => {
     ack(false, 1);
     world.socket.say({ op: 'snap', sub: 1, seq: 1, t_us: 1, data: [] });
     data(2, 1, 1);
-    expect(log.at(-1)).toBe('data 2');  // lower than before, and right
+    expect(log.at(-1)).toBe('data 2'); // lower than before, and right
   });
   it('is late after two seconds of silence and lost after five, then live again', () => {
     up_to(5);
@@ -200,7 +246,7 @@ describe('LiveClient', () => {
     // server clock is 3 s ahead; the answer was written 20 ms after the question left
     world.socket.say({ op: 'time', id: asked.id, c_us: asked.c_us, t_us: (asked.c_us as number) + 20_000 + 3_000_000 });
     expect(client.offset_us()).toBe(3_000_000);
-    world.socket.say({ op: 'hb', t_us: world.environment.wall_us() + 2_500_000 });  // delayed: worse than the round trip
+    world.socket.say({ op: 'hb', t_us: world.environment.wall_us() + 2_500_000 }); // delayed: worse than the round trip
     expect(client.offset_us()).toBe(3_000_000);
     expect(client.now_us() - world.environment.wall_us()).toBe(3_000_000);
   });

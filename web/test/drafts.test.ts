@@ -5,8 +5,17 @@ import { draft_of, drop_draft, keep_draft, newest_draft, restored } from '../src
 function storage(room = Infinity): Storage {
   const kept = new Map<string, string>();
   return {
-    get length() { return kept.size; }, key: (i) => [...kept.keys()][i] ?? null, getItem: (k) => kept.get(k) ?? null, clear: () => kept.clear(), removeItem: (k) => void kept.delete(k),
-    setItem: (k, v) => { if (kept.size >= room && !kept.has(k)) throw new DOMException('full', 'QuotaExceededError'); kept.set(k, v); },
+    get length() {
+      return kept.size;
+    },
+    key: (i) => [...kept.keys()][i] ?? null,
+    getItem: (k) => kept.get(k) ?? null,
+    clear: () => kept.clear(),
+    removeItem: (k) => void kept.delete(k),
+    setItem: (k, v) => {
+      if (kept.size >= room && !kept.has(k)) throw new DOMException('full', 'QuotaExceededError');
+      kept.set(k, v);
+    },
   };
 }
 /// The page is loaded again: what a module holds is gone, what the browser keeps is not.
@@ -14,7 +23,10 @@ async function reloaded(): Promise<typeof import('../src/state/drafts')> {
   vi.resetModules();
   return import('../src/state/drafts');
 }
-afterEach(() => { for (const key of ['plan/a', 'plan/b', 'other']) drop_draft(key); vi.unstubAllGlobals(); });
+afterEach(() => {
+  for (const key of ['plan/a', 'plan/b', 'other']) drop_draft(key);
+  vi.unstubAllGlobals();
+});
 
 describe('a draft', () => {
   it('is there after the page was loaded again', async () => {
@@ -61,7 +73,9 @@ describe('the newest draft', () => {
 
 describe('a restored form', () => {
   const start = { name: '', n: 5, los: true, ids: [] as string[] };
-  it('has what was typed', () => expect(restored(start, { name: 'x', ids: ['a'] })).toEqual({ name: 'x', n: 5, los: true, ids: ['a'] }));
-  it('takes nothing of another kind, and no field it does not have', () => expect(restored(start, { name: 3, n: 'x', ids: {}, more: 1 })).toEqual(start));
+  it('has what was typed', () =>
+    expect(restored(start, { name: 'x', ids: ['a'] })).toEqual({ name: 'x', n: 5, los: true, ids: ['a'] }));
+  it('takes nothing of another kind, and no field it does not have', () =>
+    expect(restored(start, { name: 3, n: 'x', ids: {}, more: 1 })).toEqual(start));
   it('is the empty one where nothing was kept', () => expect(restored(start, null)).toEqual(start));
 });

@@ -15,7 +15,19 @@ describe('what is taken out of use', () => {
     expect(selection_of('fixes', null, { ...EVERYTHING, who: '0x6a21' })).toBeNull();
   });
   test('what the server tells of it, in words', () => {
-    const told = exclusion_of({ id: 'a', kind: 'ranges', rows: [], since: '2026-05-04T10:11:12.345678Z', until: null, anchor: '0x6a21', n_rows: 40, reason: 'a bird', by: 'op', created_at: 'x', included: null })!;
+    const told = exclusion_of({
+      id: 'a',
+      kind: 'ranges',
+      rows: [],
+      since: '2026-05-04T10:11:12.345678Z',
+      until: null,
+      anchor: '0x6a21',
+      n_rows: 40,
+      reason: 'a bird',
+      by: 'op',
+      created_at: 'x',
+      included: null,
+    })!;
     expect(words_of(told)).toBe('0x6a21 from 10:11:12.345');
     expect(told.included).toBeNull();
     expect(words_of({ ...told, n_named: 1 })).toBe('1 row by name');

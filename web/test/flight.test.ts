@@ -6,20 +6,49 @@ import { next_step, stage_of, STEP_WORDS, TRACK } from '../src/views/flight/word
 describe('a message of the procedure', () => {
   it('needs its mission only, the rest is unknown', () => {
     expect(procedure({})).toBeNull();
-    expect(procedure({ mission: 'm' })).toMatchObject({ step: 'ready', status: 'ready', target: null, drone: null, control: null, commands: [] });
+    expect(procedure({ mission: 'm' })).toMatchObject({
+      step: 'ready',
+      status: 'ready',
+      target: null,
+      drone: null,
+      control: null,
+      commands: [],
+    });
   });
-  it('never takes an unknown word for a state', () => expect(procedure({ mission: 'm', step: 'loop', status: '<b>', commands: [{ state: 'maybe' }] })).toMatchObject({ step: 'ready', status: 'ready', commands: [{ state: 'sent' }] }));
+  it('never takes an unknown word for a state', () =>
+    expect(procedure({ mission: 'm', step: 'loop', status: '<b>', commands: [{ state: 'maybe' }] })).toMatchObject({
+      step: 'ready',
+      status: 'ready',
+      commands: [{ state: 'sent' }],
+    }));
   it('says whose height lies at an edge, and who is too far for a height search', () => {
-    const p = procedure({ mission: 'm', anchors: [{ network_id: '0x1', height_at_edge: true, no_lobe: false }, { network_id: '0x2', height_at_edge: null, no_lobe: true }, { network_id: '0x3' }] })!;
-    expect(p.anchors.map((a) => [a.at_edge, a.no_lobe])).toEqual([[true, false], [false, true], [false, false]]);
+    const p = procedure({
+      mission: 'm',
+      anchors: [
+        { network_id: '0x1', height_at_edge: true, no_lobe: false },
+        { network_id: '0x2', height_at_edge: null, no_lobe: true },
+        { network_id: '0x3' },
+      ],
+    })!;
+    expect(p.anchors.map((a) => [a.at_edge, a.no_lobe])).toEqual([
+      [true, false],
+      [false, true],
+      [false, false],
+    ]);
   });
-  it('shows the telemetry that the autopilot refuses', () => expect(procedure({ mission: 'm', drone: { streams_refused: ['SYS_STATUS: unsupported'] } })!.drone!.streams_refused).toEqual(['SYS_STATUS: unsupported']));
+  it('shows the telemetry that the autopilot refuses', () =>
+    expect(
+      procedure({ mission: 'm', drone: { streams_refused: ['SYS_STATUS: unsupported'] } })!.drone!.streams_refused,
+    ).toEqual(['SYS_STATUS: unsupported']));
   it('drops the choice of a decision whose candidates did not all arrive whole', () => {
     const c = { lon: 1, lat: 2, value: 3 };
     expect(grid({ mission: 'm', candidates: [c, c], chosen: 1 })!.chosen).toBe(1);
     expect(grid({ mission: 'm', candidates: [{ lat: 2 }, c], chosen: 1 })!.chosen).toBeNull();
   });
-  it('keeps the samples of a turn that are pairs of numbers', () => expect(turn({ mission: 'm', anchor: '0x1', samples: [[1, -80], [2], 'x', [3, null]] })!.samples).toEqual([[1, -80]]));
+  it('keeps the samples of a turn that are pairs of numbers', () =>
+    expect(turn({ mission: 'm', anchor: '0x1', samples: [[1, -80], [2], 'x', [3, null]] })!.samples).toEqual([
+      [1, -80],
+    ]));
 });
 
 describe('the track of the procedure', () => {
@@ -34,6 +63,20 @@ describe('the track of the procedure', () => {
 });
 
 describe('ranks of candidates', () => {
-  it('are 0 for the best, 5 for the worst, none where refused', () => expect(ranks([{ value: 1, refused: null }, { value: 7, refused: null }, { value: 4, refused: null }, { value: 2, refused: 'visited' }])).toEqual([0, 5, 3, null]));
-  it('are all best where all are equal', () => expect(ranks([{ value: 2, refused: null }, { value: 2, refused: null }])).toEqual([0, 0]));
+  it('are 0 for the best, 5 for the worst, none where refused', () =>
+    expect(
+      ranks([
+        { value: 1, refused: null },
+        { value: 7, refused: null },
+        { value: 4, refused: null },
+        { value: 2, refused: 'visited' },
+      ]),
+    ).toEqual([0, 5, 3, null]));
+  it('are all best where all are equal', () =>
+    expect(
+      ranks([
+        { value: 2, refused: null },
+        { value: 2, refused: null },
+      ]),
+    ).toEqual([0, 0]));
 });

@@ -1,13 +1,20 @@
 import { describe, expect, it } from 'vitest';
 import { estimate } from '../src/live/messages';
-import { ecef_from_geodetic, ellipse_from_covariance, enu_from_geodetic, magnification, round_length, sigma_h } from '../src/map/enu';
+import {
+  ecef_from_geodetic,
+  ellipse_from_covariance,
+  enu_from_geodetic,
+  magnification,
+  round_length,
+  sigma_h,
+} from '../src/map/enu';
 import { accuracy, age, bearing, clock, fixed, grouped, latlon, plain } from '../src/ui/format';
 import { why_not_done } from '../src/ui/words';
 
 describe('ENU', () => {
   it('puts the equator at the semi-major axis and the pole at the semi-minor one', () => {
     expect(ecef_from_geodetic({ lon: 0, lat: 0, h_m: 0 })[0]).toBeCloseTo(6378137, 6);
-    expect(ecef_from_geodetic({ lon: 0, lat: 90, h_m: 0 })[2]).toBeCloseTo(6356752.314245, 5);  // NIMA TR8350.2 table 3.1
+    expect(ecef_from_geodetic({ lon: 0, lat: 90, h_m: 0 })[2]).toBeCloseTo(6356752.314245, 5); // NIMA TR8350.2 table 3.1
   });
   it('agrees with the cartesian example of the EPSG guidance note 7-2 (9602)', () => {
     // 53°48'33.820"N 2°07'46.380"E 73.0 m -> X 3771793.968, Y 140253.342, Z 5124304.349
@@ -55,24 +62,55 @@ describe('scales', () => {
 
 describe('format', () => {
   it('has a true minus, fixed decimals, and a dash for the unknown', () => {
-    expect([fixed(-1.5, 2), fixed(-0.0001, 2), fixed(null, 2), fixed(NaN, 1), fixed(2, 3)]).toEqual(['−1.50', '0.00', '–', '–', '2.000']);
+    expect([fixed(-1.5, 2), fixed(-0.0001, 2), fixed(null, 2), fixed(NaN, 1), fixed(2, 3)]).toEqual([
+      '−1.50',
+      '0.00',
+      '–',
+      '–',
+      '2.000',
+    ]);
   });
   it('shows nine decimals of a degree in groups of three, and copies them plain', () => {
     expect(latlon(51.023181327)).toBe('51.023\u202f181\u202f327');
     expect(latlon(-0.1)).toBe('−0.100\u202f000\u202f000');
     expect(plain(-3.7134918, 9)).toBe('-3.713491800');
   });
-  it('writes bearings with three digits', () => expect([44, 0, 359.7, -90].map(bearing)).toEqual(['044', '000', '000', '270']));
-  it('groups thousands, also negative ones', () => expect([152823, -58992, 999].map(grouped)).toEqual(['152\u202f823', '−58\u202f992', '999']));
-  it('runs clocks', () => expect([clock(761), clock(12, true), clock(3725, true), clock(null)]).toEqual(['00:12:41', '00:12', '01:02:05', '–']));
+  it('writes bearings with three digits', () =>
+    expect([44, 0, 359.7, -90].map(bearing)).toEqual(['044', '000', '000', '270']));
+  it('groups thousands, also negative ones', () =>
+    expect([152823, -58992, 999].map(grouped)).toEqual(['152\u202f823', '−58\u202f992', '999']));
+  it('runs clocks', () =>
+    expect([clock(761), clock(12, true), clock(3725, true), clock(null)]).toEqual([
+      '00:12:41',
+      '00:12',
+      '01:02:05',
+      '–',
+    ]));
   it('says ages and accuracies as people do', () => {
     expect([6000, 240_000, 7.2e6, Infinity].map(age)).toEqual(['6 s', '4 min', '2 h', 'long']);
-    expect([0.0004, 0.008, 0.07, 0.41, 1.44, 21.3, null].map(accuracy)).toEqual(['±1 mm', '±8 mm', '±7 cm', '±41 cm', '±1.4 m', '±21 m', '–']);
+    expect([0.0004, 0.008, 0.07, 0.41, 1.44, 21.3, null].map(accuracy)).toEqual([
+      '±1 mm',
+      '±8 mm',
+      '±7 cm',
+      '±41 cm',
+      '±1.4 m',
+      '±21 m',
+      '–',
+    ]);
   });
 });
 
 describe('what to do about a twin', () => {
-  const twin = (e: number, u: number) => why_not_done(estimate({ anchor: '0x1', verdict: 'ambiguous', status: 'ambiguous', enu_m: [0, 0, 3], mirror: { enu_m: [e, 0, 3 + u], probability: 0.3 } })!)!.text;
+  const twin = (e: number, u: number) =>
+    why_not_done(
+      estimate({
+        anchor: '0x1',
+        verdict: 'ambiguous',
+        status: 'ambiguous',
+        enu_m: [0, 0, 3],
+        mirror: { enu_m: [e, 0, 3 + u], probability: 0.3 },
+      })!,
+    )!.text;
   it('is another height where the twin lies above', () => expect(twin(0.1, 7)).toMatch(/higher or lower/));
   it('is to leave the line where it lies beside', () => expect(twin(6, 0)).toMatch(/across/));
 });

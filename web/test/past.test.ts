@@ -1,7 +1,15 @@
 import { describe, expect, it } from 'vitest';
 import { past_of } from '../src/api/anchors';
 
-const published = (revision: number, lon: number, lat: number, h_m: number): object => ({ revision, published_at: '2026-05-04T10:11:12.000000Z', calibration: 'c', network_id: '0x6a2f', verdict: 'ok', geometry: { type: 'Point', coordinates: [lon, lat, h_m] }, accuracy: { relative: { h95_m: 0.05, v95_m: 0.08 } } });
+const published = (revision: number, lon: number, lat: number, h_m: number): object => ({
+  revision,
+  published_at: '2026-05-04T10:11:12.000000Z',
+  calibration: 'c',
+  network_id: '0x6a2f',
+  verdict: 'ok',
+  geometry: { type: 'Point', coordinates: [lon, lat, h_m] },
+  accuracy: { relative: { h95_m: 0.05, v95_m: 0.08 } },
+});
 
 describe('the published positions of an anchor', () => {
   it('tell how far each is from the one before', () => {

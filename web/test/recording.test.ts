@@ -2,11 +2,49 @@ import { describe, expect, it } from 'vitest';
 import type { MissionMsg, RangeMsg } from '../src/live/messages';
 import { after, Player, poses_of, type Recording } from '../src/state/recording';
 
-const mission: MissionMsg = { mission: 'm', name: 'flight', state: 'finished', t_us: 0, started_us: 0, frame: 'local', origin: null, n_ranges: 0, n_fixes: 0, anchors_found: 0, anchors_converged: 0, range_rate_hz: null, fixes_refused: {} };
+const mission: MissionMsg = {
+  mission: 'm',
+  name: 'flight',
+  state: 'finished',
+  t_us: 0,
+  started_us: 0,
+  frame: 'local',
+  origin: null,
+  n_ranges: 0,
+  n_fixes: 0,
+  anchors_found: 0,
+  anchors_converged: 0,
+  range_rate_hz: null,
+  fixes_refused: {},
+};
 const fix = (t_s: number, e: number) => ({ t_us: t_s * 1e6, local_m: [e, 0, 5], fix: 'fixed' });
-const range = (t_s: number): RangeMsg => ({ t_us: t_s * 1e6, mission: 'm', tag: '0x1', anchor: '0x2', distance_m: t_s, corrected_m: t_s, sigma_m: null, rss_dbm: null, p_los: null, used: true, refused: null });
+const range = (t_s: number): RangeMsg => ({
+  t_us: t_s * 1e6,
+  mission: 'm',
+  tag: '0x1',
+  anchor: '0x2',
+  distance_m: t_s,
+  corrected_m: t_s,
+  sigma_m: null,
+  rss_dbm: null,
+  p_los: null,
+  used: true,
+  refused: null,
+});
 const seconds = Array.from({ length: 600 }, (_, i) => i);
-const recording: Recording = { mission, from_us: 0, to_us: 599e6, poses: poses_of(seconds.map((t) => fix(t, t)), 'm', null), ranges: seconds.map(range), marks: [], cut: false };
+const recording: Recording = {
+  mission,
+  from_us: 0,
+  to_us: 599e6,
+  poses: poses_of(
+    seconds.map((t) => fix(t, t)),
+    'm',
+    null,
+  ),
+  ranges: seconds.map(range),
+  marks: [],
+  cut: false,
+};
 
 describe('the player of a recording', () => {
   it('shows what was known at a moment and nothing later', () => {
@@ -45,9 +83,14 @@ describe('the player of a recording', () => {
 
 describe('a fix of the recording', () => {
   it('gives the bearing of the body x-axis from its quaternion', () => {
-    const half = Math.SQRT1_2;   // a quarter turn about up takes x from east to north
+    const half = Math.SQRT1_2; // a quarter turn about up takes x from east to north
     expect(poses_of([{ ...fix(0, 0), q: [0, 0, half, half] }], 'm', null)[0]!.heading_deg).toBeCloseTo(0, 9);
     expect(poses_of([{ ...fix(0, 0), q: [0, 0, 0, 1] }], 'm', null)[0]!.heading_deg).toBeCloseTo(90, 9);
   });
-  it('finds the first row above a time', () => expect([after([{ t_us: 1 }, { t_us: 3 }], 0), after([{ t_us: 1 }, { t_us: 3 }], 1), after([{ t_us: 1 }, { t_us: 3 }], 9)]).toEqual([0, 1, 2]));
+  it('finds the first row above a time', () =>
+    expect([
+      after([{ t_us: 1 }, { t_us: 3 }], 0),
+      after([{ t_us: 1 }, { t_us: 3 }], 1),
+      after([{ t_us: 1 }, { t_us: 3 }], 9),
+    ]).toEqual([0, 1, 2]));
 });

@@ -3,8 +3,10 @@ import { pose, range, type RangeMsg } from '../src/live/messages';
 import { trail_of } from '../src/state/archive';
 import { interpolated, range_class, rate_hz, Scene } from '../src/state/scene';
 
-const at = (t_s: number, e: number, extra: object = {}) => pose({ mission: 'm', t_us: t_s * 1e6, enu_m: [e, 0, 5], fix: 'fixed', heading_deg: 350, ...extra })!;
-const heard = (t_s: number, d: number): RangeMsg => range({ t_us: t_s * 1e6, mission: 'm', anchor: '0x1', distance_m: d, used: true })!;
+const at = (t_s: number, e: number, extra: object = {}) =>
+  pose({ mission: 'm', t_us: t_s * 1e6, enu_m: [e, 0, 5], fix: 'fixed', heading_deg: 350, ...extra })!;
+const heard = (t_s: number, d: number): RangeMsg =>
+  range({ t_us: t_s * 1e6, mission: 'm', anchor: '0x1', distance_m: d, used: true })!;
 
 describe('Scene', () => {
   it('does not fill the trail while the drone stands still', () => {
@@ -14,7 +16,9 @@ describe('Scene', () => {
   });
   it('starts the trail anew when a looped replay jumps back', () => {
     const s = new Scene('m');
-    s.add_pose(at(0, 0), 0); s.add_pose(at(100, 50), 100); s.add_pose(at(0, 0), 200);
+    s.add_pose(at(0, 0), 0);
+    s.add_pose(at(100, 50), 100);
+    s.add_pose(at(0, 0), 200);
     expect(s.trail).toHaveLength(1);
   });
   it('keeps 20 s of ranges and knows their rate', () => {
@@ -26,28 +30,45 @@ describe('Scene', () => {
   });
   it('does not let an older range replace a newer one', () => {
     const s = new Scene('m');
-    s.add_range(heard(2, 5), 0); s.add_range(heard(1, 9), 1);
+    s.add_range(heard(2, 5), 0);
+    s.add_range(heard(1, 9), 1);
     expect(s.ranges.get('0x1')!.last.distance_m).toBe(5);
   });
   it('moves the drone evenly between two poses and through north the short way', () => {
     const s = new Scene('m');
-    s.add_pose(at(0, 0), 0); s.add_pose(at(0.1, 1, { heading_deg: 10 }), 100);
+    s.add_pose(at(0, 0), 0);
+    s.add_pose(at(0.1, 1, { heading_deg: 10 }), 100);
     const half = interpolated(s, 150)!;
     expect(half.body[0]).toBeCloseTo(0.5, 9);
     expect(half.heading_deg).toBeCloseTo(360, 9);
     expect(interpolated(s, 5000)!.body[0]).toBe(1);
   });
   it('calls a range unclear without a model or between 0.4 and 0.6', () => {
-    expect([null, 0.4, 0.5, 0.6, 0.61, 0.39].map(range_class)).toEqual(['unclear', 'unclear', 'unclear', 'unclear', 'los', 'nlos']);
+    expect([null, 0.4, 0.5, 0.6, 0.61, 0.39].map(range_class)).toEqual([
+      'unclear',
+      'unclear',
+      'unclear',
+      'unclear',
+      'los',
+      'nlos',
+    ]);
   });
 });
 
 describe('the trail after a reload', () => {
-  const feature = { geometry: { coordinates: [[3.7131, 51.0231, 10], [3.71310143, 51.0231, 10]] }, properties: { t_us: [1e6, 2e6], fix: ['fixed', 'float'], local_m: null } };
+  const feature = {
+    geometry: {
+      coordinates: [
+        [3.7131, 51.0231, 10],
+        [3.71310143, 51.0231, 10],
+      ],
+    },
+    properties: { t_us: [1e6, 2e6], fix: ['fixed', 'float'], local_m: null },
+  };
   it('is in metres about the origin of the flight', () => {
     const [first, second] = trail_of(feature, { lon: 3.7131, lat: 51.0231, h_m: 10 });
     expect([first!.e, first!.n, first!.fix]).toEqual([0, 0, 'fixed']);
-    expect(second!.e).toBeCloseTo(0.1003, 3);   // 1.43e-6 deg of longitude at 51 deg north, N cos(lat) = 4 020 km
+    expect(second!.e).toBeCloseTo(0.1003, 3); // 1.43e-6 deg of longitude at 51 deg north, N cos(lat) = 4 020 km
   });
   it('is empty on the globe without an origin', () => expect(trail_of(feature, null)).toEqual([]));
   it('comes before what the stream has told', () => {

@@ -11,16 +11,34 @@ const wire = (name: string): unknown => JSON.parse(readFileSync(`${folder}${name
 
 describe('guards of the stream', () => {
   const guards: Record<string, (v: unknown) => unknown> = {
-    'drone.pose': m.pose, 'rtk.status': m.rtk, ranges: m.range, 'anchors.estimates': m.estimate, 'mission.state': m.mission, devices: m.device, system: m.system, events: m.event, alarms: m.alarm, revisions: m.revision,
+    'drone.pose': m.pose,
+    'rtk.status': m.rtk,
+    ranges: m.range,
+    'anchors.estimates': m.estimate,
+    'mission.state': m.mission,
+    devices: m.device,
+    system: m.system,
+    events: m.event,
+    alarms: m.alarm,
+    revisions: m.revision,
   };
   // The flight's own topics are renamed on the way in; what they say is looked at below.
-  const flight: Record<string, (v: unknown) => unknown> = { procedure: f.procedure, 'mission.grid': f.grid, 'mission.turn': f.turn, 'mission.height': f.height };
-  const topics = readdirSync(folder).filter((name) => name.startsWith('topic.') && !name.startsWith('topic.jobs')), of_flight = (name: string): string | undefined => Object.keys(flight).find((t) => name === `topic.${t}.json`);
+  const flight: Record<string, (v: unknown) => unknown> = {
+    procedure: f.procedure,
+    'mission.grid': f.grid,
+    'mission.turn': f.turn,
+    'mission.height': f.height,
+  };
+  const topics = readdirSync(folder).filter((name) => name.startsWith('topic.') && !name.startsWith('topic.jobs')),
+    of_flight = (name: string): string | undefined => Object.keys(flight).find((t) => name === `topic.${t}.json`);
   it.each(topics.filter(of_flight))('let %s through, nothing of it unknown', (file) => {
-    const seen = flight[of_flight(file)!]!(wire(file.replace('.json', ''))) as Record<string, unknown>, given = wire(file.replace('.json', '')) as Record<string, unknown>;
+    const seen = flight[of_flight(file)!]!(wire(file.replace('.json', ''))) as Record<string, unknown>,
+      given = wire(file.replace('.json', '')) as Record<string, unknown>;
     expect(seen).toMatchObject({ mission: given.mission, t_us: given.t_us });
-    for (const [key, v] of Object.entries(given)) if (v !== null && key in seen) expect([key, seen[key]]).not.toEqual([key, null]);
-    for (const list of ['candidates', 'samples', 'commands', 'anchors']) if (Array.isArray(given[list])) expect(seen[list]).toHaveLength((given[list] as unknown[]).length);
+    for (const [key, v] of Object.entries(given))
+      if (v !== null && key in seen) expect([key, seen[key]]).not.toEqual([key, null]);
+    for (const list of ['candidates', 'samples', 'commands', 'anchors'])
+      if (Array.isArray(given[list])) expect(seen[list]).toHaveLength((given[list] as unknown[]).length);
   });
   it.each(topics.filter((name) => !of_flight(name)))('let %s through with every field it carries', (file) => {
     const topic = Object.keys(guards).find((t) => file.startsWith(`topic.${t}.`) || file === `topic.${t}.json`)!;
@@ -28,7 +46,13 @@ describe('guards of the stream', () => {
     for (const one of Array.isArray(given) ? given : [given]) expect(guards[topic]!(one)).toMatchObject(one as object);
   });
   it('make a missing or wrong field unknown instead of a number', () => {
-    const e = m.estimate({ anchor: '0x6a2f', h95_m: 'wide', enu_m: [1, 2], cov_enu_m2: [1, 2, 3, 4, 5, null], gdop: NaN })!;
+    const e = m.estimate({
+      anchor: '0x6a2f',
+      h95_m: 'wide',
+      enu_m: [1, 2],
+      cov_enu_m2: [1, 2, 3, 4, 5, null],
+      gdop: NaN,
+    })!;
     expect([e.h95_m, e.enu_m, e.cov_enu_m2, e.gdop, e.verdict]).toEqual([null, null, null, null, 'too_few']);
   });
   it('drop a message without its key, and keep the others of its batch', () => {
@@ -44,15 +68,30 @@ describe('REST answers', () => {
   it('read a published anchor with both accuracies and its frame', () => {
     const { rows, revision } = rows_of_collection(wire('rest.anchors.published'));
     expect(revision).toBe(7);
-    expect(rows[0]).toMatchObject({ anchor: '0x6a2f', name: 'Hall A north-west', status: 'accepted', lat: 51.023123457, lon: 3.713123457, h95_m: 0.054, absolute_h95_m: 0.057, n_ranges: 412 });
+    expect(rows[0]).toMatchObject({
+      anchor: '0x6a2f',
+      name: 'Hall A north-west',
+      status: 'accepted',
+      lat: 51.023123457,
+      lon: 3.713123457,
+      h95_m: 0.054,
+      absolute_h95_m: 0.057,
+      n_ranges: 412,
+    });
     expect(rows[0]!.crs).toBe('ETRS89, epoch 2026.34, base known point σ 8 mm');
   });
   it('read an empty collection before the first publication', () => {
-    expect(rows_of_collection({ type: 'FeatureCollection', features: [], revision: null })).toEqual({ rows: [], revision: null });
+    expect(rows_of_collection({ type: 'FeatureCollection', features: [], revision: null })).toEqual({
+      rows: [],
+      revision: null,
+    });
   });
   it('read a calibration with its ambiguous anchor and the twin', () => {
     const c = calibration_of(wire('rest.calibration'))!;
-    expect(c.rows.map((r) => [r.anchor, r.verdict])).toEqual([['0x6a2f', 'ok'], ['0x6a3c', 'ambiguous']]);
+    expect(c.rows.map((r) => [r.anchor, r.verdict])).toEqual([
+      ['0x6a2f', 'ok'],
+      ['0x6a3c', 'ambiguous'],
+    ]);
     expect(c.rows[1]!.mirror).toMatchObject({ lat: 51.023251457, probability: 0.12 });
     expect(c.rows[1]!.probability).toBeCloseTo(0.88, 12);
   });
@@ -67,6 +106,13 @@ describe('REST answers', () => {
 describe('missions of REST', () => {
   it('become what the stream would have said of them', async () => {
     const { mission_of_rest } = await import('../src/state/archive');
-    expect(mission_of_rest(wire('rest.mission'))).toMatchObject({ mission: '0197a3b0-5d10-7b1e-9c55-0a1b2c3d4e5f', name: 'Demonstration flight', state: 'recording', frame: 'wgs84', n_ranges: 4120, started_us: Date.UTC(2026, 4, 4, 10, 9, 12, 345) * 1000 });
+    expect(mission_of_rest(wire('rest.mission'))).toMatchObject({
+      mission: '0197a3b0-5d10-7b1e-9c55-0a1b2c3d4e5f',
+      name: 'Demonstration flight',
+      state: 'recording',
+      frame: 'wgs84',
+      n_ranges: 4120,
+      started_us: Date.UTC(2026, 4, 4, 10, 9, 12, 345) * 1000,
+    });
   });
 });

@@ -4,12 +4,16 @@ import { method_words } from '../src/views/models/words';
 
 describe('the name of a method', () => {
   it('is that people use', () => expect(method_words('random_forest')).toBe('Random forest'));
-  it('tells settings and features of a run', () => expect(method_words('logistic(c=3) on 3 features')).toBe('Logistic regression, c 3, 3 features'));
-  it('of several settings tells each', () => expect(method_words('svm(c=3,gamma=0.1)')).toBe('Support vector machine, c 3, gamma 0.1'));
-  it('stays as it is where it is none of these', () => expect(method_words('average of (a) and (b)')).toBe('Average of (a) and (b)'));
+  it('tells settings and features of a run', () =>
+    expect(method_words('logistic(c=3) on 3 features')).toBe('Logistic regression, c 3, 3 features'));
+  it('of several settings tells each', () =>
+    expect(method_words('svm(c=3,gamma=0.1)')).toBe('Support vector machine, c 3, gamma 0.1'));
+  it('stays as it is where it is none of these', () =>
+    expect(method_words('average of (a) and (b)')).toBe('Average of (a) and (b)'));
 });
 
 describe('the decimals of ticks', () => {
-  it('are those at which they differ', () => expect([ticks(0, 100), ticks(4.98, 5.03), ticks(-80.4, -79.6), ticks(0, 0.5)].map(decimals)).toEqual([0, 2, 1, 1]));
+  it('are those at which they differ', () =>
+    expect([ticks(0, 100), ticks(4.98, 5.03), ticks(-80.4, -79.6), ticks(0, 0.5)].map(decimals)).toEqual([0, 2, 1, 1]));
   it('are none of a single one', () => expect(decimals([3])).toBe(0));
 });

@@ -1,117 +1,299 @@
 /// Anchors as the Anchors view shows them, whether they come from the stream, from a published revision or from a fresh calibration.
-import { cov6, ellipse, estimate, mirror, num, obj, str, STATUS, vec3, VERDICT, type EstimateMsg, type Mirror } from '../live/messages';
+import {
+  cov6,
+  ellipse,
+  estimate,
+  mirror,
+  num,
+  obj,
+  str,
+  STATUS,
+  vec3,
+  VERDICT,
+  type EstimateMsg,
+  type Mirror,
+} from '../live/messages';
 import { ellipse_from_covariance, enu_from_geodetic } from '../map/enu';
 import { api_url, request } from './client';
 
 /// One acceptance test of the server: its number against its limit.
-export interface Gate { readonly name: string; readonly value: number | null; readonly limit: number | null; readonly passed: boolean; readonly why: string }
+export interface Gate {
+  readonly name: string;
+  readonly value: number | null;
+  readonly limit: number | null;
+  readonly passed: boolean;
+  readonly why: string;
+}
 export interface AnchorRow extends EstimateMsg {
-  readonly gates: readonly Gate[];       ///< empty where none were run: a running estimate
-  readonly acceptable: boolean | null;   ///< verdict ok and every gate passed; null where none were run
-  readonly override: string;             ///< why a person published it although a gate failed
+  readonly gates: readonly Gate[]; ///< empty where none were run: a running estimate
+  readonly acceptable: boolean | null; ///< verdict ok and every gate passed; null where none were run
+  readonly override: string; ///< why a person published it although a gate failed
   readonly name: string;
   readonly absolute_h95_m: number | null;
   readonly absolute_v95_m: number | null;
   readonly calibrated_at: string | null;
   readonly revision: number | null;
   readonly crs: string;
-  readonly calibration: string | null;     ///< that it comes from; null of a running estimate
-  readonly building: string; readonly floor: string; readonly height_msl_m: number | null;
+  readonly calibration: string | null; ///< that it comes from; null of a running estimate
+  readonly building: string;
+  readonly floor: string;
+  readonly height_msl_m: number | null;
 }
 
-export const row_of_estimate = (e: EstimateMsg): AnchorRow => ({ ...e, name: '', absolute_h95_m: null, absolute_v95_m: null, calibrated_at: null, revision: null, crs: '', gates: [], acceptable: null, override: '', calibration: null, building: '', floor: '', height_msl_m: null });
+export const row_of_estimate = (e: EstimateMsg): AnchorRow => ({
+  ...e,
+  name: '',
+  absolute_h95_m: null,
+  absolute_v95_m: null,
+  calibrated_at: null,
+  revision: null,
+  crs: '',
+  gates: [],
+  acceptable: null,
+  override: '',
+  calibration: null,
+  building: '',
+  floor: '',
+  height_msl_m: null,
+});
 
-const gates_of = (v: unknown): Gate[] => (Array.isArray(v) ? v.map(obj).filter((o) => o !== null && str(o.name) !== '').map((o) => ({ name: str(o!.name), value: num(o!.value), limit: num(o!.limit), passed: o!.passed === true, why: str(o!.why) })) : []);
+const gates_of = (v: unknown): Gate[] =>
+  Array.isArray(v)
+    ? v
+        .map(obj)
+        .filter((o) => o !== null && str(o.name) !== '')
+        .map((o) => ({
+          name: str(o!.name),
+          value: num(o!.value),
+          limit: num(o!.limit),
+          passed: o!.passed === true,
+          why: str(o!.why),
+        }))
+    : [];
 const point = (v: unknown): { lon: number | null; lat: number | null; h_m: number | null } => {
   const c = vec3(obj(v)?.coordinates ?? v);
   return { lon: c?.[0] ?? null, lat: c?.[1] ?? null, h_m: c?.[2] ?? null };
 };
 function mirror_of(v: unknown): Mirror | null {
   const o = obj(v);
-  return o && (o.coordinates === undefined && o.geometry === undefined ? mirror(o) : { ...point(o.geometry ?? o.coordinates), enu_m: vec3(o.enu_m), probability: num(o.probability) });
+  return (
+    o &&
+    (o.coordinates === undefined && o.geometry === undefined
+      ? mirror(o)
+      : { ...point(o.geometry ?? o.coordinates), enu_m: vec3(o.enu_m), probability: num(o.probability) })
+  );
 }
 function crs_words(v: unknown): string {
-  const o = obj(v), base = obj(o?.base);
+  const o = obj(v),
+    base = obj(o?.base);
   if (!o) return '';
   const sigma = num(base?.sigma_m);
-  return [str(o.frame) || str(o.id), num(o.epoch) ? `epoch ${num(o.epoch)}` : '', str(base?.source) ? `base ${str(base?.source).replaceAll('_', ' ')}${sigma === null ? '' : ` σ ${Math.round(sigma * 1000)} mm`}` : ''].filter(Boolean).join(', ');
+  return [
+    str(o.frame) || str(o.id),
+    num(o.epoch) ? `epoch ${num(o.epoch)}` : '',
+    str(base?.source)
+      ? `base ${str(base?.source).replaceAll('_', ' ')}${sigma === null ? '' : ` σ ${Math.round(sigma * 1000)} mm`}`
+      : '',
+  ]
+    .filter(Boolean)
+    .join(', ');
 }
 
 /// `properties` of a GeoJSON feature or one anchor of a calibration; `geometry` beside it.
 export function row_of(p: Record<string, unknown>, geometry: unknown): AnchorRow | null {
   const network_id = str(p.network_id);
   if (!network_id) return null;
-  const accuracy = obj(p.accuracy), relative = obj(accuracy?.relative) ?? accuracy, absolute = obj(accuracy?.absolute), quality = obj(p.quality);
-  const cov = cov6(relative?.cov_enu_m2), provenance = obj(p.provenance);
+  const accuracy = obj(p.accuracy),
+    relative = obj(accuracy?.relative) ?? accuracy,
+    absolute = obj(accuracy?.absolute),
+    quality = obj(p.quality);
+  const cov = cov6(relative?.cov_enu_m2),
+    provenance = obj(p.provenance);
   const verdict = str(quality?.verdict) || str(p.verdict);
   const known = (VERDICT as readonly string[]).includes(verdict);
   const status = str(p.status);
   const base = estimate({
-    anchor: network_id, mission: Array.isArray(provenance?.missions) ? str(provenance.missions[0]) : '', verdict: known ? verdict : 'ok',
-    status: (STATUS as readonly string[]).includes(status) ? status : verdict === 'ambiguous' ? 'ambiguous' : verdict === 'ok' ? 'converged' : geometry ? 'estimating' : 'found',
-    reason: str(quality?.reason) || str(p.reason), ...point(geometry), enu_m: p.enu_m ?? p.local_m, cov_enu_m2: relative?.cov_enu_m2, h95_m: relative?.h95_m, v95_m: relative?.v95_m,
-    gdop: quality?.gdop, gdop_trace: quality?.gdop_trace, n_ranges: quality?.n_ranges, n_refused: quality?.n_refused, rms_residual_m: quality?.rms_residual_m, probability: p.probability,
+    anchor: network_id,
+    mission: Array.isArray(provenance?.missions) ? str(provenance.missions[0]) : '',
+    verdict: known ? verdict : 'ok',
+    status: (STATUS as readonly string[]).includes(status)
+      ? status
+      : verdict === 'ambiguous'
+        ? 'ambiguous'
+        : verdict === 'ok'
+          ? 'converged'
+          : geometry
+            ? 'estimating'
+            : 'found',
+    reason: str(quality?.reason) || str(p.reason),
+    ...point(geometry),
+    enu_m: p.enu_m ?? p.local_m,
+    cov_enu_m2: relative?.cov_enu_m2,
+    h95_m: relative?.h95_m,
+    v95_m: relative?.v95_m,
+    gdop: quality?.gdop,
+    gdop_trace: quality?.gdop_trace,
+    n_ranges: quality?.n_ranges,
+    n_refused: quality?.n_refused,
+    rms_residual_m: quality?.rms_residual_m,
+    probability: p.probability,
   });
   if (!base) return null;
   const twin = mirror_of(p.mirror);
   return {
-    ...base, ellipse95: ellipse(relative?.ellipse95) ?? (cov && ellipse_from_covariance(cov)), mirror: twin, probability: base.probability ?? (twin?.probability == null ? null : 1 - twin.probability),
-    name: str(p.name), absolute_h95_m: num(absolute?.h95_m), absolute_v95_m: num(absolute?.v95_m), calibrated_at: str(p.calibrated_at) || null, revision: num(p.revision), crs: crs_words(p.crs),
-    gates: gates_of(quality?.gates), acceptable: typeof quality?.acceptable === 'boolean' ? quality.acceptable : null, override: str(obj(quality?.override)?.reason),
-    calibration: str(provenance?.calibration) || null, building: str(p.building), floor: str(p.floor), height_msl_m: num(p.height_orthometric_m),
+    ...base,
+    ellipse95: ellipse(relative?.ellipse95) ?? (cov && ellipse_from_covariance(cov)),
+    mirror: twin,
+    probability: base.probability ?? (twin?.probability == null ? null : 1 - twin.probability),
+    name: str(p.name),
+    absolute_h95_m: num(absolute?.h95_m),
+    absolute_v95_m: num(absolute?.v95_m),
+    calibrated_at: str(p.calibrated_at) || null,
+    revision: num(p.revision),
+    crs: crs_words(p.crs),
+    gates: gates_of(quality?.gates),
+    acceptable: typeof quality?.acceptable === 'boolean' ? quality.acceptable : null,
+    override: str(obj(quality?.override)?.reason),
+    calibration: str(provenance?.calibration) || null,
+    building: str(p.building),
+    floor: str(p.floor),
+    height_msl_m: num(p.height_orthometric_m),
   };
 }
 export function rows_of_collection(answer: unknown): { rows: AnchorRow[]; revision: number | null } {
   const o = obj(answer);
   const features = Array.isArray(o?.features) ? o.features : [];
-  const rows = features.map((f) => { const x = obj(f); return x ? row_of(obj(x.properties) ?? {}, x.geometry) : null; }).filter((r): r is AnchorRow => r !== null);
-  return { rows, revision: num(o?.revision) ?? rows.reduce<number | null>((r, x) => (x.revision === null ? r : Math.max(r ?? 0, x.revision)), null) };
+  const rows = features
+    .map((f) => {
+      const x = obj(f);
+      return x ? row_of(obj(x.properties) ?? {}, x.geometry) : null;
+    })
+    .filter((r): r is AnchorRow => r !== null);
+  return {
+    rows,
+    revision:
+      num(o?.revision) ??
+      rows.reduce<number | null>((r, x) => (x.revision === null ? r : Math.max(r ?? 0, x.revision)), null),
+  };
 }
-export const published = async (): Promise<{ rows: AnchorRow[]; revision: number | null }> => rows_of_collection(await request('GET', '/anchors?limit=1000'));
+export const published = async (): Promise<{ rows: AnchorRow[]; revision: number | null }> =>
+  rows_of_collection(await request('GET', '/anchors?limit=1000'));
 
-export interface Calibration { readonly id: string; readonly rows: readonly AnchorRow[] }
+export interface Calibration {
+  readonly id: string;
+  readonly rows: readonly AnchorRow[];
+}
 export function calibration_of(answer: unknown): Calibration | null {
   const o = obj(answer);
   if (!o || !str(o.id) || !Array.isArray(o.anchors)) return null;
-  return { id: str(o.id), rows: o.anchors.map((a) => { const x = obj(a); return x ? row_of(x, x.geometry) : null; }).filter((r): r is AnchorRow => r !== null) };
+  return {
+    id: str(o.id),
+    rows: o.anchors
+      .map((a) => {
+        const x = obj(a);
+        return x ? row_of(x, x.geometry) : null;
+      })
+      .filter((r): r is AnchorRow => r !== null),
+  };
 }
 export async function calibrate(mission: string, key: string): Promise<Calibration> {
-  const answer = await request('POST', '/calibrations', { missions: [mission] }, { Prefer: 'wait=120', 'Idempotency-Key': key });
+  const answer = await request(
+    'POST',
+    '/calibrations',
+    { missions: [mission] },
+    { Prefer: 'wait=120', 'Idempotency-Key': key },
+  );
   const done = calibration_of(answer);
   if (!done) throw new Error('The calibration is still running; look again in a minute.');
   return done;
 }
 /// An anchor that fails a gate goes out only with the reason a person gives for it.
-export interface Override { readonly network_id: string; readonly reason: string }
+export interface Override {
+  readonly network_id: string;
+  readonly reason: string;
+}
 /// The revision's note carries who was left out by a person, and why: 500 characters at most.
 export function note_of(note: string, out: readonly (readonly [string, string])[]): string {
   const words = out.map(([id, why]) => `${id}${why.trim() ? ` (${why.trim()})` : ''}`).join(', ');
   return [note.trim(), words && `Left out: ${words}.`].filter(Boolean).join(' ').slice(0, 500);
 }
 /// `only`: those a person chose; null: all that pass every gate.
-export async function publish(calibration: string, note: string, overrides: readonly Override[], key: string, only: readonly string[] | null = null): Promise<number | null> {
-  const body = { ...(note ? { note } : {}), ...(only ? { anchors: only } : {}), ...(overrides.length ? { overrides } : {}) };
-  return num(obj(await request('POST', `/calibrations/${encodeURIComponent(calibration)}/publish`, body, { 'Idempotency-Key': key }))?.revision);
+export async function publish(
+  calibration: string,
+  note: string,
+  overrides: readonly Override[],
+  key: string,
+  only: readonly string[] | null = null,
+): Promise<number | null> {
+  const body = {
+    ...(note ? { note } : {}),
+    ...(only ? { anchors: only } : {}),
+    ...(overrides.length ? { overrides } : {}),
+  };
+  return num(
+    obj(
+      await request('POST', `/calibrations/${encodeURIComponent(calibration)}/publish`, body, {
+        'Idempotency-Key': key,
+      }),
+    )?.revision,
+  );
 }
 
 /// Against what is published: where each anchor was, in metres, and whether it moved beyond what both covariances allow.
-export interface Moved { readonly change: string; readonly horizontal_m: number | null; readonly vertical_m: number | null }
+export interface Moved {
+  readonly change: string;
+  readonly horizontal_m: number | null;
+  readonly vertical_m: number | null;
+}
 export async function moved_since_published(calibration: string): Promise<Map<string, Moved>> {
-  const items = obj(await request('GET', `/calibrations/${encodeURIComponent(calibration)}/diff`))?.items, out = new Map<string, Moved>();
-  for (const o of (Array.isArray(items) ? items : []).map(obj)) if (o && str(o.network_id)) out.set(str(o.network_id), { change: str(o.change), horizontal_m: num(o.horizontal_m), vertical_m: num(o.vertical_m) });
+  const items = obj(await request('GET', `/calibrations/${encodeURIComponent(calibration)}/diff`))?.items,
+    out = new Map<string, Moved>();
+  for (const o of (Array.isArray(items) ? items : []).map(obj))
+    if (o && str(o.network_id))
+      out.set(str(o.network_id), {
+        change: str(o.change),
+        horizontal_m: num(o.horizontal_m),
+        vertical_m: num(o.vertical_m),
+      });
   return out;
 }
-export const report_url = (calibration: string): string => api_url(`/calibrations/${encodeURIComponent(calibration)}/report`);
+export const report_url = (calibration: string): string =>
+  api_url(`/calibrations/${encodeURIComponent(calibration)}/report`);
 
 /// One published position of an anchor, and how far it is from the one before; null where either has no place on the globe.
-export interface Past { readonly revision: number; readonly published_at: string; readonly status: string; readonly h95_m: number | null; readonly v95_m: number | null; readonly horizontal_m: number | null; readonly vertical_m: number | null }
+export interface Past {
+  readonly revision: number;
+  readonly published_at: string;
+  readonly status: string;
+  readonly h95_m: number | null;
+  readonly v95_m: number | null;
+  readonly horizontal_m: number | null;
+  readonly vertical_m: number | null;
+}
 export function past_of(answer: unknown): Past[] {
-  const items = obj(answer)?.items, list = (Array.isArray(items) ? items : []).map(obj).filter((o) => o !== null) as Record<string, unknown>[];
+  const items = obj(answer)?.items,
+    list = (Array.isArray(items) ? items : []).map(obj).filter((o) => o !== null) as Record<string, unknown>[];
   return list.map((o, i) => {
-    const here = point(o.geometry), before = list[i + 1] ? point(list[i + 1]!.geometry) : null, relative = obj(obj(o.accuracy)?.relative);
+    const here = point(o.geometry),
+      before = list[i + 1] ? point(list[i + 1]!.geometry) : null,
+      relative = obj(obj(o.accuracy)?.relative);
     const known = here.lon !== null && here.lat !== null && before?.lon != null && before.lat !== null;
-    const shift = known ? enu_from_geodetic({ lon: here.lon!, lat: here.lat!, h_m: here.h_m ?? 0 }, { lon: before!.lon!, lat: before!.lat!, h_m: before!.h_m ?? 0 }) : null;
-    return { revision: num(o.revision) ?? 0, published_at: str(o.published_at), status: str(o.verdict), h95_m: num(relative?.h95_m), v95_m: num(relative?.v95_m), horizontal_m: shift && Math.hypot(shift[0], shift[1]), vertical_m: shift && shift[2] };
+    const shift = known
+      ? enu_from_geodetic(
+          { lon: here.lon!, lat: here.lat!, h_m: here.h_m ?? 0 },
+          { lon: before!.lon!, lat: before!.lat!, h_m: before!.h_m ?? 0 },
+        )
+      : null;
+    return {
+      revision: num(o.revision) ?? 0,
+      published_at: str(o.published_at),
+      status: str(o.verdict),
+      h95_m: num(relative?.h95_m),
+      v95_m: num(relative?.v95_m),
+      horizontal_m: shift && Math.hypot(shift[0], shift[1]),
+      vertical_m: shift && shift[2],
+    };
   });
 }
-export const past = async (anchor: string): Promise<Past[]> => past_of(await request('GET', `/anchors/${encodeURIComponent(anchor)}/history`));
+export const past = async (anchor: string): Promise<Past[]> =>
+  past_of(await request('GET', `/anchors/${encodeURIComponent(anchor)}/history`));

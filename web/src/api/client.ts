@@ -1,29 +1,73 @@
 /// REST of this page's own server. Every failure is an ApiError that carries a problem (RFC 9457), so a view can show title, detail and request id.
 import { num, obj, str } from '../live/messages';
 
-export interface FieldProblem { readonly pointer: string; readonly detail: string }
-export interface Problem { readonly type: string; readonly title: string; readonly status: number; readonly detail: string; readonly request_id: string; readonly errors: readonly FieldProblem[] }
+export interface FieldProblem {
+  readonly pointer: string;
+  readonly detail: string;
+}
+export interface Problem {
+  readonly type: string;
+  readonly title: string;
+  readonly status: number;
+  readonly detail: string;
+  readonly request_id: string;
+  readonly errors: readonly FieldProblem[];
+}
 export class ApiError extends Error {
-  constructor(readonly problem: Problem) { super(`${problem.title}${problem.detail ? `: ${problem.detail}` : ''}`); }
+  constructor(readonly problem: Problem) {
+    super(`${problem.title}${problem.detail ? `: ${problem.detail}` : ''}`);
+  }
 }
 
 export function problem_of(body: unknown, status: number): Problem {
   const o = obj(body);
-  const errors = Array.isArray(o?.errors) ? o.errors.map(obj).filter((e) => e !== null).map((e) => ({ pointer: str(e.pointer), detail: str(e.detail) })) : [];
-  return { type: str(o?.type), title: str(o?.title) || (status ? `The server answered ${status}` : 'No answer from anchord'), status: num(o?.status) ?? status, detail: str(o?.detail), request_id: str(o?.request_id), errors };
+  const errors = Array.isArray(o?.errors)
+    ? o.errors
+        .map(obj)
+        .filter((e) => e !== null)
+        .map((e) => ({ pointer: str(e.pointer), detail: str(e.detail) }))
+    : [];
+  return {
+    type: str(o?.type),
+    title: str(o?.title) || (status ? `The server answered ${status}` : 'No answer from anchord'),
+    status: num(o?.status) ?? status,
+    detail: str(o?.detail),
+    request_id: str(o?.request_id),
+    errors,
+  };
 }
 
 export const api_url = (path: string): string => new URL(`api/v1${path}`, document.baseURI.split('#')[0]).toString();
 
 /// `etag` names the state that was read; sent back as If-Match, a change of another state is refused.
-export interface Answer { readonly body: unknown; readonly etag: string }
-export const request = async (method: string, path: string, body?: unknown, headers: Record<string, string> = {}): Promise<unknown> => (await exchange(method, path, body, headers)).body;
-export async function exchange(method: string, path: string, body?: unknown, headers: Record<string, string> = {}): Promise<Answer> {
+export interface Answer {
+  readonly body: unknown;
+  readonly etag: string;
+}
+export const request = async (
+  method: string,
+  path: string,
+  body?: unknown,
+  headers: Record<string, string> = {},
+): Promise<unknown> => (await exchange(method, path, body, headers)).body;
+export async function exchange(
+  method: string,
+  path: string,
+  body?: unknown,
+  headers: Record<string, string> = {},
+): Promise<Answer> {
   let answer: Response;
   try {
     answer = await fetch(api_url(path), {
-      method, credentials: 'same-origin', cache: 'no-cache',
-      headers: { Accept: 'application/json, application/geo+json, application/problem+json', 'X-Anchord': '1', ...(body === undefined ? {} : { 'Content-Type': 'application/json' }), ...headers },
+      method,
+      credentials: 'same-origin',
+      cache: 'no-cache',
+      headers: {
+        Accept: 'application/json, application/geo+json, application/problem+json',
+        'X-Anchord': '1',
+        ...(body === undefined ? {} : { 'Content-Type': 'application/json' }),
+        ...headers,
+      },
       ...(body === undefined ? {} : { body: typeof body === 'string' ? body : JSON.stringify(body) }),
     });
   } catch {
@@ -33,17 +77,28 @@ export async function exchange(method: string, path: string, body?: unknown, hea
   let parsed: unknown = null;
   try {
     parsed = text ? JSON.parse(text) : null;
-  } catch { /* not JSON: the status alone speaks */ }
+  } catch {
+    /* not JSON: the status alone speaks */
+  }
   if (!answer.ok) throw new ApiError(problem_of(parsed, answer.status));
   return { body: parsed, etag: answer.headers.get('etag') ?? '' };
 }
 /// What is wrong with each field, where the problem's own words do not say it already; the first five.
 function fields_said({ errors, detail }: Problem): string {
-  const more = errors.filter((e) => e.detail && !detail.includes(e.detail)).slice(0, 5).map((e) => `${e.pointer.replace(/^\//, '').replaceAll('/', ' ')} ${e.detail}`.trim());
+  const more = errors
+    .filter((e) => e.detail && !detail.includes(e.detail))
+    .slice(0, 5)
+    .map((e) => `${e.pointer.replace(/^\//, '').replaceAll('/', ' ')} ${e.detail}`.trim());
   return more.length ? `: ${more.join('; ')}` : '';
 }
 /// A failure in the words of the server, with the number under which its log has it.
-export const said = (e: unknown): string => (e instanceof ApiError ? `${e.message}${fields_said(e.problem)}${e.problem.request_id ? ` (request ${e.problem.request_id})` : ''}` : e instanceof Error ? e.message : String(e));
+export const said = (e: unknown): string =>
+  e instanceof ApiError
+    ? `${e.message}${fields_said(e.problem)}${e.problem.request_id ? ` (request ${e.problem.request_id})` : ''}`
+    : e instanceof Error
+      ? e.message
+      : String(e);
 
 /// One try per press of a button, even if the answer is lost on the way: the server keeps the first result under the key.
-export const idempotency_key = (): string => Array.from(crypto.getRandomValues(new Uint8Array(16)), (b) => b.toString(16).padStart(2, '0')).join('');
+export const idempotency_key = (): string =>
+  Array.from(crypto.getRandomValues(new Uint8Array(16)), (b) => b.toString(16).padStart(2, '0')).join('');

@@ -4,73 +4,201 @@ import { api_url, idempotency_key, request } from './client';
 import { LIMITS } from './generated/limits';
 import type { components } from './generated/schema';
 
-export interface Corner { readonly lon: number; readonly lat: number }
-export interface Waypoint extends Corner { readonly height_above_ground_m: number; readonly heading_deg: number | null; readonly dwell_s: number | null; readonly measure: boolean; readonly turn: boolean; readonly height_search: boolean }
+export interface Corner {
+  readonly lon: number;
+  readonly lat: number;
+}
+export interface Waypoint extends Corner {
+  readonly height_above_ground_m: number;
+  readonly heading_deg: number | null;
+  readonly dwell_s: number | null;
+  readonly measure: boolean;
+  readonly turn: boolean;
+  readonly height_search: boolean;
+}
 /// As stored: what is absent is the server's default.
 export type Settings = Readonly<Partial<components['schemas']['PlanSettings']>>;
 export const SETTINGS = LIMITS.PlanSettings;
 /// Settings that are a number, and what they are while the plan says nothing.
-export type NumberSetting = { [K in keyof typeof SETTINGS]: (typeof SETTINGS)[K] extends { readonly default: number } ? K : never }[keyof typeof SETTINGS];
+export type NumberSetting = {
+  [K in keyof typeof SETTINGS]: (typeof SETTINGS)[K] extends { readonly default: number } ? K : never;
+}[keyof typeof SETTINGS];
 export const setting = (p: Plan, key: NumberSetting): number => p.settings[key] ?? SETTINGS[key].default;
 const BUILDING_HEIGHT_M = LIMITS.PlanBody.building_height_m.default;
 export interface Plan {
-  readonly id: string | null; readonly revision: number; readonly name: string; readonly outline: readonly Corner[]; readonly no_fly: readonly (readonly Corner[])[]; readonly fence: readonly Corner[];
-  readonly building_height_m: number; readonly settings: Settings; readonly expected: readonly string[]; readonly waypoints: readonly Waypoint[];
-  readonly rest: Readonly<Record<string, unknown>>;   ///< what this page does not edit, kept as it came
+  readonly id: string | null;
+  readonly revision: number;
+  readonly name: string;
+  readonly outline: readonly Corner[];
+  readonly no_fly: readonly (readonly Corner[])[];
+  readonly fence: readonly Corner[];
+  readonly building_height_m: number;
+  readonly settings: Settings;
+  readonly expected: readonly string[];
+  readonly waypoints: readonly Waypoint[];
+  readonly rest: Readonly<Record<string, unknown>>; ///< what this page does not edit, kept as it came
 }
-export interface Issue { readonly severity: 'error' | 'warning'; readonly code: string; readonly pointer: string; readonly text: string }
+export interface Issue {
+  readonly severity: 'error' | 'warning';
+  readonly code: string;
+  readonly pointer: string;
+  readonly text: string;
+}
 /// An anchor assumed in the building: where, about the plan's origin, and what the flight would make of it.
-export interface Assumed { readonly e: number; readonly n: number; readonly up: number; readonly sigma_m: number; readonly gdop: number | null }
-export interface Check { readonly flyable: boolean; readonly issues: readonly Issue[]; readonly length_m: number | null; readonly duration_s: number | null; readonly n_measure: number | null; readonly rms_m: number | null; readonly worst_m: number | null; readonly assumed: readonly Assumed[] }
+export interface Assumed {
+  readonly e: number;
+  readonly n: number;
+  readonly up: number;
+  readonly sigma_m: number;
+  readonly gdop: number | null;
+}
+export interface Check {
+  readonly flyable: boolean;
+  readonly issues: readonly Issue[];
+  readonly length_m: number | null;
+  readonly duration_s: number | null;
+  readonly n_measure: number | null;
+  readonly rms_m: number | null;
+  readonly worst_m: number | null;
+  readonly assumed: readonly Assumed[];
+}
 
-export const EMPTY: Plan = { id: null, revision: 0, name: '', outline: [], no_fly: [], fence: [], building_height_m: BUILDING_HEIGHT_M, settings: {}, expected: [], waypoints: [], rest: {} };
+export const EMPTY: Plan = {
+  id: null,
+  revision: 0,
+  name: '',
+  outline: [],
+  no_fly: [],
+  fence: [],
+  building_height_m: BUILDING_HEIGHT_M,
+  settings: {},
+  expected: [],
+  waypoints: [],
+  rest: {},
+};
 
-const list = (v: unknown): Record<string, unknown>[] => (Array.isArray(v) ? v.map(obj).filter((o) => o !== null) as Record<string, unknown>[] : []);
+const list = (v: unknown): Record<string, unknown>[] =>
+  Array.isArray(v) ? (v.map(obj).filter((o) => o !== null) as Record<string, unknown>[]) : [];
 /// A GeoJSON ring closes itself; the page works with open ones.
 function ring_of(polygon: unknown): Corner[] {
-  const rings = obj(polygon)?.coordinates, ring = Array.isArray(rings) && Array.isArray(rings[0]) ? (rings[0] as unknown[]) : [];
-  const corners = ring.flatMap((c) => (Array.isArray(c) && num(c[0]) !== null && num(c[1]) !== null ? [{ lon: c[0] as number, lat: c[1] as number }] : []));
+  const rings = obj(polygon)?.coordinates,
+    ring = Array.isArray(rings) && Array.isArray(rings[0]) ? (rings[0] as unknown[]) : [];
+  const corners = ring.flatMap((c) =>
+    Array.isArray(c) && num(c[0]) !== null && num(c[1]) !== null ? [{ lon: c[0] as number, lat: c[1] as number }] : [],
+  );
   const [first, last] = [corners[0], corners[corners.length - 1]];
   return corners.length > 1 && first!.lon === last!.lon && first!.lat === last!.lat ? corners.slice(0, -1) : corners;
 }
 function plan_of(o: Record<string, unknown>): Plan {
-  const { id, revision, name, outline, no_fly, fence, building_height_m, settings, expected_anchors, waypoints, created_at: _made, changed_at: _changed, links: _links, ...rest } = o;
+  const {
+    id,
+    revision,
+    name,
+    outline,
+    no_fly,
+    fence,
+    building_height_m,
+    settings,
+    expected_anchors,
+    waypoints,
+    created_at: _made,
+    changed_at: _changed,
+    links: _links,
+    ...rest
+  } = o;
   return {
-    id: str(id) || null, revision: num(revision) ?? 0, name: str(name), outline: ring_of(outline), no_fly: Array.isArray(no_fly) ? no_fly.map(ring_of) : [], fence: ring_of(fence), building_height_m: num(building_height_m) ?? BUILDING_HEIGHT_M,
-    settings: (obj(settings) ?? {}) as Settings, rest, expected: Array.isArray(expected_anchors) ? expected_anchors.filter((a): a is string => typeof a === 'string') : [],
-    waypoints: list(waypoints).map((w) => ({ lon: num(w.lon) ?? 0, lat: num(w.lat) ?? 0, height_above_ground_m: num(w.height_above_ground_m) ?? 0, heading_deg: num(w.heading_deg), dwell_s: num(w.dwell_s), measure: w.measure !== false, turn: w.turn === true, height_search: w.height_search === true })),
+    id: str(id) || null,
+    revision: num(revision) ?? 0,
+    name: str(name),
+    outline: ring_of(outline),
+    no_fly: Array.isArray(no_fly) ? no_fly.map(ring_of) : [],
+    fence: ring_of(fence),
+    building_height_m: num(building_height_m) ?? BUILDING_HEIGHT_M,
+    settings: (obj(settings) ?? {}) as Settings,
+    rest,
+    expected: Array.isArray(expected_anchors) ? expected_anchors.filter((a): a is string => typeof a === 'string') : [],
+    waypoints: list(waypoints).map((w) => ({
+      lon: num(w.lon) ?? 0,
+      lat: num(w.lat) ?? 0,
+      height_above_ground_m: num(w.height_above_ground_m) ?? 0,
+      heading_deg: num(w.heading_deg),
+      dwell_s: num(w.dwell_s),
+      measure: w.measure !== false,
+      turn: w.turn === true,
+      height_search: w.height_search === true,
+    })),
   };
 }
-const polygon = (corners: readonly Corner[]): object | null => (corners.length < 3 ? null : { type: 'Polygon', coordinates: [[...corners, corners[0]!].map((c) => [c.lon, c.lat])] });
+const polygon = (corners: readonly Corner[]): object | null =>
+  corners.length < 3 ? null : { type: 'Polygon', coordinates: [[...corners, corners[0]!].map((c) => [c.lon, c.lat])] };
 export function body_of(p: Plan): object {
-  return { ...p.rest, name: p.name || 'Plan', outline: polygon(p.outline), no_fly: p.no_fly.map(polygon).filter((x) => x !== null), fence: polygon(p.fence), building_height_m: p.building_height_m, settings: p.settings, expected_anchors: p.expected, waypoints: p.waypoints };
+  return {
+    ...p.rest,
+    name: p.name || 'Plan',
+    outline: polygon(p.outline),
+    no_fly: p.no_fly.map(polygon).filter((x) => x !== null),
+    fence: polygon(p.fence),
+    building_height_m: p.building_height_m,
+    settings: p.settings,
+    expected_anchors: p.expected,
+    waypoints: p.waypoints,
+  };
 }
 function check_of(o: Record<string, unknown> | null): Check {
   const predicted = obj(o?.predicted);
   return {
-    flyable: o?.flyable === true, length_m: num(o?.length_m), duration_s: num(o?.duration_s), n_measure: num(o?.n_measure), rms_m: num(predicted?.rms_m), worst_m: num(predicted?.worst_m),
-    assumed: list(predicted?.anchors).flatMap((a) => { const at = vec3(a.enu_m), sigma_m = num(a.sigma_m); return at && sigma_m !== null ? [{ e: at[0], n: at[1], up: at[2], sigma_m, gdop: num(a.gdop) }] : []; }),
-    issues: list(o?.issues).map((i) => ({ severity: i.severity === 'error' ? 'error' : 'warning', code: str(i.code), pointer: str(i.pointer), text: str(i.text) })),
+    flyable: o?.flyable === true,
+    length_m: num(o?.length_m),
+    duration_s: num(o?.duration_s),
+    n_measure: num(o?.n_measure),
+    rms_m: num(predicted?.rms_m),
+    worst_m: num(predicted?.worst_m),
+    assumed: list(predicted?.anchors).flatMap((a) => {
+      const at = vec3(a.enu_m),
+        sigma_m = num(a.sigma_m);
+      return at && sigma_m !== null ? [{ e: at[0], n: at[1], up: at[2], sigma_m, gdop: num(a.gdop) }] : [];
+    }),
+    issues: list(o?.issues).map((i) => ({
+      severity: i.severity === 'error' ? 'error' : 'warning',
+      code: str(i.code),
+      pointer: str(i.pointer),
+      text: str(i.text),
+    })),
   };
 }
 
-export const plans = async (): Promise<Plan[]> => list(obj(await request('GET', '/plans?limit=100'))?.items).map(plan_of);
+export const plans = async (): Promise<Plan[]> =>
+  list(obj(await request('GET', '/plans?limit=100'))?.items).map(plan_of);
 export async function save(p: Plan): Promise<Plan> {
-  const answer = p.id ? await request('PUT', `/plans/${p.id}`, body_of(p), { 'If-Match': `"p-${p.revision}"` }) : await request('POST', '/plans', body_of(p), { 'Idempotency-Key': idempotency_key() });
+  const answer = p.id
+    ? await request('PUT', `/plans/${p.id}`, body_of(p), { 'If-Match': `"p-${p.revision}"` })
+    : await request('POST', '/plans', body_of(p), { 'Idempotency-Key': idempotency_key() });
   return plan_of(obj(answer) ?? {});
 }
-export const remove = (p: Plan): Promise<unknown> => request('DELETE', `/plans/${p.id}`, undefined, { 'If-Match': `"p-${p.revision}"` });
+export const remove = (p: Plan): Promise<unknown> =>
+  request('DELETE', `/plans/${p.id}`, undefined, { 'If-Match': `"p-${p.revision}"` });
 export const read = async (id: string): Promise<Plan> => plan_of(obj(await request('GET', `/plans/${id}`)) ?? {});
-export const check = async (id: string): Promise<Check> => check_of(obj(await request('POST', `/plans/${id}/validate`, {})));
+export const check = async (id: string): Promise<Check> =>
+  check_of(obj(await request('POST', `/plans/${id}/validate`, {})));
 /// Of what is drawn, stored or not.
-export const check_drawn = async (p: Plan): Promise<Check> => check_of(obj(await request('POST', '/plans/validate', body_of(p))));
+export const check_drawn = async (p: Plan): Promise<Check> =>
+  check_of(obj(await request('POST', '/plans/validate', body_of(p))));
 /// Waypoints from the outline alone; nothing is stored.
 export async function generate(p: Plan): Promise<{ plan: Plan; check: Check }> {
-  const answer = obj(await request('POST', '/plans/generate', body_of(p))), made = plan_of(obj(answer?.plan) ?? {});
+  const answer = obj(await request('POST', '/plans/generate', body_of(p))),
+    made = plan_of(obj(answer?.plan) ?? {});
   return { plan: { ...p, waypoints: made.waypoints }, check: check_of(obj(answer?.check)) };
 }
 export async function import_file(name: string, text: string): Promise<{ plan: Plan; notes: string[] }> {
-  const answer = obj(await request('POST', `/plans/import?dry_run=true&name=${encodeURIComponent(name)}`, text, { 'Content-Type': text.trimStart().startsWith('<') ? 'application/vnd.google-earth.kml+xml' : 'application/json' }));
-  return { plan: plan_of(obj(answer?.plan) ?? {}), notes: Array.isArray(answer?.notes) ? answer.notes.filter((n): n is string => typeof n === 'string') : [] };
+  const answer = obj(
+    await request('POST', `/plans/import?dry_run=true&name=${encodeURIComponent(name)}`, text, {
+      'Content-Type': text.trimStart().startsWith('<') ? 'application/vnd.google-earth.kml+xml' : 'application/json',
+    }),
+  );
+  return {
+    plan: plan_of(obj(answer?.plan) ?? {}),
+    notes: Array.isArray(answer?.notes) ? answer.notes.filter((n): n is string => typeof n === 'string') : [],
+  };
 }
-export const export_url = (id: string, format: 'plan' | 'geojson'): string => api_url(`/plans/${id}/export?format=${format}`);
+export const export_url = (id: string, format: 'plan' | 'geojson'): string =>
+  api_url(`/plans/${id}/export?format=${format}`);

@@ -11,18 +11,26 @@ export interface Socket {
 }
 export interface Environment {
   open(): Socket;
-  now_ms(): number;         ///< steady
-  wall_us(): number;        ///< this machine's clock
-  random(): number;         ///< 0..1
-  after(ms: number, call: () => void): () => void;  ///< returns its cancel
+  now_ms(): number; ///< steady
+  wall_us(): number; ///< this machine's clock
+  random(): number; ///< 0..1
+  after(ms: number, call: () => void): () => void; ///< returns its cancel
 }
 
-interface Topic { sub: number | null; seq: number | null; waiting: boolean; resubscribed_ms: number }
+interface Topic {
+  sub: number | null;
+  seq: number | null;
+  waiting: boolean;
+  resubscribed_ms: number;
+}
 
-const LATE_MS = 2000, LOST_MS = 5000, CHECK_MS = 250;   // dashboard.md section 4: LATE > 2 s, LOST > 5 s
-const FIRST_RETRY_MS = 500, LAST_RETRY_MS = 10_000;
+const LATE_MS = 2000,
+  LOST_MS = 5000,
+  CHECK_MS = 250; // dashboard.md section 4: LATE > 2 s, LOST > 5 s
+const FIRST_RETRY_MS = 500,
+  LAST_RETRY_MS = 10_000;
 const TIME_EVERY_MS = 10_000;
-const GREETING_MS = 10_000;  // a connection attempt into a dead network would hang for minutes
+const GREETING_MS = 10_000; // a connection attempt into a dead network would hang for minutes
 
 /// Client of subprotocol anchord.v1: subscribes, follows seq and prev, resumes by epoch and seq, reconnects for ever. No DOM.
 export class LiveClient implements LiveSource {
@@ -48,7 +56,11 @@ export class LiveClient implements LiveSource {
   private minimum_retry_ms = 0;
   private resume: { recovered: number; resynchronised: boolean; open: Set<string> } | null = null;
 
-  constructor(topics: readonly string[], private readonly env: Environment, private readonly params: Record<string, object> = {}) {
+  constructor(
+    topics: readonly string[],
+    private readonly env: Environment,
+    private readonly params: Record<string, object> = {},
+  ) {
     for (const t of topics) this.topics.set(t, { sub: null, seq: null, waiting: false, resubscribed_ms: -Infinity });
   }
 
@@ -97,15 +109,23 @@ export class LiveClient implements LiveSource {
     this.opened_ms = this.env.now_ms();
     const socket = this.env.open();
     this.socket = socket;
-    socket.onmessage = (event) => { if (this.socket === socket) this.receive(event.data); };
-    socket.onclose = (event) => { if (this.socket === socket) this.closed(event.code); };
+    socket.onmessage = (event) => {
+      if (this.socket === socket) this.receive(event.data);
+    };
+    socket.onclose = (event) => {
+      if (this.socket === socket) this.closed(event.code);
+    };
   }
   private drop_socket(): void {
     const socket = this.socket;
     this.socket = null;
     if (!socket) return;
     socket.onmessage = socket.onclose = socket.onopen = null;
-    try { socket.close(); } catch { /* already closing */ }
+    try {
+      socket.close();
+    } catch {
+      /* already closing */
+    }
   }
   private closed(code: number): void {
     this.socket = null;
@@ -130,7 +150,8 @@ export class LiveClient implements LiveSource {
     }
     if (silence === Infinity) return;
     this.set_link(silence > LOST_MS ? 'lost' : silence > LATE_MS ? 'late' : 'live');
-    if (silence > LOST_MS && this.socket && this.greeted) {  // an open socket that says nothing is a dead one
+    if (silence > LOST_MS && this.socket && this.greeted) {
+      // an open socket that says nothing is a dead one
       this.drop_socket();
       this.retry_later();
     }
@@ -153,22 +174,35 @@ export class LiveClient implements LiveSource {
     let message: Record<string, unknown> | null = null;
     try {
       message = typeof text === 'string' ? obj(JSON.parse(text)) : null;
-    } catch { /* counted below */ }
+    } catch {
+      /* counted below */
+    }
     if (!message) {
       this.counters.unreadable++;
       return;
     }
     this.heard_ms = this.env.now_ms();
     switch (message.op) {
-      case 'hello': return this.hello(message);
-      case 'ack': return this.ack(message);
-      case 'snap': case 'data': return this.content(message);
-      case 'gap': return this.gap(message);
-      case 'hb': return this.heartbeat(message);
-      case 'time': return this.time(message);
-      case 'err': return this.error(message);
-      case 'bye': this.minimum_retry_ms = Math.min(LAST_RETRY_MS, num(message.retry_ms) ?? 0); return;
-      default: this.counters.unknown_ops++;
+      case 'hello':
+        return this.hello(message);
+      case 'ack':
+        return this.ack(message);
+      case 'snap':
+      case 'data':
+        return this.content(message);
+      case 'gap':
+        return this.gap(message);
+      case 'hb':
+        return this.heartbeat(message);
+      case 'time':
+        return this.time(message);
+      case 'err':
+        return this.error(message);
+      case 'bye':
+        this.minimum_retry_ms = Math.min(LAST_RETRY_MS, num(message.retry_ms) ?? 0);
+        return;
+      default:
+        this.counters.unknown_ops++;
     }
   }
 
@@ -182,7 +216,7 @@ export class LiveClient implements LiveSource {
       for (const t of this.topics.values()) t.seq = null;
       this.sink?.restarted();
     }
-    const offered = this.offered = Array.isArray(m.topics) ? new Set(m.topics) : null;
+    const offered = (this.offered = Array.isArray(m.topics) ? new Set(m.topics) : null);
     this.by_sub.clear();
     this.by_id.clear();
     const wanted = [...this.topics.keys()].filter((t) => !offered || offered.has(t));
@@ -191,7 +225,9 @@ export class LiveClient implements LiveSource {
     this.set_link('live');
     this.ask_time();
   }
-  offers(topic: string): boolean { return this.offered?.has(topic) ?? false; }
+  offers(topic: string): boolean {
+    return this.offered?.has(topic) ?? false;
+  }
   private subscribe(name: string): void {
     const topic = this.topics.get(name);
     if (!topic) return;
@@ -213,7 +249,7 @@ export class LiveClient implements LiveSource {
     topic.waiting = false;
     if (m.recovered !== true) {
       if (topic.seq !== null && this.resume) this.resume.resynchronised = true;
-      topic.seq = null;  // the snapshot, or the first message, says where we stand
+      topic.seq = null; // the snapshot, or the first message, says where we stand
     }
     this.resume?.open.delete(name);
     // What is replayed follows its ack; the heartbeat after the last ack ends the count.
@@ -292,7 +328,7 @@ export class LiveClient implements LiveSource {
     const name = id === null ? undefined : this.by_id.get(id);
     if (id === null || name === undefined) return;
     this.by_id.delete(id);
-    this.resume?.open.delete(name);  // refused for this role: the others go on
+    this.resume?.open.delete(name); // refused for this role: the others go on
     const topic = this.topics.get(name);
     if (topic) topic.waiting = false;
   }

@@ -11,7 +11,7 @@ import { draw_fast, draw_slow, draw_top, type Content } from './picture';
 
 export type Mode = 'fit' | 'follow' | 'free';
 export interface MapView {
-  changed(): void;       ///< slow content is new
+  changed(): void; ///< slow content is new
   theme_changed(): void;
   mode(mode: Mode): void;
   zoom(steps: number): void;
@@ -28,21 +28,36 @@ export interface MapHooks {
 const ENU = new Projection({ code: 'anchord:enu', units: 'm', extent: [-2e5, -2e5, 2e5, 2e5] });
 const reduced = matchMedia('(prefers-reduced-motion: reduce)');
 
-export function open_map(target: HTMLElement, overlay: HTMLCanvasElement, top: HTMLCanvasElement, hooks: MapHooks): MapView {
+export function open_map(
+  target: HTMLElement,
+  overlay: HTMLCanvasElement,
+  top: HTMLCanvasElement,
+  hooks: MapHooks,
+): MapView {
   let palette: Palette = read_palette();
   let mode: Mode = 'fit';
   let magnified = 1;
   let closed = false;
   const slow = document.createElement('canvas');
   slow.style.position = 'absolute';
-  const view = new View({ projection: ENU, center: [0, 0], resolution: 0.06, minResolution: 0.001, maxResolution: 60, constrainResolution: false, smoothResolutionConstraint: false, enableRotation: false });
+  const view = new View({
+    projection: ENU,
+    center: [0, 0],
+    resolution: 0.06,
+    minResolution: 0.001,
+    maxResolution: 60,
+    constrainResolution: false,
+    smoothResolutionConstraint: false,
+    enableRotation: false,
+  });
   const camera = (): Camera => {
     const [w, h] = map.getSize() ?? [1, 1];
     const [e, n] = view.getCenter() ?? [0, 0];
     return { e: e!, n: n!, px_per_m: 1 / (view.getResolution() ?? 1), w: w!, h: h! };
   };
   const sized = (canvas: HTMLCanvasElement, cam: Camera): CanvasRenderingContext2D | null => {
-    const ratio = Math.min(2, devicePixelRatio || 1), [w, h] = [Math.round(cam.w * ratio), Math.round(cam.h * ratio)];
+    const ratio = Math.min(2, devicePixelRatio || 1),
+      [w, h] = [Math.round(cam.w * ratio), Math.round(cam.h * ratio)];
     if (canvas.width !== w || canvas.height !== h) {
       canvas.width = w;
       canvas.height = h;
@@ -55,8 +70,13 @@ export function open_map(target: HTMLElement, overlay: HTMLCanvasElement, top: H
   };
   const layer = new Layer({
     render: () => {
-      const cam = camera(), c = sized(slow, cam), content = hooks.content();
-      magnified = magnification(content.anchors.flatMap((a) => (a.ellipse95 && a.status !== 'ambiguous' ? [a.ellipse95.major_m] : [])), cam.px_per_m);
+      const cam = camera(),
+        c = sized(slow, cam),
+        content = hooks.content();
+      magnified = magnification(
+        content.anchors.flatMap((a) => (a.ellipse95 && a.status !== 'ambiguous' ? [a.ellipse95.major_m] : [])),
+        cam.px_per_m,
+      );
       if (c) draw_slow(c, palette, cam, content, magnified);
       const t = sized(top, cam);
       if (t) draw_top(t, palette, cam, content);
@@ -66,8 +86,16 @@ export function open_map(target: HTMLElement, overlay: HTMLCanvasElement, top: H
     },
   });
   const map = new OlMap({
-    target, view, layers: [layer], controls: [], maxTilesLoading: 1,
-    interactions: default_interactions({ altShiftDragRotate: false, pinchRotate: false, zoomDuration: reduced.matches ? 0 : 200 }),
+    target,
+    view,
+    layers: [layer],
+    controls: [],
+    maxTilesLoading: 1,
+    interactions: default_interactions({
+      altShiftDragRotate: false,
+      pinchRotate: false,
+      zoomDuration: reduced.matches ? 0 : 200,
+    }),
   });
 
   const set_mode = (next: Mode): void => {
@@ -77,13 +105,17 @@ export function open_map(target: HTMLElement, overlay: HTMLCanvasElement, top: H
   };
   map.on('pointerdrag', () => set_mode('free'));
   target.addEventListener('wheel', () => set_mode('free'), { passive: true });
-  target.addEventListener('keydown', (e) => { if (e.key.startsWith('Arrow')) set_mode('free'); });
+  target.addEventListener('keydown', (e) => {
+    if (e.key.startsWith('Arrow')) set_mode('free');
+  });
   map.on('click', (e) => {
-    const [x, y] = e.pixel as [number, number], cam = camera();
+    const [x, y] = e.pixel as [number, number],
+      cam = camera();
     let best: { id: string; d: number } | null = null;
     for (const a of hooks.content().anchors) {
       if (!a.enu_m) continue;
-      const [ax, ay] = to_px(cam, a.enu_m), d = Math.hypot(ax - x, ay - y);
+      const [ax, ay] = to_px(cam, a.enu_m),
+        d = Math.hypot(ax - x, ay - y);
       if (d < 28 && (!best || d < best.d)) best = { id: a.anchor, d };
     }
     if (best) hooks.selected(best.id);
@@ -93,36 +125,55 @@ export function open_map(target: HTMLElement, overlay: HTMLCanvasElement, top: H
   const extent = (): [number, number, number, number] | null => {
     const { anchors, scene } = hooks.content();
     const box: [number, number, number, number] = [Infinity, Infinity, -Infinity, -Infinity];
-    const add = (e: number, n: number): void => { box[0] = Math.min(box[0], e); box[1] = Math.min(box[1], n); box[2] = Math.max(box[2], e); box[3] = Math.max(box[3], n); };
+    const add = (e: number, n: number): void => {
+      box[0] = Math.min(box[0], e);
+      box[1] = Math.min(box[1], n);
+      box[2] = Math.max(box[2], e);
+      box[3] = Math.max(box[3], n);
+    };
     const trail = scene?.trail ?? [];
     for (const q of trail) add(q.e, q.n);
     const d = scene?.pose?.value.enu_m;
     if (d) add(d[0], d[1]);
     // An estimate that is still far off (hundreds of metres at first) must not shrink the flight to a dot.
-    const span = Math.max(60, 2 * Math.hypot(box[2] - box[0], box[3] - box[1]) || 0), flown = trail.length > 0 || !!d;
+    const span = Math.max(60, 2 * Math.hypot(box[2] - box[0], box[3] - box[1]) || 0),
+      flown = trail.length > 0 || !!d;
     const [ce, cn] = [(box[0] + box[2]) / 2, (box[1] + box[3]) / 2];
-    for (const a of anchors) for (const q of [a.enu_m, a.mirror?.enu_m]) if (q && (!flown || Math.hypot(q[0] - ce, q[1] - cn) < span)) add(q[0], q[1]);
+    for (const a of anchors)
+      for (const q of [a.enu_m, a.mirror?.enu_m])
+        if (q && (!flown || Math.hypot(q[0] - ce, q[1] - cn) < span)) add(q[0], q[1]);
     if (!Number.isFinite(box[0])) return null;
     const grow = Math.max(2.5 - (box[2] - box[0]) / 2, 2.5 - (box[3] - box[1]) / 2, 0);
     return [box[0] - grow, box[1] - grow, box[2] + grow, box[3] + grow];
   };
   let fitted: readonly number[] | null = null;
   const fit = (always: boolean): void => {
-    const box = extent(), size = map.getSize();
+    const box = extent(),
+      size = map.getSize();
     if (!box || !size || !(size[0]! > 80) || !(size[1]! > 80)) return;
     // Refit only when something left the fitted box or it became much too large: a map that breathes cannot be read.
-    const same = fitted && box[0] >= fitted[0]! && box[1] >= fitted[1]! && box[2] <= fitted[2]! && box[3] <= fitted[3]!
-      && (box[2] - box[0]) + (box[3] - box[1]) > 0.45 * ((fitted[2]! - fitted[0]!) + (fitted[3]! - fitted[1]!));
+    const same =
+      fitted &&
+      box[0] >= fitted[0]! &&
+      box[1] >= fitted[1]! &&
+      box[2] <= fitted[2]! &&
+      box[3] <= fitted[3]! &&
+      box[2] - box[0] + (box[3] - box[1]) > 0.45 * (fitted[2]! - fitted[0]! + (fitted[3]! - fitted[1]!));
     if (same && !always) return;
     const m = Math.max(box[2] - box[0], box[3] - box[1]) * (always ? 0 : 0.06);
     fitted = [box[0] - m, box[1] - m, box[2] + m, box[3] + m];
     const [w, h] = size as [number, number];
-    view.fit(fitted as number[], { padding: [h * 0.06 + 14, w * 0.07 + 48, h * 0.06 + 40, w * 0.07 + 60], maxZoom: 40, minResolution: 0.008 });
+    view.fit(fitted as number[], {
+      padding: [h * 0.06 + 14, w * 0.07 + 48, h * 0.06 + 40, w * 0.07 + 60],
+      maxZoom: 40,
+      minResolution: 0.008,
+    });
   };
   const follow = (): void => {
     const d = hooks.content().scene?.pose?.value.enu_m;
     if (!d) return;
-    const cam = camera(), [x, y] = to_px(cam, d);
+    const cam = camera(),
+      [x, y] = to_px(cam, d);
     if (Math.abs(x - cam.w / 2) < cam.w / 4 && Math.abs(y - cam.h / 2) < cam.h / 4) return;
     view.cancelAnimations();
     if (reduced.matches) view.setCenter([d[0], d[1]]);
@@ -134,34 +185,68 @@ export function open_map(target: HTMLElement, overlay: HTMLCanvasElement, top: H
     if (mode === 'follow') follow();
   };
 
-  let dirty = true, drawn = -1, last_ms = 0, aimed_ms = 0;
+  let dirty = true,
+    drawn = -1,
+    last_ms = 0,
+    aimed_ms = 0;
   const frame = (t: number): void => {
     if (closed) return;
     requestAnimationFrame(frame);
-    const content = hooks.content(), scene = content.scene;
-    if (t - aimed_ms > 300) { aimed_ms = t; aim(); }
+    const content = hooks.content(),
+      scene = content.scene;
+    if (t - aimed_ms > 300) {
+      aimed_ms = t;
+      aim();
+    }
     const moving = !!scene?.pose && t - scene.pose.at_ms < 1500;
     // While nothing moves, once in a quarter of a second is enough for ages and fading.
     if (!dirty && !moving && scene?.version === drawn && t - last_ms < 250) return;
-    const cam = camera(), c = sized(overlay, cam);
+    const cam = camera(),
+      c = sized(overlay, cam);
     if (c) draw_fast(c, palette, cam, content, performance.now());
     dirty = false;
     drawn = scene?.version ?? -1;
     last_ms = t;
   };
   requestAnimationFrame(frame);
-  const resized = new ResizeObserver(() => { map.updateSize(); fitted = null; dirty = true; if (mode === 'fit') fit(false); });
+  const resized = new ResizeObserver(() => {
+    map.updateSize();
+    fitted = null;
+    dirty = true;
+    if (mode === 'fit') fit(false);
+  });
   resized.observe(target);
 
   return {
-    changed: () => { aim(); layer.changed(); },
-    theme_changed: () => { palette = read_palette(); dirty = true; layer.changed(); },
+    changed: () => {
+      aim();
+      layer.changed();
+    },
+    theme_changed: () => {
+      palette = read_palette();
+      dirty = true;
+      layer.changed();
+    },
     mode: (next) => {
       set_mode(next);
-      if (next === 'fit') { fitted = null; fit(true); }
-      if (next === 'follow') { const d = hooks.content().scene?.pose?.value.enu_m; if (d) view.setCenter([d[0], d[1]]); }
+      if (next === 'fit') {
+        fitted = null;
+        fit(true);
+      }
+      if (next === 'follow') {
+        const d = hooks.content().scene?.pose?.value.enu_m;
+        if (d) view.setCenter([d[0], d[1]]);
+      }
     },
-    zoom: (steps) => { set_mode('free'); view.animate({ zoom: (view.getZoom() ?? 1) + steps, duration: reduced.matches ? 0 : 160 }); },
-    close: () => { closed = true; resized.disconnect(); map.setTarget(undefined); map.dispose(); },
+    zoom: (steps) => {
+      set_mode('free');
+      view.animate({ zoom: (view.getZoom() ?? 1) + steps, duration: reduced.matches ? 0 : 160 });
+    },
+    close: () => {
+      closed = true;
+      resized.disconnect();
+      map.setTarget(undefined);
+      map.dispose();
+    },
   };
 }

@@ -9,10 +9,19 @@ import type { Content } from './picture';
 /// The map that is on screen, for the keyboard.
 export const current_map: { view: MapView | null } = { view: null };
 
-interface Props { content: () => Content; onSelect: (anchor: string) => void; label: string; follow: boolean; version: unknown }
+interface Props {
+  content: () => Content;
+  onSelect: (anchor: string) => void;
+  label: string;
+  follow: boolean;
+  version: unknown;
+}
 
 export function MapBox({ content, onSelect, label, follow, version }: Props) {
-  const target = useRef<HTMLDivElement>(null), overlay = useRef<HTMLCanvasElement>(null), top = useRef<HTMLCanvasElement>(null), map = useRef<MapView | null>(null);
+  const target = useRef<HTMLDivElement>(null),
+    overlay = useRef<HTMLCanvasElement>(null),
+    top = useRef<HTMLCanvasElement>(null),
+    map = useRef<MapView | null>(null);
   const latest = useRef({ content, onSelect });
   latest.current = { content, onSelect };
   const [mode, set_mode] = useState<Mode>('fit');
@@ -21,17 +30,20 @@ export function MapBox({ content, onSelect, label, follow, version }: Props) {
 
   useEffect(() => {
     let gone = false;
-    import('./engine').then(({ open_map }) => {
-      if (gone || !target.current || !overlay.current || !top.current) return;
-      map.current = open_map(target.current, overlay.current, top.current, {
-        content: () => latest.current.content(),
-        selected: (id) => latest.current.onSelect(id),
-        mode_changed: set_mode,
-        camera_changed: (px_per_m, magnified) => set_scale((s) => (s.px_per_m === px_per_m && s.magnified === magnified ? s : { px_per_m, magnified })),
-      });
-      current_map.view = map.current;
-      map.current.changed();
-    }).catch(() => set_failed(true));
+    import('./engine')
+      .then(({ open_map }) => {
+        if (gone || !target.current || !overlay.current || !top.current) return;
+        map.current = open_map(target.current, overlay.current, top.current, {
+          content: () => latest.current.content(),
+          selected: (id) => latest.current.onSelect(id),
+          mode_changed: set_mode,
+          camera_changed: (px_per_m, magnified) =>
+            set_scale((s) => (s.px_per_m === px_per_m && s.magnified === magnified ? s : { px_per_m, magnified })),
+        });
+        current_map.view = map.current;
+        map.current.changed();
+      })
+      .catch(() => set_failed(true));
     return () => {
       gone = true;
       if (current_map.view === map.current) current_map.view = null;
@@ -41,7 +53,9 @@ export function MapBox({ content, onSelect, label, follow, version }: Props) {
   }, []);
   useEffect(() => map.current?.changed(), [version]);
   const theme = ground.value;
-  useEffect(() => { map.current?.theme_changed(); }, [theme]);
+  useEffect(() => {
+    map.current?.theme_changed();
+  }, [theme]);
 
   return (
     <div class="mapbox" data-testid="map">
@@ -51,11 +65,31 @@ export function MapBox({ content, onSelect, label, follow, version }: Props) {
       {failed && <p class="mapfail">The map could not be loaded; everything is in the tables. Reload to try again.</p>}
       <div class="mapui">
         <div class="mgrp">
-          <button class="mb" aria-label="Zoom in" onClick={() => map.current?.zoom(1)}><Icon name="plus" /></button>
-          <button class="mb" aria-label="Zoom out" onClick={() => map.current?.zoom(-1)}><Icon name="minus" /></button>
+          <button class="mb" aria-label="Zoom in" onClick={() => map.current?.zoom(1)}>
+            <Icon name="plus" />
+          </button>
+          <button class="mb" aria-label="Zoom out" onClick={() => map.current?.zoom(-1)}>
+            <Icon name="minus" />
+          </button>
         </div>
-        {follow && <button class={mode === 'follow' ? 'mb on' : 'mb'} aria-label="Follow drone" aria-pressed={mode === 'follow'} onClick={() => map.current?.mode('follow')}><Icon name="centre" /></button>}
-        <button class={mode === 'fit' ? 'mb on' : 'mb'} aria-label="Fit everything" aria-pressed={mode === 'fit'} onClick={() => map.current?.mode('fit')}><Icon name="fit" /></button>
+        {follow && (
+          <button
+            class={mode === 'follow' ? 'mb on' : 'mb'}
+            aria-label="Follow drone"
+            aria-pressed={mode === 'follow'}
+            onClick={() => map.current?.mode('follow')}
+          >
+            <Icon name="centre" />
+          </button>
+        )}
+        <button
+          class={mode === 'fit' ? 'mb on' : 'mb'}
+          aria-label="Fit everything"
+          aria-pressed={mode === 'fit'}
+          onClick={() => map.current?.mode('fit')}
+        >
+          <Icon name="fit" />
+        </button>
       </div>
       <ScaleBars {...scale} />
     </div>
@@ -64,12 +98,26 @@ export function MapBox({ content, onSelect, label, follow, version }: Props) {
 
 function ScaleBars({ px_per_m, magnified }: { px_per_m: number; magnified: number }) {
   if (!px_per_m) return null;
-  const ground_m = round_length(130 / px_per_m), ellipse_m = round_length(60 / px_per_m / magnified);
+  const ground_m = round_length(130 / px_per_m),
+    ellipse_m = round_length(60 / px_per_m / magnified);
   return (
     <div class="scalebar" data-testid="scale">
-      <span class="sb"><i style={{ width: `${ground_m * px_per_m}px` }} />{length_words(ground_m)}</span>
-      {magnified > 1 && <span class="sb e"><i style={{ width: `${ellipse_m * px_per_m * magnified}px` }} />{length_words(ellipse_m)} in ellipses (×{magnified})</span>}
-      <span class="north"><svg viewBox="0 0 14 18" aria-hidden="true"><path d="M7 1l5 8H8.4v8H5.6V9H2z" fill="currentColor" /></svg>N</span>
+      <span class="sb">
+        <i style={{ width: `${ground_m * px_per_m}px` }} />
+        {length_words(ground_m)}
+      </span>
+      {magnified > 1 && (
+        <span class="sb e">
+          <i style={{ width: `${ellipse_m * px_per_m * magnified}px` }} />
+          {length_words(ellipse_m)} in ellipses (×{magnified})
+        </span>
+      )}
+      <span class="north">
+        <svg viewBox="0 0 14 18" aria-hidden="true">
+          <path d="M7 1l5 8H8.4v8H5.6V9H2z" fill="currentColor" />
+        </svg>
+        N
+      </span>
     </div>
   );
 }

@@ -13,11 +13,13 @@ export interface Content {
   readonly selected: string | null;
   readonly scene: Scene | null;
   readonly link_lost: boolean;
-  readonly running: boolean;  ///< the flight is being recorded
-  readonly flight?: FlightPicture | null;  ///< what is to be flown, where something is
+  readonly running: boolean; ///< the flight is being recorded
+  readonly flight?: FlightPicture | null; ///< what is to be flown, where something is
 }
 
-const RANGE_STALE_MS = 2000, POSE_STALE_MS = 1000, TRAIL_US = 120_000_000;
+const RANGE_STALE_MS = 2000,
+  POSE_STALE_MS = 1000,
+  TRAIL_US = 120_000_000;
 const symbol_r = (p: Palette): number => p.rem * 0.47;
 
 /// Grid and ellipses, below everything that moves.
@@ -29,13 +31,21 @@ export function draw_slow(c: Ctx, p: Palette, cam: Camera, content: Content, mag
   const r = symbol_r(p);
   for (const a of content.anchors) {
     if (!a.enu_m) continue;
-    const [x, y] = to_px(cam, a.enu_m), colour = status_colour(p, a.status);
+    const [x, y] = to_px(cam, a.enu_m),
+      colour = status_colour(p, a.status);
     const scale = cam.px_per_m * magnified;
     if (a.mirror?.enu_m) {
       const [mx, my] = to_px(cam, a.mirror.enu_m);
       mirror_link(c, p, x, y, mx, my);
       if (a.ellipse95) ellipse_at(c, p, mirrored(a), mx, my, scale, colour, true);
-      c.save(); c.strokeStyle = colour; c.lineWidth = 1.6; c.setLineDash([3, 3]); c.beginPath(); c.arc(mx, my, r * 0.8, 0, Math.PI * 2); c.stroke(); c.restore();
+      c.save();
+      c.strokeStyle = colour;
+      c.lineWidth = 1.6;
+      c.setLineDash([3, 3]);
+      c.beginPath();
+      c.arc(mx, my, r * 0.8, 0, Math.PI * 2);
+      c.stroke();
+      c.restore();
     }
     // An ellipse smaller than its symbol would only blur it.
     if (a.ellipse95 && a.ellipse95.major_m * scale > r) ellipse_at(c, p, a.ellipse95, x, y, scale, colour, false);
@@ -44,26 +54,50 @@ export function draw_slow(c: Ctx, p: Palette, cam: Camera, content: Content, mag
 /// Symbols and labels, above the ranges: a line must never strike out a name.
 export function draw_top(c: Ctx, p: Palette, cam: Camera, content: Content): void {
   c.clearRect(0, 0, cam.w, cam.h);
-  const r = symbol_r(p), placed = content.anchors.filter((a) => a.enu_m), taken: Box[] = [];
-  const block = (m: Vec3): void => { const [x, y] = to_px(cam, m); taken.push({ x: x - r - 2, y: y - r - 2, w: 2 * r + 4, h: 2 * r + 4 }); };
+  const r = symbol_r(p),
+    placed = content.anchors.filter((a) => a.enu_m),
+    taken: Box[] = [];
+  const block = (m: Vec3): void => {
+    const [x, y] = to_px(cam, m);
+    taken.push({ x: x - r - 2, y: y - r - 2, w: 2 * r + 4, h: 2 * r + 4 });
+  };
   for (const a of placed) {
     block(a.enu_m!);
     if (a.mirror?.enu_m) block(a.mirror.enu_m);
   }
   for (const a of placed) anchor_symbol(c, p, a.status, ...to_px(cam, a.enu_m!), r);
-  const first = placed.filter((a) => a.anchor === content.selected), rest = placed.filter((a) => a.anchor !== content.selected);
+  const first = placed.filter((a) => a.anchor === content.selected),
+    rest = placed.filter((a) => a.anchor !== content.selected);
   for (const a of first) reticle(c, p, ...to_px(cam, a.enu_m!), r * 2.2);
   for (const a of [...first, ...rest]) {
     const [x, y] = to_px(cam, a.enu_m!);
     const gap = a.anchor === content.selected ? r * 2.2 + 8 : r + 6;
-    label(c, p, x, y, gap, a.anchor, a.mirror && a.probability !== null ? `${percent(a.probability)} % here` : accuracy(a.h95_m), taken);
-    if (a.mirror?.enu_m) label(c, p, ...to_px(cam, a.mirror.enu_m), r + 6, 'mirror', a.mirror.probability === null ? a.anchor : `${percent(a.mirror.probability)} %`, taken);
+    label(
+      c,
+      p,
+      x,
+      y,
+      gap,
+      a.anchor,
+      a.mirror && a.probability !== null ? `${percent(a.probability)} % here` : accuracy(a.h95_m),
+      taken,
+    );
+    if (a.mirror?.enu_m)
+      label(
+        c,
+        p,
+        ...to_px(cam, a.mirror.enu_m),
+        r + 6,
+        'mirror',
+        a.mirror.probability === null ? a.anchor : `${percent(a.mirror.probability)} %`,
+        taken,
+      );
   }
 }
 /// The twin's ellipse is the same one, reflected in the line between the two.
 function mirrored(a: EstimateMsg): NonNullable<EstimateMsg['ellipse95']> {
   const [e, n] = [a.mirror!.enu_m![0] - a.enu_m![0], a.mirror!.enu_m![1] - a.enu_m![1]];
-  const axis_deg = Math.atan2(e, n) * 180 / Math.PI + 90;
+  const axis_deg = (Math.atan2(e, n) * 180) / Math.PI + 90;
   return { ...a.ellipse95!, azimuth_deg: 2 * axis_deg - a.ellipse95!.azimuth_deg };
 }
 function mirror_link(c: Ctx, p: Palette, x: number, y: number, mx: number, my: number): void {
@@ -71,13 +105,19 @@ function mirror_link(c: Ctx, p: Palette, x: number, y: number, mx: number, my: n
   c.strokeStyle = p.caution;
   c.lineWidth = 1;
   c.setLineDash([2, 4]);
-  c.beginPath(); c.moveTo(x, y); c.lineTo(mx, my); c.stroke();
+  c.beginPath();
+  c.moveTo(x, y);
+  c.lineTo(mx, my);
+  c.stroke();
   // The line both candidates mirror in, a little longer than the picture needs
   const [cx, cy, l] = [(x + mx) / 2, (y + my) / 2, Math.hypot(mx - x, my - y) || 1];
   const [ux, uy] = [-(my - y) / l, (mx - x) / l];
   c.setLineDash([12, 4, 2, 4]);
   c.globalAlpha = 0.8;
-  c.beginPath(); c.moveTo(cx - ux * l, cy - uy * l); c.lineTo(cx + ux * l, cy + uy * l); c.stroke();
+  c.beginPath();
+  c.moveTo(cx - ux * l, cy - uy * l);
+  c.lineTo(cx + ux * l, cy + uy * l);
+  c.stroke();
   c.restore();
 }
 function grid(c: Ctx, p: Palette, cam: Camera): void {
@@ -89,12 +129,14 @@ function grid(c: Ctx, p: Palette, cam: Camera): void {
   for (let e = Math.ceil(left / step) * step; ; e += step) {
     const x = Math.round((e - left) * cam.px_per_m) + 0.5;
     if (x > cam.w) break;
-    c.moveTo(x, 0); c.lineTo(x, cam.h);
+    c.moveTo(x, 0);
+    c.lineTo(x, cam.h);
   }
   for (let n = Math.floor(top / step) * step; ; n -= step) {
     const y = Math.round((top - n) * cam.px_per_m) + 0.5;
     if (y > cam.h) break;
-    c.moveTo(0, y); c.lineTo(cam.w, y);
+    c.moveTo(0, y);
+    c.lineTo(cam.w, y);
   }
   c.stroke();
 }
@@ -108,43 +150,80 @@ export function draw_fast(c: Ctx, p: Palette, cam: Camera, content: Content, now
   const at = interpolated(scene, now_ms);
   if (!at) return;
   const stale = content.link_lost || now_ms - scene.pose!.at_ms > POSE_STALE_MS || !content.running;
-  const antenna = to_px(cam, at.antenna), body = to_px(cam, at.body);
+  const antenna = to_px(cam, at.antenna),
+    body = to_px(cam, at.body);
   for (const a of content.anchors) {
     const row = scene.ranges.get(a.anchor);
-    if (row && a.enu_m) range_line(c, p, antenna, to_px(cam, a.enu_m), range_class(row.last.p_los), stale ? Infinity : now_ms - row.at_ms, symbol_r(p) + 4);
+    if (row && a.enu_m)
+      range_line(
+        c,
+        p,
+        antenna,
+        to_px(cam, a.enu_m),
+        range_class(row.last.p_los),
+        stale ? Infinity : now_ms - row.at_ms,
+        symbol_r(p) + 4,
+      );
   }
   drone(c, p, ...body, at.heading_deg, stale);
   c.fillStyle = stale ? p.ink2 : p.panel;
-  c.beginPath(); c.arc(...antenna, 3 * p.rem / 16, 0, Math.PI * 2); c.fill();
+  c.beginPath();
+  c.arc(...antenna, (3 * p.rem) / 16, 0, Math.PI * 2);
+  c.fill();
   if (stale && content.running) label(c, p, ...body, 18, `last known, ${age(now_ms - scene.pose!.at_ms)}`, '', []);
 }
-function range_line(c: Ctx, p: Palette, from: readonly [number, number], to: readonly [number, number], cls: 'los' | 'nlos' | 'unclear', age_ms: number, stop: number): void {
+function range_line(
+  c: Ctx,
+  p: Palette,
+  from: readonly [number, number],
+  to: readonly [number, number],
+  cls: 'los' | 'nlos' | 'unclear',
+  age_ms: number,
+  stop: number,
+): void {
   const l = Math.hypot(to[0] - from[0], to[1] - from[1]);
   if (l < stop + 4) return;
-  const end = [to[0] - (to[0] - from[0]) / l * stop, to[1] - (to[1] - from[1]) / l * stop] as const;
+  const end = [to[0] - ((to[0] - from[0]) / l) * stop, to[1] - ((to[1] - from[1]) / l) * stop] as const;
   const stroke = (colour: string, width: number, dash: number[], alpha: number): void => {
-    c.strokeStyle = colour; c.lineWidth = width; c.globalAlpha = alpha; c.setLineDash(dash);
-    c.beginPath(); c.moveTo(...(from as [number, number])); c.lineTo(...(end as unknown as [number, number])); c.stroke();
+    c.strokeStyle = colour;
+    c.lineWidth = width;
+    c.globalAlpha = alpha;
+    c.setLineDash(dash);
+    c.beginPath();
+    c.moveTo(...(from as [number, number]));
+    c.lineTo(...(end as unknown as [number, number]));
+    c.stroke();
   };
   c.save();
   c.lineCap = cls === 'unclear' ? 'round' : 'butt';
   if (age_ms > RANGE_STALE_MS) stroke(p.ink3, 1, [2, 7], 0.6);
   else {
     stroke(p.halo, p.casing + 1, [], 0.75);
-    stroke(range_colour(p, cls), cls === 'los' ? p.strong : p.data, { los: [], nlos: [9, 6], unclear: [1.5, 5] }[cls], 1);
+    stroke(
+      range_colour(p, cls),
+      cls === 'los' ? p.strong : p.data,
+      { los: [], nlos: [9, 6], unclear: [1.5, 5] }[cls],
+      1,
+    );
   }
   c.restore();
 }
 function trail(c: Ctx, p: Palette, cam: Camera, scene: Scene, faded: boolean): void {
-  const points = scene.trail, newest = points[points.length - 1];
+  const points = scene.trail,
+    newest = points[points.length - 1];
   if (!newest) return;
   c.save();
   c.lineCap = c.lineJoin = 'round';
   c.globalAlpha = faded ? 0.5 : 1;
   const run = (from: number, to: number, colour: string, width: number, dash: number[]): void => {
-    c.strokeStyle = colour; c.lineWidth = width; c.setLineDash(dash);
+    c.strokeStyle = colour;
+    c.lineWidth = width;
+    c.setLineDash(dash);
     c.beginPath();
-    for (let i = from; i <= to; i++) { const q = points[i]!; c.lineTo(...to_px(cam, [q.e, q.n])); }
+    for (let i = from; i <= to; i++) {
+      const q = points[i]!;
+      c.lineTo(...to_px(cam, [q.e, q.n]));
+    }
     c.stroke();
   };
   // Runs of one look: grey when older than 120 s, else by fix. A hole in time is a hole in the line.
@@ -153,9 +232,13 @@ function trail(c: Ctx, p: Palette, cam: Camera, scene: Scene, faded: boolean): v
   for (let i = 1; i <= points.length; i++) {
     const hole = i < points.length && points[i]!.t_us - points[i - 1]!.t_us > 5_000_000;
     if (i < points.length && !hole && look(i) === look(from)) continue;
-    const what = look(from), to = i < points.length && !hole ? i : i - 1;
+    const what = look(from),
+      to = i < points.length && !hole ? i : i - 1;
     if (what === 'old') run(from, to, p.ink3, p.fine, []);
-    else { const s = trail_style(p, what); run(from, to, s.colour, s.width, s.dash); }
+    else {
+      const s = trail_style(p, what);
+      run(from, to, s.colour, s.width, s.dash);
+    }
     from = i;
   }
   c.restore();

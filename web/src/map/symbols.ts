@@ -19,22 +19,61 @@ export function anchor_symbol(c: Ctx, p: Palette, status: AnchorStatus, x: numbe
   c.save();
   c.lineCap = c.lineJoin = 'round';
   c.fillStyle = p.halo;
-  c.beginPath(); c.arc(x, y, r + 2.5, 0, TURN); c.fill();
+  c.beginPath();
+  c.arc(x, y, r + 2.5, 0, TURN);
+  c.fill();
   c.strokeStyle = c.fillStyle = colour;
   c.lineWidth = Math.max(1.8, r * 0.27);
-  const ring = (dash: number[] = []): void => { c.setLineDash(dash); c.beginPath(); c.arc(x, y, r * 0.86, 0, TURN); c.stroke(); c.setLineDash([]); };
+  const ring = (dash: number[] = []): void => {
+    c.setLineDash(dash);
+    c.beginPath();
+    c.arc(x, y, r * 0.86, 0, TURN);
+    c.stroke();
+    c.setLineDash([]);
+  };
   switch (status) {
-    case 'found': ring([r * 0.36, r * 0.42]); c.beginPath(); c.arc(x, y, r * 0.28, 0, TURN); c.fill(); break;
-    case 'estimating': ring(); c.beginPath(); c.arc(x, y, r * 0.38, 0, TURN); c.fill(); break;
-    case 'converged': ring(); tick(c, x, y, r * 0.82); break;
-    case 'accepted': c.beginPath(); c.arc(x, y, r, 0, TURN); c.fill(); c.strokeStyle = p.halo; tick(c, x, y, r); break;
-    case 'ambiguous': ring(); c.beginPath(); c.arc(x, y, r * 0.86, -Math.PI / 2, Math.PI / 2); c.fill(); break;
+    case 'found':
+      ring([r * 0.36, r * 0.42]);
+      c.beginPath();
+      c.arc(x, y, r * 0.28, 0, TURN);
+      c.fill();
+      break;
+    case 'estimating':
+      ring();
+      c.beginPath();
+      c.arc(x, y, r * 0.38, 0, TURN);
+      c.fill();
+      break;
+    case 'converged':
+      ring();
+      tick(c, x, y, r * 0.82);
+      break;
+    case 'accepted':
+      c.beginPath();
+      c.arc(x, y, r, 0, TURN);
+      c.fill();
+      c.strokeStyle = p.halo;
+      tick(c, x, y, r);
+      break;
+    case 'ambiguous':
+      ring();
+      c.beginPath();
+      c.arc(x, y, r * 0.86, -Math.PI / 2, Math.PI / 2);
+      c.fill();
+      break;
     case 'moved': {
       c.beginPath();
-      for (let i = 0; i < 8; i++) c.lineTo(x + r * 1.05 * Math.cos((i + 0.5) * TURN / 8), y + r * 1.05 * Math.sin((i + 0.5) * TURN / 8));
-      c.closePath(); c.fill();
+      for (let i = 0; i < 8; i++)
+        c.lineTo(x + r * 1.05 * Math.cos(((i + 0.5) * TURN) / 8), y + r * 1.05 * Math.sin(((i + 0.5) * TURN) / 8));
+      c.closePath();
+      c.fill();
       c.strokeStyle = p.halo;
-      c.beginPath(); c.moveTo(x - r * 0.4, y - r * 0.4); c.lineTo(x + r * 0.4, y + r * 0.4); c.moveTo(x + r * 0.4, y - r * 0.4); c.lineTo(x - r * 0.4, y + r * 0.4); c.stroke();
+      c.beginPath();
+      c.moveTo(x - r * 0.4, y - r * 0.4);
+      c.lineTo(x + r * 0.4, y + r * 0.4);
+      c.moveTo(x + r * 0.4, y - r * 0.4);
+      c.lineTo(x - r * 0.4, y + r * 0.4);
+      c.stroke();
       break;
     }
   }
@@ -43,22 +82,51 @@ export function anchor_symbol(c: Ctx, p: Palette, status: AnchorStatus, x: numbe
 /// Reticle of the selected anchor.
 export function reticle(c: Ctx, p: Palette, x: number, y: number, r: number): void {
   c.save();
-  for (const [colour, width] of [[p.halo, p.data + 3], [p.ink, p.data]] as const) {
-    c.strokeStyle = colour; c.lineWidth = width;
-    c.beginPath(); c.arc(x, y, r, 0, TURN); c.stroke();
+  for (const [colour, width] of [
+    [p.halo, p.data + 3],
+    [p.ink, p.data],
+  ] as const) {
+    c.strokeStyle = colour;
+    c.lineWidth = width;
     c.beginPath();
-    for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]] as const) { c.moveTo(x + dx * (r - 4), y + dy * (r - 4)); c.lineTo(x + dx * (r + 5), y + dy * (r + 5)); }
+    c.arc(x, y, r, 0, TURN);
+    c.stroke();
+    c.beginPath();
+    for (const [dx, dy] of [
+      [1, 0],
+      [-1, 0],
+      [0, 1],
+      [0, -1],
+    ] as const) {
+      c.moveTo(x + dx * (r - 4), y + dy * (r - 4));
+      c.lineTo(x + dx * (r + 5), y + dy * (r + 5));
+    }
     c.stroke();
   }
   c.restore();
 }
 /// A 95 % ellipse about (x, y): axes in px, azimuth clockwise from north. `ghost` is the mirrored twin.
-export function ellipse_at(c: Ctx, p: Palette, e: Ellipse95, x: number, y: number, px_per_m: number, colour: string, ghost: boolean): void {
+export function ellipse_at(
+  c: Ctx,
+  p: Palette,
+  e: Ellipse95,
+  x: number,
+  y: number,
+  px_per_m: number,
+  colour: string,
+  ghost: boolean,
+): void {
   c.save();
   c.beginPath();
-  c.ellipse(x, y, e.major_m * px_per_m, e.minor_m * px_per_m, (e.azimuth_deg - 90) * Math.PI / 180, 0, TURN);
-  c.fillStyle = colour; c.globalAlpha = ghost ? 0.05 : 0.13; c.fill();
-  c.globalAlpha = 1; c.strokeStyle = colour; c.lineWidth = p.data; c.setLineDash(ghost ? [4, 4] : []); c.stroke();
+  c.ellipse(x, y, e.major_m * px_per_m, e.minor_m * px_per_m, ((e.azimuth_deg - 90) * Math.PI) / 180, 0, TURN);
+  c.fillStyle = colour;
+  c.globalAlpha = ghost ? 0.05 : 0.13;
+  c.fill();
+  c.globalAlpha = 1;
+  c.strokeStyle = colour;
+  c.lineWidth = p.data;
+  c.setLineDash(ghost ? [4, 4] : []);
+  c.stroke();
   c.restore();
 }
 /// Arrowhead towards heading (degrees clockwise from north), or a diamond where the heading is unknown. Hollow = stale.
@@ -66,31 +134,68 @@ export function drone(c: Ctx, p: Palette, x: number, y: number, heading_deg: num
   const s = p.rem / 16;
   c.save();
   c.translate(x, y);
-  if (heading_deg !== null) c.rotate(heading_deg * Math.PI / 180);
+  if (heading_deg !== null) c.rotate((heading_deg * Math.PI) / 180);
   c.scale(s, s);
   c.beginPath();
-  if (heading_deg === null) { c.moveTo(0, -12); c.lineTo(12, 0); c.lineTo(0, 12); c.lineTo(-12, 0); }
-  else { c.moveTo(0, -16); c.lineTo(12, 14); c.lineTo(0, 7); c.lineTo(-12, 14); }
+  if (heading_deg === null) {
+    c.moveTo(0, -12);
+    c.lineTo(12, 0);
+    c.lineTo(0, 12);
+    c.lineTo(-12, 0);
+  } else {
+    c.moveTo(0, -16);
+    c.lineTo(12, 14);
+    c.lineTo(0, 7);
+    c.lineTo(-12, 14);
+  }
   c.closePath();
   c.lineJoin = 'round';
-  c.strokeStyle = p.halo; c.lineWidth = 5; c.stroke();
-  c.fillStyle = hollow ? p.panel : p.ink; c.fill();
-  if (hollow) { c.strokeStyle = p.ink2; c.lineWidth = 2; c.stroke(); }
+  c.strokeStyle = p.halo;
+  c.lineWidth = 5;
+  c.stroke();
+  c.fillStyle = hollow ? p.panel : p.ink;
+  c.fill();
+  if (hollow) {
+    c.strokeStyle = p.ink2;
+    c.lineWidth = 2;
+    c.stroke();
+  }
   c.restore();
 }
-export interface Box { readonly x: number; readonly y: number; readonly w: number; readonly h: number }
+export interface Box {
+  readonly x: number;
+  readonly y: number;
+  readonly w: number;
+  readonly h: number;
+}
 const overlap = (a: Box, b: Box): boolean => a.x < b.x + b.w && b.x < a.x + a.w && a.y < b.y + b.h && b.y < a.y + a.h;
 
 /// Two-line label beside (x, y): the first of eight places that is free of `taken`; else the first. Adds itself to `taken`.
-export function label(c: Ctx, p: Palette, x: number, y: number, gap: number, head: string, sub: string, taken: Box[]): void {
+export function label(
+  c: Ctx,
+  p: Palette,
+  x: number,
+  y: number,
+  gap: number,
+  head: string,
+  sub: string,
+  taken: Box[],
+): void {
   const [h1, h2] = [p.rem * 0.8125, p.rem * 0.75];
-  const heads = `600 ${h1}px ${p.font}`, subs = `500 ${h2}px ${p.font}`;
+  const heads = `600 ${h1}px ${p.font}`,
+    subs = `500 ${h2}px ${p.font}`;
   c.save();
   c.font = heads;
   const w1 = c.measureText(head).width;
   c.font = subs;
-  const w = Math.max(w1, c.measureText(sub).width), h = h1 + (sub ? h2 + 3 : 0);
-  const at = (dx: number, dy: number): Box => ({ x: dx > 0 ? x + gap : dx < 0 ? x - gap - w : x - w / 2, y: dy > 0 ? y + gap : dy < 0 ? y - gap - h : y - h / 2, w, h });
+  const w = Math.max(w1, c.measureText(sub).width),
+    h = h1 + (sub ? h2 + 3 : 0);
+  const at = (dx: number, dy: number): Box => ({
+    x: dx > 0 ? x + gap : dx < 0 ? x - gap - w : x - w / 2,
+    y: dy > 0 ? y + gap : dy < 0 ? y - gap - h : y - h / 2,
+    w,
+    h,
+  });
   const places = [at(1, 0), at(-1, 0), at(0, -1), at(0, 1), at(1, -1), at(1, 1), at(-1, -1), at(-1, 1)];
   const box = places.find((b) => !taken.some((t) => overlap(b, t))) ?? places[0]!;
   taken.push(box);
@@ -101,7 +206,14 @@ export function label(c: Ctx, p: Palette, x: number, y: number, gap: number, hea
   c.textAlign = box.x + w / 2 < x - 1 ? 'right' : box.x + w / 2 > x + 1 ? 'left' : 'center';
   const tx = c.textAlign === 'right' ? box.x + w : c.textAlign === 'left' ? box.x : box.x + w / 2;
   c.font = heads;
-  c.strokeText(head, tx, box.y); c.fillStyle = p.ink; c.fillText(head, tx, box.y);
-  if (sub) { c.font = subs; c.strokeText(sub, tx, box.y + h1 + 3); c.fillStyle = p.ink2; c.fillText(sub, tx, box.y + h1 + 3); }
+  c.strokeText(head, tx, box.y);
+  c.fillStyle = p.ink;
+  c.fillText(head, tx, box.y);
+  if (sub) {
+    c.font = subs;
+    c.strokeText(sub, tx, box.y + h1 + 3);
+    c.fillStyle = p.ink2;
+    c.fillText(sub, tx, box.y + h1 + 3);
+  }
   c.restore();
 }

@@ -12,43 +12,85 @@ const micros = (rfc3339: unknown): number | null => {
   return Number.isNaN(ms) ? null : ms * 1000;
 };
 export function mission_of_rest(v: unknown): MissionMsg | null {
-  const o = obj(v), created_us = micros(o?.created_at);
-  return o && mission({ mission: o.id, name: o.name, state: o.state, frame: o.frame, t_us: micros(o.finished_at) ?? created_us ?? 0, started_us: created_us, n_ranges: num(o.n_ranges), n_fixes: num(o.n_fixes) });
+  const o = obj(v),
+    created_us = micros(o?.created_at);
+  return (
+    o &&
+    mission({
+      mission: o.id,
+      name: o.name,
+      state: o.state,
+      frame: o.frame,
+      t_us: micros(o.finished_at) ?? created_us ?? 0,
+      started_us: created_us,
+      n_ranges: num(o.n_ranges),
+      n_fixes: num(o.n_fixes),
+    })
+  );
 }
 export async function load_missions(): Promise<void> {
   try {
     const items = obj(await request('GET', '/missions?limit=100'))?.items;
     const known = new Set(mission_list.value.map((m) => m.mission));
-    const news = (Array.isArray(items) ? items : []).map(mission_of_rest).filter((m) => m !== null).filter((m) => !known.has(m.mission));
+    const news = (Array.isArray(items) ? items : [])
+      .map(mission_of_rest)
+      .filter((m) => m !== null)
+      .filter((m) => !known.has(m.mission));
     for (const m of news) scene_of(m.mission).add_state(m, now_ms());
     if (news.length) mission_list.value = [...mission_list.value, ...news];
-  } catch { /* the stream alone will do */ }
+  } catch {
+    /* the stream alone will do */
+  }
   synced.value = true;
 }
 /// Estimates of a flight nobody feeds any more: asked for once, when it is looked at and the stream gave none.
 async function load_estimates(id: string): Promise<void> {
   try {
-    const { rows } = rows_of_collection(await request('GET', `/anchors?view=live&mission=${encodeURIComponent(id)}&limit=1000`));
+    const { rows } = rows_of_collection(
+      await request('GET', `/anchors?view=live&mission=${encodeURIComponent(id)}&limit=1000`),
+    );
     const scene = scene_of(id);
-    for (const r of rows) if (!scene.anchors.has(r.anchor)) scene.add_estimate({ ...r, mission: id, t_us: micros(r.calibrated_at) ?? 0 }, now_ms());
+    for (const r of rows)
+      if (!scene.anchors.has(r.anchor))
+        scene.add_estimate({ ...r, mission: id, t_us: micros(r.calibrated_at) ?? 0 }, now_ms());
     tick.value++;
-  } catch { /* no estimates: the view says so */ }
+  } catch {
+    /* no estimates: the view says so */
+  }
 }
 /// The way flown before this page was opened: a reload in the field must not wipe the map. What the stream has told meanwhile stays.
 async function load_track(m: MissionMsg): Promise<void> {
   try {
-    const feature = obj(await request('GET', `/missions/${encodeURIComponent(m.mission)}/track?limit=10000&since=${TRACK_SINCE(m)}`));
-    const scene = scene_of(m.mission), news = trail_of(feature, m.origin).filter((p) => !scene.trail[0] || p.t_us < scene.trail[0].t_us);
+    const feature = obj(
+      await request('GET', `/missions/${encodeURIComponent(m.mission)}/track?limit=10000&since=${TRACK_SINCE(m)}`),
+    );
+    const scene = scene_of(m.mission),
+      news = trail_of(feature, m.origin).filter((p) => !scene.trail[0] || p.t_us < scene.trail[0].t_us);
     scene.add_earlier_trail(news);
     tick.value++;
-  } catch { /* the trail begins where the page was opened */ }
+  } catch {
+    /* the trail begins where the page was opened */
+  }
 }
-const TRACK_SINCE = (m: MissionMsg): string => new Date(Math.max(0, m.t_us / 1000 - 480_000)).toISOString();   ///< eight minutes: one page even at 20 Hz
+const TRACK_SINCE = (m: MissionMsg): string => new Date(Math.max(0, m.t_us / 1000 - 480_000)).toISOString(); ///< eight minutes: one page even at 20 Hz
 /// GeoJSON of a track as points about the origin of the flight; none where a track on the globe has no origin yet.
 export function trail_of(feature: Record<string, unknown> | null, origin: MissionMsg['origin']): TrailPoint[] {
-  const p = obj(feature?.properties), times = Array.isArray(p?.t_us) ? p.t_us : [], fixes = Array.isArray(p?.fix) ? p.fix : [], globe = obj(feature?.geometry)?.coordinates;
-  const places = Array.isArray(p?.local_m) ? p.local_m.map(vec3) : Array.isArray(globe) && origin ? globe.map((c) => { const v = vec3(c); return v && enu_from_geodetic({ lon: v[0], lat: v[1], h_m: v[2] }, origin); }) : [];
-  return places.flatMap((at, i) => { const t_us = num(times[i]); return at && t_us !== null ? [{ t_us, e: at[0], n: at[1], fix: fix_class(fixes[i]) }] : []; });
+  const p = obj(feature?.properties),
+    times = Array.isArray(p?.t_us) ? p.t_us : [],
+    fixes = Array.isArray(p?.fix) ? p.fix : [],
+    globe = obj(feature?.geometry)?.coordinates;
+  const places = Array.isArray(p?.local_m)
+    ? p.local_m.map(vec3)
+    : Array.isArray(globe) && origin
+      ? globe.map((c) => {
+          const v = vec3(c);
+          return v && enu_from_geodetic({ lon: v[0], lat: v[1], h_m: v[2] }, origin);
+        })
+      : [];
+  return places.flatMap((at, i) => {
+    const t_us = num(times[i]);
+    return at && t_us !== null ? [{ t_us, e: at[0], n: at[1], fix: fix_class(fixes[i]) }] : [];
+  });
 }
 export function follow_archive(): void {
   let asked: string | null = null;
@@ -60,15 +102,17 @@ export function follow_archive(): void {
   });
   let tracked: string | null = null;
   effect(() => {
-    const m = current_mission.value;   // its origin may come later than its name
+    const m = current_mission.value; // its origin may come later than its name
     if (!m || link.value !== 'live' || tracked === m.mission || (m.frame === 'wgs84' && !m.origin)) return;
     tracked = m.mission;
     void load_track(m);
   });
-  effect(() => { if (link.value === 'lost') asked = tracked = null; });
+  effect(() => {
+    if (link.value === 'lost') asked = tracked = null;
+  });
   let restored = '';
   effect(() => {
-    const id = events.value.filter((e) => e.code === 'mission.restored').at(-1)?.id ?? '';   // somebody brought a deleted flight back
+    const id = events.value.filter((e) => e.code === 'mission.restored').at(-1)?.id ?? ''; // somebody brought a deleted flight back
     if (id && id !== restored) void load_missions();
     restored = id;
   });

@@ -2,12 +2,20 @@
 /// Local storage rather than IndexedDB: it is written before the event ends, and plans and forms are a few kB. Where the browser keeps nothing, memory. No DOM.
 import { obj } from '../live/messages';
 
-const PREFIX = 'anchord.draft.1.';   ///< 1: the form of what is kept; another form is another prefix
+const PREFIX = 'anchord.draft.1.'; ///< 1: the form of what is kept; another form is another prefix
 const memory = new Map<string, string>();
-export interface Draft { readonly key: string; readonly value: unknown; readonly at_ms: number }
+export interface Draft {
+  readonly key: string;
+  readonly value: unknown;
+  readonly at_ms: number;
+}
 
 function stored(): Storage | null {
-  try { return globalThis.localStorage ?? null; } catch { return null; }
+  try {
+    return globalThis.localStorage ?? null;
+  } catch {
+    return null;
+  }
 }
 function draft_from(key: string, text: string | null | undefined): Draft | null {
   try {
@@ -21,29 +29,52 @@ function draft_from(key: string, text: string | null | undefined): Draft | null 
 export function keep_draft(key: string, value: unknown, at_ms = Date.now()): void {
   const text = JSON.stringify({ value, at_ms });
   memory.set(key, text);
-  try { stored()?.setItem(PREFIX + key, text); } catch { /* full or forbidden: it lives as long as the page */ }
+  try {
+    stored()?.setItem(PREFIX + key, text);
+  } catch {
+    /* full or forbidden: it lives as long as the page */
+  }
 }
 export function drop_draft(key: string): void {
   memory.delete(key);
-  try { stored()?.removeItem(PREFIX + key); } catch { /* nothing was kept there */ }
+  try {
+    stored()?.removeItem(PREFIX + key);
+  } catch {
+    /* nothing was kept there */
+  }
 }
 export const draft_of = (key: string): Draft | null => draft_from(key, memory.get(key) ?? read(key));
 function read(key: string): string | null {
-  try { return stored()?.getItem(PREFIX + key) ?? null; } catch { return null; }
+  try {
+    return stored()?.getItem(PREFIX + key) ?? null;
+  } catch {
+    return null;
+  }
 }
 /// The newest whose key begins so.
 export function newest_draft(prefix: string): Draft | null {
   const keys = new Set(memory.keys());
   try {
     const kept = stored();
-    for (let i = 0; kept && i < kept.length; i++) { const k = kept.key(i); if (k?.startsWith(PREFIX)) keys.add(k.slice(PREFIX.length)); }
-  } catch { /* memory alone */ }
-  return [...keys].filter((k) => k.startsWith(prefix)).map(draft_of).reduce<Draft | null>((best, d) => (d && (!best || d.at_ms > best.at_ms) ? d : best), null);
+    for (let i = 0; kept && i < kept.length; i++) {
+      const k = kept.key(i);
+      if (k?.startsWith(PREFIX)) keys.add(k.slice(PREFIX.length));
+    }
+  } catch {
+    /* memory alone */
+  }
+  return [...keys]
+    .filter((k) => k.startsWith(prefix))
+    .map(draft_of)
+    .reduce<Draft | null>((best, d) => (d && (!best || d.at_ms > best.at_ms) ? d : best), null);
 }
 
 /// A form as it was left: of what is kept, the fields that the form has and that are of its kind.
 export function restored<T extends object>(start: T, kept: unknown): T {
-  const o = obj(kept), out: Record<string, unknown> = { ...(start as Readonly<Record<string, unknown>>) };
-  for (const [name, value] of Object.entries(start)) if (o && name in o && typeof o[name] === typeof value && Array.isArray(o[name]) === Array.isArray(value)) out[name] = o[name];
+  const o = obj(kept),
+    out: Record<string, unknown> = { ...(start as Readonly<Record<string, unknown>>) };
+  for (const [name, value] of Object.entries(start))
+    if (o && name in o && typeof o[name] === typeof value && Array.isArray(o[name]) === Array.isArray(value))
+      out[name] = o[name];
   return out as T;
 }

@@ -4,17 +4,38 @@ import { fix_class, num, obj, str, vec3, type MissionMsg, type Pose, type RangeM
 import { enu_from_geodetic, type Geodetic } from '../map/enu';
 import { Scene } from './scene';
 
-export interface Mark { readonly t_us: number; readonly level: string; readonly text: string }
-export interface Recording { readonly mission: MissionMsg; readonly from_us: number; readonly to_us: number; readonly poses: readonly Pose[]; readonly ranges: readonly RangeMsg[]; readonly marks: readonly Mark[]; readonly cut: boolean }
+export interface Mark {
+  readonly t_us: number;
+  readonly level: string;
+  readonly text: string;
+}
+export interface Recording {
+  readonly mission: MissionMsg;
+  readonly from_us: number;
+  readonly to_us: number;
+  readonly poses: readonly Pose[];
+  readonly ranges: readonly RangeMsg[];
+  readonly marks: readonly Mark[];
+  readonly cut: boolean;
+}
 
-const PAGE = 10_000, PAGES_MAX = 12;   ///< 120 000 rows of each: three hours at 10 Hz; more is said to be cut
+const PAGE = 10_000,
+  PAGES_MAX = 12; ///< 120 000 rows of each: three hours at 10 Hz; more is said to be cut
 
-async function pages<T>(path: string, of: (o: Record<string, unknown>) => T | null): Promise<{ rows: T[]; cut: boolean }> {
+async function pages<T>(
+  path: string,
+  of: (o: Record<string, unknown>) => T | null,
+): Promise<{ rows: T[]; cut: boolean }> {
   const rows: T[] = [];
   let cursor = '';
   for (let i = 0; i < PAGES_MAX; i++) {
-    const answer = obj(await request('GET', `${path}&limit=${PAGE}${cursor && `&cursor=${encodeURIComponent(cursor)}`}`));
-    for (const o of (Array.isArray(answer?.items) ? answer.items : []).map(obj)) { const row = o && of(o); if (row) rows.push(row); }
+    const answer = obj(
+      await request('GET', `${path}&limit=${PAGE}${cursor && `&cursor=${encodeURIComponent(cursor)}`}`),
+    );
+    for (const o of (Array.isArray(answer?.items) ? answer.items : []).map(obj)) {
+      const row = o && of(o);
+      if (row) rows.push(row);
+    }
     cursor = str(answer?.next_cursor);
     if (!cursor) return { rows, cut: false };
   }
@@ -25,43 +46,108 @@ async function pages<T>(path: string, of: (o: Record<string, unknown>) => T | nu
 export function poses_of(rows: readonly Record<string, unknown>[], mission: string, origin: Geodetic | null): Pose[] {
   let zero = origin;
   return rows.flatMap((o) => {
-    const t_us = num(o.t_us), [lon, lat, h_m] = [num(o.lon), num(o.lat), num(o.h_m)], local = vec3(o.local_m), c = Array.isArray(o.cov_enu_m2) ? o.cov_enu_m2.map(num) : [];
+    const t_us = num(o.t_us),
+      [lon, lat, h_m] = [num(o.lon), num(o.lat), num(o.h_m)],
+      local = vec3(o.local_m),
+      c = Array.isArray(o.cov_enu_m2) ? o.cov_enu_m2.map(num) : [];
     if (t_us === null) return [];
     const here = lon !== null && lat !== null ? { lon, lat, h_m: h_m ?? 0 } : null;
     zero ??= here;
-    const sigma = (v: number | null | undefined): number => Math.sqrt(Math.max(0, v ?? 0)), q = Array.isArray(o.q) ? o.q.map(num) : [], [x, y, z, w] = q;
+    const sigma = (v: number | null | undefined): number => Math.sqrt(Math.max(0, v ?? 0)),
+      q = Array.isArray(o.q) ? o.q.map(num) : [],
+      [x, y, z, w] = q;
     // Body x-axis of the quaternion in ENU: its bearing is the heading.
-    const heading_deg = num(o.heading_deg) ?? (x != null && y != null && z != null && w != null ? (Math.atan2(1 - 2 * (y * y + z * z), 2 * (x * y + w * z)) * 180) / Math.PI : null);
-    return [{ mission, t_us, lon, lat, h_m, enu_m: local ?? (here && zero ? enu_from_geodetic(here, zero) : null), tag_enu_m: null, heading_deg: heading_deg === null ? null : (heading_deg + 360) % 360, fix: fix_class(o.fix), sigma_m: c.length === 6 ? [sigma(c[0]), sigma(c[3]), sigma(c[5])] as const : null, speed_mps: null }];
+    const heading_deg =
+      num(o.heading_deg) ??
+      (x != null && y != null && z != null && w != null
+        ? (Math.atan2(1 - 2 * (y * y + z * z), 2 * (x * y + w * z)) * 180) / Math.PI
+        : null);
+    return [
+      {
+        mission,
+        t_us,
+        lon,
+        lat,
+        h_m,
+        enu_m: local ?? (here && zero ? enu_from_geodetic(here, zero) : null),
+        tag_enu_m: null,
+        heading_deg: heading_deg === null ? null : (heading_deg + 360) % 360,
+        fix: fix_class(o.fix),
+        sigma_m: c.length === 6 ? ([sigma(c[0]), sigma(c[3]), sigma(c[5])] as const) : null,
+        speed_mps: null,
+      },
+    ];
   });
 }
-const range_of = (mission: string) => (o: Record<string, unknown>): RangeMsg | null => {
-  const t_us = num(o.t_us), distance_m = num(o.distance_m);
-  return t_us === null || distance_m === null ? null : { t_us, mission, tag: str(o.tag), anchor: str(o.anchor), distance_m, corrected_m: distance_m, sigma_m: null, rss_dbm: num(o.rx_dbm) ?? num(o.rss_dbm), p_los: null, used: true, refused: null };
-};
+const range_of =
+  (mission: string) =>
+  (o: Record<string, unknown>): RangeMsg | null => {
+    const t_us = num(o.t_us),
+      distance_m = num(o.distance_m);
+    return t_us === null || distance_m === null
+      ? null
+      : {
+          t_us,
+          mission,
+          tag: str(o.tag),
+          anchor: str(o.anchor),
+          distance_m,
+          corrected_m: distance_m,
+          sigma_m: null,
+          rss_dbm: num(o.rx_dbm) ?? num(o.rss_dbm),
+          p_los: null,
+          used: true,
+          refused: null,
+        };
+  };
 
 export async function load_recording(mission: MissionMsg): Promise<Recording> {
   const of = encodeURIComponent(mission.mission);
   const [fixes, ranges, events] = await Promise.all([
-    pages(`/fixes?mission=${of}`, (o) => o), pages(`/ranges?mission=${of}`, range_of(mission.mission)),
-    request('GET', `/missions/${of}/events?limit=1000`).then((a) => { const items = obj(a)?.items; return Array.isArray(items) ? items.map(obj) : []; }, () => []),
+    pages(`/fixes?mission=${of}`, (o) => o),
+    pages(`/ranges?mission=${of}`, range_of(mission.mission)),
+    request('GET', `/missions/${of}/events?limit=1000`).then(
+      (a) => {
+        const items = obj(a)?.items;
+        return Array.isArray(items) ? items.map(obj) : [];
+      },
+      () => [],
+    ),
   ]);
-  const poses = poses_of(fixes.rows, mission.mission, mission.origin), by_time = (a: { t_us: number }, b: { t_us: number }): number => a.t_us - b.t_us;
-  const times = [poses[0]?.t_us, poses[poses.length - 1]?.t_us, ranges.rows[0]?.t_us, ranges.rows[ranges.rows.length - 1]?.t_us].filter((t) => t !== undefined);
+  const poses = poses_of(fixes.rows, mission.mission, mission.origin),
+    by_time = (a: { t_us: number }, b: { t_us: number }): number => a.t_us - b.t_us;
+  const times = [
+    poses[0]?.t_us,
+    poses[poses.length - 1]?.t_us,
+    ranges.rows[0]?.t_us,
+    ranges.rows[ranges.rows.length - 1]?.t_us,
+  ].filter((t) => t !== undefined);
   return {
-    mission, from_us: Math.min(...times), to_us: Math.max(...times), poses: poses.sort(by_time), ranges: ranges.rows.sort(by_time), cut: fixes.cut || ranges.cut,
-    marks: events.filter((e) => e !== null).map((e) => ({ t_us: num(e!.t_us) ?? 0, level: str(e!.level), text: str(e!.text) })).filter((e) => times.length > 0 && e.t_us >= Math.min(...times) && e.t_us <= Math.max(...times)),
+    mission,
+    from_us: Math.min(...times),
+    to_us: Math.max(...times),
+    poses: poses.sort(by_time),
+    ranges: ranges.rows.sort(by_time),
+    cut: fixes.cut || ranges.cut,
+    marks: events
+      .filter((e) => e !== null)
+      .map((e) => ({ t_us: num(e!.t_us) ?? 0, level: str(e!.level), text: str(e!.text) }))
+      .filter((e) => times.length > 0 && e.t_us >= Math.min(...times) && e.t_us <= Math.max(...times)),
   };
 }
 
 /// First index whose time is above t.
 export function after(rows: readonly { readonly t_us: number }[], t_us: number): number {
   let [lo, hi] = [0, rows.length];
-  while (lo < hi) { const mid = (lo + hi) >> 1; if (rows[mid]!.t_us <= t_us) lo = mid + 1; else hi = mid; }
+  while (lo < hi) {
+    const mid = (lo + hi) >> 1;
+    if (rows[mid]!.t_us <= t_us) lo = mid + 1;
+    else hi = mid;
+  }
   return lo;
 }
 
-const BEFORE_US = 120_000_000;   ///< what a jump shows of the past: the trail of the live view
+const BEFORE_US = 120_000_000; ///< what a jump shows of the past: the trail of the live view
 export class Player {
   scene: Scene;
   t_us: number;
@@ -76,7 +162,8 @@ export class Player {
   to(t_us: number, now_ms: number): void {
     const at = Math.max(this.recording.from_us, Math.min(this.recording.to_us, t_us));
     if (at < this.t_us || at - this.t_us > BEFORE_US) {
-      const anchors = this.scene.anchors, version = this.scene.version;
+      const anchors = this.scene.anchors,
+        version = this.scene.version;
       this.scene = new Scene(this.recording.mission.mission);
       for (const [id, e] of anchors) this.scene.anchors.set(id, e);
       this.scene.version = version + 1;
@@ -85,13 +172,24 @@ export class Player {
     }
     this.t_us = at;
     const age_ms = (t: number): number => now_ms - Math.max(0, (at - t) / 1000);
-    for (; this.pose < this.recording.poses.length && this.recording.poses[this.pose]!.t_us <= at; this.pose++) { const p = this.recording.poses[this.pose]!; this.scene.add_pose(p, age_ms(p.t_us)); this.scene.add_rtk({ mission: p.mission, t_us: p.t_us, fix: p.fix, satellites: null, correction_age_s: null, sigma_m: p.sigma_m }, age_ms(p.t_us)); }
-    for (; this.range < this.recording.ranges.length && this.recording.ranges[this.range]!.t_us <= at; this.range++) { const r = this.recording.ranges[this.range]!; this.scene.add_range(r, age_ms(r.t_us)); }
+    for (; this.pose < this.recording.poses.length && this.recording.poses[this.pose]!.t_us <= at; this.pose++) {
+      const p = this.recording.poses[this.pose]!;
+      this.scene.add_pose(p, age_ms(p.t_us));
+      this.scene.add_rtk(
+        { mission: p.mission, t_us: p.t_us, fix: p.fix, satellites: null, correction_age_s: null, sigma_m: p.sigma_m },
+        age_ms(p.t_us),
+      );
+    }
+    for (; this.range < this.recording.ranges.length && this.recording.ranges[this.range]!.t_us <= at; this.range++) {
+      const r = this.recording.ranges[this.range]!;
+      this.scene.add_range(r, age_ms(r.t_us));
+    }
     this.freshen(at, now_ms);
   }
   /// While it stands still, what was fresh at that moment stays fresh.
   private freshen(at_us: number, now_ms: number): void {
-    const age_ms = (t: number): number => now_ms - Math.max(0, (at_us - t) / 1000), { pose } = this.scene;
+    const age_ms = (t: number): number => now_ms - Math.max(0, (at_us - t) / 1000),
+      { pose } = this.scene;
     if (pose) this.scene.pose = { value: pose.value, at_ms: age_ms(pose.value.t_us) };
     for (const row of this.scene.ranges.values()) row.at_ms = age_ms(row.last.t_us);
   }

@@ -4,21 +4,37 @@ import type { EstimateMsg, FixClass, MissionMsg, Pose, RangeMsg, Rtk, Vec3 } fro
 import { sigma_h } from '../map/enu';
 
 /// A value and when it came, by the steady clock of this page: staleness is about arrival, since a replayed flight carries old times.
-export interface Heard<T> { readonly value: T; readonly at_ms: number }
-export interface TrailPoint { readonly t_us: number; readonly e: number; readonly n: number; readonly fix: FixClass }
-export interface RangeRow { last: RangeMsg; at_ms: number; readonly recent: { t_us: number; d: number }[] }
-export interface HistoryPoint { readonly t_us: number; readonly sigma_h_m: number | null; readonly gdop: number | null }
+export interface Heard<T> {
+  readonly value: T;
+  readonly at_ms: number;
+}
+export interface TrailPoint {
+  readonly t_us: number;
+  readonly e: number;
+  readonly n: number;
+  readonly fix: FixClass;
+}
+export interface RangeRow {
+  last: RangeMsg;
+  at_ms: number;
+  readonly recent: { t_us: number; d: number }[];
+}
+export interface HistoryPoint {
+  readonly t_us: number;
+  readonly sigma_h_m: number | null;
+  readonly gdop: number | null;
+}
 
 const TRAIL_POINTS = 6000;
-const TRAIL_STEP_M = 0.1;          // below a pixel at any scale a flight is watched at; standing still must not fill the trail
-const RECENT_US = 20_000_000;      // the 20 s sparkline
+const TRAIL_STEP_M = 0.1; // below a pixel at any scale a flight is watched at; standing still must not fill the trail
+const RECENT_US = 20_000_000; // the 20 s sparkline
 const HISTORY_POINTS = 1200;
 
 export class Scene {
   state: MissionMsg | null = null;
   state_at_ms = -Infinity;
   pose: Heard<Pose> | null = null;
-  before: Heard<Pose> | null = null;  ///< for interpolation
+  before: Heard<Pose> | null = null; ///< for interpolation
   rtk: Heard<Rtk> | null = null;
   trail: TrailPoint[] = [];
   readonly anchors = new Map<string, Heard<EstimateMsg>>();
@@ -29,8 +45,8 @@ export class Scene {
   grid: Heard<GridMsg> | null = null;
   readonly turns = new Map<string, Heard<ProfileMsg>>();
   readonly heights = new Map<string, Heard<ProfileMsg>>();
-  version = 0;  ///< grows with every change: what was drawn of it is still right while it stands
-  estimates_version = 0;  ///< grows with estimates only: the slow picture of the map need not be drawn for a pose
+  version = 0; ///< grows with every change: what was drawn of it is still right while it stands
+  estimates_version = 0; ///< grows with estimates only: the slow picture of the map need not be drawn for a pose
   fix_since_us: number | null = null;
 
   constructor(readonly id: string) {}
@@ -41,13 +57,18 @@ export class Scene {
     this.version++;
   }
   add_pose(p: Pose, at_ms: number): void {
-    if (this.pose && p.t_us < this.pose.value.t_us - 5_000_000) this.forget_track();  // the flight began again (a looped replay)
+    if (this.pose && p.t_us < this.pose.value.t_us - 5_000_000) this.forget_track(); // the flight began again (a looped replay)
     if (!this.pose || this.pose.value.fix !== p.fix) this.fix_since_us = p.t_us;
     this.before = this.pose;
     this.pose = { value: p, at_ms };
     if (p.enu_m) {
       const last = this.trail[this.trail.length - 1];
-      if (!last || last.fix !== p.fix || Math.hypot(p.enu_m[0] - last.e, p.enu_m[1] - last.n) > TRAIL_STEP_M || p.t_us - last.t_us > 2_000_000) {
+      if (
+        !last ||
+        last.fix !== p.fix ||
+        Math.hypot(p.enu_m[0] - last.e, p.enu_m[1] - last.n) > TRAIL_STEP_M ||
+        p.t_us - last.t_us > 2_000_000
+      ) {
         this.trail.push({ t_us: p.t_us, e: p.enu_m[0], n: p.enu_m[1], fix: p.fix });
         if (this.trail.length > TRAIL_POINTS) this.trail.splice(0, TRAIL_POINTS / 6);
       }
@@ -62,7 +83,7 @@ export class Scene {
     let row = this.ranges.get(r.anchor);
     if (!row) this.ranges.set(r.anchor, (row = { last: r, at_ms, recent: [] }));
     if (r.t_us < row.last.t_us - 5_000_000) row.recent.length = 0;
-    else if (r.t_us < row.last.t_us) return;  // late by a little: the newer one stays
+    else if (r.t_us < row.last.t_us) return; // late by a little: the newer one stays
     row.last = r;
     row.at_ms = at_ms;
     row.recent.push({ t_us: r.t_us, d: r.corrected_m });
@@ -96,7 +117,13 @@ export class Scene {
     const kept: TrailPoint[] = [];
     for (const p of points) {
       const last = kept[kept.length - 1];
-      if (!last || last.fix !== p.fix || Math.hypot(p.e - last.e, p.n - last.n) > TRAIL_STEP_M || p.t_us - last.t_us > 2_000_000) kept.push(p);
+      if (
+        !last ||
+        last.fix !== p.fix ||
+        Math.hypot(p.e - last.e, p.n - last.n) > TRAIL_STEP_M ||
+        p.t_us - last.t_us > 2_000_000
+      )
+        kept.push(p);
     }
     this.trail = [...kept, ...this.trail].slice(-TRAIL_POINTS);
     this.version++;
@@ -110,7 +137,8 @@ export class Scene {
 
 /// Ranges a second of one row, by measurement time over the last 3 s of it; null with fewer than two.
 export function rate_hz(row: RangeRow): number | null {
-  const r = row.recent, end = r[r.length - 1];
+  const r = row.recent,
+    end = r[r.length - 1];
   if (!end) return null;
   let i = r.length - 1;
   while (i > 0 && end.t_us - r[i - 1]!.t_us < 3_000_000) i--;
@@ -120,17 +148,27 @@ export function rate_hz(row: RangeRow): number | null {
 
 export type RangeClass = 'los' | 'nlos' | 'unclear';
 /// dashboard.md section 4: unclear is a probability of 0.4 to 0.6, or no model.
-export const range_class = (p_los: number | null): RangeClass => (p_los === null || (p_los >= 0.4 && p_los <= 0.6) ? 'unclear' : p_los > 0.6 ? 'los' : 'nlos');
+export const range_class = (p_los: number | null): RangeClass =>
+  p_los === null || (p_los >= 0.4 && p_los <= 0.6) ? 'unclear' : p_los > 0.6 ? 'los' : 'nlos';
 
 /// Drone between its last two poses, drawn one pose late so that it moves evenly; where they are far apart in time or place, it jumps.
-export function interpolated(scene: Scene, now_ms: number): { body: Vec3; antenna: Vec3; heading_deg: number | null } | null {
+export function interpolated(
+  scene: Scene,
+  now_ms: number,
+): { body: Vec3; antenna: Vec3; heading_deg: number | null } | null {
   const [a, b] = [scene.before, scene.pose];
   if (!b?.value.enu_m) return null;
-  const body_b = b.value.enu_m, antenna_b = b.value.tag_enu_m ?? body_b;
-  if (!a?.value.enu_m || b.at_ms - a.at_ms > 1000 || b.at_ms <= a.at_ms) return { body: body_b, antenna: antenna_b, heading_deg: b.value.heading_deg };
+  const body_b = b.value.enu_m,
+    antenna_b = b.value.tag_enu_m ?? body_b;
+  if (!a?.value.enu_m || b.at_ms - a.at_ms > 1000 || b.at_ms <= a.at_ms)
+    return { body: body_b, antenna: antenna_b, heading_deg: b.value.heading_deg };
   const f = Math.min(1, (now_ms - b.at_ms) / (b.at_ms - a.at_ms));
-  const mix = (p: Vec3, q: Vec3): Vec3 => [p[0] + (q[0] - p[0]) * f, p[1] + (q[1] - p[1]) * f, p[2] + (q[2] - p[2]) * f];
+  const mix = (p: Vec3, q: Vec3): Vec3 => [
+    p[0] + (q[0] - p[0]) * f,
+    p[1] + (q[1] - p[1]) * f,
+    p[2] + (q[2] - p[2]) * f,
+  ];
   const [ha, hb] = [a.value.heading_deg, b.value.heading_deg];
-  const heading_deg = ha === null || hb === null ? hb : ha + ((((hb - ha) % 360) + 540) % 360 - 180) * f;
+  const heading_deg = ha === null || hb === null ? hb : ha + (((((hb - ha) % 360) + 540) % 360) - 180) * f;
   return { body: mix(a.value.enu_m, body_b), antenna: mix(a.value.tag_enu_m ?? a.value.enu_m, antenna_b), heading_deg };
 }

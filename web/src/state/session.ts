@@ -2,16 +2,27 @@ import { computed, signal } from '@preact/signals';
 import { ApiError, request } from '../api/client';
 import { obj, str } from '../live/messages';
 
-export interface Me { readonly name: string; readonly roles: readonly string[]; readonly auth: string }
+export interface Me {
+  readonly name: string;
+  readonly roles: readonly string[];
+  readonly auth: string;
+}
 /// undefined: not asked yet; null: signed out.
 export const me = signal<Me | null | undefined>(undefined);
 
-export const may = (...roles: string[]): boolean => !!me.value && (me.value.auth === 'off' || me.value.roles.some((r) => r === 'admin' || roles.includes(r)));
+export const may = (...roles: string[]): boolean =>
+  !!me.value && (me.value.auth === 'off' || me.value.roles.some((r) => r === 'admin' || roles.includes(r)));
 export const may_publish = computed(() => may('engineer', 'operator', 'op'));
 
 function me_of(answer: unknown): Me | null {
   const o = obj(answer);
-  return o && { name: str(o.name), roles: Array.isArray(o.roles) ? o.roles.filter((r): r is string => typeof r === 'string') : [], auth: str(o.auth) || (str(o.token_id) === 'local' ? 'off' : 'on') };
+  return (
+    o && {
+      name: str(o.name),
+      roles: Array.isArray(o.roles) ? o.roles.filter((r): r is string => typeof r === 'string') : [],
+      auth: str(o.auth) || (str(o.token_id) === 'local' ? 'off' : 'on'),
+    }
+  );
 }
 /// Asks who we are; signed out on 401. Other trouble leaves what is known: a lost link is not a lost session.
 export async function refresh_me(): Promise<void> {

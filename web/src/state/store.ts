@@ -5,22 +5,38 @@ import * as m from '../live/messages';
 import type { LinkState, LiveSink, LiveSource } from '../live/source';
 import { Scene } from './scene';
 
-export const TOPICS = ['mission.state', 'drone.pose', 'rtk.status', 'ranges', 'anchors.estimates', 'devices', 'system', 'events', 'alarms', 'revisions', 'jobs', 'procedure', 'mission.grid', 'mission.turn', 'mission.height'] as const;
+export const TOPICS = [
+  'mission.state',
+  'drone.pose',
+  'rtk.status',
+  'ranges',
+  'anchors.estimates',
+  'devices',
+  'system',
+  'events',
+  'alarms',
+  'revisions',
+  'jobs',
+  'procedure',
+  'mission.grid',
+  'mission.turn',
+  'mission.height',
+] as const;
 
 export const link = signal<LinkState>('connecting');
 export const tick = signal(0);
 export const scenes = new Map<string, Scene>();
 export const mission_list = signal<readonly m.MissionMsg[]>([]);
-export const chosen_mission = signal<string | null>(null);   ///< by the user; null follows the newest recording
+export const chosen_mission = signal<string | null>(null); ///< by the user; null follows the newest recording
 export const chosen_anchor = signal<string | null>(null);
 export const server_alarms = signal<readonly m.AlarmMsg[]>([]);
 export const devices = signal<readonly m.DeviceMsg[]>([]);
 export const system = signal<{ value: m.SystemMsg; at_ms: number } | null>(null);
 export const events = signal<readonly m.EventMsg[]>([]);
 export const revision = signal<number | null>(null);
-export const jobs_version = signal(0);  ///< grows with every news of a job; what a job is about is asked over REST
+export const jobs_version = signal(0); ///< grows with every news of a job; what a job is about is asked over REST
 export const toast = signal<{ text: string; id: number } | null>(null);
-export const synced = signal(false);  ///< first snapshots are in: before that, empty means "not loaded yet"
+export const synced = signal(false); ///< first snapshots are in: before that, empty means "not loaded yet"
 
 export const now_ms = (): number => performance.now();
 let source: LiveSource | null = null;
@@ -29,10 +45,17 @@ export const server_now_us = (): number => source?.now_us() ?? Date.now() * 1000
 
 /// Newest recording first, then the newest of the others.
 export const ordered_missions = computed(() =>
-  [...mission_list.value].sort((a, b) => Number(b.state === 'recording') - Number(a.state === 'recording') || (b.started_us ?? b.t_us) - (a.started_us ?? a.t_us)));
+  [...mission_list.value].sort(
+    (a, b) =>
+      Number(b.state === 'recording') - Number(a.state === 'recording') ||
+      (b.started_us ?? b.t_us) - (a.started_us ?? a.t_us),
+  ),
+);
 export const mission_id = computed(() => {
   const chosen = chosen_mission.value;
-  return chosen && mission_list.value.some((x) => x.mission === chosen) ? chosen : (ordered_missions.value[0]?.mission ?? null);
+  return chosen && mission_list.value.some((x) => x.mission === chosen)
+    ? chosen
+    : (ordered_missions.value[0]?.mission ?? null);
 });
 export function scene_of(id: string): Scene {
   let scene = scenes.get(id);
@@ -85,35 +108,67 @@ const handlers: Record<string, Handler> = {
     for (const x of news) scene_of(x.mission).add_state(x, now_ms());
     if (news.length) synced.value = true;
   },
-  'drone.pose': (data) => { for (const p of m.all(data, m.pose)) scene_of(p.mission).add_pose(p, now_ms()); },
-  'rtk.status': (data) => { for (const r of m.all(data, m.rtk)) scene_of(r.mission).add_rtk(r, now_ms()); },
-  ranges: (data) => { for (const r of m.all(data, m.range)) scene_of(r.mission).add_range(r, now_ms()); },
+  'drone.pose': (data) => {
+    for (const p of m.all(data, m.pose)) scene_of(p.mission).add_pose(p, now_ms());
+  },
+  'rtk.status': (data) => {
+    for (const r of m.all(data, m.rtk)) scene_of(r.mission).add_rtk(r, now_ms());
+  },
+  ranges: (data) => {
+    for (const r of m.all(data, m.range)) scene_of(r.mission).add_range(r, now_ms());
+  },
   'anchors.estimates': (data, whole) => {
     if (whole) for (const s of scenes.values()) s.anchors.clear();
     for (const e of m.all(data, m.estimate)) scene_of(e.mission).add_estimate(e, now_ms());
   },
   devices: (data) => (devices.value = m.all(data, m.device)),
-  system: (data) => { for (const s of m.all(data, m.system)) system.value = { value: s, at_ms: now_ms() }; },
+  system: (data) => {
+    for (const s of m.all(data, m.system)) system.value = { value: s, at_ms: now_ms() };
+  },
   events: (data, whole) => {
-    const news = m.all(data, m.event), gone = news.filter((e) => e.code === 'mission.deleted' && !news.some((x) => x.code === 'mission.restored' && x.mission === e.mission && x.t_us > e.t_us));
+    const news = m.all(data, m.event),
+      gone = news.filter(
+        (e) =>
+          e.code === 'mission.deleted' &&
+          !news.some((x) => x.code === 'mission.restored' && x.mission === e.mission && x.t_us > e.t_us),
+      );
     events.value = [...(whole ? [] : events.value), ...news].slice(-50);
-    if (gone.length && !whole) mission_list.value = mission_list.value.filter((x) => !gone.some((e) => e.mission === x.mission));
+    if (gone.length && !whole)
+      mission_list.value = mission_list.value.filter((x) => !gone.some((e) => e.mission === x.mission));
   },
   alarms: (data) => (server_alarms.value = m.all(data, m.alarm)),
-  revisions: (data) => { for (const r of m.all(data, m.revision)) revision.value = Math.max(revision.value ?? 0, r.revision); },
-  procedure: (data) => { for (const p of m.all(data, f.procedure)) scene_of(p.mission).add_procedure(p, now_ms()); },
-  'mission.grid': (data) => { for (const g of m.all(data, f.grid)) scene_of(g.mission).add_grid(g, now_ms()); },
-  'mission.turn': (data) => { for (const t of m.all(data, f.turn)) scene_of(t.mission).turns.set(t.anchor, { value: t, at_ms: now_ms() }); },
-  'mission.height': (data) => { for (const h of m.all(data, f.height)) scene_of(h.mission).heights.set(h.anchor, { value: h, at_ms: now_ms() }); },
-  jobs: () => { jobs_version.value++; },
+  revisions: (data) => {
+    for (const r of m.all(data, m.revision)) revision.value = Math.max(revision.value ?? 0, r.revision);
+  },
+  procedure: (data) => {
+    for (const p of m.all(data, f.procedure)) scene_of(p.mission).add_procedure(p, now_ms());
+  },
+  'mission.grid': (data) => {
+    for (const g of m.all(data, f.grid)) scene_of(g.mission).add_grid(g, now_ms());
+  },
+  'mission.turn': (data) => {
+    for (const t of m.all(data, f.turn)) scene_of(t.mission).turns.set(t.anchor, { value: t, at_ms: now_ms() });
+  },
+  'mission.height': (data) => {
+    for (const h of m.all(data, f.height)) scene_of(h.mission).heights.set(h.anchor, { value: h, at_ms: now_ms() });
+  },
+  jobs: () => {
+    jobs_version.value++;
+  },
 };
 
 /// `fresh`: the stream begins, or another life of the server does, and what it does not tell must be asked for.
 export function connect(live: LiveSource, refused: () => void, fresh: () => void): void {
   source = live;
   const sink: LiveSink = {
-    snap: (topic, data) => { if (data != null) handlers[topic]?.(data, true); touch(); },
-    data: (topic, data) => { handlers[topic]?.(data, false); touch(); },
+    snap: (topic, data) => {
+      if (data != null) handlers[topic]?.(data, true);
+      touch();
+    },
+    data: (topic, data) => {
+      handlers[topic]?.(data, false);
+      touch();
+    },
     gap: () => touch(),
     restarted: () => {
       scenes.clear();
@@ -124,8 +179,14 @@ export function connect(live: LiveSource, refused: () => void, fresh: () => void
       fresh();
       touch();
     },
-    resumed: (recovered, resynchronised) => say(resynchronised ? 'Resynchronised: all values are current' : `Connected again, recovered ${recovered} messages`),
-    link: (state) => { link.value = state; touch(); },
+    resumed: (recovered, resynchronised) =>
+      say(
+        resynchronised ? 'Resynchronised: all values are current' : `Connected again, recovered ${recovered} messages`,
+      ),
+    link: (state) => {
+      link.value = state;
+      touch();
+    },
     refused,
   };
   live.start(sink);

@@ -3,14 +3,23 @@ import type { AlarmMsg, FixClass } from '../live/messages';
 import type { LinkState } from '../live/source';
 
 export type Priority = AlarmMsg['priority'];
-export interface Alarm { readonly id: string; readonly priority: Priority; readonly title: string; readonly advice: string; readonly since_ms: number; readonly acknowledged: boolean }
+export interface Alarm {
+  readonly id: string;
+  readonly priority: Priority;
+  readonly title: string;
+  readonly advice: string;
+  readonly since_ms: number;
+  readonly acknowledged: boolean;
+}
 
 export interface Situation {
-  readonly now_ms: number; readonly link: LinkState; readonly silence_ms: number;
-  readonly recording: boolean;          ///< a mission runs
+  readonly now_ms: number;
+  readonly link: LinkState;
+  readonly silence_ms: number;
+  readonly recording: boolean; ///< a mission runs
   readonly fix: FixClass | null;
   readonly correction_age_s: number | null;
-  readonly range_silence_ms: number;    ///< Infinity before the first range
+  readonly range_silence_ms: number; ///< Infinity before the first range
 }
 
 const RANK: Record<Priority, number> = { critical: 0, warning: 1, advisory: 2 };
@@ -23,39 +32,90 @@ export class Conditions {
 
   standing(s: Situation): Alarm[] {
     const out: Alarm[] = [];
-    const hold = (id: string, on: boolean, delay_ms: number, priority: Priority, title: string, advice: string): void => {
+    const hold = (
+      id: string,
+      on: boolean,
+      delay_ms: number,
+      priority: Priority,
+      title: string,
+      advice: string,
+    ): void => {
       if (!on) {
         this.since.delete(id);
         return;
       }
       const began = this.since.get(id) ?? s.now_ms;
       this.since.set(id, began);
-      if (s.now_ms - began >= delay_ms) out.push({ id, priority, title, advice, since_ms: began + delay_ms, acknowledged: false });
+      if (s.now_ms - began >= delay_ms)
+        out.push({ id, priority, title, advice, since_ms: began + delay_ms, acknowledged: false });
     };
     if (s.link === 'lost') {
       // Nothing new can be said about the others, so they neither appear nor vanish: they read "when last heard".
-      if (s.recording) out.push({ id: 'link.lost', priority: 'critical', title: 'Link lost: no data from anchord', advice: 'You see last known values. The drone continues its procedure on its own. To act now, use the remote control.', since_ms: s.now_ms - s.silence_ms, acknowledged: false });
+      if (s.recording)
+        out.push({
+          id: 'link.lost',
+          priority: 'critical',
+          title: 'Link lost: no data from anchord',
+          advice:
+            'You see last known values. The drone continues its procedure on its own. To act now, use the remote control.',
+          since_ms: s.now_ms - s.silence_ms,
+          acknowledged: false,
+        });
       return [...out, ...this.heard.map((a) => ({ ...a, title: `${a.title}, when last heard`, acknowledged: true }))];
     }
     const ranging = s.recording && s.range_silence_ms < 60_000;
     const poor = s.fix === 'none' || s.fix === 'single' || s.fix === 'dgps';
-    hold('rtk.lost', s.recording && (poor || (s.correction_age_s ?? 0) > 10), 2000, 'critical', `RTK lost: ${poor ? fix_word(s.fix) : `corrections ${Math.round(s.correction_age_s ?? 0)} s old`}`, 'Ranges are recorded; those without a good position are not used. Check the base radio and the sky view.');
-    hold('rtk.float', ranging && s.fix === 'float', 5000, 'warning', 'RTK is FLOAT', 'Ranges are marked and their weight falls. Hold still in open sky until FIX returns.');
-    hold('uwb.none', ranging && s.range_silence_ms > 5000, 0, 'warning', 'No UWB ranges for 5 s', 'Check the tag and its cable, or fly closer to the anchors.');
+    hold(
+      'rtk.lost',
+      s.recording && (poor || (s.correction_age_s ?? 0) > 10),
+      2000,
+      'critical',
+      `RTK lost: ${poor ? fix_word(s.fix) : `corrections ${Math.round(s.correction_age_s ?? 0)} s old`}`,
+      'Ranges are recorded; those without a good position are not used. Check the base radio and the sky view.',
+    );
+    hold(
+      'rtk.float',
+      ranging && s.fix === 'float',
+      5000,
+      'warning',
+      'RTK is FLOAT',
+      'Ranges are marked and their weight falls. Hold still in open sky until FIX returns.',
+    );
+    hold(
+      'uwb.none',
+      ranging && s.range_silence_ms > 5000,
+      0,
+      'warning',
+      'No UWB ranges for 5 s',
+      'Check the tag and its cable, or fly closer to the anchors.',
+    );
     return (this.heard = out.sort(by_rank));
   }
 }
 
 /// Server's list and the page's own, once per id; the server's word wins where both speak.
-export function merged(own: readonly Alarm[], server: readonly AlarmMsg[], server_now_us: number, now_ms: number): Alarm[] {
+export function merged(
+  own: readonly Alarm[],
+  server: readonly AlarmMsg[],
+  server_now_us: number,
+  now_ms: number,
+): Alarm[] {
   const named = new Map(own.map((a) => [a.id, a]));
   for (const a of server) {
-    named.set(a.id, { id: a.id, priority: a.priority, title: a.text || a.id, advice: named.get(a.id)?.advice ?? '', since_ms: now_ms - Math.max(0, server_now_us - a.since_us) / 1000, acknowledged: a.acknowledged });
+    named.set(a.id, {
+      id: a.id,
+      priority: a.priority,
+      title: a.text || a.id,
+      advice: named.get(a.id)?.advice ?? '',
+      since_ms: now_ms - Math.max(0, server_now_us - a.since_us) / 1000,
+      acknowledged: a.acknowledged,
+    });
   }
   return [...named.values()].sort(by_rank);
 }
 
-export const fix_word = (fix: FixClass | null): string => ({ none: 'NONE', single: 'SINGLE', dgps: 'DGPS', float: 'FLOAT', fixed: 'FIX' })[fix ?? 'none'];
+export const fix_word = (fix: FixClass | null): string =>
+  ({ none: 'NONE', single: 'SINGLE', dgps: 'DGPS', float: 'FLOAT', fixed: 'FIX' })[fix ?? 'none'];
 
 /// Same alarm at most once in 30 s (critical 10 s); a warning sounds once per appearance; muted until a time, or until the next critical.
 export class AlarmLimiter {
@@ -64,10 +124,20 @@ export class AlarmLimiter {
   private muted_until_ms = -Infinity;
   private muted_until_critical = false;
 
-  mute(until_ms: number): void { this.muted_until_ms = until_ms; this.muted_until_critical = false; }
-  mute_until_critical(): void { this.muted_until_critical = true; }
-  unmute(): void { this.muted_until_ms = -Infinity; this.muted_until_critical = false; }
-  muted(now_ms: number): boolean { return this.muted_until_critical || now_ms < this.muted_until_ms; }
+  mute(until_ms: number): void {
+    this.muted_until_ms = until_ms;
+    this.muted_until_critical = false;
+  }
+  mute_until_critical(): void {
+    this.muted_until_critical = true;
+  }
+  unmute(): void {
+    this.muted_until_ms = -Infinity;
+    this.muted_until_critical = false;
+  }
+  muted(now_ms: number): boolean {
+    return this.muted_until_critical || now_ms < this.muted_until_ms;
+  }
 
   /// The one alarm that may sound now, or null. Call at every change and at least once a second.
   due(alarms: readonly Alarm[], now_ms: number): Alarm | null {

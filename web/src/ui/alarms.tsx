@@ -1,5 +1,14 @@
 import { computed, effect, signal } from '@preact/signals';
-import { current_mission, current_scene, link, live_source, now_ms, server_alarms, server_now_us, tick } from '../state/store';
+import {
+  current_mission,
+  current_scene,
+  link,
+  live_source,
+  now_ms,
+  server_alarms,
+  server_now_us,
+  tick,
+} from '../state/store';
 import { AlarmLimiter, Conditions, merged, type Alarm } from './alarm_rules';
 import { clock } from './format';
 import { Mark } from './marks';
@@ -11,19 +20,31 @@ export const sound = signal<'off' | 'on' | 'muted'>('off');
 
 export const alarms = computed<readonly Alarm[]>(() => {
   tick.value;
-  const scene = current_scene(), mission = current_mission.value, now = now_ms();
+  const scene = current_scene(),
+    mission = current_mission.value,
+    now = now_ms();
   const own = conditions.standing({
-    now_ms: now, link: link.value, silence_ms: live_source()?.silence_ms() ?? 0, recording: mission?.state === 'recording', fix: scene?.rtk?.value.fix ?? scene?.pose?.value.fix ?? null,
-    correction_age_s: scene?.rtk?.value.correction_age_s ?? null, range_silence_ms: scene ? now - scene.range_at_ms : Infinity,
+    now_ms: now,
+    link: link.value,
+    silence_ms: live_source()?.silence_ms() ?? 0,
+    recording: mission?.state === 'recording',
+    fix: scene?.rtk?.value.fix ?? scene?.pose?.value.fix ?? null,
+    correction_age_s: scene?.rtk?.value.correction_age_s ?? null,
+    range_silence_ms: scene ? now - scene.range_at_ms : Infinity,
   });
-  return merged(own, link.value === 'lost' ? [] : server_alarms.value, server_now_us(), now).map((a) => (acknowledged.value.has(a.id) ? { ...a, acknowledged: true } : a));
+  return merged(own, link.value === 'lost' ? [] : server_alarms.value, server_now_us(), now).map((a) =>
+    acknowledged.value.has(a.id) ? { ...a, acknowledged: true } : a,
+  );
 });
-effect(() => {  // what cleared may be acknowledged anew when it returns
+effect(() => {
+  // what cleared may be acknowledged anew when it returns
   const standing = new Set(alarms.value.map((a) => a.id));
   const kept = [...acknowledged.peek()].filter((id) => standing.has(id));
   if (kept.length !== acknowledged.peek().size) acknowledged.value = new Set(kept);
 });
-export const acknowledge = (id: string): void => { acknowledged.value = new Set([...acknowledged.value, id]); };
+export const acknowledge = (id: string): void => {
+  acknowledged.value = new Set([...acknowledged.value, id]);
+};
 
 let audio: AudioContext | null = null;
 /// Browsers need a tap before they sound: the button in the strip is that tap.
@@ -32,19 +53,25 @@ export function toggle_sound(): void {
   void audio?.resume();
   sound.value = sound.value === 'on' ? 'muted' : 'on';
   if (sound.value === 'muted') mute();
-  else { limiter.unmute(); tones('warning'); }
+  else {
+    limiter.unmute();
+    tones('warning');
+  }
 }
 export function mute(): void {
   limiter.mute(now_ms() + 120_000);
   if (sound.value === 'on') sound.value = 'muted';
-  setTimeout(() => { if (sound.value === 'muted') sound.value = 'on'; }, 120_000);
+  setTimeout(() => {
+    if (sound.value === 'muted') sound.value = 'on';
+  }, 120_000);
 }
 /// Critical: three fast high tones; warning: two low ones.
 function tones(priority: Alarm['priority']): void {
   if (!audio) return;
   const [n, hz, gap_s] = priority === 'critical' ? [3, 1320, 0.16] : [2, 520, 0.28];
   for (let i = 0; i < n; i++) {
-    const [o, g] = [audio.createOscillator(), audio.createGain()], at = audio.currentTime + i * gap_s;
+    const [o, g] = [audio.createOscillator(), audio.createGain()],
+      at = audio.currentTime + i * gap_s;
     o.frequency.value = hz;
     g.gain.setValueAtTime(0.2, at);
     g.gain.exponentialRampToValueAtTime(0.001, at + gap_s * 0.8);
@@ -59,21 +86,43 @@ effect(() => {
 });
 
 export function AlarmBar() {
-  const list = alarms.value, [first, second] = list.filter((a) => a.priority !== 'advisory');
+  const list = alarms.value,
+    [first, second] = list.filter((a) => a.priority !== 'advisory');
   const quiet = list.length - (first ? 1 : 0) - (second ? 1 : 0);
   const retry = live_source()?.retry_in_ms() ?? null;
   if (!first) return <div class="alarmbar" data-testid="alarm-bar" />;
   const buttons = (a: Alarm) => (
     <>
-      {a.id === 'link.lost' && <button class="btn" onClick={() => live_source()?.retryNow()}>Retry now{retry !== null && <small>in {Math.ceil(retry / 1000)} s</small>}</button>}
-      {a.id === 'link.lost' ? <button class="btn" onClick={mute}>Mute 2 min</button> : !a.acknowledged && <button class="btn" onClick={() => acknowledge(a.id)}>Acknowledge</button>}
+      {a.id === 'link.lost' && (
+        <button class="btn" onClick={() => live_source()?.retryNow()}>
+          Retry now{retry !== null && <small>in {Math.ceil(retry / 1000)} s</small>}
+        </button>
+      )}
+      {a.id === 'link.lost' ? (
+        <button class="btn" onClick={mute}>
+          Mute 2 min
+        </button>
+      ) : (
+        !a.acknowledged && (
+          <button class="btn" onClick={() => acknowledge(a.id)}>
+            Acknowledge
+          </button>
+        )
+      )}
     </>
   );
   const row = (a: Alarm, place: string) => (
     <div class={`alarm ${place} ${a.priority}${a.acknowledged ? ' acked' : ''}`} data-testid={`alarm-${a.id}`}>
       <Mark shape={a.priority === 'critical' ? 'bad' : 'caution'} />
-      {place === 'first' && <span class="clock" aria-hidden="true">{clock((now_ms() - a.since_ms) / 1000, true)}</span>}
-      <div class="grow"><h2>{a.title}</h2>{a.advice && <p>{a.advice}</p>}</div>
+      {place === 'first' && (
+        <span class="clock" aria-hidden="true">
+          {clock((now_ms() - a.since_ms) / 1000, true)}
+        </span>
+      )}
+      <div class="grow">
+        <h2>{a.title}</h2>
+        {a.advice && <p>{a.advice}</p>}
+      </div>
       {buttons(a)}
       {place === 'second' && quiet > 0 && <span class="quiet">+{quiet} quiet</span>}
     </div>
@@ -83,7 +132,9 @@ export function AlarmBar() {
       {row(first, first.priority === 'critical' && !first.acknowledged ? 'first' : 'second')}
       {second && row(second, 'second')}
       {/* Spoken once per alarm, without the running clock; only critical interrupts. */}
-      <p class="sr" role={first.priority === 'critical' ? 'alert' : 'status'}>{first.title}. {first.advice}</p>
+      <p class="sr" role={first.priority === 'critical' ? 'alert' : 'status'}>
+        {first.title}. {first.advice}
+      </p>
     </section>
   );
 }

@@ -14,20 +14,65 @@ import { Strip } from './strip';
 export const route = signal(location.hash);
 addEventListener('hashchange', () => (route.value = location.hash));
 
-const VIEWS = [['live', 'Live'], ['plan', 'Plan'], ['anchors', 'Anchors'], ['measurements', 'Measure'], ['models', 'Models'], ['replay', 'Replay'], ['system', 'System']] as const;
+const VIEWS = [
+  ['live', 'Live'],
+  ['plan', 'Plan'],
+  ['anchors', 'Anchors'],
+  ['measurements', 'Measure'],
+  ['models', 'Models'],
+  ['replay', 'Replay'],
+  ['system', 'System'],
+] as const;
 type View = (typeof VIEWS)[number][0];
 
 function Rail({ view }: { view: View }) {
-  const item = (id: View, name: string) => <a key={id} class={view === id ? 'ri on' : 'ri'} href={`#/${id}`} aria-current={view === id ? 'page' : undefined} data-testid={`nav-${id}`}><Icon name={id} /><span>{name}</span></a>;
-  return <nav class="rail" aria-label="Views">{VIEWS.map(([id, name]) => item(id, name))}<span class="grow" /><button class="ri" onClick={() => (help_open.value = !help_open.value)} aria-expanded={help_open.value}><Icon name="help" /><span>Keys</span></button></nav>;
+  const item = (id: View, name: string) => (
+    <a
+      key={id}
+      class={view === id ? 'ri on' : 'ri'}
+      href={`#/${id}`}
+      aria-current={view === id ? 'page' : undefined}
+      data-testid={`nav-${id}`}
+    >
+      <Icon name={id} />
+      <span>{name}</span>
+    </a>
+  );
+  return (
+    <nav class="rail" aria-label="Views">
+      {VIEWS.map(([id, name]) => item(id, name))}
+      <span class="grow" />
+      <button class="ri" onClick={() => (help_open.value = !help_open.value)} aria-expanded={help_open.value}>
+        <Icon name="help" />
+        <span>Keys</span>
+      </button>
+    </nav>
+  );
 }
 
 /// A view that is not for the field comes in a chunk of its own: the operator's first load stays small.
 function Later<P extends object>({ load, props }: { load: () => Promise<ComponentType<P>>; props: P }) {
-  const [View, set_view] = useState<ComponentType<P> | null>(null), [failed, set_failed] = useState(false);
-  useEffect(() => { load().then((v) => set_view(() => v), () => set_failed(true)); }, []);
-  if (failed) return <div class="empty"><p role="status">This view could not be loaded from anchord. It needs the link to the server once.</p></div>;
-  return View ? <View {...props} /> : <div class="empty"><p role="status">Loading.</p></div>;
+  const [View, set_view] = useState<ComponentType<P> | null>(null),
+    [failed, set_failed] = useState(false);
+  useEffect(() => {
+    load().then(
+      (v) => set_view(() => v),
+      () => set_failed(true),
+    );
+  }, []);
+  if (failed)
+    return (
+      <div class="empty">
+        <p role="status">This view could not be loaded from anchord. It needs the link to the server once.</p>
+      </div>
+    );
+  return View ? (
+    <View {...props} />
+  ) : (
+    <div class="empty">
+      <p role="status">Loading.</p>
+    </div>
+  );
 }
 const load_models = () => import('../views/models/models').then((m) => m.Models);
 const load_plan = () => import('../views/plan/plan').then((m) => m.Plan);
@@ -36,8 +81,10 @@ const load_system = () => import('../views/system/system').then((m) => m.System)
 const load_measurements = () => import('../views/measurements/measurements').then((m) => m.Measurements);
 
 export function App() {
-  const [, name, ...args] = route.value.replace(/^#\/?/, '/').split('/'), arg = args[args.length - 1];
-  const view: View = VIEWS.find(([id]) => id === name)?.[0] ?? 'live', named = arg ? decodeURIComponent(arg) : null;
+  const [, name, ...args] = route.value.replace(/^#\/?/, '/').split('/'),
+    arg = args[args.length - 1];
+  const view: View = VIEWS.find(([id]) => id === name)?.[0] ?? 'live',
+    named = arg ? decodeURIComponent(arg) : null;
   return (
     <div class="app">
       <Strip />
@@ -54,7 +101,14 @@ export function App() {
       </main>
       <SignIn />
       <Help />
-      <div class="toasts" role="status">{toast.value && <div class="toast" key={toast.value.id} data-testid="toast"><Mark shape="ok" />{toast.value.text}</div>}</div>
+      <div class="toasts" role="status">
+        {toast.value && (
+          <div class="toast" key={toast.value.id} data-testid="toast">
+            <Mark shape="ok" />
+            {toast.value.text}
+          </div>
+        )}
+      </div>
     </div>
   );
 }

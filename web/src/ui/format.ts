@@ -7,7 +7,7 @@ export function fixed(value: number | null | undefined, decimals: number): strin
   const text = value.toFixed(decimals);
   return /^-0(\.0+)?$/.test(text) ? text.slice(1) : text.replace('-', '−');
 }
-export const metres = (v: number | null | undefined): string => fixed(v, 3);       ///< positions
+export const metres = (v: number | null | undefined): string => fixed(v, 3); ///< positions
 export const range_m = (v: number | null | undefined): string => fixed(v, 2);
 export const millimetres = (v_m: number | null | undefined): string => fixed(v_m == null ? null : v_m * 1000, 0);
 export const percent = (p: number | null | undefined): string => fixed(p == null ? null : p * 100, 0);
@@ -26,7 +26,10 @@ export function latlon(deg: number | null | undefined): string {
 /// Degrees, minutes and seconds with the hemisphere: 51°01′23.45298″ N. Five decimals of a second are 0.3 mm. Carries are whole: never 60″.
 export function dms(deg: number | null | undefined, axis: 'lat' | 'lon'): string {
   if (deg == null || !Number.isFinite(deg)) return MISSING;
-  const units = Math.round(Math.abs(deg) * 3600 * 1e5), s = units % 6_000_000, m = Math.floor(units / 6_000_000) % 60, d = Math.floor(units / 360_000_000);
+  const units = Math.round(Math.abs(deg) * 3600 * 1e5),
+    s = units % 6_000_000,
+    m = Math.floor(units / 6_000_000) % 60,
+    d = Math.floor(units / 360_000_000);
   return `${d}°${String(m).padStart(2, '0')}′${(s / 1e5).toFixed(5).padStart(8, '0')}″\u00a0${axis === 'lat' ? (deg < 0 ? 'S' : 'N') : deg < 0 ? 'W' : 'E'}`;
 }
 /// What is pasted elsewhere: plain ASCII.
@@ -40,7 +43,9 @@ export function grouped(v: number | null | undefined): string {
 export function clock(seconds: number | null | undefined, short = false): string {
   if (seconds == null || !Number.isFinite(seconds)) return MISSING;
   const s = Math.max(0, Math.floor(seconds));
-  const [h, m, r] = [Math.floor(s / 3600), Math.floor((s % 3600) / 60), s % 60].map((x) => String(x).padStart(2, '0')) as [string, string, string];
+  const [h, m, r] = [Math.floor(s / 3600), Math.floor((s % 3600) / 60), s % 60].map((x) =>
+    String(x).padStart(2, '0'),
+  ) as [string, string, string];
   return short && h === '00' ? `${m}:${r}` : `${h}:${m}:${r}`;
 }
 /// Age in words: 6 s, 4 min, 2 h, 3 d.
@@ -60,8 +65,12 @@ export function accuracy(m: number | null | undefined): string {
 export function bytes(v: number | null | undefined): string {
   if (v == null) return MISSING;
   const units = ['B', 'kB', 'MB', 'GB', 'TB'];
-  let i = 0, x = v;
-  while (x >= 1000 && i < units.length - 1) { x /= 1000; i++; }
+  let i = 0,
+    x = v;
+  while (x >= 1000 && i < units.length - 1) {
+    x /= 1000;
+    i++;
+  }
   return `${x < 10 && i > 0 ? x.toFixed(1) : Math.round(x)} ${units[i]}`;
 }
 /// Local or UTC date and time of an RFC 3339 text, to the minute, with the zone said.

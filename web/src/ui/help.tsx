@@ -4,21 +4,78 @@ import { Icon } from './marks';
 
 export const help_open = signal(false);
 const KEY = 'anchord.keys';
-export const keys_on = signal((() => { try { return localStorage.getItem(KEY) !== 'off'; } catch { return true; } })());
+export const keys_on = signal(
+  (() => {
+    try {
+      return localStorage.getItem(KEY) !== 'off';
+    } catch {
+      return true;
+    }
+  })(),
+);
 
 const KEYS: readonly [string, string][] = [
-  ['1', 'Live'], ['2', 'Plan'], ['3', 'Anchors'], ['4', 'Measurements'], ['5', 'Models'], ['6', 'Replay'], ['7', 'System'], ['J K', 'next, previous measurement'], ['Space ← → , .', 'play, step, previous and next event in a replay'], ['[ ]', 'previous, next anchor'], ['C', 'follow the drone'], ['F', 'fit everything'], ['+ −', 'zoom the map'], ['arrows', 'move the map, when it has the focus'],
-  ['/', 'filter anchors'], ['H', 'hold the aircraft, in flight'], ['T', 'next theme'], ['M', 'mute 2 minutes'], ['A', 'acknowledge the first alarm'], ['?', 'this list'], ['Esc', 'close'],
+  ['1', 'Live'],
+  ['2', 'Plan'],
+  ['3', 'Anchors'],
+  ['4', 'Measurements'],
+  ['5', 'Models'],
+  ['6', 'Replay'],
+  ['7', 'System'],
+  ['J K', 'next, previous measurement'],
+  ['Space ← → , .', 'play, step, previous and next event in a replay'],
+  ['[ ]', 'previous, next anchor'],
+  ['C', 'follow the drone'],
+  ['F', 'fit everything'],
+  ['+ −', 'zoom the map'],
+  ['arrows', 'move the map, when it has the focus'],
+  ['/', 'filter anchors'],
+  ['H', 'hold the aircraft, in flight'],
+  ['T', 'next theme'],
+  ['M', 'mute 2 minutes'],
+  ['A', 'acknowledge the first alarm'],
+  ['?', 'this list'],
+  ['Esc', 'close'],
 ];
 export function Help() {
   const box = useRef<HTMLElement>(null);
-  useEffect(() => { if (help_open.value) box.current?.focus(); }, [help_open.value]);
+  useEffect(() => {
+    if (help_open.value) box.current?.focus();
+  }, [help_open.value]);
   if (!help_open.value) return null;
   return (
     <section class="sheet" role="dialog" aria-labelledby="help-title" tabIndex={-1} ref={box} data-testid="help">
-      <div class="hd"><h2 id="help-title">Keys</h2><button class="btn quiet small" aria-label="Close" onClick={() => (help_open.value = false)}><Icon name="close" /></button></div>
-      <dl class="keys">{KEYS.map(([k, what]) => <div key={k}><dt><kbd>{k}</kbd></dt><dd>{what}</dd></div>)}</dl>
-      <label class="check"><input type="checkbox" checked={keys_on.value} onChange={(e) => { keys_on.value = e.currentTarget.checked; try { localStorage.setItem(KEY, keys_on.value ? 'on' : 'off'); } catch { /* not remembered */ } }} /> Single-letter keys are on</label>
+      <div class="hd">
+        <h2 id="help-title">Keys</h2>
+        <button class="btn quiet small" aria-label="Close" onClick={() => (help_open.value = false)}>
+          <Icon name="close" />
+        </button>
+      </div>
+      <dl class="keys">
+        {KEYS.map(([k, what]) => (
+          <div key={k}>
+            <dt>
+              <kbd>{k}</kbd>
+            </dt>
+            <dd>{what}</dd>
+          </div>
+        ))}
+      </dl>
+      <label class="check">
+        <input
+          type="checkbox"
+          checked={keys_on.value}
+          onChange={(e) => {
+            keys_on.value = e.currentTarget.checked;
+            try {
+              localStorage.setItem(KEY, keys_on.value ? 'on' : 'off');
+            } catch {
+              /* not remembered */
+            }
+          }}
+        />{' '}
+        Single-letter keys are on
+      </label>
       <p class="mut">σ is one sigma and says so; ellipses and ± are 95 %. GDOP is the square root of the trace.</p>
     </section>
   );

@@ -15,9 +15,27 @@ function step_anchor(by: number): void {
   chosen_anchor.value = ids[(at + by + ids.length) % ids.length]!;
 }
 const KEYS: Record<string, () => void> = {
-  1: () => (location.hash = '#/live'), 2: () => (location.hash = '#/plan'), 3: () => (location.hash = '#/anchors'), 4: () => (location.hash = '#/measurements'), 5: () => (location.hash = '#/models'), 6: () => (location.hash = '#/replay'), 7: () => (location.hash = '#/system'), t: next_theme, h: hold_now, m: mute, f: () => current_map.view?.mode('fit'), c: () => current_map.view?.mode('follow'),
-  '+': () => current_map.view?.zoom(1), '-': () => current_map.view?.zoom(-1), '[': () => step_anchor(-1), ']': () => step_anchor(1), '?': () => (help_open.value = !help_open.value),
-  a: () => { const first = alarms.value.find((x) => !x.acknowledged); if (first) acknowledge(first.id); },
+  1: () => (location.hash = '#/live'),
+  2: () => (location.hash = '#/plan'),
+  3: () => (location.hash = '#/anchors'),
+  4: () => (location.hash = '#/measurements'),
+  5: () => (location.hash = '#/models'),
+  6: () => (location.hash = '#/replay'),
+  7: () => (location.hash = '#/system'),
+  t: next_theme,
+  h: hold_now,
+  m: mute,
+  f: () => current_map.view?.mode('fit'),
+  c: () => current_map.view?.mode('follow'),
+  '+': () => current_map.view?.zoom(1),
+  '-': () => current_map.view?.zoom(-1),
+  '[': () => step_anchor(-1),
+  ']': () => step_anchor(1),
+  '?': () => (help_open.value = !help_open.value),
+  a: () => {
+    const first = alarms.value.find((x) => !x.acknowledged);
+    if (first) acknowledge(first.id);
+  },
   '/': () => {
     if (!location.hash.startsWith('#/anchors')) location.hash = '#/anchors';
     const field = document.getElementById('filter');

@@ -2,7 +2,17 @@
 import { signal } from '@preact/signals';
 import type { ComponentChildren } from 'preact';
 import { me } from '../state/session';
-import { current_mission, current_scene, devices, link, live_source, now_ms, server_now_us, system, tick } from '../state/store';
+import {
+  current_mission,
+  current_scene,
+  devices,
+  link,
+  live_source,
+  now_ms,
+  server_now_us,
+  system,
+  tick,
+} from '../state/store';
 import { alarms, sound, toggle_sound } from './alarms';
 import { fix_word } from './alarm_rules';
 import { age, bytes, clock, fixed, millimetres } from './format';
@@ -12,54 +22,201 @@ import { open_sign_in } from './sign_in';
 
 export const open_card = signal<string | null>(null);
 
-interface Reading { tone: Tone; shape: Shape; word: string; extra: string; stale?: boolean; card: ComponentChildren }
+interface Reading {
+  tone: Tone;
+  shape: Shape;
+  word: string;
+  extra: string;
+  stale?: boolean;
+  card: ComponentChildren;
+}
 const look = (tone: 'ok' | 'caution' | 'bad' | 'info' | 'off'): { tone: Tone; shape: Shape } => ({ tone, shape: tone });
 
 function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Reading> {
   tick.value;
-  const now = now_ms(), scene = current_scene(), mission = current_mission.value, running = mission?.state === 'recording', lost = link.value === 'lost';
+  const now = now_ms(),
+    scene = current_scene(),
+    mission = current_mission.value,
+    running = mission?.state === 'recording',
+    lost = link.value === 'lost';
   const silence = live_source()?.silence_ms() ?? Infinity;
   const link_look = { connecting: look('off'), live: look('ok'), late: look('caution'), lost: look('bad') }[link.value];
-  const rtk = scene?.rtk ?? null, rtk_age = rtk ? now - rtk.at_ms : Infinity, rtk_stale = !!rtk && (lost || rtk_age > 2000 || !running);
-  const r = rtk?.value, old = (r?.correction_age_s ?? 0) > 5;
-  const rtk_look = !r || r.fix === 'none' ? look('off') : r.fix === 'single' ? look('bad') : r.fix === 'dgps' ? look('info') : r.fix === 'float' || old ? look('caution') : look('ok');
-  const rows = scene ? [...scene.ranges.values()] : [], heard = rows.filter((x) => now - x.at_ms < 2000).length;
-  const all_seen = Math.max(rows.length, mission?.anchors_found ?? 0, scene?.anchors.size ?? 0), uwb_stale = all_seen > 0 && (lost || !running);
-  const pose = scene?.pose ?? null, pose_stale = !!pose && (lost || now - pose.at_ms > 1000 || !running);
+  const rtk = scene?.rtk ?? null,
+    rtk_age = rtk ? now - rtk.at_ms : Infinity,
+    rtk_stale = !!rtk && (lost || rtk_age > 2000 || !running);
+  const r = rtk?.value,
+    old = (r?.correction_age_s ?? 0) > 5;
+  const rtk_look =
+    !r || r.fix === 'none'
+      ? look('off')
+      : r.fix === 'single'
+        ? look('bad')
+        : r.fix === 'dgps'
+          ? look('info')
+          : r.fix === 'float' || old
+            ? look('caution')
+            : look('ok');
+  const rows = scene ? [...scene.ranges.values()] : [],
+    heard = rows.filter((x) => now - x.at_ms < 2000).length;
+  const all_seen = Math.max(rows.length, mission?.anchors_found ?? 0, scene?.anchors.size ?? 0),
+    uwb_stale = all_seen > 0 && (lost || !running);
+  const pose = scene?.pose ?? null,
+    pose_stale = !!pose && (lost || now - pose.at_ms > 1000 || !running);
   const up = pose?.value.enu_m?.[2] ?? null;
-  const rec_s = mission?.started_us != null ? ((running ? server_now_us() : mission.t_us) - mission.started_us) / 1e6 : null;
+  const rec_s =
+    mission?.started_us != null ? ((running ? server_now_us() : mission.t_us) - mission.started_us) / 1e6 : null;
   // A replayed flight carries old times, so its length is by measurement: newest row minus start.
   const flown_s = mission?.started_us != null && pose ? (pose.value.t_us - mission.started_us) / 1e6 : rec_s;
-  const sys = system.value?.value, craft = scene?.procedure?.value.drone ?? null;
+  const sys = system.value?.value,
+    craft = scene?.procedure?.value.drone ?? null;
   const aged = (ms: number): string => (running || lost ? `${age(ms)} old` : 'ended');
-  const list = alarms.value, worst = list[0]?.priority;
+  const list = alarms.value,
+    worst = list[0]?.priority;
   return {
     link: {
-      ...link_look, word: me.value === null ? 'SIGNED OUT' : link.value === 'connecting' ? 'CONNECTING' : link.value.toUpperCase(), extra: link.value === 'lost' ? clock(silence / 1000, true) : '',
-      card: <><p>{{ connecting: 'Waiting for the first answer of anchord.', live: 'Heartbeats arrive every second.', late: 'No heartbeat for more than 2 s.', lost: 'No heartbeat for more than 5 s. Values are the last known; the page tries again by itself.' }[link.value]}</p>{sys && <p>{fixed(sys.ws_clients, 0)} screens connected, {fixed(sys.queue_depth, 0)} rows waiting to be stored.</p>}</>,
+      ...link_look,
+      word: me.value === null ? 'SIGNED OUT' : link.value === 'connecting' ? 'CONNECTING' : link.value.toUpperCase(),
+      extra: link.value === 'lost' ? clock(silence / 1000, true) : '',
+      card: (
+        <>
+          <p>
+            {
+              {
+                connecting: 'Waiting for the first answer of anchord.',
+                live: 'Heartbeats arrive every second.',
+                late: 'No heartbeat for more than 2 s.',
+                lost: 'No heartbeat for more than 5 s. Values are the last known; the page tries again by itself.',
+              }[link.value]
+            }
+          </p>
+          {sys && (
+            <p>
+              {fixed(sys.ws_clients, 0)} screens connected, {fixed(sys.queue_depth, 0)} rows waiting to be stored.
+            </p>
+          )}
+        </>
+      ),
     },
     rtk: {
-      ...(rtk_stale ? { ...rtk_look, tone: 'off' as Tone } : rtk_look), stale: rtk_stale, word: r ? fix_word(r.fix) : 'NONE', extra: rtk_stale ? aged(rtk_age) : r?.correction_age_s == null ? '' : `${fixed(r.correction_age_s, 1)} s`,
-      card: r ? <><p>{r.fix === 'fixed' ? (old ? 'Fixed, but its corrections are more than 5 s old.' : 'Centimetre positions.') : r.fix === 'float' ? 'Decimetre positions: ranges count less until FIX returns.' : 'No RTK: ranges are recorded, their positions are too poor to use.'}</p><p>{fixed(r.satellites, 0)} satellites, corrections {fixed(r.correction_age_s, 1)} s old, σ E, N, U {r.sigma_m ? r.sigma_m.map((x) => millimetres(x)).join(', ') : '–'} mm (1σ).</p></> : <p>No position has been received for this flight.</p>,
+      ...(rtk_stale ? { ...rtk_look, tone: 'off' as Tone } : rtk_look),
+      stale: rtk_stale,
+      word: r ? fix_word(r.fix) : 'NONE',
+      extra: rtk_stale ? aged(rtk_age) : r?.correction_age_s == null ? '' : `${fixed(r.correction_age_s, 1)} s`,
+      card: r ? (
+        <>
+          <p>
+            {r.fix === 'fixed'
+              ? old
+                ? 'Fixed, but its corrections are more than 5 s old.'
+                : 'Centimetre positions.'
+              : r.fix === 'float'
+                ? 'Decimetre positions: ranges count less until FIX returns.'
+                : 'No RTK: ranges are recorded, their positions are too poor to use.'}
+          </p>
+          <p>
+            {fixed(r.satellites, 0)} satellites, corrections {fixed(r.correction_age_s, 1)} s old, σ E, N, U{' '}
+            {r.sigma_m ? r.sigma_m.map((x) => millimetres(x)).join(', ') : '–'} mm (1σ).
+          </p>
+        </>
+      ) : (
+        <p>No position has been received for this flight.</p>
+      ),
     },
     uwb: {
-      ...(rows.length === 0 || uwb_stale ? look('off') : heard === 0 ? look('bad') : look('ok')), stale: uwb_stale, word: !all_seen ? 'none' : `${uwb_stale ? all_seen : heard}/${all_seen}`, extra: uwb_stale ? (rows.length ? aged(now - (scene?.range_at_ms ?? 0)) : 'ended') : '',
-      card: <p>{rows.length ? `${heard} of ${all_seen} anchors heard in the last 2 s, ${fixed(mission?.range_rate_hz, 0)} ranges a second.` : 'No range has been received for this flight.'}{devices.value.some((d) => d.kind === 'tag') && ` Tags: ${devices.value.filter((d) => d.kind === 'tag').map((d) => `${d.network_id} ${d.state}`).join(', ')}.`}</p>,
+      ...(rows.length === 0 || uwb_stale ? look('off') : heard === 0 ? look('bad') : look('ok')),
+      stale: uwb_stale,
+      word: !all_seen ? 'none' : `${uwb_stale ? all_seen : heard}/${all_seen}`,
+      extra: uwb_stale ? (rows.length ? aged(now - (scene?.range_at_ms ?? 0)) : 'ended') : '',
+      card: (
+        <p>
+          {rows.length
+            ? `${heard} of ${all_seen} anchors heard in the last 2 s, ${fixed(mission?.range_rate_hz, 0)} ranges a second.`
+            : 'No range has been received for this flight.'}
+          {devices.value.some((d) => d.kind === 'tag') &&
+            ` Tags: ${devices.value
+              .filter((d) => d.kind === 'tag')
+              .map((d) => `${d.network_id} ${d.state}`)
+              .join(', ')}.`}
+        </p>
+      ),
     },
-    drone: craft ? {
-      ...(lost ? look('off') : !craft.connected ? look('bad') : craft.failsafe || craft.taken_over ? look('caution') : look('ok')), stale: lost, word: craft.battery === null ? craft.mode || 'seen' : `${fixed(craft.battery * 100, 0)} %`, extra: lost ? 'not known' : !craft.connected ? 'silent' : craft.battery === null ? '' : craft.mode,
-      card: <><p>{craft.connected ? `${craft.autopilot || 'The autopilot'} in mode ${craft.mode}, ${craft.in_air ? 'in the air' : craft.armed ? 'armed on the ground' : 'on the ground'}${craft.above_home_m === null ? '' : `, ${fixed(craft.above_home_m, 1)} m above home`}.` : 'The aircraft has not been heard for 3 s. It follows its own failsafe; use the remote control.'}</p>{craft.text && <p>It says: {craft.text}</p>}</>,
-    } : {
-      ...(pose && !pose_stale ? look('ok') : look('off')), stale: pose_stale, word: pose ? (up === null ? 'seen' : `${fixed(up, 1)} m`) : 'none', extra: pose_stale ? aged(now - pose.at_ms) : pose?.value.speed_mps == null ? '' : `${fixed(pose.value.speed_mps, 1)} m/s`,
-      card: <p>{pose ? 'Height above the origin of this flight, and speed over ground. Battery and mode come with the aircraft link, which this flight does not have.' : 'No position of the aircraft has been received.'}</p>,
-    },
+    drone: craft
+      ? {
+          ...(lost
+            ? look('off')
+            : !craft.connected
+              ? look('bad')
+              : craft.failsafe || craft.taken_over
+                ? look('caution')
+                : look('ok')),
+          stale: lost,
+          word: craft.battery === null ? craft.mode || 'seen' : `${fixed(craft.battery * 100, 0)} %`,
+          extra: lost ? 'not known' : !craft.connected ? 'silent' : craft.battery === null ? '' : craft.mode,
+          card: (
+            <>
+              <p>
+                {craft.connected
+                  ? `${craft.autopilot || 'The autopilot'} in mode ${craft.mode}, ${craft.in_air ? 'in the air' : craft.armed ? 'armed on the ground' : 'on the ground'}${craft.above_home_m === null ? '' : `, ${fixed(craft.above_home_m, 1)} m above home`}.`
+                  : 'The aircraft has not been heard for 3 s. It follows its own failsafe; use the remote control.'}
+              </p>
+              {craft.text && <p>It says: {craft.text}</p>}
+            </>
+          ),
+        }
+      : {
+          ...(pose && !pose_stale ? look('ok') : look('off')),
+          stale: pose_stale,
+          word: pose ? (up === null ? 'seen' : `${fixed(up, 1)} m`) : 'none',
+          extra: pose_stale
+            ? aged(now - pose.at_ms)
+            : pose?.value.speed_mps == null
+              ? ''
+              : `${fixed(pose.value.speed_mps, 1)} m/s`,
+          card: (
+            <p>
+              {pose
+                ? 'Height above the origin of this flight, and speed over ground. Battery and mode come with the aircraft link, which this flight does not have.'
+                : 'No position of the aircraft has been received.'}
+            </p>
+          ),
+        },
     rec: {
-      ...(running ? (sys && !sys.recording ? look('caution') : look('ok')) : look('off')), stale: lost && running, word: running ? clock(flown_s) : 'off', extra: lost && running ? 'not known' : running || !mission ? '' : mission.state,
-      card: <><p>{running ? `${mission.name}: ${mission.n_ranges} ranges and ${mission.n_fixes} fixes stored.` : 'No flight is being recorded.'}</p>{sys && <p>Database {bytes(sys.db_bytes)}, {bytes(sys.disk_free_bytes)} free; a stored row survives {sys.synchronous === 'full' ? 'power loss' : 'a crash of the program'}.</p>}</>,
+      ...(running ? (sys && !sys.recording ? look('caution') : look('ok')) : look('off')),
+      stale: lost && running,
+      word: running ? clock(flown_s) : 'off',
+      extra: lost && running ? 'not known' : running || !mission ? '' : mission.state,
+      card: (
+        <>
+          <p>
+            {running
+              ? `${mission.name}: ${mission.n_ranges} ranges and ${mission.n_fixes} fixes stored.`
+              : 'No flight is being recorded.'}
+          </p>
+          {sys && (
+            <p>
+              Database {bytes(sys.db_bytes)}, {bytes(sys.disk_free_bytes)} free; a stored row survives{' '}
+              {sys.synchronous === 'full' ? 'power loss' : 'a crash of the program'}.
+            </p>
+          )}
+        </>
+      ),
     },
     alarms: {
-      ...(worst === 'critical' ? look('bad') : worst === 'warning' ? look('caution') : look('off')), word: list.length ? String(list.length) : 'none', extra: '',
-      card: list.length ? <ul>{list.map((a) => <li key={a.id}><b>{a.title}</b> {a.priority}{a.acknowledged ? ', acknowledged' : ''}</li>)}</ul> : <p>Nothing is wrong that anchord can see.</p>,
+      ...(worst === 'critical' ? look('bad') : worst === 'warning' ? look('caution') : look('off')),
+      word: list.length ? String(list.length) : 'none',
+      extra: '',
+      card: list.length ? (
+        <ul>
+          {list.map((a) => (
+            <li key={a.id}>
+              <b>{a.title}</b> {a.priority}
+              {a.acknowledged ? ', acknowledged' : ''}
+            </li>
+          ))}
+        </ul>
+      ) : (
+        <p>Nothing is wrong that anchord can see.</p>
+      ),
     },
   };
 }
@@ -67,31 +224,91 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
 const LABELS = { link: 'Link', rtk: 'RTK', uwb: 'UWB', drone: 'Drone', rec: 'Recording', alarms: 'Alarms' } as const;
 
 export function Strip() {
-  const readings = read(), mission = current_mission.value, who = me.value;
+  const readings = read(),
+    mission = current_mission.value,
+    who = me.value;
   const open = open_card.value;
   return (
     <header class="strip">
       <a class="brand" href="#/live" aria-label="anchord">
-        <svg viewBox="0 0 24 24" class="logo" aria-hidden="true"><path d="M12 11.5V21M7 21h10" /><circle cx="12" cy="8.6" r="2.5" /><path d="M6 14.5a8.6 8.6 0 0 1 0-11.8M18 14.5a8.6 8.6 0 0 0 0-11.8" /></svg><span>anchord</span>
+        <svg viewBox="0 0 24 24" class="logo" aria-hidden="true">
+          <path d="M12 11.5V21M7 21h10" />
+          <circle cx="12" cy="8.6" r="2.5" />
+          <path d="M6 14.5a8.6 8.6 0 0 1 0-11.8M18 14.5a8.6 8.6 0 0 0 0-11.8" />
+        </svg>
+        <span>anchord</span>
       </a>
-      <div class="site"><b title={mission?.name ?? ''}>{mission?.name || 'No flight'}</b><span>{mission ? { recording: 'recording', finished: 'finished', planned: 'planned' }[mission.state] : 'nothing recorded yet'}</span></div>
+      <div class="site">
+        <b title={mission?.name ?? ''}>{mission?.name || 'No flight'}</b>
+        <span>
+          {mission
+            ? { recording: 'recording', finished: 'finished', planned: 'planned' }[mission.state]
+            : 'nothing recorded yet'}
+        </span>
+      </div>
       {(Object.keys(LABELS) as (keyof typeof LABELS)[]).map((k) => {
         const r = readings[k];
         return (
           <div class="tilebox" key={k}>
-            <button class={`tile ${k}${r.stale ? ' stale' : ''}${r.extra === 'ended' ? ' over' : ''}`} data-tone={r.tone} data-testid={`status-${k}`} aria-expanded={open === k} onClick={() => (open_card.value = open === k ? null : k)}>
+            <button
+              class={`tile ${k}${r.stale ? ' stale' : ''}${r.extra === 'ended' ? ' over' : ''}`}
+              data-tone={r.tone}
+              data-testid={`status-${k}`}
+              aria-expanded={open === k}
+              onClick={() => (open_card.value = open === k ? null : k)}
+            >
               <span class="tl">{LABELS[k]}</span>
-              <span class="tv"><Mark shape={r.shape} /><b>{r.word}</b>{r.extra && <i>{r.extra}</i>}</span>
+              <span class="tv">
+                <Mark shape={r.shape} />
+                <b>{r.word}</b>
+                {r.extra && <i>{r.extra}</i>}
+              </span>
             </button>
-            {open === k && <div class="card" role="dialog" aria-label={LABELS[k]}><h2>{LABELS[k]}: {r.word}</h2>{r.card}<button class="btn small" onClick={() => (open_card.value = null)}>Close</button></div>}
+            {open === k && (
+              <div class="card" role="dialog" aria-label={LABELS[k]}>
+                <h2>
+                  {LABELS[k]}: {r.word}
+                </h2>
+                {r.card}
+                <button class="btn small" onClick={() => (open_card.value = null)}>
+                  Close
+                </button>
+              </div>
+            )}
           </div>
         );
       })}
       <span class="grow" />
-      {who && <div class="who"><b>{who.auth === 'off' ? 'Open access' : who.name}</b><span>{who.auth === 'off' ? 'this machine only' : who.roles.join(', ')}</span></div>}
-      <button class="ib" data-testid="theme" aria-label={`Theme: ${theme.value}. Change`} title={`Theme: ${theme.value}`} onClick={next_theme}><Icon name={theme.value} /></button>
-      <button class="ib opt" data-testid="sound" aria-label={{ off: 'Sound off. Tap to enable', on: 'Sound on. Mute 2 minutes', muted: 'Muted. Tap to unmute' }[sound.value]} onClick={toggle_sound}><Icon name={sound.value === 'on' ? 'sound' : 'mute'} /></button>
-      <button class="ib opt" data-testid="user" aria-label={who ? 'User' : 'Sign in'} onClick={open_sign_in}><Icon name="user" /></button>
+      {who && (
+        <div class="who">
+          <b>{who.auth === 'off' ? 'Open access' : who.name}</b>
+          <span>{who.auth === 'off' ? 'this machine only' : who.roles.join(', ')}</span>
+        </div>
+      )}
+      <button
+        class="ib"
+        data-testid="theme"
+        aria-label={`Theme: ${theme.value}. Change`}
+        title={`Theme: ${theme.value}`}
+        onClick={next_theme}
+      >
+        <Icon name={theme.value} />
+      </button>
+      <button
+        class="ib opt"
+        data-testid="sound"
+        aria-label={
+          { off: 'Sound off. Tap to enable', on: 'Sound on. Mute 2 minutes', muted: 'Muted. Tap to unmute' }[
+            sound.value
+          ]
+        }
+        onClick={toggle_sound}
+      >
+        <Icon name={sound.value === 'on' ? 'sound' : 'mute'} />
+      </button>
+      <button class="ib opt" data-testid="user" aria-label={who ? 'User' : 'Sign in'} onClick={open_sign_in}>
+        <Icon name="user" />
+      </button>
     </header>
   );
 }

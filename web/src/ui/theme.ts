@@ -23,7 +23,11 @@ effect(() => {
 });
 export function next_theme(): void {
   theme.value = THEMES[(THEMES.indexOf(theme.value) + 1) % THEMES.length]!;
-  try { localStorage.setItem(KEY, theme.value); } catch { /* private window: not remembered */ }
+  try {
+    localStorage.setItem(KEY, theme.value);
+  } catch {
+    /* private window: not remembered */
+  }
 }
 /// Reads a custom property in the theme that is on; for canvases.
 export const css = (name: string): string => getComputedStyle(document.documentElement).getPropertyValue(name).trim();

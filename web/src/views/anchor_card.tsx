@@ -10,14 +10,37 @@ import { Covariance, Loupe } from './loupe';
 
 export function AnchorCard({ anchor }: { anchor: string }) {
   tick.value;
-  const scene = watched_scene(), heard = scene?.anchors.get(anchor);
-  if (!heard) return <section class="sec-p"><div class="hd"><h2>{anchor}</h2><Chip shape="off" tone="off" word="UNSEEN" /></div><p class="why">Ranges arrive, an estimate has not been made yet.</p></section>;
-  const e = heard.value, old_ms = now_ms() - heard.at_ms, stale = watched_mission.value?.state === 'recording' && (watched_lost() || old_ms > 10_000);
+  const scene = watched_scene(),
+    heard = scene?.anchors.get(anchor);
+  if (!heard)
+    return (
+      <section class="sec-p">
+        <div class="hd">
+          <h2>{anchor}</h2>
+          <Chip shape="off" tone="off" word="UNSEEN" />
+        </div>
+        <p class="why">Ranges arrive, an estimate has not been made yet.</p>
+      </section>
+    );
+  const e = heard.value,
+    old_ms = now_ms() - heard.at_ms,
+    stale = watched_mission.value?.state === 'recording' && (watched_lost() || old_ms > 10_000);
   const why = why_not_done(e);
   return (
     <section class="sec-p" data-testid="anchor-card">
-      <div class="hd"><h2><a href={`#/anchors/${anchor}`}>{anchor}</a></h2>{stale && <span class="age">{age(old_ms)} old</span>}<StatusChip status={e.status} /></div>
-      {why && <div class={`callout ${e.status === 'ambiguous' ? 'caution' : e.status === 'moved' ? 'bad' : 'info'}`}><b>{why.title}</b><p>{why.text}</p></div>}
+      <div class="hd">
+        <h2>
+          <a href={`#/anchors/${anchor}`}>{anchor}</a>
+        </h2>
+        {stale && <span class="age">{age(old_ms)} old</span>}
+        <StatusChip status={e.status} />
+      </div>
+      {why && (
+        <div class={`callout ${e.status === 'ambiguous' ? 'caution' : e.status === 'moved' ? 'bad' : 'info'}`}>
+          <b>{why.title}</b>
+          <p>{why.text}</p>
+        </div>
+      )}
       {e.enu_m && <Figures e={e} stale={stale} />}
       <div class="pair detail">
         <Convergence anchor={anchor} />
@@ -32,13 +55,45 @@ export function Figures({ e, stale }: { e: EstimateMsg; stale: boolean }) {
   const cls = stale ? 'stale' : '';
   return (
     <dl class="kv s">
-      <div><dt>E, N, U</dt><dd class={cls}><Q v={e.enu_m ? e.enu_m.map((x) => metres(x)).join(', ') : '–'} u="m" /></dd></div>
-      <div><dt>95 % horizontal</dt><dd class={cls}>{accuracy(e.h95_m)}</dd></div>
-      <div><dt>95 % vertical</dt><dd class={cls}>{accuracy(e.v95_m)}</dd></div>
-      <div><dt>σ h, v (1σ)</dt><dd class={cls}><Q v={`${fixed(sigma_h(e.cov_enu_m2), 3)}, ${fixed(sigma_v(e.cov_enu_m2), 3)}`} u="m" /></dd></div>
-      <div title={`sqrt of the trace; the dissertation's eq. 8.5, the trace itself, is ${fixed(e.gdop_trace, 2)}`}><dt>GDOP</dt><dd class={cls}>{fixed(e.gdop, 2)}</dd></div>
-      <div><dt>Ranges</dt><dd class={cls}>{e.n_ranges}{e.n_refused > 0 && <span class="u"> {e.n_refused} refused</span>}</dd></div>
-      {e.mirror && <div><dt>Odds, here to mirror</dt><dd class={cls}>{percent(e.probability)} to {percent(e.mirror.probability)}</dd></div>}
+      <div>
+        <dt>E, N, U</dt>
+        <dd class={cls}>
+          <Q v={e.enu_m ? e.enu_m.map((x) => metres(x)).join(', ') : '–'} u="m" />
+        </dd>
+      </div>
+      <div>
+        <dt>95 % horizontal</dt>
+        <dd class={cls}>{accuracy(e.h95_m)}</dd>
+      </div>
+      <div>
+        <dt>95 % vertical</dt>
+        <dd class={cls}>{accuracy(e.v95_m)}</dd>
+      </div>
+      <div>
+        <dt>σ h, v (1σ)</dt>
+        <dd class={cls}>
+          <Q v={`${fixed(sigma_h(e.cov_enu_m2), 3)}, ${fixed(sigma_v(e.cov_enu_m2), 3)}`} u="m" />
+        </dd>
+      </div>
+      <div title={`sqrt of the trace; the dissertation's eq. 8.5, the trace itself, is ${fixed(e.gdop_trace, 2)}`}>
+        <dt>GDOP</dt>
+        <dd class={cls}>{fixed(e.gdop, 2)}</dd>
+      </div>
+      <div>
+        <dt>Ranges</dt>
+        <dd class={cls}>
+          {e.n_ranges}
+          {e.n_refused > 0 && <span class="u"> {e.n_refused} refused</span>}
+        </dd>
+      </div>
+      {e.mirror && (
+        <div>
+          <dt>Odds, here to mirror</dt>
+          <dd class={cls}>
+            {percent(e.probability)} to {percent(e.mirror.probability)}
+          </dd>
+        </div>
+      )}
     </dl>
   );
 }

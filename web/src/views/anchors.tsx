@@ -32,7 +32,10 @@ let followed = false;
 function follow_revisions(): void {
   if (followed) return;
   followed = true;
-  effect(() => { revision.value; if (me.value) void load_published(); });
+  effect(() => {
+    revision.value;
+    if (me.value) void load_published();
+  });
 }
 
 /// Metres for the map: an anchor's own ENU, or its place on the globe about the first one where the revision mixes sites or flights.
@@ -40,45 +43,165 @@ function on_the_ground(rows: readonly AnchorRow[]): AnchorRow[] {
   const first = rows.find((r) => r.lon !== null && r.lat !== null);
   if (!first) return [...rows];
   const origin = { lon: first.lon!, lat: first.lat!, h_m: first.h_m ?? 0 };
-  return rows.map((r) => (r.lon === null || r.lat === null ? r : { ...r, enu_m: enu_from_geodetic({ lon: r.lon, lat: r.lat, h_m: r.h_m ?? 0 }, origin), mirror: r.mirror?.lon == null || r.mirror.lat == null ? null : { ...r.mirror, enu_m: enu_from_geodetic({ lon: r.mirror.lon, lat: r.mirror.lat, h_m: r.mirror.h_m ?? 0 }, origin) } }));
+  return rows.map((r) =>
+    r.lon === null || r.lat === null
+      ? r
+      : {
+          ...r,
+          enu_m: enu_from_geodetic({ lon: r.lon, lat: r.lat, h_m: r.h_m ?? 0 }, origin),
+          mirror:
+            r.mirror?.lon == null || r.mirror.lat == null
+              ? null
+              : {
+                  ...r.mirror,
+                  enu_m: enu_from_geodetic({ lon: r.mirror.lon, lat: r.mirror.lat, h_m: r.mirror.h_m ?? 0 }, origin),
+                },
+        },
+  );
 }
 
 export function Anchors({ anchor }: { anchor: string | null }) {
   tick.value;
-  useEffect(() => { document.title = 'Anchors - anchord'; follow_revisions(); }, []);
-  useEffect(() => { if (anchor) chosen_anchor.value = anchor; }, [anchor]);
-  const scene = current_scene(), live = source.value === 'live', mission = current_mission.value;
-  const all = live ? (scene ? [...scene.anchors.values()].map((a) => row_of_estimate(a.value)) : []) : (loaded.value?.rows ?? []);
+  useEffect(() => {
+    document.title = 'Anchors - anchord';
+    follow_revisions();
+  }, []);
+  useEffect(() => {
+    if (anchor) chosen_anchor.value = anchor;
+  }, [anchor]);
+  const scene = current_scene(),
+    live = source.value === 'live',
+    mission = current_mission.value;
+  const all = live
+    ? scene
+      ? [...scene.anchors.values()].map((a) => row_of_estimate(a.value))
+      : []
+    : (loaded.value?.rows ?? []);
   const wanted = filter.value.trim().toLowerCase();
-  const rows = sorted_rows(all.filter((r) => !wanted || `${r.anchor} ${r.name} ${r.status} ${r.verdict}`.toLowerCase().includes(wanted)));
+  const rows = sorted_rows(
+    all.filter((r) => !wanted || `${r.anchor} ${r.name} ${r.status} ${r.verdict}`.toLowerCase().includes(wanted)),
+  );
   const on_map = live ? rows : on_the_ground(rows);
   const selected = rows.find((r) => r.anchor === chosen_anchor.value) ?? rows[0] ?? null;
   const search = useRef<HTMLInputElement>(null);
   const ready = all.filter((r) => r.verdict === 'ok').length;
   const query = live ? `?view=live${mission ? `&mission=${encodeURIComponent(mission.mission)}` : ''}&` : '?';
-  const version = useMemo(() => ({}), [live && scene?.estimates_version, source.value, filter.value, selected?.anchor, loaded.value]);
+  const version = useMemo(
+    () => ({}),
+    [live && scene?.estimates_version, source.value, filter.value, selected?.anchor, loaded.value],
+  );
   return (
     <div class="anchors" data-testid="anchors">
       <div class="toolbar">
         <h1>Anchors</h1>
         <div class="seg" role="group" aria-label="Which positions">
-          <button aria-pressed={live} class={live ? 'on' : ''} data-testid="show-live" onClick={() => (source.value = 'live')}>Live estimates</button>
-          <button aria-pressed={!live} class={live ? '' : 'on'} data-testid="show-published" onClick={() => { source.value = 'published'; void load_published(); }}>Published{revision.value === null ? '' : `, rev ${revision.value}`}</button>
+          <button
+            aria-pressed={live}
+            class={live ? 'on' : ''}
+            data-testid="show-live"
+            onClick={() => (source.value = 'live')}
+          >
+            Live estimates
+          </button>
+          <button
+            aria-pressed={!live}
+            class={live ? '' : 'on'}
+            data-testid="show-published"
+            onClick={() => {
+              source.value = 'published';
+              void load_published();
+            }}
+          >
+            Published{revision.value === null ? '' : `, rev ${revision.value}`}
+          </button>
         </div>
-        <label class="search"><span class="sr">Filter anchors</span><input id="filter" ref={search} value={filter.value} placeholder={`Filter ${all.length} anchor${all.length === 1 ? '' : 's'}`} data-testid="filter" onInput={(e) => (filter.value = e.currentTarget.value)} /><kbd aria-hidden="true">/</kbd></label>
+        <label class="search">
+          <span class="sr">Filter anchors</span>
+          <input
+            id="filter"
+            ref={search}
+            value={filter.value}
+            placeholder={`Filter ${all.length} anchor${all.length === 1 ? '' : 's'}`}
+            data-testid="filter"
+            onInput={(e) => (filter.value = e.currentTarget.value)}
+          />
+          <kbd aria-hidden="true">/</kbd>
+        </label>
         <span class="grow" />
         <ColumnPicker live={live} />
-        <button class="btn" data-testid="compare" disabled={link.value === 'lost'} onClick={() => { publish_open.value = false; compare_open.value = true; }}>Compare</button>
-        <a class="btn" href={api_url(`/anchors${query}format=csv`)} download="anchors.csv" data-testid="csv"><Icon name="download" />CSV</a>
-        <a class="btn" href={api_url(`/anchors${query}format=geojson`)} download="anchors.geojson" data-testid="geojson"><Icon name="download" />GeoJSON</a>
-        {may_publish.value && <button class="btn primary" data-testid="review" disabled={!mission || !all.length || link.value === 'lost'} onClick={() => { compare_open.value = false; publish_open.value = true; }}>Review and publish{live && all.length ? `, ${ready} of ${all.length}` : ''}</button>}
+        <button
+          class="btn"
+          data-testid="compare"
+          disabled={link.value === 'lost'}
+          onClick={() => {
+            publish_open.value = false;
+            compare_open.value = true;
+          }}
+        >
+          Compare
+        </button>
+        <a class="btn" href={api_url(`/anchors${query}format=csv`)} download="anchors.csv" data-testid="csv">
+          <Icon name="download" />
+          CSV
+        </a>
+        <a
+          class="btn"
+          href={api_url(`/anchors${query}format=geojson`)}
+          download="anchors.geojson"
+          data-testid="geojson"
+        >
+          <Icon name="download" />
+          GeoJSON
+        </a>
+        {may_publish.value && (
+          <button
+            class="btn primary"
+            data-testid="review"
+            disabled={!mission || !all.length || link.value === 'lost'}
+            onClick={() => {
+              compare_open.value = false;
+              publish_open.value = true;
+            }}
+          >
+            Review and publish{live && all.length ? `, ${ready} of ${all.length}` : ''}
+          </button>
+        )}
       </div>
       <section class="tablebox" aria-label="Anchor table" tabIndex={0}>
-        {problem.value && !live && <div class="problem" role="status"><b>The published positions could not be read.</b> {problem.value} <button class="btn small" onClick={() => void load_published()}>Try again</button></div>}
-        {rows.length ? <AnchorTable rows={rows} selected={selected?.anchor ?? null} live={live} /> : <Nothing live={live} filtered={all.length > 0} />}
+        {problem.value && !live && (
+          <div class="problem" role="status">
+            <b>The published positions could not be read.</b> {problem.value}{' '}
+            <button class="btn small" onClick={() => void load_published()}>
+              Try again
+            </button>
+          </div>
+        )}
+        {rows.length ? (
+          <AnchorTable rows={rows} selected={selected?.anchor ?? null} live={live} />
+        ) : (
+          <Nothing live={live} filtered={all.length > 0} />
+        )}
       </section>
-      <MapBox content={() => ({ anchors: on_map, selected: selected?.anchor ?? null, scene: live ? current_scene() : null, link_lost: link.peek() === 'lost', running: mission?.state === 'recording' })} onSelect={(a) => (chosen_anchor.value = a)} label="Map of the anchors in the table" follow={false} version={version} />
-      <aside class="detailbox" aria-label="Selected anchor" tabIndex={0}>{selected ? <AnchorDetail row={selected} live={live} changed={() => void load_published()} /> : <p class="why pad">Nothing is selected.</p>}</aside>
+      <MapBox
+        content={() => ({
+          anchors: on_map,
+          selected: selected?.anchor ?? null,
+          scene: live ? current_scene() : null,
+          link_lost: link.peek() === 'lost',
+          running: mission?.state === 'recording',
+        })}
+        onSelect={(a) => (chosen_anchor.value = a)}
+        label="Map of the anchors in the table"
+        follow={false}
+        version={version}
+      />
+      <aside class="detailbox" aria-label="Selected anchor" tabIndex={0}>
+        {selected ? (
+          <AnchorDetail row={selected} live={live} changed={() => void load_published()} />
+        ) : (
+          <p class="why pad">Nothing is selected.</p>
+        )}
+      </aside>
       {compare_open.value && <CompareCalibrations />}
       {publish_open.value && mission && <Publish mission={mission} />}
     </div>
@@ -86,7 +209,30 @@ export function Anchors({ anchor }: { anchor: string | null }) {
 }
 
 function Nothing({ live, filtered }: { live: boolean; filtered: boolean }) {
-  if (filtered) return <div class="empty small"><p>No anchor matches the filter.</p><button class="btn" onClick={() => (filter.value = '')}>Clear the filter</button></div>;
-  if (live) return <div class="empty small"><p>{synced.value ? 'No anchor has been heard in this flight.' : 'Loading.'}</p><a class="btn" href="#/live">Go to Live</a></div>;
-  return <div class="empty small"><p>Nothing is published yet. Facility tools see an empty list until a calibration is published.</p><button class="btn" onClick={() => (source.value = 'live')}>Show live estimates</button></div>;
+  if (filtered)
+    return (
+      <div class="empty small">
+        <p>No anchor matches the filter.</p>
+        <button class="btn" onClick={() => (filter.value = '')}>
+          Clear the filter
+        </button>
+      </div>
+    );
+  if (live)
+    return (
+      <div class="empty small">
+        <p>{synced.value ? 'No anchor has been heard in this flight.' : 'Loading.'}</p>
+        <a class="btn" href="#/live">
+          Go to Live
+        </a>
+      </div>
+    );
+  return (
+    <div class="empty small">
+      <p>Nothing is published yet. Facility tools see an empty list until a calibration is published.</p>
+      <button class="btn" onClick={() => (source.value = 'live')}>
+        Show live estimates
+      </button>
+    </div>
+  );
 }

@@ -8,39 +8,113 @@ import { say } from '../state/store';
 import { use_draft } from '../ui/use_draft';
 
 const FIELDS: readonly (readonly [Exclude<keyof Fields, 'external_ids'>, string, string])[] = [
-  ['name', 'Name', 'Hall A north-west'], ['building', 'Building', 'B1'], ['floor', 'Floor', '0'], ['space', 'Room', 'A0.12'], ['asset_tag', 'Asset tag', 'as on its label'], ['ifc_guid', 'IFC GUID', '22 characters of the model'],
+  ['name', 'Name', 'Hall A north-west'],
+  ['building', 'Building', 'B1'],
+  ['floor', 'Floor', '0'],
+  ['space', 'Room', 'A0.12'],
+  ['asset_tag', 'Asset tag', 'as on its label'],
+  ['ifc_guid', 'IFC GUID', '22 characters of the model'],
 ];
 
 const key_of = (anchor: string): string => `facility/${anchor}`;
 export function FacilityPanel({ anchor, changed }: { anchor: string; changed: () => void }) {
-  const [read, set_read] = useState<(Facility & { readonly anchor: string }) | null>(null), [problem, set_problem] = useState(''), [editing, set_editing] = useState('');
-  const load = (): Promise<void> => facility(anchor).then((f) => set_read({ ...f, anchor }), (e: unknown) => { if (!(e instanceof ApiError && e.problem.status === 404)) set_problem(said(e)); });
-  useEffect(() => { set_problem(''); set_editing(draft_of(key_of(anchor)) ? anchor : ''); void load(); }, [anchor]);
+  const [read, set_read] = useState<(Facility & { readonly anchor: string }) | null>(null),
+    [problem, set_problem] = useState(''),
+    [editing, set_editing] = useState('');
+  const load = (): Promise<void> =>
+    facility(anchor).then(
+      (f) => set_read({ ...f, anchor }),
+      (e: unknown) => {
+        if (!(e instanceof ApiError && e.problem.status === 404)) set_problem(said(e));
+      },
+    );
+  useEffect(() => {
+    set_problem('');
+    set_editing(draft_of(key_of(anchor)) ? anchor : '');
+    void load();
+  }, [anchor]);
   const known = read?.anchor === anchor ? read : null;
   if (!known && !problem) return null;
   return (
     <section class="sec-p" data-testid="facility">
-      <div class="hd"><h2>Facility</h2>{known && may('integrator') && editing !== anchor && <button class="btn small" data-testid="facility-edit" onClick={() => set_editing(anchor)}>Edit</button>}</div>
-      {problem && <div class="problem" role="status"><b>That did not work.</b> {problem}</div>}
+      <div class="hd">
+        <h2>Facility</h2>
+        {known && may('integrator') && editing !== anchor && (
+          <button class="btn small" data-testid="facility-edit" onClick={() => set_editing(anchor)}>
+            Edit
+          </button>
+        )}
+      </div>
+      {problem && (
+        <div class="problem" role="status">
+          <b>That did not work.</b> {problem}
+        </div>
+      )}
       {known && editing !== anchor && <Shown fields={known.fields} />}
-      {known && editing === anchor && <Form anchor={anchor} known={known} reload={load} failed={set_problem} close={() => { set_editing(''); set_problem(''); }} done={(f) => { set_read({ ...f, anchor }); set_editing(''); set_problem(''); changed(); say(`${anchor} changed`); }} />}
+      {known && editing === anchor && (
+        <Form
+          anchor={anchor}
+          known={known}
+          reload={load}
+          failed={set_problem}
+          close={() => {
+            set_editing('');
+            set_problem('');
+          }}
+          done={(f) => {
+            set_read({ ...f, anchor });
+            set_editing('');
+            set_problem('');
+            changed();
+            say(`${anchor} changed`);
+          }}
+        />
+      )}
     </section>
   );
 }
 
 function Shown({ fields }: { fields: Fields }) {
   const given = FIELDS.filter(([key]) => fields[key]);
-  if (!given.length && !fields.external_ids.length) return <p class="why">Nothing is noted: no name, room or asset tag.</p>;
-  return <dl class="kv s">{given.map(([key, words]) => <div key={key}><dt>{words}</dt><dd>{fields[key]}</dd></div>)}{fields.external_ids.map((e) => <div key={`${e.system}/${e.id}`}><dt>{e.system}</dt><dd>{e.id}</dd></div>)}</dl>;
+  if (!given.length && !fields.external_ids.length)
+    return <p class="why">Nothing is noted: no name, room or asset tag.</p>;
+  return (
+    <dl class="kv s">
+      {given.map(([key, words]) => (
+        <div key={key}>
+          <dt>{words}</dt>
+          <dd>{fields[key]}</dd>
+        </div>
+      ))}
+      {fields.external_ids.map((e) => (
+        <div key={`${e.system}/${e.id}`}>
+          <dt>{e.system}</dt>
+          <dd>{e.id}</dd>
+        </div>
+      ))}
+    </dl>
+  );
 }
 
-interface Editing { anchor: string; known: Facility; done: (f: Facility) => void; close: () => void; reload: () => Promise<void>; failed: (why: string) => void }
+interface Editing {
+  anchor: string;
+  known: Facility;
+  done: (f: Facility) => void;
+  close: () => void;
+  reload: () => Promise<void>;
+  failed: (why: string) => void;
+}
 function Form({ anchor, known, done, close, reload, failed }: Editing) {
   // Only what was typed is kept, not the fields beside it: those may be others' by the time it is sent.
-  const [{ typed }, keep, forget] = use_draft<{ typed: Partial<Fields> }>(key_of(anchor), { typed: {} }), [busy, set_busy] = useState(false);
-  const form: Fields = { ...known.fields, ...typed }, change = (part: Partial<Fields>): void => keep({ typed: { ...typed, ...part } });
-  const patch = patch_of(known.fields, form), same = Object.keys(patch).length === 0;
-  const ids = form.external_ids, set_id = (i: number, part: { system?: string; id?: string }): void => change({ external_ids: ids.map((e, k) => (k === i ? { ...e, ...part } : e)) });
+  const [{ typed }, keep, forget] = use_draft<{ typed: Partial<Fields> }>(key_of(anchor), { typed: {} }),
+    [busy, set_busy] = useState(false);
+  const form: Fields = { ...known.fields, ...typed },
+    change = (part: Partial<Fields>): void => keep({ typed: { ...typed, ...part } });
+  const patch = patch_of(known.fields, form),
+    same = Object.keys(patch).length === 0;
+  const ids = form.external_ids,
+    set_id = (i: number, part: { system?: string; id?: string }): void =>
+      change({ external_ids: ids.map((e, k) => (k === i ? { ...e, ...part } : e)) });
   const save = async (): Promise<void> => {
     set_busy(true);
     failed('');
@@ -51,18 +125,89 @@ function Form({ anchor, known, done, close, reload, failed }: Editing) {
     } catch (e) {
       const overtaken = e instanceof ApiError && e.problem.status === 412;
       if (overtaken) await reload();
-      failed(overtaken ? 'Somebody changed this anchor meanwhile; their fields are shown, and yours are kept. Look again, then save.' : said(e));
+      failed(
+        overtaken
+          ? 'Somebody changed this anchor meanwhile; their fields are shown, and yours are kept. Look again, then save.'
+          : said(e),
+      );
       set_busy(false);
     }
   };
   return (
-    <form class="facility" aria-label={`Facility data of ${anchor}`} onSubmit={(e) => { e.preventDefault(); void save(); }}>
-      {FIELDS.map(([key, words, hint]) => <label key={key}><span class="lab">{words}</span><input value={form[key]} placeholder={hint} maxLength={200} onInput={(e) => change({ [key]: e.currentTarget.value })} /></label>)}
-      <fieldset><legend class="lab">Names in other systems</legend>
-        {ids.map((e, i) => <div class="pairrow" key={i}><input required aria-label={`System ${i + 1}`} placeholder="Archibus" maxLength={60} value={e.system} onInput={(x) => set_id(i, { system: x.currentTarget.value })} /><input required aria-label={`Name in system ${i + 1}`} placeholder="its id there" maxLength={200} value={e.id} onInput={(x) => set_id(i, { id: x.currentTarget.value })} /><button type="button" class="btn" aria-label={`Remove system ${i + 1}`} onClick={() => change({ external_ids: ids.filter((_, k) => k !== i) })}>Remove</button></div>)}
-        {ids.length < 32 && <button type="button" class="btn small" onClick={() => change({ external_ids: [...ids, { system: '', id: '' }] })}>Add a system</button>}
+    <form
+      class="facility"
+      aria-label={`Facility data of ${anchor}`}
+      onSubmit={(e) => {
+        e.preventDefault();
+        void save();
+      }}
+    >
+      {FIELDS.map(([key, words, hint]) => (
+        <label key={key}>
+          <span class="lab">{words}</span>
+          <input
+            value={form[key]}
+            placeholder={hint}
+            maxLength={200}
+            onInput={(e) => change({ [key]: e.currentTarget.value })}
+          />
+        </label>
+      ))}
+      <fieldset>
+        <legend class="lab">Names in other systems</legend>
+        {ids.map((e, i) => (
+          <div class="pairrow" key={i}>
+            <input
+              required
+              aria-label={`System ${i + 1}`}
+              placeholder="Archibus"
+              maxLength={60}
+              value={e.system}
+              onInput={(x) => set_id(i, { system: x.currentTarget.value })}
+            />
+            <input
+              required
+              aria-label={`Name in system ${i + 1}`}
+              placeholder="its id there"
+              maxLength={200}
+              value={e.id}
+              onInput={(x) => set_id(i, { id: x.currentTarget.value })}
+            />
+            <button
+              type="button"
+              class="btn"
+              aria-label={`Remove system ${i + 1}`}
+              onClick={() => change({ external_ids: ids.filter((_, k) => k !== i) })}
+            >
+              Remove
+            </button>
+          </div>
+        ))}
+        {ids.length < 32 && (
+          <button
+            type="button"
+            class="btn small"
+            onClick={() => change({ external_ids: [...ids, { system: '', id: '' }] })}
+          >
+            Add a system
+          </button>
+        )}
       </fieldset>
-      <span class="actions"><button type="button" class="btn" onClick={() => { forget(); close(); }}>Cancel</button><button class="btn primary" data-testid="facility-save" disabled={busy || same}>Save</button></span>
+      <span class="actions">
+        <button
+          type="button"
+          class="btn"
+          onClick={() => {
+            forget();
+            close();
+          }}
+        >
+          Cancel
+        </button>
+        <button class="btn primary" data-testid="facility-save" disabled={busy || same}>
+          Save
+        </button>
+      </span>
     </form>
   );
 }

@@ -2,7 +2,16 @@
 import { signal } from '@preact/signals';
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { idempotency_key, said } from '../api/client';
-import { calibrate, moved_since_published, note_of, publish, report_url, type AnchorRow, type Calibration, type Moved } from '../api/anchors';
+import {
+  calibrate,
+  moved_since_published,
+  note_of,
+  publish,
+  report_url,
+  type AnchorRow,
+  type Calibration,
+  type Moved,
+} from '../api/anchors';
 import type { MissionMsg } from '../live/messages';
 import { current_scene, revision, say } from '../state/store';
 import { accuracy, fixed } from '../ui/format';
@@ -13,47 +22,164 @@ import { gate_words, VERDICT_WORDS } from '../ui/words';
 export const publish_open = signal(false);
 
 export function Publish({ mission }: { mission: MissionMsg }) {
-  const [draft, set_draft] = useState<Calibration | null>(null), [moved, set_moved] = useState<ReadonlyMap<string, Moved>>(new Map()), [problem, set_problem] = useState(''), [busy, set_busy] = useState<'' | 'calibrating' | 'publishing'>('calibrating');
-  const keys = useRef({ calibrate: idempotency_key(), publish: idempotency_key() }), [form, change, forget] = use_draft(`publish/${mission.mission}`, { note: '', reasons: {} as Readonly<Record<string, string>>, left: {} as Readonly<Record<string, string>> }), { note, reasons, left } = form, box = useRef<HTMLElement>(null);
+  const [draft, set_draft] = useState<Calibration | null>(null),
+    [moved, set_moved] = useState<ReadonlyMap<string, Moved>>(new Map()),
+    [problem, set_problem] = useState(''),
+    [busy, set_busy] = useState<'' | 'calibrating' | 'publishing'>('calibrating');
+  const keys = useRef({ calibrate: idempotency_key(), publish: idempotency_key() }),
+    [form, change, forget] = use_draft(`publish/${mission.mission}`, {
+      note: '',
+      reasons: {} as Readonly<Record<string, string>>,
+      left: {} as Readonly<Record<string, string>>,
+    }),
+    { note, reasons, left } = form,
+    box = useRef<HTMLElement>(null);
   const guarded = async (what: 'calibrating' | 'publishing', work: () => Promise<void>): Promise<void> => {
     set_busy(what);
     set_problem('');
-    try { await work(); } catch (e) { set_problem(said(e)); }
+    try {
+      await work();
+    } catch (e) {
+      set_problem(said(e));
+    }
     set_busy('');
   };
-  const solve = (): void => void guarded('calibrating', async () => {
-    const made = await calibrate(mission.mission, keys.current.calibrate);
-    set_draft(made);
-    set_moved(await moved_since_published(made.id).catch(() => new Map()));
-  });
-  useEffect(() => { box.current?.focus(); solve(); }, []);
-  const out = Object.entries(left).filter(([id]) => draft?.rows.some((r) => r.anchor === id && passes(r))), good = draft?.rows.filter((r) => passes(r) && left[r.anchor] === undefined) ?? [], overrides = Object.entries(reasons).filter(([id, reason]) => reason.trim() !== '' && draft?.rows.some((r) => r.anchor === id && may_override(r))).map(([network_id, reason]) => ({ network_id, reason: reason.trim() }));
+  const solve = (): void =>
+    void guarded('calibrating', async () => {
+      const made = await calibrate(mission.mission, keys.current.calibrate);
+      set_draft(made);
+      set_moved(await moved_since_published(made.id).catch(() => new Map()));
+    });
+  useEffect(() => {
+    box.current?.focus();
+    solve();
+  }, []);
+  const out = Object.entries(left).filter(([id]) => draft?.rows.some((r) => r.anchor === id && passes(r))),
+    good = draft?.rows.filter((r) => passes(r) && left[r.anchor] === undefined) ?? [],
+    overrides = Object.entries(reasons)
+      .filter(([id, reason]) => reason.trim() !== '' && draft?.rows.some((r) => r.anchor === id && may_override(r)))
+      .map(([network_id, reason]) => ({ network_id, reason: reason.trim() }));
   const going = good.length + overrides.length;
-  const send = (): void => void guarded('publishing', async () => {
-    const n = await publish(draft!.id, note_of(note, out), overrides, keys.current.publish, out.length ? [...good.map((r) => r.anchor), ...overrides.map((o) => o.network_id)] : null);
-    if (n !== null) revision.value = Math.max(revision.value ?? 0, n);
-    say(`Published${n === null ? '' : ` as revision ${n}`}`);
-    forget();
-    publish_open.value = false;
-  });
+  const send = (): void =>
+    void guarded('publishing', async () => {
+      const n = await publish(
+        draft!.id,
+        note_of(note, out),
+        overrides,
+        keys.current.publish,
+        out.length ? [...good.map((r) => r.anchor), ...overrides.map((o) => o.network_id)] : null,
+      );
+      if (n !== null) revision.value = Math.max(revision.value ?? 0, n);
+      say(`Published${n === null ? '' : ` as revision ${n}`}`);
+      forget();
+      publish_open.value = false;
+    });
   return (
-    <section class="drawer" role="dialog" aria-modal="false" aria-labelledby="publish-title" tabIndex={-1} ref={box} data-testid="publish">
-      <div class="hd big"><h2 id="publish-title">Review and publish</h2><span class="grow" /><button class="btn quiet" aria-label="Close" onClick={() => (publish_open.value = false)}><Icon name="close" /></button></div>
-      <p class="why">{mission.name}: all stored ranges are solved again, together. What is published is what facility tools read; the running estimates are not.</p>
+    <section
+      class="drawer"
+      role="dialog"
+      aria-modal="false"
+      aria-labelledby="publish-title"
+      tabIndex={-1}
+      ref={box}
+      data-testid="publish"
+    >
+      <div class="hd big">
+        <h2 id="publish-title">Review and publish</h2>
+        <span class="grow" />
+        <button class="btn quiet" aria-label="Close" onClick={() => (publish_open.value = false)}>
+          <Icon name="close" />
+        </button>
+      </div>
+      <p class="why">
+        {mission.name}: all stored ranges are solved again, together. What is published is what facility tools read; the
+        running estimates are not.
+      </p>
       {busy === 'calibrating' && <p role="status">Solving {mission.n_ranges} ranges.</p>}
-      {problem && <div class="problem" role="status"><b>That did not work.</b> {problem}{!draft && <button class="btn small" onClick={() => { keys.current.calibrate = idempotency_key(); solve(); }}>Try again</button>}</div>}
+      {problem && (
+        <div class="problem" role="status">
+          <b>That did not work.</b> {problem}
+          {!draft && (
+            <button
+              class="btn small"
+              onClick={() => {
+                keys.current.calibrate = idempotency_key();
+                solve();
+              }}
+            >
+              Try again
+            </button>
+          )}
+        </div>
+      )}
       {draft && (
         <>
           <div class="scroll" tabIndex={0} aria-label="Result of the calibration">
             <table class="tbl" data-testid="draft">
               <caption class="sr">Result of the calibration for each anchor</caption>
-              <thead><tr><th scope="col">Anchor</th><th scope="col">Result</th><th scope="col" class="num">95 % h</th><th scope="col" class="num">95 % v</th><th scope="col" class="num">From live, m</th><th scope="col" class="num">From published, m</th><th scope="col">Published</th></tr></thead>
-              <tbody>{draft.rows.map((r) => <DraftRow key={r.anchor} r={r} moved={moved.get(r.anchor)} reason={reasons[r.anchor]} set_reason={(reason) => change({ reasons: { ...reasons, [r.anchor]: reason } })} left={left[r.anchor]} leave={(why) => change({ left: why === null ? Object.fromEntries(Object.entries(left).filter(([id]) => id !== r.anchor)) : { ...left, [r.anchor]: why } })} />)}</tbody>
+              <thead>
+                <tr>
+                  <th scope="col">Anchor</th>
+                  <th scope="col">Result</th>
+                  <th scope="col" class="num">
+                    95 % h
+                  </th>
+                  <th scope="col" class="num">
+                    95 % v
+                  </th>
+                  <th scope="col" class="num">
+                    From live, m
+                  </th>
+                  <th scope="col" class="num">
+                    From published, m
+                  </th>
+                  <th scope="col">Published</th>
+                </tr>
+              </thead>
+              <tbody>
+                {draft.rows.map((r) => (
+                  <DraftRow
+                    key={r.anchor}
+                    r={r}
+                    moved={moved.get(r.anchor)}
+                    reason={reasons[r.anchor]}
+                    set_reason={(reason) => change({ reasons: { ...reasons, [r.anchor]: reason } })}
+                    left={left[r.anchor]}
+                    leave={(why) =>
+                      change({
+                        left:
+                          why === null
+                            ? Object.fromEntries(Object.entries(left).filter(([id]) => id !== r.anchor))
+                            : { ...left, [r.anchor]: why },
+                      })
+                    }
+                  />
+                ))}
+              </tbody>
             </table>
           </div>
-          <label class="lab" for="note">Note</label>
-          <input id="note" value={note} onInput={(e) => change({ note: e.currentTarget.value })} placeholder="What this revision is about" maxLength={200} />
-          <div class="actions"><a class="btn" href={report_url(draft.id)} target="_blank" rel="noreferrer" data-testid="report">Report to print</a><span class="grow" /><button class="btn" onClick={() => (publish_open.value = false)}>Not now</button><button class="btn primary" data-testid="publish-now" disabled={busy !== '' || going === 0} onClick={send}>{busy === 'publishing' ? 'Publishing' : `Publish ${going} of ${draft.rows.length} anchors`}</button></div>
+          <label class="lab" for="note">
+            Note
+          </label>
+          <input
+            id="note"
+            value={note}
+            onInput={(e) => change({ note: e.currentTarget.value })}
+            placeholder="What this revision is about"
+            maxLength={200}
+          />
+          <div class="actions">
+            <a class="btn" href={report_url(draft.id)} target="_blank" rel="noreferrer" data-testid="report">
+              Report to print
+            </a>
+            <span class="grow" />
+            <button class="btn" onClick={() => (publish_open.value = false)}>
+              Not now
+            </button>
+            <button class="btn primary" data-testid="publish-now" disabled={busy !== '' || going === 0} onClick={send}>
+              {busy === 'publishing' ? 'Publishing' : `Publish ${going} of ${draft.rows.length} anchors`}
+            </button>
+          </div>
         </>
       )}
     </section>
@@ -65,20 +191,92 @@ const passes = (r: AnchorRow): boolean => r.acceptable ?? r.verdict === 'ok';
 /// Two places that fit cannot be talked into one; anything else a person may answer for.
 const may_override = (r: AnchorRow): boolean => !passes(r) && r.verdict !== 'ambiguous' && r.enu_m !== null;
 
-function DraftRow({ r, moved, reason, set_reason, left, leave }: { r: AnchorRow; moved: Moved | undefined; reason: string | undefined; set_reason: (reason: string) => void; left: string | undefined; leave: (why: string | null) => void }) {
-  const live = current_scene()?.anchors.get(r.anchor)?.value, failed = r.gates.filter((g) => !g.passed);
-  const shift = live?.enu_m && r.enu_m ? Math.hypot(r.enu_m[0] - live.enu_m[0], r.enu_m[1] - live.enu_m[1], r.enu_m[2] - live.enu_m[2]) : null;
+function DraftRow({
+  r,
+  moved,
+  reason,
+  set_reason,
+  left,
+  leave,
+}: {
+  r: AnchorRow;
+  moved: Moved | undefined;
+  reason: string | undefined;
+  set_reason: (reason: string) => void;
+  left: string | undefined;
+  leave: (why: string | null) => void;
+}) {
+  const live = current_scene()?.anchors.get(r.anchor)?.value,
+    failed = r.gates.filter((g) => !g.passed);
+  const shift =
+    live?.enu_m && r.enu_m
+      ? Math.hypot(r.enu_m[0] - live.enu_m[0], r.enu_m[1] - live.enu_m[1], r.enu_m[2] - live.enu_m[2])
+      : null;
   const from = moved?.horizontal_m == null ? null : Math.hypot(moved.horizontal_m, moved.vertical_m ?? 0);
   return (
     <tr>
       <th scope="row">{r.anchor}</th>
-      <td><StatusChip status={r.status} /><span class="mut block wrap">{r.verdict === 'ok' ? '' : r.reason || VERDICT_WORDS[r.verdict]}</span></td>
-      <td class="num">{accuracy(r.h95_m)}</td><td class="num">{accuracy(r.v95_m)}</td><td class="num">{fixed(shift, 3)}</td>
-      <td class="num">{from === null ? <span class="mut">new</span> : fixed(from, 3)}{moved?.change === 'moved' && <span class="bad block"><Mark shape="bad" tone="bad" /> moved</span>}</td>
+      <td>
+        <StatusChip status={r.status} />
+        <span class="mut block wrap">{r.verdict === 'ok' ? '' : r.reason || VERDICT_WORDS[r.verdict]}</span>
+      </td>
+      <td class="num">{accuracy(r.h95_m)}</td>
+      <td class="num">{accuracy(r.v95_m)}</td>
+      <td class="num">{fixed(shift, 3)}</td>
+      <td class="num">
+        {from === null ? <span class="mut">new</span> : fixed(from, 3)}
+        {moved?.change === 'moved' && (
+          <span class="bad block">
+            <Mark shape="bad" tone="bad" /> moved
+          </span>
+        )}
+      </td>
       <td class="wrap">
-        {passes(r) && left !== undefined ? <><Mark shape="off" tone="off" /> left out <button class="btn small" onClick={() => leave(null)}>Take it after all</button><input class="reason" aria-label={`Why ${r.anchor} is left out`} placeholder="why, goes into the note" maxLength={120} value={left} onInput={(e) => leave(e.currentTarget.value)} /></>
-          : passes(r) ? <><Mark shape="ok" tone="ok" /> yes <button class="btn small" data-testid={`leave-${r.anchor}`} onClick={() => leave('')}>Leave out</button></> : <><Mark shape="off" tone="off" /> no{failed.length ? `: ${failed.map((g) => `${gate_words(g.name).toLowerCase()} ${g.why ? `(${g.why})` : ''}`).join(', ')}` : `, ${VERDICT_WORDS[r.verdict]}`}</>}
-        {may_override(r) && (reason === undefined ? <button class="btn small" onClick={() => set_reason('')}>Publish it all the same</button> : <input class="reason" aria-label={`Reason to publish ${r.anchor}`} placeholder="why, for the record" maxLength={500} value={reason} onInput={(e) => set_reason(e.currentTarget.value)} />)}
+        {passes(r) && left !== undefined ? (
+          <>
+            <Mark shape="off" tone="off" /> left out{' '}
+            <button class="btn small" onClick={() => leave(null)}>
+              Take it after all
+            </button>
+            <input
+              class="reason"
+              aria-label={`Why ${r.anchor} is left out`}
+              placeholder="why, goes into the note"
+              maxLength={120}
+              value={left}
+              onInput={(e) => leave(e.currentTarget.value)}
+            />
+          </>
+        ) : passes(r) ? (
+          <>
+            <Mark shape="ok" tone="ok" /> yes{' '}
+            <button class="btn small" data-testid={`leave-${r.anchor}`} onClick={() => leave('')}>
+              Leave out
+            </button>
+          </>
+        ) : (
+          <>
+            <Mark shape="off" tone="off" /> no
+            {failed.length
+              ? `: ${failed.map((g) => `${gate_words(g.name).toLowerCase()} ${g.why ? `(${g.why})` : ''}`).join(', ')}`
+              : `, ${VERDICT_WORDS[r.verdict]}`}
+          </>
+        )}
+        {may_override(r) &&
+          (reason === undefined ? (
+            <button class="btn small" onClick={() => set_reason('')}>
+              Publish it all the same
+            </button>
+          ) : (
+            <input
+              class="reason"
+              aria-label={`Reason to publish ${r.anchor}`}
+              placeholder="why, for the record"
+              maxLength={500}
+              value={reason}
+              onInput={(e) => set_reason(e.currentTarget.value)}
+            />
+          ))}
       </td>
     </tr>
   );

@@ -9,35 +9,138 @@ const STALE_MS = 2000;
 /// One row per anchor, in the order of their ids: a list that re-sorts under the finger cannot be tapped.
 export function RangeList({ selected }: { selected: string | null }) {
   tick.value;
-  const scene = watched_scene(), now = now_ms(), lost = watched_lost(), running = watched_mission.value?.state === 'recording';
+  const scene = watched_scene(),
+    now = now_ms(),
+    lost = watched_lost(),
+    running = watched_mission.value?.state === 'recording';
   const rows = scene ? [...scene.ranges.entries()].sort(([a], [b]) => (a < b ? -1 : 1)) : [];
   const heard = rows.filter(([, r]) => now - r.at_ms < STALE_MS).length;
   const total_hz = rows.reduce((s, [, r]) => s + (now - r.at_ms < STALE_MS ? (rate_hz(r) ?? 0) : 0), 0);
   const modelled = rows.some(([, r]) => r.last.p_los !== null);
   return (
     <section class="sec-p ranges" data-testid="range-list">
-      <div class="hd"><h2>Ranges</h2><span class="meta">{!rows.length ? '' : lost ? `nothing for ${age(now - (scene?.range_at_ms ?? now))}` : running ? `${heard} of ${rows.length} heard, ${fixed(total_hz, 0)} Hz` : `${rows.length} anchors, flight ended`}</span></div>
-      {rows.length === 0 ? <p class="why">{replayed.value ? 'No range up to this moment.' : running ? 'No range yet. Is the tag powered, and is an anchor in reach?' : 'The last 20 s of ranges are shown while a flight is recorded.'}</p> : (
+      <div class="hd">
+        <h2>Ranges</h2>
+        <span class="meta">
+          {!rows.length
+            ? ''
+            : lost
+              ? `nothing for ${age(now - (scene?.range_at_ms ?? now))}`
+              : running
+                ? `${heard} of ${rows.length} heard, ${fixed(total_hz, 0)} Hz`
+                : `${rows.length} anchors, flight ended`}
+        </span>
+      </div>
+      {rows.length === 0 ? (
+        <p class="why">
+          {replayed.value
+            ? 'No range up to this moment.'
+            : running
+              ? 'No range yet. Is the tag powered, and is an anchor in reach?'
+              : 'The last 20 s of ranges are shown while a flight is recorded.'}
+        </p>
+      ) : (
         <table class="rg">
-          <caption class="sr">Live ranges by anchor{modelled ? '' : '. No line-of-sight model is active, so all are unclear.'}</caption>
-          <thead><tr><th scope="col">Anchor</th><th scope="col">Corrected</th><th scope="col" class="pl">{modelled ? 'P(LOS)' : 'RSS'}</th><th scope="col" class="sp">Last 20 s</th><th scope="col" class="r">Hz</th></tr></thead>
-          <tbody>{rows.map(([id, r]) => <Row key={id} id={id} row={r} stale_ms={lost || !running ? Infinity : now - r.at_ms} age_ms={now - r.at_ms} running={running} selected={id === selected} modelled={modelled} />)}</tbody>
+          <caption class="sr">
+            Live ranges by anchor{modelled ? '' : '. No line-of-sight model is active, so all are unclear.'}
+          </caption>
+          <thead>
+            <tr>
+              <th scope="col">Anchor</th>
+              <th scope="col">Corrected</th>
+              <th scope="col" class="pl">
+                {modelled ? 'P(LOS)' : 'RSS'}
+              </th>
+              <th scope="col" class="sp">
+                Last 20 s
+              </th>
+              <th scope="col" class="r">
+                Hz
+              </th>
+            </tr>
+          </thead>
+          <tbody>
+            {rows.map(([id, r]) => (
+              <Row
+                key={id}
+                id={id}
+                row={r}
+                stale_ms={lost || !running ? Infinity : now - r.at_ms}
+                age_ms={now - r.at_ms}
+                running={running}
+                selected={id === selected}
+                modelled={modelled}
+              />
+            ))}
+          </tbody>
         </table>
       )}
     </section>
   );
 }
 
-function Row({ id, row, stale_ms, age_ms, running, selected, modelled }: { id: string; row: RangeRow; stale_ms: number; age_ms: number; running: boolean; selected: boolean; modelled: boolean }) {
-  const stale = stale_ms > STALE_MS, cls = range_class(row.last.p_los), [shape, tone, word] = CLASS_LOOK[cls];
-  const r = row.last, corrected = Math.abs(r.corrected_m - r.distance_m) > 5e-4;
+function Row({
+  id,
+  row,
+  stale_ms,
+  age_ms,
+  running,
+  selected,
+  modelled,
+}: {
+  id: string;
+  row: RangeRow;
+  stale_ms: number;
+  age_ms: number;
+  running: boolean;
+  selected: boolean;
+  modelled: boolean;
+}) {
+  const stale = stale_ms > STALE_MS,
+    cls = range_class(row.last.p_los),
+    [shape, tone, word] = CLASS_LOOK[cls];
+  const r = row.last,
+    corrected = Math.abs(r.corrected_m - r.distance_m) > 5e-4;
   return (
-    <tr class={`${stale ? 'stale' : ''}${selected ? ' sel' : ''}`} onClick={() => (chosen_anchor.value = id)} data-testid={`range-${id}`}>
-      <th scope="row"><button class="id" aria-pressed={selected} onClick={() => (chosen_anchor.value = id)}>{id}</button>
-        <span class={`cl ${stale ? 'off' : r.refused ? 'caution' : tone}`}><Mark shape={stale ? 'off' : r.refused ? 'caution' : shape} />{stale ? (running ? `${age(age_ms)} old` : 'ended') : r.refused ? refused_words(r.refused) : <b>{word}</b>}</span></th>
-      <td><span class="d"><Q v={range_m(r.corrected_m)} u="m" /></span><span class="rw">{corrected ? `raw ${range_m(r.distance_m)}, ` : ''}σ {fixed(r.sigma_m, 2)} m</span></td>
-      <td class={`pl ${stale ? '' : tone}`}>{modelled ? <><span class="pv">{stale ? '–' : fixed(r.p_los, 2)}</span><span class="prob"><i style={{ width: stale || r.p_los === null ? '0' : `${r.p_los * 100}%` }} /></span></> : <span class="sec"><Q v={fixed(r.rss_dbm, 0)} u="dBm" /></span>}</td>
-      <td class={`sp ${stale ? 'mut' : tone}`}><Spark row={row} /></td>
+    <tr
+      class={`${stale ? 'stale' : ''}${selected ? ' sel' : ''}`}
+      onClick={() => (chosen_anchor.value = id)}
+      data-testid={`range-${id}`}
+    >
+      <th scope="row">
+        <button class="id" aria-pressed={selected} onClick={() => (chosen_anchor.value = id)}>
+          {id}
+        </button>
+        <span class={`cl ${stale ? 'off' : r.refused ? 'caution' : tone}`}>
+          <Mark shape={stale ? 'off' : r.refused ? 'caution' : shape} />
+          {stale ? running ? `${age(age_ms)} old` : 'ended' : r.refused ? refused_words(r.refused) : <b>{word}</b>}
+        </span>
+      </th>
+      <td>
+        <span class="d">
+          <Q v={range_m(r.corrected_m)} u="m" />
+        </span>
+        <span class="rw">
+          {corrected ? `raw ${range_m(r.distance_m)}, ` : ''}σ {fixed(r.sigma_m, 2)} m
+        </span>
+      </td>
+      <td class={`pl ${stale ? '' : tone}`}>
+        {modelled ? (
+          <>
+            <span class="pv">{stale ? '–' : fixed(r.p_los, 2)}</span>
+            <span class="prob">
+              <i style={{ width: stale || r.p_los === null ? '0' : `${r.p_los * 100}%` }} />
+            </span>
+          </>
+        ) : (
+          <span class="sec">
+            <Q v={fixed(r.rss_dbm, 0)} u="dBm" />
+          </span>
+        )}
+      </td>
+      <td class={`sp ${stale ? 'mut' : tone}`}>
+        <Spark row={row} />
+      </td>
       <td class="hz r">{fixed(stale ? 0 : rate_hz(row), 1)}</td>
     </tr>
   );
@@ -45,18 +148,32 @@ function Row({ id, row, stale_ms, age_ms, running, selected, modelled }: { id: s
 
 /// Corrected distance over the last 20 s; a pause of more than 2 s stays a gap.
 function Spark({ row }: { row: RangeRow }) {
-  const [w, h] = [72, 22], pts = row.recent, end = pts[pts.length - 1];
+  const [w, h] = [72, 22],
+    pts = row.recent,
+    end = pts[pts.length - 1];
   if (!end) return null;
   let [lo, hi] = [Infinity, -Infinity];
-  for (const p of pts) { lo = Math.min(lo, p.d); hi = Math.max(hi, p.d); }
-  const span = Math.max(hi - lo, 0.3), mid = (hi + lo) / 2;
+  for (const p of pts) {
+    lo = Math.min(lo, p.d);
+    hi = Math.max(hi, p.d);
+  }
+  const span = Math.max(hi - lo, 0.3),
+    mid = (hi + lo) / 2;
   const step = Math.max(1, Math.floor(pts.length / 48));
-  let path = '', last_us = -Infinity, y = 0;
+  let path = '',
+    last_us = -Infinity,
+    y = 0;
   for (let i = (pts.length - 1) % step; i < pts.length; i += step) {
     const p = pts[i]!;
     y = h / 2 - ((p.d - mid) / span) * (h - 4);
     path += `${p.t_us - last_us > 2_000_000 ? 'M' : 'L'}${(w * (1 - (end.t_us - p.t_us) / 2e7)).toFixed(1)} ${y.toFixed(1)}`;
     last_us = p.t_us;
   }
-  return <svg class="spark" width={w + 4} height={h + 4} viewBox={`-1 -1 ${w + 4} ${h + 4}`} aria-hidden="true"><path class="base" d={`M0 ${h + 2}H${w}`} /><path class="ln" d={path} /><circle class="pt" cx={w} cy={y} r="2.4" /></svg>;
+  return (
+    <svg class="spark" width={w + 4} height={h + 4} viewBox={`-1 -1 ${w + 4} ${h + 4}`} aria-hidden="true">
+      <path class="base" d={`M0 ${h + 2}H${w}`} />
+      <path class="ln" d={path} />
+      <circle class="pt" cx={w} cy={y} r="2.4" />
+    </svg>
+  );
 }

@@ -9,39 +9,168 @@ import { HoldButton } from './hold_button';
 
 export const checklist_open = signal(false);
 
-export function Checklist({ mission, start }: { mission: string; start: (plan: string, manual: boolean) => Promise<void> }) {
-  const [items, set_items] = useState<readonly ChecklistItem[] | null>(null), [plans, set_plans] = useState<readonly Plan[] | null>(null), [plan, set_plan] = useState<string | null>(null), [manual, set_manual] = useState(false), [problem, set_problem] = useState(''), box = useRef<HTMLElement>(null);
-  useEffect(() => { box.current?.focus(); fetch_plans().then((list) => { set_plans(list); set_plan(list[0]?.id ?? null); }, (e: unknown) => set_problem(said(e))); }, []);
-  const look = (): void => { checklist(mission, plan).then((list) => { set_items(list); set_problem(''); }, (e: unknown) => set_problem(said(e))); };
-  useEffect(() => { look(); const timer = setInterval(look, 1000); return () => clearInterval(timer); }, [mission, plan]);
+export function Checklist({
+  mission,
+  start,
+}: {
+  mission: string;
+  start: (plan: string, manual: boolean) => Promise<void>;
+}) {
+  const [items, set_items] = useState<readonly ChecklistItem[] | null>(null),
+    [plans, set_plans] = useState<readonly Plan[] | null>(null),
+    [plan, set_plan] = useState<string | null>(null),
+    [manual, set_manual] = useState(false),
+    [problem, set_problem] = useState(''),
+    box = useRef<HTMLElement>(null);
+  useEffect(() => {
+    box.current?.focus();
+    fetch_plans().then(
+      (list) => {
+        set_plans(list);
+        set_plan(list[0]?.id ?? null);
+      },
+      (e: unknown) => set_problem(said(e)),
+    );
+  }, []);
+  const look = (): void => {
+    checklist(mission, plan).then(
+      (list) => {
+        set_items(list);
+        set_problem('');
+      },
+      (e: unknown) => set_problem(said(e)),
+    );
+  };
+  useEffect(() => {
+    look();
+    const timer = setInterval(look, 1000);
+    return () => clearInterval(timer);
+  }, [mission, plan]);
   const open = items?.filter((i) => i.state !== 'ok') ?? [];
-  const set = (item: ChecklistItem, reason: string): void => { set_item(mission, item.id, reason).then(look, (e: unknown) => set_problem(said(e))); };
+  const set = (item: ChecklistItem, reason: string): void => {
+    set_item(mission, item.id, reason).then(look, (e: unknown) => set_problem(said(e)));
+  };
   return (
-    <section class="drawer" role="dialog" aria-labelledby="checklist-title" tabIndex={-1} ref={box} data-testid="checklist">
-      <div class="hd big"><h2 id="checklist-title">Before take-off</h2><span class="grow" /><button class="btn quiet" aria-label="Close" onClick={() => (checklist_open.value = false)}><Icon name="close" /></button></div>
-      {problem && <div class="problem" role="status">{problem}</div>}
-      {plans?.length === 0 ? <p class="why">There is no plan to fly yet. <a class="btn small" href="#/plan" onClick={() => (checklist_open.value = false)}>Make one</a></p>
-        : plans && <div class="addform"><label><span class="lab">Plan</span><select data-testid="start-plan" value={plan ?? ''} onChange={(e) => set_plan(e.currentTarget.value)}>{plans.map((p) => <option key={p.id} value={p.id!}>{p.name}, revision {p.revision}</option>)}</select></label>
-          <label class="check"><input type="checkbox" checked={manual} onChange={(e) => set_manual(e.currentTarget.checked)} /> A pilot flies by hand; this screen says where to</label></div>}
+    <section
+      class="drawer"
+      role="dialog"
+      aria-labelledby="checklist-title"
+      tabIndex={-1}
+      ref={box}
+      data-testid="checklist"
+    >
+      <div class="hd big">
+        <h2 id="checklist-title">Before take-off</h2>
+        <span class="grow" />
+        <button class="btn quiet" aria-label="Close" onClick={() => (checklist_open.value = false)}>
+          <Icon name="close" />
+        </button>
+      </div>
+      {problem && (
+        <div class="problem" role="status">
+          {problem}
+        </div>
+      )}
+      {plans?.length === 0 ? (
+        <p class="why">
+          There is no plan to fly yet.{' '}
+          <a class="btn small" href="#/plan" onClick={() => (checklist_open.value = false)}>
+            Make one
+          </a>
+        </p>
+      ) : (
+        plans && (
+          <div class="addform">
+            <label>
+              <span class="lab">Plan</span>
+              <select data-testid="start-plan" value={plan ?? ''} onChange={(e) => set_plan(e.currentTarget.value)}>
+                {plans.map((p) => (
+                  <option key={p.id} value={p.id!}>
+                    {p.name}, revision {p.revision}
+                  </option>
+                ))}
+              </select>
+            </label>
+            <label class="check">
+              <input type="checkbox" checked={manual} onChange={(e) => set_manual(e.currentTarget.checked)} /> A pilot
+              flies by hand; this screen says where to
+            </label>
+          </div>
+        )
+      )}
       {!items && !problem && <p role="status">Asking the server.</p>}
-      {items && <ul class="checklist">{items.map((i) => <Item key={i.id} item={i} set={set} />)}</ul>}
+      {items && (
+        <ul class="checklist">
+          {items.map((i) => (
+            <Item key={i.id} item={i} set={set} />
+          ))}
+        </ul>
+      )}
       <div class="actions">
-        <span class="mut grow" role="status">{items && (open.length ? `${open.length} item${open.length === 1 ? '' : 's'} open` : 'Everything is green')}</span>
-        <HoldButton testid="cmd-start" disabled={!items || !plan || open.length > 0} note="hold" onConfirm={() => void start(plan!, manual)}>Start</HoldButton>
+        <span class="mut grow" role="status">
+          {items && (open.length ? `${open.length} item${open.length === 1 ? '' : 's'} open` : 'Everything is green')}
+        </span>
+        <HoldButton
+          testid="cmd-start"
+          disabled={!items || !plan || open.length > 0}
+          note="hold"
+          onConfirm={() => void start(plan!, manual)}
+        >
+          Start
+        </HoldButton>
       </div>
     </section>
   );
 }
 
 function Item({ item: i, set }: { item: ChecklistItem; set: (i: ChecklistItem, reason: string) => void }) {
-  const [reason, set_reason] = useState<string | null>(null), look = i.state === 'ok' ? (i.overridden_by && !i.manual ? 'caution' : 'ok') : i.state === 'open' ? 'off' : 'bad';
+  const [reason, set_reason] = useState<string | null>(null),
+    look = i.state === 'ok' ? (i.overridden_by && !i.manual ? 'caution' : 'ok') : i.state === 'open' ? 'off' : 'bad';
   return (
     <li data-testid={`check-${i.id}`}>
-      <Mark shape={look} tone={look} /><span class="sr">{{ ok: 'green', caution: 'overridden', off: 'to be confirmed', bad: 'not yet' }[look]}</span>
-      <span class="grow"><b>{i.text}</b>{i.overridden_by ? <span class="mut block">{i.manual ? `Confirmed by ${i.overridden_by}` : `Overridden by ${i.overridden_by}: ${i.reason}`}</span> : i.detail && <span class="mut block">{i.detail}</span>}</span>
-      {i.state === 'open' && <button class="btn" onClick={() => set(i, 'confirmed')}>Confirm</button>}
-      {i.state === 'failed' && i.overridable && (reason === null ? <button class="btn small" onClick={() => set_reason('')}>Override</button>
-        : <form class="addform" onSubmit={(e) => { e.preventDefault(); if (reason.trim()) set(i, reason.trim()); }}><input aria-label={`Reason to override: ${i.text}`} placeholder="why, for the record" value={reason} maxLength={300} onInput={(e) => set_reason(e.currentTarget.value)} /><button class="btn small" disabled={!reason.trim()}>Override</button></form>)}
+      <Mark shape={look} tone={look} />
+      <span class="sr">{{ ok: 'green', caution: 'overridden', off: 'to be confirmed', bad: 'not yet' }[look]}</span>
+      <span class="grow">
+        <b>{i.text}</b>
+        {i.overridden_by ? (
+          <span class="mut block">
+            {i.manual ? `Confirmed by ${i.overridden_by}` : `Overridden by ${i.overridden_by}: ${i.reason}`}
+          </span>
+        ) : (
+          i.detail && <span class="mut block">{i.detail}</span>
+        )}
+      </span>
+      {i.state === 'open' && (
+        <button class="btn" onClick={() => set(i, 'confirmed')}>
+          Confirm
+        </button>
+      )}
+      {i.state === 'failed' &&
+        i.overridable &&
+        (reason === null ? (
+          <button class="btn small" onClick={() => set_reason('')}>
+            Override
+          </button>
+        ) : (
+          <form
+            class="addform"
+            onSubmit={(e) => {
+              e.preventDefault();
+              if (reason.trim()) set(i, reason.trim());
+            }}
+          >
+            <input
+              aria-label={`Reason to override: ${i.text}`}
+              placeholder="why, for the record"
+              value={reason}
+              maxLength={300}
+              onInput={(e) => set_reason(e.currentTarget.value)}
+            />
+            <button class="btn small" disabled={!reason.trim()}>
+              Override
+            </button>
+          </form>
+        ))}
     </li>
   );
 }

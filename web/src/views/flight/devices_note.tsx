@@ -7,21 +7,53 @@ import { events, link, say } from '../../state/store';
 import { HoldButton } from './hold_button';
 
 export function DevicesNote({ mission }: { mission: string }) {
-  const [devices, set_devices] = useState<Devices | null>(null), [problem, set_problem] = useState('');
-  const news = events.value.filter((e) => e.code.startsWith('devices.') || e.code === 'mission.finished').at(-1)?.id ?? '';
+  const [devices, set_devices] = useState<Devices | null>(null),
+    [problem, set_problem] = useState('');
+  const news =
+    events.value.filter((e) => e.code.startsWith('devices.') || e.code === 'mission.finished').at(-1)?.id ?? '';
   useEffect(() => {
     let gone = false;
-    devices_of(mission).then((d) => { if (!gone) set_devices(d); }, () => { if (!gone) set_devices(null); });   // without an answer nothing is claimed
-    return () => { gone = true; };
+    devices_of(mission).then(
+      (d) => {
+        if (!gone) set_devices(d);
+      },
+      () => {
+        if (!gone) set_devices(null);
+      },
+    ); // without an answer nothing is claimed
+    return () => {
+      gone = true;
+    };
   }, [mission, news]);
   const holder = devices?.held_by;
   if (!holder) return null;
-  const take = async (): Promise<void> => { set_problem(''); try { await take_devices(mission, holder.mission); say('This flight has the devices'); } catch (e) { set_problem(said(e)); } };
+  const take = async (): Promise<void> => {
+    set_problem('');
+    try {
+      await take_devices(mission, holder.mission);
+      say('This flight has the devices');
+    } catch (e) {
+      set_problem(said(e));
+    }
+  };
   return (
     <div class="callout caution" role="status" data-testid="devices-held">
       <b>No rows from the devices.</b> {holder.name} records with them.
-      {may('operator') && <HoldButton testid="take-devices" disabled={link.value === 'lost'} note={`takes them from ${holder.name}`} onConfirm={() => void take()}>Take the devices</HoldButton>}
-      {problem && <p class="problem" role="alert">{problem}</p>}
+      {may('operator') && (
+        <HoldButton
+          testid="take-devices"
+          disabled={link.value === 'lost'}
+          note={`takes them from ${holder.name}`}
+          onConfirm={() => void take()}
+        >
+          Take the devices
+        </HoldButton>
+      )}
+      {problem && (
+        <p class="problem" role="alert">
+          {problem}
+        </p>
+      )}
     </div>
   );
 }

@@ -9,34 +9,69 @@ import { current_mission, current_scene } from '../../state/store';
 /// The plan that is in the air: fetched once per revision, since a flight keeps the one it was started with.
 const flown = signal<{ readonly key: string; readonly plan: Plan | null } | null>(null);
 export function follow_plan(): void {
-  const p = current_scene()?.procedure?.value, key = p?.plan ? `${p.plan}/${p.plan_revision}` : '';
+  const p = current_scene()?.procedure?.value,
+    key = p?.plan ? `${p.plan}/${p.plan_revision}` : '';
   if (!p?.plan || flown.peek()?.key === key) return;
   flown.value = { key, plan: null };
-  read(p.plan).then((plan) => { flown.value = { key, plan }; }, () => undefined);
+  read(p.plan).then(
+    (plan) => {
+      flown.value = { key, plan };
+    },
+    () => undefined,
+  );
 }
 
 /// Six equal steps of value; the smallest is best.
-export function ranks(candidates: readonly { readonly value: number | null; readonly refused: string | null }[]): (number | null)[] {
-  const good = candidates.flatMap((c) => (c.value === null || c.refused ? [] : [c.value])), lo = Math.min(...good), span = Math.max(...good) - lo;
-  return candidates.map((c) => (c.value === null || c.refused ? null : span > 0 ? Math.min(5, Math.floor(((c.value - lo) / span) * 6)) : 0));
+export function ranks(
+  candidates: readonly { readonly value: number | null; readonly refused: string | null }[],
+): (number | null)[] {
+  const good = candidates.flatMap((c) => (c.value === null || c.refused ? [] : [c.value])),
+    lo = Math.min(...good),
+    span = Math.max(...good) - lo;
+  return candidates.map((c) =>
+    c.value === null || c.refused ? null : span > 0 ? Math.min(5, Math.floor(((c.value - lo) / span) * 6)) : 0,
+  );
 }
 
-const made = new WeakMap<GridMsg, FlightPicture>();   // the slow picture is drawn often, a decision comes seldom
+const made = new WeakMap<GridMsg, FlightPicture>(); // the slow picture is drawn often, a decision comes seldom
 export function flight_picture(): FlightPicture | null {
-  const scene = current_scene(), p = scene?.procedure?.value, origin = current_mission.peek()?.origin ?? null, grid = scene?.grid?.value ?? null, plan = flown.value?.plan ?? null;
+  const scene = current_scene(),
+    p = scene?.procedure?.value,
+    origin = current_mission.peek()?.origin ?? null,
+    grid = scene?.grid?.value ?? null,
+    plan = flown.value?.plan ?? null;
   if (!p || !origin) return null;
-  const at = (c: { lon: number; lat: number }): Point => { const [e, n] = enu_from_geodetic({ lon: c.lon, lat: c.lat, h_m: origin.h_m }, origin); return [e, n]; };
+  const at = (c: { lon: number; lat: number }): Point => {
+    const [e, n] = enu_from_geodetic({ lon: c.lon, lat: c.lat, h_m: origin.h_m }, origin);
+    return [e, n];
+  };
   const decision = grid && (made.get(grid) ?? remember(grid, at));
   return {
-    outline: plan?.outline.map(at) ?? [], fence: plan?.fence.map(at) ?? [], no_fly: plan?.no_fly.map((a) => a.map(at)) ?? [], waypoints: plan?.waypoints.map(at) ?? [], reached: Math.max(0, p.waypoint - 1),
-    candidates: p.step === 'done' || p.step === 'ready' ? [] : (decision?.candidates ?? []), visited: decision?.visited ?? [], target: p.target && at(p.target),
+    outline: plan?.outline.map(at) ?? [],
+    fence: plan?.fence.map(at) ?? [],
+    no_fly: plan?.no_fly.map((a) => a.map(at)) ?? [],
+    waypoints: plan?.waypoints.map(at) ?? [],
+    reached: Math.max(0, p.waypoint - 1),
+    candidates: p.step === 'done' || p.step === 'ready' ? [] : (decision?.candidates ?? []),
+    visited: decision?.visited ?? [],
+    target: p.target && at(p.target),
   };
 }
 function remember(grid: GridMsg, at: (c: { lon: number; lat: number }) => Point): FlightPicture {
-  const rank = ranks(grid.candidates), known = grid.candidates.find((c) => c.plan_m !== null);
+  const rank = ranks(grid.candidates),
+    known = grid.candidates.find((c) => c.plan_m !== null);
   // The planner's own metres are about the plan's origin; one candidate known both ways tells how far apart the two are.
   const shift: Point | null = known ? [at(known)[0] - known.plan_m![0], at(known)[1] - known.plan_m![1]] : null;
-  const picture: FlightPicture = { outline: [], fence: [], no_fly: [], waypoints: [], reached: 0, target: null, candidates: grid.candidates.map((c, i) => ({ at: at(c), rank: rank[i]! })), visited: shift ? grid.visited_plan_m.map((v): Point => [v[0] + shift[0], v[1] + shift[1]]) : [] };
+  const picture: FlightPicture = {
+    outline: [],
+    fence: [],
+    no_fly: [],
+    waypoints: [],
+    reached: 0,
+    target: null,
+    candidates: grid.candidates.map((c, i) => ({ at: at(c), rank: rank[i]! })),
+    visited: shift ? grid.visited_plan_m.map((v): Point => [v[0] + shift[0], v[1] + shift[1]]) : [],
+  };
   made.set(grid, picture);
   return picture;
 }

@@ -8,25 +8,74 @@ import { Axes, Drawing, line, scale, ticks } from '../chart';
 import { flying, next_step, stage_of, STATUS_LOOK, STEP_WORDS, TRACK } from './words';
 
 /// A reason of the server as a sentence: its words for refusals carry underscores.
-const sentence = (reason: string): string => `${reason[0]!.toUpperCase()}${reason.slice(1).replaceAll('_', ' ')}${/[.!?]$/.test(reason) ? '' : '.'}`;
+const sentence = (reason: string): string =>
+  `${reason[0]!.toUpperCase()}${reason.slice(1).replaceAll('_', ' ')}${/[.!?]$/.test(reason) ? '' : '.'}`;
 
 export function Procedure() {
   tick.value;
-  const scene = current_scene(), heard = scene?.procedure;
+  const scene = current_scene(),
+    heard = scene?.procedure;
   if (!heard) return null;
-  const p = heard.value, stale = link.value === 'lost' || now_ms() - heard.at_ms > 5000, [shape, tone, word] = STATUS_LOOK[p.status], at = stage_of(p.step), next = next_step(p.step);
+  const p = heard.value,
+    stale = link.value === 'lost' || now_ms() - heard.at_ms > 5000,
+    [shape, tone, word] = STATUS_LOOK[p.status],
+    at = stage_of(p.step),
+    next = next_step(p.step);
   const since = p.in_step_s === null ? null : p.in_step_s + (flying(p) && !stale ? (now_ms() - heard.at_ms) / 1000 : 0);
   return (
     <section class="sec-p" data-testid="procedure">
-      <div class="hd"><h2>Procedure</h2>{stale && flying(p) ? <Chip shape="off" tone="off" word="LAST KNOWN" /> : <Chip shape={shape} tone={tone} word={word} />}<span class="meta">{p.iteration > 0 ? `iteration ${p.iteration}` : p.plan_name}</span></div>
-      {at >= 0 && <div class="track" role="img" aria-label={`Stage ${at + 1} of ${TRACK.length}`}>{TRACK.map((_, i) => <i key={i} class={i < at ? 'd' : i === at ? 'c' : ''} />)}</div>}
+      <div class="hd">
+        <h2>Procedure</h2>
+        {stale && flying(p) ? (
+          <Chip shape="off" tone="off" word="LAST KNOWN" />
+        ) : (
+          <Chip shape={shape} tone={tone} word={word} />
+        )}
+        <span class="meta">{p.iteration > 0 ? `iteration ${p.iteration}` : p.plan_name}</span>
+      </div>
+      {at >= 0 && (
+        <div class="track" role="img" aria-label={`Stage ${at + 1} of ${TRACK.length}`}>
+          {TRACK.map((_, i) => (
+            <i key={i} class={i < at ? 'd' : i === at ? 'c' : ''} />
+          ))}
+        </div>
+      )}
       <div class="steps">
-        <Mark shape="estimating" tone="ink" /><span class="cur">{STEP_WORDS[p.step]}{p.step === 'step_to_waypoint' && p.k > 0 && ` (${p.part} of ${p.k})`}</span><span class={`t cur ${stale ? 'stale' : ''}`}>{since === null ? '' : <Q v={fixed(since, 0)} u="s" />}</span>
-        {next && flying(p) && <><Mark shape="off" tone="off" /><span>{STEP_WORDS[next]}</span><span class="t">{p.step_limit_s !== null && since !== null && p.step_limit_s > since ? `within ${fixed(p.step_limit_s - since, 0)} s` : ''}</span></>}
+        <Mark shape="estimating" tone="ink" />
+        <span class="cur">
+          {STEP_WORDS[p.step]}
+          {p.step === 'step_to_waypoint' && p.k > 0 && ` (${p.part} of ${p.k})`}
+        </span>
+        <span class={`t cur ${stale ? 'stale' : ''}`}>{since === null ? '' : <Q v={fixed(since, 0)} u="s" />}</span>
+        {next && flying(p) && (
+          <>
+            <Mark shape="off" tone="off" />
+            <span>{STEP_WORDS[next]}</span>
+            <span class="t">
+              {p.step_limit_s !== null && since !== null && p.step_limit_s > since
+                ? `within ${fixed(p.step_limit_s - since, 0)} s`
+                : ''}
+            </span>
+          </>
+        )}
       </div>
       {p.reason && <p class="why">{sentence(p.reason)}</p>}
-      {p.drone?.taken_over && <div class="callout caution"><b>The pilot has taken over by remote control.</b> No target is sent until the flight is started or resumed again.</div>}
-      {p.mode === 'manual' && p.target && flying(p) && <div class="callout"><b>Fly by hand: {fixed(p.distance_m, 1)} m to go{p.target.height_m === null ? '' : `, to ${fixed(p.target.height_m, 1)} m above ground`}{p.target.heading_deg === null ? '' : `, nose ${bearing(p.target.heading_deg)}°`}.</b> The flight goes on by itself when RTK sees you there.</div>}
+      {p.drone?.taken_over && (
+        <div class="callout caution">
+          <b>The pilot has taken over by remote control.</b> No target is sent until the flight is started or resumed
+          again.
+        </div>
+      )}
+      {p.mode === 'manual' && p.target && flying(p) && (
+        <div class="callout">
+          <b>
+            Fly by hand: {fixed(p.distance_m, 1)} m to go
+            {p.target.height_m === null ? '' : `, to ${fixed(p.target.height_m, 1)} m above ground`}
+            {p.target.heading_deg === null ? '' : `, nose ${bearing(p.target.heading_deg)}°`}.
+          </b>{' '}
+          The flight goes on by itself when RTK sees you there.
+        </div>
+      )}
       <NotDone p={p} />
     </section>
   );
@@ -35,80 +84,233 @@ export function Procedure() {
 function NotDone({ p }: { p: ProcedureMsg }) {
   const open = p.anchors.filter((a) => !a.done && a.why);
   if (!open.length) return null;
-  return <details class="notdone"><summary>{open.length} of {p.anchors.length} anchors not done</summary><ul>{open.map((a) => <li key={a.anchor}><b>{a.anchor}</b> {a.why}{a.at_edge && <span class="sub"> Its height lies at an end of the height search, perhaps beyond.</span>}{a.no_lobe && <span class="sub"> The turn saw no lobe of it from this far: no height search until it is nearer.</span>}</li>)}</ul></details>;
+  return (
+    <details class="notdone">
+      <summary>
+        {open.length} of {p.anchors.length} anchors not done
+      </summary>
+      <ul>
+        {open.map((a) => (
+          <li key={a.anchor}>
+            <b>{a.anchor}</b> {a.why}
+            {a.at_edge && <span class="sub"> Its height lies at an end of the height search, perhaps beyond.</span>}
+            {a.no_lobe && (
+              <span class="sub"> The turn saw no lobe of it from this far: no height search until it is nearer.</span>
+            )}
+          </li>
+        ))}
+      </ul>
+    </details>
+  );
 }
 
 export function NextPoint() {
   tick.value;
-  const scene = current_scene(), g = scene?.grid?.value, p = scene?.procedure?.value;
+  const scene = current_scene(),
+    g = scene?.grid?.value,
+    p = scene?.procedure?.value;
   if (!g || !p || !flying(p)) return null;
   const chosen = g.chosen === null ? null : g.candidates[g.chosen];
-  const fly = chosen?.plan_m && p.target ? p.distance_m : null, measure = g.rule === 'dissertation' ? 'GDOP' : 'Error';
+  const fly = chosen?.plan_m && p.target ? p.distance_m : null,
+    measure = g.rule === 'dissertation' ? 'GDOP' : 'Error';
   return (
     <section class="sec-p" data-testid="next-point">
-      <div class="hd"><h2>Next point, P{g.iteration + 1}</h2>{chosen ? <Chip shape="ok" tone="ok" word="CHOSEN" /> : <Chip shape="off" tone="off" word="NONE" />}</div>
+      <div class="hd">
+        <h2>Next point, P{g.iteration + 1}</h2>
+        {chosen ? <Chip shape="ok" tone="ok" word="CHOSEN" /> : <Chip shape="off" tone="off" word="NONE" />}
+      </div>
       <dl class="kv np2">
-        <div><dt>Fly</dt><dd><Q v={fixed(fly, 1)} u="m" /></dd></div>
-        <div><dt>{measure}</dt><dd>{value_words(g, g.value_before)} → {value_words(g, g.predicted ?? chosen?.value ?? null)}</dd></div>
-        {g.reached !== null && <div><dt>Reached</dt><dd>{value_words(g, g.reached)}</dd></div>}
+        <div>
+          <dt>Fly</dt>
+          <dd>
+            <Q v={fixed(fly, 1)} u="m" />
+          </dd>
+        </div>
+        <div>
+          <dt>{measure}</dt>
+          <dd>
+            {value_words(g, g.value_before)} → {value_words(g, g.predicted ?? chosen?.value ?? null)}
+          </dd>
+        </div>
+        {g.reached !== null && (
+          <div>
+            <dt>Reached</dt>
+            <dd>{value_words(g, g.reached)}</dd>
+          </div>
+        )}
       </dl>
       {g.reason && <p class="why">{sentence(g.reason)}</p>}
       <Ramp g={g} />
-      <details class="candidates"><summary>{g.candidates.length} candidates</summary>
-        <table class="tbl"><caption class="sr">Candidates of the last decision, best first</caption><thead><tr><th scope="col">No.</th><th scope="col" class="num">{measure}</th><th scope="col" class="num">Height, m</th><th scope="col">Refused</th></tr></thead>
-          <tbody>{g.candidates.map((c, i) => ({ c, i })).sort((a, b) => (a.c.value ?? Infinity) - (b.c.value ?? Infinity)).slice(0, 40).map(({ c, i }) => <tr key={i} class={i === g.chosen ? 'sel' : ''}><th scope="row">{i + 1}</th><td class="num">{value_words(g, c.value)}</td><td class="num">{fixed(c.height_m, 1)}</td><td>{c.refused?.replaceAll('_', ' ') ?? ''}</td></tr>)}</tbody></table>
+      <details class="candidates">
+        <summary>{g.candidates.length} candidates</summary>
+        <table class="tbl">
+          <caption class="sr">Candidates of the last decision, best first</caption>
+          <thead>
+            <tr>
+              <th scope="col">No.</th>
+              <th scope="col" class="num">
+                {measure}
+              </th>
+              <th scope="col" class="num">
+                Height, m
+              </th>
+              <th scope="col">Refused</th>
+            </tr>
+          </thead>
+          <tbody>
+            {g.candidates
+              .map((c, i) => ({ c, i }))
+              .sort((a, b) => (a.c.value ?? Infinity) - (b.c.value ?? Infinity))
+              .slice(0, 40)
+              .map(({ c, i }) => (
+                <tr key={i} class={i === g.chosen ? 'sel' : ''}>
+                  <th scope="row">{i + 1}</th>
+                  <td class="num">{value_words(g, c.value)}</td>
+                  <td class="num">{fixed(c.height_m, 1)}</td>
+                  <td>{c.refused?.replaceAll('_', ' ') ?? ''}</td>
+                </tr>
+              ))}
+          </tbody>
+        </table>
       </details>
     </section>
   );
 }
-const value_words = (g: GridMsg, v: number | null): string => (v === null ? '–' : g.rule === 'dissertation' ? fixed(v, 2) : fixed(v, Math.abs(v) < 1 ? 3 : 1));
+const value_words = (g: GridMsg, v: number | null): string =>
+  v === null ? '–' : g.rule === 'dissertation' ? fixed(v, 2) : fixed(v, Math.abs(v) < 1 ? 3 : 1);
 function Ramp({ g }: { g: GridMsg }) {
   const values = g.candidates.flatMap((c) => (c.value === null || c.refused ? [] : [c.value]));
   if (values.length < 2) return null;
-  return <div class="ramp"><span>{value_words(g, Math.min(...values))} best</span><span class="sw" aria-hidden="true">{[0, 1, 2, 3, 4, 5].map((i) => <i key={i} class={`g${i}`} />)}</span><span>{value_words(g, Math.max(...values))}</span></div>;
+  return (
+    <div class="ramp">
+      <span>{value_words(g, Math.min(...values))} best</span>
+      <span class="sw" aria-hidden="true">
+        {[0, 1, 2, 3, 4, 5].map((i) => (
+          <i key={i} class={`g${i}`} />
+        ))}
+      </span>
+      <span>{value_words(g, Math.max(...values))}</span>
+    </div>
+  );
 }
 
 export function Clues() {
   tick.value;
-  const scene = current_scene(), step = scene?.procedure?.value.step;
-  const turns = step === 'turn' ? [...(scene?.turns.values() ?? [])].map((t) => t.value) : [], heights = step === 'height_search' ? [...(scene?.heights.values() ?? [])].map((t) => t.value) : [];
-  return <>{turns.filter((t) => t.samples.length > 2).slice(0, 2).map((t) => <TurnPolar key={t.anchor} t={t} />)}{heights.filter((h) => h.samples.length > 1).slice(0, 2).map((h) => <HeightProfile key={h.anchor} h={h} />)}</>;
+  const scene = current_scene(),
+    step = scene?.procedure?.value.step;
+  const turns = step === 'turn' ? [...(scene?.turns.values() ?? [])].map((t) => t.value) : [],
+    heights = step === 'height_search' ? [...(scene?.heights.values() ?? [])].map((t) => t.value) : [];
+  return (
+    <>
+      {turns
+        .filter((t) => t.samples.length > 2)
+        .slice(0, 2)
+        .map((t) => (
+          <TurnPolar key={t.anchor} t={t} />
+        ))}
+      {heights
+        .filter((h) => h.samples.length > 1)
+        .slice(0, 2)
+        .map((h) => (
+          <HeightProfile key={h.anchor} h={h} />
+        ))}
+    </>
+  );
 }
 
 /// RSS round the compass, north up; the spoke is the bearing taken, with its sigma as a wedge.
 function TurnPolar({ t }: { t: ProfileMsg }) {
-  const rss = t.samples.map(([, r]) => r), lo = Math.min(...rss) - 3, hi = Math.max(...rss) + 1;
+  const rss = t.samples.map(([, r]) => r),
+    lo = Math.min(...rss) - 3,
+    hi = Math.max(...rss) + 1;
   return (
     <section class="sec-p" data-testid="turn-polar">
-      <div class="hd"><h2>Turn, {t.anchor}</h2><span class="meta">{t.best === null ? 'no bearing yet' : `bearing ${bearing(t.best)}° ± ${fixed(t.sigma, 0)}°`}</span></div>
-      <Drawing cls="scatter" label={`RSS over heading for ${t.anchor}, ${t.samples.length} samples${t.best === null ? '' : `; bearing ${fixed(t.best, 0)} degrees`}`} draw={(w, h) => {
-        const cx = w / 2, cy = h / 2, r = Math.max(0, Math.min(w, h) / 2 - 18), at = (deg: number, v: number): [number, number] => { const d = (r * Math.max(0, v - lo)) / (hi - lo), a = (deg * Math.PI) / 180; return [cx + d * Math.sin(a), cy - d * Math.cos(a)]; };
-        const sorted = [...t.samples].sort((a, b) => a[0] - b[0]);
-        return <>
-          {[0.33, 0.66, 1].map((f) => <circle key={f} class="ringl" cx={cx} cy={cy} r={r * f} />)}
-          {(['N', 'E', 'S', 'W'] as const).map((name, i) => { const [x, y] = at(i * 90, hi + (hi - lo) * 0.09); return <text key={name} class="ticktext" x={x} y={y + 4} text-anchor="middle">{name}</text>; })}
-          <path class="s main" d={`${line(sorted.map(([deg, v]) => at(deg, v)))}Z`} />
-          {t.best !== null && t.sigma !== null && <path class="wedge" d={`M${cx} ${cy}L${at(t.best - t.sigma, hi).join(' ')}A${r} ${r} 0 0 1 ${at(t.best + t.sigma, hi).join(' ')}Z`} />}
-          {t.best !== null && <path class="goal" d={`M${cx} ${cy}L${at(t.best, hi).join(' ')}`} />}
-        </>;
-      }} />
+      <div class="hd">
+        <h2>Turn, {t.anchor}</h2>
+        <span class="meta">
+          {t.best === null ? 'no bearing yet' : `bearing ${bearing(t.best)}° ± ${fixed(t.sigma, 0)}°`}
+        </span>
+      </div>
+      <Drawing
+        cls="scatter"
+        label={`RSS over heading for ${t.anchor}, ${t.samples.length} samples${t.best === null ? '' : `; bearing ${fixed(t.best, 0)} degrees`}`}
+        draw={(w, h) => {
+          const cx = w / 2,
+            cy = h / 2,
+            r = Math.max(0, Math.min(w, h) / 2 - 18),
+            at = (deg: number, v: number): [number, number] => {
+              const d = (r * Math.max(0, v - lo)) / (hi - lo),
+                a = (deg * Math.PI) / 180;
+              return [cx + d * Math.sin(a), cy - d * Math.cos(a)];
+            };
+          const sorted = [...t.samples].sort((a, b) => a[0] - b[0]);
+          return (
+            <>
+              {[0.33, 0.66, 1].map((f) => (
+                <circle key={f} class="ringl" cx={cx} cy={cy} r={r * f} />
+              ))}
+              {(['N', 'E', 'S', 'W'] as const).map((name, i) => {
+                const [x, y] = at(i * 90, hi + (hi - lo) * 0.09);
+                return (
+                  <text key={name} class="ticktext" x={x} y={y + 4} text-anchor="middle">
+                    {name}
+                  </text>
+                );
+              })}
+              <path class="s main" d={`${line(sorted.map(([deg, v]) => at(deg, v)))}Z`} />
+              {t.best !== null && t.sigma !== null && (
+                <path
+                  class="wedge"
+                  d={`M${cx} ${cy}L${at(t.best - t.sigma, hi).join(' ')}A${r} ${r} 0 0 1 ${at(t.best + t.sigma, hi).join(' ')}Z`}
+                />
+              )}
+              {t.best !== null && <path class="goal" d={`M${cx} ${cy}L${at(t.best, hi).join(' ')}`} />}
+            </>
+          );
+        }}
+      />
     </section>
   );
 }
 
 function HeightProfile({ h: p }: { h: ProfileMsg }) {
-  const heights = p.samples.map(([z]) => z), rss = p.samples.map(([, r]) => r), lo = Math.min(...heights) - 0.3, hi = Math.max(...heights) + 0.3, [r0, r1] = [Math.min(...rss) - 1, Math.max(...rss) + 1];
+  const heights = p.samples.map(([z]) => z),
+    rss = p.samples.map(([, r]) => r),
+    lo = Math.min(...heights) - 0.3,
+    hi = Math.max(...heights) + 0.3,
+    [r0, r1] = [Math.min(...rss) - 1, Math.max(...rss) + 1];
   return (
     <section class="sec-p" data-testid="height-profile">
-      <div class="hd"><h2>Height, {p.anchor}</h2><span class="meta">{p.best === null ? 'no height yet' : `${fixed(p.best, 1)} m ± ${fixed(p.sigma, 1)} m`}</span></div>
-      <Drawing cls="roc" label={`RSS over height for ${p.anchor}${p.best === null ? '' : `; peak at ${fixed(p.best, 1)} m`}`} draw={(w, h) => {
-        const f = { w, h, left: 44, right: 10, top: 8, bottom: 22 }, x = scale([r0, r1], [f.left, w - f.right]), y = scale([lo, hi], [h - f.bottom, f.top]);
-        return <>
-          <Axes f={f} x={x} y={y} xs={ticks(r0, r1, 4)} ys={ticks(lo, hi, 3)} xw={(v) => `${fixed(v, 0)} dBm`} yw={(v) => `${fixed(v, 1)} m`} />
-          {p.samples.map(([z, r], i) => <circle key={i} class="dot" cx={x(r)} cy={y(z)} r="3" />)}
-          {p.best !== null && <path class="goal" d={`M${f.left} ${y(p.best)}H${w - f.right}`} />}
-        </>;
-      }} />
+      <div class="hd">
+        <h2>Height, {p.anchor}</h2>
+        <span class="meta">{p.best === null ? 'no height yet' : `${fixed(p.best, 1)} m ± ${fixed(p.sigma, 1)} m`}</span>
+      </div>
+      <Drawing
+        cls="roc"
+        label={`RSS over height for ${p.anchor}${p.best === null ? '' : `; peak at ${fixed(p.best, 1)} m`}`}
+        draw={(w, h) => {
+          const f = { w, h, left: 44, right: 10, top: 8, bottom: 22 },
+            x = scale([r0, r1], [f.left, w - f.right]),
+            y = scale([lo, hi], [h - f.bottom, f.top]);
+          return (
+            <>
+              <Axes
+                f={f}
+                x={x}
+                y={y}
+                xs={ticks(r0, r1, 4)}
+                ys={ticks(lo, hi, 3)}
+                xw={(v) => `${fixed(v, 0)} dBm`}
+                yw={(v) => `${fixed(v, 1)} m`}
+              />
+              {p.samples.map(([z, r], i) => (
+                <circle key={i} class="dot" cx={x(r)} cy={y(z)} r="3" />
+              ))}
+              {p.best !== null && <path class="goal" d={`M${f.left} ${y(p.best)}H${w - f.right}`} />}
+            </>
+          );
+        }}
+      />
     </section>
   );
 }

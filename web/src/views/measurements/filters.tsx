@@ -4,30 +4,152 @@ import { EVERYTHING, type Filter, type Source } from '../../api/measurements';
 import { LABELS, time_text, typed_time } from './choice';
 
 /// An anchor of a flight, or a place of a campaign: its environments, or its settings where it names none.
-export interface Who { readonly name: string; readonly by: Filter['by'] }
-interface Props { source: Source; filter: Filter; who: readonly Who[]; set: (f: Filter) => void }
+export interface Who {
+  readonly name: string;
+  readonly by: Filter['by'];
+}
+interface Props {
+  source: Source;
+  filter: Filter;
+  who: readonly Who[];
+  set: (f: Filter) => void;
+}
 export function Filters({ source, filter: f, who, set }: Props) {
-  const flight = source.kind === 'mission', put = (part: Partial<Filter>): void => set({ ...f, ...part });
+  const flight = source.kind === 'mission',
+    put = (part: Partial<Filter>): void => set({ ...f, ...part });
   const band = (name: string, unit: string, step: string, low: 'min_m' | 'min_dbm', high: 'max_m' | 'max_dbm') => (
-    <div class="limits" role="group" aria-label={`${name}, ${unit}`}><span class="lab">{name}, {unit}</span><span class="ends"><End name={`${name} from`} value={f[low]} step={step} set={(v) => put({ [low]: v })} /><span aria-hidden="true">–</span><End name={`${name} to`} value={f[high]} step={step} set={(v) => put({ [high]: v })} /></span></div>
+    <div class="limits" role="group" aria-label={`${name}, ${unit}`}>
+      <span class="lab">
+        {name}, {unit}
+      </span>
+      <span class="ends">
+        <End name={`${name} from`} value={f[low]} step={step} set={(v) => put({ [low]: v })} />
+        <span aria-hidden="true">–</span>
+        <End name={`${name} to`} value={f[high]} step={step} set={(v) => put({ [high]: v })} />
+      </span>
+    </div>
   );
-  const time = (name: string, key: 'since_us' | 'until_us') => <label><span class="lab">{name}, UTC</span><input type="datetime-local" step="1" data-testid={key} value={time_text(f[key])} onChange={(e) => put({ [key]: typed_time(e.currentTarget.value) })} /></label>;
+  const time = (name: string, key: 'since_us' | 'until_us') => (
+    <label>
+      <span class="lab">{name}, UTC</span>
+      <input
+        type="datetime-local"
+        step="1"
+        data-testid={key}
+        value={time_text(f[key])}
+        onChange={(e) => put({ [key]: typed_time(e.currentTarget.value) })}
+      />
+    </label>
+  );
   return (
     <section class="cell-p wide filters" aria-label="Filters" data-testid="filters">
-      <label><span class="lab">{flight ? 'Anchor' : 'Place'}</span><select data-testid="who" value={f.who} onChange={(e) => put({ who: e.currentTarget.value, by: who.find((w) => w.name === e.currentTarget.value)?.by ?? 'environment' })}><option value="">{flight ? 'Every anchor' : 'Every place'}</option>{who.map((w) => <option key={w.name} value={w.name}>{w.name}</option>)}</select></label>
-      <div><span class="lab" id="by-label">Label</span><div class="seg" role="group" aria-labelledby="by-label">{LABELS.map(([id, words]) => <button key={id} class={f.label === id ? 'on' : ''} aria-pressed={f.label === id} onClick={() => put({ label: id })}>{words}</button>)}</div></div>
-      <label><span class="lab">Predicted</span><select data-testid="predicted" value={f.cls} onChange={(e) => put({ cls: e.currentTarget.value as Filter['cls'] })}><option value="">Every class</option><option value="los">LOS</option><option value="nlos">NLOS</option><option value="unclear">unclear</option></select></label>
-      {band('Distance', 'm', '0.5', 'min_m', 'max_m')}{band('Level', 'dBm', '1', 'min_dbm', 'max_dbm')}
-      {flight && <label><span class="lab">Fix</span><select data-testid="fix" value={f.fix} onChange={(e) => put({ fix: e.currentTarget.value as Filter['fix'] })}><option value="">Every fix</option><option value="fixed">FIX</option><option value="float">FLOAT</option><option value="dgps">DGPS</option><option value="single">SINGLE</option><option value="none">none within 2 s</option></select></label>}
-      {flight && time('From', 'since_us')}{flight && time('Before', 'until_us')}
-      {Object.entries(EVERYTHING).some(([k, v]) => f[k as keyof Filter] !== v && k !== 'by') && <button class="btn" data-testid="reset" onClick={() => set(EVERYTHING)}>Show all</button>}
+      <label>
+        <span class="lab">{flight ? 'Anchor' : 'Place'}</span>
+        <select
+          data-testid="who"
+          value={f.who}
+          onChange={(e) =>
+            put({
+              who: e.currentTarget.value,
+              by: who.find((w) => w.name === e.currentTarget.value)?.by ?? 'environment',
+            })
+          }
+        >
+          <option value="">{flight ? 'Every anchor' : 'Every place'}</option>
+          {who.map((w) => (
+            <option key={w.name} value={w.name}>
+              {w.name}
+            </option>
+          ))}
+        </select>
+      </label>
+      <div>
+        <span class="lab" id="by-label">
+          Label
+        </span>
+        <div class="seg" role="group" aria-labelledby="by-label">
+          {LABELS.map(([id, words]) => (
+            <button
+              key={id}
+              class={f.label === id ? 'on' : ''}
+              aria-pressed={f.label === id}
+              onClick={() => put({ label: id })}
+            >
+              {words}
+            </button>
+          ))}
+        </div>
+      </div>
+      <label>
+        <span class="lab">Predicted</span>
+        <select
+          data-testid="predicted"
+          value={f.cls}
+          onChange={(e) => put({ cls: e.currentTarget.value as Filter['cls'] })}
+        >
+          <option value="">Every class</option>
+          <option value="los">LOS</option>
+          <option value="nlos">NLOS</option>
+          <option value="unclear">unclear</option>
+        </select>
+      </label>
+      {band('Distance', 'm', '0.5', 'min_m', 'max_m')}
+      {band('Level', 'dBm', '1', 'min_dbm', 'max_dbm')}
+      {flight && (
+        <label>
+          <span class="lab">Fix</span>
+          <select
+            data-testid="fix"
+            value={f.fix}
+            onChange={(e) => put({ fix: e.currentTarget.value as Filter['fix'] })}
+          >
+            <option value="">Every fix</option>
+            <option value="fixed">FIX</option>
+            <option value="float">FLOAT</option>
+            <option value="dgps">DGPS</option>
+            <option value="single">SINGLE</option>
+            <option value="none">none within 2 s</option>
+          </select>
+        </label>
+      )}
+      {flight && time('From', 'since_us')}
+      {flight && time('Before', 'until_us')}
+      {Object.entries(EVERYTHING).some(([k, v]) => f[k as keyof Filter] !== v && k !== 'by') && (
+        <button class="btn" data-testid="reset" onClick={() => set(EVERYTHING)}>
+          Show all
+        </button>
+      )}
     </section>
   );
 }
 
 /// What is being typed is the field's own until it is done: the page is drawn anew whenever something arrives.
-function End({ name, value, step, set }: { name: string; value: number | null; step: string; set: (v: number | null) => void }) {
+function End({
+  name,
+  value,
+  step,
+  set,
+}: {
+  name: string;
+  value: number | null;
+  step: string;
+  set: (v: number | null) => void;
+}) {
   const [typed, type] = useState<string | null>(null);
-  const done = (v: string): void => { type(null); set(v === '' || !Number.isFinite(Number(v)) ? null : Number(v)); };
-  return <input type="number" step={step} inputMode="decimal" value={typed ?? value ?? ''} aria-label={name} data-testid={name.toLowerCase().replace(' ', '-')} onInput={(e) => type(e.currentTarget.value)} onChange={(e) => done(e.currentTarget.value)} />;
+  const done = (v: string): void => {
+    type(null);
+    set(v === '' || !Number.isFinite(Number(v)) ? null : Number(v));
+  };
+  return (
+    <input
+      type="number"
+      step={step}
+      inputMode="decimal"
+      value={typed ?? value ?? ''}
+      aria-label={name}
+      data-testid={name.toLowerCase().replace(' ', '-')}
+      onInput={(e) => type(e.currentTarget.value)}
+      onChange={(e) => done(e.currentTarget.value)}
+    />
+  );
 }

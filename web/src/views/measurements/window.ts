@@ -1,9 +1,10 @@
 /// Rows of a list that is longer than what is kept of it: pages by keyset cursor, only those near what is looked at. No DOM.
-export const PAGE_ROWS = 200, PAGES_KEPT = 6;
+export const PAGE_ROWS = 200,
+  PAGES_KEPT = 6;
 
 export interface Rows<T> {
-  readonly cursors: readonly (string | null)[];   ///< that opens page i; the last may not have been asked for yet
-  readonly sizes: readonly number[];              ///< of the pages that came; a page of a class may hold fewer than asked, or none
+  readonly cursors: readonly (string | null)[]; ///< that opens page i; the last may not have been asked for yet
+  readonly sizes: readonly number[]; ///< of the pages that came; a page of a class may hold fewer than asked, or none
   readonly kept: ReadonlyMap<number, readonly T[]>;
 }
 export const nothing = <T>(): Rows<T> => ({ cursors: [null], sizes: [], kept: new Map() });
@@ -34,7 +35,7 @@ export function index_of<T>(r: Rows<T>, is: (row: T) => boolean): number {
 }
 /// The page to ask for next when rows first to last are to be drawn; null when all of them are here.
 export function lacking<T>(r: Rows<T>, first: number, last: number): number | null {
-  for (let i = Math.max(0, first); i <= last; ) {
+  for (let i = Math.max(0, first); i <= last;) {
     const at = place(r, i);
     if (!at) break;
     if (!r.kept.has(at[0])) return at[0];
@@ -44,8 +45,14 @@ export function lacking<T>(r: Rows<T>, first: number, last: number): number | nu
 }
 /// A page came. What is farthest from it goes.
 export function arrived<T>(r: Rows<T>, page: number, rows: readonly T[], next: string | null): Rows<T> {
-  const fresh = page === r.sizes.length, kept = new Map(r.kept).set(page, rows);
-  while (kept.size > PAGES_KEPT) kept.delete([...kept.keys()].reduce((a, b) => (Math.abs(b - page) > Math.abs(a - page) ? b : a)));
+  const fresh = page === r.sizes.length,
+    kept = new Map(r.kept).set(page, rows);
+  while (kept.size > PAGES_KEPT)
+    kept.delete([...kept.keys()].reduce((a, b) => (Math.abs(b - page) > Math.abs(a - page) ? b : a)));
   // A page asked for again is as long as it was: rows are never changed, and new ones come before the first or after the last.
-  return { cursors: fresh && next !== null ? [...r.cursors, next] : r.cursors, sizes: fresh ? [...r.sizes, rows.length] : r.sizes, kept };
+  return {
+    cursors: fresh && next !== null ? [...r.cursors, next] : r.cursors,
+    sizes: fresh ? [...r.sizes, rows.length] : r.sizes,
+    kept,
+  };
 }

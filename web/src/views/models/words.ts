@@ -1,22 +1,71 @@
 /// Names of learning as people say them. No DOM.
 import type { Task } from '../../api/learning';
 
-export const TASK_WORDS: Record<Task, string> = { nlos_id: 'LOS or NLOS', los_bias: 'LOS bias', nlos_bias: 'NLOS bias', bias: 'Bias of all' };
+export const TASK_WORDS: Record<Task, string> = {
+  nlos_id: 'LOS or NLOS',
+  los_bias: 'LOS bias',
+  nlos_bias: 'NLOS bias',
+  bias: 'Bias of all',
+};
 const METHODS: Record<string, string> = {
-  logistic: 'Logistic regression', random_forest: 'Random forest', forest: 'Random forest', svm: 'Support vector machine', svm_linear: 'SVM, linear', svm_poly: 'SVM, polynomial', svm_sigmoid: 'SVM, sigmoid', svm_rbf: 'SVM, RBF', gbt: 'Boosted trees', boosted_trees: 'Boosted trees',
-  univariate: 'Univariate polynomial', multivariate: 'Multivariate polynomial', polynomial: 'Polynomial', mixture: 'Averaged logits', auto: 'Automatic', none: 'No correction', raw: 'No correction',
+  logistic: 'Logistic regression',
+  random_forest: 'Random forest',
+  forest: 'Random forest',
+  svm: 'Support vector machine',
+  svm_linear: 'SVM, linear',
+  svm_poly: 'SVM, polynomial',
+  svm_sigmoid: 'SVM, sigmoid',
+  svm_rbf: 'SVM, RBF',
+  gbt: 'Boosted trees',
+  boosted_trees: 'Boosted trees',
+  univariate: 'Univariate polynomial',
+  multivariate: 'Multivariate polynomial',
+  polynomial: 'Polynomial',
+  mixture: 'Averaged logits',
+  auto: 'Automatic',
+  none: 'No correction',
+  raw: 'No correction',
 };
 const plain_words = (m: string): string => METHODS[m] ?? m.replaceAll('_', ' ').replace(/^./, (c) => c.toUpperCase());
 /// A method as its run names it, with settings and features where it tells them: "logistic(c=3) on 3 features".
 export function method_words(m: string | null): string {
   if (!m) return 'Automatic';
   const parts = /^(\w+)\(([^()]*)\)(?: on (\d+ features?))?$/.exec(m);
-  return parts ? [plain_words(parts[1]!), ...(parts[2] ? parts[2].split(',').map((s) => s.trim().replace('=', ' ')) : []), ...(parts[3] ? [parts[3]] : [])].join(', ') : plain_words(m);
+  return parts
+    ? [
+        plain_words(parts[1]!),
+        ...(parts[2] ? parts[2].split(',').map((s) => s.trim().replace('=', ' ')) : []),
+        ...(parts[3] ? [parts[3]] : []),
+      ].join(', ')
+    : plain_words(m);
 }
 const FEATURES: Record<string, string> = {
-  distance_m: 'Distance', range_m: 'Distance', range_db: 'Distance, dB', rx_dbm: 'RX level', fp_dbm: 'First-path level', rx_minus_fp_db: 'RX-FP difference', noise_excess_db: 'Noise excess', fp_snr_db: 'First-path SNR', total_snr_db: 'SNR',
-  preamble_db: 'Preamble', fp_shape12_db: 'First-path shape, 1 to 2', fp_shape32_db: 'First-path shape, 3 to 2', rx_free_space_db: 'RX over free space', fp_free_space_db: 'First path over free space', fp_index: 'First-path index',
-  max_noise_db: 'Strongest noise', kurtosis: 'Kurtosis', mean_excess_delay_ns: 'Mean excess delay', rms_delay_spread_ns: 'RMS delay spread', early_energy: 'Early energy', peak_delay_ns: 'Peak delay', height_difference_m: 'Height', heading_deg: 'Heading',
-  log_range_spread: 'Spread of ranges', log_fp_spread: 'Spread of first path', log_rx_minus_fp_spread: 'Spread of RX-FP', std_noise: 'Noise',
+  distance_m: 'Distance',
+  range_m: 'Distance',
+  range_db: 'Distance, dB',
+  rx_dbm: 'RX level',
+  fp_dbm: 'First-path level',
+  rx_minus_fp_db: 'RX-FP difference',
+  noise_excess_db: 'Noise excess',
+  fp_snr_db: 'First-path SNR',
+  total_snr_db: 'SNR',
+  preamble_db: 'Preamble',
+  fp_shape12_db: 'First-path shape, 1 to 2',
+  fp_shape32_db: 'First-path shape, 3 to 2',
+  rx_free_space_db: 'RX over free space',
+  fp_free_space_db: 'First path over free space',
+  fp_index: 'First-path index',
+  max_noise_db: 'Strongest noise',
+  kurtosis: 'Kurtosis',
+  mean_excess_delay_ns: 'Mean excess delay',
+  rms_delay_spread_ns: 'RMS delay spread',
+  early_energy: 'Early energy',
+  peak_delay_ns: 'Peak delay',
+  height_difference_m: 'Height',
+  heading_deg: 'Heading',
+  log_range_spread: 'Spread of ranges',
+  log_fp_spread: 'Spread of first path',
+  log_rx_minus_fp_spread: 'Spread of RX-FP',
+  std_noise: 'Noise',
 };
 export const feature_words = (f: string): string => FEATURES[f] ?? f.replaceAll('_', ' ');

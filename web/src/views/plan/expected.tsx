@@ -6,8 +6,12 @@ import { enu_from_geodetic, type Geodetic } from '../../map/enu';
 import { fixed } from '../../ui/format';
 import { to_m } from './draft';
 
-const REACH_M = 60;   ///< within which the server's planner counts on ranges
-export interface Placed { readonly id: string; readonly e: number; readonly n: number }
+const REACH_M = 60; ///< within which the server's planner counts on ranges
+export interface Placed {
+  readonly id: string;
+  readonly e: number;
+  readonly n: number;
+}
 
 /// Expected anchors whose place is known, about the plan's origin.
 export function placed(plan: Plan, known: ReadonlyMap<string, AnchorRow>, origin: Geodetic): Placed[] {
@@ -19,24 +23,117 @@ export function placed(plan: Plan, known: ReadonlyMap<string, AnchorRow>, origin
   });
 }
 /// `0x6A2F ` as the server writes it; null where it is no radio address.
-export const typed_address = (text: string): string | null => { const t = text.trim().toLowerCase(), hex = t.startsWith('0x') ? t : `0x${t}`; return /^0x[0-9a-f]{4,8}$/.test(hex) ? hex : null; };
+export const typed_address = (text: string): string | null => {
+  const t = text.trim().toLowerCase(),
+    hex = t.startsWith('0x') ? t : `0x${t}`;
+  return /^0x[0-9a-f]{4,8}$/.test(hex) ? hex : null;
+};
 
-export function Expected({ plan, known, origin, change }: { plan: Plan; known: ReadonlyMap<string, AnchorRow>; origin: Geodetic | null; change: (p: Plan) => void }) {
-  const [text, set_text] = useState(''), address = typed_address(text), places = origin ? new Map(placed(plan, known, origin).map((p) => [p.id, p])) : new Map(), offered = [...known.keys()].filter((id) => !plan.expected.includes(id)).sort();
+export function Expected({
+  plan,
+  known,
+  origin,
+  change,
+}: {
+  plan: Plan;
+  known: ReadonlyMap<string, AnchorRow>;
+  origin: Geodetic | null;
+  change: (p: Plan) => void;
+}) {
+  const [text, set_text] = useState(''),
+    address = typed_address(text),
+    places = origin ? new Map(placed(plan, known, origin).map((p) => [p.id, p])) : new Map(),
+    offered = [...known.keys()].filter((id) => !plan.expected.includes(id)).sort();
   const points = origin ? plan.waypoints.filter((w) => w.measure).map((w) => to_m(w, origin)) : [];
-  const reach = (id: string): string => { const at = places.get(id); return at ? `${points.filter(([e, n]) => Math.hypot(e - at.e, n - at.n) <= REACH_M).length} of ${points.length}` : '–'; };
-  const add = (): void => { if (address && !plan.expected.includes(address)) change({ ...plan, expected: [...plan.expected, address] }); set_text(''); };
+  const reach = (id: string): string => {
+    const at = places.get(id);
+    return at
+      ? `${points.filter(([e, n]) => Math.hypot(e - at.e, n - at.n) <= REACH_M).length} of ${points.length}`
+      : '–';
+  };
+  const add = (): void => {
+    if (address && !plan.expected.includes(address)) change({ ...plan, expected: [...plan.expected, address] });
+    set_text('');
+  };
   return (
     <section class="sec-p" data-testid="expected">
-      <div class="hd"><h2>Expected anchors</h2><span class="meta">{plan.expected.length}</span></div>
+      <div class="hd">
+        <h2>Expected anchors</h2>
+        <span class="meta">{plan.expected.length}</span>
+      </div>
       {plan.expected.length === 0 && <p class="why">None is named: the flight takes whatever it hears.</p>}
-      {plan.expected.length > 0 && <table class="tbl"><caption class="sr">Anchors that the flight should meet</caption>
-        <thead><tr><th scope="col">Anchor</th><th scope="col">Known place</th><th scope="col" class="num">Points within {fixed(REACH_M, 0)} m</th><th scope="col"><span class="sr">Change</span></th></tr></thead>
-        <tbody>{plan.expected.map((id) => <tr key={id}><th scope="row">{known.get(id)?.name || id}{known.get(id)?.name ? <span class="mut"> {id}</span> : ''}</th><td>{places.has(id) ? 'published' : <span class="mut">not yet</span>}</td><td class="num">{reach(id)}</td><td class="acts"><button class="btn small" aria-label={`Do not expect ${id}`} onClick={() => change({ ...plan, expected: plan.expected.filter((x) => x !== id) })}>×</button></td></tr>)}</tbody>
-      </table>}
-      <form class="addform" onSubmit={(e) => { e.preventDefault(); add(); }}>
-        <input aria-label="Radio address of an anchor" placeholder="0x6a2f" list="known-anchors" value={text} data-testid="expect-address" onInput={(e) => set_text(e.currentTarget.value)} /><datalist id="known-anchors">{offered.map((id) => <option key={id} value={id}>{known.get(id)?.name}</option>)}</datalist>
-        <button class="btn" disabled={!address} data-testid="expect">Expect</button>{offered.length > 0 && <button type="button" class="btn" onClick={() => change({ ...plan, expected: [...plan.expected, ...offered] })}>All {offered.length} known</button>}
+      {plan.expected.length > 0 && (
+        <table class="tbl">
+          <caption class="sr">Anchors that the flight should meet</caption>
+          <thead>
+            <tr>
+              <th scope="col">Anchor</th>
+              <th scope="col">Known place</th>
+              <th scope="col" class="num">
+                Points within {fixed(REACH_M, 0)} m
+              </th>
+              <th scope="col">
+                <span class="sr">Change</span>
+              </th>
+            </tr>
+          </thead>
+          <tbody>
+            {plan.expected.map((id) => (
+              <tr key={id}>
+                <th scope="row">
+                  {known.get(id)?.name || id}
+                  {known.get(id)?.name ? <span class="mut"> {id}</span> : ''}
+                </th>
+                <td>{places.has(id) ? 'published' : <span class="mut">not yet</span>}</td>
+                <td class="num">{reach(id)}</td>
+                <td class="acts">
+                  <button
+                    class="btn small"
+                    aria-label={`Do not expect ${id}`}
+                    onClick={() => change({ ...plan, expected: plan.expected.filter((x) => x !== id) })}
+                  >
+                    ×
+                  </button>
+                </td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      )}
+      <form
+        class="addform"
+        onSubmit={(e) => {
+          e.preventDefault();
+          add();
+        }}
+      >
+        <input
+          aria-label="Radio address of an anchor"
+          placeholder="0x6a2f"
+          list="known-anchors"
+          value={text}
+          data-testid="expect-address"
+          onInput={(e) => set_text(e.currentTarget.value)}
+        />
+        <datalist id="known-anchors">
+          {offered.map((id) => (
+            <option key={id} value={id}>
+              {known.get(id)?.name}
+            </option>
+          ))}
+        </datalist>
+        <button class="btn" disabled={!address} data-testid="expect">
+          Expect
+        </button>
+        {offered.length > 0 && (
+          <button
+            type="button"
+            class="btn"
+            onClick={() => change({ ...plan, expected: [...plan.expected, ...offered] })}
+          >
+            All {offered.length} known
+          </button>
+        )}
       </form>
     </section>
   );

@@ -16,35 +16,73 @@ const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16] as const;
 
 export function Replay({ id }: { id: string | null }) {
   const [at_s] = useState(() => Number(new URLSearchParams(location.hash.split('?')[1] ?? '').get('t')) || 0);
-  const [player, set_player] = useState<Player | null>(null), [problem, set_problem] = useState(''), [playing, set_playing] = useState(false), [speed, set_speed] = useState<number>(1), [, redraw] = useState(0);
-  const wanted = (id ?? '').split('?')[0] || mission_id.value, mission = ordered_missions.value.find((m) => m.mission === wanted) ?? null;
+  const [player, set_player] = useState<Player | null>(null),
+    [problem, set_problem] = useState(''),
+    [playing, set_playing] = useState(false),
+    [speed, set_speed] = useState<number>(1),
+    [, redraw] = useState(0);
+  const wanted = (id ?? '').split('?')[0] || mission_id.value,
+    mission = ordered_missions.value.find((m) => m.mission === wanted) ?? null;
   useEffect(() => {
     document.title = 'Replay - anchord';
     if (!mission) return;
     let gone = false;
-    load_recording(mission).then(async (recording) => {
-      const made = new Player(recording);
-      const { rows } = await request('GET', `/anchors?view=live&mission=${encodeURIComponent(mission.mission)}&limit=1000`).then(rows_of_collection, () => ({ rows: [] }));
-      for (const r of rows) made.scene.add_estimate({ ...r, mission: mission.mission, t_us: recording.to_us }, now_ms());
-      if (gone) return;
-      made.to(recording.from_us + at_s * 1e6, now_ms());
-      show(made);
-      set_player(made);
-    }, (e: unknown) => { if (!gone) set_problem(said(e)); });
-    return () => { gone = true; replayed.value = null; };
+    load_recording(mission).then(
+      async (recording) => {
+        const made = new Player(recording);
+        const { rows } = await request(
+          'GET',
+          `/anchors?view=live&mission=${encodeURIComponent(mission.mission)}&limit=1000`,
+        ).then(rows_of_collection, () => ({ rows: [] }));
+        for (const r of rows)
+          made.scene.add_estimate({ ...r, mission: mission.mission, t_us: recording.to_us }, now_ms());
+        if (gone) return;
+        made.to(recording.from_us + at_s * 1e6, now_ms());
+        show(made);
+        set_player(made);
+      },
+      (e: unknown) => {
+        if (!gone) set_problem(said(e));
+      },
+    );
+    return () => {
+      gone = true;
+      replayed.value = null;
+    };
   }, [mission?.mission]);
-  const show = (p: Player): void => { replayed.value = { scene: p.scene, mission: { ...p.recording.mission, state: 'recording' } }; };
-  const go = (t_us: number): void => { if (player) { player.to(t_us, now_ms()); show(player); tick.value++; redraw((n) => n + 1); } };
+  const show = (p: Player): void => {
+    replayed.value = { scene: p.scene, mission: { ...p.recording.mission, state: 'recording' } };
+  };
+  const go = (t_us: number): void => {
+    if (player) {
+      player.to(t_us, now_ms());
+      show(player);
+      tick.value++;
+      redraw((n) => n + 1);
+    }
+  };
   const latest = useRef({ player, speed, go });
   latest.current = { player, speed, go };
   useEffect(() => {
-    if (!playing) { const hold = setInterval(() => { const p = latest.current.player; if (p) p.to(p.t_us, now_ms()); }, 500); return () => clearInterval(hold); }
-    let last = now_ms(), frame = 0, text = 0;
+    if (!playing) {
+      const hold = setInterval(() => {
+        const p = latest.current.player;
+        if (p) p.to(p.t_us, now_ms());
+      }, 500);
+      return () => clearInterval(hold);
+    }
+    let last = now_ms(),
+      frame = 0,
+      text = 0;
     const step = (): void => {
-      const now = now_ms(), p = latest.current.player;
+      const now = now_ms(),
+        p = latest.current.player;
       if (p) {
         p.to(p.t_us + (now - last) * 1000 * latest.current.speed, now);
-        if (now - text > 250) { text = now; latest.current.go(p.t_us); }
+        if (now - text > 250) {
+          text = now;
+          latest.current.go(p.t_us);
+        }
         if (p.t_us >= p.recording.to_us) set_playing(false);
       }
       last = now;
@@ -55,40 +93,145 @@ export function Replay({ id }: { id: string | null }) {
   }, [playing, player]);
   useEffect(() => {
     const on_key = (e: KeyboardEvent): void => {
-      if (!player || (e.target instanceof HTMLElement && e.target.closest('input, select, textarea, [role="application"]')) || e.ctrlKey || e.metaKey) return;
-      const step_us = e.altKey ? 500_000 : e.shiftKey ? 10_000 : 100_000, marks = player.recording.marks, next = after(marks, player.t_us);
+      if (
+        !player ||
+        (e.target instanceof HTMLElement && e.target.closest('input, select, textarea, [role="application"]')) ||
+        e.ctrlKey ||
+        e.metaKey
+      )
+        return;
+      const step_us = e.altKey ? 500_000 : e.shiftKey ? 10_000 : 100_000,
+        marks = player.recording.marks,
+        next = after(marks, player.t_us);
       const act: Record<string, () => void> = {
-        ' ': () => set_playing((x) => !x), ArrowRight: () => go(player.t_us + step_us), ArrowLeft: () => go(player.t_us - step_us),
-        '.': () => { const m = marks[next]; if (m) go(m.t_us); }, ',': () => { const m = marks.slice(0, next).reverse().find((x) => x.t_us < player.t_us); if (m) go(m.t_us); },
+        ' ': () => set_playing((x) => !x),
+        ArrowRight: () => go(player.t_us + step_us),
+        ArrowLeft: () => go(player.t_us - step_us),
+        '.': () => {
+          const m = marks[next];
+          if (m) go(m.t_us);
+        },
+        ',': () => {
+          const m = marks
+            .slice(0, next)
+            .reverse()
+            .find((x) => x.t_us < player.t_us);
+          if (m) go(m.t_us);
+        },
       };
-      if (act[e.key]) { e.preventDefault(); act[e.key]!(); }
+      if (act[e.key]) {
+        e.preventDefault();
+        act[e.key]!();
+      }
     };
     addEventListener('keydown', on_key);
     return () => removeEventListener('keydown', on_key);
   }, [player]);
-  if (!mission) return <div class="empty"><p>No flight is stored under this address.</p><a class="btn" href="#/live">Go to Live</a></div>;
-  const scene = player?.scene ?? null, selected = chosen_anchor.value ?? [...(scene?.anchors.keys() ?? [])].sort()[0] ?? null, r = player?.recording, span = r ? r.to_us - r.from_us : 1;
+  if (!mission)
+    return (
+      <div class="empty">
+        <p>No flight is stored under this address.</p>
+        <a class="btn" href="#/live">
+          Go to Live
+        </a>
+      </div>
+    );
+  const scene = player?.scene ?? null,
+    selected = chosen_anchor.value ?? [...(scene?.anchors.keys() ?? [])].sort()[0] ?? null,
+    r = player?.recording,
+    span = r ? r.to_us - r.from_us : 1;
   return (
     <div class="replay" data-testid="replay">
       <div class="toolbar">
-        <Chip shape="info" tone="info" word="REPLAY" /><h1>{mission.name || mission.mission.slice(0, 8)}</h1>
-        {ordered_missions.value.length > 1 && <select aria-label="Flight to replay" value={mission.mission} onChange={(e) => (location.hash = `#/replay/${e.currentTarget.value}`)}>{ordered_missions.value.map((m) => <option key={m.mission} value={m.mission}>{m.name || m.mission.slice(0, 8)}</option>)}</select>}
-        <span class="grow" />{r?.cut && <span class="mut">Only the first 120 000 rows are played.</span>}<a class="btn" href="#/live">Back to live</a>
+        <Chip shape="info" tone="info" word="REPLAY" />
+        <h1>{mission.name || mission.mission.slice(0, 8)}</h1>
+        {ordered_missions.value.length > 1 && (
+          <select
+            aria-label="Flight to replay"
+            value={mission.mission}
+            onChange={(e) => (location.hash = `#/replay/${e.currentTarget.value}`)}
+          >
+            {ordered_missions.value.map((m) => (
+              <option key={m.mission} value={m.mission}>
+                {m.name || m.mission.slice(0, 8)}
+              </option>
+            ))}
+          </select>
+        )}
+        <span class="grow" />
+        {r?.cut && <span class="mut">Only the first 120 000 rows are played.</span>}
+        <a class="btn" href="#/live">
+          Back to live
+        </a>
       </div>
-      {problem && <div class="problem" role="status"><b>The flight could not be read.</b> {problem}</div>}
+      {problem && (
+        <div class="problem" role="status">
+          <b>The flight could not be read.</b> {problem}
+        </div>
+      )}
       <div class="replaybody">
-        <MapBox content={() => ({ anchors: scene ? [...scene.anchors.values()].map((a) => a.value) : [], selected, scene: player?.scene ?? null, link_lost: false, running: true })} onSelect={(a) => (chosen_anchor.value = a)} label="Map of the recorded flight" follow version={`${mission.mission} ${player?.scene.estimates_version} ${selected}`} />
-        <aside class="side" aria-label="Ranges and anchor of the recording" tabIndex={0}><RangeList selected={selected} />{selected && scene?.anchors.has(selected) && <AnchorCard anchor={selected} />}</aside>
+        <MapBox
+          content={() => ({
+            anchors: scene ? [...scene.anchors.values()].map((a) => a.value) : [],
+            selected,
+            scene: player?.scene ?? null,
+            link_lost: false,
+            running: true,
+          })}
+          onSelect={(a) => (chosen_anchor.value = a)}
+          label="Map of the recorded flight"
+          follow
+          version={`${mission.mission} ${player?.scene.estimates_version} ${selected}`}
+        />
+        <aside class="side" aria-label="Ranges and anchor of the recording" tabIndex={0}>
+          <RangeList selected={selected} />
+          {selected && scene?.anchors.has(selected) && <AnchorCard anchor={selected} />}
+        </aside>
       </div>
       <div class="player" role="group" aria-label="Player">
-        <button class="btn primary" data-testid="play" disabled={!player} onClick={() => { if (player && player.t_us >= player.recording.to_us) go(player.recording.from_us); set_playing(!playing); }}>{playing ? 'Pause' : 'Play'}</button>
-        <span class="n" data-testid="replay-time">{player ? `${clock((player.t_us - player.recording.from_us) / 1e6)}.${fixed(Math.floor(((player.t_us - player.recording.from_us) / 1e5) % 10), 0)}` : '–'}</span>
+        <button
+          class="btn primary"
+          data-testid="play"
+          disabled={!player}
+          onClick={() => {
+            if (player && player.t_us >= player.recording.to_us) go(player.recording.from_us);
+            set_playing(!playing);
+          }}
+        >
+          {playing ? 'Pause' : 'Play'}
+        </button>
+        <span class="n" data-testid="replay-time">
+          {player
+            ? `${clock((player.t_us - player.recording.from_us) / 1e6)}.${fixed(Math.floor(((player.t_us - player.recording.from_us) / 1e5) % 10), 0)}`
+            : '–'}
+        </span>
         <div class="scrub">
           {r && <FixBand player={player!} />}
-          <input type="range" min="0" max={span} step="10000" value={player ? player.t_us - player.recording.from_us : 0} aria-label="Time in the flight" aria-valuetext={player ? clock((player.t_us - player.recording.from_us) / 1e6) : ''} data-testid="scrubber" onInput={(e) => { if (r) go(r.from_us + Number(e.currentTarget.value)); }} />
+          <input
+            type="range"
+            min="0"
+            max={span}
+            step="10000"
+            value={player ? player.t_us - player.recording.from_us : 0}
+            aria-label="Time in the flight"
+            aria-valuetext={player ? clock((player.t_us - player.recording.from_us) / 1e6) : ''}
+            data-testid="scrubber"
+            onInput={(e) => {
+              if (r) go(r.from_us + Number(e.currentTarget.value));
+            }}
+          />
         </div>
         <span class="n mut">{clock(span / 1e6)}</span>
-        <label class="limit">Speed <select value={speed} data-testid="speed" onChange={(e) => set_speed(Number(e.currentTarget.value))}>{SPEEDS.map((s) => <option key={s} value={s}>{s}×</option>)}</select></label>
+        <label class="limit">
+          Speed{' '}
+          <select value={speed} data-testid="speed" onChange={(e) => set_speed(Number(e.currentTarget.value))}>
+            {SPEEDS.map((s) => (
+              <option key={s} value={s}>
+                {s}×
+              </option>
+            ))}
+          </select>
+        </label>
       </div>
     </div>
   );
@@ -96,13 +239,29 @@ export function Replay({ id }: { id: string | null }) {
 
 /// The fix over the whole flight, and a tick for every event: where to look.
 function FixBand({ player }: { player: Player }) {
-  const { recording: r } = player, span = r.to_us - r.from_us || 1, runs: { from: number; to: number; fix: string }[] = [];
-  for (const p of r.poses) { const last = runs[runs.length - 1]; if (last && last.fix === p.fix) last.to = p.t_us; else runs.push({ from: p.t_us, to: p.t_us, fix: p.fix }); }
+  const { recording: r } = player,
+    span = r.to_us - r.from_us || 1,
+    runs: { from: number; to: number; fix: string }[] = [];
+  for (const p of r.poses) {
+    const last = runs[runs.length - 1];
+    if (last && last.fix === p.fix) last.to = p.t_us;
+    else runs.push({ from: p.t_us, to: p.t_us, fix: p.fix });
+  }
   const x = (t: number): number => ((t - r.from_us) / span) * 1000;
   return (
-    <svg class="fixband" viewBox="0 0 1000 14" preserveAspectRatio="none" role="img" aria-label={`${runs.length} stretches of one fix class, ${r.marks.length} events`}>
-      {runs.map((f, i) => <rect key={i} class={`fx ${f.fix}`} x={x(f.from)} width={Math.max(1, x(f.to) - x(f.from))} y="5" height="9" />)}
-      {r.marks.map((m, i) => <rect key={`m${i}`} class={`mk ${m.level}`} x={x(m.t_us)} width="2" y="0" height="14" />)}
+    <svg
+      class="fixband"
+      viewBox="0 0 1000 14"
+      preserveAspectRatio="none"
+      role="img"
+      aria-label={`${runs.length} stretches of one fix class, ${r.marks.length} events`}
+    >
+      {runs.map((f, i) => (
+        <rect key={i} class={`fx ${f.fix}`} x={x(f.from)} width={Math.max(1, x(f.to) - x(f.from))} y="5" height="9" />
+      ))}
+      {r.marks.map((m, i) => (
+        <rect key={`m${i}`} class={`mk ${m.level}`} x={x(m.t_us)} width="2" y="0" height="14" />
+      ))}
     </svg>
   );
 }

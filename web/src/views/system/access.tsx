@@ -1,53 +1,189 @@
 /// Who may use this server, and what was done on it: tokens with one role each, and the audit log.
 import { useEffect, useState } from 'preact/hooks';
 import { said } from '../../api/client';
-import { audit as fetch_audit, create_token, revoke_token, ROLES, tokens as fetch_tokens, type AuditLine, type Token } from '../../api/system';
+import {
+  audit as fetch_audit,
+  create_token,
+  revoke_token,
+  ROLES,
+  tokens as fetch_tokens,
+  type AuditLine,
+  type Token,
+} from '../../api/system';
 import { say } from '../../state/store';
 import { CopyBox } from '../../ui/copy_box';
 import { date } from '../../ui/format';
 
-const ROLE_WORDS: Record<string, string> = { viewer: 'sees everything', integrator: 'facility tools: reads and annotates anchors', gateway: 'sends measurements only', engineer: 'trains and publishes', operator: 'flies', admin: 'everything' };
+const ROLE_WORDS: Record<string, string> = {
+  viewer: 'sees everything',
+  integrator: 'facility tools: reads and annotates anchors',
+  gateway: 'sends measurements only',
+  engineer: 'trains and publishes',
+  operator: 'flies',
+  admin: 'everything',
+};
 
 export function AccessPanel() {
-  const [all, set_all] = useState<readonly Token[]>([]), [problem, set_problem] = useState(''), [name, set_name] = useState(''), [role, set_role] = useState<string>('viewer'), [secret, set_secret] = useState(''), [sure, set_sure] = useState('');
-  const load = (): void => { fetch_tokens().then(set_all, (e: unknown) => set_problem(said(e))); };
+  const [all, set_all] = useState<readonly Token[]>([]),
+    [problem, set_problem] = useState(''),
+    [name, set_name] = useState(''),
+    [role, set_role] = useState<string>('viewer'),
+    [secret, set_secret] = useState(''),
+    [sure, set_sure] = useState('');
+  const load = (): void => {
+    fetch_tokens().then(set_all, (e: unknown) => set_problem(said(e)));
+  };
   useEffect(load, []);
-  const guarded = async (work: () => Promise<void>): Promise<void> => { set_problem(''); try { await work(); load(); } catch (e) { set_problem(said(e)); } };
-  const create = (): void => void guarded(async () => { set_secret(await create_token(name.trim(), role)); set_name(''); });
+  const guarded = async (work: () => Promise<void>): Promise<void> => {
+    set_problem('');
+    try {
+      await work();
+      load();
+    } catch (e) {
+      set_problem(said(e));
+    }
+  };
+  const create = (): void =>
+    void guarded(async () => {
+      set_secret(await create_token(name.trim(), role));
+      set_name('');
+    });
   /// Two presses: a revoked token cannot be brought back.
-  const revoke = (t: Token): void => { if (sure !== t.id) set_sure(t.id); else void guarded(async () => { await revoke_token(t.id); set_sure(''); say(`${t.name} revoked`); }); };
+  const revoke = (t: Token): void => {
+    if (sure !== t.id) set_sure(t.id);
+    else
+      void guarded(async () => {
+        await revoke_token(t.id);
+        set_sure('');
+        say(`${t.name} revoked`);
+      });
+  };
   const valid = all.filter((t) => !t.revoked_at);
   return (
     <section class="sys-p" data-testid="access">
       <h2>Access</h2>
-      {problem && <div class="problem" role="status"><b>That did not work.</b> {problem}</div>}
-      <form class="callout addform" onSubmit={(e) => { e.preventDefault(); create(); }}>
-        <label class="grow"><span class="lab">Name</span><input required maxLength={100} value={name} placeholder="who or what will use it" onInput={(e) => set_name(e.currentTarget.value)} /></label>
-        <label><span class="lab">Role</span><select value={role} onChange={(e) => set_role(e.currentTarget.value)}>{ROLES.map((r) => <option key={r} value={r}>{r}: {ROLE_WORDS[r]}</option>)}</select></label>
-        <span class="actions"><button class="btn primary" data-testid="create-token" disabled={!name.trim()}>Make a token</button></span>
+      {problem && (
+        <div class="problem" role="status">
+          <b>That did not work.</b> {problem}
+        </div>
+      )}
+      <form
+        class="callout addform"
+        onSubmit={(e) => {
+          e.preventDefault();
+          create();
+        }}
+      >
+        <label class="grow">
+          <span class="lab">Name</span>
+          <input
+            required
+            maxLength={100}
+            value={name}
+            placeholder="who or what will use it"
+            onInput={(e) => set_name(e.currentTarget.value)}
+          />
+        </label>
+        <label>
+          <span class="lab">Role</span>
+          <select value={role} onChange={(e) => set_role(e.currentTarget.value)}>
+            {ROLES.map((r) => (
+              <option key={r} value={r}>
+                {r}: {ROLE_WORDS[r]}
+              </option>
+            ))}
+          </select>
+        </label>
+        <span class="actions">
+          <button class="btn primary" data-testid="create-token" disabled={!name.trim()}>
+            Make a token
+          </button>
+        </span>
       </form>
-      {secret && <div class="callout caution" data-testid="secret"><b>Copy it now: it is shown once.</b><CopyBox label="Copy the token" text={secret} /><button class="btn small" onClick={() => set_secret('')}>I have it</button></div>}
+      {secret && (
+        <div class="callout caution" data-testid="secret">
+          <b>Copy it now: it is shown once.</b>
+          <CopyBox label="Copy the token" text={secret} />
+          <button class="btn small" onClick={() => set_secret('')}>
+            I have it
+          </button>
+        </div>
+      )}
       <table class="tbl">
         <caption class="sr">Tokens that are valid</caption>
-        <thead><tr><th scope="col">Token</th><th scope="col">Role</th><th scope="col">Last used</th><th scope="col">Ends</th><th scope="col"><span class="sr">Revoke</span></th></tr></thead>
-        <tbody>{valid.map((t) => <tr key={t.id}><th scope="row">{t.name}<span class="mut block">made {date(t.created_at)}</span></th><td>{t.roles.join(', ')}</td><td>{t.last_used_at ? date(t.last_used_at) : <span class="mut">never</span>}</td><td>{t.expires_at ? date(t.expires_at) : <span class="mut">never</span>}</td><td class="acts"><button class="btn small" onClick={() => revoke(t)}>{sure === t.id ? 'Press again to revoke' : 'Revoke'}</button></td></tr>)}</tbody>
+        <thead>
+          <tr>
+            <th scope="col">Token</th>
+            <th scope="col">Role</th>
+            <th scope="col">Last used</th>
+            <th scope="col">Ends</th>
+            <th scope="col">
+              <span class="sr">Revoke</span>
+            </th>
+          </tr>
+        </thead>
+        <tbody>
+          {valid.map((t) => (
+            <tr key={t.id}>
+              <th scope="row">
+                {t.name}
+                <span class="mut block">made {date(t.created_at)}</span>
+              </th>
+              <td>{t.roles.join(', ')}</td>
+              <td>{t.last_used_at ? date(t.last_used_at) : <span class="mut">never</span>}</td>
+              <td>{t.expires_at ? date(t.expires_at) : <span class="mut">never</span>}</td>
+              <td class="acts">
+                <button class="btn small" onClick={() => revoke(t)}>
+                  {sure === t.id ? 'Press again to revoke' : 'Revoke'}
+                </button>
+              </td>
+            </tr>
+          ))}
+        </tbody>
       </table>
-      {valid.length === 0 && <p class="why">No token is valid: only this computer without sign-in can reach the server.</p>}
+      {valid.length === 0 && (
+        <p class="why">No token is valid: only this computer without sign-in can reach the server.</p>
+      )}
     </section>
   );
 }
 
 export function AuditPanel() {
-  const [lines, set_lines] = useState<readonly AuditLine[]>([]), [problem, set_problem] = useState('');
-  useEffect(() => { fetch_audit().then(set_lines, (e: unknown) => set_problem(said(e))); }, []);
+  const [lines, set_lines] = useState<readonly AuditLine[]>([]),
+    [problem, set_problem] = useState('');
+  useEffect(() => {
+    fetch_audit().then(set_lines, (e: unknown) => set_problem(said(e)));
+  }, []);
   return (
     <section class="sys-p" data-testid="audit">
       <h2>Audit log</h2>
-      {problem && <div class="problem" role="status">{problem}</div>}
+      {problem && (
+        <div class="problem" role="status">
+          {problem}
+        </div>
+      )}
       <div class="auditbox" tabIndex={0} role="region" aria-label="Audit log">
-        <table class="tbl"><caption class="sr">What was done, newest first</caption>
-          <thead><tr><th scope="col">When</th><th scope="col">Who</th><th scope="col">What</th><th scope="col">Result</th></tr></thead>
-          <tbody>{lines.map((l, i) => <tr key={`${l.at}${i}`}><th scope="row">{l.at.slice(0, 19).replace('T', ' ')}</th><td>{l.who}</td><td class="wrap">{l.what}</td><td>{l.result}</td></tr>)}</tbody></table>
+        <table class="tbl">
+          <caption class="sr">What was done, newest first</caption>
+          <thead>
+            <tr>
+              <th scope="col">When</th>
+              <th scope="col">Who</th>
+              <th scope="col">What</th>
+              <th scope="col">Result</th>
+            </tr>
+          </thead>
+          <tbody>
+            {lines.map((l, i) => (
+              <tr key={`${l.at}${i}`}>
+                <th scope="row">{l.at.slice(0, 19).replace('T', ' ')}</th>
+                <td>{l.who}</td>
+                <td class="wrap">{l.what}</td>
+                <td>{l.result}</td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
         {lines.length === 0 && !problem && <p class="why">Nothing has been changed yet.</p>}
       </div>
     </section>

@@ -2,93 +2,398 @@
 import { useEffect, useState } from 'preact/hooks';
 import { said } from '../../api/client';
 import { devices as fetch_devices, type Device } from '../../api/devices';
-import { change_site, create_site, flights as fetch_flights, kit_of, sites as fetch_sites, type BaseSource, type Flight, type Kit, type Site } from '../../api/site';
+import {
+  change_site,
+  create_site,
+  flights as fetch_flights,
+  kit_of,
+  sites as fetch_sites,
+  type BaseSource,
+  type Flight,
+  type Kit,
+  type Site,
+} from '../../api/site';
 import { may } from '../../state/session';
 import { say } from '../../state/store';
 import { accuracy, fixed, latlon, plain } from '../../ui/format';
 import { CopyBox } from '../../ui/copy_box';
 import { Chip, Q } from '../../ui/marks';
 
-const SOURCES: readonly (readonly [BaseSource, string])[] = [['', 'not known'], ['known_point', 'a known point'], ['survey_in', 'surveyed in by itself'], ['network', 'a network of stations']];
+const SOURCES: readonly (readonly [BaseSource, string])[] = [
+  ['', 'not known'],
+  ['known_point', 'a known point'],
+  ['survey_in', 'surveyed in by itself'],
+  ['network', 'a network of stations'],
+];
 /// How far absolute positions can be trusted, in a line.
-export function base_words(s: Pick<Site, 'source' | 'sigma_m' | 'frame'>): { readonly tone: 'ok' | 'caution'; readonly word: string; readonly text: string } {
-  if (!s.source) return { tone: 'caution', word: 'NOT KNOWN', text: 'Nobody said how the place of the base is known: anchors are right relative to it, and no absolute accuracy can be told.' };
-  if (s.source === 'survey_in') return { tone: 'caution', word: 'SURVEYED IN', text: `The base averaged its own place${s.sigma_m === null ? ', which can be metres off' : `, good to ${accuracy(s.sigma_m)} (1σ)`}: all anchors are off together by as much. Fix it on a known point or against a network to do better.` };
-  return { tone: 'ok', word: s.source === 'network' ? 'NETWORK' : 'KNOWN POINT', text: s.sigma_m === null ? 'How well it is known was not said.' : `Known to ${accuracy(s.sigma_m)} (1σ), which is part of every absolute accuracy.` };
+export function base_words(s: Pick<Site, 'source' | 'sigma_m' | 'frame'>): {
+  readonly tone: 'ok' | 'caution';
+  readonly word: string;
+  readonly text: string;
+} {
+  if (!s.source)
+    return {
+      tone: 'caution',
+      word: 'NOT KNOWN',
+      text: 'Nobody said how the place of the base is known: anchors are right relative to it, and no absolute accuracy can be told.',
+    };
+  if (s.source === 'survey_in')
+    return {
+      tone: 'caution',
+      word: 'SURVEYED IN',
+      text: `The base averaged its own place${s.sigma_m === null ? ', which can be metres off' : `, good to ${accuracy(s.sigma_m)} (1σ)`}: all anchors are off together by as much. Fix it on a known point or against a network to do better.`,
+    };
+  return {
+    tone: 'ok',
+    word: s.source === 'network' ? 'NETWORK' : 'KNOWN POINT',
+    text:
+      s.sigma_m === null
+        ? 'How well it is known was not said.'
+        : `Known to ${accuracy(s.sigma_m)} (1σ), which is part of every absolute accuracy.`,
+  };
 }
 
 export function BasePanel() {
-  const [list, set_list] = useState<readonly Site[] | null>(null), [chosen, set_chosen] = useState(''), [bases, set_bases] = useState<readonly Device[]>([]), [editing, set_editing] = useState(false), [problem, set_problem] = useState('');
+  const [list, set_list] = useState<readonly Site[] | null>(null),
+    [chosen, set_chosen] = useState(''),
+    [bases, set_bases] = useState<readonly Device[]>([]),
+    [editing, set_editing] = useState(false),
+    [problem, set_problem] = useState('');
   const load = (): void => {
     fetch_sites().then(set_list, (e: unknown) => set_problem(said(e)));
-    fetch_devices().then((all) => set_bases(all.filter((d) => d.kind === 'ntrip' && d.enabled)), () => undefined);
+    fetch_devices().then(
+      (all) => set_bases(all.filter((d) => d.kind === 'ntrip' && d.enabled)),
+      () => undefined,
+    );
   };
-  useEffect(() => { load(); const timer = setInterval(load, 3000); return () => clearInterval(timer); }, []);
-  const site = list?.find((s) => s.id === chosen) ?? list?.[0] ?? null, words = site && base_words(site), told = bases.find((d) => d.base)?.base ?? null, admin = may('admin');
+  useEffect(() => {
+    load();
+    const timer = setInterval(load, 3000);
+    return () => clearInterval(timer);
+  }, []);
+  const site = list?.find((s) => s.id === chosen) ?? list?.[0] ?? null,
+    words = site && base_words(site),
+    told = bases.find((d) => d.base)?.base ?? null,
+    admin = may('admin');
   return (
     <section class="sys-p" data-testid="base">
-      <div class="hd"><h2>Base</h2>{list && list.length > 1 && <label><span class="sr">Site</span><select value={site?.id} onChange={(e) => { set_chosen(e.currentTarget.value); set_editing(false); }}>{list.map((s) => <option key={s.id} value={s.id}>{s.name}</option>)}</select></label>}</div>
-      {problem && <div class="problem" role="status">{problem}</div>}
-      {words && <div><Chip shape={words.tone === 'ok' ? 'ok' : 'caution'} tone={words.tone} word={words.word} /> <span class="why">{words.text}</span></div>}
-      {list?.length === 0 && <p class="why">No site yet, so nobody knows in which datum positions are. {admin ? 'Name it and say where its coordinates come from.' : 'An administrator names it.'}</p>}
-      {site && !editing && <dl class="kv s">
-        <div><dt>Site</dt><dd>{site.name}</dd></div>
-        <div><dt>Datum</dt><dd>{site.frame || <span class="caution">not known</span>}</dd></div>
-        <div><dt>Epoch</dt><dd>{site.epoch === null ? <span class="mut">not known</span> : fixed(site.epoch, 2)}</dd></div>
-        <div><dt>Source</dt><dd>{SOURCES.find(([id]) => id === site.source)?.[1]}</dd></div>
-        <div><dt>σ of the base</dt><dd>{site.sigma_m === null ? '–' : <Q v={fixed(site.sigma_m * 1000, 0)} u="mm" />}</dd></div>
-      </dl>}
+      <div class="hd">
+        <h2>Base</h2>
+        {list && list.length > 1 && (
+          <label>
+            <span class="sr">Site</span>
+            <select
+              value={site?.id}
+              onChange={(e) => {
+                set_chosen(e.currentTarget.value);
+                set_editing(false);
+              }}
+            >
+              {list.map((s) => (
+                <option key={s.id} value={s.id}>
+                  {s.name}
+                </option>
+              ))}
+            </select>
+          </label>
+        )}
+      </div>
+      {problem && (
+        <div class="problem" role="status">
+          {problem}
+        </div>
+      )}
+      {words && (
+        <div>
+          <Chip shape={words.tone === 'ok' ? 'ok' : 'caution'} tone={words.tone} word={words.word} />{' '}
+          <span class="why">{words.text}</span>
+        </div>
+      )}
+      {list?.length === 0 && (
+        <p class="why">
+          No site yet, so nobody knows in which datum positions are.{' '}
+          {admin ? 'Name it and say where its coordinates come from.' : 'An administrator names it.'}
+        </p>
+      )}
+      {site && !editing && (
+        <dl class="kv s">
+          <div>
+            <dt>Site</dt>
+            <dd>{site.name}</dd>
+          </div>
+          <div>
+            <dt>Datum</dt>
+            <dd>{site.frame || <span class="caution">not known</span>}</dd>
+          </div>
+          <div>
+            <dt>Epoch</dt>
+            <dd>{site.epoch === null ? <span class="mut">not known</span> : fixed(site.epoch, 2)}</dd>
+          </div>
+          <div>
+            <dt>Source</dt>
+            <dd>{SOURCES.find(([id]) => id === site.source)?.[1]}</dd>
+          </div>
+          <div>
+            <dt>σ of the base</dt>
+            <dd>{site.sigma_m === null ? '–' : <Q v={fixed(site.sigma_m * 1000, 0)} u="mm" />}</dd>
+          </div>
+        </dl>
+      )}
       <h3>Where corrections come from</h3>
-      {told ? <><dl class="kv s" data-testid="base-place">
-        <div><dt>Latitude</dt><dd><Q v={latlon(told.lat)} u="°" /></dd></div><div><dt>Longitude</dt><dd><Q v={latlon(told.lon)} u="°" /></dd></div><div><dt>Height, ellipsoidal</dt><dd><Q v={fixed(told.h_m, 3)} u="m" /></dd></div>
-        <div><dt>Station</dt><dd>{told.station ?? '–'}</dd></div>{told.antenna_height_m !== null && <div><dt>Antenna above its marker</dt><dd><Q v={fixed(told.antenna_height_m, 3)} u="m" /></dd></div>}
-      </dl><CopyBox label="Copy the place of the base" text={`${plain(told.lat, 9)}, ${plain(told.lon, 9)}, ${plain(told.h_m, 3)}`} /></>
-        : <p class="why">{bases.length ? 'The caster has not told its place yet (RTCM 1005 or 1006 comes every few seconds).' : 'They reach the rover by its own radio, so this server does not see where the base stands. With an NTRIP device here it is told.'}</p>}
-      {admin && (editing || list?.length === 0 ? <DatumForm site={site} done={() => { set_editing(false); load(); }} close={() => set_editing(false)} /> : site && <div class="actions"><button class="btn" data-testid="edit-base" onClick={() => set_editing(true)}>Edit</button></div>)}
+      {told ? (
+        <>
+          <dl class="kv s" data-testid="base-place">
+            <div>
+              <dt>Latitude</dt>
+              <dd>
+                <Q v={latlon(told.lat)} u="°" />
+              </dd>
+            </div>
+            <div>
+              <dt>Longitude</dt>
+              <dd>
+                <Q v={latlon(told.lon)} u="°" />
+              </dd>
+            </div>
+            <div>
+              <dt>Height, ellipsoidal</dt>
+              <dd>
+                <Q v={fixed(told.h_m, 3)} u="m" />
+              </dd>
+            </div>
+            <div>
+              <dt>Station</dt>
+              <dd>{told.station ?? '–'}</dd>
+            </div>
+            {told.antenna_height_m !== null && (
+              <div>
+                <dt>Antenna above its marker</dt>
+                <dd>
+                  <Q v={fixed(told.antenna_height_m, 3)} u="m" />
+                </dd>
+              </div>
+            )}
+          </dl>
+          <CopyBox
+            label="Copy the place of the base"
+            text={`${plain(told.lat, 9)}, ${plain(told.lon, 9)}, ${plain(told.h_m, 3)}`}
+          />
+        </>
+      ) : (
+        <p class="why">
+          {bases.length
+            ? 'The caster has not told its place yet (RTCM 1005 or 1006 comes every few seconds).'
+            : 'They reach the rover by its own radio, so this server does not see where the base stands. With an NTRIP device here it is told.'}
+        </p>
+      )}
+      {admin &&
+        (editing || list?.length === 0 ? (
+          <DatumForm
+            site={site}
+            done={() => {
+              set_editing(false);
+              load();
+            }}
+            close={() => set_editing(false)}
+          />
+        ) : (
+          site && (
+            <div class="actions">
+              <button class="btn" data-testid="edit-base" onClick={() => set_editing(true)}>
+                Edit
+              </button>
+            </div>
+          )
+        ))}
     </section>
   );
 }
 
 function DatumForm({ site, done, close }: { site: Site | null; done: () => void; close: () => void }) {
-  const [name, set_name] = useState(site?.name ?? ''), [frame, set_frame] = useState(site?.frame ?? ''), [epoch, set_epoch] = useState(site?.epoch == null ? '' : String(site.epoch)), [source, set_source] = useState<BaseSource>(site?.source ?? ''), [sigma, set_sigma] = useState(site?.sigma_m == null ? '' : String(site.sigma_m * 1000)), [problem, set_problem] = useState('');
+  const [name, set_name] = useState(site?.name ?? ''),
+    [frame, set_frame] = useState(site?.frame ?? ''),
+    [epoch, set_epoch] = useState(site?.epoch == null ? '' : String(site.epoch)),
+    [source, set_source] = useState<BaseSource>(site?.source ?? ''),
+    [sigma, set_sigma] = useState(site?.sigma_m == null ? '' : String(site.sigma_m * 1000)),
+    [problem, set_problem] = useState('');
   const number = (s: string): number | null => (s.trim() === '' ? null : Number(s.replace(',', '.')));
   const send = async (): Promise<void> => {
-    const mm = number(sigma), d = { frame: frame.trim(), epoch: number(epoch), source, sigma_m: mm === null ? null : mm / 1000 };
-    try { await (site ? change_site(site.id, d) : create_site(name.trim(), d)); say('Kept: it goes out with every position from now on'); done(); } catch (e) { set_problem(said(e)); }
+    const mm = number(sigma),
+      d = { frame: frame.trim(), epoch: number(epoch), source, sigma_m: mm === null ? null : mm / 1000 };
+    try {
+      await (site ? change_site(site.id, d) : create_site(name.trim(), d));
+      say('Kept: it goes out with every position from now on');
+      done();
+    } catch (e) {
+      set_problem(said(e));
+    }
   };
   return (
-    <form class="callout" data-testid="base-form" onSubmit={(e) => { e.preventDefault(); void send(); }}>
+    <form
+      class="callout"
+      data-testid="base-form"
+      onSubmit={(e) => {
+        e.preventDefault();
+        void send();
+      }}
+    >
       <div class="addform">
-        {!site && <label class="grow"><span class="lab">Name of the site</span><input required maxLength={200} value={name} onInput={(e) => set_name(e.currentTarget.value)} /></label>}
-        <label><span class="lab">Datum of its coordinates</span><input value={frame} placeholder="ETRS89" list="datums" onInput={(e) => set_frame(e.currentTarget.value)} /><datalist id="datums">{['ETRS89', 'ETRF2000', 'ITRF2020', 'ITRF2014', 'WGS 84 (G2296)', 'NAD83(2011)', 'GDA2020'].map((f) => <option key={f} value={f} />)}</datalist></label>
-        <label><span class="lab">Epoch, year</span><input value={epoch} inputMode="decimal" placeholder="2026.34" onInput={(e) => set_epoch(e.currentTarget.value)} /></label>
-        <label><span class="lab">The base stands on</span><select value={source} data-testid="base-source" onChange={(e) => set_source(e.currentTarget.value as BaseSource)}>{SOURCES.map(([id, words]) => <option key={id} value={id} disabled={id === '' && !!site?.source}>{words}</option>)}</select></label>
-        <label><span class="lab">σ of its place, mm</span><input value={sigma} inputMode="decimal" placeholder="8" onInput={(e) => set_sigma(e.currentTarget.value)} /></label>
+        {!site && (
+          <label class="grow">
+            <span class="lab">Name of the site</span>
+            <input required maxLength={200} value={name} onInput={(e) => set_name(e.currentTarget.value)} />
+          </label>
+        )}
+        <label>
+          <span class="lab">Datum of its coordinates</span>
+          <input value={frame} placeholder="ETRS89" list="datums" onInput={(e) => set_frame(e.currentTarget.value)} />
+          <datalist id="datums">
+            {['ETRS89', 'ETRF2000', 'ITRF2020', 'ITRF2014', 'WGS 84 (G2296)', 'NAD83(2011)', 'GDA2020'].map((f) => (
+              <option key={f} value={f} />
+            ))}
+          </datalist>
+        </label>
+        <label>
+          <span class="lab">Epoch, year</span>
+          <input
+            value={epoch}
+            inputMode="decimal"
+            placeholder="2026.34"
+            onInput={(e) => set_epoch(e.currentTarget.value)}
+          />
+        </label>
+        <label>
+          <span class="lab">The base stands on</span>
+          <select
+            value={source}
+            data-testid="base-source"
+            onChange={(e) => set_source(e.currentTarget.value as BaseSource)}
+          >
+            {SOURCES.map(([id, words]) => (
+              <option key={id} value={id} disabled={id === '' && !!site?.source}>
+                {words}
+              </option>
+            ))}
+          </select>
+        </label>
+        <label>
+          <span class="lab">σ of its place, mm</span>
+          <input value={sigma} inputMode="decimal" placeholder="8" onInput={(e) => set_sigma(e.currentTarget.value)} />
+        </label>
       </div>
-      {problem && <div class="problem" role="status"><b>That did not work.</b> {problem}</div>}
-      <div class="actions">{site && <button type="button" class="btn" onClick={close}>Not now</button>}<button class="btn primary" data-testid="base-send" disabled={!site && !name.trim()}>Save</button></div>
+      {problem && (
+        <div class="problem" role="status">
+          <b>That did not work.</b> {problem}
+        </div>
+      )}
+      <div class="actions">
+        {site && (
+          <button type="button" class="btn" onClick={close}>
+            Not now
+          </button>
+        )}
+        <button class="btn primary" data-testid="base-send" disabled={!site && !name.trim()}>
+          Save
+        </button>
+      </div>
     </form>
   );
 }
 
-const POINTS: Record<string, string> = { gnss_antenna: 'the GNSS antenna', body: 'the middle of the aircraft', tag_antenna: 'the tag itself' };
+const POINTS: Record<string, string> = {
+  gnss_antenna: 'the GNSS antenna',
+  body: 'the middle of the aircraft',
+  tag_antenna: 'the tag itself',
+};
 /// Where the UWB antennas sit from the point whose track is flown: of the newest flight, with what its kit has learned of it.
 export function LeverPanel() {
-  const [flight, set_flight] = useState<Flight | null | undefined>(undefined), [kit, set_kit] = useState<Kit | null>(null);
-  useEffect(() => { fetch_flights().then((all) => { const newest = all.find((f) => f.tags.length > 0) ?? all[0] ?? null; set_flight(newest); kit_of(all).then(set_kit, () => undefined); }, () => set_flight(null)); }, []);
-  const none = flight && flight.track_point !== 'tag_antenna' && (flight.tags.length === 0 || flight.tags.every((t) => t.arm_m.every((x) => x === 0)));
+  const [flight, set_flight] = useState<Flight | null | undefined>(undefined),
+    [kit, set_kit] = useState<Kit | null>(null);
+  useEffect(() => {
+    fetch_flights().then(
+      (all) => {
+        const newest = all.find((f) => f.tags.length > 0) ?? all[0] ?? null;
+        set_flight(newest);
+        kit_of(all).then(set_kit, () => undefined);
+      },
+      () => set_flight(null),
+    );
+  }, []);
+  const none =
+    flight &&
+    flight.track_point !== 'tag_antenna' &&
+    (flight.tags.length === 0 || flight.tags.every((t) => t.arm_m.every((x) => x === 0)));
   return (
     <section class="sys-p" data-testid="levers">
-      <div class="hd"><h2>Lever arms</h2>{flight && <span class="meta">of {flight.name}{flight.kit ? `, kit ${flight.kit}` : ''}</span>}</div>
+      <div class="hd">
+        <h2>Lever arms</h2>
+        {flight && (
+          <span class="meta">
+            of {flight.name}
+            {flight.kit ? `, kit ${flight.kit}` : ''}
+          </span>
+        )}
+      </div>
       {flight === null && <p class="why">They come with a flight; there is none yet.</p>}
       {flight && <p class="why">From {POINTS[flight.track_point] ?? flight.track_point} to each UWB antenna.</p>}
-      {none && <div class="callout caution" role="status"><b>Not set.</b> The UWB antenna counts as being at {POINTS[flight.track_point]}. Measure the way between the two and give it with the next flight (tags of POST /missions): every centimetre of it is a centimetre of each anchor.</div>}
-      {flight && flight.tags.length > 0 && <table class="reads" data-testid="lever-arms">
-        <caption class="sr">Lever arms in metres</caption>
-        <thead><tr><th scope="col">Tag</th><th scope="col" class="num">Forward, m</th><th scope="col" class="num">Left, m</th><th scope="col" class="num">Up, m</th><th scope="col" class="num">Length, m</th></tr></thead>
-        <tbody>{flight.tags.map((t) => <tr key={`${t.tag}${t.antenna}`}><th scope="row">{t.tag}{t.antenna ? `, antenna ${t.antenna}` : ''}</th>{t.arm_m.map((x, i) => <td key={i} class="num">{fixed(x, 3)}</td>)}<td class="num">{fixed(Math.hypot(...t.arm_m), 3)}</td></tr>)}</tbody>
-      </table>}
-      {kit && <dl class="kv s"><div><dt>Learned by the kit, {kit.n_flights} flight{kit.n_flights === 1 ? '' : 's'}</dt><dd>antenna <Q v={fixed(kit.lever_up_m.value === null ? null : kit.lever_up_m.value * 100, 1)} u="cm" /> higher ± <Q v={fixed(kit.lever_up_m.sigma === null ? null : kit.lever_up_m.sigma * 100, 1)} u="cm" /></dd></div></dl>}
+      {none && (
+        <div class="callout caution" role="status">
+          <b>Not set.</b> The UWB antenna counts as being at {POINTS[flight.track_point]}. Measure the way between the
+          two and give it with the next flight (tags of POST /missions): every centimetre of it is a centimetre of each
+          anchor.
+        </div>
+      )}
+      {flight && flight.tags.length > 0 && (
+        <table class="reads" data-testid="lever-arms">
+          <caption class="sr">Lever arms in metres</caption>
+          <thead>
+            <tr>
+              <th scope="col">Tag</th>
+              <th scope="col" class="num">
+                Forward, m
+              </th>
+              <th scope="col" class="num">
+                Left, m
+              </th>
+              <th scope="col" class="num">
+                Up, m
+              </th>
+              <th scope="col" class="num">
+                Length, m
+              </th>
+            </tr>
+          </thead>
+          <tbody>
+            {flight.tags.map((t) => (
+              <tr key={`${t.tag}${t.antenna}`}>
+                <th scope="row">
+                  {t.tag}
+                  {t.antenna ? `, antenna ${t.antenna}` : ''}
+                </th>
+                {t.arm_m.map((x, i) => (
+                  <td key={i} class="num">
+                    {fixed(x, 3)}
+                  </td>
+                ))}
+                <td class="num">{fixed(Math.hypot(...t.arm_m), 3)}</td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      )}
+      {kit && (
+        <dl class="kv s">
+          <div>
+            <dt>
+              Learned by the kit, {kit.n_flights} flight{kit.n_flights === 1 ? '' : 's'}
+            </dt>
+            <dd>
+              antenna <Q v={fixed(kit.lever_up_m.value === null ? null : kit.lever_up_m.value * 100, 1)} u="cm" />{' '}
+              higher ± <Q v={fixed(kit.lever_up_m.sigma === null ? null : kit.lever_up_m.sigma * 100, 1)} u="cm" />
+            </dd>
+          </div>
+        </dl>
+      )}
     </section>
   );
 }

@@ -7,61 +7,234 @@ import { Q } from '../../ui/marks';
 import type { Row, Run } from './devices';
 import { by_count, dropped_words } from './standing';
 
-interface Props { readonly row: Row; readonly heard: readonly Device[]; readonly operator: boolean; readonly busy: boolean; readonly run: Run; readonly edit: () => void; readonly tune: () => void; readonly gone: () => void }
+interface Props {
+  readonly row: Row;
+  readonly heard: readonly Device[];
+  readonly operator: boolean;
+  readonly busy: boolean;
+  readonly run: Run;
+  readonly edit: () => void;
+  readonly tune: () => void;
+  readonly gone: () => void;
+}
 
 export function DeviceDetail({ row: { d, recent }, heard, operator, busy, run, edit, tune, gone }: Props) {
-  const [sure, set_sure] = useState(false), talks = d.state === 'talking', drops = by_count(d.dropped), n = d.counters;
+  const [sure, set_sure] = useState(false),
+    talks = d.state === 'talking',
+    drops = by_count(d.dropped),
+    n = d.counters;
   return (
     <div class="dd" data-testid="device-detail">
       <dl class="kv s">
-        <div class="grow"><dt>Address</dt><dd><code>{d.address}</code></dd></div>
-        <div><dt>Id of this device, stays</dt><dd><code>{d.id}</code></dd></div>
-        <div><dt>Model, firmware</dt><dd>{[d.model, d.firmware].filter(Boolean).join(', ') || '–'}</dd></div>
-        {d.serial && <div><dt>{d.kind === 'ntrip' ? 'Mount point' : 'Serial number'}</dt><dd>{d.serial}</dd></div>}
-        <div><dt>In this state for</dt><dd>{d.in_state_s === null ? '–' : age(d.in_state_s * 1000)}</dd></div>
-        <div><dt>Link opened, lost</dt><dd>{grouped(n.opened ?? 0)}, {grouped(n.lost ?? 0)}</dd></div>
-        <div><dt>Received, sent</dt><dd>{bytes(n.bytes_in ?? 0)}, {bytes(n.bytes_out ?? 0)}</dd></div>
-        <div><dt>Good frames</dt><dd>{grouped(n.frames ?? 0)}</dd></div>
-        {d.clock && <div><dt>Its clock</dt><dd>{d.clock.settled ? <><Q v={fixed(d.clock.drift_ppm, 1)} u="ppm" />, σ <Q v={fixed(d.clock.sigma_s === null ? null : d.clock.sigma_s * 1000, 2)} u="ms" /></> : 'being listened to'}</dd></div>}
-        {d.kind === 'pozyx' && <div><dt>Battery</dt><dd>tags do not tell</dd></div>}
+        <div class="grow">
+          <dt>Address</dt>
+          <dd>
+            <code>{d.address}</code>
+          </dd>
+        </div>
+        <div>
+          <dt>Id of this device, stays</dt>
+          <dd>
+            <code>{d.id}</code>
+          </dd>
+        </div>
+        <div>
+          <dt>Model, firmware</dt>
+          <dd>{[d.model, d.firmware].filter(Boolean).join(', ') || '–'}</dd>
+        </div>
+        {d.serial && (
+          <div>
+            <dt>{d.kind === 'ntrip' ? 'Mount point' : 'Serial number'}</dt>
+            <dd>{d.serial}</dd>
+          </div>
+        )}
+        <div>
+          <dt>In this state for</dt>
+          <dd>{d.in_state_s === null ? '–' : age(d.in_state_s * 1000)}</dd>
+        </div>
+        <div>
+          <dt>Link opened, lost</dt>
+          <dd>
+            {grouped(n.opened ?? 0)}, {grouped(n.lost ?? 0)}
+          </dd>
+        </div>
+        <div>
+          <dt>Received, sent</dt>
+          <dd>
+            {bytes(n.bytes_in ?? 0)}, {bytes(n.bytes_out ?? 0)}
+          </dd>
+        </div>
+        <div>
+          <dt>Good frames</dt>
+          <dd>{grouped(n.frames ?? 0)}</dd>
+        </div>
+        {d.clock && (
+          <div>
+            <dt>Its clock</dt>
+            <dd>
+              {d.clock.settled ? (
+                <>
+                  <Q v={fixed(d.clock.drift_ppm, 1)} u="ppm" />, σ{' '}
+                  <Q v={fixed(d.clock.sigma_s === null ? null : d.clock.sigma_s * 1000, 2)} u="ms" />
+                </>
+              ) : (
+                'being listened to'
+              )}
+            </dd>
+          </div>
+        )}
+        {d.kind === 'pozyx' && (
+          <div>
+            <dt>Battery</dt>
+            <dd>tags do not tell</dd>
+          </div>
+        )}
       </dl>
       <div class="cols">
         <div>
           <h3>Not used</h3>
-          {drops.length === 0 ? <p class="mut">Everything it sent was used.</p> : <table class="reads drops" data-testid="drops">
-            <thead><tr><th scope="col">Why</th><th scope="col" class="num">Last {Math.round(recent.span_s)} s</th><th scope="col" class="num">Since it was added</th></tr></thead>
-            <tbody>{drops.map(([why, count]) => <tr key={why}><th scope="row">{dropped_words(why)}</th><td class="num">{grouped(recent.dropped[why] ?? 0)}</td><td class="num">{grouped(count)}</td></tr>)}</tbody>
-          </table>}
+          {drops.length === 0 ? (
+            <p class="mut">Everything it sent was used.</p>
+          ) : (
+            <table class="reads drops" data-testid="drops">
+              <thead>
+                <tr>
+                  <th scope="col">Why</th>
+                  <th scope="col" class="num">
+                    Last {Math.round(recent.span_s)} s
+                  </th>
+                  <th scope="col" class="num">
+                    Since it was added
+                  </th>
+                </tr>
+              </thead>
+              <tbody>
+                {drops.map(([why, count]) => (
+                  <tr key={why}>
+                    <th scope="row">{dropped_words(why)}</th>
+                    <td class="num">{grouped(recent.dropped[why] ?? 0)}</td>
+                    <td class="num">{grouped(count)}</td>
+                  </tr>
+                ))}
+              </tbody>
+            </table>
+          )}
         </div>
         {d.kind === 'pozyx' && <Anchors d={d} heard={heard} may_ask={operator && talks && !busy} run={run} />}
       </div>
-      {operator && <div class="actions">
-        {d.kind === 'pozyx' && <button class="btn narrow" disabled={busy || !talks} onClick={() => void run('identify', () => act_on_device(d.id!, 'identify'), `The lights of ${d.name} blink`)}>Identify</button>}
-        {d.kind === 'pozyx' && <button class="btn narrow" disabled={busy || !talks} onClick={tune}>Radio</button>}
-        {d.kind === 'pozyx' && <button class="btn" disabled={busy || !talks} onClick={() => void run('reboot', () => act_on_device(d.id!, 'reboot'), `${d.name} was restarted`)}>Reboot</button>}
-        <button class="btn" disabled={busy} onClick={() => void run('enable', () => change_device(d.id!, { enabled: !d.enabled }), d.enabled ? 'Switched off' : 'Switched on')}>{d.enabled ? 'Switch off' : 'Switch on'}</button>
-        <button class="btn" disabled={busy} data-testid="forget" onClick={() => { if (sure) void run('forget', async () => { await forget_device(d.id!); gone(); }, 'Forgotten; what it measured stays'); else set_sure(true); }}>{sure ? 'Press again to forget it' : 'Forget'}</button>
-        <button class="btn primary" disabled={busy} data-testid="edit-device" onClick={edit}>Edit</button>
-      </div>}
+      {operator && (
+        <div class="actions">
+          {d.kind === 'pozyx' && (
+            <button
+              class="btn narrow"
+              disabled={busy || !talks}
+              onClick={() =>
+                void run('identify', () => act_on_device(d.id!, 'identify'), `The lights of ${d.name} blink`)
+              }
+            >
+              Identify
+            </button>
+          )}
+          {d.kind === 'pozyx' && (
+            <button class="btn narrow" disabled={busy || !talks} onClick={tune}>
+              Radio
+            </button>
+          )}
+          {d.kind === 'pozyx' && (
+            <button
+              class="btn"
+              disabled={busy || !talks}
+              onClick={() => void run('reboot', () => act_on_device(d.id!, 'reboot'), `${d.name} was restarted`)}
+            >
+              Reboot
+            </button>
+          )}
+          <button
+            class="btn"
+            disabled={busy}
+            onClick={() =>
+              void run(
+                'enable',
+                () => change_device(d.id!, { enabled: !d.enabled }),
+                d.enabled ? 'Switched off' : 'Switched on',
+              )
+            }
+          >
+            {d.enabled ? 'Switch off' : 'Switch on'}
+          </button>
+          <button
+            class="btn"
+            disabled={busy}
+            data-testid="forget"
+            onClick={() => {
+              if (sure)
+                void run(
+                  'forget',
+                  async () => {
+                    await forget_device(d.id!);
+                    gone();
+                  },
+                  'Forgotten; what it measured stays',
+                );
+              else set_sure(true);
+            }}
+          >
+            {sure ? 'Press again to forget it' : 'Forget'}
+          </button>
+          <button class="btn primary" disabled={busy} data-testid="edit-device" onClick={edit}>
+            Edit
+          </button>
+        </div>
+      )}
     </div>
   );
 }
 
 /// Anchors in the reach of a tag: who answers now, and which one on the wall is which.
 function Anchors({ d, heard, may_ask, run }: { d: Device; heard: readonly Device[]; may_ask: boolean; run: Run }) {
-  const [seen, set_seen] = useState<readonly string[] | null>(null), [blinking, set_blinking] = useState('');
-  const known = seen ?? [...new Set(heard.filter((h) => h.kind === 'anchor' && h.network_id).map((h) => h.network_id!))].slice(0, 24);
-  const look = (): void => void run('look', async () => {
-    const list = obj(obj(await act_on_device(d.id!, 'discover'))?.result)?.devices;
-    set_seen((Array.isArray(list) ? list : []).map(str).filter(Boolean).sort());
-  }, '');
-  const blink = (id: string): void => void run('blink', async () => { await act_on_device(d.id!, 'identify', { network_id: id }); set_blinking(id); }, `The lights of ${id} blink`);
+  const [seen, set_seen] = useState<readonly string[] | null>(null),
+    [blinking, set_blinking] = useState('');
+  const known =
+    seen ??
+    [...new Set(heard.filter((h) => h.kind === 'anchor' && h.network_id).map((h) => h.network_id!))].slice(0, 24);
+  const look = (): void =>
+    void run(
+      'look',
+      async () => {
+        const list = obj(obj(await act_on_device(d.id!, 'discover'))?.result)?.devices;
+        set_seen((Array.isArray(list) ? list : []).map(str).filter(Boolean).sort());
+      },
+      '',
+    );
+  const blink = (id: string): void =>
+    void run(
+      'blink',
+      async () => {
+        await act_on_device(d.id!, 'identify', { network_id: id });
+        set_blinking(id);
+      },
+      `The lights of ${id} blink`,
+    );
   return (
     <div data-testid="reach">
       <h3>{seen ? `${seen.length} in its reach now` : 'Anchors'}</h3>
       <p class="mut">{known.length ? 'Press one: its lights blink.' : 'None is known yet.'}</p>
-      <div class="ids">{known.map((id) => <button key={id} class="btn small" disabled={!may_ask} aria-pressed={blinking === id} onClick={() => blink(id)}>{id}</button>)}</div>
-      <button class="btn small" disabled={!may_ask} data-testid="look-around" onClick={look}>Look around</button>
+      <div class="ids">
+        {known.map((id) => (
+          <button
+            key={id}
+            class="btn small"
+            disabled={!may_ask}
+            aria-pressed={blinking === id}
+            onClick={() => blink(id)}
+          >
+            {id}
+          </button>
+        ))}
+      </div>
+      <button class="btn small" disabled={!may_ask} data-testid="look-around" onClick={look}>
+        Look around
+      </button>
     </div>
   );
 }

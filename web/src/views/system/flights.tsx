@@ -1,34 +1,149 @@
 /// Stored flights: which there are, deleting one, and getting it back.
 import { useEffect, useState } from 'preact/hooks';
 import { said } from '../../api/client';
-import { delete_flight, deleted_flights, restore_flight, stored_flights, type DeletedFlight, type StoredFlight } from '../../api/missions';
+import {
+  delete_flight,
+  deleted_flights,
+  restore_flight,
+  stored_flights,
+  type DeletedFlight,
+  type StoredFlight,
+} from '../../api/missions';
 import { may } from '../../state/session';
 import { load_missions } from '../../state/archive';
 import { events, say } from '../../state/store';
 import { date, grouped } from '../../ui/format';
 
-const days = (seconds: number): string => (seconds < 172_800 ? `${Math.ceil(seconds / 3600)} h` : `${Math.floor(seconds / 86_400)} days`);
+const days = (seconds: number): string =>
+  seconds < 172_800 ? `${Math.ceil(seconds / 3600)} h` : `${Math.floor(seconds / 86_400)} days`;
 
 export function FlightsPanel() {
-  const [all, set_all] = useState<readonly StoredFlight[]>([]), [bin, set_bin] = useState<readonly DeletedFlight[]>([]), [problem, set_problem] = useState(''), [sure, set_sure] = useState('');
-  const load = (): void => { Promise.all([stored_flights(), deleted_flights()]).then(([a, b]) => { set_all(a); set_bin(b); }, (e: unknown) => set_problem(said(e))); };
+  const [all, set_all] = useState<readonly StoredFlight[]>([]),
+    [bin, set_bin] = useState<readonly DeletedFlight[]>([]),
+    [problem, set_problem] = useState(''),
+    [sure, set_sure] = useState('');
+  const load = (): void => {
+    Promise.all([stored_flights(), deleted_flights()]).then(
+      ([a, b]) => {
+        set_all(a);
+        set_bin(b);
+      },
+      (e: unknown) => set_problem(said(e)),
+    );
+  };
   const newest = events.value.filter((e) => e.code.startsWith('mission.')).length;
   useEffect(load, [newest]);
-  const guarded = async (work: () => Promise<unknown>, done: string): Promise<void> => { set_problem(''); set_sure(''); try { await work(); say(done); } catch (e) { set_problem(said(e)); } load(); };
-  const remove = (f: StoredFlight): void => { if (sure !== f.id) set_sure(f.id); else void guarded(() => delete_flight(f.id, may()), `${f.name} is in the bin`); };
-  const restore = (f: DeletedFlight): void => void guarded(async () => { await restore_flight(f.id); await load_missions(); }, `${f.name} is back`);
+  const guarded = async (work: () => Promise<unknown>, done: string): Promise<void> => {
+    set_problem('');
+    set_sure('');
+    try {
+      await work();
+      say(done);
+    } catch (e) {
+      set_problem(said(e));
+    }
+    load();
+  };
+  const remove = (f: StoredFlight): void => {
+    if (sure !== f.id) set_sure(f.id);
+    else void guarded(() => delete_flight(f.id, may()), `${f.name} is in the bin`);
+  };
+  const restore = (f: DeletedFlight): void =>
+    void guarded(async () => {
+      await restore_flight(f.id);
+      await load_missions();
+    }, `${f.name} is back`);
   const operator = may('operator');
   return (
     <section class="sys-p" data-testid="flights">
       <h2>Flights</h2>
-      {problem && <div class="problem" role="status"><b>That did not work.</b> {problem}</div>}
-      <table class="tbl"><caption class="sr">The newest stored flights</caption>
-        <thead><tr><th scope="col">Flight</th><th scope="col">State</th><th scope="col">Ranges</th><th scope="col">Fixes</th>{operator && <th scope="col"><span class="sr">Delete</span></th>}</tr></thead>
-        <tbody>{all.map((f) => <tr key={f.id}><th scope="row">{f.name || f.id.slice(0, 8)}<span class="mut block">{date(f.created_at)}</span></th><td>{f.state.toUpperCase()}</td><td>{grouped(f.n_ranges)}</td><td>{grouped(f.n_fixes)}</td>{operator && <td class="acts">{f.state === 'recording' ? <span class="mut">finish it first</span> : <button class="btn small" data-testid="delete-flight" onClick={() => remove(f)}>{sure === f.id ? 'Press again to delete' : 'Delete'}</button>}</td>}</tr>)}</tbody></table>
+      {problem && (
+        <div class="problem" role="status">
+          <b>That did not work.</b> {problem}
+        </div>
+      )}
+      <table class="tbl">
+        <caption class="sr">The newest stored flights</caption>
+        <thead>
+          <tr>
+            <th scope="col">Flight</th>
+            <th scope="col">State</th>
+            <th scope="col">Ranges</th>
+            <th scope="col">Fixes</th>
+            {operator && (
+              <th scope="col">
+                <span class="sr">Delete</span>
+              </th>
+            )}
+          </tr>
+        </thead>
+        <tbody>
+          {all.map((f) => (
+            <tr key={f.id}>
+              <th scope="row">
+                {f.name || f.id.slice(0, 8)}
+                <span class="mut block">{date(f.created_at)}</span>
+              </th>
+              <td>{f.state.toUpperCase()}</td>
+              <td>{grouped(f.n_ranges)}</td>
+              <td>{grouped(f.n_fixes)}</td>
+              {operator && (
+                <td class="acts">
+                  {f.state === 'recording' ? (
+                    <span class="mut">finish it first</span>
+                  ) : (
+                    <button class="btn small" data-testid="delete-flight" onClick={() => remove(f)}>
+                      {sure === f.id ? 'Press again to delete' : 'Delete'}
+                    </button>
+                  )}
+                </td>
+              )}
+            </tr>
+          ))}
+        </tbody>
+      </table>
       {all.length === 0 && <p class="why">No flight is stored.</p>}
-      {bin.length > 0 && <table class="tbl" data-testid="bin"><caption>Deleted flights</caption>
-        <thead><tr><th scope="col">Flight</th><th scope="col">Deleted</th><th scope="col">Kept for</th>{operator && <th scope="col"><span class="sr">Restore</span></th>}</tr></thead>
-        <tbody>{bin.map((f) => <tr key={f.id}><th scope="row">{f.name || f.id.slice(0, 8)}<span class="mut block">{grouped(f.n_ranges)} ranges</span></th><td>{date(f.deleted_at)}<span class="mut block">by {f.deleted_by}</span></td><td>{f.emptying ? 'being removed' : `${days(f.kept_for_s)} of running`}</td>{operator && <td class="acts">{!f.emptying && <button class="btn small" data-testid="restore-flight" onClick={() => restore(f)}>Restore</button>}</td>}</tr>)}</tbody></table>}
+      {bin.length > 0 && (
+        <table class="tbl" data-testid="bin">
+          <caption>Deleted flights</caption>
+          <thead>
+            <tr>
+              <th scope="col">Flight</th>
+              <th scope="col">Deleted</th>
+              <th scope="col">Kept for</th>
+              {operator && (
+                <th scope="col">
+                  <span class="sr">Restore</span>
+                </th>
+              )}
+            </tr>
+          </thead>
+          <tbody>
+            {bin.map((f) => (
+              <tr key={f.id}>
+                <th scope="row">
+                  {f.name || f.id.slice(0, 8)}
+                  <span class="mut block">{grouped(f.n_ranges)} ranges</span>
+                </th>
+                <td>
+                  {date(f.deleted_at)}
+                  <span class="mut block">by {f.deleted_by}</span>
+                </td>
+                <td>{f.emptying ? 'being removed' : `${days(f.kept_for_s)} of running`}</td>
+                {operator && (
+                  <td class="acts">
+                    {!f.emptying && (
+                      <button class="btn small" data-testid="restore-flight" onClick={() => restore(f)}>
+                        Restore
+                      </button>
+                    )}
+                  </td>
+                )}
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      )}
     </section>
   );
 }

@@ -7,18 +7,38 @@ import { Chip, type Shape, type Tone } from '../../ui/marks';
 const LOOK: Record<string, [Shape, Tone]> = { live: ['ok', 'ok'], late: ['caution', 'caution'], lost: ['bad', 'bad'] };
 
 export function Heard({ heard }: { heard: readonly Device[] }) {
-  const flying = mission_list.value.some((m) => m.state === 'recording'), live = new Map(live_devices.value.map((d) => [d.network_id, d]));
+  const flying = mission_list.value.some((m) => m.state === 'recording'),
+    live = new Map(live_devices.value.map((d) => [d.network_id, d]));
   return (
     <>
       <h3>Radios heard</h3>
       <table class="tbl" data-testid="heard">
         <caption class="sr">Radios that were heard in any flight</caption>
-        <thead><tr><th scope="col">Radio</th><th scope="col">Kind</th><th scope="col">State</th><th scope="col">Last seen</th></tr></thead>
-        <tbody>{heard.slice(0, 100).map((d, i) => {
-          // Silence is news only while a flight is recorded.
-          const now = flying ? live.get(d.network_id ?? '')?.state : undefined, [shape, tone] = LOOK[now ?? ''] ?? ['off', 'off'];
-          return <tr key={`${d.network_id}${i}`}><th scope="row">{d.network_id ?? '–'}</th><td>{d.kind}</td><td><Chip shape={shape} tone={tone} word={(now ?? 'no flight').toUpperCase()} /></td><td>{d.last_seen_us === null ? '–' : `${age((server_now_us() - d.last_seen_us) / 1000)} ago`}</td></tr>;
-        })}</tbody>
+        <thead>
+          <tr>
+            <th scope="col">Radio</th>
+            <th scope="col">Kind</th>
+            <th scope="col">State</th>
+            <th scope="col">Last seen</th>
+          </tr>
+        </thead>
+        <tbody>
+          {heard.slice(0, 100).map((d, i) => {
+            // Silence is news only while a flight is recorded.
+            const now = flying ? live.get(d.network_id ?? '')?.state : undefined,
+              [shape, tone] = LOOK[now ?? ''] ?? ['off', 'off'];
+            return (
+              <tr key={`${d.network_id}${i}`}>
+                <th scope="row">{d.network_id ?? '–'}</th>
+                <td>{d.kind}</td>
+                <td>
+                  <Chip shape={shape} tone={tone} word={(now ?? 'no flight').toUpperCase()} />
+                </td>
+                <td>{d.last_seen_us === null ? '–' : `${age((server_now_us() - d.last_seen_us) / 1000)} ago`}</td>
+              </tr>
+            );
+          })}
+        </tbody>
       </table>
     </>
   );

@@ -6,67 +6,230 @@ import { mission_list } from '../../state/store';
 import { Mark } from '../../ui/marks';
 import { radio_differences } from './radio_words';
 
-const CHOICES: readonly (readonly [Exclude<keyof Radio, 'gain_db' | 'devices'>, string, string, readonly number[]])[] = [
-  ['channel', 'Channel', '', [1, 2, 3, 4, 5, 7]], ['rate_kbps', 'Bit rate', 'kbit/s', [110, 850, 6810]], ['prf_mhz', 'PRF', 'MHz', [16, 64]], ['preamble_symbols', 'Preamble', 'symbols', [64, 128, 256, 512, 1024, 1536, 2048, 4096]],
-];
+const CHOICES: readonly (readonly [Exclude<keyof Radio, 'gain_db' | 'devices'>, string, string, readonly number[]])[] =
+  [
+    ['channel', 'Channel', '', [1, 2, 3, 4, 5, 7]],
+    ['rate_kbps', 'Bit rate', 'kbit/s', [110, 850, 6810]],
+    ['prf_mhz', 'PRF', 'MHz', [16, 64]],
+    ['preamble_symbols', 'Preamble', 'symbols', [64, 128, 256, 512, 1024, 1536, 2048, 4096]],
+  ];
 
-export function RadioPanel({ device, may_change, told, close }: { device: Device; may_change: boolean; told: (radio: Radio) => void; close: () => void }) {
-  const [radio, set] = useState<Radio | null>(null), [now, set_now] = useState<Radio | null>(null), [problem, set_problem] = useState(''), [busy, set_busy] = useState(''), [done, set_done] = useState<Radio | null>(null);
+export function RadioPanel({
+  device,
+  may_change,
+  told,
+  close,
+}: {
+  device: Device;
+  may_change: boolean;
+  told: (radio: Radio) => void;
+  close: () => void;
+}) {
+  const [radio, set] = useState<Radio | null>(null),
+    [now, set_now] = useState<Radio | null>(null),
+    [problem, set_problem] = useState(''),
+    [busy, set_busy] = useState(''),
+    [done, set_done] = useState<Radio | null>(null);
   const flying = mission_list.value.some((m) => m.state === 'recording');
-  const take = (r: Radio): void => { set(r); set_now(r); told(r); };
+  const take = (r: Radio): void => {
+    set(r);
+    set_now(r);
+    told(r);
+  };
   const work = async (what: string, ask: () => Promise<Radio>): Promise<Radio | null> => {
     set_busy(what);
     set_problem('');
     set_done(null);
     let answer: Radio | null = null;
-    try { take((answer = await ask())); } catch (e) { set_problem(said(e)); }
+    try {
+      take((answer = await ask()));
+    } catch (e) {
+      set_problem(said(e));
+    }
     set_busy('');
     return answer;
   };
   // Asking the anchors stops ranging for some seconds: by itself only while nothing is recorded.
   const look = (): Promise<Radio | null> => work('look', () => compare_radio(device.id!));
-  useEffect(() => { void work('read', () => read_radio(device.id!)).then((r) => { if (r && may_change && !flying) void look(); }); }, [device.id]);
+  useEffect(() => {
+    void work('read', () => read_radio(device.id!)).then((r) => {
+      if (r && may_change && !flying) void look();
+    });
+  }, [device.id]);
   const apply = async (wanted: Radio): Promise<void> => {
     const answer = await work('set', () => set_radio(device.id!, wanted));
     if (answer) set_done(answer);
-    else await read_radio(device.id!).then(take, () => undefined);  // what it has now, not what was wanted
+    else await read_radio(device.id!).then(take, () => undefined); // what it has now, not what was wanted
   };
-  const changed = radio !== null && now !== null && (radio.gain_db !== now.gain_db || CHOICES.some(([key]) => radio[key] !== now[key])), apart = now?.devices.filter((p) => !p.done) ?? [];
+  const changed =
+      radio !== null &&
+      now !== null &&
+      (radio.gain_db !== now.gain_db || CHOICES.some(([key]) => radio[key] !== now[key])),
+    apart = now?.devices.filter((p) => !p.done) ?? [];
   return (
-    <form class="callout" data-testid="radio" aria-label={`Radio of ${device.name}`} onSubmit={(e) => { e.preventDefault(); if (radio) void apply(radio); }}>
-      <b>Radio of {device.name || device.network_id}.</b> <span class="mut">Tag and anchors hear each other only with the same channel, rate, PRF and preamble.</span>
-      {problem && <div class="problem" role="status"><b>That did not work.</b> {problem}</div>}
+    <form
+      class="callout"
+      data-testid="radio"
+      aria-label={`Radio of ${device.name}`}
+      onSubmit={(e) => {
+        e.preventDefault();
+        if (radio) void apply(radio);
+      }}
+    >
+      <b>Radio of {device.name || device.network_id}.</b>{' '}
+      <span class="mut">Tag and anchors hear each other only with the same channel, rate, PRF and preamble.</span>
+      {problem && (
+        <div class="problem" role="status">
+          <b>That did not work.</b> {problem}
+        </div>
+      )}
       {busy === 'read' && <p role="status">Asking the tag.</p>}
-      {radio && <div class="addform">
-        {CHOICES.map(([key, name, unit, values]) => (
-          <label key={key}><span class="lab">{name}{unit && `, ${unit}`}</span><select value={radio[key]} disabled={!may_change || busy !== ''} data-testid={`radio-${key}`} onChange={(e) => set({ ...radio, [key]: Number(e.currentTarget.value) })}>{values.map((v) => <option key={v} value={v}>{v}</option>)}</select></label>
-        ))}
-        <label><span class="lab">Gain, dB</span><input type="number" min="0" max="33.5" step="0.5" value={radio.gain_db ?? ''} disabled={!may_change || busy !== ''} onInput={(e) => set({ ...radio, gain_db: e.currentTarget.value === '' ? null : Number(e.currentTarget.value) })} /></label>
-      </div>}
+      {radio && (
+        <div class="addform">
+          {CHOICES.map(([key, name, unit, values]) => (
+            <label key={key}>
+              <span class="lab">
+                {name}
+                {unit && `, ${unit}`}
+              </span>
+              <select
+                value={radio[key]}
+                disabled={!may_change || busy !== ''}
+                data-testid={`radio-${key}`}
+                onChange={(e) => set({ ...radio, [key]: Number(e.currentTarget.value) })}
+              >
+                {values.map((v) => (
+                  <option key={v} value={v}>
+                    {v}
+                  </option>
+                ))}
+              </select>
+            </label>
+          ))}
+          <label>
+            <span class="lab">Gain, dB</span>
+            <input
+              type="number"
+              min="0"
+              max="33.5"
+              step="0.5"
+              value={radio.gain_db ?? ''}
+              disabled={!may_change || busy !== ''}
+              onInput={(e) =>
+                set({ ...radio, gain_db: e.currentTarget.value === '' ? null : Number(e.currentTarget.value) })
+              }
+            />
+          </label>
+        </div>
+      )}
       {busy === 'look' && <p role="status">Asking every anchor by radio; no ranges for some seconds.</p>}
-      {now && now.devices.length > 0 && !done && <div data-testid="radio-compared">
-        {apart.length === 0 ? <p role="status"><Mark shape="ok" tone="ok" /> All {now.devices.length} anchors it knows have the same settings.</p>
-          : <><p role="status"><Mark shape="caution" tone="caution" /> <b>{apart.length} of {now.devices.length} anchors could not be seen to have the settings of the tag:</b></p><ul>{apart.map((p) => <li key={p.network_id}>{p.network_id}: {p.why.replace(`${p.network_id} `, '').replaceAll('_', ' ')}</li>)}</ul><p class="mut">One that does not answer is off, out of reach, or on other settings: bring the tag to those settings, or the anchor to the tag by cable.</p></>}
-      </div>}
-      {done && <p role="status" data-testid="radio-done"><Mark shape="ok" tone="ok" /> Set and verified: {[device.network_id, ...done.devices.map((d) => d.network_id)].filter(Boolean).join(', ')}.</p>}
+      {now && now.devices.length > 0 && !done && (
+        <div data-testid="radio-compared">
+          {apart.length === 0 ? (
+            <p role="status">
+              <Mark shape="ok" tone="ok" /> All {now.devices.length} anchors it knows have the same settings.
+            </p>
+          ) : (
+            <>
+              <p role="status">
+                <Mark shape="caution" tone="caution" />{' '}
+                <b>
+                  {apart.length} of {now.devices.length} anchors could not be seen to have the settings of the tag:
+                </b>
+              </p>
+              <ul>
+                {apart.map((p) => (
+                  <li key={p.network_id}>
+                    {p.network_id}: {p.why.replace(`${p.network_id} `, '').replaceAll('_', ' ')}
+                  </li>
+                ))}
+              </ul>
+              <p class="mut">
+                One that does not answer is off, out of reach, or on other settings: bring the tag to those settings, or
+                the anchor to the tag by cable.
+              </p>
+            </>
+          )}
+        </div>
+      )}
+      {done && (
+        <p role="status" data-testid="radio-done">
+          <Mark shape="ok" tone="ok" /> Set and verified:{' '}
+          {[device.network_id, ...done.devices.map((d) => d.network_id)].filter(Boolean).join(', ')}.
+        </p>
+      )}
       <div class="actions">
-        <button type="button" class="btn" onClick={close}>Close</button>
-        {may_change && <button type="button" class="btn" data-testid="radio-compare" disabled={busy !== ''} onClick={() => void look()}>{flying ? 'Compare with the anchors (stops ranging)' : 'Compare with the anchors'}</button>}
-        {may_change && <button class="btn primary" data-testid="radio-apply" disabled={busy !== '' || !radio}>{busy === 'set' ? 'Setting and verifying each' : changed ? 'Apply to all and verify' : 'Apply to all again'}</button>}
+        <button type="button" class="btn" onClick={close}>
+          Close
+        </button>
+        {may_change && (
+          <button
+            type="button"
+            class="btn"
+            data-testid="radio-compare"
+            disabled={busy !== ''}
+            onClick={() => void look()}
+          >
+            {flying ? 'Compare with the anchors (stops ranging)' : 'Compare with the anchors'}
+          </button>
+        )}
+        {may_change && (
+          <button class="btn primary" data-testid="radio-apply" disabled={busy !== '' || !radio}>
+            {busy === 'set' ? 'Setting and verifying each' : changed ? 'Apply to all and verify' : 'Apply to all again'}
+          </button>
+        )}
       </div>
-      {changed && busy === '' && <p class="mut">Where one device does not follow, all go back to the settings of now.</p>}
+      {changed && busy === '' && (
+        <p class="mut">Where one device does not follow, all go back to the settings of now.</p>
+      )}
     </form>
   );
 }
 
 /// Tags that differ from each other, or anchors that were seen to differ from their tag, told until it is mended. Reads the tags once and whenever one begins to talk.
-export function RadioWarning({ devices, compared, look }: { devices: readonly Device[]; compared: Readonly<Record<string, Radio>>; look: ((id: string) => void) | null }) {
-  const [read, set_read] = useState<Readonly<Record<string, Radio>>>({}), tags = devices.filter((d) => d.kind === 'pozyx' && d.enabled && d.state === 'talking'), who = tags.map((d) => d.id!).sort().join();
+export function RadioWarning({
+  devices,
+  compared,
+  look,
+}: {
+  devices: readonly Device[];
+  compared: Readonly<Record<string, Radio>>;
+  look: ((id: string) => void) | null;
+}) {
+  const [read, set_read] = useState<Readonly<Record<string, Radio>>>({}),
+    tags = devices.filter((d) => d.kind === 'pozyx' && d.enabled && d.state === 'talking'),
+    who = tags
+      .map((d) => d.id!)
+      .sort()
+      .join();
   useEffect(() => {
     let gone = false;
-    for (const id of who.split(',').filter(Boolean)) read_radio(id).then((r) => { if (!gone) set_read((all) => ({ ...all, [id]: r })); }, () => undefined);
-    return () => { gone = true; };
+    for (const id of who.split(',').filter(Boolean))
+      read_radio(id).then(
+        (r) => {
+          if (!gone) set_read((all) => ({ ...all, [id]: r }));
+        },
+        () => undefined,
+      );
+    return () => {
+      gone = true;
+    };
   }, [who]);
-  const lines = radio_differences(tags.map((d) => ({ id: d.id!, name: d.name, radio: compared[d.id!] ?? read[d.id!] ?? null, options: d.options })));
-  return <>{lines.map((l) => <div key={l.text} class="callout caution" role="status" data-testid="radio-differs"><b>{l.title}</b> {l.text} {look && <button class="btn small" onClick={() => look(l.id)}>Radio</button>}</div>)}</>;
+  const lines = radio_differences(
+    tags.map((d) => ({ id: d.id!, name: d.name, radio: compared[d.id!] ?? read[d.id!] ?? null, options: d.options })),
+  );
+  return (
+    <>
+      {lines.map((l) => (
+        <div key={l.text} class="callout caution" role="status" data-testid="radio-differs">
+          <b>{l.title}</b> {l.text}{' '}
+          {look && (
+            <button class="btn small" onClick={() => look(l.id)}>
+              Radio
+            </button>
+          )}
+        </div>
+      ))}
+    </>
+  );
 }

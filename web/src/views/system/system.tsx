@@ -13,7 +13,9 @@ import { FlightsPanel } from './flights';
 import { TimePanel } from './time';
 
 export function System() {
-  useEffect(() => { document.title = 'System - anchord'; }, []);
+  useEffect(() => {
+    document.title = 'System - anchord';
+  }, []);
   return (
     <div class="system" data-testid="system" tabIndex={0} role="region" aria-label="System">
       <h1 class="sr">System</h1>
@@ -30,9 +32,13 @@ export function System() {
 }
 
 function HealthPanel() {
-  const [list, set_list] = useState<readonly Check[]>([]), [built, set_built] = useState<Version | null>(null), value = system.value?.value;
+  const [list, set_list] = useState<readonly Check[]>([]),
+    [built, set_built] = useState<Version | null>(null),
+    value = system.value?.value;
   useEffect(() => {
-    const look = (): void => { fetch_checks().then(set_list, () => set_list([])); };
+    const look = (): void => {
+      fetch_checks().then(set_list, () => set_list([]));
+    };
     look();
     fetch_version().then(set_built, () => undefined);
     const timer = setInterval(look, 10_000);
@@ -40,16 +46,57 @@ function HealthPanel() {
   }, []);
   return (
     <section class="sys-p" data-testid="health">
-      <div class="hd"><h2>Server</h2><span class="meta">{built ? `anchord ${built.version}${built.git ? `, ${built.git.slice(0, 10)}` : ''}` : ''}</span></div>
-      <ul class="checks">{list.map((c) => <li key={c.name}><Chip shape={c.ok ? 'ok' : 'bad'} tone={c.ok ? 'ok' : 'bad'} word={c.name.toUpperCase()} />{!c.ok && <span> {c.text}</span>}</li>)}</ul>
-      {value && <dl class="kv">
-        <div><dt>Free on disk</dt><dd>{bytes(value.disk_free_bytes)}</dd></div>
-        <div><dt>Database</dt><dd>{bytes(value.db_bytes)}</dd></div>
-        <div><dt>Rows waiting</dt><dd>{grouped(value.queue_depth)}</dd></div>
-        <div><dt>Dashboards</dt><dd>{grouped(value.ws_clients)}</dd></div>
-        <div><dt>Acknowledged rows survive</dt><dd>{value.synchronous === 'full' || value.synchronous === 'extra' ? 'power loss' : 'a crash'}</dd></div>
-      </dl>}
-      {built && <p class="sub">Schema {fixed(built.schema, 0)}, {built.build}. Metrics for Prometheus at <a class="link" href="metrics">/metrics</a>; the interface is described at <a class="link" href="api/v1/openapi.json">/api/v1/openapi.json</a>.</p>}
+      <div class="hd">
+        <h2>Server</h2>
+        <span class="meta">
+          {built ? `anchord ${built.version}${built.git ? `, ${built.git.slice(0, 10)}` : ''}` : ''}
+        </span>
+      </div>
+      <ul class="checks">
+        {list.map((c) => (
+          <li key={c.name}>
+            <Chip shape={c.ok ? 'ok' : 'bad'} tone={c.ok ? 'ok' : 'bad'} word={c.name.toUpperCase()} />
+            {!c.ok && <span> {c.text}</span>}
+          </li>
+        ))}
+      </ul>
+      {value && (
+        <dl class="kv">
+          <div>
+            <dt>Free on disk</dt>
+            <dd>{bytes(value.disk_free_bytes)}</dd>
+          </div>
+          <div>
+            <dt>Database</dt>
+            <dd>{bytes(value.db_bytes)}</dd>
+          </div>
+          <div>
+            <dt>Rows waiting</dt>
+            <dd>{grouped(value.queue_depth)}</dd>
+          </div>
+          <div>
+            <dt>Dashboards</dt>
+            <dd>{grouped(value.ws_clients)}</dd>
+          </div>
+          <div>
+            <dt>Acknowledged rows survive</dt>
+            <dd>{value.synchronous === 'full' || value.synchronous === 'extra' ? 'power loss' : 'a crash'}</dd>
+          </div>
+        </dl>
+      )}
+      {built && (
+        <p class="sub">
+          Schema {fixed(built.schema, 0)}, {built.build}. Metrics for Prometheus at{' '}
+          <a class="link" href="metrics">
+            /metrics
+          </a>
+          ; the interface is described at{' '}
+          <a class="link" href="api/v1/openapi.json">
+            /api/v1/openapi.json
+          </a>
+          .
+        </p>
+      )}
     </section>
   );
 }
