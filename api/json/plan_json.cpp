@@ -273,9 +273,10 @@ Ordered plan_check_json(const planning::PlanCheck& check) {
     }
     predicted = {{"rms_m", check.rms_m}, {"worst_m", check.worst_m}, {"anchors", std::move(anchors)}};
   }
-  return {{"flyable", check.flyable()},   {"issues", std::move(issues)},
-          {"length_m", check.length_m},   {"duration_s", check.duration_s},
-          {"n_measure", check.n_measure}, {"predicted", std::move(predicted)}};
+  return {{"flyable", check.flyable()},         {"issues", std::move(issues)},
+          {"length_m", check.length_m},         {"duration_s", check.time.expected_s},
+          {"duration_low_s", check.time.low_s}, {"duration_high_s", check.time.high_s},
+          {"n_measure", check.n_measure},       {"predicted", std::move(predicted)}};
 }
 
 }  // namespace anchord::api

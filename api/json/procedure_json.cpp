@@ -118,9 +118,14 @@ Ordered procedure_json(const ProcedureView& v, const procedure::FlightEngine& en
               {"status", v.status},
               {"step", procedure::to_string(s.step)},
               {"reason", s.reason},
+              {"ended", v.ended.empty() ? Ordered(nullptr) : Ordered(v.ended)},
               {"in_step_s", std::max(0.0, v.now_s - s.since_s)},
               {"step_limit_s", s.deadline_s > 0 ? Ordered(s.deadline_s - s.since_s) : Ordered(nullptr)},
               {"elapsed_s", finite_or_null(engine.flown_s(v.now_s))},
+              {"forecast_s", v.forecast ? Ordered{{"low", v.forecast->low_s},
+                                                  {"expected", v.forecast->expected_s},
+                                                  {"high", v.forecast->high_s}}
+                                        : Ordered(nullptr)},
               {"waypoint", s.waypoint + 1},
               {"n_waypoints", t.waypoints.size()},
               {"part", s.steps},
@@ -239,6 +244,10 @@ Ordered stored_state(const procedure::State& s) {
           {"visited", points(s.visited)},
           {"unreachable", points(s.unreachable)},
           {"anchors", std::move(anchors)},
+          {"ended", s.ended},
+          {"completed", s.completed},
+          {"by_person", s.by_person},
+          {"flown_s", s.flown_s},
           {"n_transitions", s.n_transitions}};
 }
 
@@ -279,6 +288,10 @@ std::optional<procedure::State> state_of(const nlohmann::json& j) {
       a.at("why").get_to(task.why);
       s.anchors.push_back(std::move(task));
     }
+    s.ended = j.value("ended", "");
+    s.completed = j.value("completed", false);
+    s.by_person = j.value("by_person", false);
+    s.flown_s = j.value("flown_s", 0.0);
     j.at("n_transitions").get_to(s.n_transitions);
     return s;
   } catch (const nlohmann::json::exception&) {

@@ -7,6 +7,7 @@
 
 #include "core/base/ids.hpp"
 #include "core/geo/enu.hpp"
+#include "core/planning/local_plan.hpp"
 #include "core/ports/drone.hpp"
 #include "core/procedure/flight_clues.hpp"
 #include "core/procedure/flight_engine.hpp"
@@ -33,6 +34,8 @@ struct ProcedureView {
   std::uint64_t plan_revision{};
   std::string mode;    ///< auto, manual
   std::string status;  ///< ready, running, hold, return, landing, done, aborted
+  std::string ended;   ///< why the work is over, empty while it goes on
+  std::optional<planning::FlightTime> forecast{};
   std::int64_t t_us{};
   double now_s{};
   std::optional<DroneStatus> drone{};

@@ -15,9 +15,9 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 4> k_by_a_pe
      {"airspace", "The airspace is clear and allowed"},
      {"people", "Nobody is below the flight path"},
      {"pilot", "A pilot is ready with the remote control"}}};
-constexpr std::array<std::string_view, 11> k_by_itself{"drone", "arming",      "parameters", "battery",
+constexpr std::array<std::string_view, 12> k_by_itself{"drone", "arming",      "parameters", "battery",
                                                        "rtk",   "corrections", "tag",        "plan",
-                                                       "disk",  "recording",   "fence"};
+                                                       "place", "disk",        "recording",  "fence"};
 constexpr double k_fresh_s = 5;  ///< nothing is green on older telemetry
 
 std::string words(const char* format, double value) {
@@ -69,15 +69,15 @@ std::vector<ChecklistItem> make_checklist(const ChecklistFacts& f) {
                            ? std::to_string(d.parameters.size()) + " read, as they should be"
                            : "being read"));
     // What the flight may use is what is above the reserve; 30 % of it stays as a margin.
-    const double need = f.min_battery + 1.3 * (f.plan != nullptr ? f.plan->duration_s : 0) / 1200;
-    out.push_back(item("battery", "The battery covers the plan plus 30 % reserve",
-                       d.battery && d.battery_age_s < k_fresh_s && d.battery_warning == 0 &&
-                           *d.battery >= std::min(need, 0.95),
-                       true,
-                       d.battery_warning > 0 ? "the autopilot itself warns of it"
-                       : d.battery && d.battery_age_s < k_fresh_s
-                           ? words("%.0f %% left, ", 100 * *d.battery) + words("%.0f %% wanted", 100 * need)
-                           : "unknown"));
+    const double need =
+        std::min(f.min_battery + 1.3 * (f.plan != nullptr ? f.plan->time.expected_s : 0) / 1200, 0.95);
+    out.push_back(
+        item("battery", "The battery covers the plan plus 30 % reserve",
+             d.battery && d.battery_age_s < k_fresh_s && d.battery_warning == 0 && *d.battery >= need, true,
+             d.battery_warning > 0 ? "the autopilot itself warns of it"
+             : d.battery && d.battery_age_s < k_fresh_s
+                 ? words("%.0f %% left, ", 100 * *d.battery) + words("%.0f %% wanted", 100 * need)
+                 : "unknown"));
   }
   out.push_back(item(
       "rtk", "RTK is fixed for 10 s", f.fixed_for_s && *f.fixed_for_s >= 10 && *f.fix_age_s < 2, true,
@@ -95,6 +95,12 @@ std::vector<ChecklistItem> make_checklist(const ChecklistFacts& f) {
     }
   }
   out.push_back(item("plan", "The plan can be flown", f.plan != nullptr && f.plan->flyable(), false, why));
+  out.push_back(item("place", "The aircraft may take off where it stands",
+                     f.place_refused && f.place_refused->empty(), false,
+                     f.plan == nullptr  ? "no plan is chosen"
+                     : !f.place_refused ? "it is not known where it stands: no position from the rover"
+                     : f.place_refused->empty() ? "inside the fence and off every area"
+                                                : *f.place_refused));
   out.push_back(item("disk", "More than 1 GB of disk is free", f.writable && f.disk_free_bytes > 1e9, true,
                      words("%.1f GB", f.disk_free_bytes / 1e9)));
   const bool open = f.mission != nullptr && f.mission->state != MissionState::finished;

@@ -34,6 +34,8 @@ struct ChecklistFacts {
   double disk_free_bytes{};
   bool writable{true};
   double min_battery{0.3};
+  /// What keeps the aircraft from taking off where it stands; empty: nothing. Absent: not known where it is.
+  std::optional<std::string> place_refused{};
 };
 
 /// Every item, in the order of the screen. Start is blocked until all are green.

@@ -26,6 +26,15 @@ std::optional<Event> event_of_action(const std::string& action) {
   return std::nullopt;
 }
 
+/// A plan without an origin has its ground where the aircraft stands.
+Result<Plan> flown_plan(const Plan& plan, double ground_m) {
+  BOOST_OUTCOME_TRY(Wgs84 origin, planning::plan_origin(plan));
+  if (!plan.origin) origin.height_m = ground_m;
+  Plan flown = plan;
+  flown.origin = origin;
+  return flown;
+}
+
 Error forbidden(std::string why) { return make_error(Errc::invalid_argument, std::move(why)); }
 
 }  // namespace
@@ -66,6 +75,7 @@ std::vector<ChecklistItem> FlightService::State::checklist(const Mission* record
     if (facts.fix_age_s && h.correction_age_s)
       facts.correction_age_s = *facts.fix_age_s + *h.correction_age_s;
   }
+  if (plan != nullptr) facts.place_refused = take_off_refused(*plan, mission);
   facts.writable = ground.storage.writable;
   facts.disk_free_bytes = static_cast<double>(ground.storage.disk_free_bytes);
   auto items = make_checklist(facts);
@@ -81,6 +91,21 @@ std::vector<ChecklistItem> FlightService::State::checklist(const Mission* record
     }
   }
   return items;
+}
+
+/// Judged as the flight itself will be; absent where nothing is known to judge by.
+std::optional<std::string> FlightService::State::take_off_refused(const Plan& plan,
+                                                                  const MissionId& mission) const {
+  const auto it = heard.find(mission);
+  if (it == heard.end() || !it->second.fix || it->second.fix->frame != TrackFrame::wgs84) return std::nullopt;
+  const auto flown = flown_plan(plan, it->second.fix->position.height_m);
+  if (!flown) return flown.error().message;
+  const Eigen::Vector3d here = EnuFrame(*flown.value().origin).enu_from_wgs84(it->second.fix->position).m;
+  const auto setup = procedure::flight_setup(flown.value(), here);
+  if (!setup) return setup.error().message;
+  const auto refused = procedure::refuse_take_off(setup.value().limits.bounds, here,
+                                                  procedure::take_off_height_m(setup.value()));
+  return refused ? refused->text : std::string{};
 }
 
 Result<FlightCommand> FlightService::State::begin(const Mission& mission, const Groundwork& ground,
@@ -106,12 +131,9 @@ Result<FlightCommand> FlightService::State::begin(const Mission& mission, const 
   if (!open.empty()) return forbidden("the checklist is not green: " + open);
   const auto& h = heard[mission.id];
   if (!h.fix || h.fix->frame != TrackFrame::wgs84) return forbidden("it is not known where the aircraft is");
-  BOOST_OUTCOME_TRY(Wgs84 origin, planning::plan_origin(plan));
-  // A plan without an origin has its ground where the aircraft stands.
-  if (!plan.origin) origin.height_m = (took_off_from ? *took_off_from : h.fix->position).height_m;
-  Plan flown = plan;
-  flown.origin = origin;
-  const EnuFrame frame(origin);
+  BOOST_OUTCOME_TRY(const Plan flown,
+                    flown_plan(plan, (took_off_from ? *took_off_from : h.fix->position).height_m));
+  const EnuFrame frame(*flown.origin);
   const Eigen::Vector3d here = frame.enu_from_wgs84(h.fix->position).m;
   // Home is on the ground: where this mission took off, when it starts again in the air.
   const Eigen::Vector3d home = took_off_from ? frame.enu_from_wgs84(*took_off_from).m : here;
@@ -121,6 +143,7 @@ Result<FlightCommand> FlightService::State::begin(const Mission& mission, const 
   flight.emplace(mission.id, flown, manual, frame, home,
                  procedure::FlightControl(std::move(setup), frame, manual ? nullptr : deps.drone));
   auto& f = *flight;
+  if (ground.check) f.forecast = ground.check->time;
   f.control.fix(now, here, h.fix->fix);
   if (manual) {
     f.by_hand.position_m = here, f.former_s = now;
@@ -164,9 +187,9 @@ Result<FlightCommand> FlightService::State::obey(const MissionId& mission, const
       command.state = "accepted";
     else
       by_drone_number[f.control.abort()] = command.number;
-    f.aborted = true;
-    deps.events.add("warning", "procedure.aborted",
-                    "aborted by " + who.name + ": the aircraft is the pilot's", mission);
+    f.aborted = "aborted by " + who.name + ": the aircraft is the pilot's";
+    f.aborted_s = now_s();
+    deps.events.add("warning", "procedure.aborted", f.aborted, mission);
     return command;
   }
   const auto event = event_of_action(action);
@@ -231,6 +254,7 @@ void FlightService::State::recover() {
                    procedure::FlightControl(std::move(setup).value(), EnuFrame(origin),
                                             manual ? nullptr : deps.drone, *state, now_s()));
     flight->clues_before = clues_of(j.value("clues", nlohmann::json()));
+    if (const auto check = planning::check_plan(flight->plan)) flight->forecast = check.value().time;
     // Not heard yet: whether the hold leaves is decided by the mode that the first heartbeat shows.
     tell_happenings(*flight);
     deps.events.add("critical", "procedure.restarted",
@@ -246,8 +270,10 @@ nlohmann::ordered_json FlightService::State::procedure(const ActiveFlight& f) co
   v.plan_revision = f.plan.version;
   v.mode = f.manual ? "manual" : "auto";
   v.status = f.status();
+  v.ended = f.ended();
+  v.forecast = f.forecast;
   v.t_us = deps.clock.now().us();
-  v.now_s = now_s();
+  v.now_s = f.aborted.empty() ? now_s() : f.aborted_s;
   if (!f.manual) v.drone = deps.drone->status();
   v.shift_m = f.control.shift_m();
   if (const auto held = lease.holder(moment())) {
@@ -308,6 +334,10 @@ std::vector<std::pair<std::string_view, std::string>> FlightService::State::alar
   }
   out.emplace_back("drone.taken_over",
                    flying && flight->control.taken_over() ? "the pilot or a failsafe has the aircraft" : "");
+  // Until the next flight, or until somebody says that he knows.
+  const bool failed = flight && flight->status() == "aborted" && flight->aborted.empty() &&
+                      !flight->control.engine().state().by_person;
+  out.emplace_back("flight.aborted", failed ? "the flight ended before its end: " + flight->ended() : "");
   std::string silent;
   for (const auto& c : commands) {
     if (flying && unconfirmed && c.number == *unconfirmed) silent = c.action + " " + c.state + ": " + c.text;

@@ -25,11 +25,11 @@ constexpr std::size_t k_commands = 60, k_missions = 8;
 
 bool ActiveFlight::flying() const {
   const auto step = control.engine().state().step;
-  return !aborted && step != Step::ready && step != Step::done;
+  return aborted.empty() && step != Step::ready && step != Step::done;
 }
 
 std::string ActiveFlight::status() const {
-  if (aborted) return "aborted";
+  if (!aborted.empty()) return "aborted";
   switch (control.engine().state().step) {
     case Step::ready:
       return "ready";
@@ -39,15 +39,17 @@ std::string ActiveFlight::status() const {
       return "return";
     case Step::landing:
       return "landing";
-    case Step::done:
-      return "done";
+    case Step::done:  // only what was promised
+      return control.engine().state().completed ? "done" : "aborted";
     default:
       return "running";
   }
 }
 
+std::string ActiveFlight::ended() const { return aborted.empty() ? control.engine().state().ended : aborted; }
+
 bool ActiveFlight::to_keep(std::string& text) {
-  const auto n = control.engine().state().n_transitions + (aborted ? 1'000'000 : 0);
+  const auto n = control.engine().state().n_transitions + (aborted.empty() ? 0 : 1'000'000);
   if (n == kept) return false;
   kept = n;
   text.clear();
@@ -212,7 +214,7 @@ void FlightService::State::round(const MissionService::LiveView* live) {
   }
   read_reports();
   give_fence();
-  if (!flight || flight->aborted) return;
+  if (!flight || !flight->aborted.empty()) return;
   auto& f = *flight;
   if (f.manual && f.by_hand.position_m && f.former_s) f.control.by_hand(*f.former_s, f.by_hand);
   std::vector<Estimate> estimates;

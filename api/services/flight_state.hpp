@@ -32,6 +32,8 @@ struct ActiveFlight {
 
   bool flying() const;
   std::string status() const;
+  /// Why the work is over; empty while it goes on.
+  std::string ended() const;
   /// The document to store, when the machine moved since the last call; empty text: forget it.
   bool to_keep(std::string& text);
 
@@ -48,7 +50,9 @@ struct ActiveFlight {
   }
   procedure::FlightClues clues_before;
   std::uint64_t clues_told{0};  ///< version of the engine's clues that the mission knows
-  bool aborted{false};
+  std::string aborted;          ///< who gave the aircraft back to the pilot; empty: nobody
+  double aborted_s{0};
+  std::optional<planning::FlightTime> forecast{};
   std::uint64_t kept{~0ULL}, shown{~0ULL};
   double shown_s{-10};
   std::size_t shown_iteration{~std::size_t{0}};
@@ -100,6 +104,7 @@ struct FlightService::State {
   Groundwork groundwork(const Plan* plan);
   std::vector<ChecklistItem> checklist(const Mission* record, const MissionId& mission,
                                        const Groundwork& ground, bool manual);
+  std::optional<std::string> take_off_refused(const Plan& plan, const MissionId& mission) const;
   std::vector<std::pair<std::string_view, std::string>> alarms() const;
   Result<FlightCommand> upload(const MissionId& mission, const Plan& plan, const std::string& what,
                                const std::string& who);

@@ -1,5 +1,7 @@
 #include "core/planning/local_plan.hpp"
 
+#include "core/planning/flight_time.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -186,10 +188,7 @@ Result<PlanCheck> check_plan(const Plan& plan) {
     if (const auto refusal = refuse_point(bounds, point)) {
       report(Severity::error, std::string(to_string(*refusal)), pointer, point_text(*refusal, plan, i));
     }
-    if (plan.waypoints[i].measure) {
-      ++check.n_measure;
-      check.duration_s += plan.waypoints[i].dwell_s.value_or(plan.settings.dwell_s);
-    }
+    if (plan.waypoints[i].measure) ++check.n_measure;
     if (i == 0) continue;
     const auto& before = local.waypoints_m[i - 1];
     check.length_m += (point - before).norm();
@@ -199,11 +198,14 @@ Result<PlanCheck> check_plan(const Plan& plan) {
                  " crosses the building, a no-fly area or the fence");
     }
   }
-  check.duration_s += check.length_m / plan.settings.speed_mps;
-  const auto& limit = plan.settings.max_flight_s;
-  if (limit && check.duration_s > *limit) {
+  check.time = flight_time(local, plan);
+  if (const auto& limit = plan.settings.max_flight_s; limit && check.time.low_s > *limit) {
     report(Severity::error, "too_long", "/settings/max_flight_s",
-           with_numbers("the flight takes %.0f s, the limit is %.0f s", check.duration_s, *limit));
+           with_numbers("the flight takes at least %.0f s, the limit is %.0f s", check.time.low_s, *limit));
+  } else if (limit && check.time.expected_s > *limit) {
+    report(Severity::warning, "time_short", "/settings/max_flight_s",
+           with_numbers("the flight is expected to take %.0f s; at %.0f s, the limit, it returns unfinished",
+                        check.time.expected_s, *limit));
   }
   if (check.n_measure > 0 && check.n_measure < 4) {
     report(Severity::warning, "few_points", "/waypoints",

@@ -36,10 +36,16 @@ struct PlanIssue {
   std::string text;     ///< for the operator, with the numbers
 };
 
+/// Forecast of a flight's time, s.
+struct FlightTime {
+  double low_s{}, expected_s{}, high_s{};
+};
+
 /// What a look at the plan finds, and what the flight would take and bring.
 struct PlanCheck {
   std::vector<PlanIssue> issues;
-  double length_m{}, duration_s{};
+  double length_m{};
+  FlightTime time;
   std::size_t n_measure{};
   /// Of anchors assumed 5 m apart inside the outline; empty without outline or measuring points.
   std::vector<Eigen::Vector3d> assumed_anchors_m;

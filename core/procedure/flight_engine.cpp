@@ -73,12 +73,16 @@ Result<FlightSetup> flight_setup(const Plan& plan, const Eigen::Vector3d& home_m
   return out;
 }
 
+double take_off_height_m(const FlightSetup& setup) {
+  return std::max(setup.limits.home_m.z() + setup.settings.take_off_m, setup.settings.min_height_m);
+}
+
 FlightEngine::FlightEngine(FlightSetup setup) : setup_(std::move(setup)), clues_(setup_.middle_m.z()) {}
 
 FlightEngine::FlightEngine(FlightSetup setup, const State& stored, double now_s)
     : FlightEngine(std::move(setup)) {
   state_ = stored;
-  started_s_ = now_s;
+  started_s_ = now_s - stored.flown_s;
   apply(now_s, resume_after_restart(stored, now_s));
 }
 
@@ -182,7 +186,10 @@ bool FlightEngine::down(double now_s) {
 
 bool FlightEngine::command(double now_s, Event event, const std::string& who) {
   if (event == Event::start) started_s_ = now_s;
-  return feed(now_s, event, who.empty() ? std::string{} : "by " + who);
+  const bool went_on = state_.ended.empty();
+  if (!feed(now_s, event, who.empty() ? std::string{} : "by " + who)) return false;
+  if (went_on && !state_.ended.empty()) state_.by_person = true;
+  return true;
 }
 
 /// From where a turn saw no lobe of an anchor a height search, which needs one, sees nothing either.
@@ -222,6 +229,7 @@ void FlightEngine::apply(double now_s, const Advance& step) {
     if (to == Step::height_search) clues_.begin_height_search();
   }
   state_ = step.state;
+  if (started_s_) state_.flown_s = now_s - *started_s_;
   if (state_.step == Step::done) leg_.reset();
   if (measured) {
     for (const auto& a : state_.anchors) {
@@ -238,14 +246,11 @@ void FlightEngine::apply(double now_s, const Advance& step) {
 void FlightEngine::execute(double now_s, const Command& c) {
   switch (c.kind) {
     case Command::Kind::take_off: {
-      // Above where it stands, which need not be the plan's ground, and into the band.
-      const double home_m = setup_.limits.home_m.z();
       Command up = c;
-      up.point_m.z() = std::max(home_m + setup_.settings.take_off_m, setup_.settings.min_height_m);
-      climb_to_m_ = up.point_m.z();
+      up.point_m.z() = climb_to_m_ = take_off_height_m(setup_);
       if (const auto refused = refuse_command(setup_.limits, position_m(), up)) {
         tell(now_s, "critical", "cmd.refused", refused->text);
-        pending_ = Event::land;
+        pending_ = vehicle_.armed || vehicle_.in_air ? Event::land : Event::not_taken_off;
         pending_text_ = refused->text;
       } else {
         order(up);
@@ -557,11 +562,26 @@ void FlightEngine::decide(double now_s, std::span<const Estimate> estimates) {
   feed(now_s, Event::point, decision_->decision.reason, best.point_m, std::atan2(look.x(), look.y()));
 }
 
+/// The longest flight is over: home at once, from whatever step. Who holds, holds; it is over when he
+/// resumes.
+bool FlightEngine::end_of_time(double now_s, std::span<const Estimate> estimates) {
+  const auto& longest_s = setup_.exit.max_s;
+  const auto step = state_.step;
+  if (!longest_s || !started_s_ || now_s - *started_s_ < *longest_s || step == Step::take_off ||
+      step == Step::hold || step == Step::return_home || step == Step::landing)
+    return false;
+  judge_anchors(now_s, estimates);
+  const std::string why = "the flight time of " + std::to_string(std::lround(*longest_s)) + " s is over";
+  tell(now_s, "warning", "procedure.time_over", why);
+  return feed(now_s, Event::return_home, why);
+}
+
 void FlightEngine::tick(double now_s, std::span<const Estimate> estimates) {
   if (!in_flight(state_.step)) return;
   if (down(now_s) && feed(now_s, Event::landed)) return;
   look_out(now_s);
   if (taken_over_) return;
+  if (end_of_time(now_s, estimates)) return;
   if (pending_) {
     const auto event = *std::exchange(pending_, std::nullopt);
     if (feed(now_s, event, std::exchange(pending_text_, {}))) return;

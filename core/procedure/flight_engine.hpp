@@ -39,6 +39,10 @@ struct FlightSetup {
 /// errors  invalid_argument: no waypoint, plan nowhere, settings
 Result<FlightSetup> flight_setup(const Plan& plan, const Eigen::Vector3d& home_m);
 
+/// Height that a take-off climbs to: above where it stands, which need not be the plan's ground, and into the
+/// band.
+double take_off_height_m(const FlightSetup& setup);
+
 /// What the autopilot says of itself.
 struct VehicleView {
   std::optional<Eigen::Vector3d> position_m{};
@@ -111,7 +115,10 @@ class FlightEngine {
   const std::optional<Command>& leg() const { return leg_; }
   std::optional<double> distance_left_m() const;
   double elapsed_s() const;  ///< from the start to the last transition
-  double flown_s(double now_s) const { return started_s_ ? now_s - *started_s_ : 0; }
+  /// Since the start; of a flight that is over, what it took.
+  double flown_s(double now_s) const {
+    return started_s_ && state_.step != Step::done ? now_s - *started_s_ : state_.flown_s;
+  }
   const std::map<NetworkId, std::vector<Eigen::Vector3d>>& measured_at() const { return measured_at_; }
 
  private:
@@ -123,6 +130,7 @@ class FlightEngine {
   void next_leg(double now_s);
   void order(const Command& command);
   void climb(double now_s);
+  bool end_of_time(double now_s, std::span<const Estimate> estimates);
   bool down(double now_s);
   void tell(double now_s, std::string level, std::string code, std::string text);
   void look_out(double now_s);

@@ -225,6 +225,28 @@ std::vector<Command> Entry::run() {
   return {};
 }
 
+/// After the work: nothing is measured any more.
+bool is_over(Step step) { return step == Step::return_home || step == Step::landing || step == Step::done; }
+
+/// The plan was flown to its end: what else leads home is an interruption, however it went on.
+bool nothing_left(const Transition& way) {
+  if (way.to != Step::return_home) return false;
+  return way.event == Event::done_here || way.event == Event::no_point || way.event == Event::skip ||
+         (way.event == Event::timeout &&
+          (way.from == Step::search_anchors || way.from == Step::find_next_point));
+}
+
+void note_end(State& s, const Transition& way) {
+  if (way.to == Step::hold) return;
+  if (!is_over(way.to)) {
+    s.ended.clear();
+    s.completed = s.by_person = false;
+  } else if (s.ended.empty()) {
+    s.ended = s.reason;
+    s.completed = nothing_left(way);
+  }
+}
+
 }  // namespace
 
 Result<void> Settings::check() const {
@@ -253,6 +275,7 @@ Advance advance(const Settings& settings, const State& state, const Input& input
   out.state.since_s = input.now_s;
   out.state.reason = std::string(out.transition->reason);
   if (!input.text.empty()) out.state.reason += ": " + input.text;
+  note_end(out.state, *out.transition);
   ++out.state.n_transitions;
   out.commands = Entry(settings, out.state, *out.transition, input).run();
   const double longest = longest_s(settings, out.state, out.state.step);

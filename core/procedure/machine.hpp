@@ -149,6 +149,11 @@ struct State {
   std::vector<Eigen::Vector3d> visited, unreachable;
   std::vector<AnchorTask> anchors;
   std::string reason;  ///< of the last transition
+  /// Why the work ended, from the way home on; empty while it goes on.
+  std::string ended;
+  bool completed{false};  ///< it ended because nothing was left to fly
+  bool by_person{false};  ///< or because a person told it to
+  double flown_s{};       ///< since the start, restarts of the server included
   std::uint64_t n_transitions{};
 };
 

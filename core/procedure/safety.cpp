@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 namespace anchord::procedure {
 namespace {
@@ -11,6 +12,41 @@ std::string text(const char* format, double a, double b = 0) {
   std::array<char, 160> out{};
   std::snprintf(out.data(), out.size(), format, a, b);
   return out.data();
+}
+
+/// The rule that a point breaks, in the operator's words and with the numbers.
+std::string explain(const planning::Bounds& bounds, planning::Refusal refusal, const Eigen::Vector3d& at_m) {
+  using planning::Refusal;
+  switch (refusal) {
+    case Refusal::outside_fence:
+      return at_m.allFinite() && bounds.fence.size() >= 3
+                 ? text("%.1f m outside the fence",
+                        planning::distance_to_edge_m(bounds.fence, at_m.head<2>()))
+                 : "outside the fence";
+    case Refusal::no_fly: {
+      double nearest_m = std::numeric_limits<double>::infinity();
+      for (const auto& area : bounds.no_fly) {
+        if (planning::contains(area, at_m.head<2>())) return "over the building or inside a no-fly area";
+        if (area.size() >= 3)
+          nearest_m = std::min(nearest_m, planning::distance_to_edge_m(area, at_m.head<2>()));
+      }
+      return text("%.1f m from the building or a no-fly area, %.1f m are kept", nearest_m, bounds.keep_out_m);
+    }
+    case Refusal::near_wall:
+      return "too near to a wall";
+    case Refusal::too_low:
+      return text("%.1f m high, the band begins at %.1f m", at_m.z(), bounds.min_height_m.value_or(0));
+    case Refusal::too_high:
+      return text("%.1f m high, the band ends at %.1f m", at_m.z(), bounds.max_height_m.value_or(0));
+    case Refusal::path_blocked:
+      return "the straight way crosses the building, a no-fly area or the fence";
+    case Refusal::visited:
+    case Refusal::unreachable:
+    case Refusal::over_range:
+    case Refusal::on_anchor:
+      break;  // of the planner's candidates, not of bounds
+  }
+  return std::string(planning::to_string(refusal));
 }
 
 /// The same volume, wider by the tolerance: what a breach is beyond.
@@ -54,6 +90,17 @@ std::string_view to_string(Reaction reaction) {
   return "";
 }
 
+std::optional<Refused> refuse_take_off(const planning::Bounds& bounds, const Eigen::Vector3d& stands_m,
+                                       double height_m) {
+  // Straight up from where it stands, which must be inside the fence and off every area.
+  Eigen::Vector3d above = stands_m;
+  above.z() = std::max(height_m, bounds.min_height_m.value_or(height_m));
+  const auto refusal = planning::refuse_point(bounds, above);
+  if (!refusal) return std::nullopt;
+  return Refused{std::string(planning::to_string(*refusal)),
+                 "no take-off from here: " + explain(bounds, *refusal, above)};
+}
+
 std::optional<Refused> refuse_command(const SafetyLimits& limits,
                                       const std::optional<Eigen::Vector3d>& aircraft_m,
                                       const Command& command) {
@@ -63,16 +110,7 @@ std::optional<Refused> refuse_command(const SafetyLimits& limits,
     if (!(height > 0) || (bounds.max_height_m && height > *bounds.max_height_m)) {
       return Refused{"take_off_height", text("take-off to %.1f m is outside the height band", height)};
     }
-    // Straight up from where it stands, which must be inside the fence and off every area.
-    if (aircraft_m) {
-      Eigen::Vector3d above = *aircraft_m;
-      above.z() = std::max(height, bounds.min_height_m.value_or(height));
-      if (const auto refusal = planning::refuse_point(bounds, above)) {
-        return Refused{std::string(planning::to_string(*refusal)),
-                       "the place of the take-off is not allowed"};
-      }
-    }
-    return std::nullopt;
+    return aircraft_m ? refuse_take_off(bounds, *aircraft_m, height) : std::nullopt;
   }
   if (command.kind != Command::Kind::go_to) return std::nullopt;
   if (!command.point_m.allFinite() || (command.heading_rad && !std::isfinite(*command.heading_rad))) {
@@ -86,7 +124,8 @@ std::optional<Refused> refuse_command(const SafetyLimits& limits,
                    text("the target is %.0f m away, at most %.0f m are allowed", jump_m, limits.max_jump_m)};
   }
   if (const auto refusal = planning::refuse_point(bounds, command.point_m)) {
-    return Refused{std::string(planning::to_string(*refusal)), "the target is not allowed"};
+    return Refused{std::string(planning::to_string(*refusal)),
+                   "the target is " + explain(bounds, *refusal, command.point_m)};
   }
   if (const auto refusal = planning::refuse_path(bounds, *aircraft_m, command.point_m)) {
     return Refused{std::string(planning::to_string(*refusal)),

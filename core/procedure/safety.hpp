@@ -41,6 +41,10 @@ std::optional<Refused> refuse_command(const SafetyLimits& limits,
                                       const std::optional<Eigen::Vector3d>& aircraft_m,
                                       const Command& command);
 
+/// What keeps an aircraft that stands there from taking off to this height, as refuse_command() says of it.
+std::optional<Refused> refuse_take_off(const planning::Bounds& bounds, const Eigen::Vector3d& stands_m,
+                                       double height_m);
+
 /// How things stand now. Ages in seconds.
 struct Situation {
   std::optional<Eigen::Vector3d> position_m{};  ///< the rover's, else the autopilot's

@@ -42,6 +42,29 @@ TEST_F(Flights, StartIsBlockedUntilTheChecklistIsGreen) {
   EXPECT_EQ(act("start", lease, R"(,"plan":")" + plan + '"').status, 202);
 }
 
+TEST_F(Flights, TheChecklistJudgesThePlaceOfTheTakeOffAsTheFlightWill) {
+  mission_ = mission();
+  const auto place = [&](const std::string& plan) {
+    const Json list = json(get(base() + "/checklist", {{"plan", plan}}));
+    for (const auto& item : list["items"]) {
+      if (item["id"] == "place") return item;
+    }
+    return Json();
+  };
+  const auto good = make_plan();
+  EXPECT_EQ(place(good)["state"], "failed");
+  EXPECT_NE(place(good).value("detail", "").find("not known where it stands"), std::string::npos);
+  fly(2);
+  EXPECT_EQ(place(good)["state"], "ok") << place(good);
+  // It stands 9 m west and 9 m south of the corner.
+  const auto bad = make_plan(
+      R"("no_fly":[{"type":"Polygon","coordinates":[[[3.71290,51.02298],[3.71301,51.02298],[3.71301,51.02306],[3.71290,51.02306]]]}],)");
+  EXPECT_EQ(place(bad)["state"], "failed") << place(bad);
+  EXPECT_EQ(place(bad).value("detail", ""),
+            "no take-off from here: over the building or inside a no-fly area");
+  EXPECT_EQ(post(base() + "/checklist/place", R"({"reason":"it will do"})").status, 422) << "not overridable";
+}
+
 TEST_F(Flights, OneOfEightTakesControl) {
   mission_ = mission();
   std::vector<int> status(8);
@@ -69,7 +92,9 @@ TEST_F(Flights, StartsHoldsResumesAndLands) {
   EXPECT_TRUE(fly_until([&] { return procedure()["step"] == "search_anchors"; }, 60));
   EXPECT_LT((drone_->autopilot.vehicle().position_m() - Eigen::Vector3d(-7, -5.6, 4)).norm(), 1.0);
   ASSERT_EQ(act("land", lease).status, 202);
-  EXPECT_TRUE(fly_until([&] { return procedure()["status"] == "done"; }, 60));
+  EXPECT_TRUE(fly_until([&] { return procedure()["step"] == "done"; }, 60));
+  EXPECT_EQ(procedure()["status"], "aborted") << "DONE is only what was promised";
+  EXPECT_EQ(procedure().value("ended", "").rfind("told to land: by ", 0), 0u) << procedure()["ended"];
   EXPECT_FALSE(drone_->autopilot.vehicle().armed());
   for (const char* always : {"hold", "land", "disarm"})
     EXPECT_EQ(act(always, lease).status, 202) << always << ": sent, whatever the server believes";
@@ -99,7 +124,7 @@ TEST_F(Flights, ARefusalToArmIsReportedWithinTwoSecondsInTheAutopilotsWords) {
   ASSERT_EQ(started.status, 202) << started.body;
   fly(2);
   EXPECT_EQ(command_state(json(started)["number"]), "refused");
-  EXPECT_EQ(procedure()["status"], "done");
+  EXPECT_EQ(procedure()["status"], "aborted");
   EXPECT_NE(procedure()["reason"].get<std::string>().find("Throttle too high"), std::string::npos);
   drone_->autopilot.refuse_arming("");
   fly(15);

@@ -215,6 +215,98 @@ TEST(FlightEngine, AnswersEveryFaultAtEveryStepAsDocumented) {
   }
 }
 
+TEST(FlightEngine, ReturnsAtOnceFromEveryStepWhenTheFlightTimeIsOver) {
+  for (const auto& [step, way] : ways()) {
+    auto limited = setup();
+    limited.exit.max_s = 30;
+    Flown f(std::move(limited));
+    way(f);
+    f.now += 29;
+    f.here();
+    f.engine.tick(f.now, {});
+    EXPECT_NE(f.engine.state().ended, "the flight time of 30 s is over")
+        << "too early in " << to_string(step);
+    Flown late([] {
+      auto s = setup();
+      s.exit.max_s = 30;
+      return s;
+    }());
+    way(late);
+    late.now += 31;
+    late.here();
+    late.engine.tick(late.now, {});
+    late.engine.tick(late.now, {});  // a take-off is finished first
+    const bool waits = step == Step::hold || step == Step::landing;
+    EXPECT_EQ(to_string(late.engine.state().step), to_string(waits ? step : Step::return_home));
+    EXPECT_FALSE(late.engine.state().completed);
+    if (step == Step::hold) {
+      ASSERT_TRUE(late.engine.command(late.now, Event::resume, ""));
+      late.engine.tick(late.now, {});
+      EXPECT_EQ(late.engine.state().step, Step::return_home) << "who held is not flown on";
+    }
+    if (!waits && step != Step::return_home) {
+      EXPECT_EQ(late.engine.state().ended, "told to return: the flight time of 30 s is over");
+    }
+  }
+}
+
+TEST(FlightEngine, IsCompletedOnlyWhenNothingWasLeftToFly) {
+  const auto ended_by = [](Step from, std::initializer_list<Event> events) {
+    Flown f;
+    ways().at(from)(f);
+    f.feed(events);
+    EXPECT_EQ(f.engine.state().step, Step::done);
+    return std::pair(f.engine.state().completed, f.engine.state().ended);
+  };
+  using P = std::pair<bool, std::string>;
+  EXPECT_EQ(ended_by(Step::find_next_point,
+                     {Event::done_here, Event::arrived, Event::done_here, Event::arrived, Event::landed}),
+            P(true, "all waypoints flown"));
+  EXPECT_EQ(ended_by(Step::ranging, {Event::return_home, Event::arrived, Event::landed}),
+            P(false, "told to return"));
+  EXPECT_EQ(ended_by(Step::ranging, {Event::land, Event::landed}), P(false, "told to land"));
+  EXPECT_EQ(ended_by(Step::ranging, {Event::taken_over, Event::landed}),
+            P(false, "landed and disarmed without a command"));
+  EXPECT_EQ(ended_by(Step::take_off, {Event::not_taken_off}), P(false, "not taken off"));
+  // Held on the way home, the reason stays; sent to work again, it is not over.
+  Flown f;
+  ways().at(Step::return_home)(f);
+  f.feed({Event::hold, Event::resume});
+  EXPECT_EQ(f.engine.state().ended, "told to return");
+  f.feed({Event::skip});
+  EXPECT_EQ(f.engine.state().step, Step::go_to_waypoint);
+  EXPECT_EQ(f.engine.state().ended, "");
+}
+
+TEST(FlightEngine, ATakeOffWhereItIsNotAllowedIsNotFlownAndSaysWhyInMetres) {
+  auto where = setup();
+  where.limits.home_m = {-2, 10, 0};  // 2 m from the building, 4 m are kept
+  Flown f(std::move(where));
+  f.view.armed = f.view.in_air = false;
+  f.view.position_m = Vector3d(-2, 10, 0);
+  f.engine.fix(f.now, {-2, 10, 0}, FixClass::rtk_fixed);
+  f.engine.vehicle(f.now, f.view);
+  f.feed({Event::start});
+  f.engine.tick(f.now, {});
+  EXPECT_TRUE(f.engine.take_orders().empty()) << "nothing is armed for a flight that is refused";
+  EXPECT_EQ(f.engine.state().step, Step::done);
+  EXPECT_FALSE(f.engine.state().completed);
+  EXPECT_EQ(f.engine.state().ended,
+            "not taken off: no take-off from here: 2.0 m from the building or a no-fly area, 4.0 m are kept");
+}
+
+TEST(FlightEngine, TheTimeFlownStandsStillAfterTheLandingAndGoesOnOverARestart) {
+  Flown f;
+  f.feed({Event::start, Event::airborne});
+  f.now += 40;
+  f.feed({Event::land});
+  FlightEngine after(setup(), f.engine.state(), 7000);
+  EXPECT_DOUBLE_EQ(after.flown_s(7005), 45);
+  f.now += 10;
+  f.feed({Event::landed});
+  EXPECT_DOUBLE_EQ(f.engine.flown_s(f.now + 600), 50);
+}
+
 TEST(FlightEngine, SaysWhenAFaultIsOver) {
   Flown f;
   ways().at(Step::hold)(f);

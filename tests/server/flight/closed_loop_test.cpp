@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "core/geo/enu.hpp"
+#include "core/planning/local_plan.hpp"
 
 namespace anchord::flight {
 namespace {
@@ -16,8 +17,9 @@ namespace {
 struct Row {
   std::uint64_t seed{};
   double flight_s{}, wall_s{}, median_m{}, worst_m{};
-  double ring_m{};   ///< the rival: one ring at 4 m, as a pilot flies it by hand
-  double rings_m{};  ///< for comparison: laps at 3 and at 9 m, which see the heights
+  double low_s{}, expected_s{}, high_s{};  ///< the forecast of the plan
+  double ring_m{};                         ///< the rival: one ring at 4 m, as a pilot flies it by hand
+  double rings_m{};                        ///< for comparison: laps at 3 and at 9 m, which see the heights
   int ok{}, inside{};
 };
 
@@ -40,6 +42,10 @@ Row fly(const sim::World& world, std::uint64_t seed) {
   const auto& result = flown.value();
   EXPECT_EQ(procedure::to_string(result.state.step), "done") << result.state.reason;
   row.flight_s = result.flight_s;
+  const auto forecast = planning::check_plan(plan.value()).value().time;
+  row.low_s = forecast.low_s, row.expected_s = forecast.expected_s, row.high_s = forecast.high_s;
+  EXPECT_GE(result.flight_s, forecast.low_s) << "seed " << seed;
+  EXPECT_LE(result.flight_s, forecast.high_s) << "seed " << seed;
   row.wall_s = result.wall_s;
   FlightOptions solve;
   solve.origin = world.origin;
@@ -73,14 +79,17 @@ struct Table {
   int anchors{}, ok{}, inside{};
 };
 Table fly_seeds(const char* name, const sim::World& world, std::uint64_t n) {
-  std::printf("%s\nseed  flight_s  times_real  ok  inside95  median_m  worst_m  ring_4m  rings_3_9m\n", name);
+  std::printf(
+      "%s\nseed  flight_s  forecast        times_real  ok  inside95  median_m  worst_m  ring_4m  "
+      "rings_3_9m\n",
+      name);
   std::vector<double> medians, rings, two_rings;
   Table out;
   for (std::uint64_t seed = 1; seed <= n; ++seed) {
     const auto r = fly(world, seed);
-    std::printf("%4llu  %8.0f  %10.0f  %2d  %8d  %8.3f  %7.3f  %7.3f  %10.3f\n",
-                static_cast<unsigned long long>(seed), r.flight_s, r.flight_s / r.wall_s, r.ok, r.inside,
-                r.median_m, r.worst_m, r.ring_m, r.rings_m);
+    std::printf("%4llu  %8.0f  %4.0f %4.0f %4.0f  %10.0f  %2d  %8d  %8.3f  %7.3f  %7.3f  %10.3f\n",
+                static_cast<unsigned long long>(seed), r.flight_s, r.low_s, r.expected_s, r.high_s,
+                r.flight_s / r.wall_s, r.ok, r.inside, r.median_m, r.worst_m, r.ring_m, r.rings_m);
     std::fflush(stdout);
     medians.push_back(r.median_m);
     rings.push_back(r.ring_m);

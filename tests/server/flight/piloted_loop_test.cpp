@@ -10,6 +10,8 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "core/planning/local_plan.hpp"
+
 namespace anchord::flight {
 namespace {
 
@@ -44,6 +46,9 @@ TEST(PilotedLoop, LandsAtHomeClearOfTheBuildingAndFindsTheAnchorsWithEverythingO
     const auto flown = fly_piloted_loop(world, plan.value(), hostile(seed));
     ASSERT_TRUE(flown) << flown.error().message;
     const auto& r = flown.value();
+    const auto forecast = planning::check_plan(plan.value()).value().time;
+    EXPECT_GE(r.flown.flight_s, forecast.low_s) << "seed " << seed;
+    EXPECT_LE(r.flown.flight_s, forecast.high_s) << "seed " << seed;
     if (one != nullptr)
       for (const auto& h : r.flown.happenings)
         std::printf("%8.1f  %-28s %s\n", h.time_s, h.code.c_str(), h.text.c_str());

@@ -57,6 +57,8 @@ export interface Check {
   readonly issues: readonly Issue[];
   readonly length_m: number | null;
   readonly duration_s: number | null;
+  readonly duration_low_s: number | null;
+  readonly duration_high_s: number | null;
   readonly n_measure: number | null;
   readonly rms_m: number | null;
   readonly worst_m: number | null;
@@ -150,6 +152,8 @@ function check_of(o: Record<string, unknown> | null): Check {
     flyable: o?.flyable === true,
     length_m: num(o?.length_m),
     duration_s: num(o?.duration_s),
+    duration_low_s: num(o?.duration_low_s),
+    duration_high_s: num(o?.duration_high_s),
     n_measure: num(o?.n_measure),
     rms_m: num(predicted?.rms_m),
     worst_m: num(predicted?.worst_m),

@@ -41,6 +41,7 @@ export interface CommandMsg {
 export interface AnchorTask {
   readonly anchor: string;
   readonly done: boolean;
+  readonly reached: boolean; // its accuracy; done without it: given up
   readonly why: string;
   readonly iterations: number;
   readonly at_edge: boolean;
@@ -90,7 +91,9 @@ export interface ProcedureMsg {
   readonly reason: string;
   readonly in_step_s: number | null;
   readonly step_limit_s: number | null;
+  readonly ended: string;
   readonly elapsed_s: number | null;
+  readonly forecast_s: { readonly low: number; readonly high: number } | null;
   readonly waypoint: number;
   readonly n_waypoints: number;
   readonly part: number;
@@ -185,6 +188,7 @@ export function procedure(v: unknown): ProcedureMsg | null {
   if (!o || !str(o.mission)) return null;
   const target = spot(obj(o.target)),
     alarm = obj(o.alarm),
+    forecast = obj(o.forecast_s),
     c = obj(o.control);
   return {
     mission: str(o.mission),
@@ -198,7 +202,9 @@ export function procedure(v: unknown): ProcedureMsg | null {
     reason: str(o.reason),
     in_step_s: num(o.in_step_s),
     step_limit_s: num(o.step_limit_s),
+    ended: str(o.ended),
     elapsed_s: num(o.elapsed_s),
+    forecast_s: forecast ? { low: num(forecast.low) ?? 0, high: num(forecast.high) ?? 0 } : null,
     waypoint: count(o.waypoint),
     n_waypoints: count(o.n_waypoints),
     part: count(o.part),
@@ -209,6 +215,7 @@ export function procedure(v: unknown): ProcedureMsg | null {
     anchors: list(o.anchors).map((a) => ({
       anchor: str(a.network_id),
       done: a.done === true,
+      reached: a.reached === true,
       why: str(a.why),
       iterations: count(a.iterations),
       at_edge: a.height_at_edge === true,

@@ -183,7 +183,9 @@ export function FlightBar() {
 }
 
 function Progress({ p }: { p: ProcedureMsg }) {
-  const done = p.anchors.filter((a) => a.done).length,
+  // Given up is not done: only an accuracy that was reached counts.
+  const done = p.anchors.filter((a) => a.reached).length,
+    given_up = p.anchors.filter((a) => a.done && !a.reached).length,
     battery = p.drone?.battery ?? null,
     needed = p.battery_needed;
   return (
@@ -198,11 +200,20 @@ function Progress({ p }: { p: ProcedureMsg }) {
         <dt>Anchors done</dt>
         <dd>
           {done} of {p.anchors.length}
+          {given_up > 0 && <span class="u caution"> {given_up} given up</span>}
         </dd>
       </div>
       <div>
         <dt>Flown</dt>
-        <dd>{clock(p.elapsed_s, true)}</dd>
+        <dd data-testid="flown">
+          {clock(p.elapsed_s, true)}
+          {p.forecast_s && (
+            <span class="u">
+              {' '}
+              forecast {clock(p.forecast_s.low, true)} to {clock(p.forecast_s.high, true)}
+            </span>
+          )}
+        </dd>
       </div>
       {battery !== null && (
         <div>

@@ -59,7 +59,14 @@ export function Procedure() {
           </>
         )}
       </div>
-      {p.reason && <p class="why">{sentence(p.reason)}</p>}
+      {p.status === 'aborted' ? (
+        <div class="callout bad" role="alert" data-testid="flight-aborted">
+          <b>The flight ended before its plan was flown.</b> {sentence(p.ended || p.reason)}
+        </div>
+      ) : (
+        p.reason && <p class="why">{sentence(p.reason)}</p>
+      )}
+      {p.ended && flying(p) && p.ended !== p.reason && <p class="why">Why it comes home: {p.ended}.</p>}
       {p.drone?.taken_over && (
         <div class="callout caution">
           <b>The pilot has taken over by remote control.</b> No target is sent until the flight is started or resumed

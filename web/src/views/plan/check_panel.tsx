@@ -42,7 +42,13 @@ export function CheckPanel({
         <dl class="kv">
           <div>
             <dt>Flight</dt>
-            <dd data-testid="flight-time">{clock(check.duration_s, true)}</dd>
+            <dd>
+              <span data-testid="flight-time">{clock(check.duration_s, true)}</span>
+              <span class="u">
+                {' '}
+                {clock(check.duration_low_s, true)} to {clock(check.duration_high_s, true)}
+              </span>
+            </dd>
           </div>
           <div>
             <dt>Way</dt>
