@@ -107,7 +107,7 @@ export class Contract {
       try {
         body = JSON.parse(text);
       } catch (error) {
-        throw new Error(`${what}: not JSON: ${text.slice(0, 200)}`);
+        throw new Error(`${what}: not JSON: ${text.slice(0, 200)}`, { cause: error });
       }
       this.check(`${pointer}/content/${escape(type)}/schema`, body, what);
     }

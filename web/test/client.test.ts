@@ -46,7 +46,7 @@ class FakeSocket implements Socket {
   onclose: ((e: { code: number }) => void) | null = null;
   sent: Record<string, unknown>[] = [];
   send(text: string): void {
-    this.sent.push(JSON.parse(text));
+    this.sent.push(JSON.parse(text) as Record<string, unknown>);
   }
   close(): void {
     /* the client forgets us */

@@ -62,7 +62,7 @@ describe('the lines that are sent', () => {
       lines
         .trimEnd()
         .split('\n')
-        .map((l) => JSON.parse(l)),
+        .map((l): unknown => JSON.parse(l)),
     ).toEqual([
       { range_m: 5.31, t_s: 1_700_000_000.25, rx_dbm: -84, cir: { n: 1 } },
       { range_m: 5.3, t_s: 0.000002, rx_dbm: -80, fp_dbm: -86, std_noise: 40 },

@@ -281,7 +281,7 @@ export function past_of(answer: unknown): Past[] {
     const shift = known
       ? enu_from_geodetic(
           { lon: here.lon!, lat: here.lat!, h_m: here.h_m ?? 0 },
-          { lon: before!.lon!, lat: before!.lat!, h_m: before!.h_m ?? 0 },
+          { lon: before.lon!, lat: before.lat!, h_m: before.h_m ?? 0 },
         )
       : null;
     return {

@@ -5,7 +5,7 @@ import { request } from './client';
 type Row = Readonly<Record<string, unknown>>;
 const items_of = (answer: unknown): Row[] => {
   const items = obj(answer)?.items;
-  return (Array.isArray(items) ? items : []).map(obj).filter((o) => o !== null) as Row[];
+  return (Array.isArray(items) ? items : []).map(obj).filter((o) => o !== null);
 };
 const ranges = async (mission: string, anchor: string, more: Record<string, string>): Promise<Row[]> =>
   items_of(await request('GET', `/ranges?${new URLSearchParams({ mission, anchor, ...more })}`));
@@ -43,13 +43,13 @@ export async function settings_of(campaign: string): Promise<Setting[]> {
     .map(obj)
     .filter((o) => o !== null)
     .map((o) => ({
-      setting: str(o!.setting),
-      environment: str(o!.environment),
-      distance_m: num(o!.distance_m),
-      los: typeof o!.los === 'boolean' ? o!.los : null,
-      n: num(o!.n_samples) ?? 0,
-      mean_m: num(o!.mean_range_m),
-      sd_m: num(o!.sd_range_m),
+      setting: str(o.setting),
+      environment: str(o.environment),
+      distance_m: num(o.distance_m),
+      los: typeof o.los === 'boolean' ? o.los : null,
+      n: num(o.n_samples) ?? 0,
+      mean_m: num(o.mean_range_m),
+      sd_m: num(o.sd_range_m),
     }));
 }
 export const make_campaign = (name: string, key: string): Promise<unknown> =>

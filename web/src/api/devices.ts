@@ -108,7 +108,7 @@ export async function discover(): Promise<Found[]> {
   return (Array.isArray(answer?.items) ? answer.items : [])
     .map(obj)
     .filter((o) => o !== null)
-    .map((o) => found_of(o!));
+    .map((o) => found_of(o));
 }
 export interface DeviceForm {
   readonly kind: string;
@@ -156,7 +156,7 @@ const radio_of = (v: unknown): Radio => {
     prf_mhz: num(o?.prf_mhz) ?? 0,
     preamble_symbols: num(o?.preamble_symbols) ?? 0,
     gain_db: num(o?.gain_db),
-    devices: devices.map((d) => ({ network_id: str(d!.network_id), done: d!.done === true, why: str(d!.why) })),
+    devices: devices.map((d) => ({ network_id: str(d.network_id), done: d.done === true, why: str(d.why) })),
   };
 };
 export const read_radio = async (id: string): Promise<Radio> =>

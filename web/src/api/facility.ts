@@ -33,7 +33,7 @@ export function fields_of(feature: unknown): Fields {
     external_ids: ids
       .map(obj)
       .filter((o) => o !== null)
-      .map((o) => ({ system: str(o!.system), id: str(o!.id) })),
+      .map((o) => ({ system: str(o.system), id: str(o.id) })),
   };
 }
 /// Only what differs, as a merge-patch: an emptied field is cleared by null, and what somebody else filled in meanwhile stays.

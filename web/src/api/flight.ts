@@ -35,14 +35,14 @@ export async function checklist(mission: string, plan: string | null): Promise<C
     .map(obj)
     .filter((o) => o !== null)
     .map((o) => ({
-      id: str(o!.id),
-      text: str(o!.text),
-      detail: str(o!.detail),
-      state: o!.state === 'ok' ? 'ok' : o!.state === 'open' ? 'open' : 'failed',
-      manual: o!.manual === true,
-      overridable: o!.overridable === true,
-      overridden_by: str(o!.overridden_by),
-      reason: str(o!.override_reason),
+      id: str(o.id),
+      text: str(o.text),
+      detail: str(o.detail),
+      state: o.state === 'ok' ? 'ok' : o.state === 'open' ? 'open' : 'failed',
+      manual: o.manual === true,
+      overridable: o.overridable === true,
+      overridden_by: str(o.overridden_by),
+      reason: str(o.override_reason),
     }));
 }
 export const set_item = (mission: string, item: string, reason: string): Promise<unknown> =>

@@ -79,8 +79,7 @@ export const EMPTY: Plan = {
   rest: {},
 };
 
-const list = (v: unknown): Record<string, unknown>[] =>
-  Array.isArray(v) ? (v.map(obj).filter((o) => o !== null) as Record<string, unknown>[]) : [];
+const list = (v: unknown): Record<string, unknown>[] => (Array.isArray(v) ? v.map(obj).filter((o) => o !== null) : []);
 /// A GeoJSON ring closes itself; the page works with open ones.
 function ring_of(polygon: unknown): Corner[] {
   const rings = obj(polygon)?.coordinates,
@@ -116,7 +115,7 @@ function plan_of(o: Record<string, unknown>): Plan {
     no_fly: Array.isArray(no_fly) ? no_fly.map(ring_of) : [],
     fence: ring_of(fence),
     building_height_m: num(building_height_m) ?? BUILDING_HEIGHT_M,
-    settings: (obj(settings) ?? {}) as Settings,
+    settings: obj(settings) ?? {},
     rest,
     expected: Array.isArray(expected_anchors) ? expected_anchors.filter((a): a is string => typeof a === 'string') : [],
     waypoints: list(waypoints).map((w) => ({

@@ -28,7 +28,7 @@ export async function datasets(): Promise<DatasetName[]> {
   return (Array.isArray(items) ? items : [])
     .map(obj)
     .filter((o) => o !== null)
-    .map((o) => ({ id: str(o!.id), name: str(o!.name) }));
+    .map((o) => ({ id: str(o.id), name: str(o.name) }));
 }
 const rates_of = (v: unknown): Rates | null => {
   const o = obj(v);

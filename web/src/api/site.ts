@@ -96,7 +96,9 @@ export async function kit_of(list: readonly Flight[]): Promise<Kit | null> {
   const name = list.find((f) => f.kit)?.kit;
   if (!name) return null;
   const solved = (
-    await items('/calibrations?limit=50&fields=id,missions', (o) => (Array.isArray(o.missions) ? o.missions : []))
+    await items('/calibrations?limit=50&fields=id,missions', (o) =>
+      Array.isArray(o.missions) ? (o.missions as unknown[]) : [],
+    )
   ).flat();
   if (!list.some((f) => f.kit === name && solved.includes(f.id))) return null;
   const o = obj(await request('GET', `/devices/${encodeURIComponent(name)}/profile`)),

@@ -38,7 +38,7 @@ export async function items<T>(path: string, of: (o: Record<string, unknown>) =>
   return (Array.isArray(answer?.items) ? answer.items : [])
     .map(obj)
     .filter((o) => o !== null)
-    .map((o) => of(o!));
+    .map((o) => of(o));
 }
 
 export const tokens = (): Promise<Token[]> =>

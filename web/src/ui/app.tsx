@@ -9,6 +9,7 @@ import { Help, help_open } from './help';
 import { Icon, Mark } from './marks';
 import { SignIn } from './sign_in';
 import { Strip } from './strip';
+import { useStable } from './use_stable';
 
 /// `#/live`, `#/plan/<id>`, `#/anchors`, `#/anchors/0x6a2f`, `#/measurements`, `#/models`, `#/models/runs/<id>?compare=<id>,<id>`, `#/replay/<mission>?t=12.5`, `#/system`.
 export const route = signal(location.hash);
@@ -54,12 +55,13 @@ function Rail({ view }: { view: View }) {
 function Later<P extends object>({ load, props }: { load: () => Promise<ComponentType<P>>; props: P }) {
   const [View, set_view] = useState<ComponentType<P> | null>(null),
     [failed, set_failed] = useState(false);
+  const begin = useStable(load);
   useEffect(() => {
-    load().then(
+    begin().then(
       (v) => set_view(() => v),
       () => set_failed(true),
     );
-  }, []);
+  }, [begin]);
   if (failed)
     return (
       <div class="empty">

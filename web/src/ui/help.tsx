@@ -38,11 +38,12 @@ const KEYS: readonly [string, string][] = [
   ['Esc', 'close'],
 ];
 export function Help() {
-  const box = useRef<HTMLElement>(null);
+  const box = useRef<HTMLElement>(null),
+    open = help_open.value;
   useEffect(() => {
-    if (help_open.value) box.current?.focus();
-  }, [help_open.value]);
-  if (!help_open.value) return null;
+    if (open) box.current?.focus();
+  }, [open]);
+  if (!open) return null;
   return (
     <section class="sheet" role="dialog" aria-labelledby="help-title" tabIndex={-1} ref={box} data-testid="help">
       <div class="hd">

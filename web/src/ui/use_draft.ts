@@ -2,7 +2,7 @@ import { useState } from 'preact/hooks';
 import { draft_of, drop_draft, keep_draft, restored } from '../state/drafts';
 
 /// A form that survives a reload: [values, change, forget]. `forget` once it was sent or thrown away.
-export function use_draft<T extends object>(
+export function useDraft<T extends object>(
   key: string,
   start: T,
 ): readonly [T, (part: Partial<T>) => void, () => void] {

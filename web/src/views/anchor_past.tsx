@@ -6,12 +6,13 @@ import { accuracy, date, fixed } from '../ui/format';
 
 export function AnchorPast({ anchor }: { anchor: string }) {
   const [list, set_list] = useState<{ readonly of: string; readonly items: readonly Past[] } | null>(null);
+  const newest = revision.value;
   useEffect(() => {
     past(anchor).then(
       (items) => set_list({ of: anchor, items }),
       () => set_list(null),
     );
-  }, [anchor, revision.value]);
+  }, [anchor, newest]);
   if (list?.of !== anchor || !list.items.length) return null;
   return (
     <section class="sec-p" data-testid="anchor-past">

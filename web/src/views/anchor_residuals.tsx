@@ -5,6 +5,7 @@ import { said } from '../api/client';
 import { by_suspicion, residuals, SECTORS, solves, weight_by_sector, type Residual } from '../api/residuals';
 import { bearing, clock, fixed, millimetres, range_m } from '../ui/format';
 import { Axes, Drawing, scale, ticks, type Frame } from './chart';
+import { useStable } from '../ui/use_stable';
 
 interface Loaded {
   readonly of: string;
@@ -15,26 +16,29 @@ interface Loaded {
 export function AnchorResiduals({ row, mission }: { row: AnchorRow; mission: string | null }) {
   const [got, set_got] = useState<Loaded | null>(null),
     key = `${row.anchor} ${row.calibration ?? mission}`;
+  const read = useStable(async (): Promise<readonly [readonly Residual[], string]> => {
+    const solve = row.calibration ?? (await solves()).find((s) => mission !== null && s.missions.includes(mission))?.id;
+    if (!solve)
+      return [
+        [],
+        'Running estimates keep no residuals: Review and publish solves the whole flight, and then they are here.',
+      ];
+    const rows = await residuals(solve, row);
+    return [rows, rows.length ? '' : 'The calibration kept none of this anchor.'];
+  });
   useEffect(() => {
     let gone = false;
     const tell = (rows: readonly Residual[], none: string): void => {
       if (!gone) set_got({ of: key, rows, none });
     };
-    (async () => {
-      const solve =
-        row.calibration ?? (await solves()).find((s) => mission !== null && s.missions.includes(mission))?.id;
-      if (!solve)
-        return tell(
-          [],
-          'Running estimates keep no residuals: Review and publish solves the whole flight, and then they are here.',
-        );
-      const rows = await residuals(solve, row);
-      tell(rows, rows.length ? '' : 'The calibration kept none of this anchor.');
-    })().catch((e: unknown) => tell([], said(e)));
+    read().then(
+      ([rows, none]) => tell(rows, none),
+      (e: unknown) => tell([], said(e)),
+    );
     return () => {
       gone = true;
     };
-  }, [key]);
+  }, [key, read]);
   if (got?.of !== key) return null;
   const used = got.rows.filter((r) => r.weight > 0).length;
   return (

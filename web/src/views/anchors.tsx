@@ -86,10 +86,9 @@ export function Anchors({ anchor }: { anchor: string | null }) {
   const search = useRef<HTMLInputElement>(null);
   const ready = all.filter((r) => r.verdict === 'ok').length;
   const query = live ? `?view=live${mission ? `&mission=${encodeURIComponent(mission.mission)}` : ''}&` : '?';
-  const version = useMemo(
-    () => ({}),
-    [live && scene?.estimates_version, source.value, filter.value, selected?.anchor, loaded.value],
-  );
+  const estimates = live ? scene?.estimates_version : loaded.value,
+    marked = selected?.anchor;
+  const version = useMemo(() => ({ live, estimates, wanted, marked }), [live, estimates, wanted, marked]);
   return (
     <div class="anchors" data-testid="anchors">
       <div class="toolbar">

@@ -4,6 +4,7 @@ import type uPlot from 'uplot';
 import { watched_scene, tick } from '../state/store';
 import { fixed } from '../ui/format';
 import { css, ground } from '../ui/theme';
+import { useStable } from '../ui/use_stable';
 
 /// The goal the design draws: 5 cm, 1 sigma, horizontal. Whether an anchor converged is the server's word.
 export const DONE_SIGMA_M = 0.05;
@@ -16,6 +17,11 @@ export function Convergence({ anchor }: { anchor: string }) {
   const theme = ground.value;
   const last = [...history].reverse().find((h) => h.sigma_h_m !== null)?.sigma_h_m ?? null;
 
+  const draw = useStable((): void => {
+    const h = watched_scene()?.history.get(anchor) ?? [],
+      t0 = h[0]?.t_us ?? 0;
+    plot.current?.setData([h.map((x) => (x.t_us - t0) / 1e6), h.map((x) => x.sigma_h_m)]);
+  });
   useEffect(() => {
     let gone = false;
     void import('./plot').then(({ make_convergence }) => {
@@ -47,13 +53,9 @@ export function Convergence({ anchor }: { anchor: string }) {
       plot.current?.destroy();
       plot.current = null;
     };
-  }, [anchor, theme]);
-  const draw = (): void => {
-    const h = watched_scene()?.history.get(anchor) ?? [],
-      t0 = h[0]?.t_us ?? 0;
-    plot.current?.setData([h.map((x) => (x.t_us - t0) / 1e6), h.map((x) => x.sigma_h_m)]);
-  };
-  useEffect(draw, [tick.value]);
+  }, [anchor, theme, draw]);
+  const now = tick.value;
+  useEffect(draw, [now, draw]);
   return (
     <figure class="conv" data-testid="convergence">
       <figcaption>

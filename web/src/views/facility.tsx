@@ -5,7 +5,8 @@ import { change_facility, facility, patch_of, type Facility, type Fields } from 
 import { draft_of } from '../state/drafts';
 import { may } from '../state/session';
 import { say } from '../state/store';
-import { use_draft } from '../ui/use_draft';
+import { useDraft } from '../ui/use_draft';
+import { useStable } from '../ui/use_stable';
 
 const FIELDS: readonly (readonly [Exclude<keyof Fields, 'external_ids'>, string, string])[] = [
   ['name', 'Name', 'Hall A north-west'],
@@ -21,18 +22,19 @@ export function FacilityPanel({ anchor, changed }: { anchor: string; changed: ()
   const [read, set_read] = useState<(Facility & { readonly anchor: string }) | null>(null),
     [problem, set_problem] = useState(''),
     [editing, set_editing] = useState('');
-  const load = (): Promise<void> =>
+  const load = useStable((): Promise<void> =>
     facility(anchor).then(
       (f) => set_read({ ...f, anchor }),
       (e: unknown) => {
         if (!(e instanceof ApiError && e.problem.status === 404)) set_problem(said(e));
       },
-    );
+    ),
+  );
   useEffect(() => {
     set_problem('');
     set_editing(draft_of(key_of(anchor)) ? anchor : '');
     void load();
-  }, [anchor]);
+  }, [anchor, load]);
   const known = read?.anchor === anchor ? read : null;
   if (!known && !problem) return null;
   return (
@@ -106,7 +108,7 @@ interface Editing {
 }
 function Form({ anchor, known, done, close, reload, failed }: Editing) {
   // Only what was typed is kept, not the fields beside it: those may be others' by the time it is sent.
-  const [{ typed }, keep, forget] = use_draft<{ typed: Partial<Fields> }>(key_of(anchor), { typed: {} }),
+  const [{ typed }, keep, forget] = useDraft<{ typed: Partial<Fields> }>(key_of(anchor), { typed: {} }),
     [busy, set_busy] = useState(false);
   const form: Fields = { ...known.fields, ...typed },
     change = (part: Partial<Fields>): void => keep({ typed: { ...typed, ...part } });

@@ -16,10 +16,17 @@ import type { MissionMsg } from '../live/messages';
 import { current_scene, revision, say } from '../state/store';
 import { accuracy, fixed } from '../ui/format';
 import { Icon, Mark, StatusChip } from '../ui/marks';
-import { use_draft } from '../ui/use_draft';
+import { useDraft } from '../ui/use_draft';
 import { gate_words, VERDICT_WORDS } from '../ui/words';
+import { useStable } from '../ui/use_stable';
 
 export const publish_open = signal(false);
+
+interface Form {
+  readonly note: string;
+  readonly reasons: Readonly<Record<string, string>>; ///< of overrides, by anchor
+  readonly left: Readonly<Record<string, string>>; ///< why an anchor that passes is left out
+}
 
 export function Publish({ mission }: { mission: MissionMsg }) {
   const [draft, set_draft] = useState<Calibration | null>(null),
@@ -27,11 +34,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
     [problem, set_problem] = useState(''),
     [busy, set_busy] = useState<'' | 'calibrating' | 'publishing'>('calibrating');
   const keys = useRef({ calibrate: idempotency_key(), publish: idempotency_key() }),
-    [form, change, forget] = use_draft(`publish/${mission.mission}`, {
-      note: '',
-      reasons: {} as Readonly<Record<string, string>>,
-      left: {} as Readonly<Record<string, string>>,
-    }),
+    [form, change, forget] = useDraft<Form>(`publish/${mission.mission}`, { note: '', reasons: {}, left: {} }),
     { note, reasons, left } = form,
     box = useRef<HTMLElement>(null);
   const guarded = async (what: 'calibrating' | 'publishing', work: () => Promise<void>): Promise<void> => {
@@ -44,16 +47,18 @@ export function Publish({ mission }: { mission: MissionMsg }) {
     }
     set_busy('');
   };
-  const solve = (): void =>
-    void guarded('calibrating', async () => {
-      const made = await calibrate(mission.mission, keys.current.calibrate);
-      set_draft(made);
-      set_moved(await moved_since_published(made.id).catch(() => new Map()));
-    });
+  const solve = useStable(
+    (): void =>
+      void guarded('calibrating', async () => {
+        const made = await calibrate(mission.mission, keys.current.calibrate);
+        set_draft(made);
+        set_moved(await moved_since_published(made.id).catch(() => new Map<string, Moved>()));
+      }),
+  );
   useEffect(() => {
     box.current?.focus();
     solve();
-  }, []);
+  }, [solve]);
   const out = Object.entries(left).filter(([id]) => draft?.rows.some((r) => r.anchor === id && passes(r))),
     good = draft?.rows.filter((r) => passes(r) && left[r.anchor] === undefined) ?? [],
     overrides = Object.entries(reasons)

@@ -6,6 +6,7 @@ import { checklist, set_item, type ChecklistItem } from '../../api/flight';
 import { plans as fetch_plans, type Plan } from '../../api/plans';
 import { Icon, Mark } from '../../ui/marks';
 import { HoldButton } from './hold_button';
+import { useStable } from '../../ui/use_stable';
 
 export const checklist_open = signal(false);
 
@@ -32,7 +33,7 @@ export function Checklist({
       (e: unknown) => set_problem(said(e)),
     );
   }, []);
-  const look = (): void => {
+  const look = useStable((): void => {
     checklist(mission, plan).then(
       (list) => {
         set_items(list);
@@ -40,12 +41,12 @@ export function Checklist({
       },
       (e: unknown) => set_problem(said(e)),
     );
-  };
+  });
   useEffect(() => {
     look();
     const timer = setInterval(look, 1000);
     return () => clearInterval(timer);
-  }, [mission, plan]);
+  }, [mission, plan, look]);
   const open = items?.filter((i) => i.state !== 'ok') ?? [];
   const set = (item: ChecklistItem, reason: string): void => {
     set_item(mission, item.id, reason).then(look, (e: unknown) => set_problem(said(e)));

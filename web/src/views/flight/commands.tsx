@@ -58,17 +58,18 @@ export function FlightBar() {
     heard = current_scene()?.procedure,
     p = heard?.value;
   const mine = lease.value !== null && lease.value.mission === mission?.mission;
+  const id = mission?.mission;
   useEffect(() => {
-    if (!mine || !mission) return;
+    if (!mine || !id) return;
     const timer = setInterval(
       () =>
         void guarded(async () => {
-          lease.value = { ...(await renew_control(mission.mission, lease.value!.key)), mission: mission.mission };
+          lease.value = { ...(await renew_control(id, lease.value!.key)), mission: id };
         }),
       RENEW_MS,
     );
     return () => clearInterval(timer);
-  }, [mine, mission?.mission]);
+  }, [mine, id]);
   const operator = may('operator'),
     idle = !p || p.status === 'ready' || p.status === 'done' || p.status === 'aborted';
   if (!mission || mission.state !== 'recording' || (!p && !(operator && live_source()?.offers('procedure'))))

@@ -7,7 +7,7 @@ import { num } from '../../live/messages';
 import { current_mission, current_scene, devices, tick } from '../../state/store';
 import { fixed, grouped } from '../../ui/format';
 import { Icon, Mark, Q } from '../../ui/marks';
-import { use_draft } from '../../ui/use_draft';
+import { useDraft } from '../../ui/use_draft';
 import { lines_of, missing, NEW_PLACE, setting_of, spread, truth_query, typed_number, type Place } from './take';
 
 const LOOK_MS = 400,
@@ -38,7 +38,7 @@ export function CampaignMode({
   // Without a position of the tag ranges are worked off late; that an anchor talks is known at once.
   const talking = devices.value.filter((d) => d.kind === 'anchor' && d.state === 'live').map((d) => d.network_id),
     heard = [...new Set([...(scene?.ranges.keys() ?? []), ...(scene?.anchors.keys() ?? []), ...talking])].sort();
-  const [place, change] = use_draft<Place>('campaign', NEW_PLACE),
+  const [place, change] = useDraft<Place>('campaign', NEW_PLACE),
     [take, set_take] = useState<Take | null>(null),
     [done, set_done] = useState(''),
     [problem, set_problem] = useState(''),

@@ -15,6 +15,7 @@ import { may } from '../../state/session';
 import { say } from '../../state/store';
 import { grouped } from '../../ui/format';
 import { Icon } from '../../ui/marks';
+import { useStable } from '../../ui/use_stable';
 
 export function ExcludePanel({
   mission,
@@ -38,11 +39,12 @@ export function ExcludePanel({
   const read = (): void => {
     exclusions_of(mission).then(set_list, (e: unknown) => set_problem(said(e)));
   };
-  useEffect(() => {
+  const begin = useStable((): void => {
     set_list(null);
     set_picked(sample ? [sample.id] : []);
     read();
-  }, [mission]);
+  });
+  useEffect(begin, [mission, begin]);
   const what = selection_of(kind, kind === 'ranges' && by_rows ? picked : null, filter),
     able = may('operator', 'op', 'engineer');
   const act = async (work: () => Promise<unknown>, words: string): Promise<void> => {

@@ -8,6 +8,7 @@ import { feature_words } from '../models/words';
 import { percentile } from './choice';
 import { marks_of, ordered, unit_of } from './response';
 import { KEPT_MAX, ResponsePlot, type Kept } from './response_plot';
+import { useStable } from '../../ui/use_stable';
 
 export function ImpulsePanel({
   source,
@@ -27,13 +28,15 @@ export function ImpulsePanel({
   const [loaded, set_loaded] = useState<{ id: number; response: Impulse | null } | null>(null),
     [problem, set_problem] = useState(''),
     [kept, set_kept] = useState<readonly Kept[]>([]);
+  const ask = useStable((id: number) => impulse(source, id)),
+    { id, has_cir } = sample;
   useEffect(() => {
     let gone = false;
     set_problem('');
-    if (sample.has_cir)
-      impulse(source, sample.id).then(
+    if (has_cir)
+      ask(id).then(
         (response) => {
-          if (!gone) set_loaded({ id: sample.id, response });
+          if (!gone) set_loaded({ id, response });
         },
         (e: unknown) => {
           if (!gone) set_problem(said(e));
@@ -42,7 +45,7 @@ export function ImpulsePanel({
     return () => {
       gone = true;
     };
-  }, [source.id, sample.id]);
+  }, [source.id, id, has_cir, ask]);
   const box = useRef<HTMLElement>(null);
   useEffect(() => set_kept([]), [source.id]);
   // Chosen far down in the list, it would open out of sight.
@@ -169,7 +172,7 @@ function Features({ sample, all, response }: { sample: Sample; all: readonly Sam
         {names.map((n) => (
           <tr key={n} data-testid={`feature-${n}`}>
             <th scope="row">
-              {KEYS[n] && response && <Key cls={KEYS[n]!} />}
+              {KEYS[n] && response && <Key cls={KEYS[n]} />}
               {feature_words(n)}
             </th>
             <td class="num">

@@ -27,6 +27,7 @@ import { ImpulsePanel } from './impulse';
 import { HistogramPanel, LevelPanel, TruthPanel } from './plots';
 import { RowList } from './row_list';
 import { arrived, at_end, index_of, known, lacking, nothing, PAGE_ROWS, row, type Rows } from './window';
+import { useStable } from '../../ui/use_stable';
 
 /// What is asked: another source or filter is another question, and late answers to the last one are dropped.
 interface Asked {
@@ -89,7 +90,7 @@ export function Measurements() {
       .then((p) => put((a) => ({ rows: arrived(a.rows, page, p.samples, p.next) })), failed)
       .finally(() => busy.current.delete(name));
   };
-  useEffect(() => {
+  const begin = useStable((): void => {
     if (!source) return;
     set_problem('');
     load(0, null);
@@ -132,21 +133,22 @@ export function Measurements() {
         failed(e);
       }
     })();
-  }, [key]);
+  });
+  useEffect(begin, [key, begin]);
   useEffect(() => set_sample(null), [of]);
   const drawn = current?.drawn ?? [],
     rows = current?.rows ?? nothing<Sample>(),
     n_known = known(rows),
     selected = sample?.id ?? null,
     at = useMemo(() => (selected === null ? -1 : index_of(rows, (s) => s.id === selected)), [rows, selected]);
-  const look = (first: number, last: number): void => {
+  const look = useStable((first: number, last: number): void => {
     const page = current && current.rows.sizes.length ? lacking(current.rows, first, last) : null;
     if (page !== null) load(page, current!.rows.cursors[page] ?? null);
-  };
+  });
   // Pages of a rare class may be empty for long: then there is no list yet whose end could ask for the next.
   useEffect(() => {
     if (n_known === 0 && !at_end(rows)) look(0, 0);
-  }, [rows]);
+  }, [rows, n_known, look]);
   /// Chosen by a press, not stepped to: the panel comes into sight.
   const open = (s: Sample): void => {
     set_sample(s);

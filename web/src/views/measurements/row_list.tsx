@@ -32,7 +32,7 @@ export function RowList({ source, rows, selected, at, oldest_first, select, look
     watch.observe(box.current!);
     return () => watch.disconnect();
   }, []);
-  useEffect(() => look(first, Math.max(last, first + 2 * AROUND)), [first, last, rows]);
+  useEffect(() => look(first, Math.max(last, first + 2 * AROUND)), [first, last, rows, look]);
   // Stepped to by keys, the chosen row stays in sight.
   useEffect(() => {
     const b = box.current;

@@ -176,8 +176,8 @@ export function ThresholdPanel({ roc, los, nlos }: { roc: Roc; los: number; nlos
       </dl>
       {interval && (
         <p class="sub">
-          At the chosen {fixed(roc.threshold, 2)} the FPR lies within {fixed(roc.fpr_low95! * 100, 1)} to{' '}
-          {fixed(roc.fpr_high95! * 100, 1)} % (95 %, {roc.places ?? 'few'} places with NLOS).
+          At the chosen {fixed(roc.threshold, 2)} the FPR lies within {fixed(roc.fpr_low95 * 100, 1)} to{' '}
+          {fixed(roc.fpr_high95 * 100, 1)} % (95 %, {roc.places ?? 'few'} places with NLOS).
         </p>
       )}
     </section>

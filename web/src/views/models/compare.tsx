@@ -97,13 +97,14 @@ const MEASURES: Record<'class' | 'bias', readonly Measure[]> = {
 export function Compare({ task, runs, close }: { task: Task; runs: readonly string[]; close: () => void }) {
   const [sides, set_sides] = useState<readonly Side[] | null>(null),
     [problem, set_problem] = useState('');
+  const wanted = runs.join();
   useEffect(() => {
     let gone = false;
     const one = async (id: string): Promise<Side | null> => {
       const run = await run_page(id);
       return run && { run, numbers: await run_numbers(run) };
     };
-    Promise.all(runs.map(one)).then(
+    Promise.all((wanted ? wanted.split(',') : []).map(one)).then(
       (all) => {
         if (!gone) {
           set_sides(all.filter((s): s is Side => s !== null));
@@ -117,7 +118,7 @@ export function Compare({ task, runs, close }: { task: Task; runs: readonly stri
     return () => {
       gone = true;
     };
-  }, [runs.join()]);
+  }, [wanted]);
   return (
     <section class="cell-p wide" data-testid="compare">
       <div class="hd">

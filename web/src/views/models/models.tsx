@@ -64,7 +64,9 @@ export function Models({ path }: { path: string | null }) {
         () => undefined,
       );
   }, [wanted]);
-  const of = task.value;
+  const of = task.value,
+    finished = jobs_version.value,
+    linked = link.value === 'live';
   useEffect(() => {
     let gone = false;
     Promise.all([fetch_runs(of), fetch_models(of)]).then(
@@ -81,7 +83,7 @@ export function Models({ path }: { path: string | null }) {
     return () => {
       gone = true;
     };
-  }, [of, again, jobs_version.value, link.value === 'live']);
+  }, [of, again, finished, linked]);
   const runs = all?.task === of ? all.runs : [],
     models = all?.task === of ? all.models : [];
   const active = models.find((m) => m.active),
@@ -91,13 +93,14 @@ export function Models({ path }: { path: string | null }) {
       runs.find((r) => r.state === 'succeeded') ??
       runs[0] ??
       null;
+  const shown_id = chosen?.id;
   useEffect(() => {
     let gone = false;
-    if (!chosen) {
+    if (!shown_id) {
       set_page(null);
       return;
     }
-    void run_page(chosen.id)
+    void run_page(shown_id)
       .then(async (run) => {
         if (run) {
           const numbers = await run_numbers(run);
@@ -110,7 +113,7 @@ export function Models({ path }: { path: string | null }) {
     return () => {
       gone = true;
     };
-  }, [chosen?.id, chosen?.state, chosen?.fraction]);
+  }, [shown_id, chosen?.state, chosen?.fraction]);
   const address = (run: string, ids: readonly string[] = compared): string =>
     `#/models/runs/${run}${ids.length ? `?compare=${ids.join()}` : ''}`;
   const compare = (id: string): void => {

@@ -51,7 +51,7 @@ export function Rules() {
       gone = true;
     };
   }, [chosen]);
-  const rate = (r: Rates | null, of: 'los' | 'nlos') => <Q v={fixed(r?.[of] == null ? null : r[of]! * 100, 1)} u="%" />;
+  const rate = (r: Rates | null, of: 'los' | 'nlos') => <Q v={fixed(r?.[of] == null ? null : r[of] * 100, 1)} u="%" />;
   return (
     <section class="cell-p wide" data-testid="rules">
       <div class="hd">

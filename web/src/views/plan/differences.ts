@@ -69,7 +69,7 @@ export function differences(mine: Plan, theirs: Plan): Difference[] {
     if (!same(a, b))
       out.push({ name: `No-fly ${i + 1}`, mine: corners_words(a, b)[0], theirs: corners_words(a, b)[1] });
   }
-  const word = (v: unknown): string =>
+  const word = (v: Settings[keyof Settings]): string =>
     v === null ? 'none' : typeof v === 'number' ? String(Number(v.toFixed(3))) : String(v);
   const keys = [...new Set([...Object.keys(mine.settings), ...Object.keys(theirs.settings)])] as (keyof Settings)[];
   for (const key of keys.sort())

@@ -42,7 +42,7 @@ export function Expected({
 }) {
   const [text, set_text] = useState(''),
     address = typed_address(text),
-    places = origin ? new Map(placed(plan, known, origin).map((p) => [p.id, p])) : new Map(),
+    places = new Map(origin ? placed(plan, known, origin).map((p) => [p.id, p]) : []),
     offered = [...known.keys()].filter((id) => !plan.expected.includes(id)).sort();
   const points = origin ? plan.waypoints.filter((w) => w.measure).map((w) => to_m(w, origin)) : [];
   const reach = (id: string): string => {

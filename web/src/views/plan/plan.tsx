@@ -43,6 +43,7 @@ import { PlanMap } from './plan_map';
 import { Corners, SettingFields, Waypoints } from './points';
 import { cells, PredictedPanel, type Shown } from './predicted_panel';
 import { WayTools } from './way_tools';
+import { useStable } from '../../ui/use_stable';
 
 const JUDGED_AFTER_MS = 500; ///< of no change: a drag is not judged at every step
 
@@ -97,7 +98,7 @@ export function Plan({ id }: { id: string | null }) {
     }
     set_busy('');
   };
-  useEffect(() => {
+  const begin = useStable((): void => {
     document.title = 'Plan - anchord';
     fetch_plans().then(
       (list) => {
@@ -111,7 +112,8 @@ export function Plan({ id }: { id: string | null }) {
       },
       (e: unknown) => set_problem(said(e)),
     );
-  }, [id]);
+  });
+  useEffect(begin, [id, begin]);
   useEffect(() => {
     published().then(
       ({ rows }) => set_known(new Map(rows.map((r) => [r.anchor, r]))),
@@ -121,19 +123,15 @@ export function Plan({ id }: { id: string | null }) {
   // Judged while it is drawn; whoever may only look sees what is saved judged. The last judgement stays, grey, until the next comes.
   const drawn = JSON.stringify({ ...plan, name: '', revision: 0, id: null }),
     check = judged?.check ?? null;
+  const judge = useStable((): Promise<Check> | null => {
+    if (!dirty) return saved.id ? fetch_check(saved.id) : null;
+    return engineer && (plan.waypoints.length > 0 || plan.outline.length > 2) ? check_drawn(plan) : null;
+  });
   useEffect(() => {
-    const judge = dirty
-      ? engineer && (plan.waypoints.length > 0 || plan.outline.length > 2)
-        ? () => check_drawn(plan)
-        : null
-      : saved.id
-        ? () => fetch_check(saved.id!)
-        : null;
-    if (!judge) return;
     let gone = false;
     const timer = setTimeout(
       () =>
-        judge().then(
+        void judge()?.then(
           (c) => {
             if (!gone) set_judged({ of: drawn, check: c });
           },
@@ -145,13 +143,14 @@ export function Plan({ id }: { id: string | null }) {
       gone = true;
       clearTimeout(timer);
     };
-  }, [drawn, dirty, saved.id]);
+  }, [drawn, dirty, saved.id, judge]);
   // With the change itself, not after the next picture: the page may be gone by then.
+  const listed = all !== null;
   useLayoutEffect(() => {
-    if (all === null) return;
+    if (!listed) return;
     if (dirty) keep_draft(draft_key(plan.id), plan);
     else drop_draft(draft_key(plan.id));
-  }, [plan, saved, all === null]);
+  }, [plan, saved, dirty, listed]);
   const change = (p: PlanDoc): void => set_history(changed(history, p));
   const keep = (): void =>
     void guarded('save', async () => {

@@ -11,6 +11,7 @@ import { clock, fixed } from '../../ui/format';
 import { Chip } from '../../ui/marks';
 import { AnchorCard } from '../anchor_card';
 import { RangeList } from '../range_list';
+import { useStable } from '../../ui/use_stable';
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16] as const;
 
@@ -23,7 +24,10 @@ export function Replay({ id }: { id: string | null }) {
     [, redraw] = useState(0);
   const wanted = (id ?? '').split('?')[0] || mission_id.value,
     mission = ordered_missions.value.find((m) => m.mission === wanted) ?? null;
-  useEffect(() => {
+  const show = useStable((p: Player): void => {
+    replayed.value = { scene: p.scene, mission: { ...p.recording.mission, state: 'recording' } };
+  });
+  const begin = useStable((): (() => void) | undefined => {
     document.title = 'Replay - anchord';
     if (!mission) return;
     let gone = false;
@@ -49,18 +53,16 @@ export function Replay({ id }: { id: string | null }) {
       gone = true;
       replayed.value = null;
     };
-  }, [mission?.mission]);
-  const show = (p: Player): void => {
-    replayed.value = { scene: p.scene, mission: { ...p.recording.mission, state: 'recording' } };
-  };
-  const go = (t_us: number): void => {
+  });
+  useEffect(begin, [mission?.mission, begin]);
+  const go = useStable((t_us: number): void => {
     if (player) {
       player.to(t_us, now_ms());
       show(player);
       tick.value++;
       redraw((n) => n + 1);
     }
-  };
+  });
   const latest = useRef({ player, speed, go });
   latest.current = { player, speed, go };
   useEffect(() => {
@@ -126,7 +128,7 @@ export function Replay({ id }: { id: string | null }) {
     };
     addEventListener('keydown', on_key);
     return () => removeEventListener('keydown', on_key);
-  }, [player]);
+  }, [player, go]);
   if (!mission)
     return (
       <div class="empty">
@@ -206,7 +208,7 @@ export function Replay({ id }: { id: string | null }) {
             : '–'}
         </span>
         <div class="scrub">
-          {r && <FixBand player={player!} />}
+          {r && <FixBand player={player} />}
           <input
             type="range"
             min="0"

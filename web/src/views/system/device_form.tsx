@@ -3,7 +3,7 @@ import { useState } from 'preact/hooks';
 import { said } from '../../api/client';
 import { add_device, device_at, edit_device, type Device, type Found } from '../../api/devices';
 import { say } from '../../state/store';
-import { use_draft } from '../../ui/use_draft';
+import { useDraft } from '../../ui/use_draft';
 import { BAUDS, config_of, EMPTY, KINDS, LINKS, missing, patch_of, setup_of, type Setup } from './device_setup';
 
 type Change = (part: Partial<Setup>) => void;
@@ -22,7 +22,7 @@ export function DeviceForm({
   close: () => void;
   done: () => void;
 }) {
-  const [s, change, forget] = use_draft<Setup>(
+  const [s, change, forget] = useDraft<Setup>(
     `device/${device?.id ?? start?.path ?? 'new'}`,
     device ? setup_of(device) : { ...EMPTY, ...start },
   );

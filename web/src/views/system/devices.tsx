@@ -42,7 +42,7 @@ export interface Row {
 export type Run = (what: string, work: () => Promise<unknown>, done: string) => Promise<void>;
 
 /// Keeps the last looks at every device: what it dropped lately says more than what it dropped since it was plugged in.
-function use_devices(): {
+function useDevices(): {
   readonly all: readonly Device[] | null;
   readonly rows: readonly Row[];
   readonly problem: string;
@@ -92,7 +92,7 @@ function use_devices(): {
 }
 
 export function DevicesPanel() {
-  const { all, rows, problem, load } = use_devices(),
+  const { all, rows, problem, load } = useDevices(),
     [failed, set_failed] = useState(''),
     [found, set_found] = useState<readonly Found[] | null>(null),
     [busy, set_busy] = useState('');

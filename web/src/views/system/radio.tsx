@@ -5,6 +5,7 @@ import { compare_radio, read_radio, set_radio, type Device, type Radio } from '.
 import { mission_list } from '../../state/store';
 import { Mark } from '../../ui/marks';
 import { radio_differences } from './radio_words';
+import { useStable } from '../../ui/use_stable';
 
 const CHOICES: readonly (readonly [Exclude<keyof Radio, 'gain_db' | 'devices'>, string, string, readonly number[]])[] =
   [
@@ -51,11 +52,12 @@ export function RadioPanel({
   };
   // Asking the anchors stops ranging for some seconds: by itself only while nothing is recorded.
   const look = (): Promise<Radio | null> => work('look', () => compare_radio(device.id!));
-  useEffect(() => {
+  const begin = useStable((): void => {
     void work('read', () => read_radio(device.id!)).then((r) => {
       if (r && may_change && !flying) void look();
     });
-  }, [device.id]);
+  });
+  useEffect(begin, [device.id, begin]);
   const apply = async (wanted: Radio): Promise<void> => {
     const answer = await work('set', () => set_radio(device.id!, wanted));
     if (answer) set_done(answer);

@@ -1,0 +1,49 @@
+// ESLint of the dashboard and of the JavaScript of tests/. Rules that find bugs; layout is Prettier's (.prettierrc.json).
+//   node web/node_modules/eslint/bin/eslint.js --config web/eslint.config.js web tests     (from the project's root)
+import { fileURLToPath } from 'node:url';
+import js from '@eslint/js';
+import hooks from 'eslint-plugin-react-hooks';
+import globals from 'globals';
+import typescript from 'typescript-eslint';
+
+const unused = { args: 'after-used', argsIgnorePattern: '^_', varsIgnorePattern: '^_', caughtErrors: 'none' };
+
+export default typescript.config(
+  { ignores: ['**/node_modules/', '**/generated/', '**/dist/', 'build/'] },
+  { linterOptions: { reportUnusedDisableDirectives: 'error', reportUnusedInlineConfigs: 'error' } },
+  js.configs.recommended,
+  {
+    rules: {
+      eqeqeq: ['error', 'always', { null: 'ignore' }], // x == null asks for null and undefined at once
+      'no-unused-vars': ['error', unused],
+      'no-sequences': ['error', { allowInParentheses: false }],
+      'no-constant-binary-expression': 'error',
+      'no-self-compare': 'error',
+      'no-template-curly-in-string': 'error',
+      'array-callback-return': 'error',
+    },
+  },
+  { files: ['**/*.mjs', '**/*.js', '**/vite*.config.ts'], languageOptions: { globals: globals.node } },
+  // Functions of these run in the page.
+  { files: ['**/e2e/*.mjs'], languageOptions: { globals: globals.browser } },
+  {
+    files: ['**/*.ts', '**/*.tsx'],
+    extends: [typescript.configs.recommendedTypeCheckedOnly],
+    plugins: { 'react-hooks': hooks },
+    languageOptions: {
+      globals: globals.browser,
+      parserOptions: { project: './tsconfig.json', tsconfigRootDir: fileURLToPath(new URL('.', import.meta.url)) },
+    },
+    rules: {
+      'no-undef': 'off', // the compiler's
+      'no-unused-vars': 'off',
+      '@typescript-eslint/no-unused-vars': ['error', unused],
+      '@typescript-eslint/no-floating-promises': 'error',
+      '@typescript-eslint/no-misused-promises': 'error',
+      '@typescript-eslint/switch-exhaustiveness-check': 'error',
+      // The hooks of Preact have React's names and React's rules.
+      'react-hooks/rules-of-hooks': 'error',
+      'react-hooks/exhaustive-deps': 'error',
+    },
+  },
+);
