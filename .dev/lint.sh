@@ -1,13 +1,25 @@
-# Only looks. Layout, bug patterns, headers that stand alone, the two contracts.
+# Only looks. Layout, bug patterns, headers that stand alone, the two contracts, and the JavaScript of web/ and tests/.
 
 own_sources() {
   git rev-parse --is-inside-work-tree >/dev/null 2>&1 || die "lint and fmt read the list of files from git: no git here, or no repository"
   git ls-files --cached --others --exclude-standard -- '*.cpp' '*.hpp'
 }
 
+# What Prettier keeps and ESLint reads; tests/lint/CMakeLists.txt runs the same.
+own_scripts=('web/**/*.{ts,tsx,mjs,js,css,html}' 'tests/**/*.mjs')
+prettier() { node web/node_modules/prettier/bin/prettier.cjs --log-level warn "$1" "${own_scripts[@]}"; }
+
+# The linters of the dashboard are among its packages.
+ensure_web_packages() {
+  node web/scripts/install.mjs npm || die "npm ci in web/ failed: see its own message above (is the npm registry reachable?)"
+}
+
 cmd_fmt() {
   install_packages lint
+  ensure_node
+  ensure_web_packages
   own_sources | tr '\n' '\0' | xargs -0 -r clang-format -i
+  prettier --write
   say "formatted"
 }
 
@@ -29,16 +41,23 @@ tidy() {
   return $failed
 }
 
-# cmd_lint [layout|bugs|headers|contracts ...]: all four without arguments.
+# cmd_lint [layout|bugs|headers|contracts|scripts ...]: all of them without arguments.
 cmd_lint() {
   install_packages lint
   ensure_node
   local -a parts=("$@") ; local part ; local wrong=()
-  ((${#parts[@]})) || parts=(layout contracts headers bugs)
+  ((${#parts[@]})) || parts=(layout contracts scripts headers bugs)
   for part in "${parts[@]}"; do
     say "lint: $part"
     case $part in
-      layout) own_sources | tr '\n' '\0' | xargs -0 -r clang-format --dry-run --Werror || wrong+=(layout) ;;
+      layout)
+        own_sources | tr '\n' '\0' | xargs -0 -r clang-format --dry-run --Werror || wrong+=(layout)
+        ensure_web_packages
+        prettier --check || wrong+=(prettier) ;;
+      scripts)
+        ensure_web_packages
+        node web/scripts/contract.mjs
+        node web/node_modules/eslint/bin/eslint.js --config web/eslint.config.js web tests || wrong+=(eslint) ;;
       contracts)
         ensure_test_packages
         node tests/node_modules/@redocly/cli/bin/cli.js lint --config tests/lint/redocly.yaml api/openapi.yaml || wrong+=(openapi)
@@ -47,7 +66,7 @@ cmd_lint() {
       bugs)
         configure_preset release >/dev/null
         tidy || wrong+=(bugs) ;;
-      *) die "lint knows layout, contracts, headers, bugs; not '$part'" ;;
+      *) die "lint knows layout, contracts, scripts, headers, bugs; not '$part'" ;;
     esac
   done
   ((${#wrong[@]} == 0)) || die "lint found something in: ${wrong[*]} (./dev fmt repairs layout)"
