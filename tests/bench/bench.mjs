@@ -139,7 +139,10 @@ function ndjson(count, mission, cir) {
   let body = '';
   for (let i = 0; i < count; i++) {
     const seq = sequence++;
-    body += `{"t_us":${1777889472000000 + seq * 100},"tag":"0x6e01","anchor":"0x6a2${seq % 6}","distance_m":${(5 + (seq % 1000) / 100).toFixed(3)},"rss_dbm":-84.3,"fp_dbm":-86.1,"rx_dbm":-82.7,"seq":${seq},"mission":"${mission}"${cir}}\n`;
+    body +=
+      `{"t_us":${1777889472000000 + seq * 100},"tag":"0x6e01","anchor":"0x6a2${seq % 6}",` +
+      `"distance_m":${(5 + (seq % 1000) / 100).toFixed(3)},"rss_dbm":-84.3,"fp_dbm":-86.1,"rx_dbm":-82.7,` +
+      `"seq":${seq},"mission":"${mission}"${cir}}\n`;
   }
   return body;
 }
@@ -197,7 +200,9 @@ function sqliteAlone(count) {
   const folder = mkdtempSync(join(tmpdir(), 'anchord-bench-'));
   try {
     let sql =
-      'PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; CREATE TABLE r(id INTEGER PRIMARY KEY, t INTEGER, tag INTEGER, anchor INTEGER, seq INTEGER, d REAL, rss REAL, fp REAL, rx REAL, UNIQUE(t, tag, anchor, seq)) STRICT;\n';
+      'PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; CREATE TABLE r(id INTEGER PRIMARY KEY, t INTEGER, tag ' +
+      'INTEGER, anchor INTEGER, seq INTEGER, d REAL, rss REAL, fp REAL, rx REAL, UNIQUE(t, tag, anchor, seq)) ' +
+      'STRICT;\n';
     for (let i = 0; i < count; i++) {
       if (i % 1000 === 0) sql += 'BEGIN;\n';
       sql += `INSERT INTO r(t,tag,anchor,seq,d,rss,fp,rx) VALUES(${1777889472000000 + i * 100},28161,${27168 + (i % 6)},${i},7.5,-84.3,-86.1,-82.7);\n`;

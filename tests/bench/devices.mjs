@@ -222,8 +222,12 @@ async function recorded_bytes(row, name, tags, options, seconds) {
       r.refused + r.known === 0 && r.stored >= recorded.ranges && r.untold === 0 && r.gaps === 0 && r.left === 0;
     row(
       name,
-      `${r.perSecond.toFixed(0)} ranges/s, server ${percent(r.server)}, decoder ${percent(r.decoder)} (both at 1 000/s: ${percent(((r.server + r.decoder) * 1000) / r.perSecond)}); ${recorded.ranges} recorded, ${r.stored} stored, ${r.untold} of them not on the stream, ${r.refused} refused, ${r.gaps} gaps, ${r.left} left the live path`,
-      `aim 1 000 ranges/s on 2 cores without a drop${whole ? '' : ': MISSED'}; ${megabytes.toFixed(0)} MB recorded at ${recorded.perSecond.toFixed(0)} ranges/s`,
+      `${r.perSecond.toFixed(0)} ranges/s, server ${percent(r.server)}, decoder ${percent(r.decoder)} (both at 1 ` +
+        `000/s: ${percent(((r.server + r.decoder) * 1000) / r.perSecond)}); ${recorded.ranges} recorded, ${r.stored} ` +
+        `stored, ${r.untold} of them not on the stream, ${r.refused} refused, ${r.gaps} gaps, ${r.left} left the ` +
+        'live path',
+      `aim 1 000 ranges/s on 2 cores without a drop${whole ? '' : ': MISSED'}; ${megabytes.toFixed(0)} MB recorded ` +
+        `at ${recorded.perSecond.toFixed(0)} ranges/s`,
     );
   } finally {
     await recorded.server.dispose();

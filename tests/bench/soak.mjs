@@ -201,8 +201,12 @@ export async function soak(minutes, print = console.log) {
           lately = between(minute - 1, minute);
         const streamed = streams.reduce((sum, s) => sum + s.received, 0) / 2 ** 20;
         print(
-          `${String(minute).padStart(6)}   ${String(so.acknowledged).padStart(17)}   ${median(lately).toFixed(1).padStart(15)}, ${most(lately).toFixed(1)}   ${String(now.descriptors).padStart(17)}  ${String(now.threads).padStart(7)}   ` +
-            `${(((used - cpu) / 60) * 100).toFixed(0).padStart(5)}   ${percentile(so.late, 0.5).toFixed(1)}, ${percentile(so.late, 0.99).toFixed(1)}   ${streamed.toFixed(0).padStart(20)}   ${(statSync(join(server.dataDir, 'anchord.db')).size / 2 ** 20).toFixed(1).padStart(12)}`,
+          `${String(minute).padStart(6)}   ${String(so.acknowledged).padStart(17)}   ` +
+            `${median(lately).toFixed(1).padStart(15)}, ${most(lately).toFixed(1)}   ` +
+            `${String(now.descriptors).padStart(17)}  ${String(now.threads).padStart(7)}   ` +
+            `${(((used - cpu) / 60) * 100).toFixed(0).padStart(5)}   ${percentile(so.late, 0.5).toFixed(1)}, ` +
+            `${percentile(so.late, 0.99).toFixed(1)}   ${streamed.toFixed(0).padStart(20)}   ` +
+            `${(statSync(join(server.dataDir, 'anchord.db')).size / 2 ** 20).toFixed(1).padStart(12)}`,
         );
         if (Math.max(...so.late) > k_stalled_ms) ++stalled;
         cpu = used;
@@ -226,7 +230,10 @@ export async function soak(minutes, print = console.log) {
     if (counts.failed > 0) wrong.push(`${counts.failed} rows were not acknowledged`);
     if (closed > 0) wrong.push(`${closed} of ${k_streams} streams were closed`);
     print(
-      `RSS, middle third ${median(middle).toFixed(1)} (at most ${most(middle).toFixed(1)}), last third ${median(last).toFixed(1)} (at most ${most(last).toFixed(1)}) MiB, limit +${k_flat_mib}; ${counts.acknowledged} rows acknowledged, ${gaps} gaps in ${k_streams} streams: ${wrong.length ? 'NOT FLAT' : 'flat'}`,
+      `RSS, middle third ${median(middle).toFixed(1)} (at most ${most(middle).toFixed(1)}), last third ` +
+        `${median(last).toFixed(1)} (at most ${most(last).toFixed(1)}) MiB, limit +${k_flat_mib}; ` +
+        `${counts.acknowledged} rows acknowledged, ${gaps} gaps in ${k_streams} streams: ` +
+        `${wrong.length ? 'NOT FLAT' : 'flat'}`,
     );
     for (const line of wrong) print(`    ${line}`);
     if (stalled > 0)

@@ -1,4 +1,5 @@
-// A flight through the real server and the simulated aircraft, MAVLink over TCP between them (ArduPilot's own simulator serves TCP too), measurements over REST: start, the
+// A flight through the real server and the simulated aircraft, MAVLink over TCP between them (ArduPilot's own
+// simulator serves TCP too), measurements over REST: start, the
 // server killed in the air and started again (hold first), resume, land.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';

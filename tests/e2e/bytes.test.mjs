@@ -315,7 +315,8 @@ test('a WebSocket text that is no UTF-8 ends that socket alone, every odd one is
   const key = randomBytes(16).toString('base64');
   const socket = connect(server.port, '127.0.0.1');
   socket.write(
-    `GET /api/v1/ws HTTP/1.1\r\nHost: 127.0.0.1:${server.port}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Protocol: anchord.v1\r\nSec-WebSocket-Key: ${key}\r\n\r\n`,
+    `GET /api/v1/ws HTTP/1.1\r\nHost: 127.0.0.1:${server.port}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n` +
+      `Sec-WebSocket-Version: 13\r\nSec-WebSocket-Protocol: anchord.v1\r\nSec-WebSocket-Key: ${key}\r\n\r\n`,
   );
   let got = Buffer.alloc(0);
   socket.on('data', (chunk) => (got = Buffer.concat([got, chunk]))).on('error', () => {});

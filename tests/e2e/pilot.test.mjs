@@ -122,7 +122,8 @@ test('a plan drawn in a map program is imported, and a wrong one is refused', as
     .getByLabel('Plan file')
     .setInputFiles(
       kml(
-        '<Polygon><outerBoundaryIs><LinearRing><coordinates>3.7131,51.0231 3.7135275,51.0231 3.7135275,51.0232799 3.7131,51.0231</coordinates></LinearRing></outerBoundaryIs></Polygon>',
+        '<Polygon><outerBoundaryIs><LinearRing><coordinates>3.7131,51.0231 3.7135275,51.0231 3.7135275,51.0232799 ' +
+          '3.7131,51.0231</coordinates></LinearRing></outerBoundaryIs></Polygon>',
       ),
     );
   await eventually('the outline is there', async () => id('generate').isEnabled());

@@ -123,7 +123,10 @@ class Torture {
   }
 
   summary([a, b, c, deleter, publisher, promoter, installer]) {
-    return `${a.count + b.count + c.count} rows, ${deleter.count} deletions, ${publisher.count} publications, ${promoter.count} promotions, ${installer.count} devices acknowledged`;
+    return (
+      `${a.count + b.count + c.count} rows, ${deleter.count} deletions, ${publisher.count} publications, ` +
+      `${promoter.count} promotions, ${installer.count} devices acknowledged`
+    );
   }
 
   /** A database of an older version; its first start with today's program is ended, the second must find one version or the other. */
@@ -143,7 +146,8 @@ class Torture {
     });
     const counted = () =>
       sql(
-        'SELECT (SELECT count(*) FROM mission) AS missions, (SELECT count(*) FROM uwb_range) AS ranges, (SELECT count(*) FROM fix) AS fixes, (SELECT count(*) FROM anchor) AS anchors',
+        'SELECT (SELECT count(*) FROM mission) AS missions, (SELECT count(*) FROM uwb_range) AS ranges, (SELECT ' +
+          'count(*) FROM fix) AS fixes, (SELECT count(*) FROM anchor) AS anchors',
       );
     const before = counted();
     await this.interrupted(disk, cut, 120);
@@ -218,7 +222,10 @@ export async function torture({
     const sorted = run.restarts.sort((a, b) => a - b),
       { migrations, firstStarts } = run.counts;
     print(
-      `==> ${run.counts.kills} kills, ${run.counts.cuts} power cuts, ${migrations} interrupted migrations, ${firstStarts} interrupted first starts (seed ${seed}); restart to ready: median ${(sorted[sorted.length >> 1] / 1000).toFixed(2)} s, worst ${(sorted.at(-1) / 1000).toFixed(2)} s; ${((performance.now() - began) / 1000).toFixed(0)} s`,
+      `==> ${run.counts.kills} kills, ${run.counts.cuts} power cuts, ${migrations} interrupted migrations, ` +
+        `${firstStarts} interrupted first starts (seed ${seed}); restart to ready: median ` +
+        `${(sorted[sorted.length >> 1] / 1000).toFixed(2)} s, worst ${(sorted.at(-1) / 1000).toFixed(2)} s; ` +
+        `${((performance.now() - began) / 1000).toFixed(0)} s`,
     );
     return true;
   } catch (error) {

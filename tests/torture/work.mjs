@@ -89,7 +89,8 @@ export class Gateway {
   }
   check(sql) {
     const [row] = sql(
-      `SELECT count(*) AS n, count(DISTINCT seq) AS different, coalesce(max(seq), -1) AS newest FROM uwb_range WHERE mission_key = (SELECT mission_key FROM mission WHERE id = ${blob(this.mission)})`,
+      'SELECT count(*) AS n, count(DISTINCT seq) AS different, coalesce(max(seq), -1) AS newest FROM uwb_range ' +
+        `WHERE mission_key = (SELECT mission_key FROM mission WHERE id = ${blob(this.mission)})`,
     );
     const promised = this.acknowledged * k_batch_rows;
     assert.ok(row.n >= promised, `tag ${this.tag}: ${promised} rows acknowledged, ${row.n} there`);
@@ -240,7 +241,9 @@ export class Publisher {
   }
   check(sql) {
     const revisions = sql(
-      `SELECT r.number AS number, lower(hex(c.id)) AS calibration, (SELECT count(*) FROM revision_position p WHERE p.number = r.number AND p.since_number = r.number) AS positions FROM revision r JOIN calibration c USING (calibration_key) ORDER BY r.number`,
+      'SELECT r.number AS number, lower(hex(c.id)) AS calibration, (SELECT count(*) FROM revision_position p WHERE ' +
+        'p.number = r.number AND p.since_number = r.number) AS positions FROM revision r JOIN calibration c USING ' +
+        '(calibration_key) ORDER BY r.number',
     );
     for (const { id, revision } of this.published) {
       const found = revisions.filter((r) => r.calibration === id.replaceAll('-', ''));

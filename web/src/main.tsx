@@ -11,7 +11,8 @@ import './ui/theme';
 import './style/tokens.css';
 import './style/base.css';
 import './style/shell.css';
-import './style/views.css';
+import './style/live.css';
+import './style/anchors.css';
 
 const client = new LiveClient(TOPICS, browser_environment());
 render(<App />, document.getElementById('app')!);

@@ -57,7 +57,8 @@ describe('the words for the plot', () => {
   it('say every mark, with its unit', () => {
     const features = { mean_excess_delay_ns: 12.5, rms_delay_spread_ns: 4, kurtosis: 31.2 };
     expect(summary(record(), marks_of(record(), features), features)).toBe(
-      'Impulse response of 1016 taps, 1.00 ns each, first path at tap 740.0, strongest 3.0 ns after it, 40 dB above the noise floor of 10.0, mean excess delay 12.5 ns, RMS delay spread 4.0 ns, kurtosis 31.2',
+      'Impulse response of 1016 taps, 1.00 ns each, first path at tap 740.0, strongest 3.0 ns after it, 40 dB ' +
+        'above the noise floor of 10.0, mean excess delay 12.5 ns, RMS delay spread 4.0 ns, kurtosis 31.2',
     );
   });
   it('leave out what is not known', () =>

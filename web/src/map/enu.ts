@@ -41,7 +41,8 @@ export function enu_from_geodetic(p: Geodetic, origin: Geodetic): Vec3 {
   ];
 }
 
-/// The point e, n metres from `origin` on its tangent plane, at the height of the origin. Newton on the exact forward formula: below a micrometre within a site.
+/// The point e, n metres from `origin` on its tangent plane, at the height of the origin. Newton on the exact forward
+/// formula: below a micrometre within a site.
 export function geodetic_from_enu(e: number, n: number, origin: Geodetic): Geodetic {
   let lon = origin.lon,
     lat = origin.lat;

@@ -11,7 +11,8 @@ import { SignIn } from './sign_in';
 import { Strip } from './strip';
 import { useStable } from './use_stable';
 
-/// `#/live`, `#/plan/<id>`, `#/anchors`, `#/anchors/0x6a2f`, `#/measurements`, `#/models`, `#/models/runs/<id>?compare=<id>,<id>`, `#/replay/<mission>?t=12.5`, `#/system`.
+/// `#/live`, `#/plan/<id>`, `#/anchors`, `#/anchors/0x6a2f`, `#/measurements`, `#/models`,
+/// `#/models/runs/<id>?compare=<id>,<id>`, `#/replay/<mission>?t=12.5`, `#/system`.
 export const route = signal(location.hash);
 addEventListener('hashchange', () => (route.value = location.hash));
 

@@ -1,6 +1,7 @@
 /// The status strip: the same tiles in the same order on every view. A tile opens a card with the reason and the fix.
 import { signal } from '@preact/signals';
 import type { ComponentChildren } from 'preact';
+import type { DroneMsg } from '../live/flight_messages';
 import { me } from '../state/session';
 import {
   current_mission,
@@ -31,6 +32,12 @@ interface Reading {
   card: ComponentChildren;
 }
 const look = (tone: 'ok' | 'caution' | 'bad' | 'info' | 'off'): { tone: Tone; shape: Shape } => ({ tone, shape: tone });
+
+function craft_words(craft: DroneMsg): string {
+  const where = craft.in_air ? 'in the air' : craft.armed ? 'armed on the ground' : 'on the ground',
+    height = craft.above_home_m === null ? '' : `, ${fixed(craft.above_home_m, 1)} m above home`;
+  return `${craft.autopilot || 'The autopilot'} in mode ${craft.mode}, ${where}${height}.`;
+}
 
 function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Reading> {
   tick.value;
@@ -156,7 +163,7 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
             <>
               <p>
                 {craft.connected
-                  ? `${craft.autopilot || 'The autopilot'} in mode ${craft.mode}, ${craft.in_air ? 'in the air' : craft.armed ? 'armed on the ground' : 'on the ground'}${craft.above_home_m === null ? '' : `, ${fixed(craft.above_home_m, 1)} m above home`}.`
+                  ? craft_words(craft)
                   : 'The aircraft has not been heard for 3 s. It follows its own failsafe; use the remote control.'}
               </p>
               {craft.text && <p>It says: {craft.text}</p>}
@@ -175,7 +182,8 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
           card: (
             <p>
               {pose
-                ? 'Height above the origin of this flight, and speed over ground. Battery and mode come with the aircraft link, which this flight does not have.'
+                ? 'Height above the origin of this flight, and speed over ground. Battery and mode come with the aircraft ' +
+                  'link, which this flight does not have.'
                 : 'No position of the aircraft has been received.'}
             </p>
           ),

@@ -156,7 +156,10 @@ export function LevelPanel({
         y={(s) => s.rx_dbm}
         xw={metre_words}
         yw={(v, d) => `${fixed(v, d)} dBm`}
-        label={`Received level against distance${line ? `, line of sight above ${fixed(line.at_zero_dbm, 1)} dBm and ${fixed(line.slope_dbm_per_m, 2)} dB a metre` : ''}`}
+        label={
+          'Received level against ' +
+          `distance${line ? `, line of sight above ${fixed(line.at_zero_dbm, 1)} dBm and ${fixed(line.slope_dbm_per_m, 2)} dB a metre` : ''}`
+        }
         selected={selected}
         select={select}
         over={

@@ -77,7 +77,8 @@ export function summary(r: Impulse, m: Marks, features: Sample['features']): str
   return [
     `Impulse response of ${r.magnitude.length} taps, ${fixed(r.tap_ns, 2)} ns each`,
     `first path at tap ${fixed(m.first, 1)}`,
-    `strongest ${fixed(ns_of(r, m, m.peak), 1)} ns after it${m.noise ? `, ${fixed(20 * Math.log10(strongest / m.noise), 0)} dB above the noise floor of ${fixed(m.noise, 1)}` : ''}`,
+    `strongest ${fixed(ns_of(r, m, m.peak), 1)} ns after ` +
+      `it${m.noise ? `, ${fixed(20 * Math.log10(strongest / m.noise), 0)} dB above the noise floor of ${fixed(m.noise, 1)}` : ''}`,
     ...(m.mean_ns === null ? [] : [`mean excess delay ${fixed(m.mean_ns, 1)} ns`]),
     ...(m.spread_ns === null ? [] : [`RMS delay spread ${fixed(m.spread_ns, 1)} ns`]),
     ...(features.kurtosis === undefined ? [] : [`kurtosis ${fixed(features.kurtosis, 1)}`]),

@@ -105,7 +105,10 @@ export function ThresholdPanel({ roc, los, nlos }: { roc: Roc; los: number; nlos
       </p>
       <Drawing
         cls="roc"
-        label={`ROC curve, area ${fixed(roc.auc, 3)}; at threshold ${fixed(threshold, 2)} ${fixed(at.tpr * 100, 1)} % of LOS kept and ${fixed(at.fpr * 100, 1)} % of NLOS called LOS`}
+        label={
+          `ROC curve, area ${fixed(roc.auc, 3)}; at threshold ${fixed(threshold, 2)} ${fixed(at.tpr * 100, 1)} % of ` +
+          `LOS kept and ${fixed(at.fpr * 100, 1)} % of NLOS called LOS`
+        }
         draw={(w, h) => {
           const f = { w, h, left: 44, right: 10, top: 8, bottom: 22 },
             x = scale([0, x_max], [f.left, w - f.right]),

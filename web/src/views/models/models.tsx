@@ -218,7 +218,10 @@ export function Models({ path }: { path: string | null }) {
         <div class="curl">
           <CopyBox
             label="Retrain by curl"
-            text={`curl -fsS -H "Authorization: Bearer $T" -H "Content-Type: application/json" -H "Prefer: wait=600" -d '${JSON.stringify({ task: of, dataset: chosen.dataset })}' ${location.origin}/api/v1/training-runs`}
+            text={
+              'curl -fsS -H "Authorization: Bearer $T" -H "Content-Type: application/json" -H "Prefer: wait=600" -d ' +
+              `'${JSON.stringify({ task: of, dataset: chosen.dataset })}' ${location.origin}/api/v1/training-runs`
+            }
           />
         </div>
       )}

@@ -114,7 +114,11 @@ export function Profile({
       </div>
       <Drawing
         cls="profile"
-        label={`Height over time: ${plan.waypoints.length} waypoints in ${clock(end, true)}, between ${fixed(Math.min(...heights), 1)} and ${fixed(Math.max(...heights), 1)} m above the ground${out.length ? `, ${new Set(out.map((m) => m.waypoint)).size} of them outside of ${fixed(low, 1)} to ${fixed(high, 1)} m` : ''}`}
+        label={
+          `Height over time: ${plan.waypoints.length} waypoints in ${clock(end, true)}, between ` +
+          `${fixed(Math.min(...heights), 1)} and ${fixed(Math.max(...heights), 1)} m above the ` +
+          `ground${out.length ? `, ${new Set(out.map((m) => m.waypoint)).size} of them outside of ${fixed(low, 1)} to ${fixed(high, 1)} m` : ''}`
+        }
         draw={(w, h) => {
           const f = { w, h, left: 44, right: 10, top: 8, bottom: 24 },
             x = scale([0, end || 1], [f.left, w - f.right]),

@@ -28,7 +28,8 @@ export function WayTools({
     const made = with_even_spacing(plan, origin!, spacing_m, heights!);
     change(made.plan);
     say(
-      `${made.plan.waypoints.filter((w) => w.measure).length} measuring points along the outline${made.left_out ? `; ${made.left_out} left out in no-fly areas or outside of the fence` : ''}`,
+      `${made.plan.waypoints.filter((w) => w.measure).length} measuring points along the ` +
+        `outline${made.left_out ? `; ${made.left_out} left out in no-fly areas or outside of the fence` : ''}`,
     );
   };
   return (

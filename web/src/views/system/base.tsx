@@ -41,7 +41,10 @@ export function base_words(s: Pick<Site, 'source' | 'sigma_m' | 'frame'>): {
     return {
       tone: 'caution',
       word: 'SURVEYED IN',
-      text: `The base averaged its own place${s.sigma_m === null ? ', which can be metres off' : `, good to ${accuracy(s.sigma_m)} (1σ)`}: all anchors are off together by as much. Fix it on a known point or against a network to do better.`,
+      text:
+        'The base averaged its own ' +
+        `place${s.sigma_m === null ? ', which can be metres off' : `, good to ${accuracy(s.sigma_m)} (1σ)`}: all ` +
+        'anchors are off together by as much. Fix it on a known point or against a network to do better.',
     };
   return {
     tone: 'ok',

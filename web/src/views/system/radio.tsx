@@ -188,7 +188,8 @@ export function RadioPanel({
   );
 }
 
-/// Tags that differ from each other, or anchors that were seen to differ from their tag, told until it is mended. Reads the tags once and whenever one begins to talk.
+/// Tags that differ from each other, or anchors that were seen to differ from their tag, told until it is mended.
+/// Reads the tags once and whenever one begins to talk.
 export function RadioWarning({
   devices,
   compared,

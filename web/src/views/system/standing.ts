@@ -138,7 +138,8 @@ function not_linked(d: Device): Standing {
     return bad(
       word === 'NEVER SEEN' ? word : 'UNPLUGGED',
       'Its port is not there.',
-      `Plug it in and switch it on: it is taken up within a second.${by_id ? '' : ' If the plug moved, Discover finds its new port; a name under by-id stays.'}`,
+      'Plug it in and switch it on: it is taken up within a ' +
+        `second.${by_id ? '' : ' If the plug moved, Discover finds its new port; a name under by-id stays.'}`,
     );
   if (/user or password/.test(d.reason))
     return bad('REFUSED', reason, 'Edit: check the user, and send the password again.');
@@ -358,7 +359,8 @@ export function standing(d: Device, recent: Lately, twin_speaks = true): Standin
   if (now.tone === 'ok' && d.clock?.skewed)
     return bad(
       'CLOCK WRONG',
-      `Its clock runs ${Math.round(Math.abs(d.clock.drift_ppm))} ppm too ${d.clock.drift_ppm > 0 ? 'fast' : 'slow'}: beyond any sound crystal, so its times cannot be trusted.`,
+      `Its clock runs ${Math.round(Math.abs(d.clock.drift_ppm))} ppm too ` +
+        `${d.clock.drift_ppm > 0 ? 'fast' : 'slow'}: beyond any sound crystal, so its times cannot be trusted.`,
       'Use another tag; have this one repaired.',
     );
   return now;

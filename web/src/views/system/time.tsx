@@ -161,7 +161,9 @@ function Aircraft({ drone: d }: { drone: DroneMsg | null }) {
             <span class="why">
               {d.connected
                 ? d.text
-                : `Nothing was heard of the autopilot ${d.autopilot && d.silent_s !== null ? `for ${age(d.silent_s * 1000)}` : 'yet'}: power, telemetry radio, drone.address.`}
+                : 'Nothing was heard of the autopilot ' +
+                  `${d.autopilot && d.silent_s !== null ? `for ${age(d.silent_s * 1000)}` : 'yet'}: power, telemetry radio, ` +
+                  'drone.address.'}
             </span>
           </div>
           <dl class="kv s">
