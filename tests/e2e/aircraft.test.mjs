@@ -106,5 +106,5 @@ test('killed in the air: hold before anything else, then on', async () => {
   lease = (await send(`/api/v1/missions/${mission}/control`, { action: 'take' })).json.lease;
   await accepted(await act('resume'));
   await accepted(await act('land'));
-  await eventually('it has landed', async () => (await procedure()).status === 'done', 60_000, 250);
+  await eventually('it has landed', async () => (await procedure()).step === 'done', 60_000, 250);
 });

@@ -212,10 +212,6 @@ test('an aircraft whose texts hold 0x80 to 0xff is flown, and its text is UTF-8'
     'the aircraft is heard',
     async () => (await list()).items.find((i) => i.id === 'drone').state === 'ok',
   );
-  for (const item of (await list()).items.filter((i) => i.state !== 'ok')) {
-    assert.ok(item.manual || item.overridable, JSON.stringify(item));
-    assert.equal((await post(`/api/v1/missions/${mission}/checklist/${item.id}`, { reason: 'a test' })).status, 200);
-  }
   // A flight begins where the rover says that the aircraft is.
   const fix = {
     t_us: Date.now() * 1000,
@@ -232,6 +228,11 @@ test('an aircraft whose texts hold 0x80 to 0xff is flown, and its text is UTF-8'
     headers: { 'content-type': 'application/x-ndjson' },
   });
   assert.equal(stored.status, 200, await stored.text());
+  await eventually('its place is known', async () => (await list()).items.find((i) => i.id === 'place').state === 'ok');
+  for (const item of (await list()).items.filter((i) => i.state !== 'ok')) {
+    assert.ok(item.manual || item.overridable, JSON.stringify(item));
+    assert.equal((await post(`/api/v1/missions/${mission}/checklist/${item.id}`, { reason: 'a test' })).status, 200);
+  }
   const started = await eventually('the flight begins', async () => {
     const answer = await post(`/api/v1/missions/${mission}/actions`, { action: 'start', plan, lease });
     return answer.status === 202 || !/not known where/.test(answer.json.detail) ? answer : null;

@@ -110,7 +110,7 @@ export function Profile({
     <section class="sec-p" data-testid="profile">
       <div class="hd">
         <h2>Height over time</h2>
-        <span class="meta">{clock(end, true)} from the first waypoint to the last</span>
+        <span class="meta">{clock(end, true)} of ways and dwelling alone</span>
       </div>
       <Drawing
         cls="profile"

@@ -1,4 +1,5 @@
-/// The flight over time, from the waypoints alone: straight ways at the plan's speed, dwelling where it measures. No DOM.
+/// The flight over time, from the waypoints alone: straight ways at the plan's speed, dwelling where it measures. Turns,
+/// height searches and extra points, which the forecast counts, have no place along it. No DOM.
 import { setting, type Plan } from '../../api/plans';
 import type { Geodetic } from '../../map/enu';
 import { to_m } from './draft';
@@ -9,7 +10,7 @@ export interface Moment {
   readonly waypoint: number;
 }
 
-/// Arrival at each waypoint, and its departure where it dwells; from the first waypoint on, as the server's check counts.
+/// Arrival at each waypoint, and its departure where it dwells, from the first waypoint on.
 export function profile(p: Plan, origin: Geodetic): Moment[] {
   const speed = setting(p, 'speed_mps'),
     dwell = setting(p, 'dwell_s'),
