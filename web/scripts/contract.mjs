@@ -33,7 +33,7 @@ function limits(schemas) {
 }
 
 mkdirSync(folder, { recursive: true });
-put('schema.d.ts', astToString(await openapiTS(contract)));
+put('schema.d.ts', astToString(await openapiTS(contract, { emptyObjectsUnknown: true })));
 const { components } = yaml.load(readFileSync(contract, 'utf8'));
 put(
   'limits.ts',

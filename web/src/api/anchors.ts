@@ -15,15 +15,10 @@ import {
 } from '../live/messages';
 import { ellipse_from_covariance, enu_from_geodetic } from '../map/enu';
 import { api_url, request } from './client';
+import { call, list, type Wire } from './contract';
 
 /// One acceptance test of the server: its number against its limit.
-export interface Gate {
-  readonly name: string;
-  readonly value: number | null;
-  readonly limit: number | null;
-  readonly passed: boolean;
-  readonly why: string;
-}
+export type Gate = Wire<'Gate'>;
 export interface AnchorRow extends EstimateMsg {
   readonly gates: readonly Gate[]; ///< empty where none were run: a running estimate
   readonly acceptable: boolean | null; ///< verdict ok and every gate passed; null where none were run
@@ -208,10 +203,7 @@ export async function calibrate(mission: string, key: string): Promise<Calibrati
   return done;
 }
 /// An anchor that fails a gate goes out only with the reason a person gives for it.
-export interface Override {
-  readonly network_id: string;
-  readonly reason: string;
-}
+export type Override = NonNullable<Wire<'Publish'>['overrides']>[number];
 /// The revision's note carries who was left out by a person, and why: 500 characters at most.
 export function note_of(note: string, out: readonly (readonly [string, string])[]): string {
   const words = out.map(([id, why]) => `${id}${why.trim() ? ` (${why.trim()})` : ''}`).join(', ');
@@ -227,36 +219,21 @@ export async function publish(
 ): Promise<number | null> {
   const body = {
     ...(note ? { note } : {}),
-    ...(only ? { anchors: only } : {}),
-    ...(overrides.length ? { overrides } : {}),
+    ...(only ? { anchors: [...only] } : {}),
+    ...(overrides.length ? { overrides: [...overrides] } : {}),
   };
-  return num(
-    obj(
-      await request('POST', `/calibrations/${encodeURIComponent(calibration)}/publish`, body, {
-        'Idempotency-Key': key,
-      }),
-    )?.revision,
-  );
+  const answer = await call('post', '/calibrations/{id}/publish', {
+    path: { id: calibration },
+    body,
+    headers: { 'Idempotency-Key': key },
+  });
+  return answer.body.revision;
 }
 
 /// Against what is published: where each anchor was, in metres, and whether it moved beyond what both covariances allow.
-export interface Moved {
-  readonly change: string;
-  readonly horizontal_m: number | null;
-  readonly vertical_m: number | null;
-}
-export async function moved_since_published(calibration: string): Promise<Map<string, Moved>> {
-  const items = obj(await request('GET', `/calibrations/${encodeURIComponent(calibration)}/diff`))?.items,
-    out = new Map<string, Moved>();
-  for (const o of (Array.isArray(items) ? items : []).map(obj))
-    if (o && str(o.network_id))
-      out.set(str(o.network_id), {
-        change: str(o.change),
-        horizontal_m: num(o.horizontal_m),
-        vertical_m: num(o.vertical_m),
-      });
-  return out;
-}
+export type Moved = Wire<'PositionDiff'>['items'][number];
+export const moved_since_published = async (calibration: string): Promise<Map<string, Moved>> =>
+  new Map((await list('/calibrations/{id}/diff', { path: { id: calibration } })).map((o) => [o.network_id, o]));
 export const report_url = (calibration: string): string =>
   api_url(`/calibrations/${encodeURIComponent(calibration)}/report`);
 

@@ -1,15 +1,16 @@
 /// Plans: what is to be flown. Corners and waypoints in WGS84, as the server keeps them.
 import { num, obj, str, vec3 } from '../live/messages';
 import { api_url, idempotency_key, request } from './client';
+import { call, type Wire } from './contract';
 import { LIMITS } from './generated/limits';
-import type { components } from './generated/schema';
 
 export interface Corner {
   readonly lon: number;
   readonly lat: number;
 }
-export interface Waypoint extends Corner {
-  readonly height_above_ground_m: number;
+type WireWaypoint = Wire<'PlanWaypoint'>;
+/// Every field said: what the contract leaves out is its default.
+export interface Waypoint extends Corner, Required<Pick<WireWaypoint, 'height_above_ground_m'>> {
   readonly heading_deg: number | null;
   readonly dwell_s: number | null;
   readonly measure: boolean;
@@ -17,7 +18,7 @@ export interface Waypoint extends Corner {
   readonly height_search: boolean;
 }
 /// As stored: what is absent is the server's default.
-export type Settings = Readonly<Partial<components['schemas']['PlanSettings']>>;
+export type Settings = Readonly<Partial<Wire<'PlanSettings'>>>;
 export const SETTINGS = LIMITS.PlanSettings;
 /// Settings that are a number, and what they are while the plan says nothing.
 export type NumberSetting = {
@@ -38,12 +39,7 @@ export interface Plan {
   readonly waypoints: readonly Waypoint[];
   readonly rest: Readonly<Record<string, unknown>>; ///< what this page does not edit, kept as it came
 }
-export interface Issue {
-  readonly severity: 'error' | 'warning';
-  readonly code: string;
-  readonly pointer: string;
-  readonly text: string;
-}
+export type Issue = Pick<Wire<'PlanIssue'>, 'severity' | 'code' | 'pointer' | 'text'>;
 /// An anchor assumed in the building: where, about the plan's origin, and what the flight would make of it.
 export interface Assumed {
   readonly e: number;
@@ -52,14 +48,7 @@ export interface Assumed {
   readonly sigma_m: number;
   readonly gdop: number | null;
 }
-export interface Check {
-  readonly flyable: boolean;
-  readonly issues: readonly Issue[];
-  readonly length_m: number | null;
-  readonly duration_s: number | null;
-  readonly duration_low_s: number | null;
-  readonly duration_high_s: number | null;
-  readonly n_measure: number | null;
+export interface Check extends Omit<Wire<'PlanCheck'>, 'predicted'> {
   readonly rms_m: number | null;
   readonly worst_m: number | null;
   readonly assumed: readonly Assumed[];
@@ -132,8 +121,9 @@ function plan_of(o: Record<string, unknown>): Plan {
 }
 const polygon = (corners: readonly Corner[]): object | null =>
   corners.length < 3 ? null : { type: 'Polygon', coordinates: [[...corners, corners[0]!].map((c) => [c.lon, c.lat])] };
-export function body_of(p: Plan): object {
-  return {
+/// What this page does not edit goes back as it came.
+export const body_of = (p: Plan): Wire<'PlanBody'> =>
+  ({
     ...p.rest,
     name: p.name || 'Plan',
     outline: polygon(p.outline),
@@ -143,32 +133,17 @@ export function body_of(p: Plan): object {
     settings: p.settings,
     expected_anchors: p.expected,
     waypoints: p.waypoints,
-  };
-}
-function check_of(o: Record<string, unknown> | null): Check {
-  const predicted = obj(o?.predicted);
-  return {
-    flyable: o?.flyable === true,
-    length_m: num(o?.length_m),
-    duration_s: num(o?.duration_s),
-    duration_low_s: num(o?.duration_low_s),
-    duration_high_s: num(o?.duration_high_s),
-    n_measure: num(o?.n_measure),
-    rms_m: num(predicted?.rms_m),
-    worst_m: num(predicted?.worst_m),
-    assumed: list(predicted?.anchors).flatMap((a) => {
-      const at = vec3(a.enu_m),
-        sigma_m = num(a.sigma_m);
-      return at && sigma_m !== null ? [{ e: at[0], n: at[1], up: at[2], sigma_m, gdop: num(a.gdop) }] : [];
-    }),
-    issues: list(o?.issues).map((i) => ({
-      severity: i.severity === 'error' ? 'error' : 'warning',
-      code: str(i.code),
-      pointer: str(i.pointer),
-      text: str(i.text),
-    })),
-  };
-}
+  }) as Wire<'PlanBody'>;
+
+const check_of = ({ predicted, ...check }: Wire<'PlanCheck'>): Check => ({
+  ...check,
+  rms_m: predicted?.rms_m ?? null,
+  worst_m: predicted?.worst_m ?? null,
+  assumed: (predicted?.anchors ?? []).flatMap(({ enu_m, sigma_m, gdop }) => {
+    const at = vec3(enu_m);
+    return at ? [{ e: at[0], n: at[1], up: at[2], sigma_m, gdop }] : [];
+  }),
+});
 
 export const plans = async (): Promise<Plan[]> =>
   list(obj(await request('GET', '/plans?limit=100'))?.items).map(plan_of);
@@ -182,15 +157,14 @@ export const remove = (p: Plan): Promise<unknown> =>
   request('DELETE', `/plans/${p.id}`, undefined, { 'If-Match': `"p-${p.revision}"` });
 export const read = async (id: string): Promise<Plan> => plan_of(obj(await request('GET', `/plans/${id}`)) ?? {});
 export const check = async (id: string): Promise<Check> =>
-  check_of(obj(await request('POST', `/plans/${id}/validate`, {})));
+  check_of((await call('post', '/plans/{id}/validate', { path: { id } })).body);
 /// Of what is drawn, stored or not.
 export const check_drawn = async (p: Plan): Promise<Check> =>
-  check_of(obj(await request('POST', '/plans/validate', body_of(p))));
+  check_of((await call('post', '/plans/validate', { body: body_of(p) })).body);
 /// Waypoints from the outline alone; nothing is stored.
 export async function generate(p: Plan): Promise<{ plan: Plan; check: Check }> {
-  const answer = obj(await request('POST', '/plans/generate', body_of(p))),
-    made = plan_of(obj(answer?.plan) ?? {});
-  return { plan: { ...p, waypoints: made.waypoints }, check: check_of(obj(answer?.check)) };
+  const { body } = await call('post', '/plans/generate', { body: body_of(p) });
+  return { plan: { ...p, waypoints: plan_of(body.plan).waypoints }, check: check_of(body.check) };
 }
 export async function import_file(name: string, text: string): Promise<{ plan: Plan; notes: string[] }> {
   const answer = obj(

@@ -1,33 +1,18 @@
 /// What every range says against an answer, and answers against each other. Bearings come from the track that was flown.
-import { num, obj, str, vec3, type Vec3 } from '../live/messages';
+import { vec3, type Vec3 } from '../live/messages';
 import { enu_from_geodetic } from '../map/enu';
-import { request } from './client';
-import { items } from './system';
+import type { AnchorRow } from './anchors';
+import { get, list, type Wire } from './contract';
 
-export interface Residual {
-  readonly mission: string;
-  readonly t_us: number;
+/// A row of the contract that has a residual, and where it came from.
+export interface Residual extends Omit<ResidualRow, 'network_id'> {
   readonly distance_m: number;
   readonly residual_m: number;
-  readonly standardised: number | null;
   readonly weight: number;
   readonly bearing_deg: number | null;
 }
-export interface Solve {
-  readonly id: string;
-  readonly created_at: string;
-  readonly missions: readonly string[];
-  readonly n_anchors: number;
-  readonly n_ok: number;
-}
-export const solves = (): Promise<Solve[]> =>
-  items('/calibrations?limit=100', (o) => ({
-    id: str(o.id),
-    created_at: str(o.created_at),
-    missions: Array.isArray(o.missions) ? o.missions.map(str) : [],
-    n_anchors: num(o.n_anchors) ?? 0,
-    n_ok: num(obj(o.verdicts)?.ok) ?? 0,
-  }));
+export type Solve = Wire<'CalibrationSummary'>;
+export const solves = (): Promise<Solve[]> => list('/calibrations', { query: { limit: 100 } });
 
 /// Where the track was at an instant: between the two fixes around it, null beyond a second of one.
 export interface Way {
@@ -55,79 +40,51 @@ export function at_instant({ t_us, at_m }: Way, t: number): Vec3 | null {
 export const bearing_from = (anchor: Vec3, tag: Vec3): number =>
   ((Math.atan2(tag[0] - anchor[0], tag[1] - anchor[1]) * 180) / Math.PI + 360) % 360;
 
+type Place = Pick<AnchorRow, 'lon' | 'lat' | 'h_m' | 'enu_m'>;
 /// The flight's positions about the anchor, east north up on the globe, else in local metres; at most three pages of it.
-async function way_of(
-  mission: string,
-  anchor: {
-    readonly lon: number | null;
-    readonly lat: number | null;
-    readonly h_m: number | null;
-    readonly enu_m: Vec3 | null;
-  },
-): Promise<{ readonly way: Way; readonly origin_m: Vec3 } | null> {
+async function way_of(mission: string, anchor: Place): Promise<{ readonly way: Way; readonly origin_m: Vec3 } | null> {
   const t_us: number[] = [],
     at_m: Vec3[] = [],
     globe = anchor.lon !== null && anchor.lat !== null,
     zero = { lon: anchor.lon ?? 0, lat: anchor.lat ?? 0, h_m: anchor.h_m ?? 0 };
-  let cursor = '',
+  let cursor: string | null = null,
     local = false;
   for (let page = 0; page < 3; page++) {
-    const f = obj(await request('GET', `/missions/${encodeURIComponent(mission)}/track?limit=10000${cursor}`)),
-      p = obj(f?.properties),
-      times = Array.isArray(p?.t_us) ? p.t_us : [],
-      coordinates = obj(f?.geometry)?.coordinates;
-    local = Array.isArray(p?.local_m);
-    (local ? (p!.local_m as unknown[]) : Array.isArray(coordinates) ? coordinates : []).forEach((c, i) => {
+    const track: Wire<'Track'> = await get('/missions/{id}/track', {
+        path: { id: mission },
+        query: { limit: 10000, ...(cursor ? { cursor } : {}) },
+      }),
+      { t_us: times = [], local_m } = track.properties;
+    local = !!local_m;
+    (local_m ?? track.geometry?.coordinates ?? []).forEach((c, i) => {
       const v = vec3(c),
-        t = num(times[i]);
-      if (v && t !== null && (local || globe)) {
+        t = times[i];
+      if (v && t !== undefined && (local || globe)) {
         t_us.push(t);
         at_m.push(local ? v : enu_from_geodetic({ lon: v[0], lat: v[1], h_m: v[2] }, zero));
       }
     });
-    if (!str(f?.next_cursor)) break;
-    cursor = `&cursor=${encodeURIComponent(str(f?.next_cursor))}`;
+    cursor = track.next_cursor ?? null;
+    if (!cursor) break;
   }
   const origin_m: Vec3 | null = local ? anchor.enu_m : [0, 0, 0];
   return t_us.length && origin_m ? { way: { t_us, at_m }, origin_m } : null;
 }
-export async function residuals(
-  solve: string,
-  anchor: {
-    readonly anchor: string;
-    readonly lon: number | null;
-    readonly lat: number | null;
-    readonly h_m: number | null;
-    readonly enu_m: Vec3 | null;
-  },
-): Promise<Residual[]> {
-  const rows = await items(
-    `/calibrations/${encodeURIComponent(solve)}/residuals?anchor=${encodeURIComponent(anchor.anchor)}`,
-    (o) => ({
-      mission: str(o.mission),
-      t_us: num(o.t_us),
-      distance_m: num(o.distance_m),
-      residual_m: num(o.residual_m),
-      standardised: num(o.standardised),
-      weight: num(o.weight) ?? 0,
-    }),
-  );
+type ResidualRow = Awaited<ReturnType<typeof rows_of>>[number];
+const rows_of = (solve: string, anchor: string) =>
+  list('/calibrations/{id}/residuals', { path: { id: solve }, query: { anchor } });
+export async function residuals(solve: string, anchor: Place & Pick<AnchorRow, 'anchor'>): Promise<Residual[]> {
+  const rows = await rows_of(solve, anchor.anchor);
   const ways = new Map<string, Awaited<ReturnType<typeof way_of>>>();
   for (const mission of new Set(rows.map((r) => r.mission)))
     ways.set(mission, await way_of(mission, anchor).catch(() => null));
   return rows.flatMap((r) => {
-    if (r.t_us === null || r.distance_m === null || r.residual_m === null) return [];
+    const { distance_m, residual_m } = r;
+    if (distance_m === null || residual_m === null) return [];
     const w = ways.get(r.mission),
-      tag = w ? at_instant(w.way, r.t_us) : null;
-    return [
-      {
-        ...r,
-        t_us: r.t_us,
-        distance_m: r.distance_m,
-        residual_m: r.residual_m,
-        bearing_deg: tag && w ? bearing_from(w.origin_m, tag) : null,
-      },
-    ];
+      tag = w ? at_instant(w.way, r.t_us) : null,
+      bearing_deg = tag && w ? bearing_from(w.origin_m, tag) : null;
+    return [{ ...r, distance_m, residual_m, weight: r.weight ?? 0, bearing_deg }];
   });
 }
 
@@ -147,29 +104,16 @@ export const by_suspicion = (rows: readonly Residual[]): Residual[] =>
       Number(b.weight === 0) - Number(a.weight === 0) || Math.abs(b.standardised ?? 0) - Math.abs(a.standardised ?? 0),
   );
 
-export type Change = 'agrees' | 'moved' | 'added' | 'removed' | 'not_comparable';
-export interface Shift {
+type DiffRow = Wire<'PositionDiff'>['items'][number];
+export type Change = DiffRow['change'];
+export interface Shift extends Pick<DiffRow, 'change' | 'horizontal_m' | 'vertical_m' | 'chi2' | 'chi2_limit'> {
   readonly anchor: string;
-  readonly change: Change;
   readonly delta_m: Vec3 | null;
-  readonly horizontal_m: number | null;
-  readonly vertical_m: number | null;
-  readonly chi2: number | null;
-  readonly chi2_limit: number | null;
-  readonly now_m: Vec3 | null;
 }
 /// `against`: a calibration, the number of a revision, or "published".
 export async function shifts(of: string, against: string): Promise<Shift[]> {
-  return items(`/calibrations/${encodeURIComponent(of)}/diff?against=${encodeURIComponent(against)}`, (o) => ({
-    anchor: str(o.network_id),
-    change: (['agrees', 'moved', 'added', 'removed'] as const).find((c) => c === o.change) ?? 'not_comparable',
-    delta_m: vec3(o.delta_enu_m),
-    horizontal_m: num(o.horizontal_m),
-    vertical_m: num(o.vertical_m),
-    chi2: num(o.chi2),
-    chi2_limit: num(o.chi2_limit),
-    now_m: vec3(obj(o.now)?.enu_m),
-  }));
+  const rows = await list('/calibrations/{id}/diff', { path: { id: of }, query: { against } });
+  return rows.map((r) => ({ ...r, anchor: r.network_id, delta_m: vec3(r.delta_enu_m) }));
 }
 /// All anchors shifted alike are the base, not the anchors: three or more, at least 2 cm, and apart from each other by less than a tenth of it, or than
 /// what solving twice differs by (5 cm, where the shift is twice that).

@@ -54,7 +54,7 @@ export function CompareCalibrations() {
   const name = (s: Solve): string =>
     `${date(s.created_at)}, ` +
     `${s.missions.map((m) => mission_list.value.find((x) => x.mission === m)?.name ?? 'a flight').join(' + ') || 'no flight'}, ` +
-    `${s.n_ok} of ${s.n_anchors} well determined`;
+    `${s.verdicts?.ok ?? 0} of ${s.n_anchors ?? 0} well determined`;
   const moved = rows?.filter((r) => r.change === 'moved').length ?? 0,
     both = rows?.filter((r) => r.delta_m !== null) ?? [],
     alike = common_shift(both);

@@ -135,7 +135,7 @@ function Item({ item: i, set }: { item: ChecklistItem; set: (i: ChecklistItem, r
         <b>{i.text}</b>
         {i.overridden_by ? (
           <span class="mut block">
-            {i.manual ? `Confirmed by ${i.overridden_by}` : `Overridden by ${i.overridden_by}: ${i.reason}`}
+            {i.manual ? `Confirmed by ${i.overridden_by}` : `Overridden by ${i.overridden_by}: ${i.override_reason}`}
           </span>
         ) : (
           i.detail && <span class="mut block">{i.detail}</span>

@@ -2,7 +2,7 @@
 import { signal } from '@preact/signals';
 import { useEffect } from 'preact/hooks';
 import { ApiError, said } from '../../api/client';
-import { command, release_control, renew_control, take_control, type Lease } from '../../api/flight';
+import { command, release_control, renew_control, take_control, type Action, type Lease } from '../../api/flight';
 import type { ProcedureMsg } from '../../live/flight_messages';
 import { may } from '../../state/session';
 import { current_mission, current_scene, link, live_source, say, server_now_us, tick } from '../../state/store';
@@ -40,7 +40,7 @@ const give_back = (mission: string): Promise<void> =>
     lease.value = null;
   });
 /// Hold is one press: whoever has no control yet takes it first.
-export async function send(mission: string, action: string, more: object = {}): Promise<void> {
+export async function send(mission: string, action: Action, more: Parameters<typeof command>[3] = {}): Promise<void> {
   await guarded(async () => {
     if (lease.value?.mission !== mission) lease.value = { ...(await take_control(mission, false)), mission };
     await command(mission, action, lease.value.key, more);
@@ -85,7 +85,7 @@ export function FlightBar() {
         : '';
   };
   const off = lost || !operator || other !== null,
-    act = (action: string) => () => void send(mission.mission, action);
+    act = (action: Action) => () => void send(mission.mission, action);
   return (
     <div class="fbar" data-testid="flight-bar">
       {p && <Progress p={p} />}

@@ -88,8 +88,9 @@ export function CampaignMode({
             if (!(e instanceof ApiError && e.problem.status === 409)) throw e;
           });
         const kept = await import_lines(name, truth_query(place), lines_of(rows), idempotency_key());
+        const dropped = kept.dropped.map((d) => `${d.count} ${d.reason}`).join(', ');
         set_done(
-          `${kept.accepted} of ${rows.length} kept as ${setting_of(place)}${kept.dropped.length ? `; dropped: ${kept.dropped.join(', ')}` : ''}`,
+          `${kept.accepted} of ${rows.length} kept as ${setting_of(place)}${dropped && `; dropped: ${dropped}`}`,
         );
         taken(name);
         look();
@@ -335,9 +336,9 @@ function Taken({ settings }: { settings: readonly Setting[] }) {
                 <td>{s.environment || '–'}</td>
                 <td>{s.los === null ? '–' : s.los ? 'LOS' : 'NLOS'}</td>
                 <td class="num">{fixed(s.distance_m, 3)}</td>
-                <td class="num">{grouped(s.n)}</td>
-                <td class="num">{fixed(s.mean_m, 3)}</td>
-                <td class="num">{fixed(s.sd_m === null ? null : s.sd_m * 1000, 0)}</td>
+                <td class="num">{grouped(s.n_samples)}</td>
+                <td class="num">{fixed(s.mean_range_m, 3)}</td>
+                <td class="num">{fixed(s.sd_range_m === null ? null : s.sd_range_m * 1000, 0)}</td>
               </tr>
             ))}
         </tbody>

@@ -62,7 +62,7 @@ export function ExcludePanel({
   };
   const send = (): Promise<void> =>
     act(async () => {
-      await exclude(mission, { ...what, reason: reason.trim() }, key.current);
+      if (what) await exclude(mission, { ...what, reason: reason.trim() }, key.current);
       set_reason('');
       set_picked([]);
     }, 'Excluded: the live flight is solved without them');

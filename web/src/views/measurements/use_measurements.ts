@@ -86,7 +86,7 @@ export function useMeasurements() {
     void (async () => {
       try {
         const settings = source.kind === 'campaign' ? await settings_of(source.id) : [],
-          n = settings.reduce((sum, s) => sum + s.n, 0),
+          n = settings.reduce((sum, s) => sum + s.n_samples, 0),
           total = await count_of(source, filter),
           every = every_of(total ?? n);
         if (source.kind === 'campaign' && now.current === key)

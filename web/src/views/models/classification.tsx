@@ -88,7 +88,7 @@ export function ConfusionPanel({
 /// ROC and slider: accuracy follows from the counts of each class at that point of the curve.
 export function ThresholdPanel({ roc, los, nlos }: { roc: Roc; los: number; nlos: number }) {
   const points = roc.points,
-    [threshold, set_threshold] = useState(roc.threshold ?? 0.5);
+    [threshold, set_threshold] = useState(roc.limit?.threshold ?? 0.5);
   if (points.length < 2) return null;
   // LOS is said from the threshold upwards, so the point that holds is the lowest one not below it.
   const at = points.reduce((a, b) =>
@@ -96,7 +96,8 @@ export function ThresholdPanel({ roc, los, nlos }: { roc: Roc; los: number; nlos
   );
   const accuracy = los + nlos ? (at.tpr * los + (1 - at.fpr) * nlos) / (los + nlos) : null;
   const x_max = Math.min(1, Math.max(0.1, Math.ceil(at.fpr * 12) / 10)),
-    interval = roc.fpr_low95 !== null && roc.fpr_high95 !== null;
+    limit = roc.limit,
+    max_fpr = limit?.max_fpr ?? null;
   return (
     <section class="cell-p" data-testid="threshold">
       <h2>Threshold</h2>
@@ -124,8 +125,8 @@ export function ThresholdPanel({ roc, los, nlos }: { roc: Roc; los: number; nlos
                 xw={(v) => `${fixed(v * 100, 0)} %`}
                 yw={(v) => `${fixed(v * 100, 0)} %`}
               />
-              {roc.max_fpr !== null && roc.max_fpr <= x_max && (
-                <path class="goal" d={`M${x(roc.max_fpr)} ${f.top}V${h - f.bottom}`} />
+              {max_fpr !== null && max_fpr <= x_max && (
+                <path class="goal" d={`M${x(max_fpr)} ${f.top}V${h - f.bottom}`} />
               )}
               <path
                 class="s main"
@@ -177,10 +178,10 @@ export function ThresholdPanel({ roc, los, nlos }: { roc: Roc; los: number; nlos
           </dd>
         </div>
       </dl>
-      {interval && (
+      {limit && (
         <p class="sub">
-          At the chosen {fixed(roc.threshold, 2)} the FPR lies within {fixed(roc.fpr_low95 * 100, 1)} to{' '}
-          {fixed(roc.fpr_high95 * 100, 1)} % (95 %, {roc.places ?? 'few'} places with NLOS).
+          At the chosen {fixed(limit.threshold, 2)} the FPR lies within {fixed(limit.fpr_low95 * 100, 1)} to{' '}
+          {fixed(limit.fpr_high95 * 100, 1)} % (95 %, {limit.places} places with NLOS).
         </p>
       )}
     </section>

@@ -322,7 +322,7 @@ function Numbers({ run, numbers }: { run: Run; numbers: RunNumbers }) {
         <ConfusionPanel
           confusion={confusion}
           held_out={numbers.confusion.test !== null}
-          max_fpr={numbers.roc?.max_fpr ?? null}
+          max_fpr={numbers.roc?.limit?.max_fpr ?? null}
         />
       )}
       {numbers.roc && confusion && (

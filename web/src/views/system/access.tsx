@@ -6,6 +6,7 @@ import {
   create_token,
   revoke_token,
   ROLES,
+  type Role,
   tokens as fetch_tokens,
   type AuditLine,
   type Token,
@@ -27,7 +28,7 @@ export function AccessPanel() {
   const [all, set_all] = useState<readonly Token[]>([]),
     [problem, set_problem] = useState(''),
     [name, set_name] = useState(''),
-    [role, set_role] = useState<string>('viewer'),
+    [role, set_role] = useState<Role>('viewer'),
     [secret, set_secret] = useState(''),
     [sure, set_sure] = useState('');
   const load = (): void => {
@@ -86,7 +87,7 @@ export function AccessPanel() {
         </label>
         <label>
           <span class="lab">Role</span>
-          <select value={role} onChange={(e) => set_role(e.currentTarget.value)}>
+          <select value={role} onChange={(e) => set_role(e.currentTarget.value as Role)}>
             {ROLES.map((r) => (
               <option key={r} value={r}>
                 {r}: {ROLE_WORDS[r]}

@@ -322,10 +322,11 @@ export function LeverPanel() {
       () => set_flight(null),
     );
   }, []);
+  const arm = kit?.next_flight.lever_up_m;
   const none =
     flight &&
     flight.track_point !== 'tag_antenna' &&
-    (flight.tags.length === 0 || flight.tags.every((t) => t.arm_m.every((x) => x === 0)));
+    (flight.tags.length === 0 || flight.tags.every((t) => t.lever_arm_body_m.every((x) => x === 0)));
   return (
     <section class="sys-p" data-testid="levers">
       <div class="hd">
@@ -373,12 +374,12 @@ export function LeverPanel() {
                   {t.tag}
                   {t.antenna ? `, antenna ${t.antenna}` : ''}
                 </th>
-                {t.arm_m.map((x, i) => (
+                {t.lever_arm_body_m.map((x, i) => (
                   <td key={i} class="num">
                     {fixed(x, 3)}
                   </td>
                 ))}
-                <td class="num">{fixed(Math.hypot(...t.arm_m), 3)}</td>
+                <td class="num">{fixed(Math.hypot(...t.lever_arm_body_m), 3)}</td>
               </tr>
             ))}
           </tbody>
@@ -391,8 +392,8 @@ export function LeverPanel() {
               Learned by the kit, {kit.n_flights} flight{kit.n_flights === 1 ? '' : 's'}
             </dt>
             <dd>
-              antenna <Q v={fixed(kit.lever_up_m.value === null ? null : kit.lever_up_m.value * 100, 1)} u="cm" />{' '}
-              higher ± <Q v={fixed(kit.lever_up_m.sigma === null ? null : kit.lever_up_m.sigma * 100, 1)} u="cm" />
+              antenna <Q v={fixed(arm ? arm.value * 100 : null, 1)} u="cm" /> higher ±{' '}
+              <Q v={fixed(arm ? arm.sigma * 100 : null, 1)} u="cm" />
             </dd>
           </div>
         </dl>

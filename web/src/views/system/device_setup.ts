@@ -132,7 +132,7 @@ function options_of(s: Setup): Record<string, unknown> {
   };
 }
 export const config_of = (s: Setup): DeviceForm => ({
-  kind: s.kind,
+  kind: s.kind as DeviceForm['kind'], // one of the choices of the form
   name: s.name.trim(),
   address: address_of(s),
   options: Object.fromEntries(Object.entries(options_of(s)).filter(([, v]) => v !== null)),

@@ -1,14 +1,7 @@
 /// Stored flights: which there are, deleting one, and getting it back.
 import { useEffect, useState } from 'preact/hooks';
 import { said } from '../../api/client';
-import {
-  delete_flight,
-  deleted_flights,
-  restore_flight,
-  stored_flights,
-  type DeletedFlight,
-  type StoredFlight,
-} from '../../api/missions';
+import { delete_flight, deleted_flights, restore_flight, stored_flights, type StoredFlight } from '../../api/missions';
 import { may } from '../../state/session';
 import { load_missions } from '../../state/archive';
 import { events, say } from '../../state/store';
@@ -19,7 +12,7 @@ const days = (seconds: number): string =>
 
 export function FlightsPanel() {
   const [all, set_all] = useState<readonly StoredFlight[]>([]),
-    [bin, set_bin] = useState<readonly DeletedFlight[]>([]),
+    [bin, set_bin] = useState<readonly StoredFlight[]>([]),
     [problem, set_problem] = useState(''),
     [sure, set_sure] = useState('');
   const load = (): void => {
@@ -48,7 +41,7 @@ export function FlightsPanel() {
     if (sure !== f.id) set_sure(f.id);
     else void guarded(() => delete_flight(f.id, may()), `${f.name} is in the bin`);
   };
-  const restore = (f: DeletedFlight): void =>
+  const restore = (f: StoredFlight): void =>
     void guarded(async () => {
       await restore_flight(f.id);
       await load_missions();
@@ -129,7 +122,7 @@ export function FlightsPanel() {
                   {date(f.deleted_at)}
                   <span class="mut block">by {f.deleted_by}</span>
                 </td>
-                <td>{f.emptying ? 'being removed' : `${days(f.kept_for_s)} of running`}</td>
+                <td>{f.emptying ? 'being removed' : `${days(f.kept_for_s ?? 0)} of running`}</td>
                 {operator && (
                   <td class="acts">
                     {!f.emptying && (

@@ -43,8 +43,9 @@ export function TimePanel() {
 /// 50 ms is where the alarm is raised.
 const LIMIT_S = 0.05;
 function Clocks({ look: { clock, devices }, kit }: { look: Look; kit: Kit | null }) {
+  const lag = kit?.next_flight.lag_s;
   const own = devices.filter((d) => d.clock),
-    off = clock?.offset_s != null && Math.abs(clock.offset_s) > LIMIT_S;
+    off = clock?.system_offset_s != null && Math.abs(clock.system_offset_s) > LIMIT_S;
   return (
     <section class="sys-p" data-testid="clocks">
       <h2>Clocks</h2>
@@ -53,13 +54,13 @@ function Clocks({ look: { clock, devices }, kit }: { look: Look; kit: Kit | null
       ) : (
         <>
           <div>
-            {clock.from_receiver ? (
+            {clock.source === 'receiver' ? (
               <Chip shape="ok" tone="ok" word="TIME OF THE RECEIVER" />
             ) : (
               <Chip shape="caution" tone="caution" word="TIME OF THE COMPUTER" />
             )}{' '}
             <span class="why">
-              {clock.from_receiver
+              {clock.source === 'receiver'
                 ? 'Measurements are stamped in UTC as the rover tells it.'
                 : 'No receiver has told the time yet: stamps are as good as the clock of this computer.'}
             </span>
@@ -97,7 +98,7 @@ function Clocks({ look: { clock, devices }, kit }: { look: Look; kit: Kit | null
                     </>
                   )}
                 </th>
-                <td class="num">{clock.offset_s === null ? 'no receiver' : ms(clock.offset_s)}</td>
+                <td class="num">{clock.system_offset_s === null ? 'no receiver' : ms(clock.system_offset_s)}</td>
                 <td class="num">–</td>
                 <td class="num">{ms(clock.sigma_s)}</td>
               </tr>
@@ -117,12 +118,12 @@ function Clocks({ look: { clock, devices }, kit }: { look: Look; kit: Kit | null
                   <td class="num">{ms(d.clock!.sigma_s)}</td>
                 </tr>
               ))}
-              {kit && kit.lag_s.value !== null && (
+              {kit && lag && (
                 <tr>
                   <th scope="row">UWB after RTK, learned by kit {kit.kit}</th>
-                  <td class="num">{ms(kit.lag_s.value)}</td>
+                  <td class="num">{ms(lag.value)}</td>
                   <td class="num">–</td>
-                  <td class="num">{ms(kit.lag_s.sigma)}</td>
+                  <td class="num">{ms(lag.sigma)}</td>
                 </tr>
               )}
             </tbody>
