@@ -63,9 +63,9 @@ describe('the filter of measurements', () => {
     expect(query(rooms, { who: 's1', by: 'setting' })).toEqual({ setting: 's1' });
   });
   it('goes into the file that is downloaded', () => {
-    vi.stubGlobal('document', { baseURI: 'http://127.0.0.1/#/measurements' });
+    vi.stubGlobal('document', { baseURI: 'http://127.0.0.1:8420/#/measurements' });
     expect(download_url(rooms, { ...EVERYTHING, max_m: 5 }, 'ndjson')).toBe(
-      'http://127.0.0.1/api/v1/campaigns/c%2F1/samples?max_distance_m=5&format=ndjson',
+      'http://127.0.0.1:8420/api/v1/campaigns/c%2F1/samples?max_distance_m=5&format=ndjson',
     );
     vi.unstubAllGlobals();
   });
