@@ -27,7 +27,7 @@ struct Report {
   std::string subtitle;     ///< site, building, flights
   std::string heading;      ///< "Revision 8", "not published"
   std::string calibration;  ///< id, or empty
-  std::string program;      ///< "anchord 0.1.0"
+  std::string program;      ///< "anchord 0.2.0"
   UtcTime created{};
   TrackFrame frame{TrackFrame::wgs84};
   std::optional<Wgs84> origin{};

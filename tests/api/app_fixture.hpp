@@ -44,7 +44,7 @@ class AppFixture : public ::testing::Test {
                                           database_->training_runs(), database_->models()});
     api::Application::Deps deps{database_->measurements(),   database_->missions(), database_->anchors(),
                                 database_->jobs(),           database_->access(),   clock_,
-                                {"0.1.0", "test", "", "", 1}};
+                                {"0.2.0", "test", "", "", 1}};
     deps.plans = &database_->plans();
     deps.kits = &database_->kits();
     deps.frames = &database_->frames();
