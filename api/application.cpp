@@ -61,7 +61,8 @@ struct Application::State {
                    : nullptr),
         missions({deps.missions, deps.measurements, deps.anchors, hub, events, deps.clock, deps.post,
                   deps.goal, [this] { return device_rows(); }, judge(), needs_cir(), deps.site_outline,
-                  &steady, deps.exclusions, deps.track, &late}),
+                  &steady, deps.exclusions, deps.track, &late,
+                  [this](const MissionId& id) { return clues_of_flight(id); }}),
         stream({deps.devices, deps.service, deps.missions, events}),
         housekeeping({deps.bin, running, events, [this] { return router.purge_answers(); },
                       deps.keep_deleted_ns, deps.housekeeping_by_hand}),
@@ -357,6 +358,7 @@ void Application::start() {
     else if (state_->deps.log_fault)
       state_->deps.log_fault("", before.error().message);
   });
+  (void)guarded("missions at the start", [this] { state_->missions.resume(); });
   (void)guarded("devices of the flight at the start", [this] { state_->stream.resume(); });
   if (state_->flights) state_->flights->start();
   state_->jobs.start();

@@ -213,10 +213,11 @@ Ordered anchor_feature_json(const AnchorFeature& feature) {
   p["links"] = Ordered::array({{{"rel", "history"}, {"href", self + "/history"}}});
   if (anchor.site)
     p["links"].push_back({{"rel", "site"}, {"href", "/api/v1/sites/" + to_string(*anchor.site)}});
-  return {{"type", "Feature"},
-          {"id", to_string(anchor.id)},
-          {"geometry", point(placed ? estimate->best->wgs84 : std::nullopt)},
-          {"properties", std::move(p)}};
+  Ordered out{{"type", "Feature"}};
+  if (!(anchor.id == AnchorId{})) out["id"] = to_string(anchor.id);  // absent: not stored yet
+  out["geometry"] = point(placed ? estimate->best->wgs84 : std::nullopt);
+  out["properties"] = std::move(p);
+  return out;
 }
 
 Ordered flat_feature_json(const AnchorFeature& feature) {
@@ -261,7 +262,7 @@ std::string anchors_csv_header() {
 
 std::string anchor_csv_row(const AnchorFeature& feature) {
   const Anchor& a = feature.anchor;
-  std::string row = to_string(a.id) + ',' + to_string(a.network_id);
+  std::string row = (a.id == AnchorId{} ? "" : to_string(a.id)) + ',' + to_string(a.network_id);
   const auto add = [&row](std::string_view cell) {
     row += ',';
     row += cell;

@@ -111,6 +111,16 @@ AnchorFeature published_feature(Lookup& lookup, Anchor anchor, const PublishedPo
   return feature;
 }
 
+/// As it is stored; one whose row follows the flight by a moment, or waits for the disk, has no id yet.
+/// Reading stores nothing.
+Anchor anchor_as_stored(Services& s, NetworkId id) {
+  auto found = s.deps.anchors.anchor(id);
+  if (found || found.error().code != Errc::not_found) return value_or_problem(std::move(found));
+  Anchor anchor;
+  anchor.network_id = id;
+  return anchor;
+}
+
 std::uint64_t newest_revision(Services& s) {
   const auto newest = value_or_problem(s.deps.anchors.revisions(1, 0));
   return newest.empty() ? 0 : newest.front().number;
@@ -124,9 +134,7 @@ std::vector<AnchorFeature> published(Services& s, std::optional<std::uint64_t> r
   Lookup lookup(s);
   std::vector<AnchorFeature> out;
   for (const auto& position : value_or_problem(s.deps.anchors.published(number))) {
-    auto anchor =
-        value_or_problem(s.deps.anchors.find_or_create(position.estimate.anchor, s.deps.clock.now()));
-    out.push_back(published_feature(lookup, std::move(anchor), position, number));
+    out.push_back(published_feature(lookup, anchor_as_stored(s, position.estimate.anchor), position, number));
   }
   std::sort(out.begin(), out.end(),
             [](const auto& a, const auto& b) { return a.anchor.network_id < b.anchor.network_id; });
@@ -151,7 +159,7 @@ std::vector<AnchorFeature> live(Services& s, const std::optional<MissionId>& mis
   }
   std::vector<AnchorFeature> out;
   for (auto& [id, feature] : newest) {
-    feature.anchor = value_or_problem(s.deps.anchors.find_or_create(id, s.deps.clock.now()));
+    feature.anchor = anchor_as_stored(s, id);
     feature.site = lookup.site(feature.anchor.site);
     out.push_back(std::move(feature));
   }
@@ -353,7 +361,12 @@ void add_anchor_routes(Router& router, Services& s) {
   const auto on = [&s](auto function) {
     return [&s, function](const Request& request) { return function(s, request); };
   };
-  router.add({Method::get, "/api/v1/anchors", readers(), on(list)});
+  Route listed{Method::get, "/api/v1/anchors", readers(), on(list)};
+  // Running estimates of a mission that is not followed are computed.
+  listed.work_of = [](const Request& request) {
+    return request.query_value("view") == "live" ? Work::heavy : Work::ordinary;
+  };
+  router.add(std::move(listed));
   router.add({Method::get, "/api/v1/anchors/{id}", readers(), [&s](const Request& request) {
                 check_query(request, {});
                 return answer(feature_of(s, path_anchor(s, request)));

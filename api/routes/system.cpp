@@ -73,6 +73,8 @@ Response metrics(Services& s, const Request&) {
   add("anchord_ws_slow_disconnects_total", "counter", live.slow_disconnects);
   add("anchord_live_queue_rows", "gauge", s.missions.queued());
   add("anchord_db_size_bytes", "gauge", storage.db_bytes);
+  add("anchord_live_missions", "gauge", s.missions.followed());
+  add("anchord_live_missions_evicted_total", "counter", s.missions.evicted());
   add("anchord_disk_free_bytes", "gauge", storage.disk_free_bytes);
   if (s.deps.metrics_text) text += s.deps.metrics_text();
   Response response;

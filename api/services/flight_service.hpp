@@ -75,7 +75,7 @@ class FlightService final : public MissionObserver {
   Result<void> release_control(const MissionId& mission, const std::string& key, const Principal& who);
   std::optional<Lease> control();
   /// Whether this mission's flight is in the air; and which mission flies this plan.
-  bool flies(const MissionId& mission);
+  bool flies(const MissionId& mission) override;
   std::optional<MissionId> flown_with(const PlanId& plan);
 
   struct Order {

@@ -13,6 +13,26 @@ constexpr int k_joint_rest = 24;
 
 }  // namespace
 
+std::string MissionService::State::outline_of(const Mission& mission) const {
+  if (!deps.site_outline || !mission.site || mission.frame != TrackFrame::wgs84) return {};
+  const auto site = deps.anchors.site(*mission.site);
+  return site ? site.value().outline_geojson : std::string();
+}
+
+/// Under its work_mutex; nothing where a joint solution would be no better.
+std::optional<JointWorker::Task> MissionService::State::joint_task(Flight& flight, const Mission& mission,
+                                                                   const std::string& outline) const {
+  if (flight.history.n_ranges() < k_min_joint_ranges) return std::nullopt;
+  JointWorker::Task task;
+  task.options.origin = flight.live.origin();
+  if (flight.frame == TrackFrame::wgs84 && !task.options.origin) return std::nullopt;
+  task.flight = flight.history.data(mission);
+  if (task.options.origin) task.options.clues = clues_in(flight.clues, EnuFrame(*task.options.origin));
+  if (!outline.empty()) task.options.outline_m = outline_in_enu(outline, *task.options.origin);
+  task.options.track = deps.track;
+  return task;
+}
+
 void MissionService::State::start_joint(const std::shared_ptr<Flight>& flight) {
   if (stopped || flight->rebuilding || !joint.idle()) return;
   Mission mission;
@@ -20,29 +40,21 @@ void MissionService::State::start_joint(const std::shared_ptr<Flight>& flight) {
     const std::scoped_lock lock(flight->queue_mutex);
     mission = flight->mission;
   }
-  std::string outline;
-  if (deps.site_outline && mission.site && flight->frame == TrackFrame::wgs84) {
-    if (const auto site = deps.anchors.site(*mission.site)) outline = site.value().outline_geojson;
-  }
+  const std::string outline = outline_of(mission);
   const std::unique_lock lock(flight->work_mutex, std::try_to_lock);
   if (!lock || flight->joint_running || flight->ranges_since_joint == 0) return;
   const auto now = std::chrono::steady_clock::now();
-  if (flight->history.n_ranges() < k_min_joint_ranges || now < flight->joint_not_before) return;
-  JointWorker::Task task;
-  task.flight = flight->history.data(mission);
-  task.options.origin = flight->live.origin();
-  if (flight->frame == TrackFrame::wgs84 && !task.options.origin) return;
-  if (task.options.origin) task.options.clues = clues_in(flight->clues, EnuFrame(*task.options.origin));
-  if (!outline.empty()) task.options.outline_m = outline_in_enu(outline, *task.options.origin);
-  task.options.track = deps.track;
-  task.done = [self = this, flight, cut = flight->history.newest(), now,
-               beginning = flight->beginning](const FlightSolution* solution) {
+  if (now < flight->joint_not_before) return;
+  auto task = joint_task(*flight, mission, outline);
+  if (!task) return;
+  task->done = [self = this, flight, cut = flight->history.newest(), now,
+                beginning = flight->beginning](const FlightSolution* solution) {
     self->finish_joint(*flight, solution, cut, std::chrono::steady_clock::now() - now, beginning);
   };
   // Set before the worker can be done.
   flight->joint_running = true;
   flight->ranges_since_joint = 0;
-  if (!joint.try_start(std::move(task))) flight->joint_running = false, flight->ranges_since_joint = 1;
+  if (!joint.try_start(*std::move(task))) flight->joint_running = false, flight->ranges_since_joint = 1;
 }
 
 void MissionService::State::finish_joint(Flight& flight, const FlightSolution* solution, UtcTime cut,

@@ -26,7 +26,8 @@ template <class R>
 void MissionService::State::enqueue(Flight& flight, const R& row, SteadyTime now) {
   LiveRow judged = row_of(row);
   const std::scoped_lock lock(flight.queue_mutex);
-  flight.last_arrival = now;
+  if (flight.gone) return;
+  flight.last_arrival = flight.used = now;
   (std::is_same_v<R, Fix> ? flight.fix_arrival : flight.range_arrival) = now;
   if (flight.queue.size() >= k_max_queued_rows) {
     flight.queue.pop_front();

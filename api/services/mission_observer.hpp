@@ -9,12 +9,14 @@ struct RangeResult;
 
 namespace anchord::api {
 
-/// What a mission's live path tells whoever flies by it. Called on the mission's strand: be brief.
+/// What a mission's live path tells whoever flies by it. on_* are called on the mission's strand: be brief.
 class MissionObserver {
  public:
   virtual ~MissionObserver() = default;
   virtual void on_fix(const Fix& fix) = 0;
   virtual void on_range(const MissionId& mission, const RangeResult& result) = 0;
+  /// Whether its flight is in the air, so that its mission stays in memory. Called with no lock held.
+  virtual bool flies(const MissionId& mission) = 0;
 };
 
 }  // namespace anchord::api

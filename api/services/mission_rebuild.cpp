@@ -19,6 +19,16 @@ std::vector<Exclusion> MissionService::State::exclusions_of(const MissionId& id)
   return all ? std::move(all).value() : std::vector<Exclusion>{};
 }
 
+std::unique_ptr<MissionService::Flight> MissionService::State::flight_from_store(
+    const Mission& mission) const {
+  auto flight = std::make_unique<Flight>(mission, live_options(mission));
+  flight->exclusions = exclusions_of(mission.id);
+  if (deps.kept_clues) flight->clues = deps.kept_clues(mission.id);
+  flight->clues_told = false;
+  flight->state.time = mission.created;
+  return flight;
+}
+
 void MissionService::State::begin_rebuild(const std::shared_ptr<Flight>& flight) {
   const auto n = deps.measurements.count_ranges(flight->id),
              fixes = deps.measurements.count_fixes(flight->id);
@@ -26,16 +36,18 @@ void MissionService::State::begin_rebuild(const std::shared_ptr<Flight>& flight)
     flight->rebuilding = false;
     return schedule(flight);
   }
-  {
-    const std::scoped_lock lock(flight->work_mutex);
-    flight->rebuild = std::make_unique<Flight::Rebuild>();
-    auto& r = *flight->rebuild;
-    r.range_filter.mission = r.fix_filter.mission = flight->id;
-    r.range_filter.limit = r.fix_filter.limit = 2000;
-    r.range_filter.with_cir = deps.judge_needs_cir && deps.judge_needs_cir();
-    flight->live.hold(true);
-  }
+  start_reading(*flight);
   continue_rebuild(flight);
+}
+
+void MissionService::State::start_reading(Flight& flight) const {
+  const std::scoped_lock lock(flight.work_mutex);
+  flight.rebuild = std::make_unique<Flight::Rebuild>();
+  auto& r = *flight.rebuild;
+  r.range_filter.mission = r.fix_filter.mission = flight.id;
+  r.range_filter.limit = r.fix_filter.limit = 2000;
+  r.range_filter.with_cir = deps.judge_needs_cir && deps.judge_needs_cir();
+  flight.live.hold(true);
 }
 
 void MissionService::State::continue_rebuild(const std::shared_ptr<Flight>& flight) {
@@ -44,7 +56,9 @@ void MissionService::State::continue_rebuild(const std::shared_ptr<Flight>& flig
     bool more = false;
     const auto ran = guarded("flight rebuilt", [&] { more = self->rebuild_slice(*flight); });
     if (more) return self->continue_rebuild(flight);
-    if (!ran) {  // what was read so far stands; rows that come now are not held up by it
+    if (ran) {
+      self->end_rebuild(*flight);
+    } else {  // what was read so far stands; rows that come now are not held up by it
       const std::scoped_lock lock(flight->work_mutex);
       flight->rebuild.reset();
       flight->live.hold(false);
@@ -91,11 +105,17 @@ bool MissionService::State::rebuild_slice(Flight& flight) {
   }
   flight.rebuild.reset();
   std::ranges::sort(flight.rebuilt);
+  take_clues(flight);
+  tell_live(flight);
   flight.live.hold(false);
+  return false;
+}
+
+void MissionService::State::end_rebuild(Flight& flight) {
+  const std::scoped_lock lock(flight.work_mutex);
   announce(flight, true);
   publish_pose(flight);
   flight.dirty = true;
-  return false;
 }
 
 }  // namespace anchord::api

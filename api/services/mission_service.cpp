@@ -59,11 +59,13 @@ Result<Mission> MissionService::finish(const MissionId& id) {
     flight->dirty = true;
     state_->schedule(flight);
   }
+  state_->forget_reads(id);
   state_->deps.events.add("info", "mission.finished", current.name + " finished", id);
   return current;
 }
 
 void MissionService::forget(const MissionId& id) {
+  state_->forget_reads(id);
   const std::scoped_lock lock(state_->mutex);
   ++state_->forgotten;
   state_->cache.erase(id);
@@ -76,9 +78,8 @@ void MissionService::prepare(const MissionId& id) {
   if (state_->find(id)) return;
   const auto record = mission(id);
   if (!record) return;
-  auto flight = std::make_shared<Flight>(record.value(), state_->live_options(record.value()));
-  flight->exclusions = state_->exclusions_of(id);
-  flight->state.time = record.value().created;
+  std::shared_ptr<Flight> flight = state_->flight_from_store(record.value());
+  flight->used = state_->steady_now();
   // Told before it can be found: rows that come meanwhile wait in the queue.
   flight->rebuilding = true;
   {
@@ -86,9 +87,20 @@ void MissionService::prepare(const MissionId& id) {
     if (!state_->flights.emplace(id, flight).second) return;
   }
   state_->begin_rebuild(flight);
+  state_->evict();
+}
+
+void MissionService::resume() {
+  constexpr std::size_t k_newest = 5;
+  const auto newest = state_->deps.missions.missions(k_newest, std::nullopt);
+  if (!newest) return;
+  for (const auto& mission : newest.value()) {
+    if (mission.state == MissionState::recording) prepare(mission.id);
+  }
 }
 
 void MissionService::exclusions_changed(const MissionId& id) {
+  state_->forget_reads(id);
   const auto flight = state_->find(id);
   if (!flight) return;
   // Rows that come from here on wait in the queue until what is stored is in.
@@ -122,6 +134,7 @@ bool MissionService::wants_cir() const {
 }
 
 void MissionService::note_in_flights(const std::string& code, const std::string& text) {
+  state_->forget_reads(std::nullopt);  // the models that judged their ranges may be others now
   std::vector<MissionId> recording;
   {
     const std::scoped_lock lock(state_->mutex);
@@ -144,21 +157,19 @@ void MissionService::accepted(std::span<const Fix> fixes, std::span<const RowOut
 
 std::vector<MissionService::LiveView> MissionService::live(const std::optional<MissionId>& id) {
   std::vector<std::shared_ptr<Flight>> wanted;
-  if (id) {
-    prepare(*id);
-    if (auto flight = state_->find(*id)) wanted.push_back(std::move(flight));
-  } else {
-    // After a restart nothing is followed yet: bring back the newest flights that still record.
-    if (const auto newest = state_->deps.missions.missions(5, std::nullopt)) {
-      for (const auto& mission : newest.value()) {
-        if (mission.state == MissionState::recording) prepare(mission.id);
-      }
-    }
-    const std::scoped_lock lock(state_->mutex);
-    for (const auto& [mission, flight] : state_->flights) wanted.push_back(flight);
+  if (!id) {
+    wanted = state_->all();
+  } else if (auto flight = state_->find(*id)) {
+    wanted.push_back(std::move(flight));
+  } else if (auto read = state_->read(*id)) {
+    return {*std::move(read)};
   }
   std::vector<LiveView> out;
   for (const auto& flight : wanted) {
+    if (id) {
+      const std::scoped_lock lock(flight->queue_mutex);
+      flight->used = state_->steady_now();
+    }
     const std::scoped_lock lock(flight->work_mutex);
     out.push_back(state_->view(*flight));
   }
@@ -205,6 +216,7 @@ void MissionService::tick() {
                              flight->state.time.us(), to_string(mission.id));
   }
   if (++state_->ticks % 2 == 0) state_->publish_devices();
+  state_->evict();
 }
 
 std::uint64_t MissionService::finished() const { return state_->finished; }
@@ -231,6 +243,13 @@ std::vector<FlightPulse> MissionService::pulses() {
 }
 
 std::size_t MissionService::queued() const { return state_->queued; }
+
+std::size_t MissionService::followed() const {
+  const std::scoped_lock lock(state_->mutex);
+  return state_->flights.size();
+}
+
+std::uint64_t MissionService::evicted() const { return state_->evicted; }
 
 bool MissionService::recording() const {
   const SteadyTime now = state_->steady_now();

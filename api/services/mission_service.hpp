@@ -66,7 +66,13 @@ class MissionService {
     ExclusionStore* exclusions{nullptr};  ///< null: nothing is ever excluded (tests)
     TrackLimits track{};                  ///< what the positions of a flight are held against
     LateWriter* late{nullptr};            ///< null: what it writes it writes at once
+    /// What turns and height searches of a mission's flight told, as kept with it; absent: nothing is kept.
+    std::function<procedure::FlightClues(const MissionId&)> kept_clues{};
   };
+  /// Missions kept in memory although nothing of them is in the air: finished, or silent for k_silent_s. The
+  /// others of these are evicted, least recently used first; the store has all of them.
+  static constexpr std::size_t k_most_at_rest = 4;
+  static constexpr double k_silent_s = 900;  ///< a change of battery is shorter
   explicit MissionService(Deps deps);
   ~MissionService();
 
@@ -82,6 +88,8 @@ class MissionService {
   /// Before rows of this mission are stored: makes its live flight, and has what the store holds already read
   /// in by tasks of the pool, so that a restart in flight goes on where it was and no request waits for it.
   void prepare(const MissionId& id);
+  /// After a restart: prepares the newest missions that still record, for their next rows are live at once.
+  void resume();
   /// The promoted models want impulse responses: rows are accepted with them, and lose them once judged.
   bool wants_cir() const;
   /// An event in the record of every flight that records now.
@@ -107,7 +115,9 @@ class MissionService {
     std::optional<Wgs84> origin;
     std::vector<Estimate> estimates;
   };
-  /// Running estimates of one mission, or of every recording one.
+  /// Running estimates of one mission, or of all that are followed. Follows no mission: of one that is not
+  /// followed they are computed from what the store holds (seconds for a long flight), and the answer alone
+  /// is kept for a minute.
   std::vector<LiveView> live(const std::optional<MissionId>& id);
   /// The same for whoever must not wait: nothing while its rows are worked off, and then what they gave as
   /// soon as they are.
@@ -122,7 +132,9 @@ class MissionService {
   std::vector<FlightPulse> pulses();
   /// Rows that wait to be worked off, over all missions.
   std::size_t queued() const;
-  bool recording() const;  ///< a mission got measurements in the last 5 s
+  std::size_t followed() const;   ///< missions in memory
+  std::uint64_t evicted() const;  ///< missions that left it since the start
+  bool recording() const;         ///< a mission got measurements in the last 5 s
   /// Refuses new work and waits until no task is running.
   void stop();
 

@@ -40,6 +40,9 @@ struct MissionService::Flight {
   bool closing{false};  ///< finished, and what waits for a fix is not told yet
   std::uint64_t dropped{0};
   SteadyTime last_arrival{};
+  SteadyTime used{};  ///< last by a sender or a reader
+  bool gone{
+      false};  ///< evicted: rows that found it before are in the store, where the next flight reads them
   std::optional<SteadyTime> fix_arrival{}, range_arrival{};
   std::mutex work_mutex;  ///< the strand: everything below
   LiveFlight live;
@@ -68,12 +71,13 @@ struct MissionService::Flight {
     bool more_ranges{true}, more_fixes{true};
   };
   std::unique_ptr<Rebuild> rebuild;
+  bool busy() const;
   std::vector<std::size_t> rebuilt;  ///< identities, sorted at the end, until the queue was worked off once
 };
 
 /// What the service is inside; its parts are in mission_live.cpp (rows to estimates to the hub),
-/// mission_rebuild.cpp (what was stored, after a restart) and mission_joint.cpp (the joint solution in
-/// flight).
+/// mission_rebuild.cpp (what was stored, after a restart), mission_joint.cpp (the joint solution in flight)
+/// and mission_memory.cpp (which are in memory, and what a reader of the others gets).
 struct MissionService::State : std::enable_shared_from_this<MissionService::State> {
   explicit State(Deps d) : deps(std::move(d)) {}
   Deps deps;
@@ -90,7 +94,17 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   std::condition_variable idle;
   int running{0};
   std::int64_t ticks{0};
+  std::atomic<std::uint64_t> evicted{0};
   JointWorker joint;
+  struct Read {
+    MissionId id{};
+    std::uint64_t n_ranges{}, n_fixes{};
+    SteadyTime made{};
+    LiveView view;
+  };
+  std::mutex reading_mutex;  ///< one flight is read at a time: each takes the memory of a live one
+  std::mutex reads_mutex;
+  std::deque<Read> reads;  ///< newest last
 
   SteadyTime steady_now() const {
     return (deps.steady != nullptr ? *deps.steady : system_steady_clock()).now();
@@ -130,7 +144,18 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   void publish_pose(Flight& flight);
   void begin_rebuild(const std::shared_ptr<Flight>& flight);
   void continue_rebuild(const std::shared_ptr<Flight>& flight);
+  void start_reading(Flight& flight) const;
+  void end_rebuild(Flight& flight);
   bool rebuild_slice(Flight& flight);
+  std::unique_ptr<Flight> flight_from_store(const Mission& mission) const;
+  void evict();
+  bool take_out(Flight& flight);
+  std::optional<LiveView> read(const MissionId& id);
+  std::optional<LiveView> read_before(const Read& now);
+  void forget_reads(const std::optional<MissionId>& id);
+  std::optional<JointWorker::Task> joint_task(Flight& flight, const Mission& mission,
+                                              const std::string& outline) const;
+  std::string outline_of(const Mission& mission) const;
   void post(std::function<void()> task);
   LiveOptions live_options(const Mission& mission) const;
   std::vector<Exclusion> exclusions_of(const MissionId& id) const;

@@ -176,8 +176,17 @@ TEST_F(LiveFirst, ARowOfTwoSendersIsLiveOnceWhoeverIsStoredFirst) {
   EXPECT_EQ(live(), 0);
 }
 
-TEST_F(LiveFirst, RowsOfAMissionThatNobodyLookedAtAreLiveOnceTheyAreStored) {
+TEST_F(LiveFirst, RowsOfAMissionThatRecordsAreLiveAtOnceAfterARestart) {
   const auto flight = mission();
+  restart();
+  listen();
+  app_->device_rows().live(of_device(flight, 0, 25));
+  EXPECT_EQ(live(), 25);
+}
+
+TEST_F(LiveFirst, RowsOfAMissionThatIsNotFollowedAreLiveOnceTheyAreStored) {
+  const auto flight = mission();
+  ASSERT_EQ(post("/api/v1/missions/" + flight + "/actions", R"({"action":"finish"})").status, 200);
   restart();
   listen();
   const auto batch = of_device(flight, 0, 25);
