@@ -7,6 +7,7 @@
 #include "api/live/hub.hpp"
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
+#include "api/services/flight_service.hpp"
 #include "core/ports/devices.hpp"
 #include "core/ports/drone.hpp"
 #include "core/ports/store.hpp"
@@ -72,10 +73,11 @@ Response metrics(Services& s, const Request&) {
   add("anchord_ws_conflated_total", "counter", live.conflated);
   add("anchord_ws_slow_disconnects_total", "counter", live.slow_disconnects);
   add("anchord_live_queue_rows", "gauge", s.missions.queued());
-  add("anchord_db_size_bytes", "gauge", storage.db_bytes);
   add("anchord_live_missions", "gauge", s.missions.followed());
   add("anchord_live_missions_evicted_total", "counter", s.missions.evicted());
+  add("anchord_db_size_bytes", "gauge", storage.db_bytes);
   add("anchord_disk_free_bytes", "gauge", storage.disk_free_bytes);
+  if (s.flights != nullptr) text += s.flights->metrics();
   if (s.deps.metrics_text) text += s.deps.metrics_text();
   Response response;
   response.header("Content-Type", "text/plain; version=0.0.4; charset=utf-8");

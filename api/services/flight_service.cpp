@@ -1,5 +1,7 @@
 #include "api/services/flight_service.hpp"
 
+#include <algorithm>
+#include <chrono>
 #include <nlohmann/json.hpp>
 
 #include "api/application.hpp"
@@ -25,12 +27,16 @@ void FlightService::start() {
   }
   if (state_->deps.now_s || state_->thread.joinable()) return;
   state_->thread = Thread("anchord-fly", [this] {
+    using Steady = std::chrono::steady_clock;
+    auto due = Steady::now();
     std::unique_lock lock(state_->mutex);
     while (!state_->stopping) {
       lock.unlock();
       (void)guarded("flight", [this] { step(); });
+      // At a fixed rate; a round that came late is not made up for.
+      due = std::max(due + std::chrono::milliseconds(100), Steady::now());
       lock.lock();
-      state_->wake.wait_for(lock, std::chrono::milliseconds(100), [&] { return state_->stopping; });
+      state_->wake.wait_until(lock, due, [&] { return state_->stopping; });
     }
   });
 }
@@ -293,6 +299,10 @@ std::vector<std::string> FlightService::height_texts(const MissionId& mission) {
 std::vector<std::pair<std::string_view, std::string>> FlightService::alarms() {
   const std::scoped_lock lock(state_->mutex);
   return state_->alarms();
+}
+
+std::string FlightService::metrics() const {
+  return state_->checks_apart.text("anchord_safety_interval_seconds");
 }
 
 }  // namespace anchord::api

@@ -118,6 +118,8 @@ class FlightService final : public MissionObserver {
   std::vector<std::string> height_texts(const MissionId& mission);
   /// Every alarm a flight can raise, with what is wrong now; empty: nothing is.
   std::vector<std::pair<std::string_view, std::string>> alarms();
+  /// Time between two checks of procedure and safety of a flight in the air, in Prometheus text.
+  std::string metrics() const;
 
  private:
   struct State;

@@ -214,6 +214,7 @@ void FlightService::State::round(const MissionService::LiveView* live) {
   }
   read_reports();
   give_fence();
+  if (!flight || !flight->flying()) checks_apart.pause();
   if (!flight || !flight->aborted.empty()) return;
   auto& f = *flight;
   if (f.manual && f.by_hand.position_m && f.former_s) f.control.by_hand(*f.former_s, f.by_hand);
@@ -231,7 +232,9 @@ void FlightService::State::round(const MissionService::LiveView* live) {
   }
   // Without answers a decision would be one of ignorance: it is made when they were read.
   const bool ready = f.control.engine().state().step != Step::find_next_point || live != nullptr;
-  f.control.round(now_s(), estimates, ready);
+  const double now = now_s();
+  if (f.flying()) checks_apart.note(now);
+  f.control.round(now, estimates, ready);
   note_dispatched(f, nullptr);
   tell_happenings(f);
 }

@@ -9,6 +9,7 @@
 #include "api/application.hpp"
 #include "api/json/plan_json.hpp"
 #include "api/services/flight_service.hpp"
+#include "api/services/interval_histogram.hpp"
 #include "api/services/mission_service.hpp"
 #include "core/base/guard.hpp"
 #include "core/procedure/flight_control.hpp"
@@ -126,6 +127,7 @@ struct FlightService::State {
   std::optional<std::uint64_t> unconfirmed;                ///< of the newest command that got no answer
   std::uint64_t number{0}, newest_by_person{0};
   std::vector<FlightUpload> uploads;                    ///< the newest of each kind
+  IntervalHistogram checks_apart;                       ///< of safety, while something flies
   std::optional<std::pair<MissionId, Plan>> preparing;  ///< whose checklist is being worked off
 
   struct Checked {

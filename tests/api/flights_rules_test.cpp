@@ -85,5 +85,32 @@ TEST_F(Flights, StartingAgainInTheAirNeedsAHomeOnTheGround) {
   EXPECT_LT((drone_->autopilot.vehicle().position_m() - k_home_m).norm(), 2) << "on the ground, at home";
 }
 
+/// How far apart the safety checks of a flight are is measured while it is in the air, and only then.
+TEST_F(Flights, TheIntervalOfSafetyChecksIsMeasuredInTheAir) {
+  const auto figure = [&](const std::string& name) {
+    const std::string text = get("/metrics").body, line = "\nanchord_safety_interval_seconds" + name + ' ';
+    const auto at = text.find(line);
+    EXPECT_NE(at, std::string::npos) << text;
+    return at == std::string::npos ? -1 : std::stod(text.substr(at + line.size()));
+  };
+  EXPECT_EQ(figure("_count"), 0);
+  const auto lease = take_off();
+  const double n = figure("_count");
+  fly(5);
+  EXPECT_EQ(figure("_count"), n + 50) << "ten a second";
+  EXPECT_NEAR(figure("_worst"), 0.1, 1e-6);
+  EXPECT_EQ(figure("_bucket{le=\"0.11\"}"), n + 50);
+  drone_->run_until(drone_->now + 0.7);  // nobody looks
+  fly(1);
+  EXPECT_NEAR(figure("_worst"), 0.8, 1e-6);
+  EXPECT_EQ(figure("_bucket{le=\"0.5\"}"), n + 59);
+  EXPECT_EQ(figure("_bucket{le=\"1\"}"), n + 60);
+  ASSERT_EQ(act("land", lease).status, 202);
+  EXPECT_TRUE(fly_until([&] { return procedure()["status"] == "done"; }, 60));
+  const double landed = figure("_count");
+  fly(3);
+  EXPECT_EQ(figure("_count"), landed) << "on the ground nothing is watched";
+}
+
 }  // namespace
 }  // namespace anchord::test

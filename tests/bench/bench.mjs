@@ -11,6 +11,8 @@ import { commands } from './commands.mjs';
 import { devices } from './devices.mjs';
 import { grid } from './grid.mjs';
 import { cpuSeconds, hammer, percentile, request } from './load.mjs';
+import { safety } from './safety.mjs';
+import { start_search } from './search.mjs';
 
 const wanted = process.argv.slice(2);
 const on = (name) => wanted.length === 0 || wanted.includes(name);
@@ -332,40 +334,11 @@ async function fanout(server) {
 
 /** Live ranges with and without a grid search that keeps every core busy. */
 async function training(server) {
-  const send = async (path, init, status) => {
-    const answer = await server.fetch(path, init);
-    const text = await answer.text();
-    if (answer.status !== status) throw new Error(`${path}: ${answer.status} ${text.slice(0, 300)}`);
-    return JSON.parse(text);
-  };
-  await send('/api/v1/campaigns', { json: { name: 'bench' } }, 201);
-  const csv = readFileSync(join(root, 'docs/examples/campaign.csv'));
-  await send(
-    '/api/v1/campaigns/bench/samples',
-    { method: 'POST', headers: { 'content-type': 'text/csv' }, body: csv },
-    200,
-  );
-  await send('/api/v1/datasets', { json: { name: 'bench', campaigns: ['bench'], aggregation: 'none' } }, 201);
   const quiet = await liveLatency(server, 'bench without training', 4);
-  const values = (n, from, step) => Array.from({ length: n }, (_, i) => Number((from * step ** i).toPrecision(6)));
-  const job = await send(
-    '/api/v1/training-runs',
-    {
-      json: {
-        task: 'nlos_id',
-        dataset: 'bench',
-        methods: ['svm'],
-        importance: false,
-        grid: { svm: { c: values(90, 0.1, 1.1), gamma: values(90, 0.001, 1.1) } },
-      },
-    },
-    202,
-  );
-  const now = () => send(`/api/v1/jobs/${job.id}`, {}, 200);
-  await eventually('the search runs', async () => (await now()).progress.stage === 'search', 30_000);
+  const search = await start_search(server);
   const busy = await liveLatency(server, 'bench with training', 4);
-  const still = (await now()).state;
-  await server.fetch(`/api/v1/jobs/${job.id}`, { method: 'DELETE' });
+  const still = await search.state();
+  await search.stop();
   row(
     'live range, 100/s to 4 clients, beside a grid search',
     `p50 ${busy.p50.toFixed(1)} ms, p99 ${busy.p99.toFixed(1)} ms (search ${still})`,
@@ -408,7 +381,13 @@ if (['ingest', 'get', 'fanout', 'training', 'devices'].some(on)) {
       ['get', get],
       ['fanout', fanout],
       ['training', training],
-      ['devices', (s) => devices(s, row)],
+      [
+        'devices',
+        async (s) => {
+          await devices(s, row);
+          await safety(row);
+        },
+      ],
     ]) {
       if (!on(name)) continue;
       say(name);

@@ -1,15 +1,10 @@
 // How long an aircraft in the air waits for the operator's word while others flood the server: plan checks of a viewer, generated
 // waypoints of a second operator, long lists, idle sockets, guesses of tokens. Real server with its limits on, simulated aircraft.
-import { spawn } from 'node:child_process';
-import { createSocket } from 'node:dgram';
-import { writeFileSync } from 'node:fs';
 import { connect } from 'node:net';
-import { join } from 'node:path';
 import { Worker } from 'node:worker_threads';
-import { binary, eventually, startServer } from '../e2e/server.mjs';
+import { airborne, origin } from './airborne.mjs';
 import { percentile } from './load.mjs';
 
-const origin = { lon: 3.7131, lat: 51.0231, h_m: 55.5 };
 const at = (east, north) => [origin.lon + east / 70_100, origin.lat + north / 111_250];
 /** A star-shaped hall and many waypoints round it: a check of some tenths of a second. */
 function plan(n) {
@@ -28,37 +23,6 @@ function plan(n) {
     }),
   };
 }
-const flight_plan = {
-  name: 'Hall',
-  building_height_m: 8,
-  origin,
-  settings: { keep_out_m: 4, max_height_m: 20 },
-  outline: {
-    type: 'Polygon',
-    coordinates: [
-      [
-        [3.7131, 51.0231],
-        [3.7135275, 51.0231],
-        [3.7135275, 51.0232799],
-        [3.7131, 51.0232799],
-        [3.7131, 51.0231],
-      ],
-    ],
-  },
-  waypoints: [
-    { lon: 3.713, lat: 51.02305, height_above_ground_m: 4 },
-    { lon: 3.71362, lat: 51.02305, height_above_ground_m: 9 },
-  ],
-};
-
-async function free_port() {
-  const socket = createSocket('udp4');
-  await new Promise((done) => socket.bind(0, '127.0.0.1', done));
-  const { port } = socket.address();
-  await new Promise((done) => socket.close(done));
-  return port;
-}
-
 function histogram(times) {
   const edges = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 5000, Infinity];
   let from = 0;
@@ -74,81 +38,20 @@ function histogram(times) {
 }
 
 export async function commands(row, seconds = 10) {
-  const port = await free_port();
-  const server = await startServer({
-    auth: 'on',
-    args: ['--drone-address', `udp://:${port}`, '--rate-per-s', '100000', '--rate-burst', '100000'],
-  });
-  const must = async (path, options, ...good) => {
-    const answer = await server.fetch(path, options),
-      text = await answer.text();
-    if (!good.includes(answer.status))
-      throw new Error(`${options?.json ? 'POST' : 'GET'} ${path}: ${answer.status} ${text.slice(0, 400)}`);
-    return text ? JSON.parse(text) : null;
-  };
-  const token = async (...roles) => (await must('/api/v1/tokens', { json: { name: roles.join(), roles } }, 201)).token;
-  let aircraft, flood;
+  const {
+    server,
+    mission,
+    base,
+    lease,
+    tokens: { viewer, second },
+    must,
+    as,
+    stop,
+  } = await airborne();
+  let flood;
   const sockets = [];
   try {
-    const [pilot, kit, viewer, second] = [
-      await token('operator'),
-      await token('gateway', 'operator'),
-      await token('viewer'),
-      await token('operator'),
-    ];
-    const file = join(server.dataDir, 'kit.token');
-    writeFileSync(file, kit);
-    let said = '';
-    aircraft = spawn(
-      binary,
-      [
-        'simulate',
-        'drone',
-        '--mavlink',
-        `udp://127.0.0.1:${port}`,
-        '--url',
-        server.url,
-        '--ready',
-        '1',
-        '--token-file',
-        file,
-      ],
-      { stdio: ['ignore', 'ignore', 'pipe'] },
-    );
-    aircraft.stderr.setEncoding('utf8').on('data', (chunk) => (said += chunk));
-    const mission = await eventually('the aircraft makes its mission', () => /mission ([0-9a-f-]{36})/.exec(said)?.[1]);
-    const base = `/api/v1/missions/${mission}`,
-      as = (json) => ({ token: pilot, json });
-    const flown = (await must('/api/v1/plans', as(flight_plan), 201)).id,
-      heavy = (await must('/api/v1/plans', as(plan(400)), 201)).id;
-    await must(`${base}/checklist?plan=${flown}`, { token: pilot }, 200);
-    await eventually(
-      'the aircraft is heard and its fixes come',
-      async () =>
-        (await must(`${base}/checklist?plan=${flown}`, { token: pilot }, 200)).items
-          .filter((i) => i.state === 'failed')
-          .every((i) => i.overridable),
-      30_000,
-      200,
-    );
-    for (const item of (await must(`${base}/checklist?plan=${flown}`, { token: pilot }, 200)).items.filter(
-      (i) => i.state !== 'ok',
-    ))
-      await must(`${base}/checklist/${item.id}`, as({ reason: 'bench' }), 200);
-    const { lease } = await must(`${base}/control`, as({ action: 'take' }), 200);
-    await eventually(
-      'the flight begins',
-      async () => (await server.fetch(`${base}/actions`, as({ action: 'start', plan: flown, lease }))).status === 202,
-      30_000,
-      300,
-    );
-    await eventually(
-      'the aircraft flies',
-      async () => (await must(`${base}/procedure`, { token: pilot }, 200)).status === 'running',
-      20_000,
-      100,
-    );
-
+    const heavy = (await must('/api/v1/plans', as(plan(400)), 201)).id;
     const quiet = [],
       beside = [];
     const command = async (action, times) => {
@@ -207,7 +110,6 @@ export async function commands(row, seconds = 10) {
   } finally {
     await flood?.terminate();
     for (const socket of sockets) socket.destroy();
-    aircraft?.kill('SIGINT');
-    await server.dispose();
+    await stop();
   }
 }
