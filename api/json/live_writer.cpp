@@ -123,13 +123,6 @@ std::string_view verdict_word(Verdict verdict) {
   return "diverged";
 }
 
-std::string_view live_status(const Estimate& estimate) {
-  if (!estimate.best) return "found";
-  if (reached_goal(estimate)) return "converged";
-  if (estimate.verdict == Verdict::ambiguous) return "ambiguous";
-  return "estimating";
-}
-
 std::string_view mission_state_word(MissionState state) {
   switch (state) {
     case MissionState::planned:
@@ -240,7 +233,7 @@ std::string live_estimate_json(const MissionId& mission, const Estimate& estimat
       .key("t_us")
       .integer(estimate.time.us());
   out.key("status")
-      .text(live_status(estimate))
+      .text(flight::anchor_status(estimate))
       .key("verdict")
       .text(verdict_word(estimate.verdict))
       .key("reason")
@@ -319,7 +312,7 @@ std::string live_estimate_json(const MissionId& mission, const Estimate& estimat
   return out.take();
 }
 
-std::string mission_state_json(const Mission& mission, const MissionLiveState& state) {
+std::string mission_state_json(const Mission& mission, const flight::LiveState& state) {
   Object out;
   out.key("mission")
       .text(to_string(mission.id))

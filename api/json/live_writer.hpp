@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "core/flight/live_mission.hpp"
 #include "core/localize/live_flight.hpp"
 #include "core/types/estimate.hpp"
 #include "core/types/mission.hpp"
@@ -21,21 +22,9 @@ std::string live_fix_json(const MissionId& mission, const Fix& fix);
 std::string live_estimate_json(const MissionId& mission, const Estimate& estimate,
                                std::optional<double> models_moved_m = {});
 
-/// found (no position yet), estimating, ambiguous or converged: verdict ok, and within the accuracy goal.
-std::string_view live_status(const Estimate& estimate);
 std::string_view verdict_word(Verdict verdict);
 
-struct MissionLiveState {
-  std::uint64_t n_ranges{}, n_fixes{};
-  std::size_t anchors_found{}, anchors_converged{};
-  double range_rate_hz{};
-  std::map<std::string, std::size_t> fixes_refused{};  ///< positions that are no part of the track, by reason
-  std::size_t n_fixes_excluded{};
-  std::optional<Wgs84> origin{};
-  UtcTime time{};                    ///< of the newest measurement; creation before the first
-  std::optional<UtcTime> started{};  ///< first measurement
-};
-std::string mission_state_json(const Mission& mission, const MissionLiveState& state);
+std::string mission_state_json(const Mission& mission, const flight::LiveState& state);
 std::string_view mission_state_word(MissionState state);
 
 }  // namespace anchord::api

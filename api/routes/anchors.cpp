@@ -154,7 +154,7 @@ std::vector<AnchorFeature> live(Services& s, const std::optional<MissionId>& mis
       feature.frame = view.mission.frame;
       feature.missions = {view.mission.id};
       feature.calibrated = estimate.time;
-      feature.status = live_status(estimate);
+      feature.status = flight::anchor_status(estimate);
     }
   }
   std::vector<AnchorFeature> out;

@@ -6,26 +6,11 @@
 #include <vector>
 
 #include "core/base/ids.hpp"
-#include "core/base/steady.hpp"
-#include "core/base/time.hpp"
-#include "core/types/fix.hpp"
+#include "core/flight/pulse.hpp"
 
 namespace anchord::api {
 
-/// How a flight that records stands now. Measured times are of the rows, arrivals of the steady clock:
-/// silence is a duration.
-struct FlightPulse {
-  MissionId mission{};
-  std::string name;
-  SteadyTime now{};
-  std::optional<UtcTime> newest_fix{}, newest_range{};        ///< measured
-  std::optional<SteadyTime> fix_arrival{}, range_arrival{};   ///< newest of each
-  FixClass fix{FixClass::none};                               ///< of the newest
-  std::optional<UtcTime> below_float_since{}, float_since{};  ///< measured; absent while it is better
-  std::optional<double> correction_age_s{};                   ///< of the newest fix, where it says
-  std::optional<double> lag_s{}, lag_sigma_s{};               ///< of the joint solution
-  bool as_it_happens{false};  ///< rows come about as fast as they were measured: no upload, no fast replay
-};
+using flight::FlightPulse;
 
 enum class AlarmPriority : std::uint8_t { critical, warning, advisory };
 

@@ -6,7 +6,6 @@ namespace anchord::api {
 
 namespace {
 
-constexpr std::size_t k_min_joint_ranges = 100;  // below, the own search of each anchor is as good
 constexpr auto k_joint_pause = std::chrono::seconds(2);
 // Times as long a pause as the last solution took: 4 % of one core at most, however long the flight.
 constexpr int k_joint_rest = 24;
@@ -19,18 +18,11 @@ std::string MissionService::State::outline_of(const Mission& mission) const {
   return site ? site.value().outline_geojson : std::string();
 }
 
-/// Under its work_mutex; nothing where a joint solution would be no better.
-std::optional<JointWorker::Task> MissionService::State::joint_task(Flight& flight, const Mission& mission,
-                                                                   const std::string& outline) const {
-  if (flight.history.n_ranges() < k_min_joint_ranges) return std::nullopt;
-  JointWorker::Task task;
-  task.options.origin = flight.live.origin();
-  if (flight.frame == TrackFrame::wgs84 && !task.options.origin) return std::nullopt;
-  task.flight = flight.history.data(mission);
-  if (task.options.origin) task.options.clues = clues_in(flight.clues, EnuFrame(*task.options.origin));
-  if (!outline.empty()) task.options.outline_m = outline_in_enu(outline, *task.options.origin);
-  task.options.track = deps.track;
-  return task;
+flight::LiveMission::JointProblem MissionService::State::joint_problem(Flight& flight,
+                                                                       const std::string& outline) {
+  const auto origin = flight.live.origin();
+  return flight.live.joint_problem(origin && !outline.empty() ? outline_in_enu(outline, *origin)
+                                                              : std::vector<Eigen::Vector2d>{});
 }
 
 void MissionService::State::start_joint(const std::shared_ptr<Flight>& flight) {
@@ -42,31 +34,29 @@ void MissionService::State::start_joint(const std::shared_ptr<Flight>& flight) {
   }
   const std::string outline = outline_of(mission);
   const std::unique_lock lock(flight->work_mutex, std::try_to_lock);
-  if (!lock || flight->joint_running || flight->ranges_since_joint == 0) return;
+  if (!lock || flight->joint_running || !flight->live.joint_is_worth_it()) return;
   const auto now = std::chrono::steady_clock::now();
   if (now < flight->joint_not_before) return;
-  auto task = joint_task(*flight, mission, outline);
-  if (!task) return;
-  task->done = [self = this, flight, cut = flight->history.newest(), now,
-                beginning = flight->beginning](const FlightSolution* solution) {
-    self->finish_joint(*flight, solution, cut, std::chrono::steady_clock::now() - now, beginning);
+  auto problem = joint_problem(*flight, outline);
+  JointWorker::Task task{std::move(problem.flight), std::move(problem.options), {}};
+  task.done = [self = this, flight, cut = problem.cut, now,
+               generation = problem.generation](const FlightSolution* solution) {
+    self->finish_joint(*flight, solution, cut, std::chrono::steady_clock::now() - now, generation);
   };
-  // Set before the worker can be done.
-  flight->joint_running = true;
-  flight->ranges_since_joint = 0;
-  if (!joint.try_start(*std::move(task))) flight->joint_running = false, flight->ranges_since_joint = 1;
+  flight->joint_running = true;  // before the worker can be done
+  if (joint.try_start(std::move(task))) return;
+  flight->joint_running = false;
+  flight->live.joint_dropped();
 }
 
 void MissionService::State::finish_joint(Flight& flight, const FlightSolution* solution, UtcTime cut,
-                                         std::chrono::steady_clock::duration took, std::uint64_t beginning) {
+                                         std::chrono::steady_clock::duration took, std::uint64_t generation) {
   const std::scoped_lock lock(flight.work_mutex);
   flight.joint_running = false;
   flight.joint_not_before = std::chrono::steady_clock::now() +
                             std::max<std::chrono::steady_clock::duration>(k_joint_pause, k_joint_rest * took);
-  if (solution == nullptr || stopped || beginning != flight.beginning) return;
-  flight.live.adopt(*solution, cut);
-  flight.watch.note_lag(solution->shared.lag_s.value, solution->shared.lag_s.sigma);
-  announce(flight, false);
+  if (solution == nullptr || stopped || !flight.live.adopt(*solution, cut, generation)) return;
+  tell_events(flight);
   flight.dirty = true;
 }
 
@@ -86,18 +76,7 @@ void MissionService::State::take_clues(Flight& flight) {
     const std::scoped_lock lock(flight.queue_mutex);
     clues = std::exchange(flight.new_clues, std::nullopt);
   }
-  if (!clues) return;
-  flight.clues = std::move(*clues);
-  flight.clues_told = false;
-  if (flight.history.n_ranges() > 0) ++flight.ranges_since_joint;  // worth another joint solution
-}
-
-/// Waits for the first good fix: before it there is no frame to tell them in.
-void MissionService::State::tell_live(Flight& flight) {
-  const auto origin = flight.live.origin();
-  if (flight.clues_told || !origin) return;
-  flight.live.tell(clues_in(flight.clues, EnuFrame(*origin)));
-  flight.clues_told = true;
+  if (clues) flight.live.tell(*std::move(clues));
 }
 
 }  // namespace anchord::api

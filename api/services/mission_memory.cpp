@@ -49,7 +49,7 @@ bool MissionService::State::take_out(Flight& flight) {
   const std::string key = to_string(flight.id);
   for (const Topic topic : {Topic::mission_state, Topic::drone_pose, Topic::rtk_status})
     deps.hub.forget(topic, key);
-  for (const auto& [anchor, status] : flight.statuses)
+  for (const auto& [anchor, status] : flight.live.statuses())
     deps.hub.forget(Topic::anchors_estimates, key + to_string(anchor));
   return true;
 }
@@ -65,18 +65,19 @@ std::optional<MissionService::LiveView> MissionService::State::read(const Missio
   const auto mission = deps.missions.mission(id);
   if (!mission) return std::nullopt;
   {
-    const auto flight = flight_from_store(mission.value());
-    start_reading(*flight);
-    while (rebuild_slice(*flight)) {
+    Flight flight(setup_of(mission.value()));
+    start_reading(flight);
+    while (rebuild_slice(flight)) {
       if (stopped) return std::nullopt;
     }
-    flight->live.finish();
-    if (auto task = joint_task(*flight, mission.value(), outline_of(mission.value()))) {
-      task->options.canceled = [this] { return stopped.load(); };
-      if (const auto solution = solve_flight(task->flight, task->options))
-        flight->live.adopt(solution.value(), flight->history.newest());
+    flight.live.finish();
+    if (flight.live.joint_is_worth_it()) {
+      auto problem = joint_problem(flight, outline_of(mission.value()));
+      problem.options.canceled = [this] { return stopped.load(); };
+      if (const auto solution = solve_flight(problem.flight, problem.options))
+        flight.live.adopt(solution.value(), problem.cut, problem.generation);
     }
-    now.view = view(*flight);
+    now.view = view(flight);
   }
   give_back_memory();
   const std::scoped_lock lock(reads_mutex);

@@ -4,29 +4,23 @@
 namespace anchord::api {
 
 /// The site's origin, where it has one, is that of its flights.
-LiveOptions MissionService::State::live_options(const Mission& mission) const {
-  LiveOptions options;
-  options.track = deps.track;
+flight::LiveMissionSetup MissionService::State::setup_of(const Mission& mission) const {
+  flight::LiveMissionSetup setup;
+  setup.mission = mission;
+  setup.live.track = deps.track;
+  setup.goal = deps.goal;
+  setup.exclusions = exclusions_of(mission.id);
+  if (deps.kept_clues) setup.clues = deps.kept_clues(mission.id);
   if (mission.site && mission.frame == TrackFrame::wgs84) {
-    if (const auto site = deps.anchors.site(*mission.site)) options.origin = site.value().origin;
+    if (const auto site = deps.anchors.site(*mission.site)) setup.live.origin = site.value().origin;
   }
-  return options;
+  return setup;
 }
 
 std::vector<Exclusion> MissionService::State::exclusions_of(const MissionId& id) const {
   if (deps.exclusions == nullptr) return {};
   auto all = deps.exclusions->exclusions(id);
   return all ? std::move(all).value() : std::vector<Exclusion>{};
-}
-
-std::unique_ptr<MissionService::Flight> MissionService::State::flight_from_store(
-    const Mission& mission) const {
-  auto flight = std::make_unique<Flight>(mission, live_options(mission));
-  flight->exclusions = exclusions_of(mission.id);
-  if (deps.kept_clues) flight->clues = deps.kept_clues(mission.id);
-  flight->clues_told = false;
-  flight->state.time = mission.created;
-  return flight;
 }
 
 void MissionService::State::begin_rebuild(const std::shared_ptr<Flight>& flight) {
@@ -47,7 +41,7 @@ void MissionService::State::start_reading(Flight& flight) const {
   r.range_filter.mission = r.fix_filter.mission = flight.id;
   r.range_filter.limit = r.fix_filter.limit = 2000;
   r.range_filter.with_cir = deps.judge_needs_cir && deps.judge_needs_cir();
-  flight.live.hold(true);
+  flight.live.begin_reading();
 }
 
 void MissionService::State::continue_rebuild(const std::shared_ptr<Flight>& flight) {
@@ -61,7 +55,7 @@ void MissionService::State::continue_rebuild(const std::shared_ptr<Flight>& flig
     } else {  // what was read so far stands; rows that come now are not held up by it
       const std::scoped_lock lock(flight->work_mutex);
       flight->rebuild.reset();
-      flight->live.hold(false);
+      flight->live.end_reading();
     }
     flight->rebuilding = false;
     self->schedule(flight);
@@ -90,10 +84,10 @@ bool MissionService::State::rebuild_slice(Flight& flight) {
       const std::scoped_lock queue(flight.queue_mutex);
       flight.ahead.note(rows.front());
     }
-    const LiveRow row = row_of(std::move(rows.front()));
+    const flight::LiveRow row = row_of(std::move(rows.front()));
     rows.pop_front();
-    flight.rebuilt.push_back(identity(row));
-    step(flight, row, true);
+    flight.rebuilt.push_back(flight::identity(row));
+    flight.live.add(row);
   };
   while (!failed && !(r.ranges.empty() && r.fixes.empty())) {
     // A stream that has run dry in the middle waits for its next page.
@@ -106,15 +100,13 @@ bool MissionService::State::rebuild_slice(Flight& flight) {
   flight.rebuild.reset();
   std::ranges::sort(flight.rebuilt);
   take_clues(flight);
-  tell_live(flight);
-  flight.live.hold(false);
+  flight.live.end_reading();
   return false;
 }
 
 void MissionService::State::end_rebuild(Flight& flight) {
   const std::scoped_lock lock(flight.work_mutex);
-  announce(flight, true);
-  publish_pose(flight);
+  tell_events(flight);
   flight.dirty = true;
 }
 

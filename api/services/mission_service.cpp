@@ -37,7 +37,7 @@ Result<void> MissionService::create(const Mission& mission) {
   state_->deps.events.add("info", "mission.started", mission.name + " started", mission.id);
   if (const auto flight = state_->find(mission.id)) {
     const std::scoped_lock lock(flight->work_mutex);
-    state_->deps.hub.publish(Topic::mission_state, mission_state_json(mission, flight->state),
+    state_->deps.hub.publish(Topic::mission_state, mission_state_json(mission, flight->live.state()),
                              mission.created.us(), to_string(mission.id));
   }
   return boost::outcome_v2::success();
@@ -78,7 +78,7 @@ void MissionService::prepare(const MissionId& id) {
   if (state_->find(id)) return;
   const auto record = mission(id);
   if (!record) return;
-  std::shared_ptr<Flight> flight = state_->flight_from_store(record.value());
+  auto flight = std::make_shared<Flight>(state_->setup_of(record.value()));
   flight->used = state_->steady_now();
   // Told before it can be found: rows that come meanwhile wait in the queue.
   flight->rebuilding = true;
@@ -105,26 +105,14 @@ void MissionService::exclusions_changed(const MissionId& id) {
   if (!flight) return;
   // Rows that come from here on wait in the queue until what is stored is in.
   flight->rebuilding = true;
-  Mission mission;
   {
     const std::scoped_lock lock(flight->queue_mutex);
-    mission = flight->mission;
     flight->ahead.forget();
   }
   {
     const std::scoped_lock lock(flight->work_mutex);
-    ++flight->beginning;
-    flight->exclusions = state_->exclusions_of(id);
-    flight->live = LiveFlight(mission, flight->options);
-    flight->history.clear();
-    flight->fixes_told.clear();
-    flight->clues_told = false;
-    flight->ranges_since_joint = 0;
-    flight->range_times_us.clear();
+    flight->live.begin_anew(state_->exclusions_of(id));
     flight->rebuilt.clear();
-    const UtcTime started = flight->state.time;
-    flight->state = {};
-    flight->state.time = started;
   }
   state_->begin_rebuild(flight);
 }
@@ -196,7 +184,6 @@ MissionService::LiveView MissionService::State::view(Flight& flight) const {
   }
   out.origin = flight.live.origin();
   out.estimates = flight.live.estimates();
-  for (auto& estimate : out.estimates) judge_goal(estimate, deps.goal);
   return out;
 }
 
@@ -212,8 +199,8 @@ void MissionService::tick() {
       const std::scoped_lock queue(flight->queue_mutex);
       mission = flight->mission;
     }
-    state_->deps.hub.publish(Topic::mission_state, mission_state_json(mission, flight->state),
-                             flight->state.time.us(), to_string(mission.id));
+    state_->deps.hub.publish(Topic::mission_state, mission_state_json(mission, flight->live.state()),
+                             flight->live.state().time.us(), to_string(mission.id));
   }
   if (++state_->ticks % 2 == 0) state_->publish_devices();
   state_->evict();
@@ -231,7 +218,7 @@ std::vector<FlightPulse> MissionService::pulses() {
     if (!work) continue;  // at work: rows come, nothing is silent
     const std::scoped_lock lock(flight->queue_mutex);
     if (flight->mission.state != MissionState::recording) continue;
-    FlightPulse pulse = flight->watch.look(flight->state.time, steady);
+    FlightPulse pulse = flight->live.watch().look(flight->live.state().time, steady);
     pulse.mission = flight->id;
     pulse.name = flight->mission.name;
     pulse.now = now;

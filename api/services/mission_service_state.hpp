@@ -8,30 +8,26 @@
 #include <variant>
 
 #include "api/json/live_writer.hpp"
-#include "api/services/flight_watch.hpp"
 #include "api/services/joint_worker.hpp"
 #include "api/services/late_writer.hpp"
-#include "api/services/live_row.hpp"
 #include "api/services/mission_service.hpp"
 #include "api/services/radio_watch.hpp"
-#include "core/localize/flight_history.hpp"
-#include "core/localize/live_flight.hpp"
+#include "core/flight/live_mission.hpp"
 #include "core/ports/exclusion_store.hpp"
 #include "core/ports/store.hpp"
 
 namespace anchord::api {
 
-/// One followed flight. `queue_mutex` guards what requests touch, `work_mutex` is the strand of the rest.
+/// One followed mission. `queue_mutex` guards what requests touch, `work_mutex` is the strand of the rest.
 struct MissionService::Flight {
-  Flight(const Mission& m, LiveOptions o)
-      : id(m.id), frame(m.frame), options(std::move(o)), mission(m), live(m, options) {}
+  explicit Flight(flight::LiveMissionSetup setup)
+      : id(setup.mission.id), frame(setup.mission.frame), mission(setup.mission), live(std::move(setup)) {}
   const MissionId id;
   const TrackFrame frame;
-  const LiveOptions options;
   std::mutex queue_mutex;
   Mission mission;  ///< under queue_mutex
-  std::deque<LiveRow> queue;
-  RowsAhead ahead{k_max_queued_rows};
+  std::deque<flight::LiveRow> queue;
+  flight::RowsAhead ahead{k_max_queued_rows};
   std::optional<procedure::FlightClues> new_clues;
   bool view_wanted{false};  ///< by one who does not wait: made as soon as the strand is at rest
   std::optional<LiveView> view;
@@ -45,24 +41,11 @@ struct MissionService::Flight {
       false};  ///< evicted: rows that found it before are in the store, where the next flight reads them
   std::optional<SteadyTime> fix_arrival{}, range_arrival{};
   std::mutex work_mutex;  ///< the strand: everything below
-  LiveFlight live;
-  std::vector<Exclusion> exclusions;
-  std::uint64_t beginning{
-      0};  ///< raised when the live flight begins anew: what was solved before is not adopted
-  std::map<std::string, std::size_t> fixes_told{};  ///< refusals of positions that are in the record
-  std::map<NetworkId, std::string> statuses;
-  MissionLiveState state;
-  std::int64_t last_pose_us{0}, last_rtk_us{0};
-  std::deque<std::int64_t> range_times_us;
+  flight::LiveMission live;
   std::atomic<bool> dirty{true};
-  FlightHistory history;
-  procedure::FlightClues clues;
-  bool clues_told{true};  ///< to `live`, in its frame
-  std::size_t ranges_since_joint{0};
   std::chrono::steady_clock::time_point joint_not_before{};
   bool joint_running{false};
 
-  FlightWatch watch;
   std::atomic<bool> rebuilding{false};  ///< rows wait in the queue until what was stored is in
   struct Rebuild {
     MeasurementStore::Filter range_filter{}, fix_filter{};
@@ -75,7 +58,8 @@ struct MissionService::Flight {
   std::vector<std::size_t> rebuilt;  ///< identities, sorted at the end, until the queue was worked off once
 };
 
-/// What the service is inside; its parts are in mission_live.cpp (rows to estimates to the hub),
+/// What the service is inside: the shell round one flight::LiveMission for each mission. Its parts are in
+/// mission_live.cpp (queue and strand), mission_events.cpp (what it tells, to the world),
 /// mission_rebuild.cpp (what was stored, after a restart), mission_joint.cpp (the joint solution in flight)
 /// and mission_memory.cpp (which are in memory, and what a reader of the others gets).
 struct MissionService::State : std::enable_shared_from_this<MissionService::State> {
@@ -135,36 +119,41 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
     else
       (void)write().has_value();
   }
-  LiveRow row_of(Range range) const;
-  static LiveRow row_of(Fix fix) { return fix; }
+  flight::LiveRow row_of(Range range) const;
+  static flight::LiveRow row_of(Fix fix) { return fix; }
   void schedule(const std::shared_ptr<Flight>& flight);
   void work(Flight& flight);
-  void step(Flight& flight, const LiveRow& row, bool quiet);
-  void announce(Flight& flight, bool quiet);
-  void publish_pose(Flight& flight);
+  void note_radios(const flight::LiveRow& row);
+  /// What the live mission tells, to the world: hub, event log, store, pilot. Under its work_mutex.
+  void tell_events(Flight& flight);
+  void tell(Flight& flight, const flight::FixBelieved& event);
+  void tell(Flight& flight, const flight::FixShown& event);
+  void tell(Flight& flight, const flight::PoseMoved& event);
+  void tell(Flight& flight, const flight::RangeDecided& event);
+  void tell(Flight& flight, const flight::AnchorFound& event);
+  void tell(Flight& flight, const flight::AnchorStatusChanged& event);
+  void tell(Flight& flight, const flight::AnchorEstimated& event);
+  void tell(Flight& flight, const flight::FixRejected& event);
+  void tell(Flight& flight, const flight::OriginMoved& event);
   void begin_rebuild(const std::shared_ptr<Flight>& flight);
   void continue_rebuild(const std::shared_ptr<Flight>& flight);
   void start_reading(Flight& flight) const;
   void end_rebuild(Flight& flight);
   bool rebuild_slice(Flight& flight);
-  std::unique_ptr<Flight> flight_from_store(const Mission& mission) const;
   void evict();
   bool take_out(Flight& flight);
   std::optional<LiveView> read(const MissionId& id);
   std::optional<LiveView> read_before(const Read& now);
   void forget_reads(const std::optional<MissionId>& id);
-  std::optional<JointWorker::Task> joint_task(Flight& flight, const Mission& mission,
-                                              const std::string& outline) const;
+  static flight::LiveMission::JointProblem joint_problem(Flight& flight, const std::string& outline);
   std::string outline_of(const Mission& mission) const;
   void post(std::function<void()> task);
-  LiveOptions live_options(const Mission& mission) const;
+  flight::LiveMissionSetup setup_of(const Mission& mission) const;
   std::vector<Exclusion> exclusions_of(const MissionId& id) const;
-  void tell_fixes(Flight& flight, bool quiet);
   void start_joint(const std::shared_ptr<Flight>& flight);
   void finish_joint(Flight& flight, const FlightSolution* solution, UtcTime cut,
-                    std::chrono::steady_clock::duration took, std::uint64_t beginning);
+                    std::chrono::steady_clock::duration took, std::uint64_t generation);
   void publish_devices();
-  static void tell_live(Flight& flight);
   static void take_clues(Flight& flight);
   LiveView view(Flight& flight) const;  ///< under its work_mutex
 };

@@ -1,7 +1,7 @@
 // Alarms of dashboard.md section 6: when they are raised, acknowledged and over.
 #include "api/services/alarm_board.hpp"
 #include "api/services/event_log.hpp"
-#include "api/services/flight_watch.hpp"
+#include "core/flight/pulse.hpp"
 #include "app_fixture.hpp"
 #include "core/ports/devices.hpp"
 
@@ -120,11 +120,11 @@ TEST(AlarmRules, GiveEachIdOnceForSeveralFlights) {
 }
 
 /// Ten looks, one a second of ours, while the flight's time passes at this speed.
-bool happens(api::FlightWatch& watch, double speed, double from_s = 0) {
+bool happens(flight::FlightWatch& watch, double speed, double from_s = 0) {
   bool answer = false;
   for (int i = 0; i < 10; ++i) {
     const auto ours =
-        api::FlightWatch::Steady{} + std::chrono::milliseconds(static_cast<int>((from_s + i) * 1000));
+        flight::FlightWatch::Steady{} + std::chrono::milliseconds(static_cast<int>((from_s + i) * 1000));
     answer = watch.look(at((from_s + i) * speed), ours).as_it_happens;
   }
   return answer;
@@ -133,22 +133,22 @@ bool happens(api::FlightWatch& watch, double speed, double from_s = 0) {
 TEST(FlightWatch, KnowsAFlightAsItHappensFromUploadsAndFastReplays) {
   for (const auto& [speed, live] :
        {std::pair{1.0, true}, {0.9, true}, {5.0, false}, {60.0, false}, {0.0, false}}) {
-    api::FlightWatch watch;
+    flight::FlightWatch watch;
     EXPECT_EQ(happens(watch, speed), live) << speed;
   }
 }
 
 TEST(FlightWatch, StaysWithWhatItWasWhenTheFlightFallsSilent) {
-  api::FlightWatch watch;
+  flight::FlightWatch watch;
   ASSERT_TRUE(happens(watch, 1));
   bool still = false;
   for (int i = 10; i < 40; ++i)
-    still = watch.look(at(9), api::FlightWatch::Steady{} + std::chrono::seconds(i)).as_it_happens;
+    still = watch.look(at(9), flight::FlightWatch::Steady{} + std::chrono::seconds(i)).as_it_happens;
   EXPECT_TRUE(still);
 }
 
 TEST(FlightWatch, RemembersSinceWhenTheFixIsPoor) {
-  api::FlightWatch watch;
+  flight::FlightWatch watch;
   const auto fix = [&](double t_s, FixClass cls) {
     Fix f;
     f.time = at(t_s);

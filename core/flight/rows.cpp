@@ -1,8 +1,8 @@
-#include "api/services/live_row.hpp"
+#include "core/flight/rows.hpp"
 
 #include <functional>
 
-namespace anchord::api {
+namespace anchord::flight {
 namespace {
 
 constexpr double k_least_range_m = 0.05;  // what radios report for a failure lies below it
@@ -58,4 +58,4 @@ std::optional<RangeBelief> belief_of(const JudgedRange& judged) {
   return taken ? judged.model->belief : std::nullopt;
 }
 
-}  // namespace anchord::api
+}  // namespace anchord::flight

@@ -1,6 +1,6 @@
-#include "api/services/flight_watch.hpp"
+#include "core/flight/pulse.hpp"
 
-namespace anchord::api {
+namespace anchord::flight {
 namespace {
 
 constexpr std::size_t k_looks = 10;
@@ -46,4 +46,4 @@ FlightPulse FlightWatch::look(UtcTime newest_measured, Steady now) {
   return pulse_;
 }
 
-}  // namespace anchord::api
+}  // namespace anchord::flight

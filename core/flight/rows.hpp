@@ -12,7 +12,7 @@
 #include "core/types/range.hpp"
 #include "core/types/range_model.hpp"
 
-namespace anchord::api {
+namespace anchord::flight {
 
 /// A range, and what the models that were promoted when it came say of it.
 struct JudgedRange {
@@ -74,4 +74,4 @@ Range corrected(const JudgedRange& judged);
 /// What its model believes of the error that is left; nothing where corrected() took nothing off.
 std::optional<RangeBelief> belief_of(const JudgedRange& judged);
 
-}  // namespace anchord::api
+}  // namespace anchord::flight

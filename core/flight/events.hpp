@@ -1,0 +1,60 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include "core/localize/live_flight.hpp"
+#include "core/types/estimate.hpp"
+#include "core/types/fix.hpp"
+
+namespace anchord::flight {
+
+/// What a live mission tells, in order of happening. Whoever drives it makes of them what the world sees: a
+/// message of a topic, a row of the event log, an input of the procedure.
+
+/// A position where the aircraft can have been: whoever flies may steer by it.
+struct FixBelieved {
+  Fix fix;
+};
+/// Five of these a second of measured time: how the rover's solution stands.
+struct FixShown {
+  Fix fix;
+};
+/// Ten of these a second of measured time.
+struct PoseMoved {
+  LivePose pose;
+};
+struct RangeDecided {
+  RangeResult result;
+};
+/// An anchor answered for the first time.
+struct AnchorFound {
+  NetworkId anchor{};
+  bool now{true};  ///< not read from what was stored
+};
+/// It became converged or ambiguous (anchor_status).
+struct AnchorStatusChanged {
+  NetworkId anchor{};
+  std::string_view status;
+  std::string reason;  ///< of the verdict
+};
+struct AnchorEstimated {
+  Estimate estimate;
+  std::optional<double> models_moved_m{};  ///< LiveFlight::uncorrected_shift_m
+};
+/// The first position of this mission that was rejected for this reason; later ones are counted.
+struct FixRejected {
+  std::string reason;
+};
+/// The first positions were no part of the flight: every estimate is in another frame from here on.
+struct OriginMoved {};
+
+using Event = std::variant<FixBelieved, FixShown, PoseMoved, RangeDecided, AnchorFound, AnchorStatusChanged,
+                           AnchorEstimated, FixRejected, OriginMoved>;
+
+/// found (no position yet), estimating, ambiguous or converged: verdict ok, and within the accuracy goal.
+std::string_view anchor_status(const Estimate& estimate);
+
+}  // namespace anchord::flight

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <chrono>
+#include <deque>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "core/base/ids.hpp"
+#include "core/base/steady.hpp"
+#include "core/base/time.hpp"
+#include "core/types/fix.hpp"
+
+namespace anchord::flight {
+
+/// How a flight that records stands now. Measured times are of the rows, arrivals of the steady clock:
+/// silence is a duration.
+struct FlightPulse {
+  MissionId mission{};
+  std::string name;
+  SteadyTime now{};
+  std::optional<UtcTime> newest_fix{}, newest_range{};        ///< measured
+  std::optional<SteadyTime> fix_arrival{}, range_arrival{};   ///< newest of each
+  FixClass fix{FixClass::none};                               ///< of the newest
+  std::optional<UtcTime> below_float_since{}, float_since{};  ///< measured; absent while it is better
+  std::optional<double> correction_age_s{};                   ///< of the newest fix, where it says
+  std::optional<double> lag_s{}, lag_sigma_s{};               ///< of the joint solution
+  bool as_it_happens{false};  ///< rows come about as fast as they were measured: no upload, no fast replay
+};
+
+/// Keeps what the alarms of one flight ask about. Not thread-safe.
+class FlightWatch {
+ public:
+  using Steady = std::chrono::steady_clock::time_point;
+  void note(const Fix& fix);
+  void note_range(UtcTime measured);
+  void note_lag(double lag_s, double sigma_s);
+  /// The flight as it stands. Call it about once a second: a flight counts as happening now once ten looks
+  /// saw its measured time pass about as fast as ours, and no longer when it runs ahead (an upload, a fast
+  /// replay). One that falls silent stays what it was: silence is what the alarms are about.
+  FlightPulse look(UtcTime newest_measured, Steady now);
+
+ private:
+  FlightPulse pulse_;
+  std::deque<std::pair<UtcTime, Steady>> looks_;
+};
+
+}  // namespace anchord::flight

@@ -1,0 +1,188 @@
+// One home of a live mission: the same rows give the same events byte for byte, however often, and what is
+// told is told once.
+#include "core/flight/live_mission.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <set>
+
+#include "core/localize/flight_solver.hpp"
+#include "tests/core/localize/flight_support.hpp"
+
+namespace anchord {
+namespace {
+
+using flight::Event;
+using flight::LiveMission;
+using testing::MadeFlight;
+using testing::make_flight;
+
+/// Every number to its last bit.
+struct Dump {
+  std::string out;
+  void number(double value) {
+    char text[40];
+    std::snprintf(text, sizeof text, " %a", value);
+    out += text;
+  }
+  void vector(const Eigen::Vector3d& v) {
+    for (const double x : {v.x(), v.y(), v.z()}) number(x);
+  }
+  void estimate(const Estimate& e) {
+    out += ' ' + to_string(e.anchor) + ' ' + std::to_string(e.time.ns) + ' ' + std::to_string(e.n_used) +
+           ' ' + std::to_string(static_cast<int>(e.verdict)) + ' ' + e.reason;
+    for (const auto* at : {&e.best, &e.mirror}) {
+      out += *at ? " at" : " nowhere";
+      if (!*at) continue;
+      vector((*at)->position.m);
+      number((*at)->probability);
+      for (int i = 0; i < 9; ++i) number((*at)->covariance_m2(i / 3, i % 3));
+    }
+    number(e.h95_m);
+    number(e.v95_m);
+    for (const auto& gate : e.gates) {
+      out += ' ' + gate.name + (gate.passed ? "+" : "-");
+      number(gate.value);
+    }
+    for (const auto& [why, n] : e.refused) out += ' ' + why + '=' + std::to_string(n);
+  }
+  void event(const Event& event) {
+    out += std::to_string(event.index());
+    std::visit([this](const auto& one) { fields(one); }, event);
+    out += '\n';
+  }
+  void fields(const flight::FixBelieved& e) { out += ' ' + std::to_string(e.fix.time.ns); }
+  void fields(const flight::FixShown& e) { out += ' ' + std::to_string(e.fix.time.ns); }
+  void fields(const flight::PoseMoved& e) {
+    out += ' ' + std::to_string(e.pose.time.ns);
+    vector(e.pose.enu_m);
+    number(e.pose.speed_mps.value_or(-1));
+  }
+  void fields(const flight::RangeDecided& e) {
+    const auto& r = e.result;
+    out += ' ' + std::to_string(r.range.time.ns) + ' ' + to_string(r.range.anchor) + ' ' + r.refused;
+    for (const auto& value : {r.residual_m, r.sigma_m, r.corrected_m}) number(value.value_or(-1));
+    if (r.tag_enu_m) vector(*r.tag_enu_m);
+  }
+  void fields(const flight::AnchorFound& e) { out += ' ' + to_string(e.anchor) + (e.now ? " now" : ""); }
+  void fields(const flight::AnchorStatusChanged& e) {
+    out += ' ' + to_string(e.anchor) + ' ' + std::string(e.status) + ' ' + e.reason;
+  }
+  void fields(const flight::AnchorEstimated& e) {
+    estimate(e.estimate);
+    number(e.models_moved_m.value_or(-1));
+  }
+  void fields(const flight::FixRejected& e) { out += ' ' + e.reason; }
+  void fields(const flight::OriginMoved&) {}
+};
+
+/// Ranges and fixes as they come.
+std::vector<flight::LiveRow> stream(const FlightData& data) {
+  std::vector<flight::LiveRow> rows;
+  for (const auto& range : data.ranges) rows.emplace_back(flight::JudgedRange{range, {}, range.time});
+  for (const auto& fix : data.fixes) rows.emplace_back(fix);
+  std::ranges::stable_sort(rows, {}, [](const auto& row) { return flight::time_of(row); });
+  return rows;
+}
+
+flight::LiveMissionSetup setup_of(const FlightData& data) {
+  flight::LiveMissionSetup out;
+  out.mission = data.mission;
+  out.goal = {.h95_m = 0.5, .v95_m = 0.5};
+  return out;
+}
+
+/// A flight with a joint solution each 30 s, told to a listener; its events.
+std::vector<Event> fly(const FlightData& data) {
+  LiveMission mission(setup_of(data));
+  std::vector<Event> all;
+  const auto take = [&] {
+    for (auto& event : mission.take_events()) all.push_back(std::move(event));
+  };
+  double solved_s = 0;
+  std::size_t n = 0;
+  for (const auto& row : stream(data)) {
+    mission.add(row);
+    if (++n % 40 == 0) mission.settle();
+    take();
+    const double now_s = flight::time_of(row).seconds();
+    if (now_s - solved_s < 30 || !mission.joint_is_worth_it()) continue;
+    solved_s = now_s;
+    const auto problem = mission.joint_problem({});
+    if (const auto solution = solve_flight(problem.flight, problem.options))
+      EXPECT_TRUE(mission.adopt(solution.value(), problem.cut, problem.generation));
+    take();
+  }
+  mission.finish();
+  mission.settle();
+  take();
+  return all;
+}
+
+TEST(LiveMission, TheSameRowsGiveTheSameEventsByteForByte) {
+  MadeFlight made;
+  made.nlos_share = 0.2;
+  made.frame = TrackFrame::wgs84;
+  const auto data = make_flight(made);
+  Dump first, second;
+  for (const auto& event : fly(data)) first.event(event);
+  for (const auto& event : fly(data)) second.event(event);
+  EXPECT_GT(std::ranges::count(first.out, '\n'), 4000);
+  EXPECT_EQ(first.out, second.out);
+}
+
+TEST(LiveMission, EveryRangeIsDecidedOnceAndEveryAnchorFoundOnce) {
+  const auto data = make_flight(MadeFlight{});
+  std::size_t ranges = 0, found = 0;
+  std::set<NetworkId> converged;
+  for (const auto& event : fly(data)) {
+    ranges += std::holds_alternative<flight::RangeDecided>(event);
+    found += std::holds_alternative<flight::AnchorFound>(event);
+    if (const auto* changed = std::get_if<flight::AnchorStatusChanged>(&event))
+      if (changed->status == "converged") converged.insert(changed->anchor);
+  }
+  EXPECT_EQ(ranges, data.ranges.size());
+  EXPECT_EQ(found, 4U);
+  EXPECT_EQ(converged.size(), 4U);
+}
+
+/// What was stored is counted and estimated, and tells of nothing that happened then.
+TEST(LiveMission, ReadingWhatWasStoredTellsTheEstimatesAlone) {
+  const auto data = make_flight(MadeFlight{});
+  LiveMission mission(setup_of(data));
+  mission.begin_reading();
+  for (const auto& row : stream(data)) mission.add(row);
+  mission.end_reading();
+  std::size_t estimates = 0;
+  for (const auto& event : mission.take_events()) {
+    if (const auto* found = std::get_if<flight::AnchorFound>(&event)) {
+      EXPECT_FALSE(found->now);
+    } else if (!std::holds_alternative<flight::PoseMoved>(event)) {
+      EXPECT_TRUE(std::holds_alternative<flight::AnchorEstimated>(event)) << event.index();
+      ++estimates;
+    }
+  }
+  EXPECT_EQ(estimates, 4U);
+  EXPECT_EQ(mission.state().n_ranges, data.ranges.size());
+  EXPECT_EQ(mission.state().n_fixes, data.fixes.size());
+  EXPECT_EQ(mission.state().anchors_found, 4U);
+}
+
+TEST(LiveMission, AJointSolutionOfBeforeItBeganAnewIsNotAdopted) {
+  const auto data = make_flight(MadeFlight{});
+  LiveMission mission(setup_of(data));
+  for (const auto& row : stream(data)) mission.add(row);
+  const auto problem = mission.joint_problem({});
+  const auto solution = solve_flight(problem.flight, problem.options);
+  ASSERT_TRUE(solution.has_value());
+  mission.begin_anew({});
+  EXPECT_FALSE(mission.adopt(solution.value(), problem.cut, problem.generation));
+  EXPECT_EQ(mission.state().n_ranges, 0U);
+  EXPECT_TRUE(mission.estimates().empty());
+  EXPECT_FALSE(mission.joint_is_worth_it());
+}
+
+}  // namespace
+}  // namespace anchord
