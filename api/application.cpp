@@ -17,6 +17,7 @@
 #include "api/services/access.hpp"
 #include "api/services/alarm_board.hpp"
 #include "api/services/clock_watch.hpp"
+#include "api/services/contradiction_watch.hpp"
 #include "api/services/device_ingest.hpp"
 #include "api/services/device_stream.hpp"
 #include "api/services/flight_service.hpp"
@@ -70,12 +71,14 @@ struct Application::State {
         device_ingest(deps.measurements, missions),
         jobs(deps.jobs, hub, deps.clock),
         geo(deps.geoid_dir),
+        contradictions({deps.anchors, deps.missions, events}),
         calibrations({deps.measurements, deps.missions, deps.anchors, jobs, deps.clock, profiles_of(deps),
                       models.get(), [this](const MissionId& id) { return clues_of_flight(id); }, deps.frames,
-                      deps.exclusions, deps.track}),
+                      deps.exclusions, deps.track, &contradictions}),
         services{deps, hub,          events, alarms,         missions,     ingest,
                  jobs, calibrations, geo,    profiles.get(), models.get(), deps.frames} {
     services.prompt = &prompt;
+    services.contradictions = &contradictions;
     router.on_fault(deps.log_fault);
     services.stream = &stream;
     services.running = &running;
@@ -175,6 +178,7 @@ struct Application::State {
   DeviceIngest device_ingest;
   JobService jobs;
   GeoService geo;
+  ContradictionWatch contradictions;
   std::unique_ptr<KitProfiles> profiles;
   std::unique_ptr<FlightService> flights;
   CalibrationService calibrations;
@@ -233,6 +237,7 @@ void Application::State::beat() {
 
 /// About once a second, on the thread of late writes; each part behind a guard of its own.
 void Application::State::background_round() {
+  (void)guarded("contradicted anchors", [this] { (void)contradictions.standing(); });
   (void)guarded("last uses of tokens", [this] {
     if (deps.access != nullptr) deps.access->flush();
   });
@@ -296,6 +301,7 @@ void Application::State::tell_alarms(UtcTime now, std::vector<AlarmCondition> ho
   if (auto step = clock_watch.look(now, steady.now()); !step.empty())
     holding.push_back({"clock.step", AlarmPriority::warning, std::move(step), std::nullopt});
   for (auto& alarm : stream.alarms()) holding.push_back(std::move(alarm));
+  for (auto& alarm : contradictions.alarms()) holding.push_back(std::move(alarm));
   alarms.update(std::move(holding), now);
   std::string list = "[";
   for (const auto& alarm : alarms.standing()) list += (list.size() > 1 ? "," : "") + alarm_json(alarm);

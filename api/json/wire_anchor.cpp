@@ -179,6 +179,7 @@ Ordered anchor_feature_json(const AnchorFeature& feature) {
             {"status", feature.status},
             {"revision", or_null(feature.revision)}};
   p["calibrated_at"] = feature.calibrated ? Ordered(to_rfc3339(*feature.calibrated)) : Ordered(nullptr);
+  p["contradiction"] = feature.contradicted ? Ordered::parse(feature.contradicted->json) : Ordered(nullptr);
   p["site"] = anchor.site ? Ordered(to_string(*anchor.site)) : Ordered(nullptr);
   p["building"] = anchor.building;
   p["floor"] = anchor.floor;
@@ -232,6 +233,7 @@ Ordered flat_feature_json(const AnchorFeature& feature) {
   flat["h95_m"] = place ? Ordered(metres(place->h95_m)) : Ordered(nullptr);
   flat["v95_m"] = place ? Ordered(metres(place->v95_m)) : Ordered(nullptr);
   flat["acceptable"] = estimate ? Ordered(estimate->acceptable()) : Ordered(nullptr);
+  flat["contradiction"] = feature.contradicted ? Ordered(feature.contradicted->text) : Ordered(nullptr);
   flat["override_reason"] = feature.overridden ? Ordered(feature.overridden->reason) : Ordered(nullptr);
   flat["e_m"] = feature.projected ? Ordered(rounded(feature.projected->e_m, 1e3)) : Ordered(nullptr);
   flat["n_m"] = feature.projected ? Ordered(rounded(feature.projected->n_m, 1e3)) : Ordered(nullptr);

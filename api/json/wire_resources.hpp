@@ -33,7 +33,12 @@ std::optional<GlobeAccuracy> globe_accuracy(const nlohmann::ordered_json& proven
 /// What an anchor feature (api.md section 4) is made of.
 struct AnchorFeature {
   Anchor anchor;
-  std::string status;  ///< accepted, or the live status
+  std::string status;  ///< accepted, contradicted, or the live status
+  struct Contradicted {
+    CalibrationId by{};
+    std::string json, text;  ///< the evidence, for programs and for people
+  };
+  std::optional<Contradicted> contradicted{};  ///< a later flight found it elsewhere
   std::optional<std::uint64_t> revision{};
   std::optional<UtcTime> calibrated{};
   std::optional<CalibrationId> calibration{};

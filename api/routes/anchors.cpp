@@ -3,12 +3,14 @@
 #include <nlohmann/json.hpp>
 
 #include "api/exports/kml.hpp"
+#include "api/json/budget_json.hpp"
 #include "api/json/frame_json.hpp"
 #include "api/json/live_writer.hpp"
 #include "api/json/reader.hpp"
 #include "api/json/wire_resources.hpp"
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
+#include "api/services/contradiction_watch.hpp"
 #include "api/services/geo_service.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
@@ -39,6 +41,12 @@ class Lookup {
   std::optional<GlobeAccuracy> globe(const PublishedPosition& position) {
     if (position.frame != TrackFrame::local) return std::nullopt;
     return globe_accuracy(calibration(position.calibration).provenance, position.estimate.anchor);
+  }
+
+  /// What its uncertainty comes from; empty where the calibration is of before budgets.
+  std::string budget(const PublishedPosition& position) {
+    const Ordered kept = kept_budget(calibration(position.calibration).provenance, position.estimate.anchor);
+    return kept.is_null() ? std::string{} : to_wire(kept);
   }
 
   /// What the position is called elsewhere: the positioning system's frame, the map, sea level.
@@ -107,6 +115,7 @@ AnchorFeature published_feature(Lookup& lookup, Anchor anchor, const PublishedPo
   feature.estimate = position.estimate;
   feature.overridden = position.overridden;
   feature.globe = lookup.globe(position);
+  feature.budget_json = lookup.budget(position);
   lookup.name_elsewhere(feature);
   return feature;
 }
@@ -121,6 +130,15 @@ Anchor anchor_as_stored(Services& s, NetworkId id) {
   return anchor;
 }
 
+/// A later flight found it elsewhere: no reader may take it for accepted.
+void contradict(AnchorFeature& feature, const ContradictedAnchor& against) {
+  if (feature.anchor.retired) return;
+  feature.status = "contradicted";
+  feature.contradicted = {against.calibration, to_wire(contradiction_json(against)), against.text};
+  feature.estimate->gates.push_back(
+      {"contradicted", against.what.chi2, against.what.limit, false, against.text});
+}
+
 std::uint64_t newest_revision(Services& s) {
   const auto newest = value_or_problem(s.deps.anchors.revisions(1, 0));
   return newest.empty() ? 0 : newest.front().number;
@@ -132,9 +150,15 @@ std::vector<AnchorFeature> published(Services& s, std::optional<std::uint64_t> r
   number = revision ? *revision : newest_revision(s);
   if (number == 0) return {};
   Lookup lookup(s);
+  const auto contradicted = s.contradictions->standing();
+  const bool newest = !revision || number == newest_revision(s);
   std::vector<AnchorFeature> out;
   for (const auto& position : value_or_problem(s.deps.anchors.published(number))) {
-    out.push_back(published_feature(lookup, anchor_as_stored(s, position.estimate.anchor), position, number));
+    auto anchor = anchor_as_stored(s, position.estimate.anchor);
+    out.push_back(published_feature(lookup, std::move(anchor), position, number));
+    const auto against = contradicted->find(position.estimate.anchor);
+    // What an older revision said is history; only the newest is what readers build on.
+    if (newest && against != contradicted->end()) contradict(out.back(), against->second);
   }
   std::sort(out.begin(), out.end(),
             [](const auto& a, const auto& b) { return a.anchor.network_id < b.anchor.network_id; });
@@ -278,7 +302,8 @@ AnchorFeature feature_of(Services& s, const Anchor& anchor) {
 
 std::string etag(const AnchorFeature& feature) {
   return "\"a-" + std::to_string(feature.anchor.version) + '-' +
-         std::to_string(feature.revision.value_or(0)) + '"';
+         std::to_string(feature.revision.value_or(0)) +
+         (feature.contradicted ? '-' + to_string(feature.contradicted->by) : "") + '"';
 }
 
 Response answer(const AnchorFeature& feature) {
@@ -296,6 +321,7 @@ Response patch(Services& s, const Request& request) {
     errors.push_back({"/site", "unknown_site", "there is no such site"});
   refuse_if_any(errors);
   value_or_problem(s.deps.anchors.update(anchor, anchor.version));
+  s.contradictions->changed();
   s.audit(request, "anchor.change " + to_string(anchor.network_id));
   return answer(feature_of(s, value_or_problem(s.deps.anchors.anchor(anchor.id))));
 }

@@ -10,6 +10,7 @@
 #include "api/routes/routes.hpp"
 #include "api/routes/support.hpp"
 #include "api/services/calibration_report.hpp"
+#include "api/services/contradiction_watch.hpp"
 #include "api/services/position_diff.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/store.hpp"
@@ -255,6 +256,7 @@ Response publish(Services& s, const Request& request) {
             "refused: " + published.error().message);
   const auto revision = value_or_problem(published);
   for (const auto& id : anchors) value_or_problem(s.deps.anchors.find_or_create(id, s.deps.clock.now()));
+  s.contradictions->changed();
   s.hub.publish(Topic::revisions,
                 to_wire(Ordered{{"revision", revision.number},
                                 {"t_us", revision.published.us()},
@@ -366,6 +368,7 @@ void add_calibration_routes(Router& router, Services& s) {
   router.add({Method::del, "/api/v1/calibrations/{id}", engineer, [&s](const Request& request) {
                 const auto id = path_id<CalibrationId>(request);
                 value_or_problem(s.deps.anchors.remove(id));
+                s.contradictions->changed();
                 s.audit(request, "calibration.delete " + to_string(id));
                 Response response;
                 response.status = 204;

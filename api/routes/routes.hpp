@@ -10,6 +10,7 @@
 namespace anchord::api {
 
 class AlarmBoard;
+class ContradictionWatch;
 class DeviceStream;
 class GeoService;
 class Housekeeping;
@@ -39,6 +40,7 @@ struct Services {
   DeviceStream* stream{nullptr};    ///< these three are set from the start
   RunningTime* running{nullptr};
   Housekeeping* housekeeping{nullptr};
+  ContradictionWatch* contradictions{nullptr};  ///< set from the start too
 
   StorageStatus storage() const { return deps.storage_status ? deps.storage_status() : StorageStatus{}; }
   /// Begins a backup in a job. Errors: those of the job queue.

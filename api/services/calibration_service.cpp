@@ -8,6 +8,7 @@
 #include "api/json/exclusion_json.hpp"
 #include "api/json/wire_resources.hpp"
 #include "api/services/calibration_place.hpp"
+#include "api/services/contradiction_watch.hpp"
 #include "api/services/job_service.hpp"
 #include "api/services/kit_profiles.hpp"
 #include "core/base/sha256.hpp"
@@ -230,6 +231,10 @@ Result<Job> CalibrationService::submit(CalibrationRequest request) {
         BOOST_OUTCOME_TRY(const auto solved, solve(wanted, models, job));
         const Calibration& made = solved.calibration;
         BOOST_OUTCOME_TRYV(deps_.anchors.insert(made));
+        if (deps_.contradictions != nullptr) {
+          deps_.contradictions->changed();
+          (void)deps_.contradictions->standing();
+        }
         const std::string id = to_string(made.id);
         for (const auto& profile : solved.learned) {
           BOOST_OUTCOME_TRYV(deps_.profiles->learn(profile, solved.missions(), "calibration " + id));

@@ -21,6 +21,7 @@ class FrameStore;
 
 namespace anchord::api {
 
+class ContradictionWatch;
 class JobContext;
 class KitProfiles;
 class JobService;
@@ -70,6 +71,7 @@ class CalibrationService {
     FrameStore* frames{nullptr};          ///< null: no local frames
     ExclusionStore* exclusions{nullptr};  ///< null: nothing is ever excluded (tests)
     TrackLimits track{};                  ///< what positions are held against where the request does not say
+    ContradictionWatch* contradictions{nullptr};  ///< asked again after each calibration
   };
   explicit CalibrationService(Deps deps) : deps_(deps) {}
 
