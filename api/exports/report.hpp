@@ -12,11 +12,18 @@
 
 namespace anchord {
 
+/// What an anchor's uncertainty comes from, for people: source and share of the covariance's trace.
+struct ReportBudget {
+  std::vector<std::pair<std::string, double>> shares;
+  std::string help;
+};
+
 struct ReportAnchor {
   Estimate estimate;
   std::string name;   ///< what people call it; the network id when empty
   std::string place;  ///< building, floor, space
   bool published{false};
+  ReportBudget budget{};  ///< no shares: none known
   std::optional<Override> overridden{};
   std::optional<Eigen::Vector3d> truth_m{};  ///< in the frame of the positions; height NaN when it has none
 };

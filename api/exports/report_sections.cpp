@@ -153,6 +153,30 @@ std::string gates(const Report& report) {
          words + "</p>";
 }
 
+std::string budgets(const Report& report) {
+  std::string rows, words;
+  std::vector<std::string> sources;
+  for (const auto& anchor : report.anchors) {
+    if (anchor.budget.shares.empty()) continue;
+    if (sources.empty())
+      for (const auto& [source, share] : anchor.budget.shares) sources.push_back(source);
+    rows += "<tr><td><b>" + html_text(name_of(anchor)) + "</b></td>";
+    for (const auto& source : sources) {
+      const auto at = std::ranges::find(anchor.budget.shares, source, [](const auto& s) { return s.first; });
+      rows +=
+          at == anchor.budget.shares.end() ? cell("–", "num mut") : cell(fixed(100 * at->second, 0) + " %");
+    }
+    rows += cell(html_text(anchor.budget.help), "") + "</tr>";
+  }
+  if (rows.empty()) return {};
+  std::string out = "<h2>Error budget</h2><table><thead><tr>" + head("Anchor", false);
+  for (const auto& source : sources) out += head(html_text(spaced(source)));
+  return out + head("What would help most", false) + "</tr></thead><tbody>" + rows +
+         "</tbody></table><p class=\"note\">Shares of the covariance's trace: what goes when the source is "
+         "known "
+         "perfectly. Floor: what no residual shows.</p>";
+}
+
 std::string rejected(const Report& report) {
   std::set<std::string> reasons;
   for (const auto& anchor : report.anchors) {

@@ -8,6 +8,7 @@
 namespace anchord::report {
 
 std::string positions(const Report& report);
+std::string budgets(const Report& report);     ///< what each anchor's uncertainty comes from
 std::string gates(const Report& report);       ///< every gate of every anchor, failed ones with their words
 std::string rejected(const Report& report);    ///< ranges not used, by reason
 std::string flights(const Report& report);     ///< bias, lag and offset of the kit per flight

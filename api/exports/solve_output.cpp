@@ -1,4 +1,5 @@
 #include "api/exports/solve_output.hpp"
+#include "api/json/budget_json.hpp"
 #include "api/json/live_writer.hpp"
 
 #include <cmath>
@@ -110,6 +111,7 @@ Json anchor_json(const AnchorSolution& anchor, bool globe) {
                       {"plane_ratio", number(g.plane_ratio, 4)},
                       {"sigma_ratio", number(g.sigma_ratio, 4)}};
   json["search"] = search_json(anchor.search);
+  json["budget"] = anchor.budget ? budget_json(*anchor.budget, false) : Json(nullptr);
   json["acceptable"] = e.acceptable();
   json["gates"] = Json::array();
   for (const Gate& gate : e.gates) {

@@ -206,6 +206,7 @@ Ordered anchor_feature_json(const AnchorFeature& feature) {
   p["accuracy"] =
       estimate ? accuracy(*estimate, feature.frame, feature.site, feature.globe) : Ordered(nullptr);
   p["quality"] = estimate ? quality(*estimate, feature.overridden) : Ordered(nullptr);
+  p["budget"] = feature.budget_json.empty() ? Ordered(nullptr) : Ordered::parse(feature.budget_json);
   p["provenance"] = {
       {"calibration", feature.calibration ? Ordered(to_string(*feature.calibration)) : Ordered(nullptr)},
       {"missions", std::move(missions)}};

@@ -224,8 +224,10 @@ Ordered calibration_json(const Calibration& calibration, bool with_anchors) {
     // Told in a local frame too, where the calibration asked for one.
     const auto local = Ordered::json_pointer("/frame/anchors/" + to_string(estimate.anchor));
     if (out["provenance"].contains(local)) anchors.back()["local_m"] = out["provenance"][local];
+    anchors.back()["budget"] = kept_budget(out["provenance"], estimate.anchor);
   }
   out["anchors"] = std::move(anchors);
+  out["provenance"].erase("budgets");  // each is with its anchor
   return out;
 }
 

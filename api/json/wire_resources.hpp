@@ -48,6 +48,7 @@ struct AnchorFeature {
   std::optional<Site> site{};
   std::optional<Override> overridden{};
   std::optional<GlobeAccuracy> globe{};      ///< of a place a fitted frame gave
+  std::string budget_json;                   ///< error budget; empty: none
   std::optional<Eigen::Vector3d> local_m{};  ///< in the positioning system's frame, where one is fitted
   struct Projected {
     int epsg{};

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "api/json/budget_json.hpp"
 #include "api/json/outline_json.hpp"
 
 namespace anchord::api {
@@ -110,6 +111,16 @@ void describe(Report& report, const std::vector<Mission>& missions, const std::s
   }
 }
 
+ReportBudget report_budget(const nlohmann::ordered_json& budget) {
+  ReportBudget out;
+  if (!budget.is_object()) return out;
+  for (const auto& [source, one] : budget["sources"].items()) {
+    if (one.is_object()) out.shares.emplace_back(source, one.value("share", 0.0));
+  }
+  out.help = budget.value("help_text", "");
+  return out;
+}
+
 Result<Report> calibration_report(AnchorStore& anchors, MissionStore& mission_store,
                                   const Calibration& calibration, const std::string& program) {
   Report report;
@@ -146,8 +157,10 @@ Result<Report> calibration_report(AnchorStore& anchors, MissionStore& mission_st
       if (position.since_revision == revision.number) published.emplace(position.estimate.anchor, position);
     }
   }
+  const auto told = nlohmann::ordered_json::parse(calibration.provenance_json, nullptr, false);
   for (const auto& estimate : calibration.anchors) {
     ReportAnchor anchor;
+    anchor.budget = report_budget(kept_budget(told, estimate.anchor));
     anchor.estimate = estimate;
     if (const auto known = anchors.anchor(estimate.anchor)) {
       anchor.name = known.value().name;

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "api/exports/evidence.hpp"
+#include "api/json/budget_json.hpp"
 #include "api/json/exclusion_json.hpp"
 #include "api/json/wire_resources.hpp"
 #include "api/services/calibration_place.hpp"
@@ -195,6 +196,26 @@ Json noise_provenance(const CalibrationRequest& request, const std::vector<Fligh
           {"n_nlos_applied", request.noise.nlos_m ? n_believed : 0}};
 }
 
+/// The budget of an anchor's answer, of several flights through their fusion, with the base's own error.
+Json budget_of(const std::vector<const AnchorSolution*>& flights, const Estimate& fused,
+               const std::optional<double>& base_sigma_m) {
+  if (!fused.best) return nullptr;
+  std::vector<BudgetOf> counted;
+  const ErrorBudget* chosen = nullptr;
+  for (const auto* flight : flights) {
+    if (!flight->budget) continue;
+    const auto& e = flight->estimate;
+    if (e.best->covariance_m2 == fused.best->covariance_m2) chosen = &*flight->budget;
+    if (e.verdict == Verdict::ok) counted.push_back({&*flight->budget, e.best->covariance_m2});
+  }
+  if (chosen == nullptr && counted.empty()) return nullptr;
+  // As fuse_estimates: where no flight is ok, the narrowest stands for all.
+  ErrorBudget budget = chosen != nullptr ? *chosen : fused_budget(counted, fused.best->covariance_m2);
+  if (base_sigma_m)
+    budget.part(ErrorSource::base) = *base_sigma_m * *base_sigma_m * Eigen::Matrix3d::Identity();
+  return budget_json(budget, base_sigma_m.has_value());
+}
+
 /// Where an anchor would stand without the models, and how far they moved it.
 Json without_models(const Estimate& raw, const Calibration& made) {
   const auto at = std::ranges::find(made.anchors, raw.anchor, &Estimate::anchor);
@@ -370,18 +391,33 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
   }
   if (canceled_now()) return make_error(Errc::canceled, "canceled");
   std::map<NetworkId, std::vector<Estimate>> by_anchor, by_anchor_raw;
+  std::map<NetworkId, std::vector<const AnchorSolution*>> budgets_of;
   Json flights = Json::array();
   for (std::size_t i = 0; i < request.missions.size(); ++i) {
     const auto& solution = *solved.solutions[i];
-    for (const auto& anchor : solution.anchors) by_anchor[anchor.estimate.anchor].push_back(anchor.estimate);
+    for (const auto& anchor : solution.anchors) {
+      by_anchor[anchor.estimate.anchor].push_back(anchor.estimate);
+      budgets_of[anchor.estimate.anchor].push_back(&anchor);
+    }
     solved.evidence.flights.push_back(evidence_of(solved.flights[i], solution, out.origin));
     flights.push_back(flight_provenance(solved.flights[i], solution));
     if (raw.flights.empty()) continue;
     for (const auto& anchor : raw.solutions[i]->anchors)
       by_anchor_raw[anchor.estimate.anchor].push_back(anchor.estimate);
   }
+  Json base = nullptr, budgets = Json::object();
+  std::optional<double> base_sigma_m;
+  if (const auto& site = solved.flights.front().mission.site) {
+    if (const auto found = deps_.anchors.site(*site)) {
+      base = site_base(found.value());
+      // Local metres say nothing of a base.
+      if (out.frame == TrackFrame::wgs84) base_sigma_m = found.value().base_sigma_m;
+    }
+  }
   for (const auto& [id, estimates] : by_anchor) {
     Estimate estimate = fuse_estimates(estimates);
+    if (auto budget = budget_of(budgets_of[id], estimate, base_sigma_m); !budget.is_null())
+      budgets[to_string(id)] = std::move(budget);
     if (out.origin) {
       const EnuFrame globe(*out.origin);
       if (estimate.best) estimate.best->wgs84 = globe.wgs84_from_enu(estimate.best->position);
@@ -393,13 +429,10 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
   Json uncorrected = raw.flights.empty() ? Json(nullptr) : Json::array();
   for (const auto& [id, estimates] : by_anchor_raw)
     uncorrected.push_back(without_models(fuse_estimates(estimates), out));
-  Json base = nullptr;
-  if (const auto& site = solved.flights.front().mission.site) {
-    if (const auto found = deps_.anchors.site(*site)) base = site_base(found.value());
-  }
   out.provenance_json = to_wire(Json{
       {"profiles", std::move(solved.profiles)},
       {"base", std::move(base)},
+      {"budgets", std::move(budgets)},
       {"n_clues", solved.n_clues},
       {"frame", frame ? frame_provenance(*frame, out) : Json(nullptr)},
       {"clues", {{"outline", outline}}},

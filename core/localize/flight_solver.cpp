@@ -162,11 +162,13 @@ FlightSolution describe(const Work& work, const FlightData& flight) {
     solution.notes.push_back("the joint solve did not settle within " + std::to_string(work.fit.rounds) +
                              " rounds");
   }
+  auto budgets = error_budgets(work.rows, work.fit, work.prior, options);
   for (std::size_t i = 0; i < work.rows.anchors.size(); ++i) {
     AnchorSolution anchor = judge_anchor(work.rows, work.fit, i, options);
     if (anchor.estimate.best) {
       auto& gates = anchor.estimate.gates;
       gates.insert(gates.end(), work.checks.begin(), work.checks.end());
+      anchor.budget = std::move(budgets[i]);
     }
     anchor.search = work.searches[i];
     anchor.estimate.bias_m = solution.shared.bias_m.value + anchor.delay_m.value_or(0.0);

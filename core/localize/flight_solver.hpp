@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/result.hpp"
+#include "core/localize/error_budget.hpp"
 #include "core/localize/flight_options.hpp"
 #include "core/localize/start_search.hpp"
 #include "core/types/estimate.hpp"
@@ -52,7 +53,8 @@ struct AnchorSolution {
   Eigen::Matrix3d fit_covariance_m2{Eigen::Matrix3d::Zero()};  ///< before the floor was added
   std::optional<double> delay_m;                               ///< d_a: this unit against the kit
   std::optional<double> delay_sigma_m;
-  double residual_scale_m{};  ///< robust, 1.4826 MAD
+  double residual_scale_m{};            ///< robust, 1.4826 MAD
+  std::optional<ErrorBudget> budget{};  ///< of the claimed covariance; absent without a position
   StartSearch search;
   std::vector<RangeResidual>
       residuals;  ///< of every range the track could place, by time; weight 0: rejected

@@ -5,9 +5,11 @@
 #include <fstream>
 #include <limits>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "api/exports/report.hpp"
 #include "api/imports/csv_table.hpp"
+#include "api/json/budget_json.hpp"
 #include "api/services/calibration_report.hpp"
 #include "core/geo/enu.hpp"
 
@@ -69,6 +71,7 @@ Result<void> write_solve_report(const FlightData& flight, const FlightSolution& 
     ReportAnchor one;
     one.estimate = anchor.estimate;
     one.name = anchor.name;
+    if (anchor.budget) one.budget = api::report_budget(budget_json(*anchor.budget, false));
     const auto at = truth.find(anchor.name);
     if (at != truth.end()) one.truth_m = at->second;
     // The newest measurement dates the page, so that the same folder gives the same bytes.
