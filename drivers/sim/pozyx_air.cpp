@@ -37,6 +37,7 @@ PozyxAir::PozyxAir(std::shared_ptr<const Scenario> scenario, Whereabouts where)
     PozyxStation& station = add(anchor.id, scenario_->tags.front(), false);
     station.enu_m = anchor.enu_m;
     station.bias_m = bias_m;
+    if (anchor.clock_drift_ppm) station.setup.clock_drift_ppm = *anchor.clock_drift_ppm;
   }
 }
 
@@ -228,9 +229,10 @@ void PozyxAir::store_range(PozyxStation& from, std::uint16_t to, const Exchange&
 }
 
 Terminal PozyxAir::terminal(const PozyxStation& station, double at_s) const {
-  if (!station.is_tag) return {station.enu_m, {}, station.bias_m};
+  const double clock_ppm = station.setup.clock_drift_ppm;
+  if (!station.is_tag) return {station.enu_m, {}, station.bias_m, clock_ppm};
   const Pose pose = where_(at_s);
-  return {pose.enu_m + pose.enu_from_body() * station.setup.lever_arm_m, pose.heading_rad, 0};
+  return {pose.enu_m + pose.enu_from_body() * station.setup.lever_arm_m, pose.heading_rad, 0, clock_ppm};
 }
 
 std::uint32_t PozyxAir::clock_ms(const PozyxStation& station, double at_s) const {

@@ -80,7 +80,9 @@ std::optional<Exchange> simulate_exchange(const World& world, const RadioOptions
   const bool zero = random.chance(options.zero_chance);
   if (!heard || lost) return std::nullopt;
   const double late_m = std::max(0.0, wall.excess_m + spread_m) + tail_m;
-  const double measured_m = truth_m + options.shared_bias_m + from.bias_m + to.bias_m + noise_m + late_m +
+  const double clocked_m =
+      clocked_distance_m(options.two_way, truth_m, 1e-6 * from.clock_ppm, 1e-6 * to.clock_ppm);
+  const double measured_m = clocked_m + options.shared_bias_m + from.bias_m + to.bias_m + noise_m + late_m +
                             options.level_bias_share * level_bias_m(rss_dbm);
   constexpr double k_line_of_sight_m = 0.06;
   return Exchange{zero ? 0.0 : std::max(0.0, measured_m), rss_dbm,      truth_m,

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "drivers/sim/random.hpp"
+#include "drivers/sim/two_way.hpp"
 #include "drivers/sim/world.hpp"
 
 namespace anchord::sim {
@@ -23,6 +24,7 @@ struct RadioOptions {
   /// What is left of the DW1000's error over received level (0..1) after the firmware's own correction, which
   /// no public source describes.
   double level_bias_share = 0;
+  TwoWayExchange two_way{};  ///< what the crystals of both ends do to a range
 };
 
 /// Friis, eq 2.5, isotropic antennas: received level at a distance in free space.
@@ -44,6 +46,7 @@ struct Terminal {
   Eigen::Vector3d enu_m{0, 0, 0};       ///< of the antenna
   std::optional<double> heading_rad{};  ///< clockwise from north; absent: no pattern over the turn
   double bias_m{};                      ///< antenna delay of this device
+  double clock_ppm{};                   ///< its crystal, fast is positive
 };
 
 /// One exchange as the device would report it, and what only a simulator knows.

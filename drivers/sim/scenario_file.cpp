@@ -208,6 +208,7 @@ void take_world(Object& of, World& world) {
         WorldAnchor anchor;
         one.id("id", anchor.id);
         one.vector<3>("enu_m", anchor.enu_m);
+        if (const auto ppm = one.number("clock_drift_ppm")) anchor.clock_drift_ppm = *ppm;
         anchors.push_back(anchor);
       }))
     world.anchors = std::move(anchors);
@@ -226,6 +227,9 @@ void take_radio(Object& of, RadioOptions& radio) {
   of.number("turn_lobe_db", radio.turn_lobe_db);
   of.flag("height_lobe", radio.height_lobe);
   of.number("level_bias_share", radio.level_bias_share);
+  of.word("ranging", std::array<std::string_view, 2>{"single_sided", "double_sided"}, radio.two_way.scheme);
+  of.number("reply_a_s", radio.two_way.reply_a_s);
+  of.number("reply_b_s", radio.two_way.reply_b_s);
 }
 
 void take_impulse(Object& of, ImpulseOptions& impulse) {

@@ -44,6 +44,7 @@ struct Slab {
 struct WorldAnchor {
   NetworkId id{};
   Eigen::Vector3d enu_m{0, 0, 0};
+  std::optional<double> clock_drift_ppm{};  ///< of its crystal; absent: as the first tag's
 };
 
 /// What stands on the site, in ENU metres of `origin`.
