@@ -144,6 +144,11 @@ Json flight_json(const SolvedFlight& flight) {
                     {"lever_up_m", valued(s.shared.lever_up_m)},
                     {"bias_determined", s.shared.bias_determined},
                     {"bias_z", number(s.shared.bias_z, 2)}};
+  json["shared"]["lever_up_by_antenna"] = Json::array();
+  for (const auto& antenna : s.shared.lever_up_by_antenna)
+    json["shared"]["lever_up_by_antenna"].push_back({{"tag_id", to_string(antenna.tag)},
+                                                     {"antenna", antenna.antenna},
+                                                     {"lever_up_m", valued(antenna.up_m)}});
   json["n_fixes"] = s.n_fixes;
   json["n_ranges"] = s.n_ranges;
   json["n_used"] = s.n_used;

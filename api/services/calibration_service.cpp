@@ -168,6 +168,10 @@ Json exclusions_provenance(const std::vector<Exclusion>& exclusions) {
 
 Json flight_provenance(const FlightData& flight, const FlightSolution& s) {
   const auto valued = [](const Valued& v) { return Json{{"value", v.value}, {"sigma", v.sigma}}; };
+  Json antennas = Json::array();
+  for (const auto& one : s.shared.lever_up_by_antenna)
+    antennas.push_back(
+        {{"tag", to_string(one.tag)}, {"antenna", one.antenna}, {"lever_up_m", valued(one.up_m)}});
   return {{"mission", to_string(flight.mission.id)},
           {"name", flight.mission.name},
           {"kit", flight.mission.kit},
@@ -175,6 +179,7 @@ Json flight_provenance(const FlightData& flight, const FlightSolution& s) {
           {"curve_m_per_efold", valued(s.shared.curve_m)},
           {"lag_s", valued(s.shared.lag_s)},
           {"lever_up_m", valued(s.shared.lever_up_m)},
+          {"lever_up_by_antenna", std::move(antennas)},
           {"bias_determined", s.shared.bias_determined},
           {"n_fixes", s.n_fixes},
           {"n_ranges", s.n_ranges},

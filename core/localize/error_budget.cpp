@@ -24,7 +24,7 @@ bool is_known(int shared, unsigned known) {
 
 std::vector<int> unknown_shared(unsigned known) {
   std::vector<int> out;
-  for (int i = 0; i < 6; ++i) {
+  for (int i = 0; i < k_shared_size; ++i) {
     if (!is_known(i, known)) out.push_back(i);
   }
   return out;
@@ -65,7 +65,7 @@ Covariances by_arrow(const JointFit& fit, const SharedPrior& prior, unsigned kno
 
 /// The same where ranges between anchors couple them.
 Covariances by_dense(const DenseNormal& dense, unsigned known) {
-  const Eigen::Index n = dense.matrix.rows() - 6;
+  const Eigen::Index n = dense.matrix.rows() - k_shared_size;
   std::vector<Eigen::Index> kept, at;
   for (Eigen::Index i = 0; i < n; ++i) {
     if (i % 4 == 3 && (known & k_bias) != 0) continue;

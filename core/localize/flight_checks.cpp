@@ -39,18 +39,20 @@ Result<std::optional<Gate>> check_lever_arm(const FlightRows& rows, const JointF
                                             const SharedPrior& prior, const FlightOptions& options) {
   if (options.lever_across_prior_m > 0 || !rows.track.has_attitude()) return std::optional<Gate>{};
   SharedPrior asked = prior;
-  asked.information.bottomRightCorner<2, 2>() = Eigen::Matrix2d::Identity() / (k_arm_asked_m * k_arm_asked_m);
+  asked.information.block<2, 2>(k_shared_forward, k_shared_forward) =
+      Eigen::Matrix2d::Identity() / (k_arm_asked_m * k_arm_asked_m);
   const SharedMatrix system = fit.normal.reduced + asked.information;
   const SharedVector step =
       system.ldlt().solve(fit.normal.reduced_gradient + asked.information * (prior.mean - fit.state.shared));
   const SharedMatrix covariance = system.inverse();
-  Arm arm(step.tail<2>(), covariance.bottomRightCorner<2, 2>());
+  Arm arm(step.segment<2>(k_shared_forward), covariance.block<2, 2>(k_shared_forward, k_shared_forward));
   if (!arm.beyond(k_arm_odd_z)) return std::optional<Gate>{};
   if (!arm.beyond(k_arm_z)) {
     FlightOptions free = options;
     free.lever_across_prior_m = k_arm_asked_m;
     BOOST_OUTCOME_TRY(const auto found, solve_joint(rows, fit.state, asked, free));
-    arm = Arm(found.state.shared.tail<2>(), found.shared_covariance.bottomRightCorner<2, 2>());
+    arm = Arm(found.state.shared.segment<2>(k_shared_forward),
+              found.shared_covariance.block<2, 2>(k_shared_forward, k_shared_forward));
     if (!arm.beyond(k_arm_z)) return std::optional<Gate>{};
   }
   return std::optional<Gate>{

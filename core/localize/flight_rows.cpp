@@ -27,6 +27,26 @@ std::optional<Eigen::Vector3d> lever_arm(const Mission& mission, const Range& ra
   return std::nullopt;
 }
 
+/// Each antenna its own vertical arm, where there is more than one; beyond four the rest share the common.
+void name_arms(FlightRows& rows) {
+  std::map<std::pair<NetworkId, std::uint8_t>, int> arms;
+  for (const AnchorRows& anchor : rows.anchors) {
+    for (const JointRow& row : anchor.rows) arms.try_emplace({row.tag, row.antenna}, 0);
+  }
+  int next = 0;
+  for (auto& [antenna, arm] : arms) {
+    arm = next++;
+    rows.antennas.push_back({antenna.first, antenna.second});
+  }
+  if (arms.size() < 2) return;
+  for (AnchorRows& anchor : rows.anchors) {
+    for (JointRow& row : anchor.rows) {
+      const int arm = arms.at({row.tag, row.antenna});
+      if (arm < k_most_antennas) row.arm = arm;
+    }
+  }
+}
+
 double median(std::vector<double>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::ranges::nth_element(values, middle);
@@ -62,6 +82,7 @@ Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& op
                   {},
                   0,
                   std::move(checked.refused),
+                  {},
                   checked.step_share};
   rows.track_span_s = rows.track.poses().back().t_s - rows.track.poses().front().t_s;
   bool arm_across = false;
@@ -109,6 +130,7 @@ Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& op
     std::ranges::stable_sort(anchor.rows, {}, &JointRow::t_s);
     rows.anchors.push_back(std::move(anchor));
   }
+  name_arms(rows);
   for (auto& [ids, distances_m] : between) {
     const auto a = std::ranges::find(rows.anchors, ids.first, &AnchorRows::id);
     const auto b = std::ranges::find(rows.anchors, ids.second, &AnchorRows::id);

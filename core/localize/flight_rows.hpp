@@ -20,6 +20,13 @@ struct JointRow {
   std::uint8_t antenna{0};
   std::optional<RangeBelief> belief{};
   std::optional<double> rss_dbm{};
+  std::optional<int> arm{};  ///< its antenna among those with a vertical arm of their own; absent: the common
+};
+
+/// One antenna of the aircraft that ranges came from.
+struct FlightAntenna {
+  NetworkId tag{};
+  std::uint8_t antenna{0};
 };
 
 /// All ranges of one anchor, ascending in time.
@@ -48,6 +55,7 @@ struct FlightRows {
   std::vector<std::string> notes;
   double track_span_s{};
   std::map<std::string, std::size_t> fixes_refused{};  ///< reason -> count
+  std::vector<FlightAntenna> antennas{};               ///< those heard, by tag and antenna
   double step_share{};  ///< of the good positions: in parts that are off as a whole (CheckedTrack)
 };
 

@@ -136,6 +136,18 @@ FlightSolution describe(const Work& work, const FlightData& flight) {
   solution.shared.curve_m = valued(k_shared_curve);
   solution.shared.lag_s = valued(k_shared_lag);
   solution.shared.lever_up_m = valued(k_shared_lever);
+  for (std::size_t k = 0; k < work.rows.antennas.size(); ++k) {
+    const int own = k_shared_antennas + static_cast<int>(k);
+    Valued up = solution.shared.lever_up_m;
+    if (work.rows.antennas.size() > 1 && own < k_shared_size) {
+      const auto& c = work.fit.shared_covariance;
+      up.value += work.fit.state.shared[own];
+      up.sigma = std::sqrt(
+          std::max(c(k_shared_lever, k_shared_lever) + c(own, own) + 2 * c(k_shared_lever, own), 0.0));
+    }
+    solution.shared.lever_up_by_antenna.push_back(
+        {work.rows.antennas[k].tag, work.rows.antennas[k].antenna, up});
+  }
   if (options.lever_across_prior_m > 0) {
     solution.shared.lever_forward_m = valued(k_shared_forward);
     solution.shared.lever_left_m = valued(k_shared_left);

@@ -28,6 +28,12 @@ struct SharedSolution {
   Valued curve_m;  ///< per e-fold of distance beyond 5 m
   Valued lag_s;    ///< the range stamped t belongs to the track at t + lag
   Valued lever_up_m;
+  struct AntennaArm {
+    NetworkId tag{};
+    std::uint8_t antenna{0};
+    Valued up_m;  ///< l_z of this antenna, on top of its declared arm
+  };
+  std::vector<AntennaArm> lever_up_by_antenna;  ///< each that was heard; lever_up_m is what they share
   std::optional<Valued> lever_forward_m, lever_left_m;  ///< on top of the declared arm, where asked for
   bool bias_determined{true};  ///< false: neither this flight nor a profile says what the bias is
   double bias_z{};             ///< |b| / sd(b) the calibrated-or-not gate saw

@@ -22,7 +22,7 @@ class AnchorRanges final : public ceres::CostFunction {
                const FlightOptions& options, std::vector<double> sigma_m)
       : flight_(flight), rows_(rows), options_(options), kappa_(block.kappa), sigma_m_(std::move(sigma_m)) {
     mutable_parameter_block_sizes()->push_back(4);
-    mutable_parameter_block_sizes()->push_back(6);
+    mutable_parameter_block_sizes()->push_back(k_shared_size);
     set_num_residuals(static_cast<int>(rows.rows.size()) + 1);
   }
 
@@ -51,11 +51,14 @@ class AnchorRanges final : public ceres::CostFunction {
         slope = scale * (size > 1e-12 ? value.weight * std::abs(e) / size : 1.0) / sigma_m_[i];
       }
       if (by_own) Eigen::Map<Eigen::Vector4d>(by_own + 4 * i) = -slope * line.by_anchor;
-      if (by_shared) Eigen::Map<SharedVector>(by_shared + 6 * i) = -slope * line.by_shared;
+      if (by_shared)
+        Eigen::Map<SharedVector>(by_shared + k_shared_size * static_cast<std::ptrdiff_t>(i)) =
+            -slope * line.by_shared;
     }
     residuals[n] = own[3] / options_.delay_prior_m;
     if (by_own) Eigen::Map<Eigen::Vector4d>(by_own + 4 * n) << 0, 0, 0, 1.0 / options_.delay_prior_m;
-    if (by_shared) Eigen::Map<SharedVector>(by_shared + 6 * n).setZero();
+    if (by_shared)
+      Eigen::Map<SharedVector>(by_shared + k_shared_size * static_cast<std::ptrdiff_t>(n)).setZero();
     return true;
   }
 
@@ -87,7 +90,7 @@ class ClueTerm final : public ceres::SizedCostFunction<3, 4> {
 };
 
 /// The Gaussian prior on the shared unknowns: L^T (phi - mu) with information = L L^T.
-class SharedTerm final : public ceres::SizedCostFunction<6, 6> {
+class SharedTerm final : public ceres::SizedCostFunction<k_shared_size, k_shared_size> {
  public:
   explicit SharedTerm(const SharedPrior& prior) : mean_(prior.mean) {
     root_ = SharedMatrix(prior.information.llt().matrixL()).transpose();
@@ -95,7 +98,7 @@ class SharedTerm final : public ceres::SizedCostFunction<6, 6> {
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     Eigen::Map<SharedVector>{residuals} = root_ * (Eigen::Map<const SharedVector>(parameters[0]) - mean_);
     if (jacobians && jacobians[0]) {
-      Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>{jacobians[0]} = root_;
+      Eigen::Map<Eigen::Matrix<double, k_shared_size, k_shared_size, Eigen::RowMajor>>{jacobians[0]} = root_;
     }
     return true;
   }
@@ -129,9 +132,10 @@ Result<JointState> polish_joint_ceres(const FlightRows& flight, JointState state
     ceres::Problem problem;
     SharedVector shared = state.shared;
     std::vector<Four> own(state.anchors.size());
-    problem.AddParameterBlock(shared.data(), 6);
+    problem.AddParameterBlock(shared.data(), k_shared_size);
     if (options.lever_across_prior_m <= 0)
-      problem.SetManifold(shared.data(), new ceres::SubsetManifold(6, {k_shared_forward, k_shared_left}));
+      problem.SetManifold(shared.data(),
+                          new ceres::SubsetManifold(k_shared_size, {k_shared_forward, k_shared_left}));
     problem.AddResidualBlock(new SharedTerm(prior), nullptr, shared.data());
     auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
     ordering->AddElementToGroup(shared.data(), 1);

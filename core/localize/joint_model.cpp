@@ -174,15 +174,19 @@ AnchorClues clues_of(NetworkId id, const FlightOptions& options) {
 
 double range_curve(double distance_m) { return std::log(std::max(distance_m, k_hinge_m) / k_hinge_m); }
 
+Eigen::Vector3d antenna_of(const TagPoint& point, const JointRow& row, const SharedVector& shared) {
+  const double up_m = shared[k_shared_lever] + (row.arm ? shared[k_shared_antennas + *row.arm] : 0.0);
+  return point.position_m + up_m * point.body_up + shared[k_shared_forward] * point.body_forward +
+         shared[k_shared_left] * point.body_left;
+}
+
 JointLine linearise(const TagTrack& track, const JointRow& row, const SharedVector& shared,
                     const JointState::Anchor& anchor) {
   JointLine line;
   const TagPoint point = track.at(row.t_s + shared[k_shared_lag], row.lever_arm_body_m);
   line.refused = point.refused;
   if (point.refused != TrackRefusal::none) return line;
-  const Eigen::Vector3d antenna = point.position_m + shared[k_shared_lever] * point.body_up +
-                                  shared[k_shared_forward] * point.body_forward +
-                                  shared[k_shared_left] * point.body_left;
+  const Eigen::Vector3d antenna = antenna_of(point, row, shared);
   line.antenna_m = antenna;
   const Eigen::Vector3d difference = antenna - anchor.position_m;
   const double distance_m = std::max(difference.norm(), 1e-6);
@@ -196,6 +200,7 @@ JointLine linearise(const TagTrack& track, const JointRow& row, const SharedVect
   line.by_shared[k_shared_curve] = curve;
   line.by_shared[k_shared_lag] = slope * u.dot(point.velocity_mps);
   line.by_shared[k_shared_lever] = slope * u.dot(point.body_up);
+  if (row.arm) line.by_shared[k_shared_antennas + *row.arm] = line.by_shared[k_shared_lever];
   line.by_shared[k_shared_forward] = slope * u.dot(point.body_forward);
   line.by_shared[k_shared_left] = slope * u.dot(point.body_left);
   line.position_variance_m2 = std::max(u.dot(point.covariance_m2 * u), 0.0);
@@ -250,8 +255,7 @@ std::vector<Observation> observations_of(const FlightRows& flight, const AnchorR
     const TagPoint point = flight.track.at(row.t_s + shared[k_shared_lag], row.lever_arm_body_m);
     if (point.refused != TrackRefusal::none) continue;
     Observation o;
-    o.tag_m = point.position_m + shared[k_shared_lever] * point.body_up +
-              shared[k_shared_forward] * point.body_forward + shared[k_shared_left] * point.body_left;
+    o.tag_m = antenna_of(point, row, shared);
     o.distance_m = row.distance_m - shared[k_shared_bias];
     o.distance_m -= shared[k_shared_curve] * range_curve(o.distance_m);
     o.sigma_m = sigma_m;

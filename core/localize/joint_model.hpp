@@ -37,6 +37,9 @@ std::vector<LevelSample> levels_of(const FlightRows& flight, const AnchorRows& a
 /// g(rho) of the model: no curve within 5 m, where it could not be told from the bias.
 double range_curve(double distance_m);
 
+/// Where the antenna of a row was: the track point with the declared arm, then what the shared unknowns add.
+Eigen::Vector3d antenna_of(const TagPoint& point, const JointRow& row, const SharedVector& shared);
+
 /// One row linearised: residual and derivative of the prediction by (x, y, z, d) and by the shared unknowns.
 struct JointLine {
   TrackRefusal refused{TrackRefusal::none};
@@ -55,7 +58,8 @@ double robust_weight(double residual_over_scale, const FlightOptions& options);
 /// Normal equations of one round in the shape they have: an arrow. Robust weights and tempering are inside.
 struct AnchorBlock {
   Eigen::Matrix4d own{Eigen::Matrix4d::Zero()};  ///< (x, d) against itself, prior on d included
-  Eigen::Matrix<double, 4, 6> shared{Eigen::Matrix<double, 4, 6>::Zero()};  ///< (x, d) against the shared
+  Eigen::Matrix<double, 4, k_shared_size> shared{
+      Eigen::Matrix<double, 4, k_shared_size>::Zero()};  ///< (x, d) against the shared
   Eigen::Vector4d gradient{Eigen::Vector4d::Zero()};
   Eigen::Matrix4d own_inverse{Eigen::Matrix4d::Zero()};
   double scale_m{};      ///< 1.4826 MAD, never below the floor

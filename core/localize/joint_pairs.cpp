@@ -46,14 +46,16 @@ void add_pairs(const FlightRows& flight, const JointState& state, const FlightOp
 DenseNormal dense_normal(const FlightRows& flight, const JointState& state, const JointNormal& normal,
                          const SharedPrior& prior, const FlightOptions& options) {
   const auto n = 4 * static_cast<Eigen::Index>(state.anchors.size());
-  DenseNormal dense{Eigen::MatrixXd::Zero(n + 6, n + 6), Eigen::VectorXd::Zero(n + 6)};
-  dense.matrix.bottomRightCorner<6, 6>() = normal.shared + prior.information;
-  dense.gradient.tail<6>() = normal.shared_gradient + prior.information * (prior.mean - state.shared);
+  DenseNormal dense{Eigen::MatrixXd::Zero(n + k_shared_size, n + k_shared_size),
+                    Eigen::VectorXd::Zero(n + k_shared_size)};
+  dense.matrix.bottomRightCorner<k_shared_size, k_shared_size>() = normal.shared + prior.information;
+  dense.gradient.tail<k_shared_size>() =
+      normal.shared_gradient + prior.information * (prior.mean - state.shared);
   for (Eigen::Index i = 0; i < n; i += 4) {
     const AnchorBlock& block = normal.anchors[static_cast<std::size_t>(i / 4)];
     dense.matrix.block<4, 4>(i, i) = block.own;
-    dense.matrix.block<4, 6>(i, n) = block.shared;
-    dense.matrix.block<6, 4>(n, i) = block.shared.transpose();
+    dense.matrix.block<4, k_shared_size>(i, n) = block.shared;
+    dense.matrix.block<k_shared_size, 4>(n, i) = block.shared.transpose();
     dense.gradient.segment<4>(i) = block.gradient;
     // As in the arrow: a direction nothing sees stays where it is. An anchor that takes no part is held.
     const double least = 1e-6 * block.own.topLeftCorner<3, 3>().diagonal().maxCoeff() + 1e-9;

@@ -50,7 +50,7 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
     if (coupled) {
       const DenseNormal dense = dense_normal(flight, fit.state, normal, prior, options);
       all_steps = dense.matrix.ldlt().solve(dense.gradient);
-      step = all_steps.tail<6>();
+      step = all_steps.tail<k_shared_size>();
     } else {
       const SharedMatrix system = normal.reduced + prior.information;
       step =
@@ -60,8 +60,7 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
     step[k_shared_bias] = clipped(step[k_shared_bias], 0.5);
     step[k_shared_curve] = clipped(step[k_shared_curve], 0.05);
     step[k_shared_lag] = clipped(step[k_shared_lag], 0.1);
-    for (const int arm : {k_shared_lever, k_shared_forward, k_shared_left})
-      step[arm] = clipped(step[arm], 0.1);
+    for (int arm = k_shared_lever; arm < k_shared_size; ++arm) step[arm] = clipped(step[arm], 0.1);
     double largest = step.cwiseAbs().maxCoeff();
     for (std::size_t i = 0; i < fit.state.anchors.size(); ++i) {
       auto& anchor = fit.state.anchors[i];
@@ -99,16 +98,16 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
   fit.normal = build_normal(flight, fit.state, options, 0.0, kept, true);
   if (!flight.pairs.empty()) {
     const DenseNormal dense = dense_normal(flight, fit.state, fit.normal, prior, options);
-    const Eigen::Index n = dense.matrix.rows() - 6;
+    const Eigen::Index n = dense.matrix.rows() - k_shared_size;
     const Eigen::MatrixXd covariance = dense.matrix.inverse();
-    fit.shared_covariance = covariance.bottomRightCorner<6, 6>();
+    fit.shared_covariance = covariance.bottomRightCorner<k_shared_size, k_shared_size>();
     fit.normal.reduced = fit.shared_covariance.inverse() - prior.information;
     for (Eigen::Index i = 0; i < n; i += 4) fit.anchor_covariance.emplace_back(covariance.block<4, 4>(i, i));
     return fit;
   }
   fit.shared_covariance = (fit.normal.reduced + prior.information).inverse();
   for (const AnchorBlock& block : fit.normal.anchors) {
-    const Eigen::Matrix<double, 4, 6> lever = block.own_inverse * block.shared;
+    const Eigen::Matrix<double, 4, k_shared_size> lever = block.own_inverse * block.shared;
     fit.anchor_covariance.push_back(block.own_inverse + lever * fit.shared_covariance * lever.transpose());
   }
   return fit;

@@ -25,12 +25,17 @@ Eigen::Matrix4d base_information(const FlightOptions& options, double bias_sigma
       .asDiagonal();
 }
 
-/// Nothing but what is held or known about the arm's forward and left part.
+constexpr int k_flight_size = k_shared_size - k_profile_size;  // unknowns of one flight alone
+
+/// Nothing but what is held or known of this flight's own: the arm's forward and left part, and what the
+/// vertical arm of each antenna differs from the common one.
 SharedPrior across_prior(const FlightOptions& options) {
   SharedPrior prior;
   const double sigma_m = options.lever_across_prior_m > 0 ? options.lever_across_prior_m : 1e-6;
   prior.information(k_shared_forward, k_shared_forward) = 1.0 / square(sigma_m);
   prior.information(k_shared_left, k_shared_left) = 1.0 / square(sigma_m);
+  for (int i = k_shared_antennas; i < k_shared_size; ++i)
+    prior.information(i, i) = 1.0 / square(options.lever_prior_m);
   return prior;
 }
 
@@ -52,18 +57,19 @@ struct Sum {
 }  // namespace
 
 ProfileFactor profile_factor(const JointFit& fit, const SharedPrior& prior, const std::string& flight) {
-  // The arm's forward and left part belong to this flight: marginalised with their prior, the rest without.
+  // The rest of the arms belongs to this flight: marginalised with its prior, what the kit shares without.
   SharedMatrix own_prior = SharedMatrix::Zero();
-  own_prior.bottomRightCorner<2, 2>() = prior.information.bottomRightCorner<2, 2>();
+  own_prior.bottomRightCorner<k_flight_size, k_flight_size>() =
+      prior.information.bottomRightCorner<k_flight_size, k_flight_size>();
   // At the optimum the gradient of likelihood and prior cancel: S phi_f = (S + P) phi - P mu.
   const SharedMatrix& likelihood = fit.normal.reduced;
   const SharedVector eta_all = (likelihood + prior.information) * fit.state.shared -
                                prior.information * prior.mean + own_prior * prior.mean;
   const SharedMatrix m = likelihood + own_prior;
-  const Eigen::Matrix<double, 4, 2> gain_across =
-      m.topRightCorner<4, 2>() * m.bottomRightCorner<2, 2>().inverse();
-  const Eigen::Matrix4d s = m.topLeftCorner<4, 4>() - gain_across * m.bottomLeftCorner<2, 4>();
-  const Eigen::Vector4d eta = eta_all.head<4>() - gain_across * eta_all.tail<2>();
+  const Eigen::Matrix<double, 4, k_flight_size> gain_across =
+      m.topRightCorner<4, k_flight_size>() * m.bottomRightCorner<k_flight_size, k_flight_size>().inverse();
+  const Eigen::Matrix4d s = m.topLeftCorner<4, 4>() - gain_across * m.bottomLeftCorner<k_flight_size, 4>();
+  const Eigen::Vector4d eta = eta_all.head<4>() - gain_across * eta_all.tail<k_flight_size>();
   const Eigen::Matrix4d wander_information = wander().inverse();
   const Eigen::Matrix4d gain = Eigen::Matrix4d::Identity() - s * (s + wander_information).inverse();
   ProfileFactor factor;

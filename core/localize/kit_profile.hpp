@@ -14,8 +14,16 @@ inline constexpr int k_shared_lever = 3;
 /// Then, known to one flight alone and no part of a profile: the lever arm's forward and left part (m).
 inline constexpr int k_shared_forward = 4;
 inline constexpr int k_shared_left = 5;
-using SharedVector = Eigen::Matrix<double, 6, 1>;
-using SharedMatrix = Eigen::Matrix<double, 6, 6>;
+/// Then, of one flight alone too: what each antenna's vertical arm differs from l_z (m), in the order of
+/// FlightRows::antennas. A flight with one antenna uses none, one with more than four lets the rest share
+/// l_z.
+inline constexpr int k_shared_antennas = 6;
+inline constexpr int k_most_antennas = 4;
+inline constexpr int k_shared_size = k_shared_antennas + k_most_antennas;
+/// How many of them a profile carries.
+inline constexpr int k_profile_size = 4;
+using SharedVector = Eigen::Matrix<double, k_shared_size, 1>;
+using SharedMatrix = Eigen::Matrix<double, k_shared_size, k_shared_size>;
 
 /// What one flight says about the shared unknowns, flight-to-flight wander already allowed for.
 struct ProfileFactor {

@@ -88,12 +88,13 @@ TEST(JointModel, JacobianMatchesFiniteDifferences) {
     fixes.push_back(fix);
   }
   const TagTrack track(fixes, std::nullopt, UtcTime{});
-  const JointRow row{2.03, 9.0, {0.2, -0.4, 0.1}};
+  JointRow row{2.03, 9.0, {0.2, -0.4, 0.1}};
+  row.arm = 1;
   JointState::Anchor anchor{{-6, 5, 2}, 0.02, true};
-  const SharedVector shared{{0.3, 0.05, 0.012, 0.04, 0.03, -0.05}};
+  const SharedVector shared{{0.3, 0.05, 0.012, 0.04, 0.03, -0.05, 0.01, 0.02, -0.03, 0.04}};
   const JointLine line = linearise(track, row, shared, anchor);
   const double h = 1e-7;
-  for (int k = 0; k < 6; ++k) {
+  for (int k = 0; k < k_shared_size; ++k) {
     SharedVector up = shared;
     SharedVector down = shared;
     up[k] += h;
