@@ -1,6 +1,7 @@
 #include "api/exports/solve_output.hpp"
 #include "api/json/budget_json.hpp"
 #include "api/json/live_writer.hpp"
+#include "api/learning/flight_models.hpp"
 
 #include <cmath>
 #include <cstdio>
@@ -157,6 +158,7 @@ Json flight_json(const SolvedFlight& flight) {
   for (const auto& [why, count] : s.refused) json["refused"][why] = count;
   json["fixes_refused"] = Json::object();
   for (const auto& [why, count] : s.fixes_refused) json["fixes_refused"][why] = count;
+  json["models"] = flight.models != nullptr ? api::flight_models_report_json(*flight.models) : Json(nullptr);
   json["notes"] = s.notes;
   json["anchors"] = Json::array();
   for (const auto& anchor : s.anchors) json["anchors"].push_back(anchor_json(anchor, globe));

@@ -8,12 +8,17 @@
 
 namespace anchord {
 
+namespace api {
+struct FlightModelsReport;
+}
+
 enum class SolveFormat : std::uint8_t { table, json, geojson, csv };
 
 /// A solved flight with what it was told.
 struct SolvedFlight {
   const FlightData* data{};
   const FlightSolution* solution{};
+  const api::FlightModelsReport* models{nullptr};  ///< what models did to its ranges; null: none were given
 };
 
 /// Text of `anchord solve`, newline at the end. Schema in docs/formats.md; longitudes and latitudes with 9

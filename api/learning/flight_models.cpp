@@ -41,6 +41,7 @@ FlightModelsWish read_flight_models(const Json& models, std::vector<FieldError>&
   if (const auto word = fields.word("correction", {"weighted", "hard", "none"}))
     out.correction = static_cast<ml::Correction>(*word);
   if (const auto word = fields.word("likelihood", {"one_sided", "loss"})) out.likelihood = *word == 0;
+  if (const auto word = fields.word("worth", {"shown", "ignored"})) out.ask_worth = *word == 0;
   fields.finish();
   return out;
 }
@@ -99,6 +100,46 @@ FlightModelsReport correct_flight(const ModelRegistry::Active& models, FlightDat
   return out;
 }
 
+bool leave_out_worthless(std::vector<FlightModelsReport>& reports, std::vector<FlightData>& corrected,
+                         const std::vector<FlightData>& raw,
+                         const std::vector<std::optional<FlightSolution>>& with,
+                         const std::vector<std::optional<FlightSolution>>& without) {
+  bool some = false;
+  for (std::size_t i = 0; i < reports.size(); ++i) {
+    FlightModelsReport& report = reports[i];
+    if (!report.spoke() || !with[i] || !without[i]) continue;
+    report.worth = correction_worth(*without[i], *with[i], corrected[i]);
+    if (report.worth->shown) continue;
+    report.used = false;
+    some = true;
+    corrected[i] = raw[i];
+    corrected[i].notes.push_back(
+        "the models do not explain this flight better than its ranges as they came: " + report.worth->text() +
+        "; solved without them");
+  }
+  return some;
+}
+
+Ordered flight_models_report_json(const FlightModelsReport& f) {
+  Ordered worth = nullptr;
+  if (f.worth)
+    worth = {{"gain_per_range", f.worth->gain},
+             {"sigma", f.worth->sigma},
+             {"n_ranges", f.worth->n_ranges},
+             {"n_blocks", f.worth->n_blocks},
+             {"shown", f.worth->shown}};
+  return {{"n_ranges", f.n_ranges},
+          {"n_los", f.n_los},
+          {"n_nlos", f.n_nlos},
+          {"n_corrected", f.n_corrected},
+          {"n_silent", f.n_silent},
+          {"n_believed", f.n_believed},
+          {"mean_correction_m", f.mean_correction_m},
+          {"note", f.note.empty() ? Ordered(nullptr) : Ordered(f.note)},
+          {"used", f.used},
+          {"worth", std::move(worth)}};
+}
+
 Ordered flight_models_json(const ModelRegistry::Active& models,
                            const std::vector<FlightModelsReport>& flights) {
   Ordered out = Ordered::object();
@@ -107,18 +148,11 @@ Ordered flight_models_json(const ModelRegistry::Active& models,
     out[task] = at == models.models.end() ? Ordered(nullptr) : Ordered(to_string(at->second));
   }
   out["correction"] = correction_word(models.correction);
-  out["likelihood"] =
-      std::ranges::any_of(flights, [](const auto& f) { return f.n_believed > 0; }) ? "one_sided" : "loss";
+  out["likelihood"] = std::ranges::any_of(flights, [](const auto& f) { return f.used && f.n_believed > 0; })
+                          ? "one_sided"
+                          : "loss";
   Ordered list = Ordered::array();
-  for (const auto& f : flights)
-    list.push_back({{"n_ranges", f.n_ranges},
-                    {"n_los", f.n_los},
-                    {"n_nlos", f.n_nlos},
-                    {"n_corrected", f.n_corrected},
-                    {"n_silent", f.n_silent},
-                    {"n_believed", f.n_believed},
-                    {"mean_correction_m", f.mean_correction_m},
-                    {"note", f.note.empty() ? Ordered(nullptr) : Ordered(f.note)}});
+  for (const auto& f : flights) list.push_back(flight_models_report_json(f));
   out["flights"] = std::move(list);
   return out;
 }

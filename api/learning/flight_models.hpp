@@ -7,6 +7,7 @@
 
 #include "api/http/problem.hpp"
 #include "api/learning/model_registry.hpp"
+#include "core/localize/correction_worth.hpp"
 #include "core/types/flight_data.hpp"
 
 namespace anchord::api {
@@ -17,6 +18,7 @@ struct FlightModelsWish {
   std::map<std::string, std::string> tasks{};
   std::optional<ml::Correction> correction{};  ///< absent: the one in use
   std::optional<bool> likelihood{};  ///< the mixture's density weighs each range, not the loss alone
+  bool ask_worth{true};              ///< of a flight that the models do not explain better they are left out
 };
 /// Noise that a person states in place of what the models were trained with.
 struct StatedNoise {
@@ -34,7 +36,10 @@ struct FlightModelsReport {
   std::size_t n_ranges{}, n_los{}, n_nlos{}, n_corrected{}, n_silent{};
   std::size_t n_believed{};  ///< entered the solve by the model's likelihood
   double mean_correction_m{};
-  std::string note;  ///< why some ranges were left as they came
+  std::string note;                        ///< why some ranges were left as they came
+  std::optional<CorrectionWorth> worth{};  ///< absent: not asked
+  bool used{true};                         ///< false: the flight was solved without them, for want of worth
+  bool spoke() const { return n_corrected + n_believed > 0; }
 };
 /// Takes the models' corrections off the ranges of `flight` (a copy of the record, never the record), and
 /// tells the solver what the models believe of the error that is left.
@@ -42,6 +47,16 @@ struct FlightModelsReport {
 /// noise       stated sigmas replace those of the beliefs; with nlos_m a class alone makes a belief too
 FlightModelsReport correct_flight(const ModelRegistry::Active& models, FlightData& flight,
                                   bool likelihood = true, const StatedNoise& noise = {});
+
+/// Asks what the corrections of each flight are worth, and gives those that cannot show any their ranges back
+/// as they came, with a note on the flight. True: some did, and the flights are to be solved again.
+bool leave_out_worthless(std::vector<FlightModelsReport>& reports, std::vector<FlightData>& corrected,
+                         const std::vector<FlightData>& raw,
+                         const std::vector<std::optional<FlightSolution>>& with,
+                         const std::vector<std::optional<FlightSolution>>& without);
+
+/// What the models did to one flight.
+nlohmann::ordered_json flight_models_report_json(const FlightModelsReport& report);
 
 /// For the provenance of a calibration: models by task, correction, and what they did to each flight.
 nlohmann::ordered_json flight_models_json(const ModelRegistry::Active& models,

@@ -381,7 +381,8 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
     // A kit's profile tells the bias of raw ranges: of corrected ones it would take it off twice, and what
     // these teach is no bias of the kit.
     if (n_corrected > 0) wanted.use_profile = false;
-    if (n_corrected + n_believed == 0 || !request.compare_uncorrected) raw.flights.clear();
+    const bool needed = request.compare_uncorrected || request.models.ask_worth;
+    if (n_corrected + n_believed == 0 || !needed) raw.flights.clear();
   }
   for (auto* flights : {&solved.flights, &raw.flights})
     for (auto& flight : *flights)
@@ -389,11 +390,23 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
   BOOST_OUTCOME_TRYV(solve_kits(wanted, options, solved));
   if (!raw.flights.empty()) {
     job.progress(0.7, "solve", "without the models");
-    wanted = request;
-    wanted.iterations = 0;
-    BOOST_OUTCOME_TRYV(solve_kits(wanted, options, raw));
+    CalibrationRequest plain = request;
+    plain.iterations = 0;
+    BOOST_OUTCOME_TRYV(solve_kits(plain, options, raw));
+    if (request.models.ask_worth &&
+        leave_out_worthless(solved.models, solved.flights, raw.flights, solved.solutions, raw.solutions)) {
+      job.progress(0.8, "solve", "without models that show no worth");
+      const bool corrected =
+          std::ranges::any_of(solved.models, [](const auto& m) { return m.used && m.n_corrected > 0; });
+      if (!corrected) wanted.use_profile = request.use_profile;
+      solved.profiles = Json::array();
+      solved.n_clues = 0;
+      solved.evidence.course.clear();
+      BOOST_OUTCOME_TRYV(solve_kits(wanted, options, solved));
+    }
     solved.learned = std::move(raw.learned);
   }
+  const bool compared = !raw.flights.empty() && request.compare_uncorrected;
   if (canceled_now()) return make_error(Errc::canceled, "canceled");
   std::map<NetworkId, std::vector<Estimate>> by_anchor, by_anchor_raw;
   std::map<NetworkId, std::vector<const AnchorSolution*>> budgets_of;
@@ -406,7 +419,7 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
     }
     solved.evidence.flights.push_back(evidence_of(solved.flights[i], solution, out.origin));
     flights.push_back(flight_provenance(solved.flights[i], solution));
-    if (raw.flights.empty()) continue;
+    if (!compared) continue;
     for (const auto& anchor : raw.solutions[i]->anchors)
       by_anchor_raw[anchor.estimate.anchor].push_back(anchor.estimate);
   }
@@ -431,7 +444,7 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
     if (frame && !out.origin) place_on_globe(*frame, estimate);
     out.anchors.push_back(std::move(estimate));
   }
-  Json uncorrected = raw.flights.empty() ? Json(nullptr) : Json::array();
+  Json uncorrected = compared ? Json::array() : Json(nullptr);
   for (const auto& [id, estimates] : by_anchor_raw)
     uncorrected.push_back(without_models(fuse_estimates(estimates), out));
   out.provenance_json = to_wire(Json{

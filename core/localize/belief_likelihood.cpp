@@ -48,6 +48,7 @@ BeliefValue belief_value(const RangeBelief& belief, double error_m, double varia
   const double density = los + delayed + k_stray;
   BeliefValue value;
   value.p_los = los / density;
+  value.density_per_m = density;
   value.score_per_m = (los * z_los / los_m - delayed_slope) / density;
   value.curvature_per_m2 =
       value.p_los / (los_m * los_m) + delayed / density / (nlos_m * nlos_m + tau_m * tau_m);

@@ -6,7 +6,8 @@ namespace anchord {
 
 /// What one range error says under a model's belief, for a Gauss-Newton round.
 struct BeliefValue {
-  double p_los{};               ///< after the error is seen
+  double p_los{};  ///< after the error is seen
+  double density_per_m{};
   double score_per_m{};         ///< -d log density / d e
   double curvature_per_m2{};    ///< for the step: Gaussian of each part, by how likely the part is
   double information_per_m2{};  ///< to be claimed: score squared, whose mean is the Fisher information

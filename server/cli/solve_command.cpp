@@ -33,7 +33,7 @@ struct Arguments {
   double max_correction_age_s{TrackLimits{}.max_correction_age_s};
   std::string profile, out, clues;
   std::vector<std::string> models;
-  std::string likelihood{"one_sided"};
+  std::string likelihood{"one_sided"}, worth{"shown"};
   SolveReportOptions report;
 };
 
@@ -109,9 +109,11 @@ Result<std::vector<FlightData>> read_all(const std::vector<std::string>& folders
   return flights;
 }
 
-/// What the service does with promoted models, with the artifacts named.
-Result<void> apply_models(const Arguments& a, std::vector<FlightData>& flights) {
-  if (a.models.empty()) return boost::outcome_v2::success();
+/// What the service does with promoted models, with the artifacts named; of each flight what they did.
+Result<std::vector<api::FlightModelsReport>> apply_models(const Arguments& a,
+                                                          std::vector<FlightData>& flights) {
+  std::vector<api::FlightModelsReport> reports;
+  if (a.models.empty()) return reports;
   if (!a.profile.empty())
     return make_error(
         Errc::invalid_argument,
@@ -124,7 +126,8 @@ Result<void> apply_models(const Arguments& a, std::vector<FlightData>& flights) 
   }
   BOOST_OUTCOME_TRY(const auto together, api::models_together(std::move(models), ml::Correction::weighted));
   for (auto& flight : flights) {
-    const auto report = api::correct_flight(together, flight, a.likelihood == "one_sided");
+    reports.push_back(api::correct_flight(together, flight, a.likelihood == "one_sided"));
+    const auto& report = reports.back();
     std::fprintf(stderr, "  %s: models corrected %zu of %zu ranges, by %.3f m on average, and weigh %zu\n",
                  flight.mission.name.c_str(), report.n_corrected, report.n_ranges, report.mean_correction_m,
                  report.n_believed);
@@ -132,7 +135,7 @@ Result<void> apply_models(const Arguments& a, std::vector<FlightData>& flights) 
       return make_error(Errc::invalid_argument,
                         flight.mission.name + ": the models say nothing of its ranges: " + report.note);
   }
-  return boost::outcome_v2::success();
+  return reports;
 }
 
 /// A profile of another kit would be left out in silence.
@@ -145,6 +148,14 @@ Result<void> check_profile_kit(const FlightOptions& options, const std::vector<F
                                                   "': give that kit's profile, or none");
   }
   return boost::outcome_v2::success();
+}
+
+bool leave_out_worthless(std::vector<api::FlightModelsReport>& models, std::vector<FlightData>& flights,
+                         const std::vector<FlightData>& raw, const std::vector<FlightSolution>& with,
+                         const std::vector<FlightSolution>& without) {
+  using Maybe = std::vector<std::optional<FlightSolution>>;
+  return api::leave_out_worthless(models, flights, raw, Maybe(with.begin(), with.end()),
+                                  Maybe(without.begin(), without.end()));
 }
 
 std::vector<const FlightData*> pointers(const std::vector<FlightData>& flights) {
@@ -160,14 +171,30 @@ int solve(const Arguments& a) {
   if (!flights) return complain(flights.error());
   if (const auto fits = check_profile_kit(options.value(), flights.value()); !fits)
     return complain(fits.error());
-  if (const auto corrected = apply_models(a, flights.value()); !corrected) return complain(corrected.error());
+  const std::vector<FlightData> raw = a.models.empty() ? std::vector<FlightData>{} : flights.value();
+  auto models = apply_models(a, flights.value());
+  if (!models) return complain(models.error());
   std::fprintf(stderr, "solving %zu flight%s\n", flights.value().size(),
                flights.value().size() == 1 ? "" : "s");
-  const auto solutions = solve_flights(pointers(flights.value()), options.value());
+  auto solutions = solve_flights(pointers(flights.value()), options.value());
   if (!solutions) return complain(solutions.error());
+  if (!models.value().empty() && a.worth == "shown") {
+    const auto without = solve_flights(pointers(raw), options.value());
+    if (!without) return complain(without.error());
+    if (leave_out_worthless(models.value(), flights.value(), raw, solutions.value(), without.value())) {
+      solutions = solve_flights(pointers(flights.value()), options.value());
+      if (!solutions) return complain(solutions.error());
+    }
+  }
   std::vector<SolvedFlight> solved;
-  for (std::size_t i = 0; i < flights.value().size(); ++i)
+  for (std::size_t i = 0; i < flights.value().size(); ++i) {
     solved.push_back({&flights.value()[i], &solutions.value()[i]});
+    if (models.value().empty()) continue;
+    solved.back().models = &models.value()[i];
+    if (!models.value()[i].used)
+      std::fprintf(stderr, "note: %s: %s\n", flights.value()[i].mission.name.c_str(),
+                   flights.value()[i].notes.back().c_str());
+  }
   const SolveFormat format = a.format == "json"      ? SolveFormat::json
                              : a.format == "geojson" ? SolveFormat::geojson
                              : a.format == "csv"     ? SolveFormat::csv
@@ -303,6 +330,13 @@ void add_solve_command(CLI::App& app, int& exit_code) {
       ->add_option("--likelihood", arguments->likelihood,
                    "With --models: one_sided, the models' own likelihood, or loss, their corrections alone")
       ->check(CLI::IsMember({"one_sided", "loss"}))
+      ->needs(models);
+  command
+      ->add_option(
+          "--worth", arguments->worth,
+          "With --models: shown, leave them out of a flight that they do not explain better than its "
+          "ranges as they came, or ignored")
+      ->check(CLI::IsMember({"shown", "ignored"}))
       ->needs(models);
   command->add_option("--format", arguments->format, "table, json, geojson or csv, on standard output")
       ->check(CLI::IsMember({"table", "json", "geojson", "csv"}));

@@ -253,4 +253,63 @@ TEST_F(SolveCommand, CorrectsAndWeighsRangesWithTheModelsNamed) {
   EXPECT_EQ(run("solve " + quoted() + " --models /nowhere.json").exit_code, 2);
 }
 
+/// A radio whose ranges err with the level, as this flight's do not: what it taught only adds noise here.
+TEST_F(SolveCommand, LeavesModelsOutOfAFlightThatTheyDoNotExplain) {
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> noise(0, 1);
+  const auto level_dbm = [&] { return -80 + 6 * noise(random); };
+  {
+    std::ofstream campaign(folder_ / "elsewhere.csv");
+    campaign << "environment,setting,true_distance_m,los,range_m,rx_dbm,fp_dbm\n";
+    for (int room = 0; room < 6; ++room) {
+      for (int k = 0; k < 40; ++k) {
+        const double distance_m = 2.0 + 0.8 * k, rx_dbm = level_dbm();
+        const double excess_m = 0.08 * (rx_dbm + 80) + (k % 2 == 1 ? 0.4 : 0.0);
+        campaign << "room " << room << ",s" << room * 40 + k << ',' << distance_m << ',' << (k % 2 == 0)
+                 << ',' << distance_m + excess_m + 0.05 * noise(random) << ',' << rx_dbm << ','
+                 << rx_dbm - (k % 2 == 1 ? 9 : 2) << '\n';
+      }
+    }
+  }
+  std::ifstream in(folder_ / "ranges.csv");
+  std::string line, all;
+  std::getline(in, line);
+  all = line + '\n';
+  while (std::getline(in, line)) {
+    std::vector<std::string> cells;
+    std::istringstream row(line);
+    for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
+    ASSERT_GE(cells.size(), 5U) << line;
+    const double rx_dbm = level_dbm();
+    for (int k = 0; k < 5; ++k) all += cells[static_cast<std::size_t>(k)] + ',';
+    all += std::to_string(rx_dbm) + ',' + std::to_string(rx_dbm - 2) + ",,\n";
+  }
+  in.close();
+  std::ofstream(folder_ / "ranges.csv") << all;
+  const std::string model = "'" + (folder_ / "elsewhere.json").string() + "'";
+  ASSERT_EQ(run("train --task bias --data '" + (folder_ / "elsewhere.csv").string() +
+                "' --group-by environment --placement setting --out " + model)
+                .exit_code,
+            0);
+  const auto flight = [&](const std::string& more) {
+    const Answer answer = run("solve " + quoted() + " --format json" + more);
+    EXPECT_EQ(answer.exit_code, 0);
+    return nlohmann::json::parse(answer.out)["flights"][0];
+  };
+  const auto raw = flight(""), asked = flight(" --models " + model),
+             forced = flight(" --models " + model + " --worth ignored");
+  EXPECT_TRUE(raw["models"].is_null());
+  EXPECT_TRUE(forced["models"]["used"]);
+  EXPECT_TRUE(forced["models"]["worth"].is_null());
+  EXPECT_NE(forced["anchors"][0]["enu_m"], raw["anchors"][0]["enu_m"]);
+  EXPECT_FALSE(asked["models"]["used"]);
+  EXPECT_FALSE(asked["models"]["worth"]["shown"]);
+  EXPECT_LT(asked["models"]["worth"]["gain_per_range"], 0);
+  EXPECT_NE(asked["notes"].dump().find("do not explain this flight better"), std::string::npos);
+  for (std::size_t i = 0; i < raw["anchors"].size(); ++i)
+    EXPECT_EQ(asked["anchors"][i]["enu_m"], raw["anchors"][i]["enu_m"]);
+  EXPECT_NE(run("solve " + quoted() + " --models " + model, "2>&1").out.find("solved without them"),
+            std::string::npos);
+}
+
 }  // namespace
