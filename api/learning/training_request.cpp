@@ -95,6 +95,13 @@ TrainingRequest read_training_request(const Json& body, std::vector<FieldError>&
       spec.methods.push_back(*method);
     }
   }
+  if (const auto engine = fields.word("engine", {"own", "opencv"}))
+    spec.engine = static_cast<ml::Engine>(*engine);
+  for (std::size_t i = 0; i < spec.methods.size() && methods.size() == spec.methods.size(); ++i) {
+    if (!ml::fits(spec.engine, spec.methods[i]))
+      errors.push_back({"/methods/" + std::to_string(i), "unsuitable",
+                        "engine opencv fits svm and random_forest, not " + methods[i]});
+  }
   spec.features = read_words(fields, "features", ml::k_max_features, errors);
   for (std::size_t i = 0; i < spec.features.size(); ++i) {
     const auto& registers = register_columns();

@@ -47,6 +47,16 @@ std::map<std::string, std::vector<double>> axes(const LearnOptions& options, Met
   return {};
 }
 
+// What the engine can fit it fits; corrections by nothing and by a constant are nobody's.
+std::vector<Recipe> by_engine(std::vector<Recipe> recipes, Engine engine) {
+  for (Recipe& recipe : recipes) {
+    if (engine == Engine::own || !fits(engine, recipe.method)) continue;
+    recipe.engine = engine;
+    recipe.svm.max_rows = most_svm_rows(engine);
+  }
+  return recipes;
+}
+
 Recipe boosted(const LearnOptions& options, std::size_t rows) {
   Recipe r;
   r.method = Method::boosted;
@@ -144,7 +154,7 @@ std::vector<Recipe> classifier_candidates(const Dataset& data, const LearnOption
           Names(everything.begin(), everything.begin() + static_cast<std::ptrdiff_t>(
                                                              std::min(everything.size(), k_max_features))));
   }
-  return out;
+  return by_engine(std::move(out), options.engine);
 }
 
 std::vector<Recipe> regressor_candidates(const Dataset& data, const LearnOptions& options) {
@@ -203,7 +213,7 @@ std::vector<Recipe> regressor_candidates(const Dataset& data, const LearnOptions
     b.features = levels;
     add_all(b);
   }
-  return out;
+  return by_engine(std::move(out), options.engine);
 }
 
 }  // namespace anchord::ml

@@ -274,18 +274,21 @@ std::string svm_note(const Dataset& data, const Recipe& picked) {
 
 }  // namespace
 
-Result<Learned> learn(const Dataset& data, const LearnOptions& options) {
+Result<Learned> learn(const Dataset& data, const LearnOptions& asked) {
   if (count_distinct(data.group) < 2)
     return make_error(
         Errc::too_few_observations,
         "all rows are of one place: nothing can be held out; name other columns with --group-by");
+  LearnOptions options = asked;
+  const bool by_method = !asked.methods.empty();
+  if (options.engine == Engine::opencv && !by_method) options.methods = {Method::svm, Method::random_forest};
   const auto fold = grouped_folds(data.group, options.folds, options.seed);
   const bool classes = options.task == Task::nlos_id || (options.task == Task::bias && data.labelled());
   if (options.task != Task::nlos_id && !data.has_truth())
     return make_error(Errc::not_found, "a bias needs true ranges");
   if (options.task == Task::nlos_id && !data.labelled())
     return make_error(Errc::not_found, "identification needs labels");
-  const bool mixture = options.task == Task::bias && classes && options.methods.empty();
+  const bool mixture = options.task == Task::bias && classes && !by_method;
   auto learned = options.task == Task::nlos_id ? learn_class(data, options, fold)
                  : mixture                     ? learn_bias_mixture(data, options, fold)
                                                : learn_regression(data, options, fold);

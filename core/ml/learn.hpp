@@ -29,6 +29,7 @@ bool suits(Method method, Task task);
 struct LearnOptions {
   Task task{Task::nlos_id};
   std::vector<Method> methods{};        ///< empty: auto
+  Engine engine{Engine::own};           ///< opencv: `methods` names what it has
   std::vector<std::string> features{};  ///< empty: chosen with the method
   std::size_t folds{10};
   std::uint64_t seed{1};

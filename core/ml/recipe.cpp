@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <map>
 
+#include "core/ml/train_opencv.hpp"
+
 namespace anchord::ml {
 namespace {
 
@@ -51,8 +53,19 @@ SvmOptions per_row(SvmOptions options, const Dataset& data) {
   return options;
 }
 
-Result<Classifier::Member> svm_member(const Prepared& p, const SvmOptions& options, const Execution& run) {
-  BOOST_OUTCOME_TRY(auto svm, fit_svm(p.rows(), per_row(options, p.data), true, run));
+Result<Svm> fitted_svm(const Prepared& p, const Recipe& recipe, bool classification, const Execution& run) {
+  const SvmOptions options = per_row(recipe.svm, p.data);
+  if (recipe.engine == Engine::opencv) return fit_svm_opencv(p.rows(), options, classification);
+  return fit_svm(p.rows(), options, classification, run);
+}
+
+Result<Trees> fitted_forest(const Prepared& p, const Recipe& recipe, const Execution& run) {
+  if (recipe.engine == Engine::opencv) return fit_forest_opencv(p.rows(), recipe.forest);
+  return fit_forest(p.rows(), recipe.forest, nullptr, run);
+}
+
+Result<Classifier::Member> svm_member(const Prepared& p, const Recipe& recipe, const Execution& run) {
+  BOOST_OUTCOME_TRY(auto svm, fitted_svm(p, recipe, true, run));
   std::vector<double> margin;
   for (std::size_t i = 0; i < p.data.rows(); ++i) margin.push_back(score(svm, p.rows().row(i)));
   const Platt platt = fit_platt(margin, p.y, p.data.weight);
@@ -68,6 +81,14 @@ std::string number(double value) {
 double sigmoid(double z) { return 1 / (1 + std::exp(-z)); }
 
 }  // namespace
+
+std::string_view engine_name(Engine engine) { return engine == Engine::opencv ? "opencv" : "own"; }
+
+std::size_t most_svm_rows(Engine engine) { return engine == Engine::opencv ? 20'000 : SvmOptions{}.max_rows; }
+
+bool fits(Engine engine, Method method) {
+  return engine == Engine::own || method == Method::svm || method == Method::random_forest;
+}
 
 std::string_view method_name(Method method) { return k_names.at(static_cast<std::size_t>(method)); }
 
@@ -99,7 +120,8 @@ std::string Recipe::describe() const {
     else
       add(name, number(value));
   }
-  std::string out{method_name(method)};
+  std::string out = engine == Engine::opencv ? "opencv " : "";
+  out += method_name(method);
   if (!settings.empty()) out += "(" + settings + ")";
   if (method == Method::none || method == Method::constant) return out;
   if (features.size() == 1) return out + " of " + features.front();
@@ -113,11 +135,13 @@ Result<Classifier> fit_classifier(const Dataset& data, const Recipe& recipe, con
   const bool all = recipe.method == Method::average;
   if (all || recipe.method == Method::logistic) out.members.push_back({fit_logistic(p.rows(), recipe.c)});
   if (all || recipe.method == Method::svm) {
-    BOOST_OUTCOME_TRY(auto member, svm_member(p, recipe.svm, run));
+    BOOST_OUTCOME_TRY(auto member, svm_member(p, recipe, run));
     out.members.push_back(std::move(member));
   }
-  if (all || recipe.method == Method::random_forest || recipe.method == Method::tree_average)
-    out.members.push_back({fit_forest(p.rows(), recipe.forest, nullptr, run), true});
+  if (all || recipe.method == Method::random_forest || recipe.method == Method::tree_average) {
+    BOOST_OUTCOME_TRY(auto forest, fitted_forest(p, recipe, run));
+    out.members.push_back({std::move(forest), true});
+  }
   if (recipe.method == Method::boosted || recipe.method == Method::tree_average)
     out.members.push_back({fit_boosted(p.rows(), recipe.boosted, run)});
   if (run.cancelled()) return make_error(Errc::canceled, "cancelled");
@@ -145,9 +169,10 @@ Result<Regressor> fit_regressor(const Dataset& data, const Recipe& recipe, const
       out.scorer = Linear{{}, weighted_median(std::move(values))};
       break;
     }
-    case Method::random_forest:
-      out.scorer = fit_forest(p.rows(), recipe.forest, nullptr, run);
+    case Method::random_forest: {
+      BOOST_OUTCOME_TRY(out.scorer, fitted_forest(p, recipe, run));
       break;
+    }
     case Method::boosted: {
       auto options = recipe.boosted;
       options.classification = false;
@@ -155,7 +180,7 @@ Result<Regressor> fit_regressor(const Dataset& data, const Recipe& recipe, const
       break;
     }
     case Method::svm: {
-      BOOST_OUTCOME_TRY(out.scorer, fit_svm(p.rows(), per_row(recipe.svm, p.data), false, run));
+      BOOST_OUTCOME_TRY(out.scorer, fitted_svm(p, recipe, false, run));
       break;
     }
     case Method::univariate:

@@ -30,11 +30,20 @@ enum class Method : std::uint8_t {
   tree_average,    ///< mean of the logits of boosted trees and forest: for many rows
 };
 
+/// Whose code fits: our own with libsvm, or OpenCV ml, which has SVMs and forests.
+enum class Engine : std::uint8_t { own, opencv };
+std::string_view engine_name(Engine engine);
+bool fits(Engine engine, Method method);
+/// An SVM is fitted to at most so many rows: time grows with their square. OpenCV takes a quarter of the time
+/// of libsvm, and the process it runs in can be ended at any moment.
+std::size_t most_svm_rows(Engine engine);
+
 std::string_view method_name(Method method);
 std::optional<Method> method_of(std::string_view name);
 
 struct Recipe {
   Method method{Method::average};
+  Engine engine{Engine::own};
   std::vector<std::string> features{};
   double clip{3};    ///< sd, for features outside the training range; 0 off
   double c{3};       ///< logistic

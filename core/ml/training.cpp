@@ -206,6 +206,10 @@ Result<void> TrainingSpec::check() const {
     if (!suits(method, task))
       fault(std::string{method_name(method)} + " cannot learn " + std::string{task_name(task)} +
             "; the methods that can are " + able + ", or auto");
+  for (const auto method : methods)
+    if (!fits(engine, method))
+      fault("engine " + std::string{engine_name(engine)} + " has no " + std::string{method_name(method)} +
+            ": it fits svm and random_forest");
   std::size_t points = 0;
   for (const auto& [method, axes] : grid) {
     const auto known = grid_settings(method);
@@ -237,7 +241,7 @@ Result<void> TrainingSpec::check_size(std::size_t rows) const {
                                       : search          ? default_grid(method, task == Task::nlos_id)
                                                         : std::map<std::string, std::vector<double>>{})
       points *= static_cast<double>(std::max<std::size_t>(values.size(), 1));
-    const std::size_t fitted = method == Method::svm ? std::min(rows, SvmOptions{}.max_rows) : rows;
+    const std::size_t fitted = method == Method::svm ? std::min(rows, most_svm_rows(engine)) : rows;
     settings += points;
     row_fits += points * static_cast<double>(folds) * static_cast<double>(fitted);
   }
@@ -268,8 +272,8 @@ Result<TrainingOutcome> train(const Dataset& data, const TrainingSpec& spec, std
   const Dataset train_set = data.subset(split.train);
 
   reporter.enter("search");
-  LearnOptions options{spec.task,   spec.methods, spec.features, spec.folds, spec.seed, spec.per_placement,
-                       spec.search, spec.grid,    spec.max_fpr,  run,        {}};
+  LearnOptions options{spec.task,          spec.methods, spec.engine, spec.features, spec.folds, spec.seed,
+                       spec.per_placement, spec.search,  spec.grid,   spec.max_fpr,  run,        {}};
   options.progress = [&reporter](double share, const std::string& detail) { reporter.tell(share, detail); };
   BOOST_OUTCOME_TRY(auto learned, learn(train_set, options));
   const bool classification = spec.task == Task::nlos_id || (spec.task == Task::bias && data.labelled());

@@ -19,7 +19,8 @@ inline constexpr double k_most_row_fits = 1e9;
 
 struct TrainingSpec {
   Task task{Task::nlos_id};
-  std::vector<Method> methods{};        ///< empty: auto
+  std::vector<Method> methods{};  ///< empty: auto; of opencv: svm and random_forest
+  Engine engine{Engine::own};
   std::vector<std::string> features{};  ///< empty: chosen with the method
   std::size_t folds{10};                ///< of whole places
   std::uint64_t seed{1};

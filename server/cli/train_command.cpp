@@ -16,7 +16,7 @@ namespace {
 
 struct TrainArguments {
   DataOptions data;
-  std::string task{"nlos_id"}, out{};
+  std::string task{"nlos_id"}, out{}, engine{"own"};
   std::vector<std::string> methods{"auto"}, features;
   std::size_t folds{10};
   std::uint64_t seed{1};
@@ -117,8 +117,9 @@ int train(const TrainArguments& a) {
     if (!method) return refuse("train", "unknown --method " + name);
     methods.push_back(*method);
   }
+  const ml::Engine engine = a.engine == "opencv" ? ml::Engine::opencv : ml::Engine::own;
   ml::TrainingSpec asked;
-  asked.task = *task, asked.methods = methods;
+  asked.task = *task, asked.methods = methods, asked.engine = engine;
   if (const auto able = asked.check(); !able) return refuse("train", able.error().message);
   const auto gathered = gather(a, *task);
   if (!gathered) return refuse("train", gathered.error().message);
@@ -126,7 +127,7 @@ int train(const TrainArguments& a) {
 
   ml::TrainingSpec spec;
   spec.task = *task, spec.features = a.features, spec.folds = a.folds, spec.seed = a.seed;
-  spec.methods = methods;
+  spec.methods = methods, spec.engine = engine;
   spec.per_placement = a.per_placement, spec.search = a.grid, spec.threads = a.threads;
   spec.held_out = a.held_out.empty() ? frozen_test : a.held_out;
   spec.held_out_share = a.held_out_share;
@@ -168,6 +169,11 @@ void add_train_command(CLI::App& app, int& exit_code) {
           "auto, or several of logistic, random_forest, svm, boosted, average, tree_average, constant, "
           "polynomial, multivariate, least_absolute: the best of them on held-out places")
       ->delimiter(',')
+      ->capture_default_str();
+  command
+      ->add_option("--engine", a->engine,
+                   "own (libsvm and our trees) or opencv, which fits svm and random_forest")
+      ->check(CLI::IsMember({"own", "opencv"}))
       ->capture_default_str();
   command->add_option("--features", a->features, "Features by name (default: chosen with the method)")
       ->delimiter(',');
