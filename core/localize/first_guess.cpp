@@ -41,4 +41,20 @@ Result<Eigen::Vector3d> second_guess(const Eigen::Vector3d& tag1_m, double dista
   return Eigen::Vector3d(p.x(), p.y(), height_m);
 }
 
+Eigen::Vector3d guess_from_turn(std::span<const Observation> rows, const Eigen::Vector3d& turn_m,
+                                double bearing_rad, double height_m) {
+  const auto away = [&](const Observation& o) { return (o.tag_m - turn_m).norm(); };
+  const Observation& nearest = *std::ranges::min_element(rows, {}, away);
+  const Eigen::Vector3d guess_m = first_guess(turn_m, nearest.distance_m, bearing_rad, height_m);
+  const Eigen::Vector2d right(std::cos(bearing_rad), -std::sin(bearing_rad));
+  const auto aside = [&](const Observation& o) {
+    return std::abs(right.dot((o.tag_m - nearest.tag_m).head<2>()));
+  };
+  const Observation& other = *std::ranges::max_element(rows, {}, aside);
+  const auto second =
+      second_guess(nearest.tag_m, nearest.distance_m, other.tag_m, other.distance_m, height_m, guess_m);
+  const bool near = second && (second.value() - guess_m).norm() <= 0.7 * nearest.distance_m;
+  return near ? second.value() : guess_m;
+}
+
 }  // namespace anchord

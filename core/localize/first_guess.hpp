@@ -2,7 +2,10 @@
 
 #include <Eigen/Core>
 
+#include <span>
+
 #include "core/base/result.hpp"
+#include "core/localize/observation.hpp"
 
 namespace anchord {
 
@@ -20,5 +23,12 @@ Eigen::Vector3d first_guess(const Eigen::Vector3d& tag_m, double distance_m, dou
 Result<Eigen::Vector3d> second_guess(const Eigen::Vector3d& tag1_m, double distance1_m,
                                      const Eigen::Vector3d& tag2_m, double distance2_m, double height_m,
                                      const Eigen::Vector3d& guess_m, double slack_m = 1.0);
+
+/// Both in turn: the first guess from the range nearest to the turn, then its intersection with the range
+/// taken furthest to the side of the bearing, where the bearing's 20 degrees say least. What lies further
+/// from the first guess than a bearing can be wrong (0.7 of the range, 40 degrees) is not believed. rows  not
+/// empty; same frame and axes as the turn
+Eigen::Vector3d guess_from_turn(std::span<const Observation> rows, const Eigen::Vector3d& turn_m,
+                                double bearing_rad, double height_m);
 
 }  // namespace anchord

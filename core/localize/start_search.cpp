@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/localize/first_guess.hpp"
 #include "core/localize/joint_model.hpp"
 #include "core/localize/linear.hpp"
 #include "core/localize/solver.hpp"
@@ -15,19 +16,13 @@ constexpr std::size_t k_min_rows = 5;  // one more than x, y, z and a shared bia
 constexpr double k_same_place_m = 0.2;
 constexpr std::size_t k_most_places = 6;
 
-/// The start somebody gave: a place, or where the bearing of the turn and the height search meet at the range
-/// measured nearest to the turn.
+/// The start somebody gave: a place, or what the turn and the height search say with the ranges
+/// (8.4.1, 8.4.2).
 std::optional<Eigen::Vector3d> told_start(NetworkId id, const std::vector<Observation>& rows,
                                           const AnchorClues& clues, const FlightOptions& options) {
   if (const auto told = options.starts.find(id); told != options.starts.end()) return told->second;
   if (!options.start_at_clues || !clues.bearing || !clues.height) return std::nullopt;
-  const Eigen::Vector3d& turn_m = clues.bearing->tag_m;
-  const auto away = [&](const Observation& o) { return (o.tag_m - turn_m).norm(); };
-  const double range_m = std::ranges::min_element(rows, {}, away)->distance_m;
-  const double up_m = clues.height->up_m - turn_m.z();
-  const double across_m = std::sqrt(std::max(range_m * range_m - up_m * up_m, 0.25));
-  return Eigen::Vector3d(turn_m.x() + across_m * std::sin(clues.bearing->bearing_rad),
-                         turn_m.y() + across_m * std::cos(clues.bearing->bearing_rad), clues.height->up_m);
+  return guess_from_turn(rows, clues.bearing->tag_m, clues.bearing->bearing_rad, clues.height->up_m);
 }
 
 /// Counts an end of the search where it is, or with the place it shares.

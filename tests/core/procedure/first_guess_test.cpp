@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numbers>
+#include <vector>
 
 namespace anchord {
 namespace {
@@ -33,6 +35,20 @@ TEST(FirstGuess, BridgesASmallMissAndNamesALargeOne) {
   EXPECT_NEAR(p.x(), 5, 1e-9);
   EXPECT_EQ(second_guess({0, 0, 0}, 2, {10, 0, 0}, 2, 0, {5, 1, 0}).error().code, Errc::no_convergence);
   EXPECT_EQ(second_guess({1, 1, 0}, 2, {1, 1, 5}, 2, 0, {5, 1, 0}).error().code, Errc::weak_geometry);
+}
+
+TEST(FirstGuess, TakesASecondRangeToMendTheBearing) {
+  const Vector3d truth{8, 12, 3}, turn{0, 0, 6};
+  const double bearing_rad = std::atan2(8.0, 12.0) + 20 * std::numbers::pi / 180;
+  std::vector<Observation> rows;
+  for (const Vector3d& tag : {Vector3d(0.2, 0, 6), Vector3d(4, -3, 6), Vector3d(-9, 7, 5)})
+    rows.push_back({tag, (tag - truth).norm(), 0.05});
+  const auto only = first_guess(turn, rows[0].distance_m, bearing_rad, 3);
+  EXPECT_GT((only - truth).norm(), 4);
+  EXPECT_LT((guess_from_turn(rows, turn, bearing_rad, 3) - truth).norm(), 0.3);
+  // A second range that would put it elsewhere than the bearing can mean is not believed.
+  rows[2].distance_m = 3.5;
+  EXPECT_LT((guess_from_turn(rows, turn, bearing_rad, 3) - only).norm(), 0.3);
 }
 
 }  // namespace
