@@ -6,6 +6,7 @@
 #include "api/json/wire_resources.hpp"
 #include "api/json/wire_rows.hpp"
 #include "api/learning/campaign_rows.hpp"
+#include "api/learning/campaign_schedule.hpp"
 #include "api/learning/range_features.hpp"
 #include "api/routes/learning.hpp"
 #include "api/routes/measurement_query.hpp"
@@ -33,6 +34,64 @@ Response whole(LearningServices& l, int status, const CampaignRecord& campaign) 
   Response response = json_response(status, campaign_json(campaign, &settings));
   response.header("ETag", "\"c-" + std::to_string(campaign.version) + "\"");
   return response;
+}
+
+/// The grid of the dissertation's campaign: what is measured and, cell by cell, what is missing.
+Response schedule(LearningServices& l, const Request& request) {
+  check_query(request, {"environment", "los", "samples", "limit", "cursor"});
+  const CampaignRecord campaign = named(l, request);
+  const auto page = page_query(request, CampaignGrid::k_cells);
+  const auto wanted = static_cast<std::size_t>(query_number(request, "samples", 1, 1e6).value_or(1));
+  ScheduleFilter filter;
+  filter.environment = request.query_value("environment");
+  if (request.query_value("los")) filter.los = query_flag(request, "los");
+  std::size_t from = 0;
+  if (!page.cursor.empty()) {
+    const auto* end = page.cursor.data() + page.cursor.size();
+    const auto read = std::from_chars(page.cursor.data(), end, from);
+    if (read.ec != std::errc{} || read.ptr != end)
+      throw_problem(422, "validation", "cursor is not one of ours",
+                    {{"/cursor", "bad_cursor", "is not one of ours"}});
+  }
+  const auto progress = campaign_progress(value_or_problem(l.stores.campaigns.settings(campaign.id)), filter);
+  using Grid = CampaignGrid;
+  Ordered distances = Ordered::array(), heights = Ordered::array(), headings = Ordered::array();
+  for (std::size_t i = 0; i < Grid::k_heights; ++i) heights.push_back(Grid::height_m(i));
+  for (std::size_t i = 0; i < Grid::k_headings; ++i) headings.push_back(Grid::heading_deg(i));
+  Ordered by_distance = Ordered::array(), missing = Ordered::array();
+  constexpr std::size_t k_each = Grid::k_heights * Grid::k_headings;
+  std::string next;
+  for (std::size_t i = 0; i < Grid::k_distances; ++i) {
+    distances.push_back(Grid::distance_m(i));
+    const auto first = progress.n_samples.begin() + static_cast<std::ptrdiff_t>(i * k_each);
+    by_distance.push_back({{"distance_m", Grid::distance_m(i)},
+                           {"n_planned", k_each},
+                           {"n_measured", std::count_if(first, first + static_cast<std::ptrdiff_t>(k_each),
+                                                        [&](std::size_t n) { return n >= wanted; })}});
+  }
+  for (std::size_t cell = from; cell < Grid::k_cells; ++cell) {
+    if (progress.n_samples[cell] >= wanted) continue;
+    if (missing.size() == page.limit) {
+      next = std::to_string(cell);
+      break;
+    }
+    missing.push_back({{"distance_m", Grid::distance_m(cell / k_each)},
+                       {"height_difference_m", Grid::height_m(cell / Grid::k_headings % Grid::k_heights)},
+                       {"heading_deg", Grid::heading_deg(cell % Grid::k_headings)},
+                       {"n_samples", progress.n_samples[cell]}});
+  }
+  return json_response(200, {{"campaign", to_string(campaign.id)},
+                             {"grid",
+                              {{"distance_m", std::move(distances)},
+                               {"height_difference_m", std::move(heights)},
+                               {"heading_deg", std::move(headings)}}},
+                             {"samples_wanted", wanted},
+                             {"n_planned", Grid::k_cells},
+                             {"n_measured", progress.n_measured(wanted)},
+                             {"n_samples_off_grid", progress.n_off_grid},
+                             {"by_distance", std::move(by_distance)},
+                             {"missing", std::move(missing)},
+                             {"next_cursor", next.empty() ? Ordered(nullptr) : Ordered(next)}});
 }
 
 Response list(LearningServices& l, const Request& request) {
@@ -281,6 +340,7 @@ void add_campaign_routes(Router& router, LearningServices& l) {
          response.status = 204;
          return response;
        }});
+  router.add({Method::get, "/api/v1/campaigns/{id}/schedule", readers(), on(schedule)});
   router.add(as_heavy({Method::patch, "/api/v1/ranges", Access::any_of({Role::engineer}), on(label)}));
   router.add(as_heavy({Method::get, "/api/v1/campaigns/{id}/samples", readers(), on(samples)}));
   router.add({Method::get, "/api/v1/campaigns/{id}/samples/{sample}/cir", readers(), on(sample_cir)});
