@@ -23,7 +23,8 @@ struct ReportAnchor {
   std::string name;   ///< what people call it; the network id when empty
   std::string place;  ///< building, floor, space
   bool published{false};
-  ReportBudget budget{};  ///< no shares: none known
+  std::optional<Eigen::Vector3d> linear_m{}, wls_m{};  ///< by the dissertation's methods (eq 7.2, 7.10)
+  ReportBudget budget{};                               ///< no shares: none known
   std::optional<Override> overridden{};
   std::optional<Eigen::Vector3d> truth_m{};  ///< in the frame of the positions; height NaN when it has none
 };

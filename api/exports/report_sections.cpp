@@ -153,6 +153,31 @@ std::string gates(const Report& report) {
          words + "</p>";
 }
 
+std::string methods(const Report& report) {
+  std::string rows;
+  const bool truth = any_truth(report);
+  for (const auto& anchor : report.anchors) {
+    if (!anchor.linear_m && !anchor.wls_m) continue;
+    if (!anchor.truth_m && !anchor.estimate.best) continue;
+    const Eigen::Vector3d reference = anchor.truth_m ? *anchor.truth_m : anchor.estimate.best->position.m;
+    const auto off = [&](const std::optional<Eigen::Vector3d>& at) {
+      return cell(at ? fixed(distance_m(*at, reference), 3) : std::string("–"));
+    };
+    rows +=
+        "<tr><td><b>" + html_text(name_of(anchor)) + "</b></td>" + off(anchor.linear_m) + off(anchor.wls_m);
+    rows += anchor.truth_m && anchor.estimate.best ? off(anchor.estimate.best->position.m) : cell("–");
+    rows += "</tr>";
+  }
+  if (rows.empty()) return {};
+  return "<h2>Methods compared</h2><p class=\"note\">Distance to " +
+         std::string(truth ? "the truth" : "the joint answer") +
+         ", m. Linear: eq 7.2 to 7.5, closed form. Weighted: eq 7.10, each anchor alone, weights of 7.2.3. "
+         "Joint: "
+         "all anchors with bias, range curve, lag and arms, robust.</p><table><thead><tr>" +
+         head("Anchor", false) + head("Linear") + head("Weighted") + head("Joint") + "</tr></thead><tbody>" +
+         rows + "</tbody></table>";
+}
+
 std::string budgets(const Report& report) {
   std::string rows, words;
   std::vector<std::string> sources;

@@ -8,6 +8,7 @@
 namespace anchord::report {
 
 std::string positions(const Report& report);
+std::string methods(const Report& report);     ///< linear, weighted least squares and joint side by side
 std::string budgets(const Report& report);     ///< what each anchor's uncertainty comes from
 std::string gates(const Report& report);       ///< every gate of every anchor, failed ones with their words
 std::string rejected(const Report& report);    ///< ranges not used, by reason

@@ -54,6 +54,16 @@ Json search_json(const StartSearch& search) {
   return json;
 }
 
+/// Positions of the dissertation's methods, beside which the answer is to be seen.
+Json methods_json(const MethodAnswers& answers) {
+  const auto place = [](const std::optional<Eigen::Vector3d>& at) {
+    return at ? vector_of(*at) : Json(nullptr);
+  };
+  return {{"linear_enu_m", place(answers.linear_m)},
+          {"wls_enu_m", place(answers.wls_m)},
+          {"why", answers.why.empty() ? Json(nullptr) : Json(answers.why)}};
+}
+
 Json anchor_json(const AnchorSolution& anchor, bool globe) {
   const Estimate& e = anchor.estimate;
   Json json;
@@ -161,7 +171,12 @@ Json flight_json(const SolvedFlight& flight) {
   json["models"] = flight.models != nullptr ? api::flight_models_report_json(*flight.models) : Json(nullptr);
   json["notes"] = s.notes;
   json["anchors"] = Json::array();
-  for (const auto& anchor : s.anchors) json["anchors"].push_back(anchor_json(anchor, globe));
+  for (const auto& anchor : s.anchors) {
+    json["anchors"].push_back(anchor_json(anchor, globe));
+    const auto methods = flight.methods.find(anchor.estimate.anchor);
+    json["anchors"].back()["methods"] =
+        methods == flight.methods.end() ? Json(nullptr) : methods_json(methods->second);
+  }
   return json;
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/localize/flight_solver.hpp"
+#include "core/localize/method_comparison.hpp"
 
 namespace anchord {
 
@@ -18,6 +19,7 @@ enum class SolveFormat : std::uint8_t { table, json, geojson, csv };
 struct SolvedFlight {
   const FlightData* data{};
   const FlightSolution* solution{};
+  std::map<NetworkId, MethodAnswers> methods{};  ///< positions of the dissertation's methods, for comparison
   const api::FlightModelsReport* models{nullptr};  ///< what models did to its ranges; null: none were given
 };
 

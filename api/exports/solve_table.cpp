@@ -1,6 +1,7 @@
 #include "api/exports/solve_table.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <numeric>
 
@@ -60,7 +61,10 @@ std::string solve_table(std::span<const SolvedFlight> flights) {
       append(out, "%-10s ", anchor.name.c_str());
       if (e.best) {
         append_place(out, *e.best, globe);
-        append(out, " %8.3f %8.3f", e.h95_m, e.v95_m);
+        if (std::isfinite(e.h95_m))
+          append(out, " %8.3f %8.3f", e.h95_m, e.v95_m);
+        else
+          append(out, " %8s %8s", "-", "-");
       } else {
         append(out, "%15s %15s %10s %8s %8s", "-", "-", "-", "-", "-");
       }
@@ -106,8 +110,12 @@ std::string solve_csv(std::span<const SolvedFlight> flights) {
       if (e.best) {
         const auto& p = e.best->position.m;
         const auto& c = e.best->covariance_m2;
-        append(out, "%.4f,%.4f,%.4f,%.8f,%.8f,%.8f,%.8f,%.8f,%.8f,%.4f,%.4f,", p.x(), p.y(), p.z(), c(0, 0),
-               c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2), e.h95_m, e.v95_m);
+        append(out, "%.4f,%.4f,%.4f,", p.x(), p.y(), p.z());
+        if (c.allFinite())
+          append(out, "%.8f,%.8f,%.8f,%.8f,%.8f,%.8f,%.4f,%.4f,", c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2),
+                 c(2, 2), e.h95_m, e.v95_m);
+        else
+          out += ",,,,,,,,";
       } else {
         out += ",,,,,,,,,,,";
       }

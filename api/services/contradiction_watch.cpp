@@ -131,8 +131,11 @@ std::shared_ptr<const ContradictionWatch::Standing> ContradictionWatch::standing
     compared_ = change;
     known_ = true;
   }
-  for (const auto* anchor : news)
-    deps_.events.add("warning", "anchor.contradicted", anchor->text, anchor->missions.back());
+  for (const auto* anchor : news) {
+    const auto& missions = anchor->missions;
+    deps_.events.add("warning", "anchor.contradicted", anchor->text,
+                     missions.empty() ? std::nullopt : std::optional(missions.back()));
+  }
   return now;
 }
 

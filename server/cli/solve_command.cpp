@@ -33,7 +33,7 @@ struct Arguments {
   double max_correction_age_s{TrackLimits{}.max_correction_age_s};
   std::string profile, out, clues;
   std::vector<std::string> models;
-  std::string likelihood{"one_sided"}, worth{"shown"};
+  std::string likelihood{"one_sided"}, worth{"shown"}, method{"joint"};
   SolveReportOptions report;
 };
 
@@ -189,6 +189,9 @@ int solve(const Arguments& a) {
   std::vector<SolvedFlight> solved;
   for (std::size_t i = 0; i < flights.value().size(); ++i) {
     solved.push_back({&flights.value()[i], &solutions.value()[i]});
+    auto methods = compare_methods(flights.value()[i], options.value(), solutions.value()[i].origin);
+    if (!methods) return complain(methods.error());
+    solved.back().methods = std::move(methods).value();
     if (models.value().empty()) continue;
     solved.back().models = &models.value()[i];
     if (!models.value()[i].used)
@@ -199,18 +202,24 @@ int solve(const Arguments& a) {
                              : a.format == "geojson" ? SolveFormat::geojson
                              : a.format == "csv"     ? SolveFormat::csv
                                                      : SolveFormat::table;
-  const std::string text = solve_output(solved, format);
-  std::fwrite(text.data(), 1, text.size(), stdout);
   for (std::size_t i = 0; i < solved.size() && !a.report.file.empty(); ++i) {
     SolveReportOptions one = a.report;
     if (solved.size() > 1)
       one.file.replace_filename(one.file.stem().string() + "-" + std::to_string(i + 1) +
                                 one.file.extension().string());
     std::fprintf(stderr, "writing %s\n", one.file.c_str());
-    if (const auto written = write_solve_report(*solved[i].data, *solved[i].solution, options.value(), one);
+    if (const auto written =
+            write_solve_report(*solved[i].data, *solved[i].solution, solved[i].methods, options.value(), one);
         !written)
       return complain(written.error());
   }
+  // The page compares; what is printed is the answer asked for.
+  const AnchorMethod method = a.method == "linear" ? AnchorMethod::linear
+                              : a.method == "wls"  ? AnchorMethod::wls
+                                                   : AnchorMethod::joint;
+  for (std::size_t i = 0; i < solved.size(); ++i) answer_by(method, solved[i].methods, solutions.value()[i]);
+  const std::string text = solve_output(solved, format);
+  std::fwrite(text.data(), 1, text.size(), stdout);
   if (std::fflush(stdout) != 0) return 1;
   int exit_code = 0;
   for (const auto& solution : solutions.value()) {
@@ -338,6 +347,12 @@ void add_solve_command(CLI::App& app, int& exit_code) {
           "ranges as they came, or ignored")
       ->check(CLI::IsMember({"shown", "ignored"}))
       ->needs(models);
+  command
+      ->add_option(
+          "--method", arguments->method,
+          "joint, or for comparison linear (eq 7.2 to 7.5) or wls (eq 7.10), which are never acceptable; "
+          "the report and the JSON have all three")
+      ->check(CLI::IsMember({"joint", "linear", "wls"}));
   command->add_option("--format", arguments->format, "table, json, geojson or csv, on standard output")
       ->check(CLI::IsMember({"table", "json", "geojson", "csv"}));
   auto* report = command->add_option(

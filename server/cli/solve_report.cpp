@@ -52,6 +52,7 @@ Result<Truth> read_truth(const std::filesystem::path& file, const std::optional<
 }  // namespace
 
 Result<void> write_solve_report(const FlightData& flight, const FlightSolution& solution,
+                                const std::map<NetworkId, MethodAnswers>& methods,
                                 const FlightOptions& options, const SolveReportOptions& wanted) {
   Truth truth;
   if (!wanted.truth.empty()) {
@@ -72,6 +73,10 @@ Result<void> write_solve_report(const FlightData& flight, const FlightSolution& 
     one.estimate = anchor.estimate;
     one.name = anchor.name;
     if (anchor.budget) one.budget = api::report_budget(budget_json(*anchor.budget, false));
+    if (const auto other = methods.find(anchor.estimate.anchor); other != methods.end()) {
+      one.linear_m = other->second.linear_m;
+      one.wls_m = other->second.wls_m;
+    }
     const auto at = truth.find(anchor.name);
     if (at != truth.end()) one.truth_m = at->second;
     // The newest measurement dates the page, so that the same folder gives the same bytes.

@@ -5,6 +5,7 @@
 
 #include "core/base/result.hpp"
 #include "core/localize/flight_solver.hpp"
+#include "core/localize/method_comparison.hpp"
 #include "core/types/flight_data.hpp"
 
 namespace anchord::cli {
@@ -17,6 +18,7 @@ struct SolveReportOptions {
 
 /// Writes the page of one solved flight (api/exports/report). errors name the file.
 Result<void> write_solve_report(const FlightData& flight, const FlightSolution& solution,
+                                const std::map<NetworkId, MethodAnswers>& methods,
                                 const FlightOptions& options, const SolveReportOptions& report);
 
 }  // namespace anchord::cli

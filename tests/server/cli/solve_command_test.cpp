@@ -253,6 +253,37 @@ TEST_F(SolveCommand, CorrectsAndWeighsRangesWithTheModelsNamed) {
   EXPECT_EQ(run("solve " + quoted() + " --models /nowhere.json").exit_code, 2);
 }
 
+TEST_F(SolveCommand, ComparesTheMethodsOfTheDissertationAndAcceptsNone) {
+  const auto solved = [&](const std::string& more) {
+    const Answer answer = run("solve " + quoted() + " --format json" + more);
+    EXPECT_EQ(answer.exit_code, 0);
+    return nlohmann::json::parse(answer.out)["flights"][0]["anchors"][0];
+  };
+  const auto joint = solved(""), linear = solved(" --method linear"), wls = solved(" --method wls");
+  EXPECT_EQ(joint["methods"], wls["methods"]);
+  EXPECT_EQ(linear["enu_m"], joint["methods"]["linear_enu_m"]);
+  EXPECT_EQ(wls["enu_m"], joint["methods"]["wls_enu_m"]);
+  EXPECT_NE(joint["enu_m"], wls["enu_m"]);
+  EXPECT_TRUE(linear["h95_m"].is_null());
+  EXPECT_TRUE(wls["h95_m"].is_number());
+  for (const auto* one : {&linear, &wls}) {
+    EXPECT_FALSE((*one)["acceptable"]);
+    EXPECT_EQ((*one)["gates"][0]["name"], "method");
+  }
+  const auto page = folder_ / "page.html";
+  ASSERT_EQ(run("solve " + quoted() + " --iterations 0 --report '" + page.string() + "' --truth '" +
+                (folder_ / "anchors_truth.csv").string() + "'")
+                .exit_code,
+            0);
+  std::stringstream html;
+  html << std::ifstream(page).rdbuf();
+  EXPECT_NE(html.str().find("Methods compared"), std::string::npos);
+  EXPECT_NE(html.str().find("What would help most"), std::string::npos);
+  EXPECT_NE(run("solve " + quoted() + " --method linear --format csv").out.find(",0,method"),
+            std::string::npos);
+  EXPECT_EQ(run("solve " + quoted() + " --method linear").out.find("nan"), std::string::npos);
+}
+
 /// A radio whose ranges err with the level, as this flight's do not: what it taught only adds noise here.
 TEST_F(SolveCommand, LeavesModelsOutOfAFlightThatTheyDoNotExplain) {
   std::mt19937_64 random(4);
