@@ -107,26 +107,6 @@ TEST_F(LearningService, TheSameCampaignSentTwiceIsOneCampaign) {
     EXPECT_EQ(json(post("/api/v1/campaigns/hall/samples", one, "application/x-ndjson"))["accepted"], 1);
 }
 
-TEST_F(LearningService, TrainsByOpenCvWhereAskedAndRefusesWhatItHasNot) {
-  Call options;
-  options.headers["prefer"] = "wait=120";
-  const auto asked = [&](const std::string& more) {
-    return call(
-        api::Method::post, "/api/v1/training-runs",
-        R"({"task":"nlos_id","dataset":"set","cv":{"folds":4,"seed":3},"importance":false,"engine":"opencv")" +
-            more + "}",
-        options);
-  };
-  const auto run = asked("");
-  ASSERT_EQ(run.status, 201) << run.body;
-  const auto model = json(get(json(run).value("model", "")));
-  EXPECT_NE(model.dump().find("opencv "), std::string::npos) << model;
-  ASSERT_EQ(asked(R"(,"methods":["random_forest"])").status, 201);
-  const auto refused = asked(R"(,"methods":["logistic"])");
-  EXPECT_EQ(refused.status, 422);
-  EXPECT_NE(refused.body.find("svm and random_forest"), std::string::npos) << refused.body;
-}
-
 TEST_F(LearningService, TheCurveOfABiasRunIsNamedByItsCorrection) {
   const auto run = train("bias", "auto");
   const auto curves = json(get("/api/v1/training-runs/" + run.value("id", "") + "/cdf"))["items"];
