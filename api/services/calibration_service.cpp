@@ -193,7 +193,7 @@ Json flight_provenance(const FlightData& flight, const FlightSolution& s) {
 /// What was stated about the noise, and how many ranges it bore on: of sigma_m.nlos those a model classified.
 Json noise_provenance(const CalibrationRequest& request, const std::vector<FlightModelsReport>& models) {
   std::size_t n_believed = 0;
-  for (const auto& report : models) n_believed += report.n_believed;
+  for (const auto& report : models) n_believed += report.used ? report.n_believed : 0;
   const auto stated = [](const std::optional<double>& v) { return v ? Json(*v) : Json(nullptr); };
   return {{"los", stated(request.noise.los_m)},
           {"nlos", stated(request.noise.nlos_m)},

@@ -321,6 +321,44 @@ TEST_F(Calibrations, CountWhatTheFrameIsUncertainAboutPlacesOnTheGlobe) {
   EXPECT_EQ(flat["h95_m"], answer["anchors"][0]["accuracy"]["globe"]["h95_m"]);
 }
 
+TEST_F(Calibrations, SayWhatTheUncertaintyOfEachAnchorComesFrom) {
+  const auto id = site(square(40));
+  const auto plain = solved(flown(made(11), 0, id))["anchors"];
+  for (const auto& anchor : plain) {
+    const auto& budget = anchor["budget"];
+    const auto& c = anchor["accuracy"]["relative"]["cov_enu_m2"];
+    EXPECT_NEAR(budget["trace_m2"].get<double>(),
+                c[0].get<double>() + c[3].get<double>() + c[5].get<double>(), 1e-5);
+    double share = 0;
+    for (const auto& [source, one] : budget["sources"].items()) {
+      if (source == "base") EXPECT_TRUE(one.is_null()) << "nobody stated it";
+      if (!one.is_null()) share += one["share"].get<double>();
+    }
+    EXPECT_NEAR(share, 1, 1e-4);
+    EXPECT_NE(budget["largest"], "base");
+    EXPECT_FALSE(budget["help_text"].get<std::string>().empty());
+  }
+  // A base that is known to a metre only is the largest of all.
+  Call options;
+  options.type = "application/merge-patch+json";
+  options.headers["if-match"] = header(get("/api/v1/sites/" + id), "ETag");
+  ASSERT_EQ(call(Method::patch, "/api/v1/sites/" + id,
+                 R"({"crs":{"base":{"source":"survey_in","sigma_m":1}}})", options)
+                .status,
+            200);
+  const auto based = solved(flown(made(12), 0, id));
+  for (const auto& anchor : based["anchors"]) {
+    EXPECT_EQ(anchor["budget"]["largest"], "base");
+    EXPECT_EQ(anchor["budget"]["help"], "survey_base");
+    EXPECT_NEAR(anchor["budget"]["sources"]["base"]["variance_m2"].get<double>(), 3, 1e-9);
+  }
+  EXPECT_FALSE(based["provenance"].contains("budgets")) << "each is with its anchor";
+  const auto calibration = "/api/v1/calibrations/" + based.value("id", "");
+  EXPECT_NE(get(calibration + "/report").body.find("survey the base station"), std::string::npos);
+  ASSERT_EQ(post(calibration + "/publish", R"({"anchors":["0x6000"],"reason":"seen"})").status, 201);
+  EXPECT_EQ(json(get("/api/v1/anchors/0x6000"))["properties"]["budget"], based["anchors"][0]["budget"]);
+}
+
 TEST_F(Calibrations, LeaveRangesBetweenAnchorsOutWhereAsked) {
   MadeFlight m = made(7);
   m.pairs = true;
