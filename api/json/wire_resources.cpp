@@ -1,3 +1,4 @@
+#include "api/json/budget_json.hpp"
 #include "api/json/wire_resources.hpp"
 
 #include <nlohmann/json.hpp>

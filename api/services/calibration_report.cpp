@@ -61,6 +61,33 @@ void add_base_fact(Report& report) {
     report.facts.emplace_back("Map", "EPSG:" + std::to_string(*report.site->projected_epsg));
 }
 
+/// What surveyed points say of the answer, a sentence each.
+void add_check_points(Report& report, const nlohmann::ordered_json& provenance) {
+  if (!provenance.is_object() || !provenance.contains("check_points") ||
+      !provenance["check_points"].is_object())
+    return;
+  const auto& checked = provenance["check_points"];
+  const auto words = [](const nlohmann::ordered_json& v, const nlohmann::ordered_json& p) {
+    const auto at = v.get<std::vector<double>>();
+    std::string out = number(at.at(0), 3) + " m east, " + number(at.at(1), 3) + " m north, " +
+                      number(at.at(2), 3) + " m up";
+    if (p.is_number()) out += " (chance of so much " + number(p.get<double>(), 3) + ")";
+    return out;
+  };
+  for (const auto& point : checked["points"])
+    report.remarks.push_back("Check point " + point.value("network_id", "") + ": solved less surveyed " +
+                             words(point["delta_enu_m"], point["p_value"]) +
+                             (point.value("agrees", false) ? ", agrees." : ", does not agree."));
+  for (const auto& id : checked["not_found"])
+    report.remarks.push_back("Check point " + id.get<std::string>() + " has no position here.");
+  if (checked["shift"].is_object())
+    report.remarks.push_back("All check points together are off by " +
+                             words(checked["shift"]["shift_enu_m"], checked["shift"]["p_value"]) +
+                             (checked["shift"].value("significant", false)
+                                  ? ": look at the coordinates of the base, its datum and epoch."
+                                  : ", no more than chance."));
+}
+
 }  // namespace
 
 void describe(Report& report, const std::vector<Mission>& missions, const std::string& settings_json) {
@@ -181,6 +208,7 @@ Result<Report> calibration_report(AnchorStore& anchors, MissionStore& mission_st
   if (provenance.is_object()) add_profile_fact(report, provenance);
   report.facts.emplace_back("Calibration", short_id(report.calibration));
   describe(report, missions, calibration.settings_json);
+  add_check_points(report, told);
   return report;
 }
 

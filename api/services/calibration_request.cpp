@@ -3,6 +3,7 @@
 #include <set>
 
 #include "api/imports/flight_json.hpp"
+#include "api/json/check_points_json.hpp"
 #include "api/json/clues_json.hpp"
 #include "api/json/reader.hpp"
 #include "api/services/calibration_service.hpp"
@@ -109,6 +110,8 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
   if (const Json* initial = fields.child("initial")) read_initial(fields, *initial, options, errors);
   if (const Json* clues = fields.child("clues")) read_clues(*clues, "/clues", options, errors);
   if (const Json* models = fields.child("models")) out.models = read_flight_models(*models, errors);
+  // Kept with the settings and asked once everything is solved: no data.
+  if (const Json* points = fields.child("check_points")) (void)read_check_points(*points, errors);
   out.flight_clues = fields.boolean("flight_clues").value_or(true);
   out.compare_uncorrected = fields.boolean("compare_uncorrected").value_or(true);
   // Who names a loss wants it: the likelihood of the models then takes its place only where asked for.

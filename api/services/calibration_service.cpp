@@ -6,6 +6,7 @@
 
 #include "api/exports/evidence.hpp"
 #include "api/json/budget_json.hpp"
+#include "api/json/check_points_json.hpp"
 #include "api/json/exclusion_json.hpp"
 #include "api/json/wire_resources.hpp"
 #include "api/services/calibration_place.hpp"
@@ -219,6 +220,15 @@ Json budget_of(const std::vector<const AnchorSolution*>& flights, const Estimate
   if (base_sigma_m)
     budget.part(ErrorSource::base) = *base_sigma_m * *base_sigma_m * Eigen::Matrix3d::Identity();
   return budget_json(budget, base_sigma_m.has_value());
+}
+
+/// Misclosures of the surveyed points that the request named.
+Json checked(const CalibrationRequest& request, const Calibration& made) {
+  const auto settings = Json::parse(request.settings_json, nullptr, false);
+  if (!settings.is_object() || !settings.contains("check_points")) return nullptr;
+  std::vector<FieldError> errors;  // none: the request was accepted with them
+  return check_points_provenance(read_check_points(settings["check_points"], errors), made,
+                                 request.options.dims == Dims::two);
 }
 
 /// Where an anchor would stand without the models, and how far they moved it.
@@ -451,6 +461,7 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
       {"profiles", std::move(solved.profiles)},
       {"base", std::move(base)},
       {"budgets", std::move(budgets)},
+      {"check_points", checked(request, out)},
       {"n_clues", solved.n_clues},
       {"frame", frame ? frame_provenance(*frame, out) : Json(nullptr)},
       {"clues", {{"outline", outline}}},

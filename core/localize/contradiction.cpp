@@ -3,7 +3,8 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "core/localize/chi_square.hpp"
 
 namespace anchord {
 namespace {
@@ -19,16 +20,6 @@ double chi2_of(const KnownPlace& a, const KnownPlace& b, bool plane) {
   return apart.dot(both.ldlt().solve(apart));
 }
 
-double limit_of(bool plane, const GateLimits& limits) {
-  return plane ? -2.0 * std::log(1.0 - limits.probability) : chi2_quantile(limits.probability, 3);
-}
-
-/// Upper tail of chi-square with two or three degrees of freedom, closed forms.
-double tail(double chi2, bool plane) {
-  if (plane) return std::exp(-0.5 * chi2);
-  return std::erfc(std::sqrt(0.5 * chi2)) + std::sqrt(2.0 * chi2 / std::numbers::pi) * std::exp(-0.5 * chi2);
-}
-
 struct Swap {
   std::size_t a{}, b{};
   double chi2{}, chi2_exchanged{};
@@ -41,10 +32,10 @@ std::vector<Contradiction> contradictions(std::span<const PlaceTwice> pairs, con
   std::vector<const PlaceTwice*> of;
   for (const PlaceTwice& pair : pairs) {
     const double chi2 = chi2_of(pair.later, pair.published, pair.plane);
-    const double limit = limit_of(pair.plane, limits) * (pair.acceptable ? 1.0 : k_ungated_factor);
+    const double limit = chi2_limit(pair.plane, limits) * (pair.acceptable ? 1.0 : k_ungated_factor);
     if (!std::isfinite(chi2) || chi2 <= limit) continue;
     out.push_back({pair.anchor, pair.later.at_m - pair.published.at_m, pair.plane, chi2, limit,
-                   tail(chi2, pair.plane), std::nullopt});
+                   chi2_tail(chi2, pair.plane), std::nullopt});
     of.push_back(&pair);
   }
   std::vector<Swap> swaps;
@@ -53,7 +44,7 @@ std::vector<Contradiction> contradictions(std::span<const PlaceTwice> pairs, con
       const bool plane = of[a]->plane || of[b]->plane;
       const double first = chi2_of(of[a]->later, of[b]->published, plane);
       const double second = chi2_of(of[b]->later, of[a]->published, plane);
-      const double limit = limit_of(plane, limits);
+      const double limit = chi2_limit(plane, limits);
       const Swap swap{a, b, out[a].chi2 + out[b].chi2, first + second};
       const bool fits = first <= limit && second <= limit;
       if (fits || swap.chi2_exchanged * k_exchange_gain <= swap.chi2) swaps.push_back(swap);

@@ -359,6 +359,43 @@ TEST_F(Calibrations, SayWhatTheUncertaintyOfEachAnchorComesFrom) {
   EXPECT_EQ(json(get("/api/v1/anchors/0x6000"))["properties"]["budget"], based["anchors"][0]["budget"]);
 }
 
+TEST_F(Calibrations, ShowTheMisclosureOfCheckPointsAndUseNone) {
+  const MadeFlight m = made(13);
+  const auto mission = flown(m);
+  const EnuFrame truth(m.origin);
+  const auto surveyed = [&](std::size_t i, const Eigen::Vector3d& off_m) {
+    const Wgs84 at = truth.wgs84_from_enu({m.anchors[i] + off_m});
+    return Json{{"network_id", to_string(NetworkId{static_cast<std::uint32_t>(0x6000 + i)})},
+                {"lon", at.lon_deg},
+                {"lat", at.lat_deg},
+                {"h_m", at.height_m}};
+  };
+  const Eigen::Vector3d none(0, 0, 0), moved(3, 0, 0);
+  const Json points{surveyed(0, none), surveyed(1, none), surveyed(2, moved)};
+  const auto plain = solved(mission), checked = solved(mission, {{"check_points", points}});
+  for (std::size_t i = 0; i < 4; ++i)
+    EXPECT_EQ(plain["anchors"][i]["enu_m"], checked["anchors"][i]["enu_m"]) << "a check point is no datum";
+  EXPECT_TRUE(plain["provenance"]["check_points"].is_null());
+  const auto& told = checked["provenance"]["check_points"];
+  ASSERT_EQ(told["points"].size(), 3u);
+  EXPECT_TRUE(told["points"][0]["agrees"]);
+  EXPECT_GT(told["points"][0]["p_value"], 0.001);
+  EXPECT_FALSE(told["points"][2]["agrees"]);
+  EXPECT_NEAR(told["points"][2]["delta_enu_m"][0].get<double>(), -3, 0.2);
+  EXPECT_LT(told["points"][2]["p_value"], 1e-6);
+  const auto page = get("/api/v1/calibrations/" + checked.value("id", "") + "/report").body;
+  EXPECT_NE(page.find("Check point 0x6002: solved less surveyed"), std::string::npos);
+  EXPECT_NE(page.find("does not agree"), std::string::npos);
+  // A base that is off moves all alike.
+  const Json off{surveyed(0, moved), surveyed(1, moved), surveyed(3, moved)};
+  const auto shifted = solved(mission, {{"check_points", off}})["provenance"]["check_points"]["shift"];
+  EXPECT_TRUE(shifted["significant"]) << shifted;
+  EXPECT_NEAR(shifted["shift_enu_m"][0].get<double>(), -3, 0.2);
+  const auto refused = solve(mission, {{"check_points", {{{"network_id", "0x6000"}, {"lon", 4.7}}}}});
+  EXPECT_EQ(refused.status, 422);
+  EXPECT_NE(refused.body.find("/check_points/0"), std::string::npos) << refused.body;
+}
+
 TEST_F(Calibrations, LeaveRangesBetweenAnchorsOutWhereAsked) {
   MadeFlight m = made(7);
   m.pairs = true;
