@@ -1,8 +1,8 @@
-#include "api/json/budget_json.hpp"
 #include "api/json/wire_resources.hpp"
 
 #include <nlohmann/json.hpp>
 
+#include "api/json/budget_json.hpp"
 #include "api/json/live_writer.hpp"
 #include "api/json/reader.hpp"
 #include "core/base/to_wire.hpp"

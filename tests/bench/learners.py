@@ -197,9 +197,9 @@ def judge(x, y, group, placement, folds, make, cap):
     return (los == (y == 1)).mean(), los[y == 0].mean(), seconds
 
 
-def ours(anchord, path, place, folds, features, method):
+def ours(anchord, path, place, folds, features, method, engine="own"):
     with tempfile.TemporaryDirectory() as folder:
-        command = [anchord, "train", "--data", path, "--method", method, "--features", ",".join(features), "--folds", str(folds), "--threads", "1", "--out", os.path.join(folder, "m.json"), "--json"]
+        command = [anchord, "train", "--data", path, "--method", method, "--engine", engine, "--features", ",".join(features), "--folds", str(folds), "--threads", "1", "--out", os.path.join(folder, "m.json"), "--json"]
         if place:
             command += ["--group-by", place]
         start = time.time()
@@ -217,6 +217,8 @@ def main():
         few = placement.max() + 1 < 40
         for kind, method, cap in [("logistic", "logistic", 0), ("forest", "random_forest", 0), ("svm", "svm", 4000), ("boosted", "boosted", 0)]:
             results = [("anchord", ours(anchord, path, place, folds, features, method))]
+            if kind in ("forest", "svm"):
+                results.append(("anchord, engine opencv", ours(anchord, path, place, folds, features, method, "opencv")))
             n = len(thinned(placement, range(len(y)))[0])
             for library, make in peers(kind, n, 0.3 if few else 3).items():
                 results.append((library, judge(x, y, group, placement, folds, lambda rows, make=make: make(), cap)))
