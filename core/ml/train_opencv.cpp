@@ -87,8 +87,6 @@ Result<Svm> fit_svm_opencv(const TrainingRows& rows, const SvmOptions& options, 
     cv::Mat alpha, index;
     const double rho = fitted->getDecisionFunction(0, alpha, index);
     Svm out{options.kernel, options.gamma, options.coef0, options.degree, rows.d, {}, {}, rho};
-    // Its sigmoid is tanh(-(gamma u'v + coef0)): the signs are ours to turn.
-    if (options.kernel == Kernel::sigmoid) out.gamma = -out.gamma, out.coef0 = -out.coef0;
     for (int i = 0; i < static_cast<int>(alpha.total()); ++i) {
       const auto* vector = support.ptr<float>(index.at<int>(i));
       out.support.insert(out.support.end(), vector, vector + rows.d);
