@@ -3,6 +3,7 @@
 #include "api/json/live_writer.hpp"
 #include "api/learning/flight_models.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -162,6 +163,7 @@ Json flight_json(const SolvedFlight& flight) {
                                                      {"lever_up_m", valued(antenna.up_m)}});
   json["n_fixes"] = s.n_fixes;
   json["n_ranges"] = s.n_ranges;
+  json["n_anchor_anchor"] = std::ranges::count(flight.data->ranges, RangeKind::anchor_anchor, &Range::kind);
   json["n_used"] = s.n_used;
   json["placed"] = s.placed;
   json["refused"] = Json::object();

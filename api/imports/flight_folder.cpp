@@ -182,13 +182,14 @@ Result<void> read_ranges(const std::filesystem::path& folder, const FlightDeclar
   const auto fp = table.column("fp_dbm");
   const auto rss = table.column("rss_dbm");
   const auto seq = table.column("seq");
+  const auto kind = table.column("kind");
   std::optional<PoseColumns> pose;
   if (flight.track_in_ranges) {
     BOOST_OUTCOME_TRY(pose, PoseColumns::of(table, flight));
   }
   note_unknown(table, "ranges",
-               {"anchor_id", "range_m", "tag_id", "antenna", "rx_dbm", "fp_dbm", "rss_dbm", "seq"}, flight,
-               data);
+               {"anchor_id", "range_m", "tag_id", "antenna", "rx_dbm", "fp_dbm", "rss_dbm", "seq", "kind"},
+               flight, data);
   const auto& tags = flight.mission.tags;
   if (!tag && tags.size() > 1) {
     return make_error(Errc::invalid_argument,
@@ -223,7 +224,16 @@ Result<void> read_ranges(const std::filesystem::path& folder, const FlightDeclar
     BOOST_OUTCOME_TRY(range.rss_dbm, table.number(rss));
     BOOST_OUTCOME_TRY(const auto number, table.number(seq));
     if (number && *number >= 0 && *number < 9e15) range.seq = static_cast<std::uint64_t>(*number);
-    if (pose) {
+    const std::string what = kind ? std::string(table.text(*kind)) : std::string();
+    if (what == "anchor_anchor") {
+      if (!tag)
+        return table.error(
+            "a range between anchors names the other one in tag_id, and there is no such column");
+      range.kind = RangeKind::anchor_anchor;
+    } else if (!what.empty() && what != "tag_anchor") {
+      return table.error("kind is tag_anchor or anchor_anchor");
+    }
+    if (pose && range.kind == RangeKind::tag_anchor) {
       BOOST_OUTCOME_TRY(const auto fix, pose->read(table, range.time));
       if (fix) {
         data.fixes.push_back(*fix);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -75,13 +76,14 @@ Result<void> write_track(const FlightData& flight, UtcTime epoch, bool attitude,
 
 Result<void> write_ranges(const FlightData& flight, UtcTime epoch, const std::filesystem::path& file) {
   std::ofstream out(file, std::ios::binary);
-  out << "t_s,tag_id,antenna,anchor_id,range_m,rx_dbm,fp_dbm,rss_dbm,seq\n";
+  const bool pairs = std::any_of(flight.ranges.begin(), flight.ranges.end(),
+                                 [](const Range& r) { return r.kind == RangeKind::anchor_anchor; });
+  out << "t_s,tag_id,antenna,anchor_id,range_m,rx_dbm,fp_dbm,rss_dbm,seq" << (pairs ? ",kind\n" : "\n");
   const auto optional = [&out](const std::optional<double>& value) {
     out << ',';
     if (value) row(out, "%.3f", *value);
   };
   for (const Range& range : flight.ranges) {
-    if (range.kind != RangeKind::tag_anchor) continue;
     const auto name = flight.anchor_names.find(range.anchor);
     row(out, "%.6f,%s,%u,%s,%.4f", seconds_between(epoch, range.time), to_string(range.tag).c_str(),
         static_cast<unsigned>(range.antenna),
@@ -92,6 +94,7 @@ Result<void> write_ranges(const FlightData& flight, UtcTime epoch, const std::fi
     optional(range.rss_dbm);
     out << ',';
     if (range.seq) out << *range.seq;
+    if (pairs) out << (range.kind == RangeKind::anchor_anchor ? ",anchor_anchor" : ",tag_anchor");
     out << '\n';
   }
   return closed(out, file);

@@ -184,6 +184,7 @@ Json flight_provenance(const FlightData& flight, const FlightSolution& s) {
           {"bias_determined", s.shared.bias_determined},
           {"n_fixes", s.n_fixes},
           {"n_ranges", s.n_ranges},
+          {"n_anchor_anchor", std::ranges::count(flight.ranges, RangeKind::anchor_anchor, &Range::kind)},
           {"n_used", s.n_used},
           {"refused", s.refused},
           {"fixes_refused", s.fixes_refused},

@@ -163,6 +163,27 @@ TEST_F(FlightFolder, AsksWhichTagWhenSeveralAreDeclared) {
   expect_error("no column tag_id");
 }
 
+TEST_F(FlightFolder, TakesRangesBetweenAnchorsAndWritesThem) {
+  write("ranges.csv",
+        "t_s,tag_id,anchor_id,range_m,kind\n0.1,0x6e01,3,6.14,tag_anchor\n0.2,7,3,9.5,anchor_anchor\n");
+  const auto read = read_flight_folder(folder_);
+  ASSERT_TRUE(read.has_value()) << read.error().message;
+  ASSERT_EQ(read.value().ranges.size(), 2u);
+  EXPECT_EQ(read.value().ranges[0].kind, RangeKind::tag_anchor);
+  EXPECT_EQ(read.value().ranges[1].kind, RangeKind::anchor_anchor);
+  EXPECT_EQ(read.value().ranges[1].tag, NetworkId{7});
+  const auto copy = folder_ / "copy";
+  ASSERT_TRUE(write_flight_folder(read.value(), copy).has_value());
+  const auto again = read_flight_folder(copy);
+  ASSERT_TRUE(again.has_value()) << again.error().message;
+  EXPECT_EQ(again.value().ranges[1].kind, RangeKind::anchor_anchor);
+  EXPECT_EQ(again.value().ranges[1].distance_m, 9.5);
+  write("ranges.csv", "t_s,tag_id,anchor_id,range_m,kind\n0.1,0x6e01,3,6.14,sideways\n");
+  const auto bad = read_flight_folder(folder_);
+  ASSERT_FALSE(bad.has_value());
+  EXPECT_NE(bad.error().message.find("anchor_anchor"), std::string::npos);
+}
+
 TEST_F(FlightFolder, WritesWhatItReads) {
   globe();
   const FlightData first = read_flight_folder(folder_).value();
