@@ -51,7 +51,9 @@ export function Rules() {
       gone = true;
     };
   }, [chosen]);
-  const rate = (r: Rates | null, of: 'los' | 'nlos') => <Q v={fixed(r?.[of] == null ? null : r[of] * 100, 1)} u="%" />;
+  const rate = (r: Rates | null, of: 'los' | 'nlos') => (
+    <Q v={fixed(r?.[`${of}_rate`] == null ? null : r[`${of}_rate`]! * 100, 1)} u="%" />
+  );
   return (
     <section class="cell-p wide" data-testid="rules">
       <div class="hd">
@@ -73,7 +75,7 @@ export function Rules() {
       </div>
       {problem && (
         <div class="problem" role="status">
-          <b>The rules could not be judged.</b> {problem}
+          <b>The rules could not be evaluated.</b> {problem}
         </div>
       )}
       {sets?.length === 0 && <p class="why">No data set is frozen yet.</p>}
