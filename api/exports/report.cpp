@@ -45,7 +45,7 @@ svg text{font:10px system-ui,-apple-system,"Segoe UI",Roboto,"Noto Sans",sans-se
 svg .id{font-weight:600;fill:#000;paint-order:stroke;stroke:#fff;stroke-width:3px}svg .t{paint-order:stroke;stroke:#fff;stroke-width:3px}
 .plot text.t{font-size:8.5px;stroke:none;fill:var(--ink3)}
 .grid{stroke:#e3e6e9;stroke-width:1}.axis{stroke:var(--edge);stroke-width:1}.wall{fill:none;stroke:#39424c;stroke-width:2.5}
-.track{fill:none;stroke:#a9b2bb;stroke-width:1}.link{stroke:var(--caution);stroke-dasharray:2 3}.twin{fill:none;stroke:var(--caution);stroke-dasharray:3 2}
+.track{fill:none;stroke:#a9b2bb;stroke-width:1}.link{stroke:var(--caution);stroke-dasharray:2 3}.mirror{fill:none;stroke:var(--caution);stroke-dasharray:3 2}
 .scale{fill:none;stroke:#000;stroke-width:1.6}.ell{stroke-width:1.4}.ell.good{fill:#0b6b2e21;stroke:var(--ok)}.ell.over{fill:#8a4b0021;stroke:var(--caution)}.ell.held{fill:none;stroke:var(--edge);stroke-dasharray:3 2}
 .dot{stroke:#fff;stroke-width:1}.dot.good{fill:var(--ok)}.dot.over{fill:var(--caution)}.dot.held{fill:#fff;stroke:var(--ink3);stroke-width:1.5}.dash{stroke:var(--ink3);stroke-width:1.5}.tick{fill:none;stroke:#fff;stroke-width:1.6}
 .pt{fill:#39424c;fill-opacity:.55}.rej{fill:none;stroke:var(--bad);stroke-width:.9}

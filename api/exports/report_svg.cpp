@@ -179,7 +179,7 @@ std::string map(const Report& report) {
     if (e.mirror) {
       out += line(view.x(e.best->position.m.x()), view.y(e.best->position.m.y()),
                   view.x(e.mirror->position.m.x()), view.y(e.mirror->position.m.y()), "link");
-      out += "<circle class=\"twin\" cx=\"" + px(view.x(e.mirror->position.m.x())) + "\" cy=\"" +
+      out += "<circle class=\"mirror\" cx=\"" + px(view.x(e.mirror->position.m.x())) + "\" cy=\"" +
              px(view.y(e.mirror->position.m.y())) + "\" r=\"6\"/>";
     }
     const bool good = anchor.published || e.acceptable();

@@ -194,7 +194,7 @@ Result<void> read_ranges(const std::filesystem::path& folder, const FlightDeclar
   if (!tag && tags.size() > 1) {
     return make_error(Errc::invalid_argument,
                       folder.string() + ": flight.json declares " + std::to_string(tags.size()) +
-                          " tag antennas, ranges has no column tag_id to tell them apart");
+                          " tag antennas, ranges has no column tag_id to distinguish them");
   }
   std::size_t pose_not_finite = 0;
   while (true) {

@@ -72,7 +72,7 @@ void read_clues(const nlohmann::json& value, const std::string& base, FlightOpti
   if (const auto sigma = fields.number("rss_sigma_db", 1, 30)) options.level_sigma_db = *sigma;
   if (const auto* anchors = fields.child("anchors")) {
     if (!anchors->is_object() || anchors->size() > 1000) {
-      errors.push_back({base + "/anchors", "wrong_type", "an object: anchor id -> its clues"});
+      errors.push_back({base + "/anchors", "wrong_type", "an object: anchor id -> its priors"});
     } else {
       for (const auto& [id, clues] : anchors->items()) {
         const std::string at = base + "/anchors/" + to_utf8(id, 40);

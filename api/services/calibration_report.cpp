@@ -132,7 +132,7 @@ void describe(Report& report, const std::vector<Mission>& missions, const std::s
     if (!anchor.estimate.mirror) continue;
     report.remarks.push_back(
         (anchor.name.empty() ? to_string(anchor.estimate.anchor) : anchor.name) +
-        " has a second place that fits, " +
+        " has a mirror solution, " +
         number((anchor.estimate.best->position.m - anchor.estimate.mirror->position.m).norm(), 2) +
         " m away (probability " + number(anchor.estimate.mirror->probability, 2) + ").");
   }

@@ -211,13 +211,13 @@ std::vector<Gate> gates_of(const FlightRows& flight, const JointFit& fit, std::s
   const double side = plane && !estimate.mirror ? 0.5 : estimate.best->probability;
   gates.push_back(at_least(
       "side", side, limits.side_probability,
-      estimate.mirror ? "probability of this side; the twin is given as mirror" : "no twin fits as well"));
+      estimate.mirror ? "probability of this side; the other is given as mirror" : "no mirror solution fits as well"));
   if (plane && !estimate.mirror) gates.back().why = "the track is a plane: height not determined";
   if (!options.outline_m.empty()) {
     const double outside_m = outside_outline_m(options.outline_m, estimate.best->position.m);
     gates.push_back(
         at_most("outline", outside_m, limits.outline_sigmas * options.outline_sigma_m,
-                text("%.2f m outside of the building's outline, which was a clue with sigma %.1f m",
+                text("%.2f m outside of the building's outline, which was a prior with sigma %.1f m",
                      outside_m, options.outline_sigma_m)));
   }
   // What a model has judged is corrected and weighed as what it is: late ranges are no surprise there.

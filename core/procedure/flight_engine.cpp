@@ -120,7 +120,7 @@ void FlightEngine::range(double now_s, NetworkId anchor, bool used, std::optiona
   if (rss_dbm && state_.step == Step::height_search && at) clues_.climbed(anchor, at->z(), *rss_dbm);
   if (!used) return;
   if (note_range(state_, anchor))
-    tell(now_s, "info", "anchor.found", "anchor " + to_string(anchor) + " heard first");
+    tell(now_s, "info", "anchor.found", "anchor " + to_string(anchor) + " in range for the first time");
 }
 
 void FlightEngine::vehicle(double now_s, const VehicleView& view) {

@@ -306,12 +306,12 @@ Advance resume_after_restart(const State& stored, double now_s) {
   out.state.deadline_s = 0;  // waits for the operator; the autopilot's battery failsafe stands behind it
   if (stored.step == Step::landing) {
     out.commands = {{Command::Kind::land, {0, 0, 0}, std::nullopt}};
-    out.state.reason = "server restarted while landing: told again to land";
+    out.state.reason = "server restarted while landing: commanded to land again";
     return out;
   }
   if (stored.step != Step::hold) out.state.interrupted = stored.step;
   out.state.step = Step::hold;
-  out.state.reason = "server restarted: told to hold, waiting for the operator";
+  out.state.reason = "server restarted: commanded to hold, waiting for the operator";
   out.commands = {{Command::Kind::hold, {0, 0, 0}, std::nullopt}};
   return out;
 }

@@ -20,20 +20,20 @@ constexpr Transition k_table[] = {
 
     {S::go_to_waypoint, E::arrived, G::always, S::search_anchors, "waypoint reached, listening"},
     {S::go_to_waypoint, E::timeout, G::tries_left, S::go_to_waypoint,
-     "waypoint not reached in time, told again"},
+     "waypoint not reached in time, commanded again"},
     {S::go_to_waypoint, E::timeout, G::waypoint_left, S::go_to_waypoint, "waypoint not reached, to the next"},
     {S::go_to_waypoint, E::timeout, G::always, S::return_home, "last waypoint not reached"},
     {S::go_to_waypoint, E::unreachable, G::waypoint_left, S::go_to_waypoint,
      "waypoint not allowed, to the next"},
     {S::go_to_waypoint, E::unreachable, G::always, S::return_home, "last waypoint not allowed"},
 
-    {S::search_anchors, E::heard, G::wants_turn, S::turn, "anchor heard, its bearing is wanted"},
-    {S::search_anchors, E::heard, G::wants_height, S::height_search, "anchor heard, its height is wanted"},
-    {S::search_anchors, E::heard, G::always, S::ranging, "anchors heard, ranging"},
+    {S::search_anchors, E::heard, G::wants_turn, S::turn, "anchor in range, its bearing is wanted"},
+    {S::search_anchors, E::heard, G::wants_height, S::height_search, "anchor in range, its height is wanted"},
+    {S::search_anchors, E::heard, G::always, S::ranging, "anchors in range, ranging"},
     {S::search_anchors, E::done_here, G::waypoint_left, S::go_to_waypoint,
      "nothing to measure here, to the next waypoint"},
     {S::search_anchors, E::done_here, G::always, S::return_home, "all waypoints flown"},
-    {S::search_anchors, E::timeout, G::moves_left, S::move_around, "no anchor heard, moving around"},
+    {S::search_anchors, E::timeout, G::moves_left, S::move_around, "no anchor in range, moving around"},
     {S::search_anchors, E::timeout, G::waypoint_left, S::step_to_waypoint,
      "still no anchor, a step towards the next waypoint"},
     {S::search_anchors, E::timeout, G::always, S::return_home, "no anchor at the last waypoint"},
@@ -99,12 +99,12 @@ constexpr Transition k_table[] = {
     {S::hold, E::timeout, G::always, S::return_home, "held too long"},
 
     {S::return_home, E::arrived, G::always, S::landing, "above home, landing"},
-    {S::return_home, E::timeout, G::tries_left, S::return_home, "not home in time, told again"},
+    {S::return_home, E::timeout, G::tries_left, S::return_home, "not home in time, commanded again"},
     {S::return_home, E::timeout, G::always, S::landing, "not home in time, landing"},
     {S::return_home, E::landed, G::always, S::done, "landed"},
 
     {S::landing, E::landed, G::always, S::done, "landed"},
-    {S::landing, E::timeout, G::always, S::landing, "still in the air, told again to land"},
+    {S::landing, E::timeout, G::always, S::landing, "still in the air, commanded to land again"},
 };
 
 constexpr std::array k_step_words{
@@ -112,7 +112,7 @@ constexpr std::array k_step_words{
     "turn",    "height_search", "ranging",        "find_next_point", "go_to_point", "check_connections",
     "go_back", "hold",          "return_home",    "landing",         "done"};
 constexpr std::array k_event_words{
-    "start",     "airborne",    "arrived",     "heard",        "sampled",    "point",        "no_point",
+    "start",     "airborne",    "arrived",     "in_range",       "sampled",    "point",        "no_point",
     "done_here", "unreachable", "connected",   "disconnected", "landed",     "timeout",      "hold",
     "resume",    "skip",        "return_home", "land",         "taken_over", "not_taken_off"};
 constexpr std::array k_guard_words{"always",        "wants_turn",    "wants_height", "legs_left",
@@ -136,12 +136,12 @@ std::span<const Transition> transitions() {
     for (std::size_t i = 0; i < k_step_count; ++i) {
       const auto from = static_cast<Step>(i);
       if (from == S::ready || from == S::landing || from == S::done) continue;
-      if (from != S::hold) out.push_back({from, E::hold, G::always, S::hold, "told to hold"});
+      if (from != S::hold) out.push_back({from, E::hold, G::always, S::hold, "commanded to hold"});
       out.push_back({from, E::skip, G::waypoint_left, S::go_to_waypoint, "waypoint skipped, to the next"});
       out.push_back({from, E::skip, G::always, S::return_home, "last waypoint skipped"});
       if (from != S::return_home)
-        out.push_back({from, E::return_home, G::always, S::return_home, "told to return"});
-      out.push_back({from, E::land, G::always, S::landing, "told to land"});
+        out.push_back({from, E::return_home, G::always, S::return_home, "commanded to return"});
+      out.push_back({from, E::land, G::always, S::landing, "commanded to land"});
       if (from != S::hold)
         out.push_back({from, E::taken_over, G::always, S::hold, "the pilot or a failsafe has the aircraft"});
       if (from != S::return_home)
@@ -149,7 +149,7 @@ std::span<const Transition> transitions() {
     }
     out.push_back(
         {S::landing, E::taken_over, G::always, S::hold, "the pilot or a failsafe has the aircraft"});
-    out.push_back({S::landing, E::hold, G::always, S::hold, "landing stopped, told to hold"});
+    out.push_back({S::landing, E::hold, G::always, S::hold, "landing stopped, commanded to hold"});
     return out;
   }();
   return all;

@@ -43,7 +43,7 @@ std::string why_not_done(const std::optional<Estimate>& estimate, std::span<cons
   }
   const auto& at = estimate->best->position.m;
   if (estimate->mirror) {
-    return text("mirror: a second place %.1f m away fits as well; another height or side decides",
+    return text("mirror: a solution %.1f m away fits as well; another height or side decides",
                 (estimate->mirror->position.m - at).norm());
   }
   if (!points.empty()) {
@@ -64,14 +64,14 @@ std::string why_not_done(const std::optional<Estimate>& estimate, std::span<cons
     return text("too many ranges refused: %.0f of %.0f", static_cast<double>(refused), all);
   }
   if (estimate->bias_sigma_m && *estimate->bias_sigma_m > k_bias_m) {
-    return text("bias and position are not told apart: bias known to %.2f m", *estimate->bias_sigma_m);
+    return text("bias and position cannot be distinguished: bias known to %.2f m", *estimate->bias_sigma_m);
   }
   const auto sigma = position_sigma_m(*estimate);
   if (sigma && rule.target_sigma_m && *sigma > *rule.target_sigma_m) {
     return text("accuracy %.3f m, wanted %.3f m", *sigma, *rule.target_sigma_m);
   }
   if (estimate->verdict != Verdict::ok)
-    return estimate->reason.empty() ? "not judged ok yet" : estimate->reason;
+    return estimate->reason.empty() ? "not assessed as ok yet" : estimate->reason;
   return "more points wanted";
 }
 

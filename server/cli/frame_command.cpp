@@ -95,7 +95,7 @@ void print(const Pairs& pairs, const FrameFit& fit) {
     if (r.left_out_m)
       std::printf("%.4f m\n", r.left_out_m->norm());
     else
-      std::printf("cannot be told\n");
+      std::printf("unknown\n");
   }
   for (const auto& note : fit.notes) std::printf("note: %s\n", printable(note).c_str());
 }

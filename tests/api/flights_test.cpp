@@ -94,7 +94,7 @@ TEST_F(Flights, StartsHoldsResumesAndLands) {
   ASSERT_EQ(act("land", lease).status, 202);
   EXPECT_TRUE(fly_until([&] { return procedure()["step"] == "done"; }, 60));
   EXPECT_EQ(procedure()["status"], "aborted") << "DONE is only what was promised";
-  EXPECT_EQ(procedure().value("ended", "").rfind("told to land: by ", 0), 0u) << procedure()["ended"];
+  EXPECT_EQ(procedure().value("ended", "").rfind("commanded to land: by ", 0), 0u) << procedure()["ended"];
   EXPECT_FALSE(drone_->autopilot.vehicle().armed());
   for (const char* always : {"hold", "land", "disarm"})
     EXPECT_EQ(act(always, lease).status, 202) << always << ": sent, whatever the server believes";

@@ -34,7 +34,7 @@ describe('Conditions', () => {
     const lost = c.standing({ ...calm, fix: 'none', link: 'lost', silence_ms: 6000, now_ms: 9000 });
     expect(ids(lost)).toEqual(['link.lost', 'rtk.lost']);
     expect(lost[0]!.since_ms).toBe(3000);
-    expect(lost[1]!.title).toContain('when last heard');
+    expect(lost[1]!.title).toContain('when last seen');
     expect(new Conditions().standing({ ...calm, link: 'lost', recording: false })).toEqual([]);
   });
   it('are listed once per id with the word of the server, critical first', () => {

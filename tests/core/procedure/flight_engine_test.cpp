@@ -245,7 +245,7 @@ TEST(FlightEngine, ReturnsAtOnceFromEveryStepWhenTheFlightTimeIsOver) {
       EXPECT_EQ(late.engine.state().step, Step::return_home) << "who held is not flown on";
     }
     if (!waits && step != Step::return_home) {
-      EXPECT_EQ(late.engine.state().ended, "told to return: the flight time of 30 s is over");
+      EXPECT_EQ(late.engine.state().ended, "commanded to return: the flight time of 30 s is over");
     }
   }
 }
@@ -263,8 +263,8 @@ TEST(FlightEngine, IsCompletedOnlyWhenNothingWasLeftToFly) {
                      {Event::done_here, Event::arrived, Event::done_here, Event::arrived, Event::landed}),
             P(true, "all waypoints flown"));
   EXPECT_EQ(ended_by(Step::ranging, {Event::return_home, Event::arrived, Event::landed}),
-            P(false, "told to return"));
-  EXPECT_EQ(ended_by(Step::ranging, {Event::land, Event::landed}), P(false, "told to land"));
+            P(false, "commanded to return"));
+  EXPECT_EQ(ended_by(Step::ranging, {Event::land, Event::landed}), P(false, "commanded to land"));
   EXPECT_EQ(ended_by(Step::ranging, {Event::taken_over, Event::landed}),
             P(false, "landed and disarmed without a command"));
   EXPECT_EQ(ended_by(Step::take_off, {Event::not_taken_off}), P(false, "not taken off"));
@@ -272,7 +272,7 @@ TEST(FlightEngine, IsCompletedOnlyWhenNothingWasLeftToFly) {
   Flown f;
   ways().at(Step::return_home)(f);
   f.feed({Event::hold, Event::resume});
-  EXPECT_EQ(f.engine.state().ended, "told to return");
+  EXPECT_EQ(f.engine.state().ended, "commanded to return");
   f.feed({Event::skip});
   EXPECT_EQ(f.engine.state().step, Step::go_to_waypoint);
   EXPECT_EQ(f.engine.state().ended, "");

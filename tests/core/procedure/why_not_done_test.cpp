@@ -34,7 +34,7 @@ TEST(WhyNotDone, NamesTheFirstCauseWithItsNumbers) {
   auto mirrored = good();
   mirrored.mirror = Hypothesis{};
   mirrored.mirror->position = Enu{{0, 0, 7}};
-  EXPECT_EQ(why(mirrored).rfind("mirror: a second place 7.0 m away", 0), 0u) << why(mirrored);
+  EXPECT_EQ(why(mirrored).rfind("mirror: a solution 7.0 m away", 0), 0u) << why(mirrored);
   EXPECT_EQ(why(good(), {{10, 0, 3}, {0, 10, 3}, {-10, 0, 3.5}, {0, -10, 3}}).rfind("flat flight", 0), 0u);
   EXPECT_EQ(why(good(), {{10, -5, 3}, {10, 0, 9}, {10, 5, 3}}).rfind("seen from one side only", 0), 0u);
   auto refused = good();
@@ -42,7 +42,7 @@ TEST(WhyNotDone, NamesTheFirstCauseWithItsNumbers) {
   EXPECT_EQ(why(refused), "too many ranges refused: 150 of 250");
   auto biased = good();
   biased.bias_sigma_m = 0.3;
-  EXPECT_EQ(why(biased), "bias and position are not told apart: bias known to 0.30 m");
+  EXPECT_EQ(why(biased), "bias and position cannot be distinguished: bias known to 0.30 m");
   EXPECT_EQ(why(good()), "accuracy 0.300 m, wanted 0.050 m");
 }
 

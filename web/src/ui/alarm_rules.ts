@@ -50,7 +50,7 @@ export class Conditions {
         out.push({ id, priority, title, advice, since_ms: began + delay_ms, acknowledged: false });
     };
     if (s.link === 'lost') {
-      // Nothing new can be said about the others, so they neither appear nor vanish: they read "when last heard".
+      // Nothing new can be said about the others, so they neither appear nor vanish: they read "when last seen".
       if (s.recording)
         out.push({
           id: 'link.lost',
@@ -61,7 +61,7 @@ export class Conditions {
           since_ms: s.now_ms - s.silence_ms,
           acknowledged: false,
         });
-      return [...out, ...this.heard.map((a) => ({ ...a, title: `${a.title}, when last heard`, acknowledged: true }))];
+      return [...out, ...this.heard.map((a) => ({ ...a, title: `${a.title}, when last seen`, acknowledged: true }))];
     }
     const ranging = s.recording && s.range_silence_ms < 60_000;
     const poor = s.fix === 'none' || s.fix === 'single' || s.fix === 'dgps';

@@ -137,7 +137,7 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
       card: (
         <p>
           {rows.length
-            ? `${heard} of ${all_seen} anchors heard in the last 2 s, ${fixed(mission?.range_rate_hz, 0)} ranges a second.`
+            ? `${heard} of ${all_seen} anchors in range in the last 2 s, ${fixed(mission?.range_rate_hz, 0)} ranges a second.`
             : 'No range has been received for this flight.'}
           {devices.value.some((d) => d.kind === 'tag') &&
             ` Tags: ${devices.value
@@ -164,7 +164,7 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
               <p>
                 {craft.connected
                   ? craft_words(craft)
-                  : 'The aircraft has not been heard for 3 s. It follows its own failsafe; use the remote control.'}
+                  : 'Nothing has been received from the aircraft for 3 s. It follows its own failsafe; use the remote control.'}
               </p>
               {craft.text && <p>It says: {craft.text}</p>}
             </>

@@ -19,8 +19,8 @@ export function why_not_done(e: EstimateMsg): { title: string; text: string } | 
     ok: 'More ranges from new directions will bring the ellipse below the limit.',
     weak_geometry: 'Fly where the anchor is seen from another side, and at another height.',
     ambiguous: level
-      ? 'Fly one stretch a few metres higher or lower: that tells the two heights apart.'
-      : 'Leave the line flown so far: one stretch across it tells the two places apart.',
+      ? 'Fly one stretch a few metres higher or lower: that separates the two heights.'
+      : 'Leave the line flown so far: one stretch across it separates the two positions.',
     too_few: 'Stay in reach of it for some more seconds.',
     diverged: 'Look for reflections, or for two devices with one id.',
   };
@@ -49,7 +49,7 @@ const GATE_WORDS: Record<string, string> = {
   rejected: 'Share of ranges rejected',
   geometry: 'Width of the track',
   precision: 'Precision',
-  side: 'This side, not its twin',
+  side: 'This side, not the mirror',
   residual_scale: 'Residuals',
   chi_square: 'Residuals over time',
   halves: 'Two halves agree',

@@ -243,7 +243,7 @@ function running_gates(r: AnchorRow): Line[] {
       'Mirror odds',
       r.mirror ? (r.mirror.probability ?? 1) : 0,
       GATES.mirror,
-      r.mirror ? `${percent(r.mirror.probability)} %` : 'no twin',
+      r.mirror ? `${percent(r.mirror.probability)} %` : 'no mirror solution',
       String(GATES.mirror * 100),
     ),
   ];

@@ -220,7 +220,7 @@ function Nothing({ live, filtered }: { live: boolean; filtered: boolean }) {
   if (live)
     return (
       <div class="empty small">
-        <p>{synced.value ? 'No anchor has been heard in this flight.' : 'Loading.'}</p>
+        <p>{synced.value ? 'No anchor has been in range in this flight.' : 'Loading.'}</p>
         <a class="btn" href="#/live">
           Go to Live
         </a>

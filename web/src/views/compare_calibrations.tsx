@@ -134,7 +134,7 @@ export function CompareCalibrations() {
             ) : moved === 0 ? (
               <>
                 <Chip shape="ok" tone="ok" word="NONE MOVED" /> All {both.length} anchors are where the other has them,
-                as far as both can tell.
+                as far as both are known.
               </>
             ) : (
               <>

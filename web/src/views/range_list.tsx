@@ -27,7 +27,7 @@ export function RangeList({ selected }: { selected: string | null }) {
             : lost
               ? `nothing for ${age(now - (scene?.range_at_ms ?? now))}`
               : running
-                ? `${heard} of ${rows.length} heard, ${fixed(total_hz, 0)} Hz`
+                ? `${heard} of ${rows.length} in range, ${fixed(total_hz, 0)} Hz`
                 : `${rows.length} anchors, flight ended`}
         </span>
       </div>

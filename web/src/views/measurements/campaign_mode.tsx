@@ -158,7 +158,7 @@ export function CampaignMode({
               data-testid="take-anchor"
               onChange={(e) => change({ anchor: e.currentTarget.value })}
             >
-              <option value="">{anchors.length ? 'choose' : 'none is heard'}</option>
+              <option value="">{anchors.length ? 'choose' : 'none is in range'}</option>
               {anchors.map((a) => (
                 <option key={a} value={a}>
                   {a}

@@ -143,7 +143,7 @@ export function LevelPanel({
         {line
           ? `LOS above ${fixed(line.at_zero_dbm, 1)} dBm ${line.slope_dbm_per_m < 0 ? '−' : '+'} ${fixed(Math.abs(line.slope_dbm_per_m), 2)} dB/m`
           : of === 'none'
-            ? 'received level against measured distance'
+            ? 'RSS against measured distance'
             : fitted?.of === of
               ? 'that data set has too few LOS measurements with a level for a line'
               : 'fitting the line'}
@@ -157,7 +157,7 @@ export function LevelPanel({
         xw={metre_words}
         yw={(v, d) => `${fixed(v, d)} dBm`}
         label={
-          'Received level against ' +
+          'RSS against ' +
           `distance${line ? `, line of sight above ${fixed(line.at_zero_dbm, 1)} dBm and ${fixed(line.slope_dbm_per_m, 2)} dB a metre` : ''}`
         }
         selected={selected}

@@ -43,7 +43,7 @@ const FEATURES: Record<string, string> = {
   distance_m: 'Distance',
   range_m: 'Distance',
   range_db: 'Distance, dB',
-  rx_dbm: 'RX level',
+  rx_dbm: 'RSS',
   fp_dbm: 'First-path level',
   rx_minus_fp_db: 'RX-FP difference',
   noise_excess_db: 'Noise excess',

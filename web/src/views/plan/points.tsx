@@ -268,7 +268,7 @@ export function Corners({ plan, shape, name, picked, pick, change }: Props & { s
 }
 
 const FIELDS: readonly (readonly [NumberSetting, string, number])[] = [
-  ['keep_out_m', 'Keep-out, m', 1],
+  ['keep_out_m', 'Clearance, m', 1],
   ['min_height_m', 'Lowest, m', 1],
   ['max_height_m', 'Highest, m', 1],
   ['speed_mps', 'Speed, m/s', 1],

@@ -35,7 +35,7 @@ export function base_words(s: Pick<Site, 'source' | 'sigma_m' | 'frame'>): {
     return {
       tone: 'caution',
       word: 'NOT KNOWN',
-      text: 'Nobody said how the place of the base is known: anchors are right relative to it, and no absolute accuracy can be told.',
+      text: 'Nobody said how the place of the base is known: anchors are right relative to it, and no absolute accuracy can be given.',
     };
   if (s.source === 'survey_in')
     return {
@@ -185,8 +185,8 @@ export function BasePanel() {
       ) : (
         <p class="why">
           {bases.length
-            ? 'The caster has not told its place yet (RTCM 1005 or 1006 comes every few seconds).'
-            : 'They reach the rover by its own radio, so this server does not see where the base stands. With an NTRIP device here it is told.'}
+            ? 'The caster has not sent its position yet (RTCM 1005 or 1006 comes every few seconds).'
+            : 'They reach the rover by its own radio, so this server does not see where the base stands. With an NTRIP device here it is known.'}
         </p>
       )}
       {admin &&

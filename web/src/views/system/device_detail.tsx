@@ -86,7 +86,7 @@ export function DeviceDetail({ row: { d, recent }, heard, operator, busy, run, e
         {d.kind === 'pozyx' && (
           <div>
             <dt>Battery</dt>
-            <dd>tags do not tell</dd>
+            <dd>tags do not report it</dd>
           </div>
         )}
       </dl>

@@ -319,7 +319,7 @@ function Caster({ s, change }: { s: Setup; change: Change }) {
       </label>
       <label class="tick">
         <input type="checkbox" checked={s.send_gga} onChange={(e) => change({ send_gga: e.currentTarget.checked })} />{' '}
-        Tell it where the rover is
+        Send it the position of the rover
       </label>
     </>
   );

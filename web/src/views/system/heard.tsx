@@ -11,9 +11,9 @@ export function Heard({ heard }: { heard: readonly Device[] }) {
     live = new Map(live_devices.value.map((d) => [d.network_id, d]));
   return (
     <>
-      <h3>Radios heard</h3>
+      <h3>Radios in range</h3>
       <table class="tbl" data-testid="heard">
-        <caption class="sr">Radios that were heard in any flight</caption>
+        <caption class="sr">Radios that were in range in any flight</caption>
         <thead>
           <tr>
             <th scope="col">Radio</th>

@@ -79,7 +79,7 @@ export function RadioPanel({
       }}
     >
       <b>Radio of {device.name || device.network_id}.</b>{' '}
-      <span class="mut">Tag and anchors hear each other only with the same channel, rate, PRF and preamble.</span>
+      <span class="mut">Tag and anchors receive each other only with the same channel, rate, PRF and preamble.</span>
       {problem && (
         <div class="problem" role="status">
           <b>That did not work.</b> {problem}

@@ -30,7 +30,7 @@ export function radio_differences(tags: readonly Tuned[]): Difference[] {
       out.push({
         id: t.id,
         title: 'Two tags, two radio settings.',
-        text: `${t.name} is on ${radio_words(t.radio!)}; ${first!.name} on ${radio_words(first!.radio!)}. An anchor hears only one of them.`,
+        text: `${t.name} is on ${radio_words(t.radio!)}; ${first!.name} on ${radio_words(first!.radio!)}. An anchor receives only one of them.`,
       });
   for (const t of tags) {
     const apart = t.radio?.devices.filter((p) => !p.done) ?? [],

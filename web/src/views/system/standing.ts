@@ -171,7 +171,7 @@ function not_linked(d: Device): Standing {
       : bad(
           'NO POZYX',
           'The port is open, but no Pozyx answers on it.',
-          'Another device may be in this port: Discover tells which one speaks.',
+          'Another device may be in this port: Discover shows which one answers.',
         );
   if (/silent for too long/.test(d.reason)) return silent(d);
   return bad(word, reason || 'The link is gone.', 'It is opened again by itself.');
@@ -182,7 +182,7 @@ function silent(d: Device, noise = /make no frame/.test(d.reason)): Standing {
       'SILENT',
       noise ? 'The cable is open, but what comes cannot be read.' : 'The cable is open, but the tag says nothing.',
       noise
-        ? 'Is this port a Pozyx at all? Discover tells. If it is: unplug it and plug it in again, then try another cable.'
+        ? 'Is this port a Pozyx at all? Discover shows it. If it is: unplug it and plug it in again, then try another cable.'
         : 'Unplug the tag and plug it in again. If it stays silent: another cable, another port.',
     );
   if (d.kind === 'ntrip')
@@ -193,7 +193,7 @@ function silent(d: Device, noise = /make no frame/.test(d.reason)): Standing {
         : 'The caster is connected, but sends no corrections.',
       noise
         ? 'Edit: take a mount point that gives RTCM 3.'
-        : 'Check the mount point; some casters want to be told where the rover is (Edit).',
+        : 'Check the mount point; some casters want to know where the rover is (Edit).',
     );
   return bad(
     'SILENT',
@@ -258,7 +258,7 @@ function delivering(d: Device, recent: Lately): Standing {
         );
       return say(
         `${most} exchange fails: ${dropped_words(first[0])}.`,
-        'Details tells what was dropped, and how often.',
+        'Details shows what was dropped, and how often.',
       );
     }
   }
@@ -300,7 +300,7 @@ function delivering(d: Device, recent: Lately): Standing {
       return caution(
         'FEW POSITIONS',
         `More is lost than used: ${dropped_words(first[0])}.`,
-        'Details tells what was dropped, and how often.',
+        'Details shows what was dropped, and how often.',
       );
     // A receiver's text at start-up is some lines; what goes on is the line.
     if (noise_bytes(recent.dropped) > 20 * recent.span_s)
@@ -334,7 +334,7 @@ export function standing(d: Device, recent: Lately, twin_speaks = true): Standin
     return bad(
       'ID TWICE',
       sentence(without_ids(d.conflict)),
-      "Two tags with one id cannot be told apart: switch one of them off, or give it another id with the maker's tool.",
+      "Two tags with one id cannot be distinguished: switch one of them off, or give it another id with the maker's tool.",
     );
   if (d.state === 'found' && d.address.startsWith('tcp-listen:'))
     return caution(

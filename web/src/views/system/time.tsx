@@ -61,8 +61,8 @@ function Clocks({ look: { clock, devices }, kit }: { look: Look; kit: Kit | null
             )}{' '}
             <span class="why">
               {clock.source === 'receiver'
-                ? 'Measurements are stamped in UTC as the rover tells it.'
-                : 'No receiver has told the time yet: stamps are as good as the clock of this computer.'}
+                ? 'Measurements are stamped in UTC as the rover reports it.'
+                : 'No receiver has reported the time yet: stamps are as good as the clock of this computer.'}
             </span>
           </div>
           {clock.skew && (
@@ -162,7 +162,7 @@ function Aircraft({ drone: d }: { drone: DroneMsg | null }) {
             <span class="why">
               {d.connected
                 ? d.text
-                : 'Nothing was heard of the autopilot ' +
+                : 'Nothing was received from the autopilot ' +
                   `${d.autopilot && d.silent_s !== null ? `for ${age(d.silent_s * 1000)}` : 'yet'}: power, telemetry radio, ` +
                   'drone.address.'}
             </span>
@@ -218,7 +218,7 @@ function Aircraft({ drone: d }: { drone: DroneMsg | null }) {
 function Others({ others }: { others: readonly OtherOnLink[] }) {
   return (
     <table class="reads" data-testid="link-others">
-      <caption>Others on the link: counted, not obeyed</caption>
+      <caption>Others on the link: counted, their commands ignored</caption>
       <thead>
         <tr>
           <th scope="col">Sender</th>
