@@ -1,24 +1,10 @@
-/// Models: one tab a task; the numbers of the selected run above, every run below. Follows running jobs without a reload.
+/// Models: one tab a task; the numbers of the selected run above, every run below.
 import { signal } from '@preact/signals';
-import { useEffect, useState } from 'preact/hooks';
+import { useState } from 'preact/hooks';
 import '../desk.css';
 import './models.css';
-import { idempotency_key, said } from '../../api/client';
-import {
-  cancel_job,
-  models as fetch_models,
-  roll_back,
-  run_numbers,
-  run_page,
-  runs as fetch_runs,
-  TASKS,
-  type Model,
-  type Run,
-  type RunNumbers,
-  type Task,
-} from '../../api/learning';
-import { may } from '../../state/session';
-import { jobs_version, link, say } from '../../state/store';
+import { said } from '../../api/client';
+import { cancel_job, TASKS, type Model, type Run, type RunNumbers } from '../../api/learning';
 import { CopyBox } from '../../ui/copy_box';
 import { fixed } from '../../ui/format';
 import { Chip } from '../../ui/marks';
@@ -29,110 +15,32 @@ import { GridPanel, ImportancePanel, SplitPanel } from './evidence';
 import { Promote } from './promote';
 import { Rules } from './rules';
 import { RunTable } from './run_table';
+import { task, useModels } from './use_models';
 import { method_words, TASK_WORDS } from './words';
 
-const task = signal<Task>('nlos_id'),
-  rules_open = signal(false);
+const rules_open = signal(false);
 
-interface Loaded {
-  readonly task: Task;
-  readonly runs: readonly Run[];
-  readonly models: readonly Model[];
-}
-
-/// `path` is what stands behind `#/models/runs/`: a run, and perhaps `?compare=` with two to four of them.
 export function Models({ path }: { path: string | null }) {
-  const [wanted, asked] = (path ?? '').split('?'),
-    compared = (new URLSearchParams(asked).get('compare') ?? '').split(',').filter(Boolean);
-  const [all, set_all] = useState<Loaded | null>(null),
-    [page, set_page] = useState<{ run: Run; numbers: RunNumbers } | null>(null),
-    [problem, set_problem] = useState(''),
+  const desk = useModels(path),
     [dialog, set_dialog] = useState(false),
-    [curl, set_curl] = useState(false),
-    [again, set_again] = useState(0);
-  const reload = (): void => set_again((n) => n + 1);
-  useEffect(() => {
-    document.title = 'Models - anchord';
-  }, []);
-  // A deep link names a run, and the run names its task.
-  useEffect(() => {
-    if (wanted)
-      void run_page(wanted).then(
-        (r) => {
-          if (r) task.value = r.task;
-        },
-        () => undefined,
-      );
-  }, [wanted]);
-  const of = task.value,
-    finished = jobs_version.value,
-    linked = link.value === 'live';
-  useEffect(() => {
-    let gone = false;
-    Promise.all([fetch_runs(of), fetch_models(of)]).then(
-      ([runs, models]) => {
-        if (!gone) {
-          set_all({ task: of, runs, models });
-          set_problem('');
-        }
-      },
-      (e: unknown) => {
-        if (!gone) set_problem(said(e));
-      },
-    );
-    return () => {
-      gone = true;
-    };
-  }, [of, again, finished, linked]);
-  const runs = all?.task === of ? all.runs : [],
-    models = all?.task === of ? all.models : [];
-  const active = models.find((m) => m.active),
-    chosen =
-      runs.find((r) => r.id === wanted) ??
-      runs.find((r) => r.model === active?.id) ??
-      runs.find((r) => r.state === 'succeeded') ??
-      runs[0] ??
-      null;
-  const shown_id = chosen?.id;
-  useEffect(() => {
-    let gone = false;
-    if (!shown_id) {
-      set_page(null);
-      return;
-    }
-    void run_page(shown_id)
-      .then(async (run) => {
-        if (run) {
-          const numbers = await run_numbers(run);
-          if (!gone) set_page({ run, numbers });
-        }
-      })
-      .catch((e: unknown) => {
-        if (!gone) set_problem(said(e));
-      });
-    return () => {
-      gone = true;
-    };
-  }, [shown_id, chosen?.state, chosen?.fraction]);
-  const address = (run: string, ids: readonly string[] = compared): string =>
-    `#/models/runs/${run}${ids.length ? `?compare=${ids.join()}` : ''}`;
-  const compare = (id: string): void => {
-    location.hash = address(
-      chosen?.id ?? id,
-      compared.includes(id) ? compared.filter((c) => c !== id) : [...compared, id],
-    );
-  };
-  const engineer = may('engineer'),
-    shown = page && page.run.id === chosen?.id ? page : null;
-  const undo = async (): Promise<void> => {
-    try {
-      await roll_back(of, idempotency_key());
-      say('Rolled back');
-      reload();
-    } catch (e) {
-      set_problem(said(e));
-    }
-  };
+    [curl, set_curl] = useState(false);
+  const {
+    of,
+    runs,
+    models,
+    active,
+    chosen,
+    shown,
+    compared,
+    compare,
+    address,
+    engineer,
+    problem,
+    set_problem,
+    reload,
+    undo,
+    all,
+  } = desk;
   return (
     <div class="desk" data-testid="models">
       <div class="toolbar">

@@ -56,7 +56,8 @@ export function Promote({
         </button>
       </div>
       <p class="why">
-        It classifies and corrects every range from the next one on. Flights already solved keep what they were solved with.
+        It classifies and corrects every range from the next one on. Flights already solved keep what they were solved
+        with.
       </p>
       {problem && (
         <div class="problem" role="status">

@@ -1,18 +1,8 @@
-/// What every position rests on: where the base stands, in which datum and epoch, how well that is known; and where the antennas sit on the aircraft.
+/// What every position rests on: where the base stands, in which datum and epoch, how well that is known.
 import { useEffect, useState } from 'preact/hooks';
 import { said } from '../../api/client';
 import { devices as fetch_devices, type Device } from '../../api/devices';
-import {
-  change_site,
-  create_site,
-  flights as fetch_flights,
-  kit_of,
-  sites as fetch_sites,
-  type BaseSource,
-  type Flight,
-  type Kit,
-  type Site,
-} from '../../api/site';
+import { change_site, create_site, sites as fetch_sites, type BaseSource, type Site } from '../../api/site';
 import { may } from '../../state/session';
 import { say } from '../../state/store';
 import { accuracy, fixed, latlon, plain } from '../../ui/format';
@@ -300,104 +290,5 @@ function DatumForm({ site, done, close }: { site: Site | null; done: () => void;
         </button>
       </div>
     </form>
-  );
-}
-
-const POINTS: Record<string, string> = {
-  gnss_antenna: 'the GNSS antenna',
-  body: 'the middle of the aircraft',
-  tag_antenna: 'the tag itself',
-};
-/// Where the UWB antennas sit from the point whose track is flown: of the newest flight, with what its kit has learned of it.
-export function LeverPanel() {
-  const [flight, set_flight] = useState<Flight | null | undefined>(undefined),
-    [kit, set_kit] = useState<Kit | null>(null);
-  useEffect(() => {
-    fetch_flights().then(
-      (all) => {
-        const newest = all.find((f) => f.tags.length > 0) ?? all[0] ?? null;
-        set_flight(newest);
-        kit_of(all).then(set_kit, () => undefined);
-      },
-      () => set_flight(null),
-    );
-  }, []);
-  const arm = kit?.next_flight.lever_up_m;
-  const none =
-    flight &&
-    flight.track_point !== 'tag_antenna' &&
-    (flight.tags.length === 0 || flight.tags.every((t) => t.lever_arm_body_m.every((x) => x === 0)));
-  return (
-    <section class="sys-p" data-testid="levers">
-      <div class="hd">
-        <h2>Lever arms</h2>
-        {flight && (
-          <span class="meta">
-            of {flight.name}
-            {flight.kit ? `, kit ${flight.kit}` : ''}
-          </span>
-        )}
-      </div>
-      {flight === null && <p class="why">They come with a flight; there is none yet.</p>}
-      {flight && <p class="why">From {POINTS[flight.track_point] ?? flight.track_point} to each UWB antenna.</p>}
-      {none && (
-        <div class="callout caution" role="status">
-          <b>Not set.</b> The UWB antenna counts as being at {POINTS[flight.track_point]}. Measure the way between the
-          two and give it with the next flight (tags of POST /missions): every centimetre of it is a centimetre of each
-          anchor.
-        </div>
-      )}
-      {flight && flight.tags.length > 0 && (
-        <table class="reads" data-testid="lever-arms">
-          <caption class="sr">Lever arms in metres</caption>
-          <thead>
-            <tr>
-              <th scope="col">Tag</th>
-              <th scope="col" class="num">
-                Forward, m
-              </th>
-              <th scope="col" class="num">
-                Left, m
-              </th>
-              <th scope="col" class="num">
-                Up, m
-              </th>
-              <th scope="col" class="num">
-                Length, m
-              </th>
-            </tr>
-          </thead>
-          <tbody>
-            {flight.tags.map((t) => (
-              <tr key={`${t.tag}${t.antenna}`}>
-                <th scope="row">
-                  {t.tag}
-                  {t.antenna ? `, antenna ${t.antenna}` : ''}
-                </th>
-                {t.lever_arm_body_m.map((x, i) => (
-                  <td key={i} class="num">
-                    {fixed(x, 3)}
-                  </td>
-                ))}
-                <td class="num">{fixed(Math.hypot(...t.lever_arm_body_m), 3)}</td>
-              </tr>
-            ))}
-          </tbody>
-        </table>
-      )}
-      {kit && (
-        <dl class="kv s">
-          <div>
-            <dt>
-              Learned by the kit, {kit.n_flights} flight{kit.n_flights === 1 ? '' : 's'}
-            </dt>
-            <dd>
-              antenna <Q v={fixed(arm ? arm.value * 100 : null, 1)} u="cm" /> higher ±{' '}
-              <Q v={fixed(arm ? arm.sigma * 100 : null, 1)} u="cm" />
-            </dd>
-          </div>
-        </dl>
-      )}
-    </section>
   );
 }

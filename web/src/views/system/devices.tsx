@@ -1,15 +1,8 @@
 /// Devices: those this server drives, each with what is wrong and what to do, then every radio that was heard. Discovery and set-up for who may.
 import { Fragment } from 'preact';
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useState } from 'preact/hooks';
 import { said } from '../../api/client';
-import {
-  act_on_device,
-  devices as fetch_devices,
-  discover,
-  type Device,
-  type Found,
-  type Radio,
-} from '../../api/devices';
+import { act_on_device, discover, type Found, type Radio } from '../../api/devices';
 import { may } from '../../state/session';
 import { say, server_now_us } from '../../state/store';
 import { CopyBox } from '../../ui/copy_box';
@@ -20,76 +13,10 @@ import { DeviceForm } from './device_form';
 import { kind_words, parts_of, type Setup } from './device_setup';
 import { Heard } from './heard';
 import { RadioPanel, RadioWarning } from './radio';
-import {
-  by_count,
-  doing,
-  dropped_words,
-  lately,
-  LATELY_MS,
-  lost_messages,
-  standing,
-  summary,
-  type Lately,
-  type Look,
-  type Standing,
-} from './standing';
+import { useDevices, type Row } from './use_devices';
+import { by_count, doing, dropped_words, lost_messages, summary } from './standing';
 
-export interface Row {
-  readonly d: Device;
-  readonly s: Standing;
-  readonly recent: Lately;
-}
 export type Run = (what: string, work: () => Promise<unknown>, done: string) => Promise<void>;
-
-/// Keeps the last looks at every device: what it dropped lately says more than what it dropped since it was plugged in.
-function useDevices(): {
-  readonly all: readonly Device[] | null;
-  readonly rows: readonly Row[];
-  readonly problem: string;
-  readonly load: () => void;
-} {
-  const [all, set_all] = useState<readonly Device[] | null>(null),
-    [problem, set_problem] = useState(''),
-    looks = useRef(new Map<string, Look[]>());
-  const load = (): void => {
-    fetch_devices().then(
-      (list) => {
-        const at_ms = performance.now();
-        for (const d of list)
-          if (d.id)
-            looks.current.set(d.id, [
-              ...(looks.current.get(d.id) ?? []).filter((l) => at_ms - l.at_ms <= LATELY_MS),
-              { at_ms, counters: d.counters, dropped: d.dropped },
-            ]);
-        set_all(list);
-        set_problem('');
-      },
-      (e: unknown) => set_problem(said(e)),
-    );
-  };
-  useEffect(() => {
-    load();
-    const timer = setInterval(load, 2000);
-    return () => clearInterval(timer);
-  }, []);
-  const rows = (all ?? [])
-    .filter((d) => d.id !== null)
-    .map((d) => {
-      const recent = lately(looks.current.get(d.id!) ?? []);
-      const twin = all!.some(
-        (o) =>
-          o.id !== null &&
-          o.id !== d.id &&
-          o.network_id !== null &&
-          o.network_id === d.network_id &&
-          o.state !== 'lost' &&
-          o.state !== 'off' &&
-          o.state !== 'found',
-      );
-      return { d, recent, s: standing(d, recent, twin) };
-    });
-  return { all, rows, problem, load };
-}
 
 export function DevicesPanel() {
   const { all, rows, problem, load } = useDevices(),

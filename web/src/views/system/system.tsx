@@ -7,8 +7,9 @@ import { system } from '../../state/store';
 import { bytes, fixed, grouped } from '../../ui/format';
 import { Chip } from '../../ui/marks';
 import { AccessPanel, AuditPanel } from './access';
-import { BasePanel, LeverPanel } from './base';
+import { BasePanel } from './base';
 import { DevicesPanel } from './devices';
+import { LeverPanel } from './levers';
 import { FlightsPanel } from './flights';
 import { TimePanel } from './time';
 
