@@ -14,7 +14,7 @@ constexpr double k_read_s = 60;
 
 /// Under its queue_mutex: whether something of it is still to be done.
 bool MissionService::Flight::busy() const {
-  return rebuilding || scheduled || closing || view_wanted || new_clues || !queue.empty();
+  return rebuilding || scheduled || closing || new_clues || !queue.empty();
 }
 
 void MissionService::State::evict() {
@@ -64,6 +64,7 @@ std::optional<MissionService::LiveView> MissionService::State::read(const Missio
   if (auto known = read_before(now)) return known;
   const auto mission = deps.missions.mission(id);
   if (!mission) return std::nullopt;
+  bool whole = false;  // else the store failed on the way
   {
     Flight flight(setup_of(mission.value()));
     start_reading(flight);
@@ -78,8 +79,11 @@ std::optional<MissionService::LiveView> MissionService::State::read(const Missio
         flight.live.adopt(solution.value(), problem.cut, problem.generation);
     }
     now.view = view(flight);
+    const auto& state = flight.live.state();
+    whole = state.n_ranges >= now.n_ranges && state.n_fixes >= now.n_fixes;
   }
   give_back_memory();
+  if (!whole) return std::move(now.view);
   const std::scoped_lock lock(reads_mutex);
   reads.push_back(now);
   if (reads.size() > k_reads) reads.pop_front();

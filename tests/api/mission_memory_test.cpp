@@ -68,7 +68,7 @@ TEST_F(MissionMemory, AFlightThatIsBackFromTheStoreStandsWhereItStood) {
       if (until_s > 60)
         EXPECT_GT(n, n_before);
       else
-        EXPECT_EQ(n, n_before);
+        EXPECT_NEAR(n, n_before, 2) << "the lag of a joint solution moves rows at the ends of the track";
       EXPECT_LT((place(properties) - place(before.at(anchor))).norm(), 0.15) << anchor;
       const auto& truth = made.anchors.at(std::stoul(anchor, nullptr, 16) - 0x6000);
       EXPECT_LT((place(properties) - truth).norm(), 0.3) << anchor;

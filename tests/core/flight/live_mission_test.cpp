@@ -44,7 +44,7 @@ struct Dump {
     number(e.v95_m);
     for (const auto& gate : e.gates) {
       out += ' ' + gate.name + (gate.passed ? "+" : "-");
-      number(gate.value);
+      number(gate.value.value_or(-1));
     }
     for (const auto& [why, n] : e.refused) out += ' ' + why + '=' + std::to_string(n);
   }
@@ -140,8 +140,8 @@ TEST(LiveMission, EveryRangeIsDecidedOnceAndEveryAnchorFoundOnce) {
   for (const auto& event : fly(data)) {
     ranges += std::holds_alternative<flight::RangeDecided>(event);
     found += std::holds_alternative<flight::AnchorFound>(event);
-    if (const auto* changed = std::get_if<flight::AnchorStatusChanged>(&event))
-      if (changed->status == "converged") converged.insert(changed->anchor);
+    const auto* changed = std::get_if<flight::AnchorStatusChanged>(&event);
+    if (changed != nullptr && changed->status == "converged") converged.insert(changed->anchor);
   }
   EXPECT_EQ(ranges, data.ranges.size());
   EXPECT_EQ(found, 4U);
