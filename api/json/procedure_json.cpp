@@ -339,4 +339,35 @@ procedure::FlightClues clues_of(const nlohmann::json& j) {
   return out;
 }
 
+nlohmann::ordered_json flight_upload_json(const FlightUpload& upload) {
+  return {{"what", upload.what},
+          {"plan", to_string(upload.plan)},
+          {"plan_revision", upload.revision},
+          {"items", upload.n_items},
+          {"command", flight_command_json(upload.command)}};
+}
+
+nlohmann::ordered_json checklist_json(const std::vector<ChecklistItem>& items) {
+  auto list = nlohmann::ordered_json::array();
+  bool ready = true;
+  for (const auto& i : items) {
+    ready = ready && i.green();
+    const bool person = !i.ok;
+    list.push_back(
+        {{"id", i.id},
+         {"text", i.text},
+         {"state", i.green() ? "ok"
+                   : person  ? "open"
+                             : "failed"},
+         {"manual", person},
+         {"overridable", i.overridable},
+         {"detail", i.detail},
+         {"overridden_by", i.overridden_by.empty() ? nlohmann::ordered_json(nullptr)
+                                                   : nlohmann::ordered_json(i.overridden_by)},
+         {"override_reason", i.override_reason.empty() ? nlohmann::ordered_json(nullptr)
+                                                       : nlohmann::ordered_json(i.override_reason)}});
+  }
+  return {{"ready", ready}, {"items", std::move(list)}};
+}
+
 }  // namespace anchord::api

@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "core/base/ids.hpp"
+#include "core/flight/checklist.hpp"
+#include "core/flight/command.hpp"
 #include "core/geo/enu.hpp"
 #include "core/planning/local_plan.hpp"
 #include "core/ports/drone.hpp"
@@ -14,17 +16,14 @@
 
 namespace anchord::api {
 
-/// A command of the operator or of the procedure, and what became of it.
-struct FlightCommand {
-  std::uint64_t number{};
-  std::string action;  ///< start, hold, resume, skip, return, land, abort, or go_to of the procedure
-  std::string state;   ///< sent, accepted, refused, unconfirmed
-  std::string text, by;
-  UtcTime at{};
-  MissionId mission{};
-};
+using flight::ChecklistItem;
+using flight::FlightCommand;
+using flight::FlightUpload;
+
 nlohmann::ordered_json drone_json(const DroneStatus& drone);
 nlohmann::ordered_json flight_command_json(const FlightCommand& command);
+nlohmann::ordered_json flight_upload_json(const FlightUpload& upload);
+nlohmann::ordered_json checklist_json(const std::vector<ChecklistItem>& items);
 
 /// What stands beside the machine's state in the message of topic `procedure`.
 struct ProcedureView {

@@ -4,21 +4,38 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
-#include "api/application.hpp"
-#include "api/live/hub.hpp"
 #include "api/services/event_log.hpp"
 #include "api/services/flight_state.hpp"
-#include "api/services/mission_service.hpp"
-#include "core/base/to_wire.hpp"
 #include "core/localize/live_flight.hpp"
+#include "core/ports/drone.hpp"
 #include "core/ports/plan_store.hpp"
 
 namespace anchord::api {
+namespace {
 
-using procedure::Event;
+constexpr std::size_t k_checks = 64;
+
+flight::Holder holder_of(const Principal& who) { return {who.token_id, who.name}; }
+
+}  // namespace
 
 FlightService::FlightService(Deps deps) : state_(std::make_unique<State>(std::move(deps))) {}
 FlightService::~FlightService() { stop(); }
+
+flight::Now FlightService::State::now() const {
+  flight::Now out;
+  out.utc = deps.clock.now();
+  out.steady = (deps.steady != nullptr ? *deps.steady : system_steady_clock()).now();
+  out.s = deps.now_s
+              ? deps.now_s()
+              : std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  return out;
+}
+
+void FlightService::State::tell_events() {
+  for (auto& told : operations.take_events())
+    deps.events.add(std::move(told.level), std::move(told.code), std::move(told.text), told.mission);
+}
 
 void FlightService::start() {
   if (!guarded("flight before the restart", [this] { state_->recover(); })) {
@@ -47,11 +64,7 @@ void FlightService::stop() {
     if (state_->stopping) return;
     state_->stopping = true;
     // Whoever stops the server in flight leaves an aircraft that stands, not one that goes on.
-    // One that lands, or that the pilot has, is left to it.
-    if (state_->flight && state_->flight->flying() && !state_->flight->manual &&
-        state_->deps.drone != nullptr && !state_->flight->control.taken_over() &&
-        state_->flight->control.engine().state().step != procedure::Step::landing)
-      state_->deps.drone->hold();
+    state_->operations.halt();
   }
   state_->wake.notify_all();
   state_->changed.notify_all();
@@ -66,26 +79,35 @@ void FlightService::step() {
   bool deciding = false;
   {
     const std::scoped_lock lock(s.mutex);
-    if (s.flight) {
-      mission = s.flight->mission;
-      deciding = s.flight->control.engine().state().step == procedure::Step::find_next_point;
+    if (const auto& f = s.operations.flight()) {
+      mission = f->mission;
+      deciding = f->control.engine().state().step == procedure::Step::find_next_point;
     }
   }
   std::optional<MissionService::LiveView> live;
   if (deciding) live = s.deps.missions.live_at_hand(*mission);
+  std::optional<flight::Operations::Estimates> estimates;
+  if (live && live->origin) estimates = {*live->origin, std::move(live->estimates)};
   std::string keep;
   bool keeps = false;
   std::optional<procedure::FlightClues> clues;
   {
     const std::scoped_lock lock(s.mutex);
-    s.round(live ? &*live : nullptr);
-    if (s.flight) {
-      if (!s.flight->manual) s.flight->aircraft = s.deps.drone->status().identity;
-      keeps = s.flight->to_keep(keep);
-    }
-    if (s.flight && s.flight->clues_told != s.flight->control.engine().clues_version()) {
-      s.flight->clues_told = s.flight->control.engine().clues_version();
-      clues = s.flight->clues();
+    const auto now = s.now();
+    if (s.operations.flying())
+      s.checks_apart.note(now.s);
+    else
+      s.checks_apart.pause();
+    s.operations.round(now, estimates, live.has_value());
+    s.tell_events();
+    if (const auto& f = s.operations.flight()) {
+      mission = f->mission;  // one that began meanwhile too
+      if (s.last.flight != s.operations.n_flights()) s.last = {.flight = s.operations.n_flights()};
+      keeps = s.to_keep(keep);
+      if (const auto version = f->control.engine().clues_version(); s.last.clues_told != version) {
+        s.last.clues_told = version;
+        clues = f->clues();
+      }
     }
     s.publish();
   }
@@ -96,64 +118,72 @@ void FlightService::step() {
 
 void FlightService::on_fix(const Fix& fix) {
   const std::scoped_lock lock(state_->mutex);
-  state_->hear(fix);
+  state_->operations.fix(state_->now(), fix);
 }
 
 void FlightService::on_range(const MissionId& mission, const RangeResult& result) {
   const std::scoped_lock lock(state_->mutex);
-  state_->hear(mission, result);
+  state_->operations.range(state_->now(), mission, result);
 }
 
 Result<Lease> FlightService::take_control(const MissionId& mission, const Principal& who, bool by_force) {
   BOOST_OUTCOME_TRYV(state_->deps.missions.mission(mission));
   const std::scoped_lock lock(state_->mutex);
-  const auto now = state_->moment();
-  const auto before = state_->lease.holder(now);
-  // Who has the aircraft of a mission that is not being flown keeps nobody from today's.
-  const bool idle =
-      before && before->mission != mission &&
-      !(state_->flight && state_->flight->flying() && state_->flight->mission == before->mission);
-  auto lease = state_->lease.take(mission, who, now, by_force || idle);
-  if (lease) {
-    state_->deps.events.add(before ? "warning" : "info", "control.taken",
-                            who.name + (before ? " took control from " + before->name : " has control"),
-                            mission);
-    state_->publish_soon();
-  }
+  const auto now = state_->now();
+  auto lease = state_->operations.take_control(now, mission, holder_of(who), by_force,
+                                               to_string(make_uuid_v7(now.utc)));
+  state_->tell_events();
   return lease;
 }
 
 Result<Lease> FlightService::renew_control(const MissionId& mission, const std::string& key,
                                            const Principal& who) {
   const std::scoped_lock lock(state_->mutex);
-  return state_->lease.renew(mission, key, who, state_->moment());
+  return state_->operations.renew_control(state_->now(), mission, key, holder_of(who));
 }
 
 Result<void> FlightService::release_control(const MissionId& mission, const std::string& key,
                                             const Principal& who) {
   const std::scoped_lock lock(state_->mutex);
-  BOOST_OUTCOME_TRYV(state_->lease.release(mission, key, who, state_->moment()));
-  state_->deps.events.add("info", "control.released", who.name + " gave control back", mission);
-  state_->publish_soon();
-  return boost::outcome_v2::success();
+  auto released = state_->operations.release_control(state_->now(), mission, key, holder_of(who));
+  state_->tell_events();
+  return released;
 }
 
 std::optional<Lease> FlightService::control() {
   const std::scoped_lock lock(state_->mutex);
-  return state_->lease.holder(state_->moment());
+  return state_->operations.control(state_->now());
 }
 
 bool FlightService::flies(const MissionId& mission) {
   const std::scoped_lock lock(state_->mutex);
-  const auto* flight = state_->flight_of(mission);
-  return flight != nullptr && flight->flying();
+  const auto* f = state_->operations.flight_of(mission);
+  return f != nullptr && f->flying();
 }
 
 std::optional<MissionId> FlightService::flown_with(const PlanId& plan) {
   const std::scoped_lock lock(state_->mutex);
-  const auto& flight = state_->flight;
-  return flight && flight->flying() && flight->plan.id == plan ? std::optional(flight->mission)
-                                                               : std::nullopt;
+  const auto& f = state_->operations.flight();
+  return f && f->flying() && f->plan.id == plan ? std::optional(f->mission) : std::nullopt;
+}
+
+flight::Groundwork FlightService::State::groundwork(const Plan* plan) {
+  const auto storage = deps.storage ? deps.storage() : StorageStatus{};
+  flight::Groundwork ground{plan, nullptr, storage.writable, static_cast<double>(storage.disk_free_bytes)};
+  if (plan == nullptr) return ground;
+  {
+    const std::scoped_lock lock(checks_mutex);
+    for (const auto& known : checks) {
+      if (known.plan == plan->id && known.revision == plan->version) ground.check = known.check;
+    }
+  }
+  if (ground.check) return ground;
+  if (auto checked = planning::check_plan(*plan))
+    ground.check = std::make_shared<const planning::PlanCheck>(std::move(checked).value());
+  const std::scoped_lock lock(checks_mutex);
+  checks.push_back({plan->id, plan->version, ground.check});
+  if (checks.size() > k_checks) checks.pop_front();
+  return ground;
 }
 
 Result<FlightCommand> FlightService::act(const MissionId& mission, const Order& order, const Principal& who) {
@@ -164,12 +194,15 @@ Result<FlightCommand> FlightService::act(const MissionId& mission, const Order& 
     BOOST_OUTCOME_TRY(const auto stored, state_->deps.plans.plan(*order.plan));
     plan = plan_of(stored);
   }
-  std::optional<State::Groundwork> ground;
+  std::optional<flight::Groundwork> ground;
   if (plan) ground = state_->groundwork(&*plan);
   const std::scoped_lock lock(state_->mutex);
-  BOOST_OUTCOME_TRYV(state_->lease.renew(mission, order.lease, who, state_->moment()));
-  auto given =
-      ground ? state_->begin(record, *ground, order.manual, who) : state_->obey(mission, order.action, who);
+  auto& operations = state_->operations;
+  const auto now = state_->now();
+  BOOST_OUTCOME_TRYV(operations.renew_control(now, mission, order.lease, holder_of(who)));
+  auto given = ground ? operations.begin(now, record, *ground, order.manual, who.name)
+                      : operations.act(now, mission, order.action, who.name);
+  state_->tell_events();
   state_->changed.notify_all();
   return given;
 }
@@ -181,35 +214,25 @@ Result<FlightCommand> FlightService::upload(const MissionId& mission, const std:
   BOOST_OUTCOME_TRY(const auto stored, state_->deps.plans.plan(plan_id));
   const Plan plan = plan_of(stored);
   const std::scoped_lock lock(state_->mutex);
-  BOOST_OUTCOME_TRYV(state_->lease.renew(mission, lease, who, state_->moment()));
-  return state_->upload(mission, plan, what, who.name);
+  const auto now = state_->now();
+  BOOST_OUTCOME_TRYV(state_->operations.renew_control(now, mission, lease, holder_of(who)));
+  return state_->operations.upload(now, mission, plan, what, who.name);
 }
 
 Result<DroneStatus> FlightService::change_aircraft(const MissionId& mission, const std::string& lease,
                                                    const std::string& sender, const Principal& who) {
   BOOST_OUTCOME_TRYV(state_->deps.missions.mission(mission));
   const std::scoped_lock lock(state_->mutex);
-  BOOST_OUTCOME_TRYV(state_->lease.renew(mission, lease, who, state_->moment()));
-  auto* drone = state_->deps.drone;
-  if (drone == nullptr)
-    return make_error(Errc::invalid_argument, "this server talks to no autopilot (drone.address)");
-  const auto before = drone->status();
-  if (before.connected && (before.in_air || (state_->flight && state_->flight->flying())))
-    return make_error(Errc::invalid_argument,
-                      "the aircraft in the air answers; land it before another one takes the link");
-  drone->change_peer(sender);
-  state_->deps.events.add(
-      "warning", "drone.changed",
-      who.name + (sender.empty() ? ": the next autopilot whose heartbeat is received is the aircraft"
-                                 : ": the autopilot at " + sender + " is the aircraft"),
-      mission);
-  return drone->status();
+  BOOST_OUTCOME_TRYV(state_->operations.renew_control(state_->now(), mission, lease, holder_of(who)));
+  auto changed = state_->operations.change_aircraft(mission, sender, who.name);
+  state_->tell_events();
+  return changed;
 }
 
 std::vector<FlightUpload> FlightService::uploads(const MissionId& mission) {
   const std::scoped_lock lock(state_->mutex);
   std::vector<FlightUpload> out;
-  for (const auto& u : state_->uploads) {
+  for (const auto& u : state_->operations.uploads()) {
     if (u.mission == mission) out.push_back(u);
   }
   return out;
@@ -218,9 +241,10 @@ std::vector<FlightUpload> FlightService::uploads(const MissionId& mission) {
 FlightCommand FlightService::settled(FlightCommand command, double wait_s) {
   std::unique_lock lock(state_->mutex);
   const auto latest = [&] {
-    if (const auto* found = state_->find(command.number)) command = *found;
+    const auto& operations = state_->operations;
+    if (const auto* found = operations.command(command.number)) command = *found;
     // A newer command ends the wait: who waits holds a thread that the next command may need.
-    return command.state != "sent" || state_->stopping || state_->newest_by_person > command.number;
+    return command.state != "sent" || state_->stopping || operations.newest_by_person() > command.number;
   };
   state_->changed.wait_for(lock, std::chrono::duration<double>(wait_s), latest);
   return command;
@@ -236,69 +260,26 @@ std::vector<ChecklistItem> FlightService::checklist(const MissionId& mission,
   }
   const auto ground = state_->groundwork(plan ? &*plan : nullptr);
   const std::scoped_lock lock(state_->mutex);
-  if (plan && (who.has(Role::op) || who.has(Role::admin))) state_->preparing.emplace(mission, *plan);
-  return state_->checklist(record ? &record.value() : nullptr, mission, ground,
-                           state_->deps.drone == nullptr);
+  if (plan && (who.has(Role::op) || who.has(Role::admin))) state_->operations.prepare(mission, *plan);
+  return state_->operations.checklist(state_->now(), record ? &record.value() : nullptr, mission, ground,
+                                      state_->deps.drone == nullptr);
 }
 
 Result<void> FlightService::override_item(const MissionId& mission, const std::string& item,
                                           const std::string& reason, const Principal& who) {
   BOOST_OUTCOME_TRYV(state_->deps.missions.mission(mission));
-  if (!is_checklist_item(item)) return make_error(Errc::not_found, "the checklist has no item " + item);
+  if (!flight::is_checklist_item(item))
+    return make_error(Errc::not_found, "the checklist has no item " + item);
   const auto ground = state_->groundwork(nullptr);
   const std::scoped_lock lock(state_->mutex);
-  for (const auto& one : state_->checklist(nullptr, mission, ground, state_->deps.drone == nullptr)) {
-    if (one.id == item && !one.overridable)
-      return make_error(Errc::invalid_argument, item + " cannot be overridden: " + one.text);
-  }
-  state_->said[mission][item] = {who.name, reason};
-  state_->deps.events.add("info", "checklist." + item, who.name + ": " + reason, mission);
-  return boost::outcome_v2::success();
-}
-
-std::string FlightService::procedure_text(const MissionId& mission) {
-  const std::scoped_lock lock(state_->mutex);
-  const auto* flight = state_->flight_of(mission);
-  return flight == nullptr ? std::string{} : to_wire(state_->procedure(*flight));
-}
-
-std::string FlightService::grid_text(const MissionId& mission) {
-  const std::scoped_lock lock(state_->mutex);
-  const auto* f = state_->flight_of(mission);
-  return f == nullptr
-             ? std::string{}
-             : to_wire(grid_json(mission, state_->deps.clock.now().us(), f->control.engine(), f->frame));
-}
-
-std::vector<std::string> FlightService::turn_texts(const MissionId& mission) {
-  const std::scoped_lock lock(state_->mutex);
-  std::vector<std::string> out;
-  if (const auto* f = state_->flight_of(mission)) {
-    const bool running = f->control.engine().state().step == procedure::Step::turn;
-    for (const auto& [anchor, clues] : f->control.engine().clues()) {
-      if (!clues.turn.empty())
-        out.push_back(to_wire(turn_json(mission, anchor, state_->deps.clock.now().us(), clues, running)));
-    }
-  }
-  return out;
-}
-
-std::vector<std::string> FlightService::height_texts(const MissionId& mission) {
-  const std::scoped_lock lock(state_->mutex);
-  std::vector<std::string> out;
-  if (const auto* f = state_->flight_of(mission)) {
-    const bool running = f->control.engine().state().step == procedure::Step::height_search;
-    for (const auto& [anchor, clues] : f->control.engine().clues()) {
-      if (!clues.heights.empty())
-        out.push_back(to_wire(height_json(mission, anchor, state_->deps.clock.now().us(), clues, running)));
-    }
-  }
-  return out;
+  auto done = state_->operations.override_item(state_->now(), mission, item, reason, who.name, ground);
+  state_->tell_events();
+  return done;
 }
 
 std::vector<std::pair<std::string_view, std::string>> FlightService::alarms() {
   const std::scoped_lock lock(state_->mutex);
-  return state_->alarms();
+  return state_->operations.alarms();
 }
 
 std::string FlightService::metrics() const {

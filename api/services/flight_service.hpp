@@ -6,11 +6,14 @@
 #include <string>
 #include <vector>
 
-#include "api/json/procedure_json.hpp"
-#include "api/services/control_lease.hpp"
-#include "api/services/flight_checklist.hpp"
+#include "api/http/message.hpp"
 #include "api/services/mission_observer.hpp"
 #include "core/base/result.hpp"
+#include "core/base/steady.hpp"
+#include "core/base/time.hpp"
+#include "core/flight/checklist.hpp"
+#include "core/flight/command.hpp"
+#include "core/flight/control_lease.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/plan.hpp"
 
@@ -27,17 +30,10 @@ class LateWriter;
 class MissionService;
 struct StorageStatus;
 
-/// A list given to the aircraft to keep, and what became of it.
-struct FlightUpload {
-  MissionId mission{};
-  PlanId plan{};
-  std::uint64_t revision{};
-  std::string what;  ///< fence, route
-  std::size_t n_items{};
-  double begun_s{};
-  FlightCommand command;
-};
-nlohmann::ordered_json flight_upload_json(const FlightUpload& upload);
+using flight::ChecklistItem;
+using flight::FlightCommand;
+using flight::FlightUpload;
+using flight::Lease;
 
 /// The one calibration flight that may be in the air: lease, checklist, procedure, commands, restart.
 ///

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,7 +9,7 @@
 #include "core/types/fix.hpp"
 #include "core/types/mission.hpp"
 
-namespace anchord::api {
+namespace anchord::flight {
 
 /// One item before take-off. `ok` absent: a person must say so.
 struct ChecklistItem {
@@ -41,6 +40,5 @@ struct ChecklistFacts {
 /// Every item, in the order of the screen. Start is blocked until all are green.
 std::vector<ChecklistItem> make_checklist(const ChecklistFacts& facts);
 bool is_checklist_item(std::string_view id);
-nlohmann::ordered_json checklist_json(const std::vector<ChecklistItem>& items);
 
-}  // namespace anchord::api
+}  // namespace anchord::flight

@@ -1,12 +1,11 @@
 // What the aircraft's own autopilot is given to keep: the fence, before every flight, and the route.
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
-#include "api/services/event_log.hpp"
-#include "api/services/flight_parameters.hpp"
-#include "api/services/flight_state.hpp"
+#include "core/flight/operations.hpp"
+#include "core/flight/parameters.hpp"
+#include "core/ports/drone.hpp"
 
-namespace anchord::api {
+namespace anchord::flight {
 namespace {
 
 constexpr double k_retry_s = 10;
@@ -15,23 +14,15 @@ bool has_fence(const Plan& plan) { return !plan.fence.empty() || !plan.no_fly.em
 
 }  // namespace
 
-nlohmann::ordered_json flight_upload_json(const FlightUpload& upload) {
-  return {{"what", upload.what},
-          {"plan", to_string(upload.plan)},
-          {"plan_revision", upload.revision},
-          {"items", upload.n_items},
-          {"command", flight_command_json(upload.command)}};
-}
-
-Result<FlightCommand> FlightService::State::upload(const MissionId& mission, const Plan& plan,
-                                                   const std::string& what, const std::string& who) {
+Result<FlightCommand> Operations::upload(const Now& now, const MissionId& mission, const Plan& plan,
+                                         const std::string& what, const std::string& who) {
   const auto refuse = [](const char* why) { return make_error(Errc::invalid_argument, why); };
-  if (deps.drone == nullptr) return refuse("there is no aircraft to command: nothing keeps a list");
-  const auto status = deps.drone->status();
+  if (drone_ == nullptr) return refuse("there is no aircraft to command: nothing keeps a list");
+  const auto status = drone_->status();
   if (!status.connected) return refuse("no heartbeat of the aircraft is received: check its link");
-  if ((flight && flight->flying()) || status.in_air)
+  if (flying() || status.in_air)
     return refuse("the aircraft is in the air: lists are given to it on the ground");
-  FlightUpload up{mission, plan.id, plan.version, what, 0, now_s(), {}};
+  FlightUpload up{mission, plan.id, plan.version, what, 0, now.s, {}};
   std::uint64_t sent = 0;
   if (what == "fence") {
     if (!has_fence(plan)) return refuse("the plan has neither a fence nor a no-fly area");
@@ -39,31 +30,31 @@ Result<FlightCommand> FlightService::State::upload(const MissionId& mission, con
     if (plan.outline.size() >= 3) fence.outside.push_back(plan.outline);  // the building itself
     up.n_items = plan.fence.size();
     for (const auto& area : fence.outside) up.n_items += area.size();
-    sent = deps.drone->upload_fence(fence);
+    sent = drone_->upload_fence(fence);
   } else {
     if (plan.waypoints.empty()) return refuse("the plan has no waypoint");
     // Heights of a plan are above its ground; a plan without an origin has it where the aircraft stands.
     double ground_above_home_m = 0;
-    const auto h = heard.find(mission);
-    if (plan.origin && h != heard.end() && h->second.fix)
-      ground_above_home_m = plan.origin->height_m - h->second.fix->position.height_m;
+    const auto r = received_.find(mission);
+    if (plan.origin && r != received_.end() && r->second.fix)
+      ground_above_home_m = plan.origin->height_m - r->second.fix->position.height_m;
     std::vector<RoutePoint> route;
     for (const auto& w : plan.waypoints)
       route.push_back({w.at, w.height_m + ground_above_home_m, w.heading_deg,
                        w.measure ? w.dwell_s.value_or(plan.settings.dwell_s) : 0});
     up.n_items = route.size();
-    sent = deps.drone->upload_route(route);
+    sent = drone_->upload_route(route);
   }
-  up.command = note(mission, "upload_" + what, who, "sent");
-  by_drone_number[sent] = up.command.number;
-  std::erase_if(uploads, [&](const FlightUpload& u) { return u.what == what; });
-  uploads.push_back(up);
+  up.command = note(now, mission, "upload_" + what, who, "sent");
+  by_drone_number_[sent] = up.command.number;
+  std::erase_if(uploads_, [&](const FlightUpload& u) { return u.what == what; });
+  uploads_.push_back(up);
   return up.command;
 }
 
 /// The newest of its kind, for this very plan.
-const FlightUpload* FlightService::State::uploaded(const Plan& plan, const std::string& what) const {
-  for (const auto& u : uploads) {
+const FlightUpload* Operations::uploaded(const Plan& plan, const std::string& what) const {
+  for (const auto& u : uploads_) {
     if (u.what == what && u.plan == plan.id && u.revision == plan.version) return &u;
   }
   return nullptr;
@@ -71,26 +62,26 @@ const FlightUpload* FlightService::State::uploaded(const Plan& plan, const std::
 
 /// An operator who looks at the checklist, and lets nobody else's flight be disturbed, means to fly: the
 /// fence goes up by itself, and again ten seconds after it was not confirmed.
-void FlightService::State::give_fence() {
-  if (deps.drone != nullptr && !(flight && flight->flying())) {
-    const auto status = deps.drone->status();
-    if (status.connected && !status.in_air) deps.drone->ask_parameters(flight_parameters(status.autopilot));
+void Operations::give_fence(const Now& now) {
+  if (drone_ != nullptr && !flying()) {
+    const auto status = drone_->status();
+    if (status.connected && !status.in_air) drone_->ask_parameters(flight_parameters(status.autopilot));
   }
-  if (!preparing || deps.drone == nullptr || (flight && flight->flying())) return;
-  const auto holder = lease.holder(moment());
-  if (holder && holder->mission != preparing->first) return preparing.reset();
-  const Plan& plan = preparing->second;
+  if (!preparing_ || drone_ == nullptr || flying()) return;
+  const auto holder = lease_.holder(now);
+  if (holder && holder->mission != preparing_->first) return preparing_.reset();
+  const Plan& plan = preparing_->second;
   if (!has_fence(plan)) return;
   if (const auto* up = uploaded(plan, "fence")) {
-    const bool again = up->command.state == "unconfirmed" && now_s() - up->begun_s > k_retry_s;
+    const bool again = up->command.state == "unconfirmed" && now.s - up->begun_s > k_retry_s;
     if (!again) return;
   }
-  const auto status = deps.drone->status();
+  const auto status = drone_->status();
   if (status.connected && !status.in_air)
-    (void)upload(preparing->first, plan, "fence", "checklist").has_value();
+    (void)upload(now, preparing_->first, plan, "fence", "checklist").has_value();
 }
 
-std::optional<ChecklistItem> FlightService::State::fence_item(const Plan& plan) const {
+std::optional<ChecklistItem> Operations::fence_item(const Plan& plan) const {
   if (!has_fence(plan)) return std::nullopt;
   ChecklistItem item{"fence", "The aircraft keeps the fence itself", "", false, true, {}, {}};
   const auto* up = uploaded(plan, "fence");
@@ -105,4 +96,4 @@ std::optional<ChecklistItem> FlightService::State::fence_item(const Plan& plan) 
   return item;
 }
 
-}  // namespace anchord::api
+}  // namespace anchord::flight

@@ -1,13 +1,12 @@
-#include "api/services/flight_checklist.hpp"
+#include "core/flight/checklist.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 
-#include "api/services/flight_parameters.hpp"
+#include "core/flight/parameters.hpp"
 
-namespace anchord::api {
+namespace anchord::flight {
 namespace {
 
 constexpr std::array<std::pair<std::string_view, std::string_view>, 4> k_by_a_person{
@@ -116,27 +115,4 @@ bool is_checklist_item(std::string_view id) {
          std::find(k_by_itself.begin(), k_by_itself.end(), id) != k_by_itself.end();
 }
 
-nlohmann::ordered_json checklist_json(const std::vector<ChecklistItem>& items) {
-  auto list = nlohmann::ordered_json::array();
-  bool ready = true;
-  for (const auto& i : items) {
-    ready = ready && i.green();
-    const bool person = !i.ok;
-    list.push_back(
-        {{"id", i.id},
-         {"text", i.text},
-         {"state", i.green() ? "ok"
-                   : person  ? "open"
-                             : "failed"},
-         {"manual", person},
-         {"overridable", i.overridable},
-         {"detail", i.detail},
-         {"overridden_by", i.overridden_by.empty() ? nlohmann::ordered_json(nullptr)
-                                                   : nlohmann::ordered_json(i.overridden_by)},
-         {"override_reason", i.override_reason.empty() ? nlohmann::ordered_json(nullptr)
-                                                       : nlohmann::ordered_json(i.override_reason)}});
-  }
-  return {{"ready", ready}, {"items", std::move(list)}};
-}
-
-}  // namespace anchord::api
+}  // namespace anchord::flight

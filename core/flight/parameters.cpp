@@ -1,11 +1,11 @@
-#include "api/services/flight_parameters.hpp"
+#include "core/flight/parameters.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cstdio>
 #include <span>
 
-namespace anchord::api {
+namespace anchord::flight {
 namespace {
 
 struct Rule {
@@ -73,4 +73,4 @@ ParameterCheck check_parameters(const DroneStatus& drone) {
   return out;
 }
 
-}  // namespace anchord::api
+}  // namespace anchord::flight

@@ -3,13 +3,12 @@
 #include <optional>
 #include <string>
 
-#include "api/http/message.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
 #include "core/base/steady.hpp"
 #include "core/base/time.hpp"
 
-namespace anchord::api {
+namespace anchord::flight {
 
 /// Who has the aircraft. Many may watch, one may command.
 struct Lease {
@@ -19,6 +18,10 @@ struct Lease {
   UtcTime since{};
   UtcTime until{};            ///< for people: by the system clock as it stood when this was read
   SteadyTime until_steady{};  ///< what counts
+};
+/// Who asks.
+struct Holder {
+  std::string token_id, name;
 };
 /// Now, for a stamp and for a duration.
 struct Moment {
@@ -32,12 +35,13 @@ class ControlLease {
  public:
   static constexpr std::int64_t k_lasts_ns = 60'000'000'000;
 
-  /// conflict, naming the holder, while somebody else has it; `by_force` takes it from them.
-  Result<Lease> take(const MissionId& mission, const Principal& who, const Moment& now, bool by_force);
+  /// conflict, naming the holder, while somebody else has it; `by_force` takes it from them. `key`: a fresh
+  /// one.
+  Result<Lease> take(const MissionId& mission, const Holder& who, const Moment& now, bool by_force,
+                     std::string key);
   /// Longer by a minute. conflict when the key is not the holder's, or the lease has ended.
-  Result<Lease> renew(const MissionId& mission, const std::string& key, const Principal& who,
-                      const Moment& now);
-  Result<void> release(const MissionId& mission, const std::string& key, const Principal& who,
+  Result<Lease> renew(const MissionId& mission, const std::string& key, const Holder& who, const Moment& now);
+  Result<void> release(const MissionId& mission, const std::string& key, const Holder& who,
                        const Moment& now);
   std::optional<Lease> holder(const Moment& now) const;
   /// True once, when a lease has run out.
@@ -47,4 +51,4 @@ class ControlLease {
   std::optional<Lease> lease_;
 };
 
-}  // namespace anchord::api
+}  // namespace anchord::flight

@@ -1,6 +1,6 @@
-#include "api/services/control_lease.hpp"
+#include "core/flight/control_lease.hpp"
 
-namespace anchord::api {
+namespace anchord::flight {
 
 std::optional<Lease> ControlLease::holder(const Moment& now) const {
   if (!lease_ || !(now.steady < lease_->until_steady)) return std::nullopt;
@@ -15,16 +15,15 @@ bool ControlLease::just_ended(const Moment& now) {
   return true;
 }
 
-Result<Lease> ControlLease::take(const MissionId& mission, const Principal& who, const Moment& now,
-                                 bool by_force) {
+Result<Lease> ControlLease::take(const MissionId& mission, const Holder& who, const Moment& now,
+                                 bool by_force, std::string key) {
   if (const auto held = holder(now); held && !by_force)
     return make_error(Errc::conflict, held->name + " has control since " + to_rfc3339(held->since));
-  lease_ = Lease{mission, to_string(make_uuid_v7(now.utc)), who.token_id, who.name, now.utc,
-                 {},      later(now.steady, k_lasts_ns)};
+  lease_ = Lease{mission, std::move(key), who.token_id, who.name, now.utc, {}, later(now.steady, k_lasts_ns)};
   return *holder(now);
 }
 
-Result<Lease> ControlLease::renew(const MissionId& mission, const std::string& key, const Principal& who,
+Result<Lease> ControlLease::renew(const MissionId& mission, const std::string& key, const Holder& who,
                                   const Moment& now) {
   const auto held = holder(now);
   if (!held) return make_error(Errc::conflict, "nobody has control; take it first");
@@ -34,11 +33,11 @@ Result<Lease> ControlLease::renew(const MissionId& mission, const std::string& k
   return *holder(now);
 }
 
-Result<void> ControlLease::release(const MissionId& mission, const std::string& key, const Principal& who,
+Result<void> ControlLease::release(const MissionId& mission, const std::string& key, const Holder& who,
                                    const Moment& now) {
   BOOST_OUTCOME_TRYV(renew(mission, key, who, now));
   lease_.reset();
   return boost::outcome_v2::success();
 }
 
-}  // namespace anchord::api
+}  // namespace anchord::flight

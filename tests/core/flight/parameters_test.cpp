@@ -1,12 +1,12 @@
 // Which settings of the autopilot pass the checklist. Values: ArduPilot AP_BattMonitor_Params.cpp,
 // AC_Fence.cpp, Parameters.cpp (Copter); PX4 commander_params.c, geofence_params.c.
-#include "api/services/flight_parameters.hpp"
+#include "core/flight/parameters.hpp"
 
 #include <gtest/gtest.h>
 
 #include <set>
 
-namespace anchord::api {
+namespace anchord::flight {
 namespace {
 
 /// Of 0 to 7 those that are found good, everything else set as it should be.
@@ -43,4 +43,4 @@ TEST(FlightParameters, NoFailsafeThatStopsTheMotorsInTheAirIsFoundGood) {
 }
 
 }  // namespace
-}  // namespace anchord::api
+}  // namespace anchord::flight

@@ -6,7 +6,7 @@
 
 #include "core/ports/drone.hpp"
 
-namespace anchord::api {
+namespace anchord::flight {
 
 /// Names of the autopilot's parameters that a flight counts on; docs/flying.md has them with their reasons.
 std::vector<std::string> flight_parameters(std::string_view autopilot);
@@ -17,4 +17,4 @@ struct ParameterCheck {
 };
 ParameterCheck check_parameters(const DroneStatus& drone);
 
-}  // namespace anchord::api
+}  // namespace anchord::flight

@@ -1,0 +1,218 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "core/flight/checklist.hpp"
+#include "core/flight/command.hpp"
+#include "core/flight/control_lease.hpp"
+#include "core/flight/measured_time.hpp"
+#include "core/geo/enu.hpp"
+#include "core/planning/local_plan.hpp"
+#include "core/ports/drone.hpp"
+#include "core/procedure/flight_clues.hpp"
+#include "core/procedure/flight_control.hpp"
+#include "core/types/fix.hpp"
+#include "core/types/mission.hpp"
+#include "core/types/plan.hpp"
+
+namespace anchord {
+struct RangeResult;
+}  // namespace anchord
+
+namespace anchord::flight {
+
+/// Alarms of procedure::watch(); the alarm board tells of their coming and going.
+inline constexpr std::array<std::string_view, 5> k_flight_alarms{
+    "drone.battery", "fence.breach", "drone.link", "rtk.lost", "position.disagree"};
+
+/// Now, as whoever drives a flight sees it: `s` is what the procedure runs on.
+struct Now : Moment {
+  double s{};
+};
+
+/// A line of the event log.
+struct Told {
+  std::string level;  ///< info, warning, critical
+  std::string code;
+  std::string text;
+  std::optional<MissionId> mission{};
+};
+
+/// One flight, in the air or just landed.
+struct ActiveFlight {
+  ActiveFlight(const MissionId& m, Plan p, bool by_pilot, EnuFrame f, Eigen::Vector3d home,
+               procedure::FlightControl c)
+      : mission(m),
+        plan(std::move(p)),
+        manual(by_pilot),
+        frame(std::move(f)),
+        home_m(std::move(home)),
+        control(std::move(c)) {}
+
+  bool flying() const;
+  std::string status() const;  ///< ready, running, hold, return, landing, done, aborted
+  /// Why the work is over; empty while it goes on.
+  std::string ended() const;
+  /// What is known of the anchors' sides: of before a restart, and of the engine since.
+  procedure::FlightClues clues() const {
+    return procedure::merged(clues_before, procedure::flight_clues(control.engine().clues(), frame));
+  }
+
+  MissionId mission;
+  Plan plan;
+  bool manual{false};
+  DroneIdentity aircraft;  ///< that it was begun with
+  EnuFrame frame;          ///< of the plan, its ground at height 0
+  Eigen::Vector3d home_m;
+  procedure::FlightControl control;
+  procedure::FlightClues clues_before;
+  std::string aborted;  ///< who gave the aircraft back to the pilot; empty: nobody
+  double aborted_s{0};
+  std::optional<planning::FlightTime> forecast{};
+  std::optional<Eigen::Vector3d> former_m{};  ///< manual: the last fix, for its speed
+  std::optional<double> former_s{};
+  procedure::VehicleView by_hand{};
+};
+
+/// A flight of before a restart, as it was kept.
+struct KeptFlight {
+  MissionId mission{};
+  Plan plan;  ///< with its origin
+  bool manual{false};
+  Eigen::Vector3d home_m{0, 0, 0};
+  procedure::State state;
+  procedure::FlightClues clues;
+  DroneIdentity aircraft;  ///< system 0: not said
+};
+
+/// What a checklist takes long to find out: asked before, by whoever drives.
+struct Groundwork {
+  const Plan* plan{nullptr};
+  std::shared_ptr<const planning::PlanCheck> check;  ///< null without a plan, or when it cannot be checked
+  bool writable{true};
+  double disk_free_bytes{};
+};
+
+/// Everything round the one aircraft: control lease, checklist, the one calibration flight with its procedure
+/// and safety, commands and what became of them, lists given to the autopilot, alarms.
+///
+/// Deterministic: driven by calls that bring their time; commands go to the Drone, which is asked for its
+/// status and its reports, and what happened is taken as events. No clock, thread, lock or output. Not
+/// thread-safe.
+class Operations {
+ public:
+  /// `drone` null: flights are flown by hand.
+  explicit Operations(Drone* drone) : drone_(drone) {}
+
+  // Inputs. Fixes and ranges count from when they were measured (MeasuredTime).
+  void fix(const Now& now, const Fix& fix);
+  void range(const Now& now, const MissionId& mission, const RangeResult& result);
+  /// About ten times a second: reports read, safety, procedure, commands. `live`: running estimates in metres
+  /// of `origin`, where they are at hand.
+  struct Estimates {
+    Wgs84 origin;
+    std::vector<Estimate> estimates;
+  };
+  void round(const Now& now, const std::optional<Estimates>& live, bool at_hand);
+  /// Goes on with a flight of before a restart: hold first.
+  /// errors: of the plan
+  Result<void> recover(const Now& now, KeptFlight kept);
+  /// The server stops: an aircraft in the air that we fly stands.
+  void halt();
+
+  // What an operator asks. errors: conflict (another has control), invalid_argument (the state forbids it)
+  Result<Lease> take_control(const Now& now, const MissionId& mission, const Holder& who, bool by_force,
+                             std::string key);
+  Result<Lease> renew_control(const Now& now, const MissionId& mission, const std::string& key,
+                              const Holder& who) {
+    return lease_.renew(mission, key, who, now);
+  }
+  Result<void> release_control(const Now& now, const MissionId& mission, const std::string& key,
+                               const Holder& who);
+  std::optional<Lease> control(const Now& now) const { return lease_.holder(now); }
+  Result<FlightCommand> begin(const Now& now, const Mission& mission, const Groundwork& ground, bool manual,
+                              const std::string& who);
+  Result<FlightCommand> act(const Now& now, const MissionId& mission, const std::string& action,
+                            const std::string& who);
+  Result<FlightCommand> upload(const Now& now, const MissionId& mission, const Plan& plan,
+                               const std::string& what, const std::string& who);
+  Result<DroneStatus> change_aircraft(const MissionId& mission, const std::string& sender,
+                                      const std::string& who);
+  std::vector<ChecklistItem> checklist(const Now& now, const Mission* record, const MissionId& mission,
+                                       const Groundwork& ground, bool manual) const;
+  Result<void> override_item(const Now& now, const MissionId& mission, const std::string& item,
+                             const std::string& reason, const std::string& who, const Groundwork& ground);
+  /// Somebody who may fly looks at this checklist: the aircraft gets the plan's fence.
+  void prepare(const MissionId& mission, const Plan& plan) { preparing_.emplace(mission, plan); }
+
+  // What there is.
+  const std::optional<ActiveFlight>& flight() const { return flight_; }
+  const ActiveFlight* flight_of(const MissionId& mission) const {
+    return flight_ && flight_->mission == mission ? &*flight_ : nullptr;
+  }
+  std::uint64_t n_flights() const { return n_flights_; }  ///< begun or recovered so far
+  bool flying() const { return flight_ && flight_->flying(); }
+  const std::deque<FlightCommand>& commands() const { return commands_; }  ///< newest last, at most 60
+  const FlightCommand* command(std::uint64_t number) const;
+  std::uint64_t newest_by_person() const { return newest_by_person_; }
+  const std::vector<FlightUpload>& uploads() const { return uploads_; }
+  /// Every alarm a flight can raise, with what is wrong now; empty: nothing is.
+  std::vector<std::pair<std::string_view, std::string>> alarms() const;
+  std::optional<DroneStatus> drone() const;
+
+  std::vector<Told> take_events() { return std::exchange(events_, {}); }
+  /// True once after something changed that a screen shows and no transition tells of.
+  bool take_shown_soon() { return std::exchange(show_soon_, false); }
+
+ private:
+  /// Of the newest measurements of one mission, by the clock of Now::s.
+  struct Received {
+    MeasuredTime fixes, ranges;
+    std::optional<double> fix_s{}, fixed_since_s{}, range_s{}, correction_age_s{};
+    std::optional<Fix> fix{};
+  };
+  struct Override {
+    std::string who, reason;
+  };
+  FlightCommand* find(std::uint64_t number);
+  FlightCommand& note(const Now& now, const MissionId& mission, std::string action, std::string by,
+                      std::string state);
+  void note_dispatched(const Now& now, ActiveFlight& f, FlightCommand* cause);
+  void read_reports(const Now& now);
+  void take_happenings(ActiveFlight& f);
+  FlightCommand act_directly(const Now& now, const MissionId& mission, const std::string& action,
+                             const std::string& who);
+  void give_fence(const Now& now);
+  std::optional<std::string> take_off_refused(const Plan& plan, const MissionId& mission) const;
+  const FlightUpload* uploaded(const Plan& plan, const std::string& what) const;
+  std::optional<ChecklistItem> fence_item(const Plan& plan) const;
+  void tell(std::string level, std::string code, std::string text, std::optional<MissionId> mission) {
+    events_.push_back({std::move(level), std::move(code), std::move(text), std::move(mission)});
+  }
+
+  Drone* drone_;
+  ControlLease lease_;
+  std::optional<ActiveFlight> flight_;
+  std::map<MissionId, Received> received_;                           ///< newest few missions only
+  std::map<MissionId, std::map<std::string, Override>> overridden_;  ///< of the checklist
+  std::deque<FlightCommand> commands_;
+  std::map<std::uint64_t, std::uint64_t> by_drone_number_;  ///< number of the aircraft's -> ours
+  std::optional<std::uint64_t> unconfirmed_;                ///< of the newest command that got no answer
+  std::uint64_t number_{0}, newest_by_person_{0}, n_flights_{0};
+  std::vector<FlightUpload> uploads_;                    ///< the newest of each kind
+  std::optional<std::pair<MissionId, Plan>> preparing_;  ///< whose checklist is being worked off
+  std::vector<Told> events_;
+  bool show_soon_{false};
+};
+
+}  // namespace anchord::flight

@@ -1,0 +1,251 @@
+// What an operator asks of a flight: control, checklist, begin, command; and what a restart brings back.
+#include <algorithm>
+
+#include "core/flight/operations.hpp"
+#include "core/ports/drone.hpp"
+
+namespace anchord::flight {
+
+namespace {
+
+std::optional<procedure::Event> event_of_action(const std::string& action) {
+  if (action == "hold") return procedure::Event::hold;
+  if (action == "resume") return procedure::Event::resume;
+  if (action == "skip") return procedure::Event::skip;
+  if (action == "return") return procedure::Event::return_home;
+  if (action == "land") return procedure::Event::land;
+  return std::nullopt;
+}
+
+/// A plan without an origin has its ground where the aircraft stands.
+Result<Plan> flown_plan(const Plan& plan, double ground_m) {
+  BOOST_OUTCOME_TRY(Wgs84 origin, planning::plan_origin(plan));
+  if (!plan.origin) origin.height_m = ground_m;
+  Plan flown = plan;
+  flown.origin = origin;
+  return flown;
+}
+
+Error forbidden(std::string why) { return make_error(Errc::invalid_argument, std::move(why)); }
+
+}  // namespace
+
+Result<Lease> Operations::take_control(const Now& now, const MissionId& mission, const Holder& who,
+                                       bool by_force, std::string key) {
+  const auto before = lease_.holder(now);
+  // Who has the aircraft of a mission that is not being flown keeps nobody from today's.
+  const bool idle =
+      before && before->mission != mission && !(flying() && flight_->mission == before->mission);
+  auto lease = lease_.take(mission, who, now, by_force || idle, std::move(key));
+  if (lease) {
+    tell(before ? "warning" : "info", "control.taken",
+         who.name + (before ? " took control from " + before->name : " has control"), mission);
+    show_soon_ = true;
+  }
+  return lease;
+}
+
+Result<void> Operations::release_control(const Now& now, const MissionId& mission, const std::string& key,
+                                         const Holder& who) {
+  BOOST_OUTCOME_TRYV(lease_.release(mission, key, who, now));
+  tell("info", "control.released", who.name + " gave control back", mission);
+  show_soon_ = true;
+  return boost::outcome_v2::success();
+}
+
+std::vector<ChecklistItem> Operations::checklist(const Now& now, const Mission* record,
+                                                 const MissionId& mission, const Groundwork& ground,
+                                                 bool manual) const {
+  const Plan* plan = ground.plan;
+  ChecklistFacts facts;
+  facts.mission = record;
+  if (plan != nullptr) facts.min_battery = plan->settings.min_battery;
+  facts.plan = ground.check.get();
+  if (!manual && drone_ != nullptr) facts.drone = drone_->status();
+  if (const auto it = received_.find(mission); it != received_.end()) {
+    const auto& r = it->second;
+    if (r.fix_s) facts.fix_age_s = now.s - *r.fix_s;
+    if (r.fix) facts.fix = r.fix->fix;
+    if (r.fixed_since_s) facts.fixed_for_s = now.s - *r.fixed_since_s;
+    if (r.range_s) facts.range_age_s = now.s - *r.range_s;
+    if (facts.fix_age_s && r.correction_age_s)
+      facts.correction_age_s = *facts.fix_age_s + *r.correction_age_s;
+  }
+  if (plan != nullptr) facts.place_refused = take_off_refused(*plan, mission);
+  facts.writable = ground.writable;
+  facts.disk_free_bytes = ground.disk_free_bytes;
+  auto items = make_checklist(facts);
+  if (plan != nullptr && !manual && drone_ != nullptr) {
+    if (auto fence = fence_item(*plan)) items.push_back(std::move(*fence));
+  }
+  if (const auto it = overridden_.find(mission); it != overridden_.end()) {
+    for (auto& i : items) {
+      const auto found = it->second.find(i.id);
+      if (found == it->second.end() || !i.overridable) continue;
+      i.overridden_by = found->second.who;
+      i.override_reason = found->second.reason;
+    }
+  }
+  return items;
+}
+
+/// Judged as the flight itself will be; absent where nothing is known to judge by.
+std::optional<std::string> Operations::take_off_refused(const Plan& plan, const MissionId& mission) const {
+  const auto it = received_.find(mission);
+  if (it == received_.end() || !it->second.fix || it->second.fix->frame != TrackFrame::wgs84)
+    return std::nullopt;
+  const auto& stands = it->second.fix->position;
+  const auto flown = flown_plan(plan, stands.height_m);
+  if (!flown) return flown.error().message;
+  const Eigen::Vector3d here = EnuFrame(*flown.value().origin).enu_from_wgs84(stands).m;
+  const auto setup = procedure::flight_setup(flown.value(), here);
+  if (!setup) return setup.error().message;
+  const auto refused = procedure::refuse_take_off(setup.value().limits.bounds, here,
+                                                  procedure::take_off_height_m(setup.value()));
+  return refused ? refused->text : std::string{};
+}
+
+Result<void> Operations::override_item(const Now& now, const MissionId& mission, const std::string& item,
+                                       const std::string& reason, const std::string& who,
+                                       const Groundwork& ground) {
+  for (const auto& one : checklist(now, nullptr, mission, ground, drone_ == nullptr)) {
+    if (one.id == item && !one.overridable)
+      return make_error(Errc::invalid_argument, item + " cannot be overridden: " + one.text);
+  }
+  overridden_[mission][item] = {who, reason};
+  tell("info", "checklist." + item, who + ": " + reason, mission);
+  return boost::outcome_v2::success();
+}
+
+Result<FlightCommand> Operations::begin(const Now& now, const Mission& mission, const Groundwork& ground,
+                                        bool manual, const std::string& who) {
+  const Plan& plan = *ground.plan;
+  manual = manual || drone_ == nullptr;
+  if (flying()) return forbidden("a flight is in the air already");
+  const bool in_air = !manual && drone_->status().in_air;
+  std::optional<Wgs84> took_off_from;
+  if (in_air) {
+    if (const auto* before = flight_of(mission.id))
+      took_off_from = before->frame.wgs84_from_enu(Enu{before->home_m});
+    if (!took_off_from)
+      return forbidden("the aircraft is in the air and it is not known where it took off: land it first");
+  }
+  if (mission.frame != TrackFrame::wgs84)
+    return forbidden("a mission in a local frame cannot be flown: an aircraft needs the globe");
+  preparing_.emplace(mission.id, plan);
+  std::string open;
+  for (const auto& i : checklist(now, &mission, mission.id, ground, manual)) {
+    if (!i.green()) open += (open.empty() ? "" : ", ") + i.id;
+  }
+  if (!open.empty()) return forbidden("the checklist is not green: " + open);
+  const auto& r = received_[mission.id];
+  if (!r.fix || r.fix->frame != TrackFrame::wgs84) return forbidden("it is not known where the aircraft is");
+  BOOST_OUTCOME_TRY(const Plan flown,
+                    flown_plan(plan, (took_off_from ? *took_off_from : r.fix->position).height_m));
+  const EnuFrame frame(*flown.origin);
+  const Eigen::Vector3d here = frame.enu_from_wgs84(r.fix->position).m;
+  // Home is on the ground: where this mission took off, when it starts again in the air.
+  const Eigen::Vector3d home = took_off_from ? frame.enu_from_wgs84(*took_off_from).m : here;
+  BOOST_OUTCOME_TRY(auto setup, procedure::flight_setup(flown, home));
+  // A new flight is a new object, and so is what the link knows of it.
+  flight_.emplace(mission.id, flown, manual, frame, home,
+                  procedure::FlightControl(std::move(setup), frame, manual ? nullptr : drone_));
+  ++n_flights_;
+  auto& f = *flight_;
+  if (ground.check) f.forecast = ground.check->time;
+  f.control.fix(*r.fix_s, here, r.fix->fix);
+  if (manual) {
+    f.by_hand.position_m = here, f.former_s = *r.fix_s;
+    f.control.by_hand(now.s, f.by_hand);
+  }
+  by_drone_number_.clear();
+  unconfirmed_.reset();
+  const auto number_of_start = note(now, mission.id, "start", who, "sent").number;
+  f.control.start(now.s, who);
+  note_dispatched(now, f, find(number_of_start));
+  take_happenings(f);
+  overridden_.erase(mission.id);  // of the next flight every item is asked again
+  return *find(number_of_start);
+}
+
+/// Whatever the server believes: who has control can always tell the aircraft to hold, to land, to disarm.
+FlightCommand Operations::act_directly(const Now& now, const MissionId& mission, const std::string& action,
+                                       const std::string& who) {
+  auto& command = note(now, mission, action, who, "sent");
+  if (drone_ == nullptr) {
+    command.state = "accepted", command.text = "shown to the pilot";
+    return command;
+  }
+  if (flying() && !flight_->manual && flight_->control.taken_over()) drone_->take_back();
+  by_drone_number_[action == "hold"   ? drone_->hold()
+                   : action == "land" ? drone_->land()
+                                      : drone_->disarm()] = command.number;
+  return command;
+}
+
+Result<FlightCommand> Operations::act(const Now& now, const MissionId& mission, const std::string& action,
+                                      const std::string& who) {
+  const bool flies = flight_of(mission) != nullptr && flying();
+  const bool always = action == "hold" || action == "land" || action == "disarm";
+  if (action == "disarm" || (always && !flies)) return act_directly(now, mission, action, who);
+  if (!flies) return forbidden("this mission is not being flown");
+  auto& f = *flight_;
+  if (action == "abort") {
+    auto& command = note(now, mission, action, who, "sent");
+    if (f.manual)
+      command.state = "accepted";
+    else
+      by_drone_number_[f.control.abort()] = command.number;
+    f.aborted = "aborted by " + who + ": the aircraft is the pilot's";
+    f.aborted_s = now.s;
+    tell("warning", "procedure.aborted", f.aborted, mission);
+    return command;
+  }
+  const auto event = event_of_action(action);
+  if (!event) return forbidden("there is no action " + action);
+  const auto number = note(now, mission, action, who, "sent").number;
+  if (const auto why_not = f.control.command(now.s, *event, who); !why_not.empty()) {
+    std::erase_if(commands_, [&](const FlightCommand& c) { return c.number == number; });
+    return forbidden(action + ": " + why_not);
+  }
+  note_dispatched(now, f, find(number));
+  take_happenings(f);
+  return *find(number);
+}
+
+Result<DroneStatus> Operations::change_aircraft(const MissionId& mission, const std::string& sender,
+                                                const std::string& who) {
+  if (drone_ == nullptr)
+    return make_error(Errc::invalid_argument, "this server talks to no autopilot (drone.address)");
+  const auto before = drone_->status();
+  if (before.connected && (before.in_air || flying()))
+    return make_error(Errc::invalid_argument,
+                      "the aircraft in the air answers; land it before another one takes the link");
+  drone_->change_peer(sender);
+  tell("warning", "drone.changed",
+       who + (sender.empty() ? ": the next autopilot whose heartbeat is received is the aircraft"
+                             : ": the autopilot at " + sender + " is the aircraft"),
+       mission);
+  return drone_->status();
+}
+
+Result<void> Operations::recover(const Now& now, KeptFlight kept) {
+  const EnuFrame frame(kept.plan.origin.value());
+  BOOST_OUTCOME_TRY(auto setup, procedure::flight_setup(kept.plan, kept.home_m));
+  const bool manual = kept.manual || drone_ == nullptr;
+  // Before the flight, which is a new one on the link.
+  if (!manual && kept.aircraft.system > 0) drone_->expect(kept.aircraft);
+  flight_.emplace(
+      kept.mission, std::move(kept.plan), manual, frame, kept.home_m,
+      procedure::FlightControl(std::move(setup), frame, manual ? nullptr : drone_, kept.state, now.s));
+  ++n_flights_;
+  flight_->clues_before = std::move(kept.clues);
+  if (const auto check = planning::check_plan(flight_->plan)) flight_->forecast = check.value().time;
+  // Not heard yet: whether the hold leaves is decided by the mode that the first heartbeat shows.
+  take_happenings(*flight_);
+  tell("critical", "procedure.restarted",
+       "server restarted in flight: hold commanded, waiting for the operator", kept.mission);
+  return boost::outcome_v2::success();
+}
+
+}  // namespace anchord::flight
