@@ -19,7 +19,7 @@ namespace anchord {
 namespace {
 
 constexpr std::int64_t k_unix_us = 1'777'888'800'000'000;
-constexpr double k_flight_s = 200;
+constexpr double k_flight_s = 300;
 
 std::string exact(double value) {
   char text[40];
