@@ -196,7 +196,7 @@ void LiveAnchor::describe(const LiveOptions& options) {
       estimate_.mirror->probability = odds / (1.0 + odds);
       estimate_.best->probability = 1.0 / (1.0 + odds);
       estimate_.verdict = Verdict::ambiguous;
-      estimate_.reason = geometry.reason.empty() ? "mirror: two places fit alike" : geometry.reason;
+      estimate_.reason = geometry.reason.empty() ? "mirror: another solution fits as well" : geometry.reason;
     }
   }
   const ErrorEllipse ellipse = error_ellipse(estimate_.best->covariance_m2);

@@ -11,7 +11,9 @@ const root = fileURLToPath(new URL('../../', import.meta.url));
 
 /** Word, and what stands for it. A word that means something else too has what makes it the one meant. */
 export const FORBIDDEN = [
-  [/\btwins?\b|\bsecond places?\b/i, 'mirror solution'],
+  [/\btwins?\b|\bsecond places?\b|\b(the )?other place that\b|\btwo places fit\b/i, 'mirror solution'],
+  [/\bsaid N?LOS\b/, 'predicted'],
+  [/\bLevel( over distance|, dBm)/, 'RSS'],
   [/\bclues?\b/i, 'prior'],
   [/\bbeliefs?\b/i, 'range error model'],
   [/\bjudg(e|es|ed|ing)\b/i, 'validate (input), evaluate (model), assess (estimate), compare'],

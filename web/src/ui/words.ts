@@ -4,7 +4,7 @@ import type { EstimateMsg, Verdict } from '../live/messages';
 export const VERDICT_WORDS: Record<Verdict, string> = {
   ok: 'well determined',
   weak_geometry: 'seen from one side',
-  ambiguous: 'two places fit',
+  ambiguous: 'a mirror solution fits',
   too_few: 'too few ranges',
   diverged: 'the ranges contradict each other',
 };

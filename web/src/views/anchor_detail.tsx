@@ -140,7 +140,7 @@ function Twin({ r }: { r: AnchorRow }) {
   const m = r.mirror!;
   return (
     <p class="why" data-testid="mirror">
-      <Mark shape="half" tone="caution" /> The other place that fits
+      <Mark shape="half" tone="caution" /> Mirror solution
       {m.probability === null ? '' : `, ${percent(m.probability)} %`}:{' '}
       <span class="n">
         {m.lat !== null ? `${latlon(m.lat)}°, ${latlon(m.lon)}°` : (m.enu_m?.map((x) => metres(x)).join(', ') ?? '–')}

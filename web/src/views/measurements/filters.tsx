@@ -94,7 +94,7 @@ export function Filters({ source, filter: f, who, set }: Props) {
         </select>
       </label>
       {band('Distance', 'm', '0.5', 'min_m', 'max_m')}
-      {band('Level', 'dBm', '1', 'min_dbm', 'max_dbm')}
+      {band('RSS', 'dBm', '1', 'min_dbm', 'max_dbm')}
       {flight && (
         <label>
           <span class="lab">Fix</span>

@@ -122,7 +122,7 @@ export function LevelPanel({
   return (
     <section class="cell-p" data-testid="plot-level">
       <div class="hd">
-        <h2>Level over distance</h2>
+        <h2>RSS over distance</h2>
         <select
           class="input"
           aria-label="Threshold line"

@@ -83,7 +83,7 @@ export function RowList({ source, rows, selected, at, oldest_first, select, look
                 Bias, mm
               </th>
               <th scope="col" class="num">
-                Level, dBm
+                RSS, dBm
               </th>
               <th scope="col">Response</th>
             </tr>

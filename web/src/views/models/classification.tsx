@@ -40,8 +40,8 @@ export function ConfusionPanel({
         <thead>
           <tr>
             <td />
-            <th scope="col">said LOS</th>
-            <th scope="col">said NLOS</th>
+            <th scope="col">predicted LOS</th>
+            <th scope="col">predicted NLOS</th>
           </tr>
         </thead>
         <tbody>

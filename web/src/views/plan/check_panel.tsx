@@ -51,7 +51,7 @@ export function CheckPanel({
             </dd>
           </div>
           <div>
-            <dt>Way</dt>
+            <dt>Route</dt>
             <dd>{grouped(check.length_m)} m</dd>
           </div>
           <div>
