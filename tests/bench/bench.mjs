@@ -2,11 +2,11 @@
 //   node tests/bench/bench.mjs [solve] [bound] [ingest] [get] [fanout] [training] [predict] [grid] [devices] [commands]
 import { execFileSync } from 'node:child_process';
 import { createServer } from 'node:http';
-import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { LiveClient } from '../e2e/live.mjs';
-import { eventually, root, run, startServer } from '../e2e/server.mjs';
+import { eventually, run, startServer } from '../e2e/server.mjs';
 import { commands } from './commands.mjs';
 import { devices } from './devices.mjs';
 import { grid } from './grid.mjs';

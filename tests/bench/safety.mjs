@@ -71,11 +71,13 @@ export async function safety(row, seconds = 90) {
     const n = figure('anchord_safety_interval_seconds_count'),
       worst = figure('anchord_safety_interval_seconds_worst');
     const within = figure('anchord_safety_interval_seconds_bucket{le="0.15"}');
-    const trained = await search.state();
+    const trained = await search.state(),
+      held = worst <= k_limit_s && n > 0 && trained === 'running' && refused === 0;
     row(
       `safety checks of a flight, ${k_anchors} anchors at ${k_rate_hz} Hz, beside a grid search`,
       `worst interval ${(worst * 1000).toFixed(0)} ms, ${n} checks in ${seconds} s, ${((100 * within) / n).toFixed(1)} % within 150 ms`,
-      `limit ${k_limit_s * 1000} ms${worst <= k_limit_s && n > 0 && trained === 'running' && refused === 0 ? '' : ': MISSED'}; search ${trained}, ${sent} ranges sent, ${refused} bodies refused, steps seen: ${[...steps].join(', ')}`,
+      `limit ${k_limit_s * 1000} ms${held ? '' : ': MISSED'}; search ${trained}, ${sent} ranges sent, ` +
+        `${refused} bodies refused, steps seen: ${[...steps].join(', ')}`,
     );
     await must(`${base}/actions`, as({ action: 'land', lease }), 202);
   } finally {

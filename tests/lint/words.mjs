@@ -3,7 +3,7 @@
 // Read are: strings with a blank and text of the dashboard, descriptions and summaries of the contract, strings with a blank of the
 // C++ sources (messages, problems, help of the command line), the documentation. Comments and identifiers are not.
 import { readdirSync, readFileSync } from 'node:fs';
-import { join, relative, sep } from 'node:path';
+import { join, sep } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { parse } from 'yaml';
 

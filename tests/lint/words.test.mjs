@@ -21,7 +21,7 @@ test('text and attributes of the dashboard are read, names of classes and proper
     '  {row.twin} Radios heard',
     '</p>',
     '<b title="was told so">ok</b>',
-    'say(`${n} of ${clues.heard} clues`)',
+    'say(`$' + '{n} of $' + '{clues.heard} clues`)',
   ];
   assert.deepEqual(hits(literals(source.join('\n'), { jsx: true })).sort(), [2, 4, 5]);
 });
