@@ -19,9 +19,16 @@ import { call, list, type Wire } from './contract';
 
 /// One acceptance test of the server: its number against its limit.
 export type Gate = Wire<'Gate'>;
+/// What the uncertainty of a position comes from: sources and their shares of the covariance, largest first.
+export interface Budget {
+  readonly shares: readonly { readonly source: string; readonly share: number }[];
+  readonly help: string; ///< what would help most, in words
+}
 export interface AnchorRow extends EstimateMsg {
   readonly gates: readonly Gate[]; ///< empty where none were run: a running estimate
   readonly acceptable: boolean | null; ///< verdict ok and every gate passed; null where none were run
+  readonly contradiction: string; ///< how a later flight contradicts the published place; else empty
+  readonly budget: Budget | null;
   readonly override: string; ///< why a person published it although a gate failed
   readonly name: string;
   readonly absolute_h95_m: number | null;
@@ -45,6 +52,8 @@ export const row_of_estimate = (e: EstimateMsg): AnchorRow => ({
   crs: '',
   gates: [],
   acceptable: null,
+  contradiction: '',
+  budget: null,
   override: '',
   calibration: null,
   building: '',
@@ -52,6 +61,16 @@ export const row_of_estimate = (e: EstimateMsg): AnchorRow => ({
   height_msl_m: null,
 });
 
+function budget_of(v: unknown): Budget | null {
+  const o = obj(v),
+    sources = obj(o?.sources);
+  if (!o || !sources) return null;
+  const shares = Object.entries(sources)
+    .map(([source, one]) => ({ source, share: num(obj(one)?.share) ?? 0 }))
+    .filter((s) => s.share > 0)
+    .sort((a, b) => b.share - a.share);
+  return { shares, help: str(o.help_text) };
+}
 const gates_of = (v: unknown): Gate[] =>
   Array.isArray(v)
     ? v
@@ -107,20 +126,23 @@ export function row_of(p: Record<string, unknown>, geometry: unknown): AnchorRow
   const verdict = str(quality?.verdict) || str(p.verdict);
   const known = (VERDICT as readonly string[]).includes(verdict);
   const status = str(p.status);
+  const contradiction = str(obj(p.contradiction)?.text);
   const base = estimate({
     anchor: network_id,
     mission: Array.isArray(provenance?.missions) ? str(provenance.missions[0]) : '',
     verdict: known ? verdict : 'ok',
     status: (STATUS as readonly string[]).includes(status)
       ? status
-      : verdict === 'ambiguous'
-        ? 'ambiguous'
-        : verdict === 'ok'
-          ? 'converged'
-          : geometry
-            ? 'estimating'
-            : 'found',
-    reason: str(quality?.reason) || str(p.reason),
+      : status === 'contradicted'
+        ? 'moved'
+        : verdict === 'ambiguous'
+          ? 'ambiguous'
+          : verdict === 'ok'
+            ? 'converged'
+            : geometry
+              ? 'estimating'
+              : 'found',
+    reason: contradiction || str(quality?.reason) || str(p.reason),
     ...point(geometry),
     enu_m: p.enu_m ?? p.local_m,
     cov_enu_m2: relative?.cov_enu_m2,
@@ -139,6 +161,8 @@ export function row_of(p: Record<string, unknown>, geometry: unknown): AnchorRow
     ...base,
     ellipse95: ellipse(relative?.ellipse95) ?? (cov && ellipse_from_covariance(cov)),
     mirror: twin,
+    contradiction,
+    budget: budget_of(p.budget),
     probability: base.probability ?? (twin?.probability == null ? null : 1 - twin.probability),
     name: str(p.name),
     absolute_h95_m: num(absolute?.h95_m),

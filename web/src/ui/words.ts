@@ -8,6 +8,17 @@ export const VERDICT_WORDS: Record<Verdict, string> = {
   too_few: 'too few ranges',
   diverged: 'the ranges contradict each other',
 };
+/// Sources of the error budget, as the Anchors view names them.
+export const SOURCE_WORDS: Record<string, string> = {
+  ranging: 'noise of the ranges',
+  geometry: 'geometry of the flight',
+  bias: 'range bias',
+  rtk: 'RTK positions',
+  lever_arm: 'lever arm',
+  clock: 'time lag',
+  base: 'base station',
+  floor: 'what no residual shows',
+};
 /// Title and sentence of "why not done"; null when there is nothing to explain.
 export function why_not_done(e: EstimateMsg): { title: string; text: string } | null {
   if (e.verdict === 'ok' && (e.status === 'converged' || e.status === 'accepted')) return null;

@@ -1,8 +1,8 @@
-import type { AnchorRow } from '../api/anchors';
+import type { AnchorRow, Budget } from '../api/anchors';
 import { age, accuracy, bearing, date, dms, fixed, latlon, metres, percent, plain } from '../ui/format';
 import { CopyBox } from '../ui/copy_box';
 import { Mark, Q, StatusChip } from '../ui/marks';
-import { GATES, gate_words, why_not_done, VERDICT_WORDS } from '../ui/words';
+import { GATES, gate_words, why_not_done, SOURCE_WORDS, VERDICT_WORDS } from '../ui/words';
 import { choice } from './anchor_columns';
 import { AnchorPast } from './anchor_past';
 import { AnchorResiduals } from './anchor_residuals';
@@ -10,6 +10,23 @@ import { Convergence } from './convergence';
 import { FacilityPanel } from './facility';
 import { Covariance, Loupe } from './loupe';
 import { current_scene, now_ms, tick } from '../state/store';
+
+function ErrorBudget({ budget }: { budget: Budget }) {
+  return (
+    <section class="sec-p" data-testid="error-budget">
+      <h3>Error budget</h3>
+      <dl class="kv s">
+        {budget.shares.map((s) => (
+          <div key={s.source}>
+            <dt>{SOURCE_WORDS[s.source] ?? s.source.replaceAll('_', ' ')}</dt>
+            <dd>{percent(s.share)} %</dd>
+          </div>
+        ))}
+      </dl>
+      <p class="mut">What would help most: {budget.help}.</p>
+    </section>
+  );
+}
 
 export function AnchorDetail({ row: r, live, changed }: { row: AnchorRow; live: boolean; changed: () => void }) {
   tick.value;
@@ -103,6 +120,7 @@ export function AnchorDetail({ row: r, live, changed }: { row: AnchorRow; live: 
         )}
         {r.mirror && <Twin r={r} />}
       </section>
+      {r.budget && r.budget.shares.length > 0 && <ErrorBudget budget={r.budget} />}
       <div class="two">
         <Gates r={r} />
         <section class="sec-p">
