@@ -111,8 +111,9 @@ std::vector<Event> fly(const FlightData& data) {
     if (now_s - solved_s < 30 || !mission.joint_is_worth_it()) continue;
     solved_s = now_s;
     const auto problem = mission.joint_problem({});
-    if (const auto solution = solve_flight(problem.flight, problem.options))
+    if (const auto solution = solve_flight(problem.flight, problem.options)) {
       EXPECT_TRUE(mission.adopt(solution.value(), problem.cut, problem.generation));
+    }
     take();
   }
   mission.finish();
