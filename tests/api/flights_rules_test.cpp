@@ -106,7 +106,7 @@ TEST_F(Flights, TheIntervalOfSafetyChecksIsMeasuredInTheAir) {
   EXPECT_EQ(figure("_bucket{le=\"0.5\"}"), n + 59);
   EXPECT_EQ(figure("_bucket{le=\"1\"}"), n + 60);
   ASSERT_EQ(act("land", lease).status, 202);
-  EXPECT_TRUE(fly_until([&] { return procedure()["status"] == "done"; }, 60));
+  EXPECT_TRUE(fly_until([&] { return procedure()["step"] == "done"; }, 60));
   const double landed = figure("_count");
   fly(3);
   EXPECT_EQ(figure("_count"), landed) << "on the ground nothing is watched";

@@ -194,7 +194,7 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
   await id('cmd-land').getByText('tap again').waitFor();
   await id('cmd-land').click();
   await id('procedure').getByText('ABORTED', { exact: true }).waitFor({ timeout: 60_000 });
-  assert.match(await text(id('flight-aborted')), /ended before its plan was flown.*Told to land: by /);
+  assert.match(await text(id('flight-aborted')), /ended before its plan was flown.*Commanded to land: by /);
   // The report is two presses away: a calibration of the whole flight, then the page to print.
   await page.getByRole('link', { name: /^Anchors/ }).click();
   await id('review').click();

@@ -164,6 +164,7 @@ TEST_F(FlightFolder, AsksWhichTagWhenSeveralAreDeclared) {
 }
 
 TEST_F(FlightFolder, TakesRangesBetweenAnchorsAndWritesThem) {
+  globe();
   write("ranges.csv",
         "t_s,tag_id,anchor_id,range_m,kind\n0.1,0x6e01,3,6.14,tag_anchor\n0.2,7,3,9.5,anchor_anchor\n");
   const auto read = read_flight_folder(folder_);

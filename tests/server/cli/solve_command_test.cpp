@@ -246,7 +246,8 @@ TEST_F(SolveCommand, CorrectsAndWeighsRangesWithTheModelsNamed) {
     EXPECT_EQ(n, 6);
     return sum_m / n;
   };
-  const double raw_m = error_m(""), with_m = error_m(" --models " + model);
+  // Whether so short a flight can show the worth of the model is another test's question.
+  const double raw_m = error_m(""), with_m = error_m(" --worth ignored --models " + model);
   std::printf("ranges a twentieth too long: off by %.3f m raw, %.3f m with the model\n", raw_m, with_m);
   EXPECT_LT(with_m, 0.7 * raw_m);
   EXPECT_EQ(run("solve " + quoted() + " --models " + model + " " + model).exit_code, 2) << "one a task";

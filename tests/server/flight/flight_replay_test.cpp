@@ -145,8 +145,8 @@ class Home {
       : mission_(mission), plan_(plan), live_(setup_of(mission, plan)), operations_(&drone) {}
 
   void run(const Tick& tick) {
-    for (const auto& range : tick.ranges) live_.add(flight::JudgedRange{range, {}, range.time});
-    for (const auto& fix : tick.fixes) live_.add(fix);
+    for (const auto& range : tick.ranges) live_.add(flight::LiveRow(flight::JudgedRange{range, {}, range.time}));
+    for (const auto& fix : tick.fixes) live_.add(flight::LiveRow(fix));
     live_.settle();
     for (const auto& event : live_.take_events()) std::visit([&](const auto& e) { take(tick.now, e); }, event);
     if (!begun_ && tick.now.s > 12) begin(tick.now);
