@@ -10,6 +10,8 @@ namespace anchord::api {
 namespace {
 
 constexpr std::ptrdiff_t k_shown_commands = 30;
+/// Of hundreds of anchors they are long to write, and the thread that writes them is that of safety.
+constexpr double k_profiles_s = 0.5;
 
 }  // namespace
 
@@ -55,17 +57,20 @@ void FlightService::State::publish() {
     deps.hub.publish(Topic::procedure, to_wire(procedure(f)), at.utc.us(), key);
     last.shown_s = at.s;
   }
-  publish_profiles(f, at.utc.us(), moved);
+  publish_profiles(f, at, moved);
   if (moved && engine.decision())
     deps.hub.publish(Topic::mission_grid, to_wire(grid_json(f.mission, at.utc.us(), engine, f.frame)),
                      at.utc.us(), key);
   last.shown = n;
 }
 
-void FlightService::State::publish_profiles(const flight::ActiveFlight& f, std::int64_t t_us, bool moved) {
+void FlightService::State::publish_profiles(const flight::ActiveFlight& f, const flight::Now& at,
+                                            bool moved) {
   const auto step = f.control.engine().state().step;
   const bool turning = step == procedure::Step::turn, climbing = step == procedure::Step::height_search;
-  if (!turning && !climbing && !moved) return;
+  if (!moved && (!(turning || climbing) || at.s - last.profiles_s < k_profiles_s)) return;
+  last.profiles_s = at.s;
+  const std::int64_t t_us = at.utc.us();
   const auto key = to_string(f.mission);
   for (const auto& [anchor, clues] : f.control.engine().clues()) {
     if (!clues.turn.empty() && (turning || moved))

@@ -28,7 +28,7 @@ struct FlightService::State {
   void keep(const MissionId& mission, std::string document) const;
   nlohmann::ordered_json procedure(const flight::ActiveFlight& f) const;
   void publish();
-  void publish_profiles(const flight::ActiveFlight& f, std::int64_t t_us, bool moved);
+  void publish_profiles(const flight::ActiveFlight& f, const flight::Now& at, bool moved);
 
   Deps deps;
   std::mutex mutex;
@@ -41,7 +41,7 @@ struct FlightService::State {
   /// What of the present flight was kept, shown and told; each flight begins anew.
   struct Last {
     std::uint64_t flight{0}, kept{~0ULL}, shown{~0ULL}, clues_told{0};
-    double shown_s{-10};
+    double shown_s{-10}, profiles_s{-10};
   } last;
 
   struct Checked {
