@@ -83,6 +83,7 @@ FlightEngine::FlightEngine(FlightSetup setup, const State& stored, double now_s)
     : FlightEngine(std::move(setup)) {
   state_ = stored;
   started_s_ = now_s - stored.flown_s;
+  watched_s_ = now_s;
   apply(now_s, resume_after_restart(stored, now_s));
 }
 
@@ -185,7 +186,7 @@ bool FlightEngine::down(double now_s) {
 }
 
 bool FlightEngine::command(double now_s, Event event, const std::string& who) {
-  if (event == Event::start) started_s_ = now_s;
+  if (event == Event::start) started_s_ = watched_s_ = now_s;
   const bool went_on = state_.ended.empty();
   if (!feed(now_s, event, who.empty() ? std::string{} : "by " + who)) return false;
   if (went_on && !state_.ended.empty()) state_.by_person = true;
@@ -311,7 +312,7 @@ void FlightEngine::look_out(double now_s) {
   Situation now;
   now.position_m = position_m();
   const auto age = [&](const std::optional<double>& t) {
-    return t ? now_s - *t : now_s - started_s_.value_or(now_s);
+    return now_s - t.value_or(watched_s_.value_or(now_s));
   };
   now.position_age_s = fix_m_ ? age(fix_s_) : age(vehicle_s_);
   now.autopilot_m = vehicle_.position_m;

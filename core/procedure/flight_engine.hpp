@@ -148,6 +148,8 @@ class FlightEngine {
   ClueBook clues_;
   VehicleView vehicle_;
   std::optional<double> vehicle_s_, fix_s_, good_fix_s_, started_s_;
+  std::optional<double>
+      watched_s_;  ///< since then it is looked after here: the start, or the restart of the server
   std::optional<Eigen::Vector3d> fix_m_;
   FixClass fix_{FixClass::none};
   std::optional<double> down_s_, climb_s_;  ///< seen on the ground and disarmed since; told to climb last

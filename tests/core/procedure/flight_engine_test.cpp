@@ -307,6 +307,25 @@ TEST(FlightEngine, TheTimeFlownStandsStillAfterTheLandingAndGoesOnOverARestart) 
   EXPECT_DOUBLE_EQ(f.engine.flown_s(f.now + 600), 50);
 }
 
+/// What was not received since the restart is missing since the restart, however long the flight took before.
+TEST(FlightEngine, AfterARestartItHoldsUntilTheFirstMeasurementsHadTheirTimeToCome) {
+  Flown f;
+  f.feed({Event::start, Event::airborne});
+  f.now += 300;
+  f.here();
+  f.feed({Event::hold});
+  ASSERT_NEAR(f.engine.state().flown_s, 300, 1e-9);
+  FlightEngine back(setup(), f.engine.state(), 1000);
+  for (const double now : {1000.1, 1001.0, 1001.9}) {
+    back.tick(now, {});
+    EXPECT_EQ(back.state().step, Step::hold) << now;
+    EXPECT_FALSE(back.alarm()) << back.alarm()->text;
+  }
+  back.tick(1016, {});
+  EXPECT_TRUE(back.alarm()) << "nothing came for 16 s";
+  EXPECT_NEAR(back.flown_s(1016), 316, 1e-9);
+}
+
 TEST(FlightEngine, SaysWhenAFaultIsOver) {
   Flown f;
   ways().at(Step::hold)(f);
