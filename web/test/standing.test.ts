@@ -27,28 +27,28 @@ const device = (part: Record<string, unknown>): Device =>
     ...part,
   });
 const recent = (rows: number, dropped: Record<string, number> = {}): Lately => ({ span_s: 10, rows, dropped });
-const said = (part: Record<string, unknown>, r: Lately = recent(300)): [string, string] => {
+const state_of = (part: Record<string, unknown>, r: Lately = recent(300)): [string, string] => {
   const s = standing(device(part), r);
   return [s.tone, s.word];
 };
 
 describe('what a device stands for', () => {
   it('is well while it delivers, a failed exchange now and then included', () =>
-    expect(said({}, recent(300, { no_answer: 45, zero_distance: 2 }))).toEqual(['ok', 'WORKING']));
+    expect(state_of({}, recent(300, { no_answer: 45, zero_distance: 2 }))).toEqual(['ok', 'WORKING']));
   it('is not well only because the link is: a tag that talks and ranges to nobody', () => {
-    expect(said({}, recent(0, { refused: 80 }))).toEqual(['bad', 'NO RANGES']);
-    expect(said({}, recent(0, { zero_distance: 60 }))).toEqual(['bad', 'NO RANGES']);
-    expect(said({}, recent(0))).toEqual(['bad', 'NO RANGES']);
+    expect(state_of({}, recent(0, { refused: 80 }))).toEqual(['bad', 'NO RANGES']);
+    expect(state_of({}, recent(0, { zero_distance: 60 }))).toEqual(['bad', 'NO RANGES']);
+    expect(state_of({}, recent(0))).toEqual(['bad', 'NO RANGES']);
     expect(standing(device({}), recent(0, { stray_line: 1 })).what).toContain('knows no anchor');
-    expect(said({}, recent(10, { bad_reply: 69, no_answer: 5 }))).toEqual(['caution', 'FEW RANGES']);
+    expect(state_of({}, recent(10, { bad_reply: 69, no_answer: 5 }))).toEqual(['caution', 'FEW RANGES']);
   });
   it('waits for five seconds of looking before it complains', () =>
     expect(standing(device({ counters: { ranges: 40 } }), { span_s: 2, rows: 0, dropped: {} }).word).toBe('WORKING'));
   it('does not call a device working that has delivered nothing yet', () => {
     const little: Lately = { span_s: 2, rows: 0, dropped: {} };
-    expect(said({ kind: 'gnss', rover: null, counters: { frames: 1 } }, little)).toEqual(['info', 'OPENING']);
-    expect(said({ counters: { frames: 7 } }, little)).toEqual(['info', 'OPENING']);
-    expect(said({ kind: 'ntrip', counters: { frames: 1 } }, little)).toEqual(['ok', 'WORKING']);
+    expect(state_of({ kind: 'gnss', rover: null, counters: { frames: 1 } }, little)).toEqual(['info', 'OPENING']);
+    expect(state_of({ counters: { frames: 7 } }, little)).toEqual(['info', 'OPENING']);
+    expect(state_of({ kind: 'ntrip', counters: { frames: 1 } }, little)).toEqual(['ok', 'WORKING']);
   });
   it('names the fix of a rover, and what a float costs', () => {
     const rover = (fix: string, age_s: number | null = 1): Record<string, unknown> => ({
@@ -56,17 +56,17 @@ describe('what a device stands for', () => {
       network_id: null,
       rover: { fix, satellites: 12, age_s, sigma_h_m: 0.01 },
     });
-    expect(said(rover('fixed'))).toEqual(['ok', 'WORKING']);
-    expect(said(rover('fixed', 8))).toEqual(['caution', 'OLD FIX']);
-    expect(said(rover('float'))).toEqual(['caution', 'FLOAT']);
-    expect(said(rover('single'))).toEqual(['bad', 'SINGLE']);
-    expect(said(rover('none'), recent(0, { no_fix: 50 }))).toEqual(['bad', 'NO FIX']);
-    expect(said({ kind: 'gnss', rover: null }, recent(0, { no_time: 50 }))).toEqual(['bad', 'NO FIX']);
-    expect(said({ kind: 'gnss', rover: null }, recent(0, { no_ellipsoidal_height: 50 }))).toEqual([
+    expect(state_of(rover('fixed'))).toEqual(['ok', 'WORKING']);
+    expect(state_of(rover('fixed', 8))).toEqual(['caution', 'OLD FIX']);
+    expect(state_of(rover('float'))).toEqual(['caution', 'FLOAT']);
+    expect(state_of(rover('single'))).toEqual(['bad', 'SINGLE']);
+    expect(state_of(rover('none'), recent(0, { no_fix: 50 }))).toEqual(['bad', 'NO FIX']);
+    expect(state_of({ kind: 'gnss', rover: null }, recent(0, { no_time: 50 }))).toEqual(['bad', 'NO FIX']);
+    expect(state_of({ kind: 'gnss', rover: null }, recent(0, { no_ellipsoidal_height: 50 }))).toEqual([
       'bad',
       'NO POSITIONS',
     ]);
-    expect(said(rover('fixed'), recent(50, { byte_outside_any_frame: 560 }))).toEqual(['caution', 'NOISY']);
+    expect(state_of(rover('fixed'), recent(50, { byte_outside_any_frame: 560 }))).toEqual(['caution', 'NOISY']);
   });
   it('tells two devices with one id, and a clock that is none', () => {
     const twin = standing(
@@ -74,7 +74,7 @@ describe('what a device stands for', () => {
       recent(300),
     );
     expect([twin.word, twin.what]).toEqual(['ID TWICE', '0x6e07 is also device "twin".']);
-    expect(said({ clock: { drift_ppm: 899, sigma_s: 1e-4, settled: true, skewed: true } })).toEqual([
+    expect(state_of({ clock: { drift_ppm: 899, sigma_s: 1e-4, settled: true, skewed: true } })).toEqual([
       'bad',
       'CLOCK WRONG',
     ]);
@@ -145,7 +145,7 @@ describe('what a device stands for', () => {
       ),
     ).toMatchObject({ word: 'WAITING', todo: 'Let its output connect to this computer, port 9002.' }));
   it('is off when it was switched off, whatever else', () =>
-    expect(said({ enabled: false, state: 'off', conflict: 'x is also device y' })).toEqual(['off', 'OFF']));
+    expect(state_of({ enabled: false, state: 'off', conflict: 'x is also device y' })).toEqual(['off', 'OFF']));
   it('adds up to one line', () =>
     expect(
       summary([

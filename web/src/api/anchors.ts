@@ -156,14 +156,14 @@ export function row_of(p: Record<string, unknown>, geometry: unknown): AnchorRow
     probability: p.probability,
   });
   if (!base) return null;
-  const twin = mirror_of(p.mirror);
+  const other_side = mirror_of(p.mirror);
   return {
     ...base,
     ellipse95: ellipse(relative?.ellipse95) ?? (cov && ellipse_from_covariance(cov)),
-    mirror: twin,
+    mirror: other_side,
     contradiction,
     budget: budget_of(p.budget),
-    probability: base.probability ?? (twin?.probability == null ? null : 1 - twin.probability),
+    probability: base.probability ?? (other_side?.probability == null ? null : 1 - other_side.probability),
     name: str(p.name),
     absolute_h95_m: num(absolute?.h95_m),
     absolute_v95_m: num(absolute?.v95_m),

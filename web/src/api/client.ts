@@ -84,7 +84,7 @@ export async function exchange(
   return { body: parsed, etag: answer.headers.get('etag') ?? '' };
 }
 /// What is wrong with each field, where the problem's own words do not say it already; the first five.
-function fields_said({ errors, detail }: Problem): string {
+function field_texts({ errors, detail }: Problem): string {
   const more = errors
     .filter((e) => e.detail && !detail.includes(e.detail))
     .slice(0, 5)
@@ -92,9 +92,9 @@ function fields_said({ errors, detail }: Problem): string {
   return more.length ? `: ${more.join('; ')}` : '';
 }
 /// A failure in the words of the server, with the number under which its log has it.
-export const said = (e: unknown): string =>
+export const error_text = (e: unknown): string =>
   e instanceof ApiError
-    ? `${e.message}${fields_said(e.problem)}${e.problem.request_id ? ` (request ${e.problem.request_id})` : ''}`
+    ? `${e.message}${field_texts(e.problem)}${e.problem.request_id ? ` (request ${e.problem.request_id})` : ''}`
     : e instanceof Error
       ? e.message
       : String(e);

@@ -94,7 +94,7 @@ export function draw_top(c: Ctx, p: Palette, cam: Camera, content: Content): voi
       );
   }
 }
-/// The twin's ellipse is the same one, reflected in the line between the two.
+/// The mirror's ellipse is the same one, reflected in the line between the two.
 function mirrored(a: EstimateMsg): NonNullable<EstimateMsg['ellipse95']> {
   const [e, n] = [a.mirror!.enu_m![0] - a.enu_m![0], a.mirror!.enu_m![1] - a.enu_m![1]];
   const axis_deg = (Math.atan2(e, n) * 180) / Math.PI + 90;

@@ -105,7 +105,7 @@ export function reticle(c: Ctx, p: Palette, x: number, y: number, r: number): vo
   }
   c.restore();
 }
-/// A 95 % ellipse about (x, y): axes in px, azimuth clockwise from north. `ghost` is the mirrored twin.
+/// A 95 % ellipse about (x, y): axes in px, azimuth clockwise from north. `ghost` is the mirror solution.
 export function ellipse_at(
   c: Ctx,
   p: Palette,

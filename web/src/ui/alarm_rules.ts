@@ -28,7 +28,7 @@ export const by_rank = (a: Alarm, b: Alarm): number => RANK[a.priority] - RANK[b
 /// Conditions of dashboard.md section 6 that the page can see by itself, with the delays named there. Keeps since when each holds.
 export class Conditions {
   private readonly since = new Map<string, number>();
-  private heard: readonly Alarm[] = [];
+  private received: readonly Alarm[] = [];
 
   standing(s: Situation): Alarm[] {
     const out: Alarm[] = [];
@@ -61,7 +61,7 @@ export class Conditions {
           since_ms: s.now_ms - s.silence_ms,
           acknowledged: false,
         });
-      return [...out, ...this.heard.map((a) => ({ ...a, title: `${a.title}, when last seen`, acknowledged: true }))];
+      return [...out, ...this.received.map((a) => ({ ...a, title: `${a.title}, when last seen`, acknowledged: true }))];
     }
     const ranging = s.recording && s.range_silence_ms < 60_000;
     const poor = s.fix === 'none' || s.fix === 'single' || s.fix === 'dgps';
@@ -89,7 +89,7 @@ export class Conditions {
       'No UWB ranges for 5 s',
       'Check the tag and its cable, or fly closer to the anchors.',
     );
-    return (this.heard = out.sort(by_rank));
+    return (this.received = out.sort(by_rank));
   }
 }
 

@@ -64,7 +64,7 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
             ? look('caution')
             : look('ok');
   const rows = scene ? [...scene.ranges.values()] : [],
-    heard = rows.filter((x) => now - x.at_ms < 2000).length;
+    in_range = rows.filter((x) => now - x.at_ms < 2000).length;
   const all_seen = Math.max(rows.length, mission?.anchors_found ?? 0, scene?.anchors.size ?? 0),
     uwb_stale = all_seen > 0 && (lost || !running);
   const pose = scene?.pose ?? null,
@@ -130,14 +130,14 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
       ),
     },
     uwb: {
-      ...(rows.length === 0 || uwb_stale ? look('off') : heard === 0 ? look('bad') : look('ok')),
+      ...(rows.length === 0 || uwb_stale ? look('off') : in_range === 0 ? look('bad') : look('ok')),
       stale: uwb_stale,
-      word: !all_seen ? 'none' : `${uwb_stale ? all_seen : heard}/${all_seen}`,
+      word: !all_seen ? 'none' : `${uwb_stale ? all_seen : in_range}/${all_seen}`,
       extra: uwb_stale ? (rows.length ? aged(now - (scene?.range_at_ms ?? 0)) : 'ended') : '',
       card: (
         <p>
           {rows.length
-            ? `${heard} of ${all_seen} anchors in range in the last 2 s, ${fixed(mission?.range_rate_hz, 0)} ranges a second.`
+            ? `${in_range} of ${all_seen} anchors in range in the last 2 s, ${fixed(mission?.range_rate_hz, 0)} ranges a second.`
             : 'No range has been received for this flight.'}
           {devices.value.some((d) => d.kind === 'tag') &&
             ` Tags: ${devices.value

@@ -23,7 +23,7 @@ export const SOURCE_WORDS: Record<string, string> = {
 export function why_not_done(e: EstimateMsg): { title: string; text: string } | null {
   if (e.verdict === 'ok' && (e.status === 'converged' || e.status === 'accepted')) return null;
   const text = e.reason ? `${e.reason[0]!.toUpperCase()}${e.reason.slice(1)}${/[.!?]$/.test(e.reason) ? '' : '.'}` : '';
-  // A twin above or below is told apart by height, one beside by leaving the line.
+  // A mirror above or below is separated by height, one beside by leaving the line.
   const level =
     e.mirror?.enu_m && e.enu_m && Math.hypot(e.mirror.enu_m[0] - e.enu_m[0], e.mirror.enu_m[1] - e.enu_m[1]) < 1;
   const advice: Record<Verdict, string> = {

@@ -11,8 +11,8 @@ import { Covariance, Loupe } from './loupe';
 export function AnchorCard({ anchor }: { anchor: string }) {
   tick.value;
   const scene = watched_scene(),
-    heard = scene?.anchors.get(anchor);
-  if (!heard)
+    latest = scene?.anchors.get(anchor);
+  if (!latest)
     return (
       <section class="sec-p">
         <div class="hd">
@@ -22,8 +22,8 @@ export function AnchorCard({ anchor }: { anchor: string }) {
         <p class="why">Ranges arrive, an estimate has not been made yet.</p>
       </section>
     );
-  const e = heard.value,
-    old_ms = now_ms() - heard.at_ms,
+  const e = latest.value,
+    old_ms = now_ms() - latest.at_ms,
     stale = watched_mission.value?.state === 'recording' && (watched_lost() || old_ms > 10_000);
   const why = why_not_done(e);
   return (

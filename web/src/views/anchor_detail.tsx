@@ -31,7 +31,7 @@ function ErrorBudget({ budget }: { budget: Budget }) {
 export function AnchorDetail({ row: r, live, changed }: { row: AnchorRow; live: boolean; changed: () => void }) {
   tick.value;
   const why = why_not_done(r),
-    heard = live ? current_scene()?.anchors.get(r.anchor) : undefined;
+    latest = live ? current_scene()?.anchors.get(r.anchor) : undefined;
   const geo = r.lat !== null && r.lon !== null;
   return (
     <div data-testid="anchor-detail">
@@ -41,7 +41,7 @@ export function AnchorDetail({ row: r, live, changed }: { row: AnchorRow; live: 
           {r.name && <span class="meta">{r.name}</span>}
           <StatusChip status={r.status} />
           <span class="grow" />
-          {heard && <span class="meta">updated {age(now_ms() - heard.at_ms)} ago</span>}
+          {latest && <span class="meta">updated {age(now_ms() - latest.at_ms)} ago</span>}
         </div>
         {why && (
           <div

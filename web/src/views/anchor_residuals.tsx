@@ -1,7 +1,7 @@
 /// What each range says against the answer: residuals over distance and over bearing, where the weight comes from, and which ranges to doubt.
 import { useEffect, useState } from 'preact/hooks';
 import type { AnchorRow } from '../api/anchors';
-import { said } from '../api/client';
+import { error_text } from '../api/client';
 import { by_suspicion, residuals, SECTORS, solves, weight_by_sector, type Residual } from '../api/residuals';
 import { bearing, clock, fixed, millimetres, range_m } from '../ui/format';
 import { Axes, Drawing, scale, ticks, type Frame } from './chart';
@@ -33,7 +33,7 @@ export function AnchorResiduals({ row, mission }: { row: AnchorRow; mission: str
     };
     read().then(
       ([rows, none]) => tell(rows, none),
-      (e: unknown) => tell([], said(e)),
+      (e: unknown) => tell([], error_text(e)),
     );
     return () => {
       gone = true;

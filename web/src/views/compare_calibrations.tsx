@@ -1,7 +1,7 @@
 /// Two calibrations side by side: how far each anchor is from where the other has it, and whether that is more than both covariances allow.
 import { signal } from '@preact/signals';
 import { useEffect, useRef, useState } from 'preact/hooks';
-import { said } from '../api/client';
+import { error_text } from '../api/client';
 import { common_shift, shifts, solves, type Shift, type Solve } from '../api/residuals';
 import { mission_list, revision } from '../state/store';
 import { bearing, date, fixed, millimetres } from '../ui/format';
@@ -31,7 +31,7 @@ export function CompareCalibrations() {
         set_of(all[0]?.id ?? '');
         if (revision.peek() === null && all[1]) set_against(all[1].id);
       },
-      (e: unknown) => set_problem(said(e)),
+      (e: unknown) => set_problem(error_text(e)),
     );
   }, []);
   useEffect(() => {
@@ -44,7 +44,7 @@ export function CompareCalibrations() {
           if (!gone) set_rows(r);
         },
         (e: unknown) => {
-          if (!gone) set_problem(said(e));
+          if (!gone) set_problem(error_text(e));
         },
       );
     return () => {

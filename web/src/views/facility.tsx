@@ -1,6 +1,6 @@
 /// What the facility manager keeps of an anchor, read and edited where it stands.
 import { useEffect, useState } from 'preact/hooks';
-import { ApiError, said } from '../api/client';
+import { ApiError, error_text } from '../api/client';
 import { change_facility, facility, patch_of, type Facility, type Fields } from '../api/facility';
 import { draft_of } from '../state/drafts';
 import { may } from '../state/session';
@@ -26,7 +26,7 @@ export function FacilityPanel({ anchor, changed }: { anchor: string; changed: ()
     facility(anchor).then(
       (f) => set_read({ ...f, anchor }),
       (e: unknown) => {
-        if (!(e instanceof ApiError && e.problem.status === 404)) set_problem(said(e));
+        if (!(e instanceof ApiError && e.problem.status === 404)) set_problem(error_text(e));
       },
     ),
   );
@@ -130,7 +130,7 @@ function Form({ anchor, known, done, close, reload, failed }: Editing) {
       failed(
         overtaken
           ? 'Somebody changed this anchor meanwhile; their fields are shown, and yours are kept. Look again, then save.'
-          : said(e),
+          : error_text(e),
       );
       set_busy(false);
     }

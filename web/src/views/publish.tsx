@@ -1,7 +1,7 @@
 /// Review and publish: a fresh calibration of the whole flight, the result of every anchor against the live estimate, then one revision for facility tools.
 import { signal } from '@preact/signals';
 import { useEffect, useRef, useState } from 'preact/hooks';
-import { idempotency_key, said } from '../api/client';
+import { idempotency_key, error_text } from '../api/client';
 import {
   calibrate,
   moved_since_published,
@@ -43,7 +43,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
     try {
       await work();
     } catch (e) {
-      set_problem(said(e));
+      set_problem(error_text(e));
     }
     set_busy('');
   };

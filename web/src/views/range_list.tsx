@@ -14,7 +14,7 @@ export function RangeList({ selected }: { selected: string | null }) {
     lost = watched_lost(),
     running = watched_mission.value?.state === 'recording';
   const rows = scene ? [...scene.ranges.entries()].sort(([a], [b]) => (a < b ? -1 : 1)) : [];
-  const heard = rows.filter(([, r]) => now - r.at_ms < STALE_MS).length;
+  const in_range = rows.filter(([, r]) => now - r.at_ms < STALE_MS).length;
   const total_hz = rows.reduce((s, [, r]) => s + (now - r.at_ms < STALE_MS ? (rate_hz(r) ?? 0) : 0), 0);
   const modelled = rows.some(([, r]) => r.last.p_los !== null);
   return (
@@ -27,7 +27,7 @@ export function RangeList({ selected }: { selected: string | null }) {
             : lost
               ? `nothing for ${age(now - (scene?.range_at_ms ?? now))}`
               : running
-                ? `${heard} of ${rows.length} in range, ${fixed(total_hz, 0)} Hz`
+                ? `${in_range} of ${rows.length} in range, ${fixed(total_hz, 0)} Hz`
                 : `${rows.length} anchors, flight ended`}
         </span>
       </div>

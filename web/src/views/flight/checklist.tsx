@@ -1,7 +1,7 @@
 /// Before take-off: every item green, or a reason for it. Start is blocked until then, by this page and by the server.
 import { signal } from '@preact/signals';
 import { useEffect, useRef, useState } from 'preact/hooks';
-import { said } from '../../api/client';
+import { error_text } from '../../api/client';
 import { checklist, set_item, type ChecklistItem } from '../../api/flight';
 import { plans as fetch_plans, type Plan } from '../../api/plans';
 import { Icon, Mark } from '../../ui/marks';
@@ -30,7 +30,7 @@ export function Checklist({
         set_plans(list);
         set_plan(list[0]?.id ?? null);
       },
-      (e: unknown) => set_problem(said(e)),
+      (e: unknown) => set_problem(error_text(e)),
     );
   }, []);
   const look = useStable((): void => {
@@ -39,7 +39,7 @@ export function Checklist({
         set_items(list);
         set_problem('');
       },
-      (e: unknown) => set_problem(said(e)),
+      (e: unknown) => set_problem(error_text(e)),
     );
   });
   useEffect(() => {
@@ -49,7 +49,7 @@ export function Checklist({
   }, [mission, plan, look]);
   const open = items?.filter((i) => i.state !== 'ok') ?? [];
   const set = (item: ChecklistItem, reason: string): void => {
-    set_item(mission, item.id, reason).then(look, (e: unknown) => set_problem(said(e)));
+    set_item(mission, item.id, reason).then(look, (e: unknown) => set_problem(error_text(e)));
   };
   return (
     <section

@@ -1,7 +1,7 @@
 /// The flight bar: progress at the left, commands at the right. Many may watch, one may command: control is taken, shown and given back.
 import { signal } from '@preact/signals';
 import { useEffect } from 'preact/hooks';
-import { ApiError, said } from '../../api/client';
+import { ApiError, error_text } from '../../api/client';
 import { command, release_control, renew_control, take_control, type Action, type Lease } from '../../api/flight';
 import type { ProcedureMsg } from '../../live/flight_messages';
 import { may } from '../../state/session';
@@ -23,7 +23,7 @@ async function guarded(work: () => Promise<unknown>): Promise<void> {
   try {
     await work();
   } catch (e) {
-    problem.value = said(e);
+    problem.value = error_text(e);
     if (e instanceof ApiError && e.problem.type.endsWith('no-control')) lease.value = null;
     taken_by.value = e instanceof ApiError && e.problem.status === 409;
   }
@@ -55,8 +55,8 @@ export const hold_now = (): void => {
 export function FlightBar() {
   tick.value;
   const mission = current_mission.value,
-    heard = current_scene()?.procedure,
-    p = heard?.value;
+    latest = current_scene()?.procedure,
+    p = latest?.value;
   const mine = lease.value !== null && lease.value.mission === mission?.mission;
   const id = mission?.mission;
   useEffect(() => {

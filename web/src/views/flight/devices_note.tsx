@@ -1,6 +1,6 @@
 /// A flight that records without the devices, because another one has them: said where it is started, with the way to take them.
 import { useEffect, useState } from 'preact/hooks';
-import { said } from '../../api/client';
+import { error_text } from '../../api/client';
 import { devices_of, take_devices, type Devices } from '../../api/missions';
 import { may } from '../../state/session';
 import { events, link, say } from '../../state/store';
@@ -33,7 +33,7 @@ export function DevicesNote({ mission }: { mission: string }) {
       await take_devices(mission, holder.mission);
       say('This flight has the devices');
     } catch (e) {
-      set_problem(said(e));
+      set_problem(error_text(e));
     }
   };
   return (

@@ -14,14 +14,15 @@ const sentence = (reason: string): string =>
 export function Procedure() {
   tick.value;
   const scene = current_scene(),
-    heard = scene?.procedure;
-  if (!heard) return null;
-  const p = heard.value,
-    stale = link.value === 'lost' || now_ms() - heard.at_ms > 5000,
+    latest = scene?.procedure;
+  if (!latest) return null;
+  const p = latest.value,
+    stale = link.value === 'lost' || now_ms() - latest.at_ms > 5000,
     [shape, tone, word] = STATUS_LOOK[p.status],
     at = stage_of(p.step),
     next = next_step(p.step);
-  const since = p.in_step_s === null ? null : p.in_step_s + (flying(p) && !stale ? (now_ms() - heard.at_ms) / 1000 : 0);
+  const since =
+    p.in_step_s === null ? null : p.in_step_s + (flying(p) && !stale ? (now_ms() - latest.at_ms) / 1000 : 0);
   return (
     <section class="sec-p" data-testid="procedure">
       <div class="hd">

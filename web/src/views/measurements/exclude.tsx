@@ -1,6 +1,6 @@
 /// Measurements out of use: the chosen rows, or what the time and anchor of the filter say, with a reason; the list of them, each to be used again.
 import { useEffect, useRef, useState } from 'preact/hooks';
-import { idempotency_key, said } from '../../api/client';
+import { idempotency_key, error_text } from '../../api/client';
 import {
   exclude,
   exclusions_of,
@@ -37,7 +37,7 @@ export function ExcludePanel({
     [busy, set_busy] = useState(false),
     key = useRef(idempotency_key());
   const read = (): void => {
-    exclusions_of(mission).then(set_list, (e: unknown) => set_problem(said(e)));
+    exclusions_of(mission).then(set_list, (e: unknown) => set_problem(error_text(e)));
   };
   const begin = useStable((): void => {
     set_list(null);
@@ -55,7 +55,7 @@ export function ExcludePanel({
       say(words);
       read();
     } catch (e) {
-      set_problem(said(e));
+      set_problem(error_text(e));
     }
     key.current = idempotency_key();
     set_busy(false);

@@ -1,6 +1,6 @@
 /// One measurement: its impulse response over time, and where its features stand among LOS and NLOS.
 import { useEffect, useRef, useState } from 'preact/hooks';
-import { said } from '../../api/client';
+import { error_text } from '../../api/client';
 import { impulse, type Impulse, type Sample, type Source } from '../../api/measurements';
 import { fixed, grouped } from '../../ui/format';
 import { Chip, Icon, Q } from '../../ui/marks';
@@ -39,7 +39,7 @@ export function ImpulsePanel({
           if (!gone) set_loaded({ id, response });
         },
         (e: unknown) => {
-          if (!gone) set_problem(said(e));
+          if (!gone) set_problem(error_text(e));
         },
       );
     return () => {

@@ -1,7 +1,7 @@
 /// What the Measurements view looks at: source and filter, the pages of the list, what the plots are made of, and the row that is open.
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 import { settings_of } from '../../api/campaign';
-import { said } from '../../api/client';
+import { error_text } from '../../api/client';
 import {
   campaigns as fetch_campaigns,
   count_of,
@@ -64,7 +64,7 @@ export function useMeasurements() {
     now = useRef(key),
     current = asked?.key === key ? asked : null;
   now.current = key;
-  const failed = (e: unknown): void => set_problem(said(e));
+  const failed = (e: unknown): void => set_problem(error_text(e));
   /// Into the question it was asked for, if that is still what is looked at.
   const put = (part: (a: Asked) => Partial<Asked>): void =>
     set_asked((a) => {

@@ -1,6 +1,6 @@
 /// Recording a labelled place: which anchors are in range, the ranges of one as they come, and their import into the campaign.
 import { useEffect, useRef, useState } from 'preact/hooks';
-import { ApiError, idempotency_key, said } from '../../api/client';
+import { ApiError, idempotency_key, error_text } from '../../api/client';
 import { import_lines, make_campaign, newest_us, ranges_after, settings_of, type Setting } from '../../api/campaign';
 import type { Source } from '../../api/measurements';
 import { num } from '../../live/messages';
@@ -80,7 +80,7 @@ export function useTake(campaigns: readonly Source[], taken: (campaign: string) 
         look();
       }
     } catch (e) {
-      set_problem(said(e));
+      set_problem(error_text(e));
     }
     running.current = null;
     set_take(null);

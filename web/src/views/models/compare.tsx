@@ -1,6 +1,6 @@
 /// Two to four runs side by side: what each was trained on, what it reaches, and their curves in one drawing.
 import { useEffect, useState } from 'preact/hooks';
-import { said } from '../../api/client';
+import { error_text } from '../../api/client';
 import { is_bias, run_numbers, run_page, type Run, type RunNumbers, type Task } from '../../api/learning';
 import { fixed } from '../../ui/format';
 import { Icon } from '../../ui/marks';
@@ -112,7 +112,7 @@ export function Compare({ task, runs, close }: { task: Task; runs: readonly stri
         }
       },
       (e: unknown) => {
-        if (!gone) set_problem(said(e));
+        if (!gone) set_problem(error_text(e));
       },
     );
     return () => {

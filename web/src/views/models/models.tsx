@@ -3,7 +3,7 @@ import { signal } from '@preact/signals';
 import { useState } from 'preact/hooks';
 import '../desk.css';
 import './models.css';
-import { said } from '../../api/client';
+import { error_text } from '../../api/client';
 import { cancel_job, TASKS, type Model, type Run, type RunNumbers } from '../../api/learning';
 import { CopyBox } from '../../ui/copy_box';
 import { fixed } from '../../ui/format';
@@ -91,7 +91,7 @@ export function Models({ path }: { path: string | null }) {
               <button
                 class="btn"
                 data-testid="cancel"
-                onClick={() => void cancel_job(chosen.job!).then(reload, (e: unknown) => set_problem(said(e)))}
+                onClick={() => void cancel_job(chosen.job!).then(reload, (e: unknown) => set_problem(error_text(e)))}
               >
                 Cancel
               </button>

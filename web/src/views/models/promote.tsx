@@ -1,6 +1,6 @@
 /// Promotion: what the gate says first; past a gate that does not pass only with a typed reason, which is kept.
 import { useEffect, useRef, useState } from 'preact/hooks';
-import { idempotency_key, said } from '../../api/client';
+import { idempotency_key, error_text } from '../../api/client';
 import { gate_of, promote, type Gate } from '../../api/learning';
 import { say } from '../../state/store';
 import { fixed } from '../../ui/format';
@@ -25,7 +25,7 @@ export function Promote({
     box = useRef<HTMLElement>(null);
   useEffect(() => {
     box.current?.focus();
-    gate_of(model).then(set_gate, (e: unknown) => set_problem(said(e)));
+    gate_of(model).then(set_gate, (e: unknown) => set_problem(error_text(e)));
   }, [model]);
   const send = async (): Promise<void> => {
     set_busy(true);
@@ -34,7 +34,7 @@ export function Promote({
       say('Promoted: from the next range on');
       done();
     } catch (e) {
-      set_problem(said(e));
+      set_problem(error_text(e));
       key.current = idempotency_key();
     }
     set_busy(false);

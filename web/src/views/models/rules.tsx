@@ -1,6 +1,6 @@
 /// Rules: what decides without any learning, per data set, beside which a learned model must show its worth (tables 5.2 and 5.3).
 import { useEffect, useState } from 'preact/hooks';
-import { said } from '../../api/client';
+import { error_text } from '../../api/client';
 import {
   datasets as fetch_datasets,
   rules_of,
@@ -29,7 +29,7 @@ export function Rules() {
     [rules, set_rules] = useState<{ of: string; rules: RulesOf } | null>(null),
     [problem, set_problem] = useState('');
   useEffect(() => {
-    fetch_datasets().then(set_sets, (e: unknown) => set_problem(said(e)));
+    fetch_datasets().then(set_sets, (e: unknown) => set_problem(error_text(e)));
   }, []);
   const chosen = wanted ?? sets?.[0]?.id ?? null,
     shown = rules?.of === chosen ? rules.rules : null;
@@ -44,7 +44,7 @@ export function Rules() {
         }
       },
       (e: unknown) => {
-        if (!gone) set_problem(said(e));
+        if (!gone) set_problem(error_text(e));
       },
     );
     return () => {

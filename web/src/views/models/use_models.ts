@@ -1,7 +1,7 @@
 /// What the Models view looks at: the task, its runs and models, the numbers of the chosen run, and what is compared. Follows running jobs.
 import { signal } from '@preact/signals';
 import { useEffect, useState } from 'preact/hooks';
-import { idempotency_key, said } from '../../api/client';
+import { idempotency_key, error_text } from '../../api/client';
 import {
   models as fetch_models,
   roll_back,
@@ -59,7 +59,7 @@ export function useModels(path: string | null) {
         }
       },
       (e: unknown) => {
-        if (!gone) set_problem(said(e));
+        if (!gone) set_problem(error_text(e));
       },
     );
     return () => {
@@ -90,7 +90,7 @@ export function useModels(path: string | null) {
         }
       })
       .catch((e: unknown) => {
-        if (!gone) set_problem(said(e));
+        if (!gone) set_problem(error_text(e));
       });
     return () => {
       gone = true;
@@ -112,7 +112,7 @@ export function useModels(path: string | null) {
       say('Rolled back');
       reload();
     } catch (e) {
-      set_problem(said(e));
+      set_problem(error_text(e));
     }
   };
   return {

@@ -1,7 +1,7 @@
 /// One open plan: its drawing with undo, what is saved of it, the check of it, and the requests that change it. No DOM but the title.
 import { useEffect, useLayoutEffect, useState } from 'preact/hooks';
 import { published, type AnchorRow } from '../../api/anchors';
-import { ApiError, said } from '../../api/client';
+import { ApiError, error_text } from '../../api/client';
 import {
   check as fetch_check,
   check_drawn,
@@ -32,7 +32,7 @@ import {
   type Picked,
 } from './draft';
 
-const JUDGED_AFTER_MS = 500; ///< of no change: a drag is not judged at every step
+const CHECKED_AFTER_MS = 500; ///< of no change: a drag is not checked at every step
 
 export type Desk = ReturnType<typeof usePlan>;
 
@@ -42,7 +42,7 @@ export function usePlan(id: string | null) {
     [history, set_history] = useState<History>(begun(EMPTY)),
     [saved, set_saved] = useState<PlanDoc>(EMPTY),
     [picked, pick] = useState<Picked | null>(null);
-  const [judged, set_judged] = useState<{ readonly of: string; readonly check: Check } | null>(null),
+  const [checked, set_checked] = useState<{ readonly of: string; readonly check: Check } | null>(null),
     [problem, set_problem] = useState(''),
     [theirs, set_theirs] = useState<PlanDoc | null>(null),
     [notes, set_notes] = useState<readonly string[]>([]),
@@ -59,7 +59,7 @@ export function usePlan(id: string | null) {
     set_history(begun(p));
     set_saved(p);
     pick(null);
-    set_judged(null);
+    set_checked(null);
     set_theirs(null);
     set_notes([]);
     set_back(null);
@@ -80,7 +80,7 @@ export function usePlan(id: string | null) {
     try {
       await work();
     } catch (e) {
-      set_problem(said(e));
+      set_problem(error_text(e));
     }
     set_busy('');
   };
@@ -96,7 +96,7 @@ export function usePlan(id: string | null) {
             (last === draft_key(null) ? EMPTY : list[0]);
         open_with_draft(wanted ?? EMPTY);
       },
-      (e: unknown) => set_problem(said(e)),
+      (e: unknown) => set_problem(error_text(e)),
     );
   });
   useEffect(begin, [id, begin]);
@@ -106,10 +106,10 @@ export function usePlan(id: string | null) {
       () => undefined,
     );
   }, []);
-  // Judged while it is drawn; whoever may only look sees what is saved judged. The last judgement stays, grey, until the next comes.
+  // Checked while it is drawn; whoever may only look sees what is saved checked. The last check stays, grey, until the next comes.
   const drawn = JSON.stringify({ ...plan, name: '', revision: 0, id: null }),
-    check = judged?.check ?? null;
-  const judge = useStable((): Promise<Check> | null => {
+    check = checked?.check ?? null;
+  const run_check = useStable((): Promise<Check> | null => {
     if (!dirty) return saved.id ? fetch_check(saved.id) : null;
     return engineer && (plan.waypoints.length > 0 || plan.outline.length > 2) ? check_drawn(plan) : null;
   });
@@ -117,19 +117,19 @@ export function usePlan(id: string | null) {
     let gone = false;
     const timer = setTimeout(
       () =>
-        void judge()?.then(
+        void run_check()?.then(
           (c) => {
-            if (!gone) set_judged({ of: drawn, check: c });
+            if (!gone) set_checked({ of: drawn, check: c });
           },
           () => undefined,
         ),
-      dirty ? JUDGED_AFTER_MS : 0,
+      dirty ? CHECKED_AFTER_MS : 0,
     );
     return () => {
       gone = true;
       clearTimeout(timer);
     };
-  }, [drawn, dirty, saved.id, judge]);
+  }, [drawn, dirty, saved.id, run_check]);
   // With the change itself, not after the next picture: the page may be gone by then.
   const listed = all !== null;
   useLayoutEffect(() => {
@@ -197,7 +197,7 @@ export function usePlan(id: string | null) {
     picked,
     pick,
     check,
-    check_is_old: judged !== null && judged.of !== drawn,
+    check_is_old: checked !== null && checked.of !== drawn,
     problem,
     theirs,
     notes,

@@ -1,7 +1,7 @@
 /// Replay: a stored flight on the same map and lists as the live one, with its clock in the viewer's hand. No command exists here.
 import { useEffect, useRef, useState } from 'preact/hooks';
 import './replay.css';
-import { said } from '../../api/client';
+import { error_text } from '../../api/client';
 import { rows_of_collection } from '../../api/anchors';
 import { request } from '../../api/client';
 import { MapBox } from '../../map/map_box';
@@ -46,7 +46,7 @@ export function Replay({ id }: { id: string | null }) {
         set_player(made);
       },
       (e: unknown) => {
-        if (!gone) set_problem(said(e));
+        if (!gone) set_problem(error_text(e));
       },
     );
     return () => {

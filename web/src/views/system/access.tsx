@@ -1,6 +1,6 @@
 /// Who may use this server, and what was done on it: tokens with one role each, and the audit log.
 import { useEffect, useState } from 'preact/hooks';
-import { said } from '../../api/client';
+import { error_text } from '../../api/client';
 import {
   audit as fetch_audit,
   create_token,
@@ -32,7 +32,7 @@ export function AccessPanel() {
     [secret, set_secret] = useState(''),
     [sure, set_sure] = useState('');
   const load = (): void => {
-    fetch_tokens().then(set_all, (e: unknown) => set_problem(said(e)));
+    fetch_tokens().then(set_all, (e: unknown) => set_problem(error_text(e)));
   };
   useEffect(load, []);
   const guarded = async (work: () => Promise<void>): Promise<void> => {
@@ -41,7 +41,7 @@ export function AccessPanel() {
       await work();
       load();
     } catch (e) {
-      set_problem(said(e));
+      set_problem(error_text(e));
     }
   };
   const create = (): void =>
@@ -153,7 +153,7 @@ export function AuditPanel() {
   const [lines, set_lines] = useState<readonly AuditLine[]>([]),
     [problem, set_problem] = useState('');
   useEffect(() => {
-    fetch_audit().then(set_lines, (e: unknown) => set_problem(said(e)));
+    fetch_audit().then(set_lines, (e: unknown) => set_problem(error_text(e)));
   }, []);
   return (
     <section class="sys-p" data-testid="audit">

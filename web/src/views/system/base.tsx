@@ -1,6 +1,6 @@
 /// What every position rests on: where the base stands, in which datum and epoch, how well that is known.
 import { useEffect, useState } from 'preact/hooks';
-import { said } from '../../api/client';
+import { error_text } from '../../api/client';
 import { devices as fetch_devices, type Device } from '../../api/devices';
 import { change_site, create_site, sites as fetch_sites, type BaseSource, type Site } from '../../api/site';
 import { may } from '../../state/session';
@@ -53,7 +53,7 @@ export function BasePanel() {
     [editing, set_editing] = useState(false),
     [problem, set_problem] = useState('');
   const load = (): void => {
-    fetch_sites().then(set_list, (e: unknown) => set_problem(said(e)));
+    fetch_sites().then(set_list, (e: unknown) => set_problem(error_text(e)));
     fetch_devices().then(
       (all) => set_bases(all.filter((d) => d.kind === 'ntrip' && d.enabled)),
       () => undefined,
@@ -66,7 +66,7 @@ export function BasePanel() {
   }, []);
   const site = list?.find((s) => s.id === chosen) ?? list?.[0] ?? null,
     words = site && base_words(site),
-    told = bases.find((d) => d.base)?.base ?? null,
+    reported = bases.find((d) => d.base)?.base ?? null,
     admin = may('admin');
   return (
     <section class="sys-p" data-testid="base">
@@ -133,43 +133,43 @@ export function BasePanel() {
         </dl>
       )}
       <h3>Where corrections come from</h3>
-      {told ? (
+      {reported ? (
         <>
           <dl class="kv s" data-testid="base-place">
             <div>
               <dt>Latitude</dt>
               <dd>
-                <Q v={latlon(told.lat)} u="°" />
+                <Q v={latlon(reported.lat)} u="°" />
               </dd>
             </div>
             <div>
               <dt>Longitude</dt>
               <dd>
-                <Q v={latlon(told.lon)} u="°" />
+                <Q v={latlon(reported.lon)} u="°" />
               </dd>
             </div>
             <div>
               <dt>Height, ellipsoidal</dt>
               <dd>
-                <Q v={fixed(told.h_m, 3)} u="m" />
+                <Q v={fixed(reported.h_m, 3)} u="m" />
               </dd>
             </div>
             <div>
               <dt>Station</dt>
-              <dd>{told.station ?? '–'}</dd>
+              <dd>{reported.station ?? '–'}</dd>
             </div>
-            {told.antenna_height_m !== null && (
+            {reported.antenna_height_m !== null && (
               <div>
                 <dt>Antenna above its marker</dt>
                 <dd>
-                  <Q v={fixed(told.antenna_height_m, 3)} u="m" />
+                  <Q v={fixed(reported.antenna_height_m, 3)} u="m" />
                 </dd>
               </div>
             )}
           </dl>
           <CopyBox
             label="Copy the place of the base"
-            text={`${plain(told.lat, 9)}, ${plain(told.lon, 9)}, ${plain(told.h_m, 3)}`}
+            text={`${plain(reported.lat, 9)}, ${plain(reported.lon, 9)}, ${plain(reported.h_m, 3)}`}
           />
         </>
       ) : (
@@ -218,7 +218,7 @@ function DatumForm({ site, done, close }: { site: Site | null; done: () => void;
       say('Kept: it goes out with every position from now on');
       done();
     } catch (e) {
-      set_problem(said(e));
+      set_problem(error_text(e));
     }
   };
   return (

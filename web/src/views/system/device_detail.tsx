@@ -10,7 +10,7 @@ import { by_count, dropped_words } from './standing';
 
 interface Props {
   readonly row: Row;
-  readonly heard: readonly Device[];
+  readonly radios: readonly Device[];
   readonly operator: boolean;
   readonly busy: boolean;
   readonly run: Run;
@@ -19,7 +19,7 @@ interface Props {
   readonly gone: () => void;
 }
 
-export function DeviceDetail({ row: { d, recent }, heard, operator, busy, run, edit, tune, gone }: Props) {
+export function DeviceDetail({ row: { d, recent }, radios, operator, busy, run, edit, tune, gone }: Props) {
   const [sure, set_sure] = useState(false),
     talks = d.state === 'talking',
     drops = by_count(d.dropped),
@@ -121,7 +121,7 @@ export function DeviceDetail({ row: { d, recent }, heard, operator, busy, run, e
             </table>
           )}
         </div>
-        {d.kind === 'pozyx' && <Anchors d={d} heard={heard} may_ask={operator && talks && !busy} run={run} />}
+        {d.kind === 'pozyx' && <Anchors d={d} radios={radios} may_ask={operator && talks && !busy} run={run} />}
       </div>
       {operator && (
         <div class="actions">
@@ -192,12 +192,12 @@ export function DeviceDetail({ row: { d, recent }, heard, operator, busy, run, e
 }
 
 /// Anchors in the reach of a tag: who answers now, and which one on the wall is which.
-function Anchors({ d, heard, may_ask, run }: { d: Device; heard: readonly Device[]; may_ask: boolean; run: Run }) {
+function Anchors({ d, radios, may_ask, run }: { d: Device; radios: readonly Device[]; may_ask: boolean; run: Run }) {
   const [seen, set_seen] = useState<readonly string[] | null>(null),
     [blinking, set_blinking] = useState('');
   const known =
     seen ??
-    [...new Set(heard.filter((h) => h.kind === 'anchor' && h.network_id).map((h) => h.network_id!))].slice(0, 24);
+    [...new Set(radios.filter((h) => h.kind === 'anchor' && h.network_id).map((h) => h.network_id!))].slice(0, 24);
   const look = (): void =>
     void run(
       'look',

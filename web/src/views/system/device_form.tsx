@@ -1,6 +1,6 @@
 /// Setting a device up, or changing one: where it is, and what its kind can be told. Restored after a reload until it is sent.
 import { useState } from 'preact/hooks';
-import { said } from '../../api/client';
+import { error_text } from '../../api/client';
 import { add_device, device_at, edit_device, type Device, type Found } from '../../api/devices';
 import { say } from '../../state/store';
 import { useDraft } from '../../ui/use_draft';
@@ -44,7 +44,7 @@ export function DeviceForm({
       say(device ? 'Changed; its link is being opened anew' : 'Set up; its link is being opened');
       done();
     } catch (e) {
-      set_problem(said(e));
+      set_problem(error_text(e));
     }
     set_busy(false);
   };

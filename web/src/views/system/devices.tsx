@@ -1,7 +1,7 @@
-/// Devices: those this server drives, each with what is wrong and what to do, then every radio that was heard. Discovery and set-up for who may.
+/// Devices: those this server drives, each with what is wrong and what to do, then every radio that was in range. Discovery and set-up for who may.
 import { Fragment } from 'preact';
 import { useState } from 'preact/hooks';
-import { said } from '../../api/client';
+import { error_text } from '../../api/client';
 import { act_on_device, discover, type Found, type Radio } from '../../api/devices';
 import { may } from '../../state/session';
 import { say, server_now_us } from '../../state/store';
@@ -11,7 +11,7 @@ import { Chip, Mark, Q } from '../../ui/marks';
 import { DeviceDetail } from './device_detail';
 import { DeviceForm } from './device_form';
 import { kind_words, parts_of, type Setup } from './device_setup';
-import { Heard } from './heard';
+import { RadiosInRange } from './radios_in_range';
 import { RadioPanel, RadioWarning } from './radio';
 import { useDevices, type Row } from './use_devices';
 import { by_count, doing, dropped_words, lost_messages, summary } from './standing';
@@ -29,7 +29,7 @@ export function DevicesPanel() {
     [radio, set_radio] = useState<string | null>(null),
     [compared, set_compared] = useState<Readonly<Record<string, Radio>>>({});
   const operator = may('operator', 'op'),
-    heard = all?.filter((d) => d.id === null) ?? [],
+    radios = all?.filter((d) => d.id === null) ?? [],
     edited = rows.find((r) => r.d.id === editing)?.d ?? null,
     tuned = rows.find((r) => r.d.id === radio)?.d ?? null;
   const run: Run = async (what, work, done) => {
@@ -40,7 +40,7 @@ export function DevicesPanel() {
       if (done) say(done);
       load();
     } catch (e) {
-      set_failed(said(e));
+      set_failed(error_text(e));
     }
     set_busy('');
   };
@@ -147,7 +147,7 @@ export function DevicesPanel() {
                               key={radio}
                               device={tuned}
                               may_change={operator}
-                              told={(now) => set_compared({ ...compared, [radio!]: now })}
+                              reported={(now) => set_compared({ ...compared, [radio!]: now })}
                               close={() => set_radio(null)}
                             />
                           )}
@@ -163,7 +163,7 @@ export function DevicesPanel() {
                           {open === r.d.id && (
                             <DeviceDetail
                               row={r}
-                              heard={heard}
+                              radios={radios}
                               operator={operator}
                               busy={busy !== ''}
                               run={run}
@@ -182,7 +182,7 @@ export function DevicesPanel() {
           </table>
         </div>
       )}
-      {heard.length > 0 && <Heard heard={heard} />}
+      {radios.length > 0 && <RadiosInRange radios={radios} />}
     </section>
   );
 }

@@ -1,6 +1,6 @@
 /// Stored flights: which there are, deleting one, and getting it back.
 import { useEffect, useState } from 'preact/hooks';
-import { said } from '../../api/client';
+import { error_text } from '../../api/client';
 import { delete_flight, deleted_flights, restore_flight, stored_flights, type StoredFlight } from '../../api/missions';
 import { may } from '../../state/session';
 import { load_missions } from '../../state/archive';
@@ -21,7 +21,7 @@ export function FlightsPanel() {
         set_all(a);
         set_bin(b);
       },
-      (e: unknown) => set_problem(said(e)),
+      (e: unknown) => set_problem(error_text(e)),
     );
   };
   const newest = events.value.filter((e) => e.code.startsWith('mission.')).length;
@@ -33,7 +33,7 @@ export function FlightsPanel() {
       await work();
       say(done);
     } catch (e) {
-      set_problem(said(e));
+      set_problem(error_text(e));
     }
     load();
   };

@@ -1,6 +1,6 @@
 /// Radio settings of a tag and of everything in its reach: read from it now, compared with every anchor, set everywhere and verified, or set back everywhere.
 import { useEffect, useState } from 'preact/hooks';
-import { said } from '../../api/client';
+import { error_text } from '../../api/client';
 import { compare_radio, read_radio, set_radio, type Device, type Radio } from '../../api/devices';
 import { mission_list } from '../../state/store';
 import { Mark } from '../../ui/marks';
@@ -18,12 +18,12 @@ const CHOICES: readonly (readonly [Exclude<keyof Radio, 'gain_db' | 'devices'>, 
 export function RadioPanel({
   device,
   may_change,
-  told,
+  reported,
   close,
 }: {
   device: Device;
   may_change: boolean;
-  told: (radio: Radio) => void;
+  reported: (radio: Radio) => void;
   close: () => void;
 }) {
   const [radio, set] = useState<Radio | null>(null),
@@ -35,7 +35,7 @@ export function RadioPanel({
   const take = (r: Radio): void => {
     set(r);
     set_now(r);
-    told(r);
+    reported(r);
   };
   const work = async (what: string, ask: () => Promise<Radio>): Promise<Radio | null> => {
     set_busy(what);
@@ -45,7 +45,7 @@ export function RadioPanel({
     try {
       take((answer = await ask()));
     } catch (e) {
-      set_problem(said(e));
+      set_problem(error_text(e));
     }
     set_busy('');
     return answer;
@@ -188,7 +188,7 @@ export function RadioPanel({
   );
 }
 
-/// Tags that differ from each other, or anchors that were seen to differ from their tag, told until it is mended.
+/// Tags that differ from each other, or anchors that were seen to differ from their tag, reported until it is mended.
 /// Reads the tags once and whenever one begins to talk.
 export function RadioWarning({
   devices,

@@ -317,20 +317,20 @@ function delivering(d: Device, recent: Lately): Standing {
     return stand('estimating', 'info', 'OPENING', 'It talks; waiting for its first range.');
   return stand('ok', 'ok', 'WORKING');
 }
-/// `twin_speaks`: another device here with this one's id has a link.
-export function standing(d: Device, recent: Lately, twin_speaks = true): Standing {
+/// `same_id_speaks`: another device here with this one's id has a link.
+export function standing(d: Device, recent: Lately, same_id_speaks = true): Standing {
   const trouble = /^not started: (.*?)(; correct its settings or remove it)?$/.exec(d.reason)?.[1];
   if (d.enabled && trouble) return bad('NOT STARTED', sentence(trouble), 'Edit: correct its settings, or forget it.');
   if (!d.enabled || d.state === 'off') return stand('off', 'off', 'OFF');
-  const twin = twin_speaks && /is also device/.test(d.conflict),
+  const same_id = same_id_speaks && /is also device/.test(d.conflict),
     linked = d.state !== 'lost' && d.state !== 'found';
-  if (twin && !linked)
+  if (same_id && !linked)
     return caution(
       'ELSEWHERE',
       sentence(without_ids(d.conflict).replace('is also', 'speaks as')),
       'If the tag was moved to another port: forget this one. If these are two tags: one needs another id.',
     );
-  if (twin)
+  if (same_id)
     return bad(
       'ID TWICE',
       sentence(without_ids(d.conflict)),

@@ -1,6 +1,6 @@
 /// The devices of this server, read every two seconds, with what each stands for.
 import { useEffect, useRef, useState } from 'preact/hooks';
-import { said } from '../../api/client';
+import { error_text } from '../../api/client';
 import { devices as fetch_devices, type Device } from '../../api/devices';
 import { lately, LATELY_MS, standing, type Lately, type Look, type Standing } from './standing';
 
@@ -33,7 +33,7 @@ export function useDevices(): {
         set_all(list);
         set_problem('');
       },
-      (e: unknown) => set_problem(said(e)),
+      (e: unknown) => set_problem(error_text(e)),
     );
   };
   useEffect(() => {

@@ -1,4 +1,4 @@
-/// Every radio that was heard in any flight, with how it stands while one is recorded.
+/// Every radio that was in range in any flight, with how it stands while one is recorded.
 import type { Device } from '../../api/devices';
 import { devices as live_devices, mission_list, server_now_us } from '../../state/store';
 import { age } from '../../ui/format';
@@ -6,7 +6,7 @@ import { Chip, type Shape, type Tone } from '../../ui/marks';
 
 const LOOK: Record<string, [Shape, Tone]> = { live: ['ok', 'ok'], late: ['caution', 'caution'], lost: ['bad', 'bad'] };
 
-export function Heard({ heard }: { heard: readonly Device[] }) {
+export function RadiosInRange({ radios }: { radios: readonly Device[] }) {
   const flying = mission_list.value.some((m) => m.state === 'recording'),
     live = new Map(live_devices.value.map((d) => [d.network_id, d]));
   return (
@@ -23,7 +23,7 @@ export function Heard({ heard }: { heard: readonly Device[] }) {
           </tr>
         </thead>
         <tbody>
-          {heard.slice(0, 100).map((d, i) => {
+          {radios.slice(0, 100).map((d, i) => {
             // Silence is news only while a flight is recorded.
             const now = flying ? live.get(d.network_id ?? '')?.state : undefined,
               [shape, tone] = LOOK[now ?? ''] ?? ['off', 'off'];
