@@ -5,6 +5,7 @@
 #include "api/json/budget_json.hpp"
 #include "api/json/live_writer.hpp"
 #include "api/json/reader.hpp"
+#include "api/json/word_table.hpp"
 #include "core/base/to_wire.hpp"
 
 namespace anchord::api {
@@ -26,6 +27,11 @@ Ordered or_null(const std::optional<T>& value) {
 }
 
 /// Longest texts of facility data; beyond it somebody pastes a document into a field.
+constexpr auto k_frames =
+    std::to_array<Word<TrackFrame>>({{"wgs84", TrackFrame::wgs84}, {"local", TrackFrame::local}});
+constexpr auto k_points = std::to_array<Word<TrackPoint>>({{"gnss_antenna", TrackPoint::gnss_antenna},
+                                                           {"body", TrackPoint::body},
+                                                           {"tag_antenna", TrackPoint::tag_antenna}});
 constexpr std::size_t k_max_text = 200;
 
 /// In a merge-patch null clears, absent keeps.
@@ -76,11 +82,9 @@ Mission read_mission(const Json& body, std::vector<FieldError>& errors) {
     else
       fields.error("site", "bad_id", id.error().message);
   }
-  if (const auto frame = fields.word("frame", {"wgs84", "local"}, true))
-    mission.frame = static_cast<TrackFrame>(*frame);
+  if (const auto frame = value_of_word(fields, "frame", k_frames, true)) mission.frame = *frame;
   // Required: an arm applied to the wrong point is a silent error of decimetres.
-  if (const auto point = fields.word("track_point", {"gnss_antenna", "body", "tag_antenna"}, true))
-    mission.point = static_cast<TrackPoint>(*point);
+  if (const auto point = value_of_word(fields, "track_point", k_points, true)) mission.point = *point;
   if (const Json* tags = fields.child("tags")) {
     if (!tags->is_array() || tags->size() > 64) {
       fields.error("tags", "wrong_type", "must be an array of at most 64 tag antennas");

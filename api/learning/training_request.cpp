@@ -4,10 +4,17 @@
 #include <nlohmann/json.hpp>
 
 #include "api/json/reader.hpp"
+#include "api/json/word_table.hpp"
 #include "core/base/text.hpp"
 
 namespace anchord::api {
 namespace {
+
+/// A session is a campaign under its other name.
+constexpr auto k_group_by = std::to_array<Word<Place>>({{"environment", Place::environment},
+                                                        {"campaign", Place::campaign},
+                                                        {"setting", Place::setting},
+                                                        {"session", Place::campaign}});
 
 using Json = nlohmann::json;
 
@@ -115,8 +122,7 @@ TrainingRequest read_training_request(const Json& body, std::vector<FieldError>&
         inner.integer("folds", 2, 100).value_or(static_cast<std::int64_t>(spec.folds)));
     spec.seed = static_cast<std::uint64_t>(
         inner.integer("seed", 0, 1'000'000'000).value_or(static_cast<std::int64_t>(spec.seed)));
-    if (const auto word = inner.word("group_by", {"environment", "campaign", "setting", "session"}))
-      out.group_by = *word == 3 ? Place::campaign : static_cast<Place>(*word);
+    if (const auto by = value_of_word(inner, "group_by", k_group_by)) out.group_by = *by;
     inner.finish();
   }
   if (const Json* grid = fields.child("grid")) read_grid(*grid, spec, errors);

@@ -6,6 +6,7 @@
 #include "api/json/check_points_json.hpp"
 #include "api/json/clues_json.hpp"
 #include "api/json/reader.hpp"
+#include "api/json/word_table.hpp"
 #include "api/services/calibration_service.hpp"
 #include "core/base/to_wire.hpp"
 
@@ -16,6 +17,20 @@ using Json = nlohmann::json;
 namespace {
 
 constexpr double k_far_m = 20'000;  // of the origin, as for the track
+
+constexpr auto k_solvers =
+    std::to_array<Word<anchord::Method>>({{"gauss_newton", anchord::Method::gauss_newton},
+                                          {"levenberg_marquardt", anchord::Method::levenberg_marquardt},
+                                          {"dogleg", anchord::Method::dogleg}});
+constexpr auto k_weights = std::to_array<Word<Weights>>(
+    {{"inverse_variance", Weights::inverse_variance}, {"dissertation", Weights::as_printed}});
+constexpr auto k_losses = std::to_array<Word<Loss>>(
+    {{"none", Loss::none}, {"huber", Loss::huber}, {"cauchy", Loss::cauchy}, {"tukey", Loss::tukey}});
+constexpr auto k_fixes = std::to_array<Word<FixClass>>({{"none", FixClass::none},
+                                                        {"single", FixClass::single},
+                                                        {"dgps", FixClass::dgps},
+                                                        {"float", FixClass::rtk_float},
+                                                        {"fixed", FixClass::rtk_fixed}});
 
 /// A word, or where to begin for each anchor that is named.
 void read_initial(Fields& fields, const Json& initial, FlightOptions& options,
@@ -64,14 +79,11 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
   read_ids("learn_from", out.learn_from);
   auto& options = out.options;
   if (const auto dims = fields.integer("dims", 2, 3)) options.dims = *dims == 2 ? Dims::two : Dims::three;
-  if (const auto solver = fields.word("solver", {"gauss_newton", "levenberg_marquardt", "dogleg"}))
-    options.method = static_cast<anchord::Method>(*solver);
-  if (const auto weights = fields.word("weights", {"inverse_variance", "dissertation"}))
-    options.weights = static_cast<Weights>(*weights);
+  if (const auto solver = value_of_word(fields, "solver", k_solvers)) options.method = *solver;
+  if (const auto weights = value_of_word(fields, "weights", k_weights)) options.weights = *weights;
   if (const Json* loss = fields.child("loss")) {
     Fields inner(*loss, "/loss", errors);
-    if (const auto type = inner.word("type", {"none", "huber", "cauchy", "tukey"}, true))
-      options.loss = static_cast<Loss>(*type);
+    if (const auto type = value_of_word(inner, "type", k_losses, true)) options.loss = *type;
     // The robust scale comes from the residuals themselves; `scale` stretches it, 1.5 being the neutral value
     // of api.md.
     if (const auto scale = inner.number("scale", 0.1, 10)) options.mad_factor *= *scale / 1.5;
@@ -93,8 +105,7 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
       options.height_prior = {*height, *sigma};
   }
   if (const auto gap = fields.number("max_gap_s", 0.01, 10)) options.max_gap_s = *gap;
-  if (const auto fix = fields.word("min_fix", {"none", "single", "dgps", "float", "fixed"}))
-    options.min_fix = static_cast<FixClass>(*fix);
+  if (const auto fix = value_of_word(fields, "min_fix", k_fixes)) options.min_fix = *fix;
   out.max_correction_age_s = fields.number("max_correction_age_s", 0.1, 3600);
   out.max_speed_mps = fields.number("max_speed_mps", 1, 1000);
   out.max_acceleration_mps2 = fields.number("max_acceleration_mps2", 1, 1000);
