@@ -131,8 +131,7 @@ void describe(Report& report, const std::vector<Mission>& missions, const std::s
   for (const auto& anchor : report.anchors) {
     if (!anchor.estimate.mirror) continue;
     report.remarks.push_back(
-        (anchor.name.empty() ? to_string(anchor.estimate.anchor) : anchor.name) +
-        " has a mirror solution, " +
+        (anchor.name.empty() ? to_string(anchor.estimate.anchor) : anchor.name) + " has a mirror solution, " +
         number((anchor.estimate.best->position.m - anchor.estimate.mirror->position.m).norm(), 2) +
         " m away (probability " + number(anchor.estimate.mirror->probability, 2) + ").");
   }

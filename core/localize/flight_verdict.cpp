@@ -198,8 +198,8 @@ void judge_twins(const FlightRows& flight, AnchorSolution& solution, const std::
   }
   const double apart_m = (twin->fit.position_m - estimate.best->position.m).norm();
   estimate.reason =
-      text("mirror: a solution %.2f m away fits as well (cost %+.2f, %.2f m apart horizontally)",
-           apart_m, twin->worse, twin->horizontal_m);
+      text("mirror: a solution %.2f m away fits as well (cost %+.2f, %.2f m apart horizontally)", apart_m,
+           twin->worse, twin->horizontal_m);
   if (!geometry.reason.empty()) estimate.reason += "; " + geometry.reason;
   // Until someone says which, the claimed height must hold both.
   estimate.v95_m = std::max(

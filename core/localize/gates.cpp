@@ -209,9 +209,9 @@ std::vector<Gate> gates_of(const FlightRows& flight, const JointFit& fit, std::s
       at_most("precision", spread, limits.precision, "largest sigma, of height too, over the median range"));
   const bool plane = options.dims == Dims::three && solution.determined == Determined::horizontal;
   const double side = plane && !estimate.mirror ? 0.5 : estimate.best->probability;
-  gates.push_back(at_least(
-      "side", side, limits.side_probability,
-      estimate.mirror ? "probability of this side; the other is given as mirror" : "no mirror solution fits as well"));
+  gates.push_back(at_least("side", side, limits.side_probability,
+                           estimate.mirror ? "probability of this side; the other is given as mirror"
+                                           : "no mirror solution fits as well"));
   if (plane && !estimate.mirror) gates.back().why = "the track is a plane: height not determined";
   if (!options.outline_m.empty()) {
     const double outside_m = outside_outline_m(options.outline_m, estimate.best->position.m);

@@ -297,9 +297,10 @@ Result<FlightPlan> plan_flight(const FlightPlanInput& input, const FlightPlanOpt
   const auto all = candidates(input, options, bounds);
   plan.n_candidates = all.size();
   if (static_cast<int>(all.size()) < options.min_points) {
-    return make_error(Errc::not_found, "only " + std::to_string(all.size()) +
-                                           " points to fly to are left by fence, no-fly areas and clearance, need " +
-                                           std::to_string(options.min_points));
+    return make_error(Errc::not_found,
+                      "only " + std::to_string(all.size()) +
+                          " points to fly to are left by fence, no-fly areas and clearance, need " +
+                          std::to_string(options.min_points));
   }
   plan.assumed_anchors_m = assumed_anchors(input, options, all, plan.n_out_of_range);
   if (plan.assumed_anchors_m.empty() && plan.n_out_of_range == 0)

@@ -112,7 +112,7 @@ constexpr std::array k_step_words{
     "turn",    "height_search", "ranging",        "find_next_point", "go_to_point", "check_connections",
     "go_back", "hold",          "return_home",    "landing",         "done"};
 constexpr std::array k_event_words{
-    "start",     "airborne",    "arrived",     "in_range",       "sampled",    "point",        "no_point",
+    "start",     "airborne",    "arrived",     "in_range",     "sampled",    "point",        "no_point",
     "done_here", "unreachable", "connected",   "disconnected", "landed",     "timeout",      "hold",
     "resume",    "skip",        "return_home", "land",         "taken_over", "not_taken_off"};
 constexpr std::array k_guard_words{"always",        "wants_turn",    "wants_height", "legs_left",

@@ -51,7 +51,8 @@ int rules(const RulesArguments& a) {
 
 void add_rules_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
-      "rules", "Evaluate the plain rules of line of sight (RSS line, thresholds, weighted vote) on data sets");
+      "rules",
+      "Evaluate the plain rules of line of sight (RSS line, thresholds, weighted vote) on data sets");
   auto a = std::make_shared<RulesArguments>();
   add_data_options(*command, a->data);
   command->add_option("--seed", a->seed, "Seed of the folds of whole places")->capture_default_str();

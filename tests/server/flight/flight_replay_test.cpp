@@ -1,5 +1,5 @@
-// A recorded flight replayed: the same measurements, telemetry and orders give the same events and the same commands,
-// byte for byte. Everything runs inline, without a thread.
+// A recorded flight replayed: the same measurements, telemetry and orders give the same events and the same
+// commands, byte for byte. Everything runs inline, without a thread.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -43,8 +43,8 @@ class WrittenDrone : public Drone {
   void end_flight() override { write("end_flight"); }
   std::uint64_t take_off(double m) override { return number("take_off" + exact(m), &Drone::take_off, m); }
   std::uint64_t go_to(double lat, double lon, double m, std::optional<double> heading) override {
-    return number("go_to" + exact(lat) + exact(lon) + exact(m) + exact(heading.value_or(-1)), &Drone::go_to, lat,
-                  lon, m, heading);
+    return number("go_to" + exact(lat) + exact(lon) + exact(m) + exact(heading.value_or(-1)), &Drone::go_to,
+                  lat, lon, m, heading);
   }
   void steer(double lat, double lon, double m) override {
     write("steer" + exact(lat) + exact(lon) + exact(m));
@@ -145,10 +145,12 @@ class Home {
       : mission_(mission), plan_(plan), live_(setup_of(mission, plan)), operations_(&drone) {}
 
   void run(const Tick& tick) {
-    for (const auto& range : tick.ranges) live_.add(flight::LiveRow(flight::JudgedRange{range, {}, range.time}));
+    for (const auto& range : tick.ranges)
+      live_.add(flight::LiveRow(flight::JudgedRange{range, {}, range.time}));
     for (const auto& fix : tick.fixes) live_.add(flight::LiveRow(fix));
     live_.settle();
-    for (const auto& event : live_.take_events()) std::visit([&](const auto& e) { take(tick.now, e); }, event);
+    for (const auto& event : live_.take_events())
+      std::visit([&](const auto& e) { take(tick.now, e); }, event);
     if (!begun_ && tick.now.s > 12) begin(tick.now);
     const auto& f = operations_.flight();
     const bool deciding = f && f->control.engine().state().step == procedure::Step::find_next_point;
@@ -176,7 +178,8 @@ class Home {
   }
   void begin(const flight::Now& now) {
     const flight::Holder who{"token", "the operator"};
-    if (!operations_.control(now)) (void)operations_.take_control(now, mission_.id, who, false, "key").value();
+    if (!operations_.control(now))
+      (void)operations_.take_control(now, mission_.id, who, false, "key").value();
     const auto check = planning::check_plan(plan_);
     ASSERT_TRUE(check.has_value()) << check.error().message;
     flight::Groundwork ground{&plan_, std::make_shared<const planning::PlanCheck>(check.value()), true, 1e12};
