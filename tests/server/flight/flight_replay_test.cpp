@@ -184,8 +184,8 @@ class Home {
     ASSERT_TRUE(check.has_value()) << check.error().message;
     flight::Groundwork ground{&plan_, std::make_shared<const planning::PlanCheck>(check.value()), true, 1e12};
     for (const auto& item : operations_.checklist(now, &mission_, mission_.id, ground, false)) {
-      if (!item.green() && item.overridable)
-        ASSERT_TRUE(operations_.override_item(now, mission_.id, item.id, "simulated", who.name, ground));
+      if (item.green() || !item.overridable) continue;
+      ASSERT_TRUE(operations_.override_item(now, mission_.id, item.id, "simulated", who.name, ground));
     }
     const auto begun = operations_.begin(now, mission_, ground, false, who.name);
     written += begun ? "begun\n" : begun.error().message + '\n';
