@@ -44,6 +44,17 @@ FlightOptions in_frame_of(const FlightRows& rows, FlightOptions options) {
   return options;
 }
 
+/// What the antennas of a flight have in common is l_z, which the kit's profile may know; each by itself has
+/// only what it differs from that, so that the differences sum to nothing.
+SharedPrior for_antennas(SharedPrior prior, const FlightRows& rows) {
+  constexpr double sum_sigma_m = 1e-3;
+  const auto n = static_cast<Eigen::Index>(std::min<std::size_t>(rows.antennas.size(), k_most_antennas));
+  if (n > 1)
+    prior.information.block(k_shared_antennas, k_shared_antennas, n, n).array() +=
+        1.0 / (sum_sigma_m * sum_sigma_m);
+  return prior;
+}
+
 Result<void> solve_with(Work& work, const SharedPrior& prior) {
   const FlightOptions& options = work.options;
   work.prior = prior;
@@ -247,7 +258,7 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
   }
   note_unused(all, options);
   for (Work& work : all) {
-    BOOST_OUTCOME_TRY(solve_with(work, wide_prior(options)));
+    BOOST_OUTCOME_TRY(solve_with(work, for_antennas(wide_prior(options), work.rows)));
     work.alone = work.factor;
   }
   // Two passes: what a flight says about the kit depends a little on what it was told.
@@ -258,7 +269,7 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
       auto with_own = factors;
       with_own.push_back(all[i].factor);
       all[i].gate = bias_gate(with_own, options);
-      priors.push_back(profile_prior(factors, all[i].gate, options));
+      priors.push_back(for_antennas(profile_prior(factors, all[i].gate, options), all[i].rows));
     }
     for (std::size_t i = 0; i < all.size(); ++i) {
       // A flight alone whose gate changed nothing is solved already.
