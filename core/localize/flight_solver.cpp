@@ -29,6 +29,11 @@ struct Work {
   std::string kit{}, name{}, digest{};
   BiasGate gate{};
   std::vector<Gate> checks{};  ///< of the whole flight: every anchor must pass them
+  bool antennas_apart{true};   ///< their vertical arms differ by what this flight can show
+
+  Eigen::Index antennas() const {
+    return static_cast<Eigen::Index>(std::min<std::size_t>(rows.antennas.size(), k_most_antennas));
+  }
 };
 
 /// The options in the flight's own frame: heights above its origin, the height prior with every anchor that
@@ -45,14 +50,26 @@ FlightOptions in_frame_of(const FlightRows& rows, FlightOptions options) {
 }
 
 /// What the antennas of a flight have in common is l_z, which the kit's profile may know; each by itself has
-/// only what it differs from that, so that the differences sum to nothing.
-SharedPrior for_antennas(SharedPrior prior, const FlightRows& rows) {
-  constexpr double sum_sigma_m = 1e-3;
-  const auto n = static_cast<Eigen::Index>(std::min<std::size_t>(rows.antennas.size(), k_most_antennas));
-  if (n > 1)
-    prior.information.block(k_shared_antennas, k_shared_antennas, n, n).array() +=
-        1.0 / (sum_sigma_m * sum_sigma_m);
+/// only what it differs from that, so that the differences sum to nothing, and are nothing where the flight
+/// does not show them.
+SharedPrior for_antennas(SharedPrior prior, const Work& work) {
+  constexpr double k_tight = 1.0 / (1e-3 * 1e-3);
+  const auto n = work.antennas();
+  if (n < 2) return prior;
+  auto arms = prior.information.block(k_shared_antennas, k_shared_antennas, n, n);
+  arms.array() += k_tight;
+  if (!work.antennas_apart) arms.diagonal().array() += k_tight;
   return prior;
+}
+
+/// An unknown that a flight hardly sees costs its anchors accuracy: one antenna must differ beyond doubt.
+bool shows_antennas_apart(const Work& work) {
+  constexpr double k_beyond_doubt = 4;
+  for (Eigen::Index k = k_shared_antennas; k < k_shared_antennas + work.antennas(); ++k) {
+    const double sigma_m = std::sqrt(std::max(work.fit.shared_covariance(k, k), 0.0));
+    if (std::abs(work.fit.state.shared[k]) > k_beyond_doubt * sigma_m) return true;
+  }
+  return false;
 }
 
 Result<void> solve_with(Work& work, const SharedPrior& prior) {
@@ -258,7 +275,11 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
   }
   note_unused(all, options);
   for (Work& work : all) {
-    BOOST_OUTCOME_TRY(solve_with(work, for_antennas(wide_prior(options), work.rows)));
+    BOOST_OUTCOME_TRY(solve_with(work, for_antennas(wide_prior(options), work)));
+    if (work.antennas() > 1 && !shows_antennas_apart(work)) {
+      work.antennas_apart = false;
+      BOOST_OUTCOME_TRY(solve_with(work, for_antennas(wide_prior(options), work)));
+    }
     work.alone = work.factor;
   }
   // Two passes: what a flight says about the kit depends a little on what it was told.
@@ -269,7 +290,7 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
       auto with_own = factors;
       with_own.push_back(all[i].factor);
       all[i].gate = bias_gate(with_own, options);
-      priors.push_back(for_antennas(profile_prior(factors, all[i].gate, options), all[i].rows));
+      priors.push_back(for_antennas(profile_prior(factors, all[i].gate, options), all[i]));
     }
     for (std::size_t i = 0; i < all.size(); ++i) {
       // A flight alone whose gate changed nothing is solved already.
