@@ -92,7 +92,14 @@ export async function airborne(plan = flight_plan) {
     await list();
     await eventually(
       'the aircraft is heard and its fixes come',
-      async () => (await list()).filter((i) => i.state === 'failed').every((i) => i.overridable),
+      async () => {
+        const items = await list();
+        // What is overridden here must not be what keeps the autopilot from arming.
+        return (
+          items.find((i) => i.id === 'arming').state === 'ok' &&
+          items.filter((i) => i.state === 'failed').every((i) => i.overridable)
+        );
+      },
       30_000,
       200,
     );
@@ -107,7 +114,11 @@ export async function airborne(plan = flight_plan) {
     );
     await eventually(
       'the aircraft flies',
-      async () => (await must(`${base}/procedure`, { token: tokens.pilot }, 200)).status === 'running',
+      async () => {
+        const now = await must(`${base}/procedure`, { token: tokens.pilot }, 200);
+        if (now.ended) throw new Error(`the flight ended: ${now.ended}`);
+        return now.status === 'running' && now.drone?.in_air;
+      },
       20_000,
       100,
     );

@@ -15,7 +15,7 @@ const anchors = Array.from({ length: k_anchors }, (_, i) => ({
 
 export async function safety(row, seconds = 90) {
   const first = { ...flight_plan.waypoints[0], dwell_s: 1 };
-  const { server, mission, base, lease, tokens, must, as, stop } = await airborne({
+  const { server, mission, base, tokens, must, as, stop } = await airborne({
     ...flight_plan,
     settings: { ...flight_plan.settings, samples: 5 },
     waypoints: [first, { ...flight_plan.waypoints[1], turn: true }],
@@ -79,6 +79,8 @@ export async function safety(row, seconds = 90) {
       `limit ${k_limit_s * 1000} ms${held ? '' : ': MISSED'}; search ${trained}, ${sent} ranges sent, ` +
         `${refused} bodies refused, steps seen: ${[...steps].join(', ')}`,
     );
+    // Control that nobody renewed ended meanwhile.
+    const { lease } = await must(`${base}/control`, as({ action: 'take' }), 200);
     await must(`${base}/actions`, as({ action: 'land', lease }), 202);
   } finally {
     clearInterval(timer);
