@@ -66,9 +66,9 @@ bool FlightService::State::to_keep(std::string& text) {
   text.clear();
   if (f->flying()) {
     text = to_wire(document_of(*f));
-  } else if (const auto told = stored_clues(f->clues()); !told.empty()) {
-    // What turns and height searches told outlives the flight: every calibration of it asks for it.
-    text = to_wire(nlohmann::ordered_json{{"landed", true}, {"clues", told}});
+  } else if (const auto found = stored_clues(f->clues()); !found.empty()) {
+    // What turns and height searches found outlives the flight: every calibration of it asks for it.
+    text = to_wire(nlohmann::ordered_json{{"landed", true}, {"clues", found}});
   }
   return true;
 }

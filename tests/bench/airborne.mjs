@@ -3,6 +3,7 @@ import { spawn } from 'node:child_process';
 import { createSocket } from 'node:dgram';
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
+import { hall_outline } from '../e2e/flight.mjs';
 import { binary, eventually, startServer } from '../e2e/server.mjs';
 
 export const origin = { lon: 3.7131, lat: 51.0231, h_m: 55.5 };
@@ -11,18 +12,7 @@ export const flight_plan = {
   building_height_m: 8,
   origin,
   settings: { keep_out_m: 4, max_height_m: 20 },
-  outline: {
-    type: 'Polygon',
-    coordinates: [
-      [
-        [3.7131, 51.0231],
-        [3.7135275, 51.0231],
-        [3.7135275, 51.0232799],
-        [3.7131, 51.0232799],
-        [3.7131, 51.0231],
-      ],
-    ],
-  },
+  outline: hall_outline,
   waypoints: [
     { lon: 3.713, lat: 51.02305, height_above_ground_m: 4 },
     { lon: 3.71362, lat: 51.02305, height_above_ground_m: 9 },

@@ -5,6 +5,7 @@ import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { createServer } from 'node:net';
 import { after, before, test } from 'node:test';
+import { hall_outline } from './flight.mjs';
 import { binary, eventually, startServer } from './server.mjs';
 
 let server, aircraft, mission, plan, lease;
@@ -54,21 +55,9 @@ after(async () => {
 });
 
 test('planned from the outline, checked, started', async () => {
-  const outline = {
-    type: 'Polygon',
-    coordinates: [
-      [
-        [3.7131, 51.0231],
-        [3.7135275, 51.0231],
-        [3.7135275, 51.0232799],
-        [3.7131, 51.0232799],
-        [3.7131, 51.0231],
-      ],
-    ],
-  };
   const made = await send('/api/v1/plans/generate', {
     name: 'Hall',
-    outline,
+    outline: hall_outline,
     building_height_m: 8,
     settings: { max_height_m: 14 },
   });

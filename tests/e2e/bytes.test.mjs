@@ -7,6 +7,7 @@ import { connect, createServer } from 'node:net';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { LiveClient } from './live.mjs';
+import { hall_outline } from './flight.mjs';
 import { eventually, startServer } from './server.mjs';
 
 const latin1 = (text) => Buffer.from(text, 'latin1');
@@ -185,21 +186,9 @@ test('an aircraft whose texts hold 0x80 to 0xff is flown, and its text is UTF-8'
     const answer = await server.fetch(path, { json });
     return { status: answer.status, json: await answer.json() };
   };
-  const outline = {
-    type: 'Polygon',
-    coordinates: [
-      [
-        [3.7131, 51.0231],
-        [3.7135275, 51.0231],
-        [3.7135275, 51.0232799],
-        [3.7131, 51.0232799],
-        [3.7131, 51.0231],
-      ],
-    ],
-  };
   const generated = await post('/api/v1/plans/generate', {
     name: 'Hall',
-    outline,
+    outline: hall_outline,
     building_height_m: 8,
     settings: { max_height_m: 14 },
   });

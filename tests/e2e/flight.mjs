@@ -4,6 +4,20 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { run } from './server.mjs';
 
+/** Of the simulated hall, 30 by 20 m: what plans of it are made from. */
+export const hall_outline = {
+  type: 'Polygon',
+  coordinates: [
+    [
+      [3.7131, 51.0231],
+      [3.7135275, 51.0231],
+      [3.7135275, 51.0232799],
+      [3.7131, 51.0232799],
+      [3.7131, 51.0231],
+    ],
+  ],
+};
+
 /** {mission, fixes, ranges, truth}: bodies of POST missions, fixes and ranges; truth by network id. */
 export async function simulatedFlight({ seed = 7, duration = 120 } = {}) {
   const folder = mkdtempSync(join(tmpdir(), 'anchord e2e '));

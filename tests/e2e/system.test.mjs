@@ -157,7 +157,7 @@ test('a site is named with datum and base, and a device is forgotten by two pres
   await form.getByLabel('Datum of its coordinates').fill('ETRS89');
   await form.getByLabel('Epoch, year').fill('2026,5');
   await id('base-source').selectOption('survey_in');
-  await form.getByLabel('σ of its place, mm').fill('850');
+  await form.getByLabel('σ of its position, mm').fill('850');
   await id('base-send').click();
   await id('base').getByText('SURVEYED IN', { exact: true }).waitFor();
   const { crs } = (await get('/api/v1/sites')).items.find((s) => s.name === 'yard');

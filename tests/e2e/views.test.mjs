@@ -415,7 +415,7 @@ test("facility data of an anchor are edited where they stand, kept over a reload
 test('system tells the state of the server, and a token is shown once', async () => {
   const { page, seen, id } = await openPage(browser, server, { hash: '#/system' });
   await id('health').getByText('DB', { exact: true }).waitFor();
-  await id('heard').locator('tbody tr').first().waitFor();
+  await id('radios-in-range').locator('tbody tr').first().waitFor();
   await id('access').getByPlaceholder('who or what will use it').fill('museum app');
   await id('create-token').click();
   const secret = await id('secret').getByRole('textbox').inputValue();

@@ -9,7 +9,7 @@ import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
-import { ndjson } from '../e2e/flight.mjs';
+import { hall_outline, ndjson } from '../e2e/flight.mjs';
 import { binary, eventually, startServer } from '../e2e/server.mjs';
 
 const FAKETIME = ['x86_64', 'aarch64']
@@ -224,20 +224,8 @@ test('everything hostile begins, and the flight starts all the same', async () =
   ])
     assert.equal((await call('pilot', 'POST', '/api/v1/devices', { json })).status, 201);
 
-  const outline = {
-    type: 'Polygon',
-    coordinates: [
-      [
-        [3.7131, 51.0231],
-        [3.7135275, 51.0231],
-        [3.7135275, 51.0232799],
-        [3.7131, 51.0232799],
-        [3.7131, 51.0231],
-      ],
-    ],
-  };
   const plan = await call('pilot', 'POST', '/api/v1/plans/generate', {
-    json: { name: 'Hall', outline, building_height_m: 8, settings: { max_height_m: 14 } },
+    json: { name: 'Hall', outline: hall_outline, building_height_m: 8, settings: { max_height_m: 14 } },
   });
   assert.equal(plan.status, 200, JSON.stringify(plan.json));
   const stored = (await call('pilot', 'POST', '/api/v1/plans', { json: plan.json.plan })).json.id;

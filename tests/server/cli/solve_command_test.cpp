@@ -50,6 +50,34 @@ class SolveCommand : public ::testing::Test {
     ASSERT_EQ(run("simulate flight --seed 5 --out " + quoted()).exit_code, 0);
   }
   void TearDown() override { fs::remove_all(folder_); }
+  /// Each range anew: its distance and levels, `range_m,rx_dbm,fp_dbm`, of the distance it had.
+  template <class Levels>
+  void rewrite_ranges(Levels levels) {
+    std::ifstream in(folder_ / "ranges.csv");
+    std::string line, all;
+    std::getline(in, line);
+    ASSERT_EQ(line, "t_s,tag_id,antenna,anchor_id,range_m,rx_dbm,fp_dbm,rss_dbm,seq");
+    all = line + '\n';
+    while (std::getline(in, line)) {
+      std::vector<std::string> cells;
+      std::istringstream row(line);
+      for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
+      ASSERT_GE(cells.size(), 5U) << line;
+      for (std::size_t k = 0; k < 4; ++k) all += cells[k] + ',';
+      all += levels(std::stod(cells[4])) + ",,\n";
+    }
+    in.close();
+    std::ofstream(folder_ / "ranges.csv") << all;
+  }
+  /// Quoted path of a bias model trained on this campaign of the folder.
+  std::string bias_model(const std::string& campaign) {
+    const std::string model = "'" + (folder_ / "bias.json").string() + "'";
+    EXPECT_EQ(run("train --task bias --data '" + (folder_ / campaign).string() +
+                  "' --group-by environment --placement setting --out " + model)
+                  .exit_code,
+              0);
+    return model;
+  }
 };
 
 TEST_F(SolveCommand, PrintsJsonAloneOnStandardOutput) {
@@ -197,27 +225,10 @@ TEST_F(SolveCommand, CorrectsAndWeighsRangesWithTheModelsNamed) {
     }
   }
   // A constant the flight would find by itself; a radio whose metre is 5 cm too long it does not.
-  std::ifstream in(folder_ / "ranges.csv");
-  std::string line, all;
-  std::getline(in, line);
-  ASSERT_EQ(line, "t_s,tag_id,antenna,anchor_id,range_m,rx_dbm,fp_dbm,rss_dbm,seq");
-  all = line + '\n';
-  while (std::getline(in, line)) {
-    std::vector<std::string> cells;
-    std::istringstream row(line);
-    for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
-    ASSERT_GE(cells.size(), 5U) << line;
-    const double distance_m = std::stod(cells[4]);
-    all += cells[0] + ',' + cells[1] + ',' + cells[2] + ',' + cells[3] + ',' +
-           std::to_string(1.05 * distance_m) + ',' + levels(false, distance_m, random) + ",,\n";
-  }
-  in.close();
-  std::ofstream(folder_ / "ranges.csv") << all;
-  const std::string model = "'" + (folder_ / "bias.json").string() + "'";
-  ASSERT_EQ(run("train --task bias --data '" + (folder_ / "campaign.csv").string() +
-                "' --group-by environment --placement setting --out " + model)
-                .exit_code,
-            0);
+  rewrite_ranges([&](double distance_m) {
+    return std::to_string(1.05 * distance_m) + ',' + levels(false, distance_m, random);
+  });
+  const std::string model = bias_model("campaign.csv");
   const auto error_m = [&](const std::string& more) {
     const Answer answer = run("solve " + quoted() + " --format json" + more);
     EXPECT_EQ(answer.exit_code, 0);
@@ -303,26 +314,11 @@ TEST_F(SolveCommand, LeavesModelsOutOfAFlightThatTheyDoNotExplain) {
       }
     }
   }
-  std::ifstream in(folder_ / "ranges.csv");
-  std::string line, all;
-  std::getline(in, line);
-  all = line + '\n';
-  while (std::getline(in, line)) {
-    std::vector<std::string> cells;
-    std::istringstream row(line);
-    for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
-    ASSERT_GE(cells.size(), 5U) << line;
+  rewrite_ranges([&](double distance_m) {
     const double rx_dbm = level_dbm();
-    for (int k = 0; k < 5; ++k) all += cells[static_cast<std::size_t>(k)] + ',';
-    all += std::to_string(rx_dbm) + ',' + std::to_string(rx_dbm - 2) + ",,\n";
-  }
-  in.close();
-  std::ofstream(folder_ / "ranges.csv") << all;
-  const std::string model = "'" + (folder_ / "elsewhere.json").string() + "'";
-  ASSERT_EQ(run("train --task bias --data '" + (folder_ / "elsewhere.csv").string() +
-                "' --group-by environment --placement setting --out " + model)
-                .exit_code,
-            0);
+    return std::to_string(distance_m) + ',' + std::to_string(rx_dbm) + ',' + std::to_string(rx_dbm - 2);
+  });
+  const std::string model = bias_model("elsewhere.csv");
   const auto flight = [&](const std::string& more) {
     const Answer answer = run("solve " + quoted() + " --format json" + more);
     EXPECT_EQ(answer.exit_code, 0);

@@ -256,7 +256,7 @@ function DatumForm({ site, done, close }: { site: Site | null; done: () => void;
           />
         </label>
         <label>
-          <span class="lab">The base stands on</span>
+          <span class="lab">Source of the base position</span>
           <select
             value={source}
             data-testid="base-source"
@@ -270,7 +270,7 @@ function DatumForm({ site, done, close }: { site: Site | null; done: () => void;
           </select>
         </label>
         <label>
-          <span class="lab">σ of its place, mm</span>
+          <span class="lab">σ of its position, mm</span>
           <input value={sigma} inputMode="decimal" placeholder="8" onInput={(e) => set_sigma(e.currentTarget.value)} />
         </label>
       </div>

@@ -12,7 +12,7 @@ export function RadiosInRange({ radios }: { radios: readonly Device[] }) {
   return (
     <>
       <h3>Radios in range</h3>
-      <table class="tbl" data-testid="heard">
+      <table class="tbl" data-testid="radios-in-range">
         <caption class="sr">Radios that were in range in any flight</caption>
         <thead>
           <tr>

@@ -1,0 +1,61 @@
+// A data set made of a flight that goes away meanwhile, over a real database.
+#include <chrono>
+#include <thread>
+
+#include "tests/api/app_fixture.hpp"
+
+namespace anchord::test {
+namespace {
+
+using Freeze = AppFixture;
+
+TEST_F(Freeze, AFlightDeletedWhileItIsFrozenIsFrozenWholeOrNotAtAll) {
+  constexpr int k_rows = 6000;  // six pages
+  int whole = 0, refused = 0;
+  for (int round = 0; round < 12; ++round) {
+    Mission mission;
+    mission.id.uuid = make_uuid_v7(clock_.now());
+    mission.name = "labelled " + std::to_string(round);
+    mission.created = clock_.now();
+    mission.state = MissionState::finished;
+    ASSERT_TRUE(database_->missions().insert(mission).has_value());
+    std::vector<Range> ranges(k_rows);
+    for (int i = 0; i < k_rows; ++i) {
+      auto& range = ranges[static_cast<std::size_t>(i)];
+      range.mission = mission.id;
+      range.time = UtcTime{1'700'000'000'000'000'000 + i * 10'000'000LL};
+      range.tag = NetworkId{0x6e01};
+      range.anchor = NetworkId{0x6a21};
+      range.distance_m = 5;
+    }
+    ASSERT_TRUE(database_->measurements().append_ranges(std::move(ranges), true).has_value());
+    RangeTruth truth;
+    truth.distance_m = 4.9;
+    truth.los = true;
+    ASSERT_EQ(database_->labels().label({mission.id, {}, {}, {}, {}}, truth).value(), k_rows);
+    // A little later in each round: before, in the middle of and after the reading.
+    std::thread purge([&] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(3 * round));
+      ASSERT_TRUE(database_->bin().put(mission.id, clock_.now(), 0, "me").has_value());
+      ASSERT_TRUE(database_->bin().empty(mission.id).has_value());
+      while (database_->bin().remove_rows(1000).value() > 0) {
+      }
+    });
+    const auto made =
+        post("/api/v1/datasets", R"({"name":"flight )" + std::to_string(round) + R"(","missions":[")" +
+                                     to_string(mission.id) + R"("],"aggregation":"none"})");
+    purge.join();
+    if (made.status == 201) {
+      ++whole;
+      EXPECT_EQ(json(made).value("train", 0) + json(made).value("test", 0), k_rows) << made.body;
+    } else {
+      ++refused;
+      EXPECT_EQ(made.status, 422) << made.body;
+    }
+  }
+  RecordProperty("whole", whole);
+  RecordProperty("refused", refused);
+}
+
+}  // namespace
+}  // namespace anchord::test
