@@ -33,8 +33,8 @@ flight::Now FlightService::State::now() const {
 }
 
 void FlightService::State::tell_events() {
-  for (auto& told : operations.take_events())
-    deps.events.add(std::move(told.level), std::move(told.code), std::move(told.text), told.mission);
+  for (auto& event : operations.take_events())
+    deps.events.add(std::move(event.level), std::move(event.code), std::move(event.text), event.mission);
 }
 
 void FlightService::start() {
@@ -104,8 +104,8 @@ void FlightService::step() {
       mission = f->mission;  // one that began meanwhile too
       if (s.last.flight != s.operations.n_flights()) s.last = {.flight = s.operations.n_flights()};
       keeps = s.to_keep(keep);
-      if (const auto version = f->control.engine().clues_version(); s.last.clues_told != version) {
-        s.last.clues_told = version;
+      if (const auto version = f->control.engine().clues_version(); s.last.clues_passed != version) {
+        s.last.clues_passed = version;
         clues = f->clues();
       }
     }

@@ -76,7 +76,7 @@ void MissionService::State::take_clues(Flight& flight) {
     const std::scoped_lock lock(flight.queue_mutex);
     clues = std::exchange(flight.new_clues, std::nullopt);
   }
-  if (clues) flight.live.tell(*std::move(clues));
+  if (clues) flight.live.use_clues(*std::move(clues));
 }
 
 }  // namespace anchord::api

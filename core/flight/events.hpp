@@ -11,7 +11,7 @@
 
 namespace anchord::flight {
 
-/// What a live mission tells, in order of happening. Whoever drives it makes of them what the world sees: a
+/// What happens in a live mission, in order. Whoever drives it makes of them what the world sees: a
 /// message of a topic, a row of the event log, an input of the procedure.
 
 /// A position where the aircraft can have been: whoever flies may steer by it.

@@ -78,19 +78,19 @@ void LiveMission::show_pose() {
   if (auto pose = live_.pose()) events_.emplace_back(PoseMoved{*std::move(pose)});
 }
 
-void LiveMission::tell(procedure::FlightClues clues) {
+void LiveMission::use_clues(procedure::FlightClues clues) {
   setup_.clues = std::move(clues);
-  clues_told_ = false;
+  clues_in_use_ = false;
   if (history_.n_ranges() > 0) ++ranges_since_joint_;  // worth another joint solution
   tell_live();
 }
 
-/// Before the first good fix there is no frame to tell them in.
+/// Before the first good fix there is no frame to give them in.
 void LiveMission::tell_live() {
   const auto origin = live_.origin();
-  if (clues_told_ || !origin) return;
+  if (clues_in_use_ || !origin) return;
   live_.tell(clues_in(setup_.clues, EnuFrame(*origin)));
-  clues_told_ = true;
+  clues_in_use_ = true;
 }
 
 void LiveMission::settle() {
@@ -123,13 +123,13 @@ void LiveMission::announce_fixes() {
   state_.fixes_refused = live_.fixes_refused();
   if (state_.n_fixes_excluded > 0) state_.fixes_refused["excluded"] = state_.n_fixes_excluded;
   for (const auto& [reason, n] : state_.fixes_refused) {
-    if (reason == "not_usable" || !rejections_told_.try_emplace(reason, n).second) continue;
+    if (reason == "not_usable" || !rejections_published_.try_emplace(reason, n).second) continue;
     if (!reading_) events_.emplace_back(FixRejected{reason});
   }
   const auto origin = live_.origin();
   const auto& before = state_.origin;
   if (before && origin && EnuFrame(*before).enu_from_wgs84(*origin).m.norm() > k_same_origin_m) {
-    clues_told_ = false;
+    clues_in_use_ = false;
     if (!reading_) events_.emplace_back(OriginMoved{});
   }
   state_.origin = origin;
@@ -153,8 +153,8 @@ void LiveMission::begin_anew(std::vector<Exclusion> exclusions) {
   setup_.exclusions = std::move(exclusions);
   live_ = LiveFlight(setup_.mission, setup_.live);
   history_.clear();
-  rejections_told_.clear();
-  clues_told_ = false;
+  rejections_published_.clear();
+  clues_in_use_ = false;
   ranges_since_joint_ = 0;
   range_times_us_.clear();
   const UtcTime newest = state_.time;

@@ -34,7 +34,7 @@ struct LiveMissionSetup {
   LiveOptions live{};
   AccuracyGoal goal{};  ///< an anchor within it is converged
   std::vector<Exclusion> exclusions{};
-  procedure::FlightClues clues{};  ///< what turns and height searches told before
+  procedure::FlightClues clues{};  ///< what turns and height searches found before
 };
 
 /// How a mission stands, in numbers.
@@ -60,17 +60,17 @@ class LiveMission {
 
   /// One row, judged by the models when it came.
   void add(const LiveRow& row);
-  /// What turns and height searches told, from the next solve on; waits for the first good fix.
-  void tell(procedure::FlightClues clues);
+  /// What turns and height searches found, from the next solve on; waits for the first good fix.
+  void use_clues(procedure::FlightClues clues);
   /// The rows of a batch are in: decided ranges and changed estimates become events.
   void settle();
-  /// Where the drone is, told again.
+  /// Where the drone is, published again.
   void show_pose();
   /// No more rows: ranges that wait for a fix are rejected, every anchor is solved once more. Then settle().
   void finish() { live_.finish(); }
 
-  /// Reading what was stored: rows are joined and counted, nothing is solved and nothing new is told.
-  /// end_reading() solves every anchor once and tells the estimates.
+  /// Reading what was stored: rows are joined and counted, nothing is solved and nothing new is published.
+  /// end_reading() solves every anchor once and publishes the estimates.
   void begin_reading();
   void end_reading();
   /// Begins anew, less what is excluded now: rows are given again, what was solved before is not adopted.
@@ -116,8 +116,8 @@ class LiveMission {
   FlightHistory history_;
   FlightWatch watch_;
   std::uint64_t generation_{0};
-  bool reading_{false}, clues_told_{false};
-  std::map<std::string, std::size_t> rejections_told_;
+  bool reading_{false}, clues_in_use_{false};
+  std::map<std::string, std::size_t> rejections_published_;
   std::map<NetworkId, std::string_view> statuses_;
   std::int64_t last_pose_us_{0}, last_fix_us_{0};
   std::deque<std::int64_t> range_times_us_;

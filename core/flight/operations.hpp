@@ -31,7 +31,7 @@ struct RangeResult;
 
 namespace anchord::flight {
 
-/// Alarms of procedure::watch(); the alarm board tells of their coming and going.
+/// Alarms of procedure::watch(); the alarm board logs their coming and going.
 inline constexpr std::array<std::string_view, 5> k_flight_alarms{
     "drone.battery", "fence.breach", "drone.link", "rtk.lost", "position.disagree"};
 
@@ -41,7 +41,7 @@ struct Now : Moment {
 };
 
 /// A line of the event log.
-struct Told {
+struct LogEvent {
   std::string level;  ///< info, warning, critical
   std::string code;
   std::string text;
@@ -170,8 +170,8 @@ class Operations {
   std::vector<std::pair<std::string_view, std::string>> alarms() const;
   std::optional<DroneStatus> drone() const;
 
-  std::vector<Told> take_events() { return std::exchange(events_, {}); }
-  /// True once after something changed that a screen shows and no transition tells of.
+  std::vector<LogEvent> take_events() { return std::exchange(events_, {}); }
+  /// True once after something changed that a screen shows and no transition reports.
   bool take_shown_soon() { return std::exchange(show_soon_, false); }
 
  private:
@@ -196,7 +196,7 @@ class Operations {
   std::optional<std::string> take_off_refused(const Plan& plan, const MissionId& mission) const;
   const FlightUpload* uploaded(const Plan& plan, const std::string& what) const;
   std::optional<ChecklistItem> fence_item(const Plan& plan) const;
-  void tell(std::string level, std::string code, std::string text, std::optional<MissionId> mission) {
+  void log_event(std::string level, std::string code, std::string text, std::optional<MissionId> mission) {
     events_.push_back({std::move(level), std::move(code), std::move(text), std::move(mission)});
   }
 
@@ -211,7 +211,7 @@ class Operations {
   std::uint64_t number_{0}, newest_by_person_{0}, n_flights_{0};
   std::vector<FlightUpload> uploads_;                    ///< the newest of each kind
   std::optional<std::pair<MissionId, Plan>> preparing_;  ///< whose checklist is being worked off
-  std::vector<Told> events_;
+  std::vector<LogEvent> events_;
   bool show_soon_{false};
 };
 

@@ -159,9 +159,9 @@ class Home {
     operations_.round(tick.now, estimates, deciding);
     if (f && clues_ != f->control.engine().clues_version()) {
       clues_ = f->control.engine().clues_version();
-      live_.tell(f->clues());
+      live_.use_clues(f->clues());
     }
-    for (const auto& told : operations_.take_events()) written += told.code + ' ' + told.text + '\n';
+    for (const auto& event : operations_.take_events()) written += event.code + ' ' + event.text + '\n';
     if (f) written += f->status() + ' ' + f->control.engine().state().reason + '\n';
     steps.insert(f ? std::string(procedure::to_string(f->control.engine().state().step)) : "none");
   }
