@@ -43,6 +43,7 @@ void FlightService::start() {
                             "the flight before the restart cannot be read: the pilot has it", std::nullopt);
   }
   if (state_->deps.now_s || state_->thread.joinable()) return;
+  state_->planner = Thread("anchord-plan", [this] { state_->compute_points(); });
   state_->thread = Thread("anchord-fly", [this] {
     using Steady = std::chrono::steady_clock;
     auto due = Steady::now();
@@ -68,7 +69,29 @@ void FlightService::stop() {
   }
   state_->wake.notify_all();
   state_->changed.notify_all();
+  state_->asked.notify_all();
   if (state_->thread.joinable()) state_->thread.join();
+  if (state_->planner.joinable()) state_->planner.join();
+}
+
+/// Seconds with hundreds of anchors: no lock is held meanwhile. One that fails is a decision that does not
+/// come in time.
+void FlightService::State::compute_points() {
+  std::unique_lock lock(mutex);
+  while (!stopping) {
+    if (!point_task) {
+      asked.wait(lock);
+      continue;
+    }
+    const auto task = *std::exchange(point_task, std::nullopt);
+    lock.unlock();
+    (void)guarded("planner", [&] {
+      auto decision = planning::next_point(task.input, task.options);
+      const std::scoped_lock again(mutex);
+      operations.decided(task, std::move(decision));
+    });
+    lock.lock();
+  }
 }
 
 void FlightService::step() {
@@ -99,6 +122,10 @@ void FlightService::step() {
     else
       s.checks_apart.pause();
     s.operations.round(now, estimates, live.has_value());
+    if (auto task = s.operations.take_point_task()) {
+      s.point_task = std::move(task);
+      s.asked.notify_one();
+    }
     s.tell_events();
     if (const auto& f = s.operations.flight()) {
       mission = f->mission;  // one that began meanwhile too

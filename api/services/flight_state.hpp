@@ -17,10 +17,12 @@ namespace anchord::api {
 /// The shell round flight::Operations: thread, clocks, lock; what is shown (flight_show.cpp) and kept
 /// (flight_kept.cpp).
 struct FlightService::State {
-  explicit State(Deps d) : deps(std::move(d)), operations(deps.drone) {}
+  explicit State(Deps d) : deps(std::move(d)), operations(deps.drone, !deps.now_s) {}
 
   flight::Now now() const;
   void tell_events();
+  /// Until the service stops: the points that rounds ask for.
+  void compute_points();
   flight::Groundwork groundwork(const Plan* plan);
   void recover();
   /// The document to store, when the machine moved since the last call; empty text: forget it.
@@ -32,10 +34,11 @@ struct FlightService::State {
 
   Deps deps;
   std::mutex mutex;
-  std::condition_variable wake, changed;
-  Thread thread;
+  std::condition_variable wake, changed, asked;
+  Thread thread, planner;
   bool stopping{false};
   flight::Operations operations;
+  std::optional<flight::Operations::PointTask> point_task;
   IntervalHistogram checks_apart;  ///< of safety, while something flies
 
   /// What of the present flight was kept, shown and told; each flight begins anew.

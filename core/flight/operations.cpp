@@ -184,12 +184,22 @@ void Operations::round(const Now& now, const std::optional<Estimates>& live, boo
       estimates.push_back(std::move(e));
     }
   }
-  // Without answers a decision would be one of ignorance: it is made when they were read.
-  const bool ready = f.control.engine().state().step != Step::find_next_point || at_hand;
-  f.control.round(now.s, estimates, ready);
+  f.control.round(now.s, estimates, at_hand);
   note_dispatched(now, f, nullptr);
   take_happenings(f);
   if (!f.manual) f.aircraft = drone_->status().identity;
+}
+
+std::optional<Operations::PointTask> Operations::take_point_task() {
+  if (!flight_) return std::nullopt;
+  auto task = flight_->control.engine().take_point_task();
+  if (!task) return std::nullopt;
+  return PointTask{*std::move(task), n_flights_};
+}
+
+void Operations::decided(const PointTask& task, Result<planning::Decision> decision) {
+  if (flight_ && task.flight == n_flights_)
+    flight_->control.engine().decided(task.number, std::move(decision));
 }
 
 /// One that lands, or that the pilot has, is left to it.

@@ -111,8 +111,10 @@ struct Groundwork {
 /// thread-safe.
 class Operations {
  public:
-  /// `drone` null: flights are flown by hand.
-  explicit Operations(Drone* drone) : drone_(drone) {}
+  /// `drone` null: flights are flown by hand. `decides_apart`: whoever drives computes the next point and
+  /// need not do it in a round; else rounds do.
+  explicit Operations(Drone* drone, bool decides_apart = false)
+      : drone_(drone), decides_apart_(decides_apart) {}
 
   // Inputs. Fixes and ranges count from when they were measured (MeasuredTime).
   void fix(const Now& now, const Fix& fix);
@@ -124,6 +126,12 @@ class Operations {
     std::vector<Estimate> estimates;
   };
   void round(const Now& now, const std::optional<Estimates>& live, bool at_hand);
+  /// A decision that is due, and its answer, which the next round reads.
+  struct PointTask : procedure::PointTask {
+    std::uint64_t flight{};  ///< n_flights() when it was asked
+  };
+  std::optional<PointTask> take_point_task();
+  void decided(const PointTask& task, Result<planning::Decision> decision);
   /// Goes on with a flight of before a restart: hold first.
   /// errors: of the plan
   Result<void> recover(const Now& now, KeptFlight kept);
@@ -201,6 +209,7 @@ class Operations {
   }
 
   Drone* drone_;
+  bool decides_apart_;
   ControlLease lease_;
   std::optional<ActiveFlight> flight_;
   std::map<MissionId, Received> received_;                           ///< newest few missions only

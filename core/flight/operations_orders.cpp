@@ -147,6 +147,7 @@ Result<FlightCommand> Operations::begin(const Now& now, const Mission& mission, 
   // Home is on the ground: where this mission took off, when it starts again in the air.
   const Eigen::Vector3d home = took_off_from ? frame.enu_from_wgs84(*took_off_from).m : here;
   BOOST_OUTCOME_TRY(auto setup, procedure::flight_setup(flown, home));
+  setup.decides_apart = decides_apart_;
   // A new flight is a new object, and so is what the link knows of it.
   flight_.emplace(mission.id, flown, manual, frame, home,
                   procedure::FlightControl(std::move(setup), frame, manual ? nullptr : drone_));
@@ -232,6 +233,7 @@ Result<DroneStatus> Operations::change_aircraft(const MissionId& mission, const 
 Result<void> Operations::recover(const Now& now, KeptFlight kept) {
   const EnuFrame frame(kept.plan.origin.value());
   BOOST_OUTCOME_TRY(auto setup, procedure::flight_setup(kept.plan, kept.home_m));
+  setup.decides_apart = decides_apart_;
   const bool manual = kept.manual || drone_ == nullptr;
   // Before the flight, which is a new one on the link.
   if (!manual && kept.aircraft.system > 0) drone_->expect(kept.aircraft);

@@ -136,10 +136,10 @@ void FlightControl::follow_link(double now_s, const DroneStatus& d) {
     engine_.retell(now_s);
 }
 
-void FlightControl::round(double now_s, std::span<const Estimate> estimates, bool decide) {
+void FlightControl::round(double now_s, std::span<const Estimate> estimates, bool at_hand) {
   if (over_) return;
   if (drone_ == nullptr) {
-    if (decide) engine_.tick(now_s, estimates);
+    engine_.tick(now_s, estimates, at_hand);
     return dispatch();
   }
   const DroneStatus d = drone_->status();
@@ -152,7 +152,7 @@ void FlightControl::round(double now_s, std::span<const Estimate> estimates, boo
     told_s_ = now_s;
     engine_.retell(now_s);
   }
-  if (decide) engine_.tick(now_s, estimates);
+  engine_.tick(now_s, estimates, at_hand);
   dispatch();
   if (engine_.state().step == Step::done) {
     over_ = true;

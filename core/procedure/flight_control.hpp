@@ -42,8 +42,9 @@ class FlightControl {
   std::string command(double now_s, Event event, const std::string& who);
   /// Hold, and nothing more: the aircraft is the pilot's.
   std::uint64_t abort();
-  /// At least twice a second. `decide` false: the estimates are not at hand, decisions wait.
-  void round(double now_s, std::span<const Estimate> estimates, bool decide = true);
+  /// At least twice a second. `at_hand` false: the estimates could not be read, decisions wait, safety does
+  /// not.
+  void round(double now_s, std::span<const Estimate> estimates, bool at_hand = true);
   void by_hand(double now_s, const VehicleView& view) { engine_.vehicle(now_s, view); }
   void report(double now_s, const CommandReport& report);
 

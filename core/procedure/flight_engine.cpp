@@ -6,7 +6,6 @@
 
 #include "core/planning/local_plan.hpp"
 #include "core/planning/route.hpp"
-#include "core/procedure/why_not_done.hpp"
 
 namespace anchord::procedure {
 namespace {
@@ -240,6 +239,9 @@ void FlightEngine::apply(double now_s, const Advance& step) {
   legs_.clear();
   settled_s_.reset();
   pending_.reset();
+  point_task_.reset();
+  asked_.reset();
+  answer_.reset();
   tell(now_s, "info", "procedure." + std::string(to_string(state_.step)), state_.reason);
   for (const auto& c : step.commands) execute(now_s, c);
 }
@@ -395,7 +397,7 @@ void FlightEngine::look_for_arrival(double now_s) {
     next_leg(now_s);
 }
 
-void FlightEngine::work(double now_s, std::span<const Estimate> estimates) {
+void FlightEngine::work(double now_s, std::span<const Estimate> estimates, bool at_hand) {
   const double here_s = now_s - state_.since_s;
   const auto heard = [&](int n) {
     return std::any_of(state_.anchors.begin(), state_.anchors.end(),
@@ -434,7 +436,10 @@ void FlightEngine::work(double now_s, std::span<const Estimate> estimates) {
       return;
     }
     case Step::find_next_point:
-      decide(now_s, estimates);
+      if (answer_)
+        conclude(now_s, *std::exchange(answer_, std::nullopt));
+      else if (!asked_ && at_hand)
+        decide(now_s, estimates);
       return;
     case Step::return_home:
     case Step::landing:
@@ -452,117 +457,6 @@ void FlightEngine::work(double now_s, std::span<const Estimate> estimates) {
   }
 }
 
-/// Done is not reached: a limit of points, time or battery ends an anchor too.
-std::string FlightEngine::outcome(const std::string& which) const {
-  std::string without;
-  std::size_t n = 0;
-  for (const auto& task : state_.anchors) {
-    if (!task.done || task.reached) continue;
-    ++n;
-    without += (without.empty() ? "" : ", ") + to_string(task.id);
-  }
-  if (n == 0) return "every " + which + " anchor is done";
-  return "every " + which + " anchor is done or given up; " + std::to_string(n) +
-         " without the accuracy that was wanted: " + without;
-}
-
-void FlightEngine::judge_anchors(double now_s, std::span<const Estimate> estimates) {
-  for (auto& task : state_.anchors) {
-    if (task.done) continue;
-    const auto it = std::find_if(estimates.begin(), estimates.end(),
-                                 [&](const Estimate& e) { return e.anchor == task.id; });
-    const auto estimate = it == estimates.end() ? std::nullopt : std::optional(*it);
-    Progress progress;
-    progress.iterations = task.iterations;
-    progress.battery = vehicle_.battery;
-    progress.elapsed_s = now_s - started_s_.value_or(now_s);
-    if (estimate && estimate->verdict == Verdict::ok) {
-      progress.sigma_m = position_sigma_m(*estimate);
-      progress.gdop_root = estimate->gdop;
-    }
-    if (const auto exit = exit_of(setup_.exit, progress)) {
-      task.done = true;
-      task.reached = exit->reached;
-      task.why = exit->reason;
-      tell(now_s, exit->reached ? "info" : "warning", "anchor.done",
-           to_string(task.id) + ": " + exit->reason);
-    } else {
-      task.why = why_not_done(estimate, measured_at_[task.id], setup_.exit);
-    }
-  }
-}
-
-void FlightEngine::decide(double now_s, std::span<const Estimate> estimates) {
-  judge_anchors(now_s, estimates);
-  const auto finish = [&](Event event, std::string why) {
-    if (decision_) decision_->outcome = std::string(to_string(event)) + ": " + why;
-    feed(now_s, event, std::move(why));
-  };
-  const auto is_done = [&](NetworkId id) {
-    return std::any_of(state_.anchors.begin(), state_.anchors.end(),
-                       [&](const AnchorTask& a) { return a.id == id && a.done; });
-  };
-  if (!setup_.expected.empty() && std::all_of(setup_.expected.begin(), setup_.expected.end(), is_done)) {
-    state_.waypoint = setup_.settings.waypoints.size() - 1;
-    return finish(Event::done_here, outcome("expected"));
-  }
-  planning::NextPointInput input;
-  input.visited = state_.visited;
-  input.current = state_.target_m;
-  input.unreachable = state_.unreachable;
-  input.bounds = setup_.limits.bounds;
-  for (const auto& task : state_.anchors) {
-    if (task.done) continue;
-    planning::PlannedAnchor anchor;
-    anchor.name = to_string(task.id);
-    anchor.weight = weight_of(task);
-    if (setup_.exit.target_sigma_m) anchor.target_m = *setup_.exit.target_sigma_m;
-    const auto it = std::find_if(estimates.begin(), estimates.end(),
-                                 [&](const Estimate& e) { return e.anchor == task.id && e.best; });
-    if (it == estimates.end()) {
-      anchor.places = {{clues_.guess_m(task.id).value_or(setup_.middle_m), 1}};
-      const auto& seen = measured_at_[task.id];
-      for (std::size_t i = 0; i < input.visited.size(); ++i) {
-        if (std::find(seen.begin(), seen.end(), input.visited[i]) != seen.end())
-          anchor.measured_at.push_back(i);
-      }
-    } else {
-      anchor.places = {{it->best->position.m, it->best->probability}};
-      if (it->mirror)
-        anchor.places.push_back({it->mirror->position.m, std::max(1e-3, it->mirror->probability)});
-      anchor.covariance_m2 = it->best->covariance_m2;
-    }
-    input.anchors.push_back(std::move(anchor));
-  }
-  if (input.anchors.empty()) return finish(Event::done_here, outcome("received"));
-  auto decided = planning::next_point(input, setup_.planner);
-  if (!decided) return finish(Event::no_point, decided.error().message);
-  const double before = decided.value().value_before;
-  if (decision_ && decision_->predicted && std::isfinite(before)) decision_->reached = before;
-  DecisionRecord record;
-  record.time_s = now_s;
-  record.decision = std::move(decided).value();
-  const auto chosen = record.decision.chosen;
-  if (chosen) record.predicted = record.decision.candidates[*chosen].value;
-  decision_ = std::move(record);
-  if (!chosen) return finish(Event::no_point, decision_->decision.reason);
-  if (state_.points > setup_.settings.points_per_waypoint) {
-    return finish(Event::done_here, std::to_string(state_.points) + " points measured at this waypoint");
-  }
-  const auto& best = decision_->decision.candidates[*chosen];
-  // Logarithms have no shares: for d_optimal a step of the log volume counts as the share.
-  const double gain = setup_.planner.rule == planning::Rule::d_optimal ? before - best.value
-                      : std::isfinite(before)                          ? (before - best.value) / before
-                                                                       : 1;
-  if (gain < setup_.min_gain) {
-    return finish(Event::done_here,
-                  "the best point would bring " + std::to_string(std::lround(100 * gain)) + " %");
-  }
-  const Eigen::Vector2d look = (setup_.middle_m - best.point_m).head<2>();
-  decision_->outcome = "point: " + decision_->decision.reason;
-  feed(now_s, Event::point, decision_->decision.reason, best.point_m, std::atan2(look.x(), look.y()));
-}
-
 /// The longest flight is over: home at once, from whatever step. Who holds, holds; it is over when he
 /// resumes.
 bool FlightEngine::end_of_time(double now_s, std::span<const Estimate> estimates) {
@@ -577,7 +471,7 @@ bool FlightEngine::end_of_time(double now_s, std::span<const Estimate> estimates
   return feed(now_s, Event::return_home, why);
 }
 
-void FlightEngine::tick(double now_s, std::span<const Estimate> estimates) {
+void FlightEngine::tick(double now_s, std::span<const Estimate> estimates, bool at_hand) {
   if (!in_flight(state_.step)) return;
   if (down(now_s) && feed(now_s, Event::landed)) return;
   look_out(now_s);
@@ -588,7 +482,7 @@ void FlightEngine::tick(double now_s, std::span<const Estimate> estimates) {
     if (feed(now_s, event, std::exchange(pending_text_, {}))) return;
   }
   look_for_arrival(now_s);
-  work(now_s, estimates);
+  work(now_s, estimates, at_hand);
   if (state_.deadline_s > 0 && now_s >= state_.deadline_s) {
     if (state_.step == Step::ranging || state_.step == Step::search_anchors) judge_anchors(now_s, estimates);
     feed(now_s, Event::timeout);

@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/planning/next_point.hpp"
@@ -34,6 +35,7 @@ struct FlightSetup {
   double arrive_m = 0.5, arrive_rad = 0.25, arrive_mps = 0.4;
   double arrive_believed_m = 1.5;                   ///< the autopilot must think so as well, roughly
   double home_arrive_m = 1.5, home_arrive_mps = 1;  ///< landing does not wait for centimetres
+  bool decides_apart{false};  ///< the next point is computed by whoever drives: take_point_task()
 };
 
 /// errors  invalid_argument: no waypoint, plan nowhere, settings
@@ -63,6 +65,14 @@ struct DecisionRecord {
   std::optional<double> predicted{};  ///< value of the chosen point
   std::optional<double> reached{};    ///< value when the next decision was made
   std::string outcome;                ///< point, no_point or done_here, with its reason
+};
+
+/// Where to measure next, to be computed: seconds with hundreds of anchors, and no round of safety waits for
+/// that.
+struct PointTask {
+  std::uint64_t number{};
+  planning::NextPointInput input;
+  planning::NextPointOptions options;
 };
 
 struct Happening {
@@ -98,8 +108,13 @@ class FlightEngine {
   bool not_taken_off(double now_s, const std::string& why) { return feed(now_s, Event::not_taken_off, why); }
   /// The present leg, or the way home, once more from where the aircraft is now.
   void retell(double now_s);
-  /// At least twice a second. The estimates are looked at when a decision is due.
-  void tick(double now_s, std::span<const Estimate> estimates);
+  /// At least twice a second. The estimates are looked at when a decision is due; `at_hand` false: they could
+  /// not be read, and a decision, which would be one of ignorance, waits.
+  void tick(double now_s, std::span<const Estimate> estimates, bool at_hand = true);
+  /// Of FlightSetup::decides_apart: the decision that is due, once.
+  std::optional<PointTask> take_point_task() { return std::exchange(point_task_, std::nullopt); }
+  /// What came of it, for the next tick; of a task that is no longer waited for: dropped.
+  void decided(std::uint64_t number, Result<planning::Decision> decision);
 
   std::vector<Command> take_orders();
   std::vector<Happening> take_happenings();
@@ -138,10 +153,13 @@ class FlightEngine {
   void note_lobes();
   void near_enough(NetworkId anchor, double distance_m);
   void look_for_arrival(double now_s);
-  void work(double now_s, std::span<const Estimate> estimates);
+  void work(double now_s, std::span<const Estimate> estimates, bool at_hand);
   std::string outcome(const std::string& which) const;
   void judge_anchors(double now_s, std::span<const Estimate> estimates);
   void decide(double now_s, std::span<const Estimate> estimates);
+  planning::NextPointInput point_input(std::span<const Estimate> estimates) const;
+  void conclude(double now_s, Result<planning::Decision> decided);
+  void finish(double now_s, Event event, std::string why);
 
   FlightSetup setup_;
   State state_;
@@ -162,6 +180,10 @@ class FlightEngine {
   std::optional<double> settled_s_;
   std::optional<Alarm> alarm_;
   std::optional<DecisionRecord> decision_;
+  std::optional<PointTask> point_task_;
+  std::optional<std::uint64_t> asked_;  ///< the task whose answer is waited for
+  std::optional<Result<planning::Decision>> answer_;
+  std::uint64_t n_tasks_{0};
   std::map<NetworkId, std::vector<Eigen::Vector3d>> measured_at_;
   std::map<NetworkId, double> distance_m_, no_lobe_m_;  ///< newest; where the turn saw no lobe
   std::vector<Command> orders_;

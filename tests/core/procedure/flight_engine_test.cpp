@@ -215,6 +215,69 @@ TEST(FlightEngine, AnswersEveryFaultAtEveryStepAsDocumented) {
   }
 }
 
+/// At the step where the next point is asked for, which somebody else computes.
+Flown deciding_apart() {
+  auto s = setup();
+  s.decides_apart = true;
+  Flown f(std::move(s));
+  ways().at(Step::find_next_point)(f);
+  return f;
+}
+
+TEST(FlightEngine, AnswersEveryFaultWhileTheNextPointIsComputedOrTheEstimatesCannotBeRead) {
+  for (const bool at_hand : {true, false}) {
+    for (const auto& fault : faults()) {
+      auto f = deciding_apart();
+      f.engine.tick(f.now, {}, at_hand);
+      const auto task = f.engine.take_point_task();
+      EXPECT_EQ(task.has_value(), at_hand) << fault.name;
+      fault.happens(f);
+      f.engine.tick(f.now, {}, at_hand);
+      EXPECT_EQ(f.engine.state().step, fault.reaction) << fault.name;
+      if (!task) continue;
+      // The answer to what is no longer asked changes nothing.
+      f.engine.decided(task->number, planning::next_point(task->input, task->options));
+      f.engine.tick(f.now, {}, at_hand);
+      EXPECT_EQ(f.engine.state().step, fault.reaction) << fault.name;
+      EXPECT_FALSE(f.engine.decision()) << fault.name;
+    }
+  }
+}
+
+TEST(FlightEngine, DecidesTheSameWhetherItComputesTheNextPointItselfOrIsGivenIt) {
+  Flown own;
+  ways().at(Step::find_next_point)(own);
+  own.engine.tick(own.now, {});
+  ASSERT_TRUE(own.engine.decision());
+
+  auto f = deciding_apart();
+  f.engine.tick(f.now, {});
+  const auto task = f.engine.take_point_task();
+  ASSERT_TRUE(task);
+  f.engine.tick(f.now, {});
+  EXPECT_FALSE(f.engine.take_point_task()) << "asked once";
+  EXPECT_EQ(f.engine.state().step, Step::find_next_point);
+  f.engine.decided(task->number + 1, planning::next_point(task->input, task->options));
+  f.engine.tick(f.now, {});
+  EXPECT_EQ(f.engine.state().step, Step::find_next_point) << "an answer to another question";
+  f.engine.decided(task->number, planning::next_point(task->input, task->options));
+  f.engine.tick(f.now, {});
+  EXPECT_EQ(f.engine.state().step, own.engine.state().step);
+  EXPECT_EQ(f.engine.state().target_m, own.engine.state().target_m);
+  EXPECT_EQ(f.engine.decision()->outcome, own.engine.decision()->outcome);
+}
+
+TEST(FlightEngine, GoesOnWithoutADecisionThatDoesNotComeInTime) {
+  auto f = deciding_apart();
+  f.engine.tick(f.now, {});
+  f.now += 5.1;
+  f.here();
+  f.engine.tick(f.now, {});
+  EXPECT_EQ(f.engine.state().step, Step::go_to_waypoint);
+  EXPECT_NE(f.engine.state().reason.find("no decision in time"), std::string::npos)
+      << f.engine.state().reason;
+}
+
 TEST(FlightEngine, ReturnsAtOnceFromEveryStepWhenTheFlightTimeIsOver) {
   for (const auto& [step, way] : ways()) {
     auto limited = setup();

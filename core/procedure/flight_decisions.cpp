@@ -1,0 +1,139 @@
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/procedure/flight_engine.hpp"
+#include "core/procedure/why_not_done.hpp"
+
+namespace anchord::procedure {
+
+/// Done is not reached: a limit of points, time or battery ends an anchor too.
+std::string FlightEngine::outcome(const std::string& which) const {
+  std::string without;
+  std::size_t n = 0;
+  for (const auto& task : state_.anchors) {
+    if (!task.done || task.reached) continue;
+    ++n;
+    without += (without.empty() ? "" : ", ") + to_string(task.id);
+  }
+  if (n == 0) return "every " + which + " anchor is done";
+  return "every " + which + " anchor is done or given up; " + std::to_string(n) +
+         " without the accuracy that was wanted: " + without;
+}
+
+void FlightEngine::judge_anchors(double now_s, std::span<const Estimate> estimates) {
+  for (auto& task : state_.anchors) {
+    if (task.done) continue;
+    const auto it = std::find_if(estimates.begin(), estimates.end(),
+                                 [&](const Estimate& e) { return e.anchor == task.id; });
+    const auto estimate = it == estimates.end() ? std::nullopt : std::optional(*it);
+    Progress progress;
+    progress.iterations = task.iterations;
+    progress.battery = vehicle_.battery;
+    progress.elapsed_s = now_s - started_s_.value_or(now_s);
+    if (estimate && estimate->verdict == Verdict::ok) {
+      progress.sigma_m = position_sigma_m(*estimate);
+      progress.gdop_root = estimate->gdop;
+    }
+    if (const auto exit = exit_of(setup_.exit, progress)) {
+      task.done = true;
+      task.reached = exit->reached;
+      task.why = exit->reason;
+      tell(now_s, exit->reached ? "info" : "warning", "anchor.done",
+           to_string(task.id) + ": " + exit->reason);
+    } else {
+      task.why = why_not_done(estimate, measured_at_[task.id], setup_.exit);
+    }
+  }
+}
+
+void FlightEngine::finish(double now_s, Event event, std::string why) {
+  if (decision_) decision_->outcome = std::string(to_string(event)) + ": " + why;
+  feed(now_s, event, std::move(why));
+}
+
+void FlightEngine::decide(double now_s, std::span<const Estimate> estimates) {
+  judge_anchors(now_s, estimates);
+  const auto is_done = [&](NetworkId id) {
+    return std::any_of(state_.anchors.begin(), state_.anchors.end(),
+                       [&](const AnchorTask& a) { return a.id == id && a.done; });
+  };
+  if (!setup_.expected.empty() && std::all_of(setup_.expected.begin(), setup_.expected.end(), is_done)) {
+    state_.waypoint = setup_.settings.waypoints.size() - 1;
+    return finish(now_s, Event::done_here, outcome("expected"));
+  }
+  auto input = point_input(estimates);
+  if (input.anchors.empty()) return finish(now_s, Event::done_here, outcome("received"));
+  asked_ = ++n_tasks_;
+  if (setup_.decides_apart)
+    point_task_ = {n_tasks_, std::move(input), setup_.planner};
+  else
+    conclude(now_s, planning::next_point(input, setup_.planner));
+}
+
+planning::NextPointInput FlightEngine::point_input(std::span<const Estimate> estimates) const {
+  planning::NextPointInput input;
+  input.visited = state_.visited;
+  input.current = state_.target_m;
+  input.unreachable = state_.unreachable;
+  input.bounds = setup_.limits.bounds;
+  for (const auto& task : state_.anchors) {
+    if (task.done) continue;
+    planning::PlannedAnchor anchor;
+    anchor.name = to_string(task.id);
+    anchor.weight = weight_of(task);
+    if (setup_.exit.target_sigma_m) anchor.target_m = *setup_.exit.target_sigma_m;
+    const auto it = std::find_if(estimates.begin(), estimates.end(),
+                                 [&](const Estimate& e) { return e.anchor == task.id && e.best; });
+    if (it == estimates.end()) {
+      anchor.places = {{clues_.guess_m(task.id).value_or(setup_.middle_m), 1}};
+      const auto seen = measured_at_.find(task.id);
+      for (std::size_t i = 0; seen != measured_at_.end() && i < input.visited.size(); ++i) {
+        if (std::ranges::find(seen->second, input.visited[i]) != seen->second.end())
+          anchor.measured_at.push_back(i);
+      }
+    } else {
+      anchor.places = {{it->best->position.m, it->best->probability}};
+      if (it->mirror)
+        anchor.places.push_back({it->mirror->position.m, std::max(1e-3, it->mirror->probability)});
+      anchor.covariance_m2 = it->best->covariance_m2;
+    }
+    input.anchors.push_back(std::move(anchor));
+  }
+  return input;
+}
+
+void FlightEngine::decided(std::uint64_t number, Result<planning::Decision> decision) {
+  if (asked_ == number) answer_ = std::move(decision);
+}
+
+void FlightEngine::conclude(double now_s, Result<planning::Decision> decided) {
+  if (!decided) return finish(now_s, Event::no_point, decided.error().message);
+  const double before = decided.value().value_before;
+  if (decision_ && decision_->predicted && std::isfinite(before)) decision_->reached = before;
+  DecisionRecord record;
+  record.time_s = now_s;
+  record.decision = std::move(decided).value();
+  const auto chosen = record.decision.chosen;
+  if (chosen) record.predicted = record.decision.candidates[*chosen].value;
+  decision_ = std::move(record);
+  if (!chosen) return finish(now_s, Event::no_point, decision_->decision.reason);
+  if (state_.points > setup_.settings.points_per_waypoint) {
+    return finish(now_s, Event::done_here,
+                  std::to_string(state_.points) + " points measured at this waypoint");
+  }
+  const auto& best = decision_->decision.candidates[*chosen];
+  // Logarithms have no shares: for d_optimal a step of the log volume counts as the share.
+  const double gain = setup_.planner.rule == planning::Rule::d_optimal ? before - best.value
+                      : std::isfinite(before)                          ? (before - best.value) / before
+                                                                       : 1;
+  if (gain < setup_.min_gain) {
+    return finish(now_s, Event::done_here,
+                  "the best point would bring " + std::to_string(std::lround(100 * gain)) + " %");
+  }
+  const Eigen::Vector2d look = (setup_.middle_m - best.point_m).head<2>();
+  decision_->outcome = "point: " + decision_->decision.reason;
+  feed(now_s, Event::point, decision_->decision.reason, best.point_m, std::atan2(look.x(), look.y()));
+}
+
+}  // namespace anchord::procedure
