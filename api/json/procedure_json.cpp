@@ -150,19 +150,17 @@ Ordered procedure_json(const ProcedureView& v, const procedure::FlightEngine& en
   return out;
 }
 
-Ordered grid_json(const MissionId& mission, std::int64_t t_us, const procedure::FlightEngine& engine,
-                  const EnuFrame& frame) {
-  Ordered out{{"mission", to_string(mission)}, {"t_us", t_us}, {"iteration", engine.state().visited.size()}};
-  const auto& planner = engine.setup().planner;
-  out["rule"] = planning::to_string(planner.rule);
-  out["combine"] = planning::to_string(planner.combine);
+Ordered grid_json(const GridView& v) {
+  Ordered out{{"mission", to_string(v.mission)}, {"t_us", v.t_us}, {"iteration", v.visited.size()}};
+  out["rule"] = planning::to_string(v.rule);
+  out["combine"] = planning::to_string(v.combine);
   Ordered candidates = Ordered::array(), visited = Ordered::array(), unreachable = Ordered::array();
-  for (const auto& p : engine.state().visited) visited.push_back(xyz(p));
-  for (const auto& p : engine.state().unreachable) unreachable.push_back(xyz(p));
-  const auto& record = engine.decision();
+  for (const auto& p : v.visited) visited.push_back(xyz(p));
+  for (const auto& p : v.unreachable) unreachable.push_back(xyz(p));
+  const auto& record = v.decision;
   if (record) {
     for (const auto& c : record->decision.candidates) {
-      Ordered one = place(c.point_m, frame);
+      Ordered one = place(c.point_m, v.frame);
       one["value"] = finite_or_null(c.value);
       one["p_nlos"] = finite_or_null(c.p_nlos);
       one["flight_s"] = finite_or_null(c.flight_s);

@@ -45,9 +45,18 @@ struct ProcedureView {
 };
 nlohmann::ordered_json procedure_json(const ProcedureView& view, const procedure::FlightEngine& engine,
                                       const EnuFrame& frame);
-/// Topic mission.grid: the last decision with every candidate.
-nlohmann::ordered_json grid_json(const MissionId& mission, std::int64_t t_us,
-                                 const procedure::FlightEngine& engine, const EnuFrame& frame);
+/// Topic mission.grid: the last decision with every candidate. A copy of what it is made of, since it is long
+/// to write.
+struct GridView {
+  MissionId mission{};
+  std::int64_t t_us{};
+  planning::Rule rule{};
+  planning::Combine combine{};
+  std::vector<Eigen::Vector3d> visited, unreachable;
+  std::optional<procedure::DecisionRecord> decision;
+  EnuFrame frame;
+};
+nlohmann::ordered_json grid_json(const GridView& view);
 /// Topics mission.turn and mission.height of one anchor.
 nlohmann::ordered_json turn_json(const MissionId& mission, NetworkId anchor, std::int64_t t_us,
                                  const procedure::Clues& clues, bool running);

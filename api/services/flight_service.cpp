@@ -43,7 +43,12 @@ void FlightService::start() {
                             "the flight before the restart cannot be read: the pilot has it", std::nullopt);
   }
   if (state_->deps.now_s || state_->thread.joinable()) return;
-  state_->planner = Thread("anchord-plan", [this] { state_->compute_points(); });
+  state_->helper = Thread("anchord-plan", [this] {
+    std::unique_lock lock(state_->mutex);
+    while (!state_->stopping) {
+      if (!state_->work_apart(lock)) state_->due.wait(lock);
+    }
+  });
   state_->thread = Thread("anchord-fly", [this] {
     using Steady = std::chrono::steady_clock;
     auto due = Steady::now();
@@ -69,29 +74,33 @@ void FlightService::stop() {
   }
   state_->wake.notify_all();
   state_->changed.notify_all();
-  state_->asked.notify_all();
+  state_->due.notify_all();
   if (state_->thread.joinable()) state_->thread.join();
-  if (state_->planner.joinable()) state_->planner.join();
+  if (state_->helper.joinable()) state_->helper.join();
 }
 
-/// Seconds with hundreds of anchors: no lock is held meanwhile. One that fails is a decision that does not
-/// come in time.
-void FlightService::State::compute_points() {
-  std::unique_lock lock(mutex);
-  while (!stopping) {
-    if (!point_task) {
-      asked.wait(lock);
-      continue;
-    }
-    const auto task = *std::exchange(point_task, std::nullopt);
-    lock.unlock();
-    (void)guarded("planner", [&] {
-      auto decision = planning::next_point(task.input, task.options);
-      const std::scoped_lock again(mutex);
-      operations.decided(task, std::move(decision));
-    });
-    lock.lock();
-  }
+bool FlightService::State::work_apart(std::unique_lock<std::mutex>& lock) {
+  if (!operations.flight()) apart = {};
+  if (!apart.any()) return false;
+  (void)guarded("planner", [&] {
+    if (apart.point)
+      decide(lock);
+    else if (std::exchange(apart.grid, false))
+      show_grid(lock);
+    else if (std::exchange(apart.profiles, false))
+      show_profiles(lock);
+  });
+  if (!lock.owns_lock()) lock.lock();
+  return true;
+}
+
+/// One that fails is a decision that does not come in time.
+void FlightService::State::decide(std::unique_lock<std::mutex>& lock) {
+  const auto task = *std::exchange(apart.point, std::nullopt);
+  lock.unlock();
+  auto decision = planning::next_point(task.input, task.options);
+  lock.lock();
+  operations.decided(task, std::move(decision));
 }
 
 void FlightService::step() {
@@ -115,17 +124,14 @@ void FlightService::step() {
   bool keeps = false;
   std::optional<procedure::FlightClues> clues;
   {
-    const std::scoped_lock lock(s.mutex);
+    std::unique_lock lock(s.mutex);
     const auto now = s.now();
     if (s.operations.flying())
       s.checks_apart.note(now.s);
     else
       s.checks_apart.pause();
     s.operations.round(now, estimates, live.has_value());
-    if (auto task = s.operations.take_point_task()) {
-      s.point_task = std::move(task);
-      s.asked.notify_one();
-    }
+    if (auto task = s.operations.take_point_task()) s.apart.point = std::move(task);
     s.tell_events();
     if (const auto& f = s.operations.flight()) {
       mission = f->mission;  // one that began meanwhile too
@@ -137,6 +143,10 @@ void FlightService::step() {
       }
     }
     s.publish();
+    if (s.helper.joinable())
+      s.due.notify_one();
+    else
+      while (s.work_apart(lock)) continue;
   }
   if (clues && mission) s.deps.missions.tell_clues(*mission, std::move(*clues));
   if (keeps && mission) s.keep(*mission, std::move(keep));

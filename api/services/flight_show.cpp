@@ -1,4 +1,6 @@
 // What of a flight is shown: the topics of the procedure, and their GET twins.
+#include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "api/json/procedure_json.hpp"
@@ -10,8 +12,40 @@ namespace anchord::api {
 namespace {
 
 constexpr std::ptrdiff_t k_shown_commands = 30;
-/// Of hundreds of anchors they are long to write, and the thread that writes them is that of safety.
 constexpr double k_profiles_s = 0.5;
+
+GridView grid_of(const flight::ActiveFlight& f, std::int64_t t_us) {
+  const auto& engine = f.control.engine();
+  const auto& s = engine.state();
+  const auto& planner = engine.setup().planner;
+  return {f.mission, t_us,          planner.rule,      planner.combine,
+          s.visited, s.unreachable, engine.decision(), f.frame};
+}
+
+/// Of every anchor, copied: of hundreds they are long to write.
+struct Profiles {
+  MissionId mission;
+  std::map<NetworkId, procedure::Clues> clues;
+  procedure::Step step;
+  std::int64_t t_us;
+
+  using Each = std::function<void(NetworkId, const nlohmann::ordered_json&)>;
+  void turns(const Each& each) const {
+    for (const auto& [anchor, one] : clues)
+      if (!one.turn.empty())
+        each(anchor, turn_json(mission, anchor, t_us, one, step == procedure::Step::turn));
+  }
+  void heights(const Each& each) const {
+    for (const auto& [anchor, one] : clues)
+      if (!one.heights.empty())
+        each(anchor, height_json(mission, anchor, t_us, one, step == procedure::Step::height_search));
+  }
+};
+
+Profiles profiles_of(const flight::ActiveFlight& f, std::int64_t t_us) {
+  const auto& engine = f.control.engine();
+  return {f.mission, engine.clues(), engine.state().step, t_us};
+}
 
 }  // namespace
 
@@ -43,7 +77,8 @@ nlohmann::ordered_json FlightService::State::procedure(const flight::ActiveFligh
   return procedure_json(v, f.control.engine(), f.frame);
 }
 
-/// The stepper once a second and with every transition, decisions once, profiles while they grow.
+/// The stepper once a second and with every transition. What is longer to write is left to be shown apart:
+/// decisions once, profiles while they grow.
 void FlightService::State::publish() {
   const bool soon = operations.take_shown_soon();
   if (!operations.flight()) return;
@@ -52,34 +87,37 @@ void FlightService::State::publish() {
   const auto& engine = f.control.engine();
   const auto n = engine.state().n_transitions;
   const bool moved = n != last.shown;
-  const auto key = to_string(f.mission);
   if (moved || soon || at.s - last.shown_s >= 1) {
-    deps.hub.publish(Topic::procedure, to_wire(procedure(f)), at.utc.us(), key);
+    deps.hub.publish(Topic::procedure, to_wire(procedure(f)), at.utc.us(), to_string(f.mission));
     last.shown_s = at.s;
   }
-  publish_profiles(f, at, moved);
-  if (moved && engine.decision())
-    deps.hub.publish(Topic::mission_grid, to_wire(grid_json(f.mission, at.utc.us(), engine, f.frame)),
-                     at.utc.us(), key);
+  const auto step = engine.state().step;
+  const bool growing = step == procedure::Step::turn || step == procedure::Step::height_search;
+  if (moved || (growing && at.s - last.profiles_s >= k_profiles_s)) {
+    apart.profiles = true;
+    last.profiles_s = at.s;
+  }
+  if (moved && engine.decision()) apart.grid = true;
   last.shown = n;
 }
 
-void FlightService::State::publish_profiles(const flight::ActiveFlight& f, const flight::Now& at,
-                                            bool moved) {
-  const auto step = f.control.engine().state().step;
-  const bool turning = step == procedure::Step::turn, climbing = step == procedure::Step::height_search;
-  if (!moved && (!(turning || climbing) || at.s - last.profiles_s < k_profiles_s)) return;
-  last.profiles_s = at.s;
-  const std::int64_t t_us = at.utc.us();
-  const auto key = to_string(f.mission);
-  for (const auto& [anchor, clues] : f.control.engine().clues()) {
-    if (!clues.turn.empty() && (turning || moved))
-      deps.hub.publish(Topic::mission_turn, to_wire(turn_json(f.mission, anchor, t_us, clues, turning)), t_us,
-                       key + to_string(anchor), anchor);
-    if (!clues.heights.empty() && (climbing || moved))
-      deps.hub.publish(Topic::mission_height, to_wire(height_json(f.mission, anchor, t_us, clues, climbing)),
-                       t_us, key + to_string(anchor), anchor);
-  }
+void FlightService::State::show_grid(std::unique_lock<std::mutex>& lock) {
+  const auto grid = grid_of(*operations.flight(), now().utc.us());
+  lock.unlock();
+  deps.hub.publish(Topic::mission_grid, to_wire(grid_json(grid)), grid.t_us, to_string(grid.mission));
+}
+
+void FlightService::State::show_profiles(std::unique_lock<std::mutex>& lock) {
+  const auto profiles = profiles_of(*operations.flight(), now().utc.us());
+  lock.unlock();
+  const auto key = to_string(profiles.mission);
+  const auto to = [&](Topic topic) {
+    return [&, topic](NetworkId anchor, const nlohmann::ordered_json& one) {
+      deps.hub.publish(topic, to_wire(one), profiles.t_us, key + to_string(anchor), anchor);
+    };
+  };
+  profiles.turns(to(Topic::mission_turn));
+  profiles.heights(to(Topic::mission_height));
 }
 
 std::string FlightService::procedure_text(const MissionId& mission) {
@@ -89,36 +127,33 @@ std::string FlightService::procedure_text(const MissionId& mission) {
 }
 
 std::string FlightService::grid_text(const MissionId& mission) {
-  const std::scoped_lock lock(state_->mutex);
+  std::unique_lock lock(state_->mutex);
   const auto* f = state_->operations.flight_of(mission);
-  return f == nullptr
-             ? std::string{}
-             : to_wire(grid_json(mission, state_->deps.clock.now().us(), f->control.engine(), f->frame));
+  if (f == nullptr) return {};
+  const auto grid = grid_of(*f, state_->deps.clock.now().us());
+  lock.unlock();
+  return to_wire(grid_json(grid));
 }
 
 std::vector<std::string> FlightService::turn_texts(const MissionId& mission) {
-  const std::scoped_lock lock(state_->mutex);
   std::vector<std::string> out;
-  if (const auto* f = state_->operations.flight_of(mission)) {
-    const bool running = f->control.engine().state().step == procedure::Step::turn;
-    for (const auto& [anchor, clues] : f->control.engine().clues()) {
-      if (!clues.turn.empty())
-        out.push_back(to_wire(turn_json(mission, anchor, state_->deps.clock.now().us(), clues, running)));
-    }
-  }
+  std::unique_lock lock(state_->mutex);
+  const auto* f = state_->operations.flight_of(mission);
+  if (f == nullptr) return out;
+  const auto profiles = profiles_of(*f, state_->deps.clock.now().us());
+  lock.unlock();
+  profiles.turns([&](NetworkId, const auto& one) { out.push_back(to_wire(one)); });
   return out;
 }
 
 std::vector<std::string> FlightService::height_texts(const MissionId& mission) {
-  const std::scoped_lock lock(state_->mutex);
   std::vector<std::string> out;
-  if (const auto* f = state_->operations.flight_of(mission)) {
-    const bool running = f->control.engine().state().step == procedure::Step::height_search;
-    for (const auto& [anchor, clues] : f->control.engine().clues()) {
-      if (!clues.heights.empty())
-        out.push_back(to_wire(height_json(mission, anchor, state_->deps.clock.now().us(), clues, running)));
-    }
-  }
+  std::unique_lock lock(state_->mutex);
+  const auto* f = state_->operations.flight_of(mission);
+  if (f == nullptr) return out;
+  const auto profiles = profiles_of(*f, state_->deps.clock.now().us());
+  lock.unlock();
+  profiles.heights([&](NetworkId, const auto& one) { out.push_back(to_wire(one)); });
   return out;
 }
 

@@ -21,8 +21,9 @@ struct FlightService::State {
 
   flight::Now now() const;
   void tell_events();
-  /// Until the service stops: the points that rounds ask for.
-  void compute_points();
+  /// One piece of what is due apart, with the lock given away meanwhile; false: nothing is due.
+  bool work_apart(std::unique_lock<std::mutex>& lock);
+  void decide(std::unique_lock<std::mutex>& lock);
   flight::Groundwork groundwork(const Plan* plan);
   void recover();
   /// The document to store, when the machine moved since the last call; empty text: forget it.
@@ -30,15 +31,23 @@ struct FlightService::State {
   void keep(const MissionId& mission, std::string document) const;
   nlohmann::ordered_json procedure(const flight::ActiveFlight& f) const;
   void publish();
-  void publish_profiles(const flight::ActiveFlight& f, const flight::Now& at, bool moved);
+  void show_grid(std::unique_lock<std::mutex>& lock);
+  void show_profiles(std::unique_lock<std::mutex>& lock);
 
   Deps deps;
   std::mutex mutex;
-  std::condition_variable wake, changed, asked;
-  Thread thread, planner;
+  std::condition_variable wake, changed, due;
+  Thread thread, helper;
   bool stopping{false};
   flight::Operations operations;
-  std::optional<flight::Operations::PointTask> point_task;
+
+  /// What a round asks for that takes long with hundreds of anchors: done beside it, never in it.
+  struct Apart {
+    std::optional<flight::Operations::PointTask> point;
+    bool grid{false}, profiles{false};
+    bool any() const { return point || grid || profiles; }
+  } apart;
+
   IntervalHistogram checks_apart;  ///< of safety, while something flies
 
   /// What of the present flight was kept, shown and told; each flight begins anew.
