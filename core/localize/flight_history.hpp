@@ -12,8 +12,9 @@ namespace anchord {
 /// goes, old and new alike, and from then on only every second (fourth, ...) comes in. Not thread-safe.
 class FlightHistory {
  public:
-  /// A track of 10 Hz is whole for 26 minutes, and every 0.2 s for another 26.
-  static constexpr std::size_t k_max_ranges = 24'000, k_max_fixes = 16'000;
+  /// A track of 10 Hz is whole for 10 minutes, so that memory is flat from then on, and every 0.2 s for another
+  /// 10: at 1 m/s^2 a straight line between two of those is 5 mm off. The answer after landing uses all rows.
+  static constexpr std::size_t k_max_ranges = 24'000, k_max_fixes = 6'000;
 
   /// `belief`: what a model says of the range as it is given here.
   void add(const Range& range, const std::optional<RangeBelief>& belief = {});
