@@ -121,6 +121,7 @@ Ordered procedure_json(const ProcedureView& v, const procedure::FlightEngine& en
               {"ended", v.ended.empty() ? Ordered(nullptr) : Ordered(v.ended)},
               {"in_step_s", std::max(0.0, v.now_s - s.since_s)},
               {"step_limit_s", s.deadline_s > 0 ? Ordered(s.deadline_s - s.since_s) : Ordered(nullptr)},
+              {"target_sigma_m", or_null(engine.setup().exit.target_sigma_m)},
               {"elapsed_s", finite_or_null(engine.flown_s(v.now_s))},
               {"forecast_s", v.forecast ? Ordered{{"low", v.forecast->low_s},
                                                   {"expected", v.forecast->expected_s},

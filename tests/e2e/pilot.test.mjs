@@ -184,6 +184,19 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
     120_000,
     250,
   );
+  const done_shown = (name) =>
+    id(name)
+      .innerText()
+      .then((t) => /Anchors done\s*(\d+ of \d+)/.exec(t)?.[1]);
+  await eventually(
+    'one number of done anchors, in the flight bar and beside the map',
+    async () => {
+      const [bar, side] = await Promise.all([done_shown('flight-progress'), done_shown('progress')]);
+      return bar !== undefined && bar === side;
+    },
+    10_000,
+    100,
+  );
   await page.keyboard.press('h');
   await id('procedure').getByText('HOLD', { exact: true }).waitFor({ timeout: 10_000 });
   await eventually('the autopilot holds', async () => (await procedure()).drone.mode === 'BRAKE', 10_000);

@@ -3,6 +3,7 @@ import {
   cov6,
   ellipse,
   estimate,
+  gates as gates_of,
   mirror,
   num,
   obj,
@@ -11,21 +12,20 @@ import {
   vec3,
   VERDICT,
   type EstimateMsg,
+  type GateMsg,
   type Mirror,
 } from '../live/messages';
 import { ellipse_from_covariance, enu_from_geodetic } from '../map/enu';
 import { api_url, request } from './client';
 import { call, list, type Wire } from './contract';
 
-/// One acceptance test of the server: its number against its limit.
-export type Gate = Wire<'Gate'>;
+export type Gate = GateMsg;
 /// What the uncertainty of a position comes from: sources and their shares of the covariance, largest first.
 export interface Budget {
   readonly shares: readonly { readonly source: string; readonly share: number }[];
   readonly help: string; ///< what would help most, in words
 }
 export interface AnchorRow extends EstimateMsg {
-  readonly gates: readonly Gate[]; ///< empty where none were run: a running estimate
   readonly acceptable: boolean | null; ///< verdict ok and every gate passed; null where none were run
   readonly contradiction: string; ///< how a later flight contradicts the published place; else empty
   readonly budget: Budget | null;
@@ -50,7 +50,6 @@ export const row_of_estimate = (e: EstimateMsg): AnchorRow => ({
   calibrated_at: null,
   revision: null,
   crs: '',
-  gates: [],
   acceptable: null,
   contradiction: '',
   budget: null,
@@ -71,19 +70,6 @@ function budget_of(v: unknown): Budget | null {
     .sort((a, b) => b.share - a.share);
   return { shares, help: str(o.help_text) };
 }
-const gates_of = (v: unknown): Gate[] =>
-  Array.isArray(v)
-    ? v
-        .map(obj)
-        .filter((o) => o !== null && str(o.name) !== '')
-        .map((o) => ({
-          name: str(o!.name),
-          value: num(o!.value),
-          limit: num(o!.limit),
-          passed: o!.passed === true,
-          why: str(o!.why),
-        }))
-    : [];
 const point = (v: unknown): { lon: number | null; lat: number | null; h_m: number | null } => {
   const c = vec3(obj(v)?.coordinates ?? v);
   return { lon: c?.[0] ?? null, lat: c?.[1] ?? null, h_m: c?.[2] ?? null };
@@ -137,7 +123,7 @@ export function row_of(p: Record<string, unknown>, geometry: unknown): AnchorRow
         ? 'moved'
         : verdict === 'ambiguous'
           ? 'ambiguous'
-          : verdict === 'ok'
+          : verdict === 'ok' && quality?.acceptable !== false
             ? 'converged'
             : geometry
               ? 'estimating'

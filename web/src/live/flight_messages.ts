@@ -93,6 +93,7 @@ export interface ProcedureMsg {
   readonly step_limit_s: number | null;
   readonly ended: string;
   readonly elapsed_s: number | null;
+  readonly target_sigma_m: number | null; // of the position, 1 sigma: an anchor within it is done
   readonly forecast_s: { readonly low: number; readonly high: number } | null;
   readonly waypoint: number;
   readonly n_waypoints: number;
@@ -204,6 +205,7 @@ export function procedure(v: unknown): ProcedureMsg | null {
     step_limit_s: num(o.step_limit_s),
     ended: str(o.ended),
     elapsed_s: num(o.elapsed_s),
+    target_sigma_m: num(o.target_sigma_m),
     forecast_s: forecast ? { low: num(forecast.low) ?? 0, high: num(forecast.high) ?? 0 } : null,
     waypoint: count(o.waypoint),
     n_waypoints: count(o.n_waypoints),

@@ -3,7 +3,8 @@
 
 export type Vec3 = readonly [number, number, number];
 export type FixClass = 'none' | 'single' | 'dgps' | 'float' | 'fixed';
-export type AnchorStatus = 'found' | 'estimating' | 'converged' | 'ambiguous' | 'accepted' | 'moved';
+/// `gave_up` is not on the wire: the procedure ended its work on the anchor without its accuracy (state/done.ts).
+export type AnchorStatus = 'found' | 'estimating' | 'converged' | 'ambiguous' | 'accepted' | 'moved' | 'gave_up';
 export type Verdict = 'ok' | 'weak_geometry' | 'ambiguous' | 'too_few' | 'diverged';
 
 export interface Place {
@@ -71,6 +72,15 @@ export interface EstimateMsg extends Place {
   readonly rms_residual_m: number | null;
   readonly probability: number | null;
   readonly mirror: Mirror | null;
+  readonly gates: readonly GateMsg[]; ///< what the server held it against, the accuracy goal last
+}
+/// One acceptance test of the server: its number against its limit.
+export interface GateMsg {
+  readonly name: string;
+  readonly value: number | null;
+  readonly limit: number | null;
+  readonly passed: boolean;
+  readonly why: string;
 }
 export interface MissionMsg {
   readonly mission: string;
@@ -203,6 +213,12 @@ export function mirror(v: unknown): Mirror | null {
   const o = obj(v);
   return o && { ...place(o), enu_m: vec3(o.enu_m), probability: num(o.probability) };
 }
+export const gates = (v: unknown): GateMsg[] =>
+  (Array.isArray(v) ? v.map(obj) : []).flatMap((o) =>
+    o && str(o.name)
+      ? [{ name: str(o.name), value: num(o.value), limit: num(o.limit), passed: o.passed === true, why: str(o.why) }]
+      : [],
+  );
 export function estimate(v: unknown): EstimateMsg | null {
   const o = obj(v);
   if (!o || !str(o.anchor)) return null;
@@ -226,6 +242,7 @@ export function estimate(v: unknown): EstimateMsg | null {
     rms_residual_m: num(o.rms_residual_m),
     probability: num(o.probability),
     mirror: mirror(o.mirror),
+    gates: gates(o.gates),
   };
 }
 export function mission(v: unknown): MissionMsg | null {

@@ -77,6 +77,11 @@ export function sigma_h(c: readonly number[] | null): number | null {
   const e = c && ellipse_from_covariance(c);
   return e ? e.major_m / Math.sqrt(CHI2_2_95) : null;
 }
+/// 1-sigma of the position over all three axes: the root of the trace, as the exit rule of a plan means it.
+export function sigma_position(c: readonly number[] | null): number | null {
+  const trace = c ? c[0]! + c[3]! + c[5]! : NaN;
+  return trace >= 0 ? Math.sqrt(trace) : null;
+}
 export const sigma_v = (c: readonly number[] | null): number | null => (c && c[5]! >= 0 ? Math.sqrt(c[5]!) : null);
 
 /// A length of 1, 2 or 5 times a power of ten that is at most `max_m`: for scale bars and grids.

@@ -47,7 +47,15 @@ export function read_palette(): Palette {
   };
 }
 export const status_colour = (p: Palette, s: AnchorStatus): string =>
-  ({ found: p.info, estimating: p.info, converged: p.ok, ambiguous: p.caution, accepted: p.ok, moved: p.bad })[s];
+  ({
+    found: p.info,
+    estimating: p.info,
+    converged: p.ok,
+    ambiguous: p.caution,
+    accepted: p.ok,
+    moved: p.bad,
+    gave_up: p.caution,
+  })[s];
 export const range_colour = (p: Palette, c: RangeClass): string => ({ los: p.ok, nlos: p.caution, unclear: p.off })[c];
 export const trail_style = (p: Palette, fix: FixClass): { colour: string; dash: number[]; width: number } => {
   if (fix === 'fixed') return { colour: p.ok, dash: [], width: p.strong };

@@ -55,6 +55,13 @@ export function anchor_symbol(c: Ctx, p: Palette, status: AnchorStatus, x: numbe
       c.strokeStyle = p.halo;
       tick(c, x, y, r);
       break;
+    case 'gave_up':
+      ring();
+      c.beginPath();
+      c.moveTo(x - r * 0.42, y);
+      c.lineTo(x + r * 0.42, y);
+      c.stroke();
+      break;
     case 'ambiguous':
       ring();
       c.beginPath();

@@ -1,7 +1,7 @@
 /// What is known of one flight, as mutable data: the stream writes it, the map reads it every frame, the text four times a second. No DOM, no signals.
 import type { GridMsg, ProcedureMsg, ProfileMsg } from '../live/flight_messages';
 import type { EstimateMsg, FixClass, MissionMsg, Pose, RangeMsg, Rtk, Vec3 } from '../live/messages';
-import { sigma_h } from '../map/enu';
+import { sigma_h, sigma_position } from '../map/enu';
 
 /// A value and when it came, by the steady clock of this page: staleness is about arrival, since a replayed flight carries old times.
 export interface Heard<T> {
@@ -22,6 +22,8 @@ export interface RangeRow {
 export interface HistoryPoint {
   readonly t_us: number;
   readonly sigma_h_m: number | null;
+  readonly sigma_m: number | null; ///< of the position, all three axes
+  readonly h95_m: number | null;
   readonly gdop: number | null;
 }
 
@@ -97,12 +99,23 @@ export class Scene {
     if (!h) this.history.set(e.anchor, (h = []));
     const last = h[h.length - 1];
     if (last && e.t_us < last.t_us - 5_000_000) h.length = 0;
-    if (!last || e.t_us > last.t_us) h.push({ t_us: e.t_us, sigma_h_m: sigma_h(e.cov_enu_m2), gdop: e.gdop });
+    if (!last || e.t_us > last.t_us)
+      h.push({
+        t_us: e.t_us,
+        sigma_h_m: sigma_h(e.cov_enu_m2),
+        sigma_m: sigma_position(e.cov_enu_m2),
+        h95_m: e.h95_m,
+        gdop: e.gdop,
+      });
     if (h.length > HISTORY_POINTS) h.splice(0, HISTORY_POINTS / 6);
     this.version++;
     this.estimates_version++;
   }
+  /// Which anchors are done or given up is part of the slow picture.
   add_procedure(p: ProcedureMsg, at_ms: number): void {
+    const tasks = (x: ProcedureMsg | undefined): string =>
+      x ? `${x.status} ${x.anchors.map((a) => `${a.anchor}${a.done}${a.reached}`).join()}` : '';
+    if (tasks(p) !== tasks(this.procedure?.value)) this.estimates_version++;
     this.procedure = { value: p, at_ms };
     this.version++;
   }

@@ -195,9 +195,10 @@ export const STATUS_LOOK: Record<AnchorStatus | 'unseen', [Shape, Tone]> = {
   accepted: ['ok', 'ok'],
   ambiguous: ['half', 'caution'],
   moved: ['bad', 'bad'],
+  gave_up: ['off', 'caution'],
 };
 export const StatusChip = ({ status }: { status: AnchorStatus }) => (
-  <Chip shape={STATUS_LOOK[status][0]} tone={STATUS_LOOK[status][1]} word={status.toUpperCase()} />
+  <Chip shape={STATUS_LOOK[status][0]} tone={STATUS_LOOK[status][1]} word={status.replace('_', ' ').toUpperCase()} />
 );
 export const CLASS_LOOK: Record<RangeClass, [Shape, Tone, string]> = {
   los: ['ok', 'ok', 'LOS'],

@@ -1,5 +1,6 @@
 /// Everything the page says about verdicts and reasons, in one place. No DOM.
 import type { EstimateMsg, Verdict } from '../live/messages';
+import { gate_line } from './gates';
 
 export const VERDICT_WORDS: Record<Verdict, string> = {
   ok: 'well determined',
@@ -19,15 +20,23 @@ export const SOURCE_WORDS: Record<string, string> = {
   base: 'base station',
   floor: 'what no residual shows',
 };
-/// Title and sentence of "why not done"; null when there is nothing to explain.
-export function why_not_done(e: EstimateMsg): { title: string; text: string } | null {
+const sentence = (text: string): string =>
+  text ? `${text[0]!.toUpperCase()}${text.slice(1)}${/[.!?]$/.test(text) ? '' : '.'}` : '';
+/// Title and sentence of "why not done"; null when there is nothing to explain. `task`: what the procedure says of it, empty where it is content.
+export function why_not_done(e: EstimateMsg, task = ''): { title: string; text: string } | null {
   if (e.verdict === 'ok' && (e.status === 'converged' || e.status === 'accepted')) return null;
-  const text = e.reason ? `${e.reason[0]!.toUpperCase()}${e.reason.slice(1)}${/[.!?]$/.test(e.reason) ? '' : '.'}` : '';
+  if (e.status === 'gave_up')
+    return {
+      title: 'Given up: the flight ended its work here without the accuracy that was wanted',
+      text: sentence(task) || 'Fly again for the anchors that lack something.',
+    };
+  const open = e.gates.filter((g) => !g.passed),
+    text = sentence(e.reason || task || (e.verdict === 'ok' && open.length ? gate_line(open[0]!) : ''));
   // A mirror above or below is separated by height, one beside by leaving the line.
   const level =
     e.mirror?.enu_m && e.enu_m && Math.hypot(e.mirror.enu_m[0] - e.enu_m[0], e.mirror.enu_m[1] - e.enu_m[1]) < 1;
   const advice: Record<Verdict, string> = {
-    ok: 'More ranges from new directions will bring the ellipse below the limit.',
+    ok: 'More ranges from new directions make it more accurate.',
     weak_geometry: 'Fly where the anchor is seen from another side, and at another height.',
     ambiguous: level
       ? 'Fly one stretch a few metres higher or lower: that separates the two heights.'
@@ -53,23 +62,3 @@ export const REFUSED_WORDS: Record<string, string> = {
   too_long: 'out of reach',
 };
 export const refused_words = (reason: string): string => REFUSED_WORDS[reason] ?? reason.replaceAll('_', ' ');
-
-/// Acceptance gates of the server, by name; what is not here is shown by its own name.
-const GATE_WORDS: Record<string, string> = {
-  redundancy: 'Ranges beyond need',
-  rejected: 'Share of ranges rejected',
-  geometry: 'Width of the track',
-  precision: 'Precision',
-  side: 'This side, not the mirror',
-  residual_scale: 'Residuals',
-  chi_square: 'Residuals over time',
-  halves: 'Two halves agree',
-  flights: 'Flights agree',
-  bias: 'Range bias known',
-  settled: 'Solve settled',
-};
-export const gate_words = (name: string): string =>
-  GATE_WORDS[name] ?? name.replaceAll('_', ' ').replace(/^./, (c) => c.toUpperCase());
-
-/// Limits a position is held against. The server's verdict decides; these are what the page draws and names beside the values.
-export const GATES = { h95_m: 0.1, v95_m: 0.2, gdop: 2.5, n_ranges: 60, rms_residual_m: 0.15, mirror: 0.01 } as const;

@@ -1,6 +1,7 @@
 /// The selected anchor beside the map: state, why it is not done, its curve, its ellipse at true scale, its covariance.
 import type { EstimateMsg } from '../live/messages';
 import { sigma_h, sigma_v } from '../map/enu';
+import { shown_estimate, task_reason } from '../state/done';
 import { watched_mission, watched_scene, now_ms, tick, watched_lost } from '../state/store';
 import { accuracy, age, fixed, metres, percent } from '../ui/format';
 import { Chip, Q, StatusChip } from '../ui/marks';
@@ -22,10 +23,10 @@ export function AnchorCard({ anchor }: { anchor: string }) {
         <p class="why">Ranges arrive, an estimate has not been made yet.</p>
       </section>
     );
-  const e = latest.value,
+  const e = shown_estimate(scene, anchor)!,
     old_ms = now_ms() - latest.at_ms,
     stale = watched_mission.value?.state === 'recording' && (watched_lost() || old_ms > 10_000);
-  const why = why_not_done(e);
+  const why = why_not_done(e, task_reason(scene?.procedure?.value, anchor));
   return (
     <section class="sec-p" data-testid="anchor-card">
       <div class="hd">
@@ -36,7 +37,9 @@ export function AnchorCard({ anchor }: { anchor: string }) {
         <StatusChip status={e.status} />
       </div>
       {why && (
-        <div class={`callout ${e.status === 'ambiguous' ? 'caution' : e.status === 'moved' ? 'bad' : 'info'}`}>
+        <div
+          class={`callout ${e.status === 'ambiguous' || e.status === 'gave_up' ? 'caution' : e.status === 'moved' ? 'bad' : 'info'}`}
+        >
           <b>{why.title}</b>
           <p>{why.text}</p>
         </div>

@@ -2,13 +2,15 @@ import type { AnchorRow, Budget } from '../api/anchors';
 import { age, accuracy, bearing, date, dms, fixed, latlon, metres, percent, plain } from '../ui/format';
 import { CopyBox } from '../ui/copy_box';
 import { Mark, Q, StatusChip } from '../ui/marks';
-import { GATES, gate_words, why_not_done, SOURCE_WORDS, VERDICT_WORDS } from '../ui/words';
+import { gate_limit, gate_sentence, gate_value } from '../ui/gates';
+import { why_not_done, SOURCE_WORDS } from '../ui/words';
 import { choice } from './anchor_columns';
 import { AnchorPast } from './anchor_past';
 import { AnchorResiduals } from './anchor_residuals';
 import { Convergence } from './convergence';
 import { FacilityPanel } from './facility';
 import { Covariance, Loupe } from './loupe';
+import { task_reason } from '../state/done';
 import { current_scene, now_ms, tick } from '../state/store';
 
 function ErrorBudget({ budget }: { budget: Budget }) {
@@ -30,7 +32,7 @@ function ErrorBudget({ budget }: { budget: Budget }) {
 
 export function AnchorDetail({ row: r, live, changed }: { row: AnchorRow; live: boolean; changed: () => void }) {
   tick.value;
-  const why = why_not_done(r),
+  const why = why_not_done(r, live ? task_reason(current_scene()?.procedure?.value, r.anchor) : ''),
     latest = live ? current_scene()?.anchors.get(r.anchor) : undefined;
   const geo = r.lat !== null && r.lon !== null;
   return (
@@ -45,7 +47,7 @@ export function AnchorDetail({ row: r, live, changed }: { row: AnchorRow; live: 
         </div>
         {why && (
           <div
-            class={`callout ${r.status === 'ambiguous' ? 'caution' : r.status === 'moved' ? 'bad' : 'info'}`}
+            class={`callout ${r.status === 'ambiguous' || r.status === 'gave_up' ? 'caution' : r.status === 'moved' ? 'bad' : 'info'}`}
             data-testid="why"
           >
             <b>{why.title}</b>
@@ -168,44 +170,49 @@ function Twin({ r }: { r: AnchorRow }) {
   );
 }
 
-/// The gates of the server where it ran them; on a running estimate, what the page can hold against a limit itself. The verdict is always the server's.
+/// What the server held the position against, with its limits: the same for a running estimate and for a calibration.
 function Gates({ r }: { r: AnchorRow }) {
-  const list = r.gates.length ? run_gates(r) : running_gates(r),
-    passed = list.filter((g) => g.ok === true).length;
+  const passed = r.gates.filter((g) => g.passed).length;
   return (
     <section class="sec-p">
-      <table class="gates" data-testid="gates">
-        <caption>
-          {r.gates.length ? 'Acceptance gates' : 'Quality'}{' '}
-          <span class="mut">
-            {passed} of {list.length} pass
-          </span>
-        </caption>
-        <thead class="sr">
-          <tr>
-            <th scope="col">Pass</th>
-            <th scope="col">What</th>
-            <th scope="col">Value</th>
-            <th scope="col">Limit</th>
-          </tr>
-        </thead>
-        <tbody>
-          {list.map(({ name, value, limit, ok, why }) => (
-            <tr key={name} title={why}>
-              <td>
-                <Mark shape={ok === null ? 'off' : ok ? 'ok' : 'bad'} tone={ok === null ? 'off' : ok ? 'ok' : 'bad'} />
-                <span class="sr">{ok === null ? 'not known' : ok ? 'passes' : 'fails'}</span>
-              </td>
-              <th scope="row">
-                {name}
-                {ok === false && why && <span class="mut block">{why}</span>}
-              </th>
-              <td class={`num ${ok === false ? 'bad' : ''}`}>{value}</td>
-              <td class="num mut">{limit}</td>
+      {r.gates.length === 0 ? (
+        <p class="why" data-testid="gates">
+          No acceptance gate has been run for this position yet.
+        </p>
+      ) : (
+        <table class="gates" data-testid="gates">
+          <caption>
+            Acceptance gates{' '}
+            <span class="mut">
+              {passed} of {r.gates.length} pass
+            </span>
+          </caption>
+          <thead class="sr">
+            <tr>
+              <th scope="col">Pass</th>
+              <th scope="col">What</th>
+              <th scope="col">Value</th>
+              <th scope="col">Limit</th>
             </tr>
-          ))}
-        </tbody>
-      </table>
+          </thead>
+          <tbody>
+            {r.gates.map((g) => (
+              <tr key={g.name} title={g.why}>
+                <td>
+                  <Mark shape={g.passed ? 'ok' : 'bad'} tone={g.passed ? 'ok' : 'bad'} />
+                  <span class="sr">{g.passed ? 'passes' : 'fails'}</span>
+                </td>
+                <th scope="row">
+                  {gate_sentence(g)}
+                  {!g.passed && g.why && <span class="mut block">{g.why}</span>}
+                </th>
+                <td class={`num ${g.passed ? '' : 'bad'}`}>{gate_value(g)}</td>
+                <td class="num mut">{gate_limit(g)}</td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      )}
       {r.override && (
         <p class="why" data-testid="override">
           <Mark shape="caution" tone="caution" /> Published by a person although a gate failed: {r.override}
@@ -213,56 +220,4 @@ function Gates({ r }: { r: AnchorRow }) {
       )}
     </section>
   );
-}
-interface Line {
-  readonly name: string;
-  readonly value: string;
-  readonly limit: string;
-  readonly ok: boolean | null;
-  readonly why: string;
-}
-const brief = (v: number | null): string => (v === null ? '–' : fixed(v, Math.abs(v) < 10 ? 2 : 0));
-const run_gates = (r: AnchorRow): Line[] =>
-  r.gates.map((g) => ({
-    name: gate_words(g.name),
-    value: brief(g.value),
-    limit: brief(g.limit),
-    ok: g.passed,
-    why: g.why,
-  }));
-function running_gates(r: AnchorRow): Line[] {
-  const at_most = (name: string, v: number | null, limit: number, value: string, shown: string): Line => ({
-    name,
-    value,
-    limit: `≤ ${shown}`,
-    ok: v === null ? null : v <= limit,
-    why: '',
-  });
-  return [
-    { name: 'Verdict', value: VERDICT_WORDS[r.verdict], limit: '', ok: r.verdict === 'ok', why: '' },
-    at_most('95 % horizontal', r.h95_m, GATES.h95_m, `${fixed(r.h95_m, 2)} m`, fixed(GATES.h95_m, 2)),
-    at_most('95 % vertical', r.v95_m, GATES.v95_m, `${fixed(r.v95_m, 2)} m`, fixed(GATES.v95_m, 2)),
-    at_most('GDOP', r.gdop, GATES.gdop, fixed(r.gdop, 2), fixed(GATES.gdop, 1)),
-    {
-      name: 'Ranges used',
-      value: String(r.n_ranges),
-      limit: `≥ ${GATES.n_ranges}`,
-      ok: r.n_ranges >= GATES.n_ranges,
-      why: '',
-    },
-    at_most(
-      'Residual RMS',
-      r.rms_residual_m,
-      GATES.rms_residual_m,
-      `${fixed(r.rms_residual_m === null ? null : r.rms_residual_m * 1000, 0)} mm`,
-      String(GATES.rms_residual_m * 1000),
-    ),
-    at_most(
-      'Mirror odds',
-      r.mirror ? (r.mirror.probability ?? 1) : 0,
-      GATES.mirror,
-      r.mirror ? `${percent(r.mirror.probability)} %` : 'no mirror solution',
-      String(GATES.mirror * 100),
-    ),
-  ];
 }

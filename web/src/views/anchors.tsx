@@ -5,6 +5,7 @@ import { api_url, ApiError } from '../api/client';
 import { published, row_of_estimate, type AnchorRow } from '../api/anchors';
 import { enu_from_geodetic } from '../map/enu';
 import { MapBox } from '../map/map_box';
+import { is_done, shown_estimates } from '../state/done';
 import { me, may_publish } from '../state/session';
 import { chosen_anchor, current_mission, current_scene, link, revision, synced, tick } from '../state/store';
 import { Icon } from '../ui/marks';
@@ -72,11 +73,7 @@ export function Anchors({ anchor }: { anchor: string | null }) {
   const scene = current_scene(),
     live = source.value === 'live',
     mission = current_mission.value;
-  const all = live
-    ? scene
-      ? [...scene.anchors.values()].map((a) => row_of_estimate(a.value))
-      : []
-    : (loaded.value?.rows ?? []);
+  const all = live ? shown_estimates(scene).map(row_of_estimate) : (loaded.value?.rows ?? []);
   const wanted = filter.value.trim().toLowerCase();
   const rows = sorted_rows(
     all.filter((r) => !wanted || `${r.anchor} ${r.name} ${r.status} ${r.verdict}`.toLowerCase().includes(wanted)),
@@ -84,7 +81,7 @@ export function Anchors({ anchor }: { anchor: string | null }) {
   const on_map = live ? rows : on_the_ground(rows);
   const selected = rows.find((r) => r.anchor === chosen_anchor.value) ?? rows[0] ?? null;
   const search = useRef<HTMLInputElement>(null);
-  const ready = all.filter((r) => r.verdict === 'ok').length;
+  const ready = all.filter(is_done).length;
   const query = live ? `?view=live${mission ? `&mission=${encodeURIComponent(mission.mission)}` : ''}&` : '?';
   const estimates = live ? scene?.estimates_version : loaded.value,
     marked = selected?.anchor;

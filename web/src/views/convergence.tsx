@@ -1,26 +1,33 @@
-/// Horizontal sigma of one anchor over the flight, log scale, with the limit drawn in. uPlot comes with this chunk.
+/// How well one anchor is known over the flight, log scale, with the server's limit drawn in. uPlot comes with this chunk.
 import { useEffect, useRef } from 'preact/hooks';
 import type uPlot from 'uplot';
+import { goal_of } from '../state/done';
 import { watched_scene, tick } from '../state/store';
+import type { HistoryPoint } from '../state/scene';
 import { fixed } from '../ui/format';
 import { css, ground } from '../ui/theme';
 import { useStable } from '../ui/use_stable';
 
-/// The goal the design draws: 5 cm, 1 sigma, horizontal. Whether an anchor converged is the server's word.
-export const DONE_SIGMA_M = 0.05;
+const NOTHING: HistoryPoint = { t_us: 0, sigma_h_m: null, sigma_m: null, h95_m: null, gdop: null };
 
 export function Convergence({ anchor }: { anchor: string }) {
   const box = useRef<HTMLDivElement>(null),
     plot = useRef<uPlot | null>(null);
   tick.value;
-  const history = watched_scene()?.history.get(anchor) ?? [];
+  const scene = watched_scene(),
+    history = scene?.history.get(anchor) ?? [],
+    goal = goal_of(scene?.anchors.get(anchor)?.value ?? null, scene?.procedure?.value),
+    of = goal?.of ?? 'h95',
+    limit_m = goal?.limit_m ?? null;
   const theme = ground.value;
-  const last = [...history].reverse().find((h) => h.sigma_h_m !== null)?.sigma_h_m ?? null;
+  const measure = (x: HistoryPoint): number | null => (of === 'sigma' ? x.sigma_m : x.h95_m);
+  const last = measure([...history].reverse().find((h) => measure(h) !== null) ?? NOTHING),
+    name = of === 'sigma' ? 'σ position, 1σ' : '95 % horizontal';
 
   const draw = useStable((): void => {
     const h = watched_scene()?.history.get(anchor) ?? [],
       t0 = h[0]?.t_us ?? 0;
-    plot.current?.setData([h.map((x) => (x.t_us - t0) / 1e6), h.map((x) => x.sigma_h_m)]);
+    plot.current?.setData([h.map((x) => (x.t_us - t0) / 1e6), h.map(measure)]);
   });
   useEffect(() => {
     let gone = false;
@@ -38,7 +45,7 @@ export function Convergence({ anchor }: { anchor: string }) {
           width: Number(css('--lw-data')) || 2,
           rem: parseFloat(getComputedStyle(document.documentElement).fontSize),
         },
-        DONE_SIGMA_M,
+        limit_m,
       );
       draw();
     });
@@ -53,20 +60,21 @@ export function Convergence({ anchor }: { anchor: string }) {
       plot.current?.destroy();
       plot.current = null;
     };
-  }, [anchor, theme, draw]);
+  }, [anchor, theme, limit_m, of, draw]);
   const now = tick.value;
   useEffect(draw, [now, draw]);
   return (
     <figure class="conv" data-testid="convergence">
       <figcaption>
-        σ horizontal, 1σ{' '}
+        {name}{' '}
         <b>{last === null ? 'not known yet' : last < 1 ? `${fixed(last * 100, 1)} cm` : `${fixed(last, 1)} m`}</b>
+        {limit_m !== null && <span class="mut"> limit ≤ {fixed(limit_m * 100, 1)} cm</span>}
       </figcaption>
       <div
         ref={box}
         class="plot"
         role="img"
-        aria-label={`Horizontal sigma over ${history.length} estimates, now ${last === null ? 'not known' : `${fixed(last, 3)} m`}; goal ${DONE_SIGMA_M} m`}
+        aria-label={`${name} over ${history.length} estimates, now ${last === null ? 'not known' : `${fixed(last, 3)} m`}${limit_m === null ? '' : `, limit at most ${limit_m} m`}`}
       />
     </figure>
   );

@@ -2,6 +2,7 @@
 import { useEffect } from 'preact/hooks';
 import { MapBox } from '../map/map_box';
 import type { Content } from '../map/picture';
+import { done_count, shown_estimates } from '../state/done';
 import { me } from '../state/session';
 import {
   chosen_anchor,
@@ -31,7 +32,7 @@ export function content(): Content {
   const scene = current_scene(),
     m = current_mission.peek();
   return {
-    anchors: scene ? [...scene.anchors.values()].map((a) => a.value) : [],
+    anchors: shown_estimates(scene),
     selected: chosen_anchor.peek(),
     scene,
     link_lost: link.peek() === 'lost',
@@ -51,14 +52,9 @@ export function Live() {
   if (!mission) return synced.value ? <FirstRun /> : <Waiting />;
   const scene = current_scene();
   // With nothing chosen, the anchor that needs attention most: ambiguous first, then the least accurate.
-  const sorted = scene
-    ? [...scene.anchors.values()]
-        .map((a) => a.value)
-        .sort(
-          (a, b) =>
-            Number(b.status === 'ambiguous') - Number(a.status === 'ambiguous') || (b.h95_m ?? 0) - (a.h95_m ?? 0),
-        )
-    : [];
+  const sorted = shown_estimates(scene).sort(
+    (a, b) => Number(b.status === 'ambiguous') - Number(a.status === 'ambiguous') || (b.h95_m ?? 0) - (a.h95_m ?? 0),
+  );
   const selected = chosen_anchor.value ?? sorted[0]?.anchor ?? null;
   return (
     <div class="live" data-testid="live">
@@ -110,7 +106,7 @@ function Progress() {
     list = ordered_missions.value;
   const running = m.state === 'recording',
     lost = link.value === 'lost';
-  const total = Math.max(m.anchors_found, scene?.anchors.size ?? 0);
+  const { done, gave_up, total } = done_count(scene, m);
   const s =
     m.started_us === null
       ? null
@@ -155,8 +151,9 @@ function Progress() {
         <div>
           <dt>Anchors done</dt>
           <dd class={cls}>
-            {m.anchors_converged} of {total}
-            <Pips done={m.anchors_converged} total={total} />
+            {done} of {total}
+            {gave_up > 0 && <span class="u caution"> {gave_up} given up</span>}
+            <Pips done={done} total={total} />
           </dd>
         </div>
         <div>

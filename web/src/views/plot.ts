@@ -21,7 +21,7 @@ const decades = (min: number, max: number): number[] => {
   return out;
 };
 
-export function make_convergence(box: HTMLElement, look: Look, limit_m: number): uPlot {
+export function make_convergence(box: HTMLElement, look: Look, limit_m: number | null): uPlot {
   const font = `${look.rem * 0.75}px ${look.font}`;
   return new uPlot(
     {
@@ -37,7 +37,7 @@ export function make_convergence(box: HTMLElement, look: Look, limit_m: number):
           distr: 3,
           log: 10,
           range: (_u, min, max) => [
-            10 ** Math.floor(Math.log10(Math.min(min || 1, limit_m * 0.6))),
+            10 ** Math.floor(Math.log10(Math.min(min || 1, (limit_m ?? Infinity) * 0.6))),
             10 ** Math.ceil(Math.log10(Math.max(max || 1, 1))),
           ],
         },
@@ -67,6 +67,7 @@ export function make_convergence(box: HTMLElement, look: Look, limit_m: number):
       hooks: {
         draw: [
           (u) => {
+            if (limit_m === null) return;
             const y = u.valToPos(limit_m, 'y', true),
               c = u.ctx,
               px = devicePixelRatio || 1;
@@ -85,8 +86,8 @@ export function make_convergence(box: HTMLElement, look: Look, limit_m: number):
             c.strokeStyle = look.ground;
             c.lineWidth = 4 * px;
             c.lineJoin = 'round';
-            c.strokeText(`goal ${words(limit_m)}`, u.bbox.left + u.bbox.width, y - 2 * px);
-            c.fillText(`goal ${words(limit_m)}`, u.bbox.left + u.bbox.width, y - 2 * px);
+            c.strokeText(`limit ≤ ${words(limit_m)}`, u.bbox.left + u.bbox.width, y - 2 * px);
+            c.fillText(`limit ≤ ${words(limit_m)}`, u.bbox.left + u.bbox.width, y - 2 * px);
             c.restore();
           },
         ],

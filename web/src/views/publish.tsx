@@ -17,7 +17,8 @@ import { current_scene, revision, say } from '../state/store';
 import { accuracy, fixed } from '../ui/format';
 import { Icon, Mark, StatusChip } from '../ui/marks';
 import { useDraft } from '../ui/use_draft';
-import { gate_words, VERDICT_WORDS } from '../ui/words';
+import { gate_line } from '../ui/gates';
+import { VERDICT_WORDS } from '../ui/words';
 import { useStable } from '../ui/use_stable';
 
 export const publish_open = signal(false);
@@ -262,9 +263,7 @@ function DraftRow({
         ) : (
           <>
             <Mark shape="off" tone="off" /> no
-            {failed.length
-              ? `: ${failed.map((g) => `${gate_words(g.name).toLowerCase()} ${g.why ? `(${g.why})` : ''}`).join(', ')}`
-              : `, ${VERDICT_WORDS[r.verdict]}`}
+            {failed.length ? `. ${failed.map((g) => `${gate_line(g)}.`).join(' ')}` : `, ${VERDICT_WORDS[r.verdict]}`}
           </>
         )}
         {may_override(r) &&

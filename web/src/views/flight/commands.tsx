@@ -4,6 +4,7 @@ import { useEffect } from 'preact/hooks';
 import { ApiError, error_text } from '../../api/client';
 import { command, release_control, renew_control, take_control, type Action, type Lease } from '../../api/flight';
 import type { ProcedureMsg } from '../../live/flight_messages';
+import { done_count } from '../../state/done';
 import { may } from '../../state/session';
 import { current_mission, current_scene, link, live_source, say, server_now_us, tick } from '../../state/store';
 import { clock, fixed, percent } from '../../ui/format';
@@ -184,9 +185,7 @@ export function FlightBar() {
 }
 
 function Progress({ p }: { p: ProcedureMsg }) {
-  // Given up is not done: only an accuracy that was reached counts.
-  const done = p.anchors.filter((a) => a.reached).length,
-    given_up = p.anchors.filter((a) => a.done && !a.reached).length,
+  const { done, gave_up, total } = done_count(current_scene(), current_mission.value),
     battery = p.drone?.battery ?? null,
     needed = p.battery_needed;
   return (
@@ -200,8 +199,8 @@ function Progress({ p }: { p: ProcedureMsg }) {
       <div>
         <dt>Anchors done</dt>
         <dd>
-          {done} of {p.anchors.length}
-          {given_up > 0 && <span class="u caution"> {given_up} given up</span>}
+          {done} of {total}
+          {gave_up > 0 && <span class="u caution"> {gave_up} given up</span>}
         </dd>
       </div>
       <div>

@@ -1,0 +1,93 @@
+/// Acceptance gates of the server as sentences with value, sign, limit and unit. Limits are the server's: the page has none. No DOM.
+import type { Gate } from '../api/anchors';
+import { fixed } from './format';
+
+type Unit = 'm' | '%' | '×' | 'χ²' | 'σ' | '';
+interface Words {
+  readonly passes: string;
+  readonly fails: string;
+  readonly unit: Unit;
+  readonly least?: true; ///< the value has to be at least the limit; else at most
+}
+const WORDS: Record<string, Words> = {
+  redundancy: {
+    passes: 'Ranges beyond the unknowns',
+    fails: 'Too few ranges beyond the unknowns',
+    unit: '',
+    least: true,
+  },
+  rejected: { passes: 'Few ranges are rejected', fails: 'Too many ranges are rejected', unit: '%' },
+  geometry: {
+    passes: 'The track is wide enough for its distance',
+    fails: 'The track is too narrow for its distance',
+    unit: '%',
+    least: true,
+  },
+  precision: {
+    passes: 'Largest σ is small for its distance',
+    fails: 'Largest σ is too large for its distance',
+    unit: '%',
+  },
+  side: {
+    passes: 'The mirror solution is excluded',
+    fails: 'The mirror solution is not excluded',
+    unit: '%',
+    least: true,
+  },
+  outline: { passes: 'Inside the outline of the building', fails: 'Outside the outline of the building', unit: 'm' },
+  blocked: {
+    passes: 'Residuals are like those of the other anchors',
+    fails: 'Residuals are larger than those of the other anchors',
+    unit: '×',
+  },
+  residual_scale: { passes: 'Residuals are small', fails: 'Residuals are too large', unit: 'm' },
+  chi_square: {
+    passes: 'Residuals average out over time',
+    fails: 'Residuals do not average out over time',
+    unit: 'χ²',
+  },
+  halves: { passes: 'The two halves of the flight agree', fails: 'The two halves of the flight disagree', unit: 'χ²' },
+  flights: { passes: 'The flights agree', fails: 'The flights disagree', unit: 'χ²' },
+  moved: { passes: 'It is where it was', fails: 'It moved, or one of the answers is wrong', unit: 'χ²' },
+  bias: { passes: 'Range bias of the kit is known, σ', fails: 'Range bias of the kit is not known, σ', unit: 'm' },
+  lever_arm: { passes: 'The lever arm fits the flight', fails: 'The lever arm does not fit the flight', unit: 'σ' },
+  settled: { passes: 'The joint solution settled', fails: 'The joint solution did not settle, rounds', unit: '' },
+  goal_h95_m: {
+    passes: 'Accuracy goal reached, 95 % horizontal',
+    fails: 'Accuracy goal not reached, 95 % horizontal',
+    unit: 'm',
+  },
+  goal_v95_m: {
+    passes: 'Accuracy goal reached, 95 % vertical',
+    fails: 'Accuracy goal not reached, 95 % vertical',
+    unit: 'm',
+  },
+};
+const plain_name = (name: string): string => name.replaceAll('_', ' ').replace(/^./, (c) => c.toUpperCase());
+
+/// What the gate found, as a statement that is true as it stands: a failed gate never reads "halves agree".
+export const gate_sentence = (g: Gate): string => {
+  const w = WORDS[g.name];
+  return w ? (g.passed ? w.passes : w.fails) : `${plain_name(g.name)}: ${g.passed ? 'passed' : 'failed'}`;
+};
+
+/// Digits that keep value and limit apart: a failed gate must not read 0.20 against at most 0.20.
+function digits(v: number, limit: number | null, least: number): number {
+  if (limit === null || v === limit) return least;
+  for (let d = least; d < 4; d++) if (fixed(v, d) !== fixed(limit, d)) return d;
+  return 4;
+}
+function with_unit(v: number, unit: Unit, limit: number | null): string {
+  if (unit === '%') return `${fixed(v * 100, digits(v * 100, limit === null ? null : limit * 100, v < 0.1 ? 1 : 0))} %`;
+  if (unit === '') return fixed(v, digits(v, limit, 0));
+  const text = fixed(v, digits(v, limit, unit === 'm' ? 2 : 1));
+  return unit === 'χ²' ? `χ² ${text}` : unit === '×' ? `${text}×` : `${text} ${unit}`;
+}
+const unit_of = (g: Gate): Unit => WORDS[g.name]?.unit ?? '';
+export const gate_value = (g: Gate): string =>
+  g.value === null ? 'not measured' : with_unit(g.value, unit_of(g), g.limit);
+export const gate_limit = (g: Gate): string =>
+  g.limit === null ? '' : `${WORDS[g.name]?.least ? '≥' : '≤'} ${with_unit(g.limit, unit_of(g), g.value)}`;
+/// The whole of it: "The two halves of the flight disagree: χ² 21.3 (limit ≤ 16.3)".
+export const gate_line = (g: Gate): string =>
+  `${gate_sentence(g)}: ${gate_value(g)}${g.limit === null ? '' : ` (limit ${gate_limit(g)})`}`;

@@ -1,0 +1,48 @@
+import { describe, expect, it } from 'vitest';
+import { procedure } from '../src/live/flight_messages';
+import { estimate, mission } from '../src/live/messages';
+import { as_shown, done_count, goal_of } from '../src/state/done';
+import { Scene } from '../src/state/scene';
+import { STATUS_LOOK } from '../src/ui/marks';
+import { why_not_done } from '../src/ui/words';
+
+const goal = (h95_m: number) => ({ name: 'goal_h95_m', value: h95_m, limit: 0.25, passed: h95_m <= 0.25, why: '' });
+const anchor = (id: string, status: string, h95_m = 0.1) =>
+  estimate({ mission: 'm', anchor: id, t_us: 1, status, verdict: 'ok', h95_m, gates: [goal(h95_m)] })!;
+const flight = (tasks: object[], status = 'running') =>
+  procedure({ mission: 'm', status, step: 'ranging', target_sigma_m: 0.03, anchors: tasks })!;
+const task = (network_id: string, done: boolean, reached: boolean, why = '') => ({ network_id, done, reached, why });
+const m = mission({ mission: 'm', anchors_found: 4, anchors_converged: 4 })!;
+
+describe('an anchor is done', () => {
+  it('by the word of the server where no procedure flies', () => {
+    expect(as_shown(anchor('0x1', 'converged'), null).status).toBe('converged');
+    expect(goal_of(anchor('0x1', 'estimating'), null)).toEqual({ of: 'h95', limit_m: 0.25 });
+  });
+  it('when the procedure reached its target, not while it still works on it', () => {
+    const p = flight([task('0x1', true, true), task('0x2', false, false, 'accuracy 0.083 m, wanted 0.030 m')]);
+    expect(as_shown(anchor('0x1', 'converged'), p).status).toBe('converged');
+    expect(as_shown(anchor('0x2', 'converged'), p).status).toBe('estimating');
+    expect(goal_of(anchor('0x2', 'converged'), p)).toEqual({ of: 'sigma', limit_m: 0.03 });
+  });
+  it('never when its time ran out, nor when the flight ended before: given up is not green', () => {
+    for (const p of [flight([task('0x1', true, false)]), flight([task('0x1', false, false)], 'aborted')]) {
+      const shown = as_shown(anchor('0x1', 'converged'), p);
+      expect(shown.status).toBe('gave_up');
+      expect(STATUS_LOOK[shown.status][1]).not.toBe('ok');
+      expect(why_not_done(shown, 'time over: 300 s of 300 s')!.text).toBe('Time over: 300 s of 300 s.');
+    }
+    expect(as_shown(anchor('0x1', 'accepted'), flight([task('0x1', true, false)])).status).toBe('accepted');
+    expect(as_shown(anchor('0x1', 'ambiguous'), flight([task('0x1', true, false)])).status).toBe('ambiguous');
+  });
+  it('in one number for every place of a screen', () => {
+    const s = new Scene('m');
+    for (const id of ['0x1', '0x2', '0x3']) s.add_estimate(anchor(id, 'converged'), 0);
+    expect(done_count(s, m)).toEqual({ done: 3, gave_up: 0, total: 4 });
+    const drawn = s.estimates_version;
+    s.add_procedure(flight([task('0x1', true, true), task('0x2', true, false), task('0x9', false, false)]), 0);
+    expect(s.estimates_version).toBeGreaterThan(drawn); // the map has to be drawn anew
+    expect(done_count(s, m)).toEqual({ done: 2, gave_up: 1, total: 4 }); // 0x3 is not the procedure's business
+    expect(done_count(new Scene('x'), m)).toEqual({ done: 4, gave_up: 0, total: 4 });
+  });
+});
