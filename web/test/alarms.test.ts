@@ -5,6 +5,8 @@ const calm: Situation = {
   now_ms: 0,
   link: 'live',
   silence_ms: 0,
+  data_age_ms: 0,
+  slow: false,
   recording: true,
   fix: 'fixed',
   correction_age_s: 1,
@@ -31,11 +33,53 @@ describe('Conditions', () => {
     const c = new Conditions();
     c.standing({ ...calm, fix: 'none' });
     c.standing({ ...calm, fix: 'none', now_ms: 2500 });
-    const lost = c.standing({ ...calm, fix: 'none', link: 'lost', silence_ms: 6000, now_ms: 9000 });
+    const lost = c.standing({ ...calm, fix: 'none', link: 'lost', silence_ms: 6000, data_age_ms: 6000, now_ms: 9000 });
     expect(ids(lost)).toEqual(['link.lost', 'rtk.lost']);
     expect(lost[0]!.since_ms).toBe(3000);
     expect(lost[1]!.title).toContain('when last seen');
     expect(new Conditions().standing({ ...calm, link: 'lost', recording: false })).toEqual([]);
+  });
+  it('do not blame the tag for a silence of the link, neither during an outage nor right after it', () => {
+    const c = new Conditions();
+    expect(c.standing(calm)).toEqual([]);
+    expect(ids(c.standing({ ...calm, link: 'late', silence_ms: 4000, range_silence_ms: 5100, now_ms: 4000 }))).toEqual(
+      [],
+    );
+    expect(
+      ids(
+        c.standing({
+          ...calm,
+          link: 'lost',
+          silence_ms: 20_000,
+          data_age_ms: 20_000,
+          range_silence_ms: 20_100,
+          now_ms: 20_000,
+        }),
+      ),
+    ).toEqual(['link.lost']);
+    expect(ids(c.standing({ ...calm, range_silence_ms: 20_600, now_ms: 20_500 }))).toEqual([]);
+    expect(ids(c.standing({ ...calm, range_silence_ms: 25_600, now_ms: 25_500 }))).toEqual(['uwb.none']);
+  });
+  it('call a link too slow by its name, and list it as advisory while the server helps itself', () => {
+    const lost = new Conditions().standing({ ...calm, link: 'lost', silence_ms: 300, data_age_ms: 8000, now_ms: 9000 });
+    expect(lost[0]).toMatchObject({ id: 'link.lost', title: 'Link too slow: what arrives is old', since_ms: 1000 });
+    const c = new Conditions();
+    c.standing({ ...calm, slow: true });
+    expect(c.standing({ ...calm, slow: true, now_ms: 2000 })[0]).toMatchObject({ id: 'ws.slow', priority: 'advisory' });
+  });
+  it('do not count the time of an outage as time of a poor fix', () => {
+    const c = new Conditions();
+    c.standing({ ...calm, fix: 'float', now_ms: 1000 });
+    c.standing({ ...calm, fix: 'float', link: 'lost', silence_ms: 19_000, data_age_ms: 19_000, now_ms: 20_000 });
+    expect(ids(c.standing({ ...calm, fix: 'float', now_ms: 21_000 }))).toEqual([]);
+    expect(ids(c.standing({ ...calm, fix: 'float', now_ms: 26_100 }))).toEqual(['rtk.float']);
+  });
+  it('of the server stay in the list while the link is lost, as they were when last seen', () => {
+    const server = [
+      { id: 'disk.low', priority: 'warning' as const, since_us: 0, text: 'Disk is low', acknowledged: false },
+    ];
+    const [a] = merged([], server, 1, 1, true);
+    expect([a!.title, a!.acknowledged]).toEqual(['Disk is low, when last seen', true]);
   });
   it('are listed once per id with the word of the server, critical first', () => {
     const own = new Conditions();

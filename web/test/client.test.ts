@@ -66,7 +66,8 @@ const ack = (recovered: boolean, sub = 11): void =>
   world.socket.say({ op: 'ack', id: world.socket.sub('events').id, sub, from_seq: 1, recovered });
 const data = (seq: number, prev: number | null, sub = 11): void =>
   world.socket.say({ op: 'data', sub, seq, prev, t_us: 5, data: { n: seq } });
-const beat = (): void => world.socket.say({ op: 'hb', t_us: 0 });
+/// A heartbeat that was so long on its way.
+const beat = (late_ms = 0): void => world.socket.say({ op: 'hb', t_us: world.environment.wall_us() - late_ms * 1000 });
 
 beforeEach(() => {
   world = new World();
@@ -78,7 +79,7 @@ beforeEach(() => {
     data: (_t, d) => log.push(`data ${(d as { n: number }).n}`),
     gap: (_t, n) => log.push(`gap ${n}`),
     restarted: () => log.push('restarted'),
-    resumed: (n, again) => log.push(`resumed ${n} ${again}`),
+    resumed: (n, again) => log.push(`resumed ${[...n].map(([t, k]) => `${t} ${k}`).join()} ${again}`),
     link: (s) => links.push(s),
     refused: () => log.push('refused'),
   });
@@ -156,7 +157,7 @@ describe('LiveClient', () => {
     data(6, 5, 3);
     data(7, 6, 3);
     beat();
-    expect(log.slice(-3)).toEqual(['data 6', 'data 7', 'resumed 2 false']);
+    expect(log.slice(-3)).toEqual(['data 6', 'data 7', 'resumed events 2 false']);
   });
   it('takes the snapshot when the history is gone', () => {
     up_to(5);
@@ -167,7 +168,7 @@ describe('LiveClient', () => {
     world.socket.say({ op: 'snap', sub: 3, seq: 900, t_us: 1, data: [1] });
     data(901, 900, 3);
     beat();
-    expect(log.slice(-3)).toEqual(['snap events [1]', 'data 901', 'resumed 1 true']);
+    expect(log.slice(-3)).toEqual(['snap events [1]', 'data 901', 'resumed events 1 true']);
   });
   it('forgets everything when the epoch changed', () => {
     up_to(5);
@@ -249,6 +250,49 @@ describe('LiveClient', () => {
     world.socket.say({ op: 'hb', t_us: world.environment.wall_us() + 2_500_000 }); // delayed: worse than the round trip
     expect(client.offset_us()).toBe(3_000_000);
     expect(client.now_us() - world.environment.wall_us()).toBe(3_000_000);
+  });
+  it('is late, then lost, when what arrives is old, although messages arrive all the time', () => {
+    up_to(5);
+    beat();
+    for (let late_ms = 0; late_ms <= 6000; late_ms += 1000) {
+      world.advance(1000);
+      beat(late_ms);
+    }
+    world.advance(250);
+    expect(links).toEqual(['live', 'late', 'lost']);
+    expect(client.silence_ms()).toBe(250);
+    expect(client.data_age_ms()).toBeCloseTo(6250, -1);
+    expect(world.sockets).toHaveLength(1); // the link works: hanging up would lose what is on its way
+    for (let i = 0; i < 3; i++) {
+      world.advance(1000);
+      beat(50);
+    }
+    world.advance(250);
+    expect(links.at(-1)).toBe('live');
+  });
+  it('does not take a growing delay for a clock that goes wrong, but a clock that was set for one', () => {
+    hello();
+    const asked = world.socket.sent.find((x) => x.op === 'time')!;
+    world.advance(20);
+    world.socket.say({ op: 'time', id: asked.id, c_us: asked.c_us, t_us: (asked.c_us as number) + 10_000 });
+    for (let i = 0; i < 60; i++) {
+      world.advance(1000);
+      beat(8000);
+    }
+    const now_us = world.environment.wall_us();
+    world.socket.say({ op: 'time', id: 99, c_us: now_us - 8e6, t_us: now_us - 7.9e6 });
+    expect(Math.abs(client.offset_us())).toBeLessThan(20_000);
+    world.wall_offset_us -= 3_600_000_000; // this machine's clock is set back by an hour
+    beat();
+    world.socket.say({ op: 'hb', t_us: world.environment.wall_us() + 3_600_000_000 });
+    expect(client.offset_us()).toBeCloseTo(3_600_000_000, -5);
+  });
+  it('tells when the server leaves messages out for it', () => {
+    up_to(5);
+    world.socket.say({ op: 'hb', t_us: world.environment.wall_us(), queue: 0.9, conflating: true });
+    expect(client.slow()).toBe(true);
+    beat();
+    expect(client.slow()).toBe(false);
   });
   it('ignores what it cannot read and ops it does not know', () => {
     up_to(5);

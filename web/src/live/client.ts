@@ -30,6 +30,7 @@ const LATE_MS = 2000,
 const FIRST_RETRY_MS = 500,
   LAST_RETRY_MS = 10_000;
 const TIME_EVERY_MS = 10_000;
+const DRIFT_US_PER_MS = 0.1; // two clocks of 50 ppm each
 const GREETING_MS = 10_000; // a connection attempt into a dead network would hang for minutes
 
 /// Client of subprotocol anchord.v1: subscribes, follows seq and prev, resumes by epoch and seq, reconnects for ever. No DOM.
@@ -51,10 +52,14 @@ export class LiveClient implements LiveSource {
   private retry_at_ms: number | null = null;
   private cancel_retry: (() => void) | null = null;
   private cancel_check: (() => void) | null = null;
-  private readonly offsets: { at_ms: number; offset_us: number; spread_us: number }[] = [];
+  /// Server's clock minus ours lies between: nothing arrives before it was sent, nothing is answered before it was asked.
+  private least: { us: number; at_ms: number } | null = null;
+  private most: { us: number; at_ms: number } | null = null;
+  private beat_us: number | null = null;
+  private conflating = false;
   private asked_time_ms = -Infinity;
   private minimum_retry_ms = 0;
-  private resume: { recovered: number; resynchronised: boolean; open: Set<string> } | null = null;
+  private resume: { recovered: Map<string, number>; resynchronised: boolean; open: Set<string> } | null = null;
 
   constructor(
     topics: readonly string[],
@@ -96,11 +101,20 @@ export class LiveClient implements LiveSource {
   retry_in_ms(): number | null {
     return this.retry_at_ms === null ? null : Math.max(0, this.retry_at_ms - this.env.now_ms());
   }
-  /// Clock of the server minus ours: the sample with the tightest bound among the recent ones.
+  /// Age of the newest heartbeat by the server's clock: on a link that cannot keep up messages arrive all the time, and are old.
+  data_age_ms(): number {
+    const silence = this.silence_ms();
+    return this.beat_us === null ? silence : Math.max(silence, (this.now_us() - this.beat_us) / 1000);
+  }
+  slow(): boolean {
+    return this.conflating;
+  }
+  /// Clock of the server minus ours: the middle of what is possible. A delay now does not move it, so that late data is seen to be late.
   offset_us(): number {
-    let best: { offset_us: number; spread_us: number } | null = null;
-    for (const s of this.offsets) if (!best || s.spread_us < best.spread_us) best = s;
-    return best?.offset_us ?? 0;
+    const now = this.env.now_ms(),
+      least = this.least && this.least.us - DRIFT_US_PER_MS * (now - this.least.at_ms),
+      most = this.most && this.most.us + DRIFT_US_PER_MS * (now - this.most.at_ms);
+    return least === null ? 0 : most === null ? least : (least + most) / 2;
   }
 
   private connect(): void {
@@ -149,7 +163,8 @@ export class LiveClient implements LiveSource {
       this.retry_later();
     }
     if (silence === Infinity) return;
-    this.set_link(silence > LOST_MS ? 'lost' : silence > LATE_MS ? 'late' : 'live');
+    const age = this.data_age_ms();
+    this.set_link(age > LOST_MS ? 'lost' : age > LATE_MS ? 'late' : 'live');
     if (silence > LOST_MS && this.socket && this.greeted) {
       // an open socket that says nothing is a dead one
       this.drop_socket();
@@ -220,7 +235,9 @@ export class LiveClient implements LiveSource {
     this.by_sub.clear();
     this.by_id.clear();
     const wanted = [...this.topics.keys()].filter((t) => !offered || offered.has(t));
-    this.resume = again ? { recovered: 0, resynchronised: restarted, open: new Set(wanted) } : null;
+    this.resume = again ? { recovered: new Map(), resynchronised: restarted, open: new Set(wanted) } : null;
+    this.beat_us = null;
+    this.conflating = false;
     for (const name of wanted) this.subscribe(name);
     this.set_link('live');
     this.ask_time();
@@ -276,7 +293,7 @@ export class LiveClient implements LiveSource {
       return;
     }
     topic.seq = seq;
-    if (this.resume) this.resume.recovered++;
+    this.resume?.recovered.set(name, (this.resume.recovered.get(name) ?? 0) + 1);
     this.sink?.data(name, m.data, t_us);
   }
   /// A jump that nobody announced: ask again from where we stand. Once in two seconds, else a broken server would be asked for ever.
@@ -303,8 +320,11 @@ export class LiveClient implements LiveSource {
   }
   private heartbeat(m: Record<string, unknown>): void {
     const t_us = num(m.t_us);
-    // One way only: the offset is off by the (unknown) delay, so any round trip below a second beats it.
-    if (t_us !== null) this.clock_sample(t_us - this.env.wall_us(), 1_000_000);
+    if (t_us !== null) {
+      this.clock_bounds(t_us - this.env.wall_us(), null);
+      this.beat_us = t_us;
+    }
+    this.conflating = m.conflating === true;
     if (this.resume && this.resume.open.size === 0) {
       const { recovered, resynchronised } = this.resume;
       this.resume = null;
@@ -315,13 +335,17 @@ export class LiveClient implements LiveSource {
     const [c_us, t_us] = [num(m.c_us), num(m.t_us)];
     if (c_us === null || t_us === null) return;
     const now = this.env.wall_us();
-    this.clock_sample(t_us - (c_us + now) / 2, now - c_us);
+    this.clock_bounds(t_us - now, t_us - c_us);
   }
-  private clock_sample(offset_us: number, spread_us: number): void {
-    const at_ms = this.env.now_ms();
-    while (this.offsets.length && at_ms - this.offsets[0]!.at_ms > 60_000) this.offsets.shift();
-    if (this.offsets.length >= 64) this.offsets.shift();
-    this.offsets.push({ at_ms, offset_us, spread_us });
+  /// The tightest bounds stay, widened by what two clocks may drift. Bounds that exclude each other mean that a clock was set: begin anew.
+  private clock_bounds(least_us: number, most_us: number | null): void {
+    const at_ms = this.env.now_ms(),
+      least = this.least && this.least.us - DRIFT_US_PER_MS * (at_ms - this.least.at_ms),
+      most = this.most && this.most.us + DRIFT_US_PER_MS * (at_ms - this.most.at_ms);
+    const stepped = (most !== null && least_us > most) || (most_us !== null && least !== null && most_us < least);
+    if (least === null || least_us > least || stepped) this.least = { us: least_us, at_ms };
+    if (stepped) this.most = null;
+    if (most_us !== null && (most === null || most_us < most || stepped)) this.most = { us: most_us, at_ms };
   }
   private error(m: Record<string, unknown>): void {
     const id = num(m.id);

@@ -10,8 +10,8 @@ export interface LiveSink {
   gap(topic: string, dropped: number): void;
   /// Another life of the server: everything known is replaced by the snapshots that follow.
   restarted(): void;
-  /// After an interruption all topics are up to date again: by replay of so many messages, or by snapshots.
-  resumed(recovered: number, resynchronised: boolean): void;
+  /// After an interruption all topics are up to date again: by replay of so many messages of each, or by snapshots.
+  resumed(recovered: ReadonlyMap<string, number>, resynchronised: boolean): void;
   link(state: LinkState): void;
   /// A conversation ended before it began, or the server refused it: the session may have run out.
   refused(): void;
@@ -28,5 +28,9 @@ export interface LiveSource {
   now_us(): number;
   /// Milliseconds of silence, and until the next attempt (null while connected).
   silence_ms(): number;
+  /// Milliseconds since the server made what arrived last: more than the silence where the link cannot keep up.
+  data_age_ms(): number;
+  /// Whether the server leaves messages out because this link is too slow for them.
+  slow(): boolean;
   retry_in_ms(): number | null;
 }

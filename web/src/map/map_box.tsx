@@ -1,5 +1,6 @@
 /// The map as a component: loads the engine when first shown, and offers zoom, follow and fit as buttons.
 import { useEffect, useRef, useState } from 'preact/hooks';
+import { when_back } from '../state/store';
 import { Icon } from '../ui/marks';
 import { ground } from '../ui/theme';
 import { length_words, round_length } from './enu';
@@ -24,12 +25,13 @@ export function MapBox({ content, onSelect, label, follow, version }: Props) {
     map = useRef<MapView | null>(null);
   const latest = useRef({ content, onSelect });
   latest.current = { content, onSelect };
-  const [mode, set_mode] = useState<Mode>('fit');
+  const [mode, set_mode] = useState<Mode>('fit'),
+    [attempt, set_attempt] = useState(0);
   const [scale, set_scale] = useState({ px_per_m: 0, magnified: 1 });
   const [failed, set_failed] = useState(false);
-
   useEffect(() => {
-    let gone = false;
+    let gone = false,
+      stop = (): void => undefined;
     import('./engine')
       .then(({ open_map }) => {
         if (gone || !target.current || !overlay.current || !top.current) return;
@@ -43,14 +45,21 @@ export function MapBox({ content, onSelect, label, follow, version }: Props) {
         current_map.view = map.current;
         map.current.changed();
       })
-      .catch(() => set_failed(true));
+      .then(
+        () => set_failed(false),
+        () => {
+          set_failed(true);
+          if (!gone) stop = when_back(() => set_attempt((n) => n + 1));
+        },
+      );
     return () => {
       gone = true;
+      stop();
       if (current_map.view === map.current) current_map.view = null;
       map.current?.close();
       map.current = null;
     };
-  }, []);
+  }, [attempt]);
   useEffect(() => map.current?.changed(), [version]);
   const theme = ground.value;
   useEffect(() => {
@@ -62,7 +71,11 @@ export function MapBox({ content, onSelect, label, follow, version }: Props) {
       <div class="mapcanvas" ref={target} tabindex={0} role="application" aria-label={label} />
       <canvas class="overlay" ref={overlay} aria-hidden="true" data-testid="range-lines" />
       <canvas class="overlay" ref={top} aria-hidden="true" data-testid="anchor-ellipses" />
-      {failed && <p class="mapfail">The map could not be loaded; everything is in the tables. Reload to try again.</p>}
+      {failed && (
+        <p class="mapfail">
+          The map could not be loaded; everything is in the tables. It comes as soon as the link is back.
+        </p>
+      )}
       <div class="mapui">
         <div class="mgrp">
           <button class="mb" aria-label="Zoom in" onClick={() => map.current?.zoom(1)}>

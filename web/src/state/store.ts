@@ -1,7 +1,8 @@
 /// The signals of the page, and the sink that fills them. Scenes are mutable; `tick` says, at most four times a second, that text may look again.
-import { computed, signal } from '@preact/signals';
+import { computed, effect, signal } from '@preact/signals';
 import * as f from '../live/flight_messages';
 import * as m from '../live/messages';
+import { age } from '../ui/format';
 import type { LinkState, LiveSink, LiveSource } from '../live/source';
 import { Scene } from './scene';
 
@@ -70,6 +71,16 @@ export const replayed = signal<{ readonly scene: Scene; readonly mission: m.Miss
 export const watched_scene = (): Scene | null => replayed.value?.scene ?? current_scene();
 export const watched_mission = computed(() => replayed.value?.mission ?? current_mission.value);
 export const watched_lost = (): boolean => replayed.value === null && link.value === 'lost';
+
+/// Calls every time the link has come back; returns its end.
+export function when_back(call: () => void): () => void {
+  let away = link.peek() !== 'live';
+  return effect(() => {
+    const live = link.value === 'live';
+    if (live && away) queueMicrotask(call);
+    away = !live;
+  });
+}
 
 let toasts = 0;
 let toast_timer: ReturnType<typeof setTimeout> | undefined;
@@ -157,6 +168,30 @@ const handlers: Record<string, Handler> = {
   },
 };
 
+let lost_ms: number | null = null; ///< when the last thing arrived before the outage that is on
+/// What an outage was, and what came back after it.
+export function back_words(
+  outage_ms: number | null,
+  recovered: ReadonlyMap<string, number>,
+  resynchronised: boolean,
+): string {
+  const back = outage_ms === null ? 'Connected again' : `Link back after ${age(outage_ms)}`;
+  if (resynchronised) return `${back}. Resynchronised: all values are current`;
+  const what = [...recovered].map(([topic, n]) => `${n} of ${TOPIC_WORDS[topic] ?? topic.replaceAll('.', ' ')}`);
+  return what.length ? `${back}, recovered messages: ${what.join(', ')}` : `${back}. Nothing was missed`;
+}
+const TOPIC_WORDS: Record<string, string> = {
+  'mission.state': 'flights',
+  'drone.pose': 'positions',
+  'rtk.status': 'RTK',
+  'anchors.estimates': 'anchors',
+  procedure: 'the procedure',
+  'mission.grid': 'next points',
+  'mission.turn': 'turns',
+  'mission.height': 'height searches',
+  system: 'the server',
+};
+
 /// `fresh`: the stream begins, or another life of the server does, and what it does not tell must be asked for.
 export function connect(live: LiveSource, refused: () => void, fresh: () => void): void {
   source = live;
@@ -179,11 +214,12 @@ export function connect(live: LiveSource, refused: () => void, fresh: () => void
       fresh();
       touch();
     },
-    resumed: (recovered, resynchronised) =>
-      say(
-        resynchronised ? 'Resynchronised: all values are current' : `Connected again, recovered ${recovered} messages`,
-      ),
+    resumed: (recovered, resynchronised) => {
+      say(back_words(lost_ms === null ? null : now_ms() - lost_ms, recovered, resynchronised));
+      lost_ms = null;
+    },
     link: (state) => {
+      if (state === 'lost') lost_ms ??= now_ms() - live.data_age_ms();
       link.value = state;
       touch();
     },

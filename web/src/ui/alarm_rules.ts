@@ -16,6 +16,8 @@ export interface Situation {
   readonly now_ms: number;
   readonly link: LinkState;
   readonly silence_ms: number;
+  readonly data_age_ms: number; ///< by the server's clock; more than the silence where the link cannot keep up
+  readonly slow: boolean; ///< the server leaves out what the link cannot carry
   readonly recording: boolean; ///< a mission runs
   readonly fix: FixClass | null;
   readonly correction_age_s: number | null;
@@ -29,6 +31,7 @@ export const by_rank = (a: Alarm, b: Alarm): number => RANK[a.priority] - RANK[b
 export class Conditions {
   private readonly since = new Map<string, number>();
   private received: readonly Alarm[] = [];
+  private data_from_ms = -Infinity; ///< since when data could arrive again: silence before that says nothing of the tag
 
   standing(s: Situation): Alarm[] {
     const out: Alarm[] = [];
@@ -49,20 +52,36 @@ export class Conditions {
       if (s.now_ms - began >= delay_ms)
         out.push({ id, priority, title, advice, since_ms: began + delay_ms, acknowledged: false });
     };
+    // No data, no judgement: what was standing stands, what was about to be raised starts anew when data is back.
+    if (s.link !== 'live') {
+      this.data_from_ms = s.now_ms;
+      const standing = new Set(this.received.map((a) => a.id));
+      for (const id of this.since.keys()) if (!standing.has(id)) this.since.delete(id);
+    }
+    if (s.link === 'late') return [...this.received];
     if (s.link === 'lost') {
       // Nothing new can be said about the others, so they neither appear nor vanish: they read "when last seen".
       if (s.recording)
         out.push({
           id: 'link.lost',
           priority: 'critical',
-          title: 'Link lost: no data from anchord',
+          title: s.silence_ms < 2000 ? 'Link too slow: what arrives is old' : 'Link lost: no data from anchord',
           advice:
             'You see last known values. The drone continues its procedure on its own. To act now, use the remote control.',
-          since_ms: s.now_ms - s.silence_ms,
+          since_ms: s.now_ms - s.data_age_ms,
           acknowledged: false,
         });
-      return [...out, ...this.received.map((a) => ({ ...a, title: `${a.title}, when last seen`, acknowledged: true }))];
+      return [...out, ...this.received.map(when_last_seen)];
     }
+    hold(
+      'ws.slow',
+      s.slow,
+      2000,
+      'advisory',
+      'This link is slow',
+      'The page is sent less often what it shows, never older. Go nearer to the access point, or close other pages.',
+    );
+    const range_silence_ms = Math.min(s.range_silence_ms, s.now_ms - this.data_from_ms);
     const ranging = s.recording && s.range_silence_ms < 60_000;
     const poor = s.fix === 'none' || s.fix === 'single' || s.fix === 'dgps';
     hold(
@@ -83,7 +102,7 @@ export class Conditions {
     );
     hold(
       'uwb.none',
-      ranging && s.range_silence_ms > 5000,
+      ranging && range_silence_ms > 5000,
       0,
       'warning',
       'No UWB ranges for 5 s',
@@ -93,23 +112,27 @@ export class Conditions {
   }
 }
 
-/// Server's list and the page's own, once per id; the server's word wins where both speak.
+const when_last_seen = (a: Alarm): Alarm => ({ ...a, title: `${a.title}, when last seen`, acknowledged: true });
+
+/// Server's list and the page's own, once per id; the server's word wins where both speak. With the link lost its words are those it had last.
 export function merged(
   own: readonly Alarm[],
   server: readonly AlarmMsg[],
   server_now_us: number,
   now_ms: number,
+  lost = false,
 ): Alarm[] {
   const named = new Map(own.map((a) => [a.id, a]));
   for (const a of server) {
-    named.set(a.id, {
+    const known: Alarm = {
       id: a.id,
       priority: a.priority,
       title: a.text || a.id,
       advice: named.get(a.id)?.advice ?? '',
       since_ms: now_ms - Math.max(0, server_now_us - a.since_us) / 1000,
       acknowledged: a.acknowledged,
-    });
+    };
+    named.set(a.id, lost ? when_last_seen(known) : known);
   }
   return [...named.values()].sort(by_rank);
 }

@@ -27,12 +27,14 @@ export const alarms = computed<readonly Alarm[]>(() => {
     now_ms: now,
     link: link.value,
     silence_ms: live_source()?.silence_ms() ?? 0,
+    data_age_ms: live_source()?.data_age_ms() ?? 0,
+    slow: live_source()?.slow() ?? false,
     recording: mission?.state === 'recording',
     fix: scene?.rtk?.value.fix ?? scene?.pose?.value.fix ?? null,
     correction_age_s: scene?.rtk?.value.correction_age_s ?? null,
     range_silence_ms: scene ? now - scene.range_at_ms : Infinity,
   });
-  return merged(own, link.value === 'lost' ? [] : server_alarms.value, server_now_us(), now).map((a) =>
+  return merged(own, server_alarms.value, server_now_us(), now, link.value === 'lost').map((a) =>
     acknowledged.value.has(a.id) ? { ...a, acknowledged: true } : a,
   );
 });

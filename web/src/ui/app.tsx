@@ -1,10 +1,11 @@
 import { signal } from '@preact/signals';
 import type { ComponentType } from 'preact';
 import { useEffect, useState } from 'preact/hooks';
-import { toast } from '../state/store';
+import { link, live_source, tick, toast, when_back } from '../state/store';
 import { Anchors } from '../views/anchors';
 import { Live } from '../views/live';
 import { AlarmBar } from './alarms';
+import { age } from './format';
 import { Help, help_open } from './help';
 import { Icon, Mark } from './marks';
 import { SignIn } from './sign_in';
@@ -56,24 +57,37 @@ function Rail({ view }: { view: View }) {
 function Later<P extends object>({ load, props }: { load: () => Promise<ComponentType<P>>; props: P }) {
   const [View, set_view] = useState<ComponentType<P> | null>(null),
     [failed, set_failed] = useState(false);
-  const begin = useStable(load);
-  useEffect(() => {
-    begin().then(
-      (v) => set_view(() => v),
+  const begin = useStable((): void => {
+    load().then(
+      (v) => {
+        set_view(() => v);
+        set_failed(false);
+      },
       () => set_failed(true),
     );
-  }, [begin]);
-  if (failed)
+  });
+  useEffect(begin, [begin]);
+  // Also what is still on its way: a request into a dead network ends minutes after the link is back.
+  const missing = !View;
+  useEffect(() => (missing ? when_back(begin) : undefined), [missing, begin]);
+  if (failed && !View)
     return (
       <div class="empty">
-        <p role="status">This view could not be loaded from anchord. It needs the link to the server once.</p>
+        <h1 class="sr">Not loaded</h1>
+        <p role="status">This view could not be loaded from anchord. It opens as soon as the link is back.</p>
+        <button class="btn" onClick={begin}>
+          Try again
+        </button>
       </div>
     );
   return View ? (
     <View {...props} />
   ) : (
     <div class="empty">
-      <p role="status">Loading.</p>
+      <h1 class="sr">Loading</h1>
+      <p role="status">
+        {link.value === 'lost' ? 'This view is not loaded yet. It opens as soon as the link is back.' : 'Loading.'}
+      </p>
     </div>
   );
 }
@@ -83,24 +97,66 @@ const load_replay = () => import('../views/replay/replay').then((m) => m.Replay)
 const load_system = () => import('../views/system/system').then((m) => m.System);
 const load_measurements = () => import('../views/measurements/measurements').then((m) => m.Measurements);
 
+/// What arrived before the link was lost is no news: one line gives its age for all values of the view, which are struck.
+function LastKnown() {
+  tick.value;
+  return (
+    <p class="lastknown" data-testid="last-known">
+      <Mark shape="off" tone="off" />
+      <b>Last known values, {age(live_source()?.data_age_ms() ?? Infinity)} old.</b> No data from anchord: nothing on
+      this page is current.
+    </p>
+  );
+}
+/// The rest of the page while nothing else is to be done: after an outage every view is there, and opens also during one.
+const LATER = [load_replay, load_system, load_plan, load_measurements, load_models];
+function usePrefetch(): void {
+  const ready = link.value === 'live';
+  useEffect(() => {
+    if (!ready) return;
+    let gone = false;
+    const timer = setTimeout(() => void next(0), PREFETCH_AFTER_MS);
+    const next = async (i: number): Promise<void> => {
+      if (gone || i >= LATER.length) return;
+      await LATER[i]!().catch(() => undefined);
+      await new Promise((done) =>
+        typeof requestIdleCallback === 'function' ? requestIdleCallback(done) : setTimeout(done, 200),
+      );
+      await next(i + 1);
+    };
+    return () => {
+      gone = true;
+      clearTimeout(timer);
+    };
+  }, [ready]);
+}
+const PREFETCH_AFTER_MS = 4000; // the first view has its data and its map by then
+/// Views whose values come from the server as they are now; a recording and a draft on this device do not age.
+const AGES: ReadonlySet<View> = new Set(['live', 'anchors', 'measurements', 'models', 'system']);
+
 export function App() {
   const [, name, ...args] = route.value.replace(/^#\/?/, '/').split('/'),
     arg = args[args.length - 1];
   const view: View = VIEWS.find(([id]) => id === name)?.[0] ?? 'live',
-    named = arg ? decodeURIComponent(arg) : null;
+    named = arg ? decodeURIComponent(arg) : null,
+    lost = link.value === 'lost' && AGES.has(view);
+  usePrefetch();
   return (
     <div class="app">
       <Strip />
       <AlarmBar />
       <Rail view={view} />
-      <main class="main">
-        {view === 'live' && <Live />}
-        {view === 'plan' && <Later load={load_plan} props={{ id: named }} />}
-        {view === 'anchors' && <Anchors anchor={named} />}
-        {view === 'measurements' && <Later load={load_measurements} props={{}} />}
-        {view === 'replay' && <Later load={load_replay} props={{ id: named }} />}
-        {view === 'system' && <Later load={load_system} props={{}} />}
-        {view === 'models' && <Later load={load_models} props={{ path: args[0] === 'runs' ? named : null }} />}
+      <main class={lost ? 'main lost' : 'main'} id="main" tabIndex={-1}>
+        {lost && <LastKnown />}
+        <div class="view">
+          {view === 'live' && <Live />}
+          {view === 'plan' && <Later load={load_plan} props={{ id: named }} />}
+          {view === 'anchors' && <Anchors anchor={named} />}
+          {view === 'measurements' && <Later load={load_measurements} props={{}} />}
+          {view === 'replay' && <Later load={load_replay} props={{ id: named }} />}
+          {view === 'system' && <Later load={load_system} props={{}} />}
+          {view === 'models' && <Later load={load_models} props={{ path: args[0] === 'runs' ? named : null }} />}
+        </div>
       </main>
       <SignIn />
       <Help />

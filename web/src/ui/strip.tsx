@@ -46,7 +46,9 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
     mission = current_mission.value,
     running = mission?.state === 'recording',
     lost = link.value === 'lost';
-  const silence = live_source()?.silence_ms() ?? Infinity;
+  const silence = live_source()?.silence_ms() ?? Infinity,
+    data_age = live_source()?.data_age_ms() ?? Infinity,
+    arriving = silence < 2000;
   const link_look = { connecting: look('off'), live: look('ok'), late: look('caution'), lost: look('bad') }[link.value];
   const rtk = scene?.rtk ?? null,
     rtk_age = rtk ? now - rtk.at_ms : Infinity,
@@ -83,7 +85,7 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
     link: {
       ...link_look,
       word: me.value === null ? 'SIGNED OUT' : link.value === 'connecting' ? 'CONNECTING' : link.value.toUpperCase(),
-      extra: link.value === 'lost' ? clock(silence / 1000, true) : '',
+      extra: link.value === 'lost' ? clock(data_age / 1000, true) : '',
       card: (
         <>
           <p>
@@ -91,8 +93,12 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
               {
                 connecting: 'Waiting for the first answer of anchord.',
                 live: 'Heartbeats arrive every second.',
-                late: 'No heartbeat for more than 2 s.',
-                lost: 'No heartbeat for more than 5 s. Values are the last known; the page tries again by itself.',
+                late: arriving
+                  ? 'What arrives is more than 2 s old: the link is too slow.'
+                  : 'No heartbeat for more than 2 s.',
+                lost: arriving
+                  ? 'What arrives is more than 5 s old: the link is too slow for it. Go nearer to the access point, or close other pages.'
+                  : 'No heartbeat for more than 5 s. Values are the last known; the page tries again by itself.',
               }[link.value]
             }
           </p>

@@ -63,6 +63,8 @@ export function Convergence({ anchor }: { anchor: string }) {
   }, [anchor, theme, limit_m, of, draw]);
   const now = tick.value;
   useEffect(draw, [now, draw]);
+  const seen = last === null ? 'not known' : `${fixed(last, 3)} m`,
+    words = `${name} over ${history.length} estimates, now ${seen}${limit_m === null ? '' : `, limit at most ${limit_m} m`}`;
   return (
     <figure class="conv" data-testid="convergence">
       <figcaption>
@@ -70,12 +72,7 @@ export function Convergence({ anchor }: { anchor: string }) {
         <b>{last === null ? 'not known yet' : last < 1 ? `${fixed(last * 100, 1)} cm` : `${fixed(last, 1)} m`}</b>
         {limit_m !== null && <span class="mut"> limit ≤ {fixed(limit_m * 100, 1)} cm</span>}
       </figcaption>
-      <div
-        ref={box}
-        class="plot"
-        role="img"
-        aria-label={`${name} over ${history.length} estimates, now ${last === null ? 'not known' : `${fixed(last, 3)} m`}${limit_m === null ? '' : `, limit at most ${limit_m} m`}`}
-      />
+      <div ref={box} class="plot" role="img" aria-label={words} />
     </figure>
   );
 }

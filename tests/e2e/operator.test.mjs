@@ -1,0 +1,122 @@
+// What an operator must not misread: a lost link, a slow one, and numbers of a flight that are those of the server.
+import assert from 'node:assert/strict';
+import { spawn } from 'node:child_process';
+import { mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+import { openBrowser, openPage, picture, text, violations } from './browser.mjs';
+import { binary, eventually, run, startServer } from './server.mjs';
+
+const folder = mkdtempSync(join(tmpdir(), 'anchord e2e ')),
+  flight = join(folder, 'flight');
+let browser, server, playing;
+
+before(async () => {
+  const made = await run(['simulate', 'flight', '--seed', '7', '--duration', '120', '--out', flight]);
+  assert.equal(made.code, 0, made.stderr);
+  browser = await openBrowser();
+  server = await startServer({ auth: 'off' });
+  playing = spawn(binary, ['replay', flight, '--url', server.url, '--speed', '1'], { stdio: 'ignore' });
+});
+after(async () => {
+  playing?.kill('SIGTERM');
+  await browser?.close();
+  await server?.dispose();
+  rmSync(folder, { recursive: true, force: true });
+});
+
+/** Until the page has fetched its other views, for the time without a link. */
+const views_loaded = (page) =>
+  eventually(
+    'every view is here',
+    () =>
+      page.evaluate(
+        (names) => names.every((n) => performance.getEntriesByType('resource').some((r) => r.name.includes(`/${n}-`))),
+        ['replay', 'system', 'plan', 'measurements', 'models'],
+      ),
+    30_000,
+    200,
+  );
+const live = (id) => eventually('LIVE', async () => (await text(id('status-link'))).includes('LIVE'), 20_000);
+/** Values of the view that are drawn as if they were current. */
+const unstruck = (page) =>
+  page.evaluate(() => {
+    const struck = (el) => {
+      for (let e = el; e && e !== document.body; e = e.parentElement)
+        if (getComputedStyle(e).textDecorationLine.includes('line-through')) return true;
+      return false;
+    };
+    return [...document.querySelectorAll('main :is(dd, td)')]
+      .filter(
+        (el) => /\d/.test(el.textContent) && !el.querySelector('button, input, select, a') && el.checkVisibility(),
+      )
+      .filter((el) => ![el, ...el.querySelectorAll('*')].some(struck))
+      .map((el) => `${el.closest('[data-testid]')?.dataset.testid}: ${el.textContent.trim()}`);
+  });
+
+test('with the link lost every value is struck and aged, nothing is judged without data, and what came back is told', async () => {
+  const { page, id } = await openPage(browser, server);
+  await eventually('ranges arrive', async () => (await id('range-list').locator('tbody tr').count()) >= 2, 20_000);
+  await id('anchor-card').waitFor({ timeout: 40_000 });
+  await views_loaded(page);
+  process.kill(server.pid, 'SIGSTOP');
+  try {
+    await eventually('LOST', async () => (await text(id('status-link'))).includes('LOST'), 12_000);
+    for (const view of ['live', 'anchors', 'system']) {
+      await id(`nav-${view}`).click();
+      await eventually('the age of the view', async () => /\d+ s old/.test(await text(id('last-known'))), 5000);
+      await eventually(
+        `every value of ${view} is struck: ${await unstruck(page)}`,
+        async () => (await unstruck(page)).length === 0,
+        3000,
+      );
+      await picture(page, `lost-${view}`);
+    }
+    assert.doesNotMatch(await text(id('alarm-bar')), /tag and its cable/);
+    assert.deepEqual(await violations(page), []);
+  } finally {
+    process.kill(server.pid, 'SIGCONT');
+  }
+  await id('toast').waitFor({ timeout: 20_000 });
+  assert.match(
+    await text(id('toast')),
+    /^Link back after \d+ s.*(recovered messages|Resynchronised|Nothing was missed)/,
+  );
+  await live(id);
+  assert.equal(await id('last-known').count(), 0);
+  assert.doesNotMatch(await text(id('alarm-bar')), /tag and its cable/);
+  await page.close();
+});
+
+test('a view that was not opened before an outage opens after it', async () => {
+  const { page, id } = await openPage(browser, server);
+  await live(id);
+  await page.route('**/assets/*.js', (route) => route.abort());
+  await id('nav-models').click();
+  await page.getByText('opens as soon as the link is back').waitFor();
+  process.kill(server.pid, 'SIGSTOP');
+  try {
+    await eventually('LOST', async () => (await text(id('status-link'))).includes('LOST'), 12_000);
+  } finally {
+    process.kill(server.pid, 'SIGCONT');
+  }
+  await page.unroute('**/assets/*.js');
+  await id('models').waitFor({ timeout: 20_000 });
+  await page.close();
+});
+
+test('what was loaded while nothing else was to be done opens during an outage', async () => {
+  const { page, id } = await openPage(browser, server);
+  await live(id);
+  await views_loaded(page);
+  process.kill(server.pid, 'SIGSTOP');
+  try {
+    await eventually('LOST', async () => (await text(id('status-link'))).includes('LOST'), 12_000);
+    await id('nav-system').click();
+    await id('system').waitFor({ timeout: 5000 });
+  } finally {
+    process.kill(server.pid, 'SIGCONT');
+  }
+  await page.close();
+});
