@@ -13,7 +13,7 @@ using Ordered = nlohmann::ordered_json;
 
 namespace {
 
-const std::vector<std::string_view> k_control{"take", "renew", "release"};
+const std::vector<std::string_view> k_control{"take", "renew", "release", "ask", "refuse"};
 
 Ordered lease_json(const Lease& lease, bool with_key) {
   Ordered out{{"held", true},
@@ -33,13 +33,23 @@ T granted(Result<T> result) {
   return value_or_problem(std::move(result));
 }
 
+/// Asking changes nothing: the holder's screen shows the event, and gives control back or refuses.
+Response ask_for_control(Services& s, const Request& request, const MissionId& mission) {
+  const auto lease = s.flights->control();
+  if (!lease || lease->mission != mission)
+    throw_problem(409, "no-control", "nobody has control of this mission: take it");
+  const std::string text = request.principal.name + " asks " + lease->name + " for control";
+  s.events.add("warning", "control.asked", text, mission);
+  return json_response(200, lease_json(*lease, false));
+}
+
 Response control(Services& s, const Request& request) {
   const auto mission = named_mission(s, request).id;
   std::vector<FieldError> errors;
   const auto body = json_body(request);
   Fields fields(body, "", errors);
   const auto action = fields.word("action", k_control, true);
-  const auto key = fields.text("lease", 64, action.value_or(0) != 0);
+  const auto key = fields.text("lease", 64, action.value_or(0) != 0 && action != 3);
   const bool by_force = fields.boolean("force").value_or(false);
   fields.finish();
   refuse_if_any(errors);
@@ -47,6 +57,17 @@ Response control(Services& s, const Request& request) {
   if (*action == 0) {
     const auto lease = granted(s.flights->take_control(mission, request.principal, by_force));
     s.audit_soon(request, done + (by_force ? " by force" : ""));
+    return json_response(200, lease_json(lease, true));
+  }
+  if (*action == 3) {
+    auto asked = ask_for_control(s, request, mission);
+    s.audit_soon(request, done);
+    return asked;
+  }
+  if (*action == 4) {
+    const auto lease = granted(s.flights->renew_control(mission, *key, request.principal));
+    s.events.add("info", "control.refused", lease.name + " keeps control", mission);
+    s.audit_soon(request, done);
     return json_response(200, lease_json(lease, true));
   }
   if (*action == 1)

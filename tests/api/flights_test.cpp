@@ -262,6 +262,21 @@ TEST_F(Flights, NothingIsGivenToAnAircraftInTheAir) {
   EXPECT_NE(given.body.find("in the air"), std::string::npos) << given.body;
 }
 
+TEST_F(Flights, AskingForControlReachesItsHolderAndTakesNothing) {
+  EXPECT_EQ(post(base() + "/control", R"({"action":"ask"})").status, 409) << "nobody has it: it can be taken";
+  const auto lease = take_off();
+  const auto asked = control(R"({"action":"ask"})");
+  EXPECT_EQ(asked["held"], true);
+  EXPECT_FALSE(asked.contains("lease")) << "asking is not having";
+  EXPECT_EQ(act("hold", lease).status, 202) << "the holder still has it";
+  EXPECT_EQ(post(base() + "/control", R"({"action":"refuse","lease":"another"})").status, 409);
+  EXPECT_EQ(control(R"({"action":"refuse","lease":")" + lease + "\"}")["lease"], lease);
+  std::vector<std::string> codes;
+  for (const auto& event : json(get(base() + "/events?limit=100"))["items"]) codes.push_back(event["code"]);
+  EXPECT_EQ(std::ranges::count(codes, "control.asked"), 1);
+  EXPECT_EQ(std::ranges::count(codes, "control.refused"), 1);
+}
+
 TEST_F(Flights, OnlyOneHasControl) {
   const auto lease = take_off();
   EXPECT_EQ(post(base() + "/control", R"({"action":"take"})").status, 409);

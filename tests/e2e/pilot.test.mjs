@@ -234,3 +234,40 @@ test('who only watches sees who has control, and can start nothing', async () =>
   assert.equal(await id('open-checklist').isEnabled(), false);
   await page.close();
 });
+
+test('control is asked for, refused, given; a page that lost it says so at once and its buttons are dead', async () => {
+  const control = async (json) =>
+    (await server.fetch(`/api/v1/missions/${mission}/control`, { json })).json().then((body) => body.lease);
+  let other = await control({ action: 'take', force: true });
+  const { page, id } = await openPage(browser, server);
+  await id('ask-control').click();
+  await id('control').getByText('Asked, waiting').waitFor();
+  await control({ action: 'refuse', lease: other });
+  await id('toast').getByText('keeps control').waitFor({ timeout: 10_000 });
+  await id('ask-control').click();
+  await id('control').getByText('Asked, waiting').waitFor();
+  await control({ action: 'release', lease: other });
+  await id('control').getByText('You have control').waitFor({ timeout: 10_000 });
+  assert.equal(await id('open-checklist').isEnabled(), true);
+
+  // Somebody asks this page; it keeps control, then it is taken by force.
+  await control({ action: 'ask' });
+  await id('control-asked').waitFor({ timeout: 5000 });
+  await picture(page, 'control-asked');
+  await id('control-refuse').click();
+  await id('control-asked').waitFor({ state: 'detached', timeout: 5000 });
+  other = await control({ action: 'take', force: true });
+  await id('control-lost').waitFor({ timeout: 2500 });
+  assert.equal(await id('open-checklist').isEnabled(), false);
+  await picture(page, 'control-lost');
+  assert.deepEqual(await violations(page), []);
+
+  // By force only with a second tap.
+  await id('take-anyway').click();
+  await id('take-anyway').getByText('tap again').waitFor();
+  assert.equal(await id('control').getByText('You have control').count(), 0);
+  await id('take-anyway').click();
+  await id('control').getByText('You have control').waitFor({ timeout: 5000 });
+  assert.equal(await id('control-lost').count(), 0);
+  await page.close();
+});

@@ -5,6 +5,7 @@ import { call, get, type Wire } from './contract';
 export type Action = NonNullable<Wire<'MissionAction'>['action']>;
 export interface Lease {
   readonly key: string;
+  readonly since_us: number; // tells this control from one that somebody took later
   readonly expires_us: number;
 }
 export type ChecklistItem = Wire<'Checklist'>['items'][number];
@@ -12,7 +13,7 @@ export type ChecklistItem = Wire<'Checklist'>['items'][number];
 const at = (id: string): { readonly path: { readonly id: string } } => ({ path: { id } });
 async function control(mission: string, body: Wire<'ControlAction'>): Promise<Lease> {
   const held = (await call('post', '/missions/{id}/control', { ...at(mission), body })).body;
-  return { key: held.lease ?? '', expires_us: held.expires_us ?? 0 };
+  return { key: held.lease ?? '', since_us: held.since_us ?? 0, expires_us: held.expires_us ?? 0 };
 }
 export const take_control = (mission: string, force: boolean): Promise<Lease> =>
   control(mission, { action: 'take', ...(force ? { force } : {}) });
@@ -20,6 +21,10 @@ export const renew_control = (mission: string, lease: string): Promise<Lease> =>
   control(mission, { action: 'renew', lease });
 export const release_control = (mission: string, lease: string): Promise<unknown> =>
   control(mission, { action: 'release', lease });
+/// Whoever has it sees an event, and gives it back or refuses.
+export const ask_for_control = (mission: string): Promise<unknown> => control(mission, { action: 'ask' });
+export const refuse_control = (mission: string, lease: string): Promise<unknown> =>
+  control(mission, { action: 'refuse', lease });
 export const command = (
   mission: string,
   action: Action,

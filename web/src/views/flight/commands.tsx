@@ -1,56 +1,27 @@
 /// The flight bar: progress at the left, commands at the right. Many may watch, one may command: control is taken, shown and given back.
-import { signal } from '@preact/signals';
-import { useEffect } from 'preact/hooks';
-import { ApiError, error_text } from '../../api/client';
-import { command, release_control, renew_control, take_control, type Action, type Lease } from '../../api/flight';
-import type { ProcedureMsg } from '../../live/flight_messages';
+import type { Action } from '../../api/flight';
+import type { ControlMsg, ProcedureMsg } from '../../live/flight_messages';
 import { done_count } from '../../state/done';
 import { may } from '../../state/session';
-import { current_mission, current_scene, link, live_source, say, server_now_us, tick } from '../../state/store';
+import { current_mission, current_scene, events, link, live_source, say, server_now_us, tick } from '../../state/store';
 import { clock, fixed, percent } from '../../ui/format';
 import { Checklist, checklist_open } from './checklist';
 import { DevicesNote } from './devices_note';
+import { command_note, question_of } from './control';
 import { HoldButton } from './hold_button';
+import { ask, asking, give_back, lease, lost_control, problem, refuse, send, take } from './lease';
 import { flying } from './words';
 
-/// Ours, with the mission it is for. Lives as long as the page: two browsers of one person are two.
-export const lease = signal<(Lease & { readonly mission: string }) | null>(null);
-const problem = signal(''),
-  taken_by = signal(false);
-const RENEW_MS = 20_000;
-
-async function guarded(work: () => Promise<unknown>): Promise<void> {
-  problem.value = '';
-  try {
-    await work();
-  } catch (e) {
-    problem.value = error_text(e);
-    if (e instanceof ApiError && e.problem.type.endsWith('no-control')) lease.value = null;
-    taken_by.value = e instanceof ApiError && e.problem.status === 409;
-  }
-}
-const take = (mission: string, force: boolean): Promise<void> =>
-  guarded(async () => {
-    lease.value = { ...(await take_control(mission, force)), mission };
-    taken_by.value = false;
-    say('You have control');
-  });
-const give_back = (mission: string): Promise<void> =>
-  guarded(async () => {
-    await release_control(mission, lease.value?.key ?? '');
-    lease.value = null;
-  });
-/// Hold is one press: whoever has no control yet takes it first.
-export async function send(mission: string, action: Action, more: Parameters<typeof command>[3] = {}): Promise<void> {
-  await guarded(async () => {
-    if (lease.value?.mission !== mission) lease.value = { ...(await take_control(mission, false)), mission };
-    await command(mission, action, lease.value.key, more);
-  });
-}
+/// Who else has control; null where nobody does, or this page.
+const holder_else = (mission: string, p: ProcedureMsg | undefined): ControlMsg | null =>
+  lease.value?.mission !== mission && p?.control && p.control.expires_us > server_now_us() ? p.control : null;
 export const hold_now = (): void => {
   const m = current_mission.peek(),
     p = current_scene()?.procedure?.value;
-  if (m && p && flying(p)) void send(m.mission, 'hold');
+  if (!m || !p || !flying(p) || !may('operator')) return;
+  const other = holder_else(m.mission, p);
+  if (other) say(`Not held: ${other.holder} has control. Ask for it, or take it`);
+  else void send(m.mission, 'hold');
 };
 
 export function FlightBar() {
@@ -59,32 +30,16 @@ export function FlightBar() {
     latest = current_scene()?.procedure,
     p = latest?.value;
   const mine = lease.value !== null && lease.value.mission === mission?.mission;
-  const id = mission?.mission;
-  useEffect(() => {
-    if (!mine || !id) return;
-    const timer = setInterval(
-      () =>
-        void guarded(async () => {
-          lease.value = { ...(await renew_control(id, lease.value!.key)), mission: id };
-        }),
-      RENEW_MS,
-    );
-    return () => clearInterval(timer);
-  }, [mine, id]);
   const operator = may('operator'),
     idle = !p || p.status === 'ready' || p.status === 'done' || p.status === 'aborted';
   if (!mission || mission.state !== 'recording' || (!p && !(operator && live_source()?.offers('procedure'))))
     return null;
   const lost = link.value === 'lost',
-    other = !mine && p?.control && p.control.expires_us > server_now_us() ? p.control : null;
-  const note = (action: string): string => {
-    const c = [...(p?.commands ?? [])].reverse().find((x) => x.action === action);
-    return lost
-      ? 'no link'
-      : c
-        ? { sent: 'sent', accepted: 'accepted', refused: `refused: ${c.text}`, unconfirmed: 'NOT CONFIRMED' }[c.state]
-        : '';
-  };
+    other = holder_else(mission.mission, p),
+    question = mine ? question_of(lease.value!, events.value, server_now_us()) : null,
+    taken = lost_control.value?.mission === mission.mission ? lost_control.value : null;
+  const note = (action: string): string =>
+    lost ? 'no link' : command_note(p?.commands ?? [], action, server_now_us());
   const off = lost || !operator || other !== null,
     act = (action: Action) => () => void send(mission.mission, action);
   return (
@@ -97,22 +52,44 @@ export function FlightBar() {
             {problem.value}
           </p>
         )}
+        {operator && taken && (
+          <p class="callout caution" role="alert" data-testid="control-lost">
+            <b>You no longer have control.</b> {taken.text}{' '}
+            <button class="btn small" onClick={() => (lost_control.value = null)}>
+              Understood
+            </button>
+          </p>
+        )}
+        {question && (
+          <p class="callout caution" role="alert" data-testid="control-asked">
+            <b>{question.text}.</b>{' '}
+            <button class="btn small" data-testid="control-grant" onClick={() => void give_back(mission.mission)}>
+              Give control
+            </button>{' '}
+            <button class="btn small" data-testid="control-refuse" onClick={() => void refuse(mission.mission)}>
+              Keep it
+            </button>
+          </p>
+        )}
         {!operator ? null : other ? (
           <p class="why" data-testid="control">
             {other.holder} has control, since {new Date(other.since_us / 1000).toISOString().slice(11, 16)} UTC.{' '}
-            {taken_by.value && (
-              <HoldButton
-                testid="take-anyway"
-                disabled={lost}
-                note="hold"
-                onConfirm={() => void take(mission.mission, true)}
-              >
-                Take it from them
-              </HoldButton>
-            )}
-            <button class="btn small" onClick={() => void take(mission.mission, false)}>
-              Ask
-            </button>
+            <button
+              class="btn small"
+              data-testid="ask-control"
+              disabled={lost || asking.value !== null}
+              onClick={() => void ask(mission.mission)}
+            >
+              {asking.value ? 'Asked, waiting' : 'Ask for control'}
+            </button>{' '}
+            <HoldButton
+              testid="take-anyway"
+              disabled={lost}
+              note="hold 1 s"
+              onConfirm={() => void take(mission.mission, true)}
+            >
+              Take it from them
+            </HoldButton>
           </p>
         ) : (
           <p class="why control" data-testid="control">
@@ -142,7 +119,12 @@ export function FlightBar() {
                 Resume
               </HoldButton>
             ) : (
-              <button class="cmd primary" data-testid="cmd-hold" disabled={lost} onClick={act('hold')}>
+              <button
+                class="cmd primary"
+                data-testid="cmd-hold"
+                disabled={lost || other !== null}
+                onClick={act('hold')}
+              >
                 <span>
                   <b>Hold</b>
                   <small role="status">{note('hold')}</small>
