@@ -10,8 +10,10 @@ import { AnchorResiduals } from './anchor_residuals';
 import { Convergence } from './convergence';
 import { FacilityPanel } from './facility';
 import { Covariance, Loupe } from './loupe';
-import { task_reason } from '../state/done';
-import { current_scene, now_ms, tick } from '../state/store';
+import type { EstimateMsg } from '../live/messages';
+import { enu_from_geodetic } from '../map/enu';
+import { shown_estimate, task_reason } from '../state/done';
+import { current_mission, current_scene, now_ms, tick } from '../state/store';
 
 function ErrorBudget({ budget }: { budget: Budget }) {
   return (
@@ -43,7 +45,7 @@ export function AnchorDetail({ row: r, live, changed }: { row: AnchorRow; live: 
           {r.name && <span class="meta">{r.name}</span>}
           <StatusChip status={r.status} />
           <span class="grow" />
-          {latest && <span class="meta">updated {age(now_ms() - latest.at_ms)} ago</span>}
+          {latest && <span class="meta">{updated_words(latest.value, latest.at_ms)}</span>}
         </div>
         {why && (
           <div
@@ -122,6 +124,7 @@ export function AnchorDetail({ row: r, live, changed }: { row: AnchorRow; live: 
         )}
         {r.mirror && <Twin r={r} />}
       </section>
+      {!live && <Running published={r} />}
       {r.budget && r.budget.shares.length > 0 && <ErrorBudget budget={r.budget} />}
       <div class="two">
         <Gates r={r} />
@@ -150,6 +153,62 @@ export function AnchorDetail({ row: r, live, changed }: { row: AnchorRow; live: 
         </section>
       )}
     </div>
+  );
+}
+
+/// Of a flight that is over an estimate is as old as its data, whenever this page came to know of it.
+function updated_words(e: EstimateMsg, at_ms: number): string {
+  const m = current_mission.value;
+  if (m?.state === 'recording') return `updated ${age(now_ms() - at_ms)} ago`;
+  return e.t_us > 0 ? `of ${date(new Date(e.t_us / 1000).toISOString())}, flight ended` : 'flight ended';
+}
+
+/// What the flight that is shown makes of it now, beside what is published: how far apart, and how well either is known.
+function Running({ published: p }: { published: AnchorRow }) {
+  const scene = current_scene(),
+    e = shown_estimate(scene, p.anchor),
+    heard = scene?.anchors.get(p.anchor);
+  if (!e || !heard) return null;
+  const apart =
+    e.lat !== null && e.lon !== null && p.lat !== null && p.lon !== null
+      ? enu_from_geodetic({ lon: e.lon, lat: e.lat, h_m: e.h_m ?? 0 }, { lon: p.lon, lat: p.lat, h_m: p.h_m ?? 0 })
+      : null;
+  return (
+    <section class="sec-p" data-testid="running-estimate">
+      <div class="hd">
+        <h3>Running estimate</h3>
+        <StatusChip status={e.status} />
+        <span class="meta">
+          {current_mission.value?.name}, {updated_words(e, heard.at_ms)}
+        </span>
+      </div>
+      <dl class="kv s">
+        {apart && (
+          <div>
+            <dt>From published, horizontal</dt>
+            <dd>
+              <Q v={fixed(Math.hypot(apart[0], apart[1]), 3)} u="m" />
+            </dd>
+          </div>
+        )}
+        {apart && (
+          <div>
+            <dt>Vertical</dt>
+            <dd>
+              <Q v={fixed(apart[2], 3)} u="m" />
+            </dd>
+          </div>
+        )}
+        <div>
+          <dt>95 % horizontal</dt>
+          <dd>{accuracy(e.h95_m)}</dd>
+        </div>
+        <div>
+          <dt>95 % vertical</dt>
+          <dd>{accuracy(e.v95_m)}</dd>
+        </div>
+      </dl>
+    </section>
   );
 }
 

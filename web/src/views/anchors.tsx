@@ -67,9 +67,20 @@ export function Anchors({ anchor }: { anchor: string | null }) {
     document.title = 'Anchors - anchord';
     follow_revisions();
   }, []);
+  const answered = useRef<string | null>(null),
+    known = loaded.value;
   useEffect(() => {
-    if (anchor) chosen_anchor.value = anchor;
-  }, [anchor]);
+    if (!anchor) {
+      answered.current = null;
+      return;
+    }
+    if (answered.current !== anchor) chosen_anchor.value = anchor;
+    // A link means the published position, where there is one; asked once, since the reader may choose otherwise after it.
+    if (known && answered.current !== anchor) {
+      answered.current = anchor;
+      source.value = known.rows.some((r) => r.anchor === anchor) ? 'published' : 'live';
+    }
+  }, [anchor, known]);
   const scene = current_scene(),
     live = source.value === 'live',
     mission = current_mission.value;
@@ -79,7 +90,11 @@ export function Anchors({ anchor }: { anchor: string | null }) {
     all.filter((r) => !wanted || `${r.anchor} ${r.name} ${r.status} ${r.verdict}`.toLowerCase().includes(wanted)),
   );
   const on_map = live ? rows : on_the_ground(rows);
-  const selected = rows.find((r) => r.anchor === chosen_anchor.value) ?? rows[0] ?? null;
+  const linked = anchor !== null && chosen_anchor.value === anchor ? anchor : null,
+    found = rows.find((r) => r.anchor === chosen_anchor.value) ?? null,
+    // The first one stands in for no choice; never for an anchor that somebody sent a link to.
+    selected = found ?? (linked ? null : (rows[0] ?? null)),
+    looking = linked !== null && !found && !wanted;
   const search = useRef<HTMLInputElement>(null);
   const ready = all.filter(is_done).length;
   const query = live ? `?view=live${mission ? `&mission=${encodeURIComponent(mission.mission)}` : ''}&` : '?';
@@ -195,7 +210,13 @@ export function Anchors({ anchor }: { anchor: string | null }) {
         {selected ? (
           <AnchorDetail row={selected} live={live} changed={() => void load_published()} />
         ) : (
-          <p class="why pad">Nothing is selected.</p>
+          <p class="why pad" role={looking ? 'status' : undefined} data-testid={looking ? 'unknown-anchor' : undefined}>
+            {!looking
+              ? 'Nothing is selected.'
+              : (known || problem.value) && synced.value
+                ? `No anchor ${linked} is known here: it is neither published nor in range in this flight. Check the address, or choose one from the table.`
+                : `Looking for anchor ${linked}.`}
+          </p>
         )}
       </aside>
       {compare_open.value && <CompareCalibrations />}

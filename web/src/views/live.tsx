@@ -157,7 +157,7 @@ function Progress() {
           </dd>
         </div>
         <div>
-          <dt>Time</dt>
+          <dt>Recorded</dt>
           <dd class={cls}>
             <span class="n">{clock(s)}</span>
           </dd>

@@ -5,7 +5,17 @@ import { current_scene, link, now_ms, tick } from '../../state/store';
 import { bearing, fixed } from '../../ui/format';
 import { Chip, Mark, Q } from '../../ui/marks';
 import { Axes, Drawing, line, scale, ticks } from '../chart';
-import { flying, next_step, stage_of, STATUS_LOOK, STEP_WORDS, TRACK } from './words';
+import {
+  flying,
+  grid_measure,
+  grid_outcome,
+  next_step,
+  stage_of,
+  STATUS_LOOK,
+  STEP_WORDS,
+  TRACK,
+  value_words,
+} from './words';
 
 /// A reason of the server as a sentence: its words for refusals carry underscores.
 const sentence = (reason: string): string =>
@@ -119,13 +129,14 @@ export function NextPoint() {
     p = scene?.procedure?.value;
   if (!g || !p || !flying(p)) return null;
   const chosen = g.chosen === null ? null : g.candidates[g.chosen];
-  const fly = chosen?.plan_m && p.target ? p.distance_m : null,
-    measure = g.rule === 'dissertation' ? 'GDOP' : 'Error';
+  const outcome = grid_outcome(g),
+    measure = grid_measure(g),
+    fly = chosen?.plan_m && p.target && outcome.flown ? p.distance_m : null;
   return (
     <section class="sec-p" data-testid="next-point">
       <div class="hd">
         <h2>Next point, P{g.iteration + 1}</h2>
-        {chosen ? <Chip shape="ok" tone="ok" word="CHOSEN" /> : <Chip shape="off" tone="off" word="NONE" />}
+        <Chip shape={outcome.shape} tone={outcome.tone} word={outcome.word} />
       </div>
       <dl class="kv np2">
         <div>
@@ -147,6 +158,7 @@ export function NextPoint() {
           </div>
         )}
       </dl>
+      {outcome.why && <p class="why">{sentence(outcome.why)}</p>}
       {g.reason && <p class="why">{sentence(g.reason)}</p>}
       <Ramp g={g} />
       <details class="candidates">
@@ -184,8 +196,6 @@ export function NextPoint() {
     </section>
   );
 }
-const value_words = (g: GridMsg, v: number | null): string =>
-  v === null ? '–' : g.rule === 'dissertation' ? fixed(v, 2) : fixed(v, Math.abs(v) < 1 ? 3 : 1);
 function Ramp({ g }: { g: GridMsg }) {
   const values = g.candidates.flatMap((c) => (c.value === null || c.refused ? [] : [c.value]));
   if (values.length < 2) return null;

@@ -1,5 +1,6 @@
 /// The procedure in words. No DOM.
-import type { FlightStatus, ProcedureMsg, Step } from '../../live/flight_messages';
+import type { FlightStatus, GridMsg, ProcedureMsg, Step } from '../../live/flight_messages';
+import { fixed } from '../../ui/format';
 import type { Shape, Tone } from '../../ui/marks';
 
 export const STEP_WORDS: Record<Step, string> = {
@@ -67,3 +68,28 @@ export const STATUS_LOOK: Record<FlightStatus, readonly [Shape, Tone, string]> =
 };
 export const flying = (p: ProcedureMsg): boolean =>
   p.status === 'running' || p.status === 'hold' || p.status === 'return' || p.status === 'landing';
+
+/// What a value of the planner is, in the unit in which the server's reasons name it: the root of a variance is a length, the root of a trace is GDOP.
+export const grid_measure = (g: Pick<GridMsg, 'rule'>): string =>
+  ({ dissertation: 'GDOP', a_optimal: 'Expected error, rms', d_optimal: 'Error ellipsoid, log det' })[g.rule] ??
+  'Value';
+export function value_words(g: Pick<GridMsg, 'rule'>, v: number | null): string {
+  if (v === null || (g.rule !== 'd_optimal' && v < 0)) return '–';
+  if (g.rule === 'd_optimal') return fixed(v, 2);
+  return g.rule === 'dissertation' ? fixed(Math.sqrt(v), 2) : `${fixed(Math.sqrt(v), 3)} m`;
+}
+/// What became of the decision: a best candidate that is not flown to is not a chosen one.
+export function grid_outcome(g: Pick<GridMsg, 'chosen' | 'outcome'>): {
+  readonly shape: Shape;
+  readonly tone: Tone;
+  readonly word: string;
+  readonly why: string;
+  readonly flown: boolean;
+} {
+  const [event, ...rest] = g.outcome.split(': '),
+    why = rest.join(': ');
+  if (event === 'done_here') return { shape: 'off', tone: 'off', word: 'ENOUGH HERE', why, flown: false };
+  if (event === 'no_point' || g.chosen === null)
+    return { shape: 'off', tone: 'off', word: 'NO POINT', why: event === 'no_point' ? why : '', flown: false };
+  return { shape: 'ok', tone: 'ok', word: 'CHOSEN', why: '', flown: true };
+}

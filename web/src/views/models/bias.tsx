@@ -2,9 +2,9 @@
 import type { Curve, Run } from '../../api/learning';
 import { fixed } from '../../ui/format';
 import { Axes, Drawing, line, scale, ticks } from '../chart';
+import { curve_mae, is_raw } from './mae';
 import { method_words } from './words';
 
-const is_raw = (c: Curve): boolean => c.method === 'none' || c.method === 'raw';
 const mm = (m: number | null): string => fixed(m === null ? null : m * 1000, 0);
 
 export function BiasPanel({ curves, run }: { curves: readonly Curve[]; run: Run }) {
@@ -13,10 +13,6 @@ export function BiasPanel({ curves, run }: { curves: readonly Curve[]; run: Run 
   const top = Math.max(...curves.map((c) => c.p95_m ?? 0), 0.01) * 1.25,
     best = sorted[sorted.length - 1];
   const look = (c: Curve): string => (is_raw(c) ? 's raw' : c === best ? 's main' : 's alt');
-  const mae = (c: Curve): number | null => {
-    const r = run.results.find((x) => x.method === c.method || x.name === c.method);
-    return r?.test?.mae_m ?? r?.cv.mae_m ?? (is_raw(c) ? (run.test?.mae_raw_m ?? run.metrics.mae_raw_m) : null);
-  };
   return (
     <section class="cell-p wide" data-testid="cdf">
       <div class="hd">
@@ -84,7 +80,7 @@ export function BiasPanel({ curves, run }: { curves: readonly Curve[]; run: Run 
                 <td class="num">{mm(c.p50_m)}</td>
                 <td class="num">{mm(c.p90_m)}</td>
                 <td class="num">{mm(c.p95_m)}</td>
-                <td class="num">{mm(mae(c))}</td>
+                <td class="num">{mm(curve_mae(c, run))}</td>
               </tr>
             ))}
           </tbody>

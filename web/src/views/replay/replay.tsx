@@ -6,7 +6,7 @@ import { rows_of_collection } from '../../api/anchors';
 import { request } from '../../api/client';
 import { MapBox } from '../../map/map_box';
 import { after, load_recording, Player } from '../../state/recording';
-import { chosen_anchor, mission_id, now_ms, ordered_missions, replayed, tick } from '../../state/store';
+import { chosen_anchor, mission_id, now_ms, ordered_missions, replayed, synced, tick } from '../../state/store';
 import { clock, fixed } from '../../ui/format';
 import { Chip } from '../../ui/marks';
 import { AnchorCard } from '../anchor_card';
@@ -132,7 +132,9 @@ export function Replay({ id }: { id: string | null }) {
   if (!mission)
     return (
       <div class="empty">
-        <p>No flight is stored under this address.</p>
+        <p role="status">
+          {synced.value ? 'No flight is stored under this address.' : 'Loading the flights of this server.'}
+        </p>
         <a class="btn" href="#/live">
           Go to Live
         </a>

@@ -1,14 +1,17 @@
 /// Every radio that was in range in any flight, with how it stands while one is recorded.
 import type { Device } from '../../api/devices';
-import { devices as live_devices, mission_list, server_now_us } from '../../state/store';
+import { mission_list, now_ms, scenes, server_now_us, tick } from '../../state/store';
 import { age } from '../../ui/format';
 import { Chip, type Shape, type Tone } from '../../ui/marks';
+import { radio_state } from './radio_state';
 
 const LOOK: Record<string, [Shape, Tone]> = { live: ['ok', 'ok'], late: ['caution', 'caution'], lost: ['bad', 'bad'] };
 
 export function RadiosInRange({ radios }: { radios: readonly Device[] }) {
-  const flying = mission_list.value.some((m) => m.state === 'recording'),
-    live = new Map(live_devices.value.map((d) => [d.network_id, d]));
+  tick.value;
+  const recording = mission_list.value
+    .filter((m) => m.state === 'recording')
+    .flatMap((m) => scenes.get(m.mission) ?? []);
   return (
     <>
       <h3>Radios in range</h3>
@@ -25,14 +28,14 @@ export function RadiosInRange({ radios }: { radios: readonly Device[] }) {
         <tbody>
           {radios.slice(0, 100).map((d, i) => {
             // Silence is news only while a flight is recorded.
-            const now = flying ? live.get(d.network_id ?? '')?.state : undefined,
-              [shape, tone] = LOOK[now ?? ''] ?? ['off', 'off'];
+            const now = radio_state(d.network_id ?? '', recording, now_ms()),
+              [shape, tone] = LOOK[now] ?? ['off', 'off'];
             return (
               <tr key={`${d.network_id}${i}`}>
                 <th scope="row">{d.network_id ?? '–'}</th>
                 <td>{d.kind}</td>
                 <td>
-                  <Chip shape={shape} tone={tone} word={(now ?? 'no flight').toUpperCase()} />
+                  <Chip shape={shape} tone={tone} word={now.toUpperCase()} />
                 </td>
                 <td>{d.last_seen_us === null ? '–' : `${age((server_now_us() - d.last_seen_us) / 1000)} ago`}</td>
               </tr>
