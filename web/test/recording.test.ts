@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { MissionMsg, RangeMsg } from '../src/live/messages';
-import { after, Player, poses_of, type Recording } from '../src/state/recording';
+import { after, marks_of, neighbour, Player, poses_of, type Recording } from '../src/state/recording';
 
 const mission: MissionMsg = {
   mission: 'm',
@@ -93,4 +93,21 @@ describe('a fix of the recording', () => {
       after([{ t_us: 1 }, { t_us: 3 }], 1),
       after([{ t_us: 1 }, { t_us: 3 }], 9),
     ]).toEqual([0, 1, 2]));
+});
+
+describe('events of a recording', () => {
+  const at = (t_s: number) => ({ t_us: t_s * 1e6, level: 'info', text: `at ${t_s}` }),
+    marks = marks_of([at(300), at(200), null, at(200), at(100), at(9000)], 0, 599e6);
+  it('are in the order of the flight, whatever the order of the answer', () =>
+    expect(marks.map((m) => m.t_us / 1e6)).toEqual([100, 200, 200, 300]));
+  it('are stepped through one moment after the other, both ways', () => {
+    const way = (from_s: number, by: 1 | -1): number[] => {
+      const out: number[] = [];
+      for (let m = neighbour(marks, from_s * 1e6, by); m; m = neighbour(marks, m.t_us, by)) out.push(m.t_us / 1e6);
+      return out;
+    };
+    expect(way(0, 1)).toEqual([100, 200, 300]);
+    expect(way(599, -1)).toEqual([300, 200, 100]);
+    expect(way(250, -1)).toEqual([200, 100]);
+  });
 });

@@ -101,6 +101,17 @@ const range_of =
         };
   };
 
+/// Events within the recording, in the order of the flight: the server gives the newest first.
+export const marks_of = (
+  events: readonly (Record<string, unknown> | null)[],
+  from_us: number,
+  to_us: number,
+): Recording['marks'] =>
+  events
+    .flatMap((e) => (e ? [{ t_us: num(e.t_us) ?? 0, level: str(e.level), text: str(e.text) }] : []))
+    .filter((e) => e.t_us >= from_us && e.t_us <= to_us)
+    .sort((a, b) => a.t_us - b.t_us);
+
 export async function load_recording(mission: MissionMsg): Promise<Recording> {
   const of = encodeURIComponent(mission.mission);
   const [fixes, ranges, events] = await Promise.all([
@@ -129,10 +140,7 @@ export async function load_recording(mission: MissionMsg): Promise<Recording> {
     poses: poses.sort(by_time),
     ranges: ranges.rows.sort(by_time),
     cut: fixes.cut || ranges.cut,
-    marks: events
-      .filter((e) => e !== null)
-      .map((e) => ({ t_us: num(e!.t_us) ?? 0, level: str(e!.level), text: str(e!.text) }))
-      .filter((e) => times.length > 0 && e.t_us >= Math.min(...times) && e.t_us <= Math.max(...times)),
+    marks: marks_of(events, Math.min(...times), Math.max(...times)),
   };
 }
 
@@ -145,6 +153,18 @@ export function after(rows: readonly { readonly t_us: number }[], t_us: number):
     else hi = mid;
   }
   return lo;
+}
+
+/// The event after a moment, or before it; null where there is none. Several of one moment are one step.
+export function neighbour<T extends { readonly t_us: number }>(
+  marks: readonly T[],
+  t_us: number,
+  by: 1 | -1,
+): T | null {
+  const next = after(marks, t_us);
+  if (by === 1) return marks[next] ?? null;
+  for (let i = next - 1; i >= 0; i--) if (marks[i]!.t_us < t_us) return marks[i]!;
+  return null;
 }
 
 const BEFORE_US = 120_000_000; ///< what a jump shows of the past: the trail of the live view

@@ -66,8 +66,13 @@ export function scene_of(id: string): Scene {
 export const current_scene = (): Scene | null => (mission_id.value ? scene_of(mission_id.value) : null);
 export const current_mission = computed(() => mission_list.value.find((x) => x.mission === mission_id.value) ?? null);
 
-/// A recorded flight on screen stands in for the live one in lists and map; strip and alarms stay with what is live.
-export const replayed = signal<{ readonly scene: Scene; readonly mission: m.MissionMsg } | null>(null);
+/// A recorded flight on screen stands in for the live one in lists and map; the strip says REPLAY and its time, alarms stay with what is live.
+export interface Replayed {
+  readonly scene: Scene;
+  readonly mission: m.MissionMsg;
+  readonly at_s: number; ///< of the flight, at the moment that is shown
+}
+export const replayed = signal<Replayed | null>(null);
 export const watched_scene = (): Scene | null => replayed.value?.scene ?? current_scene();
 export const watched_mission = computed(() => replayed.value?.mission ?? current_mission.value);
 export const watched_lost = (): boolean => replayed.value === null && link.value === 'lost';

@@ -4,8 +4,9 @@ import type { ComponentChildren } from 'preact';
 import type { DroneMsg } from '../live/flight_messages';
 import { me } from '../state/session';
 import {
-  current_mission,
-  current_scene,
+  replayed,
+  watched_mission,
+  watched_scene,
   devices,
   link,
   live_source,
@@ -20,6 +21,7 @@ import { age, bytes, clock, fixed, millimetres } from './format';
 import { Icon, Mark, type Shape, type Tone } from './marks';
 import { next_theme, theme } from './theme';
 import { open_sign_in } from './sign_in';
+import { useDialog } from './use_dialog';
 
 export const open_card = signal<string | null>(null);
 
@@ -42,10 +44,11 @@ function craft_words(craft: DroneMsg): string {
 function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Reading> {
   tick.value;
   const now = now_ms(),
-    scene = current_scene(),
-    mission = current_mission.value,
+    replay = replayed.value,
+    scene = watched_scene(),
+    mission = watched_mission.value,
     running = mission?.state === 'recording',
-    lost = link.value === 'lost';
+    lost = replay === null && link.value === 'lost';
   const silence = live_source()?.silence_ms() ?? Infinity,
     data_age = live_source()?.data_age_ms() ?? Infinity,
     arriving = silence < 2000;
@@ -82,34 +85,47 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
   const list = alarms.value,
     worst = list[0]?.priority;
   return {
-    link: {
-      ...link_look,
-      word: me.value === null ? 'SIGNED OUT' : link.value === 'connecting' ? 'CONNECTING' : link.value.toUpperCase(),
-      extra: link.value === 'lost' ? clock(data_age / 1000, true) : '',
-      card: (
-        <>
-          <p>
-            {
-              {
-                connecting: 'Waiting for the first answer of anchord.',
-                live: 'Heartbeats arrive every second.',
-                late: arriving
-                  ? 'What arrives is more than 2 s old: the link is too slow.'
-                  : 'No heartbeat for more than 2 s.',
-                lost: arriving
-                  ? 'What arrives is more than 5 s old: the link is too slow for it. Go nearer to the access point, or close other pages.'
-                  : 'No heartbeat for more than 5 s. Values are the last known; the page tries again by itself.',
-              }[link.value]
-            }
-          </p>
-          {sys && (
+    link: replay
+      ? {
+          ...look('info'),
+          word: 'REPLAY',
+          extra: clock(replay.at_s),
+          card: (
             <p>
-              {fixed(sys.ws_clients, 0)} screens connected, {fixed(sys.queue_depth, 0)} rows waiting to be stored.
+              A stored flight is shown, {clock(replay.at_s)} after its start. The link to anchord is {link.value}; what
+              happens now is under Live.
             </p>
-          )}
-        </>
-      ),
-    },
+          ),
+        }
+      : {
+          ...link_look,
+          word:
+            me.value === null ? 'SIGNED OUT' : link.value === 'connecting' ? 'CONNECTING' : link.value.toUpperCase(),
+          extra: link.value === 'lost' ? clock(data_age / 1000, true) : '',
+          card: (
+            <>
+              <p>
+                {
+                  {
+                    connecting: 'Waiting for the first answer of anchord.',
+                    live: 'Heartbeats arrive every second.',
+                    late: arriving
+                      ? 'What arrives is more than 2 s old: the link is too slow.'
+                      : 'No heartbeat for more than 2 s.',
+                    lost: arriving
+                      ? 'What arrives is more than 5 s old: the link is too slow for it. Go nearer to the access point, or close other pages.'
+                      : 'No heartbeat for more than 5 s. Values are the last known; the page tries again by itself.',
+                  }[link.value]
+                }
+              </p>
+              {sys && (
+                <p>
+                  {fixed(sys.ws_clients, 0)} screens connected, {fixed(sys.queue_depth, 0)} rows waiting to be stored.
+                </p>
+              )}
+            </>
+          ),
+        },
     rtk: {
       ...(rtk_stale ? { ...rtk_look, tone: 'off' } : rtk_look),
       stale: rtk_stale,
@@ -195,16 +211,18 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
           ),
         },
     rec: {
-      ...(running ? (sys && !sys.recording ? look('caution') : look('ok')) : look('off')),
+      ...(replay ? look('off') : running ? (sys && !sys.recording ? look('caution') : look('ok')) : look('off')),
       stale: lost && running,
-      word: running ? clock(flown_s) : 'off',
-      extra: lost && running ? 'not known' : running || !mission ? '' : mission.state,
+      word: replay ? 'stored' : running ? clock(flown_s) : 'off',
+      extra: replay ? '' : lost && running ? 'not known' : running || !mission ? '' : mission.state,
       card: (
         <>
           <p>
-            {running
-              ? `${mission.name}: ${mission.n_ranges} ranges and ${mission.n_fixes} fixes stored.`
-              : 'No flight is being recorded.'}
+            {replay
+              ? `${replay.mission.name} is stored; nothing of it is recorded now.`
+              : running
+                ? `${mission.name}: ${mission.n_ranges} ranges and ${mission.n_fixes} fixes stored.`
+                : 'No flight is being recorded.'}
           </p>
           {sys && (
             <p>
@@ -237,9 +255,28 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
 
 const LABELS = { link: 'Link', rtk: 'RTK', uwb: 'UWB', drone: 'Drone', rec: 'Recording', alarms: 'Alarms' } as const;
 
+function Card({ label, word, children }: { label: string; word: string; children: ComponentChildren }) {
+  const close = (): void => {
+      open_card.value = null;
+    },
+    box = useDialog<HTMLDivElement>(true, close);
+  return (
+    <div class="card" role="dialog" aria-label={label} tabIndex={-1} ref={box}>
+      <h2>
+        {label}: {word}
+      </h2>
+      {children}
+      <button class="btn small" onClick={close}>
+        Close
+      </button>
+    </div>
+  );
+}
+
 export function Strip() {
   const readings = read(),
-    mission = current_mission.value,
+    mission = watched_mission.value,
+    replay = replayed.value,
     who = me.value;
   const open = open_card.value;
   return (
@@ -255,9 +292,11 @@ export function Strip() {
       <div class="site">
         <b title={mission?.name ?? ''}>{mission?.name || 'No flight'}</b>
         <span>
-          {mission
-            ? { recording: 'recording', finished: 'finished', planned: 'planned' }[mission.state]
-            : 'nothing recorded yet'}
+          {replay
+            ? 'replay'
+            : mission
+              ? { recording: 'recording', finished: 'finished', planned: 'planned' }[mission.state]
+              : 'nothing recorded yet'}
         </span>
       </div>
       {(Object.keys(LABELS) as (keyof typeof LABELS)[]).map((k) => {
@@ -279,15 +318,9 @@ export function Strip() {
               </span>
             </button>
             {open === k && (
-              <div class="card" role="dialog" aria-label={LABELS[k]}>
-                <h2>
-                  {LABELS[k]}: {r.word}
-                </h2>
+              <Card label={LABELS[k]} word={r.word}>
                 {r.card}
-                <button class="btn small" onClick={() => (open_card.value = null)}>
-                  Close
-                </button>
-              </div>
+              </Card>
             )}
           </div>
         );

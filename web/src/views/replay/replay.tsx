@@ -5,9 +5,9 @@ import { error_text } from '../../api/client';
 import { rows_of_collection } from '../../api/anchors';
 import { request } from '../../api/client';
 import { MapBox } from '../../map/map_box';
-import { after, load_recording, Player } from '../../state/recording';
+import { after, load_recording, neighbour, Player } from '../../state/recording';
 import { chosen_anchor, mission_id, now_ms, ordered_missions, replayed, synced, tick } from '../../state/store';
-import { clock, fixed } from '../../ui/format';
+import { clock, fixed, told_apart } from '../../ui/format';
 import { Chip } from '../../ui/marks';
 import { AnchorCard } from '../anchor_card';
 import { RangeList } from '../range_list';
@@ -25,7 +25,11 @@ export function Replay({ id }: { id: string | null }) {
   const wanted = (id ?? '').split('?')[0] || mission_id.value,
     mission = ordered_missions.value.find((m) => m.mission === wanted) ?? null;
   const show = useStable((p: Player): void => {
-    replayed.value = { scene: p.scene, mission: { ...p.recording.mission, state: 'recording' } };
+    replayed.value = {
+      scene: p.scene,
+      mission: { ...p.recording.mission, state: 'recording' },
+      at_s: (p.t_us - p.recording.from_us) / 1e6,
+    };
   });
   const begin = useStable((): (() => void) | undefined => {
     document.title = 'Replay - anchord';
@@ -104,22 +108,19 @@ export function Replay({ id }: { id: string | null }) {
         return;
       const step_us = e.altKey ? 500_000 : e.shiftKey ? 10_000 : 100_000,
         marks = player.recording.marks,
-        next = after(marks, player.t_us);
+        step_to = (by: 1 | -1) => (): void => {
+          const m = neighbour(marks, player.t_us, by);
+          if (m) {
+            set_playing(false);
+            go(m.t_us);
+          }
+        };
       const act: Record<string, () => void> = {
         ' ': () => set_playing((x) => !x),
         ArrowRight: () => go(player.t_us + step_us),
         ArrowLeft: () => go(player.t_us - step_us),
-        '.': () => {
-          const m = marks[next];
-          if (m) go(m.t_us);
-        },
-        ',': () => {
-          const m = marks
-            .slice(0, next)
-            .reverse()
-            .find((x) => x.t_us < player.t_us);
-          if (m) go(m.t_us);
-        },
+        '.': step_to(1),
+        ',': step_to(-1),
       };
       if (act[e.key]) {
         e.preventDefault();
@@ -143,12 +144,13 @@ export function Replay({ id }: { id: string | null }) {
   const scene = player?.scene ?? null,
     selected = chosen_anchor.value ?? [...(scene?.anchors.keys() ?? [])].sort()[0] ?? null,
     r = player?.recording,
-    span = r ? r.to_us - r.from_us : 1;
+    span = r ? r.to_us - r.from_us : 1,
+    names = told_apart(ordered_missions.value);
   return (
     <div class="replay" data-testid="replay">
       <div class="toolbar">
         <Chip shape="info" tone="info" word="REPLAY" />
-        <h1>{mission.name || mission.mission.slice(0, 8)}</h1>
+        <h1>{names.get(mission) || mission.mission.slice(0, 8)}</h1>
         {ordered_missions.value.length > 1 && (
           <select
             aria-label="Flight to replay"
@@ -157,7 +159,7 @@ export function Replay({ id }: { id: string | null }) {
           >
             {ordered_missions.value.map((m) => (
               <option key={m.mission} value={m.mission}>
-                {m.name || m.mission.slice(0, 8)}
+                {names.get(m) || m.mission.slice(0, 8)}
               </option>
             ))}
           </select>
@@ -189,7 +191,15 @@ export function Replay({ id }: { id: string | null }) {
         />
         <aside class="side" aria-label="Ranges and anchor of the recording" tabIndex={0}>
           <RangeList selected={selected} />
-          {selected && scene?.anchors.has(selected) && <AnchorCard anchor={selected} />}
+          {selected && scene?.anchors.has(selected) && (
+            <>
+              <p class="why pad">
+                Track and ranges are of the moment shown; positions and ellipses are what the whole flight gave.
+              </p>
+              <AnchorCard anchor={selected} />
+            </>
+          )}
+          {player && <Marks player={player} go={go} />}
         </aside>
       </div>
       <div class="player" role="group" aria-label="Player">
@@ -238,6 +248,39 @@ export function Replay({ id }: { id: string | null }) {
         </label>
       </div>
     </div>
+  );
+}
+
+/// What happened, in the order of the flight; the last one before the moment shown is marked.
+function Marks({ player, go }: { player: Player; go: (t_us: number) => void }) {
+  const { marks, from_us } = player.recording,
+    here = after(marks, player.t_us) - 1;
+  if (!marks.length) return null;
+  return (
+    <section class="sec-p events" data-testid="replay-events">
+      <div class="hd">
+        <h2>Events</h2>
+        <span class="meta">
+          {here + 1} of {marks.length} <kbd>,</kbd> <kbd>.</kbd>
+        </span>
+      </div>
+      <ul>
+        {marks.slice(Math.max(0, here - 3), here + 6).map((m, k) => {
+          const i = Math.max(0, here - 3) + k;
+          return (
+            <li key={i} aria-current={i === here ? 'step' : undefined}>
+              <button class="btn small" onClick={() => go(m.t_us)}>
+                {clock((m.t_us - from_us) / 1e6)}
+              </button>
+              <span class={i === here ? 'now' : ''}>
+                <span class="sr">{m.level}: </span>
+                {m.text}
+              </span>
+            </li>
+          );
+        })}
+      </ul>
+    </section>
   );
 }
 
