@@ -1,7 +1,7 @@
 /// What is to be flown, under everything else: outline, fence, no-fly areas, waypoints, the planner's candidates and its choice.
 import { to_px, type Camera } from './camera';
 import type { Palette } from './palette';
-import { reticle, type Ctx } from './symbols';
+import { reticle, type Box, type Ctx } from './symbols';
 
 export type Point = readonly [number, number];
 export interface FlightPicture {
@@ -47,9 +47,15 @@ export function draw_flight(c: Ctx, p: Palette, cam: Camera, f: FlightPicture): 
     c.stroke();
   }
   c.setLineDash([]);
-  f.waypoints.forEach((w, i) =>
-    waypoint(c, p, ...to_px(cam, w), i, i < f.reached ? 'done' : i === f.reached ? 'next' : 'later'),
-  );
+  const shown = new Set(numbered(cam, p, f).map((w) => w.index));
+  c.fillStyle = p.ink2;
+  f.waypoints.forEach((w, i) => {
+    if (shown.has(i)) return;
+    const [x, y] = to_px(cam, w);
+    c.fillRect(x - 2, y - 2, 4, 4);
+  });
+  for (const i of shown)
+    waypoint(c, p, ...to_px(cam, f.waypoints[i]!), i, i < f.reached ? 'done' : i === f.reached ? 'next' : 'later');
   c.strokeStyle = p.ink2;
   c.lineWidth = 1.6;
   c.beginPath();
@@ -113,6 +119,24 @@ function squares(c: Ctx, p: Palette, cam: Camera, f: FlightPicture): void {
     c.fillRect(x - s / 2, y - s / 2, s, s);
   }
   c.globalAlpha = 1;
+}
+
+/// Waypoints whose number has room; the next one always has. The others are dots.
+export function numbered(
+  cam: Camera,
+  p: Pick<Palette, 'rem'>,
+  f: Pick<FlightPicture, 'waypoints' | 'reached'>,
+): { readonly index: number; readonly box: Box }[] {
+  const r = p.rem * 0.55,
+    out: { index: number; box: Box }[] = [],
+    order = [f.reached, ...f.waypoints.keys()].filter((i, k, all) => f.waypoints[i] && all.indexOf(i) === k);
+  for (const index of order) {
+    const [x, y] = to_px(cam, f.waypoints[index]!),
+      box = { x: x - r, y: y - r, w: 2 * r, h: 2 * r };
+    if (!out.some((o) => Math.abs(o.box.x - box.x) < 2 * r + 1 && Math.abs(o.box.y - box.y) < 2 * r + 1))
+      out.push({ index, box });
+  }
+  return out;
 }
 
 function waypoint(c: Ctx, p: Palette, x: number, y: number, index: number, state: 'done' | 'next' | 'later'): void {

@@ -4,7 +4,7 @@ import { interpolated, range_class, type Scene } from '../state/scene';
 import { accuracy, age, percent } from '../ui/format';
 import { to_px, type Camera } from './camera';
 import { round_length } from './enu';
-import { draw_flight, type FlightPicture } from './flight_layer';
+import { draw_flight, numbered, type FlightPicture } from './flight_layer';
 import { range_colour, status_colour, trail_style, type Palette } from './palette';
 import { anchor_symbol, drone, ellipse_at, label, reticle, type Box, type Ctx } from './symbols';
 
@@ -61,6 +61,7 @@ export function draw_top(c: Ctx, p: Palette, cam: Camera, content: Content): voi
     const [x, y] = to_px(cam, m);
     taken.push({ x: x - r - 2, y: y - r - 2, w: 2 * r + 4, h: 2 * r + 4 });
   };
+  if (content.flight) for (const w of numbered(cam, p, content.flight)) taken.push(w.box);
   for (const a of placed) {
     block(a.enu_m!);
     if (a.mirror?.enu_m) block(a.mirror.enu_m);
@@ -69,6 +70,7 @@ export function draw_top(c: Ctx, p: Palette, cam: Camera, content: Content): voi
   const first = placed.filter((a) => a.anchor === content.selected),
     rest = placed.filter((a) => a.anchor !== content.selected);
   for (const a of first) reticle(c, p, ...to_px(cam, a.enu_m!), r * 2.2);
+  // The names of all before the mirror of any: what has no room waits for the selection or a closer look.
   for (const a of [...first, ...rest]) {
     const [x, y] = to_px(cam, a.enu_m!);
     const gap = a.anchor === content.selected ? r * 2.2 + 8 : r + 6;
@@ -81,7 +83,10 @@ export function draw_top(c: Ctx, p: Palette, cam: Camera, content: Content): voi
       a.anchor,
       a.mirror && a.probability !== null ? `${percent(a.probability)} % here` : accuracy(a.h95_m),
       taken,
+      a.anchor === content.selected,
     );
+  }
+  for (const a of [...first, ...rest]) {
     if (a.mirror?.enu_m)
       label(
         c,
@@ -91,6 +96,7 @@ export function draw_top(c: Ctx, p: Palette, cam: Camera, content: Content): voi
         'mirror',
         a.mirror.probability === null ? a.anchor : `${percent(a.mirror.probability)} %`,
         taken,
+        false,
       );
   }
 }

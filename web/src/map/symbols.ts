@@ -177,7 +177,33 @@ export interface Box {
 }
 const overlap = (a: Box, b: Box): boolean => a.x < b.x + b.w && b.x < a.x + a.w && a.y < b.y + b.h && b.y < a.y + a.h;
 
-/// Two-line label beside (x, y): the first of eight places that is free of `taken`; else the first. Adds itself to `taken`.
+/// A free box of w x h about (x, y), first near it, then a little further with a line to it; null where all sixteen are taken.
+export function free_place(
+  x: number,
+  y: number,
+  gap: number,
+  w: number,
+  h: number,
+  taken: readonly Box[],
+): { readonly box: Box; readonly far: boolean } | null {
+  for (const [far, d] of [
+    [false, gap],
+    [true, gap + h * 1.4],
+  ] as const) {
+    const at = (dx: number, dy: number): Box => ({
+      x: dx > 0 ? x + d : dx < 0 ? x - d - w : x - w / 2,
+      y: dy > 0 ? y + d : dy < 0 ? y - d - h : y - h / 2,
+      w,
+      h,
+    });
+    const places = [at(1, 0), at(-1, 0), at(0, -1), at(0, 1), at(1, -1), at(1, 1), at(-1, -1), at(-1, 1)];
+    const box = places.find((b) => !taken.some((t) => overlap(b, t)));
+    if (box) return { box, far };
+  }
+  return null;
+}
+/// Two-line label beside (x, y) where there is room, else its first line alone, else none: a name over a name says neither. `always`: it is drawn
+/// whatever it covers. Adds itself to `taken`.
 export function label(
   c: Ctx,
   p: Palette,
@@ -187,6 +213,7 @@ export function label(
   head: string,
   sub: string,
   taken: Box[],
+  always = true,
 ): void {
   const [h1, h2] = [p.rem * 0.8125, p.rem * 0.75];
   const heads = `600 ${h1}px ${p.font}`,
@@ -195,17 +222,22 @@ export function label(
   c.font = heads;
   const w1 = c.measureText(head).width;
   c.font = subs;
-  const w = Math.max(w1, c.measureText(sub).width),
-    h = h1 + (sub ? h2 + 3 : 0);
-  const at = (dx: number, dy: number): Box => ({
-    x: dx > 0 ? x + gap : dx < 0 ? x - gap - w : x - w / 2,
-    y: dy > 0 ? y + gap : dy < 0 ? y - gap - h : y - h / 2,
-    w,
-    h,
-  });
-  const places = [at(1, 0), at(-1, 0), at(0, -1), at(0, 1), at(1, -1), at(1, 1), at(-1, -1), at(-1, 1)];
-  const box = places.find((b) => !taken.some((t) => overlap(b, t))) ?? places[0]!;
+  const w2 = Math.max(w1, c.measureText(sub).width),
+    whole = free_place(x, y, gap, w2, h1 + (sub ? h2 + 3 : 0), taken),
+    found = whole ?? (sub ? free_place(x, y, gap, w1, h1, taken) : null);
+  if (!found && !always) return c.restore();
+  if (!whole && found) sub = '';
+  const box = found?.box ?? { x: x + gap, y: y - h1, w: w2, h: h1 + (sub ? h2 + 3 : 0) },
+    w = box.w;
   taken.push(box);
+  if (found?.far) {
+    c.strokeStyle = p.ink3;
+    c.lineWidth = p.fine;
+    c.beginPath();
+    c.moveTo(x, y);
+    c.lineTo(Math.max(box.x, Math.min(x, box.x + w)), Math.max(box.y, Math.min(y, box.y + box.h)));
+    c.stroke();
+  }
   c.textBaseline = 'top';
   c.lineJoin = 'round';
   c.strokeStyle = p.halo;

@@ -143,11 +143,22 @@ export function App() {
   usePrefetch();
   return (
     <div class="app">
+      <button class="skip btn primary" data-testid="skip" onClick={() => document.getElementById('main')?.focus()}>
+        Skip to the view
+      </button>
       <Strip />
       <AlarmBar />
       <Rail view={view} />
       <main class={lost ? 'main lost' : 'main'} id="main" tabIndex={-1}>
         {lost && <LastKnown />}
+        <div class="toasts" role="status">
+          {toast.value && (
+            <div class="toast" key={toast.value.id} data-testid="toast">
+              <Mark shape="ok" />
+              {toast.value.text}
+            </div>
+          )}
+        </div>
         <div class="view">
           {view === 'live' && <Live />}
           {view === 'plan' && <Later load={load_plan} props={{ id: named }} />}
@@ -160,14 +171,6 @@ export function App() {
       </main>
       <SignIn />
       <Help />
-      <div class="toasts" role="status">
-        {toast.value && (
-          <div class="toast" key={toast.value.id} data-testid="toast">
-            <Mark shape="ok" />
-            {toast.value.text}
-          </div>
-        )}
-      </div>
     </div>
   );
 }

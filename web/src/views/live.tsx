@@ -17,11 +17,12 @@ import {
   synced,
   tick,
 } from '../state/store';
-import { bearing, clock, fixed, grouped, millimetres } from '../ui/format';
+import { bearing, clock, fixed, grouped, millimetres, told_apart } from '../ui/format';
 import { Chip, Q } from '../ui/marks';
 import { AnchorCard } from './anchor_card';
 import { Events } from './events';
 import { FirstRun } from './first_run';
+import './flight/field.css';
 import './flight/flight.css';
 import { FlightBar } from './flight/commands';
 import { flight_picture, follow_plan } from './flight/picture';
@@ -104,7 +105,8 @@ function Progress() {
   const m = current_mission.value!,
     scene = current_scene(),
     list = ordered_missions.value;
-  const running = m.state === 'recording',
+  const names = told_apart(list),
+    running = m.state === 'recording',
     lost = link.value === 'lost';
   const { done, gave_up, total } = done_count(scene, m);
   const s =
@@ -138,7 +140,7 @@ function Progress() {
           >
             {list.map((x) => (
               <option key={x.mission} value={x.mission}>
-                {x.name || x.mission.slice(0, 8)}
+                {names.get(x) || x.mission.slice(0, 8)}
                 {x.state === 'recording' ? ' (recording)' : ''}
               </option>
             ))}
@@ -203,7 +205,7 @@ function Band() {
   return (
     <dl class="band" data-testid="rtk-card">
       <div>
-        <dt>Height</dt>
+        <dt>Height above origin</dt>
         <dd class={pose_cls}>
           <Q v={fixed(p?.enu_m?.[2], 2)} u="m" />
         </dd>
