@@ -62,7 +62,9 @@ const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.mi
 /** What axe finds wrong on the page as it is, and whether it is wider than its window. */
 export async function violations(page) {
   await page.evaluate(axe);
-  const found = await page.evaluate(() => globalThis.axe.run(document, { resultTypes: ['violations'] }));
+  const found = await page.evaluate(() =>
+    globalThis.axe.run(document, { resultTypes: ['violations'], rules: { 'target-size': { enabled: true } } }),
+  );
   const [page_px, window_px] = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
   const sideways = page_px > window_px + 1 ? [`wider than its window: ${page_px} px in ${window_px}`] : [];
   return [...found.violations.map((v) => `${v.id}: ${v.nodes.map((n) => n.target.join(' ')).join(', ')}`), ...sideways];

@@ -107,7 +107,7 @@ test('a simulated flight converges on screen, and what is published is what the 
     await eventually('the fix is shown', async () => (await text(id('status-rtk'))).match(/FIX|FLOAT/), 10_000);
     await eventually(
       'height and speed are read',
-      async () => /Height[−\d.]+.*Speed[\d.]+/.test(await text(id('rtk-card'))),
+      async () => /Height above origin[−\d.]+.*Speed[\d.]+/.test(await text(id('rtk-card'))),
       10_000,
     );
     await picture(page, 'live-converging');

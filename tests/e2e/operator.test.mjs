@@ -120,3 +120,63 @@ test('what was loaded while nothing else was to be done opens during an outage',
   }
   await page.close();
 });
+
+test('a link to an anchor that is not known says so; one that is known opens it', async () => {
+  const { page, id } = await openPage(browser, server, { hash: '#/anchors/0xdead' });
+  await live(id);
+  await eventually(
+    'it says so',
+    async () => /No anchor 0xdead is known/.test(await text(id('unknown-anchor'))),
+    10_000,
+  );
+  assert.equal(await id('anchor-detail').count(), 0);
+  assert.deepEqual(await violations(page), []);
+  const known = await id('anchor-table').locator('tbody th button').last().textContent();
+  await page.evaluate((a) => (location.hash = `#/anchors/${a}`), known);
+  await eventually('it is opened', async () => (await text(id('anchor-detail').locator('h2'))) === known, 5000);
+  await page.evaluate(() => (location.hash = '#/replay/0197a3b0-5d10-7b1e-9c55-0a1b2c3d4e5f'));
+  await page.getByText('No flight is stored under this address').waitFor();
+  await page.close();
+});
+
+test('Escape closes every dialog and the focus goes back; the view is reached without its neighbours', async () => {
+  const { page, id } = await openPage(browser, server);
+  await live(id);
+  await page.keyboard.press('Tab');
+  assert.equal(await page.evaluate(() => document.activeElement.dataset.testid), 'skip');
+  await page.keyboard.press('Enter');
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'main');
+  const opened_from = async (opener, dialog) => {
+    await opener.focus();
+    await page.keyboard.press('Enter');
+    await dialog.waitFor();
+    assert.equal(await dialog.evaluate((d) => d.contains(document.activeElement)), true, 'the dialog has the focus');
+    await page.keyboard.press('Escape');
+    await dialog.waitFor({ state: 'detached' });
+    assert.equal(await opener.evaluate((o) => o === document.activeElement), true, 'the focus is back');
+  };
+  await opened_from(id('status-rtk'), page.getByRole('dialog'));
+  await opened_from(id('user'), page.getByRole('dialog'));
+  await opened_from(page.getByRole('button', { name: 'Keys' }), id('help'));
+  await opened_from(id('open-checklist'), id('checklist'));
+  await id('nav-anchors').click();
+  await opened_from(id('compare'), page.getByRole('dialog'));
+  await opened_from(id('review'), id('publish'));
+  await page.close();
+});
+
+test('a replay is of its moment: the strip says REPLAY and its time, never LIVE; events are stepped through in order', async () => {
+  await new Promise((done) => (playing.exitCode === null ? playing.once('exit', done) : done()));
+  const { page, id } = await openPage(browser, server, { hash: '#/replay' });
+  await eventually('the flight is read', async () => /\d/.test(await text(id('replay-time'))), 20_000);
+  await eventually('REPLAY', async () => /REPLAY.*00:00:00/.test(await text(id('status-link'))), 5000);
+  await id('scrubber').fill('30000000');
+  await eventually('its time', async () => /REPLAY.*00:00:30/.test(await text(id('status-link'))), 5000);
+  for (const tile of ['link', 'rtk', 'uwb', 'drone', 'rec'])
+    assert.doesNotMatch(await text(id(`status-${tile}`)), /LIVE|ended/, tile);
+  await picture(page, 'replay-30s');
+  assert.deepEqual(await violations(page), []);
+  await id('nav-live').click();
+  await live(id);
+  await page.close();
+});

@@ -184,6 +184,30 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
     120_000,
     250,
   );
+  for (const [width, height] of [
+    [1024, 768],
+    [768, 1024],
+    [390, 844],
+    [640, 512], // text of 200 % on 1280 x 1024
+  ]) {
+    await page.setViewportSize({ width, height });
+    await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+    const where = `${width} x ${height}`,
+      box = (name) => id(name).boundingBox(),
+      [map, hold] = [await box('map'), await box('cmd-hold')];
+    await picture(page, `flight-${width}`);
+    if (height > width) assert.ok(map.height >= 0.4 * height, `map of ${map.height} px at ${where}`);
+    for (const name of ['cmd-hold', 'cmd-skip', 'cmd-return', 'cmd-land']) {
+      const b = await box(name);
+      assert.ok(
+        b.y >= 0 && b.y + b.height <= height && b.x >= 0 && b.x + b.width <= width && b.height >= 44 && b.width >= 44,
+        `${name} in reach at ${where}: ${JSON.stringify(b)}`,
+      );
+      assert.ok(Math.abs(b.y - hold.y) < 1, `the commands are one row at ${where}`);
+    }
+    assert.deepEqual(await violations(page), [], where);
+  }
+  await page.setViewportSize({ width: 1440, height: 900 });
   const done_shown = (name) =>
     id(name)
       .innerText()

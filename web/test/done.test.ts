@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { procedure } from '../src/live/flight_messages';
 import { estimate, mission } from '../src/live/messages';
-import { as_shown, done_count, goal_of } from '../src/state/done';
+import { as_shown, done_count, goal_of, likelier } from '../src/state/done';
 import { Scene } from '../src/state/scene';
 import { STATUS_LOOK } from '../src/ui/marks';
 import { why_not_done } from '../src/ui/words';
@@ -44,5 +44,38 @@ describe('an anchor is done', () => {
     expect(s.estimates_version).toBeGreaterThan(drawn); // the map has to be drawn anew
     expect(done_count(s, m)).toEqual({ done: 2, gave_up: 1, total: 4 }); // 0x3 is not the procedure's business
     expect(done_count(new Scene('x'), m)).toEqual({ done: 4, gave_up: 0, total: 4 });
+  });
+});
+
+describe('the likelier of two solutions', () => {
+  const two = (probability: number, mirror_m: [number, number, number]) =>
+    estimate({
+      mission: 'm',
+      anchor: '0x1',
+      t_us: 1,
+      status: 'ambiguous',
+      verdict: 'ambiguous',
+      enu_m: [0, 0, 2],
+      lon: 3.7,
+      lat: 51,
+      probability,
+      cov_enu_m2: [4, 1, 0.5, 9, 0.25, 1],
+      ellipse95: { major_m: 7, minor_m: 4, azimuth_deg: 20 },
+      mirror: { lon: 3.8, lat: 51, enu_m: mirror_m, probability: 1 - probability },
+    })!;
+  it('is the anchor, the other its mirror', () => {
+    expect(likelier(two(0.6, [10, 0, 2])).enu_m).toEqual([0, 0, 2]);
+    const e = as_shown(two(0.3, [10, 0, 2]), null);
+    expect(e).toMatchObject({ enu_m: [10, 0, 2], lon: 3.8, probability: 0.7 });
+    expect(e.mirror).toMatchObject({ enu_m: [0, 0, 2], lon: 3.7, probability: 0.3 });
+    // Reflected in a north-south line: east changes its sign, azimuth 20 becomes 160.
+    expect(e.cov_enu_m2).toEqual([4, -1, -0.5, 9, 0.25, 1]);
+    expect(e.ellipse95!.azimuth_deg).toBeCloseTo(160, 9);
+  });
+  it('above or below keeps its horizontal part', () => {
+    const e = likelier(two(0.3, [0, 0, 6]));
+    expect(e.enu_m).toEqual([0, 0, 6]);
+    expect(e.ellipse95!.azimuth_deg).toBe(20);
+    expect(e.cov_enu_m2![1]).toBe(1);
   });
 });

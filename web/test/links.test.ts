@@ -2,7 +2,8 @@ import { describe, expect, it } from 'vitest';
 import { grid } from '../src/live/flight_messages';
 import { range } from '../src/live/messages';
 import { Scene } from '../src/state/scene';
-import { grid_measure, grid_outcome, value_words } from '../src/views/flight/words';
+import { told_apart } from '../src/ui/format';
+import { grid_measure, grid_outcome, turn_runs, value_words } from '../src/views/flight/words';
 import { curve_mae } from '../src/views/models/mae';
 import { radio_state } from '../src/views/system/radio_state';
 
@@ -59,5 +60,35 @@ describe('the MAE beside a curve', () => {
     } as unknown as Parameters<typeof curve_mae>[1];
     expect(curve_mae({ method: 'none' }, run)).toBe(0.112);
     expect(curve_mae({ method: 'mixture of a, quantile 0.5' }, run)).toBe(0.021);
+  });
+});
+
+describe('flights of one name', () => {
+  const flight = (name: string, started_us: number | null) => ({ name, started_us });
+  it('are told apart by their time, others keep their name', () => {
+    const list = [
+      flight('demonstration', 1_777_889_472e6),
+      flight('demonstration', 1_777_893_072e6),
+      flight('hall', 1),
+    ];
+    expect([...told_apart(list).values()]).toEqual([
+      'demonstration, 2026-05-04 10:11 UTC',
+      'demonstration, 2026-05-04 11:11 UTC',
+      'hall',
+    ]);
+  });
+});
+
+describe('a turn', () => {
+  it('is closed round the compass where it was looked at, and open where not', () => {
+    const all = Array.from({ length: 36 }, (_, i): [number, number] => [i * 10, -80]);
+    expect(turn_runs(all)).toHaveLength(1);
+    expect(turn_runs(all)[0]!.at(-1)).toEqual([360, -80]); // north again
+    const half = turn_runs(all.filter(([deg]) => deg <= 90 || (deg >= 180 && deg < 300)));
+    expect(half.map((r) => [r[0]![0], r.at(-1)![0]])).toEqual([
+      [0, 90],
+      [180, 290],
+    ]);
+    expect(turn_runs([])).toEqual([]);
   });
 });

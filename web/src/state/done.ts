@@ -8,9 +8,45 @@ export const over = (p: ProcedureMsg | null | undefined): boolean => p?.status =
 const task_of = (p: ProcedureMsg | null | undefined, anchor: string): AnchorTask | undefined =>
   p?.anchors.find((t) => t.anchor === anchor);
 
+/// The likelier of two solutions is the anchor; the other is drawn as its mirror. Reflected in the line between them, like its covariance.
+export function likelier(e: EstimateMsg): EstimateMsg {
+  const m = e.mirror;
+  if (!m?.enu_m || !e.enu_m || m.probability === null || e.probability === null || m.probability <= e.probability)
+    return e;
+  const [de, dn] = [m.enu_m[0] - e.enu_m[0], m.enu_m[1] - e.enu_m[1]],
+    length = Math.hypot(de, dn),
+    level = length < 1e-6, // above or below: the horizontal part stays
+    axis_deg = (Math.atan2(de, dn) * 180) / Math.PI + 90,
+    [x, y] = level ? [0, 0] : [de / length, dn / length],
+    [rxx, rxy, ryy] = [1 - 2 * x * x, -2 * x * y, 1 - 2 * y * y],
+    [ee, en, eu, nn, nu, uu] = (e.cov_enu_m2 ?? [0, 0, 0, 0, 0, 0]) as [number, number, number, number, number, number];
+  return {
+    ...e,
+    lon: m.lon,
+    lat: m.lat,
+    h_m: m.h_m,
+    enu_m: m.enu_m,
+    probability: m.probability,
+    mirror: { lon: e.lon, lat: e.lat, h_m: e.h_m, enu_m: e.enu_m, probability: e.probability },
+    ellipse95:
+      e.ellipse95 && !level
+        ? { ...e.ellipse95, azimuth_deg: (((2 * axis_deg - e.ellipse95.azimuth_deg) % 180) + 180) % 180 }
+        : e.ellipse95,
+    cov_enu_m2: e.cov_enu_m2 && [
+      rxx * rxx * ee + 2 * rxx * rxy * en + rxy * rxy * nn,
+      rxx * rxy * ee + (rxx * ryy + rxy * rxy) * en + rxy * ryy * nn,
+      rxx * eu + rxy * nu,
+      rxy * rxy * ee + 2 * rxy * ryy * en + ryy * ryy * nn,
+      rxy * eu + ryy * nu,
+      uu,
+    ],
+  };
+}
+
 /// The estimate with the status that is shown. While the aircraft still works on an anchor it is not done, and what ran out of time, points or
 /// battery, or was left by the end of the flight, was given up: neither is ever green.
-export function as_shown(e: EstimateMsg, p: ProcedureMsg | null | undefined): EstimateMsg {
+export function as_shown(given: EstimateMsg, p: ProcedureMsg | null | undefined): EstimateMsg {
+  const e = likelier(given);
   const task = task_of(p, e.anchor);
   if (!task || task.reached || e.status === 'accepted' || e.status === 'moved' || e.status === 'ambiguous') return e;
   if (task.done || over(p)) return { ...e, status: 'gave_up' };

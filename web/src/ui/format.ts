@@ -78,3 +78,19 @@ export function date(text: string | null | undefined): string {
   const d = new Date(text ?? '');
   return Number.isNaN(d.getTime()) ? MISSING : `${d.toISOString().slice(0, 16).replace('T', ' ')} UTC`;
 }
+
+/// Names of a list, with the time where two are the same: eight flights named "demonstration" are eight lines that differ.
+export function told_apart<T extends { readonly name: string; readonly started_us: number | null }>(
+  list: readonly T[],
+): Map<T, string> {
+  const count = new Map<string, number>();
+  for (const x of list) count.set(x.name, (count.get(x.name) ?? 0) + 1);
+  return new Map(
+    list.map((x) => [
+      x,
+      (count.get(x.name) ?? 0) > 1 && x.started_us !== null
+        ? `${x.name}, ${date(new Date(x.started_us / 1000).toISOString())}`
+        : x.name,
+    ]),
+  );
+}

@@ -1,6 +1,6 @@
 import { signal } from '@preact/signals';
-import { useEffect, useRef } from 'preact/hooks';
 import { Icon } from './marks';
+import { useDialog } from './use_dialog';
 
 export const help_open = signal(false);
 const KEY = 'anchord.keys';
@@ -38,11 +38,8 @@ const KEYS: readonly [string, string][] = [
   ['Esc', 'close'],
 ];
 export function Help() {
-  const box = useRef<HTMLElement>(null),
-    open = help_open.value;
-  useEffect(() => {
-    if (open) box.current?.focus();
-  }, [open]);
+  const open = help_open.value,
+    box = useDialog<HTMLElement>(open, () => (help_open.value = false));
   if (!open) return null;
   return (
     <section class="sheet" role="dialog" aria-labelledby="help-title" tabIndex={-1} ref={box} data-testid="help">

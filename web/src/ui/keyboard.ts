@@ -1,11 +1,8 @@
 import { current_map } from '../map/map_box';
 import { chosen_anchor, current_scene } from '../state/store';
 import { hold_now } from '../views/flight/commands';
-import { publish_open } from '../views/publish';
 import { acknowledge, alarms, mute } from './alarms';
 import { help_open, keys_on } from './help';
-import { close_sign_in } from './sign_in';
-import { open_card } from './strip';
 import { next_theme } from './theme';
 
 function step_anchor(by: number): void {
@@ -47,10 +44,7 @@ const KEYS: Record<string, () => void> = {
 export function on_key(e: KeyboardEvent): void {
   if (e.key === 'Escape') {
     if (document.activeElement instanceof HTMLInputElement) document.activeElement.blur();
-    help_open.value = publish_open.value = false;
-    open_card.value = null;
-    close_sign_in();
-    return;
+    return; // every dialog closes itself
   }
   const field = e.target instanceof HTMLElement && e.target.closest('input, select, textarea, [contenteditable]');
   if (field || e.ctrlKey || e.metaKey || e.altKey || !keys_on.value) return;

@@ -4,6 +4,7 @@ import { ApiError } from '../api/client';
 import { me, sign_in, sign_out } from '../state/session';
 import { live_source, synced } from '../state/store';
 import { Icon } from './marks';
+import { useDialog } from './use_dialog';
 
 const shown = signal(false);
 export const open_sign_in = (): void => {
@@ -23,6 +24,7 @@ export function SignIn() {
   useEffect(() => {
     if (signed_out) input.current?.focus();
   }, [signed_out]);
+  const box = useDialog<HTMLElement>(open && !signed_out, close_sign_in);
   if (!open) return null;
   const submit = async (e: Event): Promise<void> => {
     e.preventDefault();
@@ -51,7 +53,7 @@ export function SignIn() {
   };
   const who = me.value;
   return (
-    <section class="sheet" role="dialog" aria-labelledby="sign-in-title" data-testid="sign-in">
+    <section class="sheet" role="dialog" aria-labelledby="sign-in-title" tabIndex={-1} ref={box} data-testid="sign-in">
       <div class="hd">
         <h2 id="sign-in-title">
           {signed_out ? 'Signed out' : who?.auth === 'off' ? 'Open access' : (who?.name ?? 'User')}

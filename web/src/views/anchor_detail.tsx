@@ -75,7 +75,7 @@ export function AnchorDetail({ row: r, live, changed }: { row: AnchorRow; live: 
           )}
           {geo && (
             <div>
-              <dt>Ellipsoidal h</dt>
+              <dt>Height above ellipsoid</dt>
               <dd>
                 <Q v={metres(r.h_m)} u="m" />
               </dd>

@@ -1,11 +1,12 @@
 /// Two calibrations side by side: how far each anchor is from where the other has it, and whether that is more than both covariances allow.
 import { signal } from '@preact/signals';
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useEffect, useState } from 'preact/hooks';
 import { error_text } from '../api/client';
 import { common_shift, shifts, solves, type Shift, type Solve } from '../api/residuals';
 import { mission_list, revision } from '../state/store';
 import { bearing, date, fixed, millimetres } from '../ui/format';
 import { Chip, Icon, type Shape, type Tone } from '../ui/marks';
+import { useDialog } from '../ui/use_dialog';
 
 export const compare_open = signal(false);
 const LOOK: Record<Shift['change'], readonly [Shape, Tone, string]> = {
@@ -22,9 +23,8 @@ export function CompareCalibrations() {
     [against, set_against] = useState('published'),
     [rows, set_rows] = useState<readonly Shift[] | null>(null),
     [problem, set_problem] = useState(''),
-    box = useRef<HTMLElement>(null);
+    box = useDialog<HTMLElement>(true, () => (compare_open.value = false));
   useEffect(() => {
-    box.current?.focus();
     solves().then(
       (all) => {
         set_list(all);

@@ -19,6 +19,7 @@ import { Icon, Mark, StatusChip } from '../ui/marks';
 import { useDraft } from '../ui/use_draft';
 import { gate_line } from '../ui/gates';
 import { VERDICT_WORDS } from '../ui/words';
+import { useDialog } from '../ui/use_dialog';
 import { useStable } from '../ui/use_stable';
 
 export const publish_open = signal(false);
@@ -37,7 +38,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
   const keys = useRef({ calibrate: idempotency_key(), publish: idempotency_key() }),
     [form, change, forget] = useDraft<Form>(`publish/${mission.mission}`, { note: '', reasons: {}, left: {} }),
     { note, reasons, left } = form,
-    box = useRef<HTMLElement>(null);
+    box = useDialog<HTMLElement>(true, () => (publish_open.value = false));
   const guarded = async (what: 'calibrating' | 'publishing', work: () => Promise<void>): Promise<void> => {
     set_busy(what);
     set_problem('');
@@ -57,7 +58,6 @@ export function Publish({ mission }: { mission: MissionMsg }) {
       }),
   );
   useEffect(() => {
-    box.current?.focus();
     solve();
   }, [solve]);
   const out = Object.entries(left).filter(([id]) => draft?.rows.some((r) => r.anchor === id && passes(r))),

@@ -1,11 +1,12 @@
 /// Before take-off: every item green, or a reason for it. Start is blocked until then, by this page and by the server.
 import { signal } from '@preact/signals';
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useEffect, useState } from 'preact/hooks';
 import { error_text } from '../../api/client';
 import { checklist, set_item, type ChecklistItem } from '../../api/flight';
 import { plans as fetch_plans, type Plan } from '../../api/plans';
 import { Icon, Mark } from '../../ui/marks';
 import { HoldButton } from './hold_button';
+import { useDialog } from '../../ui/use_dialog';
 import { useStable } from '../../ui/use_stable';
 
 export const checklist_open = signal(false);
@@ -22,9 +23,8 @@ export function Checklist({
     [plan, set_plan] = useState<string | null>(null),
     [manual, set_manual] = useState(false),
     [problem, set_problem] = useState(''),
-    box = useRef<HTMLElement>(null);
+    box = useDialog<HTMLElement>(true, () => (checklist_open.value = false));
   useEffect(() => {
-    box.current?.focus();
     fetch_plans().then(
       (list) => {
         set_plans(list);

@@ -95,9 +95,9 @@ export function FlightBar() {
           <p class="why control" data-testid="control">
             {mine ? (
               <>
-                You have control.{' '}
+                <span class="yours">You have control. </span>
                 <button class="btn small" onClick={() => void give_back(mission.mission)}>
-                  Release
+                  Release control
                 </button>
               </>
             ) : (

@@ -15,6 +15,7 @@ import {
   STEP_WORDS,
   TRACK,
   value_words,
+  turn_runs,
 } from './words';
 
 /// A reason of the server as a sentence: its words for refusals carry underscores.
@@ -141,9 +142,7 @@ export function NextPoint() {
       <dl class="kv np2">
         <div>
           <dt>Fly</dt>
-          <dd>
-            <Q v={fixed(fly, 1)} u="m" />
-          </dd>
+          <dd>{fly === null ? '–' : <Q v={fixed(fly, 1)} u="m" />}</dd>
         </div>
         <div>
           <dt>{measure}</dt>
@@ -172,7 +171,7 @@ export function NextPoint() {
                 {measure}
               </th>
               <th scope="col" class="num">
-                Height, m
+                Height above ground, m
               </th>
               <th scope="col">Refused</th>
             </tr>
@@ -201,7 +200,7 @@ function Ramp({ g }: { g: GridMsg }) {
   if (values.length < 2) return null;
   return (
     <div class="ramp">
-      <span>{value_words(g, Math.min(...values))} best</span>
+      <span>{value_words(g, Math.min(...values))} lowest</span>
       <span class="sw" aria-hidden="true">
         {[0, 1, 2, 3, 4, 5].map((i) => (
           <i key={i} class={`g${i}`} />
@@ -261,7 +260,6 @@ function TurnPolar({ t }: { t: ProfileMsg }) {
                 a = (deg * Math.PI) / 180;
               return [cx + d * Math.sin(a), cy - d * Math.cos(a)];
             };
-          const sorted = [...t.samples].sort((a, b) => a[0] - b[0]);
           return (
             <>
               {[0.33, 0.66, 1].map((f) => (
@@ -275,7 +273,9 @@ function TurnPolar({ t }: { t: ProfileMsg }) {
                   </text>
                 );
               })}
-              <path class="s main" d={`${line(sorted.map(([deg, v]) => at(deg, v)))}Z`} />
+              {turn_runs(t.samples).map((run, i) => (
+                <path key={i} class="s main" d={line(run.map(([deg, v]) => at(deg, v)))} />
+              ))}
               {t.best !== null && t.sigma !== null && (
                 <path
                   class="wedge"
@@ -301,7 +301,9 @@ function HeightProfile({ h: p }: { h: ProfileMsg }) {
     <section class="sec-p" data-testid="height-profile">
       <div class="hd">
         <h2>Height, {p.anchor}</h2>
-        <span class="meta">{p.best === null ? 'no height yet' : `${fixed(p.best, 1)} m ± ${fixed(p.sigma, 1)} m`}</span>
+        <span class="meta">
+          {p.best === null ? 'no height yet' : `${fixed(p.best, 1)} m above ground ± ${fixed(p.sigma, 1)} m`}
+        </span>
       </div>
       <Drawing
         cls="roc"

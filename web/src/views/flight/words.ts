@@ -93,3 +93,19 @@ export function grid_outcome(g: Pick<GridMsg, 'chosen' | 'outcome'>): {
     return { shape: 'off', tone: 'off', word: 'NO POINT', why: event === 'no_point' ? why : '', flown: false };
   return { shape: 'ok', tone: 'ok', word: 'CHOSEN', why: '', flown: true };
 }
+
+const HOLE_DEG = 20;
+/// Samples of a turn as lines round the compass, broken where no heading was looked at: a hole closed by a straight line looks measured.
+export function turn_runs(samples: readonly (readonly [number, number])[]): (readonly [number, number])[][] {
+  const sorted = [...samples].sort((a, b) => a[0] - b[0]),
+    first = sorted[0],
+    runs: (readonly [number, number])[][] = [];
+  if (!first) return runs;
+  const round: (readonly [number, number])[] = [...sorted, [first[0] + 360, first[1]]];
+  for (const [i, s] of round.entries()) {
+    const before = round[i - 1];
+    if (!before || s[0] - before[0] > HOLE_DEG) runs.push([s]);
+    else runs[runs.length - 1]!.push(s);
+  }
+  return runs.filter((r) => r.length > 1);
+}

@@ -5,6 +5,7 @@ import { gate_of, promote, type Gate } from '../../api/learning';
 import { say } from '../../state/store';
 import { fixed } from '../../ui/format';
 import { Chip, Icon, Mark } from '../../ui/marks';
+import { useDialog } from '../../ui/use_dialog';
 
 export function Promote({
   model,
@@ -22,9 +23,8 @@ export function Promote({
     [reason, set_reason] = useState(''),
     [busy, set_busy] = useState(false),
     key = useRef(idempotency_key()),
-    box = useRef<HTMLElement>(null);
+    box = useDialog<HTMLElement>(true, close);
   useEffect(() => {
-    box.current?.focus();
     gate_of(model).then(set_gate, (e: unknown) => set_problem(error_text(e)));
   }, [model]);
   const send = async (): Promise<void> => {
