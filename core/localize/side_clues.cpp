@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/localize/turn.hpp"
 #include "core/planning/bounds.hpp"
-#include "core/procedure/turn.hpp"
 
 namespace anchord {
 namespace {
@@ -96,7 +96,7 @@ double level_cost(std::span<const LevelSample> samples, const Eigen::Vector3d& p
   for (const auto& s : samples) {
     const double far_m = std::max((place_m - s.tag_m).norm(), 0.5);
     const double level_db = s.rss_dbm + 20.0 * std::log10(far_m);
-    const Eigen::Vector2d row(1.0, procedure::turn_profile(s.heading_rad - bearing_of(s.tag_m, place_m)));
+    const Eigen::Vector2d row(1.0, turn_profile(s.heading_rad - bearing_of(s.tag_m, place_m)));
     normal += row * row.transpose();
     right += row * level_db;
     squares += level_db * level_db;

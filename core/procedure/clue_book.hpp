@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/base/ids.hpp"
+#include "core/localize/turn.hpp"
 #include "core/procedure/height_search.hpp"
-#include "core/procedure/turn.hpp"
 
 namespace anchord::procedure {
 

@@ -10,8 +10,8 @@
 
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
-#include "drivers/device/driver.hpp"
 #include "drivers/device/supervisor.hpp"
+#include "drivers/port/driver.hpp"
 
 namespace boost::asio {
 class io_context;

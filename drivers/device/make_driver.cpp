@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "drivers/device/driver.hpp"
 #include "drivers/gnss/rover.hpp"
 #include "drivers/link/address.hpp"
 #include "drivers/ntrip/client.hpp"
+#include "drivers/port/driver.hpp"
 #include "drivers/pozyx/unit.hpp"
 
 // The one place that knows which kinds of devices there are, and the names of their options.

@@ -9,7 +9,7 @@
 
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
-#include "drivers/device/driver.hpp"
+#include "drivers/port/driver.hpp"
 #include "drivers/record/event.hpp"
 #include "drivers/time/time_base.hpp"
 

@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "core/base/result.hpp"
-#include "drivers/device/driver.hpp"
+#include "drivers/port/driver.hpp"
 
 namespace anchord::device {
 

@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "drivers/device/driver.hpp"
 #include "drivers/gnss/decoder.hpp"
+#include "drivers/port/driver.hpp"
 
 namespace anchord::gnss {
 

@@ -4,8 +4,8 @@
 #include <optional>
 #include <string>
 
-#include "drivers/device/driver.hpp"
 #include "drivers/ntrip/rtcm.hpp"
+#include "drivers/port/driver.hpp"
 
 namespace anchord::ntrip {
 

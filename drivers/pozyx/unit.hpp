@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/device/driver.hpp"
+#include "drivers/port/driver.hpp"
 #include "drivers/pozyx/tag.hpp"
 #include "drivers/time/clock_model.hpp"
 

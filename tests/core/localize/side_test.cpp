@@ -7,7 +7,7 @@
 #include <random>
 
 #include "core/localize/flight_solver.hpp"
-#include "core/procedure/turn.hpp"
+#include "core/localize/turn.hpp"
 
 namespace anchord {
 namespace {
@@ -41,7 +41,7 @@ FlightData facade() {
     range.anchor = k_id;
     range.distance_m = way.norm() + 0.05 * noise(random);
     range.rss_dbm = -60 - 20 * std::log10(way.norm()) +
-                    10 * procedure::turn_profile(heading - std::atan2(way.x(), way.y())) + 2 * noise(random);
+                    10 * turn_profile(heading - std::atan2(way.x(), way.y())) + 2 * noise(random);
     flight.ranges.push_back(range);
   }
   return flight;

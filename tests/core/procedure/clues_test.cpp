@@ -6,9 +6,9 @@
 #include <random>
 #include <vector>
 
+#include "core/localize/turn.hpp"
 #include "core/procedure/exit_rule.hpp"
 #include "core/procedure/height_search.hpp"
-#include "core/procedure/turn.hpp"
 
 namespace anchord::procedure {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "core/base/result.hpp"
 
-namespace anchord::procedure {
+namespace anchord {
 
 /// RSS of one anchor at one heading of the 360 degree turn (8.3.5).
 struct TurnSample {
@@ -31,4 +31,4 @@ Result<Bearing> bearing_from_turn(std::span<const TurnSample> samples);
 /// The profile itself, 0..1 over orientation.
 double turn_profile(double orientation_rad);
 
-}  // namespace anchord::procedure
+}  // namespace anchord

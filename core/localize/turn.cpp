@@ -1,4 +1,4 @@
-#include "core/procedure/turn.hpp"
+#include "core/localize/turn.hpp"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace anchord::procedure {
+namespace anchord {
 namespace {
 
 constexpr double k_turn = 2 * std::numbers::pi, k_degree = std::numbers::pi / 180;
@@ -129,4 +129,4 @@ Result<Bearing> bearing_from_turn(std::span<const TurnSample> samples) {
   return Bearing{bearing, 20 * k_degree / std::max(0.2, std::min(1.0, 2 * confidence)), confidence};
 }
 
-}  // namespace anchord::procedure
+}  // namespace anchord
