@@ -5,32 +5,44 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 
-#include "api/json/live_writer.hpp"
-#include "api/json/procedure_json.hpp"
-#include "api/json/wire_devices.hpp"
+#include "api/admin/access.hpp"
+#include "api/admin/alarm_board.hpp"
+#include "api/admin/clock_watch.hpp"
+#include "api/admin/event_log.hpp"
+#include "api/admin/housekeeping.hpp"
+#include "api/admin/job_service.hpp"
+#include "api/admin/routes.hpp"
+#include "api/admin/running_time.hpp"
+#include "api/anchors/contradiction_watch.hpp"
+#include "api/anchors/geo_service.hpp"
+#include "api/anchors/routes.hpp"
+#include "api/calibration/calibration_service.hpp"
+#include "api/calibration/kit_profiles.hpp"
+#include "api/calibration/routes.hpp"
+#include "api/devices/device_json.hpp"
+#include "api/devices/device_stream.hpp"
+#include "api/devices/routes.hpp"
+#include "api/flight/flight_service.hpp"
+#include "api/flight/procedure_json.hpp"
+#include "api/flight/routes.hpp"
+#include "api/kit/late_writer.hpp"
 #include "api/learning/promotion_events.hpp"
-#include "api/live/conversation.hpp"
-#include "api/live/hub.hpp"
-#include "api/routes/access_routes.hpp"
-#include "api/routes/learning.hpp"
-#include "api/routes/routes.hpp"
-#include "api/services/access.hpp"
-#include "api/services/alarm_board.hpp"
-#include "api/services/clock_watch.hpp"
-#include "api/services/contradiction_watch.hpp"
-#include "api/services/device_ingest.hpp"
-#include "api/services/device_stream.hpp"
-#include "api/services/flight_service.hpp"
-#include "api/services/geo_service.hpp"
-#include "api/services/housekeeping.hpp"
-#include "api/services/kit_profiles.hpp"
-#include "api/services/late_writer.hpp"
-#include "api/services/running_time.hpp"
+#include "api/learning/routes.hpp"
+#include "api/measurements/device_ingest.hpp"
+#include "api/measurements/ingest.hpp"
+#include "api/measurements/routes.hpp"
+#include "api/missions/mission_service.hpp"
+#include "api/missions/routes.hpp"
+#include "api/planning/routes.hpp"
+#include "api/stream/conversation.hpp"
+#include "api/stream/hub.hpp"
+#include "api/wire/live_writer.hpp"
 #include "core/base/guard.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/backups.hpp"
 #include "core/ports/devices.hpp"
+#include "core/ports/drone.hpp"
 #include "core/ports/plan_store.hpp"
 #include "core/ports/store.hpp"
 
@@ -75,46 +87,99 @@ struct Application::State {
         calibrations({deps.measurements, deps.missions, deps.anchors, jobs, deps.clock, profiles_of(deps),
                       models.get(), [this](const MissionId& id) { return clues_of_flight(id); }, deps.frames,
                       deps.exclusions, deps.track, &contradictions}),
-        services{deps, hub,          events, alarms,         missions,     ingest,
-                 jobs, calibrations, geo,    profiles.get(), models.get(), deps.frames} {
-    services.prompt = &prompt;
-    services.contradictions = &contradictions;
+        audit(deps.access_store, prompt, deps.clock),
+        admin_api{deps.clock,
+                  hub,
+                  events,
+                  alarms,
+                  jobs,
+                  deps.jobs,
+                  prompt,
+                  audit,
+                  deps.build,
+                  deps.backups,
+                  [this] { return storage_status(); },
+                  [this] { return counts(); },
+                  [this] { return device_clock(); },
+                  [this] { return drone(); },
+                  [this] { return metrics_text(); }},
+        device_api{deps.devices, deps.measurements, stream, jobs, audit},
+        mission_api{missions,
+                    deps.missions,
+                    deps.measurements,
+                    deps.anchors,
+                    deps.bin,
+                    deps.devices,
+                    stream,
+                    events,
+                    housekeeping,
+                    running,
+                    deps.keep_deleted_ns,
+                    deps.clock,
+                    audit},
+        measurement_api{deps.measurements, ingest, missions,   models.get(),
+                        deps.exclusions,   events, deps.clock, audit},
+        anchor_api{deps.anchors, deps.frames, missions, geo, contradictions, deps.clock, audit},
+        calibration_api{calibrations,   deps.anchors,   deps.missions, missions,
+                        contradictions, profiles.get(), jobs,          hub,
+                        events,         deps.clock,     audit,         "anchord " + deps.build.version} {
     router.on_fault(deps.log_fault);
-    services.stream = &stream;
-    services.running = &running;
-    services.housekeeping = &housekeeping;
-    add_mission_routes(router, services);
-    add_mission_bin_routes(router, services);
-    add_measurement_routes(router, services);
-    add_site_routes(router, services);
-    add_anchor_routes(router, services);
-    add_calibration_routes(router, services);
-    add_comparison_routes(router, services);
-    if (services.profiles != nullptr) add_kit_routes(router, services);
-    if (services.frames != nullptr) add_frame_routes(router, services);
-    if (deps.exclusions != nullptr) add_exclusion_routes(router, services);
-    add_device_routes(router, services);
-    add_job_routes(router, services);
-    if (deps.plans != nullptr) {
-      add_plan_routes(router, services);
-      flights = std::make_unique<FlightService>(
-          FlightService::Deps{missions, *deps.plans, hub, events, deps.clock, deps.drone,
-                              [this] { return services.storage(); }, deps.flight_clock, &steady, &late});
-      missions.observe(flights.get());
-      services.flights = flights.get();
-      add_flight_routes(router, services);
-    }
+    add_mission_routes(router, mission_api);
+    add_mission_bin_routes(router, mission_api);
+    add_measurement_routes(router, measurement_api);
+    add_site_routes(router, anchor_api);
+    add_anchor_routes(router, anchor_api);
+    add_calibration_routes(router, calibration_api);
+    add_comparison_routes(router, calibration_api);
+    if (profiles) add_kit_routes(router, calibration_api);
+    if (deps.frames != nullptr) add_frame_routes(router, anchor_api);
+    if (deps.exclusions != nullptr) add_exclusion_routes(router, measurement_api);
+    add_device_routes(router, device_api);
+    add_job_routes(router, admin_api);
+    if (deps.plans != nullptr) add_flights(*deps.plans);
     if (deps.learning != nullptr) {
       learning = std::make_unique<Learning>(*this);
-      add_campaign_routes(router, learning->services);
-      add_dataset_routes(router, learning->services);
-      add_training_run_routes(router, learning->services);
-      add_model_routes(router, learning->services);
+      add_campaign_routes(router, learning->api);
+      add_dataset_routes(router, learning->api);
+      add_training_run_routes(router, learning->api);
+      add_model_routes(router, learning->api);
     }
     if (deps.access != nullptr) add_access_routes(router, *deps.access);
-    add_alarm_routes(router, services);
-    if (deps.backups != nullptr) add_backup_routes(router, services);
-    add_system_routes(router, services);
+    add_alarm_routes(router, admin_api);
+    if (deps.backups != nullptr) add_backup_routes(router, admin_api);
+    add_system_routes(router, admin_api);
+  }
+
+  void add_flights(PlanStore& plans) {
+    flights = std::make_unique<FlightService>(
+        FlightService::Deps{missions, plans, hub, events, deps.clock, deps.drone,
+                            [this] { return storage_status(); }, deps.flight_clock, &steady, &late});
+    missions.observe(flights.get());
+    planning_api.emplace(PlanningApi{plans, deps.anchors, deps.clock, audit,
+                                     [this](const PlanId& id) { return flights->flown_with(id); }});
+    add_plan_routes(router, *planning_api);
+    flight_api.emplace(FlightApi{*flights, mission_api, events, audit});
+    mission_api.control = flights.get();
+    mission_api.flight = flight_actions(*flight_api);
+    add_flight_routes(router, *flight_api);
+  }
+
+  StorageStatus storage_status() const {
+    return deps.storage_status ? deps.storage_status() : StorageStatus{};
+  }
+  ServerCounts counts() const {
+    const auto& lines = ingest.counters();
+    return {missions.recording(), missions.queued(), missions.followed(), missions.evicted(),
+            lines.accepted,       lines.duplicates,  lines.rejected};
+  }
+  nlohmann::ordered_json device_clock() const {
+    return deps.devices == nullptr ? nlohmann::ordered_json(nullptr) : clock_json(deps.devices->clock());
+  }
+  nlohmann::ordered_json drone() const {
+    return deps.drone == nullptr ? nlohmann::ordered_json(nullptr) : drone_json(deps.drone->status());
+  }
+  std::string metrics_text() const {
+    return (flights ? flights->metrics() : std::string()) + (deps.metrics_text ? deps.metrics_text() : "");
   }
 
   static std::unique_ptr<ModelSigner> signer_of(const Deps& from) {
@@ -182,15 +247,36 @@ struct Application::State {
   std::unique_ptr<KitProfiles> profiles;
   std::unique_ptr<FlightService> flights;
   CalibrationService calibrations;
-  Services services;
+  Audit audit;
+  AdminApi admin_api;
+  DeviceApi device_api;
+  MissionApi mission_api;
+  MeasurementApi measurement_api;
+  AnchorApi anchor_api;
+  CalibrationApi calibration_api;
+  std::optional<PlanningApi> planning_api;
+  std::optional<FlightApi> flight_api;
   struct Learning {
     explicit Learning(State& s)
         : training({s.deps.learning->datasets, s.deps.learning->runs, s.jobs, s.events, s.deps.clock,
                     s.deps.run_work ? s.deps.run_work : RunWork(work_inline), s.deps.build.version,
                     s.signer.get()}),
-          services{s.services, *s.deps.learning, training, *s.models} {}
+          api{*s.deps.learning,
+              training,
+              *s.models,
+              s.deps.measurements,
+              s.deps.missions,
+              s.deps.exclusions,
+              s.jobs,
+              s.deps.jobs,
+              s.events,
+              [&s](const std::string& code, const std::string& text) {
+                s.missions.note_in_flights(code, text);
+              },
+              s.deps.clock,
+              s.audit} {}
     TrainingService training;
-    LearningServices services;
+    LearningApi api;
   };
   std::unique_ptr<Learning> learning;
   std::mutex mutex;
@@ -198,18 +284,6 @@ struct Application::State {
   bool stopping{false}, started{false};
   Thread heart;
 };
-
-void Services::audit(const Request& request, std::string what, std::string result) const {
-  // Kept even when the store is in trouble is impossible; an answer that could not be audited is a 5xx.
-  value_or_problem(deps.access_store.append_audit(
-      {deps.clock.now(), request.principal.token_id, std::move(what), request.remote, std::move(result)}));
-}
-
-void Services::audit_soon(const Request& request, std::string what, std::string result) const {
-  value_or_problem((prompt != nullptr ? *prompt : deps.access_store)
-                       .append_audit({deps.clock.now(), request.principal.token_id, std::move(what),
-                                      request.remote, std::move(result)}));
-}
 
 /// Rows of topic `devices` for what is set up here.
 std::string Application::State::device_rows() {
@@ -244,7 +318,7 @@ void Application::State::background_round() {
   (void)guarded("scheduled backup", [this] {
     // Daily and after every flight (reliability.md section 2).
     if (deps.backups == nullptr || !deps.backups->due(missions.finished())) return;
-    if (const auto begun = services.begin_backup(); !begun)
+    if (const auto begun = begin_backup(admin_api); !begun)
       events.add("warning", "backup.failed", begun.error().message);
   });
 }
@@ -276,7 +350,7 @@ void Application::State::second() {
 }
 
 void Application::State::tell_system(UtcTime now, ServerPulse& pulse) {
-  const StorageStatus storage = services.storage();
+  const StorageStatus storage = storage_status();
   std::string json = R"({"t_us":)" + std::to_string(now.us()) + R"(,"recording":)" +
                      (missions.recording() ? "true" : "false");
   json += R"(,"queue_depth":)" + std::to_string(storage.queue_depth + missions.queued()) + R"(,"db_bytes":)" +

@@ -6,9 +6,12 @@
 #include <string>
 #include <vector>
 
-#include "api/http/router.hpp"
+#include "api/admin/build_info.hpp"
+#include "api/kit/router.hpp"
+#include "api/kit/storage_status.hpp"
+#include "api/learning/learning_stores.hpp"
 #include "api/learning/worker_port.hpp"
-#include "api/live/ws_handler.hpp"
+#include "api/stream/ws_handler.hpp"
 #include "core/geo/track_segments.hpp"
 #include "core/localize/accuracy_goal.hpp"
 
@@ -16,9 +19,7 @@ namespace anchord {
 class AccessStore;
 class Backups;
 class AnchorStore;
-class CampaignStore;
 class Clock;
-class DatasetStore;
 class DeviceControl;
 class DeviceRows;
 class ExclusionStore;
@@ -26,15 +27,12 @@ class FrameStore;
 class Drone;
 class JobStore;
 class KitStore;
-class LabelStore;
 class MeasurementStore;
 class MissionBin;
 class MissionStore;
 class PlanStore;
-class ModelStore;
 class ServiceStore;
 class SteadyClock;
-class TrainingRunStore;
 }  // namespace anchord
 
 namespace anchord::api {
@@ -42,30 +40,9 @@ namespace anchord::api {
 class AccessService;
 class Hub;
 
-struct BuildInfo {
-  std::string version, git, build, compiler;
-  std::int64_t schema{0};  ///< of the database
-};
-
-/// The ports of learning, together.
-struct LearningStores {
-  CampaignStore& campaigns;
-  LabelStore& labels;
-  DatasetStore& datasets;
-  TrainingRunStore& runs;
-  ModelStore& models;
-};
-
-/// State of storage as the world may know it.
-struct StorageStatus {
-  bool writable{true};
-  std::string reason;  ///< why not, in words
-  std::uint64_t db_bytes{0}, disk_free_bytes{0}, queue_depth{0};
-  std::string synchronous{"full"};
-};
-
-/// Everything above the sockets: routes, services and live topics over the ports. Built by the composition
-/// root with the stores, run by the server. Thread-safe once start() returned.
+/// Everything above the sockets, put together: the one place that sees every feature of the API. Gets the
+/// stores and the ports, makes the services, gives each feature's routes what they work with. Run by the
+/// server. Thread-safe once start() returned.
 class Application {
  public:
   struct Deps {

@@ -27,7 +27,7 @@ def literal(text):
 
 
 def main():
-    out = ["#include \"api/contract.hpp\"\n\nnamespace anchord::api {\nnamespace {\n"]
+    out = ["#include \"api/kit/contract.hpp\"\n\nnamespace anchord::api {\nnamespace {\n"]
     for name, path in (("openapi", sys.argv[1]), ("asyncapi", sys.argv[2])):
         with open(path, encoding="utf-8") as file:
             text = json.dumps(yaml.load(file, Loader), ensure_ascii=False, separators=(",", ":"))

@@ -4,42 +4,85 @@
 # And what only one file may do, for everybody: the table `single` below.
 cmake_minimum_required(VERSION 3.25)
 
-# One row a folder, the deepest first:
-#   own    project headers it may include (regular expression on the quoted path)
+# The libraries, one row a folder, the deepest first; the project's own folders are below (rows):
 #   header other libraries its headers may include; source: those only its .cpp files may, beside the former
 # The standard library is always allowed; a library that no row names is refused, so that adding one is a decision.
 set(folders server/storage server api drivers core/flight core migrations)
 
-set(base_types_ports "core/(base|types|ports)/")
+# One row a subfolder, the lowest first: which project folders its files include, beside its own, and no others. A row
+# names only folders whose rows stand above it, so that no arrow goes back up and there is no circle; and only those that
+# a file of it does include. "api" and "server" are the files that stand in these folders themselves.
+set(rows
+  "core/base:"
+  "core/types: core/base"
+  "core/ports: core/base core/types"
+  "core/geo: core/base core/types"
+  "core/nlos: core/base"
+  "core/ml: core/base core/nlos"
+  "core/planning: core/base core/types core/geo"
+  "core/localize: core/base core/types core/geo core/planning"
+  "core/procedure: core/base core/types core/ports core/geo core/planning core/localize"
+  "core/flight: core/base core/types core/ports core/geo core/planning core/localize core/procedure"
+
+  "drivers/link: core/base"
+  "drivers/time: core/base drivers/link"
+  "drivers/record: core/base drivers/link"
+  "drivers/port: core/base core/types drivers/link"
+  "drivers/gnss: core/base core/types drivers/time drivers/port"
+  "drivers/ntrip: core/base core/types drivers/port"
+  "drivers/pozyx: core/base drivers/time drivers/port"
+  "drivers/mavlink: core/base"
+  "drivers/drone: core/base core/ports drivers/mavlink"
+  "drivers/device: core/base core/types drivers/link drivers/time drivers/record drivers/port drivers/gnss drivers/ntrip drivers/pozyx"
+  "drivers/sim: core/base core/types drivers/pozyx drivers/mavlink drivers/drone"
+
+  "api/kit: core/base core/ports"
+  "api/stream: core/base api/kit"
+  "api/wire: core/base core/types core/geo core/localize core/flight api/kit"
+  "api/formats: core/base core/types core/geo core/nlos core/ml core/planning core/localize api/kit api/wire"
+  "api/admin: core/base core/ports core/flight api/kit api/stream api/wire api/formats"
+  "api/devices: core/base core/types core/ports core/geo api/kit api/wire api/admin"
+  "api/learning: core/base core/types core/ports core/nlos core/ml core/localize api/kit api/wire api/formats api/admin"
+  "api/missions: core/base core/types core/ports core/geo core/localize core/procedure core/flight api/kit api/stream api/wire api/admin api/devices"
+  "api/measurements: core/base core/types core/ports api/kit api/wire api/admin api/learning api/missions"
+  "api/anchors: core/base core/types core/ports core/geo core/localize api/kit api/wire api/formats api/admin api/missions"
+  "api/planning: core/base core/types core/ports core/planning api/kit api/formats"
+  "api/flight: core/base core/types core/ports core/geo core/planning core/localize core/procedure core/flight api/kit api/stream api/admin api/missions api/planning"
+  "api/calibration: core/base core/types core/ports core/geo core/localize core/procedure api/kit api/stream api/wire api/formats api/admin api/learning api/missions api/anchors"
+  "api: core/base core/ports core/geo core/localize api/kit api/stream api/wire api/admin api/devices api/learning api/missions api/measurements api/anchors api/planning api/flight api/calibration"
+
+  "migrations:"
+  "server/storage: core/base core/types core/ports migrations"
+  "server/runtime: core/base core/ports drivers/link drivers/record drivers/device api/learning server/storage"
+  "server/http: core/base api/kit web server/runtime"
+  "server/config: core/base server/http"
+  "server/flight: core/base core/types core/ports core/geo core/planning core/localize core/procedure drivers/link drivers/mavlink drivers/drone drivers/sim"
+  "server/app: core/base drivers/link drivers/drone api/kit api/stream api/admin api/learning api server/storage server/runtime server/http server/config server/flight"
+  "server/cli: core/base core/types core/geo core/planning core/localize drivers/link drivers/gnss drivers/device drivers/sim api/wire api/formats api/admin api/learning api/measurements api/anchors api/calibration server/storage server/runtime server/http server/config server/flight server/app"
+  "server: core/base server/cli")
+set(from_outside web)  # made by the build
 set(everywhere "Eigen/|boost/outcome/")
 
-set(core_own "^core/")
 set(core_header "^(${everywhere})")
 set(core_source "^(ceres/|libsvm/|glog/|pthread\\.h$|opencv2/|GeographicLib/|proj\\.h$|sys/random\\.h$)")
 
 # A live flight is deterministic: no library, and (rules below) no clock, thread or lock.
-set(core/flight_own "^core/")
 set(core/flight_header "^(${everywhere})")
 set(core/flight_source "^$")
 
-set(drivers_own "^(drivers/|${base_types_ports})")
 set(drivers_header "^(${everywhere}|boost/asio)")
 # json: a device of ours speaks it on the wire (gpsd), and only its decoder knows.
 set(drivers_source "^(nlohmann/json\\.hpp$|sys/|arpa/|netinet/|linux/|termios\\.h$|unistd\\.h$|fcntl\\.h$|grp\\.h$|poll\\.h$|pty\\.h$|stdlib\\.h$|time\\.h$)")
 
-set(api_own "^(api/|core/)")
 set(api_header "^(${everywhere}|nlohmann/json_fwd\\.hpp$)")
 set(api_source "^(malloc\\.h$|nlohmann/json\\.hpp$|zlib\\.h$|openssl/)")
 
-set(server/storage_own "^(server/storage/|migrations/|${base_types_ports})")
 set(server/storage_header "^(${everywhere})")
 set(server/storage_source "^(sqlite3\\.h$|SQLiteCpp/|openssl/|sys/|unistd\\.h$|fcntl\\.h$)")
 
-set(server_own "^(server/|api/|drivers/|core/|migrations/|web/assets\\.hpp$)")
 set(server_header "^(${everywhere}|boost/)")
 set(server_source "^(CLI/|linux/(filter|seccomp)\\.h$|spawn\\.h$|httplib\\.h$|spdlog/|fmt/|prometheus/|openssl/|toml\\+\\+/|toml\\.hpp$|nlohmann/json|zlib\\.h$|sys/|netdb\\.h$|netinet/|arpa/|unistd\\.h$|fcntl\\.h$|signal\\.h$|poll\\.h$|pthread\\.h$|termios\\.h$)")
 
-set(migrations_own "^(migrations/|core/base/)")
 set(migrations_header "^$")
 set(migrations_source "^$")
 
@@ -63,6 +106,77 @@ set(catch_line "catch \\(\\.\\.\\.\\)")
 set(catch_files "^core/(base/guard\\.[ch]pp|ml/parallel\\.cpp)$")
 set(catch_why "catching everything is guarded()'s (core/base/guard.hpp): there is no other door")
 
+# folder_of(PATH OUT): the row a path belongs to, its first two names, or the first where it stands in that folder itself.
+function(folder_of path out)
+  if(path MATCHES "^([^/]+/[^/]+)/")
+    set(${out} "${CMAKE_MATCH_1}" PARENT_SCOPE)
+  else()
+    string(REGEX REPLACE "/.*" "" first "${path}")
+    set(${out} "${first}" PARENT_SCOPE)
+  endif()
+endfunction()
+
+# read_rows(ROWS OUT): what is wrong with the table itself; sets may_NAME for each row.
+function(read_rows rows out)
+  set(found "")
+  set(known ${from_outside})
+  foreach(row IN LISTS rows)
+    string(REGEX MATCH "^([^:]+): *(.*)$" matched "${row}")
+    set(name "${CMAKE_MATCH_1}")
+    separate_arguments(may UNIX_COMMAND "${CMAKE_MATCH_2}")
+    foreach(one IN LISTS may)
+      if(NOT one IN_LIST known)
+        list(APPEND found "the row of ${name} names ${one}, which has no row above it")
+      endif()
+    endforeach()
+    list(APPEND known "${name}")
+    set("may_${name}" "${may}" PARENT_SCOPE)
+  endforeach()
+  list(REMOVE_ITEM known ${from_outside})
+  set(row_names "${known}" PARENT_SCOPE)
+  set(${out} "${found}" PARENT_SCOPE)
+endfunction()
+read_rows("${rows}" rows_broken)
+
+# idle_of(ROOT OUT): folders a row names although nothing includes them any more, and parts of api whose library names
+# others than its row.
+function(idle_of root out)
+  set(found "")
+  foreach(name IN LISTS row_names)
+    file(GLOB files ${root}/${name}/*.hpp ${root}/${name}/*.cpp)
+    set(included "")
+    foreach(file IN LISTS files)
+      file(STRINGS "${file}" lines REGEX "^[ \t]*#[ \t]*include[ \t]*\"")
+      foreach(line IN LISTS lines)
+        string(REGEX MATCH "\"([^\"]+)\"" matched "${line}")
+        folder_of("${CMAKE_MATCH_1}" target)
+        list(APPEND included "${target}")
+      endforeach()
+    endforeach()
+    foreach(one IN LISTS may_${name})
+      if(NOT one IN_LIST included)
+        list(APPEND found "the row of ${name} names ${one}, which nothing there includes: take it out")
+      endif()
+    endforeach()
+    if(name MATCHES "^api/(.*)$")
+      file(READ "${root}/${name}/CMakeLists.txt" text)
+      set(uses "")
+      if(text MATCHES "\n *USES ([a-z ]+)\n")
+        separate_arguments(uses UNIX_COMMAND "${CMAKE_MATCH_1}")
+      endif()
+      list(TRANSFORM uses PREPEND "api/")
+      set(row ${may_${name}})
+      list(FILTER row INCLUDE REGEX "^api/")
+      list(SORT uses)
+      list(SORT row)
+      if(NOT uses STREQUAL row)
+        list(APPEND found "${name}/CMakeLists.txt: USES ${uses} is not its row: ${row}")
+      endif()
+    endif()
+  endforeach()
+  set(${out} "${found}" PARENT_SCOPE)
+endfunction()
+
 # violations_of(ROOT OUT): one line per broken rule.
 function(violations_of root out)
   set(found "")
@@ -77,6 +191,10 @@ function(violations_of root out)
           break()
         endif()
       endforeach()
+      folder_of("${file}" part)
+      if(NOT part IN_LIST row_names)
+        list(APPEND found "${file}: ${part} has no row in tests/layering_test.cmake")
+      endif()
       foreach(rule IN LISTS single)
         if(NOT file MATCHES "${${rule}_files}" AND (NOT DEFINED ${rule}_in OR file MATCHES "${${rule}_in}"))
           file(STRINGS "${root}/${file}" lines REGEX "${${rule}_line}")
@@ -89,8 +207,9 @@ function(violations_of root out)
       foreach(line IN LISTS lines)
         if(line MATCHES "include[ \t]*\"([^\"]+)\"")
           set(name "${CMAKE_MATCH_1}")
-          if(NOT name MATCHES "${${folder}_own}")
-            list(APPEND found "${file}: ${folder} may not include \"${name}\"")
+          folder_of("${name}" target)
+          if(NOT target STREQUAL part AND NOT target IN_LIST may_${part})
+            list(APPEND found "${file}: ${part} may not include \"${name}\"")
           endif()
         elseif(line MATCHES "include[ \t]*<([^>]+)>")
           set(name "${CMAKE_MATCH_1}")
@@ -146,56 +265,78 @@ function(expect_text file text verdict)
 endfunction()
 
 if(SELF_TEST)
-  expect(core/a.hpp "\"core/base/ids.hpp\"" clean)
-  expect(core/a.cpp "<ceres/ceres.h>" clean)
-  expect(core/a.hpp "<ceres/ceres.h>" broken)
-  expect(core/a.cpp "\"api/http/message.hpp\"" broken)
-  expect(core/a.cpp "\"../server/app.hpp\"" broken)
-  expect(core/a.cpp "<nlohmann/json.hpp>" broken)
-  expect(core/a.cpp "<boost/asio/io_context.hpp>" broken)
-  expect(core/a.cpp "<some/new/library.hpp>" broken)
-  expect(core/a.hpp "<vector>" clean)
-  expect(core/a.hpp "  <boost/outcome/try.hpp>" clean)
-  expect(drivers/a.cpp "\"core/types/fix.hpp\"" clean)
-  expect(drivers/a.cpp "\"core/localize/solver.hpp\"" broken)
-  expect(drivers/a.cpp "\"api/live/hub.hpp\"" broken)
-  expect(drivers/a.hpp "<boost/asio/awaitable.hpp>" clean)
-  expect(api/a.hpp "<nlohmann/json_fwd.hpp>" clean)
-  expect(api/a.hpp "<nlohmann/json.hpp>" broken)
-  expect(api/a.cpp "<nlohmann/json.hpp>" clean)
-  expect(api/a.cpp "\"drivers/sim/flight.hpp\"" broken)
-  expect(api/a.cpp "\"server/app.hpp\"" broken)
-  expect(api/a.cpp "<sqlite3.h>" broken)
+  expect(core/base/a.hpp "\"core/base/ids.hpp\"" clean)
+  expect(core/base/a.cpp "<ceres/ceres.h>" clean)
+  expect(core/base/a.hpp "<ceres/ceres.h>" broken)
+  expect(core/base/a.cpp "\"api/kit/message.hpp\"" broken)
+  expect(core/base/a.cpp "\"../server/app.hpp\"" broken)
+  expect(core/base/a.cpp "<nlohmann/json.hpp>" broken)
+  expect(core/base/a.cpp "<boost/asio/io_context.hpp>" broken)
+  expect(core/base/a.cpp "<some/new/library.hpp>" broken)
+  expect(core/base/a.hpp "<vector>" clean)
+  expect(core/base/a.hpp "  <boost/outcome/try.hpp>" clean)
+  expect(drivers/port/a.cpp "\"core/types/fix.hpp\"" clean)
+  expect(drivers/port/a.cpp "\"core/localize/solver.hpp\"" broken)
+  expect(drivers/port/a.cpp "\"api/stream/hub.hpp\"" broken)
+  expect(drivers/port/a.hpp "<boost/asio/awaitable.hpp>" clean)
+  expect(api/kit/a.hpp "<nlohmann/json_fwd.hpp>" clean)
+  expect(api/kit/a.hpp "<nlohmann/json.hpp>" broken)
+  expect(api/kit/a.cpp "<nlohmann/json.hpp>" clean)
+  expect(api/kit/a.cpp "\"drivers/sim/flight.hpp\"" broken)
+  expect(api/kit/a.cpp "\"server/app/app.hpp\"" broken)
+  expect(api/kit/a.cpp "<sqlite3.h>" broken)
   expect(server/storage/a.cpp "<sqlite3.h>" clean)
   expect(server/storage/a.cpp "\"core/localize/solver.hpp\"" broken)
-  expect(server/storage/a.cpp "\"api/http/message.hpp\"" broken)
-  expect(server/a.cpp "<sqlite3.h>" broken)
-  expect(server/a.hpp "<CLI/CLI.hpp>" broken)
-  expect(server/a.cpp "\"drivers/sim/flight.hpp\"" clean)
-  expect_text(api/routes/a.cpp "out = json.dump()" broken)
-  expect_text(api/routes/a.cpp "out = json->dump(-1, ' ', false, Json::error_handler_t::replace)" broken)
-  expect_text(drivers/a.cpp "      .dump(1)" broken)
-  expect_text(server/a.hpp "  std::thread thread_" broken)
-  expect_text(api/a.cpp "  std::vector<std::jthread> helpers" broken)
-  expect_text(drivers/a.cpp "auto later = std::async(work)" broken)
-  expect_text(api/a.cpp "Thread(name, work); std::this_thread::yield(); std::thread::hardware_concurrency()" clean)
+  expect(server/storage/a.cpp "\"api/kit/message.hpp\"" broken)
+  expect(server/app/a.cpp "<sqlite3.h>" broken)
+  expect(server/app/a.hpp "<CLI/CLI.hpp>" broken)
+  expect(server/flight/a.cpp "\"drivers/sim/flight.hpp\"" clean)
+  expect_text(api/kit/a.cpp "out = json.dump()" broken)
+  expect_text(api/kit/a.cpp "out = json->dump(-1, ' ', false, Json::error_handler_t::replace)" broken)
+  expect_text(drivers/port/a.cpp "      .dump(1)" broken)
+  expect_text(server/app/a.hpp "  std::thread thread_" broken)
+  expect_text(api/kit/a.cpp "  std::vector<std::jthread> helpers" broken)
+  expect_text(drivers/port/a.cpp "auto later = std::async(work)" broken)
+  expect_text(api/kit/a.cpp "Thread(name, work); std::this_thread::yield(); std::thread::hardware_concurrency()" clean)
   expect_text(core/base/guard.hpp "  std::thread thread_" clean)
-  expect_text(api/a.cpp "} catch (...) {" broken)
-  expect_text(api/a.cpp "} catch (const Json::exception&) {" clean)
+  expect_text(api/kit/a.cpp "} catch (...) {" broken)
+  expect_text(api/kit/a.cpp "} catch (const Json::exception&) {" clean)
   expect_text(core/base/to_wire.hpp "return json.dump(indent)" clean)
-  expect_text(server/a.cpp "out = to_wire(json) + core_dump(1)" clean)
+  expect_text(server/app/a.cpp "out = to_wire(json) + core_dump(1)" clean)
   expect(core/flight/a.cpp "\"core/procedure/machine.hpp\"" clean)
-  expect(core/flight/a.cpp "\"api/live/hub.hpp\"" broken)
+  expect(core/flight/a.cpp "\"api/stream/hub.hpp\"" broken)
   expect(core/flight/a.cpp "<ceres/ceres.h>" broken)
   expect(core/flight/a.cpp "<nlohmann/json.hpp>" broken)
   expect_text(core/flight/a.cpp "const auto now = std::chrono::steady_clock::now();" broken)
   expect_text(core/flight/a.cpp "out.at = deps.clock.now();" broken)
   expect_text(core/flight/a.hpp "  std::mutex mutex_;" broken)
   expect_text(core/flight/a.hpp "  const Now now; clock(now)" clean)
-  expect_text(api/services/a.hpp "  std::mutex mutex_;" clean)
-  expect_text(api/services/a.hpp "  LiveFlight live;" broken)
-  expect_text(api/services/a.hpp "  procedure::FlightControl control;" broken)
-  expect_text(api/services/a.hpp "  flight::LiveMission live;" clean)
+  expect_text(api/missions/a.hpp "  std::mutex mutex_;" clean)
+  expect_text(api/missions/a.hpp "  LiveFlight live;" broken)
+  expect_text(api/missions/a.hpp "  procedure::FlightControl control;" broken)
+  expect_text(api/missions/a.hpp "  flight::LiveMission live;" clean)
+  # Within one layer: down, never back up, never past a folder that has no row.
+  expect(core/localize/a.cpp "\"core/planning/bounds.hpp\"" clean)
+  expect(core/localize/a.cpp "\"core/procedure/machine.hpp\"" broken)
+  expect(drivers/gnss/a.hpp "\"drivers/port/driver.hpp\"" clean)
+  expect(drivers/gnss/a.hpp "\"drivers/device/device_loop.hpp\"" broken)
+  expect(api/flight/a.cpp "\"api/missions/routes.hpp\"" clean)
+  expect(api/missions/a.cpp "\"api/flight/flight_service.hpp\"" broken)
+  expect(api/learning/a.cpp "\"api/measurements/ingest.hpp\"" broken)
+  expect(api/kit/a.cpp "\"api/admin/event_log.hpp\"" broken)
+  expect(api/flight/a.hpp "\"api/application.hpp\"" broken)
+  expect(api/application.cpp "\"api/flight/routes.hpp\"" clean)
+  expect(server/storage/a.cpp "\"server/app/app.hpp\"" broken)
+  expect(server/http/a.cpp "\"server/app/app.hpp\"" broken)
+  expect(api/helpers/a.cpp "\"core/base/ids.hpp\"" broken)
+  if(rows_broken)
+    message(SEND_ERROR "refused wrongly: ${rows_broken}")
+  endif()
+  read_rows("core/a: core/b;core/b: core/a" circle)
+  if(NOT circle)
+    message(SEND_ERROR "a circle in the table passes")
+  endif()
+  read_rows("${rows}" rows_broken)
   file(REMOVE_RECURSE "${SELF_TEST}")
   file(MAKE_DIRECTORY "${SELF_TEST}")
   violations_of("${SELF_TEST}" broken)
@@ -204,6 +345,8 @@ if(SELF_TEST)
   endif()
 else()
   violations_of("${ROOT}" broken)
+  idle_of("${ROOT}" idle)
+  list(APPEND broken ${rows_broken} ${idle})
   foreach(violation IN LISTS broken)
     message(SEND_ERROR "${violation}")
   endforeach()

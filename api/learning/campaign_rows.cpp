@@ -5,10 +5,10 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "api/http/problem.hpp"
-#include "api/imports/campaign.hpp"
-#include "api/json/reader.hpp"
-#include "api/routes/support.hpp"
+#include "api/formats/campaign.hpp"
+#include "api/kit/problem.hpp"
+#include "api/kit/reader.hpp"
+#include "api/kit/support.hpp"
 #include "core/base/sha256.hpp"
 #include "core/base/to_wire.hpp"
 

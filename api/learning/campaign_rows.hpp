@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "api/http/message.hpp"
+#include "api/kit/message.hpp"
 #include "core/ports/learning_store.hpp"
 
 namespace anchord::api {

@@ -4,7 +4,7 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
-#include "api/json/reader.hpp"
+#include "api/kit/reader.hpp"
 #include "api/learning/range_features.hpp"
 
 namespace anchord::api {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "api/http/problem.hpp"
+#include "api/kit/problem.hpp"
 #include "api/learning/model_registry.hpp"
 #include "core/localize/correction_worth.hpp"
 #include "core/types/flight_data.hpp"

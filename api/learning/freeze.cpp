@@ -4,8 +4,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "api/json/reader.hpp"
-#include "api/json/word_table.hpp"
+#include "api/kit/reader.hpp"
+#include "api/kit/word_table.hpp"
 #include "api/learning/range_features.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/exclusion_store.hpp"

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "api/http/problem.hpp"
+#include "api/kit/problem.hpp"
 #include "api/learning/freeze_rows.hpp"
 #include "core/ports/learning_store.hpp"
 #include "core/ports/store.hpp"

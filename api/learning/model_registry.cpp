@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-#include "api/json/model_artifact.hpp"
+#include "api/learning/model_artifact.hpp"
 #include "api/learning/range_features.hpp"
 
 namespace anchord::api {

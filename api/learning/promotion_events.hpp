@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "api/services/event_log.hpp"
+#include "api/admin/event_log.hpp"
 #include "core/ports/learning_store.hpp"
 #include "core/ports/store.hpp"
 

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <string>
 
-#include "api/exports/rule_report.hpp"
 #include "api/learning/dataset_table.hpp"
+#include "api/learning/rule_report.hpp"
 
 namespace anchord::api {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "api/json/reader.hpp"
-#include "api/json/word_table.hpp"
+#include "api/kit/reader.hpp"
+#include "api/kit/word_table.hpp"
 #include "core/base/text.hpp"
 
 namespace anchord::api {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "api/http/problem.hpp"
+#include "api/kit/problem.hpp"
 #include "api/learning/dataset_table.hpp"
 #include "core/ml/training.hpp"
 

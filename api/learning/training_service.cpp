@@ -2,10 +2,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "api/json/model_artifact.hpp"
+#include "api/admin/event_log.hpp"
+#include "api/admin/job_service.hpp"
+#include "api/learning/model_artifact.hpp"
 #include "api/learning/model_signer.hpp"
-#include "api/services/event_log.hpp"
-#include "api/services/job_service.hpp"
 #include "core/base/sha256.hpp"
 #include "core/base/to_wire.hpp"
 

@@ -1,8 +1,8 @@
 #include <nlohmann/json.hpp>
 
-#include "api/exports/training_parts.hpp"
-#include "api/json/model_artifact.hpp"
-#include "api/json/reader.hpp"
+#include "api/kit/reader.hpp"
+#include "api/learning/model_artifact.hpp"
+#include "api/learning/training_parts.hpp"
 #include "api/learning/training_request.hpp"
 #include "api/learning/worker_port.hpp"
 #include "core/base/to_wire.hpp"

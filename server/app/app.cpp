@@ -9,7 +9,7 @@
 #include <fstream>
 
 #include "api/application.hpp"
-#include "api/live/hub.hpp"
+#include "api/stream/hub.hpp"
 #include "drivers/drone/signing_key.hpp"
 #include "drivers/link/address.hpp"
 #include "server/app/front_door.hpp"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-#include "api/http/problem.hpp"
+#include "api/kit/problem.hpp"
 #include "server/app/live_peer.hpp"
 #include "server/http/base64.hpp"
 #include "server/http/request_judge.hpp"

@@ -6,9 +6,9 @@
 #include <string>
 #include <string_view>
 
-#include "api/http/router.hpp"
-#include "api/live/ws_handler.hpp"
-#include "api/services/access.hpp"
+#include "api/admin/access.hpp"
+#include "api/kit/router.hpp"
+#include "api/stream/ws_handler.hpp"
 #include "server/app/metrics.hpp"
 #include "server/app/proxies.hpp"
 #include "server/app/rate_limit.hpp"

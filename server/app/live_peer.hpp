@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "api/live/ws_handler.hpp"
+#include "api/stream/ws_handler.hpp"
 #include "server/http/gateway.hpp"
 
 namespace anchord::server {

@@ -9,7 +9,7 @@
 #include <utility>
 #include <variant>
 
-#include "api/http/message.hpp"
+#include "api/kit/message.hpp"
 
 namespace anchord::server {
 

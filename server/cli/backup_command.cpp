@@ -1,7 +1,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
-#include "api/json/flight_requests.hpp"
+#include "api/measurements/flight_requests.hpp"
 #include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/server_address.hpp"

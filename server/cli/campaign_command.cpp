@@ -3,7 +3,7 @@
 #include <fstream>
 #include <memory>
 
-#include "api/imports/campaign.hpp"
+#include "api/formats/campaign.hpp"
 #include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "api/learning/freeze_rows.hpp"
+#include "api/learning/labelled_dataset.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"
 

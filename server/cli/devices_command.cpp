@@ -4,7 +4,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "api/json/flight_requests.hpp"
+#include "api/measurements/flight_requests.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "server/cli/commands.hpp"

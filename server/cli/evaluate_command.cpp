@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "api/learning/labelled_dataset.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"
 

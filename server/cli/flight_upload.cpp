@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "api/json/flight_requests.hpp"
+#include "api/measurements/flight_requests.hpp"
 
 namespace anchord::cli {
 namespace {

@@ -6,8 +6,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "api/imports/csv_table.hpp"
-#include "api/json/frame_json.hpp"
+#include "api/anchors/frame_json.hpp"
+#include "api/formats/csv_table.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/geo/enu.hpp"

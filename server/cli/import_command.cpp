@@ -3,9 +3,9 @@
 #include <memory>
 #include <string>
 
-#include "api/imports/flight_folder.hpp"
-#include "api/json/exclusion_json.hpp"
-#include "api/json/flight_requests.hpp"
+#include "api/formats/flight_folder.hpp"
+#include "api/measurements/flight_requests.hpp"
+#include "api/wire/exclusion_json.hpp"
 #include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/flight_upload.hpp"

@@ -6,8 +6,8 @@
 #include <fstream>
 #include <iterator>
 
-#include "api/imports/gzip_lines.hpp"
-#include "api/json/model_artifact.hpp"
+#include "api/formats/gzip_lines.hpp"
+#include "api/learning/model_artifact.hpp"
 #include "core/base/text.hpp"
 
 namespace anchord::cli {

@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "api/exports/learning_report.hpp"
-#include "api/imports/labelled_table.hpp"
+#include "api/formats/labelled_table.hpp"
 #include "api/learning/dataset_table.hpp"
+#include "api/learning/learning_report.hpp"
 
 namespace CLI {
 class App;

@@ -6,8 +6,8 @@
 #include <iterator>
 #include <memory>
 
-#include "api/exports/model_report.hpp"
-#include "api/json/model_artifact.hpp"
+#include "api/learning/model_artifact.hpp"
+#include "api/learning/model_report.hpp"
 #include "api/learning/model_signer.hpp"
 #include "core/base/text.hpp"
 #include "server/cli/commands.hpp"

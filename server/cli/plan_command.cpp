@@ -5,12 +5,12 @@
 #include <iterator>
 #include <memory>
 
-#include "api/exports/flight_plan_output.hpp"
-#include "api/exports/plan_export.hpp"
-#include "api/exports/plan_output.hpp"
-#include "api/imports/kml_plan.hpp"
-#include "api/imports/outline_geojson.hpp"
-#include "api/imports/plan_input.hpp"
+#include "api/formats/flight_plan_output.hpp"
+#include "api/formats/kml_plan.hpp"
+#include "api/formats/outline_geojson.hpp"
+#include "api/formats/plan_export.hpp"
+#include "api/formats/plan_input.hpp"
+#include "api/formats/plan_output.hpp"
 #include "core/base/text.hpp"
 #include "core/planning/local_plan.hpp"
 #include "server/cli/commands.hpp"

@@ -8,8 +8,8 @@
 #include <string>
 #include <thread>
 
-#include "api/imports/flight_folder.hpp"
-#include "api/json/flight_requests.hpp"
+#include "api/formats/flight_folder.hpp"
+#include "api/measurements/flight_requests.hpp"
 #include "core/base/text.hpp"
 #include "drivers/device/replay.hpp"
 #include "server/cli/commands.hpp"

@@ -11,8 +11,8 @@
 #include <thread>
 #include <utility>
 
-#include "api/json/flight_requests.hpp"
-#include "api/json/wire_rows.hpp"
+#include "api/measurements/flight_requests.hpp"
+#include "api/wire/rows_json.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/types/mission.hpp"

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <thread>
 
-#include "api/json/flight_requests.hpp"
+#include "api/measurements/flight_requests.hpp"
 #include "server/http/http_client.hpp"
 
 namespace anchord::cli {

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "api/json/flight_requests.hpp"
+#include "api/measurements/flight_requests.hpp"
 #include "server/cli/rest_client.hpp"
 
 namespace anchord::cli {

@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <memory>
 
-#include "api/exports/rule_report.hpp"
-#include "api/imports/rule_samples.hpp"
+#include "api/formats/rule_samples.hpp"
+#include "api/learning/rule_report.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"
 

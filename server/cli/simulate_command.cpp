@@ -4,7 +4,7 @@
 #include <fstream>
 #include <memory>
 
-#include "api/imports/flight_folder.hpp"
+#include "api/formats/flight_folder.hpp"
 #include "core/base/text.hpp"
 #include "drivers/sim/flight.hpp"
 #include "server/cli/commands.hpp"

@@ -12,7 +12,7 @@
 #include <mutex>
 #include <thread>
 
-#include "api/json/flight_requests.hpp"
+#include "api/measurements/flight_requests.hpp"
 #include "core/base/guard.hpp"
 #include "core/base/text.hpp"
 #include "drivers/link/byte_link.hpp"

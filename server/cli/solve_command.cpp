@@ -5,10 +5,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "api/exports/solve_output.hpp"
-#include "api/imports/flight_folder.hpp"
-#include "api/json/clues_json.hpp"
-#include "api/json/kit_profile_json.hpp"
+#include "api/calibration/clues_json.hpp"
+#include "api/calibration/kit_profile_json.hpp"
+#include "api/calibration/solve_output.hpp"
+#include "api/formats/flight_folder.hpp"
 #include "api/learning/flight_models.hpp"
 #include "core/base/text.hpp"
 #include "core/localize/flight_solver.hpp"

@@ -7,10 +7,10 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "api/exports/report.hpp"
-#include "api/imports/csv_table.hpp"
-#include "api/json/budget_json.hpp"
-#include "api/services/calibration_report.hpp"
+#include "api/calibration/calibration_report.hpp"
+#include "api/formats/csv_table.hpp"
+#include "api/formats/report.hpp"
+#include "api/wire/budget_json.hpp"
 #include "core/geo/enu.hpp"
 
 namespace anchord::cli {

@@ -16,7 +16,7 @@ struct SolveReportOptions {
   int iterations{8};            ///< 0: no curves
 };
 
-/// Writes the page of one solved flight (api/exports/report). errors name the file.
+/// Writes the page of one solved flight (api/formats/report). errors name the file.
 Result<void> write_solve_report(const FlightData& flight, const FlightSolution& solution,
                                 const std::map<NetworkId, MethodAnswers>& methods,
                                 const FlightOptions& options, const SolveReportOptions& report);

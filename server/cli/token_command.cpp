@@ -1,8 +1,8 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
-#include "api/json/flight_requests.hpp"
-#include "api/services/access.hpp"
+#include "api/admin/access.hpp"
+#include "api/measurements/flight_requests.hpp"
 #include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/server_address.hpp"

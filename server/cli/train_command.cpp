@@ -7,7 +7,8 @@
 #include <memory>
 #include <set>
 
-#include "api/json/model_artifact.hpp"
+#include "api/learning/labelled_dataset.hpp"
+#include "api/learning/model_artifact.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "api/http/message.hpp"
+#include "api/kit/message.hpp"
 
 namespace anchord::server {
 

@@ -7,7 +7,7 @@
 #include <mutex>
 #include <string>
 
-#include "api/http/work.hpp"
+#include "api/kit/work.hpp"
 
 namespace anchord::server {
 

@@ -9,8 +9,8 @@
 #include <string_view>
 #include <utility>
 
-#include "api/http/message.hpp"
-#include "api/http/work.hpp"
+#include "api/kit/message.hpp"
+#include "api/kit/work.hpp"
 
 namespace anchord::server {
 

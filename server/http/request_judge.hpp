@@ -7,7 +7,7 @@
 #include <variant>
 #include <vector>
 
-#include "api/http/message.hpp"
+#include "api/kit/message.hpp"
 #include "server/http/limits.hpp"
 
 namespace anchord::server {

@@ -1,6 +1,6 @@
 // Alarms of dashboard.md section 6: when they are raised, acknowledged and over.
-#include "api/services/alarm_board.hpp"
-#include "api/services/event_log.hpp"
+#include "api/admin/alarm_board.hpp"
+#include "api/admin/event_log.hpp"
 #include "app_fixture.hpp"
 #include "core/flight/pulse.hpp"
 #include "core/ports/devices.hpp"

@@ -10,8 +10,8 @@
 #include <string>
 
 #include "api/application.hpp"
-#include "api/http/router.hpp"
-#include "api/live/hub.hpp"
+#include "api/kit/router.hpp"
+#include "api/stream/hub.hpp"
 #include "server/storage/sqlite_database.hpp"
 
 namespace anchord::test {

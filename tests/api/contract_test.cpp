@@ -4,8 +4,8 @@
 #include <fstream>
 #include <set>
 
-#include "api/contract.hpp"
-#include "api/services/access.hpp"
+#include "api/admin/access.hpp"
+#include "api/kit/contract.hpp"
 #include "app_fixture.hpp"
 #include "core/ports/backups.hpp"
 #include "tests/paths.hpp"

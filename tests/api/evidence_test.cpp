@@ -1,6 +1,6 @@
 // What a position rests on: the kit's profile, gates and who overrode them, differences, frames, the report.
-#include "api/exports/report.hpp"
-#include "api/exports/report_svg.hpp"
+#include "api/formats/report.hpp"
+#include "api/formats/report_svg.hpp"
 #include "app_fixture.hpp"
 #include "core/types/anchor.hpp"
 #include "drivers/sim/flight.hpp"

@@ -3,8 +3,8 @@
 #include <barrier>
 #include <thread>
 
-#include "api/imports/flight_folder.hpp"
-#include "api/json/exclusion_json.hpp"
+#include "api/formats/flight_folder.hpp"
+#include "api/wire/exclusion_json.hpp"
 #include "app_fixture.hpp"
 #include "core/ports/exclusion_store.hpp"
 #include "tests/core/localize/flight_support.hpp"

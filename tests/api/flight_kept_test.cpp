@@ -7,9 +7,9 @@
 #include <functional>
 #include <thread>
 
-#include "api/contract.hpp"
-#include "api/services/access.hpp"
-#include "api/services/clock_watch.hpp"
+#include "api/admin/access.hpp"
+#include "api/admin/clock_watch.hpp"
+#include "api/kit/contract.hpp"
 #include "kept_fixture.hpp"
 
 namespace anchord::test {

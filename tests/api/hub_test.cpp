@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "api/live/conversation.hpp"
+#include "api/stream/conversation.hpp"
 
 namespace anchord::test {
 namespace {

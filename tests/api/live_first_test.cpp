@@ -4,7 +4,7 @@
 
 #include <csignal>
 
-#include "api/live/hub.hpp"
+#include "api/stream/hub.hpp"
 #include "app_fixture.hpp"
 #include "core/ports/devices.hpp"
 

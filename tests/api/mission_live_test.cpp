@@ -5,8 +5,8 @@
 #include <future>
 #include <mutex>
 
-#include "api/live/conversation.hpp"
-#include "api/services/joint_worker.hpp"
+#include "api/missions/joint_worker.hpp"
+#include "api/stream/conversation.hpp"
 #include "core/geo/enu.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "mission_fixture.hpp"

@@ -6,7 +6,7 @@
 #include <thread>
 #include <vector>
 
-#include "api/json/kit_profile_json.hpp"
+#include "api/calibration/kit_profile_json.hpp"
 #include "app_fixture.hpp"
 #include "core/ports/site_store.hpp"
 #include "core/types/anchor.hpp"

@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "api/services/calibration_service.hpp"
+#include "api/calibration/calibration_service.hpp"
 
 namespace anchord::api {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "api/imports/flight_folder.hpp"
+#include "api/formats/flight_folder.hpp"
 #include "tests/fuzz/check.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "api/json/reader.hpp"
-#include "api/json/wire_rows.hpp"
+#include "api/kit/reader.hpp"
+#include "api/wire/rows_json.hpp"
 #include "core/base/to_wire.hpp"
 #include "tests/fuzz/check.hpp"
 

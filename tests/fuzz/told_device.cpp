@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-#include "api/json/wire_devices.hpp"
+#include "api/devices/device_json.hpp"
 #include "core/ports/devices.hpp"
 #include "drivers/device/pipeline.hpp"
 #include "drivers/device/settings.hpp"

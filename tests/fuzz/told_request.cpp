@@ -3,9 +3,9 @@
 #include <string>
 #include <string_view>
 
-#include "api/http/problem.hpp"
-#include "api/http/router.hpp"
-#include "api/json/reader.hpp"
+#include "api/kit/problem.hpp"
+#include "api/kit/reader.hpp"
+#include "api/kit/router.hpp"
 #include "server/http/request_judge.hpp"
 #include "server/http/request_parser.hpp"
 #include "tests/fuzz/told.hpp"

@@ -17,8 +17,8 @@
 #include <sstream>
 #include <thread>
 
-#include "api/imports/flight_folder.hpp"
-#include "api/json/wire_rows.hpp"
+#include "api/formats/flight_folder.hpp"
+#include "api/wire/rows_json.hpp"
 #include "core/geo/enu.hpp"
 #include "server/http/http_client.hpp"
 #include "tests/paths.hpp"

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "api/http/problem.hpp"
+#include "api/kit/problem.hpp"
 #include "server/http/http_server.hpp"
 #include "server/runtime/worker_pool.hpp"
 #include "tests/server/http/echo_peer.hpp"

@@ -1,4 +1,4 @@
-#include "api/imports/flight_folder.hpp"
+#include "api/formats/flight_folder.hpp"
 
 #include <gtest/gtest.h>
 #include <zlib.h>
@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "api/json/kit_profile_json.hpp"
+#include "api/calibration/kit_profile_json.hpp"
 
 namespace anchord {
 namespace {

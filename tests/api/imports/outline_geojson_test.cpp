@@ -1,4 +1,4 @@
-#include "api/imports/outline_geojson.hpp"
+#include "api/formats/outline_geojson.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "api/exports/flight_plan_output.hpp"
+#include "api/formats/flight_plan_output.hpp"
 #include "tests/paths.hpp"
 
 namespace anchord::api {

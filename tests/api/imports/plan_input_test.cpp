@@ -1,4 +1,4 @@
-#include "api/imports/plan_input.hpp"
+#include "api/formats/plan_input.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "api/exports/plan_output.hpp"
+#include "api/formats/plan_output.hpp"
 #include "tests/paths.hpp"
 
 namespace anchord::api {

@@ -1,4 +1,4 @@
-#include "api/imports/campaign.hpp"
+#include "api/formats/campaign.hpp"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "api/imports/labelled_table.hpp"
+#include "api/formats/labelled_table.hpp"
 #include "api/learning/freeze_rows.hpp"
 
 namespace anchord::api {

@@ -1,4 +1,5 @@
-#include "api/imports/labelled_table.hpp"
+#include "api/formats/labelled_table.hpp"
+#include "api/learning/labelled_dataset.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -7,7 +8,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "api/imports/gzip_lines.hpp"
+#include "api/formats/gzip_lines.hpp"
 #include "api/learning/dataset_table.hpp"
 
 namespace anchord::api {

@@ -1,4 +1,4 @@
-#include "api/json/model_artifact.hpp"
+#include "api/learning/model_artifact.hpp"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,8 @@
 #include <filesystem>
 #include <sstream>
 
-#include "api/imports/labelled_table.hpp"
+#include "api/formats/labelled_table.hpp"
+#include "api/learning/labelled_dataset.hpp"
 #include "core/ml/learn.hpp"
 #include "tests/paths.hpp"
 

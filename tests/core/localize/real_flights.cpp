@@ -5,9 +5,9 @@
 #include <cmath>
 #include <map>
 
-#include "api/imports/csv_table.hpp"
-#include "api/imports/flight_folder.hpp"
-#include "api/imports/flight_json.hpp"
+#include "api/formats/csv_table.hpp"
+#include "api/formats/flight_folder.hpp"
+#include "api/formats/flight_json.hpp"
 #include "core/geo/enu.hpp"
 #include "tests/paths.hpp"
 

@@ -11,9 +11,9 @@
 #include <cstdio>
 #include <map>
 
-#include "api/exports/solve_output.hpp"
-#include "api/imports/csv_table.hpp"
-#include "api/imports/flight_json.hpp"
+#include "api/calibration/solve_output.hpp"
+#include "api/formats/csv_table.hpp"
+#include "api/formats/flight_json.hpp"
 #include "tests/paths.hpp"
 
 namespace anchord {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <thread>
 
-#include "api/http/router.hpp"
+#include "api/kit/router.hpp"
 #include "tests/server/app/app_fixture.hpp"
 #include "tests/server/http/ws_client.hpp"
 

@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "api/json/wire_rows.hpp"
+#include "api/wire/rows_json.hpp"
 #include "core/base/time.hpp"
 #include "drivers/device/replay.hpp"
 #include "drivers/sim/rig.hpp"

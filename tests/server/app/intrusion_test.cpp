@@ -6,7 +6,7 @@
 #include <deque>
 #include <thread>
 
-#include "api/http/router.hpp"
+#include "api/kit/router.hpp"
 #include "server/app/proxies.hpp"
 #include "tests/server/app/app_fixture.hpp"
 #include "tests/server/http/ws_client.hpp"

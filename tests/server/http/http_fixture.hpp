@@ -6,7 +6,7 @@
 #include <numeric>
 #include <string>
 
-#include "api/http/problem.hpp"
+#include "api/kit/problem.hpp"
 #include "server/http/gateway.hpp"
 #include "server/http/http_server.hpp"
 #include "server/runtime/worker_pool.hpp"

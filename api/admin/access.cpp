@@ -1,0 +1,393 @@
+#include "api/admin/access.hpp"
+
+#include <algorithm>
+#include <array>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <shared_mutex>
+#include <utility>
+
+#include "api/admin/secrets.hpp"
+#include "api/kit/idempotency.hpp"
+#include "core/base/text.hpp"
+
+namespace anchord::api {
+namespace {
+
+constexpr std::array<std::pair<std::string_view, Role>, 6> k_roles{{{"viewer", Role::viewer},
+                                                                    {"integrator", Role::integrator},
+                                                                    {"gateway", Role::gateway},
+                                                                    {"engineer", Role::engineer},
+                                                                    {"operator", Role::op},
+                                                                    {"admin", Role::admin}}};
+
+constexpr std::string_view k_prefix = "anc_";
+constexpr std::size_t k_id_digits = 32;
+
+std::string without_dashes(const Uuid& id) {
+  std::string text = to_string(id);
+  std::erase(text, '-');
+  return text;
+}
+
+/// "anc_<32 hex>_<64 hex>" -> id text of 32 and secret; false for anything else.
+bool split_token(std::string_view text, std::string& id, std::string_view& secret) {
+  if (!text.starts_with(k_prefix) || text.size() != k_prefix.size() + k_id_digits + 1 + k_secret_digits)
+    return false;
+  id = text.substr(k_prefix.size(), k_id_digits);
+  if (text[k_prefix.size() + k_id_digits] != '_') return false;
+  secret = text.substr(k_prefix.size() + k_id_digits + 1);
+  return true;
+}
+
+Principal principal_of(const Token& token) {
+  Principal who{to_string(token.id), token.name, {}};
+  for (const auto& word : token.roles) {
+    if (const auto role = parse_role(word)) who.roles.push_back(*role);
+  }
+  return who;
+}
+
+struct Session {
+  std::string token_id;  ///< key of the token cache
+  SteadyTime until{};
+  std::uint64_t order{};
+};
+
+struct Ticket {
+  Login login;
+  SteadyTime until{};
+};
+
+SteadyTime in(SteadyTime now, std::chrono::seconds time) {
+  return later(now, std::chrono::nanoseconds(time).count());
+}
+
+}  // namespace
+
+struct AccessService::State {
+  State(TokenStore& s, AccessStore& l, const Clock& c, AccessOptions o)
+      : store(s), log(l), clock(c), options(o) {}
+  TokenStore& store;
+  AccessStore& log;
+  const Clock& clock;
+  AccessOptions options;
+
+  mutable std::shared_mutex mutex;
+  std::map<std::string, Token, std::less<>> tokens;  ///< by the id's 32 digits
+  /// When those that expire end, by the steady clock. Read off the system clock once, when a token is first
+  /// seen: a step of it during a flight locks nobody out and brings nobody back.
+  std::map<std::string, SteadyTime, std::less<>> ends;
+  std::map<std::string, Session, std::less<>>
+      sessions;  ///< by SHA-256 of the cookie: a memory dump gives no login
+  std::map<std::string, Ticket, std::less<>> tickets;  ///< by SHA-256 of the ticket
+  std::uint64_t next_order{0};
+
+  LoginGuard guard;
+  mutable std::mutex notes_mutex;  ///< apart: verify() is shared, and notes what it saw
+  struct Refusal {
+    UtcTime first{};
+    std::string who, what, from;
+    std::uint64_t count{};
+  };
+  std::map<std::string, Refusal> refusals;
+  std::uint64_t unnamed_refusals{0};
+  mutable std::map<std::string, UtcTime> used;  ///< by the id's 32 digits, since the last flush of them
+  SteadyTime used_flushed{};
+
+  SteadyTime steady_now() const {
+    return (options.steady != nullptr ? *options.steady : system_steady_clock()).now();
+  }
+  void note_end(const std::string& key, const Token& token) {
+    if (token.expires) ends.try_emplace(key, later(steady_now(), token.expires->ns - clock.now().ns));
+  }
+  bool live(const std::string& key, const Token& token) const {
+    if (token.revoked) return false;
+    const auto end = ends.find(key);
+    return end == ends.end() || steady_now() < end->second;
+  }
+
+  void note_use(const std::string& key) const {
+    const std::scoped_lock lock(notes_mutex);
+    used[key] = clock.now();
+  }
+
+  /// The mutex is held.
+  bool holds(const Login& login) const {
+    if (!login.session_sha256.empty()) {
+      const auto session = sessions.find(login.session_sha256);
+      if (session == sessions.end() || session->second.until <= steady_now()) return false;
+    }
+    std::string key = login.who.token_id;
+    std::erase(key, '-');
+    const auto token = tokens.find(key);
+    return token != tokens.end() && live(token->first, token->second) &&
+           principal_of(token->second).roles == login.who.roles;
+  }
+
+  /// Null unless the secret is right and the token lives. The mutex is held.
+  const Token* find(std::string_view text) const {
+    std::string id;
+    std::string_view secret;
+    if (!split_token(text, id, secret)) return nullptr;
+    const auto at = tokens.find(id);
+    // The comparison is done in any case, so that time does not tell which ids exist.
+    const std::string expected = at == tokens.end() ? std::string(64, '0') : at->second.secret_sha256_hex;
+    const bool same = equal_in_constant_time(sha256_hex(secret), expected);
+    return at != tokens.end() && same && live(at->first, at->second) ? &at->second : nullptr;
+  }
+};
+
+AccessService::AccessService(TokenStore& tokens, AccessStore& audit, const Clock& clock,
+                             AccessOptions options)
+    : state_(std::make_unique<State>(tokens, audit, clock, options)) {}
+AccessService::~AccessService() { flush(); }
+
+const AccessOptions& AccessService::options() const { return state_->options; }
+
+Result<void> AccessService::load() {
+  BOOST_OUTCOME_TRY(auto all, state_->store.tokens());
+  const std::unique_lock lock(state_->mutex);
+  state_->tokens.clear();
+  for (auto& token : all) {
+    const std::string key = without_dashes(token.id.uuid);
+    state_->note_end(key, token);
+    state_->tokens.emplace(key, std::move(token));
+  }
+  return boost::outcome_v2::success();
+}
+
+bool AccessService::has_tokens() const {
+  const std::shared_lock lock(state_->mutex);
+  return std::ranges::any_of(state_->tokens,
+                             [&](const auto& entry) { return state_->live(entry.first, entry.second); });
+}
+
+Result<NewToken> AccessService::create_token(std::string_view name, const std::vector<std::string>& roles,
+                                             std::optional<UtcTime> expires, const Principal& by,
+                                             std::string_view from) {
+  if (name.empty() || name.size() > 100)
+    return make_error(Errc::invalid_argument, "a name has 1 to 100 characters");
+  if (roles.empty()) return make_error(Errc::invalid_argument, "a token needs at least one role");
+  for (const auto& word : roles) {
+    if (!parse_role(word)) {
+      return make_error(
+          Errc::invalid_argument,
+          "'" + to_utf8(word, 40) + "' is no role; viewer, integrator, gateway, engineer, operator, admin");
+    }
+  }
+  const UtcTime now = state_->clock.now();
+  if (expires && *expires <= now) return make_error(Errc::invalid_argument, "the expiry lies in the past");
+  const std::string secret = random_hex_256();
+  NewToken made;
+  made.token.id = TokenId{make_uuid_v7(now)};
+  made.token.name = std::string(name);
+  made.token.secret_sha256_hex = sha256_hex(secret);
+  made.token.roles = roles;
+  made.token.created = now;
+  made.token.expires = expires;
+  const std::string key = without_dashes(made.token.id.uuid);
+  made.text = std::string(k_prefix) + key + "_" + secret;
+  BOOST_OUTCOME_TRYV(state_->store.insert(made.token));
+  {
+    const std::unique_lock lock(state_->mutex);
+    state_->note_end(key, made.token);
+    state_->tokens.emplace(key, made.token);
+  }
+  audit(by.token_id, "token create " + to_string(made.token.id), from, "done");
+  return made;
+}
+
+Result<void> AccessService::revoke_token(const TokenId& id, const Principal& by, std::string_view from) {
+  const UtcTime now = state_->clock.now();
+  BOOST_OUTCOME_TRYV(state_->store.revoke(id, now));
+  {
+    const std::unique_lock lock(state_->mutex);
+    const auto at = state_->tokens.find(without_dashes(id.uuid));
+    if (at != state_->tokens.end() && !at->second.revoked) at->second.revoked = now;
+  }
+  audit(by.token_id, "token revoke " + to_string(id), from, "done");
+  return boost::outcome_v2::success();
+}
+
+std::vector<Token> AccessService::tokens() const {
+  const std::shared_lock lock(state_->mutex);
+  std::vector<Token> all;
+  const std::scoped_lock notes(state_->notes_mutex);
+  for (const auto& [key, token] : state_->tokens) {
+    all.push_back(token);
+    if (const auto at = state_->used.find(key); at != state_->used.end()) all.back().last_used = at->second;
+  }
+  return all;
+}
+
+std::optional<Principal> AccessService::verify(std::string_view token_text) const {
+  const std::shared_lock lock(state_->mutex);
+  const Token* token = state_->find(token_text);
+  if (token == nullptr) return std::nullopt;
+  state_->note_use(without_dashes(token->id.uuid));
+  return principal_of(*token);
+}
+
+Result<std::string> AccessService::open_session(std::string_view token_text, std::string_view from) {
+  const std::string cookie = random_hex_256();
+  std::string who;
+  {
+    const std::unique_lock lock(state_->mutex);
+    if (const Token* token = state_->find(token_text)) {
+      who = to_string(token->id);
+      const SteadyTime now = state_->steady_now();
+      std::erase_if(state_->sessions, [&](const auto& entry) { return entry.second.until <= now; });
+      if (state_->sessions.size() >= state_->options.max_sessions) {
+        state_->sessions.erase(std::ranges::min_element(
+            state_->sessions, {}, [](const auto& entry) { return entry.second.order; }));
+      }
+      state_->sessions[sha256_hex(cookie)] = {
+          without_dashes(token->id.uuid), in(now, state_->options.session_lifetime), state_->next_order++};
+    }
+  }
+  audit(who.empty() ? "nobody" : who, "login", from, who.empty() ? "refused" : "done");
+  if (who.empty()) return make_error(Errc::invalid_argument, "this token is not known, expired or revoked");
+  return cookie;
+}
+
+void AccessService::close_session(std::string_view cookie, std::string_view from) {
+  std::string who;
+  {
+    const std::unique_lock lock(state_->mutex);
+    const auto at = state_->sessions.find(sha256_hex(cookie));
+    if (at == state_->sessions.end()) return;
+    who = at->second.token_id;
+    state_->sessions.erase(at);
+  }
+  audit(who, "logout", from, "done");
+}
+
+std::optional<Principal> AccessService::session(std::string_view cookie) const {
+  if (cookie.size() != k_secret_digits) return std::nullopt;
+  const std::shared_lock lock(state_->mutex);
+  const auto at = state_->sessions.find(sha256_hex(cookie));
+  if (at == state_->sessions.end() || at->second.until <= state_->steady_now()) return std::nullopt;
+  const auto token = state_->tokens.find(at->second.token_id);
+  if (token == state_->tokens.end() || !state_->live(token->first, token->second)) return std::nullopt;
+  state_->note_use(token->first);
+  return principal_of(token->second);
+}
+
+Login AccessService::login_of(const Principal& who, std::string_view cookie) const {
+  return {who, cookie.empty() ? std::string{} : sha256_hex(cookie)};
+}
+
+bool AccessService::holds(const Login& login) const {
+  if (state_->options.auth_off) return true;
+  const std::shared_lock lock(state_->mutex);
+  return state_->holds(login);
+}
+
+LoginGuard& AccessService::guard() { return state_->guard; }
+
+std::string AccessService::make_ticket(Login login) {
+  const std::string ticket = random_hex_256();
+  const std::unique_lock lock(state_->mutex);
+  const SteadyTime now = state_->steady_now();
+  std::erase_if(state_->tickets, [&](const auto& entry) { return entry.second.until <= now; });
+  if (state_->tickets.size() >= state_->options.max_tickets) state_->tickets.erase(state_->tickets.begin());
+  state_->tickets[sha256_hex(ticket)] = {std::move(login), in(now, state_->options.ticket_lifetime)};
+  return ticket;
+}
+
+std::optional<Login> AccessService::take_ticket(std::string_view ticket) {
+  if (ticket.size() != k_secret_digits) return std::nullopt;
+  const std::unique_lock lock(state_->mutex);
+  const auto at = state_->tickets.find(sha256_hex(ticket));
+  if (at == state_->tickets.end()) return std::nullopt;
+  Ticket found = std::move(at->second);
+  state_->tickets.erase(at);
+  if (found.until <= state_->steady_now() || !state_->holds(found.login)) return std::nullopt;
+  return std::move(found.login);
+}
+
+void AccessService::note_refusal(std::string_view who, std::string_view what, std::string_view from) {
+  constexpr std::size_t k_max_noted = 1000;
+  const std::string key = std::string(who) + '\n' + std::string(what) + '\n' + std::string(from);
+  const std::scoped_lock lock(state_->notes_mutex);
+  const auto at = state_->refusals.find(key);
+  if (at == state_->refusals.end() && state_->refusals.size() >= k_max_noted) {
+    ++state_->unnamed_refusals;
+    return;
+  }
+  auto& refusal = state_->refusals[key];
+  if (refusal.count++ == 0)
+    refusal = {state_->clock.now(), std::string(who), std::string(what), std::string(from), 1};
+}
+
+void AccessService::flush() {
+  constexpr std::int64_t k_minute_ns = 60'000'000'000;
+  std::map<std::string, State::Refusal> refusals;
+  std::map<std::string, UtcTime> used;
+  std::uint64_t unnamed = 0;
+  const UtcTime now = state_->clock.now();
+  {
+    const std::scoped_lock lock(state_->notes_mutex);
+    refusals.swap(state_->refusals);
+    unnamed = std::exchange(state_->unnamed_refusals, 0);
+    const SteadyTime steady = state_->steady_now();
+    if (steady.ns - state_->used_flushed.ns >= k_minute_ns) {
+      used.swap(state_->used);
+      state_->used_flushed = steady;
+    }
+  }
+  const auto write = [&](const State::Refusal& refusal) {
+    const std::string result =
+        refusal.count == 1 ? "refused" : "refused " + std::to_string(refusal.count) + " times";
+    // A store in trouble tells it by its health; a refusal that is not logged was refused all the same.
+    return state_->log.append_audit({refusal.first, refusal.who, refusal.what, refusal.from, result})
+        .has_value();
+  };
+  for (const auto& [key, refusal] : refusals) (void)write(refusal);
+  if (unnamed > 0) (void)write({now, "others", "requests", "", unnamed});
+  for (const auto& [key, time] : used) {
+    std::optional<TokenId> id;
+    {
+      const std::unique_lock lock(state_->mutex);
+      const auto at = state_->tokens.find(key);
+      if (at == state_->tokens.end()) continue;
+      at->second.last_used = time;
+      id = at->second.id;
+    }
+    (void)state_->store.touch(*id, time).has_value();
+  }
+}
+
+void AccessService::audit(std::string_view who, std::string_view what, std::string_view from,
+                          std::string_view result) {
+  const AuditEntry entry{state_->clock.now(), std::string(who), std::string(what), std::string(from),
+                         std::string(result)};
+  // A store that cannot write says so through its health and refuses the change itself.
+  if (auto written = state_->log.append_audit(entry); !written) return;
+}
+
+std::optional<Role> parse_role(std::string_view word) {
+  for (const auto& [name, role] : k_roles) {
+    if (name == word) return role;
+  }
+  return std::nullopt;
+}
+
+Principal local_principal() { return {"local", "local", {Role::admin}}; }
+
+std::string_view cookie_value(std::string_view cookie_header, std::string_view name) {
+  while (!cookie_header.empty()) {
+    const auto end = std::min(cookie_header.find(';'), cookie_header.size());
+    std::string_view pair = cookie_header.substr(0, end);
+    while (!pair.empty() && pair.front() == ' ') pair.remove_prefix(1);
+    if (pair.size() > name.size() && pair.starts_with(name) && pair[name.size()] == '=') {
+      return pair.substr(name.size() + 1);
+    }
+    cookie_header.remove_prefix(std::min(end + 1, cookie_header.size()));
+  }
+  return {};
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,100 @@
+#include "api/admin/alarm_board.hpp"
+
+#include <algorithm>
+#include <tuple>
+
+#include "api/admin/event_log.hpp"
+#include "api/wire/live_writer.hpp"
+#include "core/base/text.hpp"
+
+namespace anchord::api {
+namespace {
+
+std::string_view level_of(AlarmPriority priority) {
+  switch (priority) {
+    case AlarmPriority::critical:
+      return "critical";
+    case AlarmPriority::warning:
+      return "warning";
+    case AlarmPriority::advisory:
+      return "info";
+  }
+  return "info";
+}
+
+}  // namespace
+
+std::string_view priority_word(AlarmPriority priority) {
+  switch (priority) {
+    case AlarmPriority::critical:
+      return "critical";
+    case AlarmPriority::warning:
+      return "warning";
+    case AlarmPriority::advisory:
+      return "advisory";
+  }
+  return "advisory";
+}
+
+std::string alarm_json(const Alarm& alarm) {
+  const auto& c = alarm.condition;
+  return R"({"id":)" + json_text(c.id) + R"(,"priority":")" + std::string(priority_word(c.priority)) +
+         R"(","since_us":)" + std::to_string(alarm.since.us()) + R"(,"text":)" + json_text(c.text) +
+         R"(,"mission":)" + (c.mission ? json_text(to_string(*c.mission)) : "null") + R"(,"acknowledged":)" +
+         (alarm.acknowledged ? "true}" : "false}");
+}
+
+void AlarmBoard::update(std::vector<AlarmCondition> holding, UtcTime now) {
+  std::vector<AlarmCondition> raised, cleared;
+  {
+    const std::scoped_lock lock(mutex_);
+    std::vector<Alarm> next;
+    for (auto& condition : holding) {
+      const auto before =
+          std::ranges::find(alarms_, condition.id, [](const Alarm& a) { return a.condition.id; });
+      Alarm alarm{std::move(condition), now, false};
+      if (before == alarms_.end()) {
+        raised.push_back(alarm.condition);
+      } else {
+        alarm.since = before->since;
+        // What got worse must speak again.
+        alarm.acknowledged = before->acknowledged && alarm.condition.text == before->condition.text;
+      }
+      next.push_back(std::move(alarm));
+    }
+    for (const auto& alarm : alarms_) {
+      if (std::ranges::none_of(next, [&](const Alarm& a) { return a.condition.id == alarm.condition.id; }))
+        cleared.push_back(alarm.condition);
+    }
+    std::ranges::stable_sort(next, {},
+                             [](const Alarm& a) { return std::tuple(a.condition.priority, a.since); });
+    alarms_ = std::move(next);
+  }
+  for (const auto& c : raised)
+    events_.add(std::string(level_of(c.priority)), "alarm.raised", c.id + ": " + c.text, c.mission);
+  for (const auto& c : cleared) events_.add("info", "alarm.cleared", c.id + " is over", c.mission);
+}
+
+Result<Alarm> AlarmBoard::acknowledge(std::string_view id, std::string_view by) {
+  Alarm found;
+  {
+    const std::scoped_lock lock(mutex_);
+    const auto at =
+        std::ranges::find(alarms_, id, [](const Alarm& a) { return std::string_view(a.condition.id); });
+    if (at == alarms_.end())
+      return make_error(Errc::not_found, "there is no active alarm " + to_utf8(id, 60));
+    if (at->acknowledged) return *at;
+    at->acknowledged = true;
+    found = *at;
+  }
+  events_.add("info", "alarm.acknowledged", found.condition.id + " acknowledged by " + std::string(by),
+              found.condition.mission);
+  return found;
+}
+
+std::vector<Alarm> AlarmBoard::standing() const {
+  const std::scoped_lock lock(mutex_);
+  return alarms_;
+}
+
+}  // namespace anchord::api

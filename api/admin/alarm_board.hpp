@@ -1,0 +1,43 @@
+#pragma once
+
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "api/admin/alarm_rules.hpp"
+#include "core/base/result.hpp"
+
+namespace anchord::api {
+
+class EventLog;
+
+/// An alarm that stands.
+struct Alarm {
+  AlarmCondition condition;
+  UtcTime since{};
+  bool acknowledged{false};
+};
+std::string_view priority_word(AlarmPriority priority);
+/// As topic `alarms` and GET /alarms show it.
+std::string alarm_json(const Alarm& alarm);
+
+/// The alarms that stand: raised when their condition begins, gone when it ends, quiet but visible once
+/// acknowledged. Raising, clearing and acknowledging are events. Thread-safe.
+class AlarmBoard {
+ public:
+  explicit AlarmBoard(EventLog& events) : events_(events) {}
+  /// What holds now, about once a second.
+  void update(std::vector<AlarmCondition> holding, UtcTime now);
+  /// Errors: not_found when no such alarm stands. Acknowledging twice is no error.
+  Result<Alarm> acknowledge(std::string_view id, std::string_view by);
+  /// By priority, then time.
+  std::vector<Alarm> standing() const;
+
+ private:
+  EventLog& events_;
+  mutable std::mutex mutex_;
+  std::vector<Alarm> alarms_;
+};
+
+}  // namespace anchord::api

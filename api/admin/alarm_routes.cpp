@@ -1,0 +1,37 @@
+#include <nlohmann/json.hpp>
+
+#include "api/admin/alarm_board.hpp"
+#include "api/admin/routes.hpp"
+#include "api/kit/reader.hpp"
+#include "api/kit/router.hpp"
+#include "api/kit/support.hpp"
+
+namespace anchord::api {
+
+void add_alarm_routes(Router& router, AdminApi& s) {
+  using Ordered = nlohmann::ordered_json;
+  router.add(as_command({Method::get, "/api/v1/alarms", readers(), [&s](const Request& request) {
+                           check_query(request, {"fields"});
+                           Ordered items = Ordered::array();
+                           for (const auto& alarm : s.alarms.standing())
+                             items.push_back(Ordered::parse(alarm_json(alarm)));
+                           return list_response(request, std::move(items), "");
+                         }}));
+  router.add(as_command(
+      {Method::post, "/api/v1/alarms/{id}/ack", Access::any_of({Role::op}),
+       [&s](const Request& request) {
+         const auto body = json_body(request, true);
+         std::vector<FieldError> errors;
+         Fields fields(body, "", errors);
+         const auto note = fields.text("note", 500).value_or("");
+         fields.finish();
+         refuse_if_any(errors);
+         const std::string& id = request.params.at("id");
+         const auto alarm = value_or_problem(s.alarms.acknowledge(id, request.principal.name));
+         s.audit.soon(request, "alarm.ack " + alarm.condition.id + (note.empty() ? "" : " note: " + note));
+         return json_response(200, Ordered::parse(alarm_json(alarm)));
+       },
+       k_command_bytes}));
+}
+
+}  // namespace anchord::api

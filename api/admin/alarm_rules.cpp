@@ -1,0 +1,110 @@
+#include "api/admin/alarm_rules.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace anchord::api {
+namespace {
+
+// dashboard.md section 6
+constexpr double k_lost_s = 2, k_float_s = 5, k_silent_ranges_s = 5, k_old_corrections_s = 10;
+constexpr double k_skew_s = 0.05;
+// reliability.md section 2: warn at 2 GiB free, refuse new flights at 500 MiB
+constexpr std::uint64_t k_low_bytes = 2ULL << 30, k_refuse_bytes = 500ULL << 20;
+// Two seconds of the fastest ingest: what a writer that keeps up never lets wait.
+constexpr std::uint64_t k_many_rows = 40'000;
+constexpr double k_over_s = 30;
+
+double silence_s(const std::optional<SteadyTime>& arrival, SteadyTime now) {
+  return arrival ? seconds_between(*arrival, now) : 1e9;
+}
+
+bool holds_for(const std::optional<UtcTime>& since, const std::optional<UtcTime>& newest, double seconds) {
+  return since && newest && seconds_between(*since, *newest) > seconds;
+}
+
+void rtk(const FlightPulse& f, std::vector<AlarmCondition>& out) {
+  const double fixes_s = silence_s(f.fix_arrival, f.now);
+  const bool behind =
+      !f.newest_fix || !f.newest_range || seconds_between(*f.newest_fix, *f.newest_range) > k_lost_s;
+  const bool nothing = silence_s(f.range_arrival, f.now) > k_silent_ranges_s;
+  if (f.newest_fix && fixes_s > k_lost_s && (behind || nothing)) {
+    out.push_back({"rtk.lost", AlarmPriority::critical, f.name + ": no position from the rover", f.mission});
+  } else if (holds_for(f.below_float_since, f.newest_fix, k_lost_s)) {
+    out.push_back({"rtk.lost", AlarmPriority::critical, f.name + ": RTK lost, ranges are kept but not used",
+                   f.mission});
+  } else if (f.correction_age_s && *f.correction_age_s > k_old_corrections_s) {
+    out.push_back(
+        {"rtk.lost", AlarmPriority::critical, f.name + ": no corrections for more than 10 s", f.mission});
+  } else if (holds_for(f.float_since, f.newest_fix, k_float_s) && !nothing) {
+    out.push_back(
+        {"rtk.float", AlarmPriority::warning, f.name + ": RTK is FLOAT, ranges lose weight", f.mission});
+  }
+}
+
+void ranges(const FlightPulse& f, std::vector<AlarmCondition>& out) {
+  if (!f.newest_range || silence_s(f.range_arrival, f.now) <= k_silent_ranges_s) return;
+  out.push_back({"uwb.none", AlarmPriority::warning, f.name + ": no ranges for more than 5 s", f.mission});
+}
+
+void clock(const FlightPulse& f, std::vector<AlarmCondition>& out) {
+  if (!f.lag_s || std::abs(*f.lag_s) - 2 * f.lag_sigma_s.value_or(0) <= k_skew_s) return;
+  char text[96];
+  std::snprintf(text, sizeof text, ": tag clock and rover clock differ by %.1f s", *f.lag_s);
+  out.push_back({"clock.skew", AlarmPriority::warning, f.name + text, f.mission});
+}
+
+}  // namespace
+
+std::vector<AlarmCondition> alarm_conditions(const std::vector<FlightPulse>& flights,
+                                             const ServerPulse& server) {
+  std::vector<AlarmCondition> out;
+  if (!server.writable) out.push_back({"storage.unwritable", AlarmPriority::critical, server.reason, {}});
+  if (server.disk_free_bytes > 0 && server.disk_free_bytes < k_low_bytes) {
+    out.push_back({"disk.low",
+                   AlarmPriority::warning,
+                   server.disk_free_bytes < k_refuse_bytes ? "less than 500 MiB free: no new flight starts"
+                                                           : "less than 2 GiB free on the disk of the data",
+                   {}});
+  }
+  if (server.queued_rows > k_many_rows) {
+    out.push_back({"queue.behind",
+                   AlarmPriority::warning,
+                   "more measurements come than can be worked off; all are stored, live numbers come late",
+                   {}});
+  }
+  if (!server.failed_tasks.empty()) {
+    out.push_back({"server.task_failed",
+                   AlarmPriority::warning,
+                   "a task of the server failed and goes on; the log has it, send it with a report: " +
+                       server.failed_tasks,
+                   {}});
+  }
+  if (!server.clock_skew.empty())
+    out.push_back({"clock.skew", AlarmPriority::warning, server.clock_skew, {}});
+  if (!server.not_started.empty())
+    out.push_back({"device.not_started", AlarmPriority::warning, server.not_started, {}});
+  if (!server.unrecorded.empty()) {
+    out.push_back({"recording.failed",
+                   AlarmPriority::critical,
+                   "raw bytes of the devices are not recorded: " + server.unrecorded,
+                   {}});
+  }
+  for (const auto& f : flights) {
+    if (!f.as_it_happens) continue;
+    if (std::min(silence_s(f.fix_arrival, f.now), silence_s(f.range_arrival, f.now)) > k_over_s) continue;
+    rtk(f, out);
+    ranges(f, out);
+    clock(f, out);
+  }
+  // One row per id: the page and its operator think in ids.
+  std::vector<AlarmCondition> one_each;
+  for (auto& condition : out) {
+    const auto same = std::ranges::find(one_each, condition.id, &AlarmCondition::id);
+    if (same == one_each.end()) one_each.push_back(std::move(condition));
+  }
+  return one_each;
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,65 @@
+#include "core/ports/backups.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "api/admin/event_log.hpp"
+#include "api/admin/job_answer.hpp"
+#include "api/admin/routes.hpp"
+#include "api/kit/reader.hpp"
+#include "api/kit/router.hpp"
+#include "api/kit/support.hpp"
+#include "core/ports/store.hpp"
+
+namespace anchord::api {
+namespace {
+
+using Ordered = nlohmann::ordered_json;
+
+Ordered backup_json(const Backup& backup) {
+  return {{"name", backup.name},
+          {"sequence", backup.sequence},
+          {"made_at", to_rfc3339(backup.made)},
+          {"bytes", backup.bytes},
+          {"sha256", backup.sha256_hex},
+          {"good", backup.good ? Ordered(*backup.good) : Ordered(nullptr)}};
+}
+
+}  // namespace
+
+Result<Job> begin_backup(const AdminApi& s) {
+  return s.jobs.submit("backup", "{}", [&s](JobContext& job) -> Result<JobEnd> {
+    job.progress(0, "copy", "");
+    auto made = s.backups->make();
+    if (!made) {
+      s.events.add("warning", "backup.failed", made.error().message);
+      return std::move(made).error();
+    }
+    return JobEnd{"/api/v1/backups", made.value().name};
+  });
+}
+
+void add_backup_routes(Router& router, AdminApi& s) {
+  const auto admin = Access::any_of({Role::admin});
+  router.add({Method::get, "/api/v1/backups", admin, [&s](const Request& request) {
+                check_query(request, {});
+                Ordered items = Ordered::array();
+                for (const auto& backup : s.backups->list()) items.push_back(backup_json(backup));
+                return list_response(request, std::move(items), "");
+              }});
+  router.add({Method::post, "/api/v1/backups", admin, [&s](const Request& request) {
+                const auto body = json_body(request, true);
+                std::vector<FieldError> errors;
+                Fields(body, "", errors).finish();
+                refuse_if_any(errors);
+                Job job = value_or_problem(begin_backup(s));
+                s.audit(request, "backup.start " + to_string(job.id));
+                return job_outcome(s.jobs, request, std::move(job), [&s](const Job& done) -> Response {
+                  for (const auto& backup : s.backups->list()) {
+                    if (backup.name == done.detail) return json_response(201, backup_json(backup));
+                  }
+                  throw_problem(404, "not-found", "the backup is gone: newer ones took its place");
+                });
+              }});
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,49 @@
+#include "api/admin/event_log.hpp"
+
+#include <algorithm>
+
+#include "api/stream/hub.hpp"
+#include "api/wire/live_writer.hpp"
+#include "core/base/text.hpp"
+
+namespace anchord::api {
+
+std::string event_json(const LiveEvent& event) {
+  return R"({"id":")" + to_string(event.id) + R"(","t_us":)" + std::to_string(event.time.us()) +
+         R"(,"level":)" + json_text(event.level) + R"(,"code":)" + json_text(event.code) + R"(,"text":)" +
+         json_text(event.text) + R"(,"mission":)" +
+         (event.mission ? json_text(to_string(*event.mission)) : "null") + '}';
+}
+
+void EventLog::add(std::string level, std::string code, std::string text, std::optional<MissionId> mission) {
+  const UtcTime now = clock_.now();
+  LiveEvent event{make_uuid_v7(now), now, std::move(level), std::move(code), std::move(text), mission};
+  std::string json = event_json(event);
+  {
+    const std::scoped_lock lock(mutex_);
+    events_.push_back(std::move(event));
+    if (events_.size() > k_kept) events_.pop_front();
+  }
+  hub_.publish(Topic::events, std::move(json), now.us());
+}
+
+void EventLog::restore(const std::vector<LiveEvent>& events) {
+  const std::scoped_lock lock(mutex_);
+  const std::size_t room = k_kept - std::min(k_kept, events_.size());
+  const auto first = events.end() - static_cast<std::ptrdiff_t>(std::min(room, events.size()));
+  events_.insert(events_.begin(), first, events.end());
+}
+
+std::vector<LiveEvent> EventLog::newest(std::size_t limit, const std::optional<MissionId>& mission,
+                                        std::optional<UtcTime> since) const {
+  const std::scoped_lock lock(mutex_);
+  std::vector<LiveEvent> out;
+  for (auto it = events_.rbegin(); it != events_.rend() && out.size() < limit; ++it) {
+    if (mission && it->mission != mission) continue;
+    if (since && it->time < *since) continue;  // not in order of time where the clock was set back
+    out.push_back(*it);
+  }
+  return out;
+}
+
+}  // namespace anchord::api

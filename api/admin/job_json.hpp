@@ -1,0 +1,13 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string_view>
+
+#include "core/ports/store.hpp"
+
+namespace anchord::api {
+
+nlohmann::ordered_json job_json(const Job& job);
+std::string_view job_state_word(JobState state);
+
+}  // namespace anchord::api

@@ -1,0 +1,260 @@
+#include "api/admin/job_service.hpp"
+
+#include <condition_variable>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "api/admin/job_json.hpp"
+#include "api/kit/memory.hpp"
+#include "api/kit/problem.hpp"
+#include "api/stream/hub.hpp"
+#include "core/base/guard.hpp"
+#include "core/base/to_wire.hpp"
+
+namespace anchord::api {
+namespace {
+
+bool ended(JobState state) { return state != JobState::queued && state != JobState::running; }
+
+}  // namespace
+
+struct JobService::State {
+  State(JobStore& j, Hub& h, const Clock& c) : jobs(j), hub(h), clock(c) {}
+  struct Task {
+    JobId id{};
+    Work work{};
+  };
+  /// One kind of job.
+  struct Lane {
+    std::deque<Task> queue{};
+    Thread thread{};
+  };
+  class Context;
+
+  JobStore& jobs;
+  Hub& hub;
+  const Clock& clock;
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::map<std::string, Lane> lanes;
+  std::set<JobId> canceled;
+  bool started{false}, stopping{false};
+
+  void tell(const Job& job) {
+    hub.publish(Topic::jobs, to_wire(job_json(job)), clock.now().us(), to_string(job.id));
+  }
+  void save(const Job& job) {
+    // A job that cannot be written is still shown live; after a restart it counts as interrupted.
+    (void)jobs.update(job).has_value();
+    tell(job);
+    changed.notify_all();
+  }
+  bool is_canceled(const JobId& id) {
+    const std::scoped_lock lock(mutex);
+    return stopping || canceled.count(id) > 0;
+  }
+  bool is_stopping() {
+    const std::scoped_lock lock(mutex);
+    return stopping;
+  }
+  /// Room in the lane, told before the job is written.
+  Result<void> admit(const std::string& kind) {
+    const std::scoped_lock lock(mutex);
+    if (stopping) return make_error(Errc::queue_full, "the server is stopping");
+    if (lanes[kind].queue.size() >= k_max_queued)
+      return make_error(Errc::queue_full, std::to_string(k_max_queued) + " jobs are waiting already");
+    return boost::outcome_v2::success();
+  }
+  void enqueue(const std::shared_ptr<State>& self, const Job& job, Work work) {
+    tell(job);
+    {
+      const std::scoped_lock lock(mutex);
+      Lane& lane = lanes[job.kind];
+      canceled.erase(job.id);  // of an earlier life of the same job
+      lane.queue.push_back({job.id, std::move(work)});
+      if (started && !stopping) run_lane(self, lane);
+    }
+    changed.notify_all();
+  }
+  void run_lane(const std::shared_ptr<State>& self, Lane& lane) {
+    if (!lane.thread.joinable()) lane.thread = Thread("anchord-job", [self, &lane] { self->loop(lane); });
+  }
+  void loop(Lane& lane);
+  void run(const Task& task);
+};
+
+class JobService::State::Context final : public JobContext {
+ public:
+  Context(State& state, Job& job) : state_(state), job_(job) {}
+  const Job& job() const override { return job_; }
+  void progress(double fraction, std::string stage, std::string detail) override {
+    const bool new_stage = job_.stage != stage;
+    job_.fraction = fraction;
+    job_.stage = std::move(stage);
+    job_.detail = std::move(detail);
+    // Every write is an fsync that flights share: the store gets what is worth keeping, the hub all of it.
+    const auto now = std::chrono::steady_clock::now();
+    if (new_stage || now - saved_ >= std::chrono::seconds(1)) {
+      saved_ = now;
+      state_.save(job_);
+    } else {
+      state_.tell(job_);
+    }
+  }
+  bool canceled() const override { return state_.is_canceled(job_.id); }
+
+ private:
+  State& state_;
+  Job& job_;
+  std::chrono::steady_clock::time_point saved_{};
+};
+
+JobService::JobService(JobStore& jobs, Hub& hub, const Clock& clock)
+    : state_(std::make_shared<State>(jobs, hub, clock)) {}
+JobService::~JobService() { stop(); }
+
+void JobService::start() {
+  const auto problem =
+      problem_json(503, "internal", "interrupted: the server was restarted while the job ran; send it again");
+  (void)state_->jobs.fail_unfinished(state_->clock.now(), problem).has_value();
+  const std::scoped_lock lock(state_->mutex);
+  state_->started = true;
+  for (auto& [kind, lane] : state_->lanes) {
+    if (!lane.queue.empty()) state_->run_lane(state_, lane);
+  }
+}
+
+void JobService::stop() {
+  std::vector<Thread> running;
+  {
+    const std::scoped_lock lock(state_->mutex);
+    state_->stopping = true;
+    for (auto& [kind, lane] : state_->lanes) running.push_back(std::move(lane.thread));
+  }
+  state_->changed.notify_all();
+  for (auto& thread : running) {
+    if (thread.joinable()) thread.join();
+  }
+}
+
+Result<Job> JobService::submit(std::string kind, std::string request_json, Work work,
+                               std::optional<JobId> id) {
+  Job job;
+  job.created = state_->clock.now();
+  job.id = id.value_or(JobId{make_uuid_v7(job.created)});
+  job.kind = std::move(kind);
+  job.stage = "queued";
+  job.request_json = std::move(request_json);
+  BOOST_OUTCOME_TRYV(state_->admit(job.kind));
+  BOOST_OUTCOME_TRYV(state_->jobs.insert(job));
+  state_->enqueue(state_, job, std::move(work));
+  return job;
+}
+
+Result<Job> JobService::restart(const JobId& id, Work work) {
+  BOOST_OUTCOME_TRY(auto job, state_->jobs.job(id));
+  if (job.state == JobState::succeeded) return make_error(Errc::conflict, "the job has succeeded");
+  if (!ended(job.state)) return make_error(Errc::conflict, "the job waits or runs already");
+  BOOST_OUTCOME_TRYV(state_->admit(job.kind));
+  job.state = JobState::queued;
+  job.fraction = 0;
+  job.stage = "queued";
+  job.detail.clear();
+  job.problem_json.clear();
+  job.started.reset();
+  job.finished.reset();
+  BOOST_OUTCOME_TRYV(state_->jobs.update(job));
+  state_->enqueue(state_, job, std::move(work));
+  return job;
+}
+
+Result<Job> JobService::wait(const JobId& id, std::chrono::milliseconds longest) {
+  const auto deadline = std::chrono::steady_clock::now() + longest;
+  while (true) {
+    BOOST_OUTCOME_TRY(auto job, state_->jobs.job(id));
+    std::unique_lock lock(state_->mutex);
+    if (ended(job.state) || state_->stopping || std::chrono::steady_clock::now() >= deadline) return job;
+    // The change may be told between the read and the wait: look again after a while in any case.
+    state_->changed.wait_until(
+        lock, std::min(deadline, std::chrono::steady_clock::now() + std::chrono::milliseconds(100)));
+  }
+}
+
+Result<Job> JobService::cancel(const JobId& id) {
+  BOOST_OUTCOME_TRY(auto job, state_->jobs.job(id));
+  if (ended(job.state)) return make_error(Errc::conflict, "the job has ended");
+  std::string kind = job.kind;
+  bool waiting = false;
+  {
+    const std::scoped_lock lock(state_->mutex);
+    auto& queue = state_->lanes[kind].queue;
+    for (auto it = queue.begin(); it != queue.end(); ++it) {
+      if (it->id != id) continue;
+      queue.erase(it);
+      waiting = true;
+      break;
+    }
+    if (!waiting) state_->canceled.insert(id);
+  }
+  if (waiting) {
+    // It never ran, so it does not wait for its turn to be told so.
+    job.state = JobState::canceled;
+    job.finished = state_->clock.now();
+    state_->save(job);
+    return job;
+  }
+  state_->changed.notify_all();
+  return wait(id, std::chrono::seconds(1));
+}
+
+void JobService::State::loop(Lane& lane) {
+  while (true) {
+    give_back_memory();
+    Task task;
+    {
+      std::unique_lock lock(mutex);
+      changed.wait(lock, [&] { return stopping || !lane.queue.empty(); });
+      if (stopping) return;
+      task = std::move(lane.queue.front());
+      lane.queue.pop_front();
+    }
+    (void)guarded("job", [&] { run(task); });
+    const std::scoped_lock lock(mutex);
+    canceled.erase(task.id);
+  }
+}
+
+void JobService::State::run(const Task& task) {
+  auto stored = jobs.job(task.id);
+  if (!stored) return;
+  Job job = std::move(stored).value();
+  job.state = JobState::running;
+  job.started = clock.now();
+  Context context(*this, job);
+  context.progress(0, "load", "");
+  Result<JobEnd> result = make_error(Errc::internal, "");
+  const auto ran = guarded("job", [&] { result = task.work(context); });
+  if (!ran) result = make_error(Errc::internal, ran.what);
+  job.finished = clock.now();
+  if (result) {
+    job.state = JobState::succeeded;
+    job.fraction = 1;
+    job.detail = result.value().detail;
+    job.result_href = result.value().result_href;
+  } else if (result.error().code == Errc::canceled && !is_stopping()) {
+    job.state = JobState::canceled;
+  } else if (result.error().code == Errc::canceled) {
+    job.state = JobState::failed;
+    job.problem_json =
+        problem_json(503, "internal", "interrupted: the server was stopped while the job ran; send it again");
+  } else {
+    job.state = JobState::failed;
+    job.problem_json = problem_of(result.error()).body;
+  }
+  save(job);
+}
+
+}  // namespace anchord::api

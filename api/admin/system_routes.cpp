@@ -1,0 +1,146 @@
+#include <nlohmann/json.hpp>
+
+#include "api/admin/docs_page.hpp"
+#include "api/admin/routes.hpp"
+#include "api/kit/contract.hpp"
+#include "api/kit/support.hpp"
+#include "api/stream/hub.hpp"
+#include "core/base/time.hpp"
+#include "core/ports/store.hpp"
+
+namespace anchord::api {
+
+using Ordered = nlohmann::ordered_json;
+
+namespace {
+
+Response ready(AdminApi& s, const Request&) {
+  const StorageStatus storage = s.storage();
+  Ordered body{{"status", storage.writable ? "ready" : "degraded"},
+               {"checks",
+                {{"db", storage.writable ? "ok" : storage.reason},
+                 {"disk", storage.writable ? "ok" : storage.reason},
+                 {"migrations", "ok"}}}};
+  return json_response(storage.writable ? 200 : 503, body);
+}
+
+Response version(AdminApi& s, const Request&) {
+  const auto& build = s.build;
+  return json_response(200, {{"version", build.version},
+                             {"git", build.git},
+                             {"schema", build.schema},
+                             {"api", "v1"},
+                             {"build", build.build},
+                             {"compiler", build.compiler}});
+}
+
+Response system(AdminApi& s, const Request&) {
+  const StorageStatus storage = s.storage();
+  const ServerCounts counts = s.counts();
+  return json_response(200, {{"t_us", s.clock.now().us()},
+                             {"recording", counts.recording},
+                             {"queue_depth", storage.queue_depth + counts.queued_rows},
+                             {"db_bytes", storage.db_bytes},
+                             {"disk_free_bytes", storage.disk_free_bytes},
+                             {"ws_clients", s.hub.clients()},
+                             {"synchronous", storage.synchronous},
+                             {"writable", storage.writable},
+                             {"reason", storage.reason},
+                             {"clock", s.device_clock()},
+                             {"drone", s.drone()}});
+}
+
+Response metrics(AdminApi& s, const Request&) {
+  const ServerCounts counts = s.counts();
+  auto& live = s.hub.counters();
+  const StorageStatus storage = s.storage();
+  std::string text;
+  const auto add = [&text](const std::string& name, const char* type, std::uint64_t value,
+                           const std::string& labels = {}) {
+    if (text.find("# TYPE " + name + ' ') == std::string::npos) text += "# TYPE " + name + ' ' + type + '\n';
+    text += name + labels + ' ' + std::to_string(value) + '\n';
+  };
+  add("anchord_ingest_lines_total", "counter", counts.lines_accepted, "{result=\"accepted\"}");
+  add("anchord_ingest_lines_total", "counter", counts.lines_duplicate, "{result=\"duplicate\"}");
+  add("anchord_ingest_lines_total", "counter", counts.lines_rejected, "{result=\"rejected\"}");
+  add("anchord_ws_published_total", "counter", live.published);
+  add("anchord_ws_dropped_total", "counter", live.dropped);
+  add("anchord_ws_conflated_total", "counter", live.conflated);
+  add("anchord_ws_slow_disconnects_total", "counter", live.slow_disconnects);
+  add("anchord_live_queue_rows", "gauge", counts.queued_rows);
+  add("anchord_live_missions", "gauge", counts.missions_followed);
+  add("anchord_live_missions_evicted_total", "counter", counts.missions_evicted);
+  add("anchord_db_size_bytes", "gauge", storage.db_bytes);
+  add("anchord_disk_free_bytes", "gauge", storage.disk_free_bytes);
+  text += s.metrics_text();
+  Response response;
+  response.header("Content-Type", "text/plain; version=0.0.4; charset=utf-8");
+  response.body = std::move(text);
+  return response;
+}
+
+Response document(std::string_view text) {
+  Response response;
+  response.header("Content-Type", "application/json");
+  response.body = text;
+  return response;
+}
+
+Response audit_log(AdminApi& s, const Request& request) {
+  check_query(request, {"limit"});
+  Ordered items = Ordered::array();
+  for (const auto& entry : value_or_problem(s.audit_log.audit(page_query(request).limit))) {
+    items.push_back({{"at", to_rfc3339(entry.time)},
+                     {"who", entry.who},
+                     {"what", entry.what},
+                     {"from", entry.from},
+                     {"result", entry.result}});
+  }
+  return list_response(request, std::move(items), "");
+}
+
+Response explain(const Request& request) {
+  for (const auto& known : problem_types()) {
+    if (known.type == request.params.at("type"))
+      return json_response(200, {{"type", "/problems/" + std::string(known.type)},
+                                 {"title", known.title},
+                                 {"explanation", known.explanation}});
+  }
+  throw_problem(404, "not-found", "there is no such problem type");
+}
+
+}  // namespace
+
+void add_system_routes(Router& router, AdminApi& s) {
+  const auto on = [&s](auto function) {
+    return [&s, function](const Request& request) { return function(s, request); };
+  };
+  router.add({Method::get, "/healthz", Access::open(), [](const Request&) {
+                return json_response(200, {{"status", "ok"}});
+              }});
+  router.add(as_command({Method::get, "/readyz", Access::open(), on(ready)}));
+  router.add({Method::get, "/version", Access::open(), on(version)});
+  router.add({Method::get, "/metrics", readers(), on(metrics)});
+  router.add({Method::get, "/problems/{type}", Access::open(), explain});
+  router.add({Method::get, "/api/v1/system", readers(), on(system)});
+  router.add(as_heavy({Method::get, "/api/v1/audit", Access::any_of({Role::admin}), on(audit_log)}));
+  router.add({Method::get, "/api/docs", Access::open(), [](const Request&) {
+                static const std::string page = docs_page(openapi_json());
+                Response response;
+                response.header("Content-Type", "text/html; charset=utf-8");
+                response.body = page;
+                return response;
+              }});
+  router.add({Method::get, "/api/v1/openapi.json", Access::open(),
+              [](const Request&) { return document(openapi_json()); }});
+  router.add({Method::get, "/api/v1/asyncapi.json", Access::open(),
+              [](const Request&) { return document(asyncapi_json()); }});
+  router.add({Method::get, "/api/v1/ws", readers(), [](const Request&) -> Response {
+                Response response = problem(
+                    426, "method", "this is a WebSocket of subprotocol anchord.v1: ask for an upgrade");
+                response.header("Upgrade", "websocket");
+                return response;
+              }});
+}
+
+}  // namespace anchord::api

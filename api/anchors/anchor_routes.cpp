@@ -1,0 +1,411 @@
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "api/anchors/anchor_json.hpp"
+#include "api/anchors/anchor_kml.hpp"
+#include "api/anchors/contradiction_watch.hpp"
+#include "api/anchors/frame_json.hpp"
+#include "api/anchors/geo_service.hpp"
+#include "api/anchors/routes.hpp"
+#include "api/anchors/site_json.hpp"
+#include "api/kit/reader.hpp"
+#include "api/kit/support.hpp"
+#include "api/missions/mission_service.hpp"
+#include "api/wire/budget_json.hpp"
+#include "api/wire/live_writer.hpp"
+#include "core/base/text.hpp"
+#include "core/base/to_wire.hpp"
+#include "core/geo/enu.hpp"
+#include "core/ports/site_store.hpp"
+#include "core/ports/store.hpp"
+
+namespace anchord::api {
+
+using Ordered = nlohmann::ordered_json;
+
+namespace {
+
+/// Sites and calibrations that features refer to, each read once.
+class Lookup {
+ public:
+  explicit Lookup(AnchorApi& services) : services_(services), store_(services.anchors) {}
+  std::optional<Site> site(const std::optional<SiteId>& id) {
+    if (!id) return std::nullopt;
+    auto [it, fresh] = sites_.try_emplace(*id);
+    if (fresh) {
+      if (auto found = store_.site(*id)) it->second = std::move(found).value();
+    }
+    return it->second;
+  }
+  const std::vector<MissionId>& missions(const CalibrationId& id) { return calibration(id).missions; }
+  /// Of a published place that a fitted frame gave.
+  std::optional<GlobeAccuracy> globe(const PublishedPosition& position) {
+    if (position.frame != TrackFrame::local) return std::nullopt;
+    return globe_accuracy(calibration(position.calibration).provenance, position.estimate.anchor);
+  }
+
+  /// What its uncertainty comes from; empty where the calibration is of before budgets.
+  std::string budget(const PublishedPosition& position) {
+    const Ordered kept = kept_budget(calibration(position.calibration).provenance, position.estimate.anchor);
+    return kept.is_null() ? std::string{} : to_wire(kept);
+  }
+
+  /// What the position is called elsewhere: the positioning system's frame, the map, sea level.
+  void name_elsewhere(AnchorFeature& feature) {
+    if (!feature.estimate || !feature.estimate->best || !feature.estimate->best->wgs84) return;
+    const Wgs84& at = *feature.estimate->best->wgs84;
+    const auto map = services_.geo.projected(feature.site, at);
+    if (map)
+      feature.projected = {map.value().epsg, map.value().easting_northing_m.x(),
+                           map.value().easting_northing_m.y()};
+    else
+      feature.projected_reason = map.error().message;
+    const auto height = services_.geo.orthometric(at);
+    if (height) feature.height_orthometric_m = height.value().height_m;
+    feature.geoid = height ? height.value().geoid : height.error().message;
+    if (const auto* frame = local_frame(feature.anchor.site))
+      feature.local_m = frame->fit.transform.local_from(EnuFrame(frame->origin).enu_from_wgs84(at).m);
+  }
+
+ private:
+  /// The first fitted frame of the site.
+  const FrameDefinition* local_frame(const std::optional<SiteId>& site) {
+    if (!site || services_.frames == nullptr) return nullptr;
+    auto [it, fresh] = frames_.try_emplace(*site);
+    if (fresh) {
+      if (const auto found = services_.frames->frames_of(*site)) {
+        for (const auto& frame : found.value()) {
+          if (!it->second) it->second = frame_definition(frame);
+        }
+      }
+    }
+    return it->second ? &*it->second : nullptr;
+  }
+
+  struct Made {
+    std::vector<MissionId> missions;
+    Ordered provenance;
+  };
+  const Made& calibration(const CalibrationId& id) {
+    auto [it, fresh] = calibrations_.try_emplace(id);
+    if (fresh) {
+      if (auto found = store_.calibration(id))
+        it->second = {found.value().missions, Ordered::parse(found.value().provenance_json, nullptr, false)};
+    }
+    return it->second;
+  }
+
+  AnchorApi& services_;
+  std::map<SiteId, std::optional<FrameDefinition>> frames_;
+  AnchorStore& store_;
+  std::map<SiteId, std::optional<Site>> sites_;
+  std::map<CalibrationId, Made> calibrations_;
+};
+
+AnchorFeature published_feature(Lookup& lookup, Anchor anchor, const PublishedPosition& position,
+                                std::uint64_t revision) {
+  AnchorFeature feature;
+  feature.site = lookup.site(anchor.site);
+  feature.anchor = std::move(anchor);
+  feature.status = feature.anchor.retired ? "retired" : "accepted";
+  feature.revision = revision;
+  feature.calibrated = position.published;
+  feature.calibration = position.calibration;
+  feature.missions = lookup.missions(position.calibration);
+  feature.frame = position.frame;
+  feature.estimate = position.estimate;
+  feature.overridden = position.overridden;
+  feature.globe = lookup.globe(position);
+  feature.budget_json = lookup.budget(position);
+  lookup.name_elsewhere(feature);
+  return feature;
+}
+
+/// As it is stored; one whose row follows the flight by a moment, or waits for the disk, has no id yet.
+/// Reading stores nothing.
+Anchor anchor_as_stored(AnchorApi& s, NetworkId id) {
+  auto found = s.anchors.anchor(id);
+  if (found || found.error().code != Errc::not_found) return value_or_problem(std::move(found));
+  Anchor anchor;
+  anchor.network_id = id;
+  return anchor;
+}
+
+/// A later flight found it elsewhere: no reader may take it for accepted.
+void contradict(AnchorFeature& feature, const ContradictedAnchor& against) {
+  if (feature.anchor.retired) return;
+  feature.status = "contradicted";
+  feature.contradicted = {against.calibration, to_wire(contradiction_json(against)), against.text};
+  feature.estimate->gates.push_back(
+      {"contradicted", against.what.chi2, against.what.limit, false, against.text});
+}
+
+std::uint64_t newest_revision(AnchorApi& s) {
+  const auto newest = value_or_problem(s.anchors.revisions(1, 0));
+  return newest.empty() ? 0 : newest.front().number;
+}
+
+/// All features of the published revision (newest when absent), in order of network id.
+std::vector<AnchorFeature> published(AnchorApi& s, std::optional<std::uint64_t> revision,
+                                     std::uint64_t& number) {
+  number = revision ? *revision : newest_revision(s);
+  if (number == 0) return {};
+  Lookup lookup(s);
+  const auto contradicted = s.contradictions.standing();
+  const bool newest = !revision || number == newest_revision(s);
+  std::vector<AnchorFeature> out;
+  for (const auto& position : value_or_problem(s.anchors.published(number))) {
+    auto anchor = anchor_as_stored(s, position.estimate.anchor);
+    out.push_back(published_feature(lookup, std::move(anchor), position, number));
+    const auto against = contradicted->find(position.estimate.anchor);
+    // What an older revision said is history; only the newest is what readers build on.
+    if (newest && against != contradicted->end()) contradict(out.back(), against->second);
+  }
+  std::sort(out.begin(), out.end(),
+            [](const auto& a, const auto& b) { return a.anchor.network_id < b.anchor.network_id; });
+  return out;
+}
+
+/// Running estimates; of an anchor that several missions hear the newest.
+std::vector<AnchorFeature> live(AnchorApi& s, const std::optional<MissionId>& mission) {
+  if (mission) value_or_problem(s.missions.mission(*mission));
+  Lookup lookup(s);
+  std::map<NetworkId, AnchorFeature> newest;
+  for (const auto& view : s.missions.live(mission)) {
+    for (const auto& estimate : view.estimates) {
+      auto& feature = newest[estimate.anchor];
+      if (feature.estimate && estimate.time < feature.estimate->time) continue;
+      feature.estimate = estimate;
+      feature.frame = view.mission.frame;
+      feature.missions = {view.mission.id};
+      feature.calibrated = estimate.time;
+      feature.status = flight::anchor_status(estimate);
+    }
+  }
+  std::vector<AnchorFeature> out;
+  for (auto& [id, feature] : newest) {
+    feature.anchor = anchor_as_stored(s, id);
+    feature.site = lookup.site(feature.anchor.site);
+    out.push_back(std::move(feature));
+  }
+  return out;
+}
+
+struct Box {
+  double west, south, east, north;
+};
+std::optional<Box> query_box(const Request& request) {
+  const auto text = request.query_value("bbox");
+  if (!text) return std::nullopt;
+  nlohmann::json numbers;
+  if (parse_json('[' + *text + ']', numbers) || numbers.size() != 4 ||
+      !std::all_of(numbers.begin(), numbers.end(), [](const auto& n) { return n.is_number(); })) {
+    throw_problem(422, "validation", "bbox is west,south,east,north in degrees",
+                  {{"/bbox", "bad_value", "must be four numbers"}});
+  }
+  return Box{numbers[0], numbers[1], numbers[2], numbers[3]};
+}
+
+std::vector<AnchorFeature> wanted(AnchorApi& s, const Request& request, std::uint64_t& number) {
+  const auto view = request.query_value("view").value_or("published");
+  std::optional<std::uint64_t> revision;
+  if (const auto text = request.query_value("revision")) {
+    nlohmann::json value;
+    if (parse_json(*text, value) || !value.is_number_unsigned())
+      throw_problem(422, "validation", "revision is a number",
+                    {{"/revision", "wrong_type", "must be a number"}});
+    revision = value.get<std::uint64_t>();
+    if (*revision == 0 || *revision > newest_revision(s))
+      throw_problem(404, "not-found", "there is no revision " + *text);
+  }
+  if (view != "published" && view != "live")
+    throw_problem(422, "validation", "view is published or live",
+                  {{"/view", "unknown_value", "must be published or live"}});
+  auto all = view == "live" ? live(s, query_mission(request)) : published(s, revision, number);
+  const auto box = query_box(request);
+  const auto site = request.query_value("site");
+  std::erase_if(all, [&](const AnchorFeature& feature) {
+    if (site && (!feature.anchor.site || to_string(*feature.anchor.site) != *site)) return true;
+    if (!box) return false;
+    if (!feature.estimate || !feature.estimate->best || !feature.estimate->best->wgs84) return true;
+    const auto& at = *feature.estimate->best->wgs84;
+    return at.lon_deg < box->west || at.lon_deg > box->east || at.lat_deg < box->south ||
+           at.lat_deg > box->north;
+  });
+  return all;
+}
+
+Response as_csv(const std::vector<AnchorFeature>& features) {
+  Response response;
+  response.header("Content-Type", "text/csv; charset=utf-8");
+  response.body = anchors_csv_header() + "\r\n";
+  for (const auto& feature : features) response.body += anchor_csv_row(feature) + "\r\n";
+  return response;
+}
+
+Response list(AnchorApi& s, const Request& request) {
+  check_query(request, {"view", "revision", "mission", "site", "bbox", "limit", "cursor", "format"});
+  const auto page = page_query(request);
+  std::uint64_t number = 0;
+  auto all = wanted(s, request, number);
+  if (!page.cursor.empty()) {
+    const auto after = parse_network_id(page.cursor);
+    if (!after)
+      throw_problem(422, "validation", "cursor is not one of ours",
+                    {{"/cursor", "bad_cursor", "is not one of ours"}});
+    std::erase_if(all, [&](const auto& feature) { return feature.anchor.network_id <= after.value(); });
+  }
+  const std::string format = negotiate(request, {"geojson", "json", "csv", "ndjson"});
+  std::string next;
+  if (all.size() > page.limit) {
+    all.resize(page.limit);
+    next = to_string(all.back().anchor.network_id);
+  }
+  if (format == "csv") return as_csv(all);
+  if (format == "ndjson") {
+    Response response;
+    response.header("Content-Type", "application/x-ndjson");
+    for (const auto& feature : all) response.body += to_wire(anchor_feature_json(feature)) + '\n';
+    return response;
+  }
+  Ordered features = Ordered::array();
+  for (const auto& feature : all) features.push_back(anchor_feature_json(feature));
+  Ordered body{{"type", "FeatureCollection"},
+               {"features", std::move(features)},
+               {"revision", number == 0 ? Ordered(nullptr) : Ordered(number)},
+               {"next_cursor", next.empty() ? Ordered(nullptr) : Ordered(next)}};
+  Response response = json_response(200, body, "application/geo+json");
+  if (!next.empty()) response.header("Link", next_link(request, next));
+  return response;
+}
+
+/// By UUID or by network id ("0x6a2f").
+Anchor path_anchor(AnchorApi& s, const Request& request) {
+  const auto& text = request.params.at("id");
+  if (const auto id = parse_uuid(text)) return value_or_problem(s.anchors.anchor(AnchorId{id.value()}));
+  const auto network_id = parse_network_id(text);
+  if (!network_id) throw_problem(404, "not-found", "there is no anchor " + to_utf8(text, 60));
+  return value_or_problem(s.anchors.anchor(network_id.value()));
+}
+
+AnchorFeature feature_of(AnchorApi& s, const Anchor& anchor) {
+  Lookup lookup(s);
+  std::uint64_t number = 0;
+  for (auto& feature : published(s, std::nullopt, number)) {
+    if (feature.anchor.network_id == anchor.network_id) return feature;
+  }
+  AnchorFeature feature;
+  feature.anchor = anchor;
+  feature.site = lookup.site(anchor.site);
+  feature.status = anchor.retired ? "retired" : "found";
+  return feature;
+}
+
+std::string etag(const AnchorFeature& feature) {
+  return "\"a-" + std::to_string(feature.anchor.version) + '-' +
+         std::to_string(feature.revision.value_or(0)) +
+         (feature.contradicted ? '-' + to_string(feature.contradicted->by) : "") + '"';
+}
+
+Response answer(const AnchorFeature& feature) {
+  Response response = json_response(200, anchor_feature_json(feature), "application/geo+json");
+  response.header("ETag", etag(feature));
+  return response;
+}
+
+Response patch(AnchorApi& s, const Request& request) {
+  Anchor anchor = path_anchor(s, request);
+  require_match(request, etag(feature_of(s, anchor)));
+  std::vector<FieldError> errors;
+  patch_anchor(json_body(request), anchor, errors);
+  if (anchor.site && !s.anchors.site(*anchor.site))
+    errors.push_back({"/site", "unknown_site", "there is no such site"});
+  refuse_if_any(errors);
+  value_or_problem(s.anchors.update(anchor, anchor.version));
+  s.contradictions.changed();
+  s.audit(request, "anchor.change " + to_string(anchor.network_id));
+  return answer(feature_of(s, value_or_problem(s.anchors.anchor(anchor.id))));
+}
+
+Response estimates(AnchorApi& s, const Request& request) {
+  check_query(request, {"mission"});
+  const Anchor anchor = path_anchor(s, request);
+  Ordered items = Ordered::array();
+  for (const auto& view : s.missions.live(query_mission(request))) {
+    for (const auto& estimate : view.estimates) {
+      if (estimate.anchor == anchor.network_id)
+        items.push_back(Ordered::parse(live_estimate_json(view.mission.id, estimate)));
+    }
+  }
+  return list_response(request, std::move(items), "");
+}
+
+Response history(AnchorApi& s, const Request& request) {
+  check_query(request, {});
+  const Anchor anchor = path_anchor(s, request);
+  Ordered items = Ordered::array();
+  Lookup lookup(s);
+  for (const auto& position : value_or_problem(s.anchors.history(anchor.network_id)))
+    items.push_back(published_json(position, lookup.globe(position)));
+  return list_response(request, std::move(items), "");
+}
+
+Response export_geojson(AnchorApi& s, const Request& request) {
+  check_query(request, {"flat", "revision", "site", "bbox"});
+  const bool flat = query_flag(request, "flat");
+  std::uint64_t number = 0;
+  Ordered features = Ordered::array();
+  for (const auto& feature : wanted(s, request, number))
+    features.push_back(flat ? flat_feature_json(feature) : anchor_feature_json(feature));
+  Ordered body{{"type", "FeatureCollection"}, {"features", std::move(features)}};
+  if (!flat) body["revision"] = number == 0 ? Ordered(nullptr) : Ordered(number);
+  Response response = json_response(200, body, "application/geo+json");
+  response.header("Content-Disposition", "attachment; filename=\"anchors.geojson\"");
+  return response;
+}
+
+Response export_csv(AnchorApi& s, const Request& request) {
+  check_query(request, {"revision", "site", "bbox"});
+  std::uint64_t number = 0;
+  Response response = as_csv(wanted(s, request, number));
+  response.header("Content-Disposition", "attachment; filename=\"anchors.csv\"");
+  return response;
+}
+
+Response export_kml(AnchorApi& s, const Request& request) {
+  check_query(request, {"revision", "site", "bbox"});
+  std::uint64_t number = 0;
+  Response response;
+  response.body = anchors_kml(wanted(s, request, number));
+  response.header("Content-Type", "application/vnd.google-earth.kml+xml");
+  response.header("Content-Disposition", "attachment; filename=\"anchors.kml\"");
+  return response;
+}
+
+}  // namespace
+
+void add_anchor_routes(Router& router, AnchorApi& s) {
+  const auto on = [&s](auto function) {
+    return [&s, function](const Request& request) { return function(s, request); };
+  };
+  Route listed{Method::get, "/api/v1/anchors", readers(), on(list)};
+  // Running estimates of a mission that is not followed are computed.
+  listed.work_of = [](const Request& request) {
+    return request.query_value("view") == "live" ? Work::heavy : Work::ordinary;
+  };
+  router.add(std::move(listed));
+  router.add({Method::get, "/api/v1/anchors/{id}", readers(), [&s](const Request& request) {
+                check_query(request, {});
+                return answer(feature_of(s, path_anchor(s, request)));
+              }});
+  router.add({Method::patch, "/api/v1/anchors/{id}", Access::any_of({Role::integrator}), on(patch), 1 << 20,
+              false, true});
+  router.add(as_heavy({Method::get, "/api/v1/anchors/{id}/estimates", readers(), on(estimates)}));
+  router.add({Method::get, "/api/v1/anchors/{id}/history", readers(), on(history)});
+  router.add(as_heavy({Method::get, "/api/v1/exports/anchors.geojson", readers(), on(export_geojson)}));
+  router.add(as_heavy({Method::get, "/api/v1/exports/anchors.csv", readers(), on(export_csv)}));
+  router.add(as_heavy({Method::get, "/api/v1/exports/anchors.kml", readers(), on(export_kml)}));
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,262 @@
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "api/anchors/frame_json.hpp"
+#include "api/anchors/geo_service.hpp"
+#include "api/anchors/routes.hpp"
+#include "api/kit/reader.hpp"
+#include "api/kit/support.hpp"
+#include "core/geo/enu.hpp"
+#include "core/ports/site_store.hpp"
+#include "core/ports/store.hpp"
+
+namespace anchord::api {
+
+using Ordered = nlohmann::ordered_json;
+
+namespace {
+
+std::string etag(const LocalFrame& frame) { return "\"f-" + std::to_string(frame.version) + '"'; }
+
+Response answer(int status, const LocalFrame& frame) {
+  Response response = json_response(status, frame_json(frame));
+  response.header("ETag", etag(frame));
+  return response;
+}
+
+/// By UUID or by name.
+LocalFrame find(AnchorApi& s, const std::string& text) {
+  if (const auto id = parse_uuid(text)) return value_or_problem(s.frames->frame(FrameId{id.value()}));
+  return value_or_problem(s.frames->frame(text));
+}
+
+void read_fields(const nlohmann::json& body, bool whole, LocalFrame& frame) {
+  std::vector<FieldError> errors;
+  Fields fields(body, "", errors);
+  if (const auto name = fields.text("name", 80, whole)) {
+    frame.name = *name;
+    if (name->empty()) fields.error("name", "required", "a frame needs a name");
+  }
+  if (const auto text = fields.text("site", 36)) {
+    const auto id = parse_uuid(*text);
+    if (id)
+      frame.site = SiteId{id.value()};
+    else
+      fields.error("site", "bad_id", id.error().message);
+  }
+  fields.finish();
+  refuse_if_any(errors);
+}
+
+Response list(AnchorApi& s, const Request& request) {
+  check_query(request, {"limit", "cursor", "fields"});
+  const auto page = page_query(request);
+  auto rows = value_or_problem(s.frames->frames(page.limit + 1, cursor_id<FrameId>(page.cursor)));
+  const bool more = rows.size() > page.limit;
+  if (more) rows.pop_back();
+  Ordered items = Ordered::array();
+  for (const auto& frame : rows) items.push_back(frame_json(frame));
+  return list_response(request, std::move(items), more ? to_string(rows.back().id) : "");
+}
+
+Response create(AnchorApi& s, const Request& request) {
+  LocalFrame frame;
+  read_fields(json_body(request), true, frame);
+  frame.created = s.clock.now();
+  frame.id.uuid = make_uuid_v7(frame.created);
+  value_or_problem(s.frames->insert(frame));
+  s.audit(request, "frame.create " + frame.name);
+  Response response = answer(201, frame);
+  response.header("Location", "/api/v1/frames/" + to_string(frame.id));
+  return response;
+}
+
+Response patch(AnchorApi& s, const Request& request) {
+  LocalFrame frame = find(s, request.params.at("id"));
+  require_match(request, etag(frame));
+  read_fields(json_body(request), false, frame);
+  value_or_problem(s.frames->update(frame, frame.version));
+  ++frame.version;
+  s.audit(request, "frame.change " + frame.name);
+  return answer(200, frame);
+}
+
+Response remove(AnchorApi& s, const Request& request) {
+  const LocalFrame frame = find(s, request.params.at("id"));
+  require_match(request, etag(frame));
+  value_or_problem(s.frames->remove(frame.id, frame.version));
+  s.audit(request, "frame.delete " + frame.name);
+  Response response;
+  response.status = 204;
+  return response;
+}
+
+/// Published positions on the globe, for pairs that name an anchor.
+std::optional<Wgs84> published_place(AnchorApi& s, NetworkId anchor) {
+  for (const auto& position : value_or_problem(s.anchors.published(std::nullopt))) {
+    if (position.estimate.anchor == anchor && position.estimate.best) return position.estimate.best->wgs84;
+  }
+  return std::nullopt;
+}
+
+Response fit(AnchorApi& s, const Request& request) {
+  LocalFrame frame = find(s, request.params.at("id"));
+  std::vector<FieldError> errors;
+  auto wanted = read_fit_request(json_body(request), errors);
+  for (std::size_t i = 0; i < wanted.pairs.size(); ++i) {
+    auto& pair = wanted.pairs[i];
+    if (!pair.anchor) continue;
+    pair.wgs84 = published_place(s, *pair.anchor);
+    if (!pair.wgs84)
+      errors.push_back({"/pairs/" + std::to_string(i) + "/anchor", "no_position",
+                        to_string(*pair.anchor) + " has no published position on the globe"});
+  }
+  refuse_if_any(errors);
+  FrameDefinition definition;
+  definition.origin = *wanted.pairs.front().wgs84;
+  if (frame.site) {
+    const auto site = value_or_problem(s.anchors.site(*frame.site));
+    if (site.origin) definition.origin = *site.origin;
+  }
+  const EnuFrame enu(definition.origin);
+  for (auto& pair : wanted.pairs) {
+    pair.pair.enu_m = enu.enu_from_wgs84(*pair.wgs84).m;
+    definition.pairs.push_back(pair.pair);
+  }
+  definition.fit = value_or_problem(fit_frame(definition.pairs, wanted.options));
+  definition.fitted = s.clock.now();
+  frame.definition_json = frame_definition_json(definition);
+  value_or_problem(s.frames->update(frame, frame.version));
+  ++frame.version;
+  s.audit(request, "frame.fit " + frame.name);
+  return answer(200, frame);
+}
+
+enum class Space : std::uint8_t { geo, enu, projected, local };
+
+/// What a transformation needs to know, each thing only when one of its ends asks for it.
+struct Context {
+  std::optional<FrameDefinition> frame{};
+  std::optional<EnuFrame> enu{};
+  const Projection* projection{nullptr};
+
+  Wgs84 geo_from(Space space, const Eigen::Vector3d& at) const {
+    switch (space) {
+      case Space::geo:
+        return {at.y(), at.x(), at.z()};
+      case Space::enu:
+        return enu->wgs84_from_enu({at});
+      case Space::projected:
+        return value_or_problem(projection->geographic(at.head<2>(), at.z()));
+      case Space::local:
+        return EnuFrame(frame->origin).wgs84_from_enu({frame->fit.transform.enu_from(at)});
+    }
+    return {};
+  }
+  Eigen::Vector3d to(Space space, const Wgs84& at) const {
+    switch (space) {
+      case Space::geo:
+        return {at.lon_deg, at.lat_deg, at.height_m};
+      case Space::enu:
+        return enu->enu_from_wgs84(at).m;
+      case Space::projected: {
+        const auto map = value_or_problem(projection->easting_northing_m(at));
+        return {map.x(), map.y(), at.height_m};
+      }
+      case Space::local:
+        return frame->fit.transform.local_from(EnuFrame(frame->origin).enu_from_wgs84(at).m);
+    }
+    return {};
+  }
+};
+
+Response transform(AnchorApi& s, const Request& request) {
+  std::vector<FieldError> errors;
+  const auto body = json_body(request);
+  Fields fields(body, "", errors);
+  static const std::vector<std::string_view> k_spaces{"geo", "enu", "projected", "local"};
+  const auto from = fields.word("from", k_spaces, true), to = fields.word("to", k_spaces, true);
+  const auto frame_name = fields.text("frame", 80);
+  const auto site_text = fields.text("site", 36);
+  const auto* points = fields.child("points");
+  fields.finish();
+  if (points == nullptr || !points->is_array() || points->size() > 10'000)
+    errors.push_back({"/points", "wrong_type", "must be an array of at most 10000 points"});
+  refuse_if_any(errors);
+  const auto uses = [&](Space space) {
+    return static_cast<Space>(*from) == space || static_cast<Space>(*to) == space;
+  };
+  Context context;
+  std::optional<Site> site;
+  std::optional<LocalFrame> frame;
+  if (frame_name) frame = find(s, *frame_name);
+  if (uses(Space::local)) {
+    if (frame) context.frame = frame_definition(*frame);
+    if (!context.frame) errors.push_back({"/frame", "not_fitted", "name a frame that was fitted"});
+  }
+  if (site_text) {
+    const auto id = parse_uuid(*site_text);
+    if (id)
+      site = value_or_problem(s.anchors.site(SiteId{id.value()}));
+    else
+      errors.push_back({"/site", "bad_id", id.error().message});
+  } else if (frame && frame->site) {
+    site = value_or_problem(s.anchors.site(*frame->site));
+  }
+  if (uses(Space::enu)) {
+    if (site && site->origin)
+      context.enu.emplace(*site->origin);
+    else if (context.frame)
+      context.enu.emplace(context.frame->origin);
+    else
+      errors.push_back({"/site", "no_origin", "name a site with an origin"});
+  }
+  if (uses(Space::projected)) {
+    if (!site || !site->projected_epsg) {
+      errors.push_back({"/site", "no_epsg", "name a site with projected_epsg"});
+    } else {
+      const auto projection = s.geo.projection(*site->projected_epsg, site->crs_frame);
+      if (projection)
+        context.projection = projection.value();
+      else
+        errors.push_back({"/site", "no_projection", projection.error().message});
+    }
+  }
+  refuse_if_any(errors);
+  Ordered out = Ordered::array();
+  for (std::size_t i = 0; i < points->size(); ++i) {
+    const auto& point = (*points)[i];
+    const bool good = point.is_array() && point.size() == 3 && point[0].is_number() && point[1].is_number() &&
+                      point[2].is_number();
+    if (!good || (*from == 0 && std::abs(point[1].get<double>()) > 90)) {
+      errors.push_back({"/points/" + std::to_string(i), "wrong_type", "must be three numbers of the space"});
+      continue;
+    }
+    const Eigen::Vector3d at(point[0].get<double>(), point[1].get<double>(), point[2].get<double>());
+    const auto there = context.to(static_cast<Space>(*to), context.geo_from(static_cast<Space>(*from), at));
+    out.push_back({there.x(), there.y(), there.z()});
+  }
+  refuse_if_any(errors);
+  return json_response(200, {{"from", k_spaces[*from]}, {"to", k_spaces[*to]}, {"points", std::move(out)}});
+}
+
+}  // namespace
+
+void add_frame_routes(Router& router, AnchorApi& s) {
+  const auto on = [&s](auto function) {
+    return [&s, function](const Request& request) { return function(s, request); };
+  };
+  const auto engineer = Access::any_of({Role::engineer});
+  router.add({Method::get, "/api/v1/frames", readers(), on(list)});
+  router.add({Method::post, "/api/v1/frames", engineer, on(create)});
+  router.add({Method::get, "/api/v1/frames/{id}", readers(), [&s](const Request& request) {
+                check_query(request, {});
+                return answer(200, find(s, request.params.at("id")));
+              }});
+  router.add({Method::patch, "/api/v1/frames/{id}", engineer, on(patch), 1 << 20, false, true});
+  router.add({Method::del, "/api/v1/frames/{id}", engineer, on(remove), 1 << 20, false, true});
+  router.add(as_heavy({Method::post, "/api/v1/frames/{id}/fit", engineer, on(fit)}));
+  router.add(keeps_nothing(as_heavy({Method::post, "/api/v1/transform", readers(), on(transform)})));
+}
+
+}  // namespace anchord::api

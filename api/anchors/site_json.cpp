@@ -1,0 +1,133 @@
+#include "api/anchors/site_json.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "api/kit/reader.hpp"
+#include "core/base/to_wire.hpp"
+
+namespace anchord::api {
+
+using Json = nlohmann::json;
+using Ordered = nlohmann::ordered_json;
+
+namespace {
+
+template <class T>
+Ordered or_null(const std::optional<T>& value) {
+  if (!value) return nullptr;
+  return *value;
+}
+
+/// Longest texts of facility data; beyond it somebody pastes a document into a field.
+constexpr std::size_t k_max_text = 200;
+
+/// In a merge-patch null clears, absent keeps.
+void patch_text(Fields& fields, const Json& body, const char* key, std::string& target) {
+  if (auto text = fields.text(key, k_max_text))
+    target = *text;
+  else if (body.is_object() && body.contains(key) && body[key].is_null())
+    target.clear();
+}
+
+}  // namespace
+
+Ordered wgs84_json(const std::optional<Wgs84>& at) {
+  if (!at) return nullptr;
+  return {{"lon", at->lon_deg}, {"lat", at->lat_deg}, {"h_m", at->height_m}};
+}
+
+Ordered site_json(const Site& site) {
+  Ordered out{{"id", to_string(site.id)}, {"name", site.name}, {"origin", wgs84_json(site.origin)}};
+  out["outline"] = kept_json(site.outline_geojson);
+  out["crs"] = {{"frame", site.crs_frame.empty() ? Ordered(nullptr) : Ordered(site.crs_frame)},
+                {"epoch", or_null(site.crs_epoch)},
+                {"base",
+                 {{"source", site.base_source.empty() ? Ordered(nullptr) : Ordered(site.base_source)},
+                  {"sigma_m", or_null(site.base_sigma_m)}}}};
+  out["projected_epsg"] = or_null(site.projected_epsg);
+  out["created_at"] = to_rfc3339(site.created);
+  return out;
+}
+
+void patch_site(const Json& body, bool whole, Site& site, std::vector<FieldError>& errors) {
+  Fields fields(body, "", errors);
+  if (!fields.is_object()) return;
+  const auto cleared = [&](const char* key) { return body.contains(key) && body[key].is_null(); };
+  if (const auto text = fields.text("name", k_max_text, whole)) site.name = *text;
+  if (const Json* origin = fields.child("origin")) {
+    Fields inner(*origin, "/origin", errors);
+    const auto lon = inner.number("lon", -180, 180, true), lat = inner.number("lat", -90, 90, true),
+               height = inner.number("h_m", -500, 9000, true);
+    inner.finish();
+    if (lon && lat && height) site.origin = Wgs84{*lat, *lon, *height};
+  } else if (cleared("origin")) {
+    site.origin.reset();
+  }
+  if (const Json* outline = fields.child("outline")) {
+    const bool polygon = outline->is_object() && outline->value("type", Json()) == "Polygon" &&
+                         outline->contains("coordinates") && (*outline)["coordinates"].is_array();
+    if (!polygon || to_wire(*outline).size() > 100'000)
+      fields.error("outline", "wrong_type", "must be a GeoJSON Polygon below 100 kB");
+    else
+      site.outline_geojson = to_wire(*outline);
+  } else if (cleared("outline")) {
+    site.outline_geojson.clear();
+  }
+  if (const Json* crs = fields.child("crs")) {
+    Fields inner(*crs, "/crs", errors);
+    patch_text(inner, *crs, "frame", site.crs_frame);
+    if (const auto epoch = inner.number("epoch", 1900, 2200)) site.crs_epoch = *epoch;
+    if (const Json* base = inner.child("base")) {
+      Fields deepest(*base, "/crs/base", errors);
+      static const std::vector<std::string_view> k_sources{"known_point", "survey_in", "network"};
+      if (const auto source = deepest.word("source", k_sources)) site.base_source = k_sources[*source];
+      if (const auto sigma = deepest.number("sigma_m", 0, 100)) site.base_sigma_m = *sigma;
+      deepest.finish();
+    }
+    inner.finish();
+  }
+  if (const auto epsg = fields.integer("projected_epsg", 1024, 999'999))
+    site.projected_epsg = static_cast<int>(*epsg);
+  else if (cleared("projected_epsg"))
+    site.projected_epsg.reset();
+  fields.finish();
+}
+
+void patch_anchor(const Json& body, Anchor& anchor, std::vector<FieldError>& errors) {
+  Fields fields(body, "", errors);
+  if (!fields.is_object()) return;
+  patch_text(fields, body, "name", anchor.name);
+  patch_text(fields, body, "building", anchor.building);
+  patch_text(fields, body, "floor", anchor.floor);
+  patch_text(fields, body, "space", anchor.space);
+  patch_text(fields, body, "asset_tag", anchor.asset_tag);
+  patch_text(fields, body, "ifc_guid", anchor.ifc_guid);
+  if (const auto retired = fields.boolean("retired")) anchor.retired = *retired;
+  if (const auto text = fields.text("site", 36)) {
+    const auto id = parse_uuid(*text);
+    if (id)
+      anchor.site = SiteId{id.value()};
+    else
+      fields.error("site", "bad_id", id.error().message);
+  } else if (body.contains("site") && body["site"].is_null()) {
+    anchor.site.reset();
+  }
+  if (const Json* ids = fields.child("external_ids")) {
+    if (!ids->is_array() || ids->size() > 32) {
+      fields.error("external_ids", "wrong_type", "must be an array of at most 32 {system, id}");
+    } else {
+      anchor.external_ids.clear();
+      for (std::size_t i = 0; i < ids->size(); ++i) {
+        Fields inner((*ids)[i], "/external_ids/" + std::to_string(i), errors);
+        const auto system = inner.text("system", 60, true), id = inner.text("id", k_max_text, true);
+        inner.finish();
+        if (system && id) anchor.external_ids.emplace_back(*system, *id);
+      }
+    }
+  } else if (body.contains("external_ids") && body["external_ids"].is_null()) {
+    anchor.external_ids.clear();
+  }
+  fields.finish();
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,87 @@
+#include <nlohmann/json.hpp>
+
+#include "api/anchors/routes.hpp"
+#include "api/anchors/site_json.hpp"
+#include "api/kit/reader.hpp"
+#include "api/kit/support.hpp"
+#include "core/ports/store.hpp"
+
+namespace anchord::api {
+
+using Ordered = nlohmann::ordered_json;
+
+namespace {
+
+std::string etag(const Site& site) { return "\"s-" + std::to_string(site.version) + '"'; }
+
+Response answer(int status, const Site& site) {
+  Response response = json_response(status, site_json(site));
+  response.header("ETag", etag(site));
+  return response;
+}
+
+Response list(AnchorApi& s, const Request& request) {
+  check_query(request, {"limit", "cursor", "fields"});
+  const auto page = page_query(request);
+  auto rows = value_or_problem(s.anchors.sites(page.limit + 1, cursor_id<SiteId>(page.cursor)));
+  const bool more = rows.size() > page.limit;
+  if (more) rows.pop_back();
+  Ordered items = Ordered::array();
+  for (const auto& site : rows) items.push_back(site_json(site));
+  return list_response(request, std::move(items), more ? to_string(rows.back().id) : "");
+}
+
+Response create(AnchorApi& s, const Request& request) {
+  std::vector<FieldError> errors;
+  Site site;
+  patch_site(json_body(request), true, site, errors);
+  refuse_if_any(errors);
+  site.created = s.clock.now();
+  site.id.uuid = make_uuid_v7(site.created);
+  value_or_problem(s.anchors.insert(site));
+  s.audit(request, "site.create " + to_string(site.id));
+  Response response = answer(201, site);
+  response.header("Location", "/api/v1/sites/" + to_string(site.id));
+  return response;
+}
+
+Response patch(AnchorApi& s, const Request& request) {
+  Site site = value_or_problem(s.anchors.site(path_id<SiteId>(request)));
+  require_match(request, etag(site));
+  std::vector<FieldError> errors;
+  patch_site(json_body(request), false, site, errors);
+  refuse_if_any(errors);
+  value_or_problem(s.anchors.update(site, site.version));
+  ++site.version;
+  s.audit(request, "site.change " + to_string(site.id));
+  return answer(200, site);
+}
+
+Response remove(AnchorApi& s, const Request& request) {
+  const Site site = value_or_problem(s.anchors.site(path_id<SiteId>(request)));
+  require_match(request, etag(site));
+  value_or_problem(s.anchors.remove(site.id, site.version));
+  s.audit(request, "site.delete " + to_string(site.id));
+  Response response;
+  response.status = 204;
+  return response;
+}
+
+}  // namespace
+
+void add_site_routes(Router& router, AnchorApi& s) {
+  const auto on = [&s](auto function) {
+    return [&s, function](const Request& request) { return function(s, request); };
+  };
+  const auto admin = Access::any_of({Role::admin});
+  router.add({Method::get, "/api/v1/sites", readers(), on(list)});
+  router.add({Method::post, "/api/v1/sites", admin, on(create)});
+  router.add({Method::get, "/api/v1/sites/{id}", readers(), [&s](const Request& request) {
+                check_query(request, {});
+                return answer(200, value_or_problem(s.anchors.site(path_id<SiteId>(request))));
+              }});
+  router.add({Method::patch, "/api/v1/sites/{id}", admin, on(patch), 1 << 20, false, true});
+  router.add({Method::del, "/api/v1/sites/{id}", admin, on(remove), 1 << 20, false, true});
+}
+
+}  // namespace anchord::api

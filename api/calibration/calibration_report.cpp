@@ -1,0 +1,214 @@
+#include "api/calibration/calibration_report.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "api/wire/budget_json.hpp"
+#include "api/wire/outline_json.hpp"
+
+namespace anchord::api {
+
+using Json = nlohmann::json;
+
+namespace {
+
+std::string short_id(const std::string& id) { return id.substr(0, 8); }
+
+std::string number(double value, int decimals) {
+  char text[48];
+  std::snprintf(text, sizeof text, "%.*f", decimals, value);
+  return text;
+}
+
+std::string place_of(const Anchor& anchor) {
+  std::string out;
+  for (const auto* part : {&anchor.building, &anchor.floor, &anchor.space}) {
+    if (!part->empty()) out += (out.empty() ? "" : " ") + *part;
+  }
+  return out;
+}
+
+void add_profile_fact(Report& report, const Json& provenance) {
+  std::string words;
+  for (const auto& one : provenance.value("profiles", Json::array())) {
+    const std::string kit = one.value("kit", "");
+    words += (words.empty() ? "" : ", ") + kit +
+             (one.contains("version") && one["version"].is_number()
+                  ? " profile " + std::to_string(one["version"].get<int>()) + ", " +
+                        std::to_string(one.value("n_flights", 0)) + " flights"
+                  : " (no profile yet)");
+  }
+  report.facts.emplace_back("Kit", words.empty() ? "not named" : words);
+}
+
+void add_base_fact(Report& report) {
+  std::string words = "not stated";
+  if (report.site) {
+    words = report.site->base_source;
+    std::ranges::replace(words, '_', ' ');
+    if (words.empty()) words = "source not stated";
+    if (report.site->base_sigma_m) words += ", σ " + number(*report.site->base_sigma_m * 1000, 0) + " mm";
+  }
+  report.facts.emplace_back("Base", report.frame == TrackFrame::wgs84 ? words : "none, local frame");
+  std::string datum = report.frame == TrackFrame::wgs84 ? "not stated" : "local metres";
+  if (report.site && !report.site->crs_frame.empty()) {
+    datum = report.site->crs_frame;
+    if (report.site->crs_epoch) datum += ", epoch " + number(*report.site->crs_epoch, 2);
+  }
+  report.facts.emplace_back("Datum", datum);
+  if (report.site && report.site->projected_epsg)
+    report.facts.emplace_back("Map", "EPSG:" + std::to_string(*report.site->projected_epsg));
+}
+
+/// What surveyed points say of the answer, a sentence each.
+void add_check_points(Report& report, const nlohmann::ordered_json& provenance) {
+  if (!provenance.is_object() || !provenance.contains("check_points") ||
+      !provenance["check_points"].is_object())
+    return;
+  const auto& checked = provenance["check_points"];
+  const auto words = [](const nlohmann::ordered_json& v, const nlohmann::ordered_json& p) {
+    const auto at = v.get<std::vector<double>>();
+    std::string out = number(at.at(0), 3) + " m east, " + number(at.at(1), 3) + " m north, " +
+                      number(at.at(2), 3) + " m up";
+    if (p.is_number()) out += " (chance of so much " + number(p.get<double>(), 3) + ")";
+    return out;
+  };
+  for (const auto& point : checked["points"])
+    report.remarks.push_back("Check point " + point.value("network_id", "") + ": solved less surveyed " +
+                             words(point["delta_enu_m"], point["p_value"]) +
+                             (point.value("agrees", false) ? ", agrees." : ", does not agree."));
+  for (const auto& id : checked["not_found"])
+    report.remarks.push_back("Check point " + id.get<std::string>() + " has no position here.");
+  if (checked["shift"].is_object())
+    report.remarks.push_back("All check points together are off by " +
+                             words(checked["shift"]["shift_enu_m"], checked["shift"]["p_value"]) +
+                             (checked["shift"].value("significant", false)
+                                  ? ": look at the coordinates of the base, its datum and epoch."
+                                  : ", no more than chance."));
+}
+
+}  // namespace
+
+void describe(Report& report, const std::vector<Mission>& missions, const std::string& settings_json) {
+  std::size_t ranges = 0, used = 0, fixes = 0;
+  for (const auto& flight : report.evidence.flights) {
+    ranges += flight.n_ranges;
+    used += flight.n_used;
+    fixes += flight.n_fixes;
+    if (!flight.shared.bias_determined)
+      report.remarks.push_back(flight.name +
+                               " does not determine its own range bias, and no profile of the kit gives it: "
+                               "the regions allow for it.");
+  }
+  report.methods.push_back(std::to_string(missions.size()) +
+                           (missions.size() == 1 ? " flight, " : " flights, ") + std::to_string(ranges) +
+                           " ranges and " + std::to_string(fixes) + " positions of the tag; " +
+                           std::to_string(used) + " ranges are used.");
+  const Json settings = Json::parse(settings_json, nullptr, false);
+  const auto word = [&](const char* key, const char* usual) {
+    return settings.is_object() && settings.contains(key) && settings[key].is_string()
+               ? settings[key].get<std::string>()
+               : std::string(usual);
+  };
+  const bool plane = settings.is_object() && settings.value("dims", Json()) == 2;
+  std::string loss = "tukey";
+  if (settings.is_object() && settings.contains("loss") && settings["loss"].is_object())
+    loss = settings["loss"].value("type", loss);
+  report.methods.push_back(
+      std::string(
+          "Positions, range bias, range curve, time lag and antenna offset are solved together by robust "
+          "weighted least squares in ") +
+      (plane ? "the plane" : "three dimensions") + " (weights " + word("weights", "inverse_variance") +
+      ", loss " + loss + ", scale from the residuals). Covariances are scaled by what the residuals say.");
+  report.methods.emplace_back(
+      "95 % regions: Gaussian, from the scaled covariance with a floor of 4 cm per axis for what no residual "
+      "shows.");
+  const auto good = static_cast<std::size_t>(
+      std::ranges::count_if(report.anchors, [](const ReportAnchor& a) { return a.estimate.acceptable(); }));
+  report.remarks.push_back(std::to_string(good) + " of " + std::to_string(report.anchors.size()) +
+                           " anchors pass every acceptance gate.");
+  for (const auto& anchor : report.anchors) {
+    if (!anchor.estimate.mirror) continue;
+    report.remarks.push_back(
+        (anchor.name.empty() ? to_string(anchor.estimate.anchor) : anchor.name) + " has a mirror solution, " +
+        number((anchor.estimate.best->position.m - anchor.estimate.mirror->position.m).norm(), 2) +
+        " m away (probability " + number(anchor.estimate.mirror->probability, 2) + ").");
+  }
+}
+
+ReportBudget report_budget(const nlohmann::ordered_json& budget) {
+  ReportBudget out;
+  if (!budget.is_object()) return out;
+  for (const auto& [source, one] : budget["sources"].items()) {
+    if (one.is_object()) out.shares.emplace_back(source, one.value("share", 0.0));
+  }
+  out.help = budget.value("help_text", "");
+  return out;
+}
+
+Result<Report> calibration_report(AnchorStore& anchors, MissionStore& mission_store,
+                                  const Calibration& calibration, const std::string& program) {
+  Report report;
+  report.program = program;
+  report.calibration = to_string(calibration.id);
+  report.created = calibration.created;
+  report.frame = calibration.frame;
+  report.origin = calibration.origin;
+  BOOST_OUTCOME_TRY(const auto evidence, anchors.evidence(calibration.id));
+  if (!evidence.empty()) {
+    BOOST_OUTCOME_TRY(report.evidence, parse_evidence(evidence));
+  }
+  std::vector<Mission> missions;
+  for (const auto& id : calibration.missions) {
+    BOOST_OUTCOME_TRY(auto mission, mission_store.mission(id));
+    report.subtitle += (report.subtitle.empty() ? "" : ", ") + mission.name;
+    if (!report.site && mission.site) {
+      BOOST_OUTCOME_TRY(report.site, anchors.site(*mission.site));
+    }
+    missions.push_back(std::move(mission));
+  }
+  if (report.site) {
+    report.subtitle = report.site->name + ": " + report.subtitle;
+    if (report.origin) report.outline_m = outline_in_enu(report.site->outline_geojson, *report.origin);
+  }
+  BOOST_OUTCOME_TRY(const auto revisions, anchors.revisions(1000, 0));
+  std::map<NetworkId, PublishedPosition> published;
+  report.heading = "Not published";
+  for (const auto& revision : revisions) {
+    if (revision.calibration != calibration.id) continue;
+    if (published.empty()) report.heading = "Revision " + std::to_string(revision.number);
+    BOOST_OUTCOME_TRY(const auto positions, anchors.published(revision.number));
+    for (const auto& position : positions) {
+      if (position.since_revision == revision.number) published.emplace(position.estimate.anchor, position);
+    }
+  }
+  const auto told = nlohmann::ordered_json::parse(calibration.provenance_json, nullptr, false);
+  for (const auto& estimate : calibration.anchors) {
+    ReportAnchor anchor;
+    anchor.budget = report_budget(kept_budget(told, estimate.anchor));
+    anchor.estimate = estimate;
+    if (const auto known = anchors.anchor(estimate.anchor)) {
+      anchor.name = known.value().name;
+      anchor.place = place_of(known.value());
+    }
+    if (const auto at = published.find(estimate.anchor); at != published.end()) {
+      anchor.published = true;
+      anchor.overridden = at->second.overridden;
+    }
+    report.anchors.push_back(std::move(anchor));
+  }
+  std::string flights;
+  for (const auto& mission : missions)
+    flights += (flights.empty() ? "" : ", ") + short_id(to_string(mission.id));
+  report.facts.emplace_back(missions.size() == 1 ? "Mission" : "Missions", flights);
+  add_base_fact(report);
+  const Json provenance = Json::parse(calibration.provenance_json, nullptr, false);
+  if (provenance.is_object()) add_profile_fact(report, provenance);
+  report.facts.emplace_back("Calibration", short_id(report.calibration));
+  describe(report, missions, calibration.settings_json);
+  add_check_points(report, told);
+  return report;
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,142 @@
+// The body of POST /calibrations.
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "api/calibration/calibration_service.hpp"
+#include "api/calibration/check_points_json.hpp"
+#include "api/calibration/clues_json.hpp"
+#include "api/formats/flight_json.hpp"
+#include "api/kit/reader.hpp"
+#include "api/kit/word_table.hpp"
+#include "core/base/to_wire.hpp"
+
+namespace anchord::api {
+
+using Json = nlohmann::json;
+
+namespace {
+
+constexpr double k_far_m = 20'000;  // of the origin, as for the track
+
+constexpr auto k_solvers =
+    std::to_array<Word<anchord::Method>>({{"gauss_newton", anchord::Method::gauss_newton},
+                                          {"levenberg_marquardt", anchord::Method::levenberg_marquardt},
+                                          {"dogleg", anchord::Method::dogleg}});
+constexpr auto k_weights = std::to_array<Word<Weights>>(
+    {{"inverse_variance", Weights::inverse_variance}, {"dissertation", Weights::as_printed}});
+constexpr auto k_losses = std::to_array<Word<Loss>>(
+    {{"none", Loss::none}, {"huber", Loss::huber}, {"cauchy", Loss::cauchy}, {"tukey", Loss::tukey}});
+constexpr auto k_fixes = std::to_array<Word<FixClass>>({{"none", FixClass::none},
+                                                        {"single", FixClass::single},
+                                                        {"dgps", FixClass::dgps},
+                                                        {"float", FixClass::rtk_float},
+                                                        {"fixed", FixClass::rtk_fixed}});
+
+/// A word, or where to begin for each anchor that is named.
+void read_initial(Fields& fields, const Json& initial, FlightOptions& options,
+                  std::vector<FieldError>& errors) {
+  if (initial.is_string()) {
+    const auto word = fields.word("initial", {"search", "bearing_height"});
+    options.start_at_clues = word && *word == 1;
+    return;
+  }
+  if (!initial.is_object() || initial.size() > 1000)
+    return fields.error("initial", "wrong_type",
+                        "search, bearing_height, or an object: anchor id -> [east, north, up] in metres");
+  Fields starts(initial, "/initial", errors);
+  for (const auto& [id, place] : initial.items()) {
+    if (const auto at = starts.numbers(id, 3, -k_far_m, k_far_m))
+      options.starts[network_id_of(id)] = {(*at)[0], (*at)[1], (*at)[2]};
+  }
+  starts.finish();
+}
+
+}  // namespace
+
+CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldError>& errors) {
+  CalibrationRequest out;
+  Fields fields(body, "", errors);
+  std::set<std::string> seen;
+  const auto read_ids = [&](const char* key, std::vector<MissionId>& ids) {
+    const Json* list = fields.child(key);
+    if (list == nullptr) return;
+    if (!list->is_array() || list->empty() || list->size() > 100)
+      return fields.error(key, "wrong_type", "must be an array of 1 to 100 mission ids");
+    for (std::size_t i = 0; i < list->size(); ++i) {
+      const auto& item = (*list)[i];
+      const auto id = parse_uuid(item.is_string() ? item.get_ref<const std::string&>() : "");
+      const std::string at = std::string("/") + key + '/' + std::to_string(i);
+      if (!id)
+        errors.push_back({at, "bad_id", id.error().message});
+      else if (!seen.insert(to_string(id.value())).second)
+        errors.push_back({at, "duplicate", "the mission occurs twice"});
+      else
+        ids.push_back(MissionId{id.value()});
+    }
+  };
+  if (!fields.has("missions")) fields.error("missions", "required", "missions is missing");
+  read_ids("missions", out.missions);
+  read_ids("learn_from", out.learn_from);
+  auto& options = out.options;
+  if (const auto dims = fields.integer("dims", 2, 3)) options.dims = *dims == 2 ? Dims::two : Dims::three;
+  if (const auto solver = value_of_word(fields, "solver", k_solvers)) options.method = *solver;
+  if (const auto weights = value_of_word(fields, "weights", k_weights)) options.weights = *weights;
+  if (const Json* loss = fields.child("loss")) {
+    Fields inner(*loss, "/loss", errors);
+    if (const auto type = value_of_word(inner, "type", k_losses, true)) options.loss = *type;
+    // The robust scale comes from the residuals themselves; `scale` stretches it, 1.5 being the neutral value
+    // of api.md.
+    if (const auto scale = inner.number("scale", 0.1, 10)) options.mad_factor *= *scale / 1.5;
+    inner.finish();
+  }
+  if (const auto height = fields.number("anchor_height_m", -1000, 9000)) {
+    options.anchor_height_m = *height;
+    if (options.dims != Dims::two)
+      fields.error("anchor_height_m", "needs_dims_2", "a held height needs dims 2; in 3: height_prior");
+  }
+  if (const Json* prior = fields.child("height_prior")) {
+    Fields inner(*prior, "/height_prior", errors);
+    const auto height = inner.number("height_m", -1000, 9000, true);
+    const auto sigma = inner.number("sigma_m", 0.01, 100, true);
+    inner.finish();
+    if (options.dims == Dims::two)
+      fields.error("height_prior", "needs_dims_3", "a height prior needs dims 3; in 2: anchor_height_m");
+    else if (height && sigma)
+      options.height_prior = {*height, *sigma};
+  }
+  if (const auto gap = fields.number("max_gap_s", 0.01, 10)) options.max_gap_s = *gap;
+  if (const auto fix = value_of_word(fields, "min_fix", k_fixes)) options.min_fix = *fix;
+  out.max_correction_age_s = fields.number("max_correction_age_s", 0.1, 3600);
+  out.max_speed_mps = fields.number("max_speed_mps", 1, 1000);
+  out.max_acceleration_mps2 = fields.number("max_acceleration_mps2", 1, 1000);
+  if (const auto profile = fields.word("profile", {"kit", "none"})) out.use_profile = *profile == 0;
+  if (const auto steps = fields.integer("iterations", 0, 50)) out.iterations = static_cast<int>(*steps);
+  if (const Json* sigma = fields.child("sigma_m")) {
+    Fields inner(*sigma, "/sigma_m", errors);
+    if ((out.noise.los_m = inner.number("los", 0.001, 1))) options.min_scale_m = *out.noise.los_m;
+    if (const auto rtk = inner.number("rtk", 0, 1)) options.floor_sigma_m = *rtk;
+    out.noise.nlos_m = inner.number("nlos", 0.001, 10);
+    inner.finish();
+  }
+  if (const Json* initial = fields.child("initial")) read_initial(fields, *initial, options, errors);
+  if (const Json* clues = fields.child("clues")) read_clues(*clues, "/clues", options, errors);
+  if (const Json* models = fields.child("models")) out.models = read_flight_models(*models, errors);
+  // Kept with the settings and asked once everything is solved: no data.
+  if (const Json* points = fields.child("check_points")) (void)read_check_points(*points, errors);
+  out.flight_clues = fields.boolean("flight_clues").value_or(true);
+  out.compare_uncorrected = fields.boolean("compare_uncorrected").value_or(true);
+  // Who names a loss wants it: the likelihood of the models then takes its place only where asked for.
+  out.likelihood = out.models.likelihood.value_or(!fields.has("loss"));
+  if (auto frame = fields.text("frame", 80)) out.frame = std::move(*frame);
+  out.use_anchor_anchor = fields.boolean("use_anchor_anchor").value_or(true);
+  out.site_outline = fields.boolean("site_outline").value_or(true);
+  fields.finish();
+  out.settings_json = body.is_object() ? [&] {
+    Json settings = body;
+    settings.erase("missions");
+    return to_wire(settings);
+  }() : "{}";
+  return out;
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,481 @@
+#include "api/calibration/calibration_service.hpp"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "api/admin/job_service.hpp"
+#include "api/anchors/contradiction_watch.hpp"
+#include "api/calibration/calibration_place.hpp"
+#include "api/calibration/check_points_json.hpp"
+#include "api/calibration/kit_profiles.hpp"
+#include "api/formats/evidence.hpp"
+#include "api/wire/budget_json.hpp"
+#include "api/wire/exclusion_json.hpp"
+#include "core/base/sha256.hpp"
+#include "core/base/to_wire.hpp"
+#include "core/geo/enu.hpp"
+#include "core/geo/track_check.hpp"
+#include "core/localize/flight_solver.hpp"
+#include "core/localize/fuse.hpp"
+
+namespace anchord::api {
+
+using Json = nlohmann::json;
+
+Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission,
+                               const std::function<bool()>& canceled, bool with_cir,
+                               const std::vector<Exclusion>& exclusions) {
+  FlightData flight;
+  flight.mission = mission;
+  flight.exclusions = exclusions;
+  MeasurementStore::Filter filter;
+  filter.mission = mission.id;
+  filter.limit = 10'000;
+  do {
+    if (canceled()) return make_error(Errc::canceled, "canceled");
+    BOOST_OUTCOME_TRY(auto page, store.fixes(filter));
+    for (auto& row : page.rows) {
+      if (excluded(exclusions, row))
+        ++flight.n_fixes_excluded;
+      else
+        flight.fixes.push_back(std::move(row));
+    }
+    filter.after = page.next;
+  } while (!filter.after.empty());
+  filter.with_cir = with_cir;
+  if (with_cir) filter.limit = 1000;  // 4 kB each
+  do {
+    if (canceled()) return make_error(Errc::canceled, "canceled");
+    BOOST_OUTCOME_TRY(auto page, store.ranges(filter));
+    for (auto& row : page.rows) {
+      if (excluded(exclusions, row))
+        ++flight.n_ranges_excluded[row.anchor];
+      else
+        flight.ranges.push_back(std::move(row));
+    }
+    filter.after = page.next;
+  } while (!filter.after.empty());
+  return flight;
+}
+
+/// Flights by the place they have in the request; those to learn from stand behind.
+struct CalibrationService::Solved {
+  Calibration calibration;
+  std::vector<FlightData> flights;
+  std::vector<std::optional<FlightSolution>> solutions;
+  std::vector<KitProfile> learned;
+  Json profiles = Json::array();
+  Evidence evidence;
+  std::size_t n_clues{0};                  ///< anchors with a bearing or a height as a prior
+  std::vector<FlightModelsReport> models;  ///< what they did to each flight
+
+  std::vector<std::size_t> of_kit(const std::string& kit) const {
+    std::vector<std::size_t> out;
+    for (std::size_t i = 0; i < flights.size(); ++i) {
+      if (flights[i].mission.kit == kit) out.push_back(i);
+    }
+    return out;
+  }
+  std::vector<Mission> missions() const {
+    std::vector<Mission> out;
+    for (const auto& flight : flights) out.push_back(flight.mission);
+    return out;
+  }
+};
+
+namespace {
+
+/// The one site's origin where the flights are near it; nothing else is as steady from calibration to
+/// calibration.
+std::optional<Wgs84> site_origin(const std::vector<FlightData>& flights, AnchorStore& anchors,
+                                 const Wgs84& middle, double max_distance_m) {
+  const auto& site = flights.front().mission.site;
+  if (!site) return std::nullopt;
+  for (const auto& flight : flights)
+    if (flight.mission.site != site) return std::nullopt;
+  const auto found = anchors.site(*site);
+  if (!found || !found.value().origin) return std::nullopt;
+  const bool near =
+      (ecef_from_wgs84(*found.value().origin) - ecef_from_wgs84(middle)).norm() <= max_distance_m;
+  return near ? found.value().origin : std::nullopt;
+}
+
+/// One frame for all flights, so that their answers can be compared: the site's, else the middle of the first
+/// flight's positions as far as they are believed.
+Result<void> choose_frame(const std::vector<FlightData>& flights, AnchorStore& anchors,
+                          FlightOptions& options, Calibration& out) {
+  out.frame = flights.front().mission.frame;
+  for (const auto& flight : flights) {
+    if (flight.mission.frame != out.frame)
+      return make_error(Errc::invalid_argument,
+                        "missions on the globe and in a local frame cannot be solved together");
+    // Local coordinates of two places share no origin: their numbers would mix without anybody noticing.
+    const Mission& first = flights.front().mission;
+    if (out.frame == TrackFrame::local && flight.mission.site && first.site &&
+        *flight.mission.site != *first.site)
+      return make_error(Errc::invalid_argument,
+                        first.name + " and " + flight.mission.name +
+                            " are in local frames of different sites and cannot be solved together");
+    if (out.frame != TrackFrame::wgs84 || options.origin) continue;
+    const auto checked = check_track(flight.fixes, out.frame, options.min_fix, options.track);
+    if (!checked.centre) continue;
+    const auto of_site = site_origin(flights, anchors, *checked.centre, options.track.max_distance_m);
+    options.origin = of_site ? of_site : checked.centre;
+  }
+  out.origin = out.frame == TrackFrame::wgs84 ? options.origin : std::nullopt;
+  return boost::outcome_v2::success();
+}
+
+/// A flight solved with other than the house's settings says other things about its kit.
+bool teaches(const FlightOptions& options) {
+  const FlightOptions usual;
+  return options.loss == usual.loss && options.weights == usual.weights && options.dims == usual.dims &&
+         options.min_fix == usual.min_fix && options.mad_factor == usual.mad_factor && !options.fixed_bias_m;
+}
+
+bool believed(const FlightSolution& solution) {
+  return std::ranges::any_of(solution.anchors,
+                             [](const AnchorSolution& a) { return a.estimate.verdict == Verdict::ok; });
+}
+
+Json site_base(const Site& site) {
+  const auto text = [](const std::string& t) { return t.empty() ? Json(nullptr) : Json(t); };
+  return {{"site", to_string(site.id)},
+          {"frame", text(site.crs_frame)},
+          {"epoch", site.crs_epoch ? Json(*site.crs_epoch) : Json(nullptr)},
+          {"source", text(site.base_source)},
+          {"sigma_m", site.base_sigma_m ? Json(*site.base_sigma_m) : Json(nullptr)}};
+}
+
+/// Those that applied, by id: which rows they are is in the record, and the digest says that it is that
+/// record.
+Json exclusions_provenance(const std::vector<Exclusion>& exclusions) {
+  Json items = Json::array();
+  Sha256 digest;
+  for (const auto& e : exclusions) {
+    if (!e.applies()) continue;
+    digest.add(std::string_view(exclusion_canonical(e)));
+    items.push_back({{"id", to_string(e.id)},
+                     {"kind", e.selection.kind == RowKind::ranges ? "ranges" : "fixes"},
+                     {"n_rows", e.n_rows},
+                     {"reason", e.reason},
+                     {"by", e.by}});
+  }
+  const bool none = items.empty();
+  return {{"items", std::move(items)}, {"sha256", none ? Json(nullptr) : Json(digest.hex())}};
+}
+
+Json flight_provenance(const FlightData& flight, const FlightSolution& s) {
+  const auto valued = [](const Valued& v) { return Json{{"value", v.value}, {"sigma", v.sigma}}; };
+  Json antennas = Json::array();
+  for (const auto& one : s.shared.lever_up_by_antenna)
+    antennas.push_back(
+        {{"tag", to_string(one.tag)}, {"antenna", one.antenna}, {"lever_up_m", valued(one.up_m)}});
+  return {{"mission", to_string(flight.mission.id)},
+          {"name", flight.mission.name},
+          {"kit", flight.mission.kit},
+          {"bias_m", valued(s.shared.bias_m)},
+          {"curve_m_per_efold", valued(s.shared.curve_m)},
+          {"lag_s", valued(s.shared.lag_s)},
+          {"lever_up_m", valued(s.shared.lever_up_m)},
+          {"lever_up_by_antenna", std::move(antennas)},
+          {"bias_determined", s.shared.bias_determined},
+          {"n_fixes", s.n_fixes},
+          {"n_ranges", s.n_ranges},
+          {"n_anchor_anchor", std::ranges::count(flight.ranges, RangeKind::anchor_anchor, &Range::kind)},
+          {"n_used", s.n_used},
+          {"refused", s.refused},
+          {"fixes_refused", s.fixes_refused},
+          {"exclusions", exclusions_provenance(flight.exclusions)},
+          {"notes", s.notes}};
+}
+
+/// What was stated about the noise, and how many ranges it bore on: of sigma_m.nlos those a model classified.
+Json noise_provenance(const CalibrationRequest& request, const std::vector<FlightModelsReport>& models) {
+  std::size_t n_believed = 0;
+  for (const auto& report : models) n_believed += report.used ? report.n_believed : 0;
+  const auto stated = [](const std::optional<double>& v) { return v ? Json(*v) : Json(nullptr); };
+  return {{"los", stated(request.noise.los_m)},
+          {"nlos", stated(request.noise.nlos_m)},
+          {"rtk", request.options.floor_sigma_m},
+          {"n_nlos_applied", request.noise.nlos_m ? n_believed : 0}};
+}
+
+/// The budget of an anchor's answer, of several flights through their fusion, with the base's own error.
+Json budget_of(const std::vector<const AnchorSolution*>& flights, const Estimate& fused,
+               const std::optional<double>& base_sigma_m) {
+  if (!fused.best) return nullptr;
+  std::vector<BudgetOf> counted;
+  const ErrorBudget* chosen = nullptr;
+  for (const auto* flight : flights) {
+    if (!flight->budget) continue;
+    const auto& e = flight->estimate;
+    if (e.best->covariance_m2 == fused.best->covariance_m2) chosen = &*flight->budget;
+    if (e.verdict == Verdict::ok) counted.push_back({&*flight->budget, e.best->covariance_m2});
+  }
+  if (chosen == nullptr && counted.empty()) return nullptr;
+  // As fuse_estimates: where no flight is ok, the narrowest stands for all.
+  ErrorBudget budget = chosen != nullptr ? *chosen : fused_budget(counted, fused.best->covariance_m2);
+  if (base_sigma_m)
+    budget.part(ErrorSource::base) = *base_sigma_m * *base_sigma_m * Eigen::Matrix3d::Identity();
+  return budget_json(budget, base_sigma_m.has_value());
+}
+
+/// Misclosures of the surveyed points that the request named.
+Json checked(const CalibrationRequest& request, const Calibration& made) {
+  const auto settings = Json::parse(request.settings_json, nullptr, false);
+  if (!settings.is_object() || !settings.contains("check_points")) return nullptr;
+  std::vector<FieldError> errors;  // none: the request was accepted with them
+  return check_points_provenance(read_check_points(settings["check_points"], errors), made,
+                                 request.options.dims == Dims::two);
+}
+
+/// Where an anchor would stand without the models, and how far they moved it.
+Json without_models(const Estimate& raw, const Calibration& made) {
+  const auto at = std::ranges::find(made.anchors, raw.anchor, &Estimate::anchor);
+  Json out{{"network_id", to_string(raw.anchor)}, {"enu_m", nullptr}, {"moved_m", nullptr}};
+  if (!raw.best) return out;
+  const auto& p = raw.best->position.m;
+  out["enu_m"] = {p.x(), p.y(), p.z()};
+  if (at != made.anchors.end() && at->best) out["moved_m"] = (at->best->position.m - p).norm();
+  return out;
+}
+
+}  // namespace
+
+Result<Job> CalibrationService::submit(CalibrationRequest request) {
+  for (const auto& id : request.missions) {
+    BOOST_OUTCOME_TRYV(deps_.missions.mission(id));
+  }
+  ModelRegistry::Active models;
+  if (deps_.models != nullptr) {
+    // Chosen now: a promotion while the job waits changes nothing of what was asked for.
+    auto chosen = models_for(request.models, *deps_.models);
+    if (!chosen) return make_error(Errc::invalid_argument, "models: " + chosen.error().message);
+    models = std::move(chosen).value();
+  }
+  if (!request.frame.empty()) {  // asked now: a frame nobody fitted is no reason to solve for minutes
+    if (deps_.frames == nullptr) return make_error(Errc::invalid_argument, "frame: this server has none");
+    const auto frame = calibration_frame(*deps_.frames, request.frame);
+    if (!frame) return make_error(Errc::invalid_argument, "frame: " + frame.error().message);
+  }
+  const std::string settings = request.settings_json;
+  return deps_.jobs.submit(
+      "calibration", settings,
+      [this, wanted = std::move(request), models = std::move(models)](JobContext& job) -> Result<JobEnd> {
+        BOOST_OUTCOME_TRY(const auto solved, solve(wanted, models, job));
+        const Calibration& made = solved.calibration;
+        BOOST_OUTCOME_TRYV(deps_.anchors.insert(made));
+        if (deps_.contradictions != nullptr) {
+          deps_.contradictions->changed();
+          (void)deps_.contradictions->standing();
+        }
+        const std::string id = to_string(made.id);
+        for (const auto& profile : solved.learned) {
+          BOOST_OUTCOME_TRYV(deps_.profiles->learn(profile, solved.missions(), "calibration " + id));
+        }
+        return JobEnd{"/api/v1/calibrations/" + id, std::to_string(made.anchors.size()) + " anchors"};
+      });
+}
+
+/// All flights of one kit together, with what the kit's stored profile says about them.
+Result<void> CalibrationService::solve_kit(const CalibrationRequest& request, const FlightOptions& options,
+                                           Solved& solved, const std::string& kit) {
+  FlightOptions of_kit = options;
+  std::uint64_t version = 0;
+  const bool stored = deps_.profiles != nullptr && request.use_profile && !kit.empty();
+  if (stored && !of_kit.fixed_bias_m) {
+    BOOST_OUTCOME_TRY(auto profile, deps_.profiles->for_flights(kit, solved.missions()));
+    if (profile) {
+      of_kit.profile = std::move(profile->profile);
+      version = profile->version;
+    }
+  }
+  const auto members = solved.of_kit(kit);
+  std::vector<FlightData> named;
+  for (const std::size_t i : members) {
+    named.push_back(solved.flights[i]);
+    // Factors of a profile are told apart by this name.
+    named.back().mission.name = KitProfiles::flight_key(solved.flights[i].mission);
+  }
+  if (deps_.flight_clues && request.flight_clues && options.origin) {
+    procedure::FlightClues told;
+    for (const std::size_t i : members)
+      told = procedure::merged(std::move(told), deps_.flight_clues(solved.flights[i].mission.id));
+    // What the request says of an anchor stands; the flights fill in the rest.
+    of_kit.clues.merge(procedure::clues_in(told, EnuFrame(*options.origin)));
+    solved.n_clues += of_kit.clues.size();
+  }
+  std::vector<const FlightData*> pointers;
+  for (const auto& flight : named) pointers.push_back(&flight);
+  KitProfile learned;
+  BOOST_OUTCOME_TRY(auto answers, solve_flights(pointers, of_kit, &learned));
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    if (!believed(answers[k]))
+      std::erase_if(learned.factors,
+                    [&](const ProfileFactor& f) { return f.flight == named[k].mission.name; });
+    solved.solutions[members[k]] = std::move(answers[k]);
+  }
+  if (!kit.empty()) {
+    solved.profiles.push_back({{"kit", kit},
+                               {"version", version > 0 ? Json(version) : Json(nullptr)},
+                               {"n_flights", of_kit.profile ? of_kit.profile->factors.size() : 0}});
+    if (stored && teaches(options)) solved.learned.push_back(std::move(learned));
+  }
+  if (request.iterations > 0 && !members.empty() && members.front() < request.missions.size() &&
+      solved.evidence.course.empty()) {
+    BOOST_OUTCOME_TRY(solved.evidence.course, course_of(named.front(), of_kit, request.iterations));
+  }
+  return boost::outcome_v2::success();
+}
+
+Result<void> CalibrationService::solve_kits(const CalibrationRequest& request, const FlightOptions& options,
+                                            Solved& solved) {
+  solved.solutions.resize(solved.flights.size());
+  std::set<std::string> kits;
+  for (const auto& flight : solved.flights) kits.insert(flight.mission.kit);
+  for (const auto& kit : kits) {
+    BOOST_OUTCOME_TRYV(solve_kit(request, options, solved, kit));
+  }
+  return boost::outcome_v2::success();
+}
+
+Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRequest& request,
+                                                             const ModelRegistry::Active& models,
+                                                             JobContext& job) {
+  const auto canceled_now = [&] { return job.canceled(); };
+  Solved solved;
+  std::vector<MissionId> all = request.missions;
+  all.insert(all.end(), request.learn_from.begin(), request.learn_from.end());
+  for (const auto& id : all) {
+    BOOST_OUTCOME_TRY(auto mission, deps_.missions.mission(id));
+    std::vector<Exclusion> exclusions;
+    if (deps_.exclusions != nullptr) {
+      BOOST_OUTCOME_TRY(exclusions, deps_.exclusions->exclusions(id));
+    }
+    BOOST_OUTCOME_TRY(auto flight,
+                      load_flight(deps_.measurements, mission, canceled_now, models.needs_cir, exclusions));
+    if (!request.use_anchor_anchor)
+      std::erase_if(flight.ranges, [](const Range& r) { return r.kind == RangeKind::anchor_anchor; });
+    solved.flights.push_back(std::move(flight));
+    job.progress(0.3 * static_cast<double>(solved.flights.size()) / static_cast<double>(all.size()), "load",
+                 solved.flights.back().mission.name);
+  }
+  FlightOptions options = request.options;
+  options.track = deps_.track;
+  const auto take = [](const std::optional<double>& told, double& limit) { limit = told.value_or(limit); };
+  take(request.max_correction_age_s, options.track.max_correction_age_s);
+  take(request.max_speed_mps, options.track.max_speed_mps);
+  take(request.max_acceleration_mps2, options.track.max_acceleration_mps2);
+  options.canceled = canceled_now;
+  Calibration& out = solved.calibration;
+  BOOST_OUTCOME_TRYV(choose_frame(solved.flights, deps_.anchors, options, out));
+  std::optional<CalibrationFrame> frame;
+  if (!request.frame.empty() && deps_.frames != nullptr) {
+    BOOST_OUTCOME_TRY(frame, calibration_frame(*deps_.frames, request.frame));
+  }
+  const auto outline =
+      use_site_outline(request.site_outline, solved.flights, out.origin, frame, deps_.anchors, options);
+  job.progress(0.3, "solve", std::to_string(solved.flights.size()) + " flights");
+  Solved raw;  // the same without the models
+  CalibrationRequest wanted = request;
+  if (!models.predictor.empty()) {
+    raw.flights = solved.flights;
+    std::size_t n_corrected = 0, n_believed = 0;
+    for (auto& flight : solved.flights) {
+      solved.models.push_back(correct_flight(models, flight, request.likelihood, request.noise));
+      n_corrected += solved.models.back().n_corrected;
+      n_believed += solved.models.back().n_believed;
+    }
+    // A kit's profile tells the bias of raw ranges: of corrected ones it would take it off twice, and what
+    // these teach is no bias of the kit.
+    if (n_corrected > 0) wanted.use_profile = false;
+    const bool needed = request.compare_uncorrected || request.models.ask_worth;
+    if (n_corrected + n_believed == 0 || !needed) raw.flights.clear();
+  }
+  for (auto* flights : {&solved.flights, &raw.flights})
+    for (auto& flight : *flights)
+      for (auto& range : flight.ranges) range.cir.reset();
+  BOOST_OUTCOME_TRYV(solve_kits(wanted, options, solved));
+  if (!raw.flights.empty()) {
+    job.progress(0.7, "solve", "without the models");
+    CalibrationRequest plain = request;
+    plain.iterations = 0;
+    BOOST_OUTCOME_TRYV(solve_kits(plain, options, raw));
+    if (request.models.ask_worth &&
+        leave_out_worthless(solved.models, solved.flights, raw.flights, solved.solutions, raw.solutions)) {
+      job.progress(0.8, "solve", "without models that show no worth");
+      const bool corrected =
+          std::ranges::any_of(solved.models, [](const auto& m) { return m.used && m.n_corrected > 0; });
+      if (!corrected) wanted.use_profile = request.use_profile;
+      solved.profiles = Json::array();
+      solved.n_clues = 0;
+      solved.evidence.course.clear();
+      BOOST_OUTCOME_TRYV(solve_kits(wanted, options, solved));
+    }
+    solved.learned = std::move(raw.learned);
+  }
+  const bool compared = !raw.flights.empty() && request.compare_uncorrected;
+  if (canceled_now()) return make_error(Errc::canceled, "canceled");
+  std::map<NetworkId, std::vector<Estimate>> by_anchor, by_anchor_raw;
+  std::map<NetworkId, std::vector<const AnchorSolution*>> budgets_of;
+  Json flights = Json::array();
+  for (std::size_t i = 0; i < request.missions.size(); ++i) {
+    const auto& solution = *solved.solutions[i];
+    for (const auto& anchor : solution.anchors) {
+      by_anchor[anchor.estimate.anchor].push_back(anchor.estimate);
+      budgets_of[anchor.estimate.anchor].push_back(&anchor);
+    }
+    solved.evidence.flights.push_back(evidence_of(solved.flights[i], solution, out.origin));
+    flights.push_back(flight_provenance(solved.flights[i], solution));
+    if (!compared) continue;
+    for (const auto& anchor : raw.solutions[i]->anchors)
+      by_anchor_raw[anchor.estimate.anchor].push_back(anchor.estimate);
+  }
+  Json base = nullptr, budgets = Json::object();
+  std::optional<double> base_sigma_m;
+  if (const auto& site = solved.flights.front().mission.site) {
+    if (const auto found = deps_.anchors.site(*site)) {
+      base = site_base(found.value());
+      // Local metres say nothing of a base.
+      if (out.frame == TrackFrame::wgs84) base_sigma_m = found.value().base_sigma_m;
+    }
+  }
+  for (const auto& [id, estimates] : by_anchor) {
+    Estimate estimate = fuse_estimates(estimates);
+    if (auto budget = budget_of(budgets_of[id], estimate, base_sigma_m); !budget.is_null())
+      budgets[to_string(id)] = std::move(budget);
+    if (out.origin) {
+      const EnuFrame globe(*out.origin);
+      if (estimate.best) estimate.best->wgs84 = globe.wgs84_from_enu(estimate.best->position);
+      if (estimate.mirror) estimate.mirror->wgs84 = globe.wgs84_from_enu(estimate.mirror->position);
+    }
+    if (frame && !out.origin) place_on_globe(*frame, estimate);
+    out.anchors.push_back(std::move(estimate));
+  }
+  Json uncorrected = compared ? Json::array() : Json(nullptr);
+  for (const auto& [id, estimates] : by_anchor_raw)
+    uncorrected.push_back(without_models(fuse_estimates(estimates), out));
+  out.provenance_json = to_wire(Json{
+      {"profiles", std::move(solved.profiles)},
+      {"base", std::move(base)},
+      {"budgets", std::move(budgets)},
+      {"check_points", checked(request, out)},
+      {"n_clues", solved.n_clues},
+      {"frame", frame ? frame_provenance(*frame, out) : Json(nullptr)},
+      {"clues", {{"outline", outline}}},
+      {"sigma_m", noise_provenance(request, solved.models)},
+      {"models", models.predictor.empty() ? Json(nullptr) : Json(flight_models_json(models, solved.models))},
+      {"uncorrected", std::move(uncorrected)},
+      {"flights", std::move(flights)}});
+  out.evidence_json = evidence_json(solved.evidence);
+  out.created = deps_.clock.now();
+  out.id.uuid = job.job().id.uuid;  // the job and what it makes share their number
+  out.missions = request.missions;
+  out.settings_json = request.settings_json;
+  job.progress(0.95, "store", "");
+  return solved;
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <string>
+
+#include "api/kit/audit.hpp"
+
+namespace anchord {
+class AnchorStore;
+class Clock;
+class MissionStore;
+}  // namespace anchord
+
+namespace anchord::api {
+
+class CalibrationService;
+class ContradictionWatch;
+class EventLog;
+class Hub;
+class JobService;
+class KitProfiles;
+class MissionService;
+class Router;
+
+/// What the routes of calibrations, revisions and kits work with; lives as long as the router.
+struct CalibrationApi {
+  CalibrationService& calibrations;
+  AnchorStore& anchors;
+  MissionStore& mission_store;
+  MissionService& missions;
+  ContradictionWatch& contradictions;
+  KitProfiles* profiles{nullptr};  ///< null: their routes do not exist
+  JobService& jobs;
+  Hub& hub;
+  EventLog& events;
+  const Clock& clock;
+  Audit audit;
+  std::string program;  ///< "anchord 0.2.0", for reports
+};
+
+void add_calibration_routes(Router& router, CalibrationApi& api);
+void add_comparison_routes(Router& router, CalibrationApi& api);
+void add_kit_routes(Router& router, CalibrationApi& api);
+
+}  // namespace anchord::api

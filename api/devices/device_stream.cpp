@@ -1,0 +1,120 @@
+#include "api/devices/device_stream.hpp"
+
+#include <algorithm>
+
+#include "api/admin/event_log.hpp"
+#include "core/ports/devices.hpp"
+#include "core/ports/mission_bin.hpp"
+#include "core/ports/store.hpp"
+
+namespace anchord::api {
+
+/// With changing_ held.
+void DeviceStream::change(std::vector<Holder> next) {
+  const auto now = next.empty() ? std::nullopt : std::optional(next.back().id);
+  std::vector<MissionId> ids;
+  for (const auto& one : next) ids.push_back(one.id);
+  {
+    const std::scoped_lock lock(mutex_);
+    stack_ = std::move(next);
+  }
+  if (deps_.devices->recording_into() != now) deps_.devices->record_into(now);
+  if (deps_.store == nullptr) return;
+  if (const auto kept = deps_.store->keep_device_stream(ids); !kept) {
+    deps_.events.add("warning", "devices.not_kept",
+                     "a restart would not know whose the devices are: " + kept.error().message, now);
+  }
+}
+
+std::optional<DeviceStream::Holder> DeviceStream::begin(const Mission& mission) {
+  if (deps_.devices == nullptr) return std::nullopt;
+  const std::scoped_lock changing(changing_);
+  const auto before = holder();
+  if (!before) {
+    change({{mission.id, mission.name}});
+    return std::nullopt;
+  }
+  if (before->id == mission.id) return std::nullopt;
+  if (!deps_.devices->devices().empty()) {
+    deps_.events.add("warning", "devices.held",
+                     mission.name + " gets no rows of the devices: " + before->name + " records with them",
+                     mission.id);
+  }
+  return before;
+}
+
+std::optional<DeviceStream::Holder> DeviceStream::take(const Mission& mission, const std::string& by) {
+  if (deps_.devices == nullptr) return std::nullopt;
+  const std::scoped_lock changing(changing_);
+  const auto before = holder();
+  if (before && before->id == mission.id) return std::nullopt;
+  auto next = stack_;
+  std::erase_if(next, [&](const Holder& one) { return one.id == mission.id; });
+  next.push_back({mission.id, mission.name});
+  change(std::move(next));
+  if (before) {
+    deps_.events.add("critical", "devices.lost",
+                     by + " gave the devices of " + before->name + " to " + mission.name +
+                         "; they come back when that ends",
+                     before->id);
+    deps_.events.add("warning", "devices.taken", mission.name + " took the devices of " + before->name,
+                     mission.id);
+  }
+  return before;
+}
+
+void DeviceStream::ended(const MissionId& mission) {
+  if (deps_.devices == nullptr) return;
+  const std::scoped_lock changing(changing_);
+  const auto before = holder();
+  auto next = stack_;
+  if (std::erase_if(next, [&](const Holder& one) { return one.id == mission; }) == 0) return;
+  change(std::move(next));
+  const auto now = holder();
+  if (before->id == mission && now)
+    deps_.events.add("warning", "devices.returned", now->name + " has its devices back", now->id);
+}
+
+std::optional<DeviceStream::Holder> DeviceStream::holder() const {
+  const std::scoped_lock lock(mutex_);
+  return stack_.empty() ? std::nullopt : std::optional(stack_.back());
+}
+
+void DeviceStream::resume() {
+  if (deps_.devices == nullptr || deps_.store == nullptr) return;
+  const auto kept = deps_.store->device_stream();
+  if (!kept) {
+    deps_.events.add(
+        "critical", "devices.not_resumed",
+        "what the devices recorded into before the restart cannot be read: " + kept.error().message, {});
+    return;
+  }
+  const std::scoped_lock changing(changing_);
+  std::vector<Holder> next;
+  for (const auto& id : kept.value()) {
+    const auto mission = deps_.missions.mission(id);
+    if (mission && mission.value().state == MissionState::recording)
+      next.push_back({id, mission.value().name});
+  }
+  change(std::move(next));
+  if (const auto now = holder()) {
+    deps_.events.add("info", "devices.resumed",
+                     "the devices go on recording into " + now->name + " after the restart", now->id);
+  }
+}
+
+std::vector<AlarmCondition> DeviceStream::alarms() const {
+  Holder has, lost;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (stack_.size() < 2) return {};
+    has = stack_.back();
+    lost = stack_[stack_.size() - 2];
+  }
+  if (deps_.devices->devices().empty()) return {};  // nobody misses rows that there are none of
+  return {{"devices.lost", AlarmPriority::critical,
+           lost.name + ": its devices record into " + has.name + "; they come back when that ends", lost.id},
+          {"devices.taken", AlarmPriority::warning, has.name + " has the devices of " + lost.name, has.id}};
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,128 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "api/kit/message.hpp"
+#include "api/missions/mission_control.hpp"
+#include "api/missions/mission_observer.hpp"
+#include "core/base/result.hpp"
+#include "core/base/steady.hpp"
+#include "core/base/time.hpp"
+#include "core/flight/checklist.hpp"
+#include "core/flight/command.hpp"
+#include "core/flight/control_lease.hpp"
+#include "core/types/fix.hpp"
+#include "core/types/plan.hpp"
+
+namespace anchord {
+class Drone;
+class PlanStore;
+}  // namespace anchord
+
+namespace anchord::api {
+
+class EventLog;
+class Hub;
+class LateWriter;
+class MissionService;
+struct StorageStatus;
+
+using flight::ChecklistItem;
+using flight::FlightCommand;
+using flight::FlightUpload;
+using flight::Lease;
+
+/// The one calibration flight that may be in the air: lease, checklist, procedure, commands, restart.
+///
+/// Runs FlightEngine ten times a second on its own thread from fixes, ranges and the aircraft's telemetry;
+/// its orders go to the Drone, or, without one, to the pilot's screen. Thread-safe.
+class FlightService final : public MissionObserver, public MissionControl {
+ public:
+  struct Deps {
+    MissionService& missions;
+    PlanStore& plans;
+    Hub& hub;
+    EventLog& events;
+    const Clock& clock;
+    Drone* drone{nullptr};  ///< null: flown by hand ("manual")
+    std::function<StorageStatus()> storage;
+    std::function<double()> now_s{};     ///< steady seconds; set: no thread, the owner calls step() (tests)
+    const SteadyClock* steady{nullptr};  ///< what the lease runs on; null: the system's
+    LateWriter* late{nullptr};           ///< null: what it writes it writes at once
+  };
+  explicit FlightService(Deps deps);
+  ~FlightService() override;
+
+  /// Goes on with what a killed server was flying (hold first), then runs.
+  void start();
+  /// Tells an aircraft in the air to hold, joins.
+  void stop();
+  void step();  ///< one round: telemetry, engine, orders, messages
+
+  void on_fix(const Fix& fix) override;
+  void on_range(const MissionId& mission, const RangeResult& result) override;
+
+  // errors of all: not_found (no such mission), conflict (no control, or another's), invalid_argument
+  Result<Lease> take_control(const MissionId& mission, const Principal& who, bool by_force);
+  Result<Lease> renew_control(const MissionId& mission, const std::string& key,
+                              const Principal& who) override;
+  Result<void> release_control(const MissionId& mission, const std::string& key,
+                               const Principal& who) override;
+  std::optional<Lease> control();
+  /// Whether this mission's flight is in the air; and which mission flies this plan.
+  bool flies(const MissionId& mission) override;
+  std::optional<MissionId> flown_with(const PlanId& plan);
+
+  struct Order {
+    std::string action;  ///< start, hold, resume, skip, return, land, abort
+    std::string lease;
+    std::optional<PlanId> plan{};  ///< of start
+    bool manual{false};            ///< of start: a pilot flies, although there is an aircraft to command
+  };
+  /// What the service makes of an order: its first state is known at once, its fate within 2 s.
+  /// errors  conflict: no control (type no-control); invalid_argument: the state forbids it (type state)
+  Result<FlightCommand> act(const MissionId& mission, const Order& order, const Principal& who);
+  /// Waits until the command is no longer `sent`, at most so long.
+  FlightCommand settled(FlightCommand command, double wait_s);
+
+  /// Gives the aircraft on the ground the plan's fence or its route to keep; `what`: fence, route. Its fate
+  /// comes as a command's.
+  /// errors  conflict: no control; invalid_argument: no aircraft, in the air, nothing to give; not_found:
+  /// plan
+  Result<FlightCommand> upload(const MissionId& mission, const std::string& what, const PlanId& plan,
+                               const std::string& lease, const Principal& who);
+  /// Newest of each kind.
+  std::vector<FlightUpload> uploads(const MissionId& mission);
+
+  /// The aircraft on the link is another one: that of `sender`, or, empty, the next whose autopilot is heard.
+  /// errors  conflict: no control; invalid_argument: no link, or the aircraft that flies answers
+  Result<DroneStatus> change_aircraft(const MissionId& mission, const std::string& lease,
+                                      const std::string& sender, const Principal& who);
+
+  /// An operator who looks while nobody else has control means to fly: the aircraft gets the plan's fence.
+  std::vector<ChecklistItem> checklist(const MissionId& mission, const std::optional<PlanId>& plan,
+                                       const Principal& who);
+  /// A manual item is confirmed, an automatic one overridden; the reason is kept with the name.
+  Result<void> override_item(const MissionId& mission, const std::string& item, const std::string& reason,
+                             const Principal& who);
+
+  /// Bodies of the topics and of their GET twins; empty: this mission has no flight.
+  std::string procedure_text(const MissionId& mission);
+  std::string grid_text(const MissionId& mission);
+  std::vector<std::string> turn_texts(const MissionId& mission);
+  std::vector<std::string> height_texts(const MissionId& mission);
+  /// Every alarm a flight can raise, with what is wrong now; empty: nothing is.
+  std::vector<std::pair<std::string_view, std::string>> alarms();
+  /// Time between two checks of procedure and safety of a flight in the air, in Prometheus text.
+  std::string metrics() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace anchord::api

@@ -1,0 +1,160 @@
+// What of a flight is shown: the topics of the procedure, and their GET twins.
+#include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "api/flight/flight_state.hpp"
+#include "api/flight/procedure_json.hpp"
+#include "api/stream/hub.hpp"
+#include "core/base/to_wire.hpp"
+
+namespace anchord::api {
+namespace {
+
+constexpr std::ptrdiff_t k_shown_commands = 30;
+constexpr double k_profiles_s = 0.5;
+
+GridView grid_of(const flight::ActiveFlight& f, std::int64_t t_us) {
+  const auto& engine = f.control.engine();
+  const auto& s = engine.state();
+  const auto& planner = engine.setup().planner;
+  return {f.mission, t_us,          planner.rule,      planner.combine,
+          s.visited, s.unreachable, engine.decision(), f.frame};
+}
+
+/// Of every anchor, copied: of hundreds they are long to write.
+struct Profiles {
+  MissionId mission;
+  std::map<NetworkId, procedure::Clues> clues;
+  procedure::Step step;
+  std::int64_t t_us;
+
+  using Each = std::function<void(NetworkId, const nlohmann::ordered_json&)>;
+  void turns(const Each& each) const {
+    for (const auto& [anchor, one] : clues)
+      if (!one.turn.empty())
+        each(anchor, turn_json(mission, anchor, t_us, one, step == procedure::Step::turn));
+  }
+  void heights(const Each& each) const {
+    for (const auto& [anchor, one] : clues)
+      if (!one.heights.empty())
+        each(anchor, height_json(mission, anchor, t_us, one, step == procedure::Step::height_search));
+  }
+};
+
+Profiles profiles_of(const flight::ActiveFlight& f, std::int64_t t_us) {
+  const auto& engine = f.control.engine();
+  return {f.mission, engine.clues(), engine.state().step, t_us};
+}
+
+}  // namespace
+
+nlohmann::ordered_json FlightService::State::procedure(const flight::ActiveFlight& f) const {
+  const auto at = now();
+  ProcedureView v;
+  v.mission = f.mission;
+  v.plan = f.plan.id.uuid == Uuid{} ? "" : to_string(f.plan.id);
+  v.name = f.plan.name;
+  v.plan_revision = f.plan.version;
+  v.mode = f.manual ? "manual" : "auto";
+  v.status = f.status();
+  v.ended = f.ended();
+  v.forecast = f.forecast;
+  v.t_us = at.utc.us();
+  v.now_s = f.aborted.empty() ? at.s : f.aborted_s;
+  if (!f.manual) v.drone = operations.drone();
+  v.shift_m = f.control.shift_m();
+  if (const auto held = operations.control(at)) {
+    v.holder = held->name;
+    v.holder_since_us = held->since.us();
+    v.holder_until_us = held->until.us();
+  }
+  for (const auto& c : operations.commands()) {
+    if (c.mission == f.mission) v.commands.push_back(c);
+  }
+  if (v.commands.size() > k_shown_commands)
+    v.commands.erase(v.commands.begin(), v.commands.end() - k_shown_commands);
+  return procedure_json(v, f.control.engine(), f.frame);
+}
+
+/// The stepper once a second and with every transition. What is longer to write is left to be shown apart:
+/// decisions once, profiles while they grow.
+void FlightService::State::publish() {
+  const bool soon = operations.take_shown_soon();
+  if (!operations.flight()) return;
+  const auto& f = *operations.flight();
+  const auto at = now();
+  const auto& engine = f.control.engine();
+  const auto n = engine.state().n_transitions;
+  const bool moved = n != last.shown;
+  if (moved || soon || at.s - last.shown_s >= 1) {
+    deps.hub.publish(Topic::procedure, to_wire(procedure(f)), at.utc.us(), to_string(f.mission));
+    last.shown_s = at.s;
+  }
+  const auto step = engine.state().step;
+  const bool growing = step == procedure::Step::turn || step == procedure::Step::height_search;
+  if (moved || (growing && at.s - last.profiles_s >= k_profiles_s)) {
+    apart.profiles = true;
+    last.profiles_s = at.s;
+  }
+  if (moved && engine.decision()) apart.grid = true;
+  last.shown = n;
+}
+
+void FlightService::State::show_grid(std::unique_lock<std::mutex>& lock) {
+  const auto grid = grid_of(*operations.flight(), now().utc.us());
+  lock.unlock();
+  deps.hub.publish(Topic::mission_grid, to_wire(grid_json(grid)), grid.t_us, to_string(grid.mission));
+}
+
+void FlightService::State::show_profiles(std::unique_lock<std::mutex>& lock) {
+  const auto profiles = profiles_of(*operations.flight(), now().utc.us());
+  lock.unlock();
+  const auto key = to_string(profiles.mission);
+  const auto to = [&](Topic topic) {
+    return [&, topic](NetworkId anchor, const nlohmann::ordered_json& one) {
+      deps.hub.publish(topic, to_wire(one), profiles.t_us, key + to_string(anchor), anchor);
+    };
+  };
+  profiles.turns(to(Topic::mission_turn));
+  profiles.heights(to(Topic::mission_height));
+}
+
+std::string FlightService::procedure_text(const MissionId& mission) {
+  const std::scoped_lock lock(state_->mutex);
+  const auto* f = state_->operations.flight_of(mission);
+  return f == nullptr ? std::string{} : to_wire(state_->procedure(*f));
+}
+
+std::string FlightService::grid_text(const MissionId& mission) {
+  std::unique_lock lock(state_->mutex);
+  const auto* f = state_->operations.flight_of(mission);
+  if (f == nullptr) return {};
+  const auto grid = grid_of(*f, state_->deps.clock.now().us());
+  lock.unlock();
+  return to_wire(grid_json(grid));
+}
+
+std::vector<std::string> FlightService::turn_texts(const MissionId& mission) {
+  std::vector<std::string> out;
+  std::unique_lock lock(state_->mutex);
+  const auto* f = state_->operations.flight_of(mission);
+  if (f == nullptr) return out;
+  const auto profiles = profiles_of(*f, state_->deps.clock.now().us());
+  lock.unlock();
+  profiles.turns([&](NetworkId, const auto& one) { out.push_back(to_wire(one)); });
+  return out;
+}
+
+std::vector<std::string> FlightService::height_texts(const MissionId& mission) {
+  std::vector<std::string> out;
+  std::unique_lock lock(state_->mutex);
+  const auto* f = state_->operations.flight_of(mission);
+  if (f == nullptr) return out;
+  const auto profiles = profiles_of(*f, state_->deps.clock.now().us());
+  lock.unlock();
+  profiles.heights([&](NetworkId, const auto& one) { out.push_back(to_wire(one)); });
+  return out;
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,22 @@
+#pragma once
+
+#include "api/kit/audit.hpp"
+#include "api/missions/routes.hpp"
+
+namespace anchord::api {
+
+class FlightService;
+
+/// What the routes of the flight work with; lives as long as the router.
+struct FlightApi {
+  FlightService& flights;
+  MissionApi& missions;
+  EventLog& events;
+  Audit audit;
+};
+
+void add_flight_routes(Router& router, FlightApi& api);
+/// For POST /missions/{id}/actions. `api` must outlive the router.
+FlightActions flight_actions(FlightApi& api);
+
+}  // namespace anchord::api

@@ -1,0 +1,481 @@
+#include "api/formats/campaign.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "api/formats/cells.hpp"
+#include "api/formats/column_names.hpp"
+#include "api/kit/reader.hpp"
+#include "api/wire/rows_json.hpp"
+#include "core/base/text.hpp"
+#include "core/base/to_wire.hpp"
+#include "core/ml/dataset.hpp"
+
+namespace anchord::api {
+namespace {
+
+using namespace columns;
+constexpr std::size_t k_most_errors = 100;
+constexpr double k_furthest_m = 10'000;
+
+// Names of the hand-measured truth; a column of measured ranges may be called distance_m only where another
+// column is the truth.
+const Names k_site_name{"site", "setting", "setup_id", "setup", "placement", "measurement_point"};
+const Names k_environment{"environment", "env", "place", "room"};
+const Names k_campaign_truth{"true_distance_m", "true_range_m", "truth_m", "laser_m"};
+const Names k_measured{"range_m", "measured_range_m", "range"};
+const Names k_measured_mm{"range_mm", "measured_range_mm"};
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+  while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r'))
+    text.remove_suffix(1);
+  return text;
+}
+
+// Fields of one line by name; a view into the line or the document.
+using Row = std::map<std::string, std::string, std::less<>>;
+
+// The cell of the first of the names that has something in it; null where none has.
+const Row::value_type* cell(const Row& row, const Names& names) {
+  for (const auto name : names)
+    if (const auto at = row.find(name); at != row.end() && !at->second.empty()) return &*at;
+  return nullptr;
+}
+
+std::optional<std::string> find(const Row& row, const Names& names) {
+  if (const auto* found = cell(row, names)) return found->second;
+  return std::nullopt;
+}
+
+constexpr const char* k_unreadable = "unreadable line";
+constexpr const char* k_impossible = "impossible value";
+constexpr const char* k_missing = "missing value";
+
+// Why a line cannot be used; the first thing wrong with it.
+struct Fault {
+  const char* reason{nullptr};  // null: nothing wrong
+  std::string column{}, detail{};
+
+  void set(const char* why, std::string_view where, std::string what) {
+    if (!reason) reason = why, column = where, detail = std::move(what);
+  }
+};
+
+std::string in_quotes(std::string_view text) { return '"' + to_utf8(text, 40) + '"'; }
+
+class Importer {
+ public:
+  explicit Importer(const CampaignOptions& options) : options_{options}, defaults_{options.defaults} {}
+
+  Result<CampaignImport> run(std::string_view text) {
+    if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+    out_.report.format = options_.format == CampaignFormat::detect ? detect(text) : options_.format;
+    std::size_t line = 0;
+    while (!text.empty()) {
+      const auto end = text.find('\n');
+      const auto one = trimmed(text.substr(0, end));
+      text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+      ++line;
+      if (!one.empty()) take_line(one, line);
+      if (fatal_) return *fatal_;
+    }
+    if (out_.campaign.measurements.empty() && out_.report.lines == 0)
+      return make_error(Errc::bad_frame, "no measurement in the file");
+    finish();
+    return std::move(out_);
+  }
+
+ private:
+  static CampaignFormat detect(std::string_view text) {
+    while (!text.empty()) {
+      const auto end = text.find('\n');
+      const auto line = trimmed(text.substr(0, end));
+      text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+      if (line.empty() || line.front() == '#') continue;
+      if (line.front() == '{') return CampaignFormat::ndjson;
+      // A header has a name of ranges in it, a .txt only measurements.
+      for (const auto& names : {k_measured, k_measured_mm, k_range})
+        for (const auto name : names)
+          if (name.find('_') != std::string_view::npos && line.find(name) != std::string_view::npos)
+            return CampaignFormat::csv;
+      return CampaignFormat::txt;
+    }
+    return CampaignFormat::txt;
+  }
+
+  void take_line(std::string_view line, std::size_t number_of_line) {
+    if (line.front() == '#') {
+      take_comment(trimmed(line.substr(1)), number_of_line);
+      return;
+    }
+    switch (out_.report.format) {
+      case CampaignFormat::csv:
+        return take_csv(line, number_of_line);
+      case CampaignFormat::ndjson:
+        return take_json(line, number_of_line);
+      case CampaignFormat::txt:
+      case CampaignFormat::detect:
+        return take_txt(line, number_of_line);
+    }
+  }
+
+  // "# key = value" or "# key: value": ground truth of the lines that follow.
+  void take_comment(std::string_view text, std::size_t number_of_line) {
+    const auto at = text.find_first_of("=:");
+    if (at == std::string_view::npos) return;
+    std::string value{trimmed(text.substr(at + 1))};
+    if (const auto parsed = cell_number(value, true); parsed && value.find(',') != std::string::npos)
+      value[value.find(',')] = '.';
+    const Row row{{std::string{trimmed(text.substr(0, at))}, std::move(value)}};
+    Fault fault;
+    auto changed = site_of(row, defaults_, fault);
+    if (fault.reason) return refuse(number_of_line, std::move(fault));
+    defaults_ = std::move(changed);
+  }
+
+  void take_csv(std::string_view line, std::size_t at) {
+    if (header_.empty()) separator_ = separator_of(line);
+    std::vector<std::string_view> cells;
+    for (std::string_view rest = line;;) {
+      const auto comma = rest.find(separator_);
+      auto cell = trimmed(rest.substr(0, comma));
+      if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"')
+        cell = cell.substr(1, cell.size() - 2);
+      cells.push_back(cell);
+      if (comma == std::string_view::npos) break;
+      rest.remove_prefix(comma + 1);
+    }
+    if (header_.empty()) {
+      header_.assign(cells.begin(), cells.end());
+      return;
+    }
+    ++out_.report.lines;
+    if (cells.size() != header_.size())
+      return refuse(at, {k_unreadable, {}, wrong_cell_count(cells.size(), header_.size(), separator_)});
+    Row row;
+    for (std::size_t c = 0; c < cells.size(); ++c) row.emplace(header_[c], cells[c]);
+    take_row(row, at);
+  }
+
+  void take_json(std::string_view line, std::size_t at) {
+    ++out_.report.lines;
+    nlohmann::json object;
+    if (const auto fault = parse_json(line, object)) return refuse(at, {k_unreadable, {}, fault->detail});
+    if (!object.is_object()) return refuse(at, {k_unreadable, {}, "not a JSON object"});
+    Row row;
+    std::optional<Cir> cir;
+    for (const auto& [key, value] : object.items()) {
+      if (value.is_null()) continue;
+      if (key == "cir" && value.is_object()) {
+        std::vector<FieldError> errors;
+        cir = read_cir(value, "/cir", errors);
+        if (!errors.empty())
+          return refuse(at, {k_impossible, key, errors.front().pointer + " " + errors.front().detail});
+      } else if (value.is_boolean())
+        row.emplace(key, value.get<bool>() ? "1" : "0");
+      else if (value.is_string())
+        row.emplace(key, value.get<std::string>());
+      else if (value.is_number())
+        row.emplace(key, to_wire(value));
+      else
+        return refuse(at, {k_impossible, key, key + " is neither a number nor text"});
+    }
+    take_row(row, at, std::move(cir));
+  }
+
+  // Milliseconds, millimetres, dBm: the first three numbers of the line, whatever stands between them. Where
+  // blanks, tabs or semicolons stand between numbers, a comma inside one is a decimal comma.
+  void take_txt(std::string_view line, std::size_t at) {
+    ++out_.report.lines;
+    const bool commas_alone = line.find_first_of(" \t;") == std::string_view::npos;
+    const auto commas = std::count(line.begin(), line.end(), ',');
+    if (commas_alone && commas > 2)
+      return refuse(at,
+                    {k_unreadable,
+                     {},
+                     std::to_string(commas + 1) +
+                         " numbers separated by commas alone: decimal commas need blanks or semicolons "
+                         "between the numbers, else give time in ms, distance in mm and level in dBm only"});
+    const auto digit = [&](std::size_t i) { return i < line.size() && line[i] >= '0' && line[i] <= '9'; };
+    std::array<double, 3> value{};
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < line.size() && n < 3;) {
+      if (!digit(i) && !(line[i] == '-' && digit(i + 1))) {
+        ++i;
+        continue;
+      }
+      std::size_t end = i + 1;
+      while (digit(end) || (end < line.size() && line[end] == '.' && digit(end + 1)) ||
+             (!commas_alone && end < line.size() && line[end] == ',' && digit(end + 1)))
+        ++end;
+      const auto number = cell_number(line.substr(i, end - i), true);
+      if (!number) return refuse(at, {k_unreadable, {}, "not a number in " + in_quotes(line)});
+      value[n++] = *number;
+      i = end;
+    }
+    if (n < 2) return refuse(at, {k_missing, {}, "needs a time in ms and a distance in mm"});
+    CampaignMeasurement m;
+    m.t_s = value[0] / 1000;
+    m.range_m = value[1] / 1000;
+    if (n == 3) m.rx_dbm = value[2];
+    keep(defaults_, std::move(m), at);
+  }
+
+  void take_row(const Row& row, std::size_t at, std::optional<Cir> cir = std::nullopt) {
+    Fault fault;
+    auto site = site_of(row, defaults_, fault);
+    CampaignMeasurement m;
+    std::string range_column;
+    const auto value = [&](const Names& names, double low, double high) -> std::optional<double> {
+      const auto* found = cell(row, names);
+      if (!found || says_nothing(found->second)) return std::nullopt;
+      const auto parsed = number(found->second);
+      if (!parsed)
+        fault.set(k_impossible, found->first, found->first + " is not a number: " + in_quotes(found->second));
+      else if (*parsed < low || *parsed > high)
+        fault.set(k_impossible, found->first, found->first + " impossible: " + in_quotes(found->second));
+      return parsed;
+    };
+    const auto range = [&](const Names& names, double metres) -> std::optional<double> {
+      const auto found = value(names, 0, k_furthest_m / metres);
+      if (const auto* where = cell(row, names)) range_column = where->first;
+      return found ? std::optional{*found * metres} : std::nullopt;
+    };
+    auto range_m = range(k_measured, 1);
+    if (!range_m) range_m = range(k_measured_mm, 1e-3);
+    // "distance_m" is the measured one where another column holds the truth.
+    if (!range_m && find(row, k_campaign_truth)) range_m = range({"distance_m", "distance"}, 1);
+    for (const auto& names : {k_measured, k_measured_mm})
+      for (const auto name : names)
+        if (range_column.empty() && row.contains(name)) range_column = name;
+    if (!range_m) fault.set(k_missing, range_column, "no measured range (range_m, or range_mm)");
+    constexpr double k_any = 1e300, k_register = 1e9;
+    m.t_s = value({"t_s", "unix_s", "time_s"}, -k_any, k_any);
+    if (!m.t_s)
+      if (const auto ms = value({"t_ms", "timestamp_ms"}, -k_any, k_any)) m.t_s = *ms / 1000;
+    m.rx_dbm = value(k_rx, -200, 50), m.fp_dbm = value(k_fp, -200, 50);
+    m.fp_amp1 = value(k_f1, 0, k_register), m.fp_amp2 = value(k_f2, 0, k_register);
+    m.fp_amp3 = value(k_f3, 0, k_register), m.cir_power = value(k_cir_power, 0, k_register);
+    m.preamble_count = value(k_count, 0, k_register);
+    m.std_noise = value(k_std_noise, 0, k_register), m.max_noise = value(k_max_noise, 0, k_register);
+    m.fp_index = value(k_fp_index, 0, k_register);
+    if (fault.reason) return refuse(at, std::move(fault));
+    m.range_m = *range_m;
+    m.cir = std::move(cir);
+    keep(site, std::move(m), at, range_column);
+  }
+
+  std::optional<double> number(std::string_view text) const { return cell_number(text, separator_ != ','); }
+
+  CampaignSite site_of(const Row& row, CampaignSite site, Fault& fault) const {
+    const auto text = [&](const Names& names, std::string& out) {
+      if (auto found = find(row, names)) out = std::move(*found);
+    };
+    const auto value = [&](const Names& names, double low, double high, std::optional<double>& out) {
+      const auto* found = cell(row, names);
+      if (!found || says_nothing(found->second)) return;
+      const auto parsed = number(found->second);
+      if (!parsed || *parsed < low || *parsed > high)
+        return fault.set(k_impossible, found->first,
+                         found->first + " impossible: " + in_quotes(found->second));
+      out = parsed;
+    };
+    text(k_site_name, site.name), text(k_environment, site.environment), text({"material"}, site.material);
+    value(k_campaign_truth, 1e-3, k_furthest_m, site.distance_m);
+    // In a .txt header and beside a range column, distance_m is the truth.
+    if (find(row, k_measured) || find(row, k_measured_mm) || row.size() == 1)
+      value({"distance_m"}, 1e-3, k_furthest_m, site.distance_m);
+    value({"heading_deg"}, -360, 720, site.heading_deg);
+    value({"height_m", "height_diff_m", "height_difference_m"}, -1000, 1000, site.height_m);
+    value({"thickness_m"}, 0, 100, site.thickness_m);
+    value({"truth_sd_m", "truth_accuracy_m"}, 0, 100, site.truth_sd_m);
+    const auto truth_of = [](const std::string& word) -> std::optional<bool> {
+      if (word == "1" || word == "true" || word == "LOS" || word == "los") return true;
+      if (word == "0" || word == "false" || word == "NLOS" || word == "nlos") return false;
+      return std::nullopt;
+    };
+    const auto label = [&](const Names& names, bool means_los) {
+      const auto* cell_of = cell(row, names);
+      if (!cell_of) return;
+      const auto* found = &cell_of->second;
+      const auto parsed = truth_of(*found);
+      if (!parsed)
+        fault.set(k_impossible, cell_of->first,
+                  cell_of->first + " is neither LOS nor NLOS: " + in_quotes(*found));
+      // The words say themselves what they are; only 0 and 1 depend on the column's name.
+      const bool word = found->size() > 1 && (found->front() == 'L' || found->front() == 'l' ||
+                                              found->front() == 'N' || found->front() == 'n');
+      if (parsed) site.los = word || means_los ? *parsed : !*parsed;
+    };
+    label({"los", "is_los", "label", "class"}, true);
+    label({"nlos", "is_nlos"}, false);
+    return site;
+  }
+
+  void keep(const CampaignSite& site, CampaignMeasurement m, std::size_t at, const std::string& column = {}) {
+    m.site = index_of(site);
+    m.line = at;
+    auto& report = out_.report.sites[m.site];
+    if (m.range_m == 0) {  // the radio's way to say that there was no answer (5.2)
+      count("zero range", {at, column, "a range of zero is the radio's way to say: no answer"});
+      ++report.zero;
+      return;
+    }
+    if (!(m.range_m > 0) || m.range_m > k_furthest_m)
+      return refuse(at, {k_impossible, column, "range impossible: " + metres(m.range_m)});
+    out_.campaign.measurements.push_back(std::move(m));
+  }
+
+  std::size_t index_of(const CampaignSite& site) {
+    auto& sites = out_.campaign.sites;
+    // Neighbouring lines are of one site as a rule.
+    if (last_ < sites.size() && sites[last_] == site) return last_;
+    const auto found = std::find(sites.begin(), sites.end(), site);
+    last_ = static_cast<std::size_t>(found - sites.begin());
+    if (found == sites.end()) {
+      sites.push_back(site);
+      out_.report.sites.emplace_back();
+      out_.report.sites.back().name = site.name.empty() ? "site " + std::to_string(sites.size()) : site.name;
+    }
+    return last_;
+  }
+
+  void count(const char* reason, CampaignLineError error) {
+    auto& drop = out_.report.dropped[reason];
+    ++drop.count;
+    if (drop.first.size() < CampaignDrop::k_most_named) drop.first.push_back(std::move(error));
+  }
+
+  void refuse(std::size_t at, Fault fault) {
+    CampaignLineError error{at, std::move(fault.column), std::move(fault.detail)};
+    if (out_.report.errors.size() < k_most_errors) out_.report.errors.push_back(error);
+    count(fault.reason, std::move(error));
+  }
+
+  static std::string metres(double value_m) {
+    std::array<char, 40> text{};
+    std::snprintf(text.data(), text.size(), "%.3f m", value_m);
+    return text.data();
+  }
+
+  void finish() {
+    auto& measurements = out_.campaign.measurements;
+    std::vector<double> range;
+    std::vector<std::uint32_t> site;
+    for (const auto& m : measurements)
+      range.push_back(m.range_m), site.push_back(static_cast<std::uint32_t>(m.site));
+    std::vector<bool> outlier(measurements.size(), false);
+    if (options_.filter)
+      for (const auto i : ml::range_outliers(range, site, options_.outlier_mads, options_.outlier_floor_m))
+        outlier[i] = true;
+    std::vector<CampaignMeasurement> kept;
+    std::vector<std::vector<double>> of_site(out_.campaign.sites.size());
+    for (std::size_t i = 0; i < measurements.size(); ++i) {
+      const std::size_t s = measurements[i].site;
+      if (outlier[i]) {
+        ++out_.report.sites[s].outliers;
+        count("range off its site's median", {measurements[i].line, {}, metres(measurements[i].range_m)});
+        continue;
+      }
+      of_site[s].push_back(measurements[i].range_m);
+      kept.push_back(std::move(measurements[i]));
+    }
+    measurements = std::move(kept);
+    out_.report.kept = measurements.size();
+    for (std::size_t s = 0; s < of_site.size(); ++s) summarise(of_site[s], out_.report.sites[s]);
+  }
+
+  static void summarise(std::vector<double>& values, CampaignReport::Site& out) {
+    out.kept = values.size();
+    if (values.empty()) return;
+    std::sort(values.begin(), values.end());
+    const std::size_t n = values.size();
+    out.median_m = n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
+    double mean = 0, sum = 0;
+    for (const double v : values) mean += v / static_cast<double>(n);
+    for (const double v : values) sum += (v - mean) * (v - mean);
+    if (n > 1) out.sd_m = std::sqrt(sum / static_cast<double>(n - 1));
+  }
+
+  const CampaignOptions& options_;
+  CampaignSite defaults_;
+  std::vector<std::string> header_;
+  char separator_{','};
+  std::size_t last_{static_cast<std::size_t>(-1)};
+  std::optional<Error> fatal_;
+  CampaignImport out_;
+};
+
+}  // namespace
+
+Result<CampaignImport> import_campaign(std::string_view text, const CampaignOptions& options) {
+  return Importer{options}.run(text);
+}
+
+LabelledTable table_of(const Campaign& campaign) {
+  LabelledTable out;
+  out.grouping = Grouping::column;
+  out.group_by = "environment";
+  out.placement_by = "site";
+  std::map<std::string, std::uint32_t> places;
+  for (const auto& m : campaign.measurements) {
+    const auto& site = campaign.sites[m.site];
+    const std::string place =
+        site.environment.empty() ? "site " + std::to_string(m.site + 1) : site.environment;
+    const auto [at, fresh] = places.try_emplace(place, static_cast<std::uint32_t>(places.size()));
+    if (fresh) out.group_names.push_back(place);
+    nlos::DiagnosticSample s;
+    s.range_m = m.range_m, s.rx_dbm = m.rx_dbm, s.fp_dbm = m.fp_dbm;
+    s.fp_amp1 = m.fp_amp1, s.fp_amp2 = m.fp_amp2, s.fp_amp3 = m.fp_amp3;
+    s.cir_power = m.cir_power, s.preamble_count = m.preamble_count;
+    s.std_noise = m.std_noise, s.max_noise = m.max_noise, s.fp_index = m.fp_index;
+    s.height_difference_m = site.height_m, s.heading_deg = site.heading_deg;
+    out.features.push_back(nlos::compute_features(s));
+    out.range_m.push_back(m.range_m);
+    out.true_range_m.push_back(site.distance_m);
+    out.los.push_back(site.los);
+    out.group.push_back(at->second);
+    out.placement.push_back(static_cast<std::uint32_t>(m.site));
+    if (site.los) out.label_column = "los";
+    if (site.distance_m) out.truth_column = "true_distance_m";
+  }
+  out.rows_read = out.rows();
+  return out;
+}
+
+std::string campaign_csv(const Campaign& campaign) {
+  std::string out =
+      "site,environment,material,true_distance_m,heading_deg,height_m,thickness_m,los,truth_sd_m,t_s,range_m,"
+      "rx_dbm,fp_dbm,fp_amp1,fp_amp2,fp_amp3,cir_pwr,rxpacc,std_noise,max_noise,fp_index\n";
+  const auto put = [&out](std::optional<double> value) {
+    out += ',';
+    if (!value) return;
+    std::array<char, 32> text{};
+    const auto end = std::to_chars(text.data(), text.data() + text.size(), *value).ptr;
+    out.append(text.data(), end);
+  };
+  const auto word = [&out](std::string text) {  // commas would tear the line
+    std::replace(text.begin(), text.end(), ',', ';');
+    std::replace(text.begin(), text.end(), '\n', ' ');
+    out += text;
+  };
+  for (const auto& m : campaign.measurements) {
+    const auto& s = campaign.sites[m.site];
+    word(s.name), out += ',', word(s.environment), out += ',', word(s.material);
+    put(s.distance_m), put(s.heading_deg), put(s.height_m), put(s.thickness_m);
+    out += s.los ? (*s.los ? ",1" : ",0") : ",";
+    put(s.truth_sd_m), put(m.t_s), put(m.range_m), put(m.rx_dbm), put(m.fp_dbm), put(m.fp_amp1);
+    put(m.fp_amp2), put(m.fp_amp3), put(m.cir_power), put(m.preamble_count), put(m.std_noise);
+    put(m.max_noise), put(m.fp_index);
+    out += '\n';
+  }
+  return out;
+}
+
+}  // namespace anchord::api

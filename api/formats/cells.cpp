@@ -1,0 +1,51 @@
+#include "api/formats/cells.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+
+namespace anchord::api {
+namespace {
+
+std::optional<double> plain_number(std::string_view cell) {
+  double value{};
+  const auto [end, status] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
+  if (status != std::errc{} || end != cell.data() + cell.size() || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+char separator_of(std::string_view header) {
+  char best = ',';
+  for (const char c : {';', '\t'})
+    if (std::count(header.begin(), header.end(), c) > std::count(header.begin(), header.end(), best))
+      best = c;
+  return best;
+}
+
+std::optional<double> cell_number(std::string_view cell, bool decimal_comma) {
+  if (!decimal_comma || cell.find(',') == std::string_view::npos) return plain_number(cell);
+  // "1.234,5" and "1,234,567" mean something else in every country: no number.
+  if (cell.find('.') != std::string_view::npos || cell.find(',') != cell.rfind(',')) return std::nullopt;
+  std::string pointed{cell};
+  pointed[pointed.find(',')] = '.';
+  return plain_number(pointed);
+}
+
+bool says_nothing(std::string_view cell) {
+  constexpr std::array<std::string_view, 7> k_words{"", "nan", "na", "n/a", "null", "none", "-"};
+  std::string word;
+  for (const char c : cell) word += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return std::find(k_words.begin(), k_words.end(), word) != k_words.end();
+}
+
+std::string wrong_cell_count(std::size_t cells, std::size_t expected, char separator) {
+  std::string out = std::to_string(cells) + " cells, the header has " + std::to_string(expected);
+  if (separator == ',' && cells > expected)
+    out += " (decimal commas need semicolons or tabs between the cells; else write decimal points)";
+  return out;
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,153 @@
+#include "api/formats/flight_plan_output.hpp"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "core/base/to_wire.hpp"
+#include "core/geo/enu.hpp"
+
+namespace anchord::api {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// 1e-9 deg is 0.1 mm; more digits only make files unreadable.
+double rounded(double value, double per_unit) { return std::round(value * per_unit) / per_unit; }
+double heading_deg(const planning::Waypoint& w) {
+  const double deg = w.heading_rad * 180 / std::numbers::pi;
+  return rounded(deg < 0 ? deg + 360 : deg, 10);
+}
+
+struct Place {
+  double lon_deg, lat_deg;
+};
+/// The ground is taken flat at the origin's height: over a building's size the tangent plane is off by
+/// micrometres.
+Place place_of(const EnuFrame& frame, const Eigen::Vector2d& p) {
+  const auto at = frame.wgs84_from_enu(Enu{{p.x(), p.y(), 0}});
+  return {rounded(at.lon_deg, 1e9), rounded(at.lat_deg, 1e9)};
+}
+
+Json predicted_json(const planning::FlightPlan& plan) {
+  return {{"n_anchors_assumed", plan.assumed_anchors_m.size()},
+          {"n_out_of_range", plan.n_out_of_range},
+          {"rms_m", plan.rms_m},
+          {"worst_m", plan.worst_m}};
+}
+
+}  // namespace
+
+std::string flight_plan_json(const planning::FlightPlan& plan, const Wgs84& origin) {
+  const EnuFrame frame(origin);
+  Json out;
+  out["origin"] = {{"lon", origin.lon_deg}, {"lat", origin.lat_deg}};
+  out["n_measure"] = plan.n_measure;
+  out["length_m"] = plan.length_m;
+  out["duration_s"] = plan.duration_s;
+  out["predicted"] = predicted_json(plan);
+  out["reason"] = plan.reason;
+  out["waypoints"] = Json::array();
+  for (const auto& w : plan.waypoints) {
+    const auto at = place_of(frame, w.point_m.head<2>());
+    out["waypoints"].push_back({{"lon", at.lon_deg},
+                                {"lat", at.lat_deg},
+                                {"height_above_ground_m", w.point_m.z()},
+                                {"enu_m", {w.point_m.x(), w.point_m.y(), w.point_m.z()}},
+                                {"heading_deg", heading_deg(w)},
+                                {"measure", w.measure}});
+  }
+  return to_wire(out, 2) + "\n";
+}
+
+std::string flight_plan_geojson(const planning::FlightPlan& plan, const Wgs84& origin) {
+  const EnuFrame frame(origin);
+  Json features = Json::array(), line = Json::array();
+  for (std::size_t i = 0; i < plan.waypoints.size(); ++i) {
+    const auto& w = plan.waypoints[i];
+    const auto at = place_of(frame, w.point_m.head<2>());
+    line.push_back({at.lon_deg, at.lat_deg});
+    features.push_back({{"type", "Feature"},
+                        {"geometry", {{"type", "Point"}, {"coordinates", {at.lon_deg, at.lat_deg}}}},
+                        {"properties",
+                         {{"kind", w.measure ? "waypoint" : "transit"},
+                          {"index", i},
+                          {"height_above_ground_m", w.point_m.z()},
+                          {"heading_deg", heading_deg(w)}}}});
+  }
+  if (!line.empty()) line.push_back(line.front());
+  features.push_back({{"type", "Feature"},
+                      {"geometry", {{"type", "LineString"}, {"coordinates", line}}},
+                      {"properties",
+                       {{"kind", "path"},
+                        {"length_m", plan.length_m},
+                        {"duration_s", plan.duration_s},
+                        {"predicted", predicted_json(plan)},
+                        {"reason", plan.reason}}}});
+  Json out;
+  out["type"] = "FeatureCollection";
+  out["features"] = features;
+  return to_wire(out, 2) + "\n";
+}
+
+std::string flight_plan_qgc(const planning::FlightPlan& plan, const Wgs84& origin,
+                            const planning::Polygon& outline, const planning::FlightPlanOptions& options) {
+  // MAV_CMD and MAV_FRAME numbers of the MAVLink common set.
+  constexpr int k_waypoint = 16, k_return = 20, k_takeoff = 22, k_relative_altitude = 3, k_mission_frame = 2;
+  const EnuFrame frame(origin);
+  Json items = Json::array();
+  const auto put = [&](int command, int mav_frame, Json params, double altitude) {
+    Json item;
+    item["type"] = "SimpleItem";
+    item["AMSLAltAboveTerrain"] = nullptr;
+    item["Altitude"] = altitude;
+    item["AltitudeMode"] = 1;  // relative to the launch point
+    item["autoContinue"] = true;
+    item["command"] = command;
+    item["doJumpId"] = items.size() + 1;
+    item["frame"] = mav_frame;
+    item["params"] = std::move(params);
+    items.push_back(item);
+  };
+  Json home = {origin.lat_deg, origin.lon_deg, 0};
+  if (!plan.waypoints.empty()) {
+    const auto& first = plan.waypoints.front();
+    const auto at = place_of(frame, first.point_m.head<2>());
+    home = {at.lat_deg, at.lon_deg, 0};
+    put(k_takeoff, k_relative_altitude, {0, 0, 0, nullptr, at.lat_deg, at.lon_deg, first.point_m.z()},
+        first.point_m.z());
+  }
+  for (const auto& w : plan.waypoints) {
+    const auto at = place_of(frame, w.point_m.head<2>());
+    put(k_waypoint, k_relative_altitude,
+        {w.measure ? options.dwell_s : 0.0, 0, 0, heading_deg(w), at.lat_deg, at.lon_deg, w.point_m.z()},
+        w.point_m.z());
+  }
+  put(k_return, k_mission_frame, {0, 0, 0, 0, 0, 0, 0}, 0);
+
+  Json corners = Json::array();
+  for (const auto& corner : outline) {
+    const auto at = place_of(frame, corner);
+    corners.push_back({at.lat_deg, at.lon_deg});
+  }
+  Json out;
+  out["fileType"] = "Plan";
+  out["groundStation"] = "QGroundControl";
+  out["version"] = 1;
+  out["geoFence"] = {
+      {"circles", Json::array()},
+      {"polygons", Json::array({{{"inclusion", false}, {"polygon", corners}, {"version", 1}}})},
+      {"version", 2}};
+  out["rallyPoints"] = {{"points", Json::array()}, {"version", 2}};
+  out["mission"] = {{"version", 2},
+                    {"firmwareType", 12},  // MAV_AUTOPILOT_PX4; every item here means the same to ArduPilot
+                    {"vehicleType", 2},    // MAV_TYPE_QUADROTOR
+                    {"globalPlanAltitudeMode", 1},
+                    {"cruiseSpeed", options.speed_mps},
+                    {"hoverSpeed", options.speed_mps},
+                    {"plannedHomePosition", home},
+                    {"items", items}};
+  return to_wire(out, 2) + "\n";
+}
+
+}  // namespace anchord::api

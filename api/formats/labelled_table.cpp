@@ -1,0 +1,478 @@
+#include "api/formats/labelled_table.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include "api/formats/cells.hpp"
+#include "api/formats/column_names.hpp"
+#include "api/formats/gzip_lines.hpp"
+
+namespace anchord::api {
+namespace {
+
+using namespace columns;
+
+const Names k_group{"group",    "env",     "environment", "place",   "room",
+                    "campaign", "session", "setup",       "tag_pos", "anchor_height_m"};
+const Names k_placement{"setup_id", "placement", "setup", "setting", "measurement_point"};
+const Names k_time{"t_s", "unix_s", "t_us", "time_s"};
+const Names k_joins{"setup", "idx", "seq"};
+constexpr std::size_t k_none = static_cast<std::size_t>(-1);
+constexpr std::size_t k_time_blocks = 10;
+constexpr double k_nan = std::numeric_limits<double>::quiet_NaN();
+
+void split(std::string_view line, std::vector<std::string_view>& cells, char separator = ',') {
+  cells.clear();
+  while (true) {
+    const auto comma = line.find(separator);
+    auto cell = line.substr(0, comma);
+    if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"') cell = cell.substr(1, cell.size() - 2);
+    while (!cell.empty() && cell.front() == ' ') cell.remove_prefix(1);
+    while (!cell.empty() && cell.back() == ' ') cell.remove_suffix(1);
+    cells.push_back(cell);
+    if (comma == std::string_view::npos) return;
+    line.remove_prefix(comma + 1);
+  }
+}
+
+double number(std::string_view cell, bool decimal_comma = false) {
+  return cell_number(cell, decimal_comma).value_or(k_nan);
+}
+
+std::optional<double> finite(double value) { return std::isnan(value) ? std::nullopt : std::optional{value}; }
+
+/// "FP Power [dBm]" and "fp_power_dbm" are one name.
+std::string plain_name(std::string_view name) {
+  std::string out;
+  for (const char c : name) {
+    if (c >= 'A' && c <= 'Z')
+      out += static_cast<char>(c - 'A' + 'a');
+    else if ((c >= 'a' && c <= 'z') || (c >= '0' && c <= '9'))
+      out += c;
+  }
+  return out;
+}
+
+/// Metres of one unit of a column, by the end of its name.
+double metres_per_unit(std::string_view name) {
+  const auto plain = plain_name(name);
+  return plain.ends_with("mm") ? 1e-3 : plain.ends_with("cm") ? 1e-2 : 1.0;
+}
+
+struct Header {
+  std::vector<std::string> names;
+  std::size_t of(std::string_view name) const {
+    const auto at = std::find(names.begin(), names.end(), name);
+    return at == names.end() ? k_none : static_cast<std::size_t>(at - names.begin());
+  }
+  std::size_t first(const Names& candidates) const {
+    for (const auto name : candidates)
+      if (const auto at = of(name); at != k_none) return at;
+    for (const auto name : candidates) {
+      const auto wanted = plain_name(name);
+      for (std::size_t i = 0; i < names.size(); ++i)
+        if (plain_name(names[i]) == wanted) return i;
+    }
+    return k_none;
+  }
+};
+
+class Ids {
+ public:
+  std::uint32_t of(const std::string& name) {
+    const auto [at, fresh] = ids_.try_emplace(name, static_cast<std::uint32_t>(names_.size()));
+    if (fresh) names_.push_back(name);
+    return at->second;
+  }
+  std::vector<std::string> names() const { return names_; }
+
+ private:
+  std::unordered_map<std::string, std::uint32_t> ids_;
+  std::vector<std::string> names_;
+};
+
+std::string joined(const std::vector<std::string_view>& cells, std::span<const std::size_t> columns) {
+  std::string out;
+  for (const auto c : columns) out.append(out.empty() ? "" : "/").append(cells[c]);
+  return out;
+}
+
+/// Magnitudes by their row's key, until the ranging says where its first path is.
+struct CirTable {
+  std::vector<std::string> join_names;
+  std::unordered_map<std::string, std::vector<float>> taps;
+};
+
+Result<CirTable> read_cir(const std::filesystem::path& path) {
+  BOOST_OUTCOME_TRY(auto lines, GzipLines::open(path));
+  CirTable out;
+  std::vector<std::size_t> joins;
+  std::vector<std::pair<std::size_t, std::size_t>> taps;
+  std::vector<std::string_view> cells;
+  std::vector<float> magnitude;
+  std::size_t width = 0;
+  for (std::string_view line;;) {
+    BOOST_OUTCOME_TRY(const bool more, lines.next(line));
+    if (!more) break;
+    split(line, cells);
+    if (width == 0) {
+      width = cells.size();
+      for (std::size_t c = 0; c < width; ++c) {
+        if (std::find(k_joins.begin(), k_joins.end(), cells[c]) != k_joins.end())
+          joins.push_back(c), out.join_names.emplace_back(cells[c]);
+        else if (cells[c].size() > 1 && cells[c][0] == 'm' && !std::isnan(number(cells[c].substr(1))))
+          taps.emplace_back(static_cast<std::size_t>(number(cells[c].substr(1))), c);
+      }
+      std::sort(taps.begin(), taps.end());
+      if (joins.empty() || taps.size() < 32)
+        return make_error(
+            Errc::invalid_argument,
+            path.string() + ": a CIR table needs a join column (setup, idx, seq) and taps m0, m1, ...");
+      continue;
+    }
+    if (cells.size() != width)
+      return make_error(Errc::bad_frame, path.string() + ":" + std::to_string(lines.line_number()) + ": " +
+                                             std::to_string(cells.size()) + " cells, the header has " +
+                                             std::to_string(width));
+    magnitude.clear();
+    for (const auto& [tap, column] : taps) magnitude.push_back(static_cast<float>(number(cells[column])));
+    if (std::any_of(magnitude.begin(), magnitude.end(), [](float v) { return std::isnan(v); })) continue;
+    out.taps.emplace(joined(cells, joins), magnitude);
+  }
+  return out;
+}
+
+class Reader {
+ public:
+  Reader(const TableOptions& options, bool several_files)
+      : options_{options}, several_files_{several_files} {}
+
+  Result<void> read(const std::filesystem::path& path, const CirTable* cir) {
+    BOOST_OUTCOME_TRY(auto lines, GzipLines::open(path));
+    file_ = path.string();
+    std::string_view line;
+    BOOST_OUTCOME_TRY(const bool any, lines.next(line));
+    if (!any) return make_error(Errc::bad_frame, file_ + ": empty file, a header line is needed");
+    if (line.starts_with("\xEF\xBB\xBF")) line.remove_prefix(3);
+    const char separator = separator_of(line);
+    decimal_comma_ = separator != ',';
+    out_.file_names.push_back(file_);
+    std::vector<std::string_view> cells;
+    split(line, cells, separator);
+    BOOST_OUTCOME_TRY(take_header(cells));
+    std::vector<std::size_t> joins;
+    if (cir) {
+      for (const auto& name : cir->join_names) {
+        joins.push_back(header_.of(name));
+        if (joins.back() == k_none)
+          return make_error(Errc::not_found,
+                            file_ + ": the CIR table is joined by column " + name + ", which is not there");
+      }
+    }
+    while (true) {
+      BOOST_OUTCOME_TRY(const bool more, lines.next(line));
+      if (!more) break;
+      if (line.empty()) continue;
+      split(line, cells, separator);
+      if (cells.size() != header_.names.size())
+        return make_error(Errc::bad_frame,
+                          file_ + ":" + std::to_string(lines.line_number()) + ": " +
+                              wrong_cell_count(cells.size(), header_.names.size(), separator));
+      ++out_.rows_read;
+      const std::vector<float>* taps = nullptr;
+      if (cir) {
+        const auto found = cir->taps.find(joined(cells, joins));
+        if (found != cir->taps.end()) taps = &found->second;
+      }
+      if (cir && taps == nullptr)
+        drop("no CIR in the CIR table", lines.line_number());
+      else
+        take_row(cells, lines.line_number(), taps);
+    }
+    return boost::outcome_v2::success();
+  }
+
+  Result<LabelledTable> finish() {
+    if (out_.rows() == 0)
+      return make_error(Errc::too_few_observations,
+                        file_ + ": no usable row among " + std::to_string(out_.rows_read));
+    BOOST_OUTCOME_TRY(map_labels());
+    if (out_.grouping == Grouping::time_block) {
+      for (std::size_t i = 0; i < out_.rows(); ++i)
+        out_.group[i] = static_cast<std::uint32_t>(i * k_time_blocks / out_.rows());
+      for (std::size_t b = 0; b < k_time_blocks; ++b)
+        out_.group_names.push_back("block " + std::to_string(b));
+    } else {
+      out_.group_names = groups_.names();
+    }
+    return std::move(out_);
+  }
+
+ private:
+  Result<std::size_t> column(const std::string& name) const {
+    const auto at = header_.of(name);
+    if (at == k_none)
+      return make_error(Errc::not_found, file_ + ": no column " + name + "; the columns are " + columns());
+    return at;
+  }
+
+  std::string columns() const {
+    std::string known;
+    for (const auto& n : header_.names) {
+      if (known.size() > 600) return known + ", ...";
+      known += (known.empty() ? "" : ", ") + n;
+    }
+    return known;
+  }
+
+  Result<void> take_header(const std::vector<std::string_view>& cells) {
+    Header fresh;
+    for (const auto cell : cells) fresh.names.emplace_back(cell);
+    if (!header_.names.empty()) {
+      return follow_header(std::move(fresh));
+    }
+    header_ = std::move(fresh);
+    range_ = header_.first(k_range);
+    if (!options_.range.empty()) {
+      BOOST_OUTCOME_TRY(range_, column(options_.range));
+    }
+    if (range_ == k_none && (truth_given() || no_levels()))
+      return make_error(Errc::not_found,
+                        file_ +
+                            ": no column of measured ranges (range_m, distance_m): name it with --range; "
+                            "the columns are " +
+                            columns());
+    label_ = header_.first(k_label);
+    if (!options_.label.empty()) {
+      BOOST_OUTCOME_TRY(label_, column(options_.label));
+    }
+    truth_ = header_.first(k_truth);
+    if (!options_.truth.empty()) {
+      BOOST_OUTCOME_TRY(truth_, column(options_.truth));
+    }
+    if (label_ != k_none) out_.label_column = header_.names[label_];
+    if (truth_ != k_none) out_.truth_column = header_.names[truth_];
+    BOOST_OUTCOME_TRY(choose_groups());
+    BOOST_OUTCOME_TRY(choose_placements());
+    out_.raw_names = header_.names;
+    find_raw_columns();
+    return boost::outcome_v2::success();
+  }
+
+  // A later file may have its columns in another order, lack some that are no one's role, and have others.
+  Result<void> follow_header(Header fresh) {
+    const Header before = std::move(header_);
+    header_ = std::move(fresh);
+    std::vector<std::size_t*> roles{&range_, &label_, &truth_};
+    for (auto& c : group_columns_) roles.push_back(&c);
+    for (auto& c : placement_columns_) roles.push_back(&c);
+    for (auto* role : roles) {
+      if (*role == k_none) continue;
+      BOOST_OUTCOME_TRY(*role, column(before.names[*role]));
+    }
+    find_raw_columns();
+    return boost::outcome_v2::success();
+  }
+
+  void find_raw_columns() {
+    raw_columns_.clear();
+    for (const auto& name : out_.raw_names) raw_columns_.push_back(header_.of(name));
+    for (const auto* names : {&k_rx, &k_fp, &k_f1, &k_f2, &k_f3, &k_cir_power, &k_count, &k_std_noise,
+                              &k_max_noise, &k_fp_index, &k_height, &k_heading})
+      level_columns_[names] = header_.first(*names);
+  }
+
+  Result<void> choose_groups() {
+    for (const auto& name : options_.group_by) {
+      BOOST_OUTCOME_TRY(const auto at, column(name));
+      group_columns_.push_back(at);
+    }
+    if (group_columns_.empty() && header_.first(k_group) != k_none)
+      group_columns_.push_back(header_.first(k_group));
+    out_.grouping = !group_columns_.empty()           ? Grouping::column
+                    : several_files_                  ? Grouping::file
+                    : header_.first(k_time) != k_none ? Grouping::time_block
+                                                      : Grouping::row;
+    for (const auto c : group_columns_)
+      out_.group_by += (out_.group_by.empty() ? "" : ",") + header_.names[c];
+    if (out_.grouping == Grouping::file) out_.group_by = "file";
+    if (out_.grouping == Grouping::time_block) out_.group_by = "time block";
+    return boost::outcome_v2::success();
+  }
+
+  Result<void> choose_placements() {
+    for (const auto& name : options_.placement) {
+      BOOST_OUTCOME_TRY(const auto at, column(name));
+      placement_columns_.push_back(at);
+    }
+    const auto add = [&](std::size_t at) {
+      if (at != k_none) placement_columns_.push_back(at);
+    };
+    if (placement_columns_.empty()) add(header_.first(k_placement));
+    if (placement_columns_.empty() && header_.of("tag_pos") != k_none && header_.of("anchor_id") != k_none)
+      add(header_.of("tag_pos")), add(header_.of("anchor_id"));
+    // A true range that repeats names its placement, together with the place and the class.
+    if (placement_columns_.empty() && truth_ != k_none) {
+      placement_columns_ = group_columns_;
+      placed_by_truth_ = true;
+      add(truth_);
+      add(label_);
+    }
+    for (const auto c : placement_columns_)
+      out_.placement_by += (out_.placement_by.empty() ? "" : ",") + header_.names[c];
+    return boost::outcome_v2::success();
+  }
+
+  /// The column says by its name what 0 and 1 mean, and nobody said otherwise.
+  bool named_after_class() const {
+    const auto name = plain_name(header_.names[label_]);
+    return options_.los_value.empty() &&
+           (name == "nlos" || name == "isnlos" || name == "los" || name == "islos");
+  }
+  /// 1 for yes, 0 for no, and the classes by their names.
+  static std::optional<char> class_word(std::string_view cell) {
+    const auto word = plain_name(cell);
+    const double value = number(cell);
+    if (value == 0 || word == "false" || word == "no") return '0';
+    if (value == 1 || word == "true" || word == "yes") return '1';
+    if (word == "los") return 'L';
+    if (word == "nlos") return 'N';
+    return std::nullopt;
+  }
+
+  bool truth_given() const { return !options_.truth.empty() || header_.first(k_truth) != k_none; }
+  bool no_levels() const {
+    for (const auto* names : {&k_rx, &k_fp, &k_f1, &k_cir_power, &k_std_noise})
+      if (header_.first(*names) != k_none) return false;
+    return true;
+  }
+
+  void drop(const std::string& reason, std::size_t line) {
+    auto& entry = out_.dropped[reason];
+    if (entry.first++ == 0) entry.second = file_ + ":" + std::to_string(line);
+  }
+
+  static const char* lacks(std::string_view cell) {
+    return says_nothing(cell) ? " missing" : " is no number";
+  }
+
+  void take_row(const std::vector<std::string_view>& cells, std::size_t line,
+                const std::vector<float>* taps) {
+    values_.clear();
+    for (const auto cell : cells) values_.push_back(number(cell, decimal_comma_));
+    const auto value = [&](const Names& names) {
+      const auto at = level_columns_.at(&names);
+      return at == k_none ? std::nullopt : finite(values_[at]);
+    };
+    // A set without ranges can still tell classes by levels.
+    const double range = range_ == k_none ? 0 : values_[range_] * metres_per_unit(header_.names[range_]);
+    if (range_ != k_none && !(range > 0))
+      return drop(header_.names[range_] + (std::isnan(range) ? lacks(cells[range_]) : " not above zero"),
+                  line);
+    if (range > 1e4) return drop(header_.names[range_] + " beyond 10 km", line);
+    // A class needs no true range: whoever asks for a bias leaves rows without one out.
+    std::optional<double> truth;
+    if (truth_ != k_none && !says_nothing(cells[truth_])) {
+      truth = finite(values_[truth_] * metres_per_unit(header_.names[truth_]));
+      if (!truth) return drop(header_.names[truth_] + " is no number", line);
+      if (!(*truth > 0) || *truth > 1e4) return drop(header_.names[truth_] + " impossible", line);
+    }
+    if (label_ != k_none && cells[label_].empty()) return drop(header_.names[label_] + " missing", line);
+    if (label_ != k_none && named_after_class() && !class_word(cells[label_]))
+      return drop(header_.names[label_] + " is neither 0 nor 1, LOS nor NLOS", line);
+
+    nlos::DiagnosticSample s;
+    if (range_ != k_none) s.range_m = range;
+    s.rx_dbm = value(k_rx), s.fp_dbm = value(k_fp);
+    s.fp_amp1 = value(k_f1), s.fp_amp2 = value(k_f2), s.fp_amp3 = value(k_f3);
+    s.cir_power = value(k_cir_power), s.preamble_count = value(k_count);
+    s.std_noise = value(k_std_noise), s.max_noise = value(k_max_noise);
+    s.fp_index = value(k_fp_index);
+    s.height_difference_m = value(k_height), s.heading_deg = value(k_heading);
+    // The receiver's own first path where the file tells it: found again in magnitudes it lies 2 ns beside.
+    if (taps) {
+      s.cir = nlos::cir_shape(*taps, s.fp_index);
+      if (!s.cir) return drop("no first path in the CIR", line);
+    }
+    out_.features.push_back(nlos::compute_features(s));
+    for (const auto c : raw_columns_) out_.raw.push_back(c == k_none ? k_nan : values_[c]);
+    out_.range_m.push_back(range);
+    out_.true_range_m.push_back(truth);
+    out_.los.emplace_back();
+    labels_.emplace_back(label_ == k_none ? std::string{} : std::string{cells[label_]});
+    std::string group = out_.grouping == Grouping::file ? file_ : joined(cells, group_columns_);
+    if (out_.grouping == Grouping::row && !placement_columns_.empty())
+      group = joined(cells, placement_columns_);
+    else if (out_.grouping == Grouping::row)
+      group = std::to_string(out_.rows());
+    out_.group.push_back(out_.grouping == Grouping::time_block ? 0 : groups_.of(group));
+    out_.line.push_back(static_cast<std::uint32_t>(line));
+    out_.file.push_back(static_cast<std::uint32_t>(out_.file_names.size() - 1));
+    // Placements told apart by their true range: without one, a row is a placement of its own.
+    const bool alone = placement_columns_.empty() || (placed_by_truth_ && !truth);
+    const std::string own = alone ? "line " + std::to_string(line) : joined(cells, placement_columns_);
+    out_.placement.push_back(
+        placements_.of((several_files_ ? file_ + "/" : "") + (alone ? own : group + "/" + own)));
+    if (out_.placement.back() == out_.placement_names.size()) out_.placement_names.push_back(own);
+  }
+
+  Result<void> map_labels() {
+    if (label_ == k_none) return boost::outcome_v2::success();
+    std::string los_value = options_.los_value;
+    const auto& name = header_.names[label_];
+    if (named_after_class()) {
+      const bool nlos = plain_name(name).ends_with("nlos");
+      for (std::size_t i = 0; i < labels_.size(); ++i) {
+        const char word = class_word(labels_[i]).value_or('N');
+        out_.los[i] = word == 'L' || word == (nlos ? '0' : '1');
+      }
+      return boost::outcome_v2::success();
+    }
+    for (const char* word : {"LOS", "los", "Los"})
+      if (los_value.empty() && std::find(labels_.begin(), labels_.end(), word) != labels_.end())
+        los_value = word;
+    if (los_value.empty()) los_value = *std::min_element(labels_.begin(), labels_.end());
+    std::size_t los = 0;
+    for (std::size_t i = 0; i < labels_.size(); ++i) {
+      const double a = number(labels_[i]), b = number(los_value);
+      out_.los[i] = !std::isnan(a) && !std::isnan(b) ? a == b : labels_[i] == los_value;
+      los += *out_.los[i] ? 1 : 0;
+    }
+    if (los == 0 && !options_.los_value.empty())
+      return make_error(Errc::invalid_argument,
+                        file_ + ": no row of column " + name + " is \"" + los_value + "\"");
+    return boost::outcome_v2::success();
+  }
+
+  const TableOptions& options_;
+  bool several_files_;
+  bool decimal_comma_{false}, placed_by_truth_{false};
+  std::string file_;
+  Header header_{};
+  std::size_t range_{k_none}, label_{k_none}, truth_{k_none};
+  std::vector<std::size_t> group_columns_, placement_columns_, raw_columns_;
+  std::map<const Names*, std::size_t> level_columns_;  ///< what features are computed from
+  std::vector<double> values_;
+  std::vector<std::string> labels_;
+  Ids groups_, placements_;
+  LabelledTable out_;
+};
+
+}  // namespace
+
+Result<LabelledTable> read_labelled_tables(std::span<const std::filesystem::path> paths,
+                                           const TableOptions& options) {
+  if (paths.empty()) return make_error(Errc::invalid_argument, "no data file given");
+  std::optional<CirTable> cir;
+  if (options.cir) {
+    BOOST_OUTCOME_TRY(cir, read_cir(*options.cir));
+  }
+  Reader reader{options, paths.size() > 1};
+  for (const auto& path : paths) {
+    BOOST_OUTCOME_TRY(reader.read(path, cir ? &*cir : nullptr));
+  }
+  return reader.finish();
+}
+
+}  // namespace anchord::api

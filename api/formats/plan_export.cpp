@@ -1,0 +1,127 @@
+#include "api/formats/plan_export.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "core/base/to_wire.hpp"
+#include "core/planning/local_plan.hpp"
+
+namespace anchord::api {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// MAV_CMD and MAV_FRAME of the MAVLink common set.
+constexpr int k_waypoint = 16, k_return = 20, k_takeoff = 22, k_yaw = 115;
+constexpr int k_relative_altitude = 3, k_mission_frame = 2;
+
+class Items {
+ public:
+  void put(int command, int frame, Json params, double altitude_m) {
+    Json item;
+    item["type"] = "SimpleItem";
+    item["AMSLAltAboveTerrain"] = nullptr;
+    item["Altitude"] = altitude_m;
+    item["AltitudeMode"] = 1;  // relative to home
+    item["autoContinue"] = true;
+    item["command"] = command;
+    item["doJumpId"] = items_.size() + 1;
+    item["frame"] = frame;
+    item["params"] = std::move(params);
+    items_.push_back(std::move(item));
+  }
+  Json take() { return std::move(items_); }
+
+ private:
+  Json items_ = Json::array();
+};
+
+Json qgc_polygon(const GeoPolygon& polygon, bool inclusion) {
+  Json corners = Json::array();
+  for (const auto& p : polygon) corners.push_back({p.lat_deg, p.lon_deg});
+  return {{"inclusion", inclusion}, {"polygon", corners}, {"version", 1}};
+}
+
+Json area_feature(const GeoPolygon& polygon, const char* kind) {
+  Json ring = Json::array();
+  for (const auto& p : polygon) ring.push_back({p.lon_deg, p.lat_deg});
+  ring.push_back(ring.front());
+  return {{"type", "Feature"},
+          {"geometry", {{"type", "Polygon"}, {"coordinates", Json::array({ring})}}},
+          {"properties", {{"kind", kind}}}};
+}
+
+}  // namespace
+
+Result<std::string> plan_qgc(const Plan& plan) {
+  BOOST_OUTCOME_TRY(const auto origin, planning::plan_origin(plan));
+  LonLat home{origin.lon_deg, origin.lat_deg};
+  Items items;
+  if (!plan.waypoints.empty()) {
+    const auto& first = plan.waypoints.front();
+    home = first.at;
+    items.put(k_takeoff, k_relative_altitude, {0, 0, 0, nullptr, home.lat_deg, home.lon_deg, first.height_m},
+              first.height_m);
+  }
+  for (const auto& w : plan.waypoints) {
+    const double hold_s = w.measure ? w.dwell_s.value_or(plan.settings.dwell_s) : 0;
+    items.put(k_waypoint, k_relative_altitude,
+              {hold_s, 0, 0, w.heading_deg ? Json(*w.heading_deg) : Json(nullptr), w.at.lat_deg, w.at.lon_deg,
+               w.height_m},
+              w.height_m);
+    // 360 degrees, 30 degrees a second, clockwise, relative to where the nose is.
+    if (w.turn) items.put(k_yaw, k_mission_frame, {360, 30, 1, 1, 0, 0, 0}, 0);
+  }
+  items.put(k_return, k_mission_frame, {0, 0, 0, 0, 0, 0, 0}, 0);
+
+  Json polygons = Json::array();
+  if (!plan.fence.empty()) polygons.push_back(qgc_polygon(plan.fence, true));
+  if (!plan.outline.empty()) polygons.push_back(qgc_polygon(plan.outline, false));
+  for (const auto& area : plan.no_fly) polygons.push_back(qgc_polygon(area, false));
+  Json out;
+  out["fileType"] = "Plan";
+  out["groundStation"] = "QGroundControl";
+  out["version"] = 1;
+  out["geoFence"] = {{"circles", Json::array()}, {"polygons", std::move(polygons)}, {"version", 2}};
+  out["rallyPoints"] = {{"points", Json::array()}, {"version", 2}};
+  out["mission"] = {{"version", 2},
+                    {"firmwareType", 3},  // MAV_AUTOPILOT_ARDUPILOTMEGA; every item means the same to PX4
+                    {"vehicleType", 2},   // MAV_TYPE_QUADROTOR
+                    {"globalPlanAltitudeMode", 1},
+                    {"cruiseSpeed", plan.settings.speed_mps},
+                    {"hoverSpeed", plan.settings.speed_mps},
+                    {"plannedHomePosition", {home.lat_deg, home.lon_deg, 0}},
+                    {"items", items.take()}};
+  return to_wire(out, 2) + "\n";
+}
+
+Result<std::string> plan_geojson(const Plan& plan) {
+  Json features = Json::array(), line = Json::array();
+  if (!plan.outline.empty()) {
+    features.push_back(area_feature(plan.outline, "outline"));
+    features.back()["properties"]["height_m"] = plan.building_height_m;
+  }
+  if (!plan.fence.empty()) features.push_back(area_feature(plan.fence, "fence"));
+  for (const auto& area : plan.no_fly) features.push_back(area_feature(area, "no_fly"));
+  for (std::size_t i = 0; i < plan.waypoints.size(); ++i) {
+    const auto& w = plan.waypoints[i];
+    line.push_back({w.at.lon_deg, w.at.lat_deg});
+    features.push_back({{"type", "Feature"},
+                        {"geometry", {{"type", "Point"}, {"coordinates", {w.at.lon_deg, w.at.lat_deg}}}},
+                        {"properties",
+                         {{"kind", w.measure ? "waypoint" : "transit"},
+                          {"index", i},
+                          {"height_above_ground_m", w.height_m},
+                          {"heading_deg", w.heading_deg ? Json(*w.heading_deg) : Json(nullptr)}}}});
+  }
+  if (line.size() > 1) {
+    features.push_back({{"type", "Feature"},
+                        {"geometry", {{"type", "LineString"}, {"coordinates", line}}},
+                        {"properties", {{"kind", "path"}}}});
+  }
+  Json out;
+  out["type"] = "FeatureCollection";
+  out["features"] = std::move(features);
+  return to_wire(out, 2) + "\n";
+}
+
+}  // namespace anchord::api

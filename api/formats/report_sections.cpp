@@ -1,0 +1,305 @@
+#include "api/formats/report_sections.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "api/formats/report_svg.hpp"
+#include "api/wire/live_writer.hpp"
+
+namespace anchord::report {
+namespace {
+
+std::string cell(const std::string& html, const char* css = "num") {
+  return "<td class=\"" + std::string(css) + "\">" + html + "</td>";
+}
+std::string head(const std::string& html, bool number = true) {
+  return number ? "<th class=\"num\">" + html + "</th>" : "<th>" + html + "</th>";
+}
+
+std::string name_of(const ReportAnchor& anchor) {
+  return anchor.name.empty() ? to_string(anchor.estimate.anchor) : anchor.name;
+}
+
+std::string spaced(std::string words) {
+  std::ranges::replace(words, '_', ' ');
+  return words;
+}
+
+/// 51.023 159 414
+std::string degrees(double value) {
+  std::string text = fixed(value, 9);
+  if (text.size() > 6 && std::isfinite(value)) {
+    text.insert(text.size() - 3, "\u202f");
+    text.insert(text.size() - 9, "\u202f");
+  }
+  return text;
+}
+
+std::string state(const ReportAnchor& anchor) {
+  if (anchor.overridden) return "<span class=\"chip warn\">◆ OVERRIDDEN</span>";
+  if (anchor.published) return "<span class=\"chip ok\">✔ PUBLISHED</span>";
+  if (anchor.estimate.acceptable()) return "<span class=\"chip ok\">✔ PASSES</span>";
+  return "<span class=\"chip no\">⊖ WITHHELD</span>";
+}
+
+bool any_truth(const Report& report) {
+  return std::ranges::any_of(report.anchors, [](const ReportAnchor& a) { return a.truth_m.has_value(); });
+}
+
+std::string position_row(const Report& report, const ReportAnchor& anchor) {
+  const auto& e = anchor.estimate;
+  const bool globe = report.frame == TrackFrame::wgs84;
+  std::string out = anchor.published || e.acceptable() ? "<tr>" : "<tr class=\"mut\">";
+  out += "<td><b>" + html_text(name_of(anchor)) + "</b></td>" + cell(html_text(anchor.place), "") +
+         cell(state(anchor), "");
+  if (!e.best) {
+    out += "<td class=\"num\" colspan=\"5\">no position: " + html_text(e.reason) + "</td>";
+  } else {
+    const auto& at = e.best->position.m;
+    if (globe && e.best->wgs84)
+      out += cell(degrees(e.best->wgs84->lat_deg)) + cell(degrees(e.best->wgs84->lon_deg)) +
+             cell(fixed(e.best->wgs84->height_m, 3));
+    else
+      out += cell(fixed(at.x(), 3)) + cell(fixed(at.y(), 3)) + cell(fixed(at.z(), 3));
+    out += cell(fixed(e.h95_m, 3)) + cell(fixed(e.v95_m, 3));
+  }
+  out += cell(std::to_string(e.n_used));
+  if (any_truth(report))
+    out += cell(anchor.truth_m && e.best ? fixed(distance_m(e.best->position.m, *anchor.truth_m), 3) : "–");
+  return out + "</tr>";
+}
+
+/// Names of the gates in the order in which the first anchor that has them was asked.
+std::vector<std::string> gate_names(const Report& report) {
+  std::vector<std::string> names;
+  for (const auto& anchor : report.anchors) {
+    for (const auto& gate : anchor.estimate.gates) {
+      if (std::ranges::find(names, gate.name) == names.end()) names.push_back(gate.name);
+    }
+  }
+  return names;
+}
+
+std::string failures(const ReportAnchor& anchor) {
+  std::string out;
+  for (const auto& gate : anchor.estimate.gates) {
+    if (!gate.passed) out += (out.empty() ? "" : "; ") + spaced(gate.name) + ": " + gate.why;
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string positions(const Report& report) {
+  const bool globe = report.frame == TrackFrame::wgs84;
+  std::string out = "<h2>Positions</h2><table><thead><tr>" + head("Anchor", false) + head("Place", false) +
+                    head("State", false);
+  out += globe ? head("Latitude, °") + head("Longitude, °") + head("Height, m")
+               : head("x, m") + head("y, m") + head("z, m");
+  out += head("95 % h, m") + head("95 % v, m") + head("Ranges");
+  if (any_truth(report)) out += head("Error, m");
+  out += "</tr></thead><tbody>";
+  for (const auto& anchor : report.anchors) out += position_row(report, anchor);
+  out += "</tbody></table><p class=\"note\">";
+  out += globe ? "Height is ellipsoidal." : "Coordinates of the flights' own local frame.";
+  if (any_truth(report))
+    out += " Error is the distance to the truth that was given, in the plane where that has no height.";
+  for (const auto& anchor : report.anchors) {
+    if (anchor.overridden)
+      out += " <b>" + html_text(name_of(anchor)) + "</b> was published by " +
+             html_text(anchor.overridden->by.empty() ? "an unnamed user" : anchor.overridden->by) +
+             " in spite of its gates, because: " + html_text(anchor.overridden->reason) + ".";
+    else if (!anchor.published && !anchor.estimate.acceptable() && anchor.estimate.best)
+      out += " " + html_text(name_of(anchor)) + " is withheld: " +
+             html_text(anchor.estimate.reason.empty() ? failures(anchor) : anchor.estimate.reason) + ".";
+  }
+  return out + "</p>";
+}
+
+std::string gates(const Report& report) {
+  const auto names = gate_names(report);
+  if (names.empty())
+    return "<h2>Acceptance gates</h2><p class=\"note\">This calibration was made without gates; nothing of "
+           "it is "
+           "accepted without a person.</p>";
+  std::string out = "<h2>Acceptance gates</h2><table><thead><tr>" + head("Anchor", false);
+  for (const auto& name : names) out += head(html_text(spaced(name)));
+  out += "</tr></thead><tbody>";
+  std::string words;
+  for (const auto& anchor : report.anchors) {
+    out += "<tr><td><b>" + html_text(name_of(anchor)) + "</b></td>";
+    for (const auto& name : names) {
+      const auto& all = anchor.estimate.gates;
+      const auto gate = std::ranges::find(all, name, &Gate::name);
+      if (gate == all.end()) {
+        out += cell("–", "num mut");
+        continue;
+      }
+      const int decimals = gate->limit >= 10 ? 1 : 2;
+      const std::string value = gate->value ? fixed(*gate->value, decimals) : "–";
+      out += cell((gate->passed ? "" : "✕ ") + value + " <span class=\"u\">| " +
+                      fixed(gate->limit, decimals) + "</span>",
+                  gate->passed ? "num" : "num bad");
+    }
+    out += "</tr>";
+    const std::string why = failures(anchor);
+    if (!why.empty()) words += " <b>" + html_text(name_of(anchor)) + "</b> " + html_text(why) + ".";
+  }
+  return out +
+         "</tbody></table><p class=\"note\">Value | limit; ✕ failed. Only an anchor that passes all is "
+         "accepted "
+         "without a person." +
+         words + "</p>";
+}
+
+std::string methods(const Report& report) {
+  std::string rows;
+  const bool truth = any_truth(report);
+  for (const auto& anchor : report.anchors) {
+    if (!anchor.linear_m && !anchor.wls_m) continue;
+    if (!anchor.truth_m && !anchor.estimate.best) continue;
+    const Eigen::Vector3d reference = anchor.truth_m ? *anchor.truth_m : anchor.estimate.best->position.m;
+    const auto off = [&](const std::optional<Eigen::Vector3d>& at) {
+      return cell(at ? fixed(distance_m(*at, reference), 3) : std::string("–"));
+    };
+    rows +=
+        "<tr><td><b>" + html_text(name_of(anchor)) + "</b></td>" + off(anchor.linear_m) + off(anchor.wls_m);
+    rows += anchor.truth_m && anchor.estimate.best ? off(anchor.estimate.best->position.m) : cell("–");
+    rows += "</tr>";
+  }
+  if (rows.empty()) return {};
+  return "<h2>Methods compared</h2><p class=\"note\">Distance to " +
+         std::string(truth ? "the truth" : "the joint answer") +
+         ", m. Linear: eq 7.2 to 7.5, closed form. Weighted: eq 7.10, each anchor alone, weights of 7.2.3. "
+         "Joint: "
+         "all anchors with bias, range curve, lag and arms, robust.</p><table><thead><tr>" +
+         head("Anchor", false) + head("Linear") + head("Weighted") + head("Joint") + "</tr></thead><tbody>" +
+         rows + "</tbody></table>";
+}
+
+std::string budgets(const Report& report) {
+  std::string rows, words;
+  std::vector<std::string> sources;
+  for (const auto& anchor : report.anchors) {
+    if (anchor.budget.shares.empty()) continue;
+    if (sources.empty())
+      for (const auto& [source, share] : anchor.budget.shares) sources.push_back(source);
+    rows += "<tr><td><b>" + html_text(name_of(anchor)) + "</b></td>";
+    for (const auto& source : sources) {
+      const auto at = std::ranges::find(anchor.budget.shares, source, [](const auto& s) { return s.first; });
+      rows +=
+          at == anchor.budget.shares.end() ? cell("–", "num mut") : cell(fixed(100 * at->second, 0) + " %");
+    }
+    rows += cell(html_text(anchor.budget.help), "") + "</tr>";
+  }
+  if (rows.empty()) return {};
+  std::string out = "<h2>Error budget</h2><table><thead><tr>" + head("Anchor", false);
+  for (const auto& source : sources) out += head(html_text(spaced(source)));
+  return out + head("What would help most", false) + "</tr></thead><tbody>" + rows +
+         "</tbody></table><p class=\"note\">Shares of the covariance's trace: what goes when the source is "
+         "known "
+         "perfectly. Floor: what no residual shows.</p>";
+}
+
+std::string rejected(const Report& report) {
+  std::set<std::string> reasons;
+  for (const auto& anchor : report.anchors) {
+    for (const auto& [why, n] : anchor.estimate.refused) reasons.insert(why);
+  }
+  if (reasons.empty()) return {};
+  std::string out = "<h2>Ranges not used</h2><table><thead><tr>" + head("Anchor", false) + head("used");
+  for (const auto& why : reasons) out += head(html_text(spaced(why)));
+  out += "</tr></thead><tbody>";
+  for (const auto& anchor : report.anchors) {
+    out += "<tr><td><b>" + html_text(name_of(anchor)) + "</b></td>" +
+           cell(std::to_string(anchor.estimate.n_used));
+    for (const auto& why : reasons) {
+      const auto found = anchor.estimate.refused.find(why);
+      out +=
+          found == anchor.estimate.refused.end() ? cell("–", "num mut") : cell(std::to_string(found->second));
+    }
+    out += "</tr>";
+  }
+  return out + "</tbody></table>";
+}
+
+std::string flights(const Report& report) {
+  if (report.evidence.flights.empty()) return {};
+  std::string out = "<h2>Calibration of the kit, per flight</h2><table><thead><tr>" + head("Flight", false) +
+                    head("Kit", false) + head("Bias, m (σ)") + head("Curve, m per e-fold (σ)") +
+                    head("Lag, s (σ)") + head("Antenna up, m (σ)") + head("Ranges used") +
+                    "</tr></thead><tbody>";
+  const auto valued = [](const Valued& v) {
+    return fixed(v.value, 3) + " <span class=\"u\">(" + fixed(v.sigma, 3) + ")</span>";
+  };
+  std::string words;
+  for (const auto& flight : report.evidence.flights) {
+    const auto& s = flight.shared;
+    out += "<tr>" + cell(html_text(flight.name), "") +
+           cell(html_text(flight.kit.empty() ? "–" : flight.kit), "") +
+           cell(s.bias_determined ? valued(s.bias_m) : "<span class=\"bad\">not determined</span>") +
+           cell(valued(s.curve_m)) + cell(valued(s.lag_s)) + cell(valued(s.lever_up_m)) +
+           cell(std::to_string(flight.n_used) + " of " + std::to_string(flight.n_ranges)) + "</tr>";
+    for (const auto& note : flight.notes) words += (words.empty() ? "" : " · ") + html_text(note);
+  }
+  out += "</tbody></table>";
+  return words.empty() ? out : out + "<p class=\"note\">" + words + "</p>";
+}
+
+std::string iterations(const Report& report) {
+  std::string plots, rows;
+  bool truth = false;
+  for (const auto& anchor : report.anchors) {
+    const auto found = report.evidence.course.find(anchor.estimate.anchor);
+    if (found == report.evidence.course.end() || found->second.empty()) continue;
+    if (!anchor.truth_m && !anchor.estimate.best) continue;
+    const auto& steps = found->second;
+    const Eigen::Vector3d reference = anchor.truth_m ? *anchor.truth_m : anchor.estimate.best->position.m;
+    truth = truth || anchor.truth_m.has_value();
+    plots += "<div><h3>" + html_text(name_of(anchor)) + "</h3>" + course(steps, reference) + "</div>";
+    for (std::size_t i = 0; i < steps.size(); ++i) {
+      const auto error = [&](const std::optional<Eigen::Vector3d>& at) {
+        return at ? fixed(distance_m(*at, reference), 3) : std::string("–");
+      };
+      rows += "<tr>" + cell(i == 0 ? "<b>" + html_text(name_of(anchor)) + "</b>" : "", "") +
+              cell(std::to_string(i + 1)) + cell(std::to_string(steps[i].n_ranges)) +
+              cell(error(steps[i].raw_m)) + cell(error(steps[i].corrected_m)) +
+              cell(steps[i].corrected_m ? fixed(steps[i].h95_m, 3) : "–") +
+              cell(std::string(api::verdict_word(steps[i].verdict)), "num mut") + "</tr>";
+    }
+  }
+  if (plots.empty()) return {};
+  const char* against = truth ? "the truth" : "the final position";
+  return "<h2>Error per iteration, raw against corrected</h2><p class=\"note\">Distance to " +
+         std::string(against) +
+         " after each further part of the flight. <i class=\"key\" "
+         "style=\"color:var(--caution)\"></i><span>raw "
+         "ranges</span><i class=\"key\" style=\"color:var(--info)\"></i><span>corrected</span><i "
+         "class=\"key\" "
+         "style=\"color:var(--edge);border-top-style:dashed\"></i><span>claimed 95 %, horizontal</span></p>"
+         "<div class=\"plots\">" +
+         plots + "</div><table style=\"margin-top:10px\"><thead><tr>" + head("Anchor", false) +
+         head("Iteration") + head("Ranges") + head("Raw, m") + head("Corrected, m") +
+         head("Claimed 95 %, m") + head("Verdict") + "</tr></thead><tbody>" + rows + "</tbody></table>";
+}
+
+std::string residual_plots(const Report& report) {
+  std::string plots;
+  for (const auto& anchor : report.anchors) {
+    std::vector<const std::vector<RangeResidual>*> rows;
+    for (const auto& flight : report.evidence.flights) {
+      const auto found = flight.residuals.find(anchor.estimate.anchor);
+      if (found != flight.residuals.end()) rows.push_back(&found->second);
+    }
+    if (rows.empty()) continue;
+    plots += "<div><h3>" + html_text(name_of(anchor)) + "</h3>" + residuals(rows) + "</div>";
+  }
+  if (plots.empty()) return {};
+  return "<h2>Residuals, m, over time</h2><p class=\"note\">Corrected range less distance; · used, <span "
+         "class=\"bad\">×</span> rejected. A pattern that stays is an error of the model, not noise.</p><div "
+         "class=\"plots\">" +
+         plots + "</div>";
+}
+
+}  // namespace anchord::report

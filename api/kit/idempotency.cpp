@@ -1,0 +1,211 @@
+#include "api/kit/idempotency.hpp"
+
+#include <openssl/evp.h>
+
+#include <array>
+
+#include "api/kit/problem.hpp"
+#include "api/kit/router.hpp"
+#include "core/ports/store.hpp"
+
+namespace anchord::api {
+namespace {
+
+constexpr std::size_t k_purged_at_once = 200;
+
+class Sha256 {
+ public:
+  Sha256() : context_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) {
+    EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr);
+  }
+  void add(std::string_view bytes) { EVP_DigestUpdate(context_.get(), bytes.data(), bytes.size()); }
+  std::string hex() {
+    std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
+    unsigned size = 0;
+    EVP_DigestFinal_ex(context_.get(), digest.data(), &size);
+    std::string text;
+    for (unsigned i = 0; i < size; ++i) {
+      text += "0123456789abcdef"[digest[i] >> 4];
+      text += "0123456789abcdef"[digest[i] & 15];
+    }
+    return text;
+  }
+
+ private:
+  std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context_;
+};
+
+/// Hashes a streamed body on its way through.
+class HashingReader final : public BodyReader {
+ public:
+  HashingReader(BodyReader& inner, Sha256& hash) : inner_(inner), hash_(hash) {}
+  std::size_t read(std::span<char> buffer) override {
+    const std::size_t n = inner_.read(buffer);
+    hash_.add({buffer.data(), n});
+    return n;
+  }
+
+ private:
+  BodyReader& inner_;
+  Sha256& hash_;
+};
+
+void drain(BodyReader& reader) {
+  std::array<char, 16384> buffer{};
+  while (reader.read(buffer) != 0) {
+  }
+}
+
+/// Releases the key when the request ends, however it ends.
+class Running {
+ public:
+  Running(std::mutex& mutex, std::set<std::string>& set, std::string name)
+      : mutex_(mutex), set_(set), name_(std::move(name)) {
+    const std::scoped_lock lock(mutex_);
+    first_ = set_.insert(name_).second;
+  }
+  ~Running() {
+    const std::scoped_lock lock(mutex_);
+    if (first_) set_.erase(name_);
+  }
+  bool first() const { return first_; }
+
+ private:
+  std::mutex& mutex_;
+  std::set<std::string>& set_;
+  std::string name_;
+  bool first_{false};
+};
+
+}  // namespace
+
+std::string sha256_hex(std::string_view bytes) {
+  Sha256 hash;
+  hash.add(bytes);
+  return hash.hex();
+}
+
+AnswerUse Idempotency::use_of(const std::string& who) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (const auto at = use_.find(who); at != use_.end()) return at->second;
+  }
+  const auto stored = answers_.answer_use(who);
+  const std::scoped_lock lock(mutex_);
+  return use_.emplace(who, stored ? stored.value() : AnswerUse{}).first->second;
+}
+
+Idempotency::Room Idempotency::make_room(const std::string& who, Keeps keeps) {
+  const AnswerUse use = use_of(who);
+  if (use.count < k_max_answers && use.bytes < k_max_bytes) return {};
+  if (keeps == Keeps::answer) {
+    return {true, "this token has " + std::to_string(use.count) + " kept answers of " +
+                      std::to_string(use.bytes) + " bytes of the last 24 h (limits " +
+                      std::to_string(k_max_answers) + " and " + std::to_string(k_max_bytes) +
+                      "): send the request without Idempotency-Key, or later"};
+  }
+  (void)answers_.drop_oldest_answers(who, k_max_answers / 10).has_value();
+  const std::scoped_lock lock(mutex_);
+  use_.erase(who);
+  return {};
+}
+
+void Idempotency::keep(const Request& request, const Response& response, std::string hash) {
+  StoredAnswer answer;
+  answer.key = std::string(request.header("idempotency-key"));
+  answer.principal = request.principal.token_id;
+  answer.request_sha256_hex = std::move(hash);
+  answer.status = response.status;
+  answer.created_ran_ns = running_ns_();
+  for (const auto& [name, value] : response.headers) {
+    if (name == "Location") answer.location = value;
+    if (name == "ETag") answer.etag = value;
+  }
+  if (response.body.size() <= k_max_answer_bytes) {
+    answer.body = response.body;
+  } else {
+    answer.body = R"({"replayed":true,"detail":"done by the first request; its answer of )" +
+                  std::to_string(response.body.size()) + " bytes was not kept (limit " +
+                  std::to_string(k_max_answer_bytes) + R"(): read the resource itself"})";
+  }
+  // It was done, whatever becomes of this: an error here would tell the client that it was not.
+  if (!answers_.keep_answer(answer, answer.created_ran_ns - k_keep_ns)) return;
+  const std::scoped_lock lock(mutex_);
+  if (const auto at = use_.find(answer.principal); at != use_.end()) {
+    ++at->second.count;
+    at->second.bytes += answer.body.size();
+  }
+}
+
+void Idempotency::forget_use() {
+  const std::scoped_lock lock(mutex_);
+  use_.clear();
+}
+
+bool Idempotency::purge() {
+  const auto dropped = answers_.drop_answers_before(running_ns_() - k_keep_ns, k_purged_at_once);
+  forget_use();
+  return dropped && dropped.value() == k_purged_at_once;
+}
+
+Response Idempotency::run(Request& request, Keeps keeps, const std::function<Response(Request&)>& handler) {
+  const std::string key(request.header("idempotency-key"));
+  if (key.size() > 128) return problem(400, "malformed", "Idempotency-Key is longer than 128 characters");
+  const std::string& who = request.principal.token_id;
+  const Running running(mutex_, running_, who + '\n' + key);
+  if (!running.first())
+    return problem(409, "conflict", "a request with this Idempotency-Key is still running");
+
+  Sha256 hash;
+  hash.add(to_string(request.method));
+  hash.add(request.path);
+  for (const auto& [name, value] : request.query) hash.add("\n" + name + "=" + value);
+  hash.add("\n\n");
+
+  auto stored = answers_.answer(who, key);
+  if (!stored) return problem_of(stored.error());
+  const auto& kept = stored.value();
+  if (kept && running_ns_() - kept->created_ran_ns < k_keep_ns) {
+    if (request.body_stream != nullptr) {
+      HashingReader reader(*request.body_stream, hash);
+      drain(reader);
+    } else {
+      hash.add(request.body);
+    }
+    if (hash.hex() != kept->request_sha256_hex) {
+      return problem(422, "validation", "this Idempotency-Key was used with another request",
+                     {{"", "idempotency_key", "the key belongs to a request with other content"}});
+    }
+    Response response;
+    response.status = kept->status;
+    response.header("Content-Type", "application/json");
+    if (!kept->location.empty()) response.header("Location", kept->location);
+    if (!kept->etag.empty()) response.header("ETag", kept->etag);
+    response.header("Idempotent-Replayed", "true");
+    response.body = kept->body;
+    return response;
+  }
+  if (const Room room = make_room(who, keeps); room.refused) {
+    Response response = problem(429, "quota", room.why);
+    for (auto& [name, value] : response.headers) {
+      if (name == "Retry-After") value = "3600";
+    }
+    return response;
+  }
+
+  Response response;
+  if (request.body_stream != nullptr) {
+    HashingReader reader(*request.body_stream, hash);
+    request.body_stream = &reader;
+    response = handler(request);
+    drain(reader);
+    request.body_stream = nullptr;
+  } else {
+    hash.add(request.body);
+    response = handler(request);
+  }
+  if (response.status < 400 && !response.body_stream) keep(request, response, hash.hex());
+  return response;
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,292 @@
+#include "api/kit/router.hpp"
+
+#include <cctype>
+#include <new>
+
+#include "api/kit/problem.hpp"
+#include "core/base/guard.hpp"
+#include "core/base/text.hpp"
+
+namespace anchord::api {
+namespace {
+
+std::vector<std::string_view> segments(std::string_view path) {
+  std::vector<std::string_view> parts;
+  std::size_t at = 0;
+  while (at < path.size()) {
+    const std::size_t next = path.find('/', at + 1);
+    parts.push_back(path.substr(at + 1, next == std::string_view::npos ? next : next - at - 1));
+    if (next == std::string_view::npos) break;
+    at = next;
+  }
+  return parts;
+}
+
+/// Literal segments win over parameters, so that /anchors/stats and /anchors/{id} may stand side by side.
+bool match(const std::vector<std::string_view>& pattern, const std::vector<std::string_view>& path,
+           std::map<std::string, std::string>& params, int& literals) {
+  if (pattern.size() != path.size()) return false;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const auto part = pattern[i];
+    if (part.size() > 2 && part.front() == '{') {
+      if (path[i].empty()) return false;
+      params.emplace(part.substr(1, part.size() - 2), path[i]);
+    } else if (part == path[i]) {
+      ++literals;
+    } else {
+      return false;
+    }
+  }
+  return true;
+}
+
+bool etag_listed(std::string_view list, std::string_view etag) {
+  const auto strong = [](std::string_view tag) { return tag.substr(0, 2) == "W/" ? tag.substr(2) : tag; };
+  while (!list.empty()) {
+    auto comma = list.find(',');
+    auto item = list.substr(0, comma);
+    while (!item.empty() && std::isspace(static_cast<unsigned char>(item.front())) != 0)
+      item.remove_prefix(1);
+    while (!item.empty() && std::isspace(static_cast<unsigned char>(item.back())) != 0) item.remove_suffix(1);
+    if (item == "*" || strong(item) == strong(etag)) return true;
+    if (comma == std::string_view::npos) break;
+    list.remove_prefix(comma + 1);
+  }
+  return false;
+}
+
+bool has_header(const Response& response, std::string_view name) {
+  for (const auto& [key, value] : response.headers) {
+    if (key == name) return true;
+  }
+  return false;
+}
+
+std::string weak_etag(std::string_view body) {
+  std::uint64_t hash = 14695981039346656037ULL;  // FNV-1a, 64 bit
+  for (const char c : body) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
+  static constexpr char k_hex[] = "0123456789abcdef";
+  std::string tag = "W/\"";
+  for (int shift = 60; shift >= 0; shift -= 4) tag += k_hex[(hash >> shift) & 15];
+  return tag + '"';
+}
+
+void conditional_get(const Request& request, Response& response) {
+  if ((request.method != Method::get && request.method != Method::head) || response.status != 200 ||
+      response.body_stream) {
+    return;
+  }
+  if (!has_header(response, "ETag")) response.header("ETag", weak_etag(response.body));
+  const auto wanted = request.header("if-none-match");
+  if (wanted.empty()) return;
+  for (const auto& [key, value] : response.headers) {
+    if (key == "ETag" && etag_listed(wanted, value)) {
+      response.status = 304;
+      response.body.clear();
+      return;
+    }
+  }
+}
+
+/// Asks what would be done, and changes nothing.
+bool is_dry_run(const Request& request) {
+  const auto asked = request.query_value("dry_run");
+  return asked && *asked != "false" && *asked != "0";
+}
+
+/// A problem made below knows neither where it happened nor for whom: say both here.
+void complete_problem(const Request& request, Response& response) {
+  if (response.status < 400 || response.body.size() < 2 || response.body.back() != '}') return;
+  if (response.body.find("\"instance\":") != std::string::npos) return;
+  response.body.pop_back();
+  append_json_text(response.body += ",\"instance\":", request.path);
+  append_json_text(response.body += ",\"request_id\":", request.request_id);
+  response.body += '}';
+}
+
+}  // namespace
+
+std::string_view to_string(Method method) {
+  switch (method) {
+    case Method::get:
+      return "GET";
+    case Method::head:
+      return "HEAD";
+    case Method::post:
+      return "POST";
+    case Method::put:
+      return "PUT";
+    case Method::patch:
+      return "PATCH";
+    case Method::del:
+      return "DELETE";
+    case Method::options:
+      return "OPTIONS";
+  }
+  return "GET";
+}
+
+std::string_view to_string(Role role) {
+  switch (role) {
+    case Role::viewer:
+      return "viewer";
+    case Role::integrator:
+      return "integrator";
+    case Role::gateway:
+      return "gateway";
+    case Role::engineer:
+      return "engineer";
+    case Role::op:
+      return "operator";
+    case Role::admin:
+      return "admin";
+  }
+  return "viewer";
+}
+
+bool Access::permits(const Principal& who) const {
+  if (kind_ == Kind::open || who.has(Role::admin)) return true;
+  if (kind_ == Kind::any_token) return !who.roles.empty();
+  for (const Role role : roles_) {
+    if (who.has(role)) return true;
+  }
+  return false;
+}
+
+struct Router::State {
+  std::vector<Route> routes;
+  std::unique_ptr<Idempotency> idempotency, of_commands;
+  std::function<void(std::string_view, std::string_view)> fault;
+};
+
+Router::Router(AccessStore* answers, std::function<std::int64_t()> running_ns, AccessStore* prompt)
+    : state_(std::make_unique<State>()) {
+  if (answers == nullptr || !running_ns) return;
+  state_->idempotency = std::make_unique<Idempotency>(*answers, running_ns);
+  state_->of_commands =
+      std::make_unique<Idempotency>(prompt != nullptr ? *prompt : *answers, std::move(running_ns));
+}
+bool Router::purge_answers() const {
+  if (!state_->idempotency) return false;
+  state_->of_commands->forget_use();  // they share what is kept
+  return state_->idempotency->purge();
+}
+Router::~Router() = default;
+Router::Router(Router&&) noexcept = default;
+Router& Router::operator=(Router&&) noexcept = default;
+
+void Router::add(Route route) { state_->routes.push_back(std::move(route)); }
+const std::vector<Route>& Router::routes() const { return state_->routes; }
+void Router::on_fault(std::function<void(std::string_view, std::string_view)> log) {
+  state_->fault = std::move(log);
+}
+
+Resolution Router::resolve(Method method, std::string_view path) const {
+  Resolution best;
+  int best_literals = -1;
+  std::string allow;
+  const auto parts = segments(path);
+  const Method wanted = method == Method::head ? Method::get : method;
+  for (const auto& route : state_->routes) {
+    std::map<std::string, std::string> params;
+    int literals = 0;
+    if (!match(segments(route.pattern), parts, params, literals)) continue;
+    const std::string name(to_string(route.method));
+    if (allow.find(name) == std::string::npos)
+      allow += name + (route.method == Method::get ? ", HEAD, " : ", ");
+    if (route.method == wanted && literals > best_literals) {
+      best_literals = literals;
+      best.kind = Resolution::Kind::matched;
+      best.route = &route;
+      best.params = std::move(params);
+    }
+  }
+  if (!allow.empty()) {
+    best.allow = allow + "OPTIONS";
+    if (best.route == nullptr) best.kind = Resolution::Kind::method_not_allowed;
+  }
+  return best;
+}
+
+Response Router::refuse(const Resolution& resolution, const Request& request) const {
+  Response response;
+  if (resolution.kind == Resolution::Kind::not_found) {
+    response = problem(404, "not-found", "there is nothing at this address");
+  } else if (request.method == Method::options) {
+    response.status = 204;
+  } else {
+    response = problem(405, "method", "this address answers to " + resolution.allow);
+  }
+  if (!resolution.allow.empty()) response.header("Allow", resolution.allow);
+  complete_problem(request, response);
+  return response;
+}
+
+Response Router::handle(Request& request) const {
+  auto resolution = resolve(request.method, request.path);
+  if (resolution.kind != Resolution::Kind::matched) return refuse(resolution, request);
+  request.params = std::move(resolution.params);
+  return dispatch(*resolution.route, request);
+}
+
+Response Router::dispatch(const Route& route, Request& request) const {
+  Response response;
+  const auto handled = [&](Request& r) {
+    try {
+      return route.handler(r);
+    } catch (ProblemException& refused) {
+      return std::move(refused.response);
+    }
+  };
+  const auto answer = [&] {
+    if (!route.access.permits(request.principal)) {
+      if (request.principal.roles.empty()) {
+        response = problem(401, "unauthorized", "send a token as Authorization: Bearer");
+      } else {
+        std::string needed;
+        for (const Role role : route.access.roles())
+          needed += (needed.empty() ? "" : " or ") + std::string(to_string(role));
+        response = problem(403, "forbidden", "this needs the role " + (needed.empty() ? "admin" : needed));
+      }
+    } else if (route.needs_if_match && request.header("if-match").empty()) {
+      response = problem(428, "precondition-required", "send If-Match with the ETag that was read");
+    } else if (route.method == Method::post && state_->idempotency && route.keeps != Keeps::nothing &&
+               !is_dry_run(request) && !request.header("idempotency-key").empty()) {
+      const bool prompt = route.work_for(request) == Work::command;
+      response = (prompt ? state_->of_commands : state_->idempotency)->run(request, route.keeps, handled);
+    } else {
+      response = handled(request);
+    }
+  };
+  const auto ran = guarded(route.pattern, [&] {
+    try {
+      answer();
+    } catch (const BodyError& lost) {
+      response = problem(lost.status(),
+                         lost.status() == 413   ? "too-large"
+                         : lost.status() == 401 ? "unauthorized"
+                                                : "malformed",
+                         lost.what());
+      response.header("Connection", "close");
+    } catch (const std::bad_alloc&) {
+      response = problem(503, "overloaded", "out of memory");
+      if (state_->fault) state_->fault(request.request_id, "out of memory");
+    }
+  });
+  if (!ran) {
+    if (state_->fault) state_->fault(request.request_id, ran.what);
+    response = problem(500, "internal", "");
+  }
+  conditional_get(request, response);
+  complete_problem(request, response);
+  if (!request.request_id.empty()) response.header("X-Request-Id", request.request_id);
+  if (!has_header(response, "Cache-Control")) {
+    // A browser may keep an answer and asks each time whether it still holds; positions are not for proxies.
+    const bool kept =
+        response.status < 400 && (request.method == Method::get || request.method == Method::head);
+    response.header("Cache-Control", kept ? "private, no-cache" : "no-store");
+  }
+  return response;
+}
+
+}  // namespace anchord::api

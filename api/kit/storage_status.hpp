@@ -1,0 +1,16 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace anchord::api {
+
+/// State of storage as the world may know it.
+struct StorageStatus {
+  bool writable{true};
+  std::string reason;  ///< why not, in words
+  std::uint64_t db_bytes{0}, disk_free_bytes{0}, queue_depth{0};
+  std::string synchronous{"full"};
+};
+
+}  // namespace anchord::api

@@ -1,0 +1,253 @@
+#include <nlohmann/json.hpp>
+
+#include "api/kit/reader.hpp"
+#include "api/kit/support.hpp"
+#include "api/learning/learning_json.hpp"
+#include "api/learning/measurement_query.hpp"
+#include "api/learning/model_registry.hpp"
+#include "api/learning/range_features.hpp"
+#include "api/measurements/ingest.hpp"
+#include "api/measurements/routes.hpp"
+#include "api/wire/rows_json.hpp"
+#include "core/base/to_wire.hpp"
+#include "core/ports/store.hpp"
+
+#include <charconv>
+
+namespace anchord::api {
+
+using Ordered = nlohmann::ordered_json;
+
+namespace {
+
+MeasurementStore::Filter filter_of(const Request& request) {
+  MeasurementStore::Filter filter;
+  const auto page = page_query(request, 10'000);
+  filter.limit = page.limit;
+  filter.after = page.cursor;
+  filter.mission = query_mission(request);
+  filter.anchor = query_network_id(request, "anchor");
+  filter.tag = query_network_id(request, "tag");
+  filter.since = query_time(request, "since");
+  filter.until = query_time(request, "until");
+  const auto sort = request.query_value("sort").value_or("t_us");
+  if (sort != "t_us" && sort != "-t_us")
+    throw_problem(422, "validation", "sort is t_us or -t_us",
+                  {{"/sort", "unknown_value", "must be t_us or -t_us"}});
+  filter.descending = sort == "-t_us";
+  return filter;
+}
+
+std::string csv_number(const auto& value) {
+  if (!value) return "";
+  return to_wire(nlohmann::json(*value));
+}
+
+constexpr const char* k_range_header =
+    "id,t_us,mission,kind,tag,antenna,anchor,seq,distance_m,rss_dbm,fp_dbm,rx_dbm,std_noise,heading_deg,"
+    "truth_distance_m,truth_los\r\n";
+std::string range_csv(const Range& r, std::int64_t id) {
+  const RangeTruth truth = r.truth.value_or(RangeTruth{});
+  return std::to_string(id) + ',' + std::to_string(r.time.us()) + ',' + to_string(r.mission) + ',' +
+         (r.kind == RangeKind::tag_anchor ? "tag_anchor" : "anchor_anchor") + ',' + to_string(r.tag) + ',' +
+         std::to_string(r.antenna) + ',' + to_string(r.anchor) + ',' + csv_number(r.seq) + ',' +
+         to_wire(nlohmann::json(r.distance_m)) + ',' + csv_number(r.rss_dbm) + ',' + csv_number(r.fp_dbm) +
+         ',' + csv_number(r.rx_dbm) + ',' + csv_number(r.std_noise) + ',' + csv_number(r.heading_deg) + ',' +
+         csv_number(truth.distance_m) + ',' + csv_number(truth.los) + "\r\n";
+}
+
+constexpr const char* k_fix_header =
+    "id,t_us,mission,seq,lon,lat,h_m,x_m,y_m,z_m,fix,sigma_e_m,sigma_n_m,sigma_u_m,correction_age_s,"
+    "satellites\r\n";
+std::string fix_csv(const Fix& f, std::int64_t id) {
+  const bool globe = f.frame == TrackFrame::wgs84;
+  const auto number = [](double v) { return to_wire(nlohmann::json(v)); };
+  std::string row = std::to_string(id) + ',' + std::to_string(f.time.us()) + ',' + to_string(f.mission) +
+                    ',' + csv_number(f.seq);
+  row += ',' +
+         (globe ? number(f.position.lon_deg) + ',' + number(f.position.lat_deg) + ',' +
+                      number(f.position.height_m) + ",,,"
+                : ",,," + number(f.local_m.x()) + ',' + number(f.local_m.y()) + ',' + number(f.local_m.z()));
+  row += ',' + std::string(fix_word(f.fix));
+  for (int i = 0; i < 3; ++i)
+    row +=
+        ',' + (f.covariance_m2 ? number(std::sqrt(std::max(0.0, (*f.covariance_m2)(i, i)))) : std::string());
+  return row + ',' + csv_number(f.correction_age_s) + ',' + csv_number(f.satellites) + "\r\n";
+}
+
+/// Streams every page that matches (or `limit` rows where asked for); memory is one page.
+template <class Fetch, class Write>
+Response stream(const Request& request, MeasurementStore::Filter filter, std::string type, std::string header,
+                Fetch fetch, Write write) {
+  struct Progress {
+    MeasurementStore::Filter filter;
+    std::string header;
+    std::size_t left;
+    bool done{false};
+  };
+  const bool limited = request.query_value("limit").has_value();
+  auto state = std::make_shared<Progress>(
+      Progress{std::move(filter), std::move(header), limited ? filter.limit : SIZE_MAX});
+  Response response;
+  response.header("Content-Type", std::move(type));
+  response.body_stream = [state, fetch, write]() -> std::string {
+    std::string out = std::exchange(state->header, {});
+    if (!out.empty() || state->done) return out;
+    // A page of a class may be empty and yet not the last: an empty answer here would be the end.
+    while (out.empty() && !state->done) {
+      state->filter.limit = std::min<std::size_t>(1000, state->left);
+      const auto page = fetch(state->filter);
+      // The status is sent already; an early end is all that can still be told.
+      if (!page) throw BodyError(503, page.error().message);
+      for (std::size_t i = 0; i < page.value().rows.size(); ++i)
+        out += write(page.value().rows[i], page.value().ids[i]);
+      state->left -= page.value().rows.size();
+      state->filter.after = page.value().next;
+      state->done = page.value().next.empty() || state->left == 0;
+    }
+    return out;
+  };
+  return response;
+}
+
+template <class Fetch, class Json, class Csv>
+Response rows(const Request& request, MeasurementStore::Filter filter, Fetch fetch, Json json, Csv csv,
+              const char* header, std::optional<std::uint64_t> total = std::nullopt) {
+  const std::string format = negotiate(request, {"json", "ndjson", "csv"});
+  if (format == "csv") return stream(request, filter, "text/csv; charset=utf-8", header, fetch, csv);
+  if (format == "ndjson")
+    return stream(request, filter, "application/x-ndjson", "", fetch,
+                  [json](const auto& row, std::int64_t id) { return to_wire(json(row, id)) + '\n'; });
+  const auto page = value_or_problem(fetch(filter));
+  Ordered items = Ordered::array();
+  for (std::size_t i = 0; i < page.rows.size(); ++i) items.push_back(json(page.rows[i], page.ids[i]));
+  return list_response(request, std::move(items), page.next, total);
+}
+
+FixClass query_fix(const std::string& text) {
+  for (const auto fix :
+       {FixClass::none, FixClass::single, FixClass::dgps, FixClass::rtk_float, FixClass::rtk_fixed})
+    if (text == fix_word(fix)) return fix;
+  throw_problem(422, "validation", "fix is not one of its words",
+                {{"/fix", "unknown_value", "must be none, single, dgps, float or fixed"}});
+}
+
+/// One page of what the promoted models call `wanted`: they are asked row by row, since nothing of theirs is
+/// stored.
+Result<MeasurementStore::Page<Range>> classed(MeasurementStore& store, const ModelRegistry::Active& active,
+                                              PredictedClass wanted, MeasurementStore::Filter filter) {
+  const std::size_t limit = filter.limit;
+  MeasurementStore::Page<Range> out;
+  for (std::size_t looked = 0; out.rows.size() < limit && looked < k_class_scan_max;) {
+    filter.limit = limit - out.rows.size();
+    BOOST_OUTCOME_TRY(auto page, store.ranges(filter));
+    looked += page.rows.size();
+    for (std::size_t i = 0; i < page.rows.size(); ++i) {
+      if (class_of(ModelRegistry::judge(active, features_of(page.rows[i]))) != wanted) continue;
+      out.rows.push_back(std::move(page.rows[i]));
+      out.ids.push_back(page.ids[i]);
+    }
+    out.next = filter.after = std::move(page.next);
+    if (out.next.empty()) break;
+  }
+  return out;
+}
+
+Response list_ranges(MeasurementApi& s, const Request& request) {
+  check_query(
+      request,
+      {"limit",         "cursor",        "fields", "format", "mission",  "anchor",         "tag",
+       "since",         "until",         "sort",   "cir",    "features", "min_distance_m", "max_distance_m",
+       "min_level_dbm", "max_level_dbm", "label",  "fix",    "class",    "predicted",      "every",
+       "count"});
+  const bool with_cir = query_flag(request, "cir"), with_features = query_flag(request, "features");
+  auto filter = filter_of(request);
+  filter.limits = query_limits(request);
+  if (const auto fix = request.query_value("fix")) filter.fix = query_fix(*fix);
+  filter.every = query_every(request);
+  const auto wanted = query_class(request);
+  std::optional<std::uint64_t> total;
+  if (const auto count = request.query_value("count")) {
+    if (*count != "exact" || wanted)
+      throw_problem(422, "validation", "what is counted is stored",
+                    {{"/count", "unknown_value", "must be exact, and goes without class"}});
+    total = value_or_problem(s.measurements.count_ranges(filter));
+  }
+  const bool judged = wanted || query_flag(request, "predicted");
+  const auto active =
+      judged && s.models != nullptr ? s.models->active() : std::make_shared<const ModelRegistry::Active>();
+  filter.with_cir = with_cir || with_features || (judged && active->needs_cir);
+  return rows(
+      request, std::move(filter),
+      [&store = s.measurements, active, wanted](const MeasurementStore::Filter& page) {
+        return wanted ? classed(store, *active, *wanted, page) : store.ranges(page);
+      },
+      [with_cir, with_features, judged, active](const Range& row, std::int64_t id) {
+        Ordered json = range_json(row, id);
+        if (with_features || judged) {
+          const auto features = features_of(row);
+          if (with_features) json["features"] = features_json(features);
+          if (judged) json["predicted"] = predicted_json(ModelRegistry::judge(*active, features));
+        }
+        if (!with_cir) json.erase("cir");
+        return json;
+      },
+      range_csv, k_range_header, total);
+}
+
+Response list_fixes(MeasurementApi& s, const Request& request) {
+  check_query(request, {"limit", "cursor", "fields", "format", "mission", "since", "until", "sort"});
+  return rows(
+      request, filter_of(request),
+      [&store = s.measurements](const MeasurementStore::Filter& filter) { return store.fixes(filter); },
+      [](const Fix& row, std::int64_t id) { return fix_json(row, id); }, fix_csv, k_fix_header);
+}
+
+Range one_range(MeasurementApi& s, const Request& request) {
+  const auto& text = request.params.at("id");
+  std::int64_t id = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id);
+  if (error != std::errc{} || end != text.data() + text.size())
+    throw_problem(404, "not-found", "there is no such range");
+  return value_or_problem(s.measurements.range(id));
+}
+
+Response range_cir(MeasurementApi& s, const Request& request) {
+  check_query(request, {"format"});
+  const Range range = one_range(s, request);
+  if (!range.cir) throw_problem(404, "not-found", "this range came without an impulse response");
+  if (negotiate(request, {"json", "binary"}) == "json") return json_response(200, cir_json(*range.cir));
+  Response response;
+  response.header("Content-Type", "application/octet-stream");
+  response.body = cir_bytes(*range.cir);
+  return response;
+}
+
+}  // namespace
+
+void add_measurement_routes(Router& router, MeasurementApi& s) {
+  const auto on = [&s](auto function) {
+    return [&s, function](const Request& request) { return function(s, request); };
+  };
+  const auto ingest = [&router](const char* path, Handler handler) {
+    router.add(keeps_always({Method::post, path, Access::any_of({Role::gateway}), std::move(handler),
+                             IngestService::k_max_body_bytes, true}));
+  };
+  ingest("/api/v1/ranges", [&s](const Request& request) { return s.ingest.ranges(request); });
+  ingest("/api/v1/fixes", [&s](const Request& request) { return s.ingest.fixes(request); });
+  router.add(as_heavy({Method::get, "/api/v1/ranges", readers(), on(list_ranges)}));
+  router.add({Method::get, "/api/v1/ranges/{id}", readers(), [&s](const Request& request) {
+                check_query(request, {});
+                std::int64_t id = 0;
+                const auto& text = request.params.at("id");
+                const Range range = one_range(s, request);
+                std::from_chars(text.data(), text.data() + text.size(), id);
+                Ordered json = range_json(range, id);
+                json["features"] = features_json(features_of(range));
+                return json_response(200, json);
+              }});
+  router.add({Method::get, "/api/v1/ranges/{id}/cir", readers(), on(range_cir)});
+  router.add(as_heavy({Method::get, "/api/v1/fixes", readers(), on(list_fixes)}));
+}
+
+}  // namespace anchord::api

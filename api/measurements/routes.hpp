@@ -1,0 +1,34 @@
+#pragma once
+
+#include "api/kit/audit.hpp"
+
+namespace anchord {
+class Clock;
+class ExclusionStore;
+class MeasurementStore;
+}  // namespace anchord
+
+namespace anchord::api {
+
+class EventLog;
+class IngestService;
+class MissionService;
+class ModelRegistry;
+class Router;
+
+/// What the routes of measurements work with; lives as long as the router.
+struct MeasurementApi {
+  MeasurementStore& measurements;
+  IngestService& ingest;
+  MissionService& missions;
+  ModelRegistry* models{nullptr};       ///< null: no ranges are judged
+  ExclusionStore* exclusions{nullptr};  ///< null: their routes do not exist
+  EventLog& events;
+  const Clock& clock;
+  Audit audit;
+};
+
+void add_measurement_routes(Router& router, MeasurementApi& api);
+void add_exclusion_routes(Router& router, MeasurementApi& api);
+
+}  // namespace anchord::api

@@ -1,0 +1,82 @@
+#include "api/missions/mission_service_state.hpp"
+#include "api/wire/outline_json.hpp"
+#include "core/localize/flight_solver.hpp"
+
+namespace anchord::api {
+
+namespace {
+
+constexpr auto k_joint_pause = std::chrono::seconds(2);
+// Times as long a pause as the last solution took: 4 % of one core at most, however long the flight.
+constexpr int k_joint_rest = 24;
+
+}  // namespace
+
+std::string MissionService::State::outline_of(const Mission& mission) const {
+  if (!deps.site_outline || !mission.site || mission.frame != TrackFrame::wgs84) return {};
+  const auto site = deps.anchors.site(*mission.site);
+  return site ? site.value().outline_geojson : std::string();
+}
+
+flight::LiveMission::JointProblem MissionService::State::joint_problem(Flight& flight,
+                                                                       const std::string& outline) {
+  const auto origin = flight.live.origin();
+  return flight.live.joint_problem(origin && !outline.empty() ? outline_in_enu(outline, *origin)
+                                                              : std::vector<Eigen::Vector2d>{});
+}
+
+void MissionService::State::start_joint(const std::shared_ptr<Flight>& flight) {
+  if (stopped || flight->rebuilding || !joint.idle()) return;
+  Mission mission;
+  {
+    const std::scoped_lock lock(flight->queue_mutex);
+    mission = flight->mission;
+  }
+  const std::string outline = outline_of(mission);
+  const std::unique_lock lock(flight->work_mutex, std::try_to_lock);
+  if (!lock || flight->joint_running || !flight->live.joint_is_worth_it()) return;
+  const auto now = std::chrono::steady_clock::now();
+  if (now < flight->joint_not_before) return;
+  auto problem = joint_problem(*flight, outline);
+  JointWorker::Task task{std::move(problem.flight), std::move(problem.options), {}};
+  task.done = [self = this, flight, cut = problem.cut, now,
+               generation = problem.generation](const FlightSolution* solution) {
+    self->finish_joint(*flight, solution, cut, std::chrono::steady_clock::now() - now, generation);
+  };
+  flight->joint_running = true;  // before the worker can be done
+  if (joint.try_start(std::move(task))) return;
+  flight->joint_running = false;
+  flight->live.joint_dropped();
+}
+
+void MissionService::State::finish_joint(Flight& flight, const FlightSolution* solution, UtcTime cut,
+                                         std::chrono::steady_clock::duration took, std::uint64_t generation) {
+  const std::scoped_lock lock(flight.work_mutex);
+  flight.joint_running = false;
+  flight.joint_not_before = std::chrono::steady_clock::now() +
+                            std::max<std::chrono::steady_clock::duration>(k_joint_pause, k_joint_rest * took);
+  if (solution == nullptr || stopped || !flight.live.adopt(*solution, cut, generation)) return;
+  tell_events(flight);
+  flight.dirty = true;
+}
+
+void MissionService::tell_clues(const MissionId& id, procedure::FlightClues clues) {
+  const auto flight = state_->find(id);
+  if (!flight) return;
+  {
+    const std::scoped_lock lock(flight->queue_mutex);
+    flight->new_clues = std::move(clues);
+  }
+  state_->schedule(flight);
+}
+
+void MissionService::State::take_clues(Flight& flight) {
+  std::optional<procedure::FlightClues> clues;
+  {
+    const std::scoped_lock lock(flight.queue_mutex);
+    clues = std::exchange(flight.new_clues, std::nullopt);
+  }
+  if (clues) flight.live.use_clues(*std::move(clues));
+}
+
+}  // namespace anchord::api

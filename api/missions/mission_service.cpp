@@ -1,0 +1,259 @@
+#include "api/missions/mission_service.hpp"
+
+#include "api/admin/event_log.hpp"
+#include "api/missions/mission_service_state.hpp"
+#include "api/stream/hub.hpp"
+
+namespace anchord::api {
+namespace {
+
+constexpr double k_view_s = 2;  ///< old, the estimates that were made for one who does not wait
+
+}  // namespace
+
+MissionService::MissionService(Deps deps) : state_(std::make_shared<State>(std::move(deps))) {}
+MissionService::~MissionService() { stop(); }
+
+void MissionService::observe(MissionObserver* observer) { state_->observer = observer; }
+
+Result<Mission> MissionService::mission(const MissionId& id) {
+  std::uint64_t forgotten = 0;
+  {
+    const std::scoped_lock lock(state_->mutex);
+    const auto it = state_->cache.find(id);
+    if (it != state_->cache.end()) return it->second;
+    forgotten = state_->forgotten;
+  }
+  BOOST_OUTCOME_TRY(auto mission, state_->deps.missions.mission(id));
+  const std::scoped_lock lock(state_->mutex);
+  if (state_->cache.size() > 1000) state_->cache.clear();
+  if (forgotten == state_->forgotten) state_->cache[id] = mission;
+  return mission;
+}
+
+Result<void> MissionService::create(const Mission& mission) {
+  BOOST_OUTCOME_TRY(state_->deps.missions.insert(mission));
+  prepare(mission.id);
+  state_->deps.events.add("info", "mission.started", mission.name + " started", mission.id);
+  if (const auto flight = state_->find(mission.id)) {
+    const std::scoped_lock lock(flight->work_mutex);
+    state_->deps.hub.publish(Topic::mission_state, mission_state_json(mission, flight->live.state()),
+                             mission.created.us(), to_string(mission.id));
+  }
+  return boost::outcome_v2::success();
+}
+
+Result<Mission> MissionService::finish(const MissionId& id) {
+  BOOST_OUTCOME_TRY(const auto current, state_->deps.missions.finish(id, state_->deps.clock.now()));
+  ++state_->finished;
+  {
+    const std::scoped_lock lock(state_->mutex);
+    state_->cache[id] = current;
+  }
+  if (const auto flight = state_->find(id)) {
+    {
+      const std::scoped_lock lock(flight->queue_mutex);
+      flight->mission = current;
+      flight->closing = true;
+    }
+    flight->dirty = true;
+    state_->schedule(flight);
+  }
+  state_->forget_reads(id);
+  state_->deps.events.add("info", "mission.finished", current.name + " finished", id);
+  return current;
+}
+
+void MissionService::forget(const MissionId& id) {
+  state_->forget_reads(id);
+  const std::scoped_lock lock(state_->mutex);
+  ++state_->forgotten;
+  state_->cache.erase(id);
+  state_->flights.erase(id);
+  for (const Topic topic : {Topic::mission_state, Topic::drone_pose, Topic::rtk_status})
+    state_->deps.hub.forget(topic, to_string(id));
+}
+
+void MissionService::prepare(const MissionId& id) {
+  if (state_->find(id)) return;
+  const auto record = mission(id);
+  if (!record) return;
+  auto flight = std::make_shared<Flight>(state_->setup_of(record.value()));
+  flight->used = state_->steady_now();
+  // Told before it can be found: rows that come meanwhile wait in the queue.
+  flight->rebuilding = true;
+  {
+    const std::scoped_lock lock(state_->mutex);
+    if (!state_->flights.emplace(id, flight).second) return;
+  }
+  state_->begin_rebuild(flight);
+  state_->evict();
+}
+
+void MissionService::resume() {
+  constexpr std::size_t k_newest = 5;
+  const auto newest = state_->deps.missions.missions(k_newest, std::nullopt);
+  if (!newest) return;
+  for (const auto& mission : newest.value()) {
+    if (mission.state == MissionState::recording) prepare(mission.id);
+  }
+}
+
+void MissionService::exclusions_changed(const MissionId& id) {
+  state_->forget_reads(id);
+  const auto flight = state_->find(id);
+  if (!flight) return;
+  // Rows that come from here on wait in the queue until what is stored is in.
+  flight->rebuilding = true;
+  {
+    const std::scoped_lock lock(flight->queue_mutex);
+    flight->ahead.forget();
+  }
+  {
+    const std::scoped_lock lock(flight->work_mutex);
+    flight->live.begin_anew(state_->exclusions_of(id));
+    flight->rebuilt.clear();
+  }
+  state_->begin_rebuild(flight);
+}
+
+bool MissionService::wants_cir() const {
+  return state_->deps.judge_needs_cir && state_->deps.judge_needs_cir();
+}
+
+void MissionService::note_in_flights(const std::string& code, const std::string& text) {
+  state_->forget_reads(std::nullopt);  // the models that judged their ranges may be others now
+  std::vector<MissionId> recording;
+  {
+    const std::scoped_lock lock(state_->mutex);
+    for (const auto& [id, flight] : state_->flights) {
+      const std::scoped_lock queue(flight->queue_mutex);
+      if (flight->mission.state == MissionState::recording) recording.push_back(id);
+    }
+  }
+  for (const auto& id : recording) state_->deps.events.add("info", code, text, id);
+}
+
+void MissionService::arrived(std::span<const Range> ranges) { state_->take_newest(ranges); }
+void MissionService::arrived(std::span<const Fix> fixes) { state_->take_newest(fixes); }
+void MissionService::accepted(std::span<const Range> ranges, std::span<const RowOutcome> outcomes) {
+  state_->accept(ranges, outcomes);
+}
+void MissionService::accepted(std::span<const Fix> fixes, std::span<const RowOutcome> outcomes) {
+  state_->accept(fixes, outcomes);
+}
+
+std::vector<MissionService::LiveView> MissionService::live(const std::optional<MissionId>& id) {
+  std::vector<std::shared_ptr<Flight>> wanted;
+  if (!id) {
+    wanted = state_->all();
+  } else if (auto flight = state_->find(*id)) {
+    wanted.push_back(std::move(flight));
+  } else if (auto read = state_->read(*id)) {
+    return {*std::move(read)};
+  }
+  std::vector<LiveView> out;
+  for (const auto& flight : wanted) {
+    if (id) {
+      const std::scoped_lock lock(flight->queue_mutex);
+      flight->used = state_->steady_now();
+    }
+    const std::scoped_lock lock(flight->work_mutex);
+    out.push_back(state_->view(*flight));
+  }
+  return out;
+}
+
+std::optional<MissionService::LiveView> MissionService::live_at_hand(const MissionId& id) {
+  const auto flight = state_->find(id);
+  if (!flight) return std::nullopt;
+  if (const std::unique_lock lock(flight->work_mutex, std::try_to_lock); lock) return state_->view(*flight);
+  const std::scoped_lock lock(flight->queue_mutex);
+  flight->view_wanted = true;
+  // One that was made for an earlier question and never fetched is none.
+  auto made = std::exchange(flight->view, std::nullopt);
+  return made && seconds_between(flight->view_made, state_->steady_now()) < k_view_s ? std::move(made)
+                                                                                     : std::nullopt;
+}
+
+MissionService::LiveView MissionService::State::view(Flight& flight) const {
+  LiveView out;
+  {
+    const std::scoped_lock lock(flight.queue_mutex);
+    out.mission = flight.mission;
+  }
+  out.origin = flight.live.origin();
+  out.estimates = flight.live.estimates();
+  return out;
+}
+
+void MissionService::tick() {
+  for (const auto& flight : state_->all()) {
+    state_->start_joint(flight);
+    if (!flight->dirty) continue;
+    const std::unique_lock lock(flight->work_mutex, std::try_to_lock);
+    if (!lock) continue;  // at work: the next tick tells
+    flight->dirty = false;
+    Mission mission;
+    {
+      const std::scoped_lock queue(flight->queue_mutex);
+      mission = flight->mission;
+    }
+    state_->deps.hub.publish(Topic::mission_state, mission_state_json(mission, flight->live.state()),
+                             flight->live.state().time.us(), to_string(mission.id));
+  }
+  if (++state_->ticks % 2 == 0) state_->publish_devices();
+  state_->evict();
+}
+
+std::uint64_t MissionService::finished() const { return state_->finished; }
+
+std::vector<FlightPulse> MissionService::pulses() {
+  const SteadyTime now = state_->steady_now();
+  const auto steady = std::chrono::steady_clock::now();
+  std::vector<FlightPulse> out;
+  for (const auto& flight : state_->all()) {
+    if (flight->rebuilding) continue;
+    const std::unique_lock work(flight->work_mutex, std::try_to_lock);
+    if (!work) continue;  // at work: rows come, nothing is silent
+    const std::scoped_lock lock(flight->queue_mutex);
+    if (flight->mission.state != MissionState::recording) continue;
+    FlightPulse pulse = flight->live.watch().look(flight->live.state().time, steady);
+    pulse.mission = flight->id;
+    pulse.name = flight->mission.name;
+    pulse.now = now;
+    pulse.fix_arrival = flight->fix_arrival;
+    pulse.range_arrival = flight->range_arrival;
+    out.push_back(std::move(pulse));
+  }
+  return out;
+}
+
+std::size_t MissionService::queued() const { return state_->queued; }
+
+std::size_t MissionService::followed() const {
+  const std::scoped_lock lock(state_->mutex);
+  return state_->flights.size();
+}
+
+std::uint64_t MissionService::evicted() const { return state_->evicted; }
+
+bool MissionService::recording() const {
+  const SteadyTime now = state_->steady_now();
+  const std::scoped_lock lock(state_->mutex);
+  return std::any_of(state_->flights.begin(), state_->flights.end(), [&](const auto& entry) {
+    const std::scoped_lock queue(entry.second->queue_mutex);
+    return entry.second->mission.state == MissionState::recording &&
+           seconds_between(entry.second->last_arrival, now) < 5;
+  });
+}
+
+void MissionService::stop() {
+  state_->stopped = true;
+  state_->joint.stop();
+  std::unique_lock lock(state_->running_mutex);
+  // Tasks the pool never ran (it was stopped first) must not hold the shutdown up for ever.
+  state_->idle.wait_for(lock, std::chrono::seconds(5), [&] { return state_->running == 0; });
+}
+
+}  // namespace anchord::api

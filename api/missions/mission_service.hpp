@@ -1,0 +1,147 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "api/admin/alarm_rules.hpp"
+#include "core/base/ids.hpp"
+#include "core/base/result.hpp"
+#include "core/base/steady.hpp"
+#include "core/base/time.hpp"
+#include "core/geo/track_segments.hpp"
+#include "core/localize/accuracy_goal.hpp"
+#include "core/procedure/flight_clues.hpp"
+#include "core/types/estimate.hpp"
+#include "core/types/fix.hpp"
+#include "core/types/mission.hpp"
+#include "core/types/range.hpp"
+#include "core/types/range_model.hpp"
+
+namespace anchord {
+class AnchorStore;
+enum class RowOutcome : std::uint8_t;
+class ExclusionStore;
+class MeasurementStore;
+class MissionStore;
+}  // namespace anchord
+
+namespace anchord::api {
+
+class EventLog;
+class Hub;
+class LateWriter;
+class MissionObserver;
+
+/// Flights: their records and, for each, the one LiveFlight that follows the accepted measurements and feeds
+/// the hub.
+///
+/// Thread-safe. Rows are queued per mission and worked off in order by one task at a time (a strand), so that
+/// ingest never waits for a solve. A queue holds at most 100 000 rows; then the oldest leave the live path,
+/// which is an event (the store has them).
+class MissionService {
+ public:
+  static constexpr std::size_t k_max_queued_rows = 100'000;
+  struct Deps {
+    MissionStore& missions;
+    MeasurementStore& measurements;
+    AnchorStore& anchors;
+    Hub& hub;
+    EventLog& events;
+    const Clock& clock;
+    std::function<void(std::function<void()>)> post;  ///< runs a task on the pool; may run it inline
+    AccuracyGoal goal{};                              ///< an anchor within it is converged
+    std::function<std::string()> device_rows{};       ///< more rows of topic `devices`, comma between them
+    /// What the promoted models say of a range; absent: ranges are used raw.
+    std::function<std::optional<RangeModel>(const Range&)> judge{};
+    std::function<bool()> judge_needs_cir{};
+    bool site_outline{true};  ///< joint solutions take the site's outline as a clue: anchors are inside
+    const SteadyClock* steady{nullptr};   ///< what silence is measured by; null: the system's
+    ExclusionStore* exclusions{nullptr};  ///< null: nothing is ever excluded (tests)
+    TrackLimits track{};                  ///< what the positions of a flight are held against
+    LateWriter* late{nullptr};            ///< null: what it writes it writes at once
+    /// What turns and height searches of a mission's flight told, as kept with it; absent: nothing is kept.
+    std::function<procedure::FlightClues(const MissionId&)> kept_clues{};
+  };
+  /// Missions kept in memory although nothing of them is in the air: finished, or silent for k_silent_s. The
+  /// others of these are evicted, least recently used first; the store has all of them.
+  static constexpr std::size_t k_most_at_rest = 4;
+  static constexpr double k_silent_s = 900;  ///< a change of battery is shorter
+  explicit MissionService(Deps deps);
+  ~MissionService();
+
+  /// Before the first measurement; null ends it. The observer outlives the service or takes itself off.
+  void observe(MissionObserver* observer);
+  Result<Mission> mission(const MissionId& id);  ///< cached
+  Result<void> create(const Mission& mission);
+  /// conflict when it is finished already.
+  Result<Mission> finish(const MissionId& id);
+  /// It was deleted: nothing of it is followed, shown or cached any more.
+  void forget(const MissionId& id);
+
+  /// Before rows of this mission are stored: makes its live flight, and has what the store holds already read
+  /// in by tasks of the pool, so that a restart in flight goes on where it was and no request waits for it.
+  void prepare(const MissionId& id);
+  /// After a restart: prepares the newest missions that still record, for their next rows are live at once.
+  void resume();
+  /// The promoted models want impulse responses: rows are accepted with them, and lose them once judged.
+  bool wants_cir() const;
+  /// An event in the record of every flight that records now.
+  void note_in_flights(const std::string& code, const std::string& text);
+  /// What a person took out of use of this mission changed: its live flight, where there is one, begins anew
+  /// with what the store holds, less that.
+  void exclusions_changed(const MissionId& id);
+  /// Rows of one kind as they come, before they are stored: whatever is newer than all that came before of
+  /// its tag and anchor (or rover) cannot be a repetition and goes to the live flight. The rest waits for the
+  /// store's word. Never waits for the store.
+  void arrived(std::span<const Range> ranges);
+  void arrived(std::span<const Fix> fixes);
+  /// The store's word on each: what it accepted and the live flight has not had goes there now.
+  void accepted(std::span<const Range> ranges, std::span<const RowOutcome> outcomes);
+  void accepted(std::span<const Fix> fixes, std::span<const RowOutcome> outcomes);
+
+  /// What the turns and height searches of its flight told of its anchors: priors of every running estimate
+  /// from now on. Never waits.
+  void tell_clues(const MissionId& id, procedure::FlightClues clues);
+
+  struct LiveView {
+    Mission mission;
+    std::optional<Wgs84> origin;
+    std::vector<Estimate> estimates;
+  };
+  /// Running estimates of one mission, or of all that are followed. Follows no mission: of one that is not
+  /// followed they are computed from what the store holds (seconds for a long flight), and the answer alone
+  /// is kept for a minute.
+  std::vector<LiveView> live(const std::optional<MissionId>& id);
+  /// The same for whoever must not wait: nothing while its rows are worked off, and then what they gave as
+  /// soon as they are.
+  std::optional<LiveView> live_at_hand(const MissionId& id);
+
+  /// Each 500 ms: mission.state of what moved, devices once a second; a joint solution is begun where enough
+  /// ranges came since the last (at most a quarter of one core).
+  void tick();
+  /// Flights that were finished since the start.
+  std::uint64_t finished() const;
+  /// How each recording flight stands, for its alarms; to be called once a second (FlightWatch).
+  std::vector<FlightPulse> pulses();
+  /// Rows that wait to be worked off, over all missions.
+  std::size_t queued() const;
+  std::size_t followed() const;   ///< missions in memory
+  std::uint64_t evicted() const;  ///< missions that left it since the start
+  bool recording() const;         ///< a mission got measurements in the last 5 s
+  /// Refuses new work and waits until no task is running.
+  void stop();
+
+ private:
+  struct Flight;
+  struct State;
+  std::shared_ptr<State> state_;
+};
+
+}  // namespace anchord::api

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "api/kit/audit.hpp"
+#include "api/kit/problem.hpp"
+#include "api/kit/router.hpp"
+#include "core/types/mission.hpp"
+
+namespace anchord {
+class AnchorStore;
+class Clock;
+class DeviceControl;
+class MeasurementStore;
+class MissionBin;
+class MissionStore;
+}  // namespace anchord
+
+namespace anchord::api {
+
+class DeviceStream;
+class EventLog;
+class Fields;
+class Housekeeping;
+class MissionControl;
+class MissionService;
+class RunningTime;
+
+/// The actions of a mission that move an aircraft.
+struct FlightActions {
+  std::vector<std::string_view> words{};  ///< empty: nothing is flown here
+  std::function<Response(const Request& request, const std::string& action, Fields& fields,
+                         std::vector<FieldError>& errors)>
+      act{};
+};
+
+/// What the routes of missions work with; lives as long as the router.
+struct MissionApi {
+  MissionService& missions;
+  MissionStore& mission_store;
+  MeasurementStore& measurements;
+  AnchorStore& anchors;
+  MissionBin* bin{nullptr};         ///< null: no mission can be deleted
+  DeviceControl* devices{nullptr};  ///< null: this server has none
+  DeviceStream& stream;
+  EventLog& events;
+  Housekeeping& housekeeping;
+  RunningTime& running;
+  std::int64_t keep_deleted_ns{0};
+  const Clock& clock;
+  Audit audit;
+  MissionControl* control{nullptr};  ///< null: nothing is flown here
+  FlightActions flight{};
+};
+
+/// A mission by the path: 404 where none ever was, 410 for one in the bin, with the way back.
+Mission named_mission(MissionApi& api, const Request& request);
+/// With its ETag, which covers all that the body says.
+Response mission_answer(MissionApi& api, int status, const Mission& mission);
+/// 409 no-control unless the request names the lease of this mission's control.
+void require_control(MissionApi& api, const Request& request, const MissionId& mission,
+                     const std::string& lease, const std::string& what);
+
+void add_mission_routes(Router& router, MissionApi& api);
+void add_mission_bin_routes(Router& router, MissionApi& api);
+
+}  // namespace anchord::api

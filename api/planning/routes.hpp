@@ -1,0 +1,31 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "api/kit/audit.hpp"
+#include "core/base/ids.hpp"
+
+namespace anchord {
+class AnchorStore;
+class Clock;
+class PlanStore;
+}  // namespace anchord
+
+namespace anchord::api {
+
+class Router;
+
+/// What the routes of plans work with; lives as long as the router.
+struct PlanningApi {
+  PlanStore& plans;
+  AnchorStore& anchors;
+  const Clock& clock;
+  Audit audit;
+  /// Which mission flies this plan.
+  std::function<std::optional<MissionId>(const PlanId&)> flown_with;
+};
+
+void add_plan_routes(Router& router, PlanningApi& api);
+
+}  // namespace anchord::api

@@ -1,0 +1,236 @@
+#include "api/stream/conversation.hpp"
+
+#include <chrono>
+#include <nlohmann/json.hpp>
+
+#include "api/kit/problem.hpp"
+#include "api/kit/reader.hpp"
+#include "api/kit/router.hpp"
+#include "api/stream/frames.hpp"
+#include "core/base/to_wire.hpp"
+
+namespace anchord::api {
+
+using Json = nlohmann::json;
+
+namespace {
+
+std::int64_t steady_us() {
+  using namespace std::chrono;
+  return duration_cast<microseconds>(steady_clock::now().time_since_epoch()).count();
+}
+
+}  // namespace
+
+Conversation::Conversation(Hub& hub, Principal principal, std::function<bool()> holds)
+    : hub_(hub), principal_(std::move(principal)), holds_(std::move(holds)), outbox_(hub.counters()) {}
+
+Conversation::~Conversation() = default;
+
+void Conversation::on_open(std::function<void()> wake) {
+  wake_ = std::move(wake);
+  Json topic_names = Json::array(), roles = Json::array();
+  for (const auto& topic : topics()) topic_names.push_back(topic.name);
+  for (const Role role : principal_.roles) roles.push_back(to_string(role));
+  nlohmann::ordered_json hello{{"op", "hello"},         {"server", hub_.server_name()},
+                               {"epoch", hub_.epoch()}, {"t_us", hub_.clock().now().us()},
+                               {"hb_ms", 1000},         {"topics", topic_names},
+                               {"roles", roles}};
+  say(to_wire(hello));
+  membership_ = hub_.join(*this);
+}
+
+void Conversation::on_close() { membership_ = {}; }
+
+void Conversation::on_text(std::string_view text) {
+  Json message;
+  if (text.size() > 64 * 1024) return close(4009, "protocol");
+  if (parse_json(text, message) || !message.is_object() || !message.contains("op") ||
+      !message["op"].is_string()) {
+    refuse(message, 400, "malformed", "send JSON objects with an op");
+    return close(4009, "protocol");
+  }
+  const auto& op = message["op"].get_ref<const std::string&>();
+  if (op == "sub") return subscribe(message);
+  if (op == "unsub") return unsubscribe(message);
+  if (op == "time") {
+    nlohmann::ordered_json answer{{"op", "time"},
+                                  {"id", message.value("id", Json())},
+                                  {"c_us", message.value("c_us", Json())},
+                                  {"t_us", hub_.clock().now().us()}};
+    return say(to_wire(answer));
+  }
+  refuse(message, 422, "validation", "op is sub, unsub or time");
+}
+
+void Conversation::subscribe(const Json& message) {
+  std::vector<FieldError> errors;
+  Fields fields(message, "", errors);
+  fields.child("op");
+  const auto id = fields.integer("id", 0, INT64_MAX);
+  const auto name = fields.text("topic", 64, true);
+  Subscription subscription;
+  if (const Json* params = fields.child("params")) {
+    Fields inner(*params, "/params", errors);
+    if (const auto hz = inner.number("max_hz", 0.01, 1000))
+      subscription.min_interval_us = static_cast<std::int64_t>(1e6 / *hz);
+    if (const Json* anchors = inner.child("anchors")) {
+      if (!anchors->is_array() || anchors->size() > 1000)
+        inner.error("anchors", "wrong_type", "must be an array of at most 1000 network ids");
+      else
+        for (const auto& item : *anchors) {
+          const auto anchor = parse_network_id(item.is_string() ? item.get_ref<const std::string&>() : "");
+          if (anchor)
+            subscription.anchors.insert(anchor.value());
+          else
+            inner.error("anchors", "bad_id", anchor.error().message);
+        }
+    }
+    inner.word("encoding", {"json"});
+    inner.finish();
+  }
+  std::optional<std::pair<std::string, std::uint64_t>> since;
+  if (const Json* from = fields.child("since")) {
+    Fields inner(*from, "/since", errors);
+    const auto epoch = inner.text("epoch", 64, true);
+    const auto seq = inner.integer("seq", 0, INT64_MAX, true);
+    inner.finish();
+    if (epoch && seq) since = {*epoch, static_cast<std::uint64_t>(*seq)};
+  }
+  fields.finish();
+  if (!errors.empty())
+    return refuse(message, 422, "validation", errors.front().pointer + ": " + errors.front().detail);
+  const TopicInfo* topic = find_topic(*name);
+  if (topic == nullptr) return refuse(message, 404, "not-found", "there is no topic " + *name);
+  if (subscriptions_.size() >= k_max_subscriptions) {
+    refuse(message, 429, "rate-limited", "at most 32 subscriptions a connection");
+    return;
+  }
+  subscription.topic = topic->topic;
+  subscription.id = default_sub(topic->topic);
+  // The usual number lets all clients share the bytes of a frame; a second subscription of the topic gets its
+  // own.
+  if (subscriptions_.count(subscription.id) > 0) subscription.id = next_sub_++;
+  subscriptions_[subscription.id] = topic->topic;
+
+  {
+    // Before the hub knows of it, so that nothing published meanwhile is lost; where it begins is known
+    // after.
+    const std::scoped_lock lock(mutex_);
+    outbox_.add(subscription);
+  }
+  const Resumed start = membership_.subscribe(topic->topic, since);
+  nlohmann::ordered_json ack{{"op", "ack"},
+                             {"id", id ? Json(*id) : Json()},
+                             {"sub", subscription.id},
+                             {"from_seq", start.recovered ? since->second + 1 : start.last_seq + 1},
+                             {"recovered", start.recovered}};
+  std::string frames = to_wire(ack);
+  {
+    const std::scoped_lock lock(mutex_);
+    bool room = outbox_.control(std::move(frames));
+    outbox_.start(subscription.id, start.recovered ? since->second : start.last_seq, start.missed);
+    if (!start.recovered) {
+      std::vector<LiveElement> wanted;
+      for (const auto& element : start.snapshot) {
+        if (subscription.anchors.empty() || !element.anchor ||
+            subscription.anchors.count(*element.anchor) > 0)
+          wanted.push_back(element);
+      }
+      room = outbox_.control(snap_frame(subscription.id, start.last_seq, start.t_us, wanted, topic->keyed)) &&
+             room;
+    }
+    if (!room) close_ = {4008, "slow_consumer"};
+  }
+  if (wake_) wake_();
+}
+
+void Conversation::unsubscribe(const Json& message) {
+  std::vector<FieldError> errors;
+  Fields fields(message, "", errors);
+  fields.child("op");
+  const auto id = fields.integer("id", 0, INT64_MAX);
+  const auto sub = fields.integer("sub", 0, INT64_MAX, true);
+  fields.finish();
+  if (!errors.empty())
+    return refuse(message, 422, "validation", errors.front().pointer + ": " + errors.front().detail);
+  const auto it = subscriptions_.find(static_cast<std::uint64_t>(*sub));
+  if (it == subscriptions_.end()) return refuse(message, 404, "not-found", "there is no such subscription");
+  membership_.unsubscribe(it->second);
+  {
+    const std::scoped_lock lock(mutex_);
+    outbox_.remove(it->first);
+  }
+  nlohmann::ordered_json ack{{"op", "ack"}, {"id", id ? Json(*id) : Json()}, {"sub", it->first}};
+  subscriptions_.erase(it);
+  say(to_wire(ack));
+}
+
+void Conversation::refuse(const Json& message, int status, std::string_view type, std::string_view detail) {
+  const Json id = message.is_object() && message.contains("id") && message["id"].is_number_integer()
+                      ? message["id"]
+                      : Json();
+  say(R"({"op":"err","id":)" + to_wire(id) + R"(,"problem":)" + problem_json(status, type, detail) + '}');
+}
+
+void Conversation::say(std::string frame) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (!outbox_.control(std::move(frame)) && !close_) close_ = {4008, "slow_consumer"};
+  }
+  if (wake_) wake_();
+}
+
+void Conversation::close(std::uint16_t code, std::string_view reason) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (close_) return;
+    if (code == 4008) ++hub_.counters().slow_disconnects;
+    outbox_.control(bye_frame(code, reason));
+    close_ = {code, std::string(reason)};
+  }
+  if (wake_) wake_();
+}
+
+void Conversation::on_message(Topic topic, const std::shared_ptr<const LiveMessage>& message) {
+  bool due = false, room = true;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (close_) return;
+    room = outbox_.put(message, topic);
+    due = outbox_.due(steady_us());
+  }
+  if (!room)
+    close(4008, "slow_consumer");
+  else if (due && wake_)
+    wake_();
+}
+
+void Conversation::on_tick(UtcTime now, bool heartbeat) {
+  // Four times a second: a login that was revoked sees nothing more after a moment.
+  if (ticks_++ % 5 == 0 && holds_ && !holds_()) return close(4001, "auth");
+  bool due = false;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (close_) return;
+    if (heartbeat) outbox_.heartbeat(now.us());
+    due = outbox_.due(steady_us());
+  }
+  if (due && wake_) wake_();
+}
+
+void Conversation::on_bye(std::uint16_t code, std::string_view reason) { close(code, reason); }
+
+std::shared_ptr<const std::string> Conversation::next_frame() {
+  const std::scoped_lock lock(mutex_);
+  // After a close was asked for only control frames (the bye among them) still go out.
+  if (close_) return outbox_.next_control();
+  return outbox_.next(steady_us());
+}
+
+std::optional<std::pair<std::uint16_t, std::string>> Conversation::close_request() {
+  const std::scoped_lock lock(mutex_);
+  return close_;
+}
+
+}  // namespace anchord::api

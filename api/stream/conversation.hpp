@@ -1,0 +1,53 @@
+#pragma once
+
+#include <map>
+#include <mutex>
+#include <nlohmann/json_fwd.hpp>
+
+#include "api/stream/hub.hpp"
+#include "api/stream/outbox.hpp"
+#include "api/stream/ws_handler.hpp"
+
+namespace anchord::api {
+
+/// The `anchord.v1` protocol of one client (api.md section 9): hello, sub, unsub, time in; ack, snap, data,
+/// gap, hb, err, bye out.
+class Conversation final : public WsHandler, private HubListener {
+ public:
+  static constexpr std::size_t k_max_subscriptions = 32;
+
+  /// `holds`: false ends the conversation with 4001; empty: it always does (tests).
+  Conversation(Hub& hub, Principal principal, std::function<bool()> holds = {});
+  ~Conversation() override;
+
+  void on_open(std::function<void()> wake) override;
+  void on_text(std::string_view message) override;
+  void on_close() override;
+  std::shared_ptr<const std::string> next_frame() override;
+  std::optional<std::pair<std::uint16_t, std::string>> close_request() override;
+
+ private:
+  void on_message(Topic topic, const std::shared_ptr<const LiveMessage>& message) override;
+  void on_tick(UtcTime now, bool heartbeat) override;
+  void on_bye(std::uint16_t code, std::string_view reason) override;
+
+  void subscribe(const nlohmann::json& message);
+  void unsubscribe(const nlohmann::json& message);
+  void refuse(const nlohmann::json& message, int status, std::string_view type, std::string_view detail);
+  void say(std::string frame);
+  void close(std::uint16_t code, std::string_view reason);
+
+  Hub& hub_;
+  const Principal principal_;
+  const std::function<bool()> holds_;
+  std::function<void()> wake_;
+  std::mutex mutex_;  ///< guards outbox_ and close_; never held while the hub is called
+  Outbox outbox_;
+  std::optional<std::pair<std::uint16_t, std::string>> close_;
+  std::map<std::uint64_t, Topic> subscriptions_;  ///< touched by the session's strand alone
+  std::uint64_t next_sub_{100};
+  unsigned ticks_{0};         ///< of the hub; touched under its lock alone
+  HubMembership membership_;  ///< from on_open to on_close; last, so that it ends before what the hub calls
+};
+
+}  // namespace anchord::api

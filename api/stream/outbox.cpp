@@ -1,0 +1,223 @@
+#include "api/stream/outbox.hpp"
+
+#include <algorithm>
+
+#include "api/stream/frames.hpp"
+
+namespace anchord::api {
+namespace {
+
+bool wants(const Subscription& subscription, const LiveElement& element) {
+  return subscription.anchors.empty() || !element.anchor || subscription.anchors.count(*element.anchor) > 0;
+}
+
+}  // namespace
+
+void Outbox::add(const Subscription& subscription) { queues_[subscription.id].subscription = subscription; }
+
+void Outbox::remove(std::uint64_t sub) {
+  const auto it = queues_.find(sub);
+  if (it == queues_.end()) return;
+  for (const auto& message : it->second.messages) {
+    bytes_ -= message->bytes();
+    --count_;
+  }
+  queues_.erase(it);
+}
+
+void Outbox::start(std::uint64_t sub, std::uint64_t last_seq,
+                   const std::vector<std::shared_ptr<const LiveMessage>>& missed) {
+  auto& queue = queues_[sub];
+  queue.subscription.last_seq = last_seq;
+  for (const auto& message : missed) {
+    const auto& elements = message->elements;
+    if (std::any_of(elements.begin(), elements.end(),
+                    [&](const auto& e) { return wants(queue.subscription, e); }))
+      queue.replay.push_back(message);
+  }
+}
+
+void Outbox::heartbeat(std::int64_t t_us) {
+  heartbeat_ = heartbeat_frame(t_us, fill(), conflated_since_heartbeat_);
+  conflated_since_heartbeat_ = false;
+}
+
+bool Outbox::control(std::string frame) {
+  bytes_ += frame.size();
+  ++count_;
+  control_.push_back(std::move(frame));
+  while ((bytes_ > k_max_bytes || count_ > k_max_messages)) {
+    const std::size_t before = count_;
+    drop_oldest_stream();
+    if (count_ == before) break;
+  }
+  // A snap alone may be large; only a client that piles up control frames is too slow.
+  return control_.size() <= k_max_messages;
+}
+
+bool Outbox::put(const std::shared_ptr<const LiveMessage>& message, Topic topic) {
+  const TopicClass cls = info(topic).cls;
+  for (auto& [id, queue] : queues_) {
+    if (queue.subscription.topic != topic) continue;
+    const auto& elements = message->elements;
+    const bool any = std::any_of(elements.begin(), elements.end(),
+                                 [&](const auto& e) { return wants(queue.subscription, e); });
+    if (!any) continue;
+    if (cls == TopicClass::state) {
+      queue.only = queue.newest.empty() ? message : nullptr;
+      for (const auto& element : elements) {
+        if (!wants(queue.subscription, element)) {
+          queue.only = nullptr;
+          continue;
+        }
+        auto& pending = queue.newest[element.key];
+        if (pending.element.json) {
+          ++queue.conflated;
+          ++counters_.conflated;
+          conflated_since_heartbeat_ = true;
+        }
+        pending = {element, message->seq, message->t_us};
+      }
+      continue;
+    }
+    bytes_ += message->bytes();
+    ++count_;
+    queue.messages.push_back(message);
+    while (bytes_ > k_max_bytes || count_ > k_max_messages) {
+      const std::size_t before = count_;
+      drop_oldest_stream();
+      if (count_ == before) {
+        if (cls == TopicClass::event) return false;
+        break;
+      }
+    }
+  }
+  return true;
+}
+
+void Outbox::drop_oldest_stream() {
+  Queue* oldest = nullptr;
+  for (auto& [id, queue] : queues_) {
+    if (info(queue.subscription.topic).cls != TopicClass::stream || queue.messages.empty()) continue;
+    if (oldest == nullptr || queue.messages.front()->t_us < oldest->messages.front()->t_us) oldest = &queue;
+  }
+  if (oldest == nullptr) return;
+  const auto& message = oldest->messages.front();
+  if (oldest->gap_dropped == 0) oldest->gap_from = message->seq;
+  oldest->gap_to = message->seq;
+  ++oldest->gap_dropped;
+  ++counters_.dropped;
+  bytes_ -= message->bytes();
+  --count_;
+  oldest->messages.pop_front();
+}
+
+bool Outbox::ready(const Queue& queue, std::int64_t now_us) const {
+  if (queue.newest.empty() && queue.messages.empty() && queue.replay.empty() && queue.gap_dropped == 0)
+    return false;
+  const std::int64_t since = now_us - queue.sent_us;
+  return since >= queue.subscription.min_interval_us || since < 0;
+}
+
+bool Outbox::due(std::int64_t now_us) const {
+  if (!control_.empty() || !heartbeat_.empty()) return true;
+  return std::any_of(queues_.begin(), queues_.end(),
+                     [&](const auto& entry) { return ready(entry.second, now_us); });
+}
+
+std::shared_ptr<const std::string> Outbox::next_control() {
+  if (control_.empty()) return nullptr;
+  auto frame = std::make_shared<const std::string>(std::move(control_.front()));
+  control_.pop_front();
+  bytes_ -= frame->size();
+  --count_;
+  return frame;
+}
+
+std::shared_ptr<const std::string> Outbox::next(std::int64_t now_us) {
+  if (auto frame = next_control()) return frame;
+  if (!heartbeat_.empty()) return std::make_shared<const std::string>(std::exchange(heartbeat_, {}));
+  for (const TopicClass cls : {TopicClass::state, TopicClass::event, TopicClass::stream}) {
+    for (auto& [id, queue] : queues_) {
+      if (info(queue.subscription.topic).cls != cls || !ready(queue, now_us)) continue;
+      queue.sent_us = now_us;
+      if (cls == TopicClass::state) return take_state(queue);
+      if (!queue.replay.empty()) return take_messages(queue, queue.replay, true);
+      if (queue.gap_dropped > 0) {
+        auto frame = std::make_shared<const std::string>(
+            gap_frame(id, queue.gap_from, queue.gap_to, queue.gap_dropped));
+        queue.subscription.last_seq = queue.gap_to;
+        queue.gap_dropped = 0;
+        queue.sent_us = INT64_MIN / 2;
+        return frame;
+      }
+      return take_messages(queue, queue.messages, cls == TopicClass::stream);
+    }
+  }
+  return nullptr;
+}
+
+std::shared_ptr<const std::string> Outbox::take_state(Queue& queue) {
+  auto& subscription = queue.subscription;
+  std::vector<LiveElement> elements;
+  std::uint64_t seq = 0;
+  std::int64_t t_us = 0;
+  for (auto& [key, pending] : queue.newest) {
+    seq = std::max(seq, pending.seq);
+    t_us = std::max(t_us, pending.t_us);
+    elements.push_back(std::move(pending.element));
+  }
+  std::shared_ptr<const std::string> frame;
+  if (queue.only && queue.only->frame && queue.conflated == 0 &&
+      subscription.id == default_sub(subscription.topic) && subscription.last_seq + 1 == seq) {
+    frame = queue.only->frame;
+  } else {
+    frame = data_frame(subscription.id, seq, subscription.last_seq, t_us, elements, false, queue.conflated);
+  }
+  queue.newest.clear();
+  queue.only = nullptr;
+  queue.conflated = 0;
+  subscription.last_seq = seq;
+  return frame;
+}
+
+std::shared_ptr<const std::string> Outbox::take_messages(Queue& queue,
+                                                         std::deque<std::shared_ptr<const LiveMessage>>& from,
+                                                         bool merge) {
+  const bool counted = &from == &queue.messages;
+  auto& subscription = queue.subscription;
+  const bool filtered = !subscription.anchors.empty();
+  std::vector<LiveElement> elements;
+  std::shared_ptr<const LiveMessage> last;
+  std::size_t taken = 0, size = 0;
+  // What queued up while the client was busy leaves as one frame, of a size that is still one gulp.
+  while (!from.empty() && (taken == 0 || (merge && size < 64 * 1024))) {
+    last = std::move(from.front());
+    from.pop_front();
+    if (counted) {
+      bytes_ -= last->bytes();
+      --count_;
+    }
+    ++taken;
+    size += last->bytes();
+    for (const auto& element : last->elements) {
+      if (wants(subscription, element)) elements.push_back(element);
+    }
+  }
+  std::shared_ptr<const std::string> frame;
+  if (taken == 1 && !filtered && last->frame && subscription.id == default_sub(subscription.topic) &&
+      subscription.last_seq + 1 == last->seq) {
+    frame = last->frame;
+  } else {
+    frame = data_frame(subscription.id, last->seq, subscription.last_seq, last->t_us, elements, merge, 0);
+  }
+  subscription.last_seq = last->seq;
+  return frame;
+}
+
+double Outbox::fill() const {
+  return std::max(static_cast<double>(bytes_) / static_cast<double>(k_max_bytes),
+                  static_cast<double>(count_) / static_cast<double>(k_max_messages));
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "api/stream/hub.hpp"
+
+namespace anchord::api {
+
+/// One subscription of one connection.
+struct Subscription {
+  std::uint64_t id{};
+  Topic topic{};
+  std::set<NetworkId> anchors{};    ///< empty: all
+  std::int64_t min_interval_us{0};  ///< of max_hz
+  std::uint64_t last_seq{0};        ///< last seq this subscription was sent, for `prev`
+};
+
+/// What waits for one client, by the three rules of TopicClass. At most 1 MiB or 512 messages of streams,
+/// events and control; state is bounded by its number of keys. Not thread-safe: the conversation locks it.
+class Outbox {
+ public:
+  static constexpr std::size_t k_max_bytes = 1u << 20, k_max_messages = 512;
+
+  explicit Outbox(HubCounters& counters) : counters_(counters) {}
+
+  void add(const Subscription& subscription);
+  void remove(std::uint64_t sub);
+  /// Where the subscription begins: `missed` is replayed first (shared with the history, so not counted).
+  void start(std::uint64_t sub, std::uint64_t last_seq,
+             const std::vector<std::shared_ptr<const LiveMessage>>& missed);
+  /// Ack, snap, err, bye; goes first. False when the client must be closed (4008).
+  bool control(std::string frame);
+  /// False when the client must be closed: an event found no room.
+  bool put(const std::shared_ptr<const LiveMessage>& message, Topic topic);
+  /// Next frame that is due at `now_us` (monotonic enough: only differences count); null when nothing is.
+  std::shared_ptr<const std::string> next(std::int64_t now_us);
+  bool due(std::int64_t now_us) const;
+  /// Only control frames, after a close was decided.
+  std::shared_ptr<const std::string> next_control();
+  /// The newest heartbeat alone waits, and tells that this connection conflates since the last one.
+  void heartbeat(std::int64_t t_us);
+
+  double fill() const;
+
+ private:
+  struct Pending {
+    LiveElement element;
+    std::uint64_t seq{};
+    std::int64_t t_us{};
+  };
+  struct Queue {
+    Subscription subscription;
+    std::map<std::string, Pending> newest;    ///< state
+    std::shared_ptr<const LiveMessage> only;  ///< state: the single message pending, for its frame
+    std::uint64_t conflated{0};
+    std::deque<std::shared_ptr<const LiveMessage>> messages;  ///< stream, event
+    std::deque<std::shared_ptr<const LiveMessage>> replay;    ///< what was missed; before messages
+    std::uint64_t gap_from{0}, gap_to{0}, gap_dropped{0};
+    std::int64_t sent_us{INT64_MIN / 2};
+  };
+  bool ready(const Queue& queue, std::int64_t now_us) const;
+  void drop_oldest_stream();
+  std::shared_ptr<const std::string> take_state(Queue& queue);
+  std::shared_ptr<const std::string> take_messages(Queue& queue,
+                                                   std::deque<std::shared_ptr<const LiveMessage>>& from,
+                                                   bool merge);
+
+  HubCounters& counters_;
+  std::map<std::uint64_t, Queue> queues_;
+  std::deque<std::string> control_;
+  std::string heartbeat_;
+  std::size_t bytes_{0}, count_{0};
+  bool conflated_since_heartbeat_{false};
+};
+
+}  // namespace anchord::api
