@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace anchord::cli {
+
+/// One thing looked at, what was seen, and what to do about it.
+struct Finding {
+  enum class Level : std::uint8_t { ok, warning, failed };
+  Level level{Level::ok};
+  std::string what, seen, advice{};
+};
+
+struct DoctorOptions {
+  std::filesystem::path data_dir{"anchord-data"};
+  std::vector<std::string> listen{"127.0.0.1:8420"};  ///< where a server would listen
+};
+
+/// Everything outside the program that a server needs: folder, disk, database, port, clock, serial devices;
+/// and the server of this folder when it runs. Changes nothing, makes nothing.
+std::vector<Finding> examine(const DoctorOptions& options);
+
+}  // namespace anchord::cli

@@ -1,0 +1,60 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "core/base/text.hpp"
+#include "core/base/to_wire.hpp"
+#include "server/cli/commands.hpp"
+#include "server/cli/doctor.hpp"
+
+namespace anchord::cli {
+namespace {
+
+const char* word(Finding::Level level) {
+  switch (level) {
+    case Finding::Level::ok:
+      return "ok";
+    case Finding::Level::warning:
+      return "warning";
+    case Finding::Level::failed:
+      return "failed";
+  }
+  return "";
+}
+
+void print(const std::vector<Finding>& findings) {
+  for (const auto& f : findings) {
+    std::printf("%-8s %-14s %s\n", word(f.level), f.what.c_str(), printable(f.seen).c_str());
+    if (!f.advice.empty()) std::printf("%24s%s\n", "", printable(f.advice).c_str());
+  }
+}
+
+void print_json(const std::vector<Finding>& findings) {
+  auto out = nlohmann::ordered_json::array();
+  for (const auto& f : findings)
+    out.push_back({{"level", word(f.level)}, {"what", f.what}, {"seen", f.seen}, {"advice", f.advice}});
+  std::printf("%s\n", to_wire(out).c_str());
+}
+
+}  // namespace
+
+void add_doctor_command(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand(
+      "doctor", "Look at what a server needs: folder, disk, database, port, clock, devices; says what to do");
+  const auto options = std::make_shared<DoctorOptions>();
+  const auto json = std::make_shared<bool>(false);
+  command->add_option("--data-dir", options->data_dir, "folder of the database [anchord-data]")
+      ->envname("ANCHORD_DATA_DIR");
+  command->add_option("--listen", options->listen, "where a server would listen [127.0.0.1:8420]")
+      ->envname("ANCHORD_LISTEN");
+  command->add_flag("--json", *json, "print an array of {level, what, seen, advice}");
+  command->callback([&exit_code, options, json] {
+    const auto findings = examine(*options);
+    *json ? print_json(findings) : print(findings);
+    exit_code =
+        std::ranges::any_of(findings, [](const auto& f) { return f.level == Finding::Level::failed; });
+  });
+}
+
+}  // namespace anchord::cli
