@@ -171,7 +171,7 @@ SqliteConnection::SqliteConnection(const std::filesystem::path& file, Mode mode,
   // do.
   execute("PRAGMA wal_autocheckpoint=0");
   execute("PRAGMA journal_size_limit=67108864");
-  execute("PRAGMA cache_size=-16384");
+  execute("PRAGMA cache_size=-8192");
   // Savepoints keep the pages they would undo; in a file they cost more than the rows themselves.
   execute("PRAGMA temp_store=MEMORY");
   if (max_pages) execute("PRAGMA max_page_count=" + std::to_string(*max_pages));
