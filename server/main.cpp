@@ -1,35 +1,61 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <utility>
 
 #include "core/base/guard.hpp"
+#include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/usage.hpp"
+
+namespace {
+
+struct Command {
+  const char* group;  ///< in the help; empty: not listed
+  void (*add)(CLI::App&, int&);
+};
+
+/// In the order of use.
+constexpr Command k_commands[]{
+    {"Run a server", anchord::cli::add_serve_command},
+    {"Run a server", anchord::cli::add_doctor_command},
+    {"Run a server", anchord::cli::add_devices_command},
+    {"Run a server", anchord::cli::add_token_command},
+    {"Run a server", anchord::cli::add_backup_command},
+    {"Run a server", anchord::cli::add_config_command},
+    {"Run a server", anchord::cli::add_healthcheck_command},
+    {"Plan and measure", anchord::cli::add_plan_command},
+    {"Plan and measure", anchord::cli::add_simulate_command},
+    {"Plan and measure", anchord::cli::add_decode_command},
+    {"Plan and measure", anchord::cli::add_import_command},
+    {"Plan and measure", anchord::cli::add_replay_command},
+    {"Find anchors", anchord::cli::add_solve_command},
+    {"Find anchors", anchord::cli::add_profile_command},
+    {"Find anchors", anchord::cli::add_frame_command},
+    {"Train models", anchord::cli::add_campaign_command},
+    {"Train models", anchord::cli::add_dataset_command},
+    {"Train models", anchord::cli::add_train_command},
+    {"Train models", anchord::cli::add_evaluate_command},
+    {"Train models", anchord::cli::add_models_command},
+    {"Train models", anchord::cli::add_rules_command},
+    {"This program", anchord::cli::add_completion_command},
+    {"This program", anchord::cli::add_man_command},
+    {"This program", anchord::cli::add_version_command},
+    {"", anchord::cli::add_worker_command},
+};
+
+}  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app{"anchord: finds where a building's UWB anchors are on the globe", "anchord"};
   app.require_subcommand(1);
   int exit_code = 0;
-  anchord::cli::add_backup_command(app, exit_code);
-  anchord::cli::add_config_command(app, exit_code);
-  anchord::cli::add_frame_command(app, exit_code);
-  anchord::cli::add_healthcheck_command(app, exit_code);
-  anchord::cli::add_import_command(app, exit_code);
-  anchord::cli::add_decode_command(app, exit_code);
-  anchord::cli::add_devices_command(app, exit_code);
-  anchord::cli::add_plan_command(app, exit_code);
-  anchord::cli::add_profile_command(app, exit_code);
-  anchord::cli::add_serve_command(app, exit_code);
-  anchord::cli::add_replay_command(app, exit_code);
-  anchord::cli::add_simulate_command(app, exit_code);
-  anchord::cli::add_token_command(app, exit_code);
-  anchord::cli::add_rules_command(app, exit_code);
-  anchord::cli::add_models_command(app, exit_code);
-  anchord::cli::add_campaign_command(app, exit_code);
-  anchord::cli::add_dataset_command(app, exit_code);
-  anchord::cli::add_evaluate_command(app, exit_code);
-  anchord::cli::add_train_command(app, exit_code);
-  anchord::cli::add_solve_command(app, exit_code);
-  anchord::cli::add_version_command(app, exit_code);
-  anchord::cli::add_worker_command(app, exit_code);
+  const auto all = [](const CLI::App*) { return true; };
+  for (const auto& command : k_commands) {
+    const auto before = std::as_const(app).get_subcommands(all).size();
+    command.add(app, exit_code);
+    const auto subs = app.get_subcommands([](CLI::App*) { return true; });
+    for (std::size_t i = before; i < subs.size(); ++i) subs[i]->group(command.group);
+  }
   if (argc < 2) {
     std::fputs(app.help().c_str(), stderr);
     return 2;
@@ -38,7 +64,14 @@ int main(int argc, char** argv) {
     try {
       app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-      exit_code = app.exit(error) == 0 ? 0 : 2;
+      const auto unknown = anchord::cli::unknown_word(app, {argv + 1, static_cast<std::size_t>(argc - 1)});
+      if (error.get_exit_code() != 0 && !unknown.empty()) {
+        std::fprintf(stderr, "anchord: %s\nRun with --help for more information.\n",
+                     anchord::printable(unknown).c_str());
+        exit_code = 2;
+      } else {
+        exit_code = app.exit(error) == 0 ? 0 : 2;
+      }
     }
   });
   return ran ? exit_code : 1;

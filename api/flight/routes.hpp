@@ -5,6 +5,7 @@
 
 namespace anchord::api {
 
+class EventLog;
 class FlightService;
 
 /// What the routes of the flight work with; lives as long as the router.

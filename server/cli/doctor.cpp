@@ -14,7 +14,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "api/json/flight_requests.hpp"
+#include "api/measurements/flight_requests.hpp"
 #include "core/base/time.hpp"
 #include "drivers/link/serial_port.hpp"
 #include "server/cli/server_address.hpp"
@@ -162,6 +162,12 @@ std::vector<Finding> serial_devices() {
   return out;
 }
 
+/// Of an answer that may be of anything; empty where it is no text.
+std::string text_of(const Json& json, const char* key) {
+  const auto it = json.is_object() ? json.find(key) : json.end();
+  return json.is_object() && it != json.end() && it->is_string() ? it->get<std::string>() : std::string{};
+}
+
 std::vector<Finding> devices_of(server::HttpClient& client) {
   std::vector<Finding> out;
   const auto answer = client.call("GET", "/api/v1/devices");
@@ -174,10 +180,7 @@ std::vector<Finding> devices_of(server::HttpClient& client) {
   const auto json = Json::parse(answer.value().body, nullptr, false);
   const auto items = json.is_object() ? json.value("items", Json::array()) : json;
   for (const auto& one : items) {
-    if (!one.is_object()) continue;
-    const auto text = [&](const char* key) {
-      return one.contains(key) && one[key].is_string() ? one[key].get<std::string>() : std::string{};
-    };
+    const auto text = [&](const char* key) { return text_of(one, key); };
     const auto state = text("state");
     const bool well = state == "talking" || state == "off";
     const std::string name = text("name").empty() ? text("address") : text("name");
@@ -207,10 +210,10 @@ std::optional<std::vector<Finding>> server_of(const fs::path& dir) {
                               "see its log, and Alarms in the dashboard"});
   if (const auto token = own_token(dir); !token.empty())
     client.value().set_header("Authorization", "Bearer " + token);
-  const auto version = client.value().call("GET", "/api/v1/version");
+  const auto version = client.value().call("GET", "/version");
   const auto json = version ? Json::parse(version.value().body, nullptr, false) : Json();
-  if (json.is_object() && json.value("version", "") != ANCHORD_VERSION)
-    out.push_back({Level::warning, "server", "runs version " + json.value("version", "?"),
+  if (text_of(json, "version") != ANCHORD_VERSION)
+    out.push_back({Level::warning, "server version", "runs " + text_of(json, "version"),
                    "restart it to run " ANCHORD_VERSION});
   for (auto& one : devices_of(client.value())) out.push_back(std::move(one));
   return out;

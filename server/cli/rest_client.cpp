@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <fstream>
 #include <thread>
 
@@ -13,6 +14,7 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 constexpr auto k_give_up_after = std::chrono::seconds(60);
+constexpr auto k_never_answered = std::chrono::seconds(2);  ///< more likely a wrong address than a restart
 constexpr auto k_first_pause = std::chrono::milliseconds(100);
 constexpr auto k_longest_pause = std::chrono::milliseconds(5000);
 constexpr auto k_look_every = std::chrono::milliseconds(50);
@@ -34,6 +36,7 @@ struct RestClient::State {
   server::HttpClient client;
   std::string name;
   std::function<bool()> cancelled;
+  bool answered{false};
 
   bool pause(std::chrono::milliseconds length) const {
     const auto until = SteadyClock::now() + length;
@@ -48,18 +51,25 @@ struct RestClient::State {
                                      const std::string& body = {}, const std::string& content_type = {},
                                      const std::map<std::string, std::string>& headers = {}) {
     const std::string what = method + " " + path;
-    const auto give_up = SteadyClock::now() + k_give_up_after;
+    const auto began = SteadyClock::now();
     auto length = k_first_pause;
     for (;;) {
       if (cancelled()) return make_error(Errc::canceled, "stopped");
       const auto answer = client.call(method, path, body, content_type, headers);
+      answered = answered || answer;
       if (answer && answer.value().status >= 200 && answer.value().status < 300) return answer.value().body;
-      const std::string why =
+      std::string why =
           answer ? std::to_string(answer.value().status) + " " + api::problem_text(answer.value().body)
                  : answer.error().message;
+      if (answer && answer.value().status == 401)
+        why += "; give a file with an access token by --token-file, or the token in ANCHORD_TOKEN";
       if (answer && !worth_another_try(answer.value().status))
         return make_error(errc_of(answer.value().status), what + ": " + why);
-      if (SteadyClock::now() + length > give_up)
+      if (!answered && SteadyClock::now() + length > began + k_never_answered)
+        return make_error(Errc::link_lost,
+                          "no anchord answers at " + name + ": " + why +
+                              "; is it running there ('anchord doctor')? Else name it by --url");
+      if (SteadyClock::now() + length > began + k_give_up_after)
         return make_error(Errc::link_lost, name + " " + what + ": " + why);
       if (!pause(length)) return make_error(Errc::canceled, "stopped while " + name + " was away: " + why);
       length = std::min(length * 2, k_longest_pause);
@@ -88,7 +98,10 @@ Result<std::string> RestClient::post(const std::string& path, const std::string&
 }
 
 Result<std::string> read_token_file(const std::string& path) {
-  if (path.empty()) return std::string{};
+  if (path.empty()) {
+    const char* given = std::getenv("ANCHORD_TOKEN");
+    return std::string(given == nullptr ? "" : given);
+  }
   std::ifstream in(path);
   std::string token;
   if (!(in >> token)) return make_error(Errc::invalid_argument, path + ": no access token in this file");

@@ -9,7 +9,7 @@
 namespace anchord::cli {
 
 /// Requests to a running anchord. Sends again with growing pauses while the server is away, busy or full of
-/// work; gives up after a minute. Everything it sends may arrive twice, which is why rows have identities and
+/// work; gives up after a minute, and after 2 s when nothing ever answered there. Everything it sends may arrive twice, which is why rows have identities and
 /// creations an Idempotency-Key. One thread.
 class RestClient {
  public:
@@ -31,7 +31,7 @@ class RestClient {
   std::unique_ptr<State> state_;
 };
 
-/// First line of a file with an access token, without white space; empty for an empty path.
+/// First line of a file with an access token, without white space; for an empty path what ANCHORD_TOKEN says.
 Result<std::string> read_token_file(const std::string& path);
 
 }  // namespace anchord::cli

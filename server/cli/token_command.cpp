@@ -68,6 +68,10 @@ template <class Act>
 int with_folder(const Options& options, Act act) {
   StorageOptions storage;
   storage.data_dir = options.data_dir;
+  if (!std::filesystem::exists(storage.data_dir / "anchord.db"))
+    return fail("there is no anchord database in " + options.data_dir +
+                    ": name its folder by --data-dir; 'anchord serve' makes a new one, with a first token",
+                2);
   auto database = open_database(storage);
   if (!database) return fail(database.error().message);
   const SystemClock clock;

@@ -7,7 +7,6 @@ namespace anchord::cli {
 
 void add_worker_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("worker", "Heavy work of the server, which starts it by itself");
-  command->group("");  // not for people: hidden in the help
   command->callback([&exit_code] { exit_code = server::worker_main(); });
 }
 

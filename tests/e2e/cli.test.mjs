@@ -1,10 +1,12 @@
 // What a person or a script sees of the program itself: words on stdout, exit codes.
 import assert from 'node:assert/strict';
-import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { execFileSync } from 'node:child_process';
+import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { test } from 'node:test';
-import { run } from './server.mjs';
+import { run, startServer } from './server.mjs';
 
 test('version prints the name and a version', async () => {
   const { code, stdout } = await run(['version']);
@@ -19,11 +21,125 @@ test('without a subcommand all of them are named, on stderr', async () => {
   for (const word of ['serve', 'devices', 'decode', 'solve']) assert.match(stderr, new RegExp(`^ +${word} `, 'm'));
 });
 
-test('an unknown subcommand ends with 2 and says something on stderr', async () => {
-  const { code, stdout, stderr } = await run(['fly-me-to-the-moon']);
-  assert.equal(code, 2);
-  assert.equal(stdout, '');
-  assert.notEqual(stderr, '');
+test('a command or option that does not exist ends with 2 and names the nearest one', async () => {
+  for (const [args, said] of [
+    [['fly-me-to-the-moon'], /there is no command 'fly-me-to-the-moon'\n/],
+    [['sovle', 'folder'], /there is no command 'sovle'; did you mean 'solve'\?/],
+    [['token', 'lst'], /there is no command 'lst' of token; did you mean 'list'\?/],
+    [['serve', '--lisen', '127.0.0.1:1'], /there is no option '--lisen' of serve; did you mean '--listen'\?/],
+    [['solve', 'folder', '--dim=2'], /there is no option '--dim' of solve; did you mean '--dims'\?/],
+    [['conf\u001b[2Jig'], /there is no command 'conf[^\u001b]*ig'/],
+  ]) {
+    const { code, stdout, stderr } = await run(args);
+    assert.deepEqual([code, stdout], [2, ''], args.join(' '));
+    assert.match(stderr, said);
+  }
+});
+
+test('no command that only reads makes a data folder', async () => {
+  const folder = mkdtempSync(join(tmpdir(), 'anchord e2e '));
+  const none = join(folder, 'none');
+  try {
+    for (const args of [
+      ['token', 'list'],
+      ['token', 'create', '--name', 'x', '--role', 'viewer'],
+      ['backup'],
+      ['devices', 'list'],
+      ['doctor'],
+    ]) {
+      const { stdout, stderr } = await run([...args, '--data-dir', none]);
+      assert.ok(!existsSync(none), args.join(' '));
+      assert.match(stdout + stderr, /none/, args.join(' '));
+    }
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
+});
+
+/** A port where nobody listens: one that was given and closed again. */
+async function dead_port() {
+  const taken = createServer();
+  await new Promise((done) => taken.listen(0, '127.0.0.1', done));
+  const { port } = taken.address();
+  await new Promise((done) => taken.close(done));
+  return port;
+}
+
+test('an import to where nobody listens ends soon, one without a token says how to give one', async () => {
+  const folder = mkdtempSync(join(tmpdir(), 'anchord e2e '));
+  const flight = join(folder, 'flight');
+  let server;
+  try {
+    assert.equal((await run(['simulate', 'flight', '--duration', '10', '--out', flight])).code, 0);
+    const port = await dead_port();
+    const nobody = await run(['import', 'flight', flight, '--url', `http://127.0.0.1:${port}`], { deadlineMs: 30_000 });
+    assert.equal(nobody.code, 1, nobody.stderr);
+    assert.match(nobody.stderr, /no anchord answers at http:\/\/127\.0\.0\.1:\d+: .*--url/);
+    server = await startServer({ auth: 'on' });
+    const stranger = await run(['import', 'flight', flight, '--url', server.url]);
+    assert.notEqual(stranger.code, 0);
+    assert.match(stranger.stderr, /401 .*--token-file/);
+  } finally {
+    await server?.dispose();
+    rmSync(folder, { recursive: true });
+  }
+});
+
+test('bash completes commands, their commands and their options', async () => {
+  const { code, stdout } = await run(['completion', 'bash']);
+  assert.equal(code, 0);
+  const complete = (...words) => {
+    const script =
+      `${stdout}\nCOMP_WORDS=(${words.map((w) => `'${w}'`).join(' ')})\n` +
+      `COMP_CWORD=${words.length - 1}\n_anchord\nprintf '%s\\n' "\${COMPREPLY[@]}"`;
+    return execFileSync('bash', ['-c', script], { encoding: 'utf8' }).split('\n').filter(Boolean);
+  };
+  assert.deepEqual(complete('anchord', 'sol'), ['solve']);
+  assert.deepEqual(complete('anchord', 'token', 'l'), ['list']);
+  assert.deepEqual(complete('anchord', 'token', 'create', '--ro'), ['--role']);
+  assert.deepEqual(complete('anchord', 'serve', '--data-dir', '/x', '--list'), ['--listen']);
+  assert.ok(!complete('anchord', '').includes('worker'), 'what only the server starts is not offered');
+  assert.match((await run(['completion', 'zsh'])).stdout, /^#compdef anchord\n[^]*'solve:/);
+  assert.equal((await run(['completion', 'fish'])).code, 2);
+});
+
+test('the manual page names every command that the help names', async () => {
+  const { stdout: page } = await run(['man']);
+  const { stderr: help } = await run([]);
+  const commands = [...help.matchAll(/^ {2}([a-z]+) {2,}/gm)].map((m) => m[1]);
+  assert.ok(commands.length > 15, help);
+  for (const command of commands) assert.ok(page.includes(`\n.SS anchord ${command}\n`), command);
+  assert.doesNotMatch(page, /^\.(?!TH|SH|SS|TP|B|I)/m, 'a line of text that roff would take for a request');
+});
+
+test('doctor says what is wrong with folder and port, and of a running server how it is', async () => {
+  const server = await startServer({ auth: 'on' });
+  const folder = mkdtempSync(join(tmpdir(), 'anchord e2e '));
+  const looked = async (...args) => {
+    const { code, stdout } = await run(['doctor', '--json', ...args]);
+    const found = Object.fromEntries(JSON.parse(stdout).map((one) => [one.what, one]));
+    return { code, found };
+  };
+  try {
+    const running = await looked('--data-dir', server.dataDir);
+    assert.equal(running.found.server.level, 'ok');
+    assert.match(running.found.server.seen, new RegExp(`${server.url} answers after`));
+    assert.equal(running.found['server version'], undefined, 'it is of this version');
+    const taken = await looked('--data-dir', folder, '--listen', `127.0.0.1:${server.port}`);
+    assert.equal(taken.code, 1);
+    assert.equal(taken.found.port.level, 'failed');
+    assert.match(taken.found.port.advice, /another program listens there/);
+    await server.kill();
+    const stopped = await looked('--data-dir', server.dataDir);
+    assert.equal(stopped.found.database.level, 'ok');
+    writeFileSync(join(folder, 'anchord.db'), 'this is no database, only as long as one'.repeat(200));
+    const damaged = await looked('--data-dir', folder);
+    assert.deepEqual([damaged.code, damaged.found.database.level], [1, 'failed']);
+    assert.match(damaged.found.database.advice, /backup restore/);
+  } finally {
+    await server.dispose();
+    rmSync(folder, { recursive: true });
+  }
 });
 
 test('the simulated flight is the same, byte for byte, with the same seed, and another with another', async () => {
