@@ -59,11 +59,12 @@ export const picture = async (page, name) => {
 };
 
 const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
-/** What axe finds wrong on the page as it is, and whether it is wider than its window. */
-export async function violations(page) {
+/** What axe finds wrong on the page as it is, and whether it is wider than its window. `sizes`: of targets too, which a bar at the bottom may half cover. */
+export async function violations(page, { sizes = true } = {}) {
   await page.evaluate(axe);
-  const found = await page.evaluate(() =>
-    globalThis.axe.run(document, { resultTypes: ['violations'], rules: { 'target-size': { enabled: true } } }),
+  const found = await page.evaluate(
+    (enabled) => globalThis.axe.run(document, { resultTypes: ['violations'], rules: { 'target-size': { enabled } } }),
+    sizes,
   );
   const [page_px, window_px] = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
   const sideways = page_px > window_px + 1 ? [`wider than its window: ${page_px} px in ${window_px}`] : [];

@@ -180,3 +180,35 @@ test('a replay is of its moment: the strip says REPLAY and its time, never LIVE;
   await live(id);
   await page.close();
 });
+
+test('who may only look sees no tool that he may not use', async () => {
+  const closed = await startServer({ auth: 'on' });
+  try {
+    const { token } = await (
+      await closed.fetch('/api/v1/tokens', { json: { name: 'a visitor', roles: ['viewer'] } })
+    ).json();
+    const { page, id } = await openPage(browser, closed, { hash: '#/plan' });
+    await id('token').fill(token);
+    await id('sign-in-submit').click();
+    await id('sign-in').waitFor({ state: 'detached' });
+    for (const view of ['plan', 'live', 'anchors', 'measurements', 'models', 'system']) {
+      await id(`nav-${view}`).click();
+      await id(view === 'live' ? 'first-run' : view)
+        .first()
+        .waitFor();
+      for (const tool of [
+        /^(Undo|Import|New|Outline|Generate|Save|Draw here|Expect)$/,
+        /Review and publish|Promote|Exclude|Label|Discover|Add a device|Take control/,
+      ])
+        assert.equal(await page.getByRole('button', { name: tool }).count(), 0, `${view}: ${tool}`);
+    }
+    await id('nav-plan').click();
+    await id('plan').waitFor();
+    const fields = page.locator('main :is(input, textarea):enabled:not([readonly])').filter({ visible: true });
+    assert.equal(await fields.count(), 0, 'a plan to look at');
+    await page.close();
+    await browser.context.clearCookies();
+  } finally {
+    await closed.dispose();
+  }
+});

@@ -212,6 +212,12 @@ export async function calibrate(mission: string, key: string): Promise<Calibrati
   if (!done) throw new Error('The calibration is still running; look again in a minute.');
   return done;
 }
+/// The newest one of this flight alone, for who may publish but not solve; null where an engineer has not solved it yet.
+export async function newest_calibration(mission: string): Promise<Calibration | null> {
+  const all = await list('/calibrations', { query: { limit: 50, fields: 'id,missions' } }),
+    of_it = all.find((c) => c.missions.length === 1 && c.missions[0] === mission);
+  return of_it ? calibration_of(await request('GET', `/calibrations/${encodeURIComponent(of_it.id)}`)) : null;
+}
 /// An anchor that fails a gate goes out only with the reason a person gives for it.
 export type Override = NonNullable<Wire<'Publish'>['overrides']>[number];
 /// The revision's note carries who was left out by a person, and why: 500 characters at most.

@@ -17,6 +17,10 @@ const FIELDS: readonly (readonly [Exclude<keyof Fields, 'external_ids'>, string,
   ['ifc_guid', 'IFC GUID', '22 characters of the model'],
 ];
 
+/// ISO 16739 IfcGloballyUniqueId: 128 bits as 22 characters of base 64, the first of which carries two bits.
+export const IFC_GUID = '[0-3][0-9A-Za-z_$]{21}';
+const IFC_WORDS = 'IFC GUID: 22 characters of 0-9, A-Z, a-z, _ and $, the first of 0 to 3';
+
 const key_of = (anchor: string): string => `facility/${anchor}`;
 export function FacilityPanel({ anchor, changed }: { anchor: string; changed: () => void }) {
   const [read, set_read] = useState<(Facility & { readonly anchor: string }) | null>(null),
@@ -151,6 +155,7 @@ function Form({ anchor, known, done, close, reload, failed }: Editing) {
             value={form[key]}
             placeholder={hint}
             maxLength={200}
+            {...(key === 'ifc_guid' ? { pattern: IFC_GUID, title: IFC_WORDS } : {})}
             onInput={(e) => change({ [key]: e.currentTarget.value })}
           />
         </label>

@@ -5,6 +5,7 @@ import { idempotency_key, error_text } from '../api/client';
 import {
   calibrate,
   moved_since_published,
+  newest_calibration,
   note_of,
   publish,
   report_url,
@@ -13,6 +14,7 @@ import {
   type Moved,
 } from '../api/anchors';
 import type { MissionMsg } from '../live/messages';
+import { may } from '../state/session';
 import { current_scene, revision, say } from '../state/store';
 import { accuracy, fixed } from '../ui/format';
 import { Icon, Mark, StatusChip } from '../ui/marks';
@@ -35,6 +37,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
     [moved, set_moved] = useState<ReadonlyMap<string, Moved>>(new Map()),
     [problem, set_problem] = useState(''),
     [busy, set_busy] = useState<'' | 'calibrating' | 'publishing'>('calibrating');
+  const solves = may('engineer');
   const keys = useRef({ calibrate: idempotency_key(), publish: idempotency_key() }),
     [form, change, forget] = useDraft<Form>(`publish/${mission.mission}`, { note: '', reasons: {}, left: {} }),
     { note, reasons, left } = form,
@@ -52,7 +55,10 @@ export function Publish({ mission }: { mission: MissionMsg }) {
   const solve = useStable(
     (): void =>
       void guarded('calibrating', async () => {
-        const made = await calibrate(mission.mission, keys.current.calibrate);
+        const made = solves
+          ? await calibrate(mission.mission, keys.current.calibrate)
+          : await newest_calibration(mission.mission);
+        if (!made) throw new Error('This flight is not solved yet: an engineer has to calibrate it first.');
         set_draft(made);
         set_moved(await moved_since_published(made.id).catch(() => new Map<string, Moved>()));
       }),
@@ -98,8 +104,11 @@ export function Publish({ mission }: { mission: MissionMsg }) {
         </button>
       </div>
       <p class="why">
-        {mission.name}: all stored ranges are solved again, together. What is published is what facility tools read; the
-        running estimates are not.
+        {mission.name}:{' '}
+        {solves
+          ? 'all stored ranges are solved again, together.'
+          : 'the newest calibration that an engineer made of it.'}{' '}
+        What is published is what facility tools read; the running estimates are not.
       </p>
       {busy === 'calibrating' && <p role="status">Solving {mission.n_ranges} ranges.</p>}
       {problem && (

@@ -121,7 +121,9 @@ function Row({
           <Q v={range_m(r.corrected_m)} u="m" />
         </span>
         <span class="rw">
-          {corrected ? `raw ${range_m(r.distance_m)}, ` : ''}σ {fixed(r.sigma_m, 2)} m
+          {[corrected ? `raw ${range_m(r.distance_m)} m` : '', r.sigma_m === null ? '' : `σ ${fixed(r.sigma_m, 2)} m`]
+            .filter(Boolean)
+            .join(', ')}
         </span>
       </td>
       <td class={`pl ${stale ? '' : tone}`}>

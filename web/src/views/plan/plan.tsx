@@ -54,7 +54,7 @@ export function Plan({ id }: { id: string | null }) {
 }
 
 function Toolbar({ desk }: { desk: Desk }) {
-  const { all, plan, dirty, engineer, busy } = desk,
+  const { all, plan, dirty, able, busy } = desk,
     file = useRef<HTMLInputElement>(null);
   return (
     <div class="toolbar">
@@ -85,24 +85,27 @@ function Toolbar({ desk }: { desk: Desk }) {
         value={plan.name}
         data-testid="plan-name"
         maxLength={200}
+        readOnly={!able}
         onInput={(e) => desk.rename(e.currentTarget.value)}
       />
       <span class="mut">{plan.id ? `revision ${plan.revision}${dirty ? ', changed' : ''}` : 'not saved'}</span>
       <span class="grow" />
-      <button class="btn" disabled={!desk.can_undo} onClick={desk.undo}>
-        Undo
-      </button>
-      <button class="btn" disabled={!desk.can_redo} onClick={desk.redo}>
-        Redo
-      </button>
-      {engineer && (
-        <button class="btn" onClick={() => desk.open(EMPTY)} disabled={dirty}>
-          New
-        </button>
+      {able && (
+        <>
+          <button class="btn" disabled={!desk.can_undo} onClick={desk.undo}>
+            Undo
+          </button>
+          <button class="btn" disabled={!desk.can_redo} onClick={desk.redo}>
+            Redo
+          </button>
+          <button class="btn" onClick={() => desk.open(EMPTY)} disabled={dirty}>
+            New
+          </button>
+          <button class="btn" onClick={() => file.current?.click()}>
+            Import
+          </button>
+        </>
       )}
-      <button class="btn" onClick={() => file.current?.click()}>
-        Import
-      </button>
       <input
         ref={file}
         type="file"
@@ -127,7 +130,7 @@ function Toolbar({ desk }: { desk: Desk }) {
           </a>
         </>
       )}
-      {engineer && (
+      {able && (
         <button
           class="btn"
           data-testid="generate"
@@ -137,7 +140,7 @@ function Toolbar({ desk }: { desk: Desk }) {
           {busy === 'generate' ? 'Planning' : 'Generate'}
         </button>
       )}
-      {engineer && (
+      {able && (
         <button class="btn primary" data-testid="save" disabled={!dirty || busy !== ''} onClick={desk.keep}>
           Save
         </button>
@@ -146,9 +149,11 @@ function Toolbar({ desk }: { desk: Desk }) {
   );
 }
 
+const nothing = (): void => undefined; // a plan that one may only look at does not change under the finger
+
 /// The map, and what a tap on it adds.
 function Drawn({ desk, shown }: { desk: Desk; shown: Shown }) {
-  const { plan, origin, picked, pick, change, check, known } = desk,
+  const { plan, origin, picked, pick, change, check, known, able } = desk,
     [drawing, set_drawing] = useState<Shape>('outline'),
     [snap, set_snap] = useState(true);
   const no_flies = plan.no_fly.map((_, i): [Shape, string] => [`no_fly/${i}`, `No-fly ${i + 1}`]);
@@ -161,30 +166,32 @@ function Drawn({ desk, shown }: { desk: Desk; shown: Shown }) {
   ];
   return (
     <div class="planleft">
-      <div class="drawrow">
-        <div class="drawbar seg" role="group" aria-label="What a tap adds">
-          {areas.map(([shape, words]) => (
-            <button
-              key={words}
-              class={drawing === shape ? 'on' : ''}
-              aria-pressed={drawing === shape}
-              data-testid={`draw-${words.toLowerCase().replace(' ', '-')}`}
-              onClick={() => set_drawing(shape)}
-            >
-              {words}
-            </button>
-          ))}
+      {able && (
+        <div class="drawrow">
+          <div class="drawbar seg" role="group" aria-label="What a tap adds">
+            {areas.map(([shape, words]) => (
+              <button
+                key={words}
+                class={drawing === shape ? 'on' : ''}
+                aria-pressed={drawing === shape}
+                data-testid={`draw-${words.toLowerCase().replace(' ', '-')}`}
+                onClick={() => set_drawing(shape)}
+              >
+                {words}
+              </button>
+            ))}
+          </div>
+          <button
+            class="btn"
+            aria-pressed={snap}
+            data-testid="snap"
+            title="To right angles and half metres"
+            onClick={() => set_snap(!snap)}
+          >
+            {snap ? 'Snap on' : 'Snap off'}
+          </button>
         </div>
-        <button
-          class="btn"
-          aria-pressed={snap}
-          data-testid="snap"
-          title="To right angles and half metres"
-          onClick={() => set_snap(!snap)}
-        >
-          {snap ? 'Snap on' : 'Snap off'}
-        </button>
-      </div>
+      )}
       {origin ? (
         <PlanMap
           plan={plan}
@@ -195,10 +202,12 @@ function Drawn({ desk, shown }: { desk: Desk; shown: Shown }) {
           cells={cells(check, shown, plan, origin)}
           anchors={placed(plan, known, origin)}
           pick={pick}
-          change={change}
+          change={able ? change : nothing}
         />
-      ) : (
+      ) : able ? (
         <Where set={desk.set_origin} />
+      ) : (
+        <p class="why pad">There is no plan yet. An operator draws one.</p>
       )}
     </div>
   );
@@ -206,14 +215,14 @@ function Drawn({ desk, shown }: { desk: Desk; shown: Shown }) {
 
 /// The plan in numbers: its check, and everything drawn as fields.
 function Side({ desk, shown, show }: { desk: Desk; shown: Shown; show: (s: Shown) => void }) {
-  const { plan, origin, picked, pick, change, check, known, engineer, dirty } = desk;
+  const { plan, origin, picked, pick, change, check, known, able, dirty } = desk;
   return (
     <div class="planside" tabIndex={0} role="region" aria-label="Plan in numbers">
       <CheckPanel
         check={check}
         old={desk.check_is_old}
         plan={plan}
-        waits={dirty && !engineer ? 'Save to have it checked.' : 'Checking.'}
+        waits={dirty && !able ? 'Save to have it checked.' : 'Checking.'}
       />
       {origin && <Profile plan={plan} origin={origin} picked={picked} pick={pick} />}
       <PredictedPanel check={check} shown={shown} set={show} />
@@ -227,39 +236,41 @@ function Side({ desk, shown, show }: { desk: Desk; shown: Shown; show: (s: Shown
           </ul>
         </div>
       )}
-      <section class="sec-p">
-        <div class="hd">
-          <h2>Waypoints</h2>
-          <span class="meta">{plan.waypoints.length}</span>
-        </div>
-        {engineer && <WayTools plan={plan} origin={origin} picked={picked} change={change} />}
-        <Waypoints plan={plan} picked={picked} pick={pick} change={change} />
-      </section>
-      <section class="sec-p">
-        <h2>Areas</h2>
-        {plan.outline.length === 0 && (
-          <p class="why">The outline of the building comes first: tap its corners, or import a GeoJSON.</p>
-        )}
-        <Corners plan={plan} shape="outline" name="Outline" picked={picked} pick={pick} change={change} />
-        <Corners plan={plan} shape="fence" name="Fence" picked={picked} pick={pick} change={change} />
-        {plan.no_fly.map((_, i) => (
-          <Corners
-            key={i}
-            plan={plan}
-            shape={`no_fly/${i}`}
-            name={`No-fly ${i + 1}`}
-            picked={picked}
-            pick={pick}
-            change={change}
-          />
-        ))}
-      </section>
-      <Expected plan={plan} known={known} origin={origin} change={change} />
-      <section class="sec-p">
-        <h2>Settings</h2>
-        <SettingFields plan={plan} change={change} />
-      </section>
-      {engineer && plan.id && !dirty && (
+      <fieldset class="readable" disabled={!able}>
+        <section class="sec-p">
+          <div class="hd">
+            <h2>Waypoints</h2>
+            <span class="meta">{plan.waypoints.length}</span>
+          </div>
+          {able && <WayTools plan={plan} origin={origin} picked={picked} change={change} />}
+          <Waypoints plan={plan} picked={picked} pick={pick} change={change} />
+        </section>
+        <section class="sec-p">
+          <h2>Areas</h2>
+          {plan.outline.length === 0 && (
+            <p class="why">The outline of the building comes first: tap its corners, or import a GeoJSON.</p>
+          )}
+          <Corners plan={plan} shape="outline" name="Outline" picked={picked} pick={pick} change={change} />
+          <Corners plan={plan} shape="fence" name="Fence" picked={picked} pick={pick} change={change} />
+          {plan.no_fly.map((_, i) => (
+            <Corners
+              key={i}
+              plan={plan}
+              shape={`no_fly/${i}`}
+              name={`No-fly ${i + 1}`}
+              picked={picked}
+              pick={pick}
+              change={change}
+            />
+          ))}
+        </section>
+        <Expected plan={plan} known={known} origin={origin} change={change} />
+        <section class="sec-p">
+          <h2>Settings</h2>
+          <SettingFields plan={plan} change={change} />
+        </section>
+      </fieldset>
+      {able && plan.id && !dirty && (
         <section class="sec-p">
           <button class="btn" onClick={desk.take_away}>
             Remove this plan

@@ -52,7 +52,7 @@ export function usePlan(id: string | null) {
     [known, set_known] = useState<ReadonlyMap<string, AnchorRow>>(new Map());
   const plan = history.now,
     dirty = plan !== saved,
-    engineer = may('engineer', 'operator');
+    able = may('operator');
   // Metres are about one origin for as long as a plan is open: a map that moves while it is drawn on cannot be used.
   const open = (p: PlanDoc): void => {
     set_origin(origin_of(p, current_mission.peek()?.origin ?? null));
@@ -111,7 +111,7 @@ export function usePlan(id: string | null) {
     check = checked?.check ?? null;
   const run_check = useStable((): Promise<Check> | null => {
     if (!dirty) return saved.id ? fetch_check(saved.id) : null;
-    return engineer && (plan.waypoints.length > 0 || plan.outline.length > 2) ? check_drawn(plan) : null;
+    return able && (plan.waypoints.length > 0 || plan.outline.length > 2) ? check_drawn(plan) : null;
   });
   useEffect(() => {
     let gone = false;
@@ -191,7 +191,7 @@ export function usePlan(id: string | null) {
     plan,
     saved,
     dirty,
-    engineer,
+    able,
     can_undo: history.before.length > 0,
     can_redo: history.after.length > 0,
     picked,
