@@ -232,8 +232,21 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
   await id('cmd-land').click();
   await id('procedure').getByText('ABORTED', { exact: true }).waitFor({ timeout: 60_000 });
   assert.match(await text(id('flight-aborted')), /ended before its plan was flown.*Commanded to land: by /);
-  // The report is two presses away: a calibration of the whole flight, then the page to print.
+  // What the flight took stands still once it is over, and what is done is counted alike everywhere: no more than the procedure reached.
+  const landed_ms = Date.now(),
+    flown = await text(id('flown'));
+  await eventually('three seconds pass', () => Date.now() > landed_ms + 3000, 5000, 200);
+  assert.equal(await text(id('flown')), flown, 'flown counts on after landing');
+  const reached = (await procedure()).anchors.filter((a) => a.reached).length,
+    [bar, side] = await Promise.all([done_shown('flight-progress'), done_shown('progress')]);
+  assert.equal(bar, side);
+  assert.ok(Number(bar.split(' ')[0]) <= reached, `${bar} done, ${reached} reached`);
   await page.getByRole('link', { name: /^Anchors/ }).click();
+  await id('anchor-table').waitFor();
+  assert.equal(await id('anchor-table').locator('.chip.ok').count(), Number(bar.split(' ')[0]), 'green in the table');
+  assert.match(await text(id('review')), new RegExp(`, ${bar}$`));
+  await picture(page, 'given-up');
+  // The report is two presses away: a calibration of the whole flight, then the page to print.
   await id('review').click();
   await id('draft').locator('tbody tr').nth(3).waitFor({ timeout: 60_000 });
   await picture(page, 'landed-light');

@@ -5,7 +5,7 @@ import { api_url, ApiError } from '../api/client';
 import { published, row_of_estimate, type AnchorRow } from '../api/anchors';
 import { enu_from_geodetic } from '../map/enu';
 import { MapBox } from '../map/map_box';
-import { is_done, shown_estimates } from '../state/done';
+import { done_count, shown_estimates } from '../state/done';
 import { me, may_publish } from '../state/session';
 import { chosen_anchor, current_mission, current_scene, link, revision, synced, tick } from '../state/store';
 import { Icon } from '../ui/marks';
@@ -96,7 +96,7 @@ export function Anchors({ anchor }: { anchor: string | null }) {
     selected = found ?? (linked ? null : (rows[0] ?? null)),
     looking = linked !== null && !found && !wanted;
   const search = useRef<HTMLInputElement>(null);
-  const ready = all.filter(is_done).length;
+  const ready = done_count(live ? scene : null, live ? mission : null);
   const query = live ? `?view=live${mission ? `&mission=${encodeURIComponent(mission.mission)}` : ''}&` : '?';
   const estimates = live ? scene?.estimates_version : loaded.value,
     marked = selected?.anchor;
@@ -174,7 +174,7 @@ export function Anchors({ anchor }: { anchor: string | null }) {
               publish_open.value = true;
             }}
           >
-            Review and publish{live && all.length ? `, ${ready} of ${all.length}` : ''}
+            Review and publish{live && all.length ? `, ${ready.done} of ${ready.total}` : ''}
           </button>
         )}
       </div>
