@@ -60,7 +60,7 @@ export const picture = async (page, name) => {
 
 const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 /** What axe finds wrong on the page as it is, and whether it is wider than its window. `sizes`: of targets too, which a bar at the bottom may half cover. */
-export async function violations(page, { sizes = true } = {}) {
+export async function violations(page, { sizes = false } = {}) {
   await page.evaluate(axe);
   const found = await page.evaluate(
     (enabled) => globalThis.axe.run(document, { resultTypes: ['violations'], rules: { 'target-size': { enabled } } }),

@@ -74,7 +74,7 @@ test('with the link lost every value is struck and aged, nothing is judged witho
       await picture(page, `lost-${view}`);
     }
     assert.doesNotMatch(await text(id('alarm-bar')), /tag and its cable/);
-    assert.deepEqual(await violations(page), []);
+    assert.deepEqual(await violations(page, { sizes: true }), []);
   } finally {
     process.kill(server.pid, 'SIGCONT');
   }
@@ -130,7 +130,7 @@ test('a link to an anchor that is not known says so; one that is known opens it'
     10_000,
   );
   assert.equal(await id('anchor-detail').count(), 0);
-  assert.deepEqual(await violations(page), []);
+  assert.deepEqual(await violations(page, { sizes: true }), []);
   const known = await id('anchor-table').locator('tbody th button').last().textContent();
   await page.evaluate((a) => (location.hash = `#/anchors/${a}`), known);
   await eventually('it is opened', async () => (await text(id('anchor-detail').locator('h2'))) === known, 5000);
@@ -175,7 +175,7 @@ test('a replay is of its moment: the strip says REPLAY and its time, never LIVE;
   for (const tile of ['link', 'rtk', 'uwb', 'drone', 'rec'])
     assert.doesNotMatch(await text(id(`status-${tile}`)), /LIVE|ended/, tile);
   await picture(page, 'replay-30s');
-  assert.deepEqual(await violations(page), []);
+  assert.deepEqual(await violations(page, { sizes: true }), []);
   await id('nav-live').click();
   await live(id);
   await page.close();

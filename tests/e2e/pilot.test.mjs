@@ -205,7 +205,7 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
       );
       assert.ok(Math.abs(b.y - hold.y) < 1, `the commands are one row at ${where}`);
     }
-    assert.deepEqual(await violations(page, { sizes: false }), [], where);
+    assert.deepEqual(await violations(page), [], where);
   }
   await page.setViewportSize({ width: 1440, height: 900 });
   const done_shown = (name) =>
