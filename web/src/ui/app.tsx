@@ -1,8 +1,9 @@
 import { signal } from '@preact/signals';
 import type { ComponentType } from 'preact';
-import { useEffect, useState } from 'preact/hooks';
-import { link, live_source, tick, toast, when_back } from '../state/store';
+import { useEffect } from 'preact/hooks';
+import { link, live_source, tick, toast } from '../state/store';
 import { Anchors } from '../views/anchors';
+import { load_compare, load_publish } from '../views/dialogs';
 import { Live } from '../views/live';
 import { AlarmBar } from './alarms';
 import { age } from './format';
@@ -10,7 +11,7 @@ import { Help, help_open } from './help';
 import { Icon, Mark } from './marks';
 import { SignIn } from './sign_in';
 import { Strip } from './strip';
-import { useStable } from './use_stable';
+import { useLater } from './use_later';
 
 /// `#/live`, `#/plan/<id>`, `#/anchors`, `#/anchors/0x6a2f`, `#/measurements`, `#/models`,
 /// `#/models/runs/<id>?compare=<id>,<id>`, `#/replay/<mission>?t=12.5`, `#/system`.
@@ -55,27 +56,13 @@ function Rail({ view }: { view: View }) {
 
 /// A view that is not for the field comes in a chunk of its own: the operator's first load stays small.
 function Later<P extends object>({ load, props }: { load: () => Promise<ComponentType<P>>; props: P }) {
-  const [View, set_view] = useState<ComponentType<P> | null>(null),
-    [failed, set_failed] = useState(false);
-  const begin = useStable((): void => {
-    load().then(
-      (v) => {
-        set_view(() => v);
-        set_failed(false);
-      },
-      () => set_failed(true),
-    );
-  });
-  useEffect(begin, [begin]);
-  // Also what is still on its way: a request into a dead network ends minutes after the link is back.
-  const missing = !View;
-  useEffect(() => (missing ? when_back(begin) : undefined), [missing, begin]);
+  const { part: View, failed, again } = useLater(load);
   if (failed && !View)
     return (
       <div class="empty">
         <h1 class="sr">Not loaded</h1>
         <p role="status">This view could not be loaded from anchord. It opens as soon as the link is back.</p>
-        <button class="btn" onClick={begin}>
+        <button class="btn" onClick={again}>
           Try again
         </button>
       </div>
@@ -109,7 +96,7 @@ function LastKnown() {
   );
 }
 /// The rest of the page while nothing else is to be done: after an outage every view is there, and opens also during one.
-const LATER = [load_replay, load_system, load_plan, load_measurements, load_models];
+const LATER = [load_publish, load_compare, load_replay, load_system, load_plan, load_measurements, load_models];
 function usePrefetch(): void {
   const ready = link.value === 'live';
   useEffect(() => {

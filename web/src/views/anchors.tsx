@@ -8,12 +8,13 @@ import { MapBox } from '../map/map_box';
 import { done_count, shown_estimates } from '../state/done';
 import { me, may_publish } from '../state/session';
 import { chosen_anchor, current_mission, current_scene, link, revision, synced, tick } from '../state/store';
+import type { MissionMsg } from '../live/messages';
 import { Icon } from '../ui/marks';
+import { useLater } from '../ui/use_later';
 import { ColumnPicker } from './anchor_columns';
 import { AnchorTable, sorted_rows } from './anchor_table';
 import { AnchorDetail } from './anchor_detail';
-import { compare_open, CompareCalibrations } from './compare_calibrations';
-import { Publish, publish_open } from './publish';
+import { compare_open, load_compare, load_publish, publish_open } from './dialogs';
 
 export const source = signal<'live' | 'published'>('live');
 export const filter = signal('');
@@ -59,6 +60,15 @@ function on_the_ground(rows: readonly AnchorRow[]): AnchorRow[] {
                 },
         },
   );
+}
+
+function Compare() {
+  const { part: Dialog } = useLater(load_compare);
+  return Dialog ? <Dialog /> : null;
+}
+function Review({ mission }: { mission: MissionMsg }) {
+  const { part: Dialog } = useLater(load_publish);
+  return Dialog ? <Dialog mission={mission} /> : null;
 }
 
 export function Anchors({ anchor }: { anchor: string | null }) {
@@ -219,8 +229,8 @@ export function Anchors({ anchor }: { anchor: string | null }) {
           </p>
         )}
       </aside>
-      {compare_open.value && <CompareCalibrations />}
-      {publish_open.value && mission && <Publish mission={mission} />}
+      {compare_open.value && <Compare />}
+      {publish_open.value && mission && <Review mission={mission} />}
     </div>
   );
 }

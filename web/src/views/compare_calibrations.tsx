@@ -1,5 +1,4 @@
 /// Two calibrations side by side: how far each anchor is from where the other has it, and whether that is more than both covariances allow.
-import { signal } from '@preact/signals';
 import { useEffect, useState } from 'preact/hooks';
 import { error_text } from '../api/client';
 import { common_shift, shifts, solves, type Shift, type Solve } from '../api/residuals';
@@ -7,8 +6,8 @@ import { mission_list, revision } from '../state/store';
 import { bearing, date, fixed, millimetres } from '../ui/format';
 import { Chip, Icon, type Shape, type Tone } from '../ui/marks';
 import { useDialog } from '../ui/use_dialog';
+import { compare_open } from './dialogs';
 
-export const compare_open = signal(false);
 const LOOK: Record<Shift['change'], readonly [Shape, Tone, string]> = {
   agrees: ['ok', 'ok', 'AGREES'],
   moved: ['bad', 'bad', 'MOVED'],

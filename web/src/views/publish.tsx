@@ -1,5 +1,4 @@
 /// Review and publish: a fresh calibration of the whole flight, the result of every anchor against the live estimate, then one revision for facility tools.
-import { signal } from '@preact/signals';
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { idempotency_key, error_text } from '../api/client';
 import {
@@ -23,8 +22,7 @@ import { gate_line } from '../ui/gates';
 import { VERDICT_WORDS } from '../ui/words';
 import { useDialog } from '../ui/use_dialog';
 import { useStable } from '../ui/use_stable';
-
-export const publish_open = signal(false);
+import { publish_open } from './dialogs';
 
 interface Form {
   readonly note: string;
