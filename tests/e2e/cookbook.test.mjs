@@ -1,11 +1,11 @@
-// The cookbook's commands, taken from the page and run by a shell against the real binary.
+// The commands of the cookbook and of the tutorial, taken from the pages and run by a shell against the real binary.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
-import { cpSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { cpSync, mkdirSync, mkdtempSync, readFileSync, rmSync, symlinkSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { test } from 'node:test';
-import { root, startServer } from './server.mjs';
+import { binary, root, startServer } from './server.mjs';
 
 /** The ```sh blocks of a page, in order. */
 function commandsOf(page) {
@@ -41,6 +41,24 @@ test('every command of the cookbook does what the page says', async () => {
     assert.equal(code, 0, output.slice(-4000));
   } finally {
     await server.dispose();
+    rmSync(cwd, { recursive: true, force: true });
+  }
+});
+
+test('every block of the tutorial may be pasted as it stands, twice', async () => {
+  const commands = commandsOf(readFileSync(join(root, 'docs/tutorial.md'), 'utf8')).join('\n');
+  const cwd = mkdtempSync(join(tmpdir(), 'anchord tutorial '));
+  try {
+    mkdirSync(join(cwd, 'build/release'), { recursive: true });
+    symlinkSync(binary, join(cwd, 'build/release/anchord'));
+    const { code, output } = await shell(
+      `trap 'kill %1; wait' EXIT\n${commands}\n${commands}\n` +
+        'test $(jq ".features | length" anchors.geojson) -ge 5\n' +
+        'test "$(curl -fsS -H "Authorization: Bearer $T" $U/api/v1/revisions | jq ".items | length")" = 2',
+      { cwd, env: process.env },
+    );
+    assert.equal(code, 0, output.slice(-4000));
+  } finally {
     rmSync(cwd, { recursive: true, force: true });
   }
 });
