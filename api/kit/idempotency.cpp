@@ -1,39 +1,16 @@
 #include "api/kit/idempotency.hpp"
 
-#include <openssl/evp.h>
-
 #include <array>
 
 #include "api/kit/problem.hpp"
 #include "api/kit/router.hpp"
+#include "core/base/sha256.hpp"
 #include "core/ports/store.hpp"
 
 namespace anchord::api {
 namespace {
 
 constexpr std::size_t k_purged_at_once = 200;
-
-class Sha256 {
- public:
-  Sha256() : context_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) {
-    EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr);
-  }
-  void add(std::string_view bytes) { EVP_DigestUpdate(context_.get(), bytes.data(), bytes.size()); }
-  std::string hex() {
-    std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
-    unsigned size = 0;
-    EVP_DigestFinal_ex(context_.get(), digest.data(), &size);
-    std::string text;
-    for (unsigned i = 0; i < size; ++i) {
-      text += "0123456789abcdef"[digest[i] >> 4];
-      text += "0123456789abcdef"[digest[i] & 15];
-    }
-    return text;
-  }
-
- private:
-  std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context_;
-};
 
 /// Hashes a streamed body on its way through.
 class HashingReader final : public BodyReader {

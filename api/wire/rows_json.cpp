@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/kit/reader.hpp"
+#include "core/base/base64.hpp"
 
 namespace anchord::api {
 
@@ -280,51 +281,6 @@ Ordered cir_json(const Cir& cir) {
   put_if(out, "first_path_idx", cir.first_path_idx);
   put_if(out, "rxpacc", cir.preamble_count);
   out["b64"] = base64(cir_bytes(cir));
-  return out;
-}
-
-namespace {
-constexpr char k_alphabet[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-}
-
-std::string base64(std::string_view bytes) {
-  std::string out;
-  out.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t n = std::min<std::size_t>(3, bytes.size() - i);
-    std::uint32_t block = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      block = (block << 8) | (k < n ? static_cast<unsigned char>(bytes[i + k]) : 0u);
-    for (std::size_t k = 0; k < 4; ++k) out += k <= n ? k_alphabet[(block >> (18 - 6 * k)) & 63] : '=';
-  }
-  return out;
-}
-
-std::optional<std::string> from_base64(std::string_view text) {
-  static const auto k_value = [] {
-    std::array<std::int8_t, 256> table{};
-    table.fill(-1);
-    for (int i = 0; i < 64; ++i)
-      table[static_cast<unsigned char>(k_alphabet[i])] = static_cast<std::int8_t>(i);
-    return table;
-  }();
-  if (text.size() % 4 != 0) return std::nullopt;
-  std::size_t padding = 0;
-  while (padding < 2 && padding < text.size() && text[text.size() - 1 - padding] == '=') ++padding;
-  std::string out;
-  out.reserve(text.size() / 4 * 3);
-  for (std::size_t i = 0; i < text.size(); i += 4) {
-    const bool last = i + 4 == text.size();
-    std::uint32_t block = 0;
-    for (std::size_t k = 0; k < 4; ++k) {
-      const bool pad = last && k >= 4 - padding;
-      const int value = pad ? 0 : k_value[static_cast<unsigned char>(text[i + k])];
-      if (value < 0) return std::nullopt;
-      block = (block << 6) | static_cast<std::uint32_t>(value);
-    }
-    const std::size_t n = last ? 3 - padding : 3;
-    for (std::size_t k = 0; k < n; ++k) out += static_cast<char>((block >> (16 - 8 * k)) & 0xff);
-  }
   return out;
 }
 

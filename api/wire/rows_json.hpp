@@ -40,7 +40,4 @@ nlohmann::ordered_json cir_json(const Cir& cir);
 /// int16 re, im, little endian.
 std::string cir_bytes(const Cir& cir);
 
-std::string base64(std::string_view bytes);
-std::optional<std::string> from_base64(std::string_view text);
-
 }  // namespace anchord::api

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <fstream>
 
+#include "core/base/base64.hpp"
 #include "core/base/text.hpp"
 
 namespace anchord::ntrip {
@@ -43,19 +44,6 @@ std::optional<std::string> take_line(std::string& held) {
 }
 
 }  // namespace
-
-std::string base64(std::string_view bytes) {
-  constexpr std::string_view k_digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string out;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t group = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      group = group << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
-    for (std::size_t k = 0; k < 4; ++k)
-      out += i + k > bytes.size() ? '=' : k_digits[group >> (18 - 6 * k) & 63];
-  }
-  return out;
-}
 
 std::string gga_of(const device::RoverStatus& rover) {
   if (!rover.position || rover.fix == FixClass::none) return {};

@@ -58,6 +58,5 @@ class Client final : public device::Driver {
 
 /// A GGA sentence of a rover's position with its CR LF.
 std::string gga_of(const device::RoverStatus& rover);
-std::string base64(std::string_view bytes);
 
 }  // namespace anchord::ntrip

@@ -4,8 +4,8 @@
 #include <array>
 
 #include "api/kit/problem.hpp"
+#include "core/base/base64.hpp"
 #include "server/app/live_peer.hpp"
-#include "server/http/base64.hpp"
 #include "server/http/request_judge.hpp"
 #include "server/http/static_files.hpp"
 #include "server/http/text.hpp"
@@ -54,7 +54,7 @@ std::string credential(std::string_view authorization) {
   const auto rest = trim(authorization.substr(space + 1));
   if (iequals(scheme, "bearer")) return std::string(rest);
   if (!iequals(scheme, "basic")) return {};
-  const auto decoded = base64_decoded(rest);
+  const auto decoded = from_base64(rest);
   if (!decoded) return {};
   const auto colon = decoded->find(':');
   return colon == std::string::npos ? std::string{} : decoded->substr(colon + 1);

@@ -5,8 +5,8 @@
 #include <charconv>
 #include <optional>
 
+#include "core/base/base64.hpp"
 #include "core/base/text.hpp"
-#include "server/http/base64.hpp"
 #include "server/http/target.hpp"
 #include "server/http/text.hpp"
 
@@ -151,7 +151,7 @@ std::optional<Refusal> judge_upgrade(const ParsedHead& head, JudgedHead& good) {
                    "only WebSocket version 13",
                    {{"Sec-WebSocket-Version", "13"}, {"Upgrade", "websocket"}}};
   }
-  const auto key = base64_decoded(request.header("sec-websocket-key"));
+  const auto key = from_base64(request.header("sec-websocket-key"));
   if (!key || key->size() != 16) {
     return Refusal{400, "malformed", "Sec-WebSocket-Key must be 16 bytes in base64"};
   }

@@ -1,15 +1,14 @@
 #include "server/storage/backup.hpp"
 
-#include <openssl/evp.h>
 #include <sqlite3.h>
 
-#include <array>
 #include <chrono>
 #include <fstream>
 #include <memory>
 #include <thread>
 #include <vector>
 
+#include "core/base/sha256.hpp"
 #include "server/storage/data_folder.hpp"
 #include "server/storage/migrate.hpp"
 
@@ -45,24 +44,14 @@ Result<void> copy_pages(SqliteConnection& source, const std::filesystem::path& f
 
 Result<std::string> sha256_of_file(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
-  const std::unique_ptr<EVP_MD_CTX, void (*)(EVP_MD_CTX*)> digest(EVP_MD_CTX_new(), EVP_MD_CTX_free);
-  EVP_DigestInit_ex(digest.get(), EVP_sha256(), nullptr);
+  Sha256 digest;
   std::vector<char> chunk(1 << 16);
   while (in) {
     in.read(chunk.data(), static_cast<std::streamsize>(chunk.size()));
-    EVP_DigestUpdate(digest.get(), chunk.data(), static_cast<std::size_t>(in.gcount()));
+    digest.add({chunk.data(), static_cast<std::size_t>(in.gcount())});
   }
   if (!in.eof()) return make_error(Errc::storage_unavailable, "backup: cannot read back " + file.string());
-  std::array<unsigned char, EVP_MAX_MD_SIZE> bytes{};
-  unsigned int size = 0;
-  EVP_DigestFinal_ex(digest.get(), bytes.data(), &size);
-  std::string hex;
-  for (unsigned int i = 0; i < size; ++i) {
-    constexpr std::string_view k_digits = "0123456789abcdef";
-    hex += k_digits[bytes[i] >> 4];
-    hex += k_digits[bytes[i] & 15];
-  }
-  return hex;
+  return digest.hex();
 }
 
 }  // namespace

@@ -1,11 +1,9 @@
 #include "server/storage/migrate.hpp"
 
-#include <openssl/evp.h>
-
-#include <array>
 #include <system_error>
 
 #include "core/base/check.hpp"
+#include "core/base/sha256.hpp"
 #include "server/storage/data_folder.hpp"
 
 namespace anchord::sql {
@@ -72,17 +70,9 @@ void apply(SqliteConnection& connection, const Migration& migration, UtcTime now
 }  // namespace
 
 std::string sha256_hex(std::string_view bytes) {
-  std::array<unsigned char, 32> digest{};
-  unsigned int size = 0;
-  ANCHORD_CHECK(EVP_Digest(bytes.data(), bytes.size(), digest.data(), &size, EVP_sha256(), nullptr) == 1,
-                "SHA-256");
-  constexpr std::string_view k_digits = "0123456789abcdef";
-  std::string hex;
-  for (const unsigned char byte : digest) {
-    hex += k_digits[byte >> 4];
-    hex += k_digits[byte & 15];
-  }
-  return hex;
+  Sha256 sum;
+  sum.add(bytes);
+  return sum.hex();
 }
 
 Result<void> migrate(SqliteConnection& connection, std::span<const Migration> migrations,

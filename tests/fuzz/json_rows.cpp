@@ -6,6 +6,7 @@
 
 #include "api/kit/reader.hpp"
 #include "api/wire/rows_json.hpp"
+#include "core/base/base64.hpp"
 #include "core/base/to_wire.hpp"
 #include "tests/fuzz/check.hpp"
 
@@ -33,6 +34,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       (void)to_wire(api::fix_json(fix, std::nullopt));
     }
   }
-  (void)api::from_base64(std::string_view(reinterpret_cast<const char*>(data), size));
+  (void)from_base64(std::string_view(reinterpret_cast<const char*>(data), size));
   return 0;
 }

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <utility>
 
+#include "core/base/base64.hpp"
 #include "drivers/device/settings.hpp"
 #include "tests/drivers/device/collect.hpp"
 
