@@ -5,6 +5,7 @@
 #include "api/anchors/anchor_json.hpp"
 #include "api/anchors/site_json.hpp"
 #include "api/wire/budget_json.hpp"
+#include "api/wire/words.hpp"
 
 namespace anchord::api {
 
@@ -16,7 +17,7 @@ Ordered calibration_json(const Calibration& calibration, bool with_anchors) {
   Ordered out{{"id", to_string(calibration.id)},
               {"created_at", to_rfc3339(calibration.created)},
               {"missions", std::move(missions)},
-              {"frame", calibration.frame == TrackFrame::wgs84 ? "wgs84" : "local"},
+              {"frame", word_of(k_frame_words, calibration.frame)},
               {"origin", wgs84_json(calibration.origin)}};
   auto settings = Ordered::parse(calibration.settings_json, nullptr, false);
   out["settings"] = settings.is_discarded() ? Ordered::object() : std::move(settings);

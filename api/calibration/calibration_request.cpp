@@ -7,7 +7,7 @@
 #include "api/calibration/clues_json.hpp"
 #include "api/formats/flight_json.hpp"
 #include "api/kit/reader.hpp"
-#include "api/kit/word_table.hpp"
+#include "api/wire/words.hpp"
 #include "core/base/to_wire.hpp"
 
 namespace anchord::api {
@@ -26,11 +26,6 @@ constexpr auto k_weights = std::to_array<Word<Weights>>(
     {{"inverse_variance", Weights::inverse_variance}, {"dissertation", Weights::as_printed}});
 constexpr auto k_losses = std::to_array<Word<Loss>>(
     {{"none", Loss::none}, {"huber", Loss::huber}, {"cauchy", Loss::cauchy}, {"tukey", Loss::tukey}});
-constexpr auto k_fixes = std::to_array<Word<FixClass>>({{"none", FixClass::none},
-                                                        {"single", FixClass::single},
-                                                        {"dgps", FixClass::dgps},
-                                                        {"float", FixClass::rtk_float},
-                                                        {"fixed", FixClass::rtk_fixed}});
 
 /// A word, or where to begin for each anchor that is named.
 void read_initial(Fields& fields, const Json& initial, FlightOptions& options,
@@ -105,7 +100,7 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
       options.height_prior = {*height, *sigma};
   }
   if (const auto gap = fields.number("max_gap_s", 0.01, 10)) options.max_gap_s = *gap;
-  if (const auto fix = value_of_word(fields, "min_fix", k_fixes)) options.min_fix = *fix;
+  if (const auto fix = value_of_word(fields, "min_fix", k_fix_words)) options.min_fix = *fix;
   out.max_correction_age_s = fields.number("max_correction_age_s", 0.1, 3600);
   out.max_speed_mps = fields.number("max_speed_mps", 1, 1000);
   out.max_acceleration_mps2 = fields.number("max_acceleration_mps2", 1, 1000);

@@ -11,6 +11,7 @@
 #include "api/formats/csv_table.hpp"
 #include "api/formats/flight_json.hpp"
 #include "api/wire/exclusion_json.hpp"
+#include "api/wire/words.hpp"
 #include "core/base/text.hpp"
 
 namespace anchord {
@@ -106,17 +107,11 @@ class PoseColumns {
  private:
   Result<FixClass> fix_class(const CsvTable& table) const {
     if (!fix_) return FixClass::rtk_fixed;  // motion capture has no such column
-    constexpr std::array<std::pair<std::string_view, FixClass>, 8> words{{{"2", FixClass::rtk_fixed},
-                                                                          {"1", FixClass::rtk_float},
-                                                                          {"0", FixClass::single},
-                                                                          {"fixed", FixClass::rtk_fixed},
-                                                                          {"float", FixClass::rtk_float},
-                                                                          {"dgps", FixClass::dgps},
-                                                                          {"single", FixClass::single},
-                                                                          {"none", FixClass::none}}};
-    for (const auto& [word, fix] : words) {
-      if (table.text(*fix_) == word) return fix;
-    }
+    constexpr auto digits = std::to_array<api::Word<FixClass>>(
+        {{"2", FixClass::rtk_fixed}, {"1", FixClass::rtk_float}, {"0", FixClass::single}});
+    const auto text = table.text(*fix_);
+    if (const auto fix = api::value_of(digits, text)) return *fix;
+    if (const auto fix = api::value_of(api::k_fix_words, text)) return *fix;
     return table.error("fix: '" + to_utf8(table.text(*fix_), 20) +
                        "', expected 2 (fixed), 1 (float), 0 (neither), or fixed, float, dgps, single, none");
   }

@@ -5,6 +5,7 @@
 #include <initializer_list>
 #include <nlohmann/json.hpp>
 
+#include "api/wire/words.hpp"
 #include "core/base/to_wire.hpp"
 
 namespace anchord {
@@ -62,20 +63,14 @@ class Reader {
 void read_track(Reader r, FlightDeclaration& flight, const std::string& file, std::optional<Error>& error) {
   r.allow({"frame", "point", "in", "attitude", "heading_column", "heading_enu_ccw_from_east_deg"});
   const std::string frame = r.text("frame", true);
-  if (frame == "wgs84") {
-    flight.mission.frame = TrackFrame::wgs84;
-  } else if (frame == "local") {
-    flight.mission.frame = TrackFrame::local;
+  if (const auto known = api::value_of(api::k_frame_words, frame)) {
+    flight.mission.frame = *known;
   } else {
     r.fail("'frame' is '" + frame + "', expected wgs84 or local");
   }
   const std::string point = r.text("point", true);
-  if (point == "gnss_antenna") {
-    flight.mission.point = TrackPoint::gnss_antenna;
-  } else if (point == "body") {
-    flight.mission.point = TrackPoint::body;
-  } else if (point == "tag_antenna") {
-    flight.mission.point = TrackPoint::tag_antenna;
+  if (const auto known = api::value_of(api::k_point_words, point)) {
+    flight.mission.point = *known;
   } else {
     r.fail("'point' is '" + point + "', expected gnss_antenna, body or tag_antenna");
   }
@@ -204,19 +199,8 @@ Result<void> write_flight_json(const FlightDeclaration& flight, const std::files
   if (!mission.kit.empty()) json["kit"] = mission.kit;
   if (!mission.radio.empty()) json["radio"] = mission.radio;
   json["epoch_utc"] = to_rfc3339(flight.epoch);
-  json["track"]["frame"] = mission.frame == TrackFrame::wgs84 ? "wgs84" : "local";
-  const auto point = [&] {
-    switch (mission.point) {
-      case TrackPoint::gnss_antenna:
-        return "gnss_antenna";
-      case TrackPoint::body:
-        return "body";
-      case TrackPoint::tag_antenna:
-        return "tag_antenna";
-    }
-    return "body";
-  };
-  json["track"]["point"] = point();
+  json["track"]["frame"] = api::word_of(api::k_frame_words, mission.frame);
+  json["track"]["point"] = api::word_of(api::k_point_words, mission.point);
   if (flight.quaternion) json["track"]["attitude"] = "quaternion_xyzw";
   json["tags"] = Json::array();
   for (const auto& tag : mission.tags) {

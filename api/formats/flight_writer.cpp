@@ -6,6 +6,7 @@
 #include "api/formats/flight_folder.hpp"
 #include "api/formats/flight_json.hpp"
 #include "api/wire/exclusion_json.hpp"
+#include "api/wire/words.hpp"
 
 namespace anchord {
 namespace {
@@ -18,21 +19,8 @@ void row(std::ofstream& out, const char* format, Args... args) {
   if (size > 0) out.write(text, size);
 }
 
-const char* word(FixClass fix) {
-  switch (fix) {
-    case FixClass::none:
-      return "none";
-    case FixClass::single:
-      return "single";
-    case FixClass::dgps:
-      return "dgps";
-    case FixClass::rtk_float:
-      return "float";
-    case FixClass::rtk_fixed:
-      return "fixed";
-  }
-  return "none";
-}
+/// Of a literal, so it ends with a 0.
+const char* word(FixClass fix) { return api::word_of(api::k_fix_words, fix).data(); }
 
 Result<void> closed(std::ofstream& out, const std::filesystem::path& file) {
   out.close();

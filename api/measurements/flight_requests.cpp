@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/wire/rows_json.hpp"
+#include "api/wire/words.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 
@@ -12,18 +13,6 @@ namespace {
 
 using Json = nlohmann::json;
 using Ordered = nlohmann::ordered_json;
-
-std::string_view point_word(TrackPoint point) {
-  switch (point) {
-    case TrackPoint::gnss_antenna:
-      return "gnss_antenna";
-    case TrackPoint::body:
-      return "body";
-    case TrackPoint::tag_antenna:
-      return "tag_antenna";
-  }
-  return "gnss_antenna";
-}
 
 Json parsed(std::string_view body) { return Json::parse(body, nullptr, false); }
 
@@ -73,10 +62,8 @@ Result<Mission> parse_mission(std::string_view body) {
     mission.kit = text_of(json, "kit");
     mission.radio = text_of(json, "radio");
     mission.frame = json.at("frame") == "local" ? TrackFrame::local : TrackFrame::wgs84;
-    const std::string point = json.at("track_point").get<std::string>();
-    for (const TrackPoint candidate : {TrackPoint::gnss_antenna, TrackPoint::body, TrackPoint::tag_antenna}) {
-      if (point == point_word(candidate)) mission.point = candidate;
-    }
+    mission.point =
+        value_of(k_point_words, json.at("track_point").get<std::string>()).value_or(mission.point);
     for (const Json& tag : json.at("tags")) mission.tags.push_back(parse_tag(tag));
   } catch (const std::exception& error) {
     return make_error(Errc::bad_frame, std::string("not a mission: ") + error.what());
@@ -109,8 +96,8 @@ std::string mission_request_json(const Mission& mission) {
   Ordered out{{"name", mission.name}};
   if (!mission.kit.empty()) out["kit"] = mission.kit;
   if (!mission.radio.empty()) out["radio"] = mission.radio;
-  out["frame"] = mission.frame == TrackFrame::wgs84 ? "wgs84" : "local";
-  out["track_point"] = point_word(mission.point);
+  out["frame"] = word_of(k_frame_words, mission.frame);
+  out["track_point"] = word_of(k_point_words, mission.point);
   out["tags"] = Ordered::array();
   for (const TagAntenna& tag : mission.tags) {
     const auto& arm = tag.lever_arm_body_m;

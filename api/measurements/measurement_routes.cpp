@@ -9,6 +9,7 @@
 #include "api/measurements/ingest.hpp"
 #include "api/measurements/routes.hpp"
 #include "api/wire/rows_json.hpp"
+#include "api/wire/words.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/store.hpp"
 
@@ -49,7 +50,7 @@ constexpr const char* k_range_header =
 std::string range_csv(const Range& r, std::int64_t id) {
   const RangeTruth truth = r.truth.value_or(RangeTruth{});
   return std::to_string(id) + ',' + std::to_string(r.time.us()) + ',' + to_string(r.mission) + ',' +
-         (r.kind == RangeKind::tag_anchor ? "tag_anchor" : "anchor_anchor") + ',' + to_string(r.tag) + ',' +
+         std::string(word_of(k_range_kind_words, r.kind)) + ',' + to_string(r.tag) + ',' +
          std::to_string(r.antenna) + ',' + to_string(r.anchor) + ',' + csv_number(r.seq) + ',' +
          to_wire(nlohmann::json(r.distance_m)) + ',' + csv_number(r.rss_dbm) + ',' + csv_number(r.fp_dbm) +
          ',' + csv_number(r.rx_dbm) + ',' + csv_number(r.std_noise) + ',' + csv_number(r.heading_deg) + ',' +
@@ -125,9 +126,7 @@ Response rows(const Request& request, MeasurementStore::Filter filter, Fetch fet
 }
 
 FixClass query_fix(const std::string& text) {
-  for (const auto fix :
-       {FixClass::none, FixClass::single, FixClass::dgps, FixClass::rtk_float, FixClass::rtk_fixed})
-    if (text == fix_word(fix)) return fix;
+  if (const auto fix = value_of(k_fix_words, text)) return *fix;
   throw_problem(422, "validation", "fix is not one of its words",
                 {{"/fix", "unknown_value", "must be none, single, dgps, float or fixed"}});
 }

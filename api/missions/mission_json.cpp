@@ -3,8 +3,8 @@
 #include <nlohmann/json.hpp>
 
 #include "api/kit/reader.hpp"
-#include "api/kit/word_table.hpp"
 #include "api/wire/live_writer.hpp"
+#include "api/wire/words.hpp"
 
 namespace anchord::api {
 
@@ -19,11 +19,6 @@ Ordered or_null(const std::optional<T>& value) {
   return *value;
 }
 
-constexpr auto k_frames =
-    std::to_array<Word<TrackFrame>>({{"wgs84", TrackFrame::wgs84}, {"local", TrackFrame::local}});
-constexpr auto k_points = std::to_array<Word<TrackPoint>>({{"gnss_antenna", TrackPoint::gnss_antenna},
-                                                           {"body", TrackPoint::body},
-                                                           {"tag_antenna", TrackPoint::tag_antenna}});
 /// Longest names; beyond it somebody pastes a document into a field.
 constexpr std::size_t k_max_text = 200;
 
@@ -31,7 +26,6 @@ constexpr std::size_t k_max_text = 200;
 
 Ordered mission_json(const Mission& mission, std::optional<std::uint64_t> n_ranges,
                      std::optional<std::uint64_t> n_fixes) {
-  static constexpr std::array k_points{"gnss_antenna", "body", "tag_antenna"};
   Ordered tags = Ordered::array();
   for (const auto& tag : mission.tags) {
     const auto& arm = tag.lever_arm_body_m;
@@ -43,8 +37,8 @@ Ordered mission_json(const Mission& mission, std::optional<std::uint64_t> n_rang
   out["site"] = mission.site ? Ordered(to_string(*mission.site)) : Ordered(nullptr);
   out["kit"] = mission.kit;
   out["radio"] = mission.radio;
-  out["frame"] = mission.frame == TrackFrame::wgs84 ? "wgs84" : "local";
-  out["track_point"] = k_points[static_cast<std::size_t>(mission.point)];
+  out["frame"] = word_of(k_frame_words, mission.frame);
+  out["track_point"] = word_of(k_point_words, mission.point);
   out["tags"] = std::move(tags);
   out["state"] = mission_state_word(mission.state);
   out["created_at"] = to_rfc3339(mission.created);
@@ -67,9 +61,9 @@ Mission read_mission(const Json& body, std::vector<FieldError>& errors) {
     else
       fields.error("site", "bad_id", id.error().message);
   }
-  if (const auto frame = value_of_word(fields, "frame", k_frames, true)) mission.frame = *frame;
+  if (const auto frame = value_of_word(fields, "frame", k_frame_words, true)) mission.frame = *frame;
   // Required: an arm applied to the wrong point is a silent error of decimetres.
-  if (const auto point = value_of_word(fields, "track_point", k_points, true)) mission.point = *point;
+  if (const auto point = value_of_word(fields, "track_point", k_point_words, true)) mission.point = *point;
   if (const Json* tags = fields.child("tags")) {
     if (!tags->is_array() || tags->size() > 64) {
       fields.error("tags", "wrong_type", "must be an array of at most 64 tag antennas");

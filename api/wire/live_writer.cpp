@@ -5,6 +5,7 @@
 
 #include "api/kit/reader.hpp"
 #include "api/wire/rows_json.hpp"
+#include "api/wire/words.hpp"
 #include "core/base/text.hpp"
 #include "core/localize/accuracy_goal.hpp"
 #include "core/localize/error_ellipse.hpp"
@@ -325,7 +326,7 @@ std::string mission_state_json(const Mission& mission, const flight::LiveState& 
     out.integer(state.started->us());
   else
     out.raw("null");
-  out.key("frame").text(mission.frame == TrackFrame::wgs84 ? "wgs84" : "local").key("origin");
+  out.key("frame").text(word_of(k_frame_words, mission.frame)).key("origin");
   if (state.origin) {
     Object origin;
     place(origin, state.origin);

@@ -11,6 +11,7 @@
 #include <memory>
 #include <utility>
 
+#include "api/wire/words.hpp"
 #include "core/base/text.hpp"
 #include "core/base/time.hpp"
 #include "drivers/gnss/decoder.hpp"
@@ -18,8 +19,6 @@
 
 namespace anchord::cli {
 namespace {
-
-constexpr std::array<std::string_view, 5> k_fix_words{"none", "single", "dgps", "float", "fixed"};
 
 struct Column {
   const char* name;
@@ -71,7 +70,7 @@ std::string line_of(const gnss::Epoch& epoch, bool json) {
   };
   put("t_utc", time_text(epoch), true);
   numbers(k_position);
-  put("fix", std::string(k_fix_words[static_cast<std::size_t>(epoch.fix)]), true);
+  put("fix", std::string(api::word_of(api::k_fix_words, epoch.fix)), true);
   put("sats", epoch.satellites ? std::to_string(*epoch.satellites) : "", false);
   numbers(k_quality);
   return out + (json ? "}\n" : "\n");
@@ -91,7 +90,7 @@ constexpr std::array k_protocols{gnss::Protocol::nmea, gnss::Protocol::ubx, gnss
 /// What was found, for the report at the end.
 struct Found {
   std::uint64_t bytes{0}, epochs{0}, dateless{0}, timeless{0};
-  std::array<std::uint64_t, k_fix_words.size()> by_fix{};
+  std::array<std::uint64_t, api::k_fix_words.size()> by_fix{};
   std::array<std::uint64_t, k_protocols.size()> by_protocol{};
   bool utf16{false};
 
@@ -135,7 +134,9 @@ void report(const gnss::Decoder& decoder, const Found& found, bool all_formats) 
   if (found.epochs == 0) {
     std::fprintf(stderr, "%s\n", why_nothing(found, !from.empty(), all_formats));
   } else {
-    const auto fixes = listed(found.by_fix, [](std::size_t i) { return std::string(k_fix_words[i]); });
+    const auto fixes = listed(found.by_fix, [](std::size_t i) {
+      return std::string(api::word_of(api::k_fix_words, static_cast<FixClass>(i)));
+    });
     std::fprintf(stderr, "fix: %s\n", fixes.c_str());
   }
   if (found.by_protocol != decltype(found.by_protocol){} &&

@@ -10,6 +10,7 @@
 #include "api/calibration/solve_output.hpp"
 #include "api/formats/flight_folder.hpp"
 #include "api/learning/flight_models.hpp"
+#include "api/wire/words.hpp"
 #include "core/base/text.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "core/localize/kit_prior.hpp"
@@ -78,10 +79,7 @@ Result<FlightOptions> options_of(const Arguments& a) {
                  : a.loss == "huber"  ? Loss::huber
                  : a.loss == "cauchy" ? Loss::cauchy
                                       : Loss::tukey;
-  options.min_fix = a.min_fix == "float"    ? FixClass::rtk_float
-                    : a.min_fix == "dgps"   ? FixClass::dgps
-                    : a.min_fix == "single" ? FixClass::single
-                                            : FixClass::rtk_fixed;
+  options.min_fix = api::value_of(api::k_fix_words, a.min_fix).value_or(FixClass::rtk_fixed);
   options.fixed_bias_m = a.bias_m;
   options.track.max_correction_age_s = a.max_correction_age_s;
   options.anchor_height_m = a.height_m;

@@ -4,6 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "api/calibration/calibration_service.hpp"
+#include "api/kit/contract.hpp"
+#include "api/wire/words.hpp"
 
 namespace anchord::api {
 namespace {
@@ -16,6 +18,19 @@ FlightOptions asked(const char* key, const Json& value) {
   auto request = read_calibration_request(body, errors);
   EXPECT_TRUE(errors.empty()) << key << " " << value << ": " << (errors.empty() ? "" : errors.front().detail);
   return request.options;
+}
+
+/// The words of the table, and back to the value each of them stands for.
+template <class T, std::size_t N>
+Json both_ways(const std::array<Word<T>, N>& table) {
+  Json words = Json::array();
+  for (const auto& row : table) {
+    EXPECT_EQ(word_of(table, row.value), row.word);
+    EXPECT_EQ(value_of(table, row.word), row.value);
+    words.push_back(row.word);
+  }
+  EXPECT_EQ(value_of(table, "another"), std::nullopt);
+  return words;
 }
 
 TEST(CalibrationRequestWords, NameTheSolver) {
@@ -48,6 +63,17 @@ TEST(CalibrationRequestWords, RefuseAnotherWordWithThoseThereAre) {
   ASSERT_EQ(errors.size(), 1u);
   EXPECT_EQ(errors.front().pointer, "/solver");
   EXPECT_EQ(errors.front().detail, "must be one of gauss_newton, levenberg_marquardt, dogleg");
+}
+
+TEST(WireWords, AreThoseOfTheContractAndMeanOneValueEach) {
+  const auto schemas = Json::parse(openapi_json()).at("components").at("schemas");
+  const auto words = [&](const char* schema, const char* property) {
+    return schemas.at(schema).at("properties").at(property).at("enum");
+  };
+  EXPECT_EQ(both_ways(k_fix_words), schemas.at("FixClass").at("enum"));
+  EXPECT_EQ(both_ways(k_frame_words), words("MissionCreate", "frame"));
+  EXPECT_EQ(both_ways(k_point_words), words("MissionCreate", "track_point"));
+  EXPECT_EQ(both_ways(k_range_kind_words), words("RangeIn", "kind"));
 }
 
 }  // namespace
