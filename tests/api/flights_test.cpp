@@ -263,6 +263,7 @@ TEST_F(Flights, NothingIsGivenToAnAircraftInTheAir) {
 }
 
 TEST_F(Flights, AskingForControlReachesItsHolderAndTakesNothing) {
+  mission_ = mission();
   EXPECT_EQ(post(base() + "/control", R"({"action":"ask"})").status, 409) << "nobody has it: it can be taken";
   const auto lease = take_off();
   const auto asked = control(R"({"action":"ask"})");
@@ -272,7 +273,8 @@ TEST_F(Flights, AskingForControlReachesItsHolderAndTakesNothing) {
   EXPECT_EQ(post(base() + "/control", R"({"action":"refuse","lease":"another"})").status, 409);
   EXPECT_EQ(control(R"({"action":"refuse","lease":")" + lease + "\"}")["lease"], lease);
   std::vector<std::string> codes;
-  for (const auto& event : json(get(base() + "/events?limit=100"))["items"]) codes.push_back(event["code"]);
+  const Json events = json(get(base() + "/events", {{"limit", "100"}}));
+  for (const auto& event : events["items"]) codes.push_back(event["code"]);
   EXPECT_EQ(std::ranges::count(codes, "control.asked"), 1);
   EXPECT_EQ(std::ranges::count(codes, "control.refused"), 1);
 }

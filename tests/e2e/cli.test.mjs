@@ -28,11 +28,12 @@ test('a command or option that does not exist ends with 2 and names the nearest 
     [['token', 'lst'], /there is no command 'lst' of token; did you mean 'list'\?/],
     [['serve', '--lisen', '127.0.0.1:1'], /there is no option '--lisen' of serve; did you mean '--listen'\?/],
     [['solve', 'folder', '--dim=2'], /there is no option '--dim' of solve; did you mean '--dims'\?/],
-    [['conf\u001b[2Jig'], /there is no command 'conf[^\u001b]*ig'/],
+    [['conf\u001b[2Jig'], /there is no command 'conf/],
   ]) {
     const { code, stdout, stderr } = await run(args);
     assert.deepEqual([code, stdout], [2, ''], args.join(' '));
     assert.match(stderr, said);
+    assert.ok(!stderr.includes('\u001b'), 'what a terminal would obey');
   }
 });
 

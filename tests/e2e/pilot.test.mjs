@@ -293,7 +293,7 @@ test('control is asked for, refused, given; a page that lost it says so at once 
   await picture(page, 'control-asked');
   await id('control-refuse').click();
   await id('control-asked').waitFor({ state: 'detached', timeout: 5000 });
-  other = await control({ action: 'take', force: true });
+  await control({ action: 'take', force: true });
   await id('control-lost').waitFor({ timeout: 2500 });
   assert.equal(await id('open-checklist').isEnabled(), false);
   await picture(page, 'control-lost');

@@ -1,7 +1,10 @@
-/// A part of the page that comes in a chunk of its own: once, and again when the link has come back, since a request into a dead network ends minutes later.
+/// A part of the page that comes in a chunk of its own: once, again when the link has come back, since a request into a dead
+/// network ends minutes later, and every few seconds while it fails, since a link may be back before its server is.
 import { useEffect, useState } from 'preact/hooks';
 import { when_back } from '../state/store';
 import { useStable } from './use_stable';
+
+const AGAIN_AFTER_MS = 5000;
 
 export function useLater<T>(load: () => Promise<T>): {
   readonly part: T | null;
@@ -9,18 +12,20 @@ export function useLater<T>(load: () => Promise<T>): {
   readonly again: () => void;
 } {
   const [part, set_part] = useState<T | null>(null),
-    [failed, set_failed] = useState(false);
+    [failures, set_failures] = useState(0);
   const again = useStable((): void => {
     load().then(
-      (v) => {
-        set_part(() => v);
-        set_failed(false);
-      },
-      () => set_failed(true),
+      (v) => set_part(() => v),
+      () => set_failures((n) => n + 1),
     );
   });
   useEffect(again, [again]);
   const missing = part === null;
   useEffect(() => (missing ? when_back(again) : undefined), [missing, again]);
-  return { part, failed, again };
+  useEffect(() => {
+    if (!missing || failures === 0) return;
+    const timer = setTimeout(again, AGAIN_AFTER_MS);
+    return () => clearTimeout(timer);
+  }, [missing, failures, again]);
+  return { part, failed: missing && failures > 0, again };
 }
