@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/formats/csv_text.hpp"
+#include "api/kit/or_null.hpp"
 #include "api/wire/live_writer.hpp"
 #include "core/localize/error_ellipse.hpp"
 #include "core/ports/store.hpp"
@@ -27,17 +28,6 @@ Ordered coordinates(const Wgs84& at) {
 Ordered point(const std::optional<Wgs84>& at) {
   if (!at) return nullptr;
   return {{"type", "Point"}, {"coordinates", coordinates(*at)}};
-}
-
-template <class T>
-Ordered or_null(const std::optional<T>& value) {
-  if (!value) return nullptr;
-  return *value;
-}
-
-Ordered text_or_null(const std::string& text) {
-  if (text.empty()) return nullptr;
-  return text;
 }
 
 std::size_t n_refused(const Estimate& estimate) {

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "api/kit/or_null.hpp"
 #include "api/kit/reader.hpp"
 #include "core/base/to_wire.hpp"
 
@@ -11,12 +12,6 @@ using Json = nlohmann::json;
 using Ordered = nlohmann::ordered_json;
 
 namespace {
-
-template <class T>
-Ordered or_null(const std::optional<T>& value) {
-  if (!value) return nullptr;
-  return *value;
-}
 
 /// Longest texts of facility data; beyond it somebody pastes a document into a field.
 constexpr std::size_t k_max_text = 200;

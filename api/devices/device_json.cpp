@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "api/kit/or_null.hpp"
 #include "api/kit/reader.hpp"
 #include "api/wire/rows_json.hpp"
 #include "core/base/to_wire.hpp"
@@ -17,11 +18,6 @@ namespace {
 
 const std::vector<std::string_view> k_kinds{"gnss", "pozyx", "ntrip"};
 
-template <class T>
-Ordered maybe(const std::optional<T>& value) {
-  return value ? Ordered(*value) : Ordered(nullptr);
-}
-Ordered text_or_null(const std::string& text) { return text.empty() ? Ordered(nullptr) : Ordered(text); }
 Ordered network_id(const DeviceReport& d) {
   return d.network_id ? Ordered(to_string(*d.network_id)) : Ordered(nullptr);
 }
@@ -83,10 +79,10 @@ Ordered device_json(const DeviceReport& d) {
   if (d.rover) {
     out["rover"] = {{"t_us", d.rover->time.us()},
                     {"fix", fix_word(d.rover->fix)},
-                    {"satellites", maybe(d.rover->satellites)},
-                    {"age_s", maybe(d.rover->age_s)},
-                    {"sigma_h_m", maybe(d.rover->sigma_h_m)},
-                    {"sigma_v_m", maybe(d.rover->sigma_v_m)}};
+                    {"satellites", or_null(d.rover->satellites)},
+                    {"age_s", or_null(d.rover->age_s)},
+                    {"sigma_h_m", or_null(d.rover->sigma_h_m)},
+                    {"sigma_v_m", or_null(d.rover->sigma_v_m)}};
   }
   if (d.clock) {
     out["clock"] = {{"drift_ppm", d.clock->drift_ppm},
@@ -100,7 +96,7 @@ Ordered device_json(const DeviceReport& d) {
                    {"lon", at.lon_deg},
                    {"lat", at.lat_deg},
                    {"h_m", at.height_m},
-                   {"antenna_height_m", maybe(d.base->antenna_height_m)}};
+                   {"antenna_height_m", or_null(d.base->antenna_height_m)}};
   }
   return out;
 }
@@ -129,7 +125,7 @@ Ordered discovered_json(const DiscoveredDevice& f) {
 
 Ordered clock_json(const DeviceClock& c) {
   return {{"source", c.from_receiver ? "receiver" : "system_clock"},
-          {"system_offset_s", maybe(c.system_offset_s)},
+          {"system_offset_s", or_null(c.system_offset_s)},
           {"sigma_s", c.sigma_s},
           {"skew", text_or_null(c.skew)}};
 }

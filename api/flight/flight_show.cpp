@@ -47,6 +47,13 @@ Profiles profiles_of(const flight::ActiveFlight& f, std::int64_t t_us) {
   return {f.mission, engine.clues(), engine.state().step, t_us};
 }
 
+template <class State>
+std::optional<Profiles> profiles_in(State& state, const MissionId& mission) {
+  const std::scoped_lock lock(state.mutex);
+  const auto* f = state.operations.flight_of(mission);
+  return f == nullptr ? std::nullopt : std::optional(profiles_of(*f, state.deps.clock.now().us()));
+}
+
 }  // namespace
 
 nlohmann::ordered_json FlightService::State::procedure(const flight::ActiveFlight& f) const {
@@ -137,23 +144,15 @@ std::string FlightService::grid_text(const MissionId& mission) {
 
 std::vector<std::string> FlightService::turn_texts(const MissionId& mission) {
   std::vector<std::string> out;
-  std::unique_lock lock(state_->mutex);
-  const auto* f = state_->operations.flight_of(mission);
-  if (f == nullptr) return out;
-  const auto profiles = profiles_of(*f, state_->deps.clock.now().us());
-  lock.unlock();
-  profiles.turns([&](NetworkId, const auto& one) { out.push_back(to_wire(one)); });
+  if (const auto profiles = profiles_in(*state_, mission))
+    profiles->turns([&](NetworkId, const auto& one) { out.push_back(to_wire(one)); });
   return out;
 }
 
 std::vector<std::string> FlightService::height_texts(const MissionId& mission) {
   std::vector<std::string> out;
-  std::unique_lock lock(state_->mutex);
-  const auto* f = state_->operations.flight_of(mission);
-  if (f == nullptr) return out;
-  const auto profiles = profiles_of(*f, state_->deps.clock.now().us());
-  lock.unlock();
-  profiles.heights([&](NetworkId, const auto& one) { out.push_back(to_wire(one)); });
+  if (const auto profiles = profiles_in(*state_, mission))
+    profiles->heights([&](NetworkId, const auto& one) { out.push_back(to_wire(one)); });
   return out;
 }
 

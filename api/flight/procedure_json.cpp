@@ -4,6 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "api/kit/or_null.hpp"
+
 namespace anchord::api {
 namespace {
 
@@ -15,10 +17,6 @@ double degrees(double rad) {
   return deg < 0 ? deg + 360 : deg;
 }
 Ordered finite_or_null(double value) { return std::isfinite(value) ? Ordered(value) : Ordered(nullptr); }
-template <class T>
-Ordered or_null(const std::optional<T>& value) {
-  return value ? Ordered(*value) : Ordered(nullptr);
-}
 Ordered xyz(const Eigen::Vector3d& p) { return Ordered{p.x(), p.y(), p.z()}; }
 
 /// A point of the plan as maps and tables want it. Heights above the plan's ground are the local z: the

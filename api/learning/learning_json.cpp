@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/admin/job_json.hpp"
+#include "api/kit/or_null.hpp"
 #include "api/kit/reader.hpp"
 #include "api/wire/rows_json.hpp"
 
@@ -13,11 +14,6 @@ using Ordered = nlohmann::ordered_json;
 
 namespace {
 
-template <class T>
-Ordered maybe(const std::optional<T>& value) {
-  return value ? Ordered(*value) : Ordered(nullptr);
-}
-
 Ordered parsed(const std::string& text) {
   auto json = Ordered::parse(text, nullptr, false);
   return json.is_discarded() ? Ordered(nullptr) : json;
@@ -26,13 +22,13 @@ Ordered parsed(const std::string& text) {
 Ordered truth_json(const GroundTruth& t) {
   return {{"setting", t.setting},
           {"environment", t.environment},
-          {"distance_m", maybe(t.distance_m)},
-          {"los", maybe(t.los)},
-          {"heading_deg", maybe(t.heading_deg)},
-          {"height_difference_m", maybe(t.height_difference_m)},
+          {"distance_m", or_null(t.distance_m)},
+          {"los", or_null(t.los)},
+          {"heading_deg", or_null(t.heading_deg)},
+          {"height_difference_m", or_null(t.height_difference_m)},
           {"material", t.material},
-          {"thickness_m", maybe(t.thickness_m)},
-          {"truth_sigma_m", maybe(t.truth_sigma_m)}};
+          {"thickness_m", or_null(t.thickness_m)},
+          {"truth_sigma_m", or_null(t.truth_sigma_m)}};
 }
 
 }  // namespace
@@ -42,7 +38,7 @@ Ordered campaign_json(const CampaignRecord& c, const std::vector<CampaignStore::
               {"name", c.name},
               {"radio", c.radio},
               {"note", c.note},
-              {"truth_sigma_m", maybe(c.truth_sigma_m)},
+              {"truth_sigma_m", or_null(c.truth_sigma_m)},
               {"created_at", to_rfc3339(c.created)},
               {"version", c.version}};
   if (settings == nullptr) return out;
@@ -53,7 +49,7 @@ Ordered campaign_json(const CampaignRecord& c, const std::vector<CampaignStore::
     Ordered entry = truth_json(s.truth);
     entry["n_samples"] = s.n_samples;
     entry["mean_range_m"] = s.n_samples > 0 ? Ordered(s.mean_range_m) : Ordered(nullptr);
-    entry["sd_range_m"] = maybe(s.sd_range_m);
+    entry["sd_range_m"] = or_null(s.sd_range_m);
     list.push_back(std::move(entry));
   }
   out["n_samples"] = samples;
@@ -90,13 +86,13 @@ Ordered features_json(const nlos::FeatureVector& features) {
 Ordered sample_json(const CampaignStore::StoredSample& s) {
   const auto& x = s.sample;
   Ordered out{{"id", s.id}, {"t_us", x.time ? Ordered(x.time->us()) : Ordered(nullptr)}};
-  out["seq"] = maybe(x.seq);
+  out["seq"] = or_null(x.seq);
   out["range_m"] = x.range_m;
   out["truth"] = truth_json(s.truth);
   out["bias_m"] = s.truth.distance_m ? Ordered(x.range_m - *s.truth.distance_m) : Ordered(nullptr);
-  out["rx_dbm"] = maybe(x.rx_dbm);
-  out["fp_dbm"] = maybe(x.fp_dbm);
-  out["std_noise"] = maybe(x.std_noise);
+  out["rx_dbm"] = or_null(x.rx_dbm);
+  out["fp_dbm"] = or_null(x.fp_dbm);
+  out["std_noise"] = or_null(x.std_noise);
   out["has_cir"] = s.has_cir;
   return out;
 }
@@ -180,8 +176,8 @@ Ordered gate_json(const GateReport& gate) {
   Ordered checks = Ordered::array();
   for (const auto& check : gate.checks)
     checks.push_back({{"name", check.name},
-                      {"candidate", maybe(check.candidate)},
-                      {"current", maybe(check.current)},
+                      {"candidate", or_null(check.candidate)},
+                      {"current", or_null(check.current)},
                       {"passed", check.passed},
                       {"basis", check.basis}});
   return {
@@ -202,10 +198,10 @@ Ordered range_models_json(const RangeModels& models) {
 
 Ordered judgement_json(const RangeJudgement& j) {
   const auto& v = j.verdict;
-  Ordered out{{"los", maybe(v.los)},
-              {"p_los", maybe(v.p_los)},
-              {"bias_m", maybe(v.bias_m)},
-              {"sigma_m", maybe(v.sigma_m)},
+  Ordered out{{"los", or_null(v.los)},
+              {"p_los", or_null(v.p_los)},
+              {"bias_m", or_null(v.bias_m)},
+              {"sigma_m", or_null(v.sigma_m)},
               {"outside_training", v.outside_training},
               {"note", j.note.empty() ? Ordered(nullptr) : Ordered(j.note)},
               {"models", range_models_json(j.models)}};

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "api/kit/or_null.hpp"
 #include "api/kit/reader.hpp"
 #include "api/wire/live_writer.hpp"
 #include "api/wire/words.hpp"
@@ -12,12 +13,6 @@ using Json = nlohmann::json;
 using Ordered = nlohmann::ordered_json;
 
 namespace {
-
-template <class T>
-Ordered or_null(const std::optional<T>& value) {
-  if (!value) return nullptr;
-  return *value;
-}
 
 /// Longest names; beyond it somebody pastes a document into a field.
 constexpr std::size_t k_max_text = 200;

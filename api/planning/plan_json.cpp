@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "api/kit/or_null.hpp"
 #include "api/kit/reader.hpp"
 #include "core/base/to_wire.hpp"
 
@@ -17,11 +18,6 @@ constexpr double k_max_height_m = 500;
 constexpr std::size_t k_max_waypoints = 1000, k_max_corners = 1000, k_max_areas = 100, k_max_anchors = 1000;
 const std::vector<std::string_view> k_rules{"dissertation", "a_optimal", "d_optimal"};
 const std::vector<std::string_view> k_combines{"worst", "mean", "weighted"};
-
-template <class T>
-Ordered or_null(const std::optional<T>& value) {
-  return value ? Ordered(*value) : Ordered(nullptr);
-}
 
 Ordered polygon_json(const GeoPolygon& polygon) {
   if (polygon.empty()) return nullptr;
