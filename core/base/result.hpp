@@ -9,7 +9,7 @@
 
 namespace anchord {
 
-/// Why something could not be done. One table in api/http/problem maps these to HTTP statuses.
+/// Why something could not be done. One table in api/kit/problem maps these to HTTP statuses.
 enum class Errc {
   bad_frame,
   checksum_mismatch,

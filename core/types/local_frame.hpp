@@ -13,12 +13,12 @@ struct LocalFrame {
   FrameId id{};
   std::string name;
   std::optional<SiteId> site{};
-  std::string definition_json{"{}"};  ///< pairs and their fit; api/json/frame_json reads and writes it
+  std::string definition_json{"{}"};  ///< pairs and their fit; api/anchors/frame_json reads and writes it
   UtcTime created{};
   std::uint64_t version{1};  ///< for ETag
 };
 
-/// One state of a kit's calibration; api/json/kit_profile_json reads the text.
+/// One state of a kit's calibration; api/calibration/kit_profile_json reads the text.
 struct StoredProfile {
   std::string kit;
   std::uint64_t version{};  ///< from 1; for ETag
