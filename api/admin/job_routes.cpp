@@ -4,6 +4,7 @@
 #include "api/admin/job_answer.hpp"
 #include "api/admin/job_json.hpp"
 #include "api/admin/routes.hpp"
+#include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/router.hpp"
 #include "api/kit/support.hpp"
@@ -37,13 +38,10 @@ class WaitSlot {
 
 Response list(AdminApi& s, const Request& request) {
   check_query(request, {"limit", "cursor", "fields"});
-  const auto page = page_query(request);
-  auto rows = value_or_problem(s.job_store.jobs(page.limit + 1, cursor_id<JobId>(page.cursor)));
-  const bool more = rows.size() > page.limit;
-  if (more) rows.pop_back();
-  Ordered items = Ordered::array();
-  for (const auto& job : rows) items.push_back(job_json(job));
-  return list_response(request, std::move(items), more ? to_string(rows.back().id) : "");
+  return id_page<JobId>(
+      request,
+      [&](std::size_t limit, const std::optional<JobId>& after) { return s.job_store.jobs(limit, after); },
+      [&](const auto& job) { return job_json(job); });
 }
 
 }  // namespace

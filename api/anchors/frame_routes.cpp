@@ -4,6 +4,7 @@
 #include "api/anchors/frame_json.hpp"
 #include "api/anchors/geo_service.hpp"
 #include "api/anchors/routes.hpp"
+#include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "core/geo/enu.hpp"
@@ -50,13 +51,10 @@ void read_fields(const nlohmann::json& body, bool whole, LocalFrame& frame) {
 
 Response list(AnchorApi& s, const Request& request) {
   check_query(request, {"limit", "cursor", "fields"});
-  const auto page = page_query(request);
-  auto rows = value_or_problem(s.frames->frames(page.limit + 1, cursor_id<FrameId>(page.cursor)));
-  const bool more = rows.size() > page.limit;
-  if (more) rows.pop_back();
-  Ordered items = Ordered::array();
-  for (const auto& frame : rows) items.push_back(frame_json(frame));
-  return list_response(request, std::move(items), more ? to_string(rows.back().id) : "");
+  return id_page<FrameId>(
+      request,
+      [&](std::size_t limit, const std::optional<FrameId>& after) { return s.frames->frames(limit, after); },
+      [&](const auto& frame) { return frame_json(frame); });
 }
 
 Response create(AnchorApi& s, const Request& request) {

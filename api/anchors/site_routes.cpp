@@ -2,6 +2,7 @@
 
 #include "api/anchors/routes.hpp"
 #include "api/anchors/site_json.hpp"
+#include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "core/ports/store.hpp"
@@ -22,13 +23,10 @@ Response answer(int status, const Site& site) {
 
 Response list(AnchorApi& s, const Request& request) {
   check_query(request, {"limit", "cursor", "fields"});
-  const auto page = page_query(request);
-  auto rows = value_or_problem(s.anchors.sites(page.limit + 1, cursor_id<SiteId>(page.cursor)));
-  const bool more = rows.size() > page.limit;
-  if (more) rows.pop_back();
-  Ordered items = Ordered::array();
-  for (const auto& site : rows) items.push_back(site_json(site));
-  return list_response(request, std::move(items), more ? to_string(rows.back().id) : "");
+  return id_page<SiteId>(
+      request,
+      [&](std::size_t limit, const std::optional<SiteId>& after) { return s.anchors.sites(limit, after); },
+      [&](const auto& site) { return site_json(site); });
 }
 
 Response create(AnchorApi& s, const Request& request) {

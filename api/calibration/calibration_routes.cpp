@@ -12,6 +12,7 @@
 #include "api/calibration/position_diff.hpp"
 #include "api/calibration/routes.hpp"
 #include "api/formats/evidence.hpp"
+#include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "api/missions/mission_service.hpp"
@@ -47,20 +48,20 @@ Ordered whole(CalibrationApi& s, const Calibration& calibration) {
 
 Response list(CalibrationApi& s, const Request& request) {
   check_query(request, {"limit", "cursor", "fields"});
-  const auto page = page_query(request);
-  auto rows = value_or_problem(s.anchors.calibrations(page.limit + 1, cursor_id<CalibrationId>(page.cursor)));
-  const bool more = rows.size() > page.limit;
-  if (more) rows.pop_back();
-  Ordered items = Ordered::array();
-  for (const auto& calibration : rows) {
-    Ordered item = calibration_json(calibration, false);
-    std::map<std::string, int> verdicts;
-    for (const auto& estimate : calibration.anchors) ++verdicts[std::string(verdict_word(estimate.verdict))];
-    item["n_anchors"] = calibration.anchors.size();
-    item["verdicts"] = verdicts;
-    items.push_back(std::move(item));
-  }
-  return list_response(request, std::move(items), more ? to_string(rows.back().id) : "");
+  return id_page<CalibrationId>(
+      request,
+      [&](std::size_t limit, const std::optional<CalibrationId>& after) {
+        return s.anchors.calibrations(limit, after);
+      },
+      [](const Calibration& calibration) {
+        Ordered item = calibration_json(calibration, false);
+        std::map<std::string, int> verdicts;
+        for (const auto& estimate : calibration.anchors)
+          ++verdicts[std::string(verdict_word(estimate.verdict))];
+        item["n_anchors"] = calibration.anchors.size();
+        item["verdicts"] = verdicts;
+        return item;
+      });
 }
 
 Response create(CalibrationApi& s, const Request& request) {

@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/formats/csv_text.hpp"
+#include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "api/learning/campaign_rows.hpp"
@@ -96,14 +97,12 @@ Response schedule(LearningApi& l, const Request& request) {
 
 Response list(LearningApi& l, const Request& request) {
   check_query(request, {"limit", "cursor", "fields"});
-  const auto page = page_query(request);
-  auto rows =
-      value_or_problem(l.stores.campaigns.campaigns(page.limit + 1, cursor_id<CampaignId>(page.cursor)));
-  const bool more = rows.size() > page.limit;
-  if (more) rows.pop_back();
-  Ordered items = Ordered::array();
-  for (const auto& campaign : rows) items.push_back(campaign_json(campaign, nullptr));
-  return list_response(request, std::move(items), more ? to_string(rows.back().id) : "");
+  return id_page<CampaignId>(
+      request,
+      [&](std::size_t limit, const std::optional<CampaignId>& after) {
+        return l.stores.campaigns.campaigns(limit, after);
+      },
+      [&](const auto& campaign) { return campaign_json(campaign, nullptr); });
 }
 
 Response create(LearningApi& l, const Request& request) {

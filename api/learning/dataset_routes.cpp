@@ -2,6 +2,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "api/learning/freeze.hpp"
@@ -30,13 +31,12 @@ DatasetRecord named(LearningApi& l, const Request& request) {
 
 Response list(LearningApi& l, const Request& request) {
   check_query(request, {"limit", "cursor", "fields"});
-  const auto page = page_query(request);
-  auto rows = value_or_problem(l.stores.datasets.datasets(page.limit + 1, cursor_id<DatasetId>(page.cursor)));
-  const bool more = rows.size() > page.limit;
-  if (more) rows.pop_back();
-  Ordered items = Ordered::array();
-  for (const auto& one : rows) items.push_back(dataset_json(one, false));
-  return list_response(request, std::move(items), more ? to_string(rows.back().id) : "");
+  return id_page<DatasetId>(
+      request,
+      [&](std::size_t limit, const std::optional<DatasetId>& after) {
+        return l.stores.datasets.datasets(limit, after);
+      },
+      [&](const auto& one) { return dataset_json(one, false); });
 }
 
 /// The rows come with the request: what GET .../rows gave elsewhere.

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "api/learning/training_parts.hpp"
 #include "core/base/to_wire.hpp"
 
 namespace anchord::api {
@@ -13,16 +14,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json json_of(const ml::Confusion& c) { return {{"tp", c.tp}, {"fp", c.fp}, {"fn", c.fn}, {"tn", c.tn}}; }
-
-Json json_of(const ml::BiasEvaluation& b) {
-  return {{"n", b.raw.n},
-          {"mae_raw_m", b.raw.mae_m},
-          {"mae_m", b.corrected.mae_m},
-          {"mse_raw_m2", b.raw.mse_m2},
-          {"mse_m2", b.corrected.mse_m2},
-          {"mae_improvement", ml::improvement(b.raw.mae_m, b.corrected.mae_m)},
-          {"mse_improvement", ml::improvement(b.raw.mse_m2, b.corrected.mse_m2)}};
-}
 
 Json json_of(const RowReport& r) {
   Json dropped = Json::array();
@@ -147,9 +138,9 @@ Json test_json(const ml::Evaluation& e) {
     out["log_loss"] = e.log_loss;
     out["roc_auc"] = e.roc_auc;
   }
-  if (e.all) out["bias"] = {{"all", json_of(*e.all)}};
-  if (e.los) out["bias"]["los"] = json_of(*e.los);
-  if (e.nlos) out["bias"]["nlos"] = json_of(*e.nlos);
+  if (e.all) out["bias"] = {{"all", bias_json(*e.all)}};
+  if (e.los) out["bias"]["los"] = bias_json(*e.los);
+  if (e.nlos) out["bias"]["nlos"] = bias_json(*e.nlos);
   if (e.nll) out["mean_negative_log_likelihood"] = *e.nll;
   return out;
 }
@@ -260,9 +251,9 @@ std::string evaluation_json(const ml::Evaluation& e, const ml::Model& model, con
     out["mae_m"] = e.all->corrected.mae_m;
     out["mse_raw_m2"] = e.all->raw.mse_m2;
     out["mse_m2"] = e.all->corrected.mse_m2;
-    out["bias"] = {{"all", json_of(*e.all)}};
-    if (e.los) out["bias"]["los"] = json_of(*e.los);
-    if (e.nlos) out["bias"]["nlos"] = json_of(*e.nlos);
+    out["bias"] = {{"all", bias_json(*e.all)}};
+    if (e.los) out["bias"]["los"] = bias_json(*e.los);
+    if (e.nlos) out["bias"]["nlos"] = bias_json(*e.nlos);
     if (e.nll) out["mean_negative_log_likelihood"] = *e.nll;
     Json cdf = Json::array();
     for (std::size_t i = 0; i < e.cdf_raw.size(); i += 5)

@@ -4,14 +4,13 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "api/kit/or_null.hpp"
 #include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-Json maybe(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
 Json confusion_json(const ml::Confusion& c) {
   return {{"tp", c.tp}, {"fp", c.fp}, {"fn", c.fn}, {"tn", c.tn}};
@@ -23,16 +22,6 @@ Json rates_json(const ml::Confusion& c) {
           {"fpr", c.fpr()},
           {"fnr", c.fnr()},
           {"confusion", confusion_json(c)}};
-}
-
-Json bias_json(const ml::BiasEvaluation& b) {
-  return {{"n", b.raw.n},
-          {"mae_raw_m", b.raw.mae_m},
-          {"mae_m", b.corrected.mae_m},
-          {"mse_raw_m2", b.raw.mse_m2},
-          {"mse_m2", b.corrected.mse_m2},
-          {"mae_improvement", ml::improvement(b.raw.mae_m, b.corrected.mae_m)},
-          {"mse_improvement", ml::improvement(b.raw.mse_m2, b.corrected.mse_m2)}};
 }
 
 struct Spread {
@@ -104,7 +93,7 @@ Json test_json(const ml::Evaluation& e) {
   if (e.nll) out["nll"] = *e.nll;
   Json places = Json::array();
   for (const auto& place : e.places) {
-    Json entry{{"place", place.place}, {"n", place.rows}, {"accuracy", maybe(place.accuracy)}};
+    Json entry{{"place", place.place}, {"n", place.rows}, {"accuracy", or_null(place.accuracy)}};
     entry["mae_raw_m"] = place.bias ? Json(place.bias->raw.mae_m) : Json(nullptr);
     entry["mae_m"] = place.bias ? Json(place.bias->corrected.mae_m) : Json(nullptr);
     places.push_back(std::move(entry));
@@ -128,7 +117,7 @@ Json split_json(const ml::SplitReport& s) {
 
 Json threshold_json(const ml::ThresholdReport& t) {
   return {{"threshold", t.threshold},
-          {"max_fpr", maybe(t.max_fpr)},
+          {"max_fpr", or_null(t.max_fpr)},
           {"fpr", t.fpr},
           {"fpr_low95", t.fpr_low},
           {"fpr_high95", t.fpr_high},
@@ -223,7 +212,7 @@ Json roc_json(const ml::TrainingOutcome& o) {
     if (i % step == 0 || i + 1 == o.roc.size())
       points.push_back({{"threshold", o.roc[i].threshold}, {"fpr", o.roc[i].fpr}, {"tpr", o.roc[i].tpr}});
   return {{"points", std::move(points)},
-          {"auc", maybe(o.auc)},
+          {"auc", or_null(o.auc)},
           {"threshold", o.threshold ? threshold_json(*o.threshold) : Json(nullptr)}};
 }
 
@@ -237,17 +226,27 @@ Json predictions_json(const ml::TrainingOutcome& o, const DatasetTable& table, c
                {"setting", row.setting},
                {"split", p.held_out ? "test" : "train"},
                {"range_m", row.range_m()},
-               {"true_range_m", maybe(row.true_range_m)}};
+               {"true_range_m", or_null(row.true_range_m)}};
     entry["los"] = p.los ? Json(*p.los) : Json(nullptr);
-    entry["p_los"] = maybe(p.p_los);
-    entry["bias_m"] = maybe(p.bias_m);
-    entry["correction_m"] = maybe(p.correction_m);
+    entry["p_los"] = or_null(p.p_los);
+    entry["bias_m"] = or_null(p.bias_m);
+    entry["correction_m"] = or_null(p.correction_m);
     out.push_back(std::move(entry));
   }
   return out;
 }
 
 }  // namespace
+
+nlohmann::ordered_json bias_json(const ml::BiasEvaluation& b) {
+  return {{"n", b.raw.n},
+          {"mae_raw_m", b.raw.mae_m},
+          {"mae_m", b.corrected.mae_m},
+          {"mse_raw_m2", b.raw.mse_m2},
+          {"mse_m2", b.corrected.mse_m2},
+          {"mae_improvement", ml::improvement(b.raw.mae_m, b.corrected.mae_m)},
+          {"mse_improvement", ml::improvement(b.raw.mse_m2, b.corrected.mse_m2)}};
+}
 
 std::map<std::string, std::string> training_parts(const ml::TrainingOutcome& o, const DatasetTable& table,
                                                   const LearningRows& rows) {
@@ -275,8 +274,8 @@ std::map<std::string, std::string> training_parts(const ml::TrainingOutcome& o, 
                {"importance", importance_json(o)},
                {"split", split},
                {"threshold", o.threshold ? threshold_json(*o.threshold) : Json(nullptr)},
-               {"nll", maybe(o.nll)},
-               {"nll_constants", maybe(o.nll_constants)},
+               {"nll", or_null(o.nll)},
+               {"nll_constants", or_null(o.nll_constants)},
                {"bias", o.bias ? bias_json(*o.bias) : Json(nullptr)},
                {"test", o.test ? test_json(*o.test) : Json(nullptr)}};
   const auto text = [](const Json& json) { return to_wire(json); };

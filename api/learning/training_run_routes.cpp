@@ -4,6 +4,7 @@
 #include "api/admin/job_answer.hpp"
 #include "api/admin/job_json.hpp"
 #include "api/admin/job_service.hpp"
+#include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "api/learning/learning_json.hpp"
@@ -25,15 +26,13 @@ Ordered run_json(LearningApi& l, const TrainingRun& run, bool whole) {
 
 Response list(LearningApi& l, const Request& request) {
   check_query(request, {"limit", "cursor", "fields", "task"});
-  const auto page = page_query(request);
   const auto task = request.query_value("task");
-  auto rows =
-      value_or_problem(l.stores.runs.runs(page.limit + 1, cursor_id<TrainingRunId>(page.cursor), task));
-  const bool more = rows.size() > page.limit;
-  if (more) rows.pop_back();
-  Ordered items = Ordered::array();
-  for (const auto& run : rows) items.push_back(run_json(l, run, false));
-  return list_response(request, std::move(items), more ? to_string(rows.back().id) : "");
+  return id_page<TrainingRunId>(
+      request,
+      [&](std::size_t limit, const std::optional<TrainingRunId>& after) {
+        return l.stores.runs.runs(limit, after, task);
+      },
+      [&](const auto& run) { return run_json(l, run, false); });
 }
 
 Response finished(LearningApi& l, const Job& job) {

@@ -2,6 +2,7 @@
 
 #include "api/admin/event_log.hpp"
 #include "api/devices/device_stream.hpp"
+#include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "api/missions/mission_control.hpp"
@@ -41,13 +42,12 @@ Ordered with_counts(MissionApi& s, const Mission& mission) {
 Response list(MissionApi& s, const Request& request) {
   check_query(request, {"limit", "cursor", "fields", "deleted"});
   if (query_flag(request, "deleted")) return binned_missions(s, request);
-  const auto page = page_query(request);
-  auto rows = value_or_problem(s.mission_store.missions(page.limit + 1, cursor_id<MissionId>(page.cursor)));
-  const bool more = rows.size() > page.limit;
-  if (more) rows.pop_back();
-  Ordered items = Ordered::array();
-  for (const auto& mission : rows) items.push_back(with_counts(s, mission));
-  return list_response(request, std::move(items), more ? to_string(rows.back().id) : "");
+  return id_page<MissionId>(
+      request,
+      [&](std::size_t limit, const std::optional<MissionId>& after) {
+        return s.mission_store.missions(limit, after);
+      },
+      [&](const auto& mission) { return with_counts(s, mission); });
 }
 
 /// What a new mission wants of the devices, taken out of its body.

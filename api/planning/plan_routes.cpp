@@ -2,6 +2,7 @@
 
 #include "api/formats/kml_plan.hpp"
 #include "api/formats/plan_export.hpp"
+#include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "api/planning/plan_json.hpp"
@@ -31,13 +32,10 @@ Plan load(PlanningApi& s, const Request& request) {
 
 Response list(PlanningApi& s, const Request& request) {
   check_query(request, {"limit", "cursor", "fields"});
-  const auto page = page_query(request);
-  auto rows = value_or_problem(s.plans.plans(page.limit + 1, cursor_id<PlanId>(page.cursor)));
-  const bool more = rows.size() > page.limit;
-  if (more) rows.pop_back();
-  Ordered items = Ordered::array();
-  for (const auto& row : rows) items.push_back(plan_json(plan_of(row)));
-  return list_response(request, std::move(items), more ? to_string(rows.back().id) : "");
+  return id_page<PlanId>(
+      request,
+      [&](std::size_t limit, const std::optional<PlanId>& after) { return s.plans.plans(limit, after); },
+      [&](const auto& row) { return plan_json(plan_of(row)); });
 }
 
 /// Stores a plan that was read; refuses what is wrong with it.
