@@ -56,9 +56,9 @@ set(rows
   "server/runtime: core/base core/ports drivers/link drivers/record drivers/device api/learning server/storage"
   "server/http: core/base api/kit web server/runtime"
   "server/config: core/base server/http"
-  "server/flight: core/base core/types core/ports core/geo core/planning core/localize core/procedure drivers/link drivers/mavlink drivers/drone drivers/sim"
+  "server/flight: core/base core/types core/ports core/geo core/planning core/localize core/procedure core/flight drivers/link drivers/mavlink drivers/drone drivers/sim"
   "server/app: core/base drivers/link drivers/drone api/kit api/stream api/admin api/learning api server/storage server/runtime server/http server/config server/flight"
-  "server/cli: core/base core/types core/geo core/planning core/localize drivers/link drivers/gnss drivers/device drivers/sim api/wire api/formats api/admin api/learning api/measurements api/anchors api/calibration server/storage server/runtime server/http server/config server/flight server/app"
+  "server/cli: core/base core/types core/ports core/geo core/planning core/localize drivers/link drivers/gnss drivers/device drivers/sim api/wire api/formats api/admin api/learning api/measurements api/anchors api/calibration server/storage server/runtime server/http server/config server/flight server/app"
   "server: core/base server/cli")
 set(from_outside web)  # made by the build
 set(everywhere "Eigen/|boost/outcome/")
@@ -98,7 +98,7 @@ set(pure_files "^$")
 set(pure_in "^core/(flight|procedure|localize/live_)")
 set(pure_why "a live flight is driven by calls that bring their time (core/flight/README.md): no clock, lock, thread or chance")
 set(home_line "^ *(LiveFlight|(procedure::)?Flight(Control|Engine)|std::optional<procedure::FlightControl>) [a-z_]+[;({]")
-set(home_files "^(core/(flight|procedure|localize)/|server/flight/(closed|piloted)_loop\\.cpp$)")
+set(home_files "^core/(flight|procedure|localize)/")
 set(home_why "a live flight is held by core/flight alone")
 set(dump_line "(\\.|->)dump\\(")
 set(dump_files "^core/base/to_wire\\.hpp$")

@@ -96,9 +96,7 @@ struct AccessService::State {
   mutable std::map<std::string, UtcTime> used;  ///< by the id's 32 digits, since the last flush of them
   SteadyTime used_flushed{};
 
-  SteadyTime steady_now() const {
-    return (options.steady != nullptr ? *options.steady : system_steady_clock()).now();
-  }
+  SteadyTime steady_now() const { return options.steady->now(); }
   void note_end(const std::string& key, const Token& token) {
     if (token.expires) ends.try_emplace(key, later(steady_now(), token.expires->ns - clock.now().ns));
   }

@@ -13,7 +13,8 @@
 #include "core/base/result.hpp"
 #include "core/base/steady.hpp"
 #include "core/base/time.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/access_store.hpp"
+#include "core/ports/token_store.hpp"
 
 namespace anchord::api {
 
@@ -22,8 +23,8 @@ struct AccessOptions {
   std::chrono::seconds session_lifetime{12 * 3600};  ///< a browser login: one working day
   std::size_t max_sessions{1000};                    ///< oldest login leaves first
   std::size_t max_tickets{1000};
-  const SteadyClock* steady{nullptr};  ///< what sessions, tickets and expiry run on; null: the system's
-  bool auth_off{false};                ///< demonstration on loopback: everybody is `local`, with every right
+  const SteadyClock* steady{&system_steady_clock()};  ///< what sessions, tickets and expiry run on
+  bool auth_off{false};  ///< demonstration on loopback: everybody is `local`, with every right
 };
 
 /// A token as shown once to the person who asked for it; only its hash is kept.

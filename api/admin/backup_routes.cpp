@@ -8,7 +8,7 @@
 #include "api/kit/reader.hpp"
 #include "api/kit/router.hpp"
 #include "api/kit/support.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/job_store.hpp"
 
 namespace anchord::api {
 namespace {
@@ -29,7 +29,7 @@ Ordered backup_json(const Backup& backup) {
 Result<Job> begin_backup(const AdminApi& s) {
   return s.jobs.submit("backup", "{}", [&s](JobContext& job) -> Result<JobEnd> {
     job.progress(0, "copy", "");
-    auto made = s.backups->make();
+    auto made = s.backups.make();
     if (!made) {
       s.events.add("warning", "backup.failed", made.error().message);
       return std::move(made).error();
@@ -43,7 +43,7 @@ void add_backup_routes(Router& router, AdminApi& s) {
   router.add({Method::get, "/api/v1/backups", admin, [&s](const Request& request) {
                 check_query(request, {});
                 Ordered items = Ordered::array();
-                for (const auto& backup : s.backups->list()) items.push_back(backup_json(backup));
+                for (const auto& backup : s.backups.list()) items.push_back(backup_json(backup));
                 return list_response(request, std::move(items), "");
               }});
   router.add({Method::post, "/api/v1/backups", admin, [&s](const Request& request) {
@@ -54,7 +54,7 @@ void add_backup_routes(Router& router, AdminApi& s) {
                 Job job = value_or_problem(begin_backup(s));
                 s.audit(request, "backup.start " + to_string(job.id));
                 return job_outcome(s.jobs, request, std::move(job), [&s](const Job& done) -> Response {
-                  for (const auto& backup : s.backups->list()) {
+                  for (const auto& backup : s.backups.list()) {
                     if (backup.name == done.detail) return json_response(201, backup_json(backup));
                   }
                   throw_problem(404, "not-found", "the backup is gone: newer ones took its place");

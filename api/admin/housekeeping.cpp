@@ -62,15 +62,12 @@ bool Housekeeping::pause() {
 
 void Housekeeping::round() {
   deps_.running.keep();
-  if (deps_.bin != nullptr) {
-    const auto due = deps_.bin->empty_before(deps_.running.now_ns() - deps_.keep_deleted_ns);
-    if (due && due.value() > 0) {
-      deps_.events.add("info", "bin.emptied",
-                       std::to_string(due.value()) + " deleted missions have been long enough in the bin",
-                       {});
-    }
-    remove_marked();
+  const auto due = deps_.bin.empty_before(deps_.running.now_ns() - deps_.keep_deleted_ns);
+  if (due && due.value() > 0) {
+    deps_.events.add("info", "bin.emptied",
+                     std::to_string(due.value()) + " deleted missions have been long enough in the bin", {});
   }
+  remove_marked();
   while (deps_.purge_answers && deps_.purge_answers()) {
     if (!pause()) return;
   }
@@ -79,7 +76,7 @@ void Housekeeping::round() {
 void Housekeeping::remove_marked() {
   for (std::size_t rows = k_first_rows;;) {
     const auto begun = Steady::now();
-    const auto removed = deps_.bin->remove_rows(rows);
+    const auto removed = deps_.bin.remove_rows(rows);
     if (!removed || removed.value() == 0) return;  // storage in trouble: the next round tries again
     const auto took = Steady::now() - begun;
     if (took > k_slow) rows = std::max(k_fewest_rows, rows / 2);

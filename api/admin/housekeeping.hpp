@@ -23,7 +23,7 @@ class RunningTime;
 class Housekeeping {
  public:
   struct Deps {
-    MissionBin* bin{nullptr};  ///< null: none (tests)
+    MissionBin& bin;
     const RunningTime& running;
     EventLog& events;
     std::function<bool()> purge_answers;  ///< one slice; true: there may be more

@@ -3,7 +3,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string_view>
 
-#include "core/ports/store.hpp"
+#include "core/ports/job_store.hpp"
 
 namespace anchord::api {
 

@@ -8,7 +8,7 @@
 #include "api/kit/reader.hpp"
 #include "api/kit/router.hpp"
 #include "api/kit/support.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/job_store.hpp"
 
 namespace anchord::api {
 

@@ -13,6 +13,7 @@
 #include "api/stream/hub.hpp"
 #include "core/base/guard.hpp"
 #include "core/base/to_wire.hpp"
+#include "core/ports/executor.hpp"
 
 namespace anchord::api {
 namespace {
@@ -22,26 +23,28 @@ bool ended(JobState state) { return state != JobState::queued && state != JobSta
 }  // namespace
 
 struct JobService::State {
-  State(JobStore& j, Hub& h, const Clock& c) : jobs(j), hub(h), clock(c) {}
+  State(JobStore& j, Hub& h, const Clock& c, Executor& e) : jobs(j), hub(h), clock(c), on(e) {}
   struct Task {
     JobId id{};
     Work work{};
   };
   /// One kind of job.
   struct Lane {
-    std::deque<Task> queue{};
-    Thread thread{};
+    std::deque<Task> queue;
+    std::unique_ptr<Executor> strand;
   };
   class Context;
 
   JobStore& jobs;
   Hub& hub;
   const Clock& clock;
+  Executor& on;
   std::mutex mutex;
   std::condition_variable changed;
   std::map<std::string, Lane> lanes;
   std::set<JobId> canceled;
   bool started{false}, stopping{false};
+  int posted{0};  ///< turns that the executor has not finished
 
   void tell(const Job& job) {
     hub.publish(Topic::jobs, to_wire(job_json(job)), clock.now().us(), to_string(job.id));
@@ -72,17 +75,32 @@ struct JobService::State {
     tell(job);
     {
       const std::scoped_lock lock(mutex);
-      Lane& lane = lanes[job.kind];
       canceled.erase(job.id);  // of an earlier life of the same job
-      lane.queue.push_back({job.id, std::move(work)});
-      if (started && !stopping) run_lane(self, lane);
+      lanes[job.kind].queue.push_back({job.id, std::move(work)});
+      if (!started || stopping) return;
     }
-    changed.notify_all();
+    post_turn(self, job.kind);
   }
-  void run_lane(const std::shared_ptr<State>& self, Lane& lane) {
-    if (!lane.thread.joinable()) lane.thread = Thread("anchord-job", [self, &lane] { self->loop(lane); });
+  /// One for each job that waits: what was canceled meanwhile leaves a turn without a job.
+  void post_turn(const std::shared_ptr<State>& self, const std::string& kind) {
+    Executor* strand = nullptr;
+    {
+      const std::scoped_lock lock(mutex);
+      auto& lane = lanes[kind];
+      if (!lane.strand) lane.strand = on.strand();
+      strand = lane.strand.get();
+      ++posted;
+    }
+    strand->post([self, kind] {
+      (void)guarded("job", [&] { self->turn(kind); });
+      {
+        const std::scoped_lock lock(self->mutex);
+        --self->posted;
+      }
+      self->changed.notify_all();
+    });
   }
-  void loop(Lane& lane);
+  void turn(const std::string& kind);
   void run(const Task& task);
 };
 
@@ -112,32 +130,28 @@ class JobService::State::Context final : public JobContext {
   std::chrono::steady_clock::time_point saved_{};
 };
 
-JobService::JobService(JobStore& jobs, Hub& hub, const Clock& clock)
-    : state_(std::make_shared<State>(jobs, hub, clock)) {}
+JobService::JobService(JobStore& jobs, Hub& hub, const Clock& clock, Executor& on)
+    : state_(std::make_shared<State>(jobs, hub, clock, on)) {}
 JobService::~JobService() { stop(); }
 
 void JobService::start() {
   const auto problem =
       problem_json(503, "internal", "interrupted: the server was restarted while the job ran; send it again");
   (void)state_->jobs.fail_unfinished(state_->clock.now(), problem).has_value();
-  const std::scoped_lock lock(state_->mutex);
-  state_->started = true;
-  for (auto& [kind, lane] : state_->lanes) {
-    if (!lane.queue.empty()) state_->run_lane(state_, lane);
+  std::vector<std::string> turns;
+  {
+    const std::scoped_lock lock(state_->mutex);
+    state_->started = true;
+    for (const auto& [kind, lane] : state_->lanes) turns.insert(turns.end(), lane.queue.size(), kind);
   }
+  for (const auto& kind : turns) state_->post_turn(state_, kind);
 }
 
 void JobService::stop() {
-  std::vector<Thread> running;
-  {
-    const std::scoped_lock lock(state_->mutex);
-    state_->stopping = true;
-    for (auto& [kind, lane] : state_->lanes) running.push_back(std::move(lane.thread));
-  }
+  std::unique_lock lock(state_->mutex);
+  state_->stopping = true;
   state_->changed.notify_all();
-  for (auto& thread : running) {
-    if (thread.joinable()) thread.join();
-  }
+  state_->changed.wait(lock, [this] { return state_->posted == 0; });
 }
 
 Result<Job> JobService::submit(std::string kind, std::string request_json, Work work,
@@ -210,21 +224,20 @@ Result<Job> JobService::cancel(const JobId& id) {
   return wait(id, std::chrono::seconds(1));
 }
 
-void JobService::State::loop(Lane& lane) {
-  while (true) {
-    give_back_memory();
-    Task task;
-    {
-      std::unique_lock lock(mutex);
-      changed.wait(lock, [&] { return stopping || !lane.queue.empty(); });
-      if (stopping) return;
-      task = std::move(lane.queue.front());
-      lane.queue.pop_front();
-    }
-    (void)guarded("job", [&] { run(task); });
+void JobService::State::turn(const std::string& kind) {
+  Task task;
+  {
     const std::scoped_lock lock(mutex);
-    canceled.erase(task.id);
+    auto& queue = lanes[kind].queue;
+    if (stopping || queue.empty()) return;
+    task = std::move(queue.front());
+    queue.pop_front();
   }
+  (void)guarded("job", [&] { run(task); });
+  task.work = nullptr;  // with what it holds, before its memory is given back
+  give_back_memory();
+  const std::scoped_lock lock(mutex);
+  canceled.erase(task.id);
 }
 
 void JobService::State::run(const Task& task) {

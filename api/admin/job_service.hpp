@@ -6,7 +6,11 @@
 #include <string>
 
 #include "core/base/result.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/job_store.hpp"
+
+namespace anchord {
+class Executor;
+}
 
 namespace anchord::api {
 
@@ -27,7 +31,7 @@ struct JobEnd {
   std::string result_href{}, detail{};
 };
 
-/// Long work in a bounded, visible queue: one thread for each kind, so that a calibration never waits for a
+/// Long work in bounded, visible queues: a strand for each kind, so that a calibration never waits for a
 /// training run, at most 16 waiting of each. States live in the JobStore, progress goes to topic `jobs`.
 /// Thread-safe.
 class JobService {
@@ -35,7 +39,8 @@ class JobService {
   static constexpr std::size_t k_max_queued = 16;
   using Work = std::function<Result<JobEnd>(JobContext&)>;
 
-  JobService(JobStore& jobs, Hub& hub, const Clock& clock);
+  /// `on` has a thread for each kind that may run beside the others.
+  JobService(JobStore& jobs, Hub& hub, const Clock& clock, Executor& on);
   ~JobService();
   JobService(const JobService&) = delete;
   JobService& operator=(const JobService&) = delete;

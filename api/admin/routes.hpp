@@ -45,7 +45,7 @@ struct AdminApi {
   AccessStore& audit_log;
   Audit audit;
   BuildInfo build;
-  Backups* backups{nullptr};  ///< null: their routes do not exist
+  Backups& backups;
   std::function<StorageStatus()> storage;
   std::function<ServerCounts()> counts;
   std::function<nlohmann::ordered_json()> device_clock, drone;  ///< as /system shows them; null: none

@@ -4,16 +4,13 @@
 
 namespace anchord::api {
 
-RunningTime::RunningTime(ServiceStore* store, const SteadyClock& steady)
+RunningTime::RunningTime(ServiceStore& store, const SteadyClock& steady)
     : store_(store), steady_(steady), started_(steady.now()) {
-  if (store_ == nullptr) return;
-  if (const auto before = store_->running_ns()) before_ns_ = before.value();
+  if (const auto before = store_.running_ns()) before_ns_ = before.value();
 }
 
 std::int64_t RunningTime::now_ns() const { return before_ns_ + (steady_.now().ns - started_.ns); }
 
-void RunningTime::keep() const {
-  if (store_ != nullptr) (void)store_->keep_running_ns(now_ns()).has_value();
-}
+void RunningTime::keep() const { (void)store_.keep_running_ns(now_ns()).has_value(); }
 
 }  // namespace anchord::api

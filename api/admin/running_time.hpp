@@ -16,13 +16,12 @@ namespace anchord::api {
 /// Thread-safe.
 class RunningTime {
  public:
-  /// Without a store it counts from this start (tests).
-  RunningTime(ServiceStore* store, const SteadyClock& steady);
+  RunningTime(ServiceStore& store, const SteadyClock& steady);
   std::int64_t now_ns() const;
   void keep() const;
 
  private:
-  ServiceStore* const store_;
+  ServiceStore& store_;
   const SteadyClock& steady_;
   std::int64_t before_ns_{0};
   const SteadyTime started_;

@@ -6,7 +6,6 @@
 #include "api/kit/support.hpp"
 #include "api/stream/hub.hpp"
 #include "core/base/time.hpp"
-#include "core/ports/store.hpp"
 
 namespace anchord::api {
 

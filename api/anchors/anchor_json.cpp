@@ -7,7 +7,7 @@
 #include "api/kit/or_null.hpp"
 #include "api/wire/live_writer.hpp"
 #include "core/localize/error_ellipse.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/revision_store.hpp"
 
 namespace anchord::api {
 

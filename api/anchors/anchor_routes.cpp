@@ -17,8 +17,10 @@
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/geo/enu.hpp"
+#include "core/ports/anchor_store.hpp"
+#include "core/ports/frame_store.hpp"
+#include "core/ports/revision_store.hpp"
 #include "core/ports/site_store.hpp"
-#include "core/ports/store.hpp"
 
 namespace anchord::api {
 
@@ -29,12 +31,12 @@ namespace {
 /// Sites and calibrations that features refer to, each read once.
 class Lookup {
  public:
-  explicit Lookup(AnchorApi& services) : services_(services), store_(services.anchors) {}
+  explicit Lookup(AnchorApi& services) : services_(services) {}
   std::optional<Site> site(const std::optional<SiteId>& id) {
     if (!id) return std::nullopt;
     auto [it, fresh] = sites_.try_emplace(*id);
     if (fresh) {
-      if (auto found = store_.site(*id)) it->second = std::move(found).value();
+      if (auto found = services_.sites.site(*id)) it->second = std::move(found).value();
     }
     return it->second;
   }
@@ -71,10 +73,10 @@ class Lookup {
  private:
   /// The first fitted frame of the site.
   const FrameDefinition* local_frame(const std::optional<SiteId>& site) {
-    if (!site || services_.frames == nullptr) return nullptr;
+    if (!site) return nullptr;
     auto [it, fresh] = frames_.try_emplace(*site);
     if (fresh) {
-      if (const auto found = services_.frames->frames_of(*site)) {
+      if (const auto found = services_.frames.frames_of(*site)) {
         for (const auto& frame : found.value()) {
           if (!it->second) it->second = frame_definition(frame);
         }
@@ -90,7 +92,7 @@ class Lookup {
   const Made& calibration(const CalibrationId& id) {
     auto [it, fresh] = calibrations_.try_emplace(id);
     if (fresh) {
-      if (auto found = store_.calibration(id))
+      if (auto found = services_.calibrations.calibration(id))
         it->second = {found.value().missions, Ordered::parse(found.value().provenance_json, nullptr, false)};
     }
     return it->second;
@@ -98,7 +100,6 @@ class Lookup {
 
   AnchorApi& services_;
   std::map<SiteId, std::optional<FrameDefinition>> frames_;
-  AnchorStore& store_;
   std::map<SiteId, std::optional<Site>> sites_;
   std::map<CalibrationId, Made> calibrations_;
 };
@@ -142,7 +143,7 @@ void contradict(AnchorFeature& feature, const ContradictedAnchor& against) {
 }
 
 std::uint64_t newest_revision(AnchorApi& s) {
-  const auto newest = value_or_problem(s.anchors.revisions(1, 0));
+  const auto newest = value_or_problem(s.revisions.revisions(1, 0));
   return newest.empty() ? 0 : newest.front().number;
 }
 
@@ -155,7 +156,7 @@ std::vector<AnchorFeature> published(AnchorApi& s, std::optional<std::uint64_t> 
   const auto contradicted = s.contradictions.standing();
   const bool newest = !revision || number == newest_revision(s);
   std::vector<AnchorFeature> out;
-  for (const auto& position : value_or_problem(s.anchors.published(number))) {
+  for (const auto& position : value_or_problem(s.revisions.published(number))) {
     auto anchor = anchor_as_stored(s, position.estimate.anchor);
     out.push_back(published_feature(lookup, std::move(anchor), position, number));
     const auto against = contradicted->find(position.estimate.anchor);
@@ -319,7 +320,7 @@ Response patch(AnchorApi& s, const Request& request) {
   require_match(request, etag(feature_of(s, anchor)));
   std::vector<FieldError> errors;
   patch_anchor(json_body(request), anchor, errors);
-  if (anchor.site && !s.anchors.site(*anchor.site))
+  if (anchor.site && !s.sites.site(*anchor.site))
     errors.push_back({"/site", "unknown_site", "there is no such site"});
   refuse_if_any(errors);
   value_or_problem(s.anchors.update(anchor, anchor.version));
@@ -346,7 +347,7 @@ Response history(AnchorApi& s, const Request& request) {
   const Anchor anchor = path_anchor(s, request);
   Ordered items = Ordered::array();
   Lookup lookup(s);
-  for (const auto& position : value_or_problem(s.anchors.history(anchor.network_id)))
+  for (const auto& position : value_or_problem(s.revisions.history(anchor.network_id)))
     items.push_back(published_json(position, lookup.globe(position)));
   return list_response(request, std::move(items), "");
 }

@@ -9,7 +9,10 @@
 
 #include "api/admin/event_log.hpp"
 #include "core/geo/enu.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/anchor_store.hpp"
+#include "core/ports/calibration_store.hpp"
+#include "core/ports/mission_store.hpp"
+#include "core/ports/revision_store.hpp"
 
 namespace anchord::api {
 namespace {
@@ -155,7 +158,7 @@ std::vector<AlarmCondition> ContradictionWatch::alarms() const {
 }
 
 Result<ContradictionWatch::Standing> ContradictionWatch::compare() {
-  BOOST_OUTCOME_TRY(const auto published, deps_.anchors.published(std::nullopt));
+  BOOST_OUTCOME_TRY(const auto published, deps_.revisions.published(std::nullopt));
   Standing out;
   if (published.empty()) return out;
   std::map<CalibrationId, Calibration> known;
@@ -171,10 +174,10 @@ Result<ContradictionWatch::Standing> ContradictionWatch::compare() {
     if (!position.estimate.best || (anchor && anchor.value().retired)) continue;
     wanted[position.estimate.anchor] = &position;
     if (known.count(position.calibration) > 0) continue;
-    BOOST_OUTCOME_TRY(auto calibration, deps_.anchors.calibration(position.calibration));
+    BOOST_OUTCOME_TRY(auto calibration, deps_.calibrations.calibration(position.calibration));
     known.emplace(position.calibration, std::move(calibration));
   }
-  BOOST_OUTCOME_TRY(const auto newest, deps_.anchors.calibrations(k_calibrations_read, std::nullopt));
+  BOOST_OUTCOME_TRY(const auto newest, deps_.calibrations.calibrations(k_calibrations_read, std::nullopt));
   struct Later {
     const Calibration* of{nullptr};
     const Estimate* estimate{nullptr};

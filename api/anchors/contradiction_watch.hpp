@@ -15,7 +15,9 @@
 
 namespace anchord {
 class AnchorStore;
+class CalibrationStore;
 class MissionStore;
+class RevisionStore;
 }  // namespace anchord
 
 namespace anchord::api {
@@ -39,6 +41,8 @@ class ContradictionWatch {
  public:
   struct Deps {
     AnchorStore& anchors;
+    CalibrationStore& calibrations;
+    RevisionStore& revisions;
     MissionStore& missions;
     EventLog& events;
   };

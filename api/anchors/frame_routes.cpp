@@ -8,8 +8,9 @@
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "core/geo/enu.hpp"
+#include "core/ports/frame_store.hpp"
+#include "core/ports/revision_store.hpp"
 #include "core/ports/site_store.hpp"
-#include "core/ports/store.hpp"
 
 namespace anchord::api {
 
@@ -27,8 +28,8 @@ Response answer(int status, const LocalFrame& frame) {
 
 /// By UUID or by name.
 LocalFrame find(AnchorApi& s, const std::string& text) {
-  if (const auto id = parse_uuid(text)) return value_or_problem(s.frames->frame(FrameId{id.value()}));
-  return value_or_problem(s.frames->frame(text));
+  if (const auto id = parse_uuid(text)) return value_or_problem(s.frames.frame(FrameId{id.value()}));
+  return value_or_problem(s.frames.frame(text));
 }
 
 void read_fields(const nlohmann::json& body, bool whole, LocalFrame& frame) {
@@ -53,7 +54,7 @@ Response list(AnchorApi& s, const Request& request) {
   check_query(request, {"limit", "cursor", "fields"});
   return id_page<FrameId>(
       request,
-      [&](std::size_t limit, const std::optional<FrameId>& after) { return s.frames->frames(limit, after); },
+      [&](std::size_t limit, const std::optional<FrameId>& after) { return s.frames.frames(limit, after); },
       [&](const auto& frame) { return frame_json(frame); });
 }
 
@@ -62,7 +63,7 @@ Response create(AnchorApi& s, const Request& request) {
   read_fields(json_body(request), true, frame);
   frame.created = s.clock.now();
   frame.id.uuid = make_uuid_v7(frame.created);
-  value_or_problem(s.frames->insert(frame));
+  value_or_problem(s.frames.insert(frame));
   s.audit(request, "frame.create " + frame.name);
   Response response = answer(201, frame);
   response.header("Location", "/api/v1/frames/" + to_string(frame.id));
@@ -73,7 +74,7 @@ Response patch(AnchorApi& s, const Request& request) {
   LocalFrame frame = find(s, request.params.at("id"));
   require_match(request, etag(frame));
   read_fields(json_body(request), false, frame);
-  value_or_problem(s.frames->update(frame, frame.version));
+  value_or_problem(s.frames.update(frame, frame.version));
   ++frame.version;
   s.audit(request, "frame.change " + frame.name);
   return answer(200, frame);
@@ -82,7 +83,7 @@ Response patch(AnchorApi& s, const Request& request) {
 Response remove(AnchorApi& s, const Request& request) {
   const LocalFrame frame = find(s, request.params.at("id"));
   require_match(request, etag(frame));
-  value_or_problem(s.frames->remove(frame.id, frame.version));
+  value_or_problem(s.frames.remove(frame.id, frame.version));
   s.audit(request, "frame.delete " + frame.name);
   Response response;
   response.status = 204;
@@ -91,7 +92,7 @@ Response remove(AnchorApi& s, const Request& request) {
 
 /// Published positions on the globe, for pairs that name an anchor.
 std::optional<Wgs84> published_place(AnchorApi& s, NetworkId anchor) {
-  for (const auto& position : value_or_problem(s.anchors.published(std::nullopt))) {
+  for (const auto& position : value_or_problem(s.revisions.published(std::nullopt))) {
     if (position.estimate.anchor == anchor && position.estimate.best) return position.estimate.best->wgs84;
   }
   return std::nullopt;
@@ -113,7 +114,7 @@ Response fit(AnchorApi& s, const Request& request) {
   FrameDefinition definition;
   definition.origin = *wanted.pairs.front().wgs84;
   if (frame.site) {
-    const auto site = value_or_problem(s.anchors.site(*frame.site));
+    const auto site = value_or_problem(s.sites.site(*frame.site));
     if (site.origin) definition.origin = *site.origin;
   }
   const EnuFrame enu(definition.origin);
@@ -124,7 +125,7 @@ Response fit(AnchorApi& s, const Request& request) {
   definition.fit = value_or_problem(fit_frame(definition.pairs, wanted.options));
   definition.fitted = s.clock.now();
   frame.definition_json = frame_definition_json(definition);
-  value_or_problem(s.frames->update(frame, frame.version));
+  value_or_problem(s.frames.update(frame, frame.version));
   ++frame.version;
   s.audit(request, "frame.fit " + frame.name);
   return answer(200, frame);
@@ -195,11 +196,11 @@ Response transform(AnchorApi& s, const Request& request) {
   if (site_text) {
     const auto id = parse_uuid(*site_text);
     if (id)
-      site = value_or_problem(s.anchors.site(SiteId{id.value()}));
+      site = value_or_problem(s.sites.site(SiteId{id.value()}));
     else
       errors.push_back({"/site", "bad_id", id.error().message});
   } else if (frame && frame->site) {
-    site = value_or_problem(s.anchors.site(*frame->site));
+    site = value_or_problem(s.sites.site(*frame->site));
   }
   if (uses(Space::enu)) {
     if (site && site->origin)

@@ -4,8 +4,11 @@
 
 namespace anchord {
 class AnchorStore;
+class CalibrationStore;
 class Clock;
 class FrameStore;
+class RevisionStore;
+class SiteStore;
 }  // namespace anchord
 
 namespace anchord::api {
@@ -17,8 +20,11 @@ class Router;
 
 /// What the routes of anchors, sites and local frames work with; lives as long as the router.
 struct AnchorApi {
+  SiteStore& sites;
   AnchorStore& anchors;
-  FrameStore* frames{nullptr};  ///< null: their routes do not exist
+  CalibrationStore& calibrations;
+  RevisionStore& revisions;
+  FrameStore& frames;
   MissionService& missions;
   GeoService& geo;
   ContradictionWatch& contradictions;

@@ -5,7 +5,7 @@
 #include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/site_store.hpp"
 
 namespace anchord::api {
 
@@ -25,7 +25,7 @@ Response list(AnchorApi& s, const Request& request) {
   check_query(request, {"limit", "cursor", "fields"});
   return id_page<SiteId>(
       request,
-      [&](std::size_t limit, const std::optional<SiteId>& after) { return s.anchors.sites(limit, after); },
+      [&](std::size_t limit, const std::optional<SiteId>& after) { return s.sites.sites(limit, after); },
       [&](const auto& site) { return site_json(site); });
 }
 
@@ -36,7 +36,7 @@ Response create(AnchorApi& s, const Request& request) {
   refuse_if_any(errors);
   site.created = s.clock.now();
   site.id.uuid = make_uuid_v7(site.created);
-  value_or_problem(s.anchors.insert(site));
+  value_or_problem(s.sites.insert(site));
   s.audit(request, "site.create " + to_string(site.id));
   Response response = answer(201, site);
   response.header("Location", "/api/v1/sites/" + to_string(site.id));
@@ -44,21 +44,21 @@ Response create(AnchorApi& s, const Request& request) {
 }
 
 Response patch(AnchorApi& s, const Request& request) {
-  Site site = value_or_problem(s.anchors.site(path_id<SiteId>(request)));
+  Site site = value_or_problem(s.sites.site(path_id<SiteId>(request)));
   require_match(request, etag(site));
   std::vector<FieldError> errors;
   patch_site(json_body(request), false, site, errors);
   refuse_if_any(errors);
-  value_or_problem(s.anchors.update(site, site.version));
+  value_or_problem(s.sites.update(site, site.version));
   ++site.version;
   s.audit(request, "site.change " + to_string(site.id));
   return answer(200, site);
 }
 
 Response remove(AnchorApi& s, const Request& request) {
-  const Site site = value_or_problem(s.anchors.site(path_id<SiteId>(request)));
+  const Site site = value_or_problem(s.sites.site(path_id<SiteId>(request)));
   require_match(request, etag(site));
-  value_or_problem(s.anchors.remove(site.id, site.version));
+  value_or_problem(s.sites.remove(site.id, site.version));
   s.audit(request, "site.delete " + to_string(site.id));
   Response response;
   response.status = 204;
@@ -76,7 +76,7 @@ void add_site_routes(Router& router, AnchorApi& s) {
   router.add({Method::post, "/api/v1/sites", admin, on(create)});
   router.add({Method::get, "/api/v1/sites/{id}", readers(), [&s](const Request& request) {
                 check_query(request, {});
-                return answer(200, value_or_problem(s.anchors.site(path_id<SiteId>(request))));
+                return answer(200, value_or_problem(s.sites.site(path_id<SiteId>(request))));
               }});
   router.add({Method::patch, "/api/v1/sites/{id}", admin, on(patch), 1 << 20, false, true});
   router.add({Method::del, "/api/v1/sites/{id}", admin, on(remove), 1 << 20, false, true});

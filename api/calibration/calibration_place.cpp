@@ -6,8 +6,8 @@
 #include "api/wire/outline_json.hpp"
 #include "core/geo/enu.hpp"
 #include "core/localize/error_ellipse.hpp"
+#include "core/ports/frame_store.hpp"
 #include "core/ports/site_store.hpp"
-#include "core/ports/store.hpp"
 
 namespace anchord::api {
 
@@ -86,14 +86,14 @@ Json frame_provenance(const CalibrationFrame& frame, const Calibration& calibrat
 }
 
 Json use_site_outline(bool wanted, std::span<const FlightData> flights, const std::optional<Wgs84>& origin,
-                      const std::optional<CalibrationFrame>& frame, AnchorStore& anchors,
+                      const std::optional<CalibrationFrame>& frame, SiteStore& sites,
                       FlightOptions& options) {
   if (!options.outline_m.empty()) return outline_provenance("request", nullptr, options, "");
   if (!wanted) return outline_provenance("none", nullptr, options, "turned off by site_outline");
   const auto site_id = common_site(flights);
   if (!site_id) return outline_provenance("none", nullptr, options, "the flights name no common site");
   const Json id = to_string(*site_id);
-  const auto site = anchors.site(*site_id);
+  const auto site = sites.site(*site_id);
   if (!site || site.value().outline_geojson.empty())
     return outline_provenance("none", id, options, "the site has no outline");
   if (!origin && !frame)

@@ -12,7 +12,7 @@
 #include "core/types/flight_data.hpp"
 
 namespace anchord {
-class AnchorStore;
+class SiteStore;
 class FrameStore;
 }  // namespace anchord
 
@@ -42,7 +42,7 @@ nlohmann::json frame_provenance(const CalibrationFrame& frame, const Calibration
 /// returns  for the provenance: where the outline in use comes from, or why there is none
 nlohmann::json use_site_outline(bool wanted, std::span<const FlightData> flights,
                                 const std::optional<Wgs84>& origin,
-                                const std::optional<CalibrationFrame>& frame, AnchorStore& anchors,
+                                const std::optional<CalibrationFrame>& frame, SiteStore& sites,
                                 FlightOptions& options);
 
 }  // namespace anchord::api

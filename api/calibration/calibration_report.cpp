@@ -4,8 +4,14 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "api/calibration/routes.hpp"
 #include "api/wire/budget_json.hpp"
 #include "api/wire/outline_json.hpp"
+#include "core/ports/anchor_store.hpp"
+#include "core/ports/calibration_store.hpp"
+#include "core/ports/mission_store.hpp"
+#include "core/ports/revision_store.hpp"
+#include "core/ports/site_store.hpp"
 
 namespace anchord::api {
 
@@ -147,24 +153,23 @@ ReportBudget report_budget(const nlohmann::ordered_json& budget) {
   return out;
 }
 
-Result<Report> calibration_report(AnchorStore& anchors, MissionStore& mission_store,
-                                  const Calibration& calibration, const std::string& program) {
+Result<Report> calibration_report(CalibrationApi& api, const Calibration& calibration) {
   Report report;
-  report.program = program;
+  report.program = api.program;
   report.calibration = to_string(calibration.id);
   report.created = calibration.created;
   report.frame = calibration.frame;
   report.origin = calibration.origin;
-  BOOST_OUTCOME_TRY(const auto evidence, anchors.evidence(calibration.id));
+  BOOST_OUTCOME_TRY(const auto evidence, api.calibration_store.evidence(calibration.id));
   if (!evidence.empty()) {
     BOOST_OUTCOME_TRY(report.evidence, parse_evidence(evidence));
   }
   std::vector<Mission> missions;
   for (const auto& id : calibration.missions) {
-    BOOST_OUTCOME_TRY(auto mission, mission_store.mission(id));
+    BOOST_OUTCOME_TRY(auto mission, api.mission_store.mission(id));
     report.subtitle += (report.subtitle.empty() ? "" : ", ") + mission.name;
     if (!report.site && mission.site) {
-      BOOST_OUTCOME_TRY(report.site, anchors.site(*mission.site));
+      BOOST_OUTCOME_TRY(report.site, api.sites.site(*mission.site));
     }
     missions.push_back(std::move(mission));
   }
@@ -172,13 +177,13 @@ Result<Report> calibration_report(AnchorStore& anchors, MissionStore& mission_st
     report.subtitle = report.site->name + ": " + report.subtitle;
     if (report.origin) report.outline_m = outline_in_enu(report.site->outline_geojson, *report.origin);
   }
-  BOOST_OUTCOME_TRY(const auto revisions, anchors.revisions(1000, 0));
+  BOOST_OUTCOME_TRY(const auto revisions, api.revisions.revisions(1000, 0));
   std::map<NetworkId, PublishedPosition> published;
   report.heading = "Not published";
   for (const auto& revision : revisions) {
     if (revision.calibration != calibration.id) continue;
     if (published.empty()) report.heading = "Revision " + std::to_string(revision.number);
-    BOOST_OUTCOME_TRY(const auto positions, anchors.published(revision.number));
+    BOOST_OUTCOME_TRY(const auto positions, api.revisions.published(revision.number));
     for (const auto& position : positions) {
       if (position.since_revision == revision.number) published.emplace(position.estimate.anchor, position);
     }
@@ -188,7 +193,7 @@ Result<Report> calibration_report(AnchorStore& anchors, MissionStore& mission_st
     ReportAnchor anchor;
     anchor.budget = report_budget(kept_budget(told, estimate.anchor));
     anchor.estimate = estimate;
-    if (const auto known = anchors.anchor(estimate.anchor)) {
+    if (const auto known = api.anchors.anchor(estimate.anchor)) {
       anchor.name = known.value().name;
       anchor.place = place_of(known.value());
     }

@@ -19,7 +19,10 @@
 #include "api/stream/hub.hpp"
 #include "api/wire/live_writer.hpp"
 #include "core/base/to_wire.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/anchor_store.hpp"
+#include "core/ports/calibration_store.hpp"
+#include "core/ports/job_store.hpp"
+#include "core/ports/revision_store.hpp"
 
 namespace anchord::api {
 
@@ -30,7 +33,7 @@ namespace {
 /// Revisions that a calibration went into.
 Ordered published_in(CalibrationApi& s, const CalibrationId& id) {
   Ordered out = Ordered::array();
-  for (const auto& revision : value_or_problem(s.anchors.revisions(1000, 0))) {
+  for (const auto& revision : value_or_problem(s.revisions.revisions(1000, 0))) {
     if (revision.calibration == id) out.push_back(revision.number);
   }
   return out;
@@ -51,7 +54,7 @@ Response list(CalibrationApi& s, const Request& request) {
   return id_page<CalibrationId>(
       request,
       [&](std::size_t limit, const std::optional<CalibrationId>& after) {
-        return s.anchors.calibrations(limit, after);
+        return s.calibration_store.calibrations(limit, after);
       },
       [](const Calibration& calibration) {
         Ordered item = calibration_json(calibration, false);
@@ -81,7 +84,7 @@ Response create(CalibrationApi& s, const Request& request) {
   Job job = value_or_problem(s.calibrations.submit(std::move(wanted)));
   s.audit(request, "calibration.start " + to_string(job.id));
   return job_outcome(s.jobs, request, std::move(job), [&](const Job& done) {
-    const auto calibration = value_or_problem(s.anchors.calibration(CalibrationId{done.id.uuid}));
+    const auto calibration = value_or_problem(s.calibration_store.calibration(CalibrationId{done.id.uuid}));
     Response response = json_response(201, whole(s, calibration));
     response.header("Location", "/api/v1/calibrations/" + to_string(calibration.id));
     return response;
@@ -177,7 +180,7 @@ PublishRequest read_publish(const nlohmann::json& body) {
 
 /// The calibration as it stands today: gate "moved" is asked against what is published now.
 void ask_whether_moved(CalibrationApi& s, Calibration& calibration) {
-  const auto before = placed(value_or_problem(s.anchors.published(std::nullopt)));
+  const auto before = placed(value_or_problem(s.revisions.published(std::nullopt)));
   const auto now = placed(calibration);
   for (const auto& change : changes(now, before)) {
     if (!change.gate) continue;
@@ -235,10 +238,10 @@ std::vector<NetworkId> chosen(const Calibration& calibration, const PublishReque
 }
 
 Response publish(CalibrationApi& s, const Request& request) {
-  auto calibration = value_or_problem(s.anchors.calibration(path_id<CalibrationId>(request)));
+  auto calibration = value_or_problem(s.calibration_store.calibration(path_id<CalibrationId>(request)));
   const auto wanted = read_publish(json_body(request, true));
   // What is judged below is judged against this revision; the store refuses when another came in between.
-  const auto newest = value_or_problem(s.anchors.revisions(1, 0));
+  const auto newest = value_or_problem(s.revisions.revisions(1, 0));
   const std::uint64_t judged_on = newest.empty() ? 0 : newest.front().number;
   ask_whether_moved(s, calibration);
   std::vector<Override> overrides;
@@ -254,8 +257,8 @@ Response publish(CalibrationApi& s, const Request& request) {
     s.audit(request, "calibration.override " + to_string(calibration.id) + ' ' + to_string(one.anchor) +
                          " reason: " + one.reason + "; failed:" + words);
   }
-  const auto published = s.anchors.publish(calibration.id, anchors, request.principal.token_id, wanted.note,
-                                           s.clock.now(), overrides, judged_on);
+  const auto published = s.revisions.publish(calibration.id, anchors, request.principal.token_id, wanted.note,
+                                             s.clock.now(), overrides, judged_on);
   if (!published)
     s.audit(request, "calibration.publish " + to_string(calibration.id),
             "refused: " + published.error().message);
@@ -296,8 +299,8 @@ Response publish(CalibrationApi& s, const Request& request) {
 /// One printable page, complete in itself.
 Response report(CalibrationApi& s, const Request& request) {
   check_query(request, {});
-  auto calibration = value_or_problem(s.anchors.calibration(path_id<CalibrationId>(request)));
-  const auto page = value_or_problem(calibration_report(s.anchors, s.mission_store, calibration, s.program));
+  auto calibration = value_or_problem(s.calibration_store.calibration(path_id<CalibrationId>(request)));
+  const auto page = value_or_problem(calibration_report(s, calibration));
   Response response;
   response.header("Content-Type", "text/html; charset=utf-8");
   // No script may run in it and nothing is fetched; its own style is all it has.
@@ -314,8 +317,8 @@ Response report(CalibrationApi& s, const Request& request) {
 Response residuals(CalibrationApi& s, const Request& request) {
   check_query(request, {"anchor"});
   const auto wanted = query_network_id(request, "anchor");
-  const auto calibration = value_or_problem(s.anchors.calibration(path_id<CalibrationId>(request)));
-  const auto text = value_or_problem(s.anchors.evidence(calibration.id));
+  const auto calibration = value_or_problem(s.calibration_store.calibration(path_id<CalibrationId>(request)));
+  const auto text = value_or_problem(s.calibration_store.evidence(calibration.id));
   const auto flights = text.empty() ? Evidence{}.flights : value_or_problem(parse_evidence(text)).flights;
   Ordered items = Ordered::array();
   const auto number = [](double value) { return std::isfinite(value) ? Ordered(value) : Ordered(nullptr); };
@@ -346,7 +349,7 @@ Response revisions(CalibrationApi& s, const Request& request) {
                     {{"/cursor", "bad_cursor", "is not one of ours"}});
     before = value.get<std::uint64_t>();
   }
-  auto rows = value_or_problem(s.anchors.revisions(page.limit + 1, before));
+  auto rows = value_or_problem(s.revisions.revisions(page.limit + 1, before));
   const bool more = rows.size() > page.limit;
   if (more) rows.pop_back();
   Ordered items = Ordered::array();
@@ -365,12 +368,12 @@ void add_calibration_routes(Router& router, CalibrationApi& s) {
   router.add({Method::post, "/api/v1/calibrations", engineer, on(create)});
   router.add({Method::get, "/api/v1/calibrations/{id}", readers(), [&s](const Request& request) {
                 check_query(request, {});
-                return json_response(
-                    200, whole(s, value_or_problem(s.anchors.calibration(path_id<CalibrationId>(request)))));
+                return json_response(200, whole(s, value_or_problem(s.calibration_store.calibration(
+                                                       path_id<CalibrationId>(request)))));
               }});
   router.add({Method::del, "/api/v1/calibrations/{id}", engineer, [&s](const Request& request) {
                 const auto id = path_id<CalibrationId>(request);
-                value_or_problem(s.anchors.remove(id));
+                value_or_problem(s.calibration_store.remove(id));
                 s.contradictions.changed();
                 s.audit(request, "calibration.delete " + to_string(id));
                 Response response;

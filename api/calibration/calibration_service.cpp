@@ -88,13 +88,13 @@ namespace {
 
 /// The one site's origin where the flights are near it; nothing else is as steady from calibration to
 /// calibration.
-std::optional<Wgs84> site_origin(const std::vector<FlightData>& flights, AnchorStore& anchors,
+std::optional<Wgs84> site_origin(const std::vector<FlightData>& flights, SiteStore& sites,
                                  const Wgs84& middle, double max_distance_m) {
   const auto& site = flights.front().mission.site;
   if (!site) return std::nullopt;
   for (const auto& flight : flights)
     if (flight.mission.site != site) return std::nullopt;
-  const auto found = anchors.site(*site);
+  const auto found = sites.site(*site);
   if (!found || !found.value().origin) return std::nullopt;
   const bool near =
       (ecef_from_wgs84(*found.value().origin) - ecef_from_wgs84(middle)).norm() <= max_distance_m;
@@ -103,8 +103,8 @@ std::optional<Wgs84> site_origin(const std::vector<FlightData>& flights, AnchorS
 
 /// One frame for all flights, so that their answers can be compared: the site's, else the middle of the first
 /// flight's positions as far as they are believed.
-Result<void> choose_frame(const std::vector<FlightData>& flights, AnchorStore& anchors,
-                          FlightOptions& options, Calibration& out) {
+Result<void> choose_frame(const std::vector<FlightData>& flights, SiteStore& sites, FlightOptions& options,
+                          Calibration& out) {
   out.frame = flights.front().mission.frame;
   for (const auto& flight : flights) {
     if (flight.mission.frame != out.frame)
@@ -248,32 +248,26 @@ Result<Job> CalibrationService::submit(CalibrationRequest request) {
   for (const auto& id : request.missions) {
     BOOST_OUTCOME_TRYV(deps_.missions.mission(id));
   }
-  ModelRegistry::Active models;
-  if (deps_.models != nullptr) {
-    // Chosen now: a promotion while the job waits changes nothing of what was asked for.
-    auto chosen = models_for(request.models, *deps_.models);
-    if (!chosen) return make_error(Errc::invalid_argument, "models: " + chosen.error().message);
-    models = std::move(chosen).value();
-  }
+  // Chosen now: a promotion while the job waits changes nothing of what was asked for.
+  auto models = models_for(request.models, deps_.models);
+  if (!models) return make_error(Errc::invalid_argument, "models: " + models.error().message);
   if (!request.frame.empty()) {  // asked now: a frame nobody fitted is no reason to solve for minutes
-    if (deps_.frames == nullptr) return make_error(Errc::invalid_argument, "frame: this server has none");
-    const auto frame = calibration_frame(*deps_.frames, request.frame);
+    const auto frame = calibration_frame(deps_.frames, request.frame);
     if (!frame) return make_error(Errc::invalid_argument, "frame: " + frame.error().message);
   }
   const std::string settings = request.settings_json;
   return deps_.jobs.submit(
       "calibration", settings,
-      [this, wanted = std::move(request), models = std::move(models)](JobContext& job) -> Result<JobEnd> {
+      [this, wanted = std::move(request),
+       models = std::move(models).value()](JobContext& job) -> Result<JobEnd> {
         BOOST_OUTCOME_TRY(const auto solved, solve(wanted, models, job));
         const Calibration& made = solved.calibration;
-        BOOST_OUTCOME_TRYV(deps_.anchors.insert(made));
-        if (deps_.contradictions != nullptr) {
-          deps_.contradictions->changed();
-          (void)deps_.contradictions->standing();
-        }
+        BOOST_OUTCOME_TRYV(deps_.calibrations.insert(made));
+        deps_.contradictions.changed();
+        (void)deps_.contradictions.standing();
         const std::string id = to_string(made.id);
         for (const auto& profile : solved.learned) {
-          BOOST_OUTCOME_TRYV(deps_.profiles->learn(profile, solved.missions(), "calibration " + id));
+          BOOST_OUTCOME_TRYV(deps_.profiles.learn(profile, solved.missions(), "calibration " + id));
         }
         return JobEnd{"/api/v1/calibrations/" + id, std::to_string(made.anchors.size()) + " anchors"};
       });
@@ -284,9 +278,9 @@ Result<void> CalibrationService::solve_kit(const CalibrationRequest& request, co
                                            Solved& solved, const std::string& kit) {
   FlightOptions of_kit = options;
   std::uint64_t version = 0;
-  const bool stored = deps_.profiles != nullptr && request.use_profile && !kit.empty();
+  const bool stored = request.use_profile && !kit.empty();
   if (stored && !of_kit.fixed_bias_m) {
-    BOOST_OUTCOME_TRY(auto profile, deps_.profiles->for_flights(kit, solved.missions()));
+    BOOST_OUTCOME_TRY(auto profile, deps_.profiles.for_flights(kit, solved.missions()));
     if (profile) {
       of_kit.profile = std::move(profile->profile);
       version = profile->version;
@@ -299,7 +293,7 @@ Result<void> CalibrationService::solve_kit(const CalibrationRequest& request, co
     // Factors of a profile are told apart by this name.
     named.back().mission.name = KitProfiles::flight_key(solved.flights[i].mission);
   }
-  if (deps_.flight_clues && request.flight_clues && options.origin) {
+  if (request.flight_clues && options.origin) {
     procedure::FlightClues told;
     for (const std::size_t i : members)
       told = procedure::merged(std::move(told), deps_.flight_clues(solved.flights[i].mission.id));
@@ -350,10 +344,7 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
   all.insert(all.end(), request.learn_from.begin(), request.learn_from.end());
   for (const auto& id : all) {
     BOOST_OUTCOME_TRY(auto mission, deps_.missions.mission(id));
-    std::vector<Exclusion> exclusions;
-    if (deps_.exclusions != nullptr) {
-      BOOST_OUTCOME_TRY(exclusions, deps_.exclusions->exclusions(id));
-    }
+    BOOST_OUTCOME_TRY(const auto exclusions, deps_.exclusions.exclusions(id));
     BOOST_OUTCOME_TRY(auto flight,
                       load_flight(deps_.measurements, mission, canceled_now, models.needs_cir, exclusions));
     if (!request.use_anchor_anchor)
@@ -370,13 +361,13 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
   take(request.max_acceleration_mps2, options.track.max_acceleration_mps2);
   options.canceled = canceled_now;
   Calibration& out = solved.calibration;
-  BOOST_OUTCOME_TRYV(choose_frame(solved.flights, deps_.anchors, options, out));
+  BOOST_OUTCOME_TRYV(choose_frame(solved.flights, deps_.sites, options, out));
   std::optional<CalibrationFrame> frame;
-  if (!request.frame.empty() && deps_.frames != nullptr) {
-    BOOST_OUTCOME_TRY(frame, calibration_frame(*deps_.frames, request.frame));
+  if (!request.frame.empty()) {
+    BOOST_OUTCOME_TRY(frame, calibration_frame(deps_.frames, request.frame));
   }
   const auto outline =
-      use_site_outline(request.site_outline, solved.flights, out.origin, frame, deps_.anchors, options);
+      use_site_outline(request.site_outline, solved.flights, out.origin, frame, deps_.sites, options);
   job.progress(0.3, "solve", std::to_string(solved.flights.size()) + " flights");
   Solved raw;  // the same without the models
   CalibrationRequest wanted = request;
@@ -436,7 +427,7 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
   Json base = nullptr, budgets = Json::object();
   std::optional<double> base_sigma_m;
   if (const auto& site = solved.flights.front().mission.site) {
-    if (const auto found = deps_.anchors.site(*site)) {
+    if (const auto found = deps_.sites.site(*site)) {
       base = site_base(found.value());
       // Local metres say nothing of a base.
       if (out.frame == TrackFrame::wgs84) base_sigma_m = found.value().base_sigma_m;

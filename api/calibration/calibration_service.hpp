@@ -9,8 +9,13 @@
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
 #include "core/localize/flight_options.hpp"
+#include "core/ports/calibration_store.hpp"
 #include "core/ports/exclusion_store.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/frame_store.hpp"
+#include "core/ports/job_store.hpp"
+#include "core/ports/measurement_store.hpp"
+#include "core/ports/mission_store.hpp"
+#include "core/ports/site_store.hpp"
 #include "core/procedure/flight_clues.hpp"
 #include "core/types/anchor.hpp"
 #include "core/types/flight_data.hpp"
@@ -61,17 +66,18 @@ class CalibrationService {
   struct Deps {
     MeasurementStore& measurements;
     MissionStore& missions;
-    AnchorStore& anchors;
+    SiteStore& sites;
+    CalibrationStore& calibrations;
     JobService& jobs;
     const Clock& clock;
-    KitProfiles* profiles{nullptr};        ///< null: flights learn from each other alone
-    const ModelRegistry* models{nullptr};  ///< null: ranges are used raw
+    KitProfiles& profiles;
+    const ModelRegistry& models;
     /// What turns and height searches of a mission's flight told; absent: nothing.
-    std::function<procedure::FlightClues(const MissionId&)> flight_clues{};
-    FrameStore* frames{nullptr};          ///< null: no local frames
-    ExclusionStore* exclusions{nullptr};  ///< null: nothing is ever excluded (tests)
-    TrackLimits track{};                  ///< what positions are held against where the request does not say
-    ContradictionWatch* contradictions{nullptr};  ///< asked again after each calibration
+    std::function<procedure::FlightClues(const MissionId&)> flight_clues;
+    FrameStore& frames;
+    ExclusionStore& exclusions;
+    TrackLimits track{};                 ///< what positions are held against where the request does not say
+    ContradictionWatch& contradictions;  ///< asked again after each calibration
   };
   explicit CalibrationService(Deps deps) : deps_(deps) {}
 

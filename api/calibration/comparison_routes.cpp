@@ -7,7 +7,8 @@
 #include "api/kit/support.hpp"
 #include "api/wire/live_writer.hpp"
 #include "core/base/text.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/calibration_store.hpp"
+#include "core/ports/revision_store.hpp"
 
 namespace anchord::api {
 
@@ -63,10 +64,10 @@ std::optional<std::uint64_t> revision_number(const std::string& text) {
 PlacedEstimates other(CalibrationApi& s, const Request& request, std::string fallback, std::string& name) {
   name = request.query_value("against").value_or(std::move(fallback));
   if (const auto id = parse_uuid(name))
-    return placed(value_or_problem(s.anchors.calibration(CalibrationId{id.value()})));
-  if (name == "published") return placed(value_or_problem(s.anchors.published(std::nullopt)));
+    return placed(value_or_problem(s.calibration_store.calibration(CalibrationId{id.value()})));
+  if (name == "published") return placed(value_or_problem(s.revisions.published(std::nullopt)));
   if (const auto number = revision_number(name))
-    return placed(value_or_problem(s.anchors.published(*number)));
+    return placed(value_or_problem(s.revisions.published(*number)));
   if (name == "nothing") return {};
   throw_problem(
       422, "validation", "against is a calibration, a revision or \"published\"",
@@ -87,7 +88,7 @@ Response answer(const std::string& of, const std::string& against, const PlacedE
 
 Response calibration_diff(CalibrationApi& s, const Request& request) {
   check_query(request, {"against"});
-  const auto calibration = value_or_problem(s.anchors.calibration(path_id<CalibrationId>(request)));
+  const auto calibration = value_or_problem(s.calibration_store.calibration(path_id<CalibrationId>(request)));
   std::string against;
   const auto before = other(s, request, "published", against);
   return answer(to_string(calibration.id), against, placed(calibration), before);
@@ -98,7 +99,7 @@ Response revision_diff(CalibrationApi& s, const Request& request) {
   const auto& text = request.params.at("number");
   const auto number = revision_number(text);
   if (!number) throw_problem(404, "not-found", "there is no revision " + to_utf8(text, 20));
-  const auto now = placed(value_or_problem(s.anchors.published(*number)));
+  const auto now = placed(value_or_problem(s.revisions.published(*number)));
   std::string against;
   const auto before = other(s, request, *number > 1 ? std::to_string(*number - 1) : "nothing", against);
   return answer(text, against, now, before);

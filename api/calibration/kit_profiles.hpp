@@ -6,8 +6,8 @@
 
 #include "core/base/result.hpp"
 #include "core/localize/kit_profile.hpp"
-#include "core/ports/site_store.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/kit_store.hpp"
+#include "core/ports/mission_store.hpp"
 
 namespace anchord::api {
 

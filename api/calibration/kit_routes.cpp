@@ -42,7 +42,7 @@ Response answer(CalibrationApi& s, int status, const StoredProfile& stored) {
   body["bias"] = {{"value_m", gate.bias_m},       {"sigma_m", gate.sigma_m},       {"z", gate.z},
                   {"limit", options.bias_gate_z}, {"calibrated", gate.calibrated}, {"known", gate.known}};
   Ordered history = Ordered::array();
-  for (const auto& one : value_or_problem(s.profiles->store().history(stored.kit, k_history)))
+  for (const auto& one : value_or_problem(s.profiles.store().history(stored.kit, k_history)))
     history.push_back(version_json(one));
   body["history"] = std::move(history);
   Response response = json_response(status, body);
@@ -52,8 +52,8 @@ Response answer(CalibrationApi& s, int status, const StoredProfile& stored) {
 
 Response read(CalibrationApi& s, const Request& request) {
   check_query(request, {});
-  const auto kit = value_or_problem(s.profiles->kit_of(request.params.at("id")));
-  const auto stored = value_or_problem(s.profiles->store().profile(kit));
+  const auto kit = value_or_problem(s.profiles.kit_of(request.params.at("id")));
+  const auto stored = value_or_problem(s.profiles.store().profile(kit));
   if (!stored)
     throw_problem(
         404, "not-found",
@@ -64,7 +64,7 @@ Response read(CalibrationApi& s, const Request& request) {
 /// If-Match names the version that is replaced; "*" makes the first one of a kit.
 Response put(CalibrationApi& s, const Request& request) {
   const auto& id = request.params.at("id");
-  const auto known = s.profiles->kit_of(id);
+  const auto known = s.profiles.kit_of(id);
   const auto profile = parse_kit_profile(to_wire(json_body(request)));
   if (!profile)
     throw_problem(422, "validation", profile.error().message, {{"", "bad_profile", profile.error().message}});
@@ -73,7 +73,7 @@ Response put(CalibrationApi& s, const Request& request) {
     throw_problem(422, "validation", "the profile is of another kit",
                   {{"/kit", "other_kit", "must be '" + to_utf8(kit, 80) + "'"}});
   if (!known && id != kit) throw ProblemException{problem_of(known.error())};
-  const auto before = value_or_problem(s.profiles->store().profile(kit));
+  const auto before = value_or_problem(s.profiles.store().profile(kit));
   const std::uint64_t version = before ? before->version : 0;
   if (before || request.header("if-match") != "*") require_match(request, etag(version));
   StoredProfile next;
@@ -82,7 +82,7 @@ Response put(CalibrationApi& s, const Request& request) {
   next.by = request.principal.token_id;
   next.source = "put";
   next.profile_json = kit_profile_json(profile.value());
-  const auto stored = value_or_problem(s.profiles->store().put(std::move(next), version));
+  const auto stored = value_or_problem(s.profiles.store().put(std::move(next), version));
   s.audit(request, "profile.change " + kit + " version " + std::to_string(stored.version));
   return answer(s, before ? 200 : 201, stored);
 }

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/ports/store.hpp"
+#include "core/ports/revision_store.hpp"
 #include "core/types/anchor.hpp"
 #include "core/types/estimate.hpp"
 

@@ -6,8 +6,11 @@
 
 namespace anchord {
 class AnchorStore;
+class CalibrationStore;
 class Clock;
 class MissionStore;
+class RevisionStore;
+class SiteStore;
 }  // namespace anchord
 
 namespace anchord::api {
@@ -24,11 +27,14 @@ class Router;
 /// What the routes of calibrations, revisions and kits work with; lives as long as the router.
 struct CalibrationApi {
   CalibrationService& calibrations;
+  CalibrationStore& calibration_store;
+  RevisionStore& revisions;
+  SiteStore& sites;
   AnchorStore& anchors;
   MissionStore& mission_store;
   MissionService& missions;
   ContradictionWatch& contradictions;
-  KitProfiles* profiles{nullptr};  ///< null: their routes do not exist
+  KitProfiles& profiles;
   JobService& jobs;
   Hub& hub;
   EventLog& events;

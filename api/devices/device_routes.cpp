@@ -9,7 +9,8 @@
 #include "api/kit/support.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/devices.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/job_store.hpp"
+#include "core/ports/measurement_store.hpp"
 
 namespace anchord::api {
 
@@ -19,11 +20,6 @@ using Ordered = nlohmann::ordered_json;
 namespace {
 
 std::string etag(const DeviceReport& device) { return "\"d-" + std::to_string(device.config.version) + '"'; }
-
-DeviceControl& control(DeviceApi& s) {
-  if (s.devices == nullptr) throw_problem(503, "unavailable", "this server has no devices of its own");
-  return *s.devices;
-}
 
 Response answer(int status, const DeviceReport& device) {
   Response response = json_response(status, device_json(device));
@@ -47,8 +43,8 @@ Response list(DeviceApi& s, const Request& request) {
   check_query(request, {"mission", "fields"});
   const auto mission = query_mission(request);
   Ordered items = Ordered::array();
-  if (!mission && s.devices != nullptr) {
-    for (const auto& device : s.devices->devices()) items.push_back(device_json(device));
+  if (!mission) {
+    for (const auto& device : s.devices.devices()) items.push_back(device_json(device));
   }
   for (const auto& radio : value_or_problem(s.measurements.devices(mission))) {
     items.push_back({{"network_id", to_string(radio.network_id)},
@@ -66,7 +62,7 @@ Response create(DeviceApi& s, const Request& request) {
   DeviceConfig config;
   patch_device(json_body(request), true, config, errors);
   refuse_if_any(errors);
-  const auto device = accepted(control(s).add(std::move(config)));
+  const auto device = accepted(s.devices.add(std::move(config)));
   s.audit(request, "device.create " + to_string(device.config.id) + " " + device.config.address);
   Response response = answer(201, device);
   response.header("Location", "/api/v1/devices/" + to_string(device.config.id));
@@ -74,25 +70,25 @@ Response create(DeviceApi& s, const Request& request) {
 }
 
 Response patch(DeviceApi& s, const Request& request) {
-  const auto before = value_or_problem(control(s).device(path_uuid(request)));
+  const auto before = value_or_problem(s.devices.device(path_uuid(request)));
   require_match(request, etag(before));
   std::vector<FieldError> errors;
   auto config = before.config;
   patch_device(json_body(request), false, config, errors);
   refuse_if_any(errors);
-  const auto device = accepted(control(s).change(std::move(config), before.config.version));
+  const auto device = accepted(s.devices.change(std::move(config), before.config.version));
   s.audit(request, "device.change " + to_string(device.config.id));
   return answer(200, device);
 }
 
 Response remove(DeviceApi& s, const Request& request) {
-  const auto device = value_or_problem(control(s).device(path_uuid(request)));
+  const auto device = value_or_problem(s.devices.device(path_uuid(request)));
   require_match(request, etag(device));
   if (const auto holder = s.stream.holder(); holder && device.config.enabled)
     throw_problem(409, "conflict",
                   device.config.name + " is in use: " + holder->name +
                       " records with it; finish that mission first, or switch the device off");
-  value_or_problem(control(s).remove(device.config.id, device.config.version));
+  value_or_problem(s.devices.remove(device.config.id, device.config.version));
   s.audit(request, "device.delete " + to_string(device.config.id));
   Response response;
   response.status = 204;
@@ -106,7 +102,7 @@ bool of_the_device(const Error& error) {
 }
 
 Response act(DeviceApi& s, const Request& request) {
-  const auto device = value_or_problem(control(s).device(path_uuid(request)));
+  const auto device = value_or_problem(s.devices.device(path_uuid(request)));
   std::vector<FieldError> errors;
   const auto body = json_body(request);
   Fields fields(body, "", errors);
@@ -117,7 +113,7 @@ Response act(DeviceApi& s, const Request& request) {
   fields.finish();
   refuse_if_any(errors);
   const auto result =
-      control(s).act(device.config.id, *action, arguments == nullptr ? "{}" : to_wire(*arguments));
+      s.devices.act(device.config.id, *action, arguments == nullptr ? "{}" : to_wire(*arguments));
   s.audit(request, "device.action " + to_string(device.config.id) + " " + *action, result ? "ok" : "failed");
   if (!result && of_the_device(result.error())) throw_problem(422, "state", result.error().message);
   auto json = Ordered::parse(accepted(result), nullptr, false);
@@ -127,7 +123,7 @@ Response act(DeviceApi& s, const Request& request) {
 
 /// What the device says to a question; its state is the client's 422.
 Json ask(DeviceApi& s, const Uuid& id, std::string_view action, const std::string& arguments) {
-  const auto result = control(s).act(id, action, arguments);
+  const auto result = s.devices.act(id, action, arguments);
   if (!result && of_the_device(result.error())) throw_problem(422, "state", result.error().message);
   auto json = Json::parse(accepted(result), nullptr, false);
   return json.is_discarded() ? Json() : json;
@@ -152,7 +148,7 @@ Response uwb_answer(const Json& settings, const Json& devices) {
 
 Response get_uwb(DeviceApi& s, const Request& request) {
   check_query(request, {"devices"});
-  const auto device = value_or_problem(control(s).device(path_uuid(request)));
+  const auto device = value_or_problem(s.devices.device(path_uuid(request)));
   const bool others = query_flag(request, "devices");
   // Asking them stops ranging for seconds: not for those who only look.
   if (others && !request.principal.has(Role::op) && !request.principal.has(Role::admin))
@@ -163,7 +159,7 @@ Response get_uwb(DeviceApi& s, const Request& request) {
 
 /// Everywhere or nowhere: the tag and every device in its list, verified, else all back.
 Response put_uwb(DeviceApi& s, const Request& request) {
-  const auto device = value_or_problem(control(s).device(path_uuid(request)));
+  const auto device = value_or_problem(s.devices.device(path_uuid(request)));
   std::vector<FieldError> errors;
   const auto body = json_body(request);
   Fields fields(body, "", errors);
@@ -205,7 +201,7 @@ Response discover(DeviceApi& s, const Request& request) {
   Fields fields(body, "", errors);
   fields.finish();
   refuse_if_any(errors);
-  auto& devices = control(s);
+  auto& devices = s.devices;
   auto job =
       value_or_problem(s.jobs.submit("discovery", "{}", [&devices](JobContext& context) -> Result<JobEnd> {
         context.progress(0, "listening", "every port that is not in use");
@@ -228,7 +224,7 @@ void add_device_routes(Router& router, DeviceApi& s) {
   router.add({Method::post, "/api/v1/devices", operators, on(create)});
   router.add({Method::get, "/api/v1/devices/{id}", readers(), [&s](const Request& request) {
                 check_query(request, {});
-                return answer(200, value_or_problem(control(s).device(path_uuid(request))));
+                return answer(200, value_or_problem(s.devices.device(path_uuid(request))));
               }});
   router.add({Method::patch, "/api/v1/devices/{id}", operators, on(patch), 1 << 20, false, true});
   router.add({Method::del, "/api/v1/devices/{id}", operators, on(remove), 1 << 20, false, true});
@@ -239,7 +235,7 @@ void add_device_routes(Router& router, DeviceApi& s) {
   router.add({Method::post, "/api/v1/discovery", operators, on(discover)});
   router.add({Method::get, "/api/v1/discovery", readers(), [&s](const Request& request) {
                 check_query(request, {});
-                return found_answer(control(s));
+                return found_answer(s.devices);
               }});
 }
 

@@ -5,7 +5,6 @@
 #include "api/admin/event_log.hpp"
 #include "core/ports/devices.hpp"
 #include "core/ports/mission_bin.hpp"
-#include "core/ports/store.hpp"
 
 namespace anchord::api {
 
@@ -18,16 +17,14 @@ void DeviceStream::change(std::vector<Holder> next) {
     const std::scoped_lock lock(mutex_);
     stack_ = std::move(next);
   }
-  if (deps_.devices->recording_into() != now) deps_.devices->record_into(now);
-  if (deps_.store == nullptr) return;
-  if (const auto kept = deps_.store->keep_device_stream(ids); !kept) {
+  if (deps_.devices.recording_into() != now) deps_.devices.record_into(now);
+  if (const auto kept = deps_.store.keep_device_stream(ids); !kept) {
     deps_.events.add("warning", "devices.not_kept",
                      "a restart would not know whose the devices are: " + kept.error().message, now);
   }
 }
 
 std::optional<DeviceStream::Holder> DeviceStream::begin(const Mission& mission) {
-  if (deps_.devices == nullptr) return std::nullopt;
   const std::scoped_lock changing(changing_);
   const auto before = holder();
   if (!before) {
@@ -35,7 +32,7 @@ std::optional<DeviceStream::Holder> DeviceStream::begin(const Mission& mission) 
     return std::nullopt;
   }
   if (before->id == mission.id) return std::nullopt;
-  if (!deps_.devices->devices().empty()) {
+  if (!deps_.devices.devices().empty()) {
     deps_.events.add("warning", "devices.held",
                      mission.name + " gets no rows of the devices: " + before->name + " records with them",
                      mission.id);
@@ -44,7 +41,6 @@ std::optional<DeviceStream::Holder> DeviceStream::begin(const Mission& mission) 
 }
 
 std::optional<DeviceStream::Holder> DeviceStream::take(const Mission& mission, const std::string& by) {
-  if (deps_.devices == nullptr) return std::nullopt;
   const std::scoped_lock changing(changing_);
   const auto before = holder();
   if (before && before->id == mission.id) return std::nullopt;
@@ -64,7 +60,6 @@ std::optional<DeviceStream::Holder> DeviceStream::take(const Mission& mission, c
 }
 
 void DeviceStream::ended(const MissionId& mission) {
-  if (deps_.devices == nullptr) return;
   const std::scoped_lock changing(changing_);
   const auto before = holder();
   auto next = stack_;
@@ -81,8 +76,7 @@ std::optional<DeviceStream::Holder> DeviceStream::holder() const {
 }
 
 void DeviceStream::resume() {
-  if (deps_.devices == nullptr || deps_.store == nullptr) return;
-  const auto kept = deps_.store->device_stream();
+  const auto kept = deps_.store.device_stream();
   if (!kept) {
     deps_.events.add(
         "critical", "devices.not_resumed",
@@ -111,7 +105,7 @@ std::vector<AlarmCondition> DeviceStream::alarms() const {
     has = stack_.back();
     lost = stack_[stack_.size() - 2];
   }
-  if (deps_.devices->devices().empty()) return {};  // nobody misses rows that there are none of
+  if (deps_.devices.devices().empty()) return {};  // nobody misses rows that there are none of
   return {{"devices.lost", AlarmPriority::critical,
            lost.name + ": its devices record into " + has.name + "; they come back when that ends", lost.id},
           {"devices.taken", AlarmPriority::warning, has.name + " has the devices of " + lost.name, has.id}};

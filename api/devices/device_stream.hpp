@@ -27,10 +27,9 @@ class EventLog;
 /// both missions, and is undone when the taker ends. Kept over a restart. Thread-safe.
 class DeviceStream {
  public:
-  /// devices null: this server has none, and nothing here does anything.
   struct Deps {
-    DeviceControl* devices{nullptr};
-    ServiceStore* store{nullptr};  ///< null: not kept (tests)
+    DeviceControl& devices;
+    ServiceStore& store;
     MissionStore& missions;
     EventLog& events;
   };

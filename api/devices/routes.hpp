@@ -15,7 +15,7 @@ class Router;
 
 /// What the routes of devices work with; lives as long as the router.
 struct DeviceApi {
-  DeviceControl* devices{nullptr};  ///< null: this server has none
+  DeviceControl& devices;
   MeasurementStore& measurements;
   DeviceStream& stream;
   JobService& jobs;

@@ -78,10 +78,7 @@ void FlightService::State::keep(const MissionId& mission, std::string document) 
   const auto write = [&plans = deps.plans, mission, document = std::move(document), now = deps.clock.now()] {
     return plans.keep_procedure(mission, document, now);
   };
-  if (deps.late != nullptr)
-    deps.late->write(write);
-  else
-    (void)write().has_value();
+  deps.late.write(write);
 }
 
 void FlightService::State::recover() {

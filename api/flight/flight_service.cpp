@@ -8,6 +8,7 @@
 #include "api/flight/flight_state.hpp"
 #include "core/localize/live_flight.hpp"
 #include "core/ports/drone.hpp"
+#include "core/ports/executor.hpp"
 #include "core/ports/plan_store.hpp"
 
 namespace anchord::api {
@@ -25,7 +26,7 @@ FlightService::~FlightService() { stop(); }
 flight::Now FlightService::State::now() const {
   flight::Now out;
   out.utc = deps.clock.now();
-  out.steady = (deps.steady != nullptr ? *deps.steady : system_steady_clock()).now();
+  out.steady = deps.steady.now();
   out.s = deps.now_s
               ? deps.now_s()
               : std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -43,12 +44,6 @@ void FlightService::start() {
                             "the flight before the restart cannot be read: the pilot has it", std::nullopt);
   }
   if (state_->deps.now_s || state_->thread.joinable()) return;
-  state_->helper = Thread("anchord-plan", [this] {
-    std::unique_lock lock(state_->mutex);
-    while (!state_->stopping) {
-      if (!state_->work_apart(lock)) state_->due.wait(lock);
-    }
-  });
   state_->thread = Thread("anchord-fly", [this] {
     using Steady = std::chrono::steady_clock;
     auto due = Steady::now();
@@ -74,13 +69,24 @@ void FlightService::stop() {
   }
   state_->wake.notify_all();
   state_->changed.notify_all();
-  state_->due.notify_all();
   if (state_->thread.joinable()) state_->thread.join();
-  if (state_->helper.joinable()) state_->helper.join();
+  std::unique_lock lock(state_->mutex);
+  state_->idle.wait(lock, [this] { return !state_->apart.handed_over; });
 }
 
-bool FlightService::State::work_apart(std::unique_lock<std::mutex>& lock) {
-  if (!operations.flight()) apart = {};
+bool FlightService::State::apart_is_due() {
+  return apart.any() && !stopping && !std::exchange(apart.handed_over, true);
+}
+
+void FlightService::State::work_apart() {
+  std::unique_lock lock(mutex);
+  while (!stopping && piece_apart(lock)) continue;
+  apart.handed_over = false;
+  idle.notify_all();
+}
+
+bool FlightService::State::piece_apart(std::unique_lock<std::mutex>& lock) {
+  if (!operations.flight()) apart.drop();
   if (!apart.any()) return false;
   (void)guarded("planner", [&] {
     if (apart.point)
@@ -123,8 +129,9 @@ void FlightService::step() {
   std::string keep;
   bool keeps = false;
   std::optional<procedure::FlightClues> clues;
+  bool due_apart = false;
   {
-    std::unique_lock lock(s.mutex);
+    const std::scoped_lock lock(s.mutex);
     const auto now = s.now();
     if (s.operations.flying())
       s.checks_apart.note(now.s);
@@ -143,11 +150,9 @@ void FlightService::step() {
       }
     }
     s.publish();
-    if (s.helper.joinable())
-      s.due.notify_one();
-    else
-      while (s.work_apart(lock)) continue;
+    due_apart = s.apart_is_due();
   }
+  if (due_apart) s.deps.plan.post([&s] { s.work_apart(); });
   if (clues && mission) s.deps.missions.tell_clues(*mission, std::move(*clues));
   if (keeps && mission) s.keep(*mission, std::move(keep));
   s.changed.notify_all();

@@ -20,6 +20,7 @@
 
 namespace anchord {
 class Drone;
+class Executor;
 class PlanStore;
 }  // namespace anchord
 
@@ -48,11 +49,12 @@ class FlightService final : public MissionObserver, public MissionControl {
     Hub& hub;
     EventLog& events;
     const Clock& clock;
+    const SteadyClock& steady;  ///< what the lease runs on
+    Executor& plan;             ///< what of a flight is long to compute or to write
+    LateWriter& late;
     Drone* drone{nullptr};  ///< null: flown by hand ("manual")
     std::function<StorageStatus()> storage;
-    std::function<double()> now_s{};     ///< steady seconds; set: no thread, the owner calls step() (tests)
-    const SteadyClock* steady{nullptr};  ///< what the lease runs on; null: the system's
-    LateWriter* late{nullptr};           ///< null: what it writes it writes at once
+    std::function<double()> now_s{};  ///< steady seconds; set: no thread, the owner calls step()
   };
   explicit FlightService(Deps deps);
   ~FlightService() override;

@@ -21,8 +21,11 @@ struct FlightService::State {
 
   flight::Now now() const;
   void tell_events();
-  /// One piece of what is due apart, with the lock given away meanwhile; false: nothing is due.
-  bool work_apart(std::unique_lock<std::mutex>& lock);
+  /// Under the lock: whether what is due apart has to be handed to the executor (by the caller, without it).
+  bool apart_is_due();
+  /// All that is due, with the lock given away meanwhile.
+  void work_apart();
+  bool piece_apart(std::unique_lock<std::mutex>& lock);
   void decide(std::unique_lock<std::mutex>& lock);
   flight::Groundwork groundwork(const Plan* plan);
   void recover();
@@ -36,8 +39,8 @@ struct FlightService::State {
 
   Deps deps;
   std::mutex mutex;
-  std::condition_variable wake, changed, due;
-  Thread thread, helper;
+  std::condition_variable wake, changed, idle;
+  Thread thread;
   bool stopping{false};
   flight::Operations operations;
 
@@ -45,7 +48,12 @@ struct FlightService::State {
   struct Apart {
     std::optional<flight::Operations::PointTask> point;
     bool grid{false}, profiles{false};
+    bool handed_over{false};  ///< to the executor, and not done
     bool any() const { return point || grid || profiles; }
+    void drop() {
+      point.reset();
+      grid = profiles = false;
+    }
   } apart;
 
   IntervalHistogram checks_apart;  ///< of safety, while something flies

@@ -2,7 +2,6 @@
 
 #include "api/kit/problem.hpp"
 #include "core/base/time.hpp"
-#include "core/ports/store.hpp"
 
 namespace anchord::api {
 

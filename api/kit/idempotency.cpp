@@ -5,7 +5,7 @@
 #include "api/kit/problem.hpp"
 #include "api/kit/router.hpp"
 #include "core/base/sha256.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/access_store.hpp"
 
 namespace anchord::api {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "api/kit/message.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/access_store.hpp"
 
 namespace anchord::api {
 

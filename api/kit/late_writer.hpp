@@ -13,7 +13,7 @@
 
 #include "core/base/guard.hpp"
 #include "core/base/result.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/access_store.hpp"
 
 namespace anchord::api {
 

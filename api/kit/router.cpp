@@ -159,12 +159,11 @@ struct Router::State {
   std::function<void(std::string_view, std::string_view)> fault;
 };
 
-Router::Router(AccessStore* answers, std::function<std::int64_t()> running_ns, AccessStore* prompt)
-    : state_(std::make_unique<State>()) {
-  if (answers == nullptr || !running_ns) return;
-  state_->idempotency = std::make_unique<Idempotency>(*answers, running_ns);
-  state_->of_commands =
-      std::make_unique<Idempotency>(prompt != nullptr ? *prompt : *answers, std::move(running_ns));
+Router::Router() : state_(std::make_unique<State>()) {}
+Router::Router(AccessStore& answers, std::function<std::int64_t()> running_ns, AccessStore& prompt)
+    : Router() {
+  state_->idempotency = std::make_unique<Idempotency>(answers, running_ns);
+  state_->of_commands = std::make_unique<Idempotency>(prompt, std::move(running_ns));
 }
 bool Router::purge_answers() const {
   if (!state_->idempotency) return false;

@@ -80,11 +80,11 @@ struct Resolution {
 /// The route table. Filled at start, then read from any thread.
 class Router {
  public:
-  /// Where answers to Idempotency-Key are kept, and running time to age them by; without both the header is
-  /// ignored (tests). `prompt` keeps those of commands, which must not wait for the disk; null: as the
-  /// others.
-  explicit Router(AccessStore* answers = nullptr, std::function<std::int64_t()> running_ns = {},
-                  AccessStore* prompt = nullptr);
+  /// Ignores Idempotency-Key.
+  Router();
+  /// Where answers to Idempotency-Key are kept, and running time to age them by. `prompt` keeps those of
+  /// commands, which must not wait for the disk.
+  Router(AccessStore& answers, std::function<std::int64_t()> running_ns, AccessStore& prompt);
   ~Router();
   Router(Router&&) noexcept;
   Router& operator=(Router&&) noexcept;

@@ -81,15 +81,12 @@ Result<std::vector<DatasetRow>> rows_of_campaigns(const DatasetQuery& query, Cam
 }
 
 Result<void> add_rows_of_missions(const DatasetQuery& query, MeasurementStore& measurements,
-                                  MissionStore& missions, ExclusionStore* exclusions,
+                                  MissionStore& missions, ExclusionStore& exclusions,
                                   std::vector<DatasetRow>& rows,
                                   std::map<std::string, std::size_t>& dropped) {
   for (const auto& id : query.missions) {
     BOOST_OUTCOME_TRY(const auto mission, missions.mission(id));
-    std::vector<Exclusion> out_of_use;
-    if (exclusions != nullptr) {
-      BOOST_OUTCOME_TRY(out_of_use, exclusions->exclusions(id));
-    }
+    BOOST_OUTCOME_TRY(const auto out_of_use, exclusions.exclusions(id));
     MeasurementStore::Filter filter;
     filter.mission = id;
     filter.limit = 1000;
@@ -163,7 +160,7 @@ DatasetQuery read_dataset_query(const Json& body, CampaignStore& campaigns, Miss
 
 Result<FrozenDataset> freeze(const DatasetQuery& query, CampaignStore& campaigns,
                              MeasurementStore& measurements, MissionStore& missions,
-                             ExclusionStore* exclusions) {
+                             ExclusionStore& exclusions) {
   std::map<std::string, std::size_t> dropped;
   BOOST_OUTCOME_TRY(auto rows, rows_of_campaigns(query, campaigns));
   BOOST_OUTCOME_TRYV(add_rows_of_missions(query, measurements, missions, exclusions, rows, dropped));

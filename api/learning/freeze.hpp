@@ -7,7 +7,8 @@
 #include "api/kit/problem.hpp"
 #include "api/learning/freeze_rows.hpp"
 #include "core/ports/learning_store.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/measurement_store.hpp"
+#include "core/ports/mission_store.hpp"
 
 namespace anchord {
 class ExclusionStore;
@@ -33,6 +34,6 @@ DatasetQuery read_dataset_query(const nlohmann::json& body, CampaignStore& campa
 /// errors: too_few_observations (no row), not_found (a test place that is not there)
 Result<FrozenDataset> freeze(const DatasetQuery& query, CampaignStore& campaigns,
                              MeasurementStore& measurements, MissionStore& missions,
-                             ExclusionStore* exclusions = nullptr);
+                             ExclusionStore& exclusions);
 
 }  // namespace anchord::api

@@ -7,8 +7,8 @@
 #include "api/kit/problem.hpp"
 #include "api/learning/model_gate.hpp"
 #include "api/learning/model_registry.hpp"
+#include "core/ports/job_store.hpp"
 #include "core/ports/learning_store.hpp"
-#include "core/ports/store.hpp"
 
 namespace anchord::api {
 

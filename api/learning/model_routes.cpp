@@ -74,9 +74,8 @@ Response list(LearningApi& l, const Request& request) {
 /// Keeps the signature of one that this server signed.
 ModelStanding standing_of_upload(LearningApi& l, const std::string& artifact, const std::string& signature,
                                  std::string& kept) {
-  const ModelSigner* signer = l.models.source().signer();
-  if (signer == nullptr || signature.empty()) return ModelStanding::foreign;
-  const auto standing = signer->standing(artifact, signature);
+  if (signature.empty()) return ModelStanding::foreign;
+  const auto standing = l.models.source().signer().standing(artifact, signature);
   if (standing == ModelStanding::changed)
     throw_problem(422, "validation", "the artifact was edited after this server signed it",
                   {{"/signature", "edited",
@@ -264,7 +263,7 @@ Response promote(LearningApi& l, const Request& request) {
                              {0, stored.task, stored.id, request.principal.name, reason, l.clock.now(), false,
                               candidate.standing == ModelStanding::made
                                   ? std::string{}
-                                  : l.models.source().signature(ModelStanding::vouched, candidate.text)},
+                                  : l.models.source().signer().sign(ModelStanding::vouched, candidate.text)},
                              before);
   if (!gate.passed)
     l.events.add("warning", "model.override",

@@ -147,20 +147,13 @@ Result<ModelSource::Artifact> ModelSource::artifact(const ModelId& id) const {
   Artifact out;
   BOOST_OUTCOME_TRY(out.stored, store_->model(id));
   BOOST_OUTCOME_TRY(out.text, store_->artifact(id));
-  if (signer_ == nullptr)
-    out.standing = out.stored.run ? ModelStanding::made : ModelStanding::foreign;
-  else
-    out.standing = signer_->standing(out.text, out.stored.signature);
+  out.standing = signer_->standing(out.text, out.stored.signature);
   if (out.standing == ModelStanding::changed)
     return make_error(Errc::conflict,
                       "model " + anchord::to_string(id) +
                           " is not what this server signed: its artifact was edited. Train it "
                           "again, or upload the artifact it should be");
   return out;
-}
-
-std::string ModelSource::signature(ModelStanding purpose, std::string_view artifact) const {
-  return signer_ == nullptr ? std::string{} : signer_->sign(purpose, artifact);
 }
 
 std::string exported_artifact(std::string_view artifact, std::string_view signature) {

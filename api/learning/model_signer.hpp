@@ -48,11 +48,10 @@ class ModelSigner {
   std::string key_id_;
 };
 
-/// Models as they may be used: nothing that was edited after it was signed leaves here. Without a signer
-/// (tests, old tools) what a training run made counts as made.
+/// Models as they may be used: nothing that was edited after it was signed leaves here.
 class ModelSource {
  public:
-  ModelSource(ModelStore& store, const ModelSigner* signer) : store_(&store), signer_(signer) {}
+  ModelSource(ModelStore& store, const ModelSigner& signer) : store_(&store), signer_(&signer) {}
   struct Artifact {
     StoredModel stored;
     std::string text;
@@ -61,9 +60,7 @@ class ModelSource {
   /// errors: those of the store; conflict when it was changed after it was signed
   Result<Artifact> artifact(const ModelId& id) const;
   ModelStore& store() const { return *store_; }
-  const ModelSigner* signer() const { return signer_; }
-  /// Empty without a signer.
-  std::string signature(ModelStanding purpose, std::string_view artifact) const;
+  const ModelSigner& signer() const { return *signer_; }
 
  private:
   ModelStore* store_;

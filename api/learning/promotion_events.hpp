@@ -5,7 +5,7 @@
 
 #include "api/admin/event_log.hpp"
 #include "core/ports/learning_store.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/mission_store.hpp"
 
 namespace anchord::api {
 

@@ -29,7 +29,7 @@ struct LearningApi {
   ModelRegistry& models;
   MeasurementStore& measurements;
   MissionStore& missions;
-  ExclusionStore* exclusions{nullptr};  ///< null: nothing is ever excluded (tests)
+  ExclusionStore& exclusions;
   JobService& jobs;
   JobStore& job_store;
   EventLog& events;

@@ -51,7 +51,7 @@ Result<std::string> TrainingService::work(const TrainingRun& run, JobContext& jo
   Sha256 sum;
   sum.add(artifact);
   stored.sha256_hex = sum.hex();
-  if (deps_.signer != nullptr) stored.signature = deps_.signer->sign(ModelStanding::made, artifact);
+  stored.signature = deps_.signer.sign(ModelStanding::made, artifact);
   std::map<std::string, std::string> parts;
   for (const auto& [name, text] : json["parts"].items()) parts[name] = text.get<std::string>();
   BOOST_OUTCOME_TRYV(

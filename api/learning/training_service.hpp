@@ -4,8 +4,8 @@
 #include <string>
 
 #include "api/learning/worker_port.hpp"
+#include "core/ports/job_store.hpp"
 #include "core/ports/learning_store.hpp"
-#include "core/ports/store.hpp"
 
 namespace anchord::api {
 
@@ -26,7 +26,7 @@ class TrainingService {
     const Clock& clock;
     RunWork run_work;
     std::string code_version;
-    const ModelSigner* signer{nullptr};  ///< null: nothing is signed (tests)
+    const ModelSigner& signer;
   };
   explicit TrainingService(Deps deps) : deps_(std::move(deps)) {}
 

@@ -3,7 +3,6 @@
 #include <set>
 
 #include "api/missions/mission_service.hpp"
-#include "core/ports/store.hpp"
 
 namespace anchord::api {
 namespace {

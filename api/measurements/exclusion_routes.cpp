@@ -7,7 +7,6 @@
 #include "api/missions/mission_service.hpp"
 #include "api/wire/exclusion_json.hpp"
 #include "core/ports/exclusion_store.hpp"
-#include "core/ports/store.hpp"
 
 namespace anchord::api {
 
@@ -20,7 +19,7 @@ Response list(MeasurementApi& s, const Request& request) {
   const auto mission = path_id<MissionId>(request);
   value_or_problem(s.missions.mission(mission));
   Ordered items = Ordered::array();
-  for (const auto& one : value_or_problem(s.exclusions->exclusions(mission)))
+  for (const auto& one : value_or_problem(s.exclusions.exclusions(mission)))
     items.push_back(exclusion_json(one));
   return list_response(request, std::move(items), "");
 }
@@ -43,7 +42,7 @@ Response exclude(MeasurementApi& s, const Request& request) {
   e.selection = std::move(wanted.selection);
   e.reason = std::move(wanted.reason);
   e.by = request.principal.name;
-  auto stored = s.exclusions->insert(e, wanted.ids);
+  auto stored = s.exclusions.insert(e, wanted.ids);
   if (!stored && stored.error().code == Errc::not_found)
     throw_problem(422, "validation", stored.error().message,
                   {{wanted.ids.empty() ? "/since" : "/ids", "no_row", stored.error().message}});
@@ -64,7 +63,7 @@ Response include(MeasurementApi& s, const Request& request) {
   const auto id = path_id<ExclusionId>(request, "exclusion");
   const auto reason = optional_reason(request);
   const auto done =
-      value_or_problem(s.exclusions->include(mission, id, {s.clock.now(), request.principal.name, reason}));
+      value_or_problem(s.exclusions.include(mission, id, {s.clock.now(), request.principal.name, reason}));
   s.audit(request, "rows.include " + to_string(mission) + ' ' + to_string(id) + ' ' + words(done) +
                        (reason.empty() ? "" : " reason: " + reason));
   s.missions.exclusions_changed(mission);

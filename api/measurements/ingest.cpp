@@ -11,7 +11,7 @@
 #include "api/wire/rows_json.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/measurement_store.hpp"
 
 namespace anchord::api {
 

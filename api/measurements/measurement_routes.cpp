@@ -11,7 +11,7 @@
 #include "api/wire/rows_json.hpp"
 #include "api/wire/words.hpp"
 #include "core/base/to_wire.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/measurement_store.hpp"
 
 #include <charconv>
 
@@ -173,8 +173,7 @@ Response list_ranges(MeasurementApi& s, const Request& request) {
     total = value_or_problem(s.measurements.count_ranges(filter));
   }
   const bool judged = wanted || query_flag(request, "predicted");
-  const auto active =
-      judged && s.models != nullptr ? s.models->active() : std::make_shared<const ModelRegistry::Active>();
+  const auto active = judged ? s.models.active() : std::make_shared<const ModelRegistry::Active>();
   filter.with_cir = with_cir || with_features || (judged && active->needs_cir);
   return rows(
       request, std::move(filter),

@@ -21,8 +21,8 @@ struct MeasurementApi {
   MeasurementStore& measurements;
   IngestService& ingest;
   MissionService& missions;
-  ModelRegistry* models{nullptr};       ///< null: no ranges are judged
-  ExclusionStore* exclusions{nullptr};  ///< null: their routes do not exist
+  ModelRegistry& models;
+  ExclusionStore& exclusions;
   EventLog& events;
   const Clock& clock;
   Audit audit;

@@ -20,11 +20,6 @@ using Ordered = nlohmann::ordered_json;
 
 namespace {
 
-MissionBin& bin(MissionApi& s) {
-  if (s.bin == nullptr) throw_problem(503, "unavailable", "this server keeps no deleted missions");
-  return *s.bin;
-}
-
 Ordered binned_json(MissionApi& s, const BinnedMission& one) {
   Ordered out = mission_json(one.mission, one.n_ranges, one.n_fixes);
   const std::int64_t left_ns = s.keep_deleted_ns - (s.running.now_ns() - one.deleted_ran_ns);
@@ -57,20 +52,20 @@ Response empty_answer() {
 Response purge(MissionApi& s, const Request& request, const MissionId& id) {
   if (!request.principal.has(Role::admin))
     throw_problem(403, "forbidden", "removing a mission for good needs the role admin");
-  const auto binned = bin(s).binned(id);
+  const auto binned = s.bin.binned(id);
   if (!binned) {
     value_or_problem(s.missions.mission(id));
     throw_problem(409, "conflict", "this mission is not in the bin: delete it first, without purge");
   }
   require_match(request, binned_etag(binned.value()));
-  value_or_problem(bin(s).empty(id));
+  value_or_problem(s.bin.empty(id));
   s.audit(request, "mission.purge " + to_string(id));
   s.housekeeping.wake();
   return empty_answer();
 }
 
 void refuse_in_use(MissionApi& s, const Mission& mission) {
-  if (s.control != nullptr && s.control->flies(mission.id))
+  if (s.control.flies(mission.id))
     throw_problem(409, "conflict", mission.name + " is in the air: land and finish it, then delete it");
   if (mission.state == MissionState::recording)
     throw_problem(409, "conflict",
@@ -90,16 +85,15 @@ Response remove(MissionApi& s, const Request& request) {
     require_control(s, request, id, std::string(request.header("anchord-lease")),
                     "deleting a mission needs the role admin, or control of it with its lease in the header "
                     "Anchord-Lease");
-  value_or_problem(bin(s).put(id, s.clock.now(), s.running.now_ns(), request.principal.name));
+  value_or_problem(s.bin.put(id, s.clock.now(), s.running.now_ns(), request.principal.name));
   s.missions.forget(id);
-  if (s.control != nullptr && s.control->flies(id)) {  // it took off between the look and the deed
-    value_or_problem(bin(s).restore(id));
+  if (s.control.flies(id)) {  // it took off between the look and the deed
+    value_or_problem(s.bin.restore(id));
     refuse_in_use(s, mission);
   }
   // Control of what is gone is nobody's: the aircraft is free for another flight at once.
-  if (s.control != nullptr)
-    (void)s.control->release_control(id, std::string(request.header("anchord-lease")), request.principal)
-        .has_value();
+  (void)s.control.release_control(id, std::string(request.header("anchord-lease")), request.principal)
+      .has_value();
   s.audit(request, "mission.delete " + to_string(id));
   s.events.add("warning", "mission.deleted", mission.name + " was deleted by " + request.principal.name, id);
   return empty_answer();
@@ -112,7 +106,7 @@ Response restore(MissionApi& s, const Request& request) {
   std::vector<FieldError> errors;
   Fields(body, "", errors).finish();
   refuse_if_any(errors);
-  const auto back = bin(s).restore(id);
+  const auto back = s.bin.restore(id);
   if (!back && back.error().code == Errc::not_found) {
     value_or_problem(s.missions.mission(id));  // 404 where none ever was
     throw_problem(409, "conflict", "this mission is not in the bin");
@@ -130,13 +124,13 @@ Response restore(MissionApi& s, const Request& request) {
 /// The list of GET /missions?deleted=true.
 Response binned_missions(MissionApi& s, const Request& request) {
   Ordered items = Ordered::array();
-  for (const auto& one : value_or_problem(bin(s).list())) items.push_back(binned_json(s, one));
+  for (const auto& one : value_or_problem(s.bin.list())) items.push_back(binned_json(s, one));
   return list_response(request, std::move(items), "");
 }
 
 /// GET /missions/{id}?deleted=true: one of the bin, with the ETag that a purge names.
 Response binned_mission(MissionApi& s, const Request& request) {
-  const auto one = value_or_problem(bin(s).binned(path_id<MissionId>(request)));
+  const auto one = value_or_problem(s.bin.binned(path_id<MissionId>(request)));
   Response response = json_response(200, binned_json(s, one));
   response.header("ETag", binned_etag(one));
   return response;
@@ -145,16 +139,15 @@ Response binned_mission(MissionApi& s, const Request& request) {
 Mission named_mission(MissionApi& s, const Request& request) {
   const auto id = path_id<MissionId>(request);
   auto mission = s.missions.mission(id);
-  if (!mission && mission.error().code == Errc::not_found && s.bin != nullptr) {
-    if (const auto binned = s.bin->binned(id)) gone(binned.value());
+  if (!mission && mission.error().code == Errc::not_found) {
+    if (const auto binned = s.bin.binned(id)) gone(binned.value());
   }
   return value_or_problem(std::move(mission));
 }
 
 void require_control(MissionApi& s, const Request& request, const MissionId& mission,
                      const std::string& lease, const std::string& what) {
-  if (s.control == nullptr) throw_problem(409, "no-control", what);
-  const auto held = s.control->renew_control(mission, lease, request.principal);
+  const auto held = s.control.renew_control(mission, lease, request.principal);
   if (!held) throw_problem(409, "no-control", what + ": " + held.error().message);
 }
 

@@ -1,5 +1,7 @@
+#include "api/kit/memory.hpp"
 #include "api/missions/mission_service_state.hpp"
 #include "api/wire/outline_json.hpp"
+#include "core/base/guard.hpp"
 #include "core/localize/flight_solver.hpp"
 
 namespace anchord::api {
@@ -14,7 +16,7 @@ constexpr int k_joint_rest = 24;
 
 std::string MissionService::State::outline_of(const Mission& mission) const {
   if (!deps.site_outline || !mission.site || mission.frame != TrackFrame::wgs84) return {};
-  const auto site = deps.anchors.site(*mission.site);
+  const auto site = deps.sites.site(*mission.site);
   return site ? site.value().outline_geojson : std::string();
 }
 
@@ -26,27 +28,40 @@ flight::LiveMission::JointProblem MissionService::State::joint_problem(Flight& f
 }
 
 void MissionService::State::start_joint(const std::shared_ptr<Flight>& flight) {
-  if (stopped || flight->rebuilding || !joint.idle()) return;
+  if (stopped || flight->rebuilding || joint_busy) return;
   Mission mission;
   {
     const std::scoped_lock lock(flight->queue_mutex);
     mission = flight->mission;
   }
   const std::string outline = outline_of(mission);
-  const std::unique_lock lock(flight->work_mutex, std::try_to_lock);
+  std::unique_lock lock(flight->work_mutex, std::try_to_lock);
   if (!lock || flight->joint_running || !flight->live.joint_is_worth_it()) return;
-  const auto now = std::chrono::steady_clock::now();
-  if (now < flight->joint_not_before) return;
-  auto problem = joint_problem(*flight, outline);
-  JointWorker::Task task{std::move(problem.flight), std::move(problem.options), {}};
-  task.done = [self = this, flight, cut = problem.cut, now,
-               generation = problem.generation](const FlightSolution* solution) {
-    self->finish_joint(*flight, solution, cut, std::chrono::steady_clock::now() - now, generation);
-  };
-  flight->joint_running = true;  // before the worker can be done
-  if (joint.try_start(std::move(task))) return;
-  flight->joint_running = false;
-  flight->live.joint_dropped();
+  if (std::chrono::steady_clock::now() < flight->joint_not_before) return;
+  if (joint_busy.exchange(true)) return;
+  auto problem = std::make_shared<flight::LiveMission::JointProblem>(joint_problem(*flight, outline));
+  flight->joint_running = true;
+  lock.unlock();
+  post(deps.joint, [self = shared_from_this(), flight, problem = std::move(problem)]() mutable {
+    self->solve_joint(*flight, *problem);
+    problem.reset();
+    give_back_memory();
+    self->joint_busy = false;
+  });
+}
+
+void MissionService::State::solve_joint(Flight& flight, const flight::LiveMission::JointProblem& problem) {
+  const auto begun = std::chrono::steady_clock::now();
+  std::optional<FlightSolution> found;
+  (void)guarded("joint solution", [&] {
+    auto options = problem.options;
+    options.canceled = [this] { return stopped.load(); };
+    if (auto solution = solve_flight(problem.flight, options)) found = std::move(solution).value();
+  });
+  const auto took = std::chrono::steady_clock::now() - begun;
+  (void)guarded("joint solution", [&] {
+    finish_joint(flight, found ? &*found : nullptr, problem.cut, took, problem.generation);
+  });
 }
 
 void MissionService::State::finish_joint(Flight& flight, const FlightSolution* solution, UtcTime cut,

@@ -15,7 +15,7 @@ constexpr std::size_t k_announced = 100;  // rows between two announcements of e
 flight::LiveRow MissionService::State::row_of(Range range) const {
   flight::JudgedRange row{std::move(range), {}, {}};
   row.time = row.range.time;
-  if (deps.judge) row.model = deps.judge(row.range);
+  row.model = deps.judge(row.range);
   row.range.cir.reset();  // a queued row needs none, and it is 4 kB
   return row;
 }
@@ -83,7 +83,7 @@ void MissionService::State::schedule(const std::shared_ptr<Flight>& flight) {
     if (flight->queue.empty() && !flight->closing && !flight->new_clues) return;
     flight->scheduled = true;
   }
-  post([self = shared_from_this(), flight] {
+  post(*flight->strand, [self = shared_from_this(), flight] {
     const auto ran = guarded("live path", [&] {
       if (!self->stopped) self->work(*flight);
     });
@@ -99,24 +99,19 @@ void MissionService::State::schedule(const std::shared_ptr<Flight>& flight) {
   });
 }
 
-/// On the pool, counted, so that stop() can wait for it.
-void MissionService::State::post(std::function<void()> task) {
+void MissionService::State::post(Executor& on, std::function<void()> task) {
   {
     const std::scoped_lock lock(running_mutex);
     ++running;
   }
-  auto counted = [self = shared_from_this(), task = std::move(task)] {
+  on.post([self = shared_from_this(), task = std::move(task)] {
     (void)guarded("live path", task);
     {
       const std::scoped_lock lock(self->running_mutex);
       --self->running;
     }
     self->idle.notify_all();
-  };
-  if (deps.post)
-    deps.post(std::move(counted));
-  else
-    counted();
+  });
 }
 
 void MissionService::State::work(Flight& flight) {
@@ -195,8 +190,7 @@ void MissionService::State::note_radios(const flight::LiveRow& row) {
 void MissionService::State::publish_devices() {
   const UtcTime now = deps.clock.now();
   std::string rows = radios.rows_json(steady_now());
-  if (const std::string more = deps.device_rows ? deps.device_rows() : std::string(); !more.empty())
-    rows += (rows.empty() ? "" : ",") + more;
+  if (const std::string more = deps.device_rows(); !more.empty()) rows += (rows.empty() ? "" : ",") + more;
   if (!rows.empty()) deps.hub.publish(Topic::devices, '[' + rows + ']', now.us());
 }
 

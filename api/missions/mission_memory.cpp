@@ -66,7 +66,7 @@ std::optional<MissionService::LiveView> MissionService::State::read(const Missio
   if (!mission) return std::nullopt;
   bool whole = false;  // else the store failed on the way
   {
-    Flight flight(setup_of(mission.value()));
+    Flight flight(setup_of(mission.value()), deps.live.strand());
     start_reading(flight);
     while (rebuild_slice(flight)) {
       if (stopped) return std::nullopt;

@@ -10,16 +10,15 @@ flight::LiveMissionSetup MissionService::State::setup_of(const Mission& mission)
   setup.live.track = deps.track;
   setup.goal = deps.goal;
   setup.exclusions = exclusions_of(mission.id);
-  if (deps.kept_clues) setup.clues = deps.kept_clues(mission.id);
+  setup.clues = deps.kept_clues(mission.id);
   if (mission.site && mission.frame == TrackFrame::wgs84) {
-    if (const auto site = deps.anchors.site(*mission.site)) setup.live.origin = site.value().origin;
+    if (const auto site = deps.sites.site(*mission.site)) setup.live.origin = site.value().origin;
   }
   return setup;
 }
 
 std::vector<Exclusion> MissionService::State::exclusions_of(const MissionId& id) const {
-  if (deps.exclusions == nullptr) return {};
-  auto all = deps.exclusions->exclusions(id);
+  auto all = deps.exclusions.exclusions(id);
   return all ? std::move(all).value() : std::vector<Exclusion>{};
 }
 
@@ -40,12 +39,12 @@ void MissionService::State::start_reading(Flight& flight) const {
   auto& r = *flight.rebuild;
   r.range_filter.mission = r.fix_filter.mission = flight.id;
   r.range_filter.limit = r.fix_filter.limit = 2000;
-  r.range_filter.with_cir = deps.judge_needs_cir && deps.judge_needs_cir();
+  r.range_filter.with_cir = deps.judge_needs_cir();
   flight.live.begin_reading();
 }
 
 void MissionService::State::continue_rebuild(const std::shared_ptr<Flight>& flight) {
-  post([self = shared_from_this(), flight] {
+  post(*flight->strand, [self = shared_from_this(), flight] {
     if (self->stopped) return;
     bool more = false;
     const auto ran = guarded("flight rebuilt", [&] { more = self->rebuild_slice(*flight); });

@@ -11,7 +11,9 @@
 #include "api/missions/routes.hpp"
 #include "api/wire/rows_json.hpp"
 #include "core/ports/devices.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/measurement_store.hpp"
+#include "core/ports/mission_store.hpp"
+#include "core/ports/site_store.hpp"
 
 namespace anchord::api {
 
@@ -24,7 +26,6 @@ namespace {
 
 /// Whether it has the rows of this server's devices, and who has them instead; absent: there are none.
 void say_devices(MissionApi& s, const Mission& mission, Ordered& out) {
-  if (s.devices == nullptr) return;
   const auto holder = s.stream.holder();
   Ordered devices{{"recording", holder && holder->id == mission.id}, {"held_by", nullptr}};
   if (mission.state == MissionState::recording && holder && holder->id != mission.id)
@@ -90,7 +91,7 @@ Response create(MissionApi& s, const Request& request) {
   auto body = json_body(request);
   const auto wanted = read_devices_wanted(request, body, errors);
   Mission mission = read_mission(body, errors);
-  if (mission.site && !s.anchors.site(*mission.site))
+  if (mission.site && !s.sites.site(*mission.site))
     errors.push_back({"/site", "unknown_site", "there is no such site"});
   // A local frame has no place for a rover's positions.
   const bool records = wanted.any && mission.frame == TrackFrame::wgs84;
@@ -112,7 +113,7 @@ Response create(MissionApi& s, const Request& request) {
 }
 
 Response finish(MissionApi& s, const Request& request, const MissionId& id, const std::string& lease) {
-  if (s.control != nullptr && s.control->flies(id))
+  if (s.control.flies(id))
     require_control(s, request, id, lease, "this mission is in the air; finishing it needs its lease");
   const auto finished = s.missions.finish(id);
   if (!finished && finished.error().code == Errc::conflict)
@@ -126,7 +127,6 @@ Response finish(MissionApi& s, const Request& request, const MissionId& id, cons
 /// Rows of the devices for a mission that records without them: at once when nobody has them.
 Response take_devices(MissionApi& s, const Request& request, const Mission& mission,
                       const std::string& lease) {
-  if (s.devices == nullptr) throw_problem(422, "state", "this server has no devices of its own");
   if (mission.state != MissionState::recording)
     throw_problem(422, "state", mission.name + " does not record: devices are for a mission that does");
   if (mission.frame != TrackFrame::wgs84)

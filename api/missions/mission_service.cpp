@@ -78,7 +78,7 @@ void MissionService::prepare(const MissionId& id) {
   if (state_->find(id)) return;
   const auto record = mission(id);
   if (!record) return;
-  auto flight = std::make_shared<Flight>(state_->setup_of(record.value()));
+  auto flight = std::make_shared<Flight>(state_->setup_of(record.value()), state_->deps.live.strand());
   flight->used = state_->steady_now();
   // Told before it can be found: rows that come meanwhile wait in the queue.
   flight->rebuilding = true;
@@ -117,9 +117,7 @@ void MissionService::exclusions_changed(const MissionId& id) {
   state_->begin_rebuild(flight);
 }
 
-bool MissionService::wants_cir() const {
-  return state_->deps.judge_needs_cir && state_->deps.judge_needs_cir();
-}
+bool MissionService::wants_cir() const { return state_->deps.judge_needs_cir(); }
 
 void MissionService::note_in_flights(const std::string& code, const std::string& text) {
   state_->forget_reads(std::nullopt);  // the models that judged their ranges may be others now
@@ -250,7 +248,6 @@ bool MissionService::recording() const {
 
 void MissionService::stop() {
   state_->stopped = true;
-  state_->joint.stop();
   std::unique_lock lock(state_->running_mutex);
   // Tasks the pool never ran (it was stopped first) must not hold the shutdown up for ever.
   state_->idle.wait_for(lock, std::chrono::seconds(5), [&] { return state_->running == 0; });

@@ -28,8 +28,10 @@ namespace anchord {
 class AnchorStore;
 enum class RowOutcome : std::uint8_t;
 class ExclusionStore;
+class Executor;
 class MeasurementStore;
 class MissionStore;
+class SiteStore;
 }  // namespace anchord
 
 namespace anchord::api {
@@ -39,8 +41,8 @@ class Hub;
 class LateWriter;
 class MissionObserver;
 
-/// Flights: their records and, for each, the one LiveFlight that follows the accepted measurements and feeds
-/// the hub.
+/// Flights: their records and, for each, the one flight::LiveMission that follows the accepted measurements
+/// and feeds the hub.
 ///
 /// Thread-safe. Rows are queued per mission and worked off in order by one task at a time (a strand), so that
 /// ingest never waits for a solve. A queue holds at most 100 000 rows; then the oldest leave the live path,
@@ -51,23 +53,25 @@ class MissionService {
   struct Deps {
     MissionStore& missions;
     MeasurementStore& measurements;
+    SiteStore& sites;
     AnchorStore& anchors;
     Hub& hub;
     EventLog& events;
     const Clock& clock;
-    std::function<void(std::function<void()>)> post;  ///< runs a task on the pool; may run it inline
-    AccuracyGoal goal{};                              ///< an anchor within it is converged
-    std::function<std::string()> device_rows{};       ///< more rows of topic `devices`, comma between them
-    /// What the promoted models say of a range; absent: ranges are used raw.
-    std::function<std::optional<RangeModel>(const Range&)> judge{};
-    std::function<bool()> judge_needs_cir{};
+    const SteadyClock& steady;  ///< what silence is measured by
+    Executor& live;             ///< rows to estimates, a strand for each mission
+    Executor& joint;            ///< joint solutions in flight: seconds each
+    LateWriter& late;
+    ExclusionStore& exclusions;
+    AccuracyGoal goal{};                       ///< an anchor within it is converged
+    std::function<std::string()> device_rows;  ///< more rows of topic `devices`, comma between them
+    /// What the promoted models say of a range; nothing while none is promoted.
+    std::function<std::optional<RangeModel>(const Range&)> judge;
+    std::function<bool()> judge_needs_cir;
     bool site_outline{true};  ///< joint solutions take the site's outline as a clue: anchors are inside
-    const SteadyClock* steady{nullptr};   ///< what silence is measured by; null: the system's
-    ExclusionStore* exclusions{nullptr};  ///< null: nothing is ever excluded (tests)
-    TrackLimits track{};                  ///< what the positions of a flight are held against
-    LateWriter* late{nullptr};            ///< null: what it writes it writes at once
-    /// What turns and height searches of a mission's flight told, as kept with it; absent: nothing is kept.
-    std::function<procedure::FlightClues(const MissionId&)> kept_clues{};
+    TrackLimits track{};      ///< what the positions of a flight are held against
+    /// What turns and height searches of a mission's flight told, as kept with it.
+    std::function<procedure::FlightClues(const MissionId&)> kept_clues;
   };
   /// Missions kept in memory although nothing of them is in the air: finished, or silent for k_silent_s. The
   /// others of these are evicted, least recently used first; the store has all of them.

@@ -8,22 +8,30 @@
 #include <variant>
 
 #include "api/kit/late_writer.hpp"
-#include "api/missions/joint_worker.hpp"
 #include "api/missions/mission_service.hpp"
 #include "api/missions/radio_watch.hpp"
 #include "api/wire/live_writer.hpp"
 #include "core/flight/live_mission.hpp"
+#include "core/ports/anchor_store.hpp"
 #include "core/ports/exclusion_store.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/executor.hpp"
+#include "core/ports/measurement_store.hpp"
+#include "core/ports/mission_store.hpp"
+#include "core/ports/site_store.hpp"
 
 namespace anchord::api {
 
 /// One followed mission. `queue_mutex` guards what requests touch, `work_mutex` is the strand of the rest.
 struct MissionService::Flight {
-  explicit Flight(flight::LiveMissionSetup setup)
-      : id(setup.mission.id), frame(setup.mission.frame), mission(setup.mission), live(std::move(setup)) {}
+  Flight(flight::LiveMissionSetup setup, std::unique_ptr<Executor> on)
+      : id(setup.mission.id),
+        frame(setup.mission.frame),
+        strand(std::move(on)),
+        mission(setup.mission),
+        live(std::move(setup)) {}
   const MissionId id;
   const TrackFrame frame;
+  const std::unique_ptr<Executor> strand;
   std::mutex queue_mutex;
   Mission mission;  ///< under queue_mutex
   std::deque<flight::LiveRow> queue;
@@ -79,7 +87,7 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   int running{0};
   std::int64_t ticks{0};
   std::atomic<std::uint64_t> evicted{0};
-  JointWorker joint;
+  std::atomic<bool> joint_busy{false};  ///< one joint solution at a time, of whichever mission
   struct Read {
     MissionId id{};
     std::uint64_t n_ranges{}, n_fixes{};
@@ -90,9 +98,7 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   std::mutex reads_mutex;
   std::deque<Read> reads;  ///< newest last
 
-  SteadyTime steady_now() const {
-    return (deps.steady != nullptr ? *deps.steady : system_steady_clock()).now();
-  }
+  SteadyTime steady_now() const { return deps.steady.now(); }
   std::vector<std::shared_ptr<Flight>> all() {
     std::vector<std::shared_ptr<Flight>> out;
     const std::scoped_lock lock(mutex);
@@ -114,10 +120,7 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   void enqueue(Flight& flight, const R& row, SteadyTime now);
   /// A write that the live path does not wait for.
   void later(std::function<Result<void>()> write) const {
-    if (deps.late != nullptr)
-      deps.late->write(std::move(write), std::chrono::milliseconds(0));
-    else
-      (void)write().has_value();
+    deps.late.write(std::move(write), std::chrono::milliseconds(0));
   }
   flight::LiveRow row_of(Range range) const;
   static flight::LiveRow row_of(Fix fix) { return fix; }
@@ -147,10 +150,12 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   void forget_reads(const std::optional<MissionId>& id);
   static flight::LiveMission::JointProblem joint_problem(Flight& flight, const std::string& outline);
   std::string outline_of(const Mission& mission) const;
-  void post(std::function<void()> task);
+  /// Counted, so that stop() can wait for it.
+  void post(Executor& on, std::function<void()> task);
   flight::LiveMissionSetup setup_of(const Mission& mission) const;
   std::vector<Exclusion> exclusions_of(const MissionId& id) const;
   void start_joint(const std::shared_ptr<Flight>& flight);
+  void solve_joint(Flight& flight, const flight::LiveMission::JointProblem& problem);
   void finish_joint(Flight& flight, const FlightSolution* solution, UtcTime cut,
                     std::chrono::steady_clock::duration took, std::uint64_t generation);
   void publish_devices();

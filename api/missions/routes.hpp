@@ -12,12 +12,11 @@
 #include "core/types/mission.hpp"
 
 namespace anchord {
-class AnchorStore;
 class Clock;
-class DeviceControl;
 class MeasurementStore;
 class MissionBin;
 class MissionStore;
+class SiteStore;
 }  // namespace anchord
 
 namespace anchord::api {
@@ -43,9 +42,8 @@ struct MissionApi {
   MissionService& missions;
   MissionStore& mission_store;
   MeasurementStore& measurements;
-  AnchorStore& anchors;
-  MissionBin* bin{nullptr};         ///< null: no mission can be deleted
-  DeviceControl* devices{nullptr};  ///< null: this server has none
+  SiteStore& sites;
+  MissionBin& bin;
   DeviceStream& stream;
   EventLog& events;
   Housekeeping& housekeeping;
@@ -53,7 +51,7 @@ struct MissionApi {
   std::int64_t keep_deleted_ns{0};
   const Clock& clock;
   Audit audit;
-  MissionControl* control{nullptr};  ///< null: nothing is flown here
+  MissionControl& control;
   FlightActions flight{};
 };
 

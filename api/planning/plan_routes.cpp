@@ -10,7 +10,7 @@
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/plan_store.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/site_store.hpp"
 
 namespace anchord::api {
 
@@ -40,7 +40,7 @@ Response list(PlanningApi& s, const Request& request) {
 
 /// Stores a plan that was read; refuses what is wrong with it.
 Response store_new(PlanningApi& s, const Request& request, Plan plan, std::vector<FieldError> errors) {
-  if (plan.site && !s.anchors.site(*plan.site))
+  if (plan.site && !s.sites.site(*plan.site))
     errors.push_back({"/site", "unknown_site", "there is no such site"});
   refuse_if_any(errors);
   plan.created = plan.changed = s.clock.now();
@@ -61,7 +61,7 @@ Response create(PlanningApi& s, const Request& request) {
 
 Response replace(PlanningApi& s, const Request& request, const Plan& old, Plan plan,
                  std::vector<FieldError> errors) {
-  if (plan.site && !s.anchors.site(*plan.site))
+  if (plan.site && !s.sites.site(*plan.site))
     errors.push_back({"/site", "unknown_site", "there is no such site"});
   refuse_if_any(errors);
   plan.id = old.id;

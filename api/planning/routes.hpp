@@ -7,9 +7,9 @@
 #include "core/base/ids.hpp"
 
 namespace anchord {
-class AnchorStore;
 class Clock;
 class PlanStore;
+class SiteStore;
 }  // namespace anchord
 
 namespace anchord::api {
@@ -19,7 +19,7 @@ class Router;
 /// What the routes of plans work with; lives as long as the router.
 struct PlanningApi {
   PlanStore& plans;
-  AnchorStore& anchors;
+  SiteStore& sites;
   const Clock& clock;
   Audit audit;
   /// Which mission flies this plan.

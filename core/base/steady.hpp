@@ -31,7 +31,7 @@ class SystemSteadyClock final : public SteadyClock {
   SteadyTime now() const override;
 };
 
-/// The one of the system, for whoever was given none.
+/// The system's.
 const SteadyClock& system_steady_clock();
 
 }  // namespace anchord

@@ -87,8 +87,6 @@ class LiveMission {
   bool joint_is_worth_it() const;
   /// Where joint_is_worth_it(). `outline_m`: of the site in metres of origin(), empty where it has none.
   JointProblem joint_problem(std::vector<Eigen::Vector2d> outline_m);
-  /// The problem was not solved: the next may come at once.
-  void joint_dropped() { ranges_since_joint_ = std::max<std::size_t>(ranges_since_joint_, 1); }
   /// From the next row on it holds. False: it began anew since.
   bool adopt(const FlightSolution& solution, UtcTime cut, std::uint64_t generation);
 

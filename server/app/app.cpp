@@ -63,6 +63,9 @@ HostPolicy host_policy(const Config& config) {
   return policy;
 }
 
+/// Backup, calibration, discovery, training, and room for one more.
+constexpr std::size_t k_kinds_of_jobs = 5;
+
 /// As many descriptors as the system lets us have: connections, database and models need them.
 std::size_t raise_descriptor_limit() {
   rlimit limit{};
@@ -82,9 +85,9 @@ struct App::State {
   std::unique_ptr<BackupKeeper> backups;
   std::unique_ptr<Metrics> metrics;
   std::unique_ptr<api::AccessService> access;
-  std::unique_ptr<WorkerPool> pool, stream_pool, live_pool, command_pool, flight_pool, heavy_pool;
+  std::unique_ptr<WorkerPool> pool, stream_pool, command_pool, flight_pool, heavy_pool;  ///< of handlers
+  std::unique_ptr<WorkerPool> live_pool, joint_pool, plan_pool, job_pool;  ///< of what no request waits for
   std::unique_ptr<DeviceManager> devices;
-  std::unique_ptr<api::LearningStores> learning;
   ModelKey model_key;
   std::unique_ptr<flight::DroneLink> drone;
   std::unique_ptr<api::Application> application;
@@ -158,8 +161,8 @@ Result<void> App::State::listen() {
   options.limits.max_connections =
       std::min(options.limits.max_connections, descriptors - std::min<std::size_t>(descriptors / 2, 128));
   http = std::make_unique<HttpServer>(
-      options, *door,
-      Executors{*pool, *stream_pool, command_pool.get(), flight_pool.get(), heavy_pool.get()});
+      options, *door, Executors{*pool, *stream_pool, *command_pool, *flight_pool, *heavy_pool});
+  http->every(std::chrono::milliseconds(50), "live stream", [this] { application->stream_round(); });
   for (const auto& endpoint : config.list("listen")) {
     BOOST_OUTCOME_TRY(const auto port, http->listen(endpoint));
     urls.push_back("http://" + endpoint.substr(0, endpoint.rfind(':')) + ":" + std::to_string(port));
@@ -232,51 +235,38 @@ void App::State::compose() {
                                             config.count("http.heavy_queue"), 10);
   // Apart from the handlers, so that a flight that is being solved never makes a page wait.
   live_pool = std::make_unique<WorkerPool>("anchord-live", 2, 4096);
-  api::Application::Deps deps{.measurements = database->measurements(),
-                              .missions = database->missions(),
-                              .anchors = database->anchors(),
-                              .jobs = database->jobs(),
-                              .access_store = database->access(),
-                              .clock = clock};
-  deps.build = {ANCHORD_VERSION, ANCHORD_GIT, ANCHORD_BUILD_TYPE, __VERSION__,
-                database->health().schema_version};
-  deps.plans = &database->plans();
-  deps.drone = drone.get();
-  deps.access = access.get();
-  deps.kits = &database->kits();
-  deps.exclusions = &database->exclusions();
-  deps.frames = &database->frames();
+  joint_pool = std::make_unique<WorkerPool>("anchord-joint", 1, 1);
+  plan_pool = std::make_unique<WorkerPool>("anchord-plan", 1, 16);
+  job_pool = std::make_unique<WorkerPool>("anchord-job", k_kinds_of_jobs, k_kinds_of_jobs);
   BackupKeeper::Options keep;
   keep.dir = config.text("backup.dir").empty() ? data_dir / "backups" : fs::path(config.text("backup.dir"));
   keep.keep = config.count("backup.keep");
   keep.every_h = config.count("backup.every_h");
   keep.scheduled = config.text("backup.schedule") == "on";
   backups = std::make_unique<BackupKeeper>(*database, clock, std::move(keep));
-  deps.backups = backups.get();
+  api::Application::Deps deps{.stores = database->stores(),
+                              .work = {*live_pool, *joint_pool, *plan_pool, *job_pool},
+                              .clock = clock,
+                              .access = *access,
+                              .backups = *backups,
+                              .devices = *devices,
+                              .model_key = model_key.text};
+  deps.build = {ANCHORD_VERSION, ANCHORD_GIT, ANCHORD_BUILD_TYPE, __VERSION__,
+                database->health().schema_version};
+  deps.drone = drone.get();
   deps.goal = {config.metres("goal.h95_m"), config.metres("goal.v95_m")};
   deps.site_outline = config.text("solve.site_outline") == "on";
   deps.track.max_correction_age_s =
       std::chrono::duration<double>(config.seconds("solve.max_correction_age_s")).count();
-  deps.devices = devices.get();
-  learning = std::make_unique<api::LearningStores>(
-      api::LearningStores{database->campaigns(), database->labels(), database->datasets(),
-                          database->training_runs(), database->models()});
-  deps.learning = learning.get();
-  deps.model_key = model_key.text;
-  deps.model_key_is_new = model_key.fresh;
-  deps.run_work = work_in_process();
-  deps.bin = &database->bin();
-  deps.service = &database->service();
-  deps.keep_deleted_ns =
-      static_cast<std::int64_t>(config.count("missions.keep_deleted_days")) * 86'400 * 1'000'000'000;
-  deps.post = [this](std::function<void()> task) {
-    if (!live_pool->try_submit(task)) task();  // a full queue slows the sender, loses nothing
-  };
   deps.storage_status = [this] { return status_of(*database); };
   deps.metrics_text = [this] { return metrics->text() + devices->metrics(); };
   deps.log_fault = [](std::string_view request_id, std::string_view what) {
     log(LogLevel::error, "fault in a handler", {{"request_id", request_id}, {"what", what}});
   };
+  deps.run_work = work_in_process();
+  deps.model_key_is_new = model_key.fresh;
+  deps.keep_deleted_ns =
+      static_cast<std::int64_t>(config.count("missions.keep_deleted_days")) * 86'400 * 1'000'000'000;
   application = std::make_unique<api::Application>(std::move(deps));
   application->start();
   if (drone) drone->start();  // after a flight that goes on has said which aircraft is its own
@@ -308,8 +298,8 @@ Result<std::unique_ptr<App>> App::start(const Config& config) {
   s.metrics = std::make_unique<Metrics>(ANCHORD_VERSION);
   api::AccessOptions access_options;
   access_options.auth_off = config.text("auth") == "off";
-  s.access = std::make_unique<api::AccessService>(s.database->tokens(), s.database->access(), s.clock,
-                                                  access_options);
+  s.access = std::make_unique<api::AccessService>(s.database->stores().tokens, s.database->stores().access,
+                                                  s.clock, access_options);
   BOOST_OUTCOME_TRYV(s.access->load());
   BOOST_OUTCOME_TRYV(s.first_token());
   BOOST_OUTCOME_TRY(s.model_key, read_or_make_model_key(s.data_dir));
@@ -341,8 +331,9 @@ void App::stop() {
   step("devices");
   if (s.application) s.application->stop();  // first, so that nobody waits in a handler for a job
   step("application");
-  for (auto* workers : {s.command_pool.get(), s.flight_pool.get(), s.pool.get(), s.heavy_pool.get(),
-                        s.stream_pool.get(), s.live_pool.get()}) {
+  for (auto* workers :
+       {s.command_pool.get(), s.flight_pool.get(), s.pool.get(), s.heavy_pool.get(), s.stream_pool.get(),
+        s.live_pool.get(), s.joint_pool.get(), s.plan_pool.get(), s.job_pool.get()}) {
     if (workers != nullptr) workers->stop();
   }
   step("workers");

@@ -7,6 +7,9 @@
 #include "api/measurements/flight_requests.hpp"
 #include "api/wire/exclusion_json.hpp"
 #include "core/base/text.hpp"
+#include "core/ports/exclusion_store.hpp"
+#include "core/ports/measurement_store.hpp"
+#include "core/ports/mission_store.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/flight_upload.hpp"
 #include "server/cli/progress.hpp"
@@ -80,11 +83,11 @@ Result<std::string> import_into_folder(const Options& options, FlightData flight
   mission.state = MissionState::finished;
   mission.created = now;
   mission.finished = now;
-  BOOST_OUTCOME_TRY(db->missions().insert(mission));
+  BOOST_OUTCOME_TRY(db->stores().missions.insert(mission));
   // Not from a wire: a value that cannot be stored (NaN) is left out and counted, as the server would answer.
   std::size_t refused = std::erase_if(flight.ranges, [](const Range& r) { return !(r.distance_m > 0); });
   const std::size_t n = flight.fixes.size() + flight.ranges.size();
-  auto& store = db->measurements();
+  auto& store = db->stores().measurements;
   BOOST_OUTCOME_TRY(append_all(flight.fixes, mission.id, refused, [&](std::vector<Fix> rows) {
     return store.append_fixes(std::move(rows), false);
   }));
@@ -95,9 +98,9 @@ Result<std::string> import_into_folder(const Options& options, FlightData flight
     one.id = ExclusionId{make_uuid_v7(now)};
     one.mission = mission.id;
     const auto word = std::exchange(one.included, std::nullopt);
-    BOOST_OUTCOME_TRYV(db->exclusions().insert(one, {}));
+    BOOST_OUTCOME_TRYV(db->stores().exclusions.insert(one, {}));
     if (!word) continue;
-    BOOST_OUTCOME_TRYV(db->exclusions().include(mission.id, one.id, *word));
+    BOOST_OUTCOME_TRYV(db->stores().exclusions.include(mission.id, one.id, *word));
   }
   std::fprintf(stderr, "%s: %zu rows stored, %zu rejected\n", mission.name.c_str(), n, refused);
   return to_string(mission.id);

@@ -75,7 +75,7 @@ int with_folder(const Options& options, Act act) {
   auto database = open_database(storage);
   if (!database) return fail(database.error().message);
   const SystemClock clock;
-  api::AccessService access(database.value()->tokens(), database.value()->access(), clock);
+  api::AccessService access(database.value()->stores().tokens, database.value()->stores().access, clock);
   if (const auto loaded = access.load(); !loaded) return fail(loaded.error().message);
   return act(access);
 }

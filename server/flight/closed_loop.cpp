@@ -4,51 +4,78 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 
 #include "core/geo/enu.hpp"
-#include "core/localize/live_flight.hpp"
+#include "core/planning/bounds.hpp"
 #include "core/planning/flight_plan.hpp"
 #include "core/planning/local_plan.hpp"
+#include "drivers/drone/session.hpp"
+#include "server/flight/inline_flight.hpp"
 #include "server/flight/sim_kit.hpp"
 
 namespace anchord::flight {
 namespace {
 
-using procedure::Command;
-using procedure::Event;
+using procedure::Step;
 
+constexpr double k_tick_s = 0.05;    ///< of the link
+constexpr double k_start_s = 12;     ///< RTK must have been fixed for ten seconds
+constexpr double k_patience_s = 60;  ///< until a start that stays blocked counts
+constexpr int k_presses = 5;  ///< on a poor link a start may not be confirmed: the operator presses again
 const Eigen::Vector3d k_home_m{-9, -9, 0};
 
-void obey(sim::Vehicle& vehicle, const Command& order) {
-  switch (order.kind) {
-    case Command::Kind::take_off:
-      vehicle.arm();
-      return vehicle.take_off(order.point_m.z());
-    case Command::Kind::go_to:
-      return vehicle.go_to(order.point_m, order.heading_rad);
-    case Command::Kind::hold:
-      return vehicle.hold();
-    case Command::Kind::return_home:
-      return vehicle.return_home();
-    case Command::Kind::land:
-      return vehicle.land();
-    case Command::Kind::measure:
-    case Command::Kind::decide:
-      return;
-  }
+sim::AutopilotOptions autopilot_of(const sim::World& world, const ClosedLoopOptions& options) {
+  auto out = options.autopilot;
+  out.origin = world.origin;
+  out.home_m = k_home_m;
+  out.vehicle = options.vehicle;
+  out.ready_s = 1;
+  return out;
 }
 
-procedure::VehicleView view_of(const sim::Vehicle& vehicle) {
-  procedure::VehicleView view;
-  view.position_m = vehicle.position_m();
-  view.heading_rad = vehicle.heading_rad();
-  view.speed_mps = vehicle.velocity_mps().norm();
-  view.armed = vehicle.armed();
-  view.in_air = vehicle.in_air();
-  view.battery = vehicle.battery();
-  return view;
+/// Session and autopilot with the air between them.
+class Air {
+ public:
+  explicit Air(sim::AutopilotOptions options) : autopilot(std::move(options)) {}
+  void fly_until(double now_s) {
+    while (now_s_ + k_tick_s <= now_s + 1e-9) {
+      now_s_ += k_tick_s;
+      const auto unix_us = unix_us_at(now_s_);
+      autopilot.advance(now_s_);
+      session.feed(now_s_, unix_us, autopilot.take_bytes());
+      session.tick(now_s_, unix_us);
+      autopilot.feed(session.take_bytes());
+    }
+  }
+  Now now() const {
+    Now out;
+    out.s = now_s_;
+    out.utc = UtcTime::from_us(unix_us_at(now_s_));
+    out.steady = {static_cast<std::int64_t>(now_s_ * 1e9)};
+    return out;
+  }
+  sim::AutopilotSim autopilot;
+  drone::Session session;
+
+ private:
+  std::int64_t unix_us_at(double now_s) const {
+    return autopilot.options().start_unix_us + static_cast<std::int64_t>(now_s * 1e6);
+  }
+  double now_s_{0};
+};
+
+/// How near it came to what it must keep away from.
+void note_place(const planning::Polygon& outline, const sim::Vehicle& vehicle, Step step,
+                ClosedLoopResult& out) {
+  if (!vehicle.in_air()) return;
+  const Eigen::Vector3d at = vehicle.position_m();
+  const double edge_m = planning::distance_to_edge_m(outline, at.head<2>());
+  out.clearance_m = std::min(out.clearance_m, planning::contains(outline, at.head<2>()) ? 0 : edge_m);
+  if (step != Step::take_off && step != Step::landing && step != Step::done)
+    out.lowest_m = std::min(out.lowest_m, at.z());
 }
 
 }  // namespace
@@ -85,57 +112,45 @@ sim::World walled_world() {
 
 Result<ClosedLoopResult> fly_closed_loop(const sim::World& world, const Plan& plan,
                                          const ClosedLoopOptions& options) {
-  BOOST_OUTCOME_TRY(auto setup, procedure::flight_setup(plan, k_home_m));
-  setup.limits.battery_per_s = 1 / options.vehicle.battery_s;
   const auto begun = std::chrono::steady_clock::now();
-  const EnuFrame frame(setup.origin);
-  sim::Vehicle vehicle(options.vehicle, k_home_m, 0);
+  const planning::Polygon outline{
+      {0, 0}, {world.length_m, 0}, {world.length_m, world.width_m}, {0, world.width_m}};
+  Air air(autopilot_of(world, options));
   SimKit kit(world, options.radio, options.seed);
-  procedure::FlightEngine engine(std::move(setup));
-  LiveOptions live_options;
-  live_options.origin = frame.origin();
-  live_options.update_interval_s = options.live_update_s;
-  LiveFlight live(kit.mission(), live_options);
+  InlineFlight flight({kit.mission(), plan, options.live_update_s, options.use_clues}, air.session);
   ClosedLoopResult out;
   out.data.mission = kit.mission();
-  bool started = false;
-  std::uint64_t n_decided = 0, n_clues = 0;
+  bool flew = false;
+  int presses = 0;
   while (kit.now_s() < options.max_s) {
-    auto measured = kit.advance(vehicle);
-    const double now = kit.now_s();
-    engine.vehicle(now, view_of(vehicle));
-    for (auto& fix : measured.fixes) {
-      engine.fix(now, frame.enu_from_wgs84(fix.position).m, fix.fix);
-      live.add(fix);
-      out.data.fixes.push_back(std::move(fix));
-    }
-    for (auto& range : measured.ranges) {
-      live.add(range);
-      out.data.ranges.push_back(std::move(range));
-    }
-    for (const auto& result : live.take_ranges())
-      engine.range(now, result.range.anchor, result.used(), result.range.rss_dbm, result.range.distance_m);
-    if (options.use_clues && n_clues != engine.clues_version()) {
-      n_clues = engine.clues_version();
-      out.clues = procedure::clues_in(procedure::flight_clues(engine.clues(), frame), frame);
-      live.tell(out.clues);
-    }
-    if (!started && now > 2) started = engine.command(now, Event::start, "the simulation");
-    const bool deciding = engine.state().step == procedure::Step::find_next_point;
-    engine.tick(now, deciding ? live.estimates() : std::vector<Estimate>{});
-    if (deciding) ++n_decided;
-    for (const auto& order : engine.take_orders()) {
-      obey(vehicle, order);
-      ++out.n_orders;
-    }
-    for (auto& h : engine.take_happenings()) out.happenings.push_back(std::move(h));
-    if (engine.state().step == procedure::Step::done) break;
+    const auto& vehicle = air.autopilot.vehicle();
+    const Eigen::Vector3d before = vehicle.position_m();
+    air.fly_until(kit.now_s() + SimKit::k_step_s);
+    const auto measured = kit.observe(before, vehicle);
+    flight.step(air.now(), measured.fixes, measured.ranges);
+    std::ranges::copy(measured.fixes, std::back_inserter(out.data.fixes));
+    std::ranges::copy(measured.ranges, std::back_inserter(out.data.ranges));
+    for (auto& line : flight.take_log()) out.log.emplace_back(kit.now_s(), std::move(line));
+    const auto& f = flight.flight();
+    const Step step = f ? f->control.engine().state().step : Step::ready;
+    note_place(outline, vehicle, step, out);
+    flew = flew || vehicle.in_air();
+    if (f && f->flying()) continue;
+    if (flew || presses == k_presses) break;
+    if (kit.now_s() < k_start_s) continue;
+    const auto started = flight.start(air.now());
+    presses += started ? 1 : 0;
+    if (!started && kit.now_s() > k_start_s + k_patience_s) return started.error();
   }
+  flight.finish();
   for (const auto& anchor : world.anchors) out.data.anchor_names[anchor.id] = to_string(anchor.id);
-  live.finish();
-  out.live = live.estimates();
-  out.state = engine.state();
-  out.n_decisions = n_decided;
+  if (const auto& f = flight.flight()) {
+    out.state = f->control.engine().state();
+    if (options.use_clues) out.clues = procedure::clues_in(f->clues(), EnuFrame(*plan.origin));
+  }
+  out.landed = !air.autopilot.vehicle().in_air() && out.state.step == Step::done;
+  out.home_m = (air.autopilot.vehicle().position_m() - k_home_m).head<2>().norm();
+  out.live = flight.live().estimates();
   out.flight_s = kit.now_s();
   out.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   return out;

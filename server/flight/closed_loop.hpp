@@ -1,18 +1,19 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <optional>
-#include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/result.hpp"
+#include "core/flight/operations.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "core/procedure/flight_clues.hpp"
-#include "core/procedure/flight_engine.hpp"
+#include "core/procedure/machine.hpp"
 #include "core/types/flight_data.hpp"
 #include "core/types/plan.hpp"
+#include "drivers/sim/autopilot.hpp"
 #include "drivers/sim/radio.hpp"
 #include "drivers/sim/vehicle.hpp"
 #include "drivers/sim/world.hpp"
@@ -24,20 +25,23 @@ struct ClosedLoopOptions {
   double max_s = 3600;  ///< of the flight's own clock
   sim::VehicleOptions vehicle{};
   sim::RadioOptions radio{};
-  double live_update_s = 4;  ///< of the running estimates
-  bool use_clues = true;     ///< what turns and height searches told is a prior
+  sim::AutopilotOptions autopilot{};  ///< origin, home and vehicle are those of the world and of here
+  double live_update_s = 4;           ///< of the running estimates
+  bool use_clues = true;              ///< what turns and height searches told is a prior
 };
 
-/// What was flown and what came of it.
+/// What was flown and what came of it; places in truth.
 struct ClosedLoopResult {
   FlightData data;
   std::map<NetworkId, AnchorClues> clues;  ///< for the solve; in metres of the plan's origin
   std::vector<Estimate> live;              ///< as they stood at the end of the flight
   procedure::State state;
   double flight_s{}, wall_s{};
-  std::vector<procedure::Happening> happenings;
-  std::size_t n_decisions{};
-  std::size_t n_orders{};
+  std::vector<std::pair<double, LogEvent>> log;  ///< with the flight's time
+  double clearance_m{1e9};                       ///< nearest to the outline
+  double lowest_m{1e9};                          ///< between the first waypoint and the landing
+  double home_m{};  ///< where it stands in the end, across, from where it took off
+  bool landed{false};
 };
 
 /// A plan from the building's outline alone: no waypoint set by hand.
@@ -47,8 +51,9 @@ Result<Plan> plan_from_outline(const sim::World& world);
 /// The building with brick fronts instead of glass: every range goes through a wall.
 sim::World walled_world();
 
-/// Flies a plan in the simulated world, headless and as fast as the machine can: vehicle, tag and rover, live
-/// estimates, procedure, planner. The measurements are those that a batch solve would get.
+/// Flies a plan in the simulated world, headless and as fast as the machine can: tag, rover, autopilot and
+/// its MAVLink session, and the mission, procedure and planner that fly real ones (InlineFlight). The
+/// measurements are those that a batch solve would get. errors: of the plan; what blocks the start for good
 Result<ClosedLoopResult> fly_closed_loop(const sim::World& world, const Plan& plan,
                                          const ClosedLoopOptions& options);
 

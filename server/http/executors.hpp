@@ -13,31 +13,26 @@ namespace anchord::server {
 
 class WorkerPool;
 
-/// The pools that run handlers, by the class of the route. One that is absent is served by `ordinary`
-/// (tests).
+/// The pools that run handlers, by the class of the route.
 struct Executors {
   WorkerPool& ordinary;
   WorkerPool& uploads;  ///< handlers that wait for a body: a slow upload must not hold the others up
-  WorkerPool* command{nullptr};
-  WorkerPool* flight{nullptr};
-  WorkerPool* heavy{nullptr};
+  WorkerPool& command;
+  WorkerPool& flight;
+  WorkerPool& heavy;
 
   WorkerPool& of(api::Work work) const {
-    WorkerPool* own = nullptr;
     switch (work) {
       case api::Work::command:
-        own = command;
-        break;
+        return command;
       case api::Work::flight:
-        own = flight;
-        break;
+        return flight;
       case api::Work::heavy:
-        own = heavy;
-        break;
+        return heavy;
       case api::Work::ordinary:
         break;
     }
-    return own != nullptr ? *own : ordinary;
+    return ordinary;
   }
 };
 

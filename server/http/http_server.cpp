@@ -1,5 +1,6 @@
 #include "server/http/http_server.hpp"
 
+#include <algorithm>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/v6_only.hpp>
@@ -59,6 +60,18 @@ struct HttpServer::State {
   std::size_t io_threads{1};
   bool stopped{false};
 
+  /// At a fixed rate; a round that came late is not made up for.
+  static asio::awaitable<void> repeat(std::chrono::milliseconds period, std::string name,
+                                      std::function<void()> task) {
+    asio::steady_timer timer(co_await asio::this_coro::executor);
+    for (auto due = std::chrono::steady_clock::now();;) {
+      due = std::max(due + period, std::chrono::steady_clock::now());
+      timer.expires_at(due);
+      co_await timer.async_wait(k_wait);
+      (void)guarded(name, task);
+    }
+  }
+
   static asio::awaitable<void> accept_all(std::shared_ptr<tcp::acceptor> acceptor,
                                           std::shared_ptr<SessionContext> context, asio::io_context& io) {
     asio::steady_timer pause(acceptor->get_executor());
@@ -117,6 +130,11 @@ Result<std::uint16_t> HttpServer::listen(std::string_view text) {
   }
   state_->acceptors.push_back(acceptor);
   return acceptor->local_endpoint().port();
+}
+
+void HttpServer::every(std::chrono::milliseconds period, std::string name, std::function<void()> task) {
+  asio::co_spawn(state_->io, State::repeat(period, std::move(name), std::move(task)),
+                 [](const std::exception_ptr& fault) { (void)guarded_end("timer", fault); });
 }
 
 void HttpServer::start() {

@@ -36,6 +36,8 @@ class HttpServer {
   /// "127.0.0.1:8420", "[::1]:8420"; port 0 lets the system choose. Returns the port.
   /// Errors: invalid_argument (not an address), conflict (in use), unsupported (no such address here).
   Result<std::uint16_t> listen(std::string_view endpoint);
+  /// Runs `task` on an io thread, as often: between sockets, so it must be brief. Before start().
+  void every(std::chrono::milliseconds period, std::string name, std::function<void()> task);
   void start();
   /// Takes no more work: listeners close, idle connections end, running requests finish, WebSockets get 1001.
   /// Then, at the latest after `grace`, whatever is left is cut. Idempotent.

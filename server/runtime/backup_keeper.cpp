@@ -52,9 +52,7 @@ std::optional<std::pair<std::uint64_t, UtcTime>> read_name(const std::string& na
 BackupKeeper::BackupKeeper(Database& database, const Clock& clock, Options options)
     : database_(database), clock_(clock), options_(std::move(options)) {}
 
-SteadyTime BackupKeeper::steady_now() const {
-  return (options_.steady != nullptr ? *options_.steady : system_steady_clock()).now();
-}
+SteadyTime BackupKeeper::steady_now() const { return options_.steady->now(); }
 
 std::vector<Backup> BackupKeeper::list() const {
   std::vector<Backup> out;

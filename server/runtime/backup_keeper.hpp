@@ -25,8 +25,8 @@ class BackupKeeper final : public Backups {
     std::filesystem::path dir;
     std::size_t keep{k_fewest};  ///< whole ones; what is older than the last of them goes, whole or not
     std::size_t every_h{24};
-    bool scheduled{true};                ///< false: only when asked for
-    const SteadyClock* steady{nullptr};  ///< what the schedule runs on; null: the system's
+    bool scheduled{true};                               ///< false: only when asked for
+    const SteadyClock* steady{&system_steady_clock()};  ///< what the schedule runs on
   };
   BackupKeeper(Database& database, const Clock& clock, Options options);
   Result<Backup> make() override;

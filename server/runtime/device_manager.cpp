@@ -4,6 +4,7 @@
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <future>
 #include <mutex>
 #include <random>
@@ -26,7 +27,9 @@ namespace {
 constexpr auto k_answer_time =
     std::chrono::seconds(25);  ///< settings of six anchors by radio take half of it
 
+/// Rows wait so long for others to go with: an estimate for each single one would cost more than it tells.
 constexpr std::chrono::milliseconds k_live_batch{20}, k_store_batch{100};
+constexpr std::size_t k_live_rows = 200;
 
 DeviceReport report_of(const DeviceConfig& config, const device::DeviceState& s) {
   DeviceReport out;
@@ -109,7 +112,6 @@ class DeviceManager::Impl final : public device::DeviceListener {
 
   void start(DeviceRows& rows) {
     rows_ = &rows;
-    live_rows_ = Thread("anchord-rows", [this] { hand_on_rows(); });
     writer_ = Thread("anchord-store", [this] { write_rows(); });
     std::vector<KeptDevice> devices;
     {
@@ -180,12 +182,11 @@ class DeviceManager::Impl final : public device::DeviceListener {
       boost::asio::post(io_, [this] {
         loop_.reset();
         recorder_.reset();
+        hand_on_rows();
         io_.stop();
       });
       io_thread_.join();
     }
-    arrived_.stop();
-    if (live_rows_.joinable()) live_rows_.join();
     unstored_.stop();
     if (writer_.joinable()) writer_.join();
     const std::scoped_lock lock(answers_mutex_);
@@ -209,8 +210,8 @@ class DeviceManager::Impl final : public device::DeviceListener {
   }
 
   // --- io thread -------------------------------------------------------------------------------------------
-  void fix(const std::string&, const Fix& row) override { arrived_.push(row); }
-  void range(const std::string&, const Range& row) override { arrived_.push(row); }
+  void fix(const std::string&, const Fix& row) override { arrived(arrived_.fixes, row); }
+  void range(const std::string&, const Range& row) override { arrived(arrived_.ranges, row); }
   void changed(const std::string& id) override {
     const auto state = loop_ ? loop_->device(id) : std::nullopt;
     if (!state) {
@@ -254,14 +255,21 @@ class DeviceManager::Impl final : public device::DeviceListener {
     }
   }
 
-  // --- thread of the live flight ---------------------------------------------------------------------------
+  template <class Row>
+  void arrived(std::vector<Row>& rows, const Row& row) {
+    rows.push_back(row);
+    if (arrived_.size() >= k_live_rows) return hand_on_rows();
+    if (arrived_.size() > 1) return;  // the timer runs
+    hand_on_.expires_after(k_live_batch);
+    hand_on_.async_wait([this](boost::system::error_code error) {
+      if (!error) hand_on_rows();
+    });
+  }
+  /// To the live flights, which only queue them, and to whoever stores them.
   void hand_on_rows() {
-    DeviceBatch batch;
-    while (arrived_.take(batch)) {
-      if (batch.empty()) continue;
-      (void)guarded("live rows of devices", [&] { rows_->live(batch); });
-      unstored_.push(std::exchange(batch, {}));
-    }
+    if (arrived_.empty()) return;
+    (void)guarded("live rows of devices", [&] { rows_->live(arrived_); });
+    unstored_.push(std::exchange(arrived_, {}));
   }
 
   // --- writer thread ---------------------------------------------------------------------------------------
@@ -296,8 +304,10 @@ class DeviceManager::Impl final : public device::DeviceListener {
   std::unique_ptr<record::Recorder> recorder_;
   std::unique_ptr<device::DeviceLoop> loop_;
   std::map<std::string, std::string> told_;  ///< newest line of the log, by device
-  Thread io_thread_, live_rows_, writer_;
-  RowQueue arrived_{k_max_waiting_rows, k_live_batch}, unstored_{k_max_waiting_rows, k_store_batch};
+  DeviceBatch arrived_;                      ///< of the io thread
+  boost::asio::steady_timer hand_on_{io_};
+  Thread io_thread_, writer_;
+  RowQueue unstored_{k_max_waiting_rows, k_store_batch};
   DeviceRows* rows_{nullptr};
 
   std::mutex save_mutex_;  ///< taken before mutex_
@@ -565,7 +575,7 @@ std::string DeviceManager::metrics() {
   out +=
       "# HELP anchord_device_rows_lost_total Rows that the database did not take in time\n"
       "# TYPE anchord_device_rows_lost_total counter\nanchord_device_rows_lost_total " +
-      std::to_string(impl_->arrived_.dropped() + impl_->unstored_.dropped()) + "\n";
+      std::to_string(impl_->unstored_.dropped()) + "\n";
   return out;
 }
 

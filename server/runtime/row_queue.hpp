@@ -19,12 +19,6 @@ class RowQueue {
  public:
   RowQueue(std::size_t most_rows, std::chrono::milliseconds batch_time)
       : most_rows_(most_rows), batch_time_(batch_time) {}
-  template <class Row>
-  void push(Row row) {
-    const std::scoped_lock lock(mutex_);
-    add(std::move(row));
-    if (size() >= k_batch_rows) told_.notify_one();
-  }
   void push(DeviceBatch batch) {
     const std::scoped_lock lock(mutex_);
     for (auto& row : batch.fixes) add(std::move(row));

@@ -58,10 +58,6 @@ constexpr const char* k_position_columns =
     "p.since_number "
     "JOIN calibration c ON c.calibration_key = r.calibration_key ";
 
-Error absent(const CalibrationId& id) {
-  return make_error(Errc::not_found, "no calibration " + to_string(id));
-}
-
 std::optional<std::int64_t> key_of(Connection& c, const CalibrationId& id) {
   Query query(c, k_key);
   query << id;
@@ -167,7 +163,7 @@ std::optional<Error> insert_calibration(Connection& c, const Calibration& calibr
 Result<Calibration> find_calibration(Connection& c, const CalibrationId& id) {
   Query query(c, std::string(k_columns) + "WHERE id = ?1");
   query << id;
-  if (!query.step()) return absent(id);
+  if (!query.step()) return absent("calibration", id);
   return read(c, query);
 }
 
@@ -183,7 +179,7 @@ Result<std::vector<Calibration>> list_calibrations(Connection& c, std::int64_t l
 }
 
 Result<std::string> find_evidence(Connection& c, const CalibrationId& id) {
-  if (!key_of(c, id)) return absent(id);
+  if (!key_of(c, id)) return absent("calibration", id);
   Query query(c, k_evidence);
   query << id;
   return query.step() ? query.text() : std::string{};
@@ -191,7 +187,7 @@ Result<std::string> find_evidence(Connection& c, const CalibrationId& id) {
 
 std::optional<Error> remove_calibration(Connection& c, const CalibrationId& id) {
   const auto key = key_of(c, id);
-  if (!key) return absent(id);
+  if (!key) return absent("calibration", id);
   Query used(c, k_revisions_of);
   used << *key;
   if (used.step() && used.integer() > 0) {
@@ -208,7 +204,7 @@ Result<Revision> publish_revision(Connection& c, const CalibrationId& id,
                                   std::string_view note, UtcTime now, const std::vector<Override>& overrides,
                                   std::optional<std::uint64_t> judged_on) {
   const auto key = key_of(c, id);
-  if (!key) return absent(id);
+  if (!key) return absent("calibration", id);
   const std::uint64_t before = newest_revision(c);
   if (judged_on && *judged_on != before)
     return make_error(Errc::conflict, "revision " + std::to_string(before) +

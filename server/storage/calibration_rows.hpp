@@ -4,10 +4,12 @@
 #include <string_view>
 #include <vector>
 
-#include "core/ports/store.hpp"
+#include "core/ports/calibration_store.hpp"
+#include "core/ports/revision_store.hpp"
 #include "server/storage/sql.hpp"
 
-/// Calibrations, revisions and the positions they publish; AnchorStore says what each means.
+/// Calibrations, revisions and the positions they publish; CalibrationStore and RevisionStore say what each
+/// means.
 namespace anchord::sql {
 
 std::optional<Error> insert_calibration(Connection& connection, const Calibration& calibration);

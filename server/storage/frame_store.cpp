@@ -12,18 +12,9 @@ constexpr const char* k_update =
 constexpr const char* k_columns =
     "SELECT id, name, site_id, definition_json, created_t_ns, version FROM local_frame ";
 constexpr const char* k_remove = "DELETE FROM local_frame WHERE id = ?1 AND version = ?2 RETURNING version";
-constexpr const char* k_site = "SELECT count(*) FROM site WHERE id = ?1";
 
 void bind(Query& query, const LocalFrame& f, std::uint64_t version) {
   query << f.id << f.name << f.site << f.definition_json << f.created << version;
-}
-
-std::optional<Error> missing_site(Connection& c, const LocalFrame& frame) {
-  if (!frame.site) return std::nullopt;
-  Query query(c, k_site);
-  query << *frame.site;
-  if (query.step() && query.integer() > 0) return std::nullopt;
-  return make_error(Errc::not_found, "no site " + to_string(*frame.site));
 }
 
 std::vector<LocalFrame> all(Query& query) {
@@ -47,7 +38,7 @@ class SqlFrameStore final : public FrameStore {
 
   Result<void> insert(const LocalFrame& frame) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      if (auto error = missing_site(c, frame)) return error;
+      if (auto error = missing_site(c, frame.site)) return error;
       Query query(c, k_insert);
       bind(query, frame, frame.version);
       if (query.returned()) return std::nullopt;
@@ -56,7 +47,7 @@ class SqlFrameStore final : public FrameStore {
   }
   Result<void> update(const LocalFrame& frame, std::uint64_t expected_version) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      if (auto error = missing_site(c, frame)) return error;
+      if (auto error = missing_site(c, frame.site)) return error;
       Query named(c, std::string(k_columns) + "WHERE name = ?1 AND id <> ?2");
       named << frame.name << frame.id;
       if (named.step()) return make_error(Errc::conflict, "a frame named '" + frame.name + "' exists");
@@ -92,7 +83,7 @@ class SqlFrameStore final : public FrameStore {
       Query known(c, std::string(k_columns) + "WHERE id = ?1");
       known << id;
       if (known.step()) return make_error(Errc::conflict, "the frame was changed in between");
-      return make_error(Errc::not_found, "no frame " + to_string(id));
+      return absent("frame", id);
     });
   }
 

@@ -45,9 +45,7 @@ class SqlKitStore final : public KitStore {
       version << profile.kit;
       const std::uint64_t stored = version.step() ? version.as<std::uint64_t>() : 0;
       if (stored != expected_version)
-        return make_error(Errc::conflict, "the profile of kit " + profile.kit + " is at version " +
-                                              std::to_string(stored) + ", not " +
-                                              std::to_string(expected_version));
+        return moved_on("the profile of kit " + profile.kit, expected_version, stored);
       StoredProfile kept = profile;
       kept.version = stored + 1;
       Query insert(c, k_insert);

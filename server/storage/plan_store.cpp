@@ -13,7 +13,6 @@ constexpr const char* k_columns =
     "SELECT id, name, site_id, document_json, created_t_ns, changed_t_ns, version FROM plan ";
 constexpr const char* k_remove = "DELETE FROM plan WHERE id = ?1 AND version = ?2 RETURNING version";
 constexpr const char* k_exists = "SELECT version FROM plan WHERE id = ?1";
-constexpr const char* k_site = "SELECT 1 FROM site WHERE id = ?1";
 constexpr const char* k_keep =
     "INSERT INTO mission_procedure (mission_key, state_json, changed_t_ns) VALUES (?1, ?2, ?3) "
     "ON CONFLICT (mission_key) DO UPDATE SET state_json = excluded.state_json, "
@@ -23,24 +22,12 @@ constexpr const char* k_procedures =
     "SELECT m.id, p.state_json FROM mission_procedure p JOIN mission m ON m.mission_key = p.mission_key "
     "ORDER BY m.id";
 
-Error no_plan(const PlanId& id) { return make_error(Errc::not_found, "no plan " + to_string(id)); }
-
 /// Why a change of one version touched no row.
-Error moved_on(Connection& c, const PlanId& id, std::uint64_t expected) {
+Error unchanged(Connection& c, const PlanId& id, std::uint64_t expected) {
   Query query(c, k_exists);
   query << id;
-  if (!query.step()) return no_plan(id);
-  return make_error(Errc::conflict, "plan " + to_string(id) + " is at revision " +
-                                        std::to_string(query.integer()) + ", not " +
-                                        std::to_string(expected));
-}
-
-std::optional<Error> check_site(Connection& c, const StoredPlan& plan) {
-  if (!plan.site) return std::nullopt;
-  Query query(c, k_site);
-  query << *plan.site;
-  if (query.step()) return std::nullopt;
-  return make_error(Errc::not_found, "no site " + to_string(*plan.site));
+  if (!query.step()) return absent("plan", id);
+  return moved_on("plan " + to_string(id), expected, query.as<std::uint64_t>());
 }
 
 void bind(Query& query, const StoredPlan& p, std::uint64_t version) {
@@ -65,7 +52,7 @@ class SqlPlanStore final : public PlanStore {
 
   Result<void> insert(const StoredPlan& plan) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      if (auto error = check_site(c, plan)) return error;
+      if (auto error = missing_site(c, plan.site)) return error;
       Query query(c, k_insert);
       bind(query, plan, plan.version);
       if (query.returned()) return std::nullopt;
@@ -75,12 +62,12 @@ class SqlPlanStore final : public PlanStore {
 
   Result<void> update(const StoredPlan& plan, std::uint64_t expected_version) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      if (auto error = check_site(c, plan)) return error;
+      if (auto error = missing_site(c, plan.site)) return error;
       Query query(c, k_update);
       bind(query, plan, expected_version + 1);
       query << expected_version;
       if (query.returned()) return std::nullopt;
-      return moved_on(c, plan.id, expected_version);
+      return unchanged(c, plan.id, expected_version);
     });
   }
 
@@ -89,7 +76,7 @@ class SqlPlanStore final : public PlanStore {
       static const std::string text = std::string(k_columns) + "WHERE id = ?1";
       Query query(c, text);
       query << id;
-      if (!query.step()) return no_plan(id);
+      if (!query.step()) return absent("plan", id);
       return read(query);
     });
   }
@@ -112,14 +99,14 @@ class SqlPlanStore final : public PlanStore {
       Query query(c, k_remove);
       query << id << expected_version;
       if (query.returned()) return std::nullopt;
-      return moved_on(c, id, expected_version);
+      return unchanged(c, id, expected_version);
     });
   }
 
   Result<void> keep_procedure(const MissionId& mission, std::string_view state_json, UtcTime now) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       const auto key = mission_key(c, mission);
-      if (!key) return make_error(Errc::not_found, "no mission " + to_string(mission));
+      if (!key) return absent("mission", mission);
       Query query(c, state_json.empty() ? k_forget : k_keep);
       query << *key;
       if (!state_json.empty()) query << state_json << now;

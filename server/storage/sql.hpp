@@ -199,6 +199,16 @@ Result<T> read_value(Gate& gate, F work) {
   return *std::move(value);
 }
 
+template <class AnyId>
+Error absent(const char* what, const AnyId& id) {
+  return make_error(Errc::not_found, std::string("no ") + what + ' ' + to_string(id));
+}
+/// A change named a version that is no longer the newest.
+inline Error moved_on(const std::string& what, std::uint64_t expected, std::uint64_t stored) {
+  return make_error(Errc::conflict,
+                    what + " is at version " + std::to_string(stored) + ", not " + std::to_string(expected));
+}
+
 /// For work without a value.
 Result<void> write_void(Gate& gate, const Work& work, std::size_t rows = 1);
 

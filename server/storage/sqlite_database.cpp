@@ -44,46 +44,14 @@ class SqliteDatabase final : public Database, private sql::Gate {
             [this] { return folder_->give_up_reserve(); },
             {options_.max_queued_rows, options_.max_queued_calls, options_.checkpoint_wal_bytes}),
         readers_([this] { return open_connection(Mode::read_only); }, options_.readers),
-        measurements_(sql::make_measurement_store(*this)),
-        missions_(sql::make_mission_store(*this, [this] { return admit_mission(); })),
-        anchors_(sql::make_anchor_store(*this)),
-        kits_(sql::make_kit_store(*this)),
-        frames_(sql::make_frame_store(*this)),
-        tokens_(sql::make_token_store(*this)),
-        jobs_(sql::make_job_store(*this)),
-        access_(sql::make_access_store(*this)),
-        campaigns_(sql::make_campaign_store(*this)),
-        labels_(sql::make_label_store(*this)),
-        datasets_(sql::make_dataset_store(*this)),
-        training_runs_(sql::make_training_run_store(*this)),
-        models_(sql::make_model_store(*this)),
-        plans_(sql::make_plan_store(*this)),
-        bin_(sql::make_mission_bin(*this)),
-        service_(sql::make_service_store(*this)),
-        exclusions_(sql::make_exclusion_store(*this)) {
+        kept_(*this, [this] { return admit_mission(); }) {
     if (check_in_background) checker_ = Thread("anchord-check", [this] { check_in_background_thread(); });
   }
   ~SqliteDatabase() override {
     if (checker_.joinable()) checker_.join();
   }
 
-  MeasurementStore& measurements() override { return *measurements_; }
-  MissionStore& missions() override { return *missions_; }
-  AnchorStore& anchors() override { return *anchors_; }
-  KitStore& kits() override { return *kits_; }
-  FrameStore& frames() override { return *frames_; }
-  TokenStore& tokens() override { return *tokens_; }
-  JobStore& jobs() override { return *jobs_; }
-  AccessStore& access() override { return *access_; }
-  CampaignStore& campaigns() override { return *campaigns_; }
-  LabelStore& labels() override { return *labels_; }
-  DatasetStore& datasets() override { return *datasets_; }
-  TrainingRunStore& training_runs() override { return *training_runs_; }
-  ModelStore& models() override { return *models_; }
-  PlanStore& plans() override { return *plans_; }
-  MissionBin& bin() override { return *bin_; }
-  ServiceStore& service() override { return *service_; }
-  ExclusionStore& exclusions() override { return *exclusions_; }
+  const Stores& stores() override { return kept_.ports; }
 
   StorageHealth health() override {
     const auto status = writer_.status();
@@ -164,23 +132,7 @@ class SqliteDatabase final : public Database, private sql::Gate {
   const std::unique_ptr<DataFolder> folder_;
   sql::WriteQueue writer_;
   sql::ReaderPool readers_;
-  std::unique_ptr<MeasurementStore> measurements_;
-  std::unique_ptr<MissionStore> missions_;
-  std::unique_ptr<AnchorStore> anchors_;
-  std::unique_ptr<KitStore> kits_;
-  std::unique_ptr<FrameStore> frames_;
-  std::unique_ptr<TokenStore> tokens_;
-  std::unique_ptr<JobStore> jobs_;
-  std::unique_ptr<AccessStore> access_;
-  std::unique_ptr<CampaignStore> campaigns_;
-  std::unique_ptr<LabelStore> labels_;
-  std::unique_ptr<DatasetStore> datasets_;
-  std::unique_ptr<TrainingRunStore> training_runs_;
-  std::unique_ptr<ModelStore> models_;
-  std::unique_ptr<PlanStore> plans_;
-  std::unique_ptr<MissionBin> bin_;
-  std::unique_ptr<ServiceStore> service_;
-  std::unique_ptr<ExclusionStore> exclusions_;
+  sql::SqlStores kept_;
   Thread checker_;
 };
 

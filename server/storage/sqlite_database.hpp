@@ -8,12 +8,7 @@
 #include <string>
 
 #include "core/base/result.hpp"
-#include "core/ports/exclusion_store.hpp"
-#include "core/ports/learning_store.hpp"
-#include "core/ports/mission_bin.hpp"
-#include "core/ports/plan_store.hpp"
-#include "core/ports/site_store.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/stores.hpp"
 
 namespace anchord {
 
@@ -67,23 +62,7 @@ struct BackupReport {
 class Database {
  public:
   virtual ~Database() = default;
-  virtual MeasurementStore& measurements() = 0;
-  virtual MissionStore& missions() = 0;
-  virtual AnchorStore& anchors() = 0;
-  virtual KitStore& kits() = 0;
-  virtual FrameStore& frames() = 0;
-  virtual TokenStore& tokens() = 0;
-  virtual JobStore& jobs() = 0;
-  virtual AccessStore& access() = 0;
-  virtual CampaignStore& campaigns() = 0;
-  virtual LabelStore& labels() = 0;
-  virtual DatasetStore& datasets() = 0;
-  virtual TrainingRunStore& training_runs() = 0;
-  virtual ModelStore& models() = 0;
-  virtual PlanStore& plans() = 0;
-  virtual MissionBin& bin() = 0;
-  virtual ServiceStore& service() = 0;
-  virtual ExclusionStore& exclusions() = 0;
+  virtual const Stores& stores() = 0;
   virtual StorageHealth health() = 0;
   /// Online copy while writes go on: fsynced, integrity-checked, with its SHA-256. The file must not exist.
   virtual Result<BackupReport> backup(const std::filesystem::path& file) = 0;

@@ -3,12 +3,22 @@
 #include <functional>
 #include <memory>
 
+#include "core/ports/access_store.hpp"
+#include "core/ports/anchor_store.hpp"
+#include "core/ports/calibration_store.hpp"
 #include "core/ports/exclusion_store.hpp"
+#include "core/ports/frame_store.hpp"
+#include "core/ports/job_store.hpp"
+#include "core/ports/kit_store.hpp"
 #include "core/ports/learning_store.hpp"
+#include "core/ports/measurement_store.hpp"
 #include "core/ports/mission_bin.hpp"
+#include "core/ports/mission_store.hpp"
 #include "core/ports/plan_store.hpp"
+#include "core/ports/revision_store.hpp"
 #include "core/ports/site_store.hpp"
-#include "core/ports/store.hpp"
+#include "core/ports/stores.hpp"
+#include "core/ports/token_store.hpp"
 #include "server/storage/sql.hpp"
 
 /// The ports, written once for every database behind a Gate.
@@ -19,7 +29,10 @@ using AdmitMission = std::function<std::optional<Error>()>;
 
 std::unique_ptr<MeasurementStore> make_measurement_store(Gate& gate);
 std::unique_ptr<MissionStore> make_mission_store(Gate& gate, AdmitMission admit);
+std::unique_ptr<SiteStore> make_site_store(Gate& gate);
 std::unique_ptr<AnchorStore> make_anchor_store(Gate& gate);
+std::unique_ptr<CalibrationStore> make_calibration_store(Gate& gate);
+std::unique_ptr<RevisionStore> make_revision_store(Gate& gate);
 std::unique_ptr<KitStore> make_kit_store(Gate& gate);
 std::unique_ptr<FrameStore> make_frame_store(Gate& gate);
 std::unique_ptr<TokenStore> make_token_store(Gate& gate);
@@ -35,10 +48,39 @@ std::unique_ptr<MissionBin> make_mission_bin(Gate& gate);
 std::unique_ptr<ServiceStore> make_service_store(Gate& gate);
 std::unique_ptr<ExclusionStore> make_exclusion_store(Gate& gate);
 
+/// All of them over one gate, which outlives them.
+struct SqlStores {
+  SqlStores(Gate& gate, AdmitMission admit);
+  const std::unique_ptr<MeasurementStore> measurements;
+  const std::unique_ptr<MissionStore> missions;
+  const std::unique_ptr<MissionBin> bin;
+  const std::unique_ptr<ExclusionStore> exclusions;
+  const std::unique_ptr<SiteStore> sites;
+  const std::unique_ptr<AnchorStore> anchors;
+  const std::unique_ptr<CalibrationStore> calibrations;
+  const std::unique_ptr<RevisionStore> revisions;
+  const std::unique_ptr<KitStore> kits;
+  const std::unique_ptr<FrameStore> frames;
+  const std::unique_ptr<PlanStore> plans;
+  const std::unique_ptr<CampaignStore> campaigns;
+  const std::unique_ptr<LabelStore> labels;
+  const std::unique_ptr<DatasetStore> datasets;
+  const std::unique_ptr<TrainingRunStore> training_runs;
+  const std::unique_ptr<ModelStore> models;
+  const std::unique_ptr<JobStore> jobs;
+  const std::unique_ptr<TokenStore> tokens;
+  const std::unique_ptr<AccessStore> access;
+  const std::unique_ptr<ServiceStore> service;
+  const Stores ports;
+};
+
 /// The short form of a mission's id; nothing when there is no such mission, or when it is in the bin.
 std::optional<std::int64_t> mission_key(Connection& connection, const MissionId& id);
 /// What is in the bin, last deleted first.
 std::vector<BinnedMission> read_binned_missions(Connection& connection);
+
+/// not_found when a site is named that is not there.
+std::optional<Error> missing_site(Connection& connection, const std::optional<SiteId>& site);
 
 /// SQL's LIMIT of a page size that comes from outside.
 std::int64_t row_limit(std::size_t limit);

@@ -242,7 +242,7 @@ class ClockOnly final : public DeviceControl {
 
 class ClockAlarm : public AppFixture {
  protected:
-  void configure(api::Application::Deps& deps) override { deps.devices = &devices_; }
+  DeviceControl& devices() override { return devices_; }
   /// The list of alarms once it holds what is asked for; the last one when 20 s pass first.
   Json alarms_when(bool there_is, const std::string& id = "clock.skew") {
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);

@@ -9,10 +9,15 @@
 #include <optional>
 #include <string>
 
-#include "api/application.hpp"
+#include "api/admin/access.hpp"
 #include "api/kit/router.hpp"
 #include "api/stream/hub.hpp"
+#include "core/ports/access_store.hpp"
+#include "core/ports/calibration_store.hpp"
+#include "core/ports/token_store.hpp"
+#include "server/runtime/worker_pool.hpp"
 #include "server/storage/sqlite_database.hpp"
+#include "tests/api/ports.hpp"
 
 namespace anchord::test {
 
@@ -28,43 +33,43 @@ class AppFixture : public ::testing::Test {
     open();
   }
   void TearDown() override {
-    app_.reset();
-    database_.reset();
+    close();
     std::filesystem::remove_all(dir_);
   }
-  /// post: runs what the application puts on its pool; absent: at once, on the calling thread.
-  void open(std::function<void(std::function<void()>)> post = {}, AccuracyGoal goal = {}) {
+  void open() {
     StorageOptions options;
     options.data_dir = dir_ / "data";
     options.reserve_bytes = 0;
     auto opened = open_database(options);
     ASSERT_TRUE(opened.has_value()) << opened.error().message;
     database_ = std::move(opened).value();
-    learning_.emplace(api::LearningStores{database_->campaigns(), database_->labels(), database_->datasets(),
-                                          database_->training_runs(), database_->models()});
-    api::Application::Deps deps{database_->measurements(),   database_->missions(), database_->anchors(),
-                                database_->jobs(),           database_->access(),   clock_,
-                                {"0.2.0", "test", "", "", 1}};
-    deps.plans = &database_->plans();
-    deps.kits = &database_->kits();
-    deps.frames = &database_->frames();
-    deps.exclusions = &database_->exclusions();
-    deps.post = std::move(post);
-    deps.goal = goal;
-    deps.learning = &*learning_;
-    deps.bin = &database_->bin();
-    deps.service = &database_->service();
+    access_ =
+        std::make_unique<api::AccessService>(database_->stores().tokens, database_->stores().access, clock_);
+    ASSERT_TRUE(access_->load());
+    api::Application::Deps deps{.stores = database_->stores(),
+                                .work = {*live_, *joint_, at_once_, jobs_},
+                                .clock = clock_,
+                                .access = *access_,
+                                .backups = no_backups_,
+                                .devices = devices(),
+                                .model_key = std::string(64, '7')};
+    deps.build = {"0.2.0", "test", "", "", 1};
+    deps.goal = goal_;
     deps.housekeeping_by_hand = true;
-    deps.model_key = std::string(64, '7');
     configure(deps);
-    app_ = std::make_unique<api::Application>(std::move(deps));
+    app_ = std::make_unique<StreamingApplication>(std::move(deps));
     app_->start();
   }
   /// What a fixture adds before the application is made.
   virtual void configure(api::Application::Deps&) {}
-  void restart() {
+  virtual DeviceControl& devices() { return no_devices_; }
+  void close() {
     app_.reset();
+    access_.reset();
     database_.reset();
+  }
+  void restart() {
+    close();
     open();
   }
 
@@ -145,7 +150,7 @@ class AppFixture : public ::testing::Test {
       finish(e);
       c.anchors.push_back(e);
     }
-    EXPECT_TRUE(database_->anchors().insert(c).has_value());
+    EXPECT_TRUE(database_->stores().calibrations.insert(c).has_value());
     return to_string(c.id);
   }
 
@@ -159,8 +164,15 @@ class AppFixture : public ::testing::Test {
   SetClock clock_;
   std::filesystem::path dir_;
   std::unique_ptr<Database> database_;
-  std::optional<api::LearningStores> learning_;
-  std::unique_ptr<api::Application> app_;
+  NoBackups no_backups_;
+  NoDevices no_devices_;
+  AccuracyGoal goal_{};
+  /// The live path and the planner run where they are asked for, so that an answer has seen what came before.
+  InlineExecutor at_once_;
+  server::WorkerPool one_{"test-joint", 1, 1}, jobs_{"test-job", 5, 5};
+  Executor *live_{&at_once_}, *joint_{&one_};
+  std::unique_ptr<api::AccessService> access_;
+  std::unique_ptr<StreamingApplication> app_;
 };
 
 }  // namespace anchord::test

@@ -2,6 +2,8 @@
 // starts, a local frame, ranges between anchors, the site's outline.
 #include "app_fixture.hpp"
 #include "core/geo/enu.hpp"
+#include "core/ports/measurement_store.hpp"
+#include "core/ports/mission_store.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
 namespace anchord::test {
@@ -62,7 +64,7 @@ class Calibrations : public AppFixture {
     mission.id.uuid = make_uuid_v7(clock_.now());
     mission.created = clock_.now();
     if (!site.empty()) mission.site = SiteId{parse_uuid(site).value()};
-    EXPECT_TRUE(database_->missions().insert(mission).has_value());
+    EXPECT_TRUE(database_->stores().missions.insert(mission).has_value());
     for (auto& fix : data.fixes) fix.mission = mission.id;
     for (auto& range : data.ranges) {
       range.mission = mission.id;
@@ -74,8 +76,8 @@ class Calibrations : public AppFixture {
       range.rx_dbm = level.rx_dbm;
       range.fp_dbm = level.fp_dbm;
     }
-    EXPECT_TRUE(database_->measurements().append_fixes(data.fixes, true).has_value());
-    EXPECT_TRUE(database_->measurements().append_ranges(data.ranges, true).has_value());
+    EXPECT_TRUE(database_->stores().measurements.append_fixes(data.fixes, true).has_value());
+    EXPECT_TRUE(database_->stores().measurements.append_ranges(data.ranges, true).has_value());
     return to_string(mission.id);
   }
   api::Response solve(const std::string& mission, Json more = Json::object()) {

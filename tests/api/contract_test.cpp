@@ -28,33 +28,9 @@ std::set<std::string> documented() {
 
 class Contract : public AppFixture {};
 
-/// Only there so that its routes are.
-struct NoBackups final : Backups {
-  Result<Backup> make() override { return make_error(Errc::storage_unavailable, "none here"); }
-  std::vector<Backup> list() const override { return {}; }
-  bool due(std::uint64_t) override { return false; }
-};
-
 TEST_F(Contract, EveryOperationHasARouteAndEveryRouteAnOperation) {
-  api::AccessService access(database_->tokens(), database_->access(), clock_);
-  api::Application::Deps deps{database_->measurements(),
-                              database_->missions(),
-                              database_->anchors(),
-                              database_->jobs(),
-                              database_->access(),
-                              clock_,
-                              {},
-                              &database_->plans(),
-                              &access};
-  deps.kits = &database_->kits();
-  deps.frames = &database_->frames();
-  deps.learning = &*learning_;
-  deps.exclusions = &database_->exclusions();
-  NoBackups backups;
-  deps.backups = &backups;
-  api::Application app(std::move(deps));
   std::set<std::string> served;
-  for (const auto& route : app.router().routes())
+  for (const auto& route : app_->router().routes())
     served.insert(std::string(to_string(route.method)) + ' ' + route.pattern);
   const auto promised = documented();
   for (const auto& one : promised)

@@ -3,6 +3,8 @@
 #include <thread>
 
 #include "app_fixture.hpp"
+#include "core/ports/measurement_store.hpp"
+#include "core/ports/mission_store.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
 namespace anchord::test {
@@ -20,7 +22,7 @@ class Contradicted : public AppFixture {
     Mission mission = data.mission;
     mission.id.uuid = make_uuid_v7(clock_.now());
     mission.created = clock_.now();
-    EXPECT_TRUE(database_->missions().insert(mission).has_value());
+    EXPECT_TRUE(database_->stores().missions.insert(mission).has_value());
     const std::int64_t ahead_ns = (1'767'225'600LL + 86'400LL * day) * 1'000'000'000;
     for (auto& fix : data.fixes) {
       fix.mission = mission.id;
@@ -30,8 +32,8 @@ class Contradicted : public AppFixture {
       range.mission = mission.id;
       range.time.ns += ahead_ns;
     }
-    EXPECT_TRUE(database_->measurements().append_fixes(data.fixes, true).has_value());
-    EXPECT_TRUE(database_->measurements().append_ranges(data.ranges, true).has_value());
+    EXPECT_TRUE(database_->stores().measurements.append_fixes(data.fixes, true).has_value());
+    EXPECT_TRUE(database_->stores().measurements.append_ranges(data.ranges, true).has_value());
     Call options;
     options.headers["prefer"] = "wait=120";
     const auto response = call(Method::post, "/api/v1/calibrations",

@@ -2,6 +2,8 @@
 #include "api/formats/report.hpp"
 #include "api/formats/report_svg.hpp"
 #include "app_fixture.hpp"
+#include "core/ports/measurement_store.hpp"
+#include "core/ports/mission_store.hpp"
 #include "core/types/anchor.hpp"
 #include "drivers/sim/flight.hpp"
 
@@ -28,11 +30,11 @@ class EvidenceRoutes : public AppFixture {
     mission.kit = kit;
     mission.name = "flight " + std::to_string(seed) + " <b>";
     mission.created = clock_.now();
-    EXPECT_TRUE(database_->missions().insert(mission).has_value());
+    EXPECT_TRUE(database_->stores().missions.insert(mission).has_value());
     for (auto& range : flight.data.ranges) range.mission = mission.id;
     for (auto& fix : flight.data.fixes) fix.mission = mission.id;
-    EXPECT_TRUE(database_->measurements().append_fixes(flight.data.fixes, true).has_value());
-    EXPECT_TRUE(database_->measurements().append_ranges(flight.data.ranges, true).has_value());
+    EXPECT_TRUE(database_->stores().measurements.append_fixes(flight.data.fixes, true).has_value());
+    EXPECT_TRUE(database_->stores().measurements.append_ranges(flight.data.ranges, true).has_value());
     return to_string(mission.id);
   }
   Json solved(const std::string& mission, const std::string& more = "") {

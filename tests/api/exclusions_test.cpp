@@ -7,6 +7,8 @@
 #include "api/wire/exclusion_json.hpp"
 #include "app_fixture.hpp"
 #include "core/ports/exclusion_store.hpp"
+#include "core/ports/measurement_store.hpp"
+#include "core/ports/mission_store.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
 namespace anchord::test {
@@ -33,8 +35,8 @@ class Exclusions : public AppFixture {
       const double t_s = range.time.seconds() - k_start_ns * 1e-9;
       if (range.anchor == first_ && t_s >= 40 && t_s < 80) range.distance_m += 3;
     }
-    ASSERT_TRUE(database_->measurements().append_fixes(flight_.fixes, true).has_value());
-    ASSERT_TRUE(database_->measurements().append_ranges(flight_.ranges, true).has_value());
+    ASSERT_TRUE(database_->stores().measurements.append_fixes(flight_.fixes, true).has_value());
+    ASSERT_TRUE(database_->stores().measurements.append_ranges(flight_.ranges, true).has_value());
   }
   std::string path() const { return "/api/v1/missions/" + mission_ + "/exclusions"; }
   static std::int64_t us(double t_s) { return k_start_ns / 1000 + static_cast<std::int64_t>(t_s * 1e6); }
@@ -110,7 +112,7 @@ TEST_F(Exclusions, AreStoredAuditedAndTakenBackOnceByOneOfEight) {
   EXPECT_EQ(std::ranges::count(status, 409), 7) << ::testing::PrintToString(status);
   EXPECT_EQ(json(get(path()))["items"][0]["included"]["reason"], "it was a bird");
   // What was measured is as it was.
-  EXPECT_EQ(database_->measurements().count_ranges(MissionId{parse_uuid(mission_).value()}).value(),
+  EXPECT_EQ(database_->stores().measurements.count_ranges(MissionId{parse_uuid(mission_).value()}).value(),
             flight_.ranges.size());
 }
 
@@ -171,8 +173,9 @@ TEST_F(Exclusions, AFlightFolderCarriesThem) {
   const auto back = exclude(span(5, 6, "a bird"));
   ASSERT_EQ(post(path() + "/" + back.value("id", "") + "/include", "{}").status, 200);
   FlightData whole = flight_;
-  whole.exclusions = database_->exclusions().exclusions(MissionId{parse_uuid(mission_).value()}).value();
-  whole.mission = database_->missions().mission(MissionId{parse_uuid(mission_).value()}).value();
+  whole.exclusions =
+      database_->stores().exclusions.exclusions(MissionId{parse_uuid(mission_).value()}).value();
+  whole.mission = database_->stores().missions.mission(MissionId{parse_uuid(mission_).value()}).value();
   ASSERT_TRUE(write_flight_folder(whole, dir_ / "folder").has_value());
   auto read = read_flight_folder(dir_ / "folder");
   ASSERT_TRUE(read.has_value()) << read.error().message;

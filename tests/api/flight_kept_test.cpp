@@ -10,6 +10,10 @@
 #include "api/admin/access.hpp"
 #include "api/admin/clock_watch.hpp"
 #include "api/kit/contract.hpp"
+#include "core/ports/access_store.hpp"
+#include "core/ports/measurement_store.hpp"
+#include "core/ports/mission_bin.hpp"
+#include "core/ports/token_store.hpp"
 #include "kept_fixture.hpp"
 
 namespace anchord::test {
@@ -159,10 +163,10 @@ TEST_F(MissionBinRules, ABigDeleteStallsNoIngest) {
         row.distance_m = 7.4;
         batch.push_back(row);
       }
-      EXPECT_TRUE(database_->measurements().append_ranges(std::move(batch), false));
+      EXPECT_TRUE(database_->stores().measurements.append_ranges(std::move(batch), false));
     }
     EXPECT_EQ(remove(id).status, 204);
-    EXPECT_TRUE(database_->bin().empty(MissionId{parse_uuid(id).value()}));
+    EXPECT_TRUE(database_->stores().bin.empty(MissionId{parse_uuid(id).value()}));
     return id;
   };
   const MissionId live{parse_uuid(make_id("live")).value()};
@@ -183,7 +187,7 @@ TEST_F(MissionBinRules, ABigDeleteStallsNoIngest) {
         row.distance_m = 5;
       }
       const auto begun = std::chrono::steady_clock::now();
-      EXPECT_TRUE(database_->measurements().append_ranges(std::move(batch), false));
+      EXPECT_TRUE(database_->stores().measurements.append_ranges(std::move(batch), false));
       waits.ms.push_back(
           std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begun).count());
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
@@ -199,7 +203,7 @@ TEST_F(MissionBinRules, ABigDeleteStallsNoIngest) {
   if (asked != nullptr) {
     fill("in one go");
     report("in one transaction",
-           ingest_while([&] { (void)database_->bin().remove_rows(2 * rows + 10).has_value(); }));
+           ingest_while([&] { (void)database_->stores().bin.remove_rows(2 * rows + 10).has_value(); }));
   }
   const auto id = fill("in slices");
   auto waits = ingest_while([&] { app_->housekeeping_round(); });
@@ -314,7 +318,7 @@ TEST_F(ClockSteps, EndNoLeaseAndProlongNone) {
 TEST_F(ClockSteps, LockNobodyOutAndBringNobodyBack) {
   api::AccessOptions options;
   options.steady = &steady_;
-  api::AccessService access(database_->tokens(), database_->access(), clock_, options);
+  api::AccessService access(database_->stores().tokens, database_->stores().access, clock_, options);
   const api::Principal admin{"a", "a", {Role::admin}};
   const auto made =
       access.create_token("t", {"operator"}, UtcTime{clock_.now().ns + 3'600'000'000'000}, admin, "here");
@@ -338,7 +342,7 @@ TEST_F(ClockSteps, LockNobodyOutAndBringNobodyBack) {
   EXPECT_FALSE(access.verify(made.value().text)) << "its hour has passed, whatever the clock says";
   EXPECT_FALSE(access.session(cookie.value())) << "and the login with it";
   clock_.ahead_s = 0;
-  api::AccessService next_start(database_->tokens(), database_->access(), clock_, options);
+  api::AccessService next_start(database_->stores().tokens, database_->stores().access, clock_, options);
   ASSERT_TRUE(next_start.load());
   EXPECT_TRUE(next_start.verify(made.value().text)) << "a start judges by the clock it finds";
 }
@@ -414,7 +418,7 @@ TEST_F(KeptAnswers, AViewerWhoPostsForSecondsLeavesTheDiskAsItWas) {
     keyed("/api/v1/models/active/predict", R"({"sample":{}})", key, {Role::viewer});
   }
   EXPECT_EQ(folder_bytes(), before) << n << " rounds";
-  EXPECT_EQ(database_->access().answer_use("tester").value().count, 0u);
+  EXPECT_EQ(database_->stores().access.answer_use("tester").value().count, 0u);
 }
 
 TEST_F(KeptAnswers, NoRouteThatAViewerMayPostToKeepsAnythingAndTheContractSaysWhichDo) {
@@ -436,7 +440,7 @@ TEST_F(KeptAnswers, WhatWasRefusedOrOnlyTriedIsNotKept) {
   EXPECT_EQ(keyed("/api/v1/missions", R"({"name":"x"})", "k").status, 422);
   const auto again = keyed("/api/v1/missions", R"({"name":"x","frame":"local","track_point":"body"})", "k");
   EXPECT_EQ(again.status, 201) << "the corrected request, under the same key";
-  EXPECT_EQ(database_->access().answer_use("tester").value().count, 1u);
+  EXPECT_EQ(database_->stores().access.answer_use("tester").value().count, 1u);
 }
 
 TEST_F(KeptAnswers, ATokenHasAQuotaThatNeverStandsInTheWayOfACommand) {
@@ -446,7 +450,7 @@ TEST_F(KeptAnswers, ATokenHasAQuotaThatNeverStandsInTheWayOfACommand) {
   for (std::size_t i = 0; i < api::Idempotency::k_max_answers; ++i) {
     full.key = "old-" + std::to_string(i);
     full.created_ran_ns = static_cast<std::int64_t>(i);
-    ASSERT_TRUE(database_->access().keep_answer(full, 0));
+    ASSERT_TRUE(database_->stores().access.keep_answer(full, 0));
   }
   const auto refused =
       keyed("/api/v1/missions", R"({"name":"x","frame":"local","track_point":"body"})", "new");
@@ -472,7 +476,7 @@ TEST_F(KeptAnswers, GoAfterADayOfRunningAndNotWithTheClock) {
   EXPECT_NE(keyed("/api/v1/missions", body, "k").body, first.body) << "a new one takes its place";
   now_s_ = now_s_ + 86'401;
   app_->housekeeping_round();
-  EXPECT_EQ(database_->access().answer_use("tester").value().count, 0u);
+  EXPECT_EQ(database_->stores().access.answer_use("tester").value().count, 0u);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <set>
 #include <thread>
 
+#include "core/ports/access_store.hpp"
 #include "core/ports/devices.hpp"
 #include "core/ports/plan_store.hpp"
 #include "drivers/sim/wgs84.hpp"
@@ -297,7 +298,7 @@ TEST_F(Flights, OnlyOneHasControl) {
   EXPECT_EQ(act("hold", second).status, 202);
   EXPECT_EQ(control(R"({"action":"release","lease":")" + second + "\"}")["held"], false);
   EXPECT_EQ(json(get(base() + "/control"))["held"], false);
-  const auto audit = database_->access().audit(100);
+  const auto audit = database_->stores().access.audit(100);
   ASSERT_TRUE(audit);
   int refused = 0, done = 0;
   for (const auto& entry : audit.value()) {
@@ -385,7 +386,7 @@ TEST_F(Flights, WhatATurnToldOutlivesTheFlightAndIsNoFlightToGoOnWith) {
   const MissionId id{parse_uuid(mission_).value()};
   const std::string kept =
       R"({"landed":true,"clues":{"0x6a21":{"bearing":{"from":[51.0231,3.7131,60],"rad":1.2,"sigma_rad":0.4}}}})";
-  ASSERT_TRUE(database_->plans().keep_procedure(id, kept, UtcTime{}));
+  ASSERT_TRUE(database_->stores().plans.keep_procedure(id, kept, UtcTime{}));
   app_.reset();
   database_.reset();
   const int holds = drone_->holds;
@@ -393,7 +394,7 @@ TEST_F(Flights, WhatATurnToldOutlivesTheFlightAndIsNoFlightToGoOnWith) {
   fly(1);
   EXPECT_EQ(get(base() + "/procedure").status, 404);
   EXPECT_EQ(drone_->holds, holds) << "nothing flies, nothing is told to hold";
-  const auto stored = database_->plans().procedures();
+  const auto stored = database_->stores().plans.procedures();
   ASSERT_TRUE(stored);
   ASSERT_EQ(stored.value().size(), 1u);
   EXPECT_EQ(stored.value()[0].second, kept);

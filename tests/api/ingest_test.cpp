@@ -1,5 +1,6 @@
 // POST /ranges and /fixes: every kind of bad input has one named test, and good rows beside it are kept.
 #include "app_fixture.hpp"
+#include "core/ports/measurement_store.hpp"
 
 namespace anchord::test {
 namespace {
@@ -21,7 +22,7 @@ class Ingest : public AppFixture {
            R"(",)" + place + R"(,"fix":"fixed","sigma_m":[0.01,0.01,0.02]})";
   }
   std::uint64_t stored() {
-    return database_->measurements().count_ranges(MissionId{parse_uuid(id_).value()}).value();
+    return database_->stores().measurements.count_ranges(MissionId{parse_uuid(id_).value()}).value();
   }
   /// A good row, the bad one, a good row; the code of the bad one.
   std::string code_of(const std::string& bad, const std::string& pointer = "?") {

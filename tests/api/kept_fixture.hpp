@@ -17,7 +17,7 @@ struct HandSteady final : SteadyClock {
 };
 
 /// Devices of which only the stream matters: whose rows they are.
-class OneStream final : public DeviceControl {
+class OneStream final : public NoDevices {
  public:
   std::vector<DeviceReport> devices() override {
     DeviceReport rover;
@@ -31,16 +31,10 @@ class OneStream final : public DeviceControl {
     if (id != rover.config.id || removed) return none();
     return rover;
   }
-  Result<DeviceReport> add(DeviceConfig) override { return none(); }
-  Result<DeviceReport> change(DeviceConfig, std::uint64_t) override { return none(); }
   Result<void> remove(const Uuid&, std::uint64_t) override {
     removed = true;
     return boost::outcome_v2::success();
   }
-  Result<std::string> act(const Uuid&, std::string_view, std::string_view) override { return none(); }
-  std::vector<DiscoveredDevice> discover() override { return {}; }
-  std::vector<DiscoveredDevice> discovered() override { return {}; }
-  DeviceClock clock() override { return {}; }
   void record_into(const std::optional<MissionId>& mission) override {
     const std::scoped_lock lock(mutex_);
     into_ = mission;
@@ -49,12 +43,10 @@ class OneStream final : public DeviceControl {
     const std::scoped_lock lock(mutex_);
     return into_;
   }
-  std::string recorder_failure() override { return {}; }
 
   bool enabled{true}, removed{false};
 
  private:
-  static Error none() { return make_error(Errc::not_found, "no device"); }
   std::mutex mutex_;
   std::optional<MissionId> into_;
 };
@@ -62,9 +54,9 @@ class OneStream final : public DeviceControl {
 /// The application with devices, a pilot's flight (no aircraft to command) and clocks of its own.
 class KeptFixture : public AppFixture {
  protected:
+  DeviceControl& devices() override { return devices_; }
   void configure(api::Application::Deps& deps) override {
     steady_.seconds = &now_s_;
-    deps.devices = &devices_;
     deps.steady = &steady_;
     deps.flight_clock = [this] { return now_s_.load(); };
   }

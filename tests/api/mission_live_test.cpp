@@ -1,11 +1,10 @@
 // A flight in the air: what restarts, joint solutions and the accuracy goal do to its running estimates.
 #include <algorithm>
+#include <chrono>
 #include <condition_variable>
-#include <deque>
-#include <future>
 #include <mutex>
+#include <thread>
 
-#include "api/missions/joint_worker.hpp"
 #include "api/stream/conversation.hpp"
 #include "core/geo/enu.hpp"
 #include "core/localize/flight_solver.hpp"
@@ -40,18 +39,17 @@ TEST_F(MissionLive, TakesRowsThatComeWhileItReadsWhatWasStored) {
   const auto flight = streamed(MadeFlight{});
   const auto id = mission("local");
   deliver(id, flight, 0, 80);
-  std::deque<std::function<void()>> later;
-  app_.reset();
-  database_.reset();
-  open([&](auto task) { later.push_back(std::move(task)); });
+  HeldExecutor later;
+  live_ = &later;
+  restart();
   deliver(id, flight, 80, 120.5);
-  EXPECT_FALSE(later.empty()) << "no request did the reading itself";
-  for (; !later.empty(); later.pop_front()) later.front()();
+  EXPECT_GT(later.held(), 0U) << "no request did the reading itself";
+  while (later.run_one()) continue;
   std::size_t n = 0;
   for (const auto& [anchor, properties] : live(id)) n += properties["quality"]["n_ranges"].get<std::size_t>();
   EXPECT_LE(n, flight.ranges.size());
   EXPECT_GT(n, flight.ranges.size() * 95 / 100) << "but for those at the ends of the track";
-  app_->stop();
+  close();
 }
 
 /// Nobody looks for a fix behind the last one any more: no range is left without a word.
@@ -80,9 +78,8 @@ TEST_F(MissionLive, CallsAnAnchorConvergedOnlyWithinTheGoal) {
   const auto flight = streamed(MadeFlight{});
   for (const auto& [goal, status] : {std::pair{AccuracyGoal{.h95_m = 2, .v95_m = 2}, "converged"},
                                      {{.h95_m = 1e-4, .v95_m = 2}, "estimating"}}) {
-    app_.reset();
-    database_.reset();
-    open({}, goal);
+    goal_ = goal;
+    restart();
     const auto id = mission("local");
     deliver(id, flight, 0, 120.5);
     const auto anchors = live(id);
@@ -173,36 +170,30 @@ TEST_F(MissionLive, TakesTheOutlineOfTheSiteAsAClueWhileItFlies) {
   }
 }
 
-FlightData solvable() { return make_flight(MadeFlight{}); }
-
-TEST(JointWorker, SolvesOneTaskAtATimeAndRefusesTheRest) {
-  api::JointWorker worker;
-  std::promise<void> entered, let_go;
-  std::promise<bool> solved;
-  ASSERT_TRUE(worker.try_start({solvable(), {}, [&](const FlightSolution* solution) {
-                                  entered.set_value();
-                                  let_go.get_future().wait();
-                                  solved.set_value(solution != nullptr && solution->anchors.size() == 4);
-                                }}));
-  entered.get_future().wait();
-  EXPECT_FALSE(worker.idle());
-  EXPECT_FALSE(worker.try_start({solvable(), {}, [](const FlightSolution*) {}}));
-  let_go.set_value();
-  EXPECT_TRUE(solved.get_future().get());
-}
-
-TEST(JointWorker, TellsThatAFlightHasNoSolution) {
-  api::JointWorker worker;
-  std::promise<bool> none;
-  ASSERT_TRUE(worker.try_start(
-      {FlightData{}, {}, [&](const FlightSolution* solution) { none.set_value(solution == nullptr); }}));
-  EXPECT_TRUE(none.get_future().get());
-}
-
-TEST(JointWorker, TakesNothingOnceStopped) {
-  api::JointWorker worker;
-  worker.stop();
-  EXPECT_FALSE(worker.try_start({solvable(), {}, [](const FlightSolution*) {}}));
+/// They take seconds each, and every flight could keep a core busy with its own.
+TEST_F(MissionLive, OneJointSolutionIsComputedAtATimeWhicheverFlightItIsOf) {
+  HeldExecutor held;
+  joint_ = &held;
+  restart();
+  const auto flight = streamed(MadeFlight{});
+  const auto first = mission("local"), second = mission("local");
+  deliver(first, flight, 0, 120.5);
+  const auto posted = [&] {
+    using Clock = std::chrono::steady_clock;
+    for (const auto end = Clock::now() + std::chrono::seconds(30); Clock::now() < end;) {
+      if (held.held() > 0) return true;
+      std::this_thread::yield();
+    }
+    return false;
+  };
+  ASSERT_TRUE(posted());
+  deliver(second, flight, 0, 120.5);
+  EXPECT_EQ(held.held(), 1U);
+  ASSERT_TRUE(held.run_one());
+  ASSERT_TRUE(posted()) << "then it is the other's turn";
+  EXPECT_EQ(held.held(), 1U);
+  ASSERT_TRUE(held.run_one());
+  close();
 }
 
 }  // namespace

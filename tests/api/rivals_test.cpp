@@ -8,7 +8,8 @@
 
 #include "api/calibration/kit_profile_json.hpp"
 #include "app_fixture.hpp"
-#include "core/ports/site_store.hpp"
+#include "core/ports/access_store.hpp"
+#include "core/ports/revision_store.hpp"
 #include "core/types/anchor.hpp"
 
 namespace anchord::test {
@@ -73,11 +74,11 @@ TEST_F(Rivals, APublicationThatWasJudgedOnAnOlderRevisionIsRefusedAndAudited) {
   // Two calibrations may take turns; never is one revision the same as that before it.
   const auto made = std::ranges::count(status, 201);
   EXPECT_EQ(std::ranges::count(status, 409), k_rivals - made);
-  const auto rows = database_->anchors().revisions(100, 0).value();
+  const auto rows = database_->stores().revisions.revisions(100, 0).value();
   ASSERT_EQ(rows.size(), static_cast<std::size_t>(made));
   for (std::size_t i = 1; i < rows.size(); ++i) EXPECT_NE(rows[i].calibration, rows[i - 1].calibration);
   std::size_t refused = 0;
-  for (const auto& entry : database_->access().audit(1000).value())
+  for (const auto& entry : database_->stores().access.audit(1000).value())
     refused += entry.what.starts_with("calibration.publish") && entry.result.starts_with("refused: ");
   EXPECT_LE(refused, static_cast<std::size_t>(k_rivals - made));
 }

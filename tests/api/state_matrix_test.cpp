@@ -3,6 +3,7 @@
 #include <array>
 #include <set>
 
+#include "core/ports/calibration_store.hpp"
 #include "kept_fixture.hpp"
 
 namespace anchord::test {
@@ -70,7 +71,7 @@ class StateMatrix : public KeptFixture {
       Calibration calibration;
       calibration.id = CalibrationId{make_uuid_v7(clock_.now())};
       calibration.missions = {MissionId{parse_uuid(id).value()}};
-      EXPECT_TRUE(database_->anchors().insert(calibration));
+      EXPECT_TRUE(database_->stores().calibrations.insert(calibration));
     }
     key = leases ? lease(id) : "";
     if (state == "deleted") {

@@ -3,6 +3,8 @@
 
 #include <stdexcept>
 
+#include "core/ports/measurement_store.hpp"
+#include "core/ports/mission_store.hpp"
 #include "server/storage/sqlite_database.hpp"
 #include "tests/server/storage/scratch_dir.hpp"
 
@@ -18,7 +20,7 @@ struct Bench {
     options.synchronous = synchronous;
     db = std::move(open_database(options)).value();
     mission.id = MissionId{make_uuid_v7(UtcTime{1})};
-    if (!db->missions().insert(mission)) throw std::runtime_error("no mission");
+    if (!db->stores().missions.insert(mission)) throw std::runtime_error("no mission");
   }
   std::vector<Range> rows(std::int64_t n, bool with_cir) {
     std::vector<Range> made(static_cast<std::size_t>(n));
@@ -47,7 +49,8 @@ void append(benchmark::State& state, Synchronous synchronous, bool with_cir) {
     state.PauseTiming();
     auto rows = bench.rows(state.range(0), with_cir);
     state.ResumeTiming();
-    if (!bench.db->measurements().append_ranges(std::move(rows), false)) throw std::runtime_error("append");
+    if (!bench.db->stores().measurements.append_ranges(std::move(rows), false))
+      throw std::runtime_error("append");
   }
   state.SetItemsProcessed(state.iterations() * state.range(0));
 }
@@ -74,8 +77,8 @@ BENCHMARK(append_with_cir)->Arg(1000)->MeasureProcessCPUTime()->UseRealTime()->U
 void append_duplicates(benchmark::State& state) {
   Bench bench(Synchronous::full);
   const auto rows = bench.rows(1000, false);
-  if (!bench.db->measurements().append_ranges(rows, false)) throw std::runtime_error("append");
-  for (auto _ : state) benchmark::DoNotOptimize(bench.db->measurements().append_ranges(rows, false));
+  if (!bench.db->stores().measurements.append_ranges(rows, false)) throw std::runtime_error("append");
+  for (auto _ : state) benchmark::DoNotOptimize(bench.db->stores().measurements.append_ranges(rows, false));
   state.SetItemsProcessed(state.iterations() * 1000);
 }
 BENCHMARK(append_duplicates)->MeasureProcessCPUTime()->UseRealTime()->Unit(benchmark::kMillisecond);
@@ -84,7 +87,7 @@ void read_mission(benchmark::State& state) {
   Bench bench(Synchronous::normal);
   constexpr std::int64_t k_rows = 100'000;
   for (int i = 0; i < 10; ++i) {
-    if (!bench.db->measurements().append_ranges(bench.rows(k_rows / 10, false), false))
+    if (!bench.db->stores().measurements.append_ranges(bench.rows(k_rows / 10, false), false))
       throw std::runtime_error("append");
   }
   for (auto _ : state) {
@@ -93,7 +96,7 @@ void read_mission(benchmark::State& state) {
     filter.limit = 10'000;
     std::int64_t n = 0;
     do {
-      auto page = bench.db->measurements().ranges(filter).value();
+      auto page = bench.db->stores().measurements.ranges(filter).value();
       n += static_cast<std::int64_t>(page.rows.size());
       filter.after = page.next;
     } while (!filter.after.empty());

@@ -45,7 +45,7 @@ int main(int argc, char** argv) {
   options.hosts.hosts = {"localhost", "127.0.0.1", "[::1]", "host.docker.internal"};
   options.ws_limits.message_bytes = argc > 2 ? static_cast<std::size_t>(std::atoll(argv[2])) : 16u << 20;
   options.ws_limits.max_fragments = 1u << 20;  // suites send megabytes in pieces of 64 bytes
-  HttpServer server(options, gateway, {pool, uploads});
+  HttpServer server(options, gateway, {pool, uploads, pool, pool, pool});
   const std::string endpoint = argc > 1 ? argv[1] : "127.0.0.1:0";
   const auto port = server.listen(endpoint);
   if (!port) {

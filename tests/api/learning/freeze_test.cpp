@@ -2,6 +2,10 @@
 #include <chrono>
 #include <thread>
 
+#include "core/ports/learning_store.hpp"
+#include "core/ports/measurement_store.hpp"
+#include "core/ports/mission_bin.hpp"
+#include "core/ports/mission_store.hpp"
 #include "tests/api/app_fixture.hpp"
 
 namespace anchord::test {
@@ -18,7 +22,7 @@ TEST_F(Freeze, AFlightDeletedWhileItIsFrozenIsFrozenWholeOrNotAtAll) {
     mission.name = "labelled " + std::to_string(round);
     mission.created = clock_.now();
     mission.state = MissionState::finished;
-    ASSERT_TRUE(database_->missions().insert(mission).has_value());
+    ASSERT_TRUE(database_->stores().missions.insert(mission).has_value());
     std::vector<Range> ranges(k_rows);
     for (int i = 0; i < k_rows; ++i) {
       auto& range = ranges[static_cast<std::size_t>(i)];
@@ -28,17 +32,17 @@ TEST_F(Freeze, AFlightDeletedWhileItIsFrozenIsFrozenWholeOrNotAtAll) {
       range.anchor = NetworkId{0x6a21};
       range.distance_m = 5;
     }
-    ASSERT_TRUE(database_->measurements().append_ranges(std::move(ranges), true).has_value());
+    ASSERT_TRUE(database_->stores().measurements.append_ranges(std::move(ranges), true).has_value());
     RangeTruth truth;
     truth.distance_m = 4.9;
     truth.los = true;
-    ASSERT_EQ(database_->labels().label({mission.id, {}, {}, {}, {}}, truth).value(), k_rows);
+    ASSERT_EQ(database_->stores().labels.label({mission.id, {}, {}, {}, {}}, truth).value(), k_rows);
     // A little later in each round: before, in the middle of and after the reading.
     std::thread purge([&] {
       std::this_thread::sleep_for(std::chrono::milliseconds(3 * round));
-      ASSERT_TRUE(database_->bin().put(mission.id, clock_.now(), 0, "me").has_value());
-      ASSERT_TRUE(database_->bin().empty(mission.id).has_value());
-      while (database_->bin().remove_rows(1000).value() > 0) {
+      ASSERT_TRUE(database_->stores().bin.put(mission.id, clock_.now(), 0, "me").has_value());
+      ASSERT_TRUE(database_->stores().bin.empty(mission.id).has_value());
+      while (database_->stores().bin.remove_rows(1000).value() > 0) {
       }
     });
     const auto made =

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <thread>
 
+#include "core/ports/measurement_store.hpp"
+#include "core/ports/mission_store.hpp"
 #include "drivers/sim/flight.hpp"
 #include "tests/api/app_fixture.hpp"
 
@@ -502,11 +504,11 @@ TEST_F(LearningService, DerivesAnOldFlightAgainWithTheModelsAskedFor) {
   Mission mission = flight.data.mission;
   mission.id.uuid = make_uuid_v7(clock_.now());
   mission.created = clock_.now();
-  ASSERT_TRUE(database_->missions().insert(mission).has_value());
+  ASSERT_TRUE(database_->stores().missions.insert(mission).has_value());
   for (auto& range : flight.data.ranges) range.mission = mission.id;
   for (auto& fix : flight.data.fixes) fix.mission = mission.id;
-  ASSERT_TRUE(database_->measurements().append_fixes(flight.data.fixes, true).has_value());
-  ASSERT_TRUE(database_->measurements().append_ranges(flight.data.ranges, true).has_value());
+  ASSERT_TRUE(database_->stores().measurements.append_fixes(flight.data.fixes, true).has_value());
+  ASSERT_TRUE(database_->stores().measurements.append_ranges(flight.data.ranges, true).has_value());
   const auto solve = [&](const std::string& more) {
     Call options;
     options.headers["prefer"] = "wait=120";

@@ -1,7 +1,7 @@
 // Backups: made on schedule and on request, few kept, put back.
 #include <fstream>
 
-#include "core/ports/store.hpp"
+#include "core/ports/mission_store.hpp"
 #include "server/runtime/backup_keeper.hpp"
 #include "server/storage/sqlite_database.hpp"
 #include "tests/server/app/app_fixture.hpp"
@@ -49,7 +49,7 @@ class BackupFiles : public ::testing::Test {
     mission.id.uuid = make_uuid_v7(clock_.now());
     mission.name = name;
     mission.created = clock_.now();
-    EXPECT_TRUE(database_->missions().insert(mission));
+    EXPECT_TRUE(database_->stores().missions.insert(mission));
     return mission.id;
   }
   ScratchDir dir_;
@@ -172,14 +172,14 @@ TEST_F(BackupFiles, ArePutBackWithWhatStoodThereKept) {
   const auto old = restore_backup(data(), copy);
   ASSERT_TRUE(old) << old.error().message;
   open();
-  EXPECT_TRUE(database_->missions().mission(before));
-  EXPECT_EQ(database_->missions().mission(after).error().code, Errc::not_found);
+  EXPECT_TRUE(database_->stores().missions.mission(before));
+  EXPECT_EQ(database_->stores().missions.mission(after).error().code, Errc::not_found);
   // And back again: nothing was lost by it.
   database_.reset();
   ASSERT_TRUE(old.value());
   ASSERT_TRUE(restore_backup(data(), *old.value()));
   open();
-  EXPECT_TRUE(database_->missions().mission(after));
+  EXPECT_TRUE(database_->stores().missions.mission(after));
 }
 
 TEST_F(BackupFiles, AreRefusedWhenTheyAreNotWhatWasBackedUp) {
@@ -201,7 +201,8 @@ TEST_F(BackupFiles, AreRefusedWhenTheyAreNotWhatWasBackedUp) {
   }
   EXPECT_EQ(error_of(copy), Errc::unsupported) << "one byte differs";
   open();
-  EXPECT_EQ(database_->missions().missions(10, std::nullopt).value().size(), 1u) << "untouched by all of it";
+  EXPECT_EQ(database_->stores().missions.missions(10, std::nullopt).value().size(), 1u)
+      << "untouched by all of it";
 }
 
 TEST(BackupOverHttp, IsMadeByAdminsOnlyAndListed) {

@@ -8,11 +8,10 @@
 #include <set>
 #include <stdexcept>
 
-#include "core/flight/live_mission.hpp"
-#include "core/flight/operations.hpp"
 #include "drivers/drone/session.hpp"
 #include "drivers/sim/autopilot.hpp"
 #include "server/flight/closed_loop.hpp"
+#include "server/flight/inline_flight.hpp"
 #include "server/flight/sim_kit.hpp"
 
 namespace anchord {
@@ -138,30 +137,24 @@ struct Tick {
   std::vector<Range> ranges;
 };
 
-/// One live mission and who flies by it, as the server has them, without the server.
+/// A flight whose every event is written down.
 class Home {
  public:
-  Home(const Mission& mission, const Plan& plan, Drone& drone)
-      : mission_(mission), plan_(plan), live_(setup_of(mission, plan)), operations_(&drone) {}
+  Home(const Mission& mission, const Plan& plan, Drone& drone) : flight_({mission, plan}, drone) {
+    flight_.on_event = [this](const flight::Event& event) {
+      std::visit([this](const auto& e) { take(e); }, event);
+    };
+  }
 
   void run(const Tick& tick) {
-    for (const auto& range : tick.ranges)
-      live_.add(flight::LiveRow(flight::JudgedRange{range, {}, range.time}));
-    for (const auto& fix : tick.fixes) live_.add(flight::LiveRow(fix));
-    live_.settle();
-    for (const auto& event : live_.take_events())
-      std::visit([&](const auto& e) { take(tick.now, e); }, event);
-    if (!begun_ && tick.now.s > 12) begin(tick.now);
-    const auto& f = operations_.flight();
-    const bool deciding = f && f->control.engine().state().step == procedure::Step::find_next_point;
-    std::optional<flight::Operations::Estimates> estimates;
-    if (deciding && live_.origin()) estimates = {*live_.origin(), live_.estimates()};
-    operations_.round(tick.now, estimates, deciding);
-    if (f && clues_ != f->control.engine().clues_version()) {
-      clues_ = f->control.engine().clues_version();
-      live_.use_clues(f->clues());
+    flight_.step(tick.now, tick.fixes, tick.ranges);
+    if (!begun_ && tick.now.s > 12) {
+      const auto begun = flight_.start(tick.now);
+      written += begun ? "begun\n" : begun.error().message + '\n';
+      begun_ = begun.has_value();
     }
-    for (const auto& event : operations_.take_events()) written += event.code + ' ' + event.text + '\n';
+    for (const auto& line : flight_.take_log()) written += line.code + ' ' + line.text + '\n';
+    const auto& f = flight_.flight();
     if (f) written += f->status() + ' ' + f->control.engine().state().reason + '\n';
     steps.insert(f ? std::string(procedure::to_string(f->control.engine().state().step)) : "none");
   }
@@ -169,51 +162,23 @@ class Home {
   std::set<std::string> steps;
 
  private:
-  static flight::LiveMissionSetup setup_of(const Mission& mission, const Plan& plan) {
-    flight::LiveMissionSetup out;
-    out.mission = mission;
-    out.live.origin = plan.origin;
-    out.live.update_interval_s = 4;
-    return out;
-  }
-  void begin(const flight::Now& now) {
-    const flight::Holder who{"token", "the operator"};
-    if (!operations_.control(now))
-      (void)operations_.take_control(now, mission_.id, who, false, "key").value();
-    const auto check = planning::check_plan(plan_);
-    ASSERT_TRUE(check.has_value()) << check.error().message;
-    flight::Groundwork ground{&plan_, std::make_shared<const planning::PlanCheck>(check.value()), true, 1e12};
-    for (const auto& item : operations_.checklist(now, &mission_, mission_.id, ground, false)) {
-      if (item.green() || !item.overridable) continue;
-      ASSERT_TRUE(operations_.override_item(now, mission_.id, item.id, "simulated", who.name, ground));
-    }
-    const auto begun = operations_.begin(now, mission_, ground, false, who.name);
-    written += begun ? "begun\n" : begun.error().message + '\n';
-    begun_ = begun.has_value();
-  }
-  void take(const flight::Now& now, const flight::FixBelieved& e) { operations_.fix(now, e.fix); }
-  void take(const flight::Now& now, const flight::RangeDecided& e) {
-    operations_.range(now, mission_.id, e.result);
+  void take(const flight::RangeDecided& e) {
     written += "range " + std::to_string(e.result.range.time.ns) + ' ' + e.result.refused +
                exact(e.result.residual_m.value_or(-1)) + '\n';
   }
-  void take(const flight::Now&, const flight::AnchorEstimated& e) {
+  void take(const flight::AnchorEstimated& e) {
     written += "estimate " + to_string(e.estimate.anchor) + exact(e.estimate.h95_m);
     if (e.estimate.best)
       for (int i = 0; i < 3; ++i) written += exact(e.estimate.best->position.m[i]);
     written += '\n';
   }
   template <class Event>
-  void take(const flight::Now&, const Event&) {
+  void take(const Event&) {
     written += "event " + std::to_string(flight::Event(Event{}).index()) + '\n';
   }
 
-  Mission mission_;
-  Plan plan_;
-  flight::LiveMission live_;
-  flight::Operations operations_;
+  flight::InlineFlight flight_;
   bool begun_{false};
-  std::uint64_t clues_{0};
 };
 
 TEST(FlightReplay, ARecordedFlightGivesTheSameEventsAndCommandsByteForByte) {

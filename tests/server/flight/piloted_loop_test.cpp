@@ -1,8 +1,6 @@
-// The whole mission flown over MAVLink with everything off at once: GNSS offset, a barometer that drifts,
+// The whole mission flown with everything off at once: GNSS offset, a barometer that drifts,
 // wind, a slow and lossy link. ANCHORD_SEEDS=20 for the whole table; one seed of each dialect keeps the test
 // short. ANCHORD_SEED=N flies seed N alone and says what happens.
-#include "server/flight/piloted_loop.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,17 +9,18 @@
 #include <cstdlib>
 
 #include "core/planning/local_plan.hpp"
+#include "server/flight/closed_loop.hpp"
 
 namespace anchord::flight {
 namespace {
 
-PilotedLoopOptions hostile(std::uint64_t seed) {
-  PilotedLoopOptions o;
-  o.loop.seed = seed;
-  o.loop.radio.turn_lobe_db = 6;
-  o.loop.radio.height_lobe = true;
-  o.loop.vehicle.wind_mps = {8, 0, 0};
-  o.loop.vehicle.wind_push = 0.04;  // what a good position control leaves of it
+ClosedLoopOptions hostile(std::uint64_t seed) {
+  ClosedLoopOptions o;
+  o.seed = seed;
+  o.radio.turn_lobe_db = 6;
+  o.radio.height_lobe = true;
+  o.vehicle.wind_mps = {8, 0, 0};
+  o.vehicle.wind_push = 0.04;  // what a good position control leaves of it
   auto& a = o.autopilot;
   a.dialect = seed % 2 == 1 ? drone::Autopilot::ardupilot : drone::Autopilot::px4;
   const double turn = static_cast<double>(seed);
@@ -43,20 +42,20 @@ TEST(PilotedLoop, LandsAtHomeClearOfTheBuildingAndFindsTheAnchorsWithEverythingO
   const std::uint64_t n = one != nullptr ? first : text != nullptr ? std::strtoull(text, nullptr, 10) : 2;
   std::printf("seed  flight_s  clearance_m  lowest_m  home_m  ok  median_m  worst_m\n");
   for (std::uint64_t seed = first; seed <= n; ++seed) {
-    const auto flown = fly_piloted_loop(world, plan.value(), hostile(seed));
+    const auto flown = fly_closed_loop(world, plan.value(), hostile(seed));
     ASSERT_TRUE(flown) << flown.error().message;
     const auto& r = flown.value();
     const auto forecast = planning::check_plan(plan.value()).value().time;
-    EXPECT_GE(r.flown.flight_s, forecast.low_s) << "seed " << seed;
-    EXPECT_LE(r.flown.flight_s, forecast.high_s) << "seed " << seed;
+    EXPECT_GE(r.flight_s, forecast.low_s) << "seed " << seed;
+    EXPECT_LE(r.flight_s, forecast.high_s) << "seed " << seed;
     if (one != nullptr)
-      for (const auto& h : r.flown.happenings)
-        std::printf("%8.1f  %-28s %s\n", h.time_s, h.code.c_str(), h.text.c_str());
+      for (const auto& [time_s, line] : r.log)
+        std::printf("%8.1f  %-28s %s\n", time_s, line.code.c_str(), line.text.c_str());
     FlightOptions solve;
     solve.origin = world.origin;
-    solve.clues = r.flown.clues;
-    const auto solution = solve_flight(thinned_at_rest(r.flown.data), solve);
-    ASSERT_TRUE(solution) << "seed " << seed << ": " << r.flown.state.reason;
+    solve.clues = r.clues;
+    const auto solution = solve_flight(thinned_at_rest(r.data), solve);
+    ASSERT_TRUE(solution) << "seed " << seed << ": " << r.state.reason;
     const auto judged = judge(world, solution.value());
     double worst_m = 0;
     int ok = 0;
@@ -65,10 +64,10 @@ TEST(PilotedLoop, LandsAtHomeClearOfTheBuildingAndFindsTheAnchorsWithEverythingO
       ok += j.verdict == Verdict::ok;
     }
     std::printf("%4llu  %8.0f  %11.2f  %8.2f  %6.2f  %2d  %8.3f  %7.3f\n",
-                static_cast<unsigned long long>(seed), r.flown.flight_s, r.clearance_m, r.lowest_m, r.home_m,
-                ok, median_error_m(judged), worst_m);
+                static_cast<unsigned long long>(seed), r.flight_s, r.clearance_m, r.lowest_m, r.home_m, ok,
+                median_error_m(judged), worst_m);
     std::fflush(stdout);
-    EXPECT_TRUE(r.landed) << "seed " << seed << ": " << r.flown.state.reason;
+    EXPECT_TRUE(r.landed) << "seed " << seed << ": " << r.state.reason;
     EXPECT_LT(r.home_m, 3) << "seed " << seed;
     EXPECT_GE(r.clearance_m, 3) << "seed " << seed;
     EXPECT_GE(r.lowest_m, plan.value().settings.min_height_m) << "seed " << seed;

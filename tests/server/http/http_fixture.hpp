@@ -129,7 +129,7 @@ struct TestServer {
         uploads("test-upload", 2, 4),
         commands("test-command", 1, 4),
         heavy("test-heavy", 2, 2),
-        http(std::move(options), gateway, {pool, uploads, &commands, nullptr, &heavy}) {}
+        http(std::move(options), gateway, {pool, uploads, commands, pool, heavy}) {}
   ~TestServer() {
     gateway.release();
     http.stop(std::chrono::milliseconds(200));

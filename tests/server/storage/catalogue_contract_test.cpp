@@ -1,6 +1,18 @@
 #include <cmath>
 #include <limits>
 
+#include "core/ports/access_store.hpp"
+#include "core/ports/anchor_store.hpp"
+#include "core/ports/calibration_store.hpp"
+#include "core/ports/frame_store.hpp"
+#include "core/ports/job_store.hpp"
+#include "core/ports/kit_store.hpp"
+#include "core/ports/measurement_store.hpp"
+#include "core/ports/mission_bin.hpp"
+#include "core/ports/mission_store.hpp"
+#include "core/ports/revision_store.hpp"
+#include "core/ports/site_store.hpp"
+#include "core/ports/token_store.hpp"
 #include "tests/server/storage/backends.hpp"
 
 namespace anchord {
@@ -13,7 +25,7 @@ class MissionStoreContract : public StoreContract {};
 TEST_P(MissionStoreContract, GivesBackEveryField) {
   Site site;
   site.id = SiteId{make_uuid_v7(k_noon)};
-  ASSERT_TRUE(db_->anchors().insert(site));
+  ASSERT_TRUE(db_->stores().sites.insert(site));
   Mission m;
   m.id = MissionId{make_uuid_v7(k_noon)};
   m.site = site.id;
@@ -26,8 +38,8 @@ TEST_P(MissionStoreContract, GivesBackEveryField) {
   m.created = k_noon;
   m.finished = UtcTime{k_noon.ns + 1};
   m.tags = {{NetworkId{0x6e01}, 0, {0.1, -0.2, -0.3}}, {NetworkId{0xffffffff}, 255, {0, 0, 0}}};
-  ASSERT_TRUE(db_->missions().insert(m));
-  const auto found = db_->missions().mission(m.id).value();
+  ASSERT_TRUE(db_->stores().missions.insert(m));
+  const auto found = db_->stores().missions.mission(m.id).value();
   EXPECT_EQ(found.site, m.site);
   EXPECT_EQ(found.name, m.name);
   EXPECT_EQ(found.kit, "kit");
@@ -48,22 +60,22 @@ TEST_P(MissionStoreContract, UpdatesAllOfAMissionAndNamesAnUnknownOne) {
   m.name = "other";
   m.tags = {{NetworkId{9}, 1, {1, 2, 3}}};
   m.state = MissionState::finished;
-  ASSERT_TRUE(db_->missions().update(m));
-  const auto found = db_->missions().mission(m.id).value();
+  ASSERT_TRUE(db_->stores().missions.update(m));
+  const auto found = db_->stores().missions.mission(m.id).value();
   EXPECT_EQ(found.name, "other");
   EXPECT_EQ(found.tags.size(), 1u);
   m.id = MissionId{make_uuid_v7(k_noon)};
-  EXPECT_EQ(db_->missions().update(m).error().code, Errc::not_found);
-  EXPECT_EQ(db_->missions().mission(m.id).error().code, Errc::not_found);
-  EXPECT_EQ(db_->bin().put(m.id, k_noon, 0, "me").error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().missions.update(m).error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().missions.mission(m.id).error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().bin.put(m.id, k_noon, 0, "me").error().code, Errc::not_found);
 }
 
 TEST_P(MissionStoreContract, RefusesTheSameIdTwiceAndASiteThatIsNotThere) {
   Mission m = stored_mission();
-  EXPECT_EQ(db_->missions().insert(m).error().code, Errc::conflict);
+  EXPECT_EQ(db_->stores().missions.insert(m).error().code, Errc::conflict);
   m.id = MissionId{make_uuid_v7(k_noon)};
   m.site = SiteId{make_uuid_v7(k_noon)};
-  EXPECT_EQ(db_->missions().insert(m).error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().missions.insert(m).error().code, Errc::not_found);
 }
 
 TEST_P(MissionStoreContract, ListsNewestFirstPageByPage) {
@@ -71,13 +83,13 @@ TEST_P(MissionStoreContract, ListsNewestFirstPageByPage) {
   for (int i = 0; i < 5; ++i) {
     Mission m;
     m.id = MissionId{make_uuid_v7(UtcTime{k_noon.ns + i * 1'000'000'000LL})};
-    ASSERT_TRUE(db_->missions().insert(m));
+    ASSERT_TRUE(db_->stores().missions.insert(m));
     ids.push_back(m.id);
   }
-  const auto first = db_->missions().missions(2, std::nullopt).value();
+  const auto first = db_->stores().missions.missions(2, std::nullopt).value();
   ASSERT_EQ(first.size(), 2u);
   EXPECT_EQ(first[0].id, ids[4]);
-  const auto next = db_->missions().missions(10, first[1].id).value();
+  const auto next = db_->stores().missions.missions(10, first[1].id).value();
   ASSERT_EQ(next.size(), 3u);
   EXPECT_EQ(next[2].id, ids[0]);
 }
@@ -86,10 +98,10 @@ TEST_P(MissionStoreContract, ListsByInsertionAlsoWhenTheClockWasSetBack) {
   Mission ahead, after;
   ahead.id = MissionId{make_uuid_v7(UtcTime{k_noon.ns + 300LL * 86'400 * 1'000'000'000})};
   after.id = MissionId{make_uuid_v7(k_noon)};
-  ASSERT_TRUE(db_->missions().insert(ahead));
-  ASSERT_TRUE(db_->missions().insert(after));
-  EXPECT_EQ(db_->missions().missions(1, std::nullopt).value()[0].id, after.id);
-  EXPECT_EQ(db_->missions().missions(1, after.id).value()[0].id, ahead.id);
+  ASSERT_TRUE(db_->stores().missions.insert(ahead));
+  ASSERT_TRUE(db_->stores().missions.insert(after));
+  EXPECT_EQ(db_->stores().missions.missions(1, std::nullopt).value()[0].id, after.id);
+  EXPECT_EQ(db_->stores().missions.missions(1, after.id).value()[0].id, ahead.id);
 }
 
 MeasurementStore::Filter of(const MissionId& mission) {
@@ -102,71 +114,72 @@ TEST_P(MissionStoreContract, HidesWhatIsInTheBinAndGivesItBackWhole) {
   auto m = stored_mission();
   const auto other = stored_mission();
   m.state = MissionState::finished;
-  ASSERT_TRUE(db_->missions().update(m));
-  ASSERT_TRUE(db_->measurements().append_ranges({range_at(m.id, 1), range_at(other.id, 1)}, false));
-  ASSERT_TRUE(db_->measurements().append_fixes({fix_at(m.id, 1)}, false));
-  const auto id = db_->measurements().ranges(of(m.id)).value().ids.at(0);
-  EXPECT_EQ(db_->bin().restore(m.id).error().code, Errc::not_found) << "it is not in there";
-  ASSERT_TRUE(db_->bin().put(m.id, k_noon, 7, "me"));
-  EXPECT_EQ(db_->bin().put(m.id, k_noon, 7, "me").error().code, Errc::not_found) << "twice";
-  EXPECT_EQ(db_->missions().mission(m.id).error().code, Errc::not_found);
-  EXPECT_EQ(db_->missions().update(m).error().code, Errc::not_found);
-  EXPECT_EQ(db_->missions().insert(m).error().code, Errc::conflict) << "its id is taken";
-  EXPECT_EQ(db_->missions().missions(10, std::nullopt).value().size(), 1u);
-  EXPECT_EQ(db_->measurements().ranges({}).value().rows.size(), 1u) << "no query finds its rows";
-  EXPECT_EQ(db_->measurements().ranges(of(m.id)).error().code, Errc::not_found);
-  EXPECT_EQ(db_->measurements().fixes(of(m.id)).error().code, Errc::not_found);
-  EXPECT_EQ(db_->measurements().count_ranges(of(m.id)).error().code, Errc::not_found);
-  EXPECT_TRUE(db_->measurements().fixes({}).value().rows.empty());
-  EXPECT_EQ(db_->measurements().range(id).error().code, Errc::not_found);
-  EXPECT_EQ(db_->measurements().count_ranges(MeasurementStore::Filter{}).value(), 1u);
-  EXPECT_EQ(db_->measurements().devices(m.id).value().size(), 0u);
-  EXPECT_EQ(db_->measurements().append_ranges({range_at(m.id, 2)}, false).value()[0],
+  ASSERT_TRUE(db_->stores().missions.update(m));
+  ASSERT_TRUE(db_->stores().measurements.append_ranges({range_at(m.id, 1), range_at(other.id, 1)}, false));
+  ASSERT_TRUE(db_->stores().measurements.append_fixes({fix_at(m.id, 1)}, false));
+  const auto id = db_->stores().measurements.ranges(of(m.id)).value().ids.at(0);
+  EXPECT_EQ(db_->stores().bin.restore(m.id).error().code, Errc::not_found) << "it is not in there";
+  ASSERT_TRUE(db_->stores().bin.put(m.id, k_noon, 7, "me"));
+  EXPECT_EQ(db_->stores().bin.put(m.id, k_noon, 7, "me").error().code, Errc::not_found) << "twice";
+  EXPECT_EQ(db_->stores().missions.mission(m.id).error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().missions.update(m).error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().missions.insert(m).error().code, Errc::conflict) << "its id is taken";
+  EXPECT_EQ(db_->stores().missions.missions(10, std::nullopt).value().size(), 1u);
+  EXPECT_EQ(db_->stores().measurements.ranges({}).value().rows.size(), 1u) << "no query finds its rows";
+  EXPECT_EQ(db_->stores().measurements.ranges(of(m.id)).error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().measurements.fixes(of(m.id)).error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().measurements.count_ranges(of(m.id)).error().code, Errc::not_found);
+  EXPECT_TRUE(db_->stores().measurements.fixes({}).value().rows.empty());
+  EXPECT_EQ(db_->stores().measurements.range(id).error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().measurements.count_ranges(MeasurementStore::Filter{}).value(), 1u);
+  EXPECT_EQ(db_->stores().measurements.devices(m.id).value().size(), 0u);
+  EXPECT_EQ(db_->stores().measurements.append_ranges({range_at(m.id, 2)}, false).value()[0],
             RowOutcome::unknown_mission);
-  const auto list = db_->bin().list().value();
+  const auto list = db_->stores().bin.list().value();
   ASSERT_EQ(list.size(), 1u);
   EXPECT_EQ(list[0].mission.name, m.name);
   EXPECT_EQ(list[0].deleted_by, "me");
   EXPECT_EQ(list[0].deleted_ran_ns, 7);
   EXPECT_EQ(list[0].n_ranges, 1u);
   EXPECT_EQ(list[0].n_fixes, 1u);
-  ASSERT_TRUE(db_->bin().restore(m.id));
-  EXPECT_EQ(db_->missions().mission(m.id).value().state, MissionState::finished);
-  EXPECT_EQ(db_->measurements().ranges(of(m.id)).value().rows.size(), 1u);
-  EXPECT_TRUE(db_->bin().list().value().empty());
+  ASSERT_TRUE(db_->stores().bin.restore(m.id));
+  EXPECT_EQ(db_->stores().missions.mission(m.id).value().state, MissionState::finished);
+  EXPECT_EQ(db_->stores().measurements.ranges(of(m.id)).value().rows.size(), 1u);
+  EXPECT_TRUE(db_->stores().bin.list().value().empty());
 }
 
 TEST_P(MissionStoreContract, NeverGivesTheRestOfAFlightDeletedBetweenTwoPages) {
   auto m = stored_mission();
   m.state = MissionState::finished;
-  ASSERT_TRUE(db_->missions().update(m));
-  ASSERT_TRUE(db_->measurements()
-                  .append_ranges({range_at(m.id, 1), range_at(m.id, 2), range_at(m.id, 3)}, false)
-                  .has_value());
+  ASSERT_TRUE(db_->stores().missions.update(m));
+  ASSERT_TRUE(
+      db_->stores()
+          .measurements.append_ranges({range_at(m.id, 1), range_at(m.id, 2), range_at(m.id, 3)}, false)
+          .has_value());
   auto filter = of(m.id);
   filter.limit = 2;
-  const auto page = db_->measurements().ranges(filter).value();
+  const auto page = db_->stores().measurements.ranges(filter).value();
   ASSERT_EQ(page.rows.size(), 2u);
   filter.after = page.next;
-  ASSERT_TRUE(db_->bin().put(m.id, k_noon, 0, "me"));
-  EXPECT_EQ(db_->measurements().ranges(filter).error().code, Errc::not_found) << "in the bin";
-  ASSERT_TRUE(db_->bin().empty(m.id));
-  while (db_->bin().remove_rows(1).value() > 0) {
+  ASSERT_TRUE(db_->stores().bin.put(m.id, k_noon, 0, "me"));
+  EXPECT_EQ(db_->stores().measurements.ranges(filter).error().code, Errc::not_found) << "in the bin";
+  ASSERT_TRUE(db_->stores().bin.empty(m.id));
+  while (db_->stores().bin.remove_rows(1).value() > 0) {
   }
-  EXPECT_EQ(db_->measurements().ranges(filter).error().code, Errc::not_found) << "gone";
+  EXPECT_EQ(db_->stores().measurements.ranges(filter).error().code, Errc::not_found) << "gone";
 }
 
 TEST_P(MissionStoreContract, PutsNothingIntoTheBinThatRecordsOrACalibrationStandsOn) {
   auto recording = stored_mission();
   recording.state = MissionState::recording;
-  ASSERT_TRUE(db_->missions().update(recording));
-  EXPECT_EQ(db_->bin().put(recording.id, k_noon, 0, "me").error().code, Errc::conflict);
+  ASSERT_TRUE(db_->stores().missions.update(recording));
+  EXPECT_EQ(db_->stores().bin.put(recording.id, k_noon, 0, "me").error().code, Errc::conflict);
   auto used = stored_mission();
   used.state = MissionState::finished;
-  ASSERT_TRUE(db_->missions().update(used));
-  ASSERT_TRUE(db_->measurements().append_ranges({range_at(used.id, 1)}, false));
+  ASSERT_TRUE(db_->stores().missions.update(used));
+  ASSERT_TRUE(db_->stores().measurements.append_ranges({range_at(used.id, 1)}, false));
   stored_calibration(used, {1});
-  const auto refused = db_->bin().put(used.id, k_noon, 0, "me");
+  const auto refused = db_->stores().bin.put(used.id, k_noon, 0, "me");
   EXPECT_EQ(refused.error().code, Errc::conflict);
   EXPECT_NE(refused.error().message.find("1 calibration"), std::string::npos) << refused.error().message;
 }
@@ -175,63 +188,63 @@ TEST_P(MissionStoreContract, EmptiesTheBinByRunningTimeASliceAtATime) {
   auto old = stored_mission(), young = stored_mission();
   for (auto* m : {&old, &young}) {
     m->state = MissionState::finished;
-    ASSERT_TRUE(db_->missions().update(*m));
+    ASSERT_TRUE(db_->stores().missions.update(*m));
     std::vector<Range> rows;
     for (int i = 1; i <= 10; ++i) {
       rows.push_back(range_at(m->id, i));
       rows.back().cir = Cir{};
     }
-    ASSERT_TRUE(db_->measurements().append_ranges(rows, false));
-    ASSERT_TRUE(db_->measurements().append_fixes({fix_at(m->id, 1)}, false));
+    ASSERT_TRUE(db_->stores().measurements.append_ranges(rows, false));
+    ASSERT_TRUE(db_->stores().measurements.append_fixes({fix_at(m->id, 1)}, false));
   }
-  ASSERT_TRUE(db_->bin().put(old.id, k_noon, 100, "me"));
-  ASSERT_TRUE(db_->bin().put(young.id, k_noon, 200, "me"));
-  EXPECT_EQ(db_->bin().remove_rows(5).value(), 0u) << "nothing is due";
-  EXPECT_EQ(db_->bin().empty_before(200).value(), 1u);
-  EXPECT_EQ(db_->bin().restore(old.id).error().code, Errc::conflict) << "too late";
-  EXPECT_TRUE(db_->bin().binned(old.id).value().emptying);
-  EXPECT_EQ(db_->bin().remove_rows(6).value(), 6u);
-  EXPECT_EQ(db_->bin().remove_rows(6).value(), 6u) << "four ranges, the fix and the mission";
-  EXPECT_EQ(db_->bin().remove_rows(6).value(), 0u);
-  EXPECT_EQ(db_->bin().binned(old.id).error().code, Errc::not_found);
-  ASSERT_TRUE(db_->bin().restore(young.id));
+  ASSERT_TRUE(db_->stores().bin.put(old.id, k_noon, 100, "me"));
+  ASSERT_TRUE(db_->stores().bin.put(young.id, k_noon, 200, "me"));
+  EXPECT_EQ(db_->stores().bin.remove_rows(5).value(), 0u) << "nothing is due";
+  EXPECT_EQ(db_->stores().bin.empty_before(200).value(), 1u);
+  EXPECT_EQ(db_->stores().bin.restore(old.id).error().code, Errc::conflict) << "too late";
+  EXPECT_TRUE(db_->stores().bin.binned(old.id).value().emptying);
+  EXPECT_EQ(db_->stores().bin.remove_rows(6).value(), 6u);
+  EXPECT_EQ(db_->stores().bin.remove_rows(6).value(), 6u) << "four ranges, the fix and the mission";
+  EXPECT_EQ(db_->stores().bin.remove_rows(6).value(), 0u);
+  EXPECT_EQ(db_->stores().bin.binned(old.id).error().code, Errc::not_found);
+  ASSERT_TRUE(db_->stores().bin.restore(young.id));
   MeasurementStore::Filter all;
   all.limit = 50;
-  EXPECT_EQ(db_->measurements().ranges(all).value().rows.size(), 10u);
+  EXPECT_EQ(db_->stores().measurements.ranges(all).value().rows.size(), 10u);
 }
 
 TEST_P(MissionStoreContract, KeepsRunningTimeAndTheStreamOfTheDevices) {
-  EXPECT_EQ(db_->service().running_ns().value(), 0);
-  ASSERT_TRUE(db_->service().keep_running_ns(500));
-  ASSERT_TRUE(db_->service().keep_running_ns(400));
-  EXPECT_EQ(db_->service().running_ns().value(), 500) << "never goes back";
+  EXPECT_EQ(db_->stores().service.running_ns().value(), 0);
+  ASSERT_TRUE(db_->stores().service.keep_running_ns(500));
+  ASSERT_TRUE(db_->stores().service.keep_running_ns(400));
+  EXPECT_EQ(db_->stores().service.running_ns().value(), 500) << "never goes back";
   const auto a = stored_mission(), b = stored_mission();
-  EXPECT_TRUE(db_->service().device_stream().value().empty());
-  ASSERT_TRUE(db_->service().keep_device_stream({b.id, a.id}));
-  EXPECT_EQ(db_->service().device_stream().value(), (std::vector{b.id, a.id}));
-  ASSERT_TRUE(db_->service().keep_device_stream({a.id}));
-  EXPECT_EQ(db_->service().device_stream().value(), std::vector{a.id});
+  EXPECT_TRUE(db_->stores().service.device_stream().value().empty());
+  ASSERT_TRUE(db_->stores().service.keep_device_stream({b.id, a.id}));
+  EXPECT_EQ(db_->stores().service.device_stream().value(), (std::vector{b.id, a.id}));
+  ASSERT_TRUE(db_->stores().service.keep_device_stream({a.id}));
+  EXPECT_EQ(db_->stores().service.device_stream().value(), std::vector{a.id});
 }
 
 TEST_P(MissionStoreContract, TakesMeasurementsAlongWhenTheBinIsEmptied) {
   const auto used = stored_mission();
   auto unused = stored_mission();
   unused.state = MissionState::finished;
-  ASSERT_TRUE(db_->missions().update(unused));
+  ASSERT_TRUE(db_->stores().missions.update(unused));
   for (const auto& m : {used, unused}) {
     Range row = range_at(m.id, 1);
     row.cir = Cir{};
-    ASSERT_TRUE(db_->measurements().append_ranges({row}, false));
-    ASSERT_TRUE(db_->measurements().append_fixes({fix_at(m.id, 1)}, false));
+    ASSERT_TRUE(db_->stores().measurements.append_ranges({row}, false));
+    ASSERT_TRUE(db_->stores().measurements.append_fixes({fix_at(m.id, 1)}, false));
   }
-  ASSERT_TRUE(db_->bin().put(unused.id, k_noon, 0, "me"));
-  ASSERT_TRUE(db_->bin().empty(unused.id));
-  while (db_->bin().remove_rows(1).value() > 0) {
+  ASSERT_TRUE(db_->stores().bin.put(unused.id, k_noon, 0, "me"));
+  ASSERT_TRUE(db_->stores().bin.empty(unused.id));
+  while (db_->stores().bin.remove_rows(1).value() > 0) {
   }
-  const auto left = db_->measurements().ranges({}).value();
+  const auto left = db_->stores().measurements.ranges({}).value();
   ASSERT_EQ(left.rows.size(), 1u);
   EXPECT_EQ(left.rows[0].mission, used.id);
-  EXPECT_EQ(db_->measurements().devices(std::nullopt).value().size(), 2u);
+  EXPECT_EQ(db_->stores().measurements.devices(std::nullopt).value().size(), 2u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Backends, MissionStoreContract, backends(), backend_name);
@@ -249,38 +262,38 @@ TEST_P(AnchorStoreContract, ChangesASiteOnlyFromTheVersionNamed) {
   site.base_sigma_m = 0.008;
   site.base_source = "known_point";
   site.created = k_noon;
-  ASSERT_TRUE(db_->anchors().insert(site));
-  EXPECT_EQ(db_->anchors().insert(site).error().code, Errc::conflict);
+  ASSERT_TRUE(db_->stores().sites.insert(site));
+  EXPECT_EQ(db_->stores().sites.insert(site).error().code, Errc::conflict);
   site.name = "West";
-  ASSERT_TRUE(db_->anchors().update(site, 1));
-  EXPECT_EQ(db_->anchors().update(site, 1).error().code, Errc::conflict);
-  const auto found = db_->anchors().site(site.id).value();
+  ASSERT_TRUE(db_->stores().sites.update(site, 1));
+  EXPECT_EQ(db_->stores().sites.update(site, 1).error().code, Errc::conflict);
+  const auto found = db_->stores().sites.site(site.id).value();
   EXPECT_EQ(found.version, 2u);
   EXPECT_EQ(found.name, "West");
   EXPECT_EQ(found.origin->lat_deg, 51.02);
   EXPECT_EQ(found.crs_epoch, 2026.34);
   EXPECT_EQ(found.base_sigma_m, 0.008);
-  EXPECT_EQ(db_->anchors().sites(10, std::nullopt).value().size(), 1u);
+  EXPECT_EQ(db_->stores().sites.sites(10, std::nullopt).value().size(), 1u);
   Mission m;
   m.id = MissionId{make_uuid_v7(k_noon)};
   m.site = site.id;
-  ASSERT_TRUE(db_->missions().insert(m));
-  EXPECT_EQ(db_->anchors().remove(site.id, 2).error().code, Errc::conflict);
+  ASSERT_TRUE(db_->stores().missions.insert(m));
+  EXPECT_EQ(db_->stores().sites.remove(site.id, 2).error().code, Errc::conflict);
   m.state = MissionState::finished;
-  ASSERT_TRUE(db_->missions().update(m));
-  ASSERT_TRUE(db_->bin().put(m.id, k_noon, 0, "me"));
-  EXPECT_EQ(db_->anchors().remove(site.id, 2).error().code, Errc::conflict) << "it may come back";
-  ASSERT_TRUE(db_->bin().empty(m.id));
-  EXPECT_EQ(db_->bin().remove_rows(10).value(), 1u);
-  EXPECT_EQ(db_->anchors().remove(site.id, 1).error().code, Errc::conflict) << "it changed since";
-  ASSERT_TRUE(db_->anchors().remove(site.id, 2));
-  EXPECT_EQ(db_->anchors().site(site.id).error().code, Errc::not_found);
-  EXPECT_EQ(db_->anchors().update(site, 2).error().code, Errc::not_found);
+  ASSERT_TRUE(db_->stores().missions.update(m));
+  ASSERT_TRUE(db_->stores().bin.put(m.id, k_noon, 0, "me"));
+  EXPECT_EQ(db_->stores().sites.remove(site.id, 2).error().code, Errc::conflict) << "it may come back";
+  ASSERT_TRUE(db_->stores().bin.empty(m.id));
+  EXPECT_EQ(db_->stores().bin.remove_rows(10).value(), 1u);
+  EXPECT_EQ(db_->stores().sites.remove(site.id, 1).error().code, Errc::conflict) << "it changed since";
+  ASSERT_TRUE(db_->stores().sites.remove(site.id, 2));
+  EXPECT_EQ(db_->stores().sites.site(site.id).error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().sites.update(site, 2).error().code, Errc::not_found);
 }
 
 TEST_P(AnchorStoreContract, MakesAnAnchorOnceAndKeepsItsFacilityData) {
-  const auto made = db_->anchors().find_or_create(NetworkId{0x6a2f}, k_noon).value();
-  EXPECT_EQ(db_->anchors().find_or_create(NetworkId{0x6a2f}, UtcTime{0}).value().id, made.id);
+  const auto made = db_->stores().anchors.find_or_create(NetworkId{0x6a2f}, k_noon).value();
+  EXPECT_EQ(db_->stores().anchors.find_or_create(NetworkId{0x6a2f}, UtcTime{0}).value().id, made.id);
   Anchor changed = made;
   changed.name = "north-west";
   changed.floor = "0";
@@ -288,17 +301,17 @@ TEST_P(AnchorStoreContract, MakesAnAnchorOnceAndKeepsItsFacilityData) {
   changed.ifc_guid = "2O2Fr$t4X7Zf8NOew3FLOH";
   changed.external_ids = {{"maximo", "LOC-88231"}, {"sap", "7"}};
   changed.retired = true;
-  ASSERT_TRUE(db_->anchors().update(changed, 1));
-  EXPECT_EQ(db_->anchors().update(changed, 1).error().code, Errc::conflict);
-  const auto found = db_->anchors().anchor(NetworkId{0x6a2f}).value();
+  ASSERT_TRUE(db_->stores().anchors.update(changed, 1));
+  EXPECT_EQ(db_->stores().anchors.update(changed, 1).error().code, Errc::conflict);
+  const auto found = db_->stores().anchors.anchor(NetworkId{0x6a2f}).value();
   EXPECT_EQ(found.version, 2u);
   EXPECT_EQ(found.name, "north-west");
   EXPECT_EQ(found.external_ids, changed.external_ids);
   EXPECT_TRUE(found.retired);
-  EXPECT_EQ(db_->anchors().anchor(made.id).value().asset_tag, "UWB-000412");
-  EXPECT_EQ(db_->anchors().anchor(NetworkId{1}).error().code, Errc::not_found);
-  EXPECT_EQ(db_->anchors().anchors(10, std::nullopt).value().size(), 1u);
-  EXPECT_EQ(db_->anchors().anchors(10, made.id).value().size(), 0u);
+  EXPECT_EQ(db_->stores().anchors.anchor(made.id).value().asset_tag, "UWB-000412");
+  EXPECT_EQ(db_->stores().anchors.anchor(NetworkId{1}).error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().anchors.anchors(10, std::nullopt).value().size(), 1u);
+  EXPECT_EQ(db_->stores().anchors.anchors(10, made.id).value().size(), 0u);
 }
 
 TEST_P(AnchorStoreContract, GivesBackACalibrationAsItWas) {
@@ -327,9 +340,9 @@ TEST_P(AnchorStoreContract, GivesBackACalibrationAsItWas) {
   lost.anchor = NetworkId{2};
   lost.h95_m = std::numeric_limits<double>::quiet_NaN();
   c.anchors = {e, lost};
-  ASSERT_TRUE(db_->anchors().insert(c));
-  EXPECT_EQ(db_->anchors().insert(c).error().code, Errc::conflict);
-  const auto found = db_->anchors().calibration(c.id).value();
+  ASSERT_TRUE(db_->stores().calibrations.insert(c));
+  EXPECT_EQ(db_->stores().calibrations.insert(c).error().code, Errc::conflict);
+  const auto found = db_->stores().calibrations.calibration(c.id).value();
   EXPECT_EQ(found.missions, c.missions);
   EXPECT_EQ(found.origin->height_m, 58);
   EXPECT_EQ(found.settings_json, c.settings_json);
@@ -348,54 +361,55 @@ TEST_P(AnchorStoreContract, GivesBackACalibrationAsItWas) {
   EXPECT_FALSE(f.lag_s);
   EXPECT_FALSE(found.anchors[1].best);
   EXPECT_TRUE(std::isnan(found.anchors[1].h95_m));
-  EXPECT_EQ(db_->anchors().calibrations(10, std::nullopt).value().size(), 1u);
-  ASSERT_TRUE(db_->anchors().remove(c.id));
-  EXPECT_EQ(db_->anchors().calibration(c.id).error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().calibrations.calibrations(10, std::nullopt).value().size(), 1u);
+  ASSERT_TRUE(db_->stores().calibrations.remove(c.id));
+  EXPECT_EQ(db_->stores().calibrations.calibration(c.id).error().code, Errc::not_found);
 }
 
 TEST_P(AnchorStoreContract, RefusesACalibrationOfAMissionThatIsNotThereAndLeavesNothing) {
   Calibration c;
   c.id = CalibrationId{make_uuid_v7(k_noon)};
   c.missions = {MissionId{make_uuid_v7(k_noon)}};
-  EXPECT_EQ(db_->anchors().insert(c).error().code, Errc::not_found);
-  EXPECT_EQ(db_->anchors().calibration(c.id).error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().calibrations.insert(c).error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().calibrations.calibration(c.id).error().code, Errc::not_found);
 }
 
 TEST_P(AnchorStoreContract, CarriesPositionsOnThatANewRevisionDoesNotSet) {
   const auto mission = stored_mission();
-  EXPECT_TRUE(db_->anchors().published(std::nullopt).value().empty());
+  EXPECT_TRUE(db_->stores().revisions.published(std::nullopt).value().empty());
   const auto first = stored_calibration(mission, {1, 2});
   const auto second = stored_calibration(mission, {2, 3});
-  const auto r1 =
-      db_->anchors().publish(first.id, {NetworkId{1}, NetworkId{2}}, "token", "first", k_noon).value();
+  const auto r1 = db_->stores()
+                      .revisions.publish(first.id, {NetworkId{1}, NetworkId{2}}, "token", "first", k_noon)
+                      .value();
   EXPECT_EQ(r1.number, 1u);
-  ASSERT_TRUE(db_->anchors().publish(second.id, {NetworkId{2}}, "token", "", k_noon));
-  const auto now = db_->anchors().published(std::nullopt).value();
+  ASSERT_TRUE(db_->stores().revisions.publish(second.id, {NetworkId{2}}, "token", "", k_noon));
+  const auto now = db_->stores().revisions.published(std::nullopt).value();
   ASSERT_EQ(now.size(), 2u);
   EXPECT_EQ(now[0].estimate.anchor, NetworkId{1});
   EXPECT_EQ(now[0].since_revision, 1u);
   EXPECT_EQ(now[0].calibration, first.id);
   EXPECT_EQ(now[1].since_revision, 2u);
   EXPECT_EQ(now[1].calibration, second.id);
-  EXPECT_EQ(db_->anchors().published(1).value()[1].calibration, first.id);
-  EXPECT_EQ(db_->anchors().published(3).error().code, Errc::not_found);
-  const auto history = db_->anchors().history(NetworkId{2}).value();
+  EXPECT_EQ(db_->stores().revisions.published(1).value()[1].calibration, first.id);
+  EXPECT_EQ(db_->stores().revisions.published(3).error().code, Errc::not_found);
+  const auto history = db_->stores().revisions.history(NetworkId{2}).value();
   ASSERT_EQ(history.size(), 2u);
   EXPECT_EQ(history[0].since_revision, 2u);
-  const auto revisions = db_->anchors().revisions(10, 0).value();
+  const auto revisions = db_->stores().revisions.revisions(10, 0).value();
   ASSERT_EQ(revisions.size(), 2u);
   EXPECT_EQ(revisions[0].number, 2u);
   EXPECT_EQ(revisions[1].note, "first");
-  EXPECT_EQ(db_->anchors().revisions(10, 2).value().size(), 1u);
-  EXPECT_EQ(db_->anchors().remove(first.id).error().code, Errc::conflict);
+  EXPECT_EQ(db_->stores().revisions.revisions(10, 2).value().size(), 1u);
+  EXPECT_EQ(db_->stores().calibrations.remove(first.id).error().code, Errc::conflict);
 }
 
 TEST_P(AnchorStoreContract, PublishesNothingWhenOneAnchorHasNoPosition) {
   const auto c = stored_calibration(stored_mission(), {1});
-  const auto result = db_->anchors().publish(c.id, {NetworkId{1}, NetworkId{2}}, "", "", k_noon);
+  const auto result = db_->stores().revisions.publish(c.id, {NetworkId{1}, NetworkId{2}}, "", "", k_noon);
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().code, Errc::invalid_argument);
-  EXPECT_TRUE(db_->anchors().revisions(10, 0).value().empty());
+  EXPECT_TRUE(db_->stores().revisions.revisions(10, 0).value().empty());
 }
 
 TEST_P(AnchorStoreContract, KeepsGatesEvidenceAndWhoOverrodeWhat) {
@@ -413,11 +427,11 @@ TEST_P(AnchorStoreContract, KeepsGatesEvidenceAndWhoOverrodeWhat) {
                {"halves", std::nullopt, 16.3, false, "one half has no ranges"}};
     c.anchors.push_back(e);
   }
-  ASSERT_TRUE(db_->anchors().insert(c));
-  const auto read = db_->anchors().calibration(c.id).value();
+  ASSERT_TRUE(db_->stores().calibrations.insert(c));
+  const auto read = db_->stores().calibrations.calibration(c.id).value();
   EXPECT_EQ(read.provenance_json, c.provenance_json);
   EXPECT_TRUE(read.evidence_json.empty()) << "read on its own";
-  EXPECT_EQ(db_->anchors().evidence(c.id).value(), c.evidence_json);
+  EXPECT_EQ(db_->stores().calibrations.evidence(c.id).value(), c.evidence_json);
   ASSERT_EQ(read.anchors[1].gates.size(), 2u);
   EXPECT_EQ(read.anchors[1].gates[0].name, "chi_square");
   EXPECT_EQ(read.anchors[1].gates[0].value, 31.2);
@@ -426,35 +440,38 @@ TEST_P(AnchorStoreContract, KeepsGatesEvidenceAndWhoOverrodeWhat) {
   EXPECT_FALSE(read.anchors[1].gates[1].value.has_value());
 
   const std::vector<NetworkId> both{NetworkId{1}, NetworkId{2}};
-  EXPECT_EQ(db_->anchors().publish(c.id, both, "t", "", k_noon, {{NetworkId{3}, "no", "t"}}).error().code,
-            Errc::invalid_argument);
-  ASSERT_TRUE(db_->anchors().publish(c.id, both, "t", "", k_noon, {{NetworkId{2}, "taped", "token-7"}}));
-  const auto published = db_->anchors().published(std::nullopt).value();
+  EXPECT_EQ(
+      db_->stores().revisions.publish(c.id, both, "t", "", k_noon, {{NetworkId{3}, "no", "t"}}).error().code,
+      Errc::invalid_argument);
+  ASSERT_TRUE(
+      db_->stores().revisions.publish(c.id, both, "t", "", k_noon, {{NetworkId{2}, "taped", "token-7"}}));
+  const auto published = db_->stores().revisions.published(std::nullopt).value();
   EXPECT_FALSE(published[0].overridden.has_value());
   ASSERT_TRUE(published[1].overridden.has_value());
   EXPECT_EQ(published[1].overridden->reason, "taped");
   EXPECT_EQ(published[1].overridden->by, "token-7");
   const auto later = stored_calibration(mission, {9});
-  ASSERT_TRUE(db_->anchors().publish(later.id, {NetworkId{9}}, "t", "", k_noon));
-  EXPECT_TRUE(db_->anchors().published(std::nullopt).value()[1].overridden.has_value()) << "carried on";
+  ASSERT_TRUE(db_->stores().revisions.publish(later.id, {NetworkId{9}}, "t", "", k_noon));
+  EXPECT_TRUE(db_->stores().revisions.published(std::nullopt).value()[1].overridden.has_value())
+      << "carried on";
 }
 
 TEST_P(AnchorStoreContract, KeepsEveryProfileOfAKitAndRefusesALostUpdate) {
-  EXPECT_FALSE(db_->kits().profile("kit-1").value().has_value());
+  EXPECT_FALSE(db_->stores().kits.profile("kit-1").value().has_value());
   StoredProfile p{"kit-1", 0, k_noon, "token", "put", R"({"a":1})"};
-  EXPECT_EQ(db_->kits().put(p, 0).value().version, 1u);
-  EXPECT_EQ(db_->kits().put(p, 0).error().code, Errc::conflict);
+  EXPECT_EQ(db_->stores().kits.put(p, 0).value().version, 1u);
+  EXPECT_EQ(db_->stores().kits.put(p, 0).error().code, Errc::conflict);
   p.profile_json = R"({"a":2})";
   p.source = "calibration x";
-  EXPECT_EQ(db_->kits().put(p, 1).value().version, 2u);
+  EXPECT_EQ(db_->stores().kits.put(p, 1).value().version, 2u);
   reopen();
-  EXPECT_EQ(db_->kits().profile("kit-1").value()->profile_json, R"({"a":2})");
-  const auto history = db_->kits().history("kit-1", 10).value();
+  EXPECT_EQ(db_->stores().kits.profile("kit-1").value()->profile_json, R"({"a":2})");
+  const auto history = db_->stores().kits.history("kit-1", 10).value();
   ASSERT_EQ(history.size(), 2u);
   EXPECT_EQ(history[1].source, "put");
   p.kit = "kit-0";
-  ASSERT_TRUE(db_->kits().put(p, 0));
-  const auto newest = db_->kits().newest().value();
+  ASSERT_TRUE(db_->stores().kits.put(p, 0));
+  const auto newest = db_->stores().kits.newest().value();
   ASSERT_EQ(newest.size(), 2u);
   EXPECT_EQ(newest[0].kit, "kit-0");
   EXPECT_EQ(newest[1].version, 2u);
@@ -464,28 +481,28 @@ TEST_P(AnchorStoreContract, KeepsFramesByNameAndVersion) {
   Site site;
   site.id = SiteId{make_uuid_v7(k_noon)};
   site.projected_epsg = 25831;
-  ASSERT_TRUE(db_->anchors().insert(site));
-  EXPECT_EQ(db_->anchors().site(site.id).value().projected_epsg, 25831);
+  ASSERT_TRUE(db_->stores().sites.insert(site));
+  EXPECT_EQ(db_->stores().sites.site(site.id).value().projected_epsg, 25831);
   LocalFrame frame{FrameId{make_uuid_v7(k_noon)}, "hall-a", site.id, R"({"pairs":[]})", k_noon, 1};
-  ASSERT_TRUE(db_->frames().insert(frame));
+  ASSERT_TRUE(db_->stores().frames.insert(frame));
   LocalFrame other = frame;
   other.id = FrameId{make_uuid_v7(k_noon)};
-  EXPECT_EQ(db_->frames().insert(other).error().code, Errc::conflict);
+  EXPECT_EQ(db_->stores().frames.insert(other).error().code, Errc::conflict);
   other.name = "hall-b";
   other.site.reset();
-  ASSERT_TRUE(db_->frames().insert(other));
+  ASSERT_TRUE(db_->stores().frames.insert(other));
   other.name = "hall-a";
-  EXPECT_EQ(db_->frames().update(other, 1).error().code, Errc::conflict);
+  EXPECT_EQ(db_->stores().frames.update(other, 1).error().code, Errc::conflict);
   frame.definition_json = R"({"pairs":[1]})";
-  ASSERT_TRUE(db_->frames().update(frame, 1));
-  EXPECT_EQ(db_->frames().update(frame, 1).error().code, Errc::conflict);
-  EXPECT_EQ(db_->frames().frame("hall-a").value().version, 2u);
-  EXPECT_EQ(db_->frames().frames_of(site.id).value().size(), 1u);
-  EXPECT_EQ(db_->frames().frames(1, std::nullopt).value().size(), 1u);
-  EXPECT_EQ(db_->anchors().remove(site.id, 1).error().code, Errc::conflict) << "a frame stands on it";
-  EXPECT_EQ(db_->frames().remove(frame.id, 1).error().code, Errc::conflict) << "it changed since";
-  ASSERT_TRUE(db_->frames().remove(frame.id, 2));
-  EXPECT_EQ(db_->frames().frame(frame.id).error().code, Errc::not_found);
+  ASSERT_TRUE(db_->stores().frames.update(frame, 1));
+  EXPECT_EQ(db_->stores().frames.update(frame, 1).error().code, Errc::conflict);
+  EXPECT_EQ(db_->stores().frames.frame("hall-a").value().version, 2u);
+  EXPECT_EQ(db_->stores().frames.frames_of(site.id).value().size(), 1u);
+  EXPECT_EQ(db_->stores().frames.frames(1, std::nullopt).value().size(), 1u);
+  EXPECT_EQ(db_->stores().sites.remove(site.id, 1).error().code, Errc::conflict) << "a frame stands on it";
+  EXPECT_EQ(db_->stores().frames.remove(frame.id, 1).error().code, Errc::conflict) << "it changed since";
+  ASSERT_TRUE(db_->stores().frames.remove(frame.id, 2));
+  EXPECT_EQ(db_->stores().frames.frame(frame.id).error().code, Errc::not_found);
 }
 
 INSTANTIATE_TEST_SUITE_P(Backends, AnchorStoreContract, backends(), backend_name);
@@ -495,20 +512,20 @@ class AccessContract : public StoreContract {};
 TEST_P(AccessContract, FindsATokenBySecretAndKeepsTheFirstRevocation) {
   Token token{
       TokenId{make_uuid_v7(k_noon)}, "gate", std::string(64, 'a'), {"gateway", "viewer"}, k_noon, {}, {}, {}};
-  ASSERT_TRUE(db_->tokens().insert(token));
-  EXPECT_EQ(db_->tokens().insert(token).error().code, Errc::conflict);
-  ASSERT_TRUE(db_->tokens().touch(token.id, UtcTime{5}));
-  ASSERT_TRUE(db_->tokens().revoke(token.id, UtcTime{7}));
-  ASSERT_TRUE(db_->tokens().revoke(token.id, UtcTime{9}));
-  const auto found = db_->tokens().token_by_secret(std::string(64, 'a')).value();
+  ASSERT_TRUE(db_->stores().tokens.insert(token));
+  EXPECT_EQ(db_->stores().tokens.insert(token).error().code, Errc::conflict);
+  ASSERT_TRUE(db_->stores().tokens.touch(token.id, UtcTime{5}));
+  ASSERT_TRUE(db_->stores().tokens.revoke(token.id, UtcTime{7}));
+  ASSERT_TRUE(db_->stores().tokens.revoke(token.id, UtcTime{9}));
+  const auto found = db_->stores().tokens.token_by_secret(std::string(64, 'a')).value();
   EXPECT_EQ(found.id, token.id);
   EXPECT_THAT(found.roles, ElementsAre("gateway", "viewer"));
   EXPECT_EQ(found.last_used, UtcTime{5});
   EXPECT_EQ(found.revoked, UtcTime{7});
   EXPECT_FALSE(found.expires);
-  EXPECT_EQ(db_->tokens().token_by_secret("b").error().code, Errc::not_found);
-  EXPECT_EQ(db_->tokens().revoke(TokenId{}, k_noon).error().code, Errc::not_found);
-  EXPECT_EQ(db_->tokens().tokens().value().size(), 1u);
+  EXPECT_EQ(db_->stores().tokens.token_by_secret("b").error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().tokens.revoke(TokenId{}, k_noon).error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().tokens.tokens().value().size(), 1u);
 }
 
 TEST_P(AccessContract, FailsJobsThatARestartCutOff) {
@@ -520,57 +537,58 @@ TEST_P(AccessContract, FailsJobsThatARestartCutOff) {
   Job done = running;
   done.id = JobId{make_uuid_v7(k_noon)};
   done.state = JobState::succeeded;
-  ASSERT_TRUE(db_->jobs().insert(running));
-  ASSERT_TRUE(db_->jobs().insert(done));
-  EXPECT_EQ(db_->jobs().fail_unfinished(k_noon, "{}").value(), 1u);
-  const auto found = db_->jobs().job(running.id).value();
+  ASSERT_TRUE(db_->stores().jobs.insert(running));
+  ASSERT_TRUE(db_->stores().jobs.insert(done));
+  EXPECT_EQ(db_->stores().jobs.fail_unfinished(k_noon, "{}").value(), 1u);
+  const auto found = db_->stores().jobs.job(running.id).value();
   EXPECT_EQ(found.state, JobState::failed);
   EXPECT_EQ(found.fraction, 0.42);
   EXPECT_EQ(found.finished, k_noon);
-  EXPECT_EQ(db_->jobs().job(done.id).value().state, JobState::succeeded);
+  EXPECT_EQ(db_->stores().jobs.job(done.id).value().state, JobState::succeeded);
   done.detail = "x";
-  ASSERT_TRUE(db_->jobs().update(done));
-  EXPECT_EQ(db_->jobs().jobs(10, std::nullopt).value().size(), 2u);
-  EXPECT_EQ(db_->jobs().job(JobId{}).error().code, Errc::not_found);
+  ASSERT_TRUE(db_->stores().jobs.update(done));
+  EXPECT_EQ(db_->stores().jobs.jobs(10, std::nullopt).value().size(), 2u);
+  EXPECT_EQ(db_->stores().jobs.job(JobId{}).error().code, Errc::not_found);
 }
 
 TEST_P(AccessContract, KeepsOneAnswerForAPrincipalAndKey) {
   const StoredAnswer answer{"key", "me", "hash", std::string("a\0b", 3), "/there", "\"7\"", 201, 1000};
-  ASSERT_TRUE(db_->access().keep_answer(answer, 0));
-  EXPECT_EQ(db_->access().keep_answer(answer, 1000).error().code, Errc::conflict);
-  ASSERT_TRUE(db_->access().keep_answer(answer, 1001)) << "in the place of one that has expired";
-  EXPECT_EQ(db_->access().answer_use("me").value().count, 1u);
-  EXPECT_EQ(db_->access().answer_use("me").value().bytes, 3u);
-  EXPECT_EQ(db_->access().answer_use("you").value().count, 0u);
-  const auto found = db_->access().answer("me", "key").value();
+  ASSERT_TRUE(db_->stores().access.keep_answer(answer, 0));
+  EXPECT_EQ(db_->stores().access.keep_answer(answer, 1000).error().code, Errc::conflict);
+  ASSERT_TRUE(db_->stores().access.keep_answer(answer, 1001)) << "in the place of one that has expired";
+  EXPECT_EQ(db_->stores().access.answer_use("me").value().count, 1u);
+  EXPECT_EQ(db_->stores().access.answer_use("me").value().bytes, 3u);
+  EXPECT_EQ(db_->stores().access.answer_use("you").value().count, 0u);
+  const auto found = db_->stores().access.answer("me", "key").value();
   ASSERT_TRUE(found);
   EXPECT_EQ(found->body, answer.body);
   EXPECT_EQ(found->status, 201);
   EXPECT_EQ(found->location, "/there");
   EXPECT_EQ(found->etag, "\"7\"");
-  EXPECT_FALSE(db_->access().answer("you", "key").value());
-  EXPECT_EQ(db_->access().drop_answers_before(1000, 10).value(), 0u);
-  EXPECT_EQ(db_->access().drop_answers_before(1001, 10).value(), 1u);
+  EXPECT_FALSE(db_->stores().access.answer("you", "key").value());
+  EXPECT_EQ(db_->stores().access.drop_answers_before(1000, 10).value(), 0u);
+  EXPECT_EQ(db_->stores().access.drop_answers_before(1001, 10).value(), 1u);
   for (int i = 0; i < 5; ++i) {
     StoredAnswer one = answer;
     one.key = std::to_string(i);
     one.created_ran_ns = 10 * i;
-    ASSERT_TRUE(db_->access().keep_answer(one, 0));
+    ASSERT_TRUE(db_->stores().access.keep_answer(one, 0));
   }
-  EXPECT_EQ(db_->access().drop_answers_before(100, 2).value(), 2u) << "a slice";
-  EXPECT_EQ(db_->access().drop_oldest_answers("me", 2).value(), 2u);
-  EXPECT_TRUE(db_->access().answer("me", "4").value()) << "the youngest stays";
-  EXPECT_EQ(db_->access().answer_use("me").value().count, 1u);
+  EXPECT_EQ(db_->stores().access.drop_answers_before(100, 2).value(), 2u) << "a slice";
+  EXPECT_EQ(db_->stores().access.drop_oldest_answers("me", 2).value(), 2u);
+  EXPECT_TRUE(db_->stores().access.answer("me", "4").value()) << "the youngest stays";
+  EXPECT_EQ(db_->stores().access.answer_use("me").value().count, 1u);
 }
 
 TEST_P(AccessContract, ChainsTheAuditLog) {
   for (int i = 0; i < 3; ++i) {
-    ASSERT_TRUE(db_->access().append_audit({UtcTime{i}, "me", "publish", "127.0.0.1", std::to_string(i)}));
+    ASSERT_TRUE(
+        db_->stores().access.append_audit({UtcTime{i}, "me", "publish", "127.0.0.1", std::to_string(i)}));
   }
-  const auto entries = db_->access().audit(2).value();
+  const auto entries = db_->stores().access.audit(2).value();
   ASSERT_EQ(entries.size(), 2u);
   EXPECT_EQ(entries[0].result, "2");
-  EXPECT_TRUE(db_->access().verify_audit());
+  EXPECT_TRUE(db_->stores().access.verify_audit());
 }
 
 INSTANTIATE_TEST_SUITE_P(Backends, AccessContract, backends(), backend_name);

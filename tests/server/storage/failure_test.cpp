@@ -12,6 +12,8 @@
 #include <sstream>
 #include <thread>
 
+#include "core/ports/measurement_store.hpp"
+#include "core/ports/mission_store.hpp"
 #include "tests/server/storage/child.hpp"
 #include "tests/server/storage/store_contract.hpp"
 
@@ -68,7 +70,7 @@ class StorageFailure : public testing::Test {
   MissionId filled(int n) {
     auto db = open();
     const auto m = mission_in(*db);
-    EXPECT_TRUE(db->measurements().append_ranges(batch(m.id, 0, n), false));
+    EXPECT_TRUE(db->stores().measurements.append_ranges(batch(m.id, 0, n), false));
     return m.id;
   }
   ScratchDir dir_;
@@ -100,19 +102,21 @@ TEST_F(StorageFailure, AnswersStorageFullAtTheQuotaAndKeepsWhatItAcknowledged) {
     mission = mission_in(*db).id;
     Result<std::vector<RowOutcome>> result = std::vector<RowOutcome>{};
     while (acknowledged < 100'000 &&
-           (result = db->measurements().append_ranges(batch(mission, acknowledged, 500), false))) {
+           (result = db->stores().measurements.append_ranges(batch(mission, acknowledged, 500), false))) {
       acknowledged += 500;
     }
     ASSERT_FALSE(result);
     EXPECT_EQ(result.error().code, Errc::storage_full) << result.error().message;
     EXPECT_EQ(db->health().level, StorageLevel::full);
     EXPECT_FALSE(db->health().writable());
-    EXPECT_EQ(db->measurements().count_ranges(mission).value(), static_cast<std::uint64_t>(acknowledged));
+    EXPECT_EQ(db->stores().measurements.count_ranges(mission).value(),
+              static_cast<std::uint64_t>(acknowledged));
   }
   options_.max_pages.reset();
   const auto db = open();
-  EXPECT_EQ(db->measurements().count_ranges(mission).value(), static_cast<std::uint64_t>(acknowledged));
-  EXPECT_TRUE(db->measurements().append_ranges(batch(mission, acknowledged, 500), false));
+  EXPECT_EQ(db->stores().measurements.count_ranges(mission).value(),
+            static_cast<std::uint64_t>(acknowledged));
+  EXPECT_TRUE(db->stores().measurements.append_ranges(batch(mission, acknowledged, 500), false));
   EXPECT_EQ(db->health().level, StorageLevel::ok);
 }
 
@@ -125,16 +129,16 @@ TEST_F(StorageFailure, AnswersStorageFullWhenTheFileMayNotGrow) {
     auto db = open_database(options_);
     if (!db) return 2;
     for (int i = 10; i < 200'000; i += 1000) {
-      const auto result = db.value()->measurements().append_ranges(batch(mission, i, 1000), false);
+      const auto result = db.value()->stores().measurements.append_ranges(batch(mission, i, 1000), false);
       if (result) continue;
-      const bool reads = db.value()->measurements().count_ranges(mission).has_value();
+      const bool reads = db.value()->stores().measurements.count_ranges(mission).has_value();
       return result.error().code == Errc::storage_full && reads ? 0 : 3;
     }
     return 4;
   });
   EXPECT_EQ(child.wait(), 0);
   const auto db = open();
-  EXPECT_GE(db->measurements().count_ranges(mission).value(), 10u);
+  EXPECT_GE(db->stores().measurements.count_ranges(mission).value(), 10u);
 }
 
 TEST_F(StorageFailure, GivesUpItsReserveBeforeItAnswersFull) {
@@ -144,7 +148,7 @@ TEST_F(StorageFailure, GivesUpItsReserveBeforeItAnswersFull) {
   const auto reserve = options_.data_dir / "reserve.bin";
   EXPECT_EQ(std::filesystem::file_size(reserve), options_.reserve_bytes);
   const auto mission = mission_in(*db);
-  for (int i = 0; i < 100'000 && db->measurements().append_ranges(batch(mission.id, i, 500), false);
+  for (int i = 0; i < 100'000 && db->stores().measurements.append_ranges(batch(mission.id, i, 500), false);
        i += 500) {
     EXPECT_TRUE(std::filesystem::exists(reserve));
   }
@@ -160,8 +164,8 @@ TEST_F(StorageFailure, TakesNoNewMissionWhenSpaceIsScarceButRowsOfARunningOne) {
   EXPECT_TRUE(db->health().writable());
   Mission m;
   m.id = MissionId{make_uuid_v7(k_noon)};
-  EXPECT_EQ(db->missions().insert(m).error().code, Errc::storage_full);
-  EXPECT_TRUE(db->measurements().append_ranges(batch(mission, 1, 1), false));
+  EXPECT_EQ(db->stores().missions.insert(m).error().code, Errc::storage_full);
+  EXPECT_TRUE(db->stores().measurements.append_ranges(batch(mission, 1, 1), false));
 }
 
 TEST_F(StorageFailure, WarnsWhenSpaceGetsLow) {
@@ -243,16 +247,16 @@ TEST_F(StorageFailure, AnswersUnavailableWhileAnotherProcessHoldsTheLockAndRecov
   const auto mission = mission_in(*db);
   Raw other(file());
   other.run("BEGIN IMMEDIATE");
-  const auto refused = db->measurements().append_ranges(batch(mission.id, 0, 1), false);
+  const auto refused = db->stores().measurements.append_ranges(batch(mission.id, 0, 1), false);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, Errc::storage_unavailable);
   EXPECT_EQ(db->health().level, StorageLevel::unavailable);
-  EXPECT_TRUE(db->missions().mission(mission.id)) << "reads go on";
+  EXPECT_TRUE(db->stores().missions.mission(mission.id)) << "reads go on";
   other.run("ROLLBACK");
   Result<std::vector<RowOutcome>> taken = std::vector<RowOutcome>{};
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(5);
   do {
-    taken = db->measurements().append_ranges(batch(mission.id, 0, 1), false);
+    taken = db->stores().measurements.append_ranges(batch(mission.id, 0, 1), false);
   } while (!taken && std::chrono::steady_clock::now() < deadline);
   EXPECT_TRUE(taken);
   EXPECT_EQ(db->health().level, StorageLevel::ok);
@@ -269,7 +273,7 @@ TEST_F(StorageFailure, AnswersQueueFullBeyondTheBoundAndLosesNothingOfTheRest) {
   std::vector<std::thread> threads;
   for (int t = 0; t < 6; ++t) {
     threads.emplace_back([&, t] {
-      const auto result = db->measurements().append_ranges(batch(mission.id, t * 40, 40), false);
+      const auto result = db->stores().measurements.append_ranges(batch(mission.id, t * 40, 40), false);
       if (result) ++taken;
       if (!result && result.error().code == Errc::queue_full) ++refused;
     });
@@ -280,7 +284,8 @@ TEST_F(StorageFailure, AnswersQueueFullBeyondTheBoundAndLosesNothingOfTheRest) {
   for (auto& thread : threads) thread.join();
   EXPECT_GE(refused, 1);
   EXPECT_EQ(taken + refused, 6);
-  EXPECT_EQ(db->measurements().count_ranges(mission.id).value(), static_cast<std::uint64_t>(taken * 40));
+  EXPECT_EQ(db->stores().measurements.count_ranges(mission.id).value(),
+            static_cast<std::uint64_t>(taken * 40));
 }
 
 TEST_F(StorageFailure, KeepsEveryAcknowledgedBatchWhenKilledAtRandomMoments) {
@@ -292,7 +297,7 @@ TEST_F(StorageFailure, KeepsEveryAcknowledgedBatchWhenKilledAtRandomMoments) {
       auto db = open_database(options_);
       if (!db) return 1;
       for (int i = acknowledged;; ++i) {
-        if (!db.value()->measurements().append_ranges(batch(mission, i * 20, 20), false)) return 2;
+        if (!db.value()->stores().measurements.append_ranges(batch(mission, i * 20, 20), false)) return 2;
         if (::write(out, "x", 1) != 1) return 3;
       }
     });
@@ -302,7 +307,7 @@ TEST_F(StorageFailure, KeepsEveryAcknowledgedBatchWhenKilledAtRandomMoments) {
     while (child.read_byte()) ++acknowledged;  // written before the end: acknowledged as well
     const auto db = open();
     ASSERT_NE(db, nullptr);
-    const auto stored = db->measurements().count_ranges(mission).value();
+    const auto stored = db->stores().measurements.count_ranges(mission).value();
     ASSERT_GE(stored, static_cast<std::uint64_t>(acknowledged) * 20);
     ASSERT_EQ(stored % 20, 0u) << "half a batch";
     acknowledged = static_cast<int>(stored / 20);
@@ -313,11 +318,11 @@ TEST_F(StorageFailure, KeepsEveryAcknowledgedBatchWhenKilledAtRandomMoments) {
 TEST_F(StorageFailure, BacksUpUnderLoadACopyThatPassesItsChecks) {
   const auto db = open();
   const auto mission = mission_in(*db);
-  ASSERT_TRUE(db->measurements().append_ranges(batch(mission.id, 0, 3000), false));
+  ASSERT_TRUE(db->stores().measurements.append_ranges(batch(mission.id, 0, 3000), false));
   std::atomic<bool> stop{false};
   std::thread writer([&] {
     for (int i = 3000; !stop; i += 10)
-      EXPECT_TRUE(db->measurements().append_ranges(batch(mission.id, i, 10), false));
+      EXPECT_TRUE(db->stores().measurements.append_ranges(batch(mission.id, i, 10), false));
   });
   const auto copy = dir_.path() / "copy.db";
   const auto report = db->backup(copy);
@@ -336,7 +341,7 @@ TEST_F(StorageFailure, BacksUpUnderLoadACopyThatPassesItsChecks) {
   std::filesystem::copy_file(copy, restored.data_dir / "anchord.db");
   const auto again = open_database(restored);
   ASSERT_TRUE(again) << again.error().message;
-  EXPECT_GE(again.value()->measurements().count_ranges(mission.id).value(), 3000u);
+  EXPECT_GE(again.value()->stores().measurements.count_ranges(mission.id).value(), 3000u);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include <atomic>
 #include <thread>
 
+#include "core/ports/learning_store.hpp"
 #include "tests/server/storage/backends.hpp"
 
 namespace anchord {
@@ -13,7 +14,7 @@ class LearningStoreContract : public StoreContract {
     c.id = CampaignId{make_uuid_v7(k_noon)};
     c.name = name;
     c.created = k_noon;
-    EXPECT_TRUE(db_->campaigns().insert(c));
+    EXPECT_TRUE(db_->stores().campaigns.insert(c));
     return c;
   }
   DatasetRecord stored_dataset() {
@@ -24,7 +25,7 @@ class LearningStoreContract : public StoreContract {
     d.digest = "00";
     d.n_train = 12;
     d.created = k_noon;
-    EXPECT_TRUE(db_->datasets().insert(d, "range_m\n1\n"));
+    EXPECT_TRUE(db_->stores().datasets.insert(d, "range_m\n1\n"));
     return d;
   }
   TrainingRun stored_run(const DatasetRecord& d) {
@@ -34,7 +35,7 @@ class LearningStoreContract : public StoreContract {
     r.task = "nlos_id";
     r.request_json = "{}";
     r.created = k_noon;
-    EXPECT_TRUE(db_->training_runs().insert(r));
+    EXPECT_TRUE(db_->stores().training_runs.insert(r));
     return r;
   }
   StoredModel model_of(const std::optional<TrainingRunId>& run) {
@@ -67,9 +68,10 @@ TEST_P(LearningStoreContract, GivesBackACampaignsSettingsAndSamples) {
   with_cir.sample.rx_dbm = -80.5;
   with_cir.sample.fp_amp2 = 7000;
   with_cir.sample.cir = Cir{{1, -2, 3, -4}, 1001.6, 744.2, 1001.0};
-  const auto done = db_->campaigns().append(c.id, {row("a", 5.2, 1), with_cir, row("b", 6, 1)}).value();
+  const auto done =
+      db_->stores().campaigns.append(c.id, {row("a", 5.2, 1), with_cir, row("b", 6, 1)}).value();
   EXPECT_EQ(done.accepted, 3u);
-  const auto settings = db_->campaigns().settings(c.id).value();
+  const auto settings = db_->stores().campaigns.settings(c.id).value();
   ASSERT_EQ(settings.size(), 2u);
   EXPECT_EQ(settings[0].n_samples, 2u);
   EXPECT_NEAR(settings[0].mean_range_m, 5.3, 1e-12);
@@ -81,7 +83,7 @@ TEST_P(LearningStoreContract, GivesBackACampaignsSettingsAndSamples) {
   filter.campaign = c.id;
   filter.setting = "a";
   filter.with_cir = true;
-  const auto samples = db_->campaigns().samples(filter).value();
+  const auto samples = db_->stores().campaigns.samples(filter).value();
   ASSERT_EQ(samples.size(), 2u);
   EXPECT_FALSE(samples[0].has_cir);
   ASSERT_TRUE(samples[1].sample.cir);
@@ -89,8 +91,8 @@ TEST_P(LearningStoreContract, GivesBackACampaignsSettingsAndSamples) {
   EXPECT_EQ(samples[1].sample.rx_dbm, -80.5);
   EXPECT_EQ(samples[1].sample.fp_amp2, 7000);
   filter.after = samples[0].id;
-  EXPECT_EQ(db_->campaigns().samples(filter).value().size(), 1u);
-  EXPECT_EQ(db_->campaigns().sample(c.id, samples[1].id).value().sample.range_m, 5.4);
+  EXPECT_EQ(db_->stores().campaigns.samples(filter).value().size(), 1u);
+  EXPECT_EQ(db_->stores().campaigns.sample(c.id, samples[1].id).value().sample.range_m, 5.4);
 }
 
 TEST_P(LearningStoreContract, FiltersSamplesByDistanceLevelAndLabel) {
@@ -99,13 +101,13 @@ TEST_P(LearningStoreContract, FiltersSamplesByDistanceLevelAndLabel) {
   strong.sample.rx_dbm = -80;
   open.truth.los = true;
   untold.truth.los.reset();
-  ASSERT_TRUE(db_->campaigns().append(c.id, {near, strong, open, untold}));
+  ASSERT_TRUE(db_->stores().campaigns.append(c.id, {near, strong, open, untold}));
   const auto found = [&](const MeasurementLimits& limits) {
     CampaignStore::Filter filter;
     filter.campaign = c.id;
     filter.limits = limits;
     std::vector<double> out;
-    for (const auto& s : db_->campaigns().samples(filter).value()) out.push_back(s.sample.range_m);
+    for (const auto& s : db_->stores().campaigns.samples(filter).value()) out.push_back(s.sample.range_m);
     return out;
   };
   using Label = MeasurementLimits::Label;
@@ -118,88 +120,89 @@ TEST_P(LearningStoreContract, FiltersSamplesByDistanceLevelAndLabel) {
 
 TEST_P(LearningStoreContract, CountsARepeatedSampleAndRefusesAnotherTruthForASettingWhole) {
   const auto c = stored_campaign();
-  ASSERT_TRUE(db_->campaigns().append(c.id, {row("a", 5.2, 1)}));
-  const auto again = db_->campaigns().append(c.id, {row("a", 5.2, 1), row("a", 5.3, 2)}).value();
+  ASSERT_TRUE(db_->stores().campaigns.append(c.id, {row("a", 5.2, 1)}));
+  const auto again = db_->stores().campaigns.append(c.id, {row("a", 5.2, 1), row("a", 5.3, 2)}).value();
   EXPECT_EQ(again.accepted, 1u);
   EXPECT_EQ(again.duplicates, 1u);
   auto other = row("a", 5.5, 3);
   other.truth.distance_m = 6.0;
-  EXPECT_EQ(db_->campaigns().append(c.id, {row("a", 5.4, 4), other}).error().code, Errc::conflict);
-  EXPECT_EQ(db_->campaigns().settings(c.id).value()[0].n_samples, 2u);
+  EXPECT_EQ(db_->stores().campaigns.append(c.id, {row("a", 5.4, 4), other}).error().code, Errc::conflict);
+  EXPECT_EQ(db_->stores().campaigns.settings(c.id).value()[0].n_samples, 2u);
 }
 
 TEST_P(LearningStoreContract, KeepsNamesOfCampaignsApartAndVersionsInOrder) {
   auto c = stored_campaign();
   CampaignRecord twin = c;
   twin.id = CampaignId{make_uuid_v7(k_noon)};
-  EXPECT_EQ(db_->campaigns().insert(twin).error().code, Errc::conflict);
+  EXPECT_EQ(db_->stores().campaigns.insert(twin).error().code, Errc::conflict);
   c.note = "second day";
-  ASSERT_TRUE(db_->campaigns().update(c, 1));
-  EXPECT_EQ(db_->campaigns().update(c, 1).error().code, Errc::conflict);
-  EXPECT_EQ(db_->campaigns().campaign("hall A").value().version, 2u);
-  ASSERT_TRUE(db_->campaigns().append(c.id, {row("a", 5.2, 1)}));
-  ASSERT_TRUE(db_->campaigns().remove(c.id));
-  EXPECT_EQ(db_->campaigns().settings(c.id).error().code, Errc::not_found);
+  ASSERT_TRUE(db_->stores().campaigns.update(c, 1));
+  EXPECT_EQ(db_->stores().campaigns.update(c, 1).error().code, Errc::conflict);
+  EXPECT_EQ(db_->stores().campaigns.campaign("hall A").value().version, 2u);
+  ASSERT_TRUE(db_->stores().campaigns.append(c.id, {row("a", 5.2, 1)}));
+  ASSERT_TRUE(db_->stores().campaigns.remove(c.id));
+  EXPECT_EQ(db_->stores().campaigns.settings(c.id).error().code, Errc::not_found);
 }
 
 TEST_P(LearningStoreContract, KeepsADataSetThatATrainingRunUsed) {
   const auto d = stored_dataset();
-  EXPECT_EQ(db_->datasets().csv(d.id).value(), "range_m\n1\n");
-  EXPECT_EQ(db_->datasets().dataset("may").value().n_train, 12u);
+  EXPECT_EQ(db_->stores().datasets.csv(d.id).value(), "range_m\n1\n");
+  EXPECT_EQ(db_->stores().datasets.dataset("may").value().n_train, 12u);
   const auto r = stored_run(d);
-  EXPECT_EQ(db_->datasets().remove(d.id).error().code, Errc::conflict);
-  ASSERT_TRUE(db_->training_runs().remove(r.id));
-  EXPECT_TRUE(db_->datasets().remove(d.id));
-  EXPECT_EQ(db_->datasets().csv(d.id).error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().datasets.remove(d.id).error().code, Errc::conflict);
+  ASSERT_TRUE(db_->stores().training_runs.remove(r.id));
+  EXPECT_TRUE(db_->stores().datasets.remove(d.id));
+  EXPECT_EQ(db_->stores().datasets.csv(d.id).error().code, Errc::not_found);
 }
 
 TEST_P(LearningStoreContract, FinishesARunWithItsPartsAndItsModelAtOnce) {
   const auto d = stored_dataset();
   const auto r = stored_run(d);
-  EXPECT_EQ(db_->training_runs().part(r.id, "folds").error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().training_runs.part(r.id, "folds").error().code, Errc::not_found);
   const auto m = model_of(r.id);
-  ASSERT_TRUE(db_->training_runs().finish(r.id, "{\"a\":1}", {{"folds", "[]"}, {"grid", "[1]"}}, m, "{}"));
-  EXPECT_EQ(db_->training_runs().part(r.id, "grid").value(), "[1]");
-  const auto found = db_->training_runs().run(r.id).value();
+  ASSERT_TRUE(
+      db_->stores().training_runs.finish(r.id, "{\"a\":1}", {{"folds", "[]"}, {"grid", "[1]"}}, m, "{}"));
+  EXPECT_EQ(db_->stores().training_runs.part(r.id, "grid").value(), "[1]");
+  const auto found = db_->stores().training_runs.run(r.id).value();
   EXPECT_EQ(found.summary_json, "{\"a\":1}");
   EXPECT_EQ(found.model, m.id);
-  EXPECT_EQ(db_->models().model(m.id).value().run, r.id);
-  EXPECT_EQ(db_->models().artifact(m.id).value(), "{}");
+  EXPECT_EQ(db_->stores().models.model(m.id).value().run, r.id);
+  EXPECT_EQ(db_->stores().models.artifact(m.id).value(), "{}");
   // A model outlives the record of its run.
-  ASSERT_TRUE(db_->training_runs().remove(r.id));
-  EXPECT_FALSE(db_->models().model(m.id).value().run);
+  ASSERT_TRUE(db_->stores().training_runs.remove(r.id));
+  EXPECT_FALSE(db_->stores().models.model(m.id).value().run);
   auto lost = model_of(std::nullopt);
-  EXPECT_EQ(db_->training_runs().finish(r.id, "{}", {}, lost, "{}").error().code, Errc::not_found);
-  EXPECT_EQ(db_->models().model(lost.id).error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().training_runs.finish(r.id, "{}", {}, lost, "{}").error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().models.model(lost.id).error().code, Errc::not_found);
 }
 
 TEST_P(LearningStoreContract, SaysWhichModelIsActiveAndKeepsTheHistory) {
   const auto a = model_of(std::nullopt), b = model_of(std::nullopt);
-  ASSERT_TRUE(db_->models().insert(a, "{}"));
-  ASSERT_TRUE(db_->models().insert(b, "{}"));
-  EXPECT_TRUE(db_->models().active().value().empty());
-  EXPECT_EQ(db_->models().promote({0, "nlos_id", a.id, "me", "", k_noon, false}).value().number, 1u);
-  ASSERT_TRUE(db_->models().promote({0, "nlos_id", b.id, "me", "better", k_noon, false}));
-  ASSERT_EQ(db_->models().active().value().size(), 1u);
-  EXPECT_EQ(db_->models().active().value()[0].model, b.id);
-  ASSERT_TRUE(db_->models().promote({0, "nlos_id", std::nullopt, "me", "none", k_noon, true}));
-  EXPECT_FALSE(db_->models().active().value()[0].model);
-  EXPECT_EQ(db_->models().promotions("nlos_id", 10).value().size(), 3u);
-  EXPECT_EQ(db_->models().promotions("", 2).value().size(), 2u);
-  EXPECT_EQ(db_->models().promote({0, "los_bias", b.id, "me", "", k_noon, false}).error().code,
+  ASSERT_TRUE(db_->stores().models.insert(a, "{}"));
+  ASSERT_TRUE(db_->stores().models.insert(b, "{}"));
+  EXPECT_TRUE(db_->stores().models.active().value().empty());
+  EXPECT_EQ(db_->stores().models.promote({0, "nlos_id", a.id, "me", "", k_noon, false}).value().number, 1u);
+  ASSERT_TRUE(db_->stores().models.promote({0, "nlos_id", b.id, "me", "better", k_noon, false}));
+  ASSERT_EQ(db_->stores().models.active().value().size(), 1u);
+  EXPECT_EQ(db_->stores().models.active().value()[0].model, b.id);
+  ASSERT_TRUE(db_->stores().models.promote({0, "nlos_id", std::nullopt, "me", "none", k_noon, true}));
+  EXPECT_FALSE(db_->stores().models.active().value()[0].model);
+  EXPECT_EQ(db_->stores().models.promotions("nlos_id", 10).value().size(), 3u);
+  EXPECT_EQ(db_->stores().models.promotions("", 2).value().size(), 2u);
+  EXPECT_EQ(db_->stores().models.promote({0, "los_bias", b.id, "me", "", k_noon, false}).error().code,
             Errc::conflict);
-  EXPECT_EQ(db_->models().remove(b.id).error().code, Errc::conflict);
+  EXPECT_EQ(db_->stores().models.remove(b.id).error().code, Errc::conflict);
 }
 
 TEST_P(LearningStoreContract, OfEightPromotionsJudgedOnOneStateOneIsMade) {
   const auto a = model_of(std::nullopt);
-  ASSERT_TRUE(db_->models().insert(a, "{}"));
+  ASSERT_TRUE(db_->stores().models.insert(a, "{}"));
   std::atomic<int> made = 0, late = 0;
   {
     std::vector<std::jthread> threads;
     for (int i = 0; i < 8; ++i) {
       threads.emplace_back([&] {
-        const auto done = db_->models().promote({0, "nlos_id", a.id, "me", "", k_noon, false}, 0);
+        const auto done = db_->stores().models.promote({0, "nlos_id", a.id, "me", "", k_noon, false}, 0);
         ++(done ? made : late);
         EXPECT_TRUE(done || done.error().code == Errc::conflict);
       });
@@ -207,7 +210,7 @@ TEST_P(LearningStoreContract, OfEightPromotionsJudgedOnOneStateOneIsMade) {
   }
   EXPECT_EQ(made, 1);
   EXPECT_EQ(late, 7);
-  EXPECT_EQ(db_->models().promotions("", 10).value().size(), 1u);
+  EXPECT_EQ(db_->stores().models.promotions("", 10).value().size(), 1u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Backends, LearningStoreContract, backends(), backend_name);

@@ -4,6 +4,7 @@
 #include <limits>
 #include <thread>
 
+#include "core/ports/measurement_store.hpp"
 #include "tests/server/storage/backends.hpp"
 
 namespace anchord {
@@ -15,7 +16,7 @@ using enum RowOutcome;
 class MeasurementStoreContract : public StoreContract {
  protected:
   std::vector<RowOutcome> append(std::vector<Range> rows, bool atomic = false) {
-    auto result = db_->measurements().append_ranges(std::move(rows), atomic);
+    auto result = db_->stores().measurements.append_ranges(std::move(rows), atomic);
     EXPECT_TRUE(result) << result.error().message;
     return result ? result.value() : std::vector<RowOutcome>{};
   }
@@ -24,7 +25,7 @@ class MeasurementStoreContract : public StoreContract {
     filter.mission = mission;
     filter.limit = 100'000;
     filter.with_cir = true;
-    return db_->measurements().ranges(filter).value().rows;
+    return db_->stores().measurements.ranges(filter).value().rows;
   }
 };
 
@@ -84,10 +85,10 @@ TEST_P(MeasurementStoreContract, GivesBackEveryFieldOfAFix) {
   Fix local = fix_at(mission.id, 1);
   local.frame = TrackFrame::local;
   local.local_m = {1.25, -2.5, 3.75};
-  ASSERT_TRUE(db_->measurements().append_fixes({globe, local}, false));
+  ASSERT_TRUE(db_->stores().measurements.append_fixes({globe, local}, false));
   MeasurementStore::Filter filter;
   filter.mission = mission.id;
-  const auto rows = db_->measurements().fixes(filter).value().rows;
+  const auto rows = db_->stores().measurements.fixes(filter).value().rows;
   ASSERT_EQ(rows.size(), 2u);
   EXPECT_EQ(rows[0].position.lat_deg, 51.0231234567891);
   EXPECT_EQ(rows[0].position.lon_deg, 3.7131234567891);
@@ -111,7 +112,7 @@ TEST_P(MeasurementStoreContract, CountsTheSameRowAgainAsDuplicateWhateverItsArri
   append({row});
   row.received = k_noon;
   EXPECT_THAT(append({row, row}), ElementsAre(duplicate, duplicate));
-  EXPECT_EQ(db_->measurements().count_ranges(mission.id).value(), 1u);
+  EXPECT_EQ(db_->stores().measurements.count_ranges(mission.id).value(), 1u);
 }
 
 TEST_P(MeasurementStoreContract, KeepsTheStoredRowWhenTheSameIdentityComesWithOtherContent) {
@@ -146,7 +147,7 @@ TEST_P(MeasurementStoreContract, NamesRowsOfUnknownMissionsAndStoresTheOthers) {
   const MissionId stranger{make_uuid_v7(k_noon)};
   EXPECT_THAT(append({range_at(mission.id, 1), range_at(stranger, 2), range_at(mission.id, 3)}),
               ElementsAre(accepted, unknown_mission, accepted));
-  EXPECT_EQ(db_->measurements().count_ranges(mission.id).value(), 2u);
+  EXPECT_EQ(db_->stores().measurements.count_ranges(mission.id).value(), 2u);
 }
 
 TEST_P(MeasurementStoreContract, StoresNothingOfAnAtomicCallWithOneBadRow) {
@@ -155,10 +156,10 @@ TEST_P(MeasurementStoreContract, StoresNothingOfAnAtomicCallWithOneBadRow) {
   Range bad = range_at(mission.id, 1);
   bad.distance_m = 99;
   EXPECT_THAT(append({range_at(mission.id, 2), bad}, true), ElementsAre(accepted, conflict));
-  EXPECT_EQ(db_->measurements().count_ranges(mission.id).value(), 1u);
+  EXPECT_EQ(db_->stores().measurements.count_ranges(mission.id).value(), 1u);
   EXPECT_THAT(append({range_at(mission.id, 1), range_at(mission.id, 2)}, true),
               ElementsAre(duplicate, accepted));
-  EXPECT_EQ(db_->measurements().count_ranges(mission.id).value(), 2u);
+  EXPECT_EQ(db_->stores().measurements.count_ranges(mission.id).value(), 2u);
 }
 
 TEST_P(MeasurementStoreContract, TakesAnEmptyCall) { EXPECT_TRUE(append({}).empty()); }
@@ -167,10 +168,10 @@ TEST_P(MeasurementStoreContract, RefusesWhatIsNotANumber) {
   const auto mission = stored_mission();
   Range bad = range_at(mission.id, 1);
   bad.distance_m = std::numeric_limits<double>::quiet_NaN();
-  const auto result = db_->measurements().append_ranges({range_at(mission.id, 0), bad}, false);
+  const auto result = db_->stores().measurements.append_ranges({range_at(mission.id, 0), bad}, false);
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().code, Errc::invalid_argument);
-  EXPECT_EQ(db_->measurements().count_ranges(mission.id).value(), 0u);
+  EXPECT_EQ(db_->stores().measurements.count_ranges(mission.id).value(), 0u);
 }
 
 TEST_P(MeasurementStoreContract, PagesThroughAllRowsOnceInBothDirections) {
@@ -191,7 +192,7 @@ TEST_P(MeasurementStoreContract, PagesThroughAllRowsOnceInBothDirections) {
       std::vector<std::int64_t> ids;
       std::vector<std::int64_t> times;
       do {
-        const auto page = db_->measurements().ranges(filter).value();
+        const auto page = db_->stores().measurements.ranges(filter).value();
         ASSERT_LE(page.rows.size(), 4u);
         for (const Range& row : page.rows) times.push_back(row.time.ns);
         ids.insert(ids.end(), page.ids.begin(), page.ids.end());
@@ -214,14 +215,14 @@ TEST_P(MeasurementStoreContract, FiltersByAnchorTagAndHalfOpenTime) {
   MeasurementStore::Filter filter;
   filter.mission = mission.id;
   filter.anchor = NetworkId{0x101};
-  EXPECT_EQ(db_->measurements().ranges(filter).value().rows.size(), 3u);  // 1, 5, 9
+  EXPECT_EQ(db_->stores().measurements.ranges(filter).value().rows.size(), 3u);  // 1, 5, 9
   filter.tag = NetworkId{77};
-  EXPECT_EQ(db_->measurements().ranges(filter).value().rows.size(), 1u);
+  EXPECT_EQ(db_->stores().measurements.ranges(filter).value().rows.size(), 1u);
   filter.anchor.reset();
   filter.tag.reset();
   filter.since = rows[2].time;
   filter.until = rows[4].time;
-  EXPECT_EQ(db_->measurements().ranges(filter).value().rows.size(), 2u);  // 2, 3
+  EXPECT_EQ(db_->stores().measurements.ranges(filter).value().rows.size(), 2u);  // 2, 3
 }
 
 TEST_P(MeasurementStoreContract, FiltersByDistanceLevelAndLabelAndCountsTheSameRows) {
@@ -246,9 +247,9 @@ TEST_P(MeasurementStoreContract, FiltersByDistanceLevelAndLabelAndCountsTheSameR
     filter.mission = mission.id;
     filter.limits = limits;
     std::vector<int> out;
-    for (const auto& row : db_->measurements().ranges(filter).value().rows)
+    for (const auto& row : db_->stores().measurements.ranges(filter).value().rows)
       out.push_back(static_cast<int>(row.distance_m));
-    EXPECT_EQ(db_->measurements().count_ranges(filter).value(), out.size());
+    EXPECT_EQ(db_->stores().measurements.count_ranges(filter).value(), out.size());
     return out;
   };
   using Label = MeasurementLimits::Label;
@@ -272,13 +273,13 @@ TEST_P(MeasurementStoreContract, FiltersByTheFixThatHeldWhenARangeWasTaken) {
   auto first = fix_at(mission.id, 0), second = fix_at(mission.id, 1);
   first.time = k_noon, first.fix = FixClass::rtk_float;
   second.time = UtcTime{k_noon.ns + 1'000'000'000}, second.fix = FixClass::rtk_fixed;
-  ASSERT_TRUE(db_->measurements().append_fixes({first, second}, true));
+  ASSERT_TRUE(db_->stores().measurements.append_fixes({first, second}, true));
   const auto times = [&](FixClass fix) {
     MeasurementStore::Filter filter;
     filter.mission = mission.id;
     filter.fix = fix;
     std::vector<std::int64_t> out;
-    for (const auto& row : db_->measurements().ranges(filter).value().rows) out.push_back(row.time.ns);
+    for (const auto& row : db_->stores().measurements.ranges(filter).value().rows) out.push_back(row.time.ns);
     return out;
   };
   EXPECT_THAT(times(FixClass::rtk_float), ElementsAre(rows[1].time.ns));
@@ -298,7 +299,7 @@ TEST_P(MeasurementStoreContract, ThinsEvenlyOverAllPagesAndOutOfStepWithRadiosTh
     filter.limit = limit;
     std::vector<std::int64_t> ids;
     do {
-      const auto page = db_->measurements().ranges(filter).value();
+      const auto page = db_->stores().measurements.ranges(filter).value();
       ids.insert(ids.end(), page.ids.begin(), page.ids.end());
       filter.after = page.next;
     } while (!filter.after.empty());
@@ -312,14 +313,14 @@ TEST_P(MeasurementStoreContract, ThinsEvenlyOverAllPagesAndOutOfStepWithRadiosTh
     filter.anchor = NetworkId{anchor};
     EXPECT_NEAR(static_cast<double>(found(10'000).size()), 250, 56) << anchor;
   }
-  EXPECT_EQ(db_->measurements().count_ranges(filter).value(), 1000u) << "a count is of all";
+  EXPECT_EQ(db_->stores().measurements.count_ranges(filter).value(), 1000u) << "a count is of all";
 }
 
 TEST_P(MeasurementStoreContract, RefusesACursorThatIsNotItsOwn) {
   for (const char* cursor : {"x", "1", "1.", "1.2x", "99999999999999999999.1"}) {
     MeasurementStore::Filter filter;
     filter.after = cursor;
-    const auto page = db_->measurements().ranges(filter);
+    const auto page = db_->stores().measurements.ranges(filter);
     ASSERT_FALSE(page) << cursor;
     EXPECT_EQ(page.error().code, Errc::invalid_argument);
   }
@@ -330,20 +331,20 @@ TEST_P(MeasurementStoreContract, FindsOneRangeByTheIdOfItsPage) {
   Range row = range_at(mission.id, 3);
   row.cir = Cir{{5, 6}, 1001.6, std::nullopt, std::nullopt};
   append({row});
-  const auto page = db_->measurements().ranges({}).value();
+  const auto page = db_->stores().measurements.ranges({}).value();
   ASSERT_EQ(page.ids.size(), 1u);
   EXPECT_FALSE(page.rows[0].cir) << "lists leave impulse responses out unless asked";
-  const auto found = db_->measurements().range(page.ids[0]).value();
+  const auto found = db_->stores().measurements.range(page.ids[0]).value();
   EXPECT_EQ(found.mission, mission.id);
   EXPECT_TRUE(found.cir);
-  EXPECT_EQ(db_->measurements().range(page.ids[0] + 1).error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().measurements.range(page.ids[0] + 1).error().code, Errc::not_found);
 }
 
 TEST_P(MeasurementStoreContract, KnowsEveryRadioItHeard) {
   const auto mission = stored_mission();
   append({range_at(mission.id, 0), range_at(mission.id, 4), range_at(mission.id, 1)});
   append({range_at(mission.id, 0)});  // a duplicate is not another range
-  const auto devices = db_->measurements().devices(mission.id).value();
+  const auto devices = db_->stores().measurements.devices(mission.id).value();
   ASSERT_EQ(devices.size(), 3u);
   for (const DeviceSeen& device : devices) {
     const bool is_tag = device.kind == DeviceSeen::Kind::tag;
@@ -352,7 +353,7 @@ TEST_P(MeasurementStoreContract, KnowsEveryRadioItHeard) {
     EXPECT_EQ(device.n_ranges, expected);
   }
   EXPECT_EQ(devices[0].last_seen, range_at(mission.id, 4).time);
-  EXPECT_EQ(db_->measurements().devices(std::nullopt).value().size(), 3u);
+  EXPECT_EQ(db_->stores().measurements.devices(std::nullopt).value().size(), 3u);
 }
 
 TEST_P(MeasurementStoreContract, KeepsEverythingOverAReopening) {
@@ -379,7 +380,7 @@ TEST_P(MeasurementStoreContract, TakesEveryRowOnceFromManyThreadsAtOnce) {
   }
   for (auto& thread : threads) thread.join();
   EXPECT_EQ(n_accepted, 200);
-  EXPECT_EQ(db_->measurements().count_ranges(mission.id).value(), 200u);
+  EXPECT_EQ(db_->stores().measurements.count_ranges(mission.id).value(), 200u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Backends, MeasurementStoreContract, backends(), backend_name);

@@ -8,6 +8,12 @@
 #include <sstream>
 #include <thread>
 
+#include "core/ports/access_store.hpp"
+#include "core/ports/anchor_store.hpp"
+#include "core/ports/calibration_store.hpp"
+#include "core/ports/measurement_store.hpp"
+#include "core/ports/mission_store.hpp"
+#include "core/ports/revision_store.hpp"
 #include "tests/paths.hpp"
 #include "tests/server/storage/child.hpp"
 #include "tests/server/storage/store_contract.hpp"
@@ -152,7 +158,7 @@ TEST_F(Migrate, StartsAgainAfterAKillDuringTheVeryFirstStart) {
     }
     const auto db = open_database(options);
     ASSERT_TRUE(db) << db.error().message;
-    EXPECT_TRUE(db.value()->missions().missions(1, std::nullopt));
+    EXPECT_TRUE(db.value()->stores().missions.missions(1, std::nullopt));
   }
 }
 
@@ -171,16 +177,16 @@ TEST_F(Migrate, OpensAStoredDatabaseOfEveryEarlierVersion) {
     connect(options.data_dir / "anchord.db").execute(text.str());
     const auto db = open_database(options);
     ASSERT_TRUE(db) << db.error().message;
-    const auto missions = db.value()->missions().missions(10, std::nullopt).value();
+    const auto missions = db.value()->stores().missions.missions(10, std::nullopt).value();
     ASSERT_EQ(missions.size(), 1u);
     EXPECT_EQ(missions[0].name, "stored flight");
-    EXPECT_EQ(db.value()->measurements().count_ranges(missions[0].id).value(), 3u);
+    EXPECT_EQ(db.value()->stores().measurements.count_ranges(missions[0].id).value(), 3u);
     MeasurementStore::Filter filter;
     filter.with_cir = true;
-    EXPECT_TRUE(db.value()->measurements().ranges(filter).value().rows[0].cir);
-    EXPECT_EQ(db.value()->measurements().fixes({}).value().rows.size(), 2u);
-    EXPECT_EQ(db.value()->anchors().published(std::nullopt).value().size(), 1u);
-    EXPECT_TRUE(db.value()->access().verify_audit());
+    EXPECT_TRUE(db.value()->stores().measurements.ranges(filter).value().rows[0].cir);
+    EXPECT_EQ(db.value()->stores().measurements.fixes({}).value().rows.size(), 2u);
+    EXPECT_EQ(db.value()->stores().revisions.published(std::nullopt).value().size(), 1u);
+    EXPECT_TRUE(db.value()->stores().access.verify_audit());
   }
 }
 
@@ -197,21 +203,21 @@ TEST_F(Migrate, WritesAStoredDatabaseWhenAsked) {
   m.id = MissionId{make_uuid_v7(k_noon)};
   m.name = "stored flight";
   m.tags = {{NetworkId{0x6e01}, 0, {0.1, 0, -0.12}}};
-  ASSERT_TRUE(db->missions().insert(m));
+  ASSERT_TRUE(db->stores().missions.insert(m));
   std::vector<Range> ranges = {range_at(m.id, 0), range_at(m.id, 1), range_at(m.id, 2)};
   ranges[0].cir = Cir{{1, -1, 2, -2}, 1001.6, 1.5, 1001};
-  ASSERT_TRUE(db->measurements().append_ranges(ranges, true));
-  ASSERT_TRUE(db->measurements().append_fixes({fix_at(m.id, 0), fix_at(m.id, 1)}, true));
-  ASSERT_TRUE(db->anchors().find_or_create(NetworkId{0x100}, k_noon));
+  ASSERT_TRUE(db->stores().measurements.append_ranges(ranges, true));
+  ASSERT_TRUE(db->stores().measurements.append_fixes({fix_at(m.id, 0), fix_at(m.id, 1)}, true));
+  ASSERT_TRUE(db->stores().anchors.find_or_create(NetworkId{0x100}, k_noon));
   Calibration c;
   c.id = CalibrationId{make_uuid_v7(k_noon)};
   c.missions = {m.id};
   c.anchors.emplace_back();
   c.anchors[0].anchor = NetworkId{0x100};
   c.anchors[0].best = Hypothesis{};
-  ASSERT_TRUE(db->anchors().insert(c));
-  ASSERT_TRUE(db->anchors().publish(c.id, {NetworkId{0x100}}, "token", "note", k_noon));
-  ASSERT_TRUE(db->access().append_audit({k_noon, "token", "publish", "127.0.0.1", "ok"}));
+  ASSERT_TRUE(db->stores().calibrations.insert(c));
+  ASSERT_TRUE(db->stores().revisions.publish(c.id, {NetworkId{0x100}}, "token", "note", k_noon));
+  ASSERT_TRUE(db->stores().access.append_audit({k_noon, "token", "publish", "127.0.0.1", "ok"}));
 }
 
 }  // namespace

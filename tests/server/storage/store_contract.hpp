@@ -6,6 +6,8 @@
 #include <memory>
 #include <string>
 
+#include "core/ports/calibration_store.hpp"
+#include "core/ports/mission_store.hpp"
 #include "server/storage/sqlite_database.hpp"
 #include "tests/server/storage/scratch_dir.hpp"
 
@@ -33,7 +35,7 @@ class StoreContract : public testing::TestWithParam<Backend> {
     m.id = MissionId{make_uuid_v7(k_noon)};
     m.name = name;
     m.created = k_noon;
-    EXPECT_TRUE(db_->missions().insert(m)) << db_->missions().insert(m).error().message;
+    EXPECT_TRUE(db_->stores().missions.insert(m)) << db_->stores().missions.insert(m).error().message;
     return m;
   }
   Calibration stored_calibration(const Mission& mission, std::initializer_list<std::uint32_t> anchors) {
@@ -49,7 +51,7 @@ class StoreContract : public testing::TestWithParam<Backend> {
       e.best->position.m.x() = id;
       c.anchors.push_back(e);
     }
-    EXPECT_TRUE(db_->anchors().insert(c));
+    EXPECT_TRUE(db_->stores().calibrations.insert(c));
     return c;
   }
 

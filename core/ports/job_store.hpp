@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/ids.hpp"
+#include "core/base/result.hpp"
+#include "core/base/time.hpp"
+
+namespace anchord {
+
+/// Long work, visible and cancellable. At start the server calls fail_unfinished, for nothing runs then.
+enum class JobState : std::uint8_t { queued, running, succeeded, failed, canceled };
+struct Job {
+  JobId id{};
+  std::string kind;
+  JobState state{JobState::queued};
+  double fraction{0};
+  std::string stage, detail, result_href, problem_json, request_json;
+  UtcTime created{};
+  std::optional<UtcTime> started{}, finished{};
+};
+
+class JobStore {
+ public:
+  virtual ~JobStore() = default;
+  virtual Result<void> insert(const Job& job) = 0;
+  virtual Result<void> update(const Job& job) = 0;
+  virtual Result<Job> job(const JobId& id) = 0;
+  virtual Result<std::vector<Job>> jobs(std::size_t limit,
+                                        const std::optional<JobId>& after) = 0;  ///< newest first
+  /// Queued and running jobs become failed with this problem; says how many.
+  virtual Result<std::size_t> fail_unfinished(UtcTime now, std::string_view problem_json) = 0;
+};
+
+}  // namespace anchord

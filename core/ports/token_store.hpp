@@ -1,0 +1,36 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/ids.hpp"
+#include "core/base/result.hpp"
+#include "core/base/time.hpp"
+
+namespace anchord {
+
+/// Access tokens: only the hash of the secret is stored.
+struct Token {
+  TokenId id{};
+  std::string name;
+  std::string secret_sha256_hex;
+  std::vector<std::string> roles;
+  UtcTime created{};
+  std::optional<UtcTime> expires{}, revoked{}, last_used{};
+};
+
+class TokenStore {
+ public:
+  virtual ~TokenStore() = default;
+  virtual Result<void> insert(const Token& token) = 0;
+  virtual Result<Token> token(const TokenId& id) = 0;
+  virtual Result<Token> token_by_secret(std::string_view secret_sha256_hex) = 0;
+  virtual Result<std::vector<Token>> tokens() = 0;
+  virtual Result<void> touch(const TokenId& id,
+                             UtcTime now) = 0;  ///< last used; call it at most once a minute
+  virtual Result<void> revoke(const TokenId& id, UtcTime now) = 0;
+};
+
+}  // namespace anchord

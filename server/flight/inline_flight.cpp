@@ -1,0 +1,65 @@
+#include "server/flight/inline_flight.hpp"
+
+#include <utility>
+
+namespace anchord::flight {
+namespace {
+
+LiveMissionSetup live_setup(const InlineFlight::Setup& setup) {
+  LiveMissionSetup out;
+  out.mission = setup.mission;
+  out.live.origin = setup.plan.origin;
+  out.live.update_interval_s = setup.live_update_s;
+  return out;
+}
+
+}  // namespace
+
+InlineFlight::InlineFlight(Setup setup, Drone& drone)
+    : setup_(std::move(setup)), live_(live_setup(setup_)), operations_(&drone) {}
+
+void InlineFlight::tell_events(const Now& now) {
+  for (const auto& event : live_.take_events()) {
+    on_event(event);
+    std::visit([&](const auto& e) { take(now, e); }, event);
+  }
+}
+
+void InlineFlight::step(const Now& now, std::span<const Fix> fixes, std::span<const Range> ranges) {
+  for (const auto& range : ranges) live_.add(LiveRow(JudgedRange{range, {}, range.time}));
+  for (const auto& fix : fixes) live_.add(LiveRow(fix));
+  live_.settle();
+  tell_events(now);
+  const auto& f = flight();
+  const bool deciding = f && f->control.engine().state().step == procedure::Step::find_next_point;
+  std::optional<Operations::Estimates> estimates;
+  if (deciding && live_.origin()) estimates = {*live_.origin(), live_.estimates()};
+  operations_.round(now, estimates, deciding);
+  if (!setup_.use_clues || !f || clues_ == f->control.engine().clues_version()) return;
+  clues_ = f->control.engine().clues_version();
+  live_.use_clues(f->clues());
+}
+
+Result<void> InlineFlight::start(const Now& now) {
+  const Holder who{"token", "the operator"};
+  if (!operations_.control(now)) {
+    BOOST_OUTCOME_TRYV(operations_.take_control(now, setup_.mission.id, who, false, "key"));
+  }
+  BOOST_OUTCOME_TRY(auto check, planning::check_plan(setup_.plan));
+  const Groundwork ground{&setup_.plan, std::make_shared<const planning::PlanCheck>(std::move(check)), true,
+                          1e12};
+  for (const auto& item : operations_.checklist(now, &setup_.mission, setup_.mission.id, ground, false)) {
+    if (item.green() || !item.overridable) continue;
+    BOOST_OUTCOME_TRYV(
+        operations_.override_item(now, setup_.mission.id, item.id, "simulated", who.name, ground));
+  }
+  BOOST_OUTCOME_TRYV(operations_.begin(now, setup_.mission, ground, false, who.name));
+  return boost::outcome_v2::success();
+}
+
+void InlineFlight::finish() {
+  live_.finish();
+  live_.settle();
+}
+
+}  // namespace anchord::flight

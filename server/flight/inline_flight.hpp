@@ -1,0 +1,56 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/flight/live_mission.hpp"
+#include "core/flight/operations.hpp"
+
+namespace anchord::flight {
+
+/// One live mission and whoever flies by it, joined as the server joins them, but driven by calls: simulated
+/// missions and recordings are flown by what flies real ones, without its threads.
+class InlineFlight {
+ public:
+  struct Setup {
+    Mission mission;
+    Plan plan;  ///< with its origin: the frame of all estimates
+    double live_update_s = 4;
+    bool use_clues = true;  ///< what turns and height searches told is a prior of the running estimates
+  };
+  /// The drone outlives it.
+  InlineFlight(Setup setup, Drone& drone);
+
+  /// A tenth of a second: what was measured goes in, then a round of procedure and safety.
+  void step(const Now& now, std::span<const Fix> fixes, std::span<const Range> ranges);
+  /// What an operator does who starts at once: control, every item confirmed that may be, start.
+  /// errors: what blocks it
+  Result<void> start(const Now& now);
+  void finish();
+
+  LiveMission& live() { return live_; }
+  const std::optional<ActiveFlight>& flight() const { return operations_.flight(); }
+  /// In the order in which they happened, since the last call.
+  std::vector<LogEvent> take_log() { return operations_.take_events(); }
+  /// Told of each event of the mission, before anything follows from it.
+  std::function<void(const Event&)> on_event = [](const Event&) {};
+
+ private:
+  void tell_events(const Now& now);
+  void take(const Now& now, const FixBelieved& event) { operations_.fix(now, event.fix); }
+  void take(const Now& now, const RangeDecided& event) {
+    operations_.range(now, setup_.mission.id, event.result);
+  }
+  template <class Other>
+  void take(const Now&, const Other&) {}
+
+  Setup setup_;
+  LiveMission live_;
+  Operations operations_;
+  std::uint64_t clues_{0};
+};
+
+}  // namespace anchord::flight

@@ -1,0 +1,32 @@
+#include "server/storage/stores.hpp"
+
+#include <utility>
+
+namespace anchord::sql {
+
+SqlStores::SqlStores(Gate& gate, AdmitMission admit)
+    : measurements(make_measurement_store(gate)),
+      missions(make_mission_store(gate, std::move(admit))),
+      bin(make_mission_bin(gate)),
+      exclusions(make_exclusion_store(gate)),
+      sites(make_site_store(gate)),
+      anchors(make_anchor_store(gate)),
+      calibrations(make_calibration_store(gate)),
+      revisions(make_revision_store(gate)),
+      kits(make_kit_store(gate)),
+      frames(make_frame_store(gate)),
+      plans(make_plan_store(gate)),
+      campaigns(make_campaign_store(gate)),
+      labels(make_label_store(gate)),
+      datasets(make_dataset_store(gate)),
+      training_runs(make_training_run_store(gate)),
+      models(make_model_store(gate)),
+      jobs(make_job_store(gate)),
+      tokens(make_token_store(gate)),
+      access(make_access_store(gate)),
+      service(make_service_store(gate)),
+      ports{*measurements,  *missions, *bin,    *exclusions, *sites,     *anchors, *calibrations,
+            *revisions,     *kits,     *frames, *plans,      *campaigns, *labels,  *datasets,
+            *training_runs, *models,   *jobs,   *tokens,     *access,    *service} {}
+
+}  // namespace anchord::sql
