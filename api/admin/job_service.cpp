@@ -3,7 +3,6 @@
 #include <condition_variable>
 #include <deque>
 #include <map>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -12,6 +11,7 @@
 #include "api/kit/problem.hpp"
 #include "api/stream/hub.hpp"
 #include "core/base/guard.hpp"
+#include "core/base/locked.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/executor.hpp"
 
@@ -39,12 +39,15 @@ struct JobService::State {
   Hub& hub;
   const Clock& clock;
   Executor& on;
-  std::mutex mutex;
+  struct Lanes {
+    std::map<std::string, Lane> of_kind{};
+    std::set<JobId> canceled{};
+    bool started{false}, stopping{false};
+    int posted{0};             ///< turns that the executor has not finished
+    std::uint64_t changes{0};  ///< of states of jobs
+  };
   std::condition_variable changed;
-  std::map<std::string, Lane> lanes;
-  std::set<JobId> canceled;
-  bool started{false}, stopping{false};
-  int posted{0};  ///< turns that the executor has not finished
+  Locked<Lanes> lanes;
 
   void tell(const Job& job) {
     hub.publish(Topic::jobs, to_wire(job_json(job)), clock.now().us(), to_string(job.id));
@@ -53,31 +56,39 @@ struct JobService::State {
     // A job that cannot be written is still shown live; after a restart it counts as interrupted.
     (void)jobs.update(job).has_value();
     tell(job);
+    {
+      auto now = lanes.lock();
+      ++now->changes;
+    }
     changed.notify_all();
   }
+  std::uint64_t changes() {
+    const auto now = lanes.lock();
+    return now->changes;
+  }
   bool is_canceled(const JobId& id) {
-    const std::scoped_lock lock(mutex);
-    return stopping || canceled.count(id) > 0;
+    const auto now = lanes.lock();
+    return now->stopping || now->canceled.contains(id);
   }
   bool is_stopping() {
-    const std::scoped_lock lock(mutex);
-    return stopping;
+    const auto now = lanes.lock();
+    return now->stopping;
   }
   /// Room in the lane, told before the job is written.
   Result<void> admit(const std::string& kind) {
-    const std::scoped_lock lock(mutex);
-    if (stopping) return make_error(Errc::queue_full, "the server is stopping");
-    if (lanes[kind].queue.size() >= k_max_queued)
+    auto now = lanes.lock();
+    if (now->stopping) return make_error(Errc::queue_full, "the server is stopping");
+    if (now->of_kind[kind].queue.size() >= k_max_queued)
       return make_error(Errc::queue_full, std::to_string(k_max_queued) + " jobs are waiting already");
     return boost::outcome_v2::success();
   }
   void enqueue(const std::shared_ptr<State>& self, const Job& job, Work work) {
     tell(job);
     {
-      const std::scoped_lock lock(mutex);
-      canceled.erase(job.id);  // of an earlier life of the same job
-      lanes[job.kind].queue.push_back({job.id, std::move(work)});
-      if (!started || stopping) return;
+      auto now = lanes.lock();
+      now->canceled.erase(job.id);  // of an earlier life of the same job
+      now->of_kind[job.kind].queue.push_back({job.id, std::move(work)});
+      if (!now->started || now->stopping) return;
     }
     post_turn(self, job.kind);
   }
@@ -85,17 +96,17 @@ struct JobService::State {
   void post_turn(const std::shared_ptr<State>& self, const std::string& kind) {
     Executor* strand = nullptr;
     {
-      const std::scoped_lock lock(mutex);
-      auto& lane = lanes[kind];
+      auto now = lanes.lock();
+      auto& lane = now->of_kind[kind];
       if (!lane.strand) lane.strand = on.strand();
       strand = lane.strand.get();
-      ++posted;
+      ++now->posted;
     }
     strand->post([self, kind] {
       (void)guarded("job", [&] { self->turn(kind); });
       {
-        const std::scoped_lock lock(self->mutex);
-        --self->posted;
+        auto now = self->lanes.lock();
+        --now->posted;
       }
       self->changed.notify_all();
     });
@@ -140,18 +151,18 @@ void JobService::start() {
   (void)state_->jobs.fail_unfinished(state_->clock.now(), problem).has_value();
   std::vector<std::string> turns;
   {
-    const std::scoped_lock lock(state_->mutex);
-    state_->started = true;
-    for (const auto& [kind, lane] : state_->lanes) turns.insert(turns.end(), lane.queue.size(), kind);
+    auto now = state_->lanes.lock();
+    now->started = true;
+    for (const auto& [kind, lane] : now->of_kind) turns.insert(turns.end(), lane.queue.size(), kind);
   }
   for (const auto& kind : turns) state_->post_turn(state_, kind);
 }
 
 void JobService::stop() {
-  std::unique_lock lock(state_->mutex);
-  state_->stopping = true;
+  auto lanes = state_->lanes.lock();
+  lanes->stopping = true;
   state_->changed.notify_all();
-  state_->changed.wait(lock, [this] { return state_->posted == 0; });
+  lanes.wait(state_->changed, [](const auto& now) { return now.posted == 0; });
 }
 
 Result<Job> JobService::submit(std::string kind, std::string request_json, Work work,
@@ -188,12 +199,12 @@ Result<Job> JobService::restart(const JobId& id, Work work) {
 Result<Job> JobService::wait(const JobId& id, std::chrono::milliseconds longest) {
   const auto deadline = std::chrono::steady_clock::now() + longest;
   while (true) {
+    const auto seen = state_->changes();  // before the job is read: what changes meanwhile ends the wait
     BOOST_OUTCOME_TRY(auto job, state_->jobs.job(id));
-    std::unique_lock lock(state_->mutex);
-    if (ended(job.state) || state_->stopping || std::chrono::steady_clock::now() >= deadline) return job;
-    // The change may be told between the read and the wait: look again after a while in any case.
-    state_->changed.wait_until(
-        lock, std::min(deadline, std::chrono::steady_clock::now() + std::chrono::milliseconds(100)));
+    auto lanes = state_->lanes.lock();
+    if (ended(job.state) || lanes->stopping || std::chrono::steady_clock::now() >= deadline) return job;
+    lanes.wait_until(state_->changed, deadline,
+                     [&](const auto& now) { return now.stopping || now.changes != seen; });
   }
 }
 
@@ -203,15 +214,15 @@ Result<Job> JobService::cancel(const JobId& id) {
   std::string kind = job.kind;
   bool waiting = false;
   {
-    const std::scoped_lock lock(state_->mutex);
-    auto& queue = state_->lanes[kind].queue;
+    auto lanes = state_->lanes.lock();
+    auto& queue = lanes->of_kind[kind].queue;
     for (auto it = queue.begin(); it != queue.end(); ++it) {
       if (it->id != id) continue;
       queue.erase(it);
       waiting = true;
       break;
     }
-    if (!waiting) state_->canceled.insert(id);
+    if (!waiting) lanes->canceled.insert(id);
   }
   if (waiting) {
     // It never ran, so it does not wait for its turn to be told so.
@@ -227,17 +238,17 @@ Result<Job> JobService::cancel(const JobId& id) {
 void JobService::State::turn(const std::string& kind) {
   Task task;
   {
-    const std::scoped_lock lock(mutex);
-    auto& queue = lanes[kind].queue;
-    if (stopping || queue.empty()) return;
+    auto now = lanes.lock();
+    auto& queue = now->of_kind[kind].queue;
+    if (now->stopping || queue.empty()) return;
     task = std::move(queue.front());
     queue.pop_front();
   }
   (void)guarded("job", [&] { run(task); });
   task.work = nullptr;  // with what it holds, before its memory is given back
   give_back_memory();
-  const std::scoped_lock lock(mutex);
-  canceled.erase(task.id);
+  auto now = lanes.lock();
+  now->canceled.erase(task.id);
 }
 
 void JobService::State::run(const Task& task) {

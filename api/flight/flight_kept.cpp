@@ -57,12 +57,12 @@ std::optional<flight::KeptFlight> kept_flight(const MissionId& mission, const nl
 
 }  // namespace
 
-bool FlightService::State::to_keep(std::string& text) {
-  const auto& f = operations.flight();
+bool FlightService::State::to_keep(Work& w, std::string& text) {
+  const auto& f = w.operations.flight();
   if (!f) return false;
   const auto n = f->control.engine().state().n_transitions + (f->aborted.empty() ? 0 : k_aborted);
-  if (n == last.kept) return false;
-  last.kept = n;
+  if (n == w.last.kept) return false;
+  w.last.kept = n;
   text.clear();
   if (f->flying()) {
     text = to_wire(document_of(*f));
@@ -93,16 +93,16 @@ void FlightService::State::recover() {
         mission, j.is_object() ? clues_of(j.value("clues", nlohmann::json())) : procedure::FlightClues{});
     flying.emplace_back(mission, std::move(j));
   }
-  const std::scoped_lock lock(mutex);
+  auto w = work.lock();
   for (const auto& [mission, j] : flying) {
     if (auto found = kept_flight(mission, j)) {
-      (void)operations.recover(now(), *std::move(found)).has_value();
+      (void)w->operations.recover(now(), *std::move(found)).has_value();
     } else {
       deps.events.add("critical", "procedure.lost",
                       "the flight before the restart cannot be read: the pilot has it", mission);
     }
   }
-  tell_events();
+  tell_events(*w);
 }
 
 }  // namespace anchord::api

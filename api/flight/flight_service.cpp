@@ -33,8 +33,8 @@ flight::Now FlightService::State::now() const {
   return out;
 }
 
-void FlightService::State::tell_events() {
-  for (auto& event : operations.take_events())
+void FlightService::State::tell_events(Work& w) const {
+  for (auto& event : w.operations.take_events())
     deps.events.add(std::move(event.level), std::move(event.code), std::move(event.text), event.mission);
 }
 
@@ -47,66 +47,60 @@ void FlightService::start() {
   state_->thread = Thread("anchord-fly", [this] {
     using Steady = std::chrono::steady_clock;
     auto due = Steady::now();
-    std::unique_lock lock(state_->mutex);
-    while (!state_->stopping) {
-      lock.unlock();
+    for (bool stopping = false; !stopping;) {
       (void)guarded("flight", [this] { step(); });
       // At a fixed rate; a round that came late is not made up for.
       due = std::max(due + std::chrono::milliseconds(100), Steady::now());
-      lock.lock();
-      state_->wake.wait_until(lock, due, [&] { return state_->stopping; });
+      auto w = state_->work.lock();
+      stopping = w.wait_until(state_->wake, due, [](const auto& now) { return now.stopping; });
     }
   });
 }
 
 void FlightService::stop() {
   {
-    const std::scoped_lock lock(state_->mutex);
-    if (state_->stopping) return;
-    state_->stopping = true;
+    auto w = state_->work.lock();
+    if (std::exchange(w->stopping, true)) return;
     // Whoever stops the server in flight leaves an aircraft that stands, not one that goes on.
-    state_->operations.halt();
+    w->operations.halt();
   }
   state_->wake.notify_all();
   state_->changed.notify_all();
   if (state_->thread.joinable()) state_->thread.join();
-  std::unique_lock lock(state_->mutex);
-  state_->idle.wait(lock, [this] { return !state_->apart.handed_over; });
+  auto w = state_->work.lock();
+  w.wait(state_->idle, [](const auto& now) { return !now.apart.handed_over; });
 }
 
-bool FlightService::State::apart_is_due() {
-  return apart.any() && !stopping && !std::exchange(apart.handed_over, true);
+bool FlightService::State::apart_is_due(Work& w) {
+  return w.apart.any() && !w.stopping && !std::exchange(w.apart.handed_over, true);
 }
 
 void FlightService::State::work_apart() {
-  std::unique_lock lock(mutex);
-  while (!stopping && piece_apart(lock)) continue;
-  apart.handed_over = false;
+  auto w = work.lock();
+  while (!w->stopping && piece_apart(w)) continue;
+  w->apart.handed_over = false;
   idle.notify_all();
 }
 
-bool FlightService::State::piece_apart(std::unique_lock<std::mutex>& lock) {
-  if (!operations.flight()) apart.drop();
-  if (!apart.any()) return false;
+bool FlightService::State::piece_apart(Guard& w) {
+  if (!w->operations.flight()) w->apart.drop();
+  if (!w->apart.any()) return false;
   (void)guarded("planner", [&] {
-    if (apart.point)
-      decide(lock);
-    else if (std::exchange(apart.grid, false))
-      show_grid(lock);
-    else if (std::exchange(apart.profiles, false))
-      show_profiles(lock);
+    if (w->apart.point)
+      decide(w);
+    else if (std::exchange(w->apart.grid, false))
+      show_grid(w);
+    else if (std::exchange(w->apart.profiles, false))
+      show_profiles(w);
   });
-  if (!lock.owns_lock()) lock.lock();
   return true;
 }
 
 /// One that fails is a decision that does not come in time.
-void FlightService::State::decide(std::unique_lock<std::mutex>& lock) {
-  const auto task = *std::exchange(apart.point, std::nullopt);
-  lock.unlock();
-  auto decision = planning::next_point(task.input, task.options);
-  lock.lock();
-  operations.decided(task, std::move(decision));
+void FlightService::State::decide(Guard& w) {
+  const auto task = *std::exchange(w->apart.point, std::nullopt);
+  auto decision = w.unlocked([&] { return planning::next_point(task.input, task.options); });
+  w->operations.decided(task, std::move(decision));
 }
 
 void FlightService::step() {
@@ -116,8 +110,8 @@ void FlightService::step() {
   std::optional<MissionId> mission;
   bool deciding = false;
   {
-    const std::scoped_lock lock(s.mutex);
-    if (const auto& f = s.operations.flight()) {
+    const auto w = s.work.lock();
+    if (const auto& f = w->operations.flight()) {
       mission = f->mission;
       deciding = f->control.engine().state().step == procedure::Step::find_next_point;
     }
@@ -131,26 +125,26 @@ void FlightService::step() {
   std::optional<procedure::FlightClues> clues;
   bool due_apart = false;
   {
-    const std::scoped_lock lock(s.mutex);
+    auto w = s.work.lock();
     const auto now = s.now();
-    if (s.operations.flying())
+    if (w->operations.flying())
       s.checks_apart.note(now.s);
     else
       s.checks_apart.pause();
-    s.operations.round(now, estimates, live.has_value());
-    if (auto task = s.operations.take_point_task()) s.apart.point = std::move(task);
-    s.tell_events();
-    if (const auto& f = s.operations.flight()) {
+    w->operations.round(now, estimates, live.has_value());
+    if (auto task = w->operations.take_point_task()) w->apart.point = std::move(task);
+    s.tell_events(*w);
+    if (const auto& f = w->operations.flight()) {
       mission = f->mission;  // one that began meanwhile too
-      if (s.last.flight != s.operations.n_flights()) s.last = {.flight = s.operations.n_flights()};
-      keeps = s.to_keep(keep);
-      if (const auto version = f->control.engine().clues_version(); s.last.clues_passed != version) {
-        s.last.clues_passed = version;
+      if (w->last.flight != w->operations.n_flights()) w->last = {.flight = w->operations.n_flights()};
+      keeps = State::to_keep(*w, keep);
+      if (const auto version = f->control.engine().clues_version(); w->last.clues_passed != version) {
+        w->last.clues_passed = version;
         clues = f->clues();
       }
     }
-    s.publish();
-    due_apart = s.apart_is_due();
+    s.publish(*w);
+    due_apart = State::apart_is_due(*w);
   }
   if (due_apart) s.deps.plan.post([&s] { s.work_apart(); });
   if (clues && mission) s.deps.missions.tell_clues(*mission, std::move(*clues));
@@ -159,53 +153,53 @@ void FlightService::step() {
 }
 
 void FlightService::on_fix(const Fix& fix) {
-  const std::scoped_lock lock(state_->mutex);
-  state_->operations.fix(state_->now(), fix);
+  auto w = state_->work.lock();
+  w->operations.fix(state_->now(), fix);
 }
 
 void FlightService::on_range(const MissionId& mission, const RangeResult& result) {
-  const std::scoped_lock lock(state_->mutex);
-  state_->operations.range(state_->now(), mission, result);
+  auto w = state_->work.lock();
+  w->operations.range(state_->now(), mission, result);
 }
 
 Result<Lease> FlightService::take_control(const MissionId& mission, const Principal& who, bool by_force) {
   BOOST_OUTCOME_TRYV(state_->deps.missions.mission(mission));
-  const std::scoped_lock lock(state_->mutex);
+  auto w = state_->work.lock();
   const auto now = state_->now();
-  auto lease = state_->operations.take_control(now, mission, holder_of(who), by_force,
-                                               to_string(make_uuid_v7(now.utc)));
-  state_->tell_events();
+  auto lease =
+      w->operations.take_control(now, mission, holder_of(who), by_force, to_string(make_uuid_v7(now.utc)));
+  state_->tell_events(*w);
   return lease;
 }
 
 Result<Lease> FlightService::renew_control(const MissionId& mission, const std::string& key,
                                            const Principal& who) {
-  const std::scoped_lock lock(state_->mutex);
-  return state_->operations.renew_control(state_->now(), mission, key, holder_of(who));
+  auto w = state_->work.lock();
+  return w->operations.renew_control(state_->now(), mission, key, holder_of(who));
 }
 
 Result<void> FlightService::release_control(const MissionId& mission, const std::string& key,
                                             const Principal& who) {
-  const std::scoped_lock lock(state_->mutex);
-  auto released = state_->operations.release_control(state_->now(), mission, key, holder_of(who));
-  state_->tell_events();
+  auto w = state_->work.lock();
+  auto released = w->operations.release_control(state_->now(), mission, key, holder_of(who));
+  state_->tell_events(*w);
   return released;
 }
 
 std::optional<Lease> FlightService::control() {
-  const std::scoped_lock lock(state_->mutex);
-  return state_->operations.control(state_->now());
+  auto w = state_->work.lock();
+  return w->operations.control(state_->now());
 }
 
 bool FlightService::flies(const MissionId& mission) {
-  const std::scoped_lock lock(state_->mutex);
-  const auto* f = state_->operations.flight_of(mission);
+  auto w = state_->work.lock();
+  const auto* f = w->operations.flight_of(mission);
   return f != nullptr && f->flying();
 }
 
 std::optional<MissionId> FlightService::flown_with(const PlanId& plan) {
-  const std::scoped_lock lock(state_->mutex);
-  const auto& f = state_->operations.flight();
+  auto w = state_->work.lock();
+  const auto& f = w->operations.flight();
   return f && f->flying() && f->plan.id == plan ? std::optional(f->mission) : std::nullopt;
 }
 
@@ -214,17 +208,17 @@ flight::Groundwork FlightService::State::groundwork(const Plan* plan) {
   flight::Groundwork ground{plan, nullptr, storage.writable, static_cast<double>(storage.disk_free_bytes)};
   if (plan == nullptr) return ground;
   {
-    const std::scoped_lock lock(checks_mutex);
-    for (const auto& known : checks) {
+    const auto kept = checks.lock();
+    for (const auto& known : *kept) {
       if (known.plan == plan->id && known.revision == plan->version) ground.check = known.check;
     }
   }
   if (ground.check) return ground;
   if (auto checked = planning::check_plan(*plan))
     ground.check = std::make_shared<const planning::PlanCheck>(std::move(checked).value());
-  const std::scoped_lock lock(checks_mutex);
-  checks.push_back({plan->id, plan->version, ground.check});
-  if (checks.size() > k_checks) checks.pop_front();
+  auto kept = checks.lock();
+  kept->push_back({plan->id, plan->version, ground.check});
+  if (kept->size() > k_checks) kept->pop_front();
   return ground;
 }
 
@@ -238,13 +232,13 @@ Result<FlightCommand> FlightService::act(const MissionId& mission, const Order& 
   }
   std::optional<flight::Groundwork> ground;
   if (plan) ground = state_->groundwork(&*plan);
-  const std::scoped_lock lock(state_->mutex);
-  auto& operations = state_->operations;
+  auto w = state_->work.lock();
+  auto& operations = w->operations;
   const auto now = state_->now();
   BOOST_OUTCOME_TRYV(operations.renew_control(now, mission, order.lease, holder_of(who)));
   auto given = ground ? operations.begin(now, record, *ground, order.manual, who.name)
                       : operations.act(now, mission, order.action, who.name);
-  state_->tell_events();
+  state_->tell_events(*w);
   state_->changed.notify_all();
   return given;
 }
@@ -255,40 +249,40 @@ Result<FlightCommand> FlightService::upload(const MissionId& mission, const std:
   BOOST_OUTCOME_TRYV(state_->deps.missions.mission(mission));
   BOOST_OUTCOME_TRY(const auto stored, state_->deps.plans.plan(plan_id));
   const Plan plan = plan_of(stored);
-  const std::scoped_lock lock(state_->mutex);
+  auto w = state_->work.lock();
   const auto now = state_->now();
-  BOOST_OUTCOME_TRYV(state_->operations.renew_control(now, mission, lease, holder_of(who)));
-  return state_->operations.upload(now, mission, plan, what, who.name);
+  BOOST_OUTCOME_TRYV(w->operations.renew_control(now, mission, lease, holder_of(who)));
+  return w->operations.upload(now, mission, plan, what, who.name);
 }
 
 Result<DroneStatus> FlightService::change_aircraft(const MissionId& mission, const std::string& lease,
                                                    const std::string& sender, const Principal& who) {
   BOOST_OUTCOME_TRYV(state_->deps.missions.mission(mission));
-  const std::scoped_lock lock(state_->mutex);
-  BOOST_OUTCOME_TRYV(state_->operations.renew_control(state_->now(), mission, lease, holder_of(who)));
-  auto changed = state_->operations.change_aircraft(mission, sender, who.name);
-  state_->tell_events();
+  auto w = state_->work.lock();
+  BOOST_OUTCOME_TRYV(w->operations.renew_control(state_->now(), mission, lease, holder_of(who)));
+  auto changed = w->operations.change_aircraft(mission, sender, who.name);
+  state_->tell_events(*w);
   return changed;
 }
 
 std::vector<FlightUpload> FlightService::uploads(const MissionId& mission) {
-  const std::scoped_lock lock(state_->mutex);
+  auto w = state_->work.lock();
   std::vector<FlightUpload> out;
-  for (const auto& u : state_->operations.uploads()) {
+  for (const auto& u : w->operations.uploads()) {
     if (u.mission == mission) out.push_back(u);
   }
   return out;
 }
 
 FlightCommand FlightService::settled(FlightCommand command, double wait_s) {
-  std::unique_lock lock(state_->mutex);
-  const auto latest = [&] {
-    const auto& operations = state_->operations;
+  auto w = state_->work.lock();
+  const auto latest = [&](const auto& now) {
+    const auto& operations = now.operations;
     if (const auto* found = operations.command(command.number)) command = *found;
     // A newer command ends the wait: who waits holds a thread that the next command may need.
-    return command.state != "sent" || state_->stopping || operations.newest_by_person() > command.number;
+    return command.state != "sent" || now.stopping || operations.newest_by_person() > command.number;
   };
-  state_->changed.wait_for(lock, std::chrono::duration<double>(wait_s), latest);
+  (void)w.wait_for(state_->changed, std::chrono::duration<double>(wait_s), latest);
   return command;
 }
 
@@ -301,10 +295,10 @@ std::vector<ChecklistItem> FlightService::checklist(const MissionId& mission,
     if (const auto stored = state_->deps.plans.plan(*plan_id)) plan = plan_of(stored.value());
   }
   const auto ground = state_->groundwork(plan ? &*plan : nullptr);
-  const std::scoped_lock lock(state_->mutex);
-  if (plan && (who.has(Role::op) || who.has(Role::admin))) state_->operations.prepare(mission, *plan);
-  return state_->operations.checklist(state_->now(), record ? &record.value() : nullptr, mission, ground,
-                                      state_->deps.drone == nullptr);
+  auto w = state_->work.lock();
+  if (plan && (who.has(Role::op) || who.has(Role::admin))) w->operations.prepare(mission, *plan);
+  return w->operations.checklist(state_->now(), record ? &record.value() : nullptr, mission, ground,
+                                 state_->deps.drone == nullptr);
 }
 
 Result<void> FlightService::override_item(const MissionId& mission, const std::string& item,
@@ -313,15 +307,15 @@ Result<void> FlightService::override_item(const MissionId& mission, const std::s
   if (!flight::is_checklist_item(item))
     return make_error(Errc::not_found, "the checklist has no item " + item);
   const auto ground = state_->groundwork(nullptr);
-  const std::scoped_lock lock(state_->mutex);
-  auto done = state_->operations.override_item(state_->now(), mission, item, reason, who.name, ground);
-  state_->tell_events();
+  auto w = state_->work.lock();
+  auto done = w->operations.override_item(state_->now(), mission, item, reason, who.name, ground);
+  state_->tell_events(*w);
   return done;
 }
 
 std::vector<std::pair<std::string_view, std::string>> FlightService::alarms() {
-  const std::scoped_lock lock(state_->mutex);
-  return state_->operations.alarms();
+  auto w = state_->work.lock();
+  return w->operations.alarms();
 }
 
 std::string FlightService::metrics() const {

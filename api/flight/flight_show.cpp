@@ -49,14 +49,15 @@ Profiles profiles_of(const flight::ActiveFlight& f, std::int64_t t_us) {
 
 template <class State>
 std::optional<Profiles> profiles_in(State& state, const MissionId& mission) {
-  const std::scoped_lock lock(state.mutex);
-  const auto* f = state.operations.flight_of(mission);
+  const auto w = state.work.lock();
+  const auto* f = w->operations.flight_of(mission);
   return f == nullptr ? std::nullopt : std::optional(profiles_of(*f, state.deps.clock.now().us()));
 }
 
 }  // namespace
 
-nlohmann::ordered_json FlightService::State::procedure(const flight::ActiveFlight& f) const {
+nlohmann::ordered_json FlightService::State::procedure(const flight::Operations& operations,
+                                                       const flight::ActiveFlight& f) const {
   const auto at = now();
   ProcedureView v;
   v.mission = f.mission;
@@ -86,60 +87,65 @@ nlohmann::ordered_json FlightService::State::procedure(const flight::ActiveFligh
 
 /// The stepper once a second and with every transition. What is longer to write is left to be shown apart:
 /// decisions once, profiles while they grow.
-void FlightService::State::publish() {
-  const bool soon = operations.take_shown_soon();
-  if (!operations.flight()) return;
-  const auto& f = *operations.flight();
+void FlightService::State::publish(Work& w) const {
+  const bool soon = w.operations.take_shown_soon();
+  if (!w.operations.flight()) return;
+  const auto& f = *w.operations.flight();
   const auto at = now();
   const auto& engine = f.control.engine();
   const auto n = engine.state().n_transitions;
-  const bool moved = n != last.shown;
-  if (moved || soon || at.s - last.shown_s >= 1) {
-    deps.hub.publish(Topic::procedure, to_wire(procedure(f)), at.utc.us(), to_string(f.mission));
-    last.shown_s = at.s;
+  const bool moved = n != w.last.shown;
+  if (moved || soon || at.s - w.last.shown_s >= 1) {
+    deps.hub.publish(Topic::procedure, to_wire(procedure(w.operations, f)), at.utc.us(),
+                     to_string(f.mission));
+    w.last.shown_s = at.s;
   }
   const auto step = engine.state().step;
   const bool growing = step == procedure::Step::turn || step == procedure::Step::height_search;
-  if (moved || (growing && at.s - last.profiles_s >= k_profiles_s)) {
-    apart.profiles = true;
-    last.profiles_s = at.s;
+  if (moved || (growing && at.s - w.last.profiles_s >= k_profiles_s)) {
+    w.apart.profiles = true;
+    w.last.profiles_s = at.s;
   }
-  if (moved && engine.decision()) apart.grid = true;
-  last.shown = n;
+  if (moved && engine.decision()) w.apart.grid = true;
+  w.last.shown = n;
 }
 
-void FlightService::State::show_grid(std::unique_lock<std::mutex>& lock) {
-  const auto grid = grid_of(*operations.flight(), now().utc.us());
-  lock.unlock();
-  deps.hub.publish(Topic::mission_grid, to_wire(grid_json(grid)), grid.t_us, to_string(grid.mission));
+void FlightService::State::show_grid(Guard& w) const {
+  const auto grid = grid_of(*w->operations.flight(), now().utc.us());
+  w.unlocked([&] {
+    deps.hub.publish(Topic::mission_grid, to_wire(grid_json(grid)), grid.t_us, to_string(grid.mission));
+  });
 }
 
-void FlightService::State::show_profiles(std::unique_lock<std::mutex>& lock) {
-  const auto profiles = profiles_of(*operations.flight(), now().utc.us());
-  lock.unlock();
+void FlightService::State::show_profiles(Guard& w) const {
+  const auto profiles = profiles_of(*w->operations.flight(), now().utc.us());
   const auto key = to_string(profiles.mission);
   const auto to = [&](Topic topic) {
     return [&, topic](NetworkId anchor, const nlohmann::ordered_json& one) {
       deps.hub.publish(topic, to_wire(one), profiles.t_us, key + to_string(anchor), anchor);
     };
   };
-  profiles.turns(to(Topic::mission_turn));
-  profiles.heights(to(Topic::mission_height));
+  w.unlocked([&] {
+    profiles.turns(to(Topic::mission_turn));
+    profiles.heights(to(Topic::mission_height));
+  });
 }
 
 std::string FlightService::procedure_text(const MissionId& mission) {
-  const std::scoped_lock lock(state_->mutex);
-  const auto* f = state_->operations.flight_of(mission);
-  return f == nullptr ? std::string{} : to_wire(state_->procedure(*f));
+  const auto w = state_->work.lock();
+  const auto* f = w->operations.flight_of(mission);
+  return f == nullptr ? std::string{} : to_wire(state_->procedure(w->operations, *f));
 }
 
 std::string FlightService::grid_text(const MissionId& mission) {
-  std::unique_lock lock(state_->mutex);
-  const auto* f = state_->operations.flight_of(mission);
-  if (f == nullptr) return {};
-  const auto grid = grid_of(*f, state_->deps.clock.now().us());
-  lock.unlock();
-  return to_wire(grid_json(grid));
+  std::optional<GridView> grid;
+  {
+    const auto w = state_->work.lock();
+    const auto* f = w->operations.flight_of(mission);
+    if (f == nullptr) return {};
+    grid.emplace(grid_of(*f, state_->deps.clock.now().us()));
+  }
+  return to_wire(grid_json(*grid));
 }
 
 std::vector<std::string> FlightService::turn_texts(const MissionId& mission) {

@@ -5,9 +5,9 @@
 
 namespace anchord::api {
 
-void MissionService::State::tell_events(Flight& flight) {
-  if (!flight.live.has_events()) return;
-  for (const auto& event : flight.live.take_events())
+void MissionService::State::tell_events(Flight& flight, Flight::Work& work) {
+  if (!work.live.has_events()) return;
+  for (const auto& event : work.live.take_events())
     std::visit([&](const auto& one) { tell(flight, one); }, event);
 }
 

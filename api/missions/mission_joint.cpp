@@ -20,28 +20,25 @@ std::string MissionService::State::outline_of(const Mission& mission) const {
   return site ? site.value().outline_geojson : std::string();
 }
 
-flight::LiveMission::JointProblem MissionService::State::joint_problem(Flight& flight,
+flight::LiveMission::JointProblem MissionService::State::joint_problem(flight::LiveMission& live,
                                                                        const std::string& outline) {
-  const auto origin = flight.live.origin();
-  return flight.live.joint_problem(origin && !outline.empty() ? outline_in_enu(outline, *origin)
-                                                              : std::vector<Eigen::Vector2d>{});
+  const auto origin = live.origin();
+  return live.joint_problem(origin && !outline.empty() ? outline_in_enu(outline, *origin)
+                                                       : std::vector<Eigen::Vector2d>{});
 }
 
 void MissionService::State::start_joint(const std::shared_ptr<Flight>& flight) {
   if (stopped || flight->rebuilding || joint_busy) return;
-  Mission mission;
-  {
-    const std::scoped_lock lock(flight->queue_mutex);
-    mission = flight->mission;
+  const std::string outline = outline_of(mission_of(*flight));
+  std::shared_ptr<flight::LiveMission::JointProblem> problem;
+  if (auto work = flight->work.try_lock()) {
+    if (work->joint_running || !work->live.joint_is_worth_it()) return;
+    if (std::chrono::steady_clock::now() < work->joint_not_before) return;
+    if (joint_busy.exchange(true)) return;
+    problem = std::make_shared<flight::LiveMission::JointProblem>(joint_problem(work->live, outline));
+    work->joint_running = true;
   }
-  const std::string outline = outline_of(mission);
-  std::unique_lock lock(flight->work_mutex, std::try_to_lock);
-  if (!lock || flight->joint_running || !flight->live.joint_is_worth_it()) return;
-  if (std::chrono::steady_clock::now() < flight->joint_not_before) return;
-  if (joint_busy.exchange(true)) return;
-  auto problem = std::make_shared<flight::LiveMission::JointProblem>(joint_problem(*flight, outline));
-  flight->joint_running = true;
-  lock.unlock();
+  if (!problem) return;
   post(deps.joint, [self = shared_from_this(), flight, problem = std::move(problem)]() mutable {
     self->solve_joint(*flight, *problem);
     problem.reset();
@@ -66,12 +63,12 @@ void MissionService::State::solve_joint(Flight& flight, const flight::LiveMissio
 
 void MissionService::State::finish_joint(Flight& flight, const FlightSolution* solution, UtcTime cut,
                                          std::chrono::steady_clock::duration took, std::uint64_t generation) {
-  const std::scoped_lock lock(flight.work_mutex);
-  flight.joint_running = false;
-  flight.joint_not_before = std::chrono::steady_clock::now() +
-                            std::max<std::chrono::steady_clock::duration>(k_joint_pause, k_joint_rest * took);
-  if (solution == nullptr || stopped || !flight.live.adopt(*solution, cut, generation)) return;
-  tell_events(flight);
+  auto work = flight.work.lock();
+  work->joint_running = false;
+  work->joint_not_before = std::chrono::steady_clock::now() +
+                           std::max<std::chrono::steady_clock::duration>(k_joint_pause, k_joint_rest * took);
+  if (solution == nullptr || stopped || !work->live.adopt(*solution, cut, generation)) return;
+  tell_events(flight, *work);
   flight.dirty = true;
 }
 
@@ -79,19 +76,19 @@ void MissionService::tell_clues(const MissionId& id, procedure::FlightClues clue
   const auto flight = state_->find(id);
   if (!flight) return;
   {
-    const std::scoped_lock lock(flight->queue_mutex);
-    flight->new_clues = std::move(clues);
+    auto inbox = flight->inbox.lock();
+    inbox->new_clues = std::move(clues);
   }
   state_->schedule(flight);
 }
 
-void MissionService::State::take_clues(Flight& flight) {
+void MissionService::State::take_clues(Flight& flight, Flight::Work& work) {
   std::optional<procedure::FlightClues> clues;
   {
-    const std::scoped_lock lock(flight.queue_mutex);
-    clues = std::exchange(flight.new_clues, std::nullopt);
+    auto inbox = flight.inbox.lock();
+    clues = std::exchange(inbox->new_clues, std::nullopt);
   }
-  if (clues) flight.live.use_clues(*std::move(clues));
+  if (clues) work.live.use_clues(*std::move(clues));
 }
 
 }  // namespace anchord::api

@@ -1,3 +1,5 @@
+#include <iterator>
+
 #include "api/admin/event_log.hpp"
 #include "api/missions/mission_service_state.hpp"
 #include "api/stream/hub.hpp"
@@ -23,17 +25,17 @@ flight::LiveRow MissionService::State::row_of(Range range) const {
 template <class R>
 void MissionService::State::enqueue(Flight& flight, const R& row, SteadyTime now) {
   flight::LiveRow judged = row_of(row);
-  const std::scoped_lock lock(flight.queue_mutex);
-  if (flight.gone) return;
-  flight.last_arrival = flight.used = now;
-  (std::is_same_v<R, Fix> ? flight.fix_arrival : flight.range_arrival) = now;
-  if (flight.queue.size() >= k_max_queued_rows) {
-    flight.queue.pop_front();
-    ++flight.dropped;
+  auto inbox = flight.inbox.lock();
+  if (inbox->gone) return;
+  inbox->last_arrival = inbox->used = now;
+  (std::is_same_v<R, Fix> ? inbox->fix_arrival : inbox->range_arrival) = now;
+  if (inbox->queue.size() >= k_max_queued_rows) {
+    inbox->queue.pop_front();
+    ++inbox->dropped;
     --queued;
   }
-  flight.queue.push_back(std::move(judged));
-  flight.closing = flight.mission.state == MissionState::finished;
+  inbox->queue.push_back(std::move(judged));
+  inbox->closing = inbox->mission.state == MissionState::finished;
   ++queued;
 }
 
@@ -44,11 +46,9 @@ void MissionService::State::take_newest(std::span<const R> rows) {
   for (const auto& row : rows) {
     if (!flight || flight->id != row.mission) flight = find(row.mission);
     if (!flight) continue;
-    {
-      const std::scoped_lock lock(flight->queue_mutex);
-      // While it is read back from the store its newest row is not known.
-      if (flight->rebuilding || !flight->ahead.take(row)) continue;
-    }
+    // While it is read back from the store its newest row is not known.
+    if (flight->rebuilding) continue;
+    if (auto inbox = flight->inbox.lock(); !inbox->ahead.take(row)) continue;
     enqueue(*flight, row, now);
   }
   for (const auto& f : all()) schedule(f);
@@ -61,11 +61,9 @@ void MissionService::State::accept(std::span<const R> rows, std::span<const RowO
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (!flight || flight->id != rows[i].mission) flight = find(rows[i].mission);
     if (!flight) continue;
-    {
-      const std::scoped_lock lock(flight->queue_mutex);
-      // Of several senders of one row the store accepts one: whoever was live with it, it has been had.
-      if (outcomes[i] != RowOutcome::accepted || flight->ahead.settle(rows[i])) continue;
-    }
+    if (outcomes[i] != RowOutcome::accepted) continue;
+    // Of several senders of one row the store accepts one: whoever was live with it, it has been had.
+    if (auto inbox = flight->inbox.lock(); inbox->ahead.settle(rows[i])) continue;
     enqueue(*flight, rows[i], now);
   }
   for (const auto& f : all()) schedule(f);
@@ -78,10 +76,9 @@ template void MissionService::State::accept(std::span<const Fix>, std::span<cons
 
 void MissionService::State::schedule(const std::shared_ptr<Flight>& flight) {
   {
-    const std::scoped_lock lock(flight->queue_mutex);
-    if (flight->scheduled || stopped || flight->rebuilding) return;
-    if (flight->queue.empty() && !flight->closing && !flight->new_clues) return;
-    flight->scheduled = true;
+    auto inbox = flight->inbox.lock();
+    if (inbox->scheduled || stopped || flight->rebuilding || !inbox->busy()) return;
+    inbox->scheduled = true;
   }
   post(*flight->strand, [self = shared_from_this(), flight] {
     const auto ran = guarded("live path", [&] {
@@ -89,11 +86,11 @@ void MissionService::State::schedule(const std::shared_ptr<Flight>& flight) {
     });
     bool again = false;
     {
-      const std::scoped_lock lock(flight->queue_mutex);
-      flight->scheduled = false;
+      auto inbox = flight->inbox.lock();
+      inbox->scheduled = false;
       // Its rows are stored; a close that throws would be tried for ever.
-      if (!ran) flight->closing = false;
-      again = !flight->queue.empty() || flight->closing || flight->new_clues;
+      if (!ran) inbox->closing = false;
+      again = inbox->busy();
     }
     if (again) self->schedule(flight);
   });
@@ -101,81 +98,78 @@ void MissionService::State::schedule(const std::shared_ptr<Flight>& flight) {
 
 void MissionService::State::post(Executor& on, std::function<void()> task) {
   {
-    const std::scoped_lock lock(running_mutex);
-    ++running;
+    auto n = running.lock();
+    ++*n;
   }
   on.post([self = shared_from_this(), task = std::move(task)] {
     (void)guarded("live path", task);
     {
-      const std::scoped_lock lock(self->running_mutex);
-      --self->running;
+      auto n = self->running.lock();
+      --*n;
     }
     self->idle.notify_all();
   });
 }
 
+std::deque<flight::LiveRow> MissionService::State::take_rows(Flight& flight, std::uint64_t& dropped) {
+  auto inbox = flight.inbox.lock();
+  const auto n = static_cast<std::ptrdiff_t>(std::min(inbox->queue.size(), k_slice));
+  std::deque<flight::LiveRow> rows(std::make_move_iterator(inbox->queue.begin()),
+                                   std::make_move_iterator(inbox->queue.begin() + n));
+  inbox->queue.erase(inbox->queue.begin(), inbox->queue.begin() + n);
+  dropped = std::exchange(inbox->dropped, 0);
+  return rows;
+}
+
 void MissionService::State::work(Flight& flight) {
-  std::deque<flight::LiveRow> rows;
   std::uint64_t dropped = 0;
-  {
-    const std::scoped_lock lock(flight.queue_mutex);
-    const std::size_t n = std::min(flight.queue.size(), k_slice);
-    for (std::size_t i = 0; i < n; ++i) {
-      rows.push_back(std::move(flight.queue.front()));
-      flight.queue.pop_front();
-    }
-    dropped = std::exchange(flight.dropped, 0);
-  }
+  auto rows = take_rows(flight, dropped);
   queued -= rows.size();
   if (dropped > 0) {
     deps.events.add("warning", "live.behind",
                     std::to_string(dropped) + " measurements left the live path; they are stored", flight.id);
   }
-  const std::scoped_lock lock(flight.work_mutex);
+  auto work = flight.work.lock();
   if (flight.rebuilding) {
     // It begins anew: what was taken goes back to the head of the queue, and is worked off after what is
     // stored.
-    const std::scoped_lock queue(flight.queue_mutex);
+    auto inbox = flight.inbox.lock();
     queued += rows.size();
-    for (auto it = rows.rbegin(); it != rows.rend(); ++it) flight.queue.push_front(std::move(*it));
+    for (auto it = rows.rbegin(); it != rows.rend(); ++it) inbox->queue.push_front(std::move(*it));
     return;
   }
-  take_clues(flight);
+  take_clues(flight, *work);
   std::size_t since_announced = 0;
   for (const auto& row : rows) {
-    if (!flight.rebuilt.empty() && std::ranges::binary_search(flight.rebuilt, flight::identity(row)))
-      continue;
+    if (!work->rebuilt.empty() && std::ranges::binary_search(work->rebuilt, flight::identity(row))) continue;
     note_radios(row);
-    flight.live.add(row);
+    work->live.add(row);
     if (++since_announced == k_announced) {
-      flight.live.settle();
+      work->live.settle();
       since_announced = 0;
     }
-    tell_events(flight);
+    tell_events(flight, *work);
   }
   bool closing = false;
-  {
-    const std::scoped_lock queue(flight.queue_mutex);
-    if (flight.queue.empty()) {
-      flight.rebuilt = {};
-      closing = std::exchange(flight.closing, false);
-    }
+  if (auto inbox = flight.inbox.lock(); inbox->queue.empty()) {
+    work->rebuilt = {};
+    closing = std::exchange(inbox->closing, false);
   }
-  if (closing) flight.live.finish();
-  flight.live.settle();
-  flight.live.show_pose();
-  tell_events(flight);
+  if (closing) work->live.finish();
+  work->live.settle();
+  work->live.show_pose();
+  tell_events(flight, *work);
   flight.dirty = true;
-  bool view_wanted = false;
-  {
-    const std::scoped_lock queue(flight.queue_mutex);
-    view_wanted = std::exchange(flight.view_wanted, false);
-  }
-  if (!view_wanted) return;
-  auto made = view(flight);
-  const std::scoped_lock queue(flight.queue_mutex);
-  flight.view = std::move(made);
-  flight.view_made = steady_now();
+  make_view(flight, *work);
+}
+
+/// For one who asked and did not wait.
+void MissionService::State::make_view(Flight& flight, const Flight::Work& work) const {
+  if (auto inbox = flight.inbox.lock(); !std::exchange(inbox->view_wanted, false)) return;
+  auto made = view(flight, work);
+  auto inbox = flight.inbox.lock();
+  inbox->view = std::move(made);
+  inbox->view_made = steady_now();
 }
 
 void MissionService::State::note_radios(const flight::LiveRow& row) {

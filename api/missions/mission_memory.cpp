@@ -12,19 +12,14 @@ constexpr double k_read_s = 60;
 
 }  // namespace
 
-/// Under its queue_mutex: whether something of it is still to be done.
-bool MissionService::Flight::busy() const {
-  return rebuilding || scheduled || closing || new_clues || !queue.empty();
-}
-
 void MissionService::State::evict() {
   const SteadyTime now = steady_now();
   std::vector<std::pair<SteadyTime, std::shared_ptr<Flight>>> at_rest;
-  for (auto& flight : all()) {
-    const std::scoped_lock lock(flight->queue_mutex);
+  for (const auto& flight : all()) {
+    const auto inbox = flight->inbox.lock();
     const bool over =
-        flight->mission.state == MissionState::finished || seconds_between(flight->used, now) > k_silent_s;
-    if (over && !flight->busy()) at_rest.emplace_back(flight->used, std::move(flight));
+        inbox->mission.state == MissionState::finished || seconds_between(inbox->used, now) > k_silent_s;
+    if (over && !flight->rebuilding && !inbox->busy()) at_rest.emplace_back(inbox->used, flight);
   }
   std::ranges::sort(at_rest, {}, [](const auto& one) { return one.first; });
   std::size_t too_many = at_rest.size() - std::min(at_rest.size(), k_most_at_rest);
@@ -37,19 +32,20 @@ void MissionService::State::evict() {
 }
 
 bool MissionService::State::take_out(Flight& flight) {
-  const std::unique_lock work(flight.work_mutex, std::try_to_lock);
-  if (!work || flight.joint_running) return false;
+  const auto work = flight.work.try_lock();
+  if (!work || work->joint_running) return false;
   {
-    const std::scoped_lock lock(mutex, flight.queue_mutex);
-    if (flight.busy()) return false;
-    flight.gone = true;
-    flights.erase(flight.id);
+    auto all = known.lock();
+    auto inbox = flight.inbox.lock();
+    if (flight.rebuilding || inbox->busy()) return false;
+    inbox->gone = true;
+    all->flights.erase(flight.id);
   }
   ++evicted;
   const std::string key = to_string(flight.id);
   for (const Topic topic : {Topic::mission_state, Topic::drone_pose, Topic::rtk_status})
     deps.hub.forget(topic, key);
-  for (const auto& [anchor, status] : flight.live.statuses())
+  for (const auto& [anchor, status] : work->live.statuses())
     deps.hub.forget(Topic::anchors_estimates, key + to_string(anchor));
   return true;
 }
@@ -59,9 +55,9 @@ std::optional<MissionService::LiveView> MissionService::State::read(const Missio
   const auto n_ranges = deps.measurements.count_ranges(id), n_fixes = deps.measurements.count_fixes(id);
   if (!n_ranges || !n_fixes) return std::nullopt;
   Read now{id, n_ranges.value(), n_fixes.value(), steady_now(), {}};
-  if (auto known = read_before(now)) return known;
+  if (auto before = read_before(now)) return before;
   const std::scoped_lock one_at_a_time(reading_mutex);
-  if (auto known = read_before(now)) return known;
+  if (auto before = read_before(now)) return before;
   const auto mission = deps.missions.mission(id);
   if (!mission) return std::nullopt;
   bool whole = false;  // else the store failed on the way
@@ -71,37 +67,38 @@ std::optional<MissionService::LiveView> MissionService::State::read(const Missio
     while (rebuild_slice(flight)) {
       if (stopped) return std::nullopt;
     }
-    flight.live.finish();
-    if (flight.live.joint_is_worth_it()) {
-      auto problem = joint_problem(flight, outline_of(mission.value()));
+    auto work = flight.work.lock();  // of nobody else: this flight is not known
+    work->live.finish();
+    if (work->live.joint_is_worth_it()) {
+      auto problem = joint_problem(work->live, outline_of(mission.value()));
       problem.options.canceled = [this] { return stopped.load(); };
       if (const auto solution = solve_flight(problem.flight, problem.options))
-        flight.live.adopt(solution.value(), problem.cut, problem.generation);
+        work->live.adopt(solution.value(), problem.cut, problem.generation);
     }
-    now.view = view(flight);
-    const auto& state = flight.live.state();
+    now.view = view(flight, *work);
+    const auto& state = work->live.state();
     whole = state.n_ranges >= now.n_ranges && state.n_fixes >= now.n_fixes;
   }
   give_back_memory();
   if (!whole) return std::move(now.view);
-  const std::scoped_lock lock(reads_mutex);
-  reads.push_back(now);
-  if (reads.size() > k_reads) reads.pop_front();
+  auto kept = reads.lock();
+  kept->push_back(now);
+  if (kept->size() > k_reads) kept->pop_front();
   return std::move(now.view);
 }
 
 std::optional<MissionService::LiveView> MissionService::State::read_before(const Read& now) {
-  const std::scoped_lock lock(reads_mutex);
-  std::erase_if(reads, [&](const Read& read) { return seconds_between(read.made, now.made) > k_read_s; });
-  for (const auto& read : reads) {
+  auto kept = reads.lock();
+  std::erase_if(*kept, [&](const Read& read) { return seconds_between(read.made, now.made) > k_read_s; });
+  for (const auto& read : *kept) {
     if (read.id == now.id && read.n_ranges == now.n_ranges && read.n_fixes == now.n_fixes) return read.view;
   }
   return std::nullopt;
 }
 
 void MissionService::State::forget_reads(const std::optional<MissionId>& id) {
-  const std::scoped_lock lock(reads_mutex);
-  std::erase_if(reads, [&](const Read& read) { return !id || read.id == *id; });
+  auto kept = reads.lock();
+  std::erase_if(*kept, [&](const Read& read) { return !id || read.id == *id; });
 }
 
 }  // namespace anchord::api

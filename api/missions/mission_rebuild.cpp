@@ -34,13 +34,13 @@ void MissionService::State::begin_rebuild(const std::shared_ptr<Flight>& flight)
 }
 
 void MissionService::State::start_reading(Flight& flight) const {
-  const std::scoped_lock lock(flight.work_mutex);
-  flight.rebuild = std::make_unique<Flight::Rebuild>();
-  auto& r = *flight.rebuild;
+  auto work = flight.work.lock();
+  work->rebuild = std::make_unique<Flight::Rebuild>();
+  auto& r = *work->rebuild;
   r.range_filter.mission = r.fix_filter.mission = flight.id;
   r.range_filter.limit = r.fix_filter.limit = 2000;
   r.range_filter.with_cir = deps.judge_needs_cir();
-  flight.live.begin_reading();
+  work->live.begin_reading();
 }
 
 void MissionService::State::continue_rebuild(const std::shared_ptr<Flight>& flight) {
@@ -52,9 +52,9 @@ void MissionService::State::continue_rebuild(const std::shared_ptr<Flight>& flig
     if (ran) {
       self->end_rebuild(*flight);
     } else {  // what was read so far stands; rows that come now are not held up by it
-      const std::scoped_lock lock(flight->work_mutex);
-      flight->rebuild.reset();
-      flight->live.end_reading();
+      auto work = flight->work.lock();
+      work->rebuild.reset();
+      work->live.end_reading();
     }
     flight->rebuilding = false;
     self->schedule(flight);
@@ -63,9 +63,9 @@ void MissionService::State::continue_rebuild(const std::shared_ptr<Flight>& flig
 
 /// Two sorted streams merged by time, a page of each in memory; one page of either a call. False at the end.
 bool MissionService::State::rebuild_slice(Flight& flight) {
-  const std::scoped_lock lock(flight.work_mutex);
-  if (!flight.rebuild) return false;  // it began anew twice, and the other round was the last
-  auto& r = *flight.rebuild;
+  auto work = flight.work.lock();
+  if (!work->rebuild) return false;  // it began anew twice, and the other round was the last
+  auto& r = *work->rebuild;
   bool failed = false;
   const auto refill = [&](auto& rows, auto& filter, bool& more, auto read) {
     if (!rows.empty() || !more) return;
@@ -80,13 +80,13 @@ bool MissionService::State::rebuild_slice(Flight& flight) {
   refill(r.fixes, r.fix_filter, r.more_fixes, [&](auto& f) { return deps.measurements.fixes(f); });
   const auto take = [&](auto& rows) {
     {
-      const std::scoped_lock queue(flight.queue_mutex);
-      flight.ahead.note(rows.front());
+      auto inbox = flight.inbox.lock();
+      inbox->ahead.note(rows.front());
     }
     const flight::LiveRow row = row_of(std::move(rows.front()));
     rows.pop_front();
-    flight.rebuilt.push_back(flight::identity(row));
-    flight.live.add(row);
+    work->rebuilt.push_back(flight::identity(row));
+    work->live.add(row);
   };
   while (!failed && !(r.ranges.empty() && r.fixes.empty())) {
     // A stream that has run dry in the middle waits for its next page.
@@ -96,16 +96,16 @@ bool MissionService::State::rebuild_slice(Flight& flight) {
     else
       take(r.fixes);
   }
-  flight.rebuild.reset();
-  std::ranges::sort(flight.rebuilt);
-  take_clues(flight);
-  flight.live.end_reading();
+  work->rebuild.reset();
+  std::ranges::sort(work->rebuilt);
+  take_clues(flight, *work);
+  work->live.end_reading();
   return false;
 }
 
 void MissionService::State::end_rebuild(Flight& flight) {
-  const std::scoped_lock lock(flight.work_mutex);
-  tell_events(flight);
+  auto work = flight.work.lock();
+  tell_events(flight, *work);
   flight.dirty = true;
 }
 

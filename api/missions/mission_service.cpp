@@ -19,15 +19,15 @@ void MissionService::observe(MissionObserver* observer) { state_->observer = obs
 Result<Mission> MissionService::mission(const MissionId& id) {
   std::uint64_t forgotten = 0;
   {
-    const std::scoped_lock lock(state_->mutex);
-    const auto it = state_->cache.find(id);
-    if (it != state_->cache.end()) return it->second;
-    forgotten = state_->forgotten;
+    const auto known = state_->known.lock();
+    const auto it = known->cache.find(id);
+    if (it != known->cache.end()) return it->second;
+    forgotten = known->forgotten;
   }
   BOOST_OUTCOME_TRY(auto mission, state_->deps.missions.mission(id));
-  const std::scoped_lock lock(state_->mutex);
-  if (state_->cache.size() > 1000) state_->cache.clear();
-  if (forgotten == state_->forgotten) state_->cache[id] = mission;
+  auto known = state_->known.lock();
+  if (known->cache.size() > 1000) known->cache.clear();
+  if (forgotten == known->forgotten) known->cache[id] = mission;
   return mission;
 }
 
@@ -36,8 +36,8 @@ Result<void> MissionService::create(const Mission& mission) {
   prepare(mission.id);
   state_->deps.events.add("info", "mission.started", mission.name + " started", mission.id);
   if (const auto flight = state_->find(mission.id)) {
-    const std::scoped_lock lock(flight->work_mutex);
-    state_->deps.hub.publish(Topic::mission_state, mission_state_json(mission, flight->live.state()),
+    const auto work = flight->work.lock();
+    state_->deps.hub.publish(Topic::mission_state, mission_state_json(mission, work->live.state()),
                              mission.created.us(), to_string(mission.id));
   }
   return boost::outcome_v2::success();
@@ -47,14 +47,14 @@ Result<Mission> MissionService::finish(const MissionId& id) {
   BOOST_OUTCOME_TRY(const auto current, state_->deps.missions.finish(id, state_->deps.clock.now()));
   ++state_->finished;
   {
-    const std::scoped_lock lock(state_->mutex);
-    state_->cache[id] = current;
+    auto known = state_->known.lock();
+    known->cache[id] = current;
   }
   if (const auto flight = state_->find(id)) {
     {
-      const std::scoped_lock lock(flight->queue_mutex);
-      flight->mission = current;
-      flight->closing = true;
+      auto inbox = flight->inbox.lock();
+      inbox->mission = current;
+      inbox->closing = true;
     }
     flight->dirty = true;
     state_->schedule(flight);
@@ -66,10 +66,13 @@ Result<Mission> MissionService::finish(const MissionId& id) {
 
 void MissionService::forget(const MissionId& id) {
   state_->forget_reads(id);
-  const std::scoped_lock lock(state_->mutex);
-  ++state_->forgotten;
-  state_->cache.erase(id);
-  state_->flights.erase(id);
+  std::shared_ptr<Flight> gone;  // ends without the lock
+  {
+    auto known = state_->known.lock();
+    ++known->forgotten;
+    known->cache.erase(id);
+    if (const auto node = known->flights.extract(id)) gone = node.mapped();
+  }
   for (const Topic topic : {Topic::mission_state, Topic::drone_pose, Topic::rtk_status})
     state_->deps.hub.forget(topic, to_string(id));
 }
@@ -79,12 +82,15 @@ void MissionService::prepare(const MissionId& id) {
   const auto record = mission(id);
   if (!record) return;
   auto flight = std::make_shared<Flight>(state_->setup_of(record.value()), state_->deps.live.strand());
-  flight->used = state_->steady_now();
-  // Told before it can be found: rows that come meanwhile wait in the queue.
+  {
+    auto inbox = flight->inbox.lock();
+    inbox->used = state_->steady_now();
+  }
+  // Set before it can be found: rows that come meanwhile wait in the queue.
   flight->rebuilding = true;
   {
-    const std::scoped_lock lock(state_->mutex);
-    if (!state_->flights.emplace(id, flight).second) return;
+    auto known = state_->known.lock();
+    if (!known->flights.emplace(id, flight).second) return;
   }
   state_->begin_rebuild(flight);
   state_->evict();
@@ -106,13 +112,14 @@ void MissionService::exclusions_changed(const MissionId& id) {
   // Rows that come from here on wait in the queue until what is stored is in.
   flight->rebuilding = true;
   {
-    const std::scoped_lock lock(flight->queue_mutex);
-    flight->ahead.forget();
+    auto inbox = flight->inbox.lock();
+    inbox->ahead.forget();
   }
   {
-    const std::scoped_lock lock(flight->work_mutex);
-    flight->live.begin_anew(state_->exclusions_of(id));
-    flight->rebuilt.clear();
+    auto exclusions = state_->exclusions_of(id);
+    auto work = flight->work.lock();
+    work->live.begin_anew(std::move(exclusions));
+    work->rebuilt.clear();
   }
   state_->begin_rebuild(flight);
 }
@@ -123,10 +130,10 @@ void MissionService::note_in_flights(const std::string& code, const std::string&
   state_->forget_reads(std::nullopt);  // the models that judged their ranges may be others now
   std::vector<MissionId> recording;
   {
-    const std::scoped_lock lock(state_->mutex);
-    for (const auto& [id, flight] : state_->flights) {
-      const std::scoped_lock queue(flight->queue_mutex);
-      if (flight->mission.state == MissionState::recording) recording.push_back(id);
+    const auto known = state_->known.lock();
+    for (const auto& [id, flight] : known->flights) {
+      const auto inbox = flight->inbox.lock();
+      if (inbox->mission.state == MissionState::recording) recording.push_back(id);
     }
   }
   for (const auto& id : recording) state_->deps.events.add("info", code, text, id);
@@ -153,11 +160,11 @@ std::vector<MissionService::LiveView> MissionService::live(const std::optional<M
   std::vector<LiveView> out;
   for (const auto& flight : wanted) {
     if (id) {
-      const std::scoped_lock lock(flight->queue_mutex);
-      flight->used = state_->steady_now();
+      auto inbox = flight->inbox.lock();
+      inbox->used = state_->steady_now();
     }
-    const std::scoped_lock lock(flight->work_mutex);
-    out.push_back(state_->view(*flight));
+    const auto work = flight->work.lock();
+    out.push_back(state_->view(*flight, *work));
   }
   return out;
 }
@@ -165,40 +172,29 @@ std::vector<MissionService::LiveView> MissionService::live(const std::optional<M
 std::optional<MissionService::LiveView> MissionService::live_at_hand(const MissionId& id) {
   const auto flight = state_->find(id);
   if (!flight) return std::nullopt;
-  if (const std::unique_lock lock(flight->work_mutex, std::try_to_lock); lock) return state_->view(*flight);
-  const std::scoped_lock lock(flight->queue_mutex);
-  flight->view_wanted = true;
+  if (const auto work = flight->work.try_lock()) return state_->view(*flight, *work);
+  auto inbox = flight->inbox.lock();
+  inbox->view_wanted = true;
   // One that was made for an earlier question and never fetched is none.
-  auto made = std::exchange(flight->view, std::nullopt);
-  return made && seconds_between(flight->view_made, state_->steady_now()) < k_view_s ? std::move(made)
-                                                                                     : std::nullopt;
+  auto made = std::exchange(inbox->view, std::nullopt);
+  return made && seconds_between(inbox->view_made, state_->steady_now()) < k_view_s ? std::move(made)
+                                                                                    : std::nullopt;
 }
 
-MissionService::LiveView MissionService::State::view(Flight& flight) const {
-  LiveView out;
-  {
-    const std::scoped_lock lock(flight.queue_mutex);
-    out.mission = flight.mission;
-  }
-  out.origin = flight.live.origin();
-  out.estimates = flight.live.estimates();
-  return out;
+MissionService::LiveView MissionService::State::view(Flight& flight, const Flight::Work& work) const {
+  return {mission_of(flight), work.live.origin(), work.live.estimates()};
 }
 
 void MissionService::tick() {
   for (const auto& flight : state_->all()) {
     state_->start_joint(flight);
     if (!flight->dirty) continue;
-    const std::unique_lock lock(flight->work_mutex, std::try_to_lock);
-    if (!lock) continue;  // at work: the next tick tells
+    const auto work = flight->work.try_lock();
+    if (!work) continue;  // at work: the next tick reports
     flight->dirty = false;
-    Mission mission;
-    {
-      const std::scoped_lock queue(flight->queue_mutex);
-      mission = flight->mission;
-    }
-    state_->deps.hub.publish(Topic::mission_state, mission_state_json(mission, flight->live.state()),
-                             flight->live.state().time.us(), to_string(mission.id));
+    state_->deps.hub.publish(Topic::mission_state,
+                             mission_state_json(State::mission_of(*flight), work->live.state()),
+                             work->live.state().time.us(), to_string(flight->id));
   }
   if (++state_->ticks % 2 == 0) state_->publish_devices();
   state_->evict();
@@ -212,16 +208,16 @@ std::vector<FlightPulse> MissionService::pulses() {
   std::vector<FlightPulse> out;
   for (const auto& flight : state_->all()) {
     if (flight->rebuilding) continue;
-    const std::unique_lock work(flight->work_mutex, std::try_to_lock);
+    auto work = flight->work.try_lock();
     if (!work) continue;  // at work: rows come, nothing is silent
-    const std::scoped_lock lock(flight->queue_mutex);
-    if (flight->mission.state != MissionState::recording) continue;
-    FlightPulse pulse = flight->live.watch().look(flight->live.state().time, steady);
+    const auto inbox = flight->inbox.lock();
+    if (inbox->mission.state != MissionState::recording) continue;
+    FlightPulse pulse = work->live.watch().look(work->live.state().time, steady);
     pulse.mission = flight->id;
-    pulse.name = flight->mission.name;
+    pulse.name = inbox->mission.name;
     pulse.now = now;
-    pulse.fix_arrival = flight->fix_arrival;
-    pulse.range_arrival = flight->range_arrival;
+    pulse.fix_arrival = inbox->fix_arrival;
+    pulse.range_arrival = inbox->range_arrival;
     out.push_back(std::move(pulse));
   }
   return out;
@@ -230,27 +226,26 @@ std::vector<FlightPulse> MissionService::pulses() {
 std::size_t MissionService::queued() const { return state_->queued; }
 
 std::size_t MissionService::followed() const {
-  const std::scoped_lock lock(state_->mutex);
-  return state_->flights.size();
+  const auto known = state_->known.lock();
+  return known->flights.size();
 }
 
 std::uint64_t MissionService::evicted() const { return state_->evicted; }
 
 bool MissionService::recording() const {
   const SteadyTime now = state_->steady_now();
-  const std::scoped_lock lock(state_->mutex);
-  return std::any_of(state_->flights.begin(), state_->flights.end(), [&](const auto& entry) {
-    const std::scoped_lock queue(entry.second->queue_mutex);
-    return entry.second->mission.state == MissionState::recording &&
-           seconds_between(entry.second->last_arrival, now) < 5;
+  const auto known = state_->known.lock();
+  return std::any_of(known->flights.begin(), known->flights.end(), [&](const auto& entry) {
+    const auto inbox = entry.second->inbox.lock();
+    return inbox->mission.state == MissionState::recording && seconds_between(inbox->last_arrival, now) < 5;
   });
 }
 
 void MissionService::stop() {
   state_->stopped = true;
-  std::unique_lock lock(state_->running_mutex);
-  // Tasks the pool never ran (it was stopped first) must not hold the shutdown up for ever.
-  state_->idle.wait_for(lock, std::chrono::seconds(5), [&] { return state_->running == 0; });
+  auto running = state_->running.lock();
+  // Tasks that nobody ever ran must not hold the shutdown up for ever.
+  running.wait_for(state_->idle, std::chrono::seconds(5), [](int n) { return n == 0; });
 }
 
 }  // namespace anchord::api

@@ -11,6 +11,7 @@
 #include "api/missions/mission_service.hpp"
 #include "api/missions/radio_watch.hpp"
 #include "api/wire/live_writer.hpp"
+#include "core/base/locked.hpp"
 #include "core/flight/live_mission.hpp"
 #include "core/ports/anchor_store.hpp"
 #include "core/ports/exclusion_store.hpp"
@@ -21,49 +22,59 @@
 
 namespace anchord::api {
 
-/// One followed mission. `queue_mutex` guards what requests touch, `work_mutex` is the strand of the rest.
+/// One followed mission: what requests leave for it, and what its strand works on. Where both are taken, the
+/// work is taken first.
 struct MissionService::Flight {
   Flight(flight::LiveMissionSetup setup, std::unique_ptr<Executor> on)
       : id(setup.mission.id),
         frame(setup.mission.frame),
         strand(std::move(on)),
-        mission(setup.mission),
-        live(std::move(setup)) {}
+        inbox(std::in_place, setup.mission),
+        work(std::in_place, std::move(setup)) {}
   const MissionId id;
   const TrackFrame frame;
   const std::unique_ptr<Executor> strand;
-  std::mutex queue_mutex;
-  Mission mission;  ///< under queue_mutex
-  std::deque<flight::LiveRow> queue;
-  flight::RowsAhead ahead{k_max_queued_rows};
-  std::optional<procedure::FlightClues> new_clues;
-  bool view_wanted{false};  ///< by one who does not wait: made as soon as the strand is at rest
-  std::optional<LiveView> view;
-  SteadyTime view_made{};
-  bool scheduled{false};
-  bool closing{false};  ///< finished, and what waits for a fix is not told yet
-  std::uint64_t dropped{0};
-  SteadyTime last_arrival{};
-  SteadyTime used{};  ///< last by a sender or a reader
-  bool gone{
-      false};  ///< evicted: rows that found it before are in the store, where the next flight reads them
-  std::optional<SteadyTime> fix_arrival{}, range_arrival{};
-  std::mutex work_mutex;  ///< the strand: everything below
-  flight::LiveMission live;
-  std::atomic<bool> dirty{true};
-  std::chrono::steady_clock::time_point joint_not_before{};
-  bool joint_running{false};
 
-  std::atomic<bool> rebuilding{false};  ///< rows wait in the queue until what was stored is in
+  struct Inbox {
+    explicit Inbox(Mission m) : mission(std::move(m)) {}
+    Mission mission;
+    std::deque<flight::LiveRow> queue;
+    flight::RowsAhead ahead{k_max_queued_rows};
+    std::optional<procedure::FlightClues> new_clues;
+    bool view_wanted{false};  ///< by one who does not wait: made as soon as the strand is at rest
+    std::optional<LiveView> view;
+    SteadyTime view_made{};
+    bool scheduled{false};
+    bool closing{false};  ///< finished, and what waits for a fix is not reported yet
+    std::uint64_t dropped{0};
+    SteadyTime last_arrival{};
+    SteadyTime used{};  ///< last by a sender or a reader
+    /// Evicted: rows that found it before are in the store, where the next flight reads them.
+    bool gone{false};
+    std::optional<SteadyTime> fix_arrival{}, range_arrival{};
+    /// Something is still to be done, rows that are read back apart.
+    bool busy() const { return scheduled || closing || new_clues || !queue.empty(); }
+  };
+  Locked<Inbox> inbox;
+
   struct Rebuild {
     MeasurementStore::Filter range_filter{}, fix_filter{};
     std::deque<Range> ranges;
     std::deque<Fix> fixes;
     bool more_ranges{true}, more_fixes{true};
   };
-  std::unique_ptr<Rebuild> rebuild;
-  bool busy() const;
-  std::vector<std::size_t> rebuilt;  ///< identities, sorted at the end, until the queue was worked off once
+  struct Work {
+    explicit Work(flight::LiveMissionSetup setup) : live(std::move(setup)) {}
+    flight::LiveMission live;
+    std::chrono::steady_clock::time_point joint_not_before{};
+    bool joint_running{false};
+    std::unique_ptr<Rebuild> rebuild;
+    /// Identities, sorted at the end, until the queue was worked off once.
+    std::vector<std::size_t> rebuilt;
+  };
+  Locked<Work> work;
+  std::atomic<bool> dirty{true};
+  std::atomic<bool> rebuilding{false};  ///< rows wait in the queue until what was stored is in
 };
 
 /// What the service is inside: the shell round one flight::LiveMission for each mission. Its parts are in
@@ -73,18 +84,19 @@ struct MissionService::Flight {
 struct MissionService::State : std::enable_shared_from_this<MissionService::State> {
   explicit State(Deps d) : deps(std::move(d)) {}
   Deps deps;
-  std::mutex mutex;
-  std::map<MissionId, Mission> cache;
-  std::uint64_t forgotten{0};  ///< missions that left: what was read before is not cached after
-  std::map<MissionId, std::shared_ptr<Flight>> flights;
+  struct Known {
+    std::map<MissionId, Mission> cache;
+    std::uint64_t forgotten{0};  ///< missions that left: what was read before is not cached after
+    std::map<MissionId, std::shared_ptr<Flight>> flights;
+  };
+  Locked<Known> known;  ///< taken before the inbox of one of its flights
   RadioWatch radios;
   std::atomic<std::size_t> queued{0};
   std::atomic<bool> stopped{false};
   std::atomic<std::uint64_t> finished{0};
   std::atomic<MissionObserver*> observer{nullptr};
-  std::mutex running_mutex;
   std::condition_variable idle;
-  int running{0};
+  Locked<int> running{0};  ///< tasks
   std::int64_t ticks{0};
   std::atomic<std::uint64_t> evicted{0};
   std::atomic<bool> joint_busy{false};  ///< one joint solution at a time, of whichever mission
@@ -94,21 +106,20 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
     SteadyTime made{};
     LiveView view;
   };
-  std::mutex reading_mutex;  ///< one flight is read at a time: each takes the memory of a live one
-  std::mutex reads_mutex;
-  std::deque<Read> reads;  ///< newest last
+  std::mutex reading_mutex;        ///< one flight is read at a time: each takes the memory of a live one
+  Locked<std::deque<Read>> reads;  ///< newest last
 
   SteadyTime steady_now() const { return deps.steady.now(); }
   std::vector<std::shared_ptr<Flight>> all() {
     std::vector<std::shared_ptr<Flight>> out;
-    const std::scoped_lock lock(mutex);
-    for (const auto& [id, flight] : flights) out.push_back(flight);
+    const auto all = known.lock();
+    for (const auto& [id, flight] : all->flights) out.push_back(flight);
     return out;
   }
   std::shared_ptr<Flight> find(const MissionId& id) {
-    const std::scoped_lock lock(mutex);
-    const auto it = flights.find(id);
-    return it == flights.end() ? nullptr : it->second;
+    const auto all = known.lock();
+    const auto it = all->flights.find(id);
+    return it == all->flights.end() ? nullptr : it->second;
   }
 
   // Of Range and of Fix:
@@ -126,9 +137,11 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   static flight::LiveRow row_of(Fix fix) { return fix; }
   void schedule(const std::shared_ptr<Flight>& flight);
   void work(Flight& flight);
+  static std::deque<flight::LiveRow> take_rows(Flight& flight, std::uint64_t& dropped);
+  void make_view(Flight& flight, const Flight::Work& work) const;
   void note_radios(const flight::LiveRow& row);
-  /// What the live mission tells, to the world: hub, event log, store, pilot. Under its work_mutex.
-  void tell_events(Flight& flight);
+  /// What the live mission reports, to the world: hub, event log, store, pilot.
+  void tell_events(Flight& flight, Flight::Work& work);
   void tell(Flight& flight, const flight::FixBelieved& event);
   void tell(Flight& flight, const flight::FixShown& event);
   void tell(Flight& flight, const flight::PoseMoved& event);
@@ -148,7 +161,8 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   std::optional<LiveView> read(const MissionId& id);
   std::optional<LiveView> read_before(const Read& now);
   void forget_reads(const std::optional<MissionId>& id);
-  static flight::LiveMission::JointProblem joint_problem(Flight& flight, const std::string& outline);
+  static flight::LiveMission::JointProblem joint_problem(flight::LiveMission& live,
+                                                         const std::string& outline);
   std::string outline_of(const Mission& mission) const;
   /// Counted, so that stop() can wait for it.
   void post(Executor& on, std::function<void()> task);
@@ -159,8 +173,12 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   void finish_joint(Flight& flight, const FlightSolution* solution, UtcTime cut,
                     std::chrono::steady_clock::duration took, std::uint64_t generation);
   void publish_devices();
-  static void take_clues(Flight& flight);
-  LiveView view(Flight& flight) const;  ///< under its work_mutex
+  static void take_clues(Flight& flight, Flight::Work& work);
+  LiveView view(Flight& flight, const Flight::Work& work) const;
+  static Mission mission_of(Flight& flight) {
+    const auto inbox = flight.inbox.lock();
+    return inbox->mission;
+  }
 };
 
 }  // namespace anchord::api

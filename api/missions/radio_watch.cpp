@@ -5,8 +5,8 @@
 namespace anchord::api {
 
 void RadioWatch::heard(NetworkId id, bool tag, UtcTime measured, SteadyTime now) {
-  const std::scoped_lock lock(mutex_);
-  auto& radio = radios_[id];
+  auto radios = radios_.lock();
+  auto& radio = (*radios)[id];
   const double step_s = seconds_between(radio.last_seen, measured);
   if (radio.last_seen.ns != 0 && step_s > 0 && step_s < 10)
     radio.interval_s = radio.interval_s == 0 ? step_s : 0.9 * radio.interval_s + 0.1 * step_s;
@@ -17,8 +17,8 @@ void RadioWatch::heard(NetworkId id, bool tag, UtcTime measured, SteadyTime now)
 
 std::string RadioWatch::rows_json(SteadyTime now) const {
   std::string json;
-  const std::scoped_lock lock(mutex_);
-  for (const auto& [id, radio] : radios_) {
+  const auto radios = radios_.lock();
+  for (const auto& [id, radio] : *radios) {
     const double silent_s = seconds_between(radio.last_arrival, now);
     const char* state = silent_s < 2 ? "live" : silent_s < 5 ? "late" : "lost";
     char rate[32];

@@ -1,10 +1,10 @@
 #pragma once
 
 #include <map>
-#include <mutex>
 #include <string>
 
 #include "core/base/ids.hpp"
+#include "core/base/locked.hpp"
 #include "core/base/steady.hpp"
 #include "core/base/time.hpp"
 
@@ -25,8 +25,7 @@ class RadioWatch {
     SteadyTime last_arrival{};
     double interval_s{0};  ///< smoothed
   };
-  mutable std::mutex mutex_;
-  std::map<NetworkId, Radio> radios_;
+  Locked<std::map<NetworkId, Radio>> radios_;
 };
 
 }  // namespace anchord::api

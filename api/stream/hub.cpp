@@ -62,27 +62,28 @@ Hub::Hub(const Clock& clock, std::string server_name)
 void Hub::publish(Topic topic, std::string json, std::int64_t t_us, std::string key,
                   std::optional<NetworkId> anchor) {
   LiveElement element{std::move(key), anchor, std::make_shared<const std::string>(std::move(json))};
-  const std::scoped_lock lock(mutex_);
-  send(topic, {std::move(element)}, t_us);
+  auto bus = bus_.lock();
+  send(*bus, topic, {std::move(element)}, t_us);
 }
 
 void Hub::collect(Topic topic, std::string json, std::int64_t t_us, std::optional<NetworkId> anchor) {
-  const std::scoped_lock lock(mutex_);
-  auto& channel = channels_[static_cast<std::size_t>(topic)];
-  channel.collected.push_back({{}, anchor, std::make_shared<const std::string>(std::move(json))});
+  LiveElement element{{}, anchor, std::make_shared<const std::string>(std::move(json))};
+  auto bus = bus_.lock();
+  auto& channel = bus->of(topic);
+  channel.collected.push_back(std::move(element));
   channel.collected_t_us = t_us;
   // A bulk import makes thousands between two ticks: frames stay of a size a browser takes in one go.
-  if (channel.collected.size() >= 200) send(topic, std::exchange(channel.collected, {}), t_us);
+  if (channel.collected.size() >= 200) send(*bus, topic, std::exchange(channel.collected, {}), t_us);
 }
 
 void Hub::forget(Topic topic, const std::string& key) {
-  const std::scoped_lock lock(mutex_);
-  channels_[static_cast<std::size_t>(topic)].newest.erase(key);
+  auto bus = bus_.lock();
+  bus->of(topic).newest.erase(key);
 }
 
-void Hub::send(Topic topic, std::vector<LiveElement> elements, std::int64_t t_us) {
+void Hub::send(Bus& bus, Topic topic, std::vector<LiveElement> elements, std::int64_t t_us) {
   const auto& about = info(topic);
-  auto& channel = channels_[static_cast<std::size_t>(topic)];
+  auto& channel = bus.of(topic);
   auto message = std::make_shared<LiveMessage>();
   message->seq = ++channel.seq;
   message->t_us = t_us;
@@ -144,22 +145,23 @@ void HubMembership::unsubscribe(Topic topic) {
 }
 
 HubMembership Hub::join(HubListener& listener) {
-  const std::scoped_lock lock(mutex_);
-  ANCHORD_CHECK(connections_.insert(&listener).second, "a listener joins the hub twice");
-  if (closed_) listener.on_bye(k_bye_code, k_bye_reason);  // came between shut_down() and the closing door
+  auto bus = bus_.lock();
+  ANCHORD_CHECK(bus->connections.insert(&listener).second, "a listener joins the hub twice");
+  if (bus->closed)
+    listener.on_bye(k_bye_code, k_bye_reason);  // came between shut_down() and the closing door
   return {*this, listener};
 }
 
 void Hub::leave(HubListener& listener) {
-  const std::scoped_lock lock(mutex_);
-  connections_.erase(&listener);
-  for (auto& channel : channels_) channel.listeners.erase(&listener);
+  auto bus = bus_.lock();
+  bus->connections.erase(&listener);
+  for (auto& channel : bus->channels) channel.listeners.erase(&listener);
 }
 
 Resumed Hub::subscribe(HubListener& listener, Topic topic,
                        const std::optional<std::pair<std::string, std::uint64_t>>& since) {
-  const std::scoped_lock lock(mutex_);
-  auto& channel = channels_[static_cast<std::size_t>(topic)];
+  auto bus = bus_.lock();
+  auto& channel = bus->of(topic);
   ++channel.listeners[&listener];
   Resumed out;
   out.last_seq = channel.seq;
@@ -192,37 +194,37 @@ Resumed Hub::subscribe(HubListener& listener, Topic topic,
 }
 
 void Hub::unsubscribe(HubListener& listener, Topic topic) {
-  const std::scoped_lock lock(mutex_);
-  auto& listeners = channels_[static_cast<std::size_t>(topic)].listeners;
+  auto bus = bus_.lock();
+  auto& listeners = bus->of(topic).listeners;
   const auto it = listeners.find(&listener);
   if (it != listeners.end() && --it->second == 0) listeners.erase(it);
 }
 
 void Hub::tick() {
-  const std::scoped_lock lock(mutex_);
+  auto bus = bus_.lock();
   const UtcTime now = clock_.now();
   for (const auto& topic : topics()) {
-    auto& channel = channels_[static_cast<std::size_t>(topic.topic)];
+    auto& channel = bus->of(topic.topic);
     if (!channel.collected.empty())
-      send(topic.topic, std::exchange(channel.collected, {}), channel.collected_t_us);
+      send(*bus, topic.topic, std::exchange(channel.collected, {}), channel.collected_t_us);
     if (topic.cls == TopicClass::stream) trim(topic, channel);
   }
   // A clock that was set back must not silence the heartbeat.
-  const std::int64_t since_us = now.us() - last_heartbeat_us_;
+  const std::int64_t since_us = now.us() - bus->last_heartbeat_us;
   const bool heartbeat = since_us >= 1'000'000 || since_us < 0;
-  if (heartbeat) last_heartbeat_us_ = now.us();
-  for (auto* listener : connections_) listener->on_tick(now, heartbeat);
+  if (heartbeat) bus->last_heartbeat_us = now.us();
+  for (auto* listener : bus->connections) listener->on_tick(now, heartbeat);
 }
 
 void Hub::shut_down() {
-  const std::scoped_lock lock(mutex_);
-  closed_ = true;
-  for (auto* listener : connections_) listener->on_bye(k_bye_code, k_bye_reason);
+  auto bus = bus_.lock();
+  bus->closed = true;
+  for (auto* listener : bus->connections) listener->on_bye(k_bye_code, k_bye_reason);
 }
 
 std::size_t Hub::clients() const {
-  const std::scoped_lock lock(mutex_);
-  return connections_.size();
+  const auto bus = bus_.lock();
+  return bus->connections.size();
 }
 
 }  // namespace anchord::api

@@ -6,7 +6,6 @@
 #include <deque>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
@@ -14,6 +13,7 @@
 #include <vector>
 
 #include "core/base/ids.hpp"
+#include "core/base/locked.hpp"
 #include "core/base/time.hpp"
 
 namespace anchord::api {
@@ -160,7 +160,6 @@ class Hub {
   Resumed subscribe(HubListener& listener, Topic topic,
                     const std::optional<std::pair<std::string, std::uint64_t>>& since);
   void unsubscribe(HubListener& listener, Topic topic);
-  void send(Topic topic, std::vector<LiveElement> elements, std::int64_t t_us);
   struct Channel {
     std::uint64_t seq{0};
     std::deque<std::shared_ptr<const LiveMessage>> history;
@@ -171,15 +170,19 @@ class Hub {
     std::int64_t collected_t_us{0};
     std::map<HubListener*, std::size_t> listeners;  ///< with the number of their subscriptions
   };
-  void trim(const TopicInfo& topic, Channel& channel);
+  struct Bus {
+    Channel& of(Topic topic) { return channels[static_cast<std::size_t>(topic)]; }
+    std::array<Channel, k_topic_count> channels{};
+    std::set<HubListener*> connections{};
+    std::int64_t last_heartbeat_us{0};
+    bool closed{false};
+  };
+  void send(Bus& bus, Topic topic, std::vector<LiveElement> elements, std::int64_t t_us);
+  static void trim(const TopicInfo& topic, Channel& channel);
 
   const Clock& clock_;
   std::string server_name_, epoch_;
-  mutable std::mutex mutex_;
-  std::array<Channel, k_topic_count> channels_;
-  std::set<HubListener*> connections_;
-  std::int64_t last_heartbeat_us_{0};
-  bool closed_{false};
+  Locked<Bus> bus_;
   HubCounters counters_;
 };
 

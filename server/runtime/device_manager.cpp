@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "core/base/guard.hpp"
+#include "core/base/locked.hpp"
 #include "core/base/retry.hpp"
 #include "core/base/text.hpp"
 #include "drivers/device/device_loop.hpp"
@@ -96,28 +97,24 @@ class DeviceManager::Impl final : public device::DeviceListener {
       config.id = make_uuid_v7(SystemClock{}.now());
       devices.push_back({std::move(config), {}, {}});
     }
-    const std::scoped_lock lock(mutex_);
     for (auto& device : devices) {
       if (!DeviceSecrets::drop_password_file(device.config) || !device.problem.empty()) continue;
       device.problem =
           "password_file is not read any more, since it could be set over REST; send the password itself "
           "(options.password, or anchord devices settings DEVICE password_file=FILE)";
     }
-    spoilt_ = !kept.problem.empty() ||
-              std::any_of(devices.begin(), devices.end(), [](const auto& d) { return !d.problem.empty(); });
-    file_problem_ = std::move(kept.problem);
-    kept_ = std::move(devices);
+    auto now = kept_.lock();
+    now->spoilt = !kept.problem.empty() || std::any_of(devices.begin(), devices.end(),
+                                                       [](const auto& d) { return !d.problem.empty(); });
+    now->file_problem = std::move(kept.problem);
+    now->devices = std::move(devices);
     return boost::outcome_v2::success();
   }
 
   void start(DeviceRows& rows) {
     rows_ = &rows;
     writer_ = Thread("anchord-store", [this] { write_rows(); });
-    std::vector<KeptDevice> devices;
-    {
-      const std::scoped_lock lock(mutex_);
-      devices = kept_;
-    }
+    auto devices = kept_devices();
     // A device that cannot be started is one device less, never a server less.
     for (auto& device : devices) {
       if (device.problem.empty() && device.config.enabled) {
@@ -130,22 +127,26 @@ class DeviceManager::Impl final : public device::DeviceListener {
   }
 
   void set_problem(const Uuid& id, const std::string& problem) {
-    const std::scoped_lock lock(mutex_);
-    for (auto& device : kept_) {
+    auto kept = kept_.lock();
+    for (auto& device : kept->devices) {
       if (device.config.id == id) device.problem = problem;
     }
+  }
+  std::vector<KeptDevice> kept_devices() {
+    const auto kept = kept_.lock();
+    return kept->devices;
   }
 
   /// What is kept and does not run, with what to do; empty: nothing.
   std::string not_started() {
-    const std::scoped_lock lock(mutex_);
-    if (!file_problem_.empty()) {
-      return "the devices that are kept cannot be read: " + file_problem_ +
+    const auto kept = kept_.lock();
+    if (!kept->file_problem.empty()) {
+      return "the devices that are kept cannot be read: " + kept->file_problem +
              "; repair the file and start the server again, or set the devices up anew "
              "(a copy of the file is kept then)";
     }
     std::string out;
-    for (const auto& [config, problem, entry] : kept_) {
+    for (const auto& [config, problem, entry] : kept->devices) {
       if (problem.empty()) continue;
       out += (out.empty() ? "not started: device \"" : "; device \"") + config.name + "\" (" + problem + ')';
     }
@@ -155,29 +156,29 @@ class DeviceManager::Impl final : public device::DeviceListener {
   /// The file as the devices are now; what could not be read in the old one is kept beside it. What is
   /// written last is the newest, whoever changed what.
   Result<void> save() {
-    const std::scoped_lock one_at_a_time(save_mutex_);
+    const std::scoped_lock one_at_a_time(saving_);
     std::vector<KeptDevice> all;
     bool spoilt = false;
     {
-      const std::scoped_lock lock(mutex_);
-      all = kept_;
-      spoilt = spoilt_;
+      const auto kept = kept_.lock();
+      all = kept->devices;
+      spoilt = kept->spoilt;
     }
     if (spoilt) {
       BOOST_OUTCOME_TRYV(keep_unreadable(file()));
     }
     BOOST_OUTCOME_TRYV(write_devices(file(), all));
-    const std::scoped_lock lock(mutex_);
-    spoilt_ = false;
-    file_problem_.clear();
+    auto kept = kept_.lock();
+    kept->spoilt = false;
+    kept->file_problem.clear();
     return boost::outcome_v2::success();
   }
 
   void stop() {
     {
       // Held until the thread is gone: whoever asks meanwhile waits, and then finds no loop.
-      const std::scoped_lock lock(post_mutex_);
-      if (std::exchange(stopped_, true)) return;
+      auto stopped = stopped_.lock();
+      if (std::exchange(*stopped, true)) return;
       // The last task: what was posted before it runs before it, and nothing comes after.
       boost::asio::post(io_, [this] {
         loop_.reset();
@@ -189,9 +190,8 @@ class DeviceManager::Impl final : public device::DeviceListener {
     }
     unstored_.stop();
     if (writer_.joinable()) writer_.join();
-    const std::scoped_lock lock(answers_mutex_);
-    for (auto& [id, promise] : answers_) promise.set_value(make_error(Errc::canceled, "the server stops"));
-    answers_.clear();
+    for (auto& [id, promise] : answers_.exchange({}).waiting)
+      promise.set_value(make_error(Errc::canceled, "the server stops"));
   }
 
   /// Runs a function on the io thread and gives back what it says.
@@ -201,8 +201,8 @@ class DeviceManager::Impl final : public device::DeviceListener {
     auto result = task.get_future();
     bool alone = false;
     {
-      const std::scoped_lock lock(post_mutex_);
-      alone = stopped_;
+      const auto stopped = stopped_.lock();
+      alone = *stopped;
       if (!alone) boost::asio::post(io_, [&task] { task(); });
     }
     if (alone) task();  // the io thread is gone, and with it the loop
@@ -224,11 +224,11 @@ class DeviceManager::Impl final : public device::DeviceListener {
     if (auto& told = told_[id]; std::exchange(told, text) != text) note(text);
   }
   void answer(const std::string&, std::uint64_t command, const Result<std::string>& json) override {
-    const std::scoped_lock lock(answers_mutex_);
-    const auto found = answers_.find(command);
-    if (found == answers_.end()) return;  // nobody waits any more
+    auto answers = answers_.lock();
+    const auto found = answers->waiting.find(command);
+    if (found == answers->waiting.end()) return;  // nobody waits any more
     found->second.set_value(json);
-    answers_.erase(found);
+    answers->waiting.erase(found);
   }
 
   Result<void> begin(const DeviceConfig& config) {
@@ -249,9 +249,11 @@ class DeviceManager::Impl final : public device::DeviceListener {
       recorder_ = std::move(made).value();
       loop_->record_to(recorder_.get());
     } else {
-      const std::scoped_lock lock(mutex_);
-      recorder_failure_ = made.error().message;
-      note("raw bytes are not recorded: " + recorder_failure_);
+      {
+        auto kept = kept_.lock();
+        kept->recorder_failure = made.error().message;
+      }
+      note("raw bytes are not recorded: " + made.error().message);
     }
   }
 
@@ -310,20 +312,23 @@ class DeviceManager::Impl final : public device::DeviceListener {
   RowQueue unstored_{k_max_waiting_rows, k_store_batch};
   DeviceRows* rows_{nullptr};
 
-  std::mutex save_mutex_;  ///< taken before mutex_
-  std::mutex mutex_;       ///< the next six
-  std::vector<DiscoveredDevice> discovered_;
-  std::vector<KeptDevice> kept_;
-  std::string file_problem_;
-  bool spoilt_{false};  ///< the file holds what could not be read: it is copied before it is replaced
-  std::optional<MissionId> mission_;
-  std::string recorder_failure_;
+  struct Kept {
+    std::vector<KeptDevice> devices{};
+    std::vector<DiscoveredDevice> discovered{};
+    std::string file_problem{};
+    bool spoilt{false};  ///< the file holds what could not be read: it is copied before it is replaced
+    std::optional<MissionId> mission{};
+    std::string recorder_failure{};
+  };
+  std::mutex saving_;  ///< one write of the file at a time
+  Locked<Kept> kept_;
 
-  std::mutex answers_mutex_;
-  std::map<std::uint64_t, std::promise<Result<std::string>>> answers_;
-  std::uint64_t next_command_{1};
-  std::mutex post_mutex_;
-  bool stopped_{false};
+  struct Answers {
+    std::map<std::uint64_t, std::promise<Result<std::string>>> waiting{};
+    std::uint64_t next_command{1};
+  };
+  Locked<Answers> answers_;
+  Locked<bool> stopped_{false};
 };
 
 DeviceManager::DeviceManager(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -339,11 +344,7 @@ void DeviceManager::start(DeviceRows& rows) { impl_->start(rows); }
 void DeviceManager::stop() { impl_->stop(); }
 
 std::vector<DeviceReport> DeviceManager::devices() {
-  std::vector<KeptDevice> kept;
-  {
-    const std::scoped_lock lock(impl_->mutex_);
-    kept = impl_->kept_;
-  }
+  const auto kept = impl_->kept_devices();
   if (kept.empty()) return {};
   const auto states = impl_->on_io(
       [&] { return impl_->loop_ ? impl_->loop_->devices() : std::vector<device::DeviceState>{}; });
@@ -378,19 +379,21 @@ Result<DeviceReport> DeviceManager::add(DeviceConfig config) {
   BOOST_OUTCOME_TRY(const auto secret, DeviceSecrets::split(std::move(config), nullptr));
   config = secret.config;
   BOOST_OUTCOME_TRYV(impl_->secrets_.store(secret));
-  if (config.enabled) {
-    const auto begun = impl_->on_io([&] { return impl_->begin(config); });
-    if (!begun) {
-      impl_->secrets_.forget(config.id);
-      return begun.error();
-    }
-  }
   {
-    const std::scoped_lock lock(impl_->mutex_);
-    impl_->kept_.push_back({config, {}, {}});
+    auto kept = impl_->kept_.lock();
+    kept->devices.push_back({config, {}, {}});
   }
-  BOOST_OUTCOME_TRYV(impl_->save());
-  return device(config.id);
+  // Kept first: what runs is there after a restart too.
+  auto done = impl_->save();
+  if (done && config.enabled) done = impl_->on_io([&] { return impl_->begin(config); });
+  if (done) return device(config.id);
+  {
+    auto kept = impl_->kept_.lock();
+    std::erase_if(kept->devices, [&](const auto& d) { return d.config.id == config.id; });
+  }
+  impl_->secrets_.forget(config.id);
+  (void)impl_->save().has_value();  // what went wrong is told already
+  return done.error();
 }
 
 Result<DeviceReport> DeviceManager::change(DeviceConfig config, std::uint64_t expected_version) {
@@ -398,9 +401,9 @@ Result<DeviceReport> DeviceManager::change(DeviceConfig config, std::uint64_t ex
   DeviceSecrets::Change secret;
   const auto of_id = [id = config.id](const auto& c) { return c.config.id == id; };
   {
-    const std::scoped_lock lock(impl_->mutex_);
-    const auto found = std::find_if(impl_->kept_.begin(), impl_->kept_.end(), of_id);
-    if (found == impl_->kept_.end())
+    auto all = impl_->kept_.lock();
+    const auto found = std::find_if(all->devices.begin(), all->devices.end(), of_id);
+    if (found == all->devices.end())
       return make_error(Errc::not_found, "there is no device " + to_string(config.id));
     if (found->config.version != expected_version)
       return make_error(Errc::conflict, "the device was changed meanwhile");
@@ -430,9 +433,9 @@ Result<DeviceReport> DeviceManager::change(DeviceConfig config, std::uint64_t ex
     });
     if (!changed) {
       if (secret.given) impl_->secrets_.put_back(before.id, password);
-      const std::scoped_lock lock(impl_->mutex_);
-      const auto found = std::find_if(impl_->kept_.begin(), impl_->kept_.end(), of_id);
-      if (found != impl_->kept_.end()) *found = kept;
+      auto all = impl_->kept_.lock();
+      const auto found = std::find_if(all->devices.begin(), all->devices.end(), of_id);
+      if (found != all->devices.end()) *found = kept;
       return changed.error();
     }
   }
@@ -442,14 +445,14 @@ Result<DeviceReport> DeviceManager::change(DeviceConfig config, std::uint64_t ex
 
 Result<void> DeviceManager::remove(const Uuid& id, std::uint64_t expected_version) {
   {
-    const std::scoped_lock lock(impl_->mutex_);
-    const auto found = std::find_if(impl_->kept_.begin(), impl_->kept_.end(),
+    auto kept = impl_->kept_.lock();
+    const auto found = std::find_if(kept->devices.begin(), kept->devices.end(),
                                     [&](const auto& c) { return c.config.id == id; });
-    if (found == impl_->kept_.end())
+    if (found == kept->devices.end())
       return make_error(Errc::not_found, "there is no device " + to_string(id));
     if (found->config.version != expected_version)
       return make_error(Errc::conflict, "the device was changed meanwhile");
-    impl_->kept_.erase(found);
+    kept->devices.erase(found);
   }
   impl_->on_io([&] {
     if (impl_->loop_) (void)impl_->loop_->remove(to_string(id));
@@ -464,13 +467,13 @@ Result<std::string> DeviceManager::act(const Uuid& id, std::string_view action,
   std::future<Result<std::string>> answer;
   std::uint64_t number = 0;
   {
-    const std::scoped_lock lock(impl_->answers_mutex_);
-    number = impl_->next_command_++;
-    answer = impl_->answers_[number].get_future();
+    auto answers = impl_->answers_.lock();
+    number = answers->next_command++;
+    answer = answers->waiting[number].get_future();
   }
   const auto forget = [&] {
-    const std::scoped_lock lock(impl_->answers_mutex_);
-    impl_->answers_.erase(number);
+    auto answers = impl_->answers_.lock();
+    answers->waiting.erase(number);
   };
   const auto begun = impl_->on_io([&]() -> Result<void> {
     if (!impl_->loop_) return make_error(Errc::canceled, "the server stops");
@@ -489,23 +492,20 @@ Result<std::string> DeviceManager::act(const Uuid& id, std::string_view action,
 
 std::vector<DiscoveredDevice> DeviceManager::discover() {
   std::vector<std::string> ours;
-  {
-    const std::scoped_lock lock(impl_->mutex_);
-    for (const auto& c : impl_->kept_) ours.push_back(c.config.address);
-  }
+  for (const auto& kept : impl_->kept_devices()) ours.push_back(kept.config.address);
   std::vector<DiscoveredDevice> out;
   for (auto& found : device::discover(ours)) {
     out.push_back(
         {std::move(found.address), std::move(found.kind), std::move(found.evidence), found.configured});
   }
-  const std::scoped_lock lock(impl_->mutex_);
-  impl_->discovered_ = out;
+  auto kept = impl_->kept_.lock();
+  kept->discovered = out;
   return out;
 }
 
 std::vector<DiscoveredDevice> DeviceManager::discovered() {
-  const std::scoped_lock lock(impl_->mutex_);
-  return impl_->discovered_;
+  const auto kept = impl_->kept_.lock();
+  return kept->discovered;
 }
 
 DeviceClock DeviceManager::clock() {
@@ -516,8 +516,8 @@ DeviceClock DeviceManager::clock() {
 
 void DeviceManager::record_into(const std::optional<MissionId>& mission) {
   {
-    const std::scoped_lock lock(impl_->mutex_);
-    impl_->mission_ = mission;
+    auto kept = impl_->kept_.lock();
+    kept->mission = mission;
   }
   impl_->on_io([&] {
     if (impl_->loop_) impl_->loop_->record_into(mission);
@@ -526,14 +526,14 @@ void DeviceManager::record_into(const std::optional<MissionId>& mission) {
 }
 
 std::optional<MissionId> DeviceManager::recording_into() {
-  const std::scoped_lock lock(impl_->mutex_);
-  return impl_->mission_;
+  const auto kept = impl_->kept_.lock();
+  return kept->mission;
 }
 
 std::string DeviceManager::recorder_failure() {
   {
-    const std::scoped_lock lock(impl_->mutex_);
-    if (!impl_->recorder_failure_.empty()) return impl_->recorder_failure_;
+    const auto kept = impl_->kept_.lock();
+    if (!kept->recorder_failure.empty()) return kept->recorder_failure;
   }
   return impl_->on_io([&] { return impl_->recorder_ ? impl_->recorder_->failed() : std::string(); });
 }

@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <deque>
 #include <iterator>
-#include <mutex>
 #include <utility>
 
+#include "core/base/locked.hpp"
 #include "core/ports/devices.hpp"
 
 namespace anchord::server {
@@ -20,60 +20,61 @@ class RowQueue {
   RowQueue(std::size_t most_rows, std::chrono::milliseconds batch_time)
       : most_rows_(most_rows), batch_time_(batch_time) {}
   void push(DeviceBatch batch) {
-    const std::scoped_lock lock(mutex_);
-    for (auto& row : batch.fixes) add(std::move(row));
-    for (auto& row : batch.ranges) add(std::move(row));
-    if (size() >= k_batch_rows) told_.notify_one();
+    auto rows = rows_.lock();
+    for (auto& row : batch.fixes) rows->add(rows->fixes, std::move(row), most_rows_);
+    for (auto& row : batch.ranges) rows->add(rows->ranges, std::move(row), most_rows_);
+    if (rows->size() >= k_batch_rows) told_.notify_one();
   }
   /// Waits for a batch's time or size; false when stopping and empty.
   bool take(DeviceBatch& batch) {
-    std::unique_lock lock(mutex_);
-    told_.wait_for(lock, batch_time_, [this] { return stopping_ || size() >= k_batch_rows; });
-    batch.fixes.assign(std::make_move_iterator(fixes_.begin()), std::make_move_iterator(fixes_.end()));
-    batch.ranges.assign(std::make_move_iterator(ranges_.begin()), std::make_move_iterator(ranges_.end()));
-    fixes_.clear();
-    ranges_.clear();
-    return !stopping_ || !batch.empty();
+    auto rows = rows_.lock();
+    rows.wait_for(told_, batch_time_, [](const Rows& r) { return r.stopping || r.size() >= k_batch_rows; });
+    batch.fixes.assign(std::make_move_iterator(rows->fixes.begin()),
+                       std::make_move_iterator(rows->fixes.end()));
+    batch.ranges.assign(std::make_move_iterator(rows->ranges.begin()),
+                        std::make_move_iterator(rows->ranges.end()));
+    rows->fixes.clear();
+    rows->ranges.clear();
+    return !rows->stopping || !batch.empty();
   }
   void stop() {
-    const std::scoped_lock lock(mutex_);
-    stopping_ = true;
+    auto rows = rows_.lock();
+    rows->stopping = true;
     told_.notify_all();
   }
   bool stopping() const {
-    const std::scoped_lock lock(mutex_);
-    return stopping_;
+    const auto rows = rows_.lock();
+    return rows->stopping;
   }
   void lost(std::size_t n) {
-    const std::scoped_lock lock(mutex_);
-    dropped_ += n;
+    auto rows = rows_.lock();
+    rows->dropped += n;
   }
   std::uint64_t dropped() const {
-    const std::scoped_lock lock(mutex_);
-    return dropped_;
+    const auto rows = rows_.lock();
+    return rows->dropped;
   }
 
  private:
   static constexpr std::size_t k_batch_rows = 200;
-  std::deque<Fix>& of(const Fix&) { return fixes_; }
-  std::deque<Range>& of(const Range&) { return ranges_; }
-  std::size_t size() const { return fixes_.size() + ranges_.size(); }
-  template <class Row>
-  void add(Row row) {
-    auto& rows = of(row);
-    rows.push_back(std::move(row));
-    if (size() <= most_rows_) return;
-    rows.pop_front();
-    ++dropped_;
-  }
+  struct Rows {
+    std::size_t size() const { return fixes.size() + ranges.size(); }
+    template <class Row>
+    void add(std::deque<Row>& of_kind, Row row, std::size_t most) {
+      of_kind.push_back(std::move(row));
+      if (size() <= most) return;
+      of_kind.pop_front();
+      ++dropped;
+    }
+    std::deque<Fix> fixes{};
+    std::deque<Range> ranges{};
+    std::uint64_t dropped{0};
+    bool stopping{false};
+  };
   const std::size_t most_rows_;
   const std::chrono::milliseconds batch_time_;
-  mutable std::mutex mutex_;
   std::condition_variable told_;
-  std::deque<Fix> fixes_;
-  std::deque<Range> ranges_;
-  std::uint64_t dropped_{0};
-  bool stopping_{false};
+  Locked<Rows> rows_;
 };
 
 }  // namespace anchord::server
