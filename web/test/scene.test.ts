@@ -73,7 +73,7 @@ describe('the trail after a reload', () => {
   it('is empty on the globe without an origin', () => expect(trail_of(feature, null)).toEqual([]));
   it('comes before what the stream has told', () => {
     const scene = new Scene('m');
-    scene.trail = [{ t_us: 3e6, e: 5, n: 5, fix: 'fixed' }];
+    scene.trail = [{ t_us: 3e6, e: 5, n: 5, u: 0, fix: 'fixed' }];
     scene.add_earlier_trail(trail_of(feature, { lon: 3.7131, lat: 51.0231, h_m: 10 }));
     expect(scene.trail.map((p) => p.t_us)).toEqual([1e6, 2e6, 3e6]);
   });

@@ -26,6 +26,7 @@ export interface MapHooks {
 
 // Metres of a site: no projection on the globe, so ellipses are ellipses and doubles go all the way.
 const ENU = new Projection({ code: 'anchord:enu', units: 'm', extent: [-2e5, -2e5, 2e5, 2e5] });
+const PLAN_NEAR_M = 300;
 const reduced = matchMedia('(prefers-reduced-motion: reduce)');
 
 export function open_map(
@@ -123,7 +124,7 @@ export function open_map(
 
   /// Everything known, in metres; null while nothing is.
   const extent = (): [number, number, number, number] | null => {
-    const { anchors, scene } = hooks.content();
+    const { anchors, scene, flight } = hooks.content();
     const box: [number, number, number, number] = [Infinity, Infinity, -Infinity, -Infinity];
     const add = (e: number, n: number): void => {
       box[0] = Math.min(box[0], e);
@@ -138,6 +139,10 @@ export function open_map(
     // An estimate that is still far off (hundreds of metres at first) must not shrink the flight to a dot.
     const span = Math.max(60, 2 * Math.hypot(box[2] - box[0], box[3] - box[1]) || 0),
       flown = trail.length > 0 || !!d;
+    // What is to be flown belongs to the picture, unless it is a plan of another place.
+    for (const q of flight ? [...flight.outline, ...flight.waypoints] : [])
+      if (!flown || Math.hypot(q[0] - (box[0] + box[2]) / 2, q[1] - (box[1] + box[3]) / 2) < span + PLAN_NEAR_M)
+        add(q[0], q[1]);
     const [ce, cn] = [(box[0] + box[2]) / 2, (box[1] + box[3]) / 2];
     for (const a of anchors)
       for (const q of [a.enu_m, a.mirror?.enu_m])

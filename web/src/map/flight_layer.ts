@@ -13,6 +13,16 @@ export interface FlightPicture {
   readonly candidates: readonly { readonly at: Point; readonly rank: number | null }[]; ///< 0 best to 5; null: refused
   readonly visited: readonly Point[];
   readonly target: Point | null;
+  readonly heights: Heights | null;
+}
+/// The same upwards, in metres of the flight's origin; null where a plan says nothing of it.
+export interface Heights {
+  readonly ground_m: number | null; ///< null: not known yet
+  readonly roof_m: number; ///< these above the ground
+  readonly low_m: number;
+  readonly high_m: number;
+  readonly waypoints: readonly number[];
+  readonly target: number | null;
 }
 
 export function draw_flight(c: Ctx, p: Palette, cam: Camera, f: FlightPicture): void {

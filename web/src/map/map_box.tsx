@@ -3,6 +3,8 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 import { when_back } from '../state/store';
 import { Icon } from '../ui/marks';
 import { ground } from '../ui/theme';
+import { Elevation } from './elevation_box';
+import { elevation_on, elevation_shown } from './elevation_shown';
 import { length_words, round_length } from './enu';
 import type { MapView, Mode } from './engine';
 import type { Content } from './picture';
@@ -16,9 +18,10 @@ interface Props {
   label: string;
   follow: boolean;
   version: unknown;
+  zero?: string | undefined; ///< what heights count from where the ground is not known
 }
 
-export function MapBox({ content, onSelect, label, follow, version }: Props) {
+export function MapBox({ content, onSelect, label, follow, version, zero }: Props) {
   const target = useRef<HTMLDivElement>(null),
     overlay = useRef<HTMLCanvasElement>(null),
     top = useRef<HTMLCanvasElement>(null),
@@ -28,7 +31,10 @@ export function MapBox({ content, onSelect, label, follow, version }: Props) {
   const [mode, set_mode] = useState<Mode>('fit'),
     [attempt, set_attempt] = useState(0);
   const [scale, set_scale] = useState({ px_per_m: 0, magnified: 1 });
-  const [failed, set_failed] = useState(false);
+  const [failed, set_failed] = useState(false),
+    [height_px, set_height] = useState(0),
+    sided = height_px > 0 && elevation_on(height_px);
+  useEffect(() => set_height(target.current!.parentElement!.clientHeight), []);
   useEffect(() => {
     let gone = false,
       stop = (): void => undefined;
@@ -67,7 +73,7 @@ export function MapBox({ content, onSelect, label, follow, version }: Props) {
   }, [theme]);
 
   return (
-    <div class="mapbox" data-testid="map">
+    <div class={sided ? 'mapbox sided' : 'mapbox'} data-testid="map">
       <div class="mapcanvas" ref={target} tabindex={0} role="application" aria-label={label} />
       <canvas class="overlay" ref={overlay} aria-hidden="true" data-testid="range-lines" />
       <canvas class="overlay" ref={top} aria-hidden="true" data-testid="anchor-ellipses" />
@@ -103,8 +109,18 @@ export function MapBox({ content, onSelect, label, follow, version }: Props) {
         >
           <Icon name="fit" />
         </button>
+        <button
+          class={sided ? 'mb on' : 'mb'}
+          aria-label="Side elevation"
+          aria-pressed={sided}
+          data-testid="show-elevation"
+          onClick={() => (elevation_shown.value = !sided)}
+        >
+          <Icon name="side" />
+        </button>
       </div>
       <ScaleBars {...scale} />
+      {sided && <Elevation content={content} onSelect={onSelect} version={version} zero={zero} />}
     </div>
   );
 }

@@ -89,7 +89,7 @@ export function trail_of(feature: Record<string, unknown> | null, origin: Missio
       : [];
   return places.flatMap((at, i) => {
     const t_us = num(times[i]);
-    return at && t_us !== null ? [{ t_us, e: at[0], n: at[1], fix: fix_class(fixes[i]) }] : [];
+    return at && t_us !== null ? [{ t_us, e: at[0], n: at[1], u: at[2], fix: fix_class(fixes[i]) }] : [];
   });
 }
 export function follow_archive(): void {

@@ -12,6 +12,7 @@ export interface TrailPoint {
   readonly t_us: number;
   readonly e: number;
   readonly n: number;
+  readonly u: number;
   readonly fix: FixClass;
 }
 export interface RangeRow {
@@ -68,10 +69,10 @@ export class Scene {
       if (
         !last ||
         last.fix !== p.fix ||
-        Math.hypot(p.enu_m[0] - last.e, p.enu_m[1] - last.n) > TRAIL_STEP_M ||
+        Math.hypot(p.enu_m[0] - last.e, p.enu_m[1] - last.n, p.enu_m[2] - last.u) > TRAIL_STEP_M ||
         p.t_us - last.t_us > 2_000_000
       ) {
-        this.trail.push({ t_us: p.t_us, e: p.enu_m[0], n: p.enu_m[1], fix: p.fix });
+        this.trail.push({ t_us: p.t_us, e: p.enu_m[0], n: p.enu_m[1], u: p.enu_m[2], fix: p.fix });
         if (this.trail.length > TRAIL_POINTS) this.trail.splice(0, TRAIL_POINTS / 6);
       }
     }
@@ -133,7 +134,7 @@ export class Scene {
       if (
         !last ||
         last.fix !== p.fix ||
-        Math.hypot(p.e - last.e, p.n - last.n) > TRAIL_STEP_M ||
+        Math.hypot(p.e - last.e, p.n - last.n, p.u - last.u) > TRAIL_STEP_M ||
         p.t_us - last.t_us > 2_000_000
       )
         kept.push(p);

@@ -2,7 +2,6 @@ import { signal } from '@preact/signals';
 import type { ComponentType } from 'preact';
 import { useEffect } from 'preact/hooks';
 import { link, live_source, tick, toast } from '../state/store';
-import { Anchors } from '../views/anchors';
 import { load_compare, load_publish } from '../views/dialogs';
 import { Live } from '../views/live';
 import { AlarmBar } from './alarms';
@@ -54,7 +53,7 @@ function Rail({ view }: { view: View }) {
   );
 }
 
-/// A view that is not for the field comes in a chunk of its own: the operator's first load stays small.
+/// Every view but Live comes in a chunk of its own: the operator's first load stays small.
 function Later<P extends object>({ load, props }: { load: () => Promise<ComponentType<P>>; props: P }) {
   const { part: View, failed, again } = useLater(load);
   if (failed && !View)
@@ -78,6 +77,7 @@ function Later<P extends object>({ load, props }: { load: () => Promise<Componen
     </div>
   );
 }
+const load_anchors = () => import('../views/anchors').then((m) => m.Anchors);
 const load_models = () => import('../views/models/models').then((m) => m.Models);
 const load_plan = () => import('../views/plan/plan').then((m) => m.Plan);
 const load_replay = () => import('../views/replay/replay').then((m) => m.Replay);
@@ -96,7 +96,16 @@ function LastKnown() {
   );
 }
 /// The rest of the page while nothing else is to be done: after an outage every view is there, and opens also during one.
-const LATER = [load_publish, load_compare, load_replay, load_system, load_plan, load_measurements, load_models];
+const LATER = [
+  load_anchors,
+  load_publish,
+  load_compare,
+  load_replay,
+  load_system,
+  load_plan,
+  load_measurements,
+  load_models,
+];
 function usePrefetch(): void {
   const ready = link.value === 'live';
   useEffect(() => {
@@ -149,7 +158,7 @@ export function App() {
         <div class="view">
           {view === 'live' && <Live />}
           {view === 'plan' && <Later load={load_plan} props={{ id: named }} />}
-          {view === 'anchors' && <Anchors anchor={named} />}
+          {view === 'anchors' && <Later load={load_anchors} props={{ anchor: named }} />}
           {view === 'measurements' && <Later load={load_measurements} props={{}} />}
           {view === 'replay' && <Later load={load_replay} props={{ id: named }} />}
           {view === 'system' && <Later load={load_system} props={{}} />}

@@ -82,6 +82,7 @@ const ICONS = {
     </>
   ),
   fit: <path d="M3.2 7.2v-4h4M12.8 3.2h4v4M16.8 12.8v4h-4M7.2 16.8h-4v-4" />,
+  side: <path d="M3 16.5h14M5.5 16.5v-6h9v6M3 6.5c3-4 6 2 9 0s3-3 5-2.5" />,
   download: <path d="M10 3v9.4M6.2 8.8l3.8 3.8 3.8-3.8M3.6 16.6h12.8" />,
   copy: (
     <>

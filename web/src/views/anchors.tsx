@@ -4,6 +4,7 @@ import { useEffect, useMemo, useRef } from 'preact/hooks';
 import { api_url, ApiError } from '../api/client';
 import { published, row_of_estimate, type AnchorRow } from '../api/anchors';
 import { enu_from_geodetic } from '../map/enu';
+import type { FlightPicture } from '../map/flight_layer';
 import { MapBox } from '../map/map_box';
 import { done_count, shown_estimates } from '../state/done';
 import { me, may_publish } from '../state/session';
@@ -14,6 +15,7 @@ import { useLater } from '../ui/use_later';
 import { ColumnPicker } from './anchor_columns';
 import { AnchorTable, sorted_rows } from './anchor_table';
 import { AnchorDetail } from './anchor_detail';
+import { flight_picture } from './flight/picture';
 import { compare_open, load_compare, load_publish, publish_open } from './dialogs';
 
 export const source = signal<'live' | 'published'>('live');
@@ -62,6 +64,20 @@ function on_the_ground(rows: readonly AnchorRow[]): AnchorRow[] {
   );
 }
 
+/// Of the flight that is on, what stands there: where anchors are, not how they were measured.
+function building(): FlightPicture | null {
+  const f = flight_picture();
+  return (
+    f && {
+      ...f,
+      waypoints: [],
+      candidates: [],
+      visited: [],
+      target: null,
+      heights: f.heights && { ...f.heights, waypoints: [], target: null },
+    }
+  );
+}
 function Compare() {
   const { part: Dialog } = useLater(load_compare);
   return Dialog ? <Dialog /> : null;
@@ -210,7 +226,9 @@ export function Anchors({ anchor }: { anchor: string | null }) {
           scene: live ? current_scene() : null,
           link_lost: link.peek() === 'lost',
           running: mission?.state === 'recording',
+          flight: live ? building() : null,
         })}
+        zero={live ? undefined : 'the first anchor'}
         onSelect={(a) => (chosen_anchor.value = a)}
         label="Map of the anchors in the table"
         follow={false}

@@ -1,9 +1,11 @@
 /// The plan and the planner's last decision as the map draws them, in metres about the origin of the flight.
 import { signal } from '@preact/signals';
-import { read, type Plan } from '../../api/plans';
+import { read, setting, type Plan } from '../../api/plans';
 import type { GridMsg } from '../../live/flight_messages';
+import { num, obj } from '../../live/messages';
 import { enu_from_geodetic } from '../../map/enu';
-import type { FlightPicture, Point } from '../../map/flight_layer';
+import type { FlightPicture, Heights, Point } from '../../map/flight_layer';
+import type { Scene } from '../../state/scene';
 import { current_mission, current_scene } from '../../state/store';
 
 /// The plan that is in the air: fetched once per revision, since a flight keeps the one it was started with.
@@ -55,7 +57,26 @@ export function flight_picture(): FlightPicture | null {
     candidates: p.step === 'done' || p.step === 'ready' ? [] : (decision?.candidates ?? []),
     visited: decision?.visited ?? [],
     target: p.target && at(p.target),
+    heights: plan && heights_of(plan, scene, origin.h_m, p.target?.height_m ?? null),
   };
+}
+/// A plan counts from the ground: of the height its origin says, else where the aircraft took off.
+export function heights_of(plan: Plan, scene: Scene | null, origin_h_m: number, target_m: number | null): Heights {
+  const h_m = num(obj(plan.rest.origin)?.h_m),
+    pose = scene?.pose?.value.enu_m,
+    above_m = scene?.procedure?.value.drone?.above_home_m;
+  return {
+    ground_m: h_m !== null ? h_m - origin_h_m : pose && above_m != null ? pose[2] - above_m : lowest(scene),
+    roof_m: plan.building_height_m,
+    low_m: setting(plan, 'min_height_m'),
+    high_m: setting(plan, 'max_height_m'),
+    waypoints: plan.waypoints.map((w) => w.height_above_ground_m),
+    target: target_m,
+  };
+}
+function lowest(scene: Scene | null): number | null {
+  const ups = scene?.trail.map((q) => q.u) ?? [];
+  return ups.length ? ups.reduce((a, b) => Math.min(a, b)) : null;
 }
 function remember(grid: GridMsg, at: (c: { lon: number; lat: number }) => Point): FlightPicture {
   const rank = ranks(grid.candidates),
@@ -69,6 +90,7 @@ function remember(grid: GridMsg, at: (c: { lon: number; lat: number }) => Point)
     waypoints: [],
     reached: 0,
     target: null,
+    heights: null,
     candidates: grid.candidates.map((c, i) => ({ at: at(c), rank: rank[i]! })),
     visited: shift ? grid.visited_plan_m.map((v): Point => [v[0] + shift[0], v[1] + shift[1]]) : [],
   };

@@ -44,7 +44,7 @@ export function corners(p: Plan, shape: Shape): readonly Corner[] {
         ? p.fence
         : (p.no_fly[Number(shape.slice(7))] ?? []);
 }
-function with_corners(p: Plan, shape: Shape, list: readonly Corner[]): Plan {
+export function with_corners(p: Plan, shape: Shape, list: readonly Corner[]): Plan {
   if (shape === 'waypoints') return { ...p, waypoints: list as readonly Waypoint[] };
   if (shape === 'outline') return { ...p, outline: list };
   if (shape === 'fence') return { ...p, fence: list };

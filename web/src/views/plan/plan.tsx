@@ -3,13 +3,18 @@ import { useRef, useState } from 'preact/hooks';
 import '../desk.css';
 import './plan.css';
 import { EMPTY, export_url } from '../../api/plans';
+import { Elevation } from '../../map/elevation_box';
+import { elevation_shown } from '../../map/elevation_shown';
 import type { Geodetic } from '../../map/enu';
+import { current_mission, current_scene, now_ms, tick } from '../../state/store';
 import { age } from '../../ui/format';
 import { Icon } from '../../ui/marks';
 import { CheckPanel, Profile } from './check_panel';
 import { Conflict } from './conflict';
 import type { Shape } from './draft';
 import { Expected, placed } from './expected';
+import { around, plan_content, rover_of } from './ground';
+import { RoverTools, useBase } from './on_ground';
 import { PlanMap } from './plan_map';
 import { Corners, SettingFields, Waypoints } from './points';
 import { cells, PredictedPanel, type Shown } from './predicted_panel';
@@ -155,7 +160,10 @@ const nothing = (): void => undefined; // a plan that one may only look at does 
 function Drawn({ desk, shown }: { desk: Desk; shown: Shown }) {
   const { plan, origin, picked, pick, change, check, known, able } = desk,
     [drawing, set_drawing] = useState<Shape>('outline'),
-    [snap, set_snap] = useState(true);
+    [snap, set_snap] = useState(true),
+    [walk, set_walk] = useState<number | null>(null),
+    base = useBase(origin),
+    sided = elevation_shown.value ?? plan.waypoints.length > 1;
   const no_flies = plan.no_fly.map((_, i): [Shape, string] => [`no_fly/${i}`, `No-fly ${i + 1}`]);
   const areas: readonly (readonly [Shape, string])[] = [
     ['outline', 'Outline'],
@@ -190,6 +198,9 @@ function Drawn({ desk, shown }: { desk: Desk; shown: Shown }) {
           >
             {snap ? 'Snap on' : 'Snap off'}
           </button>
+          {origin && (
+            <RoverTools plan={plan} origin={origin} drawing={drawing} change={change} walk={walk} set_walk={set_walk} />
+          )}
         </div>
       )}
       {origin ? (
@@ -201,6 +212,11 @@ function Drawn({ desk, shown }: { desk: Desk; shown: Shown }) {
           snap={snap}
           cells={cells(check, shown, plan, origin)}
           anchors={placed(plan, known, origin)}
+          base={base}
+          rover={rover_of(current_scene(), origin, now_ms())?.m ?? null}
+          walk={walk}
+          sided={sided}
+          set_sided={(on) => (elevation_shown.value = on)}
           pick={pick}
           change={able ? change : nothing}
         />
@@ -209,8 +225,30 @@ function Drawn({ desk, shown }: { desk: Desk; shown: Shown }) {
       ) : (
         <p class="why pad">There is no plan yet. An operator draws one.</p>
       )}
+      {origin && sided && <PlanElevation desk={desk} origin={origin} />}
     </div>
   );
+}
+
+/// The plan from the side: waypoints between lowest and highest, the roof, and what is known of the place.
+function PlanElevation({ desk, origin }: { desk: Desk; origin: Geodetic }) {
+  const { plan, known, picked } = desk,
+    waypoint = picked?.shape === 'waypoints' ? picked.index : null,
+    content = () => {
+      const mission = current_mission.peek(),
+        scene = current_scene();
+      return plan_content(
+        plan,
+        origin,
+        scene,
+        around(plan, origin, mission, scene),
+        known,
+        mission?.state === 'recording',
+        waypoint,
+      );
+    };
+  tick.value;
+  return <Elevation content={content} onSelect={nothing} version={picked ?? plan} zero="the ground" />;
 }
 
 /// The plan in numbers: its check, and everything drawn as fields.

@@ -6,8 +6,10 @@ import { Icon } from '../../ui/marks';
 import { fixed } from '../../ui/format';
 import { added, corners, from_m, moved, removed, to_m, type Picked, type Shape } from './draft';
 import type { Placed } from './expected';
+import { OnGround } from './on_ground';
 import { SIDES_PX, type Cell } from './predicted_panel';
 import { snapped } from './snap';
+import type { Point } from './tools';
 
 interface Props {
   plan: Plan;
@@ -17,6 +19,11 @@ interface Props {
   snap: boolean;
   cells: readonly Cell[];
   anchors: readonly Placed[];
+  base: Point | null;
+  rover: Point | null; ///< what a fitted map must also show
+  walk: number | null;
+  sided: boolean;
+  set_sided: (on: boolean) => void;
   pick: (p: Picked | null) => void;
   change: (p: Plan) => void;
 }
@@ -28,9 +35,25 @@ interface View {
 const HIT_PX = 18,
   STEP_M = 0.5,
   FINE_M = 0.1,
-  BESIDE_M = 2;
+  BESIDE_M = 2,
+  WITH_PLAN_M = 80; ///< of something drawn: an aircraft further off does not shrink the plan
 
-export function PlanMap({ plan, origin, drawing, picked, snap, cells, anchors, pick, change }: Props) {
+export function PlanMap({
+  plan,
+  origin,
+  drawing,
+  picked,
+  snap,
+  cells,
+  anchors,
+  base,
+  rover,
+  walk,
+  sided,
+  set_sided,
+  pick,
+  change,
+}: Props) {
   const [over, set_over] = useState<[number, number] | null>(null),
     box = useRef<HTMLDivElement>(null),
     [size, set_size] = useState<[number, number]>([0, 0]),
@@ -48,7 +71,9 @@ export function PlanMap({ plan, origin, drawing, picked, snap, cells, anchors, p
   const shapes: Shape[] = ['outline', 'fence', ...plan.no_fly.map((_, i) => `no_fly/${i}` as Shape), 'waypoints'];
   const metres = (shape: Shape): [number, number][] => corners(plan, shape).map((c) => to_m(c, origin));
   const fitted = (): View => {
-    const all = shapes.flatMap(metres),
+    const drawn = shapes.flatMap(metres),
+      close = (m: Point): boolean => drawn.some(([e, n]) => Math.hypot(e - m[0], n - m[1]) < WITH_PLAN_M),
+      all: Point[] = [...drawn, ...[rover, base].filter((m): m is Point => m !== null && close(m))],
       es = all.map(([e]) => e),
       ns = all.map(([, n]) => n),
       [w, h] = size;
@@ -58,10 +83,7 @@ export function PlanMap({ plan, origin, drawing, picked, snap, cells, anchors, p
   };
   const v = view ?? fitted(),
     [w, h] = size;
-  const px = ([e, n]: readonly [number, number]): [number, number] => [
-    w / 2 + (e - v.e) * v.px_per_m,
-    h / 2 - (n - v.n) * v.px_per_m,
-  ];
+  const px = ([e, n]: Point): [number, number] => [w / 2 + (e - v.e) * v.px_per_m, h / 2 - (n - v.n) * v.px_per_m];
   const zoom = (factor: number): void =>
     set_view({ ...v, px_per_m: Math.max(0.2, Math.min(400, v.px_per_m * factor)) });
   const at = (x: number, y: number): Picked | null => {
@@ -224,6 +246,7 @@ export function PlanMap({ plan, origin, drawing, picked, snap, cells, anchors, p
               </g>
             );
           })}
+          <OnGround origin={origin} base={base} walk={walk} px={px} />
           <path class="way" d={path('waypoints')} />
           {shapes.map((shape) =>
             metres(shape).map((m, index) => {
@@ -256,6 +279,15 @@ export function PlanMap({ plan, origin, drawing, picked, snap, cells, anchors, p
         </div>
         <button class="mb" aria-label="Fit plan" data-testid="fit-plan" onClick={() => set_view(null)}>
           <Icon name="fit" />
+        </button>
+        <button
+          class={sided ? 'mb on' : 'mb'}
+          aria-label="Side elevation"
+          aria-pressed={sided}
+          data-testid="show-elevation"
+          onClick={() => set_sided(!sided)}
+        >
+          <Icon name="side" />
         </button>
       </div>
       <div class="scalebar">

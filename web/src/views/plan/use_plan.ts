@@ -18,7 +18,7 @@ import {
 import type { Geodetic } from '../../map/enu';
 import { may } from '../../state/session';
 import { draft_of, drop_draft, keep_draft, newest_draft } from '../../state/drafts';
-import { current_mission, say } from '../../state/store';
+import { current_mission, current_scene, say, tick } from '../../state/store';
 import { useStable } from '../../ui/use_stable';
 import {
   begun,
@@ -33,6 +33,15 @@ import {
 } from './draft';
 
 const CHECKED_AFTER_MS = 500; ///< of no change: a drag is not checked at every step
+
+/// Where nothing is drawn yet: at the flight, or where the aircraft stands.
+function flown_at(): Geodetic | null {
+  const pose = current_scene()?.pose?.value;
+  return (
+    current_mission.peek()?.origin ??
+    (pose && pose.lon !== null && pose.lat !== null ? { lon: pose.lon, lat: pose.lat, h_m: 0 } : null)
+  );
+}
 
 export type Desk = ReturnType<typeof usePlan>;
 
@@ -55,7 +64,7 @@ export function usePlan(id: string | null) {
     able = may('operator');
   // Metres are about one origin for as long as a plan is open: a map that moves while it is drawn on cannot be used.
   const open = (p: PlanDoc): void => {
-    set_origin(origin_of(p, current_mission.peek()?.origin ?? null));
+    set_origin(origin_of(p, flown_at()));
     set_history(begun(p));
     set_saved(p);
     pick(null);
@@ -70,10 +79,14 @@ export function usePlan(id: string | null) {
       kept = plan_from_draft(draft?.value);
     open(p);
     if (!draft || !kept || kept.id !== p.id) return;
-    set_origin(origin_of(kept, origin_of(p, current_mission.peek()?.origin ?? null)));
+    set_origin(origin_of(kept, origin_of(p, flown_at())));
     set_history(changed(begun(p), kept));
     set_back(draft.at_ms);
   };
+  const now = tick.value;
+  useEffect(() => {
+    if (origin === null) set_origin(origin_of(plan, flown_at()));
+  }, [now, origin, plan]);
   const guarded = async (what: string, work: () => Promise<void>): Promise<void> => {
     set_busy(what);
     set_problem('');
