@@ -16,6 +16,10 @@
 
 namespace anchord {
 
+/// Range errors of a moving radio stay alike so long: two of these times are one independent look. On the
+/// real flights 0.6 to 29 s, by the autocorrelation of their residuals.
+inline constexpr double k_error_correlation_s = 7.5;
+
 /// Settings of solve_flight. Defaults hold for every kit and place; their reasons were measured on real
 /// flights (core/localize/README.md).
 struct FlightOptions {
@@ -57,8 +61,8 @@ struct FlightOptions {
 
   double mad_factor{0.6};  ///< Tukey cut-off = 4.685 x this x scale; below 1 is what late clusters need
   double min_scale_m{0.02};
-  double correlation_s{7.5};   ///< errors stay alike this long (0.6 to 29 s seen); tempers the likelihood
-  double floor_sigma_m{0.04};  ///< per axis: frame, lever arm; no residual shows it
+  double correlation_s{k_error_correlation_s};  ///< tempers the likelihood
+  double floor_sigma_m{0.04};                   ///< per axis: frame, lever arm; no residual shows it
 
   std::map<NetworkId, AnchorClues> clues{};  ///< which side an anchor is on, beside its ranges
   std::vector<Eigen::Vector2d>

@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "core/localize/error_ellipse.hpp"
+#include "core/localize/flight_options.hpp"
 #include "core/localize/geometry.hpp"
 #include "core/localize/linear.hpp"
 #include "core/localize/solver.hpp"
@@ -13,9 +14,6 @@
 namespace anchord {
 namespace {
 
-// Errors of a moving radio stay alike for seconds; measured on real flights (see
-// FlightOptions::correlation_s).
-constexpr double k_correlation_s = 10.0;
 constexpr double k_floor_sigma_m = 0.04;
 constexpr double k_weak_share = 0.2;  ///< of the median range: a 95 % bound wider than this places nothing
 
@@ -158,7 +156,7 @@ void LiveAnchor::describe(const LiveOptions& options) {
   // The same tempering as the batch solve: two correlation times are one independent look.
   const double scale_m = scale_of(best.residuals_m);
   const double duration_s = std::max(seconds_between(*first_, *newest_), 1.0);
-  const double looks = std::max(duration_s / (2.0 * k_correlation_s), 1.0);
+  const double looks = std::max(duration_s / (2.0 * k_error_correlation_s), 1.0);
   const double inflate = std::max(static_cast<double>(rows.size()) / looks, 1.0) *
                          std::max(scale_m * scale_m / (options.range_sigma_m * options.range_sigma_m), 0.1);
   auto twin = solve_anchor_gauss_newton(rows, geometry.shape.mirrored(best.position_m), settings);

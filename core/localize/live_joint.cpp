@@ -10,8 +10,6 @@
 namespace anchord {
 namespace {
 
-// Errors of a moving radio stay alike for seconds; measured on real flights (FlightOptions::correlation_s).
-constexpr double k_correlation_s = 10.0;
 constexpr double k_smallest_scale_m = 0.03;  // of the residuals; what the radio's clock alone makes
 
 // The range curve of flight_solver.hpp.
@@ -44,7 +42,7 @@ bool LiveAnchor::adopt(const AnchorSolution& solution, const SharedSolution& sha
   joint.scale_m = std::max(solution.residual_scale_m, k_smallest_scale_m);
   if (first_ && newest_) {
     const double span_s = std::max(seconds_between(*first_, *newest_), 1.0);
-    joint.rows_per_look = std::max(2.0 * k_correlation_s * static_cast<double>(used_) / span_s, 1.0);
+    joint.rows_per_look = std::max(2.0 * k_error_correlation_s * static_cast<double>(used_) / span_s, 1.0);
   }
   joint_ = std::move(joint);
   refine();
