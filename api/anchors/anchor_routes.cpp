@@ -18,6 +18,7 @@
 #include "core/base/to_wire.hpp"
 #include "core/geo/enu.hpp"
 #include "core/ports/anchor_store.hpp"
+#include "core/ports/calibration_store.hpp"
 #include "core/ports/frame_store.hpp"
 #include "core/ports/revision_store.hpp"
 #include "core/ports/site_store.hpp"

@@ -120,7 +120,7 @@ Result<void> choose_frame(const std::vector<FlightData>& flights, SiteStore& sit
     if (out.frame != TrackFrame::wgs84 || options.origin) continue;
     const auto checked = check_track(flight.fixes, out.frame, options.min_fix, options.track);
     if (!checked.centre) continue;
-    const auto of_site = site_origin(flights, anchors, *checked.centre, options.track.max_distance_m);
+    const auto of_site = site_origin(flights, sites, *checked.centre, options.track.max_distance_m);
     options.origin = of_site ? of_site : checked.centre;
   }
   out.origin = out.frame == TrackFrame::wgs84 ? options.origin : std::nullopt;

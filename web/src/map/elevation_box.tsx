@@ -1,13 +1,7 @@
 /// The place of the side elevation beside a map; what draws it comes in a chunk of its own.
 import { useLater } from '../ui/use_later';
-import type { Content } from './picture';
+import type { ElevationProps } from './elevation_props';
 
-export interface ElevationProps {
-  readonly content: () => Content;
-  readonly onSelect: (anchor: string) => void;
-  readonly version: unknown;
-  readonly zero?: string | undefined; ///< what heights count from where the ground is not known
-}
 const load = () => import('./elevation_view').then((m) => m.default);
 
 export function Elevation(props: ElevationProps) {

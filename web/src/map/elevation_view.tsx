@@ -11,7 +11,7 @@ import { ground } from '../ui/theme';
 import { useStable } from '../ui/use_stable';
 import { along, building_bearing, extent, fit, intervals95, wind, type Fit } from './elevation';
 import { magnification, round_length } from './enu';
-import type { ElevationProps } from './elevation_box';
+import type { ElevationProps } from './elevation_props';
 import { elevation_shown } from './elevation_shown';
 import { read_palette, status_colour, trail_style, type Palette } from './palette';
 import type { Content } from './picture';

@@ -2,7 +2,7 @@ import { signal } from '@preact/signals';
 import type { ComponentType } from 'preact';
 import { useEffect } from 'preact/hooks';
 import { link, live_source, tick, toast } from '../state/store';
-import { load_compare, load_publish } from '../views/dialogs';
+import { load_compare, load_publish } from '../views/dialog_chunks';
 import { Live } from '../views/live';
 import { AlarmBar } from './alarms';
 import { age } from './format';

@@ -16,7 +16,8 @@ import { ColumnPicker } from './anchor_columns';
 import { AnchorTable, sorted_rows } from './anchor_table';
 import { AnchorDetail } from './anchor_detail';
 import { flight_picture } from './flight/picture';
-import { compare_open, load_compare, load_publish, publish_open } from './dialogs';
+import { load_compare, load_publish } from './dialog_chunks';
+import { compare_open, publish_open } from './dialogs';
 
 export const source = signal<'live' | 'published'>('live');
 export const filter = signal('');

@@ -1,7 +1,5 @@
-/// Which dialog of the Anchors view is open. The dialogs come in chunks of their own.
+/// Which dialog of the Anchors view is open.
 import { signal } from '@preact/signals';
 
 export const publish_open = signal(false);
 export const compare_open = signal(false);
-export const load_publish = () => import('./publish').then((m) => m.Publish);
-export const load_compare = () => import('./compare_calibrations').then((m) => m.CompareCalibrations);

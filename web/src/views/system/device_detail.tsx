@@ -4,7 +4,7 @@ import { act_on_device, change_device, forget_device, type Device } from '../../
 import { obj, str } from '../../live/messages';
 import { age, bytes, fixed, grouped } from '../../ui/format';
 import { Q } from '../../ui/marks';
-import type { Run } from './devices';
+import type { Run } from './run';
 import type { Row } from './use_devices';
 import { by_count, dropped_words } from './standing';
 

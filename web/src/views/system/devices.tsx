@@ -13,10 +13,9 @@ import { DeviceForm } from './device_form';
 import { kind_words, parts_of, type Setup } from './device_setup';
 import { RadiosInRange } from './radios_in_range';
 import { RadioPanel, RadioWarning } from './radio';
+import type { Run } from './run';
 import { useDevices, type Row } from './use_devices';
 import { by_count, doing, dropped_words, lost_messages, summary } from './standing';
-
-export type Run = (what: string, work: () => Promise<unknown>, done: string) => Promise<void>;
 
 export function DevicesPanel() {
   const { all, rows, problem, load } = useDevices(),
