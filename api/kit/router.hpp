@@ -14,9 +14,6 @@
 
 namespace anchord::api {
 
-std::string_view to_string(Method method);
-std::string_view to_string(Role role);
-
 /// Who may use a route. There is no default: a route without a decision does not compile.
 class Access {
  public:

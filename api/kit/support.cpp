@@ -203,6 +203,11 @@ void require_match(const Request& request, const std::string& etag) {
   throw ProblemException{std::move(response)};
 }
 
+void refuse_query_word(const char* name, std::span<const std::string_view> words) {
+  throw_problem(422, "validation", std::string(name) + " is not one of its words",
+                {{std::string("/") + name, "unknown_value", "must be one of " + list_of(words)}});
+}
+
 std::string negotiate(const Request& request, std::initializer_list<std::string_view> offers) {
   const auto offered = [&](std::string_view word) {
     return std::find(offers.begin(), offers.end(), word) != offers.end();

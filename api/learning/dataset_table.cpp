@@ -134,25 +134,6 @@ const std::vector<std::string_view>& register_columns() {
 
 bool is_dataset_csv(std::string_view text) { return text.starts_with("feature_set,campaign,environment,"); }
 
-std::string_view place_word(Place place) {
-  switch (place) {
-    case Place::environment:
-      return "environment";
-    case Place::campaign:
-      return "campaign";
-    case Place::setting:
-      return "setting";
-  }
-  return "environment";
-}
-
-std::optional<Place> place_of(std::string_view word) {
-  if (word == "environment") return Place::environment;
-  if (word == "campaign" || word == "session") return Place::campaign;
-  if (word == "setting") return Place::setting;
-  return std::nullopt;
-}
-
 std::string place_name(const DatasetRow& row, Place place) {
   switch (place) {
     case Place::environment:

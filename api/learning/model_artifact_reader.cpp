@@ -121,17 +121,9 @@ ml::Trees trees_of(Walk& w, const Json& j, const std::string& at, std::size_t d)
 
 ml::Svm svm_of(Walk& w, const Json& j, const std::string& at, std::size_t d) {
   ml::Svm out;
-  const auto kernel = w.text(j, at, "kernel");
-  if (kernel == "linear")
-    out.kernel = ml::Kernel::linear;
-  else if (kernel == "polynomial")
-    out.kernel = ml::Kernel::polynomial;
-  else if (kernel == "sigmoid")
-    out.kernel = ml::Kernel::sigmoid;
-  else if (kernel == "rbf")
-    out.kernel = ml::Kernel::rbf;
-  else
-    w.fail(at + "/kernel", "unknown");
+  const auto kernel = ml::k_kernel_words.find(w.text(j, at, "kernel"));
+  if (!kernel) w.fail(at + "/kernel", "unknown");
+  out.kernel = kernel.value_or(out.kernel);
   out.gamma = w.number(j, at, "gamma", 0, 1e6);
   out.coef0 = w.number(j, at, "coef0", -1e6, 1e6);
   out.degree = static_cast<int>(w.count(j, at, "degree", 16));
@@ -144,32 +136,47 @@ ml::Svm svm_of(Walk& w, const Json& j, const std::string& at, std::size_t d) {
   return out;
 }
 
+ml::Linear linear_of(Walk& w, const Json& j, const std::string& at, std::size_t d) {
+  ml::Linear out;
+  out.weights = w.numbers(j, at, "weights", 0, d);
+  out.offset = w.number(j, at, "offset", -k_huge, k_huge);
+  return out;
+}
+
+ml::Polynomial polynomial_of(Walk& w, const Json& j, const std::string& at, std::size_t d) {
+  ml::Polynomial out;
+  const Json& terms = w.member(j, at, "terms");
+  if (!terms.is_array() || terms.size() > k_max_terms) {
+    w.fail(at + "/terms", "not an array of a possible length");
+    return out;
+  }
+  for (std::size_t i = 0; i < terms.size() && w.ok(); ++i) {
+    const std::string term = at + "/terms/" + std::to_string(i);
+    auto features =
+        w.indices<std::uint16_t>(terms[i], term, "features", 0, 16, 0, static_cast<double>(d) - 1);
+    out.terms.push_back({std::move(features), w.number(terms[i], term, "coefficient", -k_huge, k_huge)});
+  }
+  return out;
+}
+
 ml::Scorer scorer_of(Walk& w, const Json& parent, const std::string& at, std::size_t d) {
   const Json& j = w.member(parent, at, "scorer");
   const std::string here = at + "/scorer";
-  const auto kind = w.text(j, here, "kind");
-  if (kind == "linear") {
-    ml::Linear out;
-    out.weights = w.numbers(j, here, "weights", 0, d);
-    out.offset = w.number(j, here, "offset", -k_huge, k_huge);
-    return out;
+  const auto kind = ml::k_scorer_words.find(w.text(j, here, "kind"));
+  if (!kind) {
+    w.fail(here + "/kind", "unknown");
+    return ml::Linear{};
   }
-  if (kind == "polynomial") {
-    ml::Polynomial out;
-    const Json& terms = w.member(j, here, "terms");
-    if (!terms.is_array() || terms.size() > k_max_terms)
-      return w.fail(here + "/terms", "not an array of a possible length"), out;
-    for (std::size_t i = 0; i < terms.size() && w.ok(); ++i) {
-      const std::string term = here + "/terms/" + std::to_string(i);
-      auto features =
-          w.indices<std::uint16_t>(terms[i], term, "features", 0, 16, 0, static_cast<double>(d) - 1);
-      out.terms.push_back({std::move(features), w.number(terms[i], term, "coefficient", -k_huge, k_huge)});
-    }
-    return out;
+  switch (*kind) {
+    case ml::ScorerKind::linear:
+      return linear_of(w, j, here, d);
+    case ml::ScorerKind::polynomial:
+      return polynomial_of(w, j, here, d);
+    case ml::ScorerKind::trees:
+      return trees_of(w, j, here, d);
+    case ml::ScorerKind::svm:
+      return svm_of(w, j, here, d);
   }
-  if (kind == "trees") return trees_of(w, j, here, d);
-  if (kind == "svm") return svm_of(w, j, here, d);
-  w.fail(here + "/kind", "unknown");
   return ml::Linear{};
 }
 
@@ -254,7 +261,7 @@ ml::ModelInfo info_of(Walk& w, const Json& root) {
   const std::string at = "/manifest";
   const Json& j = w.member(root, "", "manifest");
   ml::ModelInfo out;
-  const auto task = ml::task_of(w.text(j, at, "task"));
+  const auto task = ml::k_task_words.find(w.text(j, at, "task"));
   if (!task) w.fail(at + "/task", "unknown");
   out.task = task.value_or(ml::Task::nlos_id);
   out.method = w.text(j, at, "method");

@@ -248,6 +248,8 @@ std::vector<Candidate> joined(const std::vector<Candidate>& chosen, const Bounds
 Result<void> FlightPlanOptions::check() const {
   const auto bad = [](const char* text) { return make_error(Errc::invalid_argument, text); };
   if (!(keep_out_m > 0 && keep_out_m <= 100)) return bad("keep_out_m must be above 0 and at most 100");
+  if (rule == Rule::dissertation)
+    return bad("rule dissertation is of single points: of a whole flight a_optimal or d_optimal");
   if (ring_m.empty()) return bad("ring_m must name at least one ring");
   for (const double m : ring_m) {
     if (!(m >= 0 && m <= 200)) return bad("ring_m must be 0 to 200");

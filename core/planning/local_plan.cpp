@@ -27,7 +27,8 @@ FlightPlanOptions flight_options(const Plan& plan) {
   o.speed_mps = plan.settings.speed_mps;
   o.dwell_s = plan.settings.dwell_s;
   o.ranges_per_point = plan.settings.samples;
-  if (plan.settings.rule == "d_optimal") o.criterion = Criterion::d_optimal;
+  // The rule of the dissertation weighs one more point against those before: a whole flight has none yet.
+  if (plan.settings.rule != Rule::dissertation) o.rule = plan.settings.rule;
   return o;
 }
 

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
 #include "core/ports/measurement_limits.hpp"
@@ -31,6 +32,8 @@ struct DeviceSeen {
   UtcTime first_seen{}, last_seen{};  ///< measured times
   std::uint64_t n_ranges{};
 };
+inline constexpr auto k_radio_words =
+    enum_table<DeviceSeen::Kind>({{"tag", DeviceSeen::Kind::tag}, {"anchor", DeviceSeen::Kind::anchor}});
 
 /// Measurements. append_* return after the commit is on the disk (fsynced); concurrent calls share one
 /// commit. Outcomes stand in the order of the rows. With `atomic`, one row that is a conflict or of an
@@ -168,6 +171,11 @@ class TokenStore {
 
 /// Long work, visible and cancellable. At start the server calls fail_unfinished, for nothing runs then.
 enum class JobState : std::uint8_t { queued, running, succeeded, failed, canceled };
+inline constexpr auto k_job_state_words = enum_table<JobState>({{"queued", JobState::queued},
+                                                                {"running", JobState::running},
+                                                                {"succeeded", JobState::succeeded},
+                                                                {"failed", JobState::failed},
+                                                                {"canceled", JobState::canceled}});
 struct Job {
   JobId id{};
   std::string kind;

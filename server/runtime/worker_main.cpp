@@ -16,6 +16,7 @@
 #include <stop_token>
 #include <vector>
 
+#include "core/base/errc_words.hpp"
 #include "core/base/guard.hpp"
 #include "core/base/to_wire.hpp"
 #include "server/runtime/frames.hpp"
@@ -130,7 +131,7 @@ int worker_main() {
     send({{"op", "done"}, {"result", result.value()}});
   else
     send({{"op", "failed"},
-          {"code", static_cast<int>(result.error().code)},
+          {"code", k_errc_words.word(result.error().code)},
           {"message", result.error().message}});
   std::fflush(stderr);
   _exit(0);  // the listener still waits: nothing else is left to clean

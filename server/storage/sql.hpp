@@ -7,8 +7,11 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 
+#include "core/base/check.hpp"
+#include "core/base/enum_table.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
 #include "core/base/time.hpp"
@@ -121,7 +124,16 @@ class Query {
   std::int64_t integer() { return statement_.integer(column_++); }
   template <class T>
   T as() {
+    static_assert(!std::is_enum_v<T>, "read an enum with one_of()");
     return static_cast<T>(integer());
+  }
+  /// The value of an enum that is kept as its number.
+  template <class T, std::size_t N>
+  T one_of(const EnumTable<T, N>& table) {
+    const std::int64_t number = integer();
+    const auto value = table.of_number(number);
+    ANCHORD_CHECK(value, "the database has " << number << " where there are " << list_of(table.words()));
+    return *value;
   }
   double real();  ///< NaN for NULL, which is how the database keeps a NaN
   std::string text() { return statement_.text(column_++); }

@@ -162,7 +162,9 @@ class Home {
       live_.use_clues(f->clues());
     }
     for (const auto& event : operations_.take_events()) written += event.code + ' ' + event.text + '\n';
-    if (f) written += f->status() + ' ' + f->control.engine().state().reason + '\n';
+    if (f)
+      written += std::string(flight::k_flight_status_words.word(f->status())) + ' ' +
+                 f->control.engine().state().reason + '\n';
     steps.insert(f ? std::string(procedure::to_string(f->control.engine().state().step)) : "none");
   }
   std::string written;
