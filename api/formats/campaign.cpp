@@ -10,6 +10,7 @@
 
 #include "api/formats/cells.hpp"
 #include "api/formats/column_names.hpp"
+#include "api/formats/csv_record.hpp"
 #include "api/kit/reader.hpp"
 #include "api/wire/rows_json.hpp"
 #include "core/base/text.hpp"
@@ -141,21 +142,17 @@ class Importer {
 
   void take_csv(std::string_view line, std::size_t at) {
     if (header_.empty()) separator_ = separator_of(line);
-    std::vector<std::string_view> cells;
-    for (std::string_view rest = line;;) {
-      const auto comma = rest.find(separator_);
-      auto cell = trimmed(rest.substr(0, comma));
-      if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"')
-        cell = cell.substr(1, cell.size() - 2);
-      cells.push_back(cell);
-      if (comma == std::string_view::npos) break;
-      rest.remove_prefix(comma + 1);
-    }
+    CsvRecord record({separator_});
+    const auto read = record.read(line);
+    const auto& cells = record.cells();
     if (header_.empty()) {
+      if (!read)
+        fatal_ = make_error(Errc::bad_frame, "line " + std::to_string(at) + ": " + read.error().message);
       header_.assign(cells.begin(), cells.end());
       return;
     }
     ++out_.report.lines;
+    if (!read) return refuse(at, {k_unreadable, {}, read.error().message});
     if (cells.size() != header_.size())
       return refuse(at, {k_unreadable, {}, wrong_cell_count(cells.size(), header_.size(), separator_)});
     Row row;

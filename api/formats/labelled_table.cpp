@@ -6,6 +6,7 @@
 
 #include "api/formats/cells.hpp"
 #include "api/formats/column_names.hpp"
+#include "api/formats/csv_record.hpp"
 #include "api/formats/gzip_lines.hpp"
 
 namespace anchord::api {
@@ -22,18 +23,8 @@ constexpr std::size_t k_none = static_cast<std::size_t>(-1);
 constexpr std::size_t k_time_blocks = 10;
 constexpr double k_nan = std::numeric_limits<double>::quiet_NaN();
 
-void split(std::string_view line, std::vector<std::string_view>& cells, char separator = ',') {
-  cells.clear();
-  while (true) {
-    const auto comma = line.find(separator);
-    auto cell = line.substr(0, comma);
-    if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"') cell = cell.substr(1, cell.size() - 2);
-    while (!cell.empty() && cell.front() == ' ') cell.remove_prefix(1);
-    while (!cell.empty() && cell.back() == ' ') cell.remove_suffix(1);
-    cells.push_back(cell);
-    if (comma == std::string_view::npos) return;
-    line.remove_prefix(comma + 1);
-  }
+Error at_line(const std::string& file, const GzipLines& lines, const std::string& what) {
+  return make_error(Errc::bad_frame, file + ":" + std::to_string(lines.line_number()) + ": " + what);
 }
 
 double number(std::string_view cell, bool decimal_comma = false) {
@@ -109,13 +100,15 @@ Result<CirTable> read_cir(const std::filesystem::path& path) {
   CirTable out;
   std::vector<std::size_t> joins;
   std::vector<std::pair<std::size_t, std::size_t>> taps;
-  std::vector<std::string_view> cells;
+  CsvRecord record;
   std::vector<float> magnitude;
   std::size_t width = 0;
   for (std::string_view line;;) {
     BOOST_OUTCOME_TRY(const bool more, lines.next(line));
     if (!more) break;
-    split(line, cells);
+    if (const auto read = record.read(line); !read)
+      return at_line(path.string(), lines, read.error().message);
+    const auto& cells = record.cells();
     if (width == 0) {
       width = cells.size();
       for (std::size_t c = 0; c < width; ++c) {
@@ -132,9 +125,8 @@ Result<CirTable> read_cir(const std::filesystem::path& path) {
       continue;
     }
     if (cells.size() != width)
-      return make_error(Errc::bad_frame, path.string() + ":" + std::to_string(lines.line_number()) + ": " +
-                                             std::to_string(cells.size()) + " cells, the header has " +
-                                             std::to_string(width));
+      return at_line(path.string(), lines,
+                     std::to_string(cells.size()) + " cells, the header has " + std::to_string(width));
     magnitude.clear();
     for (const auto& [tap, column] : taps) magnitude.push_back(static_cast<float>(number(cells[column])));
     if (std::any_of(magnitude.begin(), magnitude.end(), [](float v) { return std::isnan(v); })) continue;
@@ -158,8 +150,9 @@ class Reader {
     const char separator = separator_of(line);
     decimal_comma_ = separator != ',';
     out_.file_names.push_back(file_);
-    std::vector<std::string_view> cells;
-    split(line, cells, separator);
+    CsvRecord record({separator});
+    const auto& cells = record.cells();
+    if (const auto read = record.read(line); !read) return at_line(file_, lines, read.error().message);
     BOOST_OUTCOME_TRY(take_header(cells));
     std::vector<std::size_t> joins;
     if (cir) {
@@ -174,11 +167,9 @@ class Reader {
       BOOST_OUTCOME_TRY(const bool more, lines.next(line));
       if (!more) break;
       if (line.empty()) continue;
-      split(line, cells, separator);
+      if (const auto read = record.read(line); !read) return at_line(file_, lines, read.error().message);
       if (cells.size() != header_.names.size())
-        return make_error(Errc::bad_frame,
-                          file_ + ":" + std::to_string(lines.line_number()) + ": " +
-                              wrong_cell_count(cells.size(), header_.names.size(), separator));
+        return at_line(file_, lines, wrong_cell_count(cells.size(), header_.names.size(), separator));
       ++out_.rows_read;
       const std::vector<float>* taps = nullptr;
       if (cir) {
