@@ -112,9 +112,10 @@ Result<CirTable> read_cir(const std::filesystem::path& path) {
     if (width == 0) {
       width = cells.size();
       for (std::size_t c = 0; c < width; ++c) {
-        if (std::find(k_joins.begin(), k_joins.end(), cells[c]) != k_joins.end())
-          joins.push_back(c), out.join_names.emplace_back(cells[c]);
-        else if (cells[c].size() > 1 && cells[c][0] == 'm' && !std::isnan(number(cells[c].substr(1))))
+        if (std::find(k_joins.begin(), k_joins.end(), cells[c]) != k_joins.end()) {
+          joins.push_back(c);
+          out.join_names.emplace_back(cells[c]);
+        } else if (cells[c].size() > 1 && cells[c][0] == 'm' && !std::isnan(number(cells[c].substr(1))))
           taps.emplace_back(static_cast<std::size_t>(number(cells[c].substr(1))), c);
       }
       std::sort(taps.begin(), taps.end());
@@ -301,8 +302,10 @@ class Reader {
       if (at != k_none) placement_columns_.push_back(at);
     };
     if (placement_columns_.empty()) add(header_.first(k_placement));
-    if (placement_columns_.empty() && header_.of("tag_pos") != k_none && header_.of("anchor_id") != k_none)
-      add(header_.of("tag_pos")), add(header_.of("anchor_id"));
+    if (placement_columns_.empty() && header_.of("tag_pos") != k_none && header_.of("anchor_id") != k_none) {
+      add(header_.of("tag_pos"));
+      add(header_.of("anchor_id"));
+    }
     // A true range that repeats names its placement, together with the place and the class.
     if (placement_columns_.empty() && truth_ != k_none) {
       placement_columns_ = group_columns_;
@@ -375,12 +378,18 @@ class Reader {
 
     nlos::DiagnosticSample s;
     if (range_ != k_none) s.range_m = range;
-    s.rx_dbm = value(k_rx), s.fp_dbm = value(k_fp);
-    s.fp_amp1 = value(k_f1), s.fp_amp2 = value(k_f2), s.fp_amp3 = value(k_f3);
-    s.cir_power = value(k_cir_power), s.preamble_count = value(k_count);
-    s.std_noise = value(k_std_noise), s.max_noise = value(k_max_noise);
+    s.rx_dbm = value(k_rx);
+    s.fp_dbm = value(k_fp);
+    s.fp_amp1 = value(k_f1);
+    s.fp_amp2 = value(k_f2);
+    s.fp_amp3 = value(k_f3);
+    s.cir_power = value(k_cir_power);
+    s.preamble_count = value(k_count);
+    s.std_noise = value(k_std_noise);
+    s.max_noise = value(k_max_noise);
     s.fp_index = value(k_fp_index);
-    s.height_difference_m = value(k_height), s.heading_deg = value(k_heading);
+    s.height_difference_m = value(k_height);
+    s.heading_deg = value(k_heading);
     // The receiver's own first path where the file tells it: found again in magnitudes it lies 2 ns beside.
     if (taps) {
       s.cir = nlos::cir_shape(*taps, s.fp_index);

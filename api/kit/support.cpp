@@ -25,8 +25,11 @@ std::string percent_encoded(std::string_view text) {
                        c == '-' || c == '_' || c == '.' || c == '~';
     if (plain)
       out += c;
-    else
-      out += '%', out += k_hex[byte >> 4], out += k_hex[byte & 15];
+    else {
+      out += '%';
+      out += k_hex[byte >> 4];
+      out += k_hex[byte & 15];
+    }
   }
   return out;
 }

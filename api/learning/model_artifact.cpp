@@ -26,8 +26,11 @@ Json json_of(const ml::Scorer& scorer) {
     }
     Json operator()(const ml::Trees& m) const {
       Json feature = Json::array(), left = Json::array(), value = Json::array();
-      for (const auto& n : m.nodes)
-        feature.push_back(n.feature), left.push_back(n.left), value.push_back(n.value);
+      for (const auto& n : m.nodes) {
+        feature.push_back(n.feature);
+        left.push_back(n.left);
+        value.push_back(n.value);
+      }
       return {{"kind", kind(ml::ScorerKind::trees)},
               {"base", m.base},
               {"scale", m.scale},

@@ -38,9 +38,15 @@ class Walk {
     return number_of(member(object, at, key), at + "/" + key, low, high);
   }
   double number_of(const Json& value, const std::string& at, double low, double high) {
-    if (!value.is_number()) return fail(at, "not a number"), low;
+    if (!value.is_number()) {
+      fail(at, "not a number");
+      return low;
+    }
     const double v = value.get<double>();
-    if (!std::isfinite(v) || v < low || v > high) return fail(at, "out of range"), low;
+    if (!std::isfinite(v) || v < low || v > high) {
+      fail(at, "out of range");
+      return low;
+    }
     return v;
   }
   std::size_t count(const Json& object, const std::string& at, const char* key, std::size_t most) {
@@ -50,8 +56,10 @@ class Walk {
   }
   std::string text(const Json& object, const std::string& at, const char* key, std::size_t most = 4096) {
     const Json& v = member(object, at, key);
-    if (!v.is_string() || v.get_ref<const std::string&>().size() > most)
-      return fail(at + "/" + key, "not a text of at most " + std::to_string(most) + " bytes"), std::string{};
+    if (!v.is_string() || v.get_ref<const std::string&>().size() > most) {
+      fail(at + "/" + key, "not a text of at most " + std::to_string(most) + " bytes");
+      return std::string{};
+    }
     return v.get<std::string>();
   }
   std::vector<double> numbers(const Json& object, const std::string& at, const char* key, std::size_t least,
@@ -59,8 +67,10 @@ class Walk {
     const Json& v = member(object, at, key);
     const std::string here = at + "/" + key;
     std::vector<double> out;
-    if (!v.is_array() || v.size() < least || v.size() > most)
-      return fail(here, "not an array of a possible length"), out;
+    if (!v.is_array() || v.size() < least || v.size() > most) {
+      fail(here, "not an array of a possible length");
+      return out;
+    }
     out.reserve(v.size());
     for (std::size_t i = 0; i < v.size() && ok(); ++i) {
       if (!v[i].is_number() || !std::isfinite(v[i].get<double>()) || v[i].get<double>() < low ||
@@ -109,10 +119,14 @@ ml::Trees trees_of(Walk& w, const Json& j, const std::string& at, std::size_t d)
   for (std::size_t i = 0; i < n; ++i) {
     out.nodes.push_back({feature[i], left[i], value[i]});
     if (feature[i] < 0) continue;
-    if (left[i] <= i || left[i] + std::size_t{1} >= n)
-      return w.fail(at + "/left/" + std::to_string(i), "child out of range"), out;
-    if (depth[i] >= k_max_tree_depth)
-      return w.fail(at + "/left/" + std::to_string(i), "tree deeper than 64"), out;
+    if (left[i] <= i || left[i] + std::size_t{1} >= n) {
+      w.fail(at + "/left/" + std::to_string(i), "child out of range");
+      return out;
+    }
+    if (depth[i] >= k_max_tree_depth) {
+      w.fail(at + "/left/" + std::to_string(i), "tree deeper than 64");
+      return out;
+    }
     for (const std::size_t child : {std::size_t{left[i]}, left[i] + std::size_t{1}})
       depth[child] = std::max(depth[child], depth[i] + 1);
   }

@@ -170,7 +170,8 @@ Result<FlightCommand> Operations::begin(const Now& now, const Mission& mission, 
   if (ground.check) f.forecast = ground.check->time;
   f.control.fix(*r.fix_s, here, r.fix->fix);
   if (manual) {
-    f.by_hand.position_m = here, f.former_s = *r.fix_s;
+    f.by_hand.position_m = here;
+    f.former_s = *r.fix_s;
     f.control.by_hand(now.s, f.by_hand);
   }
   by_drone_number_.clear();

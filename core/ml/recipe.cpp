@@ -204,7 +204,9 @@ double worst_harm_m(const Dataset& data, std::span<const double> correction_m) {
   std::map<std::uint32_t, std::array<double, 3>> sums;  // rows, raw, corrected
   for (std::size_t i = 0; i < data.rows(); ++i) {
     auto& s = sums[data.group[i]];
-    s[0] += 1, s[1] += std::abs(data.bias_m[i]), s[2] += std::abs(data.bias_m[i] - correction_m[i]);
+    s[0] += 1;
+    s[1] += std::abs(data.bias_m[i]);
+    s[2] += std::abs(data.bias_m[i] - correction_m[i]);
   }
   double worst = 0;
   for (const auto& [group, s] : sums)
@@ -251,9 +253,14 @@ Result<OutOfFold> cross_validate(const Dataset& data, const Recipe& recipe,
   for (std::size_t k = 0; k < folds; ++k) {
     double s = 0, w = 0;
     for (std::size_t i = 0; i < data.rows(); ++i)
-      if (fold[i] == k) s += weight[i] * loss[i], w += weight[i];
-    sum += s, total += w;
-    sum_folds += s / w, sum_squares += s / w * s / w;
+      if (fold[i] == k) {
+        s += weight[i] * loss[i];
+        w += weight[i];
+      }
+    sum += s;
+    total += w;
+    sum_folds += s / w;
+    sum_squares += s / w * s / w;
     out.fold_loss.push_back(s / w);
   }
   const auto n = static_cast<double>(folds);

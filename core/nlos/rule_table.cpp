@@ -125,8 +125,10 @@ RuleRow judge_fitted_rules(std::span<const RuleSample> samples, std::span<const 
     for (std::size_t i = 0; i < samples.size(); ++i) (fold[i] == k ? test : train).push_back(samples[i]);
     const auto part = judge_rules(fit_rules(train), test);
     for (std::size_t r = 0; r < k_rule_count; ++r) {
-      row[r].rates.los += part[r].rates.los, row[r].rates.los_right += part[r].rates.los_right;
-      row[r].rates.nlos += part[r].rates.nlos, row[r].rates.nlos_right += part[r].rates.nlos_right;
+      row[r].rates.los += part[r].rates.los;
+      row[r].rates.los_right += part[r].rates.los_right;
+      row[r].rates.nlos += part[r].rates.nlos;
+      row[r].rates.nlos_right += part[r].rates.nlos_right;
     }
   }
   return row;

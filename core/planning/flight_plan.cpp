@@ -41,7 +41,10 @@ bool in_range(const Vector3d& anchor, const std::vector<Candidate>& all, double 
 std::vector<Vector3d> assumed_anchors(const FlightPlanInput& input, const FlightPlanOptions& options,
                                       const std::vector<Candidate>& all, std::size_t& n_out_of_range) {
   Vector2d low{k_infinity, k_infinity}, high{-k_infinity, -k_infinity};
-  for (const auto& corner : input.outline) low = low.cwiseMin(corner), high = high.cwiseMax(corner);
+  for (const auto& corner : input.outline) {
+    low = low.cwiseMin(corner);
+    high = high.cwiseMax(corner);
+  }
   std::vector<double> heights;
   for (double z = 2.5; z < std::max(input.building_height_m, 2.6); z += options.floor_m) heights.push_back(z);
   const double reach_m = options.max_range_m - options.keep_out_m;

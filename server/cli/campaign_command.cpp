@@ -23,7 +23,9 @@ api::CampaignOptions options_of(const CampaignArguments& a) {
   api::CampaignOptions o;
   o.format = a.format;
   o.filter = !a.keep_outliers;
-  o.defaults.name = a.site, o.defaults.environment = a.environment, o.defaults.material = a.material;
+  o.defaults.name = a.site;
+  o.defaults.environment = a.environment;
+  o.defaults.material = a.material;
   if (a.distance_m > 0) o.defaults.distance_m = a.distance_m;
   if (a.has_heading) o.defaults.heading_deg = a.heading_deg;
   if (a.has_height) o.defaults.height_m = a.height_m;
@@ -88,7 +90,8 @@ void add_campaign_command(CLI::App& app, int& exit_code) {
   command->add_option("--label", a->label, "LOS or NLOS")->check(CLI::IsMember({"LOS", "NLOS"}));
   command->add_flag("--keep-outliers", a->keep_outliers, "Drop zero ranges only");
   command->callback([a, heading, height, thickness, &exit_code] {
-    a->has_heading = heading->count() > 0, a->has_height = height->count() > 0;
+    a->has_heading = heading->count() > 0;
+    a->has_height = height->count() > 0;
     a->has_thickness = thickness->count() > 0;
     exit_code = import(*a);
   });

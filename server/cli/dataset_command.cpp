@@ -32,7 +32,9 @@ int build(const DatasetArguments& a) {
   api::FreezeOptions how;
   how.aggregation = a.aggregate;
   how.filter_faults = !a.keep_outliers;
-  how.test = a.held_out, how.test_share = a.held_out_share, how.seed = a.seed;
+  how.test = a.held_out;
+  how.test_share = a.held_out_share;
+  how.seed = a.seed;
   std::map<std::string, std::size_t> dropped;
   for (const auto& [reason, entry] : table.value().dropped)
     dropped[reason + " (first " + entry.second + ")"] = entry.first;

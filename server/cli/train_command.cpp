@@ -130,12 +130,19 @@ int train(const TrainArguments& a) {
   const auto& [data, report, frozen_test, digest, not_for_live, feature_set] = gathered.value();
 
   ml::TrainingSpec spec;
-  spec.task = *task, spec.features = a.features, spec.folds = a.folds, spec.seed = a.seed;
-  spec.methods = methods, spec.engine = engine;
-  spec.per_placement = a.per_placement, spec.search = a.grid, spec.threads = a.threads;
+  spec.task = *task;
+  spec.features = a.features;
+  spec.folds = a.folds;
+  spec.seed = a.seed;
+  spec.methods = methods;
+  spec.engine = engine;
+  spec.per_placement = a.per_placement;
+  spec.search = a.grid;
+  spec.threads = a.threads;
   spec.held_out = a.held_out.empty() ? frozen_test : a.held_out;
   spec.held_out_share = a.held_out_share;
-  spec.importance = a.importance, spec.selection = a.selection;
+  spec.importance = a.importance;
+  spec.selection = a.selection;
   if (a.max_fpr >= 0) spec.max_fpr = a.max_fpr;
   for (const auto& one : a.tries) {
     const auto read = read_try(one, spec.grid);

@@ -116,7 +116,8 @@ int worker_main() {
     try {
       result = api::do_work(message, stop.get_token(), told);
     } catch (const std::bad_alloc&) {
-      message.clear(), message.shrink_to_fit();  // room for the answer
+      message.clear();
+      message.shrink_to_fit();  // room for the answer
       result =
           make_error(Errc::unsupported, "the training needs more memory than the " + allowed_memory() +
                                             " a worker may take: use a data set of means or medians, fewer "

@@ -99,17 +99,32 @@ class Query {
     return value;
   }
 
-  Query& operator<<(std::nullopt_t) { return statement_.bind_null(parameter_++), *this; }
-  Query& operator<<(std::int64_t v) { return statement_.bind_integer(parameter_++, v), *this; }
+  Query& operator<<(std::nullopt_t) {
+    statement_.bind_null(parameter_++);
+    return *this;
+  }
+  Query& operator<<(std::int64_t v) {
+    statement_.bind_integer(parameter_++, v);
+    return *this;
+  }
   Query& operator<<(int v) { return *this << std::int64_t{v}; }
   Query& operator<<(bool v) { return *this << std::int64_t{v}; }
   Query& operator<<(std::uint8_t v) { return *this << std::int64_t{v}; }
   Query& operator<<(std::uint64_t v) { return *this << static_cast<std::int64_t>(v); }
-  Query& operator<<(double v) { return statement_.bind_real(parameter_++, v), *this; }
-  Query& operator<<(std::string_view v) { return statement_.bind_text(parameter_++, v), *this; }
+  Query& operator<<(double v) {
+    statement_.bind_real(parameter_++, v);
+    return *this;
+  }
+  Query& operator<<(std::string_view v) {
+    statement_.bind_text(parameter_++, v);
+    return *this;
+  }
   Query& operator<<(const std::string& v) { return *this << std::string_view{v}; }
   Query& operator<<(const char* v) { return *this << std::string_view{v}; }
-  Query& operator<<(std::span<const std::byte> v) { return statement_.bind_blob(parameter_++, v), *this; }
+  Query& operator<<(std::span<const std::byte> v) {
+    statement_.bind_blob(parameter_++, v);
+    return *this;
+  }
   Query& operator<<(UtcTime v) { return *this << v.ns; }
   Query& operator<<(NetworkId v) { return *this << std::int64_t{v.value}; }
   template <class Tag>
