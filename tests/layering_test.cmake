@@ -7,7 +7,7 @@ cmake_minimum_required(VERSION 3.25)
 # The libraries, one row a folder, the deepest first; the project's own folders are below (rows):
 #   header other libraries its headers may include; source: those only its .cpp files may, beside the former
 # The standard library is always allowed; a library that no row names is refused, so that adding one is a decision.
-set(folders server/storage server api drivers core/flight core/base core migrations)
+set(folders server/storage server api/formats api drivers core/flight core/base core migrations)
 
 # One row a subfolder, the lowest first: which project folders its files include, beside its own, and no others. A row
 # names only folders whose rows stand above it, so that no arrow goes back up and there is no circle; and only those that
@@ -44,7 +44,7 @@ set(rows
   "api/devices: core/base core/types core/ports core/geo api/kit api/wire api/admin"
   "api/learning: core/base core/types core/ports core/nlos core/ml core/localize api/kit api/wire api/formats api/admin"
   "api/missions: core/base core/types core/ports core/geo core/localize core/procedure core/flight api/kit api/stream api/wire api/admin api/devices"
-  "api/measurements: core/base core/types core/ports api/kit api/wire api/admin api/learning api/missions"
+  "api/measurements: core/base core/types core/ports api/kit api/wire api/formats api/admin api/learning api/missions"
   "api/anchors: core/base core/types core/ports core/geo core/localize api/kit api/wire api/formats api/admin api/missions"
   "api/planning: core/base core/types core/ports core/planning api/kit api/formats"
   "api/flight: core/base core/types core/ports core/geo core/planning core/localize core/procedure core/flight api/kit api/stream api/admin api/missions api/planning"
@@ -80,6 +80,8 @@ set(drivers_source "^(nlohmann/json\\.hpp$|sys/|arpa/|netinet/|linux/|termios\\.
 
 set(api_header "^(${everywhere}|nlohmann/json_fwd\\.hpp$)")
 set(api_source "^(malloc\\.h$|nlohmann/json\\.hpp$|zlib\\.h$|openssl/)")
+set(api/formats_header "${api_header}")
+set(api/formats_source "^(nlohmann/json\\.hpp$|zlib\\.h$|pugixml\\.hpp$)")
 
 set(server/storage_header "^(${everywhere})")
 set(server/storage_source "^(sqlite3\\.h$|SQLiteCpp/|sys/|unistd\\.h$|fcntl\\.h$)")

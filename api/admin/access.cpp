@@ -15,13 +15,6 @@
 namespace anchord::api {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, Role>, 6> k_roles{{{"viewer", Role::viewer},
-                                                                    {"integrator", Role::integrator},
-                                                                    {"gateway", Role::gateway},
-                                                                    {"engineer", Role::engineer},
-                                                                    {"operator", Role::op},
-                                                                    {"admin", Role::admin}}};
-
 constexpr std::string_view k_prefix = "anc_";
 constexpr std::size_t k_id_digits = 32;
 
@@ -44,7 +37,7 @@ bool split_token(std::string_view text, std::string& id, std::string_view& secre
 Principal principal_of(const Token& token) {
   Principal who{to_string(token.id), token.name, {}};
   for (const auto& word : token.roles) {
-    if (const auto role = parse_role(word)) who.roles.push_back(*role);
+    if (const auto role = k_role_words.find(word)) who.roles.push_back(*role);
   }
   return who;
 }
@@ -169,11 +162,7 @@ Result<NewToken> AccessService::create_token(std::string_view name, const std::v
     return make_error(Errc::invalid_argument, "a name has 1 to 100 characters");
   if (roles.empty()) return make_error(Errc::invalid_argument, "a token needs at least one role");
   for (const auto& word : roles) {
-    if (!parse_role(word)) {
-      return make_error(
-          Errc::invalid_argument,
-          "'" + to_utf8(word, 40) + "' is no role; viewer, integrator, gateway, engineer, operator, admin");
-    }
+    BOOST_OUTCOME_TRYV(k_role_words.parse("role", word));
   }
   const UtcTime now = state_->clock.now();
   if (expires && *expires <= now) return make_error(Errc::invalid_argument, "the expiry lies in the past");
@@ -364,13 +353,6 @@ void AccessService::audit(std::string_view who, std::string_view what, std::stri
                          std::string(result)};
   // A store that cannot write says so through its health and refuses the change itself.
   if (auto written = state_->log.append_audit(entry); !written) return;
-}
-
-std::optional<Role> parse_role(std::string_view word) {
-  for (const auto& [name, role] : k_roles) {
-    if (name == word) return role;
-  }
-  return std::nullopt;
 }
 
 Principal local_principal() { return {"local", "local", {Role::admin}}; }

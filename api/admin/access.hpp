@@ -100,7 +100,6 @@ class AccessService {
 };
 
 /// "viewer" -> Role::viewer; null for other words. `operator` is Role::op.
-std::optional<Role> parse_role(std::string_view word);
 /// The principal of --auth=off.
 Principal local_principal();
 /// Name of the session cookie.

@@ -93,7 +93,7 @@ Response create_token(AccessService& access, const Request& request) {
   } else {
     for (std::size_t i = 0; i < list->size(); ++i) {
       const auto& word = (*list)[i];
-      if (!word.is_string() || !parse_role(word.get<std::string>())) {
+      if (!word.is_string() || !k_role_words.find(word.get<std::string>())) {
         faults.push_back({"/roles/" + std::to_string(i), "unknown",
                           "viewer, integrator, gateway, engineer, operator or admin"});
       } else {

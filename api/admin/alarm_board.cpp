@@ -24,23 +24,12 @@ std::string_view level_of(AlarmPriority priority) {
 
 }  // namespace
 
-std::string_view priority_word(AlarmPriority priority) {
-  switch (priority) {
-    case AlarmPriority::critical:
-      return "critical";
-    case AlarmPriority::warning:
-      return "warning";
-    case AlarmPriority::advisory:
-      return "advisory";
-  }
-  return "advisory";
-}
-
 std::string alarm_json(const Alarm& alarm) {
   const auto& c = alarm.condition;
-  return R"({"id":)" + json_text(c.id) + R"(,"priority":")" + std::string(priority_word(c.priority)) +
-         R"(","since_us":)" + std::to_string(alarm.since.us()) + R"(,"text":)" + json_text(c.text) +
-         R"(,"mission":)" + (c.mission ? json_text(to_string(*c.mission)) : "null") + R"(,"acknowledged":)" +
+  return R"({"id":)" + json_text(c.id) + R"(,"priority":")" +
+         std::string(k_alarm_priority_words.word(c.priority)) + R"(","since_us":)" +
+         std::to_string(alarm.since.us()) + R"(,"text":)" + json_text(c.text) + R"(,"mission":)" +
+         (c.mission ? json_text(to_string(*c.mission)) : "null") + R"(,"acknowledged":)" +
          (alarm.acknowledged ? "true}" : "false}");
 }
 

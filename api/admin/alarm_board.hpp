@@ -18,7 +18,6 @@ struct Alarm {
   UtcTime since{};
   bool acknowledged{false};
 };
-std::string_view priority_word(AlarmPriority priority);
 /// As topic `alarms` and GET /alarms show it.
 std::string alarm_json(const Alarm& alarm);
 

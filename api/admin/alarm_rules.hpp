@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/ids.hpp"
 #include "core/flight/pulse.hpp"
 
@@ -13,6 +14,10 @@ namespace anchord::api {
 using flight::FlightPulse;
 
 enum class AlarmPriority : std::uint8_t { critical, warning, advisory };
+inline constexpr auto k_alarm_priority_words =
+    enum_table<AlarmPriority>({{"critical", AlarmPriority::critical},
+                               {"warning", AlarmPriority::warning},
+                               {"advisory", AlarmPriority::advisory}});
 
 /// A condition that holds, in words. The text has no running numbers: it would change each second.
 struct AlarmCondition {

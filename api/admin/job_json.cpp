@@ -8,22 +8,6 @@ namespace anchord::api {
 
 using Ordered = nlohmann::ordered_json;
 
-std::string_view job_state_word(JobState state) {
-  switch (state) {
-    case JobState::queued:
-      return "queued";
-    case JobState::running:
-      return "running";
-    case JobState::succeeded:
-      return "succeeded";
-    case JobState::failed:
-      return "failed";
-    case JobState::canceled:
-      return "canceled";
-  }
-  return "failed";
-}
-
 Ordered job_json(const Job& job) {
   static const std::vector<std::string> k_solving{"queued", "load", "solve", "store"};
   static const std::vector<std::string> k_training{"queued",     "load",      "split", "search",
@@ -36,7 +20,7 @@ Ordered job_json(const Job& job) {
   if (!job.result_href.empty()) links.push_back({{"rel", "result"}, {"href", job.result_href}});
   if (job.state == JobState::queued || job.state == JobState::running)
     links.push_back({{"rel", "cancel"}, {"href", self}, {"method", "DELETE"}});
-  Ordered out{{"id", to_string(job.id)}, {"kind", job.kind}, {"state", job_state_word(job.state)}};
+  Ordered out{{"id", to_string(job.id)}, {"kind", job.kind}, {"state", k_job_state_words.word(job.state)}};
   out["progress"] = {{"fraction", job.fraction},       {"stage", job.stage},   {"stage_index", stage},
                      {"stage_count", k_stages.size()}, {"detail", job.detail}, {"eta_s", nullptr}};
   out["created_at"] = to_rfc3339(job.created);

@@ -8,6 +8,5 @@
 namespace anchord::api {
 
 nlohmann::ordered_json job_json(const Job& job);
-std::string_view job_state_word(JobState state);
 
 }  // namespace anchord::api

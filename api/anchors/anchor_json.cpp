@@ -72,7 +72,7 @@ Ordered quality(const Estimate& estimate, const std::optional<Override>& overrid
   Ordered gates = Ordered::array();
   for (const auto& gate : estimate.gates) gates.push_back(gate_json(gate));
   return {
-      {"verdict", verdict_word(estimate.verdict)},
+      {"verdict", k_verdict_words.word(estimate.verdict)},
       {"reason", estimate.reason},
       {"gdop", or_null(estimate.gdop)},
       {"gdop_trace", or_null(estimate.gdop_trace)},
@@ -148,7 +148,7 @@ Ordered estimate_result_json(const Estimate& estimate, TrackFrame frame, const s
                              const std::optional<Override>& overridden,
                              const std::optional<GlobeAccuracy>& globe) {
   Ordered out{{"network_id", to_string(estimate.anchor)},
-              {"verdict", verdict_word(estimate.verdict)},
+              {"verdict", k_verdict_words.word(estimate.verdict)},
               {"reason", estimate.reason}};
   out["geometry"] = point(estimate.best ? estimate.best->wgs84 : std::nullopt);
   out["enu_m"] = estimate.best ? vector_json(estimate.best->position.m) : Ordered(nullptr);
@@ -222,7 +222,7 @@ Ordered flat_feature_json(const AnchorFeature& feature) {
                           "floor", "space", "asset_tag", "ifc_guid"})
     flat[key] = full["properties"][key];
   const auto& estimate = feature.estimate;
-  flat["verdict"] = estimate ? Ordered(verdict_word(estimate->verdict)) : Ordered(nullptr);
+  flat["verdict"] = estimate ? Ordered(k_verdict_words.word(estimate->verdict)) : Ordered(nullptr);
   const auto place = map_accuracy(feature);
   flat["h95_m"] = place ? Ordered(metres(place->h95_m)) : Ordered(nullptr);
   flat["v95_m"] = place ? Ordered(metres(place->v95_m)) : Ordered(nullptr);
@@ -285,7 +285,7 @@ std::string anchor_csv_row(const AnchorFeature& feature) {
   add(placed ? number(ellipse.azimuth_deg, 1) : "");
   add(placed ? number(place.h95_m, 4) : "");
   add(placed ? number(place.v95_m, 4) : "");
-  add(estimate ? verdict_word(estimate->verdict) : "");
+  add(estimate ? k_verdict_words.word(estimate->verdict) : "");
   add(feature.site ? csv_text(feature.site->crs_frame) : "");
   add(feature.site && feature.site->crs_epoch ? number(*feature.site->crs_epoch, 2) : "");
   add(feature.projected ? std::to_string(feature.projected->epsg) : "");

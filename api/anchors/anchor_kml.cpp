@@ -34,7 +34,7 @@ std::string placemark(const AnchorFeature& feature) {
   out += "<ExtendedData>" + data("network_id", id) + data("status", feature.status) +
          data("revision", feature.revision ? std::to_string(*feature.revision) : "") +
          data("h_ellipsoidal_m", number(at.height_m, 4)) + data("h95_m", number(place.h95_m, 4)) +
-         data("v95_m", number(place.v95_m, 4)) + data("verdict", verdict_word(estimate.verdict)) +
+         data("v95_m", number(place.v95_m, 4)) + data("verdict", k_verdict_words.word(estimate.verdict)) +
          data("gates_failed", failed) +
          data("override_reason", feature.overridden ? feature.overridden->reason : "") +
          data("frame", feature.site ? feature.site->crs_frame : "") + "</ExtendedData>";

@@ -6,11 +6,17 @@
 #include <vector>
 
 #include "api/kit/problem.hpp"
+#include "core/base/enum_table.hpp"
 #include "core/geo/frame_fit.hpp"
 #include "core/types/local_frame.hpp"
 #include "core/types/position.hpp"
 
 namespace anchord::api {
+
+/// What the numbers of POST /transform are.
+enum class Space : std::uint8_t { geo, enu, projected, local };
+inline constexpr auto k_space_words = enum_table<Space>(
+    {{"geo", Space::geo}, {"enu", Space::enu}, {"projected", Space::projected}, {"local", Space::local}});
 
 /// What LocalFrame::definition_json holds once a frame was fitted.
 struct FrameDefinition {

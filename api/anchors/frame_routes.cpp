@@ -131,8 +131,6 @@ Response fit(AnchorApi& s, const Request& request) {
   return answer(200, frame);
 }
 
-enum class Space : std::uint8_t { geo, enu, projected, local };
-
 /// What a transformation needs to know, each thing only when one of its ends asks for it.
 struct Context {
   std::optional<FrameDefinition> frame{};
@@ -173,8 +171,7 @@ Response transform(AnchorApi& s, const Request& request) {
   std::vector<FieldError> errors;
   const auto body = json_body(request);
   Fields fields(body, "", errors);
-  static const std::vector<std::string_view> k_spaces{"geo", "enu", "projected", "local"};
-  const auto from = fields.word("from", k_spaces, true), to = fields.word("to", k_spaces, true);
+  const auto from = fields.word("from", k_space_words, true), to = fields.word("to", k_space_words, true);
   const auto frame_name = fields.text("frame", 80);
   const auto site_text = fields.text("site", 36);
   const auto* points = fields.child("points");
@@ -182,9 +179,7 @@ Response transform(AnchorApi& s, const Request& request) {
   if (points == nullptr || !points->is_array() || points->size() > 10'000)
     errors.push_back({"/points", "wrong_type", "must be an array of at most 10000 points"});
   refuse_if_any(errors);
-  const auto uses = [&](Space space) {
-    return static_cast<Space>(*from) == space || static_cast<Space>(*to) == space;
-  };
+  const auto uses = [&](Space space) { return *from == space || *to == space; };
   Context context;
   std::optional<Site> site;
   std::optional<LocalFrame> frame;
@@ -227,16 +222,18 @@ Response transform(AnchorApi& s, const Request& request) {
     const auto& point = (*points)[i];
     const bool good = point.is_array() && point.size() == 3 && point[0].is_number() && point[1].is_number() &&
                       point[2].is_number();
-    if (!good || (*from == 0 && std::abs(point[1].get<double>()) > 90)) {
+    if (!good || (from == Space::geo && std::abs(point[1].get<double>()) > 90)) {
       errors.push_back({"/points/" + std::to_string(i), "wrong_type", "must be three numbers of the space"});
       continue;
     }
     const Eigen::Vector3d at(point[0].get<double>(), point[1].get<double>(), point[2].get<double>());
-    const auto there = context.to(static_cast<Space>(*to), context.geo_from(static_cast<Space>(*from), at));
+    const auto there = context.to(*to, context.geo_from(*from, at));
     out.push_back({there.x(), there.y(), there.z()});
   }
   refuse_if_any(errors);
-  return json_response(200, {{"from", k_spaces[*from]}, {"to", k_spaces[*to]}, {"points", std::move(out)}});
+  return json_response(
+      200,
+      {{"from", k_space_words.word(*from)}, {"to", k_space_words.word(*to)}, {"points", std::move(out)}});
 }
 
 }  // namespace

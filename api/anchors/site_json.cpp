@@ -74,8 +74,8 @@ void patch_site(const Json& body, bool whole, Site& site, std::vector<FieldError
     if (const auto epoch = inner.number("epoch", 1900, 2200)) site.crs_epoch = *epoch;
     if (const Json* base = inner.child("base")) {
       Fields deepest(*base, "/crs/base", errors);
-      static const std::vector<std::string_view> k_sources{"known_point", "survey_in", "network"};
-      if (const auto source = deepest.word("source", k_sources)) site.base_source = k_sources[*source];
+      constexpr std::array<std::string_view, 3> k_sources{"known_point", "survey_in", "network"};
+      if (auto source = deepest.word("source", k_sources)) site.base_source = *std::move(source);
       if (const auto sigma = deepest.number("sigma_m", 0, 100)) site.base_sigma_m = *sigma;
       deepest.finish();
     }

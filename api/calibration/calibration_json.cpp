@@ -5,7 +5,6 @@
 #include "api/anchors/anchor_json.hpp"
 #include "api/anchors/site_json.hpp"
 #include "api/wire/budget_json.hpp"
-#include "api/wire/words.hpp"
 
 namespace anchord::api {
 
@@ -17,7 +16,7 @@ Ordered calibration_json(const Calibration& calibration, bool with_anchors) {
   Ordered out{{"id", to_string(calibration.id)},
               {"created_at", to_rfc3339(calibration.created)},
               {"missions", std::move(missions)},
-              {"frame", word_of(k_frame_words, calibration.frame)},
+              {"frame", k_frame_words.word(calibration.frame)},
               {"origin", wgs84_json(calibration.origin)}};
   auto settings = Ordered::parse(calibration.settings_json, nullptr, false);
   out["settings"] = settings.is_discarded() ? Ordered::object() : std::move(settings);

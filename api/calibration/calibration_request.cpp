@@ -7,7 +7,6 @@
 #include "api/calibration/clues_json.hpp"
 #include "api/formats/flight_json.hpp"
 #include "api/kit/reader.hpp"
-#include "api/wire/words.hpp"
 #include "core/base/to_wire.hpp"
 
 namespace anchord::api {
@@ -18,21 +17,11 @@ namespace {
 
 constexpr double k_far_m = 20'000;  // of the origin, as for the track
 
-constexpr auto k_solvers =
-    std::to_array<Word<anchord::Method>>({{"gauss_newton", anchord::Method::gauss_newton},
-                                          {"levenberg_marquardt", anchord::Method::levenberg_marquardt},
-                                          {"dogleg", anchord::Method::dogleg}});
-constexpr auto k_weights = std::to_array<Word<Weights>>(
-    {{"inverse_variance", Weights::inverse_variance}, {"dissertation", Weights::as_printed}});
-constexpr auto k_losses = std::to_array<Word<Loss>>(
-    {{"none", Loss::none}, {"huber", Loss::huber}, {"cauchy", Loss::cauchy}, {"tukey", Loss::tukey}});
-
 /// A word, or where to begin for each anchor that is named.
 void read_initial(Fields& fields, const Json& initial, FlightOptions& options,
                   std::vector<FieldError>& errors) {
   if (initial.is_string()) {
-    const auto word = fields.word("initial", {"search", "bearing_height"});
-    options.start_at_clues = word && *word == 1;
+    options.start_at_clues = fields.word("initial", k_initial_words).value_or(false);
     return;
   }
   if (!initial.is_object() || initial.size() > 1000)
@@ -74,11 +63,11 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
   read_ids("learn_from", out.learn_from);
   auto& options = out.options;
   if (const auto dims = fields.integer("dims", 2, 3)) options.dims = *dims == 2 ? Dims::two : Dims::three;
-  if (const auto solver = value_of_word(fields, "solver", k_solvers)) options.method = *solver;
-  if (const auto weights = value_of_word(fields, "weights", k_weights)) options.weights = *weights;
+  if (const auto solver = fields.word("solver", k_solver_words)) options.method = *solver;
+  if (const auto weights = fields.word("weights", k_weights_words)) options.weights = *weights;
   if (const Json* loss = fields.child("loss")) {
     Fields inner(*loss, "/loss", errors);
-    if (const auto type = value_of_word(inner, "type", k_losses, true)) options.loss = *type;
+    if (const auto type = inner.word("type", k_loss_words, true)) options.loss = *type;
     // The robust scale comes from the residuals themselves; `scale` stretches it, 1.5 being the neutral value
     // of api.md.
     if (const auto scale = inner.number("scale", 0.1, 10)) options.mad_factor *= *scale / 1.5;
@@ -100,11 +89,11 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
       options.height_prior = {*height, *sigma};
   }
   if (const auto gap = fields.number("max_gap_s", 0.01, 10)) options.max_gap_s = *gap;
-  if (const auto fix = value_of_word(fields, "min_fix", k_fix_words)) options.min_fix = *fix;
+  if (const auto fix = fields.word("min_fix", k_fix_words)) options.min_fix = *fix;
   out.max_correction_age_s = fields.number("max_correction_age_s", 0.1, 3600);
   out.max_speed_mps = fields.number("max_speed_mps", 1, 1000);
   out.max_acceleration_mps2 = fields.number("max_acceleration_mps2", 1, 1000);
-  if (const auto profile = fields.word("profile", {"kit", "none"})) out.use_profile = *profile == 0;
+  if (const auto profile = fields.word("profile", k_profile_words)) out.use_profile = *profile;
   if (const auto steps = fields.integer("iterations", 0, 50)) out.iterations = static_cast<int>(*steps);
   if (const Json* sigma = fields.child("sigma_m")) {
     Fields inner(*sigma, "/sigma_m", errors);

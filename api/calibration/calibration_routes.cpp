@@ -60,7 +60,7 @@ Response list(CalibrationApi& s, const Request& request) {
         Ordered item = calibration_json(calibration, false);
         std::map<std::string, int> verdicts;
         for (const auto& estimate : calibration.anchors)
-          ++verdicts[std::string(verdict_word(estimate.verdict))];
+          ++verdicts[std::string(k_verdict_words.word(estimate.verdict))];
         item["n_anchors"] = calibration.anchors.size();
         item["verdicts"] = verdicts;
         return item;
@@ -96,7 +96,7 @@ std::vector<Gate> failures(const Estimate& estimate) {
   std::vector<Gate> out;
   if (estimate.verdict != Verdict::ok)
     out.push_back({"verdict", std::nullopt, 0, false,
-                   std::string(verdict_word(estimate.verdict)) + ": " + estimate.reason});
+                   std::string(k_verdict_words.word(estimate.verdict)) + ": " + estimate.reason});
   for (const auto& gate : estimate.gates) {
     if (!gate.passed) out.push_back(gate);
   }
@@ -284,7 +284,7 @@ Response publish(CalibrationApi& s, const Request& request) {
     Ordered gates = Ordered::array();
     for (const auto& gate : failures(estimate)) gates.push_back(gate_json(gate));
     left.push_back({{"network_id", to_string(estimate.anchor)},
-                    {"verdict", verdict_word(estimate.verdict)},
+                    {"verdict", k_verdict_words.word(estimate.verdict)},
                     {"reason", estimate.reason},
                     {"gates", std::move(gates)}});
   }

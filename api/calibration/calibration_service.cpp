@@ -157,7 +157,7 @@ Json exclusions_provenance(const std::vector<Exclusion>& exclusions) {
     if (!e.applies()) continue;
     digest.add(std::string_view(exclusion_canonical(e)));
     items.push_back({{"id", to_string(e.id)},
-                     {"kind", e.selection.kind == RowKind::ranges ? "ranges" : "fixes"},
+                     {"kind", k_row_kind_words.word(e.selection.kind)},
                      {"n_rows", e.n_rows},
                      {"reason", e.reason},
                      {"by", e.by}});

@@ -31,6 +31,11 @@ class JobContext;
 class KitProfiles;
 class JobService;
 
+/// Where the search of each anchor begins: true at its bearing and height.
+inline constexpr auto k_initial_words = enum_table<bool>({{"search", false}, {"bearing_height", true}});
+/// Whether the profile of the kit is used.
+inline constexpr auto k_profile_words = enum_table<bool>({{"kit", true}, {"none", false}});
+
 /// A batch solve as asked for.
 struct CalibrationRequest {
   std::vector<MissionId> missions;

@@ -21,7 +21,7 @@ double millimetres(double value) { return std::round(value * 1e4) / 1e4; }
 Ordered side(const PlacedEstimate* at) {
   if (at == nullptr) return nullptr;
   const auto& e = at->estimate;
-  return {{"verdict", verdict_word(e.verdict)},
+  return {{"verdict", k_verdict_words.word(e.verdict)},
           {"acceptable", e.acceptable()},
           {"h95_m", e.best ? Ordered(millimetres(e.h95_m)) : Ordered(nullptr)},
           {"v95_m", e.best ? Ordered(millimetres(e.v95_m)) : Ordered(nullptr)},

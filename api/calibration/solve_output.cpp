@@ -70,8 +70,8 @@ Json anchor_json(const AnchorSolution& anchor, bool globe) {
   Json json;
   json["anchor_id"] = anchor.name;
   json["network_id"] = to_string(e.anchor);
-  json["verdict"] = word(e.verdict);
-  json["determined"] = word(anchor.determined);
+  json["verdict"] = k_verdict_words.word(e.verdict);
+  json["determined"] = k_determined_words.word(anchor.determined);
   json["reason"] = e.reason;
   if (e.best) {
     put_place(json, *e.best, globe);
@@ -143,7 +143,7 @@ Json flight_json(const SolvedFlight& flight) {
   Json json;
   json["name"] = mission.name;
   json["kit"] = mission.kit;
-  json["frame"] = globe ? "wgs84" : "local";
+  json["frame"] = k_frame_words.word(globe ? TrackFrame::wgs84 : TrackFrame::local);
   json["origin"] = nullptr;
   if (s.origin) {
     json["origin"] = {{"lon", number(s.origin->lon_deg, 9)},
@@ -205,20 +205,6 @@ std::string geojson(std::span<const SolvedFlight> flights) {
 }
 
 }  // namespace
-
-std::string_view word(Verdict verdict) { return api::verdict_word(verdict); }
-
-std::string_view word(Determined determined) {
-  switch (determined) {
-    case Determined::none:
-      return "none";
-    case Determined::horizontal:
-      return "horizontal";
-    case Determined::position:
-      return "position";
-  }
-  return "none";
-}
 
 std::string solve_output(std::span<const SolvedFlight> flights, SolveFormat format) {
   switch (format) {

@@ -14,6 +14,10 @@ struct FlightModelsReport;
 }
 
 enum class SolveFormat : std::uint8_t { table, json, geojson, csv };
+inline constexpr auto k_solve_format_words = enum_table<SolveFormat>({{"table", SolveFormat::table},
+                                                                      {"json", SolveFormat::json},
+                                                                      {"geojson", SolveFormat::geojson},
+                                                                      {"csv", SolveFormat::csv}});
 
 /// A solved flight with what it was told.
 struct SolvedFlight {
@@ -26,9 +30,5 @@ struct SolvedFlight {
 /// Text of `anchord solve`, newline at the end. Schema in docs/formats.md; longitudes and latitudes with 9
 /// decimals (0.1 mm), metres with 4. In a local frame GeoJSON features have no geometry.
 std::string solve_output(std::span<const SolvedFlight> flights, SolveFormat format);
-
-/// Words of the interfaces.
-std::string_view word(Verdict verdict);
-std::string_view word(Determined determined);
 
 }  // namespace anchord

@@ -68,8 +68,8 @@ std::string solve_table(std::span<const SolvedFlight> flights) {
       } else {
         append(out, "%15s %15s %10s %8s %8s", "-", "-", "-", "-", "-");
       }
-      append(out, " %-14s %7.2f %8zu %8zu\n", std::string(word(e.verdict)).c_str(), e.gdop.value_or(0.0),
-             e.n_used, total(e.refused));
+      append(out, " %-14s %7.2f %8zu %8zu\n", std::string(k_verdict_words.word(e.verdict)).c_str(),
+             e.gdop.value_or(0.0), e.n_used, total(e.refused));
       if (e.mirror) {
         append(out, "%-10s ", "  or");
         append_place(out, *e.mirror, globe);
@@ -100,7 +100,8 @@ std::string solve_csv(std::span<const SolvedFlight> flights) {
     for (const auto& anchor : flight.solution->anchors) {
       const Estimate& e = anchor.estimate;
       out += field(flight.solution->name) + "," + field(anchor.name) + "," + to_string(e.anchor) + ",";
-      out += std::string(word(e.verdict)) + "," + std::string(word(anchor.determined)) + ",";
+      out += std::string(k_verdict_words.word(e.verdict)) + "," +
+             std::string(k_determined_words.word(anchor.determined)) + ",";
       if (e.best && e.best->wgs84) {
         append(out, "%.9f,%.9f,%.4f,", e.best->wgs84->lon_deg, e.best->wgs84->lat_deg,
                e.best->wgs84->height_m);

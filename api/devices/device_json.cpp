@@ -16,7 +16,7 @@ using Ordered = nlohmann::ordered_json;
 
 namespace {
 
-const std::vector<std::string_view> k_kinds{"gnss", "pozyx", "ntrip"};
+constexpr std::array<std::string_view, 3> k_kinds{"gnss", "pozyx", "ntrip"};
 
 Ordered network_id(const DeviceReport& d) {
   return d.network_id ? Ordered(to_string(*d.network_id)) : Ordered(nullptr);
@@ -78,7 +78,7 @@ Ordered device_json(const DeviceReport& d) {
   out["dropped"] = std::move(dropped);
   if (d.rover) {
     out["rover"] = {{"t_us", d.rover->time.us()},
-                    {"fix", fix_word(d.rover->fix)},
+                    {"fix", k_fix_words.word(d.rover->fix)},
                     {"satellites", or_null(d.rover->satellites)},
                     {"age_s", or_null(d.rover->age_s)},
                     {"sigma_h_m", or_null(d.rover->sigma_h_m)},
@@ -133,7 +133,7 @@ Ordered clock_json(const DeviceClock& c) {
 void patch_device(const Json& body, bool whole, DeviceConfig& device, std::vector<FieldError>& errors) {
   Fields fields(body, "", errors);
   if (!fields.is_object()) return;
-  if (const auto kind = fields.word("kind", k_kinds, whole)) device.kind = k_kinds[*kind];
+  if (auto kind = fields.word("kind", k_kinds, whole)) device.kind = *std::move(kind);
   if (const auto name = fields.text("name", 200)) device.name = *name;
   if (const auto address = fields.text("address", 500, whole)) device.address = *address;
   if (const auto enabled = fields.boolean("enabled")) device.enabled = *enabled;

@@ -48,7 +48,7 @@ Response list(DeviceApi& s, const Request& request) {
   }
   for (const auto& radio : value_or_problem(s.measurements.devices(mission))) {
     items.push_back({{"network_id", to_string(radio.network_id)},
-                     {"kind", radio.kind == DeviceSeen::Kind::tag ? "tag" : "anchor"},
+                     {"kind", k_radio_words.word(radio.kind)},
                      {"mission", to_string(radio.mission)},
                      {"first_seen_us", radio.first_seen.us()},
                      {"last_seen_us", radio.last_seen.us()},

@@ -1,3 +1,4 @@
+#include <array>
 #include <nlohmann/json.hpp>
 
 #include "api/admin/event_log.hpp"
@@ -14,7 +15,9 @@ using Ordered = nlohmann::ordered_json;
 
 namespace {
 
-const std::vector<std::string_view> k_control{"take", "renew", "release", "ask", "refuse"};
+using flight::ControlAction;
+using flight::k_control_words;
+constexpr std::array<std::string_view, 2> k_lists{"fence", "route"};
 
 Ordered lease_json(const Lease& lease, bool with_key) {
   Ordered out{{"held", true},
@@ -49,29 +52,31 @@ Response control(FlightApi& s, const Request& request) {
   std::vector<FieldError> errors;
   const auto body = json_body(request);
   Fields fields(body, "", errors);
-  const auto action = fields.word("action", k_control, true);
-  const auto key = fields.text("lease", 64, action.value_or(0) != 0 && action != 3);
+  const auto action = fields.word("action", k_control_words, true);
+  const bool needs_lease = action && action != ControlAction::take && action != ControlAction::ask;
+  const auto key = fields.text("lease", 64, needs_lease);
   const bool by_force = fields.boolean("force").value_or(false);
   fields.finish();
   refuse_if_any(errors);
-  const auto done = std::string("control.") + std::string(k_control[*action]) + ' ' + to_string(mission);
-  if (*action == 0) {
+  const auto done =
+      std::string("control.") + std::string(k_control_words.word(*action)) + ' ' + to_string(mission);
+  if (action == ControlAction::take) {
     const auto lease = granted(s.flights.take_control(mission, request.principal, by_force));
     s.audit.soon(request, done + (by_force ? " by force" : ""));
     return json_response(200, lease_json(lease, true));
   }
-  if (*action == 3) {
+  if (action == ControlAction::ask) {
     auto asked = ask_for_control(s, request, mission);
     s.audit.soon(request, done);
     return asked;
   }
-  if (*action == 4) {
+  if (action == ControlAction::refuse) {
     const auto lease = granted(s.flights.renew_control(mission, *key, request.principal));
     s.events.add("info", "control.refused", lease.name + " keeps control", mission);
     s.audit.soon(request, done);
     return json_response(200, lease_json(lease, true));
   }
-  if (*action == 1)
+  if (action == ControlAction::renew)
     return json_response(
         200, lease_json(granted(s.flights.renew_control(mission, *key, request.principal)), true));
   granted(s.flights.release_control(mission, *key, request.principal));
@@ -136,18 +141,14 @@ Response profiles(FlightApi& s, const Request& request,
   return response;
 }
 
-const std::vector<std::string_view> k_actions{"start",  "hold", "resume", "skip",
-                                              "return", "land", "abort",  "disarm"};
-
 /// The part of POST /missions/{id}/actions that moves an aircraft. Whatever it answers is in the audit log.
-Response act_in_flight(FlightApi& s, const Request& request, const std::string& action, Fields& fields,
+Response act_in_flight(FlightApi& s, const Request& request, const std::string& word, Fields& fields,
                        std::vector<FieldError>& errors) {
-  static const std::vector<std::string_view> k_modes{"auto", "manual"};
   const auto mission = path_id<MissionId>(request);
   FlightService::Order order;
-  order.action = action;
+  order.action = value_or_problem(flight::k_flight_action_words.parse("action", word));
   order.lease = fields.text("lease", 64).value_or("");
-  if (action == "start") {
+  if (order.action == flight::FlightAction::start) {
     if (const auto text = fields.text("plan", 36, true)) {
       const auto id = parse_uuid(*text);
       if (id)
@@ -155,11 +156,11 @@ Response act_in_flight(FlightApi& s, const Request& request, const std::string& 
       else
         fields.error("plan", "bad_id", id.error().message);
     }
-    order.manual = fields.word("mode", k_modes).value_or(0) == 1;
+    order.manual = fields.word("mode", flight::k_flight_mode_words).value_or(false);
   }
   fields.finish();
   refuse_if_any(errors);
-  const std::string what = "mission." + action + ' ' + to_string(mission);
+  const std::string what = "mission." + word + ' ' + to_string(mission);
   auto command = s.flights.act(mission, order, request.principal);
   if (!command) {
     s.audit.soon(request, what, "refused: " + command.error().message);
@@ -174,7 +175,6 @@ Response act_in_flight(FlightApi& s, const Request& request, const std::string& 
 
 /// The aircraft's own lists. What is asked for is in the audit log, as every command.
 Response upload(FlightApi& s, const Request& request) {
-  static const std::vector<std::string_view> k_lists{"fence", "route"};
   const auto mission = named_mission(s.missions, request).id;
   std::vector<FieldError> errors;
   const auto body = json_body(request);
@@ -191,7 +191,8 @@ Response upload(FlightApi& s, const Request& request) {
   }
   fields.finish();
   refuse_if_any(errors);
-  const std::string list(k_lists[*what]), audited = "mission.upload " + list + ' ' + to_string(mission);
+  const std::string& list = *what;
+  const std::string audited = "mission.upload " + list + ' ' + to_string(mission);
   auto command = s.flights.upload(mission, list, plan, lease, request.principal);
   if (!command) {
     s.audit(request, audited, "refused: " + command.error().message);
@@ -236,10 +237,11 @@ Response change_aircraft(FlightApi& s, const Request& request) {
 }  // namespace
 
 FlightActions flight_actions(FlightApi& s) {
-  return {k_actions, [&s](const Request& request, const std::string& action, Fields& fields,
-                          std::vector<FieldError>& errors) {
-            return act_in_flight(s, request, action, fields, errors);
-          }};
+  const auto words = flight::k_flight_action_words.words();
+  return {
+      {words.begin(), words.end()},
+      [&s](const Request& request, const std::string& action, Fields& fields,
+           std::vector<FieldError>& errors) { return act_in_flight(s, request, action, fields, errors); }};
 }
 
 void add_flight_routes(Router& router, FlightApi& s) {

@@ -225,7 +225,7 @@ flight::Groundwork FlightService::State::groundwork(const Plan* plan) {
 Result<FlightCommand> FlightService::act(const MissionId& mission, const Order& order, const Principal& who) {
   BOOST_OUTCOME_TRY(const auto record, state_->deps.missions.mission(mission));
   std::optional<Plan> plan;
-  if (order.action == "start") {
+  if (order.action == flight::FlightAction::start) {
     if (!order.plan) return make_error(Errc::invalid_argument, "start needs the plan that is to be flown");
     BOOST_OUTCOME_TRY(const auto stored, state_->deps.plans.plan(*order.plan));
     plan = plan_of(stored);
@@ -280,7 +280,8 @@ FlightCommand FlightService::settled(FlightCommand command, double wait_s) {
     const auto& operations = now.operations;
     if (const auto* found = operations.command(command.number)) command = *found;
     // A newer command ends the wait: who waits holds a thread that the next command may need.
-    return command.state != "sent" || now.stopping || operations.newest_by_person() > command.number;
+    return command.state != CommandState::sent || now.stopping ||
+           operations.newest_by_person() > command.number;
   };
   (void)w.wait_for(state_->changed, std::chrono::duration<double>(wait_s), latest);
   return command;

@@ -80,7 +80,7 @@ class FlightService final : public MissionObserver, public MissionControl {
   std::optional<MissionId> flown_with(const PlanId& plan);
 
   struct Order {
-    std::string action;  ///< start, hold, resume, skip, return, land, abort
+    flight::FlightAction action{};
     std::string lease;
     std::optional<PlanId> plan{};  ///< of start
     bool manual{false};            ///< of start: a pilot flies, although there is an aircraft to command

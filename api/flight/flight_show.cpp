@@ -64,7 +64,7 @@ nlohmann::ordered_json FlightService::State::procedure(const flight::Operations&
   v.plan = f.plan.id.uuid == Uuid{} ? "" : to_string(f.plan.id);
   v.name = f.plan.name;
   v.plan_revision = f.plan.version;
-  v.mode = f.manual ? "manual" : "auto";
+  v.mode = flight::k_flight_mode_words.word(f.manual);
   v.status = f.status();
   v.ended = f.ended();
   v.forecast = f.forecast;

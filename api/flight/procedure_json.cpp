@@ -91,7 +91,7 @@ Ordered drone_json(const DroneStatus& d) {
 }
 
 Ordered flight_command_json(const FlightCommand& c) {
-  return {{"number", c.number}, {"action", c.action}, {"state", c.state},
+  return {{"number", c.number}, {"action", c.action}, {"state", to_string(c.state)},
           {"text", c.text},     {"by", c.by},         {"t_us", c.at.us()}};
 }
 
@@ -113,7 +113,7 @@ Ordered procedure_json(const ProcedureView& v, const procedure::FlightEngine& en
               {"plan_name", v.name},
               {"plan_revision", v.plan_revision},
               {"mode", v.mode},
-              {"status", v.status},
+              {"status", flight::k_flight_status_words.word(v.status)},
               {"step", procedure::to_string(s.step)},
               {"reason", s.reason},
               {"ended", v.ended.empty() ? Ordered(nullptr) : Ordered(v.ended)},
@@ -254,8 +254,8 @@ std::optional<procedure::State> state_of(const nlohmann::json& j) {
   };
   try {
     procedure::State s;
-    const auto step = procedure::step_of(j.at("step").get<std::string>());
-    const auto interrupted = procedure::step_of(j.at("interrupted").get<std::string>());
+    const auto step = procedure::k_step_words.find(j.at("step").get<std::string>());
+    const auto interrupted = procedure::k_step_words.find(j.at("interrupted").get<std::string>());
     if (!step || !interrupted) return std::nullopt;
     s.step = *step;
     s.interrupted = *interrupted;

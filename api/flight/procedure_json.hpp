@@ -31,9 +31,9 @@ struct ProcedureView {
   std::string plan;  ///< id, or empty
   std::string name;  ///< of the plan
   std::uint64_t plan_revision{};
-  std::string mode;    ///< auto, manual
-  std::string status;  ///< ready, running, hold, return, landing, done, aborted
-  std::string ended;   ///< why the work is over, empty while it goes on
+  std::string mode;  ///< auto, manual
+  flight::FlightStatus status{};
+  std::string ended;  ///< why the work is over, empty while it goes on
   std::optional<planning::FlightTime> forecast{};
   std::int64_t t_us{};
   double now_s{};

@@ -10,6 +10,7 @@
 
 #include "api/formats/cells.hpp"
 #include "api/formats/column_names.hpp"
+#include "api/formats/csv_record.hpp"
 #include "api/kit/reader.hpp"
 #include "api/wire/rows_json.hpp"
 #include "core/base/text.hpp"
@@ -63,7 +64,11 @@ struct Fault {
   std::string column{}, detail{};
 
   void set(const char* why, std::string_view where, std::string what) {
-    if (!reason) reason = why, column = where, detail = std::move(what);
+    if (!reason) {
+      reason = why;
+      column = where;
+      detail = std::move(what);
+    }
   }
 };
 
@@ -141,21 +146,17 @@ class Importer {
 
   void take_csv(std::string_view line, std::size_t at) {
     if (header_.empty()) separator_ = separator_of(line);
-    std::vector<std::string_view> cells;
-    for (std::string_view rest = line;;) {
-      const auto comma = rest.find(separator_);
-      auto cell = trimmed(rest.substr(0, comma));
-      if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"')
-        cell = cell.substr(1, cell.size() - 2);
-      cells.push_back(cell);
-      if (comma == std::string_view::npos) break;
-      rest.remove_prefix(comma + 1);
-    }
+    CsvRecord record({separator_});
+    const auto read = record.read(line);
+    const auto& cells = record.cells();
     if (header_.empty()) {
+      if (!read)
+        fatal_ = make_error(Errc::bad_frame, "line " + std::to_string(at) + ": " + read.error().message);
       header_.assign(cells.begin(), cells.end());
       return;
     }
     ++out_.report.lines;
+    if (!read) return refuse(at, {k_unreadable, {}, read.error().message});
     if (cells.size() != header_.size())
       return refuse(at, {k_unreadable, {}, wrong_cell_count(cells.size(), header_.size(), separator_)});
     Row row;
@@ -259,11 +260,15 @@ class Importer {
     m.t_s = value({"t_s", "unix_s", "time_s"}, -k_any, k_any);
     if (!m.t_s)
       if (const auto ms = value({"t_ms", "timestamp_ms"}, -k_any, k_any)) m.t_s = *ms / 1000;
-    m.rx_dbm = value(k_rx, -200, 50), m.fp_dbm = value(k_fp, -200, 50);
-    m.fp_amp1 = value(k_f1, 0, k_register), m.fp_amp2 = value(k_f2, 0, k_register);
-    m.fp_amp3 = value(k_f3, 0, k_register), m.cir_power = value(k_cir_power, 0, k_register);
+    m.rx_dbm = value(k_rx, -200, 50);
+    m.fp_dbm = value(k_fp, -200, 50);
+    m.fp_amp1 = value(k_f1, 0, k_register);
+    m.fp_amp2 = value(k_f2, 0, k_register);
+    m.fp_amp3 = value(k_f3, 0, k_register);
+    m.cir_power = value(k_cir_power, 0, k_register);
     m.preamble_count = value(k_count, 0, k_register);
-    m.std_noise = value(k_std_noise, 0, k_register), m.max_noise = value(k_max_noise, 0, k_register);
+    m.std_noise = value(k_std_noise, 0, k_register);
+    m.max_noise = value(k_max_noise, 0, k_register);
     m.fp_index = value(k_fp_index, 0, k_register);
     if (fault.reason) return refuse(at, std::move(fault));
     m.range_m = *range_m;
@@ -286,7 +291,9 @@ class Importer {
                          found->first + " impossible: " + in_quotes(found->second));
       out = parsed;
     };
-    text(k_site_name, site.name), text(k_environment, site.environment), text({"material"}, site.material);
+    text(k_site_name, site.name);
+    text(k_environment, site.environment);
+    text({"material"}, site.material);
     value(k_campaign_truth, 1e-3, k_furthest_m, site.distance_m);
     // In a .txt header and beside a range column, distance_m is the truth.
     if (find(row, k_measured) || find(row, k_measured_mm) || row.size() == 1)
@@ -368,8 +375,10 @@ class Importer {
     auto& measurements = out_.campaign.measurements;
     std::vector<double> range;
     std::vector<std::uint32_t> site;
-    for (const auto& m : measurements)
-      range.push_back(m.range_m), site.push_back(static_cast<std::uint32_t>(m.site));
+    for (const auto& m : measurements) {
+      range.push_back(m.range_m);
+      site.push_back(static_cast<std::uint32_t>(m.site));
+    }
     std::vector<bool> outlier(measurements.size(), false);
     if (options_.filter)
       for (const auto i : ml::range_outliers(range, site, options_.outlier_mads, options_.outlier_floor_m))
@@ -431,11 +440,19 @@ LabelledTable table_of(const Campaign& campaign) {
     const auto [at, fresh] = places.try_emplace(place, static_cast<std::uint32_t>(places.size()));
     if (fresh) out.group_names.push_back(place);
     nlos::DiagnosticSample s;
-    s.range_m = m.range_m, s.rx_dbm = m.rx_dbm, s.fp_dbm = m.fp_dbm;
-    s.fp_amp1 = m.fp_amp1, s.fp_amp2 = m.fp_amp2, s.fp_amp3 = m.fp_amp3;
-    s.cir_power = m.cir_power, s.preamble_count = m.preamble_count;
-    s.std_noise = m.std_noise, s.max_noise = m.max_noise, s.fp_index = m.fp_index;
-    s.height_difference_m = site.height_m, s.heading_deg = site.heading_deg;
+    s.range_m = m.range_m;
+    s.rx_dbm = m.rx_dbm;
+    s.fp_dbm = m.fp_dbm;
+    s.fp_amp1 = m.fp_amp1;
+    s.fp_amp2 = m.fp_amp2;
+    s.fp_amp3 = m.fp_amp3;
+    s.cir_power = m.cir_power;
+    s.preamble_count = m.preamble_count;
+    s.std_noise = m.std_noise;
+    s.max_noise = m.max_noise;
+    s.fp_index = m.fp_index;
+    s.height_difference_m = site.height_m;
+    s.heading_deg = site.heading_deg;
     out.features.push_back(nlos::compute_features(s));
     out.range_m.push_back(m.range_m);
     out.true_range_m.push_back(site.distance_m);
@@ -467,12 +484,29 @@ std::string campaign_csv(const Campaign& campaign) {
   };
   for (const auto& m : campaign.measurements) {
     const auto& s = campaign.sites[m.site];
-    word(s.name), out += ',', word(s.environment), out += ',', word(s.material);
-    put(s.distance_m), put(s.heading_deg), put(s.height_m), put(s.thickness_m);
+    word(s.name);
+    out += ',';
+    word(s.environment);
+    out += ',';
+    word(s.material);
+    put(s.distance_m);
+    put(s.heading_deg);
+    put(s.height_m);
+    put(s.thickness_m);
     out += s.los ? (*s.los ? ",1" : ",0") : ",";
-    put(s.truth_sd_m), put(m.t_s), put(m.range_m), put(m.rx_dbm), put(m.fp_dbm), put(m.fp_amp1);
-    put(m.fp_amp2), put(m.fp_amp3), put(m.cir_power), put(m.preamble_count), put(m.std_noise);
-    put(m.max_noise), put(m.fp_index);
+    put(s.truth_sd_m);
+    put(m.t_s);
+    put(m.range_m);
+    put(m.rx_dbm);
+    put(m.fp_dbm);
+    put(m.fp_amp1);
+    put(m.fp_amp2);
+    put(m.fp_amp3);
+    put(m.cir_power);
+    put(m.preamble_count);
+    put(m.std_noise);
+    put(m.max_noise);
+    put(m.fp_index);
     out += '\n';
   }
   return out;

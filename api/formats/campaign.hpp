@@ -14,6 +14,11 @@
 namespace anchord::api {
 
 enum class CampaignFormat { detect, csv, ndjson, txt };
+inline constexpr auto k_campaign_format_words =
+    enum_table<CampaignFormat>({{"detect", CampaignFormat::detect},
+                                {"csv", CampaignFormat::csv},
+                                {"ndjson", CampaignFormat::ndjson},
+                                {"txt", CampaignFormat::txt}});
 
 struct CampaignOptions {
   CampaignFormat format{CampaignFormat::detect};

@@ -39,9 +39,17 @@ Json course_json(const Course& course) {
     Json& list = out[to_string(id)] = Json::array();
     for (const auto& s : steps)
       list.push_back({rounded(s.share, 1e4), s.n_ranges, place(s.raw_m), place(s.corrected_m),
-                      rounded(s.h95_m, 1e4), static_cast<int>(s.verdict)});
+                      rounded(s.h95_m, 1e4), k_verdict_words.word(s.verdict)});
   }
   return out;
+}
+
+/// What was kept by versions before 0.2 has numbers in place of the words.
+Verdict verdict_of(const Json& json) {
+  if (const auto word = json.is_string() ? k_verdict_words.find(json.get_ref<const std::string&>())
+                                         : k_verdict_words.of_number(json.get<std::int64_t>()))
+    return *word;
+  throw std::invalid_argument("unknown verdict " + to_wire(json));
 }
 
 Course parse_course(const Json& json) {
@@ -55,7 +63,7 @@ Course parse_course(const Json& json) {
       step.raw_m = place(s.at(2));
       step.corrected_m = place(s.at(3));
       step.h95_m = number(s.at(4));
-      step.verdict = static_cast<Verdict>(std::clamp(s.at(5).get<int>(), 0, 4));
+      step.verdict = verdict_of(s.at(5));
       steps.push_back(step);
     }
   }

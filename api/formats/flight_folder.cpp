@@ -11,7 +11,6 @@
 #include "api/formats/csv_table.hpp"
 #include "api/formats/flight_json.hpp"
 #include "api/wire/exclusion_json.hpp"
-#include "api/wire/words.hpp"
 #include "core/base/text.hpp"
 
 namespace anchord {
@@ -111,7 +110,7 @@ class PoseColumns {
         {{"2", FixClass::rtk_fixed}, {"1", FixClass::rtk_float}, {"0", FixClass::single}});
     const auto text = table.text(*fix_);
     if (const auto fix = api::value_of(digits, text)) return *fix;
-    if (const auto fix = api::value_of(api::k_fix_words, text)) return *fix;
+    if (const auto fix = k_fix_words.find(text)) return *fix;
     return table.error("fix: '" + to_utf8(table.text(*fix_), 20) +
                        "', expected 2 (fixed), 1 (float), 0 (neither), or fixed, float, dgps, single, none");
   }

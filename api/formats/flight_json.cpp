@@ -5,7 +5,6 @@
 #include <initializer_list>
 #include <nlohmann/json.hpp>
 
-#include "api/wire/words.hpp"
 #include "core/base/to_wire.hpp"
 
 namespace anchord {
@@ -63,16 +62,16 @@ class Reader {
 void read_track(Reader r, FlightDeclaration& flight, const std::string& file, std::optional<Error>& error) {
   r.allow({"frame", "point", "in", "attitude", "heading_column", "heading_enu_ccw_from_east_deg"});
   const std::string frame = r.text("frame", true);
-  if (const auto known = api::value_of(api::k_frame_words, frame)) {
+  if (const auto known = k_frame_words.find(frame)) {
     flight.mission.frame = *known;
   } else {
-    r.fail("'frame' is '" + frame + "', expected wgs84 or local");
+    r.fail("'frame' is '" + frame + "', expected one of " + list_of(k_frame_words.words()));
   }
   const std::string point = r.text("point", true);
-  if (const auto known = api::value_of(api::k_point_words, point)) {
+  if (const auto known = k_point_words.find(point)) {
     flight.mission.point = *known;
   } else {
-    r.fail("'point' is '" + point + "', expected gnss_antenna, body or tag_antenna");
+    r.fail("'point' is '" + point + "', expected one of " + list_of(k_point_words.words()));
   }
   const std::string in = r.text("in", false);
   if (!in.empty() && in != "ranges" && in != "track")
@@ -199,8 +198,8 @@ Result<void> write_flight_json(const FlightDeclaration& flight, const std::files
   if (!mission.kit.empty()) json["kit"] = mission.kit;
   if (!mission.radio.empty()) json["radio"] = mission.radio;
   json["epoch_utc"] = to_rfc3339(flight.epoch);
-  json["track"]["frame"] = api::word_of(api::k_frame_words, mission.frame);
-  json["track"]["point"] = api::word_of(api::k_point_words, mission.point);
+  json["track"]["frame"] = k_frame_words.word(mission.frame);
+  json["track"]["point"] = k_point_words.word(mission.point);
   if (flight.quaternion) json["track"]["attitude"] = "quaternion_xyzw";
   json["tags"] = Json::array();
   for (const auto& tag : mission.tags) {

@@ -6,7 +6,6 @@
 #include "api/formats/flight_folder.hpp"
 #include "api/formats/flight_json.hpp"
 #include "api/wire/exclusion_json.hpp"
-#include "api/wire/words.hpp"
 
 namespace anchord {
 namespace {
@@ -20,7 +19,7 @@ void row(std::ofstream& out, const char* format, Args... args) {
 }
 
 /// Of a literal, so it ends with a 0.
-const char* word(FixClass fix) { return api::word_of(api::k_fix_words, fix).data(); }
+const char* word(FixClass fix) { return k_fix_words.word(fix).data(); }
 
 Result<void> closed(std::ofstream& out, const std::filesystem::path& file) {
   out.close();

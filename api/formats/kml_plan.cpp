@@ -6,9 +6,10 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <pugixml.hpp>
 
 #include "api/formats/qgc_plan.hpp"
-#include "api/formats/xml_tree.hpp"
+#include "api/formats/xml_document.hpp"
 #include "api/kit/reader.hpp"
 #include "core/base/text.hpp"
 
@@ -36,17 +37,13 @@ Kind kind_of(std::string_view text) {
   return Kind::unsaid;
 }
 
-/// `Data name="kind"` loses its attribute in our tree: the fields we ask for tell themselves by their values.
-std::string data_of(const XmlNode& placemark) {
+/// The names of the fields are not asked: those we look for tell themselves by their values.
+std::string data_of(const pugi::xml_node& placemark) {
   std::string out;
-  const auto* extended = placemark.child("ExtendedData");
-  if (extended == nullptr) return out;
-  for (const auto& data : extended->children) {
-    out += ' ';
-    out += data.child_text("value");
-    for (const auto& simple : data.children) {
-      if (simple.name == "SimpleData") out += ' ' + simple.text;
-    }
+  for (const auto& data : child_of(placemark, "ExtendedData")) {
+    out += ' ' + child_text(data, "value");
+    for (const auto& simple : data)
+      if (local_name(simple) == "SimpleData") out += ' ' + text_of(simple);
   }
   return out;
 }
@@ -70,17 +67,17 @@ class Reader {
 
   Plan plan;
 
-  void walk(const XmlNode& node, Kind kind) {
-    if (node.name == "Folder" || node.name == "Document") {
-      if (const Kind said = kind_of(node.child_text("name")); said != Kind::unsaid && node.name == "Folder")
-        kind = said;
+  void walk(const pugi::xml_node& node, Kind kind) {
+    const auto name = local_name(node);
+    if (name == "Folder") {
+      if (const Kind said = kind_of(child_text(node, "name")); said != Kind::unsaid) kind = said;
     }
-    if (node.name == "Placemark") return placemark(node, kind);
-    if (node.name == "NetworkLink" || node.name == "GroundOverlay" || node.name == "PhotoOverlay" ||
-        node.name == "ScreenOverlay") {
-      return note(node.name + " was left out: only what the file itself contains is read");
+    if (name == "Placemark") return placemark(node, kind);
+    if (name == "NetworkLink" || name == "GroundOverlay" || name == "PhotoOverlay" ||
+        name == "ScreenOverlay") {
+      return note(std::string(name) + " was left out: only what the file itself contains is read");
     }
-    for (const auto& child : node.children) walk(child, kind);
+    for (const auto& child : node) walk(child, kind);
   }
 
   std::size_t n_placemarks() const { return n_; }
@@ -94,35 +91,43 @@ class Reader {
     if (errors_.size() < 100) errors_.push_back({at_, code, std::move(detail) + name});
   }
 
-  void placemark(const XmlNode& node, Kind folder) {
+  void placemark(const pugi::xml_node& node, Kind folder) {
     at_ = "/Placemark/" + std::to_string(n_++);
-    name_ = to_utf8(node.child_text("name"), 60);
+    name_ = to_utf8(child_text(node, "name"), 60);
     Kind kind = kind_of(data_of(node));
-    if (kind == Kind::unsaid) kind = kind_of(node.child_text("name"));
+    if (kind == Kind::unsaid) kind = kind_of(child_text(node, "name"));
     if (kind == Kind::unsaid) kind = folder;
     bool any = false;
-    for (const auto& child : node.children) any = geometry(child, kind) || any;
+    for (const auto& child : node) any = geometry(child, kind) || any;
     if (!any) note(at_ + " has no point, line or polygon and was left out");
   }
 
-  bool geometry(const XmlNode& node, Kind kind) {
-    if (node.name == "MultiGeometry") {
-      for (const auto& child : node.children) geometry(child, kind);
-      return true;
+  bool geometry(const pugi::xml_node& node, Kind kind) {
+    const auto name = local_name(node);
+    if (name == "MultiGeometry") {
+      for (const auto& child : node) geometry(child, kind);
+    } else if (name == "Polygon") {
+      polygon(node, kind);
+    } else if (name == "Point" || name == "LineString") {
+      waypoints(node, kind);
+    } else if (name == "LinearRing" || name == "Model" || name == "Track" || name == "MultiTrack") {
+      note(at_ + " has a " + std::string(name) + ", which was left out");
+    } else {
+      return false;
     }
-    if (node.name == "Polygon") return polygon(node, kind), true;
-    if (node.name == "Point" || node.name == "LineString") return waypoints(node, kind), true;
-    if (node.name == "LinearRing" || node.name == "Model" || node.name == "Track" ||
-        node.name == "MultiTrack")
-      return note(at_ + " has a " + node.name + ", which was left out"), true;
-    return false;
+    return true;
   }
 
   /// Triples of lon,lat[,height] with white space between them.
-  std::optional<std::vector<Place>> places(const XmlNode& node) {
+  std::optional<std::vector<Place>> places(const pugi::xml_node& node) {
     std::vector<Place> out;
-    std::string_view text = node.child_text("coordinates");
-    if (text.empty()) return fail("required", node.name + " has no coordinates"), std::nullopt;
+    const std::string coordinates = child_text(node, "coordinates");
+    std::string_view text = coordinates;
+    const auto wrong = [&](const char* code, std::string detail) {
+      fail(code, std::move(detail));
+      return std::nullopt;
+    };
+    if (text.empty()) return wrong("required", std::string(local_name(node)) + " has no coordinates");
     while (!text.empty()) {
       const auto space = [](char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; };
       const auto begin =
@@ -144,24 +149,22 @@ class Reader {
           std::all_of(parts.begin(), parts.end(), [](const auto& p) { return p.has_value(); }) &&
           std::abs(*parts[0]) <= 180 && std::abs(*parts[1]) <= 90;
       if (!good) {
-        return fail("out_of_range",
-                    "coordinates must be lon,lat or lon,lat,height in degrees and metres, not " +
-                        to_utf8(one, 60)),
-               std::nullopt;
+        return wrong(
+            "out_of_range",
+            "coordinates must be lon,lat or lon,lat,height in degrees and metres, not " + to_utf8(one, 60));
       }
       out.push_back({{*parts[0], *parts[1]}, parts.size() == 3 ? parts[2] : std::nullopt});
       if (out.size() > k_max_corners)
-        return fail("out_of_range", "more than " + std::to_string(k_max_corners) + " corners"), std::nullopt;
+        return wrong("out_of_range", "more than " + std::to_string(k_max_corners) + " corners");
     }
     return out;
   }
 
-  void polygon(const XmlNode& node, Kind kind) {
-    const auto* outer = node.child("outerBoundaryIs");
-    const auto* ring = outer != nullptr ? outer->child("LinearRing") : nullptr;
-    if (ring == nullptr) return fail("required", "a Polygon needs outerBoundaryIs with a LinearRing");
-    if (node.child("innerBoundaryIs") != nullptr) note(at_ + " has holes, which were left out");
-    const auto corners = places(*ring);
+  void polygon(const pugi::xml_node& node, Kind kind) {
+    const auto ring = child_of(child_of(node, "outerBoundaryIs"), "LinearRing");
+    if (!ring) return fail("required", "a Polygon needs outerBoundaryIs with a LinearRing");
+    if (child_of(node, "innerBoundaryIs")) note(at_ + " has holes, which were left out");
+    const auto corners = places(ring);
     if (!corners) return;
     GeoPolygon area;
     for (const auto& corner : *corners) {
@@ -178,7 +181,7 @@ class Reader {
       plan.outline = std::move(area);
       // Drawn at the height of the roof, it tells that too.
       const auto& roof = corners->front().height_m;
-      if (node.child_text("altitudeMode") == "relativeToGround" && roof && *roof >= 1 && *roof <= 500)
+      if (child_text(node, "altitudeMode") == "relativeToGround" && roof && *roof >= 1 && *roof <= 500)
         plan.building_height_m = *roof;
     } else {
       fail("conflict",
@@ -188,10 +191,10 @@ class Reader {
     }
   }
 
-  void waypoints(const XmlNode& node, Kind kind) {
+  void waypoints(const pugi::xml_node& node, Kind kind) {
     const auto all = places(node);
     if (!all) return;
-    const auto mode = node.child_text("altitudeMode");
+    const auto mode = child_text(node, "altitudeMode");
     for (const auto& place : *all) {
       if (mode != "relativeToGround" || !place.height_m) {
         return fail("required",
@@ -220,18 +223,18 @@ class Reader {
 }  // namespace
 
 Plan read_kml_plan(std::string_view text, std::vector<std::string>& notes, std::vector<FieldError>& errors) {
-  const auto root = parse_xml(text);
-  if (!root) {
-    errors.push_back({"", "malformed", root.error().message});
+  pugi::xml_document document;
+  if (const auto read = read_xml(text, document); !read) {
+    errors.push_back({"", "malformed", read.error().message});
     return {};
   }
-  if (root.value().name != "kml") {
-    errors.push_back(
-        {"", "unknown_value", "the document is " + to_utf8(root.value().name, 40) + ", not kml"});
+  const auto root = document.document_element();
+  if (local_name(root) != "kml") {
+    errors.push_back({"", "unknown_value", "the document is " + to_utf8(local_name(root), 40) + ", not kml"});
     return {};
   }
   Reader reader(notes, errors);
-  reader.walk(root.value(), Kind::unsaid);
+  reader.walk(root, Kind::unsaid);
   if (reader.n_placemarks() == 0 && errors.empty())
     errors.push_back({"", "required", "the file has no Placemark: nothing is drawn in it"});
   return std::move(reader.plan);

@@ -6,6 +6,7 @@
 
 #include "api/formats/cells.hpp"
 #include "api/formats/column_names.hpp"
+#include "api/formats/csv_record.hpp"
 #include "api/formats/gzip_lines.hpp"
 
 namespace anchord::api {
@@ -22,18 +23,8 @@ constexpr std::size_t k_none = static_cast<std::size_t>(-1);
 constexpr std::size_t k_time_blocks = 10;
 constexpr double k_nan = std::numeric_limits<double>::quiet_NaN();
 
-void split(std::string_view line, std::vector<std::string_view>& cells, char separator = ',') {
-  cells.clear();
-  while (true) {
-    const auto comma = line.find(separator);
-    auto cell = line.substr(0, comma);
-    if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"') cell = cell.substr(1, cell.size() - 2);
-    while (!cell.empty() && cell.front() == ' ') cell.remove_prefix(1);
-    while (!cell.empty() && cell.back() == ' ') cell.remove_suffix(1);
-    cells.push_back(cell);
-    if (comma == std::string_view::npos) return;
-    line.remove_prefix(comma + 1);
-  }
+Error at_line(const std::string& file, const GzipLines& lines, const std::string& what) {
+  return make_error(Errc::bad_frame, file + ":" + std::to_string(lines.line_number()) + ": " + what);
 }
 
 double number(std::string_view cell, bool decimal_comma = false) {
@@ -109,19 +100,22 @@ Result<CirTable> read_cir(const std::filesystem::path& path) {
   CirTable out;
   std::vector<std::size_t> joins;
   std::vector<std::pair<std::size_t, std::size_t>> taps;
-  std::vector<std::string_view> cells;
+  CsvRecord record;
   std::vector<float> magnitude;
   std::size_t width = 0;
   for (std::string_view line;;) {
     BOOST_OUTCOME_TRY(const bool more, lines.next(line));
     if (!more) break;
-    split(line, cells);
+    if (const auto read = record.read(line); !read)
+      return at_line(path.string(), lines, read.error().message);
+    const auto& cells = record.cells();
     if (width == 0) {
       width = cells.size();
       for (std::size_t c = 0; c < width; ++c) {
-        if (std::find(k_joins.begin(), k_joins.end(), cells[c]) != k_joins.end())
-          joins.push_back(c), out.join_names.emplace_back(cells[c]);
-        else if (cells[c].size() > 1 && cells[c][0] == 'm' && !std::isnan(number(cells[c].substr(1))))
+        if (std::find(k_joins.begin(), k_joins.end(), cells[c]) != k_joins.end()) {
+          joins.push_back(c);
+          out.join_names.emplace_back(cells[c]);
+        } else if (cells[c].size() > 1 && cells[c][0] == 'm' && !std::isnan(number(cells[c].substr(1))))
           taps.emplace_back(static_cast<std::size_t>(number(cells[c].substr(1))), c);
       }
       std::sort(taps.begin(), taps.end());
@@ -132,9 +126,8 @@ Result<CirTable> read_cir(const std::filesystem::path& path) {
       continue;
     }
     if (cells.size() != width)
-      return make_error(Errc::bad_frame, path.string() + ":" + std::to_string(lines.line_number()) + ": " +
-                                             std::to_string(cells.size()) + " cells, the header has " +
-                                             std::to_string(width));
+      return at_line(path.string(), lines,
+                     std::to_string(cells.size()) + " cells, the header has " + std::to_string(width));
     magnitude.clear();
     for (const auto& [tap, column] : taps) magnitude.push_back(static_cast<float>(number(cells[column])));
     if (std::any_of(magnitude.begin(), magnitude.end(), [](float v) { return std::isnan(v); })) continue;
@@ -158,8 +151,9 @@ class Reader {
     const char separator = separator_of(line);
     decimal_comma_ = separator != ',';
     out_.file_names.push_back(file_);
-    std::vector<std::string_view> cells;
-    split(line, cells, separator);
+    CsvRecord record({separator});
+    const auto& cells = record.cells();
+    if (const auto read = record.read(line); !read) return at_line(file_, lines, read.error().message);
     BOOST_OUTCOME_TRY(take_header(cells));
     std::vector<std::size_t> joins;
     if (cir) {
@@ -174,11 +168,9 @@ class Reader {
       BOOST_OUTCOME_TRY(const bool more, lines.next(line));
       if (!more) break;
       if (line.empty()) continue;
-      split(line, cells, separator);
+      if (const auto read = record.read(line); !read) return at_line(file_, lines, read.error().message);
       if (cells.size() != header_.names.size())
-        return make_error(Errc::bad_frame,
-                          file_ + ":" + std::to_string(lines.line_number()) + ": " +
-                              wrong_cell_count(cells.size(), header_.names.size(), separator));
+        return at_line(file_, lines, wrong_cell_count(cells.size(), header_.names.size(), separator));
       ++out_.rows_read;
       const std::vector<float>* taps = nullptr;
       if (cir) {
@@ -310,8 +302,10 @@ class Reader {
       if (at != k_none) placement_columns_.push_back(at);
     };
     if (placement_columns_.empty()) add(header_.first(k_placement));
-    if (placement_columns_.empty() && header_.of("tag_pos") != k_none && header_.of("anchor_id") != k_none)
-      add(header_.of("tag_pos")), add(header_.of("anchor_id"));
+    if (placement_columns_.empty() && header_.of("tag_pos") != k_none && header_.of("anchor_id") != k_none) {
+      add(header_.of("tag_pos"));
+      add(header_.of("anchor_id"));
+    }
     // A true range that repeats names its placement, together with the place and the class.
     if (placement_columns_.empty() && truth_ != k_none) {
       placement_columns_ = group_columns_;
@@ -384,12 +378,18 @@ class Reader {
 
     nlos::DiagnosticSample s;
     if (range_ != k_none) s.range_m = range;
-    s.rx_dbm = value(k_rx), s.fp_dbm = value(k_fp);
-    s.fp_amp1 = value(k_f1), s.fp_amp2 = value(k_f2), s.fp_amp3 = value(k_f3);
-    s.cir_power = value(k_cir_power), s.preamble_count = value(k_count);
-    s.std_noise = value(k_std_noise), s.max_noise = value(k_max_noise);
+    s.rx_dbm = value(k_rx);
+    s.fp_dbm = value(k_fp);
+    s.fp_amp1 = value(k_f1);
+    s.fp_amp2 = value(k_f2);
+    s.fp_amp3 = value(k_f3);
+    s.cir_power = value(k_cir_power);
+    s.preamble_count = value(k_count);
+    s.std_noise = value(k_std_noise);
+    s.max_noise = value(k_max_noise);
     s.fp_index = value(k_fp_index);
-    s.height_difference_m = value(k_height), s.heading_deg = value(k_heading);
+    s.height_difference_m = value(k_height);
+    s.heading_deg = value(k_heading);
     // The receiver's own first path where the file tells it: found again in magnitudes it lies 2 ns beside.
     if (taps) {
       s.cir = nlos::cir_shape(*taps, s.fp_index);

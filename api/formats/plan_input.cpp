@@ -90,11 +90,11 @@ void take(T& out, const std::optional<T>& value) {
 }
 
 void read_options(Fields& fields, NextPointOptions& options) {
-  if (const auto w = fields.word("rule", {"dissertation", "a_optimal", "d_optimal"})) {
-    options.rule = static_cast<planning::Rule>(*w);
+  if (const auto rule = fields.word("rule", planning::k_rule_words)) {
+    options.rule = *rule;
   }
-  if (const auto w = fields.word("combine", {"worst", "mean", "weighted"})) {
-    options.combine = static_cast<planning::Combine>(*w);
+  if (const auto combine = fields.word("combine", planning::k_combine_words)) {
+    options.combine = *combine;
   }
   if (const auto m = fields.number("max_range_m", 0.1, k_max_m)) options.max_range_m = *m;
   take(options.visited_share, fields.number("visited_share", 0, 1));

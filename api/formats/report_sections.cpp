@@ -266,7 +266,7 @@ std::string iterations(const Report& report) {
               cell(std::to_string(i + 1)) + cell(std::to_string(steps[i].n_ranges)) +
               cell(error(steps[i].raw_m)) + cell(error(steps[i].corrected_m)) +
               cell(steps[i].corrected_m ? fixed(steps[i].h95_m, 3) : "–") +
-              cell(std::string(api::verdict_word(steps[i].verdict)), "num mut") + "</tr>";
+              cell(std::string(k_verdict_words.word(steps[i].verdict)), "num mut") + "</tr>";
     }
   }
   if (plots.empty()) return {};

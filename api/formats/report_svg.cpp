@@ -38,8 +38,10 @@ View fit(const Report& report) {
   double west = std::numeric_limits<double>::infinity(), east = -west, south = west, north = -west;
   const auto take = [&](double e, double n) {
     if (!std::isfinite(e) || !std::isfinite(n)) return;
-    west = std::min(west, e), east = std::max(east, e);
-    south = std::min(south, n), north = std::max(north, n);
+    west = std::min(west, e);
+    east = std::max(east, e);
+    south = std::min(south, n);
+    north = std::max(north, n);
   };
   for (const auto& at : report.outline_m) take(at.x(), at.y());
   for (const auto& anchor : report.anchors) {
@@ -51,9 +53,15 @@ View fit(const Report& report) {
   for (const auto& flight : report.evidence.flights) {
     for (const auto& at : flight.track_m) take(at.x(), at.y());
   }
-  if (!std::isfinite(west)) west = south = -5, east = north = 5;
+  if (!std::isfinite(west)) {
+    west = south = -5;
+    east = north = 5;
+  }
   const double pad = 0.06 * std::max({east - west, north - south, 2.0}) + 0.5;
-  west -= pad, east += pad, south -= pad, north += pad;
+  west -= pad;
+  east += pad;
+  south -= pad;
+  north += pad;
   View view;
   view.per_metre = std::min(k_width / (east - west), (k_height - k_foot) / (north - south));
   view.west = (west + east) / 2 - k_width / 2 / view.per_metre;

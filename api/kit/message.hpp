@@ -12,12 +12,29 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
+
 namespace anchord::api {
 
 enum class Method : std::uint8_t { get, head, post, put, patch, del, options };
+inline constexpr auto k_method_words = enum_table<Method>({{"GET", Method::get},
+                                                           {"HEAD", Method::head},
+                                                           {"POST", Method::post},
+                                                           {"PUT", Method::put},
+                                                           {"PATCH", Method::patch},
+                                                           {"DELETE", Method::del},
+                                                           {"OPTIONS", Method::options}});
+constexpr std::string_view to_string(Method method) { return k_method_words.word(method); }
 
 /// Rights of a token; not a ladder (a gateway may ingest and nothing else).
 enum class Role : std::uint8_t { viewer, integrator, gateway, engineer, op, admin };
+inline constexpr auto k_role_words = enum_table<Role>({{"viewer", Role::viewer},
+                                                       {"integrator", Role::integrator},
+                                                       {"gateway", Role::gateway},
+                                                       {"engineer", Role::engineer},
+                                                       {"operator", Role::op},
+                                                       {"admin", Role::admin}});
+constexpr std::string_view to_string(Role role) { return k_role_words.word(role); }
 
 /// Who asks. Empty roles: nobody.
 struct Principal {

@@ -1,5 +1,6 @@
 #include "api/kit/reader.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -277,20 +278,17 @@ std::optional<std::vector<double>> Fields::numbers(std::string_view key, std::si
   return out;
 }
 
-std::optional<std::size_t> Fields::word(std::string_view key, const std::vector<std::string_view>& words,
-                                        bool required) {
+const std::string* Fields::one_of(std::string_view key, std::span<const std::string_view> words,
+                                  bool required) {
   const Json* value = child(key);
   if (value == nullptr) {
     if (required) error(key, "required", std::string(key) + " is missing");
-    return std::nullopt;
+    return nullptr;
   }
-  std::string all;
-  for (std::size_t i = 0; i < words.size(); ++i) {
-    if (value->is_string() && value->get_ref<const std::string&>() == words[i]) return i;
-    all += (i == 0 ? "" : ", ") + std::string(words[i]);
-  }
-  errors_.push_back({pointer(key), "unknown_value", "must be one of " + all, short_json(*value)});
-  return std::nullopt;
+  if (value->is_string() && std::ranges::find(words, value->get_ref<const std::string&>()) != words.end())
+    return &value->get_ref<const std::string&>();
+  errors_.push_back({pointer(key), "unknown_value", "must be one of " + list_of(words), short_json(*value)});
+  return nullptr;
 }
 
 void Fields::error(std::string_view key, std::string code, std::string detail) {

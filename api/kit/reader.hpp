@@ -4,12 +4,14 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "api/kit/problem.hpp"
+#include "core/base/enum_table.hpp"
 
 namespace anchord::api {
 
@@ -43,14 +45,24 @@ class Fields {
   /// An array of exactly n finite numbers.
   std::optional<std::vector<double>> numbers(std::string_view key, std::size_t n, double min, double max,
                                              bool required = false);
-  /// One of the given words.
-  std::optional<std::size_t> word(std::string_view key, const std::vector<std::string_view>& words,
-                                  bool required = false);
+  /// The value of a word of the table.
+  template <class T, std::size_t N>
+  std::optional<T> word(std::string_view key, const EnumTable<T, N>& table, bool required = false) {
+    const std::string* word = one_of(key, table.words(), required);
+    return word == nullptr ? std::nullopt : table.find(*word);
+  }
+  /// One of the given words, itself.
+  std::optional<std::string> word(std::string_view key, std::span<const std::string_view> words,
+                                  bool required = false) {
+    const std::string* word = one_of(key, words, required);
+    return word == nullptr ? std::nullopt : std::optional(*word);
+  }
 
   void error(std::string_view key, std::string code, std::string detail);
   void finish();
 
  private:
+  const std::string* one_of(std::string_view key, std::span<const std::string_view> words, bool required);
   std::optional<double> finite(const nlohmann::json& value, const std::string& at, double min, double max);
   const nlohmann::json* object_{nullptr};
   std::string base_;

@@ -106,44 +106,6 @@ void complete_problem(const Request& request, Response& response) {
 
 }  // namespace
 
-std::string_view to_string(Method method) {
-  switch (method) {
-    case Method::get:
-      return "GET";
-    case Method::head:
-      return "HEAD";
-    case Method::post:
-      return "POST";
-    case Method::put:
-      return "PUT";
-    case Method::patch:
-      return "PATCH";
-    case Method::del:
-      return "DELETE";
-    case Method::options:
-      return "OPTIONS";
-  }
-  return "GET";
-}
-
-std::string_view to_string(Role role) {
-  switch (role) {
-    case Role::viewer:
-      return "viewer";
-    case Role::integrator:
-      return "integrator";
-    case Role::gateway:
-      return "gateway";
-    case Role::engineer:
-      return "engineer";
-    case Role::op:
-      return "operator";
-    case Role::admin:
-      return "admin";
-  }
-  return "viewer";
-}
-
 bool Access::permits(const Principal& who) const {
   if (kind_ == Kind::open || who.has(Role::admin)) return true;
   if (kind_ == Kind::any_token) return !who.roles.empty();

@@ -14,9 +14,6 @@
 
 namespace anchord::api {
 
-std::string_view to_string(Method method);
-std::string_view to_string(Role role);
-
 /// Who may use a route. There is no default: a route without a decision does not compile.
 class Access {
  public:
@@ -52,9 +49,18 @@ struct Route {
   Work work_for(const Request& request) const { return work_of ? work_of(request) : work; }
 };
 /// The same route, run by another executor than the ordinary one.
-inline Route as_command(Route route) { return route.work = Work::command, route; }
-inline Route as_flight(Route route) { return route.work = Work::flight, route; }
-inline Route as_heavy(Route route) { return route.work = Work::heavy, route; }
+inline Route as_command(Route route) {
+  route.work = Work::command;
+  return route;
+}
+inline Route as_flight(Route route) {
+  route.work = Work::flight;
+  return route;
+}
+inline Route as_heavy(Route route) {
+  route.work = Work::heavy;
+  return route;
+}
 /// A POST that changes nothing, or whose answer is a secret: nothing is kept of it.
 inline Route keeps_nothing(Route route) {
   route.keeps = Keeps::nothing;

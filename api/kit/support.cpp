@@ -25,8 +25,11 @@ std::string percent_encoded(std::string_view text) {
                        c == '-' || c == '_' || c == '.' || c == '~';
     if (plain)
       out += c;
-    else
-      out += '%', out += k_hex[byte >> 4], out += k_hex[byte & 15];
+    else {
+      out += '%';
+      out += k_hex[byte >> 4];
+      out += k_hex[byte & 15];
+    }
   }
   return out;
 }
@@ -201,6 +204,11 @@ void require_match(const Request& request, const std::string& etag) {
       problem(412, "precondition-failed", "it changed since it was read; its ETag is now " + etag);
   response.header("ETag", etag);
   throw ProblemException{std::move(response)};
+}
+
+void refuse_query_word(const char* name, std::span<const std::string_view> words) {
+  throw_problem(422, "validation", std::string(name) + " is not one of its words",
+                {{std::string("/") + name, "unknown_value", "must be one of " + list_of(words)}});
 }
 
 std::string negotiate(const Request& request, std::initializer_list<std::string_view> offers) {

@@ -3,12 +3,14 @@
 #include <initializer_list>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "api/kit/problem.hpp"
 #include "api/kit/router.hpp"
+#include "core/base/enum_table.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
 #include "core/base/time.hpp"
@@ -57,6 +59,17 @@ std::optional<UtcTime> query_time(const Request& request, const char* name);
 std::optional<MissionId> query_mission(const Request& request);
 std::optional<NetworkId> query_network_id(const Request& request, const char* name);
 bool query_flag(const Request& request, const char* name);
+/// 422 with the words that may be used.
+[[noreturn]] void refuse_query_word(const char* name, std::span<const std::string_view> words);
+/// The value of a word of the table; nothing where it is not given.
+template <class T, std::size_t N>
+std::optional<T> query_word(const Request& request, const char* name, const EnumTable<T, N>& table) {
+  const auto word = request.query_value(name);
+  if (!word) return std::nullopt;
+  const auto value = table.find(*word);
+  if (!value) refuse_query_word(name, table.words());
+  return value;
+}
 /// 422 outside of low..high.
 std::optional<double> query_number(const Request& request, const char* name, double low, double high);
 

@@ -123,9 +123,13 @@ CampaignRows read_campaign_rows(const Request& request) {
     auto& t = row.truth;
     t.setting = name_of(site);
     t.environment = site.environment;
-    t.distance_m = site.distance_m, t.los = site.los;
-    t.heading_deg = site.heading_deg, t.height_difference_m = site.height_m;
-    t.material = site.material, t.thickness_m = site.thickness_m, t.truth_sigma_m = site.truth_sd_m;
+    t.distance_m = site.distance_m;
+    t.los = site.los;
+    t.heading_deg = site.heading_deg;
+    t.height_difference_m = site.height_m;
+    t.material = site.material;
+    t.thickness_m = site.thickness_m;
+    t.truth_sigma_m = site.truth_sd_m;
     auto& x = row.sample;
     if (m.t_s && *m.t_s > 0 && *m.t_s < 4e9) {
       // Several rangings may share one stamp; the line tells them apart, and the same file again is the same.
@@ -133,10 +137,16 @@ CampaignRows read_campaign_rows(const Request& request) {
       x.seq = m.line;
     }
     x.range_m = m.range_m;
-    x.rx_dbm = m.rx_dbm, x.fp_dbm = m.fp_dbm;
-    x.fp_amp1 = m.fp_amp1, x.fp_amp2 = m.fp_amp2, x.fp_amp3 = m.fp_amp3;
-    x.cir_power = m.cir_power, x.preamble_count = m.preamble_count;
-    x.std_noise = m.std_noise, x.max_noise = m.max_noise, x.fp_index = m.fp_index;
+    x.rx_dbm = m.rx_dbm;
+    x.fp_dbm = m.fp_dbm;
+    x.fp_amp1 = m.fp_amp1;
+    x.fp_amp2 = m.fp_amp2;
+    x.fp_amp3 = m.fp_amp3;
+    x.cir_power = m.cir_power;
+    x.preamble_count = m.preamble_count;
+    x.std_noise = m.std_noise;
+    x.max_noise = m.max_noise;
+    x.fp_index = m.fp_index;
     x.cir = m.cir;
     out.rows.push_back(std::move(row));
   }

@@ -142,13 +142,10 @@ Response rules(LearningApi& l, const Request& request) {
       throw_problem(422, "validation", "seed must be a whole number",
                     {{"/seed", "bad_value", "must be a whole number"}});
   }
-  const auto group_by = place_of(request.query_value("group_by").value_or("environment"));
-  if (!group_by)
-    throw_problem(422, "validation", "group_by is not known",
-                  {{"/group_by", "unknown_value", "must be environment, campaign or setting"}});
+  const auto group_by = query_word(request, "group_by", k_place_words).value_or(Place::environment);
   const auto table =
       value_or_problem(DatasetTable::parse(value_or_problem(l.stores.datasets.csv(record.id))));
-  auto report = value_or_problem(rules_of(table, record.name, *group_by, seed));
+  auto report = value_or_problem(rules_of(table, record.name, group_by, seed));
   const auto all = Ordered::parse(rules_json({report}));
   Ordered json = all.at("data_sets").at(0);
   json.erase("data_set");

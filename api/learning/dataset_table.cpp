@@ -8,6 +8,7 @@
 #include <limits>
 #include <set>
 
+#include "api/formats/csv_record.hpp"
 #include "core/base/sha256.hpp"
 #include "core/base/text.hpp"
 
@@ -44,47 +45,14 @@ void put_text(std::string& out, std::string_view text) {
   if (quoted) out += '"';
 }
 
-/// One record; false at the end. Quotes may hold line ends.
-bool next_record(std::string_view& text, std::vector<std::string>& cells) {
-  cells.clear();
-  if (text.empty()) return false;
-  std::string cell;
-  bool quoted = false;
-  std::size_t i = 0;
-  for (; i < text.size(); ++i) {
-    const char c = text[i];
-    if (quoted) {
-      if (c != '"')
-        cell += c;
-      else if (i + 1 < text.size() && text[i + 1] == '"')
-        cell += c, ++i;
-      else
-        quoted = false;
-    } else if (c == '"' && cell.empty()) {
-      quoted = true;
-    } else if (c == ',') {
-      cells.push_back(std::move(cell));
-      cell.clear();
-    } else if (c == '\n') {
-      ++i;
-      break;
-    } else if (c != '\r') {
-      cell += c;
-    }
-  }
-  text.remove_prefix(i);
-  cells.push_back(std::move(cell));
-  return true;
-}
-
-std::string plain(std::string cell) {
+std::string plain(std::string_view cell) {
   if (cell.size() > 1 && cell.front() == '\'' &&
       (k_formula.find(cell[1]) != std::string_view::npos || cell[1] == '\''))
-    cell.erase(0, 1);
-  return cell;
+    cell.remove_prefix(1);
+  return std::string(cell);
 }
 
-std::optional<double> number(const std::string& cell) {
+std::optional<double> number(std::string_view cell) {
   double value = 0;
   const auto [end, status] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
   if (status != std::errc{} || end != cell.data() + cell.size() || !std::isfinite(value)) return std::nullopt;
@@ -103,13 +71,14 @@ struct Column {
   std::size_t slot{};  ///< of the registers, which keep their own order
 };
 
-Result<std::vector<Column>> columns_of(const std::vector<std::string>& header,
+Result<std::vector<Column>> columns_of(const std::vector<std::string_view>& header,
                                        std::vector<std::string>& registers) {
   std::vector<Column> out;
   std::set<std::string> seen;
   for (std::size_t c = k_columns.size() + 1; c < header.size(); ++c) {
-    if (!seen.insert(header[c]).second) return bad(1, "column " + header[c] + " occurs twice");
-    out.push_back({header[c], nlos::feature_of(header[c]), header[c] == k_truth_sigma, 0});
+    const std::string name(header[c]);
+    if (!seen.insert(name).second) return bad(1, "column " + to_utf8(name, 60) + " occurs twice");
+    out.push_back({name, nlos::feature_of(header[c]), header[c] == k_truth_sigma, 0});
   }
   for (const auto name : register_columns())
     if (seen.erase(std::string(name)) > 0) registers.emplace_back(name);
@@ -133,25 +102,6 @@ const std::vector<std::string_view>& register_columns() {
 }
 
 bool is_dataset_csv(std::string_view text) { return text.starts_with("feature_set,campaign,environment,"); }
-
-std::string_view place_word(Place place) {
-  switch (place) {
-    case Place::environment:
-      return "environment";
-    case Place::campaign:
-      return "campaign";
-    case Place::setting:
-      return "setting";
-  }
-  return "environment";
-}
-
-std::optional<Place> place_of(std::string_view word) {
-  if (word == "environment") return Place::environment;
-  if (word == "campaign" || word == "session") return Place::campaign;
-  if (word == "setting") return Place::setting;
-  return std::nullopt;
-}
 
 std::string place_name(const DatasetRow& row, Place place) {
   switch (place) {
@@ -211,8 +161,15 @@ std::string DatasetTable::csv() const {
 }
 
 Result<DatasetTable> DatasetTable::parse(std::string_view text) {
-  std::vector<std::string> cells;
-  if (!next_record(text, cells)) return bad(1, "a header line is needed");
+  CsvRecord record({',', false});  // names are kept as they are: the digest is of this very text
+  const auto& cells = record.cells();
+  const auto next = [&](std::size_t line) -> Result<bool> {
+    auto more = record.take(text);
+    if (!more) return bad(line, more.error().message);
+    return more;
+  };
+  BOOST_OUTCOME_TRY(const bool any, next(1));
+  if (!any) return bad(1, "a header line is needed");
   if (cells.size() < k_columns.size() + 1 || cells[0] != k_version_column ||
       !std::equal(k_columns.begin(), k_columns.end(), cells.begin() + 1))
     return bad(1,
@@ -221,7 +178,9 @@ Result<DatasetTable> DatasetTable::parse(std::string_view text) {
   DatasetTable out;
   BOOST_OUTCOME_TRY(const auto columns, columns_of(cells, out.registers));
   const std::size_t width = cells.size();
-  for (std::size_t line = 2; next_record(text, cells); ++line) {
+  for (std::size_t line = 2;; ++line) {
+    BOOST_OUTCOME_TRY(const bool more, next(line));
+    if (!more) break;
     if (cells.size() == 1 && cells[0].empty()) continue;
     if (cells.size() != width)
       return bad(line, std::to_string(cells.size()) + " cells, the header has " + std::to_string(width));

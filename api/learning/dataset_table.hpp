@@ -30,8 +30,14 @@ struct DatasetRow {
 
 /// What splits never divide.
 enum class Place : std::uint8_t { environment, campaign, setting };
-std::string_view place_word(Place place);
-std::optional<Place> place_of(std::string_view word);
+inline constexpr auto k_place_words = enum_table<Place>(
+    {{"environment", Place::environment}, {"campaign", Place::campaign}, {"setting", Place::setting}});
+constexpr std::string_view place_word(Place place) { return k_place_words.word(place); }
+/// A campaign under its other name.
+inline constexpr std::string_view k_session = "session";
+constexpr std::optional<Place> place_of(std::string_view word) {
+  return word == k_session ? Place::campaign : k_place_words.find(word);
+}
 std::string place_name(const DatasetRow& row, Place place);
 
 /// Rows of a frozen data set.

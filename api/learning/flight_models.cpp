@@ -13,7 +13,6 @@ namespace {
 using Json = nlohmann::json;
 using Ordered = nlohmann::ordered_json;
 
-constexpr std::array<const char*, 4> k_tasks{"nlos_id", "los_bias", "nlos_bias", "bias"};
 /// The radios' failure values are below it, and no correction may make a range one of them.
 constexpr double k_least_range_m = 0.05;
 
@@ -30,7 +29,8 @@ void state(const StatedNoise& noise, RangeBelief& belief) {
 FlightModelsWish read_flight_models(const Json& models, std::vector<FieldError>& errors) {
   FlightModelsWish out;
   Fields fields(models, "/models", errors);
-  for (const char* task : k_tasks) {
+  for (const auto word : ml::k_task_words.words()) {
+    const std::string task(word);
     const auto text = fields.text(task, 36);
     if (!text) continue;
     if (*text != "active" && *text != "none" && !parse_uuid(*text))
@@ -38,10 +38,9 @@ FlightModelsWish read_flight_models(const Json& models, std::vector<FieldError>&
     else
       out.tasks[task] = *text;
   }
-  if (const auto word = fields.word("correction", {"weighted", "hard", "none"}))
-    out.correction = static_cast<ml::Correction>(*word);
-  if (const auto word = fields.word("likelihood", {"one_sided", "loss"})) out.likelihood = *word == 0;
-  if (const auto word = fields.word("worth", {"shown", "ignored"})) out.ask_worth = *word == 0;
+  out.correction = fields.word("correction", ml::k_correction_words);
+  out.likelihood = fields.word("likelihood", k_likelihood_words);
+  out.ask_worth = fields.word("worth", k_worth_words).value_or(out.ask_worth);
   fields.finish();
   return out;
 }
@@ -143,14 +142,14 @@ Ordered flight_models_report_json(const FlightModelsReport& f) {
 Ordered flight_models_json(const ModelRegistry::Active& models,
                            const std::vector<FlightModelsReport>& flights) {
   Ordered out = Ordered::object();
-  for (const char* task : k_tasks) {
+  for (const auto word : ml::k_task_words.words()) {
+    const std::string task(word);
     const auto at = models.models.find(task);
     out[task] = at == models.models.end() ? Ordered(nullptr) : Ordered(to_string(at->second));
   }
-  out["correction"] = correction_word(models.correction);
-  out["likelihood"] = std::ranges::any_of(flights, [](const auto& f) { return f.used && f.n_believed > 0; })
-                          ? "one_sided"
-                          : "loss";
+  out["correction"] = ml::k_correction_words.word(models.correction);
+  out["likelihood"] = k_likelihood_words.word(
+      std::ranges::any_of(flights, [](const auto& f) { return f.used && f.n_believed > 0; }));
   Ordered list = Ordered::array();
   for (const auto& f : flights) list.push_back(flight_models_report_json(f));
   out["flights"] = std::move(list);

@@ -12,6 +12,11 @@
 
 namespace anchord::api {
 
+/// Whether a model is a likelihood of its own, or corrects alone.
+inline constexpr auto k_likelihood_words = enum_table<bool>({{"one_sided", true}, {"loss", false}});
+/// Whether models have to explain a flight better than its ranges as they came.
+inline constexpr auto k_worth_words = enum_table<bool>({{"shown", true}, {"ignored", false}});
+
 /// Which models correct the ranges of a calibration: per task "active", "none" or a model's id; tasks that
 /// are not named are "active".
 struct FlightModelsWish {

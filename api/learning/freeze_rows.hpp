@@ -16,6 +16,8 @@ enum class Aggregation : std::uint8_t {
   mean,    ///< of each feature over the measurements of a setting (6.2.1), and from 3 on their spreads
   median,  ///< the same with medians
 };
+inline constexpr auto k_aggregation_words = enum_table<Aggregation>(
+    {{"none", Aggregation::none}, {"mean", Aggregation::mean}, {"median", Aggregation::median}});
 
 struct FreezeOptions {
   Aggregation aggregation{Aggregation::none};  ///< a live range is one ranging: so are the rows

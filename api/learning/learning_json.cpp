@@ -120,7 +120,7 @@ Ordered training_run_json(const TrainingRun& r, const DatasetRecord& d, const Jo
   const std::string self = "/api/v1/training-runs/" + to_string(r.id);
   Ordered summary = r.summary_json.empty() ? Ordered::object() : parsed(r.summary_json);
   Ordered out{{"id", to_string(r.id)},
-              {"state", job_state_word(job.state)},
+              {"state", k_job_state_words.word(job.state)},
               {"task", r.task},
               {"dataset", dataset_json(d, false)},
               {"method", summary.contains("method") ? summary["method"] : Ordered(nullptr)},

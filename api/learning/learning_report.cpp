@@ -104,9 +104,10 @@ Json folds_json(const ml::TrainingOutcome& outcome, bool bias) {
                {"train_rows", row.train_rows},
                {"test_rows", row.test_rows},
                {"loss", row.loss}};
-    if (bias)
-      entry["mae_raw_m"] = row.mae_raw_m, entry["mae_m"] = row.mae_m;
-    else
+    if (bias) {
+      entry["mae_raw_m"] = row.mae_raw_m;
+      entry["mae_m"] = row.mae_m;
+    } else
       put_confusion(entry, row.confusion);
     out.push_back(entry);
   }
@@ -274,7 +275,10 @@ std::string evaluation_json(const ml::Evaluation& e, const ml::Model& model, con
   for (const auto& place : e.places) {
     Json entry{{"place", place.place}, {"n", place.rows}};
     if (place.accuracy) entry["accuracy"] = *place.accuracy;
-    if (place.bias) entry["mae_raw_m"] = place.bias->raw.mae_m, entry["mae_m"] = place.bias->corrected.mae_m;
+    if (place.bias) {
+      entry["mae_raw_m"] = place.bias->raw.mae_m;
+      entry["mae_m"] = place.bias->corrected.mae_m;
+    }
     places.push_back(entry);
   }
   out["places"] = places;

@@ -8,24 +8,7 @@
 namespace anchord::api {
 namespace {
 
-[[noreturn]] void unknown_word(const char* name, const char* allowed) {
-  throw_problem(422, "validation", std::string(name) + " is not one of its words",
-                {{std::string("/") + name, "unknown_value", std::string("must be ") + allowed}});
-}
-
 constexpr double k_low_unclear = 0.4, k_high_unclear = 0.6;
-
-std::string_view word(PredictedClass c) {
-  switch (c) {
-    case PredictedClass::los:
-      return "los";
-    case PredictedClass::nlos:
-      return "nlos";
-    case PredictedClass::unclear:
-      return "unclear";
-  }
-  return "";
-}
 
 }  // namespace
 
@@ -35,16 +18,7 @@ MeasurementLimits query_limits(const Request& request) {
   limits.max_distance_m = query_number(request, "max_distance_m", 0, 10'000);
   limits.min_level_dbm = query_number(request, "min_level_dbm", -200, 50);
   limits.max_level_dbm = query_number(request, "max_level_dbm", -200, 50);
-  if (const auto label = request.query_value("label")) {
-    if (*label == "los")
-      limits.label = MeasurementLimits::Label::los;
-    else if (*label == "nlos")
-      limits.label = MeasurementLimits::Label::nlos;
-    else if (*label == "none")
-      limits.label = MeasurementLimits::Label::none;
-    else
-      unknown_word("label", "los, nlos or none");
-  }
+  limits.label = query_word(request, "label", k_label_words);
   return limits;
 }
 
@@ -54,11 +28,7 @@ std::size_t query_every(const Request& request) {
 }
 
 std::optional<PredictedClass> query_class(const Request& request) {
-  const auto text = request.query_value("class");
-  if (!text) return std::nullopt;
-  for (const auto one : {PredictedClass::los, PredictedClass::nlos, PredictedClass::unclear})
-    if (*text == word(one)) return one;
-  unknown_word("class", "los, nlos or unclear");
+  return query_word(request, "class", k_predicted_words);
 }
 
 PredictedClass class_of(const RangeJudgement& judgement) {
@@ -71,7 +41,7 @@ nlohmann::ordered_json predicted_json(const RangeJudgement& judgement) {
   const auto maybe = [](const std::optional<double>& v) {
     return v ? nlohmann::ordered_json(*v) : nlohmann::ordered_json(nullptr);
   };
-  return {{"class", word(class_of(judgement))},
+  return {{"class", k_predicted_words.word(class_of(judgement))},
           {"p_los", maybe(judgement.verdict.p_los)},
           {"bias_m", maybe(judgement.verdict.bias_m)},
           {"models", range_models_json(judgement.models)}};

@@ -18,6 +18,8 @@ std::size_t query_every(const Request& request);
 
 /// What the promoted models call a measurement; unclear: P(LOS) of 0.4 to 0.6, or they say nothing.
 enum class PredictedClass : std::uint8_t { los, nlos, unclear };
+inline constexpr auto k_predicted_words = enum_table<PredictedClass>(
+    {{"los", PredictedClass::los}, {"nlos", PredictedClass::nlos}, {"unclear", PredictedClass::unclear}});
 std::optional<PredictedClass> query_class(const Request& request);
 PredictedClass class_of(const RangeJudgement& judgement);
 /// {"class","p_los","bias_m"}

@@ -14,28 +14,40 @@ Json json_of(const ml::Scaler& s) { return {{"mean", s.mean}, {"sd", s.sd}, {"cl
 
 Json json_of(const ml::Scorer& scorer) {
   struct Writer {
+    static std::string_view kind(ml::ScorerKind k) { return ml::k_scorer_words.word(k); }
     Json operator()(const ml::Linear& m) const {
-      return {{"kind", "linear"}, {"weights", m.weights}, {"offset", m.offset}};
+      return {{"kind", kind(ml::ScorerKind::linear)}, {"weights", m.weights}, {"offset", m.offset}};
     }
     Json operator()(const ml::Polynomial& m) const {
       Json terms = Json::array();
       for (const auto& t : m.terms)
         terms.push_back({{"features", t.features}, {"coefficient", t.coefficient}});
-      return {{"kind", "polynomial"}, {"terms", terms}};
+      return {{"kind", kind(ml::ScorerKind::polynomial)}, {"terms", terms}};
     }
     Json operator()(const ml::Trees& m) const {
       Json feature = Json::array(), left = Json::array(), value = Json::array();
-      for (const auto& n : m.nodes)
-        feature.push_back(n.feature), left.push_back(n.left), value.push_back(n.value);
-      return {{"kind", "trees"},    {"base", m.base}, {"scale", m.scale}, {"roots", m.roots},
-              {"feature", feature}, {"left", left},   {"value", value}};
+      for (const auto& n : m.nodes) {
+        feature.push_back(n.feature);
+        left.push_back(n.left);
+        value.push_back(n.value);
+      }
+      return {{"kind", kind(ml::ScorerKind::trees)},
+              {"base", m.base},
+              {"scale", m.scale},
+              {"roots", m.roots},
+              {"feature", feature},
+              {"left", left},
+              {"value", value}};
     }
     Json operator()(const ml::Svm& m) const {
-      constexpr const char* k_kernels[]{"linear", "polynomial", "sigmoid", "rbf"};
-      return {{"kind", "svm"},       {"kernel", k_kernels[static_cast<std::size_t>(m.kernel)]},
-              {"gamma", m.gamma},    {"coef0", m.coef0},
-              {"degree", m.degree},  {"dims", m.dims},
-              {"rho", m.rho},        {"alpha", m.alpha},
+      return {{"kind", kind(ml::ScorerKind::svm)},
+              {"kernel", ml::k_kernel_words.word(m.kernel)},
+              {"gamma", m.gamma},
+              {"coef0", m.coef0},
+              {"degree", m.degree},
+              {"dims", m.dims},
+              {"rho", m.rho},
+              {"alpha", m.alpha},
               {"support", m.support}};
     }
   };

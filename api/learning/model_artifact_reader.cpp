@@ -38,9 +38,15 @@ class Walk {
     return number_of(member(object, at, key), at + "/" + key, low, high);
   }
   double number_of(const Json& value, const std::string& at, double low, double high) {
-    if (!value.is_number()) return fail(at, "not a number"), low;
+    if (!value.is_number()) {
+      fail(at, "not a number");
+      return low;
+    }
     const double v = value.get<double>();
-    if (!std::isfinite(v) || v < low || v > high) return fail(at, "out of range"), low;
+    if (!std::isfinite(v) || v < low || v > high) {
+      fail(at, "out of range");
+      return low;
+    }
     return v;
   }
   std::size_t count(const Json& object, const std::string& at, const char* key, std::size_t most) {
@@ -50,8 +56,10 @@ class Walk {
   }
   std::string text(const Json& object, const std::string& at, const char* key, std::size_t most = 4096) {
     const Json& v = member(object, at, key);
-    if (!v.is_string() || v.get_ref<const std::string&>().size() > most)
-      return fail(at + "/" + key, "not a text of at most " + std::to_string(most) + " bytes"), std::string{};
+    if (!v.is_string() || v.get_ref<const std::string&>().size() > most) {
+      fail(at + "/" + key, "not a text of at most " + std::to_string(most) + " bytes");
+      return std::string{};
+    }
     return v.get<std::string>();
   }
   std::vector<double> numbers(const Json& object, const std::string& at, const char* key, std::size_t least,
@@ -59,8 +67,10 @@ class Walk {
     const Json& v = member(object, at, key);
     const std::string here = at + "/" + key;
     std::vector<double> out;
-    if (!v.is_array() || v.size() < least || v.size() > most)
-      return fail(here, "not an array of a possible length"), out;
+    if (!v.is_array() || v.size() < least || v.size() > most) {
+      fail(here, "not an array of a possible length");
+      return out;
+    }
     out.reserve(v.size());
     for (std::size_t i = 0; i < v.size() && ok(); ++i) {
       if (!v[i].is_number() || !std::isfinite(v[i].get<double>()) || v[i].get<double>() < low ||
@@ -109,10 +119,14 @@ ml::Trees trees_of(Walk& w, const Json& j, const std::string& at, std::size_t d)
   for (std::size_t i = 0; i < n; ++i) {
     out.nodes.push_back({feature[i], left[i], value[i]});
     if (feature[i] < 0) continue;
-    if (left[i] <= i || left[i] + std::size_t{1} >= n)
-      return w.fail(at + "/left/" + std::to_string(i), "child out of range"), out;
-    if (depth[i] >= k_max_tree_depth)
-      return w.fail(at + "/left/" + std::to_string(i), "tree deeper than 64"), out;
+    if (left[i] <= i || left[i] + std::size_t{1} >= n) {
+      w.fail(at + "/left/" + std::to_string(i), "child out of range");
+      return out;
+    }
+    if (depth[i] >= k_max_tree_depth) {
+      w.fail(at + "/left/" + std::to_string(i), "tree deeper than 64");
+      return out;
+    }
     for (const std::size_t child : {std::size_t{left[i]}, left[i] + std::size_t{1}})
       depth[child] = std::max(depth[child], depth[i] + 1);
   }
@@ -121,17 +135,9 @@ ml::Trees trees_of(Walk& w, const Json& j, const std::string& at, std::size_t d)
 
 ml::Svm svm_of(Walk& w, const Json& j, const std::string& at, std::size_t d) {
   ml::Svm out;
-  const auto kernel = w.text(j, at, "kernel");
-  if (kernel == "linear")
-    out.kernel = ml::Kernel::linear;
-  else if (kernel == "polynomial")
-    out.kernel = ml::Kernel::polynomial;
-  else if (kernel == "sigmoid")
-    out.kernel = ml::Kernel::sigmoid;
-  else if (kernel == "rbf")
-    out.kernel = ml::Kernel::rbf;
-  else
-    w.fail(at + "/kernel", "unknown");
+  const auto kernel = ml::k_kernel_words.find(w.text(j, at, "kernel"));
+  if (!kernel) w.fail(at + "/kernel", "unknown");
+  out.kernel = kernel.value_or(out.kernel);
   out.gamma = w.number(j, at, "gamma", 0, 1e6);
   out.coef0 = w.number(j, at, "coef0", -1e6, 1e6);
   out.degree = static_cast<int>(w.count(j, at, "degree", 16));
@@ -144,32 +150,47 @@ ml::Svm svm_of(Walk& w, const Json& j, const std::string& at, std::size_t d) {
   return out;
 }
 
+ml::Linear linear_of(Walk& w, const Json& j, const std::string& at, std::size_t d) {
+  ml::Linear out;
+  out.weights = w.numbers(j, at, "weights", 0, d);
+  out.offset = w.number(j, at, "offset", -k_huge, k_huge);
+  return out;
+}
+
+ml::Polynomial polynomial_of(Walk& w, const Json& j, const std::string& at, std::size_t d) {
+  ml::Polynomial out;
+  const Json& terms = w.member(j, at, "terms");
+  if (!terms.is_array() || terms.size() > k_max_terms) {
+    w.fail(at + "/terms", "not an array of a possible length");
+    return out;
+  }
+  for (std::size_t i = 0; i < terms.size() && w.ok(); ++i) {
+    const std::string term = at + "/terms/" + std::to_string(i);
+    auto features =
+        w.indices<std::uint16_t>(terms[i], term, "features", 0, 16, 0, static_cast<double>(d) - 1);
+    out.terms.push_back({std::move(features), w.number(terms[i], term, "coefficient", -k_huge, k_huge)});
+  }
+  return out;
+}
+
 ml::Scorer scorer_of(Walk& w, const Json& parent, const std::string& at, std::size_t d) {
   const Json& j = w.member(parent, at, "scorer");
   const std::string here = at + "/scorer";
-  const auto kind = w.text(j, here, "kind");
-  if (kind == "linear") {
-    ml::Linear out;
-    out.weights = w.numbers(j, here, "weights", 0, d);
-    out.offset = w.number(j, here, "offset", -k_huge, k_huge);
-    return out;
+  const auto kind = ml::k_scorer_words.find(w.text(j, here, "kind"));
+  if (!kind) {
+    w.fail(here + "/kind", "unknown");
+    return ml::Linear{};
   }
-  if (kind == "polynomial") {
-    ml::Polynomial out;
-    const Json& terms = w.member(j, here, "terms");
-    if (!terms.is_array() || terms.size() > k_max_terms)
-      return w.fail(here + "/terms", "not an array of a possible length"), out;
-    for (std::size_t i = 0; i < terms.size() && w.ok(); ++i) {
-      const std::string term = here + "/terms/" + std::to_string(i);
-      auto features =
-          w.indices<std::uint16_t>(terms[i], term, "features", 0, 16, 0, static_cast<double>(d) - 1);
-      out.terms.push_back({std::move(features), w.number(terms[i], term, "coefficient", -k_huge, k_huge)});
-    }
-    return out;
+  switch (*kind) {
+    case ml::ScorerKind::linear:
+      return linear_of(w, j, here, d);
+    case ml::ScorerKind::polynomial:
+      return polynomial_of(w, j, here, d);
+    case ml::ScorerKind::trees:
+      return trees_of(w, j, here, d);
+    case ml::ScorerKind::svm:
+      return svm_of(w, j, here, d);
   }
-  if (kind == "trees") return trees_of(w, j, here, d);
-  if (kind == "svm") return svm_of(w, j, here, d);
-  w.fail(here + "/kind", "unknown");
   return ml::Linear{};
 }
 
@@ -254,7 +275,7 @@ ml::ModelInfo info_of(Walk& w, const Json& root) {
   const std::string at = "/manifest";
   const Json& j = w.member(root, "", "manifest");
   ml::ModelInfo out;
-  const auto task = ml::task_of(w.text(j, at, "task"));
+  const auto task = ml::k_task_words.find(w.text(j, at, "task"));
   if (!task) w.fail(at + "/task", "unknown");
   out.task = task.value_or(ml::Task::nlos_id);
   out.method = w.text(j, at, "method");

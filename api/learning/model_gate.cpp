@@ -92,7 +92,9 @@ GateReport gate_of(const ml::Model& candidate, const ml::Model* current, const G
   for (const auto& on : data.rows) {
     const auto both = measured(candidate, current, on);
     if (!both) continue;
-    mine = both->candidate, theirs = both->current, basis = on.basis;
+    mine = both->candidate;
+    theirs = both->current;
+    basis = on.basis;
     break;
   }
   bool apart = false;  // made here, but never measured on the rows the active one was

@@ -27,11 +27,19 @@ Result<std::shared_ptr<const ml::Model>> read_model(const ModelSource& source, c
   return std::make_shared<const ml::Model>(std::move(model));
 }
 
-std::shared_ptr<const ml::Model>* slot(ml::ModelSet& set, const std::string& task) {
-  if (task == "nlos_id") return &set.nlos_id;
-  if (task == "los_bias") return &set.los_bias;
-  if (task == "nlos_bias") return &set.nlos_bias;
-  if (task == "bias") return &set.bias;
+std::shared_ptr<const ml::Model>* slot(ml::ModelSet& set, const std::string& name) {
+  const auto task = ml::k_task_words.find(name);
+  if (!task) return nullptr;
+  switch (*task) {
+    case ml::Task::nlos_id:
+      return &set.nlos_id;
+    case ml::Task::los_bias:
+      return &set.los_bias;
+    case ml::Task::nlos_bias:
+      return &set.nlos_bias;
+    case ml::Task::bias:
+      return &set.bias;
+  }
   return nullptr;
 }
 
@@ -68,25 +76,6 @@ void put_lacking(const ml::Model* model, const nlos::FeatureVector& features, st
 }
 
 }  // namespace
-
-std::string_view correction_word(ml::Correction how) {
-  switch (how) {
-    case ml::Correction::weighted:
-      return "weighted";
-    case ml::Correction::hard:
-      return "hard";
-    case ml::Correction::none:
-      return "none";
-  }
-  return "weighted";
-}
-
-std::optional<ml::Correction> correction_of(std::string_view word) {
-  if (word == "weighted") return ml::Correction::weighted;
-  if (word == "hard") return ml::Correction::hard;
-  if (word == "none") return ml::Correction::none;
-  return std::nullopt;
-}
 
 Result<ModelRegistry::Active> load_models(const ModelSource& source,
                                           const std::map<std::string, ModelId>& models, ml::Correction how,
@@ -138,7 +127,7 @@ Result<void> ModelRegistry::reload() {
   ml::Correction how = ml::Correction::weighted;
   for (const auto& one : promotions) {
     if (one.task == k_correction_task)
-      how = correction_of(one.reason).value_or(how);
+      how = ml::k_correction_words.find(one.reason).value_or(how);
     else if (one.model)
       wanted[one.task] = *one.model;
   }

@@ -64,8 +64,6 @@ RangeModels models_of(const ModelRegistry::Active& active, const ml::RangeVerdic
 /// corrections "hard" and "none" ask for the range as it is.
 std::optional<RangeBelief> belief_of(const ml::RangeVerdict& verdict, ml::Correction how);
 
-std::string_view correction_word(ml::Correction how);
-std::optional<ml::Correction> correction_of(std::string_view word);
 /// Promotions of this "task" say which correction is in use, in their reason.
 inline constexpr std::string_view k_correction_task = "correction";
 

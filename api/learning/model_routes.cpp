@@ -148,7 +148,7 @@ Ordered active_json(LearningApi& l) {
   }
   const bool raw = active->predictor.empty();
   return {{"models", std::move(models)},
-          {"correction", correction_word(active->correction)},
+          {"correction", ml::k_correction_words.word(active->correction)},
           {"raw", raw},
           {"note", !active->fault.empty() ? Ordered(active->fault)
                    : raw                  ? Ordered("no model is promoted: ranges are used as they come")
@@ -183,14 +183,14 @@ Response patch_active(LearningApi& l, const Request& request) {
   std::vector<FieldError> errors;
   const auto body = json_body(request);
   Fields fields(body, "", errors);
-  const auto word = fields.word("correction", {"weighted", "hard", "none"}, true);
+  const auto correction = fields.word("correction", ml::k_correction_words, true);
   fields.finish();
   refuse_if_any(errors);
-  const auto how = static_cast<ml::Correction>(*word);
+  const auto how = *correction;
   const auto before = standing_for(l, request);
-  const auto done = promoted(l, request, "models.correction " + std::string(correction_word(how)),
+  const auto done = promoted(l, request, "models.correction " + std::string(ml::k_correction_words.word(how)),
                              {0, std::string(k_correction_task), std::nullopt, request.principal.name,
-                              std::string(correction_word(how)), l.clock.now(), false},
+                              std::string(ml::k_correction_words.word(how)), l.clock.now(), false},
                              before);
   announce(l, done, "");
   return active_answer(l);
@@ -302,11 +302,11 @@ Response roll_back(LearningApi& l, const Request& request) {
   std::vector<FieldError> errors;
   const auto body = json_body(request);
   Fields fields(body, "", errors);
-  const auto task = fields.word("task", {"nlos_id", "los_bias", "nlos_bias", "bias"}, true);
+  const auto task = fields.word("task", ml::k_task_words, true);
   const auto reason = fields.text("reason", 500).value_or("");
   fields.finish();
   refuse_if_any(errors);
-  const std::string name(ml::task_name(static_cast<ml::Task>(*task)));
+  const std::string name(ml::task_name(*task));
   const auto before = standing_for(l, request);
   const auto back = before_the_newest(value_or_problem(l.stores.models.promotions(name, 100'000)));
   const auto done =
@@ -333,7 +333,7 @@ Response predict(LearningApi& l, const Request& request) {
   Fields fields(body, "", errors);
   const Json* one = fields.child("sample");
   const Json* many = fields.child("samples");
-  const auto how_word = fields.word("correction", {"weighted", "hard", "none"});
+  const auto correction = fields.word("correction", ml::k_correction_words);
   fields.finish();
   if ((one == nullptr) == (many == nullptr))
     errors.push_back({"/samples", "required", "send either sample or samples"});
@@ -354,7 +354,7 @@ Response predict(LearningApi& l, const Request& request) {
     models = std::make_shared<const ModelRegistry::Active>(std::move(loaded).value());
   }
   auto chosen = *models;
-  if (how_word) chosen.correction = static_cast<ml::Correction>(*how_word);
+  chosen.correction = correction.value_or(chosen.correction);
   Ordered items = Ordered::array();
   for (const auto& one_sample : features)
     items.push_back(judgement_json(ModelRegistry::judge(chosen, one_sample)));

@@ -61,20 +61,6 @@ const unsigned char* bytes_of(std::string_view text) {
 
 }  // namespace
 
-std::string_view to_string(ModelStanding standing) {
-  switch (standing) {
-    case ModelStanding::made:
-      return "made";
-    case ModelStanding::vouched:
-      return "vouched";
-    case ModelStanding::foreign:
-      return "foreign";
-    case ModelStanding::changed:
-      return "changed";
-  }
-  return "foreign";
-}
-
 struct ModelSigner::Key {
   Pkey pkey;
 };

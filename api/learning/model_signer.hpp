@@ -19,7 +19,11 @@ enum class ModelStanding : std::uint8_t {
   foreign,  ///< nobody here has said anything about it yet
   changed,  ///< signed here, and edited afterwards: never used
 };
-std::string_view to_string(ModelStanding standing);
+inline constexpr auto k_standing_words = enum_table<ModelStanding>({{"made", ModelStanding::made},
+                                                                    {"vouched", ModelStanding::vouched},
+                                                                    {"foreign", ModelStanding::foreign},
+                                                                    {"changed", ModelStanding::changed}});
+constexpr std::string_view to_string(ModelStanding standing) { return k_standing_words.word(standing); }
 
 /// Signs artifacts with the server's own Ed25519 key (RFC 8032), over "anchord-model-1 made\n" (or
 /// "vouched\n") and the artifact's canonical bytes, which are what write_model_artifact gives. A signature is

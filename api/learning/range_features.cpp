@@ -33,12 +33,18 @@ nlos::FeatureVector features_of(const Range& range) {
 nlos::FeatureVector features_of(const CampaignSample& x, const GroundTruth& truth) {
   nlos::DiagnosticSample s;
   s.range_m = x.range_m;
-  s.rx_dbm = x.rx_dbm, s.fp_dbm = x.fp_dbm;
-  s.fp_amp1 = x.fp_amp1, s.fp_amp2 = x.fp_amp2, s.fp_amp3 = x.fp_amp3;
-  s.cir_power = x.cir_power, s.preamble_count = x.preamble_count;
-  s.std_noise = x.std_noise, s.max_noise = x.max_noise;
+  s.rx_dbm = x.rx_dbm;
+  s.fp_dbm = x.fp_dbm;
+  s.fp_amp1 = x.fp_amp1;
+  s.fp_amp2 = x.fp_amp2;
+  s.fp_amp3 = x.fp_amp3;
+  s.cir_power = x.cir_power;
+  s.preamble_count = x.preamble_count;
+  s.std_noise = x.std_noise;
+  s.max_noise = x.max_noise;
   s.fp_index = x.fp_index;
-  s.heading_deg = truth.heading_deg, s.height_difference_m = truth.height_difference_m;
+  s.heading_deg = truth.heading_deg;
+  s.height_difference_m = truth.height_difference_m;
   take_cir(x.cir, s);
   return nlos::compute_features(s);
 }

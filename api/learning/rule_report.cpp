@@ -56,15 +56,16 @@ std::string block(const std::vector<RuleReport>& reports, bool los) {
 
 Json rates_json(const nlos::RuleRow& row) {
   Json out = Json::object();
-  for (std::size_t r = 0; r < k_rule_count; ++r) {
-    const auto& rates = row[r].rates;
-    if (!row[r].judged()) continue;
-    out[std::string{nlos::rule_name(static_cast<Rule>(r))}] = {{"los", rates.los},
-                                                               {"los_right", rates.los_right},
-                                                               {"nlos", rates.nlos},
-                                                               {"nlos_right", rates.nlos_right},
-                                                               {"los_rate", rates.los_rate()},
-                                                               {"nlos_rate", rates.nlos_rate()}};
+  for (const auto& [word, rule] : nlos::k_rule_words) {
+    const auto& cell = row[static_cast<std::size_t>(rule)];
+    const auto& rates = cell.rates;
+    if (!cell.judged()) continue;
+    out[std::string{word}] = {{"los", rates.los},
+                              {"los_right", rates.los_right},
+                              {"nlos", rates.nlos},
+                              {"nlos_right", rates.nlos_right},
+                              {"los_rate", rates.los_rate()},
+                              {"nlos_rate", rates.nlos_rate()}};
   }
   return out;
 }
@@ -75,10 +76,12 @@ Json thresholds_json(const nlos::RuleSet& rules) {
     out["rss"] = {{"at_zero_dbm", rules.rss->at_zero_dbm},
                   {"slope_dbm_per_m", rules.rss->slope_dbm_per_m},
                   {"weight", rules.weight[0]}};
-  for (std::size_t r = 0; r < k_rule_count; ++r)
-    if (const auto& t = rules.threshold[r])
-      out[std::string{nlos::rule_name(static_cast<Rule>(r))}] = {
-          {"threshold", t->threshold}, {"los_above", t->los_above}, {"weight", rules.weight[r]}};
+  for (const auto& [word, rule] : nlos::k_rule_words) {
+    const auto at = static_cast<std::size_t>(rule);
+    if (const auto& t = rules.threshold[at])
+      out[std::string{word}] = {
+          {"threshold", t->threshold}, {"los_above", t->los_above}, {"weight", rules.weight[at]}};
+  }
   return out;
 }
 

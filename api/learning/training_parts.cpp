@@ -27,7 +27,11 @@ Json rates_json(const ml::Confusion& c) {
 struct Spread {
   double sum{}, square{};
   std::size_t n{};
-  void add(double v) { sum += v, square += v * v, ++n; }
+  void add(double v) {
+    sum += v;
+    square += v * v;
+    ++n;
+  }
   Json json() const {
     if (n == 0) return nullptr;
     const auto count = static_cast<double>(n);

@@ -1,22 +1,26 @@
 #include "api/learning/training_request.hpp"
 
 #include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
 
 #include "api/kit/reader.hpp"
-#include "api/kit/word_table.hpp"
 #include "core/base/text.hpp"
 
 namespace anchord::api {
 namespace {
 
 /// A session is a campaign under its other name.
-constexpr auto k_group_by = std::to_array<Word<Place>>({{"environment", Place::environment},
-                                                        {"campaign", Place::campaign},
-                                                        {"setting", Place::setting},
-                                                        {"session", Place::campaign}});
+std::optional<Place> read_group_by(Fields& fields) {
+  std::vector<std::string_view> words(k_place_words.words().begin(), k_place_words.words().end());
+  words.push_back(k_session);
+  const auto word = fields.word("group_by", words);
+  return word ? place_of(*word) : std::nullopt;
+}
 
 using Json = nlohmann::json;
+
+constexpr std::array<std::string_view, 1> k_metrics{"fpr"};
 
 std::vector<std::string> read_words(Fields& fields, const char* key, std::size_t most,
                                     std::vector<FieldError>& errors) {
@@ -38,9 +42,8 @@ std::vector<std::string> read_words(Fields& fields, const char* key, std::size_t
 
 std::string methods_for(ml::Task task) {
   std::string out = "auto";
-  for (int m = 0; m <= static_cast<int>(ml::Method::tree_average); ++m)
-    if (ml::suits(static_cast<ml::Method>(m), task))
-      out += ", " + std::string(ml::method_name(static_cast<ml::Method>(m)));
+  for (const auto& [word, method] : ml::k_method_words)
+    if (ml::suits(method, task)) out += ", " + std::string(word);
   return out;
 }
 
@@ -85,8 +88,7 @@ TrainingRequest read_training_request(const Json& body, std::vector<FieldError>&
   auto& spec = out.spec;
   Fields fields(body, "", errors);
   (void)fields.child("dataset");
-  if (const auto task = fields.word("task", {"nlos_id", "los_bias", "nlos_bias", "bias"}, true))
-    spec.task = static_cast<ml::Task>(*task);
+  spec.task = fields.word("task", ml::k_task_words, true).value_or(spec.task);
   const auto methods = read_words(fields, "methods", 20, errors);
   for (std::size_t i = 0; i < methods.size(); ++i) {
     if (methods[i] == "auto" && methods.size() == 1) continue;
@@ -102,8 +104,7 @@ TrainingRequest read_training_request(const Json& body, std::vector<FieldError>&
       spec.methods.push_back(*method);
     }
   }
-  if (const auto engine = fields.word("engine", {"own", "opencv"}))
-    spec.engine = static_cast<ml::Engine>(*engine);
+  spec.engine = fields.word("engine", ml::k_engine_words).value_or(spec.engine);
   for (std::size_t i = 0; i < spec.methods.size() && methods.size() == spec.methods.size(); ++i) {
     if (!ml::fits(spec.engine, spec.methods[i]))
       errors.push_back({"/methods/" + std::to_string(i), "unsuitable",
@@ -122,13 +123,13 @@ TrainingRequest read_training_request(const Json& body, std::vector<FieldError>&
         inner.integer("folds", 2, 100).value_or(static_cast<std::int64_t>(spec.folds)));
     spec.seed = static_cast<std::uint64_t>(
         inner.integer("seed", 0, 1'000'000'000).value_or(static_cast<std::int64_t>(spec.seed)));
-    if (const auto by = value_of_word(inner, "group_by", k_group_by)) out.group_by = *by;
+    out.group_by = read_group_by(inner).value_or(out.group_by);
     inner.finish();
   }
   if (const Json* grid = fields.child("grid")) read_grid(*grid, spec, errors);
   if (const Json* select = fields.child("select")) {
     Fields inner(*select, "/select", errors);
-    (void)inner.word("metric", {"fpr"}, true);
+    (void)inner.word("metric", k_metrics, true);
     spec.max_fpr = inner.number("max", 0, 1, true);
     inner.finish();
   }

@@ -22,7 +22,8 @@ Result<std::string> train_work(const Json& message, const std::stop_token& stop,
   BOOST_OUTCOME_TRY(const auto table, DatasetTable::parse(csv));
   auto spec = request.spec;
   auto wish = wish_of(spec.task, table);
-  wish.features = spec.features, wish.group_by = request.group_by;
+  wish.features = spec.features;
+  wish.group_by = request.group_by;
   BOOST_OUTCOME_TRY(const auto rows, learning_rows(table, wish));
   spec.held_out = rows.held_out;
   BOOST_OUTCOME_TRY(auto outcome, ml::train(rows.data, spec, stop, [&](const ml::TrainingProgress& p) {

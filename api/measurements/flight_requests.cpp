@@ -4,7 +4,6 @@
 #include <nlohmann/json.hpp>
 
 #include "api/wire/rows_json.hpp"
-#include "api/wire/words.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 
@@ -61,9 +60,9 @@ Result<Mission> parse_mission(std::string_view body) {
     mission.name = json.at("name").get<std::string>();
     mission.kit = text_of(json, "kit");
     mission.radio = text_of(json, "radio");
-    mission.frame = json.at("frame") == "local" ? TrackFrame::local : TrackFrame::wgs84;
-    mission.point =
-        value_of(k_point_words, json.at("track_point").get<std::string>()).value_or(mission.point);
+    BOOST_OUTCOME_TRY(mission.frame, k_frame_words.parse("frame", json.at("frame").get<std::string>()));
+    BOOST_OUTCOME_TRY(mission.point,
+                      k_point_words.parse("track_point", json.at("track_point").get<std::string>()));
     for (const Json& tag : json.at("tags")) mission.tags.push_back(parse_tag(tag));
   } catch (const std::exception& error) {
     return make_error(Errc::bad_frame, std::string("not a mission: ") + error.what());
@@ -96,8 +95,8 @@ std::string mission_request_json(const Mission& mission) {
   Ordered out{{"name", mission.name}};
   if (!mission.kit.empty()) out["kit"] = mission.kit;
   if (!mission.radio.empty()) out["radio"] = mission.radio;
-  out["frame"] = word_of(k_frame_words, mission.frame);
-  out["track_point"] = word_of(k_point_words, mission.point);
+  out["frame"] = k_frame_words.word(mission.frame);
+  out["track_point"] = k_point_words.word(mission.point);
   out["tags"] = Ordered::array();
   for (const TagAntenna& tag : mission.tags) {
     const auto& arm = tag.lever_arm_body_m;

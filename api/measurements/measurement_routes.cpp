@@ -9,7 +9,6 @@
 #include "api/measurements/ingest.hpp"
 #include "api/measurements/routes.hpp"
 #include "api/wire/rows_json.hpp"
-#include "api/wire/words.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/measurement_store.hpp"
 
@@ -50,7 +49,7 @@ constexpr const char* k_range_header =
 std::string range_csv(const Range& r, std::int64_t id) {
   const RangeTruth truth = r.truth.value_or(RangeTruth{});
   return std::to_string(id) + ',' + std::to_string(r.time.us()) + ',' + to_string(r.mission) + ',' +
-         std::string(word_of(k_range_kind_words, r.kind)) + ',' + to_string(r.tag) + ',' +
+         std::string(k_range_kind_words.word(r.kind)) + ',' + to_string(r.tag) + ',' +
          std::to_string(r.antenna) + ',' + to_string(r.anchor) + ',' + csv_number(r.seq) + ',' +
          to_wire(nlohmann::json(r.distance_m)) + ',' + csv_number(r.rss_dbm) + ',' + csv_number(r.fp_dbm) +
          ',' + csv_number(r.rx_dbm) + ',' + csv_number(r.std_noise) + ',' + csv_number(r.heading_deg) + ',' +
@@ -69,7 +68,7 @@ std::string fix_csv(const Fix& f, std::int64_t id) {
          (globe ? number(f.position.lon_deg) + ',' + number(f.position.lat_deg) + ',' +
                       number(f.position.height_m) + ",,,"
                 : ",,," + number(f.local_m.x()) + ',' + number(f.local_m.y()) + ',' + number(f.local_m.z()));
-  row += ',' + std::string(fix_word(f.fix));
+  row += ',' + std::string(k_fix_words.word(f.fix));
   for (int i = 0; i < 3; ++i)
     row +=
         ',' + (f.covariance_m2 ? number(std::sqrt(std::max(0.0, (*f.covariance_m2)(i, i)))) : std::string());
@@ -125,12 +124,6 @@ Response rows(const Request& request, MeasurementStore::Filter filter, Fetch fet
   return list_response(request, std::move(items), page.next, total);
 }
 
-FixClass query_fix(const std::string& text) {
-  if (const auto fix = value_of(k_fix_words, text)) return *fix;
-  throw_problem(422, "validation", "fix is not one of its words",
-                {{"/fix", "unknown_value", "must be none, single, dgps, float or fixed"}});
-}
-
 /// One page of what the promoted models call `wanted`: they are asked row by row, since nothing of theirs is
 /// stored.
 Result<MeasurementStore::Page<Range>> classed(MeasurementStore& store, const ModelRegistry::Active& active,
@@ -162,7 +155,7 @@ Response list_ranges(MeasurementApi& s, const Request& request) {
   const bool with_cir = query_flag(request, "cir"), with_features = query_flag(request, "features");
   auto filter = filter_of(request);
   filter.limits = query_limits(request);
-  if (const auto fix = request.query_value("fix")) filter.fix = query_fix(*fix);
+  filter.fix = query_word(request, "fix", k_fix_words);
   filter.every = query_every(request);
   const auto wanted = query_class(request);
   std::optional<std::uint64_t> total;

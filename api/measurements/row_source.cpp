@@ -6,6 +6,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "api/formats/csv_record.hpp"
 #include "api/kit/reader.hpp"
 #include "core/base/text.hpp"
 
@@ -125,36 +126,6 @@ const std::map<std::string, std::string, std::less<>>& columns(RowKind kind) {
   return kind == RowKind::range ? k_range : k_fix;
 }
 
-/// Null when a quote is left open or stands where it must not.
-std::optional<std::vector<std::string>> cells(std::string_view line) {
-  std::vector<std::string> out(1);
-  bool quoted = false;
-  for (std::size_t i = 0; i < line.size(); ++i) {
-    const char c = line[i];
-    if (quoted) {
-      if (c != '"')
-        out.back() += c;
-      else if (i + 1 < line.size() && line[i + 1] == '"')
-        out.back() += '"', ++i;
-      else
-        quoted = false;
-    } else if (c == '"') {
-      if (!out.back().empty()) return std::nullopt;
-      quoted = true;
-    } else if (c == ',') {
-      out.emplace_back();
-    } else {
-      out.back() += c;
-    }
-  }
-  if (quoted) return std::nullopt;
-  for (auto& cell : out) {
-    while (!cell.empty() && cell.back() == ' ') cell.pop_back();
-    while (!cell.empty() && cell.front() == ' ') cell.erase(0, 1);
-  }
-  return out;
-}
-
 bool is_text(std::string_view pointer) {
   return pointer == "/mission" || pointer == "/tag" || pointer == "/anchor" || pointer == "/fix" ||
          pointer == "/kind" || pointer == "/cir/b64" || pointer == "/truth/campaign";
@@ -164,12 +135,15 @@ bool is_text(std::string_view pointer) {
 
 CsvRows::CsvRows(RowKind kind, std::string_view header, std::vector<FieldError>& errors) {
   if (header.substr(0, 3) == "\xef\xbb\xbf") header.remove_prefix(3);  // spreadsheets write a byte order mark
-  const auto names = cells(header);
-  if (!names || !is_utf8(header)) {
-    errors.push_back({"", "malformed", "the header is not a CSV line in UTF-8"});
+  CsvRecord names;
+  const auto read = names.read(header);
+  if (!read || !is_utf8(header)) {
+    errors.push_back({"", "malformed",
+                      "the header is not a CSV line in UTF-8" + (read ? "" : ": " + read.error().message)});
     return;
   }
-  for (const auto& name : *names) {
+  for (const auto cell : names.cells()) {
+    const std::string name(cell);
     const auto it = columns(kind).find(name);
     if (it == columns(kind).end()) {
       errors.push_back(
@@ -188,16 +162,18 @@ void CsvRows::row(std::string_view line, nlohmann::json& out, std::vector<FieldE
     errors.push_back({"", "bad_utf8", "the line is not UTF-8"});
     return;
   }
-  const auto values = cells(line);
-  if (!values || values->size() != pointers_.size()) {
+  CsvRecord record;
+  const auto read = record.read(line);
+  const auto& values = record.cells();
+  if (!read || values.size() != pointers_.size()) {
     errors.push_back({"", "malformed",
-                      values ? "has " + std::to_string(values->size()) + " cells, the header " +
-                                   std::to_string(pointers_.size())
-                             : "a quote is left open"});
+                      read ? "has " + std::to_string(values.size()) + " cells, the header " +
+                                 std::to_string(pointers_.size())
+                           : read.error().message});
     return;
   }
   for (std::size_t i = 0; i < pointers_.size(); ++i) {
-    const auto& cell = (*values)[i];
+    const auto cell = values[i];
     if (cell.empty()) continue;
     nlohmann::json value;
     if (is_text(pointers_[i])) {

@@ -5,7 +5,6 @@
 #include "api/kit/or_null.hpp"
 #include "api/kit/reader.hpp"
 #include "api/wire/live_writer.hpp"
-#include "api/wire/words.hpp"
 
 namespace anchord::api {
 
@@ -32,10 +31,10 @@ Ordered mission_json(const Mission& mission, std::optional<std::uint64_t> n_rang
   out["site"] = mission.site ? Ordered(to_string(*mission.site)) : Ordered(nullptr);
   out["kit"] = mission.kit;
   out["radio"] = mission.radio;
-  out["frame"] = word_of(k_frame_words, mission.frame);
-  out["track_point"] = word_of(k_point_words, mission.point);
+  out["frame"] = k_frame_words.word(mission.frame);
+  out["track_point"] = k_point_words.word(mission.point);
   out["tags"] = std::move(tags);
-  out["state"] = mission_state_word(mission.state);
+  out["state"] = k_mission_state_words.word(mission.state);
   out["created_at"] = to_rfc3339(mission.created);
   out["finished_at"] = mission.finished ? Ordered(to_rfc3339(*mission.finished)) : Ordered(nullptr);
   out["n_ranges"] = or_null(n_ranges);
@@ -56,9 +55,9 @@ Mission read_mission(const Json& body, std::vector<FieldError>& errors) {
     else
       fields.error("site", "bad_id", id.error().message);
   }
-  if (const auto frame = value_of_word(fields, "frame", k_frame_words, true)) mission.frame = *frame;
+  if (const auto frame = fields.word("frame", k_frame_words, true)) mission.frame = *frame;
   // Required: an arm applied to the wrong point is a silent error of decimetres.
-  if (const auto point = value_of_word(fields, "track_point", k_point_words, true)) mission.point = *point;
+  if (const auto point = fields.word("track_point", k_point_words, true)) mission.point = *point;
   if (const Json* tags = fields.child("tags")) {
     if (!tags->is_array() || tags->size() > 64) {
       fields.error("tags", "wrong_type", "must be an array of at most 64 tag antennas");

@@ -10,6 +10,7 @@
 #include "api/missions/mission_service.hpp"
 #include "api/missions/routes.hpp"
 #include "api/wire/rows_json.hpp"
+#include "core/flight/command.hpp"
 #include "core/ports/devices.hpp"
 #include "core/ports/measurement_store.hpp"
 #include "core/ports/mission_store.hpp"
@@ -23,6 +24,9 @@ Response binned_missions(MissionApi& services, const Request& request);
 Response binned_mission(MissionApi& services, const Request& request);
 
 namespace {
+
+constexpr std::string_view k_finish = "finish", k_take_devices = "take_devices";
+constexpr std::string_view k_start = flight::k_flight_action_words.word(flight::FlightAction::start);
 
 /// Whether it has the rows of this server's devices, and who has them instead; absent: there are none.
 void say_devices(MissionApi& s, const Mission& mission, Ordered& out) {
@@ -143,14 +147,16 @@ Response act(MissionApi& s, const Request& request) {
   std::vector<FieldError> errors;
   const auto body = json_body(request);
   Fields fields(body, "", errors);
-  std::vector<std::string_view> actions{"finish", "take_devices"};
+  std::vector<std::string_view> actions{k_finish, k_take_devices};
   actions.insert(actions.end(), s.flight.words.begin(), s.flight.words.end());
   const auto action = fields.word("action", actions, true);
-  if (action.value_or(0) > 1) return s.flight.act(request, std::string(actions[*action]), fields, errors);
+  if (action && *action != k_finish && *action != k_take_devices)
+    return s.flight.act(request, *action, fields, errors);
   const auto lease = fields.text("lease", 64).value_or("");
   fields.finish();
   refuse_if_any(errors);
-  return *action == 0 ? finish(s, request, mission.id, lease) : take_devices(s, request, mission, lease);
+  return *action == k_finish ? finish(s, request, mission.id, lease)
+                             : take_devices(s, request, mission, lease);
 }
 
 Response events(MissionApi& s, const Request& request) {
@@ -170,7 +176,7 @@ Response events(MissionApi& s, const Request& request) {
 Work work_of_action(const Request& request) {
   const auto body = nlohmann::json::parse(request.body, nullptr, false);
   const auto action = body.is_object() ? body.value("action", nlohmann::json()) : nlohmann::json();
-  return action == "start" || action == "finish" ? Work::flight : Work::command;
+  return action == k_start || action == k_finish ? Work::flight : Work::command;
 }
 
 /// The flown way as one GeoJSON line (in a local frame as local_m), a page of at most 10 000 points.
@@ -193,7 +199,7 @@ Response track(MissionApi& s, const Request& request) {
     else
       local.push_back({row.local_m.x(), row.local_m.y(), row.local_m.z()});
     t_us.push_back(row.time.us());
-    fix.push_back(fix_word(row.fix));
+    fix.push_back(k_fix_words.word(row.fix));
   }
   const bool globe = mission.frame == TrackFrame::wgs84;
   Ordered body{{"type", "Feature"}, {"id", to_string(id)}};

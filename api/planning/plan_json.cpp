@@ -16,8 +16,6 @@ using Ordered = nlohmann::ordered_json;
 
 constexpr double k_max_height_m = 500;
 constexpr std::size_t k_max_waypoints = 1000, k_max_corners = 1000, k_max_areas = 100, k_max_anchors = 1000;
-const std::vector<std::string_view> k_rules{"dissertation", "a_optimal", "d_optimal"};
-const std::vector<std::string_view> k_combines{"worst", "mean", "weighted"};
 
 Ordered polygon_json(const GeoPolygon& polygon) {
   if (polygon.empty()) return nullptr;
@@ -84,8 +82,8 @@ void read_settings(const Json& json, PlanSettings& s, std::vector<FieldError>& e
   take(f.number("grid_step_up_m", 0.1, 50), s.grid_step_up_m);
   whole("grid_reach", 1, 10, s.grid_reach);
   whole("grid_reach_up", 0, 10, s.grid_reach_up);
-  if (const auto word = f.word("rule", k_rules)) s.rule = k_rules[*word];
-  if (const auto word = f.word("combine", k_combines)) s.combine = k_combines[*word];
+  if (const auto rule = f.word("rule", planning::k_rule_words)) s.rule = *rule;
+  if (const auto combine = f.word("combine", planning::k_combine_words)) s.combine = *combine;
   whole("min_iterations", 1, 1000, s.min_iterations);
   whole("max_iterations", 1, 1000, s.max_iterations);
   take(f.number("target_sigma_m", 0.001, 10), s.target_sigma_m);
@@ -140,8 +138,8 @@ Ordered settings_json(const PlanSettings& s) {
           {"grid_step_up_m", s.grid_step_up_m},
           {"grid_reach", s.grid_reach},
           {"grid_reach_up", s.grid_reach_up},
-          {"rule", s.rule},
-          {"combine", s.combine},
+          {"rule", to_string(s.rule)},
+          {"combine", to_string(s.combine)},
           {"min_iterations", s.min_iterations},
           {"max_iterations", s.max_iterations},
           {"target_sigma_m", s.target_sigma_m},
@@ -252,7 +250,7 @@ Plan plan_of(const StoredPlan& row) {
 Ordered plan_check_json(const planning::PlanCheck& check) {
   Ordered issues = Ordered::array();
   for (const auto& i : check.issues) {
-    issues.push_back({{"severity", i.severity == planning::Severity::error ? "error" : "warning"},
+    issues.push_back({{"severity", planning::k_severity_words.word(i.severity)},
                       {"code", i.code},
                       {"pointer", i.pointer},
                       {"text", i.text}});

@@ -1,5 +1,6 @@
 #include "api/stream/conversation.hpp"
 
+#include <array>
 #include <chrono>
 #include <nlohmann/json.hpp>
 
@@ -14,6 +15,8 @@ namespace anchord::api {
 using Json = nlohmann::json;
 
 namespace {
+
+constexpr std::array<std::string_view, 1> k_encodings{"json"};
 
 std::int64_t steady_us() {
   using namespace std::chrono;
@@ -86,7 +89,7 @@ void Conversation::subscribe(const Json& message) {
             inner.error("anchors", "bad_id", anchor.error().message);
         }
     }
-    inner.word("encoding", {"json"});
+    inner.word("encoding", k_encodings);
     inner.finish();
   }
   std::optional<std::pair<std::string, std::uint64_t>> since;

@@ -22,16 +22,15 @@ Ordered number(double value) {
 
 Ordered budget_json(const ErrorBudget& budget, bool base_known) {
   Ordered sources = Ordered::object();
-  for (std::size_t i = 0; i < k_error_sources; ++i) {
-    const auto source = static_cast<ErrorSource>(i);
-    Ordered& one = sources[std::string(source_word(source))];
+  for (const auto& [word, source] : k_error_source_words) {
+    Ordered& one = sources[std::string(word)];
     if (source == ErrorSource::base && !base_known) continue;
     one = {{"variance_m2", number(budget.trace_m2(source))}, {"share", number(budget.share(source))}};
   }
   return {{"trace_m2", number(budget.trace_m2())},
           {"sources", std::move(sources)},
-          {"largest", source_word(budget.largest())},
-          {"help", help_word(budget.help())},
+          {"largest", k_error_source_words.word(budget.largest())},
+          {"help", k_budget_help_words.word(budget.help())},
           {"help_text", help_text(budget.help())}};
 }
 

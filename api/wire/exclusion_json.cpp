@@ -15,8 +15,6 @@ namespace {
 constexpr std::size_t k_most_rows = 10'000;
 constexpr std::int64_t k_latest_us = 4'102'444'800'000'000;  // the year 2100
 
-const char* word(RowKind kind) { return kind == RowKind::ranges ? "ranges" : "fixes"; }
-
 template <class T>
 Ordered or_null(const std::optional<T>& value) {
   return value ? Ordered(to_string(*value)) : Ordered(nullptr);
@@ -98,7 +96,7 @@ Ordered exclusion_json(const Exclusion& e) {
   const auto& s = e.selection;
   Ordered out{{"id", to_string(e.id)},
               {"mission", to_string(e.mission)},
-              {"kind", word(s.kind)},
+              {"kind", k_row_kind_words.word(s.kind)},
               {"rows", rows_json(s)},
               {"since", time_or_null(s.since)},
               {"until", time_or_null(s.until)},
@@ -118,7 +116,7 @@ Ordered exclusion_json(const Exclusion& e) {
 std::string exclusion_canonical(const Exclusion& e) {
   const auto& s = e.selection;
   return to_wire(Ordered{{"id", to_string(e.id)},
-                         {"kind", word(s.kind)},
+                         {"kind", k_row_kind_words.word(s.kind)},
                          {"rows", rows_json(s)},
                          {"since", time_or_null(s.since)},
                          {"until", time_or_null(s.until)},
@@ -131,7 +129,7 @@ ExclusionRequest read_exclusion_request(const Json& body, std::vector<FieldError
   ExclusionRequest out;
   Fields fields(body, "", errors);
   auto& s = out.selection;
-  s.kind = fields.word("kind", {"ranges", "fixes"}, true).value_or(0) == 0 ? RowKind::ranges : RowKind::fixes;
+  s.kind = fields.word("kind", k_row_kind_words, true).value_or(RowKind::ranges);
   read_ids(fields, out.ids);
   read_rows(fields, s, errors);
   s.since = read_time(fields, "since");
@@ -156,7 +154,7 @@ ExclusionRequest read_exclusion_request(const Json& body, std::vector<FieldError
 
 std::string exclusion_request_json(const Exclusion& e) {
   const auto& s = e.selection;
-  Ordered out{{"kind", word(s.kind)}, {"reason", e.reason}};
+  Ordered out{{"kind", k_row_kind_words.word(s.kind)}, {"reason", e.reason}};
   if (!s.rows.empty()) out["rows"] = rows_json(s);
   if (s.since) out["since"] = s.since->us();
   if (s.until) out["until"] = s.until->us();

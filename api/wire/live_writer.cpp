@@ -5,7 +5,6 @@
 
 #include "api/kit/reader.hpp"
 #include "api/wire/rows_json.hpp"
-#include "api/wire/words.hpp"
 #include "core/base/text.hpp"
 #include "core/localize/accuracy_goal.hpp"
 #include "core/localize/error_ellipse.hpp"
@@ -108,40 +107,12 @@ std::optional<double> heading_deg(const Fix& fix) {
 
 }  // namespace
 
-std::string_view verdict_word(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::ok:
-      return "ok";
-    case Verdict::weak_geometry:
-      return "weak_geometry";
-    case Verdict::ambiguous:
-      return "ambiguous";
-    case Verdict::too_few:
-      return "too_few";
-    case Verdict::diverged:
-      return "diverged";
-  }
-  return "diverged";
-}
-
-std::string_view mission_state_word(MissionState state) {
-  switch (state) {
-    case MissionState::planned:
-      return "planned";
-    case MissionState::recording:
-      return "recording";
-    case MissionState::finished:
-      return "finished";
-  }
-  return "recording";
-}
-
 std::string live_pose_json(const MissionId& mission, TrackFrame frame, const LivePose& pose) {
   Object out;
   out.key("mission").text(to_string(mission)).key("t_us").integer(pose.time.us());
   place(out, frame == TrackFrame::wgs84 ? std::optional(pose.fix.position) : std::nullopt);
   out.key("enu_m").vector(pose.enu_m, 4);
-  out.key("heading_deg").optional(heading_deg(pose.fix), 2).key("fix").text(fix_word(pose.fix.fix));
+  out.key("heading_deg").optional(heading_deg(pose.fix), 2).key("fix").text(k_fix_words.word(pose.fix.fix));
   out.key("sigma_m");
   if (const auto sigma = sigma_m(pose.fix))
     out.vector(*sigma, 4);
@@ -163,7 +134,7 @@ std::string live_rtk_json(const MissionId& mission, const Fix& fix) {
       .key("t_us")
       .integer(fix.time.us())
       .key("fix")
-      .text(fix_word(fix.fix));
+      .text(k_fix_words.word(fix.fix));
   out.key("satellites");
   if (fix.satellites)
     out.integer(*fix.satellites);
@@ -214,7 +185,7 @@ std::string live_fix_json(const MissionId& mission, const Fix& fix) {
     out.vector(fix.local_m, 4);
   else
     out.raw("null");
-  out.key("fix").text(fix_word(fix.fix)).key("sigma_m");
+  out.key("fix").text(k_fix_words.word(fix.fix)).key("sigma_m");
   if (const auto sigma = sigma_m(fix))
     out.vector(*sigma, 4);
   else
@@ -236,7 +207,7 @@ std::string live_estimate_json(const MissionId& mission, const Estimate& estimat
   out.key("status")
       .text(flight::anchor_status(estimate))
       .key("verdict")
-      .text(verdict_word(estimate.verdict))
+      .text(k_verdict_words.word(estimate.verdict))
       .key("reason")
       .text(estimate.reason);
   out.key("enu_m");
@@ -320,13 +291,13 @@ std::string mission_state_json(const Mission& mission, const flight::LiveState& 
       .key("name")
       .text(mission.name)
       .key("state")
-      .text(mission_state_word(mission.state));
+      .text(k_mission_state_words.word(mission.state));
   out.key("t_us").integer(state.time.us()).key("started_us");
   if (state.started)
     out.integer(state.started->us());
   else
     out.raw("null");
-  out.key("frame").text(word_of(k_frame_words, mission.frame)).key("origin");
+  out.key("frame").text(k_frame_words.word(mission.frame)).key("origin");
   if (state.origin) {
     Object origin;
     place(origin, state.origin);

@@ -22,9 +22,6 @@ std::string live_fix_json(const MissionId& mission, const Fix& fix);
 std::string live_estimate_json(const MissionId& mission, const Estimate& estimate,
                                std::optional<double> models_moved_m = {});
 
-std::string_view verdict_word(Verdict verdict);
-
 std::string mission_state_json(const Mission& mission, const flight::LiveState& state);
-std::string_view mission_state_word(MissionState state);
 
 }  // namespace anchord::api

@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 
 #include "api/kit/reader.hpp"
-#include "api/wire/words.hpp"
 #include "core/base/base64.hpp"
 
 namespace anchord::api {
@@ -19,8 +18,6 @@ namespace {
 constexpr std::int64_t k_year_2100_us = 4'102'444'800'000'000;
 constexpr double k_min_distance_m = 0.05, k_max_distance_m = 150.0;  // reliability.md section 4
 constexpr double k_pi = 3.14159265358979323846;
-// Made once: rows come a hundred thousand at a time.
-const std::vector<std::string_view> k_fixes = words_of(k_fix_words), k_kinds = words_of(k_range_kind_words);
 
 void read_common(Fields& fields, const std::optional<MissionId>& given, MissionId& mission, UtcTime& time,
                  std::optional<UtcTime>& received, std::optional<std::uint64_t>& seq) {
@@ -147,8 +144,6 @@ std::optional<Cir> read_cir(const Json& value, const std::string& at, std::vecto
   return cir;
 }
 
-std::string_view fix_word(FixClass fix) { return word_of(k_fix_words, fix); }
-
 RangeRow read_range(const Json& row, const std::optional<MissionId>& mission,
                     std::vector<FieldError>& errors) {
   RangeRow out;
@@ -156,7 +151,7 @@ RangeRow read_range(const Json& row, const std::optional<MissionId>& mission,
   Fields fields(row, "", errors);
   if (!fields.is_object()) return out;
   read_common(fields, mission, range.mission, range.time, range.received, range.seq);
-  if (const auto kind = fields.word("kind", k_kinds)) range.kind = k_range_kind_words[*kind].value;
+  if (const auto kind = fields.word("kind", k_range_kind_words)) range.kind = *kind;
   if (const auto id = read_network_id(fields, "tag")) range.tag = *id;
   if (const auto id = read_network_id(fields, "anchor")) range.anchor = *id;
   if (range.anchor == range.tag && range.anchor.value != 0)
@@ -186,7 +181,7 @@ RangeRow read_range(const Json& row, const std::optional<MissionId>& mission,
     fix.time = range.time;
     Fields inner(*pose, "/pose", errors);
     read_position(inner, fix);
-    if (const auto word = inner.word("fix", k_fixes, true)) fix.fix = k_fix_words[*word].value;
+    if (const auto word = inner.word("fix", k_fix_words, true)) fix.fix = *word;
     read_uncertainty(inner, fix);
     read_attitude(inner, fix);
     inner.finish();
@@ -202,7 +197,7 @@ Fix read_fix(const Json& row, const std::optional<MissionId>& mission, std::vect
   if (!fields.is_object()) return fix;
   read_common(fields, mission, fix.mission, fix.time, fix.received, fix.seq);
   read_position(fields, fix);
-  if (const auto word = fields.word("fix", k_fixes, true)) fix.fix = k_fix_words[*word].value;
+  if (const auto word = fields.word("fix", k_fix_words, true)) fix.fix = *word;
   read_uncertainty(fields, fix);
   read_attitude(fields, fix);
   fix.correction_age_s = fields.number("correction_age_s", 0, 1e6);
@@ -217,7 +212,7 @@ Ordered range_json(const Range& range, std::optional<std::int64_t> id) {
   out["t_us"] = range.time.us();
   if (range.received) out["received_us"] = range.received->us();
   out["mission"] = to_string(range.mission);
-  out["kind"] = word_of(k_range_kind_words, range.kind);
+  out["kind"] = k_range_kind_words.word(range.kind);
   out["tag"] = to_string(range.tag);
   out["antenna"] = range.antenna;
   out["anchor"] = to_string(range.anchor);
@@ -252,7 +247,7 @@ Ordered fix_json(const Fix& fix, std::optional<std::int64_t> id) {
   } else {
     out["local_m"] = {fix.local_m.x(), fix.local_m.y(), fix.local_m.z()};
   }
-  out["fix"] = fix_word(fix.fix);
+  out["fix"] = k_fix_words.word(fix.fix);
   if (fix.covariance_m2) {
     const auto& c = *fix.covariance_m2;
     out["cov_enu_m2"] = {c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)};

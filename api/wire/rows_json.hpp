@@ -11,9 +11,6 @@
 
 namespace anchord::api {
 
-/// Words of FixClass on the wire: none, single, dgps, float, fixed.
-std::string_view fix_word(FixClass fix);
-
 /// A range as sent, with the pose some gateways attach (it becomes a fix of the same mission and instant).
 struct RangeRow {
   Range range;

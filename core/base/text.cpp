@@ -35,7 +35,8 @@ Sequence sequence_at(std::string_view text, std::size_t i) {
   }
   for (std::size_t k = 1; k <= more; ++k) {
     if (i + k >= text.size() || byte(i + k) < low || byte(i + k) > high) return {k, false};
-    low = 0x80, high = 0xbf;
+    low = 0x80;
+    high = 0xbf;
   }
   return {more + 1, true};
 }

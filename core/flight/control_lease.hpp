@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
 #include "core/base/steady.hpp"
@@ -19,6 +21,14 @@ struct Lease {
   UtcTime until{};            ///< for people: by the system clock as it stood when this was read
   SteadyTime until_steady{};  ///< what counts
 };
+/// What may be asked of it. ask shows the holder an event; refuse answers it.
+enum class ControlAction : std::uint8_t { take, renew, release, ask, refuse };
+inline constexpr auto k_control_words = enum_table<ControlAction>({{"take", ControlAction::take},
+                                                                   {"renew", ControlAction::renew},
+                                                                   {"release", ControlAction::release},
+                                                                   {"ask", ControlAction::ask},
+                                                                   {"refuse", ControlAction::refuse}});
+
 /// Who asks.
 struct Holder {
   std::string token_id, name;

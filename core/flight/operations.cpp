@@ -23,21 +23,21 @@ bool ActiveFlight::flying() const {
   return aborted.empty() && step != Step::ready && step != Step::done;
 }
 
-std::string ActiveFlight::status() const {
-  if (!aborted.empty()) return "aborted";
+FlightStatus ActiveFlight::status() const {
+  if (!aborted.empty()) return FlightStatus::aborted;
   switch (control.engine().state().step) {
     case Step::ready:
-      return "ready";
+      return FlightStatus::ready;
     case Step::hold:
-      return "hold";
+      return FlightStatus::hold;
     case Step::return_home:
-      return "return";
+      return FlightStatus::returning;
     case Step::landing:
-      return "landing";
+      return FlightStatus::landing;
     case Step::done:  // only what was promised
-      return control.engine().state().completed ? "done" : "aborted";
+      return control.engine().state().completed ? FlightStatus::done : FlightStatus::aborted;
     default:
-      return "running";
+      return FlightStatus::running;
   }
 }
 
@@ -53,10 +53,11 @@ FlightCommand* Operations::find(std::uint64_t number) {
   return it == commands_.end() ? nullptr : &*it;
 }
 
-FlightCommand& Operations::note(const Now& now, const MissionId& mission, std::string action, std::string by,
-                                std::string state) {
+FlightCommand& Operations::note(const Now& now, const MissionId& mission, std::string_view action,
+                                std::string by) {
   if (by != "procedure" && by != "checklist") newest_by_person_ = number_ + 1;
-  commands_.push_back({++number_, std::move(action), std::move(state), "", std::move(by), now.utc, mission});
+  commands_.push_back(
+      {++number_, std::string(action), CommandState::sent, "", std::move(by), now.utc, mission});
   if (commands_.size() > k_commands) commands_.pop_front();
   return commands_.back();
 }
@@ -105,22 +106,24 @@ void Operations::note_dispatched(const Now& now, ActiveFlight& f, FlightCommand*
   for (const auto& one : f.control.take_dispatched()) {
     auto* command = cause;
     if (cause == nullptr)
-      command = f.manual
-                    ? nullptr
-                    : &note(now, f.mission, std::string(procedure::to_string(one.kind)), "procedure", "sent");
+      command = f.manual ? nullptr : &note(now, f.mission, procedure::to_string(one.kind), "procedure");
     cause = nullptr;
     if (command == nullptr) continue;
     if (one.number != 0) {
       by_drone_number_[one.number] = command->number;
     } else if (one.not_sent.empty()) {
-      command->state = "accepted", command->text = "shown to the pilot";
+      command->state = CommandState::accepted;
+      command->text = "shown to the pilot";
     } else {
-      command->state = "refused", command->text = one.not_sent;
+      command->state = CommandState::refused;
+      command->text = one.not_sent;
     }
   }
   if (cause != nullptr) {
-    if (auto* unanswered = find(wanted))
-      unanswered->state = "accepted", unanswered->text = f.control.engine().state().reason;
+    if (auto* unanswered = find(wanted)) {
+      unanswered->state = CommandState::accepted;
+      unanswered->text = f.control.engine().state().reason;
+    }
   }
   while (by_drone_number_.size() > k_numbers) by_drone_number_.erase(by_drone_number_.begin());
 }
@@ -133,9 +136,7 @@ void Operations::read_reports(const Now& now) {
     if (ours == by_drone_number_.end()) continue;
     auto* c = find(ours->second);
     if (c == nullptr || r.state == CommandState::sent) continue;
-    c->state = r.state == CommandState::accepted  ? "accepted"
-               : r.state == CommandState::refused ? "refused"
-                                                  : "unconfirmed";
+    c->state = r.state;
     c->text = r.text;
     for (auto& u : uploads_) {
       if (u.command.number == c->number) u.command = *c;
@@ -219,12 +220,13 @@ std::vector<std::pair<std::string_view, std::string>> Operations::alarms() const
   out.emplace_back("drone.taken_over",
                    flies && flight_->control.taken_over() ? "the pilot or a failsafe has the aircraft" : "");
   // Until the next flight, or until somebody says that he knows.
-  const bool failed = flight_ && flight_->status() == "aborted" && flight_->aborted.empty() &&
+  const bool failed = flight_ && flight_->status() == FlightStatus::aborted && flight_->aborted.empty() &&
                       !flight_->control.engine().state().by_person;
   out.emplace_back("flight.aborted", failed ? "the flight ended before its end: " + flight_->ended() : "");
   std::string silent;
   for (const auto& c : commands_) {
-    if (flies && unconfirmed_ && c.number == *unconfirmed_) silent = c.action + " " + c.state + ": " + c.text;
+    if (flies && unconfirmed_ && c.number == *unconfirmed_)
+      silent = c.action + " " + std::string(to_string(c.state)) + ": " + c.text;
   }
   out.emplace_back("cmd.unconfirmed", std::move(silent));
   std::string stale;

@@ -60,7 +60,7 @@ struct ActiveFlight {
         control(std::move(c)) {}
 
   bool flying() const;
-  std::string status() const;  ///< ready, running, hold, return, landing, done, aborted
+  FlightStatus status() const;
   /// Why the work is over; empty while it goes on.
   std::string ended() const;
   /// What is known of the anchors' sides: of before a restart, and of the engine since.
@@ -150,7 +150,8 @@ class Operations {
   std::optional<Lease> control(const Now& now) const { return lease_.holder(now); }
   Result<FlightCommand> begin(const Now& now, const Mission& mission, const Groundwork& ground, bool manual,
                               const std::string& who);
-  Result<FlightCommand> act(const Now& now, const MissionId& mission, const std::string& action,
+  /// Any but start, which is begin().
+  Result<FlightCommand> act(const Now& now, const MissionId& mission, FlightAction action,
                             const std::string& who);
   Result<FlightCommand> upload(const Now& now, const MissionId& mission, const Plan& plan,
                                const std::string& what, const std::string& who);
@@ -193,12 +194,11 @@ class Operations {
     std::string who, reason;
   };
   FlightCommand* find(std::uint64_t number);
-  FlightCommand& note(const Now& now, const MissionId& mission, std::string action, std::string by,
-                      std::string state);
+  FlightCommand& note(const Now& now, const MissionId& mission, std::string_view action, std::string by);
   void note_dispatched(const Now& now, ActiveFlight& f, FlightCommand* cause);
   void read_reports(const Now& now);
   void take_happenings(ActiveFlight& f);
-  FlightCommand act_directly(const Now& now, const MissionId& mission, const std::string& action,
+  FlightCommand act_directly(const Now& now, const MissionId& mission, FlightAction action,
                              const std::string& who);
   void give_fence(const Now& now);
   std::optional<std::string> take_off_refused(const Plan& plan, const MissionId& mission) const;

@@ -8,14 +8,28 @@ namespace anchord::flight {
 
 namespace {
 
-std::optional<procedure::Event> event_of_action(const std::string& action) {
-  if (action == "hold") return procedure::Event::hold;
-  if (action == "resume") return procedure::Event::resume;
-  if (action == "skip") return procedure::Event::skip;
-  if (action == "return") return procedure::Event::return_home;
-  if (action == "land") return procedure::Event::land;
+/// What the procedure is asked; nothing of the actions that are no matter of its own.
+std::optional<procedure::Event> event_of_action(FlightAction action) {
+  switch (action) {
+    case FlightAction::hold:
+      return procedure::Event::hold;
+    case FlightAction::resume:
+      return procedure::Event::resume;
+    case FlightAction::skip:
+      return procedure::Event::skip;
+    case FlightAction::return_home:
+      return procedure::Event::return_home;
+    case FlightAction::land:
+      return procedure::Event::land;
+    case FlightAction::start:
+    case FlightAction::abort:
+    case FlightAction::disarm:
+      break;
+  }
   return std::nullopt;
 }
+
+std::string word_of(FlightAction action) { return std::string(k_flight_action_words.word(action)); }
 
 /// A plan without an origin has its ground where the aircraft stands.
 Result<Plan> flown_plan(const Plan& plan, double ground_m) {
@@ -156,12 +170,13 @@ Result<FlightCommand> Operations::begin(const Now& now, const Mission& mission, 
   if (ground.check) f.forecast = ground.check->time;
   f.control.fix(*r.fix_s, here, r.fix->fix);
   if (manual) {
-    f.by_hand.position_m = here, f.former_s = *r.fix_s;
+    f.by_hand.position_m = here;
+    f.former_s = *r.fix_s;
     f.control.by_hand(now.s, f.by_hand);
   }
   by_drone_number_.clear();
   unconfirmed_.reset();
-  const auto number_of_start = note(now, mission.id, "start", who, "sent").number;
+  const auto number_of_start = note(now, mission.id, word_of(FlightAction::start), who).number;
   f.control.start(now.s, who);
   note_dispatched(now, f, find(number_of_start));
   take_happenings(f);
@@ -170,31 +185,33 @@ Result<FlightCommand> Operations::begin(const Now& now, const Mission& mission, 
 }
 
 /// Whatever the server believes: who has control can always command the aircraft to hold, to land, to disarm.
-FlightCommand Operations::act_directly(const Now& now, const MissionId& mission, const std::string& action,
+FlightCommand Operations::act_directly(const Now& now, const MissionId& mission, FlightAction action,
                                        const std::string& who) {
-  auto& command = note(now, mission, action, who, "sent");
+  auto& command = note(now, mission, word_of(action), who);
   if (drone_ == nullptr) {
-    command.state = "accepted", command.text = "shown to the pilot";
+    command.state = CommandState::accepted;
+    command.text = "shown to the pilot";
     return command;
   }
   if (flying() && !flight_->manual && flight_->control.taken_over()) drone_->take_back();
-  by_drone_number_[action == "hold"   ? drone_->hold()
-                   : action == "land" ? drone_->land()
-                                      : drone_->disarm()] = command.number;
+  by_drone_number_[action == FlightAction::hold   ? drone_->hold()
+                   : action == FlightAction::land ? drone_->land()
+                                                  : drone_->disarm()] = command.number;
   return command;
 }
 
-Result<FlightCommand> Operations::act(const Now& now, const MissionId& mission, const std::string& action,
+Result<FlightCommand> Operations::act(const Now& now, const MissionId& mission, FlightAction action,
                                       const std::string& who) {
   const bool flies = flight_of(mission) != nullptr && flying();
-  const bool always = action == "hold" || action == "land" || action == "disarm";
-  if (action == "disarm" || (always && !flies)) return act_directly(now, mission, action, who);
+  const bool disarms = action == FlightAction::disarm;
+  const bool always = action == FlightAction::hold || action == FlightAction::land || disarms;
+  if (disarms || (always && !flies)) return act_directly(now, mission, action, who);
   if (!flies) return forbidden("this mission is not being flown");
   auto& f = *flight_;
-  if (action == "abort") {
-    auto& command = note(now, mission, action, who, "sent");
+  if (action == FlightAction::abort) {
+    auto& command = note(now, mission, word_of(action), who);
     if (f.manual)
-      command.state = "accepted";
+      command.state = CommandState::accepted;
     else
       by_drone_number_[f.control.abort()] = command.number;
     f.aborted = "aborted by " + who + ": the aircraft is the pilot's";
@@ -203,11 +220,11 @@ Result<FlightCommand> Operations::act(const Now& now, const MissionId& mission, 
     return command;
   }
   const auto event = event_of_action(action);
-  if (!event) return forbidden("there is no action " + action);
-  const auto number = note(now, mission, action, who, "sent").number;
+  if (!event) return forbidden("it is being flown: there is nothing to " + word_of(action));
+  const auto number = note(now, mission, word_of(action), who).number;
   if (const auto why_not = f.control.command(now.s, *event, who); !why_not.empty()) {
     std::erase_if(commands_, [&](const FlightCommand& c) { return c.number == number; });
-    return forbidden(action + ": " + why_not);
+    return forbidden(word_of(action) + ": " + why_not);
   }
   note_dispatched(now, f, find(number));
   take_happenings(f);

@@ -45,7 +45,7 @@ Result<FlightCommand> Operations::upload(const Now& now, const MissionId& missio
     up.n_items = route.size();
     sent = drone_->upload_route(route);
   }
-  up.command = note(now, mission, "upload_" + what, who, "sent");
+  up.command = note(now, mission, "upload_" + what, who);
   by_drone_number_[sent] = up.command.number;
   std::erase_if(uploads_, [&](const FlightUpload& u) { return u.what == what; });
   uploads_.push_back(up);
@@ -73,7 +73,7 @@ void Operations::give_fence(const Now& now) {
   const Plan& plan = preparing_->second;
   if (!has_fence(plan)) return;
   if (const auto* up = uploaded(plan, "fence")) {
-    const bool again = up->command.state == "unconfirmed" && now.s - up->begun_s > k_retry_s;
+    const bool again = up->command.state == CommandState::unconfirmed && now.s - up->begun_s > k_retry_s;
     if (!again) return;
   }
   const auto status = drone_->status();
@@ -88,10 +88,11 @@ std::optional<ChecklistItem> Operations::fence_item(const Plan& plan) const {
   if (up == nullptr) {
     item.detail = "not given to it yet";
   } else {
-    item.ok = up->command.state == "accepted";
-    item.detail = up->command.state == "sent" ? "being given to it"
-                  : *item.ok                  ? up->command.text
-                             : up->command.state + ": " + up->command.text + "; the server's own guard holds";
+    item.ok = up->command.state == CommandState::accepted;
+    item.detail = up->command.state == CommandState::sent ? "being given to it"
+                  : *item.ok                              ? up->command.text
+                             : std::string(to_string(up->command.state)) + ": " + up->command.text +
+                                   "; the server's own guard holds";
   }
   return item;
 }

@@ -216,7 +216,10 @@ void add_notes(std::span<const FramePair> pairs, const Centred& c, const FrameFi
     if (!fit.residuals[i].left_out_m) return;
     const double m = fit.residuals[i].left_out_m->norm();
     rest += m;
-    if (m > worst_m) worst_m = m, worst = i;
+    if (m > worst_m) {
+      worst_m = m;
+      worst = i;
+    }
   }
   rest = (rest - worst_m) / static_cast<double>(std::max<std::size_t>(1, fit.residuals.size() - 1));
   if (worst_m > 3 * rest && worst_m > 0.05 && pairs.size() > 4)

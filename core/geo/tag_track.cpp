@@ -36,20 +36,6 @@ double default_sigma_m(FixClass fix) {
   return 100.0;
 }
 
-std::string_view to_string(TrackRefusal why) {
-  switch (why) {
-    case TrackRefusal::none:
-      return "none";
-    case TrackRefusal::outside:
-      return "outside_track";
-    case TrackRefusal::gap:
-      return "track_gap";
-    case TrackRefusal::fix_class:
-      return "fix_not_good_enough";
-  }
-  return "none";
-}
-
 TrackPose pose_of(const Fix& fix, const std::optional<EnuFrame>& frame, UtcTime epoch) {
   TrackPose pose;
   pose.t_s = seconds_between(epoch, fix.time);

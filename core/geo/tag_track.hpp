@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/time.hpp"
 #include "core/geo/enu.hpp"
 #include "core/geo/interpolation_error.hpp"
@@ -26,8 +27,13 @@ struct TrackPose {
 
 /// Why the track says nothing about an instant.
 enum class TrackRefusal : std::uint8_t { none, outside, gap, fix_class };
-/// The word under which a refused range is counted: "outside_track", "track_gap", "fix_not_good_enough".
-std::string_view to_string(TrackRefusal why);
+/// The words under which refused ranges are counted.
+inline constexpr auto k_track_refusal_words =
+    enum_table<TrackRefusal>({{"none", TrackRefusal::none},
+                              {"outside_track", TrackRefusal::outside},
+                              {"track_gap", TrackRefusal::gap},
+                              {"fix_not_good_enough", TrackRefusal::fix_class}});
+constexpr std::string_view to_string(TrackRefusal why) { return k_track_refusal_words.word(why); }
 
 /// A tag antenna at one instant.
 struct TagPoint {

@@ -69,28 +69,6 @@ FixRefusal why_apart(const TrackSegments::Segment& part, const TrackSegments::Se
   return long_enough && dense ? FixRefusal::step : FixRefusal::jump;
 }
 
-std::string_view to_string(FixRefusal why) {
-  switch (why) {
-    case FixRefusal::none:
-      return "none";
-    case FixRefusal::not_usable:
-      return "not_usable";
-    case FixRefusal::far_away:
-      return "far_from_flight";
-    case FixRefusal::jump:
-      return "position_jump";
-    case FixRefusal::step:
-      return "position_step";
-    case FixRefusal::future_stamp:
-      return "future_stamp";
-    case FixRefusal::past_stamp:
-      return "past_stamp";
-    case FixRefusal::out_of_order:
-      return "out_of_order";
-  }
-  return "none";
-}
-
 Fix believed_class(const Fix& fix, const TrackLimits& limits) {
   Fix out = fix;
   if (fix.fix != FixClass::rtk_fixed || !fix.correction_age_s ||

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/geo/track_segments.hpp"
 #include "core/types/fix.hpp"
 
@@ -23,8 +24,17 @@ enum class FixRefusal : std::uint8_t {
   past_stamp,    ///< stamped before the whole flight
   out_of_order,  ///< stamped far behind those that came before and after it
 };
-/// The word under which it is counted: "position_jump", "position_step", "future_stamp", ...
-std::string_view to_string(FixRefusal why);
+/// The words under which they are counted.
+inline constexpr auto k_fix_refusal_words =
+    enum_table<FixRefusal>({{"none", FixRefusal::none},
+                            {"not_usable", FixRefusal::not_usable},
+                            {"far_from_flight", FixRefusal::far_away},
+                            {"position_jump", FixRefusal::jump},
+                            {"position_step", FixRefusal::step},
+                            {"future_stamp", FixRefusal::future_stamp},
+                            {"past_stamp", FixRefusal::past_stamp},
+                            {"out_of_order", FixRefusal::out_of_order}});
+constexpr std::string_view to_string(FixRefusal why) { return k_fix_refusal_words.word(why); }
 /// Corrections were too old for its class; counted, and used as RTK float.
 inline constexpr std::string_view k_old_correction = "old_correction";
 

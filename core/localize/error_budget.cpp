@@ -91,52 +91,6 @@ double even_share(const Eigen::Matrix3d& covariance, bool plane) {
 
 }  // namespace
 
-std::string_view source_word(ErrorSource source) {
-  switch (source) {
-    case ErrorSource::ranging:
-      return "ranging";
-    case ErrorSource::geometry:
-      return "geometry";
-    case ErrorSource::bias:
-      return "bias";
-    case ErrorSource::rtk:
-      return "rtk";
-    case ErrorSource::lever_arm:
-      return "lever_arm";
-    case ErrorSource::clock:
-      return "clock";
-    case ErrorSource::base:
-      return "base";
-    case ErrorSource::floor:
-      return "floor";
-  }
-  return "floor";
-}
-
-std::string_view help_word(BudgetHelp help) {
-  switch (help) {
-    case BudgetHelp::more_points:
-      return "more_points";
-    case BudgetHelp::other_height:
-      return "other_height";
-    case BudgetHelp::other_sides:
-      return "other_sides";
-    case BudgetHelp::calibrate_bias:
-      return "calibrate_bias";
-    case BudgetHelp::better_rtk:
-      return "better_rtk";
-    case BudgetHelp::calibrate_arm:
-      return "calibrate_arm";
-    case BudgetHelp::fix_clock:
-      return "fix_clock";
-    case BudgetHelp::survey_base:
-      return "survey_base";
-    case BudgetHelp::check_points:
-      return "check_points";
-  }
-  return "check_points";
-}
-
 std::string_view help_text(BudgetHelp help) {
   switch (help) {
     case BudgetHelp::more_points:

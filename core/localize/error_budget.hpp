@@ -7,14 +7,22 @@
 #include <string_view>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/localize/joint_model.hpp"
 
 namespace anchord {
 
 /// Where the uncertainty of a position comes from, in the order they are shown.
 enum class ErrorSource : std::uint8_t { ranging, geometry, bias, rtk, lever_arm, clock, base, floor };
-inline constexpr std::size_t k_error_sources = 8;
-std::string_view source_word(ErrorSource source);
+inline constexpr auto k_error_source_words = enum_table<ErrorSource>({{"ranging", ErrorSource::ranging},
+                                                                      {"geometry", ErrorSource::geometry},
+                                                                      {"bias", ErrorSource::bias},
+                                                                      {"rtk", ErrorSource::rtk},
+                                                                      {"lever_arm", ErrorSource::lever_arm},
+                                                                      {"clock", ErrorSource::clock},
+                                                                      {"base", ErrorSource::base},
+                                                                      {"floor", ErrorSource::floor}});
+inline constexpr std::size_t k_error_sources = k_error_source_words.size();
 
 /// What would lower it most.
 enum class BudgetHelp : std::uint8_t {
@@ -28,7 +36,16 @@ enum class BudgetHelp : std::uint8_t {
   survey_base,
   check_points  ///< what remains is in no residual: only points known otherwise can show it
 };
-std::string_view help_word(BudgetHelp help);
+inline constexpr auto k_budget_help_words =
+    enum_table<BudgetHelp>({{"more_points", BudgetHelp::more_points},
+                            {"other_height", BudgetHelp::other_height},
+                            {"other_sides", BudgetHelp::other_sides},
+                            {"calibrate_bias", BudgetHelp::calibrate_bias},
+                            {"better_rtk", BudgetHelp::better_rtk},
+                            {"calibrate_arm", BudgetHelp::calibrate_arm},
+                            {"fix_clock", BudgetHelp::fix_clock},
+                            {"survey_base", BudgetHelp::survey_base},
+                            {"check_points", BudgetHelp::check_points}});
 std::string_view help_text(BudgetHelp help);
 
 /// The covariance of one position, taken apart. The parts are positive semidefinite and their sum is the

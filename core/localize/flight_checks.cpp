@@ -80,7 +80,10 @@ Gate check_profile(const ProfileFactor& alone, std::span<const ProfileFactor> ot
   double z = 0;
   for (int i = 0; i < 4; ++i) {
     const double one = std::abs(apart[i]) / std::sqrt(both(i, i));
-    if (one > z) z = one, oddest = i;
+    if (one > z) {
+      z = one;
+      oddest = i;
+    }
   }
   // Each by itself too: what three of them have in common does not excuse the fourth.
   const double limit = chi2_quantile(GateLimits{}.agreement, 4);

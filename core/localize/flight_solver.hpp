@@ -50,6 +50,8 @@ struct GeometryMeasures {
 
 /// Which part of the position the flight determines.
 enum class Determined : std::uint8_t { none, horizontal, position };
+inline constexpr auto k_determined_words = enum_table<Determined>(
+    {{"none", Determined::none}, {"horizontal", Determined::horizontal}, {"position", Determined::position}});
 
 struct AnchorSolution {
   Estimate estimate;

@@ -15,6 +15,8 @@ enum class AnchorMethod : std::uint8_t {
   linear,  ///< eq 7.2 to 7.5, closed form
   wls      ///< eq 7.10, weighted nonlinear least squares of each anchor alone
 };
+inline constexpr auto k_anchor_method_words = enum_table<AnchorMethod>(
+    {{"joint", AnchorMethod::joint}, {"linear", AnchorMethod::linear}, {"wls", AnchorMethod::wls}});
 
 /// One anchor by the methods that know nothing of bias, lag or outliers; the joint answer is its Estimate's.
 struct MethodAnswers {

@@ -117,7 +117,10 @@ Result<Bearing> bearing_from_turn(std::span<const TurnSample> samples) {
   double top = match(coarse);
   for (int off = -k_coarse_tenths + k_tenths_step; off < k_coarse_tenths; off += k_tenths_step) {
     const int tenths = (coarse + off + k_tenths) % k_tenths;
-    if (const double here = match(tenths); here > top) top = here, best = tenths;
+    if (const double here = match(tenths); here > top) {
+      top = here;
+      best = tenths;
+    }
   }
   const double bearing = k_turn * best / k_tenths;
   double elsewhere = 0;

@@ -97,7 +97,11 @@ std::vector<Recipe> classifier_candidates(const Dataset& data, const LearnOption
   Recipe plain;
   plain.per_placement = options.per_placement;
   plain.forest.seed = options.seed;
-  if (few) plain.c = 0.3, plain.svm.c = 1, plain.forest.leaf_share = 0.08;
+  if (few) {
+    plain.c = 0.3;
+    plain.svm.c = 1;
+    plain.forest.leaf_share = 0.08;
+  }
 
   std::vector<Names> sets;
   if (!options.features.empty())

@@ -75,7 +75,10 @@ Dataset Dataset::of_class(bool is_los) const {
 std::string Dataset::digest() const {
   Sha256 sha;
   sha.add(static_cast<std::uint64_t>(rows()));
-  for (const auto& name : features) sha.add(name), sha.add(std::string_view{"\0", 1});
+  for (const auto& name : features) {
+    sha.add(name);
+    sha.add(std::string_view{"\0", 1});
+  }
   for (const double value : x) sha.add(value);
   for (const auto value : los) sha.add(static_cast<std::uint64_t>(value));
   for (const double value : bias_m) sha.add(value);

@@ -9,7 +9,10 @@ namespace {
 BiasEvaluation bias_of(const std::vector<double>& raw, const std::vector<double>& left,
                        const std::vector<std::size_t>& rows) {
   std::vector<double> a, b;
-  for (const auto i : rows) a.push_back(raw[i]), b.push_back(left[i]);
+  for (const auto i : rows) {
+    a.push_back(raw[i]);
+    b.push_back(left[i]);
+  }
   return {error_stats(a), error_stats(b)};
 }
 

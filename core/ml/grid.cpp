@@ -21,7 +21,10 @@ constexpr std::array k_settings{
     Setting{"c",
             {Method::logistic, Method::average, Method::logistic},
             [](const Recipe& r) { return r.c; },
-            [](Recipe& r, double v) { r.c = v, r.svm.c = std::min(v, 10.0); }},
+            [](Recipe& r, double v) {
+              r.c = v;
+              r.svm.c = std::min(v, 10.0);
+            }},
     Setting{"c",
             {Method::svm, Method::svm, Method::svm},
             [](const Recipe& r) { return r.svm.c; },

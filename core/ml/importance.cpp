@@ -17,7 +17,10 @@ struct BaggedTree {
 double loss_of(const std::vector<BaggedTree>& trees, const TrainingRows& rows) {
   std::vector<double> sum(rows.n(), 0), count(rows.n(), 0);
   for (const auto& t : trees)
-    for (const auto i : t.unseen) sum[i] += score(t.tree, rows.row(i)), count[i] += 1;
+    for (const auto i : t.unseen) {
+      sum[i] += score(t.tree, rows.row(i));
+      count[i] += 1;
+    }
   double loss = 0, total = 0;
   for (std::size_t i = 0; i < rows.n(); ++i) {
     if (count[i] == 0) continue;

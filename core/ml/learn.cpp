@@ -71,7 +71,8 @@ void tell(const LearnOptions& options, const std::string& detail, std::size_t do
 CandidateRow row_of(const Recipe& recipe, const OutOfFold& result) {
   CandidateRow row;
   row.name = recipe.method == Method::none ? "none (no correction)" : recipe.describe();
-  row.loss = result.loss, row.loss_sd = result.loss_sd;
+  row.loss = result.loss;
+  row.loss_sd = result.loss_sd;
   row.method = recipe.method;
   row.settings = settings_of(recipe);
   row.features = recipe.features;
@@ -95,7 +96,8 @@ void add_folds(const Dataset& data, const std::vector<std::size_t>& fold, std::s
   for (std::size_t k = first; k < out.size(); ++k) {
     const auto n = static_cast<double>(std::max<std::size_t>(out[k].test_rows, 1));
     out[k].train_rows = data.rows() - out[k].test_rows;
-    out[k].mae_raw_m /= n, out[k].mae_m /= n;
+    out[k].mae_raw_m /= n;
+    out[k].mae_m /= n;
   }
 }
 

@@ -214,14 +214,20 @@ Result<Learned> learn_bias_mixture(const Dataset& data, const LearnOptions& opti
     for (const double kappa : {0.5, 1.0}) {
       if (cancelled("shared bias", 0.2)) return make_error(Errc::canceled, "cancelled");
       BOOST_OUTCOME_TRY(const double loss, los_loss(data, fold, {names, kappa, {}}));
-      if (loss < best_loss * 0.98) best_loss = loss, best_shape = {names, kappa, {}};
+      if (loss < best_loss * 0.98) {
+        best_loss = loss;
+        best_shape = {names, kappa, {}};
+      }
     }
   }
 
   // Every row's density from folds without it; the likelihood beside that of constants.
   const auto weight = placement_weights(data);
   double los_share = 0, total = 0;
-  for (std::size_t i = 0; i < data.rows(); ++i) los_share += weight[i] * data.los[i], total += weight[i];
+  for (std::size_t i = 0; i < data.rows(); ++i) {
+    los_share += weight[i] * data.los[i];
+    total += weight[i];
+  }
   const std::vector<double> base_rate(data.rows(), los_share / total);
   if (cancelled("constants", 0.3)) return make_error(Errc::canceled, "cancelled");
   BOOST_OUTCOME_TRY(const auto constants, out_of_fold(data, base_rate, fold, {}, options.run));

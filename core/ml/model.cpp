@@ -10,8 +10,6 @@
 namespace anchord::ml {
 namespace {
 
-constexpr std::array<std::string_view, 4> k_task_names{"nlos_id", "los_bias", "nlos_bias", "bias"};
-
 double dot(const double* a, const double* b, std::size_t n) {
   double sum = 0;
   for (std::size_t i = 0; i < n; ++i) sum += a[i] * b[i];
@@ -123,14 +121,6 @@ double Regressor::bias_m(std::span<const double> features) const {
   scaler.apply(features, z);
   const double answer = std::clamp(score(scorer, {z.data(), scaler.mean.size()}), min_m, max_m);
   return fallback_m + (answer - fallback_m) / (1 + beyond_sd * beyond_sd);
-}
-
-std::string_view task_name(Task task) { return k_task_names.at(static_cast<std::size_t>(task)); }
-
-std::optional<Task> task_of(std::string_view name) {
-  const auto* found = std::find(k_task_names.begin(), k_task_names.end(), name);
-  if (found == k_task_names.end()) return std::nullopt;
-  return static_cast<Task>(found - k_task_names.begin());
 }
 
 Prediction predict(const Model& model, std::span<const double> features) {

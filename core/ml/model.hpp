@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/ml/mixture.hpp"
 
 /// Fitted models as plain values, and their prediction: flat, free of allocation, equal on every machine that
@@ -55,6 +56,10 @@ struct Trees {
 };
 
 enum class Kernel : std::uint8_t { linear, polynomial, sigmoid, rbf };
+inline constexpr auto k_kernel_words = enum_table<Kernel>({{"linear", Kernel::linear},
+                                                           {"polynomial", Kernel::polynomial},
+                                                           {"sigmoid", Kernel::sigmoid},
+                                                           {"rbf", Kernel::rbf}});
 
 /// sum_i alpha_i K(s_i, x) - rho, with libsvm's kernels: (g u'v + c)^d, tanh(g u'v + c), exp(-g |u - v|^2).
 struct Svm {
@@ -68,6 +73,13 @@ struct Svm {
 };
 
 using Scorer = std::variant<Linear, Polynomial, Trees, Svm>;
+
+/// Which of them a Scorer is.
+enum class ScorerKind : std::uint8_t { linear, polynomial, trees, svm };
+inline constexpr auto k_scorer_words = enum_table<ScorerKind>({{"linear", ScorerKind::linear},
+                                                               {"polynomial", ScorerKind::polynomial},
+                                                               {"trees", ScorerKind::trees},
+                                                               {"svm", ScorerKind::svm}});
 
 /// Raw score at standardised features.
 double score(const Scorer& scorer, std::span<const double> x);
@@ -103,9 +115,11 @@ struct Regressor {
 };
 
 enum class Task : std::uint8_t { nlos_id, los_bias, nlos_bias, bias };
-
-std::string_view task_name(Task task);
-std::optional<Task> task_of(std::string_view name);
+inline constexpr auto k_task_words = enum_table<Task>({{"nlos_id", Task::nlos_id},
+                                                       {"los_bias", Task::los_bias},
+                                                       {"nlos_bias", Task::nlos_bias},
+                                                       {"bias", Task::bias}});
+constexpr std::string_view task_name(Task task) { return k_task_words.word(task); }
 
 /// Where a model comes from.
 struct ModelInfo {

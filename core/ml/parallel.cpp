@@ -22,7 +22,9 @@ struct Outcome {
   void fail(std::size_t at, std::optional<Error> why, std::exception_ptr what) {
     const std::lock_guard lock{mutex};
     if (at >= failed_at) return;
-    failed_at = at, error = std::move(why), thrown = std::move(what);
+    failed_at = at;
+    error = std::move(why);
+    thrown = std::move(what);
   }
 };
 
@@ -36,9 +38,13 @@ Result<void> parallel_for(std::size_t n, const Execution& how,
   const auto run = [&] {
     for (std::size_t i; !failed && !how.cancelled() && (i = next++) < n;) {
       try {
-        if (auto done = work(i); !done) outcome.fail(i, done.error(), nullptr), failed = true;
+        if (auto done = work(i); !done) {
+          outcome.fail(i, done.error(), nullptr);
+          failed = true;
+        }
       } catch (...) {  // out of memory in a worker is the caller's to handle
-        outcome.fail(i, std::nullopt, std::current_exception()), failed = true;
+        outcome.fail(i, std::nullopt, std::current_exception());
+        failed = true;
       }
     }
   };

@@ -28,6 +28,8 @@ enum class Correction : std::uint8_t {
   hard,      ///< the dissertation's switch: the bias of the class that was called (6.5.2)
   none,
 };
+inline constexpr auto k_correction_words = enum_table<Correction>(
+    {{"weighted", Correction::weighted}, {"hard", Correction::hard}, {"none", Correction::none}});
 
 /// One range, judged.
 struct RangeVerdict {

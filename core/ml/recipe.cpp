@@ -11,10 +11,6 @@
 namespace anchord::ml {
 namespace {
 
-constexpr std::array<std::string_view, 11> k_names{
-    "none",    "constant",   "logistic",     "random_forest",  "svm",         "boosted",
-    "average", "univariate", "multivariate", "least_absolute", "tree_average"};
-
 struct Prepared {
   Dataset data;
   Scaler scaler;
@@ -82,25 +78,13 @@ double sigmoid(double z) { return 1 / (1 + std::exp(-z)); }
 
 }  // namespace
 
-std::string_view engine_name(Engine engine) { return engine == Engine::opencv ? "opencv" : "own"; }
-
 std::size_t most_svm_rows(Engine engine) { return engine == Engine::opencv ? 20'000 : SvmOptions{}.max_rows; }
 
 bool fits(Engine engine, Method method) {
   return engine == Engine::own || method == Method::svm || method == Method::random_forest;
 }
 
-std::string_view method_name(Method method) { return k_names.at(static_cast<std::size_t>(method)); }
-
-std::optional<Method> method_of(std::string_view name) {
-  if (name == "polynomial") return Method::univariate;
-  const auto* found = std::find(k_names.begin(), k_names.end(), name);
-  if (found == k_names.end()) return std::nullopt;
-  return static_cast<Method>(found - k_names.begin());
-}
-
 std::string Recipe::describe() const {
-  constexpr std::array<std::string_view, 4> k_kernels{"linear", "polynomial", "sigmoid", "rbf"};
   std::string settings;
   const auto add = [&](std::string_view name, const std::string& value) {
     settings += (settings.empty() ? "" : ", ") + std::string{name} + "=" + value;
@@ -116,7 +100,7 @@ std::string Recipe::describe() const {
     if (name == "features_per_split" && value == 0) continue;
     if (name == "interactions" && interactions) continue;
     if (name == "kernel")
-      add(name, std::string{k_kernels.at(static_cast<std::size_t>(svm.kernel))});
+      add(name, std::string{k_kernel_words.word(svm.kernel)});
     else
       add(name, number(value));
   }
@@ -220,7 +204,9 @@ double worst_harm_m(const Dataset& data, std::span<const double> correction_m) {
   std::map<std::uint32_t, std::array<double, 3>> sums;  // rows, raw, corrected
   for (std::size_t i = 0; i < data.rows(); ++i) {
     auto& s = sums[data.group[i]];
-    s[0] += 1, s[1] += std::abs(data.bias_m[i]), s[2] += std::abs(data.bias_m[i] - correction_m[i]);
+    s[0] += 1;
+    s[1] += std::abs(data.bias_m[i]);
+    s[2] += std::abs(data.bias_m[i] - correction_m[i]);
   }
   double worst = 0;
   for (const auto& [group, s] : sums)
@@ -267,9 +253,14 @@ Result<OutOfFold> cross_validate(const Dataset& data, const Recipe& recipe,
   for (std::size_t k = 0; k < folds; ++k) {
     double s = 0, w = 0;
     for (std::size_t i = 0; i < data.rows(); ++i)
-      if (fold[i] == k) s += weight[i] * loss[i], w += weight[i];
-    sum += s, total += w;
-    sum_folds += s / w, sum_squares += s / w * s / w;
+      if (fold[i] == k) {
+        s += weight[i] * loss[i];
+        w += weight[i];
+      }
+    sum += s;
+    total += w;
+    sum_folds += s / w;
+    sum_squares += s / w * s / w;
     out.fold_loss.push_back(s / w);
   }
   const auto n = static_cast<double>(folds);

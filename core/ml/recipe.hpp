@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/result.hpp"
 #include "core/ml/dataset.hpp"
 #include "core/ml/parallel.hpp"
@@ -30,16 +31,32 @@ enum class Method : std::uint8_t {
   tree_average,    ///< mean of the logits of boosted trees and forest: for many rows
 };
 
+/// What univariate was called before.
+inline constexpr std::string_view k_univariate_before = "polynomial";
+inline constexpr auto k_method_words = enum_table<Method>({{"none", Method::none},
+                                                           {"constant", Method::constant},
+                                                           {"logistic", Method::logistic},
+                                                           {"random_forest", Method::random_forest},
+                                                           {"svm", Method::svm},
+                                                           {"boosted", Method::boosted},
+                                                           {"average", Method::average},
+                                                           {"univariate", Method::univariate},
+                                                           {"multivariate", Method::multivariate},
+                                                           {"least_absolute", Method::least_absolute},
+                                                           {"tree_average", Method::tree_average}});
+constexpr std::string_view method_name(Method method) { return k_method_words.word(method); }
+constexpr std::optional<Method> method_of(std::string_view name) {
+  return name == k_univariate_before ? Method::univariate : k_method_words.find(name);
+}
+
 /// Whose code fits: our own with libsvm, or OpenCV ml, which has SVMs and forests.
 enum class Engine : std::uint8_t { own, opencv };
-std::string_view engine_name(Engine engine);
+inline constexpr auto k_engine_words = enum_table<Engine>({{"own", Engine::own}, {"opencv", Engine::opencv}});
+constexpr std::string_view engine_name(Engine engine) { return k_engine_words.word(engine); }
 bool fits(Engine engine, Method method);
 /// An SVM is fitted to at most so many rows: time grows with their square. OpenCV takes a quarter of the time
 /// of libsvm, and the process it runs in can be ended at any moment.
 std::size_t most_svm_rows(Engine engine);
-
-std::string_view method_name(Method method);
-std::optional<Method> method_of(std::string_view name);
 
 struct Recipe {
   Method method{Method::average};

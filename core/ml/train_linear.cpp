@@ -56,7 +56,10 @@ Eigen::VectorXd irls(const Eigen::MatrixXd& x, const Eigen::VectorXd& y, const E
     const Eigen::VectorXd step = hessian.ldlt().solve(gradient);
     double scale = 1;
     double now = loss(beta - step);
-    while (!(now <= best) && scale > 1e-6) scale *= 0.5, now = loss(beta - scale * step);
+    while (!(now <= best) && scale > 1e-6) {
+      scale *= 0.5;
+      now = loss(beta - scale * step);
+    }
     if (!(now <= best)) break;
     beta -= scale * step;
     if (best - now < 1e-10 * (1 + std::abs(best))) break;

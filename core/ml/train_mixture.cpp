@@ -68,7 +68,10 @@ Result<BiasMixture::Shared> fit_shared_bias(const MixtureTask& task) {
   std::vector<std::size_t> los_rows;
   std::vector<std::pair<double, double>> los_bias;
   for (std::size_t i = 0; i < task.bias_m.size(); ++i)
-    if (task.los[i]) los_rows.push_back(i), los_bias.emplace_back(task.bias_m[i], task.w[i]);
+    if (task.los[i]) {
+      los_rows.push_back(i);
+      los_bias.emplace_back(task.bias_m[i], task.w[i]);
+    }
   if (los_rows.size() < 8)
     return make_error(Errc::too_few_observations,
                       "the shared bias needs 8 LOS rows, got " + std::to_string(los_rows.size()));
@@ -87,7 +90,10 @@ Result<BiasMixture::Shared> fit_shared_bias(const MixtureTask& task) {
     for (std::size_t r = 0; r < los_rows.size(); ++r)
       x[r * k + j] = std::clamp(column[r], shared.low[j], shared.high[j]);
   }
-  for (const auto i : los_rows) y.push_back(task.bias_m[i]), w.push_back(task.w[i]);
+  for (const auto i : los_rows) {
+    y.push_back(task.bias_m[i]);
+    w.push_back(task.w[i]);
+  }
   const Scaler scaler = fit_scaler(x, k, w, 0);
   for (std::size_t r = 0; r < los_rows.size(); ++r)
     for (std::size_t j = 0; j < k; ++j) x[r * k + j] = (x[r * k + j] - scaler.mean[j]) / scaler.sd[j];
@@ -128,8 +134,11 @@ Result<BiasMixture> fit_mixture(const MixtureTask& task) {
   const double tau = std::max(0.03, weighted_median(nlos_excess) / 0.69);
 
   const auto unpack = [&m](const std::vector<double>& p) {
-    m.m0_m = p[0], m.s0_m = std::exp(std::clamp(p[1], -5.0, 1.0)), m.m1_m = p[2],
-    m.s1_m = std::exp(std::clamp(p[3], -5.0, 1.0)), m.log_tau = p[4];
+    m.m0_m = p[0];
+    m.s0_m = std::exp(std::clamp(p[1], -5.0, 1.0));
+    m.m1_m = p[2];
+    m.s1_m = std::exp(std::clamp(p[3], -5.0, 1.0));
+    m.log_tau = p[4];
     for (std::size_t t = 0; t < m.tail.size(); ++t) m.tail[t].weight = std::clamp(p[5 + t], -1.5, 1.5);
   };
   const auto loss = [&](const std::vector<double>& p) {

@@ -48,7 +48,11 @@ struct Binned {
 
 struct Cell {
   double g{}, h{}, rows{};
-  void add(const Cell& other) { g += other.g, h += other.h, rows += other.rows; }
+  void add(const Cell& other) {
+    g += other.g;
+    h += other.h;
+    rows += other.rows;
+  }
 };
 
 struct GrowOptions {
@@ -67,7 +71,8 @@ class Grower {
   void grow(Trees& out, std::vector<std::uint32_t>& rows, std::span<const double> g,
             std::span<const double> h, std::span<const double> times, std::vector<std::size_t> allowed,
             double leaf_scale, Random& random) {
-    allowed_ = std::move(allowed), leaf_scale_ = leaf_scale;
+    allowed_ = std::move(allowed);
+    leaf_scale_ = leaf_scale;
     // What a row adds to a sum, side by side: the sums are most of the time, and of that most was waiting for
     // three arrays.
     share_.resize(data_.n);
@@ -191,7 +196,10 @@ Trees fit_forest(const TrainingRows& rows, const TreeOptions& options, std::vect
     grower.grow(model, used, g, h, times, first_n(rows.d), 1.0, random);
     if (!out_of_bag) continue;
     for (std::size_t i = 0; i < n; ++i)
-      if (times[i] == 0) sum[i] += tree_value(model, model.roots.back(), rows.row(i)), count[i] += 1;
+      if (times[i] == 0) {
+        sum[i] += tree_value(model, model.roots.back(), rows.row(i));
+        count[i] += 1;
+      }
   }
   if (out_of_bag) {
     out_of_bag->resize(n);
@@ -206,7 +214,10 @@ Trees fit_boosted(const TrainingRows& rows, const BoostOptions& options, const E
   const std::size_t n = rows.n();
   Grower grower{data, {options.depth, options.lambda, options.min_child_weight, options.min_rows, 0}};
   double sum_w = 0, sum_wy = 0;
-  for (std::size_t i = 0; i < n; ++i) sum_w += rows.w[i], sum_wy += rows.w[i] * rows.y[i];
+  for (std::size_t i = 0; i < n; ++i) {
+    sum_w += rows.w[i];
+    sum_wy += rows.w[i] * rows.y[i];
+  }
   const double mean = sum_wy / sum_w;
   Trees model;
   const double rate = std::clamp(mean, 0.01, 0.99);

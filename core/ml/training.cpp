@@ -199,9 +199,8 @@ Result<void> TrainingSpec::check() const {
   if (max_fpr && !(*max_fpr >= 0 && *max_fpr <= 1)) fault("max_fpr must be 0 to 1");
   if (features.size() > k_max_features) fault("at most 64 features");
   std::string able;
-  for (int m = 0; m <= static_cast<int>(Method::tree_average); ++m)
-    if (suits(static_cast<Method>(m), task))
-      able += (able.empty() ? "" : ", ") + std::string{method_name(static_cast<Method>(m))};
+  for (const auto& [word, method] : k_method_words)
+    if (suits(method, task)) able += (able.empty() ? "" : ", ") + std::string{word};
   for (const auto method : methods)
     if (!suits(method, task))
       fault(std::string{method_name(method)} + " cannot learn " + std::string{task_name(task)} +

@@ -14,8 +14,13 @@ namespace {
 void count_side(const Dataset& data, const std::vector<std::size_t>& rows, std::size_t& n,
                 std::size_t& placements, std::size_t& places) {
   std::set<std::uint32_t> placement, place;
-  for (const auto i : rows) placement.insert(data.placement[i]), place.insert(data.group[i]);
-  n = rows.size(), placements = placement.size(), places = place.size();
+  for (const auto i : rows) {
+    placement.insert(data.placement[i]);
+    place.insert(data.group[i]);
+  }
+  n = rows.size();
+  placements = placement.size();
+  places = place.size();
 }
 
 std::size_t shared_placements(const Dataset& data) {
@@ -100,7 +105,8 @@ ThresholdReport threshold_report(const Dataset& data, std::span<const double> p_
     Place sum;
     for (std::size_t k = 0; k < places.size(); ++k) {
       const auto& place = places[random.below(places.size())];
-      sum.wrong += place.wrong, sum.nlos += place.nlos;
+      sum.wrong += place.wrong;
+      sum.nlos += place.nlos;
     }
     drawn.push_back(sum.wrong / sum.nlos);
   }

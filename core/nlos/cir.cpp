@@ -58,8 +58,12 @@ WholeRecordShape whole_shape(const Taps& taps, std::size_t n, double first_path,
   double m1 = 0, m2 = 0, m3 = 0, m4 = 0, sum_t = 0, sum_tt = 0;
   for (std::size_t k = 0; k < n; ++k) {
     const double power = taps.power(k), h = std::sqrt(power), t = static_cast<double>(k) - first_path;
-    m1 += h, m2 += power, m3 += power * h, m4 += power * power;
-    sum_t += power * t, sum_tt += power * t * t;
+    m1 += h;
+    m2 += power;
+    m3 += power * h;
+    m4 += power * power;
+    sum_t += power * t;
+    sum_tt += power * t * t;
   }
   const auto count = static_cast<double>(n);
   const double mu = m1 / count, var = m2 / count - mu * mu;

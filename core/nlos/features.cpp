@@ -6,35 +6,6 @@
 namespace anchord::nlos {
 namespace {
 
-constexpr std::array<std::string_view, k_feature_count> k_names{"range_m",
-                                                                "range_db",
-                                                                "rx_dbm",
-                                                                "fp_dbm",
-                                                                "rx_minus_fp_db",
-                                                                "noise_excess_db",
-                                                                "fp_snr_db",
-                                                                "total_snr_db",
-                                                                "preamble_db",
-                                                                "fp_shape12_db",
-                                                                "fp_shape32_db",
-                                                                "rx_free_space_db",
-                                                                "fp_free_space_db",
-                                                                "fp_index",
-                                                                "max_noise_db",
-                                                                "kurtosis",
-                                                                "mean_excess_delay_ns",
-                                                                "rms_delay_spread_ns",
-                                                                "early_energy",
-                                                                "peak_delay_ns",
-                                                                "height_difference_m",
-                                                                "heading_deg",
-                                                                "log_range_spread",
-                                                                "log_fp_spread",
-                                                                "log_rx_minus_fp_spread",
-                                                                "kurtosis_whole",
-                                                                "mean_excess_delay_whole_ns",
-                                                                "rms_delay_spread_whole_ns"};
-
 // 5 % quantile of 20 log10(s / sqrt N) of the register in three public sets; of CIR noise taps it lies 10 dB
 // higher.
 constexpr double k_noise_floor_db = 7.4;
@@ -111,14 +82,6 @@ double sample_sd(std::span<const double> values) {
 
 }  // namespace
 
-std::string_view feature_name(Feature feature) { return k_names.at(static_cast<std::size_t>(feature)); }
-
-std::optional<Feature> feature_of(std::string_view name) {
-  const auto* found = std::find(k_names.begin(), k_names.end(), name);
-  if (found == k_names.end()) return std::nullopt;
-  return static_cast<Feature>(found - k_names.begin());
-}
-
 bool means_the_same(std::string_view version, std::string_view name) {
   if (version == k_feature_set_version) return true;
   if (version != k_feature_set_before) return false;
@@ -164,8 +127,6 @@ Needs needs_of(Feature feature) {
     case Feature::log_fp_spread:
     case Feature::log_rx_minus_fp_spread:
       return Needs::rest;
-    case Feature::count:
-      break;
   }
   return Needs::label;
 }

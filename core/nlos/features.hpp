@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/nlos/cir.hpp"
 #include "core/nlos/power.hpp"
 
@@ -54,10 +55,37 @@ enum class Feature : std::size_t {
   kurtosis_whole,          ///< eq 5.3 to 5.5 over every tap of a whole record, as printed
   mean_excess_delay_whole_ns,
   rms_delay_spread_whole_ns,
-  count
 };
-
-inline constexpr std::size_t k_feature_count = static_cast<std::size_t>(Feature::count);
+inline constexpr auto k_feature_words =
+    enum_table<Feature>({{"range_m", Feature::range_m},
+                         {"range_db", Feature::range_db},
+                         {"rx_dbm", Feature::rx_dbm},
+                         {"fp_dbm", Feature::fp_dbm},
+                         {"rx_minus_fp_db", Feature::rx_minus_fp_db},
+                         {"noise_excess_db", Feature::noise_excess_db},
+                         {"fp_snr_db", Feature::fp_snr_db},
+                         {"total_snr_db", Feature::total_snr_db},
+                         {"preamble_db", Feature::preamble_db},
+                         {"fp_shape12_db", Feature::fp_shape12_db},
+                         {"fp_shape32_db", Feature::fp_shape32_db},
+                         {"rx_free_space_db", Feature::rx_free_space_db},
+                         {"fp_free_space_db", Feature::fp_free_space_db},
+                         {"fp_index", Feature::fp_index},
+                         {"max_noise_db", Feature::max_noise_db},
+                         {"kurtosis", Feature::kurtosis},
+                         {"mean_excess_delay_ns", Feature::mean_excess_delay_ns},
+                         {"rms_delay_spread_ns", Feature::rms_delay_spread_ns},
+                         {"early_energy", Feature::early_energy},
+                         {"peak_delay_ns", Feature::peak_delay_ns},
+                         {"height_difference_m", Feature::height_difference_m},
+                         {"heading_deg", Feature::heading_deg},
+                         {"log_range_spread", Feature::log_range_spread},
+                         {"log_fp_spread", Feature::log_fp_spread},
+                         {"log_rx_minus_fp_spread", Feature::log_rx_minus_fp_spread},
+                         {"kurtosis_whole", Feature::kurtosis_whole},
+                         {"mean_excess_delay_whole_ns", Feature::mean_excess_delay_whole_ns},
+                         {"rms_delay_spread_whole_ns", Feature::rms_delay_spread_whole_ns}});
+inline constexpr std::size_t k_feature_count = k_feature_words.size();
 
 /// The least a source must give for a feature to exist.
 enum class Needs : std::uint8_t {
@@ -76,8 +104,8 @@ bool live_ranges_have(Feature feature);
 /// Whether features of that name mean the same in another version as here.
 bool means_the_same(std::string_view version, std::string_view feature_name);
 
-std::string_view feature_name(Feature feature);
-std::optional<Feature> feature_of(std::string_view name);
+constexpr std::string_view feature_name(Feature feature) { return k_feature_words.word(feature); }
+constexpr std::optional<Feature> feature_of(std::string_view name) { return k_feature_words.find(name); }
 
 /// One ranging's diagnostics. Registers win over levels given in dBm: data sets differ in their constants.
 struct DiagnosticSample {

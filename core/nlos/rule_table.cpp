@@ -8,10 +8,6 @@
 namespace anchord::nlos {
 namespace {
 
-constexpr std::array<std::string_view, k_rule_count> k_names{
-    "rss",          "kurtosis", "mean_excess_delay", "rms_delay", "rms_delay_far",
-    "rms_delay_95", "range_sd", "first_path",        "weighted"};
-
 std::size_t at(Rule rule) { return static_cast<std::size_t>(rule); }
 
 // The one value a threshold rule looks at.
@@ -32,7 +28,6 @@ std::optional<double> value_of(Rule rule, const RuleSample& s) {
       return s.rx_minus_fp_db;
     case Rule::rss:
     case Rule::weighted:
-    case Rule::count:
       break;
   }
   return std::nullopt;
@@ -46,8 +41,6 @@ constexpr std::array k_voices{Rule::rss,       Rule::kurtosis, Rule::mean_excess
                               Rule::rms_delay, Rule::range_sd, Rule::first_path};
 
 }  // namespace
-
-std::string_view rule_name(Rule rule) { return k_names.at(at(rule)); }
 
 std::optional<bool> RuleSet::says_los(Rule rule, const RuleSample& s) const {
   if (rule == Rule::weighted) {
@@ -119,8 +112,8 @@ RuleSet fit_rules(std::span<const RuleSample> samples) {
 RuleRow judge_rules(const RuleSet& rules, std::span<const RuleSample> samples) {
   RuleRow row{};
   for (const auto& s : samples)
-    for (std::size_t r = 0; r < k_rule_count; ++r)
-      if (const auto los = rules.says_los(static_cast<Rule>(r), s)) row[r].rates.count(s.los, *los);
+    for (const auto& [word, rule] : k_rule_words)
+      if (const auto los = rules.says_los(rule, s)) row[at(rule)].rates.count(s.los, *los);
   return row;
 }
 
@@ -132,8 +125,10 @@ RuleRow judge_fitted_rules(std::span<const RuleSample> samples, std::span<const 
     for (std::size_t i = 0; i < samples.size(); ++i) (fold[i] == k ? test : train).push_back(samples[i]);
     const auto part = judge_rules(fit_rules(train), test);
     for (std::size_t r = 0; r < k_rule_count; ++r) {
-      row[r].rates.los += part[r].rates.los, row[r].rates.los_right += part[r].rates.los_right;
-      row[r].rates.nlos += part[r].rates.nlos, row[r].rates.nlos_right += part[r].rates.nlos_right;
+      row[r].rates.los += part[r].rates.los;
+      row[r].rates.los_right += part[r].rates.los_right;
+      row[r].rates.nlos += part[r].rates.nlos;
+      row[r].rates.nlos_right += part[r].rates.nlos_right;
     }
   }
   return row;

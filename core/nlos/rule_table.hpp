@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/nlos/rules.hpp"
 
 /// Every rule of chapter 5 fitted to labelled rangings and judged on others: tables 5.1 to 5.3 for any data.
@@ -22,12 +23,18 @@ enum class Rule : std::uint8_t {
   range_sd,           ///< 5.2: sd of repeated ranges
   first_path,         ///< 5.3.4: P_RX - P_FP
   weighted,           ///< 5.8: all of them
-  count
 };
-inline constexpr std::size_t k_rule_count = static_cast<std::size_t>(Rule::count);
+inline constexpr auto k_rule_words = enum_table<Rule>({{"rss", Rule::rss},
+                                                       {"kurtosis", Rule::kurtosis},
+                                                       {"mean_excess_delay", Rule::mean_excess_delay},
+                                                       {"rms_delay", Rule::rms_delay},
+                                                       {"rms_delay_far", Rule::rms_delay_far},
+                                                       {"rms_delay_95", Rule::rms_delay_95},
+                                                       {"range_sd", Rule::range_sd},
+                                                       {"first_path", Rule::first_path},
+                                                       {"weighted", Rule::weighted}});
+inline constexpr std::size_t k_rule_count = k_rule_words.size();
 inline constexpr double k_far_m = 6.5;
-
-std::string_view rule_name(Rule rule);
 
 /// What the rules look at; a sample may lack some.
 struct RuleSample {

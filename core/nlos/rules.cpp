@@ -74,8 +74,14 @@ Result<ThresholdRule> fit_threshold(std::span<const double> los_values, std::spa
     if (all[i].first == all[i + 1].first) continue;
     const double below_is_nlos = 0.5 * ((n_los - los_below) / n_los + nlos_below / n_nlos);
     const double middle = 0.5 * (all[i].first + all[i + 1].first);
-    if (below_is_nlos > best) best = below_is_nlos, rule = {middle, true};
-    if (1 - below_is_nlos > best) best = 1 - below_is_nlos, rule = {middle, false};
+    if (below_is_nlos > best) {
+      best = below_is_nlos;
+      rule = {middle, true};
+    }
+    if (1 - below_is_nlos > best) {
+      best = 1 - below_is_nlos;
+      rule = {middle, false};
+    }
   }
   return rule;
 }

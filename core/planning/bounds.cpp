@@ -75,32 +75,6 @@ bool comes_too_near(double start_m, double end_m, double way_m, double keep_out_
 
 }  // namespace
 
-std::string_view to_string(Refusal refusal) {
-  switch (refusal) {
-    case Refusal::visited:
-      return "visited";
-    case Refusal::unreachable:
-      return "unreachable";
-    case Refusal::outside_fence:
-      return "outside_fence";
-    case Refusal::no_fly:
-      return "no_fly";
-    case Refusal::near_wall:
-      return "near_wall";
-    case Refusal::too_low:
-      return "too_low";
-    case Refusal::too_high:
-      return "too_high";
-    case Refusal::path_blocked:
-      return "path_blocked";
-    case Refusal::over_range:
-      return "over_range";
-    case Refusal::on_anchor:
-      return "on_anchor";
-  }
-  return "unknown";
-}
-
 bool contains(const Polygon& polygon, const Vector2d& point) {
   if (polygon.size() < 3) return false;
   bool inside = false, on_edge = false;

@@ -5,6 +5,8 @@
 #include <string_view>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
+
 namespace anchord::planning {
 
 /// Corners in order, either way round; the last one joins the first. Fewer than three corners: no area.
@@ -39,7 +41,17 @@ enum class Refusal : unsigned char {
   over_range,    ///< too far from every anchor
   on_anchor,     ///< no direction from there
 };
-std::string_view to_string(Refusal refusal);
+inline constexpr auto k_refusal_words = enum_table<Refusal>({{"visited", Refusal::visited},
+                                                             {"unreachable", Refusal::unreachable},
+                                                             {"outside_fence", Refusal::outside_fence},
+                                                             {"no_fly", Refusal::no_fly},
+                                                             {"near_wall", Refusal::near_wall},
+                                                             {"too_low", Refusal::too_low},
+                                                             {"too_high", Refusal::too_high},
+                                                             {"path_blocked", Refusal::path_blocked},
+                                                             {"over_range", Refusal::over_range},
+                                                             {"on_anchor", Refusal::on_anchor}});
+constexpr std::string_view to_string(Refusal refusal) { return k_refusal_words.word(refusal); }
 
 /// Inside or on the edge.
 bool contains(const Polygon& polygon, const Eigen::Vector2d& point_m);

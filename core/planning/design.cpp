@@ -75,7 +75,7 @@ double Design::square_m2(const Belief& belief) const {
 }
 
 double Design::value_of(const Belief& belief) const {
-  if (options_.criterion == Criterion::a_optimal) return square_m2(belief);
+  if (options_.rule == Rule::a_optimal) return square_m2(belief);
   const Eigen::Vector3d shift = options_.wall_excess_m * belief.shift.head<3>();
   return std::log((belief.covariance.topLeftCorner<3, 3>() + shift * shift.transpose()).determinant());
 }
@@ -105,7 +105,7 @@ double Design::value_with(std::span<const Sight> point) const {
     const Eigen::Vector4d ph = b.covariance * s.row;
     const double innovation = s.variance_m2 + s.row.dot(ph);
     const Eigen::Vector4d shift = b.shift + ph * (s.slant - s.row.dot(b.shift)) / innovation;
-    if (options_.criterion == Criterion::a_optimal) {  // the trace alone needs no matrix
+    if (options_.rule == Rule::a_optimal) {  // the trace alone needs no matrix
       out += b.covariance.topLeftCorner<3, 3>().trace() - ph.head<3>().squaredNorm() / innovation +
              options_.wall_excess_m * options_.wall_excess_m * shift.head<3>().squaredNorm();
     } else {

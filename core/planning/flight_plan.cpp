@@ -41,7 +41,10 @@ bool in_range(const Vector3d& anchor, const std::vector<Candidate>& all, double 
 std::vector<Vector3d> assumed_anchors(const FlightPlanInput& input, const FlightPlanOptions& options,
                                       const std::vector<Candidate>& all, std::size_t& n_out_of_range) {
   Vector2d low{k_infinity, k_infinity}, high{-k_infinity, -k_infinity};
-  for (const auto& corner : input.outline) low = low.cwiseMin(corner), high = high.cwiseMax(corner);
+  for (const auto& corner : input.outline) {
+    low = low.cwiseMin(corner);
+    high = high.cwiseMax(corner);
+  }
   std::vector<double> heights;
   for (double z = 2.5; z < std::max(input.building_height_m, 2.6); z += options.floor_m) heights.push_back(z);
   const double reach_m = options.max_range_m - options.keep_out_m;
@@ -248,6 +251,8 @@ std::vector<Candidate> joined(const std::vector<Candidate>& chosen, const Bounds
 Result<void> FlightPlanOptions::check() const {
   const auto bad = [](const char* text) { return make_error(Errc::invalid_argument, text); };
   if (!(keep_out_m > 0 && keep_out_m <= 100)) return bad("keep_out_m must be above 0 and at most 100");
+  if (rule == Rule::dissertation)
+    return bad("rule dissertation is of single points: of a whole flight a_optimal or d_optimal");
   if (ring_m.empty()) return bad("ring_m must name at least one ring");
   for (const double m : ring_m) {
     if (!(m >= 0 && m <= 200)) return bad("ring_m must be 0 to 200");

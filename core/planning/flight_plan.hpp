@@ -7,14 +7,9 @@
 
 #include "core/base/result.hpp"
 #include "core/planning/bounds.hpp"
+#include "core/types/plan.hpp"
 
 namespace anchord::planning {
-
-/// What one whole flight is made good for.
-enum class Criterion : std::uint8_t {
-  a_optimal,  ///< mean position variance of the assumed anchors
-  d_optimal,  ///< mean log volume of their error ellipsoids
-};
 
 struct FlightPlanInput {
   Polygon outline;  ///< of the building, ENU metres
@@ -33,8 +28,8 @@ struct FlightPlanOptions {
   int max_anchors = 80;
   double floor_m = 3;  ///< assumed anchors hang 2.5 m above each floor
   double max_range_m = 60;
-  Criterion criterion = Criterion::a_optimal;
-  int min_points = 8;  ///< a flight with fewer cannot tell bias, height and mirror apart
+  Rule rule = Rule::a_optimal;  ///< a_optimal: mean over the assumed anchors; d_optimal: mean log volume
+  int min_points = 8;           ///< a flight with fewer cannot tell bias, height and mirror apart
   int max_points = 60;
   /// Stops adding once a point lowers the mean expected squared error by less than this share.
   double min_gain = 0.02;

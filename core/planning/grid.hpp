@@ -22,7 +22,9 @@ struct Grid {
   std::size_t size() const { return x_m.size(); }
   Eigen::Vector3d at(std::size_t i) const { return {x_m[i], y_m[i], z_m[i]}; }
   void push_back(const Eigen::Vector3d& p) {
-    x_m.push_back(p.x()), y_m.push_back(p.y()), z_m.push_back(p.z());
+    x_m.push_back(p.x());
+    y_m.push_back(p.y());
+    z_m.push_back(p.z());
   }
 };
 

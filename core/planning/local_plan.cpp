@@ -27,7 +27,8 @@ FlightPlanOptions flight_options(const Plan& plan) {
   o.speed_mps = plan.settings.speed_mps;
   o.dwell_s = plan.settings.dwell_s;
   o.ranges_per_point = plan.settings.samples;
-  if (plan.settings.rule == "d_optimal") o.criterion = Criterion::d_optimal;
+  // The rule of the dissertation weighs one more point against those before: a whole flight has none yet.
+  if (plan.settings.rule != Rule::dissertation) o.rule = plan.settings.rule;
   return o;
 }
 
@@ -49,7 +50,10 @@ std::vector<Eigen::Vector3d> anchors_inside(const LocalPlan& plan, const FlightP
   std::vector<Eigen::Vector3d> out;
   if (plan.outline.size() < 3) return out;
   Eigen::Vector2d low = plan.outline[0], high = plan.outline[0];
-  for (const auto& c : plan.outline) low = low.cwiseMin(c), high = high.cwiseMax(c);
+  for (const auto& c : plan.outline) {
+    low = low.cwiseMin(c);
+    high = high.cwiseMax(c);
+  }
   for (double up = std::min(2.5, height_m / 2); up < height_m; up += options.floor_m) {
     for (double x = low.x() + 1; x < high.x(); x += options.anchor_spacing_m) {
       for (double y = low.y() + 1; y < high.y(); y += options.anchor_spacing_m) {

@@ -29,6 +29,8 @@ Result<LocalPlan> local_plan(const Plan& plan);
 Bounds flight_bounds(const LocalPlan& plan, const PlanSettings& settings);
 
 enum class Severity : std::uint8_t { error, warning };
+inline constexpr auto k_severity_words =
+    enum_table<Severity>({{"error", Severity::error}, {"warning", Severity::warning}});
 struct PlanIssue {
   Severity severity{};
   std::string code;     ///< stable word

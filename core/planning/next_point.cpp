@@ -309,28 +309,4 @@ Result<Decision> next_point(const NextPointInput& input, const NextPointOptions&
   return out;
 }
 
-std::string_view to_string(Rule rule) {
-  switch (rule) {
-    case Rule::dissertation:
-      return "dissertation";
-    case Rule::a_optimal:
-      return "a_optimal";
-    case Rule::d_optimal:
-      return "d_optimal";
-  }
-  return "unknown";
-}
-
-std::string_view to_string(Combine how) {
-  switch (how) {
-    case Combine::worst:
-      return "worst";
-    case Combine::mean:
-      return "mean";
-    case Combine::weighted:
-      return "weighted";
-  }
-  return "unknown";
-}
-
 }  // namespace anchord::planning

@@ -11,22 +11,9 @@
 #include "core/base/result.hpp"
 #include "core/planning/bounds.hpp"
 #include "core/planning/grid.hpp"
+#include "core/types/plan.hpp"
 
 namespace anchord::planning {
-
-/// What makes a point good. All values are "lower is better".
-enum class Rule : std::uint8_t {
-  dissertation,  ///< trace (M^T M)^-1 of all measured points and the candidate, eq 8.5
-  a_optimal,     ///< trace of the expected position covariance, m^2
-  d_optimal,     ///< log det of it: volume of the error ellipsoid, blind to units and axes
-};
-
-/// How several anchors make one value.
-enum class Combine : std::uint8_t {
-  worst,  ///< the anchor that is worst off decides
-  mean,
-  weighted,  ///< mean, weighted by how far each is from its target accuracy
-};
 
 /// Where an anchor may be, and how likely. A mirror pair is two of these.
 struct Place {
@@ -101,8 +88,5 @@ struct Decision {
 /// errors   invalid_argument (no anchor, no position, indices or numbers that make no sense)
 /// threads  pure
 Result<Decision> next_point(const NextPointInput& input, const NextPointOptions& options);
-
-std::string_view to_string(Rule rule);
-std::string_view to_string(Combine combine);
 
 }  // namespace anchord::planning

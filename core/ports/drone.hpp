@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/types/plan.hpp"
 #include "core/types/position.hpp"
 
@@ -19,6 +20,12 @@ enum class CommandState : std::uint8_t {
   refused,      ///< by the autopilot, with its reason
   unconfirmed,  ///< neither within 2 s: an alarm; never repeated by itself after that
 };
+inline constexpr auto k_command_state_words =
+    enum_table<CommandState>({{"sent", CommandState::sent},
+                              {"accepted", CommandState::accepted},
+                              {"refused", CommandState::refused},
+                              {"unconfirmed", CommandState::unconfirmed}});
+constexpr std::string_view to_string(CommandState state) { return k_command_state_words.word(state); }
 
 struct CommandReport {
   std::uint64_t number{};

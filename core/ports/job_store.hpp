@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
 #include "core/base/time.hpp"
@@ -14,6 +15,11 @@ namespace anchord {
 
 /// Long work, visible and cancellable. At start the server calls fail_unfinished, for nothing runs then.
 enum class JobState : std::uint8_t { queued, running, succeeded, failed, canceled };
+inline constexpr auto k_job_state_words = enum_table<JobState>({{"queued", JobState::queued},
+                                                                {"running", JobState::running},
+                                                                {"succeeded", JobState::succeeded},
+                                                                {"failed", JobState::failed},
+                                                                {"canceled", JobState::canceled}});
 struct Job {
   JobId id{};
   std::string kind;

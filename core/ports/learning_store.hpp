@@ -13,7 +13,8 @@
 #include "core/types/campaign_record.hpp"
 
 /// What learning keeps: campaigns, frozen data sets, training runs, models and who promoted them. The rules
-/// of core/ports/store.hpp hold: writes return after the fsync, callable from any thread, lists newest first.
+/// of core/ports/measurement_store.hpp hold: writes return after the fsync, callable from any thread, lists
+/// newest first.
 namespace anchord {
 
 struct CampaignRow {

@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <optional>
 
+#include "core/base/enum_table.hpp"
+
 namespace anchord {
 
 /// What a measurement must be like to be listed. A row that lacks a quantity passes no limit on it.
@@ -13,5 +15,9 @@ struct MeasurementLimits {
   std::optional<double> min_level_dbm, max_level_dbm;    ///< RX power, else the device's own RSS
   std::optional<Label> label;
 };
+inline constexpr auto k_label_words =
+    enum_table<MeasurementLimits::Label>({{"los", MeasurementLimits::Label::los},
+                                          {"nlos", MeasurementLimits::Label::nlos},
+                                          {"none", MeasurementLimits::Label::none}});
 
 }  // namespace anchord

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
 #include "core/ports/measurement_limits.hpp"
@@ -25,6 +26,9 @@ struct DeviceSeen {
   UtcTime first_seen{}, last_seen{};  ///< measured times
   std::uint64_t n_ranges{};
 };
+
+inline constexpr auto k_radio_words =
+    enum_table<DeviceSeen::Kind>({{"tag", DeviceSeen::Kind::tag}, {"anchor", DeviceSeen::Kind::anchor}});
 
 /// Measurements. append_* return after the commit is on the disk (fsynced); concurrent calls share one
 /// commit. Outcomes stand in the order of the rows. With `atomic`, one row that is a conflict or of an

@@ -58,12 +58,8 @@ Result<FlightSetup> flight_setup(const Plan& plan, const Eigen::Vector3d& home_m
   out.exit.max_s = s.max_flight_s;
   out.exit.min_battery = s.min_battery;
   auto& p = out.planner;
-  p.rule = s.rule == "dissertation" ? planning::Rule::dissertation
-           : s.rule == "d_optimal"  ? planning::Rule::d_optimal
-                                    : planning::Rule::a_optimal;
-  p.combine = s.combine == "worst"  ? planning::Combine::worst
-              : s.combine == "mean" ? planning::Combine::mean
-                                    : planning::Combine::weighted;
+  p.rule = s.rule;
+  p.combine = s.combine;
   p.grid = {s.grid_step_m, s.grid_step_up_m, s.grid_reach, s.grid_reach_up};
   p.bias_column = p.rule != planning::Rule::dissertation;
   p.flight_time_cost = p.rule != planning::Rule::dissertation;

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
 
@@ -33,9 +34,24 @@ enum class Step : std::uint8_t {
   landing,
   done,
 };
-inline constexpr std::size_t k_step_count = 17;
-std::string_view to_string(Step step);
-std::optional<Step> step_of(std::string_view word);
+inline constexpr auto k_step_words = enum_table<Step>({{"ready", Step::ready},
+                                                       {"take_off", Step::take_off},
+                                                       {"go_to_waypoint", Step::go_to_waypoint},
+                                                       {"search_anchors", Step::search_anchors},
+                                                       {"move_around", Step::move_around},
+                                                       {"step_to_waypoint", Step::step_to_waypoint},
+                                                       {"turn", Step::turn},
+                                                       {"height_search", Step::height_search},
+                                                       {"ranging", Step::ranging},
+                                                       {"find_next_point", Step::find_next_point},
+                                                       {"go_to_point", Step::go_to_point},
+                                                       {"check_connections", Step::check_connections},
+                                                       {"go_back", Step::go_back},
+                                                       {"hold", Step::hold},
+                                                       {"return_home", Step::return_home},
+                                                       {"landing", Step::landing},
+                                                       {"done", Step::done}});
+constexpr std::string_view to_string(Step step) { return k_step_words.word(step); }
 
 /// What can happen. Times come in as `timeout`: the machine has no clock, it says when it wants to be woken.
 enum class Event : std::uint8_t {
@@ -60,9 +76,27 @@ enum class Event : std::uint8_t {
   taken_over,     ///< by the pilot or a failsafe: nothing is commanded any more
   not_taken_off,  ///< arming or take-off refused, or not seen to happen
 };
-inline constexpr std::size_t k_event_count = 20;
-std::string_view to_string(Event event);
-std::optional<Event> event_of(std::string_view word);
+inline constexpr auto k_event_words = enum_table<Event>({{"start", Event::start},
+                                                         {"airborne", Event::airborne},
+                                                         {"arrived", Event::arrived},
+                                                         {"in_range", Event::heard},
+                                                         {"sampled", Event::sampled},
+                                                         {"point", Event::point},
+                                                         {"no_point", Event::no_point},
+                                                         {"done_here", Event::done_here},
+                                                         {"unreachable", Event::unreachable},
+                                                         {"connected", Event::connected},
+                                                         {"disconnected", Event::disconnected},
+                                                         {"landed", Event::landed},
+                                                         {"timeout", Event::timeout},
+                                                         {"hold", Event::hold},
+                                                         {"resume", Event::resume},
+                                                         {"skip", Event::skip},
+                                                         {"return_home", Event::return_home},
+                                                         {"land", Event::land},
+                                                         {"taken_over", Event::taken_over},
+                                                         {"not_taken_off", Event::not_taken_off}});
+constexpr std::string_view to_string(Event event) { return k_event_words.word(event); }
 
 /// What a transition asks of the state, so that one event can lead to several places.
 enum class Guard : std::uint8_t {
@@ -77,7 +111,17 @@ enum class Guard : std::uint8_t {
   was_returning,     ///< hold interrupted the way home
   had_point,         ///< hold interrupted the work at one of the planner's points
 };
-std::string_view to_string(Guard guard);
+inline constexpr auto k_guard_words = enum_table<Guard>({{"always", Guard::always},
+                                                         {"wants_turn", Guard::wants_turn},
+                                                         {"wants_height", Guard::wants_height},
+                                                         {"legs_left", Guard::legs_left},
+                                                         {"moves_left", Guard::moves_left},
+                                                         {"waypoint_left", Guard::waypoint_left},
+                                                         {"tries_left", Guard::tries_left},
+                                                         {"anything_sampled", Guard::anything_sampled},
+                                                         {"was_returning", Guard::was_returning},
+                                                         {"had_point", Guard::had_point}});
+constexpr std::string_view to_string(Guard guard) { return k_guard_words.word(guard); }
 
 struct Transition {
   Step from{};
@@ -98,7 +142,15 @@ struct Command {
   std::optional<double> heading_rad{};  ///< clockwise from north
   bool operator==(const Command&) const = default;
 };
-std::string_view to_string(Command::Kind kind);
+inline constexpr auto k_command_words =
+    enum_table<Command::Kind>({{"take_off", Command::Kind::take_off},
+                               {"go_to", Command::Kind::go_to},
+                               {"hold", Command::Kind::hold},
+                               {"return_home", Command::Kind::return_home},
+                               {"land", Command::Kind::land},
+                               {"measure", Command::Kind::measure},
+                               {"decide", Command::Kind::decide}});
+constexpr std::string_view to_string(Command::Kind kind) { return k_command_words.word(kind); }
 
 struct Waypoint {
   Eigen::Vector3d point_m{0, 0, 0};

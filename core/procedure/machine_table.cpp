@@ -107,34 +107,12 @@ constexpr Transition k_table[] = {
     {S::landing, E::timeout, G::always, S::landing, "still in the air, commanded to land again"},
 };
 
-constexpr std::array k_step_words{
-    "ready",   "take_off",      "go_to_waypoint", "search_anchors",  "move_around", "step_to_waypoint",
-    "turn",    "height_search", "ranging",        "find_next_point", "go_to_point", "check_connections",
-    "go_back", "hold",          "return_home",    "landing",         "done"};
-constexpr std::array k_event_words{
-    "start",     "airborne",    "arrived",     "in_range",     "sampled",    "point",        "no_point",
-    "done_here", "unreachable", "connected",   "disconnected", "landed",     "timeout",      "hold",
-    "resume",    "skip",        "return_home", "land",         "taken_over", "not_taken_off"};
-constexpr std::array k_guard_words{"always",        "wants_turn",    "wants_height", "legs_left",
-                                   "moves_left",    "waypoint_left", "tries_left",   "anything_sampled",
-                                   "was_returning", "had_point"};
-static_assert(k_step_words.size() == k_step_count && k_event_words.size() == k_event_count);
-
-template <class Enum, class Words>
-std::optional<Enum> find_word(const Words& words, std::string_view word) {
-  for (std::size_t i = 0; i < words.size(); ++i) {
-    if (words[i] == word) return static_cast<Enum>(i);
-  }
-  return std::nullopt;
-}
-
 }  // namespace
 
 std::span<const Transition> transitions() {
   static const std::vector<Transition> all = [] {
     std::vector<Transition> out(std::begin(k_table), std::end(k_table));
-    for (std::size_t i = 0; i < k_step_count; ++i) {
-      const auto from = static_cast<Step>(i);
+    for (const auto& [word, from] : k_step_words) {
       if (from == S::ready || from == S::landing || from == S::done) continue;
       if (from != S::hold) out.push_back({from, E::hold, G::always, S::hold, "commanded to hold"});
       out.push_back({from, E::skip, G::waypoint_left, S::go_to_waypoint, "waypoint skipped, to the next"});
@@ -153,31 +131,6 @@ std::span<const Transition> transitions() {
     return out;
   }();
   return all;
-}
-std::string_view to_string(Step step) { return k_step_words.at(static_cast<std::size_t>(step)); }
-std::string_view to_string(Event event) { return k_event_words.at(static_cast<std::size_t>(event)); }
-std::string_view to_string(Guard guard) { return k_guard_words.at(static_cast<std::size_t>(guard)); }
-std::optional<Step> step_of(std::string_view word) { return find_word<Step>(k_step_words, word); }
-std::optional<Event> event_of(std::string_view word) { return find_word<Event>(k_event_words, word); }
-
-std::string_view to_string(Command::Kind kind) {
-  switch (kind) {
-    case Command::Kind::take_off:
-      return "take_off";
-    case Command::Kind::go_to:
-      return "go_to";
-    case Command::Kind::hold:
-      return "hold";
-    case Command::Kind::return_home:
-      return "return_home";
-    case Command::Kind::land:
-      return "land";
-    case Command::Kind::measure:
-      return "measure";
-    case Command::Kind::decide:
-      return "decide";
-  }
-  return "";
 }
 
 }  // namespace anchord::procedure

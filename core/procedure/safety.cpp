@@ -78,18 +78,6 @@ std::optional<Alarm> breach(const SafetyLimits& limits, const Eigen::Vector3d& a
 
 }  // namespace
 
-std::string_view to_string(Reaction reaction) {
-  switch (reaction) {
-    case Reaction::hold:
-      return "hold";
-    case Reaction::return_home:
-      return "return_home";
-    case Reaction::land:
-      return "land";
-  }
-  return "";
-}
-
 std::optional<Refused> refuse_take_off(const planning::Bounds& bounds, const Eigen::Vector3d& stands_m,
                                        double height_m) {
   // Straight up from where it stands, which must be inside the fence and off every area.

@@ -62,7 +62,9 @@ struct Situation {
 };
 
 enum class Reaction : std::uint8_t { hold, return_home, land };
-std::string_view to_string(Reaction reaction);
+inline constexpr auto k_reaction_words = enum_table<Reaction>(
+    {{"hold", Reaction::hold}, {"return_home", Reaction::return_home}, {"land", Reaction::land}});
+constexpr std::string_view to_string(Reaction reaction) { return k_reaction_words.word(reaction); }
 struct Alarm {
   Reaction reaction{};
   bool climbs{false};  ///< hold, but higher: to the lower end of the band

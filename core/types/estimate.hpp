@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/time.hpp"
 #include "core/types/position.hpp"
@@ -16,6 +17,11 @@ namespace anchord {
 
 /// May this position be believed? Only `ok` may ever be accepted without a person.
 enum class Verdict : std::uint8_t { ok, weak_geometry, ambiguous, too_few, diverged };
+inline constexpr auto k_verdict_words = enum_table<Verdict>({{"ok", Verdict::ok},
+                                                             {"weak_geometry", Verdict::weak_geometry},
+                                                             {"ambiguous", Verdict::ambiguous},
+                                                             {"too_few", Verdict::too_few},
+                                                             {"diverged", Verdict::diverged}});
 
 /// One acceptance test of an estimate: named, with its number and its limit.
 struct Gate {

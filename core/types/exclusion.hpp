@@ -8,6 +8,7 @@
 #include <tuple>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/time.hpp"
 #include "core/types/fix.hpp"
@@ -18,6 +19,8 @@ namespace anchord {
 using ExclusionId = Id<struct ExclusionTag>;
 
 enum class RowKind : std::uint8_t { ranges, fixes };
+inline constexpr auto k_row_kind_words =
+    enum_table<RowKind>({{"ranges", RowKind::ranges}, {"fixes", RowKind::fixes}});
 
 /// One measurement by what it is, wherever it is kept: a range by all four, a fix by its time. To the
 /// microsecond, which is what the wire and files carry.

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/time.hpp"
 #include "core/types/position.hpp"
@@ -13,6 +14,11 @@ namespace anchord {
 
 /// Quality of a position, in the order of trust. `fixed` is RTK with integer ambiguities, or motion capture.
 enum class FixClass : std::uint8_t { none, single, dgps, rtk_float, rtk_fixed };
+inline constexpr auto k_fix_words = enum_table<FixClass>({{"none", FixClass::none},
+                                                          {"single", FixClass::single},
+                                                          {"dgps", FixClass::dgps},
+                                                          {"float", FixClass::rtk_float},
+                                                          {"fixed", FixClass::rtk_fixed}});
 
 /// One position epoch as received: immutable, stored as it came.
 struct Fix {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/time.hpp"
 #include "core/types/position.hpp"
@@ -13,6 +14,9 @@ namespace anchord {
 
 /// What the track positions are positions of.
 enum class TrackPoint : std::uint8_t { gnss_antenna, body, tag_antenna };
+inline constexpr auto k_point_words = enum_table<TrackPoint>({{"gnss_antenna", TrackPoint::gnss_antenna},
+                                                              {"body", TrackPoint::body},
+                                                              {"tag_antenna", TrackPoint::tag_antenna}});
 
 /// One UWB antenna of the aircraft.
 struct TagAntenna {
@@ -22,6 +26,10 @@ struct TagAntenna {
 };
 
 enum class MissionState : std::uint8_t { planned, recording, finished };
+inline constexpr auto k_mission_state_words =
+    enum_table<MissionState>({{"planned", MissionState::planned},
+                              {"recording", MissionState::recording},
+                              {"finished", MissionState::finished}});
 
 /// One flight, as the operator declares it.
 struct Mission {

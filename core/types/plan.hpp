@@ -1,12 +1,38 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/time.hpp"
 #include "core/types/position.hpp"
+
+namespace anchord::planning {
+
+/// What makes a measuring point, or the points of a whole flight, good. All values are "lower is better".
+enum class Rule : std::uint8_t {
+  dissertation,  ///< trace (M^T M)^-1 of all measured points and the candidate, eq 8.5; of single points only
+  a_optimal,     ///< trace of the expected position covariance, m^2
+  d_optimal,     ///< log det of it: volume of the error ellipsoid, blind to units and axes
+};
+inline constexpr auto k_rule_words = enum_table<Rule>(
+    {{"dissertation", Rule::dissertation}, {"a_optimal", Rule::a_optimal}, {"d_optimal", Rule::d_optimal}});
+constexpr std::string_view to_string(Rule rule) { return k_rule_words.word(rule); }
+
+/// How several anchors make one value.
+enum class Combine : std::uint8_t {
+  worst,  ///< the anchor that is worst off decides
+  mean,
+  weighted,  ///< mean, weighted by how far each is from its target accuracy
+};
+inline constexpr auto k_combine_words = enum_table<Combine>(
+    {{"worst", Combine::worst}, {"mean", Combine::mean}, {"weighted", Combine::weighted}});
+constexpr std::string_view to_string(Combine how) { return k_combine_words.word(how); }
+
+}  // namespace anchord::planning
 
 namespace anchord {
 
@@ -40,8 +66,8 @@ struct PlanSettings {
   bool turn = true, height_search = true;  ///< for anchors heard first, where the waypoint allows it
   double grid_step_m = 3, grid_step_up_m = 2;
   int grid_reach = 2, grid_reach_up = 1;
-  std::string rule = "a_optimal";  ///< words of planning::Rule and Combine
-  std::string combine = "weighted";
+  planning::Rule rule = planning::Rule::a_optimal;
+  planning::Combine combine = planning::Combine::weighted;
   int min_iterations = 4, max_iterations = 40;  ///< 8.4.4, per anchor
   double target_sigma_m = 0.05;
   std::optional<double> target_gdop{};  ///< conventional: the root

@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 
+#include "core/base/enum_table.hpp"
+
 namespace anchord {
 
 /// Geodetic position on WGS84; ellipsoidal height, not above sea level.
@@ -19,5 +21,7 @@ enum class TrackFrame {
   wgs84,  ///< on the globe
   local,  ///< metres of a frame without a place on the globe (motion capture, odometry)
 };
+inline constexpr auto k_frame_words =
+    enum_table<TrackFrame>({{"wgs84", TrackFrame::wgs84}, {"local", TrackFrame::local}});
 
 }  // namespace anchord

@@ -4,12 +4,15 @@
 #include <optional>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/time.hpp"
 
 namespace anchord {
 
 enum class RangeKind : std::uint8_t { tag_anchor, anchor_anchor };
+inline constexpr auto k_range_kind_words = enum_table<RangeKind>(
+    {{"tag_anchor", RangeKind::tag_anchor}, {"anchor_anchor", RangeKind::anchor_anchor}});
 
 /// Channel impulse response as read from the radio: interleaved re, im.
 struct Cir {

@@ -18,19 +18,22 @@ Error bad(std::string_view option, std::string_view why) {
   return make_error(Errc::invalid_argument, std::string(option) + ": " + std::string(why));
 }
 
+/// Empty where it is no text, which no option may be.
+std::string_view text_of(const Json& value) {
+  return value.is_string() ? std::string_view(value.get_ref<const std::string&>()) : std::string_view();
+}
+
 Result<std::unique_ptr<Driver>> make_rover(const Json& options, DriverOutput& output) {
   gnss::RoverOptions rover;
   for (const auto& [key, value] : options.items()) {
     if (key == "format") {
       if (value == "auto") continue;
-      for (const auto p : {gnss::Protocol::nmea, gnss::Protocol::ubx, gnss::Protocol::erb,
-                           gnss::Protocol::llh, gnss::Protocol::gpsd}) {
-        if (value == gnss::to_string(p)) rover.format = p;
-      }
-      if (!rover.format) return bad(key, "one of auto, nmea, ubx, erb, llh, gpsd");
+      rover.format = gnss::k_protocol_words.find(text_of(value));
+      if (!rover.format) return bad(key, "one of auto, " + list_of(gnss::k_protocol_words.words()));
     } else if (key == "gst_order") {
-      if (value != "standard" && value != "larger_for_both") return bad(key, "standard or larger_for_both");
-      if (value == "standard") rover.gst_order = gnss::nmea::GstOrder::standard;
+      const auto order = gnss::nmea::k_gst_order_words.find(text_of(value));
+      if (!order) return bad(key, "one of " + list_of(gnss::nmea::k_gst_order_words.words()));
+      rover.gst_order = *order;
     } else if (key == "latency_ms") {
       if (!value.is_number() || value.get<double>() < 0 || value.get<double>() > 1000)
         return bad(key, "0 to 1000");

@@ -25,22 +25,6 @@ void lose(Supervision& state, const Occurrence& why, const SupervisorOptions& op
 
 }  // namespace
 
-std::string_view to_string(Phase phase) {
-  switch (phase) {
-    case Phase::lost:
-      return "lost";
-    case Phase::found:
-      return "found";
-    case Phase::open:
-      return "open";
-    case Phase::talking:
-      return "talking";
-    case Phase::silent:
-      return "silent";
-  }
-  return "lost";
-}
-
 SupervisorStep advance(const Supervision& state, const Occurrence& occurrence,
                        const SupervisorOptions& options) {
   SupervisorStep step{state};

@@ -5,6 +5,8 @@
 #include <string>
 #include <string_view>
 
+#include "core/base/enum_table.hpp"
+
 namespace anchord::device {
 
 enum class Phase : std::uint8_t {
@@ -14,7 +16,12 @@ enum class Phase : std::uint8_t {
   talking,  ///< good frames come
   silent,   ///< the link is open and nothing good has come for too long
 };
-std::string_view to_string(Phase phase);
+inline constexpr auto k_phase_words = enum_table<Phase>({{"lost", Phase::lost},
+                                                         {"found", Phase::found},
+                                                         {"open", Phase::open},
+                                                         {"talking", Phase::talking},
+                                                         {"silent", Phase::silent}});
+constexpr std::string_view to_string(Phase phase) { return k_phase_words.word(phase); }
 
 struct SupervisorOptions {
   std::int64_t first_wait_ns = 500'000'000;  ///< after a loss; doubles with every failure

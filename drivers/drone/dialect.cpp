@@ -1,7 +1,8 @@
 #include "drivers/drone/dialect.hpp"
 
 #include <array>
-#include <utility>
+
+#include "core/base/enum_table.hpp"
 
 namespace anchord::drone {
 namespace {
@@ -15,28 +16,28 @@ constexpr Dialect k_px4{Autopilot::px4, "PX4",     px4(4, 3), px4(4, 3), px4(4, 
                         px4(4, 6),      px4(4, 2), true,      false,     true};
 constexpr Dialect k_unknown{Autopilot::unknown, "", 0, 0, 0, 0, 0, false, false, false};
 
-constexpr std::array<std::pair<std::uint32_t, std::string_view>, 12> k_ardupilot_modes{{{0, "STABILIZE"},
-                                                                                        {2, "ALT_HOLD"},
-                                                                                        {3, "AUTO"},
-                                                                                        {4, "GUIDED"},
-                                                                                        {5, "LOITER"},
-                                                                                        {6, "RTL"},
-                                                                                        {9, "LAND"},
-                                                                                        {16, "POSHOLD"},
-                                                                                        {17, "BRAKE"},
-                                                                                        {20, "GUIDED_NOGPS"},
-                                                                                        {21, "SMART_RTL"},
-                                                                                        {27, "AUTO_RTL"}}};
-constexpr std::array<std::pair<std::uint32_t, std::string_view>, 10> k_px4_modes{{{px4(1, 0), "MANUAL"},
-                                                                                  {px4(2, 0), "ALTCTL"},
-                                                                                  {px4(3, 0), "POSCTL"},
-                                                                                  {px4(4, 2), "TAKEOFF"},
-                                                                                  {px4(4, 3), "HOLD"},
-                                                                                  {px4(4, 4), "MISSION"},
-                                                                                  {px4(4, 5), "RTL"},
-                                                                                  {px4(4, 6), "LAND"},
-                                                                                  {px4(6, 0), "OFFBOARD"},
-                                                                                  {px4(7, 0), "STABILIZED"}}};
+constexpr auto k_ardupilot_modes = enum_table<std::uint32_t>({{"STABILIZE", 0},
+                                                              {"ALT_HOLD", 2},
+                                                              {"AUTO", 3},
+                                                              {"GUIDED", 4},
+                                                              {"LOITER", 5},
+                                                              {"RTL", 6},
+                                                              {"LAND", 9},
+                                                              {"POSHOLD", 16},
+                                                              {"BRAKE", 17},
+                                                              {"GUIDED_NOGPS", 20},
+                                                              {"SMART_RTL", 21},
+                                                              {"AUTO_RTL", 27}});
+constexpr auto k_px4_modes = enum_table<std::uint32_t>({{"MANUAL", px4(1, 0)},
+                                                        {"ALTCTL", px4(2, 0)},
+                                                        {"POSCTL", px4(3, 0)},
+                                                        {"TAKEOFF", px4(4, 2)},
+                                                        {"HOLD", px4(4, 3)},
+                                                        {"MISSION", px4(4, 4)},
+                                                        {"RTL", px4(4, 5)},
+                                                        {"LAND", px4(4, 6)},
+                                                        {"OFFBOARD", px4(6, 0)},
+                                                        {"STABILIZED", px4(7, 0)}});
 
 }  // namespace
 
@@ -97,26 +98,16 @@ ModeParams mode_params(Autopilot autopilot, std::uint32_t custom_mode) {
 }
 
 std::optional<std::uint32_t> mode_of(Autopilot autopilot, std::string_view wanted) {
-  const auto find = [&](const auto& modes) -> std::optional<std::uint32_t> {
-    for (const auto& [mode, word] : modes) {
-      if (word == wanted) return mode;
-    }
-    return std::nullopt;
-  };
-  return autopilot == Autopilot::px4 ? find(k_px4_modes) : find(k_ardupilot_modes);
+  return autopilot == Autopilot::px4 ? k_px4_modes.find(wanted) : k_ardupilot_modes.find(wanted);
 }
 
 std::string_view mode_word(Autopilot autopilot, std::uint32_t custom_mode) {
-  if (autopilot == Autopilot::px4) {
-    for (const auto& [mode, word] : k_px4_modes) {
+  const auto find = [custom_mode](const auto& modes) -> std::string_view {
+    for (const auto& [word, mode] : modes)
       if (mode == custom_mode) return word;
-    }
-  } else {
-    for (const auto& [mode, word] : k_ardupilot_modes) {
-      if (mode == custom_mode) return word;
-    }
-  }
-  return "other";
+    return "other";  // a mode that nobody here commands
+  };
+  return autopilot == Autopilot::px4 ? find(k_px4_modes) : find(k_ardupilot_modes);
 }
 
 }  // namespace anchord::drone

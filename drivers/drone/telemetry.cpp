@@ -45,7 +45,12 @@ std::optional<double> Telemetry::home_msl_m() const {
 
 /// Another life of the autopilot: what it said in the last one is no longer so.
 void Telemetry::restarted() {
-  for (auto& s : streams_) s.heard_s = s.asked_s = -1e9, s.asked = 0, s.result = 0, s.by_group = false;
+  for (auto& s : streams_) {
+    s.heard_s = s.asked_s = -1e9;
+    s.asked = 0;
+    s.result = 0;
+    s.by_group = false;
+  }
   for (auto& [name, p] : parameters_) p = {};
   status_.home.reset();
   status_.battery.reset();
@@ -102,7 +107,11 @@ void Telemetry::hear_parameter(const Message& m, Autopilot autopilot) {
 void Telemetry::hear(const Message& m, Autopilot autopilot, double now_s) {
   if (!first_s_) first_s_ = now_s;
   for (auto& s : streams_) {
-    if (static_cast<int>(m.id()) == s.id) s.heard_s = now_s, s.asked = 0, s.result = 0;
+    if (static_cast<int>(m.id()) == s.id) {
+      s.heard_s = now_s;
+      s.asked = 0;
+      s.result = 0;
+    }
   }
   if (m.is("HEARTBEAT")) {
     status_.armed = (m.integer("base_mode") & k_armed) != 0;

@@ -2,22 +2,6 @@
 
 namespace anchord::gnss {
 
-std::string_view to_string(Protocol protocol) {
-  switch (protocol) {
-    case Protocol::nmea:
-      return "nmea";
-    case Protocol::ubx:
-      return "ubx";
-    case Protocol::erb:
-      return "erb";
-    case Protocol::llh:
-      return "llh";
-    case Protocol::gpsd:
-      return "gpsd";
-  }
-  return "unknown";
-}
-
 std::optional<Fix> to_fix(const Epoch& epoch, const MissionId& mission) {
   if (!epoch.time || !epoch.lat_deg || !epoch.lon_deg || !epoch.height_ellipsoid_m) return std::nullopt;
   Fix out;

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/time.hpp"
 #include "core/types/fix.hpp"
@@ -15,7 +16,12 @@
 namespace anchord::gnss {
 
 enum class Protocol : std::uint8_t { nmea, ubx, erb, llh, gpsd };
-std::string_view to_string(Protocol protocol);
+inline constexpr auto k_protocol_words = enum_table<Protocol>({{"nmea", Protocol::nmea},
+                                                               {"ubx", Protocol::ubx},
+                                                               {"erb", Protocol::erb},
+                                                               {"llh", Protocol::llh},
+                                                               {"gpsd", Protocol::gpsd}});
+constexpr std::string_view to_string(Protocol protocol) { return k_protocol_words.word(protocol); }
 
 /// One position epoch of a receiver, whatever it speaks. Absent means unknown: no zeros, no NaN.
 /// With fix none there is no position, even where the receiver still prints an old one.

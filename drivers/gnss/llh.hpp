@@ -4,12 +4,15 @@
 #include <optional>
 #include <string_view>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/result.hpp"
 #include "drivers/gnss/epoch.hpp"
 
 namespace anchord::gnss::llh {
 
 enum class TimeSystem : std::uint8_t { utc, gpst, jst };
+inline constexpr auto k_time_system_words =
+    enum_table<TimeSystem>({{"utc", TimeSystem::utc}, {"gpst", TimeSystem::gpst}, {"jst", TimeSystem::jst}});
 
 /// RTKLIB solution text, line by line. Header lines may come at any time or never; until one says otherwise
 /// a date and time are of the system given here, a week and its seconds GPS time, and height is ellipsoidal.

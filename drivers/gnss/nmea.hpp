@@ -4,6 +4,7 @@
 #include <string_view>
 #include <variant>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/result.hpp"
 #include "drivers/gnss/epoch.hpp"
 
@@ -52,6 +53,8 @@ enum class GstOrder : std::uint8_t {
   larger_for_both,
   standard,  ///< latitude, longitude: where the maker is known to be right
 };
+inline constexpr auto k_gst_order_words =
+    enum_table<GstOrder>({{"larger_for_both", GstOrder::larger_for_both}, {"standard", GstOrder::standard}});
 
 /// Joins the sentences of one time into an epoch, which is published when the next time begins.
 ///

@@ -173,7 +173,10 @@ void Assembler::add(const Message& message, Epochs& out) {
           if constexpr (std::is_same_v<T, RelativePosition>) group_->relative = m;
           if constexpr (std::is_same_v<T, Dop>) group_->dop = m;
           if constexpr (std::is_same_v<T, OldPosition>) group_->old_position = true;
-          if constexpr (std::is_same_v<T, EndOfEpoch>) has_end_ = true, publish(out);
+          if constexpr (std::is_same_v<T, EndOfEpoch>) {
+            has_end_ = true;
+            publish(out);
+          }
         }
       },
       message);
@@ -207,7 +210,9 @@ void Assembler::publish(Epochs& out) {
     if (group_->covariance && group_->covariance->position_enu_m2) {
       epoch.covariance_enu_m2 = group_->covariance->position_enu_m2;
       const Eigen::Vector3d sigma = epoch.covariance_enu_m2->diagonal().cwiseSqrt();
-      epoch.sigma_e_m = sigma.x(), epoch.sigma_n_m = sigma.y(), epoch.sigma_u_m = sigma.z();
+      epoch.sigma_e_m = sigma.x();
+      epoch.sigma_n_m = sigma.y();
+      epoch.sigma_u_m = sigma.z();
     } else {
       // hAcc is one number for the plane; taking it whole for each axis never promises too much.
       const double h = fine ? group_->hp->h_acc_m : pvt.h_acc_m, v = fine ? group_->hp->v_acc_m : pvt.v_acc_m;

@@ -24,22 +24,6 @@ bool channel_exists(int channel) { return channel >= 1 && channel <= 7 && channe
 
 RangeInfo range_info(ByteView data) { return {u32_at(data, 0), u32_at(data, 4), i16_at(data, 8)}; }
 
-std::string_view to_string(RangeFault fault) {
-  switch (fault) {
-    case RangeFault::none:
-      return "none";
-    case RangeFault::zero_distance:
-      return "zero_distance";
-    case RangeFault::stale:
-      return "stale_range";
-    case RangeFault::too_far:
-      return "distance_impossible";
-    case RangeFault::rss_impossible:
-      return "rss_impossible";
-  }
-  return "none";
-}
-
 RangeFault judge(const RangeInfo& info, const std::optional<RangeInfo>& previous) {
   if (info.distance_mm == 0) return RangeFault::zero_distance;
   if (info.distance_mm > 1'000'000) return RangeFault::too_far;

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/ids.hpp"
 #include "drivers/pozyx/protocol.hpp"
 
@@ -31,7 +32,13 @@ enum class RangeFault : std::uint8_t {
             ///< ranged
   rss_impossible,  ///< 8192 dBm comes with the value above
 };
-std::string_view to_string(RangeFault fault);
+inline constexpr auto k_range_fault_words =
+    enum_table<RangeFault>({{"none", RangeFault::none},
+                            {"zero_distance", RangeFault::zero_distance},
+                            {"stale_range", RangeFault::stale},
+                            {"distance_impossible", RangeFault::too_far},
+                            {"rss_impossible", RangeFault::rss_impossible}});
+constexpr std::string_view to_string(RangeFault fault) { return k_range_fault_words.word(fault); }
 /// previous  info of the same device read before, if any
 RangeFault judge(const RangeInfo& info, const std::optional<RangeInfo>& previous);
 

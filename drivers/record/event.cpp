@@ -69,10 +69,10 @@ std::optional<Event> EventReader::next() {
   }
   const auto body = rest_.substr(k_record_head, length);
   if (crc32c(body) != get<std::uint32_t>(rest_, 4)) return std::nullopt;
-  const auto kind = get<std::uint8_t>(body, 0);
-  if (kind < 1 || kind > static_cast<std::uint8_t>(EventKind::mission)) return std::nullopt;
+  const auto kind = k_event_kind_words.of_number(get<std::uint8_t>(body, 0));
+  if (!kind) return std::nullopt;
   Event event;
-  event.kind = static_cast<EventKind>(kind);
+  event.kind = *kind;
   event.slot = get<std::uint16_t>(body, 1);
   event.at = {UtcTime{get<std::int64_t>(body, 11)}, get<std::int64_t>(body, 3)};
   event.payload = body.substr(k_body_head);

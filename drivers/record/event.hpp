@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/base/enum_table.hpp"
 #include "drivers/link/byte_link.hpp"
 
 namespace anchord::record {
@@ -22,6 +23,14 @@ enum class EventKind : std::uint8_t {
   command = 7,  ///< payload: device::Command as JSON
   mission = 8,  ///< slot 0; payload: id of the mission that records from here on, empty: none
 };
+inline constexpr auto k_event_kind_words = enum_table<EventKind>({{"added", EventKind::added},
+                                                                  {"removed", EventKind::removed},
+                                                                  {"opened", EventKind::opened},
+                                                                  {"bytes", EventKind::bytes},
+                                                                  {"tick", EventKind::tick},
+                                                                  {"closed", EventKind::closed},
+                                                                  {"command", EventKind::command},
+                                                                  {"mission", EventKind::mission}});
 
 struct Event {
   EventKind kind{EventKind::bytes};

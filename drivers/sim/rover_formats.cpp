@@ -136,11 +136,6 @@ std::string nmea_frame(std::string_view body) {
   return "$" + std::string(body) + text("*%02X\r\n", sum);
 }
 
-std::string_view to_string(RoverFormat format) {
-  constexpr std::array<std::string_view, 5> k_words{"nmea", "ubx", "erb", "llh", "gpsd"};
-  return k_words[static_cast<std::size_t>(format)];
-}
-
 std::string encode(const RoverEpoch& epoch, RoverFormat format) {
   switch (format) {
     case RoverFormat::nmea:

@@ -42,6 +42,4 @@ std::string ubx_frame(std::uint8_t message_class, std::uint8_t id, std::string_v
 std::string erb_frame(std::uint8_t id, std::string_view payload);
 std::string nmea_frame(std::string_view body);
 
-std::string_view to_string(RoverFormat format);
-
 }  // namespace anchord::sim

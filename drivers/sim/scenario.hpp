@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/time.hpp"
 #include "drivers/sim/impulse.hpp"
 #include "drivers/sim/path.hpp"
@@ -27,6 +28,17 @@ enum class FaultKind : std::uint8_t {
   refuse,       ///< tag: functions are refused, with short answers
   remote_deaf,  ///< tag: devices answer ranging, not remote questions
 };
+inline constexpr auto k_fault_words = enum_table<FaultKind>({{"unplug", FaultKind::unplug},
+                                                             {"garbage", FaultKind::garbage},
+                                                             {"silence", FaultKind::silence},
+                                                             {"fix_loss", FaultKind::fix_loss},
+                                                             {"fix_float", FaultKind::fix_float},
+                                                             {"late", FaultKind::late},
+                                                             {"stale", FaultKind::stale},
+                                                             {"zero", FaultKind::zero},
+                                                             {"no_event", FaultKind::no_event},
+                                                             {"refuse", FaultKind::refuse},
+                                                             {"remote_deaf", FaultKind::remote_deaf}});
 struct Fault {
   std::string device;  ///< name of a tag or rover of the scenario
   FaultKind kind{};
@@ -47,8 +59,17 @@ struct TagSetup {
   std::string link;                 ///< path of a symbolic link to the pty; empty: none
 };
 
+/// Its own, not gnss::Protocol: the simulator shares nothing with the decoders that it tests.
 enum class RoverFormat : std::uint8_t { nmea, ubx, erb, llh, gpsd };
+inline constexpr auto k_rover_format_words = enum_table<RoverFormat>({{"nmea", RoverFormat::nmea},
+                                                                      {"ubx", RoverFormat::ubx},
+                                                                      {"erb", RoverFormat::erb},
+                                                                      {"llh", RoverFormat::llh},
+                                                                      {"gpsd", RoverFormat::gpsd}});
+constexpr std::string_view to_string(RoverFormat format) { return k_rover_format_words.word(format); }
 enum class RoverPort : std::uint8_t { pty, tcp };
+inline constexpr auto k_rover_port_words =
+    enum_table<RoverPort>({{"pty", RoverPort::pty}, {"tcp", RoverPort::tcp}});
 
 /// An RTK receiver.
 struct RoverSetup {

@@ -90,20 +90,15 @@ class Object {
     }
     return true;
   }
-  template <std::size_t N, class Word>
-  void word(const char* key, const std::array<std::string_view, N>& words, Word& into) {
+  template <class T, std::size_t N>
+  void word(const char* key, const EnumTable<T, N>& table, T& into) {
     std::string said;
     text(key, said);
     if (said.empty()) return;
-    for (std::size_t i = 0; i < N; ++i) {
-      if (words[i] == said) {
-        into = static_cast<Word>(i);
-        return;
-      }
-    }
-    std::string all;
-    for (const auto known : words) all += (all.empty() ? "" : ", ") + std::string(known);
-    fail(key, "is one of " + all);
+    if (const auto value = table.find(said))
+      into = *value;
+    else
+      fail(key, "is one of " + list_of(table.words()));
   }
   void id(const char* key, NetworkId& into) {
     std::string said;
@@ -227,7 +222,7 @@ void take_radio(Object& of, RadioOptions& radio) {
   of.number("turn_lobe_db", radio.turn_lobe_db);
   of.flag("height_lobe", radio.height_lobe);
   of.number("level_bias_share", radio.level_bias_share);
-  of.word("ranging", std::array<std::string_view, 2>{"single_sided", "double_sided"}, radio.two_way.scheme);
+  of.word("ranging", k_two_way_words, radio.two_way.scheme);
   of.number("reply_a_s", radio.two_way.reply_a_s);
   of.number("reply_b_s", radio.two_way.reply_b_s);
 }
@@ -285,8 +280,8 @@ void take_tag(Object& of, TagSetup& tag) {
 
 void take_rover(Object& of, RoverSetup& rover) {
   of.text("name", rover.name);
-  of.word("format", std::array<std::string_view, 5>{"nmea", "ubx", "erb", "llh", "gpsd"}, rover.format);
-  of.word("port", std::array<std::string_view, 2>{"pty", "tcp"}, rover.port);
+  of.word("format", k_rover_format_words, rover.format);
+  of.word("port", k_rover_port_words, rover.port);
   of.whole("tcp_port", rover.tcp_port, 65'535);
   of.number("rate_hz", rover.rate_hz);
   of.number("delay_s", rover.delay_s);
@@ -298,10 +293,7 @@ void take_rover(Object& of, RoverSetup& rover) {
 
 void take_fault(Object& of, Fault& fault) {
   of.text("device", fault.device);
-  of.word("kind",
-          std::array<std::string_view, 11>{"unplug", "garbage", "silence", "fix_loss", "fix_float", "late",
-                                           "stale", "zero", "no_event", "refuse", "remote_deaf"},
-          fault.kind);
+  of.word("kind", k_fault_words, fault.kind);
   of.number("from_s", fault.from_s);
   of.number("until_s", fault.until_s);
 }

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 
+#include "core/base/enum_table.hpp"
+
 namespace anchord::sim {
 
 /// Two-way ranging and what free-running crystals make of it (chapter 2.2 of the dissertation). Times in
@@ -19,6 +21,8 @@ double double_sided_distance_m(double round_a_s, double reply_a_s, double round_
 double double_sided_error_m(double delta_s, double error_a, double error_b);
 
 enum class TwoWayScheme : std::uint8_t { single_sided, double_sided };
+inline constexpr auto k_two_way_words = enum_table<TwoWayScheme>(
+    {{"single_sided", TwoWayScheme::single_sided}, {"double_sided", TwoWayScheme::double_sided}});
 
 /// How two devices measure their distance.
 struct TwoWayExchange {

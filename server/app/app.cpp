@@ -10,6 +10,8 @@
 
 #include "api/application.hpp"
 #include "api/stream/hub.hpp"
+#include "core/ports/access_store.hpp"
+#include "core/ports/token_store.hpp"
 #include "drivers/drone/signing_key.hpp"
 #include "drivers/link/address.hpp"
 #include "server/app/front_door.hpp"
@@ -122,13 +124,11 @@ api::StorageStatus status_of(Database& database) {
 Result<std::unique_ptr<Database>> open_store(const Config& config) {
   StorageOptions options;
   options.data_dir = config.text("data_dir");
-  const std::string& word = config.text("storage.synchronous");
   // One for each thread that reads, so that a command never waits for somebody else's to be free.
   options.readers = config.count("http.workers") + config.count("http.heavy_workers") +
                     config.count("http.upload_workers") + 10;
-  options.synchronous = word == "normal"  ? Synchronous::normal
-                        : word == "extra" ? Synchronous::extra
-                                          : Synchronous::full;
+  BOOST_OUTCOME_TRY(options.synchronous,
+                    k_synchronous_words.parse("storage.synchronous", config.text("storage.synchronous")));
   return open_database(options);
 }
 

@@ -7,24 +7,25 @@
 #include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"
+#include "server/cli/words.hpp"
 
 namespace anchord::cli {
 namespace {
 
 struct CampaignArguments {
-  std::string file, out, environment, material, site, format{"detect"}, label;
+  std::string file, out, environment, material, site, label;
+  api::CampaignFormat format{api::CampaignFormat::detect};
   double distance_m{-1}, heading_deg{0}, height_m{0}, thickness_m{0};
   bool has_heading{false}, has_height{false}, has_thickness{false}, keep_outliers{false};
 };
 
 api::CampaignOptions options_of(const CampaignArguments& a) {
   api::CampaignOptions o;
-  o.format = a.format == "csv"      ? api::CampaignFormat::csv
-             : a.format == "ndjson" ? api::CampaignFormat::ndjson
-             : a.format == "txt"    ? api::CampaignFormat::txt
-                                    : api::CampaignFormat::detect;
+  o.format = a.format;
   o.filter = !a.keep_outliers;
-  o.defaults.name = a.site, o.defaults.environment = a.environment, o.defaults.material = a.material;
+  o.defaults.name = a.site;
+  o.defaults.environment = a.environment;
+  o.defaults.material = a.material;
   if (a.distance_m > 0) o.defaults.distance_m = a.distance_m;
   if (a.has_heading) o.defaults.heading_deg = a.heading_deg;
   if (a.has_height) o.defaults.height_m = a.height_m;
@@ -78,8 +79,7 @@ void add_campaign_command(CLI::App& app, int& exit_code) {
       "Read CSV, NDJSON or a .txt of one measurement a line, drop faults, write one CSV to train on");
   command->add_option("file", a->file, "File, plain or gzipped")->required();
   command->add_option("--out", a->out, "CSV to write (default: standard output)");
-  command->add_option("--format", a->format, "detect, csv, ndjson or txt")
-      ->check(CLI::IsMember({"detect", "csv", "ndjson", "txt"}));
+  add_word(*command, "--format", a->format, api::k_campaign_format_words, "Of the file");
   command->add_option("--site", a->site, "Name of the site, for files that name none");
   command->add_option("--environment", a->environment, "Hall, office: what no split may divide");
   command->add_option("--material", a->material, "Of the obstacle");
@@ -90,7 +90,8 @@ void add_campaign_command(CLI::App& app, int& exit_code) {
   command->add_option("--label", a->label, "LOS or NLOS")->check(CLI::IsMember({"LOS", "NLOS"}));
   command->add_flag("--keep-outliers", a->keep_outliers, "Drop zero ranges only");
   command->callback([a, heading, height, thickness, &exit_code] {
-    a->has_heading = heading->count() > 0, a->has_height = height->count() > 0;
+    a->has_heading = heading->count() > 0;
+    a->has_height = height->count() > 0;
     a->has_thickness = thickness->count() > 0;
     exit_code = import(*a);
   });

@@ -7,13 +7,15 @@
 #include "api/learning/labelled_dataset.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"
+#include "server/cli/words.hpp"
 
 namespace anchord::cli {
 namespace {
 
 struct DatasetArguments {
   DataOptions data;
-  std::string out, file, digest, campaign, aggregate{"none"};
+  std::string out, file, digest, campaign;
+  api::Aggregation aggregate{api::Aggregation::none};
   std::vector<std::string> held_out;
   bool keep_outliers{false};
   double held_out_share{0};
@@ -28,11 +30,11 @@ int build(const DatasetArguments& a) {
   const auto table = read_data(a.data);
   if (!table) return refuse("dataset", table.error().message);
   api::FreezeOptions how;
-  how.aggregation = a.aggregate == "none"   ? api::Aggregation::none
-                    : a.aggregate == "mean" ? api::Aggregation::mean
-                                            : api::Aggregation::median;
+  how.aggregation = a.aggregate;
   how.filter_faults = !a.keep_outliers;
-  how.test = a.held_out, how.test_share = a.held_out_share, how.seed = a.seed;
+  how.test = a.held_out;
+  how.test_share = a.held_out_share;
+  how.seed = a.seed;
   std::map<std::string, std::size_t> dropped;
   for (const auto& [reason, entry] : table.value().dropped)
     dropped[reason + " (first " + entry.second + ")"] = entry.first;
@@ -71,12 +73,9 @@ void add_dataset_command(CLI::App& app, int& exit_code) {
   auto* built =
       dataset->add_subcommand("build", "Aggregate, split by whole places, look for leaks, take the digest");
   add_data_options(*built, a->data);
-  built
-      ->add_option("--aggregate", a->aggregate,
-                   "none (single ranges, as flights have them), or mean or median of each "
-                   "measurement point: models of these are not for live ranges")
-      ->check(CLI::IsMember({"none", "mean", "median"}))
-      ->capture_default_str();
+  add_word(*built, "--aggregate", a->aggregate, api::k_aggregation_words,
+           "none (single ranges, as flights have them), or mean or median of each "
+           "measurement point: models of these are not for live ranges");
   built->add_option("--hold-out", a->held_out, "Places for the final test")->delimiter(',');
   built->add_option("--hold-out-share", a->held_out_share, "Or this share of the places, drawn by the seed")
       ->check(CLI::Range(0.0, 0.9));

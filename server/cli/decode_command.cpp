@@ -8,14 +8,15 @@
 #include <charconv>
 #include <cstdio>
 #include <cstring>
+#include <map>
 #include <memory>
 #include <utility>
 
-#include "api/wire/words.hpp"
 #include "core/base/text.hpp"
 #include "core/base/time.hpp"
 #include "drivers/gnss/decoder.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/words.hpp"
 
 namespace anchord::cli {
 namespace {
@@ -70,7 +71,7 @@ std::string line_of(const gnss::Epoch& epoch, bool json) {
   };
   put("t_utc", time_text(epoch), true);
   numbers(k_position);
-  put("fix", std::string(api::word_of(api::k_fix_words, epoch.fix)), true);
+  put("fix", std::string(k_fix_words.word(epoch.fix)), true);
   put("sats", epoch.satellites ? std::to_string(*epoch.satellites) : "", false);
   numbers(k_quality);
   return out + (json ? "}\n" : "\n");
@@ -84,34 +85,30 @@ std::string header() {
   return out + "\n";
 }
 
-constexpr std::array k_protocols{gnss::Protocol::nmea, gnss::Protocol::ubx, gnss::Protocol::erb,
-                                 gnss::Protocol::llh, gnss::Protocol::gpsd};
-
 /// What was found, for the report at the end.
 struct Found {
   std::uint64_t bytes{0}, epochs{0}, dateless{0}, timeless{0};
-  std::array<std::uint64_t, api::k_fix_words.size()> by_fix{};
-  std::array<std::uint64_t, k_protocols.size()> by_protocol{};
+  std::map<FixClass, std::uint64_t> by_fix{};
+  std::map<gnss::Protocol, std::uint64_t> by_protocol{};
   bool utf16{false};
 
   void add(const gnss::Epoch& epoch) {
     ++epochs;
-    ++by_fix[static_cast<std::size_t>(epoch.fix)];
-    ++by_protocol[static_cast<std::size_t>(epoch.protocol)];
+    ++by_fix[epoch.fix];
+    ++by_protocol[epoch.protocol];
     if (!epoch.time) ++(epoch.time_of_day_ns ? dateless : timeless);
   }
 };
 
 /// "12 fixed, 3 float" of what there is; empty of nothing.
-template <class Counts, class Name>
-std::string listed(const Counts& counts, const Name& name) {
+template <class T, std::size_t N>
+std::string listed(const std::map<T, std::uint64_t>& counts, const EnumTable<T, N>& table) {
   std::string out;
-  for (std::size_t i = 0; i < counts.size(); ++i) {
-    if (counts[i] > 0) out += (out.empty() ? "" : ", ") + std::to_string(counts[i]) + ' ' + name(i);
+  for (const auto& [value, n] : counts) {
+    if (n > 0) out += (out.empty() ? "" : ", ") + std::to_string(n) + ' ' + std::string(table.word(value));
   }
   return out;
 }
-std::string protocol_name(std::size_t i) { return std::string(gnss::to_string(k_protocols[i])); }
 
 /// Why there is nothing, for somebody who expected something.
 const char* why_nothing(const Found& found, bool any_frames, bool all_formats) {
@@ -125,25 +122,20 @@ const char* why_nothing(const Found& found, bool any_frames, bool all_formats) {
 }
 
 void report(const gnss::Decoder& decoder, const Found& found, bool all_formats) {
-  std::array<std::uint64_t, k_protocols.size()> frames{};
-  for (std::size_t i = 0; i < frames.size(); ++i) frames[i] = decoder.frames(k_protocols[i]);
-  const auto from = listed(frames, protocol_name);
+  std::map<gnss::Protocol, std::uint64_t> frames;
+  for (const auto& [word, protocol] : gnss::k_protocol_words) frames[protocol] = decoder.frames(protocol);
+  const auto from = listed(frames, gnss::k_protocol_words);
   std::fprintf(stderr, "%llu epochs from %s frames of %llu bytes\n",
                static_cast<unsigned long long>(found.epochs), from.empty() ? "no" : from.c_str(),
                static_cast<unsigned long long>(found.bytes));
   if (found.epochs == 0) {
     std::fprintf(stderr, "%s\n", why_nothing(found, !from.empty(), all_formats));
   } else {
-    const auto fixes = listed(found.by_fix, [](std::size_t i) {
-      return std::string(api::word_of(api::k_fix_words, static_cast<FixClass>(i)));
-    });
-    std::fprintf(stderr, "fix: %s\n", fixes.c_str());
+    std::fprintf(stderr, "fix: %s\n", listed(found.by_fix, k_fix_words).c_str());
   }
-  if (found.by_protocol != decltype(found.by_protocol){} &&
-      std::count(found.by_protocol.begin(), found.by_protocol.end(), 0U) + 1 <
-          static_cast<std::ptrdiff_t>(k_protocols.size())) {
+  if (found.by_protocol.size() > 1) {
     std::fprintf(stderr, "epochs in several formats (%s), often the same ones again: --format takes one\n",
-                 listed(found.by_protocol, protocol_name).c_str());
+                 listed(found.by_protocol, gnss::k_protocol_words).c_str());
   }
   if (found.dateless > 0) {
     std::fprintf(stderr, "%llu epochs without a date: no RMC or ZDA in the stream; give one with --date\n",
@@ -168,18 +160,18 @@ void report(const gnss::Decoder& decoder, const Found& found, bool all_formats) 
 }
 
 struct Decode {
-  std::string file, format{"auto"}, gst{"larger"}, date, llh_time{"utc"};
+  std::string file, format{"auto"}, date;
+  gnss::nmea::GstOrder gst{gnss::nmea::GstOrder::larger_for_both};
+  gnss::llh::TimeSystem llh_time{gnss::llh::TimeSystem::utc};
   bool csv{false}, json{false};
 };
 
 /// Nothing where the date is none; told to the user.
 std::optional<gnss::DecoderOptions> decoder_options(const Decode& options) {
   gnss::DecoderOptions out;
-  for (const auto p : k_protocols) {
-    if (options.format == gnss::to_string(p)) out.only = p;
-  }
-  if (options.llh_time == "gpst") out.llh_time = gnss::llh::TimeSystem::gpst;
-  if (options.gst == "standard") out.gst_order = gnss::nmea::GstOrder::standard;
+  out.only = gnss::k_protocol_words.find(options.format);
+  out.llh_time = options.llh_time;
+  out.gst_order = options.gst;
   if (!options.date.empty()) {
     const auto noon = parse_rfc3339(options.date + "T12:00:00Z");
     if (!noon) {
@@ -273,20 +265,16 @@ void add_decode_command(CLI::App& app, int& exit_code) {
   auto* command =
       app.add_subcommand("decode", "Print every epoch of a GNSS log; what was skipped goes to stderr");
   command->add_option("FILE", options->file, "log, - for standard input")->required();
+  auto formats = words_of(gnss::k_protocol_words);
+  formats.emplace_back("auto");
   command->add_option("--format", options->format, "auto takes every format the stream holds")
-      ->check(CLI::IsMember({"auto", "nmea", "ubx", "erb", "llh", "gpsd"}));
-  command
-      ->add_option(
-          "--gst", options->gst,
-          "NMEA GST sigmas: the larger of latitude and longitude for both (some receivers swap them), or "
-          "the standard order")
-      ->check(CLI::IsMember({"larger", "standard"}));
+      ->check(CLI::IsMember(formats));
+  add_word(*command, "--gst", options->gst, gnss::nmea::k_gst_order_words,
+           "NMEA GST sigmas: the larger of latitude and longitude for both (some receivers swap them), or "
+           "the standard order");
   command->add_option("--date", options->date, "YYYY-MM-DD of an NMEA log that has no RMC or ZDA");
-  command
-      ->add_option(
-          "--llh-time", options->llh_time,
-          "time system of LLH lines without a header: utc as Reach streams them, gpst as RTKLIB does")
-      ->check(CLI::IsMember({"utc", "gpst"}));
+  add_word(*command, "--llh-time", options->llh_time, gnss::llh::k_time_system_words,
+           "time system of LLH lines without a header: utc as Reach streams them, gpst as RTKLIB does");
   auto* csv = command->add_flag("--csv", options->csv, "CSV with a header line (default)");
   command->add_flag("--json", options->json, "one JSON object per line, null for unknown")->excludes(csv);
   command->callback([options, &exit_code] { exit_code = run(*options); });

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
+
 namespace anchord::cli {
 
 /// One thing looked at, what was seen, and what to do about it.
@@ -13,6 +15,8 @@ struct Finding {
   Level level{Level::ok};
   std::string what, seen, advice{};
 };
+inline constexpr auto k_finding_words = enum_table<Finding::Level>(
+    {{"ok", Finding::Level::ok}, {"warning", Finding::Level::warning}, {"failed", Finding::Level::failed}});
 
 struct DoctorOptions {
   std::filesystem::path data_dir{"anchord-data"};

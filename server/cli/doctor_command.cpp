@@ -11,21 +11,10 @@
 namespace anchord::cli {
 namespace {
 
-const char* word(Finding::Level level) {
-  switch (level) {
-    case Finding::Level::ok:
-      return "ok";
-    case Finding::Level::warning:
-      return "warning";
-    case Finding::Level::failed:
-      return "failed";
-  }
-  return "";
-}
-
 void print(const std::vector<Finding>& findings) {
   for (const auto& f : findings) {
-    std::printf("%-8s %-14s %s\n", word(f.level), f.what.c_str(), printable(f.seen).c_str());
+    std::printf("%-8s %-14s %s\n", std::string(k_finding_words.word(f.level)).c_str(), f.what.c_str(),
+                printable(f.seen).c_str());
     if (!f.advice.empty()) std::printf("%24s%s\n", "", printable(f.advice).c_str());
   }
 }

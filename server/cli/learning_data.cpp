@@ -102,16 +102,19 @@ Result<FrozenRows> rows_for(const DataOptions& o, const FrozenFile& file, ml::Ta
   FrozenRows out;
   out.data = std::move(rows.value().data);
   out.held_out = std::move(rows.value().held_out);
-  out.group_by = api::place_word(wish.group_by), out.digest = file.digest;
+  out.group_by = api::place_word(wish.group_by);
+  out.digest = file.digest;
   out.not_for_live = api::not_for_live(file.table);
   out.feature_set = file.table.feature_set;
   auto& report = out.report;
   report.files = o.files;
-  report.read = file.table.rows.size(), report.used = out.data.rows();
+  report.read = file.table.rows.size();
+  report.used = out.data.rows();
   for (const auto& [reason, n] : rows.value().dropped) report.dropped[reason].first = n;
   report.label = out.data.labelled() ? "los" : "";
   report.truth = out.data.has_truth() ? "true_range_m" : "";
-  report.group_by = out.group_by, report.placement = "setting";
+  report.group_by = out.group_by;
+  report.placement = "setting";
   return out;
 }
 

@@ -14,6 +14,7 @@
 #include "core/base/text.hpp"
 #include "core/planning/local_plan.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/words.hpp"
 
 namespace anchord::cli {
 namespace {
@@ -114,7 +115,7 @@ void add_import(CLI::App& plan, int& exit_code) {
 }
 
 struct Flight {
-  std::string outline, format{"json"}, criterion{"a_optimal"};
+  std::string outline, format{"json"};
   double building_height_m{0};
   planning::FlightPlanOptions options;
 };
@@ -134,8 +135,7 @@ int plan_flight(const Flight& flight) {
     return 2;
   }
   if (flight.building_height_m > 0) request->input.building_height_m = flight.building_height_m;
-  auto options = flight.options;
-  if (flight.criterion == "d_optimal") options.criterion = planning::Criterion::d_optimal;
+  const auto& options = flight.options;
   const auto plan = planning::plan_flight(request->input, options);
   if (!plan) {
     std::fprintf(stderr, "anchord plan: %s: %s\n", flight.outline.c_str(),
@@ -164,8 +164,9 @@ void add_flight(CLI::App& plan, int& exit_code) {
       ->required();
   command->add_option("--format", flight->format, "json, plan (QGroundControl) or geojson")
       ->check(CLI::IsMember({"json", "plan", "geojson"}));
-  command->add_option("--criterion", flight->criterion, "a_optimal: mean error; d_optimal: error volume")
-      ->check(CLI::IsMember({"a_optimal", "d_optimal"}));
+  add_word(
+      *command, "--rule,--criterion", o.rule, planning::k_rule_words,
+      "a_optimal: mean error; d_optimal: error volume; dissertation is of single points, not of flights");
   command->add_option("--height", flight->building_height_m,
                       "of the building in m; default: height_m of the outline, else 6");
   command->add_option("--keep-out", o.keep_out_m, "distance from the outline in m")->capture_default_str();

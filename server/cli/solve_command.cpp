@@ -10,13 +10,13 @@
 #include "api/calibration/solve_output.hpp"
 #include "api/formats/flight_folder.hpp"
 #include "api/learning/flight_models.hpp"
-#include "api/wire/words.hpp"
 #include "core/base/text.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "core/localize/kit_prior.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"
 #include "server/cli/solve_report.hpp"
+#include "server/cli/words.hpp"
 
 namespace anchord::cli {
 namespace {
@@ -26,15 +26,19 @@ constexpr int k_unusable = 2;
 /// What the command line of solve and profile holds.
 struct Arguments {
   std::vector<std::string> folders;
-  std::string format{"table"}, solver{"gauss_newton"}, weights{"inverse_variance"}, loss{"tukey"},
-      min_fix{"fixed"};
+  SolveFormat format{SolveFormat::table};
+  Method solver{Method::gauss_newton};
+  Weights weights{Weights::inverse_variance};
+  Loss loss{Loss::tukey};
+  FixClass min_fix{FixClass::rtk_fixed};
   int dims{3};
   std::optional<double> bias_m, height_m, max_gap_s;
   std::vector<double> height_prior;
   double max_correction_age_s{TrackLimits{}.max_correction_age_s};
   std::string profile, out, clues;
   std::vector<std::string> models;
-  std::string likelihood{"one_sided"}, worth{"shown"}, method{"joint"};
+  bool likelihood{true}, ask_worth{true};
+  AnchorMethod method{AnchorMethod::joint};
   SolveReportOptions report;
 };
 
@@ -71,15 +75,10 @@ Result<void> add_clues(const std::string& file, FlightOptions& options) {
 Result<FlightOptions> options_of(const Arguments& a) {
   FlightOptions options;
   options.dims = a.dims == 2 ? Dims::two : Dims::three;
-  options.method = a.solver == "levenberg_marquardt" ? Method::levenberg_marquardt
-                   : a.solver == "dogleg"            ? Method::dogleg
-                                                     : Method::gauss_newton;
-  options.weights = a.weights == "as_printed" ? Weights::as_printed : Weights::inverse_variance;
-  options.loss = a.loss == "none"     ? Loss::none
-                 : a.loss == "huber"  ? Loss::huber
-                 : a.loss == "cauchy" ? Loss::cauchy
-                                      : Loss::tukey;
-  options.min_fix = api::value_of(api::k_fix_words, a.min_fix).value_or(FixClass::rtk_fixed);
+  options.method = a.solver;
+  options.weights = a.weights;
+  options.loss = a.loss;
+  options.min_fix = a.min_fix;
   options.fixed_bias_m = a.bias_m;
   options.track.max_correction_age_s = a.max_correction_age_s;
   options.anchor_height_m = a.height_m;
@@ -124,7 +123,7 @@ Result<std::vector<api::FlightModelsReport>> apply_models(const Arguments& a,
   }
   BOOST_OUTCOME_TRY(const auto together, api::models_together(std::move(models), ml::Correction::weighted));
   for (auto& flight : flights) {
-    reports.push_back(api::correct_flight(together, flight, a.likelihood == "one_sided"));
+    reports.push_back(api::correct_flight(together, flight, a.likelihood));
     const auto& report = reports.back();
     std::fprintf(stderr, "  %s: models corrected %zu of %zu ranges, by %.3f m on average, and weigh %zu\n",
                  flight.mission.name.c_str(), report.n_corrected, report.n_ranges, report.mean_correction_m,
@@ -176,7 +175,7 @@ int solve(const Arguments& a) {
                flights.value().size() == 1 ? "" : "s");
   auto solutions = solve_flights(pointers(flights.value()), options.value());
   if (!solutions) return complain(solutions.error());
-  if (!models.value().empty() && a.worth == "shown") {
+  if (!models.value().empty() && a.ask_worth) {
     const auto without = solve_flights(pointers(raw), options.value());
     if (!without) return complain(without.error());
     if (leave_out_worthless(models.value(), flights.value(), raw, solutions.value(), without.value())) {
@@ -196,10 +195,6 @@ int solve(const Arguments& a) {
       std::fprintf(stderr, "note: %s: %s\n", flights.value()[i].mission.name.c_str(),
                    flights.value()[i].notes.back().c_str());
   }
-  const SolveFormat format = a.format == "json"      ? SolveFormat::json
-                             : a.format == "geojson" ? SolveFormat::geojson
-                             : a.format == "csv"     ? SolveFormat::csv
-                                                     : SolveFormat::table;
   for (std::size_t i = 0; i < solved.size() && !a.report.file.empty(); ++i) {
     SolveReportOptions one = a.report;
     if (solved.size() > 1)
@@ -212,11 +207,9 @@ int solve(const Arguments& a) {
       return complain(written.error());
   }
   // The page compares; what is printed is the answer asked for.
-  const AnchorMethod method = a.method == "linear" ? AnchorMethod::linear
-                              : a.method == "wls"  ? AnchorMethod::wls
-                                                   : AnchorMethod::joint;
-  for (std::size_t i = 0; i < solved.size(); ++i) answer_by(method, solved[i].methods, solutions.value()[i]);
-  const std::string text = solve_output(solved, format);
+  for (std::size_t i = 0; i < solved.size(); ++i)
+    answer_by(a.method, solved[i].methods, solutions.value()[i]);
+  const std::string text = solve_output(solved, a.format);
   std::fwrite(text.data(), 1, text.size(), stdout);
   if (std::fflush(stdout) != 0) return 1;
   int exit_code = 0;
@@ -290,12 +283,10 @@ void add_options(CLI::App& command, Arguments& a) {
       .add_option("flights", a.folders,
                   "Flight folders (docs/formats.md); flights of one kit learn from each other")
       ->required();
-  command.add_option("--solver", a.solver, "gauss_newton, levenberg_marquardt or dogleg")
-      ->check(CLI::IsMember({"gauss_newton", "levenberg_marquardt", "dogleg"}));
-  command.add_option("--weights", a.weights, "inverse_variance, or as_printed (eq 7.11)")
-      ->check(CLI::IsMember({"inverse_variance", "as_printed"}));
-  command.add_option("--loss", a.loss, "tukey, cauchy, huber or none")
-      ->check(CLI::IsMember({"none", "huber", "cauchy", "tukey"}));
+  add_word(command, "--solver", a.solver, k_solver_words, "How the minimum is searched");
+  add_word(command, "--weights", a.weights, k_weights_words,
+           "inverse_variance, or dissertation: as eq 7.11 is printed");
+  add_word(command, "--loss", a.loss, k_loss_words, "What a large residual counts");
   command.add_option("--dims", a.dims, "3, or 2 with the height held")->check(CLI::IsMember({2, 3}));
   command.add_option("--height", a.height_m,
                      "With --dims 2: height of all anchors in metres, ellipsoidal where the track is global "
@@ -309,8 +300,7 @@ void add_options(CLI::App& command, Arguments& a) {
   command.add_option("--max-gap", a.max_gap_s,
                      "Longest interval of the track, in seconds, to place a range in; default: as long as "
                      "interpolation misses by less than 0.5 m");
-  command.add_option("--min-fix", a.min_fix, "Least fix class of the track: fixed, float, dgps or single")
-      ->check(CLI::IsMember({"fixed", "float", "dgps", "single"}));
+  add_word(command, "--min-fix", a.min_fix, k_fix_words, "Least fix class of the track");
   command
       .add_option("--max-correction-age", a.max_correction_age_s,
                   "Seconds; RTK fixed with older corrections counts as float")
@@ -333,26 +323,17 @@ void add_solve_command(CLI::App& app, int& exit_code) {
   auto* models =
       command->add_option("--models", arguments->models,
                           "Model artifacts (anchord train) that correct and weigh the ranges, one a task");
-  command
-      ->add_option("--likelihood", arguments->likelihood,
-                   "With --models: one_sided, the models' own likelihood, or loss, their corrections alone")
-      ->check(CLI::IsMember({"one_sided", "loss"}))
+  add_word(*command, "--likelihood", arguments->likelihood, api::k_likelihood_words,
+           "With --models: one_sided, the models' own likelihood, or loss, their corrections alone")
       ->needs(models);
-  command
-      ->add_option(
-          "--worth", arguments->worth,
-          "With --models: shown, leave them out of a flight that they do not explain better than its "
-          "ranges as they came, or ignored")
-      ->check(CLI::IsMember({"shown", "ignored"}))
+  add_word(*command, "--worth", arguments->ask_worth, api::k_worth_words,
+           "With --models: shown, leave them out of a flight that they do not explain better than its "
+           "ranges as they came, or ignored")
       ->needs(models);
-  command
-      ->add_option(
-          "--method", arguments->method,
-          "joint, or for comparison linear (eq 7.2 to 7.5) or wls (eq 7.10), which are never acceptable; "
-          "the report and the JSON have all three")
-      ->check(CLI::IsMember({"joint", "linear", "wls"}));
-  command->add_option("--format", arguments->format, "table, json, geojson or csv, on standard output")
-      ->check(CLI::IsMember({"table", "json", "geojson", "csv"}));
+  add_word(*command, "--method", arguments->method, k_anchor_method_words,
+           "joint, or for comparison linear (eq 7.2 to 7.5) or wls (eq 7.10), which are never acceptable; "
+           "the report and the JSON have all three");
+  add_word(*command, "--format", arguments->format, k_solve_format_words, "On standard output");
   auto* report = command->add_option(
       "--report", arguments->report.file,
       "Also write a printable page to this HTML file; of several flights FILE-1.html, ...");

@@ -11,13 +11,16 @@
 #include "api/learning/model_artifact.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"
+#include "server/cli/words.hpp"
 
 namespace anchord::cli {
 namespace {
 
 struct TrainArguments {
   DataOptions data;
-  std::string task{"nlos_id"}, out{}, engine{"own"};
+  ml::Task task{ml::Task::nlos_id};
+  ml::Engine engine{ml::Engine::own};
+  std::string out{};
   std::vector<std::string> methods{"auto"}, features;
   std::size_t folds{10};
   std::uint64_t seed{1};
@@ -109,30 +112,37 @@ Result<Gathered> gather(const TrainArguments& a, ml::Task task) {
 }
 
 int train(const TrainArguments& a) {
-  const auto task = ml::task_of(a.task);
-  if (!task) return refuse("train", "--task is nlos_id, los_bias, nlos_bias or bias, not " + a.task);
   std::vector<ml::Method> methods;
   for (const auto& name : a.methods) {
     if (name == "auto") continue;
     const auto method = ml::method_of(name);
-    if (!method) return refuse("train", "unknown --method " + name);
+    if (!method)
+      return refuse("train", unknown_word("--method", name, ml::k_method_words.words()).message + ", auto");
     methods.push_back(*method);
   }
-  const ml::Engine engine = a.engine == "opencv" ? ml::Engine::opencv : ml::Engine::own;
   ml::TrainingSpec asked;
-  asked.task = *task, asked.methods = methods, asked.engine = engine;
+  asked.task = a.task;
+  asked.methods = methods;
+  asked.engine = a.engine;
   if (const auto able = asked.check(); !able) return refuse("train", able.error().message);
-  const auto gathered = gather(a, *task);
+  const auto gathered = gather(a, a.task);
   if (!gathered) return refuse("train", gathered.error().message);
   const auto& [data, report, frozen_test, digest, not_for_live, feature_set] = gathered.value();
 
   ml::TrainingSpec spec;
-  spec.task = *task, spec.features = a.features, spec.folds = a.folds, spec.seed = a.seed;
-  spec.methods = methods, spec.engine = engine;
-  spec.per_placement = a.per_placement, spec.search = a.grid, spec.threads = a.threads;
+  spec.task = *task;
+  spec.features = a.features;
+  spec.folds = a.folds;
+  spec.seed = a.seed;
+  spec.methods = methods;
+  spec.engine = engine;
+  spec.per_placement = a.per_placement;
+  spec.search = a.grid;
+  spec.threads = a.threads;
   spec.held_out = a.held_out.empty() ? frozen_test : a.held_out;
   spec.held_out_share = a.held_out_share;
-  spec.importance = a.importance, spec.selection = a.selection;
+  spec.importance = a.importance;
+  spec.selection = a.selection;
   if (a.max_fpr >= 0) spec.max_fpr = a.max_fpr;
   for (const auto& one : a.tries) {
     const auto read = read_try(one, spec.grid);
@@ -163,7 +173,7 @@ void add_train_command(CLI::App& app, int& exit_code) {
       "train", "Fit a model of line of sight or range bias to a table of labelled rangings");
   auto a = std::make_shared<TrainArguments>();
   add_data_options(*command, a->data);
-  command->add_option("--task", a->task, "nlos_id, los_bias, nlos_bias or bias")->capture_default_str();
+  add_word(*command, "--task", a->task, ml::k_task_words, "What the model learns");
   command
       ->add_option(
           "--method", a->methods,
@@ -171,11 +181,8 @@ void add_train_command(CLI::App& app, int& exit_code) {
           "polynomial, multivariate, least_absolute: the best of them on held-out places")
       ->delimiter(',')
       ->capture_default_str();
-  command
-      ->add_option("--engine", a->engine,
-                   "own (libsvm and our trees) or opencv, which fits svm and random_forest")
-      ->check(CLI::IsMember({"own", "opencv"}))
-      ->capture_default_str();
+  add_word(*command, "--engine", a->engine, ml::k_engine_words,
+           "own (libsvm and our trees) or opencv, which fits svm and random_forest");
   command->add_option("--features", a->features, "Features by name (default: chosen with the method)")
       ->delimiter(',');
   command->add_option("--folds", a->folds, "Folds of whole places")

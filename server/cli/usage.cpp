@@ -32,7 +32,10 @@ std::optional<std::string> nearest(const std::string& word, const std::vector<st
   for (const auto& one : known) {
     const bool begun = word.size() >= 4 && one.starts_with(word);
     const auto d = begun ? 1 : distance(word, one);
-    if (d < least) least = d, best = one;
+    if (d < least) {
+      least = d;
+      best = one;
+    }
   }
   return best;
 }

@@ -140,20 +140,6 @@ std::string Option::env() const {
 
 std::span<const Option> options() { return k_options; }
 
-std::string_view to_string(Origin origin) {
-  switch (origin) {
-    case Origin::standard:
-      return "default";
-    case Origin::file:
-      return "file";
-    case Origin::environment:
-      return "environment";
-    case Origin::flag:
-      return "flag";
-  }
-  return "default";
-}
-
 const std::string& Config::text(std::string_view key) const {
   const auto at = values.find(key);
   ANCHORD_CHECK(at != values.end(), "no setting " << key);

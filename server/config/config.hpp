@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/result.hpp"
 #include "server/http/limits.hpp"
 
@@ -31,7 +32,11 @@ struct Option {
 std::span<const Option> options();
 
 enum class Origin : std::uint8_t { standard, file, environment, flag };
-std::string_view to_string(Origin origin);
+inline constexpr auto k_origin_words = enum_table<Origin>({{"default", Origin::standard},
+                                                           {"file", Origin::file},
+                                                           {"environment", Origin::environment},
+                                                           {"flag", Origin::flag}});
+constexpr std::string_view to_string(Origin origin) { return k_origin_words.word(origin); }
 
 /// Settings as gathered: flags over ANCHORD_* over the file over the defaults.
 struct Config {

@@ -166,16 +166,25 @@ void DroneLink::start() {
 }
 
 void DroneLink::new_flight(double speed_mps) {
-  impl_->command([&](drone::Session& s) { return s.new_flight(speed_mps), 0U; });
+  impl_->command([&](drone::Session& s) {
+    s.new_flight(speed_mps);
+    return 0U;
+  });
 }
 void DroneLink::end_flight() {
-  impl_->command([](drone::Session& s) { return s.end_flight(), 0U; });
+  impl_->command([](drone::Session& s) {
+    s.end_flight();
+    return 0U;
+  });
 }
 std::uint64_t DroneLink::take_off(double above_ground_m) {
   return impl_->command([&](drone::Session& s) { return s.take_off(above_ground_m); });
 }
 void DroneLink::steer(double lat_deg, double lon_deg, double height_m) {
-  impl_->command([&](drone::Session& s) { return s.steer(lat_deg, lon_deg, height_m), 0U; });
+  impl_->command([&](drone::Session& s) {
+    s.steer(lat_deg, lon_deg, height_m);
+    return 0U;
+  });
 }
 std::uint64_t DroneLink::disarm() {
   return impl_->command([](drone::Session& s) { return s.disarm(); });

@@ -33,18 +33,6 @@ constexpr std::array k_single = {std::string_view{"host"},
                                  std::string_view{"if-modified-since"},
                                  std::string_view{"content-range"}};
 
-std::optional<api::Method> method_of(std::string_view word) {
-  using enum api::Method;
-  if (word == "GET") return get;
-  if (word == "HEAD") return head;
-  if (word == "POST") return post;
-  if (word == "PUT") return put;
-  if (word == "PATCH") return patch;
-  if (word == "DELETE") return del;
-  if (word == "OPTIONS") return options;
-  return std::nullopt;
-}
-
 bool plain_value(std::string_view value) {
   return std::ranges::all_of(value, [](char c) {
     const auto u = static_cast<unsigned char>(c);
@@ -199,7 +187,7 @@ bool origin_allowed(std::string_view origin, std::string_view host, const HostPo
 Judgement judge_head(const ParsedHead& head, const HttpLimits& limits, const HostPolicy& policy) {
   JudgedHead good;
   api::Request& request = good.request;
-  const auto method = method_of(head.method);
+  const auto method = api::k_method_words.find(head.method);
   if (!method) return Refusal{501, "not-implemented", "unknown method"};
   request.method = *method;
   if (head.version != 10 && head.version != 11)

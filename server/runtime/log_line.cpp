@@ -4,24 +4,10 @@
 
 namespace anchord::server {
 
-std::string_view log_word(LogLevel level) {
-  switch (level) {
-    case LogLevel::debug:
-      return "debug";
-    case LogLevel::info:
-      return "info";
-    case LogLevel::warning:
-      return "warning";
-    case LogLevel::error:
-      return "error";
-  }
-  return "error";
-}
-
 std::string log_line(UtcTime now, LogLevel level, std::string_view message,
                      std::initializer_list<LogField> fields) {
   std::string line = R"({"ts":")" + to_rfc3339(now) + R"(","level":")";
-  line.append(log_word(level)).append(R"(","msg":)");
+  line.append(k_log_level_words.word(level)).append(R"(","msg":)");
   append_json_text(line, message);
   for (const auto& [key, value] : fields) {
     append_json_text(line += ',', key);

@@ -48,17 +48,14 @@ spdlog::level::level_enum of(LogLevel level) {
 }  // namespace
 
 bool start_logging(std::string_view level) {
-  for (const LogLevel known : {LogLevel::debug, LogLevel::info, LogLevel::warning, LogLevel::error}) {
-    if (level == log_word(known)) {
-      logger().set_level(of(known));
-      on_task_failure([](const TaskFailure& failure) {
-        log(LogLevel::error, "task failed",
-            {{"task", failure.task}, {"what", failure.what}, {"count", std::to_string(failure.count)}});
-      });
-      return true;
-    }
-  }
-  return false;
+  const auto known = k_log_level_words.find(level);
+  if (!known) return false;
+  logger().set_level(of(*known));
+  on_task_failure([](const TaskFailure& failure) {
+    log(LogLevel::error, "task failed",
+        {{"task", failure.task}, {"what", failure.what}, {"count", std::to_string(failure.count)}});
+  });
+  return true;
 }
 
 std::size_t lost_log_lines() { return writer()->overrun_counter(); }

@@ -16,6 +16,7 @@
 #include <stop_token>
 #include <vector>
 
+#include "core/base/errc_words.hpp"
 #include "core/base/guard.hpp"
 #include "core/base/to_wire.hpp"
 #include "server/runtime/frames.hpp"
@@ -115,7 +116,8 @@ int worker_main() {
     try {
       result = api::do_work(message, stop.get_token(), told);
     } catch (const std::bad_alloc&) {
-      message.clear(), message.shrink_to_fit();  // room for the answer
+      message.clear();
+      message.shrink_to_fit();  // room for the answer
       result =
           make_error(Errc::unsupported, "the training needs more memory than the " + allowed_memory() +
                                             " a worker may take: use a data set of means or medians, fewer "
@@ -130,7 +132,7 @@ int worker_main() {
     send({{"op", "done"}, {"result", result.value()}});
   else
     send({{"op", "failed"},
-          {"code", static_cast<int>(result.error().code)},
+          {"code", k_errc_words.word(result.error().code)},
           {"message", result.error().message}});
   std::fflush(stderr);
   _exit(0);  // the listener still waits: nothing else is left to clean

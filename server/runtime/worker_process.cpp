@@ -12,6 +12,8 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "core/base/errc_words.hpp"
+#include "core/base/text.hpp"
 #include "server/runtime/frames.hpp"
 
 extern char** environ;
@@ -115,17 +117,27 @@ Result<pid_t> spawn(const std::filesystem::path& program, int socket) {
   return pid;
 }
 
-void tell(const api::WorkProgressSink& progress, const Json& j) {
-  if (!progress) return;
-  progress({j.value("stage", std::string()), j.value("stage_index", std::size_t{}),
-            j.value("stage_count", std::size_t{}), j.value("fraction", 0.0),
-            j.value("detail", std::string())});
+/// Absent where one of its fields is not what it should be.
+std::optional<api::WorkProgress> progress_of(const Json& j) {
+  const auto text = [&](const char* key) { return j.contains(key) && j[key].is_string(); };
+  const auto count = [&](const char* key) { return j.contains(key) && j[key].is_number_unsigned(); };
+  if (!text("stage") || !text("detail") || !count("stage_index") || !count("stage_count") ||
+      !j.contains("fraction") || !j["fraction"].is_number())
+    return std::nullopt;
+  return api::WorkProgress{j["stage"].get<std::string>(), j["stage_index"].get<std::size_t>(),
+                           j["stage_count"].get<std::size_t>(), j["fraction"].get<double>(),
+                           j["detail"].get<std::string>()};
 }
 
-Errc errc_of(const Json& number) {
-  const bool known =
-      number.is_number_unsigned() && number.get<std::uint64_t>() <= static_cast<unsigned>(Errc::internal);
-  return known ? static_cast<Errc>(number.get<int>()) : Errc::internal;
+Error unreadable(const std::string& what) {
+  return make_error(Errc::internal, "the worker's message cannot be read: " + what);
+}
+
+/// A word that this version does not know is an error of its own: what it meant is not guessed.
+Error failure_of(std::string_view code, std::string message) {
+  const auto known = k_errc_words.parse("code", code);
+  if (!known) return unreadable(known.error().message + "; its text is: " + message);
+  return make_error(known.value(), std::move(message));
 }
 
 Result<std::string> run(const std::filesystem::path& program, const std::string& message,
@@ -167,13 +179,15 @@ Result<std::string> run(const std::filesystem::path& program, const std::string&
     };
     const std::string op = word("op");
     if (op == "progress") {
-      tell(progress, json);
+      const auto told = progress_of(json);
+      if (!told) return unreadable("progress without stage, stage_index, stage_count, fraction, detail");
+      if (progress) progress(*told);
     } else if (op == "done") {
       return word("result");
     } else if (op == "failed") {
-      return make_error(errc_of(json["code"]), word("message"));
+      return failure_of(word("code"), word("message"));
     } else {
-      return make_error(Errc::internal, "the worker's message cannot be read");
+      return unreadable("op \"" + to_utf8(op, 60) + "\" is none of progress, done, failed");
     }
   }
 }

@@ -73,7 +73,7 @@ Calibration read(Connection& c, Query& query) {
   Calibration found;
   const std::int64_t key = query.integer();
   found.id = query.id<CalibrationId>();
-  found.frame = query.as<TrackFrame>();
+  found.frame = query.one_of(k_frame_words);
   found.origin = read_wgs84(query);
   found.settings_json = query.text();
   found.created = query.time();
@@ -94,7 +94,7 @@ std::vector<PublishedPosition> read_positions(Connection& c, Query& query) {
     const std::int64_t key = query.integer();
     position.calibration = query.id<CalibrationId>();
     position.published = query.time();
-    position.frame = query.as<TrackFrame>();
+    position.frame = query.one_of(k_frame_words);
     position.origin = read_wgs84(query);
     auto estimate = read_estimate(c, key, anchor);
     if (!estimate) throw SqlError(Failure::damaged, "a published position without its estimate");

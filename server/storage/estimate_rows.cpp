@@ -81,7 +81,7 @@ Estimate read(Connection& c, std::int64_t key, Query& query) {
   Estimate e;
   e.anchor = query.network_id();
   e.time = query.time();
-  e.verdict = query.as<Verdict>();
+  e.verdict = query.one_of(k_verdict_words);
   e.reason = query.text();
   e.h95_m = query.real();
   e.v95_m = query.real();

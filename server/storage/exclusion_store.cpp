@@ -50,7 +50,7 @@ Exclusion read(Connection& c, Query& query) {
   const std::int64_t key = query.integer();
   e.id = query.id<ExclusionId>();
   e.mission = query.id<MissionId>();
-  e.selection.kind = query.as<RowKind>();
+  e.selection.kind = query.one_of(k_row_kind_words);
   e.selection.since = query.maybe_time();
   e.selection.until = query.maybe_time();
   e.selection.anchor = query.maybe([&] { return query.network_id(); });

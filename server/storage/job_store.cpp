@@ -27,7 +27,7 @@ Job read(Query& query) {
   Job j;
   j.id = query.id<JobId>();
   j.kind = query.text();
-  j.state = query.as<JobState>();
+  j.state = query.one_of(k_job_state_words);
   j.fraction = query.real();
   j.stage = query.text();
   j.detail = query.text();

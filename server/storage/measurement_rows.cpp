@@ -65,7 +65,7 @@ void Table<Range>::bind_identity(Query& query, std::int64_t mission_key, const R
 
 Range Table<Range>::read(Query& query) {
   Range row;
-  row.kind = query.as<RangeKind>();
+  row.kind = query.one_of(k_range_kind_words);
   row.time = query.time();
   row.received = query.maybe_time();
   row.tag = query.network_id();
@@ -113,10 +113,10 @@ Fix Table<Fix>::read(Query& query) {
   row.time = query.time();
   row.received = query.maybe_time();
   row.seq = query.maybe([&] { return query.as<std::uint64_t>(); });
-  row.frame = query.as<TrackFrame>();
+  row.frame = query.one_of(k_frame_words);
   row.position = read_wgs84(query).value_or(Wgs84{});
   for (int axis = 0; axis < 3; ++axis) row.local_m[axis] = query.maybe_real().value_or(0.0);
-  row.fix = query.as<FixClass>();
+  row.fix = query.one_of(k_fix_words);
   if (query.null()) {
     query.skip(6);
   } else {

@@ -336,7 +336,7 @@ class SqlMeasurementStore final : public MeasurementStore {
       while (query.step()) {
         DeviceSeen device;
         device.network_id = query.network_id();
-        device.kind = query.as<DeviceSeen::Kind>();
+        device.kind = query.one_of(k_radio_words);
         device.mission = query.id<MissionId>();
         device.first_seen = query.time();
         device.last_seen = query.time();

@@ -54,7 +54,7 @@ class SqlMissionBin final : public MissionBin {
       found << id;
       if (!found.step()) return make_error(Errc::not_found, "no mission " + to_string(id));
       const std::int64_t key = found.integer();
-      if (found.as<MissionState>() == MissionState::recording)
+      if (found.one_of(k_mission_state_words) == MissionState::recording)
         return make_error(Errc::conflict, "mission " + to_string(id) + " records: finish it first");
       Query used(c, k_calibrations);
       used << key;

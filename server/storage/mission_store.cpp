@@ -75,9 +75,9 @@ Mission read(Connection& connection, Query& query) {
   m.name = query.text();
   m.kit = query.text();
   m.radio = query.text();
-  m.frame = query.as<TrackFrame>();
-  m.point = query.as<TrackPoint>();
-  m.state = query.as<MissionState>();
+  m.frame = query.one_of(k_frame_words);
+  m.point = query.one_of(k_point_words);
+  m.state = query.one_of(k_mission_state_words);
   m.created = query.time();
   m.finished = query.maybe_time();
   Query tags(connection, k_tags);

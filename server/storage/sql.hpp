@@ -7,8 +7,11 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 
+#include "core/base/check.hpp"
+#include "core/base/enum_table.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
 #include "core/base/time.hpp"
@@ -96,17 +99,32 @@ class Query {
     return value;
   }
 
-  Query& operator<<(std::nullopt_t) { return statement_.bind_null(parameter_++), *this; }
-  Query& operator<<(std::int64_t v) { return statement_.bind_integer(parameter_++, v), *this; }
+  Query& operator<<(std::nullopt_t) {
+    statement_.bind_null(parameter_++);
+    return *this;
+  }
+  Query& operator<<(std::int64_t v) {
+    statement_.bind_integer(parameter_++, v);
+    return *this;
+  }
   Query& operator<<(int v) { return *this << std::int64_t{v}; }
   Query& operator<<(bool v) { return *this << std::int64_t{v}; }
   Query& operator<<(std::uint8_t v) { return *this << std::int64_t{v}; }
   Query& operator<<(std::uint64_t v) { return *this << static_cast<std::int64_t>(v); }
-  Query& operator<<(double v) { return statement_.bind_real(parameter_++, v), *this; }
-  Query& operator<<(std::string_view v) { return statement_.bind_text(parameter_++, v), *this; }
+  Query& operator<<(double v) {
+    statement_.bind_real(parameter_++, v);
+    return *this;
+  }
+  Query& operator<<(std::string_view v) {
+    statement_.bind_text(parameter_++, v);
+    return *this;
+  }
   Query& operator<<(const std::string& v) { return *this << std::string_view{v}; }
   Query& operator<<(const char* v) { return *this << std::string_view{v}; }
-  Query& operator<<(std::span<const std::byte> v) { return statement_.bind_blob(parameter_++, v), *this; }
+  Query& operator<<(std::span<const std::byte> v) {
+    statement_.bind_blob(parameter_++, v);
+    return *this;
+  }
   Query& operator<<(UtcTime v) { return *this << v.ns; }
   Query& operator<<(NetworkId v) { return *this << std::int64_t{v.value}; }
   template <class Tag>
@@ -121,7 +139,16 @@ class Query {
   std::int64_t integer() { return statement_.integer(column_++); }
   template <class T>
   T as() {
+    static_assert(!std::is_enum_v<T>, "read an enum with one_of()");
     return static_cast<T>(integer());
+  }
+  /// The value of an enum that is kept as its number.
+  template <class T, std::size_t N>
+  T one_of(const EnumTable<T, N>& table) {
+    const std::int64_t number = integer();
+    const auto value = table.of_number(number);
+    ANCHORD_CHECK(value, "the database has " << number << " where there are " << list_of(table.words()));
+    return *value;
   }
   double real();  ///< NaN for NULL, which is how the database keeps a NaN
   std::string text() { return statement_.text(column_++); }

@@ -197,34 +197,6 @@ Result<std::unique_ptr<SqliteConnection>> open_writer(const StorageOptions& opti
 
 }  // namespace
 
-std::string to_string(StorageLevel level) {
-  switch (level) {
-    case StorageLevel::ok:
-      return "ok";
-    case StorageLevel::disk_low:
-      return "disk_low";
-    case StorageLevel::disk_scarce:
-      return "disk_scarce";
-    case StorageLevel::full:
-      return "full";
-    case StorageLevel::unavailable:
-      return "unavailable";
-  }
-  return "unavailable";
-}
-
-std::string to_string(Synchronous synchronous) {
-  switch (synchronous) {
-    case Synchronous::normal:
-      return "normal";
-    case Synchronous::full:
-      return "full";
-    case Synchronous::extra:
-      return "extra";
-  }
-  return "full";
-}
-
 int newest_schema_version() { return static_cast<int>(sqlite_migrations().size()); }
 
 Result<std::unique_ptr<Database>> open_database(const StorageOptions& options) {

@@ -14,6 +14,8 @@ namespace anchord {
 
 /// What a commit waits for; docs/durability.md says what survives which accident.
 enum class Synchronous : std::uint8_t { normal, full, extra };
+inline constexpr auto k_synchronous_words = enum_table<Synchronous>(
+    {{"normal", Synchronous::normal}, {"full", Synchronous::full}, {"extra", Synchronous::extra}});
 
 struct StorageOptions {
   std::filesystem::path data_dir;              ///< made with mode 0700 when absent
@@ -36,8 +38,14 @@ enum class StorageLevel : std::uint8_t {
   full,         ///< the last write found no space
   unavailable,  ///< the last write failed; reopening is tried
 };
-std::string to_string(StorageLevel level);
-std::string to_string(Synchronous synchronous);
+inline constexpr auto k_storage_level_words =
+    enum_table<StorageLevel>({{"ok", StorageLevel::ok},
+                              {"disk_low", StorageLevel::disk_low},
+                              {"disk_scarce", StorageLevel::disk_scarce},
+                              {"full", StorageLevel::full},
+                              {"unavailable", StorageLevel::unavailable}});
+inline std::string to_string(StorageLevel level) { return std::string(k_storage_level_words.word(level)); }
+inline std::string to_string(Synchronous word) { return std::string(k_synchronous_words.word(word)); }
 
 struct StorageHealth {
   StorageLevel level{StorageLevel::ok};

@@ -1,11 +1,28 @@
-// Each word of a request becomes the value of its name, whatever the order of the enum behind it.
+// Each word of a request becomes the value of its name, whatever the order of the enum behind it; and the
+// words of the contract are those of the tables.
 #include <gtest/gtest.h>
 
+#include <cctype>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
+#include "api/admin/alarm_rules.hpp"
+#include "api/anchors/frame_json.hpp"
 #include "api/calibration/calibration_service.hpp"
 #include "api/kit/contract.hpp"
-#include "api/wire/words.hpp"
+#include "api/kit/message.hpp"
+#include "api/learning/freeze_rows.hpp"
+#include "api/learning/measurement_query.hpp"
+#include "api/learning/model_signer.hpp"
+#include "core/flight/command.hpp"
+#include "core/flight/control_lease.hpp"
+#include "core/ml/recipe.hpp"
+#include "core/planning/local_plan.hpp"
+#include "core/procedure/machine.hpp"
+#include "core/procedure/safety.hpp"
+#include "core/types/exclusion.hpp"
+#include "drivers/device/supervisor.hpp"
 
 namespace anchord::api {
 namespace {
@@ -18,19 +35,6 @@ FlightOptions asked(const char* key, const Json& value) {
   auto request = read_calibration_request(body, errors);
   EXPECT_TRUE(errors.empty()) << key << " " << value << ": " << (errors.empty() ? "" : errors.front().detail);
   return request.options;
-}
-
-/// The words of the table, and back to the value each of them stands for.
-template <class T, std::size_t N>
-Json both_ways(const std::array<Word<T>, N>& table) {
-  Json words = Json::array();
-  for (const auto& row : table) {
-    EXPECT_EQ(word_of(table, row.value), row.word);
-    EXPECT_EQ(value_of(table, row.word), row.value);
-    words.push_back(row.word);
-  }
-  EXPECT_EQ(value_of(table, "another"), std::nullopt);
-  return words;
 }
 
 TEST(CalibrationRequestWords, NameTheSolver) {
@@ -65,15 +69,169 @@ TEST(CalibrationRequestWords, RefuseAnotherWordWithThoseThereAre) {
   EXPECT_EQ(errors.front().detail, "must be one of gauss_newton, levenberg_marquardt, dogleg");
 }
 
-TEST(WireWords, AreThoseOfTheContractAndMeanOneValueEach) {
-  const auto schemas = Json::parse(openapi_json()).at("components").at("schemas");
-  const auto words = [&](const char* schema, const char* property) {
-    return schemas.at(schema).at("properties").at(property).at("enum");
+/// The enums of strings of one contract, by where they are: "Schema.property.property",
+/// "GET /api/v1/ranges ?fix", "?Label" of a parameter that several share.
+void walk(const Json& node, const std::string& at, std::map<std::string, Json>& out) {
+  if (node.is_array()) {
+    for (const auto& one : node) walk(one, at, out);
+    return;
+  }
+  if (!node.is_object()) return;
+  if (const auto words = node.find("enum");
+      words != node.end() && words->is_array() && words->front().is_string())
+    out[at] = *words;
+  for (const auto& [key, value] : node.items()) {
+    if (key == "properties") {
+      for (const auto& [name, property] : value.items()) walk(property, at + "." + name, out);
+    } else if (key == "parameters" && value.is_array()) {
+      for (const auto& one : value) walk(one, at + " ?" + one.value("name", ""), out);
+    } else if (key != "enum" && key != "example" && key != "examples") {
+      walk(value, at, out);
+    }
+  }
+}
+
+std::map<std::string, Json> enums_of_openapi() {
+  std::map<std::string, Json> out;
+  const auto contract = Json::parse(openapi_json());
+  const auto& components = contract.at("components");
+  for (const auto& [name, schema] : components.at("schemas").items()) walk(schema, name, out);
+  for (const auto& [name, one] : components.at("parameters").items()) walk(one, "?" + name, out);
+  for (const auto& [path, methods] : contract.at("paths").items())
+    for (const auto& [method, operation] : methods.items()) {
+      std::string upper(method);
+      for (char& c : upper) c = static_cast<char>(std::toupper(c));
+      walk(operation, upper + " " + path, out);
+    }
+  return out;
+}
+
+std::map<std::string, Json> enums_of_asyncapi() {
+  std::map<std::string, Json> out;
+  const auto contract = Json::parse(asyncapi_json());
+  for (const auto& [name, message] : contract.at("components").at("messages").items())
+    walk(message, name, out);
+  return out;
+}
+
+template <class T, std::size_t N>
+Json words(const EnumTable<T, N>& table) {
+  return std::vector<std::string>(table.words().begin(), table.words().end());
+}
+template <class T, std::size_t N>
+Json words(std::vector<std::string> first, const EnumTable<T, N>& table) {
+  first.insert(first.end(), table.words().begin(), table.words().end());
+  return first;
+}
+template <class T, std::size_t N>
+Json words(const EnumTable<T, N>& table, const char* last) {
+  auto out = words(table);
+  out.push_back(last);
+  return out;
+}
+
+/// Every enum of the contract is the table of the code, or is said here to have none behind it.
+void expect_the_same(const std::map<std::string, Json>& contract, const std::map<std::string, Json>& tables,
+                     const std::set<std::string>& without) {
+  for (const auto& [at, enumerated] : contract) {
+    if (without.contains(at)) continue;
+    const auto table = tables.find(at);
+    if (table == tables.end())
+      ADD_FAILURE() << "enum " << at
+                    << " of the contract: name its table in this test, or say that it has none";
+    else
+      EXPECT_EQ(enumerated, table->second) << at;
+  }
+  for (const auto& [at, table] : tables)
+    EXPECT_TRUE(contract.contains(at)) << at << " is not in the contract";
+  for (const auto& at : without) EXPECT_TRUE(contract.contains(at)) << at << " is not in the contract";
+}
+
+TEST(WireWords, AreThoseOfOpenApi) {
+  const std::map<std::string, Json> tables{
+      {"Exclusion.kind", words(k_row_kind_words)},
+      {"ExclusionRequest.kind", words(k_row_kind_words)},
+      {"FixClass", words(k_fix_words)},
+      {"GET /api/v1/ranges ?fix", words(k_fix_words)},
+      {"ConfiguredDevice.rover.fix", words(k_fix_words)},
+      {"Verdict", words(k_verdict_words)},
+      {"MissionCreate.frame", words(k_frame_words)},
+      {"Mission.frame", words(k_frame_words)},
+      {"Calibration.frame", words(k_frame_words)},
+      {"MissionCreate.track_point", words(k_point_words)},
+      {"Mission.track_point", words(k_point_words)},
+      {"Mission.state", words(k_mission_state_words)},
+      {"MissionAction.action", words({"finish", "take_devices"}, flight::k_flight_action_words)},
+      {"MissionAction.mode", words(flight::k_flight_mode_words)},
+      {"Procedure.mode", words(flight::k_flight_mode_words)},
+      {"Procedure.status", words(flight::k_flight_status_words)},
+      {"Procedure.step", words(procedure::k_step_words)},
+      {"Procedure.alarm.reaction", words(procedure::k_reaction_words)},
+      {"FlightCommand.state", words(k_command_state_words)},
+      {"ControlAction.action", words(flight::k_control_words)},
+      {"Grid.rule", words(planning::k_rule_words)},
+      {"PlanSettings.rule", words(planning::k_rule_words)},
+      {"Grid.combine", words(planning::k_combine_words)},
+      {"PlanSettings.combine", words(planning::k_combine_words)},
+      {"PlanIssue.severity", words(planning::k_severity_words)},
+      {"RangeIn.kind", words(k_range_kind_words)},
+      {"HeardRadio.kind", words(k_radio_words)},
+      {"ConfiguredDevice.state", words({"off"}, device::k_phase_words)},
+      {"Alarm.priority", words(k_alarm_priority_words)},
+      {"Job.state", words(k_job_state_words)},
+      {"TrainingRun.state", words(k_job_state_words)},
+      {"Space", words(k_space_words)},
+      {"ErrorBudget.largest", words(k_error_source_words)},
+      {"ErrorBudget.help", words(k_budget_help_words)},
+      {"CalibrationCreate.solver", words(k_solver_words)},
+      {"CalibrationCreate.weights", words(k_weights_words)},
+      {"CalibrationCreate.loss.type", words(k_loss_words)},
+      {"CalibrationCreate.initial", words(k_initial_words)},
+      {"CalibrationCreate.profile", words(k_profile_words)},
+      {"CalibrationCreate.models.correction", words(ml::k_correction_words)},
+      {"CalibrationCreate.models.likelihood", words(k_likelihood_words)},
+      {"CalibrationCreate.models.worth", words(k_worth_words)},
+      {"Predict.correction", words(ml::k_correction_words)},
+      {"ActiveModels.correction", words(ml::k_correction_words)},
+      {"ActiveModelsPatch.correction", words(ml::k_correction_words)},
+      {"ModelStanding", words(k_standing_words)},
+      {"LearningTask", words(ml::k_task_words)},
+      {"TrainingRunCreate.engine", words(ml::k_engine_words)},
+      {"TrainingRunCreate.cv.group_by", words(k_place_words, "session")},
+      {"GET /api/v1/datasets/{id}/rules ?group_by", words(k_place_words)},
+      {"DatasetCreate.aggregation", words(k_aggregation_words)},
+      {"PredictedClass.class", words(k_predicted_words)},
+      {"?PredictedClass", words(k_predicted_words)},
+      {"?Label", words(k_label_words)},
+      {"TokenCreate.roles", words(k_role_words)},
   };
-  EXPECT_EQ(both_ways(k_fix_words), schemas.at("FixClass").at("enum"));
-  EXPECT_EQ(both_ways(k_frame_words), words("MissionCreate", "frame"));
-  EXPECT_EQ(both_ways(k_point_words), words("MissionCreate", "track_point"));
-  EXPECT_EQ(both_ways(k_range_kind_words), words("RangeIn", "kind"));
+  const std::set<std::string> without{
+      // formats, orders and counts of one route
+      "?Sort", "GET /api/v1/ranges ?format", "GET /api/v1/ranges ?count", "GET /api/v1/fixes ?format",
+      "GET /api/v1/ranges/{id}/cir ?format", "GET /api/v1/plans/{id}/export ?format",
+      "GET /api/v1/anchors ?view", "GET /api/v1/anchors ?format",
+      "GET /api/v1/campaigns/{id}/samples ?format", "GET /api/v1/campaigns/{id}/samples/{sample}/cir ?format",
+      "GET /api/v1/datasets/{id}/rows ?format",
+      // texts that are chosen where they are written
+      "FlightUpload.what", "UploadRequest.what", "Checklist.items.state", "FlightAircraft.others.kind",
+      "DeviceWrite.kind", "SiteWrite.crs.base.source", "ModelGate.checks.basis", "PositionDiff.items.change",
+      "DatasetCreate.split.by", "DatasetRules.positive", "DatasetRow.split",
+      "TrainingRunCreate.select.metric", "TrainingConfusion.positive", "TrainingPrediction.split",
+      "GET /api/v1/training-runs/{id}/predictions ?split", "Event.level", "Me.auth", "System.clock.source"};
+  expect_the_same(enums_of_openapi(), tables, without);
+}
+
+TEST(WireWords, AreThoseOfAsyncApi) {
+  const std::map<std::string, Json> tables{
+      {"topic.mission_grid.rule", words(planning::k_rule_words)},
+      {"topic.mission_grid.combine", words(planning::k_combine_words)},
+      {"topic.procedure.mode", words(flight::k_flight_mode_words)},
+      {"topic.procedure.status", words(flight::k_flight_status_words)},
+      {"topic.procedure.step", words(procedure::k_step_words)},
+      {"topic.procedure.alarm.reaction", words(procedure::k_reaction_words)},
+      {"topic.procedure.commands.state", words(k_command_state_words)},
+  };
+  expect_the_same(enums_of_asyncapi(), tables, {"sub.topic"});
 }
 
 }  // namespace

@@ -29,6 +29,12 @@ class WorkerProcess : public testing::Test {
     ::chmod(program.c_str(), 0755);
     return work_in_process(program)(message, {}, [] { return false; });
   }
+  /// The worker sends one frame, 4 bytes of length and a text, over the socket that is its input.
+  Result<std::string> says(const std::string& text) const {
+    char size[20];
+    std::snprintf(size, sizeof size, "\\%03o\\000\\000\\000", static_cast<unsigned>(text.size()));
+    return run("printf '" + std::string(size) + text + "' >&0; sleep 1", "{}");
+  }
 
   std::filesystem::path dir_;
 };
@@ -81,21 +87,32 @@ TEST_F(WorkerProcess, RunsOutOfMemoryWithTheLimitInTheMessageInsteadOfAFaultWith
 }
 
 TEST_F(WorkerProcess, AWorkerThatAnswersNonsenseIsAFailureAndNeverOurs) {
-  // Frames of 4 bytes of length and a text, over the socket that is its input.
-  const auto says = [&](const std::string& text) {
-    char size[20];
-    std::snprintf(size, sizeof size, "\\%03o\\000\\000\\000", static_cast<unsigned>(text.size()));
-    return run("printf '" + std::string(size) + text + "' >&0; sleep 1", "{}");
-  };
-  for (const char* text : {"no JSON", "[]", R"({"op":7})", R"({"op":"failed","code":"x","message":3})",
-                           R"({"op":"failed","code":99999})", R"({"op":"failed","code":-1})"}) {
+  for (const char* text :
+       {"no JSON", "[]", R"({"op":7})", R"({"op":"failed","code":"x","message":3})",
+        R"({"op":"failed","code":99999})", R"({"op":"failed","code":-1})", R"({"op":"progress","stage":7})",
+        R"({"op":"progress","fraction":"half"})", R"({"op":"progress","stage_index":-1})"}) {
     const auto result = says(text);
     ASSERT_FALSE(result) << text;
     EXPECT_EQ(result.error().code, Errc::internal) << text;
+    EXPECT_NE(result.error().message.find("cannot be read"), std::string::npos) << result.error().message;
   }
-  const auto known = says(R"({"op":"failed","code":7,"message":"m"})");
+}
+
+TEST_F(WorkerProcess, TakesTheCodeOfAnErrorByItsWordAndGuessesNone) {
+  const auto known = says(R"({"op":"failed","code":"conflict","message":"m"})");
   ASSERT_FALSE(known);
-  EXPECT_EQ(known.error().code, static_cast<Errc>(7));
+  EXPECT_EQ(known.error().code, Errc::conflict);
+  EXPECT_EQ(known.error().message, "m");
+  // The number that conflict has in this version may be another error in the worker's.
+  for (const char* text :
+       {R"({"op":"failed","code":6,"message":"m"})", R"({"op":"failed","code":"out_of_luck","message":"m"})",
+        R"({"op":"failed","message":"m"})"}) {
+    const auto unknown = says(text);
+    ASSERT_FALSE(unknown) << text;
+    EXPECT_EQ(unknown.error().code, Errc::internal) << text;
+    EXPECT_NE(unknown.error().message.find("m"), std::string::npos) << unknown.error().message;
+    EXPECT_NE(unknown.error().message.find("unknown code"), std::string::npos) << unknown.error().message;
+  }
 }
 
 }  // namespace anchord::server

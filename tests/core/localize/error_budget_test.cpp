@@ -131,7 +131,7 @@ ErrorSource largest(const FlightSolution& solution) {
   }
   std::string shares;
   for (std::size_t i = 0; i < k_error_sources; ++i)
-    shares += std::string(source_word(static_cast<ErrorSource>(i))) + ' ' +
+    shares += std::string(k_error_source_words.word(static_cast<ErrorSource>(i))) + ' ' +
               std::to_string(all.share(static_cast<ErrorSource>(i))) + "  ";
   std::printf("%s\n", shares.c_str());
   return all.largest();

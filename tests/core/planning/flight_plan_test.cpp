@@ -113,8 +113,8 @@ TEST(FlightPlan, IsTheSameEveryTime) {
 TEST(Design, AddingAndRemovingAPointLeavesNoTrace) {
   const std::vector<Vector3d> anchors{{5, 5, 2}, {20, 10, 2}};
   FlightPlanOptions options;
-  for (const auto criterion : {Criterion::a_optimal, Criterion::d_optimal}) {
-    options.criterion = criterion;
+  for (const auto rule : {Rule::a_optimal, Rule::d_optimal}) {
+    options.rule = rule;
     Design design(anchors, options);
     for (const auto& p : {Vector3d(-4, 0, 2), Vector3d(35, 0, 10), Vector3d(10, 25, 5), Vector3d(0, 25, 8)})
       design.add(p);

@@ -155,7 +155,9 @@ class Home {
     }
     for (const auto& line : flight_.take_log()) written += line.code + ' ' + line.text + '\n';
     const auto& f = flight_.flight();
-    if (f) written += f->status() + ' ' + f->control.engine().state().reason + '\n';
+    if (f)
+      written += std::string(flight::k_flight_status_words.word(f->status())) + ' ' +
+                 f->control.engine().state().reason + '\n';
     steps.insert(f ? std::string(procedure::to_string(f->control.engine().state().step)) : "none");
   }
   std::string written;
