@@ -9,7 +9,7 @@
 namespace anchord {
 
 /// Which measurements a person took out of use, and took back. Rows of their own: measurements are
-/// append-only. Callable from any thread; errors as in store.hpp.
+/// append-only. Callable from any thread; errors as in measurement_store.hpp.
 class ExclusionStore {
  public:
   virtual ~ExclusionStore() = default;

@@ -10,8 +10,6 @@
 
 #include "api/application.hpp"
 #include "api/stream/hub.hpp"
-#include "core/ports/access_store.hpp"
-#include "core/ports/token_store.hpp"
 #include "drivers/drone/signing_key.hpp"
 #include "drivers/link/address.hpp"
 #include "server/app/front_door.hpp"

@@ -4,8 +4,6 @@
 #include "api/admin/access.hpp"
 #include "api/measurements/flight_requests.hpp"
 #include "core/base/text.hpp"
-#include "core/ports/access_store.hpp"
-#include "core/ports/token_store.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/server_address.hpp"
 #include "server/http/http_client.hpp"
