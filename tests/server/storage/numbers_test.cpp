@@ -5,7 +5,13 @@
 #include <map>
 #include <string>
 
+#include "core/ports/job_store.hpp"
+#include "core/ports/measurement_store.hpp"
+#include "core/types/estimate.hpp"
 #include "core/types/exclusion.hpp"
+#include "core/types/fix.hpp"
+#include "core/types/mission.hpp"
+#include "core/types/range.hpp"
 
 namespace anchord {
 namespace {
