@@ -88,7 +88,7 @@ struct Application::State {
                   .judge_needs_cir = [this] { return models.active()->needs_cir; },
                   .site_outline = deps.site_outline,
                   .track = deps.track,
-                  .kept_clues = [this](const MissionId& id) { return clues_of_flight(id); }}),
+                  .kept_priors = [this](const MissionId& id) { return priors_of_flight(id); }}),
         flights({.missions = missions,
                  .plans = stores.plans,
                  .hub = hub,
@@ -117,7 +117,7 @@ struct Application::State {
                       .clock = deps.clock,
                       .profiles = profiles,
                       .models = models,
-                      .flight_clues = [this](const MissionId& id) { return clues_of_flight(id); },
+                      .flight_priors = [this](const MissionId& id) { return priors_of_flight(id); },
                       .frames = stores.frames,
                       .exclusions = stores.exclusions,
                       .track = deps.track,
@@ -231,12 +231,12 @@ struct Application::State {
   void sign_models_of_before();
 
   /// What turns and height searches of a mission's flight told, as kept with it.
-  procedure::FlightClues clues_of_flight(const MissionId& id) const {
+  procedure::FlightPriors priors_of_flight(const MissionId& id) const {
     const auto kept = stores.plans.procedures();
     if (!kept) return {};
     for (const auto& [mission, text] : kept.value()) {
       const auto j = nlohmann::json::parse(text, nullptr, false);
-      if (mission == id && j.is_object()) return clues_of(j.value("clues", nlohmann::json()));
+      if (mission == id && j.is_object()) return priors_of(j.value("clues", nlohmann::json()));
     }
     return {};
   }

@@ -53,7 +53,7 @@ class Application {
     BuildInfo build{};
     Drone* drone{nullptr};    ///< null: flights are flown by hand
     AccuracyGoal goal{};      ///< how well a live anchor must be known to count as converged
-    bool site_outline{true};  ///< a site's outline is a clue for the anchors of its flights
+    bool site_outline{true};  ///< a site's outline is a prior for the anchors of its flights
     TrackLimits track{};      ///< what the positions of a flight are held against
     std::string geoid_dir{};  ///< empty: where GeographicLib looks
     std::function<StorageStatus()> storage_status = [] { return StorageStatus{}; };

@@ -38,11 +38,11 @@ Json accuracy_on_globe(const FrameFit& fit, const Estimate& estimate) {
   if (!covariance || !covariance->allFinite()) return nullptr;
   const auto& c = *covariance;
   const ErrorEllipse ellipse = error_ellipse(c);
-  // A height with a twin claims more than its covariance; so does the place on the globe.
-  const double twin_m = std::max(estimate.v95_m - error_ellipse(local.covariance_m2).v95_m, 0.0);
+  // A height with a mirror solution claims more than its covariance; so does the place on the globe.
+  const double mirror_m = std::max(estimate.v95_m - error_ellipse(local.covariance_m2).v95_m, 0.0);
   return {{"cov_enu_m2", {c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)}},
           {"h95_m", ellipse.h95_m},
-          {"v95_m", ellipse.v95_m + twin_m}};
+          {"v95_m", ellipse.v95_m + mirror_m}};
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 
 #include "api/calibration/calibration_service.hpp"
 #include "api/calibration/check_points_json.hpp"
-#include "api/calibration/clues_json.hpp"
+#include "api/calibration/priors_json.hpp"
 #include "api/formats/flight_json.hpp"
 #include "api/kit/reader.hpp"
 #include "core/base/to_wire.hpp"
@@ -21,7 +21,7 @@ constexpr double k_far_m = 20'000;  // of the origin, as for the track
 void read_initial(Fields& fields, const Json& initial, FlightOptions& options,
                   std::vector<FieldError>& errors) {
   if (initial.is_string()) {
-    options.start_at_clues = fields.word("initial", k_initial_words).value_or(false);
+    options.start_at_priors = fields.word("initial", k_initial_words).value_or(false);
     return;
   }
   if (!initial.is_object() || initial.size() > 1000)
@@ -103,11 +103,11 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
     inner.finish();
   }
   if (const Json* initial = fields.child("initial")) read_initial(fields, *initial, options, errors);
-  if (const Json* clues = fields.child("clues")) read_clues(*clues, "/clues", options, errors);
+  if (const Json* priors = fields.child("clues")) read_priors(*priors, "/clues", options, errors);
   if (const Json* models = fields.child("models")) out.models = read_flight_models(*models, errors);
   // Kept with the settings and asked once everything is solved: no data.
   if (const Json* points = fields.child("check_points")) (void)read_check_points(*points, errors);
-  out.flight_clues = fields.boolean("flight_clues").value_or(true);
+  out.flight_priors = fields.boolean("flight_clues").value_or(true);
   out.compare_uncorrected = fields.boolean("compare_uncorrected").value_or(true);
   // Who names a loss wants it: the likelihood of the models then takes its place only where asked for.
   out.likelihood = out.models.likelihood.value_or(!fields.has("loss"));

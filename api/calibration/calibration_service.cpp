@@ -67,7 +67,7 @@ struct CalibrationService::Solved {
   std::vector<KitProfile> learned;
   Json profiles = Json::array();
   Evidence evidence;
-  std::size_t n_clues{0};                  ///< anchors with a bearing or a height as a prior
+  std::size_t n_priors{0};                 ///< anchors with a bearing or a height as a prior
   std::vector<FlightModelsReport> models;  ///< what they did to each flight
 
   std::vector<std::size_t> of_kit(const std::string& kit) const {
@@ -293,13 +293,13 @@ Result<void> CalibrationService::solve_kit(const CalibrationRequest& request, co
     // Factors of a profile are told apart by this name.
     named.back().mission.name = KitProfiles::flight_key(solved.flights[i].mission);
   }
-  if (request.flight_clues && options.origin) {
-    procedure::FlightClues told;
+  if (request.flight_priors && options.origin) {
+    procedure::FlightPriors told;
     for (const std::size_t i : members)
-      told = procedure::merged(std::move(told), deps_.flight_clues(solved.flights[i].mission.id));
+      told = procedure::merged(std::move(told), deps_.flight_priors(solved.flights[i].mission.id));
     // What the request says of an anchor stands; the flights fill in the rest.
-    of_kit.clues.merge(procedure::clues_in(told, EnuFrame(*options.origin)));
-    solved.n_clues += of_kit.clues.size();
+    of_kit.priors.merge(procedure::priors_in(told, EnuFrame(*options.origin)));
+    solved.n_priors += of_kit.priors.size();
   }
   std::vector<const FlightData*> pointers;
   for (const auto& flight : named) pointers.push_back(&flight);
@@ -401,7 +401,7 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
           std::ranges::any_of(solved.models, [](const auto& m) { return m.used && m.n_corrected > 0; });
       if (!corrected) wanted.use_profile = request.use_profile;
       solved.profiles = Json::array();
-      solved.n_clues = 0;
+      solved.n_priors = 0;
       solved.evidence.course.clear();
       BOOST_OUTCOME_TRYV(solve_kits(wanted, options, solved));
     }
@@ -453,7 +453,7 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
       {"base", std::move(base)},
       {"budgets", std::move(budgets)},
       {"check_points", checked(request, out)},
-      {"n_clues", solved.n_clues},
+      {"n_clues", solved.n_priors},
       {"frame", frame ? frame_provenance(*frame, out) : Json(nullptr)},
       {"clues", {{"outline", outline}}},
       {"sigma_m", noise_provenance(request, solved.models)},

@@ -16,7 +16,7 @@
 #include "core/ports/measurement_store.hpp"
 #include "core/ports/mission_store.hpp"
 #include "core/ports/site_store.hpp"
-#include "core/procedure/flight_clues.hpp"
+#include "core/procedure/flight_priors.hpp"
 #include "core/types/anchor.hpp"
 #include "core/types/flight_data.hpp"
 
@@ -47,12 +47,12 @@ struct CalibrationRequest {
   bool use_profile{true};     ///< the kit's stored profile tells the prior, and learns from these flights
   int iterations{0};          ///< growing parts of each flight solved too, for the report's curves
   FlightModelsWish models{};  ///< what corrects the ranges before anything is solved
-  bool flight_clues{true};    ///< bearings and heights that the flights found are priors
+  bool flight_priors{true};   ///< bearings and heights that the flights found are priors
   StatedNoise noise{};        ///< sigma_m
   bool likelihood{true};      ///< of the models, where they have one
   bool compare_uncorrected{true};  ///< the positions without the models are kept beside
   bool use_anchor_anchor{true};    ///< ranges between anchors take part
-  bool site_outline{true};         ///< the outline of the missions' site is a clue, where none is given
+  bool site_outline{true};         ///< the outline of the missions' site is a prior, where none is given
   std::string frame;               ///< name or id of the local frame the answers are told in too
 };
 
@@ -78,7 +78,7 @@ class CalibrationService {
     KitProfiles& profiles;
     const ModelRegistry& models;
     /// What turns and height searches of a mission's flight told; absent: nothing.
-    std::function<procedure::FlightClues(const MissionId&)> flight_clues;
+    std::function<procedure::FlightPriors(const MissionId&)> flight_priors;
     FrameStore& frames;
     ExclusionStore& exclusions;
     TrackLimits track{};                 ///< what positions are held against where the request does not say

@@ -30,7 +30,7 @@ nlohmann::ordered_json document_of(const flight::ActiveFlight& f) {
           {"origin", {o.lat_deg, o.lon_deg, o.height_m}},
           {"home_m", {f.home_m.x(), f.home_m.y(), f.home_m.z()}},
           {"state", stored_state(f.control.engine().state())},
-          {"clues", stored_clues(f.clues())}};
+          {"clues", stored_priors(f.priors())}};
 }
 
 /// Nothing where the document is of another shape.
@@ -51,7 +51,7 @@ std::optional<flight::KeptFlight> kept_flight(const MissionId& mission, const nl
   out.home_m = {j["home_m"][0].get<double>(), j["home_m"][1].get<double>(), j["home_m"][2].get<double>()};
   out.manual = j.value("manual", false);
   out.aircraft = aircraft_of(j.value("aircraft", nlohmann::json()));
-  out.clues = clues_of(j.value("clues", nlohmann::json()));
+  out.priors = priors_of(j.value("clues", nlohmann::json()));
   return out;
 }
 
@@ -66,7 +66,7 @@ bool FlightService::State::to_keep(Work& w, std::string& text) {
   text.clear();
   if (f->flying()) {
     text = to_wire(document_of(*f));
-  } else if (const auto found = stored_clues(f->clues()); !found.empty()) {
+  } else if (const auto found = stored_priors(f->priors()); !found.empty()) {
     // What turns and height searches found outlives the flight: every calibration of it asks for it.
     text = to_wire(nlohmann::ordered_json{{"landed", true}, {"clues", found}});
   }
@@ -89,8 +89,8 @@ void FlightService::State::recover() {
     auto j = nlohmann::json::parse(text, nullptr, false);
     if (j.is_object() && j.value("landed", false)) continue;
     deps.missions.prepare(mission);
-    deps.missions.tell_clues(
-        mission, j.is_object() ? clues_of(j.value("clues", nlohmann::json())) : procedure::FlightClues{});
+    deps.missions.tell_priors(
+        mission, j.is_object() ? priors_of(j.value("clues", nlohmann::json())) : procedure::FlightPriors{});
     flying.emplace_back(mission, std::move(j));
   }
   auto w = work.lock();

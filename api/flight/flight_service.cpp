@@ -122,7 +122,7 @@ void FlightService::step() {
   if (live && live->origin) estimates = {*live->origin, std::move(live->estimates)};
   std::string keep;
   bool keeps = false;
-  std::optional<procedure::FlightClues> clues;
+  std::optional<procedure::FlightPriors> priors;
   bool due_apart = false;
   {
     auto w = s.work.lock();
@@ -138,16 +138,16 @@ void FlightService::step() {
       mission = f->mission;  // one that began meanwhile too
       if (w->last.flight != w->operations.n_flights()) w->last = {.flight = w->operations.n_flights()};
       keeps = State::to_keep(*w, keep);
-      if (const auto version = f->control.engine().clues_version(); w->last.clues_passed != version) {
-        w->last.clues_passed = version;
-        clues = f->clues();
+      if (const auto version = f->control.engine().priors_version(); w->last.priors_passed != version) {
+        w->last.priors_passed = version;
+        priors = f->priors();
       }
     }
     s.publish(*w);
     due_apart = State::apart_is_due(*w);
   }
   if (due_apart) s.deps.plan.post([&s] { s.work_apart(); });
-  if (clues && mission) s.deps.missions.tell_clues(*mission, std::move(*clues));
+  if (priors && mission) s.deps.missions.tell_priors(*mission, std::move(*priors));
   if (keeps && mission) s.keep(*mission, std::move(keep));
   s.changed.notify_all();
 }

@@ -112,7 +112,7 @@ class FlightService final : public MissionObserver, public MissionControl {
   Result<void> override_item(const MissionId& mission, const std::string& item, const std::string& reason,
                              const Principal& who);
 
-  /// Bodies of the topics and of their GET twins; empty: this mission has no flight.
+  /// Bodies of the topics and of their GET counterparts; empty: this mission has no flight.
   std::string procedure_text(const MissionId& mission);
   std::string grid_text(const MissionId& mission);
   std::vector<std::string> turn_texts(const MissionId& mission);

@@ -1,4 +1,4 @@
-// What of a flight is shown: the topics of the procedure, and their GET twins.
+// What of a flight is shown: the topics of the procedure, and their GET counterparts.
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -25,18 +25,18 @@ GridView grid_of(const flight::ActiveFlight& f, std::int64_t t_us) {
 /// Of every anchor, copied: of hundreds they are long to write.
 struct Profiles {
   MissionId mission;
-  std::map<NetworkId, procedure::Clues> clues;
+  std::map<NetworkId, procedure::Priors> priors;
   procedure::Step step;
   std::int64_t t_us;
 
   using Each = std::function<void(NetworkId, const nlohmann::ordered_json&)>;
   void turns(const Each& each) const {
-    for (const auto& [anchor, one] : clues)
+    for (const auto& [anchor, one] : priors)
       if (!one.turn.empty())
         each(anchor, turn_json(mission, anchor, t_us, one, step == procedure::Step::turn));
   }
   void heights(const Each& each) const {
-    for (const auto& [anchor, one] : clues)
+    for (const auto& [anchor, one] : priors)
       if (!one.heights.empty())
         each(anchor, height_json(mission, anchor, t_us, one, step == procedure::Step::height_search));
   }
@@ -44,7 +44,7 @@ struct Profiles {
 
 Profiles profiles_of(const flight::ActiveFlight& f, std::int64_t t_us) {
   const auto& engine = f.control.engine();
-  return {f.mission, engine.clues(), engine.state().step, t_us};
+  return {f.mission, engine.priors(), engine.state().step, t_us};
 }
 
 template <class State>

@@ -32,7 +32,7 @@ struct FlightService::State {
   };
   /// What of the present flight was kept, shown and told; each flight begins anew.
   struct Last {
-    std::uint64_t flight{0}, kept{~0ULL}, shown{~0ULL}, clues_passed{0};
+    std::uint64_t flight{0}, kept{~0ULL}, shown{~0ULL}, priors_passed{0};
     double shown_s{-10}, profiles_s{-10};
   };
   /// What rounds, requests and measurements share. No disk, no estimate and nothing long while it is held.

@@ -30,10 +30,10 @@ Ordered place(const Eigen::Vector3d& enu_m, const EnuFrame& frame) {
 Ordered anchors_json(const procedure::FlightEngine& engine) {
   Ordered out = Ordered::array();
   for (const auto& a : engine.state().anchors) {
-    const auto clues = engine.clues().find(a.id);
-    const bool known = clues != engine.clues().end();
-    const auto bearing = known ? clues->second.bearing : std::nullopt;
-    const auto height = known ? clues->second.height : std::nullopt;
+    const auto priors = engine.priors().find(a.id);
+    const bool known = priors != engine.priors().end();
+    const auto bearing = known ? priors->second.bearing : std::nullopt;
+    const auto height = known ? priors->second.height : std::nullopt;
     out.push_back({{"network_id", to_string(a.id)},
                    {"done", a.done},
                    {"reached", a.reached},
@@ -180,10 +180,10 @@ Ordered grid_json(const GridView& v) {
 }
 
 Ordered turn_json(const MissionId& mission, NetworkId anchor, std::int64_t t_us,
-                  const procedure::Clues& clues, bool running) {
+                  const procedure::Priors& priors, bool running) {
   Ordered samples = Ordered::array();
-  for (const auto& s : clues.turn) samples.push_back({degrees(s.heading_rad), s.rss_dbm});
-  const auto& b = clues.bearing;
+  for (const auto& s : priors.turn) samples.push_back({degrees(s.heading_rad), s.rss_dbm});
+  const auto& b = priors.bearing;
   return {{"mission", to_string(mission)},
           {"anchor", to_string(anchor)},
           {"t_us", t_us},
@@ -195,10 +195,10 @@ Ordered turn_json(const MissionId& mission, NetworkId anchor, std::int64_t t_us,
 }
 
 Ordered height_json(const MissionId& mission, NetworkId anchor, std::int64_t t_us,
-                    const procedure::Clues& clues, bool running) {
+                    const procedure::Priors& priors, bool running) {
   Ordered samples = Ordered::array();
-  for (const auto& s : clues.heights) samples.push_back({s.height_m, s.rss_dbm});
-  const auto& h = clues.height;
+  for (const auto& s : priors.heights) samples.push_back({s.height_m, s.rss_dbm});
+  const auto& h = priors.height;
   return {{"mission", to_string(mission)},
           {"anchor", to_string(anchor)},
           {"t_us", t_us},
@@ -296,39 +296,39 @@ std::optional<procedure::State> state_of(const nlohmann::json& j) {
   }
 }
 
-nlohmann::ordered_json stored_clues(const procedure::FlightClues& clues) {
+nlohmann::ordered_json stored_priors(const procedure::FlightPriors& priors) {
   const auto at = [](const Wgs84& p) { return Ordered{p.lat_deg, p.lon_deg, p.height_m}; };
   Ordered out = Ordered::object();
-  for (const auto& [anchor, clue] : clues) {
+  for (const auto& [anchor, prior] : priors) {
     Ordered one = Ordered::object();
-    if (const auto& b = clue.bearing)
+    if (const auto& b = prior.bearing)
       one["bearing"] = {{"from", at(b->from)}, {"rad", b->bearing_rad}, {"sigma_rad", b->sigma_rad}};
-    if (const auto& h = clue.height) one["height"] = {{"at", at(h->at)}, {"sigma_m", h->sigma_m}};
+    if (const auto& h = prior.height) one["height"] = {{"at", at(h->at)}, {"sigma_m", h->sigma_m}};
     out[to_string(anchor)] = std::move(one);
   }
   return out;
 }
 
-procedure::FlightClues clues_of(const nlohmann::json& j) {
+procedure::FlightPriors priors_of(const nlohmann::json& j) {
   const auto place = [](const nlohmann::json& v) {
     return Wgs84{v.at(0).get<double>(), v.at(1).get<double>(), v.at(2).get<double>()};
   };
-  procedure::FlightClues out;
+  procedure::FlightPriors out;
   if (!j.is_object()) return out;
   for (const auto& [text, one] : j.items()) {
     const auto anchor = parse_network_id(text);
     if (!anchor) continue;
     try {
-      procedure::FlightClue clue;
+      procedure::FlightPrior prior;
       if (one.contains("bearing")) {
         const auto& b = one.at("bearing");
-        clue.bearing = {place(b.at("from")), b.at("rad").get<double>(), b.at("sigma_rad").get<double>()};
+        prior.bearing = {place(b.at("from")), b.at("rad").get<double>(), b.at("sigma_rad").get<double>()};
       }
       if (one.contains("height")) {
         const auto& h = one.at("height");
-        clue.height = {place(h.at("at")), h.at("sigma_m").get<double>()};
+        prior.height = {place(h.at("at")), h.at("sigma_m").get<double>()};
       }
-      out[anchor.value()] = clue;
+      out[anchor.value()] = prior;
     } catch (const nlohmann::json::exception&) {
       continue;
     }

@@ -11,8 +11,8 @@
 #include "core/geo/enu.hpp"
 #include "core/planning/local_plan.hpp"
 #include "core/ports/drone.hpp"
-#include "core/procedure/flight_clues.hpp"
 #include "core/procedure/flight_engine.hpp"
+#include "core/procedure/flight_priors.hpp"
 
 namespace anchord::api {
 
@@ -59,16 +59,16 @@ struct GridView {
 nlohmann::ordered_json grid_json(const GridView& view);
 /// Topics mission.turn and mission.height of one anchor.
 nlohmann::ordered_json turn_json(const MissionId& mission, NetworkId anchor, std::int64_t t_us,
-                                 const procedure::Clues& clues, bool running);
+                                 const procedure::Priors& priors, bool running);
 nlohmann::ordered_json height_json(const MissionId& mission, NetworkId anchor, std::int64_t t_us,
-                                   const procedure::Clues& clues, bool running);
+                                   const procedure::Priors& priors, bool running);
 
 /// The machine's state as it is kept, and back. errors: a document of another shape gives nothing.
 nlohmann::ordered_json stored_state(const procedure::State& state);
 std::optional<procedure::State> state_of(const nlohmann::json& json);
 
-/// Clues as they are kept with the mission, and back; entries of another shape are left out.
-nlohmann::ordered_json stored_clues(const procedure::FlightClues& clues);
-procedure::FlightClues clues_of(const nlohmann::json& json);
+/// Priors as they are kept with the mission, and back; entries of another shape are left out.
+nlohmann::ordered_json stored_priors(const procedure::FlightPriors& priors);
+procedure::FlightPriors priors_of(const nlohmann::json& json);
 
 }  // namespace anchord::api

@@ -17,11 +17,11 @@ using Ordered = nlohmann::ordered_json;
 constexpr double k_least_range_m = 0.05;
 
 /// Stated noise is a Gaussian of its own: no tail beside it.
-void state(const StatedNoise& noise, RangeBelief& belief) {
-  if (noise.los_m) belief.los_sigma_m = *noise.los_m;
+void state(const StatedNoise& noise, RangeErrorModel& error_model) {
+  if (noise.los_m) error_model.los_sigma_m = *noise.los_m;
   if (!noise.nlos_m) return;
-  belief.nlos_sigma_m = *noise.nlos_m;
-  belief.nlos_tail_m = 0;
+  error_model.nlos_sigma_m = *noise.nlos_m;
+  error_model.nlos_tail_m = 0;
 }
 
 }  // namespace
@@ -63,7 +63,7 @@ FlightModelsReport correct_flight(const ModelRegistry::Active& models, FlightDat
                                   const StatedNoise& noise) {
   FlightModelsReport out;
   double sum = 0;
-  std::vector<std::optional<RangeBelief>> beliefs(flight.ranges.size());
+  std::vector<std::optional<RangeErrorModel>> error_models(flight.ranges.size());
   for (std::size_t i = 0; i < flight.ranges.size(); ++i) {
     Range& range = flight.ranges[i];
     if (range.kind != RangeKind::tag_anchor || !(range.distance_m > k_least_range_m)) continue;
@@ -76,16 +76,17 @@ FlightModelsReport correct_flight(const ModelRegistry::Active& models, FlightDat
       continue;
     }
     if (judged.verdict.los) ++(*judged.verdict.los ? out.n_los : out.n_nlos);
-    std::optional<RangeBelief> belief = belief_of(judged.verdict, models.correction);
-    if (noise.nlos_m && !belief && judged.verdict.p_los) belief = RangeBelief{*judged.verdict.p_los};
-    if (belief && likelihood) {
-      state(noise, *belief);
-      beliefs[i] = belief;
+    std::optional<RangeErrorModel> error_model = error_model_of(judged.verdict, models.correction);
+    if (noise.nlos_m && !error_model && judged.verdict.p_los)
+      error_model = RangeErrorModel{*judged.verdict.p_los};
+    if (error_model && likelihood) {
+      state(noise, *error_model);
+      error_models[i] = error_model;
     }
     if (!judged.verdict.bias_m) continue;
     const double corrected_m = range.distance_m - *judged.verdict.bias_m;
     if (!(corrected_m > k_least_range_m)) {
-      beliefs[i].reset();  // it is of the corrected range
+      error_models[i].reset();  // it is of the corrected range
       continue;
     }
     sum += *judged.verdict.bias_m;
@@ -94,8 +95,8 @@ FlightModelsReport correct_flight(const ModelRegistry::Active& models, FlightDat
   }
   if (out.n_corrected > 0) out.mean_correction_m = sum / static_cast<double>(out.n_corrected);
   out.n_believed = static_cast<std::size_t>(
-      std::ranges::count_if(beliefs, [](const auto& belief) { return belief.has_value(); }));
-  if (out.n_believed > 0) flight.beliefs = std::move(beliefs);
+      std::ranges::count_if(error_models, [](const auto& error_model) { return error_model.has_value(); }));
+  if (out.n_believed > 0) flight.error_models = std::move(error_models);
   return out;
 }
 

@@ -48,8 +48,9 @@ struct FlightModelsReport {
 };
 /// Takes the models' corrections off the ranges of `flight` (a copy of the record, never the record), and
 /// tells the solver what the models believe of the error that is left.
-/// likelihood  false: no beliefs; the solver's loss alone weighs the ranges
-/// noise       stated sigmas replace those of the beliefs; with nlos_m a class alone makes a belief too
+/// likelihood  false: no error models; the solver's loss alone weighs the ranges
+/// noise       stated sigmas replace those of the error models; with nlos_m a class alone makes an error
+/// model too
 FlightModelsReport correct_flight(const ModelRegistry::Active& models, FlightData& flight,
                                   bool likelihood = true, const StatedNoise& noise = {});
 

@@ -174,7 +174,7 @@ std::optional<RangeModel> judge_range(const ModelRegistry::Active& active, const
                     verdict.bias_m,
                     verdict.sigma_m,
                     verdict.outside_training,
-                    belief_of(verdict, active.correction),
+                    error_model_of(verdict, active.correction),
                     models_of(active, verdict)};
 }
 
@@ -187,13 +187,13 @@ RangeModels models_of(const ModelRegistry::Active& active, const ml::RangeVerdic
           spoke(ml::Task::bias)};
 }
 
-std::optional<RangeBelief> belief_of(const ml::RangeVerdict& verdict, ml::Correction how) {
+std::optional<RangeErrorModel> error_model_of(const ml::RangeVerdict& verdict, ml::Correction how) {
   if (!verdict.likelihood || !verdict.bias_m || verdict.outside_training || how != ml::Correction::weighted)
     return std::nullopt;
   const ml::RangeLikelihood& l = *verdict.likelihood;
-  return RangeBelief{l.p_los,        l.los_m - *verdict.bias_m,
-                     l.los_sigma_m,  l.nlos_m - *verdict.bias_m,
-                     l.nlos_sigma_m, l.nlos_excess_m};
+  return RangeErrorModel{l.p_los,        l.los_m - *verdict.bias_m,
+                         l.los_sigma_m,  l.nlos_m - *verdict.bias_m,
+                         l.nlos_sigma_m, l.nlos_excess_m};
 }
 
 }  // namespace anchord::api

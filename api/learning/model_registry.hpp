@@ -62,7 +62,7 @@ RangeModels models_of(const ModelRegistry::Active& active, const ml::RangeVerdic
 /// The same as a likelihood, of the error that is left once the correction is taken off. Nothing without a
 /// class and both biases, outside of what was trained (its density says nothing there), or where the
 /// corrections "hard" and "none" ask for the range as it is.
-std::optional<RangeBelief> belief_of(const ml::RangeVerdict& verdict, ml::Correction how);
+std::optional<RangeErrorModel> error_model_of(const ml::RangeVerdict& verdict, ml::Correction how);
 
 /// Promotions of this "task" say which correction is in use, in their reason.
 inline constexpr std::string_view k_correction_task = "correction";

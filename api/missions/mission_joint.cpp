@@ -72,23 +72,23 @@ void MissionService::State::finish_joint(Flight& flight, const FlightSolution* s
   flight.dirty = true;
 }
 
-void MissionService::tell_clues(const MissionId& id, procedure::FlightClues clues) {
+void MissionService::tell_priors(const MissionId& id, procedure::FlightPriors priors) {
   const auto flight = state_->find(id);
   if (!flight) return;
   {
     auto inbox = flight->inbox.lock();
-    inbox->new_clues = std::move(clues);
+    inbox->new_priors = std::move(priors);
   }
   state_->schedule(flight);
 }
 
-void MissionService::State::take_clues(Flight& flight, Flight::Work& work) {
-  std::optional<procedure::FlightClues> clues;
+void MissionService::State::take_priors(Flight& flight, Flight::Work& work) {
+  std::optional<procedure::FlightPriors> priors;
   {
     auto inbox = flight.inbox.lock();
-    clues = std::exchange(inbox->new_clues, std::nullopt);
+    priors = std::exchange(inbox->new_priors, std::nullopt);
   }
-  if (clues) work.live.use_clues(*std::move(clues));
+  if (priors) work.live.use_priors(*std::move(priors));
 }
 
 }  // namespace anchord::api

@@ -138,7 +138,7 @@ void MissionService::State::work(Flight& flight) {
     for (auto it = rows.rbegin(); it != rows.rend(); ++it) inbox->queue.push_front(std::move(*it));
     return;
   }
-  take_clues(flight, *work);
+  take_priors(flight, *work);
   std::size_t since_announced = 0;
   for (const auto& row : rows) {
     if (!work->rebuilt.empty() && std::ranges::binary_search(work->rebuilt, flight::identity(row))) continue;

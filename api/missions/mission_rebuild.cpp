@@ -10,7 +10,7 @@ flight::LiveMissionSetup MissionService::State::setup_of(const Mission& mission)
   setup.live.track = deps.track;
   setup.goal = deps.goal;
   setup.exclusions = exclusions_of(mission.id);
-  setup.clues = deps.kept_clues(mission.id);
+  setup.priors = deps.kept_priors(mission.id);
   if (mission.site && mission.frame == TrackFrame::wgs84) {
     if (const auto site = deps.sites.site(*mission.site)) setup.live.origin = site.value().origin;
   }
@@ -98,7 +98,7 @@ bool MissionService::State::rebuild_slice(Flight& flight) {
   }
   work->rebuild.reset();
   std::ranges::sort(work->rebuilt);
-  take_clues(flight, *work);
+  take_priors(flight, *work);
   work->live.end_reading();
   return false;
 }

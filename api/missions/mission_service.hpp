@@ -17,7 +17,7 @@
 #include "core/base/time.hpp"
 #include "core/geo/track_segments.hpp"
 #include "core/localize/accuracy_goal.hpp"
-#include "core/procedure/flight_clues.hpp"
+#include "core/procedure/flight_priors.hpp"
 #include "core/types/estimate.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/mission.hpp"
@@ -68,10 +68,10 @@ class MissionService {
     /// What the promoted models say of a range; nothing while none is promoted.
     std::function<std::optional<RangeModel>(const Range&)> judge;
     std::function<bool()> judge_needs_cir;
-    bool site_outline{true};  ///< joint solutions take the site's outline as a clue: anchors are inside
+    bool site_outline{true};  ///< joint solutions take the site's outline as a prior: anchors are inside
     TrackLimits track{};      ///< what the positions of a flight are held against
     /// What turns and height searches of a mission's flight told, as kept with it.
-    std::function<procedure::FlightClues(const MissionId&)> kept_clues;
+    std::function<procedure::FlightPriors(const MissionId&)> kept_priors;
   };
   /// Missions kept in memory although nothing of them is in the air: finished, or silent for k_silent_s. The
   /// others of these are evicted, least recently used first; the store has all of them.
@@ -112,7 +112,7 @@ class MissionService {
 
   /// What the turns and height searches of its flight told of its anchors: priors of every running estimate
   /// from now on. Never waits.
-  void tell_clues(const MissionId& id, procedure::FlightClues clues);
+  void tell_priors(const MissionId& id, procedure::FlightPriors priors);
 
   struct LiveView {
     Mission mission;

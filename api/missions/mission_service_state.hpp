@@ -40,7 +40,7 @@ struct MissionService::Flight {
     Mission mission;
     std::deque<flight::LiveRow> queue;
     flight::RowsAhead ahead{k_max_queued_rows};
-    std::optional<procedure::FlightClues> new_clues;
+    std::optional<procedure::FlightPriors> new_priors;
     bool view_wanted{false};  ///< by one who does not wait: made as soon as the strand is at rest
     std::optional<LiveView> view;
     SteadyTime view_made{};
@@ -53,7 +53,7 @@ struct MissionService::Flight {
     bool gone{false};
     std::optional<SteadyTime> fix_arrival{}, range_arrival{};
     /// Something is still to be done, rows that are read back apart.
-    bool busy() const { return scheduled || closing || new_clues || !queue.empty(); }
+    bool busy() const { return scheduled || closing || new_priors || !queue.empty(); }
   };
   Locked<Inbox> inbox;
 
@@ -173,7 +173,7 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   void finish_joint(Flight& flight, const FlightSolution* solution, UtcTime cut,
                     std::chrono::steady_clock::duration took, std::uint64_t generation);
   void publish_devices();
-  static void take_clues(Flight& flight, Flight::Work& work);
+  static void take_priors(Flight& flight, Flight::Work& work);
   LiveView view(Flight& flight, const Flight::Work& work) const;
   static Mission mission_of(Flight& flight) {
     const auto inbox = flight.inbox.lock();

@@ -264,11 +264,11 @@ std::string live_estimate_json(const MissionId& mission, const Estimate& estimat
       .optional(estimate.best ? std::optional(estimate.best->probability) : std::nullopt, 3);
   out.key("mirror");
   if (estimate.mirror) {
-    Object twin;
-    twin.key("enu_m").vector(estimate.mirror->position.m, 4);
-    place(twin, estimate.mirror->wgs84);
-    twin.key("probability").number(estimate.mirror->probability, 3);
-    out.raw(twin.take());
+    Object mirror;
+    mirror.key("enu_m").vector(estimate.mirror->position.m, 4);
+    place(mirror, estimate.mirror->wgs84);
+    mirror.key("probability").number(estimate.mirror->probability, 3);
+    out.raw(mirror.take());
   } else {
     out.raw("null");
   }

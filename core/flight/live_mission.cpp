@@ -52,7 +52,7 @@ void LiveMission::add(const JudgedRange& judged) {
   state_.range_rate_hz = span_s > 0 ? static_cast<double>(range_times_us_.size() - 1) / span_s : 0;
   watch_.note_range(range.time);
   if (excluded(setup_.exclusions, range)) return live_.leave_out(range);
-  history_.add(corrected(judged), belief_of(judged));
+  history_.add(corrected(judged), error_model_of(judged));
   ++ranges_since_joint_;
   live_.add(range, judged.model);
 }
@@ -78,9 +78,9 @@ void LiveMission::show_pose() {
   if (auto pose = live_.pose()) events_.emplace_back(PoseMoved{*std::move(pose)});
 }
 
-void LiveMission::use_clues(procedure::FlightClues clues) {
-  setup_.clues = std::move(clues);
-  clues_in_use_ = false;
+void LiveMission::use_priors(procedure::FlightPriors priors) {
+  setup_.priors = std::move(priors);
+  priors_in_use_ = false;
   if (history_.n_ranges() > 0) ++ranges_since_joint_;  // worth another joint solution
   tell_live();
 }
@@ -88,9 +88,9 @@ void LiveMission::use_clues(procedure::FlightClues clues) {
 /// Before the first good fix there is no frame to give them in.
 void LiveMission::tell_live() {
   const auto origin = live_.origin();
-  if (clues_in_use_ || !origin) return;
-  live_.tell(clues_in(setup_.clues, EnuFrame(*origin)));
-  clues_in_use_ = true;
+  if (priors_in_use_ || !origin) return;
+  live_.tell(priors_in(setup_.priors, EnuFrame(*origin)));
+  priors_in_use_ = true;
 }
 
 void LiveMission::settle() {
@@ -129,7 +129,7 @@ void LiveMission::announce_fixes() {
   const auto origin = live_.origin();
   const auto& before = state_.origin;
   if (before && origin && EnuFrame(*before).enu_from_wgs84(*origin).m.norm() > k_same_origin_m) {
-    clues_in_use_ = false;
+    priors_in_use_ = false;
     if (!reading_) events_.emplace_back(OriginMoved{});
   }
   state_.origin = origin;
@@ -154,7 +154,7 @@ void LiveMission::begin_anew(std::vector<Exclusion> exclusions) {
   live_ = LiveFlight(setup_.mission, setup_.live);
   history_.clear();
   rejections_published_.clear();
-  clues_in_use_ = false;
+  priors_in_use_ = false;
   ranges_since_joint_ = 0;
   range_times_us_.clear();
   const UtcTime newest = state_.time;
@@ -170,7 +170,8 @@ bool LiveMission::joint_is_worth_it() const {
 LiveMission::JointProblem LiveMission::joint_problem(std::vector<Eigen::Vector2d> outline_m) {
   JointProblem out;
   out.options.origin = live_.origin();
-  if (const auto& origin = out.options.origin) out.options.clues = clues_in(setup_.clues, EnuFrame(*origin));
+  if (const auto& origin = out.options.origin)
+    out.options.priors = priors_in(setup_.priors, EnuFrame(*origin));
   out.options.outline_m = std::move(outline_m);
   out.options.track = setup_.live.track;
   out.flight = history_.data(setup_.mission);

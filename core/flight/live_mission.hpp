@@ -18,7 +18,7 @@
 #include "core/localize/flight_history.hpp"
 #include "core/localize/flight_options.hpp"
 #include "core/localize/live_flight.hpp"
-#include "core/procedure/flight_clues.hpp"
+#include "core/procedure/flight_priors.hpp"
 #include "core/types/exclusion.hpp"
 #include "core/types/flight_data.hpp"
 #include "core/types/mission.hpp"
@@ -34,7 +34,7 @@ struct LiveMissionSetup {
   LiveOptions live{};
   AccuracyGoal goal{};  ///< an anchor within it is converged
   std::vector<Exclusion> exclusions{};
-  procedure::FlightClues clues{};  ///< what turns and height searches found before
+  procedure::FlightPriors priors{};  ///< what turns and height searches found before
 };
 
 /// How a mission stands, in numbers.
@@ -61,7 +61,7 @@ class LiveMission {
   /// One row, judged by the models when it came.
   void add(const LiveRow& row);
   /// What turns and height searches found, from the next solve on; waits for the first good fix.
-  void use_clues(procedure::FlightClues clues);
+  void use_priors(procedure::FlightPriors priors);
   /// The rows of a batch are in: decided ranges and changed estimates become events.
   void settle();
   /// Where the drone is, published again.
@@ -83,7 +83,7 @@ class LiveMission {
     UtcTime cut{};               ///< measured time of the newest row in it
     std::uint64_t generation{};  ///< of begin_anew()
   };
-  /// Rows or clues came since the last problem, and there are enough for it.
+  /// Rows or priors came since the last problem, and there are enough for it.
   bool joint_is_worth_it() const;
   /// Where joint_is_worth_it(). `outline_m`: of the site in metres of origin(), empty where it has none.
   JointProblem joint_problem(std::vector<Eigen::Vector2d> outline_m);
@@ -114,7 +114,7 @@ class LiveMission {
   FlightHistory history_;
   FlightWatch watch_;
   std::uint64_t generation_{0};
-  bool reading_{false}, clues_in_use_{false};
+  bool reading_{false}, priors_in_use_{false};
   std::map<std::string, std::size_t> rejections_published_;
   std::map<NetworkId, std::string_view> statuses_;
   std::int64_t last_pose_us_{0}, last_fix_us_{0};

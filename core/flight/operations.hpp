@@ -19,8 +19,8 @@
 #include "core/geo/enu.hpp"
 #include "core/planning/local_plan.hpp"
 #include "core/ports/drone.hpp"
-#include "core/procedure/flight_clues.hpp"
 #include "core/procedure/flight_control.hpp"
+#include "core/procedure/flight_priors.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/mission.hpp"
 #include "core/types/plan.hpp"
@@ -64,8 +64,8 @@ struct ActiveFlight {
   /// Why the work is over; empty while it goes on.
   std::string ended() const;
   /// What is known of the anchors' sides: of before a restart, and of the engine since.
-  procedure::FlightClues clues() const {
-    return procedure::merged(clues_before, procedure::flight_clues(control.engine().clues(), frame));
+  procedure::FlightPriors priors() const {
+    return procedure::merged(priors_before, procedure::flight_priors(control.engine().priors(), frame));
   }
 
   MissionId mission;
@@ -75,7 +75,7 @@ struct ActiveFlight {
   EnuFrame frame;          ///< of the plan, its ground at height 0
   Eigen::Vector3d home_m;
   procedure::FlightControl control;
-  procedure::FlightClues clues_before;
+  procedure::FlightPriors priors_before;
   std::string aborted;  ///< who gave the aircraft back to the pilot; empty: nobody
   double aborted_s{0};
   std::optional<planning::FlightTime> forecast{};
@@ -91,7 +91,7 @@ struct KeptFlight {
   bool manual{false};
   Eigen::Vector3d home_m{0, 0, 0};
   procedure::State state;
-  procedure::FlightClues clues;
+  procedure::FlightPriors priors;
   DroneIdentity aircraft;  ///< system 0: not said
 };
 

@@ -258,7 +258,7 @@ Result<void> Operations::recover(const Now& now, KeptFlight kept) {
       kept.mission, std::move(kept.plan), manual, frame, kept.home_m,
       procedure::FlightControl(std::move(setup), frame, manual ? nullptr : drone_, kept.state, now.s));
   ++n_flights_;
-  flight_->clues_before = std::move(kept.clues);
+  flight_->priors_before = std::move(kept.priors);
   if (const auto check = planning::check_plan(flight_->plan)) flight_->forecast = check.value().time;
   // Not heard yet: whether the hold leaves is decided by the mode that the first heartbeat shows.
   take_happenings(*flight_);

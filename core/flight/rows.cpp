@@ -52,10 +52,10 @@ Range corrected(const JudgedRange& judged) {
   return out;
 }
 
-std::optional<RangeBelief> belief_of(const JudgedRange& judged) {
-  if (!judged.model || !judged.model->belief) return std::nullopt;
+std::optional<RangeErrorModel> error_model_of(const JudgedRange& judged) {
+  if (!judged.model || !judged.model->error_model) return std::nullopt;
   const bool taken = judged.range.distance_m - judged.model->bias_m.value_or(0) > k_least_range_m;
-  return taken ? judged.model->belief : std::nullopt;
+  return taken ? judged.model->error_model : std::nullopt;
 }
 
 }  // namespace anchord::flight

@@ -72,6 +72,6 @@ class RowsAhead {
 /// As a solution of the whole flight takes it: less the bias a model sees, unless nothing would be left.
 Range corrected(const JudgedRange& judged);
 /// What its model believes of the error that is left; nothing where corrected() took nothing off.
-std::optional<RangeBelief> belief_of(const JudgedRange& judged);
+std::optional<RangeErrorModel> error_model_of(const JudgedRange& judged);
 
 }  // namespace anchord::flight

@@ -86,8 +86,8 @@ TagTrack::TagTrack(std::span<const Fix> fixes, const std::optional<EnuFrame>& fr
     return a.t_s != b.t_s ? a.t_s < b.t_s
                           : a.fix > b.fix;  // the better of two at one instant comes first and stays
   });
-  const auto twins = std::ranges::unique(poses_, {}, &TrackPose::t_s);
-  poses_.erase(twins.begin(), twins.end());
+  const auto mirrors = std::ranges::unique(poses_, {}, &TrackPose::t_s);
+  poses_.erase(mirrors.begin(), mirrors.end());
   has_attitude_ = !poses_.empty() &&
                   std::ranges::all_of(poses_, [](const TrackPose& p) { return p.attitude.has_value(); });
   missed_ = InterpolationError(good_enough(poses_, min_fix_));

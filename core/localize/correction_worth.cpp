@@ -9,7 +9,7 @@
 #include <tuple>
 #include <vector>
 
-#include "core/localize/belief_likelihood.hpp"
+#include "core/localize/error_model_likelihood.hpp"
 
 namespace anchord {
 namespace {
@@ -44,7 +44,7 @@ double ln_t(double error_m, double scale_m) {
 
 struct Both {
   double raw_m{}, corrected_m{};
-  std::optional<RangeBelief> belief{};
+  std::optional<RangeErrorModel> error_model{};
   std::int64_t t_ns{};
 };
 
@@ -58,8 +58,9 @@ void add_blocks(const std::vector<Both>& rows, double block_s, std::vector<doubl
   const double raw_scale_m = t_scale(raw_m), corrected_scale_m = t_scale(corrected_m);
   std::map<std::int64_t, std::pair<double, std::size_t>> blocks;
   for (const Both& row : rows) {
-    const double with = row.belief ? std::log(belief_value(*row.belief, row.corrected_m, 0.0).density_per_m)
-                                   : ln_t(row.corrected_m, corrected_scale_m);
+    const double with =
+        row.error_model ? std::log(error_model_value(*row.error_model, row.corrected_m, 0.0).density_per_m)
+                        : ln_t(row.corrected_m, corrected_scale_m);
     const double gain = with - ln_t(row.raw_m, raw_scale_m);
     auto& [total, n] = blocks[std::llround(static_cast<double>(row.t_ns) * 1e-9 / block_s)];
     total += gain;
@@ -82,11 +83,12 @@ std::string CorrectionWorth::text() const {
 
 CorrectionWorth correction_worth(const FlightSolution& raw, const FlightSolution& corrected,
                                  const FlightData& corrected_flight, double block_s) {
-  std::map<std::pair<NetworkId, Key>, RangeBelief> beliefs;
-  for (std::size_t i = 0; i < corrected_flight.beliefs.size(); ++i) {
+  std::map<std::pair<NetworkId, Key>, RangeErrorModel> error_models;
+  for (std::size_t i = 0; i < corrected_flight.error_models.size(); ++i) {
     const Range& range = corrected_flight.ranges[i];
-    if (corrected_flight.beliefs[i])
-      beliefs[{range.anchor, {range.time.ns, range.tag, range.antenna}}] = *corrected_flight.beliefs[i];
+    if (corrected_flight.error_models[i])
+      error_models[{range.anchor, {range.time.ns, range.tag, range.antenna}}] =
+          *corrected_flight.error_models[i];
   }
   const auto key = [](const RangeResidual& r) { return Key{r.time.ns, r.tag, r.antenna}; };
   CorrectionWorth worth;
@@ -103,8 +105,8 @@ CorrectionWorth correction_worth(const FlightSolution& raw, const FlightSolution
       const auto at = raw_m.find(key(r));
       if (at == raw_m.end()) continue;
       Both both{at->second, r.residual_m, std::nullopt, r.time.ns};
-      const auto belief = beliefs.find({anchor.estimate.anchor, key(r)});
-      if (belief != beliefs.end()) both.belief = belief->second;
+      const auto error_model = error_models.find({anchor.estimate.anchor, key(r)});
+      if (error_model != error_models.end()) both.error_model = error_model->second;
       rows.push_back(both);
     }
     if (rows.empty()) continue;

@@ -17,10 +17,10 @@ struct CorrectionWorth {
 
 /// Compares the residuals of two solutions of one flight, range by range.
 ///
-/// A range with a belief counts the density its belief gives the error that is left, any other Student's t
-/// with three degrees of freedom, its scale that of the anchor's residuals by maximum likelihood, on either
-/// side. Errors stay alike for seconds: the mean of each anchor over `block_s` counts as one. Corrections
-/// that every range has alike gain nothing here: the solver's own bias does the same.
+/// A range with an error model counts the density its error model gives the error that is left, any other
+/// Student's t with three degrees of freedom, its scale that of the anchor's residuals by maximum likelihood,
+/// on either side. Errors stay alike for seconds: the mean of each anchor over `block_s` counts as one.
+/// Corrections that every range has alike gain nothing here: the solver's own bias does the same.
 ///
 /// raw, corrected  solutions of the flight without and with; corrected_flight: what the latter was made of
 /// returns         not shown where fewer than 8 blocks have residuals in both

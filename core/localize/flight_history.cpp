@@ -14,19 +14,19 @@ void halve(std::vector<Row>& rows) {
 
 }  // namespace
 
-void FlightHistory::add(const Range& range, const std::optional<RangeBelief>& belief) {
+void FlightHistory::add(const Range& range, const std::optional<RangeErrorModel>& error_model) {
   if (ranges_seen_++ % range_stride_ != 0) return;
   if (ranges_.empty()) ranges_.reserve(k_max_ranges);  // growing by doubling needs three times as much
   newest_ = ranges_.empty() ? range.time : std::max(newest_, range.time);
   ranges_.push_back(range);
   ranges_.back().cir.reset();
-  if (belief || !beliefs_.empty()) {
-    beliefs_.resize(ranges_.size());
-    beliefs_.back() = belief;
+  if (error_model || !error_models_.empty()) {
+    error_models_.resize(ranges_.size());
+    error_models_.back() = error_model;
   }
   if (ranges_.size() < k_max_ranges) return;
   halve(ranges_);
-  halve(beliefs_);
+  halve(error_models_);
   range_stride_ *= 2;
 }
 
@@ -44,7 +44,7 @@ FlightData FlightHistory::data(const Mission& mission) const {
   flight.mission = mission;
   flight.fixes = fixes_;
   flight.ranges = ranges_;
-  flight.beliefs = beliefs_;
+  flight.error_models = error_models_;
   return flight;
 }
 

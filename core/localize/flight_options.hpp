@@ -10,7 +10,7 @@
 #include "core/base/result.hpp"
 #include "core/geo/track_segments.hpp"
 #include "core/localize/kit_profile.hpp"
-#include "core/localize/side_clues.hpp"
+#include "core/localize/side_priors.hpp"
 #include "core/localize/solver_options.hpp"
 #include "core/types/fix.hpp"
 
@@ -30,7 +30,7 @@ struct FlightOptions {
   /// Dims two only: height of all anchors, ellipsoidal where the track is global, else z of its local frame;
   /// absent: mean height of the track.
   std::optional<double> anchor_height_m{};
-  /// Dims three: about where all anchors are that have no height among their clues, such as the poles they
+  /// Dims three: about where all anchors are that have no height among their priors, such as the poles they
   /// stand on; same reference.
   struct HeightPrior {
     double height_m{}, sigma_m{1.0};
@@ -64,14 +64,14 @@ struct FlightOptions {
   double correlation_s{k_error_correlation_s};  ///< tempers the likelihood
   double floor_sigma_m{0.04};                   ///< per axis: frame, lever arm; no residual shows it
 
-  std::map<NetworkId, AnchorClues> clues{};  ///< which side an anchor is on, beside its ranges
+  std::map<NetworkId, AnchorPriors> priors{};  ///< which side an anchor is on, beside its ranges
   std::vector<Eigen::Vector2d>
       outline_m{};              ///< of the building, in the frame of the answers: anchors are inside
   double outline_sigma_m{1.0};  ///< of that; walls are thick and outlines drawn by hand
   std::map<NetworkId, Eigen::Vector3d>
-      starts{};                ///< where to begin, in place of the search; the prior knows nothing of it
-  bool start_at_clues{false};  ///< begin where bearing and height of the clues meet, where both are known
-  std::optional<double> level_sigma_db{};  ///< of RSS about the turn profile; absent: RSS is no clue
+      starts{};                 ///< where to begin, in place of the search; the prior knows nothing of it
+  bool start_at_priors{false};  ///< begin where bearing and height of the priors meet, where both are known
+  std::optional<double> level_sigma_db{};  ///< of RSS about the turn profile; absent: RSS is no prior
 
   std::optional<Wgs84> origin{};  ///< of the ENU answers; absent: the middle of the positions believed
   std::optional<KitProfile> profile{};

@@ -116,7 +116,8 @@ Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& op
     }
     if (why.empty()) {
       anchor.rows.push_back({seconds_between(epoch, range.time), range.distance_m, *arm, range.tag,
-                             range.antenna, i < flight.beliefs.size() ? flight.beliefs[i] : std::nullopt,
+                             range.antenna,
+                             i < flight.error_models.size() ? flight.error_models[i] : std::nullopt,
                              range.rss_dbm ? range.rss_dbm : range.rx_dbm});
     } else {
       ++anchor.refused[why];

@@ -18,7 +18,7 @@ struct JointRow {
   Eigen::Vector3d lever_arm_body_m{0, 0, 0};
   NetworkId tag{};
   std::uint8_t antenna{0};
-  std::optional<RangeBelief> belief{};
+  std::optional<RangeErrorModel> error_model{};
   std::optional<double> rss_dbm{};
   std::optional<int> arm{};  ///< its antenna among those with a vertical arm of their own; absent: the common
 };

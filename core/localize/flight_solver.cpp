@@ -43,7 +43,7 @@ FlightOptions in_frame_of(const FlightRows& rows, FlightOptions options) {
   if (options.anchor_height_m) *options.anchor_height_m -= origin_m;
   if (!options.height_prior) return options;
   for (const AnchorRows& anchor : rows.anchors) {
-    auto& height = options.clues[anchor.id].height;
+    auto& height = options.priors[anchor.id].height;
     if (!height) height = {options.height_prior->height_m - origin_m, options.height_prior->sigma_m};
   }
   return options;
@@ -141,7 +141,7 @@ std::size_t n_believed(const FlightRows& flight) {
   std::size_t n = 0;
   for (const AnchorRows& anchor : flight.anchors) {
     n += static_cast<std::size_t>(
-        std::ranges::count_if(anchor.rows, [](const JointRow& row) { return row.belief.has_value(); }));
+        std::ranges::count_if(anchor.rows, [](const JointRow& row) { return row.error_model.has_value(); }));
   }
   return n;
 }

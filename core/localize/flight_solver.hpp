@@ -44,7 +44,7 @@ struct GeometryMeasures {
   Eigen::Vector3d track_sd_m{0, 0, 0};  ///< standard deviations along the principal axes, ascending
   double median_range_m{};
   double line_ratio{};   ///< L2/D; small: the track is a line seen from the anchor
-  double plane_ratio{};  ///< L1/D; small: the track is a plane, the anchor has a mirror twin
+  double plane_ratio{};  ///< L1/D; small: the track is a plane, the anchor has a mirror solution
   double sigma_ratio{};  ///< largest horizontal semi-axis (1 sigma) over D
 };
 

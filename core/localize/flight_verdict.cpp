@@ -19,16 +19,16 @@ namespace {
 constexpr std::size_t k_min_used = 10;  // below, no scale can be told from the residuals
 constexpr double k_sigma_ratio = 0.08;  // sH/D above: undetermined (seen 0.083 and up; 0.078 passes)
 constexpr double k_sigma_ratio_marginal = 0.05;
-constexpr double k_twin_distance_m = 0.4;
+constexpr double k_mirror_distance_m = 0.4;
 constexpr double k_decided_odds = 1.0 / 99.0;  // beyond 99 % one place is the answer
-constexpr double k_twin_cost = 4.6;            // tempered: ln 99
+constexpr double k_mirror_cost = 4.6;          // tempered: ln 99
 
-/// What the clues hold against a place; differences are log odds.
-class Clues {
+/// What the priors hold against a place; differences are log odds.
+class Priors {
  public:
-  Clues(const FlightRows& flight, const JointFit& fit, std::size_t index, const FlightOptions& options)
+  Priors(const FlightRows& flight, const JointFit& fit, std::size_t index, const FlightOptions& options)
       : options_(options),
-        clues_(clues_of(flight.anchors[index].id, options)),
+        priors_(priors_of(flight.anchors[index].id, options)),
         levels_(levels_of(flight, flight.anchors[index], fit.state.shared, options)) {
     // As for ranges: so many levels in a correlation time say the same thing.
     const AnchorBlock& block = fit.normal.anchors[index];
@@ -37,18 +37,18 @@ class Clues {
           1.0, block.kappa * static_cast<double>(levels_.size()) / static_cast<double>(block.n_in_track));
   }
   double cost(const Eigen::Vector3d& place_m) const {
-    const double told = clue_cost(clues_, options_.outline_m, options_.outline_sigma_m, place_m);
+    const double told = prior_cost(priors_, options_.outline_m, options_.outline_sigma_m, place_m);
     return told + (levels_.empty() ? 0.0 : level_cost(levels_, place_m, *options_.level_sigma_db) / alike_);
   }
 
  private:
   const FlightOptions& options_;
-  AnchorClues clues_;
+  AnchorPriors priors_;
   std::vector<LevelSample> levels_;
   double alike_{1};
 };
 
-struct Twin {
+struct Mirror {
   AnchorMinimum fit;
   double worse{};  ///< tempered cost above the solution's
   double horizontal_m{};
@@ -61,8 +61,8 @@ std::string text(const char* format, double a, double b, double c) {
 }
 
 /// Other places that fit about as well, best first.
-std::vector<Twin> twins_of(const FlightRows& flight, const JointFit& fit, std::size_t index,
-                           const TrackShape& shape, const Clues& clues, const FlightOptions& options) {
+std::vector<Mirror> mirrors_of(const FlightRows& flight, const JointFit& fit, std::size_t index,
+                               const TrackShape& shape, const Priors& priors, const FlightOptions& options) {
   const AnchorBlock& block = fit.normal.anchors[index];
   const Eigen::Vector3d solution = fit.state.anchors[index].position_m;
   const auto rows = observations_of(flight, flight.anchors[index], fit.state.shared, 400, block.scale_m);
@@ -87,8 +87,8 @@ std::vector<Twin> twins_of(const FlightRows& flight, const JointFit& fit, std::s
     return fine.value();
   };
   const auto here = polish(solution);
-  std::vector<Twin> twins;
-  if (!here) return twins;
+  std::vector<Mirror> mirrors;
+  if (!here) return mirrors;
   std::vector<Eigen::Vector3d> starts{shape.mirrored(solution)};
   const Eigen::Vector3d axis = shape.axes.col(2);
   for (int k = 1; k < 8; ++k) {
@@ -101,17 +101,17 @@ std::vector<Twin> twins_of(const FlightRows& flight, const JointFit& fit, std::s
     auto there = polish(start);
     if (!there) continue;
     const double worse =
-        (there->cost - here->cost) * unit + clues.cost(there->position_m) - clues.cost(solution);
+        (there->cost - here->cost) * unit + priors.cost(there->position_m) - priors.cost(solution);
     const auto close = [&](const Eigen::Vector3d& p) {
-      return (there->position_m - p).norm() < k_twin_distance_m;
+      return (there->position_m - p).norm() < k_mirror_distance_m;
     };
-    if (worse > k_twin_cost || close(solution) || close(here->position_m)) continue;
-    if (std::ranges::any_of(twins, [&](const Twin& t) { return close(t.fit.position_m); })) continue;
+    if (worse > k_mirror_cost || close(solution) || close(here->position_m)) continue;
+    if (std::ranges::any_of(mirrors, [&](const Mirror& t) { return close(t.fit.position_m); })) continue;
     const double horizontal_m = (there->position_m - here->position_m).head<2>().norm();
-    twins.push_back({*there, worse, horizontal_m});
+    mirrors.push_back({*there, worse, horizontal_m});
   }
-  std::ranges::sort(twins, {}, &Twin::worse);
-  return twins;
+  std::ranges::sort(mirrors, {}, &Mirror::worse);
+  return mirrors;
 }
 
 Hypothesis hypothesis(const FlightRows& flight, const Eigen::Vector3d& position,
@@ -156,32 +156,33 @@ double horizontal_sigma_of(const Eigen::Matrix3d& covariance, const FlightOption
   return error_ellipse(with_floor).major_m / std::sqrt(5.991464547107979);
 }
 
-/// Twins, probabilities and the part of the position that stands.
-void judge_twins(const FlightRows& flight, AnchorSolution& solution, const std::vector<Twin>& twins,
-                 const GeometryReport& geometry, const Clues& clues) {
+/// Mirrors, probabilities and the part of the position that stands.
+void judge_mirrors(const FlightRows& flight, AnchorSolution& solution, const std::vector<Mirror>& mirrors,
+                   const GeometryReport& geometry, const Priors& priors) {
   Estimate& estimate = solution.estimate;
-  const Twin* twin = twins.empty() ? nullptr : &twins.front();
-  if (!twin && geometry.kind != GeometryKind::coplanar) return;
-  if (twin) {
-    estimate.mirror =
-        hypothesis(flight, twin->fit.position_m, estimate.best->covariance_m2, estimate.best->rms_residual_m);
-    const double odds = std::exp(-std::clamp(twin->worse, -50.0, 50.0));
+  const Mirror* mirror = mirrors.empty() ? nullptr : &mirrors.front();
+  if (!mirror && geometry.kind != GeometryKind::coplanar) return;
+  if (mirror) {
+    estimate.mirror = hypothesis(flight, mirror->fit.position_m, estimate.best->covariance_m2,
+                                 estimate.best->rms_residual_m);
+    const double odds = std::exp(-std::clamp(mirror->worse, -50.0, 50.0));
     estimate.mirror->probability = odds / (1.0 + odds);
     estimate.best->probability = 1.0 / (1.0 + odds);
   }
   estimate.verdict = Verdict::ambiguous;
-  const bool sideways =
-      twin && std::ranges::any_of(twins, [](const Twin& t) { return t.horizontal_m > k_twin_distance_m; });
+  const bool sideways = mirror && std::ranges::any_of(mirrors, [](const Mirror& t) {
+                          return t.horizontal_m > k_mirror_distance_m;
+                        });
   solution.determined = sideways ? Determined::none : Determined::horizontal;
-  if (!twin) {
+  if (!mirror) {
     // No second minimum of its own, but a plane cannot tell the sides: what its reflection says is as good.
     const Eigen::Vector3d reflected = geometry.shape.mirrored(estimate.best->position.m);
     estimate.reason =
         geometry.reason + "; the side of it the anchor is on is not determined, its height is uncertain";
     const double apart_m = (reflected - estimate.best->position.m).norm();
     const double odds =
-        std::exp(-std::clamp(clues.cost(reflected) - clues.cost(estimate.best->position.m), -50.0, 50.0));
-    if (apart_m > k_twin_distance_m && odds < k_decided_odds) {
+        std::exp(-std::clamp(priors.cost(reflected) - priors.cost(estimate.best->position.m), -50.0, 50.0));
+    if (apart_m > k_mirror_distance_m && odds < k_decided_odds) {
       estimate.verdict = Verdict::ok;
       estimate.reason.clear();
       solution.determined = Determined::position;
@@ -196,14 +197,14 @@ void judge_twins(const FlightRows& flight, AnchorSolution& solution, const std::
     estimate.v95_m += std::abs(reflected.z() - estimate.best->position.m.z());
     return;
   }
-  const double apart_m = (twin->fit.position_m - estimate.best->position.m).norm();
+  const double apart_m = (mirror->fit.position_m - estimate.best->position.m).norm();
   estimate.reason =
       text("mirror: a solution %.2f m away fits as well (cost %+.2f, %.2f m apart horizontally)", apart_m,
-           twin->worse, twin->horizontal_m);
+           mirror->worse, mirror->horizontal_m);
   if (!geometry.reason.empty()) estimate.reason += "; " + geometry.reason;
   // Until someone says which, the claimed height must hold both.
   estimate.v95_m = std::max(
-      estimate.v95_m, std::abs(twin->fit.position_m.z() - estimate.best->position.m.z()) + estimate.v95_m);
+      estimate.v95_m, std::abs(mirror->fit.position_m.z() - estimate.best->position.m.z()) + estimate.v95_m);
 }
 
 }  // namespace
@@ -270,9 +271,9 @@ AnchorSolution verdict_of(const FlightRows& flight, const JointFit& fit, std::si
   solution.determined = Determined::position;
   const double horizontal_sigma_m = ellipse.major_m / std::sqrt(5.991464547107979);
   solution.geometry.sigma_ratio = horizontal_sigma_m / geometry.median_range_m;
-  const Clues clues(flight, fit, index, options);
-  judge_twins(flight, solution, twins_of(flight, fit, index, geometry.shape, clues, options), geometry,
-              clues);
+  const Priors priors(flight, fit, index, options);
+  judge_mirrors(flight, solution, mirrors_of(flight, fit, index, geometry.shape, priors, options), geometry,
+                priors);
   // A bias nobody knows makes the region wide and is told as what it is (gates bias and precision); geometry
   // is to blame only for what would remain if it were known.
   const double geometric_sigma_m = horizontal_sigma_of(known_bias_covariance(fit, index), options);

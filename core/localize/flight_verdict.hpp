@@ -5,10 +5,11 @@
 
 namespace anchord {
 
-/// Judges one solved anchor: geometry, twins, covariance, verdict. Fills everything of AnchorSolution.
+/// Judges one solved anchor: geometry, mirror solutions, covariance, verdict. Fills everything of
+/// AnchorSolution.
 ///
-/// Twins are looked for: from the reflection through the track's plane and from the solution turned about the
-/// track's main axis in steps of 45 degrees; what ends elsewhere with a tempered cost within 3 is one.
+/// Mirrors are looked for: from the reflection through the track's plane and from the solution turned about
+/// the track's main axis in steps of 45 degrees; what ends elsewhere with a tempered cost within 3 is one.
 AnchorSolution judge_anchor(const FlightRows& flight, const JointFit& fit, std::size_t index,
                             const FlightOptions& options);
 

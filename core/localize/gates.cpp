@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "core/localize/belief_likelihood.hpp"
+#include "core/localize/error_model_likelihood.hpp"
 #include "core/localize/geometry.hpp"
 #include "core/localize/residual.hpp"
 #include "core/localize/solver.hpp"
@@ -223,7 +223,7 @@ std::vector<Gate> gates_of(const FlightRows& flight, const JointFit& fit, std::s
   // What a model has judged is corrected and weighed as what it is: late ranges are no surprise there.
   const auto& rows = flight.anchors[index].rows;
   const auto n_judged =
-      std::ranges::count_if(rows, [](const JointRow& row) { return row.belief.has_value(); });
+      std::ranges::count_if(rows, [](const JointRow& row) { return row.error_model.has_value(); });
   if (2 * static_cast<std::size_t>(n_judged) < rows.size())
     gates.push_back(blocked(fit, index, options, limits));
   gates.push_back(at_most("residual_scale", solution.residual_scale_m, limits.residual_scale_m,
@@ -281,8 +281,8 @@ std::vector<RangeResidual> residuals_of(const FlightRows& flight, const JointFit
     one.residual_m = line.residual_m;
     one.corrected_m = line.residual_m + (line.antenna_m - anchor.position_m).norm();
     one.weight = robust_weight(line.residual_m / std::sqrt(sigma2), options);
-    if (row.belief) {
-      one.p_los = belief_value(*row.belief, line.residual_m, line.position_variance_m2).p_los;
+    if (row.error_model) {
+      one.p_los = error_model_value(*row.error_model, line.residual_m, line.position_variance_m2).p_los;
       one.weight = *one.p_los;
     }
     one.standardised = line.residual_m / std::sqrt(sigma2 * std::max(1.0 - leverage, 0.05));

@@ -12,7 +12,7 @@ namespace anchord {
 struct GateLimits {
   double redundancy{30};          ///< ranges beyond the unknowns; fewer cannot show that one of them is wrong
   double rejected_share{0.5};     ///< beyond: the rejected are the majority, and may be the right ones
-  double side_probability{0.99};  ///< of the chosen side against its twin
+  double side_probability{0.99};  ///< of the chosen side against its mirror solution
   double outline_sigmas{3};       ///< outside of the building by more: the outline is wrong, or the answer
   double residual_scale_m{0.6};   ///< radios that work stay below 0.25 m
   double precision{0.08};         ///< largest sigma over the median range; real flights that tell: 0.072

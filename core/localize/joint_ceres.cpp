@@ -70,13 +70,14 @@ class AnchorRanges final : public ceres::CostFunction {
   std::vector<double> sigma_m_;
 };
 
-/// What clues beside the ranges ask of one anchor.
-class ClueTerm final : public ceres::SizedCostFunction<3, 4> {
+/// What priors beside the ranges ask of one anchor.
+class PriorTerm final : public ceres::SizedCostFunction<3, 4> {
  public:
-  ClueTerm(AnchorClues clues, const FlightOptions& options) : clues_(std::move(clues)), options_(options) {}
+  PriorTerm(AnchorPriors priors, const FlightOptions& options)
+      : priors_(std::move(priors)), options_(options) {}
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     const Eigen::Vector3d place_m(parameters[0][0], parameters[0][1], parameters[0][2]);
-    const auto rows = clue_rows(clues_, options_.outline_m, options_.outline_sigma_m, place_m);
+    const auto rows = prior_rows(priors_, options_.outline_m, options_.outline_sigma_m, place_m);
     for (std::size_t i = 0; i < rows.size(); ++i) {
       residuals[i] = -rows[i].missing;
       if (jacobians && jacobians[0]) Eigen::Map<Eigen::Vector4d>(jacobians[0] + 4 * i) << rows[i].slope, 0.0;
@@ -85,7 +86,7 @@ class ClueTerm final : public ceres::SizedCostFunction<3, 4> {
   }
 
  private:
-  AnchorClues clues_;
+  AnchorPriors priors_;
   const FlightOptions& options_;
 };
 
@@ -149,8 +150,8 @@ Result<JointState> polish_joint_ceres(const FlightRows& flight, JointState state
           new AnchorRanges(flight, flight.anchors[i], normal.anchors[i], options,
                            sigmas(flight, flight.anchors[i], state, i, normal.anchors[i])),
           nullptr, own[i].data(), shared.data());
-      if (!options.clues.empty() || !options.outline_m.empty()) {
-        problem.AddResidualBlock(new ClueTerm(clues_of(flight.anchors[i].id, options), options), nullptr,
+      if (!options.priors.empty() || !options.outline_m.empty()) {
+        problem.AddResidualBlock(new PriorTerm(priors_of(flight.anchors[i].id, options), options), nullptr,
                                  own[i].data());
       }
       ordering->AddElementToGroup(own[i].data(), 0);

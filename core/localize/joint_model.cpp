@@ -7,7 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "core/localize/belief_likelihood.hpp"
+#include "core/localize/error_model_likelihood.hpp"
 #include "core/localize/residual.hpp"
 
 namespace anchord {
@@ -53,18 +53,20 @@ class Neighbours {
   std::vector<double> jumps_m_;
 };
 
-/// How much of what the beliefs claim may be claimed: 1 as long as the errors are what the model said. Larger
-/// ones make the slope of the likelihood vary more than its curvature allows, and the covariance is then that
-/// of a misspecified likelihood, H^-1 J H^-1 (Huber 1967; White 1982), by one number for the anchor.
-double believed_share(const std::vector<JointLine>& lines, const std::vector<const RangeBelief*>& beliefs) {
+/// How much of what the error models claim may be claimed: 1 as long as the errors are what the model said.
+/// Larger ones make the slope of the likelihood vary more than its curvature allows, and the covariance is
+/// then that of a misspecified likelihood, H^-1 J H^-1 (Huber 1967; White 1982), by one number for the
+/// anchor.
+double believed_share(const std::vector<JointLine>& lines,
+                      const std::vector<const RangeErrorModel*>& error_models) {
   constexpr double step_m = 1e-3, allowed = 1.2;  // H and J are sums of some hundred terms: 20 % is chance
   double curvature = 0, variance = 0, claimed = 0;
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    if (!beliefs[i]) continue;
+    if (!error_models[i]) continue;
     const auto at = [&](double error_m) {
-      return belief_value(*beliefs[i], error_m, lines[i].position_variance_m2);
+      return error_model_value(*error_models[i], error_m, lines[i].position_variance_m2);
     };
-    const BeliefValue here = at(lines[i].residual_m);
+    const ErrorModelValue here = at(lines[i].residual_m);
     claimed += here.information_per_m2;
     variance += here.score_per_m * here.score_per_m;
     curvature +=
@@ -82,7 +84,7 @@ void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointS
                   JointNormal& normal) {
   std::vector<JointLine> lines;
   std::vector<double> sizes, times_s, position_variances;
-  std::vector<const RangeBelief*> beliefs;
+  std::vector<const RangeErrorModel*> error_models;
   Neighbours neighbours;
   lines.reserve(rows.rows.size());
   for (const JointRow& row : rows.rows) {
@@ -91,9 +93,9 @@ void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointS
       ++block.refused[std::string(to_string(line.refused))];
       continue;
     }
-    const double centred_m = line.residual_m - (row.belief ? expected_error_m(*row.belief) : 0.0);
+    const double centred_m = line.residual_m - (row.error_model ? expected_error_m(*row.error_model) : 0.0);
     sizes.push_back(std::abs(centred_m));
-    beliefs.push_back(row.belief ? &*row.belief : nullptr);
+    error_models.push_back(row.error_model ? &*row.error_model : nullptr);
     neighbours.add(row, centred_m);
     times_s.push_back(row.t_s);
     position_variances.push_back(line.position_variance_m2);
@@ -108,19 +110,20 @@ void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointS
   block.scale_m = kept_scale_m > 0 ? kept_scale_m
                                    : std::max({1.4826 * median(sizes), options.min_scale_m, scale_floor_m});
   const double scale2 = block.scale_m * block.scale_m;
-  const double believed = claims ? believed_share(lines, beliefs) : 1.0;
+  const double believed = claims ? believed_share(lines, error_models) : 1.0;
   double sum_square = 0;
   std::vector<double> weights;
   weights.reserve(lines.size());
   for (std::size_t i = 0; i < lines.size(); ++i) {
     JointLine& line = lines[i];
     double weight = 0, counted = 0, counted_m = line.residual_m;
-    if (beliefs[i]) {
+    if (error_models[i]) {
       // Where a model spoke, its likelihood takes the place of scale and loss; the pull is its exact slope.
-      const BeliefValue value = belief_value(*beliefs[i], line.residual_m, line.position_variance_m2);
+      const ErrorModelValue value =
+          error_model_value(*error_models[i], line.residual_m, line.position_variance_m2);
       weight = (claims ? value.information_per_m2 : value.curvature_per_m2) * scale2;
       counted = value.p_los;
-      counted_m -= beliefs[i]->los_bias_m;
+      counted_m -= error_models[i]->los_bias_m;
       line.residual_m = weight > 0 ? value.score_per_m * scale2 / weight : 0.0;
       weight *= believed;
     } else {
@@ -167,9 +170,9 @@ double robust_weight(double residual_over_scale, const FlightOptions& options) {
   return loss_value(options.loss, bend, residual_over_scale).weight;
 }
 
-AnchorClues clues_of(NetworkId id, const FlightOptions& options) {
-  const auto known = options.clues.find(id);
-  return known == options.clues.end() ? AnchorClues{} : known->second;
+AnchorPriors priors_of(NetworkId id, const FlightOptions& options) {
+  const auto known = options.priors.find(id);
+  return known == options.priors.end() ? AnchorPriors{} : known->second;
 }
 
 double range_curve(double distance_m) { return std::log(std::max(distance_m, k_hinge_m) / k_hinge_m); }
@@ -222,10 +225,10 @@ JointNormal build_normal(const FlightRows& flight, const JointState& state, cons
     const double delay_information = 1.0 / (options.delay_prior_m * options.delay_prior_m);
     block.own(3, 3) += delay_information;
     block.gradient[3] -= delay_information * anchor.delay_m;
-    const ClueNormal clue = clue_normal(clues_of(flight.anchors[i].id, options), options.outline_m,
-                                        options.outline_sigma_m, anchor.position_m);
-    block.own.topLeftCorner<3, 3>() += clue.information;
-    block.gradient.head<3>() += clue.gradient;
+    const PriorNormal prior = prior_normal(priors_of(flight.anchors[i].id, options), options.outline_m,
+                                           options.outline_sigma_m, anchor.position_m);
+    block.own.topLeftCorner<3, 3>() += prior.information;
+    block.gradient.head<3>() += prior.gradient;
     if (options.dims == Dims::two) {
       block.own.row(2).setZero();
       block.own.col(2).setZero();
@@ -259,9 +262,9 @@ std::vector<Observation> observations_of(const FlightRows& flight, const AnchorR
     o.distance_m = row.distance_m - shared[k_shared_bias];
     o.distance_m -= shared[k_shared_curve] * range_curve(o.distance_m);
     o.sigma_m = sigma_m;
-    if (row.belief) {
-      o.distance_m -= expected_error_m(*row.belief);
-      o.sigma_m = std::hypot(sigma_m, (1.0 - row.belief->p_los) * row.belief->nlos_tail_m);
+    if (row.error_model) {
+      o.distance_m -= expected_error_m(*row.error_model);
+      o.sigma_m = std::hypot(sigma_m, (1.0 - row.error_model->p_los) * row.error_model->nlos_tail_m);
     }
     all.push_back(o);
   }

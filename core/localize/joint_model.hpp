@@ -27,8 +27,8 @@ struct JointState {
   std::vector<Anchor> anchors;
 };
 
-/// Clues of an anchor beside its ranges; none where none were given.
-AnchorClues clues_of(NetworkId id, const FlightOptions& options);
+/// Priors of an anchor beside its ranges; none where none were given.
+AnchorPriors priors_of(NetworkId id, const FlightOptions& options);
 
 /// Levels received from an anchor, thinned to at most 400; empty without attitude or options.level_sigma_db.
 std::vector<LevelSample> levels_of(const FlightRows& flight, const AnchorRows& anchor,
@@ -80,7 +80,7 @@ struct JointNormal {
   SharedVector reduced_gradient{SharedVector::Zero()};
 };
 /// scales_from  residual scales to keep instead of measuring them anew
-/// claims       rows with a belief count what may be claimed of them, not what makes the next step safe
+/// claims       rows with an error model count what may be claimed of them, not what makes the next step safe
 JointNormal build_normal(const FlightRows& flight, const JointState& state, const FlightOptions& options,
                          double scale_floor_m, const JointNormal* scales_from = nullptr, bool claims = false);
 

@@ -13,9 +13,9 @@ constexpr int k_scale_rounds = 20;
 
 double clipped(double value, double limit) { return std::clamp(value, -limit, limit); }
 
-bool has_beliefs(const FlightRows& flight) {
+bool has_error_models(const FlightRows& flight) {
   return std::ranges::any_of(flight.anchors, [](const AnchorRows& anchor) {
-    return std::ranges::any_of(anchor.rows, [](const JointRow& row) { return row.belief.has_value(); });
+    return std::ranges::any_of(anchor.rows, [](const JointRow& row) { return row.error_model.has_value(); });
   });
 }
 
@@ -29,7 +29,7 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
   // Ranges between anchors are solved here whatever the method: their network is small and dense. So are
   // ranges a model spoke about, whose likelihood is no sum of squares.
   const bool by_ceres =
-      options.method != Method::gauss_newton && flight.pairs.empty() && !has_beliefs(flight);
+      options.method != Method::gauss_newton && flight.pairs.empty() && !has_error_models(flight);
   const int most_rounds = by_ceres ? 5 : k_max_rounds;
   struct Pace {
     Eigen::Vector3d last_m{0, 0, 0};
@@ -87,7 +87,7 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
   }
   // What the rounds leave wandering, a trust region settles; of the two kinds it cannot solve, the verdict
   // says that they wander.
-  const bool wanders = !fit.converged && flight.pairs.empty() && !has_beliefs(flight);
+  const bool wanders = !fit.converged && flight.pairs.empty() && !has_error_models(flight);
   const JointNormal scales = std::move(fit.normal);
   // Measured anew, the scales of a flight that wanders would lead it on to another answer.
   const JointNormal* kept = by_ceres ? nullptr : &scales;

@@ -50,9 +50,9 @@ void centred_solutions(std::span<const Observation> observations, Dims dims,
   if (flat_axis < 0) inside_m2 -= local_anchor[0] * local_anchor[0];
   const double size_m = std::sqrt(std::max(-mean_q - inside_m2, 0.0));
   for (const double sign : {1.0, -1.0}) {
-    Eigen::Vector3d twin = local_anchor;
-    twin[weak_axis] = sign * size_m;
-    out.push_back(global(twin));
+    Eigen::Vector3d mirror = local_anchor;
+    mirror[weak_axis] = sign * size_m;
+    out.push_back(global(mirror));
   }
 }
 

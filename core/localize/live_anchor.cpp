@@ -159,16 +159,17 @@ void LiveAnchor::describe(const LiveOptions& options) {
   const double looks = std::max(duration_s / (2.0 * k_error_correlation_s), 1.0);
   const double inflate = std::max(static_cast<double>(rows.size()) / looks, 1.0) *
                          std::max(scale_m * scale_m / (options.range_sigma_m * options.range_sigma_m), 0.1);
-  auto twin = solve_anchor_gauss_newton(rows, geometry.shape.mirrored(best.position_m), settings);
-  const bool two = twin && (twin.value().position_m - best.position_m).norm() > 0.4;
-  double worse = 0;  // of the twin: tempered likelihood ratio, and what the flight's clues hold against it
+  auto mirror = solve_anchor_gauss_newton(rows, geometry.shape.mirrored(best.position_m), settings);
+  const bool two = mirror && (mirror.value().position_m - best.position_m).norm() > 0.4;
+  double worse =
+      0;  // of the mirror solution: tempered likelihood ratio, and what the flight's priors hold against it
   if (two) {
-    worse = std::max(twin.value().cost - best.cost, 0.0) / inflate;
-    if (const auto told = options.clues.find(estimate_.anchor); told != options.clues.end())
-      worse += clue_cost(told->second, {}, 1, twin.value().position_m) -
-               clue_cost(told->second, {}, 1, best.position_m);
+    worse = std::max(mirror.value().cost - best.cost, 0.0) / inflate;
+    if (const auto told = options.priors.find(estimate_.anchor); told != options.priors.end())
+      worse += prior_cost(told->second, {}, 1, mirror.value().position_m) -
+               prior_cost(told->second, {}, 1, best.position_m);
     if (worse < 0) {
-      std::swap(best, twin.value());
+      std::swap(best, mirror.value());
       worse = -worse;
     }
   }
@@ -190,7 +191,7 @@ void LiveAnchor::describe(const LiveOptions& options) {
   if (two) {
     const double odds = std::exp(-std::min(worse, 700.0));
     if (odds > 0.01) {
-      estimate_.mirror = hypothesis(twin.value());
+      estimate_.mirror = hypothesis(mirror.value());
       estimate_.mirror->probability = odds / (1.0 + odds);
       estimate_.best->probability = 1.0 / (1.0 + odds);
       estimate_.verdict = Verdict::ambiguous;

@@ -294,7 +294,9 @@ void LiveFlight::add(const Range& range, const std::optional<RangeModel>& model)
 
 void LiveFlight::leave_out(const Range& range) { state_->refuse(range, "excluded"); }
 
-void LiveFlight::tell(std::map<NetworkId, AnchorClues> clues) { state_->options.clues = std::move(clues); }
+void LiveFlight::tell(std::map<NetworkId, AnchorPriors> priors) {
+  state_->options.priors = std::move(priors);
+}
 
 void LiveFlight::adopt(const FlightSolution& solution, UtcTime cut) {
   State& s = *state_;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/geo/track_segments.hpp"
-#include "core/localize/side_clues.hpp"
+#include "core/localize/side_priors.hpp"
 #include "core/types/estimate.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/mission.hpp"
@@ -59,7 +59,7 @@ struct LiveOptions {
   TrackLimits track{};  ///< what the positions are held against
   std::optional<Wgs84> origin{};  ///< of the site; absent: the first good fix, or the middle of the flight
                                   ///< once that one turned out to be no part of it
-  std::map<NetworkId, AnchorClues> clues{};  ///< tell() replaces them
+  std::map<NetworkId, AnchorPriors> priors{};  ///< tell() replaces them
 };
 
 /// One flight as it happens: joins ranges to the track and keeps every anchor's estimate warm.
@@ -83,7 +83,7 @@ class LiveFlight {
   /// A range a person took out of use: counted as "excluded" and told, nothing else.
   void leave_out(const Range& range);
   /// What turns and height searches told, in metres of origin(): priors from the next solve on.
-  void tell(std::map<NetworkId, AnchorClues> clues);
+  void tell(std::map<NetworkId, AnchorPriors> priors);
   /// A joint solution of this flight's rows up to `cut`: its bias and lag hold from now on, and its positions
   /// are what later ranges refine. Solved in the frame of origin().
   void adopt(const FlightSolution& solution, UtcTime cut);

@@ -72,8 +72,8 @@ LiveTrack::Change LiveTrack::add(const Fix& given) {
 
 LiveTrack::Change LiveTrack::process(const Fix& fix) {
   Known known{seconds(fix), fixed_place_m(fix), jump_sigma_m(fix), k_lesser, true};
-  const auto twin = std::ranges::lower_bound(all_, known.t_s, {}, &Known::t_s);
-  if (twin != all_.end() && twin->t_s == known.t_s) return {};
+  const auto mirror = std::ranges::lower_bound(all_, known.t_s, {}, &Known::t_s);
+  if (mirror != all_.end() && mirror->t_s == known.t_s) return {};
   if (kind_ == TrackFrame::wgs84 && !frame_) {
     frame_.emplace(fix.position);
     origin_m_ = known.place_m;

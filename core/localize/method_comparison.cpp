@@ -17,7 +17,7 @@ std::vector<Observation> observations(const FlightRows& flight, const AnchorRows
   for (const JointRow& row : anchor.rows) {
     const TagPoint point = flight.track.at(row.t_s, row.lever_arm_body_m);
     if (point.refused != TrackRefusal::none) continue;
-    const double p_los = row.belief ? row.belief->p_los : 1.0;
+    const double p_los = row.error_model ? row.error_model->p_los : 1.0;
     Observation o;
     o.tag_m = point.position_m;
     o.distance_m = row.distance_m;

@@ -19,10 +19,10 @@ constexpr std::size_t k_most_places = 6;
 /// The start somebody gave: a place, or what the turn and the height search say with the ranges
 /// (8.4.1, 8.4.2).
 std::optional<Eigen::Vector3d> told_start(NetworkId id, const std::vector<Observation>& rows,
-                                          const AnchorClues& clues, const FlightOptions& options) {
+                                          const AnchorPriors& priors, const FlightOptions& options) {
   if (const auto told = options.starts.find(id); told != options.starts.end()) return told->second;
-  if (!options.start_at_clues || !clues.bearing || !clues.height) return std::nullopt;
-  return guess_from_turn(rows, clues.bearing->tag_m, clues.bearing->bearing_rad, clues.height->up_m);
+  if (!options.start_at_priors || !priors.bearing || !priors.height) return std::nullopt;
+  return guess_from_turn(rows, priors.bearing->tag_m, priors.bearing->bearing_rad, priors.height->up_m);
 }
 
 /// Counts an end of the search where it is, or with the place it shares.
@@ -56,20 +56,20 @@ StartSearch search_start(const FlightRows& flight, const AnchorRows& anchor, con
   settings.estimate_bias = !options.fixed_bias_m;
   settings.bias_prior_sigma_m = 0.5;
   settings.step_tolerance_m = 1e-5;  // the joint solve goes on from here
-  const AnchorClues clues = clues_of(anchor.id, options);
+  const AnchorPriors priors = priors_of(anchor.id, options);
   const auto levels = levels_of(flight, anchor, prior.mean, options);
   const double span_s = std::max(anchor.rows.back().t_s - anchor.rows.front().t_s, 1.0);
   const double alike =
       std::max(2.0 * options.correlation_s * static_cast<double>(levels.size()) / span_s, 1.0);
   auto starts = start_candidates(rows, options.dims);
-  if (const auto told = told_start(anchor.id, rows, clues, options)) starts = {*told};
+  if (const auto told = told_start(anchor.id, rows, priors, options)) starts = {*told};
   for (Eigen::Vector3d start : starts) {
     if (height_m) start.z() = *height_m;
     auto end = descend_to_minimum(rows, start, settings);
     if (!end) continue;
-    // The mirror fits as well: a clue, told in the same unit, is what decides where to begin.
+    // The mirror fits as well: a prior, told in the same unit, is what decides where to begin.
     AnchorMinimum& minimum = end.value();
-    minimum.cost += clue_cost(clues, options.outline_m, options.outline_sigma_m, minimum.position_m);
+    minimum.cost += prior_cost(priors, options.outline_m, options.outline_sigma_m, minimum.position_m);
     if (!levels.empty())
       minimum.cost += level_cost(levels, minimum.position_m, *options.level_sigma_db) / alike;
     note_end(search, minimum);

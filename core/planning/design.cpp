@@ -45,7 +45,7 @@ Design::Design(std::span<const Eigen::Vector3d> anchors, const FlightPlanOptions
     : anchors_(anchors.begin(), anchors.end()), options_(options), building_(building) {
   const double prior = options.prior_sigma_m * options.prior_sigma_m;
   const Eigen::Vector4d diagonal{prior, prior, prior, options.bias_sigma_m * options.bias_sigma_m};
-  beliefs_.assign(anchors_.size(), Belief{diagonal.asDiagonal().toDenseMatrix()});
+  error_models_.assign(anchors_.size(), ErrorModel{diagonal.asDiagonal().toDenseMatrix()});
 }
 
 Sight Design::sight(const Eigen::Vector3d& point, const Eigen::Vector3d& anchor) const {
@@ -69,21 +69,21 @@ std::vector<Sight> Design::sights(const Eigen::Vector3d& point) const {
   return out;
 }
 
-double Design::square_m2(const Belief& belief) const {
-  return belief.covariance.topLeftCorner<3, 3>().trace() +
-         options_.wall_excess_m * options_.wall_excess_m * belief.shift.head<3>().squaredNorm();
+double Design::square_m2(const ErrorModel& error_model) const {
+  return error_model.covariance.topLeftCorner<3, 3>().trace() +
+         options_.wall_excess_m * options_.wall_excess_m * error_model.shift.head<3>().squaredNorm();
 }
 
-double Design::value_of(const Belief& belief) const {
-  if (options_.rule == Rule::a_optimal) return square_m2(belief);
-  const Eigen::Vector3d shift = options_.wall_excess_m * belief.shift.head<3>();
-  return std::log((belief.covariance.topLeftCorner<3, 3>() + shift * shift.transpose()).determinant());
+double Design::value_of(const ErrorModel& error_model) const {
+  if (options_.rule == Rule::a_optimal) return square_m2(error_model);
+  const Eigen::Vector3d shift = options_.wall_excess_m * error_model.shift.head<3>();
+  return std::log((error_model.covariance.topLeftCorner<3, 3>() + shift * shift.transpose()).determinant());
 }
 
 void Design::update(std::span<const Sight> point, double sign) {
   for (std::size_t i = 0; i < anchors_.size(); ++i) {
     const Sight& s = point[i];
-    Belief& b = beliefs_[i];
+    ErrorModel& b = error_models_[i];
     const Eigen::Vector4d ph = b.covariance * s.row;
     const double innovation = s.variance_m2 + sign * s.row.dot(ph);
     b.shift += sign * ph * (s.slant - s.row.dot(b.shift)) / innovation;
@@ -93,7 +93,7 @@ void Design::update(std::span<const Sight> point, double sign) {
 
 double Design::value() const {
   double out = 0;
-  for (const auto& belief : beliefs_) out += value_of(belief);
+  for (const auto& error_model : error_models_) out += value_of(error_model);
   return out;
 }
 
@@ -101,7 +101,7 @@ double Design::value_with(std::span<const Sight> point) const {
   double out = 0;
   for (std::size_t i = 0; i < anchors_.size(); ++i) {
     const Sight& s = point[i];
-    const Belief& b = beliefs_[i];
+    const ErrorModel& b = error_models_[i];
     const Eigen::Vector4d ph = b.covariance * s.row;
     const double innovation = s.variance_m2 + s.row.dot(ph);
     const Eigen::Vector4d shift = b.shift + ph * (s.slant - s.row.dot(b.shift)) / innovation;
@@ -117,13 +117,13 @@ double Design::value_with(std::span<const Sight> point) const {
 
 double Design::mean_square_m2() const {
   double out = 0;
-  for (const auto& belief : beliefs_) out += square_m2(belief);
-  return out / static_cast<double>(beliefs_.size());
+  for (const auto& error_model : error_models_) out += square_m2(error_model);
+  return out / static_cast<double>(error_models_.size());
 }
 
 std::vector<double> Design::sigmas_m() const {
   std::vector<double> out;
-  for (const auto& belief : beliefs_) out.push_back(std::sqrt(square_m2(belief)));
+  for (const auto& error_model : error_models_) out.push_back(std::sqrt(square_m2(error_model)));
   return out;
 }
 

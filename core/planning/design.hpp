@@ -48,17 +48,17 @@ class Design {
   std::vector<double> sigmas_m() const;  ///< root of it, anchor by anchor
 
  private:
-  struct Belief {
+  struct ErrorModel {
     Eigen::Matrix4d covariance;
     Eigen::Vector4d shift{0, 0, 0, 0};  ///< of the answer by one unit of slant excess
   };
   Sight sight(const Eigen::Vector3d& point, const Eigen::Vector3d& anchor) const;
   void update(std::span<const Sight> point, double sign);
-  double value_of(const Belief& belief) const;
-  double square_m2(const Belief& belief) const;
+  double value_of(const ErrorModel& error_model) const;
+  double square_m2(const ErrorModel& error_model) const;
 
   std::vector<Eigen::Vector3d> anchors_;
-  std::vector<Belief> beliefs_;
+  std::vector<ErrorModel> error_models_;
   FlightPlanOptions options_;
   Building building_;
 };

@@ -86,7 +86,7 @@ planning::NextPointInput FlightEngine::point_input(std::span<const Estimate> est
     const auto it = std::find_if(estimates.begin(), estimates.end(),
                                  [&](const Estimate& e) { return e.anchor == task.id && e.best; });
     if (it == estimates.end()) {
-      anchor.places = {{clues_.guess_m(task.id).value_or(setup_.middle_m), 1}};
+      anchor.places = {{priors_.guess_m(task.id).value_or(setup_.middle_m), 1}};
       const auto seen = measured_at_.find(task.id);
       for (std::size_t i = 0; seen != measured_at_.end() && i < input.visited.size(); ++i) {
         if (std::ranges::find(seen->second, input.visited[i]) != seen->second.end())

@@ -72,7 +72,7 @@ double take_off_height_m(const FlightSetup& setup) {
   return std::max(setup.limits.home_m.z() + setup.settings.take_off_m, setup.settings.min_height_m);
 }
 
-FlightEngine::FlightEngine(FlightSetup setup) : setup_(std::move(setup)), clues_(setup_.middle_m.z()) {}
+FlightEngine::FlightEngine(FlightSetup setup) : setup_(std::move(setup)), priors_(setup_.middle_m.z()) {}
 
 FlightEngine::FlightEngine(FlightSetup setup, const State& stored, double now_s)
     : FlightEngine(std::move(setup)) {
@@ -107,13 +107,13 @@ void FlightEngine::range(double now_s, NetworkId anchor, bool used, std::optiona
   if (!in_flight(state_.step)) return;
   const auto at = position_m();
   if (distance_m && at) {
-    clues_.ranged(anchor, *at, *distance_m);
+    priors_.ranged(anchor, *at, *distance_m);
     distance_m_[anchor] = *distance_m;
     near_enough(anchor, *distance_m);
   }
   if (rss_dbm && state_.step == Step::turn && vehicle_.heading_rad)
-    clues_.turned(anchor, *vehicle_.heading_rad, *rss_dbm);
-  if (rss_dbm && state_.step == Step::height_search && at) clues_.climbed(anchor, at->z(), *rss_dbm);
+    priors_.turned(anchor, *vehicle_.heading_rad, *rss_dbm);
+  if (rss_dbm && state_.step == Step::height_search && at) priors_.climbed(anchor, at->z(), *rss_dbm);
   if (!used) return;
   if (note_range(state_, anchor))
     tell(now_s, "info", "anchor.found", "anchor " + to_string(anchor) + " in range for the first time");
@@ -191,7 +191,7 @@ bool FlightEngine::command(double now_s, Event event, const std::string& who) {
 /// From where a turn saw no lobe of an anchor a height search, which needs one, sees nothing either.
 void FlightEngine::note_lobes() {
   for (auto& task : state_.anchors) {
-    const auto seen = task.samples_here > 0 ? clues_.lobe_seen(task.id) : std::nullopt;
+    const auto seen = task.samples_here > 0 ? priors_.lobe_seen(task.id) : std::nullopt;
     if (!seen) continue;
     task.no_lobe = !*seen;
     if (const auto at = distance_m_.find(task.id); task.no_lobe && at != distance_m_.end())
@@ -219,10 +219,10 @@ bool FlightEngine::feed(double now_s, Event event, std::string text, std::option
 void FlightEngine::apply(double now_s, const Advance& step) {
   const bool measured = step.state.visited.size() > state_.visited.size();
   if (const auto from = state_.step, to = step.state.step; from != to) {
-    if (from == Step::turn) clues_.conclude_turn();
-    if (from == Step::height_search) clues_.conclude_height_search();
-    if (to == Step::turn) clues_.begin_turn();
-    if (to == Step::height_search) clues_.begin_height_search();
+    if (from == Step::turn) priors_.conclude_turn();
+    if (from == Step::height_search) priors_.conclude_height_search();
+    if (to == Step::turn) priors_.begin_turn();
+    if (to == Step::height_search) priors_.begin_height_search();
   }
   state_ = step.state;
   if (started_s_) state_.flown_s = now_s - *started_s_;

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "core/planning/next_point.hpp"
-#include "core/procedure/clue_book.hpp"
 #include "core/procedure/exit_rule.hpp"
 #include "core/procedure/machine.hpp"
+#include "core/procedure/prior_book.hpp"
 #include "core/procedure/safety.hpp"
 #include "core/types/estimate.hpp"
 #include "core/types/fix.hpp"
@@ -94,7 +94,7 @@ class FlightEngine {
   FlightEngine(FlightSetup setup, const State& stored, double now_s);
 
   void fix(double now_s, const Eigen::Vector3d& enu_m, FixClass fix);
-  /// `rss_dbm` and `distance_m` where known: clues while the aircraft turns and climbs.
+  /// `rss_dbm` and `distance_m` where known: priors while the aircraft turns and climbs.
   void range(double now_s, NetworkId anchor, bool used, std::optional<double> rss_dbm = {},
              std::optional<double> distance_m = {});
   void vehicle(double now_s, const VehicleView& view);
@@ -123,8 +123,8 @@ class FlightEngine {
   const FlightSetup& setup() const { return setup_; }
   const std::optional<Alarm>& alarm() const { return alarm_; }
   const std::optional<DecisionRecord>& decision() const { return decision_; }
-  const std::map<NetworkId, Clues>& clues() const { return clues_.clues(); }
-  std::uint64_t clues_version() const { return clues_.version(); }
+  const std::map<NetworkId, Priors>& priors() const { return priors_.priors(); }
+  std::uint64_t priors_version() const { return priors_.version(); }
   std::optional<Eigen::Vector3d> position_m() const;
   /// The target that the aircraft flies to or stands at; none while it holds, lands or takes off.
   const std::optional<Command>& leg() const { return leg_; }
@@ -163,7 +163,7 @@ class FlightEngine {
 
   FlightSetup setup_;
   State state_;
-  ClueBook clues_;
+  PriorBook priors_;
   VehicleView vehicle_;
   std::optional<double> vehicle_s_, fix_s_, good_fix_s_, started_s_;
   std::optional<double>

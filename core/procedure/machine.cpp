@@ -13,7 +13,7 @@ const Waypoint& waypoint_of(const Settings& settings, const State& state) {
   return settings.waypoints.at(std::min(state.waypoint, settings.waypoints.size() - 1));
 }
 
-/// Somebody who is heard here and whose clue is missing.
+/// Somebody who is heard here and whose prior is missing.
 template <class Missing>
 bool any_heard(const State& state, Missing missing) {
   return std::any_of(state.anchors.begin(), state.anchors.end(),

@@ -62,7 +62,7 @@ struct Estimate {
   Verdict verdict{Verdict::too_few};
   std::string reason;                  ///< in words, with the numbers; empty when ok
   std::optional<Hypothesis> best{};    ///< absent when too few
-  std::optional<Hypothesis> mirror{};  ///< the twin that fits as well
+  std::optional<Hypothesis> mirror{};  ///< the mirror solution that fits as well
   double h95_m{};                      ///< radius holding 95 % horizontally (major semi-axis)
   double v95_m{};
   std::optional<double> gdop{};        ///< sqrt(trace (M^T M)^-1), the usual number

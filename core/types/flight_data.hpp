@@ -10,7 +10,7 @@
 #include "core/types/fix.hpp"
 #include "core/types/mission.hpp"
 #include "core/types/range.hpp"
-#include "core/types/range_belief.hpp"
+#include "core/types/range_error_model.hpp"
 
 namespace anchord {
 
@@ -21,7 +21,7 @@ struct FlightData {
   std::vector<Range> ranges;                      ///< any order
   std::map<NetworkId, std::string> anchor_names;  ///< id text as the source wrote it
   /// What a model believes of each range: empty, or one for every range, in their order.
-  std::vector<std::optional<RangeBelief>> beliefs{};
+  std::vector<std::optional<RangeErrorModel>> error_models{};
   /// Left out by a person before anything else was looked at, by anchor; they are counted as "excluded".
   std::map<NetworkId, std::size_t> n_ranges_excluded{};
   std::size_t n_fixes_excluded{};

@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "core/base/ids.hpp"
-#include "core/types/range_belief.hpp"
+#include "core/types/range_error_model.hpp"
 
 namespace anchord {
 
@@ -19,7 +19,7 @@ struct RangeModel {
   std::optional<double> bias_m{};   ///< subtract it from the distance
   std::optional<double> sigma_m{};  ///< of what is left
   bool outside_training{false};
-  std::optional<RangeBelief> belief{};  ///< of the error that is left once bias_m is off
+  std::optional<RangeErrorModel> error_model{};  ///< of the error that is left once bias_m is off
   RangeModels models{};
 };
 

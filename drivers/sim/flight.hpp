@@ -31,7 +31,7 @@ struct SimulatedFlight {
 };
 
 /// Where the drone's GNSS antenna is at a share of the path (0..1): three orbits at 3.5, 9 and 14 m with
-/// climbs between them. Three heights, because one alone leaves every anchor a mirrored twin; outside,
+/// climbs between them. Three heights, because one alone leaves every anchor a mirror solution; outside,
 /// because inside has no RTK.
 Eigen::Vector3d orbit_m(const World& world, const SimulationOptions& options, double share);
 

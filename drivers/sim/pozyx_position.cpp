@@ -51,7 +51,8 @@ std::optional<TagPosition> tag_position(std::span<const AnchorRange> anchors, bo
   if (static_cast<Eigen::Index>(anchors.size()) < unknowns + 1) return std::nullopt;
   Eigen::Vector3d middle_m = Eigen::Vector3d::Zero();
   for (const AnchorRange& anchor : anchors) middle_m += anchor.at_m / static_cast<double>(anchors.size());
-  // Anchors of about one height leave a twin on their other side: the better of the two, the lower in doubt.
+  // Anchors of about one height leave a mirror solution on their other side: the better of the two, the lower
+  // in doubt.
   std::optional<Found> best;
   for (const double from_middle_m : {-2.0, 2.0}) {
     const double z_m = solve_z ? middle_m.z() + from_middle_m : height_m;

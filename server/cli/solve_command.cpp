@@ -5,8 +5,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "api/calibration/clues_json.hpp"
 #include "api/calibration/kit_profile_json.hpp"
+#include "api/calibration/priors_json.hpp"
 #include "api/calibration/solve_output.hpp"
 #include "api/formats/flight_folder.hpp"
 #include "api/learning/flight_models.hpp"
@@ -35,7 +35,7 @@ struct Arguments {
   std::optional<double> bias_m, height_m, max_gap_s;
   std::vector<double> height_prior;
   double max_correction_age_s{TrackLimits{}.max_correction_age_s};
-  std::string profile, out, clues;
+  std::string profile, out, priors;
   std::vector<std::string> models;
   bool likelihood{true}, ask_worth{true};
   AnchorMethod method{AnchorMethod::joint};
@@ -56,7 +56,7 @@ Result<KitProfile> read_profile(const std::string& file) {
   return profile;
 }
 
-Result<void> add_clues(const std::string& file, FlightOptions& options) {
+Result<void> add_priors(const std::string& file, FlightOptions& options) {
   std::ifstream in(file, std::ios::binary);
   if (!in) return make_error(Errc::not_found, file + ": cannot be opened");
   const std::string text{std::istreambuf_iterator<char>(in), {}};
@@ -65,7 +65,7 @@ Result<void> add_clues(const std::string& file, FlightOptions& options) {
   if (auto fault = api::parse_json(text, json)) {
     errors.push_back(*std::move(fault));
   } else {
-    api::read_clues(json, "", options, errors);
+    api::read_priors(json, "", options, errors);
   }
   if (errors.empty()) return boost::outcome_v2::success();
   return make_error(Errc::invalid_argument,
@@ -87,8 +87,8 @@ Result<FlightOptions> options_of(const Arguments& a) {
   if (!a.profile.empty()) {
     BOOST_OUTCOME_TRY(options.profile, read_profile(a.profile));
   }
-  if (!a.clues.empty()) {
-    BOOST_OUTCOME_TRYV(add_clues(a.clues, options));
+  if (!a.priors.empty()) {
+    BOOST_OUTCOME_TRYV(add_priors(a.priors, options));
   }
   BOOST_OUTCOME_TRY(options.check());
   return options;
@@ -317,7 +317,7 @@ void add_solve_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("solve", "Find the anchors of recorded flights, without a server");
   auto arguments = std::make_shared<Arguments>();
   add_options(*command, *arguments);
-  command->add_option("--clues", arguments->clues,
+  command->add_option("--clues", arguments->priors,
                       "JSON: outline, bearings, heights, RSS: priors that separate an anchor from its mirror "
                       "(docs/formats.md)");
   auto* models =

@@ -117,7 +117,7 @@ Result<ClosedLoopResult> fly_closed_loop(const sim::World& world, const Plan& pl
       {0, 0}, {world.length_m, 0}, {world.length_m, world.width_m}, {0, world.width_m}};
   Air air(autopilot_of(world, options));
   SimKit kit(world, options.radio, options.seed);
-  InlineFlight flight({kit.mission(), plan, options.live_update_s, options.use_clues}, air.session);
+  InlineFlight flight({kit.mission(), plan, options.live_update_s, options.use_priors}, air.session);
   ClosedLoopResult out;
   out.data.mission = kit.mission();
   bool flew = false;
@@ -146,7 +146,7 @@ Result<ClosedLoopResult> fly_closed_loop(const sim::World& world, const Plan& pl
   for (const auto& anchor : world.anchors) out.data.anchor_names[anchor.id] = to_string(anchor.id);
   if (const auto& f = flight.flight()) {
     out.state = f->control.engine().state();
-    if (options.use_clues) out.clues = procedure::clues_in(f->clues(), EnuFrame(*plan.origin));
+    if (options.use_priors) out.priors = procedure::priors_in(f->priors(), EnuFrame(*plan.origin));
   }
   out.landed = !air.autopilot.vehicle().in_air() && out.state.step == Step::done;
   out.home_m = (air.autopilot.vehicle().position_m() - k_home_m).head<2>().norm();

@@ -9,7 +9,7 @@
 #include "core/base/result.hpp"
 #include "core/flight/operations.hpp"
 #include "core/localize/flight_solver.hpp"
-#include "core/procedure/flight_clues.hpp"
+#include "core/procedure/flight_priors.hpp"
 #include "core/procedure/machine.hpp"
 #include "core/types/flight_data.hpp"
 #include "core/types/plan.hpp"
@@ -27,14 +27,14 @@ struct ClosedLoopOptions {
   sim::RadioOptions radio{};
   sim::AutopilotOptions autopilot{};  ///< origin, home and vehicle are those of the world and of here
   double live_update_s = 4;           ///< of the running estimates
-  bool use_clues = true;              ///< what turns and height searches told is a prior
+  bool use_priors = true;             ///< what turns and height searches told is a prior
 };
 
 /// What was flown and what came of it; places in truth.
 struct ClosedLoopResult {
   FlightData data;
-  std::map<NetworkId, AnchorClues> clues;  ///< for the solve; in metres of the plan's origin
-  std::vector<Estimate> live;              ///< as they stood at the end of the flight
+  std::map<NetworkId, AnchorPriors> priors;  ///< for the solve; in metres of the plan's origin
+  std::vector<Estimate> live;                ///< as they stood at the end of the flight
   procedure::State state;
   double flight_s{}, wall_s{};
   std::vector<std::pair<double, LogEvent>> log;  ///< with the flight's time

@@ -35,9 +35,9 @@ void InlineFlight::step(const Now& now, std::span<const Fix> fixes, std::span<co
   std::optional<Operations::Estimates> estimates;
   if (deciding && live_.origin()) estimates = {*live_.origin(), live_.estimates()};
   operations_.round(now, estimates, deciding);
-  if (!setup_.use_clues || !f || clues_ == f->control.engine().clues_version()) return;
-  clues_ = f->control.engine().clues_version();
-  live_.use_clues(f->clues());
+  if (!setup_.use_priors || !f || priors_ == f->control.engine().priors_version()) return;
+  priors_ = f->control.engine().priors_version();
+  live_.use_priors(f->priors());
 }
 
 Result<void> InlineFlight::start(const Now& now) {

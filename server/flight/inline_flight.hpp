@@ -19,7 +19,7 @@ class InlineFlight {
     Mission mission;
     Plan plan;  ///< with its origin: the frame of all estimates
     double live_update_s = 4;
-    bool use_clues = true;  ///< what turns and height searches told is a prior of the running estimates
+    bool use_priors = true;  ///< what turns and height searches told is a prior of the running estimates
   };
   /// The drone outlives it.
   InlineFlight(Setup setup, Drone& drone);
@@ -50,7 +50,7 @@ class InlineFlight {
   Setup setup_;
   LiveMission live_;
   Operations operations_;
-  std::uint64_t clues_{0};
+  std::uint64_t priors_{0};
 };
 
 }  // namespace anchord::flight

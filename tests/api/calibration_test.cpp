@@ -181,7 +181,7 @@ TEST_F(Calibrations, StatedNoiseOfBlockedRangesCountsAndSaysOnHowMany) {
 
 TEST_F(Calibrations, BeginWhereTheyAreTold) {
   MadeFlight flat = made(5);
-  flat.height_swing_m = 0;  // one plane at 6 m: every anchor has a twin above or below
+  flat.height_swing_m = 0;  // one plane at 6 m: every anchor has a mirror solution above or below
   flat.anchors = {{12, 2, 2}, {-10, 8, 2.5}, {3, -14, 2}, {-6, -9, 1.5}};
   const auto mission = flown(flat);
   const auto origin = solved(mission)["origin"];
@@ -200,7 +200,7 @@ TEST_F(Calibrations, BeginWhereTheyAreTold) {
   };
   const auto low = begun(2), high = begun(10);
   for (std::size_t i = 0; i < low.size(); ++i) {
-    // Which twin is told first follows the start; that there are two is told either way.
+    // Which mirror solution is told first follows the start; that there are two is told either way.
     EXPECT_GT(high[i]["enu_m"][2].get<double>() - low[i]["enu_m"][2].get<double>(), 2.0) << i;
     EXPECT_EQ(low[i]["verdict"], "ambiguous");
   }
@@ -209,11 +209,11 @@ TEST_F(Calibrations, BeginWhereTheyAreTold) {
   EXPECT_EQ(solve(mission, {{"initial", 3}}).status, 422);
 }
 
-// Clues so weak that as priors they weigh nothing (half the squared misfit is below 0.004): what follows them
-// is where the search begins, and nothing else.
+// Priors so weak that as priors they weigh nothing (half the squared misfit is below 0.004): what follows
+// them is where the search begins, and nothing else.
 TEST_F(Calibrations, BeginWhereBearingAndHeightMeet) {
   MadeFlight flat = made(11);
-  flat.height_swing_m = 0;  // one plane at 6 m: a twin of every anchor 8 to 9 m above it
+  flat.height_swing_m = 0;  // one plane at 6 m: a mirror solution of every anchor 8 to 9 m above it
   flat.anchors = {{12, 2, 2}, {-10, 8, 2.5}, {3, -14, 2}, {-6, -9, 1.5}};
   const auto mission = flown(flat);
   const auto at = solved(mission)["origin"];
@@ -410,9 +410,9 @@ TEST_F(Calibrations, LeaveRangesBetweenAnchorsOutWhereAsked) {
   EXPECT_EQ(notes({{"use_anchor_anchor", false}}).find("distances between anchors"), std::string::npos);
 }
 
-TEST_F(Calibrations, TakeTheOutlineOfTheSiteAsAClueUnlessToldNotTo) {
-  // Before one wall, up and down: the twin of every anchor is as far in front of the wall as the anchor is
-  // behind.
+TEST_F(Calibrations, TakeTheOutlineOfTheSiteAsAPriorUnlessToldNotTo) {
+  // Before one wall, up and down: the mirror solution of every anchor is as far in front of the wall as the
+  // anchor is behind.
   MadeFlight facade = made(8);
   facade.width_m = 0;
   facade.anchors = {{12, 8, 1.5}, {-10, 9, 6}, {3, 12, 2}, {-6, 10, 9}};

@@ -131,10 +131,10 @@ class Listener {
   bool woken_{false};
 };
 
-// A flight up and down before one wall: the twin of every anchor is as far in front of it as the anchor is
-// behind, and the own search of a live anchor cannot tell. The outline the site has can, through the joint
-// solution in flight.
-TEST_F(MissionLive, TakesTheOutlineOfTheSiteAsAClueWhileItFlies) {
+// A flight up and down before one wall: the mirror solution of every anchor is as far in front of it as the
+// anchor is behind, and the own search of a live anchor cannot tell. The outline the site has can, through
+// the joint solution in flight.
+TEST_F(MissionLive, TakesTheOutlineOfTheSiteAsAPriorWhileItFlies) {
   MadeFlight facade;
   facade.frame = TrackFrame::wgs84;
   facade.width_m = 0;

@@ -62,11 +62,11 @@ TEST(CorrectionWorth, IsNotShownByACorrectionThatIsAlikeForAllRanges) {
   EXPECT_NEAR(worth.gain, 0, 0.02);
 }
 
-TEST(CorrectionWorth, IsNotShownByBeliefsThatAreWrong) {
+TEST(CorrectionWorth, IsNotShownByErrorModelsThatAreWrong) {
   const FlightData raw = testing::make_flight(MadeFlight{});
   FlightData believed = raw;
   // Half a metre late in half of the cases, says the model; none is.
-  believed.beliefs.assign(raw.ranges.size(), RangeBelief{0.5, 0, 0.3, 0.5, 0.3, 0.5});
+  believed.error_models.assign(raw.ranges.size(), RangeErrorModel{0.5, 0, 0.3, 0.5, 0.3, 0.5});
   const auto worth = correction_worth(solved(raw), solved(believed), believed);
   EXPECT_FALSE(worth.shown) << worth.text();
 }

@@ -27,18 +27,18 @@ Eigen::Vector3d place(int i) {
 }
 
 /// Unlabelled: 0.3 m and up, 0.65 m on average, as the model was told.
-RangeBelief belief_of(Ranges ranges, bool blocked) {
-  RangeBelief belief;
-  belief.los_sigma_m = los_sigma_m();
+RangeErrorModel error_model_of(Ranges ranges, bool blocked) {
+  RangeErrorModel error_model;
+  error_model.los_sigma_m = los_sigma_m();
   if (ranges == Ranges::labelled) {
-    belief.los_sigma_m = blocked ? nlos_sigma_m() : los_sigma_m();
-    return belief;
+    error_model.los_sigma_m = blocked ? nlos_sigma_m() : los_sigma_m();
+    return error_model;
   }
-  belief.p_los = 1.0 - k_blocked_share;
-  belief.nlos_bias_m = 0.35;
-  belief.nlos_sigma_m = 0.27;
-  belief.nlos_tail_m = 0.3;
-  return belief;
+  error_model.p_los = 1.0 - k_blocked_share;
+  error_model.nlos_bias_m = 0.35;
+  error_model.nlos_sigma_m = 0.27;
+  error_model.nlos_tail_m = 0.3;
+  return error_model;
 }
 
 FlightOptions options_of() {
@@ -83,7 +83,7 @@ CramerRao cramer_rao(Ranges ranges, int flights, std::uint64_t seed) {
         range.anchor = NetworkId{static_cast<std::uint32_t>(0x6000 + a)};
         range.distance_m = way.norm() + late_m + sigma_m * noise(random);
         flight.ranges.push_back(range);
-        if (ranges != Ranges::unmodelled) flight.beliefs.emplace_back(belief_of(ranges, blocked));
+        if (ranges != Ranges::unmodelled) flight.error_models.emplace_back(error_model_of(ranges, blocked));
         const double spread_m2 = late_m > 0 ? 0.49 / 12.0 : 0.0;
         information[a] +=
             way * way.transpose() / (way.squaredNorm() * (sigma_m * sigma_m + k_variance_rtk_m2 + spread_m2));

@@ -29,24 +29,24 @@ TEST(FlightHistory, StaysWithinItsBoundAndKeepsOldAndNewAlike) {
   EXPECT_EQ(history.newest(), kept.ranges.back().time);
 }
 
-TEST(FlightHistory, KeepsEachBeliefWithItsRange) {
+TEST(FlightHistory, KeepsEachErrorModelWithItsRange) {
   FlightHistory history;
   const int n = 60'000;
   for (int i = 0; i < n; ++i) {
     Range range;
     range.time = UtcTime::from_seconds(i);
-    RangeBelief belief;
-    belief.p_los = static_cast<double>(i) / n;
+    RangeErrorModel error_model;
+    error_model.p_los = static_cast<double>(i) / n;
     // The first hundred came before a model was promoted.
-    history.add(range, i < 100 ? std::nullopt : std::optional(belief));
+    history.add(range, i < 100 ? std::nullopt : std::optional(error_model));
   }
   const auto kept = history.data(Mission{});
-  ASSERT_EQ(kept.beliefs.size(), kept.ranges.size());
+  ASSERT_EQ(kept.error_models.size(), kept.ranges.size());
   for (std::size_t i = 0; i < kept.ranges.size(); ++i) {
     const double t_s = kept.ranges[i].time.seconds();
-    ASSERT_EQ(kept.beliefs[i].has_value(), t_s >= 100) << t_s;
+    ASSERT_EQ(kept.error_models[i].has_value(), t_s >= 100) << t_s;
     if (t_s >= 100) {
-      EXPECT_NEAR(kept.beliefs[i]->p_los, t_s / n, 1e-9);
+      EXPECT_NEAR(kept.error_models[i]->p_los, t_s / n, 1e-9);
     }
   }
 }

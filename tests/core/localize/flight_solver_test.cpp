@@ -93,9 +93,9 @@ TEST(FlightSolver, ReportsTheMirrorOfAFlightAtOneHeight) {
     // The path is at 6 m: truth z and 12 - z fit alike, one is given as best and the other as mirror.
     const double z = made.anchors[i].z();
     const double best = a.estimate.best->position.m.z();
-    const double twin = a.estimate.mirror->position.m.z();
-    EXPECT_NEAR(std::min(best, twin), std::min(z, 12 - z), 0.3);
-    EXPECT_NEAR(std::max(best, twin), std::max(z, 12 - z), 0.3);
+    const double mirror = a.estimate.mirror->position.m.z();
+    EXPECT_NEAR(std::min(best, mirror), std::min(z, 12 - z), 0.3);
+    EXPECT_NEAR(std::max(best, mirror), std::max(z, 12 - z), 0.3);
   }
 }
 

@@ -51,8 +51,8 @@ TEST(Geometry, ToleratesNanRows) {
 TEST(Geometry, MirrorsThroughTheFlattestPlane) {
   std::mt19937_64 random(9);
   const auto rows = testing::ranges_from_box(random, k_anchor, 500, {10, 8, 0}, 0);
-  const Eigen::Vector3d twin = track_shape(rows).mirrored(k_anchor);
-  EXPECT_LT((twin - Eigen::Vector3d(3, 8, -2)).norm(), 1e-9);
+  const Eigen::Vector3d mirror = track_shape(rows).mirrored(k_anchor);
+  EXPECT_LT((mirror - Eigen::Vector3d(3, 8, -2)).norm(), 1e-9);
 }
 
 TEST(ErrorEllipse, GivesTheTextbookAxesOfADiagonalCovariance) {

@@ -47,7 +47,7 @@ FlightData facade() {
   return flight;
 }
 
-Eigen::Vector3d twin_m() { return {k_inside.x(), 2 * k_plane_y_m - k_inside.y(), k_inside.z()}; }
+Eigen::Vector3d mirror_m() { return {k_inside.x(), 2 * k_plane_y_m - k_inside.y(), k_inside.z()}; }
 
 Estimate solved(const FlightOptions& options) {
   return solve_flight(facade(), options).value().anchors.front().estimate;
@@ -61,16 +61,16 @@ void expect_inside_alone(const FlightOptions& options) {
   EXPECT_FALSE(e.mirror);
 }
 
-TEST(OneFacade, LeavesBothPlacesBeforeAnyClue) {
+TEST(OneFacade, LeavesBothPlacesBeforeAnyPrior) {
   const Estimate e = solved({});
   ASSERT_TRUE(e.best && e.mirror);
   EXPECT_EQ(e.verdict, Verdict::ambiguous);
   EXPECT_FALSE(e.acceptable());
-  const bool first_inside = (e.best->position.m - k_inside).norm() < (e.best->position.m - twin_m()).norm();
+  const bool first_inside = (e.best->position.m - k_inside).norm() < (e.best->position.m - mirror_m()).norm();
   const auto& in = first_inside ? *e.best : *e.mirror;
   const auto& out = first_inside ? *e.mirror : *e.best;
   EXPECT_LT((in.position.m - k_inside).norm(), 0.5);
-  EXPECT_LT((out.position.m - twin_m()).norm(), 0.5);
+  EXPECT_LT((out.position.m - mirror_m()).norm(), 0.5);
   EXPECT_NEAR(in.probability + out.probability, 1.0, 1e-9);
   EXPECT_LT(std::max(in.probability, out.probability), 0.99);
 }
@@ -79,7 +79,7 @@ TEST(OneFacade, IsDecidedByTheBearingOfTheTurn) {
   FlightOptions options;
   const Eigen::Vector3d turned_at(0, k_plane_y_m, 7);
   // North-east of there, 30 degrees wrong.
-  options.clues[k_id].bearing = {turned_at, std::atan2(3.0, 12.0) + 0.5, 0.35};
+  options.priors[k_id].bearing = {turned_at, std::atan2(3.0, 12.0) + 0.5, 0.35};
   expect_inside_alone(options);
 }
 
@@ -95,12 +95,12 @@ TEST(OneFacade, IsDecidedByTheLevelsOfAnAircraftThatTurns) {
   expect_inside_alone(options);
 }
 
-TEST(OneFacade, FollowsAClueThatIsWrongAsFarAsItsSigmaSays) {
+TEST(OneFacade, FollowsAPriorThatIsWrongAsFarAsItsSigmaSays) {
   FlightOptions options;
-  options.clues[k_id].bearing = {{0, k_plane_y_m, 7}, std::numbers::pi, 0.35};
+  options.priors[k_id].bearing = {{0, k_plane_y_m, 7}, std::numbers::pi, 0.35};
   const Estimate e = solved(options);
   ASSERT_TRUE(e.best);
-  EXPECT_LT((e.best->position.m - twin_m()).norm(), 0.5);
+  EXPECT_LT((e.best->position.m - mirror_m()).norm(), 0.5);
 }
 
 // A facade cannot tell by height, a flight at one height can.
@@ -112,7 +112,7 @@ TEST(OneHeight, IsDecidedByTheHeightSearch) {
   ASSERT_TRUE(before.mirror);
   EXPECT_EQ(before.verdict, Verdict::ambiguous);
   FlightOptions options;
-  options.clues[k_id].height = {5.5, 2.0};
+  options.priors[k_id].height = {5.5, 2.0};
   const auto after = solve_flight(flight, options).value().anchors.front().estimate;
   ASSERT_TRUE(after.best);
   EXPECT_LT((after.best->position.m - anchor).norm(), 0.5) << after.best->position.m.transpose();

@@ -439,12 +439,12 @@ TEST(FlightEngine, ATurnGivesABearingAndAFirstGuess) {
     f.here();
     ASSERT_TRUE(f.engine.command(f.now, Event::arrived, ""));
   }
-  const auto& clues = f.engine.clues().at(k_anchor);
-  ASSERT_TRUE(clues.bearing);
-  EXPECT_NEAR(std::remainder(clues.bearing->bearing_rad - bearing, 2 * std::numbers::pi), 0, 0.2);
-  ASSERT_TRUE(clues.guess_m);
-  EXPECT_NEAR(clues.guess_m->x(), k_place.x() + 25, 1.5) << "25 m to the east";
-  EXPECT_NEAR(clues.guess_m->y(), k_place.y(), 5);
+  const auto& priors = f.engine.priors().at(k_anchor);
+  ASSERT_TRUE(priors.bearing);
+  EXPECT_NEAR(std::remainder(priors.bearing->bearing_rad - bearing, 2 * std::numbers::pi), 0, 0.2);
+  ASSERT_TRUE(priors.guess_m);
+  EXPECT_NEAR(priors.guess_m->x(), k_place.x() + 25, 1.5) << "25 m to the east";
+  EXPECT_NEAR(priors.guess_m->y(), k_place.y(), 5);
 }
 
 TEST(FlightEngine, EveryExpectedAnchorIsDoneOnlyWhenItIs) {

@@ -49,7 +49,7 @@ Row fly(const sim::World& world, std::uint64_t seed) {
   row.wall_s = result.wall_s;
   FlightOptions solve;
   solve.origin = world.origin;
-  solve.clues = result.clues;
+  solve.priors = result.priors;
   const auto solution = solve_flight(thinned_at_rest(result.data), solve);
   EXPECT_TRUE(solution.has_value());
   const auto judged = judge(world, solution.value());
@@ -136,8 +136,8 @@ TEST(ClosedLoop, FindsEveryAnchorThroughWallsFromTheOutlineAlone) {
   }
 }
 
-/// Only the south front may be flown along, in one upright plane, as in a street: what is inside and its twin
-/// in the houses opposite fit alike.
+/// Only the south front may be flown along, in one upright plane, as in a street: what is inside and its
+/// mirror in the houses opposite fit alike.
 Plan street_plan(const sim::World& world) {
   auto plan = plan_from_outline(world).value();
   const EnuFrame frame(world.origin);
@@ -165,12 +165,12 @@ TEST(ClosedLoop, AFlightAlongOneFrontKnowsTheSideFromItsTurn) {
   ASSERT_TRUE(flown.has_value()) << flown.error().message;
   const auto& result = flown.value();
   EXPECT_EQ(procedure::to_string(result.state.step), "done") << result.state.reason;
-  EXPECT_GE(result.clues.size(), 4u);
+  EXPECT_GE(result.priors.size(), 4u);
   FlightOptions options;
   options.origin = world.origin;
   const auto data = thinned_at_rest(result.data);
   const auto blind = solve_flight(data, options);
-  options.clues = result.clues;
+  options.priors = result.priors;
   const auto told = solve_flight(data, options);
   ASSERT_TRUE(blind && told);
   // In doubt, or on the wrong side without a doubt.
@@ -182,7 +182,7 @@ TEST(ClosedLoop, AFlightAlongOneFrontKnowsTheSideFromItsTurn) {
   for (const auto& a : told.value().anchors) {
     n_told += open(a.estimate);
     ASSERT_TRUE(a.estimate.best);
-    if (result.clues.contains(a.estimate.anchor)) {
+    if (result.priors.contains(a.estimate.anchor)) {
       EXPECT_GT(a.estimate.best->position.m.y(), 0) << to_string(a.estimate.anchor);
     } else {
       EXPECT_NE(a.estimate.verdict, Verdict::ok) << "too far for its lobes: nobody claims a side";
@@ -191,7 +191,7 @@ TEST(ClosedLoop, AFlightAlongOneFrontKnowsTheSideFromItsTurn) {
   for (const auto& e : result.live) {
     n_live += open(e);
     ASSERT_TRUE(e.best);
-    if (result.clues.contains(e.anchor)) {
+    if (result.priors.contains(e.anchor)) {
       EXPECT_GT(e.best->position.m.y(), 0) << to_string(e.anchor) << " in the air";
     }
   }

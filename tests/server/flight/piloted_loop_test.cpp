@@ -53,7 +53,7 @@ TEST(PilotedLoop, LandsAtHomeClearOfTheBuildingAndFindsTheAnchorsWithEverythingO
         std::printf("%8.1f  %-28s %s\n", time_s, line.code.c_str(), line.text.c_str());
     FlightOptions solve;
     solve.origin = world.origin;
-    solve.clues = r.clues;
+    solve.priors = r.priors;
     const auto solution = solve_flight(thinned_at_rest(r.data), solve);
     ASSERT_TRUE(solution) << "seed " << seed << ": " << r.state.reason;
     const auto judged = judge(world, solution.value());

@@ -132,9 +132,9 @@ TEST_P(LearningStoreContract, CountsARepeatedSampleAndRefusesAnotherTruthForASet
 
 TEST_P(LearningStoreContract, KeepsNamesOfCampaignsApartAndVersionsInOrder) {
   auto c = stored_campaign();
-  CampaignRecord twin = c;
-  twin.id = CampaignId{make_uuid_v7(k_noon)};
-  EXPECT_EQ(db_->stores().campaigns.insert(twin).error().code, Errc::conflict);
+  CampaignRecord mirror = c;
+  mirror.id = CampaignId{make_uuid_v7(k_noon)};
+  EXPECT_EQ(db_->stores().campaigns.insert(mirror).error().code, Errc::conflict);
   c.note = "second day";
   ASSERT_TRUE(db_->stores().campaigns.update(c, 1));
   EXPECT_EQ(db_->stores().campaigns.update(c, 1).error().code, Errc::conflict);

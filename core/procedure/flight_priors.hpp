@@ -5,14 +5,14 @@
 
 #include "core/base/ids.hpp"
 #include "core/geo/enu.hpp"
-#include "core/localize/side_clues.hpp"
-#include "core/procedure/clue_book.hpp"
+#include "core/localize/side_priors.hpp"
+#include "core/procedure/prior_book.hpp"
 
 namespace anchord::procedure {
 
 /// What a flight told of one anchor beside its ranges, on the globe: kept with the mission, and good for
 /// whatever frame the answers are in.
-struct FlightClue {
+struct FlightPrior {
   struct Bearing {
     Wgs84 from{};          ///< where the aircraft turned
     double bearing_rad{};  ///< of the anchor, clockwise from north
@@ -25,18 +25,18 @@ struct FlightClue {
   };
   std::optional<Height> height{};
 };
-using FlightClues = std::map<NetworkId, FlightClue>;
+using FlightPriors = std::map<NetworkId, FlightPrior>;
 
 /// Bearings and heights concluded so far. `plan`: the frame of the engine's metres.
 /// A height whose best level lay at an end of the search, or whose peak does not stand out of the noise, is
 /// left out.
-FlightClues flight_clues(const std::map<NetworkId, Clues>& clues, const EnuFrame& plan);
+FlightPriors flight_priors(const std::map<NetworkId, Priors>& priors, const EnuFrame& plan);
 
 /// The same as priors in the frame of the answers. North of two frames a kilometre apart differs by a
 /// hundredth of a degree: bearings are taken over as they are.
-std::map<NetworkId, AnchorClues> clues_in(const FlightClues& clues, const EnuFrame& answers);
+std::map<NetworkId, AnchorPriors> priors_in(const FlightPriors& priors, const EnuFrame& answers);
 
 /// What `newer` says replaces what `older` said, anchor by anchor and kind by kind.
-FlightClues merged(FlightClues older, const FlightClues& newer);
+FlightPriors merged(FlightPriors older, const FlightPriors& newer);
 
 }  // namespace anchord::procedure

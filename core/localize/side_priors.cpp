@@ -1,4 +1,4 @@
-#include "core/localize/side_clues.hpp"
+#include "core/localize/side_priors.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -45,16 +45,16 @@ double outside_outline_m(std::span<const Eigen::Vector2d> outline_m, const Eigen
   return outside_m(outline_m, place_m.head<2>(), nullptr);
 }
 
-std::array<ClueRow, 3> clue_rows(const AnchorClues& clues, std::span<const Eigen::Vector2d> outline_m,
-                                 double outline_sigma_m, const Eigen::Vector3d& place_m) {
-  std::array<ClueRow, 3> rows;
-  if (const auto& b = clues.bearing) {
+std::array<PriorRow, 3> prior_rows(const AnchorPriors& priors, std::span<const Eigen::Vector2d> outline_m,
+                                   double outline_sigma_m, const Eigen::Vector3d& place_m) {
+  std::array<PriorRow, 3> rows;
+  if (const auto& b = priors.bearing) {
     const Eigen::Vector2d way = (place_m - b->tag_m).head<2>();
     const double far2 = std::max(way.squaredNorm(), 1.0);  // right above there is no bearing to speak of
     rows[0] = {Eigen::Vector3d(way.y(), -way.x(), 0) / (far2 * b->sigma_rad),
                wrapped(b->bearing_rad - bearing_of(b->tag_m, place_m)) / b->sigma_rad};
   }
-  if (const auto& h = clues.height)
+  if (const auto& h = priors.height)
     rows[1] = {Eigen::Vector3d::UnitZ() / h->sigma_m, (h->up_m - place_m.z()) / h->sigma_m};
   Eigen::Vector2d away(0, 0);
   const double outside = outside_m(outline_m, place_m.head<2>(), &away);
@@ -66,18 +66,18 @@ std::array<ClueRow, 3> clue_rows(const AnchorClues& clues, std::span<const Eigen
   return rows;
 }
 
-double clue_cost(const AnchorClues& clues, std::span<const Eigen::Vector2d> outline_m, double outline_sigma_m,
-                 const Eigen::Vector3d& place_m) {
+double prior_cost(const AnchorPriors& priors, std::span<const Eigen::Vector2d> outline_m,
+                  double outline_sigma_m, const Eigen::Vector3d& place_m) {
   double squares = 0;
-  for (const ClueRow& row : clue_rows(clues, outline_m, outline_sigma_m, place_m))
+  for (const PriorRow& row : prior_rows(priors, outline_m, outline_sigma_m, place_m))
     squares += row.missing * row.missing;
   return 0.5 * squares;
 }
 
-ClueNormal clue_normal(const AnchorClues& clues, std::span<const Eigen::Vector2d> outline_m,
-                       double outline_sigma_m, const Eigen::Vector3d& place_m) {
-  ClueNormal normal;
-  for (const ClueRow& row : clue_rows(clues, outline_m, outline_sigma_m, place_m)) {
+PriorNormal prior_normal(const AnchorPriors& priors, std::span<const Eigen::Vector2d> outline_m,
+                         double outline_sigma_m, const Eigen::Vector3d& place_m) {
+  PriorNormal normal;
+  for (const PriorRow& row : prior_rows(priors, outline_m, outline_sigma_m, place_m)) {
     normal.information += row.slope * row.slope.transpose();
     normal.gradient += row.slope * row.missing;
   }

@@ -1,4 +1,4 @@
-#include "core/localize/belief_likelihood.hpp"
+#include "core/localize/error_model_likelihood.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -30,23 +30,23 @@ double delayed_density(double z, double sigma, double tau) {
 
 }  // namespace
 
-BeliefValue belief_value(const RangeBelief& belief, double error_m, double variance_m2) {
-  const double p = std::clamp(belief.p_los, 0.0, 1.0);
-  const double los_m = std::sqrt(std::max(belief.los_sigma_m, k_least_sigma_m) *
-                                     std::max(belief.los_sigma_m, k_least_sigma_m) +
+ErrorModelValue error_model_value(const RangeErrorModel& error_model, double error_m, double variance_m2) {
+  const double p = std::clamp(error_model.p_los, 0.0, 1.0);
+  const double los_m = std::sqrt(std::max(error_model.los_sigma_m, k_least_sigma_m) *
+                                     std::max(error_model.los_sigma_m, k_least_sigma_m) +
                                  variance_m2);
-  const double nlos_m = std::sqrt(std::max(belief.nlos_sigma_m, k_least_sigma_m) *
-                                      std::max(belief.nlos_sigma_m, k_least_sigma_m) +
+  const double nlos_m = std::sqrt(std::max(error_model.nlos_sigma_m, k_least_sigma_m) *
+                                      std::max(error_model.nlos_sigma_m, k_least_sigma_m) +
                                   variance_m2);
-  const double tau_m = std::max(belief.nlos_tail_m, 0.01);
-  const double z_los = (error_m - belief.los_bias_m) / los_m;
-  const double z_nlos = (error_m - belief.nlos_bias_m) / nlos_m;
+  const double tau_m = std::max(error_model.nlos_tail_m, 0.01);
+  const double z_los = (error_m - error_model.los_bias_m) / los_m;
+  const double z_nlos = (error_m - error_model.nlos_bias_m) / nlos_m;
   const double los = p * normal_density(z_los, los_m);
   const double delayed = (1 - p) * delayed_density(z_nlos, nlos_m, tau_m);
   // g' = (N - g) / tau, for g is N smoothed by the exponential.
   const double delayed_slope = ((1 - p) * normal_density(z_nlos, nlos_m) - delayed) / tau_m;
   const double density = los + delayed + k_stray;
-  BeliefValue value;
+  ErrorModelValue value;
   value.p_los = los / density;
   value.density_per_m = density;
   value.score_per_m = (los * z_los / los_m - delayed_slope) / density;
@@ -57,9 +57,10 @@ BeliefValue belief_value(const RangeBelief& belief, double error_m, double varia
   return value;
 }
 
-double expected_error_m(const RangeBelief& belief) {
-  const double p = std::clamp(belief.p_los, 0.0, 1.0);
-  return p * belief.los_bias_m + (1 - p) * (belief.nlos_bias_m + std::max(belief.nlos_tail_m, 0.01));
+double expected_error_m(const RangeErrorModel& error_model) {
+  const double p = std::clamp(error_model.p_los, 0.0, 1.0);
+  return p * error_model.los_bias_m +
+         (1 - p) * (error_model.nlos_bias_m + std::max(error_model.nlos_tail_m, 0.01));
 }
 
 }  // namespace anchord

@@ -10,9 +10,9 @@
 
 namespace anchord {
 
-/// What tells an anchor from its twin on the other side of the wall, or above from below. Each is a prior
-/// with a sigma of its own; any may be absent.
-struct AnchorClues {
+/// What tells an anchor from its mirror solution on the other side of the wall, or above from below. Each is
+/// a prior with a sigma of its own; any may be absent.
+struct AnchorPriors {
   struct Bearing {
     Eigen::Vector3d tag_m{0, 0, 0};  ///< where the aircraft turned, ENU or local metres
     double bearing_rad{};            ///< of the anchor from there, clockwise from north (the y axis)
@@ -33,21 +33,21 @@ struct LevelSample {
   double rss_dbm{};
 };
 
-/// What one clue asks of a place: `missing` sigmas along `slope` (sigmas per metre). Zero where it asks
+/// What one prior asks of a place: `missing` sigmas along `slope` (sigmas per metre). Zero where it asks
 /// nothing. Bearing, height, outline.
-struct ClueRow {
+struct PriorRow {
   Eigen::Vector3d slope{0, 0, 0};
   double missing{};
 };
-std::array<ClueRow, 3> clue_rows(const AnchorClues& clues, std::span<const Eigen::Vector2d> outline_m,
-                                 double outline_sigma_m, const Eigen::Vector3d& place_m);
+std::array<PriorRow, 3> prior_rows(const AnchorPriors& priors, std::span<const Eigen::Vector2d> outline_m,
+                                   double outline_sigma_m, const Eigen::Vector3d& place_m);
 
 /// Half the squared misfit of a place, in sigmas: differences between two places are log odds.
 /// outline_m  corners of the building, ENU or local metres, empty for none: anchors are inside, and each
 /// metre
 ///            outside costs as the sigma says
-double clue_cost(const AnchorClues& clues, std::span<const Eigen::Vector2d> outline_m, double outline_sigma_m,
-                 const Eigen::Vector3d& place_m);
+double prior_cost(const AnchorPriors& priors, std::span<const Eigen::Vector2d> outline_m,
+                  double outline_sigma_m, const Eigen::Vector3d& place_m);
 
 /// Metres a place is outside of the outline; 0 within it, and without one.
 double outside_outline_m(std::span<const Eigen::Vector2d> outline_m, const Eigen::Vector3d& place_m);
@@ -58,11 +58,11 @@ double outside_outline_m(std::span<const Eigen::Vector2d> outline_m, const Eigen
 double level_cost(std::span<const LevelSample> samples, const Eigen::Vector3d& place_m, double sigma_db);
 
 /// The same as Gaussian rows at a place: information and gradient to add to its normal equations.
-struct ClueNormal {
+struct PriorNormal {
   Eigen::Matrix3d information{Eigen::Matrix3d::Zero()};
   Eigen::Vector3d gradient{Eigen::Vector3d::Zero()};
 };
-ClueNormal clue_normal(const AnchorClues& clues, std::span<const Eigen::Vector2d> outline_m,
-                       double outline_sigma_m, const Eigen::Vector3d& place_m);
+PriorNormal prior_normal(const AnchorPriors& priors, std::span<const Eigen::Vector2d> outline_m,
+                         double outline_sigma_m, const Eigen::Vector3d& place_m);
 
 }  // namespace anchord

@@ -1,4 +1,4 @@
-#include "api/calibration/clues_json.hpp"
+#include "api/calibration/priors_json.hpp"
 
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -31,12 +31,12 @@ void read_outline(const nlohmann::json& list, const std::string& at, FlightOptio
   }
 }
 
-void read_anchor(const nlohmann::json& value, const std::string& at, AnchorClues& clues,
+void read_anchor(const nlohmann::json& value, const std::string& at, AnchorPriors& priors,
                  std::vector<FieldError>& errors) {
   Fields fields(value, at, errors);
   if (const auto* bearing = fields.child("bearing")) {
     Fields inner(*bearing, at + "/bearing", errors);
-    AnchorClues::Bearing out;
+    AnchorPriors::Bearing out;
     const auto from = inner.numbers("from_m", 3, -k_far_m, k_far_m, true);
     const auto degrees = inner.number("bearing_deg", -360, 360, true);
     if (const auto sigma = inner.number("sigma_deg", 1, 180)) out.sigma_rad = *sigma * k_degree;
@@ -44,18 +44,18 @@ void read_anchor(const nlohmann::json& value, const std::string& at, AnchorClues
     if (from && degrees) {
       out.tag_m = {(*from)[0], (*from)[1], (*from)[2]};
       out.bearing_rad = *degrees * k_degree;
-      clues.bearing = out;
+      priors.bearing = out;
     }
   }
   if (const auto* height = fields.child("height")) {
     Fields inner(*height, at + "/height", errors);
-    AnchorClues::Height out;
+    AnchorPriors::Height out;
     const auto up = inner.number("up_m", -1000, 10'000, true);
     if (const auto sigma = inner.number("sigma_m", 0.01, 100)) out.sigma_m = *sigma;
     inner.finish();
     if (up) {
       out.up_m = *up;
-      clues.height = out;
+      priors.height = out;
     }
   }
   fields.finish();
@@ -63,8 +63,8 @@ void read_anchor(const nlohmann::json& value, const std::string& at, AnchorClues
 
 }  // namespace
 
-void read_clues(const nlohmann::json& value, const std::string& base, FlightOptions& options,
-                std::vector<FieldError>& errors) {
+void read_priors(const nlohmann::json& value, const std::string& base, FlightOptions& options,
+                 std::vector<FieldError>& errors) {
   Fields fields(value, base, errors);
   if (const auto* outline = fields.child("outline_m"))
     read_outline(*outline, base + "/outline_m", options, errors);
@@ -74,9 +74,9 @@ void read_clues(const nlohmann::json& value, const std::string& base, FlightOpti
     if (!anchors->is_object() || anchors->size() > 1000) {
       errors.push_back({base + "/anchors", "wrong_type", "an object: anchor id -> its priors"});
     } else {
-      for (const auto& [id, clues] : anchors->items()) {
+      for (const auto& [id, priors] : anchors->items()) {
         const std::string at = base + "/anchors/" + to_utf8(id, 40);
-        read_anchor(clues, at, options.clues[network_id_of(id)], errors);
+        read_anchor(priors, at, options.priors[network_id_of(id)], errors);
       }
     }
   }

@@ -8,7 +8,7 @@ namespace anchord {
 /// density of e = range - distance:
 ///   p_los N(e; los_bias_m, los_sigma_m) + (1 - p_los) EMG(e; nlos_bias_m, nlos_sigma_m, nlos_tail_m)
 /// EMG = Gaussian plus an exponential delay of mean nlos_tail_m: a blocked path arrives late, never early.
-struct RangeBelief {
+struct RangeErrorModel {
   double p_los{1};
   double los_bias_m{0};
   double los_sigma_m{0.049};  ///< sqrt(2401 mm^2), dissertation 7.2.3

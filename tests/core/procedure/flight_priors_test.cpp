@@ -1,6 +1,6 @@
 // What a flight's turns and height searches tell: kept on the globe, priors in any frame, and what decides
-// between an anchor and its twin while the flight is in the air.
-#include "core/procedure/flight_clues.hpp"
+// between an anchor and its mirror solution while the flight is in the air.
+#include "core/procedure/flight_priors.hpp"
 
 #include <gtest/gtest.h>
 
@@ -17,20 +17,20 @@ constexpr NetworkId k_anchor{0x6a21}, k_other{0x6a22};
 constexpr double k_plane_y_m = -8;
 const Eigen::Vector3d k_inside(3, 4, 5), k_turned_at(0, k_plane_y_m, 7);
 
-TEST(FlightClues, MeanTheSameInAnotherFrame) {
+TEST(FlightPriors, MeanTheSameInAnotherFrame) {
   const EnuFrame plan({51.0231, 3.7131, 55.5}), answers({51.0271, 3.7131, 60.0});
-  std::map<NetworkId, Clues> found;
+  std::map<NetworkId, Priors> found;
   found[k_anchor].bearing = Bearing{1.2, 0.4, 0.8};
   found[k_anchor].turned_at_m = k_turned_at;
   found[k_anchor].height = HeightGuess{5, 0.3, 9, false};
   found[k_anchor].climbed_at_m = k_turned_at;
   found[k_other].height = HeightGuess{9, 1.5, 0, true};
   found[k_other].climbed_at_m = k_turned_at;
-  const auto kept = flight_clues(found, plan);
+  const auto kept = flight_priors(found, plan);
   found[k_other].height = HeightGuess{9, 1.0, 2, false};
-  EXPECT_EQ(flight_clues(found, plan).size(), 1u) << "a peak of the noise";
+  EXPECT_EQ(flight_priors(found, plan).size(), 1u) << "a peak of the noise";
   ASSERT_EQ(kept.size(), 1u) << "the best level of the other lay at the end of its search";
-  const auto here = clues_in(kept, plan), there = clues_in(kept, answers);
+  const auto here = priors_in(kept, plan), there = priors_in(kept, answers);
   EXPECT_LT((here.at(k_anchor).bearing->tag_m - k_turned_at).norm(), 1e-6);
   EXPECT_DOUBLE_EQ(here.at(k_anchor).bearing->bearing_rad, 1.2);
   EXPECT_DOUBLE_EQ(here.at(k_anchor).bearing->sigma_rad, 0.4);
@@ -41,18 +41,18 @@ TEST(FlightClues, MeanTheSameInAnotherFrame) {
   EXPECT_NEAR(there.at(k_anchor).height->up_m, 5 - 4.5, 0.03);
 }
 
-TEST(FlightClues, OfALaterTurnReplaceTheFormer) {
-  FlightClues before, after;
-  before[k_anchor].bearing = FlightClue::Bearing{{}, 1, 0.4};
-  before[k_anchor].height = FlightClue::Height{{}, 1};
-  after[k_anchor].bearing = FlightClue::Bearing{{}, 2, 0.4};
+TEST(FlightPriors, OfALaterTurnReplaceTheFormer) {
+  FlightPriors before, after;
+  before[k_anchor].bearing = FlightPrior::Bearing{{}, 1, 0.4};
+  before[k_anchor].height = FlightPrior::Height{{}, 1};
+  after[k_anchor].bearing = FlightPrior::Bearing{{}, 2, 0.4};
   const auto both = merged(before, after);
   EXPECT_EQ(both.at(k_anchor).bearing->bearing_rad, 2);
   EXPECT_TRUE(both.at(k_anchor).height);
 }
 
-/// A live flight in one upright plane before the facade: an anchor in the building and its twin in the open
-/// fit alike.
+/// A live flight in one upright plane before the facade: an anchor in the building and its mirror solution in
+/// the open fit alike.
 LiveFlight facade() {
   std::mt19937_64 random(5);
   std::normal_distribution<double> noise(0, 1);
@@ -78,17 +78,17 @@ LiveFlight facade() {
   return live;
 }
 
-AnchorClues seen_at(double bearing_rad, double sigma_rad) {
-  AnchorClues clues;
-  clues.bearing = {k_turned_at, bearing_rad, sigma_rad};
-  return clues;
+AnchorPriors seen_at(double bearing_rad, double sigma_rad) {
+  AnchorPriors priors;
+  priors.bearing = {k_turned_at, bearing_rad, sigma_rad};
+  return priors;
 }
 double bearing_of(const Eigen::Vector3d& place_m) {
   const Eigen::Vector3d way = place_m - k_turned_at;
   return std::atan2(way.x(), way.y());
 }
 
-TEST(LiveTwins, StandBothUntilTheTurnHasTold) {
+TEST(LiveMirrors, StandBothUntilTheTurnHasTold) {
   auto live = facade();
   live.finish();
   const auto before = live.estimates().front();
@@ -96,9 +96,9 @@ TEST(LiveTwins, StandBothUntilTheTurnHasTold) {
   EXPECT_EQ(before.verdict, Verdict::ambiguous);
 }
 
-TEST(LiveTwins, AreDecidedByTheTurnWhicheverCameFirst) {
-  const Eigen::Vector3d twin(k_inside.x(), 2 * k_plane_y_m - k_inside.y(), k_inside.z());
-  for (const auto& wanted : {k_inside, twin}) {
+TEST(LiveMirrors, AreDecidedByTheTurnWhicheverCameFirst) {
+  const Eigen::Vector3d mirror(k_inside.x(), 2 * k_plane_y_m - k_inside.y(), k_inside.z());
+  for (const auto& wanted : {k_inside, mirror}) {
     auto live = facade();
     live.tell({{k_anchor, seen_at(bearing_of(wanted) + 0.3, 0.35)}});
     live.finish();
@@ -110,7 +110,7 @@ TEST(LiveTwins, AreDecidedByTheTurnWhicheverCameFirst) {
   }
 }
 
-TEST(LiveTwins, StandBothWhenTheBearingIsWeak) {
+TEST(LiveMirrors, StandBothWhenTheBearingIsWeak) {
   auto live = facade();
   live.tell({{k_anchor, seen_at(bearing_of(k_inside), 100 * std::numbers::pi / 180)}});
   live.finish();

@@ -13,7 +13,7 @@
 namespace anchord::procedure {
 
 /// What a turn and a height search told of one anchor (8.3.5, 8.3.6) before its position is known.
-struct Clues {
+struct Priors {
   std::vector<TurnSample> turn;
   std::vector<HeightSample> heights;
   std::optional<Bearing> bearing{};
@@ -24,10 +24,10 @@ struct Clues {
 
 /// Collects RSS while the aircraft turns and climbs and concludes when it has. Metres of the plan's origin.
 /// Bounded: at most 2 000 samples of a kind for each anchor. Not thread-safe.
-class ClueBook {
+class PriorBook {
  public:
   /// `default_height_m`: of the first guess where no height search gave one.
-  explicit ClueBook(double default_height_m) : default_height_m_(default_height_m) {}
+  explicit PriorBook(double default_height_m) : default_height_m_(default_height_m) {}
 
   void turned(NetworkId anchor, double heading_rad, double rss_dbm);
   void climbed(NetworkId anchor, double height_m, double rss_dbm);
@@ -41,7 +41,7 @@ class ClueBook {
   /// Whether the turn's samples show a lobe of it; none: there are too few to say.
   std::optional<bool> lobe_seen(NetworkId anchor) const;
 
-  const std::map<NetworkId, Clues>& clues() const { return clues_; }
+  const std::map<NetworkId, Priors>& priors() const { return priors_; }
   std::optional<Eigen::Vector3d> guess_m(NetworkId anchor) const;
   /// Grows whenever a turn or a height search was concluded.
   std::uint64_t version() const { return version_; }
@@ -51,11 +51,11 @@ class ClueBook {
     Eigen::Vector3d tag_m{0, 0, 0};
     double distance_m{};
   };
-  void guess(NetworkId anchor, Clues& clues);
+  void guess(NetworkId anchor, Priors& priors);
 
   double default_height_m_;
   std::uint64_t version_{0};
-  std::map<NetworkId, Clues> clues_;
+  std::map<NetworkId, Priors> priors_;
   std::map<NetworkId, Seen> newest_;
 };
 

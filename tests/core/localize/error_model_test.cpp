@@ -3,15 +3,15 @@
 
 #include <cmath>
 
-#include "core/localize/belief_likelihood.hpp"
+#include "core/localize/error_model_likelihood.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
 namespace anchord {
 namespace {
 
-RangeBelief half() {
-  RangeBelief b;
+RangeErrorModel half() {
+  RangeErrorModel b;
   b.p_los = 0.5;
   b.los_sigma_m = 0.05;
   b.nlos_bias_m = 0.1;
@@ -20,26 +20,26 @@ RangeBelief half() {
   return b;
 }
 
-TEST(BeliefLikelihood, IsAGaussianWhereLineOfSightIsCertain) {
-  RangeBelief b;
+TEST(ErrorModelLikelihood, IsAGaussianWhereLineOfSightIsCertain) {
+  RangeErrorModel b;
   b.los_sigma_m = 0.05;
-  const auto v = belief_value(b, 0.03, 0.0);
+  const auto v = error_model_value(b, 0.03, 0.0);
   // N(0.03; 0, 0.05) = 6.66 per metre against stray 0.001.
   EXPECT_NEAR(v.score_per_m, 0.03 / 0.0025, 0.01);
   EXPECT_NEAR(v.curvature_per_m2, 400.0, 0.2);
   EXPECT_NEAR(v.p_los, 1.0, 1e-3);
 }
 
-TEST(BeliefLikelihood, PullsLateRangesLittleAndEarlyOnesFully) {
-  const auto late = belief_value(half(), 0.8, 0.0), early = belief_value(half(), -0.08, 0.0);
+TEST(ErrorModelLikelihood, PullsLateRangesLittleAndEarlyOnesFully) {
+  const auto late = error_model_value(half(), 0.8, 0.0), early = error_model_value(half(), -0.08, 0.0);
   EXPECT_LT(late.p_los, 1e-6);
   EXPECT_NEAR(late.score_per_m, 1.0 / 0.4, 0.1) << "the tail of an exponential";
   EXPECT_LT(early.score_per_m, -20.0);
 }
 
 // Scores against the logarithm of a density integrated numerically: EMG as a sum over delays.
-TEST(BeliefLikelihood, ScoresAreTheSlopeOfTheDensity) {
-  const RangeBelief b = half();
+TEST(ErrorModelLikelihood, ScoresAreTheSlopeOfTheDensity) {
+  const RangeErrorModel b = half();
   const auto log_density = [&](double e) {
     const auto gauss = [](double x, double s) {
       return std::exp(-0.5 * x * x / (s * s)) / (s * 2.50662827463);
@@ -54,13 +54,13 @@ TEST(BeliefLikelihood, ScoresAreTheSlopeOfTheDensity) {
   for (const double e : {-0.6, -0.1, 0.0, 0.04, 0.2, 0.5, 1.5, 4.0}) {
     const double h = 1e-4;
     const double slope = (log_density(e + h) - log_density(e - h)) / (2 * h);
-    EXPECT_NEAR(belief_value(b, e, 0.0).score_per_m, -slope, 0.002 * std::abs(slope) + 0.01) << e;
+    EXPECT_NEAR(error_model_value(b, e, 0.0).score_per_m, -slope, 0.002 * std::abs(slope) + 0.01) << e;
   }
 }
 
-TEST(BeliefLikelihood, StaysFiniteFarOut) {
+TEST(ErrorModelLikelihood, StaysFiniteFarOut) {
   for (const double e : {-1e4, -50.0, 50.0, 1e4}) {
-    const auto v = belief_value(half(), e, 4e-4);
+    const auto v = error_model_value(half(), e, 4e-4);
     EXPECT_TRUE(std::isfinite(v.score_per_m) && std::isfinite(v.curvature_per_m2)) << e;
   }
 }
@@ -82,11 +82,11 @@ double mean_normalised_square(double noise_m, double believed_m) {
     made.noise_m = noise_m;
     made.duration_s = 60;
     FlightData flight = testing::make_flight(made);
-    RangeBelief belief;
-    belief.p_los = 0.9;
-    belief.los_sigma_m = believed_m;
-    belief.nlos_bias_m = 0.5;
-    flight.beliefs.assign(flight.ranges.size(), belief);
+    RangeErrorModel error_model;
+    error_model.p_los = 0.9;
+    error_model.los_sigma_m = believed_m;
+    error_model.nlos_bias_m = 0.5;
+    flight.error_models.assign(flight.ranges.size(), error_model);
     const auto solution = solve_flight(flight, options);
     EXPECT_TRUE(solution.has_value());
     for (std::size_t a = 0; solution && a < made.anchors.size(); ++a) {
@@ -99,14 +99,14 @@ double mean_normalised_square(double noise_m, double believed_m) {
   return sum / n;
 }
 
-TEST(BeliefLikelihood, IsClaimedInFullWhereItKeepsWhatItPromises) {
+TEST(ErrorModelLikelihood, IsClaimedInFullWhereItKeepsWhatItPromises) {
   // 100 chi-squares with three degrees of freedom: their mean is 3 with a sigma of 0.25.
   EXPECT_NEAR(mean_normalised_square(0.05, 0.05), 3.0, 1.0);
 }
 
 // Unshrunk, the score squared claims (0.1 / 0.05)^4 = 16 times the information there is over 4, and the mean
 // is beyond 12. A quarter more than the sandwich is claimed by rule (chance in its sums).
-TEST(BeliefLikelihood, IsClaimedForLessWhereErrorsAreTwiceWhatItPromises) {
+TEST(ErrorModelLikelihood, IsClaimedForLessWhereErrorsAreTwiceWhatItPromises) {
   const double mean = mean_normalised_square(0.10, 0.05);
   EXPECT_LT(mean, 5.0);
   EXPECT_GT(mean, 1.5) << "nor is everything thrown away";
