@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <condition_variable>
-#include <mutex>
 #include <nlohmann/json.hpp>
 
 #include "api/admin/access.hpp"
@@ -38,6 +37,7 @@
 #include "api/stream/hub.hpp"
 #include "api/wire/live_writer.hpp"
 #include "core/base/guard.hpp"
+#include "core/base/locked.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/backups.hpp"
@@ -285,9 +285,9 @@ struct Application::State {
   FlightApi flight_api;
   LearningStores learning_stores;
   LearningApi learning_api;
-  std::mutex mutex;
+  Locked<bool> stopping{false};
   std::condition_variable stop_told;
-  bool stopping{false}, started{false};
+  bool started{false};
   Thread heart;
 };
 
@@ -302,14 +302,13 @@ std::string Application::State::device_rows() {
 
 /// Mission states each half second, the rest each second.
 void Application::State::beat() {
-  std::unique_lock lock(mutex);
-  for (std::uint64_t n = 1; !stopping; ++n) {
-    stop_told.wait_for(lock, std::chrono::milliseconds(500), [&] { return stopping; });
-    if (stopping) return;
-    lock.unlock();
+  for (std::uint64_t n = 1;; ++n) {
+    {
+      auto stop = stopping.lock();
+      if (stop.wait_for(stop_told, std::chrono::milliseconds(500), [](bool told) { return told; })) return;
+    }
     (void)guarded("mission states", [this] { missions.tick(); });
     if (n % 2 == 0) second();
-    lock.lock();
   }
 }
 
@@ -451,10 +450,7 @@ void Application::fly() { state_->flights.step(); }
 void Application::housekeeping_round() { state_->housekeeping.round(); }
 
 void Application::stop() {
-  {
-    const std::scoped_lock lock(state_->mutex);
-    if (std::exchange(state_->stopping, true)) return;
-  }
+  if (state_->stopping.exchange(true)) return;
   state_->stop_told.notify_all();
   if (state_->heart.joinable()) state_->heart.join();
   state_->housekeeping.stop();

@@ -1,7 +1,7 @@
 # The dependency rule of the house as a test: who may include what, read off every #include of the product.
 #   cmake -DROOT=<project> -P tests/layering_test.cmake                checks the project
 #   cmake -DSELF_TEST=<scratch dir> -P tests/layering_test.cmake       checks that a broken rule is found
-# And what only one file may do, for everybody: the table `single` below.
+# And what only one file may do, for everybody: the table `single` below; and which mutexes there are.
 cmake_minimum_required(VERSION 3.25)
 
 # The libraries, one row a folder, the deepest first; the project's own folders are below (rows):
@@ -95,7 +95,7 @@ set(migrations_source "^$")
 # What is done in one place: a regular expression on lines, the files that may, and why nobody else. Of a rule with
 # _in only the files that match it are held to it.
 set(single dump thread catch pure home)
-set(pure_line "[a-z_]clock(::|\\(\\)\\.|\\.)now\\(|[cC]lock\\.now\\(|std::(recursive_|shared_)?mutex|std::atomic|std::thread|std::condition_variable|make_uuid_v7")
+set(pure_line "[a-z_]clock(::|\\(\\)\\.|\\.)now\\(|[cC]lock\\.now\\(|std::(recursive_|shared_)?mutex|Locked<|std::atomic|std::thread|std::condition_variable|make_uuid_v7")
 set(pure_files "^$")
 set(pure_in "^core/(flight|procedure|localize/live_)")
 set(pure_why "a live flight is driven by calls that bring their time (core/flight/README.md): no clock, lock, thread or chance")
@@ -111,6 +111,31 @@ set(thread_why "a thread is a Thread (core/base/guard.hpp): what it throws besid
 set(catch_line "catch \\(\\.\\.\\.\\)")
 set(catch_files "^core/(base/guard\\.[ch]pp|ml/parallel\\.cpp)$")
 set(catch_why "catching everything is guarded()'s (core/base/guard.hpp): there is no other door")
+
+# Every std::mutex there is beside Locked's own, as FILE:NAME. Data that a lock guards lives inside it (core/base/locked.hpp);
+# a plain mutex serialises an action, and its name says which.
+set(mutex_line "std::[a-z_]*mutex +[a-z0-9_]+ *[;,{=]")
+set(mutexes
+  api/anchors/contradiction_watch.hpp:comparing_  # published anchors with later flights
+  api/devices/device_stream.hpp:changing_         # whose the devices are: told to them and to the disk
+  api/learning/model_registry.hpp:reloading_      # the promoted models
+  api/missions/mission_service_state.hpp:reading_one  # a flight read back from the store
+  server/runtime/backup_keeper.hpp:making_        # a backup
+  server/runtime/device_manager.cpp:saving_       # devices.json
+  server/runtime/worker_main.cpp:writing          # a frame to the server
+  )
+
+# mutexes_of(ROOT FILE OUT): those of a file, as above.
+function(mutexes_of root file out)
+  file(STRINGS "${root}/${file}" lines REGEX "${mutex_line}")
+  set(found "")
+  foreach(line IN LISTS lines)
+    if(line MATCHES "std::[a-z_]*mutex +([a-z0-9_]+)")
+      list(APPEND found "${file}:${CMAKE_MATCH_1}")
+    endif()
+  endforeach()
+  set(${out} "${found}" PARENT_SCOPE)
+endfunction()
 
 # folder_of(PATH OUT): the row a path belongs to, its first two names, or the first where it stands in that folder itself.
 function(folder_of path out)
@@ -144,8 +169,8 @@ function(read_rows rows out)
 endfunction()
 read_rows("${rows}" rows_broken)
 
-# idle_of(ROOT OUT): folders a row names although nothing includes them any more, and parts of api whose library names
-# others than its row.
+# idle_of(ROOT OUT): folders a row names although nothing includes them any more, parts of api whose library names
+# others than its row, and mutexes that are listed and gone.
 function(idle_of root out)
   set(found "")
   foreach(name IN LISTS row_names)
@@ -180,6 +205,16 @@ function(idle_of root out)
       endif()
     endif()
   endforeach()
+  foreach(one IN LISTS mutexes)
+    string(REGEX REPLACE ":.*" "" file "${one}")
+    set(own "")
+    if(EXISTS "${root}/${file}")
+      mutexes_of("${root}" "${file}" own)
+    endif()
+    if(NOT one IN_LIST own)
+      list(APPEND found "the list of mutexes names ${one}, which is not there any more: take it out")
+    endif()
+  endforeach()
   set(${out} "${found}" PARENT_SCOPE)
 endfunction()
 
@@ -207,6 +242,12 @@ function(violations_of root out)
           if(lines)
             list(APPEND found "${file}: ${${rule}_why}")
           endif()
+        endif()
+      endforeach()
+      mutexes_of("${root}" "${file}" own)
+      foreach(one IN LISTS own)
+        if(NOT one IN_LIST mutexes)
+          list(APPEND found "${one}: data and its mutex are a Locked (core/base/locked.hpp), and one that serialises an action is listed in tests/layering_test.cmake")
         endif()
       endforeach()
       file(STRINGS "${root}/${file}" lines REGEX "^[ \t]*#[ \t]*include")
@@ -318,8 +359,16 @@ if(SELF_TEST)
   expect_text(core/flight/a.cpp "const auto now = std::chrono::steady_clock::now();" broken)
   expect_text(core/flight/a.cpp "out.at = deps.clock.now();" broken)
   expect_text(core/flight/a.hpp "  std::mutex mutex_;" broken)
+  expect_text(core/flight/a.hpp "  Locked<int> state_;" broken)
   expect_text(core/flight/a.hpp "  const Now now; clock(now)" clean)
-  expect_text(api/missions/a.hpp "  std::mutex mutex_;" clean)
+  expect_text(api/missions/a.hpp "  std::mutex mutex_;" broken)
+  expect_text(api/missions/a.hpp "  mutable std::shared_mutex mutex;" broken)
+  expect_text(api/missions/a.cpp "  std::timed_mutex changing_{};" broken)
+  expect_text(api/missions/a.cpp "  std::mutex first, second;" broken)
+  expect_text(api/missions/a.hpp "  Locked<int> state_; const std::scoped_lock one(changing_)" clean)
+  expect_text(api/missions/a.hpp "  Locked<int, std::shared_mutex> state_; void take(std::mutex& other)" clean)
+  expect_text(api/devices/device_stream.hpp "  std::mutex changing_;" clean)
+  expect_text(api/devices/device_stream.hpp "  std::mutex mutex_;" broken)
   expect_text(api/missions/a.hpp "  LiveFlight live;" broken)
   expect_text(api/missions/a.hpp "  procedure::FlightControl control;" broken)
   expect_text(api/missions/a.hpp "  flight::LiveMission live;" clean)

@@ -4,12 +4,11 @@
 #include <array>
 #include <deque>
 #include <map>
-#include <mutex>
-#include <shared_mutex>
 #include <utility>
 
 #include "api/admin/secrets.hpp"
 #include "api/kit/idempotency.hpp"
+#include "core/base/locked.hpp"
 #include "core/base/text.hpp"
 
 namespace anchord::api {
@@ -57,6 +56,62 @@ SteadyTime in(SteadyTime now, std::chrono::seconds time) {
   return later(now, std::chrono::nanoseconds(time).count());
 }
 
+/// Who may come in: asked with every request, changed seldom. No clock of its own, so that it is only data.
+struct Admitted {
+  std::map<std::string, Token, std::less<>> tokens;  ///< by the id's 32 digits
+  /// When those that expire end, by the steady clock. Read off the system clock once, when a token is first
+  /// seen: a step of it during a flight locks nobody out and brings nobody back.
+  std::map<std::string, SteadyTime, std::less<>> ends;
+  /// By SHA-256 of the cookie: a memory dump gives no login.
+  std::map<std::string, Session, std::less<>> sessions;
+  std::map<std::string, Ticket, std::less<>> tickets;  ///< by SHA-256 of the ticket
+  std::uint64_t next_order{0};
+
+  bool live(const std::string& key, const Token& token, SteadyTime now) const {
+    if (token.revoked) return false;
+    const auto end = ends.find(key);
+    return end == ends.end() || now < end->second;
+  }
+
+  bool holds(const Login& login, SteadyTime now) const {
+    if (!login.session_sha256.empty()) {
+      const auto session = sessions.find(login.session_sha256);
+      if (session == sessions.end() || session->second.until <= now) return false;
+    }
+    std::string key = login.who.token_id;
+    std::erase(key, '-');
+    const auto token = tokens.find(key);
+    return token != tokens.end() && live(token->first, token->second, now) &&
+           principal_of(token->second).roles == login.who.roles;
+  }
+
+  /// Null unless the secret is right and the token lives.
+  const Token* find(std::string_view text, SteadyTime now) const {
+    std::string id;
+    std::string_view secret;
+    if (!split_token(text, id, secret)) return nullptr;
+    const auto at = tokens.find(id);
+    // The comparison is done in any case, so that time does not tell which ids exist.
+    const std::string expected = at == tokens.end() ? std::string(64, '0') : at->second.secret_sha256_hex;
+    const bool same = equal_in_constant_time(sha256_hex(secret), expected);
+    return at != tokens.end() && same && live(at->first, at->second, now) ? &at->second : nullptr;
+  }
+};
+
+struct Refusal {
+  UtcTime first{};
+  std::string who, what, from;
+  std::uint64_t count{};
+};
+
+/// What flush() writes: noted with every request, so apart from what all requests read together.
+struct Notes {
+  std::map<std::string, Refusal> refusals;
+  std::uint64_t unnamed_refusals{0};
+  std::map<std::string, UtcTime> used;  ///< by the id's 32 digits, since the last flush of them
+  SteadyTime used_flushed{};
+};
+
 }  // namespace
 
 struct AccessService::State {
@@ -66,67 +121,17 @@ struct AccessService::State {
   AccessStore& log;
   const Clock& clock;
   AccessOptions options;
-
-  mutable std::shared_mutex mutex;
-  std::map<std::string, Token, std::less<>> tokens;  ///< by the id's 32 digits
-  /// When those that expire end, by the steady clock. Read off the system clock once, when a token is first
-  /// seen: a step of it during a flight locks nobody out and brings nobody back.
-  std::map<std::string, SteadyTime, std::less<>> ends;
-  std::map<std::string, Session, std::less<>>
-      sessions;  ///< by SHA-256 of the cookie: a memory dump gives no login
-  std::map<std::string, Ticket, std::less<>> tickets;  ///< by SHA-256 of the ticket
-  std::uint64_t next_order{0};
-
   LoginGuard guard;
-  mutable std::mutex notes_mutex;  ///< apart: verify() is shared, and notes what it saw
-  struct Refusal {
-    UtcTime first{};
-    std::string who, what, from;
-    std::uint64_t count{};
-  };
-  std::map<std::string, Refusal> refusals;
-  std::uint64_t unnamed_refusals{0};
-  mutable std::map<std::string, UtcTime> used;  ///< by the id's 32 digits, since the last flush of them
-  SteadyTime used_flushed{};
+  Locked<Admitted, std::shared_mutex> admitted;  ///< never taken together with notes
+  mutable Locked<Notes> notes;
 
   SteadyTime steady_now() const { return options.steady->now(); }
-  void note_end(const std::string& key, const Token& token) {
-    if (token.expires) ends.try_emplace(key, later(steady_now(), token.expires->ns - clock.now().ns));
+  void note_end(Admitted& all, const std::string& key, const Token& token) const {
+    if (token.expires) all.ends.try_emplace(key, later(steady_now(), token.expires->ns - clock.now().ns));
   }
-  bool live(const std::string& key, const Token& token) const {
-    if (token.revoked) return false;
-    const auto end = ends.find(key);
-    return end == ends.end() || steady_now() < end->second;
-  }
-
   void note_use(const std::string& key) const {
-    const std::scoped_lock lock(notes_mutex);
-    used[key] = clock.now();
-  }
-
-  /// The mutex is held.
-  bool holds(const Login& login) const {
-    if (!login.session_sha256.empty()) {
-      const auto session = sessions.find(login.session_sha256);
-      if (session == sessions.end() || session->second.until <= steady_now()) return false;
-    }
-    std::string key = login.who.token_id;
-    std::erase(key, '-');
-    const auto token = tokens.find(key);
-    return token != tokens.end() && live(token->first, token->second) &&
-           principal_of(token->second).roles == login.who.roles;
-  }
-
-  /// Null unless the secret is right and the token lives. The mutex is held.
-  const Token* find(std::string_view text) const {
-    std::string id;
-    std::string_view secret;
-    if (!split_token(text, id, secret)) return nullptr;
-    const auto at = tokens.find(id);
-    // The comparison is done in any case, so that time does not tell which ids exist.
-    const std::string expected = at == tokens.end() ? std::string(64, '0') : at->second.secret_sha256_hex;
-    const bool same = equal_in_constant_time(sha256_hex(secret), expected);
-    return at != tokens.end() && same && live(at->first, at->second) ? &at->second : nullptr;
+    auto noted = notes.lock();
+    noted->used[key] = clock.now();
   }
 };
 
@@ -139,20 +144,21 @@ const AccessOptions& AccessService::options() const { return state_->options; }
 
 Result<void> AccessService::load() {
   BOOST_OUTCOME_TRY(auto all, state_->store.tokens());
-  const std::unique_lock lock(state_->mutex);
-  state_->tokens.clear();
+  auto admitted = state_->admitted.lock();
+  admitted->tokens.clear();
   for (auto& token : all) {
     const std::string key = without_dashes(token.id.uuid);
-    state_->note_end(key, token);
-    state_->tokens.emplace(key, std::move(token));
+    state_->note_end(*admitted, key, token);
+    admitted->tokens.emplace(key, std::move(token));
   }
   return boost::outcome_v2::success();
 }
 
 bool AccessService::has_tokens() const {
-  const std::shared_lock lock(state_->mutex);
-  return std::ranges::any_of(state_->tokens,
-                             [&](const auto& entry) { return state_->live(entry.first, entry.second); });
+  const SteadyTime now = state_->steady_now();
+  const auto admitted = state_->admitted.lock_shared();
+  return std::ranges::any_of(
+      admitted->tokens, [&](const auto& entry) { return admitted->live(entry.first, entry.second, now); });
 }
 
 Result<NewToken> AccessService::create_token(std::string_view name, const std::vector<std::string>& roles,
@@ -178,9 +184,9 @@ Result<NewToken> AccessService::create_token(std::string_view name, const std::v
   made.text = std::string(k_prefix) + key + "_" + secret;
   BOOST_OUTCOME_TRYV(state_->store.insert(made.token));
   {
-    const std::unique_lock lock(state_->mutex);
-    state_->note_end(key, made.token);
-    state_->tokens.emplace(key, made.token);
+    auto admitted = state_->admitted.lock();
+    state_->note_end(*admitted, key, made.token);
+    admitted->tokens.emplace(key, made.token);
   }
   audit(by.token_id, "token create " + to_string(made.token.id), from, "done");
   return made;
@@ -190,48 +196,59 @@ Result<void> AccessService::revoke_token(const TokenId& id, const Principal& by,
   const UtcTime now = state_->clock.now();
   BOOST_OUTCOME_TRYV(state_->store.revoke(id, now));
   {
-    const std::unique_lock lock(state_->mutex);
-    const auto at = state_->tokens.find(without_dashes(id.uuid));
-    if (at != state_->tokens.end() && !at->second.revoked) at->second.revoked = now;
+    auto admitted = state_->admitted.lock();
+    const auto at = admitted->tokens.find(without_dashes(id.uuid));
+    if (at != admitted->tokens.end() && !at->second.revoked) at->second.revoked = now;
   }
   audit(by.token_id, "token revoke " + to_string(id), from, "done");
   return boost::outcome_v2::success();
 }
 
 std::vector<Token> AccessService::tokens() const {
-  const std::shared_lock lock(state_->mutex);
   std::vector<Token> all;
-  const std::scoped_lock notes(state_->notes_mutex);
-  for (const auto& [key, token] : state_->tokens) {
-    all.push_back(token);
-    if (const auto at = state_->used.find(key); at != state_->used.end()) all.back().last_used = at->second;
+  {
+    const auto admitted = state_->admitted.lock_shared();
+    for (const auto& [key, token] : admitted->tokens) all.push_back(token);
+  }
+  const auto notes = state_->notes.lock();
+  for (auto& token : all) {
+    const auto at = notes->used.find(without_dashes(token.id.uuid));
+    if (at != notes->used.end()) token.last_used = at->second;
   }
   return all;
 }
 
 std::optional<Principal> AccessService::verify(std::string_view token_text) const {
-  const std::shared_lock lock(state_->mutex);
-  const Token* token = state_->find(token_text);
-  if (token == nullptr) return std::nullopt;
-  state_->note_use(without_dashes(token->id.uuid));
-  return principal_of(*token);
+  std::string key;
+  Principal who;
+  {
+    const SteadyTime now = state_->steady_now();
+    const auto admitted = state_->admitted.lock_shared();
+    const Token* token = admitted->find(token_text, now);
+    if (token == nullptr) return std::nullopt;
+    key = without_dashes(token->id.uuid);
+    who = principal_of(*token);
+  }
+  state_->note_use(key);
+  return who;
 }
 
 Result<std::string> AccessService::open_session(std::string_view token_text, std::string_view from) {
   const std::string cookie = random_hex_256();
   std::string who;
   {
-    const std::unique_lock lock(state_->mutex);
-    if (const Token* token = state_->find(token_text)) {
+    const SteadyTime now = state_->steady_now();
+    auto admitted = state_->admitted.lock();
+    if (const Token* token = admitted->find(token_text, now)) {
+      auto& sessions = admitted->sessions;
       who = to_string(token->id);
-      const SteadyTime now = state_->steady_now();
-      std::erase_if(state_->sessions, [&](const auto& entry) { return entry.second.until <= now; });
-      if (state_->sessions.size() >= state_->options.max_sessions) {
-        state_->sessions.erase(std::ranges::min_element(
-            state_->sessions, {}, [](const auto& entry) { return entry.second.order; }));
+      std::erase_if(sessions, [&](const auto& entry) { return entry.second.until <= now; });
+      if (sessions.size() >= state_->options.max_sessions) {
+        sessions.erase(
+            std::ranges::min_element(sessions, {}, [](const auto& entry) { return entry.second.order; }));
       }
-      state_->sessions[sha256_hex(cookie)] = {
-          without_dashes(token->id.uuid), in(now, state_->options.session_lifetime), state_->next_order++};
+      sessions[sha256_hex(cookie)] = {without_dashes(token->id.uuid),
+                                      in(now, state_->options.session_lifetime), admitted->next_order++};
     }
   }
   audit(who.empty() ? "nobody" : who, "login", from, who.empty() ? "refused" : "done");
@@ -242,24 +259,32 @@ Result<std::string> AccessService::open_session(std::string_view token_text, std
 void AccessService::close_session(std::string_view cookie, std::string_view from) {
   std::string who;
   {
-    const std::unique_lock lock(state_->mutex);
-    const auto at = state_->sessions.find(sha256_hex(cookie));
-    if (at == state_->sessions.end()) return;
+    auto admitted = state_->admitted.lock();
+    const auto at = admitted->sessions.find(sha256_hex(cookie));
+    if (at == admitted->sessions.end()) return;
     who = at->second.token_id;
-    state_->sessions.erase(at);
+    admitted->sessions.erase(at);
   }
   audit(who, "logout", from, "done");
 }
 
 std::optional<Principal> AccessService::session(std::string_view cookie) const {
   if (cookie.size() != k_secret_digits) return std::nullopt;
-  const std::shared_lock lock(state_->mutex);
-  const auto at = state_->sessions.find(sha256_hex(cookie));
-  if (at == state_->sessions.end() || at->second.until <= state_->steady_now()) return std::nullopt;
-  const auto token = state_->tokens.find(at->second.token_id);
-  if (token == state_->tokens.end() || !state_->live(token->first, token->second)) return std::nullopt;
-  state_->note_use(token->first);
-  return principal_of(token->second);
+  std::string key;
+  Principal who;
+  {
+    const SteadyTime now = state_->steady_now();
+    const auto admitted = state_->admitted.lock_shared();
+    const auto at = admitted->sessions.find(sha256_hex(cookie));
+    if (at == admitted->sessions.end() || at->second.until <= now) return std::nullopt;
+    const auto token = admitted->tokens.find(at->second.token_id);
+    if (token == admitted->tokens.end() || !admitted->live(token->first, token->second, now))
+      return std::nullopt;
+    key = token->first;
+    who = principal_of(token->second);
+  }
+  state_->note_use(key);
+  return who;
 }
 
 Login AccessService::login_of(const Principal& who, std::string_view cookie) const {
@@ -268,64 +293,67 @@ Login AccessService::login_of(const Principal& who, std::string_view cookie) con
 
 bool AccessService::holds(const Login& login) const {
   if (state_->options.auth_off) return true;
-  const std::shared_lock lock(state_->mutex);
-  return state_->holds(login);
+  const SteadyTime now = state_->steady_now();
+  const auto admitted = state_->admitted.lock_shared();
+  return admitted->holds(login, now);
 }
 
 LoginGuard& AccessService::guard() { return state_->guard; }
 
 std::string AccessService::make_ticket(Login login) {
   const std::string ticket = random_hex_256();
-  const std::unique_lock lock(state_->mutex);
   const SteadyTime now = state_->steady_now();
-  std::erase_if(state_->tickets, [&](const auto& entry) { return entry.second.until <= now; });
-  if (state_->tickets.size() >= state_->options.max_tickets) state_->tickets.erase(state_->tickets.begin());
-  state_->tickets[sha256_hex(ticket)] = {std::move(login), in(now, state_->options.ticket_lifetime)};
+  auto admitted = state_->admitted.lock();
+  auto& tickets = admitted->tickets;
+  std::erase_if(tickets, [&](const auto& entry) { return entry.second.until <= now; });
+  if (tickets.size() >= state_->options.max_tickets) tickets.erase(tickets.begin());
+  tickets[sha256_hex(ticket)] = {std::move(login), in(now, state_->options.ticket_lifetime)};
   return ticket;
 }
 
 std::optional<Login> AccessService::take_ticket(std::string_view ticket) {
   if (ticket.size() != k_secret_digits) return std::nullopt;
-  const std::unique_lock lock(state_->mutex);
-  const auto at = state_->tickets.find(sha256_hex(ticket));
-  if (at == state_->tickets.end()) return std::nullopt;
+  const SteadyTime now = state_->steady_now();
+  auto admitted = state_->admitted.lock();
+  const auto at = admitted->tickets.find(sha256_hex(ticket));
+  if (at == admitted->tickets.end()) return std::nullopt;
   Ticket found = std::move(at->second);
-  state_->tickets.erase(at);
-  if (found.until <= state_->steady_now() || !state_->holds(found.login)) return std::nullopt;
+  admitted->tickets.erase(at);
+  if (found.until <= now || !admitted->holds(found.login, now)) return std::nullopt;
   return std::move(found.login);
 }
 
 void AccessService::note_refusal(std::string_view who, std::string_view what, std::string_view from) {
   constexpr std::size_t k_max_noted = 1000;
   const std::string key = std::string(who) + '\n' + std::string(what) + '\n' + std::string(from);
-  const std::scoped_lock lock(state_->notes_mutex);
-  const auto at = state_->refusals.find(key);
-  if (at == state_->refusals.end() && state_->refusals.size() >= k_max_noted) {
-    ++state_->unnamed_refusals;
+  auto notes = state_->notes.lock();
+  const auto at = notes->refusals.find(key);
+  if (at == notes->refusals.end() && notes->refusals.size() >= k_max_noted) {
+    ++notes->unnamed_refusals;
     return;
   }
-  auto& refusal = state_->refusals[key];
+  auto& refusal = notes->refusals[key];
   if (refusal.count++ == 0)
     refusal = {state_->clock.now(), std::string(who), std::string(what), std::string(from), 1};
 }
 
 void AccessService::flush() {
   constexpr std::int64_t k_minute_ns = 60'000'000'000;
-  std::map<std::string, State::Refusal> refusals;
+  std::map<std::string, Refusal> refusals;
   std::map<std::string, UtcTime> used;
   std::uint64_t unnamed = 0;
   const UtcTime now = state_->clock.now();
   {
-    const std::scoped_lock lock(state_->notes_mutex);
-    refusals.swap(state_->refusals);
-    unnamed = std::exchange(state_->unnamed_refusals, 0);
     const SteadyTime steady = state_->steady_now();
-    if (steady.ns - state_->used_flushed.ns >= k_minute_ns) {
-      used.swap(state_->used);
-      state_->used_flushed = steady;
+    auto notes = state_->notes.lock();
+    refusals.swap(notes->refusals);
+    unnamed = std::exchange(notes->unnamed_refusals, 0);
+    if (steady.ns - notes->used_flushed.ns >= k_minute_ns) {
+      used.swap(notes->used);
+      notes->used_flushed = steady;
     }
   }
-  const auto write = [&](const State::Refusal& refusal) {
+  const auto write = [&](const Refusal& refusal) {
     const std::string result =
         refusal.count == 1 ? "refused" : "refused " + std::to_string(refusal.count) + " times";
     // A store in trouble tells it by its health; a refusal that is not logged was refused all the same.
@@ -337,9 +365,9 @@ void AccessService::flush() {
   for (const auto& [key, time] : used) {
     std::optional<TokenId> id;
     {
-      const std::unique_lock lock(state_->mutex);
-      const auto at = state_->tokens.find(key);
-      if (at == state_->tokens.end()) continue;
+      auto admitted = state_->admitted.lock();
+      const auto at = admitted->tokens.find(key);
+      if (at == admitted->tokens.end()) continue;
       at->second.last_used = time;
       id = at->second.id;
     }

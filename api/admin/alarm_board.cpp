@@ -36,13 +36,13 @@ std::string alarm_json(const Alarm& alarm) {
 void AlarmBoard::update(std::vector<AlarmCondition> holding, UtcTime now) {
   std::vector<AlarmCondition> raised, cleared;
   {
-    const std::scoped_lock lock(mutex_);
+    auto alarms = alarms_.lock();
     std::vector<Alarm> next;
     for (auto& condition : holding) {
       const auto before =
-          std::ranges::find(alarms_, condition.id, [](const Alarm& a) { return a.condition.id; });
+          std::ranges::find(*alarms, condition.id, [](const Alarm& a) { return a.condition.id; });
       Alarm alarm{std::move(condition), now, false};
-      if (before == alarms_.end()) {
+      if (before == alarms->end()) {
         raised.push_back(alarm.condition);
       } else {
         alarm.since = before->since;
@@ -51,13 +51,13 @@ void AlarmBoard::update(std::vector<AlarmCondition> holding, UtcTime now) {
       }
       next.push_back(std::move(alarm));
     }
-    for (const auto& alarm : alarms_) {
+    for (const auto& alarm : *alarms) {
       if (std::ranges::none_of(next, [&](const Alarm& a) { return a.condition.id == alarm.condition.id; }))
         cleared.push_back(alarm.condition);
     }
     std::ranges::stable_sort(next, {},
                              [](const Alarm& a) { return std::tuple(a.condition.priority, a.since); });
-    alarms_ = std::move(next);
+    *alarms = std::move(next);
   }
   for (const auto& c : raised)
     events_.add(std::string(level_of(c.priority)), "alarm.raised", c.id + ": " + c.text, c.mission);
@@ -67,10 +67,10 @@ void AlarmBoard::update(std::vector<AlarmCondition> holding, UtcTime now) {
 Result<Alarm> AlarmBoard::acknowledge(std::string_view id, std::string_view by) {
   Alarm found;
   {
-    const std::scoped_lock lock(mutex_);
+    auto alarms = alarms_.lock();
     const auto at =
-        std::ranges::find(alarms_, id, [](const Alarm& a) { return std::string_view(a.condition.id); });
-    if (at == alarms_.end())
+        std::ranges::find(*alarms, id, [](const Alarm& a) { return std::string_view(a.condition.id); });
+    if (at == alarms->end())
       return make_error(Errc::not_found, "there is no active alarm " + to_utf8(id, 60));
     if (at->acknowledged) return *at;
     at->acknowledged = true;
@@ -81,9 +81,6 @@ Result<Alarm> AlarmBoard::acknowledge(std::string_view id, std::string_view by) 
   return found;
 }
 
-std::vector<Alarm> AlarmBoard::standing() const {
-  const std::scoped_lock lock(mutex_);
-  return alarms_;
-}
+std::vector<Alarm> AlarmBoard::standing() const { return alarms_.copy(); }
 
 }  // namespace anchord::api

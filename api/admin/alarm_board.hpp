@@ -1,11 +1,11 @@
 #pragma once
 
-#include <mutex>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "api/admin/alarm_rules.hpp"
+#include "core/base/locked.hpp"
 #include "core/base/result.hpp"
 
 namespace anchord::api {
@@ -35,8 +35,7 @@ class AlarmBoard {
 
  private:
   EventLog& events_;
-  mutable std::mutex mutex_;
-  std::vector<Alarm> alarms_;
+  Locked<std::vector<Alarm>> alarms_;
 };
 
 }  // namespace anchord::api

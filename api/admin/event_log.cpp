@@ -20,25 +20,25 @@ void EventLog::add(std::string level, std::string code, std::string text, std::o
   LiveEvent event{make_uuid_v7(now), now, std::move(level), std::move(code), std::move(text), mission};
   std::string json = event_json(event);
   {
-    const std::scoped_lock lock(mutex_);
-    events_.push_back(std::move(event));
-    if (events_.size() > k_kept) events_.pop_front();
+    auto kept = events_.lock();
+    kept->push_back(std::move(event));
+    if (kept->size() > k_kept) kept->pop_front();
   }
   hub_.publish(Topic::events, std::move(json), now.us());
 }
 
 void EventLog::restore(const std::vector<LiveEvent>& events) {
-  const std::scoped_lock lock(mutex_);
-  const std::size_t room = k_kept - std::min(k_kept, events_.size());
+  auto kept = events_.lock();
+  const std::size_t room = k_kept - std::min(k_kept, kept->size());
   const auto first = events.end() - static_cast<std::ptrdiff_t>(std::min(room, events.size()));
-  events_.insert(events_.begin(), first, events.end());
+  kept->insert(kept->begin(), first, events.end());
 }
 
 std::vector<LiveEvent> EventLog::newest(std::size_t limit, const std::optional<MissionId>& mission,
                                         std::optional<UtcTime> since) const {
-  const std::scoped_lock lock(mutex_);
   std::vector<LiveEvent> out;
-  for (auto it = events_.rbegin(); it != events_.rend() && out.size() < limit; ++it) {
+  const auto kept = events_.lock();
+  for (auto it = kept->rbegin(); it != kept->rend() && out.size() < limit; ++it) {
     if (mission && it->mission != mission) continue;
     if (since && it->time < *since) continue;  // not in order of time where the clock was set back
     out.push_back(*it);

@@ -1,12 +1,12 @@
 #pragma once
 
 #include <deque>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/base/ids.hpp"
+#include "core/base/locked.hpp"
 #include "core/base/time.hpp"
 
 namespace anchord::api {
@@ -37,8 +37,7 @@ class EventLog {
  private:
   Hub& hub_;
   const Clock& clock_;
-  mutable std::mutex mutex_;
-  std::deque<LiveEvent> events_;
+  Locked<std::deque<LiveEvent>> events_;
 };
 
 }  // namespace anchord::api

@@ -28,8 +28,8 @@ void Housekeeping::start() {
 
 void Housekeeping::stop() {
   {
-    const std::scoped_lock lock(mutex_);
-    if (std::exchange(stopping_, true)) return;
+    auto wishes = wishes_.lock();
+    if (std::exchange(wishes->stop, true)) return;
   }
   told_.notify_all();
   if (thread_.joinable()) thread_.join();
@@ -38,8 +38,8 @@ void Housekeeping::stop() {
 
 void Housekeeping::wake() {
   {
-    const std::scoped_lock lock(mutex_);
-    woken_ = true;
+    auto wishes = wishes_.lock();
+    wishes->round = true;
   }
   told_.notify_all();
 }
@@ -47,17 +47,17 @@ void Housekeeping::wake() {
 void Housekeeping::loop() {
   for (;;) {
     (void)guarded("housekeeping", [this] { round(); });
-    std::unique_lock lock(mutex_);
-    told_.wait_for(lock, k_every, [this] { return stopping_ || woken_; });
-    if (stopping_) return;
-    woken_ = false;
+    auto wishes = wishes_.lock();
+    wishes.wait_for(told_, k_every, [](const Wishes& w) { return w.stop || w.round; });
+    if (wishes->stop) return;
+    wishes->round = false;
   }
 }
 
 /// False when stopping.
 bool Housekeeping::pause() {
-  std::unique_lock lock(mutex_);
-  return !told_.wait_for(lock, k_pause, [this] { return stopping_; });
+  auto wishes = wishes_.lock();
+  return !wishes.wait_for(told_, k_pause, [](const Wishes& w) { return w.stop; });
 }
 
 void Housekeeping::round() {

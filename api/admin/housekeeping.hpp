@@ -3,9 +3,9 @@
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
-#include <mutex>
 
 #include "core/base/guard.hpp"
+#include "core/base/locked.hpp"
 #include "core/base/result.hpp"
 
 namespace anchord {
@@ -45,10 +45,13 @@ class Housekeeping {
   bool pause();
   void remove_marked();
 
+  struct Wishes {
+    bool stop{false}, round{false};
+  };
+
   const Deps deps_;
-  std::mutex mutex_;
+  Locked<Wishes> wishes_;
   std::condition_variable told_;
-  bool stopping_{false}, woken_{false};
   Thread thread_;
 };
 

@@ -25,26 +25,28 @@ std::string_view public_part(std::string_view text) {
 std::optional<int> LoginGuard::failed(std::string_view token_text, std::string_view address,
                                       Clock::time_point now) {
   const std::string token(public_part(token_text)), from(address);
-  const std::lock_guard lock(mutex_);
+  auto buckets = buckets_.lock();
+  const auto wait_of = [&](const std::string& name, double a_minute) {
+    return take(*buckets, name, a_minute, a_minute / k_minute_s, now);
+  };
   std::optional<int> wait;
   for (const auto& one :
-       {take("both " + token + ' ' + from, k_both, k_both / k_minute_s, now),
-        take("address " + from, k_address, k_address / k_minute_s, now),
-        token == "other" ? std::nullopt : take("token " + token, k_token, k_token / k_minute_s, now)}) {
+       {wait_of("both " + token + ' ' + from, k_both), wait_of("address " + from, k_address),
+        token == "other" ? std::nullopt : wait_of("token " + token, k_token)}) {
     if (one) wait = std::max(wait.value_or(0), *one);
   }
   return wait;
 }
 
-std::optional<int> LoginGuard::take(const std::string& name, double burst, double per_s,
+std::optional<int> LoginGuard::take(Buckets& buckets, const std::string& name, double burst, double per_s,
                                     Clock::time_point now) {
-  auto at = buckets_.find(name);
-  if (at == buckets_.end()) {
-    if (buckets_.size() >= k_max_names) {
-      buckets_.erase(
-          std::ranges::min_element(buckets_, {}, [](const auto& entry) { return entry.second.seen; }));
+  auto at = buckets.find(name);
+  if (at == buckets.end()) {
+    if (buckets.size() >= k_max_names) {
+      buckets.erase(
+          std::ranges::min_element(buckets, {}, [](const auto& entry) { return entry.second.seen; }));
     }
-    at = buckets_.emplace(name, Bucket{burst, now}).first;
+    at = buckets.emplace(name, Bucket{burst, now}).first;
   }
   Bucket& bucket = at->second;
   const double elapsed_s = std::chrono::duration<double>(now - bucket.seen).count();

@@ -3,10 +3,11 @@
 #include <chrono>
 #include <cstddef>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
+
+#include "core/base/locked.hpp"
 
 namespace anchord::api {
 
@@ -28,10 +29,11 @@ class LoginGuard {
     double level{};
     Clock::time_point seen{};
   };
-  std::optional<int> take(const std::string& name, double burst, double per_s, Clock::time_point now);
+  using Buckets = std::map<std::string, Bucket>;
+  static std::optional<int> take(Buckets& buckets, const std::string& name, double burst, double per_s,
+                                 Clock::time_point now);
 
-  std::mutex mutex_;
-  std::map<std::string, Bucket> buckets_;
+  Locked<Buckets> buckets_;
 };
 
 }  // namespace anchord::api

@@ -106,33 +106,33 @@ nlohmann::ordered_json contradiction_json(const ContradictedAnchor& anchor) {
 }
 
 void ContradictionWatch::changed() {
-  const std::scoped_lock lock(mutex_);
-  ++change_;
+  auto newest = newest_.lock();
+  ++newest->change;
 }
 
 std::shared_ptr<const ContradictionWatch::Standing> ContradictionWatch::standing() {
   const std::scoped_lock one(comparing_);
   std::uint64_t change = 0;
   {
-    const std::scoped_lock lock(mutex_);
-    if (compared_ == change_) return standing_;
-    change = change_;
+    const auto newest = newest_.lock();
+    if (newest->compared == newest->change) return newest->standing;
+    change = newest->change;
   }
   auto found = compare();
   std::vector<const ContradictedAnchor*> news;
   std::shared_ptr<const Standing> now;
   {
-    const std::scoped_lock lock(mutex_);
-    if (!found) return standing_;
+    auto newest = newest_.lock();
+    if (!found) return newest->standing;
     now = std::make_shared<Standing>(std::move(found).value());
     for (const auto& [id, anchor] : *now) {
-      const auto before = standing_->find(id);
-      if (known_ && (before == standing_->end() || before->second.text != anchor.text))
+      const auto before = newest->standing->find(id);
+      if (newest->known && (before == newest->standing->end() || before->second.text != anchor.text))
         news.push_back(&anchor);
     }
-    standing_ = now;
-    compared_ = change;
-    known_ = true;
+    newest->standing = now;
+    newest->compared = change;
+    newest->known = true;
   }
   for (const auto* anchor : news) {
     const auto& missions = anchor->missions;
@@ -144,8 +144,8 @@ std::shared_ptr<const ContradictionWatch::Standing> ContradictionWatch::standing
 
 std::vector<AlarmCondition> ContradictionWatch::alarms() const {
   const auto now = [&] {
-    const std::scoped_lock lock(mutex_);
-    return standing_;
+    const auto newest = newest_.lock();
+    return newest->standing;
   }();
   if (now->empty()) return {};
   std::string text;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "api/admin/alarm_rules.hpp"
+#include "core/base/locked.hpp"
 #include "core/base/result.hpp"
 #include "core/base/time.hpp"
 #include "core/localize/contradiction.hpp"
@@ -60,12 +61,15 @@ class ContradictionWatch {
 
  private:
   Result<Standing> compare();
+  struct Newest {
+    std::uint64_t change{1}, compared{0};
+    bool known{false};  ///< once compared: what was contradicted before the start is no news
+    std::shared_ptr<const Standing> standing{std::make_shared<Standing>()};
+  };
+
   Deps deps_;
-  mutable std::mutex mutex_;  ///< of the members below
-  std::mutex comparing_;      ///< one comparison at a time; taken before mutex_
-  std::uint64_t change_{1}, compared_{0};
-  bool known_{false};  ///< once compared: what was contradicted before the start is no news
-  std::shared_ptr<const Standing> standing_{std::make_shared<Standing>()};
+  std::mutex comparing_;  ///< one comparison at a time, while the store is read; taken before newest_
+  Locked<Newest> newest_;
 };
 
 }  // namespace anchord::api

@@ -4,19 +4,39 @@
 
 namespace anchord::api {
 
+// Files are opened without the lock: of two who ask at once both open, and the first stays.
+
+const Result<Projection>& GeoService::opened(int epsg, int geographic_epsg) {
+  const std::pair key{epsg, geographic_epsg};
+  {
+    const auto known = opened_.lock();
+    if (const auto at = known->projections.find(key); at != known->projections.end()) return at->second;
+  }
+  auto now = Projection::open(epsg, geographic_epsg);
+  auto known = opened_.lock();
+  return known->projections.try_emplace(key, std::move(now)).first->second;
+}
+
+const Result<Geoid>& GeoService::opened_geoid() {
+  {
+    const auto known = opened_.lock();
+    if (known->geoid) return *known->geoid;
+  }
+  auto now = Geoid::open(geoid_folder_);
+  auto known = opened_.lock();
+  if (!known->geoid) known->geoid.emplace(std::move(now));
+  return *known->geoid;
+}
+
 Result<const Projection*> GeoService::projection(int epsg, const std::string& datum) {
   if (datum.empty())
     return make_error(Errc::invalid_argument, "the datum of the base is not stated (crs.frame of the site)");
   const auto geographic = geographic_epsg(datum);
   if (!geographic)
     return make_error(Errc::unsupported, "the datum '" + to_utf8(datum, 40) + "' is none that is known here");
-  const std::scoped_lock lock(mutex_);
-  const std::pair key{epsg, *geographic};
-  auto found = projections_.find(key);
-  if (found == projections_.end())
-    found = projections_.emplace(key, Projection::open(epsg, *geographic)).first;
-  if (!found->second) return found->second.error();
-  return &found->second.value();
+  const auto& found = opened(epsg, *geographic);
+  if (!found) return found.error();
+  return &found.value();
 }
 
 Result<GeoService::Projected> GeoService::projected(const std::optional<Site>& site, const Wgs84& at) {
@@ -28,15 +48,10 @@ Result<GeoService::Projected> GeoService::projected(const std::optional<Site>& s
 }
 
 Result<GeoService::Orthometric> GeoService::orthometric(const Wgs84& at) {
-  const Geoid* geoid = nullptr;
-  {
-    const std::scoped_lock lock(mutex_);
-    if (!geoid_) geoid_.emplace(Geoid::open(geoid_folder_));
-    if (!*geoid_) return geoid_->error();
-    geoid = &geoid_->value();
-  }
-  BOOST_OUTCOME_TRY(const double undulation_m, geoid->undulation_m(at));
-  return Orthometric{at.height_m - undulation_m, geoid->name()};
+  const auto& geoid = opened_geoid();
+  if (!geoid) return geoid.error();
+  BOOST_OUTCOME_TRY(const double undulation_m, geoid.value().undulation_m(at));
+  return Orthometric{at.height_m - undulation_m, geoid.value().name()};
 }
 
 }  // namespace anchord::api

@@ -2,11 +2,11 @@
 
 #include <Eigen/Core>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include "core/base/locked.hpp"
 #include "core/geo/geoid.hpp"
 #include "core/geo/projection.hpp"
 #include "core/types/anchor.hpp"
@@ -37,10 +37,16 @@ class GeoService {
   Result<Orthometric> orthometric(const Wgs84& at);
 
  private:
-  std::string geoid_folder_;
-  std::mutex mutex_;
-  std::map<std::pair<int, int>, Result<Projection>> projections_;
-  std::optional<Result<Geoid>> geoid_;
+  /// Only ever added to, so that what was found stays where it is; both are thread-safe themselves.
+  struct Opened {
+    std::map<std::pair<int, int>, Result<Projection>> projections;
+    std::optional<Result<Geoid>> geoid;
+  };
+  const Result<Projection>& opened(int epsg, int geographic_epsg);
+  const Result<Geoid>& opened_geoid();
+
+  const std::string geoid_folder_;
+  Locked<Opened> opened_;
 };
 
 }  // namespace anchord::api

@@ -13,10 +13,7 @@ void DeviceStream::change(std::vector<Holder> next) {
   const auto now = next.empty() ? std::nullopt : std::optional(next.back().id);
   std::vector<MissionId> ids;
   for (const auto& one : next) ids.push_back(one.id);
-  {
-    const std::scoped_lock lock(mutex_);
-    stack_ = std::move(next);
-  }
+  (void)stack_.exchange(std::move(next));
   if (deps_.devices.recording_into() != now) deps_.devices.record_into(now);
   if (const auto kept = deps_.store.keep_device_stream(ids); !kept) {
     deps_.events.add("warning", "devices.not_kept",
@@ -44,7 +41,7 @@ std::optional<DeviceStream::Holder> DeviceStream::take(const Mission& mission, c
   const std::scoped_lock changing(changing_);
   const auto before = holder();
   if (before && before->id == mission.id) return std::nullopt;
-  auto next = stack_;
+  auto next = stack_.copy();
   std::erase_if(next, [&](const Holder& one) { return one.id == mission.id; });
   next.push_back({mission.id, mission.name});
   change(std::move(next));
@@ -62,7 +59,7 @@ std::optional<DeviceStream::Holder> DeviceStream::take(const Mission& mission, c
 void DeviceStream::ended(const MissionId& mission) {
   const std::scoped_lock changing(changing_);
   const auto before = holder();
-  auto next = stack_;
+  auto next = stack_.copy();
   if (std::erase_if(next, [&](const Holder& one) { return one.id == mission; }) == 0) return;
   change(std::move(next));
   const auto now = holder();
@@ -71,8 +68,8 @@ void DeviceStream::ended(const MissionId& mission) {
 }
 
 std::optional<DeviceStream::Holder> DeviceStream::holder() const {
-  const std::scoped_lock lock(mutex_);
-  return stack_.empty() ? std::nullopt : std::optional(stack_.back());
+  const auto stack = stack_.lock();
+  return stack->empty() ? std::nullopt : std::optional(stack->back());
 }
 
 void DeviceStream::resume() {
@@ -100,10 +97,10 @@ void DeviceStream::resume() {
 std::vector<AlarmCondition> DeviceStream::alarms() const {
   Holder has, lost;
   {
-    const std::scoped_lock lock(mutex_);
-    if (stack_.size() < 2) return {};
-    has = stack_.back();
-    lost = stack_[stack_.size() - 2];
+    const auto stack = stack_.lock();
+    if (stack->size() < 2) return {};
+    has = stack->back();
+    lost = (*stack)[stack->size() - 2];
   }
   if (deps_.devices.devices().empty()) return {};  // nobody misses rows that there are none of
   return {{"devices.lost", AlarmPriority::critical,

@@ -7,6 +7,7 @@
 
 #include "api/admin/alarm_rules.hpp"
 #include "core/base/ids.hpp"
+#include "core/base/locked.hpp"
 #include "core/base/result.hpp"
 #include "core/types/mission.hpp"
 
@@ -55,9 +56,10 @@ class DeviceStream {
   void change(std::vector<Holder> next);
 
   const Deps deps_;
-  std::mutex changing_;        ///< one change at a time; held while the devices and the disk are told
-  mutable std::mutex mutex_;   ///< of stack_, held for a moment: alarms must not wait for the disk
-  std::vector<Holder> stack_;  ///< the last one has them, those before get them back
+  /// One change at a time, while the devices and the disk are told; taken before stack_, which readers
+  /// (alarms) take alone: they must not wait for the disk.
+  std::mutex changing_;
+  Locked<std::vector<Holder>> stack_;  ///< the last one has them, those before get them back
 };
 
 }  // namespace anchord::api

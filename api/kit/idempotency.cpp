@@ -36,20 +36,18 @@ void drain(BodyReader& reader) {
 /// Releases the key when the request ends, however it ends.
 class Running {
  public:
-  Running(std::mutex& mutex, std::set<std::string>& set, std::string name)
-      : mutex_(mutex), set_(set), name_(std::move(name)) {
-    const std::scoped_lock lock(mutex_);
-    first_ = set_.insert(name_).second;
+  Running(Locked<std::set<std::string>>& all, std::string name) : all_(all), name_(std::move(name)) {
+    auto set = all_.lock();
+    first_ = set->insert(name_).second;
   }
   ~Running() {
-    const std::scoped_lock lock(mutex_);
-    if (first_) set_.erase(name_);
+    auto set = all_.lock();
+    if (first_) set->erase(name_);
   }
   bool first() const { return first_; }
 
  private:
-  std::mutex& mutex_;
-  std::set<std::string>& set_;
+  Locked<std::set<std::string>>& all_;
   std::string name_;
   bool first_{false};
 };
@@ -64,12 +62,12 @@ std::string sha256_hex(std::string_view bytes) {
 
 AnswerUse Idempotency::use_of(const std::string& who) {
   {
-    const std::scoped_lock lock(mutex_);
-    if (const auto at = use_.find(who); at != use_.end()) return at->second;
+    const auto use = use_.lock();
+    if (const auto at = use->find(who); at != use->end()) return at->second;
   }
   const auto stored = answers_.answer_use(who);
-  const std::scoped_lock lock(mutex_);
-  return use_.emplace(who, stored ? stored.value() : AnswerUse{}).first->second;
+  auto use = use_.lock();
+  return use->emplace(who, stored ? stored.value() : AnswerUse{}).first->second;
 }
 
 Idempotency::Room Idempotency::make_room(const std::string& who, Keeps keeps) {
@@ -82,8 +80,8 @@ Idempotency::Room Idempotency::make_room(const std::string& who, Keeps keeps) {
                       "): send the request without Idempotency-Key, or later"};
   }
   (void)answers_.drop_oldest_answers(who, k_max_answers / 10).has_value();
-  const std::scoped_lock lock(mutex_);
-  use_.erase(who);
+  auto counted = use_.lock();
+  counted->erase(who);
   return {};
 }
 
@@ -107,16 +105,16 @@ void Idempotency::keep(const Request& request, const Response& response, std::st
   }
   // It was done, whatever becomes of this: an error here would tell the client that it was not.
   if (!answers_.keep_answer(answer, answer.created_ran_ns - k_keep_ns)) return;
-  const std::scoped_lock lock(mutex_);
-  if (const auto at = use_.find(answer.principal); at != use_.end()) {
+  auto use = use_.lock();
+  if (const auto at = use->find(answer.principal); at != use->end()) {
     ++at->second.count;
     at->second.bytes += answer.body.size();
   }
 }
 
 void Idempotency::forget_use() {
-  const std::scoped_lock lock(mutex_);
-  use_.clear();
+  auto use = use_.lock();
+  use->clear();
 }
 
 bool Idempotency::purge() {
@@ -129,7 +127,7 @@ Response Idempotency::run(Request& request, Keeps keeps, const std::function<Res
   const std::string key(request.header("idempotency-key"));
   if (key.size() > 128) return problem(400, "malformed", "Idempotency-Key is longer than 128 characters");
   const std::string& who = request.principal.token_id;
-  const Running running(mutex_, running_, who + '\n' + key);
+  const Running running(running_, who + '\n' + key);
   if (!running.first())
     return problem(409, "conflict", "a request with this Idempotency-Key is still running");
 

@@ -3,11 +3,11 @@
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <mutex>
 #include <set>
 #include <string>
 
 #include "api/kit/message.hpp"
+#include "core/base/locked.hpp"
 #include "core/ports/access_store.hpp"
 
 namespace anchord::api {
@@ -53,9 +53,8 @@ class Idempotency {
 
   AccessStore& answers_;
   const std::function<std::int64_t()> running_ns_;
-  std::mutex mutex_;
-  std::set<std::string> running_;
-  std::map<std::string, AnswerUse> use_;  ///< of principals seen since the last purge
+  Locked<std::set<std::string>> running_;
+  Locked<std::map<std::string, AnswerUse>> use_;  ///< of principals seen since the last purge
 };
 
 }  // namespace anchord::api

@@ -13,7 +13,7 @@ constexpr auto k_pause = std::chrono::milliseconds(500);
 
 struct LateWriter::Entry {
   Write write;
-  bool done{false};
+  bool done{false};  ///< under the lock of waiting_
 };
 
 LateWriter::LateWriter(std::function<void(std::string_view)> log)
@@ -22,47 +22,49 @@ LateWriter::~LateWriter() { stop(); }
 
 bool LateWriter::write(Write write, std::chrono::milliseconds patience) {
   const auto entry = std::make_shared<Entry>(Entry{std::move(write), false});
-  bool lost = false;
-  std::unique_lock lock(mutex_);
-  if (stopping_) {
-    lock.unlock();
-    return attempt(entry->write).has_value();  // nobody would come for it
+  bool queued = false, done = false;
+  std::shared_ptr<Entry> lost;
+  {
+    auto waiting = waiting_.lock();
+    if (!waiting->stopping) {
+      queued = true;
+      if (waiting->entries.size() >= k_max_waiting) {
+        lost = std::move(waiting->entries.front());
+        waiting->entries.pop_front();
+      }
+      waiting->entries.push_back(entry);
+      work_.notify_one();
+      done = waiting.wait_for(written_, patience, [&](const Waiting&) { return entry->done; });
+    }
   }
-  if (entries_.size() >= k_max_waiting) {
-    entries_.pop_front();
-    lost = true;
-  }
-  entries_.push_back(entry);
-  work_.notify_one();
-  const bool done = written_.wait_for(lock, patience, [&] { return entry->done; });
-  lock.unlock();
+  if (!queued) return attempt(entry->write).has_value();  // nobody would come for it
   if (lost) report("a line of the audit log was lost: the database accepted no write for too long");
   return done;
 }
 
 void LateWriter::idle_task(std::function<void()> task) {
   {
-    const std::scoped_lock lock(mutex_);
-    if (stopping_ || task_) return;
-    task_ = std::move(task);
+    auto waiting = waiting_.lock();
+    if (waiting->stopping || waiting->task) return;
+    waiting->task = std::move(task);
   }
   work_.notify_one();
 }
 
 bool LateWriter::flush(std::chrono::milliseconds patience) {
-  std::unique_lock lock(mutex_);
-  return written_.wait_for(lock, patience, [&] { return entries_.empty(); });
+  auto waiting = waiting_.lock();
+  return waiting.wait_for(written_, patience, [](const Waiting& w) { return w.entries.empty(); });
 }
 
 std::size_t LateWriter::waiting() const {
-  const std::scoped_lock lock(mutex_);
-  return entries_.size();
+  const auto waiting = waiting_.lock();
+  return waiting->entries.size();
 }
 
 void LateWriter::stop() {
   {
-    const std::scoped_lock lock(mutex_);
-    stopping_ = true;
+    auto waiting = waiting_.lock();
+    waiting->stopping = true;
   }
   work_.notify_all();
   if (thread_.joinable()) thread_.join();
@@ -76,31 +78,36 @@ Result<void> LateWriter::attempt(const Write& write) {
 }
 
 void LateWriter::run() {
-  std::unique_lock lock(mutex_);
   bool troubled = false;
   for (;;) {
-    if (troubled && !stopping_) work_.wait_for(lock, k_pause, [&] { return stopping_; });
-    work_.wait(lock, [&] { return stopping_ || !entries_.empty() || task_; });
-    if (entries_.empty()) {
-      if (stopping_) return;
-      const auto task = std::exchange(task_, nullptr);
-      lock.unlock();
+    std::shared_ptr<Entry> entry;
+    std::function<void()> task;
+    bool last_try = false;
+    {
+      auto waiting = waiting_.lock();
+      if (troubled) waiting.wait_for(work_, k_pause, [](const Waiting& w) { return w.stopping; });
+      waiting.wait(work_, [](const Waiting& w) { return w.stopping || !w.entries.empty() || w.task; });
+      last_try = waiting->stopping;
+      if (!waiting->entries.empty())
+        entry = waiting->entries.front();
+      else if (last_try)
+        return;
+      else
+        task = std::exchange(waiting->task, nullptr);
+    }
+    if (!entry) {
       (void)guarded("late task", task);
-      lock.lock();
       continue;
     }
-    const auto entry = entries_.front();
-    const bool last_try = stopping_;
-    lock.unlock();
     const auto written = attempt(entry->write);
     const bool again = !written && may_pass(written.error().code) && !last_try;
     if (!written && !troubled) report("a write that follows its answer failed: " + written.error().message);
-    lock.lock();
     troubled = again;
     if (again) continue;
+    auto waiting = waiting_.lock();
     entry->done = true;
     // Unless it was the oldest that had to go meanwhile.
-    if (!entries_.empty() && entries_.front() == entry) entries_.pop_front();
+    if (!waiting->entries.empty() && waiting->entries.front() == entry) waiting->entries.pop_front();
     written_.notify_all();
   }
 }
@@ -108,9 +115,9 @@ void LateWriter::run() {
 Result<std::optional<StoredAnswer>> PromptAccessStore::answer(std::string_view principal,
                                                               std::string_view key) {
   {
-    const std::scoped_lock lock(mutex_);
-    const auto at = pending_.find({std::string(principal), std::string(key)});
-    if (at != pending_.end()) return std::optional(at->second);
+    const auto pending = pending_.lock();
+    const auto at = pending->find({std::string(principal), std::string(key)});
+    if (at != pending->end()) return std::optional(at->second);
   }
   return inner_.answer(principal, key);
 }
@@ -118,14 +125,14 @@ Result<std::optional<StoredAnswer>> PromptAccessStore::answer(std::string_view p
 Result<void> PromptAccessStore::keep_answer(const StoredAnswer& answer, std::int64_t expired_ran_ns) {
   const std::pair name(answer.principal, answer.key);
   {
-    const std::scoped_lock lock(mutex_);
-    if (pending_.size() >= LateWriter::k_max_waiting) pending_.erase(pending_.begin());
-    pending_[name] = answer;
+    auto pending = pending_.lock();
+    if (pending->size() >= LateWriter::k_max_waiting) pending->erase(pending->begin());
+    pending->insert_or_assign(name, answer);
   }
   writer_.write([this, answer, name, expired_ran_ns]() -> Result<void> {
     auto kept = inner_.keep_answer(answer, expired_ran_ns);
-    const std::scoped_lock lock(mutex_);
-    if (kept || !may_pass(kept.error().code)) pending_.erase(name);
+    auto pending = pending_.lock();
+    if (kept || !may_pass(kept.error().code)) pending->erase(name);
     return kept;
   });
   return boost::outcome_v2::success();

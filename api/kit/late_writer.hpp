@@ -7,11 +7,11 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <string_view>
 
 #include "core/base/guard.hpp"
+#include "core/base/locked.hpp"
 #include "core/base/result.hpp"
 #include "core/ports/access_store.hpp"
 
@@ -51,12 +51,15 @@ class LateWriter {
     if (log_) log_(what);
   }
 
+  struct Waiting {
+    std::deque<std::shared_ptr<Entry>> entries;
+    std::function<void()> task;
+    bool stopping{false};
+  };
+
   const std::function<void(std::string_view)> log_;
-  mutable std::mutex mutex_;
+  Locked<Waiting> waiting_;
   std::condition_variable work_, written_;
-  std::deque<std::shared_ptr<Entry>> entries_;
-  std::function<void()> task_;
-  bool stopping_{false};
   Thread thread_;
 };
 
@@ -81,8 +84,8 @@ class PromptAccessStore final : public AccessStore {
  private:
   AccessStore& inner_;
   LateWriter& writer_;
-  std::mutex mutex_;
-  std::map<std::pair<std::string, std::string>, StoredAnswer> pending_;  ///< by principal and key
+  /// By principal and key.
+  Locked<std::map<std::pair<std::string, std::string>, StoredAnswer>> pending_;
 };
 
 }  // namespace anchord::api

@@ -114,14 +114,10 @@ Result<ModelRegistry::Active> models_together(std::vector<ml::Model> models, ml:
 ModelRegistry::ModelRegistry(ModelSource source)
     : source_(source), active_(std::make_shared<const Active>()) {}
 
-std::shared_ptr<const ModelRegistry::Active> ModelRegistry::active() const {
-  const std::scoped_lock lock(mutex_);
-  return active_;
-}
+std::shared_ptr<const ModelRegistry::Active> ModelRegistry::active() const { return active_.copy(); }
 
 Result<void> ModelRegistry::reload() {
-  // One at a time, or the slower of two promotions leaves the older state in use.
-  const std::scoped_lock one_at_a_time(reload_mutex_);
+  const std::scoped_lock one_at_a_time(reloading_);
   BOOST_OUTCOME_TRY(const auto promotions, source_.store().active());
   std::map<std::string, ModelId> wanted;
   ml::Correction how = ml::Correction::weighted;
@@ -142,8 +138,8 @@ Result<void> ModelRegistry::reload() {
     next.correction = how;
     next.fault = loaded.error().message;
   }
-  const std::scoped_lock lock(mutex_);
-  active_ = std::make_shared<const Active>(std::move(next));
+  // The models of before end after the lock: every range of a flight takes it.
+  (void)active_.exchange(std::make_shared<const Active>(std::move(next)));
   return boost::outcome_v2::success();
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "api/learning/model_signer.hpp"
+#include "core/base/locked.hpp"
 #include "core/ml/predictor.hpp"
 #include "core/ports/learning_store.hpp"
 #include "core/types/range.hpp"
@@ -48,9 +49,8 @@ class ModelRegistry {
 
  private:
   ModelSource source_;
-  std::mutex reload_mutex_;
-  mutable std::mutex mutex_;
-  std::shared_ptr<const Active> active_;
+  std::mutex reloading_;  ///< one at a time, or the slower of two promotions leaves the older state in use
+  Locked<std::shared_ptr<const Active>> active_;
 };
 
 /// In the form a flight keeps with the range. Nothing where the models say nothing.

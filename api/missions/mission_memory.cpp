@@ -56,7 +56,7 @@ std::optional<MissionService::LiveView> MissionService::State::read(const Missio
   if (!n_ranges || !n_fixes) return std::nullopt;
   Read now{id, n_ranges.value(), n_fixes.value(), steady_now(), {}};
   if (auto before = read_before(now)) return before;
-  const std::scoped_lock one_at_a_time(reading_mutex);
+  const std::scoped_lock one_at_a_time(reading_one);
   if (auto before = read_before(now)) return before;
   const auto mission = deps.missions.mission(id);
   if (!mission) return std::nullopt;

@@ -106,7 +106,7 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
     SteadyTime made{};
     LiveView view;
   };
-  std::mutex reading_mutex;        ///< one flight is read at a time: each takes the memory of a live one
+  std::mutex reading_one;          ///< one flight is read at a time: each takes the memory of a live one
   Locked<std::deque<Read>> reads;  ///< newest last
 
   SteadyTime steady_now() const { return deps.steady.now(); }

@@ -23,10 +23,23 @@ std::int64_t steady_us() {
   return duration_cast<microseconds>(steady_clock::now().time_since_epoch()).count();
 }
 
+/// What a subscription that begins anew is shown first.
+std::string snap_of(const Subscription& subscription, const Resumed& start, bool keyed) {
+  std::vector<LiveElement> wanted;
+  for (const auto& element : start.snapshot) {
+    if (subscription.anchors.empty() || !element.anchor || subscription.anchors.count(*element.anchor) > 0)
+      wanted.push_back(element);
+  }
+  return snap_frame(subscription.id, start.last_seq, start.t_us, wanted, keyed);
+}
+
 }  // namespace
 
 Conversation::Conversation(Hub& hub, Principal principal, std::function<bool()> holds)
-    : hub_(hub), principal_(std::move(principal)), holds_(std::move(holds)), outbox_(hub.counters()) {}
+    : hub_(hub),
+      principal_(std::move(principal)),
+      holds_(std::move(holds)),
+      output_(std::in_place, hub.counters()) {}
 
 Conversation::~Conversation() = default;
 
@@ -119,8 +132,8 @@ void Conversation::subscribe(const Json& message) {
   {
     // Before the hub knows of it, so that nothing published meanwhile is lost; where it begins is known
     // after.
-    const std::scoped_lock lock(mutex_);
-    outbox_.add(subscription);
+    auto output = output_.lock();
+    output->outbox.add(subscription);
   }
   const Resumed start = membership_.subscribe(topic->topic, since);
   nlohmann::ordered_json ack{{"op", "ack"},
@@ -128,22 +141,14 @@ void Conversation::subscribe(const Json& message) {
                              {"sub", subscription.id},
                              {"from_seq", start.recovered ? since->second + 1 : start.last_seq + 1},
                              {"recovered", start.recovered}};
-  std::string frames = to_wire(ack);
+  std::string frames = to_wire(ack), snap;
+  if (!start.recovered) snap = snap_of(subscription, start, topic->keyed);
   {
-    const std::scoped_lock lock(mutex_);
-    bool room = outbox_.control(std::move(frames));
-    outbox_.start(subscription.id, start.recovered ? since->second : start.last_seq, start.missed);
-    if (!start.recovered) {
-      std::vector<LiveElement> wanted;
-      for (const auto& element : start.snapshot) {
-        if (subscription.anchors.empty() || !element.anchor ||
-            subscription.anchors.count(*element.anchor) > 0)
-          wanted.push_back(element);
-      }
-      room = outbox_.control(snap_frame(subscription.id, start.last_seq, start.t_us, wanted, topic->keyed)) &&
-             room;
-    }
-    if (!room) close_ = {4008, "slow_consumer"};
+    auto output = output_.lock();
+    bool room = output->outbox.control(std::move(frames));
+    output->outbox.start(subscription.id, start.recovered ? since->second : start.last_seq, start.missed);
+    if (!start.recovered) room = output->outbox.control(std::move(snap)) && room;
+    if (!room) output->close = {4008, "slow_consumer"};
   }
   if (wake_) wake_();
 }
@@ -161,8 +166,8 @@ void Conversation::unsubscribe(const Json& message) {
   if (it == subscriptions_.end()) return refuse(message, 404, "not-found", "there is no such subscription");
   membership_.unsubscribe(it->second);
   {
-    const std::scoped_lock lock(mutex_);
-    outbox_.remove(it->first);
+    auto output = output_.lock();
+    output->outbox.remove(it->first);
   }
   nlohmann::ordered_json ack{{"op", "ack"}, {"id", id ? Json(*id) : Json()}, {"sub", it->first}};
   subscriptions_.erase(it);
@@ -178,19 +183,19 @@ void Conversation::refuse(const Json& message, int status, std::string_view type
 
 void Conversation::say(std::string frame) {
   {
-    const std::scoped_lock lock(mutex_);
-    if (!outbox_.control(std::move(frame)) && !close_) close_ = {4008, "slow_consumer"};
+    auto output = output_.lock();
+    if (!output->outbox.control(std::move(frame)) && !output->close) output->close = {4008, "slow_consumer"};
   }
   if (wake_) wake_();
 }
 
 void Conversation::close(std::uint16_t code, std::string_view reason) {
   {
-    const std::scoped_lock lock(mutex_);
-    if (close_) return;
+    auto output = output_.lock();
+    if (output->close) return;
     if (code == 4008) ++hub_.counters().slow_disconnects;
-    outbox_.control(bye_frame(code, reason));
-    close_ = {code, std::string(reason)};
+    output->outbox.control(bye_frame(code, reason));
+    output->close = {code, std::string(reason)};
   }
   if (wake_) wake_();
 }
@@ -198,10 +203,10 @@ void Conversation::close(std::uint16_t code, std::string_view reason) {
 void Conversation::on_message(Topic topic, const std::shared_ptr<const LiveMessage>& message) {
   bool due = false, room = true;
   {
-    const std::scoped_lock lock(mutex_);
-    if (close_) return;
-    room = outbox_.put(message, topic);
-    due = outbox_.due(steady_us());
+    auto output = output_.lock();
+    if (output->close) return;
+    room = output->outbox.put(message, topic);
+    due = output->outbox.due(steady_us());
   }
   if (!room)
     close(4008, "slow_consumer");
@@ -214,10 +219,10 @@ void Conversation::on_tick(UtcTime now, bool heartbeat) {
   if (ticks_++ % 5 == 0 && holds_ && !holds_()) return close(4001, "auth");
   bool due = false;
   {
-    const std::scoped_lock lock(mutex_);
-    if (close_) return;
-    if (heartbeat) outbox_.heartbeat(now.us());
-    due = outbox_.due(steady_us());
+    auto output = output_.lock();
+    if (output->close) return;
+    if (heartbeat) output->outbox.heartbeat(now.us());
+    due = output->outbox.due(steady_us());
   }
   if (due && wake_) wake_();
 }
@@ -225,15 +230,15 @@ void Conversation::on_tick(UtcTime now, bool heartbeat) {
 void Conversation::on_bye(std::uint16_t code, std::string_view reason) { close(code, reason); }
 
 std::shared_ptr<const std::string> Conversation::next_frame() {
-  const std::scoped_lock lock(mutex_);
+  auto output = output_.lock();
   // After a close was asked for only control frames (the bye among them) still go out.
-  if (close_) return outbox_.next_control();
-  return outbox_.next(steady_us());
+  if (output->close) return output->outbox.next_control();
+  return output->outbox.next(steady_us());
 }
 
 std::optional<std::pair<std::uint16_t, std::string>> Conversation::close_request() {
-  const std::scoped_lock lock(mutex_);
-  return close_;
+  const auto output = output_.lock();
+  return output->close;
 }
 
 }  // namespace anchord::api

@@ -1,12 +1,12 @@
 #pragma once
 
 #include <map>
-#include <mutex>
 #include <nlohmann/json_fwd.hpp>
 
 #include "api/stream/hub.hpp"
 #include "api/stream/outbox.hpp"
 #include "api/stream/ws_handler.hpp"
+#include "core/base/locked.hpp"
 
 namespace anchord::api {
 
@@ -37,13 +37,17 @@ class Conversation final : public WsHandler, private HubListener {
   void say(std::string frame);
   void close(std::uint16_t code, std::string_view reason);
 
+  struct Output {
+    explicit Output(HubCounters& counters) : outbox(counters) {}
+    Outbox outbox;
+    std::optional<std::pair<std::uint16_t, std::string>> close;
+  };
+
   Hub& hub_;
   const Principal principal_;
   const std::function<bool()> holds_;
   std::function<void()> wake_;
-  std::mutex mutex_;  ///< guards outbox_ and close_; never held while the hub is called
-  Outbox outbox_;
-  std::optional<std::pair<std::uint16_t, std::string>> close_;
+  Locked<Output> output_;  ///< taken inside the hub's lock, so never held while the hub is called
   std::map<std::uint64_t, Topic> subscriptions_;  ///< touched by the session's strand alone
   std::uint64_t next_sub_{100};
   unsigned ticks_{0};         ///< of the hub; touched under its lock alone

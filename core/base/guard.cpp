@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <exception>
 #include <map>
-#include <mutex>
 
+#include "core/base/locked.hpp"
 #include "core/base/text.hpp"
 
 namespace anchord {
@@ -23,14 +23,13 @@ struct Kept {
 };
 
 struct Book {
-  std::mutex mutex;
   std::map<std::string, Kept, std::less<>> tasks;
   std::function<void(const TaskFailure&)> tell;
 };
 
 /// Never destroyed: a thread may outlive main's statics.
-Book& book() {
-  static auto* const one = new Book;
+Locked<Book>& book() {
+  static auto* const one = new Locked<Book>;
   return *one;
 }
 
@@ -51,34 +50,33 @@ void tell_stderr(const TaskFailure& failure) {
 /// The failure if it is to be told now.
 bool enter(std::string_view task, const std::string& what, TaskFailure& out,
            std::function<void(const TaskFailure&)>& tell) {
-  auto& all = book();
   const auto now = SteadyClock::now();
-  const std::scoped_lock lock(all.mutex);
-  auto found = all.tasks.find(task);
-  if (found == all.tasks.end() && all.tasks.size() >= k_most_tasks) task = "another task";
-  if (found == all.tasks.end()) found = all.tasks.try_emplace(to_utf8(task)).first;
+  auto all = book().lock();
+  auto found = all->tasks.find(task);
+  if (found == all->tasks.end() && all->tasks.size() >= k_most_tasks) task = "another task";
+  if (found == all->tasks.end()) found = all->tasks.try_emplace(to_utf8(task)).first;
   auto& [failure, told] = found->second;
   const bool news = failure.what != what || now - told >= k_same_again;
   const auto count = failure.newest == SteadyClock::time_point{} ? 1 : failure.count + 1;
   failure = {found->first, what, count, now};
   if (news) told = now;
   out = failure;
-  tell = all.tell;
+  tell = all->tell;
   return news;
 }
 
 }  // namespace
 
 void on_task_failure(std::function<void(const TaskFailure&)> tell) {
-  const std::scoped_lock lock(book().mutex);
-  book().tell = std::move(tell);
+  auto all = book().lock();
+  all->tell.swap(tell);
 }
 
 std::vector<TaskFailure> task_failures(std::chrono::seconds within) {
   std::vector<TaskFailure> out;
   const auto now = SteadyClock::now();
-  const std::scoped_lock lock(book().mutex);
-  for (const auto& [name, kept] : book().tasks) {
+  const auto all = book().lock();
+  for (const auto& [name, kept] : all->tasks) {
     if (now - kept.failure.newest <= within) out.push_back(kept.failure);
   }
   return out;

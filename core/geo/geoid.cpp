@@ -4,16 +4,16 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <mutex>
 #include <utility>
+
+#include "core/base/locked.hpp"
 
 namespace anchord {
 
 /// GeographicLib's model keeps the last cell it read, so two threads must not ask at once.
 struct Geoid::Model {
-  Model(const std::string& name, const std::string& folder) : grid(name, folder) {}
-  std::mutex mutex;
-  GeographicLib::Geoid grid;
+  Model(const std::string& name, const std::string& folder) : grid(std::in_place, name, folder) {}
+  Locked<GeographicLib::Geoid> grid;
 };
 
 namespace {
@@ -55,9 +55,9 @@ Result<Geoid> Geoid::open(const std::string& folder) {
 Result<double> Geoid::undulation_m(const Wgs84& at) const {
   if (!std::isfinite(at.lon_deg) || !(std::abs(at.lat_deg) <= 90))
     return make_error(Errc::invalid_argument, "no place on the globe");
-  const std::scoped_lock lock(model_->mutex);
+  const auto grid = model_->grid.lock();
   try {
-    return model_->grid(at.lat_deg, at.lon_deg);
+    return (*grid)(at.lat_deg, at.lon_deg);
   } catch (const std::exception& fault) {
     return make_error(Errc::storage_unavailable, fault.what());
   }

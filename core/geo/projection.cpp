@@ -5,29 +5,29 @@
 #include <array>
 #include <cctype>
 #include <cmath>
-#include <mutex>
 #include <utility>
+
+#include "core/base/locked.hpp"
 
 namespace anchord {
 
-struct Projection::Pipeline {
-  Pipeline() : context(proj_context_create()) {
+namespace {
+
+struct Transformation {
+  Transformation() : context(proj_context_create()) {
     proj_context_set_enable_network(context, 0);
     // PROJ prints what it cannot do; we say it in our own words.
     proj_log_level(context, PJ_LOG_NONE);
   }
-  ~Pipeline() {
+  ~Transformation() {
     if (operation != nullptr) proj_destroy(operation);
     proj_context_destroy(context);
   }
-  Pipeline(const Pipeline&) = delete;
-  Pipeline& operator=(const Pipeline&) = delete;
+  Transformation(const Transformation&) = delete;
+  Transformation& operator=(const Transformation&) = delete;
   PJ_CONTEXT* context;
   PJ* operation{nullptr};
-  std::mutex mutex;  // a PJ belongs to one thread at a time
 };
-
-namespace {
 
 struct Datum {
   std::string_view word;
@@ -51,6 +51,11 @@ std::string code(int epsg) { return "EPSG:" + std::to_string(epsg); }
 
 }  // namespace
 
+/// A PJ belongs to one thread at a time.
+struct Projection::Pipeline {
+  Locked<Transformation> transformation;
+};
+
 std::optional<int> geographic_epsg(std::string_view datum) {
   std::string word;
   for (const char c : datum.substr(0, datum.find(" ("))) {
@@ -71,7 +76,8 @@ Projection::~Projection() = default;
 
 Result<Projection> Projection::open(int epsg, int geographic_epsg) {
   auto pipeline = std::make_unique<Pipeline>();
-  PJ_CONTEXT* context = pipeline->context;
+  auto made = pipeline->transformation.lock();
+  PJ_CONTEXT* context = made->context;
   const Owned target{proj_create(context, code(epsg).c_str())};
   const Owned source{proj_create(context, code(geographic_epsg).c_str())};
   if (target.pj == nullptr) return make_error(Errc::not_found, "PROJ knows no " + code(epsg));
@@ -93,29 +99,28 @@ Result<Projection> Projection::open(int epsg, int geographic_epsg) {
     return make_error(Errc::unsupported,
                       "no way from " + code(geographic_epsg) + " to " + name + " with the grids installed");
   // Longitude and easting first, in whatever order the register has the axes.
-  pipeline->operation = proj_normalize_for_visualization(context, found.pj);
-  if (pipeline->operation == nullptr) return make_error(Errc::unsupported, name + ": axes not understood");
+  made->operation = proj_normalize_for_visualization(context, found.pj);
+  if (made->operation == nullptr) return make_error(Errc::unsupported, name + ": axes not understood");
   return Projection(epsg, std::move(name), std::move(pipeline));
 }
 
 Result<Eigen::Vector2d> Projection::easting_northing_m(const Wgs84& at) const {
-  const std::scoped_lock lock(pipeline_->mutex);
+  const auto use = pipeline_->transformation.lock();
   const PJ_COORD out =
-      proj_trans(pipeline_->operation, PJ_FWD, proj_coord(at.lon_deg, at.lat_deg, at.height_m, HUGE_VAL));
+      proj_trans(use->operation, PJ_FWD, proj_coord(at.lon_deg, at.lat_deg, at.height_m, HUGE_VAL));
   if (!std::isfinite(out.xy.x) || !std::isfinite(out.xy.y)) {
-    proj_errno_reset(pipeline_->operation);
+    proj_errno_reset(use->operation);
     return make_error(Errc::invalid_argument, "the place lies outside " + name_);
   }
   return Eigen::Vector2d(out.xy.x, out.xy.y);
 }
 
 Result<Wgs84> Projection::geographic(const Eigen::Vector2d& easting_northing_m, double height_m) const {
-  const std::scoped_lock lock(pipeline_->mutex);
-  const PJ_COORD out =
-      proj_trans(pipeline_->operation, PJ_INV,
-                 proj_coord(easting_northing_m.x(), easting_northing_m.y(), height_m, HUGE_VAL));
+  const auto use = pipeline_->transformation.lock();
+  const PJ_COORD out = proj_trans(
+      use->operation, PJ_INV, proj_coord(easting_northing_m.x(), easting_northing_m.y(), height_m, HUGE_VAL));
   if (!std::isfinite(out.xy.x) || !std::isfinite(out.xy.y)) {
-    proj_errno_reset(pipeline_->operation);
+    proj_errno_reset(use->operation);
     return make_error(Errc::invalid_argument, "the place lies outside " + name_);
   }
   return Wgs84{out.xy.y, out.xy.x, height_m};

@@ -3,30 +3,27 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
-#include <mutex>
 #include <optional>
 #include <thread>
 #include <vector>
 
 #include "core/base/guard.hpp"
+#include "core/base/locked.hpp"
 
 namespace anchord::ml {
 namespace {
 
+/// Of the first element that failed.
 struct Outcome {
-  std::mutex mutex;
   std::size_t failed_at{static_cast<std::size_t>(-1)};
   std::optional<Error> error;
   std::exception_ptr thrown;
-
-  void fail(std::size_t at, std::optional<Error> why, std::exception_ptr what) {
-    const std::lock_guard lock{mutex};
-    if (at >= failed_at) return;
-    failed_at = at;
-    error = std::move(why);
-    thrown = std::move(what);
-  }
 };
+
+void fail(Locked<Outcome>& shared, Outcome now) {
+  auto outcome = shared.lock();
+  if (now.failed_at < outcome->failed_at) *outcome = std::move(now);
+}
 
 }  // namespace
 
@@ -34,16 +31,16 @@ Result<void> parallel_for(std::size_t n, const Execution& how,
                           const std::function<Result<void>(std::size_t)>& work) {
   std::atomic<std::size_t> next{0};
   std::atomic<bool> failed{false};
-  Outcome outcome;
+  Locked<Outcome> shared;
   const auto run = [&] {
     for (std::size_t i; !failed && !how.cancelled() && (i = next++) < n;) {
       try {
         if (auto done = work(i); !done) {
-          outcome.fail(i, done.error(), nullptr);
+          fail(shared, {i, done.error(), nullptr});
           failed = true;
         }
       } catch (...) {  // out of memory in a worker is the caller's to handle
-        outcome.fail(i, std::nullopt, std::current_exception());
+        fail(shared, {i, std::nullopt, std::current_exception()});
         failed = true;
       }
     }
@@ -57,6 +54,7 @@ Result<void> parallel_for(std::size_t n, const Execution& how,
     for (auto& helper : helpers) helper.join();
   }
   if (how.cancelled()) return make_error(Errc::canceled, "cancelled");
+  const Outcome outcome = shared.copy();
   if (outcome.thrown) std::rethrow_exception(outcome.thrown);
   if (outcome.error) return *outcome.error;
   return boost::outcome_v2::success();

@@ -11,9 +11,11 @@
 #include <cstdio>
 #include <cstring>
 #include <map>
-#include <mutex>
+#include <utility>
+#include <vector>
 
 #include "core/base/guard.hpp"
+#include "core/base/locked.hpp"
 
 namespace anchord::record {
 namespace fs = std::filesystem;
@@ -46,6 +48,29 @@ bool write_all(int fd, std::string_view bytes) {
   return true;
 }
 
+/// What the syncing thread shares with the writing one.
+struct Parts {
+  int fd{-1};                 ///< being written
+  std::vector<int> finished;  ///< written to their end: the syncing thread syncs and closes them
+  bool new_name{false};       ///< a part was begun, and its folder not synced since
+  fs::path file;              ///< of fd
+  std::string failure;
+  bool stopping{false};
+};
+
+/// Descriptors of its own: the writer may turn to the next part meanwhile.
+struct ToSync {
+  std::vector<int> fds;
+  bool folder{false};
+};
+
+ToSync take_finished(Parts& parts) {
+  ToSync out;
+  out.fds.swap(parts.finished);
+  out.folder = std::exchange(parts.new_name, false);
+  return out;
+}
+
 }  // namespace
 
 struct Recorder::State {
@@ -54,19 +79,14 @@ struct Recorder::State {
   RecorderOptions options;
 
   // Of the calling thread.
-  int part{0};
+  int part{0}, fd{-1};
   std::uint64_t in_part{0};
   std::int64_t retry_at_ns{0};
   std::map<std::uint16_t, std::string> devices;  ///< "added" payloads, for the next part
   std::string mission, scratch;
 
-  mutable std::mutex mutex;  ///< the three below, shared with the syncing thread
+  Locked<Parts> parts;
   std::condition_variable wake;
-  int fd{-1};
-  fs::path file;
-  std::string failure;
-  bool stopping{false};
-
   std::atomic<std::uint64_t> written{0}, lost{0};
   Thread syncer;
 
@@ -74,6 +94,7 @@ struct Recorder::State {
   void remember(const Event& event);
   bool write(std::string_view bytes);
   void fail(std::int64_t now_ns, int error);
+  void sync(const ToSync& what) const;
   void sync_loop();
 };
 
@@ -89,12 +110,14 @@ Result<void> Recorder::State::next_part(const link::Arrival& at) {
                       path.string() + ": " + std::strerror(errno));
   }
   {
-    const std::lock_guard lock(mutex);
-    if (fd >= 0) ::close(fd);
-    fd = opened;
-    file = path;
-    failure.clear();
+    auto now = parts.lock();
+    if (now->fd >= 0) now->finished.push_back(now->fd);
+    now->fd = fd = opened;
+    now->new_name = true;
+    now->file = path;
+    now->failure.clear();
   }
+  wake.notify_all();
   std::string head(k_magic);
   for (const auto& [slot, settings] : devices) append_record(head, {EventKind::added, slot, at, settings});
   if (!mission.empty()) append_record(head, {EventKind::mission, 0, at, mission});
@@ -132,25 +155,37 @@ void Recorder::State::remember(const Event& event) {
 
 void Recorder::State::fail(std::int64_t now_ns, int error) {
   retry_at_ns = now_ns + k_retry_ns;
-  const std::lock_guard lock(mutex);
-  failure = file.string() + ": " + std::strerror(error);
+  auto now = parts.lock();
+  now->failure = now->file.string() + ": " + std::strerror(error);
+}
+
+void Recorder::State::sync(const ToSync& what) const {
+  for (const int one : what.fds) {
+    (void)::fdatasync(one);
+    ::close(one);
+  }
+  if (!what.folder) return;
+  const int names = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (names < 0) return;
+  (void)::fsync(names);
+  ::close(names);
 }
 
 void Recorder::State::sync_loop() {
-  std::uint64_t synced = 0;
-  std::unique_lock lock(mutex);
-  while (!stopping) {
-    wake.wait_for(lock, std::chrono::milliseconds(options.sync_every_ms), [this] { return stopping; });
-    const auto now = written.load();
-    if (fd < 0 || now == synced) continue;
-    const int copy = ::dup(fd);  // the writer may turn to the next part meanwhile
-    lock.unlock();
-    if (copy >= 0) {
-      (void)::fdatasync(copy);
-      ::close(copy);
+  const auto every = std::chrono::milliseconds(options.sync_every_ms);
+  for (std::uint64_t synced = 0;;) {
+    ToSync due;
+    {
+      auto now = parts.lock();
+      now.wait_for(wake, every, [](const Parts& p) { return p.stopping || !p.finished.empty(); });
+      if (now->stopping) return;
+      due = take_finished(*now);
+      if (const auto so_far = written.load(); now->fd >= 0 && so_far != synced) {
+        if (const int copy = ::dup(now->fd); copy >= 0) due.fds.push_back(copy);
+        synced = so_far;
+      }
     }
-    synced = now;
-    lock.lock();
+    sync(due);
   }
 }
 
@@ -160,15 +195,18 @@ Recorder::Recorder(std::unique_ptr<State> state) : state_(std::move(state)) {
 
 Recorder::~Recorder() {
   {
-    const std::lock_guard lock(state_->mutex);
-    state_->stopping = true;
+    auto parts = state_->parts.lock();
+    parts->stopping = true;
   }
   state_->wake.notify_all();
   state_->syncer.join();
-  if (state_->fd >= 0) {
-    (void)::fdatasync(state_->fd);
-    ::close(state_->fd);
+  ToSync rest;
+  {
+    auto parts = state_->parts.lock();
+    if (parts->fd >= 0) parts->finished.push_back(parts->fd);
+    rest = take_finished(*parts);
   }
+  state_->sync(rest);
 }
 
 Result<std::unique_ptr<Recorder>> Recorder::open(const fs::path& folder, UtcTime now,
@@ -212,14 +250,14 @@ void Recorder::take(const Event& event) {
 }
 
 std::string Recorder::failed() const {
-  const std::lock_guard lock(state_->mutex);
-  return state_->failure;
+  const auto parts = state_->parts.lock();
+  return parts->failure;
 }
 std::uint64_t Recorder::bytes_written() const { return state_->written; }
 std::uint64_t Recorder::events_lost() const { return state_->lost; }
 fs::path Recorder::file() const {
-  const std::lock_guard lock(state_->mutex);
-  return state_->file;
+  const auto parts = state_->parts.lock();
+  return parts->file;
 }
 
 Result<std::vector<fs::path>> parts_of(const fs::path& file) {

@@ -6,8 +6,9 @@
 #include <prometheus/registry.h>
 #include <prometheus/text_serializer.h>
 
-#include <mutex>
 #include <vector>
+
+#include "core/base/locked.hpp"
 
 namespace anchord::server {
 
@@ -19,8 +20,7 @@ struct Metrics::State {
     prometheus::Gauge* gauge;
     std::function<double()> read;
   };
-  std::mutex mutex;
-  std::vector<Read> reads;
+  Locked<std::vector<Read>> reads;
 };
 
 Metrics::Metrics(std::string_view version) : state_(std::make_unique<State>()) {
@@ -54,15 +54,14 @@ void Metrics::answered(std::string_view route, std::string_view method, int stat
 
 void Metrics::gauge(std::string name, std::string help, std::function<double()> read) {
   auto& made = prometheus::BuildGauge().Name(name).Help(help).Register(state_->registry).Add({});
-  const std::lock_guard lock(state_->mutex);
-  state_->reads.push_back({&made, std::move(read)});
+  auto reads = state_->reads.lock();
+  reads->push_back({&made, std::move(read)});
 }
 
 std::string Metrics::text() {
-  {
-    const std::lock_guard lock(state_->mutex);
-    for (const auto& [gauge, read] : state_->reads) gauge->Set(read());
-  }
+  // What they read has locks of its own: none of ours is held meanwhile.
+  const auto reads = state_->reads.copy();
+  for (const auto& [gauge, read] : reads) gauge->Set(read());
   return prometheus::TextSerializer().Serialize(state_->registry.Collect());
 }
 

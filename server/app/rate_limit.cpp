@@ -6,14 +6,14 @@
 namespace anchord::server {
 
 std::optional<int> RateLimit::take(std::string_view name, Clock::time_point now) {
-  const std::lock_guard lock(mutex_);
-  auto at = buckets_.find(name);
-  if (at == buckets_.end()) {
-    if (buckets_.size() >= max_names_) {
-      buckets_.erase(
-          std::ranges::min_element(buckets_, {}, [](const auto& entry) { return entry.second.seen; }));
+  auto buckets = buckets_.lock();
+  auto at = buckets->find(name);
+  if (at == buckets->end()) {
+    if (buckets->size() >= max_names_) {
+      buckets->erase(
+          std::ranges::min_element(*buckets, {}, [](const auto& entry) { return entry.second.seen; }));
     }
-    at = buckets_.emplace(std::string(name), Bucket{burst_, now}).first;
+    at = buckets->emplace(std::string(name), Bucket{burst_, now}).first;
   }
   Bucket& bucket = at->second;
   const double elapsed_s = std::chrono::duration<double>(now - bucket.seen).count();

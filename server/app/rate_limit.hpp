@@ -3,10 +3,11 @@
 #include <chrono>
 #include <cstddef>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
+
+#include "core/base/locked.hpp"
 
 namespace anchord::server {
 
@@ -28,8 +29,7 @@ class RateLimit {
   };
   const double per_s_, burst_;
   const std::size_t max_names_;
-  std::mutex mutex_;
-  std::map<std::string, Bucket, std::less<>> buckets_;
+  Locked<std::map<std::string, Bucket, std::less<>>> buckets_;
 };
 
 }  // namespace anchord::server

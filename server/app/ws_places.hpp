@@ -4,12 +4,13 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 #include <variant>
 
 #include "api/kit/message.hpp"
+#include "core/base/locked.hpp"
 
 namespace anchord::server {
 
@@ -32,13 +33,14 @@ class WsPlaces {
   std::size_t taken() const;
 
  private:
-  struct State {
-    std::mutex mutex;
+  struct Taken {
     std::size_t all{0};
     std::map<std::string, std::size_t> by_token;
   };
+  std::optional<Refusal> refusal(Taken& taken, const api::Principal& who, bool counted) const;
+
   const WsPlaceLimits limits_;
-  const std::shared_ptr<State> state_;
+  const std::shared_ptr<Locked<Taken>> taken_;
 };
 
 }  // namespace anchord::server

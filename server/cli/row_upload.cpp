@@ -11,49 +11,49 @@ RowUpload::RowUpload(RestClient& client) : client_(client), thread_("anchord-upl
 
 RowUpload::~RowUpload() {
   {
-    const std::scoped_lock lock(mutex_);
-    closing_ = true;
+    auto state = state_.lock();
+    state->closing = true;
   }
   changed_.notify_all();
   thread_.join();
 }
 
 Result<void> RowUpload::send(RowBatch batch) {
-  std::unique_lock lock(mutex_);
-  changed_.wait(lock, [this] { return !waiting_ || failed_; });
-  if (failed_) return *failed_;
-  waiting_ = std::move(batch);
+  auto state = state_.lock();
+  state.wait(changed_, [](const State& s) { return !s.waiting || s.failed; });
+  if (state->failed) return *state->failed;
+  state->waiting = std::move(batch);
   changed_.notify_all();
   return boost::outcome_v2::success();
 }
 
 Result<void> RowUpload::drain() {
-  std::unique_lock lock(mutex_);
-  changed_.wait(lock, [this] { return (!waiting_ && !busy_) || failed_; });
-  if (failed_) return *failed_;
+  auto state = state_.lock();
+  state.wait(changed_, [](const State& s) { return (!s.waiting && !s.busy) || s.failed; });
+  if (state->failed) return *state->failed;
   return boost::outcome_v2::success();
 }
 
 RowAnswers RowUpload::answers() const {
-  const std::scoped_lock lock(mutex_);
-  return answers_;
+  const auto state = state_.lock();
+  return state->answers;
 }
 
 void RowUpload::run() {
-  std::unique_lock lock(mutex_);
-  while (!failed_) {
-    changed_.wait(lock, [this] { return waiting_ || closing_; });
-    if (!waiting_) return;
-    const RowBatch batch = *std::exchange(waiting_, std::nullopt);
-    busy_ = true;
+  auto state = state_.lock();
+  while (!state->failed) {
+    state.wait(changed_, [](const State& s) { return s.waiting || s.closing; });
+    if (!state->waiting) return;
+    const RowBatch batch = *std::exchange(state->waiting, std::nullopt);
+    state->busy = true;
     changed_.notify_all();
-    lock.unlock();
     Result<void> done = boost::outcome_v2::success();
-    if (const auto ran = guarded("upload", [&] { done = post(batch); }); !ran)
-      done = make_error(Errc::internal, ran.what);
-    lock.lock();
-    busy_ = false;
-    if (!done) failed_ = std::move(done).error();
+    state.unlocked([&] {
+      if (const auto ran = guarded("upload", [&] { done = post(batch); }); !ran)
+        done = make_error(Errc::internal, ran.what);
+    });
+    state->busy = false;
+    if (!done) state->failed = std::move(done).error();
     changed_.notify_all();
   }
 }
@@ -68,11 +68,12 @@ Result<void> RowUpload::post_rows(const std::string& path, const std::string& li
   if (lines.empty()) return boost::outcome_v2::success();
   BOOST_OUTCOME_TRY(const auto body, client_.post(path, "application/x-ndjson", lines));
   BOOST_OUTCOME_TRY(const auto answer, api::parse_ingest_answer(body));
-  const std::scoped_lock lock(mutex_);
-  answers_.accepted += answer.accepted;
-  answers_.known += answer.duplicates;
-  answers_.refused += answer.rejected;
-  if ((answers_.*first_error).empty()) answers_.*first_error = answer.first_error;
+  auto state = state_.lock();
+  state->answers.accepted += answer.accepted;
+  state->answers.known += answer.duplicates;
+  state->answers.refused += answer.rejected;
+  auto& first = state->answers.*first_error;
+  if (first.empty()) first = answer.first_error;
   return boost::outcome_v2::success();
 }
 

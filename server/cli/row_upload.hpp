@@ -2,11 +2,11 @@
 
 #include <condition_variable>
 #include <cstdint>
-#include <mutex>
 #include <optional>
 #include <string>
 
 #include "core/base/guard.hpp"
+#include "core/base/locked.hpp"
 #include "core/base/result.hpp"
 
 namespace anchord::cli {
@@ -47,13 +47,16 @@ class RowUpload {
   Result<void> post_rows(const std::string& path, const std::string& lines,
                          std::string RowAnswers::*first_error);
 
+  struct State {
+    std::optional<RowBatch> waiting;
+    bool busy{false}, closing{false};
+    std::optional<Error> failed;
+    RowAnswers answers;
+  };
+
   RestClient& client_;
-  mutable std::mutex mutex_;
+  Locked<State> state_;
   std::condition_variable changed_;
-  std::optional<RowBatch> waiting_{};
-  bool busy_{false}, closing_{false};
-  std::optional<Error> failed_{};
-  RowAnswers answers_{};
   Thread thread_;
 };
 

@@ -9,11 +9,11 @@
 #include <cstdio>
 #include <fstream>
 #include <memory>
-#include <mutex>
 #include <thread>
 
 #include "api/measurements/flight_requests.hpp"
 #include "core/base/guard.hpp"
+#include "core/base/locked.hpp"
 #include "core/base/text.hpp"
 #include "drivers/link/byte_link.hpp"
 #include "drivers/sim/autopilot_script.hpp"
@@ -77,14 +77,14 @@ class World {
       const Eigen::Vector3d before = autopilot_.vehicle().position_m();
       autopilot_.advance(kit_.now_s() + flight::SimKit::k_step_s);
       auto measured = kit_.observe(before, autopilot_.vehicle());
-      const std::scoped_lock lock(mutex_);
+      auto rows = rows_.lock();
       for (auto& fix : measured.fixes) {
         fix.mission = mission_id_;
-        api::append_ndjson(fixes_, fix);
+        api::append_ndjson(rows->fixes, fix);
       }
       for (auto& range : measured.ranges) {
         range.mission = mission_id_;
-        api::append_ndjson(ranges_, range);
+        api::append_ndjson(rows->ranges, range);
       }
     }
     const auto out = autopilot_.take_bytes();
@@ -120,12 +120,7 @@ class World {
   /// On a thread of its own: a server that is away must not stop the aircraft.
   void deliver() {
     const std::string where = "?mission=" + mission_;
-    std::string ranges, fixes;
-    {
-      const std::scoped_lock lock(mutex_);
-      ranges.swap(ranges_);
-      fixes.swap(fixes_);
-    }
+    const auto [fixes, ranges] = rows_.exchange({});
     if (!ranges.empty()) (void)told(client_.post("/api/v1/ranges" + where, "application/x-ndjson", ranges));
     if (!fixes.empty()) (void)told(client_.post("/api/v1/fixes" + where, "application/x-ndjson", fixes));
   }
@@ -160,8 +155,11 @@ class World {
   std::string typed_;
   bool reads_{true};
   MissionId mission_id_{};
-  std::mutex mutex_;
-  std::string mission_, fixes_, ranges_;
+  std::string mission_;
+  struct Rows {
+    std::string fixes, ranges;
+  };
+  Locked<Rows> rows_;
 };
 
 int simulate_drone(const Options& options) {

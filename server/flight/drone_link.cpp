@@ -3,9 +3,9 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <mutex>
 
 #include "core/base/guard.hpp"
+#include "core/base/locked.hpp"
 #include "drivers/drone/peer_gate.hpp"
 #include "drivers/drone/session.hpp"
 #include "drivers/link/byte_link.hpp"
@@ -20,6 +20,20 @@ constexpr std::int64_t k_write_ms = 1'500;
 
 double seconds(const link::Arrival& at) { return static_cast<double>(at.steady_ns) * 1e-9; }
 
+/// Who may speak, and what is said: of the link's thread and of whoever commands.
+struct Dialogue {
+  explicit Dialogue(const std::optional<mavlink::Secret>& key) : gate(key), session(options_with(key)) {}
+
+  static drone::SessionOptions options_with(const std::optional<mavlink::Secret>& key) {
+    drone::SessionOptions out;
+    out.secret = key;
+    return out;
+  }
+
+  drone::PeerGate gate;
+  drone::Session session;
+};
+
 }  // namespace
 
 struct DroneLink::Impl {
@@ -28,15 +42,8 @@ struct DroneLink::Impl {
       : address(std::move(where)),
         log(std::move(tell)),
         timer(io),
-        gate(key),
-        session(options_with(key)),
+        dialogue(std::in_place, key),
         is_signed(key.has_value()) {}
-
-  static drone::SessionOptions options_with(const std::optional<mavlink::Secret>& key) {
-    drone::SessionOptions out;
-    out.secret = key;
-    return out;
-  }
 
   void run() {
     (void)guarded("aircraft", [this] { open(); });
@@ -53,16 +60,17 @@ struct DroneLink::Impl {
     std::string told;
     bool admitted = false;
     {
-      const std::scoped_lock lock(mutex);
-      const auto before = gate.peer();
-      admitted = gate.admits(seconds(at), at.utc.us(), sender, bytes_of(in));
-      if (gate.peer() != before && !sender.empty()) told = "the aircraft on the link is at " + sender;
+      auto now = dialogue.lock();
+      const auto before = now->gate.peer();
+      admitted = now->gate.admits(seconds(at), at.utc.us(), sender, bytes_of(in));
+      if (now->gate.peer() != before && !sender.empty()) told = "the aircraft on the link is at " + sender;
     }
     if (log && !told.empty()) log(told);
     return admitted;
   }
 
   void open() {
+    closed_for = 1;  // what throws here is tried again
     // A stream that does not take what is sent is closed: what waited in it must not come out minutes later.
     link::LinkOptions options;
     options.write_deadline_ms = k_write_ms;
@@ -77,8 +85,8 @@ struct DroneLink::Impl {
       // Guarded here, so that the link reads on after a frame that we cannot bear.
       (void)guarded("aircraft", [&] {
         if (address.kind != link::Kind::udp && !admits(in, "", at)) return;
-        const std::scoped_lock lock(mutex);
-        session.feed(seconds(at), at.utc.us(), bytes_of(in));
+        auto now = dialogue.lock();
+        now->session.feed(seconds(at), at.utc.us(), bytes_of(in));
       });
     };
     handlers.on_closed = [this](const Error& why) {
@@ -86,6 +94,7 @@ struct DroneLink::Impl {
       last_trouble = why.message;
       closed_for = 1;
     };
+    closed_for = 0;
     bytes->open(std::move(handlers));
   }
 
@@ -99,36 +108,36 @@ struct DroneLink::Impl {
   }
 
   void talk() {
-    if (closed_for > 0 && ++closed_for > k_rounds_to_reopen) {
-      closed_for = 0;
-      open();
-    }
+    if (closed_for > 0 && ++closed_for > k_rounds_to_reopen) open();
     const auto now = link::arrival_now();
-    std::vector<std::uint8_t> out;
     {
-      const std::scoped_lock lock(mutex);
-      session.tick(seconds(now), now.utc.us());
-      out = session.take_bytes();
+      auto talking = dialogue.lock();
+      talking->session.tick(seconds(now), now.utc.us());
     }
-    write(out);
+    write();
   }
 
+  /// What the session has to say. Taken and written by the link's thread alone, so that frames leave in the
+  /// order in which they were numbered and signed: of two that change places the autopilot ignores the older.
   /// What cannot leave is lost, as on any radio; the session repeats it or says that it was not confirmed.
-  void write(const std::vector<std::uint8_t>& out) {
+  void write() {
+    std::vector<std::uint8_t> out;
+    {
+      auto now = dialogue.lock();
+      out = now->session.take_bytes();
+    }
     if (!out.empty() && closed_for == 0)
       (void)bytes->write({reinterpret_cast<const char*>(out.data()), out.size()}).has_value();
   }
 
   template <class Call>
   std::uint64_t command(Call call) {
-    std::vector<std::uint8_t> out;
     std::uint64_t number = 0;
     {
-      const std::scoped_lock lock(mutex);
-      number = call(session);
-      out = session.take_bytes();
+      auto now = dialogue.lock();
+      number = call(now->session);
     }
-    asio::post(io, [this, out = std::move(out)] { write(out); });
+    asio::post(io, [this] { (void)guarded("aircraft", [this] { write(); }); });
     return number;
   }
 
@@ -139,9 +148,7 @@ struct DroneLink::Impl {
   std::unique_ptr<link::ByteLink> bytes;
   int closed_for{0};  ///< rounds since the link was lost; 0: it is open or opening
   std::string last_trouble;
-  mutable std::mutex mutex;
-  drone::PeerGate gate;
-  drone::Session session;
+  Locked<Dialogue> dialogue;
   bool is_signed{false};
   Thread thread;
 };
@@ -190,8 +197,8 @@ std::uint64_t DroneLink::disarm() {
   return impl_->command([](drone::Session& s) { return s.disarm(); });
 }
 void DroneLink::ask_parameters(const std::vector<std::string>& names) {
-  const std::scoped_lock lock(impl_->mutex);
-  impl_->session.ask_parameters(names);
+  auto now = impl_->dialogue.lock();
+  now->session.ask_parameters(names);
 }
 std::uint64_t DroneLink::go_to(double lat_deg, double lon_deg, double height_m,
                                std::optional<double> heading_deg) {
@@ -213,31 +220,31 @@ std::uint64_t DroneLink::upload_fence(const DroneFence& fence) {
   return impl_->command([&](drone::Session& s) { return s.upload_fence(fence); });
 }
 void DroneLink::take_back() {
-  const std::scoped_lock lock(impl_->mutex);
-  impl_->session.take_back();
+  auto now = impl_->dialogue.lock();
+  now->session.take_back();
 }
 void DroneLink::change_peer(const std::string& sender) {
-  const std::scoped_lock lock(impl_->mutex);
-  impl_->gate.change(sender);
-  impl_->session.forget_vehicle();
+  auto now = impl_->dialogue.lock();
+  now->gate.change(sender);
+  now->session.forget_vehicle();
 }
 void DroneLink::expect(const DroneIdentity& aircraft) {
-  const std::scoped_lock lock(impl_->mutex);
-  impl_->gate.expect(seconds(link::arrival_now()), aircraft);
-  impl_->session.expect_vehicle(impl_->gate.vehicle());
+  auto now = impl_->dialogue.lock();
+  now->gate.expect(seconds(link::arrival_now()), aircraft);
+  now->session.expect_vehicle(now->gate.vehicle());
 }
 DroneStatus DroneLink::status() const {
-  const std::scoped_lock lock(impl_->mutex);
-  DroneStatus out = impl_->session.status();
-  out.identity.peer = impl_->gate.peer().value_or("");
+  auto now = impl_->dialogue.lock();
+  DroneStatus out = now->session.status();
+  out.identity.peer = now->gate.peer().value_or("");
   out.link_signed = impl_->is_signed;
-  out.frames_refused = impl_->gate.frames_refused();
-  out.others = impl_->gate.others(seconds(link::arrival_now()));
+  out.frames_refused = now->gate.frames_refused();
+  out.others = now->gate.others(seconds(link::arrival_now()));
   return out;
 }
 std::vector<CommandReport> DroneLink::take_reports() {
-  const std::scoped_lock lock(impl_->mutex);
-  return impl_->session.take_reports();
+  auto now = impl_->dialogue.lock();
+  return now->session.take_reports();
 }
 
 }  // namespace anchord::flight

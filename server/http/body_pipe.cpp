@@ -9,25 +9,23 @@ std::size_t BodyPipe::read(std::span<char> buffer) {
   std::size_t n = 0;
   std::function<void()> call;
   {
-    std::unique_lock lock(mutex_);
-    filled_.wait(lock, [this] { return at_ < bytes_.size() || ended_ || failed_status_ != 0; });
-    if (at_ == bytes_.size()) {
-      if (failed_status_ != 0) {
-        throw api::BodyError(failed_status_, failed_);
-      }
+    auto content = content_.lock();
+    content.wait(filled_, [](const Content& c) { return c.held() > 0 || c.ended || c.failed_status != 0; });
+    if (content->held() == 0) {
+      if (content->failed_status != 0) throw api::BodyError(content->failed_status, content->failed);
       return 0;
     }
-    n = std::min(buffer.size(), bytes_.size() - at_);
-    std::copy_n(bytes_.data() + at_, n, buffer.data());
-    at_ += n;
-    if (at_ == bytes_.size()) {
-      bytes_.clear();
-      at_ = 0;
-    } else if (at_ > capacity_ / 2) {
-      bytes_.erase(0, at_);
-      at_ = 0;
+    n = std::min(buffer.size(), content->held());
+    std::copy_n(content->bytes.data() + content->at, n, buffer.data());
+    content->at += n;
+    if (content->held() == 0) {
+      content->bytes.clear();
+      content->at = 0;
+    } else if (content->at > capacity_ / 2) {
+      content->bytes.erase(0, content->at);
+      content->at = 0;
     }
-    call = on_space_;
+    call = content->on_space;
   }
   if (call) call();
   return n;
@@ -36,60 +34,59 @@ std::size_t BodyPipe::read(std::span<char> buffer) {
 void BodyPipe::abandon() {
   std::function<void()> call;
   {
-    const std::lock_guard lock(mutex_);
-    abandoned_ = true;
-    bytes_.clear();
-    at_ = 0;
-    call = on_space_;
+    auto content = content_.lock();
+    content->abandoned = true;
+    content->bytes.clear();
+    content->at = 0;
+    call = content->on_space;
   }
   if (call) call();
 }
 
 void BodyPipe::feed(std::string_view bytes) {
   {
-    const std::lock_guard lock(mutex_);
-    if (abandoned_) return;
-    bytes_.append(bytes);
+    auto content = content_.lock();
+    if (content->abandoned) return;
+    content->bytes.append(bytes);
   }
   filled_.notify_one();
 }
 
 std::size_t BodyPipe::space() const {
-  const std::lock_guard lock(mutex_);
-  const std::size_t held = bytes_.size() - at_;
+  const std::size_t held = size();
   return held >= capacity_ ? 0 : capacity_ - held;
 }
 
 std::size_t BodyPipe::size() const {
-  const std::lock_guard lock(mutex_);
-  return bytes_.size() - at_;
+  const auto content = content_.lock();
+  return content->held();
 }
 
 bool BodyPipe::abandoned() const {
-  const std::lock_guard lock(mutex_);
-  return abandoned_;
+  const auto content = content_.lock();
+  return content->abandoned;
 }
 
 void BodyPipe::finish() {
   {
-    const std::lock_guard lock(mutex_);
-    ended_ = true;
+    auto content = content_.lock();
+    content->ended = true;
   }
   filled_.notify_one();
 }
 
 void BodyPipe::fail(int status, std::string why) {
   {
-    const std::lock_guard lock(mutex_);
-    failed_status_ = status;
-    failed_ = std::move(why);
+    auto content = content_.lock();
+    content->failed_status = status;
+    content->failed = std::move(why);
   }
   filled_.notify_one();
 }
 
 void BodyPipe::on_space(std::function<void()> call) {
-  const std::lock_guard lock(mutex_);
-  on_space_ = std::move(call);
+  auto content = content_.lock();
+  content->on_space = std::move(call);
 }
 
 }  // namespace anchord::server

@@ -3,12 +3,12 @@
 #include <condition_variable>
 #include <cstddef>
 #include <functional>
-#include <mutex>
 #include <span>
 #include <string>
 #include <string_view>
 
 #include "api/kit/message.hpp"
+#include "core/base/locked.hpp"
 
 namespace anchord::server {
 
@@ -33,15 +33,19 @@ class BodyPipe final : public api::BodyReader {
   void on_space(std::function<void()> call);
 
  private:
+  struct Content {
+    std::string bytes;
+    std::size_t at{0};  ///< read so far
+    bool ended{false}, abandoned{false};
+    int failed_status{0};  ///< 0: not failed
+    std::string failed;
+    std::function<void()> on_space;
+    std::size_t held() const { return bytes.size() - at; }
+  };
+
   const std::size_t capacity_;
-  mutable std::mutex mutex_;
+  Locked<Content> content_;
   std::condition_variable filled_;
-  std::string bytes_;
-  std::size_t at_{0};
-  bool ended_{false}, abandoned_{false};
-  int failed_status_{0};  ///< 0: not failed
-  std::string failed_;
-  std::function<void()> on_space_;
 };
 
 }  // namespace anchord::server

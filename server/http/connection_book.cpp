@@ -25,38 +25,48 @@ std::shared_ptr<Connection> ConnectionBook::oldest_of(State& state, const std::s
   return nullptr;
 }
 
-ConnectionBook::Entry ConnectionBook::enter(const std::string& address, bool many) {
+ConnectionBook::Entry ConnectionBook::admit(State& state, const std::string& address, bool many) const {
   Entry entry;
-  const std::lock_guard lock(state_->mutex);
-  auto& own = state_->addresses[address];
+  auto& own = state.addresses[address];
   if (!many && own.sockets >= per_address_) {
-    entry.evict = oldest_of(*state_, address);
+    entry.evict = oldest_of(state, address);
     if (!entry.evict) {
       entry.why = "all " + std::to_string(per_address_) + " connections of one address are at work";
       return entry;
     }
-  } else if (state_->sockets >= all_) {
+  } else if (state.sockets >= all_) {
     // Of the address that has most, so that one who takes all cannot push out those who take one.
     const std::string* most = nullptr;
     std::size_t sockets = 0;
-    for (const auto& [name, at] : state_->addresses) {
+    for (const auto& [name, at] : state.addresses) {
       if (at.idle > 0 && at.sockets > sockets) {
         most = &name;
         sockets = at.sockets;
       }
     }
-    if (most != nullptr) entry.evict = oldest_of(*state_, std::string(*most));
+    if (most != nullptr) entry.evict = oldest_of(state, std::string(*most));
     if (!entry.evict) {
-      if (own.sockets == 0) state_->addresses.erase(address);
+      if (own.sockets == 0) state.addresses.erase(address);
       entry.why = "all " + std::to_string(all_) + " connections are at work";
       return entry;
     }
   }
   ++own.sockets;
-  ++state_->sockets;
-  // Not null, whatever it points to: null says that there is no place.
-  entry.place = std::shared_ptr<void>(state_.get(), [state = state_, address](void*) {
-    const std::lock_guard back(state->mutex);
+  ++state.sockets;
+  return entry;
+}
+
+ConnectionBook::Entry ConnectionBook::enter(const std::string& address, bool many) {
+  Entry entry;
+  {
+    auto state = state_->lock();
+    entry = admit(*state, address, many);
+  }
+  if (!entry.why.empty()) return entry;
+  // Not null, whatever it points to: null says that there is no place. Not under the lock: without memory for
+  // it the place is given back at once.
+  entry.place = std::shared_ptr<void>(state_.get(), [all = state_, address](void*) {
+    auto state = all->lock();
     --state->sockets;
     const auto at = state->addresses.find(address);
     if (--at->second.sockets == 0 && at->second.idle == 0) state->addresses.erase(at);
@@ -66,28 +76,28 @@ ConnectionBook::Entry ConnectionBook::enter(const std::string& address, bool man
 
 void ConnectionBook::idle(const std::string& address, const Connection* key,
                           std::weak_ptr<Connection> connection) {
-  const std::lock_guard lock(state_->mutex);
-  const auto at = state_->idle.insert(state_->idle.end(), {key, address, std::move(connection)});
-  if (!state_->index.emplace(key, at).second) {
-    state_->idle.erase(at);
+  auto state = state_->lock();
+  const auto at = state->idle.insert(state->idle.end(), {key, address, std::move(connection)});
+  if (!state->index.emplace(key, at).second) {
+    state->idle.erase(at);
     return;
   }
-  ++state_->addresses[address].idle;
+  ++state->addresses[address].idle;
 }
 
 void ConnectionBook::busy(const Connection* key) {
-  const std::lock_guard lock(state_->mutex);
-  const auto at = state_->index.find(key);
-  if (at == state_->index.end()) return;
+  auto state = state_->lock();
+  const auto at = state->index.find(key);
+  if (at == state->index.end()) return;
   const std::string address = at->second->address;
-  forget(*state_, at->second);
-  const auto known = state_->addresses.find(address);
-  if (known->second.sockets == 0 && known->second.idle == 0) state_->addresses.erase(known);
+  forget(*state, at->second);
+  const auto known = state->addresses.find(address);
+  if (known->second.sockets == 0 && known->second.idle == 0) state->addresses.erase(known);
 }
 
 std::size_t ConnectionBook::size() const {
-  const std::lock_guard lock(state_->mutex);
-  return state_->sockets;
+  const auto state = state_->lock();
+  return state->sockets;
 }
 
 }  // namespace anchord::server

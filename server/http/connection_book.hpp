@@ -4,9 +4,10 @@
 #include <list>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <unordered_map>
+
+#include "core/base/locked.hpp"
 
 namespace anchord::server {
 
@@ -41,17 +42,18 @@ class ConnectionBook {
     std::size_t sockets{0}, idle{0};
   };
   struct State {
-    std::mutex mutex;
     std::size_t sockets{0};
     std::map<std::string, Address> addresses;
     std::list<Waiting> idle;  ///< oldest first
     std::unordered_map<const Connection*, std::list<Waiting>::iterator> index;
   };
+  /// Whom to evict, or why there is no place; a place is counted.
+  Entry admit(State& state, const std::string& address, bool many) const;
   static void forget(State& state, std::list<Waiting>::iterator at);
   static std::shared_ptr<Connection> oldest_of(State& state, const std::string& address);
 
   const std::size_t all_, per_address_;
-  const std::shared_ptr<State> state_ = std::make_shared<State>();
+  const std::shared_ptr<Locked<State>> state_ = std::make_shared<Locked<State>>();
 };
 
 }  // namespace anchord::server

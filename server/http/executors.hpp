@@ -4,10 +4,10 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 
 #include "api/kit/work.hpp"
+#include "core/base/locked.hpp"
 
 namespace anchord::server {
 
@@ -39,29 +39,29 @@ struct Executors {
 /// So many of a kind at once for each name. Thread-safe.
 class Shares {
  public:
-  explicit Shares(std::size_t per_name) : state_(std::make_shared<State>()), per_name_(per_name) {}
+  explicit Shares(std::size_t per_name) : taken_(std::make_shared<Taken>()), per_name_(per_name) {}
 
   /// One share, for as long as somebody holds it; null when the name has all of its own.
   std::shared_ptr<void> take(const std::string& name) {
-    const std::lock_guard lock(state_->mutex);
-    auto& taken = state_->taken[name];
-    if (taken >= per_name_) return nullptr;
-    ++taken;
-    // Not null, whatever it points to: null says that there is none left.
-    return {state_.get(), [state = state_, name](void*) {
-              const std::lock_guard back(state->mutex);
-              const auto at = state->taken.find(name);
-              if (--at->second == 0) state->taken.erase(at);
+    {
+      auto taken = taken_->lock();
+      const auto at = taken->find(name);
+      if ((at == taken->end() ? 0 : at->second) >= per_name_) return nullptr;
+      ++(*taken)[name];
+    }
+    // Not null, whatever it points to: null says that there is none left. Not under the lock: without memory
+    // for it the share is given back at once.
+    return {taken_.get(), [all = taken_, name](void*) {
+              auto taken = all->lock();
+              const auto at = taken->find(name);
+              if (--at->second == 0) taken->erase(at);
             }};
   }
   std::size_t per_name() const { return per_name_; }
 
  private:
-  struct State {
-    std::mutex mutex;
-    std::map<std::string, std::size_t> taken;
-  };
-  const std::shared_ptr<State> state_;
+  using Taken = Locked<std::map<std::string, std::size_t>>;
+  const std::shared_ptr<Taken> taken_;
   const std::size_t per_name_;
 };
 

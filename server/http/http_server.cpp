@@ -154,14 +154,10 @@ void HttpServer::stop(std::chrono::milliseconds grace) {
   s.stopped = true;
   s.context->stopping = true;
   const auto each = [&s](auto act) {
-    std::vector<std::shared_ptr<Connection>> alive;
-    {
-      const std::lock_guard lock(s.context->mutex);
-      for (const auto& [key, weak] : s.context->alive) {
-        if (auto connection = weak.lock()) alive.push_back(std::move(connection));
-      }
+    // Whoever is the last to hold a connection ends it, and its end takes this lock: none ends below it.
+    for (const auto& [key, weak] : s.context->alive.copy()) {
+      if (const auto connection = weak.lock()) act(*connection);
     }
-    for (const auto& connection : alive) act(*connection);
   };
   asio::post(s.io, [&s] {
     error_code ignored;

@@ -4,11 +4,11 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <string_view>
 #include <unordered_map>
 
+#include "core/base/locked.hpp"
 #include "server/http/connection_book.hpp"
 #include "server/http/executors.hpp"
 #include "server/http/gateway.hpp"
@@ -41,16 +41,15 @@ struct SessionContext {
   std::atomic<std::size_t> connections{0};  ///< sockets, WebSockets included
   std::atomic<std::size_t> websockets{0};
 
-  std::mutex mutex{};
-  std::unordered_map<const Connection*, std::weak_ptr<Connection>> alive{};
+  Locked<std::unordered_map<const Connection*, std::weak_ptr<Connection>>> alive{};
 
   void enter(const Connection* key, std::weak_ptr<Connection> connection) {
-    const std::lock_guard lock(mutex);
-    alive.emplace(key, std::move(connection));
+    auto all = alive.lock();
+    all->emplace(key, std::move(connection));
   }
   void leave(const Connection* key) {
-    const std::lock_guard lock(mutex);
-    alive.erase(key);
+    auto all = alive.lock();
+    all->erase(key);
   }
 };
 

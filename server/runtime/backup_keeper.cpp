@@ -64,8 +64,8 @@ std::vector<Backup> BackupKeeper::list() const {
     Backup backup{name, made->first, made->second, entry.file_size(error), {}, {}};
     std::ifstream(entry.path().string() + ".sha256") >> backup.sha256_hex;
     {
-      const std::scoped_lock lock(checked_mutex_);
-      if (const auto at = checked_.find(name); at != checked_.end()) backup.good = at->second.good;
+      const auto checked = checked_.lock();
+      if (const auto at = checked->find(name); at != checked->end()) backup.good = at->second.good;
     }
     out.push_back(std::move(backup));
   }
@@ -78,19 +78,20 @@ void BackupKeeper::note_checked(const std::string& name, bool good) {
   std::error_code error;
   const auto file = options_.dir / name;
   const Checked found{fs::file_size(file, error), fs::last_write_time(file, error), steady_now(), good};
-  const std::scoped_lock lock(checked_mutex_);
-  checked_[name] = found;
+  auto checked = checked_.lock();
+  checked->insert_or_assign(name, found);
 }
 
 /// Its digest stands beside it and is right, and integrity_check finds nothing. Reads all of it, once a day.
 bool BackupKeeper::whole(const Backup& backup) {
   std::error_code error;
   const auto file = options_.dir / backup.name;
+  const auto bytes = fs::file_size(file, error);
+  const auto written = fs::last_write_time(file, error);
   {
-    const std::scoped_lock lock(checked_mutex_);
-    const auto at = checked_.find(backup.name);
-    if (at != checked_.end() && at->second.bytes == fs::file_size(file, error) &&
-        at->second.written == fs::last_write_time(file, error) &&
+    const auto checked = checked_.lock();
+    const auto at = checked->find(backup.name);
+    if (at != checked->end() && at->second.bytes == bytes && at->second.written == written &&
         steady_now().ns - at->second.at.ns < k_believed_ns)
       return at->second.good;
   }
@@ -113,8 +114,8 @@ void BackupKeeper::drop_old() {
     }
     fs::remove(options_.dir / backup.name, error);
     fs::remove(options_.dir / (backup.name + ".sha256"), error);
-    const std::scoped_lock lock(checked_mutex_);
-    checked_.erase(backup.name);
+    auto checked = checked_.lock();
+    checked->erase(backup.name);
   }
 }
 
@@ -137,34 +138,41 @@ Result<Backup> BackupKeeper::make() {
   BOOST_OUTCOME_TRY(const auto report, database_.backup(options_.dir / name));
   note_checked(name, true);  // backup() checked what it wrote
   {
-    const std::scoped_lock due(due_mutex_);
-    newest_ = steady_now();
+    auto due = due_.lock();
+    due->newest = steady_now();
   }
   drop_old();
   return Backup{name, sequence, now, report.bytes, report.sha256_hex, true};
 }
 
+/// When the newest backup was made. Without any, the day counts from the start: a fresh installation has
+/// nothing to lose yet. The age of one of an earlier start is the system clock's word; where it cannot be
+/// right, it is time for a new one.
+SteadyTime BackupKeeper::first_look(SteadyTime now) const {
+  const std::int64_t every_ns = static_cast<std::int64_t>(options_.every_h) * k_hour_ns;
+  const auto all = list();
+  const std::int64_t age_ns = all.empty() ? 0 : clock_.now().ns - all.front().made.ns;
+  return later(now, -(age_ns < 0 ? every_ns : std::min(age_ns, every_ns)));
+}
+
 bool BackupKeeper::due(std::uint64_t flights_ended) {
   if (!options_.scheduled) return false;
-  const std::scoped_lock lock(due_mutex_);
   const SteadyTime now = steady_now();
   const std::int64_t every_ns = static_cast<std::int64_t>(options_.every_h) * k_hour_ns;
-  if (!newest_) {
-    // Without any, the day counts from the start: a fresh installation has nothing to lose yet. The age of
-    // one of an earlier start is the system clock's word; where it cannot be right, it is time for a new one.
-    const auto all = list();
-    const std::int64_t age_ns = all.empty() ? 0 : clock_.now().ns - all.front().made.ns;
-    newest_ = later(now, -(age_ns < 0 ? every_ns : std::min(age_ns, every_ns)));
-    not_before_ = now;
+  auto due = due_.lock();
+  if (!due->newest) {
+    const SteadyTime newest = due.unlocked([&] { return first_look(now); });
+    if (!due->newest) due->newest = newest;  // else one was made meanwhile
+    due->not_before = now;
   }
-  if (now < not_before_) return false;
-  const bool old = now.ns - newest_->ns >= every_ns;
-  if (!old && flights_ended == flights_saved_) {
-    not_before_ = later(now, k_look_ns);
+  if (now < due->not_before) return false;
+  const bool old = now.ns - due->newest->ns >= every_ns;
+  if (!old && flights_ended == due->flights_saved) {
+    due->not_before = later(now, k_look_ns);
     return false;
   }
-  flights_saved_ = flights_ended;
-  not_before_ = later(now, k_pause_ns);
+  due->flights_saved = flights_ended;
+  due->not_before = later(now, k_pause_ns);
   return true;
 }
 

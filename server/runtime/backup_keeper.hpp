@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "core/base/locked.hpp"
 #include "core/base/steady.hpp"
 #include "core/ports/backups.hpp"
 
@@ -41,7 +42,13 @@ class BackupKeeper final : public Backups {
     SteadyTime at{};
     bool good{false};
   };
+  struct Due {
+    std::optional<SteadyTime> newest{};  ///< when the newest was made, or the first look
+    SteadyTime not_before{};
+    std::uint64_t flights_saved{0};
+  };
   SteadyTime steady_now() const;
+  SteadyTime first_look(SteadyTime now) const;
   bool whole(const Backup& backup);
   void note_checked(const std::string& name, bool good);
   void drop_old();
@@ -49,13 +56,9 @@ class BackupKeeper final : public Backups {
   Database& database_;
   const Clock& clock_;
   const Options options_;
-  std::mutex making_;
-  mutable std::mutex checked_mutex_;
-  std::map<std::string, Checked> checked_;
-  std::mutex due_mutex_;
-  std::optional<SteadyTime> newest_{};  ///< when the newest was made, or the first look
-  SteadyTime not_before_{};
-  std::uint64_t flights_saved_{0};
+  std::mutex making_;  ///< one backup at a time; taken before the others
+  Locked<std::map<std::string, Checked>> checked_;
+  Locked<Due> due_;
 };
 
 }  // namespace anchord::server

@@ -6,22 +6,23 @@
 namespace anchord::sql {
 
 std::unique_ptr<SqliteConnection> ReaderPool::take() {
-  std::unique_lock lock(mutex_);
-  if (!freed_.wait_for(lock, std::chrono::seconds(5), [&] { return in_use_ < size_; })) {
+  auto readers = readers_.lock();
+  const auto free = [this](const Readers& r) { return r.in_use < size_; };
+  if (!readers.wait_for(freed_, std::chrono::seconds(5), free)) {
     throw SqlError(Failure::unavailable, "database: all readers were busy for 5 s");
   }
-  ++in_use_;
-  if (idle_.empty()) return nullptr;
-  auto connection = std::move(idle_.back());
-  idle_.pop_back();
+  ++readers->in_use;
+  if (readers->idle.empty()) return nullptr;
+  auto connection = std::move(readers->idle.back());
+  readers->idle.pop_back();
   return connection;
 }
 
 void ReaderPool::give_back(std::unique_ptr<SqliteConnection> connection) {
   {
-    const std::lock_guard lock(mutex_);
-    --in_use_;
-    if (connection != nullptr) idle_.push_back(std::move(connection));
+    auto readers = readers_.lock();
+    --readers->in_use;
+    if (connection != nullptr) readers->idle.push_back(std::move(connection));
   }
   freed_.notify_one();
 }

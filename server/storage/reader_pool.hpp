@@ -3,9 +3,9 @@
 #include <condition_variable>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <vector>
 
+#include "core/base/locked.hpp"
 #include "server/storage/sql.hpp"
 #include "server/storage/sqlite_connection.hpp"
 
@@ -26,10 +26,12 @@ class ReaderPool {
 
   const Open open_;
   const std::size_t size_;
-  std::mutex mutex_;
+  struct Readers {
+    std::vector<std::unique_ptr<SqliteConnection>> idle;
+    std::size_t in_use{0};
+  };
+  Locked<Readers> readers_;
   std::condition_variable freed_;
-  std::vector<std::unique_ptr<SqliteConnection>> idle_;
-  std::size_t in_use_{0};
 };
 
 }  // namespace anchord::sql

@@ -25,8 +25,8 @@ WriteQueue::WriteQueue(std::unique_ptr<SqliteConnection> connection, Open open,
 
 WriteQueue::~WriteQueue() {
   {
-    const std::lock_guard lock(mutex_);
-    stopping_ = true;
+    auto shared = shared_.lock();
+    shared->stopping = true;
   }
   wake_writer_.notify_one();
   thread_.join();
@@ -34,31 +34,35 @@ WriteQueue::~WriteQueue() {
 
 std::optional<Error> WriteQueue::write(std::size_t rows, const Work& work) {
   Task task{rows, &work, std::nullopt, false};
-  std::unique_lock lock(mutex_);
-  if (stopping_) return make_error(Errc::storage_unavailable, "the database is closing");
-  const bool too_many_rows = queued_rows_ > 0 && queued_rows_ + rows > limits_.max_rows;
-  if (too_many_rows || queue_.size() >= limits_.max_calls) {
-    return make_error(Errc::queue_full, "the write queue is full: " + std::to_string(queued_rows_) +
-                                            " rows in " + std::to_string(queue_.size()) + " calls wait");
+  auto shared = shared_.lock();
+  if (shared->stopping) return make_error(Errc::storage_unavailable, "the database is closing");
+  const bool too_many_rows = shared->queued_rows > 0 && shared->queued_rows + rows > limits_.max_rows;
+  if (too_many_rows || shared->queue.size() >= limits_.max_calls) {
+    return make_error(Errc::queue_full, "the write queue is full: " + std::to_string(shared->queued_rows) +
+                                            " rows in " + std::to_string(shared->queue.size()) +
+                                            " calls wait");
   }
-  queue_.push_back(&task);
-  queued_rows_ += rows;
+  shared->queue.push_back(&task);
+  shared->queued_rows += rows;
   wake_writer_.notify_one();
-  wake_callers_.wait(lock, [&] { return task.done; });
+  shared.wait(wake_callers_, [&](const Shared&) { return task.done; });
   return std::move(task.error);
 }
 
 WriteQueue::Status WriteQueue::status() const {
-  const std::lock_guard lock(mutex_);
-  Status status = status_;
-  status.queued_calls = queue_.size();
-  status.queued_rows = queued_rows_;
+  const auto shared = shared_.lock();
+  Status status = shared->status;
+  status.queued_calls = shared->queue.size();
+  status.queued_rows = shared->queued_rows;
   return status;
 }
 
 void WriteQueue::run() {
+  // Once, so that the loop never ends for want of memory with callers that wait for it.
+  Group group;
+  group.reserve(k_group_calls);
   for (;;) {
-    Group group = take();
+    take(group);
     if (group.empty()) {
       (void)guarded("database writer", [this] {
         checkpoint_if(true);
@@ -66,8 +70,8 @@ void WriteQueue::run() {
         // itself.
         if (connection_ == nullptr) ensure_connection();
       });
-      const std::lock_guard lock(mutex_);
-      if (stopping_ && queue_.empty()) break;
+      const auto shared = shared_.lock();
+      if (shared->stopping && shared->queue.empty()) break;
       continue;
     }
     const auto ran = guarded("database writer", [&] { commit(group); });
@@ -78,7 +82,7 @@ void WriteQueue::run() {
       for (Task* task : group) task->error = make_error(Errc::internal, "storage: " + ran.what);
     }
     {
-      const std::lock_guard lock(mutex_);
+      const auto shared = shared_.lock();
       for (Task* task : group) task->done = true;
     }
     wake_callers_.notify_all();
@@ -87,19 +91,20 @@ void WriteQueue::run() {
   connection_.reset();
 }
 
-WriteQueue::Group WriteQueue::take() {
-  std::unique_lock lock(mutex_);
-  wake_writer_.wait_for(lock, k_idle, [&] { return stopping_ || !queue_.empty(); });
-  Group group;
+/// Into the room that run() made.
+void WriteQueue::take(Group& group) {
+  group.clear();
+  auto shared = shared_.lock();
+  shared.wait_for(wake_writer_, k_idle, [](const Shared& s) { return s.stopping || !s.queue.empty(); });
+  auto& queue = shared->queue;
   std::size_t rows = 0;
-  while (!queue_.empty() && group.size() < k_group_calls &&
-         (group.empty() || rows + queue_.front()->rows <= k_group_rows)) {
-    rows += queue_.front()->rows;
-    group.push_back(queue_.front());
-    queue_.pop_front();
+  while (!queue.empty() && group.size() < k_group_calls &&
+         (group.empty() || rows + queue.front()->rows <= k_group_rows)) {
+    rows += queue.front()->rows;
+    group.push_back(queue.front());
+    queue.pop_front();
   }
-  queued_rows_ -= rows;
-  return group;
+  shared->queued_rows -= rows;
 }
 
 void WriteQueue::commit(Group& group) {
@@ -139,11 +144,16 @@ void WriteQueue::attempt(Group& group) {
     if (!rolled_back_whole() || error.failure() != Failure::full) connection_.reset();
     throw;
   }
-  const std::lock_guard lock(mutex_);
-  ++status_.commits;
-  status_.rows += rows;
-  status_.last_commit_s = std::chrono::duration<double>(SteadyClock::now() - start).count();
-  status_.trouble.reset();
+  auto shared = shared_.lock();
+  ++shared->status.commits;
+  shared->status.rows += rows;
+  shared->status.last_commit_s = std::chrono::duration<double>(SteadyClock::now() - start).count();
+  shared->status.trouble.reset();
+}
+
+void WriteQueue::note(const std::optional<SqlError>& trouble) {
+  auto shared = shared_.lock();
+  shared->status.trouble = trouble;
 }
 
 void WriteQueue::run_task(Task& task) {
@@ -172,8 +182,7 @@ bool WriteQueue::rolled_back_whole() noexcept {
 
 void WriteQueue::fail(Group& group, const SqlError& error) {
   for (Task* task : group) task->error = to_error(error);
-  const std::lock_guard lock(mutex_);
-  status_.trouble = error;
+  note(error);
 }
 
 bool WriteQueue::ensure_connection() {
@@ -186,12 +195,10 @@ bool WriteQueue::ensure_connection() {
     // A connection opened while the disk was read-only stays so for ever.
     if (connection->read_only_file()) throw SqlError(Failure::unavailable, "database: the file is read-only");
     connection_ = std::move(connection);
-    const std::lock_guard lock(mutex_);
-    status_.trouble.reset();
+    note(std::nullopt);
     return true;
   } catch (const SqlError& error) {
-    const std::lock_guard lock(mutex_);
-    status_.trouble = error;
+    note(error);
     return false;
   }
 }
@@ -207,8 +214,7 @@ void WriteQueue::checkpoint_if(bool due) {
     // No acknowledged row is at risk: all are in the WAL. A full disk heals by itself, anything else by
     // reopening.
     if (error.failure() != Failure::full) connection_.reset();
-    const std::lock_guard lock(mutex_);
-    status_.trouble = error;
+    note(error);
   }
 }
 

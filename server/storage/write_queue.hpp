@@ -5,12 +5,12 @@
 #include <deque>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/base/guard.hpp"
+#include "core/base/locked.hpp"
 #include "server/storage/sql.hpp"
 #include "server/storage/sqlite_connection.hpp"
 #include "server/storage/sqlite_database.hpp"
@@ -48,18 +48,25 @@ class WriteQueue {
   struct Task {
     std::size_t rows{};
     const Work* work{};
-    std::optional<Error> error;
-    bool done{false};
+    std::optional<Error> error;  ///< of the writer's thread until it is done
+    bool done{false};            ///< under the lock of shared_
   };
   using Group = std::vector<Task*>;
+  struct Shared {
+    std::deque<Task*> queue;
+    std::size_t queued_rows{0};
+    bool stopping{false};
+    Status status;
+  };
 
   void run();
-  Group take();
+  void take(Group& group);
   void commit(Group& group);
   void attempt(Group& group);
   void run_task(Task& task);
   bool rolled_back_whole() noexcept;
   void fail(Group& group, const SqlError& error);
+  void note(const std::optional<SqlError>& trouble);
   bool ensure_connection();
   void checkpoint_if(bool due);
 
@@ -71,12 +78,8 @@ class WriteQueue {
   std::unique_ptr<SqliteConnection> connection_;
   std::chrono::steady_clock::time_point next_reopen_{};
 
-  mutable std::mutex mutex_;
+  Locked<Shared> shared_;
   std::condition_variable wake_writer_, wake_callers_;
-  std::deque<Task*> queue_;
-  std::size_t queued_rows_{0};
-  bool stopping_{false};
-  Status status_;
 
   Thread thread_;
 };

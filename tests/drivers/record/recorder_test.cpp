@@ -1,13 +1,45 @@
 #include "drivers/record/recorder.hpp"
 
+#include <dlfcn.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <condition_variable>
 #include <fstream>
 #include <iterator>
+#include <map>
+
+#include "core/base/locked.hpp"
+
+namespace {
+
+/// Size of each file (or 0: a folder) when it was last synced, by inode.
+using Sizes = std::map<ino_t, off_t>;
+anchord::Locked<Sizes>& synced_sizes() {
+  static anchord::Locked<Sizes> all;
+  return all;
+}
+std::condition_variable synced_one;
+
+int note_sync(int fd, const char* name) {
+  struct stat info {};
+  if (::fstat(fd, &info) == 0) {
+    auto sizes = synced_sizes().lock();
+    (*sizes)[info.st_ino] = S_ISDIR(info.st_mode) ? 0 : info.st_size;
+    synced_one.notify_all();
+  }
+  return reinterpret_cast<int (*)(int)>(::dlsym(RTLD_NEXT, name))(fd);
+}
+
+}  // namespace
+
+// In front of libc's, which they call.
+extern "C" int fdatasync(int fd) { return note_sync(fd, "fdatasync"); }
+extern "C" int fsync(int fd) { return note_sync(fd, "fsync"); }
 
 namespace anchord::record {
 namespace {
@@ -52,6 +84,34 @@ TEST(Recorder, WritesForTheOwnerAloneAndNeverOverWhatIsThere) {
   }
   const auto second = Recorder::open(folder.path, k_start).value();
   EXPECT_NE(second->file(), first);
+}
+
+ino_t inode_of(const fs::path& path) {
+  struct stat info {};
+  EXPECT_EQ(::stat(path.c_str(), &info), 0) << path;
+  return info.st_ino;
+}
+
+// A power cut takes at most the last second. What a part got after its last sync stayed in the page cache
+// when the recorder turned to the next part, and the name of a new file in its folder: half a minute for the
+// kernel.
+TEST(Recorder, SyncsEachPartToItsEndAndItsName) {
+  const Folder folder;
+  RecorderOptions options;
+  options.rotate_bytes = 1000;
+  options.sync_every_ms = 3'600'000;  // not within this test
+  const auto recorder = Recorder::open(folder.path, k_start, options).value();
+  const auto first = recorder->file();
+  for (int i = 0; recorder->file() == first; ++i)
+    recorder->take({EventKind::bytes, 3, {UtcTime{i}, i}, "a chunk of bytes"});
+  const auto size = static_cast<off_t>(fs::file_size(first));
+  ASSERT_GE(size, 1000);
+  const ino_t part = inode_of(first), names = inode_of(folder.path);
+  auto sizes = synced_sizes().lock();
+  EXPECT_TRUE(sizes.wait_for(synced_one, std::chrono::seconds(20), [&](const Sizes& s) {
+    const auto at = s.find(part);
+    return at != s.end() && at->second == size && s.contains(names);
+  }));
 }
 
 TEST(Recorder, TurnsToANewPartThatTellsTheDevicesAgain) {

@@ -13,7 +13,9 @@
 #include <chrono>
 #include <filesystem>
 #include <mutex>
+#include <span>
 #include <thread>
+#include <vector>
 
 #include "drivers/sim/autopilot.hpp"
 #include "drivers/sim/ports.hpp"
@@ -162,18 +164,33 @@ class Sender {
         packer_.pack(mavlink::Message("HEARTBEAT").set("type", 2).set("autopilot", 3).set("custom_mode", 4));
     (void)::send(socket_, frame.data(), frame.size(), 0);
   }
-  /// Frames of the server that came here.
+  /// Datagrams of the server that came here.
   std::size_t heard() {
-    std::array<char, 2048> buffer{};
-    while (::recv(socket_, buffer.data(), buffer.size(), 0) > 0) ++n_;
+    std::array<std::uint8_t, 65'536> buffer{};
+    for (ssize_t n = 0; (n = ::recv(socket_, buffer.data(), buffer.size(), 0)) > 0; ++n_)
+      number_frames({buffer.data(), static_cast<std::size_t>(n)});
     return n_;
   }
+  /// Frames so far, and those of them that came after one with a higher number.
+  std::size_t frames() const { return frames_; }
+  std::size_t overtaken() const { return overtaken_; }
 
  private:
+  /// MAVLink 2: 0xFD, length of the payload, flags (1: a signature of 13 bytes follows), flags, number.
+  void number_frames(std::span<const std::uint8_t> bytes) {
+    while (bytes.size() >= 12 && bytes[0] == 0xFD) {
+      const std::size_t size = 12u + bytes[1] + ((bytes[2] & 1) != 0 ? 13u : 0u);
+      if (frames_++ > 0 && static_cast<std::uint8_t>(bytes[4] - number_) > 127) ++overtaken_;
+      number_ = bytes[4];
+      bytes = bytes.subspan(std::min(size, bytes.size()));
+    }
+  }
+
   int socket_;
   sockaddr_in to_{};
   mavlink::Packer packer_;
-  std::size_t n_{0};
+  std::size_t n_{0}, frames_{0}, overtaken_{0};
+  std::uint8_t number_{0};
 };
 
 std::uint16_t free_port() {
@@ -222,6 +239,38 @@ TEST(DroneLink, AStrangerWhoIsHeardFirstDoesNotTakeAFlightThatGoesOn) {
   ASSERT_TRUE(until([&] { return aircraft.beat(), link.status().connected && aircraft.heard() > 0; }, 10));
   EXPECT_EQ(link.status().identity.system, 1);
   EXPECT_EQ(stranger.heard(), 0u);
+}
+
+// An autopilot that wants signed frames ignores one that is older than the one before: a command of one
+// thread that another's frame overtakes on its way out is lost, and comes only when it is repeated.
+TEST(DroneLink, FramesLeaveInTheOrderOfTheirNumbersWhoeverCommands) {
+  constexpr int k_threads = 3, k_rounds = 20, k_commands = 200;
+  const auto port = free_port();
+  auto opened = DroneLink::open("udp://:" + std::to_string(port), {});
+  ASSERT_TRUE(opened) << opened.error().message;
+  auto& link = *opened.value();
+  link.start();
+  Sender aircraft(port, 1);
+  ASSERT_TRUE(until([&] { return aircraft.beat(), link.status().connected && aircraft.heard() > 0; }, 10));
+  for (int round = 0; round < k_rounds; ++round) {
+    aircraft.beat();
+    std::atomic<int> at_work{k_threads};
+    std::vector<std::thread> people;
+    for (int i = 0; i < k_threads; ++i) {
+      people.emplace_back([&] {
+        for (int n = 0; n < k_commands; ++n) (void)link.land();
+        --at_work;
+      });
+    }
+    while (at_work > 0) (void)aircraft.heard();
+    for (auto& one : people) one.join();
+    (void)link.take_reports();
+    const auto before = aircraft.heard();
+    (void)link.hold();
+    ASSERT_TRUE(until([&] { return aircraft.heard() > before; }, 10));
+  }
+  EXPECT_GT(aircraft.frames(), static_cast<std::size_t>(k_rounds * k_commands));
+  EXPECT_EQ(aircraft.overtaken(), 0u) << "of " << aircraft.frames();
 }
 
 TEST(DroneLink, FliesTheAircraftOverTcpAndComesBackAfterALoss) {
