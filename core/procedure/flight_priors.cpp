@@ -31,12 +31,12 @@ FlightPriors flight_priors(const std::map<NetworkId, Priors>& priors, const EnuF
 
 std::map<NetworkId, AnchorPriors> priors_in(const FlightPriors& priors, const EnuFrame& answers) {
   std::map<NetworkId, AnchorPriors> out;
-  for (const auto& [anchor, prior] : priors) {
+  for (const auto& [anchor, found] : priors) {
     AnchorPriors& prior = out[anchor];
-    if (prior.bearing)
-      prior.bearing = {answers.enu_from_wgs84(prior.bearing->from).m, prior.bearing->bearing_rad,
-                       prior.bearing->sigma_rad};
-    if (prior.height) prior.height = {answers.enu_from_wgs84(prior.height->at).m.z(), prior.height->sigma_m};
+    if (found.bearing)
+      prior.bearing = {answers.enu_from_wgs84(found.bearing->from).m, found.bearing->bearing_rad,
+                       found.bearing->sigma_rad};
+    if (found.height) prior.height = {answers.enu_from_wgs84(found.height->at).m.z(), found.height->sigma_m};
   }
   return out;
 }
