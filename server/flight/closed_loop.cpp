@@ -50,7 +50,7 @@ class Air {
       autopilot.feed(session.take_bytes());
     }
   }
-  Now now() const {
+  Now now() {
     Now out;
     out.s = now_s_;
     out.utc = UtcTime::from_us(unix_us_at(now_s_));
@@ -61,7 +61,7 @@ class Air {
   drone::Session session;
 
  private:
-  std::int64_t unix_us_at(double now_s) const {
+  std::int64_t unix_us_at(double now_s) {
     return autopilot.options().start_unix_us + static_cast<std::int64_t>(now_s * 1e6);
   }
   double now_s_{0};
