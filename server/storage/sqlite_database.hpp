@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "core/base/enum_table.hpp"
 #include "core/base/result.hpp"
 #include "core/ports/stores.hpp"
 
