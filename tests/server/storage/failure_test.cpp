@@ -58,7 +58,7 @@ class StorageFailure : public testing::Test {
   static Mission mission_in(Database& db) {
     Mission m;
     m.id = MissionId{make_uuid_v7(k_noon)};
-    EXPECT_TRUE(db.missions().insert(m));
+    EXPECT_TRUE(db.stores().missions.insert(m));
     return m;
   }
   static std::vector<Range> batch(const MissionId& mission, int from, int n) {
