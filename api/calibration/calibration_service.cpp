@@ -468,7 +468,7 @@ void CalibrationService::conclude(const CalibrationRequest& request, const Model
   Json uncorrected = compared ? Json::array() : Json(nullptr);
   for (const auto& [id, estimates] : by_anchor_raw.estimates)
     uncorrected.push_back(without_models(fuse_estimates(estimates), out));
-  out.provenance_json = to_wire(Json{
+  out.provenance = {to_wire(Json{
       {"profiles", std::move(solved.profiles)},
       {"base", std::move(base)},
       {"budgets", std::move(budgets)},
@@ -479,8 +479,8 @@ void CalibrationService::conclude(const CalibrationRequest& request, const Model
       {"sigma_m", noise_provenance(request, solved.models)},
       {"models", models.predictor.empty() ? Json(nullptr) : Json(flight_models_json(models, solved.models))},
       {"uncorrected", std::move(uncorrected)},
-      {"flights", std::move(flights)}});
-  out.evidence_json = evidence_json(solved.evidence);
+      {"flights", std::move(flights)}})};
+  out.evidence = {evidence_json(solved.evidence)};
 }
 
 Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRequest& request,
@@ -504,7 +504,7 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
   out.created = deps_.clock.now();
   out.id.uuid = job.job().id.uuid;  // the job and what it makes share their number
   out.missions = request.missions;
-  out.settings_json = request.settings_json;
+  out.settings = {request.settings_json};
   job.progress(0.95, "store", "");
   return solved;
 }
