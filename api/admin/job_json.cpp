@@ -27,7 +27,7 @@ Ordered job_json(const Job& job) {
   out["started_at"] = job.started ? Ordered(to_rfc3339(*job.started)) : Ordered(nullptr);
   out["finished_at"] = job.finished ? Ordered(to_rfc3339(*job.finished)) : Ordered(nullptr);
   out["links"] = std::move(links);
-  out["problem"] = kept_json(job.problem_json);
+  out["problem"] = kept_json(job.problem.text);
   return out;
 }
 

@@ -66,7 +66,7 @@ Response job_outcome(JobService& jobs, const Request& request, Job job,
     return response;
   }
   if (job.state == JobState::failed) {
-    const auto inner = nlohmann::json::parse(job.problem_json, nullptr, false);
+    const auto inner = nlohmann::json::parse(job.problem.text, nullptr, false);
     const int status = inner.is_object() ? inner.value("status", 500) : 500;
     std::string type =
         inner.is_object() ? inner.value("type", std::string("/problems/internal")) : "/problems/internal";

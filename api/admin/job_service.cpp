@@ -148,7 +148,7 @@ JobService::~JobService() { stop(); }
 void JobService::start() {
   const auto problem =
       problem_json(503, "internal", "interrupted: the server was restarted while the job ran; send it again");
-  (void)state_->jobs.fail_unfinished(state_->clock.now(), problem).has_value();
+  (void)state_->jobs.fail_unfinished(state_->clock.now(), {problem}).has_value();
   std::vector<std::string> turns;
   {
     auto now = state_->lanes.lock();
@@ -172,7 +172,7 @@ Result<Job> JobService::submit(std::string kind, std::string request_json, Work 
   job.id = id.value_or(JobId{make_uuid_v7(job.created)});
   job.kind = std::move(kind);
   job.stage = "queued";
-  job.request_json = std::move(request_json);
+  job.request = {std::move(request_json)};
   BOOST_OUTCOME_TRYV(state_->admit(job.kind));
   BOOST_OUTCOME_TRYV(state_->jobs.insert(job));
   state_->enqueue(state_, job, std::move(work));
@@ -188,7 +188,7 @@ Result<Job> JobService::restart(const JobId& id, Work work) {
   job.fraction = 0;
   job.stage = "queued";
   job.detail.clear();
-  job.problem_json.clear();
+  job.problem = {};
   job.started.reset();
   job.finished.reset();
   BOOST_OUTCOME_TRYV(state_->jobs.update(job));
@@ -272,11 +272,11 @@ void JobService::State::run(const Task& task) {
     job.state = JobState::canceled;
   } else if (result.error().code == Errc::canceled) {
     job.state = JobState::failed;
-    job.problem_json =
-        problem_json(503, "internal", "interrupted: the server was stopped while the job ran; send it again");
+    job.problem = {problem_json(503, "internal",
+                                "interrupted: the server was stopped while the job ran; send it again")};
   } else {
     job.state = JobState::failed;
-    job.problem_json = problem_of(result.error()).body;
+    job.problem = {problem_of(result.error()).body};
   }
   save(job);
 }

@@ -94,7 +94,7 @@ class Lookup {
     auto [it, fresh] = calibrations_.try_emplace(id);
     if (fresh) {
       if (auto found = services_.calibrations.calibration(id))
-        it->second = {found.value().missions, Ordered::parse(found.value().provenance_json, nullptr, false)};
+        it->second = {found.value().missions, Ordered::parse(found.value().provenance.text, nullptr, false)};
     }
     return it->second;
   }

@@ -166,7 +166,7 @@ Result<ContradictionWatch::Standing> ContradictionWatch::compare() {
   const auto answer_of = [&](const Calibration& c, const Estimate& e) {
     const auto [site, fresh] = sites.try_emplace(c.id);
     if (fresh && c.frame == TrackFrame::local) site->second = site_of(deps_.missions, c.missions);
-    return Answer{&e, c.frame, c.origin, site->second, holds_height(c.settings_json)};
+    return Answer{&e, c.frame, c.origin, site->second, holds_height(c.settings.text)};
   };
   std::map<NetworkId, const PublishedPosition*> wanted;
   for (const auto& position : published) {

@@ -101,7 +101,7 @@ std::string frame_definition_json(const FrameDefinition& definition) {
 
 std::optional<FrameDefinition> frame_definition(const LocalFrame& frame) {
   try {  // the door of the JSON library: written by frame_definition_json
-    const Json json = Json::parse(frame.definition_json);
+    const Json json = Json::parse(frame.definition.text);
     if (!json.contains("fit")) return std::nullopt;
     FrameDefinition out;
     out.origin = {json.at("origin").at("lat").get<double>(), json.at("origin").at("lon").get<double>(),
@@ -116,7 +116,7 @@ std::optional<FrameDefinition> frame_definition(const LocalFrame& frame) {
 Ordered frame_json(const LocalFrame& frame) {
   Ordered out{{"id", to_string(frame.id)}, {"name", frame.name}};
   out["site"] = frame.site ? Ordered(to_string(*frame.site)) : Ordered(nullptr);
-  auto definition = Ordered::parse(frame.definition_json, nullptr, false);
+  auto definition = Ordered::parse(frame.definition.text, nullptr, false);
   for (const char* key : {"origin", "fitted_at", "pairs", "fit"})
     out[key] = definition.is_object() && definition.contains(key) ? definition[key] : Ordered(nullptr);
   out["created_at"] = to_rfc3339(frame.created);

@@ -18,7 +18,7 @@ enum class Space : std::uint8_t { geo, enu, projected, local };
 inline constexpr auto k_space_words = enum_table<Space>(
     {{"geo", Space::geo}, {"enu", Space::enu}, {"projected", Space::projected}, {"local", Space::local}});
 
-/// What LocalFrame::definition_json holds once a frame was fitted.
+/// What LocalFrame::definition holds once a frame was fitted.
 struct FrameDefinition {
   Wgs84 origin{};  ///< of the ENU numbers
   std::vector<FramePair> pairs;

@@ -124,7 +124,7 @@ Response fit(AnchorApi& s, const Request& request) {
   }
   definition.fit = value_or_problem(fit_frame(definition.pairs, wanted.options));
   definition.fitted = s.clock.now();
-  frame.definition_json = frame_definition_json(definition);
+  frame.definition = {frame_definition_json(definition)};
   value_or_problem(s.frames.update(frame, frame.version));
   ++frame.version;
   s.audit(request, "frame.fit " + frame.name);

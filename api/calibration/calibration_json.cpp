@@ -18,9 +18,9 @@ Ordered calibration_json(const Calibration& calibration, bool with_anchors) {
               {"missions", std::move(missions)},
               {"frame", k_frame_words.word(calibration.frame)},
               {"origin", wgs84_json(calibration.origin)}};
-  auto settings = Ordered::parse(calibration.settings_json, nullptr, false);
+  auto settings = Ordered::parse(calibration.settings.text, nullptr, false);
   out["settings"] = settings.is_discarded() ? Ordered::object() : std::move(settings);
-  auto provenance = Ordered::parse(calibration.provenance_json, nullptr, false);
+  auto provenance = Ordered::parse(calibration.provenance.text, nullptr, false);
   out["provenance"] = provenance.is_object() ? std::move(provenance) : Ordered::object();
   if (!with_anchors) return out;
   Ordered anchors = Ordered::array();

@@ -188,7 +188,7 @@ Result<Report> calibration_report(CalibrationApi& api, const Calibration& calibr
       if (position.since_revision == revision.number) published.emplace(position.estimate.anchor, position);
     }
   }
-  const auto told = nlohmann::ordered_json::parse(calibration.provenance_json, nullptr, false);
+  const auto told = nlohmann::ordered_json::parse(calibration.provenance.text, nullptr, false);
   for (const auto& estimate : calibration.anchors) {
     ReportAnchor anchor;
     anchor.budget = report_budget(kept_budget(told, estimate.anchor));
@@ -208,10 +208,10 @@ Result<Report> calibration_report(CalibrationApi& api, const Calibration& calibr
     flights += (flights.empty() ? "" : ", ") + short_id(to_string(mission.id));
   report.facts.emplace_back(missions.size() == 1 ? "Mission" : "Missions", flights);
   add_base_fact(report);
-  const Json provenance = Json::parse(calibration.provenance_json, nullptr, false);
+  const Json provenance = Json::parse(calibration.provenance.text, nullptr, false);
   if (provenance.is_object()) add_profile_fact(report, provenance);
   report.facts.emplace_back("Calibration", short_id(report.calibration));
-  describe(report, missions, calibration.settings_json);
+  describe(report, missions, calibration.settings.text);
   add_check_points(report, told);
   return report;
 }

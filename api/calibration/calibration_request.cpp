@@ -35,32 +35,54 @@ void read_initial(Fields& fields, const Json& initial, FlightOptions& options,
   starts.finish();
 }
 
+/// None may occur twice, in whatever list.
+void read_missions(Fields& fields, const char* key, std::set<std::string>& seen, std::vector<MissionId>& ids,
+                   std::vector<FieldError>& errors) {
+  const Json* list = fields.child(key);
+  if (list == nullptr) return;
+  if (!list->is_array() || list->empty() || list->size() > 100)
+    return fields.error(key, "wrong_type", "must be an array of 1 to 100 mission ids");
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    const auto& item = (*list)[i];
+    const auto id = parse_uuid(item.is_string() ? item.get_ref<const std::string&>() : "");
+    const std::string at = std::string("/") + key + '/' + std::to_string(i);
+    if (!id)
+      errors.push_back({at, "bad_id", id.error().message});
+    else if (!seen.insert(to_string(id.value())).second)
+      errors.push_back({at, "duplicate", "the mission occurs twice"});
+    else
+      ids.push_back(MissionId{id.value()});
+  }
+}
+
+/// Held in the plane, a prior in space.
+void read_height(Fields& fields, FlightOptions& options, std::vector<FieldError>& errors) {
+  if (const auto height = fields.number("anchor_height_m", -1000, 9000)) {
+    options.anchor_height_m = *height;
+    if (options.dims != Dims::two)
+      fields.error("anchor_height_m", "needs_dims_2", "a held height needs dims 2; in 3: height_prior");
+  }
+  const Json* prior = fields.child("height_prior");
+  if (prior == nullptr) return;
+  Fields inner(*prior, "/height_prior", errors);
+  const auto height = inner.number("height_m", -1000, 9000, true);
+  const auto sigma = inner.number("sigma_m", 0.01, 100, true);
+  inner.finish();
+  if (options.dims == Dims::two)
+    fields.error("height_prior", "needs_dims_3", "a height prior needs dims 3; in 2: anchor_height_m");
+  else if (height && sigma)
+    options.height_prior = {*height, *sigma};
+}
+
 }  // namespace
 
 CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldError>& errors) {
   CalibrationRequest out;
   Fields fields(body, "", errors);
   std::set<std::string> seen;
-  const auto read_ids = [&](const char* key, std::vector<MissionId>& ids) {
-    const Json* list = fields.child(key);
-    if (list == nullptr) return;
-    if (!list->is_array() || list->empty() || list->size() > 100)
-      return fields.error(key, "wrong_type", "must be an array of 1 to 100 mission ids");
-    for (std::size_t i = 0; i < list->size(); ++i) {
-      const auto& item = (*list)[i];
-      const auto id = parse_uuid(item.is_string() ? item.get_ref<const std::string&>() : "");
-      const std::string at = std::string("/") + key + '/' + std::to_string(i);
-      if (!id)
-        errors.push_back({at, "bad_id", id.error().message});
-      else if (!seen.insert(to_string(id.value())).second)
-        errors.push_back({at, "duplicate", "the mission occurs twice"});
-      else
-        ids.push_back(MissionId{id.value()});
-    }
-  };
   if (!fields.has("missions")) fields.error("missions", "required", "missions is missing");
-  read_ids("missions", out.missions);
-  read_ids("learn_from", out.learn_from);
+  read_missions(fields, "missions", seen, out.missions, errors);
+  read_missions(fields, "learn_from", seen, out.learn_from, errors);
   auto& options = out.options;
   if (const auto dims = fields.integer("dims", 2, 3)) options.dims = *dims == 2 ? Dims::two : Dims::three;
   if (const auto solver = fields.word("solver", k_solver_words)) options.method = *solver;
@@ -73,21 +95,7 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
     if (const auto scale = inner.number("scale", 0.1, 10)) options.mad_factor *= *scale / 1.5;
     inner.finish();
   }
-  if (const auto height = fields.number("anchor_height_m", -1000, 9000)) {
-    options.anchor_height_m = *height;
-    if (options.dims != Dims::two)
-      fields.error("anchor_height_m", "needs_dims_2", "a held height needs dims 2; in 3: height_prior");
-  }
-  if (const Json* prior = fields.child("height_prior")) {
-    Fields inner(*prior, "/height_prior", errors);
-    const auto height = inner.number("height_m", -1000, 9000, true);
-    const auto sigma = inner.number("sigma_m", 0.01, 100, true);
-    inner.finish();
-    if (options.dims == Dims::two)
-      fields.error("height_prior", "needs_dims_3", "a height prior needs dims 3; in 2: anchor_height_m");
-    else if (height && sigma)
-      options.height_prior = {*height, *sigma};
-  }
+  read_height(fields, options, errors);
   if (const auto gap = fields.number("max_gap_s", 0.01, 10)) options.max_gap_s = *gap;
   if (const auto fix = fields.word("min_fix", k_fix_words)) options.min_fix = *fix;
   out.max_correction_age_s = fields.number("max_correction_age_s", 0.1, 3600);

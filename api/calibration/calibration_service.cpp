@@ -69,6 +69,8 @@ struct CalibrationService::Solved {
   Evidence evidence;
   std::size_t n_priors{0};                 ///< anchors with a bearing or a height as a prior
   std::vector<FlightModelsReport> models;  ///< what they did to each flight
+  std::optional<CalibrationFrame> frame;   ///< the answers are told in it too
+  Json outline;                            ///< of the site, as it was used
 
   std::vector<std::size_t> of_kit(const std::string& kit) const {
     std::vector<std::size_t> out;
@@ -242,6 +244,38 @@ Json without_models(const Estimate& raw, const Calibration& made) {
   return out;
 }
 
+/// What the flights say of each anchor.
+struct ByAnchor {
+  std::map<NetworkId, std::vector<Estimate>> estimates;
+  std::map<NetworkId, std::vector<const AnchorSolution*>> solutions;
+
+  void add(const FlightSolution& flight) {
+    for (const auto& anchor : flight.anchors) {
+      estimates[anchor.estimate.anchor].push_back(anchor.estimate);
+      solutions[anchor.estimate.anchor].push_back(&anchor);
+    }
+  }
+};
+
+/// Every anchor of all flights into `out`; the budgets of their errors.
+Json fuse_anchors(const ByAnchor& by_anchor, const std::optional<double>& base_sigma_m,
+                  const std::optional<CalibrationFrame>& frame, Calibration& out) {
+  Json budgets = Json::object();
+  for (const auto& [id, estimates] : by_anchor.estimates) {
+    Estimate estimate = fuse_estimates(estimates);
+    if (auto budget = budget_of(by_anchor.solutions.at(id), estimate, base_sigma_m); !budget.is_null())
+      budgets[to_string(id)] = std::move(budget);
+    if (out.origin) {
+      const EnuFrame globe(*out.origin);
+      if (estimate.best) estimate.best->wgs84 = globe.wgs84_from_enu(estimate.best->position);
+      if (estimate.mirror) estimate.mirror->wgs84 = globe.wgs84_from_enu(estimate.mirror->position);
+    }
+    if (frame && !out.origin) place_on_globe(*frame, estimate);
+    out.anchors.push_back(std::move(estimate));
+  }
+  return budgets;
+}
+
 }  // namespace
 
 Result<Job> CalibrationService::submit(CalibrationRequest request) {
@@ -335,41 +369,40 @@ Result<void> CalibrationService::solve_kits(const CalibrationRequest& request, c
   return boost::outcome_v2::success();
 }
 
-Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRequest& request,
-                                                             const ModelRegistry::Active& models,
-                                                             JobContext& job) {
-  const auto canceled_now = [&] { return job.canceled(); };
-  Solved solved;
+Result<void> CalibrationService::load(const CalibrationRequest& request, const ModelRegistry::Active& models,
+                                      JobContext& job, Solved& solved) {
   std::vector<MissionId> all = request.missions;
   all.insert(all.end(), request.learn_from.begin(), request.learn_from.end());
   for (const auto& id : all) {
     BOOST_OUTCOME_TRY(auto mission, deps_.missions.mission(id));
     BOOST_OUTCOME_TRY(const auto exclusions, deps_.exclusions.exclusions(id));
-    BOOST_OUTCOME_TRY(auto flight,
-                      load_flight(deps_.measurements, mission, canceled_now, models.needs_cir, exclusions));
+    BOOST_OUTCOME_TRY(auto flight, load_flight(
+                                       deps_.measurements, mission, [&] { return job.canceled(); },
+                                       models.needs_cir, exclusions));
     if (!request.use_anchor_anchor)
       std::erase_if(flight.ranges, [](const Range& r) { return r.kind == RangeKind::anchor_anchor; });
     solved.flights.push_back(std::move(flight));
     job.progress(0.3 * static_cast<double>(solved.flights.size()) / static_cast<double>(all.size()), "load",
                  solved.flights.back().mission.name);
   }
+  return boost::outcome_v2::success();
+}
+
+FlightOptions CalibrationService::options_of(const CalibrationRequest& request, JobContext& job) const {
   FlightOptions options = request.options;
   options.track = deps_.track;
   const auto take = [](const std::optional<double>& told, double& limit) { limit = told.value_or(limit); };
   take(request.max_correction_age_s, options.track.max_correction_age_s);
   take(request.max_speed_mps, options.track.max_speed_mps);
   take(request.max_acceleration_mps2, options.track.max_acceleration_mps2);
-  options.canceled = canceled_now;
-  Calibration& out = solved.calibration;
-  BOOST_OUTCOME_TRYV(choose_frame(solved.flights, deps_.sites, options, out));
-  std::optional<CalibrationFrame> frame;
-  if (!request.frame.empty()) {
-    BOOST_OUTCOME_TRY(frame, calibration_frame(deps_.frames, request.frame));
-  }
-  const auto outline =
-      use_site_outline(request.site_outline, solved.flights, out.origin, frame, deps_.sites, options);
-  job.progress(0.3, "solve", std::to_string(solved.flights.size()) + " flights");
-  Solved raw;  // the same without the models
+  options.canceled = [&job] { return job.canceled(); };
+  return options;
+}
+
+Result<void> CalibrationService::solve_by_models(const CalibrationRequest& request,
+                                                 const ModelRegistry::Active& models,
+                                                 const FlightOptions& options, JobContext& job,
+                                                 Solved& solved, Solved& raw) {
   CalibrationRequest wanted = request;
   if (!models.predictor.empty()) {
     raw.flights = solved.flights;
@@ -389,42 +422,40 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
     for (auto& flight : *flights)
       for (auto& range : flight.ranges) range.cir.reset();
   BOOST_OUTCOME_TRYV(solve_kits(wanted, options, solved));
-  if (!raw.flights.empty()) {
-    job.progress(0.7, "solve", "without the models");
-    CalibrationRequest plain = request;
-    plain.iterations = 0;
-    BOOST_OUTCOME_TRYV(solve_kits(plain, options, raw));
-    if (request.models.ask_worth &&
-        leave_out_worthless(solved.models, solved.flights, raw.flights, solved.solutions, raw.solutions)) {
-      job.progress(0.8, "solve", "without models that show no worth");
-      const bool corrected =
-          std::ranges::any_of(solved.models, [](const auto& m) { return m.used && m.n_corrected > 0; });
-      if (!corrected) wanted.use_profile = request.use_profile;
-      solved.profiles = Json::array();
-      solved.n_priors = 0;
-      solved.evidence.course.clear();
-      BOOST_OUTCOME_TRYV(solve_kits(wanted, options, solved));
-    }
-    solved.learned = std::move(raw.learned);
+  if (raw.flights.empty()) return boost::outcome_v2::success();
+  job.progress(0.7, "solve", "without the models");
+  CalibrationRequest plain = request;
+  plain.iterations = 0;
+  BOOST_OUTCOME_TRYV(solve_kits(plain, options, raw));
+  if (request.models.ask_worth &&
+      leave_out_worthless(solved.models, solved.flights, raw.flights, solved.solutions, raw.solutions)) {
+    job.progress(0.8, "solve", "without models that show no worth");
+    const bool corrected =
+        std::ranges::any_of(solved.models, [](const auto& m) { return m.used && m.n_corrected > 0; });
+    if (!corrected) wanted.use_profile = request.use_profile;
+    solved.profiles = Json::array();
+    solved.n_priors = 0;
+    solved.evidence.course.clear();
+    BOOST_OUTCOME_TRYV(solve_kits(wanted, options, solved));
   }
+  solved.learned = std::move(raw.learned);
+  return boost::outcome_v2::success();
+}
+
+void CalibrationService::conclude(const CalibrationRequest& request, const ModelRegistry::Active& models,
+                                  Solved& solved, const Solved& raw) const {
+  Calibration& out = solved.calibration;
   const bool compared = !raw.flights.empty() && request.compare_uncorrected;
-  if (canceled_now()) return make_error(Errc::canceled, "canceled");
-  std::map<NetworkId, std::vector<Estimate>> by_anchor, by_anchor_raw;
-  std::map<NetworkId, std::vector<const AnchorSolution*>> budgets_of;
+  ByAnchor by_anchor, by_anchor_raw;
   Json flights = Json::array();
   for (std::size_t i = 0; i < request.missions.size(); ++i) {
     const auto& solution = *solved.solutions[i];
-    for (const auto& anchor : solution.anchors) {
-      by_anchor[anchor.estimate.anchor].push_back(anchor.estimate);
-      budgets_of[anchor.estimate.anchor].push_back(&anchor);
-    }
+    by_anchor.add(solution);
     solved.evidence.flights.push_back(evidence_of(solved.flights[i], solution, out.origin));
     flights.push_back(flight_provenance(solved.flights[i], solution));
-    if (!compared) continue;
-    for (const auto& anchor : raw.solutions[i]->anchors)
-      by_anchor_raw[anchor.estimate.anchor].push_back(anchor.estimate);
+    if (compared) by_anchor_raw.add(*raw.solutions[i]);
   }
-  Json base = nullptr, budgets = Json::object();
+  Json base = nullptr;
   std::optional<double> base_sigma_m;
   if (const auto& site = solved.flights.front().mission.site) {
     if (const auto found = deps_.sites.site(*site)) {
@@ -433,38 +464,47 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
       if (out.frame == TrackFrame::wgs84) base_sigma_m = found.value().base_sigma_m;
     }
   }
-  for (const auto& [id, estimates] : by_anchor) {
-    Estimate estimate = fuse_estimates(estimates);
-    if (auto budget = budget_of(budgets_of[id], estimate, base_sigma_m); !budget.is_null())
-      budgets[to_string(id)] = std::move(budget);
-    if (out.origin) {
-      const EnuFrame globe(*out.origin);
-      if (estimate.best) estimate.best->wgs84 = globe.wgs84_from_enu(estimate.best->position);
-      if (estimate.mirror) estimate.mirror->wgs84 = globe.wgs84_from_enu(estimate.mirror->position);
-    }
-    if (frame && !out.origin) place_on_globe(*frame, estimate);
-    out.anchors.push_back(std::move(estimate));
-  }
+  Json budgets = fuse_anchors(by_anchor, base_sigma_m, solved.frame, out);
   Json uncorrected = compared ? Json::array() : Json(nullptr);
-  for (const auto& [id, estimates] : by_anchor_raw)
+  for (const auto& [id, estimates] : by_anchor_raw.estimates)
     uncorrected.push_back(without_models(fuse_estimates(estimates), out));
-  out.provenance_json = to_wire(Json{
+  out.provenance = {to_wire(Json{
       {"profiles", std::move(solved.profiles)},
       {"base", std::move(base)},
       {"budgets", std::move(budgets)},
       {"check_points", checked(request, out)},
       {"n_clues", solved.n_priors},
-      {"frame", frame ? frame_provenance(*frame, out) : Json(nullptr)},
-      {"clues", {{"outline", outline}}},
+      {"frame", solved.frame ? frame_provenance(*solved.frame, out) : Json(nullptr)},
+      {"clues", {{"outline", solved.outline}}},
       {"sigma_m", noise_provenance(request, solved.models)},
       {"models", models.predictor.empty() ? Json(nullptr) : Json(flight_models_json(models, solved.models))},
       {"uncorrected", std::move(uncorrected)},
-      {"flights", std::move(flights)}});
-  out.evidence_json = evidence_json(solved.evidence);
+      {"flights", std::move(flights)}})};
+  out.evidence = {evidence_json(solved.evidence)};
+}
+
+Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRequest& request,
+                                                             const ModelRegistry::Active& models,
+                                                             JobContext& job) {
+  Solved solved;
+  BOOST_OUTCOME_TRYV(load(request, models, job, solved));
+  FlightOptions options = options_of(request, job);
+  Calibration& out = solved.calibration;
+  BOOST_OUTCOME_TRYV(choose_frame(solved.flights, deps_.sites, options, out));
+  if (!request.frame.empty()) {
+    BOOST_OUTCOME_TRY(solved.frame, calibration_frame(deps_.frames, request.frame));
+  }
+  solved.outline =
+      use_site_outline(request.site_outline, solved.flights, out.origin, solved.frame, deps_.sites, options);
+  job.progress(0.3, "solve", std::to_string(solved.flights.size()) + " flights");
+  Solved raw;
+  BOOST_OUTCOME_TRYV(solve_by_models(request, models, options, job, solved, raw));
+  if (job.canceled()) return make_error(Errc::canceled, "canceled");
+  conclude(request, models, solved, raw);
   out.created = deps_.clock.now();
   out.id.uuid = job.job().id.uuid;  // the job and what it makes share their number
   out.missions = request.missions;
-  out.settings_json = request.settings_json;
+  out.settings = {request.settings_json};
   job.progress(0.95, "store", "");
   return solved;
 }

@@ -94,6 +94,17 @@ class CalibrationService {
   struct Solved;
   Result<Solved> solve(const CalibrationRequest& request, const ModelRegistry::Active& models,
                        JobContext& job);
+  // The steps of solve(), in their order.
+  Result<void> load(const CalibrationRequest& request, const ModelRegistry::Active& models, JobContext& job,
+                    Solved& solved);
+  FlightOptions options_of(const CalibrationRequest& request, JobContext& job) const;
+  /// `raw`: the same without the models, where it is compared or their worth is asked for; else it stays
+  /// empty.
+  Result<void> solve_by_models(const CalibrationRequest& request, const ModelRegistry::Active& models,
+                               const FlightOptions& options, JobContext& job, Solved& solved, Solved& raw);
+  void conclude(const CalibrationRequest& request, const ModelRegistry::Active& models, Solved& solved,
+                const Solved& raw) const;
+
   Result<void> solve_kits(const CalibrationRequest& request, const FlightOptions& options, Solved& solved);
   Result<void> solve_kit(const CalibrationRequest& request, const FlightOptions& options, Solved& solved,
                          const std::string& kit);

@@ -45,7 +45,7 @@ Result<std::optional<KitProfiles::InUse>> KitProfiles::for_flights(const std::st
   if (!stored) return std::optional<InUse>{};
   InUse out;
   out.version = stored->version;
-  BOOST_OUTCOME_TRY(out.profile, parse_kit_profile(stored->profile_json));
+  BOOST_OUTCOME_TRY(out.profile, parse_kit_profile(stored->profile.text));
   std::erase_if(out.profile.factors, [&](const ProfileFactor& f) { return of_these(f, flights); });
   return std::optional<InUse>(std::move(out));
 }
@@ -57,7 +57,7 @@ Result<std::optional<StoredProfile>> KitProfiles::learn(const KitProfile& learne
     BOOST_OUTCOME_TRY(const auto stored, kits_.profile(learned.kit));
     KitProfile next;
     if (stored) {
-      BOOST_OUTCOME_TRY(next, parse_kit_profile(stored->profile_json));
+      BOOST_OUTCOME_TRY(next, parse_kit_profile(stored->profile.text));
     }
     next.kit = learned.kit;
     std::erase_if(next.factors, [&](const ProfileFactor& f) { return of_these(f, flights); });
@@ -68,8 +68,8 @@ Result<std::optional<StoredProfile>> KitProfiles::learn(const KitProfile& learne
     kept.kit = learned.kit;
     kept.time = clock_.now();
     kept.source = source;
-    kept.profile_json = kit_profile_json(next);
-    if (next.factors.empty() || (stored && stored->profile_json == kept.profile_json))
+    kept.profile = {kit_profile_json(next)};
+    if (next.factors.empty() || (stored && stored->profile == kept.profile))
       return std::optional<StoredProfile>{};
     auto put = kits_.put(std::move(kept), stored ? stored->version : 0);
     if (put) return std::optional<StoredProfile>(std::move(put).value());

@@ -28,13 +28,13 @@ Ordered version_json(const StoredProfile& stored) {
 
 /// The profile, the prior it gives the next flight, and where every version came from.
 Response answer(CalibrationApi& s, int status, const StoredProfile& stored) {
-  const auto profile = value_or_problem(parse_kit_profile(stored.profile_json));
+  const auto profile = value_or_problem(parse_kit_profile(stored.profile.text));
   const FlightOptions options;
   const BiasGate gate = bias_gate(profile.factors, options);
   const SharedPrior prior = profile_prior(profile.factors, gate, options);
   const auto sigma = prior_sigmas(prior);
   Ordered body{{"kit", stored.kit}, {"version", stored.version}, {"n_flights", profile.factors.size()}};
-  body["profile"] = Ordered::parse(stored.profile_json);
+  body["profile"] = Ordered::parse(stored.profile.text);
   body["next_flight"] = {{"bias_m", valued(prior.mean[k_shared_bias], sigma[k_shared_bias])},
                          {"curve_m_per_efold", valued(prior.mean[k_shared_curve], sigma[k_shared_curve])},
                          {"lag_s", valued(prior.mean[k_shared_lag], sigma[k_shared_lag])},
@@ -81,7 +81,7 @@ Response put(CalibrationApi& s, const Request& request) {
   next.time = s.clock.now();
   next.by = request.principal.token_id;
   next.source = "put";
-  next.profile_json = kit_profile_json(profile.value());
+  next.profile = {kit_profile_json(profile.value())};
   const auto stored = value_or_problem(s.profiles.store().put(std::move(next), version));
   s.audit(request, "profile.change " + kit + " version " + std::to_string(stored.version));
   return answer(s, before ? 200 : 201, stored);

@@ -53,7 +53,7 @@ Ordered device_json(const DeviceReport& d) {
               {"kind", d.config.kind},
               {"name", d.config.name},
               {"address", d.config.address},
-              {"options", kept_json(d.config.options_json)},
+              {"options", kept_json(d.config.options.text)},
               {"enabled", d.config.enabled},
               {"state", d.state},
               {"reason", text_or_null(d.reason)},
@@ -141,13 +141,13 @@ void patch_device(const Json& body, bool whole, DeviceConfig& device, std::vecto
     if (!options->is_object() || to_wire(*options).size() > 10'000) {
       fields.error("options", "wrong_type", "must be an object below 10 kB");
     } else {
-      auto merged = Json::parse(device.options_json, nullptr, false);
+      auto merged = Json::parse(device.options.text, nullptr, false);
       merged.merge_patch(*options);
       check_secret(*options, merged, errors);
-      device.options_json = to_wire(merged);
+      device.options = {to_wire(merged)};
     }
   } else if (body.contains("options")) {
-    device.options_json = "{}";
+    device.options = {"{}"};
   }
   fields.finish();
   if (device.name.empty()) device.name = device.kind;

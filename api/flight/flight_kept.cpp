@@ -22,7 +22,7 @@ DroneIdentity aircraft_of(const nlohmann::json& stored) {
 nlohmann::ordered_json document_of(const flight::ActiveFlight& f) {
   const auto& o = f.frame.origin();
   const auto& a = f.aircraft;
-  return {{"plan", nlohmann::json::parse(stored(f.plan).document_json)},
+  return {{"plan", nlohmann::json::parse(stored(f.plan).document.text)},
           {"plan_id", to_string(f.plan.id)},
           {"plan_revision", f.plan.version},
           {"manual", f.manual},

@@ -307,7 +307,7 @@ void refuse_while_trained_on(LearningApi& l, const CampaignRecord& campaign) {
     const auto run = l.stores.runs.run(TrainingRunId{job.id.uuid});
     if (!run) continue;
     const auto dataset = l.stores.datasets.dataset(run.value().dataset);
-    if (dataset && dataset.value().query_json.find(to_string(campaign.id)) != std::string::npos)
+    if (dataset && dataset.value().query.text.find(to_string(campaign.id)) != std::string::npos)
       throw_problem(409, "conflict",
                     "training run " + to_string(job.id) + " uses " + campaign.name + " (" +
                         (job.state == JobState::running ? "running" : "queued") +

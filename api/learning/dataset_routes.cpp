@@ -57,7 +57,7 @@ Response create(LearningApi& l, const Request& request) {
     record.name = request.query_value("name").value_or("");
     if (record.name.empty() || record.name.size() > 200)
       throw_problem(422, "validation", "name is missing", {{"/name", "required", "say ?name="}});
-    record.query_json = R"({"imported":true})";
+    record.query = {R"({"imported":true})"};
     frozen = read_csv(request);
   } else {
     check_query(request, {});
@@ -65,7 +65,7 @@ Response create(LearningApi& l, const Request& request) {
     const auto query = read_dataset_query(json_body(request), l.stores.campaigns, l.missions, errors);
     refuse_if_any(errors);
     record.name = query.name;
-    record.query_json = query.json;
+    record.query = {query.json};
     auto made = freeze(query, l.stores.campaigns, l.measurements, l.missions, l.exclusions);
     if (!made && (made.error().code == Errc::too_few_observations || made.error().code == Errc::not_found ||
                   made.error().code == Errc::invalid_argument))
@@ -74,7 +74,7 @@ Response create(LearningApi& l, const Request& request) {
   }
   const std::string csv = frozen.table.csv();
   record.digest = dataset_digest(csv);
-  record.report_json = std::move(frozen.report_json);
+  record.report = {std::move(frozen.report_json)};
   record.n_train = frozen.n_train;
   record.n_test = frozen.n_test;
   record.created = l.clock.now();

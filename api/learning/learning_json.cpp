@@ -98,7 +98,7 @@ Ordered sample_json(const CampaignStore::StoredSample& s) {
 }
 
 Ordered dataset_json(const DatasetRecord& d, bool whole) {
-  const Ordered report = parsed(d.report_json);
+  const Ordered report = parsed(d.report.text);
   Ordered out{{"id", to_string(d.id)},
               {"name", d.name},
               {"digest", d.digest},
@@ -108,7 +108,7 @@ Ordered dataset_json(const DatasetRecord& d, bool whole) {
               {"created_at", to_rfc3339(d.created)},
               {"created_by", d.created_by}};
   if (!whole) return out;
-  out["query"] = parsed(d.query_json);
+  out["query"] = parsed(d.query.text);
   out["report"] = report;
   out["links"] =
       Ordered::array({{{"rel", "rows"}, {"href", "/api/v1/datasets/" + to_string(d.id) + "/rows"}},
@@ -118,7 +118,7 @@ Ordered dataset_json(const DatasetRecord& d, bool whole) {
 
 Ordered training_run_json(const TrainingRun& r, const DatasetRecord& d, const Job& job, bool whole) {
   const std::string self = "/api/v1/training-runs/" + to_string(r.id);
-  Ordered summary = r.summary_json.empty() ? Ordered::object() : parsed(r.summary_json);
+  Ordered summary = r.summary.empty() ? Ordered::object() : parsed(r.summary.text);
   Ordered out{{"id", to_string(r.id)},
               {"state", k_job_state_words.word(job.state)},
               {"task", r.task},
@@ -134,7 +134,7 @@ Ordered training_run_json(const TrainingRun& r, const DatasetRecord& d, const Jo
               {"metrics", summary.contains("metrics") ? summary["metrics"] : Ordered(nullptr)},
               {"problem", job_json(job)["problem"]}};
   if (!whole) return out;
-  out["request"] = parsed(r.request_json);
+  out["request"] = parsed(r.request.text);
   for (const char* key : {"why", "features", "results", "importance", "split", "threshold", "bias", "nll",
                           "nll_constants", "test"})
     out[key] = summary.contains(key) ? summary[key] : Ordered(nullptr);
@@ -143,7 +143,7 @@ Ordered training_run_json(const TrainingRun& r, const DatasetRecord& d, const Jo
 
 Ordered model_json(const StoredModel& m, bool active) {
   const std::string self = "/api/v1/models/" + to_string(m.id);
-  const Ordered manifest = parsed(m.manifest_json);
+  const Ordered manifest = parsed(m.manifest.text);
   const auto from = [&](const char* key) {
     return manifest.is_object() && manifest.contains(key) ? manifest[key] : Ordered(nullptr);
   };

@@ -96,7 +96,7 @@ Response upload(LearningApi& l, const Request& request) {
   StoredModel stored;
   stored.task = ml::task_name(model.info.task);
   stored.method = model.info.method;
-  stored.manifest_json = manifest_of(artifact);
+  stored.manifest = {manifest_of(artifact)};
   Sha256 sum;
   sum.add(std::string_view(artifact));
   stored.sha256_hex = sum.hex();

@@ -25,7 +25,7 @@ Result<std::string> TrainingService::work(const TrainingRun& run, JobContext& jo
   BOOST_OUTCOME_TRY(const auto csv, deps_.datasets.csv(run.dataset));
   const std::string message = to_wire(Json{{"kind", "training"},
                                            {"csv", csv},
-                                           {"request", Json::parse(run.request_json)},
+                                           {"request", Json::parse(run.request.text)},
                                            {"code_version", deps_.code_version}});
   BOOST_OUTCOME_TRY(
       const auto answer,
@@ -47,7 +47,7 @@ Result<std::string> TrainingService::work(const TrainingRun& run, JobContext& jo
   stored.method = model.info.method;
   stored.run = run.id;
   stored.created_by = run.created_by;
-  stored.manifest_json = manifest_of(artifact);
+  stored.manifest = {manifest_of(artifact)};
   Sha256 sum;
   sum.add(artifact);
   stored.sha256_hex = sum.hex();
@@ -55,7 +55,7 @@ Result<std::string> TrainingService::work(const TrainingRun& run, JobContext& jo
   std::map<std::string, std::string> parts;
   for (const auto& [name, text] : json["parts"].items()) parts[name] = text.get<std::string>();
   BOOST_OUTCOME_TRYV(
-      deps_.runs.finish(run.id, json["summary"].get_ref<const std::string&>(), parts, stored, artifact));
+      deps_.runs.finish(run.id, {json["summary"].get_ref<const std::string&>()}, parts, stored, artifact));
   deps_.events.add("info", "model.trained",
                    stored.method + " for " + stored.task + " is trained: model " + to_string(stored.id));
   return stored.method;
@@ -72,11 +72,11 @@ Result<Job> TrainingService::submit(const DatasetId& dataset, std::string task, 
   run.id.uuid = make_uuid_v7(run.created);
   run.dataset = dataset;
   run.task = std::move(task);
-  run.request_json = std::move(request_json);
+  run.request = {std::move(request_json)};
   run.created_by = std::move(by);
   BOOST_OUTCOME_TRYV(deps_.runs.insert(run));
   auto job = deps_.jobs.submit(
-      "training", run.request_json,
+      "training", run.request.text,
       [work = work_of(run), id = run.id](JobContext& context) -> Result<JobEnd> {
         BOOST_OUTCOME_TRY(auto detail, work(context));
         return JobEnd{"/api/v1/training-runs/" + to_string(id), std::move(detail)};

@@ -229,13 +229,13 @@ Plan read_plan(const Json& body, std::vector<FieldError>& errors) {
 }
 
 StoredPlan stored(const Plan& plan) {
-  return {plan.id,      plan.name,    plan.site,   to_wire(document_json(plan)),
+  return {plan.id,      plan.name,    plan.site,   {to_wire(document_json(plan))},
           plan.created, plan.changed, plan.version};
 }
 
 Plan plan_of(const StoredPlan& row) {
   std::vector<FieldError> errors;
-  Plan plan = read_plan(Json::parse(row.document_json), errors);
+  Plan plan = read_plan(Json::parse(row.document.text), errors);
   if (!errors.empty()) {
     throw std::logic_error("stored plan " + to_string(row.id) + ": " + errors[0].pointer + ": " +
                            errors[0].detail);

@@ -105,6 +105,70 @@ std::optional<double> heading_deg(const Fix& fix) {
   return deg < 0 ? deg + 360 : deg;
 }
 
+void put_uncertainty(Object& out, const Estimate& estimate) {
+  if (estimate.best && estimate.best->covariance_m2.allFinite()) {
+    const auto& c = estimate.best->covariance_m2;
+    out.key("cov_enu_m2")
+        .raw("[")
+        .small(c(0, 0))
+        .raw(",")
+        .small(c(0, 1))
+        .raw(",")
+        .small(c(0, 2))
+        .raw(",")
+        .small(c(1, 1))
+        .raw(",")
+        .small(c(1, 2))
+        .raw(",")
+        .small(c(2, 2))
+        .raw("]");
+    const ErrorEllipse ellipse = error_ellipse(c);
+    Object inner;
+    inner.key("major_m")
+        .number(ellipse.major_m, 4)
+        .key("minor_m")
+        .number(ellipse.minor_m, 4)
+        .key("azimuth_deg")
+        .number(ellipse.azimuth_deg, 1);
+    out.key("ellipse95").raw(inner.take());
+    out.key("h95_m").number(estimate.h95_m, 4).key("v95_m").number(estimate.v95_m, 4);
+  } else {
+    out.key("cov_enu_m2")
+        .raw("null")
+        .key("ellipse95")
+        .raw("null")
+        .key("h95_m")
+        .raw("null")
+        .key("v95_m")
+        .raw("null");
+  }
+}
+
+void put_mirror(Object& out, const Estimate& estimate) {
+  out.key("mirror");
+  if (estimate.mirror) {
+    Object mirror;
+    mirror.key("enu_m").vector(estimate.mirror->position.m, 4);
+    place(mirror, estimate.mirror->wgs84);
+    mirror.key("probability").number(estimate.mirror->probability, 3);
+    out.raw(mirror.take());
+  } else {
+    out.raw("null");
+  }
+}
+
+void put_gates(Object& out, const std::vector<Gate>& all) {
+  std::string gates = "[";
+  for (const Gate& gate : all) {
+    Object inner;
+    inner.key("name").text(gate.name).key("value").optional(gate.value, 4);
+    inner.key("limit").number(gate.limit, 4).key("passed").raw(gate.passed ? "true" : "false");
+    inner.key("why").text(gate.why);
+    gates += (gates.size() > 1 ? "," : "") + inner.take();
+  }
+  out.key("gates").raw(gates + "]");
+}
+
 }  // namespace
 
 std::string live_pose_json(const MissionId& mission, TrackFrame frame, const LivePose& pose) {
@@ -216,42 +280,7 @@ std::string live_estimate_json(const MissionId& mission, const Estimate& estimat
   else
     out.raw("null");
   place(out, estimate.best ? estimate.best->wgs84 : std::nullopt);
-  if (estimate.best && estimate.best->covariance_m2.allFinite()) {
-    const auto& c = estimate.best->covariance_m2;
-    out.key("cov_enu_m2")
-        .raw("[")
-        .small(c(0, 0))
-        .raw(",")
-        .small(c(0, 1))
-        .raw(",")
-        .small(c(0, 2))
-        .raw(",")
-        .small(c(1, 1))
-        .raw(",")
-        .small(c(1, 2))
-        .raw(",")
-        .small(c(2, 2))
-        .raw("]");
-    const ErrorEllipse ellipse = error_ellipse(c);
-    Object inner;
-    inner.key("major_m")
-        .number(ellipse.major_m, 4)
-        .key("minor_m")
-        .number(ellipse.minor_m, 4)
-        .key("azimuth_deg")
-        .number(ellipse.azimuth_deg, 1);
-    out.key("ellipse95").raw(inner.take());
-    out.key("h95_m").number(estimate.h95_m, 4).key("v95_m").number(estimate.v95_m, 4);
-  } else {
-    out.key("cov_enu_m2")
-        .raw("null")
-        .key("ellipse95")
-        .raw("null")
-        .key("h95_m")
-        .raw("null")
-        .key("v95_m")
-        .raw("null");
-  }
+  put_uncertainty(out, estimate);
   out.key("gdop").optional(estimate.gdop, 3).key("gdop_trace").optional(estimate.gdop_trace, 3);
   out.key("n_ranges")
       .integer(static_cast<std::int64_t>(estimate.n_used))
@@ -262,25 +291,8 @@ std::string live_estimate_json(const MissionId& mission, const Estimate& estimat
   if (models_moved_m) out.key("models_moved_m").number(*models_moved_m, 4);
   out.key("probability")
       .optional(estimate.best ? std::optional(estimate.best->probability) : std::nullopt, 3);
-  out.key("mirror");
-  if (estimate.mirror) {
-    Object mirror;
-    mirror.key("enu_m").vector(estimate.mirror->position.m, 4);
-    place(mirror, estimate.mirror->wgs84);
-    mirror.key("probability").number(estimate.mirror->probability, 3);
-    out.raw(mirror.take());
-  } else {
-    out.raw("null");
-  }
-  std::string gates = "[";
-  for (const Gate& gate : estimate.gates) {
-    Object inner;
-    inner.key("name").text(gate.name).key("value").optional(gate.value, 4);
-    inner.key("limit").number(gate.limit, 4).key("passed").raw(gate.passed ? "true" : "false");
-    inner.key("why").text(gate.why);
-    gates += (gates.size() > 1 ? "," : "") + inner.take();
-  }
-  out.key("gates").raw(gates + "]");
+  put_mirror(out, estimate);
+  put_gates(out, estimate.gates);
   return out.take();
 }
 

@@ -116,41 +116,25 @@ Wgs84 robust_centre(std::span<const Wgs84> places) {
   return frame.wgs84_from_enu(middle);
 }
 
-CheckedTrack check_track(std::span<const Fix> fixes, TrackFrame frame, FixClass min_fix,
-                         const TrackLimits& limits) {
-  CheckedTrack out;
-  out.refusals.assign(fixes.size(), FixRefusal::none);
-  std::vector<Fix> all;
-  all.reserve(fixes.size());
-  std::size_t n_old = 0;
-  for (std::size_t i = 0; i < fixes.size(); ++i) {
-    all.push_back(believed_class(fixes[i], limits));
-    if (!usable(fixes[i], frame))
-      out.refusals[i] = FixRefusal::not_usable;
-    else if (all.back().fix != fixes[i].fix)
-      ++n_old;
-  }
-  check_stamps(fixes, limits, out.refusals);
+namespace {
 
-  // Good ones are held against each other; the others are neighbours at most, and say nothing about good
-  // ones.
-  std::vector<std::size_t> order, good;
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (out.refusals[i] == FixRefusal::none) order.push_back(i);
-  }
-  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return all[i].time.ns; });
+/// Good positions are held against each other; the others are neighbours at most, and say nothing about good
+/// ones. `order`: those not refused so far, by time.
+std::vector<std::size_t> good_ones(const std::vector<Fix>& all, const std::vector<std::size_t>& order,
+                                   FixClass min_fix) {
   FixClass best = FixClass::none;
   for (const std::size_t i : order) best = std::max(best, all[i].fix);
   const FixClass judged = std::min(best, min_fix);
+  std::vector<std::size_t> good;
   for (const std::size_t i : order) {
     if (all[i].fix >= judged) good.push_back(i);
   }
-  if (good.empty()) {
-    for (const auto why : out.refusals)
-      if (why != FixRefusal::none) ++out.refused[std::string(to_string(why))];
-    return out;
-  }
+  return good;
+}
 
+/// Refuses what no aircraft could have flown together with most of the rest; the others of `good`.
+std::vector<std::size_t> keep_flight(const std::vector<Fix>& all, const std::vector<std::size_t>& good,
+                                     const TrackLimits& limits, CheckedTrack& out) {
   TrackSegments segments(limits);
   std::vector<std::size_t> part(good.size());
   std::vector<std::pair<std::size_t, std::size_t>> ends;  // by part: first and last place in `good`
@@ -163,8 +147,12 @@ CheckedTrack check_track(std::span<const Fix> fixes, TrackFrame frame, FixClass 
   }
   const std::size_t flight = segments.largest();
   std::size_t n_step = 0;
+  std::vector<std::size_t> kept;
   for (std::size_t k = 0; k < good.size(); ++k) {
-    if (part[k] == flight) continue;
+    if (part[k] == flight) {
+      kept.push_back(good[k]);
+      continue;
+    }
     const auto& [first, last] = ends[part[k]];
     const FixRefusal why =
         why_apart(segments.segment(part[k]), segments.segment(flight), limits.max_pause_s, last - first + 1);
@@ -180,23 +168,25 @@ CheckedTrack check_track(std::span<const Fix> fixes, TrackFrame frame, FixClass 
     }
   }
   out.step_share = static_cast<double>(n_step) / static_cast<double>(good.size());
+  return kept;
+}
 
-  if (frame == TrackFrame::wgs84) {
-    std::vector<Wgs84> places;
-    for (std::size_t k = 0; k < good.size(); ++k) {
-      if (part[k] == flight) places.push_back(all[good[k]].position);
-    }
-    out.centre = robust_centre(places);
-    const Eigen::Vector3d middle_m = ecef_from_wgs84(*out.centre);
-    for (const std::size_t i : order) {
-      if (out.refusals[i] == FixRefusal::none &&
-          (fixed_place_m(all[i]) - middle_m).norm() > limits.max_distance_m)
-        out.refusals[i] = FixRefusal::far_away;
-    }
-  }
+/// The middle of the flight, and away with what is far from it.
+void find_centre(const std::vector<Fix>& all, const std::vector<std::size_t>& order,
+                 const std::vector<std::size_t>& flight, const TrackLimits& limits, CheckedTrack& out) {
+  std::vector<Wgs84> places;
+  for (const std::size_t i : flight) places.push_back(all[i].position);
+  out.centre = robust_centre(places);
+  const Eigen::Vector3d middle_m = ecef_from_wgs84(*out.centre);
   for (const std::size_t i : order) {
-    if (out.refusals[i] == FixRefusal::none) out.fixes.push_back(std::move(all[i]));
+    if (out.refusals[i] == FixRefusal::none &&
+        (fixed_place_m(all[i]) - middle_m).norm() > limits.max_distance_m)
+      out.refusals[i] = FixRefusal::far_away;
   }
+}
+
+/// Counts and notes of what was left out, with the first of each reason.
+void note_refused(std::span<const Fix> fixes, CheckedTrack& out) {
   std::map<std::string, const Fix*> first_of;
   for (std::size_t i = 0; i < fixes.size(); ++i) {
     if (out.refusals[i] == FixRefusal::none) continue;
@@ -208,6 +198,42 @@ CheckedTrack check_track(std::span<const Fix> fixes, TrackFrame frame, FixClass 
   for (const auto& [word, n] : out.refused)
     out.notes.push_back(std::to_string(n) + " positions left out as " + word + ", the first of " +
                         when(*first_of[word]));
+}
+
+}  // namespace
+
+CheckedTrack check_track(std::span<const Fix> fixes, TrackFrame frame, FixClass min_fix,
+                         const TrackLimits& limits) {
+  CheckedTrack out;
+  out.refusals.assign(fixes.size(), FixRefusal::none);
+  std::vector<Fix> all;
+  all.reserve(fixes.size());
+  std::size_t n_old = 0;
+  for (std::size_t i = 0; i < fixes.size(); ++i) {
+    all.push_back(believed_class(fixes[i], limits));
+    if (!usable(fixes[i], frame))
+      out.refusals[i] = FixRefusal::not_usable;
+    else if (all.back().fix != fixes[i].fix)
+      ++n_old;
+  }
+  check_stamps(fixes, limits, out.refusals);
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (out.refusals[i] == FixRefusal::none) order.push_back(i);
+  }
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return all[i].time.ns; });
+  const auto good = good_ones(all, order, min_fix);
+  if (good.empty()) {
+    for (const auto why : out.refusals)
+      if (why != FixRefusal::none) ++out.refused[std::string(to_string(why))];
+    return out;
+  }
+  const auto flight = keep_flight(all, good, limits, out);
+  if (frame == TrackFrame::wgs84) find_centre(all, order, flight, limits, out);
+  for (const std::size_t i : order) {
+    if (out.refusals[i] == FixRefusal::none) out.fixes.push_back(std::move(all[i]));
+  }
+  note_refused(fixes, out);
   if (n_old > 0) {
     out.refused[std::string(k_old_correction)] = n_old;
     char text[120];

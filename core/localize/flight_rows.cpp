@@ -53,52 +53,42 @@ double median(std::vector<double>& values) {
   return *middle;
 }
 
-}  // namespace
+/// Where the metres of the rows begin; nothing in a local frame.
+Result<std::optional<EnuFrame>> frame_of(const std::optional<Wgs84>& centre, const FlightOptions& options) {
+  if (!centre) return std::optional<EnuFrame>{};
+  const EnuFrame frame(options.origin.value_or(*centre));
+  // Swapped coordinates, or the origin of another site.
+  const double far_m = frame.enu_from_wgs84(*centre).m.norm();
+  if (far_m > options.track.max_distance_m)
+    return make_error(Errc::too_few_observations,
+                      "the middle of the track is " + std::to_string(std::llround(far_m / 1000)) +
+                          " km from the origin, more than the " +
+                          std::to_string(std::llround(options.track.max_distance_m / 1000)) +
+                          " km of any flight: check the site's origin");
+  return std::optional(frame);
+}
 
-Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& options) {
-  const TrackFrame kind = flight.mission.frame;
-  auto checked = check_track(flight.fixes, kind, options.min_fix, options.track);
-  auto& fixes = checked.fixes;
-  if (fixes.empty()) return make_error(Errc::too_few_observations, "no usable position in the track");
-  if (flight.ranges.empty()) return make_error(Errc::too_few_observations, "no ranges");
-  std::optional<EnuFrame> frame;
-  if (kind == TrackFrame::wgs84) {
-    frame.emplace(options.origin.value_or(*checked.centre));
-    // Swapped coordinates, or the origin of another site.
-    const double far_m = frame->enu_from_wgs84(*checked.centre).m.norm();
-    if (far_m > options.track.max_distance_m)
-      return make_error(Errc::too_few_observations,
-                        "the middle of the track is " + std::to_string(std::llround(far_m / 1000)) +
-                            " km from the origin, more than the " +
-                            std::to_string(std::llround(options.track.max_distance_m / 1000)) +
-                            " km of any flight: check the site's origin");
-  }
-  const UtcTime epoch = fixes.front().time;
-  FlightRows rows{epoch,
-                  frame,
-                  TagTrack(fixes, frame, epoch, {options.min_fix, options.max_gap_s}),
-                  {},
-                  {},
-                  {},
-                  0,
-                  std::move(checked.refused),
-                  {},
-                  checked.step_share};
-  rows.track_span_s = rows.track.poses().back().t_s - rows.track.poses().front().t_s;
+void note_track(const FlightData& flight, const std::vector<std::string>& notes, FlightRows& rows) {
   bool arm_across = false;
   for (const auto& tag : flight.mission.tags)
     arm_across = arm_across || tag.lever_arm_body_m.head<2>().norm() > 0.01;
   if (arm_across && !rows.track.has_attitude()) {
     rows.notes.emplace_back("the track has no attitude: only the upward part of the lever arms is applied");
   }
-  rows.notes.insert(rows.notes.end(), checked.notes.begin(), checked.notes.end());
+  rows.notes.insert(rows.notes.end(), notes.begin(), notes.end());
   if (flight.n_fixes_excluded > 0) {
     rows.fixes_refused["excluded"] = flight.n_fixes_excluded;
     rows.notes.push_back(std::to_string(flight.n_fixes_excluded) + " positions were excluded by a person");
   }
+}
+
+using Between = std::map<std::pair<NetworkId, NetworkId>, std::vector<double>>;
+
+/// Ranges of the tags into `rows`, by anchor; those between anchors into what is returned.
+Between add_ranges(const FlightData& flight, const FlightOptions& options, FlightRows& rows) {
   std::map<NetworkId, AnchorRows> anchors;
   std::set<std::tuple<std::int64_t, NetworkId, std::uint8_t, NetworkId, std::optional<std::uint64_t>>> seen;
-  std::map<std::pair<NetworkId, NetworkId>, std::vector<double>> between;
+  Between between;
   for (std::size_t i = 0; i < flight.ranges.size(); ++i) {
     const Range& range = flight.ranges[i];
     if (range.kind == RangeKind::anchor_anchor) {
@@ -115,7 +105,7 @@ Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& op
       why = "duplicate";
     }
     if (why.empty()) {
-      anchor.rows.push_back({seconds_between(epoch, range.time), range.distance_m, *arm, range.tag,
+      anchor.rows.push_back({seconds_between(rows.epoch, range.time), range.distance_m, *arm, range.tag,
                              range.antenna,
                              i < flight.error_models.size() ? flight.error_models[i] : std::nullopt,
                              range.rss_dbm ? range.rss_dbm : range.rx_dbm});
@@ -131,7 +121,10 @@ Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& op
     std::ranges::stable_sort(anchor.rows, {}, &JointRow::t_s);
     rows.anchors.push_back(std::move(anchor));
   }
-  name_arms(rows);
+  return between;
+}
+
+void add_pairs(Between between, const FlightOptions& options, FlightRows& rows) {
   for (auto& [ids, distances_m] : between) {
     const auto a = std::ranges::find(rows.anchors, ids.first, &AnchorRows::id);
     const auto b = std::ranges::find(rows.anchors, ids.second, &AnchorRows::id);
@@ -143,6 +136,34 @@ Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& op
     pair.sigma_m = std::max(pair.sigma_m, 1.4826 * median(distances_m));
     rows.pairs.push_back(pair);
   }
+}
+
+}  // namespace
+
+Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& options) {
+  const TrackFrame kind = flight.mission.frame;
+  auto checked = check_track(flight.fixes, kind, options.min_fix, options.track);
+  auto& fixes = checked.fixes;
+  if (fixes.empty()) return make_error(Errc::too_few_observations, "no usable position in the track");
+  if (flight.ranges.empty()) return make_error(Errc::too_few_observations, "no ranges");
+  BOOST_OUTCOME_TRY(const auto frame,
+                    frame_of(kind == TrackFrame::wgs84 ? checked.centre : std::nullopt, options));
+  const UtcTime epoch = fixes.front().time;
+  FlightRows rows{epoch,
+                  frame,
+                  TagTrack(fixes, frame, epoch, {options.min_fix, options.max_gap_s}),
+                  {},
+                  {},
+                  {},
+                  0,
+                  std::move(checked.refused),
+                  {},
+                  checked.step_share};
+  rows.track_span_s = rows.track.poses().back().t_s - rows.track.poses().front().t_s;
+  note_track(flight, checked.notes, rows);
+  Between between = add_ranges(flight, options, rows);
+  name_arms(rows);
+  add_pairs(std::move(between), options, rows);
   return rows;
 }
 

@@ -207,9 +207,36 @@ void judge_mirrors(const FlightRows& flight, AnchorSolution& solution, const std
       estimate.v95_m, std::abs(mirror->fit.position_m.z() - estimate.best->position.m.z()) + estimate.v95_m);
 }
 
-}  // namespace
+/// Why the track has no place for ranges of an anchor that takes no part.
+void count_unplaced(const FlightRows& flight, const AnchorRows& rows, double lag_s, Estimate& estimate) {
+  for (const JointRow& row : rows.rows) {
+    const auto why = flight.track.at(row.t_s + lag_s, row.lever_arm_body_m).refused;
+    if (why != TrackRefusal::none) ++estimate.refused[std::string(to_string(why))];
+  }
+}
 
-namespace {
+/// A bias nobody knows makes the region wide and is told as what it is (gates bias and precision); geometry
+/// is to blame only for what would remain if it were known, `geometric_sigma_m`.
+void assess_geometric_sigma(double geometric_sigma_m, const GeometryReport& geometry,
+                            AnchorSolution& solution) {
+  Estimate& estimate = solution.estimate;
+  const double geometric_ratio = geometric_sigma_m / geometry.median_range_m;
+  if (geometry.kind == GeometryKind::collinear || geometric_ratio > k_sigma_ratio) {
+    estimate.verdict = Verdict::weak_geometry;
+    solution.determined = Determined::none;
+    estimate.reason =
+        geometry.kind == GeometryKind::collinear
+            ? geometry.reason
+            : text("weak geometry: horizontal sigma %.2f m at a median range of %.2f m (ratio %.3f)",
+                   geometric_sigma_m, geometry.median_range_m, geometric_ratio);
+  } else if (estimate.verdict == Verdict::ok && (geometry.line_ratio < GeometryLimits{}.line_marginal ||
+                                                 solution.geometry.sigma_ratio > k_sigma_ratio_marginal)) {
+    estimate.reason = text(
+        "near the limit of geometry: line ratio %.3f, horizontal sigma over range %.3f (limits 0.07 and "
+        "%.2f)",
+        geometry.line_ratio, solution.geometry.sigma_ratio, k_sigma_ratio);
+  }
+}
 
 AnchorSolution verdict_of(const FlightRows& flight, const JointFit& fit, std::size_t index,
                           const FlightOptions& options) {
@@ -233,13 +260,7 @@ AnchorSolution verdict_of(const FlightRows& flight, const JointFit& fit, std::si
     estimate.reason = !geometry.reason.empty() ? geometry.reason
                                                : "too few: " + std::to_string(block.n_used) +
                                                      " usable ranges, need " + std::to_string(k_min_used);
-    if (!anchor.active) {
-      for (const JointRow& row : rows.rows) {
-        const auto why =
-            flight.track.at(row.t_s + fit.state.shared[k_shared_lag], row.lever_arm_body_m).refused;
-        if (why != TrackRefusal::none) ++estimate.refused[std::string(to_string(why))];
-      }
-    }
+    if (!anchor.active) count_unplaced(flight, rows, fit.state.shared[k_shared_lag], estimate);
     return solution;
   }
   const Eigen::Matrix4d& joint = fit.anchor_covariance[index];
@@ -274,25 +295,7 @@ AnchorSolution verdict_of(const FlightRows& flight, const JointFit& fit, std::si
   const Priors priors(flight, fit, index, options);
   judge_mirrors(flight, solution, mirrors_of(flight, fit, index, geometry.shape, priors, options), geometry,
                 priors);
-  // A bias nobody knows makes the region wide and is told as what it is (gates bias and precision); geometry
-  // is to blame only for what would remain if it were known.
-  const double geometric_sigma_m = horizontal_sigma_of(known_bias_covariance(fit, index), options);
-  const double geometric_ratio = geometric_sigma_m / geometry.median_range_m;
-  if (geometry.kind == GeometryKind::collinear || geometric_ratio > k_sigma_ratio) {
-    estimate.verdict = Verdict::weak_geometry;
-    solution.determined = Determined::none;
-    estimate.reason =
-        geometry.kind == GeometryKind::collinear
-            ? geometry.reason
-            : text("weak geometry: horizontal sigma %.2f m at a median range of %.2f m (ratio %.3f)",
-                   geometric_sigma_m, geometry.median_range_m, geometric_ratio);
-  } else if (estimate.verdict == Verdict::ok && (geometry.line_ratio < GeometryLimits{}.line_marginal ||
-                                                 solution.geometry.sigma_ratio > k_sigma_ratio_marginal)) {
-    estimate.reason = text(
-        "near the limit of geometry: line ratio %.3f, horizontal sigma over range %.3f (limits 0.07 and "
-        "%.2f)",
-        geometry.line_ratio, solution.geometry.sigma_ratio, k_sigma_ratio);
-  }
+  assess_geometric_sigma(horizontal_sigma_of(known_bias_covariance(fit, index), options), geometry, solution);
   return solution;
 }
 

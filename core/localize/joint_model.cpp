@@ -78,17 +78,42 @@ double believed_share(const std::vector<JointLine>& lines,
   return std::min(1.0, allowed * curvature * std::min(1.0, curvature / variance) / claimed);
 }
 
-void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointState::Anchor& anchor,
-                  const SharedVector& shared, const FlightOptions& options, double scale_floor_m,
-                  double kept_scale_m, double common_scale_m, bool claims, AnchorBlock& block,
-                  JointNormal& normal) {
+/// What the block of one anchor is built from.
+struct AnchorTask {
+  const FlightRows& flight;
+  const AnchorRows& rows;
+  const JointState::Anchor& anchor;
+  const SharedVector& shared;
+  const FlightOptions& options;
+  double scale_floor_m{};   ///< the scale of its residuals is no less
+  double kept_scale_m{};    ///< above 0: taken for it, nothing is measured
+  double common_scale_m{};  ///< unit of the weights of eq 7.11
+  bool claims{};            ///< information as it is claimed in the end, not as the search needs it
+};
+
+void add_lines(const std::vector<JointLine>& lines, const std::vector<double>& weights, double unit,
+               AnchorBlock& block, JointNormal& normal) {
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (weights[i] <= 0) continue;
+    const double weight = weights[i] * unit;
+    const JointLine& line = lines[i];
+    block.own.noalias() += weight * line.by_anchor * line.by_anchor.transpose();
+    block.shared.noalias() += weight * line.by_anchor * line.by_shared.transpose();
+    block.gradient += weight * line.residual_m * line.by_anchor;
+    normal.shared.noalias() += weight * line.by_shared * line.by_shared.transpose();
+    normal.shared_gradient += weight * line.residual_m * line.by_shared;
+  }
+}
+
+void build_anchor(const AnchorTask& task, AnchorBlock& block, JointNormal& normal) {
+  const FlightOptions& options = task.options;
   std::vector<JointLine> lines;
   std::vector<double> sizes, times_s, position_variances;
   std::vector<const RangeErrorModel*> error_models;
   Neighbours neighbours;
-  lines.reserve(rows.rows.size());
-  for (const JointRow& row : rows.rows) {
-    JointLine line = linearise(flight.track, row, shared, anchor);
+  lines.reserve(task.rows.rows.size());
+  for (const JointRow& row : task.rows.rows) {
+    JointLine line = linearise(task.flight.track, row, task.shared, task.anchor);
     if (line.refused != TrackRefusal::none) {
       ++block.refused[std::string(to_string(line.refused))];
       continue;
@@ -107,10 +132,11 @@ void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointS
   // The MAD holds the usual position error already; only what a row has beyond that makes it count less.
   const double usual_variance_m2 = median(position_variances);
   block.usual_position_variance_m2 = usual_variance_m2;
-  block.scale_m = kept_scale_m > 0 ? kept_scale_m
-                                   : std::max({1.4826 * median(sizes), options.min_scale_m, scale_floor_m});
+  block.scale_m = task.kept_scale_m > 0
+                      ? task.kept_scale_m
+                      : std::max({1.4826 * median(sizes), options.min_scale_m, task.scale_floor_m});
   const double scale2 = block.scale_m * block.scale_m;
-  const double believed = claims ? believed_share(lines, error_models) : 1.0;
+  const double believed = task.claims ? believed_share(lines, error_models) : 1.0;
   double sum_square = 0;
   std::vector<double> weights;
   weights.reserve(lines.size());
@@ -121,7 +147,7 @@ void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointS
       // Where a model spoke, its likelihood takes the place of scale and loss; the pull is its exact slope.
       const ErrorModelValue value =
           error_model_value(*error_models[i], line.residual_m, line.position_variance_m2);
-      weight = (claims ? value.information_per_m2 : value.curvature_per_m2) * scale2;
+      weight = (task.claims ? value.information_per_m2 : value.curvature_per_m2) * scale2;
       counted = value.p_los;
       counted_m -= error_models[i]->los_bias_m;
       line.residual_m = weight > 0 ? value.score_per_m * scale2 / weight : 0.0;
@@ -131,7 +157,7 @@ void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointS
           (scale2 + std::max(line.position_variance_m2 - usual_variance_m2, 0.0)) / scale2;
       weight = robust_weight(line.residual_m / (block.scale_m * std::sqrt(widening)), options) / widening;
       if (options.weights == Weights::as_printed)
-        weight *= std::sqrt(widening) * block.scale_m / common_scale_m;
+        weight *= std::sqrt(widening) * block.scale_m / task.common_scale_m;
       counted = weight;
     }
     weights.push_back(weight);
@@ -150,17 +176,7 @@ void build_anchor(const FlightRows& flight, const AnchorRows& rows, const JointS
   block.white_share = neighbours.white_share(scale2);
   const double slow_share = k_least_slow_m * k_least_slow_m / scale2;
   block.kappa = 1.0 + (alike - 1.0) * std::clamp(slow_share, 1.0 - k_believed_white * block.white_share, 1.0);
-  const double unit = 1.0 / (block.kappa * scale2);
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    if (weights[i] <= 0) continue;
-    const double weight = weights[i] * unit;
-    const JointLine& line = lines[i];
-    block.own.noalias() += weight * line.by_anchor * line.by_anchor.transpose();
-    block.shared.noalias() += weight * line.by_anchor * line.by_shared.transpose();
-    block.gradient += weight * line.residual_m * line.by_anchor;
-    normal.shared.noalias() += weight * line.by_shared * line.by_shared.transpose();
-    normal.shared_gradient += weight * line.residual_m * line.by_shared;
-  }
+  add_lines(lines, weights, 1.0 / (block.kappa * scale2), block, normal);
 }
 
 }  // namespace
@@ -220,8 +236,10 @@ JointNormal build_normal(const FlightRows& flight, const JointState& state, cons
     AnchorBlock& block = normal.anchors[i];
     const auto& anchor = state.anchors[i];
     if (!anchor.active) continue;
-    build_anchor(flight, flight.anchors[i], anchor, state.shared, options, scale_floor_m,
-                 scales_from ? scales_from->anchors[i].scale_m : 0.0, common_scale_m, claims, block, normal);
+    const double kept_scale_m = scales_from ? scales_from->anchors[i].scale_m : 0.0;
+    build_anchor({flight, flight.anchors[i], anchor, state.shared, options, scale_floor_m, kept_scale_m,
+                  common_scale_m, claims},
+                 block, normal);
     const double delay_information = 1.0 / (options.delay_prior_m * options.delay_prior_m);
     block.own(3, 3) += delay_information;
     block.gradient[3] -= delay_information * anchor.delay_m;

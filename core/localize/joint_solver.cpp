@@ -19,6 +19,74 @@ bool has_error_models(const FlightRows& flight) {
   });
 }
 
+/// How an anchor went in the rounds before.
+struct Pace {
+  Eigen::Vector3d last_m{0, 0, 0};
+  double share{1.0};
+};
+
+/// One step of everything, on the normal equations of `fit`; the largest of its parts.
+double take_step(const FlightRows& flight, const SharedPrior& prior, const FlightOptions& options,
+                 std::vector<Pace>& paces, JointFit& fit) {
+  const JointNormal& normal = fit.normal;
+  const bool coupled = !flight.pairs.empty();
+  Eigen::VectorXd all_steps;
+  SharedVector step;
+  if (coupled) {
+    const DenseNormal dense = dense_normal(flight, fit.state, normal, prior, options);
+    all_steps = dense.matrix.ldlt().solve(dense.gradient);
+    step = all_steps.tail<k_shared_size>();
+  } else {
+    const SharedMatrix system = normal.reduced + prior.information;
+    step = system.ldlt().solve(normal.reduced_gradient + prior.information * (prior.mean - fit.state.shared));
+  }
+  if (!step.allFinite()) step.setZero();
+  step[k_shared_bias] = clipped(step[k_shared_bias], 0.5);
+  step[k_shared_curve] = clipped(step[k_shared_curve], 0.05);
+  step[k_shared_lag] = clipped(step[k_shared_lag], 0.1);
+  for (int arm = k_shared_lever; arm < k_shared_size; ++arm) step[arm] = clipped(step[arm], 0.1);
+  double largest = step.cwiseAbs().maxCoeff();
+  for (std::size_t i = 0; i < fit.state.anchors.size(); ++i) {
+    auto& anchor = fit.state.anchors[i];
+    if (!anchor.active) continue;
+    const AnchorBlock& block = normal.anchors[i];
+    Eigen::Vector4d own = coupled ? Eigen::Vector4d(all_steps.segment<4>(4 * static_cast<Eigen::Index>(i)))
+                                  : block.own_inverse * (block.gradient - block.shared * step);
+    const double length = own.head<3>().norm();
+    if (!own.allFinite()) continue;
+    if (length > 1.0) own *= 1.0 / length;
+    // Height near the plane of the track: the full step overshoots to the other side and back, for ever.
+    Pace& pace = paces[i];
+    pace.share = own.head<3>().dot(pace.last_m) < 0 ? 0.5 * pace.share : std::min(1.0, 1.5 * pace.share);
+    pace.last_m = own.head<3>();
+    own *= pace.share;
+    anchor.position_m += own.head<3>();
+    anchor.delay_m += own[3];
+    largest = std::max(largest, own.cwiseAbs().maxCoeff());
+  }
+  fit.state.shared += step;
+  return largest;
+}
+
+/// Of the anchors and of what they share, from the normal equations of the answer.
+void fill_covariances(const FlightRows& flight, const SharedPrior& prior, const FlightOptions& options,
+                      JointFit& fit) {
+  if (!flight.pairs.empty()) {
+    const DenseNormal dense = dense_normal(flight, fit.state, fit.normal, prior, options);
+    const Eigen::Index n = dense.matrix.rows() - k_shared_size;
+    const Eigen::MatrixXd covariance = dense.matrix.inverse();
+    fit.shared_covariance = covariance.bottomRightCorner<k_shared_size, k_shared_size>();
+    fit.normal.reduced = fit.shared_covariance.inverse() - prior.information;
+    for (Eigen::Index i = 0; i < n; i += 4) fit.anchor_covariance.emplace_back(covariance.block<4, 4>(i, i));
+    return;
+  }
+  fit.shared_covariance = (fit.normal.reduced + prior.information).inverse();
+  for (const AnchorBlock& block : fit.normal.anchors) {
+    const Eigen::Matrix<double, 4, k_shared_size> lever = block.own_inverse * block.shared;
+    fit.anchor_covariance.push_back(block.own_inverse + lever * fit.shared_covariance * lever.transpose());
+  }
+}
+
 }  // namespace
 
 Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, const SharedPrior& prior,
@@ -31,10 +99,6 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
   const bool by_ceres =
       options.method != Method::gauss_newton && flight.pairs.empty() && !has_error_models(flight);
   const int most_rounds = by_ceres ? 5 : k_max_rounds;
-  struct Pace {
-    Eigen::Vector3d last_m{0, 0, 0};
-    double share{1.0};
-  };
   std::vector<Pace> paces(start.anchors.size());
   for (fit.rounds = 0; fit.rounds < most_rounds && !fit.converged; ++fit.rounds) {
     if (options.canceled && options.canceled()) return make_error(Errc::canceled, "canceled");
@@ -43,44 +107,7 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
     // Scales measured anew in every round would keep the last millimetres wandering.
     fit.normal = build_normal(flight, fit.state, options, floor_m,
                               fit.rounds > k_scale_rounds ? &fit.normal : nullptr);
-    const JointNormal& normal = fit.normal;
-    const bool coupled = !flight.pairs.empty();
-    Eigen::VectorXd all_steps;
-    SharedVector step;
-    if (coupled) {
-      const DenseNormal dense = dense_normal(flight, fit.state, normal, prior, options);
-      all_steps = dense.matrix.ldlt().solve(dense.gradient);
-      step = all_steps.tail<k_shared_size>();
-    } else {
-      const SharedMatrix system = normal.reduced + prior.information;
-      step =
-          system.ldlt().solve(normal.reduced_gradient + prior.information * (prior.mean - fit.state.shared));
-    }
-    if (!step.allFinite()) step.setZero();
-    step[k_shared_bias] = clipped(step[k_shared_bias], 0.5);
-    step[k_shared_curve] = clipped(step[k_shared_curve], 0.05);
-    step[k_shared_lag] = clipped(step[k_shared_lag], 0.1);
-    for (int arm = k_shared_lever; arm < k_shared_size; ++arm) step[arm] = clipped(step[arm], 0.1);
-    double largest = step.cwiseAbs().maxCoeff();
-    for (std::size_t i = 0; i < fit.state.anchors.size(); ++i) {
-      auto& anchor = fit.state.anchors[i];
-      if (!anchor.active) continue;
-      const AnchorBlock& block = normal.anchors[i];
-      Eigen::Vector4d own = coupled ? Eigen::Vector4d(all_steps.segment<4>(4 * static_cast<Eigen::Index>(i)))
-                                    : block.own_inverse * (block.gradient - block.shared * step);
-      const double length = own.head<3>().norm();
-      if (!own.allFinite()) continue;
-      if (length > 1.0) own *= 1.0 / length;
-      // Height near the plane of the track: the full step overshoots to the other side and back, for ever.
-      Pace& pace = paces[i];
-      pace.share = own.head<3>().dot(pace.last_m) < 0 ? 0.5 * pace.share : std::min(1.0, 1.5 * pace.share);
-      pace.last_m = own.head<3>();
-      own *= pace.share;
-      anchor.position_m += own.head<3>();
-      anchor.delay_m += own[3];
-      largest = std::max(largest, own.cwiseAbs().maxCoeff());
-    }
-    fit.state.shared += step;
+    const double largest = take_step(flight, prior, options, paces, fit);
     // 0.1 mm; what still moves after many rounds is a direction nothing measures, and its covariance says so.
     const double enough = fit.rounds < 25 ? 1e-4 : 1e-3;
     fit.converged = fit.rounds >= 3 && largest < enough;
@@ -96,20 +123,7 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
                       polish_joint_ceres(flight, std::move(fit.state), prior, options, fit.converged, kept));
   }
   fit.normal = build_normal(flight, fit.state, options, 0.0, kept, true);
-  if (!flight.pairs.empty()) {
-    const DenseNormal dense = dense_normal(flight, fit.state, fit.normal, prior, options);
-    const Eigen::Index n = dense.matrix.rows() - k_shared_size;
-    const Eigen::MatrixXd covariance = dense.matrix.inverse();
-    fit.shared_covariance = covariance.bottomRightCorner<k_shared_size, k_shared_size>();
-    fit.normal.reduced = fit.shared_covariance.inverse() - prior.information;
-    for (Eigen::Index i = 0; i < n; i += 4) fit.anchor_covariance.emplace_back(covariance.block<4, 4>(i, i));
-    return fit;
-  }
-  fit.shared_covariance = (fit.normal.reduced + prior.information).inverse();
-  for (const AnchorBlock& block : fit.normal.anchors) {
-    const Eigen::Matrix<double, 4, k_shared_size> lever = block.own_inverse * block.shared;
-    fit.anchor_covariance.push_back(block.own_inverse + lever * fit.shared_covariance * lever.transpose());
-  }
+  fill_covariances(flight, prior, options, fit);
   return fit;
 }
 

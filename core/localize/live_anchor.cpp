@@ -67,6 +67,69 @@ double scale_of(const std::vector<double>& residuals) {
   return std::max(1.4826 * *middle, 0.02);
 }
 
+/// The answer, and its mirror solution where that is another place.
+struct Answers {
+  AnchorFit best;
+  std::optional<AnchorFit> mirror;
+  double worse{
+      0};  ///< of the mirror: tempered likelihood ratio, and what the flight's priors hold against it
+};
+
+Answers with_mirror(const AnchorFit& found, const std::vector<Observation>& rows,
+                    const GeometryReport& geometry, const SolverOptions& settings, double inflate,
+                    const AnchorPriors* priors) {
+  Answers out{found, std::nullopt, 0};
+  const auto mirror = solve_anchor_gauss_newton(rows, geometry.shape.mirrored(found.position_m), settings);
+  if (!mirror || !((mirror.value().position_m - found.position_m).norm() > 0.4)) return out;
+  out.mirror = mirror.value();
+  out.worse = std::max(out.mirror->cost - out.best.cost, 0.0) / inflate;
+  if (priors != nullptr)
+    out.worse +=
+        prior_cost(*priors, {}, 1, out.mirror->position_m) - prior_cost(*priors, {}, 1, out.best.position_m);
+  if (out.worse < 0) {
+    std::swap(out.best, *out.mirror);
+    out.worse = -out.worse;
+  }
+  return out;
+}
+
+Hypothesis hypothesis_of(const AnchorFit& fit, double inflate) {
+  Hypothesis h;
+  h.position.m = fit.position_m;
+  h.covariance_m2 =
+      fit.covariance_m2 * inflate + Eigen::Matrix3d::Identity() * k_floor_sigma_m * k_floor_sigma_m;
+  h.rms_residual_m = rms(fit.residuals_m);
+  return h;
+}
+
+/// The radii of the best place; where they are too large the geometry is weak.
+void assess_precision(const GeometryReport& geometry, Estimate& estimate) {
+  const ErrorEllipse ellipse = error_ellipse(estimate.best->covariance_m2);
+  estimate.h95_m = ellipse.h95_m;
+  estimate.v95_m = ellipse.v95_m;
+  const double limit_m = k_weak_share * geometry.median_range_m;
+  const bool collinear = geometry.kind == GeometryKind::collinear;
+  if (!collinear && std::max(ellipse.h95_m, ellipse.v95_m) <= limit_m) return;
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "weak geometry: 95 %% within %.2f m horizontally and %.2f m vertically at a median range of "
+                "%.2f m",
+                ellipse.h95_m, ellipse.v95_m, geometry.median_range_m);
+  estimate.verdict = Verdict::weak_geometry;
+  estimate.reason = collinear ? geometry.reason : text;
+}
+
+void fill_gdop(const std::vector<Observation>& rows, const Eigen::Vector3d& anchor_m, Estimate& estimate) {
+  std::vector<Eigen::Vector3d> places;
+  for (const auto& row : rows) places.push_back(row.tag_m);
+  estimate.gdop.reset();
+  estimate.gdop_trace.reset();
+  if (const auto gdop = planning::gdop(anchor_m, places)) {
+    estimate.gdop = gdop.value().root;
+    estimate.gdop_trace = gdop.value().trace;
+  }
+}
+
 }  // namespace
 
 bool LiveAnchor::add(const Observation& row, UtcTime time, const LiveOptions& options, bool held) {
@@ -128,8 +191,9 @@ void LiveAnchor::search(const LiveOptions& options) {
   }
 }
 
-void LiveAnchor::describe(const LiveOptions& options) {
-  const GeometryReport geometry = assess_geometry(rows_);
+/// Verdict and reason where the rows are too few or the track pins nothing down; false: nothing is to be
+/// solved.
+bool LiveAnchor::can_be_solved(const GeometryReport& geometry) {
   estimate_.mirror.reset();
   estimate_.best.reset();
   estimate_.reason = geometry.reason;
@@ -137,13 +201,18 @@ void LiveAnchor::describe(const LiveOptions& options) {
   if (geometry.kind == GeometryKind::too_few || rows_.size() < 5) {
     if (geometry.kind != GeometryKind::too_few)
       estimate_.reason = "too few: " + std::to_string(rows_.size()) + " ranges, need 5";
-    return;
+    return false;
   }
   // A search that settles nowhere on a track that pins nothing down is the track's fault, not the ranges'.
   const bool weak = geometry.kind != GeometryKind::good;
   estimate_.verdict = weak ? Verdict::weak_geometry : Verdict::diverged;
   if (!weak) estimate_.reason = "no position explains these ranges together";
-  if (!position_m_) return;
+  return position_m_.has_value();
+}
+
+void LiveAnchor::describe(const LiveOptions& options) {
+  const GeometryReport geometry = assess_geometry(rows_);
+  if (!can_be_solved(geometry)) return;
   const SolverOptions settings = solver_options(options, options.bias_m);
   const auto rows = every_nth(rows_, 600);
   const auto fit = solve_anchor_gauss_newton(rows, *position_m_, settings);
@@ -152,74 +221,34 @@ void LiveAnchor::describe(const LiveOptions& options) {
     if (estimate_.reason.empty()) estimate_.reason = fit.error().message;
     return;
   }
-  AnchorFit best = fit.value();
   // The same tempering as the batch solve: two correlation times are one independent look.
-  const double scale_m = scale_of(best.residuals_m);
+  const double scale_m = scale_of(fit.value().residuals_m);
   const double duration_s = std::max(seconds_between(*first_, *newest_), 1.0);
   const double looks = std::max(duration_s / (2.0 * k_error_correlation_s), 1.0);
   const double inflate = std::max(static_cast<double>(rows.size()) / looks, 1.0) *
                          std::max(scale_m * scale_m / (options.range_sigma_m * options.range_sigma_m), 0.1);
-  auto mirror = solve_anchor_gauss_newton(rows, geometry.shape.mirrored(best.position_m), settings);
-  const bool two = mirror && (mirror.value().position_m - best.position_m).norm() > 0.4;
-  double worse =
-      0;  // of the mirror solution: tempered likelihood ratio, and what the flight's priors hold against it
-  if (two) {
-    worse = std::max(mirror.value().cost - best.cost, 0.0) / inflate;
-    if (const auto told = options.priors.find(estimate_.anchor); told != options.priors.end())
-      worse += prior_cost(told->second, {}, 1, mirror.value().position_m) -
-               prior_cost(told->second, {}, 1, best.position_m);
-    if (worse < 0) {
-      std::swap(best, mirror.value());
-      worse = -worse;
-    }
-  }
-  position_m_ = best.position_m;
-  bias_m_ = best.bias_m;
-  estimate_.bias_m = best.bias_m;
-  estimate_.bias_sigma_m = best.bias_sigma_m;
-  const auto hypothesis = [&](const AnchorFit& f) {
-    Hypothesis h;
-    h.position.m = f.position_m;
-    h.covariance_m2 =
-        f.covariance_m2 * inflate + Eigen::Matrix3d::Identity() * k_floor_sigma_m * k_floor_sigma_m;
-    h.rms_residual_m = rms(f.residuals_m);
-    return h;
-  };
-  estimate_.best = hypothesis(best);
+  const auto told = options.priors.find(estimate_.anchor);
+  const Answers answers = with_mirror(fit.value(), rows, geometry, settings, inflate,
+                                      told == options.priors.end() ? nullptr : &told->second);
+  position_m_ = answers.best.position_m;
+  bias_m_ = answers.best.bias_m;
+  estimate_.bias_m = answers.best.bias_m;
+  estimate_.bias_sigma_m = answers.best.bias_sigma_m;
+  estimate_.best = hypothesis_of(answers.best, inflate);
   estimate_.verdict = Verdict::ok;
   estimate_.reason.clear();
-  if (two) {
-    const double odds = std::exp(-std::min(worse, 700.0));
+  if (answers.mirror) {
+    const double odds = std::exp(-std::min(answers.worse, 700.0));
     if (odds > 0.01) {
-      estimate_.mirror = hypothesis(mirror.value());
+      estimate_.mirror = hypothesis_of(*answers.mirror, inflate);
       estimate_.mirror->probability = odds / (1.0 + odds);
       estimate_.best->probability = 1.0 / (1.0 + odds);
       estimate_.verdict = Verdict::ambiguous;
       estimate_.reason = geometry.reason.empty() ? "mirror: another solution fits as well" : geometry.reason;
     }
   }
-  const ErrorEllipse ellipse = error_ellipse(estimate_.best->covariance_m2);
-  estimate_.h95_m = ellipse.h95_m;
-  estimate_.v95_m = ellipse.v95_m;
-  const double limit_m = k_weak_share * geometry.median_range_m;
-  if (geometry.kind == GeometryKind::collinear || std::max(ellipse.h95_m, ellipse.v95_m) > limit_m) {
-    char text[160];
-    std::snprintf(
-        text, sizeof text,
-        "weak geometry: 95 %% within %.2f m horizontally and %.2f m vertically at a median range of "
-        "%.2f m",
-        ellipse.h95_m, ellipse.v95_m, geometry.median_range_m);
-    estimate_.verdict = Verdict::weak_geometry;
-    estimate_.reason = geometry.kind == GeometryKind::collinear ? geometry.reason : text;
-  }
-  std::vector<Eigen::Vector3d> places;
-  for (const auto& row : rows) places.push_back(row.tag_m);
-  estimate_.gdop.reset();
-  estimate_.gdop_trace.reset();
-  if (const auto gdop = planning::gdop(best.position_m, places)) {
-    estimate_.gdop = gdop.value().root;
-    estimate_.gdop_trace = gdop.value().trace;
-  }
+  assess_precision(geometry, estimate_);
+  fill_gdop(rows, answers.best.position_m, estimate_);
 }
 
 Estimate LiveAnchor::estimate(const std::optional<EnuFrame>& frame) const {

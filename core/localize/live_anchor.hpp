@@ -13,6 +13,7 @@
 namespace anchord {
 
 struct AnchorSolution;
+struct GeometryReport;
 struct SharedSolution;
 
 /// One anchor of a live flight: its rows as received, thinned to a bound, and its warm estimate: an own
@@ -41,6 +42,7 @@ class LiveAnchor {
  private:
   void thin(std::size_t max_rows);
   void search(const LiveOptions& options);
+  bool can_be_solved(const GeometryReport& geometry);
   void describe(const LiveOptions& options);
   void refine();
 

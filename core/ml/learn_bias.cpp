@@ -193,55 +193,64 @@ std::vector<double> weighted_class_medians(const Dataset& data, const std::vecto
   return out;
 }
 
-}  // namespace
+/// Asks whether to stop, and says where the work is.
+bool cancelled(const LearnOptions& options, const char* stage, double share) {
+  if (options.progress) options.progress(share, stage);
+  return options.run.cancelled();
+}
 
-Result<Learned> learn_bias_mixture(const Dataset& data, const LearnOptions& options,
-                                   const std::vector<std::size_t>& fold) {
-  LearnOptions identify = options;
-  identify.task = Task::nlos_id;
-  BOOST_OUTCOME_TRY(auto out, learn_class(data, identify, fold));
-  const auto cancelled = [&](const char* stage, double share) {
-    if (options.progress) options.progress(share, stage);
-    return options.run.cancelled();
-  };
-
-  // Shared curve by held-out LOS rows; a constant unless a curve is clearly better.
-  Shape best_shape;
-  BOOST_OUTCOME_TRY(double best_loss, los_loss(data, fold, best_shape));
+/// Shared curve by held-out LOS rows; a constant unless a curve is clearly better.
+Result<Shape> choose_curve(const Dataset& data, const LearnOptions& options,
+                           const std::vector<std::size_t>& fold) {
+  Shape best;
+  BOOST_OUTCOME_TRY(double best_loss, los_loss(data, fold, best));
   for (const auto& names : {std::vector<std::string>{"range_m", "range_db"},
                             std::vector<std::string>{"range_m", "fp_dbm", "noise_excess_db"}}) {
     if (indices_of(data, names).size() != names.size()) continue;
     for (const double kappa : {0.5, 1.0}) {
-      if (cancelled("shared bias", 0.2)) return make_error(Errc::canceled, "cancelled");
+      if (cancelled(options, "shared bias", 0.2)) return make_error(Errc::canceled, "cancelled");
       BOOST_OUTCOME_TRY(const double loss, los_loss(data, fold, {names, kappa, {}}));
       if (loss < best_loss * 0.98) {
         best_loss = loss;
-        best_shape = {names, kappa, {}};
+        best = {names, kappa, {}};
       }
     }
   }
+  return best;
+}
 
-  // Every row's density from folds without it; the likelihood beside that of constants.
-  const auto weight = placement_weights(data);
-  double los_share = 0, total = 0;
+double los_share(const Dataset& data, const std::vector<double>& weight) {
+  double los = 0, total = 0;
   for (std::size_t i = 0; i < data.rows(); ++i) {
-    los_share += weight[i] * data.los[i];
+    los += weight[i] * data.los[i];
     total += weight[i];
   }
-  const std::vector<double> base_rate(data.rows(), los_share / total);
-  if (cancelled("constants", 0.3)) return make_error(Errc::canceled, "cancelled");
-  BOOST_OUTCOME_TRY(const auto constants, out_of_fold(data, base_rate, fold, {}, options.run));
-  out.nll_constants = mean_nll(data, constants, weight);
-  BOOST_OUTCOME_TRY(auto tails, likely_tails(data, out.p_los, fold, best_shape, out.nll_constants, options));
+  return los / total;
+}
 
-  // Which tail, and how much of it to apply: the least mean error among those that do no place more than 2 cm
-  // of harm. Where that would throw most of the saving away, the harm is priced instead. Nothing at all is
-  // among the choices.
-  std::vector<CandidateRow> table{
-      bias_row(data, "none (no correction)", std::vector<double>(data.rows(), 0.0)),
-      bias_row(data, "class medians weighted by P(LOS)", weighted_class_medians(data, out.p_los, fold))};
-  const double raw_mae = table.front().error.mae_m;
-  Choice harmless{0, 0, 0.5, 0, raw_mae, {}}, priced{0, 0, 0.5, 0, raw_mae, {}};
+/// What was tried, and the two that may be used.
+struct Tried {
+  std::vector<CandidateRow> table;
+  Choice harmless, priced;
+
+  double mae_m(const Choice& choice) const { return table[choice.row].error.mae_m; }
+  /// The saving of the harmless one is most of what there is.
+  bool no_harm() const {
+    const double raw = table.front().error.mae_m;
+    return raw - mae_m(harmless) >= k_kept_saving * (raw - mae_m(priced));
+  }
+};
+
+/// Which tail, and how much of it to apply: the least mean error among those that do no place more than 2 cm
+/// of harm. Where that would throw most of the saving away, the harm is priced instead. Nothing at all is
+/// among the choices.
+Tried try_tails(const Dataset& data, const std::vector<double>& p_los, const std::vector<std::size_t>& fold,
+                const std::vector<Tail>& tails) {
+  Tried out;
+  out.table = {bias_row(data, "none (no correction)", std::vector<double>(data.rows(), 0.0)),
+               bias_row(data, "class medians weighted by P(LOS)", weighted_class_medians(data, p_los, fold))};
+  const double raw_mae = out.table.front().error.mae_m;
+  out.harmless = out.priced = Choice{0, 0, 0.5, 0, raw_mae, {}};
   for (std::size_t t = 0; t < tails.size(); ++t) {
     for (const double q : k_quantiles) {
       std::vector<double> whole;
@@ -250,68 +259,92 @@ Result<Learned> learn_bias_mixture(const Dataset& data, const LearnOptions& opti
         if (gain == 0) continue;
         std::vector<double> correction;
         for (const double v : whole) correction.push_back(gain * v);
-        table.push_back(bias_row(
+        out.table.push_back(bias_row(
             data,
             "mixture of " + joined(tails[t].features) + ", quantile " + fixed(q) + ", gain " + fixed(gain),
             correction));
-        const auto& row = table.back();
+        const auto& row = out.table.back();
         const double cost = row.error.mae_m + k_harm_price * std::max(0.0, row.worst_harm_m - k_harmless_m);
-        const Choice one{table.size() - 1, t, q, gain, cost, std::move(correction)};
+        const Choice one{out.table.size() - 1, t, q, gain, cost, std::move(correction)};
         // A less likely tail must correct clearly better.
         const auto better = [&](const Choice& than) {
           return cost < (than.tail == t ? than.cost : 0.99 * than.cost) - 1e-4;
         };
-        if (row.worst_harm_m <= k_harmless_m && better(harmless)) harmless = one;
-        if (better(priced)) priced = one;
+        if (row.worst_harm_m <= k_harmless_m && better(out.harmless)) out.harmless = one;
+        if (better(out.priced)) out.priced = one;
       }
     }
   }
-  const double saved = raw_mae - table[harmless.row].error.mae_m;
-  const bool no_harm = saved >= k_kept_saving * (raw_mae - table[priced.row].error.mae_m);
-  Choice& best = no_harm ? harmless : priced;
-  const std::size_t best_row = best.row;
-  const double best_q = best.quantile, best_gain = best.gain;
-  best_shape.tail = tails[best.tail].features;
-  out.nll = tails[best.tail].nll;
-  out.correction_m = std::move(best.correction_m);
-  if (out.correction_m.empty()) out.correction_m.assign(data.rows(), 0.0);
-  table[best_row].picked = true;
+  return out;
+}
+
+/// The mixture that is deployed, on every row. The model sees the classifier's own feature columns, so the
+/// mixture's names join them.
+Result<BiasMixture> fit_deployed(const Dataset& data, const Shape& shape, Learned& out) {
   std::vector<std::size_t> all(data.rows());
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
-  // The deployed model sees the classifier's own feature columns, so the mixture's names join them.
-  std::vector<std::string> features = out.model.info.features;
-  std::vector<std::string> wanted = best_shape.shared;
-  wanted.insert(wanted.end(), best_shape.tail.begin(), best_shape.tail.end());
+  std::vector<std::string>& features = out.model.info.features;
+  std::vector<std::string> wanted = shape.shared;
+  wanted.insert(wanted.end(), shape.tail.begin(), shape.tail.end());
   for (const auto& name : wanted)
     if (!indices_of(data, {name}).empty() &&
         std::find(features.begin(), features.end(), name) == features.end())
       features.push_back(name);
   BOOST_OUTCOME_TRY(const auto narrowed, data.with_features(features));
-  BOOST_OUTCOME_TRY(auto mixture, fit_on(narrowed, out.p_los, all, best_shape));
-  mixture.quantile = best_q;
-  mixture.gain = best_gain;
+  return fit_on(narrowed, out.p_los, all, shape);
+}
 
+void explain(const Shape& shape, const Choice& best, const Tried& tried, Learned& out) {
   auto& info = out.model.info;
-  info.features = features;
-  info.why += "; bias: mixture, shared curve " +
-              (best_shape.shared.empty()
-                   ? std::string{"constant"}
-                   : "of " + best_shape.shared.front() + " and others, kappa " + fixed(best_shape.kappa)) +
-              "; late by " + joined(best_shape.tail) + "; quantile " + fixed(best_q) + " and gain " +
-              fixed(best_gain) +
-              (no_harm ? " had the least held-out error of those that harm no place by more than 2 cm"
+  info.why +=
+      "; bias: mixture, shared curve " +
+      (shape.shared.empty() ? std::string{"constant"}
+                            : "of " + shape.shared.front() + " and others, kappa " + fixed(shape.kappa)) +
+      "; late by " + joined(shape.tail) + "; quantile " + fixed(best.quantile) + " and gain " +
+      fixed(best.gain) +
+      (tried.no_harm() ? " had the least held-out error of those that harm no place by more than 2 cm"
                        : " had the least held-out error with harm beyond 2 cm priced in");
-  const auto raw = table.front().error, corrected = table[best_row].error;
+  const auto raw = tried.table.front().error, corrected = tried.table[best.row].error;
   info.metrics.insert(info.metrics.end(), {{"mae_raw_m", raw.mae_m},
                                            {"mae_m", corrected.mae_m},
                                            {"mse_raw_m2", raw.mse_m2},
                                            {"mse_m2", corrected.mse_m2},
-                                           {"worst_place_harm_m", table[best_row].worst_harm_m},
+                                           {"worst_place_harm_m", tried.table[best.row].worst_harm_m},
                                            {"nll", out.nll},
                                            {"nll_constants", out.nll_constants}});
+}
+
+}  // namespace
+
+Result<Learned> learn_bias_mixture(const Dataset& data, const LearnOptions& options,
+                                   const std::vector<std::size_t>& fold) {
+  LearnOptions identify = options;
+  identify.task = Task::nlos_id;
+  BOOST_OUTCOME_TRY(auto out, learn_class(data, identify, fold));
+  BOOST_OUTCOME_TRY(auto shape, choose_curve(data, options, fold));
+
+  // Every row's density from folds without it; the likelihood beside that of constants.
+  const auto weight = placement_weights(data);
+  const std::vector<double> base_rate(data.rows(), los_share(data, weight));
+  if (cancelled(options, "constants", 0.3)) return make_error(Errc::canceled, "cancelled");
+  BOOST_OUTCOME_TRY(const auto constants, out_of_fold(data, base_rate, fold, {}, options.run));
+  out.nll_constants = mean_nll(data, constants, weight);
+  BOOST_OUTCOME_TRY(const auto tails, likely_tails(data, out.p_los, fold, shape, out.nll_constants, options));
+
+  Tried tried = try_tails(data, out.p_los, fold, tails);
+  Choice best = tried.no_harm() ? tried.harmless : tried.priced;
+  shape.tail = tails[best.tail].features;
+  out.nll = tails[best.tail].nll;
+  out.correction_m = std::move(best.correction_m);
+  if (out.correction_m.empty()) out.correction_m.assign(data.rows(), 0.0);
+  BOOST_OUTCOME_TRY(auto mixture, fit_deployed(data, shape, out));
+  mixture.quantile = best.quantile;
+  mixture.gain = best.gain;
+  explain(shape, best, tried, out);
   out.model.mixture = std::move(mixture);
   out.class_table = std::move(out.table);
-  out.table = std::move(table);
+  out.table = std::move(tried.table);
+  out.table[best.row].picked = true;
   out.folds.clear();
   return out;
 }

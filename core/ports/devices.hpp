@@ -9,6 +9,7 @@
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
 #include "core/types/base_station.hpp"
+#include "core/types/document.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/range.hpp"
 
@@ -19,8 +20,8 @@ struct DeviceConfig {
   Uuid id{};
   std::string kind;  ///< gnss, pozyx, ntrip
   std::string name;
-  std::string address;  ///< serial:..., tcp://..., tcp-listen://..., udp://...
-  std::string options_json{"{}"};
+  std::string address;     ///< serial:..., tcp://..., tcp-listen://..., udp://...
+  Document options{"{}"};  ///< object of its kind: drivers/device/make_driver
   bool enabled{true};
   std::uint64_t version{1};  ///< for ETag
 };

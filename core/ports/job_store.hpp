@@ -10,6 +10,7 @@
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
 #include "core/base/time.hpp"
+#include "core/types/document.hpp"
 
 namespace anchord {
 
@@ -25,7 +26,8 @@ struct Job {
   std::string kind;
   JobState state{JobState::queued};
   double fraction{0};
-  std::string stage, detail, result_href, problem_json, request_json;
+  std::string stage, detail, result_href;
+  Document problem, request;  ///< api/admin/job_service
   UtcTime created{};
   std::optional<UtcTime> started{}, finished{};
 };
@@ -39,7 +41,7 @@ class JobStore {
   virtual Result<std::vector<Job>> jobs(std::size_t limit,
                                         const std::optional<JobId>& after) = 0;  ///< newest first
   /// Queued and running jobs become failed with this problem; says how many.
-  virtual Result<std::size_t> fail_unfinished(UtcTime now, std::string_view problem_json) = 0;
+  virtual Result<std::size_t> fail_unfinished(UtcTime now, const Document& problem) = 0;
 };
 
 }  // namespace anchord

@@ -11,6 +11,7 @@
 #include "core/base/result.hpp"
 #include "core/ports/measurement_limits.hpp"
 #include "core/types/campaign_record.hpp"
+#include "core/types/document.hpp"
 
 /// What learning keeps: campaigns, frozen data sets, training runs, models and who promoted them. The rules
 /// of core/ports/measurement_store.hpp hold: writes return after the fsync, callable from any thread, lists
@@ -88,8 +89,8 @@ class LabelStore {
 /// A frozen query: its rows never change, and its digest proves it.
 struct DatasetRecord {
   DatasetId id{};
-  std::string name;  ///< unique
-  std::string query_json, report_json;
+  std::string name;        ///< unique
+  Document query, report;  ///< api/learning/freeze_rows
   std::string digest;
   std::uint64_t n_train{}, n_test{};
   UtcTime created{};
@@ -113,9 +114,9 @@ struct StoredModel {
   ModelId id{};
   std::string task;  ///< nlos_id, los_bias, nlos_bias, bias
   std::string method;
-  std::string sha256_hex;     ///< of the artifact
-  std::string manifest_json;  ///< of the artifact: features, scaler, data digest, seed, metrics
-  std::string signature{};    ///< of this server's key over the artifact; empty: nobody vouches for it
+  std::string sha256_hex;   ///< of the artifact
+  Document manifest;        ///< of the artifact: features, scaler, data digest, seed, metrics
+  std::string signature{};  ///< of this server's key over the artifact; empty: nobody vouches for it
   std::optional<TrainingRunId> run{};  ///< absent: uploaded
   UtcTime created{};
   std::string created_by;
@@ -125,8 +126,8 @@ struct TrainingRun {
   TrainingRunId id{};  ///< its job has the same
   DatasetId dataset{};
   std::string task;
-  std::string request_json;
-  std::string summary_json;  ///< empty until it has succeeded
+  Document request;
+  Document summary;  ///< empty until it has succeeded
   std::optional<ModelId> model{};
   UtcTime created{};
   std::string created_by;
@@ -141,7 +142,7 @@ class TrainingRunStore {
   virtual Result<std::vector<TrainingRun>> runs(std::size_t limit, const std::optional<TrainingRunId>& after,
                                                 const std::optional<std::string>& task = {}) = 0;
   /// Results, model and link between them in one transaction: there is a whole run or none.
-  virtual Result<void> finish(const TrainingRunId& id, std::string_view summary_json,
+  virtual Result<void> finish(const TrainingRunId& id, const Document& summary,
                               const std::map<std::string, std::string>& parts, const StoredModel& model,
                               std::string_view artifact) = 0;
   /// One part of the results ("folds", "grid", ...). not_found where the run has none of that name.

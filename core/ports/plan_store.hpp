@@ -9,6 +9,7 @@
 
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
+#include "core/types/document.hpp"
 #include "core/types/plan.hpp"
 
 namespace anchord {
@@ -18,7 +19,7 @@ struct StoredPlan {
   PlanId id{};
   std::string name;
   std::optional<SiteId> site{};
-  std::string document_json;
+  Document document;  ///< api/planning/plan_json
   UtcTime created{}, changed{};
   std::uint64_t version{1};
 };

@@ -6,6 +6,7 @@
 
 #include "core/base/ids.hpp"
 #include "core/base/time.hpp"
+#include "core/types/document.hpp"
 #include "core/types/estimate.hpp"
 
 namespace anchord {
@@ -43,13 +44,13 @@ struct Calibration {
   std::vector<MissionId> missions;
   TrackFrame frame{TrackFrame::wgs84};
   std::optional<Wgs84> origin{};  ///< of the ENU numbers
-  std::string settings_json;      ///< the request as accepted
+  Document settings;              ///< the request as accepted
   UtcTime created{};
   std::vector<Estimate> anchors;
-  std::string provenance_json{"{}"};  ///< profile, models, base, and what each flight said
+  Document provenance{"{}"};  ///< profile, models, base, and what each flight said
   /// Residuals and the course of the estimate, for the report. Large: read back by AnchorStore::evidence
   /// alone.
-  std::string evidence_json;
+  Document evidence;
 };
 
 /// A person published an anchor although a gate failed.

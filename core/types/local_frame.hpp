@@ -5,6 +5,7 @@
 
 #include "core/base/ids.hpp"
 #include "core/base/time.hpp"
+#include "core/types/document.hpp"
 
 namespace anchord {
 
@@ -13,19 +14,19 @@ struct LocalFrame {
   FrameId id{};
   std::string name;
   std::optional<SiteId> site{};
-  std::string definition_json{"{}"};  ///< pairs and their fit; api/anchors/frame_json reads and writes it
+  Document definition{"{}"};  ///< pairs and their fit: api/anchors/frame_json
   UtcTime created{};
   std::uint64_t version{1};  ///< for ETag
 };
 
-/// One state of a kit's calibration; api/calibration/kit_profile_json reads the text.
+/// One state of a kit's calibration.
 struct StoredProfile {
   std::string kit;
   std::uint64_t version{};  ///< from 1; for ETag
   UtcTime time{};
   std::string by;      ///< token id, or empty for the server itself
   std::string source;  ///< "put", or "calibration <id>"
-  std::string profile_json;
+  Document profile;    ///< api/calibration/kit_profile_json
 };
 
 }  // namespace anchord

@@ -229,6 +229,31 @@ PozyxDevice::Answer PozyxDevice::impulse(ByteView parameters) const {
   return answer;
 }
 
+/// Offset, bytes; the newest write ends the message.
+bool PozyxDevice::write_message(ByteView parameters) {
+  if (parameters.empty() || parameters[0] + parameters.size() - 1 > tx_.size()) return false;
+  std::copy(parameters.begin() + 1, parameters.end(), tx_.begin() + parameters[0]);
+  tx_size_ = parameters[0] + parameters.size() - 1;
+  return true;
+}
+
+/// Only lights that are not under system control follow.
+bool PozyxDevice::set_lights(ByteView parameters) {
+  if (parameters.size() != 1) return false;
+  const unsigned free = (parameters[0] >> 4) & ~unsigned{memory_[reg::config_leds]} & 0x0f;
+  const unsigned now = (lights_ & ~free) | (parameters[0] & free);
+  flashes_ += (now & ~unsigned{lights_}) != 0;
+  lights_ = static_cast<std::uint8_t>(now & 0x0f);
+  return true;
+}
+
+bool PozyxDevice::set_positioning_ids(ByteView parameters) {
+  if (parameters.empty() || parameters.size() % 2 != 0 || parameters.size() > 32) return false;
+  positioning_ids_.clear();
+  for (std::size_t i = 0; i < parameters.size(); i += 2) positioning_ids_.push_back(u16_at(parameters, i));
+  return true;
+}
+
 std::optional<PozyxDevice::Answer> PozyxDevice::call(std::uint8_t function, ByteView parameters) {
   const auto refuse = [this](std::uint8_t error_code) {
     fail(error_code);
@@ -237,13 +262,8 @@ std::optional<PozyxDevice::Answer> PozyxDevice::call(std::uint8_t function, Byte
   const Known* device = known(parameters);
   Answer answer;
   switch (function) {
-    case fn::tx_data: {  // offset, bytes; the newest write ends the message
-      if (parameters.empty() || parameters[0] + parameters.size() - 1 > tx_.size())
-        return refuse(k_bad_parameters);
-      std::copy(parameters.begin() + 1, parameters.end(), tx_.begin() + parameters[0]);
-      tx_size_ = parameters[0] + parameters.size() - 1;
-      return answer;
-    }
+    case fn::tx_data:
+      return write_message(parameters) ? answer : refuse(k_bad_parameters);
     case fn::rx_data: {  // offset, count
       if (parameters.size() != 2 || std::size_t{parameters[0]} + parameters[1] > rx_.size())
         return refuse(k_bad_parameters);
@@ -252,22 +272,10 @@ std::optional<PozyxDevice::Answer> PozyxDevice::call(std::uint8_t function, Byte
       unread_ = false;
       return answer;
     }
-    case fn::led_ctrl: {
-      if (parameters.size() != 1) return refuse(k_bad_parameters);
-      // Only lights that are not under system control follow.
-      const unsigned free = (parameters[0] >> 4) & ~unsigned{memory_[reg::config_leds]} & 0x0f;
-      const unsigned now = (lights_ & ~free) | (parameters[0] & free);
-      flashes_ += (now & ~unsigned{lights_}) != 0;
-      lights_ = static_cast<std::uint8_t>(now & 0x0f);
-      return answer;
-    }
+    case fn::led_ctrl:
+      return set_lights(parameters) ? answer : refuse(k_bad_parameters);
     case fn::pos_set_anchor_ids:
-      if (parameters.empty() || parameters.size() % 2 != 0 || parameters.size() > 32)
-        return refuse(k_bad_parameters);
-      positioning_ids_.clear();
-      for (std::size_t i = 0; i < parameters.size(); i += 2)
-        positioning_ids_.push_back(u16_at(parameters, i));
-      return answer;
+      return set_positioning_ids(parameters) ? answer : refuse(k_bad_parameters);
     case fn::pos_get_anchor_ids:
       return positioning_ids_answer();
     case fn::flash_reset:

@@ -73,6 +73,10 @@ class PozyxDevice {
   Answer positioning_ids_answer() const;
   Answer save(pozyx::ByteView parameters);
   Answer impulse(pozyx::ByteView parameters) const;
+  // Functions that answer with success alone; false: bad parameters.
+  bool write_message(pozyx::ByteView parameters);
+  bool set_lights(pozyx::ByteView parameters);
+  bool set_positioning_ids(pozyx::ByteView parameters);
   void start();
   const Known* known(pozyx::ByteView id) const;
 

@@ -50,7 +50,7 @@ KeptDevice device_of(const Json& item) {
     out.config.name = word(item, "name");
     out.config.address = word(item, "address");
     if (const auto it = item.find("options"); it != item.end() && it->is_object())
-      out.config.options_json = to_wire(*it);
+      out.config.options = {to_wire(*it)};
     if (const auto it = item.find("enabled"); it != item.end() && it->is_boolean())
       out.config.enabled = it->get<bool>();
     if (const auto it = item.find("version"); it != item.end() && it->is_number_unsigned())
@@ -120,7 +120,7 @@ Result<void> write_devices(const fs::path& file, const std::vector<KeptDevice>& 
                     {"kind", d.kind},
                     {"name", d.name},
                     {"address", d.address},
-                    {"options", Json::parse(d.options_json, nullptr, false)},
+                    {"options", Json::parse(d.options.text, nullptr, false)},
                     {"enabled", d.enabled},
                     {"version", d.version}});
   }

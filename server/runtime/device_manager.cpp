@@ -417,7 +417,7 @@ Result<DeviceReport> DeviceManager::change(DeviceConfig config, std::uint64_t ex
   const auto password = impl_->secrets_.kept(before.id);
   const auto stored = impl_->secrets_.store(secret);
   const bool same_link = !secret.given && kept.problem.empty() && before.kind == config.kind &&
-                         before.address == config.address && before.options_json == config.options_json &&
+                         before.address == config.address && before.options == config.options &&
                          before.name == config.name && before.enabled == config.enabled;
   if (!same_link) {
     const auto changed = impl_->on_io([&]() -> Result<void> {

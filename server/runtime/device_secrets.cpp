@@ -24,9 +24,9 @@ bool password_set(const Json& options) {
 
 Result<DeviceSecrets::Change> DeviceSecrets::split(DeviceConfig config, const DeviceConfig* before) {
   Change change;
-  auto options = Json::parse(config.options_json, nullptr, false);
+  auto options = Json::parse(config.options.text, nullptr, false);
   if (!options.is_object()) options = Json::object();
-  const auto had = before != nullptr ? Json::parse(before->options_json, nullptr, false) : Json::object();
+  const auto had = before != nullptr ? Json::parse(before->options.text, nullptr, false) : Json::object();
   bool set = password_set(had);
   if (const auto given = options.find("password"); given != options.end() && given->is_string()) {
     change.given = true;
@@ -39,7 +39,7 @@ Result<DeviceSecrets::Change> DeviceSecrets::split(DeviceConfig config, const De
   options.erase("password");
   options.erase("password_set");
   if (set) options["password_set"] = true;
-  config.options_json = to_wire(options);
+  config.options = {to_wire(options)};
   change.config = std::move(config);
   return change;
 }
@@ -79,8 +79,8 @@ void DeviceSecrets::put_back(const Uuid& id, const std::string& password) const 
 }
 
 std::string DeviceSecrets::driver_options(const DeviceConfig& config) const {
-  auto options = Json::parse(config.options_json, nullptr, false);
-  if (!options.is_object() || !options.contains("password_set")) return config.options_json;
+  auto options = Json::parse(config.options.text, nullptr, false);
+  if (!options.is_object() || !options.contains("password_set")) return config.options.text;
   const bool set = password_set(options);
   options.erase("password_set");
   if (set) options["password_file"] = file(config.id).string();
@@ -88,9 +88,9 @@ std::string DeviceSecrets::driver_options(const DeviceConfig& config) const {
 }
 
 bool DeviceSecrets::drop_password_file(DeviceConfig& config) {
-  auto options = Json::parse(config.options_json, nullptr, false);
+  auto options = Json::parse(config.options.text, nullptr, false);
   if (!options.is_object() || options.erase("password_file") == 0) return false;
-  config.options_json = to_wire(options);
+  config.options = {to_wire(options)};
   return true;
 }
 

@@ -75,9 +75,9 @@ Calibration read(Connection& c, Query& query) {
   found.id = query.id<CalibrationId>();
   found.frame = query.one_of(k_frame_words);
   found.origin = read_wgs84(query);
-  found.settings_json = query.text();
+  found.settings = query.document();
   found.created = query.time();
-  found.provenance_json = query.text();
+  found.provenance = query.document();
   Query missions(c, k_missions);
   missions << key;
   while (missions.step()) found.missions.push_back(missions.id<MissionId>());
@@ -139,7 +139,7 @@ std::optional<Error> insert_calibration(Connection& c, const Calibration& calibr
     Query query(c, k_insert);
     query << calibration.id << static_cast<int>(calibration.frame);
     bind_wgs84(query, calibration.origin);
-    query << calibration.settings_json << calibration.created << calibration.provenance_json;
+    query << calibration.settings << calibration.created << calibration.provenance;
     key = query.returned();
   }
   if (!key) return make_error(Errc::conflict, "calibration " + to_string(calibration.id) + " exists");
@@ -152,9 +152,9 @@ std::optional<Error> insert_calibration(Connection& c, const Calibration& calibr
     query.run();
   }
   store_estimates(c, *key, calibration.anchors);
-  if (!calibration.evidence_json.empty()) {
+  if (!calibration.evidence.empty()) {
     Query query(c, k_insert_evidence);
-    query << *key << calibration.evidence_json;
+    query << *key << calibration.evidence;
     query.run();
   }
   return std::nullopt;

@@ -23,8 +23,8 @@ DatasetRecord read(Query& query) {
   DatasetRecord d;
   d.id = query.id<DatasetId>();
   d.name = query.text();
-  d.query_json = query.text();
-  d.report_json = query.text();
+  d.query = query.document();
+  d.report = query.document();
   d.digest = query.text();
   d.n_train = query.as<std::uint64_t>();
   d.n_test = query.as<std::uint64_t>();
@@ -43,8 +43,8 @@ class SqlDatasetStore final : public DatasetStore {
       named << d.name;
       if (named.step()) return make_error(Errc::conflict, "there is a data set named " + d.name);
       Query query(c, k_insert);
-      query << d.id << d.name << d.query_json << d.report_json << d.digest << d.n_train << d.n_test
-            << d.created << d.created_by;
+      query << d.id << d.name << d.query << d.report << d.digest << d.n_train << d.n_test << d.created
+            << d.created_by;
       const auto key = query.returned();
       Query content(c, k_insert_content);
       content << key << csv;

@@ -14,7 +14,7 @@ constexpr const char* k_columns =
 constexpr const char* k_remove = "DELETE FROM local_frame WHERE id = ?1 AND version = ?2 RETURNING version";
 
 void bind(Query& query, const LocalFrame& f, std::uint64_t version) {
-  query << f.id << f.name << f.site << f.definition_json << f.created << version;
+  query << f.id << f.name << f.site << f.definition << f.created << version;
 }
 
 std::vector<LocalFrame> all(Query& query) {
@@ -24,7 +24,7 @@ std::vector<LocalFrame> all(Query& query) {
     f.id = query.id<FrameId>();
     f.name = query.text();
     f.site = query.maybe([&] { return query.id<SiteId>(); });
-    f.definition_json = query.text();
+    f.definition = query.document();
     f.created = query.time();
     f.version = query.as<std::uint64_t>();
     found.push_back(std::move(f));

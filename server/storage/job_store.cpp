@@ -20,7 +20,7 @@ static_assert(static_cast<int>(JobState::failed) == 3 && static_cast<int>(JobSta
 
 void bind(Query& query, const Job& j) {
   query << j.id << j.kind << static_cast<int>(j.state) << j.fraction << j.stage << j.detail << j.result_href
-        << j.problem_json << j.request_json << j.created << j.started << j.finished;
+        << j.problem << j.request << j.created << j.started << j.finished;
 }
 
 Job read(Query& query) {
@@ -32,8 +32,8 @@ Job read(Query& query) {
   j.stage = query.text();
   j.detail = query.text();
   j.result_href = query.text();
-  j.problem_json = query.text();
-  j.request_json = query.text();
+  j.problem = query.document();
+  j.request = query.document();
   j.created = query.time();
   j.started = query.maybe_time();
   j.finished = query.maybe_time();
@@ -79,10 +79,10 @@ class SqlJobStore final : public JobStore {
       return found;
     });
   }
-  Result<std::size_t> fail_unfinished(UtcTime now, std::string_view problem_json) override {
+  Result<std::size_t> fail_unfinished(UtcTime now, const Document& problem) override {
     return write_value<std::size_t>(gate_, 1, [&](Connection& c) -> Result<std::size_t> {
       Query query(c, k_fail_unfinished);
-      query << now << problem_json;
+      query << now << problem;
       std::size_t n = 0;
       while (query.step()) ++n;
       return n;

@@ -20,7 +20,7 @@ StoredProfile read(Query& query) {
   p.time = query.time();
   p.by = query.text();
   p.source = query.text();
-  p.profile_json = query.text();
+  p.profile = query.document();
   return p;
 }
 
@@ -49,7 +49,7 @@ class SqlKitStore final : public KitStore {
       StoredProfile kept = profile;
       kept.version = stored + 1;
       Query insert(c, k_insert);
-      insert << kept.kit << kept.version << kept.time << kept.by << kept.source << kept.profile_json;
+      insert << kept.kit << kept.version << kept.time << kept.by << kept.source << kept.profile;
       insert.run();
       return kept;
     });

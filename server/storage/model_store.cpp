@@ -36,7 +36,7 @@ StoredModel read(Query& query) {
   m.task = query.text();
   m.method = query.text();
   m.sha256_hex = query.text();
-  m.manifest_json = query.text();
+  m.manifest = query.document();
   m.created = query.time();
   m.created_by = query.text();
   m.signature = query.text();
@@ -177,7 +177,7 @@ class SqlModelStore final : public ModelStore {
 
 void insert_model(Connection& connection, const StoredModel& m, std::string_view artifact) {
   Query query(connection, k_insert);
-  query << m.id << m.run << m.task << m.method << m.sha256_hex << m.manifest_json << m.created << m.created_by
+  query << m.id << m.run << m.task << m.method << m.sha256_hex << m.manifest << m.created << m.created_by
         << m.signature;
   const auto key = query.returned();
   Query content(connection, k_insert_artifact);

@@ -31,7 +31,7 @@ Error unchanged(Connection& c, const PlanId& id, std::uint64_t expected) {
 }
 
 void bind(Query& query, const StoredPlan& p, std::uint64_t version) {
-  query << p.id << p.name << p.site << p.document_json << p.created << p.changed << version;
+  query << p.id << p.name << p.site << p.document << p.created << p.changed << version;
 }
 
 StoredPlan read(Query& query) {
@@ -39,7 +39,7 @@ StoredPlan read(Query& query) {
   p.id = query.id<PlanId>();
   p.name = query.text();
   p.site = query.maybe([&] { return query.id<SiteId>(); });
-  p.document_json = query.text();
+  p.document = query.document();
   p.created = query.time();
   p.changed = query.time();
   p.version = query.as<std::uint64_t>();

@@ -15,6 +15,7 @@
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
 #include "core/base/time.hpp"
+#include "core/types/document.hpp"
 
 /// The seam between the stores and the database: stores are written once against it, each database implements
 /// it once. SQL texts use ?1, ?2 ... in order, ON CONFLICT and RETURNING, and nothing that only one database
@@ -120,6 +121,7 @@ class Query {
     return *this;
   }
   Query& operator<<(const std::string& v) { return *this << std::string_view{v}; }
+  Query& operator<<(const Document& v) { return *this << v.text; }
   Query& operator<<(const char* v) { return *this << std::string_view{v}; }
   Query& operator<<(std::span<const std::byte> v) {
     statement_.bind_blob(parameter_++, v);
@@ -152,6 +154,7 @@ class Query {
   }
   double real();  ///< NaN for NULL, which is how the database keeps a NaN
   std::string text() { return statement_.text(column_++); }
+  Document document() { return {text()}; }
   std::span<const std::byte> blob() { return statement_.blob(column_++); }
   UtcTime time() { return {integer()}; }
   NetworkId network_id() { return {static_cast<std::uint32_t>(integer())}; }

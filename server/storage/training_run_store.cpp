@@ -28,8 +28,8 @@ TrainingRun read(Query& query) {
   r.id = query.id<TrainingRunId>();
   r.dataset = query.id<DatasetId>();
   r.task = query.text();
-  r.request_json = query.text();
-  r.summary_json = query.text();
+  r.request = query.document();
+  r.summary = query.document();
   r.model = query.maybe([&] { return query.id<ModelId>(); });
   r.created = query.time();
   r.created_by = query.text();
@@ -43,7 +43,7 @@ class SqlTrainingRunStore final : public TrainingRunStore {
   Result<void> insert(const TrainingRun& r) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       Query query(c, k_insert);
-      query << r.id << r.dataset << r.task << r.request_json << r.summary_json << r.created << r.created_by;
+      query << r.id << r.dataset << r.task << r.request << r.summary << r.created << r.created_by;
       if (query.returned()) return std::nullopt;
       return make_error(Errc::not_found, "no data set " + to_string(r.dataset));
     });
@@ -72,12 +72,12 @@ class SqlTrainingRunStore final : public TrainingRunStore {
         });
   }
 
-  Result<void> finish(const TrainingRunId& id, std::string_view summary_json,
+  Result<void> finish(const TrainingRunId& id, const Document& summary,
                       const std::map<std::string, std::string>& parts, const StoredModel& model,
                       std::string_view artifact) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       Query query(c, k_finish);
-      query << id << summary_json;
+      query << id << summary;
       const auto key = query.returned();
       if (!key) return no_run(id);
       Query drop(c, k_drop_parts);

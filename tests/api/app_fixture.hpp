@@ -133,7 +133,7 @@ class AppFixture : public ::testing::Test {
     c.id.uuid = make_uuid_v7(clock_.now());
     c.missions = {MissionId{parse_uuid(mission()).value()}};
     c.origin = Wgs84{51.023, 3.713, 55};
-    c.settings_json = "{}";
+    c.settings = {"{}"};
     c.created = clock_.now();
     for (const std::uint32_t id : {0x6a2fu, 0x6a3cu}) {
       Estimate e;

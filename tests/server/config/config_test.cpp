@@ -4,7 +4,11 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
+
+#include "server/runtime/log_line.hpp"
+#include "server/storage/sqlite_database.hpp"
 
 namespace anchord::server {
 namespace {
@@ -22,6 +26,23 @@ class ConfigFile {
  private:
   std::filesystem::path path_;
 };
+
+/// "a|b|c".
+template <class T, std::size_t N>
+std::string choices_of(const EnumTable<T, N>& table) {
+  std::string out;
+  for (const auto word : table.words()) out.append(out.empty() ? "" : "|").append(word);
+  return out;
+}
+
+TEST(Config, OffersTheWordsOfTheEnumsItSets) {
+  const auto offered = [](std::string_view key) {
+    const auto at = std::ranges::find(options(), key, &Option::key);
+    return at == options().end() ? std::string("no such option") : std::string(at->choices);
+  };
+  EXPECT_EQ(offered("log_level"), choices_of(k_log_level_words));
+  EXPECT_EQ(offered("storage.synchronous"), choices_of(k_synchronous_words));
+}
 
 TEST(Config, TakesFlagsOverEnvironmentOverFileOverDefaults) {
   const ConfigFile file(

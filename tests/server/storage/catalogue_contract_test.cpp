@@ -320,7 +320,7 @@ TEST_P(AnchorStoreContract, GivesBackACalibrationAsItWas) {
   c.id = CalibrationId{make_uuid_v7(k_noon)};
   c.missions = {mission.id};
   c.origin = Wgs84{51, 3, 58};
-  c.settings_json = R"({"dims":3})";
+  c.settings = {R"({"dims":3})"};
   c.created = k_noon;
   Estimate e;
   e.anchor = NetworkId{0x6a2f};
@@ -345,7 +345,7 @@ TEST_P(AnchorStoreContract, GivesBackACalibrationAsItWas) {
   const auto found = db_->stores().calibrations.calibration(c.id).value();
   EXPECT_EQ(found.missions, c.missions);
   EXPECT_EQ(found.origin->height_m, 58);
-  EXPECT_EQ(found.settings_json, c.settings_json);
+  EXPECT_EQ(found.settings, c.settings);
   ASSERT_EQ(found.anchors.size(), 2u);
   const auto& f = found.anchors[0];
   EXPECT_EQ(f.verdict, Verdict::ambiguous);
@@ -417,8 +417,8 @@ TEST_P(AnchorStoreContract, KeepsGatesEvidenceAndWhoOverrodeWhat) {
   Calibration c;
   c.id = CalibrationId{make_uuid_v7(k_noon)};
   c.missions = {mission.id};
-  c.provenance_json = R"({"profile":null})";
-  c.evidence_json = R"({"residuals":[1,2]})";
+  c.provenance = {R"({"profile":null})"};
+  c.evidence = {R"({"residuals":[1,2]})"};
   for (const std::uint32_t id : {1u, 2u}) {
     Estimate e;
     e.anchor = NetworkId{id};
@@ -429,9 +429,9 @@ TEST_P(AnchorStoreContract, KeepsGatesEvidenceAndWhoOverrodeWhat) {
   }
   ASSERT_TRUE(db_->stores().calibrations.insert(c));
   const auto read = db_->stores().calibrations.calibration(c.id).value();
-  EXPECT_EQ(read.provenance_json, c.provenance_json);
-  EXPECT_TRUE(read.evidence_json.empty()) << "read on its own";
-  EXPECT_EQ(db_->stores().calibrations.evidence(c.id).value(), c.evidence_json);
+  EXPECT_EQ(read.provenance, c.provenance);
+  EXPECT_TRUE(read.evidence.empty()) << "read on its own";
+  EXPECT_EQ(db_->stores().calibrations.evidence(c.id).value(), c.evidence.text);
   ASSERT_EQ(read.anchors[1].gates.size(), 2u);
   EXPECT_EQ(read.anchors[1].gates[0].name, "chi_square");
   EXPECT_EQ(read.anchors[1].gates[0].value, 31.2);
@@ -461,11 +461,11 @@ TEST_P(AnchorStoreContract, KeepsEveryProfileOfAKitAndRefusesALostUpdate) {
   StoredProfile p{"kit-1", 0, k_noon, "token", "put", R"({"a":1})"};
   EXPECT_EQ(db_->stores().kits.put(p, 0).value().version, 1u);
   EXPECT_EQ(db_->stores().kits.put(p, 0).error().code, Errc::conflict);
-  p.profile_json = R"({"a":2})";
+  p.profile = {R"({"a":2})"};
   p.source = "calibration x";
   EXPECT_EQ(db_->stores().kits.put(p, 1).value().version, 2u);
   reopen();
-  EXPECT_EQ(db_->stores().kits.profile("kit-1").value()->profile_json, R"({"a":2})");
+  EXPECT_EQ(db_->stores().kits.profile("kit-1").value()->profile.text, R"({"a":2})");
   const auto history = db_->stores().kits.history("kit-1", 10).value();
   ASSERT_EQ(history.size(), 2u);
   EXPECT_EQ(history[1].source, "put");
@@ -493,7 +493,7 @@ TEST_P(AnchorStoreContract, KeepsFramesByNameAndVersion) {
   ASSERT_TRUE(db_->stores().frames.insert(other));
   other.name = "hall-a";
   EXPECT_EQ(db_->stores().frames.update(other, 1).error().code, Errc::conflict);
-  frame.definition_json = R"({"pairs":[1]})";
+  frame.definition = {R"({"pairs":[1]})"};
   ASSERT_TRUE(db_->stores().frames.update(frame, 1));
   EXPECT_EQ(db_->stores().frames.update(frame, 1).error().code, Errc::conflict);
   EXPECT_EQ(db_->stores().frames.frame("hall-a").value().version, 2u);
@@ -539,7 +539,7 @@ TEST_P(AccessContract, FailsJobsThatARestartCutOff) {
   done.state = JobState::succeeded;
   ASSERT_TRUE(db_->stores().jobs.insert(running));
   ASSERT_TRUE(db_->stores().jobs.insert(done));
-  EXPECT_EQ(db_->stores().jobs.fail_unfinished(k_noon, "{}").value(), 1u);
+  EXPECT_EQ(db_->stores().jobs.fail_unfinished(k_noon, {"{}"}).value(), 1u);
   const auto found = db_->stores().jobs.job(running.id).value();
   EXPECT_EQ(found.state, JobState::failed);
   EXPECT_EQ(found.fraction, 0.42);

@@ -21,7 +21,7 @@ class LearningStoreContract : public StoreContract {
     DatasetRecord d;
     d.id = DatasetId{make_uuid_v7(k_noon)};
     d.name = "may";
-    d.query_json = d.report_json = "{}";
+    d.query = d.report = {"{}"};
     d.digest = "00";
     d.n_train = 12;
     d.created = k_noon;
@@ -33,7 +33,7 @@ class LearningStoreContract : public StoreContract {
     r.id = TrainingRunId{make_uuid_v7(k_noon)};
     r.dataset = d.id;
     r.task = "nlos_id";
-    r.request_json = "{}";
+    r.request = {"{}"};
     r.created = k_noon;
     EXPECT_TRUE(db_->stores().training_runs.insert(r));
     return r;
@@ -44,7 +44,7 @@ class LearningStoreContract : public StoreContract {
     m.task = "nlos_id";
     m.method = "logistic";
     m.run = run;
-    m.manifest_json = "{}";
+    m.manifest = {"{}"};
     m.created = k_noon;
     return m;
   }
@@ -161,10 +161,10 @@ TEST_P(LearningStoreContract, FinishesARunWithItsPartsAndItsModelAtOnce) {
   EXPECT_EQ(db_->stores().training_runs.part(r.id, "folds").error().code, Errc::not_found);
   const auto m = model_of(r.id);
   ASSERT_TRUE(
-      db_->stores().training_runs.finish(r.id, "{\"a\":1}", {{"folds", "[]"}, {"grid", "[1]"}}, m, "{}"));
+      db_->stores().training_runs.finish(r.id, {"{\"a\":1}"}, {{"folds", "[]"}, {"grid", "[1]"}}, m, "{}"));
   EXPECT_EQ(db_->stores().training_runs.part(r.id, "grid").value(), "[1]");
   const auto found = db_->stores().training_runs.run(r.id).value();
-  EXPECT_EQ(found.summary_json, "{\"a\":1}");
+  EXPECT_EQ(found.summary.text, "{\"a\":1}");
   EXPECT_EQ(found.model, m.id);
   EXPECT_EQ(db_->stores().models.model(m.id).value().run, r.id);
   EXPECT_EQ(db_->stores().models.artifact(m.id).value(), "{}");
@@ -172,7 +172,7 @@ TEST_P(LearningStoreContract, FinishesARunWithItsPartsAndItsModelAtOnce) {
   ASSERT_TRUE(db_->stores().training_runs.remove(r.id));
   EXPECT_FALSE(db_->stores().models.model(m.id).value().run);
   auto lost = model_of(std::nullopt);
-  EXPECT_EQ(db_->stores().training_runs.finish(r.id, "{}", {}, lost, "{}").error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().training_runs.finish(r.id, {"{}"}, {}, lost, "{}").error().code, Errc::not_found);
   EXPECT_EQ(db_->stores().models.model(lost.id).error().code, Errc::not_found);
 }
 
