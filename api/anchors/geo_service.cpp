@@ -20,12 +20,14 @@ const Result<Projection>& GeoService::opened(int epsg, int geographic_epsg) {
 const Result<Geoid>& GeoService::opened_geoid() {
   {
     const auto known = opened_.lock();
-    if (known->geoid) return *known->geoid;
+    const auto& geoid = known->geoid;
+    if (geoid) return *geoid;
   }
   auto now = Geoid::open(geoid_folder_);
   auto known = opened_.lock();
-  if (!known->geoid) known->geoid.emplace(std::move(now));
-  return *known->geoid;
+  auto& geoid = known->geoid;
+  if (!geoid) geoid.emplace(std::move(now));
+  return *geoid;
 }
 
 Result<const Projection*> GeoService::projection(int epsg, const std::string& datum) {

@@ -54,7 +54,8 @@ struct Parts {
   std::vector<int> finished;  ///< written to their end: the syncing thread syncs and closes them
   bool new_name{false};       ///< a part was begun, and its folder not synced since
   fs::path file;              ///< of fd
-  std::string failure;
+  std::string failure;        ///< of the last write
+  std::string unsynced;       ///< of the last sync: a disk that was pulled takes writes until then
   bool stopping{false};
 };
 
@@ -94,7 +95,7 @@ struct Recorder::State {
   void remember(const Event& event);
   bool write(std::string_view bytes);
   void fail(std::int64_t now_ns, int error);
-  void sync(const ToSync& what) const;
+  int sync(const ToSync& what) const;
   void sync_loop();
 };
 
@@ -159,16 +160,19 @@ void Recorder::State::fail(std::int64_t now_ns, int error) {
   now->failure = now->file.string() + ": " + std::strerror(error);
 }
 
-void Recorder::State::sync(const ToSync& what) const {
+/// errno of what failed first, or 0.
+int Recorder::State::sync(const ToSync& what) const {
+  int failed = 0;
   for (const int one : what.fds) {
-    (void)::fdatasync(one);
+    if (::fdatasync(one) != 0 && failed == 0) failed = errno;
     ::close(one);
   }
-  if (!what.folder) return;
+  if (!what.folder) return failed;
   const int names = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (names < 0) return;
-  (void)::fsync(names);
+  if (names < 0) return failed == 0 ? errno : failed;
+  (void)::fsync(names);  // not every file system can
   ::close(names);
+  return failed;
 }
 
 void Recorder::State::sync_loop() {
@@ -181,11 +185,17 @@ void Recorder::State::sync_loop() {
       if (now->stopping) return;
       due = take_finished(*now);
       if (const auto so_far = written.load(); now->fd >= 0 && so_far != synced) {
-        if (const int copy = ::dup(now->fd); copy >= 0) due.fds.push_back(copy);
-        synced = so_far;
+        if (const int copy = ::dup(now->fd); copy >= 0) {
+          due.fds.push_back(copy);
+          synced = so_far;
+        }
       }
     }
-    sync(due);
+    const int failed = sync(due);
+    if (due.fds.empty() && failed == 0) continue;
+    auto now = parts.lock();
+    now->unsynced =
+        failed == 0 ? "" : now->file.string() + ": cannot be synced to the disk: " + std::strerror(failed);
   }
 }
 
@@ -206,7 +216,7 @@ Recorder::~Recorder() {
     if (parts->fd >= 0) parts->finished.push_back(parts->fd);
     rest = take_finished(*parts);
   }
-  state_->sync(rest);
+  (void)state_->sync(rest);
 }
 
 Result<std::unique_ptr<Recorder>> Recorder::open(const fs::path& folder, UtcTime now,
@@ -251,7 +261,7 @@ void Recorder::take(const Event& event) {
 
 std::string Recorder::failed() const {
   const auto parts = state_->parts.lock();
-  return parts->failure;
+  return parts->failure.empty() ? parts->unsynced : parts->failure;
 }
 std::uint64_t Recorder::bytes_written() const { return state_->written; }
 std::uint64_t Recorder::events_lost() const { return state_->lost; }

@@ -33,7 +33,7 @@ class Recorder {
   Recorder& operator=(const Recorder&) = delete;
 
   void take(const Event& event);
-  /// Why nothing is being recorded; empty while it is.
+  /// Why nothing is being recorded, or does not reach the disk; empty while it does.
   std::string failed() const;
   std::uint64_t bytes_written() const;
   std::uint64_t events_lost() const;

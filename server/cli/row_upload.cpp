@@ -21,7 +21,7 @@ RowUpload::~RowUpload() {
 Result<void> RowUpload::send(RowBatch batch) {
   auto state = state_.lock();
   state.wait(changed_, [](const State& s) { return !s.waiting || s.failed; });
-  if (state->failed) return *state->failed;
+  if (auto failed = state->failed) return *std::move(failed);
   state->waiting = std::move(batch);
   changed_.notify_all();
   return boost::outcome_v2::success();
@@ -30,7 +30,7 @@ Result<void> RowUpload::send(RowBatch batch) {
 Result<void> RowUpload::drain() {
   auto state = state_.lock();
   state.wait(changed_, [](const State& s) { return (!s.waiting && !s.busy) || s.failed; });
-  if (state->failed) return *state->failed;
+  if (auto failed = state->failed) return *std::move(failed);
   return boost::outcome_v2::success();
 }
 
@@ -43,13 +43,13 @@ void RowUpload::run() {
   auto state = state_.lock();
   while (!state->failed) {
     state.wait(changed_, [](const State& s) { return s.waiting || s.closing; });
-    if (!state->waiting) return;
-    const RowBatch batch = *std::exchange(state->waiting, std::nullopt);
+    const auto batch = std::exchange(state->waiting, std::nullopt);
+    if (!batch) return;
     state->busy = true;
     changed_.notify_all();
     Result<void> done = boost::outcome_v2::success();
     state.unlocked([&] {
-      if (const auto ran = guarded("upload", [&] { done = post(batch); }); !ran)
+      if (const auto ran = guarded("upload", [&] { done = post(*batch); }); !ran)
         done = make_error(Errc::internal, ran.what);
     });
     state->busy = false;

@@ -161,12 +161,12 @@ bool BackupKeeper::due(std::uint64_t flights_ended) {
   const std::int64_t every_ns = static_cast<std::int64_t>(options_.every_h) * k_hour_ns;
   auto due = due_.lock();
   if (!due->newest) {
-    const SteadyTime newest = due.unlocked([&] { return first_look(now); });
-    if (!due->newest) due->newest = newest;  // else one was made meanwhile
+    const SteadyTime found = due.unlocked([&] { return first_look(now); });
+    due->newest = due->newest.value_or(found);  // one may have been made meanwhile
     due->not_before = now;
   }
   if (now < due->not_before) return false;
-  const bool old = now.ns - due->newest->ns >= every_ns;
+  const bool old = now.ns - due->newest.value_or(now).ns >= every_ns;
   if (!old && flights_ended == due->flights_saved) {
     due->not_before = later(now, k_look_ns);
     return false;

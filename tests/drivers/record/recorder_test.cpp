@@ -8,6 +8,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <cerrno>
 #include <condition_variable>
 #include <fstream>
 #include <iterator>
@@ -24,8 +26,10 @@ anchord::Locked<Sizes>& synced_sizes() {
   return all;
 }
 std::condition_variable synced_one;
+std::atomic<bool> pulled{false};  ///< the disk: it takes what is written and keeps nothing
 
 int note_sync(int fd, const char* name) {
+  if (pulled) return errno = EIO, -1;
   struct stat info {};
   if (::fstat(fd, &info) == 0) {
     auto sizes = synced_sizes().lock();
@@ -112,6 +116,26 @@ TEST(Recorder, SyncsEachPartToItsEndAndItsName) {
     const auto at = s.find(part);
     return at != s.end() && at->second == size && s.contains(names);
   }));
+}
+
+// write() goes to memory: that the disk is gone is the sync's to tell.
+TEST(Recorder, ADiskThatIsGoneIsToldAndForgottenWhenItIsBack) {
+  const Folder folder;
+  RecorderOptions options;
+  options.sync_every_ms = 1;
+  const auto recorder = Recorder::open(folder.path, k_start, options).value();
+  const auto until = [&, n = std::int64_t{0}](auto holds) mutable {
+    for (const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+         !holds(recorder->failed()) && std::chrono::steady_clock::now() < end; ++n)
+      recorder->take({EventKind::bytes, 3, {UtcTime{n}, n}, "a chunk of bytes"});
+    return recorder->failed();
+  };
+  pulled = true;
+  EXPECT_EQ(until([](const std::string& why) { return !why.empty(); }),
+            recorder->file().string() + ": cannot be synced to the disk: Input/output error");
+  pulled = false;
+  EXPECT_EQ(until([](const std::string& why) { return why.empty(); }), "");
+  EXPECT_EQ(recorder->events_lost(), 0U);
 }
 
 TEST(Recorder, TurnsToANewPartThatTellsTheDevicesAgain) {
