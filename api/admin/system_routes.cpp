@@ -6,6 +6,7 @@
 #include "api/kit/support.hpp"
 #include "api/stream/hub.hpp"
 #include "core/base/time.hpp"
+#include "core/ports/access_store.hpp"
 
 namespace anchord::api {
 

@@ -5,6 +5,7 @@
 #include "api/admin/event_log.hpp"
 #include "core/ports/devices.hpp"
 #include "core/ports/mission_bin.hpp"
+#include "core/ports/mission_store.hpp"
 
 namespace anchord::api {
 

@@ -106,10 +106,11 @@ class PoseColumns {
  private:
   Result<FixClass> fix_class(const CsvTable& table) const {
     if (!fix_) return FixClass::rtk_fixed;  // motion capture has no such column
-    constexpr auto digits = std::to_array<api::Word<FixClass>>(
-        {{"2", FixClass::rtk_fixed}, {"1", FixClass::rtk_float}, {"0", FixClass::single}});
     const auto text = table.text(*fix_);
-    if (const auto fix = api::value_of(digits, text)) return *fix;
+    for (const auto& [digit, fix] :
+         {std::pair{"2", FixClass::rtk_fixed}, {"1", FixClass::rtk_float}, {"0", FixClass::single}}) {
+      if (text == digit) return fix;
+    }
     if (const auto fix = k_fix_words.find(text)) return *fix;
     return table.error("fix: '" + to_utf8(table.text(*fix_), 20) +
                        "', expected 2 (fixed), 1 (float), 0 (neither), or fixed, float, dgps, single, none");

@@ -2,6 +2,7 @@
 
 #include "api/kit/problem.hpp"
 #include "core/base/time.hpp"
+#include "core/ports/access_store.hpp"
 
 namespace anchord::api {
 

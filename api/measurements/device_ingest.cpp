@@ -3,6 +3,7 @@
 #include <set>
 
 #include "api/missions/mission_service.hpp"
+#include "core/ports/measurement_store.hpp"
 
 namespace anchord::api {
 namespace {
