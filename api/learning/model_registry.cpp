@@ -18,7 +18,7 @@ constexpr std::array k_of_cir{Feature::kurtosis, Feature::mean_excess_delay_ns, 
 Result<std::shared_ptr<const ml::Model>> read_model(const ModelSource& source, const ModelId& id,
                                                     bool vouched_only) {
   BOOST_OUTCOME_TRY(const auto artifact, source.artifact(id));
-  if (vouched_only && source.signer() != nullptr && artifact.standing == ModelStanding::foreign)
+  if (vouched_only && artifact.standing == ModelStanding::foreign)
     return make_error(Errc::conflict,
                       "model " + to_string(id) +
                           " is not signed by this server: it was made elsewhere, or before "
