@@ -27,6 +27,7 @@
 #include "api/kit/late_writer.hpp"
 #include "api/learning/promotion_events.hpp"
 #include "api/learning/routes.hpp"
+#include "api/measurements/demonstration.hpp"
 #include "api/measurements/device_ingest.hpp"
 #include "api/measurements/ingest.hpp"
 #include "api/measurements/routes.hpp"
@@ -105,6 +106,7 @@ struct Application::State {
                       deps.keep_deleted_ns, deps.housekeeping_by_hand}),
         ingest(stores.measurements, missions),
         device_ingest(stores.measurements, missions),
+        demonstration({missions, device_ingest, events, deps.clock, deps.demonstration}),
         jobs(stores.jobs, hub, deps.clock, deps.work.jobs),
         geo(deps.geoid_dir),
         contradictions({stores.anchors, stores.calibrations, stores.revisions, stores.missions, events}),
@@ -144,8 +146,8 @@ struct Application::State {
         mission_api{
             missions,     stores.missions, stores.measurements,  stores.sites, stores.bin, stream, events,
             housekeeping, running,         deps.keep_deleted_ns, deps.clock,   audit,      flights},
-        measurement_api{stores.measurements, ingest, missions,   models,
-                        stores.exclusions,   events, deps.clock, audit},
+        measurement_api{stores.measurements, ingest, missions,     models, stores.exclusions, events,
+                        deps.clock,          audit,  demonstration},
         anchor_api{stores.sites,
                    stores.anchors,
                    stores.calibrations,
@@ -245,6 +247,7 @@ struct Application::State {
   std::string device_rows();
   void second();
   void background_round();
+  void calibrate_landed();
   void tell_system(UtcTime now, ServerPulse& pulse);
   void tell_alarms(UtcTime now, std::vector<AlarmCondition> holding,
                    std::vector<std::pair<std::string_view, std::string>>& of_flight);
@@ -268,6 +271,7 @@ struct Application::State {
   ClockWatch clock_watch;
   IngestService ingest;
   DeviceIngest device_ingest;
+  Demonstration demonstration;
   JobService jobs;
   GeoService geo;
   ContradictionWatch contradictions;
@@ -312,8 +316,29 @@ void Application::State::beat() {
   }
 }
 
+/// What has landed is solved at once, so that the result is there when the operator looks; a person publishes
+/// it.
+void Application::State::calibrate_landed() {
+  for (const auto& id : flights.take_landed()) {
+    if (!deps.calibrate_landed) continue;
+    if (const auto n = stores.measurements.count_ranges(id); n && n.value() == 0)
+      continue;  // nothing to solve
+    std::vector<FieldError> none;
+    const auto body = nlohmann::json{{"missions", {to_string(id)}}};
+    auto request = read_calibration_request(body, none);
+    request.settings_json = R"({"after_landing":true})";
+    if (const auto job = calibrations.submit(std::move(request)); job)
+      events.add("info", "calibration.after_landing",
+                 "landed: all ranges are solved again, together; the result waits for review", id);
+    else
+      events.add("warning", "calibration.not_started", "not calibrated after landing: " + job.error().message,
+                 id);
+  }
+}
+
 /// About once a second, on the thread of late writes; each part behind a guard of its own.
 void Application::State::background_round() {
+  (void)guarded("calibration after landing", [this] { calibrate_landed(); });
   (void)guarded("contradicted anchors", [this] { (void)contradictions.standing(); });
   (void)guarded("last uses of tokens", [this] { deps.access.flush(); });
   (void)guarded("scheduled backup", [this] {
@@ -454,6 +479,7 @@ void Application::stop() {
   state_->stop_told.notify_all();
   if (state_->heart.joinable()) state_->heart.join();
   state_->housekeeping.stop();
+  state_->demonstration.stop();
   state_->flights.stop();
   state_->hub.shut_down();
   state_->jobs.stop();

@@ -11,6 +11,7 @@
 #include "api/kit/storage_status.hpp"
 #include "api/learning/worker_port.hpp"
 #include "api/stream/ws_handler.hpp"
+#include "core/base/result.hpp"
 #include "core/base/steady.hpp"
 #include "core/geo/track_segments.hpp"
 #include "core/localize/accuracy_goal.hpp"
@@ -21,6 +22,7 @@ class Backups;
 class Clock;
 class DeviceControl;
 class DeviceRows;
+struct FlightData;
 class Drone;
 class Executor;
 }  // namespace anchord
@@ -51,9 +53,12 @@ class Application {
     DeviceControl& devices;
     std::string model_key;  ///< 64 hex digits, what models are signed with
     BuildInfo build{};
-    Drone* drone{nullptr};    ///< null: flights are flown by hand
-    AccuracyGoal goal{};      ///< how well a live anchor must be known to count as converged
-    bool site_outline{true};  ///< a site's outline is a prior for the anchors of its flights
+    Drone* drone{nullptr};         ///< null: flights are flown by hand
+    AccuracyGoal goal{};           ///< how well a live anchor must be known to count as converged
+    bool site_outline{true};       ///< a site's outline is a prior for the anchors of its flights
+    bool calibrate_landed{false};  ///< a flight is solved by itself once it has landed
+    /// A flight to play on request.
+    std::function<Result<FlightData>()> demonstration{};
     TrackLimits track{};      ///< what the positions of a flight are held against
     std::string geoid_dir{};  ///< empty: where GeographicLib looks
     std::function<StorageStatus()> storage_status = [] { return StorageStatus{}; };

@@ -137,6 +137,7 @@ void FlightService::step() {
     if (const auto& f = w->operations.flight()) {
       mission = f->mission;  // one that began meanwhile too
       if (w->last.flight != w->operations.n_flights()) w->last = {.flight = w->operations.n_flights()};
+      State::note_landing(*w, *f);
       keeps = State::to_keep(*w, keep);
       if (const auto version = f->control.engine().priors_version(); w->last.priors_passed != version) {
         w->last.priors_passed = version;
@@ -150,6 +151,22 @@ void FlightService::step() {
   if (priors && mission) s.deps.missions.tell_priors(*mission, std::move(*priors));
   if (keeps && mission) s.keep(*mission, std::move(keep));
   s.changed.notify_all();
+}
+
+/// A flight is over on the ground: what aborted in the air is so once the pilot has it down.
+void FlightService::State::note_landing(Work& w, const flight::ActiveFlight& f) {
+  const auto aircraft = w.operations.drone();
+  if (w.operations.flying()) {
+    w.last.flew = true;
+  } else if (w.last.flew && (f.manual || !aircraft || !aircraft->in_air)) {
+    w.last.flew = false;
+    w.landed.push_back(f.mission);
+  }
+}
+
+std::vector<MissionId> FlightService::take_landed() {
+  auto w = state_->work.lock();
+  return std::exchange(w->landed, {});
 }
 
 void FlightService::on_fix(const Fix& fix) {

@@ -78,6 +78,8 @@ class FlightService final : public MissionObserver, public MissionControl {
   /// Whether this mission's flight is in the air; and which mission flies this plan.
   bool flies(const MissionId& mission) override;
   std::optional<MissionId> flown_with(const PlanId& plan);
+  /// Missions whose flight has ended on the ground since the last call: what was to be measured is.
+  std::vector<MissionId> take_landed();
 
   struct Order {
     flight::FlightAction action{};

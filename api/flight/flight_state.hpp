@@ -34,6 +34,7 @@ struct FlightService::State {
   struct Last {
     std::uint64_t flight{0}, kept{~0ULL}, shown{~0ULL}, priors_passed{0};
     double shown_s{-10}, profiles_s{-10};
+    bool flew{false};
   };
   /// What rounds, requests and measurements share. No disk, no estimate and nothing long while it is held.
   struct Work {
@@ -41,6 +42,7 @@ struct FlightService::State {
     flight::Operations operations;
     Apart apart;
     Last last;
+    std::vector<MissionId> landed;  ///< not asked for yet
     bool stopping{false};
   };
   using Guard = Locked<Work>::Exclusive;
@@ -57,6 +59,7 @@ struct FlightService::State {
   void recover();
   /// The document to store, when the machine moved since the last call; empty text: forget it.
   static bool to_keep(Work& w, std::string& text);
+  static void note_landing(Work& w, const flight::ActiveFlight& f);
   void keep(const MissionId& mission, std::string document) const;
   nlohmann::ordered_json procedure(const flight::Operations& operations, const flight::ActiveFlight& f) const;
   void publish(Work& w) const;

@@ -6,6 +6,7 @@
 #include "api/learning/measurement_query.hpp"
 #include "api/learning/model_registry.hpp"
 #include "api/learning/range_features.hpp"
+#include "api/measurements/demonstration.hpp"
 #include "api/measurements/ingest.hpp"
 #include "api/measurements/routes.hpp"
 #include "api/wire/rows_json.hpp"
@@ -214,6 +215,21 @@ Response range_cir(MeasurementApi& s, const Request& request) {
   return response;
 }
 
+Response demonstrate(MeasurementApi& s, const Request& request) {
+  check_query(request, {});
+  const auto body = json_body(request, true);
+  std::vector<FieldError> errors;
+  Fields fields(body, "", errors);
+  const double speed = fields.number("speed", 1, 20).value_or(1);
+  fields.finish();
+  refuse_if_any(errors);
+  const Mission mission = value_or_problem(s.demonstration.start(speed));
+  s.audit(request, "demonstration.start " + to_string(mission.id));
+  Response response = json_response(202, Ordered{{"mission", to_string(mission.id)}});
+  response.header("Location", "/api/v1/missions/" + to_string(mission.id));
+  return response;
+}
+
 }  // namespace
 
 void add_measurement_routes(Router& router, MeasurementApi& s) {
@@ -238,6 +254,7 @@ void add_measurement_routes(Router& router, MeasurementApi& s) {
                 return json_response(200, json);
               }});
   router.add({Method::get, "/api/v1/ranges/{id}/cir", readers(), on(range_cir)});
+  router.add(as_heavy({Method::post, "/api/v1/demonstration", Access::any_of({Role::op}), on(demonstrate)}));
   router.add(as_heavy({Method::get, "/api/v1/fixes", readers(), on(list_fixes)}));
 }
 

@@ -10,6 +10,7 @@ class MeasurementStore;
 
 namespace anchord::api {
 
+class Demonstration;
 class EventLog;
 class IngestService;
 class MissionService;
@@ -26,6 +27,7 @@ struct MeasurementApi {
   EventLog& events;
   const Clock& clock;
   Audit audit;
+  Demonstration& demonstration;
 };
 
 void add_measurement_routes(Router& router, MeasurementApi& api);

@@ -15,6 +15,7 @@
 #include "server/app/front_door.hpp"
 #include "server/app/metrics.hpp"
 #include "server/app/model_key.hpp"
+#include "server/flight/demonstration_flight.hpp"
 #include "server/flight/drone_link.hpp"
 #include "server/http/http_server.hpp"
 #include "server/http/request_judge.hpp"
@@ -254,6 +255,8 @@ void App::State::compose() {
   deps.drone = drone.get();
   deps.goal = {config.metres("goal.h95_m"), config.metres("goal.v95_m")};
   deps.site_outline = config.text("solve.site_outline") == "on";
+  deps.demonstration = flight::demonstration_flight;
+  deps.calibrate_landed = config.text("solve.after_landing") == "on";
   deps.track.max_correction_age_s =
       std::chrono::duration<double>(config.seconds("solve.max_correction_age_s")).count();
   deps.storage_status = [this] { return status_of(*database); };

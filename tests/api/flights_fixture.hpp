@@ -88,6 +88,7 @@ class Flights : public AppFixture {
   void configure(api::Application::Deps& deps) override {
     deps.drone = with_drone_ ? drone_.get() : nullptr;
     deps.flight_clock = [this] { return drone_->now; };
+    deps.calibrate_landed = calibrates_;
   }
   std::string origin_text() const { return R"({"lon":3.7131,"lat":51.0231,"h_m":55.5})"; }
   std::string make_plan(const std::string& more = "") {
@@ -167,6 +168,7 @@ class Flights : public AppFixture {
 
   std::unique_ptr<LoopDrone> drone_;
   bool with_drone_{true};
+  bool calibrates_{false};
   std::string mission_;
   std::uint64_t start_{};
 };

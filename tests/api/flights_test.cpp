@@ -102,6 +102,60 @@ TEST_F(Flights, StartsHoldsResumesAndLands) {
   EXPECT_EQ(act("return", lease).status, 422) << "nothing flies any more";
 }
 
+/// A flight that measures one anchor at (10, 5, 2): the operator who lands finds it solved, once, and not
+/// published.
+class LandedFlights : public Flights {
+ protected:
+  void SetUp() override {
+    calibrates_ = true;
+    Flights::SetUp();
+  }
+  void measure(double seconds) {
+    for (int i = 0; i < static_cast<int>(seconds * 5); ++i) {
+      fly(0.2);
+      const Eigen::Vector3d at = drone_->autopilot.vehicle().position_m();
+      const auto t_us = k_unix_us + std::llround(drone_->now * 1e6);
+      const Json row{{"t_us", t_us},
+                     {"tag", "0x6e01"},
+                     {"anchor", "0x6a21"},
+                     {"distance_m", (at - Eigen::Vector3d(10, 5, 2)).norm()}};
+      ASSERT_EQ(
+          post("/api/v1/ranges", row.dump() + "\n", "application/x-ndjson", {{"mission", mission_}}).status,
+          200);
+    }
+  }
+  Json calibrations() { return json(get("/api/v1/calibrations"))["items"]; }
+  bool event(const std::string& code) {
+    const auto events = json(get(base() + "/events"))["items"];
+    return std::ranges::any_of(events, [&](const Json& e) { return e["code"] == code; });
+  }
+  bool within(double seconds, const std::function<bool()>& done) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+    while (!done() && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+    return done();
+  }
+};
+
+TEST_F(LandedFlights, AreCalibratedByThemselvesAndWaitForReview) {
+  // The first one lands with nothing measured, and has nothing to solve.
+  ASSERT_EQ(act("land", take_off()).status, 202);
+  ASSERT_TRUE(fly_until([&] { return procedure()["step"] == "done"; }, 60));
+  const auto lease = take_off();
+  measure(20);
+  EXPECT_TRUE(calibrations().empty()) << "in the air nothing is solved again";
+  ASSERT_EQ(act("land", lease).status, 202);
+  ASSERT_TRUE(fly_until([&] { return procedure()["step"] == "done"; }, 60));
+  ASSERT_TRUE(within(60, [&] { return calibrations().size() == 1; }));
+  const auto made = calibrations()[0];
+  EXPECT_EQ(made["missions"], Json::array({mission_}));
+  EXPECT_EQ(made["n_anchors"], 1);
+  EXPECT_EQ(made["settings"]["after_landing"], true);
+  EXPECT_EQ(json(get("/api/v1/jobs"))["items"].size(), 1u) << "one job for the two landings";
+  EXPECT_TRUE(event("calibration.after_landing"));
+  EXPECT_TRUE(json(get("/api/v1/calibrations/" + made["id"].get<std::string>()))["published"].empty());
+  EXPECT_TRUE(json(get("/api/v1/revisions"))["items"].empty()) << "a person publishes";
+}
+
 TEST_F(Flights, ARefusalToArmIsReportedWithinTwoSecondsInTheAutopilotsWords) {
   mission_ = mission();
   const auto plan = make_plan();

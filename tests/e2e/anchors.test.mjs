@@ -96,8 +96,26 @@ test('columns are chosen and stay, degrees may have minutes, and one anchor is l
   const good = await leave.count(),
     out = (await leave.first().getAttribute('data-testid')).slice('leave-'.length);
   assert.ok(good >= 2, `${good} may go out`);
+  // Each anchor says why: gates, error budget, residuals, on the map among the others. What has moved since is told on the globe.
+  await id(`why-${out}`).click();
+  const review = id('review-anchor');
+  await review.getByTestId('gates').waitFor();
+  await review
+    .getByTestId('residuals')
+    .getByText(/ranges with weight/)
+    .waitFor();
+  assert.equal(await review.getByTestId('map').count(), 1);
+  const shifts = (await id('draft').locator('tbody td:nth-child(5)').allTextContents()).map(Number);
+  assert.ok(
+    shifts.every((m) => m < 2),
+    `from live: ${shifts.join()} m`,
+  );
+  assert.deepEqual(await violations(page), []);
+  await picture(page, 'review-light');
+  await id(`why-${out}`).click();
+  await review.waitFor({ state: 'detached' });
   await leave.first().click();
-  await page.getByLabel(`Why ${out} is left out`).fill('its pole was hit');
+  await page.getByLabel(`Why ${out} is rejected`).fill('its pole was hit');
   await id('publish-now').click();
   await eventually('it is published', async () => (await get('/api/v1/revisions')).items?.length === 1, 20_000);
   const [revision] = (await get('/api/v1/revisions')).items;

@@ -157,7 +157,7 @@ test('Escape closes every dialog and the focus goes back; the view is reached wi
   };
   await opened_from(id('status-rtk'), page.getByRole('dialog'));
   await opened_from(id('user'), page.getByRole('dialog'));
-  await opened_from(page.getByRole('button', { name: 'Keys' }), id('help'));
+  await opened_from(page.getByRole('button', { name: 'Help' }), id('help'));
   await opened_from(id('open-checklist'), id('checklist'));
   await id('nav-anchors').click();
   await opened_from(id('compare'), page.getByRole('dialog'));

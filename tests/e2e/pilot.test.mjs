@@ -246,9 +246,20 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
   assert.equal(await id('anchor-table').locator('.chip.ok').count(), Number(bar.split(' ')[0]), 'green in the table');
   assert.match(await text(id('review')), new RegExp(`, ${bar}$`));
   await picture(page, 'given-up');
-  // The report is two presses away: a calibration of the whole flight, then the page to print.
-  await id('review').click();
-  await id('draft').locator('tbody tr').nth(3).waitFor({ timeout: 60_000 });
+  // The flight is solved by itself after landing, and waits for review.
+  await page.getByRole('link', { name: /^Live/ }).click();
+  await id('after-landing').getByText('The flight is calibrated.').waitFor({ timeout: 60_000 });
+  const solved = (await get('/api/v1/calibrations')).items;
+  assert.equal(solved.length, 1);
+  await picture(page, 'after-landing-light');
+  await id('review-landed').click();
+  await id('draft').locator('tbody tr').nth(3).waitFor({ timeout: 10_000 });
+  assert.equal(
+    (await get('/api/v1/calibrations')).items.length,
+    1,
+    'the review shows what is there, and solves nothing anew',
+  );
+  assert.deepEqual((await get('/api/v1/revisions')).items, []);
   await picture(page, 'landed-light');
   const [report] = await Promise.all([browser.context.waitForEvent('page'), id('report').click()]);
   await report.waitForLoadState();
@@ -259,6 +270,20 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
   assert.ok(provenance.n_clues > 0, 'what the turn and the height search told went into it');
   await picture(report, 'report-light');
   await report.close();
+  // So short a flight leaves anchors that lack something: a plan about those, to look at and to save.
+  const lacking = Number(/(\d+)$/.exec(await text(id('fly-again')))[1]);
+  assert.ok(lacking > 0);
+  await id('fly-again').click();
+  await eventually(
+    'the plan is open',
+    async () => (await id('plan-name').inputValue()).startsWith('Again: 0x'),
+    20_000,
+  );
+  assert.equal((await id('plan-name').inputValue()).split(',').length, lacking);
+  await id('check').getByText('BE FLOWN').waitFor({ timeout: 20_000 });
+  assert.ok((await id('plan-map').locator('.wp').count()) >= 4);
+  await picture(page, 'fly-again-light');
+  await page.getByRole('button', { name: 'Discard them' }).click();
   assert.deepEqual(seen.errors, []);
   await page.close();
 });

@@ -186,6 +186,9 @@ export const published = async (): Promise<{ rows: AnchorRow[]; revision: number
 
 export interface Calibration {
   readonly id: string;
+  readonly created_at: string;
+  readonly published: boolean;
+  readonly after_landing: boolean; ///< made by the server when the flight had landed
   readonly rows: readonly AnchorRow[];
 }
 export function calibration_of(answer: unknown): Calibration | null {
@@ -193,10 +196,14 @@ export function calibration_of(answer: unknown): Calibration | null {
   if (!o || !str(o.id) || !Array.isArray(o.anchors)) return null;
   return {
     id: str(o.id),
+    created_at: str(o.created_at),
+    published: Array.isArray(o.published) && o.published.length > 0,
+    after_landing: obj(o.settings)?.after_landing === true,
     rows: o.anchors
-      .map((a) => {
+      .map((a): AnchorRow | null => {
         const x = obj(a);
-        return x ? row_of(x, x.geometry) : null;
+        const row = x && row_of(x, x.geometry);
+        return row && { ...row, calibration: str(o.id) };
       })
       .filter((r): r is AnchorRow => r !== null),
   };
@@ -212,10 +219,13 @@ export async function calibrate(mission: string, key: string): Promise<Calibrati
   if (!done) throw new Error('The calibration is still running; look again in a minute.');
   return done;
 }
-/// The newest one of this flight alone, for who may publish but not solve; null where an engineer has not solved it yet.
+/// The newest one of this flight alone; null where it is not solved yet.
+export const newest_summary = async (mission: string): Promise<Wire<'CalibrationSummary'> | null> =>
+  (await list('/calibrations', { query: { limit: 50 } })).find(
+    (c) => c.missions.length === 1 && c.missions[0] === mission,
+  ) ?? null;
 export async function newest_calibration(mission: string): Promise<Calibration | null> {
-  const all = await list('/calibrations', { query: { limit: 50, fields: 'id,missions' } }),
-    of_it = all.find((c) => c.missions.length === 1 && c.missions[0] === mission);
+  const of_it = await newest_summary(mission);
   return of_it ? calibration_of(await request('GET', `/calibrations/${encodeURIComponent(of_it.id)}`)) : null;
 }
 /// An anchor that fails a gate goes out only with the reason a person gives for it.

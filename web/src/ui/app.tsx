@@ -28,7 +28,7 @@ const VIEWS = [
 ] as const;
 type View = (typeof VIEWS)[number][0];
 
-function Rail({ view }: { view: View }) {
+function Rail({ view }: { view: View | null }) {
   const item = (id: View, name: string) => (
     <a
       key={id}
@@ -47,7 +47,7 @@ function Rail({ view }: { view: View }) {
       <span class="grow" />
       <button class="ri" onClick={() => (help_open.value = !help_open.value)} aria-expanded={help_open.value}>
         <Icon name="help" />
-        <span>Keys</span>
+        <span>Help</span>
       </button>
     </nav>
   );
@@ -78,6 +78,8 @@ function Later<P extends object>({ load, props }: { load: () => Promise<Componen
   );
 }
 const load_anchors = () => import('../views/anchors').then((m) => m.Anchors);
+const load_import = () => import('../views/start/import').then((m) => m.Import);
+const load_guide = () => import('../views/guide/guide').then((m) => m.Guide);
 const load_models = () => import('../views/models/models').then((m) => m.Models);
 const load_plan = () => import('../views/plan/plan').then((m) => m.Plan);
 const load_replay = () => import('../views/replay/replay').then((m) => m.Replay);
@@ -98,6 +100,7 @@ function LastKnown() {
 /// The rest of the page while nothing else is to be done: after an outage every view is there, and opens also during one.
 const LATER = [
   load_anchors,
+  load_guide,
   load_publish,
   load_compare,
   load_replay,
@@ -133,9 +136,10 @@ const AGES: ReadonlySet<View> = new Set(['live', 'anchors', 'measurements', 'mod
 export function App() {
   const [, name, ...args] = route.value.replace(/^#\/?/, '/').split('/'),
     arg = args[args.length - 1];
-  const view: View = VIEWS.find(([id]) => id === name)?.[0] ?? 'live',
+  const beside = name === 'import' || name === 'guide' ? name : null, // pages that the rail does not show
+    view: View | null = beside ? null : (VIEWS.find(([id]) => id === name)?.[0] ?? 'live'),
     named = arg ? decodeURIComponent(arg) : null,
-    lost = link.value === 'lost' && AGES.has(view);
+    lost = link.value === 'lost' && view !== null && AGES.has(view);
   usePrefetch();
   return (
     <div class="app">
@@ -157,6 +161,8 @@ export function App() {
         </div>
         <div class="view">
           {view === 'live' && <Live />}
+          {beside === 'import' && <Later load={load_import} props={{}} />}
+          {beside === 'guide' && <Later load={load_guide} props={{ page: named }} />}
           {view === 'plan' && <Later load={load_plan} props={{ id: named }} />}
           {view === 'anchors' && <Later load={load_anchors} props={{ anchor: named }} />}
           {view === 'measurements' && <Later load={load_measurements} props={{}} />}

@@ -1,5 +1,6 @@
 import { signal } from '@preact/signals';
 import { Icon } from './marks';
+import { useLater } from './use_later';
 import { useDialog } from './use_dialog';
 
 export const help_open = signal(false);
@@ -34,9 +35,16 @@ const KEYS: readonly [string, string][] = [
   ['T', 'next theme'],
   ['M', 'mute 2 minutes'],
   ['A', 'acknowledge the first alarm'],
-  ['?', 'this list'],
+  ['?', 'help for what is on the screen'],
   ['Esc', 'close'],
 ];
+const load_guide = () => import('../views/guide/guide').then((m) => m.GuideSheet);
+/// What is on the screen, in words: the guide's page for it.
+function ScreenHelp({ close }: { close: () => void }) {
+  const { part: Sheet } = useLater(load_guide);
+  return Sheet ? <Sheet hash={location.hash} close={close} /> : null;
+}
+
 export function Help() {
   const open = help_open.value,
     box = useDialog<HTMLElement>(open, () => (help_open.value = false));
@@ -44,11 +52,13 @@ export function Help() {
   return (
     <section class="sheet" role="dialog" aria-labelledby="help-title" tabIndex={-1} ref={box} data-testid="help">
       <div class="hd">
-        <h2 id="help-title">Keys</h2>
+        <h2 id="help-title">Help</h2>
         <button class="btn quiet small" aria-label="Close" onClick={() => (help_open.value = false)}>
           <Icon name="close" />
         </button>
       </div>
+      <ScreenHelp close={() => (help_open.value = false)} />
+      <h3>Keys</h3>
       <dl class="keys">
         {KEYS.map(([k, what]) => (
           <div key={k}>

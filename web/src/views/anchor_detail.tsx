@@ -32,7 +32,18 @@ function ErrorBudget({ budget }: { budget: Budget }) {
   );
 }
 
-export function AnchorDetail({ row: r, live, changed }: { row: AnchorRow; live: boolean; changed: () => void }) {
+/// `draft`: of a calibration that is not published: it has no facility data yet.
+export function AnchorDetail({
+  row: r,
+  live,
+  draft = false,
+  changed,
+}: {
+  row: AnchorRow;
+  live: boolean;
+  draft?: boolean;
+  changed: () => void;
+}) {
   tick.value;
   const why = why_not_done(r, live ? task_reason(current_scene()?.procedure?.value, r.anchor) : ''),
     latest = live ? current_scene()?.anchors.get(r.anchor) : undefined;
@@ -124,7 +135,7 @@ export function AnchorDetail({ row: r, live, changed }: { row: AnchorRow; live: 
         )}
         {r.mirror && <Twin r={r} />}
       </section>
-      {!live && <Running published={r} />}
+      {!live && <Running published={r} draft={draft} />}
       {r.budget && r.budget.shares.length > 0 && <ErrorBudget budget={r.budget} />}
       <div class="two">
         <Gates r={r} />
@@ -145,7 +156,7 @@ export function AnchorDetail({ row: r, live, changed }: { row: AnchorRow; live: 
         </section>
       </div>
       <AnchorResiduals row={r} mission={live ? r.mission || null : null} />
-      <FacilityPanel anchor={r.anchor} changed={changed} />
+      {!draft && <FacilityPanel anchor={r.anchor} changed={changed} />}
       {!live && <AnchorPast anchor={r.anchor} />}
       {live && (
         <section class="sec-p">
@@ -164,7 +175,7 @@ function updated_words(e: EstimateMsg, at_ms: number): string {
 }
 
 /// What the flight that is shown makes of it now, beside what is published: how far apart, and how well either is known.
-function Running({ published: p }: { published: AnchorRow }) {
+function Running({ published: p, draft }: { published: AnchorRow; draft: boolean }) {
   const scene = current_scene(),
     e = shown_estimate(scene, p.anchor),
     heard = scene?.anchors.get(p.anchor);
@@ -185,7 +196,7 @@ function Running({ published: p }: { published: AnchorRow }) {
       <dl class="kv s">
         {apart && (
           <div>
-            <dt>From published, horizontal</dt>
+            <dt>From {draft ? 'the calibration' : 'published'}, horizontal</dt>
             <dd>
               <Q v={fixed(Math.hypot(apart[0], apart[1]), 3)} u="m" />
             </dd>

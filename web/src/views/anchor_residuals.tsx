@@ -65,7 +65,10 @@ export function AnchorResiduals({ row, mission }: { row: AnchorRow; mission: str
             there.
           </p>
           <Weights rows={got.rows} />
-          <Doubtful rows={got.rows} />
+          <Doubtful
+            name={row.calibration ? `${row.anchor}, calibration ${row.calibration.slice(0, 8)}` : row.anchor}
+            rows={got.rows}
+          />
         </>
       )}
     </section>
@@ -163,11 +166,11 @@ function Weights({ rows }: { rows: readonly Residual[] }) {
     </table>
   );
 }
-function Doubtful({ rows }: { rows: readonly Residual[] }) {
+function Doubtful({ rows, name }: { rows: readonly Residual[]; name: string }) {
   const first = Math.min(...rows.map((r) => r.t_us)),
     worst = by_suspicion(rows).slice(0, 8);
   return (
-    <div class="scrollx" tabIndex={0} role="region" aria-label="Ranges to doubt">
+    <div class="scrollx" tabIndex={0} role="region" aria-label={`Ranges to doubt of ${name}`}>
       <table class="reads doubt" data-testid="doubtful">
         <caption>Ranges to doubt first</caption>
         <thead>

@@ -19,9 +19,9 @@ import {
 } from '../state/store';
 import { bearing, clock, fixed, grouped, millimetres, told_apart } from '../ui/format';
 import { Chip, Q } from '../ui/marks';
+import { useLater } from '../ui/use_later';
 import { AnchorCard } from './anchor_card';
 import { Events } from './events';
-import { FirstRun } from './first_run';
 import './flight/field.css';
 import './flight/flight.css';
 import { FlightBar } from './flight/commands';
@@ -50,7 +50,7 @@ export function Live() {
   useEffect(() => {
     document.title = `${mission?.name ?? 'Live'} - anchord`;
   }, [mission?.name]);
-  if (!mission) return synced.value ? <FirstRun /> : <Waiting />;
+  if (!mission) return synced.value ? <NoFlight /> : <Waiting />;
   const scene = current_scene();
   // With nothing chosen, the anchor that needs attention most: ambiguous first, then the least accurate.
   const sorted = shown_estimates(scene).sort(
@@ -83,6 +83,12 @@ export function Live() {
       </aside>
     </div>
   );
+}
+
+const load_first_run = () => import('./start/first_run').then((m) => m.FirstRun);
+function NoFlight() {
+  const { part: FirstRun } = useLater(load_first_run);
+  return FirstRun ? <FirstRun /> : null;
 }
 
 function Waiting() {

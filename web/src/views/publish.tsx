@@ -12,10 +12,12 @@ import {
   type Calibration,
   type Moved,
 } from '../api/anchors';
-import type { MissionMsg } from '../live/messages';
+import type { EstimateMsg, MissionMsg } from '../live/messages';
+import { enu_from_geodetic } from '../map/enu';
 import { may } from '../state/session';
+import { keep_draft } from '../state/drafts';
 import { current_scene, revision, say } from '../state/store';
-import { accuracy, fixed } from '../ui/format';
+import { accuracy, date, fixed } from '../ui/format';
 import { Icon, Mark, StatusChip } from '../ui/marks';
 import { useDraft } from '../ui/use_draft';
 import { gate_line } from '../ui/gates';
@@ -23,6 +25,10 @@ import { VERDICT_WORDS } from '../ui/words';
 import { useDialog } from '../ui/use_dialog';
 import { useStable } from '../ui/use_stable';
 import { publish_open } from './dialogs';
+import { plan_again } from './plan_again';
+import { draft_key } from './plan/draft';
+import { ReviewAnchor } from './review_anchor';
+import { flying } from './flight/words';
 
 interface Form {
   readonly note: string;
@@ -34,13 +40,14 @@ export function Publish({ mission }: { mission: MissionMsg }) {
   const [draft, set_draft] = useState<Calibration | null>(null),
     [moved, set_moved] = useState<ReadonlyMap<string, Moved>>(new Map()),
     [problem, set_problem] = useState(''),
-    [busy, set_busy] = useState<'' | 'calibrating' | 'publishing'>('calibrating');
+    [busy, set_busy] = useState<'' | 'calibrating' | 'publishing' | 'planning'>('calibrating'),
+    [picked, pick] = useState<string | null>(null);
   const solves = may('engineer');
   const keys = useRef({ calibrate: idempotency_key(), publish: idempotency_key() }),
     [form, change, forget] = useDraft<Form>(`publish/${mission.mission}`, { note: '', reasons: {}, left: {} }),
     { note, reasons, left } = form,
     box = useDialog<HTMLElement>(true, () => (publish_open.value = false));
-  const guarded = async (what: 'calibrating' | 'publishing', work: () => Promise<void>): Promise<void> => {
+  const guarded = async (what: 'calibrating' | 'publishing' | 'planning', work: () => Promise<void>): Promise<void> => {
     set_busy(what);
     set_problem('');
     try {
@@ -51,18 +58,23 @@ export function Publish({ mission }: { mission: MissionMsg }) {
     set_busy('');
   };
   const solve = useStable(
-    (): void =>
+    (anew: boolean): void =>
       void guarded('calibrating', async () => {
-        const made = solves
-          ? await calibrate(mission.mission, keys.current.calibrate)
-          : await newest_calibration(mission.mission);
+        // After landing the server has solved the flight by itself: that is what waits for review.
+        const there = solves && anew ? null : await newest_calibration(mission.mission);
+        const made =
+          there && (!solves || (there.after_landing && !in_air()))
+            ? there
+            : solves
+              ? await calibrate(mission.mission, keys.current.calibrate)
+              : null;
         if (!made) throw new Error('This flight is not solved yet: an engineer has to calibrate it first.');
         set_draft(made);
         set_moved(await moved_since_published(made.id).catch(() => new Map<string, Moved>()));
       }),
   );
   useEffect(() => {
-    solve();
+    solve(false);
   }, [solve]);
   const out = Object.entries(left).filter(([id]) => draft?.rows.some((r) => r.anchor === id && passes(r))),
     good = draft?.rows.filter((r) => passes(r) && left[r.anchor] === undefined) ?? [],
@@ -84,9 +96,19 @@ export function Publish({ mission }: { mission: MissionMsg }) {
       forget();
       publish_open.value = false;
     });
+  const reviewed = draft?.rows.find((r) => r.anchor === picked) ?? null,
+    lacking = draft?.rows.filter((r) => !passes(r) || left[r.anchor] !== undefined) ?? [];
+  const fly_again = (): void =>
+    void guarded('planning', async () => {
+      const made = await plan_again(mission.mission, lacking);
+      keep_draft(draft_key(null), made);
+      say(`A plan for ${lacking.length} anchor${lacking.length === 1 ? '' : 's'}: look at it, then save it`);
+      publish_open.value = false;
+      location.hash = '#/plan';
+    });
   return (
     <section
-      class="drawer"
+      class={reviewed ? 'drawer wide' : 'drawer'}
       role="dialog"
       aria-modal="false"
       aria-labelledby="publish-title"
@@ -103,9 +125,24 @@ export function Publish({ mission }: { mission: MissionMsg }) {
       </div>
       <p class="why">
         {mission.name}:{' '}
-        {solves
-          ? 'all stored ranges are solved again, together.'
-          : 'the newest calibration that an engineer made of it.'}{' '}
+        {draft?.after_landing
+          ? `all ranges were solved together after landing, ${date(draft.created_at)}.`
+          : solves
+            ? 'all stored ranges are solved again, together.'
+            : 'the newest calibration that an engineer made of it.'}{' '}
+        {solves && draft?.after_landing && (
+          <button
+            class="btn small"
+            data-testid="solve-again"
+            disabled={busy !== ''}
+            onClick={() => {
+              keys.current.calibrate = idempotency_key();
+              solve(true);
+            }}
+          >
+            Solve again
+          </button>
+        )}{' '}
         What is published is what facility tools read; the running estimates are not.
       </p>
       {busy === 'calibrating' && <p role="status">Solving {mission.n_ranges} ranges.</p>}
@@ -117,7 +154,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
               class="btn small"
               onClick={() => {
                 keys.current.calibrate = idempotency_key();
-                solve();
+                solve(false);
               }}
             >
               Try again
@@ -146,13 +183,15 @@ export function Publish({ mission }: { mission: MissionMsg }) {
                   <th scope="col" class="num">
                     From published, m
                   </th>
-                  <th scope="col">Published</th>
+                  <th scope="col">Goes out</th>
                 </tr>
               </thead>
               <tbody>
                 {draft.rows.map((r) => (
                   <DraftRow
                     key={r.anchor}
+                    picked={r.anchor === picked}
+                    pick={() => pick(r.anchor === picked ? null : r.anchor)}
                     r={r}
                     moved={moved.get(r.anchor)}
                     reason={reasons[r.anchor]}
@@ -171,6 +210,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
               </tbody>
             </table>
           </div>
+          {reviewed && <ReviewAnchor row={reviewed} rows={draft.rows} pick={pick} />}
           <label class="lab" for="note">
             Note
           </label>
@@ -185,6 +225,11 @@ export function Publish({ mission }: { mission: MissionMsg }) {
             <a class="btn" href={report_url(draft.id)} target="_blank" rel="noreferrer" data-testid="report">
               Report to print
             </a>
+            {lacking.length > 0 && may('operator') && (
+              <button class="btn" data-testid="fly-again" disabled={busy !== ''} onClick={fly_again}>
+                {busy === 'planning' ? 'Planning' : `Fly again for ${lacking.length}`}
+              </button>
+            )}
             <span class="grow" />
             <button class="btn" onClick={() => (publish_open.value = false)}>
               Not now
@@ -199,6 +244,20 @@ export function Publish({ mission }: { mission: MissionMsg }) {
   );
 }
 
+const in_air = (): boolean => {
+  const p = current_scene()?.procedure?.value;
+  return p !== undefined && flying(p);
+};
+/// Metres between two places of an anchor. On the globe, where both have one: metres of a calibration and of a flight count from other origins.
+function apart_m(a: EstimateMsg, b: EstimateMsg): number | null {
+  if (a.lon !== null && a.lat !== null && b.lon !== null && b.lat !== null)
+    return Math.hypot(
+      ...enu_from_geodetic({ lon: a.lon, lat: a.lat, h_m: a.h_m ?? 0 }, { lon: b.lon, lat: b.lat, h_m: b.h_m ?? 0 }),
+    );
+  return a.enu_m && b.enu_m
+    ? Math.hypot(a.enu_m[0] - b.enu_m[0], a.enu_m[1] - b.enu_m[1], a.enu_m[2] - b.enu_m[2])
+    : null;
+}
 /// What may go out without a person: the server says so; a server without gates is taken at its verdict.
 const passes = (r: AnchorRow): boolean => r.acceptable ?? r.verdict === 'ok';
 /// Two places that fit cannot be talked into one; anything else a person may answer for.
@@ -207,12 +266,16 @@ const may_override = (r: AnchorRow): boolean => !passes(r) && r.verdict !== 'amb
 function DraftRow({
   r,
   moved,
+  picked,
+  pick,
   reason,
   set_reason,
   left,
   leave,
 }: {
   r: AnchorRow;
+  picked: boolean;
+  pick: () => void;
   moved: Moved | undefined;
   reason: string | undefined;
   set_reason: (reason: string) => void;
@@ -221,14 +284,15 @@ function DraftRow({
 }) {
   const live = current_scene()?.anchors.get(r.anchor)?.value,
     failed = r.gates.filter((g) => !g.passed);
-  const shift =
-    live?.enu_m && r.enu_m
-      ? Math.hypot(r.enu_m[0] - live.enu_m[0], r.enu_m[1] - live.enu_m[1], r.enu_m[2] - live.enu_m[2])
-      : null;
+  const shift = live ? apart_m(r, live) : null;
   const from = moved?.horizontal_m == null ? null : Math.hypot(moved.horizontal_m, moved.vertical_m ?? 0);
   return (
-    <tr>
-      <th scope="row">{r.anchor}</th>
+    <tr aria-selected={picked}>
+      <th scope="row">
+        <button class="id" aria-expanded={picked} data-testid={`why-${r.anchor}`} onClick={pick}>
+          {r.anchor}
+        </button>
+      </th>
       <td>
         <StatusChip status={r.status} />
         <span class="mut block wrap">{r.verdict === 'ok' ? '' : r.reason || VERDICT_WORDS[r.verdict]}</span>
@@ -247,13 +311,13 @@ function DraftRow({
       <td class="wrap">
         {passes(r) && left !== undefined ? (
           <>
-            <Mark shape="off" tone="off" /> left out{' '}
-            <button class="btn small" onClick={() => leave(null)}>
-              Take it after all
+            <Mark shape="off" tone="off" /> rejected{' '}
+            <button class="btn small" data-testid={`accept-${r.anchor}`} onClick={() => leave(null)}>
+              Accept
             </button>
             <input
               class="reason"
-              aria-label={`Why ${r.anchor} is left out`}
+              aria-label={`Why ${r.anchor} is rejected`}
               placeholder="why, goes into the note"
               maxLength={120}
               value={left}
@@ -262,26 +326,26 @@ function DraftRow({
           </>
         ) : passes(r) ? (
           <>
-            <Mark shape="ok" tone="ok" /> yes{' '}
+            <Mark shape="ok" tone="ok" /> accepted{' '}
             <button class="btn small" data-testid={`leave-${r.anchor}`} onClick={() => leave('')}>
-              Leave out
+              Reject
             </button>
           </>
         ) : (
           <>
-            <Mark shape="off" tone="off" /> no
+            <Mark shape="off" tone="off" /> withheld
             {failed.length ? `. ${failed.map((g) => `${gate_line(g)}.`).join(' ')}` : `, ${VERDICT_WORDS[r.verdict]}`}
           </>
         )}
         {may_override(r) &&
           (reason === undefined ? (
             <button class="btn small" onClick={() => set_reason('')}>
-              Publish it all the same
+              Accept all the same
             </button>
           ) : (
             <input
               class="reason"
-              aria-label={`Reason to publish ${r.anchor}`}
+              aria-label={`Reason to accept ${r.anchor}`}
               placeholder="why, for the record"
               maxLength={500}
               value={reason}

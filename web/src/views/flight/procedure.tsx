@@ -5,6 +5,7 @@ import { current_scene, link, now_ms, tick } from '../../state/store';
 import { bearing, fixed } from '../../ui/format';
 import { Chip, Mark, Q } from '../../ui/marks';
 import { Axes, Drawing, line, scale, ticks } from '../chart';
+import { AfterLanding } from './after_landing';
 import {
   flying,
   grid_measure,
@@ -78,6 +79,7 @@ export function Procedure() {
       ) : (
         p.reason && <p class="why">{sentence(p.reason)}</p>
       )}
+      {(p.status === 'done' || p.status === 'aborted') && <AfterLanding mission={p.mission} />}
       {p.ended && flying(p) && p.ended !== p.reason && <p class="why">Why it comes home: {p.ended}.</p>}
       {p.drone?.taken_over && (
         <div class="callout caution">

@@ -49,7 +49,14 @@ export function FlightsPanel() {
   const operator = may('operator');
   return (
     <section class="sys-p" data-testid="flights">
-      <h2>Flights</h2>
+      <div class="hd">
+        <h2>Flights</h2>
+        {may('operator') && (
+          <a class="btn small" href="#/import" data-testid="to-import">
+            Import a flight
+          </a>
+        )}
+      </div>
       {problem && (
         <div class="problem" role="status">
           <b>That did not work.</b> {problem}

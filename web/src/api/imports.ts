@@ -1,0 +1,58 @@
+/// A flight into this server, as a mission of its own that is finished when all rows are in.
+import { idempotency_key, request } from './client';
+import { call, type Wire } from './contract';
+import { num, obj, str } from '../live/messages';
+
+const BATCH = 5000; ///< rows in a request: some hundred kilobytes
+export interface Sent {
+  readonly mission: string;
+  readonly accepted: number;
+  readonly rejected: number;
+  readonly first_reason: string;
+}
+
+/// `progress`: share of the rows that are in. Stopping leaves what is in, and an unfinished mission is finished.
+export async function send_flight(
+  mission: Wire<'MissionCreate'>,
+  fixes: readonly object[],
+  ranges: readonly object[],
+  progress: (share: number) => void,
+): Promise<Sent> {
+  const { body } = await call('post', '/missions', {
+    query: { devices: false },
+    body: mission,
+    headers: { 'Idempotency-Key': idempotency_key() },
+  });
+  let accepted = 0,
+    rejected = 0,
+    done = 0,
+    first_reason = '';
+  try {
+    // A range waits on the server for the position after it.
+    for (const [path, rows] of [
+      ['/fixes', fixes],
+      ['/ranges', ranges],
+    ] as const)
+      for (let i = 0; i < rows.length; i += BATCH) {
+        const part = rows.slice(i, i + BATCH),
+          answer = obj(
+            await request('POST', `${path}?mission=${body.id}`, part.map((r) => JSON.stringify(r)).join('\n') + '\n', {
+              'Content-Type': 'application/x-ndjson',
+              'Idempotency-Key': idempotency_key(),
+            }),
+          );
+        accepted += num(answer?.accepted) ?? 0;
+        rejected += num(answer?.rejected) ?? 0;
+        const first = obj(Array.isArray(answer?.errors) ? answer.errors[0] : null);
+        first_reason ||= str(first?.detail) || str(first?.code);
+        progress((done += part.length) / (fixes.length + ranges.length));
+      }
+  } finally {
+    await call('post', '/missions/{id}/actions', {
+      path: { id: body.id },
+      body: { action: 'finish' },
+      headers: { 'Idempotency-Key': idempotency_key() },
+    });
+  }
+  return { mission: body.id, accepted, rejected, first_reason };
+}

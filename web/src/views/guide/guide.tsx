@@ -1,0 +1,100 @@
+/// The guide, as pages of the product: set up, fly, what each screen means, what to do when something is missing.
+import { useEffect } from 'preact/hooks';
+import './guide.css';
+import { page_for, page_of, PAGES, type Block, type Page } from './pages';
+
+export const Blocks = ({ blocks }: { blocks: readonly Block[] }) => (
+  <>
+    {blocks.map((b, i) =>
+      'p' in b ? (
+        <p key={i}>{b.p}</p>
+      ) : 'h' in b ? (
+        <h3 key={i}>{b.h}</h3>
+      ) : 'steps' in b ? (
+        <ol key={i}>
+          {b.steps.map((s) => (
+            <li key={s}>{s}</li>
+          ))}
+        </ol>
+      ) : 'list' in b ? (
+        <ul key={i}>
+          {b.list.map((s) => (
+            <li key={s}>{s}</li>
+          ))}
+        </ul>
+      ) : (
+        <div key={i} class="scrollx">
+          <table class="tbl">
+            <thead>
+              <tr>
+                {b.head.map((h) => (
+                  <th key={h} scope="col">
+                    {h}
+                  </th>
+                ))}
+              </tr>
+            </thead>
+            <tbody>
+              {b.rows.map((r) => (
+                <tr key={r[0]}>
+                  <th scope="row">{r[0]}</th>
+                  {r.slice(1).map((c) => (
+                    <td key={c}>{c}</td>
+                  ))}
+                </tr>
+              ))}
+            </tbody>
+          </table>
+        </div>
+      ),
+    )}
+  </>
+);
+
+export function Guide({ page: id }: { page: string | null }) {
+  const page = page_of(id),
+    groups = [...new Set(PAGES.map((p) => p.group))];
+  useEffect(() => {
+    document.title = `${page.title} - anchord guide`;
+  }, [page]);
+  return (
+    <div class="guide" data-testid="guide">
+      <nav class="guidenav" aria-label="Pages of the guide">
+        {groups.map((g) => (
+          <div key={g}>
+            <h2>{g}</h2>
+            <ul>
+              {PAGES.filter((p) => p.group === g).map((p) => (
+                <li key={p.id}>
+                  <a href={`#/guide/${p.id}`} aria-current={p === page ? 'page' : undefined}>
+                    {p.title}
+                  </a>
+                </li>
+              ))}
+            </ul>
+          </div>
+        ))}
+      </nav>
+      <article class="guidepage" tabIndex={0} aria-label={page.title}>
+        <h1>{page.title}</h1>
+        <Blocks blocks={page.blocks} />
+      </article>
+    </div>
+  );
+}
+
+/// In the help sheet: the page for what is on the screen.
+export function GuideSheet({ hash, close }: { hash: string; close: () => void }) {
+  const page: Page = page_of(page_for(hash));
+  return (
+    <div class="guidepage insheet" data-testid="help-page">
+      <h3>{page.title}</h3>
+      <Blocks blocks={page.blocks} />
+      <p>
+        <a class="btn small" href={`#/guide/${page.id}`} onClick={close}>
+          All pages of the guide
+        </a>
+      </p>
+    </div>
+  );
+}

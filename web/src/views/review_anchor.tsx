@@ -1,0 +1,30 @@
+/// One anchor of a calibration under review: where it is among the others, why, error budget, residuals, history.
+import type { AnchorRow } from '../api/anchors';
+import { MapBox } from '../map/map_box';
+import { AnchorDetail } from './anchor_detail';
+
+const nothing = (): void => undefined;
+
+export function ReviewAnchor({
+  row,
+  rows,
+  pick,
+}: {
+  row: AnchorRow;
+  rows: readonly AnchorRow[];
+  pick: (anchor: string) => void;
+}) {
+  return (
+    <section class="reviewed" aria-label={`Anchor ${row.anchor}`} data-testid="review-anchor">
+      <MapBox
+        content={() => ({ anchors: rows, selected: row.anchor, scene: null, link_lost: false, running: false })}
+        onSelect={pick}
+        label="Map of the anchors under review"
+        follow={false}
+        version={row}
+        zero="the origin of the calibration"
+      />
+      <AnchorDetail row={row} live={false} draft changed={nothing} />
+    </section>
+  );
+}

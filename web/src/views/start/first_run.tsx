@@ -1,0 +1,96 @@
+/// No flight yet: three ways to the first one. The demonstration is flown by the server itself, through the same door as a real flight.
+import { useEffect, useState } from 'preact/hooks';
+import './start.css';
+import { error_text } from '../../api/client';
+import { idempotency_key } from '../../api/client';
+import { call } from '../../api/contract';
+import { may } from '../../state/session';
+import { CopyBox } from '../../ui/copy_box';
+
+const SPEED = 4; ///< times real time: a minute to the first positions of anchors
+
+export function FirstRun() {
+  const [busy, set_busy] = useState(false),
+    [problem, set_problem] = useState(''),
+    able = may('operator');
+  useEffect(() => {
+    document.title = 'First flight - anchord';
+  }, []);
+  const fly = async (): Promise<void> => {
+    set_busy(true);
+    set_problem('');
+    try {
+      await call('post', '/demonstration', {
+        body: { speed: SPEED },
+        headers: { 'Idempotency-Key': idempotency_key() },
+      });
+      // The flight is on the stream in a moment, and Live shows it.
+    } catch (e) {
+      set_problem(error_text(e));
+      set_busy(false);
+    }
+  };
+  const url = new URL('.', document.baseURI.split('#')[0]).toString().replace(/\/$/, '');
+  return (
+    <div class="firstrun" data-testid="first-run">
+      <div class="start">
+        <h1>No flight yet</h1>
+        <p class="lead">
+          {able
+            ? 'Three ways to the first one. All of them work without internet.'
+            : 'An operator starts the first one; this page shows it as it arrives.'}
+        </p>
+        {problem && (
+          <div class="problem" role="alert">
+            <b>The demonstration did not start.</b> {problem}
+          </div>
+        )}
+        {able && (
+          <div class="choicesbig">
+            <section>
+              <h2>See how it works</h2>
+              <p>
+                A simulated drone flies round a building with six anchors, four times as fast as a real one. It needs no
+                hardware and takes a minute.
+              </p>
+              <button class="btn primary" data-testid="fly-demonstration" disabled={busy} onClick={() => void fly()}>
+                {busy ? 'Starting' : 'Fly the demonstration'}
+              </button>
+            </section>
+            <section>
+              <h2>Fly for real</h2>
+              <p>
+                Plug in the UWB tag and the RTK receiver. System finds them, shows whether each is measuring, and
+                compares their radio settings; the guide says how to mount them.
+              </p>
+              <span class="rowed">
+                <a class="btn primary" href="#/system" data-testid="connect-devices">
+                  Connect my devices
+                </a>
+                <a class="btn" href="#/guide/mounting">
+                  Guide
+                </a>
+              </span>
+            </section>
+            <section>
+              <h2>Bring a flight</h2>
+              <p>
+                A folder, tables (.csv) or an archive (.zip) of a flight that was flown already. Columns with other
+                names are told on a page.
+              </p>
+              <a class="btn primary" href="#/import" data-testid="import-flight">
+                Import a flight
+              </a>
+            </section>
+          </div>
+        )}
+        <details>
+          <summary>The same from a shell</summary>
+          <CopyBox text="anchord simulate flight --seed 7 --out demo-flight" />
+          <CopyBox text={`anchord replay demo-flight --url ${url} --speed 4`} />
+          <CopyBox text="anchord import flight DIR" />
+        </details>
+      </div>
+    </div>
+  );
+}
