@@ -39,10 +39,10 @@ class SqliteDatabase final : public Database, private sql::Gate {
                  std::unique_ptr<SqliteConnection> writer, bool check_in_background)
       : options_(std::move(options)),
         folder_(std::move(folder)),
-        writer_(
-            std::move(writer), [this] { return open_connection(Mode::read_write); },
-            [this] { return folder_->give_up_reserve(); },
-            {options_.max_queued_rows, options_.max_queued_calls, options_.checkpoint_wal_bytes}),
+        writer_(std::move(writer), [this] { return open_connection(Mode::read_write); },
+                {[this] { return folder_->give_up_reserve(); },
+                 [this] { folder_->fill_reserve(options_.warn_free_bytes); }},
+                {options_.max_queued_rows, options_.max_queued_calls, options_.checkpoint_wal_bytes}),
         readers_([this] { return open_connection(Mode::read_only); }, options_.readers),
         kept_(*this, [this] { return admit_mission(); }) {
     if (check_in_background) checker_ = Thread("anchord-check", [this] { check_in_background_thread(); });
@@ -66,7 +66,6 @@ class SqliteDatabase final : public Database, private sql::Gate {
     health.disk_free_bytes = folder_->free_bytes();
     health.schema_version = newest_schema_version();
     health.synchronous = options_.synchronous;
-    folder_->fill_reserve(options_.warn_free_bytes);
     judge(health, status);
     return health;
   }

@@ -15,10 +15,10 @@ constexpr std::uint64_t k_page_bytes = 8192;
 
 }  // namespace
 
-WriteQueue::WriteQueue(std::unique_ptr<SqliteConnection> connection, Open open,
-                       std::function<bool()> give_up_reserve, Limits limits)
+WriteQueue::WriteQueue(std::unique_ptr<SqliteConnection> connection, Open open, Reserve reserve,
+                       Limits limits)
     : open_(std::move(open)),
-      give_up_reserve_(std::move(give_up_reserve)),
+      reserve_(std::move(reserve)),
       limits_(limits),
       connection_(std::move(connection)),
       thread_("anchord-writer", [this] { run(); }) {}
@@ -69,6 +69,7 @@ void WriteQueue::run() {
         // A database that fell away is tried again also when nobody writes, so that readiness comes back by
         // itself.
         if (connection_ == nullptr) ensure_connection();
+        if (!status().trouble) reserve_.fill();
       });
       const auto shared = shared_.lock();
       if (shared->stopping && shared->queue.empty()) break;
@@ -112,7 +113,7 @@ void WriteQueue::commit(Group& group) {
     attempt(group);
     return;
   } catch (const SqlError& error) {
-    const bool retry = error.failure() == Failure::full && (give_up_reserve_() || group.size() > 1);
+    const bool retry = error.failure() == Failure::full && (reserve_.give_up() || group.size() > 1);
     if (!retry) return fail(group, error);
   }
   // Space was found, or perhaps a large call is in the way of small ones: each for itself.

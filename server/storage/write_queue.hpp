@@ -34,10 +34,14 @@ class WriteQueue {
   };
   using Open = std::function<std::unique_ptr<SqliteConnection>()>;
 
-  /// `open` makes a new connection after a failure; `give_up_reserve` frees disk space once and says whether
-  /// it did.
-  WriteQueue(std::unique_ptr<SqliteConnection> connection, Open open, std::function<bool()> give_up_reserve,
-             Limits limits);
+  /// Of disk space, touched by the writer's thread alone.
+  struct Reserve {
+    std::function<bool()> give_up;  ///< frees space once and says whether it did
+    std::function<void()> fill;     ///< when nothing is to be written and the last write went well
+  };
+
+  /// `open` makes a new connection after a failure.
+  WriteQueue(std::unique_ptr<SqliteConnection> connection, Open open, Reserve reserve, Limits limits);
   /// Finishes what is queued, checkpoints, closes.
   ~WriteQueue();
 
@@ -71,7 +75,7 @@ class WriteQueue {
   void checkpoint_if(bool due);
 
   const Open open_;
-  const std::function<bool()> give_up_reserve_;
+  const Reserve reserve_;
   const Limits limits_;
 
   // Of the writer's thread only.

@@ -155,6 +155,23 @@ TEST_F(StorageFailure, GivesUpItsReserveBeforeItAnswersFull) {
   EXPECT_FALSE(std::filesystem::exists(reserve));
 }
 
+// Where a file system cannot set space aside, it is filled byte by byte: nothing that alarms and heartbeats
+// wait for.
+TEST_F(StorageFailure, MakesItsReserveAnewWhenNothingIsWrittenAndNobodyAsks) {
+  options_.reserve_bytes = 1u << 20;
+  options_.warn_free_bytes = 0;
+  const auto db = open();
+  const auto reserve = options_.data_dir / "reserve.bin";
+  ASSERT_TRUE(std::filesystem::remove(reserve));
+  std::error_code error;
+  for (const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+       std::filesystem::file_size(reserve, error) != options_.reserve_bytes &&
+       std::chrono::steady_clock::now() < end;) {
+    std::this_thread::yield();
+  }
+  EXPECT_EQ(std::filesystem::file_size(reserve, error), options_.reserve_bytes);
+}
+
 TEST_F(StorageFailure, TakesNoNewMissionWhenSpaceIsScarceButRowsOfARunningOne) {
   const MissionId mission = filled(1);
   options_.refuse_free_bytes = std::uint64_t{1} << 60;
