@@ -22,7 +22,7 @@ void print(const std::vector<Finding>& findings) {
 void print_json(const std::vector<Finding>& findings) {
   auto out = nlohmann::ordered_json::array();
   for (const auto& f : findings)
-    out.push_back({{"level", word(f.level)}, {"what", f.what}, {"seen", f.seen}, {"advice", f.advice}});
+    out.push_back({{"level", k_finding_words.word(f.level)}, {"what", f.what}, {"seen", f.seen}, {"advice", f.advice}});
   std::printf("%s\n", to_wire(out).c_str());
 }
 
