@@ -130,12 +130,12 @@ int train(const TrainArguments& a) {
   const auto& [data, report, frozen_test, digest, not_for_live, feature_set] = gathered.value();
 
   ml::TrainingSpec spec;
-  spec.task = *task;
+  spec.task = a.task;
   spec.features = a.features;
   spec.folds = a.folds;
   spec.seed = a.seed;
   spec.methods = methods;
-  spec.engine = engine;
+  spec.engine = a.engine;
   spec.per_placement = a.per_placement;
   spec.search = a.grid;
   spec.threads = a.threads;

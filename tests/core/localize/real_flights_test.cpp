@@ -39,7 +39,7 @@ std::string verdicts(const FlightSolution& solution) {
   std::map<std::string, int> count;
   for (const auto& anchor : solution.anchors) {
     const bool none = anchor.determined == Determined::none;
-    ++count[none ? "undetermined" : std::string(word(anchor.estimate.verdict))];
+    ++count[none ? "undetermined" : std::string(k_verdict_words.word(anchor.estimate.verdict))];
   }
   std::string text;
   for (const auto& [verdict, n] : count)

@@ -124,7 +124,7 @@ TEST(Recorder, ADiskThatIsGoneIsToldAndForgottenWhenItIsBack) {
   RecorderOptions options;
   options.sync_every_ms = 1;
   const auto recorder = Recorder::open(folder.path, k_start, options).value();
-  const auto until = [&, n = std::int64_t{0}](auto holds) mutable {
+  auto until = [&, n = std::int64_t{0}](auto holds) mutable {
     for (const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
          !holds(recorder->failed()) && std::chrono::steady_clock::now() < end; ++n)
       recorder->take({EventKind::bytes, 3, {UtcTime{n}, n}, "a chunk of bytes"});
