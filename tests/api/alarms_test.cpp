@@ -206,7 +206,7 @@ TEST_F(Alarms, AreQuietOnceAcknowledgedUntilTheyGetWorse) {
 }
 
 /// Devices of which only the clock matters here.
-class ClockOnly final : public DeviceControl {
+class ClockOnly final : public NoDevices {
  public:
   void set(const std::string& skew) {
     const std::scoped_lock lock(mutex_);
@@ -222,20 +222,8 @@ class ClockOnly final : public DeviceControl {
     if (!throws_.empty()) throw std::runtime_error(throws_);
     return {true, 0.0, 0.02, skew_};
   }
-  std::vector<DeviceReport> devices() override { return {}; }
-  Result<DeviceReport> device(const Uuid&) override { return none(); }
-  Result<DeviceReport> add(DeviceConfig) override { return none(); }
-  Result<DeviceReport> change(DeviceConfig, std::uint64_t) override { return none(); }
-  Result<void> remove(const Uuid&, std::uint64_t) override { return none(); }
-  Result<std::string> act(const Uuid&, std::string_view, std::string_view) override { return none(); }
-  std::vector<DiscoveredDevice> discover() override { return {}; }
-  std::vector<DiscoveredDevice> discovered() override { return {}; }
-  void record_into(const std::optional<MissionId>&) override {}
-  std::optional<MissionId> recording_into() override { return {}; }
-  std::string recorder_failure() override { return {}; }
 
  private:
-  static Error none() { return make_error(Errc::not_found, "no device"); }
   std::mutex mutex_;
   std::string skew_, throws_;
 };

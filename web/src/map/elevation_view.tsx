@@ -15,7 +15,7 @@ import type { ElevationProps } from './elevation_props';
 import { elevation_shown } from './elevation_shown';
 import { read_palette, status_colour, trail_style, type Palette } from './palette';
 import type { Content } from './picture';
-import { anchor_symbol, drone, label, reticle, type Box, type Ctx } from './symbols';
+import { anchor_symbol, drone, label, mirror_dots, reticle, type Box, type Ctx } from './symbols';
 
 /// Chosen by hand; null looks along the building.
 const turned = signal<number | null>(null);
@@ -225,15 +225,7 @@ function draw_elevation(
     interval(c, p, x, y, intervals95(a, bearing_deg), picture, colour, false);
     if (!a.mirror?.enu_m) continue;
     const [mx, my] = [s(a.mirror.enu_m), picture.y(a.mirror.enu_m[2])];
-    c.save();
-    c.strokeStyle = p.caution;
-    c.lineWidth = 1;
-    c.setLineDash([2, 4]);
-    c.beginPath();
-    c.moveTo(x, y);
-    c.lineTo(mx, my);
-    c.stroke();
-    c.restore();
+    mirror_dots(c, p, x, y, mx, my);
     interval(c, p, mx, my, intervals95(a, bearing_deg), picture, colour, true);
     c.save();
     c.strokeStyle = colour;

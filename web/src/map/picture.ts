@@ -6,7 +6,7 @@ import { to_px, type Camera } from './camera';
 import { round_length } from './enu';
 import { draw_flight, numbered, type FlightPicture } from './flight_layer';
 import { range_colour, status_colour, trail_style, type Palette } from './palette';
-import { anchor_symbol, drone, ellipse_at, label, reticle, type Box, type Ctx } from './symbols';
+import { anchor_symbol, drone, ellipse_at, label, mirror_dots, reticle, type Box, type Ctx } from './symbols';
 
 export interface Content {
   readonly anchors: readonly EstimateMsg[];
@@ -107,14 +107,10 @@ function mirrored(a: EstimateMsg): NonNullable<EstimateMsg['ellipse95']> {
   return { ...a.ellipse95!, azimuth_deg: 2 * axis_deg - a.ellipse95!.azimuth_deg };
 }
 function mirror_link(c: Ctx, p: Palette, x: number, y: number, mx: number, my: number): void {
+  mirror_dots(c, p, x, y, mx, my);
   c.save();
   c.strokeStyle = p.caution;
   c.lineWidth = 1;
-  c.setLineDash([2, 4]);
-  c.beginPath();
-  c.moveTo(x, y);
-  c.lineTo(mx, my);
-  c.stroke();
   // The line both candidates mirror in, a little longer than the picture needs
   const [cx, cy, l] = [(x + mx) / 2, (y + my) / 2, Math.hypot(mx - x, my - y) || 1];
   const [ux, uy] = [-(my - y) / l, (mx - x) / l];

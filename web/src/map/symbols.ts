@@ -6,6 +6,19 @@ import { status_colour } from './palette';
 export type Ctx = CanvasRenderingContext2D;
 const TURN = Math.PI * 2;
 
+/// Dots between an anchor and its mirror solution.
+export function mirror_dots(c: Ctx, p: Palette, x: number, y: number, mx: number, my: number): void {
+  c.save();
+  c.strokeStyle = p.caution;
+  c.lineWidth = 1;
+  c.setLineDash([2, 4]);
+  c.beginPath();
+  c.moveTo(x, y);
+  c.lineTo(mx, my);
+  c.stroke();
+  c.restore();
+}
+
 function tick(c: Ctx, x: number, y: number, r: number): void {
   c.beginPath();
   c.moveTo(x - r * 0.48, y + r * 0.05);
