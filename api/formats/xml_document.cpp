@@ -34,7 +34,7 @@ Error at_line(std::string_view text, std::ptrdiff_t offset, const std::string& w
 struct DepthWalker : pugi::xml_tree_walker {
   pugi::xml_node too_deep;
   bool for_each(pugi::xml_node& node) override {
-    if (depth() > k_deepest) too_deep = node;
+    if (node.type() == pugi::node_element && depth() >= k_deepest) too_deep = node;  // the first has depth 0
     return !too_deep;
   }
 };
