@@ -134,6 +134,9 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
   const { page, seen, id } = await openPage(browser, server);
   await id('open-checklist').click({ timeout: 20_000 });
   await id('check-props').waitFor();
+  // Alarms sound only after a tap: the checklist offers it, and does not wait for it.
+  await id('check-sound').getByRole('button').click();
+  await id('check-sound').waitFor({ state: 'detached' });
   assert.equal(await id('cmd-start').isEnabled(), false);
   await eventually(
     'RTK is fixed for 10 s',
