@@ -1,8 +1,11 @@
 #include "api/formats/report_sections.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
+#include <span>
+#include <string_view>
 
 #include "api/formats/report_svg.hpp"
 #include "api/wire/live_writer.hpp"
@@ -81,10 +84,78 @@ std::vector<std::string> gate_names(const Report& report) {
   return names;
 }
 
+constexpr std::size_t k_gate_columns = 6;
+
+/// What a gate asks, in the words of the dashboard (web/src/ui/gates.ts), and how its numbers are read.
+struct GateWords {
+  std::string_view name, asks, unit;
+  bool least{false};  ///< the value has to be at least the limit; else at most
+};
+constexpr std::array k_gate_words{
+    GateWords{"redundancy", "Ranges beyond the unknowns", "", true},
+    GateWords{"rejected", "Ranges rejected", "%"},
+    GateWords{"geometry", "Width of the track for its distance", "%", true},
+    GateWords{"precision", "Largest σ for its distance", "%"},
+    GateWords{"side", "The mirror solution is excluded", "%", true},
+    GateWords{"outline", "Outside the outline of the building", "m"},
+    GateWords{"blocked", "Residuals against those of the other anchors", "×"},
+    GateWords{"residual_scale", "Size of the residuals", "m"},
+    GateWords{"chi_square", "Residuals average out over time", "χ²"},
+    GateWords{"halves", "The two halves of the flight agree", "χ²"},
+    GateWords{"flights", "The flights agree", "χ²"},
+    GateWords{"moved", "It is where it was", "χ²"},
+    GateWords{"bias", "Range bias of the kit, σ", "m"},
+    GateWords{"lever_arm", "The lever arm fits the flight", "σ"},
+    GateWords{"settled", "Rounds until the joint solution settled", ""},
+    GateWords{"goal_h95_m", "95 % horizontal", "m"},
+    GateWords{"goal_v95_m", "95 % vertical", "m"},
+};
+GateWords words_of(std::string_view name) {
+  const auto it = std::ranges::find(k_gate_words, name, &GateWords::name);
+  return it == k_gate_words.end() ? GateWords{name, name, ""} : *it;
+}
+std::string gate_number(double value, double limit, const GateWords& words) {
+  const bool share = words.unit == "%";
+  return fixed(share ? 100 * value : value, share || words.unit.empty() ? 0 : limit >= 10 ? 1 : 2);
+}
+
+std::string gate_row(std::span<const ReportAnchor> anchors, const std::string& name) {
+  const GateWords words = words_of(name);
+  std::string cells, limit = "–";
+  for (const auto& anchor : anchors) {
+    const auto gate = std::ranges::find(anchor.estimate.gates, name, &Gate::name);
+    if (gate == anchor.estimate.gates.end()) {
+      cells += cell("–", "num mut");
+      continue;
+    }
+    limit = (words.least ? "≥ " : "≤ ") + gate_number(gate->limit, gate->limit, words) +
+            (words.unit.empty() ? "" : " " + std::string(words.unit));
+    cells +=
+        cell((gate->passed ? "" : "✕ ") + (gate->value ? gate_number(*gate->value, gate->limit, words) : "–"),
+             gate->passed ? "num" : "num bad");
+  }
+  return "<tr><td>" + html_text(spaced(std::string(words.asks))) + "</td>" + cell(limit, "num mut") + cells +
+         "</tr>";
+}
+
+/// Where an error comes from, in the words of the dashboard (web/src/ui/words.ts).
+std::string source_words(const std::string& source) {
+  constexpr std::array words{std::pair{"ranging", "noise of the ranges"},
+                             std::pair{"geometry", "geometry of the flight"},
+                             std::pair{"bias", "range bias"},
+                             std::pair{"rtk", "RTK positions"},
+                             std::pair{"clock", "time lag"},
+                             std::pair{"base", "base station"},
+                             std::pair{"floor", "what no residual shows"}};
+  const auto it = std::ranges::find(words, source, [](const auto& w) { return std::string(w.first); });
+  return it == words.end() ? spaced(source) : it->second;
+}
+
 std::string failures(const ReportAnchor& anchor) {
   std::string out;
   for (const auto& gate : anchor.estimate.gates) {
-    if (!gate.passed) out += (out.empty() ? "" : "; ") + spaced(gate.name) + ": " + gate.why;
+    if (!gate.passed)
+      out += (out.empty() ? "" : "; ") + spaced(std::string(words_of(gate.name).asks)) + ": " + gate.why;
   }
   return out;
 }
@@ -123,33 +194,23 @@ std::string gates(const Report& report) {
     return "<h2>Acceptance gates</h2><p class=\"note\">This calibration was made without gates; nothing of "
            "it is "
            "accepted without a person.</p>";
-  std::string out = "<h2>Acceptance gates</h2><table><thead><tr>" + head("Anchor", false);
-  for (const auto& name : names) out += head(html_text(spaced(name)));
-  out += "</tr></thead><tbody>";
+  std::string out = "<h2>Acceptance gates</h2>";
+  // A gate a row and a few anchors beside each other: so it fits the page, however many there are of either.
+  for (std::size_t from = 0; from < report.anchors.size(); from += k_gate_columns) {
+    const auto some =
+        std::span(report.anchors).subspan(from, std::min(k_gate_columns, report.anchors.size() - from));
+    out += "<table class=\"gates\"><thead><tr>" + head("What is asked", false) + head("Limit");
+    for (const auto& anchor : some) out += head(html_text(name_of(anchor)));
+    out += "</tr></thead><tbody>";
+    for (const auto& name : names) out += gate_row(some, name);
+    out += "</tbody></table>";
+  }
   std::string words;
   for (const auto& anchor : report.anchors) {
-    out += "<tr><td><b>" + html_text(name_of(anchor)) + "</b></td>";
-    for (const auto& name : names) {
-      const auto& all = anchor.estimate.gates;
-      const auto gate = std::ranges::find(all, name, &Gate::name);
-      if (gate == all.end()) {
-        out += cell("–", "num mut");
-        continue;
-      }
-      const int decimals = gate->limit >= 10 ? 1 : 2;
-      const std::string value = gate->value ? fixed(*gate->value, decimals) : "–";
-      out += cell((gate->passed ? "" : "✕ ") + value + " <span class=\"u\">| " +
-                      fixed(gate->limit, decimals) + "</span>",
-                  gate->passed ? "num" : "num bad");
-    }
-    out += "</tr>";
     const std::string why = failures(anchor);
     if (!why.empty()) words += " <b>" + html_text(name_of(anchor)) + "</b> " + html_text(why) + ".";
   }
-  return out +
-         "</tbody></table><p class=\"note\">Value | limit; ✕ failed. Only an anchor that passes all is "
-         "accepted "
-         "without a person." +
+  return out + "<p class=\"note\">✕ failed. Only an anchor that passes all is accepted without a person." +
          words + "</p>";
 }
 
@@ -195,11 +256,11 @@ std::string budgets(const Report& report) {
   }
   if (rows.empty()) return {};
   std::string out = "<h2>Error budget</h2><table><thead><tr>" + head("Anchor", false);
-  for (const auto& source : sources) out += head(html_text(spaced(source)));
+  for (const auto& source : sources) out += head(html_text(source_words(source)));
   return out + head("What would help most", false) + "</tr></thead><tbody>" + rows +
          "</tbody></table><p class=\"note\">Shares of the covariance's trace: what goes when the source is "
          "known "
-         "perfectly. Floor: what no residual shows.</p>";
+         "perfectly.</p>";
 }
 
 std::string rejected(const Report& report) {

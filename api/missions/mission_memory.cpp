@@ -99,6 +99,8 @@ std::optional<MissionService::LiveView> MissionService::State::read_before(const
 void MissionService::State::forget_reads(const std::optional<MissionId>& id) {
   auto kept = reads.lock();
   std::erase_if(*kept, [&](const Read& read) { return !id || read.id == *id; });
+  auto over_time = histories.lock();
+  std::erase_if(*over_time, [&](const History& one) { return !id || one.id == *id; });
 }
 
 }  // namespace anchord::api

@@ -180,6 +180,16 @@ Work work_of_action(const Request& request) {
 }
 
 /// The flown way as one GeoJSON line (in a local frame as local_m), a page of at most 10 000 points.
+Response estimates_over_time(MissionApi& s, const Request& request) {
+  check_query(request, {});
+  const auto text = s.missions.estimates_over_time(named_mission(s, request).id);
+  if (!text) throw_problem(503, "storage", "the stored rows of this flight cannot be read now: ask again");
+  Response response;
+  response.body = *text;
+  response.header("Content-Type", "application/json");
+  return response;
+}
+
 Response track(MissionApi& s, const Request& request) {
   check_query(request, {"limit", "cursor", "since", "until"});
   const auto mission = named_mission(s, request);
@@ -243,6 +253,7 @@ void add_mission_routes(Router& router, MissionApi& s) {
   router.add(keeps_always(std::move(actions)));
   router.add({Method::get, "/api/v1/missions/{id}/events", readers(), on(events)});
   router.add(as_heavy({Method::get, "/api/v1/missions/{id}/track", readers(), on(track)}));
+  router.add(as_heavy({Method::get, "/api/v1/missions/{id}/estimates", readers(), on(estimates_over_time)}));
   router.add({Method::get, "/api/v1/events", readers(), on(events)});
 }
 

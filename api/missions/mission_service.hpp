@@ -123,7 +123,11 @@ class MissionService {
   /// followed they are computed from what the store holds (seconds for a long flight), and the answer alone
   /// is kept for a minute.
   std::vector<LiveView> live(const std::optional<MissionId>& id);
-  /// The same for whoever must not wait: nothing while its rows are worked off, and then what they gave as
+  /// What was estimated at some 240 moments of a flight, as the body {items, next_cursor} of running
+  /// estimates; computed from the stored rows as they came (seconds for a long flight), one flight at a time.
+  /// Null: the store failed, or the server stops.
+  std::shared_ptr<const std::string> estimates_over_time(const MissionId& id);
+  /// live() for whoever must not wait: nothing while its rows are worked off, and then what they gave as
   /// soon as they are.
   std::optional<LiveView> live_at_hand(const MissionId& id);
 

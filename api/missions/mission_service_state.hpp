@@ -79,7 +79,8 @@ struct MissionService::Flight {
 
 /// What the service is inside: the shell round one flight::LiveMission for each mission. Its parts are in
 /// mission_live.cpp (queue and strand), mission_events.cpp (what it tells, to the world),
-/// mission_rebuild.cpp (what was stored, after a restart), mission_joint.cpp (the joint solution in flight)
+/// mission_rebuild.cpp (what was stored, after a restart), mission_history.cpp (what was estimated when),
+/// mission_joint.cpp (the joint solution in flight)
 /// and mission_memory.cpp (which are in memory, and what a reader of the others gets).
 struct MissionService::State : std::enable_shared_from_this<MissionService::State> {
   explicit State(Deps d) : deps(std::move(d)) {}
@@ -108,6 +109,14 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   };
   std::mutex reading_one;          ///< one flight is read at a time: each takes the memory of a live one
   Locked<std::deque<Read>> reads;  ///< newest last
+  /// What a flight estimated over time, as the body that tells it.
+  struct History {
+    MissionId id{};
+    std::uint64_t n_ranges{}, n_fixes{};
+    SteadyTime made{};
+    std::shared_ptr<const std::string> text;
+  };
+  Locked<std::deque<History>> histories;  ///< newest last
 
   SteadyTime steady_now() const { return deps.steady.now(); }
   std::vector<std::shared_ptr<Flight>> all() {
@@ -161,6 +170,8 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   std::optional<LiveView> read(const MissionId& id);
   std::optional<LiveView> read_before(const Read& now);
   void forget_reads(const std::optional<MissionId>& id);
+  std::shared_ptr<const std::string> replayed(const Mission& mission);
+  std::optional<double> length_of(const MissionId& id) const;
   static flight::LiveMission::JointProblem joint_problem(flight::LiveMission& live,
                                                          const std::string& outline);
   std::string outline_of(const Mission& mission) const;

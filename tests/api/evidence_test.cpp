@@ -222,11 +222,14 @@ TEST_F(EvidenceRoutes, TheReportIsOnePageThatRunsNothing) {
   const std::string& html = page.body;
   EXPECT_EQ(header(page, "Content-Type"), "text/html; charset=utf-8");
   for (const char* part : {"<svg class=\"map\"", "Acceptance gates", "Ranges not used", "Error per iteration",
-                           "Calibration of the kit", "Checked by", "quad-03"})
+                           "Calibration of the kit", "Checked by", "quad-03", "Ranges beyond the unknowns",
+                           "The two halves of the flight agree"})
     EXPECT_NE(html.find(part), std::string::npos) << part;
   for (const char* part : {"<script", "http://", "https://", "url(", "@import", "<b>,", "flight 3 <b>"})
     EXPECT_EQ(html.find(part), std::string::npos) << part;
   EXPECT_NE(html.find("flight 3 &lt;b&gt;"), std::string::npos);
+  for (const char* raw : {">redundancy<", ">halves<", ">blocked<", ">chi square<"})
+    EXPECT_EQ(html.find(raw), std::string::npos) << raw << " is a word of the code";
   EXPECT_EQ(get("/api/v1/calibrations/" + calibration["id"].get<std::string>() + "/report").body, html);
 }
 

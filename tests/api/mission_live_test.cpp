@@ -34,6 +34,37 @@ TEST_F(MissionLive, GoesOnAfterARestartWhereItWas) {
   }
 }
 
+/// A page that is opened late, and a replay: every moment as it was, the end as it is.
+TEST_F(MissionLive, TellsWhatWasEstimatedWhen) {
+  const MadeFlight made;
+  const auto flight = streamed(made);
+  const auto id = mission("local");
+  EXPECT_TRUE(json(get("/api/v1/missions/" + id + "/estimates"))["items"].empty());
+  deliver(id, flight, 0, 120.5);
+  ASSERT_EQ(post("/api/v1/missions/" + id + "/actions", R"({"action":"finish"})").status, 200);
+  const auto items = json(get("/api/v1/missions/" + id + "/estimates"))["items"];
+  std::map<std::string, std::vector<Json>> over_time;
+  std::int64_t last_us = 0;
+  for (const auto& one : items) {
+    over_time[one["anchor"]].push_back(one);
+    EXPECT_EQ(one["mission"], id);
+    EXPECT_LE(one["t_us"].get<std::int64_t>(), k_start_us + 120'500'000);
+    last_us = std::max(last_us, one["t_us"].get<std::int64_t>());
+  }
+  ASSERT_EQ(over_time.size(), 4U);
+  EXPECT_GT(last_us, k_start_us + 110'000'000);
+  for (const auto& [anchor, points] : over_time) {
+    EXPECT_GE(points.size(), 20U) << anchor;
+    EXPECT_LE(points.size(), 61U) << "every two seconds of two minutes";
+    // It begins with few ranges and ends with all of them, and the last one is what the flight gives now.
+    EXPECT_LT(3 * points.front()["n_ranges"].get<int>(), points.back()["n_ranges"].get<int>()) << anchor;
+    const auto& truth = made.anchors.at(std::stoul(anchor, nullptr, 16) - 0x6000);
+    const auto at = points.back()["enu_m"].get<std::vector<double>>();
+    EXPECT_LT((Eigen::Vector3d(at.at(0), at.at(1), at.at(2)) - truth).norm(), 0.3) << points.back().dump();
+  }
+  EXPECT_EQ(get("/api/v1/missions/01a20000-0000-7000-8000-000000000000/estimates").status, 404);
+}
+
 /// Rows reach the live flight while it is still reading what was stored: none is lost, none counted twice.
 TEST_F(MissionLive, TakesRowsThatComeWhileItReadsWhatWasStored) {
   const auto flight = streamed(MadeFlight{});

@@ -134,6 +134,9 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
   const { page, seen, id } = await openPage(browser, server);
   await id('open-checklist').click({ timeout: 20_000 });
   await id('check-props').waitFor();
+  // Alarms sound only after a tap: the checklist offers it, and does not wait for it.
+  await id('check-sound').getByRole('button').click();
+  await id('check-sound').waitFor({ state: 'detached' });
   assert.equal(await id('cmd-start').isEnabled(), false);
   await eventually(
     'RTK is fixed for 10 s',
@@ -269,6 +272,23 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
   for (const { network_id } of anchors) assert.ok(await report.getByText(network_id).count(), network_id);
   assert.ok(provenance.n_clues > 0, 'what the turn and the height search told went into it');
   await picture(report, 'report-light');
+  // It fits the page to print on, and a phone.
+  const widest = () =>
+    report.evaluate(() => {
+      const { right } = document.querySelector('.sheet').getBoundingClientRect();
+      return Math.max(
+        document.documentElement.scrollWidth - innerWidth,
+        ...[...document.querySelectorAll('.sheet > *')].map((x) => x.getBoundingClientRect().right - right),
+      );
+    });
+  await report.setViewportSize({ width: 390, height: 844 });
+  assert.ok((await widest()) <= 1, `phone: ${await widest()} px too wide`);
+  await picture(report, 'report-phone');
+  await report.setViewportSize({ width: 680, height: 1000 }); // A4 without its margins, at 96 dots an inch
+  await report.emulateMedia({ media: 'print' });
+  assert.ok((await widest()) <= 1, `A4: ${await widest()} px too wide`);
+  await picture(report, 'report-print');
+  await report.emulateMedia({ media: 'screen' });
   await report.close();
   // So short a flight leaves anchors that lack something: a plan about those, to look at and to save.
   const lacking = Number(/(\d+)$/.exec(await text(id('fly-again')))[1]);

@@ -436,6 +436,17 @@ test('a stored flight is replayed: time moves, a jump shows that moment, and no 
   await id('scrubber').fill('30000000');
   await eventually('it is at 30 s', async () => (await text(id('replay-time'))).startsWith('00:00:30'));
   assert.ok((await id('range-list').locator('tbody tr').count()) >= 3);
+  // Positions are of that moment: what the server says was estimated then, not what the whole flight gave.
+  await page.locator('[data-testid="replay"][data-positions="moment"]').waitFor({ timeout: 60_000 });
+  const [mission] = (await get('/api/v1/missions')).items,
+    { items } = await get(`/api/v1/missions/${mission.id}/estimates`),
+    from_us = (await get(`/api/v1/missions/${mission.id}/track?limit=1`)).properties.t_us[0];
+  const anchor = await text(id('anchor-card').locator('h2')),
+    of_it = items.filter((e) => e.anchor === anchor),
+    of_moment = of_it.filter((e) => e.t_us <= from_us + 30e6).at(-1);
+  assert.ok(of_it.length > 10 && of_moment.t_us < of_it.at(-1).t_us - 20e6);
+  const [e, n] = of_moment.enu_m.map((m) => m.toFixed(3).replace('-', '−'));
+  await eventually('its position is that of 30 s', async () => (await text(id('anchor-card'))).includes(`${e}, ${n},`));
   await id('speed').selectOption('4');
   await id('play').click();
   await eventually('time moves on', async () => Number((await text(id('replay-time'))).slice(6, 8)) >= 33);

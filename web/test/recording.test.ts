@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import type { MissionMsg, RangeMsg } from '../src/live/messages';
+import { estimate, type MissionMsg, type RangeMsg } from '../src/live/messages';
 import { after, marks_of, neighbour, Player, poses_of, type Recording } from '../src/state/recording';
 
 const mission: MissionMsg = {
@@ -71,6 +71,29 @@ describe('the player of a recording', () => {
     p.to(10.5e6, 1000);
     p.to(10.5e6, 9000);
     expect(9000 - p.scene.pose!.at_ms).toBeCloseTo(500, 6);
+  });
+  it('shows the estimates of the moment, with all that led to them, and none of later ones', () => {
+    const p = new Player(recording),
+      at = (t_s: number, h95_m: number) =>
+        estimate({ mission: 'm', anchor: '0x6a21', t_us: t_s * 1e6, status: 'estimating', h95_m })!;
+    p.to(100e6, 1000);
+    expect(p.scene.anchors.size).toBe(0);
+    p.learn([at(20, 5), at(90, 2), at(120, 1), at(400, 0.1)], 1000);
+    const shown = () => p.scene.anchors.get('0x6a21')!.value.h95_m;
+    expect(shown()).toBe(2);
+    expect(p.scene.history.get('0x6a21')!.map((h) => h.h95_m)).toEqual([5, 2]);
+    p.to(150e6, 2000);
+    expect(shown()).toBe(1);
+    p.to(500e6, 3000);
+    expect(shown()).toBe(0.1);
+    p.to(30e6, 4000);
+    expect(shown()).toBe(5);
+    p.to(10e6, 5000);
+    expect(p.scene.anchors.size).toBe(0);
+    // As old as it is at that moment, however long the page stands there.
+    p.to(25e6, 6000);
+    p.to(25e6, 60_000);
+    expect(60_000 - p.scene.anchors.get('0x6a21')!.at_ms).toBeCloseTo(5000, 6);
   });
   it('does not leave the flight', () => {
     const p = new Player(recording);

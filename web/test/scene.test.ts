@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { pose, range, type RangeMsg } from '../src/live/messages';
+import { estimate, pose, range, type RangeMsg } from '../src/live/messages';
 import { trail_of } from '../src/state/archive';
 import { interpolated, range_class, rate_hz, Scene } from '../src/state/scene';
 
@@ -76,5 +76,19 @@ describe('the trail after a reload', () => {
     scene.trail = [{ t_us: 3e6, e: 5, n: 5, u: 0, fix: 'fixed' }];
     scene.add_earlier_trail(trail_of(feature, { lon: 3.7131, lat: 51.0231, h_m: 10 }));
     expect(scene.trail.map((p) => p.t_us)).toEqual([1e6, 2e6, 3e6]);
+  });
+});
+
+describe('the convergence of a page that was opened late', () => {
+  it('begins with the flight: what the server estimated before comes first, what the page saw stays', () => {
+    const scene = new Scene('m'),
+      at = (t_s: number, h95_m: number) =>
+        estimate({ mission: 'm', anchor: '0x6a21', t_us: t_s * 1e6, status: 'estimating', h95_m })!;
+    scene.add_estimate(at(100, 1), 0);
+    scene.add_estimate(at(101, 0.9), 0);
+    scene.add_earlier_estimates([at(2, 9), at(50, 3), at(100.5, 7), { ...at(10, 4), anchor: '0x6a22' }]);
+    expect(scene.history.get('0x6a21')!.map((h) => h.h95_m)).toEqual([9, 3, 1, 0.9]);
+    expect(scene.history.get('0x6a22')!.map((h) => h.h95_m)).toEqual([4]);
+    expect(scene.anchors.size).toBe(1); // no estimate is made newer by what was before
   });
 });

@@ -1,6 +1,18 @@
 /// A stored flight, and the player that feeds a scene from it as the stream would have. No DOM.
 import { request } from '../api/client';
-import { fix_class, num, obj, str, vec3, type MissionMsg, type Pose, type RangeMsg } from '../live/messages';
+import {
+  all,
+  estimate,
+  fix_class,
+  num,
+  obj,
+  str,
+  vec3,
+  type EstimateMsg,
+  type MissionMsg,
+  type Pose,
+  type RangeMsg,
+} from '../live/messages';
 import { enu_from_geodetic, type Geodetic } from '../map/enu';
 import { Scene } from './scene';
 
@@ -144,6 +156,12 @@ export async function load_recording(mission: MissionMsg): Promise<Recording> {
   };
 }
 
+/// What was estimated when, in the order of time: the server computes it from the stored rows, which takes seconds for a long flight.
+export async function estimates_over_time(mission: string): Promise<EstimateMsg[]> {
+  const answer = obj(await request('GET', `/missions/${encodeURIComponent(mission)}/estimates`));
+  return all(answer?.items ?? [], estimate).sort((a, b) => a.t_us - b.t_us);
+}
+
 /// First index whose time is above t.
 export function after(rows: readonly { readonly t_us: number }[], t_us: number): number {
   let [lo, hi] = [0, rows.length];
@@ -173,23 +191,36 @@ export class Player {
   t_us: number;
   private pose = 0;
   private range = 0;
+  private estimate = 0;
+  /// Null: not there (yet); positions are then what the scene was given.
+  private estimates: readonly EstimateMsg[] | null = null;
 
   constructor(readonly recording: Recording) {
     this.scene = new Scene(recording.mission.mission);
     this.t_us = recording.from_us;
   }
+  get of_the_moment(): boolean {
+    return this.estimates !== null;
+  }
+  /// From here on, positions and ellipses are of the moment that is shown.
+  learn(estimates: readonly EstimateMsg[], now_ms: number): void {
+    this.estimates = estimates;
+    this.begin_anew(this.t_us);
+    this.to(this.t_us, now_ms);
+  }
+  private begin_anew(at: number): void {
+    const { anchors, version } = this.scene;
+    this.scene = new Scene(this.recording.mission.mission);
+    if (!this.estimates) for (const [id, e] of anchors) this.scene.anchors.set(id, e);
+    this.scene.version = version + 1;
+    this.pose = after(this.recording.poses, at - BEFORE_US);
+    this.range = after(this.recording.ranges, at - BEFORE_US);
+    this.estimate = 0; // all of them up to the moment: the convergence begins with the flight
+  }
   /// Onwards by playing, anywhere by a jump. `now_ms` is the page's clock: what is heard now is fresh.
   to(t_us: number, now_ms: number): void {
     const at = Math.max(this.recording.from_us, Math.min(this.recording.to_us, t_us));
-    if (at < this.t_us || at - this.t_us > BEFORE_US) {
-      const anchors = this.scene.anchors,
-        version = this.scene.version;
-      this.scene = new Scene(this.recording.mission.mission);
-      for (const [id, e] of anchors) this.scene.anchors.set(id, e);
-      this.scene.version = version + 1;
-      this.pose = after(this.recording.poses, at - BEFORE_US);
-      this.range = after(this.recording.ranges, at - BEFORE_US);
-    }
+    if (at < this.t_us || at - this.t_us > BEFORE_US) this.begin_anew(at);
     this.t_us = at;
     const age_ms = (t: number): number => now_ms - Math.max(0, (at - t) / 1000);
     for (; this.pose < this.recording.poses.length && this.recording.poses[this.pose]!.t_us <= at; this.pose++) {
@@ -204,6 +235,10 @@ export class Player {
       const r = this.recording.ranges[this.range]!;
       this.scene.add_range(r, age_ms(r.t_us));
     }
+    const { estimates } = this;
+    if (estimates)
+      for (; this.estimate < estimates.length && estimates[this.estimate]!.t_us <= at; this.estimate++)
+        this.scene.add_estimate(estimates[this.estimate]!, age_ms(estimates[this.estimate]!.t_us));
     this.freshen(at, now_ms);
   }
   /// While it stands still, what was fresh at that moment stays fresh.
@@ -212,5 +247,7 @@ export class Player {
       { pose } = this.scene;
     if (pose) this.scene.pose = { value: pose.value, at_ms: age_ms(pose.value.t_us) };
     for (const row of this.scene.ranges.values()) row.at_ms = age_ms(row.last.t_us);
+    for (const [id, e] of this.scene.anchors)
+      this.scene.anchors.set(id, { value: e.value, at_ms: age_ms(e.value.t_us) });
   }
 }

@@ -100,14 +100,7 @@ export class Scene {
     if (!h) this.history.set(e.anchor, (h = []));
     const last = h[h.length - 1];
     if (last && e.t_us < last.t_us - 5_000_000) h.length = 0;
-    if (!last || e.t_us > last.t_us)
-      h.push({
-        t_us: e.t_us,
-        sigma_h_m: sigma_h(e.cov_enu_m2),
-        sigma_m: sigma_position(e.cov_enu_m2),
-        h95_m: e.h95_m,
-        gdop: e.gdop,
-      });
+    if (!last || e.t_us > last.t_us) h.push(history_point(e));
     if (h.length > HISTORY_POINTS) h.splice(0, HISTORY_POINTS / 6);
     this.version++;
     this.estimates_version++;
@@ -142,12 +135,35 @@ export class Scene {
     this.trail = [...kept, ...this.trail].slice(-TRAIL_POINTS);
     this.version++;
   }
+  /// What was estimated before this page was opened, in the order of time.
+  add_earlier_estimates(list: readonly EstimateMsg[]): void {
+    const earlier = new Map<string, HistoryPoint[]>();
+    for (const e of list) {
+      const points = earlier.get(e.anchor) ?? [];
+      earlier.set(e.anchor, points);
+      points.push(history_point(e));
+    }
+    for (const [anchor, points] of earlier) {
+      const known = this.history.get(anchor) ?? [],
+        first_us = known[0]?.t_us ?? Infinity;
+      this.history.set(anchor, [...points.filter((p) => p.t_us < first_us), ...known].slice(-HISTORY_POINTS));
+    }
+    this.version++;
+  }
   forget_track(): void {
     this.trail = [];
     this.before = null;
     this.version++;
   }
 }
+
+const history_point = (e: EstimateMsg): HistoryPoint => ({
+  t_us: e.t_us,
+  sigma_h_m: sigma_h(e.cov_enu_m2),
+  sigma_m: sigma_position(e.cov_enu_m2),
+  h95_m: e.h95_m,
+  gdop: e.gdop,
+});
 
 /// Ranges a second of one row, by measurement time over the last 3 s of it; null with fewer than two.
 export function rate_hz(row: RangeRow): number | null {

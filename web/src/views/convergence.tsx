@@ -2,11 +2,31 @@
 import { useEffect, useRef } from 'preact/hooks';
 import type uPlot from 'uplot';
 import { goal_of } from '../state/done';
-import { watched_scene, tick } from '../state/store';
+import { estimates_over_time } from '../state/recording';
+import { current_mission, current_scene, replayed, tick, watched_scene } from '../state/store';
 import type { HistoryPoint } from '../state/scene';
 import { fixed } from '../ui/format';
 import { css, ground } from '../ui/theme';
 import { useStable } from '../ui/use_stable';
+
+const asked = new Set<string>(); ///< flights whose beginning was asked for
+/// The whole flight, whenever the page was opened: what it did not see itself comes from the server, once.
+function ask_for_the_beginning(): void {
+  const scene = current_scene(),
+    m = current_mission.peek();
+  if (replayed.peek() || !scene || !m || asked.has(scene.id)) return;
+  const first_us = Math.min(...[...scene.history.values()].map((h) => h[0]?.t_us ?? Infinity));
+  if (m.started_us === null || first_us - m.started_us < SEEN_ALL_US) return;
+  asked.add(scene.id);
+  estimates_over_time(scene.id).then(
+    (list) => {
+      scene.add_earlier_estimates(list);
+      tick.value++;
+    },
+    () => undefined, // the chart begins where the page was opened
+  );
+}
+const SEEN_ALL_US = 15_000_000;
 
 const NOTHING: HistoryPoint = { t_us: 0, sigma_h_m: null, sigma_m: null, h95_m: null, gdop: null };
 
@@ -63,6 +83,7 @@ export function Convergence({ anchor }: { anchor: string }) {
   }, [anchor, theme, limit_m, of, draw]);
   const now = tick.value;
   useEffect(draw, [now, draw]);
+  useEffect(ask_for_the_beginning, [scene, history.length > 0]);
   const seen = last === null ? 'not known' : `${fixed(last, 3)} m`,
     words = `${name} over ${history.length} estimates, now ${seen}${limit_m === null ? '' : `, limit at most ${limit_m} m`}`;
   return (

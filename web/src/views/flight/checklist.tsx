@@ -4,6 +4,7 @@ import { useEffect, useState } from 'preact/hooks';
 import { error_text } from '../../api/client';
 import { checklist, set_item, type ChecklistItem } from '../../api/flight';
 import { plans as fetch_plans, type Plan } from '../../api/plans';
+import { sound, toggle_sound } from '../../ui/alarms';
 import { Icon, Mark } from '../../ui/marks';
 import { HoldButton } from './hold_button';
 import { useDialog } from '../../ui/use_dialog';
@@ -105,6 +106,18 @@ export function Checklist({
           {items.map((i) => (
             <Item key={i.id} item={i} set={set} />
           ))}
+          {sound.value === 'off' && (
+            <li data-testid="check-sound">
+              <Mark shape="off" tone="off" />
+              <span class="grow">
+                <b>Alarms make no sound yet</b>
+                <span class="mut block">A browser sounds only after a tap; nothing else waits for it.</span>
+              </span>
+              <button class="btn" onClick={toggle_sound}>
+                Turn sound on
+              </button>
+            </li>
+          )}
         </ul>
       )}
       <div class="actions">

@@ -5,7 +5,7 @@ import { is_bias, run_numbers, run_page, type Run, type RunNumbers, type Task } 
 import { fixed } from '../../ui/format';
 import { Icon } from '../../ui/marks';
 import { Axes, Drawing, line, scale, ticks } from '../chart';
-import { method_words } from './words';
+import { run_names } from './words';
 
 export const MOST_COMPARED = 4;
 const DASHES = ['none', '9 4', '2 4', '12 4 2 4'];
@@ -140,7 +140,8 @@ export function Compare({ task, runs, close }: { task: Task; runs: readonly stri
 }
 
 function Sides({ sides, bias }: { sides: readonly Side[]; bias: boolean }) {
-  const one_set = new Set(sides.map((s) => s.run.dataset_id)).size === 1;
+  const one_set = new Set(sides.map((s) => s.run.dataset_id)).size === 1,
+    names = run_names(sides.map((s) => s.run));
   // As shown: two figures that read alike have no winner.
   const read = (m: Measure, s: Side): number | null => {
     const v = m.of(s);
@@ -169,7 +170,7 @@ function Sides({ sides, bias }: { sides: readonly Side[]; bias: boolean }) {
                   <svg class="key" viewBox="0 0 24 8" aria-hidden="true">
                     <path class="s main" stroke-dasharray={DASHES[i]} d="M0 4h24" />
                   </svg>
-                  <a href={`#/models/runs/${s.run.id}`}>{method_words(s.run.method)}</a>
+                  <a href={`#/models/runs/${s.run.id}`}>{names.get(s.run.id)}</a>
                 </th>
               ))}
             </tr>

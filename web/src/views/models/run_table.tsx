@@ -3,7 +3,7 @@ import { is_bias, type Model, type Run, type Task } from '../../api/learning';
 import { date, fixed } from '../../ui/format';
 import { Chip, Q, type Shape, type Tone } from '../../ui/marks';
 import { MOST_COMPARED } from './compare';
-import { method_words } from './words';
+import { method_words, run_names } from './words';
 
 const pc = (v: number | null) => <Q v={fixed(v === null ? null : v * 100, 1)} u="%" />,
   mm = (v: number | null) => <Q v={fixed(v === null ? null : v * 1000, 0)} u="mm" />;
@@ -64,7 +64,8 @@ export function RunTable({
         word={r.state === 'succeeded' ? 'CANDIDATE' : r.state.toUpperCase()}
       />
     );
-  const uploaded = models.filter((m) => !m.run);
+  const names = run_names(runs),
+    uploaded = models.filter((m) => !m.run);
   return (
     <table class="tbl" data-testid="runs">
       <caption class="sr">Training runs of this task</caption>
@@ -125,7 +126,7 @@ export function RunTable({
               </label>
             </td>
             <th scope="row">
-              <a href={address(r.id)}>{method_words(r.method)}</a>
+              <a href={address(r.id)}>{names.get(r.id)}</a>
             </th>
             <td>
               {state(r)}

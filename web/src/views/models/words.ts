@@ -1,4 +1,5 @@
 /// Names of learning as people say them. No DOM.
+import { date } from '../../ui/format';
 import type { Task } from '../../api/learning';
 
 export const TASK_WORDS: Record<Task, string> = {
@@ -38,6 +39,30 @@ export function method_words(m: string | null): string {
         ...(parts[3] ? [parts[3]] : []),
       ].join(', ')
     : plain_words(m);
+}
+interface Named {
+  readonly id: string;
+  readonly method: string | null;
+  readonly created_at: string;
+}
+/// By their methods; those of one method by their time too, and of one minute by their number in it.
+export function run_names(runs: readonly Named[]): ReadonlyMap<string, string> {
+  const ordered = [...runs].sort((a, b) => a.created_at.localeCompare(b.created_at)),
+    timed = (r: Named): string => `${method_words(r.method)}, ${date(r.created_at)}`;
+  return new Map(
+    runs.map((r) => {
+      const same = ordered.filter((x) => method_words(x.method) === method_words(r.method)),
+        together = same.filter((x) => timed(x) === timed(r));
+      return [
+        r.id,
+        same.length < 2
+          ? method_words(r.method)
+          : together.length < 2
+            ? timed(r)
+            : `${timed(r)}, no. ${together.indexOf(r) + 1}`,
+      ];
+    }),
+  );
 }
 const FEATURES: Record<string, string> = {
   distance_m: 'Distance',

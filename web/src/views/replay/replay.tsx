@@ -5,7 +5,7 @@ import { error_text } from '../../api/client';
 import { rows_of_collection } from '../../api/anchors';
 import { request } from '../../api/client';
 import { MapBox } from '../../map/map_box';
-import { after, load_recording, neighbour, Player } from '../../state/recording';
+import { after, estimates_over_time, load_recording, neighbour, Player } from '../../state/recording';
 import { chosen_anchor, mission_id, now_ms, ordered_missions, replayed, synced, tick } from '../../state/store';
 import { clock, fixed, told_apart } from '../../ui/format';
 import { Chip } from '../../ui/marks';
@@ -15,12 +15,22 @@ import { useStable } from '../../ui/use_stable';
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16] as const;
 
+/// What the whole flight gave.
+const whole = (mission: string) =>
+  request('GET', `/anchors?view=live&mission=${encodeURIComponent(mission)}&limit=1000`)
+    .then(rows_of_collection)
+    .then(
+      ({ rows }) => rows,
+      () => [],
+    );
+
 export function Replay({ id }: { id: string | null }) {
   const [at_s] = useState(() => Number(new URLSearchParams(location.hash.split('?')[1] ?? '').get('t')) || 0);
   const [player, set_player] = useState<Player | null>(null),
     [problem, set_problem] = useState(''),
     [playing, set_playing] = useState(false),
     [speed, set_speed] = useState<number>(1),
+    [moment, set_moment] = useState<'asked' | 'moment' | 'whole'>('asked'),
     [, redraw] = useState(0);
   const wanted = (id ?? '').split('?')[0] || mission_id.value,
     mission = ordered_missions.value.find((m) => m.mission === wanted) ?? null;
@@ -38,16 +48,20 @@ export function Replay({ id }: { id: string | null }) {
     load_recording(mission).then(
       async (recording) => {
         const made = new Player(recording);
-        const { rows } = await request(
-          'GET',
-          `/anchors?view=live&mission=${encodeURIComponent(mission.mission)}&limit=1000`,
-        ).then(rows_of_collection, () => ({ rows: [] }));
-        for (const r of rows)
-          made.scene.add_estimate({ ...r, mission: mission.mission, t_us: recording.to_us }, now_ms());
         if (gone) return;
         made.to(recording.from_us + at_s * 1e6, now_ms());
         show(made);
         set_player(made);
+        // Positions of the moment, else what the whole flight gave.
+        const over_time = await estimates_over_time(mission.mission).catch(() => null);
+        if (gone) return;
+        if (over_time) made.learn(over_time, now_ms());
+        else
+          for (const r of await whole(mission.mission))
+            made.scene.add_estimate({ ...r, mission: mission.mission, t_us: recording.to_us }, now_ms());
+        show(made);
+        set_moment(over_time ? 'moment' : 'whole');
+        tick.value++;
       },
       (e: unknown) => {
         if (!gone) set_problem(error_text(e));
@@ -147,7 +161,7 @@ export function Replay({ id }: { id: string | null }) {
     span = r ? r.to_us - r.from_us : 1,
     names = told_apart(ordered_missions.value);
   return (
-    <div class="replay" data-testid="replay">
+    <div class="replay" data-testid="replay" data-positions={moment}>
       <div class="toolbar">
         <Chip shape="info" tone="info" word="REPLAY" />
         <h1>{names.get(mission) || mission.mission.slice(0, 8)}</h1>
@@ -191,14 +205,15 @@ export function Replay({ id }: { id: string | null }) {
         />
         <aside class="side" aria-label="Ranges and anchor of the recording" tabIndex={0}>
           <RangeList selected={selected} />
-          {selected && scene?.anchors.has(selected) && (
-            <>
-              <p class="why pad">
-                Track and ranges are of the moment shown; positions and ellipses are what the whole flight gave.
-              </p>
-              <AnchorCard anchor={selected} />
-            </>
+          {moment === 'asked' && player && (
+            <p class="why pad" role="status">
+              Positions of each moment are being computed from the stored ranges.
+            </p>
           )}
+          {moment === 'whole' && (
+            <p class="why pad">Track and ranges are of the moment shown; positions are what the whole flight gave.</p>
+          )}
+          {selected && scene?.anchors.has(selected) && <AnchorCard anchor={selected} />}
           {player && <Marks player={player} go={go} />}
         </aside>
       </div>
