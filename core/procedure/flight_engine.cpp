@@ -14,6 +14,9 @@ constexpr double k_listen_s = 1.0;   ///< least stay in a search, so that every 
 constexpr double k_connect_s = 1.0;  ///< least look at the connections of a point
 constexpr double k_settle_s = 0.5;   ///< at rest this long counts as arrived
 constexpr int k_heard = 3;           ///< ranges that make an anchor heard
+constexpr double k_late_s = 0.5;     ///< latency and period of telemetry on a poor link
+constexpr double k_latest_s =
+    1.0;  ///< of two positions that are compared; older ones are an alarm of their own
 constexpr double k_degree = std::numbers::pi / 180;
 
 double apart(double a, double b) { return std::abs(std::remainder(a - b, 2 * std::numbers::pi)); }
@@ -329,6 +332,9 @@ void FlightEngine::look_out(double now_s) {
   SafetyLimits limits = setup_.limits;
   // What disagrees agrees again when it does so clearly.
   if (alarm_ && alarm_->id == "position.disagree") limits.disagree_m *= 2.0 / 3;
+  // Under way the two are of different moments: the way flown between them is no disagreement.
+  limits.disagree_m +=
+      vehicle_.speed_mps * std::min(k_late_s + now.position_age_s + now.autopilot_silent_s, k_latest_s);
   const auto alarm = watch(limits, now);
   if (taken_over_) {
     if (alarm && (!alarm_ || alarm_->id != alarm->id)) tell(now_s, "critical", alarm->id, alarm->text);

@@ -155,6 +155,8 @@ TEST_F(StateMatrix, EveryRouteThatDeletesIsKnown) {
       "/api/v1/training-runs/{id}",  // waiting or running: 422
       "/api/v1/models/{id}",         // ever promoted: 409
       "/api/v1/jobs/{id}",           // cancels; ended: 422
+      "/api/v1/tokens/{id}",         // revokes: it stays in the list
+      "/api/v1/session",             // ends the caller's own
   };
   for (const auto& route : app_->router().routes()) {
     if (route.method == Method::del) {

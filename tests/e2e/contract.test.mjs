@@ -437,6 +437,13 @@ test('what can be deleted', async () => {
   await call('DELETE', `/api/v1/calibrations/${ids.calibration}`);
 });
 
+test('the demonstration is flown in the server, one at a time, and its estimates are there as they came', async () => {
+  const flown = await call('POST', '/api/v1/demonstration', { expect: 202, json: { speed: 20 } });
+  await call('POST', '/api/v1/demonstration', { expect: 409, json: {} });
+  await call('POST', '/api/v1/demonstration', { expect: 422, json: { speed: 100 } });
+  await call('GET', `/api/v1/missions/${flown.json.mission}/estimates`, { expect: 200 });
+});
+
 test('no operation of the contract was left out', () => {
   const left = contract.uncalled().filter((name) => name !== 'GET /api/v1/ws'); // live.test.mjs
   assert.deepEqual(left, []);

@@ -389,6 +389,20 @@ TEST(FlightEngine, AfterARestartItHoldsUntilTheFirstMeasurementsHadTheirTimeToCo
   EXPECT_NEAR(back.flown_s(1016), 316, 1e-9);
 }
 
+/// Telemetry is late by the latency of its link: under way the two positions are of different moments.
+TEST(FlightEngine, PositionsOfDifferentMomentsDisagreeOnlyByMoreThanTheWayBetweenThem) {
+  for (const auto& [speed_mps, apart_m, holds] :
+       {std::tuple{0.0, 2.9, false}, {0.0, 3.1, true}, {3.0, 4.2, false}, {3.0, 6.1, true}}) {
+    Flown f;
+    f.feed({Event::start, Event::airborne});
+    f.view.speed_mps = speed_mps;
+    f.view.position_m = k_place + Eigen::Vector3d(apart_m, 0, 0);
+    f.here();
+    f.engine.tick(f.now, {});
+    EXPECT_EQ(f.engine.state().step == Step::hold, holds) << speed_mps << " m/s, " << apart_m << " m";
+  }
+}
+
 TEST(FlightEngine, SaysWhenAFaultIsOver) {
   Flown f;
   ways().at(Step::hold)(f);
