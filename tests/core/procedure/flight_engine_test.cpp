@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <numbers>
+#include <tuple>
 #include <utility>
 
 namespace anchord::procedure {
