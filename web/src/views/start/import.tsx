@@ -57,13 +57,14 @@ async function found_in(files: readonly File[]): Promise<Found> {
   if (!tables.length)
     throw new Error('There is no table in it: a flight is flight.json, track.csv and ranges.csv, or tables alone.');
   const named = (what: RegExp): Table | undefined => tables.find((t) => what.test(t.name)),
+    likeliest = (of: readonly Table[], missing: (t: Table) => number): Table | undefined =>
+      [...of].sort((a, b) => missing(a) - missing(b))[0],
     ranges =
-      named(/^range|distance/) ?? tables.find((t) => missing_ranges(guessed_ranges(t)).length === 0) ?? tables[0]!,
+      named(/(^|[^a-z])(range|distance)/) ?? likeliest(tables, (t) => missing_ranges(guessed_ranges(t)).length)!,
     others = tables.filter((t) => t !== ranges),
     track =
-      named(/^track|gnss|gps|pos|rover|fix/) ??
-      others.find((t) => missing_track(guessed_track(t)).length === 0) ??
-      others[0] ??
+      others.find((t) => /(^|[^a-z])(track|gnss|gps|pos|rover|fix)/.test(t.name)) ??
+      likeliest(others, (t) => missing_track(guessed_track(t)).length) ??
       ranges;
   return {
     track,
