@@ -59,8 +59,7 @@ async function found_in(files: readonly File[]): Promise<Found> {
   const named = (what: RegExp): Table | undefined => tables.find((t) => what.test(t.name)),
     likeliest = (of: readonly Table[], missing: (t: Table) => number): Table | undefined =>
       [...of].sort((a, b) => missing(a) - missing(b))[0],
-    ranges =
-      named(/(^|[^a-z])(range|distance)/) ?? likeliest(tables, (t) => missing_ranges(guessed_ranges(t)).length)!,
+    ranges = named(/(^|[^a-z])(range|distance)/) ?? likeliest(tables, (t) => missing_ranges(guessed_ranges(t)).length)!,
     others = tables.filter((t) => t !== ranges),
     track =
       others.find((t) => /(^|[^a-z])(track|gnss|gps|pos|rover|fix)/.test(t.name)) ??
