@@ -24,6 +24,7 @@ class RunningTime {
   ServiceStore& store_;
   const SteadyClock& steady_;
   std::int64_t before_ns_{0};
+  bool known_{false};  ///< what was kept of before could be read
   const SteadyTime started_;
 };
 
