@@ -34,7 +34,7 @@ h2{font-size:13.5px;margin:15px 0 4px}h3{font-size:11px;margin:0 0 2px;font-weig
 table{border-collapse:collapse;width:100%}th{font-size:10.5px;font-weight:600;color:var(--ink2);text-align:left;padding:0 6px 4px 0;vertical-align:bottom}
 td{height:23px;padding:2px 6px 2px 0;border-top:1px solid var(--line);vertical-align:middle}tr:last-child td{border-bottom:1px solid var(--line)}
 thead+tbody tr:first-child td{border-top-color:var(--edge)}
-tr{break-inside:avoid}thead{display:table-header-group}.num{text-align:right;white-space:nowrap}.mut,.mut td{color:var(--ink3)}
+tr{break-inside:avoid}thead{display:table-header-group}.num{text-align:right;white-space:nowrap}th.num{white-space:normal}.mut,.mut td{color:var(--ink3)}
 .chip{white-space:nowrap;font-weight:600}.chip.ok{color:var(--ok)}.chip.warn{color:var(--caution)}.chip.no{color:var(--ink3)}.chip.bad,.bad{color:var(--bad)}
 .cols{display:grid;grid-template-columns:1fr 1fr;gap:20px}.cols p{margin:0 0 4px}
 .sig{display:grid;grid-template-columns:1fr 1fr 1fr;gap:20px;margin-top:auto;padding-top:34px;break-inside:avoid}.sig>div{border-top:1px solid #000;padding-top:4px;height:34px}
