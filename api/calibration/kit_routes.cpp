@@ -35,16 +35,12 @@ Response answer(CalibrationApi& s, int status, const StoredProfile& stored) {
   const auto sigma = prior_sigmas(prior);
   Ordered body{{"kit", stored.kit}, {"version", stored.version}, {"n_flights", profile.factors.size()}};
   body["profile"] = Ordered::parse(stored.profile.text);
-  body["next_flight"] = {{"bias_m", valued(gate.bias_m, gate.sigma_m)},
+  body["next_flight"] = {{"bias_m", valued(prior.mean[k_shared_bias], sigma[k_shared_bias])},
                          {"curve_m_per_efold", valued(prior.mean[k_shared_curve], sigma[k_shared_curve])},
                          {"lag_s", valued(prior.mean[k_shared_lag], sigma[k_shared_lag])},
                          {"lever_up_m", valued(prior.mean[k_shared_lever], sigma[k_shared_lever])}};
-  body["bias"] = {{"value_m", gate.bias_m},
-                  {"sigma_m", gate.sigma_m},
-                  {"z", gate.z},
-                  {"p_calibrated", gate.p_calibrated},
-                  {"calibrated", gate.calibrated()},
-                  {"known", gate.known}};
+  body["bias"] = {{"value_m", gate.bias_m},       {"sigma_m", gate.sigma_m},       {"z", gate.z},
+                  {"limit", options.bias_gate_z}, {"calibrated", gate.calibrated}, {"known", gate.known}};
   Ordered history = Ordered::array();
   for (const auto& one : value_or_problem(s.profiles.store().history(stored.kit, k_history)))
     history.push_back(version_json(one));

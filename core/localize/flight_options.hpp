@@ -43,20 +43,20 @@ struct FlightOptions {
   double min_range_m{0.05};               ///< reliability limit; 0 is the radios' failure value
   double max_range_m{150.0};
 
-  double bias_prior_m{1.0};               ///< of a flight before its kit is judged (kit_prior: BiasGate)
-  double calibrated_bias_prior_m{0.025};  ///< of kits whose bias is calibrated away
-  double calibrated_share{0.5};           ///< so many kits are: both kinds are met
+  double bias_prior_m{1.0};               ///< 0 to 0.7 m seen for whole kits
+  double calibrated_bias_prior_m{0.025};  ///< once the gate says the kit is calibrated
+  double bias_gate_z{3.0};                ///< below: calibrated
   double bias_known_sigma_m{
       0.1};  ///< a flight (with profile) that knows its bias worse than this cannot tell
-  double uncalibrated_bias_m{0.7};  ///< of the other kits; 0.2 to 0.7 m seen
-  double delay_prior_m{0.06};       ///< unit to unit; a free one is fatal in small volumes
-  double curve_prior_m{0.03};       ///< leading edge moves with received power
-  double lag_prior_s{0.2};          ///< stamping delay
-  double lever_prior_m{0.1};        ///< body z only: x, y are confounded with the lag
-  double lever_across_prior_m{0};   ///< body x and y; 0: held at the declared arm. Only where heading and
-                                    ///< course differ can it be told from the lag
-  double pair_sigma_m{0.1};         ///< of a range between two anchors, whatever its repeats say
-  double pair_bias_prior_m{0.3};    ///< common to all ranges between anchors
+  double unknown_bias_prior_m{0.28};  ///< then: between calibrated (0) and not (0.7), and the regions show it
+  double delay_prior_m{0.06};         ///< unit to unit; a free one is fatal in small volumes
+  double curve_prior_m{0.03};         ///< leading edge moves with received power
+  double lag_prior_s{0.2};            ///< stamping delay
+  double lever_prior_m{0.1};          ///< body z only: x, y are confounded with the lag
+  double lever_across_prior_m{0};     ///< body x and y; 0: held at the declared arm. Only where heading and
+                                      ///< course differ can it be told from the lag
+  double pair_sigma_m{0.1};           ///< of a range between two anchors, whatever its repeats say
+  double pair_bias_prior_m{0.3};      ///< common to all ranges between anchors
   std::optional<double> fixed_bias_m{};  ///< no estimate: this bias is given
 
   double mad_factor{0.6};  ///< Tukey cut-off = 4.685 x this x scale; below 1 is what late clusters need

@@ -231,11 +231,10 @@ FlightSolution describe(const Work& work, const FlightData& flight) {
 Result<void> FlightOptions::check() const {
   const auto positive = [](double v) { return std::isfinite(v) && v > 0; };
   const bool good =
-      positive(bias_prior_m) && positive(calibrated_bias_prior_m) && positive(uncalibrated_bias_m) &&
-      calibrated_share >= 0 && calibrated_share < 1 && positive(delay_prior_m) && positive(curve_prior_m) &&
-      positive(lag_prior_s) && positive(lever_prior_m) && positive(mad_factor) && positive(min_scale_m) &&
-      correlation_s >= 0 && floor_sigma_m >= 0 && min_range_m >= 0 && max_range_m > min_range_m &&
-      (!max_gap_s || positive(*max_gap_s)) && positive(track.max_speed_mps) &&
+      positive(bias_prior_m) && positive(calibrated_bias_prior_m) && positive(delay_prior_m) &&
+      positive(curve_prior_m) && positive(lag_prior_s) && positive(lever_prior_m) && positive(mad_factor) &&
+      positive(min_scale_m) && correlation_s >= 0 && floor_sigma_m >= 0 && min_range_m >= 0 &&
+      max_range_m > min_range_m && (!max_gap_s || positive(*max_gap_s)) && positive(track.max_speed_mps) &&
       positive(track.max_acceleration_mps2) && positive(track.max_correction_age_s) &&
       (!anchor_height_m || std::isfinite(*anchor_height_m)) &&
       (!height_prior || (std::isfinite(height_prior->height_m) && positive(height_prior->sigma_m)));
@@ -302,7 +301,7 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
     }
   }
   if (!options.fixed_bias_m) {
-    for (Work& work : all) add_doubt(work.fit, work.gate);
+    for (Work& work : all) add_doubt(work.fit, work.prior, work.gate);
   }
   for (std::size_t i = 0; i < all.size(); ++i) {
     Work& work = all[i];

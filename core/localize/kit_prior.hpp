@@ -15,25 +15,22 @@ ProfileFactor profile_factor(const JointFit& fit, const SharedPrior& prior, cons
 /// Prior of a kit nobody has flown: FlightOptions' sigmas about zero.
 SharedPrior wide_prior(const FlightOptions& options);
 
-/// Is the kit's bias calibrated away, or does it have one? Two kinds of kits are weighed by what all factors
-/// say, those of the flight solved included: `calibrated_share` of the kits with a bias of some centimetres,
-/// the others with one of some decimetres. The posterior of the two is told by its mean and variance, so that
-/// nothing jumps where the one becomes likelier than the other.
+/// Is the kit's bias calibrated away, or does it have one? In a small volume the antenna pattern alone
+/// imitates a common bias of 0.1 m, while true uncalibrated kits stand out: z decides, on all flights
+/// including the one solved.
 struct BiasGate {
-  double bias_m{}, sigma_m{};  ///< of the kit, every doubt included
-  double z{};                  ///< bias over sigma, as the ranges alone have them
-  double p_calibrated{};       ///< probability of the first kind
-  bool known{};                ///< sigma within bias_known_sigma_m, or surely of the second kind
-  double prior_sigma_m{1.0};   ///< of a Gaussian about zero that leads to the same mean
-  /// Variance of the bias beyond that Gaussian's posterior: which kind it is, and what a pattern imitates.
+  double bias_m{}, sigma_m{}, z{};
+  bool calibrated{};          ///< z below the gate
+  bool known{};               ///< not calibrated, or known well enough to say that it is
+  double prior_sigma_m{1.0};  ///< of the bias about zero, as the gate decided
+  /// Mean square of what the bias would be if the kit were not calibrated after all, times the probability of
+  /// that: "calibrated" is a decision on evidence, and the regions must not know better than the evidence.
   double doubt_m2{};
-
-  bool calibrated() const { return p_calibrated > 0.5; }
 };
 BiasGate bias_gate(std::span<const ProfileFactor> all, const FlightOptions& options);
 
-/// Widens the covariances of a fit by the doubt about its bias, along the way everything follows the bias.
-void add_doubt(JointFit& fit, const BiasGate& gate);
+/// Widens the covariances of a fit by the doubt about its bias, along the way each position follows the bias.
+void add_doubt(JointFit& fit, const SharedPrior& prior, const BiasGate& gate);
 
 /// Prior for the next flight: what the gate decided about the bias and the factors of the others, widened by
 /// the wander where there are any.

@@ -3,16 +3,14 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 namespace anchord {
 namespace {
 
-/// What the pattern of an antenna looks like in the ranges of a small volume, at most; where a flight knows
-/// its bias better, as much as its own sigma: against truth and other flights, biases of real kits miss
-/// by 1.25 sigma. Flights round the same anchors repeat it, so it does not average out.
+/// What the pattern of an antenna can look like: no flight alone can tell such a bias from it, whatever its
+/// residuals claim. In a small volume flights of one kit came to biases 0.2 m apart; where a flight knows its
+/// bias better, by at most twice its sigma (1.8 seen against the other flights of the kit).
 constexpr double k_imitated_bias_m = 0.15;
-constexpr double k_surely = 0.95;
 
 double square(double v) { return v * v; }
 
@@ -45,40 +43,14 @@ SharedPrior across_prior(const FlightOptions& options) {
   return prior;
 }
 
-/// A bias with a share of all kits: normal about zero.
-struct KitKind {
-  double share{}, sigma2{};
-  double p{};  ///< given what was seen
-
-  /// How far the mean of this kind follows what was seen with variance s2.
-  double gain(double s2) const { return sigma2 / (s2 + sigma2); }
-};
-
-std::vector<KitKind> weighed(std::vector<KitKind> kinds, double seen_m, double variance) {
-  double sum = 0;
-  for (KitKind& kind : kinds) {
-    // Against the widest, far out the densest: no exponential overflows.
-    const double far =
-        square(seen_m) * (1.0 / (variance + kind.sigma2) - 1.0 / (variance + kinds.back().sigma2));
-    kind.p = kind.share * std::exp(-0.5 * far) / std::sqrt(variance + kind.sigma2);
-    sum += kind.p;
-  }
-  for (KitKind& kind : kinds) kind.p /= sum;
-  return kinds;
-}
-
-std::vector<KitKind> two_kinds(const FlightOptions& options) {
-  return {{options.calibrated_share, square(options.calibrated_bias_prior_m)},
-          {1.0 - options.calibrated_share, square(options.uncalibrated_bias_m)}};
-}
-
-/// Biases of every size, none likelier than another: scales from the calibrated to the uncalibrated, doubled.
-std::vector<KitKind> all_sizes(const FlightOptions& options) {
-  std::vector<KitKind> kinds;
-  for (double m = options.calibrated_bias_prior_m; kinds.empty() || m < 2 * options.uncalibrated_bias_m;
-       m *= 2)
-    kinds.push_back({1.0, square(m)});
-  return kinds;
+/// Two hypotheses, even odds before: the kit is calibrated, or its bias is anything of half a metre. The
+/// Bayes factor of what all factors say decides how much of the second remains.
+double doubt_m2(const BiasGate& gate, const FlightOptions& options) {
+  const double own2 = square(gate.sigma_m), seen2 = square(gate.bias_m);
+  const double calibrated2 = own2 + square(options.calibrated_bias_prior_m), other2 = own2 + square(0.5);
+  const double odds =
+      std::sqrt(calibrated2 / other2) * std::exp(0.5 * seen2 * (1 / calibrated2 - 1 / other2));
+  return odds / (1.0 + odds) * (seen2 + own2);
 }
 
 struct Sum {
@@ -125,51 +97,31 @@ SharedPrior wide_prior(const FlightOptions& options) {
 BiasGate bias_gate(std::span<const ProfileFactor> all, const FlightOptions& options) {
   Sum sum;
   sum.information = base_information(options, options.bias_prior_m);
-  double imitated = 0, told = 0;
   for (const auto& factor : all) {
-    const Eigen::Matrix4d alone = base_information(options, options.bias_prior_m) + factor.information;
-    const double own2 = alone.inverse()(k_shared_bias, k_shared_bias);
-    imitated += std::min(square(k_imitated_bias_m), own2) / own2;
-    told += 1.0 / own2;
     sum.information += factor.information;
     sum.information_mean += factor.information_mean;
   }
   const Eigen::Matrix4d covariance = sum.information.inverse();
-  const double variance = covariance(k_shared_bias, k_shared_bias);
-  const double bias_m = (covariance * sum.information_mean)[k_shared_bias];
+  const Eigen::Vector4d mean = covariance * sum.information_mean;
   BiasGate gate;
-  gate.z = std::abs(bias_m) / std::sqrt(variance);
-  // What the ranges say without the wide prior they were weighed with.
-  const double s2 = 1.0 / std::max(1.0 / variance - 1.0 / square(options.bias_prior_m), 1e-6);
-  const double seen_m = bias_m / variance * s2;
-  // The mean follows an imitated bias as it follows a true one, however many flights repeat it.
-  const double imitated2 = told > 0 ? imitated / told : 0.0;
-  const auto kinds = weighed(two_kinds(options), seen_m, s2);
-  double gain = 0, gain_left = 0, doubt2 = 0, variance2 = 0;
-  for (const KitKind& kind : kinds) {
-    gain += kind.p * kind.gain(s2);
-    gain_left += kind.p * s2 / (s2 + kind.sigma2);
-  }
-  // The answer sides with one of two kinds; the doubt knows biases of any size, and that what was seen may be
-  // imitated.
-  for (const KitKind& kind : weighed(all_sizes(options), seen_m, s2 + imitated2)) {
-    variance2 += kind.p * (s2 + kind.gain(s2) * imitated2) * kind.gain(s2);
-    doubt2 += kind.p * square(seen_m * (kind.gain(s2) - gain));
-  }
-  gate.p_calibrated = kinds.front().p;
-  gate.bias_m = gain * seen_m;
-  gate.prior_sigma_m = std::sqrt(s2 * gain / gain_left);
-  gate.sigma_m = std::sqrt(variance2 + doubt2);
-  gate.doubt_m2 = std::max(variance2 + doubt2 - gain * s2, 0.0);
-  gate.known = gate.sigma_m <= options.bias_known_sigma_m || gate.p_calibrated < 1.0 - k_surely;
+  gate.bias_m = mean[k_shared_bias];
+  gate.sigma_m = std::sqrt(covariance(k_shared_bias, k_shared_bias));
+  gate.z = std::abs(gate.bias_m) / gate.sigma_m;
+  gate.calibrated = gate.z < options.bias_gate_z;
+  gate.known = !gate.calibrated || gate.sigma_m <= options.bias_known_sigma_m;
+  gate.prior_sigma_m = !gate.calibrated ? options.bias_prior_m
+                       : gate.known     ? options.calibrated_bias_prior_m
+                                        : options.unknown_bias_prior_m;
+  if (gate.calibrated && gate.known) gate.doubt_m2 = doubt_m2(gate, options);
+  if (gate.calibrated && gate.known && all.size() == 1)
+    gate.doubt_m2 = std::max(gate.doubt_m2, square(std::min(k_imitated_bias_m, 2.0 * gate.sigma_m)));
   return gate;
 }
 
-void add_doubt(JointFit& fit, const BiasGate& gate) {
+void add_doubt(JointFit& fit, const SharedPrior& prior, const BiasGate& gate) {
   if (!(gate.doubt_m2 > 0)) return;
-  // Were the bias another, the shared unknowns would follow by `shared` per metre, each anchor by `own`.
-  const SharedVector shared =
-      fit.shared_covariance.col(k_shared_bias) / fit.shared_covariance(k_shared_bias, k_shared_bias);
+  // Were the mean of the prior moved, the shared unknowns would follow by `shared`, each anchor by `own`.
+  const SharedVector shared = fit.shared_covariance * prior.information.col(k_shared_bias);
   for (std::size_t i = 0; i < fit.anchor_covariance.size(); ++i) {
     const AnchorBlock& block = fit.normal.anchors[i];
     const Eigen::Vector4d own = -block.own_inverse * (block.shared * shared);

@@ -1,5 +1,4 @@
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <iterator>
@@ -266,17 +265,16 @@ int show_profile(const std::string& file) {
   const auto sigma = prior_sigmas(prior);
   std::printf("kit %s, %zu flights\n", profile.value().kit.c_str(), profile.value().factors.size());
   for (const auto& factor : profile.value().factors) std::printf("  %s\n", factor.flight.c_str());
-  std::printf("bias %.3f m (sigma %.3f), %s (%.0f %% likely, z %.1f)\n", gate.bias_m, gate.sigma_m,
-              !gate.known         ? gate.calibrated() ? "not determined, rather calibrated"
-                                                      : "not determined, rather not calibrated"
-              : gate.calibrated() ? "taken as calibrated"
-                                  : "not calibrated",
-              100 * std::max(gate.p_calibrated, 1.0 - gate.p_calibrated), gate.z);
+  std::printf("bias %.3f m (sigma %.3f), %s (z %.1f, limit %.1f)\n", gate.bias_m, gate.sigma_m,
+              !gate.known       ? "not determined"
+              : gate.calibrated ? "taken as calibrated"
+                                : "not calibrated",
+              gate.z, options.bias_gate_z);
   std::printf(
       "prior of the next flight: bias %.3f m (%.3f), range curve %.3f m per e-fold (%.3f), lag %.3f s "
       "(%.3f), antenna up "
       "%.3f m (%.3f)\n",
-      gate.bias_m, gate.sigma_m, prior.mean[1], sigma[1], prior.mean[2], sigma[2], prior.mean[3], sigma[3]);
+      prior.mean[0], sigma[0], prior.mean[1], sigma[1], prior.mean[2], sigma[2], prior.mean[3], sigma[3]);
   return 0;
 }
 

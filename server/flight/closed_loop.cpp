@@ -24,6 +24,7 @@ using procedure::Step;
 constexpr double k_tick_s = 0.05;    ///< of the link
 constexpr double k_start_s = 12;     ///< RTK must have been fixed for ten seconds
 constexpr double k_patience_s = 60;  ///< until a start that stays blocked counts
+constexpr double k_again_s = 5;      ///< what was refused is read first
 constexpr int k_presses = 5;  ///< on a poor link a start may not be confirmed: the operator presses again
 const Eigen::Vector3d k_home_m{-9, -9, 0};
 
@@ -122,6 +123,7 @@ Result<ClosedLoopResult> fly_closed_loop(const sim::World& world, const Plan& pl
   out.data.mission = kit.mission();
   bool flew = false;
   int presses = 0;
+  double press_s = k_start_s;
   while (kit.now_s() < options.max_s) {
     const auto& vehicle = air.autopilot.vehicle();
     const Eigen::Vector3d before = vehicle.position_m();
@@ -137,9 +139,12 @@ Result<ClosedLoopResult> fly_closed_loop(const sim::World& world, const Plan& pl
     flew = flew || vehicle.in_air();
     if (f && f->flying()) continue;
     if (flew || presses == k_presses) break;
-    if (kit.now_s() < k_start_s) continue;
+    if (kit.now_s() < press_s) continue;
     const auto started = flight.start(air.now());
-    presses += started ? 1 : 0;
+    if (started) {
+      ++presses;
+      press_s = kit.now_s() + k_again_s;
+    }
     if (!started && kit.now_s() > k_start_s + k_patience_s) return started.error();
   }
   flight.finish();
