@@ -366,7 +366,7 @@ void FlightEngine::look_out(double now_s) {
   alarm_ = alarm;
 }
 
-/// The autopilot's own return ends with its landing, which nobody here commands: near home it may come down.
+/// The autopilot's own return ends with its landing, which the server does not command: near home it may come down.
 bool FlightEngine::lands_by_itself() const {
   constexpr double k_near_home_m = 5;
   const auto at = position_m();
@@ -418,7 +418,7 @@ void FlightEngine::work(double now_s, std::span<const Estimate> estimates, bool 
       if (state_.steps == 0 && !waypoint.measure) {
         feed(now_s, Event::done_here, "a point on the way only");
       } else if (here_s >= k_listen_s && heard(k_heard)) {
-        feed(now_s, Event::heard);
+        feed(now_s, Event::in_range);
       } else if (here_s >= 2 * k_listen_s &&
                  std::any_of(state_.anchors.begin(), state_.anchors.end(),
                              [](const AnchorTask& a) { return a.samples_here >= k_heard; })) {

@@ -58,7 +58,7 @@ enum class Event : std::uint8_t {
   start,
   airborne,
   arrived,      ///< at the target of the last go_to, heading included
-  heard,        ///< at least one unfinished anchor answers
+  in_range,     ///< at least one unfinished anchor answers
   sampled,      ///< enough ranges of every anchor that answers
   point,        ///< the planner chose one
   no_point,     ///< the planner found none
@@ -79,7 +79,7 @@ enum class Event : std::uint8_t {
 inline constexpr auto k_event_words = enum_table<Event>({{"start", Event::start},
                                                          {"airborne", Event::airborne},
                                                          {"arrived", Event::arrived},
-                                                         {"in_range", Event::heard},
+                                                         {"in_range", Event::in_range},
                                                          {"sampled", Event::sampled},
                                                          {"point", Event::point},
                                                          {"no_point", Event::no_point},
@@ -101,7 +101,7 @@ constexpr std::string_view to_string(Event event) { return k_event_words.word(ev
 /// What a transition asks of the state, so that one event can lead to several places.
 enum class Guard : std::uint8_t {
   always,
-  wants_turn,        ///< an anchor is heard whose bearing is not known, and turns are allowed here
+  wants_turn,        ///< an anchor is in range whose bearing is not known, and turns are allowed here
   wants_height,      ///< no turn wanted, and a height not known that a search could see
   legs_left,         ///< of the turn or the height search
   moves_left,        ///< of the three directions

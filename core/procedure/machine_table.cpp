@@ -27,9 +27,10 @@ constexpr Transition k_table[] = {
      "waypoint not allowed, to the next"},
     {S::go_to_waypoint, E::unreachable, G::always, S::return_home, "last waypoint not allowed"},
 
-    {S::search_anchors, E::heard, G::wants_turn, S::turn, "anchor in range, its bearing is wanted"},
-    {S::search_anchors, E::heard, G::wants_height, S::height_search, "anchor in range, its height is wanted"},
-    {S::search_anchors, E::heard, G::always, S::ranging, "anchors in range, ranging"},
+    {S::search_anchors, E::in_range, G::wants_turn, S::turn, "anchor in range, its bearing is wanted"},
+    {S::search_anchors, E::in_range, G::wants_height, S::height_search,
+     "anchor in range, its height is wanted"},
+    {S::search_anchors, E::in_range, G::always, S::ranging, "anchors in range, ranging"},
     {S::search_anchors, E::done_here, G::waypoint_left, S::go_to_waypoint,
      "nothing to measure here, to the next waypoint"},
     {S::search_anchors, E::done_here, G::always, S::return_home, "all waypoints flown"},

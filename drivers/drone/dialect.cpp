@@ -105,7 +105,7 @@ std::string_view mode_word(Autopilot autopilot, std::uint32_t custom_mode) {
   const auto find = [custom_mode](const auto& modes) -> std::string_view {
     for (const auto& [word, mode] : modes)
       if (mode == custom_mode) return word;
-    return "other";  // a mode that nobody here commands
+    return "other";  // a mode that the server never commands
   };
   return autopilot == Autopilot::px4 ? find(k_px4_modes) : find(k_ardupilot_modes);
 }

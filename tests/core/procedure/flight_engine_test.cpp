@@ -62,7 +62,7 @@ const std::map<Step, std::function<void(Flown&)>>& ways() {
   static const auto to_ranging = [](Flown& f) {
     to_search(f);
     f.hear();
-    f.feed({Event::heard, Event::timeout});  // the turn is given up
+    f.feed({Event::in_range, Event::timeout});  // the turn is given up
   };
   static const std::map<Step, std::function<void(Flown&)>> k_ways{
       {Step::take_off, [](Flown& f) { f.feed({Event::start}); }},
@@ -86,13 +86,13 @@ const std::map<Step, std::function<void(Flown&)>>& ways() {
        [](Flown& f) {
          to_search(f);
          f.hear();
-         f.feed({Event::heard});
+         f.feed({Event::in_range});
        }},
       {Step::height_search,
        [](Flown& f) {
          to_search(f);
          f.hear();
-         f.feed({Event::heard});
+         f.feed({Event::in_range});
          while (f.engine.state().step == Step::turn) {
            f.hear();
            f.feed({Event::arrived});

@@ -219,7 +219,7 @@ TEST(ProcedureMachine, TurnsInFourQuartersOnTheSpotThenSearchesTheHeight) {
   State s = at(Step::search_anchors);
   s.heading_rad = 0.0;
   s.anchors = {heard(false, false)};
-  auto step = advance(settings, s, {Event::heard, 1, {}, {}, {}});
+  auto step = advance(settings, s, {Event::in_range, 1, {}, {}, {}});
   std::vector<double> headings;
   while (step.state.step == Step::turn) {
     headings.push_back(*step.commands[0].heading_rad);
@@ -250,9 +250,9 @@ TEST(ProcedureMachine, FliesNoHeightSearchForAnAnchorThatTheTurnDidNotSee) {
   State s = at(Step::search_anchors);
   s.anchors = {heard(true, false)};
   s.anchors[0].no_lobe = true;
-  EXPECT_EQ(advance(settings, s, {Event::heard, 1, {}, {}, {}}).state.step, Step::ranging);
+  EXPECT_EQ(advance(settings, s, {Event::in_range, 1, {}, {}, {}}).state.step, Step::ranging);
   s.anchors.push_back(heard(true, false));  // somebody else's can be seen
-  auto step = advance(settings, s, {Event::heard, 1, {}, {}, {}});
+  auto step = advance(settings, s, {Event::in_range, 1, {}, {}, {}});
   while (step.state.step == Step::height_search) {
     for (auto& a : step.state.anchors) a.samples_here = 30;
     step = advance(settings, step.state, {Event::arrived, 2, {}, {}, {}});

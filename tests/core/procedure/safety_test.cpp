@@ -211,7 +211,7 @@ RandomMission random_mission(std::mt19937_64& random) {
 TEST(SafetyProperty, NoCommandLeavesTheAllowedVolumeIn10000RandomMissions) {
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> share(0, 1);
-  constexpr std::array k_events{Event::airborne,     Event::arrived, Event::heard,     Event::sampled,
+  constexpr std::array k_events{Event::airborne,     Event::arrived, Event::in_range,  Event::sampled,
                                 Event::done_here,    Event::timeout, Event::connected, Event::unreachable,
                                 Event::disconnected, Event::skip,    Event::hold,      Event::resume,
                                 Event::return_home,  Event::no_point};

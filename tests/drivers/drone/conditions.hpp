@@ -19,7 +19,7 @@ class Conditions : public ::testing::TestWithParam<Autopilot> {
     return o;
   }
   const drone::Dialect& dialect() const { return drone::dialect_of(GetParam()); }
-  /// A mode that nobody here commands: LOITER, POSCTL.
+  /// A mode that the server never commands: LOITER, POSCTL.
   std::uint32_t pilots() const { return GetParam() == Autopilot::px4 ? 3U << 16U : 5U; }
   static std::string kinds(const std::vector<AirRig::Wire>& wire) {
     std::string out;
