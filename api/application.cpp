@@ -85,8 +85,8 @@ struct Application::State {
                   .exclusions = stores.exclusions,
                   .goal = deps.goal,
                   .device_rows = [this] { return device_rows(); },
-                  .judge = [this](const Range& range) { return judge_range(*models.active(), range); },
-                  .judge_needs_cir = [this] { return models.active()->needs_cir; },
+                  .predict = [this](const Range& range) { return predict_range(*models.active(), range); },
+                  .predict_needs_cir = [this] { return models.active()->needs_cir; },
                   .site_outline = deps.site_outline,
                   .track = deps.track,
                   .kept_priors = [this](const MissionId& id) { return priors_of_flight(id); }}),
@@ -248,9 +248,9 @@ struct Application::State {
   void second();
   void background_round();
   void calibrate_landed();
-  void tell_system(UtcTime now, ServerPulse& pulse);
-  void tell_alarms(UtcTime now, std::vector<AlarmCondition> holding,
-                   std::vector<std::pair<std::string_view, std::string>>& of_flight);
+  void publish_system(UtcTime now, ServerPulse& pulse);
+  void publish_alarms(UtcTime now, std::vector<AlarmCondition> holding,
+                      std::vector<std::pair<std::string_view, std::string>>& of_flight);
 
   Deps deps;
   const Stores& stores;
@@ -355,7 +355,7 @@ void Application::State::second() {
   ServerPulse pulse;
   // Alarms and heartbeats must not wait for the disk.
   late.idle_task([this] { background_round(); });
-  (void)guarded("server status", [&] { tell_system(now, pulse); });
+  (void)guarded("server status", [&] { publish_system(now, pulse); });
   (void)guarded("device clocks", [&] {
     pulse.clock_skew = deps.devices.clock().skew;
     pulse.unrecorded = deps.devices.recorder_failure();
@@ -369,10 +369,10 @@ void Application::State::second() {
     pulse.failed_tasks +=
         (pulse.failed_tasks.empty() ? "" : "; ") + failure.task + " (" + to_utf8(failure.what, 120) + ')';
   }
-  (void)guarded("alarms", [&] { tell_alarms(now, alarm_conditions(pulses, pulse), of_flight); });
+  (void)guarded("alarms", [&] { publish_alarms(now, alarm_conditions(pulses, pulse), of_flight); });
 }
 
-void Application::State::tell_system(UtcTime now, ServerPulse& pulse) {
+void Application::State::publish_system(UtcTime now, ServerPulse& pulse) {
   const StorageStatus storage = deps.storage_status();
   std::string json = R"({"t_us":)" + std::to_string(now.us()) + R"(,"recording":)" +
                      (missions.recording() ? "true" : "false");
@@ -388,8 +388,8 @@ void Application::State::tell_system(UtcTime now, ServerPulse& pulse) {
   pulse.queued_rows = storage.queue_depth + missions.queued();
 }
 
-void Application::State::tell_alarms(UtcTime now, std::vector<AlarmCondition> holding,
-                                     std::vector<std::pair<std::string_view, std::string>>& of_flight) {
+void Application::State::publish_alarms(UtcTime now, std::vector<AlarmCondition> holding,
+                                        std::vector<std::pair<std::string_view, std::string>>& of_flight) {
   for (auto& [id, text] : of_flight) {
     const bool told = std::any_of(holding.begin(), holding.end(), [&](const auto& c) { return c.id == id; });
     if (!text.empty() && !told)

@@ -49,13 +49,13 @@ struct JobService::State {
   std::condition_variable changed;
   Locked<Lanes> lanes;
 
-  void tell(const Job& job) {
+  void publish(const Job& job) {
     hub.publish(Topic::jobs, to_wire(job_json(job)), clock.now().us(), to_string(job.id));
   }
   void save(const Job& job) {
     // A job that cannot be written is still shown live; after a restart it counts as interrupted.
     (void)jobs.update(job).has_value();
-    tell(job);
+    publish(job);
     {
       auto now = lanes.lock();
       ++now->changes;
@@ -83,7 +83,7 @@ struct JobService::State {
     return boost::outcome_v2::success();
   }
   void enqueue(const std::shared_ptr<State>& self, const Job& job, Work work) {
-    tell(job);
+    publish(job);
     {
       auto now = lanes.lock();
       now->canceled.erase(job.id);  // of an earlier life of the same job
@@ -130,7 +130,7 @@ class JobService::State::Context final : public JobContext {
       saved_ = now;
       state_.save(job_);
     } else {
-      state_.tell(job_);
+      state_.publish(job_);
     }
   }
   bool canceled() const override { return state_.is_canceled(job_.id); }

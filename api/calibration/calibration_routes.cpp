@@ -242,7 +242,7 @@ Response publish(CalibrationApi& s, const Request& request) {
   const auto wanted = read_publish(json_body(request, true));
   // What is judged below is judged against this revision; the store refuses when another came in between.
   const auto newest = value_or_problem(s.revisions.revisions(1, 0));
-  const std::uint64_t judged_on = newest.empty() ? 0 : newest.front().number;
+  const std::uint64_t decided_on = newest.empty() ? 0 : newest.front().number;
   ask_whether_moved(s, calibration);
   std::vector<Override> overrides;
   const auto anchors = chosen(calibration, wanted, overrides, request.principal.token_id);
@@ -258,7 +258,7 @@ Response publish(CalibrationApi& s, const Request& request) {
                          " reason: " + one.reason + "; failed:" + words);
   }
   const auto published = s.revisions.publish(calibration.id, anchors, request.principal.token_id, wanted.note,
-                                             s.clock.now(), overrides, judged_on);
+                                             s.clock.now(), overrides, decided_on);
   if (!published)
     s.audit(request, "calibration.publish " + to_string(calibration.id),
             "refused: " + published.error().message);

@@ -353,7 +353,7 @@ Result<void> CalibrationService::solve_kit(const CalibrationRequest& request, co
   }
   if (request.iterations > 0 && !members.empty() && members.front() < request.missions.size() &&
       solved.evidence.course.empty()) {
-    BOOST_OUTCOME_TRY(solved.evidence.course, course_of(named.front(), of_kit, request.iterations));
+    BOOST_OUTCOME_TRY(solved.evidence.course, convergence_of(named.front(), of_kit, request.iterations));
   }
   return boost::outcome_v2::success();
 }

@@ -59,7 +59,7 @@ Ordered device_json(const DeviceReport& d) {
               {"reason", text_or_null(d.reason)},
               {"conflict", text_or_null(d.conflict)},
               {"in_state_s", d.in_state_s},
-              {"last_seen_us", d.last_heard ? Ordered(d.last_heard->us()) : Ordered(nullptr)},
+              {"last_seen_us", d.last_seen ? Ordered(d.last_seen->us()) : Ordered(nullptr)},
               {"network_id", network_id(d)},
               {"model", text_or_null(d.model)},
               {"firmware", text_or_null(d.firmware)},
@@ -107,7 +107,7 @@ Ordered device_row_json(const DeviceReport& d) {
           {"state", d.state == "talking"                    ? "live"
                     : d.state == "lost" || d.state == "off" ? "lost"
                                                             : "late"},
-          {"last_seen_us", d.last_heard ? Ordered(d.last_heard->us()) : Ordered(nullptr)},
+          {"last_seen_us", d.last_seen ? Ordered(d.last_seen->us()) : Ordered(nullptr)},
           {"rate_hz", d.rows_per_s},
           {"id", to_string(d.config.id)},
           {"name", d.config.name},

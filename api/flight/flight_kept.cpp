@@ -89,7 +89,7 @@ void FlightService::State::recover() {
     auto j = nlohmann::json::parse(text, nullptr, false);
     if (j.is_object() && j.value("landed", false)) continue;
     deps.missions.prepare(mission);
-    deps.missions.tell_priors(
+    deps.missions.set_priors(
         mission, j.is_object() ? priors_of(j.value("clues", nlohmann::json())) : procedure::FlightPriors{});
     flying.emplace_back(mission, std::move(j));
   }
@@ -102,7 +102,7 @@ void FlightService::State::recover() {
                       "the flight before the restart cannot be read: the pilot has it", mission);
     }
   }
-  tell_events(*w);
+  publish_events(*w);
 }
 
 }  // namespace anchord::api

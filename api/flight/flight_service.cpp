@@ -33,7 +33,7 @@ flight::Now FlightService::State::now() const {
   return out;
 }
 
-void FlightService::State::tell_events(Work& w) const {
+void FlightService::State::publish_events(Work& w) const {
   for (auto& event : w.operations.take_events())
     deps.events.add(std::move(event.level), std::move(event.code), std::move(event.text), event.mission);
 }
@@ -133,7 +133,7 @@ void FlightService::step() {
       s.checks_apart.pause();
     w->operations.round(now, estimates, live.has_value());
     if (auto task = w->operations.take_point_task()) w->apart.point = std::move(task);
-    s.tell_events(*w);
+    s.publish_events(*w);
     if (const auto& f = w->operations.flight()) {
       mission = f->mission;  // one that began meanwhile too
       if (w->last.flight != w->operations.n_flights()) w->last = {.flight = w->operations.n_flights()};
@@ -148,7 +148,7 @@ void FlightService::step() {
     due_apart = State::apart_is_due(*w);
   }
   if (due_apart) s.deps.plan.post([&s] { s.work_apart(); });
-  if (priors && mission) s.deps.missions.tell_priors(*mission, std::move(*priors));
+  if (priors && mission) s.deps.missions.set_priors(*mission, std::move(*priors));
   if (keeps && mission) s.keep(*mission, std::move(keep));
   s.changed.notify_all();
 }
@@ -185,7 +185,7 @@ Result<Lease> FlightService::take_control(const MissionId& mission, const Princi
   const auto now = state_->now();
   auto lease =
       w->operations.take_control(now, mission, holder_of(who), by_force, to_string(make_uuid_v7(now.utc)));
-  state_->tell_events(*w);
+  state_->publish_events(*w);
   return lease;
 }
 
@@ -199,7 +199,7 @@ Result<void> FlightService::release_control(const MissionId& mission, const std:
                                             const Principal& who) {
   auto w = state_->work.lock();
   auto released = w->operations.release_control(state_->now(), mission, key, holder_of(who));
-  state_->tell_events(*w);
+  state_->publish_events(*w);
   return released;
 }
 
@@ -255,7 +255,7 @@ Result<FlightCommand> FlightService::act(const MissionId& mission, const Order& 
   BOOST_OUTCOME_TRYV(operations.renew_control(now, mission, order.lease, holder_of(who)));
   auto given = ground ? operations.begin(now, record, *ground, order.manual, who.name)
                       : operations.act(now, mission, order.action, who.name);
-  state_->tell_events(*w);
+  state_->publish_events(*w);
   state_->changed.notify_all();
   return given;
 }
@@ -278,7 +278,7 @@ Result<DroneStatus> FlightService::change_aircraft(const MissionId& mission, con
   auto w = state_->work.lock();
   BOOST_OUTCOME_TRYV(w->operations.renew_control(state_->now(), mission, lease, holder_of(who)));
   auto changed = w->operations.change_aircraft(mission, sender, who.name);
-  state_->tell_events(*w);
+  state_->publish_events(*w);
   return changed;
 }
 
@@ -327,7 +327,7 @@ Result<void> FlightService::override_item(const MissionId& mission, const std::s
   const auto ground = state_->groundwork(nullptr);
   auto w = state_->work.lock();
   auto done = w->operations.override_item(state_->now(), mission, item, reason, who.name, ground);
-  state_->tell_events(*w);
+  state_->publish_events(*w);
   return done;
 }
 

@@ -48,7 +48,7 @@ struct FlightService::State {
   using Guard = Locked<Work>::Exclusive;
 
   flight::Now now() const;
-  void tell_events(Work& w) const;
+  void publish_events(Work& w) const;
   /// Whether what is due apart has to be handed to the executor (by the caller, without the lock).
   static bool apart_is_due(Work& w);
   /// All that is due, with the lock given away meanwhile.

@@ -33,7 +33,7 @@ std::optional<Eigen::Vector3d> place(const Json& json) {
   return Eigen::Vector3d(number(json.at(0)), number(json.at(1)), number(json.at(2)));
 }
 
-Json course_json(const Course& course) {
+Json course_json(const Convergence& course) {
   Json out = Json::object();
   for (const auto& [id, steps] : course) {
     Json& list = out[to_string(id)] = Json::array();
@@ -52,12 +52,12 @@ Verdict verdict_of(const Json& json) {
   throw std::invalid_argument("unknown verdict " + to_wire(json));
 }
 
-Course parse_course(const Json& json) {
-  Course course;
+Convergence parse_course(const Json& json) {
+  Convergence course;
   for (const auto& [id, list] : json.items()) {
     auto& steps = course[parse_network_id(id).value()];
     for (const auto& s : list) {
-      CourseStep step;
+      ConvergenceStep step;
       step.share = number(s.at(0));
       step.n_ranges = s.at(1).get<std::size_t>();
       step.raw_m = place(s.at(2));

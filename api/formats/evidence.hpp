@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/base/result.hpp"
-#include "core/localize/course.hpp"
+#include "core/localize/convergence.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "core/types/flight_data.hpp"
 
@@ -29,7 +29,7 @@ struct FlightEvidence {
 /// Everything behind a calibration that its positions do not carry.
 struct Evidence {
   std::vector<FlightEvidence> flights;
-  Course course;
+  Convergence course;
 };
 
 /// At most 400 track points and 500 residuals an anchor, evenly taken; rejected ranges are preferred over

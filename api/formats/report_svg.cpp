@@ -259,7 +259,7 @@ std::string residuals(const std::vector<const std::vector<RangeResidual>*>& flig
   return out + "</svg>";
 }
 
-std::string course(const std::vector<CourseStep>& steps, const Eigen::Vector3d& reference) {
+std::string course(const std::vector<ConvergenceStep>& steps, const Eigen::Vector3d& reference) {
   constexpr double w = 268, h = 104, left = 34, foot = 16;
   double most = 0.02;
   const auto error = [&](const std::optional<Eigen::Vector3d>& at) {
@@ -305,11 +305,11 @@ std::string course(const std::vector<CourseStep>& steps, const Eigen::Vector3d& 
                         : "<path class=\"" + std::string(css) + "\" d=\"" + path + "\"/>" + marks;
   };
   out += curve(
-      "claim", [](const CourseStep& s) { return s.corrected_m ? s.h95_m : std::nan(""); }, false);
+      "claim", [](const ConvergenceStep& s) { return s.corrected_m ? s.h95_m : std::nan(""); }, false);
   out += curve(
-      "raw", [&](const CourseStep& s) { return error(s.raw_m); }, true);
+      "raw", [&](const ConvergenceStep& s) { return error(s.raw_m); }, true);
   out += curve(
-      "cor", [&](const CourseStep& s) { return error(s.corrected_m); }, true);
+      "cor", [&](const ConvergenceStep& s) { return error(s.corrected_m); }, true);
   for (std::size_t i = 0; i < steps.size(); ++i)
     out += label(x(i), h - 3, std::to_string(i + 1), "t", "middle");
   return out + "</svg>";

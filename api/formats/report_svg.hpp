@@ -19,6 +19,6 @@ std::string map(const Report& report);
 std::string residuals(const std::vector<const std::vector<RangeResidual>*>& flights);
 /// Error raw and corrected, and the claimed 95 % radius, per iteration. `truth`: against it, else against the
 /// end.
-std::string course(const std::vector<CourseStep>& steps, const Eigen::Vector3d& reference);
+std::string course(const std::vector<ConvergenceStep>& steps, const Eigen::Vector3d& reference);
 
 }  // namespace anchord::report

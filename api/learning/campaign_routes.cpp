@@ -169,7 +169,7 @@ Result<SamplePage> sample_page(CampaignStore& store, const ModelRegistry::Active
     out.next = more ? rows.back().id : 0;
     filter.after = out.next;
     for (auto& row : rows) {
-      if (wanted && class_of(ModelRegistry::judge(active, features_of(row.sample, row.truth))) != *wanted)
+      if (wanted && class_of(ModelRegistry::predict(active, features_of(row.sample, row.truth))) != *wanted)
         continue;
       out.rows.push_back(std::move(row));
     }
@@ -227,7 +227,7 @@ Response samples(LearningApi& l, const Request& request) {
     if (!with_features && !judged) return item;
     const auto features = features_of(row.sample, row.truth);
     if (with_features) item["features"] = features_json(features);
-    if (judged) item["predicted"] = predicted_json(ModelRegistry::judge(*active, features));
+    if (judged) item["predicted"] = predicted_json(ModelRegistry::predict(*active, features));
     return item;
   };
   const std::string format = negotiate(request, {"json", "ndjson", "csv"});

@@ -69,7 +69,7 @@ FlightModelsReport correct_flight(const ModelRegistry::Active& models, FlightDat
     if (range.kind != RangeKind::tag_anchor || !(range.distance_m > k_least_range_m)) continue;
     ++out.n_ranges;
     const auto features = features_of(range);
-    const auto judged = ModelRegistry::judge(models, features);
+    const auto judged = ModelRegistry::predict(models, features);
     if (!judged.note.empty()) {
       ++out.n_silent;
       if (out.note.empty()) out.note = judged.note;

@@ -196,7 +196,7 @@ Ordered range_models_json(const RangeModels& models) {
   return out;
 }
 
-Ordered judgement_json(const RangeJudgement& j) {
+Ordered model_answer_json(const ModelAnswer& j) {
   const auto& v = j.verdict;
   Ordered out{{"los", or_null(v.los)},
               {"p_los", or_null(v.p_los)},

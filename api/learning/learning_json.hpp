@@ -29,7 +29,7 @@ nlohmann::ordered_json promotion_json(const Promotion& promotion);
 nlohmann::ordered_json gate_json(const GateReport& gate);
 /// Ids by task, of those that spoke.
 nlohmann::ordered_json range_models_json(const RangeModels& models);
-nlohmann::ordered_json judgement_json(const RangeJudgement& judgement);
+nlohmann::ordered_json model_answer_json(const ModelAnswer& judgement);
 
 /// One sample to predict: diagnostics and features by name. What is wrong goes to `errors`.
 nlos::FeatureVector read_features(const nlohmann::json& sample, const std::string& at,

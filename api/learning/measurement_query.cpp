@@ -31,13 +31,13 @@ std::optional<PredictedClass> query_class(const Request& request) {
   return query_word(request, "class", k_predicted_words);
 }
 
-PredictedClass class_of(const RangeJudgement& judgement) {
+PredictedClass class_of(const ModelAnswer& judgement) {
   const auto p_los = judgement.verdict.p_los;
   if (!p_los || (*p_los >= k_low_unclear && *p_los <= k_high_unclear)) return PredictedClass::unclear;
   return *p_los > k_high_unclear ? PredictedClass::los : PredictedClass::nlos;
 }
 
-nlohmann::ordered_json predicted_json(const RangeJudgement& judgement) {
+nlohmann::ordered_json predicted_json(const ModelAnswer& judgement) {
   const auto maybe = [](const std::optional<double>& v) {
     return v ? nlohmann::ordered_json(*v) : nlohmann::ordered_json(nullptr);
   };

@@ -21,9 +21,9 @@ enum class PredictedClass : std::uint8_t { los, nlos, unclear };
 inline constexpr auto k_predicted_words = enum_table<PredictedClass>(
     {{"los", PredictedClass::los}, {"nlos", PredictedClass::nlos}, {"unclear", PredictedClass::unclear}});
 std::optional<PredictedClass> query_class(const Request& request);
-PredictedClass class_of(const RangeJudgement& judgement);
+PredictedClass class_of(const ModelAnswer& judgement);
 /// {"class","p_los","bias_m"}
-nlohmann::ordered_json predicted_json(const RangeJudgement& judgement);
+nlohmann::ordered_json predicted_json(const ModelAnswer& judgement);
 
 /// Measurements that a class is looked for in, for one page: beyond it the page is handed out as it is, with
 /// its cursor.

@@ -143,13 +143,13 @@ Result<void> ModelRegistry::reload() {
   return boost::outcome_v2::success();
 }
 
-RangeJudgement ModelRegistry::judge(const Active& active, const nlos::FeatureVector& features) {
-  RangeJudgement out;
+ModelAnswer ModelRegistry::predict(const Active& active, const nlos::FeatureVector& features) {
+  ModelAnswer out;
   if (active.predictor.empty()) {
     out.note = active.fault.empty() ? "no model is promoted" : active.fault;
     return out;
   }
-  out.verdict = active.predictor.judge(features, active.correction);
+  out.verdict = active.predictor.predict(features, active.correction);
   out.models = models_of(active, out.verdict);
   if (!out.verdict.p_los && !out.verdict.bias_m) {
     std::string lacking;
@@ -161,9 +161,9 @@ RangeJudgement ModelRegistry::judge(const Active& active, const nlos::FeatureVec
   return out;
 }
 
-std::optional<RangeModel> judge_range(const ModelRegistry::Active& active, const Range& range) {
+std::optional<RangeModel> predict_range(const ModelRegistry::Active& active, const Range& range) {
   if (active.predictor.empty() || range.kind != RangeKind::tag_anchor) return std::nullopt;
-  const auto verdict = active.predictor.judge(features_of(range), active.correction);
+  const auto verdict = active.predictor.predict(features_of(range), active.correction);
   if (!verdict.p_los && !verdict.bias_m) return std::nullopt;
   return RangeModel{verdict.los,
                     verdict.p_los,
@@ -174,7 +174,7 @@ std::optional<RangeModel> judge_range(const ModelRegistry::Active& active, const
                     models_of(active, verdict)};
 }
 
-RangeModels models_of(const ModelRegistry::Active& active, const ml::RangeVerdict& verdict) {
+RangeModels models_of(const ModelRegistry::Active& active, const ml::RangePrediction& verdict) {
   const auto spoke = [&](ml::Task task) -> std::optional<ModelId> {
     if (!verdict.spoke.test(static_cast<std::size_t>(task))) return std::nullopt;
     return active.ids[static_cast<std::size_t>(task)];
@@ -183,7 +183,7 @@ RangeModels models_of(const ModelRegistry::Active& active, const ml::RangeVerdic
           spoke(ml::Task::bias)};
 }
 
-std::optional<RangeErrorModel> error_model_of(const ml::RangeVerdict& verdict, ml::Correction how) {
+std::optional<RangeErrorModel> error_model_of(const ml::RangePrediction& verdict, ml::Correction how) {
   if (!verdict.likelihood || !verdict.bias_m || verdict.outside_training || how != ml::Correction::weighted)
     return std::nullopt;
   const ml::RangeLikelihood& l = *verdict.likelihood;

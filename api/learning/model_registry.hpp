@@ -18,8 +18,8 @@
 namespace anchord::api {
 
 /// What the promoted models say about one range, or why they say nothing.
-struct RangeJudgement {
-  ml::RangeVerdict verdict{};
+struct ModelAnswer {
+  ml::RangePrediction verdict{};
   RangeModels models{};
   std::string note;  ///< empty when classified: "no model is promoted", "lacks std_noise ..."
 };
@@ -45,7 +45,7 @@ class ModelRegistry {
 
   const ModelSource& source() const { return source_; }
 
-  static RangeJudgement judge(const Active& active, const nlos::FeatureVector& features);
+  static ModelAnswer predict(const Active& active, const nlos::FeatureVector& features);
 
  private:
   ModelSource source_;
@@ -54,15 +54,15 @@ class ModelRegistry {
 };
 
 /// In the form a flight keeps with the range. Nothing where the models say nothing.
-std::optional<RangeModel> judge_range(const ModelRegistry::Active& active, const Range& range);
+std::optional<RangeModel> predict_range(const ModelRegistry::Active& active, const Range& range);
 
 /// Of those active, the models that gave a verdict its class or bias.
-RangeModels models_of(const ModelRegistry::Active& active, const ml::RangeVerdict& verdict);
+RangeModels models_of(const ModelRegistry::Active& active, const ml::RangePrediction& verdict);
 
 /// The same as a likelihood, of the error that is left once the correction is taken off. Nothing without a
 /// class and both biases, outside of what was trained (its density says nothing there), or where the
 /// corrections "hard" and "none" ask for the range as it is.
-std::optional<RangeErrorModel> error_model_of(const ml::RangeVerdict& verdict, ml::Correction how);
+std::optional<RangeErrorModel> error_model_of(const ml::RangePrediction& verdict, ml::Correction how);
 
 /// Promotions of this "task" say which correction is in use, in their reason.
 inline constexpr std::string_view k_correction_task = "correction";

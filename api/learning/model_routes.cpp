@@ -164,9 +164,9 @@ Response active_answer(LearningApi& l) {
 
 /// Audited before it happens, as publications are; what the store then refuses is audited as refused.
 Promotion promoted(LearningApi& l, const Request& request, const std::string& what,
-                   const Promotion& promotion, const Standing& judged_on) {
+                   const Promotion& promotion, const Standing& decided_on) {
   l.audit(request, what);
-  auto done = l.stores.models.promote(promotion, judged_on.newest);
+  auto done = l.stores.models.promote(promotion, decided_on.newest);
   if (!done) l.audit(request, what, "refused: " + done.error().message);
   return value_or_problem(std::move(done));
 }
@@ -208,7 +208,7 @@ std::optional<ml::Model> active_model(LearningApi& l, const Standing& now, const
 
 /// Made here: by the places its own run held out, else by what this server keeps, else its own figures. From
 /// elsewhere: by what this server keeps.
-GateReport judge(LearningApi& l, const Standing& now, const ModelSource::Artifact& candidate) {
+GateReport gate_report(LearningApi& l, const Standing& now, const ModelSource::Artifact& candidate) {
   const auto model = value_or_problem(read_model_artifact(candidate.text));
   const auto current = active_model(l, now, candidate.stored.task);
   GateData data;
@@ -253,7 +253,7 @@ Response promote(LearningApi& l, const Request& request) {
           load_models(l.models.source(), {{stored.task, stored.id}}, ml::Correction::weighted, false);
       !able)
     throw_problem(422, "unsupported", able.error().message);
-  const auto gate = judge(l, before, candidate);
+  const auto gate = gate_report(l, before, candidate);
   if (!gate.passed && reason.empty())
     throw_problem(422, "state", gate.why + " (give a reason to promote all the same)");
   const auto done = promoted(l, request,
@@ -278,7 +278,7 @@ Response promote(LearningApi& l, const Request& request) {
 Response gate_of_model(LearningApi& l, const Request& request) {
   check_query(request, {});
   const auto candidate = value_or_problem(l.models.source().artifact(path_id<ModelId>(request)));
-  return json_response(200, gate_json(judge(l, standing(l), candidate)));
+  return json_response(200, gate_json(gate_report(l, standing(l), candidate)));
 }
 
 /// What was active before the newest promotion that still stands.
@@ -357,7 +357,7 @@ Response predict(LearningApi& l, const Request& request) {
   chosen.correction = correction.value_or(chosen.correction);
   Ordered items = Ordered::array();
   for (const auto& one_sample : features)
-    items.push_back(judgement_json(ModelRegistry::judge(chosen, one_sample)));
+    items.push_back(model_answer_json(ModelRegistry::predict(chosen, one_sample)));
   if (one != nullptr) return json_response(200, items.front());
   return json_response(200, {{"items", std::move(items)}});
 }

@@ -56,8 +56,8 @@ Result<RuleReport> rules_of(const DatasetTable& table, std::string name, Place g
                         .first->second);
   }
   if (samples.empty()) return make_error(Errc::too_few_observations, "no row of the data set has a label");
-  out.printed = nlos::judge_rules(nlos::printed_rules(), samples);
-  out.fitted = nlos::judge_fitted_rules(samples, ml::grouped_folds(place, 10, seed));
+  out.printed = nlos::evaluate_rules(nlos::printed_rules(), samples);
+  out.fitted = nlos::evaluate_fitted_rules(samples, ml::grouped_folds(place, 10, seed));
   out.rules = nlos::fit_rules(samples);
   return out;
 }

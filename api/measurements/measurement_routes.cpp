@@ -136,7 +136,7 @@ Result<MeasurementStore::Page<Range>> classed(MeasurementStore& store, const Mod
     BOOST_OUTCOME_TRY(auto page, store.ranges(filter));
     looked += page.rows.size();
     for (std::size_t i = 0; i < page.rows.size(); ++i) {
-      if (class_of(ModelRegistry::judge(active, features_of(page.rows[i]))) != wanted) continue;
+      if (class_of(ModelRegistry::predict(active, features_of(page.rows[i]))) != wanted) continue;
       out.rows.push_back(std::move(page.rows[i]));
       out.ids.push_back(page.ids[i]);
     }
@@ -179,7 +179,7 @@ Response list_ranges(MeasurementApi& s, const Request& request) {
         if (with_features || judged) {
           const auto features = features_of(row);
           if (with_features) json["features"] = features_json(features);
-          if (judged) json["predicted"] = predicted_json(ModelRegistry::judge(*active, features));
+          if (judged) json["predicted"] = predicted_json(ModelRegistry::predict(*active, features));
         }
         if (!with_cir) json.erase("cir");
         return json;

@@ -5,28 +5,28 @@
 
 namespace anchord::api {
 
-void MissionService::State::tell_events(Flight& flight, Flight::Work& work) {
+void MissionService::State::publish_events(Flight& flight, Flight::Work& work) {
   if (!work.live.has_events()) return;
   for (const auto& event : work.live.take_events())
-    std::visit([&](const auto& one) { tell(flight, one); }, event);
+    std::visit([&](const auto& one) { publish(flight, one); }, event);
 }
 
-void MissionService::State::tell(Flight&, const flight::FixBelieved& event) {
+void MissionService::State::publish(Flight&, const flight::FixBelieved& event) {
   if (auto* pilot = observer.load()) pilot->on_fix(event.fix);
 }
 
-void MissionService::State::tell(Flight& flight, const flight::FixShown& event) {
+void MissionService::State::publish(Flight& flight, const flight::FixShown& event) {
   const std::int64_t t_us = event.fix.time.us();
   deps.hub.publish(Topic::rtk_status, live_rtk_json(flight.id, event.fix), t_us, to_string(flight.id));
   deps.hub.collect(Topic::fixes, live_fix_json(flight.id, event.fix), t_us);
 }
 
-void MissionService::State::tell(Flight& flight, const flight::PoseMoved& event) {
+void MissionService::State::publish(Flight& flight, const flight::PoseMoved& event) {
   deps.hub.publish(Topic::drone_pose, live_pose_json(flight.id, flight.frame, event.pose),
                    event.pose.time.us(), to_string(flight.id));
 }
 
-void MissionService::State::tell(Flight& flight, const flight::RangeDecided& event) {
+void MissionService::State::publish(Flight& flight, const flight::RangeDecided& event) {
   const auto& result = event.result;
   if (auto* pilot = observer.load()) pilot->on_range(flight.id, result);
   deps.hub.collect(Topic::ranges, live_range_json(flight.id, result), result.range.time.us(),
@@ -34,7 +34,7 @@ void MissionService::State::tell(Flight& flight, const flight::RangeDecided& eve
 }
 
 /// From its first range on an anchor has an identity that facility data can hang on.
-void MissionService::State::tell(Flight& flight, const flight::AnchorFound& event) {
+void MissionService::State::publish(Flight& flight, const flight::AnchorFound& event) {
   later([&anchors = deps.anchors, who = event.anchor, now = deps.clock.now()]() -> Result<void> {
     BOOST_OUTCOME_TRYV(anchors.find_or_create(who, now));
     return boost::outcome_v2::success();
@@ -43,7 +43,7 @@ void MissionService::State::tell(Flight& flight, const flight::AnchorFound& even
     deps.events.add("info", "anchor.found", "anchor " + to_string(event.anchor) + " found", flight.id);
 }
 
-void MissionService::State::tell(Flight& flight, const flight::AnchorStatusChanged& event) {
+void MissionService::State::publish(Flight& flight, const flight::AnchorStatusChanged& event) {
   const bool converged = event.status == "converged";
   deps.events.add(
       converged ? "info" : "warning", "anchor." + std::string(event.status),
@@ -51,13 +51,13 @@ void MissionService::State::tell(Flight& flight, const flight::AnchorStatusChang
       flight.id);
 }
 
-void MissionService::State::tell(Flight& flight, const flight::AnchorEstimated& event) {
+void MissionService::State::publish(Flight& flight, const flight::AnchorEstimated& event) {
   const auto& estimate = event.estimate;
   deps.hub.publish(Topic::anchors_estimates, live_estimate_json(flight.id, estimate, event.models_moved_m),
                    estimate.time.us(), to_string(flight.id) + to_string(estimate.anchor), estimate.anchor);
 }
 
-void MissionService::State::tell(Flight& flight, const flight::FixRejected& event) {
+void MissionService::State::publish(Flight& flight, const flight::FixRejected& event) {
   deps.events.add("warning", "track." + event.reason,
                   event.reason == "excluded" ? "positions were excluded by a person"
                                              : "a position is rejected: " + event.reason +
@@ -65,7 +65,7 @@ void MissionService::State::tell(Flight& flight, const flight::FixRejected& even
                   flight.id);
 }
 
-void MissionService::State::tell(Flight& flight, const flight::OriginMoved&) {
+void MissionService::State::publish(Flight& flight, const flight::OriginMoved&) {
   deps.events.add("warning", "track.origin",
                   "the first positions were no part of the flight: its origin is another from here on",
                   flight.id);

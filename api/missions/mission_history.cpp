@@ -75,7 +75,7 @@ void note(const MissionId& id, flight::LiveMission& live, std::string& items) {
 /// moments is kept.
 std::shared_ptr<const std::string> MissionService::State::replayed(const Mission& mission) {
   const auto& id = mission.id;
-  Stream<Range> ranges(id, deps.judge_needs_cir(),
+  Stream<Range> ranges(id, deps.predict_needs_cir(),
                        [this](const auto& filter) { return deps.measurements.ranges(filter); });
   Stream<Fix> fixes(id, false, [this](const auto& filter) { return deps.measurements.fixes(filter); });
   flight::LiveMission live(setup_of(mission));

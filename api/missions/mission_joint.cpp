@@ -68,11 +68,11 @@ void MissionService::State::finish_joint(Flight& flight, const FlightSolution* s
   work->joint_not_before = std::chrono::steady_clock::now() +
                            std::max<std::chrono::steady_clock::duration>(k_joint_pause, k_joint_rest * took);
   if (solution == nullptr || stopped || !work->live.adopt(*solution, cut, generation)) return;
-  tell_events(flight, *work);
+  publish_events(flight, *work);
   flight.dirty = true;
 }
 
-void MissionService::tell_priors(const MissionId& id, procedure::FlightPriors priors) {
+void MissionService::set_priors(const MissionId& id, procedure::FlightPriors priors) {
   const auto flight = state_->find(id);
   if (!flight) return;
   {

@@ -15,9 +15,9 @@ constexpr std::size_t k_announced = 100;  // rows between two announcements of e
 }  // namespace
 
 flight::LiveRow MissionService::State::row_of(Range range) const {
-  flight::JudgedRange row{std::move(range), {}, {}};
+  flight::PredictedRange row{std::move(range), {}, {}};
   row.time = row.range.time;
-  row.model = deps.judge(row.range);
+  row.model = deps.predict(row.range);
   row.range.cir.reset();  // a queued row needs none, and it is 4 kB
   return row;
 }
@@ -148,7 +148,7 @@ void MissionService::State::work(Flight& flight) {
       work->live.settle();
       since_announced = 0;
     }
-    tell_events(flight, *work);
+    publish_events(flight, *work);
   }
   bool closing = false;
   if (auto inbox = flight.inbox.lock(); inbox->queue.empty()) {
@@ -158,7 +158,7 @@ void MissionService::State::work(Flight& flight) {
   if (closing) work->live.finish();
   work->live.settle();
   work->live.show_pose();
-  tell_events(flight, *work);
+  publish_events(flight, *work);
   flight.dirty = true;
   make_view(flight, *work);
 }
@@ -173,7 +173,7 @@ void MissionService::State::make_view(Flight& flight, const Flight::Work& work) 
 }
 
 void MissionService::State::note_radios(const flight::LiveRow& row) {
-  const auto* judged = std::get_if<flight::JudgedRange>(&row);
+  const auto* judged = std::get_if<flight::PredictedRange>(&row);
   if (judged == nullptr) return;
   const Range& range = judged->range;
   const SteadyTime now = steady_now();

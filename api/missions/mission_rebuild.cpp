@@ -39,7 +39,7 @@ void MissionService::State::start_reading(Flight& flight) const {
   auto& r = *work->rebuild;
   r.range_filter.mission = r.fix_filter.mission = flight.id;
   r.range_filter.limit = r.fix_filter.limit = 2000;
-  r.range_filter.with_cir = deps.judge_needs_cir();
+  r.range_filter.with_cir = deps.predict_needs_cir();
   work->live.begin_reading();
 }
 
@@ -105,7 +105,7 @@ bool MissionService::State::rebuild_slice(Flight& flight) {
 
 void MissionService::State::end_rebuild(Flight& flight) {
   auto work = flight.work.lock();
-  tell_events(flight, *work);
+  publish_events(flight, *work);
   flight.dirty = true;
 }
 

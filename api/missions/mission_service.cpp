@@ -124,7 +124,7 @@ void MissionService::exclusions_changed(const MissionId& id) {
   state_->begin_rebuild(flight);
 }
 
-bool MissionService::wants_cir() const { return state_->deps.judge_needs_cir(); }
+bool MissionService::wants_cir() const { return state_->deps.predict_needs_cir(); }
 
 void MissionService::note_in_flights(const std::string& code, const std::string& text) {
   state_->forget_reads(std::nullopt);  // the models that judged their ranges may be others now

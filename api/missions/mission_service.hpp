@@ -66,8 +66,8 @@ class MissionService {
     AccuracyGoal goal{};                       ///< an anchor within it is converged
     std::function<std::string()> device_rows;  ///< more rows of topic `devices`, comma between them
     /// What the promoted models say of a range; nothing while none is promoted.
-    std::function<std::optional<RangeModel>(const Range&)> judge;
-    std::function<bool()> judge_needs_cir;
+    std::function<std::optional<RangeModel>(const Range&)> predict;
+    std::function<bool()> predict_needs_cir;
     bool site_outline{true};  ///< joint solutions take the site's outline as a prior: anchors are inside
     TrackLimits track{};      ///< what the positions of a flight are held against
     /// What turns and height searches of a mission's flight told, as kept with it.
@@ -112,7 +112,7 @@ class MissionService {
 
   /// What the turns and height searches of its flight told of its anchors: priors of every running estimate
   /// from now on. Never waits.
-  void tell_priors(const MissionId& id, procedure::FlightPriors priors);
+  void set_priors(const MissionId& id, procedure::FlightPriors priors);
 
   struct LiveView {
     Mission mission;

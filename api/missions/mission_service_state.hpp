@@ -150,16 +150,16 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   void make_view(Flight& flight, const Flight::Work& work) const;
   void note_radios(const flight::LiveRow& row);
   /// What the live mission reports, to the world: hub, event log, store, pilot.
-  void tell_events(Flight& flight, Flight::Work& work);
-  void tell(Flight& flight, const flight::FixBelieved& event);
-  void tell(Flight& flight, const flight::FixShown& event);
-  void tell(Flight& flight, const flight::PoseMoved& event);
-  void tell(Flight& flight, const flight::RangeDecided& event);
-  void tell(Flight& flight, const flight::AnchorFound& event);
-  void tell(Flight& flight, const flight::AnchorStatusChanged& event);
-  void tell(Flight& flight, const flight::AnchorEstimated& event);
-  void tell(Flight& flight, const flight::FixRejected& event);
-  void tell(Flight& flight, const flight::OriginMoved& event);
+  void publish_events(Flight& flight, Flight::Work& work);
+  void publish(Flight& flight, const flight::FixBelieved& event);
+  void publish(Flight& flight, const flight::FixShown& event);
+  void publish(Flight& flight, const flight::PoseMoved& event);
+  void publish(Flight& flight, const flight::RangeDecided& event);
+  void publish(Flight& flight, const flight::AnchorFound& event);
+  void publish(Flight& flight, const flight::AnchorStatusChanged& event);
+  void publish(Flight& flight, const flight::AnchorEstimated& event);
+  void publish(Flight& flight, const flight::FixRejected& event);
+  void publish(Flight& flight, const flight::OriginMoved& event);
   void begin_rebuild(const std::shared_ptr<Flight>& flight);
   void continue_rebuild(const std::shared_ptr<Flight>& flight);
   void start_reading(Flight& flight) const;

@@ -52,7 +52,7 @@ void Conversation::on_open(std::function<void()> wake) {
                                {"epoch", hub_.epoch()}, {"t_us", hub_.clock().now().us()},
                                {"hb_ms", 1000},         {"topics", topic_names},
                                {"roles", roles}};
-  say(to_wire(hello));
+  send(to_wire(hello));
   membership_ = hub_.join(*this);
 }
 
@@ -74,7 +74,7 @@ void Conversation::on_text(std::string_view text) {
                                   {"id", message.value("id", Json())},
                                   {"c_us", message.value("c_us", Json())},
                                   {"t_us", hub_.clock().now().us()}};
-    return say(to_wire(answer));
+    return send(to_wire(answer));
   }
   refuse(message, 422, "validation", "op is sub, unsub or time");
 }
@@ -171,17 +171,17 @@ void Conversation::unsubscribe(const Json& message) {
   }
   nlohmann::ordered_json ack{{"op", "ack"}, {"id", id ? Json(*id) : Json()}, {"sub", it->first}};
   subscriptions_.erase(it);
-  say(to_wire(ack));
+  send(to_wire(ack));
 }
 
 void Conversation::refuse(const Json& message, int status, std::string_view type, std::string_view detail) {
   const Json id = message.is_object() && message.contains("id") && message["id"].is_number_integer()
                       ? message["id"]
                       : Json();
-  say(R"({"op":"err","id":)" + to_wire(id) + R"(,"problem":)" + problem_json(status, type, detail) + '}');
+  send(R"({"op":"err","id":)" + to_wire(id) + R"(,"problem":)" + problem_json(status, type, detail) + '}');
 }
 
-void Conversation::say(std::string frame) {
+void Conversation::send(std::string frame) {
   {
     auto output = output_.lock();
     if (!output->outbox.control(std::move(frame)) && !output->close) output->close = {4008, "slow_consumer"};

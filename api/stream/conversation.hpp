@@ -34,7 +34,7 @@ class Conversation final : public WsHandler, private HubListener {
   void subscribe(const nlohmann::json& message);
   void unsubscribe(const nlohmann::json& message);
   void refuse(const nlohmann::json& message, int status, std::string_view type, std::string_view detail);
-  void say(std::string frame);
+  void send(std::string frame);
   void close(std::uint16_t code, std::string_view reason);
 
   struct Output {

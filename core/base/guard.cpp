@@ -43,7 +43,7 @@ std::string words_of_current() {
   }
 }
 
-void tell_stderr(const TaskFailure& failure) {
+void report_stderr(const TaskFailure& failure) {
   std::fprintf(stderr, "anchord: %s failed: %s\n", failure.task.c_str(), printable(failure.what).c_str());
 }
 
@@ -88,7 +88,7 @@ Ran note_task_failure(std::string_view task) noexcept {
     out.what = words_of_current();
     TaskFailure failure;
     std::function<void(const TaskFailure&)> tell;
-    if (enter(task, out.what, failure, tell)) tell ? tell(failure) : tell_stderr(failure);
+    if (enter(task, out.what, failure, tell)) tell ? tell(failure) : report_stderr(failure);
   } catch (...) {
     // No memory to tell of it, or the log itself throws: stderr takes constant bytes.
     std::fputs("anchord: a task failed, and so did logging it\n", stderr);

@@ -43,7 +43,7 @@ void LiveMission::add(const LiveRow& row) {
   std::visit([this](const auto& one) { add(one); }, row);
 }
 
-void LiveMission::add(const JudgedRange& judged) {
+void LiveMission::add(const PredictedRange& judged) {
   const Range& range = judged.range;
   ++state_.n_ranges;
   range_times_us_.push_back(range.time.us());
@@ -82,19 +82,19 @@ void LiveMission::use_priors(procedure::FlightPriors priors) {
   setup_.priors = std::move(priors);
   priors_in_use_ = false;
   if (history_.n_ranges() > 0) ++ranges_since_joint_;  // worth another joint solution
-  tell_live();
+  update_live_priors();
 }
 
 /// Before the first good fix there is no frame to give them in.
-void LiveMission::tell_live() {
+void LiveMission::update_live_priors() {
   const auto origin = live_.origin();
   if (priors_in_use_ || !origin) return;
-  live_.tell(priors_in(setup_.priors, EnuFrame(*origin)));
+  live_.set_priors(priors_in(setup_.priors, EnuFrame(*origin)));
   priors_in_use_ = true;
 }
 
 void LiveMission::settle() {
-  tell_live();
+  update_live_priors();
   for (auto& result : live_.take_ranges()) {
     if (!reading_) events_.emplace_back(RangeDecided{std::move(result)});
   }
@@ -106,7 +106,7 @@ void LiveMission::settle() {
 }
 
 void LiveMission::announce_estimate(Estimate estimate) {
-  judge_goal(estimate, setup_.goal);
+  assess_goal(estimate, setup_.goal);
   const auto status = anchor_status(estimate);
   const auto [known, is_new] = statuses_.try_emplace(estimate.anchor, status);
   const bool changed = is_new || known->second != status;
@@ -141,7 +141,7 @@ void LiveMission::begin_reading() {
 }
 
 void LiveMission::end_reading() {
-  tell_live();
+  update_live_priors();
   live_.hold(false);
   settle();
   reading_ = false;
@@ -191,7 +191,7 @@ bool LiveMission::adopt(const FlightSolution& solution, UtcTime cut, std::uint64
 
 std::vector<Estimate> LiveMission::estimates() const {
   auto out = live_.estimates();
-  for (auto& estimate : out) judge_goal(estimate, setup_.goal);
+  for (auto& estimate : out) assess_goal(estimate, setup_.goal);
   return out;
 }
 

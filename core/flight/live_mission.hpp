@@ -102,11 +102,11 @@ class LiveMission {
   FlightWatch& watch() { return watch_; }
 
  private:
-  void add(const JudgedRange& judged);
+  void add(const PredictedRange& judged);
   void add(const Fix& fix);
   void announce_fixes();
   void announce_estimate(Estimate estimate);
-  void tell_live();
+  void update_live_priors();
 
   LiveMissionSetup setup_;
   LiveFlight live_;

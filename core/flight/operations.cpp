@@ -153,8 +153,8 @@ void Operations::read_reports(const Now& now) {
   }
 }
 
-void Operations::take_happenings(ActiveFlight& f) {
-  for (auto& h : f.control.engine().take_happenings()) {
+void Operations::take_events(ActiveFlight& f) {
+  for (auto& h : f.control.engine().take_events()) {
     const bool by_the_board =
         h.code.ends_with(".cleared") || std::ranges::find(k_flight_alarms, h.code) != k_flight_alarms.end();
     if (!by_the_board) log_event(std::move(h.level), std::move(h.code), std::move(h.text), f.mission);
@@ -187,7 +187,7 @@ void Operations::round(const Now& now, const std::optional<Estimates>& live, boo
   }
   f.control.round(now.s, estimates, at_hand);
   note_dispatched(now, f, nullptr);
-  take_happenings(f);
+  take_events(f);
   if (!f.manual) f.aircraft = drone_->status().identity;
 }
 

@@ -197,7 +197,7 @@ class Operations {
   FlightCommand& note(const Now& now, const MissionId& mission, std::string_view action, std::string by);
   void note_dispatched(const Now& now, ActiveFlight& f, FlightCommand* cause);
   void read_reports(const Now& now);
-  void take_happenings(ActiveFlight& f);
+  void take_events(ActiveFlight& f);
   FlightCommand act_directly(const Now& now, const MissionId& mission, FlightAction action,
                              const std::string& who);
   void give_fence(const Now& now);

@@ -28,7 +28,7 @@ std::size_t identity(const Fix& fix) {
 }
 
 std::size_t identity(const LiveRow& row) {
-  if (const auto* judged = std::get_if<JudgedRange>(&row)) return identity(judged->range);
+  if (const auto* judged = std::get_if<PredictedRange>(&row)) return identity(judged->range);
   return identity(std::get<Fix>(row));
 }
 
@@ -45,14 +45,14 @@ bool RowsAhead::note(const Fix& fix) {
   return true;
 }
 
-Range corrected(const JudgedRange& judged) {
+Range corrected(const PredictedRange& judged) {
   Range out = judged.range;
   const double bias_m = judged.model ? judged.model->bias_m.value_or(0) : 0;
   if (out.distance_m - bias_m > k_least_range_m) out.distance_m -= bias_m;
   return out;
 }
 
-std::optional<RangeErrorModel> error_model_of(const JudgedRange& judged) {
+std::optional<RangeErrorModel> error_model_of(const PredictedRange& judged) {
   if (!judged.model || !judged.model->error_model) return std::nullopt;
   const bool taken = judged.range.distance_m - judged.model->bias_m.value_or(0) > k_least_range_m;
   return taken ? judged.model->error_model : std::nullopt;

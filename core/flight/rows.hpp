@@ -15,13 +15,13 @@
 namespace anchord::flight {
 
 /// A range, and what the models that were promoted when it came say of it.
-struct JudgedRange {
+struct PredictedRange {
   Range range;
   std::optional<RangeModel> model;
   UtcTime time{};
 };
 /// What waits for a live flight.
-using LiveRow = std::variant<JudgedRange, Fix>;
+using LiveRow = std::variant<PredictedRange, Fix>;
 
 UtcTime time_of(const LiveRow& row);
 /// Enough to know a row again that came both from the store and from the queue.
@@ -70,8 +70,8 @@ class RowsAhead {
 };
 
 /// As a solution of the whole flight takes it: less the bias a model sees, unless nothing would be left.
-Range corrected(const JudgedRange& judged);
+Range corrected(const PredictedRange& judged);
 /// What its model believes of the error that is left; nothing where corrected() took nothing off.
-std::optional<RangeErrorModel> error_model_of(const JudgedRange& judged);
+std::optional<RangeErrorModel> error_model_of(const PredictedRange& judged);
 
 }  // namespace anchord::flight

@@ -18,7 +18,7 @@ inline constexpr const char* k_goal_h95 = "goal_h95_m";
 inline constexpr const char* k_goal_v95 = "goal_v95_m";
 
 /// Puts the two gates of the goal last among the estimate's gates, in place of older ones.
-inline void judge_goal(Estimate& estimate, const AccuracyGoal& goal) {
+inline void assess_goal(Estimate& estimate, const AccuracyGoal& goal) {
   std::erase_if(estimate.gates,
                 [](const Gate& gate) { return gate.name == k_goal_h95 || gate.name == k_goal_v95; });
   const auto add = [&](const char* name, double value, double limit) {

@@ -204,7 +204,7 @@ FlightSolution describe(const Work& work, const FlightData& flight) {
   }
   auto budgets = error_budgets(work.rows, work.fit, work.prior, options);
   for (std::size_t i = 0; i < work.rows.anchors.size(); ++i) {
-    AnchorSolution anchor = judge_anchor(work.rows, work.fit, i, options);
+    AnchorSolution anchor = assess_anchor(work.rows, work.fit, i, options);
     if (anchor.estimate.best) {
       auto& gates = anchor.estimate.gates;
       gates.insert(gates.end(), work.checks.begin(), work.checks.end());

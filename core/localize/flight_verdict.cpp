@@ -157,8 +157,8 @@ double horizontal_sigma_of(const Eigen::Matrix3d& covariance, const FlightOption
 }
 
 /// Mirrors, probabilities and the part of the position that stands.
-void judge_mirrors(const FlightRows& flight, AnchorSolution& solution, const std::vector<Mirror>& mirrors,
-                   const GeometryReport& geometry, const Priors& priors) {
+void assess_mirrors(const FlightRows& flight, AnchorSolution& solution, const std::vector<Mirror>& mirrors,
+                    const GeometryReport& geometry, const Priors& priors) {
   Estimate& estimate = solution.estimate;
   const Mirror* mirror = mirrors.empty() ? nullptr : &mirrors.front();
   if (!mirror && geometry.kind != GeometryKind::coplanar) return;
@@ -293,16 +293,16 @@ AnchorSolution verdict_of(const FlightRows& flight, const JointFit& fit, std::si
   const double horizontal_sigma_m = ellipse.major_m / std::sqrt(5.991464547107979);
   solution.geometry.sigma_ratio = horizontal_sigma_m / geometry.median_range_m;
   const Priors priors(flight, fit, index, options);
-  judge_mirrors(flight, solution, mirrors_of(flight, fit, index, geometry.shape, priors, options), geometry,
-                priors);
+  assess_mirrors(flight, solution, mirrors_of(flight, fit, index, geometry.shape, priors, options), geometry,
+                 priors);
   assess_geometric_sigma(horizontal_sigma_of(known_bias_covariance(fit, index), options), geometry, solution);
   return solution;
 }
 
 }  // namespace
 
-AnchorSolution judge_anchor(const FlightRows& flight, const JointFit& fit, std::size_t index,
-                            const FlightOptions& options) {
+AnchorSolution assess_anchor(const FlightRows& flight, const JointFit& fit, std::size_t index,
+                             const FlightOptions& options) {
   AnchorSolution solution = verdict_of(flight, fit, index, options);
   if (fit.state.anchors[index].active) solution.residuals = residuals_of(flight, fit, index, options);
   solution.estimate.gates = gates_of(flight, fit, index, solution, options);

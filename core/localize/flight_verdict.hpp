@@ -10,7 +10,7 @@ namespace anchord {
 ///
 /// Mirrors are looked for: from the reflection through the track's plane and from the solution turned about
 /// the track's main axis in steps of 45 degrees; what ends elsewhere with a tempered cost within 3 is one.
-AnchorSolution judge_anchor(const FlightRows& flight, const JointFit& fit, std::size_t index,
-                            const FlightOptions& options);
+AnchorSolution assess_anchor(const FlightRows& flight, const JointFit& fit, std::size_t index,
+                             const FlightOptions& options);
 
 }  // namespace anchord

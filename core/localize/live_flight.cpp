@@ -115,7 +115,7 @@ struct LiveFlight::State {
     return Fate::decided;
   }
 
-  void tell(Waiting& entry, const char* why) {
+  void set_priors(Waiting& entry, const char* why) {
     if (!entry.told.empty()) return;
     entry.told = why;
     refuse(entry.range, why);
@@ -126,8 +126,8 @@ struct LiveFlight::State {
     if (!track.epoch()) return false;
     const std::string told = entry.told;
     const Fate fate = decide(entry);
-    if (fate == Fate::outside) tell(entry, "outside_track");
-    if (fate == Fate::gap) tell(entry, "track_gap");
+    if (fate == Fate::outside) set_priors(entry, "outside_track");
+    if (fate == Fate::gap) set_priors(entry, "track_gap");
     if (fate == Fate::decided && !told.empty()) anchors.at(entry.range.anchor).forgive(told);
     return fate == Fate::decided;
   }
@@ -149,16 +149,16 @@ struct LiveFlight::State {
     const std::int64_t ns = entry.range.time.ns;
     const auto late_ns = static_cast<std::int64_t>(options.max_wait_s * 1e9);
     newest_range_ns = std::max(newest_range_ns, ns);
-    if (ns < told_until_ns) tell(entry, "no_fix_in_time");
+    if (ns < told_until_ns) set_priors(entry, "no_fix_in_time");
     waiting.emplace(ns, std::move(entry));
     // Time moves on with the ranges too: without fixes nobody is left to wonder.
     if (newest_range_ns - late_ns > told_until_ns) {
       auto it = waiting.lower_bound(told_until_ns);
       told_until_ns = newest_range_ns - late_ns;
-      for (; it != waiting.end() && it->first < told_until_ns; ++it) tell(it->second, "no_fix_in_time");
+      for (; it != waiting.end() && it->first < told_until_ns; ++it) set_priors(it->second, "no_fix_in_time");
     }
     while (waiting.size() > options.max_waiting) {
-      tell(waiting.begin()->second, "waited_too_long");
+      set_priors(waiting.begin()->second, "waited_too_long");
       waiting.erase(waiting.begin());
     }
   }
@@ -294,7 +294,7 @@ void LiveFlight::add(const Range& range, const std::optional<RangeModel>& model)
 
 void LiveFlight::leave_out(const Range& range) { state_->refuse(range, "excluded"); }
 
-void LiveFlight::tell(std::map<NetworkId, AnchorPriors> priors) {
+void LiveFlight::set_priors(std::map<NetworkId, AnchorPriors> priors) {
   state_->options.priors = std::move(priors);
 }
 
@@ -325,7 +325,7 @@ void LiveFlight::hold(bool held) {
 
 void LiveFlight::finish() {
   state_->follow(state_->track.settle(), state_->pose ? state_->pose->fix : Fix{});
-  for (auto& [ns, entry] : state_->waiting) state_->tell(entry, "outside_track");
+  for (auto& [ns, entry] : state_->waiting) state_->set_priors(entry, "outside_track");
   state_->solve_all();
 }
 

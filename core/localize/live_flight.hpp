@@ -59,7 +59,7 @@ struct LiveOptions {
   TrackLimits track{};  ///< what the positions are held against
   std::optional<Wgs84> origin{};  ///< of the site; absent: the first good fix, or the middle of the flight
                                   ///< once that one turned out to be no part of it
-  std::map<NetworkId, AnchorPriors> priors{};  ///< tell() replaces them
+  std::map<NetworkId, AnchorPriors> priors{};  ///< set_priors() replaces them
 };
 
 /// One flight as it happens: joins ranges to the track and keeps every anchor's estimate warm.
@@ -83,7 +83,7 @@ class LiveFlight {
   /// A range a person took out of use: counted as "excluded" and told, nothing else.
   void leave_out(const Range& range);
   /// What turns and height searches told, in metres of origin(): priors from the next solve on.
-  void tell(std::map<NetworkId, AnchorPriors> priors);
+  void set_priors(std::map<NetworkId, AnchorPriors> priors);
   /// A joint solution of this flight's rows up to `cut`: its bias and lag hold from now on, and its positions
   /// are what later ranges refine. Solved in the frame of origin().
   void adopt(const FlightSolution& solution, UtcTime cut);

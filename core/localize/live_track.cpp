@@ -95,7 +95,7 @@ LiveTrack::Change LiveTrack::process(const Fix& fix) {
   Change change = insert(std::move(known), std::move(pose));
   if (unsorted_ >= std::max(k_least_unsorted,
                             static_cast<std::size_t>(k_unsorted_share * static_cast<double>(all_.size())))) {
-    join(change, judge_again());
+    join(change, assess_again());
   } else if (options_.origin && !origin_checked_ && flight_ &&
              segments_.segment(*flight_).n >= k_told_parts) {
     // Of another site, or mistyped: numbers of a hundred kilometres help nobody.
@@ -170,7 +170,7 @@ LiveTrack::Change LiveTrack::insert(Known known, TrackPose pose) {
   return change;
 }
 
-LiveTrack::Change LiveTrack::judge_again() {
+LiveTrack::Change LiveTrack::assess_again() {
   unsorted_ = 0;
   TrackSegments every(options_.limits);
   std::vector<Known*> good;
@@ -238,7 +238,7 @@ LiveTrack::Change LiveTrack::settle() {
   Change change;
   if (pending_) change = process(*std::exchange(pending_, std::nullopt));
   if (unsorted_ > 0)
-    join(change, judge_again());
+    join(change, assess_again());
   else if (flight_ && segments_.largest() != *flight_)
     join(change, take(segments_.largest()));
   return change;

@@ -61,7 +61,7 @@ class LiveTrack {
   Change process(const Fix& fix);
   std::size_t part_of(Known& known);
   Change insert(Known known, TrackPose pose);
-  Change judge_again();
+  Change assess_again();
   Change take(std::size_t part);
   void choose_frame();
   bool reaches(const Known& known) const;

@@ -64,7 +64,7 @@ struct Picked {
   std::string why;
 };
 
-void tell(const LearnOptions& options, const std::string& detail, std::size_t done, std::size_t of) {
+void report(const LearnOptions& options, const std::string& detail, std::size_t done, std::size_t of) {
   if (options.progress) options.progress(static_cast<double>(done) / static_cast<double>(of), detail);
 }
 
@@ -111,7 +111,7 @@ Result<Picked> pick_classifier(const Dataset& data, const LearnOptions& options,
   std::vector<OutOfFold> results;
   std::size_t best = 0;
   for (std::size_t c = 0; c < candidates.size(); ++c) {
-    tell(options, candidates[c].describe(), c, candidates.size());
+    report(options, candidates[c].describe(), c, candidates.size());
     const bool light = few && searched[c].svm.max_rows != candidates[c].svm.max_rows;
     const auto& on = light ? few->data : data;
     const auto& on_fold = light ? few->fold : fold;
@@ -219,7 +219,7 @@ Result<Learned> learn_regression(const Dataset& data, const LearnOptions& option
     return r.loss + k_harm_price * std::max(0.0, r.worst_harm_m - k_harmless_m);
   };
   for (std::size_t c = 0; c < candidates.size(); ++c) {
-    tell(options, candidates[c].describe(), c, candidates.size());
+    report(options, candidates[c].describe(), c, candidates.size());
     const bool light = few && searched[c].svm.max_rows != candidates[c].svm.max_rows;
     const auto& on = light ? few->data : data;
     const auto& on_fold = light ? few->fold : fold;

@@ -8,8 +8,8 @@ namespace {
 double ratio(double part, double whole) { return whole > 0 ? part / whole : 0; }
 }  // namespace
 
-void Confusion::count(bool is_los, bool said_los, double weight) {
-  (is_los ? (said_los ? tp : fn) : (said_los ? fp : tn)) += weight;
+void Confusion::count(bool is_los, bool called_los, double weight) {
+  (is_los ? (called_los ? tp : fn) : (called_los ? fp : tn)) += weight;
 }
 double Confusion::accuracy() const { return ratio(tp + tn, total()); }
 double Confusion::fpr() const { return ratio(fp, fp + tn); }

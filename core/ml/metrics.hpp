@@ -15,7 +15,7 @@ struct Confusion {
   double fn{};  ///< LOS called NLOS
   double tn{};  ///< NLOS called NLOS
 
-  void count(bool is_los, bool said_los, double weight = 1);
+  void count(bool is_los, bool called_los, double weight = 1);
   double total() const { return tp + fp + fn + tn; }
   double accuracy() const;           ///< eq 6.5
   double balanced_accuracy() const;  ///< mean of both classes' hit rates

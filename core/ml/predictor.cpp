@@ -76,8 +76,8 @@ bool Predictor::gather(const Slot& slot, const nlos::FeatureVector& features, st
   return true;
 }
 
-RangeVerdict Predictor::judge(const nlos::FeatureVector& features, Correction how) const {
-  RangeVerdict out;
+RangePrediction Predictor::predict(const nlos::FeatureVector& features, Correction how) const {
+  RangePrediction out;
   std::array<double, k_max_features> x;
   // Class: the identification model, else the classifier inside the bias model.
   for (const Slot* slot : {&nlos_id_, &bias_}) {

@@ -32,7 +32,7 @@ inline constexpr auto k_correction_words = enum_table<Correction>(
     {{"weighted", Correction::weighted}, {"hard", Correction::hard}, {"none", Correction::none}});
 
 /// One range, judged.
-struct RangeVerdict {
+struct RangePrediction {
   std::optional<bool> los{};
   std::optional<double> p_los{};
   std::optional<double> bias_m{};   ///< subtract from the measured range
@@ -57,7 +57,7 @@ class Predictor {
   static Result<Predictor> make(ModelSet models);
 
   /// Empty verdict parts where a model is absent or the sample lacks one of its features.
-  RangeVerdict judge(const nlos::FeatureVector& features, Correction how = Correction::weighted) const;
+  RangePrediction predict(const nlos::FeatureVector& features, Correction how = Correction::weighted) const;
 
   bool empty() const;
   const ModelSet& models() const { return models_; }

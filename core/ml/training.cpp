@@ -27,10 +27,10 @@ class Reporter {
   void enter(const char* name) {
     while (at_ < stages_.size() && std::string_view{stages_[at_].name} != name)
       before_ += stages_[at_++].share;
-    tell(0, "");
+    report(0, "");
   }
 
-  void tell(double share_of_stage, const std::string& detail) {
+  void report(double share_of_stage, const std::string& detail) {
     if (!sink_ || at_ >= stages_.size()) return;
     const auto& stage = stages_[at_];
     most_ = std::max(most_, (before_ + stage.share * std::clamp(share_of_stage, 0.0, 1.0)) / whole_);
@@ -273,7 +273,7 @@ Result<TrainingOutcome> train(const Dataset& data, const TrainingSpec& spec, std
   reporter.enter("search");
   LearnOptions options{spec.task,          spec.methods, spec.engine, spec.features, spec.folds, spec.seed,
                        spec.per_placement, spec.search,  spec.grid,   spec.max_fpr,  run,        {}};
-  options.progress = [&reporter](double share, const std::string& detail) { reporter.tell(share, detail); };
+  options.progress = [&reporter](double share, const std::string& detail) { reporter.report(share, detail); };
   BOOST_OUTCOME_TRY(auto learned, learn(train_set, options));
   const bool classification = spec.task == Task::nlos_id || (spec.task == Task::bias && data.labelled());
   if (spec.importance) {
@@ -304,7 +304,7 @@ Result<TrainingOutcome> train(const Dataset& data, const TrainingSpec& spec, std
   reporter.enter("test");
   if (!split.test.empty()) add_test(data, split, out);
   if (run.cancelled()) return make_error(Errc::canceled, "cancelled");
-  reporter.tell(1, "");
+  reporter.report(1, "");
   return out;
 }
 

@@ -42,18 +42,18 @@ constexpr std::array k_voices{Rule::rss,       Rule::kurtosis, Rule::mean_excess
 
 }  // namespace
 
-std::optional<bool> RuleSet::says_los(Rule rule, const RuleSample& s) const {
+std::optional<bool> RuleSet::calls_los(Rule rule, const RuleSample& s) const {
   if (rule == Rule::weighted) {
     const auto p = p_nlos(s);
     return p ? std::optional{*p < 0.5} : std::nullopt;
   }
   if (rule == Rule::rss) {
     if (!rss || !s.rss_dbm || !s.distance_m) return std::nullopt;
-    return rss->says_los(*s.rss_dbm, *s.distance_m);
+    return rss->calls_los(*s.rss_dbm, *s.distance_m);
   }
   const auto value = value_of(rule, s);
   if (!value || !threshold[at(rule)]) return std::nullopt;
-  return threshold[at(rule)]->says_los(*value);
+  return threshold[at(rule)]->calls_los(*value);
 }
 
 std::optional<double> RuleSet::p_nlos(const RuleSample& s) const {
@@ -61,7 +61,7 @@ std::optional<double> RuleSet::p_nlos(const RuleSample& s) const {
   std::size_t n = 0;
   for (const Rule rule : k_voices) {
     if (!(weight[at(rule)] > 0)) continue;
-    if (const auto los = says_los(rule, s)) votes[n++] = {*los ? 0.0 : 1.0, weight[at(rule)]};
+    if (const auto los = calls_los(rule, s)) votes[n++] = {*los ? 0.0 : 1.0, weight[at(rule)]};
   }
   return weighted_p_nlos({votes.data(), n});
 }
@@ -100,7 +100,7 @@ RuleSet fit_rules(std::span<const RuleSample> samples) {
         by_share ? fit_threshold_for_nlos_share(nlos, false, share) : fit_threshold(los, nlos);
     if (fitted) out.threshold[at(rule)] = fitted.value();
   }
-  const auto row = judge_rules(out, samples);
+  const auto row = evaluate_rules(out, samples);
   for (const Rule rule : k_voices) {
     const auto& rates = row[at(rule)].rates;
     if (rates.los > 0 && rates.nlos > 0)
@@ -109,21 +109,21 @@ RuleSet fit_rules(std::span<const RuleSample> samples) {
   return out;
 }
 
-RuleRow judge_rules(const RuleSet& rules, std::span<const RuleSample> samples) {
+RuleRow evaluate_rules(const RuleSet& rules, std::span<const RuleSample> samples) {
   RuleRow row{};
   for (const auto& s : samples)
     for (const auto& [word, rule] : k_rule_words)
-      if (const auto los = rules.says_los(rule, s)) row[at(rule)].rates.count(s.los, *los);
+      if (const auto los = rules.calls_los(rule, s)) row[at(rule)].rates.count(s.los, *los);
   return row;
 }
 
-RuleRow judge_fitted_rules(std::span<const RuleSample> samples, std::span<const std::size_t> fold) {
+RuleRow evaluate_fitted_rules(std::span<const RuleSample> samples, std::span<const std::size_t> fold) {
   RuleRow row{};
   const std::size_t folds = fold.empty() ? 0 : *std::max_element(fold.begin(), fold.end()) + 1;
   for (std::size_t k = 0; k < folds; ++k) {
     std::vector<RuleSample> train, test;
     for (std::size_t i = 0; i < samples.size(); ++i) (fold[i] == k ? test : train).push_back(samples[i]);
-    const auto part = judge_rules(fit_rules(train), test);
+    const auto part = evaluate_rules(fit_rules(train), test);
     for (std::size_t r = 0; r < k_rule_count; ++r) {
       row[r].rates.los += part[r].rates.los;
       row[r].rates.los_right += part[r].rates.los_right;

@@ -56,7 +56,7 @@ struct RuleSet {
 
   /// No value where the rule has no threshold or the sample not what it looks at. The vote calls LOS below
   /// p_NLOS 0.5.
-  std::optional<bool> says_los(Rule rule, const RuleSample& sample) const;
+  std::optional<bool> calls_los(Rule rule, const RuleSample& sample) const;
   std::optional<double> p_nlos(const RuleSample& sample) const;  ///< eq 5.8
 };
 
@@ -77,10 +77,10 @@ struct RuleCell {
 using RuleRow = std::array<RuleCell, k_rule_count>;
 
 /// Hit rates of one set of rules.
-RuleRow judge_rules(const RuleSet& rules, std::span<const RuleSample> samples);
+RuleRow evaluate_rules(const RuleSet& rules, std::span<const RuleSample> samples);
 
 /// Hit rates where each sample is judged by rules fitted to the other folds only.
 /// fold  of each sample, 0 .. k-1: whole places
-RuleRow judge_fitted_rules(std::span<const RuleSample> samples, std::span<const std::size_t> fold);
+RuleRow evaluate_fitted_rules(std::span<const RuleSample> samples, std::span<const std::size_t> fold);
 
 }  // namespace anchord::nlos

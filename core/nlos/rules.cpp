@@ -103,13 +103,13 @@ double vote_weight(double balanced_accuracy) {
   return std::log(a / (1 - a));
 }
 
-void RuleRates::count(bool is_los, bool said_los) {
+void RuleRates::count(bool is_los, bool called_los) {
   if (is_los) {
     ++los;
-    los_right += said_los ? 1 : 0;
+    los_right += called_los ? 1 : 0;
   } else {
     ++nlos;
-    nlos_right += said_los ? 0 : 1;
+    nlos_right += called_los ? 0 : 1;
   }
 }
 

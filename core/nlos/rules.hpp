@@ -17,7 +17,7 @@ struct RssLine {
 
   double threshold_dbm(double range_m) const { return at_zero_dbm + slope_dbm_per_m * range_m; }
   /// eq 5.2: above the line is LOS, on it or below is NLOS.
-  bool says_los(double rss_dbm, double range_m) const { return rss_dbm > threshold_dbm(range_m); }
+  bool calls_los(double rss_dbm, double range_m) const { return rss_dbm > threshold_dbm(range_m); }
 };
 
 struct RssSample {
@@ -40,7 +40,7 @@ struct ThresholdRule {
   bool los_above{};  ///< true: above is LOS; false: above is NLOS
 
   /// A value on the threshold is NLOS: the mistake that costs less.
-  bool says_los(double value) const { return los_above ? value > threshold : value < threshold; }
+  bool calls_los(double value) const { return los_above ? value > threshold : value < threshold; }
 };
 
 inline constexpr ThresholdRule k_range_sd_rule_m{0.050, false};  ///< 5.2: 50 mm
@@ -79,7 +79,7 @@ struct RuleRates {
   std::size_t los{}, los_right{}, nlos{}, nlos_right{};
   double los_rate() const { return los ? static_cast<double>(los_right) / static_cast<double>(los) : 0; }
   double nlos_rate() const { return nlos ? static_cast<double>(nlos_right) / static_cast<double>(nlos) : 0; }
-  void count(bool is_los, bool said_los);
+  void count(bool is_los, bool called_los);
 };
 
 }  // namespace anchord::nlos

@@ -33,7 +33,7 @@ struct DeviceReport {
   std::string reason;        ///< why it is not talking, one line
   std::string conflict;      ///< two devices on one port, or one identity on two
   double in_state_s{};
-  std::optional<UtcTime> last_heard{};
+  std::optional<UtcTime> last_seen{};
   std::string model, firmware, serial;
   std::optional<NetworkId> network_id{};
   std::uint64_t bytes_in{}, bytes_out{}, frames{}, fixes{}, ranges{}, opened{}, lost{};

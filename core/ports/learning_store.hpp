@@ -171,10 +171,10 @@ class ModelStore {
   virtual Result<std::string> artifact(const ModelId& id) = 0;
   virtual Result<void> sign(const ModelId& id, std::string_view signature) = 0;
   virtual Result<void> remove(const ModelId& id) = 0;  ///< conflict once it was promoted
-  /// Its number is given back. conflict when the newest promotion of all tasks is no longer `judged_on` (0:
+  /// Its number is given back. conflict when the newest promotion of all tasks is no longer `decided_on` (0:
   /// none): the caller decided against another state.
   virtual Result<Promotion> promote(const Promotion& promotion,
-                                    std::optional<std::uint64_t> judged_on = std::nullopt) = 0;
+                                    std::optional<std::uint64_t> decided_on = std::nullopt) = 0;
   /// The newest promotion of each task.
   virtual Result<std::vector<Promotion>> active() = 0;
   /// Newest first, of one task or all.

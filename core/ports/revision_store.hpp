@@ -31,11 +31,11 @@ class RevisionStore {
   /// their position from it, all others keep that of the revision before. Which verdicts may be published is
   /// not decided here; `overrides` (of named anchors) are kept with the revision. conflict when every named
   /// anchor stands at its position of this calibration already, or when the newest revision is no longer
-  /// `judged_on` (0: none), against which the caller decided.
+  /// `decided_on` (0: none), against which the caller decided.
   virtual Result<Revision> publish(const CalibrationId& id, const std::vector<NetworkId>& anchors,
                                    std::string_view by, std::string_view note, UtcTime now,
                                    const std::vector<Override>& overrides = {},
-                                   std::optional<std::uint64_t> judged_on = std::nullopt) = 0;
+                                   std::optional<std::uint64_t> decided_on = std::nullopt) = 0;
   /// before: 0 for the newest page.
   virtual Result<std::vector<Revision>> revisions(std::size_t limit, std::uint64_t before) = 0;
   /// All positions of a revision, of the newest when absent (empty when nothing was ever published).

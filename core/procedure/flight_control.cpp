@@ -33,7 +33,7 @@ FlightControl::FlightControl(FlightSetup setup, EnuFrame frame, Drone* drone, co
       adopts_(drone != nullptr) {
   if (drone_ == nullptr) return;
   drone_->new_flight(setup.limits.speed_mps);
-  (void)engine_.take_orders();  // decided when the aircraft is heard, by its mode
+  (void)engine_.take_commands();  // decided when the aircraft is heard, by its mode
 }
 
 void FlightControl::fix(double now_s, const Eigen::Vector3d& enu_m, FixClass fix) {
@@ -44,12 +44,12 @@ void FlightControl::fix(double now_s, const Eigen::Vector3d& enu_m, FixClass fix
 }
 
 bool FlightControl::start(double now_s, const std::string& who) {
-  if (drone_ != nullptr) look(now_s, drone_->status());
-  const bool started = engine_.command(now_s, Event::start, who);
+  if (drone_ != nullptr) update_vehicle(now_s, drone_->status());
+  const bool started = engine_.command(now_s, Trigger::start, who);
   if (started && drone_ != nullptr && drone_->status().in_air) {
-    (void)engine_.take_orders();  // it is up already
+    (void)engine_.take_commands();  // it is up already
     drone_->take_back();
-    engine_.command(now_s, Event::airborne, "");
+    engine_.command(now_s, Trigger::airborne, "");
   }
   dispatch();
   return started;
@@ -69,7 +69,7 @@ void FlightControl::smooth(double now_s, const Eigen::Vector3d& difference_m, do
   shift_m_->z() = std::clamp(shift_m_->z(), -k_most_up_m, k_most_up_m);
 }
 
-void FlightControl::look(double now_s, const DroneStatus& d) {
+void FlightControl::update_vehicle(double now_s, const DroneStatus& d) {
   if (d.autopilot.empty()) return;  // never heard
   VehicleView view;
   if (d.position && d.position_age_s < 2) {
@@ -133,7 +133,7 @@ void FlightControl::follow_link(double now_s, const DroneStatus& d) {
   else if (step == Step::landing)
     dispatched_.push_back({Command::Kind::land, drone_->land(), ""});
   else
-    engine_.retell(now_s);
+    engine_.repeat_leg(now_s);
 }
 
 void FlightControl::round(double now_s, std::span<const Estimate> estimates, bool at_hand) {
@@ -143,14 +143,14 @@ void FlightControl::round(double now_s, std::span<const Estimate> estimates, boo
     return dispatch();
   }
   const DroneStatus d = drone_->status();
-  look(now_s, d);
+  update_vehicle(now_s, d);
   follow_link(now_s, d);
   // Just behind a heartbeat: one that shows a pilot's mode must not be crossed by a command.
   const bool may = !taken_over_ && d.connected && d.mode_age_s < k_just_heard_s;
-  if (tells_again_ && may && (!told_s_ || now_s - *told_s_ > k_tell_again_s)) {
-    tells_again_ = false;
-    told_s_ = now_s;
-    engine_.retell(now_s);
+  if (repeats_ && may && (!sent_s_ || now_s - *sent_s_ > k_tell_again_s)) {
+    repeats_ = false;
+    sent_s_ = now_s;
+    engine_.repeat_leg(now_s);
   }
   engine_.tick(now_s, estimates, at_hand);
   dispatch();
@@ -184,7 +184,7 @@ std::uint64_t FlightControl::send(const Command& order) {
       std::optional<double> heading;
       if (order.heading_rad) heading = std::fmod(*order.heading_rad / k_degree + 720, 360.0);
       const Aim at = aim(order.point_m, drone_->status());
-      tells_again_ = false;
+      repeats_ = false;
       return last_target_ = drone_->go_to(at.lat_deg, at.lon_deg, at.height_m, heading);
     }
     case Command::Kind::hold:
@@ -201,7 +201,7 @@ std::uint64_t FlightControl::send(const Command& order) {
 }
 
 void FlightControl::dispatch() {
-  for (const auto& order : engine_.take_orders()) {
+  for (const auto& order : engine_.take_commands()) {
     Dispatch out{order.kind, 0, ""};
     if (taken_over_)
       out.not_sent = "not sent: the pilot or a failsafe has the aircraft";
@@ -213,25 +213,25 @@ void FlightControl::dispatch() {
   }
 }
 
-std::string FlightControl::command(double now_s, Event event, const std::string& who) {
+std::string FlightControl::command(double now_s, Trigger trigger, const std::string& who) {
   if (adopts_ && drone_->status().connected) {  // the operator decides, before the first round could
     adopts_ = false;
     drone_->take_back();
   }
   if (taken_over_) {
-    if (event == Event::skip)
+    if (trigger == Trigger::skip)
       return "the pilot or a failsafe has taken over; resume, hold, return or land take it back";
     taken_over_ = false;
     drone_->take_back();
     engine_.taken_back(now_s);
   }
   const auto before = dispatched_.size();
-  const bool meant = engine_.command(now_s, event, who);
+  const bool meant = engine_.command(now_s, trigger, who);
   dispatch();
-  const bool always = event == Event::hold || event == Event::land;
+  const bool always = trigger == Trigger::hold || trigger == Trigger::land;
   if (!meant && !always) return "nothing to do in step " + std::string(to_string(engine_.state().step));
   if (always && drone_ != nullptr && dispatched_.size() == before) {
-    const bool holds = event == Event::hold;
+    const bool holds = trigger == Trigger::hold;
     dispatched_.push_back(
         {holds ? Command::Kind::hold : Command::Kind::land, holds ? drone_->hold() : drone_->land(), ""});
   }
@@ -253,9 +253,9 @@ void FlightControl::report(double now_s, const CommandReport& r) {
     engine_.not_taken_off(now_s, r.text);
   } else if (r.what == "go_to" && r.number == last_target_) {
     if (r.state == CommandState::refused) {
-      (void)engine_.command(now_s, Event::unreachable, "");
+      (void)engine_.command(now_s, Trigger::unreachable, "");
     } else {
-      tells_again_ = true;
+      repeats_ = true;
     }
   }
 }

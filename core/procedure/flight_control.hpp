@@ -39,7 +39,7 @@ class FlightControl {
   bool start(double now_s, const std::string& who);
   /// hold, resume, skip, return_home, land of an operator. Hold and land are always sent. Empty: done; else
   /// why not.
-  std::string command(double now_s, Event event, const std::string& who);
+  std::string command(double now_s, Trigger trigger, const std::string& who);
   /// Hold, and nothing more: the aircraft is the pilot's.
   std::uint64_t abort();
   /// At least twice a second. `at_hand` false: the estimates could not be read, decisions wait, safety does
@@ -56,7 +56,7 @@ class FlightControl {
   const std::optional<Eigen::Vector3d>& shift_m() const { return shift_m_; }
 
  private:
-  void look(double now_s, const DroneStatus& d);
+  void update_vehicle(double now_s, const DroneStatus& d);
   void follow_link(double now_s, const DroneStatus& d);
   void smooth(double now_s, const Eigen::Vector3d& difference_m, double speed_mps);
   void dispatch();
@@ -70,9 +70,9 @@ class FlightControl {
   Drone* drone_;
   Eigen::Vector3d home_m_;
   FlightEngine engine_;
-  bool taken_over_{false}, silent_{false}, adopts_{false}, over_{false}, tells_again_{false};
+  bool taken_over_{false}, silent_{false}, adopts_{false}, over_{false}, repeats_{false};
   std::optional<Eigen::Vector3d> fix_m_, autopilot_m_, shift_m_;
-  std::optional<double> fix_s_, smoothed_s_, sea_level_m_, steered_s_, told_s_, cells_, cell_v_, cell_s_;
+  std::optional<double> fix_s_, smoothed_s_, sea_level_m_, steered_s_, sent_s_, cells_, cell_v_, cell_s_;
   std::uint64_t last_target_{0}, take_off_{0};
   std::vector<Dispatch> dispatched_;
 };

@@ -21,7 +21,7 @@ std::string FlightEngine::outcome(const std::string& which) const {
          " without the accuracy that was wanted: " + without;
 }
 
-void FlightEngine::judge_anchors(double now_s, std::span<const Estimate> estimates) {
+void FlightEngine::assess_anchors(double now_s, std::span<const Estimate> estimates) {
   for (auto& task : state_.anchors) {
     if (task.done) continue;
     const auto it = std::find_if(estimates.begin(), estimates.end(),
@@ -39,31 +39,31 @@ void FlightEngine::judge_anchors(double now_s, std::span<const Estimate> estimat
       task.done = true;
       task.reached = exit->reached;
       task.why = exit->reason;
-      tell(now_s, exit->reached ? "info" : "warning", "anchor.done",
-           to_string(task.id) + ": " + exit->reason);
+      report(now_s, exit->reached ? "info" : "warning", "anchor.done",
+             to_string(task.id) + ": " + exit->reason);
     } else {
       task.why = why_not_done(estimate, measured_at_[task.id], setup_.exit);
     }
   }
 }
 
-void FlightEngine::finish(double now_s, Event event, std::string why) {
-  if (decision_) decision_->outcome = std::string(to_string(event)) + ": " + why;
-  feed(now_s, event, std::move(why));
+void FlightEngine::finish(double now_s, Trigger trigger, std::string why) {
+  if (decision_) decision_->outcome = std::string(to_string(trigger)) + ": " + why;
+  feed(now_s, trigger, std::move(why));
 }
 
 void FlightEngine::decide(double now_s, std::span<const Estimate> estimates) {
-  judge_anchors(now_s, estimates);
+  assess_anchors(now_s, estimates);
   const auto is_done = [&](NetworkId id) {
     return std::any_of(state_.anchors.begin(), state_.anchors.end(),
                        [&](const AnchorTask& a) { return a.id == id && a.done; });
   };
   if (!setup_.expected.empty() && std::all_of(setup_.expected.begin(), setup_.expected.end(), is_done)) {
     state_.waypoint = setup_.settings.waypoints.size() - 1;
-    return finish(now_s, Event::done_here, outcome("expected"));
+    return finish(now_s, Trigger::done_here, outcome("expected"));
   }
   auto input = point_input(estimates);
-  if (input.anchors.empty()) return finish(now_s, Event::done_here, outcome("received"));
+  if (input.anchors.empty()) return finish(now_s, Trigger::done_here, outcome("received"));
   asked_ = ++n_tasks_;
   if (setup_.decides_apart)
     point_task_ = {n_tasks_, std::move(input), setup_.planner};
@@ -108,7 +108,7 @@ void FlightEngine::decided(std::uint64_t number, Result<planning::Decision> deci
 }
 
 void FlightEngine::conclude(double now_s, Result<planning::Decision> decided) {
-  if (!decided) return finish(now_s, Event::no_point, decided.error().message);
+  if (!decided) return finish(now_s, Trigger::no_point, decided.error().message);
   const double before = decided.value().value_before;
   if (decision_ && decision_->predicted && std::isfinite(before)) decision_->reached = before;
   DecisionRecord record;
@@ -117,9 +117,9 @@ void FlightEngine::conclude(double now_s, Result<planning::Decision> decided) {
   const auto chosen = record.decision.chosen;
   if (chosen) record.predicted = record.decision.candidates[*chosen].value;
   decision_ = std::move(record);
-  if (!chosen) return finish(now_s, Event::no_point, decision_->decision.reason);
+  if (!chosen) return finish(now_s, Trigger::no_point, decision_->decision.reason);
   if (state_.points > setup_.settings.points_per_waypoint) {
-    return finish(now_s, Event::done_here,
+    return finish(now_s, Trigger::done_here,
                   std::to_string(state_.points) + " points measured at this waypoint");
   }
   const auto& best = decision_->decision.candidates[*chosen];
@@ -128,12 +128,12 @@ void FlightEngine::conclude(double now_s, Result<planning::Decision> decided) {
                       : std::isfinite(before)                          ? (before - best.value) / before
                                                                        : 1;
   if (gain < setup_.min_gain) {
-    return finish(now_s, Event::done_here,
+    return finish(now_s, Trigger::done_here,
                   "the best point would bring " + std::to_string(std::lround(100 * gain)) + " %");
   }
   const Eigen::Vector2d look = (setup_.middle_m - best.point_m).head<2>();
   decision_->outcome = "point: " + decision_->decision.reason;
-  feed(now_s, Event::point, decision_->decision.reason, best.point_m, std::atan2(look.x(), look.y()));
+  feed(now_s, Trigger::point, decision_->decision.reason, best.point_m, std::atan2(look.x(), look.y()));
 }
 
 }  // namespace anchord::procedure

@@ -13,7 +13,7 @@ namespace {
 constexpr double k_listen_s = 1.0;   ///< least stay in a search, so that every anchor had its turn
 constexpr double k_connect_s = 1.0;  ///< least look at the connections of a point
 constexpr double k_settle_s = 0.5;   ///< at rest this long counts as arrived
-constexpr int k_heard = 3;           ///< ranges that make an anchor heard
+constexpr int k_in_range = 3;        ///< ranges that make an anchor heard
 constexpr double k_late_s = 0.5;     ///< latency and period of telemetry on a poor link
 constexpr double k_latest_s =
     1.0;  ///< of two positions that are compared; older ones are an alarm of their own
@@ -90,11 +90,11 @@ std::optional<Eigen::Vector3d> FlightEngine::position_m() const {
 }
 double FlightEngine::elapsed_s() const { return started_s_ ? state_.since_s - *started_s_ : 0; }
 
-std::vector<Command> FlightEngine::take_orders() { return std::exchange(orders_, {}); }
-std::vector<Happening> FlightEngine::take_happenings() { return std::exchange(happenings_, {}); }
+std::vector<Command> FlightEngine::take_commands() { return std::exchange(orders_, {}); }
+std::vector<Event> FlightEngine::take_events() { return std::exchange(events_, {}); }
 
-void FlightEngine::tell(double now_s, std::string level, std::string code, std::string text) {
-  happenings_.push_back({now_s, std::move(level), std::move(code), std::move(text)});
+void FlightEngine::report(double now_s, std::string level, std::string code, std::string text) {
+  events_.push_back({now_s, std::move(level), std::move(code), std::move(text)});
 }
 
 void FlightEngine::fix(double now_s, const Eigen::Vector3d& enu_m, FixClass fix) {
@@ -119,7 +119,7 @@ void FlightEngine::range(double now_s, NetworkId anchor, bool used, std::optiona
   if (rss_dbm && state_.step == Step::height_search && at) priors_.climbed(anchor, at->z(), *rss_dbm);
   if (!used) return;
   if (note_range(state_, anchor))
-    tell(now_s, "info", "anchor.found", "anchor " + to_string(anchor) + " in range for the first time");
+    report(now_s, "info", "anchor.found", "anchor " + to_string(anchor) + " in range for the first time");
 }
 
 void FlightEngine::vehicle(double now_s, const VehicleView& view) {
@@ -138,8 +138,8 @@ void FlightEngine::taken_over(double now_s, const std::string& mode) {
   leg_.reset();
   legs_.clear();
   pending_.reset();
-  feed(now_s, Event::taken_over, mode);
-  tell(now_s, "warning", "drone.taken_over", "the pilot or a failsafe has the aircraft: " + mode);
+  feed(now_s, Trigger::taken_over, mode);
+  report(now_s, "warning", "drone.taken_over", "the pilot or a failsafe has the aircraft: " + mode);
 }
 
 /// What is wrong is judged anew: it was only told of before.
@@ -149,7 +149,7 @@ void FlightEngine::taken_back(double now_s) {
   if (state_.deadline_s > 0) state_.deadline_s = std::max(state_.deadline_s, now_s + 10);
 }
 
-void FlightEngine::retell(double now_s) {
+void FlightEngine::repeat_leg(double now_s) {
   if (!legs_.empty()) return next_leg(now_s);
   if (state_.step == Step::return_home) execute(now_s, {Command::Kind::return_home, {0, 0, 0}, std::nullopt});
 }
@@ -183,10 +183,10 @@ bool FlightEngine::down(double now_s) {
   return now_down && now_s - *down_s_ >= k_sure_s;
 }
 
-bool FlightEngine::command(double now_s, Event event, const std::string& who) {
-  if (event == Event::start) started_s_ = watched_s_ = now_s;
+bool FlightEngine::command(double now_s, Trigger trigger, const std::string& who) {
+  if (trigger == Trigger::start) started_s_ = watched_s_ = now_s;
   const bool went_on = state_.ended.empty();
-  if (!feed(now_s, event, who.empty() ? std::string{} : "by " + who)) return false;
+  if (!feed(now_s, trigger, who.empty() ? std::string{} : "by " + who)) return false;
   if (went_on && !state_.ended.empty()) state_.by_person = true;
   return true;
 }
@@ -210,10 +210,10 @@ void FlightEngine::near_enough(NetworkId anchor, double distance_m) {
   no_lobe_m_.erase(from);
 }
 
-bool FlightEngine::feed(double now_s, Event event, std::string text, std::optional<Eigen::Vector3d> point,
+bool FlightEngine::feed(double now_s, Trigger trigger, std::string text, std::optional<Eigen::Vector3d> point,
                         std::optional<double> heading) {
-  if (state_.step == Step::turn && event == Event::arrived && state_.legs <= 1) note_lobes();
-  const auto step = advance(setup_.settings, state_, {event, now_s, point, heading, std::move(text)});
+  if (state_.step == Step::turn && trigger == Trigger::arrived && state_.legs <= 1) note_lobes();
+  const auto step = advance(setup_.settings, state_, {trigger, now_s, point, heading, std::move(text)});
   if (step.transition == nullptr) return false;
   apply(now_s, step);
   return true;
@@ -241,7 +241,7 @@ void FlightEngine::apply(double now_s, const Advance& step) {
   point_task_.reset();
   asked_.reset();
   answer_.reset();
-  tell(now_s, "info", "procedure." + std::string(to_string(state_.step)), state_.reason);
+  report(now_s, "info", "procedure." + std::string(to_string(state_.step)), state_.reason);
   for (const auto& c : step.commands) execute(now_s, c);
 }
 
@@ -251,8 +251,8 @@ void FlightEngine::execute(double now_s, const Command& c) {
       Command up = c;
       up.point_m.z() = climb_to_m_ = take_off_height_m(setup_);
       if (const auto refused = refuse_command(setup_.limits, position_m(), up)) {
-        tell(now_s, "critical", "cmd.refused", refused->text);
-        pending_ = vehicle_.armed || vehicle_.in_air ? Event::land : Event::not_taken_off;
+        report(now_s, "critical", "cmd.refused", refused->text);
+        pending_ = vehicle_.armed || vehicle_.in_air ? Trigger::land : Trigger::not_taken_off;
         pending_text_ = refused->text;
       } else {
         order(up);
@@ -285,8 +285,8 @@ void FlightEngine::fly(double now_s, const Eigen::Vector3d& to_m, std::optional<
       from && !(home && lost) ? planning::route(setup_.limits.bounds, *from, to_m) : std::nullopt;
   if (!way && home) return order({Command::Kind::return_home, {0, 0, 0}, std::nullopt});
   if (!way) {
-    tell(now_s, "warning", "point.unreachable", "no legal way to the target");
-    pending_ = Event::unreachable;
+    report(now_s, "warning", "point.unreachable", "no legal way to the target");
+    pending_ = Trigger::unreachable;
     pending_text_ = "no legal way";
     return;
   }
@@ -300,16 +300,16 @@ void FlightEngine::next_leg(double now_s) {
   const Command c{Command::Kind::go_to, legs_.front(),
                   state_.step == Step::return_home ? std::nullopt : state_.heading_rad};
   if (const auto refused = refuse_command(setup_.limits, position_m(), c)) {
-    tell(now_s, "warning", "point.unreachable", refused->text);
+    report(now_s, "warning", "point.unreachable", refused->text);
     legs_.clear();
-    pending_ = Event::unreachable;
+    pending_ = Trigger::unreachable;
     pending_text_ = refused->text;
     return;
   }
   order(c);
 }
 
-void FlightEngine::look_out(double now_s) {
+void FlightEngine::monitor(double now_s) {
   Situation now;
   now.position_m = position_m();
   const auto age = [&](const std::optional<double>& t) {
@@ -337,36 +337,37 @@ void FlightEngine::look_out(double now_s) {
       vehicle_.speed_mps * std::min(k_late_s + now.position_age_s + now.autopilot_silent_s, k_latest_s);
   const auto alarm = watch(limits, now);
   if (taken_over_) {
-    if (alarm && (!alarm_ || alarm_->id != alarm->id)) tell(now_s, "critical", alarm->id, alarm->text);
+    if (alarm && (!alarm_ || alarm_->id != alarm->id)) report(now_s, "critical", alarm->id, alarm->text);
     alarm_ = alarm;
     return;
   }
   if (alarm && alarm->climbs && alarm_ && alarm_->climbs) climb(now_s);
   if (alarm && (!alarm_ || alarm_->id != alarm->id || alarm_->reaction < alarm->reaction)) {
-    tell(now_s, "critical", alarm->id, alarm->text);
+    report(now_s, "critical", alarm->id, alarm->text);
     alarm_ = alarm;
     const auto step = state_.step;
     if (alarm->climbs) {
-      if (step != Step::hold) feed(now_s, Event::hold, alarm->text);
+      if (step != Step::hold) feed(now_s, Trigger::hold, alarm->text);
       climb_s_.reset();
       return climb(now_s);
     }
     if (alarm->reaction == Reaction::land && step != Step::landing) {
-      feed(now_s, Event::land, alarm->text);
+      feed(now_s, Trigger::land, alarm->text);
     } else if (alarm->reaction == Reaction::return_home && step != Step::landing &&
                step != Step::return_home) {
-      feed(now_s, Event::return_home, alarm->text);
+      feed(now_s, Trigger::return_home, alarm->text);
     } else if (alarm->reaction == Reaction::hold && step != Step::landing && step != Step::hold &&
                step != Step::return_home) {
-      feed(now_s, Event::hold, alarm->text);
+      feed(now_s, Trigger::hold, alarm->text);
     }
     return;
   }
-  if (!alarm && alarm_) tell(now_s, "info", alarm_->id + ".cleared", "no longer");
+  if (!alarm && alarm_) report(now_s, "info", alarm_->id + ".cleared", "no longer");
   alarm_ = alarm;
 }
 
-/// The autopilot's own return ends with its landing, which the server does not command: near home it may come down.
+/// The autopilot's own return ends with its landing, which the server does not command: near home it may come
+/// down.
 bool FlightEngine::lands_by_itself() const {
   constexpr double k_near_home_m = 5;
   const auto at = position_m();
@@ -374,7 +375,7 @@ bool FlightEngine::lands_by_itself() const {
          (*at - setup_.limits.home_m).head<2>().norm() < k_near_home_m;
 }
 
-void FlightEngine::look_for_arrival(double now_s) {
+void FlightEngine::detect_arrival(double now_s) {
   if (legs_.empty()) return;
   const auto at = position_m();
   if (!at) return;
@@ -394,7 +395,7 @@ void FlightEngine::look_for_arrival(double now_s) {
   if (last && now_s - *settled_s_ < k_settle_s) return;
   legs_.pop_front();
   if (legs_.empty())
-    feed(now_s, Event::arrived);
+    feed(now_s, Trigger::arrived);
   else
     next_leg(now_s);
 }
@@ -410,31 +411,31 @@ void FlightEngine::work(double now_s, std::span<const Estimate> estimates, bool 
       const auto at = vehicle_.position_m ? vehicle_.position_m : fix_m_;
       const double home_m = setup_.limits.home_m.z();
       if (vehicle_.in_air && at && at->z() - home_m >= 0.9 * (climb_to_m_ - home_m))
-        feed(now_s, Event::airborne);
+        feed(now_s, Trigger::airborne);
       return;
     }
     case Step::search_anchors: {
       const auto& waypoint = setup_.settings.waypoints.at(state_.waypoint);
       if (state_.steps == 0 && !waypoint.measure) {
-        feed(now_s, Event::done_here, "a point on the way only");
-      } else if (here_s >= k_listen_s && heard(k_heard)) {
-        feed(now_s, Event::in_range);
+        feed(now_s, Trigger::done_here, "a point on the way only");
+      } else if (here_s >= k_listen_s && heard(k_in_range)) {
+        feed(now_s, Trigger::in_range);
       } else if (here_s >= 2 * k_listen_s &&
                  std::any_of(state_.anchors.begin(), state_.anchors.end(),
-                             [](const AnchorTask& a) { return a.samples_here >= k_heard; })) {
-        feed(now_s, Event::done_here, "only anchors that are done answer here");
+                             [](const AnchorTask& a) { return a.samples_here >= k_in_range; })) {
+        feed(now_s, Trigger::done_here, "only anchors that are done answer here");
       }
       return;
     }
     case Step::check_connections:
-      if (here_s >= k_connect_s && heard(1) && (fix_ >= FixClass::rtk_float)) feed(now_s, Event::connected);
+      if (here_s >= k_connect_s && heard(1) && (fix_ >= FixClass::rtk_float)) feed(now_s, Trigger::connected);
       return;
     case Step::ranging: {
       const double dwell_s = setup_.settings.waypoints.at(state_.waypoint).dwell_s;
       const bool enough = std::all_of(state_.anchors.begin(), state_.anchors.end(), [&](const AnchorTask& a) {
         return a.done || a.samples_here == 0 || a.samples_here >= setup_.samples;
       });
-      if (here_s >= dwell_s && enough && heard(1)) feed(now_s, Event::sampled);
+      if (here_s >= dwell_s && enough && heard(1)) feed(now_s, Trigger::sampled);
       return;
     }
     case Step::find_next_point:
@@ -467,27 +468,27 @@ bool FlightEngine::end_of_time(double now_s, std::span<const Estimate> estimates
   if (!longest_s || !started_s_ || now_s - *started_s_ < *longest_s || step == Step::take_off ||
       step == Step::hold || step == Step::return_home || step == Step::landing)
     return false;
-  judge_anchors(now_s, estimates);
+  assess_anchors(now_s, estimates);
   const std::string why = "the flight time of " + std::to_string(std::lround(*longest_s)) + " s is over";
-  tell(now_s, "warning", "procedure.time_over", why);
-  return feed(now_s, Event::return_home, why);
+  report(now_s, "warning", "procedure.time_over", why);
+  return feed(now_s, Trigger::return_home, why);
 }
 
 void FlightEngine::tick(double now_s, std::span<const Estimate> estimates, bool at_hand) {
   if (!in_flight(state_.step)) return;
-  if (down(now_s) && feed(now_s, Event::landed)) return;
-  look_out(now_s);
+  if (down(now_s) && feed(now_s, Trigger::landed)) return;
+  monitor(now_s);
   if (taken_over_) return;
   if (end_of_time(now_s, estimates)) return;
   if (pending_) {
-    const auto event = *std::exchange(pending_, std::nullopt);
-    if (feed(now_s, event, std::exchange(pending_text_, {}))) return;
+    const auto trigger = *std::exchange(pending_, std::nullopt);
+    if (feed(now_s, trigger, std::exchange(pending_text_, {}))) return;
   }
-  look_for_arrival(now_s);
+  detect_arrival(now_s);
   work(now_s, estimates, at_hand);
   if (state_.deadline_s > 0 && now_s >= state_.deadline_s) {
-    if (state_.step == Step::ranging || state_.step == Step::search_anchors) judge_anchors(now_s, estimates);
-    feed(now_s, Event::timeout);
+    if (state_.step == Step::ranging || state_.step == Step::search_anchors) assess_anchors(now_s, estimates);
+    feed(now_s, Trigger::timeout);
   }
 }
 

@@ -75,7 +75,7 @@ struct PointTask {
   planning::NextPointOptions options;
 };
 
-struct Happening {
+struct Event {
   double time_s{};
   std::string level;  ///< info, warning, critical
   std::string code;
@@ -100,14 +100,16 @@ class FlightEngine {
   void vehicle(double now_s, const VehicleView& view);
   /// What the operator wants: start, hold, resume, skip, return_home, land. False: means nothing in this
   /// step.
-  bool command(double now_s, Event event, const std::string& who);
+  bool command(double now_s, Trigger trigger, const std::string& who);
   /// The pilot or a failsafe has the aircraft: alarms are told, nothing is reacted to and no time runs out.
   void taken_over(double now_s, const std::string& mode);
   void taken_back(double now_s);
   /// Arming or take-off did not happen.
-  bool not_taken_off(double now_s, const std::string& why) { return feed(now_s, Event::not_taken_off, why); }
+  bool not_taken_off(double now_s, const std::string& why) {
+    return feed(now_s, Trigger::not_taken_off, why);
+  }
   /// The present leg, or the way home, once more from where the aircraft is now.
-  void retell(double now_s);
+  void repeat_leg(double now_s);
   /// At least twice a second. The estimates are looked at when a decision is due; `at_hand` false: they could
   /// not be read, and a decision, which would be one of ignorance, waits.
   void tick(double now_s, std::span<const Estimate> estimates, bool at_hand = true);
@@ -116,8 +118,8 @@ class FlightEngine {
   /// What came of it, for the next tick; of a task that is no longer waited for: dropped.
   void decided(std::uint64_t number, Result<planning::Decision> decision);
 
-  std::vector<Command> take_orders();
-  std::vector<Happening> take_happenings();
+  std::vector<Command> take_commands();
+  std::vector<Event> take_events();
 
   const State& state() const { return state_; }
   const FlightSetup& setup() const { return setup_; }
@@ -138,7 +140,7 @@ class FlightEngine {
 
  private:
   void apply(double now_s, const Advance& step);
-  bool feed(double now_s, Event event, std::string text = {}, std::optional<Eigen::Vector3d> point = {},
+  bool feed(double now_s, Trigger trigger, std::string text = {}, std::optional<Eigen::Vector3d> point = {},
             std::optional<double> heading = {});
   void execute(double now_s, const Command& command);
   void fly(double now_s, const Eigen::Vector3d& to_m, std::optional<double> heading, bool home);
@@ -147,19 +149,19 @@ class FlightEngine {
   void climb(double now_s);
   bool end_of_time(double now_s, std::span<const Estimate> estimates);
   bool down(double now_s);
-  void tell(double now_s, std::string level, std::string code, std::string text);
-  void look_out(double now_s);
+  void report(double now_s, std::string level, std::string code, std::string text);
+  void monitor(double now_s);
   bool lands_by_itself() const;
   void note_lobes();
   void near_enough(NetworkId anchor, double distance_m);
-  void look_for_arrival(double now_s);
+  void detect_arrival(double now_s);
   void work(double now_s, std::span<const Estimate> estimates, bool at_hand);
   std::string outcome(const std::string& which) const;
-  void judge_anchors(double now_s, std::span<const Estimate> estimates);
+  void assess_anchors(double now_s, std::span<const Estimate> estimates);
   void decide(double now_s, std::span<const Estimate> estimates);
   planning::NextPointInput point_input(std::span<const Estimate> estimates) const;
   void conclude(double now_s, Result<planning::Decision> decided);
-  void finish(double now_s, Event event, std::string why);
+  void finish(double now_s, Trigger trigger, std::string why);
 
   FlightSetup setup_;
   State state_;
@@ -175,7 +177,7 @@ class FlightEngine {
   bool was_armed_{false}, above_floor_{false}, taken_over_{false};
   std::optional<Command> leg_;
   std::deque<Eigen::Vector3d> legs_;  ///< still to be flown to, the present one first
-  std::optional<Event> pending_;      ///< an order was refused: fed at the next tick
+  std::optional<Trigger> pending_;    ///< an order was refused: fed at the next tick
   std::string pending_text_;
   std::optional<double> settled_s_;
   std::optional<Alarm> alarm_;
@@ -187,7 +189,7 @@ class FlightEngine {
   std::map<NetworkId, std::vector<Eigen::Vector3d>> measured_at_;
   std::map<NetworkId, double> distance_m_, no_lobe_m_;  ///< newest; where the turn saw no lobe
   std::vector<Command> orders_;
-  std::vector<Happening> happenings_;
+  std::vector<Event> events_;
 };
 
 }  // namespace anchord::procedure

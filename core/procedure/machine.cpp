@@ -15,7 +15,7 @@ const Waypoint& waypoint_of(const Settings& settings, const State& state) {
 
 /// Somebody who is heard here and whose prior is missing.
 template <class Missing>
-bool any_heard(const State& state, Missing missing) {
+bool any_in_range(const State& state, Missing missing) {
   return std::any_of(state.anchors.begin(), state.anchors.end(),
                      [&](const AnchorTask& a) { return a.samples_here > 0 && !a.done && missing(a); });
 }
@@ -26,10 +26,10 @@ bool holds(Guard guard, const Settings& settings, const State& s) {
       return true;
     case Guard::wants_turn:
       return waypoint_of(settings, s).turn &&
-             any_heard(s, [](const AnchorTask& a) { return !a.has_bearing; });
+             any_in_range(s, [](const AnchorTask& a) { return !a.has_bearing; });
     case Guard::wants_height:
       return waypoint_of(settings, s).height_search &&
-             any_heard(s, [](const AnchorTask& a) { return !a.has_height && !a.no_lobe; });
+             any_in_range(s, [](const AnchorTask& a) { return !a.has_height && !a.no_lobe; });
     case Guard::legs_left:
       return s.legs > 1;
     case Guard::moves_left:
@@ -39,7 +39,7 @@ bool holds(Guard guard, const Settings& settings, const State& s) {
     case Guard::tries_left:
       return s.tries + 1 < settings.tries;
     case Guard::anything_sampled:
-      return any_heard(s, [](const AnchorTask&) { return true; });
+      return any_in_range(s, [](const AnchorTask&) { return true; });
     case Guard::was_returning:
       return s.interrupted == Step::return_home;
     case Guard::had_point:
@@ -200,7 +200,7 @@ std::vector<Command> Entry::run() {
       if (way_.from == Step::ranging) point_is_measured();
       return {only(Command::Kind::decide)};
     case Step::go_to_point:
-      if (way_.event == Event::point) {
+      if (way_.trigger == Trigger::point) {
         s_.former_m = s_.target_m;
         s_.target_m = input_.point_m.value_or(s_.target_m);
         s_.heading_rad = input_.heading_rad;
@@ -215,7 +215,7 @@ std::vector<Command> Entry::run() {
       return {go_to()};
     case Step::hold:
       s_.interrupted = way_.from;
-      if (way_.event == Event::taken_over) return {};
+      if (way_.trigger == Trigger::taken_over) return {};
       return {only(Command::Kind::hold)};
     case Step::return_home:
       return {only(Command::Kind::return_home)};
@@ -231,8 +231,9 @@ bool is_over(Step step) { return step == Step::return_home || step == Step::land
 /// The plan was flown to its end: what else leads home is an interruption, however it went on.
 bool nothing_left(const Transition& way) {
   if (way.to != Step::return_home) return false;
-  return way.event == Event::done_here || way.event == Event::no_point || way.event == Event::skip ||
-         (way.event == Event::timeout &&
+  return way.trigger == Trigger::done_here || way.trigger == Trigger::no_point ||
+         way.trigger == Trigger::skip ||
+         (way.trigger == Trigger::timeout &&
           (way.from == Step::search_anchors || way.from == Step::find_next_point));
 }
 
@@ -265,7 +266,7 @@ Result<void> Settings::check() const {
 Advance advance(const Settings& settings, const State& state, const Input& input) {
   Advance out{state, {}, nullptr};
   for (const auto& way : transitions()) {
-    if (way.from == state.step && way.event == input.event && holds(way.guard, settings, state)) {
+    if (way.from == state.step && way.trigger == input.trigger && holds(way.guard, settings, state)) {
       out.transition = &way;
       break;
     }

@@ -54,7 +54,7 @@ inline constexpr auto k_step_words = enum_table<Step>({{"ready", Step::ready},
 constexpr std::string_view to_string(Step step) { return k_step_words.word(step); }
 
 /// What can happen. Times come in as `timeout`: the machine has no clock, it says when it wants to be woken.
-enum class Event : std::uint8_t {
+enum class Trigger : std::uint8_t {
   start,
   airborne,
   arrived,      ///< at the target of the last go_to, heading included
@@ -76,29 +76,29 @@ enum class Event : std::uint8_t {
   taken_over,     ///< by the pilot or a failsafe: nothing is commanded any more
   not_taken_off,  ///< arming or take-off refused, or not seen to happen
 };
-inline constexpr auto k_event_words = enum_table<Event>({{"start", Event::start},
-                                                         {"airborne", Event::airborne},
-                                                         {"arrived", Event::arrived},
-                                                         {"in_range", Event::in_range},
-                                                         {"sampled", Event::sampled},
-                                                         {"point", Event::point},
-                                                         {"no_point", Event::no_point},
-                                                         {"done_here", Event::done_here},
-                                                         {"unreachable", Event::unreachable},
-                                                         {"connected", Event::connected},
-                                                         {"disconnected", Event::disconnected},
-                                                         {"landed", Event::landed},
-                                                         {"timeout", Event::timeout},
-                                                         {"hold", Event::hold},
-                                                         {"resume", Event::resume},
-                                                         {"skip", Event::skip},
-                                                         {"return_home", Event::return_home},
-                                                         {"land", Event::land},
-                                                         {"taken_over", Event::taken_over},
-                                                         {"not_taken_off", Event::not_taken_off}});
-constexpr std::string_view to_string(Event event) { return k_event_words.word(event); }
+inline constexpr auto k_trigger_words = enum_table<Trigger>({{"start", Trigger::start},
+                                                             {"airborne", Trigger::airborne},
+                                                             {"arrived", Trigger::arrived},
+                                                             {"in_range", Trigger::in_range},
+                                                             {"sampled", Trigger::sampled},
+                                                             {"point", Trigger::point},
+                                                             {"no_point", Trigger::no_point},
+                                                             {"done_here", Trigger::done_here},
+                                                             {"unreachable", Trigger::unreachable},
+                                                             {"connected", Trigger::connected},
+                                                             {"disconnected", Trigger::disconnected},
+                                                             {"landed", Trigger::landed},
+                                                             {"timeout", Trigger::timeout},
+                                                             {"hold", Trigger::hold},
+                                                             {"resume", Trigger::resume},
+                                                             {"skip", Trigger::skip},
+                                                             {"return_home", Trigger::return_home},
+                                                             {"land", Trigger::land},
+                                                             {"taken_over", Trigger::taken_over},
+                                                             {"not_taken_off", Trigger::not_taken_off}});
+constexpr std::string_view to_string(Trigger trigger) { return k_trigger_words.word(trigger); }
 
-/// What a transition asks of the state, so that one event can lead to several places.
+/// What a transition asks of the state, so that one trigger can lead to several places.
 enum class Guard : std::uint8_t {
   always,
   wants_turn,        ///< an anchor is in range whose bearing is not known, and turns are allowed here
@@ -125,7 +125,7 @@ constexpr std::string_view to_string(Guard guard) { return k_guard_words.word(gu
 
 struct Transition {
   Step from{};
-  Event event{};
+  Trigger trigger{};
   Guard guard{};
   Step to{};
   std::string_view reason;  ///< for the operator
@@ -209,9 +209,9 @@ struct State {
   std::uint64_t n_transitions{};
 };
 
-/// An event with what comes along.
+/// A trigger with what comes along.
 struct Input {
-  Event event{};
+  Trigger trigger{};
   double now_s{};                            ///< of the flight's own clock, never falling
   std::optional<Eigen::Vector3d> point_m{};  ///< of `point`
   std::optional<double> heading_rad{};       ///< of `point`
@@ -221,7 +221,7 @@ struct Input {
 struct Advance {
   State state;
   std::vector<Command> commands;
-  const Transition* transition{};  ///< null: the event means nothing in this step, nothing changed
+  const Transition* transition{};  ///< null: the trigger means nothing in this step, nothing changed
 };
 
 /// One step of Fig 8.3. Pure: no clock, no aircraft, no randomness.

@@ -6,7 +6,7 @@ namespace anchord::procedure {
 namespace {
 
 using S = Step;
-using E = Event;
+using E = Trigger;
 using G = Guard;
 
 // In the order in which they are tried. docs/procedure.md has the same rows; machine_test.cpp compares them.

@@ -239,7 +239,7 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     const auto found = entries_.find(slot);
     if (found == entries_.end()) return;
     ++found->second.told.frames;
-    found->second.told.last_heard = now_.utc;
+    found->second.told.last_seen = now_.utc;
     if (const auto& link = found->second.link) found->second.bytes_understood = link->counters().bytes_in;
     happen(slot, {Happened::heard, now()});
   }

@@ -29,7 +29,7 @@ struct DeviceState {
   std::string reason;    ///< why it is not talking
   std::string conflict;  ///< two devices on one port, or one identity on two devices; empty: none
   double in_phase_s{0};
-  std::optional<UtcTime> last_heard{};
+  std::optional<UtcTime> last_seen{};
   Identity identity;
   std::optional<RoverStatus> rover{};
   std::optional<ClockReading> clock{};  ///< of this connection

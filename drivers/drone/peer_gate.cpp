@@ -39,7 +39,7 @@ void PeerGate::expect(double now_s, const DroneIdentity& aircraft) {
   peer_ = aircraft.peer;
   vehicle_ = {static_cast<std::uint8_t>(aircraft.system), static_cast<std::uint8_t>(aircraft.component)};
   armed_ = true;
-  heard_s_ = now_s;
+  last_seen_s_ = now_s;
 }
 
 void PeerGate::note(const std::string& sender, mavlink::Address from, const std::string& kind, double now_s) {
@@ -70,7 +70,7 @@ std::vector<mavlink::Received> PeerGate::read(mavlink::Framer& framer, const std
 bool PeerGate::may_take(const mavlink::Received& heartbeat, const std::string& sender, double now_s) const {
   if (!is_autopilot(heartbeat.message) || (wanted_ && *wanted_ != sender)) return false;
   if (!peer_) return true;
-  if (now_s - heard_s_ <= k_silent_s) return false;
+  if (now_s - last_seen_s_ <= k_silent_s) return false;
   return !armed_ || heartbeat.from == vehicle_;
 }
 
@@ -95,7 +95,7 @@ bool PeerGate::admits(double now_s, std::int64_t unix_us, const std::string& sen
     }
     if (taken && one.from == vehicle_) {
       if (!heartbeat) continue;
-      heard_s_ = now_s;
+      last_seen_s_ = now_s;
       armed_ = (one.message.integer("base_mode") & 0x80) != 0;
     } else {
       note(sender, one.from, kind_of(one.message), now_s);

@@ -54,7 +54,7 @@ class PeerGate {
   std::optional<std::string> peer_, wanted_;
   mavlink::Address vehicle_{0, 0};
   bool armed_{false};
-  double heard_s_{0};
+  double last_seen_s_{0};
   std::uint64_t refused_{0};
   std::map<Who, Seen> others_;
 };

@@ -54,7 +54,7 @@ void Session::feed(double now_s, std::int64_t unix_us, std::span<const std::uint
 
 /// Nothing of one aircraft is another's.
 void Session::forget_vehicle() {
-  heard_s_.reset();
+  last_seen_s_.reset();
   beat_s_.reset();
   vehicle_ = {0, 0};
   expected_.reset();
@@ -81,15 +81,15 @@ void Session::handle(const mavlink::Received& in) {
   if (in.from != vehicle_) return;
   keep_alive();
   if (m.is("COMMAND_ACK")) return on_ack(m);
-  telemetry_.hear(m, autopilot_, now_s_);
+  telemetry_.receive(m, autopilot_, now_s_);
   on_transfer(m);
 }
 
 /// Whatever comes of the vehicle shows that the link lives, so that a lost heartbeat or two are no silence
 /// (PX4 sends one a second). After a silence nothing but a heartbeat ends it: the mode may be another's now.
 void Session::keep_alive() {
-  if (!beat_s_ || now_s_ - *beat_s_ > k_mode_kept_s || now_s_ - *heard_s_ > k_silent_s) return;
-  heard_s_ = now_s_;
+  if (!beat_s_ || now_s_ - *beat_s_ > k_mode_kept_s || now_s_ - *last_seen_s_ > k_silent_s) return;
+  last_seen_s_ = now_s_;
 }
 
 void Session::on_heartbeat(const mavlink::Received& in) {
@@ -97,22 +97,22 @@ void Session::on_heartbeat(const mavlink::Received& in) {
   if (m.integer("autopilot") == 8 || m.integer("type") == 6) return;  // another station
   if (expected_ && in.from != *expected_) return;
   expected_.reset();
-  if (heard_s_ && in.from != vehicle_) {
+  if (last_seen_s_ && in.from != vehicle_) {
     // One vehicle a session: the first heard, until it is silent for long and was not armed.
-    if (now_s_ - *heard_s_ <= k_vehicle_kept_s || telemetry_.armed()) return;
+    if (now_s_ - *last_seen_s_ <= k_vehicle_kept_s || telemetry_.armed()) return;
     forget_vehicle();
   }
   vehicle_ = in.from;
   autopilot_ = autopilot_of(m.integer("autopilot"));
-  heard_s_ = beat_s_ = now_s_;
-  telemetry_.hear(m, autopilot_, now_s_);
+  last_seen_s_ = beat_s_ = now_s_;
+  telemetry_.receive(m, autopilot_, now_s_);
   custom_mode_ = static_cast<std::uint32_t>(m.integer("custom_mode"));
   if (!telemetry_.armed()) drop_target("the aircraft is disarmed");
-  judge_mode();
+  assess_mode();
 }
 
 /// Any mode that was not commanded is the pilot's, or a failsafe's.
-void Session::judge_mode() {
+void Session::assess_mode() {
   if (!flight_ || flight_->taken_over || !flight_->wanted) return;
   auto& f = *flight_;
   if (custom_mode_ == *f.wanted) {
@@ -177,8 +177,8 @@ void Session::tick(double now_s, std::int64_t unix_us) {
              .set("system_status", 4)
              .set("mavlink_version", 3));
   }
-  if (!heard_s_) return;
-  if (now_s_ - *heard_s_ <= k_silent_s) {
+  if (!last_seen_s_) return;
+  if (now_s_ - *last_seen_s_ <= k_silent_s) {
     if (auto question = telemetry_.question(autopilot_, now_s_)) {
       question->set("target_system", vehicle_.system).set("target_component", vehicle_.component);
       if (question->is("COMMAND_LONG"))
@@ -198,12 +198,12 @@ DroneStatus Session::status() const {
   DroneStatus out;
   telemetry_.fill(out, now_s_);
   out.autopilot = std::string(dialect_of(autopilot_).name);
-  out.silent_s = heard_s_ ? now_s_ - *heard_s_ : now_s_;
+  out.silent_s = last_seen_s_ ? now_s_ - *last_seen_s_ : now_s_;
   out.mode_age_s = beat_s_ ? now_s_ - *beat_s_ : now_s_;
-  out.connected = heard_s_ && out.silent_s <= k_silent_s;
+  out.connected = last_seen_s_ && out.silent_s <= k_silent_s;
   if (!out.connected) out.stale.clear();  // the silence itself is what is wrong
-  out.mode = heard_s_ ? std::string(mode_word(autopilot_, custom_mode_)) : "";
-  out.mode_kind = heard_s_ ? mode_kind(autopilot_, custom_mode_) : ModeKind::other;
+  out.mode = last_seen_s_ ? std::string(mode_word(autopilot_, custom_mode_)) : "";
+  out.mode_kind = last_seen_s_ ? mode_kind(autopilot_, custom_mode_) : ModeKind::other;
   out.taken_over = flight_ && flight_->taken_over;
   out.identity = {"", vehicle_.system, vehicle_.component};
   return out;

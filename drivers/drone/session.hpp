@@ -149,7 +149,7 @@ class Session final : public Drone {
   void command_mode(std::uint64_t number, const std::string& what, std::uint32_t custom_mode, bool part);
   void want(std::uint32_t custom_mode);
   void keep_alive();
-  void judge_mode();
+  void assess_mode();
   void take_over();
   bool deaf(std::uint64_t number, const std::string& what);
   void report(std::uint64_t number, const std::string& what, CommandState state, std::string text);
@@ -175,8 +175,8 @@ class Session final : public Drone {
   mavlink::Packer packer_;
   std::vector<std::uint8_t> out_;
   double now_s_{0}, heartbeat_s_{-10};
-  std::optional<double> heard_s_;  ///< any message of the vehicle, see keep_alive()
-  std::optional<double> beat_s_;   ///< its heartbeat: what mode it is in is as old as that
+  std::optional<double> last_seen_s_;  ///< any message of the vehicle, see keep_alive()
+  std::optional<double> beat_s_;       ///< its heartbeat: what mode it is in is as old as that
   mavlink::Address vehicle_{0, 0};
   std::optional<mavlink::Address> expected_;
   Autopilot autopilot_{Autopilot::unknown};

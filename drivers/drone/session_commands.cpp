@@ -45,9 +45,9 @@ void Session::command(std::uint64_t number, const std::string& what, int command
 
 /// A mode number means nothing before it is known whose it is.
 bool Session::deaf(std::uint64_t number, const std::string& what) {
-  if (heard_s_ && autopilot_ != Autopilot::unknown) return false;
+  if (last_seen_s_ && autopilot_ != Autopilot::unknown) return false;
   report(number, what, CommandState::refused,
-         heard_s_ ? "neither ArduPilot nor PX4" : "no heartbeat of the aircraft is received");
+         last_seen_s_ ? "neither ArduPilot nor PX4" : "no heartbeat of the aircraft is received");
   return true;
 }
 

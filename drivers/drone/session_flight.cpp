@@ -201,7 +201,7 @@ std::uint64_t Session::go_to(double lat_deg, double lon_deg, double height_m,
 
 void Session::steer(double lat_deg, double lon_deg, double height_m) {
   if (!flight_ || !flight_->target || flight_->taken_over || !telemetry_.armed()) return;
-  if (!heard_s_ || now_s_ - *heard_s_ > 3) return;
+  if (!last_seen_s_ || now_s_ - *last_seen_s_ > 3) return;
   if (!std::isfinite(lat_deg) || !std::isfinite(lon_deg) || !std::isfinite(height_m) ||
       distance_m(lat_deg, lon_deg, height_m) > options_.max_jump_m)
     return;

@@ -29,7 +29,7 @@ Telemetry::Telemetry()
 bool Telemetry::fresh(std::string_view stream, double now_s, double within_s) const {
   const auto it =
       std::find_if(streams_.begin(), streams_.end(), [&](const Stream& s) { return s.name == stream; });
-  return it != streams_.end() && now_s - it->heard_s <= within_s;
+  return it != streams_.end() && now_s - it->last_seen_s <= within_s;
 }
 
 bool Telemetry::in_air(double now_s) const {
@@ -46,7 +46,7 @@ std::optional<double> Telemetry::home_msl_m() const {
 /// Another life of the autopilot: what it said in the last one is no longer so.
 void Telemetry::restarted() {
   for (auto& s : streams_) {
-    s.heard_s = s.asked_s = -1e9;
+    s.last_seen_s = s.asked_s = -1e9;
     s.asked = 0;
     s.result = 0;
     s.by_group = false;
@@ -62,7 +62,7 @@ void Telemetry::restarted() {
   battery_s_ = warning_s_ = -1e9;
 }
 
-void Telemetry::hear_status_text(const Message& m, double now_s) {
+void Telemetry::receive_status_text(const Message& m, double now_s) {
   status_.text = m.text("text");
   if (m.integer("severity") > 4) return;  // MAV_SEVERITY_WARNING and worse
   warning_ = status_.text;
@@ -73,7 +73,7 @@ void Telemetry::hear_status_text(const Message& m, double now_s) {
   }
 }
 
-void Telemetry::hear_battery(const Message& m, double now_s) {
+void Telemetry::receive_battery(const Message& m, double now_s) {
   if (const auto left = m.integer("battery_remaining"); left >= 0) {
     status_.battery = static_cast<double>(left) / 100;
     battery_s_ = now_s;
@@ -94,7 +94,7 @@ void Telemetry::hear_battery(const Message& m, double now_s) {
   status_.battery_warning = state >= 3 && state <= 6 ? 2 : state == 2 ? 1 : 0;
 }
 
-void Telemetry::hear_parameter(const Message& m, Autopilot autopilot) {
+void Telemetry::receive_parameter(const Message& m, Autopilot autopilot) {
   const auto it = parameters_.find(m.text("param_id"));
   if (it == parameters_.end()) return;
   const auto value = static_cast<float>(m.real("param_value"));
@@ -104,11 +104,11 @@ void Telemetry::hear_parameter(const Message& m, Autopilot autopilot) {
                                                               : static_cast<double>(value);
 }
 
-void Telemetry::hear(const Message& m, Autopilot autopilot, double now_s) {
+void Telemetry::receive(const Message& m, Autopilot autopilot, double now_s) {
   if (!first_s_) first_s_ = now_s;
   for (auto& s : streams_) {
     if (static_cast<int>(m.id()) == s.id) {
-      s.heard_s = now_s;
+      s.last_seen_s = now_s;
       s.asked = 0;
       s.result = 0;
     }
@@ -120,7 +120,7 @@ void Telemetry::hear(const Message& m, Autopilot autopilot, double now_s) {
     const auto boot_ms = m.integer("time_boot_ms");
     if (boot_ms + 1000 < boot_ms_) {
       restarted();
-      streams_[0].heard_s = now_s;
+      streams_[0].last_seen_s = now_s;
     }
     boot_ms_ = boot_ms;
     const double lat = m.real("lat") * 1e-7, lon = m.real("lon") * 1e-7;
@@ -131,15 +131,15 @@ void Telemetry::hear(const Message& m, Autopilot autopilot, double now_s) {
   } else if (m.is("GPS_RAW_INT")) {
     status_.gps_fix = static_cast<int>(m.integer("fix_type"));
   } else if (m.is("SYS_STATUS") || m.is("BATTERY_STATUS")) {
-    hear_battery(m, now_s);
+    receive_battery(m, now_s);
   } else if (m.is("HOME_POSITION")) {
     status_.home = Wgs84{m.real("latitude") * 1e-7, m.real("longitude") * 1e-7, m.real("altitude") * 1e-3};
   } else if (m.is("EXTENDED_SYS_STATE")) {
     landed_ = m.integer("landed_state");
   } else if (m.is("STATUSTEXT")) {
-    hear_status_text(m, now_s);
+    receive_status_text(m, now_s);
   } else if (m.is("PARAM_VALUE")) {
-    hear_parameter(m, autopilot);
+    receive_parameter(m, autopilot);
   }
 }
 
@@ -164,7 +164,7 @@ std::optional<Message> Telemetry::question(Autopilot autopilot, double now_s) {
     const bool now = group && !std::exchange(s.by_group, group.has_value());
     // What it does not have is not asked for for ever at the same pace.
     const double patience_s = s.asked < k_tries ? 2 : 10;
-    const bool comes = !never && now_s - s.heard_s <= k_ask_again_s;
+    const bool comes = !never && now_s - s.last_seen_s <= k_ask_again_s;
     if (comes || (!now && now_s - s.asked_s < patience_s)) continue;
     s.asked_s = question_s_ = now_s;
     ++s.asked;
@@ -196,10 +196,10 @@ void Telemetry::fill(DroneStatus& out, double now_s) const {
   const auto age = [&](double since_s) {
     return since_s < -1e8 ? std::numeric_limits<double>::infinity() : now_s - since_s;
   };
-  out.position_age_s = age(streams_[0].heard_s);
+  out.position_age_s = age(streams_[0].last_seen_s);
   out.battery_age_s = age(battery_s_);
   for (const auto& s : streams_) {
-    const double since_s = std::max(s.heard_s, first_s_.value_or(now_s));
+    const double since_s = std::max(s.last_seen_s, first_s_.value_or(now_s));
     if (s.watched && now_s - since_s > k_stale_s) out.stale.emplace_back(s.name);
     if (s.result != 0) out.streams_refused.push_back(std::string(s.name) + ": " + result_word(s.result));
   }

@@ -21,7 +21,7 @@ namespace anchord::drone {
 class Telemetry {
  public:
   Telemetry();
-  void hear(const mavlink::Message& m, Autopilot autopilot, double now_s);
+  void receive(const mavlink::Message& m, Autopilot autopilot, double now_s);
   /// What to ask for now: COMMAND_LONG 511, REQUEST_DATA_STREAM or PARAM_REQUEST_READ, not addressed yet.
   std::optional<mavlink::Message> question(Autopilot autopilot, double now_s);
   void answer(std::int64_t result);  ///< to the newest 511
@@ -43,7 +43,7 @@ class Telemetry {
     std::string_view name;
     double interval_s{};
     bool watched{false};  ///< flights are judged by it
-    double heard_s{-1e9}, asked_s{-1e9};
+    double last_seen_s{-1e9}, asked_s{-1e9};
     int asked{0};
     std::int64_t result{0};  ///< MAV_RESULT of the newest answer
     bool by_group{false};    ///< asked for by its group since it was refused
@@ -55,9 +55,9 @@ class Telemetry {
   };
 
   void restarted();
-  void hear_status_text(const mavlink::Message& m, double now_s);
-  void hear_battery(const mavlink::Message& m, double now_s);
-  void hear_parameter(const mavlink::Message& m, Autopilot autopilot);
+  void receive_status_text(const mavlink::Message& m, double now_s);
+  void receive_battery(const mavlink::Message& m, double now_s);
+  void receive_parameter(const mavlink::Message& m, Autopilot autopilot);
 
   DroneStatus status_;
   std::array<Stream, 7> streams_;

@@ -80,7 +80,7 @@ std::uint64_t Session::upload_fence(const DroneFence& fence) {
 }
 
 std::uint64_t Session::upload_checked(ItemList list, std::vector<MissionItem> items) {
-  if (!heard_s_) {
+  if (!last_seen_s_) {
     const std::uint64_t number = ++number_;
     deaf(number, "upload");
     return number;

@@ -203,7 +203,7 @@ void Client::begin_stream(const device::Arrival& at) {
   identity.serial = options_.mount;
   out_.identified(identity);
   deadline_ns_.reset();
-  if (options_.send_gga) tell_position(at);
+  if (options_.send_gga) send_position(at);
   std::string rest;
   rest.swap(held_);
   if (!rest.empty()) stream(rest);
@@ -248,7 +248,7 @@ void Client::unchunk(std::string_view bytes) {
   chunked_ = true;
 }
 
-void Client::tell_position(const device::Arrival& now) {
+void Client::send_position(const device::Arrival& now) {
   if (const auto rover = out_.rover_position()) {
     if (const auto sentence = gga_of(*rover); !sentence.empty()) out_.send(sentence);
   }
@@ -257,7 +257,7 @@ void Client::tell_position(const device::Arrival& now) {
 
 void Client::tick(const device::Arrival& now) {
   if (!deadline_ns_ || now.steady_ns < *deadline_ns_) return;
-  if (state_ == State::stream) return tell_position(now);
+  if (state_ == State::stream) return send_position(now);
   if (state_ == State::table) return table_end();
   if (state_ == State::maybe_headers) return begin_stream(now);
   refuse("no answer of the caster within 10 s", 10);

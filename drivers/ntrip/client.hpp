@@ -42,7 +42,7 @@ class Client final : public device::Driver {
   void stream(std::string_view bytes);
   void unchunk(std::string_view bytes);
   void refuse(const std::string& why, std::int64_t wait_s);
-  void tell_position(const device::Arrival& now);
+  void send_position(const device::Arrival& now);
 
   ClientOptions options_;
   device::DriverOutput& out_;

@@ -107,7 +107,7 @@ Script<Ranging> Tag::range(std::uint16_t id) {
   out.failure.clear();
   out.info = range_info(data.value());
   const auto before = newest_.find(id);
-  out.fault = judge(out.info, before == newest_.end() ? std::nullopt : std::optional(before->second));
+  out.fault = fault_of(out.info, before == newest_.end() ? std::nullopt : std::optional(before->second));
   newest_[id] = out.info;
   co_return out;
 }

@@ -126,7 +126,8 @@ Script<Ranging> Tag::range_between(std::uint16_t from, std::uint16_t to) {
   }
   out.info = range_info(data.value());
   const auto before = newest_between_.find({from, to});
-  out.fault = judge(out.info, before == newest_between_.end() ? std::nullopt : std::optional(before->second));
+  out.fault =
+      fault_of(out.info, before == newest_between_.end() ? std::nullopt : std::optional(before->second));
   newest_between_[{from, to}] = out.info;
   co_return out;
 }

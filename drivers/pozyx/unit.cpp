@@ -75,16 +75,16 @@ void Unit::command(const device::Command& command, const Arrival& now) {
 }
 
 void Unit::after() {
-  // What went wrong on the wire since last told.
+  // What went wrong on the wire since the last report.
   const ConversationCounters& now = session_->wire.counters();
-  ConversationCounters& told = session_->told;
-  const auto tell = [this](std::string_view reason, std::uint64_t now_n, std::uint64_t told_n) {
-    if (now_n > told_n) out_.dropped(reason, now_n - told_n);
+  ConversationCounters& reported = session_->reported;
+  const auto report = [this](std::string_view reason, std::uint64_t now_n, std::uint64_t reported_n) {
+    if (now_n > reported_n) out_.dropped(reason, now_n - reported_n);
   };
-  tell("no_reply", now.timeouts, told.timeouts);
-  tell("bad_reply", now.bad_replies, told.bad_replies);
-  tell("stray_line", now.stray_lines, told.stray_lines);
-  told = now;
+  report("no_reply", now.timeouts, reported.timeouts);
+  report("bad_reply", now.bad_replies, reported.bad_replies);
+  report("stray_line", now.stray_lines, reported.stray_lines);
+  reported = now;
   if (session_->script && session_->script->done()) session_->script->rethrow();
 }
 

@@ -48,7 +48,7 @@ class Unit final : public device::Driver {
     explicit Session(Conversation::Send send) : wire(std::move(send)), tag(wire) {}
     Conversation wire;
     Tag tag;
-    ConversationCounters told{};
+    ConversationCounters reported{};
     std::optional<Script<int>> script{};
   };
 

@@ -24,7 +24,7 @@ bool channel_exists(int channel) { return channel >= 1 && channel <= 7 && channe
 
 RangeInfo range_info(ByteView data) { return {u32_at(data, 0), u32_at(data, 4), i16_at(data, 8)}; }
 
-RangeFault judge(const RangeInfo& info, const std::optional<RangeInfo>& previous) {
+RangeFault fault_of(const RangeInfo& info, const std::optional<RangeInfo>& previous) {
   if (info.distance_mm == 0) return RangeFault::zero_distance;
   if (info.distance_mm > 1'000'000) return RangeFault::too_far;
   if (info.rss_dbm < -120 || info.rss_dbm > -40) return RangeFault::rss_impossible;

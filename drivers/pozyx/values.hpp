@@ -40,7 +40,7 @@ inline constexpr auto k_range_fault_words =
                             {"rss_impossible", RangeFault::rss_impossible}});
 constexpr std::string_view to_string(RangeFault fault) { return k_range_fault_words.word(fault); }
 /// previous  info of the same device read before, if any
-RangeFault judge(const RangeInfo& info, const std::optional<RangeInfo>& previous);
+RangeFault fault_of(const RangeInfo& info, const std::optional<RangeInfo>& previous);
 
 enum class Prf : std::uint8_t { mhz16, mhz64 };
 

@@ -103,11 +103,11 @@ std::vector<std::uint8_t> AutopilotSim::take_bytes() {
 
 void AutopilotSim::feed(std::span<const std::uint8_t> bytes) {
   if (bytes.empty()) return;
-  if (options_.latency_s <= 0) return hear(bytes);
+  if (options_.latency_s <= 0) return receive(bytes);
   in_.push_back({now_s_ + options_.latency_s, {bytes.begin(), bytes.end()}});
 }
 
-void AutopilotSim::hear(std::span<const std::uint8_t> bytes) {
+void AutopilotSim::receive(std::span<const std::uint8_t> bytes) {
   std::vector<mavlink::Received> in;
   framer_.feed(bytes, in);
   for (const auto& one : in) {
@@ -229,7 +229,7 @@ void AutopilotSim::advance(double now_s) {
     while (!in_.empty() && in_.front().due_s <= now_s_ + 1e-9) {
       const auto bytes = std::move(in_.front().bytes);
       in_.pop_front();
-      hear(bytes);
+      receive(bytes);
     }
     watch_failsafes();
     if (now_s_ - mode_s_ >= options_.mode_lag_s) shown_mode_ = custom_mode_;

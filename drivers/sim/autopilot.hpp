@@ -94,7 +94,7 @@ class AutopilotSim {
     bool whole{false};
   };
 
-  void hear(std::span<const std::uint8_t> bytes);
+  void receive(std::span<const std::uint8_t> bytes);
   void handle(const mavlink::Message& m, mavlink::Address from);
   int run_command(const mavlink::Message& m);
   int set_interval(const mavlink::Message& m);

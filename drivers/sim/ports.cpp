@@ -96,12 +96,12 @@ class Pty final : public Port {
     const bool was = std::exchange(open_, (look.revents & POLLHUP) == 0);
     return open_ && !was ? std::vector<int>{0} : std::vector<int>{};
   }
-  std::vector<Heard> hear() override {
+  std::vector<Received> receive() override {
     std::string bytes;
     // Also what a host said before it closed the port: it has to be done, and not to be taken for the next
     // host's.
     if (master_ >= 0) read_all(master_, bytes);
-    return bytes.empty() ? std::vector<Heard>{} : std::vector<Heard>{{0, std::move(bytes)}};
+    return bytes.empty() ? std::vector<Received>{} : std::vector<Received>{{0, std::move(bytes)}};
   }
   void send(int, std::string_view bytes) override { send_all(bytes); }
   void send_all(std::string_view bytes) override {
@@ -168,8 +168,8 @@ class Tcp final : public Port {
     }
     return out;
   }
-  std::vector<Heard> hear() override {
-    std::vector<Heard> out;
+  std::vector<Received> receive() override {
+    std::vector<Received> out;
     for (auto at = peers_.begin(); at != peers_.end();) {
       std::string bytes;
       const bool alive = read_all(at->second, bytes);

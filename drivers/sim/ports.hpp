@@ -14,7 +14,7 @@ namespace anchord::sim {
 /// One thread.
 class Port {
  public:
-  struct Heard {
+  struct Received {
     int peer{};  ///< which client; a pty has one, 0
     std::string bytes;
   };
@@ -25,7 +25,7 @@ class Port {
   virtual bool is_up() const = 0;
   /// New peers since the last call, and what they said.
   virtual std::vector<int> arrived() = 0;
-  virtual std::vector<Heard> hear() = 0;
+  virtual std::vector<Received> receive() = 0;
   virtual void send(int peer, std::string_view bytes) = 0;
   virtual void send_all(std::string_view bytes) = 0;
   virtual bool anybody() const = 0;

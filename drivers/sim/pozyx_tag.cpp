@@ -26,7 +26,7 @@ void PozyxTag::opened() {
   lines_.clear();
 }
 
-void PozyxTag::hear(std::string_view bytes, double now_s) {
+void PozyxTag::receive(std::string_view bytes, double now_s) {
   air_->run_until(now_s);
   lines_.feed(bytes);
   while (const auto line = lines_.next()) {
@@ -41,17 +41,17 @@ void PozyxTag::take(const Command& command, double now_s) {
       air_->write(*self_, command.address, command.data, now_s);
       return;
     case Command::Kind::read:
-      return say(reply_line(air_->read(*self_, command.address, command.count, now_s, true)), now_s);
+      return send(reply_line(air_->read(*self_, command.address, command.count, now_s, true)), now_s);
     case Command::Kind::function: {
       const Bytes answer = call(command, now_s);
       const bool range = command.address == fn::device_get_range_info && !answer.empty() &&
                          answer.front() == 1 && std::exchange(self_->fresh, false);
-      return say(reply_line(answer), now_s, range);
+      return send(reply_line(answer), now_s, range);
     }
   }
 }
 
-void PozyxTag::say(std::string bytes, double now_s, bool range) {
+void PozyxTag::send(std::string bytes, double now_s, bool range) {
   const auto faulty = [&](FaultKind kind) { return air_->faulty(*self_, kind, now_s); };
   if (faulty(FaultKind::silence)) return;
   double at_s = now_s + self_->setup.reply_s + (faulty(FaultKind::late) ? 0.150 : 0.0);

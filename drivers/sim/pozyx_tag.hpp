@@ -23,7 +23,7 @@ class PozyxTag {
   PozyxTag(const PozyxTag&) = delete;
   PozyxTag& operator=(const PozyxTag&) = delete;
 
-  void hear(std::string_view bytes, double now_s);
+  void receive(std::string_view bytes, double now_s);
   /// What is due by now.
   std::string speak(double now_s);
   /// When something is due next; absent: nothing until it hears.
@@ -47,7 +47,7 @@ class PozyxTag {
   };
 
   void take(const pozyx::Command& command, double now_s);
-  void say(std::string bytes, double now_s, bool range = false);
+  void send(std::string bytes, double now_s, bool range = false);
   pozyx::Bytes call(const pozyx::Command& command, double now_s);
 
   std::shared_ptr<PozyxAir> air_;

@@ -56,7 +56,7 @@ class TagUnit final : public Unit {
       : Unit(std::move(served), std::move(made)), tag_(std::move(air), setup) {}
   void run(double now_s) override {
     if (!port().arrived().empty()) tag_.opened();
-    for (const auto& heard : port().hear()) tag_.hear(heard.bytes, now_s);
+    for (const auto& heard : port().receive()) tag_.receive(heard.bytes, now_s);
     port().send_all(tag_.speak(now_s));
   }
   std::optional<double> next_s() const override { return tag_.next_s(); }
@@ -80,7 +80,7 @@ class RoverUnit final : public Unit {
       watching_[peer] = format_ != RoverFormat::gpsd;
     }
     // Corrections come in on the same wire; only a gpsd is asked things.
-    for (const auto& heard : port().hear()) {
+    for (const auto& heard : port().receive()) {
       if (format_ == RoverFormat::gpsd) answer(heard.peer, heard.bytes);
     }
     const std::string bytes = rover_.speak(now_s);

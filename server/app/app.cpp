@@ -12,13 +12,13 @@
 #include "api/stream/hub.hpp"
 #include "drivers/drone/signing_key.hpp"
 #include "drivers/link/address.hpp"
-#include "server/app/front_door.hpp"
+#include "server/app/authenticator.hpp"
 #include "server/app/metrics.hpp"
 #include "server/app/model_key.hpp"
 #include "server/flight/demonstration_flight.hpp"
 #include "server/flight/drone_link.hpp"
 #include "server/http/http_server.hpp"
-#include "server/http/request_judge.hpp"
+#include "server/http/request_check.hpp"
 #include "server/http/text.hpp"
 #include "server/runtime/backup_keeper.hpp"
 #include "server/runtime/device_manager.hpp"
@@ -92,7 +92,7 @@ struct App::State {
   ModelKey model_key;
   std::unique_ptr<flight::DroneLink> drone;
   std::unique_ptr<api::Application> application;
-  std::unique_ptr<FrontDoor> door;
+  std::unique_ptr<Authenticator> door;
   std::unique_ptr<HttpServer> http;
   std::vector<std::string> urls;
   fs::path data_dir;
@@ -272,15 +272,15 @@ void App::State::compose() {
   application->start();
   if (drone) drone->start();  // after a flight that goes on has said which aircraft is its own
   devices->start(application->device_rows());
-  FrontDoorOptions options;
+  AuthenticatorOptions options;
   options.hosts = host_policy(config);
   options.rate_per_s = static_cast<double>(config.count("rate.per_s"));
   options.rate_burst = static_cast<double>(config.count("rate.burst"));
   options.places = {config.count("ws.max_connections"), config.count("ws.per_token"),
                     config.count("ws.reserved")};
   options.proxies = proxies;
-  door = std::make_unique<FrontDoor>(application->router(), application->ws_factory(), *access, *metrics,
-                                     options);
+  door = std::make_unique<Authenticator>(application->router(), application->ws_factory(), *access, *metrics,
+                                         options);
 }
 
 App::App(std::unique_ptr<State> state) : state_(std::move(state)) {}

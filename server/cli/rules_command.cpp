@@ -17,7 +17,7 @@ struct RulesArguments {
   bool json{false};
 };
 
-Result<api::RuleReport> judge(const RulesArguments& a, const std::string& file) {
+Result<api::RuleReport> evaluate(const RulesArguments& a, const std::string& file) {
   DataOptions one = a.data;
   one.files = {file};
   BOOST_OUTCOME_TRY(const auto table, read_data(one));
@@ -30,8 +30,8 @@ Result<api::RuleReport> judge(const RulesArguments& a, const std::string& file) 
   const std::filesystem::path path{file};
   report.data_set = (path.parent_path().filename() / path.filename()).string();
   for (const auto& s : samples) (s.los ? report.los_rows : report.nlos_rows) += 1;
-  report.printed = nlos::judge_rules(nlos::printed_rules(), samples);
-  report.fitted = nlos::judge_fitted_rules(samples, ml::grouped_folds(table.group, 10, a.seed));
+  report.printed = nlos::evaluate_rules(nlos::printed_rules(), samples);
+  report.fitted = nlos::evaluate_fitted_rules(samples, ml::grouped_folds(table.group, 10, a.seed));
   report.rules = nlos::fit_rules(samples);
   return report;
 }
@@ -39,7 +39,7 @@ Result<api::RuleReport> judge(const RulesArguments& a, const std::string& file) 
 int rules(const RulesArguments& a) {
   std::vector<api::RuleReport> reports;
   for (const auto& file : a.data.files) {
-    auto report = judge(a, file);
+    auto report = evaluate(a, file);
     if (!report) return refuse("rules", report.error().message);
     reports.push_back(std::move(report).value());
   }

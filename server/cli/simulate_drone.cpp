@@ -114,7 +114,7 @@ class World {
       if (end > 0) (void)told(sim::happen(autopilot_, std::string_view(typed_).substr(0, end)));
     }
   }
-  void hear(std::string_view in) {
+  void receive(std::string_view in) {
     autopilot_.feed({reinterpret_cast<const std::uint8_t*>(in.data()), in.size()});
   }
   /// On a thread of its own: a server that is away must not stop the aircraft.
@@ -176,7 +176,7 @@ int simulate_drone(const Options& options) {
   const auto bytes = link::make_link(io, address.value());
   bool lost = false;
   link::LinkHandlers handlers;
-  handlers.on_bytes = [&](std::string_view in, const link::Arrival&) { world.hear(in); };
+  handlers.on_bytes = [&](std::string_view in, const link::Arrival&) { world.receive(in); };
   handlers.on_closed = [&](const Error& why) {
     std::fprintf(stderr, "anchord simulate drone: %s\n", printable(why.message).c_str());
     lost = true;

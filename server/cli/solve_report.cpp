@@ -66,7 +66,7 @@ Result<void> write_solve_report(const FlightData& flight, const FlightSolution& 
   report.origin = solution.origin;
   report.evidence.flights.push_back(evidence_of(flight, solution, solution.origin));
   if (wanted.iterations > 0) {
-    BOOST_OUTCOME_TRY(report.evidence.course, course_of(flight, options, wanted.iterations));
+    BOOST_OUTCOME_TRY(report.evidence.course, convergence_of(flight, options, wanted.iterations));
   }
   for (const auto& anchor : solution.anchors) {
     ReportAnchor one;

@@ -208,11 +208,11 @@ FlightData thinned_at_rest(FlightData data) {
   return data;
 }
 
-std::vector<Judged> judge(const sim::World& world, const FlightSolution& solution) {
+std::vector<AnchorError> assess(const sim::World& world, const FlightSolution& solution) {
   constexpr double k_chi2_95 = 7.815;
-  std::vector<Judged> out;
+  std::vector<AnchorError> out;
   for (const auto& anchor : world.anchors) {
-    Judged judged;
+    AnchorError judged;
     judged.anchor = anchor.id;
     judged.error_m = std::numeric_limits<double>::infinity();
     judged.verdict = Verdict::too_few;
@@ -230,9 +230,9 @@ std::vector<Judged> judge(const sim::World& world, const FlightSolution& solutio
   return out;
 }
 
-double median_error_m(std::vector<Judged> judged) {
+double median_error_m(std::vector<AnchorError> judged) {
   std::sort(judged.begin(), judged.end(),
-            [](const Judged& a, const Judged& b) { return a.error_m < b.error_m; });
+            [](const AnchorError& a, const AnchorError& b) { return a.error_m < b.error_m; });
   const std::size_t n = judged.size();
   return n == 0 ? std::numeric_limits<double>::infinity()
                 : (judged[(n - 1) / 2].error_m + judged[n / 2].error_m) / 2;

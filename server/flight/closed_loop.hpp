@@ -67,13 +67,13 @@ FlightData fly_ring(const sim::World& world, double duration_s, const std::vecto
 FlightData thinned_at_rest(FlightData data);
 
 /// How an answer stands to the truth.
-struct Judged {
+struct AnchorError {
   NetworkId anchor{};
   double error_m{};
   Verdict verdict{};
   bool inside{};  ///< truth inside the 95 % ellipsoid (chi-square, three dimensions: 7.815)
 };
-std::vector<Judged> judge(const sim::World& world, const FlightSolution& solution);
-double median_error_m(std::vector<Judged> judged);
+std::vector<AnchorError> assess(const sim::World& world, const FlightSolution& solution);
+double median_error_m(std::vector<AnchorError> judged);
 
 }  // namespace anchord::flight

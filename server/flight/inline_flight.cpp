@@ -18,7 +18,7 @@ LiveMissionSetup live_setup(const InlineFlight::Setup& setup) {
 InlineFlight::InlineFlight(Setup setup, Drone& drone)
     : setup_(std::move(setup)), live_(live_setup(setup_)), operations_(&drone) {}
 
-void InlineFlight::tell_events(const Now& now) {
+void InlineFlight::publish_events(const Now& now) {
   for (const auto& event : live_.take_events()) {
     on_event(event);
     std::visit([&](const auto& e) { take(now, e); }, event);
@@ -26,10 +26,10 @@ void InlineFlight::tell_events(const Now& now) {
 }
 
 void InlineFlight::step(const Now& now, std::span<const Fix> fixes, std::span<const Range> ranges) {
-  for (const auto& range : ranges) live_.add(LiveRow(JudgedRange{range, {}, range.time}));
+  for (const auto& range : ranges) live_.add(LiveRow(PredictedRange{range, {}, range.time}));
   for (const auto& fix : fixes) live_.add(LiveRow(fix));
   live_.settle();
-  tell_events(now);
+  publish_events(now);
   const auto& f = flight();
   const bool deciding = f && f->control.engine().state().step == procedure::Step::find_next_point;
   std::optional<Operations::Estimates> estimates;

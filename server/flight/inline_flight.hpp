@@ -39,7 +39,7 @@ class InlineFlight {
   std::function<void(const Event&)> on_event = [](const Event&) {};
 
  private:
-  void tell_events(const Now& now);
+  void publish_events(const Now& now);
   void take(const Now& now, const FixBelieved& event) { operations_.fix(now, event.fix); }
   void take(const Now& now, const RangeDecided& event) {
     operations_.range(now, setup_.mission.id, event.result);

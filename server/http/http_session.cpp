@@ -6,8 +6,8 @@
 #include "core/base/guard.hpp"
 #include "server/http/body_pipe.hpp"
 #include "server/http/http_wire.hpp"
+#include "server/http/request_check.hpp"
 #include "server/http/request_id.hpp"
-#include "server/http/request_judge.hpp"
 #include "server/http/response_writer.hpp"
 #include "server/http/sessions.hpp"
 #include "server/runtime/worker_pool.hpp"
@@ -78,18 +78,18 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
     if (head.size == 0) co_return false;
     RequestParser parser(limits_);
     auto broken = parser.parse_head(wire_.buffered().substr(0, head.size));
-    Judgement judgement;
+    HeadCheck judgement;
     if (broken) {
       judgement = std::move(*broken);
     } else {
-      judgement = judge_head(parser.head(), limits_, context_->hosts);
+      judgement = validate_head(parser.head(), limits_, context_->hosts);
     }
     wire_.consume(head.size);
     if (auto* refusal = std::get_if<Refusal>(&judgement)) {
       co_await refuse(*refusal);
       co_return false;
     }
-    auto& judged = std::get<JudgedHead>(judgement);
+    auto& judged = std::get<ValidHead>(judgement);
     request_ = std::make_shared<api::Request>(std::move(judged.request));
     request_->request_id = request_id_of(request_->header("x-request-id"));
     request_->remote = remote_;
@@ -110,7 +110,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
     co_return co_await exchange(parser, judged, admission);
   }
 
-  awaitable<bool> exchange(RequestParser& parser, JudgedHead& judged, Admission& admission) {
+  awaitable<bool> exchange(RequestParser& parser, ValidHead& judged, Admission& admission) {
     const std::uint64_t limit = admission.refusal ? limits_.drain_bytes : admission.body_limit;
     const bool too_large = judged.framing == Framing::length && judged.content_length > limit;
     bool keep = judged.keep_alive;
@@ -158,7 +158,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
     return BodyEnd::refused;
   }
 
-  awaitable<BodyEnd> read_body(RequestParser& parser, const JudgedHead& judged, std::uint64_t limit,
+  awaitable<BodyEnd> read_body(RequestParser& parser, const ValidHead& judged, std::uint64_t limit,
                                std::string& body) {
     if (parser.done()) co_return BodyEnd::complete;
     wire_.expect_body();
@@ -312,7 +312,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
     co_await bell_.async_wait(k_wait);
   }
 
-  awaitable<bool> answer(api::Response& response, const JudgedHead& judged, bool keep) {
+  awaitable<bool> answer(api::Response& response, const ValidHead& judged, bool keep) {
     const bool http_1_0 = judged.version == 10;
     const bool head_only = request_->method == api::Method::head;
     const bool streamed = static_cast<bool>(response.body_stream);

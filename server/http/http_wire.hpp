@@ -11,7 +11,7 @@
 #include "server/http/limits.hpp"
 #include "server/http/net.hpp"
 #include "server/http/rate_floor.hpp"
-#include "server/http/request_judge.hpp"
+#include "server/http/request_check.hpp"
 #include "server/http/request_parser.hpp"
 
 namespace anchord::server {

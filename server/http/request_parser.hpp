@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "server/http/request_judge.hpp"
+#include "server/http/request_check.hpp"
 
 namespace anchord::server {
 

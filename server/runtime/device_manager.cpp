@@ -39,7 +39,7 @@ DeviceReport report_of(const DeviceConfig& config, const device::DeviceState& s)
   out.reason = s.reason;
   out.conflict = s.conflict;
   out.in_state_s = s.in_phase_s;
-  out.last_heard = s.last_heard;
+  out.last_seen = s.last_seen;
   out.model = s.identity.model;
   out.firmware = s.identity.firmware;
   out.serial = s.identity.serial;

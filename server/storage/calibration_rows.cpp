@@ -202,11 +202,11 @@ std::optional<Error> remove_calibration(Connection& c, const CalibrationId& id) 
 Result<Revision> publish_revision(Connection& c, const CalibrationId& id,
                                   const std::vector<NetworkId>& anchors, std::string_view by,
                                   std::string_view note, UtcTime now, const std::vector<Override>& overrides,
-                                  std::optional<std::uint64_t> judged_on) {
+                                  std::optional<std::uint64_t> decided_on) {
   const auto key = key_of(c, id);
   if (!key) return absent("calibration", id);
   const std::uint64_t before = newest_revision(c);
-  if (judged_on && *judged_on != before)
+  if (decided_on && *decided_on != before)
     return make_error(Errc::conflict, "revision " + std::to_string(before) +
                                           " was published meanwhile: read the anchors again");
   if (all_stand(c, before, *key, anchors))

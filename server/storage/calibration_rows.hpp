@@ -20,7 +20,7 @@ std::optional<Error> remove_calibration(Connection& connection, const Calibratio
 Result<Revision> publish_revision(Connection& connection, const CalibrationId& id,
                                   const std::vector<NetworkId>& anchors, std::string_view by,
                                   std::string_view note, UtcTime now, const std::vector<Override>& overrides,
-                                  std::optional<std::uint64_t> judged_on);
+                                  std::optional<std::uint64_t> decided_on);
 Result<std::string> find_evidence(Connection& connection, const CalibrationId& id);
 Result<std::vector<Revision>> list_revisions(Connection& connection, std::int64_t limit,
                                              std::uint64_t before);

@@ -119,11 +119,11 @@ class SqlModelStore final : public ModelStore {
     });
   }
 
-  Result<Promotion> promote(const Promotion& promotion, std::optional<std::uint64_t> judged_on) override {
+  Result<Promotion> promote(const Promotion& promotion, std::optional<std::uint64_t> decided_on) override {
     return write_value<Promotion>(gate_, 1, [&](Connection& c) -> Result<Promotion> {
       Query newest(c, k_newest);
       const std::uint64_t before = newest.step() ? newest.as<std::uint64_t>() : 0;
-      if (judged_on && *judged_on != before)
+      if (decided_on && *decided_on != before)
         return make_error(Errc::conflict, "promotion " + std::to_string(before) +
                                               " came meanwhile: read the active models again");
       if (promotion.model) {

@@ -11,9 +11,9 @@ class SqlRevisionStore final : public RevisionStore {
   Result<Revision> publish(const CalibrationId& id, const std::vector<NetworkId>& anchors,
                            std::string_view by, std::string_view note, UtcTime now,
                            const std::vector<Override>& overrides,
-                           std::optional<std::uint64_t> judged_on) override {
+                           std::optional<std::uint64_t> decided_on) override {
     return write_value<Revision>(gate_, 1, [&](Connection& c) {
-      return publish_revision(c, id, anchors, by, note, now, overrides, judged_on);
+      return publish_revision(c, id, anchors, by, note, now, overrides, decided_on);
     });
   }
   Result<std::vector<Revision>> revisions(std::size_t limit, std::uint64_t before) override {

@@ -66,7 +66,7 @@ class SqliteDatabase final : public Database, private sql::Gate {
     health.disk_free_bytes = folder_->free_bytes();
     health.schema_version = newest_schema_version();
     health.synchronous = options_.synchronous;
-    judge(health, status);
+    assess(health, status);
     return health;
   }
 
@@ -98,7 +98,7 @@ class SqliteDatabase final : public Database, private sql::Gate {
                                               " needed; a running one goes on");
   }
 
-  void judge(StorageHealth& health, const sql::WriteQueue::Status& status) const {
+  void assess(StorageHealth& health, const sql::WriteQueue::Status& status) const {
     const std::uint64_t free = health.disk_free_bytes;
     if (status.trouble) {
       health.level =

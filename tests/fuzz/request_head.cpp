@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "server/http/request_judge.hpp"
+#include "server/http/request_check.hpp"
 #include "server/http/request_parser.hpp"
 #include "server/http/target.hpp"
 #include "tests/fuzz/check.hpp"
@@ -27,8 +27,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   RequestParser parser(limits);
   const std::string raw(bytes.substr(0, head->head_end));
   if (parser.parse_head(raw)) return 0;
-  const Judgement judgement = judge_head(parser.head(), limits, policy);
-  const auto* good = std::get_if<JudgedHead>(&judgement);
+  const HeadCheck judgement = validate_head(parser.head(), limits, policy);
+  const auto* good = std::get_if<ValidHead>(&judgement);
   if (!good) return 0;
   std::string_view rest = bytes.substr(head->head_end);
   std::array<char, 64> out{};  // small: many steps

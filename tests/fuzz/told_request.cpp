@@ -6,7 +6,7 @@
 #include "api/kit/problem.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/router.hpp"
-#include "server/http/request_judge.hpp"
+#include "server/http/request_check.hpp"
 #include "server/http/request_parser.hpp"
 #include "tests/fuzz/told.hpp"
 
@@ -70,9 +70,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   RequestParser parser(limits);
   const std::string raw(bytes.substr(0, head.head_end));
   if (const auto why = parser.parse_head(raw)) return refused(*why);
-  Judgement judgement = judge_head(parser.head(), limits, policy);
+  HeadCheck judgement = validate_head(parser.head(), limits, policy);
   if (const auto* why = std::get_if<Refusal>(&judgement)) return refused(*why);
-  auto request = std::move(std::get<JudgedHead>(judgement).request);
+  auto request = std::move(std::get<ValidHead>(judgement).request);
   request.body = bytes.substr(head.head_end);
   fuzz::told(request.path);
   for (const auto& [key, value] : request.headers) fuzz::told(value);

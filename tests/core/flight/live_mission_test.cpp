@@ -81,7 +81,7 @@ struct Dump {
 /// Ranges and fixes as they come.
 std::vector<flight::LiveRow> stream(const FlightData& data) {
   std::vector<flight::LiveRow> rows;
-  for (const auto& range : data.ranges) rows.emplace_back(flight::JudgedRange{range, {}, range.time});
+  for (const auto& range : data.ranges) rows.emplace_back(flight::PredictedRange{range, {}, range.time});
   for (const auto& fix : data.fixes) rows.emplace_back(fix);
   std::ranges::stable_sort(rows, {}, [](const auto& row) { return flight::time_of(row); });
   return rows;

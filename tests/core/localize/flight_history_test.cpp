@@ -72,27 +72,27 @@ TEST(AccuracyGoal, IsReachedOnlyWhenBothBoundsAreWithinIt) {
   for (const auto& [h95_m, v95_m, reached] :
        {std::tuple{0.2, 0.4, true}, {0.201, 0.1, false}, {0.1, 0.401, false}, {0.05, 0.05, true}}) {
     auto estimate = known_within(h95_m, v95_m);
-    judge_goal(estimate, {.h95_m = 0.2, .v95_m = 0.4});
+    assess_goal(estimate, {.h95_m = 0.2, .v95_m = 0.4});
     EXPECT_EQ(reached_goal(estimate), reached) << h95_m << ' ' << v95_m;
   }
 }
 
 TEST(AccuracyGoal, IsJudgedAnewNotTwice) {
   auto estimate = known_within(0.3, 0.3);
-  judge_goal(estimate, {.h95_m = 0.2, .v95_m = 0.4});
+  assess_goal(estimate, {.h95_m = 0.2, .v95_m = 0.4});
   EXPECT_FALSE(reached_goal(estimate));
-  judge_goal(estimate, {.h95_m = 0.5, .v95_m = 0.5});
+  assess_goal(estimate, {.h95_m = 0.5, .v95_m = 0.5});
   EXPECT_EQ(estimate.gates.size(), 2U);
   EXPECT_TRUE(reached_goal(estimate));
 }
 
 TEST(AccuracyGoal, IsNotReachedWithoutAPositionOrWithAnotherVerdict) {
   Estimate nowhere;
-  judge_goal(nowhere, {});
+  assess_goal(nowhere, {});
   EXPECT_FALSE(reached_goal(nowhere));
   auto ambiguous = known_within(0.01, 0.01);
   ambiguous.verdict = Verdict::ambiguous;
-  judge_goal(ambiguous, {});
+  assess_goal(ambiguous, {});
   EXPECT_FALSE(reached_goal(ambiguous));
   EXPECT_FALSE(reached_goal(known_within(0.01, 0.01))) << "never judged";
 }

@@ -77,7 +77,7 @@ const char* word(Variant variant) {
   return "";
 }
 
-double Judged::ratio() const {
+double AnchorError::ratio() const {
   const double claimed_m = flat ? solution.estimate.h95_m : claimed_3d_m;
   return claimed_m / std::max(error_m(), 1e-3);
 }
@@ -103,13 +103,13 @@ std::vector<FlightSolution> solve_set(const FlightSet& set, Variant variant) {
   return solutions;
 }
 
-std::vector<Judged> judge(const FlightSet& set, std::size_t index, const FlightSolution& solution) {
+std::vector<AnchorError> assess(const FlightSet& set, std::size_t index, const FlightSolution& solution) {
   const auto truth = read_truth(set.folders[index], solution.origin);
-  std::vector<Judged> all;
+  std::vector<AnchorError> all;
   for (const auto& anchor : solution.anchors) {
     const auto known = truth.find(anchor.estimate.anchor);
     if (known == truth.end()) continue;
-    Judged one;
+    AnchorError one;
     one.flight = solution.name;
     one.solution = anchor;
     one.flat = known->second.flat;
@@ -128,7 +128,7 @@ std::vector<Judged> judge(const FlightSet& set, std::size_t index, const FlightS
   return all;
 }
 
-Summary summary(const std::vector<Judged>& anchors) {
+Summary summary(const std::vector<AnchorError>& anchors) {
   Summary sum;
   std::vector<double> h95_m, ratios;
   for (const auto& one : anchors) {

@@ -19,7 +19,7 @@ enum class Variant : std::uint8_t {
 const char* word(Variant variant);
 
 /// One anchor of one flight against the truth.
-struct Judged {
+struct AnchorError {
   std::string flight;
   AnchorSolution solution;
   bool flat{false};  ///< the truth has no height
@@ -42,7 +42,7 @@ struct FlightSet {
 FlightSet read_set(const std::string& name);
 std::vector<FlightSolution> solve_set(const FlightSet& set, Variant variant);
 /// Anchors with a surveyed place, of flight `index` of the set.
-std::vector<Judged> judge(const FlightSet& set, std::size_t index, const FlightSolution& solution);
+std::vector<AnchorError> assess(const FlightSet& set, std::size_t index, const FlightSolution& solution);
 
 /// What several anchors come to.
 struct Summary {
@@ -50,6 +50,6 @@ struct Summary {
   double mean_h_m{0}, mean_m{0}, max_m{0};
   double median_h95_m{0}, median_ratio{0};
 };
-Summary summary(const std::vector<Judged>& anchors);
+Summary summary(const std::vector<AnchorError>& anchors);
 
 }  // namespace anchord::testing

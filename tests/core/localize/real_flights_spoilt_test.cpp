@@ -12,8 +12,8 @@
 namespace anchord {
 namespace {
 
+using testing::AnchorError;
 using testing::FlightSet;
-using testing::Judged;
 
 struct Spoilt {
   const char* how;
@@ -139,7 +139,7 @@ TEST(SpoiltRealFlights, AreNeverAcceptedBesideTheTruth) {
           if (profile && !way.with_profile) continue;
           const auto solution = solve_flight(flight, profile ? with_profile : FlightOptions{});
           if (!solution) continue;  // no answer is no wrong answer
-          for (const Judged& one : testing::judge(set, i, solution.value())) {
+          for (const AnchorError& one : testing::assess(set, i, solution.value())) {
             ++anchors;
             const Estimate& e = one.solution.estimate;
             if (!e.acceptable()) continue;

@@ -26,7 +26,7 @@ using ::testing::Test;
 struct Solved {
   FlightSet set;
   std::map<Variant, std::vector<FlightSolution>> solutions;
-  std::map<Variant, std::map<std::string, std::vector<Judged>>> judged;
+  std::map<Variant, std::map<std::string, std::vector<AnchorError>>> judged;
 
   Summary sum(Variant variant, const std::string& flight) const {
     const auto& flights = judged.at(variant);
@@ -68,7 +68,7 @@ Solved solve_all_ways(const std::string& name) {
     auto& solutions = out.solutions[variant] = solve_set(out.set, variant);
     auto& judged = out.judged[variant];
     for (std::size_t i = 0; i < solutions.size(); ++i) {
-      auto anchors = judge(out.set, i, solutions[i]);
+      auto anchors = assess(out.set, i, solutions[i]);
       auto& all = judged["all"];
       all.insert(all.end(), anchors.begin(), anchors.end());
       const bool flat = !anchors.empty() && anchors.front().flat;
@@ -197,7 +197,7 @@ TEST_F(RealFlights, PlainRobustSingleAndWithTheProfileOfTheOtherFlights) {
   // one second, not 7.5; a T from differences of residuals two seconds apart made it 8.7 but lost two of four
   // anchors of seq1, whose errors are as short and yet do not average out. So T stays what every flight
   // holds.
-  std::vector<Judged> all;
+  std::vector<AnchorError> all;
   for (const Solved* set : {&outdoor, &inrol, &rcv}) {
     const auto& anchors = set->judged.at(Variant::profile).at("all");
     all.insert(all.end(), anchors.begin(), anchors.end());
@@ -223,7 +223,7 @@ TEST_F(RealFlights, OfAWalkWithOnePositionASecondStayInsideTheirClaim) {
     FlightOptions options;
     options.origin = solve_flight(set.flights[i]).value().origin;
     const auto solution = solve_flight(sparse, options).value();
-    const auto anchors = judge(set, i, solution);
+    const auto anchors = assess(set, i, solution);
     const Summary s = summary(anchors);
     std::printf("%-14s 1 Hz: mean error %.3f m, %d of %d inside\n", solution.name.c_str(), s.mean_m, s.inside,
                 s.n);

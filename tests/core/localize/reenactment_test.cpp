@@ -47,11 +47,11 @@ double error_m(const std::vector<Observation>& rows) {
   return fit ? (fit.value().position_m - k_anchor).norm() : 10.0;
 }
 
-struct Course {
+struct Convergence {
   std::array<double, k_iterations> raw_m{}, corrected_m{};  ///< median over the seeds, after each iteration
 };
 
-Course fly(const Errors& errors) {
+Convergence fly(const Errors& errors) {
   const auto places = path();
   std::vector<std::array<double, k_seeds>> raw(k_iterations), corrected(k_iterations);
   for (std::size_t seed = 0; seed < k_seeds; ++seed) {
@@ -75,7 +75,7 @@ Course fly(const Errors& errors) {
       corrected[k][seed] = error_m(mitigated);
     }
   }
-  Course course;
+  Convergence course;
   const auto median = [](std::array<double, k_seeds>& values) {
     std::ranges::nth_element(values, values.begin() + k_seeds / 2);
     return values[k_seeds / 2];
@@ -90,13 +90,13 @@ Course fly(const Errors& errors) {
 }
 
 TEST(Reenactment, OfFigure810EndsWithinTwoCentimetresInLineOfSight) {
-  const Course course = fly(k_los);
+  const Convergence course = fly(k_los);
   EXPECT_LE(course.corrected_m.back(), 0.02);
   EXPECT_GT(course.raw_m.back(), course.corrected_m.back());
 }
 
 TEST(Reenactment, OfFigure811EndsWithinNineCentimetresWithoutLineOfSight) {
-  const Course course = fly(k_nlos);
+  const Convergence course = fly(k_nlos);
   EXPECT_LE(course.corrected_m.back(), 0.09);
   EXPECT_GT(course.raw_m.back(), course.corrected_m.back());
   EXPECT_LT(course.corrected_m.back(), 0.5 * course.corrected_m[4]) << "iterations must pay";

@@ -48,7 +48,7 @@ TEST(Predictor, WeighsBothBiasesByTheProbability) {
   const auto made = Predictor::make(
       {classifier(), constant_bias(Task::los_bias, 0.1, 0.05), constant_bias(Task::nlos_bias, 0.6, 0.3), {}});
   ASSERT_TRUE(made) << made.error().message;
-  const auto v = made.value().judge(sample(std::log(3.0)));  // P = 3 / 4
+  const auto v = made.value().predict(sample(std::log(3.0)));  // P = 3 / 4
   EXPECT_NEAR(*v.p_los, 0.75, 1e-12);
   EXPECT_TRUE(*v.los);
   EXPECT_NEAR(*v.bias_m, 0.75 * 0.1 + 0.25 * 0.6, 1e-12);
@@ -59,7 +59,7 @@ TEST(Predictor, WeighsBothBiasesByTheProbability) {
 
 TEST(Predictor, SaysWhichModelsGaveTheAnswer) {
   const auto spoke = [](ModelSet set, const nlos::FeatureVector& f) {
-    return Predictor::make(std::move(set)).value().judge(f).spoke.to_string();  // bias, nlos, los, id
+    return Predictor::make(std::move(set)).value().predict(f).spoke.to_string();  // bias, nlos, los, id
   };
   EXPECT_EQ(spoke({classifier(), {}, {}, {}}, sample(1)), "0001");
   EXPECT_EQ(spoke({classifier(),
@@ -78,8 +78,8 @@ TEST(Predictor, HardSwitchTakesTheBiasOfTheClassCalled) {
   const auto made = Predictor::make(
       {classifier(), constant_bias(Task::los_bias, 0.1, 0.05), constant_bias(Task::nlos_bias, 0.6, 0.3), {}});
   ASSERT_TRUE(made);
-  EXPECT_NEAR(*made.value().judge(sample(1), Correction::hard).bias_m, 0.1, 1e-12);
-  EXPECT_NEAR(*made.value().judge(sample(-1), Correction::hard).bias_m, 0.6, 1e-12);
+  EXPECT_NEAR(*made.value().predict(sample(1), Correction::hard).bias_m, 0.1, 1e-12);
+  EXPECT_NEAR(*made.value().predict(sample(-1), Correction::hard).bias_m, 0.6, 1e-12);
 }
 
 TEST(Predictor, SaysNothingOfASampleThatLacksItsFeature) {
@@ -87,7 +87,7 @@ TEST(Predictor, SaysNothingOfASampleThatLacksItsFeature) {
   ASSERT_TRUE(made);
   FeatureVector f;
   f.set(Feature::range_m, 2.0);
-  const auto v = made.value().judge(f);
+  const auto v = made.value().predict(f);
   EXPECT_FALSE(v.p_los);
   EXPECT_FALSE(v.bias_m);
 }
@@ -116,8 +116,8 @@ TEST(Predictor, RefusesAModelInTheWrongSlotAndColumnsLiveRangesLack) {
 TEST(Predictor, MarksSamplesOutsideTheTrainingRows) {
   const auto made = Predictor::make({classifier(), {}, {}, {}});
   ASSERT_TRUE(made);
-  EXPECT_FALSE(made.value().judge(sample(2.9)).outside_training);
-  EXPECT_TRUE(made.value().judge(sample(3.1)).outside_training);
+  EXPECT_FALSE(made.value().predict(sample(2.9)).outside_training);
+  EXPECT_TRUE(made.value().predict(sample(3.1)).outside_training);
 }
 
 }  // namespace anchord::ml

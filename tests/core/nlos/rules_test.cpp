@@ -8,8 +8,8 @@ namespace anchord::nlos {
 TEST(RssRule, ThresholdIsThatOfEquation51) {
   const RssLine line;
   EXPECT_NEAR(line.threshold_dbm(5), -84.6331, 1e-9);
-  EXPECT_TRUE(line.says_los(-84.6, 5));
-  EXPECT_FALSE(line.says_los(-84.7, 5));
+  EXPECT_TRUE(line.calls_los(-84.6, 5));
+  EXPECT_FALSE(line.calls_los(-84.7, 5));
 }
 
 // Eleven levels 0..10 dB above a line at each distance: 90 % exceed the one 1 dB above it.
@@ -34,8 +34,8 @@ TEST(ThresholdRule, KeepsTheAskedShareOfNlosOnItsSide) {
   const auto rule = fit_threshold_for_nlos_share(nlos, false, 0.90);
   ASSERT_TRUE(rule);
   EXPECT_NEAR(rule.value().threshold, 10, 1e-9);
-  EXPECT_TRUE(rule.value().says_los(9));
-  EXPECT_FALSE(rule.value().says_los(10));
+  EXPECT_TRUE(rule.value().calls_los(9));
+  EXPECT_FALSE(rule.value().calls_los(10));
 }
 
 TEST(ThresholdRule, FitFindsTheGapAndTheSide) {

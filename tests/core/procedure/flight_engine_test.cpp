@@ -48,7 +48,7 @@ struct Flown {
     engine.fix(now, k_place, FixClass::rtk_fixed);
     engine.vehicle(now, view);
   }
-  void feed(std::initializer_list<Event> events) {
+  void feed(std::initializer_list<Trigger> events) {
     for (const auto e : events) ASSERT_TRUE(engine.command(now, e, "")) << to_string(e);
   }
   void hear() {
@@ -58,77 +58,79 @@ struct Flown {
 
 /// How each step in flight is come to.
 const std::map<Step, std::function<void(Flown&)>>& ways() {
-  static const auto to_search = [](Flown& f) { f.feed({Event::start, Event::airborne, Event::arrived}); };
+  static const auto to_search = [](Flown& f) {
+    f.feed({Trigger::start, Trigger::airborne, Trigger::arrived});
+  };
   static const auto to_ranging = [](Flown& f) {
     to_search(f);
     f.hear();
-    f.feed({Event::in_range, Event::timeout});  // the turn is given up
+    f.feed({Trigger::in_range, Trigger::timeout});  // the turn is given up
   };
   static const std::map<Step, std::function<void(Flown&)>> k_ways{
-      {Step::take_off, [](Flown& f) { f.feed({Event::start}); }},
+      {Step::take_off, [](Flown& f) { f.feed({Trigger::start}); }},
       {Step::go_to_waypoint,
        [](Flown& f) {
-         f.feed({Event::start, Event::airborne});
+         f.feed({Trigger::start, Trigger::airborne});
        }},
       {Step::search_anchors, to_search},
       {Step::move_around,
        [](Flown& f) {
          to_search(f);
-         f.feed({Event::timeout});
+         f.feed({Trigger::timeout});
        }},
       {Step::step_to_waypoint,
        [](Flown& f) {
          to_search(f);
-         for (int i = 0; i < 3; ++i) f.feed({Event::timeout, Event::arrived});
-         f.feed({Event::timeout});
+         for (int i = 0; i < 3; ++i) f.feed({Trigger::timeout, Trigger::arrived});
+         f.feed({Trigger::timeout});
        }},
       {Step::turn,
        [](Flown& f) {
          to_search(f);
          f.hear();
-         f.feed({Event::in_range});
+         f.feed({Trigger::in_range});
        }},
       {Step::height_search,
        [](Flown& f) {
          to_search(f);
          f.hear();
-         f.feed({Event::in_range});
+         f.feed({Trigger::in_range});
          while (f.engine.state().step == Step::turn) {
            f.hear();
-           f.feed({Event::arrived});
+           f.feed({Trigger::arrived});
          }
        }},
       {Step::ranging, to_ranging},
       {Step::find_next_point,
        [](Flown& f) {
          to_ranging(f);
-         f.feed({Event::sampled});
+         f.feed({Trigger::sampled});
        }},
       {Step::go_to_point,
        [](Flown& f) {
          to_ranging(f);
-         f.feed({Event::sampled, Event::point});
+         f.feed({Trigger::sampled, Trigger::point});
        }},
       {Step::check_connections,
        [](Flown& f) {
          to_ranging(f);
-         f.feed({Event::sampled, Event::point, Event::arrived});
+         f.feed({Trigger::sampled, Trigger::point, Trigger::arrived});
        }},
       {Step::go_back,
        [](Flown& f) {
          to_ranging(f);
-         f.feed({Event::sampled, Event::point, Event::unreachable});
+         f.feed({Trigger::sampled, Trigger::point, Trigger::unreachable});
        }},
       {Step::hold,
        [](Flown& f) {
-         f.feed({Event::start, Event::airborne, Event::hold});
+         f.feed({Trigger::start, Trigger::airborne, Trigger::hold});
        }},
       {Step::return_home,
        [](Flown& f) {
-         f.feed({Event::start, Event::airborne, Event::return_home});
+         f.feed({Trigger::start, Trigger::airborne, Trigger::return_home});
        }},
       {Step::landing, [](Flown& f) {
-         f.feed({Event::start, Event::airborne, Event::land});
+         f.feed({Trigger::start, Trigger::airborne, Trigger::land});
        }}};
   return k_ways;
 }
@@ -200,14 +202,14 @@ TEST(FlightEngine, AnswersEveryFaultAtEveryStepAsDocumented) {
       Flown f;
       way(f);
       ASSERT_EQ(f.engine.state().step, step) << to_string(f.engine.state().step);
-      (void)f.engine.take_orders();
+      (void)f.engine.take_commands();
       f.here();
       fault.happens(f);
       f.engine.tick(f.now, {});
       EXPECT_EQ(to_string(f.engine.state().step), to_string(expected(step, fault.reaction)))
           << fault.name << " in " << to_string(step);
       ASSERT_TRUE(f.engine.alarm()) << fault.name;
-      for (const auto& order : f.engine.take_orders()) {
+      for (const auto& order : f.engine.take_commands()) {
         if (order.kind != Command::Kind::go_to) continue;
         EXPECT_EQ(f.engine.state().step, Step::return_home) << fault.name << " in " << to_string(step);
         EXPECT_FALSE(planning::refuse_point(setup().limits.bounds, order.point_m));
@@ -304,7 +306,7 @@ TEST(FlightEngine, ReturnsAtOnceFromEveryStepWhenTheFlightTimeIsOver) {
     EXPECT_EQ(to_string(late.engine.state().step), to_string(waits ? step : Step::return_home));
     EXPECT_FALSE(late.engine.state().completed);
     if (step == Step::hold) {
-      ASSERT_TRUE(late.engine.command(late.now, Event::resume, ""));
+      ASSERT_TRUE(late.engine.command(late.now, Trigger::resume, ""));
       late.engine.tick(late.now, {});
       EXPECT_EQ(late.engine.state().step, Step::return_home) << "who held is not flown on";
     }
@@ -315,7 +317,7 @@ TEST(FlightEngine, ReturnsAtOnceFromEveryStepWhenTheFlightTimeIsOver) {
 }
 
 TEST(FlightEngine, IsCompletedOnlyWhenNothingWasLeftToFly) {
-  const auto ended_by = [](Step from, std::initializer_list<Event> events) {
+  const auto ended_by = [](Step from, std::initializer_list<Trigger> events) {
     Flown f;
     ways().at(from)(f);
     f.feed(events);
@@ -323,21 +325,21 @@ TEST(FlightEngine, IsCompletedOnlyWhenNothingWasLeftToFly) {
     return std::pair(f.engine.state().completed, f.engine.state().ended);
   };
   using P = std::pair<bool, std::string>;
-  EXPECT_EQ(ended_by(Step::find_next_point,
-                     {Event::done_here, Event::arrived, Event::done_here, Event::arrived, Event::landed}),
+  EXPECT_EQ(ended_by(Step::find_next_point, {Trigger::done_here, Trigger::arrived, Trigger::done_here,
+                                             Trigger::arrived, Trigger::landed}),
             P(true, "all waypoints flown"));
-  EXPECT_EQ(ended_by(Step::ranging, {Event::return_home, Event::arrived, Event::landed}),
+  EXPECT_EQ(ended_by(Step::ranging, {Trigger::return_home, Trigger::arrived, Trigger::landed}),
             P(false, "commanded to return"));
-  EXPECT_EQ(ended_by(Step::ranging, {Event::land, Event::landed}), P(false, "commanded to land"));
-  EXPECT_EQ(ended_by(Step::ranging, {Event::taken_over, Event::landed}),
+  EXPECT_EQ(ended_by(Step::ranging, {Trigger::land, Trigger::landed}), P(false, "commanded to land"));
+  EXPECT_EQ(ended_by(Step::ranging, {Trigger::taken_over, Trigger::landed}),
             P(false, "landed and disarmed without a command"));
-  EXPECT_EQ(ended_by(Step::take_off, {Event::not_taken_off}), P(false, "not taken off"));
+  EXPECT_EQ(ended_by(Step::take_off, {Trigger::not_taken_off}), P(false, "not taken off"));
   // Held on the way home, the reason stays; sent to work again, it is not over.
   Flown f;
   ways().at(Step::return_home)(f);
-  f.feed({Event::hold, Event::resume});
+  f.feed({Trigger::hold, Trigger::resume});
   EXPECT_EQ(f.engine.state().ended, "commanded to return");
-  f.feed({Event::skip});
+  f.feed({Trigger::skip});
   EXPECT_EQ(f.engine.state().step, Step::go_to_waypoint);
   EXPECT_EQ(f.engine.state().ended, "");
 }
@@ -350,9 +352,9 @@ TEST(FlightEngine, ATakeOffWhereItIsNotAllowedIsNotFlownAndSaysWhyInMetres) {
   f.view.position_m = Vector3d(-2, 10, 0);
   f.engine.fix(f.now, {-2, 10, 0}, FixClass::rtk_fixed);
   f.engine.vehicle(f.now, f.view);
-  f.feed({Event::start});
+  f.feed({Trigger::start});
   f.engine.tick(f.now, {});
-  EXPECT_TRUE(f.engine.take_orders().empty()) << "nothing is armed for a flight that is refused";
+  EXPECT_TRUE(f.engine.take_commands().empty()) << "nothing is armed for a flight that is refused";
   EXPECT_EQ(f.engine.state().step, Step::done);
   EXPECT_FALSE(f.engine.state().completed);
   EXPECT_EQ(f.engine.state().ended,
@@ -361,23 +363,23 @@ TEST(FlightEngine, ATakeOffWhereItIsNotAllowedIsNotFlownAndSaysWhyInMetres) {
 
 TEST(FlightEngine, TheTimeFlownStandsStillAfterTheLandingAndGoesOnOverARestart) {
   Flown f;
-  f.feed({Event::start, Event::airborne});
+  f.feed({Trigger::start, Trigger::airborne});
   f.now += 40;
-  f.feed({Event::land});
+  f.feed({Trigger::land});
   FlightEngine after(setup(), f.engine.state(), 7000);
   EXPECT_DOUBLE_EQ(after.flown_s(7005), 45);
   f.now += 10;
-  f.feed({Event::landed});
+  f.feed({Trigger::landed});
   EXPECT_DOUBLE_EQ(f.engine.flown_s(f.now + 600), 50);
 }
 
 /// What was not received since the restart is missing since the restart, however long the flight took before.
 TEST(FlightEngine, AfterARestartItHoldsUntilTheFirstMeasurementsHadTheirTimeToCome) {
   Flown f;
-  f.feed({Event::start, Event::airborne});
+  f.feed({Trigger::start, Trigger::airborne});
   f.now += 300;
   f.here();
-  f.feed({Event::hold});
+  f.feed({Trigger::hold});
   ASSERT_NEAR(f.engine.state().flown_s, 300, 1e-9);
   FlightEngine back(setup(), f.engine.state(), 1000);
   for (const double now : {1000.1, 1001.0, 1001.9}) {
@@ -395,7 +397,7 @@ TEST(FlightEngine, PositionsOfDifferentMomentsDisagreeOnlyByMoreThanTheWayBetwee
   for (const auto& [speed_mps, apart_m, holds] :
        {std::tuple{0.0, 2.9, false}, {0.0, 3.1, true}, {3.0, 4.2, false}, {3.0, 6.1, true}}) {
     Flown f;
-    f.feed({Event::start, Event::airborne});
+    f.feed({Trigger::start, Trigger::airborne});
     f.view.speed_mps = speed_mps;
     f.view.position_m = k_place + Eigen::Vector3d(apart_m, 0, 0);
     f.here();
@@ -452,7 +454,7 @@ TEST(FlightEngine, ATurnGivesABearingAndAFirstGuess) {
     }
     f.view.heading_rad = to;
     f.here();
-    ASSERT_TRUE(f.engine.command(f.now, Event::arrived, ""));
+    ASSERT_TRUE(f.engine.command(f.now, Trigger::arrived, ""));
   }
   const auto& priors = f.engine.priors().at(k_anchor);
   ASSERT_TRUE(priors.bearing);
@@ -472,7 +474,7 @@ TEST(FlightEngine, EveryExpectedAnchorIsDoneOnlyWhenItIs) {
     Flown f(std::move(given));
     ways().at(Step::ranging)(f);
     f.hear();
-    f.feed({Event::sampled});
+    f.feed({Trigger::sampled});
     f.here();
     f.engine.tick(f.now, {});
     EXPECT_TRUE(f.engine.state().anchors[0].done);
@@ -506,7 +508,7 @@ TEST(FlightEngine, ATurnThatSeesNoLobeIsFollowedByNoHeightSearchUntilItIsNearer)
       }
       f.view.heading_rad = to;
       f.here();
-      ASSERT_TRUE(f.engine.command(f.now, Event::arrived, ""));
+      ASSERT_TRUE(f.engine.command(f.now, Trigger::arrived, ""));
     }
     EXPECT_EQ(f.engine.state().step, lobes ? Step::height_search : Step::ranging);
     EXPECT_EQ(f.engine.state().anchors[0].no_lobe, !lobes);

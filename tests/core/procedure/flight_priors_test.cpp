@@ -100,7 +100,7 @@ TEST(LiveMirrors, AreDecidedByTheTurnWhicheverCameFirst) {
   const Eigen::Vector3d mirror(k_inside.x(), 2 * k_plane_y_m - k_inside.y(), k_inside.z());
   for (const auto& wanted : {k_inside, mirror}) {
     auto live = facade();
-    live.tell({{k_anchor, seen_at(bearing_of(wanted) + 0.3, 0.35)}});
+    live.set_priors({{k_anchor, seen_at(bearing_of(wanted) + 0.3, 0.35)}});
     live.finish();
     const auto after = live.estimates().front();
     ASSERT_TRUE(after.best);
@@ -112,7 +112,7 @@ TEST(LiveMirrors, AreDecidedByTheTurnWhicheverCameFirst) {
 
 TEST(LiveMirrors, StandBothWhenTheBearingIsWeak) {
   auto live = facade();
-  live.tell({{k_anchor, seen_at(bearing_of(k_inside), 100 * std::numbers::pi / 180)}});
+  live.set_priors({{k_anchor, seen_at(bearing_of(k_inside), 100 * std::numbers::pi / 180)}});
   live.finish();
   const auto after = live.estimates().front();
   ASSERT_TRUE(after.best && after.mirror) << "180 degrees are 1.8 sigma: four to one, not beyond 99 %";

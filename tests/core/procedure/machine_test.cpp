@@ -32,7 +32,7 @@ std::vector<std::string> documented() {
   std::string line;
   while (std::getline(file, line)) {
     const auto cells = cells_of(line);
-    if (cells.size() != 5 || !k_event_words.find(cells[1])) continue;
+    if (cells.size() != 5 || !k_trigger_words.find(cells[1])) continue;
     const std::string rest = cells[1] + "|" + cells[2] + "|" + cells[3] + "|" + cells[4];
     if (cells[0].rfind("any in flight", 0) != 0) {
       out.push_back(cells[0] + "|" + rest);
@@ -50,7 +50,7 @@ std::vector<std::string> documented() {
 
 std::string row_of(const Transition& t) {
   std::string out;
-  for (const auto word : {to_string(t.from), to_string(t.event), to_string(t.guard), to_string(t.to)}) {
+  for (const auto word : {to_string(t.from), to_string(t.trigger), to_string(t.guard), to_string(t.to)}) {
     out += std::string(word) + "|";
   }
   return out + std::string(t.reason);
@@ -105,11 +105,11 @@ State at(Step step) {
   s.target_m = {0, 0, 4};
   return s;
 }
-Advance after(const Settings& settings, State state, std::initializer_list<Event> events) {
+Advance after(const Settings& settings, State state, std::initializer_list<Trigger> events) {
   Advance out{std::move(state), {}, nullptr};
   double now = 0;
-  for (const auto event : events)
-    out = advance(settings, out.state, {event, now += 1, Eigen::Vector3d(5, 5, 4), {}, {}});
+  for (const auto trigger : events)
+    out = advance(settings, out.state, {trigger, now += 1, Eigen::Vector3d(5, 5, 4), {}, {}});
   return out;
 }
 
@@ -127,15 +127,16 @@ TEST(ProcedureMachine, HasExactlyTheTransitionsOfTheDocumentation) {
 TEST(ProcedureMachine, TriesRowsInTheOrderOfTheDocumentation) {
   std::map<std::pair<std::string, std::string>, std::vector<std::string>> code, page;
   for (const auto& t : transitions()) {
-    code[{std::string(to_string(t.from)), std::string(to_string(t.event))}].emplace_back(to_string(t.guard));
+    code[{std::string(to_string(t.from)), std::string(to_string(t.trigger))}].emplace_back(
+        to_string(t.guard));
   }
   for (const auto& row : documented()) {
     std::istringstream in(row);
-    std::string from, event, guard;
+    std::string from, trigger, guard;
     std::getline(in, from, '|');
-    std::getline(in, event, '|');
+    std::getline(in, trigger, '|');
     std::getline(in, guard, '|');
-    page[{from, event}].push_back(guard);
+    page[{from, trigger}].push_back(guard);
   }
   EXPECT_EQ(code, page);
 }
@@ -145,7 +146,7 @@ TEST(ProcedureMachine, EveryTransitionIsReached) {
   for (const auto& wanted : transitions()) {
     bool reached = false;
     for (const auto& state : variants(wanted.from)) {
-      const auto step = advance(settings, state, {wanted.event, 10, Eigen::Vector3d(5, 5, 4), {}, "cause"});
+      const auto step = advance(settings, state, {wanted.trigger, 10, Eigen::Vector3d(5, 5, 4), {}, "cause"});
       if (step.transition != &wanted) continue;
       reached = true;
       EXPECT_EQ(step.state.step, wanted.to);
@@ -163,13 +164,13 @@ TEST(ProcedureMachine, EveryStepInFlightHasALongestStayAndAWayOut) {
     const auto step = static_cast<Step>(i);
     if (step == Step::ready || step == Step::done) continue;
     for (const auto& state : variants(step)) {
-      EXPECT_NE(advance(settings, state, {Event::timeout, 1, {}, {}, {}}).transition, nullptr)
+      EXPECT_NE(advance(settings, state, {Trigger::timeout, 1, {}, {}, {}}).transition, nullptr)
           << to_string(step);
     }
   }
   for (const auto& t : transitions()) {
     for (const auto& state : variants(t.from)) {
-      const auto step = advance(settings, state, {t.event, 10, Eigen::Vector3d(5, 5, 4), {}, {}});
+      const auto step = advance(settings, state, {t.trigger, 10, Eigen::Vector3d(5, 5, 4), {}, {}});
       if (step.state.step == Step::done) continue;
       EXPECT_GT(step.state.deadline_s, 10) << row_of(t);
     }
@@ -178,7 +179,7 @@ TEST(ProcedureMachine, EveryStepInFlightHasALongestStayAndAWayOut) {
 
 TEST(ProcedureMachine, AnEventWithoutARowChangesNothing) {
   const auto state = at(Step::ranging);
-  const auto step = advance(two_waypoints(), state, {Event::airborne, 5, {}, {}, {}});
+  const auto step = advance(two_waypoints(), state, {Trigger::airborne, 5, {}, {}, {}});
   EXPECT_EQ(step.transition, nullptr);
   EXPECT_EQ(step.state.step, Step::ranging);
   EXPECT_TRUE(step.commands.empty());
@@ -190,15 +191,15 @@ TEST(ProcedureMachine, StepsTowardsTheNextWaypointInKParts) {
   State s = at(Step::search_anchors);
   s.moves = 3;
   for (const double x : {4.0, 8.0, 12.0}) {
-    const auto step = advance(settings, s, {Event::timeout, 1, {}, {}, {}});
+    const auto step = advance(settings, s, {Trigger::timeout, 1, {}, {}, {}});
     ASSERT_EQ(step.state.step, Step::step_to_waypoint);
     ASSERT_EQ(step.commands.size(), 1u);
     EXPECT_TRUE(step.commands[0].point_m.isApprox(Eigen::Vector3d(x, 0, 4)));
-    s = advance(settings, step.state, {Event::arrived, 2, {}, {}, {}}).state;
+    s = advance(settings, step.state, {Trigger::arrived, 2, {}, {}, {}}).state;
     s.moves = 3;
   }
   EXPECT_EQ(s.waypoint, 1u);
-  EXPECT_EQ(advance(settings, s, {Event::timeout, 3, {}, {}, {}}).state.step, Step::return_home);
+  EXPECT_EQ(advance(settings, s, {Trigger::timeout, 3, {}, {}, {}}).state.step, Step::return_home);
 }
 
 TEST(ProcedureMachine, MovesInThreeDirectionsBeforeItGoesOn) {
@@ -206,12 +207,12 @@ TEST(ProcedureMachine, MovesInThreeDirectionsBeforeItGoesOn) {
   State s = at(Step::search_anchors);
   s.centre_m = {0, 0, 4};
   for (const auto& to : {Eigen::Vector3d(2, 0, 4), Eigen::Vector3d(0, 2, 4), Eigen::Vector3d(0, 0, 6)}) {
-    const auto step = advance(settings, s, {Event::timeout, 1, {}, {}, {}});
+    const auto step = advance(settings, s, {Trigger::timeout, 1, {}, {}, {}});
     ASSERT_EQ(step.state.step, Step::move_around);
     EXPECT_TRUE(step.commands[0].point_m.isApprox(to));
-    s = advance(settings, step.state, {Event::arrived, 2, {}, {}, {}}).state;
+    s = advance(settings, step.state, {Trigger::arrived, 2, {}, {}, {}}).state;
   }
-  EXPECT_EQ(advance(settings, s, {Event::timeout, 3, {}, {}, {}}).state.step, Step::step_to_waypoint);
+  EXPECT_EQ(advance(settings, s, {Trigger::timeout, 3, {}, {}, {}}).state.step, Step::step_to_waypoint);
 }
 
 TEST(ProcedureMachine, TurnsInFourQuartersOnTheSpotThenSearchesTheHeight) {
@@ -219,13 +220,13 @@ TEST(ProcedureMachine, TurnsInFourQuartersOnTheSpotThenSearchesTheHeight) {
   State s = at(Step::search_anchors);
   s.heading_rad = 0.0;
   s.anchors = {heard(false, false)};
-  auto step = advance(settings, s, {Event::in_range, 1, {}, {}, {}});
+  auto step = advance(settings, s, {Trigger::in_range, 1, {}, {}, {}});
   std::vector<double> headings;
   while (step.state.step == Step::turn) {
     headings.push_back(*step.commands[0].heading_rad);
     EXPECT_TRUE(step.commands[0].point_m.isApprox(s.target_m));
     step.state.anchors[0].samples_here = 30;
-    step = advance(settings, step.state, {Event::arrived, 2, {}, {}, {}});
+    step = advance(settings, step.state, {Trigger::arrived, 2, {}, {}, {}});
   }
   ASSERT_EQ(headings.size(), 4u);
   for (std::size_t i = 0; i < 4; ++i) {
@@ -238,7 +239,7 @@ TEST(ProcedureMachine, TurnsInFourQuartersOnTheSpotThenSearchesTheHeight) {
   while (step.state.step == Step::height_search) {
     heights.push_back(step.commands[0].point_m.z());
     step.state.anchors[0].samples_here = 30;
-    step = advance(settings, step.state, {Event::arrived, 3, {}, {}, {}});
+    step = advance(settings, step.state, {Trigger::arrived, 3, {}, {}, {}});
   }
   EXPECT_EQ(heights, (std::vector<double>{5.5, 2.5, 4.0}));
   EXPECT_EQ(step.state.step, Step::ranging);
@@ -250,12 +251,12 @@ TEST(ProcedureMachine, FliesNoHeightSearchForAnAnchorThatTheTurnDidNotSee) {
   State s = at(Step::search_anchors);
   s.anchors = {heard(true, false)};
   s.anchors[0].no_lobe = true;
-  EXPECT_EQ(advance(settings, s, {Event::in_range, 1, {}, {}, {}}).state.step, Step::ranging);
+  EXPECT_EQ(advance(settings, s, {Trigger::in_range, 1, {}, {}, {}}).state.step, Step::ranging);
   s.anchors.push_back(heard(true, false));  // somebody else's can be seen
-  auto step = advance(settings, s, {Event::in_range, 1, {}, {}, {}});
+  auto step = advance(settings, s, {Trigger::in_range, 1, {}, {}, {}});
   while (step.state.step == Step::height_search) {
     for (auto& a : step.state.anchors) a.samples_here = 30;
-    step = advance(settings, step.state, {Event::arrived, 2, {}, {}, {}});
+    step = advance(settings, step.state, {Trigger::arrived, 2, {}, {}, {}});
   }
   EXPECT_FALSE(step.state.anchors[0].has_height) << "its turn comes when it is nearer";
   EXPECT_TRUE(step.state.anchors[1].has_height);
@@ -264,8 +265,8 @@ TEST(ProcedureMachine, FliesNoHeightSearchForAnAnchorThatTheTurnDidNotSee) {
 TEST(ProcedureMachine, RemembersAPointItCouldNotReachAndGoesBack) {
   State s = at(Step::find_next_point);
   s.target_m = {1, 1, 4};
-  const auto there = advance(two_waypoints(), s, {Event::point, 1, Eigen::Vector3d(5, 5, 4), {}, {}});
-  const auto back = advance(two_waypoints(), there.state, {Event::unreachable, 2, {}, {}, {}});
+  const auto there = advance(two_waypoints(), s, {Trigger::point, 1, Eigen::Vector3d(5, 5, 4), {}, {}});
+  const auto back = advance(two_waypoints(), there.state, {Trigger::unreachable, 2, {}, {}, {}});
   EXPECT_EQ(back.state.step, Step::go_back);
   EXPECT_TRUE(back.commands[0].point_m.isApprox(Eigen::Vector3d(1, 1, 4)));
   ASSERT_EQ(back.state.unreachable.size(), 1u);
@@ -288,7 +289,7 @@ TEST(ProcedureMachine, AnchorsShareTheAircraftFairly) {
     for (auto& a : s.anchors) a.samples_here = 0;
     s.anchors[best].samples_here = 20;
     s.step = Step::ranging;
-    s = advance(settings, s, {Event::sampled, static_cast<double>(round), {}, {}, {}}).state;
+    s = advance(settings, s, {Trigger::sampled, static_cast<double>(round), {}, {}, {}}).state;
   }
   std::array<int, 10> counts{};
   for (const auto i : served) ++counts[i];
@@ -311,7 +312,7 @@ TEST(ProcedureMachine, ARestartedServerTellsTheAircraftToHoldFirst) {
   auto stored = at(Step::ranging);
   stored.points = 2;
   const auto resumed =
-      advance(two_waypoints(), resume_after_restart(stored, 100).state, {Event::resume, 101, {}, {}, {}});
+      advance(two_waypoints(), resume_after_restart(stored, 100).state, {Trigger::resume, 101, {}, {}, {}});
   EXPECT_EQ(resumed.state.step, Step::go_to_point);
   EXPECT_TRUE(resumed.commands[0].point_m.isApprox(stored.target_m));
 }
@@ -319,9 +320,9 @@ TEST(ProcedureMachine, ARestartedServerTellsTheAircraftToHoldFirst) {
 TEST(ProcedureMachine, HoldReturnAndLandWorkInEveryStepInFlight) {
   for (std::size_t i = 1; i + 2 < k_step_words.size(); ++i) {
     const auto step = static_cast<Step>(i);
-    EXPECT_EQ(after(two_waypoints(), at(step), {Event::hold}).state.step, Step::hold);
-    EXPECT_EQ(after(two_waypoints(), at(step), {Event::return_home}).state.step, Step::return_home);
-    const auto landing = after(two_waypoints(), at(step), {Event::land});
+    EXPECT_EQ(after(two_waypoints(), at(step), {Trigger::hold}).state.step, Step::hold);
+    EXPECT_EQ(after(two_waypoints(), at(step), {Trigger::return_home}).state.step, Step::return_home);
+    const auto landing = after(two_waypoints(), at(step), {Trigger::land});
     EXPECT_EQ(landing.state.step, Step::landing);
     EXPECT_EQ(landing.commands[0].kind, Command::Kind::land);
   }

@@ -211,10 +211,10 @@ RandomMission random_mission(std::mt19937_64& random) {
 TEST(SafetyProperty, NoCommandLeavesTheAllowedVolumeIn10000RandomMissions) {
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> share(0, 1);
-  constexpr std::array k_events{Event::airborne,     Event::arrived, Event::in_range,  Event::sampled,
-                                Event::done_here,    Event::timeout, Event::connected, Event::unreachable,
-                                Event::disconnected, Event::skip,    Event::hold,      Event::resume,
-                                Event::return_home,  Event::no_point};
+  constexpr std::array k_triggers{
+      Trigger::airborne, Trigger::arrived,   Trigger::in_range,    Trigger::sampled,      Trigger::done_here,
+      Trigger::timeout,  Trigger::connected, Trigger::unreachable, Trigger::disconnected, Trigger::skip,
+      Trigger::hold,     Trigger::resume,    Trigger::return_home, Trigger::no_point};
   std::size_t sent = 0, in_the_air = 0;
   for (int mission = 0; mission < 10'000; ++mission) {
     auto made = random_mission(random);
@@ -226,9 +226,9 @@ TEST(SafetyProperty, NoCommandLeavesTheAllowedVolumeIn10000RandomMissions) {
     view.battery = 0.9;
     engine.fix(now, aircraft, FixClass::rtk_fixed);
     engine.vehicle(now, view);
-    ASSERT_TRUE(engine.command(now, Event::start, "operator"));
+    ASSERT_TRUE(engine.command(now, Trigger::start, "operator"));
     for (int step = 0; step < 25; ++step) {
-      for (const auto& order : engine.take_orders()) {
+      for (const auto& order : engine.take_commands()) {
         if (order.kind != Command::Kind::go_to) continue;
         ++sent;
         const auto why = broken(made.setup.limits, aircraft, order.point_m);
@@ -244,7 +244,7 @@ TEST(SafetyProperty, NoCommandLeavesTheAllowedVolumeIn10000RandomMissions) {
       engine.vehicle(now, view);
       if (share(random) < 0.5) engine.range(now, {0x6a00 + static_cast<std::uint32_t>(random() % 6)}, true);
       // Anything may happen at any time, the senseless too.
-      if (share(random) < 0.6) (void)engine.command(now, k_events[random() % k_events.size()], "");
+      if (share(random) < 0.6) (void)engine.command(now, k_triggers[random() % k_triggers.size()], "");
       engine.tick(now, {});
     }
   }

@@ -69,7 +69,7 @@ class AirRig {
   }
   /// As FlightService does it.
   std::string act(const std::string& action) {
-    using procedure::Event;
+    using procedure::Trigger;
     if (action == "start") return start() ? "" : "not now";
     if (action == "disarm" || ((action == "hold" || action == "land") && !flying())) {
       if (flying() && control->taken_over()) session->take_back();
@@ -83,11 +83,11 @@ class AirRig {
       control->abort(), aborted = true;
     else
       why = control->command(now,
-                             action == "hold"     ? Event::hold
-                             : action == "resume" ? Event::resume
-                             : action == "skip"   ? Event::skip
-                             : action == "land"   ? Event::land
-                                                  : Event::return_home,
+                             action == "hold"     ? Trigger::hold
+                             : action == "resume" ? Trigger::resume
+                             : action == "skip"   ? Trigger::skip
+                             : action == "land"   ? Trigger::land
+                                                  : Trigger::return_home,
                              "operator");
     collect();
     return why;
@@ -120,7 +120,7 @@ class AirRig {
     autopilot.advance(now);
     const auto in = autopilot.take_bytes();
     if (!link_down) {
-      hear(in);
+      receive(in);
       session->feed(now, unix_us, in);
     }
     session->tick(now, unix_us);
@@ -174,7 +174,7 @@ class AirRig {
   std::unique_ptr<drone::Session> session{std::make_unique<drone::Session>()};
   std::unique_ptr<procedure::FlightControl> control;
   std::vector<CommandReport> reports;
-  std::vector<procedure::Happening> happenings;
+  std::vector<procedure::Event> events;
   std::vector<Wire> wire;
   double now{0}, lowest_m{1e9};
   std::uint64_t n{0};
@@ -202,13 +202,13 @@ class AirRig {
     }
     control->round(now, {});
     (void)control->take_dispatched();
-    for (auto& h : control->engine().take_happenings()) happenings.push_back(std::move(h));
+    for (auto& h : control->engine().take_events()) events.push_back(std::move(h));
     const auto s = step_now();
     using procedure::Step;
     if (autopilot.vehicle().in_air() && s != Step::take_off && s != Step::landing && s != Step::done)
       lowest_m = std::min(lowest_m, rover().z());
   }
-  void hear(const std::vector<std::uint8_t>& bytes) {
+  void receive(const std::vector<std::uint8_t>& bytes) {
     std::vector<mavlink::Received> in;
     down_.feed(bytes, in);
     for (const auto& one : in) {

@@ -276,7 +276,7 @@ TEST_P(Conditions, LostHeartbeatsAreNoSilenceWhileOtherTelemetryComes) {
     rig.autopilot.vehicle().set_battery(0.9);
     rig.run(10);
   }
-  for (const auto& h : rig.happenings) EXPECT_NE(h.code, "drone.link") << h.time_s << " s: " << h.text;
+  for (const auto& h : rig.events) EXPECT_NE(h.code, "drone.link") << h.time_s << " s: " << h.text;
 }
 
 TEST_P(Conditions, AfterASilenceOnlyAHeartbeatBringsTheLinkBack) {
@@ -424,7 +424,7 @@ TEST_P(Conditions, AHeightWithoutRtkSendsNobodyUp) {
     rig.control->fix(rig.now, rig.rover() - Eigen::Vector3d(0, 0, 4), FixClass::single);
     rig.step();
   }
-  for (const auto& h : rig.happenings) EXPECT_NE(h.code, "fence.breach") << h.text;
+  for (const auto& h : rig.events) EXPECT_NE(h.code, "fence.breach") << h.text;
 }
 
 // The rest.

@@ -26,7 +26,7 @@ Message heartbeat(bool armed = false) {
 
 struct Link {
   explicit Link(std::optional<mavlink::Secret> key = {}) : gate(key) {}
-  bool hear(const std::string& sender, const std::vector<std::uint8_t>& bytes) {
+  bool receive(const std::string& sender, const std::vector<std::uint8_t>& bytes) {
     return gate.admits(now, k_unix_us + static_cast<std::int64_t>(now * 1e6), sender, bytes);
   }
   PeerGate gate;
@@ -36,15 +36,17 @@ struct Link {
 TEST(PeerGate, TakesTheFirstAutopilotAndKeepsItAgainstStrangers) {
   Link link;
   Packer copter({1, 1}), other({1, 1}), station({255, 190});
-  EXPECT_FALSE(link.hear(k_stranger, {'h', 'e', 'l', 'l', 'o'})) << "no MAVLink is no aircraft";
-  EXPECT_FALSE(link.hear(k_stranger, station.pack(Message("HEARTBEAT").set("type", 6).set("autopilot", 8))));
-  EXPECT_FALSE(link.hear(k_aircraft, copter.pack(Message("SYS_STATUS")))) << "not before its heartbeat";
-  EXPECT_TRUE(link.hear(k_aircraft, copter.pack(heartbeat())));
+  EXPECT_FALSE(link.receive(k_stranger, {'h', 'e', 'l', 'l', 'o'})) << "no MAVLink is no aircraft";
+  EXPECT_FALSE(
+      link.receive(k_stranger, station.pack(Message("HEARTBEAT").set("type", 6).set("autopilot", 8))));
+  EXPECT_FALSE(link.receive(k_aircraft, copter.pack(Message("SYS_STATUS")))) << "not before its heartbeat";
+  EXPECT_TRUE(link.receive(k_aircraft, copter.pack(heartbeat())));
   EXPECT_EQ(link.gate.peer(), k_aircraft);
   for (int i = 0; i < 50; ++i) {
     link.now += 1;
-    EXPECT_FALSE(link.hear(k_stranger, other.pack(heartbeat()))) << "one datagram took the aircraft before";
-    EXPECT_TRUE(link.hear(k_aircraft, copter.pack(heartbeat())));
+    EXPECT_FALSE(link.receive(k_stranger, other.pack(heartbeat())))
+        << "one datagram took the aircraft before";
+    EXPECT_TRUE(link.receive(k_aircraft, copter.pack(heartbeat())));
   }
   EXPECT_EQ(link.gate.peer(), k_aircraft);
   std::uint64_t counted = 0;
@@ -58,21 +60,21 @@ TEST(PeerGate, TakesTheFirstAutopilotAndKeepsItAgainstStrangers) {
 TEST(PeerGate, AnotherIsTakenAfterTenSecondsOfSilenceOnly) {
   Link link;
   Packer copter({1, 1}), other({2, 1});
-  ASSERT_TRUE(link.hear(k_aircraft, copter.pack(heartbeat())));
+  ASSERT_TRUE(link.receive(k_aircraft, copter.pack(heartbeat())));
   link.now = 9.9;
-  EXPECT_FALSE(link.hear(k_stranger, other.pack(heartbeat())));
+  EXPECT_FALSE(link.receive(k_stranger, other.pack(heartbeat())));
   link.now = 10.1;
-  EXPECT_TRUE(link.hear(k_stranger, other.pack(heartbeat())));
+  EXPECT_TRUE(link.receive(k_stranger, other.pack(heartbeat())));
   EXPECT_EQ(link.gate.peer(), k_stranger);
 }
 
 TEST(PeerGate, AnAircraftThatWasArmedIsFollowedByItsOwnSystemIdAlone) {
   Link link;
   Packer copter({1, 1}), other({2, 1});
-  ASSERT_TRUE(link.hear(k_aircraft, copter.pack(heartbeat(true))));
+  ASSERT_TRUE(link.receive(k_aircraft, copter.pack(heartbeat(true))));
   link.now = 30;
-  EXPECT_FALSE(link.hear(k_stranger, other.pack(heartbeat())));
-  EXPECT_TRUE(link.hear("192.0.2.10:50001", copter.pack(heartbeat(true)))) << "its radio has a new port";
+  EXPECT_FALSE(link.receive(k_stranger, other.pack(heartbeat())));
+  EXPECT_TRUE(link.receive("192.0.2.10:50001", copter.pack(heartbeat(true)))) << "its radio has a new port";
 }
 
 TEST(PeerGate, TheAircraftOfAFlightThatGoesOnIsWaitedFor) {
@@ -80,10 +82,10 @@ TEST(PeerGate, TheAircraftOfAFlightThatGoesOnIsWaitedFor) {
   Packer copter({1, 1}), other({66, 1}), forger({1, 1});
   link.now = 100;
   link.gate.expect(link.now, {k_aircraft, 1, 1});
-  EXPECT_FALSE(link.hear(k_stranger, other.pack(heartbeat(true)))) << "first on the link, and not ours";
-  EXPECT_FALSE(link.hear(k_stranger, forger.pack(heartbeat(true)))) << "our id from elsewhere";
+  EXPECT_FALSE(link.receive(k_stranger, other.pack(heartbeat(true)))) << "first on the link, and not ours";
+  EXPECT_FALSE(link.receive(k_stranger, forger.pack(heartbeat(true)))) << "our id from elsewhere";
   link.now = 105;
-  EXPECT_TRUE(link.hear(k_aircraft, copter.pack(heartbeat(true))));
+  EXPECT_TRUE(link.receive(k_aircraft, copter.pack(heartbeat(true))));
   EXPECT_EQ(link.gate.peer(), k_aircraft);
 }
 
@@ -92,8 +94,8 @@ TEST(PeerGate, TheAircraftOfAFlightThatGoesOnMayComeFromAnotherPortAfterTenSecon
   Packer copter({1, 1}), other({66, 1});
   link.gate.expect(link.now, {k_aircraft, 1, 1});
   link.now = 10.1;
-  EXPECT_FALSE(link.hear(k_stranger, other.pack(heartbeat(true)))) << "however long it is silent";
-  EXPECT_TRUE(link.hear("192.0.2.10:50001", copter.pack(heartbeat(true)))) << "its radio has a new port";
+  EXPECT_FALSE(link.receive(k_stranger, other.pack(heartbeat(true)))) << "however long it is silent";
+  EXPECT_TRUE(link.receive("192.0.2.10:50001", copter.pack(heartbeat(true)))) << "its radio has a new port";
 }
 
 TEST(PeerGate, APersonChangesTheAircraftOfAFlightThatGoesOn) {
@@ -101,24 +103,24 @@ TEST(PeerGate, APersonChangesTheAircraftOfAFlightThatGoesOn) {
   Packer other({66, 1});
   link.gate.expect(link.now, {k_aircraft, 1, 1});
   link.gate.change(k_stranger);
-  EXPECT_TRUE(link.hear(k_stranger, other.pack(heartbeat())));
+  EXPECT_TRUE(link.receive(k_stranger, other.pack(heartbeat())));
 }
 
 TEST(PeerGate, APersonChangesIt) {
   Link link;
   Packer copter({1, 1}), other({2, 1}), third({3, 1});
-  ASSERT_TRUE(link.hear(k_aircraft, copter.pack(heartbeat(true))));
+  ASSERT_TRUE(link.receive(k_aircraft, copter.pack(heartbeat(true))));
   link.gate.change(k_stranger);
-  EXPECT_FALSE(link.hear(k_aircraft, copter.pack(heartbeat(true))));
-  EXPECT_FALSE(link.hear("192.0.2.7:1", third.pack(heartbeat())));
-  EXPECT_TRUE(link.hear(k_stranger, other.pack(heartbeat())));
+  EXPECT_FALSE(link.receive(k_aircraft, copter.pack(heartbeat(true))));
+  EXPECT_FALSE(link.receive("192.0.2.7:1", third.pack(heartbeat())));
+  EXPECT_TRUE(link.receive(k_stranger, other.pack(heartbeat())));
   link.gate.change("");
-  EXPECT_TRUE(link.hear("192.0.2.7:1", third.pack(heartbeat()))) << "the next that is heard";
+  EXPECT_TRUE(link.receive("192.0.2.7:1", third.pack(heartbeat()))) << "the next that is heard";
 }
 
 TEST(PeerGate, ThousandsOfStrangersAreAHandfulOfRows) {
   Link link;
-  for (int i = 0; i < 5000; ++i) link.hear("192.0.2.1:" + std::to_string(i), {'x'});
+  for (int i = 0; i < 5000; ++i) link.receive("192.0.2.1:" + std::to_string(i), {'x'});
   EXPECT_LE(link.gate.others(0).size(), 32u);
 }
 
@@ -128,19 +130,19 @@ TEST(PeerGate, WithAKeyOnlySignedFramesTakeTheLinkAndAReplayDoesNot) {
   Link link(key);
   const auto stamp = mavlink::signature_time(k_unix_us);
   Packer copter({1, 1}), forger({1, 1}), other({1, 1});
-  EXPECT_FALSE(link.hear(k_stranger, forger.pack(heartbeat())));
+  EXPECT_FALSE(link.receive(k_stranger, forger.pack(heartbeat())));
   mavlink::Secret wrong{};
   other.sign_with(wrong, 0, stamp);
-  EXPECT_FALSE(link.hear(k_stranger, other.pack(heartbeat())));
+  EXPECT_FALSE(link.receive(k_stranger, other.pack(heartbeat())));
   EXPECT_EQ(link.gate.frames_refused(), 2u);
   copter.sign_with(key, 0, stamp);
   const auto first = copter.pack(heartbeat());
-  EXPECT_TRUE(link.hear(k_aircraft, first));
+  EXPECT_TRUE(link.receive(k_aircraft, first));
   link.now = 30;
-  EXPECT_FALSE(link.hear(k_stranger, first)) << "recorded and sent again";
+  EXPECT_FALSE(link.receive(k_stranger, first)) << "recorded and sent again";
   link.now = 31;
   copter.set_time(stamp + 3'100'000);
-  EXPECT_TRUE(link.hear("192.0.2.10:50001", copter.pack(heartbeat())));
+  EXPECT_TRUE(link.receive("192.0.2.10:50001", copter.pack(heartbeat())));
   EXPECT_EQ(link.gate.others(link.now).front().kind, "unsigned");
 }
 

@@ -35,7 +35,7 @@ struct Pty {
   void say(std::string_view text) const {
     EXPECT_EQ(::write(device, text.data(), text.size()), static_cast<ssize_t>(text.size()));
   }
-  std::string hear(std::size_t n) const {
+  std::string receive(std::size_t n) const {
     std::string out(n, '\0');
     out.resize(static_cast<std::size_t>(std::max<ssize_t>(0, ::read(device, out.data(), n))));
     return out;
@@ -56,7 +56,7 @@ TEST(SerialLink, CarriesEveryByteValueUnchanged) {
   EXPECT_EQ(seen.text, every) << "the line discipline is raw: no CR, XON or ^C handling";
   ASSERT_TRUE(seen.link->write(every));
   ASSERT_TRUE(run_until(io, [&] { return seen.link->counters().bytes_out == 256; }));
-  EXPECT_EQ(pty.hear(256), every);
+  EXPECT_EQ(pty.receive(256), every);
 }
 
 TEST(SerialLink, NoticesThePlugBeingPulled) {

@@ -21,14 +21,14 @@ class SimulatedWire {
 
   void send(std::string_view bytes) { to_tag += bytes; }
 
-  /// Runs until `done` or for so long. `hear` and `tick` are the host's; times in steady ns.
+  /// Runs until `done` or for so long. `receive` and `tick` are the host's; times in steady ns.
   void run(double seconds, const std::function<bool()>& done,
            const std::function<std::optional<std::int64_t>()>& deadline,
-           const std::function<void(std::string_view, std::int64_t)>& hear,
+           const std::function<void(std::string_view, std::int64_t)>& receive,
            const std::function<void(std::int64_t)>& tick) {
     const std::int64_t end_ns = now_ns + static_cast<std::int64_t>(seconds * 1e9);
     while (!done() && now_ns < end_ns) {
-      if (!to_tag.empty()) tag.hear(std::exchange(to_tag, {}), at_s());
+      if (!to_tag.empty()) tag.receive(std::exchange(to_tag, {}), at_s());
       std::int64_t next_ns = end_ns;
       if (const auto due = tag.next_s())
         next_ns = std::min(next_ns, std::max(now_ns, static_cast<std::int64_t>(*due * 1e9) + 1));
@@ -36,7 +36,7 @@ class SimulatedWire {
       now_ns = next_ns;
       const std::string bytes = tag.speak(at_s());
       log += bytes;
-      if (!bytes.empty()) hear(bytes, now_ns);
+      if (!bytes.empty()) receive(bytes, now_ns);
       if (const auto due = deadline(); due && *due <= now_ns) tick(now_ns);
     }
   }

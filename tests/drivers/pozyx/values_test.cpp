@@ -15,13 +15,13 @@ TEST(RangeInfo, IsReadAndItsFailureValuesAreNotRanges) {
   const Bytes data = unhex("C6020000CD0F0000AFFF").value();  // the sheet's example
   const RangeInfo info = range_info(data);
   EXPECT_EQ(info, (RangeInfo{710, 4045, -81}));
-  EXPECT_EQ(judge(info, std::nullopt), RangeFault::none);
-  EXPECT_EQ(judge(info, info), RangeFault::stale);
-  EXPECT_EQ(judge({711, 0, -81}, info), RangeFault::zero_distance);
-  EXPECT_EQ(judge({711, 167772160, 8192}, info), RangeFault::too_far);
-  EXPECT_EQ(judge({711, 4000, 8192}, info), RangeFault::rss_impossible);
-  EXPECT_EQ(judge({711, 4000, 0}, info), RangeFault::rss_impossible);
-  EXPECT_EQ(judge({3, 4045, -81}, info), RangeFault::none) << "the tag was reset: its clock began anew";
+  EXPECT_EQ(fault_of(info, std::nullopt), RangeFault::none);
+  EXPECT_EQ(fault_of(info, info), RangeFault::stale);
+  EXPECT_EQ(fault_of({711, 0, -81}, info), RangeFault::zero_distance);
+  EXPECT_EQ(fault_of({711, 167772160, 8192}, info), RangeFault::too_far);
+  EXPECT_EQ(fault_of({711, 4000, 8192}, info), RangeFault::rss_impossible);
+  EXPECT_EQ(fault_of({711, 4000, 0}, info), RangeFault::rss_impossible);
+  EXPECT_EQ(fault_of({3, 4045, -81}, info), RangeFault::none) << "the tag was reset: its clock began anew";
 }
 
 TEST(UwbSettings, AreTheRegistersOfTheSheetBothWays) {

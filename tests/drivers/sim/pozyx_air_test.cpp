@@ -289,7 +289,7 @@ TEST(SimulatedTags, AnswerWhateverTheyAreAsked) {
       const std::size_t kind = below(8);
       if (kind == 0) {
         if (address >= 0x1a && address <= 0x1e) continue;  // they would hear nobody for the rest of the time
-        host.tag.hear("W," + hex(Bytes{address}) + "," + text + "\r", host.now_s);
+        host.tag.receive("W," + hex(Bytes{address}) + "," + text + "\r", host.now_s);
         continue;
       }
       std::string question =

@@ -44,7 +44,7 @@ struct Host {
       : scenario(first.scenario), air(first.air), tag(air, scenario->tags.at(number)), now_s(first.now_s) {}
 
   std::string ask(const std::string& question) {
-    tag.hear(question + "\r", now_s);
+    tag.receive(question + "\r", now_s);
     const auto due_s = tag.next_s();
     if (!due_s || *due_s > now_s + 0.1) return {};
     now_s = *due_s;

@@ -138,7 +138,7 @@ TEST(SimulatedTag, KeepsTheAcknowledgementUntilASlowHostHasReadIt) {
 TEST(SimulatedTag, EndsACommandAtACarriageReturnAlone) {
   Host host(open_field());
   const auto said = [&](std::string_view bytes) {
-    host.tag.hear(bytes, host.now_s);
+    host.tag.receive(bytes, host.now_s);
     host.now_s += 0.01;
     return host.tag.speak(host.now_s);
   };
@@ -155,7 +155,7 @@ TEST(SimulatedTag, EndsACommandAtACarriageReturnAlone) {
 
 TEST(SimulatedTag, BeginsAnewWithTheNextHost) {
   Host host(open_field());
-  host.tag.hear("R,1a,2\rR,0", host.now_s);
+  host.tag.receive("R,1a,2\rR,0", host.now_s);
   host.tag.opened();
   EXPECT_EQ(host.tag.speak(host.now_s + 1), "") << "an answer nobody waits for any more";
   host.now_s += 1;
@@ -242,7 +242,7 @@ TEST(SimulatedTag, HasTheFailuresOfItsScenario) {
   host.now_s = 70;
   std::string noisy;
   for (int i = 0; i < 50; ++i) {
-    host.tag.hear("R,00,1\r", host.now_s += 0.01);
+    host.tag.receive("R,00,1\r", host.now_s += 0.01);
     noisy += host.tag.speak(host.now_s);
   }
   EXPECT_GT(noisy.size(), 50 * 6u);

@@ -11,19 +11,19 @@
 namespace anchord::sim {
 namespace {
 
-struct Judged {
+struct AnchorError {
   int anchors{0}, ok{0}, inside{0};
   double worst_m{0};
 };
 
-Judged judge(std::uint64_t seed) {
+AnchorError assess(std::uint64_t seed) {
   SimulationOptions options;
   options.seed = seed;
   const World world = demonstration_world();
   const SimulatedFlight flight = simulate_flight(world, options).value();
   const FlightSolution solution = solve_flight(flight.data).value();
   const GeographicLib::LocalCartesian site(world.origin.lat_deg, world.origin.lon_deg, world.origin.height_m);
-  Judged judged;
+  AnchorError judged;
   for (const AnchorSolution& anchor : solution.anchors) {
     const Estimate& estimate = anchor.estimate;
     ++judged.anchors;
@@ -44,7 +44,7 @@ Judged judge(std::uint64_t seed) {
 }
 
 TEST(DemonstrationFlight, FindsEveryAnchorInsideItsClaimedRegion) {
-  const Judged judged = judge(7);  // the seed of ./dev run
+  const AnchorError judged = assess(7);  // the seed of ./dev run
   EXPECT_EQ(judged.anchors, 6);
   EXPECT_EQ(judged.ok, 6);
   EXPECT_EQ(judged.inside, 6);
@@ -53,9 +53,9 @@ TEST(DemonstrationFlight, FindsEveryAnchorInsideItsClaimedRegion) {
 }
 
 TEST(SimulatedFlight, ClaimsRegionsThatHoldTheTruthOverManySeeds) {
-  Judged all;
+  AnchorError all;
   for (std::uint64_t seed = 101; seed < 109; ++seed) {
-    const Judged one = judge(seed);
+    const AnchorError one = assess(seed);
     all.anchors += one.anchors;
     all.inside += one.inside;
     all.worst_m = std::max(all.worst_m, one.worst_m);

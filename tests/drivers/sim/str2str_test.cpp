@@ -143,10 +143,10 @@ TEST_F(Str2str, AsACasterGivesCorrectionsThatReachTheRoverWhole) {
   std::string heard;
   const auto turn = [&] {
     (void)base->arrived();
-    (void)base->hear();
+    (void)base->receive();
     (void)receiver->arrived();
     base->send_all(k_1005);
-    for (const auto& part : receiver->hear()) heard += part.bytes;
+    for (const auto& part : receiver->receive()) heard += part.bytes;
   };
   EXPECT_TRUE(until([&] { return heard.size() >= 40 * k_1005.size(); }, turn))
       << loop_.device("caster")->reason;

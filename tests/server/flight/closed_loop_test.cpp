@@ -52,7 +52,7 @@ Row fly(const sim::World& world, std::uint64_t seed) {
   solve.priors = result.priors;
   const auto solution = solve_flight(thinned_at_rest(result.data), solve);
   EXPECT_TRUE(solution.has_value());
-  const auto judged = judge(world, solution.value());
+  const auto judged = assess(world, solution.value());
   row.median_m = median_error_m(judged);
   for (const auto& j : judged) {
     row.worst_m = std::max(row.worst_m, j.error_m);
@@ -62,7 +62,7 @@ Row fly(const sim::World& world, std::uint64_t seed) {
   const auto rival = [&](const std::vector<double>& heights_m) {
     const auto solved =
         solve_flight(thinned_at_rest(fly_ring(world, result.flight_s, heights_m, options)), solve);
-    return solved ? median_error_m(judge(world, solved.value())) : std::numeric_limits<double>::infinity();
+    return solved ? median_error_m(assess(world, solved.value())) : std::numeric_limits<double>::infinity();
   };
   row.ring_m = rival({4});
   row.rings_m = rival({3, 9});

@@ -69,7 +69,7 @@ class Aircraft {
         const auto out = autopilot_.take_bytes();
         if (port_->is_up()) {
           (void)port_->arrived();
-          for (const auto& heard : port_->hear())
+          for (const auto& heard : port_->receive())
             autopilot_.feed({reinterpret_cast<const std::uint8_t*>(heard.bytes.data()), heard.bytes.size()});
           port_->send_all({reinterpret_cast<const char*>(out.data()), out.size()});
         }

@@ -56,7 +56,7 @@ TEST(PilotedLoop, LandsAtHomeClearOfTheBuildingAndFindsTheAnchorsWithEverythingO
     solve.priors = r.priors;
     const auto solution = solve_flight(thinned_at_rest(r.data), solve);
     ASSERT_TRUE(solution) << "seed " << seed << ": " << r.state.reason;
-    const auto judged = judge(world, solution.value());
+    const auto judged = assess(world, solution.value());
     double worst_m = 0;
     int ok = 0;
     for (const auto& j : judged) {

@@ -1,4 +1,4 @@
-#include "server/http/request_judge.hpp"
+#include "server/http/request_check.hpp"
 
 #include <algorithm>
 #include <array>
@@ -83,7 +83,7 @@ std::optional<Refusal> take_fields(const ParsedHead& head, const HttpLimits& lim
   return std::nullopt;
 }
 
-std::optional<Refusal> judge_framing(const ParsedHead& head, JudgedHead& good) {
+std::optional<Refusal> validate_framing(const ParsedHead& head, ValidHead& good) {
   const auto& headers = good.request.headers;
   const auto coding = headers.find("transfer-encoding");
   const auto length = headers.find("content-length");
@@ -113,7 +113,7 @@ std::optional<Refusal> judge_framing(const ParsedHead& head, JudgedHead& good) {
   return std::nullopt;
 }
 
-std::optional<Refusal> judge_host(std::string_view host, const HostPolicy& policy) {
+std::optional<Refusal> validate_host(std::string_view host, const HostPolicy& policy) {
   const std::string name = host_name(host);
   if (name.empty()) return Refusal{400, "malformed", "Host is malformed"};
   if (std::ranges::find(policy.hosts, name) == policy.hosts.end()) {
@@ -124,7 +124,7 @@ std::optional<Refusal> judge_host(std::string_view host, const HostPolicy& polic
   return std::nullopt;
 }
 
-std::optional<Refusal> judge_upgrade(const ParsedHead& head, JudgedHead& good) {
+std::optional<Refusal> validate_upgrade(const ParsedHead& head, ValidHead& good) {
   const auto& request = good.request;
   if (request.header("upgrade").empty()) return std::nullopt;
   if (!listed(request.header("connection"), "upgrade")) return std::nullopt;  // an offer we may ignore
@@ -184,8 +184,8 @@ bool origin_allowed(std::string_view origin, std::string_view host, const HostPo
          std::string_view(given).substr(scheme + 3) == lower(host);
 }
 
-Judgement judge_head(const ParsedHead& head, const HttpLimits& limits, const HostPolicy& policy) {
-  JudgedHead good;
+HeadCheck validate_head(const ParsedHead& head, const HttpLimits& limits, const HostPolicy& policy) {
+  ValidHead good;
   api::Request& request = good.request;
   const auto method = api::k_method_words.find(head.method);
   if (!method) return Refusal{501, "not-implemented", "unknown method"};
@@ -197,13 +197,13 @@ Judgement judge_head(const ParsedHead& head, const HttpLimits& limits, const Hos
   good.version = head.version;
   const auto host = request.headers.find("host");
   if (host == request.headers.end()) return Refusal{400, "malformed", "Host is missing"};
-  if (auto no = judge_host(host->second, policy)) return *no;
+  if (auto no = validate_host(host->second, policy)) return *no;
   auto target = split_target(head.target, limits.query_parameters);
   if (auto* why = std::get_if<std::string>(&target)) return Refusal{400, "malformed", std::move(*why)};
   auto& parts = std::get<Target>(target);
   if (!parts.authority.empty()) {
     // RFC 9112 section 3.2.2: the authority of an absolute target replaces Host.
-    if (auto no = judge_host(parts.authority, policy)) return *no;
+    if (auto no = validate_host(parts.authority, policy)) return *no;
   }
   if (parts.path == "*" && *method != api::Method::options)
     return Refusal{400, "malformed", "target * is for OPTIONS"};
@@ -212,8 +212,8 @@ Judgement judge_head(const ParsedHead& head, const HttpLimits& limits, const Hos
   request.path = std::move(parts.path);
   request.query = std::move(parts.query);
 
-  if (auto no = judge_framing(head, good)) return *no;
-  if (auto no = judge_upgrade(head, good)) return *no;
+  if (auto no = validate_framing(head, good)) return *no;
+  if (auto no = validate_upgrade(head, good)) return *no;
   const auto connection = request.header("connection");
   good.keep_alive = head.version == 11 ? !listed(connection, "close") : listed(connection, "keep-alive");
   return good;

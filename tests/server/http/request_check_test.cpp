@@ -1,4 +1,4 @@
-#include "server/http/request_judge.hpp"
+#include "server/http/request_check.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,28 +11,28 @@ const HostPolicy k_policy{{"localhost", "127.0.0.1", "[::1]"}, {"https://portal.
 const HttpLimits k_limits;
 
 /// The way of a head through scan, parser and judge, as the session goes it.
-Judgement judge(const std::string& raw) {
+HeadCheck check(const std::string& raw) {
   const auto seen = scan_head(raw, {}, k_limits);
   if (const auto* refusal = std::get_if<Refusal>(&seen)) return *refusal;
   if (std::get<HeadScan>(seen).head_end == 0) return Refusal{0, "incomplete", ""};
   RequestParser parser(k_limits);
   if (auto refusal = parser.parse_head(raw)) return *refusal;
-  return judge_head(parser.head(), k_limits, k_policy);
+  return validate_head(parser.head(), k_limits, k_policy);
 }
 
 int status(const std::string& raw) {
-  const auto judgement = judge(raw);
+  const auto judgement = check(raw);
   const auto* refusal = std::get_if<Refusal>(&judgement);
   return refusal == nullptr ? 200 : refusal->status;
 }
 
-JudgedHead good(const std::string& raw) {
-  auto judgement = judge(raw);
+ValidHead good(const std::string& raw) {
+  auto judgement = check(raw);
   if (const auto* refusal = std::get_if<Refusal>(&judgement)) {
     ADD_FAILURE() << refusal->status << " " << refusal->detail;
     return {};
   }
-  return std::get<JudgedHead>(std::move(judgement));
+  return std::get<ValidHead>(std::move(judgement));
 }
 
 std::string get(const std::string& target, const std::string& headers = "Host: localhost\r\n") {
@@ -42,7 +42,7 @@ std::string post(const std::string& headers) {
   return "POST /x HTTP/1.1\r\nHost: localhost\r\n" + headers + "\r\n";
 }
 
-TEST(RequestJudge, TakesAnOrdinaryRequest) {
+TEST(RequestCheck, TakesAnOrdinaryRequest) {
   const auto head =
       good(get("/api/v1/anchors?limit=5&q=a%20b+c", "Host: LOCALHOST:8420\r\nX-A: 1\r\nX-A: 2\r\n"));
   EXPECT_EQ(head.request.path, "/api/v1/anchors");
@@ -54,21 +54,21 @@ TEST(RequestJudge, TakesAnOrdinaryRequest) {
   EXPECT_EQ(head.framing, Framing::none);
 }
 
-TEST(RequestJudge, RefusesAMissingHost) { EXPECT_EQ(status(get("/", "")), 400); }
-TEST(RequestJudge, RefusesAMissingHostInHttp10) { EXPECT_EQ(status("GET / HTTP/1.0\r\n\r\n"), 400); }
-TEST(RequestJudge, RefusesTwoHosts) {
+TEST(RequestCheck, RefusesAMissingHost) { EXPECT_EQ(status(get("/", "")), 400); }
+TEST(RequestCheck, RefusesAMissingHostInHttp10) { EXPECT_EQ(status("GET / HTTP/1.0\r\n\r\n"), 400); }
+TEST(RequestCheck, RefusesTwoHosts) {
   EXPECT_EQ(status(get("/", "Host: localhost\r\nHost: localhost\r\n")), 400);
 }
-TEST(RequestJudge, RefusesAMalformedHost) {
+TEST(RequestCheck, RefusesAMalformedHost) {
   for (const char* host : {"", "a b", "a/b", "u@localhost", "localhost:", "localhost:x", "[::1", "local,host",
                            "localhost:123456"}) {
     EXPECT_EQ(status(get("/", std::string("Host: ") + host + "\r\n")), 400) << host;
   }
 }
-TEST(RequestJudge, RefusesAHostThatIsNotOurs) { EXPECT_EQ(status(get("/", "Host: evil.example\r\n")), 400); }
-TEST(RequestJudge, TakesIpv6Loopback) { EXPECT_EQ(status(get("/", "Host: [::1]:8420\r\n")), 200); }
+TEST(RequestCheck, RefusesAHostThatIsNotOurs) { EXPECT_EQ(status(get("/", "Host: evil.example\r\n")), 400); }
+TEST(RequestCheck, TakesIpv6Loopback) { EXPECT_EQ(status(get("/", "Host: [::1]:8420\r\n")), 200); }
 
-TEST(RequestJudge, RoutesAbsoluteFormByPathAndJudgesItsAuthority) {
+TEST(RequestCheck, RoutesAbsoluteFormByPathAndJudgesItsAuthority) {
   const auto head = good(get("http://127.0.0.1:1/a?b=c"));
   EXPECT_EQ(head.request.path, "/a");
   EXPECT_EQ(head.host, "127.0.0.1:1");
@@ -78,88 +78,88 @@ TEST(RequestJudge, RoutesAbsoluteFormByPathAndJudgesItsAuthority) {
   EXPECT_EQ(good(get("http://localhost")).request.path, "/");
 }
 
-TEST(RequestJudge, RefusesFoldedContentLength) {
+TEST(RequestCheck, RefusesFoldedContentLength) {
   EXPECT_EQ(status(post("Content-Length:\r\n 5\r\n")), 400);
   EXPECT_EQ(status(post("Content-Length: 1\r\n\t5\r\n")), 400);
 }
-TEST(RequestJudge, RefusesAnyFoldedLine) {
+TEST(RequestCheck, RefusesAnyFoldedLine) {
   EXPECT_EQ(status(get("/", "Host: localhost\r\nX-A: b\r\n c\r\n")), 400);
 }
-TEST(RequestJudge, RefusesContentLengthThatIsNotOneNumber) {
+TEST(RequestCheck, RefusesContentLengthThatIsNotOneNumber) {
   for (const char* value : {"5, 5", "+5", "-1", "0x5", "5 5", "", "99999999999999999999", "5,6"}) {
     EXPECT_EQ(status(post(std::string("Content-Length: ") + value + "\r\n")), 400) << value;
   }
 }
-TEST(RequestJudge, RefusesTwoContentLengths) {
+TEST(RequestCheck, RefusesTwoContentLengths) {
   EXPECT_EQ(status(post("Content-Length: 5\r\nContent-Length: 5\r\n")), 400);
 }
-TEST(RequestJudge, RefusesContentLengthWithTransferEncoding) {
+TEST(RequestCheck, RefusesContentLengthWithTransferEncoding) {
   EXPECT_EQ(status(post("Transfer-Encoding: chunked\r\nContent-Length: 5\r\n")), 400);
   EXPECT_EQ(status(post("Content-Length: 5\r\nTransfer-Encoding: chunked\r\n")), 400);
 }
-TEST(RequestJudge, RefusesTransferEncodingOtherThanChunked) {
+TEST(RequestCheck, RefusesTransferEncodingOtherThanChunked) {
   for (const char* value :
        {"gzip", "gzip, chunked", "chunked, gzip", "identity", "xchunked", "chunked;q=1", ""}) {
     EXPECT_EQ(status(post(std::string("Transfer-Encoding: ") + value + "\r\n")), 501) << value;
   }
   EXPECT_EQ(good(post("Transfer-Encoding: Chunked\r\n")).framing, Framing::chunked);
 }
-TEST(RequestJudge, RefusesTransferEncodingInHttp10) {
+TEST(RequestCheck, RefusesTransferEncodingInHttp10) {
   EXPECT_EQ(status("POST / HTTP/1.0\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n"), 400);
 }
-TEST(RequestJudge, RefusesCompressedBodies) {
+TEST(RequestCheck, RefusesCompressedBodies) {
   EXPECT_EQ(status(post("Content-Length: 5\r\nContent-Encoding: gzip\r\n")), 415);
 }
-TEST(RequestJudge, RefusesRepeatedHeadersThatDecide) {
+TEST(RequestCheck, RefusesRepeatedHeadersThatDecide) {
   for (const char* name :
        {"Authorization", "Content-Type", "Cookie", "Origin", "Expect", "X-Anchord", "Idempotency-Key"}) {
     const std::string line = std::string(name) + ": x\r\n";
     EXPECT_EQ(status(get("/", "Host: localhost\r\n" + line + line)), 400) << name;
   }
 }
-TEST(RequestJudge, KnowsOnlyOneExpectation) {
+TEST(RequestCheck, KnowsOnlyOneExpectation) {
   EXPECT_TRUE(good(post("Content-Length: 5\r\nExpect: 100-Continue\r\n")).expects_continue);
   EXPECT_EQ(status(post("Content-Length: 5\r\nExpect: tea\r\n")), 417);
 }
 
-TEST(RequestJudge, RefusesBrokenPercentEncoding) {
+TEST(RequestCheck, RefusesBrokenPercentEncoding) {
   for (const char* target :
        {"/%", "/%4", "/%zz", "/a?b=%f", "/a?%zz=1", "/%00", "/a%0d%0a", "/%c3%28", "/a?b=%00", "/%e2%82"}) {
     EXPECT_EQ(status(get(target)), 400) << target;
   }
 }
-TEST(RequestJudge, RefusesWhatMovesSegments) {
+TEST(RequestCheck, RefusesWhatMovesSegments) {
   for (const char* target : {"/a/../b", "/..", "/a/%2e%2e/b", "/a%2fb", "/a%5cb", "/./a"}) {
     EXPECT_EQ(status(get(target)), 400) << target;
   }
 }
-TEST(RequestJudge, RefusesRepeatedAndNamelessQueryKeys) {
+TEST(RequestCheck, RefusesRepeatedAndNamelessQueryKeys) {
   EXPECT_EQ(status(get("/a?b=1&b=2")), 400);
   EXPECT_EQ(status(get("/a?b=1&%62=2")), 400);
   EXPECT_EQ(status(get("/a?=1")), 400);
   EXPECT_EQ(good(get("/a?b&c=&&d=%26")).request.query.size(), 3u);
 }
-TEST(RequestJudge, BoundsQueryParameters) {
+TEST(RequestCheck, BoundsQueryParameters) {
   std::string target = "/a?";
   for (int i = 0; i < 65; ++i) target += "k" + std::to_string(i) + "=1&";
   EXPECT_EQ(status(get(target)), 400);
 }
-TEST(RequestJudge, RefusesFragmentsAndRawBytesInTheTarget) {
+TEST(RequestCheck, RefusesFragmentsAndRawBytesInTheTarget) {
   EXPECT_EQ(status(get("/a#b")), 400);
   EXPECT_EQ(status(get("/a\x80")), 400);
 }
-TEST(RequestJudge, RefusesAsteriskForOtherThanOptions) {
+TEST(RequestCheck, RefusesAsteriskForOtherThanOptions) {
   EXPECT_EQ(status(get("*")), 400);
   EXPECT_EQ(status("OPTIONS * HTTP/1.1\r\nHost: localhost\r\n\r\n"), 200);
 }
-TEST(RequestJudge, RefusesUnknownMethodsAndVersions) {
+TEST(RequestCheck, RefusesUnknownMethodsAndVersions) {
   EXPECT_EQ(status("BREW / HTTP/1.1\r\nHost: localhost\r\n\r\n"), 501);
   EXPECT_EQ(status("TRACE / HTTP/1.1\r\nHost: localhost\r\n\r\n"), 501);
   EXPECT_EQ(status("CONNECT localhost:1 HTTP/1.1\r\nHost: localhost\r\n\r\n"), 501);
   EXPECT_EQ(status("GET / HTTP/2.0\r\nHost: localhost\r\n\r\n"), 505);
   EXPECT_NE(status("PRI * HTTP/2.0\r\n\r\n"), 200);
 }
-TEST(RequestJudge, RefusesLooseLineEndsAndControlCharacters) {
+TEST(RequestCheck, RefusesLooseLineEndsAndControlCharacters) {
   EXPECT_EQ(status("GET / HTTP/1.1\nHost: localhost\n\n"), 400);
   EXPECT_EQ(status("GET / HTTP/1.1\r\nHost: localhost\rX: y\r\n\r\n"), 400);
   EXPECT_EQ(status(get("/",
@@ -168,28 +168,28 @@ TEST(RequestJudge, RefusesLooseLineEndsAndControlCharacters) {
             400);
   EXPECT_EQ(status(get("/", std::string("Host: localhost\r\nX: a") + '\0' + "b\r\n")), 400);
 }
-TEST(RequestJudge, RefusesSpaceBeforeTheColon) { EXPECT_EQ(status(get("/", "Host : localhost\r\n")), 400); }
-TEST(RequestJudge, RefusesWhatIsNotHttpAtTheFirstByte) {
+TEST(RequestCheck, RefusesSpaceBeforeTheColon) { EXPECT_EQ(status(get("/", "Host : localhost\r\n")), 400); }
+TEST(RequestCheck, RefusesWhatIsNotHttpAtTheFirstByte) {
   const auto seen = scan_head("\x16\x03\x01", {}, k_limits);
   ASSERT_TRUE(std::holds_alternative<Refusal>(seen));
   EXPECT_EQ(std::get<Refusal>(seen).status, 400);
 }
 
-TEST(RequestJudge, BoundsTheRequestLine) {
+TEST(RequestCheck, BoundsTheRequestLine) {
   EXPECT_EQ(status(get("/" + std::string(8 * 1024, 'a'))), 414);
   EXPECT_EQ(status(get("/" + std::string(7 * 1024, 'a'))), 200);
 }
-TEST(RequestJudge, BoundsTheHead) {
+TEST(RequestCheck, BoundsTheHead) {
   EXPECT_EQ(status(get("/", "Host: localhost\r\nX: " + std::string(16 * 1024, 'a') + "\r\n")), 431);
 }
-TEST(RequestJudge, BoundsTheNumberOfHeaders) {
+TEST(RequestCheck, BoundsTheNumberOfHeaders) {
   std::string many = "Host: localhost\r\n";
   for (int i = 0; i < 99; ++i) many += "X-" + std::to_string(i) + ": 1\r\n";
   EXPECT_EQ(status(get("/", many)), 200);
   EXPECT_EQ(status(get("/", many + "X-99: 1\r\nX-100: 1\r\n")), 431);
 }
 
-TEST(RequestJudge, AsksForACompleteWebSocketHandshake) {
+TEST(RequestCheck, AsksForACompleteWebSocketHandshake) {
   const std::string base = "Host: localhost\r\nUpgrade: websocket\r\nConnection: keep-alive, Upgrade\r\n";
   const std::string key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
   EXPECT_TRUE(good(get("/", base + key + "Sec-WebSocket-Version: 13\r\n")).websocket);
@@ -217,7 +217,7 @@ TEST(OriginRule, LetsThePagesOwnOriginAndListedOnesIn) {
 }
 
 // A head cut anywhere is incomplete or refused, never taken for a shorter good one.
-TEST(RequestJudge, NeverTakesATruncatedHead) {
+TEST(RequestCheck, NeverTakesATruncatedHead) {
   const std::string raw = get("/a?b=c", "Host: localhost\r\nContent-Length: 12\r\n");
   for (std::size_t n = 1; n < raw.size(); ++n) EXPECT_NE(status(raw.substr(0, n)), 200) << n;
 }

@@ -24,7 +24,7 @@ struct ParsedHead {
 enum class Framing : std::uint8_t { none, length, chunked };
 
 /// A head that was found good.
-struct JudgedHead {
+struct ValidHead {
   api::Request request;  ///< without principal, params and body
   unsigned version{11};  ///< 10 or 11
   Framing framing{Framing::none};
@@ -43,14 +43,14 @@ struct Refusal {
   std::vector<std::pair<std::string, std::string>> headers{};  ///< what else the answer must carry
 };
 
-using Judgement = std::variant<JudgedHead, Refusal>;
+using HeadCheck = std::variant<ValidHead, Refusal>;
 
 /// The one judge of request heads. The parser accepts what is grammatical; this refuses what is ambiguous or
 /// not ours to serve: Host missing, twice, malformed or foreign; absolute-form (routed by path, judged by
 /// authority); folded lines; Content-Length as a list; Transfer-Encoding other than exactly "chunked";
 /// Content-Encoding; repeated headers that decide; broken percent-encoding; repeated query keys; too many of
 /// anything. Pure; any thread.
-Judgement judge_head(const ParsedHead& head, const HttpLimits& limits, const HostPolicy& policy);
+HeadCheck validate_head(const ParsedHead& head, const HttpLimits& limits, const HostPolicy& policy);
 
 /// Looks at raw bytes of a head that is still arriving: line ends, sizes, first character.
 /// Null: nothing wrong so far. `head_end` becomes the size of the head once its empty line has come, else 0.

@@ -1,4 +1,4 @@
-#include "core/localize/course.hpp"
+#include "core/localize/convergence.hpp"
 
 #include <algorithm>
 
@@ -22,13 +22,13 @@ FlightOptions raw_options(const FlightOptions& options) {
 
 }  // namespace
 
-Result<Course> course_of(const FlightData& flight, const FlightOptions& options, int steps) {
+Result<Convergence> convergence_of(const FlightData& flight, const FlightOptions& options, int steps) {
   if (steps < 1 || steps > 50) return make_error(Errc::invalid_argument, "1 to 50 iterations");
   BOOST_OUTCOME_TRYV(options.check());
   FlightData part = flight;
   std::ranges::stable_sort(part.ranges, {}, &Range::time);
   const std::vector<Range> all = part.ranges;
-  Course course;
+  Convergence course;
   std::map<NetworkId, std::size_t> heard;
   std::size_t counted = 0;
   for (int step = 1; step <= steps; ++step) {
@@ -43,7 +43,7 @@ Result<Course> course_of(const FlightData& flight, const FlightOptions& options,
       continue;  // too few ranges yet
     }
     for (const auto& anchor : corrected.value().anchors) {
-      CourseStep at;
+      ConvergenceStep at;
       at.share = static_cast<double>(step) / steps;
       at.n_ranges = heard[anchor.estimate.anchor];
       at.corrected_m = place(anchor.estimate);

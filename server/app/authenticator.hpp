@@ -18,7 +18,7 @@
 
 namespace anchord::server {
 
-struct FrontDoorOptions {
+struct AuthenticatorOptions {
   HostPolicy hosts{};
   double rate_per_s{50}, rate_burst{200};
   TrustedProxies proxies{};
@@ -27,10 +27,10 @@ struct FrontDoorOptions {
 
 /// Between the transport and the application: who asks, from which page, how often, and which route answers.
 /// Denies by default: what no route and no file claims is refused. Called on io threads; never blocks.
-class FrontDoor final : public Gateway {
+class Authenticator final : public Gateway {
  public:
-  FrontDoor(const api::Router& router, api::WsHandlerFactory live, api::AccessService& access,
-            Metrics& metrics, FrontDoorOptions options);
+  Authenticator(const api::Router& router, api::WsHandlerFactory live, api::AccessService& access,
+                Metrics& metrics, AuthenticatorOptions options);
 
   Admission admit(api::Request& request, std::string_view host, bool websocket) override;
   api::Response problem(int status, std::string_view type, std::string detail) override;
@@ -50,7 +50,7 @@ class FrontDoor final : public Gateway {
   api::WsHandlerFactory live_;
   api::AccessService& access_;
   Metrics& metrics_;
-  FrontDoorOptions options_;
+  AuthenticatorOptions options_;
   RateLimit rate_;
   WsPlaces places_;
   std::atomic<bool> closed_{false};

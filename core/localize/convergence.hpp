@@ -13,7 +13,7 @@
 namespace anchord {
 
 /// One anchor after the first part of a flight (an iteration of Fig 8.10 and 8.11).
-struct CourseStep {
+struct ConvergenceStep {
   double share{};                                ///< of the flight's ranges flown so far, (0, 1]
   std::size_t n_ranges{};                        ///< of this anchor, so far
   std::optional<Eigen::Vector3d> raw_m{};        ///< least squares on the ranges as received
@@ -21,12 +21,12 @@ struct CourseStep {
   double h95_m{};                                ///< claimed, of the corrected one
   Verdict verdict{Verdict::too_few};
 };
-using Course = std::map<NetworkId, std::vector<CourseStep>>;
+using Convergence = std::map<NetworkId, std::vector<ConvergenceStep>>;
 
 /// How the answer came about: the flight cut after each of `steps` equal numbers of ranges and solved anew,
 /// raw (no bias, no loss) and corrected. Steps too short to be solved are absent. Costs 2 x steps solves.
 /// steps    1 to 50, else invalid_argument;  errors of the options;  canceled
 /// threads  pure
-Result<Course> course_of(const FlightData& flight, const FlightOptions& options, int steps);
+Result<Convergence> convergence_of(const FlightData& flight, const FlightOptions& options, int steps);
 
 }  // namespace anchord

@@ -1,4 +1,4 @@
-#include "server/app/front_door.hpp"
+#include "server/app/authenticator.hpp"
 
 #include <algorithm>
 #include <array>
@@ -6,7 +6,7 @@
 #include "api/kit/problem.hpp"
 #include "core/base/base64.hpp"
 #include "server/app/live_peer.hpp"
-#include "server/http/request_judge.hpp"
+#include "server/http/request_check.hpp"
 #include "server/http/static_files.hpp"
 #include "server/http/text.hpp"
 #include "server/runtime/logging.hpp"
@@ -62,8 +62,8 @@ std::string credential(std::string_view authorization) {
 
 }  // namespace
 
-FrontDoor::FrontDoor(const api::Router& router, api::WsHandlerFactory live, api::AccessService& access,
-                     Metrics& metrics, FrontDoorOptions options)
+Authenticator::Authenticator(const api::Router& router, api::WsHandlerFactory live,
+                             api::AccessService& access, Metrics& metrics, AuthenticatorOptions options)
     : router_(router),
       live_(std::move(live)),
       access_(access),
@@ -73,8 +73,8 @@ FrontDoor::FrontDoor(const api::Router& router, api::WsHandlerFactory live, api:
       places_(options_.places) {}
 
 /// Whoever guesses is told to wait; whoever has the right secret never comes here.
-api::Response FrontDoor::wrong_secret(const api::Request& request, std::string_view secret,
-                                      std::string_view what) {
+api::Response Authenticator::wrong_secret(const api::Request& request, std::string_view secret,
+                                          std::string_view what) {
   const auto wait_s = access_.guard().failed(secret, request.remote, api::LoginGuard::Clock::now());
   if (!wait_s) return problem(401, "unauthorized", std::string(what));
   auto response = problem(429, "rate-limited",
@@ -84,7 +84,8 @@ api::Response FrontDoor::wrong_secret(const api::Request& request, std::string_v
   return response;
 }
 
-std::optional<api::Response> FrontDoor::identify(api::Request& request, bool websocket, api::Login& login) {
+std::optional<api::Response> Authenticator::identify(api::Request& request, bool websocket,
+                                                     api::Login& login) {
   for (const auto& [key, value] : request.query) {
     // A long-lived secret in an address ends in logs, histories and Referer headers.
     if (key == "token" || key == "access_token" || value.starts_with("anc_")) {
@@ -132,7 +133,7 @@ std::optional<api::Response> FrontDoor::identify(api::Request& request, bool web
   return std::nullopt;
 }
 
-std::optional<api::Response> FrontDoor::limit(const api::Request& request, const api::Resolution& found) {
+std::optional<api::Response> Authenticator::limit(const api::Request& request, const api::Resolution& found) {
   if (access_.options().auth_off) return std::nullopt;
   const std::string& id = request.principal.token_id;
   std::string name = id.empty() ? "address " + request.remote : id;
@@ -147,7 +148,7 @@ std::optional<api::Response> FrontDoor::limit(const api::Request& request, const
   return response;
 }
 
-Admission FrontDoor::live(api::Request& request, bool websocket, api::Login login) {
+Admission Authenticator::live(api::Request& request, bool websocket, api::Login login) {
   const std::string route(k_live_path);
   using enum api::Role;
   if (request.principal.roles.empty()) {
@@ -204,7 +205,7 @@ class HeldReader final : public api::BodyReader {
 
 /// The handler, and what it opens: a body that comes or goes in pieces ends within a piece of the login's
 /// end.
-api::Response FrontDoor::run(const api::Route& route, api::Request& request, const api::Login& login) {
+api::Response Authenticator::run(const api::Route& route, api::Request& request, const api::Login& login) {
   if (login.who.token_id.empty()) return router_.dispatch(route, request);
   const auto holds = [this, login] { return access_.holds(login); };
   std::optional<HeldReader> held;
@@ -221,7 +222,7 @@ api::Response FrontDoor::run(const api::Route& route, api::Request& request, con
   return response;
 }
 
-Admission FrontDoor::admit(api::Request& request, std::string_view host, bool websocket) {
+Admission Authenticator::admit(api::Request& request, std::string_view host, bool websocket) {
   request.remote = options_.proxies.client(request.remote, request.header("x-forwarded-for"));
   if (closed_) {
     auto response = problem(503, "overloaded", "the server stops");
@@ -276,12 +277,12 @@ Admission FrontDoor::admit(api::Request& request, std::string_view host, bool we
   return admission;
 }
 
-api::Response FrontDoor::problem(int status, std::string_view type, std::string detail) {
+api::Response Authenticator::problem(int status, std::string_view type, std::string detail) {
   return api::problem(status, type, std::move(detail));
 }
 
-void FrontDoor::answered(const api::Request& request, std::string_view route, int status, double seconds,
-                         std::size_t bytes_out) {
+void Authenticator::answered(const api::Request& request, std::string_view route, int status, double seconds,
+                             std::size_t bytes_out) {
   metrics_.answered(route, api::to_string(request.method), status, seconds);
   const LogLevel level = status >= 500 ? LogLevel::warning : LogLevel::debug;
   log(level, "request",

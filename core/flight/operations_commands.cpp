@@ -9,18 +9,18 @@ namespace anchord::flight {
 namespace {
 
 /// What the procedure is asked; nothing of the actions that are no matter of its own.
-std::optional<procedure::Event> event_of_action(FlightAction action) {
+std::optional<procedure::Trigger> trigger_of(FlightAction action) {
   switch (action) {
     case FlightAction::hold:
-      return procedure::Event::hold;
+      return procedure::Trigger::hold;
     case FlightAction::resume:
-      return procedure::Event::resume;
+      return procedure::Trigger::resume;
     case FlightAction::skip:
-      return procedure::Event::skip;
+      return procedure::Trigger::skip;
     case FlightAction::return_home:
-      return procedure::Event::return_home;
+      return procedure::Trigger::return_home;
     case FlightAction::land:
-      return procedure::Event::land;
+      return procedure::Trigger::land;
     case FlightAction::start:
     case FlightAction::abort:
     case FlightAction::disarm:
@@ -179,7 +179,7 @@ Result<FlightCommand> Operations::begin(const Now& now, const Mission& mission, 
   const auto number_of_start = note(now, mission.id, word_of(FlightAction::start), who).number;
   f.control.start(now.s, who);
   note_dispatched(now, f, find(number_of_start));
-  take_happenings(f);
+  take_events(f);
   overridden_.erase(mission.id);  // of the next flight every item is asked again
   return *find(number_of_start);
 }
@@ -219,7 +219,7 @@ Result<FlightCommand> Operations::act(const Now& now, const MissionId& mission, 
     log_event("warning", "procedure.aborted", f.aborted, mission);
     return command;
   }
-  const auto event = event_of_action(action);
+  const auto event = trigger_of(action);
   if (!event) return forbidden("it is being flown: there is nothing to " + word_of(action));
   const auto number = note(now, mission, word_of(action), who).number;
   if (const auto why_not = f.control.command(now.s, *event, who); !why_not.empty()) {
@@ -227,7 +227,7 @@ Result<FlightCommand> Operations::act(const Now& now, const MissionId& mission, 
     return forbidden(word_of(action) + ": " + why_not);
   }
   note_dispatched(now, f, find(number));
-  take_happenings(f);
+  take_events(f);
   return *find(number);
 }
 
@@ -261,7 +261,7 @@ Result<void> Operations::recover(const Now& now, KeptFlight kept) {
   flight_->priors_before = std::move(kept.priors);
   if (const auto check = planning::check_plan(flight_->plan)) flight_->forecast = check.value().time;
   // Not heard yet: whether the hold leaves is decided by the mode that the first heartbeat shows.
-  take_happenings(*flight_);
+  take_events(*flight_);
   log_event("critical", "procedure.restarted",
             "server restarted in flight: hold commanded, waiting for the operator", kept.mission);
   return boost::outcome_v2::success();
