@@ -121,6 +121,24 @@ function planner() {
   );
 }
 
+function polygons() {
+  const bench = join(process.env.ANCHORD_BENCH_DIR ?? '', 'polygon_bench');
+  if (!existsSync(bench)) return row('polygons', 'not built', bench);
+  const out = JSON.parse(
+    execFileSync(bench, ['--benchmark_format=json', '--benchmark_min_time=0.2'], {
+      stdio: ['ignore', 'pipe', 'ignore'],
+    }),
+  );
+  const ns = Object.fromEntries(out.benchmarks.map((b) => [b.name, b.per_call * 1e9]));
+  for (const question of ['contains', 'distance_to_edge', 'way_crosses']) {
+    row(
+      `polygon of 12 corners, ${question.replaceAll('_', ' ')}`,
+      `${ns[`${question}_own`].toFixed(0)} ns CPU`,
+      `Boost.Geometry ${ns[`${question}_boost`].toFixed(0)} ns`,
+    );
+  }
+}
+
 const mission = (name) => ({
   name,
   kit: 'bench',
@@ -353,6 +371,7 @@ if (on('bound')) {
 if (on('planner')) {
   say('planner');
   planner();
+  polygons();
 }
 if (on('solve')) {
   say('solving');
