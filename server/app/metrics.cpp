@@ -1,26 +1,56 @@
 #include "server/app/metrics.hpp"
 
+#include <prometheus/collectable.h>
 #include <prometheus/counter.h>
 #include <prometheus/gauge.h>
 #include <prometheus/histogram.h>
 #include <prometheus/registry.h>
 #include <prometheus/text_serializer.h>
 
+#include <algorithm>
+#include <iterator>
 #include <vector>
 
 #include "core/base/locked.hpp"
 
 namespace anchord::server {
 
-struct Metrics::State {
-  prometheus::Registry registry;
-  prometheus::Family<prometheus::Counter>* requests{};
-  prometheus::Family<prometheus::Histogram>* durations{};
+namespace {
+
+/// Values that are asked for when somebody collects, each a family of one gauge.
+class ReadGauges final : public prometheus::Collectable {
+ public:
+  void add(std::string name, std::string help, std::function<double()> read) {
+    auto reads = reads_.lock();
+    reads->push_back({std::move(name), std::move(help), std::move(read)});
+  }
+  std::vector<prometheus::MetricFamily> Collect() const override {
+    // What they read has locks of its own: none of ours is held meanwhile.
+    const auto reads = reads_.copy();
+    std::vector<prometheus::MetricFamily> out;
+    for (const auto& [name, help, read] : reads) {
+      prometheus::ClientMetric value;
+      value.gauge.value = read();
+      out.push_back({name, help, prometheus::MetricType::Gauge, {value}});
+    }
+    return out;
+  }
+
+ private:
   struct Read {
-    prometheus::Gauge* gauge;
+    std::string name, help;
     std::function<double()> read;
   };
-  Locked<std::vector<Read>> reads;
+  Locked<std::vector<Read>> reads_;
+};
+
+}  // namespace
+
+struct Metrics::State {
+  prometheus::Registry registry;
+  ReadGauges gauges;
+  prometheus::Family<prometheus::Counter>* requests{};
+  prometheus::Family<prometheus::Histogram>* durations{};
 };
 
 Metrics::Metrics(std::string_view version) : state_(std::make_unique<State>()) {
@@ -53,16 +83,13 @@ void Metrics::answered(std::string_view route, std::string_view method, int stat
 }
 
 void Metrics::gauge(std::string name, std::string help, std::function<double()> read) {
-  auto& made = prometheus::BuildGauge().Name(name).Help(help).Register(state_->registry).Add({});
-  auto reads = state_->reads.lock();
-  reads->push_back({&made, std::move(read)});
+  state_->gauges.add(std::move(name), std::move(help), std::move(read));
 }
 
 std::string Metrics::text() {
-  // What they read has locks of its own: none of ours is held meanwhile.
-  const auto reads = state_->reads.copy();
-  for (const auto& [gauge, read] : reads) gauge->Set(read());
-  return prometheus::TextSerializer().Serialize(state_->registry.Collect());
+  auto families = state_->registry.Collect();
+  std::ranges::move(state_->gauges.Collect(), std::back_inserter(families));
+  return prometheus::TextSerializer().Serialize(families);
 }
 
 }  // namespace anchord::server
