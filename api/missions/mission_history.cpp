@@ -1,4 +1,3 @@
-#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -11,48 +10,8 @@ namespace {
 
 constexpr double k_moments = 240;  ///< of a flight that are kept
 constexpr double k_least_step_s = 2;
-constexpr std::size_t k_page = 2000;
 constexpr std::size_t k_kept = 4;
 constexpr double k_again_s = 30;  ///< of a flight that records, an answer serves so long
-
-/// Stored rows of one kind in the order of time, a page of them in memory.
-template <class Row>
-class Stream {
- public:
-  using Read = std::function<Result<MeasurementStore::Page<Row>>(const MeasurementStore::Filter&)>;
-  Stream(const MissionId& mission, bool with_cir, Read read) : read_(std::move(read)) {
-    filter_.mission = mission;
-    filter_.limit = k_page;
-    filter_.with_cir = with_cir;
-  }
-  /// Null at the end, and when the store failed.
-  const Row* front() {
-    if (rows_.empty() && more_) {
-      auto page = read_(filter_);
-      failed_ = !page;
-      if (failed_) {
-        more_ = false;
-        return nullptr;
-      }
-      for (auto& row : page.value().rows) rows_.push_back(std::move(row));
-      filter_.after = page.value().next;
-      more_ = !filter_.after.empty();
-    }
-    return rows_.empty() ? nullptr : &rows_.front();
-  }
-  Row take() {
-    Row row = std::move(rows_.front());
-    rows_.pop_front();
-    return row;
-  }
-  bool failed() const { return failed_; }
-
- private:
-  Read read_;
-  MeasurementStore::Filter filter_;
-  std::deque<Row> rows_;
-  bool more_{true}, failed_{false};
-};
 
 /// What was estimated since the last moment, the newest of each anchor.
 void note(const MissionId& id, flight::LiveMission& live, std::string& items) {
@@ -75,9 +34,7 @@ void note(const MissionId& id, flight::LiveMission& live, std::string& items) {
 /// moments is kept.
 std::shared_ptr<const std::string> MissionService::State::replayed(const Mission& mission) {
   const auto& id = mission.id;
-  Stream<Range> ranges(id, deps.predict_needs_cir(),
-                       [this](const auto& filter) { return deps.measurements.ranges(filter); });
-  Stream<Fix> fixes(id, false, [this](const auto& filter) { return deps.measurements.fixes(filter); });
+  StoredRows rows(deps.measurements, id, deps.predict_needs_cir());
   flight::LiveMission live(setup_of(mission));
   std::string items;
   const auto length_s = length_of(id);
@@ -91,20 +48,12 @@ std::shared_ptr<const std::string> MissionService::State::replayed(const Mission
     note(id, live, items);
     while (*next_ns <= time.ns) *next_ns += step_ns;
   };
-  for (;;) {
+  while (auto stored = rows.next()) {
     if (stopped) return nullptr;
-    const Range* range = ranges.front();
-    const Fix* fix = fixes.front();
-    if (range == nullptr && fix == nullptr) break;
-    if (fix == nullptr || (range != nullptr && range->time < fix->time)) {
-      at(range->time);
-      live.add(row_of(ranges.take()));
-    } else {
-      at(fix->time);
-      live.add(row_of(fixes.take()));
-    }
+    std::visit([&](const auto& row) { at(row.time); }, *stored);
+    live.add(std::visit([&](auto& row) { return row_of(std::move(row)); }, *stored));
   }
-  if (ranges.failed() || fixes.failed()) return nullptr;
+  if (rows.failed()) return nullptr;
   if (mission.state == MissionState::finished) live.finish();
   live.settle();
   note(id, live, items);

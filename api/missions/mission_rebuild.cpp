@@ -35,11 +35,7 @@ void MissionService::State::begin_rebuild(const std::shared_ptr<Flight>& flight)
 
 void MissionService::State::start_reading(Flight& flight) const {
   auto work = flight.work.lock();
-  work->rebuild = std::make_unique<Flight::Rebuild>();
-  auto& r = *work->rebuild;
-  r.range_filter.mission = r.fix_filter.mission = flight.id;
-  r.range_filter.limit = r.fix_filter.limit = 2000;
-  r.range_filter.with_cir = deps.predict_needs_cir();
+  work->rebuild = std::make_unique<StoredRows>(deps.measurements, flight.id, deps.predict_needs_cir());
   work->live.begin_reading();
 }
 
@@ -61,46 +57,28 @@ void MissionService::State::continue_rebuild(const std::shared_ptr<Flight>& flig
   });
 }
 
-/// Two sorted streams merged by time, a page of each in memory; one page of either a call. False at the end.
+/// A page of the stored rows a call, so that what else waits for this flight gets its turn. False at the end.
 bool MissionService::State::rebuild_slice(Flight& flight) {
   auto work = flight.work.lock();
   if (!work->rebuild) return false;  // it began anew twice, and the other round was the last
-  auto& r = *work->rebuild;
-  bool failed = false;
-  const auto refill = [&](auto& rows, auto& filter, bool& more, auto read) {
-    if (!rows.empty() || !more) return;
-    auto page = read(filter);
-    failed = failed || !page;
-    if (!page) return;
-    for (auto& row : page.value().rows) rows.push_back(std::move(row));
-    filter.after = page.value().next;
-    more = !filter.after.empty();
-  };
-  refill(r.ranges, r.range_filter, r.more_ranges, [&](auto& f) { return deps.measurements.ranges(f); });
-  refill(r.fixes, r.fix_filter, r.more_fixes, [&](auto& f) { return deps.measurements.fixes(f); });
-  const auto take = [&](auto& rows) {
+  for (std::size_t n = 0; n < StoredRows::k_page; ++n) {
+    auto stored = work->rebuild->next();
+    if (!stored) {
+      work->rebuild.reset();
+      std::ranges::sort(work->rebuilt);
+      take_priors(flight, *work);
+      work->live.end_reading();
+      return false;
+    }
     {
       auto inbox = flight.inbox.lock();
-      inbox->ahead.note(rows.front());
+      std::visit([&](const auto& row) { inbox->ahead.note(row); }, *stored);
     }
-    const flight::LiveRow row = row_of(std::move(rows.front()));
-    rows.pop_front();
+    const flight::LiveRow row = std::visit([&](auto& one) { return row_of(std::move(one)); }, *stored);
     work->rebuilt.push_back(flight::identity(row));
     work->live.add(row);
-  };
-  while (!failed && !(r.ranges.empty() && r.fixes.empty())) {
-    // A stream that has run dry in the middle waits for its next page.
-    if ((r.ranges.empty() && r.more_ranges) || (r.fixes.empty() && r.more_fixes)) return true;
-    if (r.fixes.empty() || (!r.ranges.empty() && r.ranges.front().time < r.fixes.front().time))
-      take(r.ranges);
-    else
-      take(r.fixes);
   }
-  work->rebuild.reset();
-  std::ranges::sort(work->rebuilt);
-  take_priors(flight, *work);
-  work->live.end_reading();
-  return false;
+  return true;
 }
 
 void MissionService::State::end_rebuild(Flight& flight) {

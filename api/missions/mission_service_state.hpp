@@ -10,6 +10,7 @@
 #include "api/kit/late_writer.hpp"
 #include "api/missions/mission_service.hpp"
 #include "api/missions/radio_watch.hpp"
+#include "api/missions/stored_rows.hpp"
 #include "api/wire/live_writer.hpp"
 #include "core/base/locked.hpp"
 #include "core/flight/live_mission.hpp"
@@ -57,18 +58,12 @@ struct MissionService::Flight {
   };
   Locked<Inbox> inbox;
 
-  struct Rebuild {
-    MeasurementStore::Filter range_filter{}, fix_filter{};
-    std::deque<Range> ranges;
-    std::deque<Fix> fixes;
-    bool more_ranges{true}, more_fixes{true};
-  };
   struct Work {
     explicit Work(flight::LiveMissionSetup setup) : live(std::move(setup)) {}
     flight::LiveMission live;
     std::chrono::steady_clock::time_point joint_not_before{};
     bool joint_running{false};
-    std::unique_ptr<Rebuild> rebuild;
+    std::unique_ptr<StoredRows> rebuild;  ///< while stored rows are read
     /// Identities, sorted at the end, until the queue was worked off once.
     std::vector<std::size_t> rebuilt;
   };
