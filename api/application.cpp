@@ -328,11 +328,11 @@ void Application::State::calibrate_landed() {
     auto request = read_calibration_request(body, none);
     request.settings_json = R"({"after_landing":true})";
     if (const auto job = calibrations.submit(std::move(request)); job)
-      events.add("info", "calibration.after_landing",
+      events.add(EventLevel::info, "calibration.after_landing",
                  "landed: all ranges are solved again, together; the result waits for review", id);
     else
-      events.add("warning", "calibration.not_started", "not calibrated after landing: " + job.error().message,
-                 id);
+      events.add(EventLevel::warning, "calibration.not_started",
+                 "not calibrated after landing: " + job.error().message, id);
   }
 }
 
@@ -345,7 +345,7 @@ void Application::State::background_round() {
     // Daily and after every flight (reliability.md section 2).
     if (!deps.backups.due(missions.finished())) return;
     if (const auto begun = begin_backup(admin_api); !begun)
-      events.add("warning", "backup.failed", begun.error().message);
+      events.add(EventLevel::warning, "backup.failed", begun.error().message);
   });
 }
 
@@ -431,7 +431,7 @@ void Application::State::sign_models_of_before() {
   }
   if (n > 0)
     events.add(
-        "info", "model.signed",
+        EventLevel::info, "model.signed",
         std::to_string(n) + " models of before are signed with this server's new key " + signer.key_id());
 }
 
@@ -452,7 +452,7 @@ void Application::start() {
     if (state_->deps.model_key_is_new) state_->sign_models_of_before();
     const auto loaded = state_->models.reload();
     if (const auto& fault = state_->models.active()->fault; !fault.empty())
-      state_->events.add("warning", "model.refused", fault);
+      state_->events.add(EventLevel::warning, "model.refused", fault);
     if (!loaded) state_->deps.log_fault("", loaded.error().message);
     const auto before = promotion_events(state_->stores.models, state_->stores.missions);
     if (before)

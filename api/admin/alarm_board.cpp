@@ -10,16 +10,16 @@
 namespace anchord::api {
 namespace {
 
-std::string_view level_of(AlarmPriority priority) {
+EventLevel level_of(AlarmPriority priority) {
   switch (priority) {
     case AlarmPriority::critical:
-      return "critical";
+      return EventLevel::critical;
     case AlarmPriority::warning:
-      return "warning";
+      return EventLevel::warning;
     case AlarmPriority::advisory:
-      return "info";
+      return EventLevel::info;
   }
-  return "info";
+  return EventLevel::info;
 }
 
 }  // namespace
@@ -60,8 +60,8 @@ void AlarmBoard::update(std::vector<AlarmCondition> holding, UtcTime now) {
     *alarms = std::move(next);
   }
   for (const auto& c : raised)
-    events_.add(std::string(level_of(c.priority)), "alarm.raised", c.id + ": " + c.text, c.mission);
-  for (const auto& c : cleared) events_.add("info", "alarm.cleared", c.id + " is over", c.mission);
+    events_.add(level_of(c.priority), "alarm.raised", c.id + ": " + c.text, c.mission);
+  for (const auto& c : cleared) events_.add(EventLevel::info, "alarm.cleared", c.id + " is over", c.mission);
 }
 
 Result<Alarm> AlarmBoard::acknowledge(std::string_view id, std::string_view by) {
@@ -76,8 +76,8 @@ Result<Alarm> AlarmBoard::acknowledge(std::string_view id, std::string_view by) 
     at->acknowledged = true;
     found = *at;
   }
-  events_.add("info", "alarm.acknowledged", found.condition.id + " acknowledged by " + std::string(by),
-              found.condition.mission);
+  events_.add(EventLevel::info, "alarm.acknowledged",
+              found.condition.id + " acknowledged by " + std::string(by), found.condition.mission);
   return found;
 }
 

@@ -31,7 +31,7 @@ Result<Job> begin_backup(const AdminApi& s) {
     job.progress(0, "copy", "");
     auto made = s.backups.make();
     if (!made) {
-      s.events.add("warning", "backup.failed", made.error().message);
+      s.events.add(EventLevel::warning, "backup.failed", made.error().message);
       return std::move(made).error();
     }
     return JobEnd{"/api/v1/backups", made.value().name};

@@ -10,14 +10,14 @@ namespace anchord::api {
 
 std::string event_json(const LiveEvent& event) {
   return R"({"id":")" + to_string(event.id) + R"(","t_us":)" + std::to_string(event.time.us()) +
-         R"(,"level":)" + json_text(event.level) + R"(,"code":)" + json_text(event.code) + R"(,"text":)" +
-         json_text(event.text) + R"(,"mission":)" +
+         R"(,"level":)" + json_text(to_string(event.level)) + R"(,"code":)" + json_text(event.code) +
+         R"(,"text":)" + json_text(event.text) + R"(,"mission":)" +
          (event.mission ? json_text(to_string(*event.mission)) : "null") + '}';
 }
 
-void EventLog::add(std::string level, std::string code, std::string text, std::optional<MissionId> mission) {
+void EventLog::add(EventLevel level, std::string code, std::string text, std::optional<MissionId> mission) {
   const UtcTime now = clock_.now();
-  LiveEvent event{make_uuid_v7(now), now, std::move(level), std::move(code), std::move(text), mission};
+  LiveEvent event{make_uuid_v7(now), now, level, std::move(code), std::move(text), mission};
   std::string json = event_json(event);
   {
     auto kept = events_.lock();

@@ -8,6 +8,7 @@
 #include "core/base/ids.hpp"
 #include "core/base/locked.hpp"
 #include "core/base/time.hpp"
+#include "core/types/event_level.hpp"
 
 namespace anchord::api {
 
@@ -17,7 +18,8 @@ class Hub;
 struct LiveEvent {
   Uuid id{};
   UtcTime time{};
-  std::string level, code, text;  ///< level: info, warning, critical
+  EventLevel level{};
+  std::string code, text;
   std::optional<MissionId> mission{};
 };
 std::string event_json(const LiveEvent& event);
@@ -27,7 +29,7 @@ class EventLog {
  public:
   static constexpr std::size_t k_kept = 10'000;
   EventLog(Hub& hub, const Clock& clock) : hub_(hub), clock_(clock) {}
-  void add(std::string level, std::string code, std::string text, std::optional<MissionId> mission = {});
+  void add(EventLevel level, std::string code, std::string text, std::optional<MissionId> mission = {});
   /// Puts events of before the start in front of all others, oldest first; nobody is told again.
   void restore(const std::vector<LiveEvent>& events);
   /// Newest first.

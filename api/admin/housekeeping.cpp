@@ -64,7 +64,7 @@ void Housekeeping::round() {
   deps_.running.keep();
   const auto due = deps_.bin.empty_before(deps_.running.now_ns() - deps_.keep_deleted_ns);
   if (due && due.value() > 0) {
-    deps_.events.add("info", "bin.emptied",
+    deps_.events.add(EventLevel::info, "bin.emptied",
                      std::to_string(due.value()) + " deleted missions have been long enough in the bin", {});
   }
   remove_marked();

@@ -136,7 +136,7 @@ std::shared_ptr<const ContradictionWatch::Standing> ContradictionWatch::standing
   }
   for (const auto* anchor : news) {
     const auto& missions = anchor->missions;
-    deps_.events.add("warning", "anchor.contradicted", anchor->text,
+    deps_.events.add(EventLevel::warning, "anchor.contradicted", anchor->text,
                      missions.empty() ? std::nullopt : std::optional(missions.back()));
   }
   return now;

@@ -270,7 +270,7 @@ Response publish(CalibrationApi& s, const Request& request) {
                                 {"t_us", revision.published.us()},
                                 {"calibration", to_string(calibration.id)}}),
                 revision.published.us());
-  s.events.add(overrides.empty() ? "info" : "warning", "revision.published",
+  s.events.add(overrides.empty() ? EventLevel::info : EventLevel::warning, "revision.published",
                "revision " + std::to_string(revision.number) + " with " + std::to_string(anchors.size()) +
                    " anchors published" +
                    (overrides.empty() ? "" : ", " + std::to_string(overrides.size()) + " by override"));

@@ -17,7 +17,7 @@ void DeviceStream::change(std::vector<Holder> next) {
   (void)stack_.exchange(std::move(next));
   if (deps_.devices.recording_into() != now) deps_.devices.record_into(now);
   if (const auto kept = deps_.store.keep_device_stream(ids); !kept) {
-    deps_.events.add("warning", "devices.not_kept",
+    deps_.events.add(EventLevel::warning, "devices.not_kept",
                      "a restart would not know whose the devices are: " + kept.error().message, now);
   }
 }
@@ -31,7 +31,7 @@ std::optional<DeviceStream::Holder> DeviceStream::begin(const Mission& mission) 
   }
   if (before->id == mission.id) return std::nullopt;
   if (!deps_.devices.devices().empty()) {
-    deps_.events.add("warning", "devices.held",
+    deps_.events.add(EventLevel::warning, "devices.held",
                      mission.name + " gets no rows of the devices: " + before->name + " records with them",
                      mission.id);
   }
@@ -47,12 +47,12 @@ std::optional<DeviceStream::Holder> DeviceStream::take(const Mission& mission, c
   next.push_back({mission.id, mission.name});
   change(std::move(next));
   if (before) {
-    deps_.events.add("critical", "devices.lost",
+    deps_.events.add(EventLevel::critical, "devices.lost",
                      by + " gave the devices of " + before->name + " to " + mission.name +
                          "; they come back when that ends",
                      before->id);
-    deps_.events.add("warning", "devices.taken", mission.name + " took the devices of " + before->name,
-                     mission.id);
+    deps_.events.add(EventLevel::warning, "devices.taken",
+                     mission.name + " took the devices of " + before->name, mission.id);
   }
   return before;
 }
@@ -65,7 +65,7 @@ void DeviceStream::ended(const MissionId& mission) {
   change(std::move(next));
   const auto now = holder();
   if (before->id == mission && now)
-    deps_.events.add("warning", "devices.returned", now->name + " has its devices back", now->id);
+    deps_.events.add(EventLevel::warning, "devices.returned", now->name + " has its devices back", now->id);
 }
 
 std::optional<DeviceStream::Holder> DeviceStream::holder() const {
@@ -77,7 +77,7 @@ void DeviceStream::resume() {
   const auto kept = deps_.store.device_stream();
   if (!kept) {
     deps_.events.add(
-        "critical", "devices.not_resumed",
+        EventLevel::critical, "devices.not_resumed",
         "what the devices recorded into before the restart cannot be read: " + kept.error().message, {});
     return;
   }
@@ -90,7 +90,7 @@ void DeviceStream::resume() {
   }
   change(std::move(next));
   if (const auto now = holder()) {
-    deps_.events.add("info", "devices.resumed",
+    deps_.events.add(EventLevel::info, "devices.resumed",
                      "the devices go on recording into " + now->name + " after the restart", now->id);
   }
 }

@@ -98,7 +98,7 @@ void FlightService::State::recover() {
     if (auto found = kept_flight(mission, j)) {
       (void)w->operations.recover(now(), *std::move(found)).has_value();
     } else {
-      deps.events.add("critical", "procedure.lost",
+      deps.events.add(EventLevel::critical, "procedure.lost",
                       "the flight before the restart cannot be read: the pilot has it", mission);
     }
   }

@@ -43,7 +43,7 @@ Response ask_for_control(FlightApi& s, const Request& request, const MissionId& 
   if (!lease || lease->mission != mission)
     throw_problem(409, "no-control", "nobody has control of this mission: take it (action: take)");
   const std::string text = request.principal.name + " asks " + lease->name + " for control";
-  s.events.add("warning", "control.asked", text, mission);
+  s.events.add(EventLevel::warning, "control.asked", text, mission);
   return json_response(200, lease_json(*lease, false));
 }
 
@@ -72,7 +72,7 @@ Response control(FlightApi& s, const Request& request) {
   }
   if (action == ControlAction::refuse) {
     const auto lease = granted(s.flights.renew_control(mission, *key, request.principal));
-    s.events.add("info", "control.refused", lease.name + " keeps control", mission);
+    s.events.add(EventLevel::info, "control.refused", lease.name + " keeps control", mission);
     s.audit.soon(request, done);
     return json_response(200, lease_json(lease, true));
   }

@@ -35,12 +35,12 @@ flight::Now FlightService::State::now() const {
 
 void FlightService::State::publish_events(Work& w) const {
   for (auto& event : w.operations.take_events())
-    deps.events.add(std::move(event.level), std::move(event.code), std::move(event.text), event.mission);
+    deps.events.add(event.level, std::move(event.code), std::move(event.text), event.mission);
 }
 
 void FlightService::start() {
   if (!guarded("flight before the restart", [this] { state_->recover(); })) {
-    state_->deps.events.add("critical", "procedure.lost",
+    state_->deps.events.add(EventLevel::critical, "procedure.lost",
                             "the flight before the restart cannot be read: the pilot has it", std::nullopt);
   }
   if (state_->deps.now_s || state_->thread.joinable()) return;

@@ -174,7 +174,7 @@ Promotion promoted(LearningApi& l, const Request& request, const std::string& wh
 void announce(LearningApi& l, const Promotion& done, const std::string& method) {
   value_or_problem(l.models.reload());
   const auto words = promotion_words(done, method);
-  l.events.add("info", words.code, words.text);
+  l.events.add(EventLevel::info, words.code, words.text);
   if (done.task != k_correction_task) l.note_in_flights(words.code, words.text);
 }
 
@@ -266,7 +266,7 @@ Response promote(LearningApi& l, const Request& request) {
                                   : l.models.source().signer().sign(ModelStanding::vouched, candidate.text)},
                              before);
   if (!gate.passed)
-    l.events.add("warning", "model.override",
+    l.events.add(EventLevel::warning, "model.override",
                  request.principal.name + " promoted model " + to_string(stored.id) + " against the gate (" +
                      gate.why + "): " + reason);
   announce(l, done, stored.method);

@@ -33,7 +33,7 @@ Result<std::vector<LiveEvent>> promotion_events(ModelStore& models, MissionStore
       method = model.method;
     }
     const auto words = promotion_words(p, method);
-    LiveEvent event{make_uuid_v7(p.time), p.time, "info", words.code, words.text, {}};
+    LiveEvent event{make_uuid_v7(p.time), p.time, EventLevel::info, words.code, words.text, {}};
     out.push_back(event);
     if (p.task == k_correction_task) continue;
     for (const auto& flight : flights) {

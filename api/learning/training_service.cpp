@@ -56,7 +56,7 @@ Result<std::string> TrainingService::work(const TrainingRun& run, JobContext& jo
   for (const auto& [name, text] : json["parts"].items()) parts[name] = text.get<std::string>();
   BOOST_OUTCOME_TRYV(
       deps_.runs.finish(run.id, {json["summary"].get_ref<const std::string&>()}, parts, stored, artifact));
-  deps_.events.add("info", "model.trained",
+  deps_.events.add(EventLevel::info, "model.trained",
                    stored.method + " for " + stored.task + " is trained: model " + to_string(stored.id));
   return stored.method;
 }

@@ -110,13 +110,13 @@ void Demonstration::play(const MissionId& id, Rows& rows, double speed) {
     if (batch.empty()) continue;
     deps_.rows.live(batch);
     if (const auto stored = deps_.rows.store(batch); !stored) {
-      deps_.events.add("warning", "demonstration.ended", "the demonstration ended: " + stored.error().message,
-                       id);
+      deps_.events.add(EventLevel::warning, "demonstration.ended",
+                       "the demonstration ended: " + stored.error().message, id);
       return;
     }
   }
   if (const auto finished = deps_.missions.finish(id); !finished)
-    deps_.events.add("warning", "demonstration.ended", finished.error().message, id);
+    deps_.events.add(EventLevel::warning, "demonstration.ended", finished.error().message, id);
 }
 
 void Demonstration::stop() {

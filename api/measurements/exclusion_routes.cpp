@@ -50,8 +50,8 @@ Response exclude(MeasurementApi& s, const Request& request) {
   s.audit(request, "rows.exclude " + to_string(mission) + ' ' + to_string(done.id) + ' ' + words(done) +
                        " reason: " + done.reason);
   s.missions.exclusions_changed(mission);
-  s.events.add("info", "rows.excluded", words(done) + " excluded by " + done.by + ": " + done.reason,
-               mission);
+  s.events.add(EventLevel::info, "rows.excluded",
+               words(done) + " excluded by " + done.by + ": " + done.reason, mission);
   Response response = json_response(201, exclusion_json(done));
   response.header("Location", "/api/v1/missions/" + to_string(mission) + "/exclusions");
   return response;
@@ -67,7 +67,8 @@ Response include(MeasurementApi& s, const Request& request) {
   s.audit(request, "rows.include " + to_string(mission) + ' ' + to_string(id) + ' ' + words(done) +
                        (reason.empty() ? "" : " reason: " + reason));
   s.missions.exclusions_changed(mission);
-  s.events.add("info", "rows.included", words(done) + " are used again, by " + done.included->by, mission);
+  s.events.add(EventLevel::info, "rows.included", words(done) + " are used again, by " + done.included->by,
+               mission);
   return json_response(200, exclusion_json(done));
 }
 

@@ -95,7 +95,8 @@ Response remove(MissionApi& s, const Request& request) {
   (void)s.control.release_control(id, std::string(request.header("anchord-lease")), request.principal)
       .has_value();
   s.audit(request, "mission.delete " + to_string(id));
-  s.events.add("warning", "mission.deleted", mission.name + " was deleted by " + request.principal.name, id);
+  s.events.add(EventLevel::warning, "mission.deleted",
+               mission.name + " was deleted by " + request.principal.name, id);
   return empty_answer();
 }
 
@@ -115,7 +116,8 @@ Response restore(MissionApi& s, const Request& request) {
   s.missions.forget(id);
   const Mission mission = value_or_problem(s.missions.mission(id));
   s.audit(request, "mission.restore " + to_string(id));
-  s.events.add("info", "mission.restored", mission.name + " is back, by " + request.principal.name, id);
+  s.events.add(EventLevel::info, "mission.restored", mission.name + " is back, by " + request.principal.name,
+               id);
   return mission_answer(s, 200, mission);
 }
 

@@ -40,13 +40,14 @@ void MissionService::State::publish(Flight& flight, const flight::AnchorFound& e
     return boost::outcome_v2::success();
   });
   if (event.now)
-    deps.events.add("info", "anchor.found", "anchor " + to_string(event.anchor) + " found", flight.id);
+    deps.events.add(EventLevel::info, "anchor.found", "anchor " + to_string(event.anchor) + " found",
+                    flight.id);
 }
 
 void MissionService::State::publish(Flight& flight, const flight::AnchorStatusChanged& event) {
   const bool converged = event.status == "converged";
   deps.events.add(
-      converged ? "info" : "warning", "anchor." + std::string(event.status),
+      converged ? EventLevel::info : EventLevel::warning, "anchor." + std::string(event.status),
       "anchor " + to_string(event.anchor) + (converged ? " converged" : " is ambiguous: " + event.reason),
       flight.id);
 }
@@ -58,7 +59,7 @@ void MissionService::State::publish(Flight& flight, const flight::AnchorEstimate
 }
 
 void MissionService::State::publish(Flight& flight, const flight::FixRejected& event) {
-  deps.events.add("warning", "track." + event.reason,
+  deps.events.add(EventLevel::warning, "track." + event.reason,
                   event.reason == "excluded" ? "positions were excluded by a person"
                                              : "a position is rejected: " + event.reason +
                                                    "; more of them are counted in the flight's state",
@@ -66,7 +67,7 @@ void MissionService::State::publish(Flight& flight, const flight::FixRejected& e
 }
 
 void MissionService::State::publish(Flight& flight, const flight::OriginMoved&) {
-  deps.events.add("warning", "track.origin",
+  deps.events.add(EventLevel::warning, "track.origin",
                   "the first positions were no part of the flight: its origin is another from here on",
                   flight.id);
 }

@@ -126,7 +126,7 @@ void MissionService::State::work(Flight& flight) {
   auto rows = take_rows(flight, dropped);
   queued -= rows.size();
   if (dropped > 0) {
-    deps.events.add("warning", "live.behind",
+    deps.events.add(EventLevel::warning, "live.behind",
                     std::to_string(dropped) + " measurements left the live path; they are stored", flight.id);
   }
   auto work = flight.work.lock();

@@ -34,7 +34,7 @@ Result<Mission> MissionService::mission(const MissionId& id) {
 Result<void> MissionService::create(const Mission& mission) {
   BOOST_OUTCOME_TRY(state_->deps.missions.insert(mission));
   prepare(mission.id);
-  state_->deps.events.add("info", "mission.started", mission.name + " started", mission.id);
+  state_->deps.events.add(EventLevel::info, "mission.started", mission.name + " started", mission.id);
   if (const auto flight = state_->find(mission.id)) {
     const auto work = flight->work.lock();
     state_->deps.hub.publish(Topic::mission_state, mission_state_json(mission, work->live.state()),
@@ -60,7 +60,7 @@ Result<Mission> MissionService::finish(const MissionId& id) {
     state_->schedule(flight);
   }
   state_->forget_reads(id);
-  state_->deps.events.add("info", "mission.finished", current.name + " finished", id);
+  state_->deps.events.add(EventLevel::info, "mission.finished", current.name + " finished", id);
   return current;
 }
 
@@ -136,7 +136,7 @@ void MissionService::note_in_flights(const std::string& code, const std::string&
       if (inbox->mission.state == MissionState::recording) recording.push_back(id);
     }
   }
-  for (const auto& id : recording) state_->deps.events.add("info", code, text, id);
+  for (const auto& id : recording) state_->deps.events.add(EventLevel::info, code, text, id);
 }
 
 void MissionService::arrived(std::span<const Range> ranges) { state_->take_newest(ranges); }

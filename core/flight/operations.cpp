@@ -147,7 +147,7 @@ void Operations::read_reports(const Now& now) {
       unconfirmed_.reset();
     } else if (!superseded) {
       if (r.state == CommandState::refused)
-        log_event("warning", "cmd.refused", c->action + " refused: " + r.text, mission);
+        log_event(EventLevel::warning, "cmd.refused", c->action + " refused: " + r.text, mission);
       unconfirmed_ = c->number;
     }
   }
@@ -157,13 +157,13 @@ void Operations::take_events(ActiveFlight& f) {
   for (auto& h : f.control.engine().take_events()) {
     const bool by_the_board =
         h.code.ends_with(".cleared") || std::ranges::find(k_flight_alarms, h.code) != k_flight_alarms.end();
-    if (!by_the_board) log_event(std::move(h.level), std::move(h.code), std::move(h.text), f.mission);
+    if (!by_the_board) log_event(h.level, std::move(h.code), std::move(h.text), f.mission);
   }
 }
 
 void Operations::round(const Now& now, const std::optional<Estimates>& live, bool at_hand) {
   if (lease_.just_ended(now)) {
-    log_event(flying() ? "warning" : "info", "control.ended",
+    log_event(flying() ? EventLevel::warning : EventLevel::info, "control.ended",
               "control ended: it was not renewed for a minute",
               flight_ ? std::optional(flight_->mission) : std::nullopt);
     show_soon_ = true;

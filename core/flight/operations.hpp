@@ -21,6 +21,7 @@
 #include "core/ports/drone.hpp"
 #include "core/procedure/flight_control.hpp"
 #include "core/procedure/flight_priors.hpp"
+#include "core/types/event_level.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/mission.hpp"
 #include "core/types/plan.hpp"
@@ -42,7 +43,7 @@ struct Now : Moment {
 
 /// A line of the event log.
 struct LogEvent {
-  std::string level;  ///< info, warning, critical
+  EventLevel level{};
   std::string code;
   std::string text;
   std::optional<MissionId> mission{};
@@ -204,8 +205,8 @@ class Operations {
   std::optional<std::string> take_off_refused(const Plan& plan, const MissionId& mission) const;
   const FlightUpload* uploaded(const Plan& plan, const std::string& what) const;
   std::optional<ChecklistItem> fence_item(const Plan& plan) const;
-  void log_event(std::string level, std::string code, std::string text, std::optional<MissionId> mission) {
-    events_.push_back({std::move(level), std::move(code), std::move(text), std::move(mission)});
+  void log_event(EventLevel level, std::string code, std::string text, std::optional<MissionId> mission) {
+    events_.push_back({level, std::move(code), std::move(text), std::move(mission)});
   }
 
   Drone* drone_;

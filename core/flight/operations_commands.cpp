@@ -52,7 +52,7 @@ Result<Lease> Operations::take_control(const Now& now, const MissionId& mission,
       before && before->mission != mission && !(flying() && flight_->mission == before->mission);
   auto lease = lease_.take(mission, who, now, by_force || idle, std::move(key));
   if (lease) {
-    log_event(before ? "warning" : "info", "control.taken",
+    log_event(before ? EventLevel::warning : EventLevel::info, "control.taken",
               who.name + (before ? " took control from " + before->name : " has control"), mission);
     show_soon_ = true;
   }
@@ -62,7 +62,7 @@ Result<Lease> Operations::take_control(const Now& now, const MissionId& mission,
 Result<void> Operations::release_control(const Now& now, const MissionId& mission, const std::string& key,
                                          const Holder& who) {
   BOOST_OUTCOME_TRYV(lease_.release(mission, key, who, now));
-  log_event("info", "control.released", who.name + " gave control back", mission);
+  log_event(EventLevel::info, "control.released", who.name + " gave control back", mission);
   show_soon_ = true;
   return boost::outcome_v2::success();
 }
@@ -127,7 +127,7 @@ Result<void> Operations::override_item(const Now& now, const MissionId& mission,
       return make_error(Errc::invalid_argument, item + " cannot be overridden: " + one.text);
   }
   overridden_[mission][item] = {who, reason};
-  log_event("info", "checklist." + item, who + ": " + reason, mission);
+  log_event(EventLevel::info, "checklist." + item, who + ": " + reason, mission);
   return boost::outcome_v2::success();
 }
 
@@ -216,7 +216,7 @@ Result<FlightCommand> Operations::act(const Now& now, const MissionId& mission, 
       by_drone_number_[f.control.abort()] = command.number;
     f.aborted = "aborted by " + who + ": the aircraft is the pilot's";
     f.aborted_s = now.s;
-    log_event("warning", "procedure.aborted", f.aborted, mission);
+    log_event(EventLevel::warning, "procedure.aborted", f.aborted, mission);
     return command;
   }
   const auto event = trigger_of(action);
@@ -240,7 +240,7 @@ Result<DroneStatus> Operations::change_aircraft(const MissionId& mission, const 
     return make_error(Errc::invalid_argument,
                       "the aircraft in the air answers; land it before another one takes the link");
   drone_->change_peer(sender);
-  log_event("warning", "drone.changed",
+  log_event(EventLevel::warning, "drone.changed",
             who + (sender.empty() ? ": the next autopilot whose heartbeat is received is the aircraft"
                                   : ": the autopilot at " + sender + " is the aircraft"),
             mission);
@@ -262,7 +262,7 @@ Result<void> Operations::recover(const Now& now, KeptFlight kept) {
   if (const auto check = planning::check_plan(flight_->plan)) flight_->forecast = check.value().time;
   // Not heard yet: whether the hold leaves is decided by the mode that the first heartbeat shows.
   take_events(*flight_);
-  log_event("critical", "procedure.restarted",
+  log_event(EventLevel::critical, "procedure.restarted",
             "server restarted in flight: hold commanded, waiting for the operator", kept.mission);
   return boost::outcome_v2::success();
 }

@@ -39,7 +39,7 @@ void FlightEngine::assess_anchors(double now_s, std::span<const Estimate> estima
       task.done = true;
       task.reached = exit->reached;
       task.why = exit->reason;
-      report(now_s, exit->reached ? "info" : "warning", "anchor.done",
+      report(now_s, exit->reached ? EventLevel::info : EventLevel::warning, "anchor.done",
              to_string(task.id) + ": " + exit->reason);
     } else {
       task.why = why_not_done(estimate, measured_at_[task.id], setup_.exit);

@@ -93,8 +93,8 @@ double FlightEngine::elapsed_s() const { return started_s_ ? state_.since_s - *s
 std::vector<Command> FlightEngine::take_commands() { return std::exchange(orders_, {}); }
 std::vector<Event> FlightEngine::take_events() { return std::exchange(events_, {}); }
 
-void FlightEngine::report(double now_s, std::string level, std::string code, std::string text) {
-  events_.push_back({now_s, std::move(level), std::move(code), std::move(text)});
+void FlightEngine::report(double now_s, EventLevel level, std::string code, std::string text) {
+  events_.push_back({now_s, level, std::move(code), std::move(text)});
 }
 
 void FlightEngine::fix(double now_s, const Eigen::Vector3d& enu_m, FixClass fix) {
@@ -119,7 +119,8 @@ void FlightEngine::range(double now_s, NetworkId anchor, bool used, std::optiona
   if (rss_dbm && state_.step == Step::height_search && at) priors_.climbed(anchor, at->z(), *rss_dbm);
   if (!used) return;
   if (note_range(state_, anchor))
-    report(now_s, "info", "anchor.found", "anchor " + to_string(anchor) + " in range for the first time");
+    report(now_s, EventLevel::info, "anchor.found",
+           "anchor " + to_string(anchor) + " in range for the first time");
 }
 
 void FlightEngine::vehicle(double now_s, const VehicleView& view) {
@@ -139,7 +140,7 @@ void FlightEngine::taken_over(double now_s, const std::string& mode) {
   legs_.clear();
   pending_.reset();
   feed(now_s, Trigger::taken_over, mode);
-  report(now_s, "warning", "drone.taken_over", "the pilot or a failsafe has the aircraft: " + mode);
+  report(now_s, EventLevel::warning, "drone.taken_over", "the pilot or a failsafe has the aircraft: " + mode);
 }
 
 /// What is wrong is judged anew: it was only told of before.
@@ -241,7 +242,7 @@ void FlightEngine::apply(double now_s, const Advance& step) {
   point_task_.reset();
   asked_.reset();
   answer_.reset();
-  report(now_s, "info", "procedure." + std::string(to_string(state_.step)), state_.reason);
+  report(now_s, EventLevel::info, "procedure." + std::string(to_string(state_.step)), state_.reason);
   for (const auto& c : step.commands) execute(now_s, c);
 }
 
@@ -251,7 +252,7 @@ void FlightEngine::execute(double now_s, const Command& c) {
       Command up = c;
       up.point_m.z() = climb_to_m_ = take_off_height_m(setup_);
       if (const auto refused = refuse_command(setup_.limits, position_m(), up)) {
-        report(now_s, "critical", "cmd.refused", refused->text);
+        report(now_s, EventLevel::critical, "cmd.refused", refused->text);
         pending_ = vehicle_.armed || vehicle_.in_air ? Trigger::land : Trigger::not_taken_off;
         pending_text_ = refused->text;
       } else {
@@ -285,7 +286,7 @@ void FlightEngine::fly(double now_s, const Eigen::Vector3d& to_m, std::optional<
       from && !(home && lost) ? planning::route(setup_.limits.bounds, *from, to_m) : std::nullopt;
   if (!way && home) return order({Command::Kind::return_home, {0, 0, 0}, std::nullopt});
   if (!way) {
-    report(now_s, "warning", "point.unreachable", "no legal way to the target");
+    report(now_s, EventLevel::warning, "point.unreachable", "no legal way to the target");
     pending_ = Trigger::unreachable;
     pending_text_ = "no legal way";
     return;
@@ -300,7 +301,7 @@ void FlightEngine::next_leg(double now_s) {
   const Command c{Command::Kind::go_to, legs_.front(),
                   state_.step == Step::return_home ? std::nullopt : state_.heading_rad};
   if (const auto refused = refuse_command(setup_.limits, position_m(), c)) {
-    report(now_s, "warning", "point.unreachable", refused->text);
+    report(now_s, EventLevel::warning, "point.unreachable", refused->text);
     legs_.clear();
     pending_ = Trigger::unreachable;
     pending_text_ = refused->text;
@@ -337,13 +338,14 @@ void FlightEngine::monitor(double now_s) {
       vehicle_.speed_mps * std::min(k_late_s + now.position_age_s + now.autopilot_silent_s, k_latest_s);
   const auto alarm = watch(limits, now);
   if (taken_over_) {
-    if (alarm && (!alarm_ || alarm_->id != alarm->id)) report(now_s, "critical", alarm->id, alarm->text);
+    if (alarm && (!alarm_ || alarm_->id != alarm->id))
+      report(now_s, EventLevel::critical, alarm->id, alarm->text);
     alarm_ = alarm;
     return;
   }
   if (alarm && alarm->climbs && alarm_ && alarm_->climbs) climb(now_s);
   if (alarm && (!alarm_ || alarm_->id != alarm->id || alarm_->reaction < alarm->reaction)) {
-    report(now_s, "critical", alarm->id, alarm->text);
+    report(now_s, EventLevel::critical, alarm->id, alarm->text);
     alarm_ = alarm;
     const auto step = state_.step;
     if (alarm->climbs) {
@@ -362,7 +364,7 @@ void FlightEngine::monitor(double now_s) {
     }
     return;
   }
-  if (!alarm && alarm_) report(now_s, "info", alarm_->id + ".cleared", "no longer");
+  if (!alarm && alarm_) report(now_s, EventLevel::info, alarm_->id + ".cleared", "no longer");
   alarm_ = alarm;
 }
 
@@ -470,7 +472,7 @@ bool FlightEngine::end_of_time(double now_s, std::span<const Estimate> estimates
     return false;
   assess_anchors(now_s, estimates);
   const std::string why = "the flight time of " + std::to_string(std::lround(*longest_s)) + " s is over";
-  report(now_s, "warning", "procedure.time_over", why);
+  report(now_s, EventLevel::warning, "procedure.time_over", why);
   return feed(now_s, Trigger::return_home, why);
 }
 

@@ -15,6 +15,7 @@
 #include "core/procedure/prior_book.hpp"
 #include "core/procedure/safety.hpp"
 #include "core/types/estimate.hpp"
+#include "core/types/event_level.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/plan.hpp"
 
@@ -77,7 +78,7 @@ struct PointTask {
 
 struct Event {
   double time_s{};
-  std::string level;  ///< info, warning, critical
+  EventLevel level{};
   std::string code;
   std::string text;
 };
@@ -149,7 +150,7 @@ class FlightEngine {
   void climb(double now_s);
   bool end_of_time(double now_s, std::span<const Estimate> estimates);
   bool down(double now_s);
-  void report(double now_s, std::string level, std::string code, std::string text);
+  void report(double now_s, EventLevel level, std::string code, std::string text);
   void monitor(double now_s);
   bool lands_by_itself() const;
   void note_lobes();
