@@ -5,21 +5,16 @@
 #include "api/anchors/anchor_json.hpp"
 #include "api/anchors/anchor_kml.hpp"
 #include "api/anchors/contradiction_watch.hpp"
-#include "api/anchors/frame_json.hpp"
-#include "api/anchors/geo_service.hpp"
+#include "api/anchors/published_features.hpp"
 #include "api/anchors/routes.hpp"
 #include "api/anchors/site_json.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "api/missions/mission_service.hpp"
-#include "api/wire/budget_json.hpp"
 #include "api/wire/live_writer.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
-#include "core/geo/enu.hpp"
 #include "core/ports/anchor_store.hpp"
-#include "core/ports/calibration_store.hpp"
-#include "core/ports/frame_store.hpp"
 #include "core/ports/revision_store.hpp"
 #include "core/ports/site_store.hpp"
 
@@ -29,150 +24,10 @@ using Ordered = nlohmann::ordered_json;
 
 namespace {
 
-/// Sites and calibrations that features refer to, each read once.
-class Lookup {
- public:
-  explicit Lookup(AnchorApi& services) : services_(services) {}
-  std::optional<Site> site(const std::optional<SiteId>& id) {
-    if (!id) return std::nullopt;
-    auto [it, fresh] = sites_.try_emplace(*id);
-    if (fresh) {
-      if (auto found = services_.sites.site(*id)) it->second = std::move(found).value();
-    }
-    return it->second;
-  }
-  const std::vector<MissionId>& missions(const CalibrationId& id) { return calibration(id).missions; }
-  /// Of a published place that a fitted frame gave.
-  std::optional<GlobeAccuracy> globe(const PublishedPosition& position) {
-    if (position.frame != TrackFrame::local) return std::nullopt;
-    return globe_accuracy(calibration(position.calibration).provenance, position.estimate.anchor);
-  }
-
-  /// What its uncertainty comes from; empty where the calibration is of before budgets.
-  std::string budget(const PublishedPosition& position) {
-    const Ordered kept = kept_budget(calibration(position.calibration).provenance, position.estimate.anchor);
-    return kept.is_null() ? std::string{} : to_wire(kept);
-  }
-
-  /// What the position is called elsewhere: the positioning system's frame, the map, sea level.
-  void name_elsewhere(AnchorFeature& feature) {
-    if (!feature.estimate || !feature.estimate->best || !feature.estimate->best->wgs84) return;
-    const Wgs84& at = *feature.estimate->best->wgs84;
-    const auto map = services_.geo.projected(feature.site, at);
-    if (map)
-      feature.projected = {map.value().epsg, map.value().easting_northing_m.x(),
-                           map.value().easting_northing_m.y()};
-    else
-      feature.projected_reason = map.error().message;
-    const auto height = services_.geo.orthometric(at);
-    if (height) feature.height_orthometric_m = height.value().height_m;
-    feature.geoid = height ? height.value().geoid : height.error().message;
-    if (const auto* frame = local_frame(feature.anchor.site))
-      feature.local_m = frame->fit.transform.local_from(EnuFrame(frame->origin).enu_from_wgs84(at).m);
-  }
-
- private:
-  /// The first fitted frame of the site.
-  const FrameDefinition* local_frame(const std::optional<SiteId>& site) {
-    if (!site) return nullptr;
-    auto [it, fresh] = frames_.try_emplace(*site);
-    if (fresh) {
-      if (const auto found = services_.frames.frames_of(*site)) {
-        for (const auto& frame : found.value()) {
-          if (!it->second) it->second = frame_definition(frame);
-        }
-      }
-    }
-    return it->second ? &*it->second : nullptr;
-  }
-
-  struct Made {
-    std::vector<MissionId> missions;
-    Ordered provenance;
-  };
-  const Made& calibration(const CalibrationId& id) {
-    auto [it, fresh] = calibrations_.try_emplace(id);
-    if (fresh) {
-      if (auto found = services_.calibrations.calibration(id))
-        it->second = {found.value().missions, Ordered::parse(found.value().provenance.text, nullptr, false)};
-    }
-    return it->second;
-  }
-
-  AnchorApi& services_;
-  std::map<SiteId, std::optional<FrameDefinition>> frames_;
-  std::map<SiteId, std::optional<Site>> sites_;
-  std::map<CalibrationId, Made> calibrations_;
-};
-
-AnchorFeature published_feature(Lookup& lookup, Anchor anchor, const PublishedPosition& position,
-                                std::uint64_t revision) {
-  AnchorFeature feature;
-  feature.site = lookup.site(anchor.site);
-  feature.anchor = std::move(anchor);
-  feature.status = feature.anchor.retired ? "retired" : "accepted";
-  feature.revision = revision;
-  feature.calibrated = position.published;
-  feature.calibration = position.calibration;
-  feature.missions = lookup.missions(position.calibration);
-  feature.frame = position.frame;
-  feature.estimate = position.estimate;
-  feature.overridden = position.overridden;
-  feature.globe = lookup.globe(position);
-  feature.budget_json = lookup.budget(position);
-  lookup.name_elsewhere(feature);
-  return feature;
-}
-
-/// As it is stored; one whose row follows the flight by a moment, or waits for the disk, has no id yet.
-/// Reading stores nothing.
-Anchor anchor_as_stored(AnchorApi& s, NetworkId id) {
-  auto found = s.anchors.anchor(id);
-  if (found || found.error().code != Errc::not_found) return value_or_problem(std::move(found));
-  Anchor anchor;
-  anchor.network_id = id;
-  return anchor;
-}
-
-/// A later flight found it elsewhere: no reader may take it for accepted.
-void contradict(AnchorFeature& feature, const ContradictedAnchor& against) {
-  if (feature.anchor.retired) return;
-  feature.status = "contradicted";
-  feature.contradicted = {against.calibration, to_wire(contradiction_json(against)), against.text};
-  feature.estimate->gates.push_back(
-      {"contradicted", against.what.chi2, against.what.limit, false, against.text});
-}
-
-std::uint64_t newest_revision(AnchorApi& s) {
-  const auto newest = value_or_problem(s.revisions.revisions(1, 0));
-  return newest.empty() ? 0 : newest.front().number;
-}
-
-/// All features of the published revision (newest when absent), in order of network id.
-std::vector<AnchorFeature> published(AnchorApi& s, std::optional<std::uint64_t> revision,
-                                     std::uint64_t& number) {
-  number = revision ? *revision : newest_revision(s);
-  if (number == 0) return {};
-  Lookup lookup(s);
-  const auto contradicted = s.contradictions.standing();
-  const bool newest = !revision || number == newest_revision(s);
-  std::vector<AnchorFeature> out;
-  for (const auto& position : value_or_problem(s.revisions.published(number))) {
-    auto anchor = anchor_as_stored(s, position.estimate.anchor);
-    out.push_back(published_feature(lookup, std::move(anchor), position, number));
-    const auto against = contradicted->find(position.estimate.anchor);
-    // What an older revision said is history; only the newest is what readers build on.
-    if (newest && against != contradicted->end()) contradict(out.back(), against->second);
-  }
-  std::sort(out.begin(), out.end(),
-            [](const auto& a, const auto& b) { return a.anchor.network_id < b.anchor.network_id; });
-  return out;
-}
-
 /// Running estimates; of an anchor that several missions hear the newest.
 std::vector<AnchorFeature> live(AnchorApi& s, const std::optional<MissionId>& mission) {
   if (mission) value_or_problem(s.missions.mission(*mission));
-  Lookup lookup(s);
+  FeatureLookup lookup(s);
   std::map<NetworkId, AnchorFeature> newest;
   for (const auto& view : s.missions.live(mission)) {
     for (const auto& estimate : view.estimates) {
@@ -224,7 +79,7 @@ std::vector<AnchorFeature> wanted(AnchorApi& s, const Request& request, std::uin
   if (view != "published" && view != "live")
     throw_problem(422, "validation", "view is published or live",
                   {{"/view", "unknown_value", "must be published or live"}});
-  auto all = view == "live" ? live(s, query_mission(request)) : published(s, revision, number);
+  auto all = view == "live" ? live(s, query_mission(request)) : published_features(s, revision, number);
   const auto box = query_box(request);
   const auto site = request.query_value("site");
   std::erase_if(all, [&](const AnchorFeature& feature) {
@@ -292,9 +147,9 @@ Anchor path_anchor(AnchorApi& s, const Request& request) {
 }
 
 AnchorFeature feature_of(AnchorApi& s, const Anchor& anchor) {
-  Lookup lookup(s);
+  FeatureLookup lookup(s);
   std::uint64_t number = 0;
-  for (auto& feature : published(s, std::nullopt, number)) {
+  for (auto& feature : published_features(s, std::nullopt, number)) {
     if (feature.anchor.network_id == anchor.network_id) return feature;
   }
   AnchorFeature feature;
@@ -347,7 +202,7 @@ Response history(AnchorApi& s, const Request& request) {
   check_query(request, {});
   const Anchor anchor = path_anchor(s, request);
   Ordered items = Ordered::array();
-  Lookup lookup(s);
+  FeatureLookup lookup(s);
   for (const auto& position : value_or_problem(s.revisions.history(anchor.network_id)))
     items.push_back(published_json(position, lookup.globe(position)));
   return list_response(request, std::move(items), "");

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "api/anchors/anchor_json.hpp"
+
+namespace anchord::api {
+
+struct AnchorApi;
+
+/// Sites, calibrations and frames that the features of one answer refer to, each read once.
+class FeatureLookup {
+ public:
+  explicit FeatureLookup(AnchorApi& services);
+  ~FeatureLookup();
+  FeatureLookup(const FeatureLookup&) = delete;
+  FeatureLookup& operator=(const FeatureLookup&) = delete;
+
+  std::optional<Site> site(const std::optional<SiteId>& id);
+  /// Of a published place that a fitted frame gave.
+  std::optional<GlobeAccuracy> globe(const PublishedPosition& position);
+  /// A published position as a feature; `revision` is the one that the reader asked for.
+  AnchorFeature feature(Anchor anchor, const PublishedPosition& position, std::uint64_t revision);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// As it is stored; one whose row follows the flight by a moment, or waits for the disk, has no id yet.
+/// Reading stores nothing.
+Anchor anchor_as_stored(AnchorApi& services, NetworkId id);
+
+/// 0: nothing was ever published.
+std::uint64_t newest_revision(AnchorApi& services);
+
+/// All features of the published revision (newest when absent), in order of network id; `number` is the
+/// revision that was read.
+std::vector<AnchorFeature> published_features(AnchorApi& services, std::optional<std::uint64_t> revision,
+                                              std::uint64_t& number);
+
+}  // namespace anchord::api
