@@ -21,6 +21,7 @@
 #include "api/devices/device_json.hpp"
 #include "api/devices/device_stream.hpp"
 #include "api/devices/routes.hpp"
+#include "api/exchange/routes.hpp"
 #include "api/flight/flight_service.hpp"
 #include "api/flight/procedure_json.hpp"
 #include "api/flight/routes.hpp"
@@ -176,6 +177,7 @@ struct Application::State {
         planning_api{stores.plans, stores.sites, deps.clock, audit,
                      [this](const PlanId& id) { return flights.flown_with(id); }},
         flight_api{flights, mission_api, events, audit},
+        exchange_api{anchor_api, stores.missions, stores.measurements},
         learning_stores{stores.campaigns, stores.labels, stores.datasets, stores.training_runs,
                         stores.models},
         learning_api{learning_stores,
@@ -217,6 +219,7 @@ struct Application::State {
     add_alarm_routes(router, admin_api);
     add_backup_routes(router, admin_api);
     add_system_routes(router, admin_api);
+    add_ogc_routes(router, exchange_api);
   }
 
   ServerCounts counts() const {
@@ -287,6 +290,7 @@ struct Application::State {
   CalibrationApi calibration_api;
   PlanningApi planning_api;
   FlightApi flight_api;
+  ExchangeApi exchange_api;
   LearningStores learning_stores;
   LearningApi learning_api;
   Locked<bool> stopping{false};

@@ -16,6 +16,13 @@ using Ordered = nlohmann::ordered_json;
 
 namespace {
 
+[[noreturn]] void bad_query(const char* name, std::string detail) {
+  throw_problem(422, "validation", std::string(name) + " " + detail,
+                {{std::string("/") + name, "bad_value", detail}});
+}
+
+}  // namespace
+
 std::string percent_encoded(std::string_view text) {
   static constexpr char k_hex[] = "0123456789ABCDEF";
   std::string out;
@@ -33,13 +40,6 @@ std::string percent_encoded(std::string_view text) {
   }
   return out;
 }
-
-[[noreturn]] void bad_query(const char* name, std::string detail) {
-  throw_problem(422, "validation", std::string(name) + " " + detail,
-                {{std::string("/") + name, "bad_value", detail}});
-}
-
-}  // namespace
 
 Access readers() { return Access::any_of({Role::viewer, Role::integrator, Role::engineer, Role::op}); }
 

@@ -35,6 +35,8 @@ PageQuery page_query(const Request& request, std::size_t max_limit = 1000);
 /// `total` only where the client asked for a count.
 Response list_response(const Request& request, nlohmann::ordered_json items, const std::string& next_cursor,
                        std::optional<std::uint64_t> total = std::nullopt);
+/// A part of a query: unreserved characters of RFC 3986 stay.
+std::string percent_encoded(std::string_view text);
 std::string next_link(const Request& request, const std::string& next_cursor);
 
 /// The path parameter as an id; 404 when it is none, for then there is nothing at this address.

@@ -345,10 +345,11 @@ test('everything that can be read', async () => {
     '/datasets/': ids.dataset,
     '/training-runs/': ids.run,
     '/models/': ids.model,
+    '/collections/': 'anchors',
   };
   const wrong = []; // all at once, as a person wants them
   for (const { method, template } of contract.operations.filter((o) => o.method === 'get')) {
-    if (template === '/api/v1/ws' || template.includes('{sample}') || template.endsWith('/uwb-settings')) continue; // tests of their own
+    if (template === '/api/v1/ws' || template.includes('{sample}') || template.includes('{feature}') || template.endsWith('/uwb-settings')) continue; // tests of their own
     const resource = Object.keys(given).find((part) => template.includes(part));
     const id = /missions\/[^/]+\/(procedure|grid)$/.test(template)
       ? ids.flown
@@ -370,6 +371,13 @@ test('everything that can be read', async () => {
   }
   assert.equal(wrong.join('\n\n'), '');
   await call('GET', '/api/v1/anchors?view=live', { expect: 200 });
+  for (const name of ['anchors', 'revisions', 'tracks']) {
+    const items = `/ogc/collections/${name}/items`;
+    const { json } = await call('GET', `${items}?limit=1`, { expect: 200 });
+    await call('GET', `${items}/${json.features[0].id}`, { expect: 200 });
+    await call('GET', `${items}/${unknown}`, { expect: 404 });
+    await call('GET', `${items}?bbox=1,2,3`, { expect: 400 });
+  }
   await call('GET', '/api/v1/missions?limit=0', { expect: 422 });
   await call('GET', '/api/v1/alarms', { expect: 200 });
   await call('POST', '/api/v1/alarms/rtk.lost/ack', { expect: 404, json: { note: 'seen' } });

@@ -1,0 +1,164 @@
+// The OGC face: what a query means, whatever client sends it. GDAL and QGIS read the same in
+// tests/e2e/neighbours.test.mjs.
+#include <set>
+
+#include "app_fixture.hpp"
+#include "core/base/to_wire.hpp"
+
+namespace anchord::test {
+namespace {
+
+using api::Role;
+
+class Ogc : public AppFixture {
+ protected:
+  using Query = std::map<std::string, std::string>;
+  /// 0x6a2f at Ghent, 0x6a3c beside the antimeridian; published as revision 1.
+  void publish() {
+    const auto id = stored_calibration([](Estimate& e) {
+      if (e.anchor.value == 0x6a3c) e.best->wgs84 = Wgs84{-17.5, 179.99, 12.25};
+    });
+    const auto made = post("/api/v1/calibrations/" + id + "/publish", "{}");
+    ASSERT_EQ(made.status, 201) << made.body;
+  }
+  Json items(const std::string& collection, Query query = {}, int status = 200) {
+    const auto response = get("/ogc/collections/" + collection + "/items", std::move(query));
+    EXPECT_EQ(response.status, status) << response.body;
+    return Json::parse(response.body);
+  }
+  static std::set<std::string> anchors(const Json& page) {
+    std::set<std::string> out;
+    for (const auto& feature : page["features"]) out.insert(feature["properties"]["network_id"]);
+    return out;
+  }
+  using Names = std::set<std::string>;
+};
+
+TEST_F(Ogc, ABoxHoldsWhatIsInItAlsoAcrossTheAntimeridianAndBetweenHeights) {
+  publish();
+  EXPECT_EQ(anchors(items("anchors")), (Names{"0x6a2f", "0x6a3c"}));
+  EXPECT_EQ(anchors(items("anchors", {{"bbox", "3,51,4,52"}})), Names{"0x6a2f"});
+  EXPECT_EQ(anchors(items("anchors", {{"bbox", "179,-18,-179,-17"}})), Names{"0x6a3c"});
+  EXPECT_EQ(anchors(items("anchors", {{"bbox", "-180,-90,58,180,90,59"}})), Names{"0x6a2f"});
+  EXPECT_EQ(anchors(items("anchors", {{"bbox", "51,3,52,4"},
+                                      {"bbox-crs", "http://www.opengis.net/def/crs/EPSG/0/4326"}})),
+            Names{"0x6a2f"});
+  EXPECT_EQ(items("anchors", {{"bbox", "5,51,6,52"}})["numberMatched"], 0);
+}
+
+TEST_F(Ogc, CoordinatesComeInTheOrderOfTheSystemThatWasAskedFor) {
+  publish();
+  const std::string point = "/ogc/collections/anchors/items/0x6a2f";
+  const auto at = [&](const Query& query) { return json(get(point, query))["geometry"]["coordinates"]; };
+  EXPECT_EQ(at({}), Json({3.7131, 51.0231, 58.4}));
+  EXPECT_EQ(at({{"crs", "http://www.opengis.net/def/crs/EPSG/0/4979"}}), Json({51.0231, 3.7131, 58.4}));
+  EXPECT_EQ(at({{"crs", "http://www.opengis.net/def/crs/OGC/1.3/CRS84"}}), Json({3.7131, 51.0231}));
+  EXPECT_EQ(header(get(point, {{"crs", "http://www.opengis.net/def/crs/EPSG/0/4979"}}), "Content-Crs"),
+            "<http://www.opengis.net/def/crs/EPSG/0/4979>");
+  EXPECT_EQ(header(get(point), "Content-Crs"), "<http://www.opengis.net/def/crs/OGC/0/CRS84h>");
+  EXPECT_EQ(get(point, {{"crs", "http://www.opengis.net/def/crs/EPSG/0/25831"}}).status, 400);
+}
+
+TEST_F(Ogc, PagesShowEachFeatureOnce) {
+  publish();
+  const Json first = items("anchors", {{"limit", "1"}});
+  EXPECT_EQ(first["numberReturned"], 1);
+  EXPECT_EQ(first["numberMatched"], 2);
+  ASSERT_EQ(first["links"].size(), 2U);
+  EXPECT_EQ(first["links"][1]["rel"], "next");
+  EXPECT_EQ(first["links"][1]["href"], "/ogc/collections/anchors/items?limit=1&cursor=0x6a3c");
+  const Json second = items("anchors", {{"limit", "1"}, {"cursor", "0x6a3c"}});
+  EXPECT_EQ(anchors(first), Names{"0x6a2f"});
+  EXPECT_EQ(anchors(second), Names{"0x6a3c"});
+  EXPECT_EQ(second["links"].size(), 1U);
+  EXPECT_EQ(items("anchors", {{"limit", "1000000"}})["numberReturned"], 2)
+      << "the maximum, as the standard has it";
+}
+
+TEST_F(Ogc, LinksAreAbsoluteAndSayHowAProxyWasAsked) {
+  Call options;
+  options.headers["host"] = "anchord.example:8420";
+  const auto self = [&] { return json(call(api::Method::get, "/ogc", "", options))["links"][0]["href"]; };
+  EXPECT_EQ(self(), "http://anchord.example:8420/ogc");
+  options.headers["x-forwarded-proto"] = "https";
+  EXPECT_EQ(self(), "https://anchord.example:8420/ogc");
+}
+
+TEST_F(Ogc, ARevisionIsOneFeatureForEachPositionItSet) {
+  publish();
+  publish();
+  const Json page = items("revisions");
+  ASSERT_EQ(page["numberMatched"], 4);
+  std::set<std::string> newest, ids;
+  for (const auto& feature : page["features"]) {
+    ids.insert(feature["id"]);
+    if (feature["properties"]["newest"]) newest.insert(feature["id"]);
+  }
+  EXPECT_EQ(ids, (Names{"1-0x6a2f", "2-0x6a2f", "1-0x6a3c", "2-0x6a3c"}));
+  EXPECT_EQ(newest, (Names{"2-0x6a2f", "2-0x6a3c"}));
+  const std::string when = page["features"][0]["properties"]["calibrated_at"];
+  EXPECT_EQ(items("revisions", {{"datetime", when + "/.."}})["numberMatched"], 2);
+  EXPECT_EQ(items("revisions", {{"datetime", "2001-01-01T00:00:00Z/2002-01-01T00:00:00Z"}})["numberMatched"],
+            0);
+  EXPECT_EQ(get("/ogc/collections/revisions/items/1-0x6a3c").status, 200);
+  EXPECT_EQ(get("/ogc/collections/revisions/items/9-0x6a3c").status, 404);
+}
+
+// A metre of latitude is 1 / 111 252 degree at 51 N (WGS 84, meridian radius of curvature 6 374 241 m).
+TEST_F(Ogc, ATrackKeepsThePathAndNotTheHovering) {
+  const auto id = mission();
+  std::string rows;
+  for (int i = 0; i < 300; ++i) {
+    const double lat_deg = 51.0 + (i < 100 ? 0 : (i - 99) * 0.1 / 111252);  // hovers, then 0.1 m each
+    rows += R"({"t_us":)" + std::to_string(1777889472000000LL + i * 100000LL) + R"(,"lon":3.7,"lat":)" +
+            to_wire(Json(lat_deg)) + R"(,"h_m":60.5,"fix":"fixed"})" + "\n";
+  }
+  ASSERT_EQ(post("/api/v1/fixes", rows, "application/x-ndjson", {{"mission", id}}).status, 200);
+  const Json track = items("tracks")["features"][0];
+  EXPECT_EQ(track["properties"]["n_fixes"], 300);
+  EXPECT_EQ(track["geometry"]["type"], "LineString");
+  EXPECT_EQ(track["geometry"]["coordinates"].size(), 201U);
+  EXPECT_EQ(track["geometry"]["coordinates"][0], Json({3.7, 51.0, 60.5}));
+  EXPECT_EQ(items("tracks", {{"bbox", "3,50,4,52"}})["numberReturned"], 1);
+  EXPECT_EQ(items("tracks", {{"bbox", "5,50,6,52"}})["numberReturned"], 0);
+  EXPECT_EQ(items("tracks", {{"datetime", "2026-05-04T10:11:20Z"}})["numberReturned"], 1)
+      << "during the flight";
+  EXPECT_EQ(items("tracks", {{"datetime", "../2026-05-04T10:11:11Z"}})["numberReturned"], 0);
+  EXPECT_EQ(get("/ogc/collections/tracks/items/" + id).status, 200);
+}
+
+TEST_F(Ogc, AFlightWithoutAPlaceOnTheGlobeHasNoGeometry) {
+  mission("local");
+  mission();  // without a position
+  const Json page = items("tracks", {{"limit", "1"}});
+  EXPECT_EQ(page["features"][0]["geometry"], nullptr);
+  EXPECT_EQ(page["links"].size(), 2U);
+  EXPECT_EQ(items("tracks")["features"][1]["geometry"], nullptr);
+}
+
+TEST_F(Ogc, WrongQueriesAreBadRequests) {
+  for (const Query& wrong :
+       {Query{{"bbox", "1,2,3"}}, Query{{"bbox", "1,2,3,x"}}, Query{{"bbox", "1,5,2,4"}},
+        Query{{"limit", "0"}}, Query{{"limit", "many"}}, Query{{"datetime", "yesterday"}},
+        Query{{"cursor", "nobody"}}, Query{{"datetime", "2026-05-05T00:00:00Z/2026-05-04T00:00:00Z"}},
+        Query{{"colour", "red"}}, Query{{"f", "html"}}}) {
+    const Json problem = items("anchors", wrong, 400);
+    EXPECT_EQ(problem["errors"].size(), 1U) << wrong.begin()->first;
+  }
+  EXPECT_EQ(get("/ogc/collections/zones").status, 404);
+  EXPECT_EQ(get("/ogc", {{"colour", "red"}}).status, 400);
+}
+
+TEST_F(Ogc, IsForReadersAndNobodyElse) {
+  for (const auto& route : app_->router().routes()) {
+    if (!route.pattern.starts_with("/ogc")) continue;
+    EXPECT_EQ(route.method, api::Method::get) << route.pattern;
+    for (const Role role : {Role::viewer, Role::integrator, Role::engineer, Role::op, Role::admin})
+      EXPECT_TRUE(route.access.permits({"x", "x", {role}})) << route.pattern << ' ' << to_string(role);
+    EXPECT_FALSE(route.access.permits({"x", "x", {Role::gateway}})) << route.pattern;
+    EXPECT_FALSE(route.access.permits({"x", "x", {}})) << route.pattern;
+  }
+}
+
+}  // namespace
+}  // namespace anchord::test
