@@ -40,7 +40,7 @@ set(rows
   "api/stream: core/base api/kit"
   "api/wire: core/base core/types core/geo core/localize core/flight api/kit"
   "api/formats: core/base core/types core/geo core/nlos core/ml core/planning core/localize api/kit api/wire"
-  "api/admin: core/base core/ports core/flight api/kit api/stream api/wire api/formats"
+  "api/admin: core/base core/types core/ports core/flight api/kit api/stream api/wire api/formats"
   "api/devices: core/base core/types core/ports core/geo api/kit api/wire api/admin"
   "api/learning: core/base core/types core/ports core/nlos core/ml core/localize api/kit api/wire api/formats api/admin"
   "api/missions: core/base core/types core/ports core/geo core/localize core/procedure core/flight api/kit api/stream api/wire api/admin api/devices"
