@@ -99,12 +99,14 @@ std::map<std::string, Json> enums_of_openapi() {
   const auto& components = contract.at("components");
   for (const auto& [name, schema] : components.at("schemas").items()) walk(schema, name, out);
   for (const auto& [name, one] : components.at("parameters").items()) walk(one, "?" + name, out);
-  for (const auto& [path, methods] : contract.at("paths").items())
+  for (const auto& [path, methods] : contract.at("paths").items()) {
+    if (path.starts_with("/ogc")) continue;  // its words are those of a standard
     for (const auto& [method, operation] : methods.items()) {
       std::string upper(method);
       for (char& c : upper) c = static_cast<char>(std::toupper(c));
       walk(operation, upper + " " + path, out);
     }
+  }
   return out;
 }
 
