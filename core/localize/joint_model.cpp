@@ -108,9 +108,9 @@ void add_lines(const std::vector<JointLine>& lines, const std::vector<double>& w
 void build_anchor(const AnchorTask& task, AnchorBlock& block, JointNormal& normal) {
   const FlightOptions& options = task.options;
   std::vector<JointLine> lines;
-  std::vector<double> sizes, times_s, position_variances;
+  std::vector<double> sizes, centred_of_m, times_s, position_variances;
   std::vector<const RangeErrorModel*> error_models;
-  Neighbours neighbours;
+  std::vector<const JointRow*> placed;
   lines.reserve(task.rows.rows.size());
   for (const JointRow& row : task.rows.rows) {
     JointLine line = linearise(task.flight.track, row, task.shared, task.anchor);
@@ -121,7 +121,8 @@ void build_anchor(const AnchorTask& task, AnchorBlock& block, JointNormal& norma
     const double centred_m = line.residual_m - (row.error_model ? expected_error_m(*row.error_model) : 0.0);
     sizes.push_back(std::abs(centred_m));
     error_models.push_back(row.error_model ? &*row.error_model : nullptr);
-    neighbours.add(row, centred_m);
+    placed.push_back(&row);
+    centred_of_m.push_back(centred_m);
     times_s.push_back(row.t_s);
     position_variances.push_back(line.position_variance_m2);
     block.last_t_s = std::max(block.last_t_s, row.t_s);
@@ -138,7 +139,8 @@ void build_anchor(const AnchorTask& task, AnchorBlock& block, JointNormal& norma
   const double scale2 = block.scale_m * block.scale_m;
   const double believed = task.claims ? believed_share(lines, error_models) : 1.0;
   double sum_square = 0;
-  std::vector<double> weights;
+  Neighbours neighbours;
+  std::vector<double> weights, kept_sizes;
   weights.reserve(lines.size());
   for (std::size_t i = 0; i < lines.size(); ++i) {
     JointLine& line = lines[i];
@@ -165,6 +167,8 @@ void build_anchor(const AnchorTask& task, AnchorBlock& block, JointNormal& norma
     sum_square += counted * counted_m * counted_m;
     if (weight > 0) {
       ++block.n_used;
+      neighbours.add(*placed[i], centred_of_m[i]);
+      kept_sizes.push_back(std::abs(centred_of_m[i]));
     } else {
       ++block.n_rejected;
     }
@@ -172,9 +176,13 @@ void build_anchor(const AnchorTask& task, AnchorBlock& block, JointNormal& norma
   if (block.n_rejected > 0) block.refused["outlier"] = block.n_rejected;
   if (block.sum_weight > 0) block.rms_m = std::sqrt(sum_square / block.sum_weight);
   const double alike = std::max(1.0, 2.0 * options.correlation_s * block.sum_weight / duration_s(times_s));
-  // The mean over a correlation time keeps what is shared and averages the rest.
+  // The mean over a correlation time keeps what is shared and averages the rest. Of the ranges kept: jumps to
+  // those that are off by metres, and the scale they blow up, are no noise, and taken for it they would make
+  // spoilt ranges count for more than clean ones.
   block.white_share = neighbours.white_share(scale2);
-  const double slow_share = k_least_slow_m * k_least_slow_m / scale2;
+  const double kept_m = kept_sizes.empty() ? block.scale_m : 1.4826 * median(kept_sizes);
+  const double kept2 = std::clamp(kept_m * kept_m, options.min_scale_m * options.min_scale_m, scale2);
+  const double slow_share = k_least_slow_m * k_least_slow_m / kept2;
   block.kappa = 1.0 + (alike - 1.0) * std::clamp(slow_share, 1.0 - k_believed_white * block.white_share, 1.0);
   add_lines(lines, weights, 1.0 / (block.kappa * scale2), block, normal);
 }

@@ -63,7 +63,7 @@ struct AnchorBlock {
   Eigen::Vector4d gradient{Eigen::Vector4d::Zero()};
   Eigen::Matrix4d own_inverse{Eigen::Matrix4d::Zero()};
   double scale_m{};      ///< 1.4826 MAD, never below the floor
-  double white_share{};  ///< of the residual variance, what changes from one range to the next
+  double white_share{};  ///< of the residual variance, what changes from one kept range to the next
   double kappa{1};       ///< tempering
   double sum_weight{};
   double rms_m{};                       ///< weighted
