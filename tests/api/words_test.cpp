@@ -97,10 +97,12 @@ std::map<std::string, Json> enums_of_openapi() {
   std::map<std::string, Json> out;
   const auto contract = Json::parse(openapi_json());
   const auto& components = contract.at("components");
-  for (const auto& [name, schema] : components.at("schemas").items()) walk(schema, name, out);
+  // The words of OGC API Features are those of its standard.
+  for (const auto& [name, schema] : components.at("schemas").items())
+    if (!name.starts_with("Ogc")) walk(schema, name, out);
   for (const auto& [name, one] : components.at("parameters").items()) walk(one, "?" + name, out);
   for (const auto& [path, methods] : contract.at("paths").items()) {
-    if (path.starts_with("/ogc")) continue;  // its words are those of a standard
+    if (path.starts_with("/ogc")) continue;
     for (const auto& [method, operation] : methods.items()) {
       std::string upper(method);
       for (char& c : upper) c = static_cast<char>(std::toupper(c));
