@@ -174,8 +174,12 @@ struct Application::State {
                         deps.clock,
                         audit,
                         "anchord " + deps.build.version},
-        planning_api{stores.plans, stores.sites, deps.clock, audit,
-                     [this](const PlanId& id) { return flights.flown_with(id); }},
+        planning_api{stores.plans,
+                     stores.sites,
+                     deps.clock,
+                     audit,
+                     [this](const PlanId& id) { return flights.flown_with(id); },
+                     [this](const Plan& plan) { flights.plan_saved(plan); }},
         flight_api{flights, mission_api, events, audit},
         exchange_api{anchor_api, stores.missions, stores.measurements},
         learning_stores{stores.campaigns, stores.labels, stores.datasets, stores.training_runs,
@@ -211,6 +215,7 @@ struct Application::State {
     add_job_routes(router, admin_api);
     add_plan_routes(router, planning_api);
     add_flight_routes(router, flight_api);
+    add_plan_change_routes(router, flight_api);
     add_campaign_routes(router, learning_api);
     add_dataset_routes(router, learning_api);
     add_training_run_routes(router, learning_api);

@@ -12,11 +12,71 @@ namespace anchord::api {
 namespace {
 
 constexpr std::uint64_t k_aborted = 1'000'000;  // beyond any number of transitions
+constexpr std::uint64_t k_change = 10'000'000;  // and of both
 
 /// System 0 where it is not said: whoever is heard first.
 DroneIdentity aircraft_of(const nlohmann::json& stored) {
   if (!stored.is_object()) return {};
   return {stored.value("peer", ""), stored.value("system", 0), stored.value("component", 0)};
+}
+
+nlohmann::ordered_json document_of(const Plan& plan) {
+  return {{"id", to_string(plan.id)},
+          {"revision", plan.version},
+          {"plan", nlohmann::json::parse(stored(plan).document.text)}};
+}
+std::optional<Plan> plan_in(const nlohmann::json& j) {
+  if (!j.is_object()) return std::nullopt;
+  std::vector<FieldError> errors;
+  Plan plan = read_plan(j.value("plan", nlohmann::json()), errors);
+  if (!errors.empty()) return std::nullopt;
+  if (const auto id = parse_uuid(j.value("id", ""))) plan.id = PlanId{id.value()};
+  plan.version = j.value("revision", 1ULL);
+  return plan;
+}
+
+/// Areas and the kept waypoint are written as plans: what reads one reads them.
+nlohmann::ordered_json changes_json(const flight::FlownChanges& c) {
+  nlohmann::ordered_json out{{"n", c.n},
+                             {"at_us", c.at.us()},
+                             {"by", c.by},
+                             {"own_origin", c.own_origin},
+                             {"saved_revision", c.saved_revision}};
+  if (c.former) out["former"] = document_of(*c.former);
+  if (c.kept) {
+    Plan at;
+    at.name = "waypoint";
+    at.waypoints = {c.kept->waypoint};
+    out["kept"] = {{"at", c.kept->at}, {"extra", c.kept->extra}, {"of", document_of(at)}};
+  }
+  if (c.autopilot_keeps) {
+    Plan areas;
+    areas.name = "areas";
+    areas.fence = c.autopilot_keeps->inside;
+    areas.no_fly = c.autopilot_keeps->outside;
+    out["autopilot_keeps"] = document_of(areas);
+  }
+  return out;
+}
+/// Of a flight that an older server began: nothing was changed, and its plan's origin was written with it.
+flight::FlownChanges changes_of(const nlohmann::json& j) {
+  flight::FlownChanges out;
+  if (!j.is_object()) return out;
+  out.n = j.value("n", 0ULL);
+  out.at = UtcTime::from_us(j.value("at_us", 0LL));
+  out.by = j.value("by", "");
+  out.own_origin = j.value("own_origin", true);
+  out.saved_revision = j.value("saved_revision", 0ULL);
+  out.former = plan_in(j.value("former", nlohmann::json()));
+  if (const auto kept = j.value("kept", nlohmann::json()); kept.is_object()) {
+    const auto at = plan_in(kept.value("of", nlohmann::json()));
+    if (at && at->waypoints.size() == 1)
+      out.kept =
+          flight::KeptPlace{at->waypoints[0], kept.value("at", std::size_t{0}), kept.value("extra", false)};
+  }
+  if (const auto areas = plan_in(j.value("autopilot_keeps", nlohmann::json())))
+    out.autopilot_keeps = DroneFence{areas->fence, areas->no_fly};
+  return out;
 }
 
 nlohmann::ordered_json document_of(const flight::ActiveFlight& f) {
@@ -29,6 +89,7 @@ nlohmann::ordered_json document_of(const flight::ActiveFlight& f) {
           {"aircraft", {{"peer", a.peer}, {"system", a.system}, {"component", a.component}}},
           {"origin", {o.lat_deg, o.lon_deg, o.height_m}},
           {"home_m", {f.home_m.x(), f.home_m.y(), f.home_m.z()}},
+          {"changes", changes_json(f.changes)},
           {"state", stored_state(f.control.engine().state())},
           {"clues", stored_priors(f.priors())}};
 }
@@ -51,6 +112,7 @@ std::optional<flight::KeptFlight> kept_flight(const MissionId& mission, const nl
   out.home_m = {j["home_m"][0].get<double>(), j["home_m"][1].get<double>(), j["home_m"][2].get<double>()};
   out.manual = j.value("manual", false);
   out.aircraft = aircraft_of(j.value("aircraft", nlohmann::json()));
+  out.changes = changes_of(j.value("changes", nlohmann::json()));
   out.priors = priors_of(j.value("clues", nlohmann::json()));
   return out;
 }
@@ -60,7 +122,8 @@ std::optional<flight::KeptFlight> kept_flight(const MissionId& mission, const nl
 bool FlightService::State::to_keep(Work& w, std::string& text) {
   const auto& f = w.operations.flight();
   if (!f) return false;
-  const auto n = f->control.engine().state().n_transitions + (f->aborted.empty() ? 0 : k_aborted);
+  const auto n = f->control.engine().state().n_transitions + (f->aborted.empty() ? 0 : k_aborted) +
+                 k_change * (f->changes.n + f->changes.saved_revision);
   if (n == w.last.kept) return false;
   w.last.kept = n;
   text.clear();

@@ -15,6 +15,7 @@
 #include "core/flight/checklist.hpp"
 #include "core/flight/command.hpp"
 #include "core/flight/control_lease.hpp"
+#include "core/flight/plan_change.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/plan.hpp"
 
@@ -99,6 +100,37 @@ class FlightService final : public MissionObserver, public MissionControl {
   /// plan
   Result<FlightCommand> upload(const MissionId& mission, const std::string& what, const PlanId& plan,
                                const std::string& lease, const Principal& who);
+  /// What is flown, and how it came to be; the plan has the origin of the flight.
+  struct FlownPlan {
+    Plan plan;
+    std::uint64_t n_changes{};
+    UtcTime changed{};
+    std::string changed_by;
+    std::uint64_t saved_revision{};                ///< 0: none since the start
+    std::optional<std::uint64_t> former_revision;  ///< that undo goes back to
+  };
+  /// errors  not_found: no such mission, or it has not been flown since the server started
+  Result<FlownPlan> flown_plan(const MissionId& mission);
+  /// A change of the plan in flight: to the revision that is stored, or back to the one flown before.
+  struct PlanOrder {
+    bool undo{false};
+    std::string lease{};                         ///< of take
+    std::optional<std::uint64_t> revision{};     ///< that a person has seen the difference of
+    std::optional<std::size_t> next_waypoint{};  ///< and from where it was to be flown; from 1
+  };
+  struct PlanDifference {
+    Plan before;
+    flight::PlanProposal proposal;
+  };
+  /// As it would be taken now; nothing changes by asking.
+  /// errors  not_found; invalid_argument: not flown, nothing to undo
+  Result<PlanDifference> plan_difference(const MissionId& mission, const PlanOrder& order);
+  /// errors  conflict: no control; invalid_argument: refused, with every reason; or another revision, or
+  /// another next waypoint, than the person has seen
+  Result<PlanDifference> take_plan(const MissionId& mission, const PlanOrder& order, const Principal& who);
+  /// A revision of a plan was stored.
+  void plan_saved(const Plan& plan);
+
   /// Newest of each kind.
   std::vector<FlightUpload> uploads(const MissionId& mission);
 

@@ -64,6 +64,9 @@ nlohmann::ordered_json FlightService::State::procedure(const flight::Operations&
   v.plan = f.plan.id.uuid == Uuid{} ? "" : to_string(f.plan.id);
   v.name = f.plan.name;
   v.plan_revision = f.plan.version;
+  v.saved_revision = f.changes.saved_revision;
+  if (f.changes.former) v.undo_revision = f.changes.former->version;
+  v.plan_changes = f.changes.n;
   v.mode = flight::k_flight_mode_words.word(f.manual);
   v.status = f.status();
   v.ended = f.ended();

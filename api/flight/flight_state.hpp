@@ -56,6 +56,7 @@ struct FlightService::State {
   bool piece_apart(Guard& w);
   static void decide(Guard& w);
   flight::Groundwork groundwork(const Plan* plan);
+  Result<Plan> wanted_plan(const MissionId& mission, bool undo);
   void recover();
   /// The document to store, when the machine moved since the last call; empty text: forget it.
   static bool to_keep(Work& w, std::string& text);

@@ -31,6 +31,9 @@ struct ProcedureView {
   std::string plan;  ///< id, or empty
   std::string name;  ///< of the plan
   std::uint64_t plan_revision{};
+  std::uint64_t saved_revision{};                ///< newest stored since the start; 0: none
+  std::optional<std::uint64_t> undo_revision{};  ///< of the plan before a change in flight
+  std::uint64_t plan_changes{};
   std::string mode;  ///< auto, manual
   flight::FlightStatus status{};
   std::string ended;  ///< why the work is over, empty while it goes on

@@ -17,6 +17,7 @@ struct FlightApi {
 };
 
 void add_flight_routes(Router& router, FlightApi& api);
+void add_plan_change_routes(Router& router, FlightApi& api);
 /// For POST /missions/{id}/actions. `api` must outlive the router.
 FlightActions flight_actions(FlightApi& api);
 

@@ -69,6 +69,7 @@ Response replace(PlanningApi& s, const Request& request, const Plan& old, Plan p
   plan.changed = s.clock.now();
   value_or_problem(s.plans.update(stored(plan), old.version));
   plan.version = old.version + 1;
+  s.saved(plan);
   s.audit(request, "plan.change " + to_string(plan.id));
   return answer(200, plan);
 }

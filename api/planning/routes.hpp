@@ -5,6 +5,7 @@
 
 #include "api/kit/audit.hpp"
 #include "core/base/ids.hpp"
+#include "core/types/plan.hpp"
 
 namespace anchord {
 class Clock;
@@ -24,6 +25,8 @@ struct PlanningApi {
   Audit audit;
   /// Which mission flies this plan.
   std::function<std::optional<MissionId>(const PlanId&)> flown_with;
+  /// A new revision was stored: a flight that flies the plan shows it.
+  std::function<void(const Plan&)> saved;
 };
 
 void add_plan_routes(Router& router, PlanningApi& api);

@@ -16,6 +16,7 @@
 #include "core/flight/command.hpp"
 #include "core/flight/control_lease.hpp"
 #include "core/flight/measured_time.hpp"
+#include "core/flight/plan_change.hpp"
 #include "core/geo/enu.hpp"
 #include "core/planning/local_plan.hpp"
 #include "core/ports/drone.hpp"
@@ -49,6 +50,18 @@ struct LogEvent {
   std::optional<MissionId> mission{};
 };
 
+/// What became of a flight's plan since the start.
+struct FlownChanges {
+  std::uint64_t n{0};
+  UtcTime at{};                               ///< of the last one
+  std::string by;                             ///< who took it
+  std::optional<Plan> former;                 ///< the plan before it, for undo
+  std::optional<KeptPlace> kept;              ///< the waypoint that was worked at when it was taken
+  std::optional<DroneFence> autopilot_keeps;  ///< given on the ground, not to be changed in the air
+  bool own_origin{true};                      ///< the stored plan has one; else the take-off gave it
+  std::uint64_t saved_revision{0};            ///< newest that is stored of the plan; 0: none since the start
+};
+
 /// One flight, in the air or just landed.
 struct ActiveFlight {
   ActiveFlight(const MissionId& m, Plan p, bool by_pilot, EnuFrame f, Eigen::Vector3d home,
@@ -70,7 +83,8 @@ struct ActiveFlight {
   }
 
   MissionId mission;
-  Plan plan;
+  Plan plan;  ///< that is flown; changes of it in flight: operations_plans.cpp
+  FlownChanges changes;
   bool manual{false};
   DroneIdentity aircraft;  ///< that it was begun with
   EnuFrame frame;          ///< of the plan, its ground at height 0
@@ -94,6 +108,7 @@ struct KeptFlight {
   procedure::State state;
   procedure::FlightPriors priors;
   DroneIdentity aircraft;  ///< system 0: not said
+  FlownChanges changes;
 };
 
 /// What a checklist takes long to find out: asked before, by whoever drives.
@@ -154,6 +169,14 @@ class Operations {
   /// Any but start, which is begin().
   Result<FlightCommand> act(const Now& now, const MissionId& mission, FlightAction action,
                             const std::string& who);
+  /// Of a change of the plan in flight; none: this mission is not the one that is flown.
+  std::optional<ChangeBasis> change_basis(const Now& now, const MissionId& mission) const;
+  /// Flies on by what was proposed on that basis. False: the flight has moved on since, propose anew.
+  /// errors  invalid_argument: refused, with every reason
+  Result<bool> take_plan(const Now& now, const MissionId& mission, const ChangeBasis& basis,
+                         const PlanProposal& proposal, const std::string& who);
+  /// A revision was stored that is not flown, should a flight fly this plan.
+  void plan_saved(const PlanId& plan, const std::string& name, std::uint64_t revision);
   Result<FlightCommand> upload(const Now& now, const MissionId& mission, const Plan& plan,
                                const std::string& what, const std::string& who);
   Result<DroneStatus> change_aircraft(const MissionId& mission, const std::string& sender,
@@ -203,6 +226,7 @@ class Operations {
                              const std::string& who);
   void give_fence(const Now& now);
   std::optional<std::string> take_off_refused(const Plan& plan, const MissionId& mission) const;
+  std::optional<DroneFence> fence_given(const Plan& plan) const;
   const FlightUpload* uploaded(const Plan& plan, const std::string& what) const;
   std::optional<ChecklistItem> fence_item(const Plan& plan) const;
   void log_event(EventLevel level, std::string code, std::string text, std::optional<MissionId> mission) {

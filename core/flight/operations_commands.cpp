@@ -168,6 +168,8 @@ Result<FlightCommand> Operations::begin(const Now& now, const Mission& mission, 
   ++n_flights_;
   auto& f = *flight_;
   if (ground.check) f.forecast = ground.check->time;
+  f.changes.own_origin = plan.origin.has_value();
+  if (!manual) f.changes.autopilot_keeps = fence_given(plan);
   f.control.fix(*r.fix_s, here, r.fix->fix);
   if (manual) {
     f.by_hand.position_m = here;
@@ -249,7 +251,8 @@ Result<DroneStatus> Operations::change_aircraft(const MissionId& mission, const 
 
 Result<void> Operations::recover(const Now& now, KeptFlight kept) {
   const EnuFrame frame(kept.plan.origin.value());
-  BOOST_OUTCOME_TRY(auto setup, procedure::flight_setup(kept.plan, kept.home_m));
+  const auto& changes = kept.changes;
+  BOOST_OUTCOME_TRY(auto setup, setup_of(kept.plan, changes.kept, changes.autopilot_keeps, kept.home_m));
   setup.decides_apart = decides_apart_;
   const bool manual = kept.manual || drone_ == nullptr;
   // Before the flight, which is a new one on the link.
@@ -259,7 +262,9 @@ Result<void> Operations::recover(const Now& now, KeptFlight kept) {
       procedure::FlightControl(std::move(setup), frame, manual ? nullptr : drone_, kept.state, now.s));
   ++n_flights_;
   flight_->priors_before = std::move(kept.priors);
-  if (const auto check = planning::check_plan(flight_->plan)) flight_->forecast = check.value().time;
+  flight_->changes = std::move(kept.changes);
+  if (const auto check = planning::check_plan(flight_->plan); check && flight_->changes.n == 0)
+    flight_->forecast = check.value().time;
   // Not heard yet: whether the hold leaves is decided by the mode that the first heartbeat shows.
   take_events(*flight_);
   log_event(EventLevel::critical, "procedure.restarted",

@@ -12,6 +12,12 @@ constexpr double k_retry_s = 10;
 
 bool has_fence(const Plan& plan) { return !plan.fence.empty() || !plan.no_fly.empty(); }
 
+DroneFence fence_of(const Plan& plan) {
+  DroneFence fence{plan.fence, plan.no_fly};
+  if (plan.outline.size() >= 3) fence.outside.push_back(plan.outline);  // the building itself
+  return fence;
+}
+
 }  // namespace
 
 Result<FlightCommand> Operations::upload(const Now& now, const MissionId& mission, const Plan& plan,
@@ -26,8 +32,7 @@ Result<FlightCommand> Operations::upload(const Now& now, const MissionId& missio
   std::uint64_t sent = 0;
   if (what == "fence") {
     if (!has_fence(plan)) return refuse("the plan has neither a fence nor a no-fly area");
-    DroneFence fence{plan.fence, plan.no_fly};
-    if (plan.outline.size() >= 3) fence.outside.push_back(plan.outline);  // the building itself
+    const DroneFence fence = fence_of(plan);
     up.n_items = plan.fence.size();
     for (const auto& area : fence.outside) up.n_items += area.size();
     sent = drone_->upload_fence(fence);
@@ -58,6 +63,14 @@ const FlightUpload* Operations::uploaded(const Plan& plan, const std::string& wh
     if (u.what == what && u.plan == plan.id && u.revision == plan.version) return &u;
   }
   return nullptr;
+}
+
+/// What the autopilot keeps to by itself, or soon will: nothing can be taken back from it in the air.
+std::optional<DroneFence> Operations::fence_given(const Plan& plan) const {
+  const auto* up = uploaded(plan, "fence");
+  const bool given = up != nullptr &&
+                     (up->command.state == CommandState::accepted || up->command.state == CommandState::sent);
+  return given ? std::optional(fence_of(plan)) : std::nullopt;
 }
 
 /// An operator who looks at the checklist, and lets nobody else's flight be disturbed, means to fly: the

@@ -45,6 +45,11 @@ class FlightControl {
   /// At least twice a second. `at_hand` false: the estimates could not be read, decisions wait, safety does
   /// not.
   void round(double now_s, std::span<const Estimate> estimates, bool at_hand = true);
+  /// FlightEngine::change_plan(), and what follows from it for the aircraft.
+  void change_plan(double now_s, FlightSetup setup, std::size_t waypoint, const std::string& why) {
+    engine_.change_plan(now_s, std::move(setup), waypoint, why);
+    dispatch();
+  }
   void by_hand(double now_s, const VehicleView& view) { engine_.vehicle(now_s, view); }
   void report(double now_s, const CommandReport& report);
 

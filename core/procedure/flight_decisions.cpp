@@ -136,4 +136,38 @@ void FlightEngine::conclude(double now_s, Result<planning::Decision> decided) {
   feed(now_s, Trigger::point, decision_->decision.reason, best.point_m, std::atan2(look.x(), look.y()));
 }
 
+bool FlightEngine::next_is_current() const {
+  const auto step = state_.step == Step::hold ? state_.interrupted : state_.step;
+  return step == Step::go_to_waypoint || step == Step::take_off;
+}
+
+void FlightEngine::change_plan(double now_s, FlightSetup setup, std::size_t waypoint,
+                               const std::string& why) {
+  const ExitRule &was = setup_.exit, &is = setup.exit;
+  const bool other_aim = was.target_sigma_m != is.target_sigma_m || was.gdop_root != is.gdop_root ||
+                         was.min_iterations != is.min_iterations || was.max_iterations != is.max_iterations;
+  setup_ = std::move(setup);
+  state_.waypoint = waypoint;
+  point_task_.reset();
+  asked_.reset();
+  answer_.reset();
+  for (auto& task : state_.anchors) {
+    if (!task.done || !other_aim) continue;
+    task.done = task.reached = false;
+    task.why = "assessed again at the next point: the plan was changed";
+  }
+  report(now_s, EventLevel::info, "procedure.plan_changed", why);
+  if (taken_over_) return;
+  if (state_.step == Step::go_to_waypoint) {
+    const auto& next = setup_.settings.waypoints.at(waypoint);
+    state_.target_m = state_.centre_m = next.point_m;
+    state_.heading_rad = next.heading_rad;
+    state_.tries = 0;
+    state_.deadline_s = now_s + setup_.settings.go_to_s;
+    fly(now_s, next.point_m, next.heading_rad, false);
+  } else if (!legs_.empty()) {
+    fly(now_s, legs_.back(), state_.heading_rad, state_.step == Step::return_home);
+  }
+}
+
 }  // namespace anchord::procedure

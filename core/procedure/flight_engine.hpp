@@ -119,6 +119,13 @@ class FlightEngine {
   /// What came of it, for the next tick; of a task that is no longer waited for: dropped.
   void decided(std::uint64_t number, Result<planning::Decision> decision);
 
+  /// Flies on by another plan, the aircraft being at its waypoint number `waypoint`, or on the way to it
+  /// while next_is_current(): the leg is laid out anew, a decision that is due is made anew, and with other
+  /// targets every anchor is assessed anew. Whether it may: core/flight/plan_change.
+  void change_plan(double now_s, FlightSetup setup, std::size_t waypoint, const std::string& why);
+  /// The present waypoint is still to be flown to: on the way, or after a hold on it.
+  bool next_is_current() const;
+
   std::vector<Command> take_commands();
   std::vector<Event> take_events();
 

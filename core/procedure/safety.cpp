@@ -78,6 +78,16 @@ std::optional<Alarm> breach(const SafetyLimits& limits, const Eigen::Vector3d& a
 
 }  // namespace
 
+std::optional<std::string> refuse_standing(const SafetyLimits& limits, const Eigen::Vector3d& at_m,
+                                           std::string_view what) {
+  const auto floor_m = limits.bounds.min_height_m;
+  if (floor_m && at_m.z() < *floor_m - limits.floor_tolerance_m)
+    return std::string(what) + text(" %.1f m high, the band begins at %.1f m", at_m.z(), *floor_m);
+  if (!breach(limits, at_m)) return std::nullopt;
+  const auto refusal = planning::refuse_point(widened(limits), at_m);
+  return std::string(what) + ' ' + explain(limits.bounds, *refusal, at_m);
+}
+
 std::optional<Refused> refuse_take_off(const planning::Bounds& bounds, const Eigen::Vector3d& stands_m,
                                        double height_m) {
   // Straight up from where it stands, which must be inside the fence and off every area.

@@ -45,6 +45,11 @@ std::optional<Refused> refuse_command(const SafetyLimits& limits,
 std::optional<Refused> refuse_take_off(const planning::Bounds& bounds, const Eigen::Vector3d& stands_m,
                                        double height_m);
 
+/// Why it may not be there, in flight: a breach of these limits, or below the band by more than the
+/// tolerance. `what` is where: "the aircraft is".
+std::optional<std::string> refuse_standing(const SafetyLimits& limits, const Eigen::Vector3d& at_m,
+                                           std::string_view what);
+
 /// How things stand now. Ages in seconds.
 struct Situation {
   std::optional<Eigen::Vector3d> position_m{};  ///< the rover's, else the autopilot's

@@ -20,6 +20,7 @@
 #include "core/flight/control_lease.hpp"
 #include "core/ml/recipe.hpp"
 #include "core/planning/local_plan.hpp"
+#include "core/planning/plan_change.hpp"
 #include "core/procedure/machine.hpp"
 #include "core/procedure/safety.hpp"
 #include "core/types/event_level.hpp"
@@ -179,6 +180,9 @@ TEST(WireWords, AreThoseOfOpenApi) {
       {"Procedure.status", words(flight::k_flight_status_words)},
       {"Procedure.step", words(procedure::k_step_words)},
       {"Procedure.alarm.reaction", words(procedure::k_reaction_words)},
+      {"PlanDifference.waypoints.change", words(planning::k_changed_words)},
+      {"PlanDifference.areas.area", words(planning::k_area_words)},
+      {"PlanDifference.areas.change", words(planning::k_changed_words)},
       {"FlightCommand.state", words(k_command_state_words)},
       {"ControlAction.action", words(flight::k_control_words)},
       {"Grid.rule", words(planning::k_rule_words)},

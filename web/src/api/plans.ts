@@ -156,6 +156,20 @@ export async function save(p: Plan): Promise<Plan> {
 export const remove = (p: Plan): Promise<unknown> =>
   request('DELETE', `/plans/${p.id}`, undefined, { 'If-Match': `"p-${p.revision}"` });
 export const read = async (id: string): Promise<Plan> => plan_of(obj(await request('GET', `/plans/${id}`)) ?? {});
+/// What a flight flies: the revision it was started with, or that it was changed to in the air.
+export const flown_plan = async (mission: string): Promise<Plan> =>
+  plan_of((await call('get', '/missions/{id}/plan', { path: { id: mission } })).body.plan);
+export type PlanDifference = Wire<'PlanDifference'>;
+export const plan_difference = async (mission: string, undo: boolean): Promise<PlanDifference> =>
+  (await call('get', '/missions/{id}/plan/change', { path: { id: mission }, query: { undo } })).body;
+export const change_flown_plan = async (mission: string, body: Wire<'PlanChangeRequest'>): Promise<PlanDifference> =>
+  (
+    await call('post', '/missions/{id}/plan', {
+      path: { id: mission },
+      body,
+      headers: { 'Idempotency-Key': idempotency_key() },
+    })
+  ).body;
 export const check = async (id: string): Promise<Check> =>
   check_of((await call('post', '/plans/{id}/validate', { path: { id } })).body);
 /// Of what is drawn, stored or not.

@@ -85,6 +85,8 @@ export interface ProcedureMsg {
   readonly plan: string | null;
   readonly plan_name: string;
   readonly plan_revision: number;
+  readonly plan_saved_revision: number | null; // newest that was saved since the start; none: null
+  readonly plan_undo_revision: number | null; // flown before the last change
   readonly mode: 'auto' | 'manual';
   readonly status: FlightStatus;
   readonly step: Step;
@@ -197,6 +199,8 @@ export function procedure(v: unknown): ProcedureMsg | null {
     plan: str(o.plan) || null,
     plan_name: str(o.plan_name),
     plan_revision: count(o.plan_revision),
+    plan_saved_revision: num(o.plan_saved_revision),
+    plan_undo_revision: num(o.plan_undo_revision),
     mode: word(o.mode, ['auto', 'manual'] as const, 'auto'),
     status: word(o.status, ['ready', 'running', 'hold', 'return', 'landing', 'done', 'aborted'] as const, 'ready'),
     step: word(o.step, STEPS, 'ready'),

@@ -9,6 +9,7 @@ import { Checklist, checklist_open } from './checklist';
 import { DevicesNote } from './devices_note';
 import { command_note, question_of } from './control';
 import { HoldButton } from './hold_button';
+import { PlanNotice } from './plan_notice';
 import { ask, asking, give_back, lease, lost_control, problem, refuse, send, take } from './lease';
 import { flying } from './words';
 
@@ -46,6 +47,7 @@ export function FlightBar() {
     <div class="fbar" data-testid="flight-bar">
       {p && <Progress p={p} />}
       <DevicesNote mission={mission.mission} />
+      {p && <PlanNotice p={p} />}
       <div class="cmds" data-testid="commands">
         {problem.value && (
           <p class="problem" role="alert">

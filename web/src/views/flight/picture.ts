@@ -1,6 +1,6 @@
 /// The plan and the planner's last decision as the map draws them, in metres about the origin of the flight.
 import { signal } from '@preact/signals';
-import { read, setting, type Plan } from '../../api/plans';
+import { flown_plan, setting, type Plan } from '../../api/plans';
 import type { GridMsg } from '../../live/flight_messages';
 import { num, obj } from '../../live/messages';
 import { enu_from_geodetic } from '../../map/enu';
@@ -8,14 +8,14 @@ import type { FlightPicture, Heights, Point } from '../../map/flight_layer';
 import type { Scene } from '../../state/scene';
 import { current_mission, current_scene } from '../../state/store';
 
-/// The plan that is in the air: fetched once per revision, since a flight keeps the one it was started with.
+/// The plan that is in the air: fetched once per revision, since only a change that was taken makes it another.
 const flown = signal<{ readonly key: string; readonly plan: Plan | null } | null>(null);
 export function follow_plan(): void {
   const p = current_scene()?.procedure?.value,
     key = p?.plan ? `${p.plan}/${p.plan_revision}` : '';
   if (!p?.plan || flown.peek()?.key === key) return;
   flown.value = { key, plan: null };
-  read(p.plan).then(
+  flown_plan(p.mission).then(
     (plan) => {
       flown.value = { key, plan };
     },

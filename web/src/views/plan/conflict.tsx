@@ -86,7 +86,7 @@ export function Conflict({
   );
 }
 
-function Small({ plan, other, origin, name }: { plan: Plan; other: Plan; origin: Geodetic; name: string }) {
+export function Small({ plan, other, origin, name }: { plan: Plan; other: Plan; origin: Geodetic; name: string }) {
   const shapes = (p: Plan): Shape[] => [
       'outline',
       'fence',

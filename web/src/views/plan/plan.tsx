@@ -9,6 +9,7 @@ import type { Geodetic } from '../../map/enu';
 import { current_mission, current_scene, now_ms, tick } from '../../state/store';
 import { age } from '../../ui/format';
 import { Icon } from '../../ui/marks';
+import { PlanNotice } from '../flight/plan_notice';
 import { CheckPanel, Profile } from './check_panel';
 import { Conflict } from './conflict';
 import type { Shape } from './draft';
@@ -24,7 +25,8 @@ import { WayTools } from './way_tools';
 export function Plan({ id }: { id: string | null }) {
   const desk = usePlan(id),
     [shown, show] = useState<Shown>({ of: 'gdop', up: null }),
-    { plan, origin, problem, back_ms, theirs } = desk;
+    { plan, origin, problem, back_ms, theirs } = desk,
+    flown = current_scene()?.procedure?.value;
   return (
     <div class="plan" data-testid="plan">
       <Toolbar desk={desk} />
@@ -50,6 +52,7 @@ export function Plan({ id }: { id: string | null }) {
           take_theirs={() => desk.open(theirs)}
         />
       )}
+      {flown && flown.plan === plan.id && <PlanNotice p={flown} />}
       <div class="planbody">
         <Drawn desk={desk} shown={shown} />
         <Side desk={desk} shown={shown} show={show} />

@@ -1,0 +1,104 @@
+// Plans changed in flight, as they are asked for.
+#include <utility>
+
+#include "api/flight/flight_state.hpp"
+#include "core/ports/plan_store.hpp"
+
+namespace anchord::api {
+namespace {
+
+constexpr int k_tries = 3;
+
+Error cannot(std::string why) { return make_error(Errc::invalid_argument, std::move(why)); }
+
+/// What a person has confirmed is what is taken.
+Result<void> as_seen(const FlightService::PlanOrder& order, const flight::PlanProposal& proposal) {
+  if (order.revision && *order.revision != proposal.plan.version)
+    return cannot("it would be revision " + std::to_string(proposal.plan.version) + ", not " +
+                  std::to_string(*order.revision) + ": look at the difference again");
+  const auto next = proposal.change.next + 1;
+  if (order.next_waypoint && *order.next_waypoint != next)
+    return cannot("the aircraft has moved on, waypoint " + std::to_string(next) +
+                  " would be the next: look at the difference again");
+  return boost::outcome_v2::success();
+}
+
+}  // namespace
+
+Result<FlightService::FlownPlan> FlightService::flown_plan(const MissionId& mission) {
+  BOOST_OUTCOME_TRYV(state_->deps.missions.mission(mission));
+  const auto w = state_->work.lock();
+  const auto* f = w->operations.flight_of(mission);
+  if (f == nullptr)
+    return make_error(Errc::not_found, "this mission has not been flown since the server started");
+  const auto& c = f->changes;
+  return FlownPlan{
+      f->plan, c.n, c.at, c.by, c.saved_revision, c.former ? std::optional(c.former->version) : std::nullopt};
+}
+
+/// The plan that is asked for; the store is asked without the lock.
+Result<Plan> FlightService::State::wanted_plan(const MissionId& mission, bool undo) {
+  PlanId id;
+  {
+    const auto w = work.lock();
+    const auto* f = w->operations.flight_of(mission);
+    if (f == nullptr || !f->flying()) return cannot("this mission is not being flown");
+    if (undo) {
+      if (!f->changes.former)
+        return cannot("the plan was not changed in this flight: there is nothing to undo");
+      Plan former = *f->changes.former;
+      if (!f->changes.own_origin) former.origin.reset();
+      return former;
+    }
+    id = f->plan.id;
+  }
+  BOOST_OUTCOME_TRY(const auto stored, deps.plans.plan(id));
+  return plan_of(stored);
+}
+
+Result<FlightService::PlanDifference> FlightService::plan_difference(const MissionId& mission,
+                                                                     const PlanOrder& order) {
+  BOOST_OUTCOME_TRYV(state_->deps.missions.mission(mission));
+  BOOST_OUTCOME_TRY(const auto wanted, state_->wanted_plan(mission, order.undo));
+  std::optional<flight::ChangeBasis> basis;
+  {
+    const auto w = state_->work.lock();
+    basis = w->operations.change_basis(state_->now(), mission);
+  }
+  if (!basis) return cannot("this mission is not being flown");
+  auto proposal = flight::propose_change(*basis, wanted);
+  return PlanDifference{std::move(basis->plan), std::move(proposal)};
+}
+
+Result<FlightService::PlanDifference> FlightService::take_plan(const MissionId& mission,
+                                                               const PlanOrder& order, const Principal& who) {
+  BOOST_OUTCOME_TRYV(renew_control(mission, order.lease, who));
+  BOOST_OUTCOME_TRY(const auto wanted, state_->wanted_plan(mission, order.undo));
+  for (int i = 0; i < k_tries; ++i) {
+    std::optional<flight::ChangeBasis> basis;
+    {
+      const auto w = state_->work.lock();
+      basis = w->operations.change_basis(state_->now(), mission);
+    }
+    if (!basis) return cannot("this mission is not being flown");
+    // Long with many waypoints: computed while the flight goes on, and taken if that has not changed its
+    // basis.
+    auto proposal = flight::propose_change(*basis, wanted);
+    BOOST_OUTCOME_TRYV(as_seen(order, proposal));
+    auto w = state_->work.lock();
+    BOOST_OUTCOME_TRY(const bool taken,
+                      w->operations.take_plan(state_->now(), mission, *basis, proposal, who.name));
+    if (!taken) continue;
+    state_->publish_events(*w);
+    return PlanDifference{std::move(basis->plan), std::move(proposal)};
+  }
+  return cannot("the flight moves on faster than the change can be checked: hold, then take it");
+}
+
+void FlightService::plan_saved(const Plan& plan) {
+  auto w = state_->work.lock();
+  w->operations.plan_saved(plan.id, plan.name, plan.version);
+  state_->publish_events(*w);
+}
+
+}  // namespace anchord::api
