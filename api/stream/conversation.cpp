@@ -90,6 +90,11 @@ void Conversation::subscribe(const Json& message) {
     Fields inner(*params, "/params", errors);
     if (const auto hz = inner.number("max_hz", 0.01, 1000))
       subscription.min_interval_us = static_cast<std::int64_t>(1e6 / *hz);
+    if (const auto age_s = inner.number("max_age_s", 0.1, 60))
+      subscription.max_age_us = static_cast<std::int64_t>(1e6 * *age_s);
+    subscription.deltas = inner.boolean("deltas").value_or(false);
+    if (subscription.deltas && name != "anchors.estimates")
+      inner.error("deltas", "not_applicable", "only anchors.estimates has deltas");
     if (const Json* anchors = inner.child("anchors")) {
       if (!anchors->is_array() || anchors->size() > 1000)
         inner.error("anchors", "wrong_type", "must be an array of at most 1000 network ids");
@@ -146,7 +151,8 @@ void Conversation::subscribe(const Json& message) {
   {
     auto output = output_.lock();
     bool room = output->outbox.control(std::move(frames));
-    output->outbox.start(subscription.id, start.recovered ? since->second : start.last_seq, start.missed);
+    output->outbox.start(subscription.id, start.recovered ? since->second : start.last_seq, start.missed,
+                         start.snapshot);
     if (!start.recovered) room = output->outbox.control(std::move(snap)) && room;
     if (!room) output->close = {4008, "slow_consumer"};
   }
@@ -205,7 +211,7 @@ void Conversation::on_message(Topic topic, const std::shared_ptr<const LiveMessa
   {
     auto output = output_.lock();
     if (output->close) return;
-    room = output->outbox.put(message, topic);
+    room = output->outbox.put(message, topic, steady_us());
     due = output->outbox.due(steady_us());
   }
   if (!room)

@@ -1,11 +1,18 @@
 #include "api/stream/outbox.hpp"
 
 #include <algorithm>
+#include <array>
 
+#include "api/stream/delta.hpp"
 #include "api/stream/frames.hpp"
 
 namespace anchord::api {
 namespace {
+
+/// By these a client knows what a difference is of.
+constexpr std::array<std::string_view, 2> k_identity{"mission", "anchor"};
+/// A client that asked for less is not slow before its frame is overdue by this.
+constexpr std::int64_t k_grace_us = 200'000;
 
 bool wants(const Subscription& subscription, const LiveElement& element) {
   return subscription.anchors.empty() || !element.anchor || subscription.anchors.count(*element.anchor) > 0;
@@ -18,22 +25,28 @@ void Outbox::add(const Subscription& subscription) { queues_[subscription.id].su
 void Outbox::remove(std::uint64_t sub) {
   const auto it = queues_.find(sub);
   if (it == queues_.end()) return;
-  for (const auto& message : it->second.messages) {
-    bytes_ -= message->bytes();
+  for (const auto& waiting : it->second.messages) {
+    bytes_ -= waiting.message->bytes();
     --count_;
   }
   queues_.erase(it);
 }
 
 void Outbox::start(std::uint64_t sub, std::uint64_t last_seq,
-                   const std::vector<std::shared_ptr<const LiveMessage>>& missed) {
+                   const std::vector<std::shared_ptr<const LiveMessage>>& missed,
+                   const std::vector<LiveElement>& snapshot) {
   auto& queue = queues_[sub];
   queue.subscription.last_seq = last_seq;
+  queue.started = true;
+  if (queue.subscription.deltas) {
+    for (const auto& element : snapshot)
+      if (wants(queue.subscription, element)) queue.shown[element.key] = element.json;
+  }
   for (const auto& message : missed) {
     const auto& elements = message->elements;
     if (std::any_of(elements.begin(), elements.end(),
                     [&](const auto& e) { return wants(queue.subscription, e); }))
-      queue.replay.push_back(message);
+      queue.replay.push_back({message, INT64_MAX / 2});
   }
 }
 
@@ -55,7 +68,7 @@ bool Outbox::control(std::string frame) {
   return control_.size() <= k_max_messages;
 }
 
-bool Outbox::put(const std::shared_ptr<const LiveMessage>& message, Topic topic) {
+bool Outbox::put(const std::shared_ptr<const LiveMessage>& message, Topic topic, std::int64_t now_us) {
   const TopicClass cls = info(topic).cls;
   for (auto& [id, queue] : queues_) {
     if (queue.subscription.topic != topic) continue;
@@ -74,7 +87,8 @@ bool Outbox::put(const std::shared_ptr<const LiveMessage>& message, Topic topic)
         if (pending.element.json) {
           ++queue.conflated;
           ++counters_.conflated;
-          conflated_since_heartbeat_ = true;
+          const bool asked_for_less = queue.subscription.min_interval_us > 0 || queue.subscription.deltas;
+          conflated_since_heartbeat_ |= !asked_for_less || now_us - queue.due_us > k_grace_us;
         }
         pending = {element, message->seq, message->t_us};
       }
@@ -82,7 +96,8 @@ bool Outbox::put(const std::shared_ptr<const LiveMessage>& message, Topic topic)
     }
     bytes_ += message->bytes();
     ++count_;
-    queue.messages.push_back(message);
+    queue.messages.push_back({message, now_us});
+    if (cls == TopicClass::stream) drop_aged(queue, now_us);
     while (bytes_ > k_max_bytes || count_ > k_max_messages) {
       const std::size_t before = count_;
       drop_oldest_stream();
@@ -99,24 +114,36 @@ void Outbox::drop_oldest_stream() {
   Queue* oldest = nullptr;
   for (auto& [id, queue] : queues_) {
     if (info(queue.subscription.topic).cls != TopicClass::stream || queue.messages.empty()) continue;
-    if (oldest == nullptr || queue.messages.front()->t_us < oldest->messages.front()->t_us) oldest = &queue;
+    if (oldest == nullptr || queue.messages.front().message->t_us < oldest->messages.front().message->t_us)
+      oldest = &queue;
   }
-  if (oldest == nullptr) return;
-  const auto& message = oldest->messages.front();
-  if (oldest->gap_dropped == 0) oldest->gap_from = message->seq;
-  oldest->gap_to = message->seq;
-  ++oldest->gap_dropped;
+  if (oldest != nullptr) drop_front(*oldest);
+}
+
+void Outbox::drop_front(Queue& queue) {
+  const auto& message = queue.messages.front().message;
+  if (queue.gap_dropped == 0) queue.gap_from = message->seq;
+  queue.gap_to = message->seq;
+  ++queue.gap_dropped;
   ++counters_.dropped;
   bytes_ -= message->bytes();
   --count_;
-  oldest->messages.pop_front();
+  queue.messages.pop_front();
+}
+
+/// Less, and never older.
+void Outbox::drop_aged(Queue& queue, std::int64_t now_us) {
+  const auto longest_us = queue.subscription.max_age_us;
+  while (longest_us > 0 && !queue.messages.empty() && now_us - queue.messages.front().since_us > longest_us) {
+    drop_front(queue);
+    conflated_since_heartbeat_ = true;
+  }
 }
 
 bool Outbox::ready(const Queue& queue, std::int64_t now_us) const {
   if (queue.newest.empty() && queue.messages.empty() && queue.replay.empty() && queue.gap_dropped == 0)
     return false;
-  const std::int64_t since = now_us - queue.sent_us;
-  return since >= queue.subscription.min_interval_us || since < 0;
+  return queue.started && (now_us >= queue.due_us || now_us < queue.sent_us);
 }
 
 bool Outbox::due(std::int64_t now_us) const {
@@ -141,14 +168,22 @@ std::shared_ptr<const std::string> Outbox::next(std::int64_t now_us) {
     for (auto& [id, queue] : queues_) {
       if (info(queue.subscription.topic).cls != cls || !ready(queue, now_us)) continue;
       queue.sent_us = now_us;
-      if (cls == TopicClass::state) return take_state(queue);
+      queue.due_us = now_us + queue.subscription.min_interval_us;
+      if (cls == TopicClass::state) {
+        auto frame = take_state(queue);
+        const auto bytes = static_cast<std::int64_t>(frame->size());
+        if (queue.subscription.deltas)
+          queue.due_us = std::max(queue.due_us, now_us + bytes * 1'000'000 / k_delta_bytes_per_s);
+        return frame;
+      }
+      if (cls == TopicClass::stream) drop_aged(queue, now_us);
       if (!queue.replay.empty()) return take_messages(queue, queue.replay, true);
       if (queue.gap_dropped > 0) {
         auto frame = std::make_shared<const std::string>(
             gap_frame(id, queue.gap_from, queue.gap_to, queue.gap_dropped));
         queue.subscription.last_seq = queue.gap_to;
         queue.gap_dropped = 0;
-        queue.sent_us = INT64_MIN / 2;
+        queue.sent_us = queue.due_us = INT64_MIN / 2;
         return frame;
       }
       return take_messages(queue, queue.messages, cls == TopicClass::stream);
@@ -167,6 +202,10 @@ std::shared_ptr<const std::string> Outbox::take_state(Queue& queue) {
     t_us = std::max(t_us, pending.t_us);
     elements.push_back(std::move(pending.element));
   }
+  if (subscription.deltas) {
+    to_deltas(queue, elements);
+    queue.only = nullptr;
+  }
   std::shared_ptr<const std::string> frame;
   if (queue.only && queue.only->frame && queue.conflated == 0 &&
       subscription.id == default_sub(subscription.topic) && subscription.last_seq + 1 == seq) {
@@ -181,8 +220,17 @@ std::shared_ptr<const std::string> Outbox::take_state(Queue& queue) {
   return frame;
 }
 
-std::shared_ptr<const std::string> Outbox::take_messages(Queue& queue,
-                                                         std::deque<std::shared_ptr<const LiveMessage>>& from,
+/// What the client has of a key is replaced by what it gets now; one it does not have is sent whole.
+void Outbox::to_deltas(Queue& queue, std::vector<LiveElement>& elements) {
+  for (auto& element : elements) {
+    auto& shown = queue.shown[element.key];
+    const Text whole = element.json;
+    if (shown) element.json = std::make_shared<const std::string>(delta_of(*shown, *whole, k_identity));
+    shown = whole;
+  }
+}
+
+std::shared_ptr<const std::string> Outbox::take_messages(Queue& queue, std::deque<Waiting>& from,
                                                          bool merge) {
   const bool counted = &from == &queue.messages;
   auto& subscription = queue.subscription;
@@ -192,7 +240,7 @@ std::shared_ptr<const std::string> Outbox::take_messages(Queue& queue,
   std::size_t taken = 0, size = 0;
   // What queued up while the client was busy leaves as one frame, of a size that is still one gulp.
   while (!from.empty() && (taken == 0 || (merge && size < 64 * 1024))) {
-    last = std::move(from.front());
+    last = std::move(from.front().message);
     from.pop_front();
     if (counted) {
       bytes_ -= last->bytes();

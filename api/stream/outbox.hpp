@@ -19,7 +19,10 @@ struct Subscription {
   Topic topic{};
   std::set<NetworkId> anchors{};    ///< empty: all
   std::int64_t min_interval_us{0};  ///< of max_hz
-  std::uint64_t last_seq{0};        ///< last seq this subscription was sent, for `prev`
+  std::int64_t max_age_us{0};  ///< of max_age_s: what of a stream has waited longer is dropped; 0: nothing
+  /// Of a state topic: only what changed since the last frame, at most k_delta_bytes_per_s.
+  bool deltas{false};
+  std::uint64_t last_seq{0};  ///< last seq this subscription was sent, for `prev`
 };
 
 /// What waits for one client, by the three rules of TopicClass. At most 1 MiB or 512 messages of streams,
@@ -27,18 +30,21 @@ struct Subscription {
 class Outbox {
  public:
   static constexpr std::size_t k_max_bytes = 1u << 20, k_max_messages = 512;
+  static constexpr std::int64_t k_delta_bytes_per_s = 30'000;
 
   explicit Outbox(HubCounters& counters) : counters_(counters) {}
 
   void add(const Subscription& subscription);
   void remove(std::uint64_t sub);
-  /// Where the subscription begins: `missed` is replayed first (shared with the history, so not counted).
+  /// Where the subscription begins: `missed` is replayed first (shared with the history, so not counted); the
+  /// client was shown `snapshot`. Nothing of the subscription leaves before.
   void start(std::uint64_t sub, std::uint64_t last_seq,
-             const std::vector<std::shared_ptr<const LiveMessage>>& missed);
+             const std::vector<std::shared_ptr<const LiveMessage>>& missed,
+             const std::vector<LiveElement>& snapshot);
   /// Ack, snap, err, bye; goes first. False when the client must be closed (4008).
   bool control(std::string frame);
   /// False when the client must be closed: an event found no room.
-  bool put(const std::shared_ptr<const LiveMessage>& message, Topic topic);
+  bool put(const std::shared_ptr<const LiveMessage>& message, Topic topic, std::int64_t now_us);
   /// Next frame that is due at `now_us` (monotonic enough: only differences count); null when nothing is.
   std::shared_ptr<const std::string> next(std::int64_t now_us);
   bool due(std::int64_t now_us) const;
@@ -50,6 +56,11 @@ class Outbox {
   double fill() const;
 
  private:
+  using Text = std::shared_ptr<const std::string>;
+  struct Waiting {
+    std::shared_ptr<const LiveMessage> message;
+    std::int64_t since_us{};
+  };
   struct Pending {
     LiveElement element;
     std::uint64_t seq{};
@@ -60,17 +71,20 @@ class Outbox {
     std::map<std::string, Pending> newest;    ///< state
     std::shared_ptr<const LiveMessage> only;  ///< state: the single message pending, for its frame
     std::uint64_t conflated{0};
-    std::deque<std::shared_ptr<const LiveMessage>> messages;  ///< stream, event
-    std::deque<std::shared_ptr<const LiveMessage>> replay;    ///< what was missed; before messages
+    std::deque<Waiting> messages;       ///< stream, event
+    std::deque<Waiting> replay;         ///< what was missed; before messages
+    std::map<std::string, Text> shown;  ///< of a subscription to deltas: what the client has, by key
     std::uint64_t gap_from{0}, gap_to{0}, gap_dropped{0};
-    std::int64_t sent_us{INT64_MIN / 2};
+    std::int64_t sent_us{INT64_MIN / 2}, due_us{INT64_MIN / 2};
+    bool started{false};
   };
   bool ready(const Queue& queue, std::int64_t now_us) const;
   void drop_oldest_stream();
-  std::shared_ptr<const std::string> take_state(Queue& queue);
-  std::shared_ptr<const std::string> take_messages(Queue& queue,
-                                                   std::deque<std::shared_ptr<const LiveMessage>>& from,
-                                                   bool merge);
+  void drop_front(Queue& queue);
+  void drop_aged(Queue& queue, std::int64_t now_us);
+  Text take_state(Queue& queue);
+  static void to_deltas(Queue& queue, std::vector<LiveElement>& elements);
+  Text take_messages(Queue& queue, std::deque<Waiting>& from, bool merge);
 
   HubCounters& counters_;
   std::map<std::uint64_t, Queue> queues_;

@@ -1,12 +1,16 @@
 // The rules of topics: sequence, resume, and what a slow client loses or keeps.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
 #include <deque>
+#include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "api/stream/conversation.hpp"
+#include "api/stream/delta.hpp"
 
 namespace anchord::test {
 namespace {
@@ -77,6 +81,134 @@ TEST_F(HubRules, KeepsOnlyTheNewestStatePerKeyForASlowClient) {
   EXPECT_EQ(data[0]["conflated"], 998);
   EXPECT_EQ(data[0]["prev"], 0);
   EXPECT_EQ(data[0]["seq"], 1000);
+}
+
+/// One client's outbox, its time given with each call.
+class OutboxRules : public ::testing::Test {
+ protected:
+  void subscribe(Topic topic, const std::function<void(api::Subscription&)>& how) {
+    topic_ = topic;
+    api::Subscription subscription;
+    subscription.id = api::default_sub(topic);
+    subscription.topic = topic;
+    how(subscription);
+    outbox_.add(subscription);
+    outbox_.start(subscription.id, 0, {}, shown_);
+  }
+  void put(double now_s, const std::string& json, const std::string& key = {}) {
+    auto message = std::make_shared<api::LiveMessage>();
+    message->seq = ++seq_;
+    message->elements.push_back({key, {}, std::make_shared<const std::string>(json)});
+    EXPECT_TRUE(outbox_.put(message, topic_, us(now_s)));
+  }
+  static std::string estimate(const char* anchor, int h_m, const char* status) {
+    return R"({"mission":"m","anchor":")" + std::string(anchor) + R"(","status":")" + status + R"(","h_m":)" +
+           std::to_string(h_m) + "}";
+  }
+  std::vector<Json> read(double now_s) {
+    std::vector<Json> frames;
+    while (auto frame = outbox_.next(us(now_s))) frames.push_back(Json::parse(*frame));
+    return frames;
+  }
+  static std::int64_t us(double s) { return static_cast<std::int64_t>(s * 1e6); }
+
+  api::HubCounters counters_;
+  api::Outbox outbox_{counters_};
+  std::vector<api::LiveElement> shown_;
+  Topic topic_{};
+  std::uint64_t seq_{0};
+};
+
+TEST_F(OutboxRules, SendsOnlyWhatChangedToWhomAsksForDeltasAtMostTwiceASecond) {
+  shown_.push_back({"a", {}, std::make_shared<const std::string>(estimate("a", 1, "found"))});
+  subscribe(Topic::anchors_estimates, [](auto& s) { s.deltas = true, s.min_interval_us = 500'000; });
+  put(10, estimate("a", 2, "found"), "a");
+  auto data = read(10);
+  ASSERT_EQ(data.size(), 1u);
+  EXPECT_EQ(data[0]["data"], Json::parse(R"({"mission":"m","anchor":"a","h_m":2})"));
+  for (int i = 0; i < 20; ++i) put(10 + i * 0.02, estimate("a", 3 + i, "converged"), "a");
+  put(10.45, estimate("b", 7, "found"), "b");
+  EXPECT_TRUE(read(10.49).empty()) << "half a second is not over";
+  data = read(10.5);
+  ASSERT_EQ(data.size(), 1u);
+  EXPECT_EQ(data[0]["data"], Json::parse(R"([{"mission":"m","anchor":"a","status":"converged","h_m":22},
+                                             {"mission":"m","anchor":"b","status":"found","h_m":7}])"))
+      << "merged, the newest of each; of one that the client has not, all";
+  outbox_.heartbeat(0);
+  EXPECT_EQ(read(10.6)[0]["conflating"], false) << "who asked for less is not slow";
+}
+
+TEST_F(OutboxRules, HoldsDeltasOfFiftyAnchorsTo30KilobytesASecondWithTheNewestOfEach) {
+  subscribe(Topic::anchors_estimates, [](auto& s) { s.deltas = true, s.min_interval_us = 500'000; });
+  std::size_t bytes = 0;
+  std::map<std::string, int> has;
+  for (int step = 0; step < 1000; ++step) {  // 100 estimates a second for ten seconds, of 700 bytes each
+    const double now_s = step * 0.01;
+    const auto anchor = std::to_string(step % 50);
+    put(now_s,
+        R"({"mission":"m","anchor":")" + anchor + R"(","n":)" + std::to_string(step) + R"(,"x":")" +
+            std::string(650, static_cast<char>('a' + step % 26)) + R"("})",
+        anchor);
+    while (auto frame = outbox_.next(us(now_s))) {
+      bytes += frame->size();
+      Json rows = Json::parse(*frame)["data"];
+      if (!rows.is_array()) rows = Json::array({rows});
+      for (const auto& row : rows) has[row["anchor"]] = row["n"];
+    }
+  }
+  EXPECT_LT(bytes, 330'000u);
+  for (const auto& [anchor, n] : has) EXPECT_GT(n, 1000 - 300) << anchor << " is older than three seconds";
+}
+
+TEST_F(OutboxRules, GivesWhoAsksForNoOldStreamTheNewestAndTellsOfTheGap) {
+  subscribe(Topic::ranges, [](auto& s) { s.max_age_us = 1'000'000; });
+  for (int i = 0; i < 3; ++i) put(10, R"({"n":)" + std::to_string(i) + "}");
+  put(11.5, R"({"n":3})");
+  const auto frames = read(11.6);
+  ASSERT_EQ(frames.size(), 2u);
+  EXPECT_EQ(frames[0]["op"], "gap");
+  EXPECT_EQ(frames[0]["dropped"], 3);
+  EXPECT_EQ(frames[1]["data"][0]["n"], 3);
+  EXPECT_EQ(frames[1]["prev"], frames[0]["to_seq"]);
+}
+
+TEST_F(OutboxRules, SendsNothingOfASubscriptionBeforeItIsKnownWhereItBegins) {
+  api::Subscription subscription;
+  subscription.id = 7;
+  subscription.topic = topic_ = Topic::drone_pose;
+  outbox_.add(subscription);
+  put(10, R"({"n":1})", "m");
+  EXPECT_TRUE(read(10).empty());
+  outbox_.start(7, 0, {}, {});
+  EXPECT_EQ(read(10).size(), 1u);
+}
+
+TEST_F(HubRules, HasDeltasOfEstimatesAlone) {
+  auto client = connect();
+  client->on_text(R"({"op":"sub","id":1,"topic":"ranges","params":{"deltas":true}})");
+  client->on_text(R"({"op":"sub","id":2,"topic":"anchors.estimates","params":{"deltas":true,"max_hz":2}})");
+  const auto frames = read(*client);
+  EXPECT_EQ(of(frames, "err").size(), 1u);
+  EXPECT_EQ(of(frames, "ack").size(), 1u);
+}
+
+TEST(Delta, IsWhatDiffersAndNamesWhatIsGone) {
+  const std::array<std::string_view, 1> id{"id"};
+  EXPECT_EQ(
+      api::delta_of(R"({"id":1,"a":2,"b":"x,}\"","c":[1,2]})", R"({"id":1,"a":3,"b":"x,}\"","d":null})", id),
+      R"({"id":1,"a":3,"d":null,"c":null})");
+  EXPECT_EQ(api::delta_of(R"({"p":{"x":1,"y":2},"q":null})", R"({"p":{"x":1,"y":3},"q":{"z":1}})", {}),
+            R"({"p":{"y":3},"q":{"z":1}})");
+  EXPECT_EQ(api::delta_of(R"({"g":[{"n":"a","v":1},{"n":"b","v":2}]})",
+                          R"({"g":[{"n":"a","v":1},{"n":"b","v":5}]})", {}),
+            R"({"g":{"1":{"v":5}}})");
+  EXPECT_EQ(api::delta_of(R"({"g":[{"v":1}]})", R"({"g":[{"v":1},{"v":2}]})", {}),
+            R"({"g":[{"v":1},{"v":2}]})")
+      << "another number of them: all";
+  EXPECT_EQ(api::delta_of(R"({"g":[1,2]})", R"({"g":[1,3]})", {}), R"({"g":[1,3]})");
+  EXPECT_EQ(api::delta_of(R"({"a":1})", R"({"a":1})", {}), "{}");
+  for (const char* broken : {"", "{", R"({"a)", R"({"a")", R"({"a":)", R"({"a":1)", "7", R"({"a":[1})"})
+    EXPECT_EQ(api::delta_of(broken, R"({"a":2})", {}), R"({"a":2})") << broken;
 }
 
 TEST_F(HubRules, DropsTheOldestOfAStreamAndSaysSoWithoutHoles) {

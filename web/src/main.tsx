@@ -4,7 +4,7 @@ import { browser_environment } from './live/browser';
 import { LiveClient } from './live/client';
 import { follow_archive, load_missions } from './state/archive';
 import { me, refresh_me } from './state/session';
-import { connect, TOPICS } from './state/store';
+import { connect, PARAMS, TOPICS } from './state/store';
 import { App } from './ui/app';
 import { on_key } from './ui/keyboard';
 import './ui/theme';
@@ -14,7 +14,7 @@ import './style/shell.css';
 import './style/live.css';
 import './style/anchors.css';
 
-const client = new LiveClient(TOPICS, browser_environment());
+const client = new LiveClient(TOPICS, browser_environment(), PARAMS);
 render(<App />, document.getElementById('app')!);
 addEventListener('keydown', on_key);
 /// Signed out, the stream rests until somebody signs in; the last picture stays.

@@ -1,3 +1,4 @@
+import { Whole } from './deltas';
 import { num, obj, str } from './messages';
 import type { LinkState, LiveSink, LiveSource } from './source';
 
@@ -17,11 +18,19 @@ export interface Environment {
   after(ms: number, call: () => void): () => void; ///< returns its cancel
 }
 
+/// What a subscription asks for; asyncapi, sub.
+export interface TopicParams {
+  readonly max_hz?: number;
+  readonly max_age_s?: number;
+  readonly deltas?: boolean;
+}
+
 interface Topic {
   sub: number | null;
   seq: number | null;
   waiting: boolean;
   resubscribed_ms: number;
+  readonly whole: Whole | null; ///< of a topic that comes as what changed
 }
 
 const LATE_MS = 2000,
@@ -64,9 +73,12 @@ export class LiveClient implements LiveSource {
   constructor(
     topics: readonly string[],
     private readonly env: Environment,
-    private readonly params: Record<string, object> = {},
+    private readonly params: Readonly<Record<string, TopicParams>> = {},
   ) {
-    for (const t of topics) this.topics.set(t, { sub: null, seq: null, waiting: false, resubscribed_ms: -Infinity });
+    for (const t of topics) {
+      const whole = params[t]?.deltas ? new Whole() : null;
+      this.topics.set(t, { sub: null, seq: null, waiting: false, resubscribed_ms: -Infinity, whole });
+    }
   }
 
   start(sink: LiveSink): void {
@@ -280,6 +292,7 @@ export class LiveClient implements LiveSource {
     const t_us = num(m.t_us) ?? this.now_us();
     if (m.op === 'snap') {
       topic.seq = seq;
+      topic.whole?.snap(m.data);
       this.sink?.snap(name, m.data, t_us);
       return;
     }
@@ -292,9 +305,15 @@ export class LiveClient implements LiveSource {
       this.hole(name, topic);
       return;
     }
+    const data = topic.whole ? topic.whole.data(m.data) : m.data;
+    if (data === null) {
+      topic.seq = null; // whole again: not from where we stand
+      this.hole(name, topic);
+      return;
+    }
     topic.seq = seq;
     this.resume?.recovered.set(name, (this.resume.recovered.get(name) ?? 0) + 1);
-    this.sink?.data(name, m.data, t_us);
+    this.sink?.data(name, data, t_us);
   }
   /// A jump that nobody announced: ask again from where we stand. Once in two seconds, else a broken server would be asked for ever.
   private hole(name: string, topic: Topic): void {

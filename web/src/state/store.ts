@@ -24,6 +24,12 @@ export const TOPICS = [
   'mission.height',
 ] as const;
 
+/// A link that cannot keep up gets less, and nothing older.
+export const PARAMS = {
+  'anchors.estimates': { max_hz: 2, deltas: true },
+  ranges: { max_age_s: 1 },
+} as const;
+
 export const link = signal<LinkState>('connecting');
 export const tick = signal(0);
 export const scenes = new Map<string, Scene>();
