@@ -19,6 +19,7 @@ import { Scene } from './scene';
 export interface Mark {
   readonly t_us: number;
   readonly level: string;
+  readonly code: string;
   readonly text: string;
 }
 export interface Recording {
@@ -120,7 +121,7 @@ export const marks_of = (
   to_us: number,
 ): Recording['marks'] =>
   events
-    .flatMap((e) => (e ? [{ t_us: num(e.t_us) ?? 0, level: str(e.level), text: str(e.text) }] : []))
+    .flatMap((e) => (e ? [{ t_us: num(e.t_us) ?? 0, level: str(e.level), code: str(e.code), text: str(e.text) }] : []))
     .filter((e) => e.t_us >= from_us && e.t_us <= to_us)
     .sort((a, b) => a.t_us - b.t_us);
 

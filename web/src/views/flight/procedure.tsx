@@ -1,6 +1,6 @@
 /// Where the flight stands in its procedure and why; where it goes next and what that is worth; the turn and the height search while they run.
 import '../desk.css';
-import type { GridMsg, ProcedureMsg, ProfileMsg } from '../../live/flight_messages';
+import type { GridMsg, ProcedureMsg, ProfileMsg, Step } from '../../live/flight_messages';
 import { current_scene, link, now_ms, tick } from '../../state/store';
 import { bearing, fixed } from '../../ui/format';
 import { Chip, Mark, Q } from '../../ui/marks';
@@ -20,7 +20,7 @@ import {
 } from './words';
 
 /// A reason of the server as a sentence: its words for refusals carry underscores.
-const sentence = (reason: string): string =>
+export const sentence = (reason: string): string =>
   `${reason[0]!.toUpperCase()}${reason.slice(1).replaceAll('_', ' ')}${/[.!?]$/.test(reason) ? '' : '.'}`;
 
 export function Procedure() {
@@ -31,7 +31,6 @@ export function Procedure() {
   const p = latest.value,
     stale = link.value === 'lost' || now_ms() - latest.at_ms > 5000,
     [shape, tone, word] = STATUS_LOOK[p.status],
-    at = stage_of(p.step),
     next = next_step(p.step);
   const since =
     p.in_step_s === null ? null : p.in_step_s + (flying(p) && !stale ? (now_ms() - latest.at_ms) / 1000 : 0);
@@ -46,13 +45,7 @@ export function Procedure() {
         )}
         <span class="meta">{p.iteration > 0 ? `iteration ${p.iteration}` : p.plan_name}</span>
       </div>
-      {at >= 0 && (
-        <div class="track" role="img" aria-label={`Stage ${at + 1} of ${TRACK.length}`}>
-          {TRACK.map((_, i) => (
-            <i key={i} class={i < at ? 'd' : i === at ? 'c' : ''} />
-          ))}
-        </div>
-      )}
+      <Track step={p.step} />
       <div class="steps">
         <Mark shape="estimating" tone="ink" />
         <span class="cur">
@@ -99,6 +92,18 @@ export function Procedure() {
       )}
       <NotDone p={p} />
     </section>
+  );
+}
+
+/// How far the flight is in its eleven stages.
+export function Track({ step }: { step: Step }) {
+  const at = stage_of(step);
+  return at < 0 ? null : (
+    <div class="track" role="img" aria-label={`Stage ${at + 1} of ${TRACK.length}`}>
+      {TRACK.map((_, i) => (
+        <i key={i} class={i < at ? 'd' : i === at ? 'c' : ''} />
+      ))}
+    </div>
   );
 }
 

@@ -6,10 +6,14 @@ import { rows_of_collection } from '../../api/anchors';
 import { request } from '../../api/client';
 import { MapBox } from '../../map/map_box';
 import { after, estimates_over_time, load_recording, neighbour, Player } from '../../state/recording';
+import { alarms_at, procedure_at, status_of } from '../../state/moment';
 import { chosen_anchor, mission_id, now_ms, ordered_missions, replayed, synced, tick } from '../../state/store';
 import { clock, fixed, told_apart } from '../../ui/format';
-import { Chip } from '../../ui/marks';
+import { Chip, Mark, Q } from '../../ui/marks';
 import { AnchorCard } from '../anchor_card';
+import '../flight/flight.css';
+import { sentence, Track } from '../flight/procedure';
+import { STATUS_LOOK, STEP_WORDS } from '../flight/words';
 import { RangeList } from '../range_list';
 import { useStable } from '../../ui/use_stable';
 
@@ -204,6 +208,7 @@ export function Replay({ id }: { id: string | null }) {
           version={`${mission.mission} ${player?.scene.estimates_version} ${selected}`}
         />
         <aside class="side" aria-label="Ranges and anchor of the recording" tabIndex={0}>
+          {player && <Then player={player} />}
           <RangeList selected={selected} />
           {moment === 'asked' && player && (
             <p class="why pad" role="status">
@@ -263,6 +268,64 @@ export function Replay({ id }: { id: string | null }) {
         </label>
       </div>
     </div>
+  );
+}
+
+/// Where the flight stood in its procedure at the moment shown, and which alarms stood.
+function Then({ player }: { player: Player }) {
+  const { marks } = player.recording,
+    p = procedure_at(marks, player.t_us),
+    alarms = alarms_at(marks, player.t_us);
+  const [shape, tone, word] =
+    p?.step === 'done' ? (['off', 'off', 'LANDED'] as const) : STATUS_LOOK[status_of(p?.step ?? 'ready')];
+  return (
+    <>
+      {alarms.length > 0 && (
+        <section class="sec-p" data-testid="replay-alarms">
+          <h2>Alarms at this moment</h2>
+          <ul class="plain">
+            {alarms.map((a) => (
+              <li key={a.id}>
+                <Mark
+                  shape={a.level === 'critical' ? 'bad' : 'caution'}
+                  tone={a.level === 'critical' ? 'bad' : 'caution'}
+                />{' '}
+                <b>{a.id}</b> {a.text && sentence(a.text)}{' '}
+                <span class="mut">for {clock((player.t_us - a.since_us) / 1e6, true)}</span>
+              </li>
+            ))}
+          </ul>
+        </section>
+      )}
+      {p && (
+        <section class="sec-p" data-testid="replay-procedure">
+          <div class="hd">
+            <h2>Procedure</h2>
+            <Chip shape={shape} tone={tone} word={word} />
+            <span class="meta">{p.iteration > 0 ? `iteration ${p.iteration}` : ''}</span>
+          </div>
+          <Track step={p.step} />
+          <div class="steps">
+            <Mark shape="estimating" tone="ink" />
+            <span class="cur">{STEP_WORDS[p.step]}</span>
+            <span class="t cur">
+              <Q v={fixed((player.t_us - p.since_us) / 1e6, 0)} u="s" />
+            </span>
+          </div>
+          {p.reason && <p class="why">{sentence(p.reason)}</p>}
+          {p.reached.length > 0 && (
+            <details class="notdone">
+              <summary>{p.reached.length} anchors whose work was over</summary>
+              <ul>
+                {p.reached.map((r) => (
+                  <li key={r}>{r}</li>
+                ))}
+              </ul>
+            </details>
+          )}
+        </section>
+      )}
+    </>
   );
 }
 

@@ -1,0 +1,69 @@
+/// The procedure and the alarms of a moment of a stored flight, from its events: each step is one, and each alarm that came or went. No DOM.
+import type { ProcedureMsg, Step } from '../live/flight_messages';
+import { STEPS } from '../live/flight_messages';
+import type { Mark } from './recording';
+
+export interface MomentAlarm {
+  readonly id: string;
+  readonly level: string;
+  readonly text: string;
+  readonly since_us: number;
+}
+export interface Moment {
+  readonly step: Step;
+  readonly reason: string;
+  readonly since_us: number;
+  readonly started_us: number;
+  readonly iteration: number; ///< points measured so far
+  readonly reached: readonly string[]; ///< anchors whose work is over, with the words of the procedure
+}
+
+const step_of = (m: Mark): Step | null =>
+  m.code.startsWith('procedure.') ? (STEPS.find((s) => s === m.code.slice('procedure.'.length)) ?? null) : null;
+
+/// Null before the take-off: a flight may be recorded long before it is flown, or be flown by nobody here.
+export function procedure_at(marks: readonly Mark[], t_us: number): Moment | null {
+  let now = null as Moment | null;
+  for (const m of marks) {
+    if (m.t_us > t_us) break;
+    const step = step_of(m);
+    if (m.code === 'anchor.done' && now !== null) now = { ...now, reached: [...now.reached, m.text] };
+    if (!step) continue;
+    const anew: Moment | null = step === 'take_off' && now?.step !== 'take_off' ? null : now;
+    now = {
+      step,
+      reason: m.text,
+      since_us: m.t_us,
+      started_us: anew?.started_us ?? m.t_us,
+      iteration: (anew?.iteration ?? 0) + Number(step === 'find_next_point' && anew?.step === 'ranging'),
+      reached: anew?.reached ?? [],
+    };
+  }
+  return now;
+}
+
+/// Newest last. "alarm.raised" says "id: what is wrong", "alarm.cleared" "id is over".
+export function alarms_at(marks: readonly Mark[], t_us: number): MomentAlarm[] {
+  const standing = new Map<string, MomentAlarm>();
+  for (const m of marks) {
+    if (m.t_us > t_us) break;
+    if (m.code === 'alarm.raised') {
+      const [id = '', ...words] = m.text.split(': ');
+      standing.set(id, { id, level: m.level, text: words.join(': '), since_us: m.t_us });
+    } else if (m.code === 'alarm.cleared') standing.delete(m.text.replace(/ is over$/, ''));
+  }
+  return [...standing.values()];
+}
+
+export const status_of = (step: Step): ProcedureMsg['status'] =>
+  step === 'hold'
+    ? 'hold'
+    : step === 'return_home'
+      ? 'return'
+      : step === 'landing'
+        ? 'landing'
+        : step === 'ready'
+          ? 'ready'
+          : step === 'done'
+            ? 'done'
+            : 'running';

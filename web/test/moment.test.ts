@@ -1,0 +1,49 @@
+import { expect, it } from 'vitest';
+import { alarms_at, procedure_at } from '../src/state/moment';
+import type { Mark } from '../src/state/recording';
+
+const at = (s: number, code: string, text: string, level = 'info'): Mark => ({ t_us: s * 1e6, code, text, level });
+const marks = [
+  at(1, 'control.taken', 'operator has control'),
+  at(5, 'procedure.take_off', 'started by the operator'),
+  at(20, 'procedure.go_to_waypoint', 'in the air, to the first waypoint'),
+  at(22, 'alarm.raised', 'rtk.lost: no RTK for 2.1 s', 'critical'),
+  at(25, 'alarm.cleared', 'rtk.lost is over'),
+  at(30, 'procedure.ranging', 'anchors in range, ranging'),
+  at(34, 'procedure.find_next_point', 'enough ranges at this point'),
+  at(34, 'anchor.done', '0x6a21: accuracy reached: 0.041 m, wanted 0.050 m'),
+  at(35, 'procedure.plan_changed', 'Hall: revision 2 is flown'),
+  at(40, 'alarm.raised', 'uwb.none: no range for 5 s: check the tag', 'warning'),
+];
+
+it('is the step of that moment with its reason and its time, and nothing before the take-off', () => {
+  expect(procedure_at(marks, 4e6)).toBeNull();
+  expect(procedure_at(marks, 21e6)).toMatchObject({
+    step: 'go_to_waypoint',
+    reason: 'in the air, to the first waypoint',
+    since_us: 20e6,
+    started_us: 5e6,
+    iteration: 0,
+    reached: [],
+  });
+  expect(procedure_at(marks, 33e6)).toMatchObject({ step: 'ranging', iteration: 0 });
+  expect(procedure_at(marks, 36e6)).toMatchObject({
+    step: 'find_next_point',
+    iteration: 1,
+    reached: ['0x6a21: accuracy reached: 0.041 m, wanted 0.050 m'],
+  });
+});
+it('begins anew with a second flight of the same mission', () => {
+  const second = [...marks, at(60, 'procedure.done', 'landed'), at(90, 'procedure.take_off', 'started again')];
+  expect(procedure_at(second, 91e6)).toMatchObject({ step: 'take_off', started_us: 90e6, iteration: 0, reached: [] });
+});
+it('has the alarms that stood then, with since when', () => {
+  expect(alarms_at(marks, 21e6)).toEqual([]);
+  expect(alarms_at(marks, 23e6)).toEqual([
+    { id: 'rtk.lost', level: 'critical', text: 'no RTK for 2.1 s', since_us: 22e6 },
+  ]);
+  expect(alarms_at(marks, 26e6)).toEqual([]);
+  expect(alarms_at(marks, 41e6)).toEqual([
+    { id: 'uwb.none', level: 'warning', text: 'no range for 5 s: check the tag', since_us: 40e6 },
+  ]);
+});
