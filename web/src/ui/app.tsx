@@ -167,7 +167,7 @@ export function App() {
           {view === 'anchors' && <Later load={load_anchors} props={{ anchor: named }} />}
           {view === 'measurements' && <Later load={load_measurements} props={{}} />}
           {view === 'replay' && <Later load={load_replay} props={{ id: named }} />}
-          {view === 'system' && <Later load={load_system} props={{}} />}
+          {view === 'system' && <Later load={load_system} props={{ part: named }} />}
           {view === 'models' && <Later load={load_models} props={{ path: args[0] === 'runs' ? named : null }} />}
         </div>
       </main>

@@ -60,11 +60,11 @@ export function FirstRun() {
             <section>
               <h2>Fly for real</h2>
               <p>
-                Plug in the UWB tag and the RTK receiver. System finds them, shows whether each is measuring, and
-                compares their radio settings; the guide says how to mount them.
+                Plug in the UWB tag and the RTK receiver. Step by step they are found, checked while they measure, and
+                their radio settings compared; the guide says how to mount them.
               </p>
               <span class="rowed">
-                <a class="btn primary" href="#/system" data-testid="connect-devices">
+                <a class="btn primary" href="#/system/connect" data-testid="connect-devices">
                   Connect my devices
                 </a>
                 <a class="btn" href="#/guide/mounting">

@@ -8,6 +8,7 @@ import { say, server_now_us } from '../../state/store';
 import { CopyBox } from '../../ui/copy_box';
 import { age, fixed } from '../../ui/format';
 import { Chip, Mark, Q } from '../../ui/marks';
+import { ConnectSteps } from './connect_steps';
 import { DeviceDetail } from './device_detail';
 import { DeviceForm } from './device_form';
 import { kind_words, parts_of, type Setup } from './device_setup';
@@ -17,7 +18,7 @@ import type { Run } from './run';
 import { useDevices, type Row } from './use_devices';
 import { by_count, doing, dropped_words, lost_messages, summary } from './standing';
 
-export function DevicesPanel() {
+export function DevicesPanel({ guided }: { guided: boolean }) {
   const { all, rows, problem, load } = useDevices(),
     [failed, set_failed] = useState(''),
     [found, set_found] = useState<readonly Found[] | null>(null),
@@ -69,6 +70,17 @@ export function DevicesPanel() {
           </button>
         )}
       </div>
+      {guided && (
+        <ConnectSteps
+          rows={rows}
+          found={found}
+          radios={compared}
+          discover={
+            operator && busy === '' ? () => void run('discover', async () => set_found(await discover()), '') : null
+          }
+          tune={operator ? set_radio : null}
+        />
+      )}
       {(failed || problem) && (
         <div class="problem" role="status">
           <b>That did not work.</b> {failed || problem}

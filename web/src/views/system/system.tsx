@@ -13,14 +13,15 @@ import { LeverPanel } from './levers';
 import { FlightsPanel } from './flights';
 import { TimePanel } from './time';
 
-export function System() {
+/// `part` connect: the first set-up, step by step.
+export function System({ part }: { part: string | null }) {
   useEffect(() => {
     document.title = 'System - anchord';
   }, []);
   return (
     <div class="system" data-testid="system" tabIndex={0} role="region" aria-label="System">
       <h1 class="sr">System</h1>
-      <DevicesPanel />
+      <DevicesPanel guided={part === 'connect'} />
       <BasePanel />
       <LeverPanel />
       <TimePanel />
