@@ -147,11 +147,8 @@ Anchor path_anchor(AnchorApi& s, const Request& request) {
 }
 
 AnchorFeature feature_of(AnchorApi& s, const Anchor& anchor) {
+  if (auto published = published_feature(s, anchor)) return *std::move(published);
   FeatureLookup lookup(s);
-  std::uint64_t number = 0;
-  for (auto& feature : published_features(s, std::nullopt, number)) {
-    if (feature.anchor.network_id == anchor.network_id) return feature;
-  }
   AnchorFeature feature;
   feature.anchor = anchor;
   feature.site = lookup.site(anchor.site);

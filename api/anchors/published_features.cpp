@@ -169,4 +169,16 @@ std::vector<AnchorFeature> published_features(AnchorApi& s, std::optional<std::u
   return out;
 }
 
+std::optional<AnchorFeature> published_feature(AnchorApi& s, const Anchor& anchor) {
+  const auto number = newest_revision(s);
+  const auto position = value_or_problem(s.revisions.position(anchor.network_id, number));
+  if (!position) return std::nullopt;
+  FeatureLookup lookup(s);
+  auto out = lookup.feature(anchor, *position, number);
+  const auto contradicted = s.contradictions.standing();
+  if (const auto against = contradicted->find(anchor.network_id); against != contradicted->end())
+    contradict(out, against->second);
+  return out;
+}
+
 }  // namespace anchord::api

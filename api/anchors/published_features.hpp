@@ -43,4 +43,7 @@ std::uint64_t newest_revision(AnchorApi& services);
 std::vector<AnchorFeature> published_features(AnchorApi& services, std::optional<std::uint64_t> revision,
                                               std::uint64_t& number);
 
+/// That of one anchor in the newest revision, without reading the others; none: it has no place there.
+std::optional<AnchorFeature> published_feature(AnchorApi& services, const Anchor& anchor);
+
 }  // namespace anchord::api

@@ -40,6 +40,9 @@ class RevisionStore {
   virtual Result<std::vector<Revision>> revisions(std::size_t limit, std::uint64_t before) = 0;
   /// All positions of a revision, of the newest when absent (empty when nothing was ever published).
   virtual Result<std::vector<PublishedPosition>> published(std::optional<std::uint64_t> revision) = 0;
+  /// That of one anchor in a revision, read by itself; none: it has no position in it, or there is no such
+  /// revision.
+  virtual Result<std::optional<PublishedPosition>> position(NetworkId network_id, std::uint64_t revision) = 0;
   /// Every position ever published of one anchor, newest first.
   virtual Result<std::vector<PublishedPosition>> history(NetworkId network_id) = 0;
 };

@@ -272,6 +272,14 @@ Result<std::vector<PublishedPosition>> positions_of_revision(Connection& c,
   return read_positions(c, query);
 }
 
+Result<std::optional<PublishedPosition>> position_in_revision(Connection& c, NetworkId network_id,
+                                                              std::uint64_t revision) {
+  Query query(c, std::string(k_position_columns) + "WHERE p.number = ?1 AND p.network_id = ?2");
+  query << revision << network_id;
+  auto found = read_positions(c, query);
+  return found.empty() ? std::nullopt : std::optional(std::move(found.front()));
+}
+
 Result<std::vector<PublishedPosition>> positions_of_anchor(Connection& c, NetworkId network_id) {
   Query query(c, std::string(k_position_columns) +
                      "WHERE p.network_id = ?1 AND p.number = p.since_number ORDER BY p.number DESC");

@@ -26,6 +26,8 @@ Result<std::vector<Revision>> list_revisions(Connection& connection, std::int64_
                                              std::uint64_t before);
 Result<std::vector<PublishedPosition>> positions_of_revision(Connection& connection,
                                                              std::optional<std::uint64_t> revision);
+Result<std::optional<PublishedPosition>> position_in_revision(Connection& connection, NetworkId network_id,
+                                                              std::uint64_t revision);
 Result<std::vector<PublishedPosition>> positions_of_anchor(Connection& connection, NetworkId network_id);
 
 /// All estimates of one calibration, in the order in which it has them.

@@ -24,6 +24,10 @@ class SqlRevisionStore final : public RevisionStore {
     return read_value<std::vector<PublishedPosition>>(
         gate_, [&](Connection& c) { return positions_of_revision(c, revision); });
   }
+  Result<std::optional<PublishedPosition>> position(NetworkId network_id, std::uint64_t revision) override {
+    return read_value<std::optional<PublishedPosition>>(
+        gate_, [&](Connection& c) { return position_in_revision(c, network_id, revision); });
+  }
   Result<std::vector<PublishedPosition>> history(NetworkId network_id) override {
     return read_value<std::vector<PublishedPosition>>(
         gate_, [&](Connection& c) { return positions_of_anchor(c, network_id); });

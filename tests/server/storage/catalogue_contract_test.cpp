@@ -393,6 +393,17 @@ TEST_P(AnchorStoreContract, CarriesPositionsOnThatANewRevisionDoesNotSet) {
   EXPECT_EQ(now[1].calibration, second.id);
   EXPECT_EQ(db_->stores().revisions.published(1).value()[1].calibration, first.id);
   EXPECT_EQ(db_->stores().revisions.published(3).error().code, Errc::not_found);
+  for (const std::uint64_t number : {1, 2}) {
+    for (const auto& whole : db_->stores().revisions.published(number).value()) {
+      const auto alone = db_->stores().revisions.position(whole.estimate.anchor, number).value();
+      ASSERT_TRUE(alone);
+      EXPECT_EQ(alone->since_revision, whole.since_revision);
+      EXPECT_EQ(alone->calibration, whole.calibration);
+      EXPECT_EQ(alone->estimate.best->position.m, whole.estimate.best->position.m);
+    }
+  }
+  EXPECT_FALSE(db_->stores().revisions.position(NetworkId{3}, 2).value()) << "never published";
+  EXPECT_FALSE(db_->stores().revisions.position(NetworkId{1}, 3).value()) << "no such revision";
   const auto history = db_->stores().revisions.history(NetworkId{2}).value();
   ASSERT_EQ(history.size(), 2u);
   EXPECT_EQ(history[0].since_revision, 2u);
