@@ -298,9 +298,18 @@ void FlightEngine::fly(double now_s, const Eigen::Vector3d& to_m, std::optional<
 
 void FlightEngine::next_leg(double now_s) {
   settled_s_.reset();
-  const Command c{Command::Kind::go_to, legs_.front(),
-                  state_.step == Step::return_home ? std::nullopt : state_.heading_rad};
-  if (const auto refused = refuse_command(setup_.limits, position_m(), c)) {
+  const auto heading = state_.step == Step::return_home ? std::nullopt : state_.heading_rad;
+  Command c{Command::Kind::go_to, legs_.front(), heading};
+  const auto at = position_m();
+  auto refused = refuse_command(setup_.limits, at, c);
+  // A turning point counts as reached from a metre off, and from there the next leg may graze what it clears.
+  const auto anew = refused && at ? planning::route(setup_.limits.bounds, *at, legs_.back()) : std::nullopt;
+  if (anew) {
+    legs_.assign(anew->begin(), anew->end());
+    c.point_m = legs_.front();
+    refused = refuse_command(setup_.limits, at, c);
+  }
+  if (refused) {
     report(now_s, EventLevel::warning, "point.unreachable", refused->text);
     legs_.clear();
     pending_ = Trigger::unreachable;
