@@ -181,7 +181,7 @@ TEST_F(PlanInFlight, ANoFlyAreaThatIsAddedIsFlownRoundAtOnce) {
 TEST_F(PlanInFlight, UndoFliesThePlanBeforeAndCanBeUndoneItself) {
   const auto lease = take_off();
   EXPECT_EQ(get(base() + "/plan/change", {{"undo", "true"}}).status, 422) << "nothing to undo yet";
-  edit([](Json& plan) { plan["waypoints"][0] = waypoint(-7, 10, 6); });
+  edit([](Json& plan) { plan["waypoints"][0] = waypoint(-3, -8, 6); });
   ASSERT_EQ(take(lease, 2).status, 200);
   EXPECT_EQ(difference(true)["to_revision"], 1);
   ASSERT_EQ(take(lease, 1, R"(,"undo":true)").status, 200);
