@@ -28,7 +28,7 @@ export default typescript.config(
   },
   { files: ['**/*.mjs', '**/*.js', '**/vite*.config.ts'], languageOptions: { globals: globals.node } },
   // Functions of these run in the page.
-  { files: ['**/e2e/*.mjs'], languageOptions: { globals: globals.browser } },
+  { files: ['**/e2e/*.mjs', '**/bench/*.mjs'], languageOptions: { globals: globals.browser } },
   {
     files: ['**/*.ts', '**/*.tsx'],
     extends: [typescript.configs.recommendedTypeCheckedOnly],

@@ -105,6 +105,13 @@ void add_lines(const std::vector<JointLine>& lines, const std::vector<double>& w
   }
 }
 
+/// Scatter of the ranges kept. Jumps to those that are off by metres, and the scale they blow up, are no
+/// noise: taken for it they would make spoilt ranges count for more than clean ones.
+double kept_variance_m2(std::vector<double>& kept_sizes_m, double scale_m, double min_scale_m) {
+  const double kept_m = kept_sizes_m.empty() ? scale_m : 1.4826 * median(kept_sizes_m);
+  return std::clamp(kept_m * kept_m, min_scale_m * min_scale_m, scale_m * scale_m);
+}
+
 void build_anchor(const AnchorTask& task, AnchorBlock& block, JointNormal& normal) {
   const FlightOptions& options = task.options;
   std::vector<JointLine> lines;
@@ -176,13 +183,10 @@ void build_anchor(const AnchorTask& task, AnchorBlock& block, JointNormal& norma
   if (block.n_rejected > 0) block.refused["outlier"] = block.n_rejected;
   if (block.sum_weight > 0) block.rms_m = std::sqrt(sum_square / block.sum_weight);
   const double alike = std::max(1.0, 2.0 * options.correlation_s * block.sum_weight / duration_s(times_s));
-  // The mean over a correlation time keeps what is shared and averages the rest. Of the ranges kept: jumps to
-  // those that are off by metres, and the scale they blow up, are no noise, and taken for it they would make
-  // spoilt ranges count for more than clean ones.
+  // The mean over a correlation time keeps what is shared and averages the rest.
   block.white_share = neighbours.white_share(scale2);
-  const double kept_m = kept_sizes.empty() ? block.scale_m : 1.4826 * median(kept_sizes);
-  const double kept2 = std::clamp(kept_m * kept_m, options.min_scale_m * options.min_scale_m, scale2);
-  const double slow_share = k_least_slow_m * k_least_slow_m / kept2;
+  const double slow_share =
+      k_least_slow_m * k_least_slow_m / kept_variance_m2(kept_sizes, block.scale_m, options.min_scale_m);
   block.kappa = 1.0 + (alike - 1.0) * std::clamp(slow_share, 1.0 - k_believed_white * block.white_share, 1.0);
   add_lines(lines, weights, 1.0 / (block.kappa * scale2), block, normal);
 }
