@@ -44,6 +44,20 @@ struct Course {
   }
 };
 
+void add_track(FlightData& flight, const Course& course, double duration_s, Random& random) {
+  for (double t_s = 0; t_s < duration_s; t_s += 0.2) {
+    const Way way = course.at(t_s);
+    Fix fix;
+    fix.time = UtcTime::from_seconds(t_s);
+    fix.frame = TrackFrame::local;
+    fix.fix = FixClass::rtk_fixed;
+    fix.local_m =
+        way.at_m + Eigen::Vector3d(normal(random, 0.01), normal(random, 0.01), normal(random, 0.015));
+    fix.enu_from_body = Eigen::Quaterniond(Eigen::AngleAxisd(way.course_rad, Eigen::Vector3d::UnitZ()));
+    flight.fixes.push_back(fix);
+  }
+}
+
 }  // namespace
 
 const char* word(Spoilage spoilage) {
@@ -94,17 +108,7 @@ KitFlight fly(const MadeKit& kit, const std::string& name, Random& random, Spoil
   const double duration_s = between(random, 60, 120);
   const Course course{wall_x_m + off_m,          wall_y_m + off_m,          0.5 * top_m + 1.5,    0.5 * top_m,
                       between(random, 0.1, 0.2), between(random, 0.2, 0.4), between(random, 0, 6)};
-  for (double t_s = 0; t_s < duration_s; t_s += 0.2) {
-    const Way way = course.at(t_s);
-    Fix fix;
-    fix.time = UtcTime::from_seconds(t_s);
-    fix.frame = TrackFrame::local;
-    fix.fix = FixClass::rtk_fixed;
-    fix.local_m =
-        way.at_m + Eigen::Vector3d(normal(random, 0.01), normal(random, 0.01), normal(random, 0.015));
-    fix.enu_from_body = Eigen::Quaterniond(Eigen::AngleAxisd(way.course_rad, Eigen::Vector3d::UnitZ()));
-    flight.fixes.push_back(fix);
-  }
+  add_track(flight, course, duration_s, random);
   const double bias_m = kit.bias_m + normal(random, k_wander_m);
   const double blocked_from_rad = between(random, 0, 2 * std::numbers::pi);
   const double noise_m = between(random, 0.02, 0.06);
