@@ -1,5 +1,7 @@
+#include <map>
 #include <nlohmann/json.hpp>
 
+#include "api/admin/alarm_board.hpp"
 #include "api/admin/docs_page.hpp"
 #include "api/admin/routes.hpp"
 #include "api/kit/contract.hpp"
@@ -55,23 +57,34 @@ Response metrics(AdminApi& s, const Request&) {
   auto& live = s.hub.counters();
   const StorageStatus storage = s.storage();
   std::string text;
-  const auto add = [&text](const std::string& name, const char* type, std::uint64_t value,
+  const auto add = [&text](const std::string& name, const char* type, std::uint64_t value, const char* help,
                            const std::string& labels = {}) {
-    if (text.find("# TYPE " + name + ' ') == std::string::npos) text += "# TYPE " + name + ' ' + type + '\n';
+    if (text.find("# TYPE " + name + ' ') == std::string::npos)
+      text += "# HELP " + name + ' ' + help + "\n# TYPE " + name + ' ' + type + '\n';
     text += name + labels + ' ' + std::to_string(value) + '\n';
   };
-  add("anchord_ingest_lines_total", "counter", counts.lines_accepted, "{result=\"accepted\"}");
-  add("anchord_ingest_lines_total", "counter", counts.lines_duplicate, "{result=\"duplicate\"}");
-  add("anchord_ingest_lines_total", "counter", counts.lines_rejected, "{result=\"rejected\"}");
-  add("anchord_ws_published_total", "counter", live.published);
-  add("anchord_ws_dropped_total", "counter", live.dropped);
-  add("anchord_ws_conflated_total", "counter", live.conflated);
-  add("anchord_ws_slow_disconnects_total", "counter", live.slow_disconnects);
-  add("anchord_live_queue_rows", "gauge", counts.queued_rows);
-  add("anchord_live_missions", "gauge", counts.missions_followed);
-  add("anchord_live_missions_evicted_total", "counter", counts.missions_evicted);
-  add("anchord_db_size_bytes", "gauge", storage.db_bytes);
-  add("anchord_disk_free_bytes", "gauge", storage.disk_free_bytes);
+  const char* lines = "Lines of ranges and fixes received, by what became of them";
+  add("anchord_ingest_lines_total", "counter", counts.lines_accepted, lines, "{result=\"accepted\"}");
+  add("anchord_ingest_lines_total", "counter", counts.lines_duplicate, lines, "{result=\"duplicate\"}");
+  add("anchord_ingest_lines_total", "counter", counts.lines_rejected, lines, "{result=\"rejected\"}");
+  std::map<AlarmPriority, std::uint64_t> active;
+  for (const auto& alarm : s.alarms.standing()) ++active[alarm.condition.priority];
+  for (const auto priority : {AlarmPriority::critical, AlarmPriority::warning, AlarmPriority::advisory})
+    add("anchord_alarms", "gauge", active[priority], "Active alarms, by priority",
+        "{priority=\"" + std::string(k_alarm_priority_words.word(priority)) + "\"}");
+  add("anchord_ws_published_total", "counter", live.published, "Messages published on the live topics");
+  add("anchord_ws_dropped_total", "counter", live.dropped,
+      "Messages dropped for clients that read too slowly");
+  add("anchord_ws_conflated_total", "counter", live.conflated,
+      "Messages replaced by a newer one of their key");
+  add("anchord_ws_slow_disconnects_total", "counter", live.slow_disconnects,
+      "Clients disconnected because they read too slowly");
+  add("anchord_live_queue_rows", "gauge", counts.queued_rows, "Rows that wait for the live estimates");
+  add("anchord_live_missions", "gauge", counts.missions_followed, "Missions in memory");
+  add("anchord_live_missions_evicted_total", "counter", counts.missions_evicted,
+      "Missions that left memory for another one");
+  add("anchord_db_size_bytes", "gauge", storage.db_bytes, "Size of the database");
+  add("anchord_disk_free_bytes", "gauge", storage.disk_free_bytes, "Free space where the database is");
   text += s.metrics_text();
   Response response;
   response.header("Content-Type", "text/plain; version=0.0.4; charset=utf-8");

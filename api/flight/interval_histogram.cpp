@@ -23,7 +23,8 @@ std::string IntervalHistogram::text(std::string_view name) const {
     if (out.back() == '.') out.pop_back();
     return out;
   };
-  std::string out = "# TYPE " + of + " histogram\n";
+  std::string out =
+      "# HELP " + of + " Time from one round of the safety checks to the next\n# TYPE " + of + " histogram\n";
   std::uint64_t n = 0;
   for (std::size_t i = 0; i < counts_.size(); ++i) {
     n += counts_[i];
@@ -31,7 +32,8 @@ std::string IntervalHistogram::text(std::string_view name) const {
            std::to_string(n) + '\n';
   }
   out += of + "_sum " + std::to_string(sum_s_) + '\n' + of + "_count " + std::to_string(n) + '\n';
-  return out + "# TYPE " + of + "_worst gauge\n" + of + "_worst " + std::to_string(worst_s_) + '\n';
+  return out + "# HELP " + of + "_worst The longest of them\n# TYPE " + of + "_worst gauge\n" + of +
+         "_worst " + std::to_string(worst_s_) + '\n';
 }
 
 }  // namespace anchord::api

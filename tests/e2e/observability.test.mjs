@@ -1,0 +1,59 @@
+// Alert rules and board name metrics that the server has, and promtool (Debian's prometheus) takes all of it.
+import assert from 'node:assert/strict';
+import { execFile } from 'node:child_process';
+import { readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+import { promisify } from 'node:util';
+import { root, startServer } from './server.mjs';
+
+const deploy = join(root, 'deploy');
+let server, metrics;
+const promtool = (args, input) => {
+  const running = promisify(execFile)('promtool', args);
+  if (input !== undefined) running.child.stdin.end(input);
+  return running;
+};
+
+before(async () => {
+  server = await startServer();
+  const device = { kind: 'ntrip', address: 'tcp://127.0.0.1:1', options: { mount: 'M' } };
+  assert.equal((await server.fetch('/api/v1/devices', { json: device })).status, 201);
+  metrics = await (await server.fetch('/metrics')).text();
+});
+after(() => server?.dispose());
+
+test('promtool finds nothing wrong with /metrics', async () => {
+  const { stdout, stderr } = await promtool(['check', 'metrics'], metrics);
+  assert.equal(stdout + stderr, '');
+});
+
+test('promtool takes the rules, and each fires when it should', async () => {
+  const at = (name) => join(deploy, 'prometheus', name);
+  assert.match((await promtool(['check', 'rules', at('anchord.rules.yml')])).stdout, /SUCCESS: \d+ rules found/);
+  assert.match((await promtool(['test', 'rules', at('anchord.rules.test.yml')])).stdout, /SUCCESS/);
+  assert.match((await promtool(['check', 'config', at('prometheus.yml')])).stdout, /SUCCESS/);
+});
+
+test('every metric of the rules and the board is one of the server', () => {
+  const served = new Set([...metrics.matchAll(/^# TYPE (\S+) (\S+)/gm)].map((m) => m[1]));
+  const named = (text) =>
+    [...text.matchAll(/\banchord_[a-z0-9_]+/g)].map((m) => m[0].replace(/_(bucket|sum|count)$/, ''));
+  const board = readFileSync(join(deploy, 'grafana/anchord.json'), 'utf8');
+  const all = [...named(board), ...named(readFileSync(join(deploy, 'prometheus/anchord.rules.yml'), 'utf8'))];
+  assert.ok(all.length > 30);
+  assert.deepEqual(
+    [...new Set(all)].filter((name) => !served.has(name)),
+    [],
+  );
+});
+
+test('each expression of the board is one that Prometheus can read', async () => {
+  const { panels } = JSON.parse(readFileSync(join(deploy, 'grafana/anchord.json'), 'utf8'));
+  const rules = panels
+    .flatMap((panel) => panel.targets)
+    .map(({ expr }, i) => ({ record: `board:${i}`, expr: expr.replaceAll('$instance', '.*') }));
+  const file = join(server.dataDir, 'board.rules.json');
+  writeFileSync(file, JSON.stringify({ groups: [{ name: 'board', rules }] })); // JSON is YAML
+  assert.match((await promtool(['check', 'rules', file])).stdout, new RegExp(`${rules.length} rules found`));
+});
