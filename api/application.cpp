@@ -21,6 +21,7 @@
 #include "api/devices/device_json.hpp"
 #include "api/devices/device_stream.hpp"
 #include "api/devices/routes.hpp"
+#include "api/exchange/anchor_files.hpp"
 #include "api/exchange/routes.hpp"
 #include "api/flight/flight_service.hpp"
 #include "api/flight/procedure_json.hpp"
@@ -181,7 +182,7 @@ struct Application::State {
                      [this](const PlanId& id) { return flights.flown_with(id); },
                      [this](const Plan& plan) { flights.plan_saved(plan); }},
         flight_api{flights, mission_api, events, audit},
-        exchange_api{anchor_api, stores.missions, stores.measurements},
+        exchange_api{anchor_api, stores.missions, stores.measurements, deps.geopackage},
         learning_stores{stores.campaigns, stores.labels, stores.datasets, stores.training_runs,
                         stores.models},
         learning_api{learning_stores,
@@ -200,6 +201,9 @@ struct Application::State {
                      audit} {
     missions.observe(&flights);
     mission_api.flight = flight_actions(flight_api);
+    anchor_api.file = [this](std::string_view format, const Request& request) {
+      return anchor_file(exchange_api, format, request);
+    };
     router.on_fault(deps.log_fault);
     add_mission_routes(router, mission_api);
     add_mission_bin_routes(router, mission_api);
@@ -225,6 +229,7 @@ struct Application::State {
     add_backup_routes(router, admin_api);
     add_system_routes(router, admin_api);
     add_ogc_routes(router, exchange_api);
+    add_anchor_file_routes(router, exchange_api);
   }
 
   ServerCounts counts() const {

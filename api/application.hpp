@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,7 @@
 #include "core/geo/track_segments.hpp"
 #include "core/localize/accuracy_goal.hpp"
 #include "core/ports/stores.hpp"
+#include "core/types/feature_table.hpp"
 
 namespace anchord {
 class Backups;
@@ -70,6 +72,11 @@ class Application {
     bool model_key_is_new{false};    ///< models of before it existed are signed at the start
     std::int64_t keep_deleted_ns{30LL * 86'400 * 1'000'000'000};  ///< a deleted mission, in running time
     const SteadyClock* steady{&system_steady_clock()};            ///< what every duration is measured by
+    /// The bytes of a GeoPackage; unset: there is nobody who writes one.
+    std::function<Result<std::string>(std::span<const FeatureTable>, UtcTime)> geopackage =
+        [](std::span<const FeatureTable>, UtcTime) -> Result<std::string> {
+      return Error{Errc::unsupported, "this program writes no GeoPackage"};
+    };
     std::function<double()> flight_clock{};  ///< steady seconds; set: fly() is called by hand
     bool housekeeping_by_hand{false};        ///< set: housekeeping_round() is called by hand
   };

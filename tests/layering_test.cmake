@@ -49,8 +49,8 @@ set(rows
   "api/planning: core/base core/types core/ports core/planning api/kit api/formats"
   "api/flight: core/base core/types core/ports core/geo core/planning core/localize core/procedure core/flight api/kit api/stream api/admin api/missions api/planning"
   "api/calibration: core/base core/types core/ports core/geo core/localize core/procedure api/kit api/stream api/wire api/formats api/admin api/learning api/missions api/anchors"
-  "api/exchange: core/base core/types core/ports core/geo api/kit api/anchors"
-  "api: core/base core/ports core/geo core/localize api/kit api/stream api/wire api/admin api/devices api/learning api/missions api/measurements api/anchors api/planning api/flight api/calibration api/exchange"
+  "api/exchange: core/base core/types core/ports core/geo core/localize api/kit api/anchors"
+  "api: core/base core/types core/ports core/geo core/localize api/kit api/stream api/wire api/admin api/devices api/learning api/missions api/measurements api/anchors api/planning api/flight api/calibration api/exchange"
 
   "migrations:"
   "server/storage: core/base core/types core/ports migrations"

@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/anchors/anchor_json.hpp"
-#include "api/anchors/anchor_kml.hpp"
+#include "api/anchors/anchor_selection.hpp"
 #include "api/anchors/contradiction_watch.hpp"
 #include "api/anchors/published_features.hpp"
 #include "api/anchors/routes.hpp"
@@ -24,75 +24,6 @@ using Ordered = nlohmann::ordered_json;
 
 namespace {
 
-/// Running estimates; of an anchor that several missions hear the newest.
-std::vector<AnchorFeature> live(AnchorApi& s, const std::optional<MissionId>& mission) {
-  if (mission) value_or_problem(s.missions.mission(*mission));
-  FeatureLookup lookup(s);
-  std::map<NetworkId, AnchorFeature> newest;
-  for (const auto& view : s.missions.live(mission)) {
-    for (const auto& estimate : view.estimates) {
-      auto& feature = newest[estimate.anchor];
-      if (feature.estimate && estimate.time < feature.estimate->time) continue;
-      feature.estimate = estimate;
-      feature.frame = view.mission.frame;
-      feature.missions = {view.mission.id};
-      feature.calibrated = estimate.time;
-      feature.status = flight::anchor_status(estimate);
-    }
-  }
-  std::vector<AnchorFeature> out;
-  for (auto& [id, feature] : newest) {
-    feature.anchor = anchor_as_stored(s, id);
-    feature.site = lookup.site(feature.anchor.site);
-    out.push_back(std::move(feature));
-  }
-  return out;
-}
-
-struct Box {
-  double west, south, east, north;
-};
-std::optional<Box> query_box(const Request& request) {
-  const auto text = request.query_value("bbox");
-  if (!text) return std::nullopt;
-  nlohmann::json numbers;
-  if (parse_json('[' + *text + ']', numbers) || numbers.size() != 4 ||
-      !std::all_of(numbers.begin(), numbers.end(), [](const auto& n) { return n.is_number(); })) {
-    throw_problem(422, "validation", "bbox is west,south,east,north in degrees",
-                  {{"/bbox", "bad_value", "must be four numbers"}});
-  }
-  return Box{numbers[0], numbers[1], numbers[2], numbers[3]};
-}
-
-std::vector<AnchorFeature> wanted(AnchorApi& s, const Request& request, std::uint64_t& number) {
-  const auto view = request.query_value("view").value_or("published");
-  std::optional<std::uint64_t> revision;
-  if (const auto text = request.query_value("revision")) {
-    nlohmann::json value;
-    if (parse_json(*text, value) || !value.is_number_unsigned())
-      throw_problem(422, "validation", "revision is a number",
-                    {{"/revision", "wrong_type", "must be a number"}});
-    revision = value.get<std::uint64_t>();
-    if (*revision == 0 || *revision > newest_revision(s))
-      throw_problem(404, "not-found", "there is no revision " + *text);
-  }
-  if (view != "published" && view != "live")
-    throw_problem(422, "validation", "view is published or live",
-                  {{"/view", "unknown_value", "must be published or live"}});
-  auto all = view == "live" ? live(s, query_mission(request)) : published_features(s, revision, number);
-  const auto box = query_box(request);
-  const auto site = request.query_value("site");
-  std::erase_if(all, [&](const AnchorFeature& feature) {
-    if (site && (!feature.anchor.site || to_string(*feature.anchor.site) != *site)) return true;
-    if (!box) return false;
-    if (!feature.estimate || !feature.estimate->best || !feature.estimate->best->wgs84) return true;
-    const auto& at = *feature.estimate->best->wgs84;
-    return at.lon_deg < box->west || at.lon_deg > box->east || at.lat_deg < box->south ||
-           at.lat_deg > box->north;
-  });
-  return all;
-}
-
 Response as_csv(const std::vector<AnchorFeature>& features) {
   Response response;
   response.header("Content-Type", "text/csv; charset=utf-8");
@@ -102,10 +33,14 @@ Response as_csv(const std::vector<AnchorFeature>& features) {
 }
 
 Response list(AnchorApi& s, const Request& request) {
+  const std::string format =
+      negotiate(request, {"geojson", "json", "csv", "ndjson", "kml", "gpkg", "dxf", "pnezd", "pozyx"});
+  if (format != "geojson" && format != "json" && format != "csv" && format != "ndjson")
+    return s.file(format, request);
   check_query(request, {"view", "revision", "mission", "site", "bbox", "limit", "cursor", "format"});
   const auto page = page_query(request);
   std::uint64_t number = 0;
-  auto all = wanted(s, request, number);
+  auto all = selected_anchors(s, request, number);
   if (!page.cursor.empty()) {
     const auto after = parse_network_id(page.cursor);
     if (!after)
@@ -113,7 +48,6 @@ Response list(AnchorApi& s, const Request& request) {
                     {{"/cursor", "bad_cursor", "is not one of ours"}});
     std::erase_if(all, [&](const auto& feature) { return feature.anchor.network_id <= after.value(); });
   }
-  const std::string format = negotiate(request, {"geojson", "json", "csv", "ndjson"});
   std::string next;
   if (all.size() > page.limit) {
     all.resize(page.limit);
@@ -210,7 +144,7 @@ Response export_geojson(AnchorApi& s, const Request& request) {
   const bool flat = query_flag(request, "flat");
   std::uint64_t number = 0;
   Ordered features = Ordered::array();
-  for (const auto& feature : wanted(s, request, number))
+  for (const auto& feature : selected_anchors(s, request, number))
     features.push_back(flat ? flat_feature_json(feature) : anchor_feature_json(feature));
   Ordered body{{"type", "FeatureCollection"}, {"features", std::move(features)}};
   if (!flat) body["revision"] = number == 0 ? Ordered(nullptr) : Ordered(number);
@@ -222,18 +156,8 @@ Response export_geojson(AnchorApi& s, const Request& request) {
 Response export_csv(AnchorApi& s, const Request& request) {
   check_query(request, {"revision", "site", "bbox"});
   std::uint64_t number = 0;
-  Response response = as_csv(wanted(s, request, number));
+  Response response = as_csv(selected_anchors(s, request, number));
   response.header("Content-Disposition", "attachment; filename=\"anchors.csv\"");
-  return response;
-}
-
-Response export_kml(AnchorApi& s, const Request& request) {
-  check_query(request, {"revision", "site", "bbox"});
-  std::uint64_t number = 0;
-  Response response;
-  response.body = anchors_kml(wanted(s, request, number));
-  response.header("Content-Type", "application/vnd.google-earth.kml+xml");
-  response.header("Content-Disposition", "attachment; filename=\"anchors.kml\"");
   return response;
 }
 
@@ -244,9 +168,10 @@ void add_anchor_routes(Router& router, AnchorApi& s) {
     return [&s, function](const Request& request) { return function(s, request); };
   };
   Route listed{Method::get, "/api/v1/anchors", readers(), on(list)};
-  // Running estimates of a mission that is not followed are computed.
+  // Running estimates of a mission that is not followed are computed, and files hold everything.
   listed.work_of = [](const Request& request) {
-    return request.query_value("view") == "live" ? Work::heavy : Work::ordinary;
+    const bool file = request.query_value("format").value_or("geojson") != "geojson";
+    return file || request.query_value("view") == "live" ? Work::heavy : Work::ordinary;
   };
   router.add(std::move(listed));
   router.add({Method::get, "/api/v1/anchors/{id}", readers(), [&s](const Request& request) {
@@ -259,7 +184,6 @@ void add_anchor_routes(Router& router, AnchorApi& s) {
   router.add({Method::get, "/api/v1/anchors/{id}/history", readers(), on(history)});
   router.add(as_heavy({Method::get, "/api/v1/exports/anchors.geojson", readers(), on(export_geojson)}));
   router.add(as_heavy({Method::get, "/api/v1/exports/anchors.csv", readers(), on(export_csv)}));
-  router.add(as_heavy({Method::get, "/api/v1/exports/anchors.kml", readers(), on(export_kml)}));
 }
 
 }  // namespace anchord::api

@@ -1,6 +1,10 @@
 #pragma once
 
+#include <functional>
+#include <string_view>
+
 #include "api/kit/audit.hpp"
+#include "api/kit/message.hpp"
 
 namespace anchord {
 class AnchorStore;
@@ -30,6 +34,9 @@ struct AnchorApi {
   ContradictionWatch& contradictions;
   const Clock& clock;
   Audit audit;
+  /// The published anchors that a request selects as a file of another program (`format` of GET /anchors);
+  /// given by api/exchange.
+  std::function<Response(std::string_view format, const Request&)> file{};
 };
 
 void add_anchor_routes(Router& router, AnchorApi& api);

@@ -27,6 +27,7 @@
 #include "server/runtime/worker_pool.hpp"
 #include "server/runtime/worker_process.hpp"
 #include "server/storage/data_folder.hpp"
+#include "server/storage/geopackage.hpp"
 #include "server/storage/sqlite_database.hpp"
 
 namespace anchord::server {
@@ -264,6 +265,7 @@ void App::State::compose() {
   deps.log_fault = [](std::string_view request_id, std::string_view what) {
     log(LogLevel::error, "fault in a handler", {{"request_id", request_id}, {"what", what}});
   };
+  deps.geopackage = geopackage;
   deps.run_work = work_in_process();
   deps.model_key_is_new = model_key.fresh;
   deps.keep_deleted_ns =

@@ -16,6 +16,7 @@
 #include "core/ports/calibration_store.hpp"
 #include "core/ports/token_store.hpp"
 #include "server/runtime/worker_pool.hpp"
+#include "server/storage/geopackage.hpp"
 #include "server/storage/sqlite_database.hpp"
 #include "tests/api/ports.hpp"
 
@@ -56,6 +57,7 @@ class AppFixture : public ::testing::Test {
     deps.build = {"0.2.0", "test", "", "", 1};
     deps.goal = goal_;
     deps.housekeeping_by_hand = true;
+    deps.geopackage = geopackage;
     configure(deps);
     app_ = std::make_unique<StreamingApplication>(std::move(deps));
     app_->start();

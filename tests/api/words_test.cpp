@@ -10,6 +10,7 @@
 #include "api/admin/alarm_rules.hpp"
 #include "api/anchors/frame_json.hpp"
 #include "api/calibration/calibration_service.hpp"
+#include "api/exchange/anchor_drawing.hpp"
 #include "api/kit/contract.hpp"
 #include "api/kit/message.hpp"
 #include "api/learning/freeze_rows.hpp"
@@ -168,6 +169,9 @@ TEST(WireWords, AreThoseOfOpenApi) {
       {"GET /api/v1/ranges ?fix", words(k_fix_words)},
       {"ConfiguredDevice.rover.fix", words(k_fix_words)},
       {"Verdict", words(k_verdict_words)},
+      {"GET /api/v1/anchors ?height", words(k_file_height_words)},
+      {"GET /api/v1/exports/anchors.dxf ?height", words(k_file_height_words)},
+      {"GET /api/v1/exports/anchors-pnezd.csv ?height", words(k_file_height_words)},
       {"MissionCreate.frame", words(k_frame_words)},
       {"Mission.frame", words(k_frame_words)},
       {"Calibration.frame", words(k_frame_words)},

@@ -77,7 +77,23 @@ test('a calibration, published', async () => {
 });
 
 test('a local frame, fitted to the published anchors', async () => {
-  ids.frame = (await call('POST', '/api/v1/frames', { expect: 201, json: { name: 'hall-a' } })).json.id;
+  const merge = (etag, json) => ({
+    expect: 200,
+    headers: { 'content-type': 'application/merge-patch+json', 'if-match': etag },
+    body: JSON.stringify(json),
+  });
+  const site = await call('GET', `/api/v1/sites/${ids.site}`, { expect: 200 });
+  const mapped = { projected_epsg: 25831, crs: { frame: 'ETRS89' } };
+  await call('PATCH', `/api/v1/sites/${ids.site}`, merge(site.headers.get('etag'), mapped));
+  for (const { properties } of (await call('GET', '/api/v1/anchors', { expect: 200 })).json.features) {
+    const path = `/api/v1/anchors/${properties.network_id}`;
+    const { headers } = await call('GET', path, { expect: 200 });
+    await call('PATCH', path, merge(headers.get('etag'), { site: ids.site }));
+  }
+  for (const format of ['dxf', 'pnezd', 'kml', 'gpkg'])
+    await call('GET', `/api/v1/anchors?format=${format}`, { expect: 200 });
+  await call('GET', '/api/v1/anchors?format=pozyx', { expect: 422 }); // no frame is fitted
+  ids.frame = (await call('POST', '/api/v1/frames', { expect: 201, json: { name: 'hall-a', site: ids.site } })).json.id;
   const { json } = await call('GET', '/api/v1/anchors', { expect: 200 });
   const pairs = json.features.map(({ properties }) => ({ anchor: properties.network_id, local_m: properties.enu_m }));
   const fit = await call('POST', `/api/v1/frames/${ids.frame}/fit`, { expect: 200, json: { pairs, parameters: 4 } });
@@ -447,7 +463,10 @@ test('what can be deleted', async () => {
     expect: 204,
     headers: { 'if-match': await etag(`${spare}?deleted=true`) },
   });
-  for (const path of [`/api/v1/frames/${ids.frame}`, `/api/v1/sites/${ids.site}`]) {
+  const used = `/api/v1/sites/${ids.site}`;
+  await call('DELETE', used, { expect: 409, headers: { 'if-match': await etag(used) } }); // anchors are on it
+  const site = (await call('POST', '/api/v1/sites', { expect: 201, json: { name: 'spare site' } })).json.id;
+  for (const path of [`/api/v1/frames/${ids.frame}`, `/api/v1/sites/${site}`]) {
     const answer = await call('DELETE', path, { headers: { 'if-match': (await etag(path)) ?? '*' } });
     assert.ok(answer.status < 300, `${path}: ${answer.status} ${answer.text}`);
   }

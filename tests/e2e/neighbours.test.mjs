@@ -1,10 +1,15 @@
 // What other people's programs read of a running server, each by the program itself (docs/integration.md has the table).
 import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { ndjson, simulatedFlight } from './flight.mjs';
 import { apart, gdal, layer } from './gdal.mjs';
 import { startServer } from './server.mjs';
 
+const folder = mkdtempSync(join(tmpdir(), 'anchord neighbours '));
 let server, mission, published;
 const get = async (path) => (await server.fetch(path)).json();
 const post = async (path, json, headers) => {
@@ -23,10 +28,44 @@ before(async () => {
   await post(`/api/v1/missions/${mission}/actions`, { action: 'finish' });
   const solved = await post('/api/v1/calibrations', { missions: [mission] }, { prefer: 'wait=120' });
   await post(`/api/v1/calibrations/${solved.id}/publish`, {});
+  const site = (await post('/api/v1/sites', { name: 'Hall A', projected_epsg: 25831, crs: { frame: 'ETRS89' } })).id;
+  const { features } = await get('/api/v1/anchors');
+  for (const [i, { properties }] of features.entries()) {
+    const path = `/api/v1/anchors/${properties.network_id}`,
+      etag = (await server.fetch(path)).headers.get('etag');
+    const headers = { 'content-type': 'application/merge-patch+json', 'if-match': etag };
+    const patched = await server.fetch(path, { method: 'PATCH', headers, json: { site, floor: String(i % 2) } });
+    assert.equal(patched.status, 200, await patched.text());
+  }
+  // Numbers of the flight's own frame are a local frame as good as any.
+  const frame = await post('/api/v1/frames', { name: 'hall', site });
+  const pairs = features.map(({ properties }) => ({ anchor: properties.network_id, local_m: properties.enu_m }));
+  await post(`/api/v1/frames/${frame.id}/fit`, { pairs, parameters: 4 });
   published = (await get('/api/v1/exports/anchors.geojson')).features;
   assert.ok(published.length >= 3, `${published.length} anchors`);
 });
-after(() => server?.dispose());
+after(async () => {
+  await server?.dispose();
+  rmSync(folder, { recursive: true, force: true });
+});
+
+/** The file of this name under /exports, kept for a program to read. */
+async function exported(name) {
+  const answer = await server.fetch(`/api/v1/exports/${name}`);
+  assert.equal(answer.status, 200, `${name}: ${await answer.clone().text()}`);
+  const path = join(folder, name);
+  writeFileSync(path, Buffer.from(await answer.arrayBuffer()));
+  return path;
+}
+const by_id = (features, anchor, key = 'network_id') =>
+  features.find((one) => String(one.properties[key]) === anchor.properties.network_id);
+/** Easting and northing by PROJ's own program, from the published coordinates. */
+async function projected({ geometry: { coordinates: at } }) {
+  const child = execFileSync('gdaltransform', ['-s_srs', 'EPSG:4937', '-t_srs', 'EPSG:25831', '-output_xy'], {
+    input: at.join(' '),
+  });
+  return String(child).trim().split(' ').map(Number);
+}
 
 /** Options of GDAL's OAPIF driver; the token is the password, as a GIS client sends it. */
 const oapif = (...more) => ['-oo', `USERPWD=qgis:${server.token}`, ...more.flatMap((one) => ['-oo', one])];
@@ -79,4 +118,89 @@ test('without a token GDAL is refused, and a gateway is too', async () => {
   await assert.rejects(gdal('ogrinfo', '-ro', `OAPIF:${server.url}/ogc`), /401|failed/i);
   const { token } = await post('/api/v1/tokens', { name: 'bridge', roles: ['gateway'] });
   assert.equal((await server.fetch('/ogc/collections/anchors/items', { token })).status, 403);
+});
+
+test('GDAL reads the GeoPackage: anchors with covariance, ellipses as polygons, tracks as 3-D lines, styles', async () => {
+  const file = await exported('anchors.gpkg');
+  const anchors = await layer(file, 'anchors');
+  assert.equal(anchors.count, published.length);
+  assert.equal(anchors.geometry, '3D Point');
+  assert.match(anchors.summary, /ID\["EPSG",4979\]/);
+  for (const anchor of published) {
+    const read = by_id(anchors.features, anchor);
+    // GeoJSON has nine decimals of a degree and a tenth of a millimetre of height.
+    assert.ok(apart(read, anchor) <= 5.1e-5, `${apart(read, anchor)}`);
+    const [ee, en, eu, nn, nu, uu] = anchor.properties.accuracy.relative.cov_enu_m2,
+      p = read.properties;
+    assert.deepEqual(
+      [p.cov_ee_m2, p.cov_en_m2, p.cov_eu_m2, p.cov_nn_m2, p.cov_nu_m2, p.cov_uu_m2],
+      [ee, en, eu, nn, nu, uu],
+    );
+  }
+  const ellipses = await layer(file, 'ellipses95');
+  assert.equal(ellipses.geometry, '3D Polygon');
+  assert.equal(ellipses.count, published.length);
+  for (const anchor of published) {
+    const [ring] = by_id(ellipses.features, anchor).geometry.coordinates,
+      { major_m, minor_m } = anchor.properties.accuracy.relative.ellipse95;
+    // Degrees to metres at 51 N: radii of curvature of WGS 84 there, 6 374 200 m along and 6 391 000 m across the meridian.
+    const [lon, lat] = anchor.geometry.coordinates,
+      rad = Math.PI / 180;
+    const far = ring.map(([x, y]) =>
+      Math.hypot((x - lon) * rad * 6391000 * Math.cos(lat * rad), (y - lat) * rad * 6374200),
+    );
+    assert.ok(Math.abs(Math.max(...far) / major_m - 1) < 0.005, `${Math.max(...far)} of ${major_m}`);
+    assert.ok(Math.abs(Math.min(...far) / minor_m - 1) < 0.005, `${Math.min(...far)} of ${minor_m}`);
+  }
+  const tracks = await layer(file, 'tracks');
+  assert.equal(tracks.geometry, '3D Line String');
+  assert.equal(tracks.count, 1);
+  const styles = await gdal(
+    'ogrinfo',
+    '-ro',
+    '-q',
+    file,
+    '-sql',
+    'SELECT f_table_name, useAsDefault FROM layer_styles',
+  );
+  assert.deepEqual([...styles.matchAll(/f_table_name \(String\) = (\S+)/g)].map((m) => m[1]).sort(), [
+    'anchors',
+    'ellipses95',
+    'tracks',
+  ]);
+});
+
+test('GDAL reads the DXF: a layer for each floor, 3-D points in the map system', async () => {
+  const { features } = await layer(await exported('anchors.dxf'), 'entities');
+  const points = features.filter((one) => one.properties.SubClasses !== 'AcDbText' && !one.properties.Text);
+  assert.equal(points.length, published.length);
+  assert.deepEqual([...new Set(points.map((one) => one.properties.Layer))].sort(), ['FLOOR_0', 'FLOOR_1']);
+  for (const anchor of published) {
+    const [e, n] = await projected(anchor);
+    const found = points.find(({ geometry: { coordinates: at } }) => Math.hypot(at[0] - e, at[1] - n) < 0.001);
+    assert.ok(found, `${anchor.properties.network_id} at ${e} ${n}`);
+    assert.equal(found.properties.Layer, `FLOOR_${anchor.properties.floor}`);
+    assert.ok(Math.abs(found.geometry.coordinates[2] - anchor.geometry.coordinates[2]) < 0.001);
+  }
+});
+
+test("GDAL reads the surveyors' table and the KML, and Pozyx has millimetres of the local frame", async () => {
+  const columns = ['X=field_3', 'Y=field_2', 'Z=field_4'].map((one) => one.replace('=', '_POSSIBLE_NAMES='));
+  const open = ['HEADERS=NO', 'AUTODETECT_TYPE=YES', ...columns].flatMap((one) => ['-oo', one]);
+  const { features } = await layer(await exported('anchors-pnezd.csv'), 'anchors-pnezd', ...open);
+  assert.equal(features.length, published.length);
+  for (const anchor of published) {
+    const [e, n] = await projected(anchor),
+      read = features.find((one) => one.properties.field_1 === Number(anchor.properties.network_id));
+    assert.ok(Math.hypot(read.properties.field_3 - e, read.properties.field_2 - n) < 0.001);
+    assert.ok(Math.abs(read.geometry.coordinates[2] - anchor.geometry.coordinates[2]) < 0.001);
+  }
+  const kml = await gdal('ogrinfo', '-ro', '-al', '-so', await exported('anchors.kml'));
+  assert.match(kml, new RegExp(`Feature Count: ${published.length}\\b`));
+  const pozyx = await get('/api/v1/exports/pozyx.json');
+  for (const anchor of published) {
+    const one = pozyx.find((p) => p.network_id === anchor.properties.network_id);
+    const apart_mm = ['x_mm', 'y_mm', 'z_mm'].map((key, i) => Math.abs(one[key] - anchor.properties.local_m[i] * 1000));
+    assert.ok(Math.max(...apart_mm) <= 0.56, apart_mm.join()); // half a millimetre, and the tenth that GeoJSON rounds to
+  }
 });

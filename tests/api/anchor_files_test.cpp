@@ -1,0 +1,109 @@
+// Files of published anchors: what is in them, and which are refused. GDAL reads each in
+// tests/e2e/neighbours.test.mjs.
+#include "app_fixture.hpp"
+
+namespace anchord::test {
+namespace {
+
+class AnchorFiles : public AppFixture {
+ protected:
+  /// Two anchors, published; of a site whose map system and datum are known where `mapped`.
+  void publish(bool mapped) {
+    const auto id = stored_calibration([](Estimate& e) {
+      if (e.anchor.value == 0x6a3c) e.best->wgs84 = Wgs84{51.0232, 3.7133, 61.25};
+    });
+    ASSERT_EQ(post("/api/v1/calibrations/" + id + "/publish", "{}").status, 201);
+    const auto site =
+        post("/api/v1/sites", R"({"name":"Ghent","projected_epsg":25831,"crs":{"frame":"ETRS89"}})");
+    ASSERT_EQ(site.status, 201) << site.body;
+    if (!mapped) return;
+    patch("0x6a2f", {{"site", json(site)["id"]}, {"floor", "0.5"}, {"name", "Hal A, \"noord\" é"}});
+    patch("0x6a3c", {{"site", json(site)["id"]}, {"floor", "0-5"}});
+  }
+  void patch(const std::string& anchor, const Json& fields) {
+    const auto path = "/api/v1/anchors/" + anchor;
+    Call options;
+    options.type = "application/merge-patch+json";
+    options.headers["if-match"] = header(get(path), "ETag");
+    const auto done = call(api::Method::patch, path, fields.dump(), options);
+    ASSERT_EQ(done.status, 200) << done.body;
+  }
+  api::Response file(const std::string& format, std::map<std::string, std::string> query = {}) {
+    query["format"] = format;
+    return get("/api/v1/anchors", query);
+  }
+};
+
+// Expected: gdaltransform -s_srs EPSG:4937 -t_srs EPSG:25831 (PROJ 9.1, Debian 12).
+TEST_F(AnchorFiles, PnezdHasNumberNorthingEastingElevationAndDescription) {
+  publish(true);
+  const auto got = file("pnezd");
+  ASSERT_EQ(got.status, 200) << got.body;
+  EXPECT_EQ(got.body,
+            "27183,5652635.6549,550012.8222,58.4000,UWB 0x6a2f Hal A   noord  é EPSG:25831 ellipsoidal\r\n"
+            "27196,5652646.9109,550026.7413,61.2500,UWB 0x6a3c EPSG:25831 ellipsoidal\r\n");
+  EXPECT_EQ(get("/api/v1/exports/anchors-pnezd.csv").body, got.body);
+}
+
+TEST_F(AnchorFiles, DxfHasALayerForEachFloorAlsoWhereNamesOfLayersCollide) {
+  publish(true);
+  const auto got = file("dxf");
+  ASSERT_EQ(got.status, 200) << got.body;
+  EXPECT_TRUE(got.body.starts_with("999\r\nEPSG:25831, metres, ellipsoidal heights\r\n"));
+  for (const char* layer : {"\r\n2\r\nFLOOR_0_5\r\n", "\r\n2\r\nFLOOR_0-5\r\n"})
+    EXPECT_NE(got.body.find(layer), std::string::npos) << layer;
+  EXPECT_NE(got.body.find("\r\n1\r\nHal A, \"noord\" \\U+00E9\r\n"), std::string::npos) << "ASCII of R12";
+  patch("0x6a3c", {{"floor", "0,5"}});
+  EXPECT_NE(file("dxf").body.find("\r\n2\r\nFLOOR_0_5_2\r\n"), std::string::npos);
+}
+
+TEST_F(AnchorFiles, AreRefusedWhereAnAnchorWouldBeMissing) {
+  publish(false);
+  for (const char* format : {"dxf", "pnezd", "pozyx"}) {
+    const auto got = file(format);
+    EXPECT_EQ(got.status, 422) << format;
+    EXPECT_NE(json(got)["detail"].get<std::string>().find("0x6a2f, 0x6a3c have no "), std::string::npos)
+        << got.body;
+  }
+  EXPECT_EQ(file("kml").status, 200) << "needs neither map nor frame";
+  EXPECT_EQ(file("gpkg").status, 200);
+}
+
+TEST_F(AnchorFiles, DoNotGuessAHeight) {
+  publish(true);
+  const auto got = file("pnezd", {{"height", "orthometric"}});
+  EXPECT_EQ(got.status, 422);
+  EXPECT_NE(got.body.find("height=ellipsoidal"), std::string::npos) << got.body;
+  EXPECT_EQ(file("pnezd", {{"height", "ellipsoidal"}}).status, 200);
+  EXPECT_EQ(file("pnezd", {{"height", "of the tower"}}).status, 422);
+  EXPECT_EQ(file("gpkg", {{"height", "ellipsoidal"}}).status, 422) << "it has both";
+}
+
+TEST_F(AnchorFiles, OfTwoMapSystemsAreRefused) {
+  publish(true);
+  const auto other = post("/api/v1/sites", R"({"name":"B","projected_epsg":25832,"crs":{"frame":"ETRS89"}})");
+  patch("0x6a3c", {{"site", json(other)["id"]}});
+  const auto got = file("dxf");
+  EXPECT_EQ(got.status, 422);
+  EXPECT_NE(got.body.find("EPSG:25831 and EPSG:25832: name one site"), std::string::npos) << got.body;
+  EXPECT_EQ(file("dxf", {{"site", json(other)["id"]}}).status, 200);
+}
+
+TEST_F(AnchorFiles, AreThePublishedOnesWhole) {
+  publish(true);
+  for (const auto& query : {std::pair{"view", "live"}, {"limit", "1"}, {"cursor", "0x6a2f"}})
+    EXPECT_EQ(file("gpkg", {{query.first, query.second}}).status, 422) << query.first;
+  EXPECT_EQ(file("shp").status, 406);
+  const auto name = header(file("gpkg"), "Content-Disposition");
+  EXPECT_EQ(name, "attachment; filename=\"anchors.gpkg\"");
+}
+
+TEST_F(AnchorFiles, OfNothingPublishedAreEmptyAndValid) {
+  EXPECT_EQ(file("pnezd").body, "");
+  EXPECT_EQ(json(file("pozyx")), Json::array());
+  EXPECT_TRUE(file("dxf").body.ends_with("0\r\nEOF\r\n"));
+  EXPECT_TRUE(file("gpkg").body.starts_with("SQLite format 3"));
+}
+
+}  // namespace
+}  // namespace anchord::test
