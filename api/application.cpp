@@ -38,6 +38,8 @@
 #include "api/planning/routes.hpp"
 #include "api/stream/conversation.hpp"
 #include "api/stream/hub.hpp"
+#include "api/webhooks/routes.hpp"
+#include "api/webhooks/webhook_service.hpp"
 #include "api/wire/live_writer.hpp"
 #include "core/base/guard.hpp"
 #include "core/base/locked.hpp"
@@ -128,6 +130,8 @@ struct Application::State {
                       .contradictions = contradictions}),
         training({stores.datasets, stores.training_runs, jobs, events, deps.clock, deps.run_work,
                   deps.build.version, signer}),
+        webhooks({stores.webhooks, deps.web_post, deps.clock, [this] { return running.now_ns(); },
+                  deps.webhook_waits_s.empty() ? k_webhook_waits_s : deps.webhook_waits_s}),
         audit(stores.access, prompt, deps.clock),
         admin_api{deps.clock,
                   hub,
@@ -183,6 +187,7 @@ struct Application::State {
                      [this](const Plan& plan) { flights.plan_saved(plan); }},
         flight_api{flights, mission_api, events, audit},
         exchange_api{anchor_api, stores.missions, stores.measurements, deps.geopackage},
+        webhook_api{stores.webhooks, webhooks, deps.web_post, deps.clock, audit},
         learning_stores{stores.campaigns, stores.labels, stores.datasets, stores.training_runs,
                         stores.models},
         learning_api{learning_stores,
@@ -230,6 +235,8 @@ struct Application::State {
     add_system_routes(router, admin_api);
     add_ogc_routes(router, exchange_api);
     add_anchor_file_routes(router, exchange_api);
+    add_webhook_routes(router, webhook_api);
+    events.on_event([this](const LiveEvent& event) { webhooks.tell(event); });
   }
 
   ServerCounts counts() const {
@@ -291,6 +298,7 @@ struct Application::State {
   KitProfiles profiles;
   CalibrationService calibrations;
   TrainingService training;
+  WebhookService webhooks;
   Audit audit;
   AdminApi admin_api;
   DeviceApi device_api;
@@ -301,6 +309,7 @@ struct Application::State {
   PlanningApi planning_api;
   FlightApi flight_api;
   ExchangeApi exchange_api;
+  WebhookApi webhook_api;
   LearningStores learning_stores;
   LearningApi learning_api;
   Locked<bool> stopping{false};
@@ -476,6 +485,7 @@ void Application::start() {
   });
   (void)guarded("missions at the start", [this] { state_->missions.resume(); });
   (void)guarded("devices of the flight at the start", [this] { state_->stream.resume(); });
+  (void)guarded("webhooks at the start", [this] { state_->webhooks.changed(); });
   state_->flights.start();
   state_->jobs.start();
   state_->housekeeping.start();
@@ -498,6 +508,7 @@ void Application::stop() {
   state_->hub.shut_down();
   state_->jobs.stop();
   state_->missions.stop();
+  state_->webhooks.stop();
   state_->late.stop();
 }
 

@@ -27,6 +27,7 @@ class DeviceRows;
 struct FlightData;
 class Drone;
 class Executor;
+class WebPost;
 }  // namespace anchord
 
 namespace anchord::api {
@@ -77,6 +78,8 @@ class Application {
         [](std::span<const FeatureTable>, UtcTime) -> Result<std::string> {
       return Error{Errc::unsupported, "this program writes no GeoPackage"};
     };
+    WebPost* web_post{nullptr};              ///< null: webhooks are not served
+    std::vector<double> webhook_waits_s{};   ///< from one attempt to the next; empty: those of the service
     std::function<double()> flight_clock{};  ///< steady seconds; set: fly() is called by hand
     bool housekeeping_by_hand{false};        ///< set: housekeeping_round() is called by hand
   };

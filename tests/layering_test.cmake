@@ -50,12 +50,13 @@ set(rows
   "api/flight: core/base core/types core/ports core/geo core/planning core/localize core/procedure core/flight api/kit api/stream api/admin api/missions api/planning"
   "api/calibration: core/base core/types core/ports core/geo core/localize core/procedure api/kit api/stream api/wire api/formats api/admin api/learning api/missions api/anchors"
   "api/exchange: core/base core/types core/ports core/geo core/localize api/kit api/anchors"
-  "api: core/base core/types core/ports core/geo core/localize api/kit api/stream api/wire api/admin api/devices api/learning api/missions api/measurements api/anchors api/planning api/flight api/calibration api/exchange"
+  "api/webhooks: core/base core/types core/ports api/kit api/admin"
+  "api: core/base core/types core/ports core/geo core/localize api/kit api/stream api/wire api/admin api/devices api/learning api/missions api/measurements api/anchors api/planning api/flight api/calibration api/exchange api/webhooks"
 
   "migrations:"
   "server/storage: core/base core/types core/ports migrations"
   "server/runtime: core/base core/ports drivers/link drivers/record drivers/device api/learning server/storage"
-  "server/http: core/base api/kit web server/runtime"
+  "server/http: core/base core/ports api/kit web server/runtime"
   "server/config: core/base server/http"
   "server/flight: core/base core/types core/ports core/geo core/planning core/localize core/procedure core/flight drivers/link drivers/mavlink drivers/drone drivers/sim"
   "server/app: core/base drivers/link drivers/drone api/kit api/stream api/admin api/learning api server/storage server/runtime server/http server/config server/flight"
@@ -121,6 +122,7 @@ set(mutexes
   api/devices/device_stream.hpp:changing_         # whose the devices are: told to them and to the disk
   api/learning/model_registry.hpp:reloading_      # the promoted models
   api/missions/mission_service_state.hpp:reading_one  # a flight read back from the store
+  api/webhooks/webhook_service.hpp:starting_      # the thread of webhooks: begun or joined
   server/runtime/backup_keeper.hpp:making_        # a backup
   server/runtime/device_manager.cpp:saving_       # devices.json
   server/runtime/worker_main.cpp:writing          # a frame to the server

@@ -17,14 +17,15 @@ std::string event_json(const LiveEvent& event) {
 
 void EventLog::add(EventLevel level, std::string code, std::string text, std::optional<MissionId> mission) {
   const UtcTime now = clock_.now();
-  LiveEvent event{make_uuid_v7(now), now, level, std::move(code), std::move(text), mission};
+  const LiveEvent event{make_uuid_v7(now), now, level, std::move(code), std::move(text), mission};
   std::string json = event_json(event);
   {
     auto kept = events_.lock();
-    kept->push_back(std::move(event));
+    kept->push_back(event);
     if (kept->size() > k_kept) kept->pop_front();
   }
   hub_.publish(Topic::events, std::move(json), now.us());
+  tell_(event);
 }
 
 void EventLog::restore(const std::vector<LiveEvent>& events) {

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/ids.hpp"
@@ -29,6 +31,8 @@ class EventLog {
  public:
   static constexpr std::size_t k_kept = 10'000;
   EventLog(Hub& hub, const Clock& clock) : hub_(hub), clock_(clock) {}
+  /// Who is told of every event beside the stream, on the thread that adds it; set once, before the threads.
+  void on_event(std::function<void(const LiveEvent&)> tell) { tell_ = std::move(tell); }
   void add(EventLevel level, std::string code, std::string text, std::optional<MissionId> mission = {});
   /// Puts events of before the start in front of all others, oldest first; nobody is told again.
   void restore(const std::vector<LiveEvent>& events);
@@ -39,6 +43,7 @@ class EventLog {
  private:
   Hub& hub_;
   const Clock& clock_;
+  std::function<void(const LiveEvent&)> tell_{[](const LiveEvent&) {}};
   Locked<std::deque<LiveEvent>> events_;
 };
 

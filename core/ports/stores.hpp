@@ -22,6 +22,7 @@ class ServiceStore;
 class SiteStore;
 class TokenStore;
 class TrainingRunStore;
+class WebhookStore;
 
 /// Everything that is kept, by port; whoever opened the database owns them and outlives their users.
 struct Stores {
@@ -45,6 +46,7 @@ struct Stores {
   TokenStore& tokens;
   AccessStore& access;
   ServiceStore& service;
+  WebhookStore& webhooks;
 };
 
 }  // namespace anchord

@@ -20,6 +20,7 @@
 #include "server/http/http_server.hpp"
 #include "server/http/request_check.hpp"
 #include "server/http/text.hpp"
+#include "server/http/web_post.hpp"
 #include "server/runtime/backup_keeper.hpp"
 #include "server/runtime/device_manager.hpp"
 #include "server/runtime/logging.hpp"
@@ -92,6 +93,7 @@ struct App::State {
   std::unique_ptr<DeviceManager> devices;
   ModelKey model_key;
   std::unique_ptr<flight::DroneLink> drone;
+  std::unique_ptr<WebPost> web_post;
   std::unique_ptr<api::Application> application;
   std::unique_ptr<Authenticator> door;
   std::unique_ptr<HttpServer> http;
@@ -266,6 +268,8 @@ void App::State::compose() {
     log(LogLevel::error, "fault in a handler", {{"request_id", request_id}, {"what", what}});
   };
   deps.geopackage = geopackage;
+  web_post = make_web_post(config.flag("webhooks.allow_private"));
+  deps.web_post = web_post.get();
   deps.run_work = work_in_process();
   deps.model_key_is_new = model_key.fresh;
   deps.keep_deleted_ns =

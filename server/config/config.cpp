@@ -45,6 +45,8 @@ constexpr std::array k_options = {
            "serial:/dev/ttyACM0; empty: flown by hand"},
     Option{"drone.signing_key_file", "",
            "file (mode 0600) with the key of MAVLink 2 signing; frames without its signature are rejected"},
+    Option{"webhooks.allow_private", "false",
+           "webhooks may go to addresses of this machine and of private networks", flag},
     Option{"http.io_threads", "1", "threads of the sockets", count},
     Option{"http.workers", "4", "threads that run handlers", count},
     Option{"http.queue", "256", "requests that may wait for a handler; beyond: 503", count},

@@ -25,8 +25,9 @@ SqlStores::SqlStores(Gate& gate, AdmitMission admit)
       tokens(make_token_store(gate)),
       access(make_access_store(gate)),
       service(make_service_store(gate)),
+      webhooks(make_webhook_store(gate)),
       ports{*measurements,  *missions, *bin,    *exclusions, *sites,     *anchors, *calibrations,
             *revisions,     *kits,     *frames, *plans,      *campaigns, *labels,  *datasets,
-            *training_runs, *models,   *jobs,   *tokens,     *access,    *service} {}
+            *training_runs, *models,   *jobs,   *tokens,     *access,    *service, *webhooks} {}
 
 }  // namespace anchord::sql

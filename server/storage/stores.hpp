@@ -19,6 +19,7 @@
 #include "core/ports/site_store.hpp"
 #include "core/ports/stores.hpp"
 #include "core/ports/token_store.hpp"
+#include "core/ports/webhook_store.hpp"
 #include "server/storage/sql.hpp"
 
 /// The ports, written once for every database behind a Gate.
@@ -47,6 +48,7 @@ std::unique_ptr<PlanStore> make_plan_store(Gate& gate);
 std::unique_ptr<MissionBin> make_mission_bin(Gate& gate);
 std::unique_ptr<ServiceStore> make_service_store(Gate& gate);
 std::unique_ptr<ExclusionStore> make_exclusion_store(Gate& gate);
+std::unique_ptr<WebhookStore> make_webhook_store(Gate& gate);
 
 /// All of them over one gate, which outlives them.
 struct SqlStores {
@@ -71,6 +73,7 @@ struct SqlStores {
   const std::unique_ptr<TokenStore> tokens;
   const std::unique_ptr<AccessStore> access;
   const std::unique_ptr<ServiceStore> service;
+  const std::unique_ptr<WebhookStore> webhooks;
   const Stores ports;
 };
 

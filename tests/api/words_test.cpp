@@ -17,6 +17,7 @@
 #include "api/learning/measurement_query.hpp"
 #include "api/learning/model_signer.hpp"
 #include "api/stream/hub.hpp"
+#include "api/webhooks/cloud_event.hpp"
 #include "core/flight/command.hpp"
 #include "core/flight/control_lease.hpp"
 #include "core/ml/recipe.hpp"
@@ -26,6 +27,7 @@
 #include "core/procedure/safety.hpp"
 #include "core/types/event_level.hpp"
 #include "core/types/exclusion.hpp"
+#include "core/types/webhook.hpp"
 #include "drivers/device/supervisor.hpp"
 
 namespace anchord::api {
@@ -169,6 +171,9 @@ TEST(WireWords, AreThoseOfOpenApi) {
       {"GET /api/v1/ranges ?fix", words(k_fix_words)},
       {"ConfiguredDevice.rover.fix", words(k_fix_words)},
       {"Verdict", words(k_verdict_words)},
+      {"WebhookRequest.events", Json(k_webhook_events)},
+      {"WebhookChange.events", Json(k_webhook_events)},
+      {"Delivery.state", words(k_delivery_words)},
       {"GET /api/v1/anchors ?height", words(k_file_height_words)},
       {"GET /api/v1/exports/anchors.dxf ?height", words(k_file_height_words)},
       {"GET /api/v1/exports/anchors-pnezd.csv ?height", words(k_file_height_words)},

@@ -104,6 +104,29 @@ test('a local frame, fitted to the published anchors', async () => {
   });
 });
 
+test('a webhook: set up, tried, turned off, taken away', async () => {
+  const made = await call('POST', '/api/v1/webhooks', {
+    expect: 201,
+    json: { name: 'contract', url: 'http://127.0.0.1:1/hook', events: ['alarm.raised'] },
+  });
+  const path = `/api/v1/webhooks/${made.json.id}`;
+  await call('POST', '/api/v1/webhooks', { expect: 422, json: { name: 'x', url: 'ftp://a' } });
+  await call('GET', path, { expect: 200 });
+  await call('GET', '/api/v1/webhooks', { expect: 200 });
+  await call('GET', `/api/v1/webhooks/${unknown}`, { expect: 404 });
+  const delivery = await call('POST', `${path}/test`, { expect: 202 });
+  await eventually('it is refused, being of this machine', async () => {
+    const { json } = await call('GET', `${path}/deliveries`, { expect: 200 });
+    return json.items[0].id === delivery.json.id && json.items[0].fault?.includes('webhooks.allow_private');
+  });
+  await call('PATCH', path, { expect: 428, json: { enabled: false } });
+  const patch = { json: { enabled: false }, headers: { 'if-match': made.headers.get('etag') } };
+  const off = await call('PATCH', path, { expect: 200, ...patch });
+  await call('PATCH', path, { expect: 412, ...patch });
+  await call('POST', `${path}/test`, { expect: 422 });
+  await call('DELETE', path, { expect: 204, headers: { 'if-match': off.headers.get('etag') } });
+});
+
 test('a plan that says nothing flies by the defaults of the contract', async () => {
   const { json: made } = await call('POST', '/api/v1/plans', { expect: 201, json: { name: 'defaults' } });
   const [settings] = contract.deref('/components/schemas/PlanSettings'),
@@ -372,6 +395,7 @@ test('everything that can be read', async () => {
   const wrong = []; // all at once, as a person wants them
   for (const { method, template } of contract.operations.filter((o) => o.method === 'get')) {
     const own_test =
+      template.includes('/webhooks/') ||
       template === '/api/v1/ws' ||
       template.includes('{sample}') ||
       template.includes('{feature}') ||

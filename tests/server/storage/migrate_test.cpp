@@ -53,7 +53,8 @@ TEST_F(Migrate, FindsEveryLandedMigrationAsItWas) {
             "5 f6fddabd2c8bebecb1b9370fa20c1a691b2facf7483f685b5be0583a65374ef3\n"
             "6 fa850be7202896aa8b044cc8cab22219a207f27ab439030bb69bc0bbc91eae96\n"
             "7 928ced75f17f95eee611eef5bcb10890a421087a2d744c12b04838d2bc94e8cc\n"
-            "8 993f088a1a82f736ed536f4af9fbb963034237ed191e6e299a8e5d4a46bceb2f\n");
+            "8 993f088a1a82f736ed536f4af9fbb963034237ed191e6e299a8e5d4a46bceb2f\n"
+            "9 7c4ffeb6bd9e4aeb1810a60170fbca4d00fb10c4e5046f130dc0dc47fbdbec15\n");
 }
 
 TEST_F(Migrate, KnowsTheDigestOfAPublishedVector) {

@@ -1,0 +1,182 @@
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "api/kit/or_null.hpp"
+#include "api/kit/reader.hpp"
+#include "api/kit/support.hpp"
+#include "api/webhooks/cloud_event.hpp"
+#include "api/webhooks/routes.hpp"
+#include "api/webhooks/webhook_service.hpp"
+#include "core/ports/web_post.hpp"
+#include "core/ports/webhook_store.hpp"
+
+namespace anchord::api {
+
+using Json = nlohmann::json;
+using Ordered = nlohmann::ordered_json;
+
+namespace {
+
+constexpr std::size_t k_most_webhooks = 20;
+
+std::string etag(const Webhook& webhook) { return "\"h-" + std::to_string(webhook.version) + '"'; }
+
+/// Never with its secret, which is told once.
+Ordered webhook_json(const Webhook& w) {
+  return {{"id", to_string(w.id)}, {"name", w.name},       {"url", w.url},
+          {"events", w.events},    {"enabled", w.enabled}, {"created_at", to_rfc3339(w.created)}};
+}
+
+Ordered delivery_json(const WebhookDelivery& d) {
+  return {{"id", to_string(d.id)},
+          {"event", d.event},
+          {"state", k_delivery_words.word(d.state)},
+          {"created_at", to_rfc3339(d.created)},
+          {"attempts", d.attempts},
+          {"tried_at", d.tried ? Ordered(to_rfc3339(*d.tried)) : Ordered(nullptr)},
+          {"status", or_null(d.status)},
+          {"fault", text_or_null(d.fault)}};
+}
+
+void read_events(Fields& fields, Webhook& webhook, std::vector<FieldError>& errors) {
+  const Json* list = fields.child("events");
+  if (list == nullptr) return;
+  webhook.events.clear();
+  const auto known = [](const Json& one) {
+    return one.is_string() &&
+           std::ranges::find(k_webhook_events, one.get_ref<const std::string&>()) != k_webhook_events.end();
+  };
+  if (!list->is_array() || list->empty() || !std::all_of(list->begin(), list->end(), known)) {
+    std::string all;
+    for (const auto one : k_webhook_events) all += (all.empty() ? "" : ", ") + std::string(one);
+    errors.push_back({"/events", "unknown_value", "must be a list of " + all});
+    return;
+  }
+  for (const auto& one : *list) {
+    auto code = one.get<std::string>();
+    if (std::ranges::find(webhook.events, code) == webhook.events.end())
+      webhook.events.push_back(std::move(code));
+  }
+}
+
+/// Fields of a body over what there is; `made`: name and url must be there.
+void read(WebhookApi& s, const Json& body, Webhook& webhook, bool made) {
+  std::vector<FieldError> errors;
+  Fields fields(body, "", errors);
+  if (const auto name = fields.text("name", 100, made)) webhook.name = *name;
+  if (const auto url = fields.text("url", 500, made)) {
+    webhook.url = *url;
+    if (s.post != nullptr) {
+      if (const auto fit = s.post->check(*url); !fit)
+        errors.push_back({"/url", "bad_value", fit.error().message});
+    }
+  }
+  if (const auto enabled = fields.boolean("enabled")) webhook.enabled = *enabled;
+  read_events(fields, webhook, errors);
+  fields.finish();
+  refuse_if_any(errors);
+}
+
+Response answer(int status, const Webhook& webhook) {
+  Response response = json_response(status, webhook_json(webhook));
+  response.header("ETag", etag(webhook));
+  return response;
+}
+
+Webhook path_webhook(WebhookApi& s, const Request& request) {
+  return value_or_problem(s.store.webhook(path_id<WebhookId>(request)));
+}
+
+Response create(WebhookApi& s, const Request& request) {
+  check_query(request, {});
+  if (s.post == nullptr) throw_problem(422, "unsupported", "this server sends no webhooks");
+  Webhook webhook;
+  webhook.id.uuid = make_uuid_v7(s.clock.now());
+  webhook.created = s.clock.now();
+  webhook.events.assign(k_webhook_events.begin(), k_webhook_events.end());
+  read(s, json_body(request), webhook, true);
+  if (value_or_problem(s.store.webhooks()).size() >= k_most_webhooks)
+    throw_problem(409, "conflict",
+                  "there are " + std::to_string(k_most_webhooks) + " webhooks: delete one first");
+  webhook.secret = make_webhook_secret();
+  value_or_problem(s.store.insert(webhook));
+  s.service.changed();
+  s.audit(request, "webhook.create " + to_string(webhook.id) + ' ' + webhook.url);
+  Ordered body = webhook_json(webhook);
+  body["secret"] = webhook.secret;
+  Response response = json_response(201, body);
+  response.header("ETag", etag(webhook)).header("Location", "/api/v1/webhooks/" + to_string(webhook.id));
+  return response;
+}
+
+Response patch(WebhookApi& s, const Request& request) {
+  check_query(request, {});
+  Webhook webhook = path_webhook(s, request);
+  require_match(request, etag(webhook));
+  read(s, json_body(request), webhook, false);
+  value_or_problem(s.store.update(webhook, webhook.version));
+  s.service.changed();
+  s.audit(request, "webhook.change " + to_string(webhook.id) + ' ' + webhook.url);
+  return answer(200, path_webhook(s, request));
+}
+
+Response remove(WebhookApi& s, const Request& request) {
+  check_query(request, {});
+  const Webhook webhook = path_webhook(s, request);
+  require_match(request, etag(webhook));
+  value_or_problem(s.store.remove(webhook.id));
+  s.service.changed();
+  s.audit(request, "webhook.delete " + to_string(webhook.id) + ' ' + webhook.url);
+  Response response;
+  response.status = 204;
+  return response;
+}
+
+Response test(WebhookApi& s, const Request& request) {
+  check_query(request, {});
+  const Webhook webhook = path_webhook(s, request);
+  if (!webhook.enabled) throw_problem(422, "state", "the webhook is off: set enabled");
+  return json_response(202, delivery_json(value_or_problem(s.service.test(webhook))));
+}
+
+Response deliveries(WebhookApi& s, const Request& request) {
+  check_query(request, {"limit", "cursor"});
+  const Webhook webhook = path_webhook(s, request);
+  const auto page = page_query(request);
+  auto rows =
+      value_or_problem(s.store.deliveries(webhook.id, page.limit + 1, cursor_id<DeliveryId>(page.cursor)));
+  const bool more = rows.size() > page.limit;
+  if (more) rows.pop_back();
+  Ordered items = Ordered::array();
+  for (const auto& row : rows) items.push_back(delivery_json(row));
+  return list_response(request, std::move(items), more ? to_string(rows.back().id) : "");
+}
+
+}  // namespace
+
+void add_webhook_routes(Router& router, WebhookApi& s) {
+  const auto on = [&s](auto function) {
+    return [&s, function](const Request& request) { return function(s, request); };
+  };
+  // Addresses of webhooks often are secrets themselves: only who may set them up sees them.
+  const auto access = Access::any_of({Role::integrator});
+  const std::string one = "/api/v1/webhooks/{id}";
+  router.add({Method::get, "/api/v1/webhooks", access, [&s](const Request& request) {
+                check_query(request, {});
+                Ordered items = Ordered::array();
+                for (const auto& webhook : value_or_problem(s.store.webhooks()))
+                  items.push_back(webhook_json(webhook));
+                return list_response(request, std::move(items), "");
+              }});
+  router.add(keeps_nothing({Method::post, "/api/v1/webhooks", access, on(create)}));
+  router.add({Method::get, one, access, [&s](const Request& request) {
+                check_query(request, {});
+                return answer(200, path_webhook(s, request));
+              }});
+  router.add({Method::patch, one, access, on(patch), 1 << 20, false, true});
+  router.add({Method::del, one, access, on(remove), 1 << 20, false, true});
+  router.add({Method::post, one + "/test", access, on(test)});
+  router.add({Method::get, one + "/deliveries", access, on(deliveries)});
+}
+
+}  // namespace anchord::api
