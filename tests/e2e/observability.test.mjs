@@ -7,7 +7,7 @@ import { after, before, test } from 'node:test';
 import { promisify } from 'node:util';
 import { root, startServer } from './server.mjs';
 
-const deploy = join(root, 'deploy');
+const monitoring = join(root, 'docs/monitoring');
 let server, metrics;
 const promtool = (args, input) => {
   const running = promisify(execFile)('promtool', args);
@@ -29,7 +29,7 @@ test('promtool finds nothing wrong with /metrics', async () => {
 });
 
 test('promtool takes the rules, and each fires when it should', async () => {
-  const at = (name) => join(deploy, 'prometheus', name);
+  const at = (name) => join(monitoring, 'prometheus', name);
   assert.match((await promtool(['check', 'rules', at('anchord.rules.yml')])).stdout, /SUCCESS: \d+ rules found/);
   assert.match((await promtool(['test', 'rules', at('anchord.rules.test.yml')])).stdout, /SUCCESS/);
   assert.match((await promtool(['check', 'config', at('prometheus.yml')])).stdout, /SUCCESS/);
@@ -39,8 +39,8 @@ test('every metric of the rules and the board is one of the server', () => {
   const served = new Set([...metrics.matchAll(/^# TYPE (\S+) (\S+)/gm)].map((m) => m[1]));
   const named = (text) =>
     [...text.matchAll(/\banchord_[a-z0-9_]+/g)].map((m) => m[0].replace(/_(bucket|sum|count)$/, ''));
-  const board = readFileSync(join(deploy, 'grafana/anchord.json'), 'utf8');
-  const all = [...named(board), ...named(readFileSync(join(deploy, 'prometheus/anchord.rules.yml'), 'utf8'))];
+  const board = readFileSync(join(monitoring, 'grafana/anchord.json'), 'utf8');
+  const all = [...named(board), ...named(readFileSync(join(monitoring, 'prometheus/anchord.rules.yml'), 'utf8'))];
   assert.ok(all.length > 30);
   assert.deepEqual(
     [...new Set(all)].filter((name) => !served.has(name)),
@@ -49,7 +49,7 @@ test('every metric of the rules and the board is one of the server', () => {
 });
 
 test('each expression of the board is one that Prometheus can read', async () => {
-  const { panels } = JSON.parse(readFileSync(join(deploy, 'grafana/anchord.json'), 'utf8'));
+  const { panels } = JSON.parse(readFileSync(join(monitoring, 'grafana/anchord.json'), 'utf8'));
   const rules = panels
     .flatMap((panel) => panel.targets)
     .map(({ expr }, i) => ({ record: `board:${i}`, expr: expr.replaceAll('$instance', '.*') }));
