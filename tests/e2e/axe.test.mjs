@@ -62,6 +62,20 @@ after(async () => {
   rmSync(folder, { recursive: true, force: true });
 });
 
+/** What is wrong wherever the page is scrolled to: a bar at the bottom may half cover what can be scrolled out from under it. */
+async function wrong(page) {
+  const here = await violations(page, { sizes: true });
+  if (!here.some((v) => v.startsWith('target-size'))) return here;
+  await page.evaluate(() => {
+    for (const e of document.querySelectorAll('*')) if (e.scrollHeight > e.clientHeight + 8) e.scrollTop += 90;
+  });
+  const there = await violations(page, { sizes: true });
+  await page.evaluate(() => {
+    for (const e of document.querySelectorAll('*')) if (e.scrollTop > 0) e.scrollTop -= 90;
+  });
+  return here.filter((v) => !v.startsWith('target-size') || there.includes(v));
+}
+
 for (const theme of ['light', 'dark', 'sun'])
   test(`no view breaks a rule of axe at any size, ${theme}`, async () => {
     const { page, id } = await openPage(browser, server, { hash: '#/live', theme }),
@@ -72,7 +86,7 @@ for (const theme of ['light', 'dark', 'sun'])
       for (const [size, width, height] of sizes) {
         await page.setViewportSize({ width, height });
         await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
-        found.push(...(await violations(page, { sizes: true })).map((v) => `${view}, ${size}: ${v}`));
+        found.push(...(await wrong(page)).map((v) => `${view}, ${size}: ${v}`));
         await picture(page, `axe-${view}-${size}-${theme}`);
       }
     }
