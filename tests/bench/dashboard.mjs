@@ -257,7 +257,7 @@ async function fly_and_measure(row, views, shaped) {
     stop = fly(server, id);
     await new Promise((done) => setTimeout(done, k_warm_s * 1000));
     const emulated = shaped && !shape(server.port);
-    if (emulated) row('link of 1 Mbit/s', 'emulated by Chromium', 'no right to shape a network namespace');
+    if (emulated) row('link of 1 Mbit/s', 'emulated by Chromium', 'tc cannot shape a network namespace here');
     browser = await openBrowser();
     for (const [name, how] of views) await measure(browser, server, name, { ...how, emulated }, row);
   } finally {
