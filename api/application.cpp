@@ -147,7 +147,8 @@ struct Application::State {
                   [this] { return counts(); },
                   [this] { return device_clock(); },
                   [this] { return drone(); },
-                  [this] { return flights.metrics() + deps.metrics_text(); }},
+                  [this] { return flights.metrics() + deps.metrics_text(); },
+                  deps.support_files},
         device_api{deps.devices, stores.measurements, stream, jobs, audit},
         mission_api{
             missions,     stores.missions, stores.measurements,  stores.sites, stores.bin, stream, events,

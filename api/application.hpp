@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "api/admin/build_info.hpp"
@@ -67,6 +68,10 @@ class Application {
     std::function<StorageStatus()> storage_status = [] { return StorageStatus{}; };
     /// Prometheus text of the server, appended to ours.
     std::function<std::string()> metrics_text = [] { return std::string(); };
+    /// Name and content: settings, log and what else only the server has, for a support bundle.
+    std::function<std::vector<std::pair<std::string, std::string>>()> support_files = [] {
+      return std::vector<std::pair<std::string, std::string>>{};
+    };
     std::function<void(std::string_view request_id, std::string_view what)> log_fault =
         [](std::string_view, std::string_view) {};
     RunWork run_work = work_inline;  ///< runs the heavy part of a training job

@@ -18,6 +18,7 @@ struct Command {
 constexpr Command k_commands[]{
     {"Run a server", anchord::cli::add_serve_command},
     {"Run a server", anchord::cli::add_doctor_command},
+    {"Run a server", anchord::cli::add_support_command},
     {"Run a server", anchord::cli::add_devices_command},
     {"Run a server", anchord::cli::add_token_command},
     {"Run a server", anchord::cli::add_backup_command},

@@ -4,6 +4,8 @@
 #include <functional>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "api/admin/build_info.hpp"
 #include "api/kit/audit.hpp"
@@ -50,6 +52,8 @@ struct AdminApi {
   std::function<ServerCounts()> counts;
   std::function<nlohmann::ordered_json()> device_clock, drone;  ///< as /system shows them; null: none
   std::function<std::string()> metrics_text;                    ///< Prometheus text of all others, after ours
+  /// Name and content: what the rest of the server adds to a support bundle.
+  std::function<std::vector<std::pair<std::string, std::string>>()> support_files;
 };
 
 /// Begins a backup in a job. Errors: those of the job queue.

@@ -3,7 +3,9 @@
 
 #include "api/admin/alarm_board.hpp"
 #include "api/admin/docs_page.hpp"
+#include "api/admin/event_log.hpp"
 #include "api/admin/routes.hpp"
+#include "api/admin/support_bundle.hpp"
 #include "api/kit/contract.hpp"
 #include "api/kit/support.hpp"
 #include "api/stream/hub.hpp"
@@ -92,6 +94,32 @@ Response metrics(AdminApi& s, const Request&) {
   return response;
 }
 
+constexpr std::size_t k_supported_events = 1000;
+constexpr std::string_view k_read_me =
+    "What an anchord server reports of itself, to find out what is wrong with it.\n"
+    "Left out: passwords, tokens, keys, measurements, positions of anchors.\n"
+    "Read it before you send it.\n";
+
+/// One archive for whoever helps from afar.
+Response support(AdminApi& s, const Request& request) {
+  check_query(request, {});
+  std::string alarms, events;
+  for (const auto& alarm : s.alarms.standing()) alarms += alarm_json(alarm) + '\n';
+  for (const auto& event : s.events.newest(k_supported_events, {}, {})) events += event_json(event) + '\n';
+  std::vector<SupportFile> files{
+      {"README.txt", std::string(k_read_me)},   {"version.json", version(s, request).body},
+      {"system.json", system(s, request).body}, {"metrics.txt", metrics(s, request).body},
+      {"alarms.jsonl", std::move(alarms)},      {"events.jsonl", std::move(events)}};
+  for (auto& file : s.support_files()) files.push_back(std::move(file));
+  for (auto& [name, content] : files) content = without_secrets(content);
+  s.audit.soon(request, "support.bundle");
+  Response response;
+  response.header("Content-Type", "application/x-tar");
+  response.header("Content-Disposition", "attachment; filename=\"anchord-support.tar\"");
+  response.body = tar_of(files, s.clock.now());
+  return response;
+}
+
 Response document(std::string_view text) {
   Response response;
   response.header("Content-Type", "application/json");
@@ -136,6 +164,7 @@ void add_system_routes(Router& router, AdminApi& s) {
   router.add({Method::get, "/metrics", readers(), on(metrics)});
   router.add({Method::get, "/problems/{type}", Access::open(), explain});
   router.add({Method::get, "/api/v1/system", readers(), on(system)});
+  router.add(as_heavy({Method::get, "/api/v1/support-bundle", Access::any_of({Role::admin}), on(support)}));
   router.add(as_heavy({Method::get, "/api/v1/audit", Access::any_of({Role::admin}), on(audit_log)}));
   router.add({Method::get, "/api/docs", Access::open(), [](const Request&) {
                 static const std::string page = docs_page(openapi_json());

@@ -66,6 +66,17 @@ HostPolicy host_policy(const Config& config) {
   return policy;
 }
 
+/// Every setting with its value and where that comes from; files are named, never read.
+std::string settings_text(const Config& config) {
+  std::string out;
+  for (const auto& option : options()) {
+    const auto& value = config.values.find(option.key)->second;
+    out.append(option.key).append(" = \"").append(value.text).append("\"  # ");
+    out.append(to_string(value.origin)).append("\n");
+  }
+  return out;
+}
+
 /// Backup, calibration, discovery, training, and room for one more.
 constexpr std::size_t k_kinds_of_jobs = 5;
 
@@ -83,6 +94,7 @@ std::size_t raise_descriptor_limit() {
 
 struct App::State {
   Config config;
+  std::function<std::string()> doctor;
   SystemClock clock;
   std::unique_ptr<Database> database;
   std::unique_ptr<BackupKeeper> backups;
@@ -264,6 +276,11 @@ void App::State::compose() {
       std::chrono::duration<double>(config.seconds("solve.max_correction_age_s")).count();
   deps.storage_status = [this] { return status_of(*database); };
   deps.metrics_text = [this] { return metrics->text() + devices->metrics(); };
+  deps.support_files = [this] {
+    return std::vector<std::pair<std::string, std::string>>{{"settings.txt", settings_text(config)},
+                                                            {"log.jsonl", recent_log()},
+                                                            {"doctor.json", doctor ? doctor() : ""}};
+  };
   deps.log_fault = [](std::string_view request_id, std::string_view what) {
     log(LogLevel::error, "fault in a handler", {{"request_id", request_id}, {"what", what}});
   };
@@ -294,11 +311,12 @@ App::~App() { stop(); }
 const api::Router& App::router() const { return state_->application->router(); }
 const std::vector<std::string>& App::urls() const { return state_->urls; }
 
-Result<std::unique_ptr<App>> App::start(const Config& config) {
+Result<std::unique_ptr<App>> App::start(const Config& config, std::function<std::string()> doctor) {
   BOOST_OUTCOME_TRYV(check_listeners(config));
   auto state = std::make_unique<State>();
   auto& s = *state;
   s.config = config;
+  s.doctor = std::move(doctor);
   s.data_dir = config.text("data_dir");
   BOOST_OUTCOME_TRY(s.proxies, TrustedProxies::parse(config.list("trusted_proxies")));
   BOOST_OUTCOME_TRY(s.database, open_store(config));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -20,7 +21,9 @@ class App {
   /// Checks the addresses, opens and migrates the database, makes the first admin token, listens. Messages of
   /// errors are for the operator's terminal. Errors: invalid_argument (settings), conflict (address or folder
   /// in use), those of the database.
-  static Result<std::unique_ptr<App>> start(const Config& config);
+  /// `doctor`: what a look at folder, disk, database and clock finds, for a support bundle; empty: nobody
+  /// looks.
+  static Result<std::unique_ptr<App>> start(const Config& config, std::function<std::string()> doctor = {});
   ~App();
   App(const App&) = delete;
   App& operator=(const App&) = delete;

@@ -27,4 +27,7 @@ struct DoctorOptions {
 /// and the server of this folder when it runs. Changes nothing, makes nothing.
 std::vector<Finding> examine(const DoctorOptions& options);
 
+/// An array of {level, what, seen, advice}.
+std::string findings_json(const std::vector<Finding>& findings);
+
 }  // namespace anchord::cli

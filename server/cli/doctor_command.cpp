@@ -19,14 +19,15 @@ void print(const std::vector<Finding>& findings) {
   }
 }
 
-void print_json(const std::vector<Finding>& findings) {
+}  // namespace
+
+std::string findings_json(const std::vector<Finding>& findings) {
   auto out = nlohmann::ordered_json::array();
   for (const auto& f : findings)
-    out.push_back({{"level", k_finding_words.word(f.level)}, {"what", f.what}, {"seen", f.seen}, {"advice", f.advice}});
-  std::printf("%s\n", to_wire(out).c_str());
+    out.push_back(
+        {{"level", k_finding_words.word(f.level)}, {"what", f.what}, {"seen", f.seen}, {"advice", f.advice}});
+  return to_wire(out);
 }
-
-}  // namespace
 
 void add_doctor_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
@@ -40,7 +41,10 @@ void add_doctor_command(CLI::App& app, int& exit_code) {
   command->add_flag("--json", *json, "print an array of {level, what, seen, advice}");
   command->callback([&exit_code, options, json] {
     const auto findings = examine(*options);
-    *json ? print_json(findings) : print(findings);
+    if (*json)
+      std::printf("%s\n", findings_json(findings).c_str());
+    else
+      print(findings);
     exit_code =
         std::ranges::any_of(findings, [](const auto& f) { return f.level == Finding::Level::failed; });
   });

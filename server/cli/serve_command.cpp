@@ -8,6 +8,7 @@
 #include "server/app/app.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/config_flags.hpp"
+#include "server/cli/doctor.hpp"
 #include "server/runtime/logging.hpp"
 
 namespace anchord::cli {
@@ -26,7 +27,10 @@ int serve(const server::Config& config) {
 
   server::start_logging(config.text("log_level"));
   for (const auto& warning : config.warnings) server::log(server::LogLevel::warning, warning);
-  auto app = server::App::start(config);
+  DoctorOptions look;
+  look.data_dir = config.text("data_dir");
+  look.listen = config.list("listen");
+  auto app = server::App::start(config, [look] { return findings_json(examine(look)); });
   if (!app) {
     std::fprintf(stderr, "anchord: %s\n", printable(app.error().message).c_str());
     return app.error().code == Errc::invalid_argument ? 2 : 1;

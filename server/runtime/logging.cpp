@@ -5,7 +5,10 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <deque>
+
 #include "core/base/guard.hpp"
+#include "core/base/locked.hpp"
 #include "core/base/time.hpp"
 
 namespace anchord::server {
@@ -29,6 +32,13 @@ spdlog::logger& logger() {
     return made;
   }();
   return *instance;
+}
+
+/// What was logged lately; a line is a few hundred bytes.
+constexpr std::size_t k_recent_lines = 2000;
+Locked<std::deque<std::string>>& recent() {
+  static Locked<std::deque<std::string>> lines;
+  return lines;
 }
 
 spdlog::level::level_enum of(LogLevel level) {
@@ -64,6 +74,16 @@ void log(LogLevel level, std::string_view message, std::initializer_list<LogFiel
   if (!logger().should_log(of(level))) return;
   const std::string line = log_line(SystemClock().now(), level, message, fields);
   logger().log(of(level), spdlog::string_view_t(line.data(), line.size()));
+  auto lines = recent().lock();
+  lines->push_back(line);
+  if (lines->size() > k_recent_lines) lines->pop_front();
+}
+
+std::string recent_log() {
+  const auto lines = recent().lock();
+  std::string out;
+  for (const auto& line : *lines) out += line + '\n';
+  return out;
 }
 
 }  // namespace anchord::server

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 #include <string_view>
 
 #include "server/runtime/log_line.hpp"
@@ -15,5 +16,7 @@ bool start_logging(std::string_view level);
 /// lost. Thread-safe.
 void log(LogLevel level, std::string_view message, std::initializer_list<LogField> fields = {});
 std::size_t lost_log_lines();
+/// The last 2000 lines, one below the other: what a support bundle shows. Thread-safe.
+std::string recent_log();
 
 }  // namespace anchord::server

@@ -1,7 +1,8 @@
 // What a person or a script sees of the program itself: words on stdout, exit codes.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { randomBytes } from 'node:crypto';
+import { existsSync, mkdtempSync, readdirSync, readFileSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -137,6 +138,60 @@ test('doctor says what is wrong with folder and port, and of a running server ho
     const damaged = await looked('--data-dir', folder);
     assert.deepEqual([damaged.code, damaged.found.database.level], [1, 'failed']);
     assert.match(damaged.found.database.advice, /backup restore/);
+  } finally {
+    await server.dispose();
+    rmSync(folder, { recursive: true });
+  }
+});
+
+test('a support bundle has what helps and no secret of the server', async () => {
+  const folder = mkdtempSync(join(tmpdir(), 'anchord e2e ')),
+    signing = randomBytes(32).toString('hex'),
+    key_file = join(folder, 'signing.key'),
+    archive = join(folder, 'bundle.tar');
+  writeFileSync(key_file, signing, { mode: 0o600 });
+  const server = await startServer({
+    auth: 'on',
+    args: ['--drone-address', 'udp://:0', '--drone-signing-key-file', key_file],
+  });
+  try {
+    const made = await (await server.fetch('/api/v1/tokens', { json: { name: 'gis', roles: ['viewer'] } })).json();
+    const password = `p${randomBytes(12).toString('hex')}`,
+      device = await server.fetch('/api/v1/devices', {
+        json: {
+          name: 'caster',
+          kind: 'ntrip',
+          address: 'tcp://127.0.0.1:9',
+          options: { mount: 'M', user: 'surveyor', password },
+        },
+      });
+    assert.equal(device.status, 201, await device.clone().text());
+    await server.fetch('/api/v1/missions', { headers: { authorization: `Bearer wrong-${password}` } });
+    const secrets = [readFileSync(join(server.dataDir, 'admin.token'), 'utf8').trim(), made.token, signing, password];
+    for (const name of readdirSync(server.dataDir))
+      if (/key|secret/.test(name) && statSync(join(server.dataDir, name)).isFile())
+        secrets.push(readFileSync(join(server.dataDir, name), 'latin1').trim());
+    assert.ok(
+      secrets.every((s) => typeof s === 'string' && s.length >= 16),
+      'every secret is known to this test',
+    );
+    const { code, stderr } = await run(['support-bundle', '--data-dir', server.dataDir, '--out', archive]);
+    assert.equal(code, 0, stderr);
+    const bundle = readFileSync(archive, 'latin1');
+    for (const secret of secrets) assert.ok(!bundle.includes(secret), 'a secret is in the bundle');
+    const part = (name) => execFileSync('tar', ['-xOf', archive, name], { encoding: 'utf8' });
+    assert.match(part('version.json'), /"version"/);
+    assert.match(part('settings.txt'), /drone\.signing_key_file = ".*signing\.key" {2}# flag/);
+    assert.match(part('log.jsonl'), /"msg":"listening"/);
+    assert.match(part('metrics.txt'), /anchord_db_size_bytes \d+/);
+    assert.ok(JSON.parse(part('doctor.json')).some((f) => f.what === 'data folder' && f.level === 'ok'));
+    const refused = await fetch(`${server.url}/api/v1/support-bundle`, {
+      headers: { authorization: `Bearer ${made.token}` },
+    });
+    assert.equal(refused.status, 403);
+    await server.kill();
+    assert.equal((await run(['support-bundle', '--data-dir', server.dataDir, '--out', archive])).code, 0);
+    assert.ok(JSON.parse(part('doctor.json')).length > 2, 'without a server it is what doctor finds');
   } finally {
     await server.dispose();
     rmSync(folder, { recursive: true });

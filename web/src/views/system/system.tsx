@@ -99,6 +99,15 @@ function HealthPanel() {
           .
         </p>
       )}
+      {may('admin') && (
+        <p class="sub">
+          <a class="btn" href="api/v1/support-bundle" download="anchord-support.tar" data-testid="support-bundle">
+            Download a support bundle
+          </a>{' '}
+          Versions, settings, log, metrics and what <code>anchord doctor</code> finds, in one archive. Passwords,
+          tokens, keys, measurements and positions are left out.
+        </p>
+      )}
     </section>
   );
 }
