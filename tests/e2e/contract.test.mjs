@@ -367,7 +367,7 @@ test('a flight by hand: control, checklist, start, hold, abort', async () => {
 test('the plan of a flight that has landed is changed no more', async () => {
   const path = `/api/v1/missions/${ids.flown}/plan`;
   await call('GET', `${path}/change`, { expect: 422 });
-  await call('POST', path, { expect: 422, json: { revision: 1 } });
+  await call('POST', path, { expect: 409, json: { revision: 1 } });
 });
 
 test('everything that can be read', async () => {
