@@ -114,6 +114,14 @@ std::string operation_of(const std::string& method, const std::string& path, con
   return out + "</ul>\n";
 }
 
+constexpr const char* k_style =
+    ":root{color-scheme:light dark}body{margin:0;font:16px/1.5 system-ui,sans-serif}"
+    "main{max-width:72rem;margin:0 auto;padding:1rem;overflow-wrap:anywhere}"
+    "a{display:inline-block;padding:3px 4px}nav ul{display:flex;flex-wrap:wrap;gap:4px 12px;"
+    "list-style:none;padding:0}table{border-collapse:collapse;margin:.5rem 0}"
+    "td,th{border:1px solid #8888;padding:2px 8px;text-align:left;vertical-align:top}"
+    "h3{margin-top:2rem;padding-top:.5rem;border-top:1px solid #8888}";
+
 }  // namespace
 
 std::string docs_page(std::string_view openapi_json) {
@@ -134,14 +142,14 @@ std::string docs_page(std::string_view openapi_json) {
   std::string out =
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><title>" +
-      text_of(info, "title") + "</title></head><body>\n<h1>" + text_of(info, "title") + " " +
-      text_of(info, "version") + "</h1>\n<p>" + text_of(info, "description") +
+      text_of(info, "title") + "</title><style>" + k_style + "</style></head><body>\n<main>\n<h1>" +
+      text_of(info, "title") + " " + text_of(info, "version") + "</h1>\n<p>" + text_of(info, "description") +
       "</p>\n<p>As documents: <a href=\"/api/v1/openapi.json\">openapi.json</a>, <a "
       "href=\"/api/v1/asyncapi.json\">asyncapi.json</a> (live topics). Fields with * are "
-      "required.</p>\n<ul>\n";
+      "required.</p>\n<nav aria-label=\"Sections\"><ul>\n";
   for (const auto& tag : order)
     out += "<li><a href=\"#tag-" + html_text(tag) + "\">" + html_text(tag) + "</a></li>\n";
-  out += "<li><a href=\"#schemas\">schemas</a></li>\n</ul>\n";
+  out += "<li><a href=\"#schemas\">schemas</a></li>\n</ul></nav>\n";
   for (const auto& tag : order)
     out += "<h2 id=\"tag-" + html_text(tag) + "\">" + html_text(tag) + "</h2>\n" + sections[tag];
   out += "<h2 id=\"schemas\">schemas</h2>\n";
@@ -149,7 +157,7 @@ std::string docs_page(std::string_view openapi_json) {
     out += "<h3 id=\"schema-" + html_text(name) + "\">" + html_text(name) + "</h3>\n<p>" +
            text_of(schema, "description") + " " + type_of(schema) + "</p>\n" + fields_of(schema);
   }
-  return out + "</body></html>\n";
+  return out + "</main></body></html>\n";
 }
 
 }  // namespace anchord::api

@@ -7,6 +7,7 @@
 #include "api/admin/routes.hpp"
 #include "api/admin/support_bundle.hpp"
 #include "api/kit/contract.hpp"
+#include "api/kit/html_page.hpp"
 #include "api/kit/support.hpp"
 #include "api/stream/hub.hpp"
 #include "core/base/time.hpp"
@@ -168,10 +169,7 @@ void add_system_routes(Router& router, AdminApi& s) {
   router.add(as_heavy({Method::get, "/api/v1/audit", Access::any_of({Role::admin}), on(audit_log)}));
   router.add({Method::get, "/api/docs", Access::open(), [](const Request&) {
                 static const std::string page = docs_page(openapi_json());
-                Response response;
-                response.header("Content-Type", "text/html; charset=utf-8");
-                response.body = page;
-                return response;
+                return html_page(page);
               }});
   router.add({Method::get, "/api/v1/openapi.json", Access::open(),
               [](const Request&) { return document(openapi_json()); }});

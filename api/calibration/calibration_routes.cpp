@@ -12,6 +12,7 @@
 #include "api/calibration/position_diff.hpp"
 #include "api/calibration/routes.hpp"
 #include "api/formats/evidence.hpp"
+#include "api/kit/html_page.hpp"
 #include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
@@ -301,15 +302,9 @@ Response report(CalibrationApi& s, const Request& request) {
   check_query(request, {});
   auto calibration = value_or_problem(s.calibration_store.calibration(path_id<CalibrationId>(request)));
   const auto page = value_or_problem(calibration_report(s, calibration));
-  Response response;
-  response.header("Content-Type", "text/html; charset=utf-8");
-  // No script may run in it and nothing is fetched; its own style is all it has.
-  response.header("Content-Security-Policy",
-                  "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'; "
-                  "frame-ancestors 'none'");
+  Response response = html_page(report_html(page));
   response.header("Content-Disposition",
                   "inline; filename=\"calibration-" + to_string(calibration.id).substr(0, 8) + ".html\"");
-  response.body = report_html(page);
   return response;
 }
 

@@ -97,43 +97,45 @@ export function PredictedPanel({ check, shown, set }: { check: Check | null; sho
           </span>
         </p>
       )}
-      <table class="tbl">
-        <caption class="sr">
-          Expected of anchors assumed 5 m apart inside the outline, by their height: middle and worst
-        </caption>
-        <thead>
-          <tr>
-            <th scope="col">Height</th>
-            <th scope="col" class="num">
-              Anchors
-            </th>
-            <th scope="col" class="num">
-              GDOP, worst
-            </th>
-            <th scope="col" class="num">
-              1σ, worst
-            </th>
-          </tr>
-        </thead>
-        <tbody>
-          {heights.map((h) => {
-            const s = summary(check.assumed, h);
-            return (
-              <tr key={h}>
-                <th scope="row">{fixed(h, 1)} m</th>
-                <td class="num">
-                  {s.n}
-                  {s.unseen > 0 ? `, ${s.unseen} not seen` : ''}
-                </td>
-                <td class="num">{s.gdop ? `${fixed(s.gdop[0], 2)}, ${fixed(s.gdop[1], 2)}` : '–'}</td>
-                <td class="num">
-                  {value_words(s.sigma_m[0], 'sigma_m')}, {value_words(s.sigma_m[1], 'sigma_m')}
-                </td>
-              </tr>
-            );
-          })}
-        </tbody>
-      </table>
+      <div class="scrollx" tabIndex={0} role="region" aria-label="Expected by height">
+        <table class="tbl">
+          <caption class="sr">
+            Expected of anchors assumed 5 m apart inside the outline, by their height: middle and worst
+          </caption>
+          <thead>
+            <tr>
+              <th scope="col">Height</th>
+              <th scope="col" class="num">
+                Anchors
+              </th>
+              <th scope="col" class="num">
+                GDOP, worst
+              </th>
+              <th scope="col" class="num">
+                1σ, worst
+              </th>
+            </tr>
+          </thead>
+          <tbody>
+            {heights.map((h) => {
+              const s = summary(check.assumed, h);
+              return (
+                <tr key={h}>
+                  <th scope="row">{fixed(h, 1)} m</th>
+                  <td class="num">
+                    {s.n}
+                    {s.unseen > 0 ? `, ${s.unseen} not seen` : ''}
+                  </td>
+                  <td class="num">{s.gdop ? `${fixed(s.gdop[0], 2)}, ${fixed(s.gdop[1], 2)}` : '–'}</td>
+                  <td class="num">
+                    {value_words(s.sigma_m[0], 'sigma_m')}, {value_words(s.sigma_m[1], 'sigma_m')}
+                  </td>
+                </tr>
+              );
+            })}
+          </tbody>
+        </table>
+      </div>
       <p class="sub" title="The dissertation's eq 8.5 is the trace without the root: the square of this">
         Middle and worst of anchors assumed 5 m apart. GDOP is √trace, of the measuring points within 60 m.
       </p>
