@@ -78,7 +78,7 @@ TEST_F(Rivals, APublicationThatWasJudgedOnAnOlderRevisionIsRefusedAndAudited) {
   ASSERT_EQ(rows.size(), static_cast<std::size_t>(made));
   for (std::size_t i = 1; i < rows.size(); ++i) EXPECT_NE(rows[i].calibration, rows[i - 1].calibration);
   std::size_t refused = 0;
-  for (const auto& entry : database_->stores().access.audit(1000).value())
+  for (const auto log = database_->stores().access.audit(1000); const auto& entry : log.value())
     refused += entry.what.starts_with("calibration.publish") && entry.result.starts_with("refused: ");
   EXPECT_LE(refused, static_cast<std::size_t>(k_rivals - made));
 }

@@ -156,6 +156,7 @@ TEST_F(StateMatrix, EveryRouteThatDeletesIsKnown) {
       "/api/v1/models/{id}",         // ever promoted: 409
       "/api/v1/jobs/{id}",           // cancels; ended: 422
       "/api/v1/tokens/{id}",         // revokes: it stays in the list
+      "/api/v1/webhooks/{id}",       // If-Match; what was not delivered goes with it
       "/api/v1/session",             // ends the caller's own
   };
   for (const auto& route : app_->router().routes()) {

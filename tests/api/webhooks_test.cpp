@@ -245,7 +245,7 @@ TEST_F(Webhooks, GoNowhereOnThisMachineUnlessAllowed) {
     ASSERT_FALSE(sent) << host;
     EXPECT_NE(sent.error().code, Errc::canceled) << host;
   }
-  const Json made = hook("http://localhost:" + port + "/hook");
+  const Json made = hook("http://127.0.0.1:" + port + "/hook");
   finished_mission();
   const auto end = std::chrono::steady_clock::now() + 20s;
   Json told = delivery(made, "pending");

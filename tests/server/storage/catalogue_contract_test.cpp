@@ -394,7 +394,8 @@ TEST_P(AnchorStoreContract, CarriesPositionsOnThatANewRevisionDoesNotSet) {
   EXPECT_EQ(db_->stores().revisions.published(1).value()[1].calibration, first.id);
   EXPECT_EQ(db_->stores().revisions.published(3).error().code, Errc::not_found);
   for (const std::uint64_t number : {1, 2}) {
-    for (const auto& whole : db_->stores().revisions.published(number).value()) {
+    const auto positions = db_->stores().revisions.published(number).value();
+    for (const auto& whole : positions) {
       const auto alone = db_->stores().revisions.position(whole.estimate.anchor, number).value();
       ASSERT_TRUE(alone);
       EXPECT_EQ(alone->since_revision, whole.since_revision);

@@ -107,7 +107,8 @@ TEST_P(LearningStoreContract, FiltersSamplesByDistanceLevelAndLabel) {
     filter.campaign = c.id;
     filter.limits = limits;
     std::vector<double> out;
-    for (const auto& s : db_->stores().campaigns.samples(filter).value()) out.push_back(s.sample.range_m);
+    for (const auto page = db_->stores().campaigns.samples(filter); const auto& s : page.value())
+      out.push_back(s.sample.range_m);
     return out;
   };
   using Label = MeasurementLimits::Label;

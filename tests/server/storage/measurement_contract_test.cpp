@@ -247,7 +247,7 @@ TEST_P(MeasurementStoreContract, FiltersByDistanceLevelAndLabelAndCountsTheSameR
     filter.mission = mission.id;
     filter.limits = limits;
     std::vector<int> out;
-    for (const auto& row : db_->stores().measurements.ranges(filter).value().rows)
+    for (const auto page = db_->stores().measurements.ranges(filter); const auto& row : page.value().rows)
       out.push_back(static_cast<int>(row.distance_m));
     EXPECT_EQ(db_->stores().measurements.count_ranges(filter).value(), out.size());
     return out;
@@ -279,7 +279,8 @@ TEST_P(MeasurementStoreContract, FiltersByTheFixThatHeldWhenARangeWasTaken) {
     filter.mission = mission.id;
     filter.fix = fix;
     std::vector<std::int64_t> out;
-    for (const auto& row : db_->stores().measurements.ranges(filter).value().rows) out.push_back(row.time.ns);
+    for (const auto page = db_->stores().measurements.ranges(filter); const auto& row : page.value().rows)
+      out.push_back(row.time.ns);
     return out;
   };
   EXPECT_THAT(times(FixClass::rtk_float), ElementsAre(rows[1].time.ns));
