@@ -1,12 +1,11 @@
 // A plan changed while it is flown, by the page: the real server, the simulated aircraft at the other end of MAVLink. What is saved waits; the
 // difference is shown, refused where it is not safe, flown once confirmed, undone.
 import assert from 'node:assert/strict';
-import { spawn } from 'node:child_process';
-import { createSocket } from 'node:dgram';
 import { after, before, test } from 'node:test';
 import { openBrowser, openPage, picture, text, violations } from './browser.mjs';
 import { hall_outline } from './flight.mjs';
-import { binary, eventually, startServer } from './server.mjs';
+import { eventually } from './server.mjs';
+import { serverWithAircraft } from './simulated_aircraft.mjs';
 
 let server, aircraft, browser, mission, plan;
 const get = async (path) => (await server.fetch(path)).json();
@@ -50,19 +49,7 @@ async function hold(page, button) {
 }
 
 before(async () => {
-  const socket = createSocket('udp4');
-  await new Promise((done) => socket.bind(0, '127.0.0.1', done));
-  const { port } = socket.address();
-  await new Promise((done) => socket.close(done));
-  server = await startServer({ auth: 'off', args: ['--drone-address', `udp://:${port}`] });
-  let said = '';
-  aircraft = spawn(
-    binary,
-    ['simulate', 'drone', '--mavlink', `udp://127.0.0.1:${port}`, '--url', server.url, '--ready', '2'],
-    { stdio: ['ignore', 'ignore', 'pipe'] },
-  );
-  aircraft.stderr.setEncoding('utf8').on('data', (chunk) => (said += chunk));
-  mission = await eventually('the aircraft makes its mission', () => /mission ([0-9a-f-]{36})/.exec(said)?.[1]);
+  ({ server, aircraft, mission } = await serverWithAircraft());
   const made = await send('/api/v1/plans/generate', {
     name: 'Hall',
     outline: hall_outline,
