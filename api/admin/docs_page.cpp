@@ -120,6 +120,7 @@ constexpr const char* k_style =
     "a{display:inline-block;padding:3px 4px}nav ul{display:flex;flex-wrap:wrap;gap:4px 12px;"
     "list-style:none;padding:0}table{border-collapse:collapse;margin:.5rem 0}"
     "td,th{border:1px solid #8888;padding:2px 8px;text-align:left;vertical-align:top}"
+    "th,td:nth-child(2):nth-last-child(3){overflow-wrap:normal}"
     "h3{margin-top:2rem;padding-top:.5rem;border-top:1px solid #8888}";
 
 }  // namespace
