@@ -237,7 +237,7 @@ struct Application::State {
     add_ogc_routes(router, exchange_api);
     add_anchor_file_routes(router, exchange_api);
     add_webhook_routes(router, webhook_api);
-    events.on_event([this](const LiveEvent& event) { webhooks.tell(event); });
+    events.on_event([this](const LiveEvent& event) { webhooks.notify(event); });
   }
 
   ServerCounts counts() const {

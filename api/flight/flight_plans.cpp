@@ -15,11 +15,11 @@ Error cannot(std::string why) { return make_error(Errc::invalid_argument, std::m
 Result<void> as_seen(const FlightService::PlanOrder& order, const flight::PlanProposal& proposal) {
   if (order.revision && *order.revision != proposal.plan.version)
     return cannot("it would be revision " + std::to_string(proposal.plan.version) + ", not " +
-                  std::to_string(*order.revision) + ": look at the difference again");
+                  std::to_string(*order.revision) + ": read the difference again");
   const auto next = proposal.change.next + 1;
   if (order.next_waypoint && *order.next_waypoint != next)
     return cannot("the aircraft has moved on, waypoint " + std::to_string(next) +
-                  " would be the next: look at the difference again");
+                  " would be the next: read the difference again");
   return boost::outcome_v2::success();
 }
 

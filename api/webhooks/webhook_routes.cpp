@@ -21,7 +21,7 @@ constexpr std::size_t k_most_webhooks = 20;
 
 std::string etag(const Webhook& webhook) { return "\"h-" + std::to_string(webhook.version) + '"'; }
 
-/// Never with its secret, which is told once.
+/// Never with its secret, which is shown once.
 Ordered webhook_json(const Webhook& w) {
   return {{"id", to_string(w.id)}, {"name", w.name},       {"url", w.url},
           {"events", w.events},    {"enabled", w.enabled}, {"created_at", to_rfc3339(w.created)}};

@@ -35,7 +35,7 @@ void WebhookService::changed() {
   }
   wake_.notify_all();
   if (!begin) return;
-  if (thread_.joinable()) thread_.join();  // it ended by itself, when there was nobody to tell
+  if (thread_.joinable()) thread_.join();  // it ended by itself, when there was nobody to notify
   thread_ = Thread("anchord-hook", [this] { run(); });
 }
 
@@ -75,7 +75,7 @@ WebhookDelivery WebhookService::delivery(const Webhook& webhook, const LiveEvent
   return out;
 }
 
-void WebhookService::tell(const LiveEvent& event) {
+void WebhookService::notify(const LiveEvent& event) {
   if (std::ranges::find(k_webhook_events, event.code) == k_webhook_events.end()) return;
   {
     auto state = state_.lock();

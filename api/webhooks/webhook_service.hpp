@@ -46,7 +46,7 @@ class WebhookService {
   void stop();
 
   /// Called for every event, from any thread; waits for neither disk nor network.
-  void tell(const LiveEvent& event);
+  void notify(const LiveEvent& event);
   /// Puts one test event into the outbox, for this webhook alone.
   Result<WebhookDelivery> test(const Webhook& webhook);
   /// Events that found the queue to the outbox full.
@@ -73,7 +73,7 @@ class WebhookService {
     const auto state = state_.lock();
     return state->stopped;
   }
-  /// Whether the thread is to end, which it then has: nobody is to be told, or the server stops.
+  /// Whether the thread is to end, which it then has: nobody is to be notified, or the server stops.
   bool ended();
 
   Deps deps_;

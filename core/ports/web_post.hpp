@@ -13,7 +13,7 @@ namespace anchord {
 /// is connected to, no redirects, no proxy. Blocks; one thread at a time, stop() from any.
 class WebPost {
  public:
-  struct Letter {
+  struct Message {
     std::string url;
     std::vector<std::pair<std::string, std::string>> headers;
     std::string body;
@@ -24,7 +24,7 @@ class WebPost {
   virtual Result<void> check(const std::string& url) const = 0;
   /// The status of the answer, whatever it is; its body is thrown away. Within 20 s. Errors: invalid_argument
   /// (an address that is not allowed), link_lost (no answer), canceled (stop).
-  virtual Result<int> post(const Letter& letter) = 0;
+  virtual Result<int> post(const Message& message) = 0;
   /// Ends the post that runs, and every later one at once.
   virtual void stop() = 0;
 };

@@ -15,7 +15,7 @@ namespace anchord {
 using WebhookId = Id<struct WebhookTag>;
 using DeliveryId = Id<struct DeliveryTag>;
 
-/// An address outside that is told of events.
+/// An address outside that is notified of events.
 struct Webhook {
   WebhookId id{};
   std::string name, url;

@@ -93,9 +93,9 @@ class HttpPost final : public WebPost {
                       "'" + to_utf8(url, 120) + "' is not like https://host/path, without user and fragment");
   }
 
-  Result<int> post(const Letter& letter) override {
-    BOOST_OUTCOME_TRY(check(letter.url));
-    const Url url = *parse(letter.url);
+  Result<int> post(const Message& message) override {
+    BOOST_OUTCOME_TRY(check(message.url));
+    const Url url = *parse(message.url);
     const auto addresses = resolved(url);
     if (addresses.empty()) return make_error(Errc::link_lost, url.host + " has no address");
     std::string pinned;
@@ -107,7 +107,7 @@ class HttpPost final : public WebPost {
                               "webhooks.allow_private");
       if (pinned.empty()) pinned = one;
     }
-    return exchange(url, pinned, letter);
+    return exchange(url, pinned, message);
   }
 
   void stop() override {
@@ -122,12 +122,12 @@ class HttpPost final : public WebPost {
     httplib::Client* client{nullptr};
   };
 
-  Result<int> exchange(const Url& url, const std::string& pinned, const Letter& letter) {
+  Result<int> exchange(const Url& url, const std::string& pinned, const Message& message) {
     const bool v6 = url.host.find(':') != std::string::npos;
     httplib::Client client((url.tls ? "https://" : "http://") + (v6 ? '[' + url.host + ']' : url.host) + ':' +
                            std::to_string(url.port));
     if (!client.is_valid())
-      return make_error(Errc::invalid_argument, "'" + to_utf8(letter.url, 120) + "' cannot be used");
+      return make_error(Errc::invalid_argument, "'" + to_utf8(message.url, 120) + "' cannot be used");
     // What was checked is what is connected to; a second look-up may answer otherwise.
     client.set_hostname_addr_map({{url.host, pinned}});
     client.set_follow_location(false);
@@ -143,8 +143,8 @@ class HttpPost final : public WebPost {
     httplib::Request request;
     request.method = "POST";
     request.path = url.path;
-    request.body = letter.body;
-    for (const auto& [name, value] : letter.headers) request.headers.emplace(name, value);
+    request.body = message.body;
+    for (const auto& [name, value] : message.headers) request.headers.emplace(name, value);
     request.response_handler = [&](const httplib::Response& head) {
       status = head.status;
       return true;

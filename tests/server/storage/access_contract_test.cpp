@@ -1,0 +1,98 @@
+#include "core/ports/access_store.hpp"
+#include "core/ports/job_store.hpp"
+#include "core/ports/token_store.hpp"
+#include "tests/server/storage/backends.hpp"
+
+namespace anchord {
+namespace {
+
+using testing::ElementsAre;
+
+class AccessContract : public StoreContract {};
+
+TEST_P(AccessContract, FindsATokenBySecretAndKeepsTheFirstRevocation) {
+  Token token{
+      TokenId{make_uuid_v7(k_noon)}, "gate", std::string(64, 'a'), {"gateway", "viewer"}, k_noon, {}, {}, {}};
+  ASSERT_TRUE(db_->stores().tokens.insert(token));
+  EXPECT_EQ(db_->stores().tokens.insert(token).error().code, Errc::conflict);
+  ASSERT_TRUE(db_->stores().tokens.touch(token.id, UtcTime{5}));
+  ASSERT_TRUE(db_->stores().tokens.revoke(token.id, UtcTime{7}));
+  ASSERT_TRUE(db_->stores().tokens.revoke(token.id, UtcTime{9}));
+  const auto found = db_->stores().tokens.token_by_secret(std::string(64, 'a')).value();
+  EXPECT_EQ(found.id, token.id);
+  EXPECT_THAT(found.roles, ElementsAre("gateway", "viewer"));
+  EXPECT_EQ(found.last_used, UtcTime{5});
+  EXPECT_EQ(found.revoked, UtcTime{7});
+  EXPECT_FALSE(found.expires);
+  EXPECT_EQ(db_->stores().tokens.token_by_secret("b").error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().tokens.revoke(TokenId{}, k_noon).error().code, Errc::not_found);
+  EXPECT_EQ(db_->stores().tokens.tokens().value().size(), 1u);
+}
+
+TEST_P(AccessContract, FailsJobsThatARestartCutOff) {
+  Job running;
+  running.id = JobId{make_uuid_v7(k_noon)};
+  running.kind = "calibration";
+  running.state = JobState::running;
+  running.fraction = 0.42;
+  Job done = running;
+  done.id = JobId{make_uuid_v7(k_noon)};
+  done.state = JobState::succeeded;
+  ASSERT_TRUE(db_->stores().jobs.insert(running));
+  ASSERT_TRUE(db_->stores().jobs.insert(done));
+  EXPECT_EQ(db_->stores().jobs.fail_unfinished(k_noon, {"{}"}).value(), 1u);
+  const auto found = db_->stores().jobs.job(running.id).value();
+  EXPECT_EQ(found.state, JobState::failed);
+  EXPECT_EQ(found.fraction, 0.42);
+  EXPECT_EQ(found.finished, k_noon);
+  EXPECT_EQ(db_->stores().jobs.job(done.id).value().state, JobState::succeeded);
+  done.detail = "x";
+  ASSERT_TRUE(db_->stores().jobs.update(done));
+  EXPECT_EQ(db_->stores().jobs.jobs(10, std::nullopt).value().size(), 2u);
+  EXPECT_EQ(db_->stores().jobs.job(JobId{}).error().code, Errc::not_found);
+}
+
+TEST_P(AccessContract, KeepsOneAnswerForAPrincipalAndKey) {
+  const StoredAnswer answer{"key", "me", "hash", std::string("a\0b", 3), "/there", "\"7\"", 201, 1000};
+  ASSERT_TRUE(db_->stores().access.keep_answer(answer, 0));
+  EXPECT_EQ(db_->stores().access.keep_answer(answer, 1000).error().code, Errc::conflict);
+  ASSERT_TRUE(db_->stores().access.keep_answer(answer, 1001)) << "in the place of one that has expired";
+  EXPECT_EQ(db_->stores().access.answer_use("me").value().count, 1u);
+  EXPECT_EQ(db_->stores().access.answer_use("me").value().bytes, 3u);
+  EXPECT_EQ(db_->stores().access.answer_use("you").value().count, 0u);
+  const auto found = db_->stores().access.answer("me", "key").value();
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->body, answer.body);
+  EXPECT_EQ(found->status, 201);
+  EXPECT_EQ(found->location, "/there");
+  EXPECT_EQ(found->etag, "\"7\"");
+  EXPECT_FALSE(db_->stores().access.answer("you", "key").value());
+  EXPECT_EQ(db_->stores().access.drop_answers_before(1000, 10).value(), 0u);
+  EXPECT_EQ(db_->stores().access.drop_answers_before(1001, 10).value(), 1u);
+  for (int i = 0; i < 5; ++i) {
+    StoredAnswer one = answer;
+    one.key = std::to_string(i);
+    one.created_ran_ns = 10 * i;
+    ASSERT_TRUE(db_->stores().access.keep_answer(one, 0));
+  }
+  EXPECT_EQ(db_->stores().access.drop_answers_before(100, 2).value(), 2u) << "a slice";
+  EXPECT_EQ(db_->stores().access.drop_oldest_answers("me", 2).value(), 2u);
+  EXPECT_TRUE(db_->stores().access.answer("me", "4").value()) << "the youngest stays";
+  EXPECT_EQ(db_->stores().access.answer_use("me").value().count, 1u);
+}
+
+TEST_P(AccessContract, ChainsTheAuditLog) {
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(
+        db_->stores().access.append_audit({UtcTime{i}, "me", "publish", "127.0.0.1", std::to_string(i)}));
+  }
+  const auto entries = db_->stores().access.audit(2).value();
+  ASSERT_EQ(entries.size(), 2u);
+  EXPECT_EQ(entries[0].result, "2");
+  EXPECT_TRUE(db_->stores().access.verify_audit());
+}
+
+INSTANTIATE_TEST_SUITE_P(Backends, AccessContract, backends(), backend_name);
+
+}  // namespace
+}  // namespace anchord
