@@ -14,6 +14,7 @@
 #include "api/admin/running_time.hpp"
 #include "api/anchors/contradiction_watch.hpp"
 #include "api/anchors/geo_service.hpp"
+#include "api/anchors/published_features.hpp"
 #include "api/anchors/routes.hpp"
 #include "api/calibration/calibration_service.hpp"
 #include "api/calibration/kit_profiles.hpp"
@@ -35,6 +36,9 @@
 #include "api/measurements/routes.hpp"
 #include "api/missions/mission_service.hpp"
 #include "api/missions/routes.hpp"
+#include "api/mqtt/mqtt_publisher.hpp"
+#include "api/mqtt/mqtt_status.hpp"
+#include "api/places/routes.hpp"
 #include "api/planning/routes.hpp"
 #include "api/stream/conversation.hpp"
 #include "api/stream/hub.hpp"
@@ -46,6 +50,7 @@
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/backups.hpp"
+#include "core/ports/broker.hpp"
 #include "core/ports/devices.hpp"
 #include "core/ports/drone.hpp"
 #include "core/ports/job_store.hpp"
@@ -147,7 +152,12 @@ struct Application::State {
                   [this] { return counts(); },
                   [this] { return device_clock(); },
                   [this] { return drone(); },
-                  [this] { return flights.metrics() + deps.metrics_text(); },
+                  [this] { return mqtt(); },
+                  [this] {
+                    return flights.metrics() +
+                           (deps.broker == nullptr ? "" : broker_metrics(deps.broker->status())) +
+                           deps.metrics_text();
+                  },
                   deps.support_files},
         device_api{deps.devices, stores.measurements, stream, jobs, audit},
         mission_api{
@@ -187,8 +197,15 @@ struct Application::State {
                      [this](const PlanId& id) { return flights.flown_with(id); },
                      [this](const Plan& plan) { flights.plan_saved(plan); }},
         flight_api{flights, mission_api, events, audit},
+        publisher({hub, stores.missions, stores.sites, stores.revisions,
+                   [this] {
+                     std::uint64_t newest = 0;
+                     return published_features(anchor_api, std::nullopt, newest);
+                   },
+                   steady, deps.mqtt_prefix, deps.build.version}),
         exchange_api{anchor_api, stores.missions, stores.measurements, deps.geopackage},
         webhook_api{stores.webhooks, webhooks, deps.web_post, deps.clock, audit},
+        place_api{stores.places, stores.sites, jobs, deps.run_plan_work, deps.clock, steady, audit},
         learning_stores{stores.campaigns, stores.labels, stores.datasets, stores.training_runs,
                         stores.models},
         learning_api{learning_stores,
@@ -218,6 +235,7 @@ struct Application::State {
     add_anchor_routes(router, anchor_api);
     add_calibration_routes(router, calibration_api);
     add_comparison_routes(router, calibration_api);
+    add_datum_routes(router, calibration_api);
     add_kit_routes(router, calibration_api);
     add_frame_routes(router, anchor_api);
     add_exclusion_routes(router, measurement_api);
@@ -237,6 +255,9 @@ struct Application::State {
     add_ogc_routes(router, exchange_api);
     add_anchor_file_routes(router, exchange_api);
     add_webhook_routes(router, webhook_api);
+    add_building_routes(router, place_api);
+    add_floor_routes(router, place_api);
+    add_floor_plan_routes(router, place_api);
     events.on_event([this](const LiveEvent& event) { webhooks.notify(event); });
   }
 
@@ -248,6 +269,10 @@ struct Application::State {
   nlohmann::ordered_json device_clock() const { return clock_json(deps.devices.clock()); }
   nlohmann::ordered_json drone() const {
     return deps.drone == nullptr ? nlohmann::ordered_json(nullptr) : drone_json(deps.drone->status());
+  }
+
+  nlohmann::ordered_json mqtt() const {
+    return deps.broker == nullptr ? nlohmann::ordered_json(nullptr) : broker_json(deps.broker->status());
   }
 
   /// Once, when the key is new: what a run made here, and what was promoted before promotions judged uploads.
@@ -309,8 +334,10 @@ struct Application::State {
   CalibrationApi calibration_api;
   PlanningApi planning_api;
   FlightApi flight_api;
+  MqttPublisher publisher;
   ExchangeApi exchange_api;
   WebhookApi webhook_api;
+  PlaceApi place_api;
   LearningStores learning_stores;
   LearningApi learning_api;
   Locked<bool> stopping{false};
@@ -421,6 +448,11 @@ void Application::State::publish_alarms(UtcTime now, std::vector<AlarmCondition>
   }
   if (auto step = clock_watch.look(now, steady.now()); !step.empty())
     holding.push_back({"clock.step", AlarmPriority::warning, std::move(step), std::nullopt});
+  if (deps.broker != nullptr) {
+    if (auto away = broker_alarm(deps.broker->status()); !away.empty())
+      holding.push_back({"mqtt.disconnected", AlarmPriority::warning, std::move(away), std::nullopt});
+  }
+  for (auto& alarm : deps.server_alarms()) holding.push_back(std::move(alarm));
   for (auto& alarm : stream.alarms()) holding.push_back(std::move(alarm));
   for (auto& alarm : contradictions.alarms()) holding.push_back(std::move(alarm));
   alarms.update(std::move(holding), now);
@@ -487,6 +519,7 @@ void Application::start() {
   (void)guarded("missions at the start", [this] { state_->missions.resume(); });
   (void)guarded("devices of the flight at the start", [this] { state_->stream.resume(); });
   (void)guarded("webhooks at the start", [this] { state_->webhooks.changed(); });
+  if (state_->deps.broker != nullptr) state_->deps.broker->start(state_->publisher);
   state_->flights.start();
   state_->jobs.start();
   state_->housekeeping.start();
@@ -503,6 +536,7 @@ void Application::stop() {
   if (state_->stopping.exchange(true)) return;
   state_->stop_told.notify_all();
   if (state_->heart.joinable()) state_->heart.join();
+  if (state_->deps.broker != nullptr) state_->deps.broker->stop();
   state_->housekeeping.stop();
   state_->demonstration.stop();
   state_->flights.stop();

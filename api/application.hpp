@@ -8,10 +8,12 @@
 #include <utility>
 #include <vector>
 
+#include "api/admin/alarm_rules.hpp"
 #include "api/admin/build_info.hpp"
 #include "api/kit/router.hpp"
 #include "api/kit/storage_status.hpp"
 #include "api/learning/worker_port.hpp"
+#include "api/places/plan_work.hpp"
 #include "api/stream/ws_handler.hpp"
 #include "core/base/result.hpp"
 #include "core/base/steady.hpp"
@@ -22,6 +24,7 @@
 
 namespace anchord {
 class Backups;
+class Broker;
 class Clock;
 class DeviceControl;
 class DeviceRows;
@@ -72,10 +75,13 @@ class Application {
     std::function<std::vector<std::pair<std::string, std::string>>()> support_files = [] {
       return std::vector<std::pair<std::string, std::string>>{};
     };
+    /// Conditions that only the server sees, of its certificate for example; asked every second.
+    std::function<std::vector<AlarmCondition>()> server_alarms = [] { return std::vector<AlarmCondition>{}; };
     std::function<void(std::string_view request_id, std::string_view what)> log_fault =
         [](std::string_view, std::string_view) {};
-    RunWork run_work = work_inline;  ///< runs the heavy part of a training job
-    bool model_key_is_new{false};    ///< models of before it existed are signed at the start
+    RunWork run_work = work_inline;            ///< runs the heavy part of a training job
+    RunWork run_plan_work = plan_work_inline;  ///< decodes, turns and traces pictures of plans
+    bool model_key_is_new{false};              ///< models of before it existed are signed at the start
     std::int64_t keep_deleted_ns{30LL * 86'400 * 1'000'000'000};  ///< a deleted mission, in running time
     const SteadyClock* steady{&system_steady_clock()};            ///< what every duration is measured by
     /// The bytes of a GeoPackage; unset: there is nobody who writes one.
@@ -85,6 +91,8 @@ class Application {
     };
     WebPost* web_post{nullptr};              ///< null: webhooks are not served
     std::vector<double> webhook_waits_s{};   ///< from one attempt to the next; empty: those of the service
+    Broker* broker{nullptr};                 ///< null: nothing is published by MQTT
+    std::string mqtt_prefix{"anchord"};      ///< of every topic
     std::function<double()> flight_clock{};  ///< steady seconds; set: fly() is called by hand
     bool housekeeping_by_hand{false};        ///< set: housekeeping_round() is called by hand
   };

@@ -21,6 +21,7 @@ constexpr Command k_commands[]{
     {"Run a server", anchord::cli::add_support_command},
     {"Run a server", anchord::cli::add_devices_command},
     {"Run a server", anchord::cli::add_token_command},
+    {"Run a server", anchord::cli::add_tls_command},
     {"Run a server", anchord::cli::add_backup_command},
     {"Run a server", anchord::cli::add_config_command},
     {"Run a server", anchord::cli::add_healthcheck_command},

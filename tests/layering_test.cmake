@@ -7,7 +7,7 @@ cmake_minimum_required(VERSION 3.25)
 # The libraries, one row a folder, the deepest first; the project's own folders are below (rows):
 #   header other libraries its headers may include; source: those only its .cpp files may, beside the former
 # The standard library is always allowed; a library that no row names is refused, so that adding one is a decision.
-set(folders server/storage server api/formats api drivers core/flight core/base core migrations)
+set(folders server/storage server/mqtt server api/formats api/wire api drivers core/flight core/floor_plan core/base core migrations)
 
 # One row a subfolder, the lowest first: which project folders its files include, beside its own, and no others. A row
 # names only folders whose rows stand above it, so that no arrow goes back up and there is no circle; and only those that
@@ -23,6 +23,7 @@ set(rows
   "core/localize: core/base core/types core/geo core/planning"
   "core/procedure: core/base core/types core/ports core/geo core/planning core/localize"
   "core/flight: core/base core/types core/ports core/geo core/planning core/localize core/procedure"
+  "core/floor_plan: core/base"
 
   "drivers/link: core/base"
   "drivers/time: core/base drivers/link"
@@ -31,9 +32,12 @@ set(rows
   "drivers/gnss: core/base core/types drivers/time drivers/port"
   "drivers/ntrip: core/base core/types drivers/port"
   "drivers/pozyx: core/base drivers/time drivers/port"
+  "drivers/dwm1001: core/base drivers/time drivers/port"
+  "drivers/mapping: core/base drivers/time drivers/port"
+  "drivers/mqtt: core/base drivers/time drivers/port drivers/mapping"
   "drivers/mavlink: core/base"
   "drivers/drone: core/base core/ports drivers/mavlink"
-  "drivers/device: core/base core/types drivers/link drivers/time drivers/record drivers/port drivers/gnss drivers/ntrip drivers/pozyx"
+  "drivers/device: core/base core/types drivers/link drivers/time drivers/record drivers/port drivers/gnss drivers/ntrip drivers/pozyx drivers/dwm1001 drivers/mapping drivers/mqtt"
   "drivers/sim: core/base core/types drivers/pozyx drivers/mavlink drivers/drone"
 
   "api/kit: core/base core/ports"
@@ -51,16 +55,20 @@ set(rows
   "api/calibration: core/base core/types core/ports core/geo core/localize core/procedure api/kit api/stream api/wire api/formats api/admin api/learning api/missions api/anchors"
   "api/exchange: core/base core/types core/ports core/geo core/localize api/kit api/anchors"
   "api/webhooks: core/base core/types core/ports api/kit api/admin"
-  "api: core/base core/types core/ports core/geo core/localize api/kit api/stream api/wire api/admin api/devices api/learning api/missions api/measurements api/anchors api/planning api/flight api/calibration api/exchange api/webhooks"
+  "api/mqtt: core/base core/ports api/kit api/stream api/anchors"
+  "api/places: core/base core/types core/ports core/geo core/floor_plan api/kit api/admin api/learning"
+  "api: core/base core/types core/ports core/geo core/localize api/kit api/stream api/wire api/admin api/devices api/learning api/missions api/measurements api/anchors api/planning api/flight api/calibration api/exchange api/webhooks api/mqtt api/places"
 
   "migrations:"
   "server/storage: core/base core/types core/ports migrations"
-  "server/runtime: core/base core/ports drivers/link drivers/record drivers/device api/learning server/storage"
-  "server/http: core/base core/ports api/kit web server/runtime"
+  "server/mqtt: core/base core/ports"
+  "server/runtime: core/base core/ports drivers/link drivers/record drivers/device api/learning api/places server/storage"
+  "server/tls: core/base"
+  "server/http: core/base core/ports api/kit web server/runtime server/tls"
   "server/config: core/base server/http"
   "server/flight: core/base core/types core/ports core/geo core/planning core/localize core/procedure core/flight drivers/link drivers/mavlink drivers/drone drivers/sim"
-  "server/app: core/base drivers/link drivers/drone api/kit api/stream api/admin api/learning api server/storage server/runtime server/http server/config server/flight"
-  "server/cli: core/base core/types core/ports core/geo core/planning core/localize drivers/link drivers/gnss drivers/device drivers/sim api/wire api/formats api/admin api/learning api/measurements api/anchors api/calibration server/storage server/runtime server/http server/config server/flight server/app"
+  "server/app: core/base drivers/link drivers/drone api/kit api/stream api/admin api/learning api/mqtt api server/storage server/mqtt server/runtime server/tls server/http server/config server/flight"
+  "server/cli: core/base core/types core/ports core/geo core/planning core/localize drivers/link drivers/gnss drivers/device drivers/sim api/wire api/formats api/admin api/learning api/measurements api/anchors api/calibration server/storage server/runtime server/tls server/http server/config server/flight server/app"
   "server: core/base server/cli")
 set(from_outside web)  # made by the build
 set(everywhere "Eigen/|boost/outcome/")
@@ -76,17 +84,28 @@ set(core/base_source "^(openssl/evp\\.h$|pthread\\.h$|sys/random\\.h$)")
 set(core/flight_header "^(${everywhere})")
 set(core/flight_source "^$")
 
+# Pictures of plans: decoders that run in the worker process alone.
+set(core/floor_plan_header "^(${everywhere})")
+set(core/floor_plan_source "^(opencv2/|png\\.h$|jpeglib\\.h$|jerror\\.h$|tiffio\\.h$)")
+
 set(drivers_header "^(${everywhere}|boost/asio)")
 # json: a device of ours speaks it on the wire (gpsd), and only its decoder knows.
 set(drivers_source "^(nlohmann/json\\.hpp$|sys/|arpa/|netinet/|linux/|termios\\.h$|unistd\\.h$|fcntl\\.h$|grp\\.h$|poll\\.h$|pty\\.h$|stdlib\\.h$|time\\.h$)")
 
 set(api_header "^(${everywhere}|nlohmann/json_fwd\\.hpp$)")
-set(api_source "^(malloc\\.h$|nlohmann/json\\.hpp$|zlib\\.h$|openssl/)")
+set(api_source "^(malloc\\.h$|nlohmann/json\\.hpp$|zlib\\.h$|openssl/|xxhash\\.h$)")
+# Rows of bulk uploads are read by simdjson, all other JSON by nlohmann's.
+set(api/wire_header "${api_header}")
+set(api/wire_source "^(nlohmann/json\\.hpp$|simdjson\\.h$)")
 set(api/formats_header "${api_header}")
 set(api/formats_source "^(nlohmann/json\\.hpp$|zlib\\.h$|pugixml\\.hpp$)")
 
 set(server/storage_header "^(${everywhere})")
 set(server/storage_source "^(sqlite3\\.h$|SQLiteCpp/|sys/|unistd\\.h$|fcntl\\.h$)")
+
+# The one folder that knows the library of MQTT.
+set(server/mqtt_header "^(${everywhere})")
+set(server/mqtt_source "^(mosquitto\\.h$|poll\\.h$|resolv\\.h$|sys/|unistd\\.h$)")
 
 set(server_header "^(${everywhere}|boost/)")
 set(server_source "^(CLI/|linux/(filter|seccomp)\\.h$|spawn\\.h$|httplib\\.h$|spdlog/|fmt/|prometheus/|openssl/|toml\\+\\+/|toml\\.hpp$|nlohmann/json|zlib\\.h$|sys/|netdb\\.h$|netinet/|arpa/|unistd\\.h$|fcntl\\.h$|signal\\.h$|poll\\.h$|pthread\\.h$|termios\\.h$)")
@@ -341,6 +360,8 @@ if(SELF_TEST)
   expect(server/storage/a.cpp "\"core/localize/solver.hpp\"" broken)
   expect(server/storage/a.cpp "\"api/kit/message.hpp\"" broken)
   expect(server/app/a.cpp "<sqlite3.h>" broken)
+  expect(server/mqtt/a.cpp "<mosquitto.h>" clean)
+  expect(server/app/a.cpp "<mosquitto.h>" broken)
   expect(server/app/a.hpp "<CLI/CLI.hpp>" broken)
   expect(server/flight/a.cpp "\"drivers/sim/flight.hpp\"" clean)
   expect_text(api/kit/a.cpp "out = json.dump()" broken)

@@ -70,10 +70,13 @@ Response answer(int status, const json& body) {
   return response;
 }
 
-// The page and the API are the same origin; without TLS a Secure cookie would never be sent back.
-std::string cookie(std::string_view value, std::int64_t max_age_s) {
+// The page and the API are the same origin; without TLS a Secure cookie would never be sent back. Whether
+// there is TLS, here or at a trusted proxy, is in this header: the transport lets nobody else write it.
+std::string cookie(const Request& request, std::string_view value, std::int64_t max_age_s) {
+  const bool tls = request.header("x-forwarded-proto") == "https";
   return std::string(k_session_cookie) + "=" + std::string(value) +
-         "; Path=/; HttpOnly; SameSite=Strict; Max-Age=" + std::to_string(max_age_s);
+         "; Path=/; HttpOnly; SameSite=Strict; Max-Age=" + std::to_string(max_age_s) +
+         (tls ? "; Secure" : "");
 }
 
 /// Of the session that asks; a token in the header goes before a cookie, as at the door.
@@ -153,14 +156,15 @@ Response login(AccessService& access, const Request& request) {
   }
   const auto who = access.session(opened.value());
   auto response = answer(200, who ? principal_json(*who) : json::object());
-  return response.header("Set-Cookie", cookie(opened.value(), access.options().session_lifetime.count()));
+  return response.header("Set-Cookie",
+                         cookie(request, opened.value(), access.options().session_lifetime.count()));
 }
 
 Response logout(AccessService& access, const Request& request) {
   access.close_session(cookie_value(request.header("cookie"), k_session_cookie), request.remote);
   Response response;
   response.status = 204;
-  return response.header("Set-Cookie", cookie("", 0));
+  return response.header("Set-Cookie", cookie(request, "", 0));
 }
 
 }  // namespace

@@ -50,8 +50,8 @@ struct AdminApi {
   Backups& backups;
   std::function<StorageStatus()> storage;
   std::function<ServerCounts()> counts;
-  std::function<nlohmann::ordered_json()> device_clock, drone;  ///< as /system shows them; null: none
-  std::function<std::string()> metrics_text;                    ///< Prometheus text of all others, after ours
+  std::function<nlohmann::ordered_json()> device_clock, drone, mqtt;  ///< as /system shows them; null: none
+  std::function<std::string()> metrics_text;  ///< Prometheus text of all others, after ours
   /// Name and content: what the rest of the server adds to a support bundle.
   std::function<std::vector<std::pair<std::string, std::string>>()> support_files;
 };

@@ -52,7 +52,8 @@ Response system(AdminApi& s, const Request&) {
                              {"writable", storage.writable},
                              {"reason", storage.reason},
                              {"clock", s.device_clock()},
-                             {"drone", s.drone()}});
+                             {"drone", s.drone()},
+                             {"mqtt", s.mqtt()}});
 }
 
 Response metrics(AdminApi& s, const Request&) {

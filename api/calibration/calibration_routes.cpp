@@ -1,7 +1,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "api/admin/event_log.hpp"
 #include "api/admin/job_answer.hpp"
 #include "api/admin/job_service.hpp"
 #include "api/anchors/anchor_json.hpp"
@@ -10,6 +9,7 @@
 #include "api/calibration/calibration_report.hpp"
 #include "api/calibration/calibration_service.hpp"
 #include "api/calibration/position_diff.hpp"
+#include "api/calibration/revision_news.hpp"
 #include "api/calibration/routes.hpp"
 #include "api/formats/evidence.hpp"
 #include "api/kit/html_page.hpp"
@@ -17,8 +17,6 @@
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "api/missions/mission_service.hpp"
-#include "api/stream/hub.hpp"
-#include "api/wire/live_writer.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/anchor_store.hpp"
 #include "core/ports/calibration_store.hpp"
@@ -265,16 +263,7 @@ Response publish(CalibrationApi& s, const Request& request) {
             "refused: " + published.error().message);
   const auto revision = value_or_problem(published);
   for (const auto& id : anchors) value_or_problem(s.anchors.find_or_create(id, s.clock.now()));
-  s.contradictions.changed();
-  s.hub.publish(Topic::revisions,
-                to_wire(Ordered{{"revision", revision.number},
-                                {"t_us", revision.published.us()},
-                                {"calibration", to_string(calibration.id)}}),
-                revision.published.us());
-  s.events.add(overrides.empty() ? EventLevel::info : EventLevel::warning, "revision.published",
-               "revision " + std::to_string(revision.number) + " with " + std::to_string(anchors.size()) +
-                   " anchors published" +
-                   (overrides.empty() ? "" : ", " + std::to_string(overrides.size()) + " by override"));
+  announce_revision(s, revision, anchors.size(), overrides.size());
   Ordered answer = revision_json(revision);
   Ordered taken = Ordered::array(), left = Ordered::array(), overridden = Ordered::array();
   for (const auto& id : anchors) taken.push_back(to_string(id));

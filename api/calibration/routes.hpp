@@ -45,6 +45,7 @@ struct CalibrationApi {
 
 void add_calibration_routes(Router& router, CalibrationApi& api);
 void add_comparison_routes(Router& router, CalibrationApi& api);
+void add_datum_routes(Router& router, CalibrationApi& api);
 void add_kit_routes(Router& router, CalibrationApi& api);
 
 }  // namespace anchord::api

@@ -16,7 +16,7 @@ using Ordered = nlohmann::ordered_json;
 
 namespace {
 
-constexpr std::array<std::string_view, 3> k_kinds{"gnss", "pozyx", "ntrip"};
+constexpr std::array<std::string_view, 6> k_kinds{"gnss", "pozyx", "ntrip", "mqtt", "ndjson", "dwm1001"};
 
 Ordered network_id(const DeviceReport& d) {
   return d.network_id ? Ordered(to_string(*d.network_id)) : Ordered(nullptr);
@@ -142,6 +142,8 @@ void patch_device(const Json& body, bool whole, DeviceConfig& device, std::vecto
       fields.error("options", "wrong_type", "must be an object below 10 kB");
     } else {
       auto merged = Json::parse(device.options.text, nullptr, false);
+      // A mapping is one thing: keys of the one before must not live on in it.
+      if (options->contains("mapping")) merged.erase("mapping");
       merged.merge_patch(*options);
       check_secret(*options, merged, errors);
       device.options = {to_wire(merged)};

@@ -5,6 +5,7 @@
 #include "api/devices/device_json.hpp"
 #include "api/devices/device_stream.hpp"
 #include "api/devices/routes.hpp"
+#include "api/kit/content_tag.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "core/base/to_wire.hpp"
@@ -130,11 +131,7 @@ Json ask(DeviceApi& s, const Uuid& id, std::string_view action, const std::strin
 }
 
 /// Of the settings themselves: whoever changes them at the device changes it as well.
-std::string settings_etag(const Json& settings) {
-  std::uint64_t hash = 14695981039346656037u;  // FNV-1a
-  for (const char c : to_wire(settings)) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211u;
-  return "\"u-" + std::to_string(hash) + '"';
-}
+std::string settings_etag(const Json& settings) { return content_tag(to_wire(settings), "u-"); }
 
 Response uwb_answer(const Json& settings, const Json& devices) {
   Ordered body;

@@ -187,7 +187,7 @@ std::optional<double> Fields::finite(const Json& value, const std::string& at, d
     errors_.push_back({at, "out_of_range", "must be " + bound(min) + ".." + bound(max), short_json(value)});
     return std::nullopt;
   }
-  return number;
+  return number + 0.0;  // a zero has no sign
 }
 
 std::optional<double> Fields::number(std::string_view key, double min, double max, bool required) {

@@ -1,44 +1,72 @@
 #include "api/kit/router.hpp"
 
+#include <array>
 #include <cctype>
 #include <new>
+#include <optional>
 
+#include "api/kit/content_tag.hpp"
 #include "api/kit/problem.hpp"
+#include "core/base/check.hpp"
 #include "core/base/guard.hpp"
 #include "core/base/text.hpp"
 
 namespace anchord::api {
 namespace {
 
-std::vector<std::string_view> segments(std::string_view path) {
-  std::vector<std::string_view> parts;
-  std::size_t at = 0;
-  while (at < path.size()) {
-    const std::size_t next = path.find('/', at + 1);
-    parts.push_back(path.substr(at + 1, next == std::string_view::npos ? next : next - at - 1));
-    if (next == std::string_view::npos) break;
-    at = next;
-  }
-  return parts;
-}
+/// A path or pattern cut at its slashes, nothing copied; no pattern of ours comes near the most there is room
+/// for, and a longer path matches none.
+struct Segments {
+  std::array<std::string_view, 16> parts;
+  std::size_t count{0};  ///< beyond the room: too many
 
-/// Literal segments win over parameters, so that /anchors/stats and /anchors/{id} may stand side by side.
-bool match(const std::vector<std::string_view>& pattern, const std::vector<std::string_view>& path,
-           std::map<std::string, std::string>& params, int& literals) {
-  if (pattern.size() != path.size()) return false;
-  for (std::size_t i = 0; i < path.size(); ++i) {
-    const auto part = pattern[i];
-    if (part.size() > 2 && part.front() == '{') {
-      if (path[i].empty()) return false;
-      params.emplace(part.substr(1, part.size() - 2), path[i]);
-    } else if (part == path[i]) {
-      ++literals;
-    } else {
-      return false;
+  explicit Segments(std::string_view path) {
+    std::size_t at = 0;
+    while (at < path.size()) {
+      const std::size_t next = path.find('/', at + 1);
+      if (count < parts.size())
+        parts[count] = path.substr(at + 1, next == std::string_view::npos ? next : next - at - 1);
+      ++count;
+      if (next == std::string_view::npos) break;
+      at = next;
     }
   }
-  return true;
-}
+  bool too_many() const { return count > parts.size(); }
+};
+
+/// The pattern of a route, cut when the route is added.
+struct Pattern {
+  struct Part {
+    std::string text;  ///< of a parameter: its name
+    bool parameter{};
+  };
+  std::size_t route{};  ///< which it is
+  std::vector<Part> parts;
+
+  Pattern(std::size_t of_route, const Segments& cut) : route(of_route) {
+    for (std::size_t i = 0; i < cut.count; ++i) {
+      const auto part = cut.parts[i];
+      const bool parameter = part.size() > 2 && part.front() == '{';
+      parts.push_back({std::string(parameter ? part.substr(1, part.size() - 2) : part), parameter});
+    }
+  }
+  /// How many parts are the path's own words; nothing where it is another path.
+  std::optional<int> literals(const Segments& path) const {
+    int same = 0;
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      if (parts[i].parameter ? path.parts[i].empty() : parts[i].text != path.parts[i]) return std::nullopt;
+      same += parts[i].parameter ? 0 : 1;
+    }
+    return same;
+  }
+  std::map<std::string, std::string> params(const Segments& path) const {
+    std::map<std::string, std::string> out;
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      if (parts[i].parameter) out.emplace(parts[i].text, path.parts[i]);
+    }
+    return out;
+  }
+};
 
 bool etag_listed(std::string_view list, std::string_view etag) {
   const auto strong = [](std::string_view tag) { return tag.substr(0, 2) == "W/" ? tag.substr(2) : tag; };
@@ -62,21 +90,12 @@ bool has_header(const Response& response, std::string_view name) {
   return false;
 }
 
-std::string weak_etag(std::string_view body) {
-  std::uint64_t hash = 14695981039346656037ULL;  // FNV-1a, 64 bit
-  for (const char c : body) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
-  static constexpr char k_hex[] = "0123456789abcdef";
-  std::string tag = "W/\"";
-  for (int shift = 60; shift >= 0; shift -= 4) tag += k_hex[(hash >> shift) & 15];
-  return tag + '"';
-}
-
 void conditional_get(const Request& request, Response& response) {
   if ((request.method != Method::get && request.method != Method::head) || response.status != 200 ||
       response.body_stream) {
     return;
   }
-  if (!has_header(response, "ETag")) response.header("ETag", weak_etag(response.body));
+  if (!has_header(response, "ETag")) response.header("ETag", weak_content_tag(response.body));
   const auto wanted = request.header("if-none-match");
   if (wanted.empty()) return;
   for (const auto& [key, value] : response.headers) {
@@ -117,6 +136,7 @@ bool Access::permits(const Principal& who) const {
 
 struct Router::State {
   std::vector<Route> routes;
+  std::vector<std::vector<Pattern>> patterns;  ///< by the number of their parts
   std::unique_ptr<Idempotency> idempotency, of_commands;
   std::function<void(std::string_view, std::string_view)> fault;
 };
@@ -136,37 +156,46 @@ Router::~Router() = default;
 Router::Router(Router&&) noexcept = default;
 Router& Router::operator=(Router&&) noexcept = default;
 
-void Router::add(Route route) { state_->routes.push_back(std::move(route)); }
+void Router::add(Route route) {
+  const Segments cut(route.pattern);
+  ANCHORD_CHECK(!cut.too_many(), "the pattern " << route.pattern << " has too many parts");
+  if (state_->patterns.size() <= cut.count) state_->patterns.resize(cut.count + 1);
+  state_->patterns[cut.count].emplace_back(state_->routes.size(), cut);
+  state_->routes.push_back(std::move(route));
+}
 const std::vector<Route>& Router::routes() const { return state_->routes; }
 void Router::on_fault(std::function<void(std::string_view, std::string_view)> log) {
   state_->fault = std::move(log);
 }
 
+/// Literal parts win over parameters, so that /anchors/stats and /anchors/{id} may be side by side.
 Resolution Router::resolve(Method method, std::string_view path) const {
-  Resolution best;
-  int best_literals = -1;
-  std::string allow;
-  const auto parts = segments(path);
+  Resolution found;
+  const Segments cut(path);
+  if (cut.count >= state_->patterns.size()) return found;
   const Method wanted = method == Method::head ? Method::get : method;
-  for (const auto& route : state_->routes) {
-    std::map<std::string, std::string> params;
-    int literals = 0;
-    if (!match(segments(route.pattern), parts, params, literals)) continue;
-    const std::string name(to_string(route.method));
-    if (allow.find(name) == std::string::npos)
-      allow += name + (route.method == Method::get ? ", HEAD, " : ", ");
-    if (route.method == wanted && literals > best_literals) {
-      best_literals = literals;
-      best.kind = Resolution::Kind::matched;
-      best.route = &route;
-      best.params = std::move(params);
+  const Pattern* best = nullptr;
+  int best_literals = -1;
+  for (const Pattern& pattern : state_->patterns[cut.count]) {
+    const auto literals = pattern.literals(cut);
+    if (!literals) continue;
+    const Route& route = state_->routes[pattern.route];
+    const std::string_view name = to_string(route.method);
+    if (found.allow.find(name) == std::string::npos)
+      found.allow.append(name).append(route.method == Method::get ? ", HEAD, " : ", ");
+    if (route.method == wanted && *literals > best_literals) {
+      best_literals = *literals;
+      best = &pattern;
     }
   }
-  if (!allow.empty()) {
-    best.allow = allow + "OPTIONS";
-    if (best.route == nullptr) best.kind = Resolution::Kind::method_not_allowed;
+  if (found.allow.empty()) return found;
+  found.allow += "OPTIONS";
+  found.kind = best == nullptr ? Resolution::Kind::method_not_allowed : Resolution::Kind::matched;
+  if (best != nullptr) {
+    found.route = &state_->routes[best->route];
+    found.params = best->params(cut);
   }
-  return best;
+  return found;
 }
 
 Response Router::refuse(const Resolution& resolution, const Request& request) const {

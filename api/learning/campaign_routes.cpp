@@ -11,6 +11,7 @@
 #include "api/learning/measurement_query.hpp"
 #include "api/learning/range_features.hpp"
 #include "api/learning/routes.hpp"
+#include "api/wire/row_report.hpp"
 #include "api/wire/rows_json.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
@@ -146,7 +147,7 @@ Response import(LearningApi& l, const Request& request) {
   report["accepted"] = dry_run ? read.rows.size() : done.accepted;
   report["duplicates"] = done.duplicates;
   if (dry_run) report["dry_run"] = true;
-  return json_response(200, report);
+  return row_report(report, read.rows.empty(), "no row can be used; nothing was stored");
 }
 
 struct SamplePage {

@@ -23,6 +23,7 @@ struct IngestAnswer {
   std::uint64_t accepted{}, duplicates{}, rejected{};
   std::string first_error;  ///< "line 412: zero_distance: ..." or empty
 };
+/// Of a 200, or of the 422 that says that not one row was taken.
 /// errors  bad_frame when it is not the answer of an ingest
 Result<IngestAnswer> parse_ingest_answer(std::string_view body);
 /// "id" of a created resource.

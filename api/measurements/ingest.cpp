@@ -3,11 +3,14 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <utility>
 
 #include "api/kit/problem.hpp"
 #include "api/kit/reader.hpp"
 #include "api/measurements/row_source.hpp"
 #include "api/missions/mission_service.hpp"
+#include "api/wire/row_parser.hpp"
+#include "api/wire/row_report.hpp"
 #include "api/wire/rows_json.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
@@ -31,9 +34,10 @@ std::optional<bool> flag(const Request& request, const char* name) {
 }
 
 /// A live row needs no impulse response, and it is 4 kB.
-Range without_cir(const Range& range) {
+Range without_cir(Range& range) {
+  auto cir = std::exchange(range.cir, std::nullopt);
   Range copy = range;
-  copy.cir.reset();
+  range.cir = std::move(cir);
   return copy;
 }
 
@@ -163,6 +167,7 @@ class IngestRun {
     if (!elements) throw_problem(400, "malformed", "the body is not a JSON array");
     // Judged whole before the first row is stored: a document with a syntax error applies nothing.
     for (std::size_t i = 0; i < elements->size(); ++i) {
+      if (parsed((*elements)[i])) continue;
       Json value;
       const auto error = parse_json((*elements)[i], value);
       if (error && error->code == "malformed")
@@ -171,7 +176,20 @@ class IngestRun {
     for (std::size_t i = 0; i < elements->size(); ++i) take_text(i + 1, (*elements)[i]);
   }
 
+  /// The row, where nothing is wrong with it.
+  auto parsed(std::string_view text) {
+    if constexpr (std::is_same_v<Row, Range>)
+      return parser_.range(text, mission_);
+    else
+      return parser_.fix(text, mission_);
+  }
+
   void take_text(std::uint64_t line, std::string_view text) {
+    if (auto row = parsed(text)) {
+      std::vector<FieldError> errors;
+      keep(line, std::move(*row), errors);
+      return;
+    }
     Json value;
     if (const auto error = parse_json(text, value)) {
       if (single_ && (error->code == "malformed" || error->code == "bad_utf8"))
@@ -184,18 +202,26 @@ class IngestRun {
 
   void take(std::uint64_t line, const Json& value) {
     std::vector<FieldError> errors;
-    if constexpr (std::is_same_v<Row, Range>) {
-      RangeRow row = read_range(value, mission_, errors);
-      check_mission(row.range.mission, row.pose ? &*row.pose : nullptr, errors);
-      if (!errors.empty()) return reject(line, errors);
-      rows_.push_back(std::move(row.range));
-      if (row.pose) poses_.push_back(std::move(*row.pose));
-    } else {
-      Fix fix = read_fix(value, mission_, errors);
-      check_mission(fix.mission, &fix, errors);
-      if (!errors.empty()) return reject(line, errors);
-      rows_.push_back(std::move(fix));
-    }
+    if constexpr (std::is_same_v<Row, Range>)
+      keep(line, read_range(value, mission_, errors), errors);
+    else
+      keep(line, read_fix(value, mission_, errors), errors);
+  }
+
+  void keep(std::uint64_t line, RangeRow row, std::vector<FieldError>& errors) {
+    check_mission(row.range.mission, row.pose ? &*row.pose : nullptr, errors);
+    if (!errors.empty()) return reject(line, errors);
+    rows_.push_back(std::move(row.range));
+    if (row.pose) poses_.push_back(std::move(*row.pose));
+    count(line);
+  }
+  void keep(std::uint64_t line, Fix fix, std::vector<FieldError>& errors) {
+    check_mission(fix.mission, &fix, errors);
+    if (!errors.empty()) return reject(line, errors);
+    rows_.push_back(std::move(fix));
+    count(line);
+  }
+  void count(std::uint64_t line) {
     lines_.push_back(line);
     if (rows_.size() >= k_batch_rows && !atomic_) flush();
   }
@@ -253,7 +279,7 @@ class IngestRun {
     const bool with_cir = service_.missions_.wants_cir();
     std::vector<Row> live;
     live.reserve(rows_.size());
-    for (const auto& row : rows_) {
+    for (auto& row : rows_) {
       if constexpr (std::is_same_v<Row, Range>)
         live.push_back(with_cir ? row : without_cir(row));
       else
@@ -334,14 +360,15 @@ class IngestRun {
     body["errors"] = std::move(list);
     body["errors_truncated"] = truncated_;
     if (dry_run_) body["dry_run"] = true;
-    Response response;
-    response.header("Content-Type", "application/json");
-    response.body = to_wire(body);
-    return response;
+    return row_report(body, rejected_ > 0 && accepted_ + duplicates_ == 0,
+                      rejected_ == 1
+                          ? "the only row is wrong; nothing was stored"
+                          : "all " + std::to_string(rejected_) + " rows are wrong; nothing was stored");
   }
 
   IngestService& service_;
   const Request& request_;
+  RowParser parser_;
   std::optional<MissionId> mission_;
   bool atomic_{false}, dry_run_{false}, single_{false}, truncated_{false}, conflict_{false};
   std::map<MissionId, std::optional<Mission>> seen_;

@@ -2,6 +2,7 @@
 
 #include "api/admin/event_log.hpp"
 #include "api/devices/device_stream.hpp"
+#include "api/kit/content_tag.hpp"
 #include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
@@ -230,9 +231,7 @@ Response track(MissionApi& s, const Request& request) {
 
 Response mission_answer(MissionApi& s, int status, const Mission& mission) {
   Response response = json_response(status, with_counts(s, mission));
-  std::uint64_t hash = 14695981039346656037ULL;  // FNV-1a, 64 bit
-  for (const char c : response.body) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
-  response.header("ETag", "\"m-" + std::to_string(hash) + '"');
+  response.header("ETag", content_tag(response.body, "m-"));
   return response;
 }
 

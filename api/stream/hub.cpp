@@ -81,6 +81,15 @@ void Hub::forget(Topic topic, const std::string& key) {
   bus->of(topic).newest.erase(key);
 }
 
+std::optional<Hub::Newest> Hub::newest(Topic topic, std::uint64_t seen) const {
+  const auto bus = bus_.lock();
+  const auto& channel = bus->of(topic);
+  if (channel.seq == seen) return std::nullopt;
+  Newest out{channel.seq, {}};
+  for (const auto& [key, kept] : channel.newest) out.elements.push_back(kept.first);
+  return out;
+}
+
 void Hub::send(Bus& bus, Topic topic, std::vector<LiveElement> elements, std::int64_t t_us) {
   const auto& about = info(topic);
   auto& channel = bus.of(topic);

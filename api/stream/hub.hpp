@@ -143,6 +143,14 @@ class Hub {
   /// Forgets a key of a state topic (a removed mission).
   void forget(Topic topic, const std::string& key);
 
+  /// The newest element of each key of a state topic, for who asks now and then instead of listening; nothing
+  /// while the topic has had no message since number `seen`.
+  struct Newest {
+    std::uint64_t seq{};
+    std::vector<LiveElement> elements;
+  };
+  std::optional<Newest> newest(Topic topic, std::uint64_t seen) const;
+
   /// How many may come is decided where connections are accepted (ws.max_connections), not here.
   [[nodiscard]] HubMembership join(HubListener& listener);
 
@@ -172,6 +180,7 @@ class Hub {
   };
   struct Bus {
     Channel& of(Topic topic) { return channels[static_cast<std::size_t>(topic)]; }
+    const Channel& of(Topic topic) const { return channels[static_cast<std::size_t>(topic)]; }
     std::array<Channel, k_topic_count> channels{};
     std::set<HubListener*> connections{};
     std::int64_t last_heartbeat_us{0};

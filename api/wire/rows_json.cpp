@@ -1,11 +1,13 @@
 #include "api/wire/rows_json.hpp"
 
+#include <algorithm>
 #include <array>
-#include <cmath>
+#include <bit>
 #include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "api/kit/reader.hpp"
+#include "api/wire/row_limits.hpp"
 #include "core/base/base64.hpp"
 
 namespace anchord::api {
@@ -15,17 +17,34 @@ using Ordered = nlohmann::ordered_json;
 
 namespace {
 
-constexpr std::int64_t k_year_2100_us = 4'102'444'800'000'000;
-constexpr double k_min_distance_m = 0.05, k_max_distance_m = 150.0;  // reliability.md section 4
-constexpr double k_pi = 3.14159265358979323846;
+using namespace row_limits;
+
+static_assert(std::endian::native == std::endian::little, "impulse responses are sent little endian");
+
+template <std::size_t N>
+std::optional<std::array<double, N>> read_array(Fields& fields, std::string_view key, const Bounds& bounds) {
+  const auto numbers = fields.numbers(key, N, bounds.min, bounds.max);
+  if (!numbers) return std::nullopt;
+  std::array<double, N> out;
+  std::ranges::copy(*numbers, out.begin());
+  return out;
+}
+std::optional<double> read_number(Fields& fields, std::string_view key, const Bounds& bounds,
+                                  bool required = false) {
+  return fields.number(key, bounds.min, bounds.max, required);
+}
+std::optional<std::int64_t> read_whole(Fields& fields, std::string_view key, const WholeBounds& bounds,
+                                       bool required = false) {
+  return fields.integer(key, bounds.min, bounds.max, required);
+}
 
 void read_common(Fields& fields, const std::optional<MissionId>& given, MissionId& mission, UtcTime& time,
                  std::optional<UtcTime>& received, std::optional<std::uint64_t>& seq) {
-  if (const auto t = fields.integer("t_us", 0, k_year_2100_us, true)) time = UtcTime::from_us(*t);
-  if (const auto t = fields.integer("received_us", 0, k_year_2100_us)) received = UtcTime::from_us(*t);
-  if (const auto n = fields.integer("seq", 0, INT64_MAX)) seq = static_cast<std::uint64_t>(*n);
+  if (const auto t = read_whole(fields, "t_us", k_t_us, true)) time = UtcTime::from_us(*t);
+  if (const auto t = read_whole(fields, "received_us", k_t_us)) received = UtcTime::from_us(*t);
+  if (const auto n = read_whole(fields, "seq", k_seq)) seq = static_cast<std::uint64_t>(*n);
   if (fields.has("mission")) {
-    if (const auto text = fields.text("mission", 36, true)) {
+    if (const auto text = fields.text("mission", k_uuid_bytes, true)) {
       const auto id = parse_uuid(*text);
       if (id)
         mission.uuid = id.value();
@@ -42,7 +61,7 @@ void read_common(Fields& fields, const std::optional<MissionId>& given, MissionI
 }
 
 std::optional<NetworkId> read_network_id(Fields& fields, std::string_view key) {
-  const auto text = fields.text(key, 20, true);
+  const auto text = fields.text(key, k_network_id_bytes, true);
   if (!text) return std::nullopt;
   const auto id = parse_network_id(*text);
   if (id) return id.value();
@@ -52,7 +71,7 @@ std::optional<NetworkId> read_network_id(Fields& fields, std::string_view key) {
 
 void read_position(Fields& fields, Fix& fix) {
   const bool local = fields.has("local_m");
-  const auto local_m = fields.numbers("local_m", 3, -1e5, 1e5);
+  const auto local_m = read_array<3>(fields, "local_m", k_local_m);
   if (local) {
     fix.frame = TrackFrame::local;
     if (local_m) fix.local_m = {(*local_m)[0], (*local_m)[1], (*local_m)[2]};
@@ -63,10 +82,10 @@ void read_position(Fields& fields, Fix& fix) {
     return;
   }
   fix.frame = TrackFrame::wgs84;
-  const auto lon = fields.number("lon", -180, 180, true);
-  const auto lat = fields.number("lat", -90, 90, true);
-  const auto height = fields.number("h_m", -500, 9000, true);
-  if (lon && lat && *lon == 0 && *lat == 0) {
+  const auto lon = read_number(fields, "lon", k_lon_deg, true);
+  const auto lat = read_number(fields, "lat", k_lat_deg, true);
+  const auto height = read_number(fields, "h_m", k_height_m, true);
+  if (lon && lat && null_island(*lon, *lat)) {
     fields.error("lat", "null_island",
                  "longitude and latitude are both 0: what a receiver without a fix sends");
   }
@@ -74,38 +93,26 @@ void read_position(Fields& fields, Fix& fix) {
 }
 
 void read_uncertainty(Fields& fields, Fix& fix) {
-  const auto sigma = fields.numbers("sigma_m", 3, 1e-5, 1000);
-  const auto cov = fields.numbers("cov_enu_m2", 6, -1e6, 1e6);
+  const auto sigma = read_array<3>(fields, "sigma_m", k_sigma_m);
+  const auto cov = read_array<6>(fields, "cov_enu_m2", k_covariance_m2);
   if (cov) {
-    Eigen::Matrix3d c;
-    const auto& v = *cov;
-    c << v[0], v[1], v[2], v[1], v[3], v[4], v[2], v[4], v[5];
-    // Sylvester: all leading minors positive.
-    if (c(0, 0) > 0 && c(0, 0) * c(1, 1) - c(0, 1) * c(0, 1) > 0 && c.determinant() > 0)
-      fix.covariance_m2 = c;
-    else
+    fix.covariance_m2 = covariance_of(*cov);
+    if (!fix.covariance_m2)
       fields.error("cov_enu_m2", "not_positive",
                    "is not a positive definite matrix [ee, en, eu, nn, nu, uu]");
   } else if (sigma) {
-    fix.covariance_m2 =
-        Eigen::Vector3d((*sigma)[0] * (*sigma)[0], (*sigma)[1] * (*sigma)[1], (*sigma)[2] * (*sigma)[2])
-            .asDiagonal();
+    fix.covariance_m2 = covariance_of_sigmas(*sigma);
   }
 }
 
 void read_attitude(Fields& fields, Fix& fix) {
-  const auto q = fields.numbers("q", 4, -1.01, 1.01);
-  const auto heading = fields.number("heading_deg", -360, 360);
+  const auto q = read_array<4>(fields, "q", k_quaternion);
+  const auto heading = read_number(fields, "heading_deg", k_heading_deg);
   if (q) {
-    const Eigen::Quaterniond rotation((*q)[3], (*q)[0], (*q)[1], (*q)[2]);
-    if (std::abs(rotation.norm() - 1) > 0.01)
-      fields.error("q", "not_unit", "is not a unit quaternion [qx, qy, qz, qw]");
-    else
-      fix.enu_from_body = rotation.normalized();
+    fix.enu_from_body = rotation_of(*q);
+    if (!fix.enu_from_body) fields.error("q", "not_unit", "is not a unit quaternion [qx, qy, qz, qw]");
   } else if (heading) {
-    // Clockwise from north; the body's x axis points forward, ENU angles count counter-clockwise from east.
-    const double yaw_rad = (90.0 - *heading) * k_pi / 180.0;
-    fix.enu_from_body = Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()));
+    fix.enu_from_body = rotation_of_heading(*heading);
   }
 }
 
@@ -119,11 +126,11 @@ std::optional<Cir> read_cir(const Json& value, const std::string& at, std::vecto
   const std::size_t before = errors.size();
   Fields fields(value, at, errors);
   Cir cir;
-  const auto n = fields.integer("n", 1, 4096, true);
-  if (const auto dt = fields.number("dt_ps", 1, 1e6)) cir.dt_ps = *dt;
-  cir.first_path_idx = fields.number("first_path_idx", 0, 4096);
-  cir.preamble_count = fields.number("rxpacc", 0, 1e6);
-  if (const auto text = fields.text("b64", 32768, true)) {
+  const auto n = read_whole(fields, "n", k_cir_taps, true);
+  if (const auto dt = read_number(fields, "dt_ps", k_cir_dt_ps)) cir.dt_ps = *dt;
+  cir.first_path_idx = read_number(fields, "first_path_idx", k_cir_first_path);
+  cir.preamble_count = read_number(fields, "rxpacc", k_cir_preamble);
+  if (const auto text = fields.text("b64", k_cir_base64_bytes, true)) {
     const auto bytes = from_base64(*text);
     if (!bytes) {
       fields.error("b64", "bad_base64", "is not base64");
@@ -132,11 +139,7 @@ std::optional<Cir> read_cir(const Json& value, const std::string& at, std::vecto
                    "holds " + std::to_string(bytes->size()) + " bytes, n says " + std::to_string(*n * 4));
     } else {
       cir.re_im.resize(bytes->size() / 2);
-      for (std::size_t i = 0; i < cir.re_im.size(); ++i) {
-        const auto low = static_cast<unsigned char>((*bytes)[2 * i]);
-        const auto high = static_cast<unsigned char>((*bytes)[2 * i + 1]);
-        cir.re_im[i] = static_cast<std::int16_t>(static_cast<std::uint16_t>(low | (high << 8)));
-      }
+      std::memcpy(cir.re_im.data(), bytes->data(), cir.re_im.size() * 2);
     }
   }
   fields.finish();
@@ -156,22 +159,22 @@ RangeRow read_range(const Json& row, const std::optional<MissionId>& mission,
   if (const auto id = read_network_id(fields, "anchor")) range.anchor = *id;
   if (range.anchor == range.tag && range.anchor.value != 0)
     fields.error("anchor", "same_device", "a radio cannot measure the distance to itself");
-  if (const auto n = fields.integer("antenna", 0, 255)) range.antenna = static_cast<std::uint8_t>(*n);
+  if (const auto n = read_whole(fields, "antenna", k_antenna)) range.antenna = static_cast<std::uint8_t>(*n);
   const Json* distance = fields.child("distance_m");
   if (distance != nullptr && distance->is_number() && distance->get<double>() == 0) {
     fields.error("distance_m", "zero_distance", "0 mm is the Pozyx failure value");
-  } else if (const auto d = fields.number("distance_m", k_min_distance_m, k_max_distance_m, true)) {
+  } else if (const auto d = read_number(fields, "distance_m", k_distance_m, true)) {
     range.distance_m = *d;
   }
-  range.rss_dbm = fields.number("rss_dbm", -200, 50);
-  range.fp_dbm = fields.number("fp_dbm", -200, 50);
-  range.rx_dbm = fields.number("rx_dbm", -200, 50);
-  range.std_noise = fields.number("std_noise", 0, 65535);
-  range.heading_deg = fields.number("heading_deg", -360, 360);
+  range.rss_dbm = read_number(fields, "rss_dbm", k_dbm);
+  range.fp_dbm = read_number(fields, "fp_dbm", k_dbm);
+  range.rx_dbm = read_number(fields, "rx_dbm", k_dbm);
+  range.std_noise = read_number(fields, "std_noise", k_std_noise);
+  range.heading_deg = read_number(fields, "heading_deg", k_heading_deg);
   if (const Json* truth = fields.child("truth")) {
     Fields inner(*truth, "/truth", errors);
-    range.truth = RangeTruth{inner.number("distance_m", 0, 1000), inner.boolean("los")};
-    inner.text("campaign", 200);
+    range.truth = RangeTruth{read_number(inner, "distance_m", k_truth_distance_m), inner.boolean("los")};
+    inner.text("campaign", k_campaign_bytes);
     inner.finish();
   }
   if (const Json* cir = fields.child("cir")) range.cir = read_cir(*cir, "/cir", errors);
@@ -200,8 +203,8 @@ Fix read_fix(const Json& row, const std::optional<MissionId>& mission, std::vect
   if (const auto word = fields.word("fix", k_fix_words, true)) fix.fix = *word;
   read_uncertainty(fields, fix);
   read_attitude(fields, fix);
-  fix.correction_age_s = fields.number("correction_age_s", 0, 1e6);
-  if (const auto n = fields.integer("satellites", 0, 255)) fix.satellites = static_cast<int>(*n);
+  fix.correction_age_s = read_number(fields, "correction_age_s", k_correction_age_s);
+  if (const auto n = read_whole(fields, "satellites", k_satellites)) fix.satellites = static_cast<int>(*n);
   fields.finish();
   return fix;
 }

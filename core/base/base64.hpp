@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -10,5 +12,8 @@ namespace anchord {
 std::string base64(std::string_view bytes);
 /// Null for anything else, a missing padding included.
 std::optional<std::string> from_base64(std::string_view text);
+/// The same into `out`, which must be of just the size that the text holds; else false, and `out` is
+/// anything.
+bool decode_base64(std::string_view text, std::span<std::byte> out);
 
 }  // namespace anchord

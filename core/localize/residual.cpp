@@ -5,6 +5,8 @@
 #include <cmath>
 #include <string>
 
+#include "core/localize/range_block.hpp"
+
 namespace anchord {
 
 double default_bend(Loss loss) {
@@ -53,17 +55,19 @@ double residual_m(const Observation& o, const Unknowns& at, Eigen::Vector4d* der
   return o.distance_m - distance_m - at[3];
 }
 
+RowScale row_scale(const Observation& o, const Unknowns& at, Weights weights) {
+  Eigen::Vector4d derivative;
+  residual_m(o, at, &derivative);
+  const Eigen::Vector3d u = derivative.head<3>();
+  const double sigma_m = std::sqrt(o.sigma_m * o.sigma_m + std::max(u.dot(o.tag_covariance_m2 * u), 0.0));
+  return {sigma_m, weights == Weights::as_printed ? std::sqrt(sigma_m) : 1.0};
+}
+
 std::vector<RowScale> row_scales(std::span<const Observation> observations, const Unknowns& at,
                                  Weights weights) {
   std::vector<RowScale> scales;
   scales.reserve(observations.size());
-  Eigen::Vector4d derivative;
-  for (const auto& o : observations) {
-    residual_m(o, at, &derivative);
-    const Eigen::Vector3d u = derivative.head<3>();
-    const double sigma_m = std::sqrt(o.sigma_m * o.sigma_m + std::max(u.dot(o.tag_covariance_m2 * u), 0.0));
-    scales.push_back({sigma_m, weights == Weights::as_printed ? std::sqrt(sigma_m) : 1.0});
-  }
+  for (const auto& o : observations) scales.push_back(row_scale(o, at, weights));
   return scales;
 }
 
@@ -104,6 +108,13 @@ Result<void> check_problem(std::span<const Observation> observations, const Eige
                       std::to_string(observations.size()) + " ranges, need " + std::to_string(needed));
   }
   if (!start.allFinite()) return make_error(Errc::invalid_argument, "the start is not finite");
+  // A number that is not finite stays so in a sum, also times zero; then the rows are asked one by one.
+  double nothing = 0, least_sigma_m = 1.0;
+  for (const auto& o : observations) {
+    nothing += 0.0 * (o.tag_m.sum() + o.distance_m + o.sigma_m + o.tag_covariance_m2.sum());
+    least_sigma_m = std::min(least_sigma_m, o.sigma_m);
+  }
+  if (nothing == 0 && least_sigma_m > 0) return boost::outcome_v2::success();
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const auto& o = observations[i];
     if (!o.tag_m.allFinite() || !std::isfinite(o.distance_m) || !std::isfinite(o.sigma_m) ||
@@ -116,30 +127,39 @@ Result<void> check_problem(std::span<const Observation> observations, const Eige
   return boost::outcome_v2::success();
 }
 
-Result<AnchorFit> finish_fit(std::span<const Observation> observations, const Unknowns& at,
-                             const SolverOptions& options) {
+namespace {
+
+/// Sum of W^2 s^2 omega u u^T.
+Eigen::Matrix4d noise_of(std::span<const Observation> observations, const Unknowns& at,
+                         const SolverOptions& options, double bend) {
+  const auto scales = row_scales(observations, at, options.weights);
+  Eigen::Matrix4d noise = Eigen::Matrix4d::Zero();
+  Eigen::Vector4d u;
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const double s_m = scales[i].sigma_m, factor2 = scales[i].factor * scales[i].factor;
+    const LossValue value = loss_value(options.loss, bend, residual_m(observations[i], at, &u) / s_m);
+    noise += value.weight * factor2 * factor2 / (s_m * s_m) * u * u.transpose();
+  }
+  return noise;
+}
+
+}  // namespace
+
+Result<AnchorFit> finish_fit(RangeBlock& block, const Unknowns& at, const SolverOptions& options) {
   if (!at.allFinite()) return make_error(Errc::no_convergence, "the solver left the finite numbers");
   const double bend = options.loss_sigmas > 0 ? options.loss_sigmas : default_bend(options.loss);
-  const auto scales = row_scales(observations, at, options.weights);
   const auto free = free_unknowns(options);
   const auto size = static_cast<Eigen::Index>(free.size());
   AnchorFit fit;
   fit.position_m = at.head<3>();
   fit.bias_m = at[3];
-  Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();  // sum of W omega u u^T
-  Eigen::Matrix4d noise =
-      Eigen::Matrix4d::Zero();  // the same with W^2 s^2: what the noise does to the gradient
-  Eigen::Vector4d u;
-  for (std::size_t i = 0; i < observations.size(); ++i) {
-    const double e_m = residual_m(observations[i], at, &u);
-    const double s = scales[i].sigma_m;
-    const LossValue value = loss_value(options.loss, bend, e_m / s);
-    const double weight = value.weight * scales[i].factor * scales[i].factor / (s * s);
-    normal += weight * u * u.transpose();
-    noise += weight * scales[i].factor * scales[i].factor * u * u.transpose();
-    fit.residuals_m.push_back(e_m);
-    fit.cost += 0.5 * scales[i].factor * scales[i].factor * value.rho;
-  }
+  block.scale(at, options.weights);
+  const RangeNormal sums = block.normal(at, options.loss, bend);
+  fit.cost = sums.cost;
+  Eigen::Matrix4d normal = sums.matrix;  // sum of W omega u u^T
+  Eigen::Matrix4d noise = normal;        // the same with W^2 s^2: what the noise does to the gradient
+  if (options.weights == Weights::as_printed) noise = noise_of(block.observations(), at, options, bend);
+  fit.residuals_m = block.residuals_m(at);
   if (options.estimate_bias) {
     const double information = 1.0 / (options.bias_prior_sigma_m * options.bias_prior_sigma_m);
     normal(3, 3) += information;

@@ -10,6 +10,8 @@
 
 namespace anchord {
 
+class RangeBlock;
+
 /// Robust loss of a residual in sigmas: cost, and the weight d rho / d s that multiplies its square.
 struct LossValue {
   double rho{};
@@ -27,6 +29,7 @@ struct RowScale {
   double sigma_m{};
   double factor{};
 };
+RowScale row_scale(const Observation& o, const Unknowns& at, Weights weights);
 std::vector<RowScale> row_scales(std::span<const Observation> observations, const Unknowns& at,
                                  Weights weights);
 
@@ -42,8 +45,7 @@ double robust_residual(const Observation& o, const RowScale& scale, const Unknow
 Result<void> check_problem(std::span<const Observation> observations, const Eigen::Vector3d& start,
                            const SolverOptions& options);
 /// Covariance, residuals and cost at the optimum; weak_geometry when the normal matrix is singular.
-Result<AnchorFit> finish_fit(std::span<const Observation> observations, const Unknowns& at,
-                             const SolverOptions& options);
+Result<AnchorFit> finish_fit(RangeBlock& block, const Unknowns& at, const SolverOptions& options);
 /// Indices of the unknowns that move.
 std::vector<int> free_unknowns(const SolverOptions& options);
 

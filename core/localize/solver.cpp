@@ -2,6 +2,7 @@
 
 #include <ceres/ceres.h>
 
+#include "core/localize/range_block.hpp"
 #include "core/localize/residual.hpp"
 
 namespace anchord {
@@ -97,7 +98,8 @@ Result<AnchorFit> solve_anchor(std::span<const Observation> observations, const 
     }
     if ((at - before).norm() < 1e-9) break;
   }
-  BOOST_OUTCOME_TRY(auto fit, finish_fit(observations, at, options));
+  RangeBlock block(observations);
+  BOOST_OUTCOME_TRY(auto fit, finish_fit(block, at, options));
   fit.iterations = iterations;
   return fit;
 }

@@ -16,6 +16,7 @@ class MeasurementStore;
 class MissionBin;
 class MissionStore;
 class ModelStore;
+class PlaceStore;
 class PlanStore;
 class RevisionStore;
 class ServiceStore;
@@ -47,6 +48,7 @@ struct Stores {
   AccessStore& access;
   ServiceStore& service;
   WebhookStore& webhooks;
+  PlaceStore& places;
 };
 
 }  // namespace anchord

@@ -1,8 +1,11 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "drivers/dwm1001/tag.hpp"
 #include "drivers/gnss/rover.hpp"
 #include "drivers/link/address.hpp"
+#include "drivers/mapping/ndjson.hpp"
+#include "drivers/mqtt/subscriber.hpp"
 #include "drivers/ntrip/client.hpp"
 #include "drivers/port/driver.hpp"
 #include "drivers/pozyx/unit.hpp"
@@ -96,6 +99,12 @@ Result<std::unique_ptr<Driver>> make_driver(const Settings& settings, DriverOutp
   if (kind == "gnss") return make_rover(options, output);
   if (kind == "ntrip") return make_caster_client(options, address, output);
   if (kind == "pozyx") return pozyx::make_unit(options_json, output);
+  if (kind == "dwm1001") return dwm1001::make_tag(options_json, output);
+  if (kind == "mqtt") return mqtt::make_subscriber(options_json, id, output);
+  if (kind == "ndjson") {
+    const auto where = link::parse_address(address);
+    return mapping::make_ndjson(options_json, where && where.value().kind == link::Kind::udp, output);
+  }
   return make_error(Errc::invalid_argument, "kind: no driver for \"" + kind + "\"");
 }
 

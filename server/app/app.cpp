@@ -9,18 +9,21 @@
 #include <fstream>
 
 #include "api/application.hpp"
+#include "api/mqtt/topic_name.hpp"
 #include "api/stream/hub.hpp"
 #include "drivers/drone/signing_key.hpp"
 #include "drivers/link/address.hpp"
 #include "server/app/authenticator.hpp"
 #include "server/app/metrics.hpp"
 #include "server/app/model_key.hpp"
+#include "server/config/listeners.hpp"
 #include "server/flight/demonstration_flight.hpp"
 #include "server/flight/drone_link.hpp"
 #include "server/http/http_server.hpp"
 #include "server/http/request_check.hpp"
 #include "server/http/text.hpp"
 #include "server/http/web_post.hpp"
+#include "server/mqtt/mqtt_broker.hpp"
 #include "server/runtime/backup_keeper.hpp"
 #include "server/runtime/device_manager.hpp"
 #include "server/runtime/logging.hpp"
@@ -30,37 +33,16 @@
 #include "server/storage/data_folder.hpp"
 #include "server/storage/geopackage.hpp"
 #include "server/storage/sqlite_database.hpp"
+#include "server/tls/tls_keeper.hpp"
 
 namespace anchord::server {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// The rules about who may reach the server from where (one place, so that no other path can listen).
-Result<void> check_listeners(const Config& config) {
-  const bool auth_off = config.text("auth") == "off";
-  const auto endpoints = config.list("listen");
-  if (endpoints.empty()) return make_error(Errc::invalid_argument, "listen: no address");
-  for (const auto& endpoint : endpoints) {
-    BOOST_OUTCOME_TRY(const bool loopback, is_loopback(endpoint));
-    if (loopback) continue;
-    if (auth_off) {
-      return make_error(Errc::invalid_argument, "--auth=off is for loopback addresses only; " + endpoint +
-                                                    " could be reached by others");
-    }
-    if (!config.flag("insecure")) {
-      return make_error(Errc::invalid_argument,
-                        endpoint +
-                            " can be reached by others and there is no TLS yet; put a "
-                            "TLS proxy before a loopback address, or say --insecure");
-    }
-  }
-  return boost::outcome_v2::success();
-}
-
-HostPolicy host_policy(const Config& config) {
+HostPolicy host_policy(const Config& config, const std::vector<Listener>& listeners) {
   HostPolicy policy{{"localhost", "127.0.0.1", "[::1]"}, {}};
-  for (const auto& endpoint : config.list("listen")) policy.hosts.push_back(host_name(endpoint));
+  for (const auto& one : listeners) policy.hosts.push_back(host_name(one.address));
   for (const auto& host : config.list("allowed_hosts")) policy.hosts.push_back(lower(host));
   for (const auto& origin : config.list("allowed_origins")) policy.origins.push_back(lower(origin));
   return policy;
@@ -79,6 +61,19 @@ std::string settings_text(const Config& config) {
 
 /// Backup, calibration, discovery, training, and room for one more.
 constexpr std::size_t k_kinds_of_jobs = 5;
+
+/// For the commands of this machine: a plain address if there is one, and never one that is only for
+/// listening.
+std::string local_address(const std::vector<std::string>& urls) {
+  const auto plain = std::ranges::find_if(urls, [](const auto& url) { return url.starts_with("http://"); });
+  std::string url = plain == urls.end() ? urls.front() : *plain;
+  // A certificate has names; "any address" is none.
+  for (const auto& [any, own] :
+       {std::pair{"https://0.0.0.0:", "https://127.0.0.1:"}, std::pair{"https://[::]:", "https://[::1]:"}}) {
+    if (url.starts_with(any)) url.replace(0, std::string_view(any).size(), own);
+  }
+  return url;
+}
 
 /// As many descriptors as the system lets us have: connections, database and models need them.
 std::size_t raise_descriptor_limit() {
@@ -106,17 +101,21 @@ struct App::State {
   ModelKey model_key;
   std::unique_ptr<flight::DroneLink> drone;
   std::unique_ptr<WebPost> web_post;
+  std::unique_ptr<Broker> broker;
   std::unique_ptr<api::Application> application;
   std::unique_ptr<Authenticator> door;
   std::unique_ptr<HttpServer> http;
   std::vector<std::string> urls;
   fs::path data_dir;
   TrustedProxies proxies;
+  std::vector<Listener> listeners;
+  std::shared_ptr<TlsKeeper> tls;  ///< null: no TLS
   bool stopped{false};
 
   Result<void> first_token();
   Result<void> open_devices();
   Result<void> open_drone();
+  Result<void> open_broker();
   void compose();
   Result<void> listen();
 };
@@ -168,8 +167,9 @@ Result<void> App::State::listen() {
   HttpServerOptions options;
   options.limits = http_limits(config);
   options.ws_limits = ws_limits(config);
-  options.hosts = host_policy(config);
+  options.hosts = host_policy(config, listeners);
   options.io_threads = config.count("http.io_threads");
+  options.tls = tls;
   options.is_proxy = [this](std::string_view address) { return proxies.trusts(address); };
   const std::size_t descriptors = raise_descriptor_limit();
   options.limits.max_connections =
@@ -177,9 +177,16 @@ Result<void> App::State::listen() {
   http = std::make_unique<HttpServer>(
       options, *door, Executors{*pool, *stream_pool, *command_pool, *flight_pool, *heavy_pool});
   http->every(std::chrono::milliseconds(50), "live stream", [this] { application->stream_round(); });
-  for (const auto& endpoint : config.list("listen")) {
-    BOOST_OUTCOME_TRY(const auto port, http->listen(endpoint));
-    urls.push_back("http://" + endpoint.substr(0, endpoint.rfind(':')) + ":" + std::to_string(port));
+  for (const auto& [address, secure] : listeners) {
+    BOOST_OUTCOME_TRY(const auto port, http->listen(address, secure));
+    urls.push_back((secure ? "https://" : "http://") + address.substr(0, address.rfind(':')) + ":" +
+                   std::to_string(port));
+  }
+  if (tls) {
+    metrics->gauge("anchord_tls_certificate_expiry_seconds", "Unix time at which the served certificate ends",
+                   [this] { return tls->facts().not_after.seconds(); });
+    metrics->gauge("anchord_tls_handshakes_failed", "Connections that spoke no TLS, or too slowly",
+                   [this] { return static_cast<double>(http->failed_handshakes()); });
   }
   metrics->gauge("anchord_http_connections", "Sockets open",
                  [this] { return static_cast<double>(http->connections()); });
@@ -194,7 +201,7 @@ Result<void> App::State::listen() {
   metrics->gauge("anchord_worker_queue", "Requests that wait for a handler",
                  [this] { return static_cast<double>(pool->queued()); });
   http->start();
-  BOOST_OUTCOME_TRYV(write_private(data_dir / k_address_file, urls.front() + "\n"));
+  BOOST_OUTCOME_TRYV(write_private(data_dir / k_address_file, local_address(urls) + "\n"));
   for (const auto& url : urls) log(LogLevel::info, "listening", {{"url", url}});
   return boost::outcome_v2::success();
 }
@@ -234,6 +241,39 @@ Result<void> App::State::open_drone() {
       key);
   if (!opened) return make_error(opened.error().code, "drone.address: " + opened.error().message);
   drone = std::move(opened).value();
+  return boost::outcome_v2::success();
+}
+
+/// A password must not pass a network that others may be on in the clear.
+Result<void> App::State::open_broker() {
+  const auto bad = [](std::string_view key, const std::string& why) {
+    return make_error(Errc::invalid_argument, std::string(key) + ": " + why);
+  };
+  MqttOptions options;
+  options.host = config.text("mqtt.host");
+  if (options.host.empty()) return boost::outcome_v2::success();
+  const auto port = config.count("mqtt.port");
+  if (port > 65'535) return bad("mqtt.port", std::to_string(port) + " is above 65535");
+  options.port = static_cast<std::uint16_t>(port);
+  if (const auto wrong = api::wrong_prefix(config.text("mqtt.prefix")); !wrong.empty())
+    return bad("mqtt.prefix", wrong);
+  options.ca_file = config.text("mqtt.ca_file");
+  options.user = config.text("mqtt.user");
+  if (const auto& file = config.text("mqtt.password_file"); !file.empty()) {
+    if (options.user.empty()) return bad("mqtt.password_file", "a password needs mqtt.user");
+    auto password = read_mqtt_password(file);
+    if (!password) return bad("mqtt.password_file", password.error().message);
+    options.password = std::move(password).value();
+    const bool v6 = options.host.find(':') != std::string::npos;
+    const auto local =
+        is_loopback((v6 ? '[' + options.host + ']' : options.host) + ':' + std::to_string(port));
+    if (options.ca_file.empty() && !(local && local.value()) && !config.flag("insecure"))
+      return bad("mqtt.password_file", "the password would go to " + options.host +
+                                           " in the clear; set mqtt.ca_file (TLS), or say --insecure");
+  }
+  auto opened = make_mqtt_broker(std::move(options));
+  if (!opened) return bad("mqtt.ca_file", opened.error().message);
+  broker = std::move(opened).value();
   return boost::outcome_v2::success();
 }
 
@@ -284,10 +324,22 @@ void App::State::compose() {
   deps.log_fault = [](std::string_view request_id, std::string_view what) {
     log(LogLevel::error, "fault in a handler", {{"request_id", request_id}, {"what", what}});
   };
+  deps.server_alarms = [this] {
+    std::vector<api::AlarmCondition> out;
+    if (!tls) return out;
+    for (auto& warning : tls_warnings(tls->facts(), tls->failure(), clock.now()))
+      out.push_back({std::move(warning.id),
+                     warning.critical ? api::AlarmPriority::critical : api::AlarmPriority::warning,
+                     std::move(warning.text), std::nullopt});
+    return out;
+  };
   deps.geopackage = geopackage;
   web_post = make_web_post(config.flag("webhooks.allow_private"));
   deps.web_post = web_post.get();
+  deps.broker = broker.get();
+  deps.mqtt_prefix = config.text("mqtt.prefix");
   deps.run_work = work_in_process();
+  deps.run_plan_work = deps.run_work;
   deps.model_key_is_new = model_key.fresh;
   deps.keep_deleted_ns =
       static_cast<std::int64_t>(config.count("missions.keep_deleted_days")) * 86'400 * 1'000'000'000;
@@ -296,7 +348,7 @@ void App::State::compose() {
   if (drone) drone->start();  // after a flight that goes on has said which aircraft is its own
   devices->start(application->device_rows());
   AuthenticatorOptions options;
-  options.hosts = host_policy(config);
+  options.hosts = host_policy(config, listeners);
   options.rate_per_s = static_cast<double>(config.count("rate.per_s"));
   options.rate_burst = static_cast<double>(config.count("rate.burst"));
   options.places = {config.count("ws.max_connections"), config.count("ws.per_token"),
@@ -312,10 +364,15 @@ const api::Router& App::router() const { return state_->application->router(); }
 const std::vector<std::string>& App::urls() const { return state_->urls; }
 
 Result<std::unique_ptr<App>> App::start(const Config& config, std::function<std::string()> doctor) {
-  BOOST_OUTCOME_TRYV(check_listeners(config));
+  BOOST_OUTCOME_TRY(auto listeners, listeners_of(config));
+  BOOST_OUTCOME_TRYV(check_listeners(config, listeners));
   auto state = std::make_unique<State>();
   auto& s = *state;
   s.config = config;
+  s.listeners = std::move(listeners);
+  if (!config.text("tls.certificate").empty()) {
+    BOOST_OUTCOME_TRY(s.tls, TlsKeeper::open({config.text("tls.certificate"), config.text("tls.key")}));
+  }
   s.doctor = std::move(doctor);
   s.data_dir = config.text("data_dir");
   BOOST_OUTCOME_TRY(s.proxies, TrustedProxies::parse(config.list("trusted_proxies")));
@@ -330,10 +387,28 @@ Result<std::unique_ptr<App>> App::start(const Config& config, std::function<std:
   BOOST_OUTCOME_TRY(s.model_key, read_or_make_model_key(s.data_dir));
   BOOST_OUTCOME_TRYV(s.open_devices());
   BOOST_OUTCOME_TRYV(s.open_drone());
+  BOOST_OUTCOME_TRYV(s.open_broker());
   s.compose();
   auto app = std::unique_ptr<App>(new App(std::move(state)));
   BOOST_OUTCOME_TRYV(app->state_->listen());
   return app;
+}
+
+void App::reload() {
+  auto& s = *state_;
+  if (!s.tls) {
+    log(LogLevel::info, "nothing to reload", {{"why", "there is no tls.certificate"}});
+    return;
+  }
+  const auto reloaded = s.tls->reload(s.clock.now());
+  if (!reloaded) {
+    log(LogLevel::error, "the new certificate was refused, the former is still served",
+        {{"why", reloaded.error().message}});
+    return;
+  }
+  const auto facts = s.tls->facts();
+  log(LogLevel::info, "reloaded the certificate",
+      {{"until", to_rfc3339(facts.not_after)}, {"sha256", facts.sha256}});
 }
 
 void App::stop() {

@@ -30,8 +30,10 @@ class App {
 
   /// Every route with its access decision.
   const api::Router& router() const;
-  /// Where it listens, "http://127.0.0.1:8420".
+  /// Where it listens, "http://127.0.0.1:8420" or "https://...".
   const std::vector<std::string>& urls() const;
+  /// Reads the certificate again; what cannot be served is logged and an alarm, and the former stays.
+  void reload();
   /// Refuses new work, says goodbye to WebSockets, finishes what runs, flushes and closes the database. Logs
   /// how long each step took. Idempotent; within 10 s.
   void stop();

@@ -9,6 +9,7 @@
 #include "core/base/to_wire.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/server_address.hpp"
+#include "server/config/toml_json.hpp"
 #include "server/http/http_client.hpp"
 
 namespace anchord::cli {
@@ -147,6 +148,11 @@ Result<Json> patch_of(const std::vector<std::string>& settings) {
       out["options"]["password"] = password;
       continue;
     }
+    if (key == "mapping_file") {
+      BOOST_OUTCOME_TRY(const auto mapping, server::read_as_json(raw));
+      out["options"]["mapping"] = Json::parse(mapping, nullptr, false);
+      continue;
+    }
     if (key == "password") {
       out["options"][key] = raw;  // 123456 is a text too
       continue;
@@ -237,10 +243,11 @@ void add_devices_command(CLI::App& app, int& exit_code) {
     run(discover);
   });
   auto* made = command->add_subcommand("add", "Set a device up");
-  made->add_option("kind", options->kind, "gnss, pozyx or ntrip")->required();
+  made->add_option("kind", options->kind, "gnss, pozyx, ntrip, mqtt, ndjson or dwm1001")->required();
   made->add_option("address", options->address, "serial:/dev/serial/by-id/..., tcp://host:port, ...")
       ->required();
-  made->add_option("settings", options->settings, "key=value, e.g. format=ubx, mount=RTCM3");
+  made->add_option("settings", options->settings,
+                   "key=value, e.g. format=ubx, mount=RTCM3, mapping_file=tags.toml");
   made->add_option("--name", options->name, "For people");
   made->callback([run] { run(add); });
   auto* set =

@@ -20,6 +20,7 @@
 #include "server/cli/server_address.hpp"
 #include "server/http/http_client.hpp"
 #include "server/storage/sqlite_connection.hpp"
+#include "server/tls/tls_keeper.hpp"
 
 namespace anchord::cli {
 namespace {
@@ -99,8 +100,23 @@ std::optional<Finding> database(const fs::path& dir) {
   }
 }
 
+/// Whether the certificate can be served, and for how long.
+std::optional<Finding> certificate(const DoctorOptions& options) {
+  if (options.tls_certificate.empty() && options.tls_key.empty()) return std::nullopt;
+  const auto kept = server::TlsKeeper::open({options.tls_certificate, options.tls_key});
+  if (!kept)
+    return Finding{Level::failed, "certificate", kept.error().message,
+                   "'anchord tls init' or 'anchord tls renew'"};
+  const auto facts = kept.value()->facts();
+  for (const auto& warning : server::tls_warnings(facts, std::nullopt, SystemClock{}.now()))
+    return Finding{warning.critical ? Level::failed : Level::warning, "certificate", warning.text};
+  return Finding{Level::ok, "certificate",
+                 options.tls_certificate + ", until " + to_rfc3339(facts.not_after)};
+}
+
 /// Whether a server could listen there now.
-Finding port(const std::string& address) {
+Finding port(std::string address) {
+  if (const auto scheme = address.find("://"); scheme != std::string::npos) address.erase(0, scheme + 3);
   const Finding unreadable{Level::warning, "port", address + ": not looked at",
                            "only IPv4 addresses with a port are tried"};
   const auto colon = address.rfind(':');
@@ -232,6 +248,7 @@ std::vector<Finding> examine(const DoctorOptions& options) {
     if (auto found = database(options.data_dir)) out.push_back(*std::move(found));
     for (const auto& address : options.listen) out.push_back(port(address));
   }
+  if (auto found = certificate(options)) out.push_back(*std::move(found));
   out.push_back(clock_set());
   out.push_back(open_files());
   add(serial_devices());

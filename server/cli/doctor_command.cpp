@@ -38,6 +38,10 @@ void add_doctor_command(CLI::App& app, int& exit_code) {
       ->envname("ANCHORD_DATA_DIR");
   command->add_option("--listen", options->listen, "where a server would listen [127.0.0.1:8420]")
       ->envname("ANCHORD_LISTEN");
+  command->add_option("--tls-certificate", options->tls_certificate, "PEM file of the server's certificate")
+      ->envname("ANCHORD_TLS_CERTIFICATE");
+  command->add_option("--tls-key", options->tls_key, "PEM file of its private key")
+      ->envname("ANCHORD_TLS_KEY");
   command->add_flag("--json", *json, "print an array of {level, what, seen, advice}");
   command->callback([&exit_code, options, json] {
     const auto findings = examine(*options);

@@ -58,6 +58,9 @@ struct RestClient::State {
       const auto answer = client.call(method, path, body, content_type, headers);
       answered = answered || answer;
       if (answer && answer.value().status >= 200 && answer.value().status < 300) return answer.value().body;
+      // Not one row was taken: the report of that is an answer like any other, and the next rows may be good.
+      if (answer && answer.value().status == 422 && api::parse_ingest_answer(answer.value().body))
+        return answer.value().body;
       std::string why =
           answer ? std::to_string(answer.value().status) + " " + api::problem_text(answer.value().body)
                  : answer.error().message;

@@ -10,6 +10,7 @@
 #include "server/cli/config_flags.hpp"
 #include "server/cli/doctor.hpp"
 #include "server/runtime/logging.hpp"
+#include "server/runtime/service_manager.hpp"
 
 namespace anchord::cli {
 namespace {
@@ -20,6 +21,7 @@ int serve(const server::Config& config) {
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);
   sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   signal(SIGPIPE, SIG_IGN);
   signal(SIGXFSZ, SIG_IGN);  // a file size limit is an answer (507), as a full disk is
@@ -30,14 +32,24 @@ int serve(const server::Config& config) {
   DoctorOptions look;
   look.data_dir = config.text("data_dir");
   look.listen = config.list("listen");
+  look.tls_certificate = config.text("tls.certificate");
+  look.tls_key = config.text("tls.key");
   auto app = server::App::start(config, [look] { return findings_json(examine(look)); });
   if (!app) {
     std::fprintf(stderr, "anchord: %s\n", printable(app.error().message).c_str());
     return app.error().code == Errc::invalid_argument ? 2 : 1;
   }
+  if (!server::notify_service_manager("READY=1"))
+    server::log(server::LogLevel::warning, "the service manager at NOTIFY_SOCKET was not reached");
   int received = 0;
-  sigwait(&signals, &received);
+  for (;;) {
+    sigwait(&signals, &received);
+    if (received != SIGHUP) break;
+    server::log(server::LogLevel::info, "reloading", {{"signal", "SIGHUP"}});
+    app.value()->reload();
+  }
   server::log(server::LogLevel::info, "stopping", {{"signal", received == SIGINT ? "SIGINT" : "SIGTERM"}});
+  (void)server::notify_service_manager("STOPPING=1");
   app.value()->stop();
   server::log(server::LogLevel::info, "stopped");
   return 0;

@@ -4,6 +4,7 @@
 #include <fstream>
 
 #include "server/app/app.hpp"
+#include "server/http/http_client.hpp"
 
 namespace anchord::cli {
 namespace {
@@ -19,6 +20,12 @@ std::string first_line(const std::filesystem::path& file) {
 
 std::optional<std::string> running_server(const std::filesystem::path& data_dir) {
   auto line = first_line(data_dir / server::k_address_file);
+  // Of anchord tls init; who named another authority knows better.
+  const auto authority = data_dir / "tls" / "ca.pem";
+  std::error_code ignored;
+  if (line.starts_with("https://") && std::getenv("ANCHORD_CA_FILE") == nullptr &&
+      std::filesystem::exists(authority, ignored))
+    server::HttpClient::trust(authority.string());
   return line.empty() ? std::nullopt : std::optional(std::move(line));
 }
 

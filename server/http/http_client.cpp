@@ -1,5 +1,7 @@
 #include "server/http/http_client.hpp"
 
+#include <cstdlib>
+
 #include "core/base/text.hpp"
 #include "server/http/text.hpp"
 
@@ -21,10 +23,21 @@ std::string why(httplib::Error error, const std::string& origin) {
     case httplib::Error::SSLConnection:
     case httplib::Error::SSLLoadingCerts:
     case httplib::Error::SSLServerVerification:
-      return origin + ": no TLS connection: is the certificate one this machine trusts?";
+      return origin +
+             ": no TLS connection: does TLS run there, with a certificate for this name that is trusted "
+             "here? "
+             "ANCHORD_CA_FILE names the authority (ca.pem of anchord tls init)";
     default:
       return origin + ": " + httplib::to_string(error);
   }
+}
+
+std::string& trusted_file() {
+  static std::string file = [] {
+    const char* given = std::getenv("ANCHORD_CA_FILE");
+    return std::string(given == nullptr ? "" : given);
+  }();
+  return file;
 }
 
 }  // namespace
@@ -49,6 +62,7 @@ Result<HttpClient> HttpClient::to(std::string_view url, std::chrono::millisecond
   while (prefix.ends_with('/')) prefix.remove_suffix(1);
   auto state = std::make_unique<State>(std::string(url.substr(0, slash)), std::string(prefix));
   if (!state->client.is_valid()) return bad();
+  if (word == "https" && !trusted_file().empty()) state->client.set_ca_cert_path(trusted_file().c_str());
   state->client.set_keep_alive(true);
   state->client.set_tcp_nodelay(true);  // small requests one after the other would wait for each other's ACK
   state->client.set_url_encode(false);
@@ -57,6 +71,8 @@ Result<HttpClient> HttpClient::to(std::string_view url, std::chrono::millisecond
   state->client.set_write_timeout(timeout);
   return HttpClient(std::move(state));
 }
+
+void HttpClient::trust(const std::string& ca_file) { trusted_file() = ca_file; }
 
 HttpClient::HttpClient(std::unique_ptr<State> state) : state_(std::move(state)) {}
 HttpClient::HttpClient(HttpClient&& other) noexcept = default;

@@ -24,6 +24,9 @@ class HttpClient {
   /// Errors: invalid_argument.
   static Result<HttpClient> to(std::string_view url,
                                std::chrono::milliseconds timeout = std::chrono::seconds(30));
+  /// Servers whose certificate is signed by one of this PEM file are trusted, instead of those the system
+  /// trusts. Else ANCHORD_CA_FILE says which. Before to().
+  static void trust(const std::string& ca_file);
   ~HttpClient();
   HttpClient(HttpClient&& other) noexcept;
   HttpClient& operator=(HttpClient&&) = delete;

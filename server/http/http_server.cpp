@@ -7,6 +7,7 @@
 #include <charconv>
 #include <thread>
 
+#include "core/base/check.hpp"
 #include "core/base/guard.hpp"
 #include "core/base/text.hpp"
 #include "server/http/sessions.hpp"
@@ -55,7 +56,11 @@ struct HttpServer::State {
   std::shared_ptr<SessionContext> context;
   asio::io_context io;
   asio::executor_work_guard<asio::io_context::executor_type> work{io.get_executor()};
-  std::vector<std::shared_ptr<tcp::acceptor>> acceptors;
+  struct Listener {
+    std::shared_ptr<tcp::acceptor> acceptor;
+    bool tls{false};
+  };
+  std::vector<Listener> listeners;
   std::vector<Thread> threads;
   std::size_t io_threads{1};
   bool stopped{false};
@@ -72,8 +77,9 @@ struct HttpServer::State {
     }
   }
 
-  static asio::awaitable<void> accept_all(std::shared_ptr<tcp::acceptor> acceptor,
-                                          std::shared_ptr<SessionContext> context, asio::io_context& io) {
+  static asio::awaitable<void> accept_all(Listener listener, std::shared_ptr<SessionContext> context,
+                                          asio::io_context& io) {
+    const auto acceptor = listener.acceptor;
     asio::steady_timer pause(acceptor->get_executor());
     while (!context->stopping) {
       tcp::socket socket(asio::make_strand(io));
@@ -90,9 +96,10 @@ struct HttpServer::State {
       auto entry = context->book.enter(address, context->is_proxy && context->is_proxy(address));
       if (entry.evict) entry.evict->evict();
       if (!entry.place) {
-        const std::string answer = no_place(entry.why);
+        // In a handshake a plain answer would be garbage.
+        const std::string answer = listener.tls ? std::string() : no_place(entry.why);
         socket.non_blocking(true, ignored);
-        socket.write_some(asio::buffer(answer), ignored);
+        if (!answer.empty()) socket.write_some(asio::buffer(answer), ignored);
         socket.shutdown(tcp::socket::shutdown_both, ignored);
         continue;
       }
@@ -100,7 +107,7 @@ struct HttpServer::State {
       ++context->connections;
       ConnectionSlot slot(nullptr,
                           [context, place = std::move(entry.place)](void*) { --context->connections; });
-      start_http_session(std::move(socket), context, std::move(slot));
+      start_http_session(std::move(socket), context, std::move(slot), listener.tls);
     }
   }
 };
@@ -110,12 +117,14 @@ HttpServer::HttpServer(HttpServerOptions options, Gateway& gateway, Executors po
   state_->context = std::make_shared<SessionContext>(gateway, pools, options.limits, options.ws_limits);
   state_->context->hosts = std::move(options.hosts);
   state_->context->is_proxy = std::move(options.is_proxy);
+  state_->context->tls = std::move(options.tls);
   state_->io_threads = options.io_threads;
 }
 
 HttpServer::~HttpServer() { stop(std::chrono::milliseconds(0)); }
 
-Result<std::uint16_t> HttpServer::listen(std::string_view text) {
+Result<std::uint16_t> HttpServer::listen(std::string_view text, bool tls) {
+  ANCHORD_CHECK(!tls || state_->context->tls, "a listener with TLS needs a certificate");
   BOOST_OUTCOME_TRY(const auto endpoint, parse_endpoint(text));
   auto acceptor = std::make_shared<tcp::acceptor>(state_->io);
   error_code error;
@@ -128,7 +137,7 @@ Result<std::uint16_t> HttpServer::listen(std::string_view text) {
     const auto code = error == asio::error::address_in_use ? Errc::conflict : Errc::unsupported;
     return make_error(code, "cannot listen on " + std::string(text) + ": " + error.message());
   }
-  state_->acceptors.push_back(acceptor);
+  state_->listeners.push_back({acceptor, tls});
   return acceptor->local_endpoint().port();
 }
 
@@ -139,8 +148,8 @@ void HttpServer::every(std::chrono::milliseconds period, std::string name, std::
 
 void HttpServer::start() {
   auto& s = *state_;
-  for (const auto& acceptor : s.acceptors) {
-    asio::co_spawn(s.io, State::accept_all(acceptor, s.context, s.io),
+  for (const auto& listener : s.listeners) {
+    asio::co_spawn(s.io, State::accept_all(listener, s.context, s.io),
                    [](const std::exception_ptr& fault) { (void)guarded_end("listener", fault); });
   }
   for (std::size_t i = 0; i < s.io_threads; ++i) {
@@ -161,7 +170,7 @@ void HttpServer::stop(std::chrono::milliseconds grace) {
   };
   asio::post(s.io, [&s] {
     error_code ignored;
-    for (const auto& acceptor : s.acceptors) acceptor->close(ignored);
+    for (const auto& listener : s.listeners) listener.acceptor->close(ignored);
   });
   const auto wait_until_none = [&s](std::chrono::steady_clock::time_point deadline) {
     while (s.context->connections.load() > 0 && std::chrono::steady_clock::now() < deadline) {
@@ -182,6 +191,7 @@ void HttpServer::stop(std::chrono::milliseconds grace) {
 
 std::size_t HttpServer::connections() const { return state_->context->connections; }
 std::size_t HttpServer::websockets() const { return state_->context->websockets; }
+std::uint64_t HttpServer::failed_handshakes() const { return state_->context->failed_handshakes; }
 
 Result<bool> is_loopback(std::string_view endpoint) {
   BOOST_OUTCOME_TRY(const auto parsed, parse_endpoint(endpoint));

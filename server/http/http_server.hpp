@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -15,6 +16,8 @@
 
 namespace anchord::server {
 
+class TlsKeeper;
+
 struct HttpServerOptions {
   HttpLimits limits{};
   WsLimits ws_limits{};
@@ -22,6 +25,7 @@ struct HttpServerOptions {
   std::size_t io_threads{1};  ///< connections are on strands, so more is configuration
   /// Many ask from behind this address: its number of sockets is not limited by itself.
   std::function<bool(std::string_view address)> is_proxy{};
+  std::shared_ptr<const TlsKeeper> tls{};  ///< of the listeners that speak TLS
 };
 
 /// Accepts connections and runs them. Hides Asio and Beast from its users.
@@ -35,7 +39,8 @@ class HttpServer {
 
   /// "127.0.0.1:8420", "[::1]:8420"; port 0 lets the system choose. Returns the port.
   /// Errors: invalid_argument (not an address), conflict (in use), unsupported (no such address here).
-  Result<std::uint16_t> listen(std::string_view endpoint);
+  /// `tls`: HTTPS and wss there, by the options' certificate.
+  Result<std::uint16_t> listen(std::string_view endpoint, bool tls = false);
   /// Runs `task` on an io thread, as often: between sockets, so it must be brief. Before start().
   void every(std::chrono::milliseconds period, std::string name, std::function<void()> task);
   void start();
@@ -45,6 +50,8 @@ class HttpServer {
 
   std::size_t connections() const;
   std::size_t websockets() const;
+  /// Connections that spoke no TLS where it is spoken, or too slowly.
+  std::uint64_t failed_handshakes() const;
 
  private:
   struct State;

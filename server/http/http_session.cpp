@@ -27,12 +27,13 @@ enum class BodyEnd : std::uint8_t { complete, lost, refused };
 /// `bell_`.
 class HttpSession final : public Connection, public std::enable_shared_from_this<HttpSession> {
  public:
-  HttpSession(tcp::socket socket, std::shared_ptr<SessionContext> context, ConnectionSlot slot)
+  HttpSession(tcp::socket socket, std::shared_ptr<SessionContext> context, ConnectionSlot slot, bool tls)
       : wire_(std::move(socket), context->limits),
         bell_(wire_.executor()),
         context_(std::move(context)),
         slot_(std::move(slot)),
         limits_(context_->limits),
+        tls_(tls),
         pool_(&context_->pools.ordinary),
         remote_(wire_.remote()) {}
   ~HttpSession() override {
@@ -42,6 +43,10 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
 
   static awaitable<void> run(std::shared_ptr<HttpSession> self) {
     self->context_->enter(self.get(), self->weak_from_this());
+    if (self->tls_) {
+      const bool secured = co_await self->secure();
+      if (!secured) co_return;
+    }
     bool first = true;
     while (co_await self->serve_one(first)) first = false;
   }
@@ -64,6 +69,25 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
   void close() {
     wire_.close();
     bell_.cancel();
+  }
+
+  /// Keys are exchanged. Until then it is one of those that go first when places run out.
+  awaitable<bool> secure() {
+    awaits_head_ = true;
+    context_->book.idle(remote_, this, weak_from_this());
+    const bool secured = co_await wire_.secure(context_->tls->begin());
+    awaits_head_ = false;
+    context_->book.busy(this);
+    if (!secured && !context_->stopping) ++context_->failed_handshakes;
+    co_return secured;
+  }
+
+  /// Handlers believe this header: it is a trusted proxy's word, or ours, and nobody else's.
+  void settle_scheme() {
+    auto& headers = request_->headers;
+    const bool proxy = context_->is_proxy && context_->is_proxy(remote_);
+    if (!proxy) headers.erase("x-forwarded-proto");
+    if (tls_) headers.try_emplace("x-forwarded-proto", "https");
   }
 
   /// One request and its answer. False: the connection is finished.
@@ -93,6 +117,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
     request_ = std::make_shared<api::Request>(std::move(judged.request));
     request_->request_id = request_id_of(request_->header("x-request-id"));
     request_->remote = remote_;
+    settle_scheme();
     Admission admission = context_->gateway.admit(*request_, judged.host, judged.websocket);
     route_ = admission.route;
     if (admission.websocket && !admission.refusal) {
@@ -397,6 +422,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
   ConnectionSlot slot_;
   const HttpLimits& limits_;
   bool awaits_head_{false};
+  const bool tls_;
   WorkerPool* pool_;             ///< of the exchange that runs
   std::shared_ptr<void> share_;  ///< of heavy work, while it runs and is sent
   std::string remote_, route_;
@@ -407,9 +433,10 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
 
 }  // namespace
 
-void start_http_session(tcp::socket socket, std::shared_ptr<SessionContext> context, ConnectionSlot slot) {
+void start_http_session(tcp::socket socket, std::shared_ptr<SessionContext> context, ConnectionSlot slot,
+                        bool tls) {
   const auto executor = socket.get_executor();
-  auto session = std::make_shared<HttpSession>(std::move(socket), context, std::move(slot));
+  auto session = std::make_shared<HttpSession>(std::move(socket), context, std::move(slot), tls);
   asio::co_spawn(executor, HttpSession::run(session),
                  [session](const std::exception_ptr& fault) { (void)guarded_end("connection", fault); });
 }

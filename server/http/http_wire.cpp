@@ -1,5 +1,7 @@
 #include "server/http/http_wire.hpp"
 
+#include <openssl/ssl.h>
+
 #include <algorithm>
 #include <array>
 #include <utility>
@@ -10,6 +12,15 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 constexpr std::size_t k_head_read_bytes = 4096;
+
+/// Answer to plain HTTP where TLS is spoken.
+std::string speaks_https() {
+  const std::string body =
+      R"({"type":"/problems/malformed","title":"The request is not well-formed","status":400,)"
+      R"("detail":"this address speaks HTTPS: write https:// for it"})";
+  return "HTTP/1.1 400 Bad Request\r\nContent-Type: application/problem+json\r\nContent-Length: " +
+         std::to_string(body.size()) + "\r\nConnection: close\r\n\r\n" + body;
+}
 
 }  // namespace
 
@@ -24,9 +35,40 @@ void HttpWire::close() {
   stream_.socket().close(ignored);
 }
 
-beast::tcp_stream HttpWire::take() {
-  stream_.expires_never();
+WireStream HttpWire::take() {
+  stream_.next_layer().expires_never();
   return std::move(stream_);
+}
+
+asio::awaitable<bool> HttpWire::secure(ssl_st* session) {
+  std::unique_ptr<ssl_st, void (*)(ssl_st*)> owned(session, SSL_free);
+  if (!owned) co_return false;
+  struct Idle {
+    bool& idle;
+    ~Idle() { idle = false; }
+  } const waiting{idle_};
+  idle_ = true;
+  const auto deadline = SteadyClock::now() + limits_.tls_handshake;
+  stream_.next_layer().expires_at(deadline);
+  const auto space = buffer_.prepare(k_head_read_bytes);
+  const auto [no_hello, n] = co_await stream_.async_read_some(space, k_wait);
+  if (no_hello) co_return false;
+  buffer_.commit(n);
+  if (const auto bytes = buffered(); bytes.front() >= 'A' && bytes.front() <= 'Z') {
+    const std::string answer = speaks_https();
+    const bool sent = co_await write(answer, {});
+    if (sent) co_await say_goodbye();
+    co_return false;
+  }
+  // A record of a handshake (RFC 8446 section 5.1) begins with 22; nothing else is worth OpenSSL's time.
+  if (buffered().front() != 22) co_return false;
+  auto& tls = stream_.begin_tls(owned.release());
+  stream_.next_layer().expires_at(deadline);
+  const auto hello = buffer_.data();
+  const auto [error, used] = co_await tls.async_handshake(WireStream::Tls::server, hello, k_wait);
+  if (error) co_return false;
+  buffer_.consume(used);
+  co_return buffer_.size() == 0;  // bytes that were sent before the keys were known
 }
 
 std::string_view HttpWire::buffered() const {
@@ -50,7 +92,7 @@ asio::awaitable<HttpWire::Head> HttpWire::read_head(bool first, const std::atomi
     }
     if (!started && stopping) co_return Head{};
     idle_ = !started;
-    stream_.expires_at(deadline);
+    stream_.next_layer().expires_at(deadline);
     const auto space = buffer_.prepare(k_head_read_bytes);
     const auto [error, n] = co_await stream_.async_read_some(space, k_wait);
     idle_ = false;
@@ -70,7 +112,7 @@ asio::awaitable<HttpWire::Piece> HttpWire::next_piece(RequestParser& parser, Rat
     buffer_.consume(step.consumed);
     if (step.refusal) co_return Piece{0, false, std::move(step.refusal)};
     if (step.produced > 0 || step.done) co_return Piece{step.produced, false, std::nullopt};
-    stream_.expires_at(floor.deadline());
+    stream_.next_layer().expires_at(floor.deadline());
     const auto space =
         buffer_.prepare(std::max<std::size_t>(limits_.read_buffer_bytes - buffer_.size(), 4096));
     const auto [error, n] = co_await stream_.async_read_some(space, k_wait);
@@ -84,7 +126,7 @@ asio::awaitable<bool> HttpWire::write(std::string_view a, std::string_view b) {
   while (!a.empty() || !b.empty()) {
     const std::array<asio::const_buffer, 2> buffers{asio::buffer(a.data(), a.size()),
                                                     asio::buffer(b.data(), b.size())};
-    stream_.expires_after(limits_.write_stall);
+    stream_.next_layer().expires_after(limits_.write_stall);
     const auto [error, n] = co_await stream_.async_write_some(buffers, k_wait);
     if (error) co_return false;
     bytes_out_ += n;
@@ -97,14 +139,19 @@ asio::awaitable<bool> HttpWire::write(std::string_view a, std::string_view b) {
 
 asio::awaitable<void> HttpWire::say_goodbye() {
   error_code ignored;
+  const auto deadline = SteadyClock::now() + limits_.linger;
+  if (stream_.tls() != nullptr) {
+    stream_.next_layer().expires_at(deadline);
+    // Says that the answer is whole. What the peer still sends ends it early, and is thrown away below.
+    co_await stream_.tls()->async_shutdown(k_wait);
+  }
   stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
   if (ignored) co_return;
-  const auto deadline = SteadyClock::now() + limits_.linger;
   buffer_.clear();
   for (std::size_t thrown = 0; thrown < 16 * limits_.drain_bytes;) {
-    stream_.expires_at(deadline);
+    stream_.next_layer().expires_at(deadline);
     const auto space = buffer_.prepare(k_head_read_bytes);
-    const auto [error, n] = co_await stream_.async_read_some(space, k_wait);
+    const auto [error, n] = co_await stream_.next_layer().async_read_some(space, k_wait);
     if (error) break;
     thrown += n;
   }

@@ -13,6 +13,7 @@
 #include "server/http/rate_floor.hpp"
 #include "server/http/request_check.hpp"
 #include "server/http/request_parser.hpp"
+#include "server/http/wire_stream.hpp"
 
 namespace anchord::server {
 
@@ -25,9 +26,13 @@ class HttpWire {
   auto executor() { return stream_.get_executor(); }
   std::string remote();
   void close();
+  /// The handshake of TLS with `session`, which it takes. False: the connection is over. Who speaks plain
+  /// HTTP here gets a plain answer that says so; garbage gets none.
+  asio::awaitable<bool> secure(ssl_st* session);
+  bool secured() { return stream_.tls() != nullptr; }
   bool idle() const { return idle_; }  ///< between two requests
   /// The connection for somebody else, after a head that nothing followed.
-  beast::tcp_stream take();
+  WireStream take();
 
   std::string_view buffered() const;
   void consume(std::size_t n) { buffer_.consume(n); }
@@ -59,7 +64,7 @@ class HttpWire {
   asio::awaitable<void> say_goodbye();
 
  private:
-  beast::tcp_stream stream_;
+  WireStream stream_;
   beast::flat_buffer buffer_;
   const HttpLimits& limits_;
   std::size_t bytes_out_{0};

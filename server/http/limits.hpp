@@ -22,10 +22,11 @@ struct HttpLimits {
   std::size_t read_buffer_bytes{64 * 1024};  ///< reserved before a body: small reads cost twice the CPU
   std::size_t body_pipe_bytes{256 * 1024};   ///< between socket and a handler that streams
   std::size_t gzip_from_bytes{1024};
-  std::size_t heavy_per_token{8};                 ///< computations of one token that wait or run; beyond: 429
-  std::chrono::milliseconds keep_alive{75'000};   ///< idle between requests
-  std::chrono::milliseconds head_time{10'000};    ///< first byte to last byte of a head
-  std::chrono::milliseconds body_window{20'000};  ///< a body may fall behind its floor rate by this much
+  std::size_t heavy_per_token{8};                ///< computations of one token that wait or run; beyond: 429
+  std::chrono::milliseconds keep_alive{75'000};  ///< idle between requests
+  std::chrono::milliseconds head_time{10'000};   ///< first byte to last byte of a head
+  std::chrono::milliseconds tls_handshake{10'000};  ///< from the connection to its keys
+  std::chrono::milliseconds body_window{20'000};    ///< a body may fall behind its floor rate by this much
   std::uint64_t body_floor_bytes_per_s{1024};
   std::chrono::milliseconds write_stall{30'000};  ///< a write without progress
   std::chrono::milliseconds linger{2'000};        ///< after a refusal: time for the peer to read it

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -13,6 +14,7 @@
 #include "server/http/executors.hpp"
 #include "server/http/gateway.hpp"
 #include "server/http/limits.hpp"
+#include "server/tls/tls_keeper.hpp"
 
 namespace anchord::server {
 
@@ -33,6 +35,7 @@ struct SessionContext {
   WsLimits ws_limits{};
   HostPolicy hosts{};
   std::function<bool(std::string_view address)> is_proxy{};
+  std::shared_ptr<const TlsKeeper> tls{};  ///< null: no listener speaks TLS
 
   Shares heavy_shares{limits.heavy_per_token};
   ConnectionBook book{limits.max_connections, limits.max_per_address};
@@ -40,6 +43,7 @@ struct SessionContext {
   std::atomic<bool> stopping{false};
   std::atomic<std::size_t> connections{0};  ///< sockets, WebSockets included
   std::atomic<std::size_t> websockets{0};
+  std::atomic<std::uint64_t> failed_handshakes{0};
 
   Locked<std::unordered_map<const Connection*, std::weak_ptr<Connection>>> alive{};
 

@@ -32,7 +32,7 @@ using UpgradeRequest = http::request<http::empty_body>;
 /// strand. The peer holds the queue and its bound; nobody who makes messages ever waits for this session.
 class WsSession final : public Connection, public std::enable_shared_from_this<WsSession> {
  public:
-  WsSession(beast::tcp_stream stream, std::shared_ptr<SessionContext> context, ConnectionSlot slot,
+  WsSession(WireStream stream, std::shared_ptr<SessionContext> context, ConnectionSlot slot,
             std::unique_ptr<WsPeer> peer)
       : ws_(std::move(stream)),
         bell_(ws_.get_executor()),
@@ -231,7 +231,7 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
     pulse_.cancel();
   }
 
-  websocket::stream<beast::tcp_stream, false> ws_;  // false: permessage-deflate is not even compiled in
+  websocket::stream<WireStream, false> ws_;  // false: permessage-deflate is not even compiled in
   asio::steady_timer bell_, pulse_, stall_;
   std::shared_ptr<SessionContext> context_;
   ConnectionSlot slot_;
@@ -242,7 +242,7 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
 
 }  // namespace
 
-void start_ws_session(beast::tcp_stream stream, std::shared_ptr<SessionContext> context, ConnectionSlot slot,
+void start_ws_session(WireStream stream, std::shared_ptr<SessionContext> context, ConnectionSlot slot,
                       const api::Request& request, std::string subprotocol, std::unique_ptr<WsPeer> peer) {
   UpgradeRequest upgrade(http::verb::get, request.path, 11);
   for (const auto& [name, value] : request.headers) {

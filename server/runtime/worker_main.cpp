@@ -16,6 +16,7 @@
 #include <stop_token>
 #include <vector>
 
+#include "api/places/plan_work.hpp"
 #include "core/base/errc_words.hpp"
 #include "core/base/guard.hpp"
 #include "core/base/to_wire.hpp"
@@ -112,21 +113,26 @@ int worker_main() {
           {"fraction", p.fraction},
           {"detail", p.detail}});
   };
-  const auto ran = guarded("training", [&] {  // the door of jobs, in this process
+  const bool plan = api::is_plan_work(message);
+  const auto ran = guarded(plan ? "floor plan" : "training", [&] {  // the door of jobs, in this process
     try {
-      result = api::do_work(message, stop.get_token(), told);
+      result = plan ? api::do_plan_work(message, stop.get_token(), told)
+                    : api::do_work(message, stop.get_token(), told);
     } catch (const std::bad_alloc&) {
       message.clear();
       message.shrink_to_fit();  // room for the answer
-      result =
-          make_error(Errc::unsupported, "the training needs more memory than the " + allowed_memory() +
-                                            " a worker may take: use a data set of means or medians, fewer "
-                                            "rows, features or trees, and start the run again");
+      result = plan ? make_error(Errc::invalid_argument, "the picture needs more memory than the " +
+                                                             allowed_memory() +
+                                                             " a worker may take: save it smaller")
+                    : make_error(Errc::unsupported,
+                                 "the training needs more memory than the " + allowed_memory() +
+                                     " a worker may take: use a data set of means or medians, fewer "
+                                     "rows, features or trees, and start the run again");
     }
   });
   if (!ran) {
-    result = make_error(Errc::link_lost,
-                        "the worker failed: " + ran.what + "; the run, its rows and settings are kept");
+    result = make_error(Errc::link_lost, "the worker failed: " + ran.what +
+                                             (plan ? "" : "; the run, its rows and settings are kept"));
   }
   if (result)
     send({{"op", "done"}, {"result", result.value()}});

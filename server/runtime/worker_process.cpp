@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "api/places/plan_work.hpp"
 #include "core/base/errc_words.hpp"
 #include "core/base/text.hpp"
 #include "server/runtime/frames.hpp"
@@ -43,7 +44,8 @@ class Socket {
 };
 
 /// What most often lies behind a worker's death, and what helps.
-std::string cause_of(int signal) {
+std::string cause_of(int signal, bool plan) {
+  if (plan) return "a fault of the decoder or too little memory";
   switch (signal) {
     case SIGKILL:
       return "most often the machine had no memory left; free some, or train on fewer rows or a smaller "
@@ -61,7 +63,7 @@ std::string cause_of(int signal) {
 /// A child that is always collected: killed where it still runs when this goes.
 class Child {
  public:
-  explicit Child(pid_t pid) : pid_(pid) {}
+  Child(pid_t pid, bool plan) : pid_(pid), plan_(plan) {}
   ~Child() {
     if (pid_ <= 0) return;
     kill();
@@ -78,12 +80,13 @@ class Child {
     pid_ = 0;
     if (WIFSIGNALED(status))
       return "was ended by signal " + std::to_string(WTERMSIG(status)) + " (" + strsignal(WTERMSIG(status)) +
-             "): " + cause_of(WTERMSIG(status));
+             "): " + cause_of(WTERMSIG(status), plan_);
     return "ended with code " + std::to_string(WEXITSTATUS(status)) + " without an answer";
   }
 
  private:
   pid_t pid_;
+  bool plan_;  ///< it works on the picture of a plan
 };
 
 Result<pid_t> spawn(const std::filesystem::path& program, int socket) {
@@ -147,7 +150,7 @@ Result<std::string> run(const std::filesystem::path& program, const std::string&
     return make_error(Errc::internal, std::string("cannot start a worker: ") + std::strerror(errno));
   Socket ours(ends[0]), theirs(ends[1]);
   BOOST_OUTCOME_TRY(const auto pid, spawn(program, theirs.fd()));
-  Child child(pid);
+  Child child(pid, api::is_plan_work(message));
   theirs.close();
   if (!write_frame(ours.fd(), message))
     return make_error(Errc::link_lost, "the worker " + child.end() + " before it began");

@@ -303,7 +303,7 @@ class SqlCampaignStore final : public CampaignStore {
     if (!id) return false;
     if (x.cir) {
       Query cir(c, k_insert_cir);
-      cir << *id << x.cir->dt_ps << x.cir->first_path_idx << x.cir->preamble_count
+      cir << *id << stored_dt_ps(*x.cir) << x.cir->first_path_idx << x.cir->preamble_count
           << std::as_bytes(std::span{x.cir->re_im});
       cir.run();
     }

@@ -25,7 +25,7 @@ struct Table<Range> {
       "rss_dbm, "
       "fp_dbm, rx_dbm, std_noise, heading_deg, truth_distance_m, truth_los) "
       "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16) "
-      "ON CONFLICT DO NOTHING RETURNING range_id";
+      "ON CONFLICT DO NOTHING";
   static constexpr std::string_view same_identity =
       "mission_key = ?1 AND t_ns = ?2 AND tag = ?3 AND anchor = ?4 AND antenna = ?5 AND ifnull(seq, -1) = ?6";
   static void bind(Query& query, std::int64_t mission_key, const Range& row);
@@ -52,7 +52,7 @@ struct Table<Fix> {
       "enu_from_body_x, enu_from_body_y, enu_from_body_z, enu_from_body_w, correction_age_s, satellites) "
       "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20, "
       "?21, ?22, "
-      "?23, ?24) ON CONFLICT DO NOTHING RETURNING fix_id";
+      "?23, ?24) ON CONFLICT DO NOTHING";
   static constexpr std::string_view same_identity = "mission_key = ?1 AND t_ns = ?2 AND ifnull(seq, -1) = ?3";
   static void bind(Query& query, std::int64_t mission_key, const Fix& row);
   static void bind_identity(Query& query, std::int64_t mission_key, const Fix& row);
@@ -85,6 +85,8 @@ inline std::string thinned(std::string_view id) {
   return "0 = ((" + std::string(id) + " & 16777215) * 2654435761 >> 12 & 1048575) % ";
 }
 
+/// What a column dt_ps keeps; read_cir_columns() knows it.
+double stored_dt_ps(const Cir& cir);
 void insert_cir(Connection& connection, std::int64_t range_id, const Cir& cir);
 std::optional<Cir> read_cir(Connection& connection, std::int64_t range_id);
 /// dt_ps, first_path_idx, preamble_count, re_im.

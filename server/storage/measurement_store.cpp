@@ -28,7 +28,10 @@ constexpr const char* k_devices =
     "FROM device_seen d JOIN mission m ON m.mission_key = d.mission_key "
     "WHERE m.mission_key NOT IN (SELECT mission_key FROM mission_bin) ORDER BY d.last_t_ns DESC, "
     "d.network_id";
-constexpr const char* k_count_ranges = "SELECT count(*) FROM uwb_range WHERE mission_key = ?1";
+/// Each row was noted with its two radios, in its own transaction: what a count over the rows gives, without
+/// them.
+constexpr const char* k_count_ranges =
+    "SELECT coalesce(sum(n_ranges), 0) / 2 FROM device_seen WHERE mission_key = ?1";
 constexpr const char* k_count_fixes = "SELECT count(*) FROM fix WHERE mission_key = ?1";
 
 class Keys {
@@ -118,7 +121,7 @@ void append_rows(Connection& connection, const std::vector<Row>& rows, std::vect
     }
     insert.again();
     Table<Row>::bind(insert, *key, rows[i]);
-    const auto id = insert.returned();
+    const auto id = insert.inserted();
     if (!id) {
       outcomes[i] = judge_stored(connection, *key, rows[i]);
       continue;

@@ -21,7 +21,8 @@ constexpr const char* k_site_columns =
     "base_sigma_m, base_source, projected_epsg, created_t_ns, version FROM site ";
 constexpr const char* k_site_users =
     "SELECT (SELECT count(*) FROM mission WHERE site_id = ?1) + (SELECT count(*) FROM anchor WHERE site_id = "
-    "?1) + (SELECT count(*) FROM local_frame WHERE site_id = ?1)";
+    "?1) + (SELECT count(*) FROM local_frame WHERE site_id = ?1) + (SELECT count(*) FROM building WHERE "
+    "site_id = ?1)";
 constexpr const char* k_site_remove = "DELETE FROM site WHERE id = ?1 AND version = ?2 RETURNING version";
 
 void bind(Query& query, const Site& s, std::uint64_t version) {
@@ -103,7 +104,8 @@ class SqlSiteStore final : public SiteStore {
       users << id;
       if (users.step() && users.integer() > 0) {
         return make_error(Errc::conflict, "site " + to_string(id) +
-                                              " has missions (deleted ones in the bin count) or anchors");
+                                              " has missions (deleted ones in the bin count), anchors, frames or "
+                                              "buildings");
       }
       Query query(c, k_site_remove);
       query << id << expected_version;

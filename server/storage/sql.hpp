@@ -52,6 +52,9 @@ class Statement {
   virtual void bind_text(int index, std::string_view value) = 0;
   virtual void bind_blob(int index, std::span<const std::byte> value) = 0;
   virtual bool step() = 0;  ///< true: a row
+  /// Runs an INSERT of one row: its row id, or nothing where ON CONFLICT DO NOTHING left it out. A RETURNING
+  /// says the same at three times the cost.
+  virtual std::optional<std::int64_t> insert() = 0;
   virtual void reset() noexcept = 0;
   virtual bool is_null(int column) = 0;
   virtual std::int64_t integer(int column) = 0;
@@ -90,6 +93,9 @@ class Query {
     while (step()) {
     }
   }
+
+  /// Of a table with an integer key: the id of the row inserted, or nothing where there is one like it.
+  std::optional<std::int64_t> inserted() { return statement_.insert(); }
 
   /// The integer of a RETURNING; nothing when no row was touched. Runs to the end, where foreign keys are
   /// judged.

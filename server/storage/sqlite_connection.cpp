@@ -97,6 +97,12 @@ class SqliteStatement final : public Statement {
     guard([&] { row = statement_.executeStep(); });
     return row;
   }
+  std::optional<std::int64_t> insert() override {
+    while (step()) {
+    }
+    if (sqlite3_changes(db_) == 0) return std::nullopt;
+    return sqlite3_last_insert_rowid(db_);
+  }
   void reset() noexcept override { statement_.tryReset(); }
   bool is_null(int column) override { return statement_.isColumnNull(column); }
   std::int64_t integer(int column) override { return statement_.getColumn(column).getInt64(); }
@@ -133,12 +139,18 @@ int open_flags(SqliteConnection::Mode mode) {
   return SQLite::OPEN_READONLY | SQLite::OPEN_NOMUTEX;
 }
 
+/// A prepared statement is found by its text without a copy of that.
+struct TextHash {
+  using is_transparent = void;
+  std::size_t operator()(std::string_view text) const { return std::hash<std::string_view>{}(text); }
+};
+
 }  // namespace
 
 struct SqliteConnection::State {
   State(const std::filesystem::path& file, int flags) : db(file.string(), flags, k_busy_timeout_ms) {}
   SQLite::Database db;
-  std::unordered_map<std::string, std::unique_ptr<SqliteStatement>> statements;
+  std::unordered_map<std::string, std::unique_ptr<SqliteStatement>, TextHash, std::equal_to<>> statements;
   int wal_pages{0};
 };
 
@@ -189,10 +201,10 @@ SqliteConnection::~SqliteConnection() {
 }
 
 Statement& SqliteConnection::prepared(std::string_view sql) {
-  std::string text(sql);
-  auto it = state_->statements.find(text);
+  auto it = state_->statements.find(sql);
   if (it == state_->statements.end()) {
     try {
+      std::string text(sql);
       auto statement = std::make_unique<SqliteStatement>(state_->db, text);
       it = state_->statements.emplace(std::move(text), std::move(statement)).first;
     } catch (const SQLite::Exception& error) {

@@ -26,8 +26,10 @@ SqlStores::SqlStores(Gate& gate, AdmitMission admit)
       access(make_access_store(gate)),
       service(make_service_store(gate)),
       webhooks(make_webhook_store(gate)),
+      places(make_place_store(gate)),
       ports{*measurements,  *missions, *bin,    *exclusions, *sites,     *anchors, *calibrations,
             *revisions,     *kits,     *frames, *plans,      *campaigns, *labels,  *datasets,
-            *training_runs, *models,   *jobs,   *tokens,     *access,    *service, *webhooks} {}
+            *training_runs, *models,   *jobs,   *tokens,     *access,    *service, *webhooks,
+            *places} {}
 
 }  // namespace anchord::sql

@@ -16,6 +16,7 @@
 #include "core/ports/mission_store.hpp"
 #include "core/ports/plan_store.hpp"
 #include "core/ports/revision_store.hpp"
+#include "core/ports/place_store.hpp"
 #include "core/ports/site_store.hpp"
 #include "core/ports/stores.hpp"
 #include "core/ports/token_store.hpp"
@@ -49,6 +50,7 @@ std::unique_ptr<MissionBin> make_mission_bin(Gate& gate);
 std::unique_ptr<ServiceStore> make_service_store(Gate& gate);
 std::unique_ptr<ExclusionStore> make_exclusion_store(Gate& gate);
 std::unique_ptr<WebhookStore> make_webhook_store(Gate& gate);
+std::unique_ptr<PlaceStore> make_place_store(Gate& gate);
 
 /// All of them over one gate, which outlives them.
 struct SqlStores {
@@ -74,6 +76,7 @@ struct SqlStores {
   const std::unique_ptr<AccessStore> access;
   const std::unique_ptr<ServiceStore> service;
   const std::unique_ptr<WebhookStore> webhooks;
+  const std::unique_ptr<PlaceStore> places;
   const Stores ports;
 };
 

@@ -133,12 +133,12 @@ void WriteQueue::attempt(Group& group) {
     throw SqlError(Failure::unavailable, status().trouble ? status().trouble->what() : "closed");
   std::size_t rows = 0;
   try {
-    connection_->execute("BEGIN IMMEDIATE");
+    Query(*connection_, "BEGIN IMMEDIATE").run();
     for (Task* task : group) {
       run_task(*task);
       if (!task->error) rows += task->rows;
     }
-    connection_->execute("COMMIT");
+    Query(*connection_, "COMMIT").run();
   } catch (const SqlError& error) {
     // After a failed write or fsync the pages in memory are not to be believed: close, and let a new
     // connection recover.
@@ -159,7 +159,7 @@ void WriteQueue::note(const std::optional<SqlError>& trouble) {
 
 void WriteQueue::run_task(Task& task) {
   task.error.reset();
-  connection_->execute("SAVEPOINT call");
+  Query(*connection_, "SAVEPOINT call").run();
   try {
     task.error = (*task.work)(*connection_);
   } catch (const SqlError& error) {
@@ -168,8 +168,8 @@ void WriteQueue::run_task(Task& task) {
   } catch (const std::exception& error) {
     task.error = make_error(Errc::internal, std::string("storage: ") + error.what());
   }
-  if (task.error) connection_->execute("ROLLBACK TO call");
-  connection_->execute("RELEASE call");
+  if (task.error) Query(*connection_, "ROLLBACK TO call").run();
+  Query(*connection_, "RELEASE call").run();
 }
 
 bool WriteQueue::rolled_back_whole() noexcept {

@@ -1,9 +1,12 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <memory>
+#include <mutex>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "app_fixture.hpp"
@@ -30,6 +33,7 @@ class LoopDrone final : public Drone {
         }()) {}
 
   void run_until(double seconds) {
+    const std::lock_guard turn(in_use);
     while (now < seconds - 1e-9) {
       now += 0.05;
       const auto unix_us = k_unix_us + static_cast<std::int64_t>(now * 1e6);
@@ -40,39 +44,81 @@ class LoopDrone final : public Drone {
       if (!link_down) autopilot.feed(out);
     }
   }
-  void new_flight(double speed_mps) override { session.new_flight(speed_mps); }
-  void end_flight() override { session.end_flight(); }
-  std::uint64_t take_off(double m) override { return session.take_off(m); }
-  void steer(double lat, double lon, double m) override { session.steer(lat, lon, m); }
-  std::uint64_t disarm() override { return session.disarm(); }
-  void ask_parameters(const std::vector<std::string>& names) override { session.ask_parameters(names); }
+  void new_flight(double speed_mps) override {
+    alone([&] { session.new_flight(speed_mps); });
+  }
+  void end_flight() override {
+    alone([&] { session.end_flight(); });
+  }
+  std::uint64_t take_off(double m) override {
+    return alone([&] { return session.take_off(m); });
+  }
+  void steer(double lat, double lon, double m) override {
+    alone([&] { session.steer(lat, lon, m); });
+  }
+  std::uint64_t disarm() override {
+    return alone([&] { return session.disarm(); });
+  }
+  void ask_parameters(const std::vector<std::string>& names) override {
+    alone([&] { session.ask_parameters(names); });
+  }
   std::uint64_t go_to(double lat, double lon, double m, std::optional<double> heading) override {
-    targets.push_back({lat, lon, m});
-    return session.go_to(lat, lon, m, heading);
+    return alone([&] {
+      targets.push_back({lat, lon, m});
+      return session.go_to(lat, lon, m, heading);
+    });
   }
-  std::uint64_t hold() override { return ++holds, session.hold(); }
-  std::uint64_t return_home() override { return session.return_home(); }
-  std::uint64_t land() override { return session.land(); }
+  std::uint64_t hold() override {
+    return alone([&] {
+      ++holds;
+      return session.hold();
+    });
+  }
+  std::uint64_t return_home() override {
+    return alone([&] { return session.return_home(); });
+  }
+  std::uint64_t land() override {
+    return alone([&] { return session.land(); });
+  }
   std::uint64_t upload_route(const std::vector<RoutePoint>& route) override {
-    return session.upload_route(route);
+    return alone([&] { return session.upload_route(route); });
   }
-  std::uint64_t upload_fence(const DroneFence& fence) override { return session.upload_fence(fence); }
-  void take_back() override { session.take_back(); }
+  std::uint64_t upload_fence(const DroneFence& fence) override {
+    return alone([&] { return session.upload_fence(fence); });
+  }
+  void take_back() override {
+    alone([&] { session.take_back(); });
+  }
   void expect(const DroneIdentity& aircraft) override {
-    expected = aircraft;
-    session.expect_vehicle(
-        {static_cast<std::uint8_t>(aircraft.system), static_cast<std::uint8_t>(aircraft.component)});
+    alone([&] {
+      expected = aircraft;
+      session.expect_vehicle(
+          {static_cast<std::uint8_t>(aircraft.system), static_cast<std::uint8_t>(aircraft.component)});
+    });
   }
-  DroneStatus status() const override { return session.status(); }
-  std::vector<CommandReport> take_reports() override { return session.take_reports(); }
+  DroneStatus status() const override {
+    return alone([&] { return session.status(); });
+  }
+  std::vector<CommandReport> take_reports() override {
+    return alone([&] { return session.take_reports(); });
+  }
 
   sim::AutopilotSim autopilot;
   drone::Session session;
   std::vector<Wgs84> targets;
   std::optional<DroneIdentity> expected;
   double now{0};
-  int holds{0};
-  bool link_down{false};
+  std::atomic<int> holds{0};
+  std::atomic<bool> link_down{false};
+
+ private:
+  /// The application's threads ask while a test flies on, as they do of a real link.
+  template <class Act>
+  std::invoke_result_t<Act> alone(Act act) const {
+    const std::lock_guard turn(in_use);
+    return act();
+  }
+  mutable std::mutex in_use;
 };
 
 class Flights : public AppFixture {

@@ -1,4 +1,5 @@
 // POST /ranges and /fixes: every kind of bad input has one named test, and good rows beside it are kept.
+#include "api/measurements/flight_requests.hpp"
 #include "app_fixture.hpp"
 #include "core/ports/measurement_store.hpp"
 
@@ -176,6 +177,41 @@ TEST_F(Ingest, ListsTheFirstHundredErrorsAndSaysThereAreMore) {
   EXPECT_EQ(response["rejected"], 150);
   EXPECT_EQ(response["errors"].size(), 100u);
   EXPECT_EQ(response["errors_truncated"], true);
+}
+TEST_F(Ingest, AnswersRowsThatAreAllWrongWith422AndTheSameReport) {
+  const std::string bad = with("7.5", "0");
+  const auto check = [&](const api::Response& response, int n) {
+    EXPECT_EQ(response.status, 422) << response.body;
+    EXPECT_EQ(header(response, "Content-Type"), "application/problem+json");
+    const auto body = json(response);
+    EXPECT_EQ(body["type"], "/problems/validation");
+    EXPECT_EQ(body["status"], 422);
+    EXPECT_EQ(body["accepted"], 0);
+    EXPECT_EQ(body["duplicates"], 0);
+    EXPECT_EQ(body["rejected"], n);
+    EXPECT_EQ(body["errors"][0]["line"], 1);
+    EXPECT_EQ(body["errors"][0]["code"], "zero_distance");
+    EXPECT_EQ(body["errors_truncated"], false);
+    EXPECT_FALSE(body["instance"].get<std::string>().empty());
+  };
+  check(post("/api/v1/ranges", bad + "\n" + bad, "application/x-ndjson"), 2);
+  check(post("/api/v1/ranges", bad, "application/x-ndjson"), 1);
+  check(post("/api/v1/ranges", "[" + bad + "," + bad + "]"), 2);
+  check(post("/api/v1/ranges", bad + "\n" + bad, "application/x-ndjson", {{"dry_run", "true"}}), 2);
+  EXPECT_EQ(post("/api/v1/fixes", fix(1, R"("lon":0,"lat":0,"h_m":5)"), "application/x-ndjson").status, 422);
+  EXPECT_EQ(stored(), 0u);
+  // One that is taken, or known already, and it is what it was.
+  EXPECT_EQ(post("/api/v1/ranges", bad + "\n" + row(1), "application/x-ndjson").status, 200);
+  EXPECT_EQ(post("/api/v1/ranges", bad + "\n" + row(1), "application/x-ndjson").status, 200);
+  EXPECT_EQ(post("/api/v1/ranges", "\n\n", "application/x-ndjson").status, 200) << "no rows, none wrong";
+}
+TEST_F(Ingest, ReadsTheReportOfRowsThatAreAllWrongAsItsOwnClient) {
+  const auto response = post("/api/v1/ranges", with("7.5", "0"), "application/x-ndjson");
+  const auto answer = api::parse_ingest_answer(response.body);
+  ASSERT_TRUE(answer) << response.body;
+  EXPECT_EQ(answer.value().rejected, 1u);
+  EXPECT_TRUE(answer.value().first_error.starts_with("zero_distance: ")) << answer.value().first_error;
+  EXPECT_FALSE(api::parse_ingest_answer(post("/api/v1/ranges", "{", "application/json").body));
 }
 TEST_F(Ingest, RefusesWrongAbsentAndCompressedContent) {
   EXPECT_EQ(post("/api/v1/ranges", row(1), "text/plain").status, 415);

@@ -158,6 +158,9 @@ TEST_F(StateMatrix, EveryRouteThatDeletesIsKnown) {
       "/api/v1/tokens/{id}",         // revokes: it stays in the list
       "/api/v1/webhooks/{id}",       // If-Match; what was not delivered goes with it
       "/api/v1/session",             // ends the caller's own
+      "/api/v1/buildings/{id}",      // with floors: 409
+      "/api/v1/floors/{id}",         // If-Match; its plan and walls go with it
+      "/api/v1/floors/{id}/plan",    // If-Match; the walls that were accepted stay
   };
   for (const auto& route : app_->router().routes()) {
     if (route.method == Method::del) {

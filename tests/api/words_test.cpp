@@ -10,16 +10,20 @@
 #include "api/admin/alarm_rules.hpp"
 #include "api/anchors/frame_json.hpp"
 #include "api/calibration/calibration_service.hpp"
+#include "api/calibration/datum_change.hpp"
 #include "api/exchange/anchor_drawing.hpp"
 #include "api/kit/contract.hpp"
 #include "api/kit/message.hpp"
 #include "api/learning/freeze_rows.hpp"
 #include "api/learning/measurement_query.hpp"
 #include "api/learning/model_signer.hpp"
+#include "api/places/structure_json.hpp"
 #include "api/stream/hub.hpp"
 #include "api/webhooks/cloud_event.hpp"
 #include "core/flight/command.hpp"
 #include "core/flight/control_lease.hpp"
+#include "core/floor_plan/georeference.hpp"
+#include "core/floor_plan/image_head.hpp"
 #include "core/ml/recipe.hpp"
 #include "core/planning/local_plan.hpp"
 #include "core/planning/plan_change.hpp"
@@ -175,7 +179,8 @@ std::set<std::string> words_without_a_table() {
           "DeviceWrite.kind", "SiteWrite.crs.base.source", "ModelGate.checks.basis",
           "PositionDiff.items.change", "DatasetCreate.split.by", "DatasetRules.positive", "DatasetRow.split",
           "TrainingRunCreate.select.metric", "TrainingConfusion.positive", "TrainingPrediction.split",
-          "GET /api/v1/training-runs/{id}/predictions ?split", "Me.auth", "System.clock.source"};
+          "GET /api/v1/training-runs/{id}/predictions ?split", "Me.auth", "System.clock.source",
+          "System.mqtt.state", "FloorPlanGeoreference.source"};
 }
 
 TEST(WireWords, AreThoseOfOpenApi) {
@@ -227,6 +232,7 @@ TEST(WireWords, AreThoseOfOpenApi) {
       {"CalibrationCreate.weights", words(k_weights_words)},
       {"CalibrationCreate.loss.type", words(k_loss_words)},
       {"CalibrationCreate.initial", words(k_initial_words)},
+      {"DatumWrite.helmert.convention", words(k_rotation_words)},
       {"CalibrationCreate.profile", words(k_profile_words)},
       {"CalibrationCreate.models.correction", words(ml::k_correction_words)},
       {"CalibrationCreate.models.likelihood", words(k_likelihood_words)},
@@ -245,6 +251,12 @@ TEST(WireWords, AreThoseOfOpenApi) {
       {"?Label", words(k_label_words)},
       {"TokenCreate.roles", words(k_role_words)},
       {"Event.level", words(k_event_level_words)},
+      {"Floor.plan.media_type", words(floor_plan::k_image_format_words)},
+      {"FloorPlanGeoreference.model", words(floor_plan::k_fit_model_words)},
+      {"GeoreferenceWrite.model", words(floor_plan::k_fit_model_words)},
+      {"FloorWalls.walls.material", Json(k_wall_materials)},
+      {"FloorWallsWrite.walls.material", Json(k_wall_materials)},
+      {"FloorWallsWrite.material", Json(k_wall_materials)},
   };
   expect_the_same(enums_of_openapi(), tables, words_without_a_table());
 }

@@ -9,6 +9,7 @@ import { createInterface } from 'node:readline';
 import { after, before, test } from 'node:test';
 import { Contract, checked } from './contract.mjs';
 import { ndjson, simulatedFlight } from './flight.mjs';
+import { room_png } from './room.mjs';
 import { binary, eventually, root, startServer } from './server.mjs';
 
 const contract = new Contract();
@@ -93,6 +94,9 @@ test('a local frame, fitted to the published anchors', async () => {
   for (const format of ['dxf', 'pnezd', 'kml', 'gpkg'])
     await call('GET', `/api/v1/anchors?format=${format}`, { expect: 200 });
   await call('GET', '/api/v1/anchors?format=pozyx', { expect: 422 }); // no frame is fitted
+  const shift = { shift: { east_m: 0.1, north_m: 0, up_m: 0 }, note: 'base surveyed again' };
+  await call('POST', `/api/v1/sites/${ids.site}/datum?dry_run=true`, { expect: 200, json: shift });
+  await call('POST', `/api/v1/sites/${ids.site}/datum`, { expect: 201, json: shift });
   ids.frame = (await call('POST', '/api/v1/frames', { expect: 201, json: { name: 'hall-a', site: ids.site } })).json.id;
   const { json } = await call('GET', '/api/v1/anchors', { expect: 200 });
   const pairs = json.features.map(({ properties }) => ({ anchor: properties.network_id, local_m: properties.enu_m }));
@@ -125,6 +129,65 @@ test('a webhook: set up, tried, turned off, taken away', async () => {
   await call('PATCH', path, { expect: 412, ...patch });
   await call('POST', `${path}/test`, { expect: 422 });
   await call('DELETE', path, { expect: 204, headers: { 'if-match': off.headers.get('etag') } });
+});
+
+test('a building, its floor, the plan of it: sent, placed, traced, accepted, taken away', async () => {
+  const site = (
+    await call('POST', '/api/v1/sites', {
+      expect: 201,
+      json: { name: 'plans', origin: { lon: 3.7, lat: 51, h_m: 50 } },
+    })
+  ).json.id;
+  const building = await call('POST', '/api/v1/buildings', { expect: 201, json: { site, name: 'B1', height_m: 9 } });
+  const b = `/api/v1/buildings/${building.json.id}`;
+  const made = await call('POST', '/api/v1/floors', {
+    expect: 201,
+    json: { building: building.json.id, name: 'Ground', level: 0 },
+  });
+  const f = `/api/v1/floors/${made.json.id}`;
+  let etag = made.headers.get('etag');
+  const change = async (method, path, expect, options = {}) => {
+    const answer = await call(method, path, { expect, ...options, headers: { ...options.headers, 'if-match': etag } });
+    etag = answer.headers.get('etag') ?? (await call('GET', f)).headers.get('etag');
+    return answer;
+  };
+  await call('GET', b, { expect: 200 });
+  await call('GET', `/api/v1/buildings?site=${site}`, { expect: 200 });
+  await call('GET', `/api/v1/floors?building=${building.json.id}`, { expect: 200 });
+  await call('GET', `/api/v1/buildings/${unknown}`, { expect: 404 });
+  for (const part of ['', '/plan', '/plan/preview', '/plan/backdrop', '/plan/trace', '/walls'])
+    await call('GET', `/api/v1/floors/${unknown}${part}`, { expect: 404 });
+  const merge = { headers: { 'content-type': 'application/merge-patch+json' } };
+  await call('PATCH', b, {
+    expect: 200,
+    body: '{"height_m":9.5}',
+    headers: { ...merge.headers, 'if-match': building.headers.get('etag') },
+  });
+  await change('PATCH', f, 200, { ...merge, body: '{"base_height_m":0.1}' });
+  const png = { headers: { 'content-type': 'image/png' } };
+  await change('PUT', `${f}/plan`, 415, { ...png, body: '%PDF-1.7' });
+  await change('PUT', `${f}/plan`, 201, { ...png, body: room_png() });
+  await call('GET', `${f}/plan`, { expect: 200 });
+  await call('GET', `${f}/plan/preview`, { expect: 200 });
+  const points = [
+    [100, 100],
+    [700, 100],
+    [100, 500],
+  ].map(([x, y]) => ({ pixel: [x, y], enu_m: [x / 50, -y / 50] }));
+  await call('POST', `${f}/plan/trace`, { expect: 422 });
+  await change('PUT', `${f}/plan/georeference?dry_run=true`, 200, { json: { points } });
+  await change('PUT', `${f}/plan/georeference`, 200, { json: { points } });
+  await call('GET', `${f}/plan/backdrop`, { expect: 200 });
+  await call('POST', `${f}/plan/trace`, { expect: 200, headers: { prefer: 'wait=60' } });
+  const traced = await call('GET', `${f}/plan/trace`, { expect: 200 });
+  assert.equal(traced.json.walls.length, 4);
+  etag = (await call('GET', f, { expect: 200 })).headers.get('etag');
+  await change('PUT', `${f}/walls`, 200, { json: { from_trace: true, material: 'brick' } });
+  await call('GET', `${f}/walls`, { expect: 200 });
+  await call('DELETE', b, { expect: 409, headers: { 'if-match': (await call('GET', b)).headers.get('etag') } });
+  await change('DELETE', `${f}/plan`, 204);
+  await change('DELETE', f, 204);
+  await call('DELETE', b, { expect: 204, headers: { 'if-match': (await call('GET', b)).headers.get('etag') } });
 });
 
 test('a plan that says nothing flies by the defaults of the contract', async () => {
@@ -396,6 +459,8 @@ test('everything that can be read', async () => {
   for (const { method, template } of contract.operations.filter((o) => o.method === 'get')) {
     const own_test =
       template.includes('/webhooks/') ||
+      template.includes('/buildings/') ||
+      template.includes('/floors/') ||
       template === '/api/v1/ws' ||
       template.includes('{sample}') ||
       template.includes('{feature}') ||

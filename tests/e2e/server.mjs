@@ -35,11 +35,12 @@ for (const signal of ['SIGINT', 'SIGTERM', 'SIGHUP']) process.on(signal, () => p
  *   await server.dispose();                        // stops it and removes the folder
  */
 export class Server {
-  constructor({ auth = 'off', dataDir, args = [], env = {} } = {}) {
+  constructor({ auth = 'off', dataDir, args = [], env = {}, tls } = {}) {
     this.auth = auth;
     this.ownsDataDir = !dataDir;
     this.dataDir = dataDir ?? mkdtempSync(join(tmpdir(), 'anchord e2e '));
     this.args = args;
+    this.tls = tls; // {certificate, key}: HTTPS too, at secureUrl
     this.env = env;
     this.port = 0;
     this.log = '';
@@ -50,14 +51,20 @@ export class Server {
     return `http://127.0.0.1:${this.port}`;
   }
 
+  get secureUrl() {
+    return `https://127.0.0.1:${this.securePort}`;
+  }
+
   get pid() {
     return this.child?.pid;
   }
 
   /** Starts it and waits until /readyz answers 200. */
   async start(deadlineMs = 15_000) {
-    const listen = `127.0.0.1:${this.port}`;
+    const plain = `127.0.0.1:${this.port}`;
+    const listen = this.tls ? `http://${plain},127.0.0.1:${this.securePort ?? 0}` : plain;
     const args = ['serve', '--listen', listen, `--auth=${this.auth}`, '--data-dir', this.dataDir, ...this.args];
+    if (this.tls) args.push('--tls-certificate', this.tls.certificate, '--tls-key', this.tls.key);
     this.child = spawn(binary, args, { stdio: ['ignore', 'pipe', 'pipe'], env: { ...process.env, ...this.env } });
     const child = this.child;
     running.add(child);
@@ -80,8 +87,10 @@ export class Server {
       () => {
         if (ended) throw new Error(`the server ended (${JSON.stringify(ended)}):\n${output}`);
         const match = /http:\/\/127\.0\.0\.1:([1-9]\d*)/.exec(output); // the address of a device is not ours
+        const secure = /https:\/\/127\.0\.0\.1:([1-9]\d*)/.exec(output);
         if (match) this.port = Number(match[1]);
-        return match;
+        if (secure) this.securePort = Number(secure[1]);
+        return match && (!this.tls || secure);
       },
       deadlineMs,
     );
@@ -165,9 +174,9 @@ export async function startServer(options) {
 }
 
 /** Runs one subcommand to its end: {code, stdout, stderr}. */
-export function run(args, { input, deadlineMs = 120_000 } = {}) {
+export function run(args, { input, env = {}, deadlineMs = 120_000 } = {}) {
   return new Promise((done, fail) => {
-    const child = spawn(binary, args, { stdio: ['pipe', 'pipe', 'pipe'] });
+    const child = spawn(binary, args, { stdio: ['pipe', 'pipe', 'pipe'], env: { ...process.env, ...env } });
     let stdout = '',
       stderr = '';
     const timer = setTimeout(() => {

@@ -1,5 +1,6 @@
 // A worker that dies, in every way it may: the work gets a cause and advice, and the caller lives.
 #include "server/runtime/worker_process.hpp"
+#include "tests/core/floor_plan/pictures.hpp"
 #include "tests/paths.hpp"
 
 #include <gtest/gtest.h>
@@ -113,6 +114,31 @@ TEST_F(WorkerProcess, TakesTheCodeOfAnErrorByItsWordAndGuessesNone) {
     EXPECT_NE(unknown.error().message.find("m"), std::string::npos) << unknown.error().message;
     EXPECT_NE(unknown.error().message.find("unknown code"), std::string::npos) << unknown.error().message;
   }
+}
+
+/// A picture of 4 x 3 pixels as the server sends it.
+std::string plan_message(const std::string& picture) {
+  return R"(floor_plan {"task":"inspect","enu_from_pixel":[1,0,0,0,-1,0]})" "\n" + picture;
+}
+
+TEST_F(WorkerProcess, DecodesThePictureOfAFloorPlan) {
+  const std::string real = "exec '" ANCHORD_BINARY "' worker";
+  const auto result = run(real, plan_message(floor_plan::tiff(false, false)));
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(nlohmann::json::parse(result.value())["width_px"], 4);
+  const auto bomb = run(real, plan_message(floor_plan::png_head(50'000, 50'000)));
+  ASSERT_FALSE(bomb);
+  EXPECT_EQ(bomb.error().code, Errc::invalid_argument);
+  const auto half = run(real, plan_message(floor_plan::png_head(400, 300)));
+  ASSERT_FALSE(half);
+  EXPECT_EQ(half.error().code, Errc::bad_frame);
+}
+
+TEST_F(WorkerProcess, ADecoderThatDiesSaysNothingOfTraining) {
+  const auto result = run("kill -SEGV $$", plan_message("x"));
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, Errc::link_lost);
+  EXPECT_NE(result.error().message.find("a fault of the decoder"), std::string::npos) << result.error().message;
 }
 
 }  // namespace anchord::server

@@ -50,6 +50,19 @@ describe('what a device stands for', () => {
     expect(state_of({ counters: { frames: 7 } }, little)).toEqual(['info', 'OPENING']);
     expect(state_of({ kind: 'ntrip', counters: { frames: 1 } }, little)).toEqual(['ok', 'WORKING']);
   });
+  it('says of ranges by a mapping what the mapping gets wrong, and asks none of a position stream', () => {
+    const mqtt = (options: Record<string, unknown>): Record<string, unknown> => ({ kind: 'mqtt', options });
+    const wrong = standing(device(mqtt({ mapping: {} })), recent(0, { out_of_reach: 90 }));
+    expect([wrong.tone, wrong.word]).toEqual(['bad', 'NO RANGES']);
+    expect(wrong.what).toContain('unit of the mapping?');
+    expect(state_of({ kind: 'ndjson' }, recent(0))).toEqual(['bad', 'NO RANGES']);
+    expect(state_of({ kind: 'ndjson' }, recent(10, { bad_anchor: 30 }))).toEqual(['caution', 'FEW RANGES']);
+    expect(state_of({ kind: 'ndjson' })).toEqual(['ok', 'WORKING']);
+    expect(state_of(mqtt({ format: 'pozyx' }), recent(0))).toEqual(['ok', 'WORKING']);
+    expect(state_of({ kind: 'ndjson', state: 'silent' }, recent(0))).toEqual(['bad', 'SILENT']);
+    expect(standing(device({ kind: 'dwm1001' }), recent(0)).what).toContain('no anchor');
+    expect(state_of({ kind: 'dwm1001' })).toEqual(['ok', 'WORKING']);
+  });
   it('names the fix of a rover, and what a float costs', () => {
     const rover = (fix: string, age_s: number | null = 1): Record<string, unknown> => ({
       kind: 'gnss',

@@ -67,6 +67,13 @@ class LearningService : public AppFixture {
 
 TEST_F(LearningService, ReportsWhatAnImportDropped) {
   ASSERT_EQ(imported_.status, 200) << imported_.body;
+  // Zero is what Pozyx gives for no range: a file of nothing else is refused, with the report.
+  const auto none =
+      post("/api/v1/campaigns/hall/samples", "distance_m,range_m,los\n5,0,1\n5,0,1\n", "text/csv");
+  EXPECT_EQ(none.status, 422) << none.body;
+  EXPECT_EQ(json(none)["status"], 422);
+  EXPECT_EQ(json(none)["accepted"], 0);
+  EXPECT_EQ(json(none)["read"], 2);
   EXPECT_EQ(json(imported_)["accepted"], 180);
   const auto dropped = json(imported_)["dropped"];
   ASSERT_EQ(dropped.size(), 1u);

@@ -79,8 +79,8 @@ TEST(GuardedLoop, GoesOnWithTheNextHandler) {
   EXPECT_EQ(loop.done, 2);
 }
 
-// Last: it fills the book.
-TEST(Guarded, KeepsABoundedNumberOfNames) {
+// A suite of its own, for the last of this file: it fills the book.
+TEST(GuardedTasks, AreKeptUpToABoundedNumberOfNames) {
   on_task_failure([](const TaskFailure&) {});
   for (int i = 0; i < 1000; ++i) (void)guarded("task " + std::to_string(i), [] { throw 1; });
   on_task_failure({});

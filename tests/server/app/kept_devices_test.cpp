@@ -4,6 +4,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "core/base/locked.hpp"
 #include "core/base/text.hpp"
 #include "server/runtime/device_manager.hpp"
 #include "tests/server/app/app_fixture.hpp"
@@ -38,7 +39,10 @@ struct Kept {
     manager.reset();
     server::DeviceManagerOptions options;
     options.data_dir = folder;
-    options.log = [this](const std::string& line) { log += line + '\n'; };
+    options.log = [this](const std::string& line) {
+      const auto text = log.lock();
+      *text += line + '\n';
+    };
     auto opened = server::DeviceManager::open(std::move(options));
     ASSERT_TRUE(opened) << opened.error().message;
     manager = std::move(opened).value();
@@ -50,7 +54,7 @@ struct Kept {
   }
   Nowhere rows;
   fs::path folder;
-  std::string log;
+  Locked<std::string> log;  ///< written by the devices' threads
   std::unique_ptr<server::DeviceManager> manager;
 };
 
@@ -92,8 +96,8 @@ TEST(KeptDevices, ASpoiltEntryCostsOnlyItselfAndSaysWhy) {
     EXPECT_NE(devices[1].reason.find(why), std::string::npos) << devices[1].reason;
     EXPECT_TRUE(devices[1].reason.ends_with("correct its settings or remove it")) << devices[1].reason;
     EXPECT_NE(kept.manager->not_started().find(why), std::string::npos);
-    EXPECT_NE(kept.log.find(why), std::string::npos);
-    EXPECT_TRUE(is_utf8(kept.manager->not_started() + kept.log));
+    EXPECT_NE(kept.log.copy().find(why), std::string::npos);
+    EXPECT_TRUE(is_utf8(kept.manager->not_started() + kept.log.copy()));
   }
 }
 
@@ -148,7 +152,7 @@ TEST(KeptDevices, AFileThatIsNoListStartsWithoutDevicesAndIsKept) {
     EXPECT_TRUE(kept.manager->devices().empty());
     EXPECT_NE(kept.manager->not_started().find("devices.json: not a list of devices"), std::string::npos)
         << text;
-    EXPECT_NE(kept.log.find("repair the file"), std::string::npos);
+    EXPECT_NE(kept.log.copy().find("repair the file"), std::string::npos);
     EXPECT_EQ(kept.file(), text);
     DeviceConfig config;
     config.kind = "gnss";

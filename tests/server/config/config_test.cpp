@@ -1,6 +1,8 @@
 #include "server/config/config.hpp"
+#include "server/config/listeners.hpp"
 #include "tests/paths.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -84,6 +86,41 @@ TEST(Config, WarnsOfVariablesItDoesNotKnow) {
 }
 
 TEST(Config, EveryDefaultIsValid) { EXPECT_TRUE(load_config({}, std::nullopt, {})); }
+
+TEST(Listeners, SpeakTlsWhenThereIsACertificateButForThoseThatSayOtherwise) {
+  const auto listeners = [](const std::string& listen, bool certificate) {
+    std::map<std::string, std::string> settings{{"listen", listen}};
+    if (certificate) settings.insert({{"tls.certificate", "server.pem"}, {"tls.key", "server.key"}});
+    std::string out;
+    const auto found = listeners_of(load_config(settings, std::nullopt, {}).value());
+    if (!found) return found.error().message;
+    for (const auto& one : found.value()) out += one.address + (one.tls ? " tls;" : " plain;");
+    return out;
+  };
+  EXPECT_EQ(listeners("127.0.0.1:1,[::1]:2", false), "127.0.0.1:1 plain;[::1]:2 plain;");
+  EXPECT_EQ(listeners("0.0.0.0:8443, http://127.0.0.1:8420", true), "0.0.0.0:8443 tls;127.0.0.1:8420 plain;");
+  EXPECT_EQ(listeners("https://0.0.0.0:8443", true), "0.0.0.0:8443 tls;");
+  EXPECT_THAT(listeners("https://0.0.0.0:8443", false),
+              ::testing::HasSubstr("needs tls.certificate and tls.key"));
+  EXPECT_THAT(listeners(" , ", false), ::testing::HasSubstr("no address"));
+  const auto half = load_config({{"tls.key", "server.key"}}, std::nullopt, {}).value();
+  EXPECT_THAT(listeners_of(half).error().message, ::testing::HasSubstr("belong together"));
+}
+
+TEST(Listeners, BeyondLoopbackNeedTlsOrASayingThatThereIsNone) {
+  const auto allowed = [](std::map<std::string, std::string> settings) {
+    const auto config = load_config(settings, std::nullopt, {}).value();
+    return static_cast<bool>(check_listeners(config, listeners_of(config).value()));
+  };
+  const std::pair<const std::string, std::string> certificate{"tls.certificate", "s.pem"},
+      key{"tls.key", "s.key"};
+  EXPECT_FALSE(allowed({{"listen", "0.0.0.0:1"}}));
+  EXPECT_TRUE(allowed({{"listen", "0.0.0.0:1"}, {"insecure", "true"}}));
+  EXPECT_TRUE(allowed({{"listen", "0.0.0.0:1"}, certificate, key}));
+  EXPECT_FALSE(allowed({{"listen", "0.0.0.0:1, http://0.0.0.0:2"}, certificate, key}));
+  EXPECT_TRUE(allowed({{"listen", "0.0.0.0:1, http://127.0.0.1:2"}, certificate, key}));
+  EXPECT_FALSE(allowed({{"listen", "0.0.0.0:1"}, {"auth", "off"}, certificate, key}));
+}
 
 TEST(Config, SaysThatTheFileIsMissing) { EXPECT_FALSE(load_config({}, "/nowhere/anchord.toml", {})); }
 

@@ -79,6 +79,8 @@ class ProbeGateway final : public server::Gateway {
       admission.run = [](api::Request&) -> api::Response { throw std::runtime_error("bug"); };
     } else if (request.path == "/denied") {
       admission.refusal = api::problem(401, "unauthorized", "no");
+    } else if (handler) {
+      admission.run = handler;
     } else {
       admission.run = [](api::Request&) { return text("hello"); };
     }
@@ -106,6 +108,7 @@ class ProbeGateway final : public server::Gateway {
   }
 
   std::function<std::unique_ptr<server::WsPeer>()> make_peer;
+  std::function<api::Response(api::Request&)> handler;  ///< of any other path; unset: hello
   std::mutex mutex;
   std::condition_variable changed;
   int held{0};

@@ -382,6 +382,9 @@ TEST_P(MeasurementStoreContract, TakesEveryRowOnceFromManyThreadsAtOnce) {
   for (auto& thread : threads) thread.join();
   EXPECT_EQ(n_accepted, 200);
   EXPECT_EQ(db_->stores().measurements.count_ranges(mission.id).value(), 200u);
+  MeasurementStore::Filter all;
+  all.mission = mission.id;
+  EXPECT_EQ(db_->stores().measurements.count_ranges(all).value(), 200u) << "row by row";
 }
 
 INSTANTIATE_TEST_SUITE_P(Backends, MeasurementStoreContract, backends(), backend_name);

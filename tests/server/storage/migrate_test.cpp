@@ -54,7 +54,8 @@ TEST_F(Migrate, FindsEveryLandedMigrationAsItWas) {
             "6 fa850be7202896aa8b044cc8cab22219a207f27ab439030bb69bc0bbc91eae96\n"
             "7 928ced75f17f95eee611eef5bcb10890a421087a2d744c12b04838d2bc94e8cc\n"
             "8 993f088a1a82f736ed536f4af9fbb963034237ed191e6e299a8e5d4a46bceb2f\n"
-            "9 7c4ffeb6bd9e4aeb1810a60170fbca4d00fb10c4e5046f130dc0dc47fbdbec15\n");
+            "9 7c4ffeb6bd9e4aeb1810a60170fbca4d00fb10c4e5046f130dc0dc47fbdbec15\n"
+            "10 098b135dddac37d59e25a60e4ca32042085fe09793cd02a168a2db795eed8968\n");
 }
 
 TEST_F(Migrate, KnowsTheDigestOfAPublishedVector) {

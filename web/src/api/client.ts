@@ -14,7 +14,11 @@ export interface Problem {
   readonly errors: readonly FieldProblem[];
 }
 export class ApiError extends Error {
-  constructor(readonly problem: Problem) {
+  /// `body`: all that came, where a problem carries more than its own members.
+  constructor(
+    readonly problem: Problem,
+    readonly body: unknown = null,
+  ) {
     super(`${problem.title}${problem.detail ? `: ${problem.detail}` : ''}`);
   }
 }
@@ -68,7 +72,9 @@ export async function exchange(
         ...(body === undefined ? {} : { 'Content-Type': 'application/json' }),
         ...headers,
       },
-      ...(body === undefined ? {} : { body: typeof body === 'string' ? body : JSON.stringify(body) }),
+      ...(body === undefined
+        ? {}
+        : { body: typeof body === 'string' || body instanceof Blob ? body : JSON.stringify(body) }),
     });
   } catch {
     throw new ApiError(problem_of(null, 0));
@@ -80,7 +86,7 @@ export async function exchange(
   } catch {
     /* not JSON: the status alone speaks */
   }
-  if (!answer.ok) throw new ApiError(problem_of(parsed, answer.status));
+  if (!answer.ok) throw new ApiError(problem_of(parsed, answer.status), parsed);
   return { body: parsed, etag: answer.headers.get('etag') ?? '' };
 }
 /// What is wrong with each field, where the problem's own words do not say it already; the first five.

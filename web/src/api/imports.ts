@@ -1,5 +1,5 @@
 /// A flight into this server, as a mission of its own that is finished when all rows are in.
-import { idempotency_key, request } from './client';
+import { ApiError, idempotency_key, request } from './client';
 import { call, type Wire } from './contract';
 import { num, obj, str } from '../live/messages';
 
@@ -9,6 +9,16 @@ export interface Sent {
   readonly accepted: number;
   readonly rejected: number;
   readonly first_reason: string;
+}
+
+/// What became of rows. Where not one was taken it comes as a problem (422) with the same members.
+export async function row_report(sending: Promise<unknown>): Promise<unknown> {
+  try {
+    return await sending;
+  } catch (e) {
+    if (e instanceof ApiError && num(obj(e.body)?.rejected) !== null) return e.body;
+    throw e;
+  }
 }
 
 /// `progress`: share of the rows that are in. Stopping leaves what is in, and an unfinished mission is finished.
@@ -36,10 +46,12 @@ export async function send_flight(
       for (let i = 0; i < rows.length; i += BATCH) {
         const part = rows.slice(i, i + BATCH),
           answer = obj(
-            await request('POST', `${path}?mission=${body.id}`, part.map((r) => JSON.stringify(r)).join('\n') + '\n', {
-              'Content-Type': 'application/x-ndjson',
-              'Idempotency-Key': idempotency_key(),
-            }),
+            await row_report(
+              request('POST', `${path}?mission=${body.id}`, part.map((r) => JSON.stringify(r)).join('\n') + '\n', {
+                'Content-Type': 'application/x-ndjson',
+                'Idempotency-Key': idempotency_key(),
+              }),
+            ),
           );
         accepted += num(answer?.accepted) ?? 0;
         rejected += num(answer?.rejected) ?? 0;

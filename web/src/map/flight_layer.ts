@@ -25,7 +25,8 @@ export interface Heights {
   readonly target: number | null;
 }
 
-export function draw_flight(c: Ctx, p: Palette, cam: Camera, f: FlightPicture): void {
+/// `over_plan`: the plan of the floor shows through the outline.
+export function draw_flight(c: Ctx, p: Palette, cam: Camera, f: FlightPicture, over_plan = false): void {
   c.save();
   const trace = (points: readonly Point[], close: boolean): void => {
     c.beginPath();
@@ -35,7 +36,7 @@ export function draw_flight(c: Ctx, p: Palette, cam: Camera, f: FlightPicture): 
   if (f.outline.length > 2) {
     trace(f.outline, true);
     c.fillStyle = p.panel;
-    c.fill();
+    if (!over_plan) c.fill();
     c.strokeStyle = p.ink;
     c.lineWidth = 2.5;
     c.stroke();

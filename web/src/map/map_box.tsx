@@ -1,5 +1,6 @@
 /// The map as a component: loads the engine when first shown, and offers zoom, follow and fit as buttons.
 import { useEffect, useRef, useState } from 'preact/hooks';
+import { backdrop_version } from '../state/floors';
 import { when_back } from '../state/store';
 import { Icon } from '../ui/marks';
 import { ground } from '../ui/theme';
@@ -7,6 +8,7 @@ import { Elevation } from './elevation_box';
 import { elevation_on, elevation_shown } from './elevation_shown';
 import { length_words, round_length } from './enu';
 import type { MapView, Mode } from './engine';
+import { LevelChoice } from './level_choice';
 import type { Content } from './picture';
 
 /// The map that is on screen, for the keyboard.
@@ -66,7 +68,8 @@ export function MapBox({ content, onSelect, label, follow, version, zero }: Prop
       map.current = null;
     };
   }, [attempt]);
-  useEffect(() => map.current?.changed(), [version]);
+  const backdrop = backdrop_version.value;
+  useEffect(() => map.current?.changed(), [version, backdrop]);
   const theme = ground.value;
   useEffect(() => {
     map.current?.theme_changed();
@@ -119,6 +122,7 @@ export function MapBox({ content, onSelect, label, follow, version, zero }: Prop
           <Icon name="side" />
         </button>
       </div>
+      <LevelChoice />
       <ScaleBars {...scale} />
       {sided && <Elevation content={content} onSelect={onSelect} version={version} zero={zero} />}
     </div>

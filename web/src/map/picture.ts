@@ -1,6 +1,7 @@
 /// What is drawn, given a camera, from below: the slow picture (grid, ellipses), the fast one (trail, ranges, drone), the top (symbols, labels).
 import type { EstimateMsg, FixClass, Vec3 } from '../live/messages';
 import { interpolated, range_class, type Scene } from '../state/scene';
+import type { Backdrop } from '../state/floors';
 import { accuracy, age, percent } from '../ui/format';
 import { to_px, type Camera } from './camera';
 import { round_length } from './enu';
@@ -15,6 +16,7 @@ export interface Content {
   readonly link_lost: boolean;
   readonly running: boolean; ///< the flight is being recorded
   readonly flight?: FlightPicture | null; ///< what is to be flown, where something is
+  readonly backdrops?: readonly Backdrop[]; ///< plans of floors, under everything
 }
 
 const RANGE_STALE_MS = 2000,
@@ -27,7 +29,9 @@ export function draw_slow(c: Ctx, p: Palette, cam: Camera, content: Content, mag
   c.fillStyle = p.map;
   c.fillRect(0, 0, cam.w, cam.h);
   grid(c, p, cam);
-  if (content.flight) draw_flight(c, p, cam, content.flight);
+  const backdrops = content.backdrops ?? [];
+  for (const b of backdrops) draw_backdrop(c, cam, b);
+  if (content.flight) draw_flight(c, p, cam, content.flight, backdrops.length > 0);
   const r = symbol_r(p);
   for (const a of content.anchors) {
     if (!a.enu_m) continue;
@@ -50,6 +54,15 @@ export function draw_slow(c: Ctx, p: Palette, cam: Camera, content: Content, mag
     // An ellipse smaller than its symbol would only blur it.
     if (a.ellipse95 && a.ellipse95.major_m * scale > r) ellipse_at(c, p, a.ellipse95, x, y, scale, colour, false);
   }
+}
+/// Half as strong as it is drawn: a plan is there to find one's way by, not to be read.
+export function draw_backdrop(c: Ctx, cam: Camera, b: Backdrop): void {
+  const [left, bottom] = to_px(cam, b.low),
+    [right, top] = to_px(cam, b.high);
+  c.save();
+  c.globalAlpha = 0.5;
+  c.drawImage(b.image, left, top, right - left, bottom - top);
+  c.restore();
 }
 /// Symbols and labels, above the ranges: a line must never strike out a name.
 export function draw_top(c: Ctx, p: Palette, cam: Camera, content: Content): void {

@@ -3,10 +3,11 @@ import { effect, signal } from '@preact/signals';
 import { useEffect, useMemo, useRef } from 'preact/hooks';
 import { api_url, ApiError } from '../api/client';
 import { published, row_of_estimate, type AnchorRow } from '../api/anchors';
-import { enu_from_geodetic } from '../map/enu';
+import { enu_from_geodetic, type Geodetic } from '../map/enu';
 import type { FlightPicture } from '../map/flight_layer';
 import { MapBox } from '../map/map_box';
 import { done_count, shown_estimates } from '../state/done';
+import { backdrops } from '../state/floors';
 import { me, may_publish } from '../state/session';
 import { chosen_anchor, current_mission, current_scene, link, revision, synced, tick } from '../state/store';
 import type { MissionMsg } from '../live/messages';
@@ -43,11 +44,15 @@ function follow_revisions(): void {
   });
 }
 
+/// Of the metres of what is published.
+function origin_of(rows: readonly AnchorRow[]): Geodetic | null {
+  const first = rows.find((r) => r.lon !== null && r.lat !== null);
+  return first ? { lon: first.lon!, lat: first.lat!, h_m: first.h_m ?? 0 } : null;
+}
 /// Metres for the map: an anchor's own ENU, or its place on the globe about the first one where the revision mixes sites or flights.
 function on_the_ground(rows: readonly AnchorRow[]): AnchorRow[] {
-  const first = rows.find((r) => r.lon !== null && r.lat !== null);
-  if (!first) return [...rows];
-  const origin = { lon: first.lon!, lat: first.lat!, h_m: first.h_m ?? 0 };
+  const origin = origin_of(rows);
+  if (!origin) return [...rows];
   return rows.map((r) =>
     r.lon === null || r.lat === null
       ? r
@@ -228,6 +233,7 @@ export function Anchors({ anchor }: { anchor: string | null }) {
           link_lost: link.peek() === 'lost',
           running: mission?.state === 'recording',
           flight: live ? building() : null,
+          backdrops: backdrops(live ? mission?.origin : origin_of(rows)),
         })}
         zero={live ? undefined : 'the first anchor'}
         onSelect={(a) => (chosen_anchor.value = a)}

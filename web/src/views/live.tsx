@@ -3,6 +3,7 @@ import { useEffect } from 'preact/hooks';
 import { MapBox } from '../map/map_box';
 import type { Content } from '../map/picture';
 import { done_count, shown_estimates } from '../state/done';
+import { backdrops } from '../state/floors';
 import { me } from '../state/session';
 import {
   chosen_anchor,
@@ -39,6 +40,7 @@ export function content(): Content {
     link_lost: link.peek() === 'lost',
     running: m?.state === 'recording',
     flight: flight_picture(),
+    backdrops: backdrops(m?.origin),
   };
 }
 

@@ -1,4 +1,5 @@
 /// Plan: outline, areas and waypoints, drawn or typed; generated from the outline; checked while it is edited; saved by revision.
+import { signal } from '@preact/signals';
 import { useRef, useState } from 'preact/hooks';
 import '../desk.css';
 import './plan.css';
@@ -6,9 +7,11 @@ import { EMPTY, export_url } from '../../api/plans';
 import { Elevation } from '../../map/elevation_box';
 import { elevation_shown } from '../../map/elevation_shown';
 import type { Geodetic } from '../../map/enu';
+import { may } from '../../state/session';
 import { current_mission, current_scene, now_ms, tick } from '../../state/store';
 import { age } from '../../ui/format';
 import { Icon } from '../../ui/marks';
+import { useLater } from '../../ui/use_later';
 import { PlanNotice } from '../flight/plan_notice';
 import { CheckPanel, Profile } from './check_panel';
 import { Conflict } from './conflict';
@@ -53,12 +56,26 @@ export function Plan({ id }: { id: string | null }) {
         />
       )}
       {flown && flown.plan === plan.id && <PlanNotice p={flown} />}
+      {floor_plan_open.value && <FloorPlan desk={desk} />}
       <div class="planbody">
         <Drawn desk={desk} shown={shown} />
         <Side desk={desk} shown={shown} show={show} />
       </div>
     </div>
   );
+}
+
+const floor_plan_open = signal(false);
+const load_floor_plan = () => import('./floor_plan').then((m) => m.FloorPlanDialog);
+function FloorPlan({ desk }: { desk: Desk }) {
+  const { part: Dialog } = useLater(load_floor_plan);
+  return Dialog ? (
+    <Dialog
+      corners={desk.plan.outline}
+      close={() => (floor_plan_open.value = false)}
+      use_outline={(outline) => desk.change({ ...desk.plan, outline: [...outline] })}
+    />
+  ) : null;
 }
 
 function Toolbar({ desk }: { desk: Desk }) {
@@ -98,6 +115,11 @@ function Toolbar({ desk }: { desk: Desk }) {
       />
       <span class="mut">{plan.id ? `revision ${plan.revision}${dirty ? ', changed' : ''}` : 'not saved'}</span>
       <span class="grow" />
+      {may('integrator') && (
+        <button class="btn" data-testid="open-floor-plan" onClick={() => (floor_plan_open.value = true)}>
+          Floor plan
+        </button>
+      )}
       {able && (
         <>
           <button class="btn" disabled={!desk.can_undo} onClick={desk.undo}>

@@ -2,6 +2,9 @@
 import { useEffect, useRef, useState } from 'preact/hooks';
 import type { Plan } from '../../api/plans';
 import { length_words, round_length, type Geodetic } from '../../map/enu';
+import { LevelChoice } from '../../map/level_choice';
+import { draw_backdrop } from '../../map/picture';
+import { backdrop_version, backdrops } from '../../state/floors';
 import { Icon } from '../../ui/marks';
 import { fixed } from '../../ui/format';
 import { added, corners, from_m, moved, removed, to_m, type Picked, type Shape } from './draft';
@@ -186,7 +189,7 @@ export function PlanMap({
         zoom(e.deltaY < 0 ? 1.2 : 1 / 1.2);
       }}
       onPointerDown={(e) => {
-        if (e.target instanceof Element && e.target.closest('button')) return;
+        if (e.target instanceof Element && e.target.closest('button, select')) return;
         const [x, y] = local(e);
         drag.current = { x, y, view: v, far: false };
       }}
@@ -210,6 +213,7 @@ export function PlanMap({
       onPointerLeave={() => set_over(null)}
       onPointerCancel={() => (drag.current = null)}
     >
+      {w > 0 && <Under origin={origin} v={v} w={w} h={h} />}
       {w > 0 && (
         <svg width={w} height={h} aria-hidden="true">
           <Grid v={v} w={w} h={h} />
@@ -290,6 +294,7 @@ export function PlanMap({
           <Icon name="side" />
         </button>
       </div>
+      <LevelChoice />
       <div class="scalebar">
         <span class="sb">
           <i style={{ width: `${bar_m * v.px_per_m}px` }} />
@@ -298,6 +303,19 @@ export function PlanMap({
       </div>
     </div>
   );
+}
+
+/// Plans of floors under the drawing.
+function Under({ origin, v, w, h }: { origin: Geodetic; v: View; w: number; h: number }) {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const version = backdrop_version.value;
+  useEffect(() => {
+    const c = canvas.current?.getContext('2d');
+    if (!c) return;
+    c.clearRect(0, 0, w, h);
+    for (const b of backdrops(origin)) draw_backdrop(c, { ...v, w, h }, b);
+  }, [origin, v, w, h, version]);
+  return <canvas class="underplan" ref={canvas} width={w} height={h} aria-hidden="true" data-testid="under-plan" />;
 }
 
 function Grid({ v, w, h }: { v: View; w: number; h: number }) {

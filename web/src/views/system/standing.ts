@@ -67,6 +67,21 @@ const DROPPED: Readonly<Record<string, string>> = {
   out_of_order: 'out of order',
   caster_refused: 'the caster refused',
   no_rtcm_bytes: 'bytes that are no RTCM',
+  not_utf8: 'messages that are not UTF-8',
+  not_json: 'messages that are not JSON',
+  too_deep: 'messages that are nested too deeply',
+  too_large: 'messages that are too large',
+  no_array: 'no array where the mapping says',
+  too_many: 'more than 10 000 elements in a message',
+  bad_tag: 'no tag where the mapping says',
+  bad_anchor: 'no anchor where the mapping says',
+  bad_distance: 'no distance where the mapping says',
+  out_of_reach: 'distances below 0.05 m or above 150 m (unit of the mapping?)',
+  bad_time: 'no time where the mapping says',
+  time_off: 'times more than a minute away (clock not set, or unit of the mapping?)',
+  bad_power: 'a power outside of -200 to 50 dBm',
+  too_many_tags: 'more than 64 tags',
+  retained: 'messages that the broker kept from before',
   write_refused: 'the device takes no more bytes',
   write_without_link: 'nobody to send to',
   port_conflict: 'the port is taken by another device here',
@@ -195,6 +210,16 @@ function silent(d: Device, noise = /make no frame/.test(d.reason)): Standing {
         ? 'Edit: take a mount point that gives RTCM 3.'
         : 'Check the mount point; some casters want to know where the rover is (Edit).',
     );
+  if (d.kind === 'mqtt' || d.kind === 'ndjson')
+    return bad(
+      'SILENT',
+      noise ? 'Messages come, but none of them can be used.' : 'The link is open, but no message comes.',
+      noise
+        ? 'Details shows why messages are rejected: correct the mapping.'
+        : d.kind === 'mqtt'
+          ? 'Check that the broker runs.'
+          : 'Check that the tag sends, and that each line ends.',
+    );
   return bad(
     'SILENT',
     noise ? 'Bytes come, but none of them can be read.' : 'The link is open, but the receiver says nothing.',
@@ -217,12 +242,39 @@ const LOW_FIX: Readonly<Record<string, readonly [Tone, string, string]>> = {
     'Wait for the fix with a free sky. It stays float where the base is far or its corrections are old.',
   ],
 };
+/// Ranges of another system; a position stream makes no rows.
+const by_mapping = (d: Device): boolean =>
+  d.kind === 'ndjson' || (d.kind === 'mqtt' && d.options['format'] !== 'pozyx');
+const of_ranges = (d: Device): boolean => d.kind === 'pozyx' || d.kind === 'dwm1001' || by_mapping(d);
 /// Of a tag or rover whose link is good: does it deliver what it is there for?
 function delivering(d: Device, recent: Lately): Standing {
   // One stray line is no reason; what comes once in two seconds is.
   const drops = lost_messages(recent.dropped),
     [first] = by_count(recent.dropped).filter(([, n]) => 2 * n >= recent.span_s),
     known = recent.span_s >= 5;
+  if (d.kind === 'dwm1001' && known && recent.rows === 0)
+    return bad(
+      'NO RANGES',
+      first
+        ? `The module answers, but not with ranges: ${dropped_words(first[0])}.`
+        : 'The module measures to no anchor.',
+      'Switch its anchors on; they must be in its network (panid).',
+    );
+  if (by_mapping(d)) {
+    const why = first ? ` Most are rejected: ${dropped_words(first[0])}.` : '';
+    if (known && recent.rows === 0)
+      return bad(
+        'NO RANGES',
+        first ? `No message makes a range.${why}` : 'No message comes.',
+        first ? 'Correct the mapping: anchord devices settings.' : 'Check that the tags send, and the topic.',
+      );
+    if (known && drops > recent.rows)
+      return caution(
+        'FEW RANGES',
+        `More is rejected than used.${why}`,
+        'Details shows what was dropped, and how often.',
+      );
+  }
   if (d.kind === 'pozyx') {
     // A failed exchange now and then is the air; more than half of them is a fault.
     const none = known && recent.rows === 0,
@@ -313,7 +365,7 @@ function delivering(d: Device, recent: Lately): Standing {
   // Linked for less than the five seconds that a verdict takes: not wrong yet, but nothing was delivered that would make it working.
   if (d.kind === 'gnss' && !d.rover && recent.rows === 0)
     return stand('estimating', 'info', 'OPENING', 'It talks; waiting for its first position.');
-  if (d.kind === 'pozyx' && !d.counters.ranges && recent.rows === 0)
+  if (of_ranges(d) && !d.counters.ranges && recent.rows === 0)
     return stand('estimating', 'info', 'OPENING', 'It talks; waiting for its first range.');
   return stand('ok', 'ok', 'WORKING');
 }
@@ -381,7 +433,7 @@ export function doing(d: Device): string {
     ]
       .filter(Boolean)
       .join(', ');
-  if (d.kind === 'pozyx')
+  if (of_ranges(d))
     return d.counters.ranges ? `${d.counters.ranges.toLocaleString('en').replaceAll(',', ' ')} ranges` : '';
   return d.kind === 'ntrip' && d.counters.frames
     ? `${d.counters.frames.toLocaleString('en').replaceAll(',', ' ')} correction${d.counters.frames === 1 ? '' : 's'}`

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+
+#include "core/base/result.hpp"
+#include "core/floor_plan/georeference.hpp"
+#include "core/floor_plan/image_head.hpp"
+#include "core/types/document.hpp"
+#include "core/types/position.hpp"
+
+namespace anchord::api {
+
+/// Where a plan lies, and how that is known.
+struct Georeference {
+  Wgs84 origin{};  ///< of the ENU metres
+  floor_plan::PlanTransform transform{};
+  Document document;                   ///< as it is kept and shown
+  std::optional<std::string> wrong{};  ///< why it must not be taken: a point that does not fit the others
+};
+
+/// By the tags of a GeoTIFF, or a map file beside the picture: the map's affine in metres round the origin.
+/// datum  of the site ("ETRS89"), for a map of another one
+/// errors unsupported (a map without a code, or whose code is not known here), invalid_argument
+Result<Georeference> by_map(const floor_plan::GeoTags& tags, std::string_view source, std::int64_t width_px,
+                            std::int64_t height_px, const std::optional<Wgs84>& site_origin,
+                            const std::string& datum);
+
+/// By the body of PUT .../georeference. Throws its problem.
+/// tags  of the plan, for source "geotiff"
+Georeference read_georeference(const nlohmann::json& body, const std::optional<floor_plan::GeoTags>& tags,
+                               std::int64_t width_px, std::int64_t height_px,
+                               const std::optional<Wgs84>& site_origin, const std::string& datum);
+
+/// Of what is kept; nothing where a plan was never placed.
+std::optional<Georeference> kept_georeference(const Document& document);
+
+}  // namespace anchord::api

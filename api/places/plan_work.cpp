@@ -1,0 +1,127 @@
+#include "api/places/plan_work.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "api/kit/reader.hpp"
+#include "core/base/base64.hpp"
+#include "core/base/enum_table.hpp"
+#include "core/base/steady.hpp"
+#include "core/base/to_wire.hpp"
+#include "core/floor_plan/backdrop.hpp"
+#include "core/floor_plan/trace.hpp"
+
+namespace anchord::api {
+
+using Json = nlohmann::json;
+
+namespace {
+
+constexpr std::string_view k_mark = "floor_plan ";
+constexpr auto k_task_words = enum_table<PlanTask>(
+    {{"inspect", PlanTask::inspect}, {"backdrop", PlanTask::backdrop}, {"trace", PlanTask::trace}});
+
+Json pair_json(const Eigen::Vector2d& m) { return {m.x(), m.y()}; }
+
+Result<std::string> inspect(floor_plan::Image image) {
+  const int width = image.width_px, height = image.height_px;
+  auto preview = floor_plan::shrunk(std::move(image), k_preview_px);
+  BOOST_OUTCOME_TRY(const auto png, floor_plan::encode_png_within(std::move(preview), k_max_picture_bytes));
+  return to_wire(Json{{"width_px", width}, {"height_px", height}, {"png", base64(png)}});
+}
+
+Result<std::string> backdrop(const floor_plan::Image& image, const floor_plan::PlanTransform& transform) {
+  BOOST_OUTCOME_TRY(auto made, floor_plan::make_backdrop(image, transform, k_backdrop_px));
+  BOOST_OUTCOME_TRY(const auto png,
+                    floor_plan::encode_png_within(std::move(made.image), k_max_picture_bytes));
+  return to_wire(
+      Json{{"low_m", pair_json(made.low_m)}, {"high_m", pair_json(made.high_m)}, {"png", base64(png)}});
+}
+
+Result<std::string> trace(const floor_plan::Image& image, const floor_plan::PlanTransform& transform,
+                          const std::stop_token& stop, const WorkProgressSink& progress) {
+  BOOST_OUTCOME_TRY(const auto found,
+                    floor_plan::trace_plan(image, transform, {}, [&](double fraction, std::string_view step) {
+                      if (progress) progress({std::string(step), 0, 3, fraction, ""});
+                      return !stop.stop_requested();
+                    }));
+  Json outline = Json::array(), walls = Json::array();
+  for (const auto& corner : found.outline_m) outline.push_back(pair_json(corner));
+  for (const auto& wall : found.walls)
+    walls.push_back({{"from_m", pair_json(wall.from_m)},
+                     {"to_m", pair_json(wall.to_m)},
+                     {"thickness_m", wall.thickness_m}});
+  return to_wire(Json{{"outline_m", std::move(outline)},
+                      {"walls", std::move(walls)},
+                      {"cell_m", found.cell_m},
+                      {"notes", found.notes}});
+}
+
+}  // namespace
+
+bool is_plan_work(std::string_view message) { return message.starts_with(k_mark); }
+
+Result<std::string> do_plan_work(std::string_view message, const std::stop_token& stop,
+                                 const WorkProgressSink& progress) {
+  const auto line_end = message.find('\n');
+  if (!is_plan_work(message) || line_end == std::string_view::npos)
+    return make_error(Errc::bad_frame, "no work on a plan");
+  const auto head = Json::parse(message.substr(k_mark.size(), line_end - k_mark.size()), nullptr, false);
+  const auto bytes = message.substr(line_end + 1);
+  try {
+    BOOST_OUTCOME_TRY(const auto task, k_task_words.parse("task", head.at("task").get<std::string>()));
+    floor_plan::PlanTransform transform;
+    const auto& m = head.at("enu_from_pixel");
+    transform.linear << m.at(0).get<double>(), m.at(1).get<double>(), m.at(3).get<double>(),
+        m.at(4).get<double>();
+    transform.shift_m = {m.at(2).get<double>(), m.at(5).get<double>()};
+    BOOST_OUTCOME_TRY(auto image, floor_plan::decode_image(std::as_bytes(std::span(bytes))));
+    switch (task) {
+      case PlanTask::inspect:
+        return inspect(std::move(image));
+      case PlanTask::backdrop:
+        return backdrop(image, transform);
+      case PlanTask::trace:
+        return trace(image, transform, stop, progress);
+    }
+  } catch (const Json::exception& fault) {
+    return make_error(Errc::bad_frame, fault.what());
+  }
+  return make_error(Errc::bad_frame, "no work of this kind");
+}
+
+Result<std::string> plan_work_inline(const std::string& message, const WorkProgressSink& progress,
+                                     const std::function<bool()>& canceled) {
+  std::stop_source stop;
+  return do_plan_work(message, stop.get_token(), [&](const WorkProgress& p) {
+    if (canceled()) stop.request_stop();
+    if (progress) progress(p);
+  });
+}
+
+Result<Json> ask_worker(const RunWork& run, const SteadyClock& steady, PlanTask task,
+                        const floor_plan::PlanTransform& transform, std::string_view picture,
+                        const WorkProgressSink& progress, const std::function<bool()>& canceled) {
+  const auto& m = transform.linear;
+  const Json head{
+      {"task", k_task_words.word(task)},
+      {"enu_from_pixel", {m(0, 0), m(0, 1), transform.shift_m.x(), m(1, 0), m(1, 1), transform.shift_m.y()}}};
+  std::string message = std::string(k_mark) + to_wire(head) + '\n';
+  message.append(picture);
+  const auto begun = steady.now();
+  bool late = false;
+  const auto answer = run(message, progress, [&] {
+    late = late || seconds_between(begun, steady.now()) > k_plan_work_s;
+    return late || canceled();
+  });
+  if (!answer && late)
+    return make_error(Errc::invalid_argument, "the picture kept the server busy for more than " +
+                                                  std::to_string(static_cast<int>(k_plan_work_s)) +
+                                                  " s: save it again as a plain PNG, or smaller");
+  BOOST_OUTCOME_TRY(const auto text, answer);
+  Json out;
+  if (parse_json(text, out) || !out.is_object())
+    return make_error(Errc::internal, "the worker's answer cannot be read");
+  return out;
+}
+
+}  // namespace anchord::api

@@ -1,0 +1,71 @@
+#!/usr/bin/env bash
+# The Debian package: what is in it, that its SBOM names what the executable needs, that two builds are the same bytes.
+set -uo pipefail
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+cd "$root" || exit 1
+source tests/dev/checks.sh
+[[ -x ${ANCHORD_BINARY:-} ]] || { echo "FAILED: ANCHORD_BINARY names no executable"; exit 1; }
+build=$(dirname "$ANCHORD_BINARY")
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+export LC_ALL=C.UTF-8 SOURCE_DATE_EPOCH=1790000000   # 2026-09-21
+
+# make NAME: a package in a folder of its own; the umask is that of ./dev package.
+make() {
+  (cd "$build" && umask 022 && cpack -G DEB -B "$scratch/$1") >"$scratch/$1.log" 2>&1
+  pass_or_fail $? "cpack makes a package" "$(tail -n 5 "$scratch/$1.log")"
+}
+make first
+make second
+one=$(echo "$scratch"/first/*.deb) two=$(echo "$scratch"/second/*.deb)
+cmp -s "$one" "$two" ; pass_or_fail $? "two packages of one build differ" "$(sha256sum "$one" "$two")"
+
+attempt dpkg-deb --info "$one"
+expect "its description" 0 'Package: anchord'
+listed=$(awk '{sub(/#.*/, "")} $2 == "@runtime" {print $1}' .ci/packages | sort)
+depends=$(dpkg-deb --field "$one" Depends | tr ',' '\n' | awk '{print $1}' | grep -vx adduser | sort)
+[[ $listed == "$depends" ]] ; pass_or_fail $? "Depends and @runtime of .ci/packages disagree" "$(diff <(echo "$listed") <(echo "$depends"))"
+dpkg-deb --info "$one" conffiles | grep -qx /etc/anchord/anchord.toml ; pass_or_fail $? "the settings are no conffile"
+
+dpkg-deb --raw-extract "$one" "$scratch/tree" || exit 1
+tree=$scratch/tree
+doc=$tree/usr/share/doc/anchord
+for file in usr/bin/anchord lib/systemd/system/anchord.service lib/udev/rules.d/60-anchord-pozyx.rules etc/anchord/anchord.toml \
+  usr/share/man/man1/anchord.1.gz usr/share/bash-completion/completions/anchord usr/share/zsh/vendor-completions/_anchord \
+  usr/share/doc/anchord/{copyright,changelog.gz,CHANGELOG.md.gz,operations.md,anchord.spdx.json,licences.txt.gz}; do
+  [[ -s $tree/$file ]] ; pass_or_fail $? "/$file is not in the package"
+done
+odd=$(find "$tree" -not -path '*/DEBIAN*' -printf '%m %y %P\n' | awk '$2 == "d" && $1 != 755 || $2 == "f" && $1 != ($3 ~ /^usr\/bin\// ? 755 : 644)')
+[[ -z $odd ]] ; pass_or_fail $? "modes that are odd in a package" "$odd"
+empty=$(find "$tree" -type d -empty)
+[[ -z $empty ]] ; pass_or_fail $? "empty folders in the package" "$empty"
+foreign=$(dpkg-deb --contents "$one" | awk '$2 != "root/root"')
+[[ -z $foreign ]] ; pass_or_fail $? "files that are not root's" "$foreign"
+[[ $(sed -n 1p "$tree/usr/share/zsh/vendor-completions/_anchord") == '#compdef anchord' ]]
+pass_or_fail $? "zsh loads a completion by its first line"
+attempt man --warnings -E UTF-8 -l "$tree/usr/share/man/man1/anchord.1.gz"
+expect "the manual page" 0 'anchord serve'
+attempt "$tree/usr/bin/anchord" config check --config "$tree/etc/anchord/anchord.toml"
+expect "the settings of the package" 0 ''
+attempt readelf -S "$tree/usr/bin/anchord"
+[[ $output != *.debug_info* ]] ; pass_or_fail $? "the executable is not stripped"
+
+# --- SBOM: each library that is needed, each npm package of the page; a licence text for what is inside.
+read_sbom() { python3 -c '
+import json, sys
+for p in json.load(open(sys.argv[1]))["packages"]: print(p["name"], p["versionInfo"], p.get("comment", ""))' "$doc/anchord.spdx.json"; }
+named=$(read_sbom) ; pass_or_fail $? "the SBOM cannot be read"
+for library in $(readelf -d "$ANCHORD_BINARY" | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p'); do
+  grep -qF " $library" <<<"$named" ; pass_or_fail $? "the SBOM does not name $library"
+done
+for package in $(awk '{sub(/#.*/, "")} $2 == "@runtime" {print $1}' .ci/packages | grep -vx proj-data); do
+  grep -q "^$package " <<<"$named" ; pass_or_fail $? "the SBOM does not name $package"
+done
+texts=$(zcat "$doc/licences.txt.gz")
+for inside in libboost1.81-dev libeigen3-dev libceres-dev libsqlitecpp-dev nlohmann-json3-dev ol preact uplot @preact/signals; do
+  grep -q "^$inside " <<<"$named" ; pass_or_fail $? "the SBOM does not name $inside"
+  grep -qE "^$inside [^ ]+ \(in the (executable|dashboard)\)" <<<"$texts" ; pass_or_fail $? "no licence text of $inside"
+done
+! grep -q "$(date +%Y-%m-%dT)" "$doc/anchord.spdx.json" || [[ $(date +%F) == 2026-09-21 ]]
+pass_or_fail $? "the SBOM has the time of the build"
+verdict

@@ -1,0 +1,67 @@
+/// Buildings, floors and their plans.
+import { exchange, idempotency_key } from './client';
+import { call, get, list, type Wire } from './contract';
+
+export type Floor = Wire<'Floor'>;
+export type Georeference = Wire<'FloorPlanGeoreference'>;
+export type Trace = Wire<'FloorPlanTrace'>;
+export type Material = Wire<'FloorWalls'>['walls'][number]['material'];
+export const MATERIALS: readonly Material[] = ['unknown', 'brick', 'concrete', 'glass', 'plasterboard'];
+
+/// A point of the plan and the place it is.
+export interface Click {
+  readonly pixel: readonly [number, number];
+  readonly lon: number;
+  readonly lat: number;
+}
+export interface Held {
+  readonly floor: Floor;
+  readonly etag: string;
+}
+
+export const floors = (): Promise<Floor[]> => list('/floors', { query: { limit: 1000 } });
+export const buildings = (): Promise<Wire<'Building'>[]> => list('/buildings', { query: { limit: 1000 } });
+const made = (): Record<string, string> => ({ 'Idempotency-Key': idempotency_key() });
+/// A floor in the building of this name, which is made where the site has none.
+export async function create_floor(site: string, building: string, name: string, level: number): Promise<Held> {
+  const there = (await buildings()).find((b) => b.site === site && b.name === building),
+    home = there ?? (await call('post', '/buildings', { body: { site, name: building }, headers: made() })).body,
+    { body, etag } = await call('post', '/floors', { body: { building: home.id, name, level }, headers: made() });
+  return { floor: body, etag };
+}
+export async function floor(id: string): Promise<Held> {
+  const { body, etag } = await call('get', '/floors/{id}', { path: { id } });
+  return { floor: body, etag };
+}
+export async function send_plan(held: Held, file: Blob): Promise<Held> {
+  const { body, etag } = await exchange('PUT', `/floors/${held.floor.id}/plan`, file, {
+    'If-Match': held.etag,
+    'Content-Type': 'application/octet-stream',
+  });
+  return { floor: body as Floor, etag };
+}
+/// `keep` false: only what the residuals would be.
+export async function georeference(held: Held, points: readonly Click[], keep: boolean): Promise<Held> {
+  const { body, etag } = await call('put', '/floors/{id}/plan/georeference', {
+    path: { id: held.floor.id },
+    query: keep ? {} : { dry_run: true },
+    body: {
+      model: 'helmert',
+      points: points.map((p) => ({ pixel: [p.pixel[0], p.pixel[1]], lon: p.lon, lat: p.lat })),
+    },
+    headers: { 'If-Match': held.etag },
+  });
+  return { floor: body, etag };
+}
+export async function trace(held: Held): Promise<Trace> {
+  await exchange('POST', `/floors/${held.floor.id}/plan/trace`, undefined, { Prefer: 'wait=120', ...made() });
+  return get('/floors/{id}/plan/trace', { path: { id: held.floor.id } });
+}
+export async function accept_trace(held: Held, material: Material): Promise<void> {
+  const { etag } = await floor(held.floor.id); // the trace made it another version
+  await call('put', '/floors/{id}/walls', {
+    path: { id: held.floor.id },
+    body: { from_trace: true, material, site_outline: false },
+    headers: { 'If-Match': etag },
+  });
+}
