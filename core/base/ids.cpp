@@ -4,21 +4,56 @@
 #include <cstdio>
 #include <random>
 
+#include "core/base/locked.hpp"
 #include "core/base/text.hpp"
 
 namespace anchord {
 
-Uuid make_uuid_v7(UtcTime now) {
+namespace {
+
+/// The 74 bits of a version 7 that are not its time: 12 before the variant, 62 after it.
+struct Tail {
+  std::uint64_t high{}, low{};
+};
+constexpr std::uint64_t k_low_bits = (std::uint64_t{1} << 62) - 1;
+
+std::uint64_t random_bits() {
   thread_local std::random_device random;
-  Uuid id;
+  return (std::uint64_t{random()} << 32) | random();
+}
+
+/// The first bit of a new one is left free, so that no millisecond counts over its end (RFC 9562, 6.2).
+Tail new_tail() { return {random_bits() & 0x7ff, random_bits() & k_low_bits}; }
+
+Tail later_tail(Tail before) {
+  before.low += 1 + (random_bits() & 0xffff'ffff);
+  return {before.high + (before.low >> 62), before.low & k_low_bits};
+}
+
+/// Of ids of one millisecond the later made is the greater: lists and "the newest" go by it.
+Tail next_tail(std::uint64_t ms) {
+  struct Last {
+    std::uint64_t ms{};
+    Tail tail;
+  };
+  static Locked<Last> last;
+  const auto held = last.lock();
+  held->tail = held->ms == ms ? later_tail(held->tail) : new_tail();
+  held->ms = ms;
+  return held->tail;
+}
+
+}  // namespace
+
+Uuid make_uuid_v7(UtcTime now) {
   const auto ms = static_cast<std::uint64_t>(now.ns / 1'000'000);
+  const Tail tail = next_tail(ms);
+  Uuid id;
   for (std::size_t i = 0; i < 6; ++i) id.bytes[i] = static_cast<std::uint8_t>(ms >> (40 - 8 * i));
-  for (std::size_t i = 6; i < 16; i += 2) {
-    const auto bits = random();
-    id.bytes[i] = static_cast<std::uint8_t>(bits);
-    id.bytes[i + 1] = static_cast<std::uint8_t>(bits >> 8);
-  }
-  id.bytes[6] = static_cast<std::uint8_t>((id.bytes[6] & 0x0f) | 0x70);
+  id.bytes[6] = static_cast<std::uint8_t>(0x70 | (tail.high >> 8));
+  id.bytes[7] = static_cast<std::uint8_t>(tail.high);
+  for (std::size_t i = 8; i < 16; ++i)
+    id.bytes[i] = static_cast<std::uint8_t>(tail.low >> (56 - 8 * (i - 8)));
   id.bytes[8] = static_cast<std::uint8_t>((id.bytes[8] & 0x3f) | 0x80);
   return id;
 }

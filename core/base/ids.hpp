@@ -17,7 +17,8 @@ struct Uuid {
   auto operator<=>(const Uuid&) const = default;
 };
 
-/// Version 7 from a time and 74 random bits of the operating system's generator.
+/// Version 7 from a time and the operating system's random bits. Of ids that one program makes of one
+/// millisecond the later is the greater (RFC 9562 section 6.2, method 2).
 Uuid make_uuid_v7(UtcTime now);
 /// Lower-case canonical form, 36 characters.
 std::string to_string(const Uuid& id);

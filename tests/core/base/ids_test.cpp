@@ -15,6 +15,25 @@ TEST(Uuid, Version7SortsByTimeAndSurvivesTheRoundTrip) {
   EXPECT_EQ(parse_uuid(text).value(), a);
 }
 
+// RFC 9562 section 6.2: what a program makes within one tick of its clock still sorts as it was made.
+TEST(Uuid, Version7OfOneMillisecondSortsAsItWasMade) {
+  const UtcTime now = UtcTime::from_us(1777889472345678);
+  Uuid before = make_uuid_v7(now);
+  for (int i = 0; i < 20'000; ++i) {
+    const Uuid next = make_uuid_v7(now);
+    ASSERT_LT(before, next) << i;
+    ASSERT_EQ(to_string(next).substr(0, 15), "019df278-6f59-7") << "its time and its version are untouched";
+    ASSERT_EQ(next.bytes[8] >> 6, 2) << "the variant of RFC 9562";
+    before = next;
+  }
+}
+
+TEST(Uuid, Version7OfTwoMillisecondsShareNothingOfTheirRandomBits) {
+  const auto tail = [](std::int64_t us) { return to_string(make_uuid_v7(UtcTime::from_us(us))).substr(15); };
+  EXPECT_NE(tail(1'000), tail(2'000));
+  EXPECT_NE(tail(1'000), tail(2'000)) << "nor a clock set back the bits it gave before";
+}
+
 TEST(Uuid, RefusesAnythingButTheCanonicalForm) {
   for (const char* text :
        {"", "0197a3c2", "0197a3c25d107b1e9c550a1b2c3d4e5f", "0197a3c2-5d10-7b1e-9c55-0a1b2c3d4e5g"}) {
