@@ -34,7 +34,7 @@ Response as_csv(const std::vector<AnchorFeature>& features) {
 
 Response list(AnchorApi& s, const Request& request) {
   const std::string format =
-      negotiate(request, {"geojson", "json", "csv", "ndjson", "kml", "gpkg", "dxf", "pnezd", "pozyx"});
+      negotiate(request, {"geojson", "json", "csv", "ndjson", "kml", "gpkg", "dxf", "ifc", "pnezd", "pozyx"});
   if (format != "geojson" && format != "json" && format != "csv" && format != "ndjson")
     return s.file(format, request);
   check_query(request, {"view", "revision", "mission", "site", "bbox", "limit", "cursor", "format"});

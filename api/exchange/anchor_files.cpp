@@ -7,6 +7,7 @@
 #include "api/anchors/anchor_selection.hpp"
 #include "api/anchors/routes.hpp"
 #include "api/exchange/anchor_drawing.hpp"
+#include "api/exchange/anchor_ifc.hpp"
 #include "api/exchange/anchor_tables.hpp"
 #include "api/exchange/routes.hpp"
 #include "api/kit/support.hpp"
@@ -68,6 +69,7 @@ struct File {
 constexpr std::array k_files{File{"kml", "application/vnd.google-earth.kml+xml", "anchors.kml", false},
                              File{"gpkg", "application/geopackage+sqlite3", "anchors.gpkg", false},
                              File{"dxf", "image/vnd.dxf", "anchors.dxf", true},
+                             File{"ifc", "application/x-step", "anchors.ifc", true},
                              File{"pnezd", "text/csv; charset=utf-8", "anchors-pnezd.csv", true},
                              File{"pozyx", "application/json", "pozyx.json", false}};
 
@@ -78,6 +80,7 @@ std::string bytes_of(ExchangeApi& s, std::string_view format, const Anchors& anc
     return value_or_problem(
         s.geopackage(anchor_tables(anchors, s.missions, s.measurements), s.anchors.clock.now()));
   if (format == "dxf") return anchors_dxf(anchors, checked_height(anchors, request));
+  if (format == "ifc") return anchors_ifc(anchors, checked_height(anchors, request));
   if (format == "pnezd") return anchors_pnezd(anchors, checked_height(anchors, request));
   complete(
       anchors, [](const auto& f) { return !f.local_m; }, "local coordinates",

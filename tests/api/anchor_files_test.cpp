@@ -1,5 +1,6 @@
 // Files of published anchors: what is in them, and which are refused. GDAL reads each in
 // tests/e2e/neighbours.test.mjs.
+#include "api/exchange/step_text.hpp"
 #include "app_fixture.hpp"
 
 namespace anchord::test {
@@ -57,9 +58,44 @@ TEST_F(AnchorFiles, DxfHasALayerForEachFloorAlsoWhereNamesOfLayersCollide) {
   EXPECT_NE(file("dxf").body.find("\r\n2\r\nFLOOR_0_5_2\r\n"), std::string::npos);
 }
 
+// ISO 10303-21, 6.4.3: quotes and backslashes are doubled, characters outside ASCII are \X2\ with UTF-16.
+TEST_F(AnchorFiles, IfcHasTextOfItsNotationAndTheGlobalIdsOfTheBuilding) {
+  publish(true);
+  patch("0x6a2f", {{"name", "d'Hal \\ \u00e9"}, {"ifc_guid", "2O2Fr$t4X7Zf8NOew3FLOH"}});
+  patch("0x6a3c", {{"ifc_guid", "2O2Fr$t4X7Zf8NOew3FLOH"}});
+  const auto got = file("ifc");
+  ASSERT_EQ(got.status, 200) << got.body;
+  EXPECT_NE(got.body.find("('2O2Fr$t4X7Zf8NOew3FLOH',$,'d''Hal \\\\ \\X2\\00E9\\X0\\',$,'UWB anchor'"),
+            std::string::npos)
+      << got.body;
+  EXPECT_EQ(got.body.find("2O2Fr$t4X7Zf8NOew3FLOH"), got.body.rfind("2O2Fr$t4X7Zf8NOew3FLOH"))
+      << "a GlobalId is of one thing alone";
+  EXPECT_NE(got.body.find("IFCPROJECTEDCRS('EPSG:25831',$,'ETRS89','ellipsoidal height'"), std::string::npos);
+  EXPECT_NE(got.body.find(",550012.0000,5652635.0000,0.,1.,0.,1.)"), std::string::npos);
+  EXPECT_EQ(file("ifc").body, got.body) << "the same anchors, the same file";
+}
+
+// Six bits a character, two in the first: ISO 16739-1, IfcGloballyUniqueId.
+TEST(StepText, PacksAUuidIntoTwentyTwoCharacters) {
+  EXPECT_EQ(api::step::guid({}), "0000000000000000000000");
+  Uuid all;
+  all.bytes.fill(0xff);
+  EXPECT_EQ(api::step::guid(all), "3$$$$$$$$$$$$$$$$$$$$$");
+  for (const char* bad : {"", "000000000000000000000", "4000000000000000000000", "000000000000000000000-"})
+    EXPECT_FALSE(api::step::is_guid(bad)) << bad;
+  EXPECT_TRUE(api::step::is_guid("2O2Fr$t4X7Zf8NOew3FLOH"));
+}
+
+TEST(StepText, CutsNoCharacterAndKeepsLineEndsAndBrokenBytesOut) {
+  EXPECT_EQ(api::step::text("a\nb\x7f"), "'a b '");
+  EXPECT_EQ(api::step::text("\xff"), "'\\X2\\FFFD\\X0\\'");
+  EXPECT_EQ(api::step::text("\xf0\x9d\x84\x9e"), "'\\X4\\0001D11E\\X0\\'");
+  EXPECT_EQ(api::step::text(std::string(300, 'a')), "'" + std::string(255, 'a') + "'");
+}
+
 TEST_F(AnchorFiles, AreRefusedWhereAnAnchorWouldBeMissing) {
   publish(false);
-  for (const char* format : {"dxf", "pnezd", "pozyx"}) {
+  for (const char* format : {"dxf", "ifc", "pnezd", "pozyx"}) {
     const auto got = file(format);
     EXPECT_EQ(got.status, 422) << format;
     EXPECT_NE(json(got)["detail"].get<std::string>().find("0x6a2f, 0x6a3c have no "), std::string::npos)
@@ -101,6 +137,8 @@ TEST_F(AnchorFiles, AreThePublishedOnesWhole) {
 TEST_F(AnchorFiles, OfNothingPublishedAreEmptyAndValid) {
   EXPECT_EQ(file("pnezd").body, "");
   EXPECT_EQ(json(file("pozyx")), Json::array());
+  EXPECT_EQ(file("ifc").body.find("IFCMAPCONVERSION"), std::string::npos) << "no map system is known";
+  EXPECT_TRUE(file("ifc").body.ends_with("END-ISO-10303-21;\r\n"));
   EXPECT_TRUE(file("dxf").body.ends_with("0\r\nEOF\r\n"));
   EXPECT_TRUE(file("gpkg").body.starts_with("SQLite format 3"));
 }

@@ -196,6 +196,7 @@ TEST(WireWords, AreThoseOfOpenApi) {
       {"Delivery.state", words(k_delivery_words)},
       {"GET /api/v1/anchors ?height", words(k_file_height_words)},
       {"GET /api/v1/exports/anchors.dxf ?height", words(k_file_height_words)},
+      {"GET /api/v1/exports/anchors.ifc ?height", words(k_file_height_words)},
       {"GET /api/v1/exports/anchors-pnezd.csv ?height", words(k_file_height_words)},
       {"MissionCreate.frame", words(k_frame_words)},
       {"Mission.frame", words(k_frame_words)},

@@ -91,7 +91,7 @@ test('a local frame, fitted to the published anchors', async () => {
     const { headers } = await call('GET', path, { expect: 200 });
     await call('PATCH', path, merge(headers.get('etag'), { site: ids.site }));
   }
-  for (const format of ['dxf', 'pnezd', 'kml', 'gpkg'])
+  for (const format of ['dxf', 'ifc', 'pnezd', 'kml', 'gpkg'])
     await call('GET', `/api/v1/anchors?format=${format}`, { expect: 200 });
   await call('GET', '/api/v1/anchors?format=pozyx', { expect: 422 }); // no frame is fitted
   const shift = { shift: { east_m: 0.1, north_m: 0, up_m: 0 }, note: 'base surveyed again' };

@@ -1,10 +1,11 @@
 // What other people's programs read of a running server, each by the program itself (docs/integration.md has the table).
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
+import * as ifc from 'web-ifc';
 import { ndjson, simulatedFlight } from './flight.mjs';
 import { apart, gdal, layer } from './gdal.mjs';
 import { startServer } from './server.mjs';
@@ -182,6 +183,47 @@ test('GDAL reads the DXF: a layer for each floor, 3-D points in the map system',
     assert.equal(found.properties.Layer, `FLOOR_${anchor.properties.floor}`);
     assert.ok(Math.abs(found.geometry.coordinates[2] - anchor.geometry.coordinates[2]) < 0.001);
   }
+});
+
+test('web-ifc reads the IFC: antennas on their floors, metres of the map system, accuracy', async () => {
+  const reader = new ifc.IfcAPI();
+  await reader.Init();
+  const model = reader.OpenModel(readFileSync(await exported('anchors.ifc')));
+  assert.equal(reader.GetModelSchema(model), 'IFC4');
+  const all = (type) => {
+    const ids = reader.GetLineIDsWithType(model, type);
+    return Array.from({ length: ids.size() }, (_, i) => reader.GetLine(model, ids.get(i), true));
+  };
+  const [map] = all(ifc.IFCMAPCONVERSION);
+  assert.equal(map.TargetCRS.Name.value, 'EPSG:25831');
+  const floors = new Map(
+    all(ifc.IFCRELCONTAINEDINSPATIALSTRUCTURE).flatMap(({ RelatingStructure: floor, RelatedElements: parts }) =>
+      parts.map((one) => [one.GlobalId.value, floor.Name.value]),
+    ),
+  );
+  const properties = new Map(
+    all(ifc.IFCRELDEFINESBYPROPERTIES).map(({ RelatedObjects: [one], RelatingPropertyDefinition: set }) => [
+      one.GlobalId.value,
+      Object.fromEntries(set.HasProperties.map((each) => [each.Name.value, each.NominalValue.value])),
+    ]),
+  );
+  const shapes = [];
+  reader.StreamAllMeshes(model, (mesh) => shapes.push(mesh.expressID));
+  const antennas = all(ifc.IFCCOMMUNICATIONSAPPLIANCE);
+  assert.equal(antennas.length, published.length);
+  assert.equal(shapes.length, published.length, 'each is seen');
+  for (const anchor of published) {
+    const [e, n] = await projected(anchor),
+      found = antennas.find((one) => one.Tag.value === anchor.properties.network_id),
+      [x, y, z] = found.ObjectPlacement.RelativePlacement.Location.Coordinates.map((one) => one.value);
+    assert.equal(found.PredefinedType.value, 'ANTENNA');
+    assert.ok(Math.hypot(map.Eastings.value + x - e, map.Northings.value + y - n) < 0.001, `${x} ${y}`);
+    assert.ok(Math.abs(map.OrthogonalHeight.value + z - anchor.geometry.coordinates[2]) < 0.001);
+    const guid = found.GlobalId.value;
+    assert.equal(floors.get(guid), anchor.properties.floor);
+    assert.equal(properties.get(guid).NetworkId, anchor.properties.network_id);
+  }
+  reader.CloseModel(model);
 });
 
 test("GDAL reads the surveyors' table and the KML, and Pozyx has millimetres of the local frame", async () => {
