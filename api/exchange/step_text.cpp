@@ -33,7 +33,7 @@ std::string escaped(char32_t code) {
 }  // namespace
 
 std::string step::text(std::string_view utf8) {
-  const std::string valid = to_utf8(utf8, utf8.size());
+  const std::string valid = to_utf8(utf8);
   std::string out = "'";
   std::size_t characters = 0;
   for (std::size_t i = 0; i < valid.size() && characters < k_most_characters; ++characters) {
