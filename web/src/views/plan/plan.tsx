@@ -247,6 +247,8 @@ function Drawn({ desk, shown }: { desk: Desk; shown: Shown }) {
         />
       ) : able ? (
         <Where set={desk.set_origin} />
+      ) : !desk.ready ? (
+        <p class="why pad">Loading the plans.</p>
       ) : (
         <p class="why pad">There is no plan yet. An operator draws one.</p>
       )}

@@ -58,10 +58,12 @@ export function usePlan(id: string | null) {
     [busy, set_busy] = useState(''),
     [origin, set_origin] = useState<Geodetic | null>(null),
     [back_ms, set_back] = useState<number | null>(null),
+    [ready, set_ready] = useState(false),
     [known, set_known] = useState<ReadonlyMap<string, AnchorRow>>(new Map());
   const plan = history.now,
     dirty = plan !== saved,
-    able = may('operator');
+    // Until the plans are there nothing can be drawn: it would be thrown away when one of them opens.
+    able = ready && may('operator');
   // Metres are about one origin for as long as a plan is open: a map that moves while it is drawn on cannot be used.
   const open = (p: PlanDoc): void => {
     set_origin(origin_of(p, flown_at()));
@@ -99,6 +101,7 @@ export function usePlan(id: string | null) {
   };
   const begin = useStable((): void => {
     document.title = 'Plan - anchord';
+    set_ready(false);
     fetch_plans().then(
       (list) => {
         set_all(list);
@@ -108,8 +111,12 @@ export function usePlan(id: string | null) {
             list.find((p) => draft_key(p.id) === last) ??
             (last === draft_key(null) ? EMPTY : list[0]);
         open_with_draft(wanted ?? EMPTY);
+        set_ready(true);
       },
-      (e: unknown) => set_problem(error_text(e)),
+      (e: unknown) => {
+        set_problem(error_text(e));
+        set_ready(true);
+      },
     );
   });
   useEffect(begin, [id, begin]);
@@ -204,6 +211,7 @@ export function usePlan(id: string | null) {
     plan,
     saved,
     dirty,
+    ready,
     able,
     can_undo: history.before.length > 0,
     can_redo: history.after.length > 0,
