@@ -269,6 +269,23 @@ describe('LiveClient', () => {
     }
     world.advance(250);
     expect(links.at(-1)).toBe('live');
+    expect(log.filter((l) => l.startsWith('resumed'))).toEqual(['resumed  false']); // LOST was said: so is its end
+  });
+  it('says once that a loss is over where it took a new connection', () => {
+    up_to(5);
+    beat();
+    world.advance(6000);
+    expect(links.at(-1)).toBe('lost');
+    world.advance(2000);
+    hello();
+    ack(true, 3);
+    data(6, 5, 3);
+    beat();
+    world.advance(500);
+    beat();
+    world.advance(500);
+    expect(links.at(-1)).toBe('live');
+    expect(log.filter((l) => l.startsWith('resumed'))).toEqual(['resumed events 1 false']);
   });
   it('does not take a growing delay for a clock that goes wrong, but a clock that was set for one', () => {
     hello();

@@ -68,6 +68,7 @@ export class LiveClient implements LiveSource {
   private conflating = false;
   private asked_time_ms = -Infinity;
   private minimum_retry_ms = 0;
+  private loss_open = false; ///< LOST was said, and not yet that it is over
   private resume: { recovered: Map<string, number>; resynchronised: boolean; open: Set<string> } | null = null;
 
   constructor(
@@ -187,7 +188,14 @@ export class LiveClient implements LiveSource {
   private set_link(state: LinkState): void {
     if (state === this.state) return;
     this.state = state;
+    if (state === 'lost') this.loss_open = true;
     this.sink?.link(state);
+    // Data that only came late needs no new connection; whoever was told LOST is told that it is over all the same.
+    if (state === 'live' && this.loss_open && !this.resume) this.back(new Map(), false);
+  }
+  private back(recovered: ReadonlyMap<string, number>, resynchronised: boolean): void {
+    this.loss_open = false;
+    this.sink?.resumed(recovered, resynchronised);
   }
   private ask_time(): void {
     this.asked_time_ms = this.env.now_ms();
@@ -347,7 +355,7 @@ export class LiveClient implements LiveSource {
     if (this.resume && this.resume.open.size === 0) {
       const { recovered, resynchronised } = this.resume;
       this.resume = null;
-      this.sink?.resumed(recovered, resynchronised);
+      this.back(recovered, resynchronised);
     }
   }
   private time(m: Record<string, unknown>): void {
