@@ -38,3 +38,9 @@ it('is over when tag, position, corrections and radio settings are good', () => 
   const single = [row('pozyx', well), row('gnss', well, { rover: { ...rover, fix: 'single' as const } })];
   expect(connect_steps(single, null, {})[3]).toMatchObject({ state: 'now', what: 'my gnss: SINGLE' });
 });
+it('takes a tag of another maker for the tag, and compares no radio that it cannot read', () => {
+  const steps = connect_steps([row('dwm1001', well)], null, {});
+  expect(steps[1]).toMatchObject({ id: 'tag', state: 'done' });
+  expect(steps.map((s) => s.id)).not.toContain('radio');
+  expect(states([row('dwm1001', well), row('pozyx', ill)], null, {}).at(-1)).toBe('radio later');
+});

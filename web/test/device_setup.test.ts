@@ -1,6 +1,20 @@
 import { describe, expect, it } from 'vitest';
+import { ApiError, problem_of } from '../src/api/client';
 import { device_of } from '../src/api/devices';
-import { address_of, config_of, EMPTY, missing, parts_of, patch_of, setup_of } from '../src/views/system/device_setup';
+import {
+  address_of,
+  config_of,
+  EMPTY,
+  kind_words,
+  KINDS,
+  missing,
+  of_kind,
+  parts_of,
+  patch_of,
+  rejected_of,
+  setup_of,
+  type Setup,
+} from '../src/views/system/device_setup';
 import { radio_differences } from '../src/views/system/radio_words';
 
 /// The forms of drivers/link/address.hpp.
@@ -92,6 +106,156 @@ describe('the settings of a device', () => {
     expect(missing({ ...caster, port: '70000' })).toBe('A port number is 1 to 65535.');
     expect(missing({ ...EMPTY, path: '/dev/x', anchors: '6a21' })).toBe('6a21 is no network id like 0x6a21.');
     expect(missing(caster)).toBe('');
+  });
+});
+
+/// The mapping of docs/integration.md.
+const MAPPING = {
+  array: '/r',
+  tag: '#/id',
+  anchor: '/to',
+  id_format: 'hex',
+  distance: { pointer: '/mm', unit: 'mm' },
+  time: { pointer: '#/ts', unit: 'ms', clock: 'device', wrap_bits: 32 },
+  rss: { pointer: '/dbm', unit: 'dBm' },
+};
+const at_broker = { kind: 'mqtt', link: 'tcp', host: '192.168.2.20', port: '1883', topic: 'uwb/+/ranges' };
+const BROKER: Setup = { ...EMPTY, ...at_broker, mapping: JSON.stringify(MAPPING) };
+const LINES: Setup = { ...EMPTY, kind: 'ndjson', path: '/dev/ttyUSB0', mapping: JSON.stringify(MAPPING) };
+const MODULE: Setup = { ...EMPTY, kind: 'dwm1001', path: '/dev/serial/by-id/usb-SEGGER' };
+
+describe('the settings of a tag of another maker', () => {
+  it.each<[string, Setup, string, object]>([
+    ['mqtt', BROKER, 'tcp://192.168.2.20:1883', { mapping: MAPPING, topic: 'uwb/+/ranges' }],
+    [
+      'mqtt with a user',
+      { ...BROKER, user: 'me' },
+      'tcp://192.168.2.20:1883',
+      { mapping: MAPPING, topic: 'uwb/+/ranges', user: 'me' },
+    ],
+    ['mqtt of Pozyx', { ...BROKER, payload: 'pozyx', topic: '' }, 'tcp://192.168.2.20:1883', { format: 'pozyx' }],
+    ['ndjson', { ...LINES, baud: '9600' }, 'serial:/dev/ttyUSB0?baud=9600', { mapping: MAPPING }],
+    ['ndjson over UDP', { ...LINES, link: 'udp', port: '9001' }, 'udp://:9001', { mapping: MAPPING }],
+    ['dwm1001', MODULE, 'serial:/dev/serial/by-id/usb-SEGGER', {}],
+    [
+      'dwm1001 in binary',
+      { ...MODULE, mode: 'tlv', tag: '0x6e01' },
+      'serial:/dev/serial/by-id/usb-SEGGER',
+      { mode: 'tlv', tag: '0x6e01' },
+    ],
+  ])('of %s is sent, comes back into the form as it was, and is not sent again', (_, s, address, options) => {
+    expect(missing(s)).toBe('');
+    const sent = config_of(s);
+    expect(sent).toEqual({ kind: s.kind, name: '', address, options });
+    const was = device_of({ id: 'x', ...sent, options: sent.options! });
+    expect(config_of(setup_of(was))).toEqual(sent);
+    expect(patch_of(was, setup_of(was))).toBeNull();
+  });
+  it('is not sent again where it names what the server takes by itself', () => {
+    const was = device_of({
+      id: 'x',
+      kind: 'dwm1001',
+      name: 'n',
+      address: 'serial:/dev/x',
+      options: { mode: 'shell' },
+    });
+    expect(patch_of(was, setup_of(was))).toBeNull();
+  });
+  it('changes a mapping as a whole, and takes it out for positions of Pozyx', () => {
+    const { options, ...sent } = config_of(BROKER),
+      was = device_of({ id: 'x', ...sent, options: options! }),
+      other = { ...MAPPING, array: '/ranges' };
+    expect(patch_of(was, { ...setup_of(was), mapping: JSON.stringify(other) })).toEqual({
+      options: { mapping: other },
+    });
+    expect(patch_of(was, { ...setup_of(was), payload: 'pozyx', topic: '' })).toEqual({
+      options: { format: 'pozyx', mapping: null, topic: null },
+    });
+  });
+  it('keeps the password of a broker on the server, asks for it with another address, and forgets it with the user', () => {
+    const { options, ...sent } = config_of({ ...BROKER, user: 'me' }),
+      was = device_of({ id: 'x', ...sent, options: { ...options, password_set: true } }),
+      kept = setup_of(was);
+    expect([kept.password, patch_of(was, kept)]).toEqual(['', null]);
+    expect(patch_of(was, { ...kept, password: 'secret' })).toEqual({ options: { password: 'secret' } });
+    expect(missing({ ...kept, host: '10.0.0.9' })).toBe('The password belongs to the old address: type it again.');
+    const nobody = { ...kept, user: '', host: '10.0.0.9' };
+    expect(missing(nobody)).toBe('');
+    expect(patch_of(was, nobody)).toEqual({
+      address: 'tcp://10.0.0.9:1883',
+      options: { user: null, password: null },
+    });
+  });
+  it('is refused without a mapping, or with one that is no JSON object, with the place of the fault', () => {
+    expect(missing({ ...LINES, mapping: ' ' })).toBe('Mapping: missing. Paste the JSON object, or choose its file.');
+    expect(missing({ ...LINES, mapping: '[]' })).toMatch(/^Mapping: must be a JSON object/);
+    expect(missing({ ...LINES, mapping: '{\n  "tag": "/id",\n}' })).toMatch(
+      /^Mapping: no valid JSON at line 3, column 1\. /,
+    );
+    expect(missing({ ...LINES, mapping: 'array = "/r"\ntag = "#/id"' })).toMatch(/TOML.*as JSON.*mapping_file=/);
+  });
+  it.each<[string, object, RegExp]>([
+    ['no tag', { tag: undefined }, /"tag" is missing\. Add/],
+    ['no anchor', { anchor: undefined }, /"anchor" is missing\. Add/],
+    ['no distance', { distance: undefined }, /"distance" needs a pointer and a unit \(m, cm, mm, ft\)/],
+    ['a distance without a unit', { distance: '/mm' }, /"distance" needs a pointer and a unit/],
+    ['a distance in inches', { distance: { pointer: '/mm', unit: 'in' } }, /"distance" needs a pointer and a unit/],
+    ['a topic on a line', { topic: 'uwb/+' }, /"topic" is of MQTT.*Take it out/],
+    [
+      '10 kB and more',
+      { id_prefix: 'x'.repeat(10_000) },
+      /10\.\d kB with the other settings \(limit 10 kB\)\. Shorten/,
+    ],
+  ])('is refused where its mapping has %s', (_, part, words) =>
+    expect(missing({ ...LINES, mapping: JSON.stringify({ ...MAPPING, ...part }) })).toMatch(words),
+  );
+  it('takes the topic of the form or of the mapping, and refuses none and what is no filter', () => {
+    const inside = JSON.stringify({ ...MAPPING, topic: 'uwb/#' });
+    expect(missing({ ...BROKER, topic: '', mapping: inside })).toBe('');
+    expect(missing({ ...BROKER, topic: ' ' })).toMatch(/^Topic: missing\. Type it/);
+    expect(missing({ ...BROKER, topic: 'uwb/#/x' })).toMatch(/^Topic: "#" cannot be a level/);
+    expect(missing({ ...BROKER, topic: 'uwb/a+' })).toMatch(/^Topic: "a\+" cannot be a level/);
+    expect(missing({ ...BROKER, topic: 'x'.repeat(1001) })).toMatch(/longer than 1000 bytes/);
+    expect(missing({ ...BROKER, payload: 'pozyx', topic: '', mapping: '' })).toBe('');
+  });
+  it('is refused with a password and no user, and without the id that binary needs', () => {
+    expect(missing({ ...BROKER, password: 'secret' })).toMatch(/^User: missing, and a password needs one/);
+    expect(missing({ ...MODULE, mode: 'tlv' })).toMatch(/^Id of the tag: missing, and binary needs it/);
+    for (const tag of ['6e01', '0x', '0x100000000', '-1'])
+      expect(missing({ ...MODULE, tag })).toBe(`Id of the tag: ${tag} is no id. Type 32 bits at most, like 0x6e01.`);
+    expect(missing({ ...MODULE, tag: '27183' })).toBe('');
+  });
+  it('is asked for where the kind is: a broker at its usual port, a tag at a serial port again', () => {
+    expect(KINDS.map(([id]) => id).sort()).toEqual(['dwm1001', 'gnss', 'mqtt', 'ndjson', 'ntrip', 'pozyx']);
+    expect(kind_words('dwm1001')).toBe('DWM1001 tag');
+    const broker = { ...EMPTY, ...of_kind(EMPTY, 'mqtt') };
+    expect([broker.link, broker.port]).toEqual(['tcp', '1883']);
+    expect(of_kind(broker, 'ntrip')).toMatchObject({ link: 'tcp', port: '2101' });
+    expect(of_kind(broker, 'dwm1001')).toEqual({ kind: 'dwm1001', link: 'serial', port: '' });
+    expect(of_kind({ ...broker, host: 'h', port: '7000' }, 'ndjson')).toEqual({ kind: 'ndjson', port: '7000' });
+  });
+});
+
+describe('what the server rejects', () => {
+  const refused = (pointer: string, detail: string): ApiError =>
+    new ApiError(problem_of({ title: 'Validation', detail, errors: [{ pointer, detail }] }, 422));
+  it('is of the field that it names, every fault of a mapping by itself', () => {
+    const text = 'mapping/tag: is needed, like "/tag"; mapping/x: there is no such key; there are topic, array';
+    expect(rejected_of(refused('/options', text), 'ndjson')).toEqual({
+      field: 'mapping',
+      faults: ['mapping/tag: is needed, like "/tag"', 'mapping/x: there is no such key; there are topic, array'],
+    });
+    expect(rejected_of(refused('/options', 'tag: an id like 0x022e'), 'dwm1001')?.field).toBe('tag');
+    expect(rejected_of(refused('/options/password', 'must be a text'), 'mqtt')).toEqual({
+      field: 'password',
+      faults: ['password: must be a text'],
+    });
+  });
+  it('is of the whole form where it names no field of it', () => {
+    expect(rejected_of(refused('/address', 'tag: the host is missing'), 'mqtt')).toBeNull();
+    expect(rejected_of(refused('/options', 'must be an object below 10 kB'), 'mqtt')).toBeNull();
+    expect(rejected_of(refused('/options', 'mount: the name of a mount point'), 'ntrip')).toBeNull();
+    expect(rejected_of(new Error('no answer'), 'mqtt')).toBeNull();
   });
 });
 

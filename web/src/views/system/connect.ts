@@ -1,6 +1,6 @@
 /// Connecting devices as steps, each with what is there and what to do next. No DOM.
 import type { Device, Found, Radio } from '../../api/devices';
-import type { Standing } from './standing';
+import { of_ranges, type Standing } from './standing';
 
 export interface Step {
   readonly id: 'find' | 'tag' | 'rover' | 'corrections' | 'radio';
@@ -25,9 +25,9 @@ const FIX: Readonly<Record<string, string>> = {
 
 type Checked = Omit<Step, 'state'> & { readonly done: boolean };
 
-/// One of a kind, the one that is well first.
-const best = (rows: readonly Driven[], kind: string): Driven | undefined =>
-  [...rows.filter((r) => r.d.kind === kind && r.d.enabled)].sort(
+/// One of them, the one that is well first.
+const best = (rows: readonly Driven[], wanted: (d: Device) => boolean): Driven | undefined =>
+  [...rows.filter((r) => wanted(r.d) && r.d.enabled)].sort(
     (a, b) => Number(b.s.tone === 'ok') - Number(a.s.tone === 'ok'),
   )[0];
 
@@ -47,11 +47,13 @@ export function connect_steps(
   found: readonly Found[] | null,
   radios: Readonly<Record<string, Radio>>,
 ): Step[] {
-  const tag = best(rows, 'pozyx'),
-    rover = best(rows, 'gnss'),
-    caster = best(rows, 'ntrip'),
+  const of_kind = (kind: string): Driven | undefined => best(rows, (d) => d.kind === kind),
+    tag = best(rows, of_ranges),
+    pozyx = of_kind('pozyx'), // the one kind whose radio can be read
+    rover = of_kind('gnss'),
+    caster = of_kind('ntrip'),
     fix = rover?.d.rover?.fix ?? null,
-    radio = tag?.d.id ? radios[tag.d.id] : undefined,
+    radio = pozyx?.d.id ? radios[pozyx.d.id] : undefined,
     asked = radio?.devices.length ?? 0,
     alike = radio?.devices.filter((p) => p.done).length ?? 0,
     corrected = fix === 'float' || fix === 'fixed';
@@ -92,9 +94,10 @@ export function connect_steps(
       todo: asked
         ? 'Open Radio: it sets all of them, verifies, and goes back where that fails.'
         : 'Open Radio, and compare with the anchors: it takes up to 15 s.',
-      device: tag?.d.id ?? null,
+      device: pozyx?.d.id ?? null,
     },
   ];
+  if (tag && !pozyx) checked.pop();
   const first = checked.findIndex((s) => !s.done);
   return checked.map(({ done, ...s }, i) => ({ ...s, state: done ? 'done' : i === first ? 'now' : 'later' }));
 }

@@ -4,9 +4,22 @@ import { error_text } from '../../api/client';
 import { add_device, device_at, edit_device, type Device, type Found } from '../../api/devices';
 import { say } from '../../state/store';
 import { useDraft } from '../../ui/use_draft';
-import { BAUDS, config_of, EMPTY, KINDS, LINKS, missing, patch_of, setup_of, type Setup } from './device_setup';
-
-type Change = (part: Partial<Setup>) => void;
+import { Broker, Lines, Module, type Change } from './device_form_ranges';
+import {
+  BAUDS,
+  config_of,
+  EMPTY,
+  is_service,
+  KINDS,
+  LINKS,
+  missing,
+  of_kind,
+  patch_of,
+  rejected_of,
+  setup_of,
+  type Rejected,
+  type Setup,
+} from './device_setup';
 
 /// `device`: null for a new one; `ports`: what the last discovery found.
 export function DeviceForm({
@@ -27,11 +40,13 @@ export function DeviceForm({
     device ? setup_of(device) : { ...EMPTY, ...start },
   );
   const [problem, set_problem] = useState(''),
+    [rejected, set_rejected] = useState<Rejected | null>(null),
     [busy, set_busy] = useState(false),
     lack = missing(s);
   const send = async (): Promise<void> => {
     set_busy(true);
     set_problem('');
+    set_rejected(null);
     try {
       if (!device) await add_device(config_of(s));
       else {
@@ -44,7 +59,9 @@ export function DeviceForm({
       say(device ? 'Changed; its link is being opened anew' : 'Set up; its link is being opened');
       done();
     } catch (e) {
-      set_problem(error_text(e));
+      const at_field = rejected_of(e, s.kind);
+      set_rejected(at_field);
+      if (!at_field) set_problem(error_text(e));
     }
     set_busy(false);
   };
@@ -66,12 +83,7 @@ export function DeviceForm({
             <select
               value={s.kind}
               data-testid="device-kind"
-              onChange={(e) =>
-                change({
-                  kind: e.currentTarget.value,
-                  ...(e.currentTarget.value === 'ntrip' ? { link: 'tcp', port: s.port || '2101' } : {}),
-                })
-              }
+              onChange={(e) => change(of_kind(s, e.currentTarget.value))}
             >
               {KINDS.map(([id, words]) => (
                 <option key={id} value={id}>
@@ -97,6 +109,12 @@ export function DeviceForm({
           <Rover s={s} change={change} />
         ) : s.kind === 'pozyx' ? (
           <Tag s={s} change={change} />
+        ) : s.kind === 'dwm1001' ? (
+          <Module s={s} change={change} rejected={rejected} />
+        ) : s.kind === 'mqtt' ? (
+          <Broker s={s} change={change} rejected={rejected} />
+        ) : s.kind === 'ndjson' ? (
+          <Lines s={s} change={change} rejected={rejected} />
         ) : (
           <Caster s={s} change={change} />
         )}
@@ -130,7 +148,7 @@ function Where({ s, change, ports }: { s: Setup; change: Change; ports: readonly
   const link = (
     <label>
       <span class="lab">Link</span>
-      <select value={s.link} disabled={s.kind === 'ntrip'} onChange={(e) => change({ link: e.currentTarget.value })}>
+      <select value={s.link} disabled={is_service(s.kind)} onChange={(e) => change({ link: e.currentTarget.value })}>
         {LINKS.map(([id, words]) => (
           <option key={id} value={id}>
             {words}
@@ -162,7 +180,7 @@ function Where({ s, change, ports }: { s: Setup; change: Change; ports: readonly
               ))}
           </datalist>
         </label>
-        {s.kind === 'gnss' && (
+        {(s.kind === 'gnss' || s.kind === 'ndjson') && (
           <label>
             <span class="lab">Baud rate</span>
             <select value={s.baud} onChange={(e) => change({ baud: e.currentTarget.value })}>
@@ -200,7 +218,7 @@ function Where({ s, change, ports }: { s: Setup; change: Change; ports: readonly
           value={s.port}
           inputMode="numeric"
           data-testid="device-port"
-          placeholder={s.kind === 'ntrip' ? '2101' : '9001'}
+          placeholder={s.kind === 'ntrip' ? '2101' : s.kind === 'mqtt' ? '1883' : '9001'}
           onInput={(e) => change({ port: e.currentTarget.value })}
         />
       </label>

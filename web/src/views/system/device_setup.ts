@@ -1,13 +1,23 @@
 /// A device's settings between the form and the server: the address in its parts, the options of each kind. What the form does not know it leaves
 /// as it is. No DOM.
+import { ApiError } from '../../api/client';
 import type { Device, DeviceForm } from '../../api/devices';
+import { bytes_of, mapping_fault, mapping_of, mapping_text, topic_fault } from './device_mapping';
 
-export const KINDS = [
-  ['pozyx', 'Pozyx tag'],
-  ['gnss', 'RTK rover'],
-  ['ntrip', 'NTRIP corrections'],
+/// Kind, its words in the list of devices, and in the form where those need more.
+const KIND_WORDS = [
+  ['pozyx', 'Pozyx tag', ''],
+  ['dwm1001', 'DWM1001 tag', 'DWM1001 tag (serial or TCP)'],
+  ['mqtt', 'MQTT broker', 'MQTT broker (mapping file, or Pozyx positions)'],
+  ['ndjson', 'NDJSON tag', 'NDJSON tag (mapping file)'],
+  ['gnss', 'RTK rover', ''],
+  ['ntrip', 'NTRIP corrections', ''],
 ] as const;
-export const kind_words = (kind: string): string => KINDS.find(([id]) => id === kind)?.[1] ?? kind;
+export const KINDS: readonly (readonly [string, string])[] = KIND_WORDS.map(([id, words, long]) => [id, long || words]);
+export const kind_words = (kind: string): string => KIND_WORDS.find(([id]) => id === kind)?.[1] ?? kind;
+/// Kinds that this server connects to, and nothing else: the port they have by custom.
+const SERVICES: Readonly<Record<string, string>> = { ntrip: '2101', mqtt: '1883' };
+export const is_service = (kind: string): boolean => kind in SERVICES;
 export const LINKS = [
   ['serial', 'USB or serial port'],
   ['tcp', 'TCP, this server connects'],
@@ -39,6 +49,11 @@ export interface Setup {
   readonly password_of: string;
   readonly version: string;
   readonly send_gga: boolean;
+  readonly payload: string; ///< of mqtt: mapping or pozyx
+  readonly topic: string;
+  readonly mapping: string; ///< JSON
+  readonly mode: string;
+  readonly tag: string;
 }
 export const EMPTY: Setup = {
   kind: 'pozyx',
@@ -62,7 +77,19 @@ export const EMPTY: Setup = {
   password_of: '',
   version: '2',
   send_gga: false,
+  payload: 'mapping',
+  topic: '',
+  mapping: '',
+  mode: 'shell',
+  tag: '',
 };
+
+/// What another kind changes of the place: a service is connected to at its usual port, and a device gets its port back.
+export function of_kind(s: Setup, kind: string): Partial<Setup> {
+  const port = s.port === SERVICES[s.kind] ? '' : s.port;
+  if (is_service(kind)) return { kind, link: 'tcp', port: port || SERVICES[kind]! };
+  return { kind, port, ...(is_service(s.kind) && !s.host.trim() ? { link: 'serial' } : {}) };
+}
 
 export function address_of(s: Setup): string {
   if (s.link === 'serial') return `serial:${s.path.trim()}${s.baud === '115200' ? '' : `?baud=${s.baud}`}`;
@@ -99,6 +126,11 @@ export function setup_of(d: Device): Setup {
     password_of: o.password_set === true ? d.address : '',
     version: text(o.version) || '2',
     send_gga: o.send_gga === true,
+    payload: text(o.format) === 'pozyx' ? 'pozyx' : 'mapping',
+    topic: text(o.topic),
+    mapping: mapping_text(o.mapping),
+    mode: text(o.mode) || 'shell',
+    tag: text(o.tag),
   };
 }
 const number = (s: string): number | null => {
@@ -123,6 +155,16 @@ function options_of(s: Setup): Record<string, unknown> {
       heading: other(s.heading, false),
       anchor_anchor_s: number(s.anchor_anchor_s) || null,
     };
+  if (s.kind === 'dwm1001') return { mode: other(s.mode, 'shell'), tag: s.tag.trim() || null };
+  if (s.kind === 'ndjson') return { mapping: mapping_of(s.mapping) };
+  if (s.kind === 'mqtt')
+    return {
+      format: other(s.payload, 'mapping'),
+      mapping: s.payload === 'mapping' ? mapping_of(s.mapping) : null,
+      topic: s.topic.trim() || null,
+      user: s.user.trim() || null,
+      password: s.password || null,
+    };
   return {
     mount: s.mount.trim() || null,
     user: s.user.trim() || null,
@@ -137,15 +179,20 @@ export const config_of = (s: Setup): DeviceForm => ({
   address: address_of(s),
   options: Object.fromEntries(Object.entries(options_of(s)).filter(([, v]) => v !== null)),
 });
+/// A broker takes no password without a user: who empties the user wants to be nobody there.
+export const forgets_password = (s: Setup): boolean =>
+  s.kind === 'mqtt' && s.password_of !== '' && !s.password && !s.user.trim();
 /// Merge-patch of what changed; null when nothing did.
 export function patch_of(was: Device, s: Setup): Record<string, unknown> | null {
   const out: Record<string, unknown> = {},
     options: Record<string, unknown> = {},
-    address = address_of(s);
+    address = address_of(s),
+    before = options_of(setup_of(was));
   if (s.name.trim() !== was.name) out.name = s.name.trim();
   if (address !== address_of(setup_of(was))) out.address = address;
   for (const [key, v] of Object.entries(options_of(s)))
-    if (JSON.stringify(v) !== JSON.stringify(was.options[key] ?? null)) options[key] = v;
+    if (JSON.stringify(v) !== JSON.stringify(before[key] ?? null)) options[key] = v;
+  if (forgets_password(s)) options.password = null;
   if (Object.keys(options).length) out.options = options;
   return Object.keys(out).length ? out : null;
 }
@@ -156,8 +203,16 @@ export function missing(s: Setup): string {
   if (s.link === 'tcp' && !s.host.trim()) return 'Which computer or address?';
   if (s.link !== 'serial' && !(Number(s.port) >= 1 && Number(s.port) <= 65_535)) return 'A port number is 1 to 65535.';
   if (s.kind === 'ntrip' && !s.mount.trim()) return 'Which mount point of the caster?';
-  if (s.password_of && !s.password && address_of(s) !== address_of({ ...s, ...parts_of(s.password_of) }))
+  if (
+    s.password_of &&
+    !s.password &&
+    !forgets_password(s) &&
+    address_of(s) !== address_of({ ...s, ...parts_of(s.password_of) })
+  )
     return 'The password belongs to the old address: type it again.';
+  if (s.kind === 'ndjson') return mapping_fault(s.mapping, null) || size_fault(s);
+  if (s.kind === 'mqtt') return broker_fault(s);
+  if (s.kind === 'dwm1001') return module_fault(s);
   const id =
     s.kind === 'pozyx'
       ? s.anchors
@@ -166,4 +221,46 @@ export function missing(s: Setup): string {
           .find((a) => !/^0x[0-9a-fA-F]{1,8}$/.test(a))
       : undefined;
   return id ? `${id} is no network id like 0x6a21.` : '';
+}
+
+/// Of api/devices/device_json.cpp: all options that are sent at once.
+const MOST_OPTIONS_BYTES = 10_000;
+function size_fault(s: Setup): string {
+  const bytes = bytes_of(JSON.stringify(config_of(s).options));
+  return bytes > MOST_OPTIONS_BYTES
+    ? `Mapping: ${(bytes / 1000).toFixed(1)} kB with the other settings (limit 10 kB). Shorten "ids": id_prefix and id_format may replace them.`
+    : '';
+}
+function broker_fault(s: Setup): string {
+  if (s.password && !s.user.trim()) return 'User: missing, and a password needs one. Type it, or clear the password.';
+  return (
+    topic_fault(s.topic.trim()) || (s.payload === 'mapping' ? mapping_fault(s.mapping, s.topic) || size_fault(s) : '')
+  );
+}
+function module_fault(s: Setup): string {
+  const id = s.tag.trim();
+  if (!id)
+    return s.mode === 'tlv' ? 'Id of the tag: missing, and binary needs it. Type it as on its label, like 0x6e01.' : '';
+  return /^(?:0[xX][0-9a-fA-F]+|\d+)$/.test(id) && Number(id) < 2 ** 32
+    ? ''
+    : `Id of the tag: ${id} is no id. Type 32 bits at most, like 0x6e01.`;
+}
+
+/// What the server rejected of one field of the form; null where it is of no single one of these.
+export interface Rejected {
+  readonly field: 'mapping' | 'topic' | 'user' | 'password' | 'tag';
+  readonly faults: readonly string[];
+}
+const REJECTED = /^(mapping|topic|user|password|tag)(?:\/|: )/;
+export function rejected_of(e: unknown, kind: string): Rejected | null {
+  if (!(e instanceof ApiError) || !['mqtt', 'ndjson', 'dwm1001'].includes(kind)) return null;
+  const [first, ...others] = e.problem.errors;
+  if (!first || others.length || !first.pointer.startsWith('/options')) return null;
+  // The driver names the option in its text, the reader of the request in the pointer.
+  const at = first.pointer.slice('/options/'.length),
+    text = at ? `${at}: ${first.detail}` : first.detail,
+    field = REJECTED.exec(text)?.[1];
+  return field
+    ? { field: field as Rejected['field'], faults: text.split(/; (?=mapping\/)/) } // words of the pattern
+    : null;
 }

@@ -245,7 +245,7 @@ const LOW_FIX: Readonly<Record<string, readonly [Tone, string, string]>> = {
 /// Ranges of another system; a position stream makes no rows.
 const by_mapping = (d: Device): boolean =>
   d.kind === 'ndjson' || (d.kind === 'mqtt' && d.options['format'] !== 'pozyx');
-const of_ranges = (d: Device): boolean => d.kind === 'pozyx' || d.kind === 'dwm1001' || by_mapping(d);
+export const of_ranges = (d: Device): boolean => d.kind === 'pozyx' || d.kind === 'dwm1001' || by_mapping(d);
 /// Of a tag or rover whose link is good: does it deliver what it is there for?
 function delivering(d: Device, recent: Lately): Standing {
   // One stray line is no reason; what comes once in two seconds is.
