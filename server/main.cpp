@@ -17,6 +17,7 @@ struct Command {
 /// In the order of use.
 constexpr Command k_commands[]{
     {"Run a server", anchord::cli::add_serve_command},
+    {"Run a server", anchord::cli::add_top_command},
     {"Run a server", anchord::cli::add_doctor_command},
     {"Run a server", anchord::cli::add_support_command},
     {"Run a server", anchord::cli::add_devices_command},

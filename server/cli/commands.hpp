@@ -26,6 +26,7 @@ void add_simulate_command(CLI::App& app, int& exit_code);
 void add_support_command(CLI::App& app, int& exit_code);
 void add_tls_command(CLI::App& app, int& exit_code);
 void add_token_command(CLI::App& app, int& exit_code);
+void add_top_command(CLI::App& app, int& exit_code);
 void add_rules_command(CLI::App& app, int& exit_code);
 void add_models_command(CLI::App& app, int& exit_code);
 void add_campaign_command(CLI::App& app, int& exit_code);

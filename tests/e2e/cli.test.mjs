@@ -87,6 +87,30 @@ test('an import to where nobody listens ends soon, one without a token says how 
   }
 });
 
+test('top prints a server once as plain text into a pipe, and fails where nobody listens or without a token', async () => {
+  const nobody = await run(['top', '--once', '--url', `http://127.0.0.1:${await dead_port()}`], { deadlineMs: 30_000 });
+  assert.deepEqual([nobody.code, nobody.stdout], [1, '']);
+  assert.match(nobody.stderr, /no anchord answers at http:\/\/127\.0\.0\.1:\d+: .*--url/);
+  const server = await startServer({ auth: 'on' });
+  try {
+    for (const args of [['--once'], []]) {
+      const { code, stdout, stderr } = await run(['top', ...args, '--data-dir', server.dataDir], {
+        deadlineMs: 30_000,
+      });
+      assert.equal(code, 0, stderr);
+      assert.match(stdout, /^anchord \d+\.\d+\.\d+.* at http[^]*\nHealth: READY\n/);
+      assert.match(stdout, /\nALARMS[^]*\nMISSION IN FLIGHT[^]*\nDEVICES[^]*\nQUEUES[^]*\nJOBS/);
+      assert.match(stdout, /rows to be stored or estimated +\d+\n[^]* commands +\d+\n/);
+      assert.ok(!stdout.includes('\u001b'), 'an escape code');
+    }
+    const stranger = await run(['top', '--once', '--url', server.url]);
+    assert.deepEqual([stranger.code, stranger.stdout], [1, '']);
+    assert.match(stranger.stderr, /401 .*--token-file/);
+  } finally {
+    await server.dispose();
+  }
+});
+
 test('bash completes commands, their commands and their options', async () => {
   const { code, stdout } = await run(['completion', 'bash']);
   assert.equal(code, 0);
