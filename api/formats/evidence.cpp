@@ -33,13 +33,24 @@ std::optional<Eigen::Vector3d> place(const Json& json) {
   return Eigen::Vector3d(number(json.at(0)), number(json.at(1)), number(json.at(2)));
 }
 
+Json middle_json(const std::optional<CorrectedRange>& range) {
+  if (!range) return nullptr;
+  return {place(std::optional(range->tag_m)), rounded(range->distance_m, 1e4),
+          rounded(range->corrected_m, 1e4)};
+}
+std::optional<CorrectedRange> parse_middle(const Json& json) {
+  if (!json.is_array()) return std::nullopt;
+  return CorrectedRange{place(json.at(0)).value(), number(json.at(1)), number(json.at(2))};
+}
+
 Json course_json(const Convergence& course) {
   Json out = Json::object();
   for (const auto& [id, steps] : course) {
     Json& list = out[to_string(id)] = Json::array();
     for (const auto& s : steps)
       list.push_back({rounded(s.share, 1e4), s.n_ranges, place(s.raw_m), place(s.corrected_m),
-                      rounded(s.h95_m, 1e4), k_verdict_words.word(s.verdict)});
+                      rounded(s.h95_m, 1e4), k_verdict_words.word(s.verdict), s.n_los, s.n_nlos,
+                      middle_json(s.middle)});
   }
   return out;
 }
@@ -64,6 +75,11 @@ Convergence parse_course(const Json& json) {
       step.corrected_m = place(s.at(3));
       step.h95_m = number(s.at(4));
       step.verdict = verdict_of(s.at(5));
+      if (s.size() > 6) {  // since 0.2
+        step.n_los = s.at(6).get<std::size_t>();
+        step.n_nlos = s.at(7).get<std::size_t>();
+        step.middle = parse_middle(s.at(8));
+      }
       steps.push_back(step);
     }
   }
@@ -86,7 +102,9 @@ Json flight_json(const FlightEvidence& flight) {
     Json& list = residuals[to_string(id)] = Json::array();
     for (const auto& r : rows)
       list.push_back({r.time.ns, rounded(r.distance_m, 1e4), rounded(r.residual_m, 1e4),
-                      rounded(r.standardised, 1e3), rounded(r.weight, 1e3)});
+                      rounded(r.standardised, 1e3), rounded(r.weight, 1e6), rounded(r.tag_m.x(), 1e4),
+                      rounded(r.tag_m.y(), 1e4), rounded(r.tag_m.z(), 1e4), rounded(r.corrected_m, 1e4),
+                      rounded(r.sigma_m, 1e4)});
   }
   return out;
 }
@@ -117,6 +135,13 @@ FlightEvidence parse_flight(const Json& json) {
       row.residual_m = number(r.at(2));
       row.standardised = number(r.at(3));
       row.weight = number(r.at(4));
+      if (r.size() < 10) {
+        flight.observations = false;
+      } else {
+        row.tag_m = {number(r.at(5)), number(r.at(6)), number(r.at(7))};
+        row.corrected_m = number(r.at(8));
+        row.sigma_m = number(r.at(9));
+      }
       rows.push_back(row);
     }
   }

@@ -24,6 +24,7 @@ struct FlightEvidence {
   std::vector<std::string> notes;
   std::vector<Eigen::Vector2d> track_m;  ///< east, north
   std::map<NetworkId, std::vector<RangeResidual>> residuals;
+  bool observations{true};  ///< tag_m, corrected_m and sigma_m of the residuals were kept (not before 0.2)
 };
 
 /// Everything behind a calibration that its positions do not carry.

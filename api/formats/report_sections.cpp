@@ -318,15 +318,24 @@ std::string iterations(const Report& report) {
     const auto& steps = found->second;
     const Eigen::Vector3d reference = anchor.truth_m ? *anchor.truth_m : anchor.estimate.best->position.m;
     truth = truth || anchor.truth_m.has_value();
-    plots += "<div><h3>" + html_text(name_of(anchor)) + "</h3>" + course(steps, reference) + "</div>";
+    // A range error is in space: a truth without a height gets that of the solution.
+    Eigen::Vector3d space_m = reference;
+    if (!std::isfinite(space_m.z()) && anchor.estimate.best)
+      space_m.z() = anchor.estimate.best->position.m.z();
+    plots += "<div><h3>" + html_text(name_of(anchor)) + ": position</h3>" + course(steps, reference) +
+             "</div><div><h3>" + html_text(name_of(anchor)) + ": range</h3>" + range_course(steps, space_m) +
+             "</div>";
     for (std::size_t i = 0; i < steps.size(); ++i) {
       const auto error = [&](const std::optional<Eigen::Vector3d>& at) {
         return at ? fixed(distance_m(*at, reference), 3) : std::string("–");
       };
+      const RangeErrors ranges = range_errors(steps[i], space_m);
       rows += "<tr>" + cell(i == 0 ? "<b>" + html_text(name_of(anchor)) + "</b>" : "", "") +
               cell(std::to_string(i + 1)) + cell(std::to_string(steps[i].n_ranges)) +
               cell(error(steps[i].raw_m)) + cell(error(steps[i].corrected_m)) +
-              cell(steps[i].corrected_m ? fixed(steps[i].h95_m, 3) : "–") +
+              cell(steps[i].corrected_m ? fixed(steps[i].h95_m, 3) : "–") + cell(fixed(ranges.raw_m, 3)) +
+              cell(fixed(ranges.corrected_m, 3)) +
+              cell(std::to_string(steps[i].n_los) + " : " + std::to_string(steps[i].n_nlos)) +
               cell(std::string(k_verdict_words.word(steps[i].verdict)), "num mut") + "</tr>";
     }
   }
@@ -334,7 +343,9 @@ std::string iterations(const Report& report) {
   const char* against = truth ? "the truth" : "the final position";
   return "<h2>Error per iteration, raw against corrected</h2><p class=\"note\">Distance to " +
          std::string(against) +
-         " after each further part of the flight. <i class=\"key\" "
+         " after each further part of the flight; beside it the error of that part's middle range, and below "
+         "it what a model predicted of most of them (L line of sight, N not line of sight, – no prediction). "
+         "<i class=\"key\" "
          "style=\"color:var(--caution)\"></i><span>raw "
          "ranges</span><i class=\"key\" style=\"color:var(--info)\"></i><span>corrected</span><i "
          "class=\"key\" "
@@ -342,7 +353,8 @@ std::string iterations(const Report& report) {
          "<div class=\"plots\">" +
          plots + "</div><table style=\"margin-top:10px\"><thead><tr>" + head("Anchor", false) +
          head("Iteration") + head("Ranges") + head("Raw, m") + head("Corrected, m") +
-         head("Claimed 95 %, m") + head("Verdict") + "</tr></thead><tbody>" + rows + "</tbody></table>";
+         head("Claimed 95 %, m") + head("Range raw, m") + head("Range corrected, m") + head("LOS : NLOS") +
+         head("Verdict") + "</tr></thead><tbody>" + rows + "</tbody></table>";
 }
 
 std::string residual_plots(const Report& report) {

@@ -28,6 +28,24 @@ double round_step(double most) {
   return power;
 }
 
+/// A line through the points that are finite.
+std::string curve(const char* css, const std::vector<Eigen::Vector2d>& points) {
+  std::string path;
+  for (const auto& at : points)
+    if (at.allFinite()) path += (path.empty() ? "M" : " ") + px(at.x()) + ' ' + px(at.y());
+  return path.empty() ? path : "<path class=\"" + std::string(css) + "\" d=\"" + path + "\"/>";
+}
+
+std::string marks(const char* css, const std::vector<Eigen::Vector2d>& points) {
+  std::string out;
+  for (const auto& at : points) {
+    if (at.allFinite())
+      out += "<circle class=\"" + std::string(css) + " m\" cx=\"" + px(at.x()) + "\" cy=\"" + px(at.y()) +
+             "\" r=\"1.8\"/>";
+  }
+  return out;
+}
+
 struct View {
   double west{}, north{}, per_metre{1};
   double x(double east_m) const { return (east_m - west) * per_metre; }
@@ -291,28 +309,55 @@ std::string course(const std::vector<ConvergenceStep>& steps, const Eigen::Vecto
                              : fixed(v, 0) + " m",
                  "t", "end");
   }
-  const auto curve = [&](const char* css, auto value, bool dots) {
-    std::string path, marks;
-    for (std::size_t i = 0; i < steps.size(); ++i) {
-      const double v = value(steps[i]);
-      if (!std::isfinite(v)) continue;
-      path += (path.empty() ? "M" : " ") + px(x(i)) + ' ' + px(y(v));
-      if (dots)
-        marks += "<circle class=\"" + std::string(css) + " m\" cx=\"" + px(x(i)) + "\" cy=\"" + px(y(v)) +
-                 "\" r=\"1.8\"/>";
-    }
-    return path.empty() ? std::string{}
-                        : "<path class=\"" + std::string(css) + "\" d=\"" + path + "\"/>" + marks;
-  };
-  out += curve(
-      "claim", [](const ConvergenceStep& s) { return s.corrected_m ? s.h95_m : std::nan(""); }, false);
-  out += curve(
-      "raw", [&](const ConvergenceStep& s) { return error(s.raw_m); }, true);
-  out += curve(
-      "cor", [&](const ConvergenceStep& s) { return error(s.corrected_m); }, true);
-  for (std::size_t i = 0; i < steps.size(); ++i)
+  std::vector<Eigen::Vector2d> claim, raw, corrected;
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    claim.emplace_back(x(i), y(steps[i].corrected_m ? steps[i].h95_m : std::nan("")));
+    raw.emplace_back(x(i), y(error(steps[i].raw_m)));
+    corrected.emplace_back(x(i), y(error(steps[i].corrected_m)));
     out += label(x(i), h - 3, std::to_string(i + 1), "t", "middle");
-  return out + "</svg>";
+  }
+  return out + curve("claim", claim) + curve("raw", raw) + marks("raw", raw) + curve("cor", corrected) +
+         marks("cor", corrected) + "</svg>";
+}
+
+RangeErrors range_errors(const ConvergenceStep& step, const Eigen::Vector3d& reference) {
+  if (!step.middle) return {};
+  const double truth_m = distance_m(step.middle->tag_m, reference);
+  return {step.middle->distance_m - truth_m, step.middle->corrected_m - truth_m};
+}
+
+std::string predicted_class(const ConvergenceStep& step) {
+  if (step.n_los + step.n_nlos == 0) return "–";
+  return step.n_los >= step.n_nlos ? "L" : "N";
+}
+
+std::string range_course(const std::vector<ConvergenceStep>& steps, const Eigen::Vector3d& reference) {
+  constexpr double w = 268, h = 92, left = 34, foot = 16;
+  double most = 0.02;
+  for (const auto& s : steps) {
+    const RangeErrors errors = range_errors(s, reference);
+    for (const double v : {errors.raw_m, errors.corrected_m})
+      if (std::isfinite(v)) most = std::max(most, std::abs(v));
+  }
+  const double zero = (h - foot) / 2, step = round_step(most);
+  const auto y = [&](double v) { return zero - v / most * (zero - 4); };
+  const double n = static_cast<double>(std::max<std::size_t>(2, steps.size()));
+  std::string out =
+      "<svg class=\"plot\" viewBox=\"0 0 268 92\" role=\"img\" aria-label=\"Range error per iteration\">";
+  for (const double v : {-step, 0.0, step}) {
+    out += line(left, y(v), w, y(v), v == 0 ? "axis" : "grid");
+    out += label(left - 4, y(v) + 3, fixed(v, step < 0.095 ? 2 : 1), "t", "end");
+  }
+  std::vector<Eigen::Vector2d> raw, corrected;
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const double x = left + 8 + (w - left - 16) * static_cast<double>(i) / (n - 1);
+    const RangeErrors errors = range_errors(steps[i], reference);
+    raw.emplace_back(x, y(errors.raw_m));
+    corrected.emplace_back(x, y(errors.corrected_m));
+    out += label(x, h - 3, predicted_class(steps[i]), "t", "middle");
+  }
+  return out + curve("raw", raw) + marks("raw", raw) + curve("cor", corrected) + marks("cor", corrected) +
+         "</svg>";
 }
 
 }  // namespace anchord::report

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -20,5 +21,17 @@ std::string residuals(const std::vector<const std::vector<RangeResidual>*>& flig
 /// Error raw and corrected, and the claimed 95 % radius, per iteration. `truth`: against it, else against the
 /// end.
 std::string course(const std::vector<ConvergenceStep>& steps, const Eigen::Vector3d& reference);
+
+/// Error of an iteration's middle range against `reference`, metres; NaN where it had no range.
+struct RangeErrors {
+  double raw_m{std::numeric_limits<double>::quiet_NaN()};
+  double corrected_m{std::numeric_limits<double>::quiet_NaN()};
+};
+RangeErrors range_errors(const ConvergenceStep& step, const Eigen::Vector3d& reference);
+/// What a model predicted of most ranges of the iteration: "L" (line of sight), "N" (not line of sight), "–"
+/// (no prediction).
+std::string predicted_class(const ConvergenceStep& step);
+/// Error of the ranges raw and corrected, and their predicted class, per iteration.
+std::string range_course(const std::vector<ConvergenceStep>& steps, const Eigen::Vector3d& reference);
 
 }  // namespace anchord::report

@@ -90,6 +90,8 @@ FlightModelsReport correct_flight(const ModelRegistry::Active& models, FlightDat
       continue;
     }
     sum += *judged.verdict.bias_m;
+    if (flight.received_m.empty())
+      for (const Range& as_received : flight.ranges) flight.received_m.push_back(as_received.distance_m);
     range.distance_m = corrected_m;
     ++out.n_corrected;
   }

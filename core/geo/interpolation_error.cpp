@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/base/median.hpp"
 #include "core/geo/tag_track.hpp"
 
 namespace anchord {
@@ -16,9 +17,7 @@ constexpr std::size_t k_most_triples = 1000;
 double median_interval_s(std::span<const TrackPose> poses) {
   std::vector<double> interval_s;
   for (std::size_t i = 1; i < poses.size(); ++i) interval_s.push_back(poses[i].t_s - poses[i - 1].t_s);
-  const auto middle = interval_s.begin() + static_cast<std::ptrdiff_t>(interval_s.size() / 2);
-  std::ranges::nth_element(interval_s, middle);
-  return *middle;
+  return upper_median(interval_s);
 }
 
 }  // namespace

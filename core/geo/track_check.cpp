@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <numeric>
 
+#include "core/base/median.hpp"
 #include "core/geo/enu.hpp"
 #include "core/geo/tag_track.hpp"
 
@@ -17,12 +18,6 @@ constexpr double k_ascending_share = 0.9;  ///< fewer, and the order of arrival 
 constexpr std::size_t k_step_fixes = 10;
 constexpr double k_step_s = 1.0;
 constexpr double k_dense_share = 0.5;  ///< of all positions between the ends of a part: fewer are outliers
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 /// Stamps ahead of, or behind, the neighbours in arrival on both sides.
 void check_stamps(std::span<const Fix> fixes, const TrackLimits& limits, std::vector<FixRefusal>& refusals) {
@@ -42,7 +37,7 @@ void check_stamps(std::span<const Fix> fixes, const TrackLimits& limits, std::ve
   const auto middle_of = [&](std::size_t from, std::size_t to) -> std::optional<double> {
     std::vector<double> stamps;
     for (std::size_t k = from; k < to; ++k) stamps.push_back(seconds_between(start, fixes[order[k]].time));
-    return stamps.empty() ? std::nullopt : std::optional(median(std::move(stamps)));
+    return stamps.empty() ? std::nullopt : std::optional(upper_median(stamps));
   };
   for (std::size_t k = 0; k < order.size(); ++k) {
     const auto before = middle_of(k > k_neighbours ? k - k_neighbours : 0, k),
@@ -111,8 +106,7 @@ Wgs84 robust_centre(std::span<const Wgs84> places) {
     for (int axis = 0; axis < 3; ++axis) axes[static_cast<std::size_t>(axis)].push_back(at_m[axis]);
   }
   Enu middle;
-  for (int axis = 0; axis < 3; ++axis)
-    middle.m[axis] = median(std::move(axes[static_cast<std::size_t>(axis)]));
+  for (int axis = 0; axis < 3; ++axis) middle.m[axis] = upper_median(axes[static_cast<std::size_t>(axis)]);
   return frame.wgs84_from_enu(middle);
 }
 

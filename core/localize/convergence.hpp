@@ -12,6 +12,13 @@
 
 namespace anchord {
 
+/// One range of an iteration and what was made of it.
+struct CorrectedRange {
+  Eigen::Vector3d tag_m{0, 0, 0};  ///< antenna, ENU or local
+  double distance_m{};             ///< as received
+  double corrected_m{};
+};
+
 /// One anchor after the first part of a flight (an iteration of Fig 8.10 and 8.11).
 struct ConvergenceStep {
   double share{};                                ///< of the flight's ranges flown so far, (0, 1]
@@ -20,6 +27,8 @@ struct ConvergenceStep {
   std::optional<Eigen::Vector3d> corrected_m{};  ///< with bias, lag and robust weights
   double h95_m{};                                ///< claimed, of the corrected one
   Verdict verdict{Verdict::too_few};
+  std::optional<CorrectedRange> middle{};  ///< of this iteration's ranges the one of median error
+  std::size_t n_los{}, n_nlos{};           ///< of this iteration's ranges, as a model predicted
 };
 using Convergence = std::map<NetworkId, std::vector<ConvergenceStep>>;
 

@@ -67,8 +67,8 @@ struct ErrorBudget {
 ///
 /// bias, clock, lever_arm  the covariance that goes when the source is known perfectly: bias, curve and unit
 ///     delays; lag; vertical (and freed horizontal) arm. What two of them hide from each other is split
-///     evenly (mean over the orders in which they become known, Shapley). To the bias belongs the doubt
-///     whether the kit is calibrated (kit_prior.hpp).
+///     evenly (mean over the orders in which they become known, Shapley). To the bias belong the doubt
+///     whether the kit is calibrated (kit_prior.hpp) and that of ranges that scatter (scatter_doubt.hpp).
 /// geometry  of what remains, C0: the part that would go had the ranges, as many and as good, come from
 ///     evenly spread directions: tr C0 - 9 / tr C0^-1 (in the plane 4 / tr)
 /// rtk, ranging  the rest by the share of the track's variance along the line of sight in the residual

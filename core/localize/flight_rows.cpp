@@ -5,6 +5,7 @@
 #include <set>
 #include <tuple>
 
+#include "core/base/median.hpp"
 #include "core/geo/track_check.hpp"
 
 namespace anchord {
@@ -45,12 +46,6 @@ void name_arms(FlightRows& rows) {
       if (arm < k_most_antennas) row.arm = arm;
     }
   }
-}
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
 }
 
 /// Where the metres of the rows begin; nothing in a local frame.
@@ -109,6 +104,7 @@ Between add_ranges(const FlightData& flight, const FlightOptions& options, Fligh
                              range.antenna,
                              i < flight.error_models.size() ? flight.error_models[i] : std::nullopt,
                              range.rss_dbm ? range.rss_dbm : range.rx_dbm});
+      if (i < flight.received_m.size()) anchor.rows.back().received_m = flight.received_m[i];
     } else {
       ++anchor.refused[why];
     }
@@ -130,10 +126,10 @@ void add_pairs(Between between, const FlightOptions& options, FlightRows& rows) 
     const auto b = std::ranges::find(rows.anchors, ids.second, &AnchorRows::id);
     if (a == rows.anchors.end() || b == rows.anchors.end()) continue;
     PairRow pair{static_cast<std::size_t>(a - rows.anchors.begin()),
-                 static_cast<std::size_t>(b - rows.anchors.begin()), median(distances_m),
+                 static_cast<std::size_t>(b - rows.anchors.begin()), upper_median(distances_m),
                  options.pair_sigma_m, distances_m.size()};
     for (double& d : distances_m) d = std::abs(d - pair.distance_m);
-    pair.sigma_m = std::max(pair.sigma_m, 1.4826 * median(distances_m));
+    pair.sigma_m = std::max(pair.sigma_m, 1.4826 * upper_median(distances_m));
     rows.pairs.push_back(pair);
   }
 }

@@ -20,6 +20,7 @@ struct JointRow {
   std::uint8_t antenna{0};
   std::optional<RangeErrorModel> error_model{};
   std::optional<double> rss_dbm{};
+  std::optional<double> received_m{};  ///< where a model has corrected the distance
   std::optional<int> arm{};  ///< its antenna among those with a vertical arm of their own; absent: the common
 };
 

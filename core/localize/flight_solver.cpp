@@ -10,6 +10,7 @@
 #include "core/localize/flight_verdict.hpp"
 #include "core/localize/joint_model.hpp"
 #include "core/localize/kit_prior.hpp"
+#include "core/localize/scatter_doubt.hpp"
 #include "core/localize/unplaced.hpp"
 
 namespace anchord {
@@ -302,6 +303,13 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
   }
   if (!options.fixed_bias_m) {
     for (Work& work : all) add_doubt(work.fit, work.prior, work.gate);
+  }
+  for (Work& work : all) {
+    if (const std::size_t n = add_scatter_doubt(work.rows, work.prior, work.options, work.fit))
+      work.rows.notes.push_back(
+          std::to_string(n) + " of " + std::to_string(work.rows.anchors.size()) +
+          " anchors are less certain because their ranges scatter more from some directions than from "
+          "others: an obstacle there may lengthen them");
   }
   for (std::size_t i = 0; i < all.size(); ++i) {
     Work& work = all[i];

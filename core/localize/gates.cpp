@@ -277,9 +277,10 @@ std::vector<RangeResidual> residuals_of(const FlightRows& flight, const JointFit
     one.tag = row.tag;
     one.antenna = row.antenna;
     one.tag_m = line.antenna_m;
-    one.distance_m = row.distance_m;
+    one.distance_m = row.received_m.value_or(row.distance_m);
     one.residual_m = line.residual_m;
     one.corrected_m = line.residual_m + (line.antenna_m - anchor.position_m).norm();
+    one.sigma_m = std::sqrt(sigma2);
     one.weight = robust_weight(line.residual_m / std::sqrt(sigma2), options);
     if (row.error_model) {
       one.p_los = error_model_value(*row.error_model, line.residual_m, line.position_variance_m2).p_los;

@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <vector>
 
+#include "core/base/median.hpp"
+
 namespace anchord {
 namespace {
 
@@ -63,8 +65,7 @@ GeometryReport assess_geometry(std::span<const Observation> observations, Dims d
   }
   std::vector<double> range_m;
   for (const auto& o : rows) range_m.push_back(o.distance_m);
-  std::ranges::nth_element(range_m, range_m.begin() + static_cast<std::ptrdiff_t>(range_m.size() / 2));
-  report.median_range_m = std::max(range_m[range_m.size() / 2], 1e-3);
+  report.median_range_m = std::max(upper_median(range_m), 1e-3);
   report.shape = track_shape(rows);
   report.line_ratio = report.shape.sd_m.y() / report.median_range_m;
   report.plane_ratio = report.shape.sd_m.x() / report.median_range_m;

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/base/median.hpp"
 #include "core/localize/error_model_likelihood.hpp"
 #include "core/localize/residual.hpp"
 
@@ -16,12 +17,6 @@ namespace {
 constexpr double k_hinge_m = 5.0;
 constexpr double k_least_slow_m = 0.05;   // no radio in the air was seen with less of it
 constexpr double k_believed_white = 0.9;  // the share is an estimate; too much of it claims too much
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 /// Time the rows cover, pauses of more than 2 s left out.
 double duration_s(const std::vector<double>& times_s) {
@@ -44,7 +39,7 @@ class Neighbours {
   }
   double white_share(double scale2) {
     if (jumps_m_.size() < 50) return 0.0;
-    const double jump_m = 1.4826 * median(jumps_m_);
+    const double jump_m = 1.4826 * upper_median(jumps_m_);
     return std::min(0.5 * jump_m * jump_m / scale2, 1.0);
   }
 
@@ -108,7 +103,7 @@ void add_lines(const std::vector<JointLine>& lines, const std::vector<double>& w
 /// Scatter of the ranges kept. Jumps to those that are off by metres, and the scale they blow up, are no
 /// noise: taken for it they would make spoilt ranges count for more than clean ones.
 double kept_variance_m2(std::vector<double>& kept_sizes_m, double scale_m, double min_scale_m) {
-  const double kept_m = kept_sizes_m.empty() ? scale_m : 1.4826 * median(kept_sizes_m);
+  const double kept_m = kept_sizes_m.empty() ? scale_m : 1.4826 * upper_median(kept_sizes_m);
   return std::clamp(kept_m * kept_m, min_scale_m * min_scale_m, scale_m * scale_m);
 }
 
@@ -138,11 +133,11 @@ void build_anchor(const AnchorTask& task, AnchorBlock& block, JointNormal& norma
   block.n_in_track = lines.size();
   if (lines.empty()) return;
   // The MAD holds the usual position error already; only what a row has beyond that makes it count less.
-  const double usual_variance_m2 = median(position_variances);
+  const double usual_variance_m2 = upper_median(position_variances);
   block.usual_position_variance_m2 = usual_variance_m2;
   block.scale_m = task.kept_scale_m > 0
                       ? task.kept_scale_m
-                      : std::max({1.4826 * median(sizes), options.min_scale_m, task.scale_floor_m});
+                      : std::max({1.4826 * upper_median(sizes), options.min_scale_m, task.scale_floor_m});
   const double scale2 = block.scale_m * block.scale_m;
   const double believed = task.claims ? believed_share(lines, error_models) : 1.0;
   double sum_square = 0;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/base/median.hpp"
 #include "core/localize/error_ellipse.hpp"
 #include "core/localize/flight_options.hpp"
 #include "core/localize/geometry.hpp"
@@ -62,9 +63,7 @@ double rms(const std::vector<double>& residuals) {
 double scale_of(const std::vector<double>& residuals) {
   std::vector<double> size;
   for (const double r : residuals) size.push_back(std::abs(r));
-  const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
-  std::ranges::nth_element(size, middle);
-  return std::max(1.4826 * *middle, 0.02);
+  return std::max(1.4826 * upper_median(size), 0.02);
 }
 
 /// The answer, and its mirror solution where that is another place.

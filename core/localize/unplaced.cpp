@@ -5,6 +5,8 @@
 #include <map>
 #include <vector>
 
+#include "core/base/median.hpp"
+
 namespace anchord {
 namespace {
 
@@ -15,18 +17,13 @@ std::string text(const char* format, Numbers... numbers) {
   return buffer;
 }
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
+double median_or_zero(std::vector<double> values) { return values.empty() ? 0.0 : upper_median(values); }
 
 std::string gap(const FlightRows& rows) {
   const auto poses = rows.track.poses();
   std::vector<double> interval_s;
   for (std::size_t i = 1; i < poses.size(); ++i) interval_s.push_back(poses[i].t_s - poses[i - 1].t_s);
-  const double usual_s = median(interval_s);
+  const double usual_s = median_or_zero(interval_s);
   std::string why = text(
       "the track has one position in %.3g s, and a straight line across that misses the flight path by "
       "%.2f m (limit 0.5 m, or max_gap_s): give a denser track",
@@ -57,7 +54,7 @@ std::string bounds(const FlightData& flight, const FlightOptions& options) {
     if (range.kind == RangeKind::tag_anchor) distances_m.push_back(range.distance_m);
   }
   return text("the median range is %.1f m, usable are %.2f to %.0f m: range_m is in metres",
-              median(std::move(distances_m)), options.min_range_m, options.max_range_m);
+              median_or_zero(std::move(distances_m)), options.min_range_m, options.max_range_m);
 }
 
 }  // namespace

@@ -5,18 +5,12 @@
 #include <map>
 #include <set>
 
+#include "core/base/median.hpp"
 #include "core/base/sha256.hpp"
 #include "core/ml/random.hpp"
 
 namespace anchord::ml {
 namespace {
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  if (values.size() % 2 == 1) return *middle;
-  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
-}
 
 double mean_of(const std::vector<double>& values) {
   double sum = 0;
@@ -134,7 +128,7 @@ void weigh_by_truth(Dataset& data, std::span<const std::optional<double>> truth_
 }
 
 Dataset aggregate_placements(const Dataset& data, bool mean) {
-  const auto middle = [mean](const std::vector<double>& v) { return mean ? mean_of(v) : median(v); };
+  const auto middle = [mean](std::vector<double> v) { return mean ? mean_of(v) : median(v); };
   std::vector<std::size_t> firsts;
   const auto placements = rows_by(data.placement);
   for (const auto& [id, rows] : placements) firsts.push_back(rows.front());

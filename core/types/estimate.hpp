@@ -40,6 +40,7 @@ struct RangeResidual {
   Eigen::Vector3d tag_m{0, 0, 0};  ///< antenna, ENU or local, lag applied
   double distance_m{};             ///< as received
   double corrected_m{};            ///< less the bias, curve, unit delay and what a model took off
+  double sigma_m{};                ///< of the range with the place of its tag, before the robust weight
   double residual_m{};             ///< corrected - geometric
   double standardised{};           ///< residual over its sigma and redundancy
   double weight{};                 ///< 0..1; 0: rejected

@@ -22,6 +22,8 @@ struct FlightData {
   std::map<NetworkId, std::string> anchor_names;  ///< id text as the source wrote it
   /// What a model believes of each range: empty, or one for every range, in their order.
   std::vector<std::optional<RangeErrorModel>> error_models{};
+  /// Distances as received, where a model corrected those of the ranges: empty, or one for every range.
+  std::vector<double> received_m{};
   /// Left out by a person before anything else was looked at, by anchor; they are counted as "excluded".
   std::map<NetworkId, std::size_t> n_ranges_excluded{};
   std::size_t n_fixes_excluded{};

@@ -4,18 +4,14 @@
 #include <cmath>
 #include <vector>
 
+#include "core/base/median.hpp"
+
 namespace anchord::timing {
 namespace {
 
 struct Xy {
   double x{}, y{};  ///< seconds of device time, nanoseconds of lag, both from a reference
 };
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Median of the slopes of all pairs: up to 29 % of the points may be anything. At most 120 points, once a
 /// second.
@@ -28,7 +24,7 @@ double theil_sen(const std::vector<Xy>& points) {
         slopes.push_back((points[k].y - points[i].y) / (points[k].x - points[i].x));
     }
   }
-  return slopes.empty() ? 0 : median(std::move(slopes));
+  return slopes.empty() ? 0 : upper_median(slopes);
 }
 
 /// Points that do not lie impossibly early.
@@ -36,10 +32,11 @@ std::vector<Xy> without_early(const std::vector<Xy>& points) {
   const double slope = theil_sen(points);
   std::vector<double> residuals;
   for (const auto& p : points) residuals.push_back(p.y - slope * p.x);
-  const double center = median(residuals);
-  std::vector<double> off;
+  std::vector<double> off = residuals;
+  const double center = upper_median(off);
+  off.clear();
   for (const double r : residuals) off.push_back(std::abs(r - center));
-  const double bound = center - 8 * std::max(median(std::move(off)), 10'000.0);  // 10 us: clocks have ticks
+  const double bound = center - 8 * std::max(upper_median(off), 10'000.0);  // 10 us: clocks have ticks
   std::vector<Xy> out;
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (residuals[i] >= bound) out.push_back(points[i]);
@@ -165,7 +162,7 @@ void ClockModel::fit() {
     above.push_back(std::max(0.0, p.y - intercept - slope_ * 1e9 * p.x));
     square += (p.x - mean_x) * (p.x - mean_x) / static_cast<double>(points.size());
   }
-  scale_ns_ = median(std::move(above)) / std::log(2.0);  // median of an exponential is ln 2 of its mean
+  scale_ns_ = upper_median(above) / std::log(2.0);  // median of an exponential is ln 2 of its mean
   spread_s_ = std::sqrt(square);
 }
 

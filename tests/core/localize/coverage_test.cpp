@@ -1,4 +1,4 @@
-// 500 flights with kits, geometry, noise and spoilage of their own: what the regions claim is what is met.
+// 600 flights with kits, geometry, noise and spoilage of their own: what the regions claim is what is met.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -69,9 +69,16 @@ TEST(Coverage, HoldsHoweverRangesAreSpoilt) {
   for (const double share : {0.05, 0.1, 0.2, 0.3, 0.5}) add(Spoilage::scattered, share, 28);
   for (const double share : {0.05, 0.1, 0.2, 0.3, 0.5}) add(Spoilage::far_off, share, 28);
   for (const double share : {0.05, 0.1, 0.2, 0.3}) add(Spoilage::bursts, share, 20);
-  for (const double share : {0.05, 0.1}) add(Spoilage::one_sided, share, 20);
+  for (const double share : {0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8}) add(Spoilage::one_sided, share, 20);
   std::printf("%d of %d inside; accepted %d, %d of them inside\n", all.inside, all.anchors, all.accepted,
               all.accepted_inside);
+}
+
+// Late from one side, with nothing else to tell by: half of the anchors once lay outside, accepted.
+TEST(Coverage, HoldsWhereOneSideIsBlocked) {
+  const Coverage half = covered(Spoilage::one_sided, 0.5, 60);
+  EXPECT_GE(half.share(), 0.93);
+  EXPECT_EQ(half.far_outside, 0);
 }
 
 // Ranges made 0 to 20 m long once counted as white noise that averages out: the regions shrank, and lost the

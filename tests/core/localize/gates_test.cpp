@@ -219,6 +219,9 @@ TEST(Residuals, ListEveryPlacedRangeAndMarkTheRejected) {
     EXPECT_EQ(static_cast<std::size_t>(rejected), anchor.estimate.refused.at("outlier"));
     EXPECT_EQ(anchor.residuals.size() - static_cast<std::size_t>(rejected), anchor.estimate.n_used);
     for (const auto& r : anchor.residuals) {
+      EXPECT_GT(r.sigma_m, 0.0);
+      EXPECT_LE(std::abs(r.residual_m) / r.sigma_m, std::abs(r.standardised) * (1 + 1e-9))
+          << "redundancy below 1";
       // Baarda: beyond 3.3 sigmas rejected, far inside kept.
       if (std::abs(r.standardised) > 3.8) {
         EXPECT_EQ(r.weight, 0.0);
