@@ -5,6 +5,7 @@
 #include "api/flight/flight_state.hpp"
 #include "api/flight/procedure_json.hpp"
 #include "api/kit/late_writer.hpp"
+#include "api/planning/site_structures.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/plan_store.hpp"
 
@@ -156,9 +157,16 @@ void FlightService::State::recover() {
         mission, j.is_object() ? priors_of(j.value("clues", nlohmann::json())) : procedure::FlightPriors{});
     flying.emplace_back(mission, std::move(j));
   }
-  auto w = work.lock();
+  std::vector<std::optional<flight::KeptFlight>> read;
   for (const auto& [mission, j] : flying) {
-    if (auto found = kept_flight(mission, j)) {
+    read.push_back(kept_flight(mission, j));
+    // A flight goes on without walls rather than not at all; its own areas are in its plan.
+    if (read.back()) (void)deps.structures.join(read.back()->plan).has_value();
+  }
+  auto w = work.lock();
+  for (std::size_t i = 0; i < flying.size(); ++i) {
+    const auto& mission = flying[i].first;
+    if (auto& found = read[i]) {
       (void)w->operations.recover(now(), *std::move(found)).has_value();
     } else {
       deps.events.add(EventLevel::critical, "procedure.lost",

@@ -2,6 +2,7 @@
 #include <utility>
 
 #include "api/flight/flight_state.hpp"
+#include "api/planning/site_structures.hpp"
 #include "core/ports/plan_store.hpp"
 
 namespace anchord::api {
@@ -36,9 +37,9 @@ Result<FlightService::FlownPlan> FlightService::flown_plan(const MissionId& miss
       f->plan, c.n, c.at, c.by, c.saved_revision, c.former ? std::optional(c.former->version) : std::nullopt};
 }
 
-/// The plan that is asked for; the store is asked without the lock.
+/// The plan that is asked for, by the walls of today; the store is asked without the lock.
 Result<Plan> FlightService::State::wanted_plan(const MissionId& mission, bool undo) {
-  PlanId id;
+  Plan wanted;
   {
     const auto w = work.lock();
     const auto* f = w->operations.flight_of(mission);
@@ -46,14 +47,18 @@ Result<Plan> FlightService::State::wanted_plan(const MissionId& mission, bool un
     if (undo) {
       if (!f->changes.former)
         return cannot("the plan was not changed in this flight: there is nothing to undo");
-      Plan former = *f->changes.former;
-      if (!f->changes.own_origin) former.origin.reset();
-      return former;
+      wanted = *f->changes.former;
+      if (!f->changes.own_origin) wanted.origin.reset();
+    } else {
+      wanted.id = f->plan.id;
     }
-    id = f->plan.id;
   }
-  BOOST_OUTCOME_TRY(const auto stored, deps.plans.plan(id));
-  return plan_of(stored);
+  if (!undo) {
+    BOOST_OUTCOME_TRY(const auto stored, deps.plans.plan(wanted.id));
+    wanted = plan_of(stored);
+  }
+  BOOST_OUTCOME_TRYV(deps.structures.join(wanted));
+  return wanted;
 }
 
 Result<FlightService::PlanDifference> FlightService::plan_difference(const MissionId& mission,

@@ -6,6 +6,7 @@
 
 #include "api/admin/event_log.hpp"
 #include "api/flight/flight_state.hpp"
+#include "api/planning/site_structures.hpp"
 #include "core/localize/live_flight.hpp"
 #include "core/ports/drone.hpp"
 #include "core/ports/executor.hpp"
@@ -15,6 +16,8 @@ namespace anchord::api {
 namespace {
 
 constexpr std::size_t k_checks = 64;
+
+std::uint64_t structure_of(const Plan& plan) { return plan.structure ? plan.structure->version : 0; }
 
 flight::Holder holder_of(const Principal& who) { return {who.token_id, who.name}; }
 
@@ -227,14 +230,15 @@ flight::Groundwork FlightService::State::groundwork(const Plan* plan) {
   {
     const auto kept = checks.lock();
     for (const auto& known : *kept) {
-      if (known.plan == plan->id && known.revision == plan->version) ground.check = known.check;
+      if (known.plan == plan->id && known.revision == plan->version && known.structure == structure_of(*plan))
+        ground.check = known.check;
     }
   }
   if (ground.check) return ground;
   if (auto checked = planning::check_plan(*plan))
     ground.check = std::make_shared<const planning::PlanCheck>(std::move(checked).value());
   auto kept = checks.lock();
-  kept->push_back({plan->id, plan->version, ground.check});
+  kept->push_back({plan->id, plan->version, structure_of(*plan), ground.check});
   if (kept->size() > k_checks) kept->pop_front();
   return ground;
 }
@@ -246,6 +250,7 @@ Result<FlightCommand> FlightService::act(const MissionId& mission, const Order& 
     if (!order.plan) return make_error(Errc::invalid_argument, "start needs the plan that is to be flown");
     BOOST_OUTCOME_TRY(const auto stored, state_->deps.plans.plan(*order.plan));
     plan = plan_of(stored);
+    BOOST_OUTCOME_TRYV(state_->deps.structures.join(*plan));
   }
   std::optional<flight::Groundwork> ground;
   if (plan) ground = state_->groundwork(&*plan);
@@ -311,6 +316,7 @@ std::vector<ChecklistItem> FlightService::checklist(const MissionId& mission,
   std::optional<Plan> plan;
   if (plan_id) {
     if (const auto stored = state_->deps.plans.plan(*plan_id)) plan = plan_of(stored.value());
+    if (plan && !state_->deps.structures.join(*plan)) plan.reset();
   }
   const auto ground = state_->groundwork(plan ? &*plan : nullptr);
   auto w = state_->work.lock();

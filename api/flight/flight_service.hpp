@@ -31,6 +31,7 @@ class EventLog;
 class Hub;
 class LateWriter;
 class MissionService;
+class SiteStructures;
 struct StorageStatus;
 
 using flight::ChecklistItem;
@@ -47,6 +48,7 @@ class FlightService final : public MissionObserver, public MissionControl {
   struct Deps {
     MissionService& missions;
     PlanStore& plans;
+    SiteStructures& structures;
     Hub& hub;
     EventLog& events;
     const Clock& clock;

@@ -75,7 +75,7 @@ struct FlightService::State {
 
   struct Checked {
     PlanId plan{};
-    std::uint64_t revision{};
+    std::uint64_t revision{}, structure{};
     std::shared_ptr<const planning::PlanCheck> check;
   };
   Locked<std::deque<Checked>> checks;  ///< newest last, at most 64: pages ask for the same one every second

@@ -93,6 +93,7 @@ Result<RangePage> parse_range_page(std::string_view body) {
 
 std::string mission_request_json(const Mission& mission) {
   Ordered out{{"name", mission.name}};
+  if (mission.site) out["site"] = to_string(*mission.site);
   if (!mission.kit.empty()) out["kit"] = mission.kit;
   if (!mission.radio.empty()) out["radio"] = mission.radio;
   out["frame"] = k_frame_words.word(mission.frame);

@@ -98,6 +98,7 @@ Response put_walls(PlaceApi& s, const Request& request) {
   floor.structure = wanted.structure;
   value_or_problem(s.places.update(floor, floor.version));
   ++floor.version;
+  s.changed();
   s.audit(request, "floor.walls " + to_string(floor.id));
   return walls(200, floor);
 }

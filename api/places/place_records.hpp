@@ -38,7 +38,8 @@ class PlaceRecords {
     response.header("ETag", etag(place));
     return response;
   }
-  static void note(PlaceApi& s, const Request& request, const char* what, const Place& place) {
+  static void written(PlaceApi& s, const Request& request, const char* what, const Place& place) {
+    s.changed();
     s.audit(request, std::string(Kind::k_word) + what + to_string(place.id));
   }
 
@@ -49,7 +50,7 @@ class PlaceRecords {
     place.created = s.clock.now();
     place.id.uuid = make_uuid_v7(place.created);
     value_or_problem(s.places.insert(place));
-    note(s, request, ".create ", place);
+    written(s, request, ".create ", place);
     Response response = answer(201, place);
     response.header("Location", std::string(Kind::k_path) + '/' + to_string(place.id));
     return response;
@@ -67,7 +68,7 @@ class PlaceRecords {
     Kind::read(json_body(request), place, false);
     value_or_problem(s.places.update(place, place.version));
     ++place.version;
-    note(s, request, ".change ", place);
+    written(s, request, ".change ", place);
     return answer(200, place);
   }
 
@@ -76,7 +77,7 @@ class PlaceRecords {
     const Place place = Kind::find(s, request);
     require_match(request, etag(place));
     value_or_problem(s.places.remove(place.id, place.version));
-    note(s, request, ".delete ", place);
+    written(s, request, ".delete ", place);
     Response response;
     response.status = 204;
     return response;

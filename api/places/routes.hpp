@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 
 #include "api/kit/audit.hpp"
 #include "api/learning/worker_port.hpp"
@@ -26,6 +27,8 @@ struct PlaceApi {
   const Clock& clock;
   const SteadyClock& steady;
   Audit audit;
+  /// A building, a floor or what is accepted of it was written: what is planned by it is read anew.
+  std::function<void()> changed;
   /// One picture is read at a time: each may take a gigabyte of the worker's.
   std::atomic<bool> reading{false};
 };

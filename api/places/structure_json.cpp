@@ -7,6 +7,7 @@
 #include "api/kit/reader.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/geo/enu.hpp"
+#include "core/types/wall.hpp"
 
 namespace anchord::api {
 
@@ -47,8 +48,7 @@ Ordered read_wall(const Json& body, const std::string& at, std::vector<FieldErro
       fields.error(end, "wrong_type", "must be [lon, lat] in degrees");
   }
   out["thickness_m"] = fields.number("thickness_m", 0.01, 3).value_or(0.1);
-  out["material"] =
-      fields.word("material", std::span<const std::string_view>(k_wall_materials)).value_or("unknown");
+  out["material"] = fields.word("material", k_wall_material_words.words()).value_or("unknown");
   fields.finish();
   return out;
 }
@@ -82,7 +82,7 @@ AcceptedStructure read_structure(const Json& body, const Document& proposal) {
   Ordered structure{{"outline", nullptr}, {"walls", Ordered::array()}};
   const bool from_trace = fields.boolean("from_trace").value_or(false);
   out.site_outline = fields.boolean("site_outline").value_or(false);
-  const auto material = fields.word("material", std::span<const std::string_view>(k_wall_materials));
+  const auto material = fields.word("material", k_wall_material_words.words());
   if (from_trace) {
     const auto kept = kept_json(proposal.text);
     if (!kept.is_object()) {

@@ -1,17 +1,13 @@
 #pragma once
 
-#include <array>
 #include <nlohmann/json_fwd.hpp>
-#include <string_view>
+#include <string>
 
 #include "core/types/document.hpp"
 #include "core/types/position.hpp"
 
 namespace anchord::api {
 
-/// What walls are made of: the materials of the simulator, and what nobody has said.
-inline constexpr std::array<std::string_view, 5> k_wall_materials{"unknown", "brick", "concrete", "glass",
-                                                                  "plasterboard"};
 /// Most walls of a floor; a hospital's has some 2000.
 inline constexpr std::size_t k_max_walls = 10'000;
 

@@ -7,6 +7,7 @@
 #include "api/kit/support.hpp"
 #include "api/planning/plan_json.hpp"
 #include "api/planning/routes.hpp"
+#include "api/planning/site_structures.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/plan_store.hpp"
@@ -106,22 +107,24 @@ Response remove(PlanningApi& s, const Request& request) {
 }
 
 Response validate(PlanningApi& s, const Request& request) {
-  const Plan plan = load(s, request);
+  Plan plan = load(s, request);
+  value_or_problem(s.structures.join(plan));
   return json_response(200, plan_check_json(value_or_problem(planning::check_plan(plan))));
 }
 
 /// The same of a plan that need not be stored: what is drawn is judged while it is drawn.
-Response validate_body(PlanningApi&, const Request& request) {
+Response validate_body(PlanningApi& s, const Request& request) {
   std::vector<FieldError> errors;
   auto body = json_body(request);
   if (body.is_object() && !body.contains("name")) body["name"] = "Drawn";
-  const Plan plan = read_plan(body, errors);
+  Plan plan = read_plan(body, errors);
   refuse_if_any(errors);
+  value_or_problem(s.structures.join(plan));
   return json_response(200, plan_check_json(value_or_problem(planning::check_plan(plan))));
 }
 
 /// The body is a plan that need not be stored; the answer is the same one with waypoints, and its check.
-Response generate(PlanningApi&, const Request& request) {
+Response generate(PlanningApi& s, const Request& request) {
   std::vector<FieldError> errors;
   auto body = json_body(request);
   if (body.is_object() && !body.contains("name")) body["name"] = "Generated";
@@ -129,6 +132,7 @@ Response generate(PlanningApi&, const Request& request) {
   if (errors.empty() && plan.outline.empty())
     errors.push_back({"/outline", "required", "waypoints are made from it"});
   refuse_if_any(errors);
+  value_or_problem(s.structures.join(plan));
   const Plan made = value_or_problem(planning::generate_waypoints(plan));
   const auto check = value_or_problem(planning::check_plan(made));
   auto out = plan_json(made);

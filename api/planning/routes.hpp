@@ -16,6 +16,7 @@ class SiteStore;
 namespace anchord::api {
 
 class Router;
+class SiteStructures;
 
 /// What the routes of plans work with; lives as long as the router.
 struct PlanningApi {
@@ -27,6 +28,7 @@ struct PlanningApi {
   std::function<std::optional<MissionId>(const PlanId&)> flown_with;
   /// A new revision was stored: a flight that flies the plan shows it.
   std::function<void(const Plan&)> saved;
+  SiteStructures& structures;
 };
 
 void add_plan_routes(Router& router, PlanningApi& api);

@@ -8,6 +8,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/base/median.hpp"
+
 namespace anchord::floor_plan {
 namespace {
 
@@ -24,11 +26,7 @@ Eigen::Vector2d perpendicular(const Eigen::Vector2d& v) { return {-v.y(), v.x()}
 double median_offset(const Points& points, const Eigen::Vector2d& at, const Eigen::Vector2d& normal) {
   std::vector<double> offsets;
   for (const auto& p : points) offsets.push_back(normal.dot(p - at));
-  const auto middle = offsets.begin() + static_cast<std::ptrdiff_t>(offsets.size() / 2);
-  std::nth_element(offsets.begin(), middle, offsets.end());
-  const double high = *middle;
-  if (offsets.size() % 2 == 1) return high;
-  return (high + *std::max_element(offsets.begin(), middle)) / 2;
+  return median(offsets);
 }
 
 /// The nearest of the four main directions to `angle`.

@@ -119,6 +119,19 @@ double distance_to_edge_m(const Polygon& polygon, const Vector2d& point) {
   return out;
 }
 
+bool covers(const Polygon& outer, const Polygon& inner, double slack_m) {
+  constexpr double k_step_m = 0.5;
+  bool all = outer.size() >= 3 && !inner.empty();
+  for_each_edge(inner, [&](const Vector2d& a, const Vector2d& b) {
+    const int steps = std::clamp(static_cast<int>((b - a).norm() / k_step_m) + 1, 1, 10'000);
+    for (int k = 0; k < steps && all; ++k) {
+      const Vector2d at = a + (b - a) * (static_cast<double>(k) / steps);
+      all = contains(outer, at) || distance_to_edge_m(outer, at) <= slack_m;
+    }
+  });
+  return all;
+}
+
 std::optional<Refusal> refuse_point(const Bounds& bounds, const Eigen::Vector3d& point_m) {
   if (!point_m.allFinite()) return Refusal::outside_fence;
   const Vector2d p = point_m.head<2>();

@@ -66,6 +66,9 @@ double distance_between_segments_m(const Eigen::Vector2d& a, const Eigen::Vector
 /// To the nearest edge, from either side.
 double distance_to_edge_m(const Polygon& polygon, const Eigen::Vector2d& point_m);
 
+/// The whole of `inner` lies in `outer`, its edge at most `slack_m` outside (looked at every half metre).
+bool covers(const Polygon& outer, const Polygon& inner, double slack_m);
+
 /// First rule the point breaks; nothing when it may be flown to. Not finite: outside_fence.
 std::optional<Refusal> refuse_point(const Bounds& bounds, const Eigen::Vector3d& point_m);
 

@@ -3,19 +3,29 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace anchord::planning {
 namespace {
 
-constexpr double k_least_cosine = 0.2;  // a grazing ray leaves through the edge of the wall
-
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-/// Walls between two points, each by the inverse cosine; the roof counts as `roof` of them.
-double slant_between(const Building& building, double roof, const Eigen::Vector3d& from,
-                     const Eigen::Vector3d& to) {
+constexpr double k_facade_m = 0.6;
+
+/// Walls between two points, each by the inverse cosine: one of unknown make counts as one, an accepted one
+/// by its excess in units of `unknown_m`, the roof as `roof` of them. Nothing where the accepted ones let
+/// nothing through.
+std::optional<double> slant_between(const Building& building, double roof, double unknown_m,
+                                    const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   const Polygon& outline = building.outline;
-  if (outline.size() < 3) return 0;
+  const auto hits = building.walls ? hits_between(*building.walls, from, to) : std::vector<WallHit>{};
+  double accepted = 0, loss_db = 0;
+  for (const WallHit& hit : hits) {
+    accepted += unknown_m > 0 ? hit.excess_m / unknown_m : 0;
+    loss_db += hit.loss_db;
+  }
+  if (loss_db > k_opaque_db) return std::nullopt;
+  if (outline.size() < 3) return accepted;
   const Eigen::Vector3d way = to - from;
   const double length = way.norm();
   double out = 0;
@@ -31,11 +41,15 @@ double slant_between(const Building& building, double roof, const Eigen::Vector3
       over = true;
       continue;
     }
-    out += 1 / std::max(std::abs(across) / edge.norm() / length, k_least_cosine);
+    const double across_m = std::abs(across) / edge.norm();  // of the whole way, at right angles to the edge
+    const bool known = std::any_of(hits.begin(), hits.end(), [&](const WallHit& hit) {
+      return std::abs(hit.share - share) * across_m <= k_facade_m;
+    });
+    if (!known) out += wall_slant(across_m / length);
   }
   // In over the top of a wall means in through the roof.
-  if (over) out += roof / std::max(std::abs(way.z()) / length, k_least_cosine);
-  return out;
+  if (over) out += roof * wall_slant(std::abs(way.z()) / length);
+  return out + accepted;
 }
 
 }  // namespace
@@ -53,8 +67,10 @@ Sight Design::sight(const Eigen::Vector3d& point, const Eigen::Vector3d& anchor)
   const Eigen::Vector3d d = point - anchor;
   const double length = d.norm();
   if (length > options_.max_range_m || length < 1e-6) return out;
+  const auto slant = slant_between(building_, options_.roof_walls, options_.wall_excess_m, point, anchor);
+  if (!slant) return out;
   out.row << d / length, 1.0;
-  out.slant = slant_between(building_, options_.roof_walls, point, anchor);
+  out.slant = *slant;
   // The spread of late paths grows as the excess does.
   const double noise_m = options_.range_sigma_m * std::max(1.0, out.slant);
   out.variance_m2 =

@@ -315,7 +315,7 @@ Result<FlightPlan> plan_flight(const FlightPlanInput& input, const FlightPlanOpt
                                            std::to_string(std::lround(options.max_range_m)) +
                                            " m of where the aircraft may fly");
   }
-  Design design(plan.assumed_anchors_m, options, {input.outline, input.building_height_m});
+  Design design(plan.assumed_anchors_m, options, {input.outline, input.building_height_m, input.walls});
   Sights sights;
   for (const auto& c : all) sights.push_back(design.sights(c.point_m));
   std::vector<Candidate> chosen;

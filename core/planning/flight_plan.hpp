@@ -7,6 +7,7 @@
 
 #include "core/base/result.hpp"
 #include "core/planning/bounds.hpp"
+#include "core/planning/walls.hpp"
 #include "core/types/plan.hpp"
 
 namespace anchord::planning {
@@ -16,6 +17,7 @@ struct FlightPlanInput {
   double building_height_m = 6;
   std::vector<Polygon> no_fly;
   Polygon fence;  ///< empty: none
+  Walls walls{};  ///< accepted ones, in the same metres
 };
 
 struct FlightPlanOptions {

@@ -76,7 +76,7 @@ void predict(const Plan& plan, const LocalPlan& local, PlanCheck& check) {
     check.assumed_anchors_m.clear();
     return;
   }
-  Design design(check.assumed_anchors_m, options, {local.outline, plan.building_height_m});
+  Design design(check.assumed_anchors_m, options, {local.outline, plan.building_height_m, local.walls});
   for (std::size_t i = 0; i < local.waypoints_m.size(); ++i) {
     if (plan.waypoints[i].measure) design.add(local.waypoints_m[i]);
   }
@@ -93,6 +93,16 @@ void predict(const Plan& plan, const LocalPlan& local, PlanCheck& check) {
   }
   check.rms_m = std::sqrt(design.mean_square_m2());
   check.worst_m = *std::max_element(check.predicted_sigma_m.begin(), check.predicted_sigma_m.end());
+}
+
+/// Floors of a building have nearly the same outline, and the drawn one often is it: what another covers
+/// would only cost time wherever a way is looked for.
+void add_building(Polygon outline, LocalPlan& plan) {
+  constexpr double k_same_m = 0.1;  // tracing is no better
+  const auto within = [&](const Polygon& outer) { return covers(outer, outline, k_same_m); };
+  if (within(plan.outline) || std::ranges::any_of(plan.buildings, within)) return;
+  std::erase_if(plan.buildings, [&](const Polygon& kept) { return covers(outline, kept, k_same_m); });
+  plan.buildings.push_back(std::move(outline));
 }
 
 std::string point_text(Refusal refusal, const Plan& plan, std::size_t i) {
@@ -151,6 +161,13 @@ Result<LocalPlan> local_plan(const Plan& plan) {
   out.outline = area(plan.outline);
   out.fence = area(plan.fence);
   for (const auto& polygon : plan.no_fly) out.no_fly.push_back(area(polygon));
+  if (plan.structure) {
+    for (const auto& polygon : plan.structure->outlines) add_building(area(polygon), out);
+    auto walls = std::make_shared<std::vector<BuiltWall>>();
+    for (const auto& w : plan.structure->walls)
+      walls->push_back({metres(w.from), metres(w.to), w.bottom_m, w.top_m, w.thickness_m, w.material});
+    out.walls = std::move(walls);
+  }
   for (const auto& w : plan.waypoints) {
     const auto at = metres(w.at);
     out.waypoints_m.emplace_back(at.x(), at.y(), w.height_m);
@@ -163,6 +180,7 @@ Bounds flight_bounds(const LocalPlan& plan, const PlanSettings& settings) {
   bounds.fence = plan.fence;
   bounds.no_fly = plan.no_fly;
   if (plan.outline.size() >= 3) bounds.no_fly.push_back(plan.outline);
+  bounds.no_fly.insert(bounds.no_fly.end(), plan.buildings.begin(), plan.buildings.end());
   // Straight ways between points of a ring cut its arcs: plan_flight() allows 20 cm, and 1 cm is rounding.
   bounds.keep_out_m = std::max(0.0, settings.keep_out_m - 0.21);
   bounds.min_height_m = settings.min_height_m;
@@ -226,7 +244,8 @@ Result<Plan> generate_waypoints(const Plan& plan) {
                       "waypoints are made from the building's outline, and the plan has none");
   }
   BOOST_OUTCOME_TRY(const auto local, local_plan(plan));
-  FlightPlanInput input{local.outline, plan.building_height_m, local.no_fly, local.fence};
+  FlightPlanInput input{local.outline, plan.building_height_m, local.no_fly, local.fence, local.walls};
+  input.no_fly.insert(input.no_fly.end(), local.buildings.begin(), local.buildings.end());
   auto options = flight_options(plan);
   options.heights_m = heights_of(plan);
   BOOST_OUTCOME_TRY(const auto flight, plan_flight(input, options));

@@ -18,6 +18,8 @@ struct LocalPlan {
   std::vector<Polygon> no_fly;
   Polygon fence;
   std::vector<Eigen::Vector3d> waypoints_m;
+  std::vector<Polygon> buildings;  ///< outlines of accepted floor plans that no other one covers
+  Walls walls;                     ///< of them
 };
 
 /// Where 0, 0, 0 of a plan is: its origin, else the middle of its outline, else of its waypoints.
@@ -25,7 +27,8 @@ struct LocalPlan {
 Result<Wgs84> plan_origin(const Plan& plan);
 Result<LocalPlan> local_plan(const Plan& plan);
 
-/// Where the aircraft may be by this plan: the outline is a no-fly area like the drawn ones.
+/// Where the aircraft may be by this plan: the outline is a no-fly area like the drawn ones, and so are the
+/// outlines of accepted floor plans.
 Bounds flight_bounds(const LocalPlan& plan, const PlanSettings& settings);
 
 enum class Severity : std::uint8_t { error, warning };

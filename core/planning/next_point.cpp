@@ -73,21 +73,32 @@ Column ridge_traces(const NextPointInput& input, const PlannedAnchor& anchor, co
   return out;
 }
 
+/// By the walls of the bounds and by those that a person accepted; nothing where these let nothing through.
+std::optional<double> expected_nlos(const NextPointInput& input, const Eigen::Vector3d& point,
+                                    const Eigen::Vector3d& place) {
+  const double drawn = p_nlos_through(input.bounds, point, place);
+  if (!input.walls || input.walls->empty()) return drawn;
+  const double loss_db = obstruction_between(*input.walls, point, place).loss_db;
+  if (loss_db > k_opaque_db) return std::nullopt;
+  return 1.0 - (1.0 - drawn) * (1.0 - p_nlos_of_loss(loss_db));
+}
+
 Column informations(const NextPointInput& input, const PlannedAnchor& anchor, const Place& place,
                     const NextPointOptions& options, const Grid& grid) {
   Information base(place.position_m, anchor.covariance_m2, options);
   if (!anchor.covariance_m2) {
     for (const auto i : anchor.measured_at) {
-      base.add(input.visited[i], p_nlos_through(input.bounds, input.visited[i], place.position_m));
+      base.add(input.visited[i], expected_nlos(input, input.visited[i], place.position_m).value_or(1));
     }
   }
   Column out{base.now(), {}};
   out.with.reserve(grid.size());
   for (std::size_t i = 0; i < grid.size(); ++i) {
     const auto point = grid.at(i);
-    out.with.push_back(out_of_range(options, point, place.position_m)
-                           ? out.before
-                           : base.with(point, p_nlos_through(input.bounds, point, place.position_m)));
+    const auto nlos = out_of_range(options, point, place.position_m)
+                          ? std::nullopt
+                          : expected_nlos(input, point, place.position_m);
+    out.with.push_back(nlos ? base.with(point, *nlos) : out.before);
   }
   return out;
 }
@@ -272,7 +283,7 @@ Result<Decision> next_point(const NextPointInput& input, const NextPointOptions&
     c.point_m = grid.at(i);
     for (std::size_t k = 0; k < columns.size(); ++k) {
       c.per_anchor.push_back(columns[k].with[i]);
-      c.p_nlos += p_nlos_through(input.bounds, c.point_m, input.anchors[k].places.front().position_m) /
+      c.p_nlos += expected_nlos(input, c.point_m, input.anchors[k].places.front().position_m).value_or(1) /
                   static_cast<double>(columns.size());
     }
     c.value = combine(c.per_anchor, weights, options.combine);

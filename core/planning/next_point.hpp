@@ -11,6 +11,7 @@
 #include "core/base/result.hpp"
 #include "core/planning/bounds.hpp"
 #include "core/planning/grid.hpp"
+#include "core/planning/walls.hpp"
 #include "core/types/plan.hpp"
 
 namespace anchord::planning {
@@ -38,6 +39,7 @@ struct NextPointInput {
   std::vector<Eigen::Vector3d> unreachable;  ///< tried and given up (8.3.9, 8.3.10)
   std::vector<PlannedAnchor> anchors;
   Bounds bounds;
+  Walls walls{};  ///< what ranges go through; nothing is flown by them
 };
 
 struct NextPointOptions {

@@ -77,6 +77,7 @@ planning::NextPointInput FlightEngine::point_input(std::span<const Estimate> est
   input.current = state_.target_m;
   input.unreachable = state_.unreachable;
   input.bounds = setup_.limits.bounds;
+  input.walls = setup_.walls;
   for (const auto& task : state_.anchors) {
     if (task.done) continue;
     planning::PlannedAnchor anchor;

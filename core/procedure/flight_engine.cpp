@@ -51,6 +51,7 @@ Result<FlightSetup> flight_setup(const Plan& plan, const Eigen::Vector3d& home_m
   out.settings.take_off_m = std::clamp(4.0, s.min_height_m, s.max_height_m);
   BOOST_OUTCOME_TRY(out.settings.check());
   out.limits.bounds = planning::flight_bounds(local, s);
+  out.walls = local.walls;
   out.limits.home_m = home_m;
   out.limits.speed_mps = s.speed_mps;
   out.limits.min_battery = s.min_battery;

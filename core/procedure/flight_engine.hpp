@@ -29,7 +29,8 @@ struct FlightSetup {
   planning::NextPointOptions planner;
   Wgs84 origin{};
   Eigen::Vector3d middle_m{
-      0, 0, 0};  ///< of the building: where an anchor is thought to be before anything is known
+      0, 0, 0};             ///< of the building: where an anchor is thought to be before anything is known
+  planning::Walls walls{};  ///< accepted ones, which ranges go through
   std::vector<NetworkId> expected;  ///< when every one of them is done, the flight is over
   int samples = 20;                 ///< ranges wanted of each anchor at a point
   double min_gain = 0.1;            ///< share of the value; a point that brings less is not flown to

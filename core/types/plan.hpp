@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "core/base/ids.hpp"
 #include "core/base/time.hpp"
 #include "core/types/position.hpp"
+#include "core/types/wall.hpp"
 
 namespace anchord::planning {
 
@@ -55,6 +57,21 @@ struct PlanWaypoint {
   bool height_search{false};
 };
 
+/// A wall of a floor plan; heights above the ground.
+struct GeoWall {
+  LonLat from, to;
+  double bottom_m{}, top_m{};
+  double thickness_m{0.1};
+  WallMaterial material{WallMaterial::unknown};
+};
+
+/// What people accepted of the floor plans of a site.
+struct SiteStructure {
+  std::vector<GeoWall> walls;
+  std::vector<GeoPolygon> outlines;  ///< of its buildings, floor by floor: nothing is flown inside
+  std::uint64_t version{0};          ///< changes with any of them
+};
+
 /// Grid, rules and limits of a flight; the defaults fly without a look at them.
 struct PlanSettings {
   double keep_out_m = 4;  ///< from the outline and from no-fly areas
@@ -88,6 +105,8 @@ struct Plan {
   PlanSettings settings{};
   std::vector<NetworkId> expected_anchors;
   std::vector<PlanWaypoint> waypoints;
+  /// Of its site, as it is now: joined where a plan is checked, generated or flown, never kept with it.
+  std::shared_ptr<const SiteStructure> structure{};
   UtcTime created{}, changed{};
   std::uint64_t version{1};
 };

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/median.hpp"
+
 namespace anchord::sim {
 namespace {
 
@@ -69,14 +71,13 @@ Eigen::Vector3d filter_position(std::span<const Eigen::Vector3d> newest_last, un
   const auto window = newest_last.last(n);
   const unsigned kind = setting & 0x0f;
   if (kind == 4) {
-    Eigen::Vector3d median = Eigen::Vector3d::Zero();
+    Eigen::Vector3d middle = Eigen::Vector3d::Zero();
     for (int axis = 0; axis < 3; ++axis) {
       std::vector<double> values;
       for (const Eigen::Vector3d& at_m : window) values.push_back(at_m(axis));
-      std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(n / 2), values.end());
-      median(axis) = values[n / 2];
+      middle(axis) = upper_median(values);
     }
-    return median;
+    return middle;
   }
   if (kind != 1 && kind != 3) return window.back();
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();

@@ -135,7 +135,7 @@ void take_material(Object& of, Material& material) {
   std::string name;
   of.text("material", name);
   bool known = name.empty();
-  for (const Material& one : {k_glass, k_brick, k_concrete, k_plasterboard}) {
+  for (const Material& one : {k_glass, k_brick, k_concrete, k_plasterboard, k_metal}) {
     if (one.name != name) continue;
     material = one;
     known = true;
@@ -144,7 +144,7 @@ void take_material(Object& of, Material& material) {
   if (!known) material = Material{"other", 1, 0};
   const auto permittivity = of.number("relative_permittivity"), loss = of.number("loss_db");
   if (!known && !loss)
-    of.fail("material", "is none of glass, brick, concrete, plasterboard: say its loss_db");
+    of.fail("material", "is none of glass, brick, concrete, plasterboard, metal: say its loss_db");
   if (permittivity) material.relative_permittivity = *permittivity;
   if (loss) material.loss_db = *loss;
   if (material.relative_permittivity < 1 || material.loss_db < 0) of.fail("material", "is not possible");

@@ -42,14 +42,14 @@ std::optional<double> crossing(const Slab& slab, const Eigen::Vector3d& from_m,
 }
 
 void add_crossing(Obstruction& sum, double cosine, double excess_m, double loss_db) {
-  const double slant = 1.0 / std::max(cosine, 0.2);  // a grazing ray leaves through the panel's edge
+  const double slant = wall_slant(cosine);
   sum.excess_m += excess_m * slant;
   sum.loss_db += loss_db * slant;
   ++sum.panels;
 }
 
 double slab_excess_m(const Material& material, double thickness_m) {
-  return (std::sqrt(material.relative_permittivity) - 1.0) * thickness_m;
+  return anchord::slab_excess_m(material.relative_permittivity, thickness_m);
 }
 
 Panel upright(double x0, double y0, double x1, double y1, double height_m, double thickness_m,
@@ -106,6 +106,13 @@ Panel upright_wall(const Eigen::Vector2d& from_m, const Eigen::Vector2d& to_m, d
           thickness_m,
           material,
           {}};
+}
+
+Panel panel_of(const BuiltWall& wall) {
+  Panel panel = upright_wall(wall.from_m, wall.to_m, wall.bottom_m, wall.top_m, wall.thickness_m,
+                             material_of(wall.material));
+  panel.excess_m = wall_excess_m(wall);
+  return panel;
 }
 
 Obstruction obstruction_between(const World& world, const Eigen::Vector3d& a_m, const Eigen::Vector3d& b_m) {

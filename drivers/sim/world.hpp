@@ -7,22 +7,28 @@
 
 #include "core/base/ids.hpp"
 #include "core/types/position.hpp"
+#include "core/types/wall.hpp"
 
 namespace anchord::sim {
 
 /// What a panel is made of. The excess delay of a crossing is (sqrt(permittivity) - 1) * thickness /
 /// cos(incidence), the extra optical path of a dielectric slab; its loss is `loss_db` at right angles,
-/// divided by the same cosine. Values for 4 to 6.5 GHz in the middle of ITU-R P.2040-3 table 3 (permittivity)
-/// and of published UWB wall tests.
+/// divided by the same cosine. Values and their sources: core/types/wall.hpp, by which flights are planned
+/// too.
 struct Material {
   std::string_view name;
   double relative_permittivity{};
   double loss_db{};
 };
-inline constexpr Material k_glass{"glass", 6.3, 2.0};
-inline constexpr Material k_brick{"brick", 3.9, 7.0};
-inline constexpr Material k_concrete{"concrete", 5.2, 14.0};
-inline constexpr Material k_plasterboard{"plasterboard", 2.7, 1.5};
+constexpr Material material_of(WallMaterial material) {
+  const auto made = properties_of(material);
+  return {k_wall_material_words.word(material), made.relative_permittivity, made.loss_db};
+}
+inline constexpr Material k_glass = material_of(WallMaterial::glass);
+inline constexpr Material k_brick = material_of(WallMaterial::brick);
+inline constexpr Material k_concrete = material_of(WallMaterial::concrete);
+inline constexpr Material k_plasterboard = material_of(WallMaterial::plasterboard);
+inline constexpr Material k_metal = material_of(WallMaterial::metal);
 
 /// A flat rectangular piece of wall, window or ceiling; ENU metres.
 struct Panel {
@@ -59,6 +65,9 @@ struct World {
 /// An upright wall between two points seen from above.
 Panel upright_wall(const Eigen::Vector2d& from_m, const Eigen::Vector2d& to_m, double bottom_m, double top_m,
                    double thickness_m, const Material& material);
+
+/// The panel of a wall that was accepted from a floor plan.
+Panel panel_of(const BuiltWall& wall);
 
 /// The demonstration building: 30 x 20 x 8 m with glass fronts between brick piers, a concrete stair core,
 /// plasterboard partitions and a concrete roof; six anchors inside, at 2.4 to 6.6 m.

@@ -9,8 +9,8 @@
 namespace anchord::cli {
 
 /// Requests to a running anchord. Sends again with growing pauses while the server is away, busy or full of
-/// work; gives up after a minute, and after 2 s when nothing ever answered there. Everything it sends may arrive twice, which is why rows have identities and
-/// creations an Idempotency-Key. One thread.
+/// work; gives up after a minute, and after 2 s when nothing ever answered there. Everything it sends may
+/// arrive twice, which is why rows have identities and creations an Idempotency-Key. One thread.
 class RestClient {
  public:
   /// `url`: http://host:port, with or without a path before /api. `cancelled` ends waiting early.

@@ -20,8 +20,10 @@
 #include "server/cli/progress.hpp"
 #include "server/cli/rest_client.hpp"
 #include "server/cli/simulate_drone.hpp"
+#include "server/cli/site_source.hpp"
 #include "server/flight/closed_loop.hpp"
 #include "server/flight/sim_kit.hpp"
+#include "server/flight/site_world.hpp"
 
 namespace anchord::cli {
 namespace {
@@ -29,7 +31,8 @@ namespace {
 using SteadyClock = std::chrono::steady_clock;
 
 struct Options {
-  std::string mavlink{"udp://127.0.0.1:14550"}, url{"http://127.0.0.1:8420"}, token_file, mission, scenario;
+  std::string mavlink{"udp://127.0.0.1:14550"}, url{"http://127.0.0.1:8420"}, token_file, mission, scenario,
+      site;
   std::uint64_t seed{1};
   double ready_s{5}, wind_mps{0}, battery_s{1200};
   bool px4{false}, walls{false};
@@ -45,11 +48,11 @@ bool told(const Result<T>& result) {
 
 class World {
  public:
-  World(const Options& options, RestClient& client)
+  World(const Options& options, RestClient& client, flight::Scene scene)
       : options_(options),
         client_(client),
-        world_(options.walls ? flight::walled_world() : sim::demonstration_world()),
-        autopilot_(autopilot_options(options, world_)),
+        world_(std::move(scene.world)),
+        autopilot_(autopilot_options(options, world_, scene.home_m)),
         kit_(world_, radio(), options.seed, SystemClock().now()),
         start_(SteadyClock::now()) {}
 
@@ -61,6 +64,10 @@ class World {
     }
     auto mission = kit_.mission();
     mission.name = "Simulated drone";
+    if (!options_.site.empty()) {
+      BOOST_OUTCOME_TRY(const auto site, parse_uuid(options_.site));
+      mission.site = SiteId{site};
+    }
     BOOST_OUTCOME_TRY(const auto made, client_.post("/api/v1/missions", "application/json",
                                                     api::mission_request_json(mission)));
     BOOST_OUTCOME_TRY(mission_, api::parse_created_id(made));
@@ -126,11 +133,12 @@ class World {
   }
 
  private:
-  static sim::AutopilotOptions autopilot_options(const Options& options, const sim::World& world) {
+  static sim::AutopilotOptions autopilot_options(const Options& options, const sim::World& world,
+                                                 const Eigen::Vector3d& home_m) {
     sim::AutopilotOptions out;
     out.dialect = options.px4 ? drone::Autopilot::px4 : drone::Autopilot::ardupilot;
     out.origin = world.origin;
-    out.home_m = {-9, -9, 0};
+    out.home_m = home_m;
     out.ready_s = options.ready_s;
     out.seed = options.seed;
     out.vehicle.wind_mps = {options.wind_mps, 0, 0};
@@ -162,6 +170,23 @@ class World {
   Locked<Rows> rows_;
 };
 
+/// The site's own, or the demonstration building.
+Result<flight::Scene> scene_of(const Options& options, RestClient& client) {
+  if (options.site.empty())
+    return flight::Scene{options.walls ? flight::walled_world() : sim::demonstration_world()};
+  BOOST_OUTCOME_TRY(auto scene, fetch_site_scene(client, options.site));
+  std::fprintf(stderr,
+               "anchord simulate drone: %zu walls, %zu roofs, %zu anchors; the aircraft is %.0f m east, %.0f "
+               "m north of the origin\n",
+               scene.world.panels.size(), scene.world.slabs.size(), scene.world.anchors.size(),
+               scene.home_m.x(), scene.home_m.y());
+  if (scene.world.anchors.empty())
+    return make_error(
+        Errc::invalid_argument,
+        "site " + options.site + " has no place for an anchor: publish one, or accept an outline");
+  return scene;
+}
+
 int simulate_drone(const Options& options) {
   const auto address = link::parse_address(options.mavlink);
   if (!told(address)) return 2;
@@ -169,7 +194,9 @@ int simulate_drone(const Options& options) {
   if (!told(token)) return 2;
   auto client = RestClient::make(options.url, token.value(), interrupted);
   if (!told(client)) return 2;
-  World world(options, *client.value());
+  auto scene = scene_of(options, *client.value());
+  if (!told(scene)) return 2;
+  World world(options, *client.value(), std::move(scene).value());
   if (!told(world.read_scenario())) return 2;
   if (!told(world.find_mission())) return 1;
   boost::asio::io_context io;
@@ -222,7 +249,13 @@ void add_simulate_drone(CLI::App& simulate, int& exit_code) {
       "file of lines \"seconds what happens\", like \"30 pilot LOITER\"; the same without the "
       "seconds on standard input (drivers/sim/autopilot.md)");
   command->add_flag("--px4", o->px4, "speaks as PX4; default ArduPilot");
-  command->add_flag("--walls", o->walls, "brick fronts instead of glass");
+  auto* walls = command->add_flag("--walls", o->walls, "brick fronts instead of glass");
+  command
+      ->add_option(
+          "--site", o->site,
+          "id of a site: its accepted walls delay ranges, its published anchors answer them; default: the "
+          "demonstration building")
+      ->excludes(walls);
   command->callback([o, &exit_code] { exit_code = simulate_drone(*o); });
 }
 

@@ -38,6 +38,17 @@ TEST(Bounds, DistancesByHand) {
   EXPECT_DOUBLE_EQ(distance_between_segments_m({0, 0}, {2, 0}, {0, 1}, {2, 1}), 1);
 }
 
+TEST(Bounds, CoverWhatLiesInThemOrBesideThemBySoMuch) {
+  const Polygon square{{1, 1}, {4, 1}, {4, 4}, {1, 4}};
+  EXPECT_TRUE(covers(k_ell, square, 0));
+  EXPECT_FALSE(covers(square, k_ell, 0.1));
+  EXPECT_TRUE(covers(k_ell, {{-0.1, -0.1}, {4, 0}, {4, 4}}, 0.15));
+  EXPECT_FALSE(covers(k_ell, {{-0.2, -0.2}, {4, 0}, {4, 4}}, 0.15));
+  EXPECT_FALSE(covers(k_ell, {{1, 9.9}, {1, 1}, {9.9, 1}}, 0.1))
+      << "all corners inside, an edge across the notch";
+  EXPECT_FALSE(covers({{0, 0}, {1, 1}}, square, 5)) << "two corners enclose nothing";
+}
+
 TEST(Bounds, RefusesPointsByTheRuleTheyBreak) {
   Bounds bounds;
   bounds.fence = {{-50, -50}, {50, -50}, {50, 50}, {-50, 50}};

@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
+
+#include "core/planning/walls.hpp"
 
 namespace anchord::sim {
 namespace {
@@ -38,6 +41,26 @@ TEST(Wall, IsNotSeenBesideBeforeOrBehindTheLine) {
   EXPECT_EQ(obstruction_between(world, {5.1, 0, 0}, {9, 0, 0}).panels, 0);
   EXPECT_EQ(obstruction_between(world, {0, 30, 0}, {10, 30, 0}).panels, 0);
   EXPECT_EQ(obstruction_between(world, {5, 0, 0}, {5, 3, 0}).panels, 0) << "a ray inside the panel's plane";
+}
+
+TEST(Wall, OfAFloorPlanDelaysARangeAsThePlannerPredicts) {
+  const std::vector<BuiltWall> walls{{{5, -10}, {5, 10}, 0, 3, 0.2, WallMaterial::concrete},
+                                     {{7, -2}, {9, 8}, 0, 2, 0.1, WallMaterial::plasterboard},
+                                     {{2, 3}, {8, 3}, 3, 6, 0.02, WallMaterial::glass}};
+  World world;
+  for (const auto& wall : walls) world.panels.push_back(panel_of(wall));
+  int crossed = 0;
+  for (const Eigen::Vector3d& to :
+       {Eigen::Vector3d(12, 1, 1), {12, 8, 5}, {8, 9, 7}, {12, -9, 1}, {3, 1, 1}}) {
+    const Eigen::Vector3d from(0, 0, 1.5);
+    const Obstruction simulated = obstruction_between(world, from, to);
+    const auto predicted = planning::obstruction_between(walls, from, to);
+    EXPECT_EQ(simulated.panels, static_cast<int>(predicted.n)) << to.transpose();
+    EXPECT_NEAR(simulated.excess_m, predicted.excess_m, 1e-12) << to.transpose();
+    EXPECT_NEAR(simulated.loss_db, predicted.loss_db, 1e-12) << to.transpose();
+    crossed += simulated.panels;
+  }
+  EXPECT_GE(crossed, 4) << "the rays above do meet walls";
 }
 
 TEST(Exchange, ComesOutLongAndWeakThroughAWall) {
