@@ -69,7 +69,8 @@ test('the script and the styles stay within their budgets', async () => {
   console.log(
     `first load ${js} B gz script, ${css} B gz style; chunks ${chunks.map((c, i) => `${c} ${lazy[i]}`).join(', ')}`,
   );
-  assert.ok(js > 5000 && js <= 60_000, `first load ${js} B gz`);
+  assert.ok(js > 5000 && js <= 52_000, `first load ${js} B gz`);
+  assert.ok(first.length <= 3, `${first.length} files before anything is seen`);
   assert.ok(css <= 15_000, `style ${css} B gz`);
   assert.ok(chunks.length >= 2, 'map and plot are chunks of their own');
   for (const n of lazy) assert.ok(n <= 130_000, `a chunk of ${n} B gz`);

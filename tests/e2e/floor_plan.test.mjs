@@ -26,7 +26,6 @@ const place = (x, y) => {
 
 test('a person sends a plan, clicks points, sees residuals, places it, traces it, and draws by its outline', async () => {
   const { page, seen, id } = await openPage(browser, server, { hash: '#/plan' });
-  // Alarms come with the link and move the page: a click on its way would land beside the button.
   await eventually('LIVE', async () => (await text(id('status-link'))).includes('LIVE'), 20_000);
   await id('where').fill('51.0000, 3.7000');
   await id('where').press('Enter');

@@ -55,7 +55,7 @@ const unstruck = (page) =>
       .map((el) => `${el.closest('[data-testid]')?.dataset.testid}: ${el.textContent.trim()}`);
   });
 
-test('with the link lost every value is struck and aged, nothing is judged without data, and what came back is told', async () => {
+test('with the link lost every value is struck and aged, nothing is assessed without data, and what came back is told', async () => {
   const { page, id } = await openPage(browser, server);
   await eventually('ranges arrive', async () => (await id('range-list').locator('tbody tr').count()) >= 2, 20_000);
   await id('anchor-card').waitFor({ timeout: 40_000 });
@@ -165,7 +165,7 @@ test('Escape closes every dialog and the focus goes back; the view is reached wi
   await page.close();
 });
 
-test('a replay is of its moment: the strip says REPLAY and its time, never LIVE; events are stepped through in order', async () => {
+test('a replay is of its moment: the strip says REPLAY and its time, never LIVE', async () => {
   await new Promise((done) => (playing.exitCode === null ? playing.once('exit', done) : done()));
   const { page, id } = await openPage(browser, server, { hash: '#/replay' });
   await eventually('the flight is read', async () => /\d/.test(await text(id('replay-time'))), 20_000);

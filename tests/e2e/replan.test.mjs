@@ -3,17 +3,11 @@
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 import { openBrowser, openPage, picture, text, violations } from './browser.mjs';
-import { hall_outline } from './flight.mjs';
 import { eventually } from './server.mjs';
-import { serverWithAircraft } from './simulated_aircraft.mjs';
+import { serverWithAircraft, startFlight } from './simulated_aircraft.mjs';
 
 let server, aircraft, browser, mission, plan;
 const get = async (path) => (await server.fetch(path)).json();
-const send = async (path, json) => {
-  const answer = await server.fetch(path, { json });
-  assert.ok(answer.ok, `${path}: ${answer.status} ${await answer.clone().text()}`);
-  return answer.json();
-};
 const procedure = () => get(`/api/v1/missions/${mission}/procedure`);
 /** Somebody else saves the plan: its next revision. */
 async function save(edit) {
@@ -50,29 +44,7 @@ async function hold(page, button) {
 
 before(async () => {
   ({ server, aircraft, mission } = await serverWithAircraft());
-  const made = await send('/api/v1/plans/generate', {
-    name: 'Hall',
-    outline: hall_outline,
-    building_height_m: 8,
-    settings: { max_height_m: 14 },
-  });
-  plan = (await send('/api/v1/plans', made.plan)).id;
-  const list = () => get(`/api/v1/missions/${mission}/checklist?plan=${plan}`);
-  await eventually(
-    'RTK is fixed for 10 s',
-    async () => (await list()).items.find((i) => i.id === 'rtk').state === 'ok',
-    60_000,
-    500,
-  );
-  const { lease } = await send(`/api/v1/missions/${mission}/control`, { action: 'take' });
-  await eventually('everything that may be confirmed is green', async () => {
-    for (const item of (await list()).items.filter((i) => i.state !== 'ok' && (i.manual || i.overridable)))
-      await send(`/api/v1/missions/${mission}/checklist/${item.id}`, { reason: 'a test' });
-    return (await list()).ready;
-  });
-  await send(`/api/v1/missions/${mission}/actions`, { action: 'start', lease, plan });
-  await eventually('it works at a waypoint', async () => (await procedure()).step === 'ranging', 90_000, 250);
-  await send(`/api/v1/missions/${mission}/control`, { action: 'release', lease });
+  plan = await startFlight(server, mission);
   browser = await openBrowser();
 });
 after(async () => {

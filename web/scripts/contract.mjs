@@ -1,5 +1,5 @@
-// What the page believes of the API comes from the contract: src/api/generated/schema.d.ts (types) and limits.ts (of every property
-// with a default: that, its least and most). Not committed; written anew before each check, build and test.
+// What the page believes of the API comes from the contract: src/api/generated/schema.d.ts (types), limits.ts (of every property
+// with a default: that, its least and most) and secrets.ts (names of what is only written). Not committed; written anew before each check, build and test.
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import yaml from 'js-yaml';
@@ -32,10 +32,26 @@ function limits(schemas) {
   return out;
 }
 
+/** Names of all fields that the contract has as passwords, or as written and never read: nothing of the page may keep them. */
+function secrets(node, found = new Set()) {
+  for (const [name, rule] of Object.entries(node ?? {})) {
+    if (rule === null || typeof rule !== 'object') continue;
+    if (rule.writeOnly === true || rule.format === 'password') found.add(name);
+    secrets(rule, found);
+  }
+  return found;
+}
+
 mkdirSync(folder, { recursive: true });
 put('schema.d.ts', astToString(await openapiTS(contract, { emptyObjectsUnknown: true })));
-const { components } = yaml.load(readFileSync(contract, 'utf8'));
+const whole = yaml.load(readFileSync(contract, 'utf8')),
+  { components } = whole;
 put(
   'limits.ts',
   `/// Written by scripts/contract.mjs from api/openapi.yaml.\nexport const LIMITS = ${JSON.stringify(limits(components.schemas), null, 1)} as const;\n`,
+);
+const names = JSON.stringify([...secrets(whole)].sort());
+put(
+  'secrets.ts',
+  `/// Written by scripts/contract.mjs from api/openapi.yaml.\nexport const SECRETS: ReadonlySet<string> = new Set(${names});\n`,
 );

@@ -11,6 +11,8 @@ import './ui/theme';
 import './style/tokens.css';
 import './style/base.css';
 import './style/shell.css';
+import './style/strip.css';
+import './style/alarm.css';
 import './style/live.css';
 import './style/anchors.css';
 

@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { AlarmLimiter, Conditions, merged, type Alarm, type Situation } from '../src/ui/alarm_rules';
+import { AlarmLimiter, by_urgency, Conditions, merged, type Alarm, type Situation } from '../src/ui/alarm_rules';
 
 const calm: Situation = {
   now_ms: 0,
@@ -105,6 +105,34 @@ describe('Conditions', () => {
     ]);
     expect(list[0]!.since_ms).toBe(1000);
   });
+});
+
+describe('the alarm that stands in the line', () => {
+  const alarm = (id: string, priority: Alarm['priority'], acknowledged = false, since_ms = 0): Alarm => ({
+    id,
+    priority,
+    title: id,
+    advice: '',
+    since_ms,
+    acknowledged,
+  });
+  const order = (...list: Alarm[]): string[] => list.sort(by_urgency).map((a) => a.id);
+  it('is the gravest that nobody has acknowledged, the oldest of them', () =>
+    expect(
+      order(
+        alarm('uwb.none', 'warning'),
+        alarm('rtk.lost', 'critical', true),
+        alarm('drone.link', 'critical', false, 5),
+        alarm('fence.breach', 'critical', false, 4),
+      ),
+    ).toEqual(['fence.breach', 'drone.link', 'uwb.none', 'rtk.lost']));
+  it('is never advice while an alarm stands, acknowledged or not', () =>
+    expect(order(alarm('ws.slow', 'advisory'), alarm('rtk.float', 'warning', true))).toEqual(['rtk.float', 'ws.slow']));
+  it('is the lost link whatever else stood: that was seen before', () =>
+    expect(order(alarm('drone.link', 'critical'), alarm('link.lost', 'critical', true, 9))).toEqual([
+      'link.lost',
+      'drone.link',
+    ]));
 });
 
 describe('AlarmLimiter', () => {

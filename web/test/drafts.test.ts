@@ -1,4 +1,5 @@
 import { afterEach, describe, expect, it, vi } from 'vitest';
+import { SECRETS } from '../src/api/generated/secrets';
 import { draft_of, drop_draft, keep_draft, newest_draft, restored } from '../src/state/drafts';
 
 /// As a browser's local storage behaves, `room` entries large.
@@ -78,4 +79,27 @@ describe('a restored form', () => {
   it('takes nothing of another kind, and no field it does not have', () =>
     expect(restored(start, { name: 3, n: 'x', ids: {}, more: 1 })).toEqual(start));
   it('is the empty one where nothing was kept', () => expect(restored(start, null)).toEqual(start));
+});
+
+describe('a draft of a form with secrets', () => {
+  const typed = { kind: 'ntrip', user: 'me', password: 'hunter2', options: [{ token: 'anc_1', mount: 'NEAR' }] },
+    kept_of = { kind: 'ntrip', user: 'me', options: [{ mount: 'NEAR' }] };
+  it('knows them by the contract', () => expect([...SECRETS]).toEqual(expect.arrayContaining(['password', 'token'])));
+  it('holds everything else, in the browser and in memory', () => {
+    const kept = storage();
+    vi.stubGlobal('localStorage', kept);
+    keep_draft('other', typed, 5);
+    expect(kept.getItem('anchord.draft.1.other')).toBe(JSON.stringify({ value: kept_of, at_ms: 5 }));
+    vi.stubGlobal('localStorage', undefined);
+    expect(draft_of('other')?.value).toEqual(kept_of);
+  });
+  it('of an earlier version of the page loses them when the page is loaded', async () => {
+    const kept = storage();
+    vi.stubGlobal('localStorage', kept);
+    kept.setItem('anchord.draft.1.other', JSON.stringify({ value: typed, at_ms: 5 }));
+    kept.setItem('of another program', JSON.stringify({ password: 'theirs' }));
+    await reloaded();
+    expect(kept.getItem('anchord.draft.1.other')).toBe(JSON.stringify({ value: kept_of, at_ms: 5 }));
+    expect(kept.getItem('of another program')).toMatch(/theirs/);
+  });
 });

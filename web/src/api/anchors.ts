@@ -17,6 +17,7 @@ import {
 } from '../live/messages';
 import { ellipse_from_covariance, enu_from_geodetic } from '../map/enu';
 import { api_url, request } from './client';
+import { newest_summary } from './calibrations';
 import { call, list, type Wire } from './contract';
 
 export type Gate = GateMsg;
@@ -219,11 +220,6 @@ export async function calibrate(mission: string, key: string): Promise<Calibrati
   if (!done) throw new Error('The calibration is still running; look again in a minute.');
   return done;
 }
-/// The newest one of this flight alone; null where it is not solved yet.
-export const newest_summary = async (mission: string): Promise<Wire<'CalibrationSummary'> | null> =>
-  (await list('/calibrations', { query: { limit: 50 } })).find(
-    (c) => c.missions.length === 1 && c.missions[0] === mission,
-  ) ?? null;
 export async function newest_calibration(mission: string): Promise<Calibration | null> {
   const of_it = await newest_summary(mission);
   return of_it ? calibration_of(await request('GET', `/calibrations/${encodeURIComponent(of_it.id)}`)) : null;

@@ -6,7 +6,7 @@ export type Floor = Wire<'Floor'>;
 export type Georeference = Wire<'FloorPlanGeoreference'>;
 export type Trace = Wire<'FloorPlanTrace'>;
 export type Material = Wire<'FloorWalls'>['walls'][number]['material'];
-export const MATERIALS: readonly Material[] = ['unknown', 'brick', 'concrete', 'glass', 'plasterboard'];
+export const MATERIALS: readonly Material[] = ['unknown', 'brick', 'concrete', 'glass', 'plasterboard', 'metal'];
 
 /// A point of the plan and the place it is.
 export interface Click {

@@ -190,6 +190,20 @@ export interface Box {
 }
 const overlap = (a: Box, b: Box): boolean => a.x < b.x + b.w && b.x < a.x + a.w && a.y < b.y + b.h && b.y < a.y + a.h;
 
+/// Labels are drawn again with every picture and seldom say something new: measuring them was half of what they cost.
+const widths = new Map<string, number>();
+function width_of(c: Ctx, font: string, text: string): number {
+  const key = `${font} ${text}`,
+    known = widths.get(key);
+  if (known !== undefined) return known;
+  if (widths.size >= MOST_WIDTHS) widths.clear(); // readings make ever new words
+  c.font = font;
+  const width = c.measureText(text).width;
+  widths.set(key, width);
+  return width;
+}
+const MOST_WIDTHS = 2000;
+
 /// A free box of w x h about (x, y), first near it, then a little further with a line to it; null where all sixteen are taken.
 export function free_place(
   x: number,
@@ -232,10 +246,8 @@ export function label(
   const heads = `600 ${h1}px ${p.font}`,
     subs = `500 ${h2}px ${p.font}`;
   c.save();
-  c.font = heads;
-  const w1 = c.measureText(head).width;
-  c.font = subs;
-  const w2 = Math.max(w1, c.measureText(sub).width),
+  const w1 = width_of(c, heads, head),
+    w2 = Math.max(w1, width_of(c, subs, sub)),
     whole = free_place(x, y, gap, w2, h1 + (sub ? h2 + 3 : 0), taken),
     found = whole ?? (sub ? free_place(x, y, gap, w1, h1, taken) : null);
   if (!found && !always) return c.restore();

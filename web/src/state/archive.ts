@@ -1,6 +1,5 @@
 /// What the stream does not tell: flights of an earlier life of the server, from REST. The stream wins wherever both speak.
 import { effect } from '@preact/signals';
-import { rows_of_collection } from '../api/anchors';
 import { request } from '../api/client';
 import { fix_class, mission, num, obj, str, vec3, type MissionMsg } from '../live/messages';
 import { enu_from_geodetic } from '../map/enu';
@@ -46,9 +45,11 @@ export async function load_missions(): Promise<void> {
 /// Estimates of a flight nobody feeds any more: asked for once, when it is looked at and the stream gave none.
 async function load_estimates(id: string): Promise<void> {
   try {
-    const { rows } = rows_of_collection(
-      await request('GET', `/anchors?view=live&mission=${encodeURIComponent(id)}&limit=1000`),
-    );
+    const [{ rows_of_collection }, answer] = await Promise.all([
+        import('../api/anchors'),
+        request('GET', `/anchors?view=live&mission=${encodeURIComponent(id)}&limit=1000`),
+      ]),
+      { rows } = rows_of_collection(answer);
     const scene = scene_of(id);
     for (const r of rows)
       if (!scene.anchors.has(r.anchor))
@@ -112,7 +113,7 @@ export function follow_archive(): void {
   });
   let restored = '';
   effect(() => {
-    const id = events.value.filter((e) => e.code === 'mission.restored').at(-1)?.id ?? ''; // somebody brought a deleted flight back
+    const id = events.value.filter((e) => ['mission.restored', 'bundle.imported'].includes(e.code)).at(-1)?.id ?? ''; // back, or from another server
     if (id && id !== restored) void load_missions();
     restored = id;
   });

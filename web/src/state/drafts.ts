@@ -1,5 +1,7 @@
 /// What a person typed and has not sent: kept on this device until it is sent or thrown away, so that a reload or an empty battery loses nothing.
 /// Local storage rather than IndexedDB: it is written before the event ends, and plans and forms are a few kB. Where the browser keeps nothing, memory. No DOM.
+/// Never a secret: fields that the contract only has written (passwords, tokens) are left out of every draft, wherever in it they are.
+import { SECRETS } from '../api/generated/secrets';
 import { obj } from '../live/messages';
 
 const PREFIX = 'anchord.draft.1.'; ///< 1: the form of what is kept; another form is another prefix
@@ -10,6 +12,8 @@ export interface Draft {
   readonly at_ms: number;
 }
 
+const without_secrets = (name: string, value: unknown): unknown => (SECRETS.has(name) ? undefined : value);
+
 function stored(): Storage | null {
   try {
     return globalThis.localStorage ?? null;
@@ -19,7 +23,7 @@ function stored(): Storage | null {
 }
 function draft_from(key: string, text: string | null | undefined): Draft | null {
   try {
-    const o = obj(JSON.parse(text ?? 'null'));
+    const o = obj(JSON.parse(text ?? 'null', without_secrets));
     return o && typeof o.at_ms === 'number' ? { key, value: o.value, at_ms: o.at_ms } : null;
   } catch {
     return null;
@@ -27,7 +31,7 @@ function draft_from(key: string, text: string | null | undefined): Draft | null 
 }
 
 export function keep_draft(key: string, value: unknown, at_ms = Date.now()): void {
-  const text = JSON.stringify({ value, at_ms });
+  const text = JSON.stringify({ value, at_ms }, without_secrets);
   memory.set(key, text);
   try {
     stored()?.setItem(PREFIX + key, text);
@@ -68,6 +72,23 @@ export function newest_draft(prefix: string): Draft | null {
     .map(draft_of)
     .reduce<Draft | null>((best, d) => (d && (!best || d.at_ms > best.at_ms) ? d : best), null);
 }
+
+/// What an earlier version of the page kept of secrets is taken out of this browser.
+function forget_secrets(): void {
+  try {
+    const kept = stored();
+    for (let i = 0; kept && i < kept.length; i++) {
+      const key = kept.key(i),
+        before = key?.startsWith(PREFIX) ? kept.getItem(key) : null,
+        draft = before === null ? null : draft_from(key!, before),
+        after = draft && JSON.stringify({ value: draft.value, at_ms: draft.at_ms });
+      if (key && after && after !== before) kept.setItem(key, after);
+    }
+  } catch {
+    /* nothing is kept here */
+  }
+}
+forget_secrets();
 
 /// A form as it was left: of what is kept, the fields that the form has and that are of its kind.
 export function restored<T extends object>(start: T, kept: unknown): T {

@@ -27,6 +27,12 @@ export interface Situation {
 const RANK: Record<Priority, number> = { critical: 0, warning: 1, advisory: 2 };
 export const by_rank = (a: Alarm, b: Alarm): number => RANK[a.priority] - RANK[b.priority] || a.since_ms - b.since_ms;
 
+const quiet = (a: Alarm): number => (a.priority === 'advisory' ? 2 : a.acknowledged ? 1 : 0);
+/// Which alarm the line shows: while the link is lost, that one, since all others are only "when last seen"; else what nobody has
+/// acknowledged, then what somebody has, advice last.
+export const by_urgency = (a: Alarm, b: Alarm): number =>
+  Number(b.id === 'link.lost') - Number(a.id === 'link.lost') || quiet(a) - quiet(b) || by_rank(a, b);
+
 /// Conditions of dashboard.md section 6 that the page can see by itself, with the delays named there. Keeps since when each holds.
 export class Conditions {
   private readonly since = new Map<string, number>();
@@ -66,8 +72,7 @@ export class Conditions {
           id: 'link.lost',
           priority: 'critical',
           title: s.silence_ms < 2000 ? 'Link too slow: what arrives is old' : 'Link lost: no data from anchord',
-          advice:
-            'You see last known values. The drone continues its procedure on its own. To act now, use the remote control.',
+          advice: 'To act now, use the remote control. The drone continues its procedure on its own.',
           since_ms: s.now_ms - s.data_age_ms,
           acknowledged: false,
         });

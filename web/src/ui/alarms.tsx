@@ -10,8 +10,6 @@ import {
   tick,
 } from '../state/store';
 import { AlarmLimiter, Conditions, merged, type Alarm } from './alarm_rules';
-import { clock } from './format';
-import { Mark } from './marks';
 
 const conditions = new Conditions();
 const limiter = new AlarmLimiter();
@@ -44,6 +42,7 @@ effect(() => {
   const kept = [...acknowledged.peek()].filter((id) => standing.has(id));
   if (kept.length !== acknowledged.peek().size) acknowledged.value = new Set(kept);
 });
+/// For this page; it stays listed, quiet.
 export const acknowledge = (id: string): void => {
   acknowledged.value = new Set([...acknowledged.value, id]);
 };
@@ -86,57 +85,3 @@ effect(() => {
   const due = limiter.due(alarms.value, now_ms());
   if (due && sound.peek() !== 'off') tones(due.priority);
 });
-
-export function AlarmBar() {
-  const list = alarms.value,
-    [first, second] = list.filter((a) => a.priority !== 'advisory');
-  const quiet = list.length - (first ? 1 : 0) - (second ? 1 : 0);
-  const retry = live_source()?.retry_in_ms() ?? null;
-  if (!first) return <div class="alarmbar" data-testid="alarm-bar" />;
-  const buttons = (a: Alarm) => (
-    <>
-      {a.id === 'link.lost' && (
-        <button class="btn" onClick={() => live_source()?.retryNow()}>
-          Retry now{retry !== null && <small>in {Math.ceil(retry / 1000)} s</small>}
-        </button>
-      )}
-      {a.id === 'link.lost' ? (
-        <button class="btn" onClick={mute}>
-          Mute 2 min
-        </button>
-      ) : (
-        !a.acknowledged && (
-          <button class="btn" onClick={() => acknowledge(a.id)}>
-            Acknowledge
-          </button>
-        )
-      )}
-    </>
-  );
-  const row = (a: Alarm, place: string) => (
-    <div class={`alarm ${place} ${a.priority}${a.acknowledged ? ' acked' : ''}`} data-testid={`alarm-${a.id}`}>
-      <Mark shape={a.priority === 'critical' ? 'bad' : 'caution'} />
-      {place === 'first' && (
-        <span class="clock" aria-hidden="true">
-          {clock((now_ms() - a.since_ms) / 1000, true)}
-        </span>
-      )}
-      <div class="grow">
-        <h2>{a.title}</h2>
-        {a.advice && <p>{a.advice}</p>}
-      </div>
-      {buttons(a)}
-      {place === 'second' && quiet > 0 && <span class="quiet">+{quiet} quiet</span>}
-    </div>
-  );
-  return (
-    <section class="alarmbar on" aria-label="Alarms" data-testid="alarm-bar">
-      {row(first, first.priority === 'critical' && !first.acknowledged ? 'first' : 'second')}
-      {second && row(second, 'second')}
-      {/* Spoken once per alarm, without the running clock; only critical interrupts. */}
-      <p class="sr" role={first.priority === 'critical' ? 'alert' : 'status'}>
-        {first.title}. {first.advice}
-      </p>
-    </section>
-  );
-}

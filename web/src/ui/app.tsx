@@ -1,14 +1,13 @@
 import { signal } from '@preact/signals';
 import type { ComponentType } from 'preact';
 import { useEffect } from 'preact/hooks';
-import { link, live_source, tick, toast } from '../state/store';
+import { link, toast } from '../state/store';
 import { load_compare, load_publish } from '../views/dialog_chunks';
 import { Live } from '../views/live';
-import { AlarmBar } from './alarms';
-import { age } from './format';
-import { Help, help_open } from './help';
+import { AlarmLine } from './alarm_line';
+import { Help, help_open, load_help } from './help';
 import { Icon, Mark } from './marks';
-import { SignIn } from './sign_in';
+import { load_sign_in, SignIn } from './sign_in';
 import { Strip } from './strip';
 import { useLater } from './use_later';
 
@@ -86,19 +85,10 @@ const load_replay = () => import('../views/replay/replay').then((m) => m.Replay)
 const load_system = () => import('../views/system/system').then((m) => m.System);
 const load_measurements = () => import('../views/measurements/measurements').then((m) => m.Measurements);
 
-/// What arrived before the link was lost is no news: one line gives its age for all values of the view, which are struck.
-function LastKnown() {
-  tick.value;
-  return (
-    <p class="lastknown" data-testid="last-known">
-      <Mark shape="off" tone="off" />
-      <b>Last known values, {age(live_source()?.data_age_ms() ?? Infinity)} old.</b> No data from anchord: nothing on
-      this page is current.
-    </p>
-  );
-}
 /// The rest of the page while nothing else is to be done: after an outage every view is there, and opens also during one.
 const LATER = [
+  load_sign_in,
+  load_help,
   load_anchors,
   load_guide,
   load_publish,
@@ -147,10 +137,9 @@ export function App() {
         Skip to the view
       </button>
       <Strip />
-      <AlarmBar />
+      <AlarmLine last_known={lost} />
       <Rail view={view} />
       <main class={lost ? 'main lost' : 'main'} id="main" tabIndex={-1}>
-        {lost && <LastKnown />}
         <div class="toasts" role="status">
           {toast.value && (
             <div class="toast" key={toast.value.id} data-testid="toast">

@@ -1,7 +1,5 @@
 import { signal } from '@preact/signals';
-import { Icon } from './marks';
 import { useLater } from './use_later';
-import { useDialog } from './use_dialog';
 
 export const help_open = signal(false);
 const KEY = 'anchord.keys';
@@ -15,76 +13,18 @@ export const keys_on = signal(
   })(),
 );
 
-const KEYS: readonly [string, string][] = [
-  ['1', 'Live'],
-  ['2', 'Plan'],
-  ['3', 'Anchors'],
-  ['4', 'Measurements'],
-  ['5', 'Models'],
-  ['6', 'Replay'],
-  ['7', 'System'],
-  ['J K', 'next, previous measurement'],
-  ['Space ← → , .', 'play, step, previous and next event in a replay'],
-  ['[ ]', 'previous, next anchor'],
-  ['C', 'follow the drone'],
-  ['F', 'fit everything'],
-  ['+ −', 'zoom the map'],
-  ['arrows', 'move the map, when it has the focus'],
-  ['/', 'filter anchors'],
-  ['H', 'hold the aircraft, in flight'],
-  ['T', 'next theme'],
-  ['M', 'mute 2 minutes'],
-  ['A', 'acknowledge the first alarm'],
-  ['?', 'help for what is on the screen'],
-  ['Esc', 'close'],
-];
-const load_guide = () => import('../views/guide/guide').then((m) => m.GuideSheet);
-/// What is on the screen, in words: the guide's page for it.
-function ScreenHelp({ close }: { close: () => void }) {
-  const { part: Sheet } = useLater(load_guide);
-  return Sheet ? <Sheet hash={location.hash} close={close} /> : null;
+export function set_keys(on: boolean): void {
+  keys_on.value = on;
+  try {
+    localStorage.setItem(KEY, on ? 'on' : 'off');
+  } catch {
+    /* not remembered */
+  }
 }
 
-export function Help() {
-  const open = help_open.value,
-    box = useDialog<HTMLElement>(open, () => (help_open.value = false));
-  if (!open) return null;
-  return (
-    <section class="sheet" role="dialog" aria-labelledby="help-title" tabIndex={-1} ref={box} data-testid="help">
-      <div class="hd">
-        <h2 id="help-title">Help</h2>
-        <button class="btn quiet small" aria-label="Close" onClick={() => (help_open.value = false)}>
-          <Icon name="close" />
-        </button>
-      </div>
-      <ScreenHelp close={() => (help_open.value = false)} />
-      <h3>Keys</h3>
-      <dl class="keys">
-        {KEYS.map(([k, what]) => (
-          <div key={k}>
-            <dt>
-              <kbd>{k}</kbd>
-            </dt>
-            <dd>{what}</dd>
-          </div>
-        ))}
-      </dl>
-      <label class="check">
-        <input
-          type="checkbox"
-          checked={keys_on.value}
-          onChange={(e) => {
-            keys_on.value = e.currentTarget.checked;
-            try {
-              localStorage.setItem(KEY, keys_on.value ? 'on' : 'off');
-            } catch {
-              /* not remembered */
-            }
-          }}
-        />{' '}
-        Single-letter keys are on
-      </label>
-      <p class="mut">σ is one sigma and says so; ellipses and ± are 95 %. GDOP is the square root of the trace.</p>
-    </section>
-  );
+export const load_help = () => import('./help_sheet').then((m) => m.HelpSheet);
+function Sheet() {
+  const { part: HelpSheet } = useLater(load_help);
+  return HelpSheet ? <HelpSheet /> : null;
 }
+export const Help = () => (help_open.value ? <Sheet /> : null);

@@ -1,6 +1,7 @@
 import { current_map } from '../map/map_box';
 import { chosen_anchor, current_scene } from '../state/store';
 import { hold_now } from '../views/flight/commands';
+import { by_urgency } from './alarm_rules';
 import { acknowledge, alarms, mute } from './alarms';
 import { help_open, keys_on } from './help';
 import { next_theme } from './theme';
@@ -30,7 +31,7 @@ const KEYS: Record<string, () => void> = {
   ']': () => step_anchor(1),
   '?': () => (help_open.value = !help_open.value),
   a: () => {
-    const first = alarms.value.find((x) => !x.acknowledged);
+    const first = [...alarms.value].sort(by_urgency).find((x) => !x.acknowledged);
     if (first) acknowledge(first.id);
   },
   '/': () => {

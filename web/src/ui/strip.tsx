@@ -314,8 +314,8 @@ export function Strip() {
               <span class="tv">
                 <Mark shape={r.shape} />
                 <b>{r.word}</b>
-                {r.extra && <i>{r.extra}</i>}
               </span>
+              <span class="te">{r.extra}</span>
             </button>
             {open === k && (
               <Card label={LABELS[k]} word={r.word}>

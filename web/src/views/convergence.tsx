@@ -2,7 +2,6 @@
 import { useEffect, useRef } from 'preact/hooks';
 import type uPlot from 'uplot';
 import { goal_of } from '../state/done';
-import { estimates_over_time } from '../state/recording';
 import { current_mission, current_scene, replayed, tick, watched_scene } from '../state/store';
 import type { HistoryPoint } from '../state/scene';
 import { fixed } from '../ui/format';
@@ -18,7 +17,8 @@ function ask_for_the_beginning(): void {
   const first_us = Math.min(...[...scene.history.values()].map((h) => h[0]?.t_us ?? Infinity));
   if (m.started_us === null || first_us - m.started_us < SEEN_ALL_US) return;
   asked.add(scene.id);
-  estimates_over_time(scene.id).then(
+  const read = async () => (await import('../state/recording')).estimates_over_time(scene.id);
+  read().then(
     (list) => {
       scene.add_earlier_estimates(list);
       tick.value++;

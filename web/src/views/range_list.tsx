@@ -1,3 +1,5 @@
+import type { VNode } from 'preact';
+import { useRef } from 'preact/hooks';
 import { chosen_anchor, replayed, watched_mission, watched_scene, now_ms, tick, watched_lost } from '../state/store';
 import { range_class, rate_hz, type RangeRow } from '../state/scene';
 import { age, fixed, range_m } from '../ui/format';
@@ -13,7 +15,8 @@ export function RangeList({ selected }: { selected: string | null }) {
     now = now_ms(),
     lost = watched_lost(),
     running = watched_mission.value?.state === 'recording';
-  const rows = scene ? [...scene.ranges.entries()].sort(([a], [b]) => (a < b ? -1 : 1)) : [];
+  const drawn = useRef(new Map<string, Drawn>()).current,
+    rows = scene ? [...scene.ranges.entries()].sort(([a], [b]) => (a < b ? -1 : 1)) : [];
   const in_range = rows.filter(([, r]) => now - r.at_ms < STALE_MS).length;
   const total_hz = rows.reduce((s, [, r]) => s + (now - r.at_ms < STALE_MS ? (rate_hz(r) ?? 0) : 0), 0);
   const modelled = rows.some(([, r]) => r.last.p_los !== null);
@@ -60,18 +63,26 @@ export function RangeList({ selected }: { selected: string | null }) {
             </tr>
           </thead>
           <tbody>
-            {rows.map(([id, r]) => (
-              <Row
-                key={id}
-                id={id}
-                row={r}
-                stale_ms={lost || !running ? Infinity : now - r.at_ms}
-                age_ms={now - r.at_ms}
-                running={running}
-                selected={id === selected}
-                modelled={modelled}
-              />
-            ))}
+            {rows.map(([id, r]) => {
+              const stale = lost || !running || now - r.at_ms > STALE_MS,
+                says = `${r.last.t_us} ${stale ? age(now - r.at_ms) : ''} ${running} ${id === selected} ${modelled}`,
+                before = drawn.get(id);
+              if (before?.row === r && before.says === says) return before.element;
+              const element = (
+                <Row
+                  key={id}
+                  id={id}
+                  row={r}
+                  stale={stale}
+                  age_ms={now - r.at_ms}
+                  running={running}
+                  selected={id === selected}
+                  modelled={modelled}
+                />
+              );
+              drawn.set(id, { row: r, says, element });
+              return element;
+            })}
           </tbody>
         </table>
       )}
@@ -79,10 +90,17 @@ export function RangeList({ selected }: { selected: string | null }) {
   );
 }
 
+/// A row as it was last drawn: where it would say the same again, the same element is given, and Preact leaves it alone.
+interface Drawn {
+  readonly row: RangeRow;
+  readonly says: string;
+  readonly element: VNode;
+}
+
 function Row({
   id,
   row,
-  stale_ms,
+  stale,
   age_ms,
   running,
   selected,
@@ -90,14 +108,13 @@ function Row({
 }: {
   id: string;
   row: RangeRow;
-  stale_ms: number;
+  stale: boolean;
   age_ms: number;
   running: boolean;
   selected: boolean;
   modelled: boolean;
 }) {
-  const stale = stale_ms > STALE_MS,
-    cls = range_class(row.last.p_los),
+  const cls = range_class(row.last.p_los),
     [shape, tone, word] = CLASS_LOOK[cls];
   const r = row.last,
     corrected = Math.abs(r.corrected_m - r.distance_m) > 5e-4;

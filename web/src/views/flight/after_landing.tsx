@@ -1,6 +1,6 @@
 /// What happens with a flight that has landed: it is solved by itself, and a person reviews the result.
 import { useEffect, useState } from 'preact/hooks';
-import { newest_summary } from '../../api/anchors';
+import { newest_summary } from '../../api/calibrations';
 import type { Wire } from '../../api/contract';
 import { may_publish } from '../../state/session';
 import { events, jobs_version } from '../../state/store';

@@ -1,16 +1,14 @@
 /// Before take-off: every item green, or a reason for it. Start is blocked until then, by this page and by the server.
-import { signal } from '@preact/signals';
 import { useEffect, useState } from 'preact/hooks';
 import { error_text } from '../../api/client';
 import { checklist, set_item, type ChecklistItem } from '../../api/flight';
 import { plans as fetch_plans, type Plan } from '../../api/plans';
 import { sound, toggle_sound } from '../../ui/alarms';
 import { Icon, Mark } from '../../ui/marks';
+import { checklist_open } from './checklist_open';
 import { HoldButton } from './hold_button';
 import { useDialog } from '../../ui/use_dialog';
 import { useStable } from '../../ui/use_stable';
-
-export const checklist_open = signal(false);
 
 export function Checklist({
   mission,

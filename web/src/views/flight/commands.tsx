@@ -5,7 +5,8 @@ import { done_count } from '../../state/done';
 import { may } from '../../state/session';
 import { current_mission, current_scene, events, link, live_source, say, server_now_us, tick } from '../../state/store';
 import { clock, fixed, percent } from '../../ui/format';
-import { Checklist, checklist_open } from './checklist';
+import { useLater } from '../../ui/use_later';
+import { checklist_open } from './checklist_open';
 import { DevicesNote } from './devices_note';
 import { command_note, question_of } from './control';
 import { HoldButton } from './hold_button';
@@ -155,16 +156,24 @@ export function FlightBar() {
           </button>
         )}
       </div>
-      {checklist_open.value && idle && (
-        <Checklist
-          mission={mission.mission}
-          start={async (plan, manual) => {
-            await send(mission.mission, 'start', { plan, mode: manual ? 'manual' : 'auto' });
-            checklist_open.value = problem.value !== '';
-          }}
-        />
-      )}
+      {operator && idle && <BeforeTakeOff mission={mission.mission} />}
     </div>
+  );
+}
+
+/// Fetched when there is a flight to start, before anybody asks for it.
+const load_checklist = () => import('./checklist').then((m) => m.Checklist);
+function BeforeTakeOff({ mission }: { mission: string }) {
+  const { part: Checklist } = useLater(load_checklist);
+  if (!checklist_open.value || !Checklist) return null;
+  return (
+    <Checklist
+      mission={mission}
+      start={async (plan, manual) => {
+        await send(mission, 'start', { plan, mode: manual ? 'manual' : 'auto' });
+        checklist_open.value = problem.value !== '';
+      }}
+    />
   );
 }
 

@@ -1,6 +1,6 @@
 /// The plan and the planner's last decision as the map draws them, in metres about the origin of the flight.
 import { signal } from '@preact/signals';
-import { flown_plan, setting, type Plan } from '../../api/plans';
+import type { Plan } from '../../api/plans';
 import type { GridMsg } from '../../live/flight_messages';
 import { num, obj } from '../../live/messages';
 import { enu_from_geodetic } from '../../map/enu';
@@ -9,18 +9,29 @@ import type { Scene } from '../../state/scene';
 import { current_mission, current_scene } from '../../state/store';
 
 /// The plan that is in the air: fetched once per revision, since only a change that was taken makes it another.
-const flown = signal<{ readonly key: string; readonly plan: Plan | null } | null>(null);
+interface Flown {
+  readonly plan: Plan;
+  readonly low_m: number;
+  readonly high_m: number;
+}
+const flown = signal<{ readonly key: string; readonly plan: Flown | null } | null>(null);
 export function follow_plan(): void {
   const p = current_scene()?.procedure?.value,
     key = p?.plan ? `${p.plan}/${p.plan_revision}` : '';
   if (!p?.plan || flown.peek()?.key === key) return;
   flown.value = { key, plan: null };
-  flown_plan(p.mission).then(
+  read_plan(p.mission).then(
     (plan) => {
       flown.value = { key, plan };
     },
     () => undefined,
   );
+}
+/// How plans are read comes when the first one is: no page needs it before.
+async function read_plan(mission: string): Promise<Flown | null> {
+  const { flown_plan, setting } = await import('../../api/plans'),
+    plan = await flown_plan(mission);
+  return plan && { plan, low_m: setting(plan, 'min_height_m'), high_m: setting(plan, 'max_height_m') };
 }
 
 /// Six equal steps of value; the smallest is best.
@@ -41,7 +52,8 @@ export function flight_picture(): FlightPicture | null {
     p = scene?.procedure?.value,
     origin = current_mission.peek()?.origin ?? null,
     grid = scene?.grid?.value ?? null,
-    plan = flown.value?.plan ?? null;
+    read = flown.value?.plan ?? null,
+    plan = read?.plan;
   if (!p || !origin) return null;
   const at = (c: { lon: number; lat: number }): Point => {
     const [e, n] = enu_from_geodetic({ lon: c.lon, lat: c.lat, h_m: origin.h_m }, origin);
@@ -57,19 +69,27 @@ export function flight_picture(): FlightPicture | null {
     candidates: p.step === 'done' || p.step === 'ready' ? [] : (decision?.candidates ?? []),
     visited: decision?.visited ?? [],
     target: p.target && at(p.target),
-    heights: plan && heights_of(plan, scene, origin.h_m, p.target?.height_m ?? null),
+    heights: read && heights_of(read, scene, origin.h_m, p.target?.height_m ?? null),
   };
 }
 /// A plan counts from the ground: of the height its origin says, else where the aircraft took off.
-export function heights_of(plan: Plan, scene: Scene | null, origin_h_m: number, target_m: number | null): Heights {
+export function ground_of(plan: Plan, scene: Scene | null, origin_h_m: number): number | null {
   const h_m = num(obj(plan.rest.origin)?.h_m),
     pose = scene?.pose?.value.enu_m,
     above_m = scene?.procedure?.value.drone?.above_home_m;
+  return h_m !== null ? h_m - origin_h_m : pose && above_m != null ? pose[2] - above_m : lowest(scene);
+}
+function heights_of(
+  { plan, low_m, high_m }: Flown,
+  scene: Scene | null,
+  origin_h_m: number,
+  target_m: number | null,
+): Heights {
   return {
-    ground_m: h_m !== null ? h_m - origin_h_m : pose && above_m != null ? pose[2] - above_m : lowest(scene),
+    ground_m: ground_of(plan, scene, origin_h_m),
     roof_m: plan.building_height_m,
-    low_m: setting(plan, 'min_height_m'),
-    high_m: setting(plan, 'max_height_m'),
+    low_m,
+    high_m,
     waypoints: plan.waypoints.map((w) => w.height_above_ground_m),
     target: target_m,
   };

@@ -7,7 +7,7 @@ import { num, obj, type EstimateMsg, type FixClass, type MissionMsg, type Vec3 }
 import { enu_from_geodetic, type Geodetic } from '../../map/enu';
 import type { Content } from '../../map/picture';
 import { Scene } from '../../state/scene';
-import { heights_of } from '../flight/picture';
+import { ground_of } from '../flight/picture';
 import { to_m } from './draft';
 import { distance_to_edge, type Point } from './tools';
 
@@ -105,7 +105,7 @@ export function around(plan: Plan, origin: Geodetic, mission: MissionMsg | null,
   if (!own) return null;
   const [e, n] = enu_from_geodetic({ lon: own.lon, lat: own.lat, h_m: origin.h_m }, origin),
     told = num(obj(plan.rest.origin)?.h_m),
-    ground_m = heights_of(plan, scene, own.h_m, null).ground_m;
+    ground_m = ground_of(plan, scene, own.h_m);
   if (Math.hypot(e, n) > APART_M) return null;
   const ground_h_m = told ?? own.h_m + (ground_m ?? 0);
   return { shift: [e, n, own.h_m - ground_h_m], ground_h_m };

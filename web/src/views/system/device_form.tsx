@@ -318,7 +318,7 @@ function Caster({ s, change }: { s: Setup; change: Change }) {
         <input value={s.user} autocomplete="off" onInput={(e) => change({ user: e.currentTarget.value })} />
       </label>
       <label class="grow">
-        <span class="lab">Password</span>
+        <span class="lab">Password; after a reload to be typed again</span>
         <input
           type="password"
           value={s.password}

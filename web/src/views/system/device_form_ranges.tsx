@@ -99,7 +99,7 @@ export function Broker({ s, change, rejected }: Part) {
       </label>
       <Faults rejected={rejected} field="user" />
       <label>
-        <span class="lab">Password</span>
+        <span class="lab">Password; after a reload to be typed again</span>
         <input
           type="password"
           value={s.password}

@@ -1,0 +1,110 @@
+// Replay of a real flight: it says REPLAY at every moment and never LIVE, offers no command, and its events are stepped through by the keys.
+// The simulated aircraft flies it first, so that what is replayed has the events of a procedure.
+import assert from 'node:assert/strict';
+import { after, before, test } from 'node:test';
+import { openBrowser, openPage, picture, text, violations } from './browser.mjs';
+import { eventually } from './server.mjs';
+import { serverWithAircraft, startFlight } from './simulated_aircraft.mjs';
+
+let server, aircraft, browser, mission;
+const get = async (path) => (await server.fetch(path)).json();
+
+before(async () => {
+  ({ server, aircraft, mission } = await serverWithAircraft());
+  await startFlight(server, mission);
+  browser = await openBrowser();
+});
+after(async () => {
+  await browser?.close();
+  aircraft?.kill('SIGINT');
+  await server?.dispose();
+});
+
+/** Opened, read to its end, at its first moment. */
+async function opened(options = {}) {
+  const { page, seen, id } = await openPage(browser, server, { hash: `#/replay/${mission}`, ...options });
+  await eventually('the flight is read', async () => /\d/.test(await text(id('replay-time'))), 30_000);
+  return { page, seen, id };
+}
+const seconds = (clock) => clock.split(':').reduce((s, part) => 60 * s + Number(part), 0);
+
+test('. and , step through the events in the order of the flight, each at its own moment', async () => {
+  const { page, seen, id } = await opened();
+  const place = async () =>
+    (/(\d+) of (\d+)/.exec(await text(id('replay-events').locator('.meta'))) ?? []).slice(1).map(Number);
+  const [at_first, n] = await place();
+  assert.ok(n >= 4, `${n} events of the flight`);
+  const path = `mission=${mission}&limit=1`,
+    firsts = await Promise.all([get(`/api/v1/fixes?${path}`), get(`/api/v1/ranges?${path}`)]),
+    from_us = Math.min(...firsts.map(({ items: [row] }) => row.t_us)),
+    { items } = await get(`/api/v1/missions/${mission}/events?limit=1000`),
+    moments = [...new Set(items.map((e) => e.t_us))].sort((a, b) => a - b).filter((t_us) => t_us > from_us);
+  const current = async () => ({
+    time_s: seconds(await text(id('replay-time'))),
+    words: (await text(id('replay-events').locator('[aria-current="step"] > span'))).replace(/^\w*: /, ''),
+    place: (await place())[0],
+  });
+  const forth = [];
+  let last = at_first;
+  while (last < n) {
+    await page.keyboard.press('.');
+    await eventually('the next event', async () => (await place())[0] > last, 5000);
+    forth.push(await current());
+    last = forth.at(-1).place;
+    assert.match(await text(id('status-link')), /REPLAY/);
+    for (const tile of ['link', 'rtk', 'uwb', 'drone', 'rec'])
+      assert.doesNotMatch(await text(id(`status-${tile}`)), /LIVE/, `${tile} at event ${last}`);
+  }
+  assert.ok(forth.length >= 4, `${forth.length} steps`);
+  for (const [i, { words, time_s }] of forth.entries()) {
+    const at_s = (moments[i] - from_us) / 1e6; // tenths are shown
+    assert.ok(time_s <= at_s + 0.01 && time_s > at_s - 0.11, `event ${i + 1} at ${time_s} s, by the API ${at_s} s`);
+    assert.ok(
+      items.some((e) => e.t_us === moments[i] && e.text === words),
+      `the event of that moment: ${words}`,
+    );
+  }
+  await picture(page, 'replay-last-event');
+  const back = [];
+  while (back.length < forth.length - 1) {
+    const [here] = await place();
+    await page.keyboard.press(',');
+    await eventually('the event before', async () => (await place())[0] < here, 5000);
+    back.push(await current());
+  }
+  assert.deepEqual(back.reverse(), forth.slice(0, -1), 'the same events on the way back');
+  assert.deepEqual(await violations(page, { sizes: true }), []);
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});
+
+test('while it plays, jumps and ends the strip says REPLAY; no command is there, and alarms stay those of now', async () => {
+  const { page, id } = await opened({ width: 768, height: 1024 });
+  const said = [];
+  const look = async () => said.push(await text(id('status-link')));
+  await id('speed').selectOption('4');
+  await page.evaluate(() => document.activeElement?.blur());
+  await page.keyboard.press(' ');
+  await eventually('it plays', async () => seconds(await text(id('replay-time'))) > 2, 10_000);
+  for (let i = 0; i < 10; i++) {
+    await look();
+    await page.evaluate(() => new Promise((done) => setTimeout(done, 100)));
+  }
+  await page.keyboard.press(' ');
+  const paused = await text(id('replay-time'));
+  await page.keyboard.press('ArrowRight');
+  await eventually('a tenth of a second', async () => seconds(await text(id('replay-time'))) > seconds(paused), 5000);
+  await look();
+  await id('scrubber').press('End');
+  await look();
+  for (const one of said) assert.match(one, /REPLAY/);
+  for (const one of said) assert.doesNotMatch(one, /LIVE/);
+  assert.equal(
+    await page.locator('[data-testid^="cmd-"], [data-testid="take-control"], [data-testid="flight-bar"]').count(),
+    0,
+  );
+  assert.ok(await id('alarm-bar').isVisible());
+  await id('nav-live').click();
+  await eventually('LIVE', async () => (await text(id('status-link'))).includes('LIVE'), 10_000);
+  await page.close();
+});

@@ -1,0 +1,3 @@
+import { signal } from '@preact/signals';
+
+export const checklist_open = signal(false);
