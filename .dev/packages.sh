@@ -11,15 +11,20 @@ package_names() {
 
 is_installed() { [[ $(dpkg-query -W -f='${db:Status-Status}' "$1" 2>/dev/null) == installed ]]; }
 
-# apt-get as root, without questions.
-apt() {
+# A command as root.
+as_root() {
   local -a root=()
   if ((EUID != 0)); then
     command -v sudo >/dev/null || die "not root and no sudo: run as root: apt-get install -y --no-install-recommends $missing_text"
     root=(sudo)
   fi
+  "${root[@]}" "$@"
+}
+
+# apt-get as root, without questions.
+apt() {
   # A machine just started may be installing its updates: wait for it.
-  "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -q -o DPkg::Lock::Timeout=300 "$@"
+  as_root env DEBIAN_FRONTEND=noninteractive apt-get -q -o DPkg::Lock::Timeout=300 "$@"
 }
 
 # libboost1.81-dev declares a conflict with every other libboost*-dev. Where such a one is installed it stays (other
@@ -63,8 +68,18 @@ install_packages() {
       apt-cache show "$name" >/dev/null 2>&1 ||
         die "Debian package '$name' is not available from the sources of this machine (needed: Debian 12 bookworm, main)$network"
     done
+    # Debian's PostgreSQL would make a database and serve it for good; the tests start their own and end it.
+    local no_cluster=
+    if [[ " $missing_text " == *" postgresql-15 "* ]]; then
+      no_cluster=/etc/postgresql-common/createcluster.d/anchord.conf
+      as_root mkdir -p "${no_cluster%/*}"
+      as_root tee "$no_cluster" >/dev/null <<<'create_main_cluster = false'
+    fi
+    local installed=0
     # --no-remove: nothing of the user's goes away for our sake.
-    apt install -y --no-install-recommends --no-remove "${missing[@]}" ||
+    apt install -y --no-install-recommends --no-remove "${missing[@]}" || installed=$?
+    [[ -z $no_cluster ]] || as_root rm -f "$no_cluster"
+    ((installed == 0)) ||
       die "apt-get could not install: $missing_text (see its own message above)$network"
   fi
   if [[ -n $boost_conflict ]]; then unpack_private_boost "$boost_conflict"; fi

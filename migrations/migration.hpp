@@ -13,5 +13,7 @@ struct Migration {
 };
 
 std::span<const Migration> sqlite_migrations();
+/// The same numbers and names: a version means the same tables in both.
+std::span<const Migration> postgresql_migrations();
 
 }  // namespace anchord

@@ -56,8 +56,10 @@ set(rows
   "api/exchange: core/base core/types core/ports core/geo core/localize api/kit api/anchors"
   "api/webhooks: core/base core/types core/ports api/kit api/admin"
   "api/mqtt: core/base core/ports api/kit api/stream api/anchors"
+  "api/omlox: core/base core/types core/ports core/geo api/kit api/stream api/anchors api/webhooks"
   "api/places: core/base core/types core/ports core/geo core/floor_plan api/kit api/admin api/learning"
-  "api: core/base core/types core/ports core/geo core/localize api/kit api/stream api/wire api/admin api/devices api/learning api/missions api/measurements api/anchors api/planning api/flight api/calibration api/exchange api/webhooks api/mqtt api/places"
+  "api/bundles: core/base core/types core/ports api/kit api/formats api/admin"
+  "api: core/base core/types core/ports core/geo core/localize api/kit api/stream api/wire api/admin api/devices api/learning api/missions api/measurements api/anchors api/planning api/flight api/calibration api/exchange api/webhooks api/mqtt api/omlox api/places api/bundles"
 
   "migrations:"
   "server/storage: core/base core/types core/ports migrations"
@@ -98,10 +100,10 @@ set(api_source "^(malloc\\.h$|nlohmann/json\\.hpp$|zlib\\.h$|openssl/|xxhash\\.h
 set(api/wire_header "${api_header}")
 set(api/wire_source "^(nlohmann/json\\.hpp$|simdjson\\.h$)")
 set(api/formats_header "${api_header}")
-set(api/formats_source "^(nlohmann/json\\.hpp$|zlib\\.h$|pugixml\\.hpp$)")
+set(api/formats_source "^(nlohmann/json\\.hpp$|zlib\\.h$|zip\\.h$|pugixml\\.hpp$)")
 
 set(server/storage_header "^(${everywhere})")
-set(server/storage_source "^(sqlite3\\.h$|SQLiteCpp/|sys/|unistd\\.h$|fcntl\\.h$)")
+set(server/storage_source "^(sqlite3\\.h$|SQLiteCpp/|libpq-fe\\.h$|sys/|unistd\\.h$|fcntl\\.h$)")
 
 # The one folder that knows the library of MQTT.
 set(server/mqtt_header "^(${everywhere})")
@@ -360,6 +362,8 @@ if(SELF_TEST)
   expect(server/storage/a.cpp "\"core/localize/solver.hpp\"" broken)
   expect(server/storage/a.cpp "\"api/kit/message.hpp\"" broken)
   expect(server/app/a.cpp "<sqlite3.h>" broken)
+  expect(server/storage/a.cpp "<libpq-fe.h>" clean)
+  expect(server/app/a.cpp "<libpq-fe.h>" broken)
   expect(server/mqtt/a.cpp "<mosquitto.h>" clean)
   expect(server/app/a.cpp "<mosquitto.h>" broken)
   expect(server/app/a.hpp "<CLI/CLI.hpp>" broken)

@@ -4,6 +4,7 @@ namespace anchord {
 
 class AccessStore;
 class AnchorStore;
+class BundleStore;
 class CalibrationStore;
 class CampaignStore;
 class DatasetStore;
@@ -49,6 +50,7 @@ struct Stores {
   ServiceStore& service;
   WebhookStore& webhooks;
   PlaceStore& places;
+  BundleStore& bundles;
 };
 
 }  // namespace anchord

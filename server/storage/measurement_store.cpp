@@ -31,7 +31,7 @@ constexpr const char* k_devices =
 /// Each row was noted with its two radios, in its own transaction: what a count over the rows gives, without
 /// them.
 constexpr const char* k_count_ranges =
-    "SELECT coalesce(sum(n_ranges), 0) / 2 FROM device_seen WHERE mission_key = ?1";
+    "SELECT CAST(coalesce(sum(n_ranges), 0) AS BIGINT) / 2 FROM device_seen WHERE mission_key = ?1";
 constexpr const char* k_count_fixes = "SELECT count(*) FROM fix WHERE mission_key = ?1";
 
 class Keys {
@@ -121,7 +121,7 @@ void append_rows(Connection& connection, const std::vector<Row>& rows, std::vect
     }
     insert.again();
     Table<Row>::bind(insert, *key, rows[i]);
-    const auto id = insert.inserted();
+    const auto id = insert.inserted(Table<Row>::id);
     if (!id) {
       outcomes[i] = judge_stored(connection, *key, rows[i]);
       continue;

@@ -103,9 +103,10 @@ class SqlSiteStore final : public SiteStore {
       Query users(c, k_site_users);
       users << id;
       if (users.step() && users.integer() > 0) {
-        return make_error(Errc::conflict, "site " + to_string(id) +
-                                              " has missions (deleted ones in the bin count), anchors, frames or "
-                                              "buildings");
+        return make_error(Errc::conflict,
+                          "site " + to_string(id) +
+                              " has missions (deleted ones in the bin count), anchors, frames or "
+                              "buildings");
       }
       Query query(c, k_site_remove);
       query << id << expected_version;

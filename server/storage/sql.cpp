@@ -13,6 +13,7 @@ Error to_error(const SqlError& error) {
     case Failure::full:
       return make_error(Errc::storage_full, error.what());
     case Failure::unavailable:
+    case Failure::contended:
     case Failure::damaged:
       return make_error(Errc::storage_unavailable, error.what());
     case Failure::constraint:

@@ -18,8 +18,8 @@
 #include "core/types/document.hpp"
 
 /// The seam between the stores and the database: stores are written once against it, each database implements
-/// it once. SQL texts use ?1, ?2 ... in order, ON CONFLICT and RETURNING, and nothing that only one database
-/// knows.
+/// it once. SQL texts use ?1, ?2 ... in order, ON CONFLICT, RETURNING and ifnull, and nothing else that only
+/// one database knows.
 namespace anchord::sql {
 
 enum class Failure : std::uint8_t {
@@ -27,6 +27,7 @@ enum class Failure : std::uint8_t {
   unavailable,  ///< I/O error, read-only, busy past the limit
   damaged,      ///< the file is not what it should be
   constraint,   ///< a rule of the schema; the caller's data, not the database
+  contended,    ///< undone because of another transaction: the same work may succeed when it is run again
   internal,     ///< our SQL is wrong
 };
 
@@ -52,9 +53,9 @@ class Statement {
   virtual void bind_text(int index, std::string_view value) = 0;
   virtual void bind_blob(int index, std::span<const std::byte> value) = 0;
   virtual bool step() = 0;  ///< true: a row
-  /// Runs an INSERT of one row: its row id, or nothing where ON CONFLICT DO NOTHING left it out. A RETURNING
-  /// says the same at three times the cost.
-  virtual std::optional<std::int64_t> insert() = 0;
+  /// Runs an INSERT of one row, which says no RETURNING: its `key`, the table's integer key, or nothing where
+  /// ON CONFLICT DO NOTHING left it out. In SQLite a RETURNING says the same at three times the cost.
+  virtual std::optional<std::int64_t> insert(std::string_view key) = 0;
   virtual void reset() noexcept = 0;
   virtual bool is_null(int column) = 0;
   virtual std::int64_t integer(int column) = 0;
@@ -94,8 +95,8 @@ class Query {
     }
   }
 
-  /// Of a table with an integer key: the id of the row inserted, or nothing where there is one like it.
-  std::optional<std::int64_t> inserted() { return statement_.insert(); }
+  /// Of a table with an integer key: that of the row inserted, or nothing where there is one like it.
+  std::optional<std::int64_t> inserted(std::string_view key) { return statement_.insert(key); }
 
   /// The integer of a RETURNING; nothing when no row was touched. Runs to the end, where foreign keys are
   /// judged.

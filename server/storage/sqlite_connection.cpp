@@ -97,7 +97,7 @@ class SqliteStatement final : public Statement {
     guard([&] { row = statement_.executeStep(); });
     return row;
   }
-  std::optional<std::int64_t> insert() override {
+  std::optional<std::int64_t> insert(std::string_view) override {
     while (step()) {
     }
     if (sqlite3_changes(db_) == 0) return std::nullopt;

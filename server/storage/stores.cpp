@@ -27,9 +27,9 @@ SqlStores::SqlStores(Gate& gate, AdmitMission admit)
       service(make_service_store(gate)),
       webhooks(make_webhook_store(gate)),
       places(make_place_store(gate)),
-      ports{*measurements,  *missions, *bin,    *exclusions, *sites,     *anchors, *calibrations,
-            *revisions,     *kits,     *frames, *plans,      *campaigns, *labels,  *datasets,
-            *training_runs, *models,   *jobs,   *tokens,     *access,    *service, *webhooks,
-            *places} {}
+      bundles(make_bundle_store(gate)),
+      ports{*measurements, *missions, *bin,    *exclusions, *sites,    *anchors,  *calibrations,  *revisions,
+            *kits,         *frames,   *plans,  *campaigns,  *labels,   *datasets, *training_runs, *models,
+            *jobs,         *tokens,   *access, *service,    *webhooks, *places,   *bundles} {}
 
 }  // namespace anchord::sql

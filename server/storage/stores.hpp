@@ -5,6 +5,7 @@
 
 #include "core/ports/access_store.hpp"
 #include "core/ports/anchor_store.hpp"
+#include "core/ports/bundle_store.hpp"
 #include "core/ports/calibration_store.hpp"
 #include "core/ports/exclusion_store.hpp"
 #include "core/ports/frame_store.hpp"
@@ -14,9 +15,9 @@
 #include "core/ports/measurement_store.hpp"
 #include "core/ports/mission_bin.hpp"
 #include "core/ports/mission_store.hpp"
+#include "core/ports/place_store.hpp"
 #include "core/ports/plan_store.hpp"
 #include "core/ports/revision_store.hpp"
-#include "core/ports/place_store.hpp"
 #include "core/ports/site_store.hpp"
 #include "core/ports/stores.hpp"
 #include "core/ports/token_store.hpp"
@@ -51,6 +52,7 @@ std::unique_ptr<ServiceStore> make_service_store(Gate& gate);
 std::unique_ptr<ExclusionStore> make_exclusion_store(Gate& gate);
 std::unique_ptr<WebhookStore> make_webhook_store(Gate& gate);
 std::unique_ptr<PlaceStore> make_place_store(Gate& gate);
+std::unique_ptr<BundleStore> make_bundle_store(Gate& gate);
 
 /// All of them over one gate, which outlives them.
 struct SqlStores {
@@ -77,6 +79,7 @@ struct SqlStores {
   const std::unique_ptr<ServiceStore> service;
   const std::unique_ptr<WebhookStore> webhooks;
   const std::unique_ptr<PlaceStore> places;
+  const std::unique_ptr<BundleStore> bundles;
   const Stores ports;
 };
 

@@ -4,13 +4,14 @@ namespace anchord::sql {
 namespace {
 
 constexpr const char* k_insert =
-    "INSERT INTO webhook (id, name, url, secret, events, enabled, created_t_ns, version) "
-    "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)";
+    "INSERT INTO webhook (id, name, url, secret, events, enabled, created_t_ns, version, kind, dialect, "
+    "token) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)";
 constexpr const char* k_update =
-    "UPDATE webhook SET name = ?2, url = ?3, secret = ?4, events = ?5, enabled = ?6, version = ?7 "
-    "WHERE id = ?1 AND version = ?8 RETURNING version";
+    "UPDATE webhook SET name = ?2, url = ?3, secret = ?4, events = ?5, enabled = ?6, version = ?7, "
+    "dialect = ?9, token = ?10 WHERE id = ?1 AND version = ?8 RETURNING version";
 constexpr const char* k_columns =
-    "SELECT id, name, url, secret, events, enabled, created_t_ns, version FROM webhook ";
+    "SELECT id, name, url, secret, events, enabled, created_t_ns, version, kind, dialect, token FROM "
+    "webhook ";
 constexpr const char* k_remove = "DELETE FROM webhook WHERE id = ?1 RETURNING webhook_key";
 constexpr const char* k_add =
     "INSERT INTO webhook_delivery (id, webhook_key, event, body, state, created_t_ns, attempts, due_ran_ns, "
@@ -55,6 +56,9 @@ std::vector<Webhook> all(Query& query) {
     w.enabled = query.integer() != 0;
     w.created = query.time();
     w.version = query.as<std::uint64_t>();
+    w.kind = query.one_of(k_webhook_kind_words);
+    w.dialect = query.one_of(k_dialect_words);
+    w.token = query.text();
     found.push_back(std::move(w));
   }
   return found;
@@ -87,7 +91,8 @@ class SqlWebhookStore final : public WebhookStore {
   Result<void> insert(const Webhook& w) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       Query query(c, k_insert);
-      query << w.id << w.name << w.url << w.secret << joined(w.events) << w.enabled << w.created << w.version;
+      query << w.id << w.name << w.url << w.secret << joined(w.events) << w.enabled << w.created << w.version
+            << static_cast<std::uint8_t>(w.kind) << static_cast<std::uint8_t>(w.dialect) << w.token;
       query.run();
       return std::nullopt;
     });
@@ -96,7 +101,7 @@ class SqlWebhookStore final : public WebhookStore {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       Query query(c, k_update);
       query << w.id << w.name << w.url << w.secret << joined(w.events) << w.enabled << expected_version + 1
-            << expected_version;
+            << expected_version << static_cast<std::uint8_t>(w.dialect) << w.token;
       if (query.returned()) return std::nullopt;
       Query known(c, std::string(k_columns) + "WHERE id = ?1");
       known << w.id;

@@ -55,7 +55,8 @@ TEST_F(Migrate, FindsEveryLandedMigrationAsItWas) {
             "7 928ced75f17f95eee611eef5bcb10890a421087a2d744c12b04838d2bc94e8cc\n"
             "8 993f088a1a82f736ed536f4af9fbb963034237ed191e6e299a8e5d4a46bceb2f\n"
             "9 7c4ffeb6bd9e4aeb1810a60170fbca4d00fb10c4e5046f130dc0dc47fbdbec15\n"
-            "10 098b135dddac37d59e25a60e4ca32042085fe09793cd02a168a2db795eed8968\n");
+            "10 098b135dddac37d59e25a60e4ca32042085fe09793cd02a168a2db795eed8968\n"
+            "11 fb46c23aed9b18c6fb8d78f4b993f62c7c9955ea2d2f7ce173a314072fd736a2\n");
 }
 
 TEST_F(Migrate, KnowsTheDigestOfAPublishedVector) {

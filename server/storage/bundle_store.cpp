@@ -1,0 +1,455 @@
+#include "core/ports/bundle_store.hpp"
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <set>
+
+#include "core/types/mission.hpp"
+#include "server/storage/bundle_tables.hpp"
+#include "server/storage/stores.hpp"
+
+namespace anchord::sql {
+namespace {
+
+/// The transaction of a bundle stands alone: nothing small waits in its group.
+constexpr std::size_t k_weight = 20'000;
+
+constexpr const char* k_mission_state = "SELECT state, name FROM mission WHERE mission_key = ?1";
+constexpr const char* k_sites =
+    "SELECT s.id FROM site s WHERE s.id IN (SELECT m.site_id FROM mission m WHERE m.mission_key = ?1) OR "
+    "s.id "
+    "IN (SELECT a.site_id FROM anchor a JOIN device_seen d ON d.network_id = a.network_id WHERE "
+    "d.mission_key "
+    "= ?1 AND d.kind = 1)";
+constexpr const char* k_plans = "SELECT id, site_id FROM plan";
+constexpr const char* k_procedure = "SELECT state_json FROM mission_procedure WHERE mission_key = ?1";
+constexpr const char* k_models = "SELECT id FROM model";
+constexpr const char* k_provenance =
+    "SELECT c.settings_json, c.provenance_json FROM calibration c JOIN calibration_mission m ON "
+    "m.calibration_key = c.calibration_key WHERE m.mission_key = ?1";
+constexpr const char* k_any_mission = "SELECT mission_key FROM mission WHERE id = ?1";
+constexpr const char* k_insert_cir =
+    "INSERT INTO cir (range_id, dt_ps, first_path_idx, preamble_count, re_im) VALUES (?1, ?2, ?3, ?4, ?5)";
+constexpr const char* k_revisions = "SELECT number FROM revision";
+
+std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span{text}); }
+
+BundleCell read_cell(Query& query, CellKind kind) {
+  if (query.null()) {
+    query.skip();
+    return std::monostate{};
+  }
+  switch (kind) {
+    case CellKind::integer:
+      return query.integer();
+    case CellKind::real:
+      return query.real();
+    case CellKind::text:
+      return query.text();
+    case CellKind::bytes:
+    case CellKind::id: {
+      const auto bytes = query.blob();
+      return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    }
+  }
+  return std::monostate{};
+}
+
+BundleRow read_row(Query& query, const BundleTable& table) {
+  BundleRow row;
+  row.reserve(table.columns.size());
+  for (const auto& column : table.columns) row.push_back(read_cell(query, column.kind));
+  return row;
+}
+
+void bind_cell(Query& query, const BundleCell& cell, CellKind kind) {
+  if (const auto* whole = std::get_if<std::int64_t>(&cell)) {
+    query << *whole;
+  } else if (const auto* real = std::get_if<double>(&cell)) {
+    query << *real;
+  } else if (const auto* text = std::get_if<std::string>(&cell)) {
+    if (kind == CellKind::text)
+      query << *text;
+    else
+      query << bytes_of(*text);
+  } else {
+    query << std::nullopt;
+  }
+}
+
+bool same(const BundleCell& a, const BundleCell& b) {
+  const auto* x = std::get_if<double>(&a);
+  const auto* y = std::get_if<double>(&b);
+  if (x != nullptr && y != nullptr)
+    return std::bit_cast<std::uint64_t>(*x) == std::bit_cast<std::uint64_t>(*y);
+  return a == b;
+}
+
+Uuid uuid_of(const BundleCell& cell) {
+  Uuid id;
+  const auto* text = std::get_if<std::string>(&cell);
+  if (text != nullptr && text->size() == id.bytes.size()) std::memcpy(id.bytes.data(), text->data(), 16);
+  return id;
+}
+
+std::int64_t whole_of(const BundleCell& cell) {
+  const auto* whole = std::get_if<std::int64_t>(&cell);
+  return whole != nullptr ? *whole : -1;
+}
+
+std::string in_words(const BundleCell& cell, const BundleColumn& column) {
+  if (const auto* whole = std::get_if<std::int64_t>(&cell)) {
+    const bool radio = column.name == "network_id" || column.name == "tag" || column.name == "anchor";
+    return radio ? to_string(NetworkId{static_cast<std::uint32_t>(*whole)}) : std::to_string(*whole);
+  }
+  if (const auto* text = std::get_if<std::string>(&cell))
+    return column.kind == CellKind::id ? to_string(uuid_of(cell)) : *text;
+  return "none";
+}
+
+/// "anchor 0x6a2f", "kit_profile xcel 3"
+std::string name_of(const BundleSpec& spec, const BundleRow& row) {
+  std::string name = spec.table.name;
+  for (const std::size_t key : spec.keys) name += ' ' + in_words(row[key], spec.table.columns[key]);
+  return name;
+}
+
+/// What else the rows of a flight name, so that it stands whole on another server.
+struct Named {
+  std::set<Uuid> sites, plans, models;
+};
+
+std::string all_text(Connection& c, const char* sql, std::int64_t mission) {
+  Query query(c, sql);
+  query << mission;
+  std::string text;
+  while (query.step()) text += query.text() + '\n';
+  return text;
+}
+
+Named named_by(Connection& c, std::int64_t mission) {
+  Named out;
+  const std::string flown = all_text(c, k_procedure, mission);
+  std::string told;
+  {
+    Query query(c, k_provenance);
+    query << mission;
+    while (query.step()) {
+      told += query.text();
+      told += query.text();
+    }
+  }
+  {
+    Query query(c, k_sites);
+    query << mission;
+    while (query.step()) out.sites.insert(query.id<SiteId>().uuid);
+  }
+  {
+    Query query(c, k_plans);
+    while (query.step()) {
+      const Uuid id = query.id<SiteId>().uuid;
+      const auto site = query.maybe([&] { return query.id<SiteId>().uuid; });
+      if (flown.find(to_string(id)) == std::string::npos) continue;
+      out.plans.insert(id);
+      if (site) out.sites.insert(*site);
+    }
+  }
+  Query query(c, k_models);
+  while (query.step()) {
+    const Uuid id = query.id<ModelId>().uuid;
+    if (told.find(to_string(id)) != std::string::npos) out.models.insert(id);
+  }
+  return out;
+}
+
+class Writer {
+ public:
+  Writer(Connection& c, std::int64_t mission, BundleSink& sink)
+      : c_(c), mission_(mission), named_(named_by(c, mission)), sink_(sink) {}
+  std::optional<Error> run() {
+    for (const auto& spec : bundle_specs()) {
+      if (auto begun = sink_.begin(spec.table); !begun) return begun.error();
+      const std::set<Uuid>* each = spec.part == BundlePart::site    ? &named_.sites
+                                   : spec.part == BundlePart::plan  ? &named_.plans
+                                   : spec.part == BundlePart::model ? &named_.models
+                                                                    : nullptr;
+      if (each == nullptr) {
+        if (auto error = rows(spec, nullptr)) return error;
+        continue;
+      }
+      for (const Uuid& id : *each)
+        if (auto error = rows(spec, &id)) return error;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  std::optional<Error> rows(const BundleSpec& spec, const Uuid* of) {
+    Query query(c_, spec.select);
+    if (of == nullptr)
+      query << mission_;
+    else
+      query << SiteId{*of};
+    while (query.step()) {
+      if (auto written = sink_.row(read_row(query, spec.table)); !written) return written.error();
+    }
+    return std::nullopt;
+  }
+
+  Connection& c_;
+  const std::int64_t mission_;
+  const Named named_;
+  BundleSink& sink_;
+};
+
+/// One import, inside one transaction.
+class Reader {
+ public:
+  Reader(Connection& c, const MissionId& mission, BundleSource& source)
+      : c_(c), mission_(mission), source_(source) {}
+
+  Result<BundleOutcome> run() {
+    {
+      Query found(c_, k_any_mission);
+      found << mission_;
+      if (found.step()) key_ = found.integer();
+    }
+    fresh_ = !key_.has_value();
+    if (!fresh_ && !mission_key(c_, mission_))
+      return make_error(Errc::conflict, "mission " + to_string(mission_) +
+                                            " is in the bin here: restore it, or remove it for good");
+    BOOST_OUTCOME_TRY(leave_out_calibrations());
+    BOOST_OUTCOME_TRY(leave_out_revisions());
+    for (const auto& spec : bundle_specs()) {
+      BOOST_OUTCOME_TRY(take(spec));
+    }
+    return std::move(out_);
+  }
+
+ private:
+  /// Those made with flights that are not here stay out: their rows would name nobody.
+  Result<void> leave_out_calibrations() {
+    const BundleSpec& spec = spec_named("calibration_mission");
+    BOOST_OUTCOME_TRY(source_.open(spec.table));
+    BundleRow row;
+    for (;;) {
+      BOOST_OUTCOME_TRY(const bool more, source_.next(row));
+      if (!more) return boost::outcome_v2::success();
+      const Uuid calibration = uuid_of(row[0]);
+      const MissionId mission{uuid_of(row[2])};
+      if (mission == mission_ || mission_key(c_, mission)) continue;
+      if (calibrations_out_.insert(calibration).second)
+        out_.left_out.push_back({"calibration " + to_string(calibration),
+                                 "it was made with mission " + to_string(mission) +
+                                     " too, which is not here: import that one's bundle, then this again"});
+    }
+  }
+
+  /// What is published here is this server's word. Those of a bundle stand where nothing else was published,
+  /// and all they rest on comes along.
+  Result<void> leave_out_revisions() {
+    std::set<std::int64_t> mine, theirs, named;
+    const BundleSpec& revision = spec_named("revision");
+    BOOST_OUTCOME_TRY(source_.open(revision.table));
+    BundleRow row;
+    bool whole = true;
+    for (;;) {
+      BOOST_OUTCOME_TRY(const bool more, source_.next(row));
+      if (!more) break;
+      theirs.insert(whole_of(row[0]));
+      whole = whole && !calibrations_out_.contains(uuid_of(row[1]));
+    }
+    BOOST_OUTCOME_TRY(source_.open(spec_named("revision_position").table));
+    for (;;) {
+      BOOST_OUTCOME_TRY(const bool more, source_.next(row));
+      if (!more) break;
+      named.insert(whole_of(row[2]));
+    }
+    for (const std::int64_t number : named) whole = whole && theirs.contains(number);
+    Query query(c_, k_revisions);
+    while (query.step()) mine.insert(query.integer());
+    bool others = false;
+    for (const std::int64_t number : mine) others = others || !theirs.contains(number);
+    revisions_out_ = others || !whole;
+    if (!revisions_out_) return boost::outcome_v2::success();
+    for (const std::int64_t number : theirs)
+      out_.left_out.push_back(
+          {"revision " + std::to_string(number),
+           others ? "this server has published revisions of its own: publish the calibration here"
+                  : "it rests on revisions or calibrations that did not come along: publish the calibration "
+                    "here"});
+    return boost::outcome_v2::success();
+  }
+
+  Result<void> take(const BundleSpec& spec) {
+    BundleOutcome::Table counted{spec.table.name, 0, 0};
+    BOOST_OUTCOME_TRY(source_.open(spec.table));
+    BundleRow row;
+    for (;;) {
+      BOOST_OUTCOME_TRY(const bool more, source_.next(row));
+      if (!more) break;
+      ++counted.n_rows;
+      if (skipped(spec, row)) continue;
+      BOOST_OUTCOME_TRY(const bool added, take_row(spec, row));
+      if (added) ++counted.n_added;
+    }
+    if (spec.part == BundlePart::mission && counted.n_rows != 1)
+      return make_error(Errc::invalid_argument,
+                        "a bundle has one mission, this one " + std::to_string(counted.n_rows));
+    if (spec.part == BundlePart::measured && !fresh_) {
+      BOOST_OUTCOME_TRY(same_count(spec, counted.n_rows));
+    }
+    out_.tables.push_back(std::move(counted));
+    return boost::outcome_v2::success();
+  }
+
+  bool skipped(const BundleSpec& spec, const BundleRow& row) const {
+    if (spec.part == BundlePart::revision) return revisions_out_;
+    return spec.part == BundlePart::calibration && calibrations_out_.contains(uuid_of(row[0]));
+  }
+
+  Result<bool> take_row(const BundleSpec& spec, const BundleRow& row) {
+    if (spec.part == BundlePart::mission) {
+      BOOST_OUTCOME_TRY(check_mission(spec, row));
+    }
+    // What belongs to a flight that came just now cannot be here yet.
+    const bool nothing_yet = fresh_ && (spec.part == BundlePart::measured || spec.part == BundlePart::own);
+    if (!nothing_yet) {
+      BOOST_OUTCOME_TRY(const bool here, is_here(spec, row));
+      if (here) return false;
+      if (spec.part == BundlePart::measured)
+        return make_error(Errc::conflict, "mission " + to_string(mission_) + " is here without " +
+                                              name_of(spec, row) +
+                                              " of the bundle: it is another flight of the same id");
+    }
+    BOOST_OUTCOME_TRY(add(spec, row));
+    return true;
+  }
+
+  Result<void> check_mission(const BundleSpec& spec, const BundleRow& row) const {
+    if (uuid_of(row[0]) != mission_.uuid)
+      return make_error(Errc::invalid_argument,
+                        "the bundle is of mission " + to_string(mission_) + ", its row of another");
+    const auto state = std::ranges::find(spec.columns, "state", &BundleColumnSql::bundle);
+    if (whole_of(row[static_cast<std::size_t>(state - spec.columns.begin())]) ==
+        static_cast<std::int64_t>(MissionState::recording))
+      return make_error(Errc::invalid_argument, "the mission of a bundle is finished, this one records");
+    return boost::outcome_v2::success();
+  }
+
+  Result<bool> is_here(const BundleSpec& spec, const BundleRow& row) {
+    Query query(c_, spec.find);
+    if (spec.of_mission) query << key_.value();
+    for (const std::size_t key : spec.keys) {
+      const bool none = std::holds_alternative<std::monostate>(row[key]);
+      if (none && std::ranges::count(spec.nullable, spec.columns[key].bundle) > 0)
+        query << -1;
+      else
+        bind_cell(query, row[key], spec.table.columns[key].kind);
+    }
+    if (!query.step()) return false;
+    const BundleRow stored = read_row(query, spec.table);
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      if (!same(stored[i], row[i]))
+        return make_error(Errc::conflict, name_of(spec, row) + " is here with other content (" +
+                                              spec.table.columns[i].name + "); nothing was imported");
+    }
+    return true;
+  }
+
+  Result<void> add(const BundleSpec& spec, const BundleRow& row) {
+    Query query(c_, spec.insert);
+    if (spec.of_mission) query << key_.value();
+    bool with_cir = false;
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      if (spec.columns[i].column.empty())
+        with_cir = !std::holds_alternative<std::monostate>(row[i]);  // the last of them: its samples
+      else
+        bind_cell(query, row[i], spec.table.columns[i].kind);
+    }
+    try {
+      if (spec.part == BundlePart::mission)
+        key_ = query.inserted("mission_key");
+      else if (with_cir)
+        add_cir(query.inserted("range_id").value(), row);
+      else
+        query.run();
+    } catch (const SqlError& error) {
+      if (error.failure() != Failure::constraint) throw;
+      return make_error(Errc::conflict, name_of(spec, row) + " cannot stand here (" + error.what() +
+                                            "); nothing was imported");
+    }
+    return boost::outcome_v2::success();
+  }
+
+  void add_cir(std::int64_t range, const BundleRow& row) {
+    Query query(c_, k_insert_cir);
+    query << range;
+    for (std::size_t i = row.size() - 4; i < row.size(); ++i)
+      bind_cell(query, row[i], i + 1 == row.size() ? CellKind::bytes : CellKind::real);
+    query.run();
+  }
+
+  Result<void> same_count(const BundleSpec& spec, std::uint64_t n_rows) {
+    Query query(c_, spec.count);
+    query << key_.value();
+    const std::uint64_t here = query.step() ? query.as<std::uint64_t>() : 0;
+    if (here == n_rows) return boost::outcome_v2::success();
+    return make_error(Errc::conflict, "mission " + to_string(mission_) + " is here with " +
+                                          std::to_string(here) + " rows of " + spec.table.name + ", not " +
+                                          std::to_string(n_rows) + "; nothing was imported");
+  }
+
+  static const BundleSpec& spec_named(std::string_view name) {
+    const auto& all = bundle_specs();
+    return *std::ranges::find(all, name, [](const BundleSpec& spec) { return spec.table.name; });
+  }
+
+  Connection& c_;
+  const MissionId mission_;
+  BundleSource& source_;
+  std::optional<std::int64_t> key_;
+  bool fresh_{false}, revisions_out_{false};
+  std::set<Uuid> calibrations_out_;
+  BundleOutcome out_;
+};
+
+class SqlBundleStore final : public BundleStore {
+ public:
+  explicit SqlBundleStore(Gate& gate) : gate_(gate) {
+    for (const auto& spec : bundle_specs()) tables_.push_back(spec.table);
+  }
+
+  const std::vector<BundleTable>& tables() const override { return tables_; }
+
+  Result<void> write_out(const MissionId& mission, BundleSink& sink) override {
+    const auto error = gate_.read([&](Connection& c) -> std::optional<Error> {
+      const auto key = mission_key(c, mission);
+      if (!key) return absent("mission", mission);
+      Query query(c, k_mission_state);
+      query << *key;
+      if (query.step() && query.one_of(k_mission_state_words) == MissionState::recording)
+        return make_error(Errc::conflict, query.text() + " records: finish it first, then take its bundle");
+      return Writer(c, *key, sink).run();
+    });
+    if (error) return *error;
+    return boost::outcome_v2::success();
+  }
+
+  Result<BundleOutcome> take_in(const MissionId& mission, BundleSource& source) override {
+    return write_value<BundleOutcome>(gate_, k_weight, [&](Connection& c) -> Result<BundleOutcome> {
+      return Reader(c, mission, source).run();
+    });
+  }
+
+ private:
+  Gate& gate_;
+  std::vector<BundleTable> tables_;
+};
+
+}  // namespace
+
+std::unique_ptr<BundleStore> make_bundle_store(Gate& gate) { return std::make_unique<SqlBundleStore>(gate); }
+
+}  // namespace anchord::sql

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/types/bundle.hpp"
+
+namespace anchord::sql {
+
+/// Whose rows a table of a bundle has, and so what may happen to them where the bundle is taken.
+enum class BundlePart : std::uint8_t {
+  site,         ///< one site a query
+  plan,         ///< one plan a query
+  model,        ///< one model a query
+  shared,       ///< of others too: the same, or added
+  mission,      ///< the flight itself
+  measured,     ///< never changes after the flight: all there, or none
+  own,          ///< of the flight; more may come later
+  calibration,  ///< with a calibration, which may be left out
+  revision,     ///< with a revision, which may be left out
+};
+
+/// One column of a bundle in SQL.
+struct BundleColumnSql {
+  std::string bundle;  ///< its name in the bundle
+  std::string column;  ///< in the table; empty: of the impulse response beside a range
+  std::string select;  ///< what reads it
+  std::string parent;  ///< the table that the id of the bundle is of; empty: it is no reference
+};
+
+/// A table with the SQL that reads, finds and adds its rows.
+struct BundleSpec {
+  BundlePart part{};
+  BundleTable table;
+  std::vector<BundleColumnSql> columns;
+  bool of_mission{};                  ///< has mission_key, which is always that of the flight
+  std::vector<std::size_t> keys;      ///< columns that tell one row from another
+  std::vector<std::string> nullable;  ///< of them, those that may be NULL
+  std::string select;                 ///< ?1: mission_key, or the id of the site, plan or model
+  std::string find;                   ///< parameters: mission_key where it has one, then the keys
+  std::string insert;                 ///< parameters: mission_key where it has one, then the columns
+  std::string count;                  ///< of the flight; ?1: mission_key
+};
+
+/// In the order in which rows are written and taken: what is named stands before what names it.
+const std::vector<BundleSpec>& bundle_specs();
+
+}  // namespace anchord::sql

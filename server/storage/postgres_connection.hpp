@@ -1,0 +1,33 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "server/storage/sql.hpp"
+
+namespace anchord::sql {
+
+/// One connection to PostgreSQL. Nothing of it outlives a transaction (no prepared statement has a name, no
+/// setting stays), so that a pooler may give every transaction another session. A result is in memory whole
+/// before its first row is read.
+class PostgresConnection final : public Connection {
+ public:
+  /// Blocks at most some seconds. Throws SqlError.
+  explicit PostgresConnection(const std::string& address);
+  ~PostgresConnection() override;
+
+  Statement& prepared(std::string_view sql) override;
+  void execute(const std::string& sql) override;
+
+  bool usable() const;  ///< the server was there when it was last spoken to
+  bool in_transaction() const;
+  /// Throws also where PostgreSQL answers a COMMIT by undoing.
+  void commit();
+
+  struct State;  ///< of the .cpp file
+
+ private:
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace anchord::sql

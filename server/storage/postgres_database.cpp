@@ -1,0 +1,130 @@
+#include "server/storage/postgres_database.hpp"
+
+#include <condition_variable>
+#include <utility>
+
+#include "core/base/guard.hpp"
+#include "core/base/locked.hpp"
+#include "migrations/migration.hpp"
+#include "server/storage/data_folder.hpp"
+#include "server/storage/postgres_gate.hpp"
+#include "server/storage/postgres_migrate.hpp"
+#include "server/storage/postgres_text.hpp"
+#include "server/storage/stores.hpp"
+
+namespace anchord {
+namespace {
+
+using sql::PostgresConnection;
+using sql::PostgresGate;
+using sql::SqlError;
+
+constexpr auto k_look_every = std::chrono::seconds(2);
+constexpr const char* k_bytes = "SELECT pg_database_size(current_database())";
+
+class PostgresDatabase final : public Database {
+ public:
+  PostgresDatabase(const PostgresOptions& options, std::unique_ptr<sql::DataFolder> folder)
+      : folder_(std::move(folder)),
+        gate_([address = options.address] { return std::make_unique<PostgresConnection>(address); },
+              {options.writers, options.readers, options.max_queued_rows, options.max_queued_calls,
+               options.statement_timeout}),
+        // The disk is the database server's: whether a mission still fits, it says when it does not.
+        kept_(gate_, [] { return std::optional<Error>{}; }),
+        watch_("anchord-dbwatch", [this] { watch(); }) {}
+
+  ~PostgresDatabase() override {
+    {
+      auto seen = seen_.lock();
+      seen->stopping = true;
+    }
+    stop_.notify_one();
+    watch_.join();
+  }
+
+  const Stores& stores() override { return kept_.ports; }
+
+  /// Asks nobody: what the last calls met, and those of watch().
+  StorageHealth health() override {
+    const auto status = gate_.status();
+    StorageHealth health;
+    health.queued_calls = status.queued_calls;
+    health.queued_rows = status.queued_rows;
+    health.commits = status.commits;
+    health.rows_written = status.rows;
+    health.last_commit_s = status.last_commit_s;
+    health.schema_version = newest_schema_version();
+    health.db_bytes = seen_.copy().bytes;
+    health.disk_free_bytes = folder_->free_bytes();
+    if (status.trouble) {
+      health.level =
+          status.trouble->failure() == sql::Failure::full ? StorageLevel::full : StorageLevel::unavailable;
+      health.reason = status.trouble->what();
+    }
+    return health;
+  }
+
+  Result<BackupReport> backup(const std::filesystem::path&) override {
+    return make_error(Errc::unsupported,
+                      "a PostgreSQL database is copied by its own tools: pg_dump, or the archive of its WAL");
+  }
+
+ private:
+  struct Seen {
+    std::uint64_t bytes{0};
+    bool stopping{false};
+  };
+
+  /// A database that fell away is tried also when nobody writes, so that readiness comes back by itself.
+  void watch() {
+    for (;;) {
+      (void)guarded("database watch", [this] { look(); });
+      auto seen = seen_.lock();
+      if (seen.wait_for(stop_, k_look_every, [](const Seen& s) { return s.stopping; })) return;
+    }
+  }
+  void look() {
+    std::uint64_t bytes = 0;
+    const auto error = gate_.write(0, [&](sql::Connection& c) -> std::optional<Error> {
+      sql::Query query(c, k_bytes);
+      if (query.step()) bytes = query.as<std::uint64_t>();
+      return std::nullopt;
+    });
+    if (error) return;
+    auto seen = seen_.lock();
+    seen->bytes = bytes;
+  }
+
+  const std::unique_ptr<sql::DataFolder> folder_;
+  PostgresGate gate_;
+  sql::SqlStores kept_;
+  Locked<Seen> seen_;
+  std::condition_variable stop_;
+  Thread watch_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Database>> open_postgres(const PostgresOptions& options) {
+  if (!sql::names_postgres(options.address)) {
+    return make_error(Errc::invalid_argument,
+                      "the database has no address of PostgreSQL: write postgresql://user@host:5432/name");
+  }
+  if (sql::names_password(options.address)) {
+    return make_error(
+        Errc::invalid_argument,
+        "database " + sql::shown_address(options.address) +
+            ": its address has a password in it, which others can read; put it into ~/.pgpass, or "
+            "into a file named by PGPASSFILE");
+  }
+  BOOST_OUTCOME_TRY(auto folder, sql::DataFolder::open(options.data_dir, 0));
+  try {
+    PostgresConnection connection(options.address);
+    BOOST_OUTCOME_TRYV(sql::migrate_postgres(connection, postgresql_migrations(), SystemClock{}.now()));
+    return std::unique_ptr<Database>(std::make_unique<PostgresDatabase>(options, std::move(folder)));
+  } catch (const SqlError& error) {
+    return sql::to_error(error);
+  }
+}
+
+}  // namespace anchord

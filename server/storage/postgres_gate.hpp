@@ -1,0 +1,80 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/locked.hpp"
+#include "server/storage/postgres_connection.hpp"
+#include "server/storage/sql.hpp"
+
+namespace anchord::sql {
+
+/// A bounded number of connections, opened on demand. One that was lost is replaced; while the server is away
+/// a new one is tried at most every half second, and everybody else is told at once.
+class PostgresPool {
+ public:
+  using Open = std::function<std::unique_ptr<PostgresConnection>()>;
+  PostgresPool(Open open, std::size_t size) : open_(std::move(open)), size_(size) {}
+
+  /// Runs `use` with a connection on which `begin` was executed. Throws SqlError, also what `use` throws: the
+  /// transaction is undone then. `use` ends the transaction where it goes well.
+  void run(const std::string& begin, const std::function<void(PostgresConnection&)>& use);
+
+ private:
+  using SteadyClock = std::chrono::steady_clock;
+  class Place;
+  struct Shared {
+    std::vector<std::unique_ptr<PostgresConnection>> idle;
+    std::size_t in_use{0};
+    SteadyClock::time_point not_before{};
+    std::optional<SqlError> trouble;  ///< of the last connection that could not be opened
+  };
+  std::unique_ptr<PostgresConnection> begun(const std::string& begin);
+  std::unique_ptr<PostgresConnection> opened();
+
+  const Open open_;
+  const std::size_t size_;
+  Locked<Shared> shared_;
+  std::condition_variable freed_;
+};
+
+/// Each call is a transaction: a read sees one snapshot; a write is serialisable, and run again when another
+/// one, perhaps of another server, was in its way.
+class PostgresGate final : public Gate {
+ public:
+  struct Limits {
+    std::size_t writers, readers, max_rows, max_calls;
+    std::chrono::milliseconds statement_timeout;
+  };
+  struct Status {
+    std::size_t queued_calls{}, queued_rows{};
+    std::uint64_t commits{}, rows{}, repeats{};
+    double last_commit_s{};
+    std::optional<SqlError> trouble;  ///< of the last call that did not reach the database or found no space
+  };
+  PostgresGate(PostgresPool::Open open, Limits limits);
+
+  /// Of no rows: tells whether the database can be written.
+
+  std::optional<Error> write(std::size_t rows, const Work& work) override;
+  std::optional<Error> read(const Work& work) override;
+  Status status() const;
+
+ private:
+  std::optional<Error> enter(std::size_t rows);
+  std::optional<Error> attempt(std::size_t rows, const Work& work);
+  void note(const SqlError& trouble);
+  void count_repeat();
+
+  const Limits limits_;
+  const std::string begin_write_, begin_read_;
+  PostgresPool writers_, readers_;
+  Locked<Status> status_;
+};
+
+}  // namespace anchord::sql

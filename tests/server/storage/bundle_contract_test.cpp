@@ -1,0 +1,147 @@
+// A flight as rows for another server, over every backend, and from each to SQLite and back.
+#include "core/ports/bundle_store.hpp"
+
+#include <map>
+
+#include "core/ports/exclusion_store.hpp"
+#include "core/ports/kit_store.hpp"
+#include "core/ports/revision_store.hpp"
+#include "core/ports/site_store.hpp"
+#include "tests/server/storage/backends.hpp"
+
+namespace anchord {
+namespace {
+
+/// Rows in memory, in and out.
+struct Rows final : BundleSink, BundleSource {
+  std::map<std::string, std::vector<BundleRow>> tables;
+  std::string name;
+  std::size_t at{0};
+  Result<void> begin(const BundleTable& table) override {
+    tables[name = table.name];
+    return boost::outcome_v2::success();
+  }
+  Result<void> row(const BundleRow& row) override {
+    tables[name].push_back(row);
+    return boost::outcome_v2::success();
+  }
+  Result<void> open(const BundleTable& table) override {
+    name = table.name;
+    at = 0;
+    return boost::outcome_v2::success();
+  }
+  Result<bool> next(BundleRow& row) override {
+    if (at >= tables[name].size()) return false;
+    row = tables[name][at++];
+    return true;
+  }
+};
+
+class BundleStoreContract : public StoreContract {
+ protected:
+  /// A finished flight with something in nearly every table.
+  MissionId flown() {
+    const Stores s = db_->stores();
+    Site site;
+    site.id = SiteId{make_uuid_v7(k_noon)};
+    site.name = "hall";
+    site.origin = Wgs84{51.1 / 3, 3.7, -0.0};
+    site.created = k_noon;
+    EXPECT_TRUE(s.sites.insert(site));
+    Mission m;
+    m.id = MissionId{make_uuid_v7(k_noon)};
+    m.site = site.id;
+    m.name = "flight";
+    m.kit = "kit";
+    m.tags = {{NetworkId{0x6e01}, 0, {0.1, 0.2, 0.3}}};
+    m.created = k_noon;
+    EXPECT_TRUE(s.missions.insert(m));
+    std::vector<Range> ranges;
+    for (int i = 0; i < 40; ++i) ranges.push_back(range_at(m.id, i));
+    ranges[3].seq = 7;
+    ranges[4].cir.emplace();
+    ranges[4].cir->re_im = {0, -1, 32767, -32768};
+    EXPECT_TRUE(s.measurements.append_ranges(ranges, true));
+    StoredProfile profile;
+    profile.kit = "kit";
+    profile.time = k_noon;
+    profile.by = profile.source = "test";
+    profile.profile = {"{}"};
+    EXPECT_TRUE(s.kits.put(profile, 0));
+    Exclusion e;
+    e.id = ExclusionId{make_uuid_v7(k_noon)};
+    e.mission = m.id;
+    e.selection.since = k_noon;
+    e.reason = "why";
+    e.created = k_noon;
+    EXPECT_TRUE(s.exclusions.insert(e, {}));
+    EXPECT_TRUE(s.exclusions.include(m.id, e.id, {k_noon, "me", "not so"}));
+    EXPECT_TRUE(s.missions.finish(m.id, k_noon));
+    const Calibration c = stored_calibration(m, {0x6a21, 0x6a22});
+    EXPECT_TRUE(s.revisions.publish(c.id, {NetworkId{0x6a21}}, "me", "", k_noon));
+    return m.id;
+  }
+  static Rows written(Database& db, const MissionId& mission) {
+    Rows rows;
+    const auto done = db.stores().bundles.write_out(mission, rows);
+    EXPECT_TRUE(done) << done.error().message;
+    return rows;
+  }
+};
+
+TEST_P(BundleStoreContract, ComeBackTheSameFromAnotherDatabase) {
+  const auto mission = flown();
+  Rows rows = written(*db_, mission);
+  EXPECT_EQ(rows.tables.at("uwb_range").size(), 40u);
+  EXPECT_EQ(rows.tables.at("exclusion_taken_back").size(), 1u);
+  EXPECT_EQ(rows.tables.at("revision_position").size(), 1u);
+  ScratchDir folder;
+  const auto other = open_sqlite(folder.path() / "data");
+  const auto taken = other->stores().bundles.take_in(mission, rows);
+  ASSERT_TRUE(taken) << taken.error().message;
+  EXPECT_TRUE(taken.value().left_out.empty());
+  EXPECT_EQ(written(*other, mission).tables, rows.tables);
+  const auto back = db_->stores().bundles.take_in(mission, rows);
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_FALSE(back.value().added()) << "all of it is here";
+}
+
+TEST_P(BundleStoreContract, AreTakenFromSqlite) {
+  const auto here = std::exchange(db_, nullptr);
+  ScratchDir folder;
+  db_ = open_sqlite(folder.path() / "data");
+  const auto mission = flown();
+  Rows rows = written(*db_, mission);
+  const auto taken = here->stores().bundles.take_in(mission, rows);
+  ASSERT_TRUE(taken) << taken.error().message;
+  EXPECT_EQ(written(*here, mission).tables, rows.tables);
+}
+
+TEST_P(BundleStoreContract, AreRefusedWholeWhereAMeasurementDiffers) {
+  const auto mission = flown();
+  Rows rows = written(*db_, mission);
+  rows.tables["uwb_range"].pop_back();
+  const auto fewer = db_->stores().bundles.take_in(mission, rows);
+  ASSERT_FALSE(fewer);
+  EXPECT_EQ(fewer.error().code, Errc::conflict);
+  EXPECT_NE(fewer.error().message.find("40 rows of uwb_range"), std::string::npos) << fewer.error().message;
+  ScratchDir folder;
+  const auto other = open_sqlite(folder.path() / "data");
+  rows.tables["estimate"][0][0] = std::string(16, '\0');  // of a calibration that is nowhere
+  EXPECT_FALSE(other->stores().bundles.take_in(mission, rows));
+  EXPECT_FALSE(other->stores().missions.mission(mission)) << "nothing of it stays";
+}
+
+TEST_P(BundleStoreContract, AreOfFinishedMissionsAlone) {
+  Rows rows;
+  const auto records = db_->stores().bundles.write_out(stored_mission().id, rows);
+  ASSERT_FALSE(records);
+  EXPECT_EQ(records.error().code, Errc::conflict);
+  EXPECT_EQ(db_->stores().bundles.write_out(MissionId{make_uuid_v7(k_noon)}, rows).error().code,
+            Errc::not_found);
+}
+
+INSTANTIATE_TEST_SUITE_P(Backends, BundleStoreContract, backends(), backend_name);
+
+}  // namespace
+}  // namespace anchord

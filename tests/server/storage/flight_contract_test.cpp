@@ -1,0 +1,241 @@
+// Plans, exclusions, labels, filters of measurements and the outbox of webhooks, over every backend.
+#include "core/ports/exclusion_store.hpp"
+#include "core/ports/learning_store.hpp"
+#include "core/ports/plan_store.hpp"
+#include "core/ports/site_store.hpp"
+#include "core/ports/webhook_store.hpp"
+#include "tests/server/storage/backends.hpp"
+
+namespace anchord {
+namespace {
+
+using testing::ElementsAre;
+using testing::Pair;
+
+class FlightStoreContract : public StoreContract {
+ protected:
+  PlanStore& plans() { return db_->stores().plans; }
+  ExclusionStore& exclusions() { return db_->stores().exclusions; }
+  WebhookStore& webhooks() { return db_->stores().webhooks; }
+
+  StoredPlan plan(const std::string& name) {
+    return {
+        PlanId{make_uuid_v7(k_noon)}, name, {}, Document{"{\"name\":\"" + name + "\"}"}, k_noon, k_noon, 1};
+  }
+  /// A mission with n ranges of four anchors, 10 ms apart.
+  Mission mission_with(int n) {
+    const Mission m = stored_mission();
+    std::vector<Range> rows;
+    for (int i = 0; i < n; ++i) rows.push_back(range_at(m.id, i));
+    EXPECT_TRUE(db_->stores().measurements.append_ranges(rows, true));
+    return m;
+  }
+  Exclusion exclusion_of(const Mission& mission) {
+    Exclusion e;
+    e.id = ExclusionId{make_uuid_v7(k_noon)};
+    e.mission = mission.id;
+    e.reason = "reflections";
+    e.by = "anna";
+    e.created = k_noon;
+    return e;
+  }
+  Webhook stored_webhook(const std::string& name) {
+    Webhook w;
+    w.id = WebhookId{make_uuid_v7(k_noon)};
+    w.name = name;
+    w.url = "https://example.org/" + name;
+    w.secret = "whsec_x";
+    w.events = {"revision.published", "alarm.raised"};
+    w.created = k_noon;
+    EXPECT_TRUE(webhooks().insert(w));
+    return w;
+  }
+  WebhookDelivery delivery(const Webhook& to, std::int64_t due_ran_ns) {
+    WebhookDelivery d;
+    d.id = DeliveryId{make_uuid_v7(k_noon)};
+    d.webhook = to.id;
+    d.event = "alarm.raised";
+    d.body = Document{"{}"};
+    d.created = k_noon;
+    d.due_ran_ns = due_ran_ns;
+    return d;
+  }
+};
+
+TEST_P(FlightStoreContract, ListsPlansNewestFirstAndKeepsVersions) {
+  StoredPlan first = plan("first");
+  const StoredPlan second = plan("second");
+  ASSERT_TRUE(plans().insert(first));
+  ASSERT_TRUE(plans().insert(second));
+  EXPECT_EQ(plans().insert(first).error().code, Errc::conflict);
+  const auto all = plans().plans(10, std::nullopt).value();
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_EQ(all[0].id, second.id);
+  EXPECT_EQ(plans().plans(10, second.id).value().at(0).id, first.id);
+  first.name = "renamed";
+  ASSERT_TRUE(plans().update(first, 1));
+  EXPECT_EQ(plans().update(first, 1).error().code, Errc::conflict);
+  EXPECT_EQ(plans().plan(first.id).value().name, "renamed");
+  EXPECT_EQ(plans().plan(first.id).value().version, 2u);
+  EXPECT_EQ(plans().remove(first.id, 1).error().code, Errc::conflict);
+  ASSERT_TRUE(plans().remove(first.id, 2));
+  EXPECT_EQ(plans().plan(first.id).error().code, Errc::not_found);
+  first.site = SiteId{make_uuid_v7(k_noon)};
+  EXPECT_EQ(plans().insert(first).error().code, Errc::not_found);
+}
+
+TEST_P(FlightStoreContract, KeepsTheNewestStateOfAProcedureUntilItIsForgotten) {
+  const Mission m = stored_mission();
+  ASSERT_TRUE(plans().keep_procedure(m.id, "{\"step\":1}", k_noon));
+  ASSERT_TRUE(plans().keep_procedure(m.id, "{\"step\":2}", k_noon));
+  EXPECT_THAT(plans().procedures().value(), ElementsAre(Pair(m.id, "{\"step\":2}")));
+  ASSERT_TRUE(plans().keep_procedure(m.id, "", k_noon));
+  EXPECT_TRUE(plans().procedures().value().empty());
+  EXPECT_EQ(plans().keep_procedure(MissionId{}, "{}", k_noon).error().code, Errc::not_found);
+}
+
+TEST_P(FlightStoreContract, ExcludesASpanOfTimeOfAnAnchorAndTakesItBackOnce) {
+  const Mission m = mission_with(12);
+  Exclusion e = exclusion_of(m);
+  e.selection.since = UtcTime{k_noon.ns + 20'000'000};
+  e.selection.anchor = NetworkId{0x102};  // ranges 2, 6 and 10
+  const auto made = exclusions().insert(e, {});
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_EQ(made.value().n_rows, 3u);
+  const Exclusion::Included word{UtcTime{k_noon.ns + 1}, "bob", "they were right"};
+  ASSERT_TRUE(exclusions().include(m.id, e.id, word));
+  EXPECT_EQ(exclusions().include(m.id, e.id, word).error().code, Errc::conflict);
+  EXPECT_EQ(exclusions().include(m.id, ExclusionId{}, word).error().code, Errc::not_found);
+  const auto all = exclusions().exclusions(m.id).value();
+  ASSERT_EQ(all.size(), 1u);
+  EXPECT_EQ(all[0].included->reason, "they were right");
+  EXPECT_EQ(all[0].selection.anchor, NetworkId{0x102});
+  EXPECT_FALSE(all[0].selection.tag);
+}
+
+TEST_P(FlightStoreContract, ExcludesEachRowNamedOnce) {
+  const Mission m = mission_with(4);
+  MeasurementStore::Filter filter;
+  filter.mission = m.id;
+  const auto ids = db_->stores().measurements.ranges(filter).value().ids;
+  const Exclusion e = exclusion_of(m);
+  const auto made = exclusions().insert(e, {ids[1], ids[3], ids[1]});
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_EQ(made.value().n_rows, 2u);
+  EXPECT_EQ(exclusions().exclusions(m.id).value().at(0).selection.rows, made.value().selection.rows);
+  Exclusion other = exclusion_of(m);
+  EXPECT_EQ(exclusions().insert(other, {ids[0], 999'999}).error().code, Errc::not_found);
+  EXPECT_EQ(exclusions().exclusions(m.id).value().size(), 1u);
+}
+
+TEST_P(FlightStoreContract, LabelsWhatIsGivenAndKeepsTheRest) {
+  const Mission m = mission_with(8);
+  auto& labels = db_->stores().labels;
+  EXPECT_EQ(labels.label({m.id, NetworkId{0x101}, {}, {}, {}}, {4.25, std::nullopt}).value(), 2u);
+  EXPECT_EQ(
+      labels.label({m.id, {}, NetworkId{0x6e01}, {}, UtcTime{k_noon.ns + 40'000'000}}, {{}, false}).value(),
+      4u);
+  EXPECT_EQ(labels.label({MissionId{}, {}, {}, {}, {}}, {1.0, true}).error().code, Errc::not_found);
+  MeasurementStore::Filter filter;
+  filter.mission = m.id;
+  const auto rows = db_->stores().measurements.ranges(filter).value().rows;
+  ASSERT_EQ(rows.size(), 8u);
+  EXPECT_EQ(rows[1].truth->distance_m, 4.25);
+  EXPECT_EQ(rows[1].truth->los, false);
+  EXPECT_EQ(rows[5].truth->distance_m, 4.25);
+  EXPECT_FALSE(rows[5].truth->los);
+  EXPECT_FALSE(rows[6].truth);
+}
+
+TEST_P(FlightStoreContract, FiltersRangesByDistanceLevelAndLabel) {
+  const Mission m = stored_mission();
+  std::vector<Range> rows;
+  for (int i = 0; i < 6; ++i) {
+    rows.push_back(range_at(m.id, i));
+    rows.back().distance_m = i;
+    if (i % 2 == 0) rows.back().rx_dbm = -80.0 - i;
+    if (i == 5) rows.back().rss_dbm = -70.0;
+    if (i == 3) rows.back().truth = RangeTruth{std::nullopt, true};
+  }
+  ASSERT_TRUE(db_->stores().measurements.append_ranges(rows, true));
+  const auto count = [&](const MeasurementLimits& limits) {
+    MeasurementStore::Filter filter;
+    filter.mission = m.id;
+    filter.limits = limits;
+    const auto page = db_->stores().measurements.ranges(filter);
+    EXPECT_TRUE(page) << page.error().message;
+    EXPECT_EQ(page.value().rows.size(), db_->stores().measurements.count_ranges(filter).value());
+    return page.value().rows.size();
+  };
+  using Label = MeasurementLimits::Label;
+  EXPECT_EQ(count({2.0, 4.0, {}, {}, {}}), 3u);
+  EXPECT_EQ(count({{}, {}, -82.0, {}, {}}), 3u);  // 0, 2, and by its own RSS 5
+  EXPECT_EQ(count({{}, {}, {}, -81.0, {}}), 2u);  // 2 and 4
+  EXPECT_EQ(count({{}, {}, {}, {}, Label::los}), 1u);
+  EXPECT_EQ(count({{}, {}, {}, {}, Label::nlos}), 0u);
+  EXPECT_EQ(count({{}, {}, {}, {}, Label::none}), 5u);
+}
+
+TEST_P(FlightStoreContract, KeepsWebhooksInOrderAndTheirVersions) {
+  Webhook first = stored_webhook("first");
+  const Webhook second = stored_webhook("second");
+  const auto all = webhooks().webhooks().value();
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_EQ(all[0].id, first.id);
+  EXPECT_EQ(all[0].events, first.events);
+  first.enabled = false;
+  ASSERT_TRUE(webhooks().update(first, 1));
+  EXPECT_EQ(webhooks().update(first, 1).error().code, Errc::conflict);
+  EXPECT_FALSE(webhooks().webhook(first.id).value().enabled);
+  ASSERT_TRUE(webhooks().remove(first.id));
+  EXPECT_EQ(webhooks().remove(first.id).error().code, Errc::not_found);
+  EXPECT_EQ(webhooks().update(first, 2).error().code, Errc::not_found);
+  EXPECT_EQ(webhooks().webhook(second.id).value().name, "second");
+}
+
+TEST_P(FlightStoreContract, GivesPendingDeliveriesOfEnabledWebhooksTheFirstDueFirst) {
+  const Webhook on = stored_webhook("on");
+  Webhook off = stored_webhook("off");
+  off.enabled = false;
+  ASSERT_TRUE(webhooks().update(off, 1));
+  WebhookDelivery late = delivery(on, 900);
+  const WebhookDelivery soon = delivery(on, 100);
+  Webhook gone;
+  gone.id = WebhookId{make_uuid_v7(k_noon)};
+  ASSERT_TRUE(webhooks().add({late, soon, delivery(off, 1), delivery(gone, 1)}));
+  auto pending = webhooks().pending(10).value();
+  ASSERT_EQ(pending.size(), 2u);
+  EXPECT_EQ(pending[0].id, soon.id);
+  EXPECT_FALSE(pending[0].tried);
+  late.state = DeliveryState::failed;
+  late.attempts = 3;
+  late.tried = UtcTime{k_noon.ns + 5};
+  late.status = 503;
+  late.fault = "busy";
+  ASSERT_TRUE(webhooks().record(late));
+  EXPECT_EQ(webhooks().pending(10).value().size(), 1u);
+  const auto log = webhooks().deliveries(on.id, 10, std::nullopt).value();
+  ASSERT_EQ(log.size(), 2u);
+  EXPECT_EQ(log[0].id, soon.id);
+  EXPECT_EQ(log[1].status, 503);
+  EXPECT_EQ(log[1].fault, "busy");
+  EXPECT_EQ(webhooks().deliveries(on.id, 10, soon.id).value().at(0).id, late.id);
+  ASSERT_TRUE(webhooks().remove(on.id));
+  EXPECT_TRUE(webhooks().deliveries(on.id, 10, std::nullopt).value().empty());
+}
+
+TEST_P(FlightStoreContract, ForgetsTheOldestDeliveriesOfAWebhook) {
+  const Webhook to = stored_webhook("to");
+  std::vector<WebhookDelivery> all;
+  for (std::size_t i = 0; i < WebhookStore::k_kept_deliveries + 3; ++i) all.push_back(delivery(to, 1));
+  ASSERT_TRUE(webhooks().add(all));
+  const auto kept = webhooks().deliveries(to.id, 10'000, std::nullopt).value();
+  ASSERT_EQ(kept.size(), WebhookStore::k_kept_deliveries);
+  EXPECT_EQ(kept.front().id, all.back().id);
+  EXPECT_EQ(kept.back().id, all[3].id);
+}
+
+INSTANTIATE_TEST_SUITE_P(Backends, FlightStoreContract, backends(), backend_name);
+
+}  // namespace
+}  // namespace anchord
