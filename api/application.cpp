@@ -16,8 +16,11 @@
 #include "api/anchors/geo_service.hpp"
 #include "api/anchors/published_features.hpp"
 #include "api/anchors/routes.hpp"
+#include "api/bundles/bundle_notes.hpp"
+#include "api/bundles/routes.hpp"
 #include "api/calibration/calibration_service.hpp"
 #include "api/calibration/kit_profiles.hpp"
+#include "api/calibration/revision_news.hpp"
 #include "api/calibration/routes.hpp"
 #include "api/devices/device_json.hpp"
 #include "api/devices/device_stream.hpp"
@@ -38,13 +41,19 @@
 #include "api/missions/routes.hpp"
 #include "api/mqtt/mqtt_publisher.hpp"
 #include "api/mqtt/mqtt_status.hpp"
+#include "api/omlox/omlox_conversation.hpp"
+#include "api/omlox/omlox_locations.hpp"
+#include "api/omlox/omlox_push.hpp"
+#include "api/omlox/routes.hpp"
 #include "api/places/routes.hpp"
 #include "api/planning/routes.hpp"
+#include "api/planning/site_structures.hpp"
 #include "api/stream/conversation.hpp"
 #include "api/stream/hub.hpp"
 #include "api/webhooks/routes.hpp"
 #include "api/webhooks/webhook_service.hpp"
 #include "api/wire/live_writer.hpp"
+#include "core/base/ed25519.hpp"
 #include "core/base/guard.hpp"
 #include "core/base/locked.hpp"
 #include "core/base/text.hpp"
@@ -99,8 +108,10 @@ struct Application::State {
                   .site_outline = deps.site_outline,
                   .track = deps.track,
                   .kept_priors = [this](const MissionId& id) { return priors_of_flight(id); }}),
+        structures(stores.places),
         flights({.missions = missions,
                  .plans = stores.plans,
+                 .structures = structures,
                  .hub = hub,
                  .events = events,
                  .clock = deps.clock,
@@ -135,8 +146,10 @@ struct Application::State {
                       .contradictions = contradictions}),
         training({stores.datasets, stores.training_runs, jobs, events, deps.clock, deps.run_work,
                   deps.build.version, signer}),
+        omlox_locations(hub, stores.missions),
+        omlox_push({anchor_api, stores.places, omlox_locations, deps.web_post}),
         webhooks({stores.webhooks, deps.web_post, deps.clock, [this] { return running.now_ns(); },
-                  deps.webhook_waits_s.empty() ? k_webhook_waits_s : deps.webhook_waits_s}),
+                  deps.webhook_waits_s.empty() ? k_webhook_waits_s : deps.webhook_waits_s, &omlox_push}),
         audit(stores.access, prompt, deps.clock),
         admin_api{deps.clock,
                   hub,
@@ -195,7 +208,8 @@ struct Application::State {
                      deps.clock,
                      audit,
                      [this](const PlanId& id) { return flights.flown_with(id); },
-                     [this](const Plan& plan) { flights.plan_saved(plan); }},
+                     [this](const Plan& plan) { flights.plan_saved(plan); },
+                     structures},
         flight_api{flights, mission_api, events, audit},
         publisher({hub, stores.missions, stores.sites, stores.revisions,
                    [this] {
@@ -205,7 +219,25 @@ struct Application::State {
                    steady, deps.mqtt_prefix, deps.build.version}),
         exchange_api{anchor_api, stores.missions, stores.measurements, deps.geopackage},
         webhook_api{stores.webhooks, webhooks, deps.web_post, deps.clock, audit},
-        place_api{stores.places, stores.sites, jobs, deps.run_plan_work, deps.clock, steady, audit},
+        omlox_api{anchor_api, stores.places, omlox_locations, deps.clock},
+        place_api{stores.places, stores.sites, jobs,  deps.run_plan_work,
+                  deps.clock,    steady,       audit, [this] { structures.changed(); }},
+        bundle_api{.bundles = stores.bundles,
+                   .clock = deps.clock,
+                   .audit = audit,
+                   .made_by = "anchord " + deps.build.version,
+                   .spool = deps.spool_dir,
+                   .named = [this](const Request& request) { return named_mission(mission_api, request); },
+                   .notes =
+                       [this](const Mission& mission, const Principal& who) {
+                         return bundle_notes(events, stores.access, mission, who);
+                       },
+                   .taken = [this](const MissionId& id, const std::string& text,
+                                   bool published) { announce_bundle(calibration_api, id, text, published); },
+                   .calibrations = stores.calibrations,
+                   .revisions = stores.revisions,
+                   .key = signer.key(),
+                   .ask = [this](Request& request) { return router.handle(request); }},
         learning_stores{stores.campaigns, stores.labels, stores.datasets, stores.training_runs,
                         stores.models},
         learning_api{learning_stores,
@@ -255,9 +287,12 @@ struct Application::State {
     add_ogc_routes(router, exchange_api);
     add_anchor_file_routes(router, exchange_api);
     add_webhook_routes(router, webhook_api);
+    add_omlox_routes(router, omlox_api);
     add_building_routes(router, place_api);
     add_floor_routes(router, place_api);
     add_floor_plan_routes(router, place_api);
+    add_bundle_routes(router, bundle_api);
+    add_handover_routes(router, bundle_api);
     events.on_event([this](const LiveEvent& event) { webhooks.notify(event); });
   }
 
@@ -311,6 +346,7 @@ struct Application::State {
   ModelSigner signer;
   ModelRegistry models;
   MissionService missions;
+  SiteStructures structures;
   FlightService flights;
   DeviceStream stream;
   Housekeeping housekeeping;
@@ -324,6 +360,8 @@ struct Application::State {
   KitProfiles profiles;
   CalibrationService calibrations;
   TrainingService training;
+  OmloxLocations omlox_locations;
+  OmloxPush omlox_push;  ///< reads through anchor_api, once everything is there
   WebhookService webhooks;
   Audit audit;
   AdminApi admin_api;
@@ -337,7 +375,9 @@ struct Application::State {
   MqttPublisher publisher;
   ExchangeApi exchange_api;
   WebhookApi webhook_api;
+  OmloxApi omlox_api;
   PlaceApi place_api;
+  BundleApi bundle_api;
   LearningStores learning_stores;
   LearningApi learning_api;
   Locked<bool> stopping{false};
@@ -391,6 +431,7 @@ void Application::State::calibrate_landed() {
 void Application::State::background_round() {
   (void)guarded("calibration after landing", [this] { calibrate_landed(); });
   (void)guarded("contradicted anchors", [this] { (void)contradictions.standing(); });
+  (void)guarded("flights of omlox", [this] { omlox_locations.refresh(); });
   (void)guarded("last uses of tokens", [this] { deps.access.flush(); });
   (void)guarded("scheduled backup", [this] {
     // Daily and after every flight (reliability.md section 2).
@@ -498,6 +539,13 @@ DeviceRows& Application::device_rows() { return state_->device_ingest; }
 WsHandlerFactory Application::ws_factory() {
   return [this](const Principal& who, std::function<bool()> holds) {
     return std::make_unique<Conversation>(state_->hub, who, std::move(holds));
+  };
+}
+
+TokenWsFactory Application::omlox_ws_factory() {
+  return [this](std::function<bool()> holds, TokenDoor door) {
+    return std::make_unique<OmloxConversation>(state_->hub, state_->omlox_locations, std::move(holds),
+                                               std::move(door));
   };
 }
 

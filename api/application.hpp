@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <span>
@@ -89,6 +90,8 @@ class Application {
         [](std::span<const FeatureTable>, UtcTime) -> Result<std::string> {
       return Error{Errc::unsupported, "this program writes no GeoPackage"};
     };
+    /// Where bundles are made and uploads of them wait; emptied by whoever owns it.
+    std::filesystem::path spool_dir{std::filesystem::temp_directory_path() / "anchord-spool"};
     WebPost* web_post{nullptr};              ///< null: webhooks are not served
     std::vector<double> webhook_waits_s{};   ///< from one attempt to the next; empty: those of the service
     Broker* broker{nullptr};                 ///< null: nothing is published by MQTT
@@ -104,6 +107,8 @@ class Application {
 
   Router& router();
   WsHandlerFactory ws_factory();
+  /// At /omlox/v2/ws/socket, whose clients send their token in a message.
+  TokenWsFactory omlox_ws_factory();
   Hub& hub();
   /// Where rows of this server's own devices go.
   DeviceRows& device_rows();

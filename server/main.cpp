@@ -34,6 +34,7 @@ constexpr Command k_commands[]{
     {"Find anchors", anchord::cli::add_solve_command},
     {"Find anchors", anchord::cli::add_profile_command},
     {"Find anchors", anchord::cli::add_frame_command},
+    {"Find anchors", anchord::cli::add_verify_command},
     {"Train models", anchord::cli::add_campaign_command},
     {"Train models", anchord::cli::add_dataset_command},
     {"Train models", anchord::cli::add_train_command},

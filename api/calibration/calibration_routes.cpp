@@ -12,6 +12,7 @@
 #include "api/calibration/revision_news.hpp"
 #include "api/calibration/routes.hpp"
 #include "api/formats/evidence.hpp"
+#include "api/formats/starnet.hpp"
 #include "api/kit/html_page.hpp"
 #include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
@@ -297,26 +298,53 @@ Response report(CalibrationApi& s, const Request& request) {
   return response;
 }
 
+/// The same as input of STAR*NET.
+Response starnet(CalibrationApi& s, const Calibration& calibration, const Evidence& evidence,
+                 const std::optional<NetworkId>& wanted) {
+  StarnetOptions options{s.program, {}, wanted};
+  for (const auto& estimate : calibration.anchors) {
+    if (const auto known = s.anchors.anchor(estimate.anchor))
+      options.names[estimate.anchor] = known.value().name;
+  }
+  const auto listing = starnet_listing(calibration, evidence, options);
+  if (!listing) throw_problem(422, "state", listing.error().message);
+  Response response;
+  response.body = listing.value();
+  response.header("Content-Type", "text/plain; charset=utf-8");
+  response.header("Content-Disposition",
+                  "attachment; filename=\"calibration-" + to_string(calibration.id).substr(0, 8) + ".dat\"");
+  return response;
+}
+
 /// What each range says against the answer, as kept with the calibration; ?anchor= only those to one.
 Response residuals(CalibrationApi& s, const Request& request) {
-  check_query(request, {"anchor"});
+  check_query(request, {"anchor", "format"});
+  const auto format = negotiate(request, {"json", "starnet"});
   const auto wanted = query_network_id(request, "anchor");
   const auto calibration = value_or_problem(s.calibration_store.calibration(path_id<CalibrationId>(request)));
   const auto text = value_or_problem(s.calibration_store.evidence(calibration.id));
-  const auto flights = text.empty() ? Evidence{}.flights : value_or_problem(parse_evidence(text)).flights;
+  const auto evidence = text.empty() ? Evidence{} : value_or_problem(parse_evidence(text));
+  if (format == "starnet") return starnet(s, calibration, evidence, wanted);
+  const auto& flights = evidence.flights;
   Ordered items = Ordered::array();
   const auto number = [](double value) { return std::isfinite(value) ? Ordered(value) : Ordered(nullptr); };
   for (std::size_t i = 0; i < flights.size() && i < calibration.missions.size(); ++i) {
+    const bool kept = flights[i].observations;
     for (const auto& [anchor, rows] : flights[i].residuals) {
       if (wanted && anchor != *wanted) continue;
       for (const auto& r : rows)
-        items.push_back({{"mission", to_string(calibration.missions[i])},
-                         {"network_id", to_string(anchor)},
-                         {"t_us", r.time.us()},
-                         {"distance_m", number(r.distance_m)},
-                         {"residual_m", number(r.residual_m)},
-                         {"standardised", number(r.standardised)},
-                         {"weight", number(r.weight)}});
+        items.push_back(
+            {{"mission", to_string(calibration.missions[i])},
+             {"network_id", to_string(anchor)},
+             {"t_us", r.time.us()},
+             {"distance_m", number(r.distance_m)},
+             {"corrected_m", kept ? number(r.corrected_m) : Ordered(nullptr)},
+             {"sigma_m", kept ? number(r.sigma_m) : Ordered(nullptr)},
+             {"tag_m", kept ? Ordered{number(r.tag_m.x()), number(r.tag_m.y()), number(r.tag_m.z())}
+                            : Ordered(nullptr)},
+             {"residual_m", number(r.residual_m)},
+             {"standardised", number(r.standardised)},
+             {"weight", number(r.weight)}});
     }
   }
   return json_response(200, {{"items", std::move(items)}});

@@ -139,6 +139,7 @@ struct Router::State {
   std::vector<std::vector<Pattern>> patterns;  ///< by the number of their parts
   std::unique_ptr<Idempotency> idempotency, of_commands;
   std::function<void(std::string_view, std::string_view)> fault;
+  std::vector<std::pair<std::string, std::function<void(Response&)>>> shapes;  ///< of refusals, by prefix
 };
 
 Router::Router() : state_(std::make_unique<State>()) {}
@@ -164,6 +165,15 @@ void Router::add(Route route) {
   state_->routes.push_back(std::move(route));
 }
 const std::vector<Route>& Router::routes() const { return state_->routes; }
+void Router::refusals_under(std::string prefix, std::function<void(Response&)> shape) {
+  state_->shapes.emplace_back(std::move(prefix), std::move(shape));
+}
+void Router::shape_refusal(const Request& request, Response& response) const {
+  if (response.status < 400) return;
+  for (const auto& [prefix, shape] : state_->shapes) {
+    if (request.path.starts_with(prefix)) return shape(response);
+  }
+}
 void Router::on_fault(std::function<void(std::string_view, std::string_view)> log) {
   state_->fault = std::move(log);
 }
@@ -209,6 +219,7 @@ Response Router::refuse(const Resolution& resolution, const Request& request) co
   }
   if (!resolution.allow.empty()) response.header("Allow", resolution.allow);
   complete_problem(request, response);
+  shape_refusal(request, response);
   return response;
 }
 
@@ -269,6 +280,7 @@ Response Router::dispatch(const Route& route, Request& request) const {
   }
   conditional_get(request, response);
   complete_problem(request, response);
+  shape_refusal(request, response);
   if (!request.request_id.empty()) response.header("X-Request-Id", request.request_id);
   if (!has_header(response, "Cache-Control")) {
     // A browser may keep an answer and asks each time whether it still holds; positions are not for proxies.

@@ -113,6 +113,12 @@ class Router {
   /// Drops kept answers that have expired, a slice at a time; says whether there may be more.
   bool purge_answers() const;
 
+  /// Answers of 4xx and 5xx under this prefix are given to `shape` before they leave: for an API of somebody
+  /// else whose errors are no problem documents. Set at start.
+  void refusals_under(std::string prefix, std::function<void(Response&)> shape);
+  /// Does it to an answer that was made outside of the router.
+  void shape_refusal(const Request& request, Response& response) const;
+
   /// Told about every exception that reached the door (a bug, or the ground gave way); for the log.
   void on_fault(std::function<void(std::string_view request_id, std::string_view what)> log);
 

@@ -1,37 +1,35 @@
 #include "api/learning/model_signer.hpp"
 
-#include <openssl/evp.h>
 #include <openssl/rand.h>
 
 #include <nlohmann/json.hpp>
 
-#include "core/base/sha256.hpp"
+#include "core/base/ed25519.hpp"
 #include "core/base/text.hpp"
 
 namespace anchord::api {
 namespace {
 
-constexpr std::size_t k_signature_bytes = 64, k_key_bytes = 32;
-
-std::string hex(std::span<const std::uint8_t> bytes) {
+std::string hex(std::string_view bytes) {
   std::string out;
-  for (const auto byte : bytes) {
+  for (const char c : bytes) {
+    const auto byte = static_cast<std::uint8_t>(c);
     out += "0123456789abcdef"[byte >> 4];
     out += "0123456789abcdef"[byte & 15];
   }
   return out;
 }
 
-std::optional<std::vector<std::uint8_t>> from_hex(std::string_view text) {
+std::optional<std::string> from_hex(std::string_view text) {
   if (text.size() % 2 != 0) return std::nullopt;
   const auto digit = [](char c) {
     return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
   };
-  std::vector<std::uint8_t> out;
+  std::string out;
   for (std::size_t i = 0; i < text.size(); i += 2) {
     const int high = digit(text[i]), low = digit(text[i + 1]);
     if (high < 0 || low < 0) return std::nullopt;
-    out.push_back(static_cast<std::uint8_t>(16 * high + low));
+    out += static_cast<char>(16 * high + low);
   }
   return out;
 }
@@ -52,17 +50,10 @@ std::optional<Parts> parts_of(std::string_view signature) {
                signature.substr(second + 1)};
 }
 
-using Pkey = std::unique_ptr<EVP_PKEY, decltype(&EVP_PKEY_free)>;
-using Context = std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)>;
-
-const unsigned char* bytes_of(std::string_view text) {
-  return reinterpret_cast<const unsigned char*>(text.data());
-}
-
 }  // namespace
 
 struct ModelSigner::Key {
-  Pkey pkey;
+  Ed25519Key key;
 };
 
 ModelSigner::Seed ModelSigner::random_seed() {
@@ -79,39 +70,26 @@ Result<ModelSigner::Seed> ModelSigner::parse_seed(std::string_view text) {
   Seed seed{};
   if (!bytes || bytes->size() != seed.size())
     return make_error(Errc::invalid_argument, "the key of the models is not 64 hex digits");
-  std::ranges::copy(*bytes, seed.begin());
+  std::ranges::transform(*bytes, seed.begin(), [](char c) { return static_cast<std::uint8_t>(c); });
   return seed;
 }
 
-std::string ModelSigner::to_text(const Seed& seed) { return hex(seed); }
+std::string ModelSigner::to_text(const Seed& seed) {
+  return hex(std::string_view(reinterpret_cast<const char*>(seed.data()), seed.size()));
+}
 
 ModelSigner::ModelSigner(const Seed& seed)
-    : key_(std::make_unique<Key>(
-          Key{Pkey(EVP_PKEY_new_raw_private_key(EVP_PKEY_ED25519, nullptr, seed.data(), seed.size()),
-                   &EVP_PKEY_free)})) {
-  if (!key_->pkey) throw std::runtime_error("OpenSSL cannot make an Ed25519 key");
-  std::array<std::uint8_t, k_key_bytes> open{};
-  std::size_t size = open.size();
-  if (EVP_PKEY_get_raw_public_key(key_->pkey.get(), open.data(), &size) != 1)
-    throw std::runtime_error("OpenSSL gives no public key");
-  Sha256 sum;
-  sum.add(std::string_view(reinterpret_cast<const char*>(open.data()), open.size()));
-  key_id_ = sum.hex().substr(0, 16);
-}
+    : key_(std::make_unique<Key>(Key{Ed25519Key(seed)})), key_id_(key_->key.open_half().id()) {}
 
 ModelSigner::~ModelSigner() = default;
 ModelSigner::ModelSigner(ModelSigner&&) noexcept = default;
 
 std::string ModelSigner::sign(ModelStanding purpose, std::string_view artifact) const {
-  const std::string text = message(to_string(purpose), artifact);
-  const Context context(EVP_MD_CTX_new(), &EVP_MD_CTX_free);
-  std::array<std::uint8_t, k_signature_bytes> value{};
-  std::size_t size = value.size();
-  if (EVP_DigestSignInit(context.get(), nullptr, nullptr, nullptr, key_->pkey.get()) != 1 ||
-      EVP_DigestSign(context.get(), value.data(), &size, bytes_of(text), text.size()) != 1)
-    throw std::runtime_error("OpenSSL cannot sign a model");
-  return std::string(to_string(purpose)) + ':' + key_id_ + ':' + hex(value);
+  return std::string(to_string(purpose)) + ':' + key_id_ + ':' +
+         hex(key_->key.sign(message(to_string(purpose), artifact)));
 }
+
+const Ed25519Key& ModelSigner::key() const { return key_->key; }
 
 ModelStanding ModelSigner::standing(std::string_view artifact, std::string_view signature) const {
   const auto parts = parts_of(signature);
@@ -119,13 +97,8 @@ ModelStanding ModelSigner::standing(std::string_view artifact, std::string_view 
   const bool made = parts->purpose == to_string(ModelStanding::made);
   if (!made && parts->purpose != to_string(ModelStanding::vouched)) return ModelStanding::changed;
   const auto value = from_hex(parts->value);
-  if (!value || value->size() != k_signature_bytes) return ModelStanding::changed;
-  const std::string text = message(parts->purpose, artifact);
-  const Context context(EVP_MD_CTX_new(), &EVP_MD_CTX_free);
-  const bool good =
-      EVP_DigestVerifyInit(context.get(), nullptr, nullptr, nullptr, key_->pkey.get()) == 1 &&
-      EVP_DigestVerify(context.get(), value->data(), value->size(), bytes_of(text), text.size()) == 1;
-  if (!good) return ModelStanding::changed;
+  if (!value || !key_->key.open_half().verifies(message(parts->purpose, artifact), *value))
+    return ModelStanding::changed;
   return made ? ModelStanding::made : ModelStanding::vouched;
 }
 

@@ -10,6 +10,10 @@
 #include "core/base/result.hpp"
 #include "core/ports/learning_store.hpp"
 
+namespace anchord {
+class Ed25519Key;
+}
+
 namespace anchord::api {
 
 /// What this server can say of a stored artifact.
@@ -42,6 +46,8 @@ class ModelSigner {
 
   /// Of the public key: the first 16 hex digits of its SHA-256.
   const std::string& key_id() const { return key_id_; }
+  /// The server's key itself. What it signs elsewhere must not begin with "anchord-model-".
+  const Ed25519Key& key() const;
   std::string sign(ModelStanding purpose, std::string_view artifact) const;
   /// foreign without a signature, or with one of another key.
   ModelStanding standing(std::string_view artifact, std::string_view signature) const;

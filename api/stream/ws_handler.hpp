@@ -32,4 +32,10 @@ class WsHandler {
 using WsHandlerFactory =
     std::function<std::unique_ptr<WsHandler>(const Principal&, std::function<bool()> holds)>;
 
+/// Lets in by a token that came in a message: whether that login still stands, as `holds` above. Empty: the
+/// token is not known, or may not listen.
+using TokenDoor = std::function<std::function<bool()>(std::string_view token)>;
+/// Of a protocol whose clients send their token in a message: nobody has come in yet where `holds` is empty.
+using TokenWsFactory = std::function<std::unique_ptr<WsHandler>(std::function<bool()> holds, TokenDoor door)>;
+
 }  // namespace anchord::api

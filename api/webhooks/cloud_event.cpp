@@ -18,6 +18,11 @@ constexpr std::string_view k_prefix = "whsec_";
 
 }  // namespace
 
+bool may_ask_for(WebhookKind kind, std::string_view event) {
+  if (kind == WebhookKind::omlox_hub) return event == "revision.published" || event == k_location_event;
+  return event != k_location_event;
+}
+
 std::string cloud_event(const LiveEvent& event) {
   nlohmann::ordered_json out{{"specversion", "1.0"},
                              {"id", to_string(event.id)},

@@ -5,13 +5,20 @@
 #include <string>
 #include <string_view>
 
+#include "core/types/webhook.hpp"
+
 namespace anchord::api {
 
 struct LiveEvent;
 
-/// Codes of the event log that webhooks may ask for.
-inline constexpr std::array<std::string_view, 5> k_webhook_events{
-    "revision.published", "anchor.contradicted", "alarm.raised", "alarm.cleared", "mission.finished"};
+/// What an omlox hub is sent beside revisions: where the tag is now.
+inline constexpr std::string_view k_location_event = "location.updated";
+/// Codes of the event log that webhooks may ask for, and what only hubs may.
+inline constexpr std::array<std::string_view, 6> k_webhook_events{"revision.published", "anchor.contradicted",
+                                                                  "alarm.raised",       "alarm.cleared",
+                                                                  "mission.finished",   k_location_event};
+/// Whether a receiver of this kind may ask for it.
+bool may_ask_for(WebhookKind kind, std::string_view event);
 /// What POST /webhooks/{id}/test sends, asked for or not.
 inline constexpr std::string_view k_test_event = "webhook.test";
 

@@ -18,13 +18,28 @@ using Ordered = nlohmann::ordered_json;
 namespace {
 
 constexpr std::size_t k_most_webhooks = 20;
+constexpr std::size_t k_most_token = 4096;  ///< of a hub, often a JWT
 
 std::string etag(const Webhook& webhook) { return "\"h-" + std::to_string(webhook.version) + '"'; }
 
-/// Never with its secret, which is shown once.
-Ordered webhook_json(const Webhook& w) {
-  return {{"id", to_string(w.id)}, {"name", w.name},       {"url", w.url},
-          {"events", w.events},    {"enabled", w.enabled}, {"created_at", to_rfc3339(w.created)}};
+Ordered live_json(const std::optional<HubLive>& live) {
+  if (!live) return nullptr;
+  return {{"taken", live->taken},
+          {"tried_at", to_rfc3339(live->tried)},
+          {"status", or_null(live->status)},
+          {"fault", text_or_null(live->fault)}};
+}
+
+/// Never with its secret, which is shown once, nor with the token of a hub.
+Ordered webhook_json(const WebhookApi& s, const Webhook& w) {
+  const bool hub = w.kind == WebhookKind::omlox_hub;
+  Ordered out{{"id", to_string(w.id)}, {"name", w.name},       {"url", w.url},
+              {"events", w.events},    {"enabled", w.enabled}, {"created_at", to_rfc3339(w.created)}};
+  out["kind"] = k_webhook_kind_words.word(w.kind);
+  out["dialect"] = hub ? Ordered(k_dialect_words.word(w.dialect)) : Ordered(nullptr);
+  out["token_set"] = !w.token.empty();
+  out["live"] = hub ? live_json(s.service.live(w.id)) : Ordered(nullptr);
+  return out;
 }
 
 Ordered delivery_json(const WebhookDelivery& d) {
@@ -38,17 +53,25 @@ Ordered delivery_json(const WebhookDelivery& d) {
           {"fault", text_or_null(d.fault)}};
 }
 
+std::vector<std::string> all_events(WebhookKind kind) {
+  std::vector<std::string> out;
+  for (const auto one : k_webhook_events) {
+    if (may_ask_for(kind, one)) out.emplace_back(one);
+  }
+  return out;
+}
+
 void read_events(Fields& fields, Webhook& webhook, std::vector<FieldError>& errors) {
   const Json* list = fields.child("events");
   if (list == nullptr) return;
+  const auto may = all_events(webhook.kind);
   webhook.events.clear();
-  const auto known = [](const Json& one) {
-    return one.is_string() &&
-           std::ranges::find(k_webhook_events, one.get_ref<const std::string&>()) != k_webhook_events.end();
+  const auto known = [&may](const Json& one) {
+    return one.is_string() && std::ranges::find(may, one.get_ref<const std::string&>()) != may.end();
   };
   if (!list->is_array() || list->empty() || !std::all_of(list->begin(), list->end(), known)) {
     std::string all;
-    for (const auto one : k_webhook_events) all += (all.empty() ? "" : ", ") + std::string(one);
+    for (const auto& one : may) all += (all.empty() ? "" : ", ") + one;
     errors.push_back({"/events", "unknown_value", "must be a list of " + all});
     return;
   }
@@ -59,10 +82,33 @@ void read_events(Fields& fields, Webhook& webhook, std::vector<FieldError>& erro
   }
 }
 
+/// What only hubs have.
+void read_hub(Fields& fields, Webhook& webhook, std::vector<FieldError>& errors) {
+  const auto dialect = fields.word("dialect", k_dialect_words);
+  const auto token = fields.text("token", k_most_token);
+  if (webhook.kind != WebhookKind::omlox_hub) {
+    for (const char* key : {"dialect", "token"}) {
+      if (fields.has(key))
+        errors.push_back({fields.pointer(key), "not_applicable", "only with kind omlox_hub"});
+    }
+    return;
+  }
+  if (dialect) webhook.dialect = *dialect;
+  if (!token) return;
+  webhook.token = *token;
+  // It becomes a header.
+  if (!std::ranges::all_of(*token, [](char c) { return c > ' ' && c < 0x7f; }))
+    errors.push_back({"/token", "bad_value", "must be printable ASCII without blanks"});
+}
+
 /// Fields of a body over what there is; `made`: name and url must be there.
 void read(WebhookApi& s, const Json& body, Webhook& webhook, bool made) {
   std::vector<FieldError> errors;
   Fields fields(body, "", errors);
+  if (made) {
+    webhook.kind = fields.word("kind", k_webhook_kind_words).value_or(WebhookKind::cloud_event);
+    webhook.events = all_events(webhook.kind);
+  }
   if (const auto name = fields.text("name", 100, made)) webhook.name = *name;
   if (const auto url = fields.text("url", 500, made)) {
     webhook.url = *url;
@@ -70,15 +116,18 @@ void read(WebhookApi& s, const Json& body, Webhook& webhook, bool made) {
       if (const auto fit = s.post->check(*url); !fit)
         errors.push_back({"/url", "bad_value", fit.error().message});
     }
+    if (webhook.kind == WebhookKind::omlox_hub && url->find('?') != std::string::npos)
+      errors.push_back({"/url", "bad_value", "must be the root of the hub's API, like https://host/v2"});
   }
   if (const auto enabled = fields.boolean("enabled")) webhook.enabled = *enabled;
   read_events(fields, webhook, errors);
+  read_hub(fields, webhook, errors);
   fields.finish();
   refuse_if_any(errors);
 }
 
-Response answer(int status, const Webhook& webhook) {
-  Response response = json_response(status, webhook_json(webhook));
+Response answer(WebhookApi& s, int status, const Webhook& webhook) {
+  Response response = json_response(status, webhook_json(s, webhook));
   response.header("ETag", etag(webhook));
   return response;
 }
@@ -93,17 +142,16 @@ Response create(WebhookApi& s, const Request& request) {
   Webhook webhook;
   webhook.id.uuid = make_uuid_v7(s.clock.now());
   webhook.created = s.clock.now();
-  webhook.events.assign(k_webhook_events.begin(), k_webhook_events.end());
   read(s, json_body(request), webhook, true);
   if (value_or_problem(s.store.webhooks()).size() >= k_most_webhooks)
     throw_problem(409, "conflict",
                   "there are " + std::to_string(k_most_webhooks) + " webhooks: delete one first");
-  webhook.secret = make_webhook_secret();
+  if (webhook.kind == WebhookKind::cloud_event) webhook.secret = make_webhook_secret();
   value_or_problem(s.store.insert(webhook));
   s.service.changed();
   s.audit(request, "webhook.create " + to_string(webhook.id) + ' ' + webhook.url);
-  Ordered body = webhook_json(webhook);
-  body["secret"] = webhook.secret;
+  Ordered body = webhook_json(s, webhook);
+  body["secret"] = text_or_null(webhook.secret);
   Response response = json_response(201, body);
   response.header("ETag", etag(webhook)).header("Location", "/api/v1/webhooks/" + to_string(webhook.id));
   return response;
@@ -117,7 +165,7 @@ Response patch(WebhookApi& s, const Request& request) {
   value_or_problem(s.store.update(webhook, webhook.version));
   s.service.changed();
   s.audit(request, "webhook.change " + to_string(webhook.id) + ' ' + webhook.url);
-  return answer(200, path_webhook(s, request));
+  return answer(s, 200, path_webhook(s, request));
 }
 
 Response remove(WebhookApi& s, const Request& request) {
@@ -165,13 +213,13 @@ void add_webhook_routes(Router& router, WebhookApi& s) {
                 check_query(request, {});
                 Ordered items = Ordered::array();
                 for (const auto& webhook : value_or_problem(s.store.webhooks()))
-                  items.push_back(webhook_json(webhook));
+                  items.push_back(webhook_json(s, webhook));
                 return list_response(request, std::move(items), "");
               }});
   router.add(keeps_nothing({Method::post, "/api/v1/webhooks", access, on(create)}));
   router.add({Method::get, one, access, [&s](const Request& request) {
                 check_query(request, {});
-                return answer(200, path_webhook(s, request));
+                return answer(s, 200, path_webhook(s, request));
               }});
   router.add({Method::patch, one, access, on(patch), 1 << 20, false, true});
   router.add({Method::del, one, access, on(remove), 1 << 20, false, true});

@@ -14,6 +14,8 @@ constexpr std::size_t k_most_fresh = 1000;
 constexpr std::int64_t k_second_ns = 1'000'000'000;
 constexpr std::int64_t k_store_pause_ns = 5 * k_second_ns;  ///< where the database takes nothing
 constexpr std::int64_t k_idle_ns = 3600 * k_second_ns;
+constexpr std::int64_t k_live_ns = k_second_ns;  ///< from one live location to the next
+constexpr int k_most_doublings = 6;              ///< of that, while a hub takes none: 64 s
 
 }  // namespace
 
@@ -48,6 +50,7 @@ void WebhookService::stop() {
   if (deps_.post != nullptr) deps_.post->stop();
   wake_.notify_all();
   if (thread_.joinable()) thread_.join();
+  (void)guarded("locations that were not sent", [this] { keep_unsent(); });
   std::vector<WebhookDelivery> left;
   {
     auto state = state_.lock();
@@ -109,10 +112,11 @@ void WebhookService::run() {
   while (!ended()) {
     std::int64_t wait_ns = k_store_pause_ns;
     (void)guarded("webhooks", [&] { wait_ns = round(); });
+    const bool paused = wait_ns == k_store_pause_ns;
+    (void)guarded("locations to hubs", [&] { wait_ns = std::min(wait_ns, live_round()); });
     auto state = state_.lock();
-    state.wait_for(wake_, std::chrono::nanoseconds(wait_ns), [&](const State& s) {
-      return s.stopped || s.look || (!s.fresh.empty() && wait_ns != k_store_pause_ns);
-    });
+    state.wait_for(wake_, std::chrono::nanoseconds(wait_ns),
+                   [&](const State& s) { return s.stopped || s.look || (!s.fresh.empty() && !paused); });
   }
 }
 
@@ -144,8 +148,8 @@ std::int64_t WebhookService::round() {
   return pending.value().empty() ? k_idle_ns : 0;
 }
 
-void WebhookService::attempt(const Webhook& webhook, WebhookDelivery one) {
-  const UtcTime now = deps_.clock.now();
+WebhookService::Tried WebhookService::send_event(const Webhook& webhook, const WebhookDelivery& one,
+                                                 UtcTime now) {
   const std::int64_t seconds = now.us() / 1'000'000;
   const std::string id = to_string(one.id);
   const auto answer = deps_.post->post(
@@ -156,26 +160,144 @@ void WebhookService::attempt(const Webhook& webhook, WebhookDelivery one) {
         {"webhook-timestamp", std::to_string(seconds)},
         {"webhook-signature", webhook_signature(webhook.secret, id, seconds, one.body.text)}},
        one.body.text});
-  if (!answer && answer.error().code == Errc::canceled) return;  // not tried: it is due after the next start
+  if (!answer)
+    return {std::nullopt, to_utf8(answer.error().message, 300), answer.error().code == Errc::canceled};
+  if (answer.value() / 100 == 2) return {answer.value(), "", false};
+  return {answer.value(),
+          "answered " + std::to_string(answer.value()) +
+              (answer.value() / 100 == 3 ? "; redirects are not followed" : ""),
+          false};
+}
+
+WebhookService::Tried WebhookService::tried(const Result<HubSender::Sent>& sent) {
+  if (!sent) return {std::nullopt, to_utf8(sent.error().message, 300), sent.error().code == Errc::canceled};
+  return {sent.value().status, to_utf8(sent.value().fault, 300), false};
+}
+
+/// What is published, or where the tag is, is read when it is sent: a hub that was away gets what holds now.
+WebhookService::Tried WebhookService::send_to_hub(const Webhook& hub, const WebhookDelivery& one) {
+  if (deps_.hubs == nullptr) return {std::nullopt, "this server sends to no hub", false};
+  if (one.event != k_location_event) return tried(deps_.hubs->send_zones(hub));
+  auto body = deps_.hubs->newest_locations();
+  if (body.empty()) body = one.body.text;  // of before a restart
+  auto result = tried(deps_.hubs->send_locations(hub, body));
+  if (result.fault.empty()) hubs_[hub.id] = {body, "", 0, 0, hub.version};
+  return result;
+}
+
+void WebhookService::attempt(const Webhook& webhook, WebhookDelivery one) {
+  const UtcTime now = deps_.clock.now();
+  const bool hub = webhook.kind == WebhookKind::omlox_hub;
+  auto result = hub ? send_to_hub(webhook, one) : send_event(webhook, one, now);
+  if (result.canceled) return;  // not tried: it is due after the next start
   ++one.attempts;
   one.tried = now;
-  one.status = answer ? std::optional(answer.value()) : std::nullopt;
-  one.fault.clear();
-  if (answer && answer.value() / 100 == 2) {
+  one.status = result.status;
+  one.fault = std::move(result.fault);
+  if (one.fault.empty()) {
     one.state = DeliveryState::delivered;
   } else {
-    one.fault = answer ? "answered " + std::to_string(answer.value()) +
-                             (answer.value() / 100 == 3 ? "; redirects are not followed" : "")
-                       : to_utf8(answer.error().message, 300);
     const auto done = static_cast<std::size_t>(one.attempts);
     // 410: the receiver wants no more of it (Standard Webhooks).
-    if (done > deps_.waits_s.size() || (answer && answer.value() == 410))
+    if (done > deps_.waits_s.size() || (!hub && one.status == 410))
       one.state = DeliveryState::failed;
     else
       one.due_ran_ns = deps_.running_ns() + static_cast<std::int64_t>(deps_.waits_s[done - 1] * 1e9);
   }
   // Where the database takes it not, it is sent again: at least once.
   (void)deps_.store.record(one).has_value();
+}
+
+std::vector<Webhook> WebhookService::live_hubs() const {
+  std::vector<Webhook> out;
+  const auto state = state_.lock();
+  for (const auto& one : state->enabled) {
+    if (one.kind == WebhookKind::omlox_hub &&
+        std::ranges::find(one.events, k_location_event) != one.events.end())
+      out.push_back(one);
+  }
+  return out;
+}
+
+std::int64_t WebhookService::live_round() {
+  if (deps_.hubs == nullptr) return k_idle_ns;
+  const auto hubs = live_hubs();
+  std::erase_if(hubs_, [&](const auto& known) {
+    return std::ranges::find(hubs, known.first, &Webhook::id) == hubs.end();
+  });
+  if (hubs.empty()) return k_idle_ns;
+  const auto body = deps_.hubs->newest_locations();
+  std::int64_t wait_ns = k_live_ns;
+  for (const auto& hub : hubs) {
+    auto& known = hubs_[hub.id];
+    if (known.version != hub.version) known = {"", "", 0, 0, hub.version};  // perhaps another address
+    if (body.empty() || body == known.sent) continue;
+    const auto now_ns = deps_.running_ns();
+    if (known.due_ns > now_ns) {
+      wait_ns = std::min(wait_ns, known.due_ns - now_ns);
+      continue;
+    }
+    if (stopped()) break;
+    send_live(hub, known, body);
+  }
+  return wait_ns;
+}
+
+void WebhookService::send_live(const Webhook& hub, Hub& known, const std::string& body) {
+  auto result = tried(deps_.hubs->send_locations(hub, body));
+  if (result.canceled) return;
+  {
+    auto state = state_.lock();
+    auto& live = state->live[hub.id];
+    if (result.fault.empty()) ++live.taken;
+    live.tried = deps_.clock.now();
+    live.status = result.status;
+    live.fault = result.fault;
+  }
+  if (result.fault.empty()) {
+    known.sent = body;
+    known.failures = 0;
+    return;
+  }
+  if (known.failures == 0) keep(hub, known, body, result);
+  known.failures = std::min(known.failures + 1, k_most_doublings);
+  known.due_ns = deps_.running_ns() + (k_live_ns << known.failures);
+}
+
+void WebhookService::keep(const Webhook& hub, Hub& known, const std::string& body, const Tried& why) {
+  WebhookDelivery one;
+  one.created = deps_.clock.now();
+  one.id.uuid = make_uuid_v7(one.created);
+  one.webhook = hub.id;
+  one.event = std::string(k_location_event);
+  one.body = {body};
+  one.attempts = 1;
+  one.tried = one.created;
+  one.status = why.status;
+  one.fault = why.fault;
+  const double wait_s = deps_.waits_s.empty() ? 0 : deps_.waits_s.front();
+  one.due_ran_ns = deps_.running_ns() + static_cast<std::int64_t>(wait_s * 1e9);
+  if (!deps_.store.add({one})) return;  // the next failure in a row is not kept; the newest is, at the stop
+  (void)deps_.store.record(one).has_value();
+  known.kept = body;
+}
+
+/// The newest goes behind what was kept of it at the first failure, and so holds in the end.
+void WebhookService::keep_unsent() {
+  if (deps_.hubs == nullptr) return;
+  const auto body = deps_.hubs->newest_locations();
+  for (const auto& hub : live_hubs()) {
+    auto& known = hubs_[hub.id];
+    if (body.empty() || body == known.sent || body == known.kept) continue;
+    keep(hub, known, body, {std::nullopt, "the server stopped before it was sent", false});
+  }
+}
+
+std::optional<HubLive> WebhookService::live(const WebhookId& hub) const {
+  const auto state = state_.lock();
+  const auto at = state->live.find(hub);
+  if (at == state->live.end()) return std::nullopt;
+  return at->second;
 }
 
 }  // namespace anchord::api

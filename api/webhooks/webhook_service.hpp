@@ -4,7 +4,9 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +27,30 @@ namespace anchord::api {
 /// nothing is due.
 inline const std::vector<double> k_webhook_waits_s{30, 600, 7200, 72000};
 
+/// Speaks to omlox hubs (api/omlox). Blocks; one thread at a time.
+class HubSender {
+ public:
+  struct Sent {
+    int status{};       ///< of the last answer
+    std::string fault;  ///< empty: the hub took everything
+  };
+  virtual ~HubSender() = default;
+  /// Everything that is published, made or changed there. Errors: those of WebPost.
+  virtual Result<Sent> send_zones(const Webhook& hub) = 0;
+  /// `body`: what newest_locations() once gave.
+  virtual Result<Sent> send_locations(const Webhook& hub, const std::string& body) = 0;
+  /// Of each provider, as a JSON array; empty: there is none.
+  virtual std::string newest_locations() = 0;
+};
+
+/// How the newest live locations went to a hub.
+struct HubLive {
+  std::uint64_t taken{0};  ///< since the server started
+  UtcTime tried{};
+  std::optional<int> status{};
+  std::string fault;  ///< why the newest attempt failed; empty: it did not
+};
+
 /// Sends events to the webhooks that asked for them: at least once, in order of their time where nothing
 /// fails. An event waits in memory for the moment its row takes to be written; from then on it survives the
 /// process. The thread is there while there is an enabled webhook. Thread-safe.
@@ -36,6 +62,7 @@ class WebhookService {
     const Clock& clock;
     std::function<std::int64_t()> running_ns;
     std::vector<double> waits_s{k_webhook_waits_s};
+    HubSender* hubs{nullptr};  ///< null: there are no omlox hubs
   };
   explicit WebhookService(Deps deps) : deps_(std::move(deps)) {}
   ~WebhookService() { stop(); }
@@ -49,6 +76,8 @@ class WebhookService {
   void notify(const LiveEvent& event);
   /// Puts one test event into the outbox, for this webhook alone.
   Result<WebhookDelivery> test(const Webhook& webhook);
+  /// Nothing where no live location was sent yet.
+  std::optional<HubLive> live(const WebhookId& hub) const;
   /// Events that found the queue to the outbox full.
   std::uint64_t dropped() const {
     const auto state = state_.lock();
@@ -63,12 +92,36 @@ class WebhookService {
     bool running{false};                ///< the thread
     bool stopped{false};                ///< for good
     std::uint64_t dropped{0};
+    std::map<WebhookId, HubLive> live;
+  };
+  /// What became of one attempt.
+  struct Tried {
+    std::optional<int> status;
+    std::string fault;  ///< empty: it was taken
+    bool canceled{false};
+  };
+  /// Of one hub, what the thread knows.
+  struct Hub {
+    std::string sent, kept;  ///< locations that it took; that wait in the outbox
+    std::int64_t due_ns{0};
+    int failures{0};           ///< in a row
+    std::uint64_t version{0};  ///< of the webhook
   };
   WebhookDelivery delivery(const Webhook& webhook, const LiveEvent& event) const;
   void run();
   /// Moves fresh ones to the outbox, makes what is due; nanoseconds until there is something to do.
   std::int64_t round();
   void attempt(const Webhook& webhook, WebhookDelivery delivery);
+  Tried send_event(const Webhook& webhook, const WebhookDelivery& delivery, UtcTime now);
+  Tried send_to_hub(const Webhook& hub, const WebhookDelivery& delivery);
+  static Tried tried(const Result<HubSender::Sent>& sent);
+  /// Sends hubs the newest locations, once a second while they change; nanoseconds until the next.
+  std::int64_t live_round();
+  void send_live(const Webhook& hub, Hub& known, const std::string& body);
+  /// Into the outbox, so that what a hub could not take outlives the process.
+  void keep(const Webhook& hub, Hub& known, const std::string& body, const Tried& why);
+  void keep_unsent();
+  std::vector<Webhook> live_hubs() const;
   bool stopped() const {
     const auto state = state_.lock();
     return state->stopped;
@@ -77,6 +130,7 @@ class WebhookService {
   bool ended();
 
   Deps deps_;
+  std::map<WebhookId, Hub> hubs_;  ///< touched by the thread alone
   mutable Locked<State> state_;
   std::condition_variable wake_;
   std::mutex starting_;  ///< the thread is begun or joined

@@ -277,6 +277,17 @@ Result<void> App::State::open_broker() {
   return boost::outcome_v2::success();
 }
 
+namespace {
+
+/// Where bundles are made and uploads wait, without what requests left that a stop cut off.
+fs::path emptied_spool(const fs::path& data_dir) {
+  std::error_code none;
+  fs::remove_all(data_dir / "spool", none);
+  return data_dir / "spool";
+}
+
+}  // namespace
+
 void App::State::compose() {
   pool =
       std::make_unique<WorkerPool>("anchord-work", config.count("http.workers"), config.count("http.queue"));
@@ -334,12 +345,12 @@ void App::State::compose() {
     return out;
   };
   deps.geopackage = geopackage;
+  deps.spool_dir = emptied_spool(data_dir);
   web_post = make_web_post(config.flag("webhooks.allow_private"));
   deps.web_post = web_post.get();
   deps.broker = broker.get();
   deps.mqtt_prefix = config.text("mqtt.prefix");
-  deps.run_work = work_in_process();
-  deps.run_plan_work = deps.run_work;
+  deps.run_plan_work = deps.run_work = work_in_process();
   deps.model_key_is_new = model_key.fresh;
   deps.keep_deleted_ns =
       static_cast<std::int64_t>(config.count("missions.keep_deleted_days")) * 86'400 * 1'000'000'000;
@@ -354,8 +365,8 @@ void App::State::compose() {
   options.places = {config.count("ws.max_connections"), config.count("ws.per_token"),
                     config.count("ws.reserved")};
   options.proxies = proxies;
-  door = std::make_unique<Authenticator>(application->router(), application->ws_factory(), *access, *metrics,
-                                         options);
+  door = std::make_unique<Authenticator>(application->router(), application->ws_factory(),
+                                         application->omlox_ws_factory(), *access, *metrics, options);
 }
 
 App::App(std::unique_ptr<State> state) : state_(std::move(state)) {}

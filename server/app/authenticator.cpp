@@ -15,7 +15,12 @@ namespace anchord::server {
 namespace {
 
 constexpr std::string_view k_live_path = "/api/v1/ws";
+constexpr std::string_view k_omlox_path = "/omlox/v2/ws/socket";
+/// Connections that have ten seconds for their token: of all, and of one address.
+constexpr WsPlaceLimits k_strangers{8, 4, 0};
 constexpr std::string_view k_subprotocol = "anchord.v1";
+/// In the audit log.
+constexpr std::string_view k_unknown_token = "a token that is not known, expired or revoked";
 
 bool unsafe(api::Method method) {
   return method != api::Method::get && method != api::Method::head && method != api::Method::options;
@@ -62,15 +67,17 @@ std::string credential(std::string_view authorization) {
 
 }  // namespace
 
-Authenticator::Authenticator(const api::Router& router, api::WsHandlerFactory live,
+Authenticator::Authenticator(const api::Router& router, api::WsHandlerFactory live, api::TokenWsFactory omlox,
                              api::AccessService& access, Metrics& metrics, AuthenticatorOptions options)
     : router_(router),
       live_(std::move(live)),
+      omlox_(std::move(omlox)),
       access_(access),
       metrics_(metrics),
       options_(std::move(options)),
       rate_(options_.rate_per_s, options_.rate_burst),
-      places_(options_.places) {}
+      places_(options_.places),
+      strangers_(k_strangers) {}
 
 /// Whoever guesses is told to wait; whoever has the right secret never comes here.
 api::Response Authenticator::wrong_secret(const api::Request& request, std::string_view secret,
@@ -99,7 +106,7 @@ std::optional<api::Response> Authenticator::identify(api::Request& request, bool
     const std::string secret = credential(authorization);
     const auto who = access_.verify(secret);
     if (!who) {
-      access_.note_refusal("nobody", "a token that is not known, expired or revoked", request.remote);
+      access_.note_refusal("nobody", k_unknown_token, request.remote);
       return wrong_secret(request, secret, "the token is not known, expired or revoked");
     }
     request.principal = *who;
@@ -148,21 +155,34 @@ std::optional<api::Response> Authenticator::limit(const api::Request& request, c
   return response;
 }
 
+namespace {
+
+bool may_watch(const api::Principal& who) {
+  using enum api::Role;
+  return api::Access::any_of({viewer, integrator, engineer, op}).permits(who);
+}
+
+/// To a plain GET of a WebSocket's address.
+api::Response upgrade_needed(const char* type, const char* detail) {
+  auto response = api::problem(426, type, detail);
+  response.header("Upgrade", "websocket").header("Sec-WebSocket-Version", "13");
+  return response;
+}
+
+}  // namespace
+
 Admission Authenticator::live(api::Request& request, bool websocket, api::Login login) {
   const std::string route(k_live_path);
-  using enum api::Role;
   if (request.principal.roles.empty()) {
     return refused(problem(401, "unauthorized", "send a token, a session cookie or ?ticket="), route);
   }
-  if (!api::Access::any_of({viewer, integrator, engineer, op}).permits(request.principal)) {
+  if (!may_watch(request.principal)) {
     access_.note_refusal(request.principal.token_id, "GET " + route, request.remote);
     return refused(problem(403, "forbidden", "live data needs the role viewer"), route);
   }
-  if (!websocket) {
-    auto response = problem(426, "malformed", "this address speaks WebSocket, subprotocol anchord.v1");
-    response.header("Upgrade", "websocket").header("Sec-WebSocket-Version", "13");
-    return refused(std::move(response), route);
-  }
+  if (!websocket)
+    return refused(upgrade_needed("malformed", "this address speaks WebSocket, subprotocol anchord.v1"),
+                   route);
   Admission admission;
   admission.route = route;
   if (const auto offered = request.header("sec-websocket-protocol"); !offered.empty()) {
@@ -181,6 +201,66 @@ Admission Authenticator::live(api::Request& request, bool websocket, api::Login 
   admission.websocket = [this, who = request.principal, login = std::move(login),
                          held = std::get<std::shared_ptr<void>>(std::move(place))] {
     return make_live_peer(live_(who, [this, login] { return access_.holds(login); }), held);
+  };
+  return admission;
+}
+
+std::function<bool()> Authenticator::standing(const api::Login& login, std::shared_ptr<void> place) {
+  return [this, login, place = std::move(place)] { return access_.holds(login); };
+}
+
+/// By a token that came in a message; empty: it is not let in.
+std::function<bool()> Authenticator::let_in(const api::Request& request, std::string_view token) {
+  if (access_.options().auth_off) return [] { return true; };
+  const auto who = access_.verify(token);
+  if (!who) {
+    access_.note_refusal("nobody", k_unknown_token, request.remote);
+    (void)access_.guard().failed(token, request.remote, api::LoginGuard::Clock::now());
+    return {};
+  }
+  if (!may_watch(*who)) {
+    access_.note_refusal(who->token_id, "GET " + std::string(k_omlox_path), request.remote);
+    return {};
+  }
+  auto place = places_.take(*who, true);
+  if (std::holds_alternative<WsPlaces::Refusal>(place)) return {};
+  return standing({*who, {}}, std::get<std::shared_ptr<void>>(std::move(place)));
+}
+
+/// Its clients send no header: the connection is made, and the token comes in a message.
+Admission Authenticator::live_omlox(const api::Request& request, bool websocket, const api::Login& login) {
+  const std::string route(k_omlox_path);
+  const api::Principal& who = request.principal;
+  if (!websocket && who.roles.empty())
+    return refused(problem(401, "unauthorized", "send a token as Authorization: Bearer"), route);
+  if (!who.roles.empty() && !may_watch(who)) {
+    access_.note_refusal(who.token_id, "GET " + route, request.remote);
+    return refused(problem(403, "forbidden", "live data needs the role viewer"), route);
+  }
+  if (!websocket) return refused(upgrade_needed("method", "this is a WebSocket: ask for an upgrade"), route);
+  Admission admission;
+  admission.route = route;
+  const bool stranger = who.roles.empty();
+  const api::Principal unknown{"address " + request.remote, "", {}};
+  auto place = stranger ? strangers_.take(unknown, true) : places_.take(who, !access_.options().auth_off);
+  if (const auto* no = std::get_if<WsPlaces::Refusal>(&place)) {
+    admission.websocket = [why = *no] { return make_refusing_peer(why.first, why.second); };
+    return admission;
+  }
+  // A stranger gives its place back once its token let it in, and then holds one as everybody does.
+  const auto first =
+      std::make_shared<std::shared_ptr<void>>(std::get<std::shared_ptr<void>>(std::move(place)));
+  api::Request from;
+  from.remote = request.remote;
+  auto door = [this, first, from](std::string_view token) {
+    auto holds = let_in(from, token);
+    if (holds && !access_.options().auth_off) first->reset();
+    return holds;
+  };
+  std::function<bool()> holds;
+  if (!stranger) holds = standing(login.who.token_id.empty() ? api::Login{who, {}} : login, *first);
+  admission.websocket = [this, door = std::move(door), holds = std::move(holds)] {
+    return make_live_peer(omlox_(holds, door), nullptr);
   };
   return admission;
 }
@@ -223,6 +303,12 @@ api::Response Authenticator::run(const api::Route& route, api::Request& request,
 }
 
 Admission Authenticator::admit(api::Request& request, std::string_view host, bool websocket) {
+  Admission admission = decide(request, host, websocket);
+  if (admission.refusal) router_.shape_refusal(request, *admission.refusal);
+  return admission;
+}
+
+Admission Authenticator::decide(api::Request& request, std::string_view host, bool websocket) {
   request.remote = options_.proxies.client(request.remote, request.header("x-forwarded-for"));
   if (closed_) {
     auto response = problem(503, "overloaded", "the server stops");
@@ -242,6 +328,7 @@ Admission Authenticator::admit(api::Request& request, std::string_view host, boo
     if (auto wait = limit(request, found)) return refused(std::move(*wait));
   }
   if (request.path == k_live_path) return live(request, websocket, std::move(login));
+  if (request.path == k_omlox_path) return live_omlox(request, websocket, login);
   if (found.kind == api::Resolution::Kind::not_found && !unsafe(request.method)) {
     if (auto response = static_file(request)) {
       if (request.method == api::Method::options)

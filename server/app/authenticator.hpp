@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -29,8 +30,8 @@ struct AuthenticatorOptions {
 /// Denies by default: what no route and no file claims is refused. Called on io threads; never blocks.
 class Authenticator final : public Gateway {
  public:
-  Authenticator(const api::Router& router, api::WsHandlerFactory live, api::AccessService& access,
-                Metrics& metrics, AuthenticatorOptions options);
+  Authenticator(const api::Router& router, api::WsHandlerFactory live, api::TokenWsFactory omlox,
+                api::AccessService& access, Metrics& metrics, AuthenticatorOptions options);
 
   Admission admit(api::Request& request, std::string_view host, bool websocket) override;
   api::Response problem(int status, std::string_view type, std::string detail) override;
@@ -44,15 +45,22 @@ class Authenticator final : public Gateway {
   api::Response wrong_secret(const api::Request& request, std::string_view secret, std::string_view what);
   std::optional<api::Response> limit(const api::Request& request, const api::Resolution& found);
   Admission live(api::Request& request, bool websocket, api::Login login);
+  Admission live_omlox(const api::Request& request, bool websocket, const api::Login& login);
+  /// Whether this login stands; holds its place among the live connections for as long as it is kept.
+  std::function<bool()> standing(const api::Login& login, std::shared_ptr<void> place);
+  std::function<bool()> let_in(const api::Request& request, std::string_view token);
+  Admission decide(api::Request& request, std::string_view host, bool websocket);
   api::Response run(const api::Route& route, api::Request& request, const api::Login& login);
 
   const api::Router& router_;
   api::WsHandlerFactory live_;
+  api::TokenWsFactory omlox_;
   api::AccessService& access_;
   Metrics& metrics_;
   AuthenticatorOptions options_;
   RateLimit rate_;
   WsPlaces places_;
+  WsPlaces strangers_;  ///< whose token is still to come
   std::atomic<bool> closed_{false};
 };
 

@@ -2,6 +2,7 @@
 
 #include <netdb.h>
 
+#include <algorithm>
 #include <chrono>
 #include <functional>
 #include <optional>
@@ -19,7 +20,6 @@ namespace {
 using Steady = std::chrono::steady_clock;
 constexpr auto k_whole = std::chrono::seconds(20);  ///< of one exchange
 constexpr auto k_step = std::chrono::seconds(5);    ///< of one connect, read or write
-constexpr std::size_t k_most_answer = 64 * 1024;
 
 struct Url {
   bool tls{};
@@ -93,7 +93,7 @@ class HttpPost final : public WebPost {
                       "'" + to_utf8(url, 120) + "' is not like https://host/path, without user and fragment");
   }
 
-  Result<int> post(const Message& message) override {
+  Result<Answer> send(const Message& message) override {
     BOOST_OUTCOME_TRY(check(message.url));
     const Url url = *parse(message.url);
     const auto addresses = resolved(url);
@@ -122,7 +122,7 @@ class HttpPost final : public WebPost {
     httplib::Client* client{nullptr};
   };
 
-  Result<int> exchange(const Url& url, const std::string& pinned, const Message& message) {
+  Result<Answer> exchange(const Url& url, const std::string& pinned, const Message& message) {
     const bool v6 = url.host.find(':') != std::string::npos;
     httplib::Client client((url.tls ? "https://" : "http://") + (v6 ? '[' + url.host + ']' : url.host) + ':' +
                            std::to_string(url.port));
@@ -138,25 +138,25 @@ class HttpPost final : public WebPost {
     client.set_write_timeout(k_step);
     if (!enter(&client)) return make_error(Errc::canceled, "the server stops");
     const auto end = Steady::now() + k_whole;
-    int status = 0;
-    std::size_t read = 0;
+    Answer answer;
     httplib::Request request;
-    request.method = "POST";
+    request.method = message.method;
     request.path = url.path;
     request.body = message.body;
     for (const auto& [name, value] : message.headers) request.headers.emplace(name, value);
     request.response_handler = [&](const httplib::Response& head) {
-      status = head.status;
+      answer.status = head.status;
       return true;
     };
-    request.content_receiver = [&](const char*, std::size_t n, std::uint64_t, std::uint64_t) {
-      read += n;
-      return read <= k_most_answer && Steady::now() < end;
+    request.content_receiver = [&](const char* bytes, std::size_t n, std::uint64_t, std::uint64_t) {
+      answer.body.append(bytes, std::min(n, k_most_answer - answer.body.size()));
+      return answer.body.size() < k_most_answer && Steady::now() < end;
     };
     const auto result = client.send(request);
     const bool stopped = leave();
-    if (result) return result->status;  // the head of an answer without a body is not handed on before
-    if (status != 0) return status;     // its body was cut off
+    // The head of an answer without a body is not handed on before.
+    if (result) answer.status = result->status;
+    if (answer.status != 0) return answer;  // perhaps its body was cut off
     if (stopped) return make_error(Errc::canceled, "the server stops");
     return make_error(Errc::link_lost, "no answer of " + url.host + " (" + pinned +
                                            "): " + httplib::to_string(result.error()));

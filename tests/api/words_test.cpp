@@ -17,6 +17,7 @@
 #include "api/learning/freeze_rows.hpp"
 #include "api/learning/measurement_query.hpp"
 #include "api/learning/model_signer.hpp"
+#include "api/omlox/omlox_zone.hpp"
 #include "api/places/structure_json.hpp"
 #include "api/stream/hub.hpp"
 #include "api/webhooks/cloud_event.hpp"
@@ -31,6 +32,7 @@
 #include "core/procedure/safety.hpp"
 #include "core/types/event_level.hpp"
 #include "core/types/exclusion.hpp"
+#include "core/types/wall.hpp"
 #include "core/types/webhook.hpp"
 #include "drivers/device/supervisor.hpp"
 
@@ -172,8 +174,9 @@ std::set<std::string> words_without_a_table() {
           "?Sort", "GET /api/v1/ranges ?format", "GET /api/v1/ranges ?count", "GET /api/v1/fixes ?format",
           "GET /api/v1/ranges/{id}/cir ?format", "GET /api/v1/plans/{id}/export ?format",
           "GET /api/v1/anchors ?view", "GET /api/v1/anchors ?format",
-          "GET /api/v1/campaigns/{id}/samples ?format",
+          "GET /api/v1/campaigns/{id}/samples ?format", "GET /api/v1/calibrations/{id}/residuals ?format",
           "GET /api/v1/campaigns/{id}/samples/{sample}/cir ?format", "GET /api/v1/datasets/{id}/rows ?format",
+          "GET /api/v1/signing-key ?format",
           // texts that are chosen where they are written
           "FlightUpload.what", "UploadRequest.what", "Checklist.items.state", "FlightAircraft.others.kind",
           "DeviceWrite.kind", "SiteWrite.crs.base.source", "ModelGate.checks.basis",
@@ -183,17 +186,22 @@ std::set<std::string> words_without_a_table() {
           "System.mqtt.state", "FloorPlanGeoreference.source"};
 }
 
+std::map<std::string, Json> tables_of_receivers() {
+  return {
+      {"WebhookRequest.events", Json(k_webhook_events)},    {"WebhookChange.events", Json(k_webhook_events)},
+      {"WebhookRequest.kind", words(k_webhook_kind_words)}, {"Webhook.kind", words(k_webhook_kind_words)},
+      {"Delivery.state", words(k_delivery_words)},          {"OmloxDialect", words(k_dialect_words)},
+  };
+}
+
 TEST(WireWords, AreThoseOfOpenApi) {
-  const std::map<std::string, Json> tables{
+  std::map<std::string, Json> tables{
       {"Exclusion.kind", words(k_row_kind_words)},
       {"ExclusionRequest.kind", words(k_row_kind_words)},
       {"FixClass", words(k_fix_words)},
       {"GET /api/v1/ranges ?fix", words(k_fix_words)},
       {"ConfiguredDevice.rover.fix", words(k_fix_words)},
       {"Verdict", words(k_verdict_words)},
-      {"WebhookRequest.events", Json(k_webhook_events)},
-      {"WebhookChange.events", Json(k_webhook_events)},
-      {"Delivery.state", words(k_delivery_words)},
       {"GET /api/v1/anchors ?height", words(k_file_height_words)},
       {"GET /api/v1/exports/anchors.dxf ?height", words(k_file_height_words)},
       {"GET /api/v1/exports/anchors.ifc ?height", words(k_file_height_words)},
@@ -255,10 +263,11 @@ TEST(WireWords, AreThoseOfOpenApi) {
       {"Floor.plan.media_type", words(floor_plan::k_image_format_words)},
       {"FloorPlanGeoreference.model", words(floor_plan::k_fit_model_words)},
       {"GeoreferenceWrite.model", words(floor_plan::k_fit_model_words)},
-      {"FloorWalls.walls.material", Json(k_wall_materials)},
-      {"FloorWallsWrite.walls.material", Json(k_wall_materials)},
-      {"FloorWallsWrite.material", Json(k_wall_materials)},
+      {"FloorWalls.walls.material", words(k_wall_material_words)},
+      {"FloorWallsWrite.walls.material", words(k_wall_material_words)},
+      {"FloorWallsWrite.material", words(k_wall_material_words)},
   };
+  tables.merge(tables_of_receivers());
   expect_the_same(enums_of_openapi(), tables, words_without_a_table());
 }
 

@@ -1,5 +1,5 @@
-// Polygons of the planner beside Boost.Geometry: an outline of 12 corners asked at 10 000 points and ways, as a
-// decision does. CPU time, one thread. Why the own functions stay: docs/adr/0008-polygons.md.
+// Polygons of the planner beside Boost.Geometry: an outline of 12 corners asked at 10 000 points and ways, as
+// a decision does. CPU time, one thread. Why the own functions stay: docs/adr/0008-polygons.md.
 #include <benchmark/benchmark.h>
 
 #include <boost/geometry.hpp>

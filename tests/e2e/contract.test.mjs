@@ -9,14 +9,13 @@ import { createInterface } from 'node:readline';
 import { after, before, test } from 'node:test';
 import { Contract, checked } from './contract.mjs';
 import { ndjson, simulatedFlight } from './flight.mjs';
+import { omlox, unknown } from './omlox.mjs';
 import { room_png } from './room.mjs';
 import { binary, eventually, root, startServer } from './server.mjs';
-
 const contract = new Contract();
 let server, call, flight;
 const ids = {};
 const lines = (rows) => ({ headers: { 'content-type': 'application/x-ndjson' }, body: ndjson(rows) });
-const unknown = '0197a3b0-5d10-7b1e-9c55-0a1b2c3d4e5f';
 
 before(async () => {
   server = await startServer({ auth: 'on' });
@@ -66,6 +65,11 @@ test('a calibration, published', async () => {
   ids.calibration = solved.json.id;
   const job = await call('POST', '/api/v1/calibrations', { json: { missions: [ids.mission] } });
   assert.ok([200, 201, 202].includes(job.status));
+  const listing = await call('GET', `/api/v1/calibrations/${ids.calibration}/residuals?format=starnet`, {
+    expect: 200,
+  });
+  assert.match(listing.text, /^D F1T1-0x[0-9a-f]+ [0-9.]+ [0-9.]+\r$/m);
+  await call('GET', `/api/v1/calibrations/${ids.calibration}/residuals?format=landxml`, { expect: 406 });
   await call('POST', `/api/v1/calibrations/${ids.calibration}/publish`, { json: {} });
   // Its kit learned from it; a first profile of another one is put.
   const profile = await call('GET', `/api/v1/devices/${flight.mission.kit}/profile`, { expect: 200 });
@@ -75,6 +79,20 @@ test('a calibration, published', async () => {
     json: profile.json.profile,
     headers: { 'if-match': profile.headers.get('etag') },
   });
+});
+
+test('a flight as one file, and back', async () => {
+  const bundle = await server.fetch(`/api/v1/missions/${ids.mission}/bundle`);
+  const body = Buffer.from(await bundle.arrayBuffer());
+  const headers = { 'content-type': 'application/vnd.anchord.bundle+zip' };
+  const back = await call('POST', '/api/v1/bundles', { expect: 200, headers, body });
+  assert.equal(back.json.already, true, back.text);
+  assert.ok(back.json.rows.uwb_range > 0, back.text);
+  await call('POST', '/api/v1/bundles', { expect: 422, headers, body: body.subarray(0, 500) });
+  await call('POST', '/api/v1/bundles', { expect: 415, json: {} });
+  await call('GET', `/api/v1/missions/${ids.spare}/bundle`, { expect: 409 }); // it records
+  await call('GET', `/api/v1/missions/${ids.mission}/handover`, { expect: 200 });
+  await call('GET', '/api/v1/signing-key?format=pem', { expect: 200 });
 });
 
 test('a local frame, fitted to the published anchors', async () => {
@@ -130,6 +148,8 @@ test('a webhook: set up, tried, turned off, taken away', async () => {
   await call('POST', `${path}/test`, { expect: 422 });
   await call('DELETE', path, { expect: 204, headers: { 'if-match': off.headers.get('etag') } });
 });
+
+test('omlox: a hub with a token that is not shown, and the face of a hub', () => omlox(call, ids.site));
 
 test('a building, its floor, the plan of it: sent, placed, traced, accepted, taken away', async () => {
   const site = (
@@ -461,6 +481,7 @@ test('everything that can be read', async () => {
       template.includes('/webhooks/') ||
       template.includes('/buildings/') ||
       template.includes('/floors/') ||
+      template.includes('/omlox/v2/') ||
       template === '/api/v1/ws' ||
       template.includes('{sample}') ||
       template.includes('{feature}') ||

@@ -118,7 +118,9 @@ TEST_F(WorkerProcess, TakesTheCodeOfAnErrorByItsWordAndGuessesNone) {
 
 /// A picture of 4 x 3 pixels as the server sends it.
 std::string plan_message(const std::string& picture) {
-  return R"(floor_plan {"task":"inspect","enu_from_pixel":[1,0,0,0,-1,0]})" "\n" + picture;
+  return R"(floor_plan {"task":"inspect","enu_from_pixel":[1,0,0,0,-1,0]})"
+         "\n" +
+         picture;
 }
 
 TEST_F(WorkerProcess, DecodesThePictureOfAFloorPlan) {
@@ -138,7 +140,8 @@ TEST_F(WorkerProcess, ADecoderThatDiesSaysNothingOfTraining) {
   const auto result = run("kill -SEGV $$", plan_message("x"));
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().code, Errc::link_lost);
-  EXPECT_NE(result.error().message.find("a fault of the decoder"), std::string::npos) << result.error().message;
+  EXPECT_NE(result.error().message.find("a fault of the decoder"), std::string::npos)
+      << result.error().message;
 }
 
 }  // namespace anchord::server

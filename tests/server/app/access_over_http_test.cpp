@@ -255,6 +255,47 @@ TEST(LiveAccess, TakesATicketOnceAndNoOtherOrigin) {
   EXPECT_EQ(client.ended_with(), 1003);
 }
 
+TEST(OmloxAccess, TakesATokenInAMessageAndCountsThoseThatHaveNone) {
+  AppFixture server;
+  ASSERT_TRUE(server.app) << server.error.message;
+  const std::string path = "/omlox/v2/ws/socket";
+  const auto subscribe = [](const std::string& token) {
+    return R"({"event":"subscribe","topic":"location_updates","params":{"token":")" + token + R"("}})";
+  };
+  WsClient client(server.port, path);
+  ASSERT_TRUE(client.open()) << "its token comes in a message";
+  client.send(1, subscribe(server.admin));
+  const auto answer = client.frame();
+  ASSERT_TRUE(answer);
+  EXPECT_NE(answer->payload.find(R"("event":"subscribed")"), std::string::npos) << answer->payload;
+  WsClient gateway(server.port, path);
+  gateway.send(1, subscribe(server.token(R"(["gateway"])")));
+  const auto refused = gateway.frame();
+  ASSERT_TRUE(refused);
+  EXPECT_NE(refused->payload.find("10004"), std::string::npos) << refused->payload;
+  std::vector<std::unique_ptr<WsClient>> strangers;
+  for (int i = 0; i < 3; ++i) strangers.push_back(std::make_unique<WsClient>(server.port, path));
+  for (const auto& one : strangers) EXPECT_TRUE(one->open());
+  WsClient one_more(server.port, path);
+  EXPECT_EQ(one_more.ended_with(), 4029) << "four of one address, the one that came in not among them";
+  WsClient by_header(server.port, path, "Authorization: Bearer " + server.admin + "\r\n");
+  by_header.send(1, R"({"event":"subscribe","topic":"location_updates"})");
+  const auto at_once = by_header.frame();
+  ASSERT_TRUE(at_once);
+  EXPECT_NE(at_once->payload.find("subscribed"), std::string::npos);
+}
+
+TEST(OmloxAccess, RefusesInTheFormOfOmlox) {
+  AppFixture server;
+  ASSERT_TRUE(server.app) << server.error.message;
+  for (const auto& headers : {std::map<std::string, std::string>{}, server.bearer("anc_wrong")}) {
+    const auto answer = server.call("GET", "/omlox/v2/zones", {}, headers);
+    EXPECT_EQ(answer.status, 401);
+    EXPECT_EQ(answer.headers.at("content-type"), "application/json");
+    EXPECT_NE(answer.body.find(R"("code":401)"), std::string::npos) << answer.body;
+  }
+}
+
 TEST(LiveAccess, SaysByeWhenTheServerStops) {
   AppFixture server(Settings{{"auth", "off"}});
   ASSERT_TRUE(server.app) << server.error.message;

@@ -1,0 +1,127 @@
+#include "api/bundles/bundle_file.hpp"
+
+#include <cerrno>
+#include <fstream>
+
+#include "api/bundles/spool.hpp"
+#include "core/base/sha256.hpp"
+
+namespace anchord::api {
+namespace {
+
+constexpr std::size_t k_write_bytes = std::size_t{1} << 20;
+
+/// One file a table, with its digest.
+class FolderSink final : public BundleSink {
+ public:
+  FolderSink(const SpoolFolder& folder, std::vector<BundleEntry>& entries)
+      : folder_(folder), entries_(entries) {}
+
+  Result<void> begin(const BundleTable& table) override {
+    BOOST_OUTCOME_TRY(end());
+    table_ = &table;
+    entry_ = {bundle_entry_name(table), 0, 0, ""};
+    file_ = std::ofstream(folder_.path(table.name), std::ios::binary);
+    if (!file_) return failed();
+    sum_ = Sha256();
+    text_ = bundle_header(table);
+    return boost::outcome_v2::success();
+  }
+  Result<void> row(const BundleRow& row) override {
+    if (++entry_.rows > k_bundle_rows)
+      return make_error(Errc::unsupported, "the mission has more than " + std::to_string(k_bundle_rows) +
+                                               " rows of " + table_->name + ", and no bundle holds more");
+    text_ += bundle_line(*table_, row);
+    if (text_.size() < k_write_bytes) return boost::outcome_v2::success();
+    return flush();
+  }
+  Result<void> end() {
+    if (table_ == nullptr) return boost::outcome_v2::success();
+    BOOST_OUTCOME_TRY(flush());
+    file_.close();
+    if (!file_) return failed();
+    entry_.sha256_hex = sum_.hex();
+    entries_.push_back(entry_);
+    table_ = nullptr;
+    return boost::outcome_v2::success();
+  }
+
+ private:
+  Result<void> flush() {
+    sum_.add(text_);
+    entry_.bytes += text_.size();
+    errno = 0;
+    if (!file_.write(text_.data(), static_cast<std::streamsize>(text_.size()))) return failed();
+    text_.clear();
+    return boost::outcome_v2::success();
+  }
+  Error failed() const {
+    return make_error(errno == ENOSPC ? Errc::storage_full : Errc::storage_unavailable,
+                      "cannot write " + entry_.name + " of the bundle");
+  }
+
+  const SpoolFolder& folder_;
+  std::vector<BundleEntry>& entries_;
+  const BundleTable* table_{nullptr};
+  BundleEntry entry_;
+  std::ofstream file_;
+  Sha256 sum_;
+  std::string text_;
+};
+
+}  // namespace
+
+Result<std::filesystem::path> make_bundle(BundleApi& api, const Mission& mission, const Principal& who,
+                                          const SpoolFolder& folder) {
+  BundleManifest manifest{mission.id, mission.name, api.made_by, api.clock.now(), {}};
+  FolderSink sink(folder, manifest.entries);
+  BOOST_OUTCOME_TRY(api.bundles.write_out(mission.id, sink));
+  BOOST_OUTCOME_TRY(sink.end());
+  const std::size_t n_tables = manifest.entries.size();
+  auto notes = api.notes(mission, who);
+  for (const auto& note : notes) {
+    Sha256 sum;
+    sum.add(note.text);
+    manifest.entries.push_back(
+        {std::string(k_bundle_notes) + note.name, note.text.size(), note.rows, sum.hex()});
+  }
+  const auto file = folder.path("bundle.anchord");
+  BOOST_OUTCOME_TRY(auto zip, ZipWriter::create(file));
+  BOOST_OUTCOME_TRY(zip.add_text(std::string(k_bundle_manifest), write_bundle_manifest(manifest)));
+  for (std::size_t i = 0; i < n_tables; ++i) {
+    BOOST_OUTCOME_TRY(zip.add_file(manifest.entries[i].name, folder.path(api.bundles.tables()[i].name)));
+  }
+  for (std::size_t i = 0; i < notes.size(); ++i) {
+    BOOST_OUTCOME_TRY(zip.add_text(manifest.entries[n_tables + i].name, std::move(notes[i].text)));
+  }
+  BOOST_OUTCOME_TRY(zip.finish());
+  for (const auto& table : api.bundles.tables()) {
+    std::error_code gone;
+    std::filesystem::remove(folder.path(table.name), gone);
+  }
+  return file;
+}
+
+Result<void> BundleZipSource::open(const BundleTable& table) {
+  table_ = &table;
+  BOOST_OUTCOME_TRY(auto lines, ZipLines::open(zip_, bundle_entry_name(table)));
+  lines_ = std::move(lines);
+  std::string_view line;
+  BOOST_OUTCOME_TRY(const bool more, lines_->next(line));
+  return check_bundle_header(table, more ? line : std::string_view{});
+}
+
+Result<bool> BundleZipSource::next(BundleRow& row) {
+  std::string_view line;
+  BOOST_OUTCOME_TRY(const bool more, lines_->next(line));
+  if (!more) return false;
+  const std::string at = bundle_entry_name(*table_) + " line " + std::to_string(lines_->number());
+  if (lines_->number() > k_bundle_rows + 1)
+    return make_error(Errc::invalid_argument, at + " is beyond what a bundle holds");
+  auto read = read_bundle_line(*table_, line);
+  if (!read) return make_error(read.error().code, at + ": " + read.error().message);
+  row = std::move(read).value();
+  return true;
+}
+
+}  // namespace anchord::api

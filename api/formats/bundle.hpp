@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "api/formats/zip_archive.hpp"
+#include "core/base/ids.hpp"
+#include "core/base/result.hpp"
+#include "core/base/time.hpp"
+#include "core/types/bundle.hpp"
+
+/// The flight bundle (docs/formats.md): a zip file with a manifest, one file of lines for each table, and
+/// notes. A line is a JSON array; the first of a table names its columns.
+namespace anchord::api {
+
+inline constexpr std::string_view k_bundle_manifest = "manifest.json";
+inline constexpr std::string_view k_bundle_notes = "notes/";
+inline constexpr int k_bundle_version = 1;
+
+struct BundleEntry {
+  std::string name;
+  std::uint64_t bytes{}, rows{};
+  std::string sha256_hex;
+};
+struct BundleManifest {
+  MissionId mission{};
+  std::string mission_name, made_by;
+  UtcTime made{};
+  std::vector<BundleEntry> entries;  ///< all but the manifest
+};
+
+/// SHA-256 over version, mission, and name and digest of every table: the same flight has the same, whenever
+/// and wherever it was written, whatever the notes tell.
+std::string bundle_digest(const BundleManifest& manifest);
+std::string write_bundle_manifest(const BundleManifest& manifest);
+/// errors: bad_frame (no manifest, or its own digest differs), unsupported (made by a newer format)
+Result<BundleManifest> read_bundle_manifest(std::string_view text);
+
+/// The manifest of a bundle that is just what it says: no entry more or less, every size and digest right.
+/// Reads all of it. errors: bad_frame, naming each entry that differs; unsupported
+Result<BundleManifest> checked_bundle(const ZipReader& zip);
+
+std::string bundle_entry_name(const BundleTable& table);
+std::string bundle_header(const BundleTable& table);
+/// With its line end.
+std::string bundle_line(const BundleTable& table, const BundleRow& row);
+/// errors: invalid_argument
+Result<void> check_bundle_header(const BundleTable& table, std::string_view line);
+Result<BundleRow> read_bundle_line(const BundleTable& table, std::string_view line);
+
+/// Lines of an entry, one in memory. errors: those of the zip file; bad_frame where a line is too long
+class ZipLines {
+ public:
+  static constexpr std::size_t k_line_bytes = std::size_t{128} << 20;
+  static Result<ZipLines> open(const ZipReader& zip, std::string_view name);
+  /// False at the end. The line holds until the next call.
+  Result<bool> next(std::string_view& line);
+  std::uint64_t number() const { return number_; }
+
+ private:
+  ZipLines(ZipReader::Stream stream, std::string name) : stream_(std::move(stream)), name_(std::move(name)) {}
+  ZipReader::Stream stream_;
+  std::string name_, buffer_;
+  std::size_t at_{0};
+  std::uint64_t number_{0};
+  bool ended_{false};
+};
+
+}  // namespace anchord::api
