@@ -49,6 +49,18 @@ Origin origin_of(std::span<const AnchorFeature> anchors) {
   return {std::floor(out.e_m), std::floor(out.n_m)};
 }
 
+/// Of the oldest site, or of the oldest anchor where none has a site (UUIDv7 sort by time): the project of
+/// two servers is not the same one, and that of a site stays itself when anchors come to it.
+std::string oldest_id(std::span<const AnchorFeature> anchors) {
+  std::set<std::string> sites, own;
+  for (const auto& feature : anchors) {
+    if (feature.anchor.site) sites.insert(to_string(*feature.anchor.site));
+    own.insert(to_string(feature.anchor.id));
+  }
+  const auto& ids = sites.empty() ? own : sites;
+  return ids.empty() ? std::string() : *ids.begin();
+}
+
 /// Sites, their buildings, and the floors of these, as the anchors name them.
 struct Place {
   std::string name;
@@ -58,7 +70,7 @@ struct Place {
 
 class Model {
  public:
-  explicit Model(Origin origin) : origin_(origin) {
+  Model(Origin origin, std::string oldest) : origin_(origin), oldest_(std::move(oldest)) {
     const auto zero = data_.add("IFCCARTESIANPOINT", "(0.,0.,0.)");
     placement_ = data_.add("IFCLOCALPLACEMENT", "$," + data_.add("IFCAXIS2PLACEMENT3D", zero + ",$,$"));
     context_ = data_.add("IFCGEOMETRICREPRESENTATIONCONTEXT",
@@ -66,8 +78,8 @@ class Model {
     metre_ = data_.add("IFCSIUNIT", "*,.LENGTHUNIT.,$,.METRE.");
     const auto radian = data_.add("IFCSIUNIT", "*,.PLANEANGLEUNIT.,$,.RADIAN.");
     units_ = data_.add("IFCUNITASSIGNMENT", list({metre_, radian}));
-    project_ = data_.add("IFCPROJECT", "'" + named_guid("project") + "',$,'UWB anchors',$,$,$,$," +
-                                           list({context_}) + "," + units_);
+    project_ = data_.add("IFCPROJECT", "'" + named_guid("project\n" + oldest_) +
+                                           "',$,'UWB anchors',$,$,$,$," + list({context_}) + "," + units_);
     const auto corner = data_.add("IFCCARTESIANPOINT", "(0.,0.)");
     const auto square =
         data_.add("IFCRECTANGLEPROFILEDEF", ".AREA.,$," + data_.add("IFCAXIS2PLACEMENT2D", corner + ",$") +
@@ -126,7 +138,7 @@ class Model {
       }
       sites.push_back(placed("IFCSITE", "site\n" + site, one.place, ",$,$,$,$,$"));
     }
-    aggregate("sites", project_, sites);
+    aggregate("sites\n" + oldest_, project_, sites);
     return data_.instances();
   }
 
@@ -142,7 +154,7 @@ class Model {
 
   Place& place_of(const AnchorFeature& feature) {
     const auto& anchor = feature.anchor;
-    auto& site = sites_[anchor.site ? to_string(*anchor.site) : std::string()];
+    auto& site = sites_[anchor.site ? to_string(*anchor.site) : "none of\n" + oldest_];
     site.place.name = feature.site && !feature.site->name.empty() ? feature.site->name : "Site";
     if (anchor.building.empty() && anchor.floor.empty()) return site.place;
     // A floor is in a building, named or not.
@@ -194,6 +206,7 @@ class Model {
   }
 
   Origin origin_;
+  std::string oldest_;  ///< id
   StepData data_;
   std::string placement_, context_, metre_, units_, project_, shape_;
   std::set<std::string> guids_;
@@ -213,7 +226,7 @@ std::string time_of(std::span<const AnchorFeature> anchors) {
 }  // namespace
 
 std::string anchors_ifc(std::span<const AnchorFeature> anchors, FileHeight height) {
-  Model model(origin_of(anchors));
+  Model model(origin_of(anchors), oldest_id(anchors));
   if (!anchors.empty()) model.map_system(anchors.front(), height);
   for (const auto& feature : anchors) model.add(feature, height);
   return "ISO-10303-21;\r\nHEADER;\r\nFILE_DESCRIPTION(('ViewDefinition [ReferenceView_V1.2]'),'2;1');\r\n"

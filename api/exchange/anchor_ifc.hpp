@@ -12,8 +12,8 @@ namespace anchord::api {
 /// building and floor that the anchors name, and every anchor as an IfcCommunicationsAppliance (ANTENNA) of
 /// 0.1 m with its accuracy as properties. Coordinates are metres along the grid of the map system, less a
 /// whole number of metres that the IfcMapConversion holds. GlobalIds are the anchor's ifc_guid where it has
-/// one, else made of its id, and the same in every file; the text depends on nothing but the anchors. The
-/// anchors have `projected`, of one EPSG code, and the height.
+/// one, else made of its id, that of the project of its oldest site's; the same in every file; the text
+/// depends on nothing but the anchors. The anchors have `projected`, of one EPSG code, and the height.
 std::string anchors_ifc(std::span<const AnchorFeature> anchors, FileHeight height);
 
 }  // namespace anchord::api

@@ -75,6 +75,22 @@ TEST_F(AnchorFiles, IfcHasTextOfItsNotationAndTheGlobalIdsOfTheBuilding) {
   EXPECT_EQ(file("ifc").body, got.body) << "the same anchors, the same file";
 }
 
+// A model that joins the files of two servers would take two projects of one GlobalId for one.
+TEST_F(AnchorFiles, IfcProjectsOfTwoSitesOfOneNameHaveTheirOwnGlobalIds) {
+  publish(true);
+  const auto project = [&] {
+    const std::string body = file("ifc").body;
+    return body.substr(body.find("IFCPROJECT('") + 12, 22);
+  };
+  const auto first = project();
+  const auto other =
+      post("/api/v1/sites", R"({"name":"Ghent","projected_epsg":25831,"crs":{"frame":"ETRS89"}})");
+  patch("0x6a3c", {{"site", json(other)["id"]}});
+  EXPECT_EQ(project(), first) << "of the oldest of its sites";
+  patch("0x6a2f", {{"site", json(other)["id"]}});
+  EXPECT_NE(project(), first);
+}
+
 // Six bits a character, two in the first: ISO 16739-1, IfcGloballyUniqueId.
 TEST(StepText, PacksAUuidIntoTwentyTwoCharacters) {
   EXPECT_EQ(api::step::guid({}), "0000000000000000000000");
