@@ -108,8 +108,9 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     BOOST_OUTCOME_TRY(const auto address, link::parse_address(settings.address));
     for (const auto& [slot, entry] : entries_) {
       if (entry.settings.id == settings.id) return make_error(Errc::conflict, "the device is there already");
-      // One caster has many mount points.
-      if (settings.kind == "ntrip" && entry.settings.kind == "ntrip") continue;
+      // One caster has many mount points, one broker many topics.
+      const bool shared = settings.kind == "ntrip" || settings.kind == "mqtt";
+      if (shared && settings.kind == entry.settings.kind) continue;
       if (entry.address == address && (address.kind == link::Kind::serial || address.port != 0)) {
         return make_error(Errc::conflict, "address: " + settings.address + " is that of device \"" +
                                               entry.settings.name + "\"");

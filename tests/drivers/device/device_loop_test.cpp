@@ -222,6 +222,20 @@ TEST(DeviceLoop, TwoMountPointsOfOneCasterAreTwoDevices) {
   EXPECT_FALSE(loop.add(gnss("rover", caster)));
 }
 
+TEST(DeviceLoop, TwoTopicsOfOneBrokerAreTwoDevices) {
+  boost::asio::io_context io;
+  Listener listener;
+  DeviceLoop loop(io, nullptr, listener, quick());
+  const std::string broker = "tcp://127.0.0.1:1";
+  for (const std::string name : {"hall", "yard"}) {
+    EXPECT_TRUE(loop.add({name, "mqtt", name, broker,
+                          R"({"mapping":{"topic":")" + name +
+                              R"(/+/ranges","tag":{"topic_level":2},"anchor":"/a",)"
+                              R"("distance":{"pointer":"/d","unit":"m"}}})"}));
+  }
+  EXPECT_FALSE(loop.add(gnss("rover", broker)));
+}
+
 TEST(DeviceLoop, GarbageIsOpenButNotTalkingAndIsCounted) {
   boost::asio::io_context io;
   Listener listener;
