@@ -11,6 +11,7 @@
 #include "core/base/base64.hpp"
 #include "core/base/sha256.hpp"
 #include "core/base/to_wire.hpp"
+#include "core/floor_plan/dxf.hpp"
 #include "core/floor_plan/image_head.hpp"
 #include "core/ports/place_store.hpp"
 #include "core/ports/site_store.hpp"
@@ -133,12 +134,35 @@ void place(PlaceApi& s, Floor& floor, const Georeference& georeference, const st
   floor.proposal = {};
 }
 
+/// A drawing has no code of its map system: it may be in that of its site.
+std::optional<floor_plan::GeoTags> tags_of_drawing(const Json& drawn, const Site& site) {
+  if (!site.projected_epsg || !site.origin) return std::nullopt;
+  floor_plan::GeoTags tags;
+  tags.epsg = *site.projected_epsg;
+  const auto& m = drawn.at("drawing_m_from_pixel");
+  tags.map_from_pixel << m.at(0), m.at(1), m.at(2), m.at(3), m.at(4), m.at(5);
+  return tags;
+}
+
+/// Whether it lies there: the middle of the plan within 5 km of the origin of the site.
+bool is_at_site(const Georeference& georeference, const floor_plan::ImageHead& head) {
+  constexpr double k_near_m = 5000;
+  const Eigen::Vector2d middle(0.5 * static_cast<double>(head.width_px),
+                               0.5 * static_cast<double>(head.height_px));
+  return georeference.transform.enu_from(middle).norm() < k_near_m;
+}
+
 Response put_plan(PlaceApi& s, const Request& request) {
   check_query(request, {});
   Floor floor = path_floor(s, request);
   require_match(request, etag(floor));
   const Reading held(s);
-  const std::string picture = picture_of(request);
+  std::string picture = picture_of(request);
+  std::optional<Json> drawn;
+  if (floor_plan::is_dxf(std::as_bytes(std::span(picture)))) {
+    drawn = worked(s, PlanTask::draw, {}, picture);
+    picture = png_of(*drawn);
+  }
   const auto head = head_of(picture);
   const Json seen = worked(s, PlanTask::inspect, {}, picture);
   const auto preview = png_of(seen);
@@ -152,12 +176,13 @@ Response put_plan(PlaceApi& s, const Request& request) {
   floor.georeference = floor.proposal = {};
   value_or_problem(s.places.keep(floor.id, *floor.plan, picture));
   value_or_problem(s.places.keep(floor.id, *floor.preview, preview));
-  if (head.geo) {
-    const Site site = site_of(s, floor);
-    // Tags of a system that is not known here leave the plan to be clicked.
-    if (const auto by_tags =
-            by_map(*head.geo, "geotiff", head.width_px, head.height_px, site.origin, site.crs_frame))
-      place(s, floor, by_tags.value(), picture);
+  const Site site = site_of(s, floor);
+  if (const auto tags = drawn ? tags_of_drawing(*drawn, site) : head.geo) {
+    const auto by_tags = by_map(*tags, drawn ? "drawing" : "geotiff", head.width_px, head.height_px,
+                                site.origin, site.crs_frame);
+    // Tags of a system that is not known here leave the plan to be clicked, and so does a drawing of its own
+    // one.
+    if (by_tags && (!drawn || is_at_site(by_tags.value(), head))) place(s, floor, by_tags.value(), picture);
   }
   value_or_problem(s.places.update(floor, floor.version));
   ++floor.version;

@@ -8,6 +8,8 @@
 #include "core/base/steady.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/floor_plan/backdrop.hpp"
+#include "core/floor_plan/draw.hpp"
+#include "core/floor_plan/image_head.hpp"
 #include "core/floor_plan/trace.hpp"
 
 namespace anchord::api {
@@ -17,8 +19,10 @@ using Json = nlohmann::json;
 namespace {
 
 constexpr std::string_view k_mark = "floor_plan ";
-constexpr auto k_task_words = enum_table<PlanTask>(
-    {{"inspect", PlanTask::inspect}, {"backdrop", PlanTask::backdrop}, {"trace", PlanTask::trace}});
+constexpr auto k_task_words = enum_table<PlanTask>({{"inspect", PlanTask::inspect},
+                                                    {"backdrop", PlanTask::backdrop},
+                                                    {"trace", PlanTask::trace},
+                                                    {"draw", PlanTask::draw}});
 
 Json pair_json(const Eigen::Vector2d& m) { return {m.x(), m.y()}; }
 
@@ -56,6 +60,21 @@ Result<std::string> trace(const floor_plan::Image& image, const floor_plan::Plan
                       {"notes", found.notes}});
 }
 
+Result<std::string> draw(std::span<const std::byte> dxf) {
+  BOOST_OUTCOME_TRY(const auto drawing, floor_plan::read_dxf(dxf));
+  BOOST_OUTCOME_TRY(auto made, floor_plan::draw_plan(drawing));
+  const auto& m = made.drawing_m_from_pixel;
+  const int width = made.image.width_px;
+  BOOST_OUTCOME_TRY(const auto png,
+                    floor_plan::encode_png_within(std::move(made.image), floor_plan::k_max_image_bytes));
+  const auto head = floor_plan::image_head(std::as_bytes(std::span(png)));
+  // A picture that had to be made smaller has larger pixels.
+  const double by = head ? static_cast<double>(width) / static_cast<double>(head.value().width_px) : 1;
+  return to_wire(Json{
+      {"png", base64(png)},
+      {"drawing_m_from_pixel", {by * m(0, 0), by * m(0, 1), m(0, 2), by * m(1, 0), by * m(1, 1), m(1, 2)}}});
+}
+
 }  // namespace
 
 bool is_plan_work(std::string_view message) { return message.starts_with(k_mark); }
@@ -74,6 +93,7 @@ Result<std::string> do_plan_work(std::string_view message, const std::stop_token
     transform.linear << m.at(0).get<double>(), m.at(1).get<double>(), m.at(3).get<double>(),
         m.at(4).get<double>();
     transform.shift_m = {m.at(2).get<double>(), m.at(5).get<double>()};
+    if (task == PlanTask::draw) return draw(std::as_bytes(std::span(bytes)));
     BOOST_OUTCOME_TRY(auto image, floor_plan::decode_image(std::as_bytes(std::span(bytes))));
     switch (task) {
       case PlanTask::inspect:
@@ -82,6 +102,8 @@ Result<std::string> do_plan_work(std::string_view message, const std::stop_token
         return backdrop(image, transform);
       case PlanTask::trace:
         return trace(image, transform, stop, progress);
+      case PlanTask::draw:
+        break;
     }
   } catch (const Json::exception& fault) {
     return make_error(Errc::bad_frame, fault.what());

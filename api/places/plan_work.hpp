@@ -20,6 +20,7 @@ enum class PlanTask : std::uint8_t {
   inspect,   ///< {width_px, height_px, preview}: decoded whole once, so that a broken file is refused at once
   backdrop,  ///< {low_m, high_m, width_px, height_px, png}
   trace,     ///< {outline_m, walls, cell_m, notes}
+  draw,      ///< {png, drawing_m_from_pixel}: of a DXF
 };
 
 /// The longest side of previews, and the most bytes of previews and backdrops.
@@ -30,7 +31,8 @@ inline constexpr double k_plan_work_s = 120;
 
 /// Whether a message is one of these; else it is do_work's.
 bool is_plan_work(std::string_view message);
-/// Does it, on the calling thread. errors: those of decode_image, make_backdrop, trace_plan; bad_frame
+/// Does it, on the calling thread. errors: those of decode_image, make_backdrop, trace_plan, read_dxf,
+/// draw_plan; bad_frame
 Result<std::string> do_plan_work(std::string_view message, const std::stop_token& stop,
                                  const WorkProgressSink& progress);
 /// do_plan_work on the calling thread, as a RunWork.

@@ -6,6 +6,7 @@
 #include "core/floor_plan/image_head.hpp"
 #include "core/geo/enu.hpp"
 #include "core/ports/access_store.hpp"
+#include "tests/core/floor_plan/drawings.hpp"
 #include "tests/core/floor_plan/pictures.hpp"
 
 namespace anchord::test {
@@ -165,7 +166,10 @@ TEST_F(Places, RefuseFilesThatAreNoPlansWithAReason) {
                          {floor_plan::png_head(20'000, 20'000), 413, "100 million"},
                          {good.substr(0, good.size() / 2), 422, "cut short"},
                          {floor_plan::png_head(400, 300), 422, "cannot be decoded"},
-                         {"%PDF-1.7", 415, "PNG, JPEG or (Geo)TIFF"},
+                         {"%PDF-1.7", 415, "PNG, JPEG, (Geo)TIFF or ASCII DXF"},
+                         {"AutoCAD Binary DXF\r\n\x1a", 415, "save it as ASCII DXF"},
+                         {floor_plan::dxf::entities("0\nTEXT\n1\nA\n"), 422, "no line in its model space"},
+                         {"0\nSECTION\n2\nENTITIES\n0\nLINE\n1x\n", 422, "near its line"},
                          {"\xff\xd8\xff\xe0 broken", 422, "cut short"},
                          {good + std::string(51u << 20, 'x'), 413, "50 MiB"}}) {
     const auto answer = put(f + "/plan", f, file, "application/octet-stream");
@@ -237,6 +241,39 @@ TEST_F(Places, PlaceAGeoTiffByItsTagsAndAPictureByItsWorldFile) {
                 geo["enu_from_pixel"][i].get<double>(), 1e-6);
   EXPECT_EQ(put(f + "/plan/georeference", f, R"({"world_file":[0,0,0,0,1,1],"epsg":25831})").status, 422);
   EXPECT_EQ(put(f + "/plan/georeference", f, R"({"geotiff":true})").status, 200);
+}
+
+TEST_F(Places, DrawADxfAndPlaceItWhereItIsInTheMapSystemOfItsSite) {
+  const auto made = post("/api/v1/sites", R"({"name":"dock","projected_epsg":25831,"crs":{"frame":"ETRS89"},)"
+                                          R"("origin":{"lon":3.00001411567,"lat":50.55192901,"h_m":30}})");
+  ASSERT_EQ(made.status, 201) << made.body;
+  const auto b = building(json(made)["id"]);
+  const auto f =
+      header(post("/api/v1/floors", R"({"name":"G","level":0,"building":")" + b + "\"}"), "Location");
+  namespace dxf = floor_plan::dxf;
+  // Of its own system first: the walls are there, the place is to be clicked.
+  const auto own = put(f + "/plan", f, dxf::header(4) + dxf::entities(dxf::room_mm(0)), "image/vnd.dxf");
+  ASSERT_EQ(own.status, 201) << own.body;
+  EXPECT_EQ(json(own)["plan"]["media_type"], "image/png");
+  EXPECT_EQ(json(own)["plan"]["width_px"], 12 * 50 + 40) << "2 cm a pixel and a margin of 20";
+  EXPECT_TRUE(json(own)["georeference"].is_null());
+  EXPECT_TRUE(get(f + "/plan").body.starts_with("\x89PNG"));
+  // The origin is 500 001 m east, 5 599 999.625 m north in zone 31 by gdaltransform: the test of GeoTIFF
+  // above.
+  const auto mapped =
+      put(f + "/plan", f, dxf::header(4) + dxf::entities(dxf::room_mm(0, 500'001'000, 5'600'000'000)),
+          "application/octet-stream");
+  ASSERT_EQ(mapped.status, 200) << mapped.body;
+  const auto geo = json(mapped)["georeference"];
+  ASSERT_TRUE(geo.is_object()) << mapped.body;
+  EXPECT_EQ(geo["source"], "drawing");
+  const auto& m = geo["enu_from_pixel"];
+  const auto at = [&](std::size_t row, double x, double y) {
+    return m[3 * row].get<double>() * x + m[3 * row + 1].get<double>() * y + m[3 * row + 2].get<double>();
+  };
+  EXPECT_NEAR(at(0, 20, 420), 0, 0.01) << "the lower left corner, UTM 0.4 mm a metre smaller than the ground";
+  EXPECT_NEAR(at(1, 20, 420), 0.375 / 0.9996, 0.01);
+  EXPECT_NEAR(at(0, 620, 420), 12 / 0.9996, 0.01);
 }
 
 TEST_F(Places, TraceAPlanAndKeepWhatAPersonAccepts) {
