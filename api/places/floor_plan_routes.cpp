@@ -105,9 +105,8 @@ StoredImage stored(PlaceApi& s, ImageKind kind, std::string_view media_type, std
           static_cast<std::int64_t>(bytes.size()), sum.hex()};
 }
 
-Json worked(PlaceApi& s, PlanTask task, const floor_plan::PlanTransform& transform,
-            const std::string& picture) {
-  auto done = ask_worker(s.run_work, s.steady, task, transform, picture, {}, [] { return false; });
+Json worked(PlaceApi& s, const PlanQuestion& question, const std::string& picture) {
+  auto done = ask_worker(s.run_work, s.steady, question, picture, {}, [] { return false; });
   if (!done) refuse_picture(done.error());
   return std::move(done).value();
 }
@@ -121,7 +120,7 @@ std::string png_of(const Json& answer) {
 
 /// Has the plan turned north up, and keeps that with where it lies. The floor is not stored yet.
 void place(PlaceApi& s, Floor& floor, const Georeference& georeference, const std::string& picture) {
-  const Json made = worked(s, PlanTask::backdrop, georeference.transform, picture);
+  const Json made = worked(s, {PlanTask::backdrop, georeference.transform}, picture);
   const auto png = png_of(made);
   const auto head = head_of(png);
   const auto image = stored(s, ImageKind::backdrop, "image/png", head.width_px, head.height_px, png);
@@ -134,37 +133,39 @@ void place(PlaceApi& s, Floor& floor, const Georeference& georeference, const st
   floor.proposal = {};
 }
 
-/// A drawing has no code of its map system: it may be in that of its site.
-std::optional<floor_plan::GeoTags> tags_of_drawing(const Json& drawn, const Site& site) {
+/// Where a site is in its map system; nothing where it has none, or lies outside of it.
+std::optional<Eigen::Vector2d> on_map_m(const Site& site) {
   if (!site.projected_epsg || !site.origin) return std::nullopt;
+  const auto map = map_of(*site.projected_epsg, site.crs_frame);
+  if (!map) return std::nullopt;
+  const auto at = map.value().easting_northing_m(*site.origin);
+  return at ? std::optional(at.value()) : std::nullopt;
+}
+
+/// A drawing has no code of its map system: one that lies at the site is in the site's.
+std::optional<floor_plan::GeoTags> tags_of_drawing(const Json& drawn, const Site& site) {
+  if (!drawn.at("is_at_site").get<bool>()) return std::nullopt;
   floor_plan::GeoTags tags;
-  tags.epsg = *site.projected_epsg;
+  tags.epsg = site.projected_epsg.value();
   const auto& m = drawn.at("drawing_m_from_pixel");
   tags.map_from_pixel << m.at(0), m.at(1), m.at(2), m.at(3), m.at(4), m.at(5);
   return tags;
-}
-
-/// Whether it lies there: the middle of the plan within 5 km of the origin of the site.
-bool is_at_site(const Georeference& georeference, const floor_plan::ImageHead& head) {
-  constexpr double k_near_m = 5000;
-  const Eigen::Vector2d middle(0.5 * static_cast<double>(head.width_px),
-                               0.5 * static_cast<double>(head.height_px));
-  return georeference.transform.enu_from(middle).norm() < k_near_m;
 }
 
 Response put_plan(PlaceApi& s, const Request& request) {
   check_query(request, {});
   Floor floor = path_floor(s, request);
   require_match(request, etag(floor));
+  const Site site = site_of(s, floor);
   const Reading held(s);
   std::string picture = picture_of(request);
   std::optional<Json> drawn;
   if (floor_plan::is_dxf(std::as_bytes(std::span(picture)))) {
-    drawn = worked(s, PlanTask::draw, {}, picture);
+    drawn = worked(s, {PlanTask::draw, {}, on_map_m(site)}, picture);
     picture = png_of(*drawn);
   }
   const auto head = head_of(picture);
-  const Json seen = worked(s, PlanTask::inspect, {}, picture);
+  const Json seen = worked(s, {PlanTask::inspect}, picture);
   const auto preview = png_of(seen);
   const auto preview_head = head_of(preview);
   const bool made = !floor.plan;
@@ -176,13 +177,11 @@ Response put_plan(PlaceApi& s, const Request& request) {
   floor.georeference = floor.proposal = {};
   value_or_problem(s.places.keep(floor.id, *floor.plan, picture));
   value_or_problem(s.places.keep(floor.id, *floor.preview, preview));
-  const Site site = site_of(s, floor);
   if (const auto tags = drawn ? tags_of_drawing(*drawn, site) : head.geo) {
     const auto by_tags = by_map(*tags, drawn ? "drawing" : "geotiff", head.width_px, head.height_px,
                                 site.origin, site.crs_frame);
-    // Tags of a system that is not known here leave the plan to be clicked, and so does a drawing of its own
-    // one.
-    if (by_tags && (!drawn || is_at_site(by_tags.value(), head))) place(s, floor, by_tags.value(), picture);
+    // Tags of a system that is not known here leave the plan to be clicked.
+    if (by_tags) place(s, floor, by_tags.value(), picture);
   }
   value_or_problem(s.places.update(floor, floor.version));
   ++floor.version;
@@ -265,7 +264,7 @@ Result<JobEnd> trace(PlaceApi& s, const Floor& floor, const Georeference& georef
   BOOST_OUTCOME_TRY(const auto bytes, s.places.bytes(floor.plan->id));
   BOOST_OUTCOME_TRY(const auto traced,
                     ask_worker(
-                        s.run_work, s.steady, PlanTask::trace, georeference.transform, bytes,
+                        s.run_work, s.steady, {PlanTask::trace, georeference.transform}, bytes,
                         [&job](const WorkProgress& p) { job.progress(0.95 * p.fraction, p.stage, p.detail); },
                         [&job] { return job.canceled(); }));
   std::string proposal;

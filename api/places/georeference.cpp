@@ -22,15 +22,6 @@ namespace {
 constexpr std::size_t k_max_points = 100;
 constexpr int k_wgs84_3d = 4979, k_etrs89_3d = 4937;
 
-/// A site that names no datum has that of its base; a map of Europe is then taken to be in the same one, for
-/// from ETRS89 to WGS 84 there is no exact way, and RTK networks there give ETRS89.
-Result<Projection> open(int epsg, const std::string& datum) {
-  if (const auto known = geographic_epsg(datum)) return Projection::open(epsg, *known);
-  auto opened = Projection::open(epsg, k_wgs84_3d);
-  if (opened || opened.error().code != Errc::unsupported) return opened;
-  return Projection::open(epsg, k_etrs89_3d);
-}
-
 Ordered pair_json(const Eigen::Vector2d& v) { return {v.x(), v.y()}; }
 
 Ordered head_json(std::string_view source, std::string_view model, const Wgs84& origin,
@@ -166,12 +157,19 @@ std::optional<GeoTags> read_world_file(Fields& fields) {
 
 }  // namespace
 
+Result<Projection> map_of(int epsg, const std::string& datum) {
+  if (const auto known = geographic_epsg(datum)) return Projection::open(epsg, *known);
+  auto opened = Projection::open(epsg, k_wgs84_3d);
+  if (opened || opened.error().code != Errc::unsupported) return opened;
+  return Projection::open(epsg, k_etrs89_3d);
+}
+
 Result<Georeference> by_map(const GeoTags& tags, std::string_view source, std::int64_t width_px,
                             std::int64_t height_px, const std::optional<Wgs84>& site_origin,
                             const std::string& datum) {
   std::optional<Projection> projection;
   if (!tags.geographic) {
-    BOOST_OUTCOME_TRY(auto opened, open(tags.epsg, datum));
+    BOOST_OUTCOME_TRY(auto opened, map_of(tags.epsg, datum));
     projection.emplace(std::move(opened));
   }
   const auto on_globe = [&](const Eigen::Vector2d& pixel) -> Result<Wgs84> {

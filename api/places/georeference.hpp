@@ -7,6 +7,7 @@
 #include "core/base/result.hpp"
 #include "core/floor_plan/georeference.hpp"
 #include "core/floor_plan/image_head.hpp"
+#include "core/geo/projection.hpp"
 #include "core/types/document.hpp"
 #include "core/types/position.hpp"
 
@@ -19,6 +20,11 @@ struct Georeference {
   Document document;                   ///< as it is kept and shown
   std::optional<std::string> wrong{};  ///< why it must not be taken: a point that does not fit the others
 };
+
+/// The map system of an EPSG code, for a site of this datum. A site that names no datum has that of its base;
+/// a map of Europe is then taken to be in the same one, for from ETRS89 to WGS 84 there is no exact way, and
+/// RTK networks there give ETRS89. errors  as of Projection::open
+Result<Projection> map_of(int epsg, const std::string& datum);
 
 /// By the tags of a GeoTIFF, or a map file beside the picture: the map's affine in metres round the origin.
 /// datum  of the site ("ETRS89"), for a map of another one

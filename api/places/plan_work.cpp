@@ -60,9 +60,9 @@ Result<std::string> trace(const floor_plan::Image& image, const floor_plan::Plan
                       {"notes", found.notes}});
 }
 
-Result<std::string> draw(std::span<const std::byte> dxf) {
+Result<std::string> draw(std::span<const std::byte> dxf, const std::optional<Eigen::Vector2d>& site_map_m) {
   BOOST_OUTCOME_TRY(const auto drawing, floor_plan::read_dxf(dxf));
-  BOOST_OUTCOME_TRY(auto made, floor_plan::draw_plan(drawing));
+  BOOST_OUTCOME_TRY(auto made, floor_plan::draw_plan(drawing, site_map_m));
   const auto& m = made.drawing_m_from_pixel;
   const int width = made.image.width_px;
   BOOST_OUTCOME_TRY(const auto png,
@@ -72,6 +72,7 @@ Result<std::string> draw(std::span<const std::byte> dxf) {
   const double by = head ? static_cast<double>(width) / static_cast<double>(head.value().width_px) : 1;
   return to_wire(Json{
       {"png", base64(png)},
+      {"is_at_site", made.is_at_site},
       {"drawing_m_from_pixel", {by * m(0, 0), by * m(0, 1), m(0, 2), by * m(1, 0), by * m(1, 1), m(1, 2)}}});
 }
 
@@ -93,7 +94,12 @@ Result<std::string> do_plan_work(std::string_view message, const std::stop_token
     transform.linear << m.at(0).get<double>(), m.at(1).get<double>(), m.at(3).get<double>(),
         m.at(4).get<double>();
     transform.shift_m = {m.at(2).get<double>(), m.at(5).get<double>()};
-    if (task == PlanTask::draw) return draw(std::as_bytes(std::span(bytes)));
+    if (task == PlanTask::draw) {
+      std::optional<Eigen::Vector2d> site_map_m;
+      if (const auto at = head.find("site_map_m"); at != head.end())
+        site_map_m.emplace(at->at(0).get<double>(), at->at(1).get<double>());
+      return draw(std::as_bytes(std::span(bytes)), site_map_m);
+    }
     BOOST_OUTCOME_TRY(auto image, floor_plan::decode_image(std::as_bytes(std::span(bytes))));
     switch (task) {
       case PlanTask::inspect:
@@ -120,13 +126,14 @@ Result<std::string> plan_work_inline(const std::string& message, const WorkProgr
   });
 }
 
-Result<Json> ask_worker(const RunWork& run, const SteadyClock& steady, PlanTask task,
-                        const floor_plan::PlanTransform& transform, std::string_view picture,
-                        const WorkProgressSink& progress, const std::function<bool()>& canceled) {
-  const auto& m = transform.linear;
-  const Json head{
-      {"task", k_task_words.word(task)},
-      {"enu_from_pixel", {m(0, 0), m(0, 1), transform.shift_m.x(), m(1, 0), m(1, 1), transform.shift_m.y()}}};
+Result<Json> ask_worker(const RunWork& run, const SteadyClock& steady, const PlanQuestion& question,
+                        std::string_view picture, const WorkProgressSink& progress,
+                        const std::function<bool()>& canceled) {
+  const auto& m = question.transform.linear;
+  const auto& shift = question.transform.shift_m;
+  Json head{{"task", k_task_words.word(question.task)},
+            {"enu_from_pixel", {m(0, 0), m(0, 1), shift.x(), m(1, 0), m(1, 1), shift.y()}}};
+  if (question.site_map_m) head["site_map_m"] = pair_json(*question.site_map_m);
   std::string message = std::string(k_mark) + to_wire(head) + '\n';
   message.append(picture);
   const auto begun = steady.now();

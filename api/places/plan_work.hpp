@@ -1,6 +1,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <string_view>
@@ -20,7 +21,13 @@ enum class PlanTask : std::uint8_t {
   inspect,   ///< {width_px, height_px, preview}: decoded whole once, so that a broken file is refused at once
   backdrop,  ///< {low_m, high_m, width_px, height_px, png}
   trace,     ///< {outline_m, walls, cell_m, notes}
-  draw,      ///< {png, drawing_m_from_pixel}: of a DXF
+  draw,      ///< {png, drawing_m_from_pixel, is_at_site}: of a DXF
+};
+
+struct PlanQuestion {
+  PlanTask task{PlanTask::inspect};
+  floor_plan::PlanTransform transform{};        ///< backdrop, trace
+  std::optional<Eigen::Vector2d> site_map_m{};  ///< draw: easting and northing of the site in its map system
 };
 
 /// The longest side of previews, and the most bytes of previews and backdrops.
@@ -41,8 +48,8 @@ Result<std::string> plan_work_inline(const std::string& message, const WorkProgr
 
 /// Has it done by `run`, and reads the answer as what a stranger sends.
 /// errors  those of the work; no_convergence (it took longer than k_plan_work_s), canceled
-Result<nlohmann::json> ask_worker(const RunWork& run, const SteadyClock& steady, PlanTask task,
-                                  const floor_plan::PlanTransform& transform, std::string_view picture,
-                                  const WorkProgressSink& progress, const std::function<bool()>& canceled);
+Result<nlohmann::json> ask_worker(const RunWork& run, const SteadyClock& steady, const PlanQuestion& question,
+                                  std::string_view picture, const WorkProgressSink& progress,
+                                  const std::function<bool()>& canceled);
 
 }  // namespace anchord::api

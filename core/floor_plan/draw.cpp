@@ -59,7 +59,7 @@ std::vector<DrawnLine> without_strays(const std::vector<DrawnLine>& lines) {
   const auto box = inner_box(lines);
   std::ranges::copy_if(lines, std::back_inserter(out),
                        [&](const auto& line) { return inside(box, line.from) && inside(box, line.to); });
-  return out;
+  return out.empty() ? lines : out;
 }
 
 Box box_of(const std::vector<DrawnLine>& lines) {
@@ -169,9 +169,17 @@ Walls walls_of(const Faces& faces, std::size_t lines) {
   return out;
 }
 
+/// The unit that puts the drawing at its site; 0: none does.
+double unit_at(const Vector2d& site_map_m, double unit_m, const Box& box) {
+  constexpr double k_near_m = 5000;
+  for (const double unit : {unit_m, 1.0, 0.001, 0.01, 0.3048})
+    if (unit > 0 && (0.5 * unit * (box.low + box.high) - site_map_m).norm() < k_near_m) return unit;
+  return 0;
+}
+
 }  // namespace
 
-Result<DrawnPlan> draw_plan(const Drawing& drawing) {
+Result<DrawnPlan> draw_plan(const Drawing& drawing, const std::optional<Vector2d>& site_map_m) {
   const auto lines = drawing.lines.empty() ? drawing.lines : without_strays(drawing.lines);
   const auto nothing =
       make_error(Errc::weak_geometry, "the drawing has no size: its lines are all in one place");
@@ -179,8 +187,12 @@ Result<DrawnPlan> draw_plan(const Drawing& drawing) {
   const auto box = box_of(lines);
   if (box.longest() <= 0) return nothing;
   DrawnPlan out;
-  out.unit_is_known = drawing.unit_m > 0;
-  const double unit_m = out.unit_is_known ? drawing.unit_m : box.longest() < 1000 ? 1 : 0.001;
+  const double at_site_m = site_map_m ? unit_at(*site_map_m, drawing.unit_m, box) : 0;
+  out.is_at_site = at_site_m > 0;
+  const double unit_m = out.is_at_site          ? at_site_m
+                        : drawing.unit_m > 0    ? drawing.unit_m
+                        : box.longest() < 1'000 ? 1
+                                                : 0.001;
   const double pixel_m = std::max(k_pixel_m, box.longest() * unit_m / k_longest_px);
   const Vector2d size = (box.high - box.low) * unit_m / pixel_m;
   const cv::Size pixels(static_cast<int>(std::ceil(size.x())) + 2 * k_margin_px,

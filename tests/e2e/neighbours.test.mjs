@@ -246,3 +246,56 @@ test("GDAL reads the surveyors' table and the KML, and Pozyx has millimetres of 
     assert.ok(Math.max(...apart_mm) <= 0.56, apart_mm.join()); // half a millimetre, and the tenth that GeoJSON rounds to
   }
 });
+
+test('a DXF that GDAL wrote is a floor plan, at the place of its coordinates', async () => {
+  // Both faces of 30 cm walls round 14 m x 9 m, in metres of the map.
+  const corner = [550000, 5652600];
+  const ring = (inset) =>
+    [
+      [inset, inset],
+      [14 - inset, inset],
+      [14 - inset, 9 - inset],
+      [inset, 9 - inset],
+      [inset, inset],
+    ].map(([e, n]) => [corner[0] + e, corner[1] + n]);
+  const geojson = join(folder, 'hall.geojson'),
+    dxf = join(folder, 'hall.dxf');
+  const feature = (coordinates) => ({ type: 'Feature', properties: {}, geometry: { type: 'LineString', coordinates } });
+  writeFileSync(geojson, JSON.stringify({ type: 'FeatureCollection', features: [ring(0), ring(0.3)].map(feature) }));
+  await gdal('ogr2ogr', '-f', 'DXF', dxf, geojson);
+  const [lon, lat] = String(
+    execFileSync('gdaltransform', ['-s_srs', 'EPSG:25831', '-t_srs', 'EPSG:4937', '-output_xy'], {
+      input: corner.join(' '),
+    }),
+  )
+    .trim()
+    .split(' ')
+    .map(Number);
+  const site = await post('/api/v1/sites', {
+    name: 'Hall C',
+    projected_epsg: 25831,
+    crs: { frame: 'ETRS89' },
+    origin: { lon, lat, h_m: 50 },
+  });
+  const building = await post('/api/v1/buildings', { name: 'C', site: site.id, height_m: 8 });
+  const floor = await post('/api/v1/floors', { name: '0', level: 0, building: building.id });
+  const path = `/api/v1/floors/${floor.id}`;
+  const sent = await server.fetch(`${path}/plan`, {
+    method: 'PUT',
+    headers: {
+      'content-type': 'application/octet-stream',
+      'if-match': (await server.fetch(path)).headers.get('etag'),
+    },
+    body: readFileSync(dxf),
+  });
+  const answer = await sent.json();
+  assert.equal(sent.status, 201, JSON.stringify(answer));
+  assert.equal(answer.georeference.source, 'drawing');
+  const traced = await post(`${path}/plan/trace`, {}, { prefer: 'wait=60' });
+  for (const [lon, lat] of traced.outline.coordinates[0]) {
+    const at = await projected({ geometry: { coordinates: [lon, lat] } });
+    const apart = Math.min(...ring(0).map(([e, n]) => Math.hypot(at[0] - e, at[1] - n)));
+    assert.ok(apart < 0.08, `${at} is ${apart} m from any corner`);
+  }
+  assert.equal(traced.outline.coordinates[0].length, 5);
+});

@@ -129,7 +129,6 @@ TEST(DrawnPlan, OfARoomWithTwoFacesAWallIsTracedWithin5Cm) {
   for (const double turn_deg : {0.0, 23.0}) {
     const auto made = draw_plan(drawing(dxf::header(4) + dxf::entities(dxf::room_mm(turn_deg))));
     ASSERT_TRUE(made.has_value()) << made.error().message;
-    EXPECT_TRUE(made.value().unit_is_known);
     PlanTransform transform;
     transform.linear = made.value().drawing_m_from_pixel.leftCols<2>();
     transform.shift_m = made.value().drawing_m_from_pixel.col(2);
@@ -155,6 +154,20 @@ TEST(DrawnPlan, LeavesOutWhatWasForgottenFarAway) {
       drawing(dxf::header(4) + dxf::entities(dxf::room_mm(0) + dxf::line("0", 9e8, 9e8, 9e8 + 1, 9e8))));
   ASSERT_TRUE(made.has_value());
   EXPECT_LT(made.value().image.width_px, 700) << "12 m at 2 cm a pixel";
+}
+
+// GDAL writes inches into every DXF; AutoCAD writes what its user never looked at.
+TEST(DrawnPlan, OfMapCoordinatesIsInMetresWhateverUnitTheFileNames) {
+  const auto inches =
+      drawing(dxf::header(1) + dxf::entities(dxf::line("0", 550000, 5652600, 550014, 5652609)));
+  const auto made = draw_plan(inches, Vector2d(550100, 5652000));
+  ASSERT_TRUE(made.has_value());
+  EXPECT_TRUE(made.value().is_at_site);
+  EXPECT_EQ(made.value().image.width_px, 14 * 50 + 40);
+  const auto elsewhere = draw_plan(inches, Vector2d(400000, 5652000));
+  ASSERT_TRUE(elsewhere.has_value());
+  EXPECT_FALSE(elsewhere.value().is_at_site);
+  EXPECT_EQ(elsewhere.value().image.width_px, std::ceil(14 * 0.0254 * 50) + 40);
 }
 
 TEST(DrawnPlan, WithoutSizeIsRefused) {
