@@ -19,8 +19,8 @@ using Eigen::Affine2d;
 using Eigen::Vector2d;
 
 constexpr std::string_view k_binary = "AutoCAD Binary DXF";
-constexpr int k_max_depth = 16;                    ///< of blocks in blocks
-constexpr std::size_t k_max_groups = 100'000'000;  ///< read, those of a block each time it is inserted
+constexpr int k_max_depth = 16;                   ///< of blocks in blocks
+constexpr std::size_t k_max_groups = 10'000'000;  ///< read, those of a block each time it is inserted
 constexpr double k_step_rad = 5 * std::numbers::pi / 180;
 constexpr double k_largest = 1e10;  ///< coordinate in any unit
 
@@ -86,15 +86,17 @@ std::string_view text_of(std::span<const std::byte> bytes) {
 /// One entity as its groups tell it.
 struct Entity {
   std::string_view type, layer{"0"}, block;
-  std::array<double, 256> value{};           ///< of the codes 10 to 255, the last one of each
+  std::array<double, 80> value{};            ///< of the codes 10 to 79, the last one of each
   std::vector<Vector2d> points, fit_points;  ///< codes 10 and 20, 11 and 21
   std::vector<double> bulges;                ///< of the points
   bool shown{true};
+  bool backwards{false};  ///< drawn on the other side of the paper
 
   void add(const Group& group) {
     if (group.code == 8) layer = group.value;
     if (group.code == 2) block = group.value;
-    if (group.code < 10 || group.code >= 256) return;
+    if (group.code == 230) backwards = number(group.value) < -0.5;
+    if (group.code < 10 || group.code >= 80) return;
     const double v = value[static_cast<std::size_t>(group.code)] = number(group.value);
     if (group.code == 10) {
       points.emplace_back(v, 0);
@@ -284,7 +286,7 @@ class Reader {
     // Plane entities of the other side of the paper: their x runs backwards.
     const bool own_plane = e.type == "ARC" || e.type == "CIRCLE" || e.type == "LWPOLYLINE" ||
                            e.type == "POLYLINE" || e.type == "SOLID";
-    if (own_plane && e.value[230] < -0.5) place = place * Eigen::Scaling(-1.0, 1.0);
+    if (own_plane && e.backwards) place = place * Eigen::Scaling(-1.0, 1.0);
     wall_ = names_walls(layer);
     curve(e, place);
     return out_.lines.size() > k_max_drawn_lines ? too_much() : Result<void>(boost::outcome_v2::success());
@@ -362,7 +364,7 @@ class Reader {
                rows = static_cast<int>(std::clamp(e.of(71, 1), 1.0, 1e4));
     const Eigen::Rotation2Dd turn(e.value[50] * std::numbers::pi / 180);
     Affine2d to_parent = inserted.place;
-    if (e.value[230] < -0.5) to_parent = to_parent * Eigen::Scaling(-1.0, 1.0);
+    if (e.backwards) to_parent = to_parent * Eigen::Scaling(-1.0, 1.0);
     for (int column = 0; column < columns; ++column) {
       for (int row = 0; row < rows; ++row) {
         const Vector2d shift(column * e.value[44], row * e.value[45]);
