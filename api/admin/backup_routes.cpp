@@ -51,6 +51,7 @@ void add_backup_routes(Router& router, AdminApi& s) {
                 std::vector<FieldError> errors;
                 Fields(body, "", errors).finish();
                 refuse_if_any(errors);
+                if (const auto why = s.backups.refusal()) throw ProblemException{problem_of(*why)};
                 Job job = value_or_problem(begin_backup(s));
                 s.audit(request, "backup.start " + to_string(job.id));
                 return job_outcome(s.jobs, request, std::move(job), [&s](const Job& done) -> Response {

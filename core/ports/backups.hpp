@@ -32,6 +32,8 @@ class Backups {
   /// Whether one is to be begun now: the newest is older than the schedule wants, or a flight ended since the
   /// last was begun (`flights_ended` only grows). Never while the schedule is off, at most each ten minutes.
   virtual bool due(std::uint64_t flights_ended) = 0;
+  /// Why none is ever made here; nothing where they are.
+  virtual std::optional<Error> refusal() const { return std::nullopt; }
 };
 
 }  // namespace anchord

@@ -32,7 +32,8 @@
 #include "server/runtime/worker_process.hpp"
 #include "server/storage/data_folder.hpp"
 #include "server/storage/geopackage.hpp"
-#include "server/storage/sqlite_database.hpp"
+#include "server/storage/postgres_database.hpp"
+#include "server/storage/postgres_text.hpp"
 #include "server/tls/tls_keeper.hpp"
 
 namespace anchord::server {
@@ -92,7 +93,7 @@ struct App::State {
   std::function<std::string()> doctor;
   SystemClock clock;
   std::unique_ptr<Database> database;
-  std::unique_ptr<BackupKeeper> backups;
+  std::unique_ptr<Backups> backups;
   std::unique_ptr<Metrics> metrics;
   std::unique_ptr<api::AccessService> access;
   std::unique_ptr<WorkerPool> pool, stream_pool, command_pool, flight_pool, heavy_pool;  ///< of handlers
@@ -116,6 +117,7 @@ struct App::State {
   Result<void> open_devices();
   Result<void> open_drone();
   Result<void> open_broker();
+  std::unique_ptr<Backups> make_backups() const;
   void compose();
   Result<void> listen();
 };
@@ -134,7 +136,7 @@ api::StorageStatus status_of(Database& database) {
   return status;
 }
 
-Result<std::unique_ptr<Database>> open_store(const Config& config) {
+Result<std::unique_ptr<Database>> open_rows(const Config& config) {
   StorageOptions options;
   options.data_dir = config.text("data_dir");
   // One for each thread that reads, so that a command never waits for somebody else's to be free.
@@ -142,7 +144,11 @@ Result<std::unique_ptr<Database>> open_store(const Config& config) {
                     config.count("http.upload_workers") + 10;
   BOOST_OUTCOME_TRY(options.synchronous,
                     k_synchronous_words.parse("storage.synchronous", config.text("storage.synchronous")));
-  return open_database(options);
+  const auto& address = config.text("database");
+  BOOST_OUTCOME_TRY(auto database, open_store(address, options));
+  if (!address.empty())
+    log(LogLevel::info, "rows are in PostgreSQL", {{"database", sql::shown_address(address)}});
+  return database;
 }
 
 }  // namespace
@@ -288,6 +294,16 @@ fs::path emptied_spool(const fs::path& data_dir) {
 
 }  // namespace
 
+std::unique_ptr<Backups> App::State::make_backups() const {
+  if (!config.text("database").empty()) return std::make_unique<NoBackups>(k_postgres_backups);
+  BackupKeeper::Options keep;
+  keep.dir = config.text("backup.dir").empty() ? data_dir / "backups" : fs::path(config.text("backup.dir"));
+  keep.keep = config.count("backup.keep");
+  keep.every_h = config.count("backup.every_h");
+  keep.scheduled = config.text("backup.schedule") == "on";
+  return std::make_unique<BackupKeeper>(*database, clock, std::move(keep));
+}
+
 void App::State::compose() {
   pool =
       std::make_unique<WorkerPool>("anchord-work", config.count("http.workers"), config.count("http.queue"));
@@ -303,12 +319,7 @@ void App::State::compose() {
   joint_pool = std::make_unique<WorkerPool>("anchord-joint", 1, 1);
   plan_pool = std::make_unique<WorkerPool>("anchord-plan", 1, 16);
   job_pool = std::make_unique<WorkerPool>("anchord-job", k_kinds_of_jobs, k_kinds_of_jobs);
-  BackupKeeper::Options keep;
-  keep.dir = config.text("backup.dir").empty() ? data_dir / "backups" : fs::path(config.text("backup.dir"));
-  keep.keep = config.count("backup.keep");
-  keep.every_h = config.count("backup.every_h");
-  keep.scheduled = config.text("backup.schedule") == "on";
-  backups = std::make_unique<BackupKeeper>(*database, clock, std::move(keep));
+  backups = make_backups();
   api::Application::Deps deps{.stores = database->stores(),
                               .work = {*live_pool, *joint_pool, *plan_pool, *job_pool},
                               .clock = clock,
@@ -387,7 +398,7 @@ Result<std::unique_ptr<App>> App::start(const Config& config, std::function<std:
   s.doctor = std::move(doctor);
   s.data_dir = config.text("data_dir");
   BOOST_OUTCOME_TRY(s.proxies, TrustedProxies::parse(config.list("trusted_proxies")));
-  BOOST_OUTCOME_TRY(s.database, open_store(config));
+  BOOST_OUTCOME_TRY(s.database, open_rows(config));
   s.metrics = std::make_unique<Metrics>(ANCHORD_VERSION);
   api::AccessOptions access_options;
   access_options.auth_off = config.text("auth") == "off";

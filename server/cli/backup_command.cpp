@@ -4,16 +4,18 @@
 #include "api/measurements/flight_requests.hpp"
 #include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/config_flags.hpp"
 #include "server/cli/server_address.hpp"
 #include "server/http/http_client.hpp"
 #include "server/runtime/backup_keeper.hpp"
-#include "server/storage/sqlite_database.hpp"
+#include "server/storage/data_folder.hpp"
+#include "server/storage/postgres_database.hpp"
 
 namespace anchord::cli {
 namespace {
 
 struct Options {
-  std::string data_dir{"anchord-data"}, dir, file;
+  std::string data_dir{"anchord-data"}, database, dir, file;
   std::size_t keep{7};
   std::filesystem::path folder() const {
     return dir.empty() ? std::filesystem::path(data_dir) / "backups" : std::filesystem::path(dir);
@@ -44,7 +46,13 @@ std::optional<int> through_server(const Options& options) {
   return 0;
 }
 
+/// Whether the rows are where no command of this file reaches.
+bool elsewhere(const Options& options) {
+  return !options.database.empty() || !sql::postgres_of_folder(options.data_dir).empty();
+}
+
 int make(const Options& options) {
+  if (elsewhere(options)) return fail(k_postgres_backups, 2);
   if (const auto code = through_server(options)) return *code;
   StorageOptions storage;
   storage.data_dir = options.data_dir;
@@ -62,6 +70,7 @@ int make(const Options& options) {
 }
 
 int restore(const Options& options) {
+  if (elsewhere(options)) return fail(k_postgres_backups, 2);
   const auto old = restore_backup(options.data_dir, options.file);
   if (!old) {
     const bool input = old.error().code == Errc::not_found || old.error().code == Errc::unsupported;
@@ -81,6 +90,7 @@ void add_backup_command(CLI::App& app, int& exit_code) {
   const auto common = [&](CLI::App* sub) {
     sub->add_option("--data-dir", options->data_dir, "folder of the database [anchord-data]")
         ->envname("ANCHORD_DATA_DIR");
+    add_database_option(*sub, options->database);
   };
   common(command);
   command->add_option("--dir", options->dir, "where to put it, when no server runs [DATA_DIR/backups]");

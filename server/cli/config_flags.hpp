@@ -23,4 +23,7 @@ struct ConfigFlags {
 /// One flag per setting of the table, and --config FILE.
 std::shared_ptr<ConfigFlags> add_config_flags(CLI::App& command);
 
+/// --database of a command that opens the rows of a data folder itself.
+void add_database_option(CLI::App& command, std::string& address);
+
 }  // namespace anchord::cli

@@ -19,6 +19,9 @@
 #include "drivers/link/serial_port.hpp"
 #include "server/cli/server_address.hpp"
 #include "server/http/http_client.hpp"
+#include "server/storage/data_folder.hpp"
+#include "server/storage/postgres_database.hpp"
+#include "server/storage/postgres_text.hpp"
 #include "server/storage/sqlite_connection.hpp"
 #include "server/tls/tls_keeper.hpp"
 
@@ -98,6 +101,29 @@ std::optional<Finding> database(const fs::path& dir) {
     return Finding{Level::failed, "database", size + ", " + failure.what(),
                    "run as the owner of the folder; if it is damaged: 'anchord backup restore FILE'"};
   }
+}
+
+/// PostgreSQL is looked at also while a server runs: it may be the reason why that is not ready.
+Finding postgres(const DoctorOptions& options) {
+  const auto shown = sql::shown_address(options.database);
+  const auto found = look_at_postgres(options.database);
+  if (!found) return Finding{Level::failed, "database", found.error().message, "see docs/postgresql.md"};
+  const auto& facts = found.value();
+  const std::string seen = shown + ", PostgreSQL " + facts.server_version + ", " +
+                           number(static_cast<double>(facts.bytes) / 1e6) + " MB, version " +
+                           std::to_string(facts.schema_version);
+  if (facts.schema_version > newest_schema_version())
+    return Finding{Level::failed, "database", seen + " of a newer anchord",
+                   "install the version that wrote it"};
+  return Finding{Level::ok, "database", seen};
+}
+
+/// Rows that are elsewhere than the caller thinks.
+std::optional<Finding> rows_elsewhere(const fs::path& dir) {
+  const auto there = sql::postgres_of_folder(dir);
+  if (there.empty()) return std::nullopt;
+  return Finding{Level::warning, "database", "the rows of this folder are in " + there,
+                 "name it with --database"};
 }
 
 /// Whether the certificate can be served, and for how long.
@@ -242,10 +268,16 @@ std::vector<Finding> examine(const DoctorOptions& options) {
   const auto add = [&](std::vector<Finding> more) {
     for (auto& one : more) out.push_back(std::move(one));
   };
+  if (!options.database.empty()) {
+    out.push_back(postgres(options));
+  } else if (auto found = rows_elsewhere(options.data_dir)) {
+    out.push_back(*std::move(found));
+  }
   if (auto running = server_of(options.data_dir)) {
     add(*std::move(running));
   } else {
-    if (auto found = database(options.data_dir)) out.push_back(*std::move(found));
+    if (auto found = database(options.data_dir); found && options.database.empty())
+      out.push_back(*std::move(found));
     for (const auto& address : options.listen) out.push_back(port(address));
   }
   if (auto found = certificate(options)) out.push_back(*std::move(found));

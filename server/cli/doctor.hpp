@@ -20,6 +20,7 @@ inline constexpr auto k_finding_words = enum_table<Finding::Level>(
 
 struct DoctorOptions {
   std::filesystem::path data_dir{"anchord-data"};
+  std::string database{};                             ///< address of a PostgreSQL; empty: SQLite in data_dir
   std::vector<std::string> listen{"127.0.0.1:8420"};  ///< where a server would listen
   std::string tls_certificate{}, tls_key{};           ///< files; empty: no TLS
 };

@@ -6,6 +6,7 @@
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/config_flags.hpp"
 #include "server/cli/doctor.hpp"
 
 namespace anchord::cli {
@@ -36,6 +37,7 @@ void add_doctor_command(CLI::App& app, int& exit_code) {
   const auto json = std::make_shared<bool>(false);
   command->add_option("--data-dir", options->data_dir, "folder of the database [anchord-data]")
       ->envname("ANCHORD_DATA_DIR");
+  add_database_option(*command, options->database);
   command->add_option("--listen", options->listen, "where a server would listen [127.0.0.1:8420]")
       ->envname("ANCHORD_LISTEN");
   command->add_option("--tls-certificate", options->tls_certificate, "PEM file of the server's certificate")

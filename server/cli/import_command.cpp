@@ -11,15 +11,16 @@
 #include "core/ports/measurement_store.hpp"
 #include "core/ports/mission_store.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/config_flags.hpp"
 #include "server/cli/flight_upload.hpp"
 #include "server/cli/progress.hpp"
-#include "server/storage/sqlite_database.hpp"
+#include "server/storage/postgres_database.hpp"
 
 namespace anchord::cli {
 namespace {
 
 struct Options {
-  std::string folder, url, data_dir, token_file, name;
+  std::string folder, url, data_dir, database, token_file, name;
 };
 
 std::string name_of(const Options& options, const FlightData& flight) {
@@ -75,7 +76,7 @@ Result<void> append_all(std::vector<Row>& rows, const MissionId& mission, std::s
 Result<std::string> import_into_folder(const Options& options, FlightData flight) {
   StorageOptions storage;
   storage.data_dir = options.data_dir;
-  BOOST_OUTCOME_TRY(const auto db, open_database(storage));
+  BOOST_OUTCOME_TRY(const auto db, open_store(options.database, storage));
   Mission mission = flight.mission;
   const UtcTime now = SystemClock{}.now();
   mission.id = MissionId{make_uuid_v7(now)};
@@ -139,6 +140,7 @@ void add_import_command(CLI::App& app, int& exit_code) {
       ->add_option("--data-dir", options->data_dir,
                    "Straight into the data folder of a server that is not running")
       ->excludes(url);
+  add_database_option(*flight, options->database);
   flight->add_option("--token-file", options->token_file, "File with an access token (gateway and operator)");
   flight->add_option("--name", options->name, "Name of the mission; else that of the folder");
   flight->callback([options, &exit_code] { exit_code = import_flight(*options); });

@@ -31,6 +31,7 @@ int serve(const server::Config& config) {
   for (const auto& warning : config.warnings) server::log(server::LogLevel::warning, warning);
   DoctorOptions look;
   look.data_dir = config.text("data_dir");
+  look.database = config.text("database");
   look.listen = config.list("listen");
   look.tls_certificate = config.text("tls.certificate");
   look.tls_key = config.text("tls.key");

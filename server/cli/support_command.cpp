@@ -16,7 +16,7 @@ namespace anchord::cli {
 namespace {
 
 struct Options {
-  std::string data_dir{"anchord-data"}, out{"anchord-support.tar"};
+  std::string data_dir{"anchord-data"}, database, out{"anchord-support.tar"};
 };
 
 /// What the server of this folder reports of itself; none when it does not run.
@@ -38,6 +38,7 @@ std::optional<Result<std::string>> from_server(const Options& options) {
 std::string from_here(const Options& options) {
   DoctorOptions look;
   look.data_dir = options.data_dir;
+  look.database = options.database;
   return api::tar_of({{"README.txt", "No server runs on this folder: this is what 'anchord doctor' finds.\n"},
                       {"doctor.json", api::without_secrets(findings_json(examine(look)))}},
                      SystemClock().now());
@@ -52,6 +53,7 @@ void add_support_command(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<Options>();
   command->add_option("--data-dir", options->data_dir, "folder of the database [anchord-data]")
       ->envname("ANCHORD_DATA_DIR");
+  add_database_option(*command, options->database);
   command->add_option("--out", options->out, "the archive to write [anchord-support.tar]");
   command->callback([&exit_code, options] {
     const auto served = from_server(*options);

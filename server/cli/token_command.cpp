@@ -5,16 +5,18 @@
 #include "api/measurements/flight_requests.hpp"
 #include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/config_flags.hpp"
 #include "server/cli/server_address.hpp"
 #include "server/http/http_client.hpp"
 #include "server/runtime/logging.hpp"
-#include "server/storage/sqlite_database.hpp"
+#include "server/storage/data_folder.hpp"
+#include "server/storage/postgres_database.hpp"
 
 namespace anchord::cli {
 namespace {
 
 struct Options {
-  std::string data_dir{"anchord-data"}, url, name, expires, id;
+  std::string data_dir{"anchord-data"}, database, url, name, expires, id;
   std::vector<std::string> roles;
 };
 
@@ -68,11 +70,12 @@ template <class Act>
 int with_folder(const Options& options, Act act) {
   StorageOptions storage;
   storage.data_dir = options.data_dir;
-  if (!std::filesystem::exists(storage.data_dir / "anchord.db"))
+  if (options.database.empty() && sql::postgres_of_folder(storage.data_dir).empty() &&
+      !std::filesystem::exists(storage.data_dir / "anchord.db"))
     return fail("there is no anchord database in " + options.data_dir +
                     ": name its folder by --data-dir; 'anchord serve' makes a new one, with a first token",
                 2);
-  auto database = open_database(storage);
+  auto database = open_store(options.database, storage);
   if (!database) return fail(database.error().message);
   const SystemClock clock;
   api::AccessService access(database.value()->stores().tokens, database.value()->stores().access, clock);
@@ -138,6 +141,7 @@ void add_token_command(CLI::App& app, int& exit_code) {
   const auto common = [&](CLI::App* sub) {
     sub->add_option("--data-dir", options->data_dir, "folder of the database [anchord-data]")
         ->envname("ANCHORD_DATA_DIR");
+    add_database_option(*sub, options->database);
     sub->add_option("--url", options->url, "address of a running server (token in ANCHORD_TOKEN)");
   };
   auto* make = command->add_subcommand("create", "Make a token and print it, once");

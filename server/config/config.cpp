@@ -8,6 +8,7 @@
 #include "core/base/check.hpp"
 #include "server/config/toml_file.hpp"
 #include "server/http/text.hpp"
+#include "server/storage/postgres_text.hpp"
 
 extern char** environ;
 
@@ -23,6 +24,11 @@ constexpr std::array k_options = {
         "although there is a certificate",
         list},
     Option{"data_dir", "anchord-data", "folder of the database; made when absent"},
+    Option{"database", "",
+           "PostgreSQL that has the rows, like postgresql://user@host/name, its password in ~/.pgpass or the "
+           "file "
+           "of PGPASSFILE; empty: SQLite in data_dir",
+           database},
     Option{"auth", "on", "off: everybody may do everything; only on loopback, for demonstrations", choice,
            "on|off"},
     Option{"insecure", "false", "allow other addresses than loopback although there is no TLS", flag},
@@ -115,6 +121,11 @@ std::optional<double> number(std::string_view text) {
   return value;
 }
 
+/// As it may stand in a message: an address that is refused may have a password in it.
+std::string shown(const Option& option, const std::string& value) {
+  return option.kind == database ? sql::shown_address(value) : value;
+}
+
 /// Why the text does not suit the option; empty when it does.
 std::string wrong(const Option& option, const std::string& value) {
   switch (option.kind) {
@@ -140,6 +151,8 @@ std::string wrong(const Option& option, const std::string& value) {
       if (std::ranges::find(words, value) != words.end()) return {};
       return "must be one of " + std::string(option.choices);
     }
+    case database:
+      return value.empty() ? "" : sql::address_fault(value);
   }
   return {};
 }
@@ -188,7 +201,7 @@ Result<Config> load_config(const std::map<std::string, std::string>& flags,
     if (option == nullptr) {
       faults += called + ": there is no such setting\n";
     } else if (const auto why = wrong(*option, value); !why.empty()) {
-      faults += called + " = '" + value + "': " + why + "\n";
+      faults += called + " = '" + shown(*option, value) + "': " + why + "\n";
     } else {
       config.values[std::string(key)] = {std::move(value), origin};
     }

@@ -61,4 +61,17 @@ class BackupKeeper final : public Backups {
   Locked<Due> due_;
 };
 
+/// Of a database that is copied by programs of its own: makes none, and says so.
+class NoBackups final : public Backups {
+ public:
+  explicit NoBackups(std::string why) : why_(std::move(why)) {}
+  Result<Backup> make() override { return *refusal(); }
+  std::vector<Backup> list() const override { return {}; }
+  bool due(std::uint64_t) override { return false; }
+  std::optional<Error> refusal() const override { return make_error(Errc::unsupported, why_); }
+
+ private:
+  const std::string why_;
+};
+
 }  // namespace anchord::server

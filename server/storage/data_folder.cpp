@@ -9,6 +9,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <string_view>
 #include <system_error>
 
@@ -18,6 +19,7 @@ namespace {
 constexpr const char* k_lock = "anchord.lock";
 constexpr const char* k_marker = "anchord.folder";
 constexpr const char* k_reserve = "reserve.bin";
+constexpr const char* k_postgres = "anchord.postgresql";
 constexpr mode_t k_private_file = 0600;
 constexpr mode_t k_private_folder = 0700;
 
@@ -62,6 +64,13 @@ std::string shell_quoted(const std::filesystem::path& path) { return "'" + path.
 
 }  // namespace
 
+std::string postgres_of_folder(const std::filesystem::path& dir) {
+  std::string shown;
+  std::ifstream file(dir / k_postgres);
+  std::getline(file, shown);
+  return shown;
+}
+
 Result<std::unique_ptr<DataFolder>> DataFolder::open(const std::filesystem::path& dir,
                                                      std::uint64_t reserve_bytes) {
   ::umask(S_IRWXG | S_IRWXO);
@@ -103,6 +112,20 @@ Result<void> DataFolder::note_database() {
   if (had_database()) return boost::outcome_v2::success();
   return write_small(dir_ / k_marker,
                      "anchord data folder: a database was made here; do not delete this file\n");
+}
+
+Result<void> DataFolder::note_postgres(const std::string& shown_address) {
+  if (postgres() == shown_address) return boost::outcome_v2::success();
+  return write_small(dir_ / k_postgres, shown_address + "\n");
+}
+
+void DataFolder::forget_postgres() { ::unlink((dir_ / k_postgres).c_str()); }
+
+Result<void> DataFolder::check_rows_are_here() const {
+  const std::string there = postgres();
+  if (there.empty()) return boost::outcome_v2::success();
+  return make_error(Errc::unsupported, "the rows of data folder " + dir_.string() + " are in " + there +
+                                           ": name it with --database, or name another folder");
 }
 
 std::uint64_t DataFolder::free_bytes() const {

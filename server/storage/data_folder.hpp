@@ -9,6 +9,10 @@
 
 namespace anchord::sql {
 
+/// The PostgreSQL that has the rows of a data folder, as it is shown to people; empty: they are in the
+/// folder.
+std::string postgres_of_folder(const std::filesystem::path& dir);
+
 /// The folder with the database: its lock, its reserve of disk space, and what stands in it.
 class DataFolder {
  public:
@@ -28,6 +32,13 @@ class DataFolder {
   /// A database was made here once; from then on an empty or missing one is damage, never a fresh start.
   bool had_database() const;
   Result<void> note_database();
+
+  std::string postgres() const { return postgres_of_folder(dir_); }
+  Result<void> note_postgres(const std::string& shown_address);
+  /// From here on the rows are those of the folder's own file again.
+  void forget_postgres();
+  /// Errors: unsupported where they are in PostgreSQL, with what to do.
+  Result<void> check_rows_are_here() const;
 
   std::uint64_t free_bytes() const;
   /// Makes the reserve file when there is space for it beyond `keep_free_bytes`.

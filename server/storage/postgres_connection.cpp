@@ -251,6 +251,12 @@ class PostgresStatement final : public Statement {
   int row_{-1};
 };
 
+/// Where a password was wanted: the message alone does not say where it is to be written.
+std::string password_advice(const PGconn* connection) {
+  if (PQconnectionNeedsPassword(connection) == 0 && PQconnectionUsedPassword(connection) == 0) return {};
+  return "; the password is looked for in ~/.pgpass, or in the file (mode 0600) named by PGPASSFILE";
+}
+
 /// A statement is found by its text without a copy of that.
 struct TextHash {
   using is_transparent = void;
@@ -290,7 +296,7 @@ PostgresConnection::PostgresConnection(const std::string& address)
   if (c == nullptr) throw SqlError(Failure::unavailable, "database: no memory for a connection");
   const std::string where = "database " + shown_address(address) + ": ";
   if (PQstatus(c) != CONNECTION_OK)
-    throw SqlError(Failure::unavailable, where + first_line(PQerrorMessage(c)));
+    throw SqlError(Failure::unavailable, where + first_line(PQerrorMessage(c)) + password_advice(c));
   PQsetNoticeProcessor(
       c, [](void*, const char*) {}, nullptr);  // it would write to the terminal
   if (PQserverVersion(c) < k_least_version)

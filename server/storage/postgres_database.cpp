@@ -21,6 +21,8 @@ using sql::SqlError;
 
 constexpr auto k_look_every = std::chrono::seconds(2);
 constexpr const char* k_bytes = "SELECT pg_database_size(current_database())";
+constexpr const char* k_facts =
+    "SELECT current_setting('server_version'), pg_database_size(current_database())";
 
 class PostgresDatabase final : public Database {
  public:
@@ -65,8 +67,7 @@ class PostgresDatabase final : public Database {
   }
 
   Result<BackupReport> backup(const std::filesystem::path&) override {
-    return make_error(Errc::unsupported,
-                      "a PostgreSQL database is copied by its own tools: pg_dump, or the archive of its WAL");
+    return make_error(Errc::unsupported, k_postgres_backups);
   }
 
  private:
@@ -103,28 +104,61 @@ class PostgresDatabase final : public Database {
   Thread watch_;
 };
 
+Result<void> check_address(const std::string& address) {
+  if (const auto fault = sql::address_fault(address); !fault.empty())
+    return make_error(Errc::invalid_argument, "database " + sql::shown_address(address) + ": " + fault);
+  return boost::outcome_v2::success();
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Database>> open_postgres(const PostgresOptions& options) {
-  if (!sql::names_postgres(options.address)) {
-    return make_error(Errc::invalid_argument,
-                      "the database has no address of PostgreSQL: write postgresql://user@host:5432/name");
-  }
-  if (sql::names_password(options.address)) {
-    return make_error(
-        Errc::invalid_argument,
-        "database " + sql::shown_address(options.address) +
-            ": its address has a password in it, which others can read; put it into ~/.pgpass, or "
-            "into a file named by PGPASSFILE");
-  }
+  BOOST_OUTCOME_TRYV(check_address(options.address));
   BOOST_OUTCOME_TRY(auto folder, sql::DataFolder::open(options.data_dir, 0));
+  if (folder->had_database() && folder->postgres().empty()) {
+    return make_error(Errc::unsupported, "data folder " + options.data_dir.string() +
+                                             " has a database of its own, whose rows are not in " +
+                                             sql::shown_address(options.address) +
+                                             ": name another --data-dir");
+  }
   try {
     PostgresConnection connection(options.address);
     BOOST_OUTCOME_TRYV(sql::migrate_postgres(connection, postgresql_migrations(), SystemClock{}.now()));
+    BOOST_OUTCOME_TRYV(folder->note_postgres(sql::shown_address(options.address)));
     return std::unique_ptr<Database>(std::make_unique<PostgresDatabase>(options, std::move(folder)));
   } catch (const SqlError& error) {
     return sql::to_error(error);
   }
+}
+
+Result<PostgresFacts> look_at_postgres(const std::string& address) {
+  BOOST_OUTCOME_TRYV(check_address(address));
+  try {
+    PostgresConnection connection(address);
+    PostgresFacts facts;
+    connection.execute("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY");
+    sql::Query query(connection, k_facts);
+    if (query.step()) {
+      facts.server_version = query.text();
+      facts.bytes = query.as<std::uint64_t>();
+    }
+    facts.schema_version = sql::postgres_version(connection);
+    connection.execute("ROLLBACK");
+    return facts;
+  } catch (const SqlError& error) {
+    return sql::to_error(error);
+  }
+}
+
+Result<std::unique_ptr<Database>> open_store(const std::string& address, const StorageOptions& options) {
+  if (address.empty()) return open_database(options);
+  PostgresOptions postgres;
+  postgres.address = address;
+  postgres.data_dir = options.data_dir;
+  postgres.readers = options.readers;
+  postgres.max_queued_rows = options.max_queued_rows;
+  postgres.max_queued_calls = options.max_queued_calls;
+  return open_postgres(postgres);
 }
 
 }  // namespace anchord

@@ -23,7 +23,26 @@ struct PostgresOptions {
 
 /// Opens the database of an address and migrates it; the stores are those of SQLite. A backup is pg_dump's,
 /// so backup() refuses. Errors: invalid_argument (no address, or one with a password), conflict (another
-/// process has the folder), unsupported (made by a newer anchord, or not by anchord), storage_unavailable.
+/// process has the folder), unsupported (made by a newer anchord, or not by anchord; the folder has rows of
+/// its own), storage_unavailable.
 Result<std::unique_ptr<Database>> open_postgres(const PostgresOptions& options);
+
+/// What can be seen of a database without changing it.
+struct PostgresFacts {
+  std::string server_version;  ///< "15.14"
+  int schema_version{};        ///< 0: nothing of anchord's is in it yet
+  std::uint64_t bytes{};
+};
+/// Errors: invalid_argument, storage_unavailable.
+Result<PostgresFacts> look_at_postgres(const std::string& address);
+
+/// Opens where the rows are: the PostgreSQL of the address, or without one the folder's own file. For servers
+/// and commands alike, so that none makes an empty database beside the one that is meant.
+Result<std::unique_ptr<Database>> open_store(const std::string& address, const StorageOptions& options);
+
+/// Why a command that copies SQLite's file does nothing for PostgreSQL.
+inline constexpr const char* k_postgres_backups =
+    "the rows are in PostgreSQL, which has backups of its own: pg_dump, or the archive of its WAL; see "
+    "docs/postgresql.md";
 
 }  // namespace anchord

@@ -76,6 +76,11 @@ Result<void> bring_up(PostgresConnection& connection, std::span<const Migration>
 
 }  // namespace
 
+int postgres_version(PostgresConnection& connection) {
+  if (number(connection, k_has_versions) == 0) return 0;
+  return static_cast<int>(number(connection, "SELECT max(number) FROM schema_migration"));
+}
+
 Result<void> migrate_postgres(PostgresConnection& connection, std::span<const Migration> migrations,
                               UtcTime now) {
   connection.execute(k_begin);

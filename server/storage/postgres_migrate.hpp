@@ -13,4 +13,7 @@ namespace anchord::sql {
 Result<void> migrate_postgres(PostgresConnection& connection, std::span<const Migration> migrations,
                               UtcTime now);
 
+/// The newest step that was applied; 0: none.
+int postgres_version(PostgresConnection& connection);
+
 }  // namespace anchord::sql

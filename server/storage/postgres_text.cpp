@@ -26,6 +26,22 @@ std::size_t behind_quoted(std::string_view sql, std::size_t at) {
   return at;
 }
 
+/// libpq decodes the names of parameters too.
+std::string decoded(std::string_view text) {
+  std::string out;
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    int byte = 0;
+    const char* const hex = text.data() + at + 1;
+    if (text[at] == '%' && at + 2 < text.size() && std::from_chars(hex, hex + 2, byte, 16).ptr == hex + 2) {
+      out += static_cast<char>(byte);
+      at += 2;
+    } else {
+      out += text[at];
+    }
+  }
+  return out;
+}
+
 bool is_ifnull(std::string_view sql, std::size_t at) {
   return sql.substr(at, k_ifnull.size()) == k_ifnull && (at == 0 || !of_a_name(sql[at - 1])) &&
          sql.substr(at + k_ifnull.size(), 1) == "(";
@@ -87,16 +103,16 @@ std::string shown_address(std::string_view address) {
   return std::string(prefix) + std::string(rest.substr(begin, query - begin));
 }
 
-bool names_password(std::string_view address) {
-  const auto scheme = address.find("://");
-  const auto rest = scheme == std::string_view::npos ? address : address.substr(scheme + 3);
+std::string address_fault(std::string_view address) {
+  if (!address.starts_with("postgresql://") && !address.starts_with("postgres://"))
+    return "this is no address of PostgreSQL; write postgresql://user@host:5432/name";
+  const auto rest = address.substr(address.find("://") + 3);
   const auto at = rest.rfind('@');
   const auto user = at == std::string_view::npos ? std::string_view{} : rest.substr(0, at);
-  return user.find(':') != std::string_view::npos || rest.find("password=") != std::string_view::npos;
-}
-
-bool names_postgres(std::string_view address) {
-  return address.starts_with("postgresql://") || address.starts_with("postgres://");
+  if (user.find(':') == std::string_view::npos && decoded(rest).find("password=") == std::string::npos)
+    return {};
+  return "there is a password in it, which others can read; put it into ~/.pgpass, or into a file named by "
+         "PGPASSFILE";
 }
 
 }  // namespace anchord::sql

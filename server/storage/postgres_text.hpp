@@ -34,10 +34,7 @@ class PostgresText {
 /// Address of a database without the password, for messages; "PostgreSQL" where it is not a URL.
 std::string shown_address(std::string_view address);
 
-/// Whether a password is part of the address.
-bool names_password(std::string_view address);
-
-/// Whether the text is an address of PostgreSQL: postgresql://... or postgres://...
-bool names_postgres(std::string_view address);
+/// Why this is no address of a database to give: another kind, or one with a password in it. Empty: it is.
+std::string address_fault(std::string_view address);
 
 }  // namespace anchord::sql

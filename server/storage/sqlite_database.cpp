@@ -200,6 +200,7 @@ int newest_schema_version() { return static_cast<int>(sqlite_migrations().size()
 
 Result<std::unique_ptr<Database>> open_database(const StorageOptions& options) {
   BOOST_OUTCOME_TRY(auto folder, DataFolder::open(options.data_dir, options.reserve_bytes));
+  BOOST_OUTCOME_TRYV(folder->check_rows_are_here());
   try {
     const bool check = size_of(folder->database()) <= k_check_at_start_bytes;
     BOOST_OUTCOME_TRY(auto writer, open_writer(options, *folder, check));
