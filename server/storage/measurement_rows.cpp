@@ -9,8 +9,6 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "impulse responses are stored little endian");
 
-constexpr const char* k_insert_cir =
-    "INSERT INTO cir (range_id, dt_ps, first_path_idx, preamble_count, re_im) VALUES (?1, ?2, ?3, ?4, ?5)";
 constexpr const char* k_select_cir =
     "SELECT dt_ps, first_path_idx, preamble_count, re_im FROM cir WHERE range_id = ?1";
 
@@ -150,11 +148,9 @@ std::string Table<Fix>::refusal(const Fix& row) {
 
 double stored_dt_ps(const Cir& cir) { return cir.dt_ps == k_usual_dt_ps ? k_usual : cir.dt_ps; }
 
-void insert_cir(Connection& connection, std::int64_t range_id, const Cir& cir) {
-  Query query(connection, k_insert_cir);
+void bind_cir(Query& query, std::int64_t range_id, const Cir& cir) {
   query << range_id << stored_dt_ps(cir) << cir.first_path_idx << cir.preamble_count
         << std::as_bytes(std::span<const std::int16_t>{cir.re_im});
-  query.run();
 }
 
 std::optional<Cir> read_cir(Connection& connection, std::int64_t range_id) {

@@ -20,12 +20,11 @@ struct Table<Range> {
       "range_id, mission_key, kind, t_ns, received_t_ns, tag, antenna, anchor, seq, distance_m, rss_dbm, "
       "fp_dbm, "
       "rx_dbm, std_noise, heading_deg, truth_distance_m, truth_los";
-  static constexpr std::string_view insert =
-      "INSERT INTO uwb_range (mission_key, kind, t_ns, received_t_ns, tag, antenna, anchor, seq, distance_m, "
-      "rss_dbm, "
-      "fp_dbm, rx_dbm, std_noise, heading_deg, truth_distance_m, truth_los) "
-      "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16) "
-      "ON CONFLICT DO NOTHING";
+  static constexpr BulkTable bulk{name,
+                                  "mission_key, kind, t_ns, received_t_ns, tag, antenna, anchor, seq, "
+                                  "distance_m, rss_dbm, fp_dbm, rx_dbm, "
+                                  "std_noise, heading_deg, truth_distance_m, truth_los",
+                                  id};
   static constexpr std::string_view same_identity =
       "mission_key = ?1 AND t_ns = ?2 AND tag = ?3 AND anchor = ?4 AND antenna = ?5 AND ifnull(seq, -1) = ?6";
   static void bind(Query& query, std::int64_t mission_key, const Range& row);
@@ -45,14 +44,12 @@ struct Table<Fix> {
       "fix_class, "
       "cov_ee_m2, cov_en_m2, cov_eu_m2, cov_nn_m2, cov_nu_m2, cov_uu_m2, "
       "enu_from_body_x, enu_from_body_y, enu_from_body_z, enu_from_body_w, correction_age_s, satellites";
-  static constexpr std::string_view insert =
-      "INSERT INTO fix (mission_key, t_ns, received_t_ns, seq, frame, lat_deg, lon_deg, height_m, x_m, y_m, "
-      "z_m, "
-      "fix_class, cov_ee_m2, cov_en_m2, cov_eu_m2, cov_nn_m2, cov_nu_m2, cov_uu_m2, "
-      "enu_from_body_x, enu_from_body_y, enu_from_body_z, enu_from_body_w, correction_age_s, satellites) "
-      "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20, "
-      "?21, ?22, "
-      "?23, ?24) ON CONFLICT DO NOTHING";
+  static constexpr BulkTable bulk{
+      name,
+      "mission_key, t_ns, received_t_ns, seq, frame, lat_deg, lon_deg, height_m, x_m, y_m, z_m, fix_class, "
+      "cov_ee_m2, cov_en_m2, cov_eu_m2, cov_nn_m2, cov_nu_m2, cov_uu_m2, enu_from_body_x, enu_from_body_y, "
+      "enu_from_body_z, enu_from_body_w, correction_age_s, satellites",
+      id};
   static constexpr std::string_view same_identity = "mission_key = ?1 AND t_ns = ?2 AND ifnull(seq, -1) = ?3";
   static void bind(Query& query, std::int64_t mission_key, const Fix& row);
   static void bind_identity(Query& query, std::int64_t mission_key, const Fix& row);
@@ -87,7 +84,9 @@ inline std::string thinned(std::string_view id) {
 
 /// What a column dt_ps keeps; read_cir_columns() knows it.
 double stored_dt_ps(const Cir& cir);
-void insert_cir(Connection& connection, std::int64_t range_id, const Cir& cir);
+/// Of a range with this key; the columns of k_cirs.
+void bind_cir(Query& query, std::int64_t range_id, const Cir& cir);
+inline constexpr BulkTable k_cirs{"cir", "range_id, dt_ps, first_path_idx, preamble_count, re_im"};
 std::optional<Cir> read_cir(Connection& connection, std::int64_t range_id);
 /// dt_ps, first_path_idx, preamble_count, re_im.
 Cir read_cir_columns(Query& query);

@@ -85,10 +85,25 @@ class Devices {
   std::map<Device, Seen> seen_;
 };
 
-void store_cir(Connection& connection, std::int64_t id, const Range& row) {
-  if (row.cir) insert_cir(connection, id, *row.cir);
+/// A row of the call whose mission is known.
+struct Known {
+  std::size_t at{};
+  std::int64_t mission_key{};
+};
+
+void store_cirs(Connection& connection, const std::vector<Range>& rows, const std::vector<Known>& known,
+                const Connection::Keys& ids) {
+  std::vector<std::pair<std::int64_t, const Cir*>> cirs;
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    const auto& cir = rows[known[i].at].cir;
+    if (ids[i] && cir) cirs.emplace_back(*ids[i], &*cir);
+  }
+  if (cirs.empty()) return;
+  connection.insert_rows(k_cirs, cirs.size(), [&](Query& query, std::size_t i) {
+    bind_cir(query, cirs[i].first, *cirs[i].second);
+  });
 }
-void store_cir(Connection&, std::int64_t, const Fix&) {}
+void store_cirs(Connection&, const std::vector<Fix>&, const std::vector<Known>&, const Connection::Keys&) {}
 void load_cir(Connection& connection, std::int64_t id, Range& row) { row.cir = read_cir(connection, id); }
 void load_cir(Connection&, std::int64_t, Fix&) {}
 
@@ -109,25 +124,28 @@ RowOutcome judge_stored(Connection& connection, std::int64_t key, const Row& row
 
 template <class Row>
 void append_rows(Connection& connection, const std::vector<Row>& rows, std::vector<RowOutcome>& outcomes) {
-  outcomes.assign(rows.size(), RowOutcome::accepted);
+  outcomes.assign(rows.size(), RowOutcome::unknown_mission);
   Keys keys(connection);
-  Devices devices;
-  Query insert(connection, Table<Row>::insert);
+  std::vector<Known> known;
+  known.reserve(rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    const auto key = keys.of(rows[i].mission);
-    if (!key) {
-      outcomes[i] = RowOutcome::unknown_mission;
-      continue;
+    if (const auto key = keys.of(rows[i].mission)) known.push_back({i, *key});
+  }
+  const auto ids = connection.insert_rows(Table<Row>::bulk, known.size(), [&](Query& query, std::size_t i) {
+    Table<Row>::bind(query, known[i].mission_key, rows[known[i].at]);
+  });
+  // Before rows are compared with what is stored, which may be one of these.
+  store_cirs(connection, rows, known, ids);
+  Devices devices;
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    const Row& row = rows[known[i].at];
+    auto& outcome = outcomes[known[i].at];
+    if (ids[i]) {
+      outcome = RowOutcome::accepted;
+      devices.note(known[i].mission_key, row);
+    } else {
+      outcome = judge_stored(connection, known[i].mission_key, row);
     }
-    insert.again();
-    Table<Row>::bind(insert, *key, rows[i]);
-    const auto id = insert.inserted(Table<Row>::id);
-    if (!id) {
-      outcomes[i] = judge_stored(connection, *key, rows[i]);
-      continue;
-    }
-    store_cir(connection, *id, rows[i]);
-    devices.note(*key, rows[i]);
   }
   devices.store(connection);
 }

@@ -2,6 +2,7 @@
 
 #include <libpq-fe.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -11,6 +12,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "server/storage/postgres_arrays.hpp"
 #include "server/storage/postgres_text.hpp"
 
 namespace anchord::sql {
@@ -18,16 +20,6 @@ namespace {
 
 /// Older ones are not tried.
 constexpr int k_least_version = 150000;
-/// Types by their numbers in PostgreSQL's catalogue (pg_type.dat), which never change.
-enum Type : Oid {
-  k_bool = 16,
-  k_bytea = 17,
-  k_int8 = 20,
-  k_int2 = 21,
-  k_int4 = 23,
-  k_text = 25,
-  k_float8 = 701
-};
 constexpr int k_binary = 1;
 
 struct Clear {
@@ -76,12 +68,6 @@ void check(PGconn* connection, const PGresult* result) {
   if (status != PGRES_COMMAND_OK && status != PGRES_TUPLES_OK) throw failed(connection, result);
 }
 
-/// As the wire has numbers.
-template <class T>
-void put_big_endian(std::string& out, T value) {
-  for (int shift = static_cast<int>(sizeof(T)) * 8 - 8; shift >= 0; shift -= 8)
-    out += static_cast<char>(static_cast<unsigned char>(value >> shift));
-}
 std::uint64_t big_endian(const char* bytes, int n) {
   std::uint64_t value = 0;
   for (int i = 0; i < n; ++i) value = value << 8 | static_cast<unsigned char>(bytes[i]);
@@ -116,6 +102,9 @@ class PostgresStatement final : public Statement {
   void bind_blob(int index, std::span<const std::byte> value) override {
     fresh(index, k_bytea).borrowed = value;
   }
+
+  /// In PostgreSQL's binary form.
+  void bind_binary(int index, unsigned type, std::string value) { fresh(index, type).own = std::move(value); }
 
   bool step() override {
     if (!ran_) run("");
@@ -257,6 +246,20 @@ std::string password_advice(const PGconn* connection) {
   return "; the password is looked for in ~/.pgpass, or in the file (mode 0600) named by PGPASSFILE";
 }
 
+/// Fewer rows are not worth a statement of arrays; more at once only cost memory.
+constexpr std::size_t k_few_rows = 3, k_most_rows = 5000, k_most_bytes = 8u << 20;
+
+/// "a, b, c" apart.
+std::vector<std::string_view> split_columns(std::string_view columns) {
+  std::vector<std::string_view> out;
+  for (std::size_t at = 0; at < columns.size();) {
+    const auto end = std::min(columns.find(", ", at), columns.size());
+    out.push_back(columns.substr(at, end - at));
+    at = end + 2;
+  }
+  return out;
+}
+
 /// A statement is found by its text without a copy of that.
 struct TextHash {
   using is_transparent = void;
@@ -327,6 +330,77 @@ void PostgresConnection::execute(const std::string& sql) {
   state_->parsed = {};
   const Answer answer(PQexec(state_->get(), sql.c_str()));
   check(state_->get(), answer.get());
+}
+
+Connection::Keys PostgresConnection::insert_rows(const BulkTable& table, std::size_t n, const BindRow& bind) {
+  if (n <= k_few_rows) return Connection::insert_rows(table, n, bind);
+  const auto names = split_columns(table.columns);
+  PostgresArrays arrays(names.size());
+  Query row(arrays);
+  Keys keys;
+  for (std::size_t at = 0; at < n;) {
+    arrays.clear();
+    const std::size_t first = at;
+    while (at < n && at - first < k_most_rows && arrays.bytes() < k_most_bytes) {
+      row.again();
+      bind(row, at++);
+    }
+    insert_arrays(table, names, arrays, at - first, keys);
+  }
+  return keys;
+}
+
+/// Keys are drawn before, for RETURNING does not tell which of the rows it is about.
+void PostgresConnection::insert_arrays(const BulkTable& table, const std::vector<std::string_view>& names,
+                                       const PostgresArrays& arrays, std::size_t n, Keys& keys) {
+  const std::string key(table.key);
+  std::string into, values, from, columns;
+  int parameter = 0;
+  const auto add = [&](std::string_view name, bool given) {
+    const std::string column = given ? "c" + std::to_string(++parameter) : "NULL";
+    into.append(into.empty() ? "" : ", ").append(name);
+    values.append(values.empty() ? "" : ", ").append(column);
+    if (!given) return;
+    from.append(from.empty() ? "?" : ", ?").append(std::to_string(parameter));
+    columns.append(columns.empty() ? "" : ", ").append(column);
+  };
+  std::vector<std::int64_t> drawn;
+  if (!key.empty()) {
+    drawn = draw_keys(table, n);
+    add(key, true);
+  }
+  for (std::size_t i = 0; i < names.size(); ++i) add(names[i], arrays.element(i) != 0);
+  const std::string text = "INSERT INTO " + std::string(table.name) + " (" + into + ") SELECT " + values +
+                           " FROM unnest(" + from + ") AS r(" + columns + ")" +
+                           (key.empty() ? "" : " ON CONFLICT DO NOTHING RETURNING " + key);
+  auto& statement = static_cast<PostgresStatement&>(prepared(text));
+  Query query(statement);
+  parameter = 0;
+  if (!key.empty()) {
+    PostgresArrays of_keys(1);
+    for (const auto one : drawn) of_keys.bind_integer(1, one);
+    statement.bind_binary(++parameter, of_keys.type(0), of_keys.array(0));
+  }
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (arrays.element(i) != 0) statement.bind_binary(++parameter, arrays.type(i), arrays.array(i));
+  }
+  const std::size_t first = keys.size();
+  if (!key.empty()) keys.resize(first + n);
+  while (query.step()) {
+    const auto one = query.integer();
+    const auto at = std::ranges::lower_bound(drawn, one) - drawn.begin();
+    keys[first + static_cast<std::size_t>(at)] = one;
+  }
+}
+
+std::vector<std::int64_t> PostgresConnection::draw_keys(const BulkTable& table, std::size_t n) {
+  Query query(*this, "SELECT nextval(pg_get_serial_sequence(?1, ?2)) FROM generate_series(1, ?3)");
+  query << table.name << table.key << static_cast<std::int64_t>(n);
+  std::vector<std::int64_t> keys;
+  keys.reserve(n);
+  while (query.step()) keys.push_back(query.integer());
+  std::ranges::sort(keys);
+  return keys;
 }
 
 bool PostgresConnection::usable() const { return PQstatus(state_->get()) == CONNECTION_OK; }

@@ -7,6 +7,8 @@
 
 namespace anchord::sql {
 
+class PostgresArrays;
+
 /// One connection to PostgreSQL. Nothing of it outlives a transaction (no prepared statement has a name, no
 /// setting stays), so that a pooler may give every transaction another session. A result is in memory whole
 /// before its first row is read.
@@ -18,6 +20,8 @@ class PostgresConnection final : public Connection {
 
   Statement& prepared(std::string_view sql) override;
   void execute(const std::string& sql) override;
+  /// One statement for thousands of rows, each column an array.
+  Keys insert_rows(const BulkTable& table, std::size_t n, const BindRow& bind) override;
 
   bool usable() const;  ///< the server was there when it was last spoken to
   bool in_transaction() const;
@@ -27,6 +31,10 @@ class PostgresConnection final : public Connection {
   struct State;  ///< of the .cpp file
 
  private:
+  void insert_arrays(const BulkTable& table, const std::vector<std::string_view>& names,
+                     const PostgresArrays& arrays, std::size_t n, Keys& keys);
+  std::vector<std::int64_t> draw_keys(const BulkTable& table, std::size_t n);
+
   std::unique_ptr<State> state_;
 };
 

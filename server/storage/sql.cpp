@@ -24,6 +24,26 @@ Error to_error(const SqlError& error) {
   return make_error(Errc::internal, error.what());
 }
 
+Connection::Keys Connection::insert_rows(const BulkTable& table, std::size_t n, const BindRow& bind) {
+  std::string text =
+      "INSERT INTO " + std::string(table.name) + " (" + std::string(table.columns) + ") VALUES (?1";
+  const auto columns = std::ranges::count(table.columns, ',') + 1;
+  for (std::ptrdiff_t i = 2; i <= columns; ++i) text += ", ?" + std::to_string(i);
+  text += table.key.empty() ? ")" : ") ON CONFLICT DO NOTHING";
+  Query query(*this, text);
+  Keys keys;
+  if (!table.key.empty()) keys.reserve(n);
+  for (std::size_t row = 0; row < n; ++row) {
+    query.again();
+    bind(query, row);
+    if (table.key.empty())
+      query.run();
+    else
+      keys.push_back(query.inserted(table.key));
+  }
+  return keys;
+}
+
 double Query::real() {
   if (null()) {
     skip();

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "core/base/check.hpp"
 #include "core/base/enum_table.hpp"
@@ -64,6 +65,15 @@ class Statement {
   virtual std::span<const std::byte> blob(int column) = 0;  ///< until the next step or reset
 };
 
+class Query;
+
+/// A table that takes many rows in one call.
+struct BulkTable {
+  std::string_view name;
+  std::string_view columns;  ///< "a, b, c", in the order in which they are bound
+  std::string_view key{};    ///< integer key that the database gives out; empty: there is none
+};
+
 /// One connection, used by one thread at a time.
 class Connection {
  public:
@@ -71,12 +81,20 @@ class Connection {
   /// Prepared once per text and kept.
   virtual Statement& prepared(std::string_view sql) = 0;
   virtual void execute(const std::string& sql) = 0;
+
+  using BindRow = std::function<void(Query&, std::size_t row)>;
+  using Keys = std::vector<std::optional<std::int64_t>>;
+  /// Inserts `n` rows. With a key: the key of each, or nothing for one that is left out because there is one
+  /// like it, also among these. Without a key: a row that is there already is an error, nothing is answered.
+  /// One statement a row, which is the fastest way in SQLite; a database with round trips has another.
+  virtual Keys insert_rows(const BulkTable& table, std::size_t n, const BindRow& bind);
 };
 
 /// A statement in use: bind with <<, step, take columns in order; resets itself.
 class Query {
  public:
-  Query(Connection& connection, std::string_view sql) : statement_(connection.prepared(sql)) {}
+  Query(Connection& connection, std::string_view sql) : Query(connection.prepared(sql)) {}
+  explicit Query(Statement& statement) : statement_(statement) {}
   ~Query() { statement_.reset(); }
   Query(const Query&) = delete;
   Query& operator=(const Query&) = delete;
