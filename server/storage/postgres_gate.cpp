@@ -102,18 +102,18 @@ std::unique_ptr<PostgresConnection> PostgresPool::begun(const std::string& begin
 
 std::unique_ptr<PostgresConnection> PostgresPool::opened() {
   {
-    const auto shared = shared_.lock();
-    if (shared->trouble && SteadyClock::now() < shared->not_before) throw SqlError(*shared->trouble);
+    const auto outage = outage_.lock();
+    if (outage->trouble && SteadyClock::now() < outage->not_before) throw SqlError(*outage->trouble);
   }
   try {
     auto connection = open_();
-    auto shared = shared_.lock();
-    shared->trouble.reset();
+    auto outage = outage_.lock();
+    outage->trouble.reset();
     return connection;
   } catch (const SqlError& error) {
-    auto shared = shared_.lock();
-    shared->trouble = error;
-    shared->not_before = SteadyClock::now() + k_reopen_every;
+    auto outage = outage_.lock();
+    outage->trouble = error;
+    outage->not_before = SteadyClock::now() + k_reopen_every;
     throw;
   }
 }
@@ -122,8 +122,8 @@ PostgresGate::PostgresGate(PostgresPool::Open open, Limits limits)
     : limits_(limits),
       begin_write_(begin_text("SERIALIZABLE", limits.statement_timeout)),
       begin_read_(begin_text("REPEATABLE READ READ ONLY", limits.statement_timeout)),
-      writers_(open, limits.writers),
-      readers_(std::move(open), limits.readers) {}
+      writers_(open, limits.writers, outage_),
+      readers_(std::move(open), limits.readers, outage_) {}
 
 std::optional<Error> PostgresGate::enter(std::size_t rows) {
   auto status = status_.lock();

@@ -19,26 +19,31 @@ namespace anchord::sql {
 class PostgresPool {
  public:
   using Open = std::function<std::unique_ptr<PostgresConnection>()>;
-  PostgresPool(Open open, std::size_t size) : open_(std::move(open)), size_(size) {}
+  /// Since when the server is away; of all pools that reach the same, so that what one finds again is there
+  /// for the others too.
+  struct Outage {
+    std::chrono::steady_clock::time_point not_before{};
+    std::optional<SqlError> trouble;  ///< of the last connection that could not be opened
+  };
+  PostgresPool(Open open, std::size_t size, Locked<Outage>& outage)
+      : open_(std::move(open)), size_(size), outage_(outage) {}
 
   /// Runs `use` with a connection on which `begin` was executed. Throws SqlError, also what `use` throws: the
   /// transaction is undone then. `use` ends the transaction where it goes well.
   void run(const std::string& begin, const std::function<void(PostgresConnection&)>& use);
 
  private:
-  using SteadyClock = std::chrono::steady_clock;
   class Place;
   struct Shared {
     std::vector<std::unique_ptr<PostgresConnection>> idle;
     std::size_t in_use{0};
-    SteadyClock::time_point not_before{};
-    std::optional<SqlError> trouble;  ///< of the last connection that could not be opened
   };
   std::unique_ptr<PostgresConnection> begun(const std::string& begin);
   std::unique_ptr<PostgresConnection> opened();
 
   const Open open_;
   const std::size_t size_;
+  Locked<Outage>& outage_;
   Locked<Shared> shared_;
   std::condition_variable freed_;
 };
@@ -73,6 +78,7 @@ class PostgresGate final : public Gate {
 
   const Limits limits_;
   const std::string begin_write_, begin_read_;
+  Locked<PostgresPool::Outage> outage_;
   PostgresPool writers_, readers_;
   Locked<Status> status_;
 };

@@ -1,5 +1,5 @@
 // ./dev bench: one table. Every figure of ours stands beside a peer or a limit taken in the same run.
-//   node tests/bench/bench.mjs [solve] [bound] [ingest] [get] [fanout] [training] [predict] [grid] [devices] [commands] [dashboard]
+//   node tests/bench/bench.mjs [solve] [bound] [ingest] [databases] [get] [fanout] [training] [predict] [grid] [devices] [commands] [dashboard]
 import { execFileSync } from 'node:child_process';
 import { createServer } from 'node:http';
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
@@ -9,6 +9,7 @@ import { LiveClient } from '../e2e/live.mjs';
 import { eventually, run, startServer } from '../e2e/server.mjs';
 import { commands } from './commands.mjs';
 import { dashboard } from './dashboard.mjs';
+import { databases } from './databases.mjs';
 import { devices } from './devices.mjs';
 import { grid } from './grid.mjs';
 import { cpuSeconds, hammer, percentile, request } from './load.mjs';
@@ -390,6 +391,13 @@ if (on('commands')) {
   say('commands to an aircraft beside a flood');
   await commands(row).catch((error) => {
     row('commands', `FAILED: ${error.message.split('\n')[0]}`);
+    process.exitCode = 1;
+  });
+}
+if (on('databases')) {
+  say('SQLite and PostgreSQL');
+  await databases(row).catch((error) => {
+    row('databases', `FAILED: ${error.message.split('\n')[0]}`);
     process.exitCode = 1;
   });
 }

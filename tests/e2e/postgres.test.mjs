@@ -27,8 +27,9 @@ const serve = (url, { env = postgres.env, data = 'never served' } = {}) =>
 before(async () => {
   postgres = await startPostgres();
   await postgres.psql('CREATE DATABASE anchord');
-  server = await startServer({ auth: 'on', args: ['--database', postgres.url('anchord')], env: postgres.env });
+  server = await startServer({ args: ['--database', postgres.url('anchord')], env: postgres.env });
   flight = await simulatedFlight({ duration: 60 });
+  flight.ranges = flight.ranges.filter((row) => row.distance_m > 0); // Pozyx's failures
 });
 after(async () => {
   await server?.dispose();
@@ -43,7 +44,7 @@ test('a flight is measured, calibrated, published and exported, and nothing of i
     const answer = await server.fetch(`/api/v1/${what}?mission=${mission}`, rows(flight[what]));
     assert.equal((await answer.json()).accepted, flight[what].length);
     const again = await server.fetch(`/api/v1/${what}?mission=${mission}`, rows(flight[what]));
-    assert.equal((await again.json()).duplicate, flight[what].length);
+    assert.equal((await again.json()).duplicates, flight[what].length);
   }
   await post(`/api/v1/missions/${mission}/actions`, { action: 'finish' });
   const solved = await post('/api/v1/calibrations', { missions: [mission] }, { prefer: 'wait=120' });
@@ -74,10 +75,11 @@ test('backups are left to PostgreSQL, and a command that would open a file of SQ
     assert.match(ended.stderr, says);
   }
   assert.equal(existsSync(join(server.dataDir, 'anchord.db')), false);
-  const listed = await run(['token', 'list', ...at, '--database', postgres.url('anchord')], { env: postgres.env });
-  assert.equal(listed.code, 0, listed.stderr);
-  assert.match(listed.stdout, /first run/);
-  const looked = await run(['doctor', ...at, '--database', postgres.url('anchord')], { env: postgres.env });
+  const there = [...at, '--database', postgres.url('anchord')];
+  const made = await run(['token', 'create', '--name', 'reader', '--role', 'viewer', ...there], { env: postgres.env });
+  assert.equal(made.code, 0, made.stderr);
+  assert.equal(await postgres.psql('SELECT name FROM token', 'anchord'), 'reader');
+  const looked = await run(['doctor', ...there], { env: postgres.env });
   assert.match(looked.stdout, /PostgreSQL 15/);
   await server.start();
 });
