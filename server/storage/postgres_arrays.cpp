@@ -1,5 +1,6 @@
 #include "server/storage/postgres_arrays.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -7,6 +8,7 @@
 namespace anchord::sql {
 namespace {
 
+constexpr std::size_t k_head_bytes = 5 * sizeof(std::uint32_t);
 constexpr std::uint32_t k_null_length = 0xffffffff;
 
 /// Of the arrays of a type (typarray in pg_type.dat).
@@ -35,8 +37,8 @@ std::string& PostgresArrays::next(int index, unsigned type, std::size_t bytes) {
   column.type = type;
   ++column.rows;
   bytes_ += bytes + sizeof(std::uint32_t);
-  put_big_endian(column.elements, static_cast<std::uint32_t>(bytes));
-  return column.elements;
+  put_big_endian(column.array, static_cast<std::uint32_t>(bytes));
+  return column.array;
 }
 
 void PostgresArrays::bind_null(int index) {
@@ -44,7 +46,7 @@ void PostgresArrays::bind_null(int index) {
   ++column.rows;
   column.has_null = true;
   bytes_ += sizeof(std::uint32_t);
-  put_big_endian(column.elements, k_null_length);
+  put_big_endian(column.array, k_null_length);
 }
 
 void PostgresArrays::bind_integer(int index, std::int64_t value) {
@@ -68,16 +70,15 @@ void PostgresArrays::bind_blob(int index, std::span<const std::byte> value) {
 unsigned PostgresArrays::type(std::size_t column) const { return array_of(columns_[column].type); }
 
 /// Dimensions, whether there are NULLs, type of the elements, length, lower bound, elements: array_send().
-std::string PostgresArrays::array(std::size_t column) const {
-  const Column& of = columns_[column];
-  std::string out;
-  out.reserve(of.elements.size() + 20);
-  put_big_endian(out, std::uint32_t{1});
-  put_big_endian(out, std::uint32_t{of.has_null});
-  put_big_endian(out, std::uint32_t{of.type});
-  put_big_endian(out, of.rows);
-  put_big_endian(out, std::uint32_t{1});
-  return out += of.elements;
+std::string_view PostgresArrays::array(std::size_t column) {
+  Column& of = columns_[column];
+  std::size_t at = 0;
+  for (const std::uint32_t word : {1u, std::uint32_t{of.has_null}, of.type, of.rows, 1u}) {
+    const auto bytes = big_endian_bytes(word);
+    std::ranges::copy(bytes, of.array.begin() + static_cast<std::ptrdiff_t>(at));
+    at += bytes.size();
+  }
+  return of.array;
 }
 
 void PostgresArrays::clear() {
@@ -85,7 +86,7 @@ void PostgresArrays::clear() {
     column.type = 0;
     column.rows = 0;
     column.has_null = false;
-    column.elements.clear();
+    column.array.assign(k_head_bytes, '\0');
   }
   bytes_ = 0;
 }

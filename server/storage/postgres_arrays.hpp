@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -18,17 +19,24 @@ enum PostgresType : unsigned {
   k_float8 = 701,
 };
 
-/// Appends a number as PostgreSQL's wire has it.
+/// A number as PostgreSQL's wire has it.
+template <class T>
+std::array<char, sizeof(T)> big_endian_bytes(T value) {
+  std::array<char, sizeof(T)> out;
+  for (std::size_t i = 0; i < sizeof(T); ++i)
+    out[i] = static_cast<char>(static_cast<unsigned char>(value >> (8 * (sizeof(T) - 1 - i))));
+  return out;
+}
 template <class T>
 void put_big_endian(std::string& out, T value) {
-  for (int shift = static_cast<int>(sizeof(T)) * 8 - 8; shift >= 0; shift -= 8)
-    out += static_cast<char>(static_cast<unsigned char>(value >> shift));
+  const auto bytes = big_endian_bytes(value);
+  out.append(bytes.data(), bytes.size());
 }
 
 /// Rows that are bound one after another, kept as one array a column in PostgreSQL's binary form.
 class PostgresArrays final : public Statement {
  public:
-  explicit PostgresArrays(std::size_t columns) : columns_(columns) {}
+  explicit PostgresArrays(std::size_t columns) : columns_(columns) { clear(); }
 
   void bind_null(int index) override;
   void bind_integer(int index, std::int64_t value) override;
@@ -41,7 +49,8 @@ class PostgresArrays final : public Statement {
   /// Type of the elements; 0 when all are NULL.
   unsigned element(std::size_t column) const { return columns_[column].type; }
   unsigned type(std::size_t column) const;
-  std::string array(std::size_t column) const;
+  /// Until the next change.
+  std::string_view array(std::size_t column);
   /// Empty again, for more rows.
   void clear();
 
@@ -59,7 +68,7 @@ class PostgresArrays final : public Statement {
     unsigned type{0};
     std::uint32_t rows{0};
     bool has_null{false};
-    std::string elements;
+    std::string array;  ///< the elements behind room for what describes them
   };
   /// Where the next element goes, its length written.
   std::string& next(int index, unsigned type, std::size_t bytes);

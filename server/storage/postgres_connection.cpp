@@ -103,8 +103,10 @@ class PostgresStatement final : public Statement {
     fresh(index, k_bytea).borrowed = value;
   }
 
-  /// In PostgreSQL's binary form.
-  void bind_binary(int index, unsigned type, std::string value) { fresh(index, type).own = std::move(value); }
+  /// In PostgreSQL's binary form; must live until reset.
+  void bind_binary(int index, unsigned type, std::string_view value) {
+    fresh(index, type).borrowed = std::as_bytes(std::span{value});
+  }
 
   bool step() override {
     if (!ran_) run("");
@@ -159,10 +161,10 @@ class PostgresStatement final : public Statement {
     std::span<const std::byte> borrowed;
     const char* data() const {
       // A null pointer would be NULL; an empty value is one.
-      if (type != k_bytea) return own.data();
-      return borrowed.empty() ? "" : reinterpret_cast<const char*>(borrowed.data());
+      if (borrowed.data() == nullptr) return own.data();
+      return reinterpret_cast<const char*>(borrowed.data());
     }
-    std::size_t size() const { return type == k_bytea ? borrowed.size() : own.size(); }
+    std::size_t size() const { return borrowed.data() == nullptr ? own.size() : borrowed.size(); }
   };
 
   Parameter& at(int index) {
@@ -174,6 +176,7 @@ class PostgresStatement final : public Statement {
     Parameter& parameter = at(index);
     parameter.type = type;
     parameter.own.clear();
+    parameter.borrowed = {};
     return parameter;
   }
 
@@ -334,8 +337,7 @@ void PostgresConnection::execute(const std::string& sql) {
 
 Connection::Keys PostgresConnection::insert_rows(const BulkTable& table, std::size_t n, const BindRow& bind) {
   if (n <= k_few_rows) return Connection::insert_rows(table, n, bind);
-  const auto names = split_columns(table.columns);
-  PostgresArrays arrays(names.size());
+  PostgresArrays arrays(split_columns(table.columns).size());
   Query row(arrays);
   Keys keys;
   for (std::size_t at = 0; at < n;) {
@@ -345,52 +347,67 @@ Connection::Keys PostgresConnection::insert_rows(const BulkTable& table, std::si
       row.again();
       bind(row, at++);
     }
-    insert_arrays(table, names, arrays, at - first, keys);
+    insert_arrays(table, arrays, at - first, keys);
   }
   return keys;
 }
 
-/// Keys are drawn before, for RETURNING does not tell which of the rows it is about.
-void PostgresConnection::insert_arrays(const BulkTable& table, const std::vector<std::string_view>& names,
-                                       const PostgresArrays& arrays, std::size_t n, Keys& keys) {
-  const std::string key(table.key);
-  std::string into, values, from, columns;
-  int parameter = 0;
-  const auto add = [&](std::string_view name, bool given) {
-    const std::string column = given ? "c" + std::to_string(++parameter) : "NULL";
-    into.append(into.empty() ? "" : ", ").append(name);
-    values.append(values.empty() ? "" : ", ").append(column);
-    if (!given) return;
-    from.append(from.empty() ? "?" : ", ?").append(std::to_string(parameter));
-    columns.append(columns.empty() ? "" : ", ").append(column);
+/// Keys are drawn before, for RETURNING does not tell which of the rows it is about. A row that is there
+/// already is rare, and looking for one with every row costs a third: first as if there were none.
+void PostgresConnection::insert_arrays(const BulkTable& table, PostgresArrays& arrays, std::size_t n,
+                                       Keys& keys) {
+  if (table.key.empty()) return void(insert_arrays(table, arrays, {}, ""));
+  const auto drawn = draw_keys(table, n);
+  execute("SAVEPOINT bulk");
+  try {
+    insert_arrays(table, arrays, drawn, "");
+    execute("RELEASE SAVEPOINT bulk");
+    keys.insert(keys.end(), drawn.begin(), drawn.end());
+    return;
+  } catch (const SqlError& error) {
+    if (error.failure() != Failure::constraint) throw;
+  }
+  execute("ROLLBACK TO SAVEPOINT bulk; RELEASE SAVEPOINT bulk");
+  const auto taken =
+      insert_arrays(table, arrays, drawn, " ON CONFLICT DO NOTHING RETURNING " + std::string(table.key));
+  for (const auto key : drawn)
+    keys.push_back(std::ranges::binary_search(taken, key) ? std::optional(key) : std::nullopt);
+}
+
+std::vector<std::int64_t> PostgresConnection::insert_arrays(const BulkTable& table, PostgresArrays& arrays,
+                                                            const std::vector<std::int64_t>& drawn,
+                                                            const std::string& behind) {
+  PostgresArrays of_keys(1);
+  for (const auto key : drawn) of_keys.bind_integer(1, key);
+  struct Given {
+    unsigned type;
+    std::string_view array;
   };
-  std::vector<std::int64_t> drawn;
-  if (!key.empty()) {
-    drawn = draw_keys(table, n);
-    add(key, true);
-  }
-  for (std::size_t i = 0; i < names.size(); ++i) add(names[i], arrays.element(i) != 0);
-  const std::string text = "INSERT INTO " + std::string(table.name) + " (" + into + ") SELECT " + values +
-                           " FROM unnest(" + from + ") AS r(" + columns + ")" +
-                           (key.empty() ? "" : " ON CONFLICT DO NOTHING RETURNING " + key);
-  auto& statement = static_cast<PostgresStatement&>(prepared(text));
+  std::vector<Given> given;
+  std::string into, values, from, columns;
+  const auto add = [&](std::string_view name, PostgresArrays& of, std::size_t column) {
+    into.append(into.empty() ? "" : ", ").append(name);
+    values.append(values.empty() ? "" : ", ");
+    if (of.element(column) == 0) return void(values.append("NULL"));
+    given.push_back({of.type(column), of.array(column)});
+    const std::string number = std::to_string(given.size());
+    values.append("c" + number);
+    from.append(from.empty() ? "?" : ", ?").append(number);
+    columns.append(columns.empty() ? "c" : ", c").append(number);
+  };
+  if (!drawn.empty()) add(table.key, of_keys, 0);
+  std::size_t column = 0;
+  for (const auto name : split_columns(table.columns)) add(name, arrays, column++);
+  auto& statement = static_cast<PostgresStatement&>(prepared("INSERT INTO " + std::string(table.name) + " (" +
+                                                             into + ") SELECT " + values + " FROM unnest(" +
+                                                             from + ") AS r(" + columns + ")" + behind));
   Query query(statement);
-  parameter = 0;
-  if (!key.empty()) {
-    PostgresArrays of_keys(1);
-    for (const auto one : drawn) of_keys.bind_integer(1, one);
-    statement.bind_binary(++parameter, of_keys.type(0), of_keys.array(0));
-  }
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (arrays.element(i) != 0) statement.bind_binary(++parameter, arrays.type(i), arrays.array(i));
-  }
-  const std::size_t first = keys.size();
-  if (!key.empty()) keys.resize(first + n);
-  while (query.step()) {
-    const auto one = query.integer();
-    const auto at = std::ranges::lower_bound(drawn, one) - drawn.begin();
-    keys[first + static_cast<std::size_t>(at)] = one;
-  }
+  int parameter = 0;
+  for (const Given& one : given) statement.bind_binary(++parameter, one.type, one.array);
+  std::vector<std::int64_t> answered;
+  while (query.step()) answered.push_back(query.integer());
+  std::ranges::sort(answered);
+  return answered;
 }
 
 std::vector<std::int64_t> PostgresConnection::draw_keys(const BulkTable& table, std::size_t n) {

@@ -31,8 +31,10 @@ class PostgresConnection final : public Connection {
   struct State;  ///< of the .cpp file
 
  private:
-  void insert_arrays(const BulkTable& table, const std::vector<std::string_view>& names,
-                     const PostgresArrays& arrays, std::size_t n, Keys& keys);
+  void insert_arrays(const BulkTable& table, PostgresArrays& arrays, std::size_t n, Keys& keys);
+  /// Answers what `behind` returns, sorted.
+  std::vector<std::int64_t> insert_arrays(const BulkTable& table, PostgresArrays& arrays,
+                                          const std::vector<std::int64_t>& drawn, const std::string& behind);
   std::vector<std::int64_t> draw_keys(const BulkTable& table, std::size_t n);
 
   std::unique_ptr<State> state_;
