@@ -70,8 +70,8 @@ template <class Act>
 int with_folder(const Options& options, Act act) {
   StorageOptions storage;
   storage.data_dir = options.data_dir;
-  if (options.database.empty() && sql::postgres_of_folder(storage.data_dir).empty() &&
-      !std::filesystem::exists(storage.data_dir / "anchord.db"))
+  const bool elsewhere = !options.database.empty() || !sql::postgres_of_folder(storage.data_dir).empty();
+  if (!std::filesystem::exists(elsewhere ? storage.data_dir : storage.data_dir / "anchord.db"))
     return fail("there is no anchord database in " + options.data_dir +
                     ": name its folder by --data-dir; 'anchord serve' makes a new one, with a first token",
                 2);

@@ -119,7 +119,9 @@ Result<void> DataFolder::note_postgres(const std::string& shown_address) {
   return write_small(dir_ / k_postgres, shown_address + "\n");
 }
 
-void DataFolder::forget_postgres() { ::unlink((dir_ / k_postgres).c_str()); }
+void DataFolder::forget_database() {
+  for (const char* name : {k_postgres, k_marker}) ::unlink((dir_ / name).c_str());
+}
 
 Result<void> DataFolder::check_rows_are_here() const {
   const std::string there = postgres();

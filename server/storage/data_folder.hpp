@@ -35,8 +35,8 @@ class DataFolder {
 
   std::string postgres() const { return postgres_of_folder(dir_); }
   Result<void> note_postgres(const std::string& shown_address);
-  /// From here on the rows are those of the folder's own file again.
-  void forget_postgres();
+  /// As of a folder that never had rows: the next database is made here.
+  void forget_database();
   /// Errors: unsupported where they are in PostgreSQL, with what to do.
   Result<void> check_rows_are_here() const;
 

@@ -7,6 +7,7 @@
 #include "core/base/locked.hpp"
 #include "migrations/migration.hpp"
 #include "server/storage/data_folder.hpp"
+#include "server/storage/database_copy.hpp"
 #include "server/storage/postgres_gate.hpp"
 #include "server/storage/postgres_migrate.hpp"
 #include "server/storage/postgres_text.hpp"
@@ -21,6 +22,7 @@ using sql::SqlError;
 
 constexpr auto k_look_every = std::chrono::seconds(2);
 constexpr const char* k_bytes = "SELECT pg_database_size(current_database())";
+constexpr const char* k_has_rows = "SELECT EXISTS (SELECT 1 FROM mission) OR EXISTS (SELECT 1 FROM token)";
 constexpr const char* k_facts =
     "SELECT current_setting('server_version'), pg_database_size(current_database())";
 
@@ -104,6 +106,11 @@ class PostgresDatabase final : public Database {
   Thread watch_;
 };
 
+bool has_rows(sql::Connection& connection) {
+  sql::Query query(connection, k_has_rows);
+  return query.step() && query.integer() != 0;
+}
+
 Result<void> check_address(const std::string& address) {
   if (const auto fault = sql::address_fault(address); !fault.empty())
     return make_error(Errc::invalid_argument, "database " + sql::shown_address(address) + ": " + fault);
@@ -115,15 +122,18 @@ Result<void> check_address(const std::string& address) {
 Result<std::unique_ptr<Database>> open_postgres(const PostgresOptions& options) {
   BOOST_OUTCOME_TRYV(check_address(options.address));
   BOOST_OUTCOME_TRY(auto folder, sql::DataFolder::open(options.data_dir, 0));
-  if (folder->had_database() && folder->postgres().empty()) {
-    return make_error(Errc::unsupported, "data folder " + options.data_dir.string() +
-                                             " has a database of its own, whose rows are not in " +
-                                             sql::shown_address(options.address) +
-                                             ": name another --data-dir");
-  }
   try {
     PostgresConnection connection(options.address);
     BOOST_OUTCOME_TRYV(sql::migrate_postgres(connection, postgresql_migrations(), SystemClock{}.now()));
+    BOOST_OUTCOME_TRYV(sql::check_copy_is_whole(connection, sql::k_unfinished_in_postgres));
+    // Rows of a flight would seem to be gone.
+    if (folder->had_database() && folder->postgres().empty() && !has_rows(connection)) {
+      return make_error(Errc::unsupported,
+                        "data folder " + options.data_dir.string() + " has a database of its own and " +
+                            sql::shown_address(options.address) +
+                            " is empty: copy the rows with 'anchord database copy', or name "
+                            "another --data-dir");
+    }
     BOOST_OUTCOME_TRYV(folder->note_postgres(sql::shown_address(options.address)));
     return std::unique_ptr<Database>(std::make_unique<PostgresDatabase>(options, std::move(folder)));
   } catch (const SqlError& error) {

@@ -7,9 +7,11 @@
 #include "migrations/migration.hpp"
 #include "server/storage/backup.hpp"
 #include "server/storage/data_folder.hpp"
+#include "server/storage/database_copy.hpp"
 #include "server/storage/migrate.hpp"
 #include "server/storage/reader_pool.hpp"
 #include "server/storage/sqlite_connection.hpp"
+#include "server/storage/sqlite_file.hpp"
 #include "server/storage/stores.hpp"
 #include "server/storage/write_queue.hpp"
 
@@ -168,8 +170,10 @@ Result<bool> judge_file(const DataFolder& folder) {
   return false;
 }
 
-Result<std::unique_ptr<SqliteConnection>> open_writer(const StorageOptions& options, DataFolder& folder,
-                                                      bool check) {
+}  // namespace
+
+Result<std::unique_ptr<SqliteConnection>> sql::open_sqlite_file(const StorageOptions& options,
+                                                                DataFolder& folder, bool check) {
   const std::uint64_t bytes = size_of(folder.database());
   if (bytes == 0 && (folder.had_database() || size_of(folder.wal()) > 0)) {
     return damaged(folder,
@@ -194,8 +198,6 @@ Result<std::unique_ptr<SqliteConnection>> open_writer(const StorageOptions& opti
   return writer;
 }
 
-}  // namespace
-
 int newest_schema_version() { return static_cast<int>(sqlite_migrations().size()); }
 
 Result<std::unique_ptr<Database>> open_database(const StorageOptions& options) {
@@ -203,7 +205,8 @@ Result<std::unique_ptr<Database>> open_database(const StorageOptions& options) {
   BOOST_OUTCOME_TRYV(folder->check_rows_are_here());
   try {
     const bool check = size_of(folder->database()) <= k_check_at_start_bytes;
-    BOOST_OUTCOME_TRY(auto writer, open_writer(options, *folder, check));
+    BOOST_OUTCOME_TRY(auto writer, sql::open_sqlite_file(options, *folder, check));
+    BOOST_OUTCOME_TRYV(sql::check_copy_is_whole(*writer, sql::k_unfinished_in_sqlite));
     folder->fill_reserve(options.refuse_free_bytes);
     return std::unique_ptr<Database>(
         std::make_unique<SqliteDatabase>(options, std::move(folder), std::move(writer), !check));

@@ -19,7 +19,11 @@ function familySeconds(pid) {
   return [pid, ...children].reduce((sum, one) => sum + cpuSeconds(one), ended / 100);
 }
 
-const samples = Buffer.from(Array.from({ length: 1016 * 4 }, (_, i) => (i * 37) & 0xff)).toString('base64');
+// As a receiver's: small numbers of both signs in which a compressor finds nothing (Park and Miller's generator).
+let noise = 1;
+const samples = Buffer.from(
+  new Int16Array(1016 * 2).map(() => ((noise = (noise * 48271) % 2147483647) % 400) - 200).buffer,
+).toString('base64');
 const cir = `,"cir":{"n":1016,"dt_ps":1001.6,"first_path_idx":744.2,"rxpacc":1001,"b64":"${samples}"}`;
 let sequence = 0;
 const range = (mission, extra) => {
@@ -46,9 +50,7 @@ async function mission(server) {
       tags: [{ tag: '0x6e01', antenna: 0, lever_arm_body_m: [0, 0, 0] }],
     },
   });
-  const { id } = await answer.json();
-  await server.fetch(`/api/v1/missions/${id}/actions`, { json: { action: 'finish' } }); // rows are stored, nothing is solved live
-  return id;
+  return (await answer.json()).id;
 }
 
 async function send(server, path, body, count) {

@@ -1,0 +1,94 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+
+#include "core/base/text.hpp"
+#include "server/cli/commands.hpp"
+#include "server/cli/progress.hpp"
+#include "server/storage/database_copy.hpp"
+
+namespace anchord::cli {
+namespace {
+
+struct Options {
+  std::string from, to;
+};
+
+int fail(const Error& error) {
+  std::fprintf(stderr, "anchord: %s\n", printable(error.message).c_str());
+  const bool input = error.code == Errc::invalid_argument || error.code == Errc::not_found ||
+                     error.code == Errc::unsupported;
+  return input ? 2 : 1;
+}
+
+void print(const sql::TableDigest& table) {
+  std::printf("%-28s %10llu  %s\n", table.table.c_str(), static_cast<unsigned long long>(table.rows),
+              table.sha256_hex.c_str());
+}
+
+int migrate(const Options& options) {
+  const auto version = migrate_database(options.from);
+  if (!version) return fail(version.error());
+  std::printf("version %d\n", version.value());
+  return 0;
+}
+
+int check(const Options& options) {
+  const auto here = digest_database(options.from);
+  if (!here) return fail(here.error());
+  if (options.to.empty()) {
+    for (const auto& table : here.value()) print(table);
+    return 0;
+  }
+  const auto there = digest_database(options.to);
+  if (!there) return fail(there.error());
+  int differ = 0;
+  for (std::size_t i = 0; i < here.value().size(); ++i) {
+    const auto& one = here.value()[i];
+    const auto& other = there.value()[i];
+    if (one == other) continue;
+    ++differ;
+    std::printf("%-28s %10llu rows, there %llu\n", one.table.c_str(),
+                static_cast<unsigned long long>(one.rows), static_cast<unsigned long long>(other.rows));
+  }
+  std::printf("%zu tables, %d differ\n", here.value().size(), differ);
+  return differ == 0 ? 0 : 1;
+}
+
+int copy(const Options& options) {
+  (void)interrupted();
+  std::string told;
+  const auto done = copy_database(options.from, options.to, [&](const std::string& table, std::uint64_t) {
+    if (table != told) std::fprintf(stderr, "%s\n", table.c_str());
+    told = table;
+    return !interrupted();
+  });
+  if (!done) return fail(done.error());
+  for (const auto& table : done.value()) print(table);
+  return 0;
+}
+
+}  // namespace
+
+void add_database_command(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand(
+      "database", "Migrate, compare and copy whole databases: SQLite folders and PostgreSQL");
+  command->require_subcommand(1);
+  const auto options = std::make_shared<Options>();
+  const char* place = "data folder, or postgresql://user@host/name";
+  auto* migrated = command->add_subcommand("migrate", "Bring a database to the newest version");
+  migrated->add_option("database", options->from, place)->required();
+  migrated->callback([&exit_code, options] { exit_code = migrate(*options); });
+  auto* checked =
+      command->add_subcommand("check", "Print rows and digest of each table, or compare two databases");
+  checked->add_option("database", options->from, place)->required();
+  checked->add_option("other", options->to, "compare with this one");
+  checked->callback([&exit_code, options] { exit_code = check(*options); });
+  auto* copied = command->add_subcommand(
+      "copy", "Copy all rows into an empty database and compare; given again, goes on where it was cut off");
+  copied->add_option("from", options->from, place)->required();
+  copied->add_option("to", options->to, place)->required();
+  copied->callback([&exit_code, options] { exit_code = copy(*options); });
+}
+
+}  // namespace anchord::cli

@@ -1,0 +1,197 @@
+#include "server/storage/database_copy.hpp"
+
+#include <algorithm>
+
+#include "core/base/text.hpp"
+#include "migrations/migration.hpp"
+#include "server/storage/postgres_connection.hpp"
+#include "server/storage/postgres_migrate.hpp"
+#include "server/storage/postgres_text.hpp"
+#include "server/storage/sqlite_file.hpp"
+
+namespace anchord {
+namespace {
+
+using sql::Connection;
+using sql::Query;
+using sql::RowTable;
+using sql::SqlError;
+
+/// Has one row from the start, which a copy brings along.
+constexpr std::string_view k_seeded = "service_state";
+
+bool is_address(const std::string& place) { return place.find("://") != std::string::npos; }
+
+/// A database at the newest version, and the lock of its folder.
+struct Place {
+  std::string shown;
+  std::unique_ptr<sql::DataFolder> folder{};  ///< of SQLite
+  std::unique_ptr<Connection> connection{};
+
+  bool postgres() const { return folder == nullptr; }
+  void begin_reading() const {
+    connection->execute(postgres() ? "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY" : "BEGIN");
+  }
+  void begin_writing() const { connection->execute(postgres() ? "BEGIN" : "BEGIN IMMEDIATE"); }
+  bool unfinished() const {
+    Query query(*connection, postgres() ? sql::k_unfinished_in_postgres : sql::k_unfinished_in_sqlite);
+    return query.step() && query.integer() > 0;
+  }
+};
+
+Result<Place> open_postgres_place(const std::string& address) {
+  Place place{sql::shown_address(address)};
+  if (const auto fault = sql::address_fault(address); !fault.empty())
+    return make_error(Errc::invalid_argument, place.shown + ": " + fault);
+  auto connection = std::make_unique<sql::PostgresConnection>(address);
+  BOOST_OUTCOME_TRYV(sql::migrate_postgres(*connection, postgresql_migrations(), SystemClock{}.now()));
+  place.connection = std::move(connection);
+  return place;
+}
+
+Result<Place> open_folder(const std::string& dir, bool fill) {
+  Place place{std::filesystem::absolute(dir).lexically_normal().string()};
+  if (!fill && !std::filesystem::exists(std::filesystem::path(dir) / "anchord.db"))
+    return make_error(Errc::not_found, "there is no anchord database in " + dir);
+  BOOST_OUTCOME_TRY(place.folder, sql::DataFolder::open(dir, 0));
+  // Rows come home into a folder whose own file is gone.
+  if (fill && !place.folder->postgres().empty() && !std::filesystem::exists(place.folder->database()))
+    place.folder->forget_database();
+  BOOST_OUTCOME_TRYV(place.folder->check_rows_are_here());
+  StorageOptions options;
+  options.data_dir = dir;
+  BOOST_OUTCOME_TRY(place.connection, sql::open_sqlite_file(options, *place.folder, true));
+  return place;
+}
+
+Result<Place> open_place(const std::string& place, bool fill = false) {
+  return is_address(place) ? open_postgres_place(place) : open_folder(place, fill);
+}
+
+Result<void> ready(Place& to, const std::string& source, const std::vector<RowTable>& tables) {
+  Connection& c = *to.connection;
+  if (to.unfinished()) {
+    Query begun(c, "SELECT source FROM unfinished_copy");
+    const std::string before = begun.step() ? begun.text() : "";
+    if (before == source) return boost::outcome_v2::success();
+    return make_error(Errc::conflict, "a copy from " + before + " into " + to.shown +
+                                          " was not finished: finish that one, or give a new database");
+  }
+  for (const RowTable& table : tables) {
+    if (table.name == k_seeded) continue;
+    if (const auto rows = sql::count_rows(c, table); rows > 0) {
+      return make_error(Errc::conflict, to.shown + " has rows already (" + std::to_string(rows) + " in " +
+                                            table.name + "): a copy goes into an empty database; " +
+                                            (to.postgres() ? "make one with createdb"
+                                                           : "name a folder that does not exist yet"));
+    }
+  }
+  to.begin_writing();
+  c.execute("CREATE TABLE unfinished_copy (source TEXT)");
+  Query note(c, "INSERT INTO unfinished_copy (source) VALUES (?1)");
+  note << source;
+  note.run();
+  c.execute("DELETE FROM " + std::string(k_seeded));
+  c.execute("COMMIT");
+  return boost::outcome_v2::success();
+}
+
+Result<void> copy_table(Place& from, Place& to, const RowTable& table, const CopyProgress& progress) {
+  sql::RowPages pages(*from.connection, table);
+  pages.begin_after(sql::last_key(*to.connection, table));
+  std::uint64_t rows = 0;
+  for (auto page = pages.next(); !page.empty(); page = pages.next()) {
+    to.begin_writing();
+    sql::insert_cells(*to.connection, table, page);
+    to.connection->execute("COMMIT");
+    rows += page.size();
+    if (progress(table.name, rows)) continue;
+    return make_error(Errc::canceled, "the copy was ended; the same command goes on where it was");
+  }
+  return boost::outcome_v2::success();
+}
+
+/// Keys that are given out from now on are beyond those that came along. SQLite looks for itself.
+void set_keys(Place& to, const RowTable& table) {
+  if (!to.postgres() || table.key.size() != 1 || table.types[table.key[0]] != RowTable::Type::integer) return;
+  const std::string& key = table.columns[table.key[0]];
+  Query query(*to.connection, "SELECT setval(pg_get_serial_sequence('" + table.name + "', '" + key +
+                                  "'), (SELECT max(" + key + ") FROM " + table.name + "))");
+  query.run();
+}
+
+std::vector<sql::TableDigest> digests(Place& place, const std::vector<RowTable>& tables) {
+  std::vector<sql::TableDigest> out;
+  for (const RowTable& table : tables) out.push_back(sql::digest_of(*place.connection, table));
+  return out;
+}
+
+Result<std::vector<sql::TableDigest>> copy_rows(Place& from, Place& to, const CopyProgress& progress) {
+  const auto tables = sql::row_tables();
+  BOOST_OUTCOME_TRYV(ready(to, from.shown, tables));
+  from.begin_reading();
+  for (const RowTable& table : tables) {
+    BOOST_OUTCOME_TRYV(copy_table(from, to, table, progress));
+    set_keys(to, table);
+  }
+  auto expected = digests(from, tables);
+  const auto found = digests(to, tables);
+  from.connection->execute("ROLLBACK");
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    if (expected[i] == found[i]) continue;
+    return make_error(Errc::conflict, "table " + expected[i].table + " differs after the copy (" +
+                                          std::to_string(expected[i].rows) + " rows, there " +
+                                          std::to_string(found[i].rows) + "): " + from.shown +
+                                          " was changed meanwhile; begin again with a new database");
+  }
+  to.connection->execute("DROP TABLE unfinished_copy");
+  return expected;
+}
+
+/// SqlError never leaves this folder.
+template <class F>
+auto without_throwing(F work) -> decltype(work()) {
+  try {
+    return work();
+  } catch (const SqlError& error) {
+    return sql::to_error(error);
+  }
+}
+
+}  // namespace
+
+Result<int> migrate_database(const std::string& place) {
+  return without_throwing([&]() -> Result<int> {
+    BOOST_OUTCOME_TRYV(open_place(place));
+    return newest_schema_version();
+  });
+}
+
+Result<std::vector<sql::TableDigest>> digest_database(const std::string& place) {
+  return without_throwing([&]() -> Result<std::vector<sql::TableDigest>> {
+    BOOST_OUTCOME_TRY(auto opened, open_place(place));
+    opened.begin_reading();
+    return digests(opened, sql::row_tables());
+  });
+}
+
+Result<std::vector<sql::TableDigest>> copy_database(const std::string& from, const std::string& to,
+                                                    const CopyProgress& progress) {
+  return without_throwing([&]() -> Result<std::vector<sql::TableDigest>> {
+    BOOST_OUTCOME_TRY(auto source, open_place(from));
+    if (source.unfinished())
+      return make_error(Errc::unsupported, "a copy into " + source.shown + " has not come to its end");
+    BOOST_OUTCOME_TRY(auto target, open_place(to, true));
+    return copy_rows(source, target, progress);
+  });
+}
+
+Result<void> sql::check_copy_is_whole(Connection& connection, const char* exists) {
+  Query query(connection, exists);
+  if (!query.step() || query.integer() == 0) return boost::outcome_v2::success();
+  return make_error(Errc::unsupported,
+                    "a copy into this database has not come to its end: give 'anchord database copy' again, "
+                    "or make a new database");
+}
+
+}  // namespace anchord

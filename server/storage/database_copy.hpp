@@ -1,0 +1,40 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "server/storage/row_tables.hpp"
+
+/// Whole databases: brought to a version, compared, moved between a file of SQLite and PostgreSQL. A place is
+/// a data folder or postgresql://user@host/name; nobody else may have the folder, and no server should serve
+/// a database that is copied.
+namespace anchord {
+
+/// Returns the version. Errors: those of open_database() and open_postgres().
+Result<int> migrate_database(const std::string& place);
+
+/// Of every table; of a database of an older version too, which is migrated first.
+Result<std::vector<sql::TableDigest>> digest_database(const std::string& place);
+
+/// Called after each table or some thousand rows; false ends the copy, which can be gone on with.
+using CopyProgress = std::function<bool(const std::string& table, std::uint64_t rows)>;
+
+/// Copies all rows of `from` into `to`, which has none, and compares both by digests. One that was cut off
+/// goes on where it was; until it is whole, no server takes the database. What is no row (keys, recordings)
+/// stays in its folder. Returns what was copied. Errors: conflict (`to` has rows; they differ in the end;
+/// another process has the folder), canceled, those of the databases.
+Result<std::vector<sql::TableDigest>> copy_database(const std::string& from, const std::string& to,
+                                                    const CopyProgress& progress);
+
+namespace sql {
+/// unsupported where a copy into this database has not come to its end. `exists` tells whether its table is
+/// there.
+Result<void> check_copy_is_whole(Connection& connection, const char* exists);
+inline constexpr const char* k_unfinished_in_sqlite =
+    "SELECT count(*) FROM sqlite_schema WHERE name = 'unfinished_copy'";
+inline constexpr const char* k_unfinished_in_postgres =
+    "SELECT count(*) FROM pg_class WHERE oid = to_regclass('unfinished_copy')";
+}  // namespace sql
+
+}  // namespace anchord

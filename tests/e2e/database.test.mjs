@@ -1,0 +1,139 @@
+// Whole databases between SQLite and PostgreSQL: a flown flight there and back with the same rows, a copy that was killed and goes on, and
+// what is refused.
+import assert from 'node:assert/strict';
+import { execFileSync, spawn } from 'node:child_process';
+import { existsSync, mkdtempSync, renameSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+import { ndjson, simulatedFlight } from './flight.mjs';
+import { startPostgres } from './postgres.mjs';
+import { binary, eventually, run, startServer } from './server.mjs';
+
+const folder = mkdtempSync(join(tmpdir(), 'anchord database '));
+const flown = join(folder, 'flown');
+let postgres, mission, anchors;
+const database = (...words) => run(['database', ...words], { env: postgres.env });
+const address = async (name) => {
+  await postgres.psql(`CREATE DATABASE ${name}`);
+  return postgres.url(name);
+};
+/** Every row of every table as SQLite's own program prints it. */
+const dump = (dir) => {
+  const tables = "SELECT name FROM sqlite_schema WHERE type = 'table' AND name <> 'schema_migration' ORDER BY 1";
+  const sql = (text, mode = 'list') =>
+    execFileSync('sqlite3', ['-cmd', `.mode ${mode}`, join(dir, 'anchord.db'), text], {
+      encoding: 'utf8',
+      maxBuffer: 1 << 28,
+    });
+  return sql(tables)
+    .trim()
+    .split('\n')
+    .map((table) => `${table}\n${sql(`SELECT * FROM ${table} ORDER BY 1, 2`, 'insert')}`)
+    .join('\n');
+};
+
+before(async () => {
+  postgres = await startPostgres();
+  const server = await startServer({ dataDir: flown });
+  const flight = await simulatedFlight({ duration: 60 });
+  const samples = Buffer.from(Array.from({ length: 1016 * 4 }, (_, i) => (i * i) & 0xff)).toString('base64');
+  flight.ranges.forEach((row, i) => {
+    if (i % 3 === 0) row.cir = { n: 1016, dt_ps: 1001.6, first_path_idx: 744.2, rxpacc: 1001, b64: samples };
+  });
+  const post = async (path, json, headers) => (await server.fetch(path, { json, headers })).json();
+  mission = (await post('/api/v1/missions', flight.mission)).id;
+  for (const what of ['fixes', 'ranges']) {
+    const headers = { 'content-type': 'application/x-ndjson' };
+    await server.fetch(`/api/v1/${what}?mission=${mission}`, { method: 'POST', headers, body: ndjson(flight[what]) });
+  }
+  await post(`/api/v1/missions/${mission}/actions`, { action: 'finish' });
+  const solved = await post('/api/v1/calibrations', { missions: [mission] }, { prefer: 'wait=120' });
+  await post(`/api/v1/calibrations/${solved.id}/publish`, {});
+  anchors = await (await server.fetch('/api/v1/anchors')).json();
+  assert.ok(anchors.features.length >= 3);
+  await server.stop();
+});
+after(async () => {
+  await postgres?.dispose();
+  rmSync(folder, { recursive: true, force: true });
+});
+
+test('a flown flight goes to PostgreSQL and back, and every row is the same', async () => {
+  const there = await address('copied'),
+    back = join(folder, 'back');
+  for (const [from, to] of [
+    [flown, there],
+    [there, back],
+  ]) {
+    const copied = await database('copy', from, to);
+    assert.equal(copied.code, 0, copied.stderr);
+    const checked = await database('check', from, to);
+    assert.equal(checked.code, 0, checked.stdout + checked.stderr);
+    assert.match(checked.stdout, /tables, 0 differ/);
+  }
+  assert.ok(Number(await postgres.psql('SELECT count(*) FROM cir', 'copied')) > 300);
+  assert.equal(dump(back) === dump(flown), true, 'a row differs');
+
+  // Served where they came to, with the folder they came from; new rows get keys of their own.
+  const args = ['--database', there];
+  const server = await startServer({ dataDir: flown, args, env: postgres.env });
+  assert.deepEqual(await (await server.fetch('/api/v1/anchors')).json(), anchors);
+  const another = await server.fetch('/api/v1/missions', {
+    json: { name: 'later', frame: 'wgs84', track_point: 'gnss_antenna' },
+  });
+  assert.equal(another.status, 201);
+  await server.dispose();
+  const differs = await database('check', there, back);
+  assert.equal(differs.code, 1);
+  assert.match(differs.stdout, /mission +2 rows, there 1/);
+
+  // Home again into that folder, once its old file is out of the way.
+  const refused = await database('copy', there, flown);
+  assert.notEqual(refused.code, 0);
+  renameSync(join(flown, 'anchord.db'), join(folder, 'old.db'));
+  const home = await database('copy', there, flown);
+  assert.equal(home.code, 0, home.stderr);
+  assert.equal((await database('check', there, flown)).code, 0);
+  rmSync(join(flown, 'anchord.db'));
+  renameSync(join(folder, 'old.db'), join(flown, 'anchord.db'));
+});
+
+test('a copy that was killed goes on where it was; until then no server takes the database', async () => {
+  for (const to of [await address('cut'), join(folder, 'cut')]) {
+    // Killed as soon as a table that comes late is reached.
+    const child = spawn(binary, ['database', 'copy', flown, to], { env: { ...process.env, ...postgres.env } });
+    child.stderr.setEncoding('utf8').on('data', (text) => /^(cir|fix|uwb_range)$/m.test(text) && child.kill('SIGKILL'));
+    const { signal } = await new Promise((done) => child.once('exit', (code, how) => done({ code, signal: how })));
+    assert.equal(signal, 'SIGKILL');
+    const at = to.includes('://') ? ['--data-dir', join(folder, 'none'), '--database', to] : ['--data-dir', to];
+    const served = await run(['serve', '--listen', '127.0.0.1:0', ...at], { env: postgres.env });
+    assert.notEqual(served.code, 0);
+    assert.match(served.stderr, /database copy/);
+    const other = await database('copy', join(folder, 'back'), to);
+    assert.match(other.stderr, /was not finished/);
+    const resumed = await database('copy', flown, to);
+    assert.equal(resumed.code, 0, resumed.stderr);
+    assert.equal((await database('check', flown, to)).code, 0);
+  }
+});
+
+test('a copy into rows, from nothing, or of a folder in use is refused, and changes nothing', async () => {
+  const again = await database('copy', flown, postgres.url('copied'));
+  assert.equal(again.code, 1);
+  assert.match(again.stderr, /has rows already.*createdb/);
+  const nothing = await database('copy', join(folder, 'nowhere'), await address('empty'));
+  assert.equal(nothing.code, 2);
+  assert.equal(existsSync(join(folder, 'nowhere')), false);
+  const fresh = join(folder, 'fresh');
+  const server = await startServer({ dataDir: fresh });
+  const used = await database('copy', fresh, postgres.url('empty'));
+  assert.match(used.stderr, /in use/);
+  await server.dispose();
+  const migrated = await database('migrate', postgres.url('empty'));
+  assert.match(migrated.stdout, /^version \d+\n$/);
+  await eventually(
+    'nothing was copied',
+    async () => (await postgres.psql('SELECT count(*) FROM mission', 'empty')) === '0',
+  );
+});
