@@ -411,7 +411,10 @@ std::vector<std::int64_t> PostgresConnection::insert_arrays(const BulkTable& tab
 }
 
 std::vector<std::int64_t> PostgresConnection::draw_keys(const BulkTable& table, std::size_t n) {
-  Query query(*this, "SELECT nextval(pg_get_serial_sequence(?1, ?2)) FROM generate_series(1, ?3)");
+  // OFFSET: the sequence is looked up once, not with every row.
+  Query query(*this,
+              "SELECT nextval(s.name) FROM (SELECT CAST(pg_get_serial_sequence(?1, ?2) AS regclass) AS name "
+              "OFFSET 0) s, generate_series(1, ?3)");
   query << table.name << table.key << static_cast<std::int64_t>(n);
   std::vector<std::int64_t> keys;
   keys.reserve(n);

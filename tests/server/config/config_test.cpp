@@ -85,6 +85,13 @@ TEST(Config, WarnsOfVariablesItDoesNotKnow) {
   EXPECT_EQ(config.value().warnings.size(), 1u);
 }
 
+TEST(Config, ShowsNoPasswordOfADatabaseItRefuses) {
+  const auto config = load_config({{"database", "postgresql://anchord:secret@host/name"}}, std::nullopt, {});
+  ASSERT_FALSE(config);
+  EXPECT_THAT(config.error().message, testing::HasSubstr("--database = 'postgresql://host/name'"));
+  EXPECT_THAT(config.error().message, testing::Not(testing::HasSubstr("secret")));
+}
+
 TEST(Config, EveryDefaultIsValid) { EXPECT_TRUE(load_config({}, std::nullopt, {})); }
 
 TEST(Listeners, SpeakTlsWhenThereIsACertificateButForThoseThatSayOtherwise) {

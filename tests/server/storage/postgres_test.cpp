@@ -8,6 +8,7 @@
 #include "core/base/guard.hpp"
 #include "server/storage/postgres_gate.hpp"
 #include "server/storage/postgres_migrate.hpp"
+#include "server/storage/row_tables.hpp"
 #include "tests/server/storage/backends.hpp"
 
 namespace anchord::sql {
@@ -39,6 +40,17 @@ TEST(PostgresText, ShowsAnAddressWithoutItsPassword) {
   EXPECT_EQ(shown_address("postgresql:///name?host=/run"), "postgresql:///name");
   EXPECT_EQ(shown_address("postgresql://a:se?cret@host/name"), "postgresql://...");
   EXPECT_EQ(shown_address("host=x password=secret"), "PostgreSQL");
+}
+
+TEST(PostgresText, RefusesAPasswordHoweverItIsSpelt) {
+  for (const char* address :
+       {"postgresql://a:secret@host/name", "postgresql://host/name?password=secret",
+        "postgresql://host/n?pass%77ord=x", "postgresql://host/name?sslmode=require&sslpassword=x",
+        "mysql://host/name", "/var/lib/name", ""})
+    EXPECT_NE(address_fault(address), "") << address;
+  for (const char* address :
+       {"postgresql://a@host:5432/name?sslmode=verify-full", "postgres:///name", "postgresql://%41@host/x"})
+    EXPECT_EQ(address_fault(address), "") << address;
 }
 
 /// A database of its own for each test.
@@ -305,6 +317,44 @@ TEST_F(Postgres, AnAddressWithAPasswordOrOfAnotherDatabaseIsRefusedWithoutShowin
     EXPECT_EQ(refused.error().code, Errc::invalid_argument) << address;
     EXPECT_THAT(refused.error().message, Not(HasSubstr("cret"))) << address;
   }
+}
+
+TEST_F(Postgres, AFolderWithRowsOfItsOwnDoesNotBeginAnEmptyDatabaseBeside) {
+  open_sqlite(dir_.path() / "data");
+  PostgresOptions options;
+  options.address = address();
+  options.data_dir = dir_.path() / "data";
+  const auto refused = open_postgres(options);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, Errc::unsupported);
+  EXPECT_THAT(refused.error().message, HasSubstr("anchord database copy"));
+}
+
+TEST_F(Postgres, AFolderWhoseRowsAreInPostgresDoesNotBeginAFileBeside) {
+  PostgresOptions options;
+  options.address = address();
+  options.data_dir = dir_.path() / "data";
+  ASSERT_TRUE(open_postgres(options));
+  StorageOptions without;
+  without.data_dir = options.data_dir;
+  const auto refused = open_database(without);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, Errc::unsupported);
+  EXPECT_FALSE(std::filesystem::exists(options.data_dir / "anchord.db"));
+  EXPECT_TRUE(open_postgres(options));
+}
+
+TEST_F(Postgres, TablesComeAfterThoseTheyName) {
+  std::vector<std::string> names;
+  for (const auto& table : row_tables()) names.push_back(table.name);
+  const auto place = [&](const char* name) { return std::ranges::find(names, name) - names.begin(); };
+  EXPECT_LT(place("site"), place("mission"));
+  EXPECT_LT(place("mission"), place("uwb_range"));
+  EXPECT_LT(place("uwb_range"), place("cir"));
+  ASSERT_TRUE(migrated());
+  const auto c = connect();
+  EXPECT_EQ(static_cast<std::int64_t>(names.size()) + 1,
+            integer(*c, "SELECT count(*) FROM pg_tables WHERE schemaname = 'public'"));
 }
 
 /// A server of its own, which is stopped and started.

@@ -208,6 +208,79 @@ TEST_P(SeamContract, AQuestionThatFailedLeavesTheNextOneAlone) {
   EXPECT_NO_THROW(query.run());
 }
 
+constexpr BulkTable k_keyed{"seam", "i, r, t, b, one", "key"};
+constexpr BulkTable k_keyless{"seam", "key, one"};
+
+TEST_P(SeamContract, ManyRowsHaveTheirKeysAndTheirValuesToTheLastBit) {
+  constexpr std::size_t k_rows = 12'000;  // more than one statement takes
+  const std::vector<std::byte> blob(300, std::byte{0x80});
+  connection_->execute("BEGIN");
+  const auto keys = connection_->insert_rows(k_keyed, k_rows, [&](Query& query, std::size_t row) {
+    const auto i = static_cast<std::int64_t>(row);
+    query << i << (row % 2 == 0 ? std::nullopt : std::optional(0.1 * static_cast<double>(row)));
+    query << (row % 3 == 0 ? ""
+                           : "ran\xc3\xa7"
+                             "e")
+          << std::span(blob).first(row % 300) << std::nullopt;
+  });
+  connection_->execute("COMMIT");
+  ASSERT_EQ(keys.size(), k_rows);
+  Query query(*connection_, "SELECT i, r, t, b, one FROM seam WHERE key = ?1");
+  for (const std::size_t row :
+       {std::size_t{0}, std::size_t{1}, std::size_t{4999}, std::size_t{5000}, k_rows - 1}) {
+    ASSERT_TRUE(keys[row]);
+    query.again();
+    query << *keys[row];
+    ASSERT_TRUE(query.step());
+    EXPECT_EQ(query.integer(), static_cast<std::int64_t>(row));
+    EXPECT_EQ(query.maybe_real(),
+              row % 2 == 0 ? std::nullopt : std::optional(0.1 * static_cast<double>(row)));
+    EXPECT_EQ(query.text(), row % 3 == 0 ? ""
+                                         : "ran\xc3\xa7"
+                                           "e");
+    EXPECT_EQ(query.blob().size(), row % 300);
+    EXPECT_TRUE(query.null());
+  }
+}
+
+TEST_P(SeamContract, OfManyRowsThoseLikeAnotherAreLeftOut) {
+  put("one", 3);
+  connection_->execute("BEGIN");
+  const auto keys = connection_->insert_rows(k_keyed, 10, [](Query& query, std::size_t row) {
+    // 1 to 5, twice.
+    query << std::nullopt << std::nullopt << std::nullopt << std::nullopt
+          << static_cast<std::int64_t>(row % 5 + 1);
+  });
+  connection_->execute("COMMIT");
+  std::vector<bool> accepted;
+  for (const auto& key : keys) accepted.push_back(key.has_value());
+  EXPECT_EQ(accepted, (std::vector<bool>{true, true, false, true, true, false, false, false, false, false}));
+  Query query(*connection_, "SELECT count(*) FROM seam");
+  ASSERT_TRUE(query.step());
+  EXPECT_EQ(query.integer(), 5);
+}
+
+TEST_P(SeamContract, ManyRowsThatTheSchemaRefusesAreAnError) {
+  const auto insert = [&](const BulkTable& table, std::int64_t one) {
+    connection_->execute("BEGIN");
+    try {
+      connection_->insert_rows(table, 10, [&](Query& query, std::size_t row) {
+        if (table.key.empty())
+          query << static_cast<std::int64_t>(row % 9) << one;
+        else
+          query << std::nullopt << std::nullopt << std::nullopt << std::nullopt << one;
+      });
+    } catch (const SqlError& error) {
+      connection_->execute("ROLLBACK");
+      return error.failure();
+    }
+    ADD_FAILURE() << "no error";
+    return Failure::internal;
+  };
+  EXPECT_EQ(insert(k_keyed, -1), Failure::constraint);
+  EXPECT_EQ(insert(k_keyless, 7), Failure::constraint);
+}
+
 INSTANTIATE_TEST_SUITE_P(Backends, SeamContract,
                          testing::Values(Side{"sqlite", sqlite_side, sqlite_missing},
                                          Side{"postgresql", postgresql_side, postgresql_missing}),
