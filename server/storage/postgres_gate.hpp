@@ -65,7 +65,6 @@ class PostgresGate final : public Gate {
   PostgresGate(PostgresPool::Open open, Limits limits);
 
   /// Of no rows: tells whether the database can be written.
-
   std::optional<Error> write(std::size_t rows, const Work& work) override;
   std::optional<Error> read(const Work& work) override;
   Status status() const;
