@@ -32,6 +32,10 @@ constexpr const char* k_any_mission = "SELECT mission_key FROM mission WHERE id 
 constexpr const char* k_insert_cir =
     "INSERT INTO cir (range_id, dt_ps, first_path_idx, preamble_count, re_im) VALUES (?1, ?2, ?3, ?4, ?5)";
 constexpr const char* k_revisions = "SELECT number FROM revision";
+constexpr const char* k_count_fixes_anew =
+    "INSERT INTO mission_fixes (mission_key, n_fixes) SELECT mission_key, count(*) FROM fix WHERE "
+    "mission_key = "
+    "?1 GROUP BY mission_key";
 
 std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span{text}); }
 
@@ -223,6 +227,11 @@ class Reader {
     BOOST_OUTCOME_TRY(leave_out_revisions());
     for (const auto& spec : bundle_specs()) {
       BOOST_OUTCOME_TRY(take(spec));
+    }
+    if (fresh_) {
+      Query counted(c_, k_count_fixes_anew);
+      counted << key_.value();
+      counted.run();
     }
     return std::move(out_);
   }

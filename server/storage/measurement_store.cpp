@@ -32,7 +32,13 @@ constexpr const char* k_devices =
 /// them.
 constexpr const char* k_count_ranges =
     "SELECT CAST(coalesce(sum(n_ranges), 0) AS BIGINT) / 2 FROM device_seen WHERE mission_key = ?1";
-constexpr const char* k_count_fixes = "SELECT count(*) FROM fix WHERE mission_key = ?1";
+constexpr const char* k_count_all_ranges =
+    "SELECT CAST(coalesce(sum(n_ranges), 0) AS BIGINT) / 2 FROM device_seen WHERE mission_key NOT IN (SELECT "
+    "mission_key FROM mission_bin)";
+constexpr const char* k_note_fixes =
+    "INSERT INTO mission_fixes (mission_key, n_fixes) VALUES (?1, ?2) "
+    "ON CONFLICT (mission_key) DO UPDATE SET n_fixes = mission_fixes.n_fixes + excluded.n_fixes";
+constexpr const char* k_count_fixes = "SELECT n_fixes FROM mission_fixes WHERE mission_key = ?1";
 
 class Keys {
  public:
@@ -51,8 +57,9 @@ class Keys {
   std::optional<std::pair<MissionId, std::optional<std::int64_t>>> last_;
 };
 
-/// Sums of one append, so that each device costs one statement a call and not one a row.
-class Devices {
+/// Sums of one append, so that each device, and the count of a mission's fixes, costs one statement a call
+/// and not one a row.
+class Sums {
  public:
   void note(std::int64_t key, const Range& row) {
     add({key, row.anchor.value, DeviceSeen::Kind::anchor}, row.time);
@@ -60,8 +67,13 @@ class Devices {
          row.kind == RangeKind::tag_anchor ? DeviceSeen::Kind::tag : DeviceSeen::Kind::anchor},
         row.time);
   }
-  void note(std::int64_t, const Fix&) {}
+  void note(std::int64_t key, const Fix&) { ++fixes_[key]; }
   void store(Connection& connection) const {
+    for (const auto& [key, n] : fixes_) {
+      Query query(connection, k_note_fixes);
+      query << key << n;
+      query.run();
+    }
     for (const auto& [device, seen] : seen_) {
       const auto& [key, network_id, kind] = device;
       Query query(connection, k_note_device);
@@ -83,6 +95,7 @@ class Devices {
     ++it->second.n;
   }
   std::map<Device, Seen> seen_;
+  std::map<std::int64_t, std::int64_t> fixes_;  // by mission
 };
 
 /// A row of the call whose mission is known.
@@ -136,18 +149,18 @@ void append_rows(Connection& connection, const std::vector<Row>& rows, std::vect
   });
   // Before rows are compared with what is stored, which may be one of these.
   store_cirs(connection, rows, known, ids);
-  Devices devices;
+  Sums sums;
   for (std::size_t i = 0; i < known.size(); ++i) {
     const Row& row = rows[known[i].at];
     auto& outcome = outcomes[known[i].at];
     if (ids[i]) {
       outcome = RowOutcome::accepted;
-      devices.note(known[i].mission_key, row);
+      sums.note(known[i].mission_key, row);
     } else {
       outcome = judge_stored(connection, known[i].mission_key, row);
     }
   }
-  devices.store(connection);
+  sums.store(connection);
 }
 
 template <class Row>
@@ -192,28 +205,74 @@ constexpr LimitColumns k_range_limits{"distance_m", "ifnull(rx_dbm, rss_dbm)", "
 /// Class of the newest position at most 2 s before a range; 0, none, where there is no such.
 constexpr const char* k_fix_class =
     "ifnull((SELECT f.fix_class FROM fix f WHERE f.mission_key = uwb_range.mission_key AND f.t_ns <= "
-    "uwb_range.t_ns AND f.t_ns >= uwb_range.t_ns - 2000000000 ORDER BY f.t_ns DESC LIMIT 1), 0) = ";
+    "uwb_range.t_ns AND f.t_ns >= uwb_range.t_ns - 2000000000 ORDER BY f.t_ns DESC, ifnull(f.seq, -1) DESC "
+    "LIMIT 1), 0) = ";
+/// The same from the other side, for one mission: a span for each position of the class, up to the next
+/// position. A class that a flight hardly had costs what it had, not a look at every range.
+constexpr const char* k_spans_of_class =
+    "(SELECT f.fix_id AS span_id, f.t_ns AS from_ns, (SELECT ifnull(min(g.t_ns), f.t_ns + 2000000001) FROM "
+    "fix "
+    "g WHERE g.mission_key = f.mission_key AND g.t_ns > f.t_ns AND g.t_ns <= f.t_ns + 2000000000) AS "
+    "until_ns "
+    "FROM fix f WHERE f.mission_key = ?1 AND NOT EXISTS (SELECT 1 FROM fix g WHERE g.mission_key = "
+    "f.mission_key AND g.t_ns = f.t_ns AND ifnull(g.seq, -1) > ifnull(f.seq, -1)) AND f.fix_class = ";
 
-/// What matches: the parameters appear in the order in which bind_filter() binds them; n is how many.
-template <class Row>
-std::string where_text(const MeasurementStore::Filter& filter, int& n) {
-  std::string where;
-  const auto bare = [&](const std::string& text) { where += (where.empty() ? " WHERE " : " AND ") + text; };
-  const auto term = [&](const std::string& text) { bare(text + "?" + std::to_string(++n)); };
-  if (filter.mission)
-    term("mission_key = ");
-  else
-    bare("mission_key NOT IN (SELECT mission_key FROM mission_bin)");
-  if (filter.since) term("t_ns >= ");
-  if (filter.until) term("t_ns < ");
-  if constexpr (std::is_same_v<Row, Range>) {
-    if (filter.anchor) term("anchor = ");
-    if (filter.tag) term("tag = ");
-    limit_terms(filter.limits, k_range_limits, term, bare);
-    if (filter.fix) term(k_fix_class);
-    if (filter.every > 1) term(thinned("range_id"));
+/// What a page or a count selects from; the parameters appear in the order in which bind_filter() binds them.
+struct Selection {
+  std::string from, where;
+  int n{0};              ///< parameters so far
+  bool in_spans{false};  ///< from k_spans_of_class: in the order of the spans the rows are in that of time
+
+  void bare(const std::string& text) { where += (where.empty() ? " WHERE " : " AND ") + text; }
+  void term(const std::string& text) { bare(text + "?" + std::to_string(++n)); }
+  std::string last() const { return "?" + std::to_string(n); }
+  void since(const char* relation) {
+    term(std::string("t_ns ") + relation + " ");
+    if (in_spans) bare("from_ns > CAST(" + last() + " AS BIGINT) - 2000000001");
   }
-  return where;
+  void until(const char* relation) {
+    term(std::string("t_ns ") + relation + " ");
+    if (in_spans) bare(std::string("from_ns ") + relation + " " + last());
+  }
+  /// Of a radio: also within the times at which it was heard, so that one hardly heard is found by the index.
+  void heard(const char* column, bool of_mission) {
+    term(std::string(column) + " = ");
+    const std::string known = " FROM device_seen d WHERE " +
+                              std::string(of_mission ? "d.mission_key = ?1 AND " : "") +
+                              "d.network_id = " + last() + ")";
+    bare("t_ns >= (SELECT min(d.first_t_ns)" + known);
+    bare("t_ns <= (SELECT max(d.last_t_ns)" + known);
+  }
+};
+
+template <class Row>
+Selection select(const MeasurementStore::Filter& filter) {
+  Selection out;
+  out.from = " FROM " + std::string(Table<Row>::name);
+  if constexpr (std::is_same_v<Row, Range>)
+    out.in_spans = filter.mission && filter.fix && *filter.fix != FixClass::none;
+  if (filter.mission)
+    out.term("mission_key = ");
+  else
+    out.bare("mission_key NOT IN (SELECT mission_key FROM mission_bin)");
+  if (filter.since) out.since(">=");
+  if (filter.until) out.until("<");
+  if constexpr (std::is_same_v<Row, Range>) {
+    if (filter.anchor) out.heard("anchor", filter.mission.has_value());
+    if (filter.tag) out.heard("tag", filter.mission.has_value());
+    limit_terms(
+        filter.limits, k_range_limits, [&](const std::string& text) { out.term(text); },
+        [&](const std::string& text) { out.bare(text); });
+    if (out.in_spans) {
+      out.from =
+          " FROM " + (k_spans_of_class + ("?" + std::to_string(++out.n))) + ") span CROSS JOIN uwb_range";
+      out.bare("t_ns >= from_ns AND t_ns < until_ns");
+    } else if (filter.fix) {
+      out.term(k_fix_class);
+    }
+    if (filter.every > 1) out.term(thinned("range_id"));
+  }
+  return out;
 }
 
 template <class Row>
@@ -234,23 +293,30 @@ void bind_filter(Query& query, const MeasurementStore::Filter& filter,
 /// Text of one page: the filter's parameters, then those of the cursor, then the limit.
 template <class Row>
 std::string page_text(const MeasurementStore::Filter& filter, bool after) {
-  int n = 0;
-  std::string where = where_text<Row>(filter, n);
-  const auto term = [&](const std::string& text) {
-    where += (where.empty() ? " WHERE " : " AND ") + text + "?" + std::to_string(++n);
-  };
+  Selection all = select<Row>(filter);
   const std::string id(Table<Row>::id);
   if (after) {
     // The first comparison is implied by the second, but an index can follow only the first.
     const std::string beyond = filter.descending ? "<" : ">";
-    term("t_ns " + beyond + "= ");
-    const std::string same = "?" + std::to_string(n);
-    where += " AND (t_ns " + beyond + " " + same + " OR (t_ns = " + same + " AND " + id + " " + beyond +
-             " ?" + std::to_string(++n) + "))";
+    if (filter.descending)
+      all.until("<=");
+    else
+      all.since(">=");
+    const std::string same = all.last();
+    all.bare("(t_ns " + beyond + " " + same + " OR (t_ns = " + same + " AND " + id + " " + beyond + " ?" +
+             std::to_string(++all.n) + "))");
   }
   const std::string direction = filter.descending ? " DESC" : "";
-  return "SELECT " + std::string(Table<Row>::columns) + " FROM " + std::string(Table<Row>::name) + where +
-         " ORDER BY t_ns" + direction + ", " + id + direction + " LIMIT ?" + std::to_string(++n);
+  const std::string spans = all.in_spans ? "from_ns" + direction + ", span_id" + direction + ", " : "";
+  return "SELECT " + std::string(Table<Row>::columns) + all.from + all.where + " ORDER BY " + spans + "t_ns" +
+         direction + ", " + id + direction + " LIMIT ?" + std::to_string(++all.n);
+}
+
+/// Nothing narrows the ranges of a mission, or of all: what the appends counted is the answer.
+bool unfiltered(const MeasurementStore::Filter& filter) {
+  const auto& limits = filter.limits;
+  return !filter.anchor && !filter.tag && !filter.since && !filter.until && !filter.fix && !limits.label &&
+         !limits.min_distance_m && !limits.max_distance_m && !limits.min_level_dbm && !limits.max_level_dbm;
 }
 
 MissionId mission_id(Connection& connection, std::int64_t key) {
@@ -339,8 +405,13 @@ class SqlMeasurementStore final : public MeasurementStore {
     return read_value<std::uint64_t>(gate_, [&](Connection& c) -> Result<std::uint64_t> {
       const auto key = filter.mission ? mission_key(c, *filter.mission) : std::nullopt;
       if (filter.mission && !key) return gone(*filter.mission);
-      int n = 0;
-      Query query(c, "SELECT count(*) FROM uwb_range" + where_text<Range>(filter, n));
+      if (unfiltered(filter)) {
+        Query query(c, key ? k_count_ranges : k_count_all_ranges);
+        if (key) query << *key;
+        return query.step() ? query.as<std::uint64_t>() : 0;
+      }
+      const Selection selection = select<Range>(filter);
+      Query query(c, "SELECT count(*)" + selection.from + selection.where);
       bind_filter<Range>(query, filter, key);
       return query.step() ? query.as<std::uint64_t>() : 0;
     });

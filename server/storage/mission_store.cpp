@@ -33,10 +33,14 @@ constexpr const char* k_tags =
     "SELECT tag, antenna, lever_arm_forward_m, lever_arm_left_m, lever_arm_up_m FROM mission_tag "
     "WHERE mission_key = ?1 ORDER BY ordinal";
 constexpr const char* k_drop_tags = "DELETE FROM mission_tag WHERE mission_key = ?1";
+/// Counted anew only while rows go; else what the appends kept.
 constexpr const char* k_binned =
-    "SELECT b.deleted_t_ns, b.deleted_ran_ns, b.deleted_by, b.emptying, (SELECT count(*) FROM uwb_range r "
-    "WHERE "
-    "r.mission_key = b.mission_key), (SELECT count(*) FROM fix f WHERE f.mission_key = b.mission_key), m.id "
+    "SELECT b.deleted_t_ns, b.deleted_ran_ns, b.deleted_by, b.emptying, "
+    "CASE WHEN b.emptying = 1 THEN (SELECT count(*) FROM uwb_range r WHERE r.mission_key = b.mission_key) "
+    "ELSE (SELECT CAST(coalesce(sum(d.n_ranges), 0) AS BIGINT) / 2 FROM device_seen d WHERE d.mission_key = "
+    "b.mission_key) END, "
+    "CASE WHEN b.emptying = 1 THEN (SELECT count(*) FROM fix f WHERE f.mission_key = b.mission_key) "
+    "ELSE coalesce((SELECT k.n_fixes FROM mission_fixes k WHERE k.mission_key = b.mission_key), 0) END, m.id "
     "FROM mission_bin b JOIN mission m ON m.mission_key = b.mission_key ORDER BY b.deleted_ran_ns DESC, "
     "b.mission_key DESC";
 constexpr const char* k_site = "SELECT 1 FROM site WHERE id = ?1";

@@ -37,9 +37,9 @@ std::optional<Error> ReaderPool::read(const Work& work) {
   }
   try {
     if (connection == nullptr) connection = open_();
-    connection->execute("BEGIN");
+    Query(*connection, "BEGIN").run();
     error = work(*connection);
-    connection->execute("COMMIT");
+    Query(*connection, "COMMIT").run();
   } catch (const SqlError& failed) {
     connection.reset();  // whatever state it is in
     error = to_error(failed);

@@ -139,6 +139,13 @@ int open_flags(SqliteConnection::Mode mode) {
   return SQLite::OPEN_READONLY | SQLite::OPEN_NOMUTEX;
 }
 
+/// SQLite's sums of its memory take one mutex of the whole process at every allocation, and nobody reads
+/// them. Refused, and no harm, where another library has begun with SQLite before.
+void count_no_memory() {
+  static const int once = sqlite3_config(SQLITE_CONFIG_MEMSTATUS, 0);
+  static_cast<void>(once);
+}
+
 /// A prepared statement is found by its text without a copy of that.
 struct TextHash {
   using is_transparent = void;
@@ -156,6 +163,7 @@ struct SqliteConnection::State {
 
 SqliteConnection::SqliteConnection(const std::filesystem::path& file, Mode mode, Synchronous synchronous,
                                    std::optional<std::uint32_t> max_pages) {
+  count_no_memory();
   try {
     state_ = std::make_unique<State>(file, open_flags(mode));
   } catch (const SQLite::Exception& error) {

@@ -24,6 +24,7 @@ namespace {
 MeasurementStore::Filter rows_of(const MissionId& mission) {
   MeasurementStore::Filter filter;
   filter.mission = mission;
+  filter.since = UtcTime{0};  // of a whole mission the kept count is the answer
   return filter;
 }
 

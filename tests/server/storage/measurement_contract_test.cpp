@@ -2,6 +2,7 @@
 #include <atomic>
 #include <functional>
 #include <limits>
+#include <random>
 #include <thread>
 
 #include "core/ports/measurement_store.hpp"
@@ -286,6 +287,67 @@ TEST_P(MeasurementStoreContract, FiltersByTheFixThatHeldWhenARangeWasTaken) {
   EXPECT_THAT(times(FixClass::rtk_float), ElementsAre(rows[1].time.ns));
   EXPECT_THAT(times(FixClass::rtk_fixed), ElementsAre(rows[2].time.ns));
   EXPECT_THAT(times(FixClass::none), ElementsAre(rows[0].time.ns, rows[3].time.ns));
+}
+
+// Positions at one time, gaps of more than 2 s, ranges at the very time of a position: what holds is said by
+// the definition, row by row; pages are as a reader takes them.
+TEST_P(MeasurementStoreContract, PagesTheRangesOfAClassOfPositionInOrderBothWays) {
+  const auto mission = stored_mission();
+  std::mt19937 random(11);
+  std::vector<Fix> fixes;
+  for (std::int64_t t_ns = 0, i = 0; i < 120;
+       ++i, t_ns += 500'000'000 * static_cast<std::int64_t>(random() % 7)) {
+    fixes.push_back(fix_at(mission.id, 0));
+    fixes.back().time = UtcTime{k_noon.ns + t_ns};
+    fixes.back().seq = static_cast<std::uint64_t>(i);
+    fixes.back().fix = random() % 3 == 0 ? FixClass::rtk_float : FixClass::rtk_fixed;
+  }
+  ASSERT_TRUE(db_->stores().measurements.append_fixes(fixes, true));
+  std::vector<Range> rows;
+  std::vector<std::int64_t> expected;
+  for (int i = 0; i < 900; ++i) {
+    rows.push_back(range_at(mission.id, i));
+    rows.back().time = UtcTime{k_noon.ns - 1'000'000'000 + 250'000'000 * std::int64_t{i}};
+    const Fix* held = nullptr;  // the newest, and of those of one time the last by number
+    for (const auto& fix : fixes) {
+      if (!(rows.back().time < fix.time) && rows.back().time.ns - fix.time.ns <= 2'000'000'000) held = &fix;
+    }
+    if (held != nullptr && held->fix == FixClass::rtk_float) expected.push_back(rows.back().time.ns);
+  }
+  append(rows);
+  ASSERT_GT(expected.size(), 20u);
+  MeasurementStore::Filter filter;
+  filter.mission = mission.id;
+  filter.fix = FixClass::rtk_float;
+  EXPECT_EQ(db_->stores().measurements.count_ranges(filter).value(), expected.size());
+  filter.limit = 7;
+  for (const bool descending : {false, true}) {
+    filter.descending = descending;
+    filter.after.clear();
+    std::vector<std::int64_t> found;
+    do {
+      const auto page = db_->stores().measurements.ranges(filter).value();
+      for (const auto& row : page.rows) found.push_back(row.time.ns);
+      filter.after = page.next;
+    } while (!filter.after.empty());
+    EXPECT_EQ(found, expected);
+    std::ranges::reverse(expected);
+  }
+}
+
+TEST_P(MeasurementStoreContract, CountsFixesThatWereAcceptedAndNoRepetition) {
+  const auto mission = stored_mission(), other = stored_mission("other");
+  auto& measurements = db_->stores().measurements;
+  ASSERT_TRUE(
+      measurements.append_fixes({fix_at(mission.id, 0), fix_at(other.id, 0), fix_at(mission.id, 1)}, false));
+  ASSERT_TRUE(measurements.append_fixes({fix_at(mission.id, 1), fix_at(mission.id, 2)}, false));
+  auto changed = fix_at(mission.id, 2);
+  changed.position.height_m += 1;
+  ASSERT_TRUE(measurements.append_fixes({fix_at(mission.id, 3), changed}, true));  // a conflict: none of them
+  EXPECT_EQ(measurements.count_fixes(mission.id).value(), 3u);
+  EXPECT_EQ(measurements.count_fixes(other.id).value(), 1u);
+  reopen();
+  EXPECT_EQ(db_->stores().measurements.count_fixes(mission.id).value(), 3u);
 }
 
 TEST_P(MeasurementStoreContract, ThinsEvenlyOverAllPagesAndOutOfStepWithRadiosThatTalkInTurn) {

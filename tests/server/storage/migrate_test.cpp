@@ -56,7 +56,8 @@ TEST_F(Migrate, FindsEveryLandedMigrationAsItWas) {
             "8 993f088a1a82f736ed536f4af9fbb963034237ed191e6e299a8e5d4a46bceb2f\n"
             "9 7c4ffeb6bd9e4aeb1810a60170fbca4d00fb10c4e5046f130dc0dc47fbdbec15\n"
             "10 098b135dddac37d59e25a60e4ca32042085fe09793cd02a168a2db795eed8968\n"
-            "11 fb46c23aed9b18c6fb8d78f4b993f62c7c9955ea2d2f7ce173a314072fd736a2\n");
+            "11 fb46c23aed9b18c6fb8d78f4b993f62c7c9955ea2d2f7ce173a314072fd736a2\n"
+            "12 772f473e05d3ce7c38825e4939476ca713a0069c8b4555c9abcce6f130781942\n");
 }
 
 TEST_F(Migrate, KnowsTheDigestOfAPublishedVector) {
@@ -184,6 +185,7 @@ TEST_F(Migrate, OpensAStoredDatabaseOfEveryEarlierVersion) {
     ASSERT_EQ(missions.size(), 1u);
     EXPECT_EQ(missions[0].name, "stored flight");
     EXPECT_EQ(db.value()->stores().measurements.count_ranges(missions[0].id).value(), 3u);
+    EXPECT_EQ(db.value()->stores().measurements.count_fixes(missions[0].id).value(), 2u);
     MeasurementStore::Filter filter;
     filter.with_cir = true;
     EXPECT_TRUE(db.value()->stores().measurements.ranges(filter).value().rows[0].cir);
