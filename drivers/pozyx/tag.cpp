@@ -127,9 +127,9 @@ Script<Result<CirRecord>> Tag::read_cir(CirRead what) {
     case CirRead::none:
       break;
     case CirRead::window:
-      out.from = 672;
-      add(672, 128, false);
-      add(300, 32, true);
+      out.from = k_window_from;
+      add(k_window_from, k_window_taps, false);
+      add(k_noise_from, k_noise_taps, true);
       break;
     case CirRead::whole:
       add(0, cir_taps(settings_.prf), false);

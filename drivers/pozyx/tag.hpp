@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "drivers/pozyx/cir_record.hpp"
 #include "drivers/pozyx/conversation.hpp"
 #include "drivers/pozyx/values.hpp"
 
@@ -16,12 +17,6 @@ enum class CirRead : std::uint8_t {
   none,    ///< distance and RSS only
   window,  ///< 128 taps from 672 (first path and 60 ns of echoes) and 32 of noise: four questions
   whole,   ///< all 1016 or 992 taps: 21 questions
-};
-
-/// Taps as read, interleaved re, im. Window: `taps` begins at `from`, and `noise` is beside it.
-struct CirRecord {
-  std::vector<std::int16_t> taps, noise;
-  std::size_t from{};
 };
 
 /// One try to range.

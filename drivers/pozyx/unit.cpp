@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "drivers/pozyx/diagnostics.hpp"
 #include "drivers/pozyx/registers.hpp"
 #include "drivers/time/time_base.hpp"
 
@@ -248,19 +247,7 @@ void Unit::emit(const Ranging& ranging, std::uint16_t anchor, const std::optiona
   range.heading_deg = heading_deg;
   if (cir) {
     const double constant_db = session_->tag.settings().prf == Prf::mhz16 ? 113.77 : 121.74;
-    const auto d = diagnose({cir->taps, cir->noise, cir->from}, range.rss_dbm, constant_db);
-    if (d) {
-      range.fp_dbm = d->fp_dbm;
-      range.rx_dbm = d->rx_dbm;
-      range.std_noise = d->noise_sd;
-    }
-    Cir record;
-    record.re_im = cir->taps;
-    if (d) {
-      record.first_path_idx = d->first_path_idx - static_cast<double>(cir->from);  // of the taps given
-      record.preamble_count = d->preamble_count;
-    }
-    range.cir = std::move(record);
+    take_record(range, *cir, constant_db);
   }
   out_.emit(std::move(range));
 }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "drivers/sim/receiver_error.hpp"
+#include "drivers/sim/tag_reading.hpp"
 #include "drivers/sim/wgs84.hpp"
 
 namespace anchord::sim {
@@ -79,6 +80,7 @@ std::vector<Fix> simulate_fixes(const World& world, const SimulationOptions& opt
 }
 
 std::vector<Range> simulate_ranges(const World& world, const SimulationOptions& options, Random& random) {
+  Random impulse_random(options.seed ^ 0xc2b2ae3d27d4eb4fU);  // leaves distances as they are without
   std::vector<double> bias_m;
   for (std::size_t i = 0; i < world.anchors.size(); ++i)
     bias_m.push_back(options.radio.anchor_bias_sigma_m * random.normal());
@@ -103,6 +105,7 @@ std::vector<Range> simulate_ranges(const World& world, const SimulationOptions& 
         std::round(exchange->distance_m * 1000.0) / 1000.0;  // the device answers whole millimetres
     range.rss_dbm = std::round(exchange->rss_dbm * 100.0) / 100.0;
     range.truth = RangeTruth{exchange->truth_m, exchange->line_of_sight};
+    if (options.impulse) read_as_tag(range, *exchange, *options.impulse, impulse_random);
     ranges.push_back(std::move(range));
   }
   return ranges;

@@ -2,9 +2,11 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 
 #include "core/base/ids.hpp"
 #include "core/types/flight_data.hpp"
+#include "drivers/sim/impulse.hpp"
 #include "drivers/sim/radio.hpp"
 #include "drivers/sim/world.hpp"
 
@@ -21,6 +23,7 @@ struct SimulationOptions {
   double float_share = 0.04;  ///< of the flight, in one piece: the rover has lost its integer fix
   UtcTime start = UtcTime::from_us(1'777'888'800'000'000);  ///< 2026-05-04T10:00:00Z
   RadioOptions radio{};
+  std::optional<ImpulseOptions> impulse{};  ///< ranges as the tag reads them, with its impulse response
 };
 
 /// A flight and what only a simulator knows about it.
