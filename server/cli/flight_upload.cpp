@@ -38,7 +38,12 @@ Result<void> FlightUpload::create_mission(const std::string& name) {
   const std::string key = to_string(make_uuid_v7(SystemClock{}.now()));
   BOOST_OUTCOME_TRY(const auto body, client_.post("/api/v1/missions?devices=false", "application/json",
                                                   api::mission_request_json(flight_.mission), key));
-  BOOST_OUTCOME_TRY(mission_id_, api::parse_created_id(body));
+  BOOST_OUTCOME_TRY(const auto id, api::parse_created_id(body));
+  return use_mission(id);
+}
+
+Result<void> FlightUpload::use_mission(const std::string& id) {
+  mission_id_ = id;
   BOOST_OUTCOME_TRY(const auto uuid, parse_uuid(mission_id_));
   for (Fix& fix : flight_.fixes) fix.mission = MissionId{uuid};
   for (Range& range : flight_.ranges) range.mission = MissionId{uuid};

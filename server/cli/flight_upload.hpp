@@ -21,6 +21,8 @@ class FlightUpload {
 
   FlightUpload(RestClient& client, FlightData flight);  ///< prepared
   Result<void> create_mission(const std::string& name);
+  /// One that was made before, in place of create_mission(): rows that it has already count as duplicates.
+  Result<void> use_mission(const std::string& id);
   /// All rows before `until`, at most k_batch_rows of each kind in a request.
   Result<void> send_before(UtcTime until);
   Result<void> send_next_batch();

@@ -10,6 +10,7 @@
 #include "server/cli/commands.hpp"
 #include "server/cli/simulate_devices.hpp"
 #include "server/cli/simulate_drone.hpp"
+#include "server/cli/simulate_site.hpp"
 
 namespace anchord::cli {
 namespace {
@@ -83,6 +84,7 @@ void add_simulate_command(CLI::App& app, int& exit_code) {
   flight->add_option("--fix-rate", options->fix_rate_hz, "RTK epochs a second")->capture_default_str();
   flight->callback([options, folder, &exit_code] { exit_code = simulate(*options, *folder); });
   add_simulate_drone(*command, exit_code);
+  add_simulate_site(*command, exit_code);
 }
 
 }  // namespace anchord::cli

@@ -1,40 +1,16 @@
 #include "server/cli/site_source.hpp"
 
 #include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
 
 #include "api/formats/floor_structure.hpp"
+#include "server/cli/rest_json.hpp"
 
 namespace anchord::cli {
 namespace {
 
 using Json = nlohmann::json;
-
-Result<Json> fetched(RestClient& client, const std::string& path) {
-  BOOST_OUTCOME_TRY(const auto body, client.get(path));
-  auto json = Json::parse(body, nullptr, false);
-  if (!json.is_object()) return make_error(Errc::invalid_argument, path + ": the answer is no JSON object");
-  return json;
-}
-
-/// Every item of a listing; what has more than ten thousand is no site.
-Result<std::vector<Json>> items(RestClient& client, const std::string& path) {
-  std::vector<Json> out;
-  std::string cursor;
-  for (int page = 0; page < 10; ++page) {
-    BOOST_OUTCOME_TRY(const auto json, fetched(client, path + "&limit=1000" + cursor));
-    for (const char* key : {"items", "features"}) {
-      if (json.contains(key) && json[key].is_array())
-        out.insert(out.end(), json[key].begin(), json[key].end());
-    }
-    const auto next = json.value("next_cursor", Json());
-    if (!next.is_string()) return out;
-    cursor = "&cursor=" + next.get<std::string>();
-  }
-  return out;
-}
 
 std::optional<double> number(const Json& object, const char* key) {
   const auto value = object.value(key, Json());
@@ -44,7 +20,8 @@ std::optional<double> number(const Json& object, const char* key) {
 Result<void> add_building(RestClient& client, const Json& building, SiteStructure& out) {
   Building of;
   of.height_m = number(building, "height_m");
-  BOOST_OUTCOME_TRY(const auto listed, items(client, "/api/v1/floors?building=" + building.value("id", "")));
+  BOOST_OUTCOME_TRY(const auto listed,
+                    get_items(client, "/api/v1/floors?building=" + building.value("id", "")));
   std::vector<Floor> floors;
   for (const auto& floor : listed) {
     Floor& one = floors.emplace_back();
@@ -63,19 +40,19 @@ Result<void> add_building(RestClient& client, const Json& building, SiteStructur
 Result<flight::Scene> fetch_site_scene(RestClient& client, const std::string& site) {
   BOOST_OUTCOME_TRY(const auto uuid, parse_uuid(site));
   const std::string id = to_string(uuid);
-  BOOST_OUTCOME_TRY(const auto record, fetched(client, "/api/v1/sites/" + id));
+  BOOST_OUTCOME_TRY(const auto record, get_json(client, "/api/v1/sites/" + id));
   const auto origin = record.value("origin", Json());
   if (!origin.is_object() || !number(origin, "lat") || !number(origin, "lon"))
     return make_error(Errc::invalid_argument,
                       "site " + id + " has no origin: give it one, or fly its first mission");
   SiteStructure structure;
-  BOOST_OUTCOME_TRY(const auto buildings, items(client, "/api/v1/buildings?site=" + id));
+  BOOST_OUTCOME_TRY(const auto buildings, get_items(client, "/api/v1/buildings?site=" + id));
   for (const auto& building : buildings) {
     BOOST_OUTCOME_TRYV(add_building(client, building, structure));
   }
   keep_longest(structure);
   std::map<NetworkId, Wgs84> published;
-  BOOST_OUTCOME_TRY(const auto features, items(client, "/api/v1/anchors?site=" + id));
+  BOOST_OUTCOME_TRY(const auto features, get_items(client, "/api/v1/anchors?site=" + id));
   for (const auto& feature : features) {
     const auto network_id = parse_network_id(feature.value("/properties/network_id"_json_pointer, ""));
     const auto at = feature.value("/geometry/coordinates"_json_pointer, Json());
