@@ -1,4 +1,5 @@
-# cmd_run: build, serve on loopback without login, fly the simulated demonstration through the real drivers, again and again.
+# cmd_run: build, serve on loopback without login, fill what a server in use holds (anchord simulate site), fly the simulated
+# demonstration through the real drivers, again and again.
 # ANCHORD_DEMO=drone: an aircraft that stands ready instead, to be planned for and flown from the dashboard.
 run_address=127.0.0.1:8420
 run_pids=()
@@ -101,6 +102,9 @@ cmd_run() {
     sleep 0.2
   done
   say "anchord is at http://$run_address/  (Ctrl-C ends it; data in $data)"
+  # Beside the flight, which waits for nothing: campaign, model, finished flight and revision, once per data folder.
+  "$server" simulate site --url "http://$run_address" &
+  run_pids+=($!)
   if [[ $demo == drone ]]; then
     "$server" simulate drone --seed "$seed" --url "http://$run_address" &
   elif [[ -n $devices ]]; then
