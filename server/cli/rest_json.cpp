@@ -1,6 +1,7 @@
 #include "server/cli/rest_json.hpp"
 
 #include <chrono>
+#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "core/base/ids.hpp"

@@ -1,6 +1,7 @@
 #include "server/cli/site_source.hpp"
 
 #include <map>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
 
