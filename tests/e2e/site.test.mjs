@@ -97,7 +97,10 @@ test('ranges of a live flight are told apart by the promoted model', async () =>
     500,
   );
   const of = (name) => ranges.filter(({ predicted }) => predicted.class === name).length;
-  assert.ok(ranges.every(({ predicted }) => predicted.p_los !== null), 'each has a probability');
+  assert.ok(
+    ranges.every(({ predicted }) => predicted.p_los !== null),
+    'each has a probability',
+  );
   assert.ok(of('unclear') < 0.25 * ranges.length, `${of('unclear')} of ${ranges.length} are unclear`);
   assert.ok(of('los') > 0 && of('nlos') > 0, `${of('los')} LOS, ${of('nlos')} NLOS`);
 });
