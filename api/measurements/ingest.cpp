@@ -227,6 +227,12 @@ class IngestRun {
   }
 
   const Mission* known(const MissionId& id) {
+    // Rows of one mission come together.
+    if (last_known_ != nullptr && last_known_->id == id) return last_known_;
+    return last_known_ = looked_up(id);
+  }
+
+  const Mission* looked_up(const MissionId& id) {
     const auto it = seen_.find(id);
     if (it != seen_.end()) return it->second ? &*it->second : nullptr;
     auto mission = service_.missions_.mission(id);
@@ -272,7 +278,10 @@ class IngestRun {
       lines_.clear();
       return;
     }
+    const MissionId* last = nullptr;
     for (const auto& row : rows_) {
+      if (last != nullptr && *last == row.mission) continue;
+      last = &row.mission;
       if (prepared_.insert(row.mission).second) service_.missions_.prepare(row.mission);
     }
     if (!poses_.empty()) store_poses();
@@ -372,6 +381,7 @@ class IngestRun {
   std::optional<MissionId> mission_;
   bool atomic_{false}, dry_run_{false}, single_{false}, truncated_{false}, conflict_{false};
   std::map<MissionId, std::optional<Mission>> seen_;
+  const Mission* last_known_{nullptr};  ///< in seen_
   std::set<MissionId> prepared_;
   std::vector<Row> rows_;
   std::vector<Fix> poses_;

@@ -140,9 +140,10 @@ void MissionService::State::work(Flight& flight) {
   }
   take_priors(flight, *work);
   std::size_t since_announced = 0;
+  const SteadyTime now = steady_now();
   for (const auto& row : rows) {
     if (!work->rebuilt.empty() && std::ranges::binary_search(work->rebuilt, flight::identity(row))) continue;
-    note_radios(row);
+    note_radios(row, now);
     work->live.add(row);
     if (++since_announced == k_announced) {
       work->live.settle();
@@ -172,11 +173,10 @@ void MissionService::State::make_view(Flight& flight, const Flight::Work& work) 
   inbox->view_made = steady_now();
 }
 
-void MissionService::State::note_radios(const flight::LiveRow& row) {
+void MissionService::State::note_radios(const flight::LiveRow& row, SteadyTime now) {
   const auto* judged = std::get_if<flight::PredictedRange>(&row);
   if (judged == nullptr) return;
   const Range& range = judged->range;
-  const SteadyTime now = steady_now();
   radios.heard(range.tag, range.kind == RangeKind::tag_anchor, judged->time, now);
   radios.heard(range.anchor, false, judged->time, now);
 }

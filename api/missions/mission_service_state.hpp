@@ -143,7 +143,7 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   void work(Flight& flight);
   static std::deque<flight::LiveRow> take_rows(Flight& flight, std::uint64_t& dropped);
   void make_view(Flight& flight, const Flight::Work& work) const;
-  void note_radios(const flight::LiveRow& row);
+  void note_radios(const flight::LiveRow& row, SteadyTime now);
   /// What the live mission reports, to the world: hub, event log, store, pilot.
   void publish_events(Flight& flight, Flight::Work& work);
   void publish(Flight& flight, const flight::FixBelieved& event);

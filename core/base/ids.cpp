@@ -1,7 +1,6 @@
 #include "core/base/ids.hpp"
 
 #include <charconv>
-#include <cstdio>
 #include <random>
 
 #include "core/base/locked.hpp"
@@ -101,9 +100,12 @@ Result<Uuid> parse_uuid(std::string_view text) {
 }
 
 std::string to_string(NetworkId id) {
-  char text[16];
-  std::snprintf(text, sizeof text, "0x%04x", static_cast<unsigned>(id.value));
-  return text;
+  char digits[8];
+  const auto end = std::to_chars(digits, digits + sizeof digits, id.value, 16).ptr;
+  const auto n = static_cast<std::size_t>(end - digits);
+  std::string text = "0x";
+  if (n < 4) text.append(4 - n, '0');
+  return text.append(digits, n);
 }
 
 Result<NetworkId> parse_network_id(std::string_view text) {
