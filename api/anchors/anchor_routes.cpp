@@ -8,6 +8,7 @@
 #include "api/anchors/published_features.hpp"
 #include "api/anchors/routes.hpp"
 #include "api/anchors/site_json.hpp"
+#include "api/kit/content_tag.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "api/missions/mission_service.hpp"
@@ -102,6 +103,16 @@ Response answer(const AnchorFeature& feature) {
   return response;
 }
 
+/// To a GET: who names the ETag has the body already, which is not even made then; the router answers 304.
+Response answer_unless_known(const Request& request, const AnchorFeature& feature) {
+  const std::string tag = etag(feature);
+  if (!etag_listed(request.header("if-none-match"), tag)) return answer(feature);
+  Response response;
+  response.header("Content-Type", "application/geo+json");
+  response.header("ETag", tag);
+  return response;
+}
+
 Response patch(AnchorApi& s, const Request& request) {
   Anchor anchor = path_anchor(s, request);
   require_match(request, etag(feature_of(s, anchor)));
@@ -176,7 +187,7 @@ void add_anchor_routes(Router& router, AnchorApi& s) {
   router.add(std::move(listed));
   router.add({Method::get, "/api/v1/anchors/{id}", readers(), [&s](const Request& request) {
                 check_query(request, {});
-                return answer(feature_of(s, path_anchor(s, request)));
+                return answer_unless_known(request, feature_of(s, path_anchor(s, request)));
               }});
   router.add({Method::patch, "/api/v1/anchors/{id}", Access::any_of({Role::integrator}), on(patch), 1 << 20,
               false, true});

@@ -1,7 +1,6 @@
 #include "api/kit/router.hpp"
 
 #include <array>
-#include <cctype>
 #include <new>
 #include <optional>
 
@@ -67,21 +66,6 @@ struct Pattern {
     return out;
   }
 };
-
-bool etag_listed(std::string_view list, std::string_view etag) {
-  const auto strong = [](std::string_view tag) { return tag.substr(0, 2) == "W/" ? tag.substr(2) : tag; };
-  while (!list.empty()) {
-    auto comma = list.find(',');
-    auto item = list.substr(0, comma);
-    while (!item.empty() && std::isspace(static_cast<unsigned char>(item.front())) != 0)
-      item.remove_prefix(1);
-    while (!item.empty() && std::isspace(static_cast<unsigned char>(item.back())) != 0) item.remove_suffix(1);
-    if (item == "*" || strong(item) == strong(etag)) return true;
-    if (comma == std::string_view::npos) break;
-    list.remove_prefix(comma + 1);
-  }
-  return false;
-}
 
 bool has_header(const Response& response, std::string_view name) {
   for (const auto& [key, value] : response.headers) {

@@ -353,7 +353,9 @@ Admission Authenticator::decide(api::Request& request, std::string_view host, bo
   }
   admission.body_limit = route.body_limit;
   admission.streams_body = route.streams_body;
-  admission.quick = request.path == "/healthz";  // says that the event loop turns, so it is answered by it
+  // /healthz says that the event loop turns, so it is answered by it; /version is a constant, and two changes
+  // of thread would cost more than all the rest of its answer.
+  admission.quick = request.path == "/healthz" || request.path == "/version";
   admission.run = [this, &route, login = std::move(login)](api::Request& r) { return run(route, r, login); };
   admission.work = [&route](const api::Request& r) { return route.work_for(r); };
   // With login off everybody is the same one.
@@ -372,6 +374,7 @@ void Authenticator::answered(const api::Request& request, std::string_view route
                              std::size_t bytes_out) {
   metrics_.answered(route, api::to_string(request.method), status, seconds);
   const LogLevel level = status >= 500 ? LogLevel::warning : LogLevel::debug;
+  if (!logs(level)) return;
   log(level, "request",
       {{"request_id", request.request_id},
        {"method", api::to_string(request.method)},

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <map>
 #include <vector>
 
 #include "core/base/locked.hpp"
@@ -46,12 +47,39 @@ class ReadGauges final : public prometheus::Collectable {
 
 }  // namespace
 
+/// The counters of one kind of answer. Prometheus finds them by maps of strings, which is dearer than the
+/// answer.
+struct AnswerSeries {
+  prometheus::Counter* requests;
+  prometheus::Histogram* durations;
+};
+
 struct Metrics::State {
   prometheus::Registry registry;
+  /// By route, then method and status. As many as the routes have: none is ever removed.
+  using OfRoute = std::map<std::pair<std::string, int>, AnswerSeries>;
+  Locked<std::map<std::string, OfRoute, std::less<>>> series;
   ReadGauges gauges;
   prometheus::Family<prometheus::Counter>* requests{};
   prometheus::Family<prometheus::Histogram>* durations{};
+  AnswerSeries of(std::string_view route, std::string_view method, int status);
 };
+
+AnswerSeries Metrics::State::of(std::string_view route, std::string_view method, int status) {
+  static const prometheus::Histogram::BucketBoundaries k_buckets{
+      0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 10};
+  auto known = series.lock();
+  auto at = known->find(route);
+  if (at == known->end()) at = known->emplace(route, OfRoute{}).first;
+  const std::pair key{std::string(method), status};
+  if (const auto found = at->second.find(key); found != at->second.end()) return found->second;
+  const std::string text(route);
+  const AnswerSeries made{
+      &requests->Add({{"route", text}, {"method", std::string(method)}, {"code", std::to_string(status)}}),
+      &durations->Add({{"route", text}}, k_buckets)};
+  at->second.emplace(key, made);
+  return made;
+}
 
 Metrics::Metrics(std::string_view version) : state_(std::make_unique<State>()) {
   auto& registry = state_->registry;
@@ -73,13 +101,9 @@ Metrics::Metrics(std::string_view version) : state_(std::make_unique<State>()) {
 Metrics::~Metrics() = default;
 
 void Metrics::answered(std::string_view route, std::string_view method, int status, double seconds) {
-  static const prometheus::Histogram::BucketBoundaries k_buckets{
-      0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 10};
-  const std::string template_text(route.empty() ? "none" : route);
-  state_->requests
-      ->Add({{"route", template_text}, {"method", std::string(method)}, {"code", std::to_string(status)}})
-      .Increment();
-  state_->durations->Add({{"route", template_text}}, k_buckets).Observe(seconds);
+  const AnswerSeries series = state_->of(route.empty() ? "none" : route, method, status);
+  series.requests->Increment();
+  series.durations->Observe(seconds);
 }
 
 void Metrics::gauge(std::string name, std::string help, std::function<double()> read) {

@@ -1,8 +1,7 @@
 #include "server/http/request_id.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cstdio>
+#include <cstdint>
 #include <random>
 
 namespace anchord::server {
@@ -14,9 +13,11 @@ std::string request_id_of(std::string_view given) {
   });
   if (plain) return std::string(given);
   thread_local std::mt19937_64 random{std::random_device{}()};  // names requests, protects nothing
-  std::array<char, 20> text{};
-  std::snprintf(text.data(), text.size(), "%016llx", static_cast<unsigned long long>(random()));
-  return {text.data(), 16};
+  static constexpr std::string_view k_hex = "0123456789abcdef";
+  std::string text(16, '0');
+  std::uint64_t number = random();
+  for (auto digit = text.rbegin(); digit != text.rend(); ++digit, number >>= 4) *digit = k_hex[number & 0xf];
+  return text;
 }
 
 }  // namespace anchord::server

@@ -33,12 +33,15 @@ std::string_view value(const api::Response& response, std::string_view name) {
 /// A value may hold what a client sent (a Location, an ETag): it must not begin a header of its own.
 void add(std::string& head, std::string_view name, std::string_view text) {
   head.append(name).append(": ");
-  for (const char c : text) head.push_back(static_cast<unsigned char>(c) < 0x20 && c != '\t' ? ' ' : c);
+  const std::size_t from = head.size();
+  head.append(text);
+  for (std::size_t i = from; i < head.size(); ++i) {
+    if (static_cast<unsigned char>(head[i]) < 0x20 && head[i] != '\t') head[i] = ' ';
+  }
   head.append("\r\n");
 }
 
-std::string http_date() {
-  const std::time_t now = std::time(nullptr);
+std::string http_date_of(std::time_t now) {
   std::tm utc{};
   gmtime_r(&now, &utc);
   static constexpr std::array k_day = {"Sun", "Mon", "Tue", "Wed", "Thu", "Fri", "Sat"};
@@ -50,6 +53,18 @@ std::string http_date() {
                               k_month.at(static_cast<std::size_t>(utc.tm_mon)), utc.tm_year + 1900,
                               utc.tm_hour, utc.tm_min, utc.tm_sec);
   return {text.data(), static_cast<std::size_t>(std::max(n, 0))};
+}
+
+/// Written once a second.
+std::string_view http_date() {
+  thread_local std::time_t written_s = 0;
+  thread_local std::string text;
+  const std::time_t now_s = std::time(nullptr);
+  if (text.empty() || now_s != written_s) {
+    text = http_date_of(now_s);
+    written_s = now_s;
+  }
+  return text;
 }
 
 /// zlib as a value: bytes in, gzip bytes out.

@@ -70,8 +70,10 @@ bool start_logging(std::string_view level) {
 
 std::size_t lost_log_lines() { return writer()->overrun_counter(); }
 
+bool logs(LogLevel level) { return logger().should_log(of(level)); }
+
 void log(LogLevel level, std::string_view message, std::initializer_list<LogField> fields) {
-  if (!logger().should_log(of(level))) return;
+  if (!logs(level)) return;
   const std::string line = log_line(SystemClock().now(), level, message, fields);
   logger().log(of(level), spdlog::string_view_t(line.data(), line.size()));
   auto lines = recent().lock();

@@ -12,6 +12,8 @@ namespace anchord::server {
 /// before the threads. Unknown word: false.
 bool start_logging(std::string_view level);
 
+/// Whether such a line is written at all, for who would gather its fields in vain. Thread-safe.
+bool logs(LogLevel level);
 /// A log_line. Never hand a token to it. Never waits for whoever reads it: the oldest of 8192 unread lines is
 /// lost. Thread-safe.
 void log(LogLevel level, std::string_view message, std::initializer_list<LogField> fields = {});
