@@ -1,10 +1,11 @@
 // ./dev bench: one table. Every figure of ours stands beside a peer or a limit taken in the same run.
-//   node tests/bench/bench.mjs [solve] [bound] [ingest] [databases] [get] [fanout] [training] [predict] [grid] [devices] [commands] [dashboard]
+//   node tests/bench/bench.mjs [keep] [solve] [bound] [http] [ingest] [databases] [get] [fanout] [training] [predict] [grid] [devices] [commands] [dashboard]
 import { execFileSync } from 'node:child_process';
 import { createServer } from 'node:http';
-import { existsSync, mkdtempSync, rmSync } from 'node:fs';
+import { existsSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
+import { fileURLToPath } from 'node:url';
 import { LiveClient } from '../e2e/live.mjs';
 import { eventually, run, startServer } from '../e2e/server.mjs';
 import { commands } from './commands.mjs';
@@ -12,16 +13,25 @@ import { dashboard } from './dashboard.mjs';
 import { databases } from './databases.mjs';
 import { devices } from './devices.mjs';
 import { grid } from './grid.mjs';
+import { drops, keep, newestOf, ratios } from './history.mjs';
+import { http } from './http.mjs';
 import { cpuSeconds, hammer, percentile, request } from './load.mjs';
 import { safety } from './safety.mjs';
 import { start_search } from './search.mjs';
 
-const wanted = process.argv.slice(2);
+const history = fileURLToPath(new URL('history', import.meta.url));
+const wanted = process.argv.slice(2).filter((name) => name !== 'keep');
 const on = (name) => wanted.length === 0 || wanted.includes(name);
 const rows = [];
 const row = (work, figure, beside = '') => {
   rows.push([work, figure, beside]);
   console.error(`    ${work}: ${figure}${beside ? `   (${beside})` : ''}`);
+};
+// What has a peer of the same run in the same unit; its ratio is compared with that of the last run.
+const measured = [];
+const measure = (work, unit, ours, peer, beside) => {
+  measured.push({ work, unit, ours, peer });
+  row(work, `${ours.toPrecision(3)} ${unit} CPU`, `${beside} ${peer.toPrecision(3)}`);
 };
 const say = (text) => console.error(`==> ${text}`);
 
@@ -35,11 +45,8 @@ function solve() {
   );
   const time = Object.fromEntries(out.benchmarks.map((b) => [b.name, b]));
   for (const n of [10, 100, 1000, 10000]) {
-    row(
-      `solve one anchor, ${n} ranges, cold`,
-      `${time[`solve_gauss_newton/${n}`].cpu_time.toFixed(1)} us CPU`,
-      `Ceres ${time[`solve_ceres/${n}`].cpu_time.toFixed(0)} us`,
-    );
+    const [ours, ceres] = ['gauss_newton', 'ceres'].map((solver) => time[`solve_${solver}/${n}`].cpu_time);
+    measure(`solve one anchor, ${n} ranges, cold`, 'us', ours, ceres, 'Ceres');
   }
   row('solve a flight of 3 700 ranges, 6 anchors', `${time.solve_whole_flight.cpu_time.toFixed(0)} ms CPU`);
   row('joint solve of 10 000 ranges to 50 anchors, cold', `${time.solve_fifty_anchors.cpu_time.toFixed(0)} ms CPU`);
@@ -116,10 +123,12 @@ function planner() {
     }),
   );
   const ns = Object.fromEntries(out.benchmarks.map((b) => [b.name, b.per_candidate * 1e9]));
-  row(
+  measure(
     'planner, 41^3 candidates, 1 000 past points, per candidate',
-    `${ns.batch_kernel.toFixed(1)} ns CPU`,
-    `rebuild and invert ${(ns.rebuild_and_invert / 1e3).toFixed(1)} us`,
+    'ns',
+    ns.batch_kernel,
+    ns.rebuild_and_invert,
+    'rebuild and invert',
   );
 }
 
@@ -133,11 +142,8 @@ function polygons() {
   );
   const ns = Object.fromEntries(out.benchmarks.map((b) => [b.name, b.per_call * 1e9]));
   for (const question of ['contains', 'distance_to_edge', 'way_crosses']) {
-    row(
-      `polygon of 12 corners, ${question.replaceAll('_', ' ')}`,
-      `${ns[`${question}_own`].toFixed(0)} ns CPU`,
-      `Boost.Geometry ${ns[`${question}_boost`].toFixed(0)} ns`,
-    );
+    const work = `polygon of 12 corners, ${question.replaceAll('_', ' ')}`;
+    measure(work, 'ns', ns[`${question}_own`], ns[`${question}_boost`], 'Boost.Geometry');
   }
 }
 
@@ -408,10 +414,12 @@ if (on('dashboard')) {
     process.exitCode = 1;
   });
 }
-if (['ingest', 'get', 'fanout', 'training', 'devices'].some(on)) {
-  const server = await startServer();
+if (['http', 'ingest', 'get', 'fanout', 'training', 'devices'].some(on)) {
+  // The limits of one token are not what is measured.
+  const server = await startServer({ args: ['--rate-per-s', '1000000', '--rate-burst', '1000000'] });
   try {
     for (const [name, task] of [
+      ['http', async (s) => http(s, ndjson, await newMission(s, 'bench http'), measure)],
       ['ingest', ingest],
       ['get', get],
       ['fanout', fanout],
@@ -439,4 +447,11 @@ const width = [0, 1].map((column) => Math.max(...rows.map((r) => r[column].lengt
 console.log(
   rows.map(([work, figure, beside]) => `${work.padEnd(width[0])}  ${figure.padEnd(width[1])}  ${beside}`).join('\n'),
 );
+const now = ratios(measured);
+if (process.env.ANCHORD_BENCH_DIR)
+  writeFileSync(join(process.env.ANCHORD_BENCH_DIR, 'bench.json'), JSON.stringify({ rows, measured }, null, 2) + '\n');
+const last = newestOf(history);
+for (const { work, before, now: ratio } of last ? drops(last.ratios, now) : [])
+  console.log(`SLOWER than ${last.name}: ${work}: ${ratio} times its peer, was ${before}`);
+if (process.argv.includes('keep')) keep(history, new Date().toISOString().slice(0, 10), now);
 process.exit();
