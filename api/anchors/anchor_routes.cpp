@@ -91,10 +91,19 @@ AnchorFeature feature_of(AnchorApi& s, const Anchor& anchor) {
   return feature;
 }
 
+/// Of all that an answer shows: the anchor, its position, what contradicts that, its site (datum, base, map
+/// system) and the frame of its positioning system.
 std::string etag(const AnchorFeature& feature) {
-  return "\"a-" + std::to_string(feature.anchor.version) + '-' +
-         std::to_string(feature.revision.value_or(0)) +
-         (feature.contradicted ? '-' + to_string(feature.contradicted->by) : "") + '"';
+  std::string tag =
+      "\"a-" + std::to_string(feature.anchor.version) + '-' + std::to_string(feature.revision.value_or(0));
+  if (feature.contradicted) tag += '-' + to_string(feature.contradicted->by);
+  if (feature.site) tag += "-s" + std::to_string(feature.site->version);
+  if (feature.local_m) {
+    const auto* const bytes = reinterpret_cast<const char*>(feature.local_m->data());
+    const auto local = content_tag({bytes, 3 * sizeof(double)}, "l");
+    tag += '-' + local.substr(1, local.size() - 2);  // without its quotes
+  }
+  return tag + '"';
 }
 
 Response answer(const AnchorFeature& feature) {

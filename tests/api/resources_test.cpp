@@ -84,6 +84,27 @@ TEST_F(Resources, ChangeASiteOnlyWithTheEtagThatWasRead) {
   EXPECT_EQ(call(Method::get, path, "", with("if-none-match", header(made, "ETag"))).status, 200);
 }
 
+// A reader that keeps what it read would go on with the old datum, accuracy and map coordinates.
+TEST_F(Resources, AnAnchorsEtagChangesWithWhatItShowsOfItsSite) {
+  post("/api/v1/calibrations/" + calibration() + "/publish", "");
+  const auto site = post("/api/v1/sites", R"({"name":"Ghent","origin":{"lon":3.7,"lat":51.0,"h_m":55}})");
+  const std::string path = "/api/v1/anchors/0x6a2f";
+  const auto placed = call(Method::patch, path, to_wire(Json{{"site", json(site)["id"]}}),
+                           with("if-match", header(get(path), "ETag")));
+  ASSERT_EQ(placed.status, 200) << placed.body;
+  const auto known = with("if-none-match", header(get(path), "ETag"));
+  const auto same = call(Method::get, path, "", known);
+  EXPECT_EQ(same.status, 304);
+  EXPECT_EQ(same.body, "");
+  const auto changed =
+      call(Method::patch, "/api/v1/sites/" + json(site)["id"].get<std::string>(),
+           R"({"crs":{"frame":"ETRS89","epoch":2026.5}})", with("if-match", header(site, "ETag")));
+  ASSERT_EQ(changed.status, 200) << changed.body;
+  const auto read = call(Method::get, path, "", known);
+  ASSERT_EQ(read.status, 200);
+  EXPECT_EQ(json(read)["properties"]["crs"]["frame"], "ETRS89");
+}
+
 TEST_F(Resources, PublishOnlyWhatIsBelievedUnlessAReasonIsGiven) {
   const auto id = calibration();
   EXPECT_TRUE(json(get("/api/v1/anchors"))["features"].empty());
