@@ -109,7 +109,8 @@ set(server/storage_source "^(sqlite3\\.h$|SQLiteCpp/|libpq-fe\\.h$|sys/|unistd\\
 set(server/mqtt_header "^(${everywhere})")
 set(server/mqtt_source "^(mosquitto\\.h$|poll\\.h$|resolv\\.h$|sys/|unistd\\.h$)")
 
-set(server_header "^(${everywhere}|boost/)")
+# Of JSON only its name, as in api.
+set(server_header "^(${everywhere}|boost/|nlohmann/json_fwd\\.hpp$)")
 set(server_source "^(CLI/|linux/(filter|seccomp)\\.h$|spawn\\.h$|httplib\\.h$|spdlog/|fmt/|prometheus/|openssl/|toml\\+\\+/|toml\\.hpp$|nlohmann/json|zlib\\.h$|sys/|netdb\\.h$|netinet/|arpa/|unistd\\.h$|fcntl\\.h$|signal\\.h$|poll\\.h$|pthread\\.h$|termios\\.h$)")
 
 set(migrations_header "^$")
@@ -362,6 +363,8 @@ if(SELF_TEST)
   expect(server/storage/a.cpp "\"core/localize/solver.hpp\"" broken)
   expect(server/storage/a.cpp "\"api/kit/message.hpp\"" broken)
   expect(server/app/a.cpp "<sqlite3.h>" broken)
+  expect(server/cli/a.hpp "<nlohmann/json_fwd.hpp>" clean)
+  expect(server/cli/a.hpp "<nlohmann/json.hpp>" broken)
   expect(server/storage/a.cpp "<libpq-fe.h>" clean)
   expect(server/app/a.cpp "<libpq-fe.h>" broken)
   expect(server/mqtt/a.cpp "<mosquitto.h>" clean)
