@@ -36,7 +36,7 @@ test('a person sends a plan, clicks points, sees residuals, places it, traces it
   await id('floor-name').fill('Ground floor');
   await id('make-floor').click();
   await id('plan-file').setInputFiles({ name: 'no.pdf', mimeType: 'application/pdf', buffer: Buffer.from('%PDF-1.7') });
-  await id('floor-plan').getByText('PNG, JPEG or (Geo)TIFF').waitFor();
+  await id('floor-plan').getByText('PNG, JPEG, (Geo)TIFF or ASCII DXF').waitFor();
   await id('plan-file').setInputFiles({ name: 'room.png', mimeType: 'image/png', buffer: room_png() });
   const shown = id('plan-picture');
   await eventually('the picture is there', () => shown.evaluate((i) => i.complete && i.naturalWidth === 800));
