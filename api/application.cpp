@@ -217,7 +217,7 @@ struct Application::State {
                      return published_features(anchor_api, std::nullopt, newest);
                    },
                    steady, deps.mqtt_prefix, deps.build.version}),
-        exchange_api{anchor_api, stores.missions, stores.measurements, deps.geopackage},
+        exchange_api{anchor_api, stores.missions, stores.measurements, stores.places, deps.geopackage},
         webhook_api{stores.webhooks, webhooks, deps.web_post, deps.clock, audit},
         omlox_api{anchor_api, stores.places, omlox_locations, deps.clock},
         place_api{stores.places, stores.sites, jobs,  deps.run_plan_work,

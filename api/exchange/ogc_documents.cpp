@@ -88,7 +88,8 @@ Ordered ogc_collection_json(const std::string& root, const OgcCollection& collec
     const auto& b = *extent.box;
     Ordered box{b.west, b.south, b.east, b.north};
     if (std::isfinite(b.low_m)) box = {b.west, b.south, b.low_m, b.east, b.north, b.high_m};
-    where["spatial"] = {{"bbox", Ordered::array({std::move(box)})}, {"crs", k_storage_crs.uri}};
+    where["spatial"] = {{"bbox", Ordered::array({std::move(box)})},
+                        {"crs", (std::isfinite(b.low_m) ? k_storage_crs : k_flat_crs).uri}};
   }
   if (extent.interval)
     where["temporal"] = {{"interval", Ordered::array({Ordered::array({time_or_null(extent.interval->from),
@@ -96,8 +97,10 @@ Ordered ogc_collection_json(const std::string& root, const OgcCollection& collec
                          {"trs", "http://www.opengis.net/def/uom/ISO-8601/0/Gregorian"}};
   if (!where.empty()) out["extent"] = std::move(where);
   out["crs"] = Ordered::array();
-  for (const auto& crs : k_ogc_crs) out["crs"].push_back(crs.uri);
-  out["storageCrs"] = k_storage_crs.uri;
+  for (const auto& crs : k_ogc_crs)
+    if (collection.has_heights || !crs.has_height) out["crs"].push_back(crs.uri);
+  const auto& storage = collection.has_heights ? k_storage_crs : k_flat_crs;
+  out["storageCrs"] = storage.uri;
   out["links"] = {ogc_link(self, "self", k_json, "This collection"),
                   ogc_link(self + "/items", "items", k_geojson, collection.title)};
   return out;

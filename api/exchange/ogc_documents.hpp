@@ -15,6 +15,7 @@ namespace anchord::api {
 struct OgcCollection {
   std::string_view id, title, description;
   std::size_t usual_limit, max_limit;
+  bool has_heights{true};
 };
 inline constexpr std::array k_ogc_collections{
     OgcCollection{"anchors", "UWB anchors", "Anchors of the newest published revision", 100, 1000},
@@ -24,7 +25,9 @@ inline constexpr std::array k_ogc_collections{
         "position",
         100, 1000},
     OgcCollection{"tracks", "Flight paths",
-                  "One line for each flight, newest first, at least spacing_m between its vertices", 10, 50}};
+                  "One line for each flight, newest first, at least spacing_m between its vertices", 10, 50},
+    OgcCollection{"zones", "Floors", "Floors of buildings, with the outline that a person accepted", 100,
+                  1000, false}};
 /// Null where there is none of this name.
 const OgcCollection* ogc_collection(std::string_view id);
 

@@ -28,14 +28,15 @@ void only(const Request& request, std::initializer_list<std::string_view> allowe
   if (format && *format != "json" && *format != "geojson") bad("f", "must be json: there is no other form");
 }
 
-OgcCrs named_crs(const Request& request, const char* name) {
+OgcCrs named_crs(const Request& request, const char* name, bool heights) {
   const auto uri = request.query_value(name);
-  if (!uri) return k_storage_crs;
-  for (const auto& crs : k_ogc_crs) {
-    if (crs.uri == *uri) return crs;
-  }
+  if (!uri) return heights ? k_storage_crs : k_flat_crs;
   std::string all;
-  for (const auto& crs : k_ogc_crs) all += (all.empty() ? "" : ", ") + std::string(crs.uri);
+  for (const auto& crs : k_ogc_crs) {
+    if (crs.has_height && !heights) continue;
+    if (crs.uri == *uri) return crs;
+    all += (all.empty() ? "" : ", ") + std::string(crs.uri);
+  }
   bad(name, "must be one of " + all);
 }
 
@@ -51,7 +52,7 @@ std::vector<double> numbers(const std::string& text) {
 }
 
 OgcBox box_of(const Request& request, const std::string& text) {
-  const auto crs = named_crs(request, "bbox-crs");
+  const auto crs = named_crs(request, "bbox-crs", true);
   auto n = numbers(text);
   if (n.size() != 4 && n.size() != 6)
     bad("bbox", "is four numbers, or six with heights: west,south,east,north");
@@ -94,9 +95,15 @@ bool OgcBox::holds(const Wgs84& at) const {
   return along && at.lat_deg >= south && at.lat_deg <= north && at.height_m >= low_m && at.height_m <= high_m;
 }
 
-OgcQuery ogc_items_query(const Request& request, std::size_t usual, std::size_t maximum) {
+bool OgcBox::meets(double west_of, double south_of, double east_of, double north_of) const {
+  const bool across = west > east;
+  const bool along = across ? east_of >= west || west_of <= east : east_of >= west && west_of <= east;
+  return along && north_of >= south && south_of <= north;
+}
+
+OgcQuery ogc_items_query(const Request& request, std::size_t usual, std::size_t maximum, bool heights) {
   only(request, {"limit", "cursor", "bbox", "bbox-crs", "datetime", "crs", "f"});
-  OgcQuery out{usual, request.query_value("cursor").value_or(""), {}, {}, named_crs(request, "crs")};
+  OgcQuery out{usual, request.query_value("cursor").value_or(""), {}, {}, named_crs(request, "crs", heights)};
   if (const auto text = request.query_value("limit")) {
     const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), out.limit);
     if (error != std::errc{} || end != text->data() + text->size() || out.limit < 1)
@@ -108,9 +115,9 @@ OgcQuery ogc_items_query(const Request& request, std::size_t usual, std::size_t 
   return out;
 }
 
-OgcCrs ogc_item_query(const Request& request) {
+OgcCrs ogc_item_query(const Request& request, bool heights) {
   only(request, {"crs", "f"});
-  return named_crs(request, "crs");
+  return named_crs(request, "crs", heights);
 }
 
 void ogc_document_query(const Request& request) { only(request, {"f"}); }

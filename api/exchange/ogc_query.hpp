@@ -26,11 +26,16 @@ inline constexpr std::array k_ogc_crs{k_storage_crs,
                                       OgcCrs{"http://www.opengis.net/def/crs/EPSG/0/4979", true, true},
                                       OgcCrs{"http://www.opengis.net/def/crs/EPSG/0/4326", true, false}};
 
+/// Of features without heights.
+inline constexpr OgcCrs k_flat_crs = k_ogc_crs[1];
+
 /// A bounding box in degrees and metres; west > east crosses the antimeridian.
 struct OgcBox {
   double west, south, east, north;
   double low_m, high_m;
   bool holds(const Wgs84& at) const;
+  /// Whether it has a part of a rectangle that does not cross the antimeridian, at any height.
+  bool meets(double west_of, double south_of, double east_of, double north_of) const;
 };
 
 /// Instants from..to, both included; an open end is absent.
@@ -48,10 +53,10 @@ struct OgcQuery {
   OgcCrs crs;
   bool filters() const { return box || interval; }
 };
-/// `limit` above the maximum means the maximum.
-OgcQuery ogc_items_query(const Request& request, std::size_t usual, std::size_t maximum);
+/// `limit` above the maximum means the maximum. heights: whether the features have them
+OgcQuery ogc_items_query(const Request& request, std::size_t usual, std::size_t maximum, bool heights);
 /// `crs` of a request for one item.
-OgcCrs ogc_item_query(const Request& request);
+OgcCrs ogc_item_query(const Request& request, bool heights);
 /// For documents, which only take `f=json`.
 void ogc_document_query(const Request& request);
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "api/anchors/published_features.hpp"
@@ -6,11 +7,13 @@
 #include "api/exchange/flight_track.hpp"
 #include "api/exchange/ogc_documents.hpp"
 #include "api/exchange/ogc_query.hpp"
+#include "api/exchange/ogc_zones.hpp"
 #include "api/exchange/routes.hpp"
 #include "api/kit/or_null.hpp"
 #include "api/kit/support.hpp"
 #include "core/ports/anchor_store.hpp"
 #include "core/ports/mission_store.hpp"
+#include "core/ports/place_store.hpp"
 #include "core/ports/revision_store.hpp"
 
 namespace anchord::api {
@@ -36,10 +39,16 @@ struct Item {
   Ordered feature;
   std::optional<Wgs84> at;
   std::optional<UtcTime> time;
+  std::optional<ZoneBounds> bounds{};  ///< of what is no point
 };
 
+bool is_in(const OgcBox& box, const Item& item) {
+  if (const auto& b = item.bounds) return box.meets(b->west, b->south, b->east, b->north);
+  return item.at && box.holds(*item.at);
+}
+
 bool wanted(const Item& item, const OgcQuery& query) {
-  if (query.box && !(item.at && query.box->holds(*item.at))) return false;
+  if (query.box && !is_in(*query.box, item)) return false;
   return !query.interval || (item.time && query.interval->meets(*item.time, *item.time));
 }
 
@@ -82,6 +91,22 @@ std::vector<Item> revision_items(ExchangeApi& s) {
     }
   }
   return out;
+}
+
+std::vector<Item> zone_items(ExchangeApi& s) {
+  std::vector<Item> out;
+  value_or_problem(each_zone(s.places, [&](const Floor& floor, const Building& building) {
+    Item item{to_string(floor.id), zone_json(floor, building), {}, floor.created};
+    item.bounds = bounds_of(item.feature);
+    out.push_back(std::move(item));
+  }));
+  return out;
+}
+
+/// Of the collections that are made whole: all but tracks.
+std::vector<Item> items_of(ExchangeApi& s, const OgcCollection& collection) {
+  if (collection.id == "zones") return zone_items(s);
+  return collection.id == "anchors" ? anchor_items(s) : revision_items(s);
 }
 
 Ordered track_json(const Mission& mission, const FlightTrack& track) {
@@ -207,20 +232,21 @@ Page track_page(ExchangeApi& s, const OgcQuery& query) {
 
 const OgcCollection& path_collection(const Request& request) {
   const auto* found = ogc_collection(request.params.at("collection"));
-  if (found == nullptr) throw_problem(404, "not-found", "the collections are anchors, revisions and tracks");
+  if (found == nullptr)
+    throw_problem(404, "not-found", "the collections are anchors, revisions, tracks and zones");
   return *found;
 }
 
 Response items(ExchangeApi& s, const Request& request) {
   const auto& collection = path_collection(request);
-  const auto query = ogc_items_query(request, collection.usual_limit, collection.max_limit);
+  const auto query =
+      ogc_items_query(request, collection.usual_limit, collection.max_limit, collection.has_heights);
   if (collection.id == "tracks") return page_answer(request, collection, query, track_page(s, query));
-  return page_answer(request, collection, query,
-                     page_of(collection.id == "anchors" ? anchor_items(s) : revision_items(s), query));
+  return page_answer(request, collection, query, page_of(items_of(s, collection), query));
 }
 
 Response answer_one(const Request& request, const OgcCollection& collection, Ordered feature) {
-  const auto crs = ogc_item_query(request);
+  const auto crs = ogc_item_query(request, collection.has_heights);
   turn(feature, crs);
   const std::string home = root_of(request) + "/collections/" + std::string(collection.id);
   feature["links"] = {
@@ -240,29 +266,35 @@ Response one_of(const Request& request, const OgcCollection& collection, std::ve
 
 Response item(ExchangeApi& s, const Request& request) {
   const auto& collection = path_collection(request);
-  if (collection.id == "anchors") return one_of(request, collection, anchor_items(s));
-  if (collection.id == "revisions") return one_of(request, collection, revision_items(s));
+  if (collection.id != "tracks") return one_of(request, collection, items_of(s, collection));
   const auto mission = value_or_problem(s.missions.mission(path_id<MissionId>(request, "feature")));
   return answer_one(request, collection,
                     track_json(mission, value_or_problem(flight_track(s.measurements, mission.id))));
 }
 
-/// Of anchors, where they are few enough to look at; a reader zooms to it.
+/// Widens it by a point or by the bounds of an outline, whose heights are not known.
+void widen(std::optional<OgcBox>& box, const Item& item) {
+  constexpr double k_any = std::numeric_limits<double>::infinity();
+  OgcBox one{};
+  if (item.bounds)
+    one = {item.bounds->west, item.bounds->south, item.bounds->east, item.bounds->north, -k_any, k_any};
+  else if (item.at)
+    one = {item.at->lon_deg, item.at->lat_deg,  item.at->lon_deg,
+           item.at->lat_deg, item.at->height_m, item.at->height_m};
+  else
+    return;
+  if (!box) box = one;
+  box = OgcBox{std::min(box->west, one.west),   std::min(box->south, one.south),
+               std::max(box->east, one.east),   std::max(box->north, one.north),
+               std::min(box->low_m, one.low_m), std::max(box->high_m, one.high_m)};
+}
+
+/// Of anchors and floors, where they are few enough to look at; a reader zooms to it.
 OgcExtent extent_of(ExchangeApi& s, const OgcCollection& collection) {
   OgcExtent out;
   if (collection.id == "tracks") return out;
-  for (const auto& one : collection.id == "anchors" ? anchor_items(s) : revision_items(s)) {
-    if (one.at) {
-      const auto& at = *one.at;
-      if (!out.box)
-        out.box = OgcBox{at.lon_deg, at.lat_deg, at.lon_deg, at.lat_deg, at.height_m, at.height_m};
-      out.box->west = std::min(out.box->west, at.lon_deg);
-      out.box->east = std::max(out.box->east, at.lon_deg);
-      out.box->south = std::min(out.box->south, at.lat_deg);
-      out.box->north = std::max(out.box->north, at.lat_deg);
-      out.box->low_m = std::min(out.box->low_m, at.height_m);
-      out.box->high_m = std::max(out.box->high_m, at.height_m);
-    }
+  for (const auto& one : items_of(s, collection)) {
+    widen(out.box, one);
     if (one.time) {
       if (!out.interval) out.interval = OgcInterval{one.time, one.time};
       out.interval->from = std::min(*out.interval->from, *one.time);

@@ -11,6 +11,7 @@
 namespace anchord {
 class MeasurementStore;
 class MissionStore;
+class PlaceStore;
 }  // namespace anchord
 
 namespace anchord::api {
@@ -23,6 +24,7 @@ struct ExchangeApi {
   AnchorApi& anchors;
   MissionStore& missions;
   MeasurementStore& measurements;
+  PlaceStore& places;
   /// The bytes of a GeoPackage; of the layer that has SQLite.
   std::function<Result<std::string>(std::span<const FeatureTable>, UtcTime)> geopackage;
 };

@@ -136,6 +136,46 @@ TEST_F(Ogc, AFlightWithoutAPlaceOnTheGlobeHasNoGeometry) {
   EXPECT_EQ(items("tracks")["features"][1]["geometry"], nullptr);
 }
 
+// QGIS asks for the box of its window, which lies inside of a floor when somebody zoomed in.
+TEST_F(Ogc, AZoneIsAFloorWithItsAcceptedOutlineAndIsInEveryBoxThatItReachesInto) {
+  const auto site = json(post("/api/v1/sites", R"({"name":"Ghent"})"))["id"].get<std::string>();
+  const auto building =
+      json(post("/api/v1/buildings", R"({"name":"B1","height_m":9,"site":")" + site + "\"}"))["id"];
+  const auto floor = [&](const char* name) {
+    const auto made =
+        post("/api/v1/floors", to_wire(Json{{"name", name}, {"level", 0}, {"building", building}}));
+    EXPECT_EQ(made.status, 201) << made.body;
+    return json(made)["id"].get<std::string>();
+  };
+  const auto ground = floor("Ground"), bare = floor("Roof");
+  Call options;
+  options.headers["if-match"] = header(get("/api/v1/floors/" + ground), "ETag");
+  const auto kept = call(
+      api::Method::put, "/api/v1/floors/" + ground + "/walls",
+      R"({"walls":[],"outline":{"type":"Polygon","coordinates":[[[3.7,51],[3.702,51],[3.702,51.001],[3.7,51.001],[3.7,51]]]}})",
+      options);
+  ASSERT_EQ(kept.status, 200) << kept.body;
+  const auto all = items("zones");
+  ASSERT_EQ(all["features"].size(), 2u);
+  EXPECT_TRUE(all["features"][1]["geometry"].is_null()) << "nobody accepted an outline of " << bare;
+  const auto& zone = all["features"][0];
+  EXPECT_EQ(zone["id"], ground);
+  EXPECT_EQ(zone["geometry"]["coordinates"][0][2], Json({3.702, 51.001}));
+  EXPECT_EQ(zone["properties"]["building"], "B1");
+  EXPECT_EQ(zone["properties"]["site"], site);
+  EXPECT_EQ(items("zones", {{"bbox", "3.7009,51.0004,3.7011,51.0006"}})["numberMatched"], 1);
+  EXPECT_EQ(items("zones", {{"bbox", "3.703,51,3.71,51.1"}})["numberMatched"], 0);
+  const auto one =
+      get("/ogc/collections/zones/items/" + ground, {{"crs", "http://www.opengis.net/def/crs/EPSG/0/4326"}});
+  EXPECT_EQ(json(one)["geometry"]["coordinates"][0][2], Json({51.001, 3.702}));
+  EXPECT_EQ(header(get("/ogc/collections/zones/items"), "Content-Crs"),
+            "<http://www.opengis.net/def/crs/OGC/1.3/CRS84>");
+  items("zones", {{"crs", "http://www.opengis.net/def/crs/EPSG/0/4979"}}, 400);
+  const auto about = json(get("/ogc/collections/zones"));
+  EXPECT_EQ(about["extent"]["spatial"]["bbox"][0], Json({3.7, 51.0, 3.702, 51.001}));
+  EXPECT_EQ(about["storageCrs"], "http://www.opengis.net/def/crs/OGC/1.3/CRS84");
+}
+
 TEST_F(Ogc, WrongQueriesAreBadRequests) {
   for (const Query& wrong :
        {Query{{"bbox", "1,2,3"}}, Query{{"bbox", "1,2,3,x"}}, Query{{"bbox", "1,5,2,4"}},
