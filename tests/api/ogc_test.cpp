@@ -185,7 +185,7 @@ TEST_F(Ogc, WrongQueriesAreBadRequests) {
     const Json problem = items("anchors", wrong, 400);
     EXPECT_EQ(problem["errors"].size(), 1U) << wrong.begin()->first;
   }
-  EXPECT_EQ(get("/ogc/collections/zones").status, 404);
+  EXPECT_EQ(get("/ogc/collections/walls").status, 404);
   EXPECT_EQ(get("/ogc", {{"colour", "red"}}).status, 400);
 }
 

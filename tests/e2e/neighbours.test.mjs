@@ -298,4 +298,16 @@ test('a DXF that GDAL wrote is a floor plan, at the place of its coordinates', a
     assert.ok(apart < 0.08, `${at} is ${apart} m from any corner`);
   }
   assert.equal(traced.outline.coordinates[0].length, 5);
+  const etag = (await server.fetch(path)).headers.get('etag');
+  const accepted = await server.fetch(`${path}/walls`, {
+    method: 'PUT',
+    headers: { 'if-match': etag },
+    json: { from_trace: true, material: 'brick' },
+  });
+  assert.equal(accepted.status, 200, await accepted.text());
+  const zones = await layer(`OAPIF:${server.url}/ogc`, 'zones', ...oapif());
+  assert.equal(zones.count, 1);
+  assert.equal(zones.geometry, 'Polygon');
+  assert.equal(zones.features[0].properties.building, 'C');
+  assert.ok(apart(zones.features[0], { geometry: traced.outline }) < 1e-9);
 });
