@@ -1,5 +1,6 @@
 // Missions, sites, anchors, calibrations: conventions of api.md section 5 over a real database.
 #include "app_fixture.hpp"
+#include "core/base/to_wire.hpp"
 #include "core/types/anchor.hpp"
 
 namespace anchord::test {
