@@ -27,6 +27,8 @@ cmd_fmt() {
 tidy() {
   local seen=build/lint failed=0 rules file files mark jobs
   mkdir -p "$seen"
+  # Each file as itself: the release build compiles several as one.
+  configure_preset tidy
   jobs=$(jobs_count)
   files=$(own_sources | grep '\.cpp$' | grep -v '^tests/')
   rules=$(own_sources | grep '\.hpp$' | tr '\n' '\0' | xargs -0 cat .clang-tidy | sha256sum | cut -c1-16)
@@ -37,7 +39,7 @@ tidy() {
   done <<<"$files" >"$seen/todo"
   xargs -0 -r -n 2 -P "$jobs" bash -c '
     echo "    $1" >&2
-    timeout 300 clang-tidy-16 -p build/release --quiet --extra-arg=-Wno-unknown-warning-option "$1" 2>/dev/null && touch "$2"' tidy <"$seen/todo" || failed=1
+    timeout 300 clang-tidy-16 -p build/tidy --quiet --extra-arg=-Wno-unknown-warning-option "$1" 2>/dev/null && touch "$2"' tidy <"$seen/todo" || failed=1
   return $failed
 }
 

@@ -7,9 +7,13 @@
 #include "api/kit/support.hpp"
 
 namespace anchord::api {
+namespace {
+
+using Ordered = nlohmann::ordered_json;
+
+}  // namespace
 
 void add_alarm_routes(Router& router, AdminApi& s) {
-  using Ordered = nlohmann::ordered_json;
   router.add(as_command({Method::get, "/api/v1/alarms", readers(), [&s](const Request& request) {
                            check_query(request, {"fields"});
                            Ordered items = Ordered::array();

@@ -17,6 +17,8 @@
 namespace anchord::api {
 namespace {
 
+using Ordered = nlohmann::ordered_json;
+
 constexpr std::size_t k_calibrations_read = 200;         // the newest; older ones were answered long ago
 constexpr std::size_t k_named = 6;                       // in the text of the alarm
 const UtcTime k_stamped{946'684'800LL * 1'000'000'000};  // 2000-01-01; folders without an epoch begin in 1970
@@ -81,7 +83,6 @@ std::string text_of(const Contradiction& c, UtcTime measured) {
 }  // namespace
 
 nlohmann::ordered_json contradiction_json(const ContradictedAnchor& anchor) {
-  using Ordered = nlohmann::ordered_json;
   const auto metres = [](double v) { return std::round(v * 1e4) / 1e4; };
   const Contradiction& c = anchor.what;
   Ordered missions = Ordered::array();

@@ -8,12 +8,12 @@
 namespace anchord {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Ordered = nlohmann::ordered_json;
 constexpr const char* k_schema = "anchord.kit_profile/1";
 
 Error wrong(const std::string& what) { return make_error(Errc::invalid_argument, "kit profile: " + what); }
 
-Result<ProfileFactor> parse_factor(const Json& json, std::size_t index) {
+Result<ProfileFactor> parse_factor(const Ordered& json, std::size_t index) {
   const std::string where = "factors[" + std::to_string(index) + "]";
   if (!json.is_object()) return wrong(where + " is not an object");
   for (const auto& [key, value] : json.items()) {
@@ -25,21 +25,21 @@ Result<ProfileFactor> parse_factor(const Json& json, std::size_t index) {
     factor.flight = json["flight"].get<std::string>();
   if (json.contains("digest") && json["digest"].is_string())
     factor.digest = json["digest"].get<std::string>();
-  const auto finite = [](const Json& v) { return v.is_number() && std::isfinite(v.get<double>()); };
+  const auto finite = [](const Ordered& v) { return v.is_number() && std::isfinite(v.get<double>()); };
   if (!json.contains("information") || !json["information"].is_array() || json["information"].size() != 16 ||
       !json.contains("information_mean") || !json["information_mean"].is_array() ||
       json["information_mean"].size() != 4) {
     return wrong(where + ": information needs 16 numbers, information_mean 4");
   }
   for (std::size_t i = 0; i < 16; ++i) {
-    const Json& value = json["information"][i];
+    const Ordered& value = json["information"][i];
     if (!finite(value))
       return wrong(where + ".information[" + std::to_string(i) + "] is not a finite number");
     factor.information(static_cast<Eigen::Index>(i / 4), static_cast<Eigen::Index>(i % 4)) =
         value.get<double>();
   }
   for (std::size_t i = 0; i < 4; ++i) {
-    const Json& value = json["information_mean"][i];
+    const Ordered& value = json["information_mean"][i];
     if (!finite(value))
       return wrong(where + ".information_mean[" + std::to_string(i) + "] is not a finite number");
     factor.information_mean[static_cast<Eigen::Index>(i)] = value.get<double>();
@@ -52,15 +52,15 @@ Result<ProfileFactor> parse_factor(const Json& json, std::size_t index) {
 }  // namespace
 
 std::string kit_profile_json(const KitProfile& profile) {
-  Json json = {{"schema", k_schema},
-               {"kit", profile.kit},
-               {"order", {"bias_m", "curve_m_per_efold", "lag_s", "lever_up_m"}},
-               {"factors", Json::array()}};
+  Ordered json = {{"schema", k_schema},
+                  {"kit", profile.kit},
+                  {"order", {"bias_m", "curve_m_per_efold", "lag_s", "lever_up_m"}},
+                  {"factors", Ordered::array()}};
   for (const auto& factor : profile.factors) {
-    Json one = {{"flight", factor.flight}};
+    Ordered one = {{"flight", factor.flight}};
     if (!factor.digest.empty()) one["digest"] = factor.digest;
-    one["information"] = Json::array();
-    one["information_mean"] = Json::array();
+    one["information"] = Ordered::array();
+    one["information_mean"] = Ordered::array();
     for (Eigen::Index r = 0; r < 4; ++r) {
       for (Eigen::Index c = 0; c < 4; ++c) one["information"].push_back(factor.information(r, c));
       one["information_mean"].push_back(factor.information_mean[r]);
@@ -71,7 +71,7 @@ std::string kit_profile_json(const KitProfile& profile) {
 }
 
 Result<KitProfile> parse_kit_profile(std::string_view text) {
-  const Json json = Json::parse(text, nullptr, false);
+  const Ordered json = Ordered::parse(text, nullptr, false);
   if (json.is_discarded() || !json.is_object()) return wrong("not a JSON object");
   for (const auto& [key, value] : json.items()) {
     if (key != "schema" && key != "kit" && key != "order" && key != "factors")

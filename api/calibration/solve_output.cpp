@@ -16,26 +16,26 @@
 namespace anchord {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Ordered = nlohmann::ordered_json;
 
 /// A number with so many decimals, null where there is none.
-Json number(double value, int decimals) {
+Ordered number(double value, int decimals) {
   if (!std::isfinite(value)) return nullptr;
   char text[40];
   std::snprintf(text, sizeof text, "%.*f", decimals, value);
   return std::strtod(text, nullptr);  // prints back with at most these decimals
 }
-Json number(const std::optional<double>& value, int decimals) {
-  return value ? number(*value, decimals) : Json(nullptr);
+Ordered number(const std::optional<double>& value, int decimals) {
+  return value ? number(*value, decimals) : Ordered(nullptr);
 }
-Json valued(const Valued& v) { return {{"value", number(v.value, 5)}, {"sigma", number(v.sigma, 5)}}; }
+Ordered valued(const Valued& v) { return {{"value", number(v.value, 5)}, {"sigma", number(v.sigma, 5)}}; }
 
-Json vector_of(const Eigen::Vector3d& v) { return {number(v.x(), 4), number(v.y(), 4), number(v.z(), 4)}; }
+Ordered vector_of(const Eigen::Vector3d& v) { return {number(v.x(), 4), number(v.y(), 4), number(v.z(), 4)}; }
 
-void put_place(Json& json, const Hypothesis& h, bool globe) {
-  json["lon"] = h.wgs84 ? number(h.wgs84->lon_deg, 9) : Json(nullptr);
-  json["lat"] = h.wgs84 ? number(h.wgs84->lat_deg, 9) : Json(nullptr);
-  json["h_m"] = h.wgs84 ? number(h.wgs84->height_m, 4) : Json(nullptr);
+void put_place(Ordered& json, const Hypothesis& h, bool globe) {
+  json["lon"] = h.wgs84 ? number(h.wgs84->lon_deg, 9) : Ordered(nullptr);
+  json["lat"] = h.wgs84 ? number(h.wgs84->lat_deg, 9) : Ordered(nullptr);
+  json["h_m"] = h.wgs84 ? number(h.wgs84->height_m, 4) : Ordered(nullptr);
   json["enu_m"] = vector_of(h.position.m);
   if (!globe) {
     json["x_m"] = number(h.position.m.x(), 4);
@@ -44,8 +44,9 @@ void put_place(Json& json, const Hypothesis& h, bool globe) {
   }
 }
 
-Json search_json(const StartSearch& search) {
-  Json json = {{"n_starts", search.n_starts}, {"n_settled", search.n_settled}, {"places", Json::array()}};
+Ordered search_json(const StartSearch& search) {
+  Ordered json = {
+      {"n_starts", search.n_starts}, {"n_settled", search.n_settled}, {"places", Ordered::array()}};
   for (const auto& place : search.places) {
     json["places"].push_back({{"enu_m", vector_of(place.position_m)},
                               {"cost", number(place.cost, 3)},
@@ -56,18 +57,18 @@ Json search_json(const StartSearch& search) {
 }
 
 /// Positions of the dissertation's methods, beside which the answer is to be seen.
-Json methods_json(const MethodAnswers& answers) {
+Ordered methods_json(const MethodAnswers& answers) {
   const auto place = [](const std::optional<Eigen::Vector3d>& at) {
-    return at ? vector_of(*at) : Json(nullptr);
+    return at ? vector_of(*at) : Ordered(nullptr);
   };
   return {{"linear_enu_m", place(answers.linear_m)},
           {"wls_enu_m", place(answers.wls_m)},
-          {"why", answers.why.empty() ? Json(nullptr) : Json(answers.why)}};
+          {"why", answers.why.empty() ? Ordered(nullptr) : Ordered(answers.why)}};
 }
 
-Json anchor_json(const AnchorSolution& anchor, bool globe) {
+Ordered anchor_json(const AnchorSolution& anchor, bool globe) {
   const Estimate& e = anchor.estimate;
-  Json json;
+  Ordered json;
   json["anchor_id"] = anchor.name;
   json["network_id"] = to_string(e.anchor);
   json["verdict"] = k_verdict_words.word(e.verdict);
@@ -97,14 +98,14 @@ Json anchor_json(const AnchorSolution& anchor, bool globe) {
   }
   json["mirror"] = nullptr;
   if (e.mirror) {
-    Json mirror;
+    Ordered mirror;
     put_place(mirror, *e.mirror, globe);
     mirror["probability"] = number(e.mirror->probability, 4);
     json["mirror"] = std::move(mirror);
   }
   json["n_ranges"] = e.n_used;
   std::size_t n_refused = 0;
-  json["refused"] = Json::object();
+  json["refused"] = Ordered::object();
   for (const auto& [why, count] : e.refused) {
     json["refused"][why] = count;
     n_refused += count;
@@ -123,9 +124,9 @@ Json anchor_json(const AnchorSolution& anchor, bool globe) {
                       {"plane_ratio", number(g.plane_ratio, 4)},
                       {"sigma_ratio", number(g.sigma_ratio, 4)}};
   json["search"] = search_json(anchor.search);
-  json["budget"] = anchor.budget ? budget_json(*anchor.budget, false) : Json(nullptr);
+  json["budget"] = anchor.budget ? budget_json(*anchor.budget, false) : Ordered(nullptr);
   json["acceptable"] = e.acceptable();
-  json["gates"] = Json::array();
+  json["gates"] = Ordered::array();
   for (const Gate& gate : e.gates) {
     json["gates"].push_back({{"name", gate.name},
                              {"value", number(gate.value, 4)},
@@ -136,11 +137,11 @@ Json anchor_json(const AnchorSolution& anchor, bool globe) {
   return json;
 }
 
-Json flight_json(const SolvedFlight& flight) {
+Ordered flight_json(const SolvedFlight& flight) {
   const FlightSolution& s = *flight.solution;
   const Mission& mission = flight.data->mission;
   const bool globe = mission.frame == TrackFrame::wgs84;
-  Json json;
+  Ordered json;
   json["name"] = mission.name;
   json["kit"] = mission.kit;
   json["frame"] = k_frame_words.word(globe ? TrackFrame::wgs84 : TrackFrame::local);
@@ -156,7 +157,7 @@ Json flight_json(const SolvedFlight& flight) {
                     {"lever_up_m", valued(s.shared.lever_up_m)},
                     {"bias_determined", s.shared.bias_determined},
                     {"bias_z", number(s.shared.bias_z, 2)}};
-  json["shared"]["lever_up_by_antenna"] = Json::array();
+  json["shared"]["lever_up_by_antenna"] = Ordered::array();
   for (const auto& antenna : s.shared.lever_up_by_antenna)
     json["shared"]["lever_up_by_antenna"].push_back({{"tag_id", to_string(antenna.tag)},
                                                      {"antenna", antenna.antenna},
@@ -166,30 +167,31 @@ Json flight_json(const SolvedFlight& flight) {
   json["n_anchor_anchor"] = std::ranges::count(flight.data->ranges, RangeKind::anchor_anchor, &Range::kind);
   json["n_used"] = s.n_used;
   json["placed"] = s.placed;
-  json["refused"] = Json::object();
+  json["refused"] = Ordered::object();
   for (const auto& [why, count] : s.refused) json["refused"][why] = count;
-  json["fixes_refused"] = Json::object();
+  json["fixes_refused"] = Ordered::object();
   for (const auto& [why, count] : s.fixes_refused) json["fixes_refused"][why] = count;
-  json["models"] = flight.models != nullptr ? api::flight_models_report_json(*flight.models) : Json(nullptr);
+  json["models"] =
+      flight.models != nullptr ? api::flight_models_report_json(*flight.models) : Ordered(nullptr);
   json["notes"] = s.notes;
-  json["anchors"] = Json::array();
+  json["anchors"] = Ordered::array();
   for (const auto& anchor : s.anchors) {
     json["anchors"].push_back(anchor_json(anchor, globe));
     const auto methods = flight.methods.find(anchor.estimate.anchor);
     json["anchors"].back()["methods"] =
-        methods == flight.methods.end() ? Json(nullptr) : methods_json(methods->second);
+        methods == flight.methods.end() ? Ordered(nullptr) : methods_json(methods->second);
   }
   return json;
 }
 
 std::string geojson(std::span<const SolvedFlight> flights) {
-  Json all = {{"type", "FeatureCollection"}, {"features", Json::array()}};
+  Ordered all = {{"type", "FeatureCollection"}, {"features", Ordered::array()}};
   for (const auto& flight : flights) {
     const bool globe = flight.data->mission.frame == TrackFrame::wgs84;
     for (const auto& anchor : flight.solution->anchors) {
-      Json properties = anchor_json(anchor, globe);
+      Ordered properties = anchor_json(anchor, globe);
       properties["flight"] = flight.data->mission.name;
-      Json geometry = nullptr;
+      Ordered geometry = nullptr;
       const auto& best = anchor.estimate.best;
       if (best && best->wgs84) {
         geometry = {{"type", "Point"},
@@ -217,7 +219,7 @@ std::string solve_output(std::span<const SolvedFlight> flights, SolveFormat form
     case SolveFormat::json:
       break;
   }
-  Json all = {{"schema", "anchord.solve/1"}, {"flights", Json::array()}};
+  Ordered all = {{"schema", "anchord.solve/1"}, {"flights", Ordered::array()}};
   for (const auto& flight : flights) all["flights"].push_back(flight_json(flight));
   return to_wire(all, 1) + "\n";
 }

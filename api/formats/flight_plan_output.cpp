@@ -10,7 +10,7 @@
 namespace anchord::api {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Ordered = nlohmann::ordered_json;
 
 /// 1e-9 deg is 0.1 mm; more digits only make files unreadable.
 double rounded(double value, double per_unit) { return std::round(value * per_unit) / per_unit; }
@@ -29,7 +29,7 @@ Place place_of(const EnuFrame& frame, const Eigen::Vector2d& p) {
   return {rounded(at.lon_deg, 1e9), rounded(at.lat_deg, 1e9)};
 }
 
-Json predicted_json(const planning::FlightPlan& plan) {
+Ordered predicted_json(const planning::FlightPlan& plan) {
   return {{"n_anchors_assumed", plan.assumed_anchors_m.size()},
           {"n_out_of_range", plan.n_out_of_range},
           {"rms_m", plan.rms_m},
@@ -40,14 +40,14 @@ Json predicted_json(const planning::FlightPlan& plan) {
 
 std::string flight_plan_json(const planning::FlightPlan& plan, const Wgs84& origin) {
   const EnuFrame frame(origin);
-  Json out;
+  Ordered out;
   out["origin"] = {{"lon", origin.lon_deg}, {"lat", origin.lat_deg}};
   out["n_measure"] = plan.n_measure;
   out["length_m"] = plan.length_m;
   out["duration_s"] = plan.duration_s;
   out["predicted"] = predicted_json(plan);
   out["reason"] = plan.reason;
-  out["waypoints"] = Json::array();
+  out["waypoints"] = Ordered::array();
   for (const auto& w : plan.waypoints) {
     const auto at = place_of(frame, w.point_m.head<2>());
     out["waypoints"].push_back({{"lon", at.lon_deg},
@@ -62,7 +62,7 @@ std::string flight_plan_json(const planning::FlightPlan& plan, const Wgs84& orig
 
 std::string flight_plan_geojson(const planning::FlightPlan& plan, const Wgs84& origin) {
   const EnuFrame frame(origin);
-  Json features = Json::array(), line = Json::array();
+  Ordered features = Ordered::array(), line = Ordered::array();
   for (std::size_t i = 0; i < plan.waypoints.size(); ++i) {
     const auto& w = plan.waypoints[i];
     const auto at = place_of(frame, w.point_m.head<2>());
@@ -84,7 +84,7 @@ std::string flight_plan_geojson(const planning::FlightPlan& plan, const Wgs84& o
                         {"duration_s", plan.duration_s},
                         {"predicted", predicted_json(plan)},
                         {"reason", plan.reason}}}});
-  Json out;
+  Ordered out;
   out["type"] = "FeatureCollection";
   out["features"] = features;
   return to_wire(out, 2) + "\n";
@@ -95,9 +95,9 @@ std::string flight_plan_qgc(const planning::FlightPlan& plan, const Wgs84& origi
   // MAV_CMD and MAV_FRAME numbers of the MAVLink common set.
   constexpr int k_waypoint = 16, k_return = 20, k_takeoff = 22, k_relative_altitude = 3, k_mission_frame = 2;
   const EnuFrame frame(origin);
-  Json items = Json::array();
-  const auto put = [&](int command, int mav_frame, Json params, double altitude) {
-    Json item;
+  Ordered items = Ordered::array();
+  const auto put = [&](int command, int mav_frame, Ordered params, double altitude) {
+    Ordered item;
     item["type"] = "SimpleItem";
     item["AMSLAltAboveTerrain"] = nullptr;
     item["Altitude"] = altitude;
@@ -109,7 +109,7 @@ std::string flight_plan_qgc(const planning::FlightPlan& plan, const Wgs84& origi
     item["params"] = std::move(params);
     items.push_back(item);
   };
-  Json home = {origin.lat_deg, origin.lon_deg, 0};
+  Ordered home = {origin.lat_deg, origin.lon_deg, 0};
   if (!plan.waypoints.empty()) {
     const auto& first = plan.waypoints.front();
     const auto at = place_of(frame, first.point_m.head<2>());
@@ -125,20 +125,20 @@ std::string flight_plan_qgc(const planning::FlightPlan& plan, const Wgs84& origi
   }
   put(k_return, k_mission_frame, {0, 0, 0, 0, 0, 0, 0}, 0);
 
-  Json corners = Json::array();
+  Ordered corners = Ordered::array();
   for (const auto& corner : outline) {
     const auto at = place_of(frame, corner);
     corners.push_back({at.lat_deg, at.lon_deg});
   }
-  Json out;
+  Ordered out;
   out["fileType"] = "Plan";
   out["groundStation"] = "QGroundControl";
   out["version"] = 1;
   out["geoFence"] = {
-      {"circles", Json::array()},
-      {"polygons", Json::array({{{"inclusion", false}, {"polygon", corners}, {"version", 1}}})},
+      {"circles", Ordered::array()},
+      {"polygons", Ordered::array({{{"inclusion", false}, {"polygon", corners}, {"version", 1}}})},
       {"version", 2}};
-  out["rallyPoints"] = {{"points", Json::array()}, {"version", 2}};
+  out["rallyPoints"] = {{"points", Ordered::array()}, {"version", 2}};
   out["mission"] = {{"version", 2},
                     {"firmwareType", 12},  // MAV_AUTOPILOT_PX4; every item here means the same to ArduPilot
                     {"vehicleType", 2},    // MAV_TYPE_QUADROTOR

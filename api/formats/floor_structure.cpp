@@ -10,25 +10,25 @@
 namespace anchord {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Ordered = nlohmann::ordered_json;
 
 constexpr double k_storey_m = 3;
 
 double bottom_of(const Floor& floor) { return floor.base_height_m.value_or(floor.level * k_storey_m); }
 
-std::optional<LonLat> position(const Json& j) {
+std::optional<LonLat> position(const Ordered& j) {
   if (!j.is_array() || j.size() < 2 || !j[0].is_number() || !j[1].is_number()) return std::nullopt;
   const LonLat at{j[0].get<double>(), j[1].get<double>()};
   if (!(std::abs(at.lon_deg) <= 180) || !(std::abs(at.lat_deg) <= 90)) return std::nullopt;
   return at;
 }
 
-void add_wall(const Json& wall, const StoreyHeights& heights, SiteStructure& out) {
+void add_wall(const Ordered& wall, const StoreyHeights& heights, SiteStructure& out) {
   if (!wall.is_object()) return;
-  const auto from = position(wall.value("from", Json())), to = position(wall.value("to", Json()));
+  const auto from = position(wall.value("from", Ordered())), to = position(wall.value("to", Ordered()));
   if (!from || !to || *from == *to) return;
   GeoWall made{*from, *to, heights.bottom_m, heights.top_m};
-  const auto thickness = wall.value("thickness_m", Json()), material = wall.value("material", Json());
+  const auto thickness = wall.value("thickness_m", Ordered()), material = wall.value("material", Ordered());
   if (thickness.is_number()) made.thickness_m = std::clamp(thickness.get<double>(), 0.01, 3.0);
   if (material.is_string())
     made.material =
@@ -36,7 +36,7 @@ void add_wall(const Json& wall, const StoreyHeights& heights, SiteStructure& out
   out.walls.push_back(made);
 }
 
-void add_outline(const Json& outline, SiteStructure& out) {
+void add_outline(const Ordered& outline, SiteStructure& out) {
   if (!outline.is_object() || !outline.contains("coordinates")) return;
   const auto& rings = outline["coordinates"];
   if (!rings.is_array() || rings.empty() || !rings[0].is_array()) return;

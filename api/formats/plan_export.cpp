@@ -8,7 +8,7 @@
 namespace anchord::api {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Ordered = nlohmann::ordered_json;
 
 // MAV_CMD and MAV_FRAME of the MAVLink common set.
 constexpr int k_waypoint = 16, k_return = 20, k_takeoff = 22, k_yaw = 115;
@@ -16,8 +16,8 @@ constexpr int k_relative_altitude = 3, k_mission_frame = 2;
 
 class Items {
  public:
-  void put(int command, int frame, Json params, double altitude_m) {
-    Json item;
+  void put(int command, int frame, Ordered params, double altitude_m) {
+    Ordered item;
     item["type"] = "SimpleItem";
     item["AMSLAltAboveTerrain"] = nullptr;
     item["Altitude"] = altitude_m;
@@ -29,24 +29,24 @@ class Items {
     item["params"] = std::move(params);
     items_.push_back(std::move(item));
   }
-  Json take() { return std::move(items_); }
+  Ordered take() { return std::move(items_); }
 
  private:
-  Json items_ = Json::array();
+  Ordered items_ = Ordered::array();
 };
 
-Json qgc_polygon(const GeoPolygon& polygon, bool inclusion) {
-  Json corners = Json::array();
+Ordered qgc_polygon(const GeoPolygon& polygon, bool inclusion) {
+  Ordered corners = Ordered::array();
   for (const auto& p : polygon) corners.push_back({p.lat_deg, p.lon_deg});
   return {{"inclusion", inclusion}, {"polygon", corners}, {"version", 1}};
 }
 
-Json area_feature(const GeoPolygon& polygon, const char* kind) {
-  Json ring = Json::array();
+Ordered area_feature(const GeoPolygon& polygon, const char* kind) {
+  Ordered ring = Ordered::array();
   for (const auto& p : polygon) ring.push_back({p.lon_deg, p.lat_deg});
   ring.push_back(ring.front());
   return {{"type", "Feature"},
-          {"geometry", {{"type", "Polygon"}, {"coordinates", Json::array({ring})}}},
+          {"geometry", {{"type", "Polygon"}, {"coordinates", Ordered::array({ring})}}},
           {"properties", {{"kind", kind}}}};
 }
 
@@ -65,24 +65,24 @@ Result<std::string> plan_qgc(const Plan& plan) {
   for (const auto& w : plan.waypoints) {
     const double hold_s = w.measure ? w.dwell_s.value_or(plan.settings.dwell_s) : 0;
     items.put(k_waypoint, k_relative_altitude,
-              {hold_s, 0, 0, w.heading_deg ? Json(*w.heading_deg) : Json(nullptr), w.at.lat_deg, w.at.lon_deg,
-               w.height_m},
+              {hold_s, 0, 0, w.heading_deg ? Ordered(*w.heading_deg) : Ordered(nullptr), w.at.lat_deg,
+               w.at.lon_deg, w.height_m},
               w.height_m);
     // 360 degrees, 30 degrees a second, clockwise, relative to where the nose is.
     if (w.turn) items.put(k_yaw, k_mission_frame, {360, 30, 1, 1, 0, 0, 0}, 0);
   }
   items.put(k_return, k_mission_frame, {0, 0, 0, 0, 0, 0, 0}, 0);
 
-  Json polygons = Json::array();
+  Ordered polygons = Ordered::array();
   if (!plan.fence.empty()) polygons.push_back(qgc_polygon(plan.fence, true));
   if (!plan.outline.empty()) polygons.push_back(qgc_polygon(plan.outline, false));
   for (const auto& area : plan.no_fly) polygons.push_back(qgc_polygon(area, false));
-  Json out;
+  Ordered out;
   out["fileType"] = "Plan";
   out["groundStation"] = "QGroundControl";
   out["version"] = 1;
-  out["geoFence"] = {{"circles", Json::array()}, {"polygons", std::move(polygons)}, {"version", 2}};
-  out["rallyPoints"] = {{"points", Json::array()}, {"version", 2}};
+  out["geoFence"] = {{"circles", Ordered::array()}, {"polygons", std::move(polygons)}, {"version", 2}};
+  out["rallyPoints"] = {{"points", Ordered::array()}, {"version", 2}};
   out["mission"] = {{"version", 2},
                     {"firmwareType", 3},  // MAV_AUTOPILOT_ARDUPILOTMEGA; every item means the same to PX4
                     {"vehicleType", 2},   // MAV_TYPE_QUADROTOR
@@ -95,7 +95,7 @@ Result<std::string> plan_qgc(const Plan& plan) {
 }
 
 Result<std::string> plan_geojson(const Plan& plan) {
-  Json features = Json::array(), line = Json::array();
+  Ordered features = Ordered::array(), line = Ordered::array();
   if (!plan.outline.empty()) {
     features.push_back(area_feature(plan.outline, "outline"));
     features.back()["properties"]["height_m"] = plan.building_height_m;
@@ -111,14 +111,14 @@ Result<std::string> plan_geojson(const Plan& plan) {
                          {{"kind", w.measure ? "waypoint" : "transit"},
                           {"index", i},
                           {"height_above_ground_m", w.height_m},
-                          {"heading_deg", w.heading_deg ? Json(*w.heading_deg) : Json(nullptr)}}}});
+                          {"heading_deg", w.heading_deg ? Ordered(*w.heading_deg) : Ordered(nullptr)}}}});
   }
   if (line.size() > 1) {
     features.push_back({{"type", "Feature"},
                         {"geometry", {{"type", "LineString"}, {"coordinates", line}}},
                         {"properties", {{"kind", "path"}}}});
   }
-  Json out;
+  Ordered out;
   out["type"] = "FeatureCollection";
   out["features"] = std::move(features);
   return to_wire(out, 2) + "\n";

@@ -10,14 +10,14 @@
 namespace anchord::api {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Ordered = nlohmann::ordered_json;
 using planning::Rule;
 
 /// JSON has no infinity: a value that is singular is null.
-Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+Ordered finite_or_null(double value) { return std::isfinite(value) ? Ordered(value) : Ordered(nullptr); }
 
-Json point_json(const Eigen::Vector3d& p, int dims) {
-  return dims == 2 ? Json::array({p.x(), p.y()}) : Json::array({p.x(), p.y(), p.z()});
+Ordered point_json(const Eigen::Vector3d& p, int dims) {
+  return dims == 2 ? Ordered::array({p.x(), p.y()}) : Ordered::array({p.x(), p.y(), p.z()});
 }
 
 const char* value_name(Rule rule) {
@@ -32,40 +32,40 @@ const char* value_name(Rule rule) {
   return "";
 }
 
-Json candidate_json(const planning::CandidateValue& c, const PlanRequest& request) {
-  Json out;
+Ordered candidate_json(const planning::CandidateValue& c, const PlanRequest& request) {
+  Ordered out;
   out["point_m"] = point_json(c.point_m, request.options.dims);
   out["value"] = finite_or_null(c.value);
   if (request.options.rule == Rule::dissertation) out["gdop_root"] = finite_or_null(std::sqrt(c.value));
   out["score"] = finite_or_null(c.score);
-  Json anchors = Json::array();
+  Ordered anchors = Ordered::array();
   for (std::size_t k = 0; k < c.per_anchor.size(); ++k) {
     anchors.push_back({{"name", request.input.anchors[k].name}, {"value", finite_or_null(c.per_anchor[k])}});
   }
   out["per_anchor"] = anchors;
   out["p_nlos"] = c.p_nlos;
   out["flight_s"] = c.flight_s;
-  out["refused"] = c.refused ? Json(planning::to_string(*c.refused)) : Json(nullptr);
+  out["refused"] = c.refused ? Ordered(planning::to_string(*c.refused)) : Ordered(nullptr);
   return out;
 }
 
 }  // namespace
 
 std::string decision_json(const planning::Decision& decision, const PlanRequest& request) {
-  Json out;
+  Ordered out;
   out["rule"] = planning::to_string(request.options.rule);
   out["combine"] = planning::to_string(request.options.combine);
   out["dims"] = request.options.dims;
   out["value_is"] = value_name(request.options.rule);
   out["next_m"] = decision.chosen
                       ? point_json(decision.candidates[*decision.chosen].point_m, request.options.dims)
-                      : Json(nullptr);
-  out["chosen"] = decision.chosen ? Json(*decision.chosen) : Json(nullptr);
+                      : Ordered(nullptr);
+  out["chosen"] = decision.chosen ? Ordered(*decision.chosen) : Ordered(nullptr);
   out["value"] =
-      decision.chosen ? finite_or_null(decision.candidates[*decision.chosen].value) : Json(nullptr);
+      decision.chosen ? finite_or_null(decision.candidates[*decision.chosen].value) : Ordered(nullptr);
   out["value_before"] = finite_or_null(decision.value_before);
   out["reason"] = decision.reason;
-  out["candidates"] = Json::array();
+  out["candidates"] = Ordered::array();
   for (const auto& c : decision.candidates) out["candidates"].push_back(candidate_json(c, request));
   return to_wire(out, 2) + "\n";
 }

@@ -6,7 +6,7 @@
 
 namespace anchord::api {
 
-using Json = nlohmann::ordered_json;
+using Ordered = nlohmann::ordered_json;
 
 const std::vector<ProblemType>& problem_types() {
   static const std::vector<ProblemType> k_types{
@@ -46,16 +46,16 @@ std::string problem_json(int status, std::string_view type, std::string_view det
   for (const auto& known : problem_types()) {
     if (known.type == type) title = known.title;
   }
-  Json body{{"type", "/problems/" + std::string(type)}, {"title", title}, {"status", status}};
+  Ordered body{{"type", "/problems/" + std::string(type)}, {"title", title}, {"status", status}};
   if (!detail.empty()) body["detail"] = detail;
   if (!instance.empty()) body["instance"] = instance;
   if (!request_id.empty()) body["request_id"] = request_id;
   if (!errors.empty()) {
-    Json list = Json::array();
+    Ordered list = Ordered::array();
     for (const auto& error : errors) {
-      Json item{{"pointer", error.pointer}, {"code", error.code}, {"detail", error.detail}};
+      Ordered item{{"pointer", error.pointer}, {"code", error.code}, {"detail", error.detail}};
       if (!error.value_json.empty()) {
-        auto value = Json::parse(error.value_json, nullptr, false);
+        auto value = Ordered::parse(error.value_json, nullptr, false);
         if (!value.is_discarded()) item["value"] = std::move(value);
       }
       list.push_back(std::move(item));

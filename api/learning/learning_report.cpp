@@ -11,19 +11,19 @@
 namespace anchord::api {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Ordered = nlohmann::ordered_json;
 
-Json json_of(const ml::Confusion& c) { return {{"tp", c.tp}, {"fp", c.fp}, {"fn", c.fn}, {"tn", c.tn}}; }
+Ordered json_of(const ml::Confusion& c) { return {{"tp", c.tp}, {"fp", c.fp}, {"fn", c.fn}, {"tn", c.tn}}; }
 
-Json json_of(const RowReport& r) {
-  Json dropped = Json::array();
+Ordered json_of(const RowReport& r) {
+  Ordered dropped = Ordered::array();
   for (const auto& [reason, entry] : r.dropped) {
-    Json item{{"reason", reason}, {"count", entry.first}};
+    Ordered item{{"reason", reason}, {"count", entry.first}};
     if (!entry.second.empty()) item["first"] = entry.second;
     dropped.push_back(item);
   }
-  Json out{{"files", r.files}, {"rows_read", r.read}, {"rows_used", r.used}, {"dropped", dropped}};
-  const auto text = [](const std::string& s) { return s.empty() ? Json(nullptr) : Json(s); };
+  Ordered out{{"files", r.files}, {"rows_read", r.read}, {"rows_used", r.used}, {"dropped", dropped}};
+  const auto text = [](const std::string& s) { return s.empty() ? Ordered(nullptr) : Ordered(s); };
   out["columns"] = {{"label", text(r.label)},
                     {"truth", text(r.truth)},
                     {"group_by", text(r.group_by)},
@@ -32,7 +32,7 @@ Json json_of(const RowReport& r) {
   return out;
 }
 
-void put_confusion(Json& out, const ml::Confusion& c) {
+void put_confusion(Ordered& out, const ml::Confusion& c) {
   out["accuracy"] = c.accuracy();
   out["balanced_accuracy"] = c.balanced_accuracy();
   out["fpr"] = c.fpr();
@@ -66,20 +66,20 @@ std::string text_row(const char* name, const ml::BiasEvaluation& b) {
 
 namespace {
 
-Json settings_json(const std::vector<std::pair<std::string, double>>& settings) {
-  Json out = Json::object();
+Ordered settings_json(const std::vector<std::pair<std::string, double>>& settings) {
+  Ordered out = Ordered::object();
   for (const auto& [name, value] : settings) out[name] = value;
   return out;
 }
 
-Json candidates_json(const std::vector<ml::CandidateRow>& table, bool bias) {
-  Json out = Json::array();
+Ordered candidates_json(const std::vector<ml::CandidateRow>& table, bool bias) {
+  Ordered out = Ordered::array();
   for (const auto& row : table) {
-    Json entry{{"candidate", row.name},
-               {"picked", row.picked},
-               {"method", ml::method_name(row.method)},
-               {"settings", settings_json(row.settings)},
-               {"features", row.features}};
+    Ordered entry{{"candidate", row.name},
+                  {"picked", row.picked},
+                  {"method", ml::method_name(row.method)},
+                  {"settings", settings_json(row.settings)},
+                  {"features", row.features}};
     if (bias) {
       entry["mae_m"] = row.error.mae_m;
       entry["mse_m2"] = row.error.mse_m2;
@@ -96,14 +96,14 @@ Json candidates_json(const std::vector<ml::CandidateRow>& table, bool bias) {
   return out;
 }
 
-Json folds_json(const ml::TrainingOutcome& outcome, bool bias) {
-  Json out = Json::array();
+Ordered folds_json(const ml::TrainingOutcome& outcome, bool bias) {
+  Ordered out = Ordered::array();
   for (const auto& row : outcome.folds) {
-    Json entry{{"candidate", row.candidate},
-               {"fold", row.fold},
-               {"train_rows", row.train_rows},
-               {"test_rows", row.test_rows},
-               {"loss", row.loss}};
+    Ordered entry{{"candidate", row.candidate},
+                  {"fold", row.fold},
+                  {"train_rows", row.train_rows},
+                  {"test_rows", row.test_rows},
+                  {"loss", row.loss}};
     if (bias) {
       entry["mae_raw_m"] = row.mae_raw_m;
       entry["mae_m"] = row.mae_m;
@@ -114,7 +114,7 @@ Json folds_json(const ml::TrainingOutcome& outcome, bool bias) {
   return out;
 }
 
-Json split_json(const ml::SplitReport& s) {
+Ordered split_json(const ml::SplitReport& s) {
   return {
       {"train", {{"rows", s.train_rows}, {"placements", s.train_placements}, {"places", s.train_places}}},
       {"test", {{"rows", s.test_rows}, {"placements", s.test_placements}, {"places", s.test_place_names}}},
@@ -123,16 +123,17 @@ Json split_json(const ml::SplitReport& s) {
       {"leak", s.leak}};
 }
 
-Json threshold_json(const ml::ThresholdReport& t) {
-  Json out{{"threshold", t.threshold},    {"fpr", t.fpr},           {"fpr_low", t.fpr_low},
-           {"fpr_high", t.fpr_high},      {"accuracy", t.accuracy}, {"accuracy_at_half", t.accuracy_at_half},
-           {"places_with_nlos", t.places}};
+Ordered threshold_json(const ml::ThresholdReport& t) {
+  Ordered out{{"threshold", t.threshold},    {"fpr", t.fpr},
+              {"fpr_low", t.fpr_low},        {"fpr_high", t.fpr_high},
+              {"accuracy", t.accuracy},      {"accuracy_at_half", t.accuracy_at_half},
+              {"places_with_nlos", t.places}};
   if (t.max_fpr) out["max_fpr"] = *t.max_fpr;
   return out;
 }
 
-Json test_json(const ml::Evaluation& e) {
-  Json out{{"n", e.rows}};
+Ordered test_json(const ml::Evaluation& e) {
+  Ordered out{{"n", e.rows}};
   if (e.confusion) {
     put_confusion(out, *e.confusion);
     out["brier"] = e.brier;
@@ -151,13 +152,13 @@ Json test_json(const ml::Evaluation& e) {
 std::string train_json(const ml::TrainingOutcome& outcome, const RowReport& rows,
                        const std::string& out_path) {
   const auto& info = outcome.model.info;
-  Json out{{"model", out_path},          {"task", ml::task_name(info.task)},
-           {"method", info.method},      {"why", info.why},
-           {"features", info.features},  {"data", json_of(rows)},
-           {"digest", info.data_digest}, {"placements", info.placements},
-           {"places", info.groups},      {"folds", info.folds},
-           {"seed", info.seed}};
-  Json cv = Json::object();
+  Ordered out{{"model", out_path},          {"task", ml::task_name(info.task)},
+              {"method", info.method},      {"why", info.why},
+              {"features", info.features},  {"data", json_of(rows)},
+              {"digest", info.data_digest}, {"placements", info.placements},
+              {"places", info.groups},      {"folds", info.folds},
+              {"seed", info.seed}};
+  Ordered cv = Ordered::object();
   for (const auto& [name, value] : info.metrics) cv[name] = value;
   out["cross_validation"] = cv;
   const bool bias = info.task != ml::Task::nlos_id;
@@ -169,13 +170,13 @@ std::string train_json(const ml::TrainingOutcome& outcome, const RowReport& rows
   if (outcome.model.classifier) out["threshold"] = outcome.model.classifier->threshold;
   if (outcome.threshold) out["threshold_report"] = threshold_json(*outcome.threshold);
   if (!outcome.importance.empty()) {
-    Json list = Json::array();
+    Ordered list = Ordered::array();
     for (const auto& one : outcome.importance)
       list.push_back({{"feature", one.feature}, {"mean", one.mean}, {"sd", one.sd}});
     out["importance"] = list;
   }
   if (!outcome.selection.empty()) {
-    Json list = Json::array();
+    Ordered list = Ordered::array();
     for (const auto& one : outcome.selection)
       list.push_back({{"feature", one.feature}, {"loss", one.loss}, {"kept", one.kept}});
     out["selection"] = list;
@@ -239,7 +240,7 @@ std::string train_text(const ml::TrainingOutcome& outcome, const RowReport& rows
 }
 
 std::string evaluation_json(const ml::Evaluation& e, const ml::Model& model, const RowReport& rows) {
-  Json out{{"task", ml::task_name(model.info.task)}, {"method", model.info.method}, {"n", e.rows}};
+  Ordered out{{"task", ml::task_name(model.info.task)}, {"method", model.info.method}, {"n", e.rows}};
   if (e.confusion) {
     put_confusion(out, *e.confusion);
     out["threshold"] = model.classifier->threshold;
@@ -256,7 +257,7 @@ std::string evaluation_json(const ml::Evaluation& e, const ml::Model& model, con
     if (e.los) out["bias"]["los"] = bias_json(*e.los);
     if (e.nlos) out["bias"]["nlos"] = bias_json(*e.nlos);
     if (e.nll) out["mean_negative_log_likelihood"] = *e.nll;
-    Json cdf = Json::array();
+    Ordered cdf = Ordered::array();
     for (std::size_t i = 0; i < e.cdf_raw.size(); i += 5)
       cdf.push_back({{"share", e.cdf_raw[i].share},
                      {"raw_m", e.cdf_raw[i].value_m},
@@ -264,16 +265,16 @@ std::string evaluation_json(const ml::Evaluation& e, const ml::Model& model, con
     out["cdf"] = cdf;
   }
   if (!e.roc.empty()) {
-    Json roc = Json::array();
+    Ordered roc = Ordered::array();
     const std::size_t step = std::max<std::size_t>(1, e.roc.size() / 100);
     for (std::size_t i = 0; i < e.roc.size(); ++i)
       if (i % step == 0 || i + 1 == e.roc.size())
         roc.push_back({{"threshold", e.roc[i].threshold}, {"fpr", e.roc[i].fpr}, {"tpr", e.roc[i].tpr}});
     out["roc"] = roc;
   }
-  Json places = Json::array();
+  Ordered places = Ordered::array();
   for (const auto& place : e.places) {
-    Json entry{{"place", place.place}, {"n", place.rows}};
+    Ordered entry{{"place", place.place}, {"n", place.rows}};
     if (place.accuracy) entry["accuracy"] = *place.accuracy;
     if (place.bias) {
       entry["mae_raw_m"] = place.bias->raw.mae_m;

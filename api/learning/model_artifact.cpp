@@ -8,24 +8,24 @@
 namespace anchord::api {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Ordered = nlohmann::ordered_json;
 
-Json json_of(const ml::Scaler& s) { return {{"mean", s.mean}, {"sd", s.sd}, {"clip", s.clip}}; }
+Ordered json_of(const ml::Scaler& s) { return {{"mean", s.mean}, {"sd", s.sd}, {"clip", s.clip}}; }
 
-Json json_of(const ml::Scorer& scorer) {
+Ordered json_of(const ml::Scorer& scorer) {
   struct Writer {
     static std::string_view kind(ml::ScorerKind k) { return ml::k_scorer_words.word(k); }
-    Json operator()(const ml::Linear& m) const {
+    Ordered operator()(const ml::Linear& m) const {
       return {{"kind", kind(ml::ScorerKind::linear)}, {"weights", m.weights}, {"offset", m.offset}};
     }
-    Json operator()(const ml::Polynomial& m) const {
-      Json terms = Json::array();
+    Ordered operator()(const ml::Polynomial& m) const {
+      Ordered terms = Ordered::array();
       for (const auto& t : m.terms)
         terms.push_back({{"features", t.features}, {"coefficient", t.coefficient}});
       return {{"kind", kind(ml::ScorerKind::polynomial)}, {"terms", terms}};
     }
-    Json operator()(const ml::Trees& m) const {
-      Json feature = Json::array(), left = Json::array(), value = Json::array();
+    Ordered operator()(const ml::Trees& m) const {
+      Ordered feature = Ordered::array(), left = Ordered::array(), value = Ordered::array();
       for (const auto& n : m.nodes) {
         feature.push_back(n.feature);
         left.push_back(n.left);
@@ -39,7 +39,7 @@ Json json_of(const ml::Scorer& scorer) {
               {"left", left},
               {"value", value}};
     }
-    Json operator()(const ml::Svm& m) const {
+    Ordered operator()(const ml::Svm& m) const {
       return {{"kind", kind(ml::ScorerKind::svm)},
               {"kernel", ml::k_kernel_words.word(m.kernel)},
               {"gamma", m.gamma},
@@ -54,8 +54,8 @@ Json json_of(const ml::Scorer& scorer) {
   return std::visit(Writer{}, scorer);
 }
 
-Json json_of(const ml::Classifier& c) {
-  Json members = Json::array();
+Ordered json_of(const ml::Classifier& c) {
+  Ordered members = Ordered::array();
   for (const auto& m : c.members)
     members.push_back(
         {{"share", m.share}, {"slope", m.slope}, {"offset", m.offset}, {"scorer", json_of(m.scorer)}});
@@ -68,8 +68,8 @@ Json json_of(const ml::Classifier& c) {
           {"members", members}};
 }
 
-Json json_of(const ml::BiasMixture& m) {
-  Json tail = Json::array();
+Ordered json_of(const ml::BiasMixture& m) {
+  Ordered tail = Ordered::array();
   for (const auto& t : m.tail)
     tail.push_back({{"feature", t.feature}, {"mean", t.mean}, {"sd", t.sd}, {"weight", t.weight}});
   const auto& s = m.shared;
@@ -100,7 +100,7 @@ std::string write_model_artifact(const ml::Model& model) {
   nlohmann::json metrics =
       nlohmann::json::object();  // sorted by name, so that reading and writing again gives the same bytes
   for (const auto& [name, value] : i.metrics) metrics[name] = value;
-  Json out{
+  Ordered out{
       {"format", k_model_format},
       {"manifest",
        {{"task", ml::task_name(i.task)},

@@ -9,7 +9,7 @@
 namespace anchord::api {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Ordered = nlohmann::ordered_json;
 using nlos::k_rule_count;
 using nlos::Rule;
 
@@ -54,8 +54,8 @@ std::string block(const std::vector<RuleReport>& reports, bool los) {
   return out;
 }
 
-Json rates_json(const nlos::RuleRow& row) {
-  Json out = Json::object();
+Ordered rates_json(const nlos::RuleRow& row) {
+  Ordered out = Ordered::object();
   for (const auto& [word, rule] : nlos::k_rule_words) {
     const auto& cell = row[static_cast<std::size_t>(rule)];
     const auto& rates = cell.rates;
@@ -70,8 +70,8 @@ Json rates_json(const nlos::RuleRow& row) {
   return out;
 }
 
-Json thresholds_json(const nlos::RuleSet& rules) {
-  Json out = Json::object();
+Ordered thresholds_json(const nlos::RuleSet& rules) {
+  Ordered out = Ordered::object();
   if (rules.rss)
     out["rss"] = {{"at_zero_dbm", rules.rss->at_zero_dbm},
                   {"slope_dbm_per_m", rules.rss->slope_dbm_per_m},
@@ -97,7 +97,7 @@ std::string rules_text(const std::vector<RuleReport>& reports) {
 }
 
 std::string rules_json(const std::vector<RuleReport>& reports) {
-  Json sets = Json::array();
+  Ordered sets = Ordered::array();
   for (const auto& r : reports)
     sets.push_back({{"data_set", r.data_set},
                     {"los_rows", r.los_rows},
@@ -105,7 +105,7 @@ std::string rules_json(const std::vector<RuleReport>& reports) {
                     {"printed", rates_json(r.printed)},
                     {"fitted", rates_json(r.fitted)},
                     {"thresholds", thresholds_json(r.rules)}});
-  return to_wire(Json{{"positive", "LOS"}, {"data_sets", sets}}, 2) + "\n";
+  return to_wire(Ordered{{"positive", "LOS"}, {"data_sets", sets}}, 2) + "\n";
 }
 
 }  // namespace anchord::api

@@ -10,13 +10,13 @@
 namespace anchord::api {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Ordered = nlohmann::ordered_json;
 
-Json confusion_json(const ml::Confusion& c) {
+Ordered confusion_json(const ml::Confusion& c) {
   return {{"tp", c.tp}, {"fp", c.fp}, {"fn", c.fn}, {"tn", c.tn}};
 }
 
-Json rates_json(const ml::Confusion& c) {
+Ordered rates_json(const ml::Confusion& c) {
   return {{"accuracy", c.accuracy()},
           {"balanced_accuracy", c.balanced_accuracy()},
           {"fpr", c.fpr()},
@@ -32,7 +32,7 @@ struct Spread {
     square += v * v;
     ++n;
   }
-  Json json() const {
+  Ordered json() const {
     if (n == 0) return nullptr;
     const auto count = static_cast<double>(n);
     const double mean = sum / count;
@@ -41,21 +41,21 @@ struct Spread {
   }
 };
 
-Json settings_json(const ml::CandidateRow& row) {
-  Json out = Json::object();
+Ordered settings_json(const ml::CandidateRow& row) {
+  Ordered out = Ordered::object();
   for (const auto& [name, value] : row.settings) out[name] = value;
   return out;
 }
 
-Json candidate_json(const ml::TrainingOutcome& o, std::size_t index, bool bias) {
+Ordered candidate_json(const ml::TrainingOutcome& o, std::size_t index, bool bias) {
   const auto& row = o.candidates[index];
-  Json out{{"name", row.name},
-           {"method", ml::method_name(row.method)},
-           {"settings", settings_json(row)},
-           {"features", row.features},
-           {"picked", row.picked},
-           {"loss", row.loss},
-           {"loss_sd", row.loss_sd}};
+  Ordered out{{"name", row.name},
+              {"method", ml::method_name(row.method)},
+              {"settings", settings_json(row)},
+              {"features", row.features},
+              {"picked", row.picked},
+              {"loss", row.loss},
+              {"loss_sd", row.loss_sd}};
   if (bias) {
     out["mae_m"] = row.error.mae_m;
     out["mse_m2"] = row.error.mse_m2;
@@ -69,7 +69,7 @@ Json candidate_json(const ml::TrainingOutcome& o, std::size_t index, bool bias) 
 }
 
 /// Mean and sd over the folds, as tables of chapter 6 have them.
-Json cv_json(const ml::TrainingOutcome& o, std::size_t index, bool bias) {
+Ordered cv_json(const ml::TrainingOutcome& o, std::size_t index, bool bias) {
   Spread loss, accuracy, fpr, mae;
   for (const auto& fold : o.folds) {
     if (fold.candidate != index) continue;
@@ -83,8 +83,8 @@ Json cv_json(const ml::TrainingOutcome& o, std::size_t index, bool bias) {
   return {{"loss", loss.json()}, {"accuracy", accuracy.json()}, {"fpr", fpr.json()}};
 }
 
-Json test_json(const ml::Evaluation& e) {
-  Json out{{"n", e.rows}};
+Ordered test_json(const ml::Evaluation& e) {
+  Ordered out{{"n", e.rows}};
   if (e.confusion) {
     out.update(rates_json(*e.confusion));
     out["brier"] = e.brier;
@@ -95,18 +95,18 @@ Json test_json(const ml::Evaluation& e) {
   if (e.los) out["bias_los"] = bias_json(*e.los);
   if (e.nlos) out["bias_nlos"] = bias_json(*e.nlos);
   if (e.nll) out["nll"] = *e.nll;
-  Json places = Json::array();
+  Ordered places = Ordered::array();
   for (const auto& place : e.places) {
-    Json entry{{"place", place.place}, {"n", place.rows}, {"accuracy", or_null(place.accuracy)}};
-    entry["mae_raw_m"] = place.bias ? Json(place.bias->raw.mae_m) : Json(nullptr);
-    entry["mae_m"] = place.bias ? Json(place.bias->corrected.mae_m) : Json(nullptr);
+    Ordered entry{{"place", place.place}, {"n", place.rows}, {"accuracy", or_null(place.accuracy)}};
+    entry["mae_raw_m"] = place.bias ? Ordered(place.bias->raw.mae_m) : Ordered(nullptr);
+    entry["mae_m"] = place.bias ? Ordered(place.bias->corrected.mae_m) : Ordered(nullptr);
     places.push_back(std::move(entry));
   }
   out["places"] = std::move(places);
   return out;
 }
 
-Json split_json(const ml::SplitReport& s) {
+Ordered split_json(const ml::SplitReport& s) {
   return {{"train", s.train_rows},
           {"train_settings", s.train_placements},
           {"train_places", s.train_places},
@@ -119,7 +119,7 @@ Json split_json(const ml::SplitReport& s) {
           {"leak", s.leak}};
 }
 
-Json threshold_json(const ml::ThresholdReport& t) {
+Ordered threshold_json(const ml::ThresholdReport& t) {
   return {{"threshold", t.threshold},
           {"max_fpr", or_null(t.max_fpr)},
           {"fpr", t.fpr},
@@ -130,15 +130,15 @@ Json threshold_json(const ml::ThresholdReport& t) {
           {"accuracy_at_half", t.accuracy_at_half}};
 }
 
-Json importance_json(const ml::TrainingOutcome& o) {
-  Json out = Json::array();
+Ordered importance_json(const ml::TrainingOutcome& o) {
+  Ordered out = Ordered::array();
   for (const auto& one : o.importance)
     out.push_back({{"feature", one.feature}, {"mean", one.mean}, {"sd", one.sd}});
   return out;
 }
 
 /// The best of each method, in the order they were tried.
-Json results_json(const ml::TrainingOutcome& o, bool bias) {
+Ordered results_json(const ml::TrainingOutcome& o, bool bias) {
   std::vector<std::size_t> best;
   for (std::size_t i = 0; i < o.candidates.size(); ++i) {
     const auto same = std::find_if(best.begin(), best.end(), [&](std::size_t k) {
@@ -150,31 +150,31 @@ Json results_json(const ml::TrainingOutcome& o, bool bias) {
              (!o.candidates[*same].picked && o.candidates[i].loss < o.candidates[*same].loss))
       *same = i;
   }
-  Json out = Json::array();
+  Ordered out = Ordered::array();
   for (const auto i : best) {
     const auto& row = o.candidates[i];
-    Json entry{{"method", ml::method_name(row.method)},
-               {"name", row.name},
-               {"params", settings_json(row)},
-               {"features", row.features},
-               {"picked", row.picked},
-               {"cv", cv_json(o, i, bias)},
-               {"pooled", candidate_json(o, i, bias)},
-               {"test", row.picked && o.test ? test_json(*o.test) : Json(nullptr)}};
+    Ordered entry{{"method", ml::method_name(row.method)},
+                  {"name", row.name},
+                  {"params", settings_json(row)},
+                  {"features", row.features},
+                  {"picked", row.picked},
+                  {"cv", cv_json(o, i, bias)},
+                  {"pooled", candidate_json(o, i, bias)},
+                  {"test", row.picked && o.test ? test_json(*o.test) : Ordered(nullptr)}};
     out.push_back(std::move(entry));
   }
   return out;
 }
 
-Json folds_json(const ml::TrainingOutcome& o, bool bias) {
-  Json out = Json::array();
+Ordered folds_json(const ml::TrainingOutcome& o, bool bias) {
+  Ordered out = Ordered::array();
   for (const auto& fold : o.folds) {
-    Json entry{{"candidate", o.candidates[fold.candidate].name},
-               {"method", ml::method_name(o.candidates[fold.candidate].method)},
-               {"fold", fold.fold},
-               {"train", fold.train_rows},
-               {"test", fold.test_rows},
-               {"loss", fold.loss}};
+    Ordered entry{{"candidate", o.candidates[fold.candidate].name},
+                  {"method", ml::method_name(o.candidates[fold.candidate].method)},
+                  {"fold", fold.fold},
+                  {"train", fold.train_rows},
+                  {"test", fold.test_rows},
+                  {"loss", fold.loss}};
     if (bias) {
       entry["mae_raw_m"] = fold.mae_raw_m;
       entry["mae_m"] = fold.mae_m;
@@ -186,17 +186,17 @@ Json folds_json(const ml::TrainingOutcome& o, bool bias) {
   return {{"items", std::move(out)}, {"places", o.fold_places}};
 }
 
-Json cdf_json(const ml::TrainingOutcome& o) {
-  Json items = Json::array();
+Ordered cdf_json(const ml::TrainingOutcome& o) {
+  Ordered items = Ordered::array();
   const auto curve = [&](const char* name, const std::vector<ml::CdfPoint>& points) {
     if (points.empty()) return;
-    Json list = Json::array();
-    Json read = Json::object();
+    Ordered list = Ordered::array();
+    Ordered read = Ordered::object();
     for (const auto& p : points) list.push_back({{"value_m", p.value_m}, {"share", p.share}});
     for (const auto& [key, share] : {std::pair{"p50_m", 0.5}, {"p90_m", 0.9}, {"p95_m", 0.95}}) {
       const auto at = std::find_if(points.begin(), points.end(),
                                    [s = share](const ml::CdfPoint& p) { return p.share >= s - 1e-9; });
-      read[key] = at == points.end() ? Json(nullptr) : Json(at->value_m);
+      read[key] = at == points.end() ? Ordered(nullptr) : Ordered(at->value_m);
     }
     items.push_back({{"method", name}, {"read", std::move(read)}, {"points", std::move(list)}});
   };
@@ -208,8 +208,8 @@ Json cdf_json(const ml::TrainingOutcome& o) {
   return {{"items", std::move(items)}};
 }
 
-Json roc_json(const ml::TrainingOutcome& o) {
-  Json points = Json::array();
+Ordered roc_json(const ml::TrainingOutcome& o) {
+  Ordered points = Ordered::array();
   // A few hundred points draw the same curve as fifty thousand.
   const std::size_t step = std::max<std::size_t>(1, o.roc.size() / 400);
   for (std::size_t i = 0; i < o.roc.size(); ++i)
@@ -217,21 +217,21 @@ Json roc_json(const ml::TrainingOutcome& o) {
       points.push_back({{"threshold", o.roc[i].threshold}, {"fpr", o.roc[i].fpr}, {"tpr", o.roc[i].tpr}});
   return {{"points", std::move(points)},
           {"auc", or_null(o.auc)},
-          {"threshold", o.threshold ? threshold_json(*o.threshold) : Json(nullptr)}};
+          {"threshold", o.threshold ? threshold_json(*o.threshold) : Ordered(nullptr)}};
 }
 
-Json predictions_json(const ml::TrainingOutcome& o, const DatasetTable& table, const LearningRows& rows) {
-  Json out = Json::array();
+Ordered predictions_json(const ml::TrainingOutcome& o, const DatasetTable& table, const LearningRows& rows) {
+  Ordered out = Ordered::array();
   for (const auto& p : o.predictions) {
     const auto& row = table.rows[rows.source[p.row]];
-    Json entry{{"row", rows.source[p.row]},
-               {"campaign", row.campaign},
-               {"environment", row.environment},
-               {"setting", row.setting},
-               {"split", p.held_out ? "test" : "train"},
-               {"range_m", row.range_m()},
-               {"true_range_m", or_null(row.true_range_m)}};
-    entry["los"] = p.los ? Json(*p.los) : Json(nullptr);
+    Ordered entry{{"row", rows.source[p.row]},
+                  {"campaign", row.campaign},
+                  {"environment", row.environment},
+                  {"setting", row.setting},
+                  {"split", p.held_out ? "test" : "train"},
+                  {"range_m", row.range_m()},
+                  {"true_range_m", or_null(row.true_range_m)}};
+    entry["los"] = p.los ? Ordered(*p.los) : Ordered(nullptr);
     entry["p_los"] = or_null(p.p_los);
     entry["bias_m"] = or_null(p.bias_m);
     entry["correction_m"] = or_null(p.correction_m);
@@ -256,33 +256,33 @@ std::map<std::string, std::string> training_parts(const ml::TrainingOutcome& o, 
                                                   const LearningRows& rows) {
   const auto& info = o.model.info;
   const bool bias = info.task != ml::Task::nlos_id;
-  Json grid = Json::array(), dropped = Json::object(), metrics = Json::object();
+  Ordered grid = Ordered::array(), dropped = Ordered::object(), metrics = Ordered::object();
   for (std::size_t i = 0; i < o.candidates.size(); ++i) grid.push_back(candidate_json(o, i, bias));
   for (const auto& [reason, n] : rows.dropped) dropped[reason] = n;
   for (const auto& [name, value] : info.metrics) metrics[name] = value;
-  Json selection = Json::array();
+  Ordered selection = Ordered::array();
   for (const auto& step : o.selection)
     selection.push_back({{"feature", step.feature}, {"loss", step.loss}, {"kept", step.kept}});
-  Json confusion{{"cv", nullptr}, {"test", nullptr}, {"positive", "los"}};
+  Ordered confusion{{"cv", nullptr}, {"test", nullptr}, {"positive", "los"}};
   if (o.confusion) confusion["cv"] = rates_json(*o.confusion);
   if (o.test && o.test->confusion) confusion["test"] = rates_json(*o.test->confusion);
-  confusion["threshold"] = o.model.classifier ? Json(o.model.classifier->threshold) : Json(nullptr);
-  Json split = split_json(o.split);
+  confusion["threshold"] = o.model.classifier ? Ordered(o.model.classifier->threshold) : Ordered(nullptr);
+  Ordered split = split_json(o.split);
   split["dropped"] = dropped;
 
-  Json summary{{"method", info.method},
-               {"why", info.why},
-               {"features", info.features},
-               {"metrics", metrics},
-               {"results", results_json(o, bias)},
-               {"importance", importance_json(o)},
-               {"split", split},
-               {"threshold", o.threshold ? threshold_json(*o.threshold) : Json(nullptr)},
-               {"nll", or_null(o.nll)},
-               {"nll_constants", or_null(o.nll_constants)},
-               {"bias", o.bias ? bias_json(*o.bias) : Json(nullptr)},
-               {"test", o.test ? test_json(*o.test) : Json(nullptr)}};
-  const auto text = [](const Json& json) { return to_wire(json); };
+  Ordered summary{{"method", info.method},
+                  {"why", info.why},
+                  {"features", info.features},
+                  {"metrics", metrics},
+                  {"results", results_json(o, bias)},
+                  {"importance", importance_json(o)},
+                  {"split", split},
+                  {"threshold", o.threshold ? threshold_json(*o.threshold) : Ordered(nullptr)},
+                  {"nll", or_null(o.nll)},
+                  {"nll_constants", or_null(o.nll_constants)},
+                  {"bias", o.bias ? bias_json(*o.bias) : Ordered(nullptr)},
+                  {"test", o.test ? test_json(*o.test) : Ordered(nullptr)}};
+  const auto text = [](const Ordered& json) { return to_wire(json); };
   return {{"summary", text(summary)},
           {"folds", text(folds_json(o, bias))},
           {"grid", text({{"items", grid}})},

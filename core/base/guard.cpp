@@ -12,14 +12,14 @@
 namespace anchord {
 namespace {
 
-using SteadyClock = std::chrono::steady_clock;
+using MonotonicClock = std::chrono::steady_clock;
 
 constexpr auto k_same_again = std::chrono::seconds(10);
 constexpr std::size_t k_most_tasks = 64, k_most_words = 1000;
 
 struct Kept {
   TaskFailure failure;
-  SteadyClock::time_point told{};
+  MonotonicClock::time_point told{};
 };
 
 struct Book {
@@ -50,14 +50,14 @@ void report_stderr(const TaskFailure& failure) {
 /// The failure if it is to be told now.
 bool enter(std::string_view task, const std::string& what, TaskFailure& out,
            std::function<void(const TaskFailure&)>& tell) {
-  const auto now = SteadyClock::now();
+  const auto now = MonotonicClock::now();
   auto all = book().lock();
   auto found = all->tasks.find(task);
   if (found == all->tasks.end() && all->tasks.size() >= k_most_tasks) task = "another task";
   if (found == all->tasks.end()) found = all->tasks.try_emplace(to_utf8(task)).first;
   auto& [failure, told] = found->second;
   const bool news = failure.what != what || now - told >= k_same_again;
-  const auto count = failure.newest == SteadyClock::time_point{} ? 1 : failure.count + 1;
+  const auto count = failure.newest == MonotonicClock::time_point{} ? 1 : failure.count + 1;
   failure = {found->first, what, count, now};
   if (news) told = now;
   out = failure;
@@ -74,7 +74,7 @@ void on_task_failure(std::function<void(const TaskFailure&)> tell) {
 
 std::vector<TaskFailure> task_failures(std::chrono::seconds within) {
   std::vector<TaskFailure> out;
-  const auto now = SteadyClock::now();
+  const auto now = MonotonicClock::now();
   const auto all = book().lock();
   for (const auto& [name, kept] : all->tasks) {
     if (now - kept.failure.newest <= within) out.push_back(kept.failure);

@@ -7,21 +7,21 @@
 namespace anchord::device {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Ordered = nlohmann::ordered_json;
 
-std::string text_of(const Json& object, const char* key) {
+std::string text_of(const Ordered& object, const char* key) {
   const auto it = object.find(key);
   return it != object.end() && it->is_string() ? it->get<std::string>() : std::string();
 }
 
-Json object_of(const std::string& text) {
-  auto json = Json::parse(text.empty() ? "{}" : text, nullptr, false);
-  return json.is_object() ? json : Json::object();
+Ordered object_of(const std::string& text) {
+  auto json = Ordered::parse(text.empty() ? "{}" : text, nullptr, false);
+  return json.is_object() ? json : Ordered::object();
 }
 
-Result<Json> parsed(std::string_view text) {
+Result<Ordered> parsed(std::string_view text) {
   if (text.size() > 65'536) return make_error(Errc::bad_frame, "longer than 64 KiB");
-  auto json = Json::parse(text.begin(), text.end(), nullptr, false);
+  auto json = Ordered::parse(text.begin(), text.end(), nullptr, false);
   if (!json.is_object()) return make_error(Errc::bad_frame, "not a JSON object");
   return json;
 }
@@ -29,11 +29,11 @@ Result<Json> parsed(std::string_view text) {
 }  // namespace
 
 std::string to_json(const Settings& s) {
-  return to_wire(Json{{"id", s.id},
-                      {"kind", s.kind},
-                      {"name", s.name},
-                      {"address", s.address},
-                      {"options", object_of(s.options_json)}});
+  return to_wire(Ordered{{"id", s.id},
+                         {"kind", s.kind},
+                         {"name", s.name},
+                         {"address", s.address},
+                         {"options", object_of(s.options_json)}});
 }
 
 Result<Settings> parse_settings(std::string_view text) {
@@ -46,7 +46,7 @@ Result<Settings> parse_settings(std::string_view text) {
 }
 
 std::string to_json(const Command& c) {
-  return to_wire(Json{{"id", c.id}, {"name", c.name}, {"arguments", object_of(c.arguments_json)}});
+  return to_wire(Ordered{{"id", c.id}, {"name", c.name}, {"arguments", object_of(c.arguments_json)}});
 }
 
 Result<Command> parse_command(std::string_view text) {

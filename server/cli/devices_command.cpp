@@ -15,7 +15,7 @@
 namespace anchord::cli {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Ordered = nlohmann::ordered_json;
 
 struct Options {
   std::string data_dir{"anchord-data"}, url, device, kind, address, name, action, arguments, anchor;
@@ -45,9 +45,9 @@ class Server {
     return Server(std::move(client));
   }
 
-  Result<Json> call(std::string_view method, const std::string& target, const std::string& body = {}) {
+  Result<Ordered> call(std::string_view method, const std::string& target, const std::string& body = {}) {
     BOOST_OUTCOME_TRY(const auto answer, client_.call(method, target, body));
-    auto json = Json::parse(answer.body, nullptr, false);
+    auto json = Ordered::parse(answer.body, nullptr, false);
     if (answer.status >= 400) {
       return make_error(answer.status == 404 ? Errc::not_found : Errc::invalid_argument,
                         api::problem_text(answer.body));
@@ -62,24 +62,24 @@ class Server {
   server::HttpClient client_;
 };
 
-std::string text(const Json& object, const char* key) {
+std::string text(const Ordered& object, const char* key) {
   const auto it = object.find(key);
   return it != object.end() && it->is_string() ? it->get<std::string>() : std::string();
 }
 
-Result<Json> configured(Server& server) {
+Result<Ordered> configured(Server& server) {
   BOOST_OUTCOME_TRY(const auto all, server.call("GET", "/api/v1/devices"));
-  Json out = Json::array();
-  for (const auto& item : all.value("items", Json::array())) {
+  Ordered out = Ordered::array();
+  for (const auto& item : all.value("items", Ordered::array())) {
     if (item.contains("address")) out.push_back(item);
   }
   return out;
 }
 
 /// By id, the beginning of it, or name. errors: not_found, conflict (several).
-Result<Json> find(Server& server, const std::string& word) {
+Result<Ordered> find(Server& server, const std::string& word) {
   BOOST_OUTCOME_TRY(const auto all, configured(server));
-  std::vector<Json> hits;
+  std::vector<Ordered> hits;
   for (const auto& device : all) {
     if (text(device, "id").starts_with(word) || text(device, "name") == word) hits.push_back(device);
   }
@@ -88,9 +88,9 @@ Result<Json> find(Server& server, const std::string& word) {
   return hits.front();
 }
 
-void print_device(const Json& d) {
+void print_device(const Ordered& d) {
   std::string state = text(d, "state");
-  const auto dropped = d.value("dropped", Json::object());
+  const auto dropped = d.value("dropped", Ordered::object());
   std::uint64_t n = 0;
   for (const auto& [reason, count] : dropped.items()) n += count.get<std::uint64_t>();
   std::printf("%s  %-6s %-16s %-8s %6.1f/s  %s\n", text(d, "id").c_str(), text(d, "kind").c_str(),
@@ -101,7 +101,8 @@ void print_device(const Json& d) {
   if (n > 0) std::printf("    not used: %s\n", to_wire(dropped).c_str());
 }
 
-int show(const Options& options, const Result<Json>& list, const char* none, void (*print)(const Json&)) {
+int show(const Options& options, const Result<Ordered>& list, const char* none,
+         void (*print)(const Ordered&)) {
   if (!list) return fail(list.error().message);
   if (options.json) {
     std::printf("%s\n", to_wire(list.value(), 1).c_str());
@@ -123,7 +124,7 @@ int discover(const Options& options, Server& server) {
   if (!found) return fail(found.error().message);
   if (!found.value().contains("items")) return fail("the discovery takes longer than 20 s: ask again");
   const char* none = "no serial port that is not in use; a device of the network is added by its address";
-  return show(options, found.value()["items"], none, [](const Json& d) {
+  return show(options, found.value()["items"], none, [](const Ordered& d) {
     const auto kind = text(d, "kind");
     std::printf("%-6s %s\n    %s\n", kind.empty() ? "?" : kind.c_str(), text(d, "address").c_str(),
                 text(d, "evidence").c_str());
@@ -131,8 +132,8 @@ int discover(const Options& options, Server& server) {
 }
 
 /// "name=rover", "enabled=false", "address=...", everything else is an option of the kind.
-Result<Json> patch_of(const std::vector<std::string>& settings) {
-  Json out = Json::object();
+Result<Ordered> patch_of(const std::vector<std::string>& settings) {
+  Ordered out = Ordered::object();
   for (const auto& setting : settings) {
     const auto equals = setting.find('=');
     if (equals == std::string::npos)
@@ -150,14 +151,14 @@ Result<Json> patch_of(const std::vector<std::string>& settings) {
     }
     if (key == "mapping_file") {
       BOOST_OUTCOME_TRY(const auto mapping, server::read_as_json(raw));
-      out["options"]["mapping"] = Json::parse(mapping, nullptr, false);
+      out["options"]["mapping"] = Ordered::parse(mapping, nullptr, false);
       continue;
     }
     if (key == "password") {
       out["options"][key] = raw;  // 123456 is a text too
       continue;
     }
-    auto value = Json::parse(raw, nullptr, false);
+    auto value = Ordered::parse(raw, nullptr, false);
     if (value.is_discarded()) value = raw;
     if (key == "name" || key == "address" || key == "kind") {
       out[key] = raw;
@@ -210,15 +211,15 @@ int remove(const Options& options, Server& server) {
 int act(const Options& options, Server& server) {
   const auto device = find(server, options.device);
   if (!device) return fail(device.error().message);
-  Json body{{"action", options.action}};
+  Ordered body{{"action", options.action}};
   if (!options.arguments.empty()) {
-    body["arguments"] = Json::parse(options.arguments, nullptr, false);
+    body["arguments"] = Ordered::parse(options.arguments, nullptr, false);
     if (!body["arguments"].is_object()) return fail("--arguments is a JSON object", 2);
   }
   const auto done =
       server.call("POST", "/api/v1/devices/" + text(device.value(), "id") + "/actions", to_wire(body));
   if (!done) return fail(done.error().message);
-  std::printf("%s\n", to_wire(done.value().value("result", Json()), 1).c_str());
+  std::printf("%s\n", to_wire(done.value().value("result", Ordered()), 1).c_str());
   return 0;
 }
 
@@ -264,7 +265,7 @@ void add_devices_command(CLI::App& app, int& exit_code) {
   identify->add_option("anchor", options->anchor, "Network id of an anchor, e.g. 0x6a21");
   identify->callback([run, options] {
     options->action = "identify";
-    if (!options->anchor.empty()) options->arguments = to_wire(Json{{"network_id", options->anchor}});
+    if (!options->anchor.empty()) options->arguments = to_wire(Ordered{{"network_id", options->anchor}});
     run(act);
   });
   auto* action = command->add_subcommand("action", "Anything else a device can be asked");

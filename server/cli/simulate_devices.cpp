@@ -19,25 +19,25 @@ namespace anchord::cli {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
+using Ordered = nlohmann::ordered_json;
 
 int fail(const std::string& message, int code) {
   std::fprintf(stderr, "anchord simulate: %s\n", printable(message).c_str());
   return code;
 }
 
-Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
+Ordered text_or_null(const std::string& text) { return text.empty() ? Ordered(nullptr) : Ordered(text); }
 
 void print(const sim::ServedDevice& d, bool json) {
   if (json) {
-    const Json line{{"name", d.name},
-                    {"kind", d.kind},
-                    {"format", text_or_null(d.format)},
-                    {"pty", text_or_null(d.pty)},
-                    {"link", text_or_null(d.link)},
-                    {"port", d.tcp_port != 0 ? Json(d.tcp_port) : Json(nullptr)},
-                    {"address", d.address},
-                    {"plugged", d.plugged}};
+    const Ordered line{{"name", d.name},
+                       {"kind", d.kind},
+                       {"format", text_or_null(d.format)},
+                       {"pty", text_or_null(d.pty)},
+                       {"link", text_or_null(d.link)},
+                       {"port", d.tcp_port != 0 ? Ordered(d.tcp_port) : Ordered(nullptr)},
+                       {"address", d.address},
+                       {"plugged", d.plugged}};
     std::printf("%s\n", to_wire(line).c_str());
   } else {
     std::printf("%-12s %-6s %-5s %s%s\n", d.name.c_str(), d.kind.c_str(), d.format.c_str(), d.address.c_str(),

@@ -12,19 +12,19 @@
 namespace anchord::server {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
+using Ordered = nlohmann::ordered_json;
 constexpr std::string_view k_replacement = "\xef\xbf\xbd";  // U+FFFD, what to_utf8 leaves
 
 namespace {
 
-std::string word(const Json& item, const char* key) {
+std::string word(const Ordered& item, const char* key) {
   const auto it = item.find(key);
   return it != item.end() && it->is_string() ? it->get<std::string>() : std::string();
 }
 
 /// What in an entry cannot be what somebody set up; empty: nothing. Whether a driver takes its settings is
 /// seen when it is started.
-std::string fault_of(const Json& item) {
+std::string fault_of(const Ordered& item) {
   if (!item.is_object()) return "the entry is no object";
   if (!parse_uuid(word(item, "id"))) return "id: not a UUID";
   for (const char* key : {"kind", "name", "address"}) {
@@ -40,7 +40,7 @@ std::string fault_of(const Json& item) {
   return {};
 }
 
-KeptDevice device_of(const Json& item) {
+KeptDevice device_of(const Ordered& item) {
   KeptDevice out;
   out.problem = fault_of(item);
   if (item.is_object()) {
@@ -75,7 +75,7 @@ KeptDevices read_devices(const fs::path& file) {
   const std::string text(std::istreambuf_iterator<char>(in), {});
   if (in.bad()) return bad("cannot be read to its end");
   // Bytes that are no text spoil the entry that has them, not the others.
-  const auto json = Json::parse(to_utf8(text), nullptr, false);
+  const auto json = Ordered::parse(to_utf8(text), nullptr, false);
   if (!json.is_object() || word(json, "schema") != "anchord.devices/1" || !json.contains("devices") ||
       !json["devices"].is_array()) {
     return bad("not a list of devices (anchord.devices/1)");
@@ -109,23 +109,23 @@ Result<void> keep_unreadable(const fs::path& file) {
 }
 
 Result<void> write_devices(const fs::path& file, const std::vector<KeptDevice>& devices) {
-  Json list = Json::array();
+  Ordered list = Ordered::array();
   for (const auto& kept : devices) {
     const auto& d = kept.config;
     if (!kept.entry_json.empty()) {
-      list.push_back(Json::parse(kept.entry_json, nullptr, false));
+      list.push_back(Ordered::parse(kept.entry_json, nullptr, false));
       continue;
     }
     list.push_back({{"id", to_string(d.id)},
                     {"kind", d.kind},
                     {"name", d.name},
                     {"address", d.address},
-                    {"options", Json::parse(d.options.text, nullptr, false)},
+                    {"options", Ordered::parse(d.options.text, nullptr, false)},
                     {"enabled", d.enabled},
                     {"version", d.version}});
   }
   return write_private(
-      file, to_wire(Json{{"schema", "anchord.devices/1"}, {"devices", std::move(list)}}, 1) + "\n");
+      file, to_wire(Ordered{{"schema", "anchord.devices/1"}, {"devices", std::move(list)}}, 1) + "\n");
 }
 
 }  // namespace anchord::server
