@@ -8,7 +8,9 @@ vi.hoisted(() => {
 });
 vi.mock('../src/ui/theme', () => ({ css: () => '' }));
 import { numbered } from '../src/map/flight_layer';
-import { free_place, type Box } from '../src/map/symbols';
+import { mark_trail, trail_stands, type Content } from '../src/map/picture';
+import { Scene } from '../src/state/scene';
+import { beyond, free_place, type Box } from '../src/map/symbols';
 
 const overlap = (a: Box, b: Box): boolean => a.x < b.x + b.w && b.x < a.x + a.w && a.y < b.y + b.h && b.y < a.y + a.h;
 
@@ -31,6 +33,18 @@ describe('labels of the map', () => {
     expect(far).toBeGreaterThan(0);
     expect(left_out).toBeGreaterThan(0);
   });
+  it('are never cut by an edge of the picture', () => {
+    for (const [x, y] of [
+      [2, 2],
+      [798, 300],
+      [400, 599],
+      [799, 599],
+    ] as const) {
+      const { box } = free_place(x, y, 12, 90, 26, beyond(800, 600))!;
+      expect([box.x >= 0, box.y >= 0, box.x + box.w <= 800, box.y + box.h <= 600]).toEqual([true, true, true, true]);
+    }
+    expect(free_place(40, 10, 12, 90, 26, beyond(80, 20))).toBeNull(); // nor squeezed in where there is no room
+  });
 });
 
 describe('numbers of waypoints', () => {
@@ -43,5 +57,37 @@ describe('numbers of waypoints', () => {
     expect(few.length).toBeLessThan(14);
     expect(few.map((w) => w.index)).toContain(7);
     for (const a of few) for (const b of few) if (a !== b) expect(overlap(a.box, b.box)).toBe(false);
+  });
+});
+
+describe('the trail below the drone', () => {
+  const flown = (n: number): Scene => {
+    const scene = new Scene('m');
+    for (let i = 0; i < n; i++) scene.trail.push({ t_us: i, e: i, n: 0, u: 0, fix: 'fixed' });
+    return scene;
+  };
+  const content = (scene: Scene | null, link_lost = false): Content => ({
+    anchors: [],
+    selected: null,
+    scene,
+    link_lost,
+    running: true,
+  });
+  it('stands while the flight goes on, and is drawn anew when it does not show it any more', () => {
+    const scene = flown(100),
+      mark = mark_trail(content(scene))!;
+    scene.trail.push({ t_us: 100, e: 100, n: 0, u: 0, fix: 'fixed' });
+    expect(trail_stands(mark, content(scene))).toBe(true);
+    expect(mark.points).toBe(100);
+    expect(trail_stands(mark, content(scene, true))).toBe(false); // it fades with the link
+    expect(trail_stands(mark, content(flown(100)))).toBe(false); // another flight
+    expect(trail_stands(mark, content(null))).toBe(false);
+    scene.trail.splice(0, 10); // its beginning was thinned out
+    expect(trail_stands(mark, content(scene))).toBe(false);
+    const longer = flown(100),
+      of_longer = mark_trail(content(longer));
+    longer.trail.push(...flown(60).trail);
+    expect(trail_stands(of_longer, content(longer))).toBe(false); // too much would be drawn with every frame
+    expect(trail_stands(null, content(null))).toBe(true);
   });
 });

@@ -15,12 +15,13 @@ import type { ElevationProps } from './elevation_props';
 import { elevation_shown } from './elevation_shown';
 import { read_palette, status_colour, trail_style, type Palette } from './palette';
 import type { Content } from './picture';
-import { anchor_symbol, drone, label, mirror_dots, reticle, type Box, type Ctx } from './symbols';
+import { anchor_symbol, beyond, drone, label, mirror_dots, reticle, type Box, type Ctx } from './symbols';
 
 /// Chosen by hand; null looks along the building.
 const turned = signal<number | null>(null);
 const STEP_DEG = 15;
 const HOLE_US = 5_000_000;
+const NOTE_PX = 20; // the line at the foot: above what heights are, and the scale
 
 interface Picture {
   readonly fit: Fit;
@@ -213,7 +214,7 @@ function draw_elevation(
   }
   const s = (m: readonly [number, number] | readonly [number, number, number]): number =>
       picture.x(along(bearing_deg, m)),
-    taken: Box[] = [];
+    taken: Box[] = [...beyond(w, h), { x: 0, y: h - NOTE_PX, w, h: NOTE_PX }];
   axes(c, p, w, h, picture, note(picture, zero));
   planned(c, p, w, content, picture, s);
   flown(c, p, content, picture, s);

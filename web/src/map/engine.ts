@@ -7,7 +7,8 @@ import View from 'ol/View.js';
 import { to_px, type Camera } from './camera';
 import { magnification } from './enu';
 import { read_palette, type Palette } from './palette';
-import { draw_fast, draw_slow, draw_top, type Content } from './picture';
+import { interpolated } from '../state/scene';
+import { draw_fast, draw_slow, draw_top, mark_trail, trail_stands, type Content, type TrailMark } from './picture';
 
 export type Mode = 'fit' | 'follow' | 'free';
 export interface MapView {
@@ -39,6 +40,7 @@ export function open_map(
   let mode: Mode = 'fit';
   let magnified = 1;
   let closed = false;
+  let trail_mark: TrailMark | null = null;
   const slow = document.createElement('canvas');
   slow.style.position = 'absolute';
   const view = new View({
@@ -79,6 +81,7 @@ export function open_map(
         cam.px_per_m,
       );
       if (c) draw_slow(c, palette, cam, content, magnified);
+      trail_mark = mark_trail(content);
       const t = sized(top, cam);
       if (t) draw_top(t, palette, cam, content);
       hooks.camera_changed(cam.px_per_m, magnified);
@@ -193,23 +196,31 @@ export function open_map(
   let dirty = true,
     drawn = -1,
     last_ms = 0,
-    aimed_ms = 0;
+    aimed_ms = 0,
+    place = '';
   const frame = (t: number): void => {
     if (closed) return;
     requestAnimationFrame(frame);
-    const content = hooks.content(),
-      scene = content.scene;
     if (t - aimed_ms > 300) {
       aimed_ms = t;
       aim();
     }
-    const moving = !!scene?.pose && t - scene.pose.at_ms < 1500;
-    // While nothing moves, once in a quarter of a second is enough for ages and fading.
-    if (!dirty && !moving && scene?.version === drawn && t - last_ms < 250) return;
-    const cam = camera(),
-      c = sized(overlay, cam);
-    if (c) draw_fast(c, palette, cam, content, performance.now());
+    const content = hooks.content(),
+      scene = content.scene,
+      cam = camera(),
+      now = performance.now(),
+      at = scene?.pose && t - scene.pose.at_ms < 1500 ? interpolated(scene, now) : null,
+      // Half a pixel and two degrees: less than that nobody sees.
+      here = at ? [...to_px(cam, at.body).map((x) => x * 2), (at.heading_deg ?? 0) / 2].map(Math.round).join() : '';
+    // What is new beside it, ten times a second; while nothing comes, four times, for ages and fading.
+    const moved = dirty || here !== place,
+      news = scene?.version !== drawn && t - last_ms > 95;
+    if (!moved && !news && t - last_ms < 250) return;
+    if (!trail_stands(trail_mark, content)) layer.changed();
+    const c = sized(overlay, cam);
+    if (c) draw_fast(c, palette, cam, content, now, trail_mark?.scene === scene ? trail_mark!.points : 0);
     dirty = false;
+    place = here;
     drawn = scene?.version ?? -1;
     last_ms = t;
   };

@@ -1,13 +1,13 @@
-/// What is drawn, given a camera, from below: the slow picture (grid, ellipses), the fast one (trail, ranges, drone), the top (symbols, labels).
+/// What is drawn, given a camera, from below: the slow picture (grid, ellipses, trail), the fast one (ranges, drone), the top (symbols, labels).
 import type { EstimateMsg, FixClass, Vec3 } from '../live/messages';
-import { interpolated, range_class, type Scene } from '../state/scene';
+import { interpolated, range_class, type Scene, type TrailPoint } from '../state/scene';
 import type { Backdrop } from '../state/floors';
 import { accuracy, age, percent } from '../ui/format';
 import { to_px, type Camera } from './camera';
 import { round_length } from './enu';
 import { draw_flight, numbered, type FlightPicture } from './flight_layer';
 import { range_colour, status_colour, trail_style, type Palette } from './palette';
-import { anchor_symbol, drone, ellipse_at, label, mirror_dots, reticle, type Box, type Ctx } from './symbols';
+import { anchor_symbol, beyond, drone, ellipse_at, label, mirror_dots, reticle, type Box, type Ctx } from './symbols';
 
 export interface Content {
   readonly anchors: readonly EstimateMsg[];
@@ -24,7 +24,7 @@ const RANGE_STALE_MS = 2000,
   TRAIL_US = 120_000_000;
 const symbol_r = (p: Palette): number => p.rem * 0.47;
 
-/// Grid and ellipses, below everything that moves.
+/// Grid, ellipses and what was flown, below everything that moves.
 export function draw_slow(c: Ctx, p: Palette, cam: Camera, content: Content, magnified: number): void {
   c.fillStyle = p.map;
   c.fillRect(0, 0, cam.w, cam.h);
@@ -54,6 +54,7 @@ export function draw_slow(c: Ctx, p: Palette, cam: Camera, content: Content, mag
     // An ellipse smaller than its symbol would only blur it.
     if (a.ellipse95 && a.ellipse95.major_m * scale > r) ellipse_at(c, p, a.ellipse95, x, y, scale, colour, false);
   }
+  if (content.scene) trail(c, p, cam, content.scene, faded(content), 0, content.scene.trail.length - 1);
 }
 /// Half as strong as it is drawn: a plan is there to find one's way by, not to be read.
 export function draw_backdrop(c: Ctx, cam: Camera, b: Backdrop): void {
@@ -69,7 +70,7 @@ export function draw_top(c: Ctx, p: Palette, cam: Camera, content: Content): voi
   c.clearRect(0, 0, cam.w, cam.h);
   const r = symbol_r(p),
     placed = content.anchors.filter((a) => a.enu_m),
-    taken: Box[] = [];
+    taken: Box[] = beyond(cam.w, cam.h);
   const block = (m: Vec3): void => {
     const [x, y] = to_px(cam, m);
     taken.push({ x: x - r - 2, y: y - r - 2, w: 2 * r + 4, h: 2 * r + 4 });
@@ -156,30 +157,54 @@ function grid(c: Ctx, p: Palette, cam: Camera): void {
   c.stroke();
 }
 
-export function draw_fast(c: Ctx, p: Palette, cam: Camera, content: Content, now_ms: number): void {
+/// How much of a scene's trail the slow picture shows: drawn twice a second there, not sixty times with the drone.
+export interface TrailMark {
+  readonly scene: Scene;
+  readonly points: number;
+  readonly last: TrailPoint | undefined;
+  readonly faded: boolean;
+}
+const faded = (content: Content): boolean => content.link_lost || !content.running;
+export const mark_trail = (content: Content): TrailMark | null =>
+  content.scene && {
+    scene: content.scene,
+    points: content.scene.trail.length,
+    last: content.scene.trail.at(-1),
+    faded: faded(content),
+  };
+/// Whether the mark is still of this trail: neither another flight, nor cut, nor jumped back in, nor far behind.
+export function trail_stands(mark: TrailMark | null, content: Content): boolean {
+  const scene = content.scene;
+  if (!scene || !mark) return !scene && !mark;
+  return (
+    mark.scene === scene &&
+    mark.faded === faded(content) &&
+    scene.trail[mark.points - 1] === mark.last &&
+    scene.trail.length - mark.points < TRAIL_AHEAD
+  );
+}
+const TRAIL_AHEAD = 50; // 5 s of positions
+
+/// Drone and ranges, and the trail from where the slow picture ends.
+export function draw_fast(c: Ctx, p: Palette, cam: Camera, content: Content, now_ms: number, from: number): void {
   c.clearRect(0, 0, cam.w, cam.h);
   const scene = content.scene;
   if (!scene) return;
-  const faded = content.link_lost || !content.running;
-  trail(c, p, cam, scene, faded);
+  trail(c, p, cam, scene, faded(content), Math.max(0, from - 1), scene.trail.length - 1);
   const at = interpolated(scene, now_ms);
   if (!at) return;
-  const stale = content.link_lost || now_ms - scene.pose!.at_ms > POSE_STALE_MS || !content.running;
+  const stale = faded(content) || now_ms - scene.pose!.at_ms > POSE_STALE_MS;
   const antenna = to_px(cam, at.antenna),
     body = to_px(cam, at.body);
+  const lines: RangeLine[] = [];
   for (const a of content.anchors) {
     const row = scene.ranges.get(a.anchor);
-    if (row && a.enu_m)
-      range_line(
-        c,
-        p,
-        antenna,
-        to_px(cam, a.enu_m),
-        range_class(row.last.p_los),
-        stale ? Infinity : now_ms - row.at_ms,
-        symbol_r(p) + 4,
-      );
+    if (!row || !a.enu_m) continue;
+    const old = stale || now_ms - row.at_ms > RANGE_STALE_MS;
+    const end = short_of(antenna, to_px(cam, a.enu_m), symbol_r(p) + 4);
+    if (end) lines.push({ end, look: old ? 'old' : range_class(row.last.p_los) });
   }
+  range_lines(c, p, antenna, lines);
   drone(c, p, ...body, at.heading_deg, stale);
   c.fillStyle = stale ? p.ink2 : p.panel;
   c.beginPath();
@@ -187,46 +212,48 @@ export function draw_fast(c: Ctx, p: Palette, cam: Camera, content: Content, now
   c.fill();
   if (stale && content.running) label(c, p, ...body, 18, `last known, ${age(now_ms - scene.pose!.at_ms)}`, '', []);
 }
-function range_line(
-  c: Ctx,
-  p: Palette,
-  from: readonly [number, number],
-  to: readonly [number, number],
-  cls: 'los' | 'nlos' | 'unclear',
-  age_ms: number,
-  stop: number,
-): void {
+type Point = readonly [number, number];
+interface RangeLine {
+  readonly end: Point;
+  readonly look: 'los' | 'nlos' | 'unclear' | 'old';
+}
+/// `to`, but so far before it; null where there is nothing between.
+function short_of(from: Point, to: Point, px: number): Point | null {
   const l = Math.hypot(to[0] - from[0], to[1] - from[1]);
-  if (l < stop + 4) return;
-  const end = [to[0] - ((to[0] - from[0]) / l) * stop, to[1] - ((to[1] - from[1]) / l) * stop] as const;
-  const stroke = (colour: string, width: number, dash: number[], alpha: number): void => {
+  return l < px + 4 ? null : [to[0] - ((to[0] - from[0]) / l) * px, to[1] - ((to[1] - from[1]) / l) * px];
+}
+/// Up to so many lines have a casing; of more it would only strike out the neighbours.
+const CASED_LINES = 24;
+/// One style after the other, and square ends: round dots cost three times as much to draw, of fifty lines half a frame.
+function range_lines(c: Ctx, p: Palette, from: Point, lines: readonly RangeLine[]): void {
+  const stroke = (some: readonly RangeLine[], colour: string, width: number, dash: number[], alpha: number): void => {
+    if (!some.length) return;
     c.strokeStyle = colour;
     c.lineWidth = width;
     c.globalAlpha = alpha;
     c.setLineDash(dash);
-    c.beginPath();
-    c.moveTo(...(from as [number, number]));
-    c.lineTo(...(end as unknown as [number, number]));
-    c.stroke();
+    for (const { end } of some) {
+      c.beginPath();
+      c.moveTo(from[0], from[1]);
+      c.lineTo(end[0], end[1]);
+      c.stroke();
+    }
   };
+  const of = (look: RangeLine['look']): RangeLine[] => lines.filter((l) => l.look === look),
+    fresh = lines.filter((l) => l.look !== 'old');
   c.save();
-  c.lineCap = cls === 'unclear' ? 'round' : 'butt';
-  if (age_ms > RANGE_STALE_MS) stroke(p.ink3, 1, [2, 7], 0.6);
-  else {
-    stroke(p.halo, p.casing + 1, [], 0.75);
-    stroke(
-      range_colour(p, cls),
-      cls === 'los' ? p.strong : p.data,
-      { los: [], nlos: [9, 6], unclear: [1.5, 5] }[cls],
-      1,
-    );
-  }
+  c.lineCap = 'butt';
+  stroke(of('old'), p.ink3, 1, [2, 7], 0.6);
+  if (fresh.length <= CASED_LINES) stroke(fresh, p.halo, p.casing + 1, [], 0.75);
+  stroke(of('unclear'), range_colour(p, 'unclear'), p.data, [p.data, 3 * p.data], 1);
+  stroke(of('nlos'), range_colour(p, 'nlos'), p.data, [9, 6], 1);
+  stroke(of('los'), range_colour(p, 'los'), p.strong, [], 1);
   c.restore();
 }
-function trail(c: Ctx, p: Palette, cam: Camera, scene: Scene, faded: boolean): void {
+function trail(c: Ctx, p: Palette, cam: Camera, scene: Scene, faded: boolean, first: number, last: number): void {
   const points = scene.trail,
     newest = points[points.length - 1];
-  if (!newest) return;
+  if (!newest || last <= first) return;
   c.save();
   c.lineCap = c.lineJoin = 'round';
   c.globalAlpha = faded ? 0.5 : 1;
@@ -243,12 +270,12 @@ function trail(c: Ctx, p: Palette, cam: Camera, scene: Scene, faded: boolean): v
   };
   // Runs of one look: grey when older than 120 s, else by fix. A hole in time is a hole in the line.
   const look = (i: number): FixClass | 'old' => (newest.t_us - points[i]!.t_us > TRAIL_US ? 'old' : points[i]!.fix);
-  let from = 0;
-  for (let i = 1; i <= points.length; i++) {
-    const hole = i < points.length && points[i]!.t_us - points[i - 1]!.t_us > 5_000_000;
-    if (i < points.length && !hole && look(i) === look(from)) continue;
+  let from = first;
+  for (let i = first + 1; i <= last + 1; i++) {
+    const hole = i <= last && points[i]!.t_us - points[i - 1]!.t_us > 5_000_000;
+    if (i <= last && !hole && look(i) === look(from)) continue;
     const what = look(from),
-      to = i < points.length && !hole ? i : i - 1;
+      to = i <= last && !hole ? i : i - 1;
     if (what === 'old') run(from, to, p.ink3, p.fine, []);
     else {
       const s = trail_style(p, what);

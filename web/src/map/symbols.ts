@@ -190,6 +190,15 @@ export interface Box {
 }
 const overlap = (a: Box, b: Box): boolean => a.x < b.x + b.w && b.x < a.x + a.w && a.y < b.y + b.h && b.y < a.y + a.h;
 
+/// What lies beyond the edges of a picture of w x h: nothing is written where it would be cut.
+export const beyond = (w: number, h: number): Box[] => [
+  { x: -FAR, y: -FAR, w: 2 * FAR + w, h: FAR },
+  { x: -FAR, y: h, w: 2 * FAR + w, h: FAR },
+  { x: -FAR, y: -FAR, w: FAR, h: 2 * FAR + h },
+  { x: w, y: -FAR, w: FAR, h: 2 * FAR + h },
+];
+const FAR = 1e5;
+
 /// Labels are drawn again with every picture and seldom say something new: measuring them was half of what they cost.
 const widths = new Map<string, number>();
 function width_of(c: Ctx, font: string, text: string): number {

@@ -126,8 +126,8 @@ export const ALL: readonly Column[] = [
   },
   {
     key: 'refused',
-    head: 'Refused',
-    words: 'Ranges refused',
+    head: 'Rejected',
+    words: 'Ranges rejected',
     cell: (r) => String(r.n_refused),
     sort: (r) => r.n_refused,
   },

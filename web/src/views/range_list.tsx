@@ -1,12 +1,36 @@
 import type { VNode } from 'preact';
-import { useRef } from 'preact/hooks';
+import { useEffect, useRef } from 'preact/hooks';
 import { chosen_anchor, replayed, watched_mission, watched_scene, now_ms, tick, watched_lost } from '../state/store';
 import { range_class, rate_hz, type RangeRow } from '../state/scene';
 import { age, fixed, range_m } from '../ui/format';
 import { CLASS_LOOK, Mark, Q } from '../ui/marks';
 import { refused_words } from '../ui/words';
 
-const STALE_MS = 2000;
+const STALE_MS = 2000,
+  UNSEEN_EVERY_MS = 2000;
+
+/// Ids of the rows that are in sight, or nearly so. Drawing the others four times a second as well is most of what a long list costs.
+function useInSight(rows: number): ReadonlySet<string> {
+  const body = useRef(new Set<string>()).current;
+  useEffect(() => {
+    const table = document.querySelector('.rg tbody');
+    if (!table) return;
+    const watch = new IntersectionObserver(
+      (list) => {
+        for (const e of list) {
+          const id = (e.target as HTMLElement).dataset.id ?? '';
+          if (e.isIntersecting) body.add(id);
+          else body.delete(id);
+        }
+        if (list.some((e) => e.isIntersecting)) tick.value++;
+      },
+      { rootMargin: '200px' },
+    );
+    for (const row of table.children) watch.observe(row);
+    return () => watch.disconnect();
+  }, [rows, body]);
+  return body;
+}
 
 /// One row per anchor, in the order of their ids: a list that re-sorts under the finger cannot be tapped.
 export function RangeList({ selected }: { selected: string | null }) {
@@ -16,7 +40,8 @@ export function RangeList({ selected }: { selected: string | null }) {
     lost = watched_lost(),
     running = watched_mission.value?.state === 'recording';
   const drawn = useRef(new Map<string, Drawn>()).current,
-    rows = scene ? [...scene.ranges.entries()].sort(([a], [b]) => (a < b ? -1 : 1)) : [];
+    rows = scene ? [...scene.ranges.entries()].sort(([a], [b]) => (a < b ? -1 : 1)) : [],
+    in_sight = useInSight(rows.length);
   const in_range = rows.filter(([, r]) => now - r.at_ms < STALE_MS).length;
   const total_hz = rows.reduce((s, [, r]) => s + (now - r.at_ms < STALE_MS ? (rate_hz(r) ?? 0) : 0), 0);
   const modelled = rows.some(([, r]) => r.last.p_los !== null);
@@ -65,9 +90,14 @@ export function RangeList({ selected }: { selected: string | null }) {
           <tbody>
             {rows.map(([id, r]) => {
               const stale = lost || !running || now - r.at_ms > STALE_MS,
-                says = `${r.last.t_us} ${stale ? age(now - r.at_ms) : ''} ${running} ${id === selected} ${modelled}`,
+                look = `${stale} ${running} ${id === selected} ${modelled}`,
+                says = `${look} ${r.last.t_us} ${stale ? age(now - r.at_ms) : ''}`,
                 before = drawn.get(id);
-              if (before?.row === r && before.says === says) return before.element;
+              if (before?.row === r) {
+                if (before.says === says) return before.element;
+                if (before.look === look && !in_sight.has(id) && now - before.at_ms < UNSEEN_EVERY_MS)
+                  return before.element;
+              }
               const element = (
                 <Row
                   key={id}
@@ -80,7 +110,7 @@ export function RangeList({ selected }: { selected: string | null }) {
                   modelled={modelled}
                 />
               );
-              drawn.set(id, { row: r, says, element });
+              drawn.set(id, { row: r, look, says, at_ms: now, element });
               return element;
             })}
           </tbody>
@@ -93,6 +123,8 @@ export function RangeList({ selected }: { selected: string | null }) {
 /// A row as it was last drawn: where it would say the same again, the same element is given, and Preact leaves it alone.
 interface Drawn {
   readonly row: RangeRow;
+  readonly look: string; ///< what may not wait, in sight or not
+  readonly at_ms: number;
   readonly says: string;
   readonly element: VNode;
 }
@@ -123,6 +155,7 @@ function Row({
       class={`${stale ? 'stale' : ''}${selected ? ' sel' : ''}`}
       onClick={() => (chosen_anchor.value = id)}
       data-testid={`range-${id}`}
+      data-id={id}
     >
       <th scope="row">
         <button class="id" aria-pressed={selected} onClick={() => (chosen_anchor.value = id)}>
