@@ -69,6 +69,7 @@ void Conversation::on_text(std::string_view text) {
   const auto& op = message["op"].get_ref<const std::string&>();
   if (op == "sub") return subscribe(message);
   if (op == "unsub") return unsubscribe(message);
+  if (op == "seen") return seen(message);
   if (op == "time") {
     nlohmann::ordered_json answer{{"op", "time"},
                                   {"id", message.value("id", Json())},
@@ -76,7 +77,7 @@ void Conversation::on_text(std::string_view text) {
                                   {"t_us", hub_.clock().now().us()}};
     return send(to_wire(answer));
   }
-  refuse(message, 422, "validation", "op is sub, unsub or time");
+  refuse(message, 422, "validation", "op is sub, unsub, seen or time");
 }
 
 void Conversation::subscribe(const Json& message) {
@@ -178,6 +179,23 @@ void Conversation::unsubscribe(const Json& message) {
   nlohmann::ordered_json ack{{"op", "ack"}, {"id", id ? Json(*id) : Json()}, {"sub", it->first}};
   subscriptions_.erase(it);
   send(to_wire(ack));
+}
+
+/// Without an answer: it comes twenty times a second.
+void Conversation::seen(const Json& message) {
+  std::vector<FieldError> errors;
+  Fields fields(message, "", errors);
+  fields.child("op");
+  const auto frames = fields.integer("frames", 0, INT64_MAX, true);
+  fields.finish();
+  if (!errors.empty())
+    return refuse(message, 422, "validation", errors.front().pointer + ": " + errors.front().detail);
+  bool sent = true;
+  {
+    auto output = output_.lock();
+    sent = output->outbox.seen(static_cast<std::uint64_t>(*frames), steady_us());
+  }
+  if (!sent) refuse(message, 422, "validation", "/frames: more than this connection was sent");
 }
 
 void Conversation::refuse(const Json& message, int status, std::string_view type, std::string_view detail) {

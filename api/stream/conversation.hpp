@@ -10,8 +10,8 @@
 
 namespace anchord::api {
 
-/// The `anchord.v1` protocol of one client (api.md section 9): hello, sub, unsub, time in; ack, snap, data,
-/// gap, hb, err, bye out.
+/// The `anchord.v1` protocol of one client (api.md section 9): sub, unsub, seen, time in; hello, ack, snap,
+/// data, gap, hb, err, bye out.
 class Conversation final : public WsHandler, private HubListener {
  public:
   static constexpr std::size_t k_max_subscriptions = 32;
@@ -33,6 +33,7 @@ class Conversation final : public WsHandler, private HubListener {
 
   void subscribe(const nlohmann::json& message);
   void unsubscribe(const nlohmann::json& message);
+  void seen(const nlohmann::json& message);
   void refuse(const nlohmann::json& message, int status, std::string_view type, std::string_view detail);
   void send(std::string frame);
   void close(std::uint16_t code, std::string_view reason);

@@ -148,8 +148,8 @@ bool Outbox::ready(const Queue& queue, std::int64_t now_us) const {
 
 bool Outbox::due(std::int64_t now_us) const {
   if (!control_.empty() || !heartbeat_.empty()) return true;
-  return std::any_of(queues_.begin(), queues_.end(),
-                     [&](const auto& entry) { return ready(entry.second, now_us); });
+  return unseen_.open(now_us) && std::any_of(queues_.begin(), queues_.end(),
+                                             [&](const auto& entry) { return ready(entry.second, now_us); });
 }
 
 std::shared_ptr<const std::string> Outbox::next_control() {
@@ -162,8 +162,19 @@ std::shared_ptr<const std::string> Outbox::next_control() {
 }
 
 std::shared_ptr<const std::string> Outbox::next(std::int64_t now_us) {
+  auto frame = pick(now_us);
+  if (frame) unseen_.sent(now_us);
+  return frame;
+}
+
+/// Answers and heartbeats always; what is news, while the client keeps up.
+std::shared_ptr<const std::string> Outbox::pick(std::int64_t now_us) {
   if (auto frame = next_control()) return frame;
   if (!heartbeat_.empty()) return std::make_shared<const std::string>(std::exchange(heartbeat_, {}));
+  return unseen_.open(now_us) ? pick_content(now_us) : nullptr;
+}
+
+std::shared_ptr<const std::string> Outbox::pick_content(std::int64_t now_us) {
   for (const TopicClass cls : {TopicClass::state, TopicClass::event, TopicClass::stream}) {
     for (auto& [id, queue] : queues_) {
       if (info(queue.subscription.topic).cls != cls || !ready(queue, now_us)) continue;

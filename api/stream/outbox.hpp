@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "api/stream/hub.hpp"
+#include "api/stream/unseen.hpp"
 
 namespace anchord::api {
 
@@ -50,6 +51,8 @@ class Outbox {
   bool due(std::int64_t now_us) const;
   /// Only control frames, after a close was decided.
   std::shared_ptr<const std::string> next_control();
+  /// The client has read so many frames of this connection; false where it was not sent so many.
+  bool seen(std::uint64_t frames, std::int64_t now_us) { return unseen_.seen(frames, now_us); }
   /// The newest heartbeat alone waits, and tells that this connection conflates since the last one.
   void heartbeat(std::int64_t t_us);
 
@@ -79,6 +82,8 @@ class Outbox {
     bool started{false};
   };
   bool ready(const Queue& queue, std::int64_t now_us) const;
+  std::shared_ptr<const std::string> pick(std::int64_t now_us);
+  std::shared_ptr<const std::string> pick_content(std::int64_t now_us);
   void drop_oldest_stream();
   void drop_front(Queue& queue);
   void drop_aged(Queue& queue, std::int64_t now_us);
@@ -90,6 +95,7 @@ class Outbox {
   std::map<std::uint64_t, Queue> queues_;
   std::deque<std::string> control_;
   std::string heartbeat_;
+  Unseen unseen_;
   std::size_t bytes_{0}, count_{0};
   bool conflated_since_heartbeat_{false};
 };

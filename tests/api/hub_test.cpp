@@ -172,6 +172,70 @@ TEST_F(OutboxRules, GivesWhoAsksForNoOldStreamTheNewestAndTellsOfTheGap) {
   EXPECT_EQ(frames[1]["prev"], frames[0]["to_seq"]);
 }
 
+TEST_F(OutboxRules, HoldsNewsFromAClientThatLagsBehindAndThenSendsTheNewest) {
+  subscribe(Topic::drone_pose, [](auto&) {});
+  put(10, R"({"n":0})", "m");
+  ASSERT_EQ(read(10).size(), 1u);
+  EXPECT_TRUE(outbox_.seen(1, us(10.1)));
+  put(10.1, R"({"n":1})", "m");
+  ASSERT_EQ(read(10.1).size(), 1u);
+  EXPECT_TRUE(outbox_.seen(2, us(10.16))) << "the quickest report takes 0.06 s";
+  for (int i = 2; i < 20; ++i) {
+    put(11 + i * 0.1, R"({"n":)" + std::to_string(i) + "}", "m");
+    read(11 + i * 0.1);
+  }
+  outbox_.heartbeat(0);
+  const auto held = read(13);
+  ASSERT_EQ(held.size(), 1u) << "a client that reads nothing gets heartbeats alone";
+  EXPECT_EQ(held[0]["op"], "hb");
+  EXPECT_EQ(held[0]["conflating"], true);
+  EXPECT_FALSE(outbox_.due(us(13)));
+  // 11.2, 11.3, 11.4 and 11.5 s left before the first of them was 0.31 s unread; then the heartbeat.
+  EXPECT_TRUE(outbox_.seen(7, us(13.1)));
+  EXPECT_TRUE(outbox_.due(us(13.1)));
+  const auto data = read(13.1);
+  ASSERT_EQ(data.size(), 1u);
+  EXPECT_EQ(data[0]["data"]["n"], 19);
+  EXPECT_FALSE(outbox_.seen(99, us(13.2))) << "it was sent eight frames";
+}
+
+TEST_F(OutboxRules, LagIsCountedBeyondTheWayAndNeverForWhoReportsNothing) {
+  subscribe(Topic::drone_pose, [](auto&) {});
+  std::size_t sent = 0;
+  for (int i = 0; i < 100; ++i) {  // a way of 0.6 s there and back, ten frames a second
+    const double now_s = 10 + i * 0.1;
+    put(now_s, R"({"n":)" + std::to_string(i) + "}", "m");
+    if (i >= 6) ASSERT_TRUE(outbox_.seen(static_cast<std::uint64_t>(i - 5), us(now_s)));
+    sent += read(now_s).size();
+  }
+  EXPECT_EQ(sent, 100u) << "a long way is not a slow reader";
+  api::HubCounters counters;
+  api::Outbox silent{counters};
+  api::Subscription subscription;
+  subscription.id = api::default_sub(Topic::drone_pose);
+  subscription.topic = Topic::drone_pose;
+  silent.add(subscription);
+  silent.start(subscription.id, 0, {}, {});
+  for (int i = 1; i < 100; ++i) {
+    auto message = std::make_shared<api::LiveMessage>();
+    message->seq = static_cast<std::uint64_t>(i);
+    message->elements.push_back({"m", {}, std::make_shared<const std::string>("{}")});
+    EXPECT_TRUE(silent.put(message, Topic::drone_pose, us(i)));
+    EXPECT_NE(silent.next(us(i)), nullptr);
+  }
+}
+
+TEST_F(HubRules, RefusesToHaveSentWhatItDidNot) {
+  auto client = connect();
+  EXPECT_EQ(read(*client).size(), 1u);
+  client->on_text(R"({"op":"seen","frames":1})");
+  EXPECT_TRUE(read(*client).empty()) << "no answer where all is well";
+  client->on_text(R"({"op":"seen","frames":5})");
+  client->on_text(R"({"op":"seen"})");
+  EXPECT_EQ(of(read(*client), "err").size(), 2u);
+  EXPECT_FALSE(client->close_request().has_value());
+}
+
 TEST_F(OutboxRules, SendsNothingOfASubscriptionBeforeItIsKnownWhereItBegins) {
   api::Subscription subscription;
   subscription.id = 7;

@@ -311,6 +311,30 @@ describe('LiveClient', () => {
     beat();
     expect(client.slow()).toBe(false);
   });
+  it('reports what it has read, at most twenty times a second, and all of it in the end', () => {
+    const seen = (): unknown[] => world.socket.sent.filter((x) => x.op === 'seen').map((x) => x.frames);
+    up_to(5); // hello, ack, snap, data
+    expect(seen()).toEqual([1]);
+    world.advance(49);
+    expect(seen()).toEqual([1]);
+    world.advance(1);
+    expect(seen()).toEqual([1, 4]);
+    world.advance(1000);
+    expect(seen()).toEqual([1, 4]);
+    for (let i = 0; i < 100; i++) {
+      data(6 + i, 5 + i);
+      world.advance(10);
+    }
+    world.advance(50);
+    expect(seen().length).toBeGreaterThan(15);
+    expect(seen().length).toBeLessThanOrEqual(23);
+    expect(seen().at(-1)).toBe(104);
+    world.socket.onmessage!({ data: '{"op":' });
+    world.socket.onclose!({ code: 1006 });
+    world.advance(600);
+    hello();
+    expect(seen()).toEqual([1]); // another connection counts anew, and owes nothing of the last one
+  });
   it('ignores what it cannot read and ops it does not know', () => {
     up_to(5);
     world.socket.onmessage!({ data: '{"op":' });

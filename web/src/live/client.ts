@@ -40,6 +40,7 @@ const FIRST_RETRY_MS = 500,
   LAST_RETRY_MS = 10_000;
 const TIME_EVERY_MS = 10_000;
 const DRIFT_US_PER_MS = 0.1; // two clocks of 50 ppm each
+const SEEN_EVERY_MS = 50;
 const GREETING_MS = 10_000; // a connection attempt into a dead network would hang for minutes
 
 /// Client of subprotocol anchord.v1: subscribes, follows seq and prev, resumes by epoch and seq, reconnects for ever. No DOM.
@@ -68,6 +69,9 @@ export class LiveClient implements LiveSource {
   private conflating = false;
   private asked_time_ms = -Infinity;
   private minimum_retry_ms = 0;
+  private frames = 0; ///< read of this connection
+  private seen_ms = -Infinity; ///< when that was reported last
+  private cancel_seen: (() => void) | null = null;
   private loss_open = false; ///< LOST was said, and not yet that it is over
   private resume: { recovered: Map<string, number>; resynchronised: boolean; open: Set<string> } | null = null;
 
@@ -134,10 +138,15 @@ export class LiveClient implements LiveSource {
     this.retry_at_ms = null;
     this.greeted = false;
     this.opened_ms = this.env.now_ms();
+    this.frames = 0;
+    this.seen_ms = -Infinity;
     const socket = this.env.open();
     this.socket = socket;
     socket.onmessage = (event) => {
-      if (this.socket === socket) this.receive(event.data);
+      if (this.socket !== socket) return;
+      this.receive(event.data);
+      this.frames++;
+      this.report_seen();
     };
     socket.onclose = (event) => {
       if (this.socket === socket) this.closed(event.code);
@@ -146,6 +155,7 @@ export class LiveClient implements LiveSource {
   private drop_socket(): void {
     const socket = this.socket;
     this.socket = null;
+    this.forget_report();
     if (!socket) return;
     socket.onmessage = socket.onclose = socket.onopen = null;
     try {
@@ -156,6 +166,7 @@ export class LiveClient implements LiveSource {
   }
   private closed(code: number): void {
     this.socket = null;
+    this.forget_report();
     if (!this.greeted || code === 4001 || code === 4003) this.sink?.refused();
     this.retry_later();
   }
@@ -200,6 +211,24 @@ export class LiveClient implements LiveSource {
   private ask_time(): void {
     this.asked_time_ms = this.env.now_ms();
     this.send({ op: 'time', id: this.next_id++, c_us: this.env.wall_us() });
+  }
+  /// The socket takes in whatever comes; only the server can leave out what this page is too slow for, so it is told where the page is.
+  private report_seen(): void {
+    const wait_ms = SEEN_EVERY_MS - (this.env.now_ms() - this.seen_ms);
+    if (wait_ms > 0) {
+      this.cancel_seen ??= this.env.after(wait_ms, () => {
+        this.cancel_seen = null;
+        this.report_seen();
+      });
+      return;
+    }
+    this.forget_report();
+    this.seen_ms = this.env.now_ms();
+    this.send({ op: 'seen', frames: this.frames });
+  }
+  private forget_report(): void {
+    this.cancel_seen?.();
+    this.cancel_seen = null;
   }
   private send(message: object): void {
     this.socket?.send(JSON.stringify(message));
