@@ -86,7 +86,7 @@ export function Figures({ e, stale }: { e: EstimateMsg; stale: boolean }) {
         <dt>Ranges</dt>
         <dd class={cls}>
           {e.n_ranges}
-          {e.n_refused > 0 && <span class="u"> {e.n_refused} refused</span>}
+          {e.n_refused > 0 && <span class="u"> {e.n_refused} rejected</span>}
         </dd>
       </div>
       {e.mirror && (
