@@ -1,4 +1,4 @@
-// The commands of the cookbook and of the tutorial, taken from the pages and run by a shell against the real binary.
+// The commands of the cookbook, of the recipes and of the tutorial, taken from the pages and run by a shell against the real binary.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { cpSync, mkdirSync, mkdtempSync, readFileSync, rmSync, symlinkSync } from 'node:fs';
@@ -38,6 +38,24 @@ test('every command of the cookbook does what the page says', async () => {
       cwd,
       env: { ...process.env, U: server.url, T: server.token },
     });
+    assert.equal(code, 0, output.slice(-4000));
+  } finally {
+    await server.dispose();
+    rmSync(cwd, { recursive: true, force: true });
+  }
+});
+
+test('every command of the recipes does what the page says', async () => {
+  const commands = commandsOf(readFileSync(join(root, 'docs/recipes.md'), 'utf8'));
+  assert.ok(commands.length >= 7, `${commands.length} blocks`);
+  const server = await startServer({ auth: 'on' });
+  const cwd = mkdtempSync(join(tmpdir(), 'anchord recipes '));
+  try {
+    symlinkSync(binary, join(cwd, 'anchord'));
+    const { code, output } = await shell(
+      `anchord simulate flight --seed 7 --out my-flight\n${commands.join('\n')}\ntest "$(wc -l < ranges.csv)" -gt 100\n`,
+      { cwd, env: { ...process.env, PATH: `${cwd}:${process.env.PATH}`, U: server.url, T: server.token } },
+    );
     assert.equal(code, 0, output.slice(-4000));
   } finally {
     await server.dispose();
