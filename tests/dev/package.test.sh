@@ -50,6 +50,12 @@ expect "the settings of the package" 0 ''
 attempt readelf -S "$tree/usr/bin/anchord"
 [[ $output != *.debug_info* ]] ; pass_or_fail $? "the executable is not stripped"
 
+# --- Compose: the form of the file, with every profile.
+for profile in field mqtt https; do
+  attempt docker-compose -f docker-compose.yml --profile "$profile" config --quiet
+  expect "docker-compose.yml with profile $profile" 0 ''
+done
+
 # --- SBOM: each library that is needed, each npm package of the page; a licence text for what is inside.
 read_sbom() { python3 -c '
 import json, sys
