@@ -32,15 +32,17 @@ const char* value_name(Rule rule) {
   return "";
 }
 
-Ordered candidate_json(const planning::CandidateValue& c, const PlanRequest& request) {
+Ordered candidate_json(const planning::Candidates& all, std::size_t i, const PlanRequest& request) {
+  const planning::CandidateValue c = all[i];
   Ordered out;
   out["point_m"] = point_json(c.point_m, request.options.dims);
   out["value"] = finite_or_null(c.value);
   if (request.options.rule == Rule::dissertation) out["gdop_root"] = finite_or_null(std::sqrt(c.value));
   out["score"] = finite_or_null(c.score);
   Ordered anchors = Ordered::array();
-  for (std::size_t k = 0; k < c.per_anchor.size(); ++k) {
-    anchors.push_back({{"name", request.input.anchors[k].name}, {"value", finite_or_null(c.per_anchor[k])}});
+  for (std::size_t k = 0; k < all.of_anchor.size(); ++k) {
+    anchors.push_back(
+        {{"name", request.input.anchors[k].name}, {"value", finite_or_null(all.of_anchor[k][i])}});
   }
   out["per_anchor"] = anchors;
   out["p_nlos"] = c.p_nlos;
@@ -66,7 +68,8 @@ std::string decision_json(const planning::Decision& decision, const PlanRequest&
   out["value_before"] = finite_or_null(decision.value_before);
   out["reason"] = decision.reason;
   out["candidates"] = Ordered::array();
-  for (const auto& c : decision.candidates) out["candidates"].push_back(candidate_json(c, request));
+  for (std::size_t i = 0; i < decision.candidates.size(); ++i)
+    out["candidates"].push_back(candidate_json(decision.candidates, i, request));
   return to_wire(out, 2) + "\n";
 }
 
@@ -74,7 +77,7 @@ std::string decision_text(const planning::Decision& decision, const PlanRequest&
   std::array<char, 256> line{};
   std::string out;
   if (decision.chosen) {
-    const auto& p = decision.candidates[*decision.chosen].point_m;
+    const Eigen::Vector3d p = decision.candidates[*decision.chosen].point_m;
     std::snprintf(line.data(), line.size(), "next: (%.3f, %.3f, %.3f) m\n", p.x(), p.y(), p.z());
     out += line.data();
   }

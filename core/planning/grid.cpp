@@ -21,12 +21,18 @@ Result<Grid> grid_around(const Eigen::Vector3d& centre_m, const GridOptions& opt
                                                   std::to_string(across) + " x " + std::to_string(upward) +
                                                   " points is too large");
   }
+  const auto size = static_cast<std::size_t>(across) * static_cast<std::size_t>(across * upward);
   Grid grid;
+  for (auto* column : {&grid.x_m, &grid.y_m, &grid.z_m}) column->resize(size);
+  std::size_t i = 0;
   for (int iy = -options.reach; iy <= options.reach; ++iy) {
+    const double y_m = centre_m.y() + iy * options.step_m;
     for (int ix = -options.reach; ix <= options.reach; ++ix) {
-      for (int iz = -options.reach_up; iz <= options.reach_up; ++iz) {
-        grid.push_back(centre_m +
-                       Eigen::Vector3d(ix * options.step_m, iy * options.step_m, iz * options.step_up_m));
+      const double x_m = centre_m.x() + ix * options.step_m;
+      for (int iz = -options.reach_up; iz <= options.reach_up; ++iz, ++i) {
+        grid.x_m[i] = x_m;
+        grid.y_m[i] = y_m;
+        grid.z_m[i] = centre_m.z() + iz * options.step_up_m;
       }
     }
   }

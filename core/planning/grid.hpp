@@ -21,11 +21,6 @@ struct Grid {
   std::vector<double> x_m, y_m, z_m;
   std::size_t size() const { return x_m.size(); }
   Eigen::Vector3d at(std::size_t i) const { return {x_m[i], y_m[i], z_m[i]}; }
-  void push_back(const Eigen::Vector3d& p) {
-    x_m.push_back(p.x());
-    y_m.push_back(p.y());
-    z_m.push_back(p.z());
-  }
 };
 
 /// (2 reach + 1)^2 (2 reach_up + 1) points, the middle one included; order: y slowest, then x, then z, each

@@ -10,6 +10,8 @@
 
 #include "core/planning/gdop.hpp"
 #include "core/planning/information.hpp"
+#include "core/planning/refusals.hpp"
+#include "core/planning/sight.hpp"
 
 namespace anchord::planning {
 namespace {
@@ -17,16 +19,16 @@ namespace {
 constexpr double k_infinity = std::numeric_limits<double>::infinity();
 constexpr double k_tie = 1e-9;  // relative; mirrored candidates differ by rounding only
 
+/// Candidates above one another, side by side in the grid.
+std::size_t column_height(const NextPointOptions& options) {
+  return 2 * static_cast<std::size_t>(options.grid.reach_up) + 1;
+}
+
 /// One column of values over the grid, and the value before.
 struct Column {
   double before{};
   std::vector<double> with;
 };
-
-bool out_of_range(const NextPointOptions& options, const Eigen::Vector3d& point,
-                  const Eigen::Vector3d& place) {
-  return options.max_range_m && (point - place).norm() > *options.max_range_m;
-}
 
 template <int Dim>
 Column traces(const NextPointInput& input, const PlannedAnchor& anchor, const Place& place,
@@ -73,18 +75,8 @@ Column ridge_traces(const NextPointInput& input, const PlannedAnchor& anchor, co
   return out;
 }
 
-/// By the walls of the bounds and by those that a person accepted; nothing where these let nothing through.
-std::optional<double> expected_nlos(const NextPointInput& input, const Eigen::Vector3d& point,
-                                    const Eigen::Vector3d& place) {
-  const double drawn = p_nlos_through(input.bounds, point, place);
-  if (!input.walls || input.walls->empty()) return drawn;
-  const double loss_db = obstruction_between(*input.walls, point, place).loss_db;
-  if (loss_db > k_opaque_db) return std::nullopt;
-  return 1.0 - (1.0 - drawn) * (1.0 - p_nlos_of_loss(loss_db));
-}
-
 Column informations(const NextPointInput& input, const PlannedAnchor& anchor, const Place& place,
-                    const NextPointOptions& options, const Grid& grid) {
+                    const NextPointOptions& options, const Grid& grid, const Sights& sights) {
   Information base(place.position_m, anchor.covariance_m2, options);
   if (!anchor.covariance_m2) {
     for (const auto i : anchor.measured_at) {
@@ -95,33 +87,35 @@ Column informations(const NextPointInput& input, const PlannedAnchor& anchor, co
   out.with.reserve(grid.size());
   for (std::size_t i = 0; i < grid.size(); ++i) {
     const auto point = grid.at(i);
-    const auto nlos = out_of_range(options, point, place.position_m)
-                          ? std::nullopt
-                          : expected_nlos(input, point, place.position_m);
+    const auto nlos = out_of_range(options, point, place.position_m) ? std::nullopt : sights[i];
     out.with.push_back(nlos ? base.with(point, *nlos) : out.before);
   }
   return out;
 }
 
-/// Expectation over the places an anchor may be at.
+/// Expectation over the places an anchor may be at. `first`: what is seen of the first of them.
 Column anchor_column(const NextPointInput& input, const PlannedAnchor& anchor,
-                     const NextPointOptions& options, const Grid& grid, bool ridge) {
-  Column out{0, std::vector<double>(grid.size(), 0.0)};
+                     const NextPointOptions& options, const Grid& grid, bool ridge, const Sights& first) {
   double total = 0;
   for (const auto& place : anchor.places) total += place.probability;
-  for (const auto& place : anchor.places) {
-    Column one;
+  const auto column_of = [&](const Place& place) {
     if (options.rule != Rule::dissertation) {
-      one = informations(input, anchor, place, options, grid);
-    } else if (options.dims == 2) {
-      one = ridge ? ridge_traces<2>(input, anchor, place, grid)
-                  : traces<2>(input, anchor, place, options, grid);
-    } else {
-      one = ridge ? ridge_traces<3>(input, anchor, place, grid)
-                  : traces<3>(input, anchor, place, options, grid);
+      if (&place == &anchor.places.front()) return informations(input, anchor, place, options, grid, first);
+      const Sights sights(input, grid, column_height(options), place.position_m);
+      return informations(input, anchor, place, options, grid, sights);
     }
+    if (options.dims == 2)
+      return ridge ? ridge_traces<2>(input, anchor, place, grid)
+                   : traces<2>(input, anchor, place, options, grid);
+    return ridge ? ridge_traces<3>(input, anchor, place, grid)
+                 : traces<3>(input, anchor, place, options, grid);
+  };
+  if (anchor.places.size() == 1) return column_of(anchor.places.front());
+  Column out{0, std::vector<double>(grid.size(), 0.0)};
+  for (const auto& place : anchor.places) {
     const double share = place.probability / total;
     if (share == 0) continue;
+    const Column one = column_of(place);
     out.before += share * one.before;
     for (std::size_t i = 0; i < grid.size(); ++i) out.with[i] += share * one.with[i];
   }
@@ -150,30 +144,25 @@ double combine(const std::vector<double>& values, const std::vector<double>& wei
   return sum / total;
 }
 
-std::optional<Refusal> refuse(const NextPointInput& input, const NextPointOptions& options,
-                              const Eigen::Vector3d& current, const Eigen::Vector3d& point) {
-  const auto near = [&](const Eigen::Vector3d& other) {
-    Eigen::Vector3d d = (point - other).cwiseAbs();
-    d.head<2>() /= options.grid.step_m;
-    d.z() /= options.grid.step_up_m;
-    return d.maxCoeff() < options.visited_share;
-  };
-  if (std::any_of(input.unreachable.begin(), input.unreachable.end(), near)) return Refusal::unreachable;
-  if (near(current) || std::any_of(input.visited.begin(), input.visited.end(), near)) return Refusal::visited;
-  if (const auto why = refuse_point(input.bounds, point)) return why;
-  if (const auto why = refuse_path(input.bounds, current, point)) return why;
-  bool all_over = true;
-  for (const auto& anchor : input.anchors) {
-    for (const auto& place : anchor.places) {
-      if (options.dims == 2 ? (point - place.position_m).head<2>().norm() <= k_min_distance_m
-                            : (point - place.position_m).norm() <= k_min_distance_m) {
-        return Refusal::on_anchor;
-      }
-      all_over = all_over && out_of_range(options, point, place.position_m);
+/// combine() of every candidate.
+std::vector<double> combined(const std::vector<std::vector<double>>& of_anchor,
+                             const std::vector<double>& weights, Combine how) {
+  std::vector<double> out = of_anchor.front();
+  if (how == Combine::worst) {
+    for (std::size_t k = 1; k < of_anchor.size(); ++k) {
+      const auto& one = of_anchor[k];
+      for (std::size_t i = 0; i < out.size(); ++i) out[i] = out[i] < one[i] ? one[i] : out[i];
     }
+    return out;
   }
-  if (all_over) return Refusal::over_range;
-  return std::nullopt;
+  double total = 0;
+  for (const double w : weights) total += w;
+  for (std::size_t k = 0; k < of_anchor.size(); ++k) {
+    const auto& one = of_anchor[k];
+    for (std::size_t i = 0; i < out.size(); ++i) out[i] = (k == 0 ? 0.0 : out[i]) + weights[k] * one[i];
+  }
+  for (double& value : out) value /= total;
+  return out;
 }
 
 Result<void> check_input(const NextPointInput& input) {
@@ -210,21 +199,25 @@ Result<void> check_input(const NextPointInput& input) {
   return boost::outcome_v2::success();
 }
 
-std::string refused_words(const std::vector<CandidateValue>& candidates) {
+std::string refused_words(const Refusals& refused) {
   std::map<std::string_view, int> counts;
-  for (const auto& c : candidates) {
-    if (c.refused) ++counts[to_string(*c.refused)];
+  std::array<int, k_refusal_words.size()> n{};
+  for (std::size_t i = 0; i < refused.size(); ++i) {
+    if (refused.any(i)) ++n[static_cast<std::size_t>(*refused[i])];
+  }
+  for (std::size_t why = 0; why < n.size(); ++why) {
+    if (n[why] > 0) counts[to_string(static_cast<Refusal>(why))] = n[why];
   }
   std::string out;
-  for (const auto& [why, n] : counts)
-    out += (out.empty() ? "" : ", ") + std::to_string(n) + " " + std::string(why);
+  for (const auto& [why, count] : counts)
+    out += (out.empty() ? "" : ", ") + std::to_string(count) + " " + std::string(why);
   return out.empty() ? "none rejected" : "refused: " + out;
 }
 
 std::string words(const Decision& decision, const NextPointOptions& options, bool ridge) {
   const std::string total = "; " + std::to_string(decision.candidates.size()) + " candidates, ";
-  if (!decision.chosen) return "nowhere to go" + total + refused_words(decision.candidates);
-  const auto& best = decision.candidates[*decision.chosen];
+  if (!decision.chosen) return "nowhere to go" + total + refused_words(decision.candidates.refused);
+  const CandidateValue best = decision.candidates[*decision.chosen];
   std::array<char, 256> text{};
   if (ridge) {
     std::snprintf(text.data(), text.size(),
@@ -242,7 +235,45 @@ std::string words(const Decision& decision, const NextPointOptions& options, boo
                   best.value, decision.value_before);
   }
   return text.data() + (options.flight_time_cost ? std::string(", best gain per second") : std::string()) +
-         total + refused_words(decision.candidates);
+         total + refused_words(decision.candidates.refused);
+}
+
+std::vector<double> mean_nlos(const std::vector<Sights>& sights, std::size_t size) {
+  if (std::ranges::all_of(sights, &Sights::all_clear)) return {};
+  std::vector<double> out(size, 0.0);
+  for (const Sights& one : sights) {
+    for (std::size_t i = 0; i < size; ++i) out[i] += one[i].value_or(1) / static_cast<double>(sights.size());
+  }
+  return out;
+}
+
+void score_by_time(Decision& decision) {
+  Candidates& all = decision.candidates;
+  all.scored.resize(all.size());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const double flight_s = all.flight_s(i);
+    all.scored[i] = flight_s > 0 ? (all.value[i] - decision.value_before) / flight_s : all.value[i];
+  }
+}
+
+bool none_can_be_chosen(const Candidates& all) {
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (!all.refused.any(i) && std::isfinite(all.value[i])) return false;
+  }
+  return true;
+}
+
+/// The lowest score; among equal ones the first.
+std::optional<std::size_t> lowest_score(const Candidates& all) {
+  std::optional<std::size_t> chosen;
+  const auto& scores = all.scored.empty() ? all.value : all.scored;
+  double below = k_infinity;
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    if (!(scores[i] < below) || all.refused.any(i) || !std::isfinite(scores[i])) continue;
+    below = scores[i] - k_tie * std::max(1e-6, std::abs(scores[i]));
+    chosen = i;
+  }
+  return chosen;
 }
 
 }  // namespace
@@ -264,58 +295,37 @@ Result<Decision> next_point(const NextPointInput& input, const NextPointOptions&
   BOOST_OUTCOME_TRY(check_input(input));
   const Eigen::Vector3d current =
       input.current.value_or(input.visited.empty() ? Eigen::Vector3d::Zero().eval() : input.visited.back());
-  BOOST_OUTCOME_TRY(const auto grid, grid_around(current, options.grid));
+  Decision out;
+  Candidates& all = out.candidates;
+  BOOST_OUTCOME_TRY(all.grid, grid_around(current, options.grid));
+  all.from_m = current;
+  all.speed_mps = options.speed_mps;
+  all.dwell_s = options.dwell_s;
+  all.refused = refusals_of(input, options, current, all.grid);
 
-  std::vector<Column> columns;
   std::vector<double> weights, before;
+  std::vector<Sights> sights;
   for (const auto& anchor : input.anchors) {
-    columns.push_back(anchor_column(input, anchor, options, grid, false));
-    before.push_back(columns.back().before);
+    sights.emplace_back(input, all.grid, column_height(options), anchor.places.front().position_m);
+    Column column = anchor_column(input, anchor, options, all.grid, false, sights.back());
+    before.push_back(column.before);
+    all.of_anchor.push_back(std::move(column.with));
     const double need = options.combine == Combine::weighted ? deficit(anchor, options, before.back()) : 1.0;
     weights.push_back(anchor.weight * need);
   }
-
-  Decision out;
   out.value_before = combine(before, weights, options.combine);
-  bool any_finite = false;
-  for (std::size_t i = 0; i < grid.size(); ++i) {
-    CandidateValue c;
-    c.point_m = grid.at(i);
-    for (std::size_t k = 0; k < columns.size(); ++k) {
-      c.per_anchor.push_back(columns[k].with[i]);
-      c.p_nlos += expected_nlos(input, c.point_m, input.anchors[k].places.front().position_m).value_or(1) /
-                  static_cast<double>(columns.size());
-    }
-    c.value = combine(c.per_anchor, weights, options.combine);
-    c.flight_s = (c.point_m - current).norm() / options.speed_mps + options.dwell_s;
-    const bool by_time = options.flight_time_cost && std::isfinite(out.value_before) && c.flight_s > 0;
-    c.score = by_time ? (c.value - out.value_before) / c.flight_s : c.value;
-    c.refused = refuse(input, options, current, c.point_m);
-    any_finite = any_finite || (!c.refused && std::isfinite(c.value));
-    out.candidates.push_back(std::move(c));
-  }
+  all.value = combined(all.of_anchor, weights, options.combine);
+  all.expected_nlos = mean_nlos(sights, all.grid.size());
+  if (options.flight_time_cost && std::isfinite(out.value_before)) score_by_time(out);
 
-  const bool ridge = !any_finite && options.rule == Rule::dissertation;
+  const bool ridge = options.rule == Rule::dissertation && none_can_be_chosen(all);
   if (ridge) {
-    std::vector<Column> spread;
-    for (const auto& anchor : input.anchors)
-      spread.push_back(anchor_column(input, anchor, options, grid, true));
-    for (std::size_t i = 0; i < grid.size(); ++i) {
-      std::vector<double> values;
-      for (const auto& column : spread) values.push_back(column.with[i]);
-      out.candidates[i].score = combine(values, weights, options.combine);
-    }
+    std::vector<std::vector<double>> spread;
+    for (std::size_t k = 0; k < input.anchors.size(); ++k)
+      spread.push_back(anchor_column(input, input.anchors[k], options, all.grid, true, sights[k]).with);
+    all.scored = combined(spread, weights, options.combine);
   }
-
-  double best = k_infinity;
-  for (std::size_t i = 0; i < grid.size(); ++i) {
-    const auto& c = out.candidates[i];
-    if (c.refused || !std::isfinite(c.score)) continue;
-    if (!out.chosen || c.score < best - k_tie * std::max(1e-6, std::abs(best))) {
-      best = c.score;
-      out.chosen = i;
-    }
-  }
+  out.chosen = lowest_score(all);
   out.reason = words(out, options, ridge);
   return out;
 }

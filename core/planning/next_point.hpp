@@ -10,6 +10,7 @@
 
 #include "core/base/result.hpp"
 #include "core/planning/bounds.hpp"
+#include "core/planning/candidates.hpp"
 #include "core/planning/grid.hpp"
 #include "core/planning/walls.hpp"
 #include "core/types/plan.hpp"
@@ -66,22 +67,12 @@ struct NextPointOptions {
   Result<void> check() const;
 };
 
-struct CandidateValue {
-  Eigen::Vector3d point_m{0, 0, 0};
-  double value{};  ///< of the rule, combined; +infinity where singular
-  double score{};  ///< what was minimised: value, or minus the gain per second
-  std::vector<double> per_anchor;
-  double p_nlos{};  ///< expected, mean over anchors
-  double flight_s{};
-  std::optional<Refusal> refused{};  ///< value is still shown, but the point cannot be chosen
-};
-
 /// Where next, what it should bring, and what was refused.
 struct Decision {
   std::optional<std::size_t> chosen{};  ///< index into candidates; absent: nowhere to go from here
   double value_before{};                ///< +infinity while singular
   std::string reason;                   ///< in words, for the operator
-  std::vector<CandidateValue> candidates;
+  Candidates candidates;
 };
 
 /// Best next point by the rule (8.4.3). Visited, unreachable and forbidden points keep their value but cannot

@@ -33,6 +33,10 @@ struct Obstruction {
 };
 Obstruction obstruction_between(std::span<const BuiltWall> walls, const Eigen::Vector3d& a_m,
                                 const Eigen::Vector3d& b_m);
+/// The same from points above one another: out[i] from (a, z[i]).
+void obstructions_between(std::span<const BuiltWall> walls, const Eigen::Vector2d& a_m,
+                          std::span<const double> z_m, const Eigen::Vector3d& b_m,
+                          std::span<Obstruction> out);
 
 /// More than this nothing gets through at any distance: what a DW1000 has left at one metre, -14.3 dBm sent,
 /// 44.5 dB of the first metre, -102 dBm of sensitivity (docs/radio-model.md).

@@ -130,6 +130,11 @@ function planner() {
     ns.rebuild_and_invert,
     'rebuild and invert',
   );
+  row(
+    'planner, whole decision of the same, per candidate',
+    `${ns['whole_decision/20'].toFixed(1)} ns CPU`,
+    `its kernel ${ns.batch_kernel.toFixed(1)}`,
+  );
 }
 
 function polygons() {

@@ -99,6 +99,6 @@ void whole_decision(benchmark::State& state) {
 BENCHMARK(batch_kernel)->Unit(benchmark::kMicrosecond);
 BENCHMARK(base_built_anew_then_batch)->Unit(benchmark::kMicrosecond);
 BENCHMARK(rebuild_and_invert)->Unit(benchmark::kMicrosecond);
-BENCHMARK(whole_decision)->Arg(1)->Arg(5)->Unit(benchmark::kMicrosecond);
+BENCHMARK(whole_decision)->Arg(1)->Arg(5)->Arg(20)->Unit(benchmark::kMicrosecond);
 
 }  // namespace

@@ -29,7 +29,7 @@ TEST(PlanInput, ReadsTheExampleOfTheDocumentationAndDecidesAsTheDissertation) {
   const auto request = read_plan_input(text, errors);
   ASSERT_TRUE(request) << (errors.empty() ? "" : errors[0].pointer + errors[0].detail);
   const auto decision = planning::next_point(request->input, request->options).value();
-  const auto p = decision.candidates.at(decision.chosen.value()).point_m;
+  const auto p = decision.candidates[decision.chosen.value()].point_m;
   EXPECT_NEAR(p.x(), 2.52, 1e-12);  // Fig 8.8
   EXPECT_NEAR(p.y(), -0.48, 1e-12);
   const auto json = decision_json(decision, *request);

@@ -29,7 +29,7 @@ std::vector<Eigen::Vector3d> path() {
   while (static_cast<int>(input.visited.size()) < k_iterations) {
     const auto decision = planning::next_point(input, options).value();
     input.anchors[0].measured_at.push_back(input.visited.size());
-    input.visited.push_back(decision.candidates.at(decision.chosen.value()).point_m);
+    input.visited.push_back(decision.candidates[decision.chosen.value()].point_m);
   }
   return input.visited;
 }

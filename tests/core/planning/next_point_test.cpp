@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
+#include <map>
 #include <random>
 
 #include "core/planning/information.hpp"
@@ -29,7 +31,7 @@ struct Fig88 {
   }
   Vector3d step() {
     const auto decision = next_point(input, options).value();
-    const auto& c = decision.candidates.at(decision.chosen.value());
+    const auto& c = decision.candidates[decision.chosen.value()];
     input.anchors[0].measured_at.push_back(input.visited.size());
     input.visited.push_back(c.point_m);
     traces.push_back(c.value);
@@ -102,9 +104,9 @@ TEST(NextPoint, RefusesPointsBeyondTheRangeOfEveryAnchor) {
   Fig88 flight;
   flight.options.max_range_m = 4.0;
   const auto decision = next_point(flight.input, flight.options).value();
-  const auto& chosen = decision.candidates.at(decision.chosen.value());
+  const auto& chosen = decision.candidates[decision.chosen.value()];
   EXPECT_LT((chosen.point_m - Vector3d(-1.2, 0, 0)).norm(), 4.0);
-  EXPECT_EQ(decision.candidates.front().point_m.x(), 2.52);
+  EXPECT_EQ(decision.candidates[0].point_m.x(), 2.52);
   EXPECT_EQ(decision.candidates[2].refused, Refusal::over_range);
 }
 
@@ -132,10 +134,10 @@ TEST(NextPoint, WorstHelpsTheAnchorThatIsWorstOff) {
   options.dims = 2;
   options.grid.step_m = 4;
   const auto decision = next_point(input, options).value();
-  const auto& best = decision.candidates.at(decision.chosen.value());
-  for (const auto& c : decision.candidates) {
-    if (!c.refused) {
-      EXPECT_LE(best.per_anchor[1], c.per_anchor[1] * (1 + 1e-9));
+  const auto& poor = decision.candidates.of_anchor[1];
+  for (std::size_t i = 0; i < decision.candidates.size(); ++i) {
+    if (!decision.candidates[i].refused) {
+      EXPECT_LE(poor[decision.chosen.value()], poor[i] * (1 + 1e-9));
     }
   }
 }
@@ -189,6 +191,101 @@ TEST(NextPoint, GoesRoundAWallToALineOfSight) {
   options.grid = {4.0, 4.0, 1, 0};
   const auto decision = next_point(input, options).value();
   EXPECT_GT(decision.candidates[*decision.chosen].point_m.x(), 0.5);
+}
+
+/// A site with everything in it: past points, areas, walls of both kinds, limits, an anchor on a candidate.
+struct Crowded {
+  NextPointInput input;
+  NextPointOptions options;
+
+  explicit Crowded(int seed) {
+    std::mt19937_64 random(static_cast<std::uint64_t>(seed));
+    std::uniform_real_distribution<double> at(-6, 6), up(0, 6);
+    const auto point = [&] { return Vector3d{at(random), at(random), up(random)}; };
+    for (int i = 0; i < 40; ++i) input.visited.push_back(point());
+    for (int i = 0; i < 5; ++i) input.unreachable.push_back(point());
+    input.current = Vector3d{0.25, -0.5, 3};
+    input.anchors = {{"a", {{{1.25, 0.5, 3.5}, 0.7}, {point(), 0.3}}, {0, 1, 2, 3, 4}},
+                     {"b", {{point(), 1}}, {5, 6, 7, 8}}};
+    input.bounds.fence = {{-4.2, -4.1}, {4.4, -3.9}, {4.1, 4.3}, {0.1, 2.2}, {-4.3, 4.2}};
+    input.bounds.no_fly = {{{1.1, -2.9}, {2.3, -2.8}, {2.2, -1.4}}};
+    input.bounds.keep_out_m = 0.4;
+    input.bounds.walls = {{{-3, 1}, {-1, 1.5}, 0.3, 0.6}, {{2.7, 0}, {2.8, 2}, 0, 0}};
+    input.bounds.min_height_m = 1.2;
+    input.bounds.max_height_m = 4.6;
+    input.walls = std::make_shared<std::vector<BuiltWall>>(
+        std::vector<BuiltWall>{{{-2, -2}, {2, -2.2}, 0, 3.1, 0.2, WallMaterial::concrete},
+                               {{0.7, -3}, {0.8, 3}, 2, 5, 0.1, WallMaterial::metal}});
+    options.grid = {0.5, 0.5, 9, 5};
+    options.dims = seed % 2 ? 3 : 2;
+    options.max_range_m = 4.5;
+  }
+
+  std::optional<Refusal> refused(const Vector3d& p) const {
+    const auto near = [&](const Vector3d& other) {
+      return std::abs(p.x() - other.x()) < 0.25 && std::abs(p.y() - other.y()) < 0.25 &&
+             std::abs(p.z() - other.z()) < 0.25;
+    };
+    if (std::ranges::any_of(input.unreachable, near)) return Refusal::unreachable;
+    if (near(*input.current) || std::ranges::any_of(input.visited, near)) return Refusal::visited;
+    if (const auto why = refuse_point(input.bounds, p)) return why;
+    if (const auto why = refuse_path(input.bounds, *input.current, p)) return why;
+    bool over = true;
+    for (const auto& anchor : input.anchors) {
+      for (const auto& place : anchor.places) {
+        const Vector3d d = p - place.position_m;
+        if (d.head(options.dims).norm() <= 1e-6) return Refusal::on_anchor;
+        over = over && d.norm() > *options.max_range_m;
+      }
+    }
+    if (over) return Refusal::over_range;
+    return std::nullopt;
+  }
+
+  /// 1 where nothing gets through: more than 43 dB.
+  double p_nlos(const Vector3d& p) const {
+    double sum = 0;
+    for (const auto& anchor : input.anchors) {
+      const Vector3d& place = anchor.places.front().position_m;
+      double loss_db = 0;
+      for (const auto& hit : hits_between(*input.walls, p, place)) loss_db += hit.loss_db;
+      const double drawn = p_nlos_through(input.bounds, p, place);
+      sum += loss_db > 43 ? 1 : 1 - (1 - drawn) * std::pow(10, -loss_db / 10);
+    }
+    return sum / 2;
+  }
+};
+
+// Each candidate by itself, rule after rule, as 8.3.9 and 8.4.3 state them.
+TEST(NextPoint, RefusesAndExpectsOfAWholeGridWhatItDoesOfEachCandidateAlone) {
+  std::map<Refusal, int> met;
+  for (int seed = 1; seed <= 4; ++seed) {
+    const Crowded site(seed);
+    const auto decision = next_point(site.input, site.options).value();
+    ASSERT_EQ(decision.candidates.size(), 19u * 19 * 11);
+    for (const auto& c : decision.candidates) {
+      EXPECT_EQ(c.refused, site.refused(c.point_m)) << c.point_m.transpose() << " of " << seed;
+      EXPECT_NEAR(c.p_nlos, site.p_nlos(c.point_m), 1e-12) << c.point_m.transpose() << " of " << seed;
+      if (c.refused) ++met[*c.refused];
+    }
+  }
+  EXPECT_EQ(met.size(), k_refusal_words.size()) << "every reason is met";
+}
+
+// A point half-way between two candidates is of neither.
+TEST(NextPoint, VisitsACellFromLessThanHalfAStepAway) {
+  Fig88 flight;
+  flight.input.current = Vector3d{3, 0, 0};
+  flight.options.grid = {1.0, 1.0, 2, 0};
+  flight.input.visited.push_back({3 + 1.5, 0.49, 0});
+  const auto decision = next_point(flight.input, flight.options).value();
+  for (const auto& c : decision.candidates)
+    EXPECT_EQ(c.refused == Refusal::visited, c.point_m == Vector3d(3, 0, 0)) << c.point_m.transpose();
+  flight.input.visited.back().x() = 3 + 1.51;
+  const auto other = next_point(flight.input, flight.options).value();
+  int n = 0;
+  for (const auto& c : other.candidates) n += c.refused == Refusal::visited;
+  EXPECT_EQ(n, 2);
 }
 
 TEST(NextPoint, RefusesInputThatMakesNoSense) {

@@ -125,11 +125,11 @@ struct Mirrored {
     options.rule = Rule::a_optimal;
     options.grid.step_m = 3;
   }
-  const CandidateValue& at(const Decision& decision, double x, double y, double z) const {
+  CandidateValue at(const Decision& decision, double x, double y, double z) const {
     for (const auto& c : decision.candidates)
       if ((c.point_m - Vector3d(x, y, z)).norm() < 1e-9) return c;
     ADD_FAILURE() << "no candidate at " << x << ' ' << y;
-    return decision.candidates.front();
+    return decision.candidates[0];
   }
 };
 
