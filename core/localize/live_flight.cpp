@@ -6,13 +6,13 @@
 #include <limits>
 #include <map>
 #include <set>
-#include <tuple>
 #include <utility>
 
 #include "core/geo/tag_track.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "core/localize/live_anchor.hpp"
 #include "core/localize/live_track.hpp"
+#include "core/localize/seen_exchanges.hpp"
 
 namespace anchord {
 namespace {
@@ -47,13 +47,13 @@ struct LiveFlight::State {
   std::set<NetworkId> changed;
   bool held{false};
   std::optional<LivePose> pose;
-  using Identity = std::tuple<std::int64_t, NetworkId, std::uint8_t, NetworkId>;
-  std::set<Identity> seen;  ///< of the last seconds, against repeats
+  SeenExchanges seen;  ///< against repeats
 
   State(Mission m, LiveOptions o)
       : mission(std::move(m)),
         options(std::move(o)),
-        track(mission.frame, {options.min_fix, options.max_track, options.origin, options.track}) {}
+        track(mission.frame, {options.min_fix, options.max_track, options.origin, options.track}),
+        seen(4 * options.max_waiting) {}
 
   double seconds(UtcTime t) const { return seconds_between(*track.epoch(), t); }
 
@@ -280,12 +280,10 @@ void LiveFlight::add(const Range& range, const std::optional<RangeModel>& model)
     s.refuse(range, "out_of_bounds");
     return;
   }
-  const State::Identity identity{range.time.ns, range.tag, range.antenna, range.anchor};
-  if (!s.seen.insert(identity).second) {
+  if (!s.seen.insert(range)) {
     s.refuse(range, "duplicate");
     return;
   }
-  while (s.seen.size() > 4 * s.options.max_waiting) s.seen.erase(s.seen.begin());
   s.remember(range, model);
   State::Waiting entry{range, model, {}};
   entry.range.cir.reset();
