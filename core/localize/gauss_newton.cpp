@@ -5,6 +5,7 @@
 #include "core/localize/range_block.hpp"
 #include "core/localize/residual.hpp"
 #include "core/localize/solver.hpp"
+#include "core/localize/warm_solve.hpp"
 
 namespace anchord {
 namespace {
@@ -87,12 +88,13 @@ Descent descend(const RangeBlock& block, Unknowns& at, const SolverOptions& opti
   return descent;
 }
 
-Result<AnchorMinimum> descend_to_minimum(RangeBlock& block, const Eigen::Vector3d& start,
-                                         const SolverOptions& options) {
-  BOOST_OUTCOME_TRY(check_problem(block.observations(), start, options));
+/// Descends from a place; no cost yet. The block is left with the scales of the round before the last.
+Result<AnchorMinimum> descend_from(RangeBlock& block, const WarmStart& start, const SolverOptions& options,
+                                   double scale_tolerance_m) {
+  BOOST_OUTCOME_TRY(check_problem(block.observations(), start.position_m, options));
   const double bend = options.loss_sigmas > 0 ? options.loss_sigmas : default_bend(options.loss);
   Unknowns at;
-  at << start, options.estimate_bias ? options.bias_prior_m : 0.0;
+  at << start.position_m, options.estimate_bias ? start.bias_m : 0.0;
   AnchorMinimum minimum;
   for (int round = 0; round < 20; ++round) {
     const Unknowns before = at;
@@ -100,11 +102,21 @@ Result<AnchorMinimum> descend_to_minimum(RangeBlock& block, const Eigen::Vector3
     const Descent descent = descend(block, at, options, bend);
     minimum.iterations += descent.iterations;
     minimum.settled = descent.settled;
-    if (!descent.settled || block.one_scale() || (at - before).norm() < 1e-9) break;
+    if (!descent.settled || block.one_scale() || (at - before).norm() < scale_tolerance_m) break;
   }
   if (!at.allFinite()) return make_error(Errc::no_convergence, "the solver left the finite numbers");
   minimum.position_m = at.head<3>();
   minimum.bias_m = at[3];
+  return minimum;
+}
+
+Result<AnchorMinimum> descend_to_minimum(RangeBlock& block, const Eigen::Vector3d& start,
+                                         const SolverOptions& options, double scale_tolerance_m) {
+  BOOST_OUTCOME_TRY(auto minimum,
+                    descend_from(block, {start, options.bias_prior_m}, options, scale_tolerance_m));
+  const double bend = options.loss_sigmas > 0 ? options.loss_sigmas : default_bend(options.loss);
+  Unknowns at;
+  at << minimum.position_m, minimum.bias_m;
   if (!block.one_scale()) block.scale(at, options.weights);
   minimum.cost = build(block, at, options, bend).cost;
   return minimum;
@@ -115,13 +127,12 @@ Result<AnchorMinimum> descend_to_minimum(RangeBlock& block, const Eigen::Vector3
 Result<AnchorMinimum> descend_to_minimum(std::span<const Observation> observations,
                                          const Eigen::Vector3d& start, const SolverOptions& options) {
   RangeBlock block(observations);
-  return descend_to_minimum(block, start, options);
+  return descend_to_minimum(block, start, options, k_scale_tolerance_m);
 }
 
-Result<AnchorFit> solve_anchor_gauss_newton(std::span<const Observation> observations,
-                                            const Eigen::Vector3d& start, const SolverOptions& options) {
-  RangeBlock block(observations);
-  BOOST_OUTCOME_TRY(const AnchorMinimum minimum, descend_to_minimum(block, start, options));
+Result<AnchorFit> solve_block(RangeBlock& block, const WarmStart& start, const SolverOptions& options,
+                              double scale_tolerance_m) {
+  BOOST_OUTCOME_TRY(const AnchorMinimum minimum, descend_from(block, start, options, scale_tolerance_m));
   if (!minimum.settled) {
     return make_error(Errc::no_convergence,
                       "not settled after " + std::to_string(minimum.iterations) + " Gauss-Newton steps");
@@ -131,6 +142,31 @@ Result<AnchorFit> solve_anchor_gauss_newton(std::span<const Observation> observa
   BOOST_OUTCOME_TRY(auto fit, finish_fit(block, at, options));
   fit.iterations = minimum.iterations;
   return fit;
+}
+
+Result<AnchorFit> best_of_starts(RangeBlock& block, std::span<const Eigen::Vector3d> starts,
+                                 const SolverOptions& options, double scale_tolerance_m, double coarse_m) {
+  SolverOptions coarse = options;
+  coarse.step_tolerance_m = coarse_m;
+  std::vector<AnchorMinimum> ends;
+  Result<AnchorFit> best = make_error(Errc::no_convergence, "no start settled");
+  for (const auto& start : starts) {
+    auto end = descend_to_minimum(block, start, coarse, coarse_m);
+    if (end && end.value().settled) ends.push_back(end.value());
+    if (!end) best = end.error();
+  }
+  std::ranges::stable_sort(ends, {}, &AnchorMinimum::cost);
+  for (const auto& end : ends) {
+    best = solve_block(block, {end.position_m, end.bias_m}, options, scale_tolerance_m);
+    if (best) break;
+  }
+  return best;
+}
+
+Result<AnchorFit> solve_anchor_gauss_newton(std::span<const Observation> observations,
+                                            const Eigen::Vector3d& start, const SolverOptions& options) {
+  RangeBlock block(observations);
+  return solve_block(block, {start, options.bias_prior_m}, options);
 }
 
 }  // namespace anchord

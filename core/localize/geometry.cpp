@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <vector>
 
 #include "core/base/median.hpp"
@@ -57,13 +58,18 @@ GeometryReport assess_geometry(std::span<const Observation> observations, Dims d
                              static_cast<double>(observations.size()));
     return report;
   }
-  std::vector<Observation> rows(observations.begin(), observations.end());
-  std::erase_if(rows,
-                [](const Observation& o) { return !o.tag_m.allFinite() || !std::isfinite(o.distance_m); });
-  if (dims == Dims::two) {
-    for (auto& o : rows) o.tag_m.z() = 0;
+  const auto usable = [](const Observation& o) { return o.tag_m.allFinite() && std::isfinite(o.distance_m); };
+  std::span<const Observation> rows = observations;
+  std::vector<Observation> changed;
+  if (dims == Dims::two || !std::ranges::all_of(observations, usable)) {
+    std::ranges::copy_if(observations, std::back_inserter(changed), usable);
+    if (dims == Dims::two) {
+      for (auto& o : changed) o.tag_m.z() = 0;
+    }
+    rows = changed;
   }
   std::vector<double> range_m;
+  range_m.reserve(rows.size());
   for (const auto& o : rows) range_m.push_back(o.distance_m);
   report.median_range_m = std::max(upper_median(range_m), 1e-3);
   report.shape = track_shape(rows);

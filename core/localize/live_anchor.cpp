@@ -9,13 +9,17 @@
 #include "core/localize/flight_options.hpp"
 #include "core/localize/geometry.hpp"
 #include "core/localize/linear.hpp"
-#include "core/localize/solver.hpp"
+#include "core/localize/warm_solve.hpp"
 #include "core/planning/gdop.hpp"
 
 namespace anchord {
 namespace {
 
 constexpr double k_floor_sigma_m = 0.04;
+constexpr double k_scale_m = 1e-5;  ///< what sigmas along the lines of sight do not feel
+constexpr std::size_t k_most_solved = 600, k_most_searched = 80;  ///< rows of one solve, of a search
+constexpr double k_coarse_m =
+    1e-3;  ///< tells the ends of a search apart, which lie decimetres from each other
 constexpr double k_weak_share = 0.2;  ///< of the median range: a 95 % bound wider than this places nothing
 
 SolverOptions solver_options(const LiveOptions& live, double bias_m) {
@@ -25,33 +29,24 @@ SolverOptions solver_options(const LiveOptions& live, double bias_m) {
   options.estimate_bias = true;
   options.bias_prior_m = bias_m;
   options.bias_prior_sigma_m = live.bias_prior_sigma_m;
-  options.max_iterations = 100;  // a track near a plane leaves a long curved valley to walk down
+  options.max_iterations = 100;     // a track near a plane leaves a long curved valley to walk down
+  options.step_tolerance_m = 1e-7;  // Newton squares what is left of a step: good to nanometres
   return options;
 }
 
-std::vector<Observation> every_nth(const std::vector<Observation>& rows, std::size_t most) {
-  if (rows.size() <= most) return rows;
+std::vector<Observation> every_nth(std::span<const Observation> rows, std::size_t most) {
   std::vector<Observation> few;
+  few.reserve(most);
   const double step = static_cast<double>(rows.size()) / static_cast<double>(most);
   for (std::size_t i = 0; i < most; ++i)
     few.push_back(rows[static_cast<std::size_t>(static_cast<double>(i) * step)]);
   return few;
 }
 
-/// The best of many starts, by cost.
-std::optional<AnchorFit> best_fit(const std::vector<Observation>& rows,
-                                  const std::vector<Eigen::Vector3d>& starts, const SolverOptions& options) {
-  std::optional<AnchorFit> best;
-  for (const auto& start : starts) {
-    auto fit = solve_anchor_gauss_newton(rows, start, options);
-    if (fit && (!best || fit.value().cost < best->cost)) best = std::move(fit.value());
-  }
-  return best;
-}
-
 double rms(const std::vector<double>& residuals) {
   // The middle two thirds: what the typical range does, not what the worst one did.
   std::vector<double> size;
+  size.reserve(residuals.size());
   for (const double r : residuals) size.push_back(r * r);
   const auto keep = static_cast<std::ptrdiff_t>(std::max<std::size_t>(size.size() * 2 / 3, 1));
   std::ranges::nth_element(size, size.begin() + keep - 1);
@@ -62,6 +57,7 @@ double rms(const std::vector<double>& residuals) {
 
 double scale_of(const std::vector<double>& residuals) {
   std::vector<double> size;
+  size.reserve(residuals.size());
   for (const double r : residuals) size.push_back(std::abs(r));
   return std::max(1.4826 * upper_median(size), 0.02);
 }
@@ -74,11 +70,10 @@ struct Answers {
       0};  ///< of the mirror: tempered likelihood ratio, and what the flight's priors hold against it
 };
 
-Answers with_mirror(const AnchorFit& found, const std::vector<Observation>& rows,
-                    const GeometryReport& geometry, const SolverOptions& settings, double inflate,
-                    const AnchorPriors* priors) {
+Answers with_mirror(const AnchorFit& found, RangeBlock& block, const WarmStart& mirror_start,
+                    const SolverOptions& settings, double inflate, const AnchorPriors* priors) {
   Answers out{found, std::nullopt, 0};
-  const auto mirror = solve_anchor_gauss_newton(rows, geometry.shape.mirrored(found.position_m), settings);
+  const auto mirror = solve_block(block, mirror_start, settings, k_scale_m);
   if (!mirror || !((mirror.value().position_m - found.position_m).norm() > 0.4)) return out;
   out.mirror = mirror.value();
   out.worse = std::max(out.mirror->cost - out.best.cost, 0.0) / inflate;
@@ -118,8 +113,9 @@ void assess_precision(const GeometryReport& geometry, Estimate& estimate) {
   estimate.reason = collinear ? geometry.reason : text;
 }
 
-void fill_gdop(const std::vector<Observation>& rows, const Eigen::Vector3d& anchor_m, Estimate& estimate) {
+void fill_gdop(std::span<const Observation> rows, const Eigen::Vector3d& anchor_m, Estimate& estimate) {
   std::vector<Eigen::Vector3d> places;
+  places.reserve(rows.size());
   for (const auto& row : rows) places.push_back(row.tag_m);
   estimate.gdop.reset();
   estimate.gdop_trace.reset();
@@ -167,27 +163,36 @@ bool LiveAnchor::solve(const LiveOptions& options) {
     refine();
     return true;
   }
-  search(options);
-  describe(options);
+  std::vector<Observation> few;
+  std::span<const Observation> rows = rows_;
+  if (rows.size() > k_most_solved) rows = few = every_nth(rows, k_most_solved);
+  RangeBlock block(rows);
+  const auto fit = search(block, solver_options(options, options.bias_m));
+  describe(block, fit, options);
   return true;
 }
 
-void LiveAnchor::search(const LiveOptions& options) {
-  if (rows_.size() < 5) return;
-  const SolverOptions settings = solver_options(options, options.bias_m);
-  std::vector<Eigen::Vector3d> starts;
-  if (position_m_) starts.push_back(*position_m_);
+Result<AnchorFit> LiveAnchor::search(RangeBlock& block, const SolverOptions& settings) {
+  Result<AnchorFit> best = make_error(Errc::too_few_observations, "");
+  if (rows_.size() < 5) return best;
+  if (position_m_) best = solve_block(block, {*position_m_, bias_m_}, settings, k_scale_m);
   // While the geometry still grows the warm start may sit on the wrong side: look afresh at every doubling.
   if (!position_m_ || rows_.size() >= 2 * rows_at_search_) {
     rows_at_search_ = rows_.size();
-    const auto few = every_nth(rows_, 80);
-    if (auto best = best_fit(few, start_candidates(few), settings)) starts.push_back(best->position_m);
+    mirror_.reset();
+    const std::span<const Observation> rows = rows_;
+    const auto few = rows.size() > k_most_searched ? every_nth(rows, k_most_searched) : rows_;
+    RangeBlock of_few(few);
+    if (const auto start = best_of_starts(of_few, start_candidates(few), settings, k_scale_m, k_coarse_m)) {
+      auto fit = solve_block(block, {start.value().position_m, start.value().bias_m}, settings, k_scale_m);
+      if (!best || (fit && fit.value().cost < best.value().cost)) best = std::move(fit);
+    }
   }
-  const auto rows = every_nth(rows_, 600);
-  if (auto best = best_fit(rows, starts, settings)) {
-    position_m_ = best->position_m;
-    bias_m_ = best->bias_m;
+  if (best) {
+    position_m_ = best.value().position_m;
+    bias_m_ = best.value().bias_m;
   }
+  return best;
 }
 
 /// Verdict and reason where the rows are too few or the track pins nothing down; false: nothing is to be
@@ -209,12 +214,11 @@ bool LiveAnchor::can_be_solved(const GeometryReport& geometry) {
   return position_m_.has_value();
 }
 
-void LiveAnchor::describe(const LiveOptions& options) {
+void LiveAnchor::describe(RangeBlock& block, const Result<AnchorFit>& fit, const LiveOptions& options) {
   const GeometryReport geometry = assess_geometry(rows_);
   if (!can_be_solved(geometry)) return;
   const SolverOptions settings = solver_options(options, options.bias_m);
-  const auto rows = every_nth(rows_, 600);
-  const auto fit = solve_anchor_gauss_newton(rows, *position_m_, settings);
+  const auto rows = block.observations();
   if (!fit) {
     if (fit.error().code == Errc::weak_geometry) estimate_.verdict = Verdict::weak_geometry;
     if (estimate_.reason.empty()) estimate_.reason = fit.error().message;
@@ -227,8 +231,11 @@ void LiveAnchor::describe(const LiveOptions& options) {
   const double inflate = std::max(static_cast<double>(rows.size()) / looks, 1.0) *
                          std::max(scale_m * scale_m / (options.range_sigma_m * options.range_sigma_m), 0.1);
   const auto told = options.priors.find(estimate_.anchor);
-  const Answers answers = with_mirror(fit.value(), rows, geometry, settings, inflate,
+  const WarmStart reflected{geometry.shape.mirrored(fit.value().position_m), fit.value().bias_m};
+  const Answers answers = with_mirror(fit.value(), block, mirror_.value_or(reflected), settings, inflate,
                                       told == options.priors.end() ? nullptr : &told->second);
+  mirror_.reset();
+  if (answers.mirror) mirror_ = {answers.mirror->position_m, answers.mirror->bias_m};
   position_m_ = answers.best.position_m;
   bias_m_ = answers.best.bias_m;
   estimate_.bias_m = answers.best.bias_m;

@@ -8,6 +8,7 @@
 #include "core/geo/enu.hpp"
 #include "core/localize/live_flight.hpp"
 #include "core/localize/observation.hpp"
+#include "core/localize/warm_solve.hpp"
 #include "core/types/estimate.hpp"
 
 namespace anchord {
@@ -41,9 +42,9 @@ class LiveAnchor {
 
  private:
   void thin(std::size_t max_rows);
-  void search(const LiveOptions& options);
+  Result<AnchorFit> search(RangeBlock& block, const SolverOptions& settings);
   bool can_be_solved(const GeometryReport& geometry);
-  void describe(const LiveOptions& options);
+  void describe(RangeBlock& block, const Result<AnchorFit>& fit, const LiveOptions& options);
   void refine();
 
   /// What a joint solution said, refined by the ranges since.
@@ -66,6 +67,7 @@ class LiveAnchor {
   std::size_t used_{0}, used_at_solve_{0};
   std::optional<Eigen::Vector3d> position_m_;
   double bias_m_{0};
+  std::optional<WarmStart> mirror_;  ///< of the last solve; none: the next looks for it anew
   std::optional<UtcTime> first_, newest_, solved_;
   std::size_t rows_at_search_{0};
   Estimate estimate_;

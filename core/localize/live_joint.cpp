@@ -6,6 +6,7 @@
 #include "core/localize/error_ellipse.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "core/localize/live_anchor.hpp"
+#include "core/localize/range_block.hpp"
 
 namespace anchord {
 namespace {
@@ -53,26 +54,24 @@ void LiveAnchor::refine() {
   const Joint& joint = *joint_;
   const Eigen::Vector3d before = joint.estimate.best->position.m;
   Eigen::Vector3d at = before;
+  std::vector<Observation> rows;
+  rows.reserve(recent_.size());
+  for (const Recent& recent : recent_) {
+    rows.push_back(recent.row);
+    rows.back().distance_m -= joint.bias_m + joint.curve_m * curve_shape(recent.row.distance_m);
+    rows.back().sigma_m = joint.scale_m;
+  }
+  RangeBlock block(rows);
   Eigen::Matrix3d information = joint.information_per_m2;
   // Three steps: the start is within centimetres.
   for (int step = 0; step < 3; ++step) {
-    information = joint.information_per_m2;
-    Eigen::Vector3d gradient = information * (before - at);
-    for (const Recent& recent : recent_) {
-      const Eigen::Vector3d from_tag = at - recent.row.tag_m;
-      const double distance_m = from_tag.norm();
-      if (distance_m < 0.05) continue;
-      const Eigen::Vector3d direction = from_tag / distance_m;
-      const double measured_m = recent.row.distance_m;
-      const double residual_m =
-          measured_m - joint.bias_m - joint.curve_m * curve_shape(measured_m) - distance_m;
-      const double variance_m2 =
-          joint.scale_m * joint.scale_m + direction.dot(recent.row.tag_covariance_m2 * direction);
-      const double outlying = residual_m * residual_m / (4.0 * variance_m2);  // Cauchy at two sigma
-      const double weight = 1.0 / ((1.0 + outlying) * variance_m2 * joint.rows_per_look);
-      information += weight * direction * direction.transpose();
-      gradient += weight * residual_m * direction;
-    }
+    Unknowns place;
+    place << at, 0.0;
+    block.scale(place, Weights::inverse_variance);
+    const RangeNormal sums = block.normal(place, Loss::cauchy, 2.0);
+    information = joint.information_per_m2 + sums.matrix.topLeftCorner<3, 3>() / joint.rows_per_look;
+    const Eigen::Vector3d gradient =
+        joint.information_per_m2 * (before - at) + sums.gradient.head<3>() / joint.rows_per_look;
     at += information.inverse() * gradient;
   }
   Estimate answer = joint.estimate;

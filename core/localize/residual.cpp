@@ -167,8 +167,8 @@ Result<AnchorFit> finish_fit(RangeBlock& block, const Unknowns& at, const Solver
     const double off = at[3] - options.bias_prior_m;
     fit.cost += 0.5 * information * off * off;
   }
-  Eigen::MatrixXd a(size, size);
-  Eigen::MatrixXd b(size, size);
+  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 4, 4>;  // no heap
+  Matrix a(size, size), b(size, size);
   for (Eigen::Index r = 0; r < size; ++r) {
     for (Eigen::Index c = 0; c < size; ++c) {
       const auto row = free[static_cast<std::size_t>(r)];
@@ -177,7 +177,7 @@ Result<AnchorFit> finish_fit(RangeBlock& block, const Unknowns& at, const Solver
       b(r, c) = noise(row, col);
     }
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(a);
+  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(a);
   // 1e-10: what planning/gdop calls singular; below, the covariance would be rounding noise.
   if (!(eigen.eigenvalues().minCoeff() > 1e-10 * eigen.eigenvalues().maxCoeff())) {
     return make_error(Errc::weak_geometry,
@@ -185,9 +185,8 @@ Result<AnchorFit> finish_fit(RangeBlock& block, const Unknowns& at, const Solver
                           std::to_string(eigen.eigenvalues().minCoeff()) + " to " +
                           std::to_string(eigen.eigenvalues().maxCoeff()));
   }
-  const Eigen::MatrixXd inverse = a.inverse();
-  const Eigen::MatrixXd covariance =
-      options.weights == Weights::as_printed ? Eigen::MatrixXd(inverse * b * inverse) : inverse;
+  const Matrix inverse = a.inverse();
+  const Matrix covariance = options.weights == Weights::as_printed ? Matrix(inverse * b * inverse) : inverse;
   for (Eigen::Index r = 0; r < size; ++r) {
     for (Eigen::Index c = 0; c < size; ++c) {
       const auto row = free[static_cast<std::size_t>(r)];
