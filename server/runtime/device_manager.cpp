@@ -540,6 +540,8 @@ std::string DeviceManager::recorder_failure() {
 
 std::string DeviceManager::not_started() { return impl_->not_started(); }
 
+std::uint64_t DeviceManager::rows_lost() { return impl_->unstored_.dropped(); }
+
 std::string DeviceManager::metrics() {
   const auto all = devices();
   if (all.empty()) return {};
@@ -575,7 +577,7 @@ std::string DeviceManager::metrics() {
   out +=
       "# HELP anchord_device_rows_lost_total Rows that the database did not take in time\n"
       "# TYPE anchord_device_rows_lost_total counter\nanchord_device_rows_lost_total " +
-      std::to_string(impl_->unstored_.dropped()) + "\n";
+      std::to_string(rows_lost()) + "\n";
   return out;
 }
 

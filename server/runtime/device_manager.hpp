@@ -48,6 +48,8 @@ class DeviceManager final : public DeviceControl {
   std::string recorder_failure() override;
   std::string not_started() override;
 
+  /// Rows that were not stored in time; the recording has their bytes.
+  std::uint64_t rows_lost();
   /// Prometheus text of all devices.
   std::string metrics();
 

@@ -1,5 +1,5 @@
 // ./dev bench: one table. Every figure of ours stands beside a peer or a limit taken in the same run.
-//   node tests/bench/bench.mjs [keep] [solve] [bound] [http] [ingest] [databases] [get] [fanout] [training] [predict] [grid] [devices] [commands] [dashboard]
+//   node tests/bench/bench.mjs [keep] [solve] [bound] [http] [ingest] [databases] [get] [fanout] [training] [predict] [grid] [devices] [commands] [dashboard] [gateway]
 import { execFileSync } from 'node:child_process';
 import { createServer } from 'node:http';
 import { existsSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
@@ -12,6 +12,7 @@ import { commands } from './commands.mjs';
 import { dashboard } from './dashboard.mjs';
 import { databases } from './databases.mjs';
 import { devices } from './devices.mjs';
+import { gateway } from './gateway.mjs';
 import { grid } from './grid.mjs';
 import { drops, keep, newestOf, ratios } from './history.mjs';
 import { http } from './http.mjs';
@@ -402,6 +403,13 @@ if (on('commands')) {
   say('commands to an aircraft beside a flood');
   await commands(row).catch((error) => {
     row('commands', `FAILED: ${error.message.split('\n')[0]}`);
+    process.exitCode = 1;
+  });
+}
+if (wanted.includes('gateway')) {
+  say('gateway over a bad link (half an hour)');
+  await gateway(row).catch((error) => {
+    row('gateway', `FAILED: ${error.message.split('\n')[0]}`);
     process.exitCode = 1;
   });
 }
