@@ -218,7 +218,7 @@ export function open_map(
     if (!moved && !news && t - last_ms < 250) return;
     if (!trail_stands(trail_mark, content)) layer.changed();
     const c = sized(overlay, cam);
-    if (c) draw_fast(c, palette, cam, content, now, trail_mark?.scene === scene ? trail_mark!.points : 0);
+    if (c) draw_fast(c, palette, cam, content, now, trail_mark?.scene === scene ? trail_mark.points : 0);
     dirty = false;
     place = here;
     drawn = scene?.version ?? -1;
