@@ -84,6 +84,13 @@ Result<void> solve_with(Work& work, const SharedPrior& prior) {
   return boost::outcome_v2::success();
 }
 
+/// Sigmas within a fortieth: the answer moves by less than that.
+bool about_same(const SharedPrior& a, const SharedPrior& b) {
+  const SharedMatrix apart = (a.information - b.information).cwiseAbs();
+  return (a.mean - b.mean).cwiseAbs().maxCoeff() < 1e-4 &&
+         (apart.array() <= 0.05 * b.information.cwiseAbs().array()).all();
+}
+
 bool same_kit(const Work& a, const Work& b) { return !a.kit.empty() && a.kit == b.kit; }
 
 /// The very same flight? By content; profiles of old tell flights apart by name alone.
@@ -294,15 +301,13 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
       priors.push_back(for_antennas(profile_prior(factors, all[i].gate, options), all[i]));
     }
     for (std::size_t i = 0; i < all.size(); ++i) {
-      // A flight alone whose gate changed nothing is solved already.
-      const bool same =
-          priors[i].mean == all[i].prior.mean && priors[i].information == all[i].prior.information;
-      if (same) continue;
+      // A flight whose gate changed next to nothing is solved already.
+      if (about_same(priors[i], all[i].prior)) continue;
       BOOST_OUTCOME_TRY(solve_with(all[i], priors[i]));
     }
   }
   if (!options.fixed_bias_m) {
-    for (Work& work : all) add_doubt(work.fit, work.prior, work.gate);
+    for (Work& work : all) add_doubt(work.fit, work.gate);
   }
   for (Work& work : all) {
     if (const std::size_t n = add_scatter_doubt(work.rows, work.prior, work.options, work.fit))

@@ -3,14 +3,20 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace anchord {
 namespace {
 
-/// What the pattern of an antenna can look like: no flight alone can tell such a bias from it, whatever its
-/// residuals claim. In a small volume flights of one kit came to biases 0.2 m apart; where a flight knows its
-/// bias better, by at most twice its sigma (1.8 seen against the other flights of the kit).
-constexpr double k_imitated_bias_m = 0.15;
+/// What the pattern of an antenna looks like in the ranges of a small volume (anchors in one room differed by
+/// -0.07 to 0.11 m); where a flight knows its bias better, as much as its own sigma. Flights round the same
+/// anchors repeat it, so it does not average out.
+constexpr double k_imitated_bias_m = 0.07;
+
+// How softly the kinds of kits part, in z and in the logarithm of sigma. Sharper, a flight more or less would
+// move the answer by more than its sigma; softer, kits that stand out by z = 3.8 are drawn to zero.
+constexpr double k_softness_z = 0.35;
+constexpr double k_softness_log = 0.25;
 
 double square(double v) { return v * v; }
 
@@ -43,20 +49,81 @@ SharedPrior across_prior(const FlightOptions& options) {
   return prior;
 }
 
-/// Two hypotheses, even odds before: the kit is calibrated, or its bias is anything of half a metre. The
-/// Bayes factor of what all factors say decides how much of the second remains.
-double doubt_m2(const BiasGate& gate, const FlightOptions& options) {
-  const double own2 = square(gate.sigma_m), seen2 = square(gate.bias_m);
-  const double calibrated2 = own2 + square(options.calibrated_bias_prior_m), other2 = own2 + square(0.5);
-  const double odds =
-      std::sqrt(calibrated2 / other2) * std::exp(0.5 * seen2 * (1 / calibrated2 - 1 / other2));
-  return odds / (1.0 + odds) * (seen2 + own2);
+double logistic(double x) { return 1.0 / (1.0 + std::exp(-x)); }
+
+/// Sigma of a Gaussian about zero: that of calibrated kits, of those that have a bias, and between them where
+/// nothing tells. Continuous in both, so that no flight more or less turns the answer over.
+double prior_sigma_m(double z, double sigma_m, const FlightOptions& options) {
+  const double biased = options.bias_gate_z > 0 ? logistic((z - options.bias_gate_z) / k_softness_z) : 1.0;
+  const double unknown = logistic(std::log(sigma_m / options.bias_known_sigma_m) / k_softness_log);
+  const double calibrated_log =
+      std::lerp(std::log(options.calibrated_bias_prior_m), std::log(options.unknown_bias_prior_m), unknown);
+  return std::exp(std::lerp(calibrated_log, std::log(options.bias_prior_m), biased));
+}
+
+/// Kits whose bias is normal about zero with this variance.
+struct KitKind {
+  double sigma2{};
+  double p{};  ///< given what was seen
+
+  /// How far the mean of this kind follows what was seen with variance s2.
+  double gain(double s2) const { return sigma2 / (s2 + sigma2); }
+};
+
+/// Biases of every size, none likelier than another before: sigmas doubled from the calibrated on.
+std::vector<KitKind> kinds_given(double seen_m, double s2, const FlightOptions& options) {
+  std::vector<KitKind> kinds;
+  for (double m = options.calibrated_bias_prior_m; m < 2 * options.bias_prior_m; m *= 2)
+    kinds.push_back({square(m)});
+  double sum = 0;
+  for (KitKind& kind : kinds) {
+    // Against the widest: no exponential overflows.
+    const double far = square(seen_m) * (1.0 / (s2 + kind.sigma2) - 1.0 / (s2 + kinds.back().sigma2));
+    kind.p = std::exp(-0.5 * far) / std::sqrt(s2 + kind.sigma2);
+    sum += kind.p;
+  }
+  for (KitKind& kind : kinds) kind.p /= sum;
+  return kinds;
+}
+
+/// What the ranges of all factors say of the bias.
+struct Seen {
+  double bias_m{}, variance_m2{};  ///< with the wide prior they were weighed with
+  double imitated_m2{};            ///< variance of what patterns imitate; flights repeat it
+};
+
+/// Mean square error of a mean that follows what was seen by `gain`, over biases of every size.
+double mean_square_m2(double seen_m, double s2, double imitated_m2, double gain,
+                      const FlightOptions& options) {
+  double sum_m2 = 0;
+  for (const KitKind& kind : kinds_given(seen_m, s2 + imitated_m2, options)) {
+    const double own = kind.gain(s2 + imitated_m2);
+    sum_m2 += kind.p * (own * (s2 + imitated_m2) + square(seen_m * (own - gain)));
+  }
+  return sum_m2;
 }
 
 struct Sum {
   Eigen::Matrix4d information{Eigen::Matrix4d::Zero()};
   Eigen::Vector4d information_mean{Eigen::Vector4d::Zero()};
 };
+
+Seen seen_by(std::span<const ProfileFactor> all, const FlightOptions& options) {
+  Sum sum;
+  sum.information = base_information(options, options.bias_prior_m);
+  double imitated = 0, told = 0;
+  for (const auto& factor : all) {
+    const Eigen::Matrix4d alone = base_information(options, options.bias_prior_m) + factor.information;
+    const double own2 = alone.inverse()(k_shared_bias, k_shared_bias);
+    imitated += std::min(square(k_imitated_bias_m) / own2, 1.0);
+    told += 1.0 / own2;
+    sum.information += factor.information;
+    sum.information_mean += factor.information_mean;
+  }
+  const Eigen::Matrix4d covariance = sum.information.inverse();
+  return {(covariance * sum.information_mean)[k_shared_bias], covariance(k_shared_bias, k_shared_bias),
+          told > 0 ? imitated / told : 0.0};
+}
 
 }  // namespace
 
@@ -95,33 +162,28 @@ SharedPrior wide_prior(const FlightOptions& options) {
 }
 
 BiasGate bias_gate(std::span<const ProfileFactor> all, const FlightOptions& options) {
-  Sum sum;
-  sum.information = base_information(options, options.bias_prior_m);
-  for (const auto& factor : all) {
-    sum.information += factor.information;
-    sum.information_mean += factor.information_mean;
-  }
-  const Eigen::Matrix4d covariance = sum.information.inverse();
-  const Eigen::Vector4d mean = covariance * sum.information_mean;
+  const Seen seen = seen_by(all, options);
   BiasGate gate;
-  gate.bias_m = mean[k_shared_bias];
-  gate.sigma_m = std::sqrt(covariance(k_shared_bias, k_shared_bias));
-  gate.z = std::abs(gate.bias_m) / gate.sigma_m;
+  gate.z = std::abs(seen.bias_m) / std::sqrt(seen.variance_m2);
   gate.calibrated = gate.z < options.bias_gate_z;
+  gate.prior_sigma_m = prior_sigma_m(gate.z, std::sqrt(seen.variance_m2), options);
+  // What the ranges say without the wide prior, and how far a mean with the other prior follows it.
+  const double s2 = 1.0 / std::max(1.0 / seen.variance_m2 - 1.0 / square(options.bias_prior_m), 1e-6);
+  const double seen_m = seen.bias_m / seen.variance_m2 * s2;
+  const double gain = square(gate.prior_sigma_m) / (s2 + square(gate.prior_sigma_m));
+  gate.bias_m = gain * seen_m;
+  const double error_m2 = mean_square_m2(seen_m, s2, seen.imitated_m2, gain, options);
+  gate.sigma_m = std::sqrt(error_m2);
+  gate.doubt_m2 = std::max(error_m2 - gain * s2, 0.0);
   gate.known = !gate.calibrated || gate.sigma_m <= options.bias_known_sigma_m;
-  gate.prior_sigma_m = !gate.calibrated ? options.bias_prior_m
-                       : gate.known     ? options.calibrated_bias_prior_m
-                                        : options.unknown_bias_prior_m;
-  if (gate.calibrated && gate.known) gate.doubt_m2 = doubt_m2(gate, options);
-  if (gate.calibrated && gate.known && all.size() == 1)
-    gate.doubt_m2 = std::max(gate.doubt_m2, square(std::min(k_imitated_bias_m, 2.0 * gate.sigma_m)));
   return gate;
 }
 
-void add_doubt(JointFit& fit, const SharedPrior& prior, const BiasGate& gate) {
+void add_doubt(JointFit& fit, const BiasGate& gate) {
   if (!(gate.doubt_m2 > 0)) return;
-  // Were the mean of the prior moved, the shared unknowns would follow by `shared`, each anchor by `own`.
-  const SharedVector shared = fit.shared_covariance * prior.information.col(k_shared_bias);
+  // Were the bias another, the shared unknowns would follow by `shared` per metre, each anchor by `own`.
+  const SharedVector shared =
+      fit.shared_covariance.col(k_shared_bias) / fit.shared_covariance(k_shared_bias, k_shared_bias);
   for (std::size_t i = 0; i < fit.anchor_covariance.size(); ++i) {
     const AnchorBlock& block = fit.normal.anchors[i];
     const Eigen::Vector4d own = -block.own_inverse * (block.shared * shared);
