@@ -82,6 +82,8 @@ double AnchorError::ratio() const {
   return claimed_m / std::max(error_m(), 1e-3);
 }
 
+double AnchorError::sigma_ratio() const { return claimed_sigma_m / std::max(error_m(), 1e-3); }
+
 FlightSet read_set(const std::string& name) {
   FlightSet set;
   set.name = name;
@@ -120,6 +122,7 @@ std::vector<AnchorError> assess(const FlightSet& set, std::size_t index, const F
       one.error_3d_m = off.norm();
       const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(c);
       one.claimed_3d_m = std::sqrt(k_three * axes.eigenvalues().maxCoeff());
+      one.claimed_sigma_m = std::sqrt(one.flat ? c.topLeftCorner<2, 2>().trace() : c.trace());
       one.inside = one.flat ? off.head<2>().dot(c.topLeftCorner<2, 2>().inverse() * off.head<2>()) < k_two
                             : off.dot(c.inverse() * off) < k_three;
     }
@@ -130,7 +133,7 @@ std::vector<AnchorError> assess(const FlightSet& set, std::size_t index, const F
 
 Summary summary(const std::vector<AnchorError>& anchors) {
   Summary sum;
-  std::vector<double> h95_m, ratios;
+  std::vector<double> h95_m, ratios, sigma_ratios;
   for (const auto& one : anchors) {
     if (!one.answered()) {
       ++sum.undetermined;
@@ -143,6 +146,10 @@ Summary summary(const std::vector<AnchorError>& anchors) {
     sum.max_m = std::max(sum.max_m, one.error_m());
     h95_m.push_back(one.solution.estimate.h95_m);
     ratios.push_back(one.ratio());
+    sigma_ratios.push_back(one.sigma_ratio());
+    const bool accepted = one.solution.estimate.acceptable();
+    sum.acceptable += accepted ? 1 : 0;
+    sum.acceptable_outside += accepted && !one.inside ? 1 : 0;
   }
   if (sum.n > 0) {
     sum.mean_h_m /= sum.n;
@@ -150,6 +157,7 @@ Summary summary(const std::vector<AnchorError>& anchors) {
   }
   sum.median_h95_m = median(h95_m);
   sum.median_ratio = median(ratios);
+  sum.median_sigma_ratio = median(sigma_ratios);
   return sum;
 }
 

@@ -24,13 +24,16 @@ struct AnchorError {
   AnchorSolution solution;
   bool flat{false};  ///< the truth has no height
   double error_h_m{}, error_3d_m{};
-  double claimed_3d_m{};  ///< largest semi-axis of the 95 % region
+  double claimed_3d_m{};     ///< largest semi-axis of the 95 % region
+  double claimed_sigma_m{};  ///< root of the trace of the covariance, in the plane where there is no height
   bool inside{false};
 
   bool answered() const { return solution.determined != Determined::none && solution.estimate.best; }
   double error_m() const { return flat ? error_h_m : error_3d_m; }
   /// Claimed 95 % over the actual error, in the plane where there is no height.
   double ratio() const;
+  /// Root of the trace over the error: 1.1 in the median of an honest Gaussian in space, 1.2 in the plane.
+  double sigma_ratio() const;
 };
 
 /// A set of ../shared/data: its flights, read once.
@@ -48,7 +51,9 @@ std::vector<AnchorError> assess(const FlightSet& set, std::size_t index, const F
 struct Summary {
   int n{0}, inside{0}, undetermined{0};
   double mean_h_m{0}, mean_m{0}, max_m{0};
-  double median_h95_m{0}, median_ratio{0};
+  double median_h95_m{0}, median_ratio{0}, median_sigma_ratio{0};
+  int acceptable{0}, acceptable_outside{0};
+  double inside_share() const { return n > 0 ? static_cast<double>(inside) / n : 0.0; }
 };
 Summary summary(const std::vector<AnchorError>& anchors);
 

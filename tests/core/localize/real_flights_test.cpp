@@ -124,6 +124,42 @@ ViralAgreement agreement(const std::vector<FlightSolution>& solutions) {
   return out;
 }
 
+/// One figure of the table of limits.
+struct Limit {
+  std::string set;
+  Variant variant;
+  const char* what;
+  double value, least, most;
+  bool asserted;  ///< false: known to miss, named in the table until it holds
+};
+
+void hold(const std::vector<Limit>& limits) {
+  std::printf("%-12s %-8s %-26s %8s %16s\n", "set", "solved", "figure", "value", "limit");
+  for (const Limit& one : limits) {
+    const bool holds = one.value >= one.least && one.value <= one.most;
+    std::printf("%-12s %-8s %-26s %8.3f %7.3f..%7.3f  %s\n", one.set.c_str(), testing::word(one.variant),
+                one.what, one.value, one.least, one.most,
+                !holds         ? "MISSED"
+                : one.asserted ? "holds"
+                               : "holds now: assert it");
+    if (one.asserted) {
+      EXPECT_TRUE(holds) << one.set << ' ' << testing::word(one.variant) << ' ' << one.what;
+    }
+  }
+}
+
+/// Wanted of every set: errors as the README of the sets has them, one sigma claimed between 0.9 and 2 of
+/// what is met, 93 % inside their regions, nothing accepted beside the truth.
+void add_limits(const Solved& solved, Variant variant, double most_error_m, bool claim_holds,
+                std::vector<Limit>& limits) {
+  const Summary s = solved.sum(variant, "all");
+  const std::string& set = solved.set.name;
+  limits.push_back({set, variant, "mean error, m", s.mean_m, 0.0, most_error_m, true});
+  limits.push_back({set, variant, "claimed over actual error", s.median_sigma_ratio, 0.9, 2.0, claim_holds});
+  limits.push_back({set, variant, "share inside", s.inside_share(), 0.93, 1.0, true});
+  limits.push_back({set, variant, "accepted, outside", 1.0 * s.acceptable_outside, 0.0, 0.0, true});
+}
+
 class RealFlights : public Test {
  protected:
   void SetUp() override {
@@ -204,6 +240,18 @@ TEST_F(RealFlights, PlainRobustSingleAndWithTheProfileOfTheOtherFlights) {
     const double limit = set == &rcv ? 7.0 : 4.0;
     EXPECT_LE(set->sum(Variant::profile, "all").median_ratio, limit) << set->set.name;
   }
+  // Regions of rcv-drone are too wide (why: above), those of inrol-mocap at the limit.
+  std::vector<Limit> limits;
+  add_limits(outdoor, Variant::single, 0.107, true, limits);
+  add_limits(outdoor, Variant::profile, 0.055, true, limits);
+  add_limits(inrol, Variant::single, 0.146, true, limits);
+  add_limits(inrol, Variant::profile, 0.115, false, limits);
+  add_limits(rcv, Variant::single, 0.300, false, limits);
+  add_limits(rcv, Variant::profile, 0.125, false, limits);
+  limits.push_back({"viral-drone", Variant::profile, "from the authors, m", v.authors_m, 0, 0.075, true});
+  limits.push_back({"viral-drone", Variant::profile, "between anchors, m", v.between_m, 0, 0.12, true});
+  limits.push_back({"viral-drone", Variant::profile, "spread over flights, m", v.spread_m, 0, 0.16, true});
+  hold(limits);
   s = summary(all);
   print("= every flight", Variant::profile, s, false, "");
   EXPECT_EQ(s.n, 48);
