@@ -43,9 +43,9 @@ void link_alarms(const Status& s, std::vector<Alarm>& out) {
   else if (link == Link::up && !s.sender.why.empty())
     out.push_back({"gateway.disk_write", s.sender.why});
   for (const auto& [mission, why] : s.sender.held)
-    out.push_back(
-        {"gateway.mission_unknown", "rows of mission " + to_string(mission) + " wait, the server answers " +
-                                        why + ": restore the mission there, or import its bundle"});
+    out.push_back({"gateway.mission_unknown", "rows of mission " + to_string(mission) +
+                                                  " wait, the server answers " + why +
+                                                  ": restore the mission there, or import its bundle"});
 }
 
 void disk_alarms(const Status& s, std::vector<Alarm>& out) {

@@ -8,5 +8,9 @@ export async function gateway(row, { offS = 600, onS = 120 } = {}) {
   row('gateway: live again at 256 kbit/s after', `${got.liveAfterS.toFixed(1)} s`, 'limit 10 s');
   row('gateway: oldest live row while the backlog goes', `${got.worstLiveAgeS.toFixed(1)} s`);
   row('gateway: share of the link that is used', `${(100 * got.used).toFixed(0)} %`, '100 %');
-  row('gateway: backlog gone after', `${got.drainedAfterS.toFixed(0)} s`, `${(got.bytes / 32_000).toFixed(0)} s of the bare link`);
+  row(
+    'gateway: backlog gone after',
+    `${got.drainedAfterS.toFixed(0)} s`,
+    `${(got.bytes / 32_000).toFixed(0)} s of the bare link`,
+  );
 }

@@ -196,7 +196,8 @@ export class GatewayProcess {
       stdio: ['ignore', 'pipe', 'pipe'],
     });
     const child = this.child;
-    for (const stream of [child.stdout, child.stderr]) stream.setEncoding('utf8').on('data', (text) => (this.log += text));
+    for (const stream of [child.stdout, child.stderr])
+      stream.setEncoding('utf8').on('data', (text) => (this.log += text));
     this.exited = new Promise((done) => child.once('exit', (code, signal) => done({ code, signal })));
     await eventually('the gateway answers', () => {
       if (child.exitCode !== null) throw new Error(`the gateway ended with ${child.exitCode}: ${this.log}`);
@@ -218,7 +219,10 @@ export class GatewayProcess {
   }
   rejected() {
     const text = readFileSync(join(this.dataDir, 'rejected.ndjson'), 'utf8');
-    return text.trim().split('\n').map((line) => JSON.parse(line));
+    return text
+      .trim()
+      .split('\n')
+      .map((line) => JSON.parse(line));
   }
   async kill(signal = 'SIGKILL') {
     this.child.kill(signal);
@@ -248,7 +252,10 @@ export async function storedNumbers(server, mission) {
   const answer = await server.fetch(`/api/v1/ranges?mission=${mission}&format=ndjson`);
   const text = await answer.text();
   if (!answer.ok) throw new Error(text);
-  return text.split('\n').filter(Boolean).map((line) => JSON.parse(line).seq);
+  return text
+    .split('\n')
+    .filter(Boolean)
+    .map((line) => JSON.parse(line).seq);
 }
 
 /** How many rows a server has of a mission, without reading them. */

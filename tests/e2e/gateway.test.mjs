@@ -2,7 +2,15 @@
 import assert from 'node:assert/strict';
 import { createServer, request } from 'node:http';
 import { test } from 'node:test';
-import { Feeder, GatewayProcess, LinkProxy, gatewayToken, recordingMission, storedCount, storedNumbers } from './gateway.mjs';
+import {
+  Feeder,
+  GatewayProcess,
+  LinkProxy,
+  gatewayToken,
+  recordingMission,
+  storedCount,
+  storedNumbers,
+} from './gateway.mjs';
 import { linkOffThenSlow } from './gateway_link.mjs';
 import { eventually, startServer } from './server.mjs';
 
@@ -62,7 +70,11 @@ test('a link that swallows everything is noticed, and live is back within 10 s',
     await sleep(3_000);
     await proxy.restore();
     const back = Date.now();
-    await eventually('live again', async () => (await gateway.status()).outbox.newest_delivered_us > back * 1000, 10_000);
+    await eventually(
+      'live again',
+      async () => (await gateway.status()).outbox.newest_delivered_us > back * 1000,
+      10_000,
+    );
     feeder.pause();
     await drained(gateway);
     await everyRowOnce(server, mission, feeder);
@@ -118,7 +130,11 @@ async function moodyServer(server) {
     incoming.pipe(onward);
   });
   await new Promise((done) => front.listen(0, '127.0.0.1', done));
-  return { mood, url: `http://127.0.0.1:${front.address().port}`, close: () => front.closeAllConnections() ?? front.close() };
+  return {
+    mood,
+    url: `http://127.0.0.1:${front.address().port}`,
+    close: () => front.closeAllConnections() ?? front.close(),
+  };
 }
 
 test('each refusal of the server has its answer: wait, say what to do, cut in pieces, write down; and every row arrives', () =>
@@ -138,21 +154,38 @@ test('each refusal of the server has its answer: wait, say what to do, cut in pi
       assert.match(refused.text, /anchord token create/);
       assert.equal((await gateway.cli()).code, 1);
       mood.answer = () => ({ status: 403, headers: {} });
-      await eventually('the role is missing', async () => /403/.test((await gateway.status()).link.reason ?? ''), 20_000);
+      await eventually(
+        'the role is missing',
+        async () => /403/.test((await gateway.status()).link.reason ?? ''),
+        20_000,
+      );
 
       for (const status of [429, 503]) {
         mood.times.length = 0;
         mood.answer = () => ({ status, headers: { 'retry-after': '3' } });
-        await eventually(`${status}`, async () => (await gateway.status()).link.reason?.startsWith(`${status}`), 45_000);
+        await eventually(
+          `${status}`,
+          async () => (await gateway.status()).link.reason?.startsWith(`${status}`),
+          45_000,
+        );
         const first = mood.times.at(-1);
         await eventually('it asks again', () => mood.times.at(-1) > first, 10_000);
         assert.ok(mood.times.at(-1) - first >= 3000, `after ${mood.times.at(-1) - first} ms, told were 3 s`);
       }
 
-      mood.answer = (incoming) => (Number(incoming.headers['content-length']) > 1500 ? { status: 413, headers: {} } : null);
+      mood.answer = (incoming) =>
+        Number(incoming.headers['content-length']) > 1500 ? { status: 413, headers: {} } : null;
       await eventually('all goes again in small pieces', async () => (await gateway.status()).outbox.rows < 30, 60_000);
-      mood.answer = () => ({ status: 200, headers: { 'content-type': 'text/html' }, body: '<html>please log in</html>' });
-      await eventually('a login page is no answer', async () => (await gateway.status()).link.state === 'refused', 20_000);
+      mood.answer = () => ({
+        status: 200,
+        headers: { 'content-type': 'text/html' },
+        body: '<html>please log in</html>',
+      });
+      await eventually(
+        'a login page is no answer',
+        async () => (await gateway.status()).link.state === 'refused',
+        20_000,
+      );
       mood.answer = null;
       await eventually('the link is up', async () => (await gateway.status()).link.state === 'up', 45_000);
       feeder.pause();
@@ -195,7 +228,11 @@ test('a full outbox keeps what it has, says so, and takes rows again when the li
       await proxy.restore();
       await eventually('room again', async () => (await fetch(`${gateway.url}/readyz`)).status === 200, 30_000);
       await drained(gateway);
-      await eventually('all have come', async () => (await storedCount(server, mission)) === feeder.sent.length, 30_000);
+      await eventually(
+        'all have come',
+        async () => (await storedCount(server, mission)) === feeder.sent.length,
+        30_000,
+      );
       await everyRowOnce(server, mission, feeder);
       assert.deepEqual(await gateway.alarms(), []);
     },

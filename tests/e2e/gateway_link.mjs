@@ -1,6 +1,14 @@
 // The proof of the gateway's link: off for a while, then slow. Used by the test (seconds) and by the bench (ten minutes).
 import assert from 'node:assert/strict';
-import { Feeder, GatewayProcess, LinkProxy, gatewayToken, recordingMission, storedCount, storedNumbers } from './gateway.mjs';
+import {
+  Feeder,
+  GatewayProcess,
+  LinkProxy,
+  gatewayToken,
+  recordingMission,
+  storedCount,
+  storedNumbers,
+} from './gateway.mjs';
 import { eventually, startServer } from './server.mjs';
 
 const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
@@ -38,10 +46,15 @@ export async function linkOffThenSlow({ rowsPerS = 300, offS, bytesPerS = 32_000
     proxy.toServer = 0;
     await proxy.restore();
     const back = performance.now();
-    await eventually('a live row', async () => {
-      const age = await newestAge(server, mission);
-      return age !== null && age < (performance.now() - back) / 1000;
-    }, 30_000, 100);
+    await eventually(
+      'a live row',
+      async () => {
+        const age = await newestAge(server, mission);
+        return age !== null && age < (performance.now() - back) / 1000;
+      },
+      30_000,
+      100,
+    );
     const liveAfterS = (performance.now() - back) / 1000;
     note(`live ${liveAfterS.toFixed(1)} s after the link came back`);
 
@@ -62,7 +75,16 @@ export async function linkOffThenSlow({ rowsPerS = 300, offS, bytesPerS = 32_000
     assert.equal(new Set(numbers).size, feeder.sent.length, 'none twice');
     assert.equal(await storedCount(server, mission), status.rows.kept);
     assert.equal(status.rows.rejected + status.rows.lost, 0);
-    return { waiting, liveAfterS, worstLiveAgeS: Math.max(...ages), used, left, drainedAfterS, rows: feeder.sent.length, bytes: proxy.toServer };
+    return {
+      waiting,
+      liveAfterS,
+      worstLiveAgeS: Math.max(...ages),
+      used,
+      left,
+      drainedAfterS,
+      rows: feeder.sent.length,
+      bytes: proxy.toServer,
+    };
   } finally {
     feeder.close();
     await gateway.dispose();
