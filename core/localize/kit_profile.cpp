@@ -73,7 +73,7 @@ struct KitKind {
 /// Biases of every size, none likelier than another before: sigmas doubled from the calibrated on.
 std::vector<KitKind> kinds_given(double seen_m, double s2, const FlightOptions& options) {
   std::vector<KitKind> kinds;
-  for (double m = options.calibrated_bias_prior_m; m < 2 * options.bias_prior_m; m *= 2)
+  for (double m = options.calibrated_bias_prior_m; m < options.bias_prior_m; m *= 2)
     kinds.push_back({square(m)});
   double sum = 0;
   for (KitKind& kind : kinds) {

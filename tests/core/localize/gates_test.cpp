@@ -184,7 +184,7 @@ TEST(Gates, HoldBackAHeightThatNoFlightSaw) {
   MadeFlight made;
   made.height_swing_m = 0.7;  // the third anchor is at the height of the flight: how high it is hardly shows
   made.anchors = {{12, 2, 5.5}, {-10, 8, 5.6}, {3, -14, 6.3}};
-  made.noise_m = 0.8;
+  made.noise_m = 0.5;
   const auto s = solve_flight(make_flight(made));
   ASSERT_TRUE(s);
   const auto sigma_share = [](const AnchorSolution& anchor, int axis) {
