@@ -1,5 +1,5 @@
 // ./dev bench: one table. Every figure of ours stands beside a peer or a limit taken in the same run.
-//   node tests/bench/bench.mjs [keep] [solve] [bound] [http] [ingest] [databases] [get] [fanout] [training] [predict] [grid] [devices] [commands] [dashboard] [gateway]
+//   node tests/bench/bench.mjs [keep] [PART...]: see README.md
 import { execFileSync } from 'node:child_process';
 import { createServer } from 'node:http';
 import { existsSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
